@@ -1,0 +1,83 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "arena.h"
+#include <stdint.h>
+#include <string.h>
+
+#define BLOCK_MIN ((size_t)64 << 10)
+
+struct imp__arena_block {
+    struct imp__arena_block *next;
+    size_t size;
+    _Alignas(64) unsigned char bytes[];
+};
+
+void imp__arena_init(struct imp_arena *a, imp_context *ctx)
+{
+    *a = (struct imp_arena){.ctx = ctx};
+}
+
+void imp__arena_free(struct imp_arena *a)
+{
+    for (struct imp__arena_block *b = a->first, *next; b; b = next) {
+        next = b->next;
+        imp__release(a->ctx, b);
+    }
+    imp__arena_init(a, a->ctx);
+}
+
+static bool block_next(struct imp_arena *a, size_t bytes)
+{
+    struct imp__arena_block *next = a->current ? a->current->next : a->first;
+    while (next && next->size < bytes) next = next->next; /* kept blocks may be smaller */
+    if (!next) {
+        const size_t size = imp_max(bytes, imp_max(BLOCK_MIN, a->total / 2));
+        next = imp__alloc(a->ctx, 1, sizeof *next + size);
+        if (!next) return false;
+        next->size = size;
+        a->total += size;
+        struct imp__arena_block **tail = &a->first;
+        while (*tail) tail = &(*tail)->next;
+        *tail = next;
+    }
+    a->current = next;
+    a->used = 0;
+    return true;
+}
+
+void *imp__arena_take(struct imp_arena *a, size_t n, size_t size)
+{
+    size_t bytes;
+    if (__builtin_mul_overflow(n, size, &bytes) || bytes > SIZE_MAX / 4) return NULL;
+    bytes = (bytes + 31) & ~(size_t)31;
+    if (!a->current || a->used + bytes > a->current->size)
+        if (!block_next(a, bytes)) return NULL;
+    void *p = a->current->bytes + a->used;
+    a->used += bytes;
+    return p;
+}
+
+void *imp__arena_array(struct imp_arena *a, size_t n, size_t size)
+{
+    void *p = imp__arena_take(a, n, size);
+    if (p) memset(p, 0, n * size);
+    return p;
+}
+
+char *imp__arena_strdup(struct imp_arena *a, const char *text)
+{
+    const size_t n = strlen(text) + 1;
+    char *copy = imp__arena_take(a, n, 1);
+    if (copy) memcpy(copy, text, n);
+    return copy;
+}
+
+struct imp_arena_mark imp__arena_mark(const struct imp_arena *a)
+{
+    return (struct imp_arena_mark){a->current, a->used};
+}
+
+void imp__arena_rewind(struct imp_arena *a, struct imp_arena_mark mark)
+{
+    a->current = mark.block;
+    a->used = mark.used;
+}

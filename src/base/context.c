@@ -1,0 +1,191 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Context, errors and memory. Error texts are kept per thread through a pthread key of the
+ * context, so the library has no global state. */
+#include "context.h"
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+#include "pool.h"
+
+#define ERROR_LENGTH 2048
+
+struct imp__error_text {
+    struct imp__error_text *next;
+    char text[ERROR_LENGTH];
+};
+
+static void *default_allocate(size_t bytes, void *payload)
+{
+    (void)payload;
+    void *p = NULL;
+    return posix_memalign(&p, 64, bytes) == 0 ? p : NULL;
+}
+static void default_release(void *memory, void *payload)
+{
+    (void)payload;
+    free(memory);
+}
+
+const char *imp_status_text(enum imp_status status)
+{
+#define STATUS_CASE(name, value, text)                                                     \
+    case name: return text;
+    switch (status) { IMP_STATUS_LIST(STATUS_CASE) }
+#undef STATUS_CASE
+    return "unknown status";
+}
+
+const char *imp_version(void) { return IMP_VERSION_STRING; }
+
+enum imp_status imp_context_create(const struct imp_context_options *options, imp_context **out)
+{
+    const struct imp_context_options none = IMP_CONTEXT_OPTIONS_INIT;
+    const struct imp_context_options *o = options ? options : &none;
+    if (!out || o->threads < 0 || o->threads > 4096) return IMP_E_ARG;
+    if (!o->allocator.allocate != !o->allocator.release) return IMP_E_ARG;
+
+    struct imp_allocator a = o->allocator;
+    if (!a.allocate) a = (struct imp_allocator){default_allocate, default_release, NULL};
+    imp_context *ctx = a.allocate(sizeof *ctx, a.payload);
+    if (!ctx) return IMP_E_NOMEM;
+    memset(ctx, 0, sizeof *ctx);
+    ctx->allocator = a;
+    ctx->log = o->log;
+    ctx->log_payload = o->log_payload;
+    ctx->threads = o->threads ? o->threads : (int)sysconf(_SC_NPROCESSORS_ONLN);
+    if (ctx->threads < 1) ctx->threads = 1;
+    if (pthread_key_create(&ctx->error_key, NULL) != 0) {
+        a.release(ctx, a.payload);
+        return IMP_E_NOMEM;
+    }
+    pthread_mutex_init(&ctx->lock, NULL);
+    *out = ctx;
+    return IMP_OK;
+}
+
+void imp_context_destroy(imp_context *ctx)
+{
+    if (!ctx) return;
+    if (ctx->device) ctx->device_release(ctx->device);
+    imp__pool_destroy(ctx, ctx->pool);
+    for (struct imp__error_text *e = ctx->errors, *next; e; e = next) {
+        next = e->next;
+        imp__release(ctx, e);
+    }
+    pthread_key_delete(ctx->error_key);
+    pthread_mutex_destroy(&ctx->lock);
+    ctx->allocator.release(ctx, ctx->allocator.payload);
+}
+
+int imp_context_threads(const imp_context *ctx) { return ctx ? ctx->threads : 0; }
+
+const char *imp_last_error(const imp_context *ctx)
+{
+    if (!ctx) return "";
+    const struct imp__error_text *e = pthread_getspecific(ctx->error_key);
+    return e ? e->text : "";
+}
+
+static struct imp__error_text *error_text(imp_context *ctx)
+{
+    struct imp__error_text *e = pthread_getspecific(ctx->error_key);
+    if (e) return e;
+    e = imp__alloc(ctx, 1, sizeof *e);
+    if (!e) return NULL;
+    if (pthread_setspecific(ctx->error_key, e) != 0) {
+        imp__release(ctx, e);
+        return NULL;
+    }
+    pthread_mutex_lock(&ctx->lock);
+    e->next = ctx->errors;
+    ctx->errors = e;
+    pthread_mutex_unlock(&ctx->lock);
+    return e;
+}
+
+enum imp_status imp__error(imp_context *ctx, enum imp_status status, const char *format, ...)
+{
+    struct imp__error_text *e = error_text(ctx);
+    if (!e) return status;
+    va_list args;
+    va_start(args, format);
+    char text[ERROR_LENGTH]; /* the arguments may point into the old message */
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    memcpy(e->text, text, sizeof text);
+    return status;
+}
+
+enum imp_status imp__error_prefix(imp_context *ctx, enum imp_status status,
+                                  const char *format, ...)
+{
+    struct imp__error_text *e = error_text(ctx);
+    if (!e) return status;
+    char text[ERROR_LENGTH];
+    va_list args;
+    va_start(args, format);
+    int n = vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    const size_t used = n < 0 ? 0 : imp_min((size_t)n, sizeof text - 3);
+    memcpy(text + used, ": ", 2);
+    const size_t kept = imp_min(strlen(e->text), sizeof text - used - 3);
+    memcpy(text + used + 2, e->text, kept);
+    text[used + 2 + kept] = 0;
+    memcpy(e->text, text, sizeof text);
+    return status;
+}
+
+void imp__warn(imp_context *ctx, const char *format, ...)
+{
+    if (!ctx->log) return;
+    char text[ERROR_LENGTH];
+    va_list args;
+    va_start(args, format);
+    vsnprintf(text, sizeof text, format, args);
+    va_end(args);
+    ctx->log(IMP_LOG_WARNING, text, ctx->log_payload);
+}
+
+void *imp__alloc(imp_context *ctx, size_t n, size_t size)
+{
+    size_t bytes;
+    if (__builtin_mul_overflow(n, size, &bytes) || bytes > SIZE_MAX / 4) return NULL;
+    bytes = bytes ? bytes : 1;
+    void *p = ctx->allocator.allocate(bytes, ctx->allocator.payload);
+    if (p) memset(p, 0, bytes);
+    return p;
+}
+
+void imp__release(imp_context *ctx, void *memory)
+{
+    if (memory) ctx->allocator.release(memory, ctx->allocator.payload);
+}
+
+void imp_free(imp_context *ctx, void *memory) { imp__release(ctx, memory); }
+
+void *imp__grow(imp_context *ctx, void *array, size_t *capacity, size_t n, size_t size)
+{
+    if (n <= *capacity && array) return array;
+    size_t wanted = *capacity ? *capacity : 16;
+    while (wanted < n) {
+        if (wanted > SIZE_MAX / 2) return NULL;
+        wanted *= 2;
+    }
+    void *p = imp__alloc(ctx, wanted, size);
+    if (!p) return NULL;
+    if (array) memcpy(p, array, *capacity * size);
+    imp__release(ctx, array);
+    *capacity = wanted;
+    return p;
+}
+
+char *imp__strdup(imp_context *ctx, const char *text)
+{
+    const size_t n = strlen(text) + 1;
+    char *copy = imp__alloc(ctx, n, 1);
+    if (copy) memcpy(copy, text, n);
+    return copy;
+}

@@ -1,0 +1,269 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "props.h"
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+static const char *const type_names[] = {
+    [IMP_PROP_BOOL] = "boolean", [IMP_PROP_INTEGER] = "integer", [IMP_PROP_FLOAT] = "float",
+    [IMP_PROP_STRING] = "string", [IMP_PROP_VECTOR] = "vector", [IMP_PROP_RGB] = "rgb",
+    [IMP_PROP_UNIFORM] = "spectrum", [IMP_PROP_SPECTRUM] = "spectrum",
+    [IMP_PROP_TRANSFORM] = "transform", [IMP_PROP_REF] = "ref"};
+
+struct imp_node *imp__node_create(struct imp_arena *a, const char *tag, const char *type,
+                                  const char *id, const char *name, struct imp_loc loc)
+{
+    struct imp_node *n = imp__arena_array(a, 1, sizeof *n);
+    if (!n) return NULL;
+    n->tag = imp__arena_strdup(a, tag);
+    n->type = imp__arena_strdup(a, type ? type : "");
+    n->id = id ? imp__arena_strdup(a, id) : NULL;
+    n->name = name ? imp__arena_strdup(a, name) : NULL;
+    n->loc = loc;
+    return n->tag && n->type && !n->id == !id && !n->name == !name ? n : NULL;
+}
+
+/* Arrays grow inside the arena; the old ones stay until it is freed (sizes double). */
+static void *array_grow(struct imp_arena *a, void *old, size_t n, size_t *cap, size_t size)
+{
+    if (n < *cap) return old;
+    const size_t wanted = *cap ? 2 * *cap : 4;
+    void *p = imp__arena_array(a, wanted, size);
+    if (!p) return NULL;
+    if (n) memcpy(p, old, n * size);
+    *cap = wanted;
+    return p;
+}
+
+struct imp_prop *imp__node_add(struct imp_arena *a, struct imp_node *node, const char *name,
+                               enum imp_prop_type type, struct imp_loc loc)
+{
+    struct imp_prop *p = array_grow(a, node->props, node->n_props, &node->cap_props, sizeof *p);
+    if (!p) return NULL;
+    node->props = p;
+    char *copy = imp__arena_strdup(a, name);
+    if (!copy) return NULL;
+    p += node->n_props++;
+    *p = (struct imp_prop){.name = copy, .type = type, .loc = loc};
+    return p;
+}
+
+struct imp_child *imp__node_add_child(struct imp_arena *a, struct imp_node *parent,
+                                      struct imp_node *child, const char *name,
+                                      struct imp_loc loc)
+{
+    struct imp_child *c =
+        array_grow(a, parent->children, parent->n_children, &parent->cap_children, sizeof *c);
+    if (!c) return NULL;
+    parent->children = c;
+    char *copy = name ? imp__arena_strdup(a, name) : NULL;
+    if (name && !copy) return NULL;
+    c += parent->n_children++;
+    *c = (struct imp_child){.name = copy, .node = child, .loc = loc};
+    return c;
+}
+
+struct imp_prop *imp__node_prop(const struct imp_node *node, const char *name)
+{
+    for (size_t i = 0; i < node->n_props; i++)
+        if (strcmp(node->props[i].name, name) == 0) return &node->props[i];
+    return NULL;
+}
+
+struct imp_child *imp__node_child(const struct imp_node *node, const char *name)
+{
+    for (size_t i = 0; i < node->n_children; i++) {
+        struct imp_child *c = &node->children[i];
+        if (c->name && strcmp(c->name, name) == 0) return c;
+    }
+    return NULL;
+}
+
+const char *imp__loc_text(struct imp_loc loc, char *buffer, size_t size)
+{
+    if (loc.file)
+        snprintf(buffer, size, "%s:%d:%d", loc.file, loc.line, loc.column);
+    else
+        snprintf(buffer, size, "scene");
+    return buffer;
+}
+
+static enum imp_status error_at(imp_context *ctx, const struct imp_node *node,
+                                struct imp_loc loc, enum imp_status status,
+                                const char *format, va_list args)
+{
+    char where[512], text[1024];
+    vsnprintf(text, sizeof text, format, args);
+    imp__loc_text(loc, where, sizeof where);
+    const char *id = node->id ? node->id : "";
+    return imp__error(ctx, status, "%s: %s%s%s%s%s%s%s: %s", where, node->tag,
+                      *id ? " '" : "", id, *id ? "'" : "", *node->type ? " (" : "",
+                      node->type, *node->type ? ")" : "", text);
+}
+
+enum imp_status imp__node_error(imp_context *ctx, const struct imp_node *node,
+                                enum imp_status status, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    error_at(ctx, node, node->loc, status, format, args);
+    va_end(args);
+    return status;
+}
+
+enum imp_status imp__prop_error(imp_context *ctx, const struct imp_node *node,
+                                const struct imp_prop *prop, enum imp_status status,
+                                const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    error_at(ctx, node, prop ? prop->loc : node->loc, status, format, args);
+    va_end(args);
+    return status;
+}
+
+/* The property, marked as used, if it is there and of this type; an integer passes for a
+ * float. A child in this slot is a type error too. */
+static enum imp_status find(imp_context *ctx, struct imp_node *node, const char *name,
+                            enum imp_prop_type type, struct imp_prop **out)
+{
+    struct imp_prop *p = imp__node_prop(node, name);
+    *out = NULL;
+    if (!p) {
+        const struct imp_child *c = imp__node_child(node, name);
+        if (!c) return IMP_OK;
+        return imp__node_error(ctx, node, IMP_E_SCENE, "property '%s' must be a %s, not an object",
+                               name, type_names[type]);
+    }
+    p->used = true;
+    if (p->type != type && !(type == IMP_PROP_FLOAT && p->type == IMP_PROP_INTEGER))
+        return imp__prop_error(ctx, node, p, IMP_E_SCENE,
+                               "property '%s' must be a %s, not a %s", name, type_names[type],
+                               type_names[p->type]);
+    *out = p;
+    return IMP_OK;
+}
+
+enum imp_status imp__props_bool(imp_context *ctx, struct imp_node *node, const char *name,
+                                bool fallback, bool *out)
+{
+    struct imp_prop *p;
+    const enum imp_status st = find(ctx, node, name, IMP_PROP_BOOL, &p);
+    if (st == IMP_OK) *out = p ? p->integer != 0 : fallback;
+    return st;
+}
+
+enum imp_status imp__props_int(imp_context *ctx, struct imp_node *node, const char *name,
+                               int64_t fallback, int64_t lo, int64_t hi, int64_t *out)
+{
+    struct imp_prop *p;
+    const enum imp_status st = find(ctx, node, name, IMP_PROP_INTEGER, &p);
+    if (st != IMP_OK) return st;
+    const int64_t v = p ? p->integer : fallback;
+    if (v < lo || v > hi)
+        return imp__prop_error(ctx, node, p, IMP_E_SCENE, "%s = %lld is outside [%lld, %lld]",
+                               name, (long long)v, (long long)lo, (long long)hi);
+    *out = v;
+    return IMP_OK;
+}
+
+enum imp_status imp__props_float(imp_context *ctx, struct imp_node *node, const char *name,
+                                 double fallback, double *out)
+{
+    struct imp_prop *p;
+    const enum imp_status st = find(ctx, node, name, IMP_PROP_FLOAT, &p);
+    if (st != IMP_OK) return st;
+    const double v = !p ? fallback
+                     : p->type == IMP_PROP_INTEGER ? (double)p->integer : p->number[0];
+    if (!isfinite(v))
+        return imp__prop_error(ctx, node, p, IMP_E_SCENE, "%s = %g is not finite", name, v);
+    *out = v;
+    return IMP_OK;
+}
+
+enum imp_status imp__props_string(imp_context *ctx, struct imp_node *node, const char *name,
+                                  const char *fallback, const char **out)
+{
+    struct imp_prop *p;
+    const enum imp_status st = find(ctx, node, name, IMP_PROP_STRING, &p);
+    if (st == IMP_OK) *out = p ? p->string : fallback;
+    return st;
+}
+
+enum imp_status imp__props_vector(imp_context *ctx, struct imp_node *node, const char *name,
+                                  const double fallback[3], double out[3])
+{
+    struct imp_prop *p;
+    const enum imp_status st = find(ctx, node, name, IMP_PROP_VECTOR, &p);
+    if (st != IMP_OK) return st;
+    for (int i = 0; i < 3; i++) {
+        const double v = p ? p->number[i] : fallback[i];
+        if (!isfinite(v))
+            return imp__prop_error(ctx, node, p, IMP_E_SCENE, "%s is not finite", name);
+        out[i] = v;
+    }
+    return IMP_OK;
+}
+
+enum imp_status imp__props_transform(imp_context *ctx, struct imp_node *node,
+                                     const char *name, double out[16])
+{
+    struct imp_prop *p;
+    const enum imp_status st = find(ctx, node, name, IMP_PROP_TRANSFORM, &p);
+    if (st != IMP_OK) return st;
+    for (int i = 0; i < 16; i++) out[i] = p ? p->number[i] : i % 5 == 0;
+    return IMP_OK;
+}
+
+bool imp__props_has(const struct imp_node *node, const char *name)
+{
+    return imp__node_prop(node, name) || imp__node_child(node, name);
+}
+
+enum imp_status imp__props_choice(imp_context *ctx, struct imp_node *node, const char *name,
+                                  const char *const *words, int n, int fallback, int *out)
+{
+    struct imp_prop *p;
+    const enum imp_status st = find(ctx, node, name, IMP_PROP_STRING, &p);
+    if (st != IMP_OK) return st;
+    if (!p) {
+        *out = fallback;
+        return IMP_OK;
+    }
+    char list[256] = "";
+    for (int i = 0; i < n; i++) {
+        if (strcmp(words[i], p->string) == 0) {
+            *out = i;
+            return IMP_OK;
+        }
+        const size_t used = strlen(list);
+        snprintf(list + used, sizeof list - used, "%s%s", i ? ", " : "", words[i]);
+    }
+    return imp__prop_error(ctx, node, p, IMP_E_SCENE, "%s = '%s': must be one of %s", name,
+                           p->string, list);
+}
+
+enum imp_status imp__props_finish(imp_context *ctx, const struct imp_node *node)
+{
+    char list[768] = "", where[256];
+    const struct imp_prop *first = NULL;
+    for (size_t i = 0; i < node->n_props; i++) {
+        const struct imp_prop *p = &node->props[i];
+        if (p->used) continue;
+        const size_t n = strlen(list);
+        snprintf(list + n, sizeof list - n, "%s'%s' (%s)", n ? ", " : "", p->name,
+                 imp__loc_text(p->loc, where, sizeof where));
+        if (!first) first = p;
+    }
+    for (size_t i = 0; i < node->n_children; i++) {
+        const struct imp_child *c = &node->children[i];
+        if (c->used) continue;
+        const size_t n = strlen(list);
+        snprintf(list + n, sizeof list - n, "%s%s '%s' (%s)", n ? ", " : "",
+                 c->node ? c->node->tag : "ref", c->name ? c->name : "",
+                 imp__loc_text(c->loc, where, sizeof where));
+    }
+    if (!*list) return IMP_OK;
+    return imp__prop_error(ctx, node, first, IMP_E_SCENE, "not a property of this plugin: %s",
+                           list);
+}

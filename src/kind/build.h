@@ -1,0 +1,46 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What a kind's build function gets, and the concepts' tables. Inputs (imp_input_desc) are
+ * read by the engine before build is called; build reads the remaining properties with
+ * imp__props_* of base/props.h. Unread properties are an error afterwards. */
+#ifndef IMP_KIND_BUILD_H
+#define IMP_KIND_BUILD_H
+
+#include <importon/kinds.h>
+#include "base/props.h"
+
+struct imp_build {
+    imp_context *ctx;
+    struct imp_node *node;
+    struct imp_arena *arena;      /* lives as long as the scene */
+    enum imp_color_mode mode;
+    /* Register the bulk data of a texture as a parameter: `data` [count] in place, shape
+     * `dims`. Sets *param. */
+    enum imp_status (*add_bulk)(const struct imp_build *b, const char *key, float *data,
+                                int n_dims, const size_t dims[3], unsigned flags, double lo,
+                                double hi, int *param);
+    void *scene;
+};
+
+/* Tables; each ends with NULL. */
+extern const struct imp_bsdf_ops *const imp__bsdf_kinds[];
+extern const struct imp_texture_ops *const imp__texture_kinds[];
+extern const struct imp_shape_ops *const imp__shape_kinds[];
+extern const struct imp_emitter_ops *const imp__emitter_kinds[];
+extern const struct imp_sensor_ops *const imp__sensor_kinds[];
+extern const struct imp_filter_ops *const imp__filter_kinds[];
+
+/* Inputs at a point (src/kind/texture/input.c). in [n]. */
+void imp__inputs_eval(const struct imp_input *const *input, int n,
+                      const struct imp_texcoord *at, imp_spec *in);
+/* Transpose: in_bar [n] goes to the parameters behind the inputs. */
+void imp__inputs_scatter(const struct imp_input *const *input, int n,
+                         const struct imp_texcoord *at, const imp_spec *in_bar,
+                         struct imp_sink *sink);
+/* Derivative in a direction: in_dot [n]. */
+void imp__inputs_tangent(const struct imp_input *const *input, int n,
+                         const struct imp_texcoord *at,
+                         double (*dot)(const void *x_dot, int param, size_t element),
+                         const void *x_dot, imp_spec *in_dot);
+
+#endif
