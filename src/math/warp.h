@@ -1,0 +1,89 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * From the unit square to directions and points: each warp with its density and inverse. */
+#ifndef IMP_MATH_WARP_H
+#define IMP_MATH_WARP_H
+
+#include "vec.h"
+
+/* Uniform unit disk, concentric map (Shirley and Chiu 1997). Density 1/pi. */
+static inline void imp__concentric_disk(const double u[2], double xy[2])
+{
+    const double a = 2 * u[0] - 1, b = 2 * u[1] - 1;
+    if (a == 0 && b == 0) {
+        xy[0] = xy[1] = 0;
+        return;
+    }
+    double r, phi;
+    if (fabs(a) > fabs(b)) {
+        r = a;
+        phi = IMP_PI / 4 * (b / a);
+    } else {
+        r = b;
+        phi = IMP_PI / 2 - IMP_PI / 4 * (a / b);
+    }
+    xy[0] = r * cos(phi);
+    xy[1] = r * sin(phi);
+}
+static inline void imp__concentric_disk_inverse(const double xy[2], double u[2])
+{
+    const double r = hypot(xy[0], xy[1]);
+    double phi = atan2(xy[1], xy[0]);
+    if (phi < -IMP_PI / 4) phi += IMP_2PI;
+    double a, b;
+    if (phi < IMP_PI / 4) { a = r; b = phi * a / (IMP_PI / 4); }
+    else if (phi < 3 * IMP_PI / 4) { b = r; a = (IMP_PI / 2 - phi) * b / (IMP_PI / 4); }
+    else if (phi < 5 * IMP_PI / 4) { a = -r; b = (phi - IMP_PI) * a / (IMP_PI / 4); }
+    else { b = -r; a = -(phi - 3 * IMP_PI / 2) * b / (IMP_PI / 4); }
+    u[0] = (a + 1) / 2;
+    u[1] = (b + 1) / 2;
+}
+
+/* Cosine-weighted hemisphere about +z (Malley). Density cos/pi. */
+static inline imp_v3 imp__cosine_hemisphere(const double u[2])
+{
+    double d[2];
+    imp__concentric_disk(u, d);
+    return imp__v3(d[0], d[1], sqrt(fmax(0, 1 - d[0] * d[0] - d[1] * d[1])));
+}
+static inline double imp__cosine_hemisphere_pdf(imp_v3 w) { return w[2] > 0 ? w[2] * IMP_INV_PI : 0; }
+static inline void imp__cosine_hemisphere_inverse(imp_v3 w, double u[2])
+{
+    const double d[2] = {w[0], w[1]};
+    imp__concentric_disk_inverse(d, u);
+}
+
+/* Uniform sphere. Density 1/(4 pi). */
+static inline imp_v3 imp__uniform_sphere(const double u[2])
+{
+    const double z = 1 - 2 * u[0], r = sqrt(fmax(0, 1 - z * z)), phi = IMP_2PI * u[1];
+    return imp__v3(r * cos(phi), r * sin(phi), z);
+}
+static inline void imp__uniform_sphere_inverse(imp_v3 w, double u[2])
+{
+    const double phi = atan2(w[1], w[0]) / IMP_2PI;
+    u[0] = (1 - w[2]) / 2;
+    u[1] = phi < 0 ? phi + 1 : phi;
+}
+
+/* Uniform in the cone cos >= cos_max about +z. Density 1/(2 pi (1 - cos_max)). */
+static inline imp_v3 imp__uniform_cone(const double u[2], double cos_max)
+{
+    const double z = 1 - u[0] * (1 - cos_max), r = sqrt(fmax(0, 1 - z * z));
+    const double phi = IMP_2PI * u[1];
+    return imp__v3(r * cos(phi), r * sin(phi), z);
+}
+static inline double imp__uniform_cone_pdf(double cos_max)
+{
+    return 1 / (IMP_2PI * (1 - cos_max));
+}
+
+/* Uniform triangle: barycentric weights of the second and third vertex. Density 1/area. */
+static inline void imp__uniform_triangle(const double u[2], double b[2])
+{
+    const double t = sqrt(fmax(0, 1 - u[0]));
+    b[0] = 1 - t;
+    b[1] = t * u[1];
+}
+
+#endif
