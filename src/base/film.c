@@ -1,0 +1,137 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "film.h"
+#include <string.h>
+
+/* "R,G,B" -> names; blanks around names do not count, empty and repeated names are errors. */
+static enum imp_status names_split(imp_film *f, const char *list)
+{
+    size_t n = 1;
+    for (const char *c = list; *c; c++) n += *c == ',';
+    if (n > IMP_FILM_CHANNELS_MAX)
+        return imp__error(f->ctx, IMP_E_ARG, "film: %zu channels, at most %d", n,
+                          IMP_FILM_CHANNELS_MAX);
+    f->names = imp__alloc(f->ctx, n, sizeof *f->names);
+    if (!f->names) return imp__error(f->ctx, IMP_E_NOMEM, "film: out of memory");
+    for (const char *c = list;; c++) {
+        c += strspn(c, " ");
+        const size_t length = strcspn(c, ",");
+        size_t used = length;
+        while (used && c[used - 1] == ' ') used--;
+        if (!used || used > 200)
+            return imp__error(f->ctx, IMP_E_ARG, "film: bad channel name in '%.200s'", list);
+        char *name = imp__alloc(f->ctx, used + 1, 1);
+        if (!name) return imp__error(f->ctx, IMP_E_NOMEM, "film: out of memory");
+        memcpy(name, c, used);
+        if (imp__film_find(f, name) >= 0) {
+            imp__release(f->ctx, name);
+            return imp__error(f->ctx, IMP_E_ARG, "film: channel name twice in '%.200s'", list);
+        }
+        f->names[f->channels++] = name;
+        c += length;
+        if (!*c) return IMP_OK;
+    }
+}
+
+enum imp_status imp__film_create(imp_context *ctx, int width, int height, const char *names,
+                                 bool with_se, imp_film **out)
+{
+    enum imp_status st = IMP_OK;
+    imp_film *f = imp__alloc(ctx, 1, sizeof *f);
+    if (!f) return imp__error(ctx, IMP_E_NOMEM, "film: out of memory");
+    f->ctx = ctx;
+    if (width < 1 || height < 1 || width > IMP_FILM_SIDE_MAX || height > IMP_FILM_SIDE_MAX)
+        IMP_TRY(imp__error(ctx, IMP_E_ARG, "film: size %d x %d is not between 1 and %d", width,
+                           height, IMP_FILM_SIDE_MAX));
+    IMP_TRY(names_split(f, names));
+    f->width = width;
+    f->height = height;
+    const size_t n = imp__film_values(f);
+    if (n > IMP_FILM_VALUES_MAX)
+        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "film: %d x %d with %d channels is too large",
+                           width, height, f->channels));
+    f->mean = imp__alloc(ctx, n, sizeof *f->mean);
+    f->se = with_se ? imp__alloc(ctx, n, sizeof *f->se) : NULL;
+    if (!f->mean || (with_se && !f->se))
+        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "film: no memory for %d x %d with %d channels",
+                           width, height, f->channels));
+    *out = f;
+    return IMP_OK;
+out:
+    imp_film_destroy(f);
+    return st;
+}
+
+int imp__film_find(const imp_film *f, const char *name)
+{
+    for (int c = 0; c < f->channels; c++)
+        if (strcmp(f->names[c], name) == 0) return c;
+    return -1;
+}
+
+enum imp_status imp_film_create(imp_context *ctx, int width, int height, const char *names,
+                                imp_film **out)
+{
+    if (!ctx || !out) return IMP_E_ARG;
+    if (!names) return imp__error(ctx, IMP_E_ARG, "film: no channel names");
+    return imp__film_create(ctx, width, height, names, false, out);
+}
+
+void imp_film_destroy(imp_film *f)
+{
+    if (!f) return;
+    imp_context *ctx = f->ctx;
+    for (int c = 0; c < f->channels; c++) imp__release(ctx, f->names[c]);
+    for (size_t i = 0; i < f->n_texts; i++) {
+        imp__release(ctx, f->texts[i].key);
+        imp__release(ctx, f->texts[i].value);
+    }
+    imp__release(ctx, f->texts);
+    imp__release(ctx, f->names);
+    imp__release(ctx, f->mean);
+    imp__release(ctx, f->se);
+    imp__release(ctx, f);
+}
+
+void imp_film_get_info(const imp_film *f, struct imp_film_info *info)
+{
+    if (!f || !info) return;
+    const struct imp_film_info all = {sizeof all, f->width, f->height, f->channels,
+                                      f->spp, f->se != NULL, f->dropped};
+    const size_t size = info->size && info->size < sizeof all ? info->size : sizeof all;
+    memcpy(info, &all, size);
+    info->size = size;
+}
+
+const char *imp_film_channel(const imp_film *f, int channel)
+{
+    return f && channel >= 0 && channel < f->channels ? f->names[channel] : NULL;
+}
+
+float *imp_film_mean(imp_film *f) { return f ? f->mean : NULL; }
+float *imp_film_se(imp_film *f) { return f ? f->se : NULL; }
+
+enum imp_status imp_film_set_text(imp_film *f, const char *key, const char *value)
+{
+    if (!f) return IMP_E_ARG;
+    imp_context *ctx = f->ctx;
+    if (!key || !*key || !value || strlen(key) > 200)
+        return imp__error(ctx, IMP_E_ARG, "film: a text needs a key (1 to 200 bytes) and a value");
+    char *copy = imp__strdup(ctx, value);
+    if (!copy) return imp__error(ctx, IMP_E_NOMEM, "film: out of memory");
+    for (size_t i = 0; i < f->n_texts; i++)
+        if (strcmp(f->texts[i].key, key) == 0) {
+            imp__release(ctx, f->texts[i].value);
+            f->texts[i].value = copy;
+            return IMP_OK;
+        }
+    struct imp_film_text *texts =
+        imp__grow(ctx, f->texts, &f->cap_texts, f->n_texts + 1, sizeof *texts);
+    if (texts) f->texts = texts;
+    char *key_copy = texts ? imp__strdup(ctx, key) : NULL;
+    if (!key_copy) {
+        imp__release(ctx, copy);
+        return imp__error(ctx, IMP_E_NOMEM, "film: out of memory");
+    }
+    f->texts[f->n_texts++] = (struct imp_film_text){key_copy, copy};
+    return IMP_OK;
+}

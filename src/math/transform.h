@@ -1,0 +1,90 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * 4x4 matrices, row-major, column vectors: p' = M p (scene-format 1.4). Points divide by w
+ * only in imp__project_point; the matrices of shapes and sensors are affine. */
+#ifndef IMP_MATH_TRANSFORM_H
+#define IMP_MATH_TRANSFORM_H
+
+#include <string.h>
+#include "vec.h"
+
+struct imp_mat4 { double m[16]; };
+
+static inline struct imp_mat4 imp__mat4_identity(void)
+{
+    return (struct imp_mat4){{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}};
+}
+static inline struct imp_mat4 imp__mat4_from(const double m[16])
+{
+    struct imp_mat4 a;
+    memcpy(a.m, m, sizeof a.m);
+    return a;
+}
+static inline struct imp_mat4 imp__mat4_multiply(const struct imp_mat4 *a,
+                                                 const struct imp_mat4 *b)
+{
+    struct imp_mat4 c;
+    for (int i = 0; i < 4; i++)
+        for (int j = 0; j < 4; j++) {
+            double sum = 0;
+            for (int k = 0; k < 4; k++) sum += a->m[4 * i + k] * b->m[4 * k + j];
+            c.m[4 * i + j] = sum;
+        }
+    return c;
+}
+
+/* Affine maps: the last row is taken to be 0 0 0 1. */
+static inline imp_v3 imp__point(const struct imp_mat4 *a, imp_v3 p)
+{
+    const double *m = a->m;
+    return imp__v3(m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3],
+                   m[4] * p[0] + m[5] * p[1] + m[6] * p[2] + m[7],
+                   m[8] * p[0] + m[9] * p[1] + m[10] * p[2] + m[11]);
+}
+static inline imp_v3 imp__vector(const struct imp_mat4 *a, imp_v3 v)
+{
+    const double *m = a->m;
+    return imp__v3(m[0] * v[0] + m[1] * v[1] + m[2] * v[2],
+                   m[4] * v[0] + m[5] * v[1] + m[6] * v[2],
+                   m[8] * v[0] + m[9] * v[1] + m[10] * v[2]);
+}
+/* Normals go with the inverse transpose: pass the inverse of the map. Not normalised. */
+static inline imp_v3 imp__normal(const struct imp_mat4 *inverse, imp_v3 n)
+{
+    const double *m = inverse->m;
+    return imp__v3(m[0] * n[0] + m[4] * n[1] + m[8] * n[2],
+                   m[1] * n[0] + m[5] * n[1] + m[9] * n[2],
+                   m[2] * n[0] + m[6] * n[1] + m[10] * n[2]);
+}
+static inline imp_v3 imp__project_point(const struct imp_mat4 *a, imp_v3 p)
+{
+    const double *m = a->m;
+    const double w = m[12] * p[0] + m[13] * p[1] + m[14] * p[2] + m[15];
+    return imp__point(a, p) * (1 / w);
+}
+
+static inline bool imp__mat4_is_affine(const struct imp_mat4 *a)
+{
+    return a->m[12] == 0 && a->m[13] == 0 && a->m[14] == 0 && a->m[15] == 1;
+}
+static inline bool imp__mat4_is_finite(const struct imp_mat4 *a)
+{
+    for (int i = 0; i < 16; i++)
+        if (!isfinite(a->m[i])) return false;
+    return true;
+}
+/* Determinant of the upper left 3x3: negative where the map mirrors. */
+double imp__mat4_det3(const struct imp_mat4 *a);
+/* False, and *out unchanged, if `a` is singular or not finite. */
+bool imp__mat4_inverse(const struct imp_mat4 *a, struct imp_mat4 *out);
+
+struct imp_mat4 imp__translate(imp_v3 t);
+struct imp_mat4 imp__scale(imp_v3 s);
+/* Right-handed about a unit axis (Rodrigues). */
+struct imp_mat4 imp__rotate(imp_v3 axis, double degrees);
+/* Columns (left, newup, dir, origin): a sensor looks along +z, +y is up, +x points left. A
+ * zero `up` takes the first tangent of the basis of dir. False: target at the origin, up
+ * parallel to dir, or not finite. */
+bool imp__lookat(imp_v3 origin, imp_v3 target, imp_v3 up, struct imp_mat4 *out);
+
+#endif
