@@ -1,0 +1,285 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Problems: which numbers are free, and what they have to match. */
+#include "problem.h"
+#include "match.h"
+#include <math.h>
+#include <string.h>
+
+enum imp_status imp_problem_create(imp_scene *scene, imp_problem **out)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = scene->ctx;
+    imp_problem *p = NULL;
+
+    if (!scene->committed)
+        return imp__error(ctx, IMP_E_ARG, "a problem needs a committed scene");
+    p = imp__alloc(ctx, 1, sizeof *p);
+    if (!p) return imp__error(ctx, IMP_E_NOMEM, "no memory for a problem");
+    p->ctx = ctx;
+    p->scene = scene;
+    p->run = (struct imp_run)IMP_RUN_INIT;
+    imp__arena_init(&p->fit_arena, ctx);
+    imp__arena_init(&p->check_arena, ctx);
+    p->chosen = imp__alloc(ctx, imp_max(scene->n_params, (size_t)1), 1);
+    if (!p->chosen) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a problem"));
+    IMP_TRY(imp__active_create(scene, p->chosen, &p->active));
+    *out = p;
+    return IMP_OK;
+out:
+    imp_problem_destroy(p);
+    return st;
+}
+
+static void target_free(imp_context *ctx, struct imp__target *t)
+{
+    imp__release(ctx, t->pixels);
+    imp__release(ctx, t->weights);
+    imp__release(ctx, t->noise_se);
+}
+
+void imp_problem_destroy(imp_problem *p)
+{
+    if (!p) return;
+    for (size_t i = 0; i < p->n_targets; i++) target_free(p->ctx, &p->targets[i]);
+    imp__release(p->ctx, p->targets);
+    for (size_t i = 0; i < p->n_regularisers; i++) {
+        imp__release(p->ctx, p->regularisers[i].on);
+        imp__release(p->ctx, p->regularisers[i].origin);
+    }
+    imp__release(p->ctx, p->regularisers);
+    imp__active_destroy(p->ctx, &p->active);
+    imp__arena_free(&p->fit_arena);
+    imp__arena_free(&p->check_arena);
+    imp__release(p->ctx, p->chosen);
+    imp__release(p->ctx, p);
+}
+
+/* ---- Active parameters ---------------------------------------------------------------- */
+
+static enum imp_status activate_named(imp_problem *p, const char *name, uint8_t *chosen)
+{
+    size_t k;
+    const enum imp_status st = imp_scene_find_param(p->scene, name, &k);
+    if (st != IMP_OK) return st;
+    const struct imp_param_info *info = &p->scene->params[k].info;
+    if (info->flags & IMP_PARAM_INTEGER)
+        return imp__error(p->ctx, IMP_E_BIAS,
+                          "%s counts in whole numbers, so it has no derivative", info->name);
+    if (!(info->flags & IMP_PARAM_DIFFERENTIABLE))
+        return imp__error(p->ctx, IMP_E_BIAS,
+                          "%s has no unbiased derivative: changing it bends or moves light "
+                          "paths, or the densities they are drawn with, and the terms of that "
+                          "motion are not computed. Leave it at its value, or scan it",
+                          info->name);
+    chosen[k] = 1;
+    return IMP_OK;
+}
+
+enum imp_status imp_problem_activate(imp_problem *p, const char *glob)
+{
+    enum imp_status st = IMP_OK;
+    const struct imp_scene *s = p->scene;
+    struct imp_active active = {0};
+    uint8_t *chosen = imp__alloc(p->ctx, imp_max(s->n_params, (size_t)1), 1);
+
+    if (!glob || !*glob) IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "no parameter is named"));
+    if (!chosen) IMP_TRY(imp__error(p->ctx, IMP_E_NOMEM, "no memory for active parameters"));
+    memcpy(chosen, p->chosen, s->n_params);
+    if (!imp__has_wildcards(glob)) {
+        IMP_TRY(activate_named(p, glob, chosen));
+    } else {
+        size_t met = 0, usable = 0;
+        for (size_t k = 0; k < s->n_params; k++) {
+            if (!imp__glob(glob, s->params[k].info.name)) continue;
+            met++;
+            if (!(s->params[k].info.flags & IMP_PARAM_DIFFERENTIABLE)) continue;
+            usable++;
+            chosen[k] = 1;
+        }
+        if (!met)
+            IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "no parameter matches '%s' (there are %zu)",
+                               glob, s->n_params));
+        if (!usable)
+            IMP_TRY(imp__error(p->ctx, IMP_E_ARG,
+                               "none of the %zu parameters that match '%s' has an unbiased "
+                               "derivative", met, glob));
+    }
+    IMP_TRY(imp__active_create(s, chosen, &active));
+    imp__active_destroy(p->ctx, &p->active);
+    p->active = active;
+    p->n = active.n;
+    memcpy(p->chosen, chosen, s->n_params);
+out:
+    imp__release(p->ctx, chosen);
+    return st;
+}
+
+size_t imp_problem_n(const imp_problem *p) { return p->n; }
+
+enum imp_status imp_problem_variable(const imp_problem *p, size_t i, size_t *param,
+                                     size_t *element, double *lo, double *hi)
+{
+    for (size_t k = 0; k < p->scene->n_params; k++) {
+        const struct imp_param_info *info = &p->scene->params[k].info;
+        const int64_t base = p->active.base[k];
+        if (base < 0 || i < (size_t)base || i - (size_t)base >= info->count) continue;
+        if (param) *param = k;
+        if (element) *element = i - (size_t)base;
+        if (lo) *lo = info->lo;
+        if (hi) *hi = info->hi;
+        return IMP_OK;
+    }
+    return imp__error(p->ctx, IMP_E_ARG, "there is no active number %zu (there are %zu)", i,
+                      p->n);
+}
+
+void imp_problem_get_x(const imp_problem *p, double *x)
+{
+    for (size_t k = 0; k < p->scene->n_params; k++) {
+        const int64_t base = p->active.base[k];
+        if (base < 0) continue;
+        const struct imp_param *param = &p->scene->params[k];
+        for (size_t e = 0; e < param->info.count; e++)
+            x[(size_t)base + e] = param->store == IMP_STORE_LANES ? (*param->lanes)[e]
+                                                                   : param->bulk[e];
+    }
+}
+
+enum imp_status imp_problem_set_x(imp_problem *p, const double *x)
+{
+    enum imp_status st = IMP_OK;
+    /* All or nothing: look at everything before the first is set. */
+    for (size_t k = 0; k < p->scene->n_params; k++) {
+        const struct imp_param_info *info = &p->scene->params[k].info;
+        const int64_t base = p->active.base[k];
+        for (size_t e = 0; base >= 0 && e < info->count; e++) {
+            const double v = x[(size_t)base + e];
+            if (!isfinite(v) || v < info->lo || v > info->hi)
+                return imp__error(p->ctx, IMP_E_ARG, "%s[%zu] = %g is outside [%g, %g]",
+                                  info->name, e, v, info->lo, info->hi);
+        }
+    }
+    for (size_t k = 0; k < p->scene->n_params; k++) {
+        const int64_t base = p->active.base[k];
+        if (base >= 0)
+            IMP_TRY(imp_scene_set_values(p->scene, k, p->scene->params[k].info.count,
+                                         x + (size_t)base));
+    }
+out:
+    return st;
+}
+
+/* ---- Targets -------------------------------------------------------------------------- */
+
+static enum imp_status plane_copy(imp_context *ctx, const float *from, size_t n, float **to)
+{
+    *to = imp__alloc(ctx, n, sizeof **to);
+    if (!*to) return imp__error(ctx, IMP_E_NOMEM, "no memory for a target picture");
+    memcpy(*to, from, n * sizeof *from);
+    return IMP_OK;
+}
+
+/* Pixels with weight 0 may hold anything; they are stored as 0. */
+static enum imp_status target_check(imp_problem *p, struct imp__target *t)
+{
+    const struct imp_target *d = &t->desc;
+    const size_t channels = (size_t)d->channels;
+    double total = 0;
+    for (size_t i = 0; i < (size_t)d->width * (size_t)d->height; i++) {
+        const int x = (int)(i % (size_t)d->width), y = (int)(i / (size_t)d->width);
+        const float w = t->weights ? t->weights[i] : 1;
+        if (!(w >= 0) || !isfinite(w))
+            return imp__error(p->ctx, IMP_E_ARG,
+                              "weight %g of target pixel (%d, %d) is not a number >= 0", w, x,
+                              y);
+        total += w;
+        for (size_t c = 0; c < channels; c++) {
+            float *v = &t->pixels[i * channels + c];
+            if (w == 0) *v = 0;
+            if (!isfinite(*v))
+                return imp__error(p->ctx, IMP_E_ARG,
+                                  "target pixel (%d, %d) is not finite; give it weight 0 to "
+                                  "leave it out", x, y);
+            float *se = t->noise_se ? &t->noise_se[i * channels + c] : NULL;
+            if (se && w == 0) *se = 0;
+            if (se && (!(*se >= 0) || !isfinite(*se)))
+                return imp__error(p->ctx, IMP_E_ARG,
+                                  "noise_se of target pixel (%d, %d) is not a number >= 0", x,
+                                  y);
+        }
+    }
+    if (total == 0)
+        return imp__error(p->ctx, IMP_E_ARG, "all weights of the target are 0");
+    return IMP_OK;
+}
+
+enum imp_status imp_problem_add_target(imp_problem *p, const struct imp_target *target)
+{
+    enum imp_status st = IMP_OK;
+    struct imp__target t = {.desc = IMP_TARGET_INIT};
+    struct imp_sensor_info sensor = {.size = sizeof sensor};
+
+    if (!target || !target->size)
+        return imp__error(p->ctx, IMP_E_ARG, "target is NULL or without its size");
+    memcpy(&t.desc, target, imp_min(target->size, sizeof t.desc));
+    const struct imp_target *d = &t.desc;
+    IMP_TRY(imp_scene_get_sensor(p->scene, d->sensor, &sensor));
+    if (d->width != sensor.width || d->height != sensor.height)
+        IMP_TRY(imp__error(p->ctx, IMP_E_ARG,
+                           "target is %d x %d, but sensor %d ('%s') makes %d x %d pixels",
+                           d->width, d->height, d->sensor, sensor.name ? sensor.name : "",
+                           sensor.width, sensor.height));
+    if (d->channels != 1 && d->channels != p->scene->channels)
+        IMP_TRY(imp__error(p->ctx, IMP_E_ARG,
+                           "target has %d channels; this scene's pictures have %d", d->channels,
+                           p->scene->channels));
+    if (!d->pixels) IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "target without pixels"));
+    if ((unsigned)d->loss > IMP_LOSS_LOG)
+        IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "loss %d does not exist", (int)d->loss));
+    if (!(d->epsilon >= 0) || !(d->scale >= 0) || !isfinite(d->epsilon) || !isfinite(d->scale))
+        IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "epsilon %g and scale %g must be finite and >= 0",
+                           d->epsilon, d->scale));
+    if (t.desc.epsilon == 0) t.desc.epsilon = 1e-2;
+    if (t.desc.scale == 0) t.desc.scale = 1;
+
+    const size_t n = (size_t)d->width * (size_t)d->height;
+    IMP_TRY(plane_copy(p->ctx, d->pixels, n * (size_t)d->channels, &t.pixels));
+    if (d->weights) IMP_TRY(plane_copy(p->ctx, d->weights, n, &t.weights));
+    if (d->noise_se) IMP_TRY(plane_copy(p->ctx, d->noise_se, n * (size_t)d->channels,
+                                        &t.noise_se));
+    IMP_TRY(target_check(p, &t));
+    t.desc.pixels = t.pixels;
+    t.desc.weights = t.weights;
+    t.desc.noise_se = t.noise_se;
+
+    struct imp__target *grown = imp__grow(p->ctx, p->targets, &p->cap_targets, p->n_targets + 1,
+                                          sizeof *grown);
+    if (!grown) IMP_TRY(imp__error(p->ctx, IMP_E_NOMEM, "no memory for a target"));
+    p->targets = grown;
+    p->targets[p->n_targets++] = t;
+    return IMP_OK;
+out:
+    target_free(p->ctx, &t);
+    return st;
+}
+
+/* ---- NLopt's callback shape ------------------------------------------------------------ */
+
+void imp_problem_set_run(imp_problem *p, const struct imp_run *run)
+{
+    p->run = (struct imp_run)IMP_RUN_INIT;
+    if (run) memcpy(&p->run, run, imp_min(run->size, sizeof p->run));
+}
+
+double imp_problem_nlopt(unsigned n, const double *x, double *gradient, void *problem)
+{
+    imp_problem *p = problem;
+    struct imp_estimate e;
+    if (n != p->n) {
+        imp__error(p->ctx, IMP_E_ARG, "n is %u, but %zu numbers are active", n, p->n);
+        return HUGE_VAL;
+    }
+    const enum imp_status st = imp_problem_objective(p, x, &p->run, &e, gradient, NULL);
+    return st == IMP_OK && isfinite(e.value) ? e.value : HUGE_VAL;
+}

@@ -1,0 +1,116 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Regularisers: exact functions of x, added to the estimated data term. */
+#include "problem.h"
+#include "match.h"
+#include <math.h>
+#include <string.h>
+
+static enum imp_status add(imp_problem *p, const char *glob, double weight, int kind,
+                           bool from_here)
+{
+    enum imp_status st = IMP_OK;
+    const struct imp_scene *s = p->scene;
+    struct imp__regulariser r = {.kind = kind, .weight = weight};
+    size_t met = 0, usable = 0;
+
+    if (!glob || !*glob) return imp__error(p->ctx, IMP_E_ARG, "no parameter is named");
+    if (!(weight >= 0) || !isfinite(weight))
+        return imp__error(p->ctx, IMP_E_ARG, "weight %g must be finite and >= 0", weight);
+    r.on = imp__alloc(p->ctx, imp_max(s->n_params, (size_t)1), 1);
+    if (from_here) r.origin = imp__alloc(p->ctx, imp_max(s->n_theta, (size_t)1), sizeof(double));
+    if (!r.on || (from_here && !r.origin))
+        IMP_TRY(imp__error(p->ctx, IMP_E_NOMEM, "no memory for a regulariser"));
+    for (size_t k = 0; k < s->n_params; k++) {
+        if (!imp__glob(glob, s->params[k].info.name)) continue;
+        met++;
+        if (kind == IMP_SMOOTHNESS && s->params[k].info.n_dims < 2) continue;
+        usable++;
+        r.on[k] = 1;
+    }
+    if (!met) IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "no parameter matches '%s'", glob));
+    if (!usable)
+        IMP_TRY(imp__error(p->ctx, IMP_E_ARG,
+                           "smoothness needs a texture: nothing that matches '%s' has two "
+                           "dimensions", glob));
+    if (from_here) imp_scene_get_theta(s, r.origin);
+
+    struct imp__regulariser *grown = imp__grow(p->ctx, p->regularisers, &p->cap_regularisers,
+                                               p->n_regularisers + 1, sizeof *grown);
+    if (!grown) IMP_TRY(imp__error(p->ctx, IMP_E_NOMEM, "no memory for a regulariser"));
+    p->regularisers = grown;
+    p->regularisers[p->n_regularisers++] = r;
+    return IMP_OK;
+out:
+    imp__release(p->ctx, r.on);
+    imp__release(p->ctx, r.origin);
+    return st;
+}
+
+enum imp_status imp_problem_add_tikhonov(imp_problem *p, const char *glob, double weight,
+                                         int from_here)
+{
+    return add(p, glob, weight, IMP_TIKHONOV, from_here != 0);
+}
+
+enum imp_status imp_problem_add_smoothness(imp_problem *p, const char *glob, double weight)
+{
+    return add(p, glob, weight, IMP_SMOOTHNESS, false);
+}
+
+/* 1/2 w sum (x - x0)^2 */
+static double tikhonov(double w, size_t n, const double *x, const double *x0, double *g)
+{
+    double sum = 0;
+    for (size_t e = 0; e < n; e++) {
+        const double d = x[e] - (x0 ? x0[e] : 0);
+        sum += d * d;
+        if (g) g[e] += w * d;
+    }
+    return 0.5 * w * sum;
+}
+
+/* 1/2 w sum over neighbours of (x_q - x_p)^2, along both axes of [h][w][c] */
+static double smoothness(double weight, size_t h, size_t w, size_t c, const double *x, double *g)
+{
+    double sum = 0;
+    for (size_t i = 0; i < h; i++)
+        for (size_t j = 0; j < w; j++)
+            for (size_t k = 0; k < c; k++) {
+                const size_t here = (i * w + j) * c + k;
+                const size_t next[2] = {here + c, here + w * c};
+                const bool inside[2] = {j + 1 < w, i + 1 < h};
+                for (int a = 0; a < 2; a++) {
+                    if (!inside[a]) continue;
+                    const double d = x[next[a]] - x[here];
+                    sum += d * d;
+                    if (!g) continue;
+                    g[next[a]] += weight * d;
+                    g[here] -= weight * d;
+                }
+            }
+    return 0.5 * weight * sum;
+}
+
+double imp__regularise(const struct imp_problem *p, const double *x, double *gradient)
+{
+    double value = 0;
+    for (size_t i = 0; i < p->n_regularisers; i++) {
+        const struct imp__regulariser *r = &p->regularisers[i];
+        for (size_t k = 0; k < p->scene->n_params; k++) {
+            const int64_t base = p->active.base[k];
+            if (base < 0 || !r->on[k]) continue;
+            const struct imp_param_info *info = &p->scene->params[k].info;
+            const double *at = x + base;
+            double *g = gradient ? gradient + base : NULL;
+            if (r->kind == IMP_TIKHONOV)
+                value += tikhonov(r->weight, info->count, at,
+                                  r->origin ? r->origin + info->offset : NULL, g);
+            else
+                value += smoothness(r->weight, info->dims[0], info->dims[1],
+                                    info->count / imp_max(info->dims[0] * info->dims[1],
+                                                          (size_t)1), at, g);
+        }
+    }
+    return value;
+}
