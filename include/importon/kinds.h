@@ -54,7 +54,8 @@ struct imp_input {
     const struct imp_texture *texture; /* NULL: constant */
     imp_spec value;                    /* the constant, in all used lanes */
     int param;                         /* index of its parameter, -1: none */
-    bool scalar;
+    bool scalar;                       /* declared IMP_INPUT_SCALAR: textures give one number */
+    int count;                         /* numbers of a constant: 3, or 1 (in all lanes) */
 };
 
 struct imp_build;   /* what build functions get: src/kind/build.h */

@@ -1,0 +1,13 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The materials: one line a kind (docs/kinds.md). */
+#include "kind/build.h"
+
+#define BSDFS(X)                                                                           \
+    X(imp__diffuse)                                                                        \
+    X(imp__twosided)
+
+#define DECLARE(kind) extern const struct imp_bsdf_ops kind;
+BSDFS(DECLARE)
+#define ADDRESS(kind) &kind,
+const struct imp_bsdf_ops *const imp__bsdf_kinds[] = {BSDFS(ADDRESS) NULL};

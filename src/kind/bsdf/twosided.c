@@ -1,0 +1,117 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * twosided: seen from behind, the second child (or the only one) is turned over: the mirror
+ * z -> -z is applied to both directions. */
+#include "kind/build.h"
+#include "math/vec.h"
+
+static enum imp_status build(const struct imp_build *build, void *self, struct imp_bsdf *b)
+{
+    enum imp_status st = IMP_OK;
+    bool allow;
+    (void)self;
+    IMP_TRY(imp__props_bool(build->ctx, build->node, "allow_transmission", false, &allow));
+    b->flags = 0;
+    b->absorb = 0;
+    for (int k = 0; k < b->n_child; k++) {
+        b->flags |= b->child[k]->flags;
+        b->absorb = imp_max(b->absorb, b->child[k]->absorb);
+    }
+    if ((b->flags & IMP_BSDF_TRANSMIT) && !allow)
+        IMP_TRY(imp__node_error(build->ctx, build->node, IMP_E_SCENE,
+                                "the nested material transmits light; set "
+                                "'allow_transmission' if that is meant"));
+out:
+    return st;
+}
+
+static imp_v3 flip(imp_v3 w, bool back) { return back ? imp__v3(w[0], w[1], -w[2]) : w; }
+
+/* The child that answers, where its inputs are, and the directions as it sees them. */
+static const struct imp_bsdf *side(const struct imp_bsdf *b, const imp_v3 *wo, bool *back,
+                                   int *first)
+{
+    *back = (*wo)[2] < 0;
+    const int k = *back ? b->n_child - 1 : 0;
+    *first = b->child_in[k];
+    return b->child[k];
+}
+
+static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
+                   struct imp_dirs *d, struct imp_bsdf_sample *s)
+{
+    bool back;
+    int first;
+    const struct imp_bsdf *c = side(b, &d->wo, &back, &first);
+    struct imp_dirs e = {flip(d->wo, back), d->wi, d->lobe};
+    if (!c->ops->sample(c, in + first, u, &e, s)) return false;
+    d->wi = flip(e.wi, back);
+    d->lobe = e.lobe;
+    return true;
+}
+static void eval(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
+                 imp_spec *f)
+{
+    bool back;
+    int first;
+    const struct imp_bsdf *c = side(b, &d->wo, &back, &first);
+    const struct imp_dirs e = {flip(d->wo, back), flip(d->wi, back), d->lobe};
+    c->ops->eval(c, in + first, &e, f);
+}
+static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
+{
+    bool back;
+    int first;
+    const struct imp_bsdf *c = side(b, &d->wo, &back, &first);
+    const struct imp_dirs e = {flip(d->wo, back), flip(d->wi, back), d->lobe};
+    return c->ops->pdf(c, in + first, &e);
+}
+static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
+                   imp_spec *df)
+{
+    bool back;
+    int first;
+    const struct imp_bsdf *c = side(b, &d->wo, &back, &first);
+    const struct imp_dirs e = {flip(d->wo, back), flip(d->wi, back), d->lobe};
+    for (int j = 0; j < b->n_in; j++) df[j] = imp__spec(0);
+    c->ops->eval_d(c, in + first, &e, df + first);
+}
+static void emit(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo, imp_spec *e)
+{
+    bool back;
+    int first;
+    const struct imp_bsdf *c = side(b, wo, &back, &first);
+    const imp_v3 w = flip(*wo, back);
+    *e = imp__spec(0);
+    if (c->flags & IMP_BSDF_EMIT) c->ops->emit(c, in + first, &w, e);
+}
+static void emit_d(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
+                   imp_spec *de)
+{
+    bool back;
+    int first;
+    const struct imp_bsdf *c = side(b, wo, &back, &first);
+    const imp_v3 w = flip(*wo, back);
+    for (int j = 0; j < b->n_in; j++) de[j] = imp__spec(0);
+    if (c->flags & IMP_BSDF_EMIT) c->ops->emit_d(c, in + first, &w, de + first);
+}
+static bool sample_d(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
+                     const struct imp_dirs *d, int j, imp_spec *dweight, imp_v3 *dwi)
+{
+    bool back;
+    int first;
+    const struct imp_bsdf *c = side(b, &d->wo, &back, &first);
+    const struct imp_dirs e = {flip(d->wo, back), flip(d->wi, back), d->lobe};
+    if (!c->ops->sample_d || j < first || j >= first + c->n_in) return false;
+    if (!c->ops->sample_d(c, in + first, u, &e, j - first, dweight, dwi)) return false;
+    *dwi = flip(*dwi, back);
+    return true;
+}
+
+static const struct imp_input_desc inputs[] = {{0}};
+
+const struct imp_bsdf_ops imp__twosided = {
+    .size = sizeof(struct imp_bsdf_ops), .name = "twosided", .inputs = inputs,
+    .min_children = 1, .max_children = 2, .build = build,
+    .sample = sample, .eval = eval, .pdf = pdf, .eval_d = eval_d,
+    .emit = emit, .emit_d = emit_d, .sample_d = sample_d};

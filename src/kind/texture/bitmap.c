@@ -1,0 +1,230 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * bitmap: a picture. Texel (i, j) has its centre at ((i + .5)/W, (j + .5)/H), row 0 at v = 0.
+ * The value is linear in the texels, so its derivative is the set of filter weights itself:
+ * eval, scatter and tangent all go through `footprint`. */
+#include <math.h>
+#include <string.h>
+#include "color/rgb.h"
+#include "input.h"
+#include "math/vec.h"
+#include "uv.h"
+
+enum wrap { WRAP_REPEAT, WRAP_MIRROR, WRAP_CLAMP };
+enum filter { FILTER_BILINEAR, FILTER_NEAREST };
+
+struct bitmap {
+    int width, height, channels;  /* 1 or 3 */
+    enum wrap wrap;
+    enum filter filter;
+    bool identity;                /* to_uv does nothing */
+    struct imp__to_uv to_uv;
+    float *data;                  /* [height][width][channels], and one number more */
+};
+
+/* Pixels in one more number than needed: three channels are read with one load of four. */
+static enum imp_status data_convert(const struct imp_build *b, const struct imp_image_data *im,
+                                    bool raw, struct bitmap *t)
+{
+    const size_t n = (size_t)im->width * (size_t)im->height;
+    const bool grey = im->channels == 3 && b->mode == IMP_MONO;
+    t->channels = grey ? 1 : im->channels;
+    t->data = imp__arena_take(b->arena, n * (size_t)t->channels + 1, sizeof *t->data);
+    if (!t->data) return imp__error(b->ctx, IMP_E_NOMEM, "bitmap does not fit");
+    t->data[n * (size_t)t->channels] = 0;
+    for (size_t i = 0; i < n; i++) {
+        double p[3] = {0, 0, 0};
+        for (int c = 0; c < im->channels; c++) {
+            p[c] = im->pixels[i * (size_t)im->channels + (size_t)c];
+            if (!isfinite(p[c]))
+                return imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+                                       "pixel (%zu, %zu) of the picture is not finite",
+                                       i % (size_t)im->width, i / (size_t)im->width);
+            if (im->srgb && !raw) p[c] = imp__srgb_decode(p[c]);
+        }
+        if (grey) p[0] = imp__luminance(p[0], p[1], p[2]);
+        for (int c = 0; c < t->channels; c++)
+            t->data[i * (size_t)t->channels + (size_t)c] = (float)p[c];
+    }
+    return IMP_OK;
+}
+
+static enum imp_status build(const struct imp_build *b, void *self, struct imp_texture *tex)
+{
+    static const char *const wraps[] = {"repeat", "mirror", "clamp"};
+    static const char *const filters[] = {"bilinear", "nearest"};
+    static const char *const formats[] = {"auto", "variant", "float16", "fp16", "uint8"};
+    enum imp_status st = IMP_OK;
+    struct bitmap *t = self;
+    const struct imp_image_data *im = b->node->image;
+    const char *filename;
+    bool raw, accel;
+    int wrap, filter, format;
+
+    IMP_TRY(imp__props_string(b->ctx, b->node, "filename", NULL, &filename));
+    IMP_TRY(imp__props_bool(b->ctx, b->node, "raw", false, &raw));
+    IMP_TRY(imp__props_choice(b->ctx, b->node, "wrap_mode", wraps, 3, WRAP_REPEAT, &wrap));
+    IMP_TRY(imp__props_choice(b->ctx, b->node, "filter_type", filters, 2, FILTER_BILINEAR,
+                              &filter));
+    /* How Mitsuba stores texels and looks them up: of no consequence here. */
+    IMP_TRY(imp__props_choice(b->ctx, b->node, "format", formats, 5, 0, &format));
+    IMP_TRY(imp__props_bool(b->ctx, b->node, "accel", true, &accel));
+    IMP_TRY(imp__to_uv_read(b, &t->to_uv));
+    if (!im)
+        IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+                                "needs a picture: 'filename' is required"));
+    if (im->width < 1 || im->height < 1 || (im->channels != 1 && im->channels != 3))
+        IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+                                "picture of %d x %d with %d channels; 1 or 3 are possible",
+                                im->width, im->height, im->channels));
+    t->width = im->width;
+    t->height = im->height;
+    t->wrap = (enum wrap)wrap;
+    t->filter = (enum filter)filter;
+    const struct imp__to_uv id = {{{1, 0, 0}, {0, 1, 0}}};
+    t->identity = memcmp(&id, &t->to_uv, sizeof id) == 0;
+    IMP_TRY(data_convert(b, im, raw, t));
+
+    const size_t dims[3] = {(size_t)t->height, (size_t)t->width, (size_t)t->channels};
+    float lo = 0;
+    for (size_t i = 0; i < dims[0] * dims[1] * dims[2]; i++) lo = imp_min(lo, t->data[i]);
+    IMP_TRY(b->add_bulk(b, "data", t->data, 3, dims,
+                        IMP_PARAM_DIFFERENTIABLE | IMP_PARAM_COLOR, lo < 0 ? -INFINITY : 0.0,
+                        INFINITY, &tex->param));
+out:
+    return st;
+}
+
+/* u in one period, so that an index made from it fits an int however wild u is. */
+static double period(double u, enum wrap wrap)
+{
+    switch (wrap) {
+    case WRAP_REPEAT: u -= floor(u); break;
+    case WRAP_MIRROR: u -= 2 * floor(u * 0.5); break;
+    case WRAP_CLAMP: u = imp_clamp(u, -1.0, 2.0); break;
+    }
+    return u >= -1 && u <= 2 ? u : 0; /* NaN and infinity */
+}
+/* -n <= i <= 2 n */
+static int wrap_index(int i, int n, enum wrap wrap)
+{
+    switch (wrap) {
+    case WRAP_REPEAT: return i < 0 ? i + n : i >= n ? (i - n) % n : i;
+    case WRAP_MIRROR:
+        if (i < 0) i = -1 - i;
+        if (i >= 2 * n) i -= 2 * n;
+        return i < n ? i : 2 * n - 1 - i;
+    case WRAP_CLAMP: break;
+    }
+    return i < 0 ? 0 : i >= n ? n - 1 : i;
+}
+
+/* The up to four texels that a lookup sees, and their weights. */
+struct footprint {
+    int n;
+    size_t texel[4];
+    double weight[4];
+};
+
+static inline void footprint(const struct bitmap *t, const struct imp_texcoord *at,
+                             struct footprint *f)
+{
+    double uv[2] = {at->uv[0], at->uv[1]};
+    if (!t->identity) imp__to_uv_apply(&t->to_uv, at->uv, uv);
+    const double u = period(uv[0], t->wrap), v = period(uv[1], t->wrap);
+    const size_t w = (size_t)t->width;
+    if (t->filter == FILTER_NEAREST) {
+        const int x = wrap_index((int)floor(u * t->width), t->width, t->wrap);
+        const int y = wrap_index((int)floor(v * t->height), t->height, t->wrap);
+        f->n = 1;
+        f->texel[0] = (size_t)y * w + (size_t)x;
+        f->weight[0] = 1;
+        return;
+    }
+    const double x = u * t->width - 0.5, y = v * t->height - 0.5;
+    const int x0 = (int)floor(x), y0 = (int)floor(y);
+    const double a = x - x0, b = y - y0;
+    const size_t xs[2] = {(size_t)wrap_index(x0, t->width, t->wrap),
+                          (size_t)wrap_index(x0 + 1, t->width, t->wrap)};
+    const size_t ys[2] = {w * (size_t)wrap_index(y0, t->height, t->wrap),
+                          w * (size_t)wrap_index(y0 + 1, t->height, t->wrap)};
+    f->n = 4;
+    f->texel[0] = ys[0] + xs[0];
+    f->texel[1] = ys[0] + xs[1];
+    f->texel[2] = ys[1] + xs[0];
+    f->texel[3] = ys[1] + xs[1];
+    f->weight[0] = (1 - a) * (1 - b);
+    f->weight[1] = a * (1 - b);
+    f->weight[2] = (1 - a) * b;
+    f->weight[3] = a * b;
+}
+
+typedef float texel4 __attribute__((vector_size(16)));
+
+static void eval(const struct imp_texture *tex, const struct imp_texcoord *at, bool scalar,
+                 imp_spec *value)
+{
+    const struct bitmap *t = tex->self;
+    struct footprint f;
+    footprint(t, at, &f);
+    if (t->channels == 1) {
+        double sum = 0;
+        for (int k = 0; k < f.n; k++) sum += f.weight[k] * t->data[f.texel[k]];
+        *value = imp__spec(sum);
+        return;
+    }
+    imp_spec sum = imp__spec(0);
+    for (int k = 0; k < f.n; k++) {
+        texel4 p;
+        memcpy(&p, t->data + 3 * f.texel[k], sizeof p);
+        sum += __builtin_convertvector(p, imp_spec) * f.weight[k];
+    }
+    *value = scalar ? imp__spec(imp__luminance(sum[0], sum[1], sum[2])) : sum;
+}
+
+static void scatter(const struct imp_texture *tex, const struct imp_texcoord *at, bool scalar,
+                    const imp_spec *bar, struct imp_sink *sink)
+{
+    const struct bitmap *t = tex->self;
+    struct footprint f;
+    if (tex->param < 0) return;
+    footprint(t, at, &f);
+    for (int k = 0; k < f.n; k++) {
+        const imp_spec part = *bar * f.weight[k];
+        if (t->channels == 1)
+            sink->add(sink, tex->param, f.texel[k], 1, &part);
+        else if (scalar)
+            imp__luminance_scatter(sink, tex->param, 3 * f.texel[k], part);
+        else
+            sink->add(sink, tex->param, 3 * f.texel[k], 3, &part);
+    }
+}
+
+static void tangent(const struct imp_texture *tex, const struct imp_texcoord *at, bool scalar,
+                    imp_dot_fn *dot, const void *x_dot, imp_spec *value_dot)
+{
+    const struct bitmap *t = tex->self;
+    struct footprint f;
+    imp_spec sum = imp__spec(0);
+    footprint(t, at, &f);
+    for (int k = 0; k < f.n && tex->param >= 0; k++) {
+        imp_spec p;
+        if (t->channels == 1) {
+            p = imp__spec(dot(x_dot, tex->param, f.texel[k]));
+        } else {
+            const size_t e = 3 * f.texel[k];
+            p = (imp_spec){dot(x_dot, tex->param, e), dot(x_dot, tex->param, e + 1),
+                           dot(x_dot, tex->param, e + 2), 0};
+        }
+        sum += p * f.weight[k];
+    }
+    *value_dot = scalar && t->channels == 3 ? imp__spec(imp__luminance(sum[0], sum[1], sum[2]))
+                                            : sum;
+}
+
+static const struct imp_input_desc inputs[] = {{0}};
+
+const struct imp_texture_ops imp__bitmap = {
+    .size = sizeof(struct imp_texture_ops), .name = "bitmap",
+    .object_size = sizeof(struct bitmap), .inputs = inputs,
+    .build = build, .eval = eval, .scatter = scatter, .tangent = tangent};

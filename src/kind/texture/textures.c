@@ -1,0 +1,13 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The textures: one line a kind. */
+#include "kind/build.h"
+
+#define TEXTURES(X)                                                                        \
+    X(imp__bitmap)                                                                         \
+    X(imp__checkerboard)
+
+#define DECLARE(kind) extern const struct imp_texture_ops kind;
+TEXTURES(DECLARE)
+#define ADDRESS(kind) &kind,
+const struct imp_texture_ops *const imp__texture_kinds[] = {TEXTURES(ADDRESS) NULL};
