@@ -1,0 +1,123 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Distributions, quadrature and small linear algebra against published or exact numbers. */
+#include "imp_tap.h"
+#include "math/linalg.h"
+#include "math/quadrature.h"
+#include "math/rng.h"
+#include "math/stat.h"
+
+static void distributions(void)
+{
+    tap_near(imp__normal_cdf(1.959963984540054), 0.975, 1e-14, 0, "normal cdf at 1.96");
+    tap_near(imp__normal_cdf(-10), 7.619853024160527e-24, 1e-12, 0, "normal cdf far left");
+    tap_near(imp__normal_quantile(0.975), 1.959963984540054, 1e-14, 0, "normal quantile .975");
+    tap_near(imp__normal_quantile(1e-20), -9.262340089798408, 1e-13, 0, "quantile of 1e-20");
+    double worst = 0;
+    for (int i = 1; i < 1000; i++) {
+        const double p = i / 1000.0;
+        worst = fmax(worst, fabs(imp__normal_cdf(imp__normal_quantile(p)) - p));
+    }
+    tap_near(worst, 0, 0, 1e-15, "cdf(quantile(p)) = p");
+    /* Q(1, x) = e^-x; Q(1/2, x) = erfc(sqrt x); tables for the rest. */
+    tap_near(imp__gamma_q(1, 3), exp(-3), 1e-14, 0, "Q(1, 3)");
+    tap_near(imp__gamma_q(0.5, 0.3), erfc(sqrt(0.3)), 1e-14, 0, "Q(1/2, 0.3)");
+    tap_near(imp__gamma_q(0.5, 30), erfc(sqrt(30)), 1e-12, 0, "Q(1/2, 30)");
+    tap_near(imp__chi2_tail(124.342113404004, 100), 0.05, 1e-11, 0, "chi-square, 100, 5 %");
+    tap_near(imp__chi2_tail(3.841458820694124, 1), 0.05, 1e-13, 0, "chi-square, 1, 5 %");
+    /* Q(n, x) is a Poisson sum, also where both expansions meet. */
+    double sum = 0;
+    for (int k = 0; k < 2000; k++) {
+        int sign;
+        sum += exp(-2000.0 + k * log(2000.0) - lgamma_r(k + 1.0, &sign));
+    }
+    tap_near(imp__gamma_q(2000, 2000), sum, 1e-10, 0, "Q(2000, 2000)");
+    tap_near(imp__sidak(0.01, 4096), 2.45e-6, 0, 0.005e-6, "Sidak over 64 x 64 pixels");
+    tap_near(pow(1 - imp__sidak(0.01, 4096), 4096), 0.99, 1e-12, 0, "and back");
+}
+
+static void quadrature(void)
+{
+    for (size_t n = 1; n <= 65; n += 16) {
+        double x[65], w[65], error = 0;
+        imp__gauss_legendre(n, -1, 2, x, w);
+        for (size_t d = 0; d < 2 * n && d < 40; d++) {
+            double q = 0;
+            for (size_t i = 0; i < n; i++) q += w[i] * pow(x[i], (double)d);
+            const double exact = (pow(2, d + 1.0) - pow(-1, d + 1.0)) / (d + 1);
+            error = fmax(error, fabs(q - exact) / pow(2, d + 1.0));
+        }
+        tap_ok(error < 1e-14, "%zu points are exact to degree %zu # error %.1e", n, 2 * n - 1,
+               error);
+    }
+}
+
+static void linear_algebra(void)
+{
+    enum { N = 12 };
+    double a[N * N], l[N * N], inverse[N * N], b[N], x[N], work[N * N], values[N], v[N * N];
+    const struct imp_key key = imp__key(3, 1, 4);
+    double m[N * N];
+    for (int i = 0; i < N * N; i++) m[i] = imp__u01(key, (unsigned)i) - 0.5;
+    for (int i = 0; i < N; i++)
+        for (int j = 0; j < N; j++) {
+            a[i * N + j] = i == j ? 0.1 : 0;
+            for (int k = 0; k < N; k++) a[i * N + j] += m[i * N + k] * m[j * N + k];
+        }
+    memcpy(l, a, sizeof a);
+    tap_ok(imp__cholesky(N, l), "a positive definite matrix has a factor");
+    imp__cholesky_inverse(N, l, inverse);
+    double error = 0, residual = 0, eigen = 0, ortho = 0;
+    for (int i = 0; i < N; i++)
+        for (int j = 0; j < N; j++) {
+            double s = 0;
+            for (int k = 0; k < N; k++) s += a[i * N + k] * inverse[k * N + j];
+            error = fmax(error, fabs(s - (i == j)));
+        }
+    tap_ok(error < 1e-12, "A A^-1 = 1 # error %.1e", error);
+    for (int i = 0; i < N; i++) x[i] = b[i] = imp__u01(key, 500 + (unsigned)i);
+    imp__cholesky_solve(N, l, x);
+    for (int i = 0; i < N; i++) {
+        double s = 0;
+        for (int k = 0; k < N; k++) s += a[i * N + k] * x[k];
+        residual = fmax(residual, fabs(s - b[i]));
+    }
+    tap_ok(residual < 1e-13, "A x = b # residual %.1e", residual);
+    memcpy(work, a, sizeof a);
+    tap_ok(imp__eigen_symmetric(N, work, values, v), "Jacobi converges");
+    for (int k = 0; k < N; k++)
+        for (int i = 0; i < N; i++) {
+            double s = 0, o = 0;
+            for (int j = 0; j < N; j++) {
+                s += a[i * N + j] * v[k * N + j];
+                o += v[k * N + j] * v[i * N + j];
+            }
+            eigen = fmax(eigen, fabs(s - values[k] * v[k * N + i]));
+            ortho = fmax(ortho, fabs(o - (i == k)));
+        }
+    tap_ok(eigen < 1e-14 && ortho < 1e-14, "A v = lambda v, v orthonormal # %.1e %.1e", eigen,
+           ortho);
+    int ascending = 1;
+    for (int k = 1; k < N; k++) ascending &= values[k - 1] <= values[k];
+    tap_ok(ascending, "eigenvalues ascend");
+
+    /* Hilbert matrix, order 6: the least eigenvalue has all its digits. */
+    for (int i = 0; i < 36; i++) work[i] = 1.0 / (i / 6 + i % 6 + 1);
+    imp__eigen_symmetric(6, work, values, v);
+    tap_near(values[0], 1.082799485e-07, 1e-8, 0, "Hilbert 6: least eigenvalue");
+    double singular[4] = {1, 2, 2, 4}, indefinite[4] = {1, 2, 2, 1},
+           nan[4] = {NAN, 0, 0, 1};
+    tap_ok(!imp__cholesky(2, singular) && !imp__cholesky(2, indefinite) &&
+               !imp__cholesky(2, nan),
+           "singular, indefinite and NaN matrices have no factor");
+    double bad[4] = {1, NAN, NAN, 1};
+    tap_ok(!imp__eigen_symmetric(2, bad, values, v), "NaN: no eigenvalues, and no hang");
+}
+
+int main(void)
+{
+    distributions();
+    quadrature();
+    linear_algebra();
+    return tap_done();
+}
