@@ -100,7 +100,7 @@ void imp__theta_finish(struct imp_scene *scene);
 enum imp_status imp__intersector_create(struct imp_scene *scene);
 void imp__intersector_destroy(struct imp_scene *scene);
 size_t imp__intersector_bytes(const struct imp_scene *scene);
-/* Nearest hit of o + t d, tmin < t < tmax. */
+/* Nearest hit of o + t d, tmin < t < tmax, tmin >= 0. Rays that are not finite hit nothing. */
 bool imp__intersect(const struct imp_scene *scene, const imp_v3 *o, const imp_v3 *d,
                     double tmin, double tmax, struct imp_hit *hit);
 /* Is anything between? */

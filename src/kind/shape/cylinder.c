@@ -1,0 +1,127 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * An open circular cylinder about the line from p0 to p1, in double precision. */
+#include "shape.h"
+
+struct cylinder {
+    imp_v3 base;            /* the middle of the end at p0 */
+    struct imp_frame axes;  /* orthonormal; n runs along the axis */
+    double radius, length;
+    double side;            /* 1: the normal points outwards */
+};
+
+static enum imp_status cylinder_build(const struct imp_build *b, void *self,
+                                      struct imp_shape *s)
+{
+    enum imp_status st = IMP_OK;
+    struct cylinder *c = self;
+    struct imp_placement at;
+    double p0[3], p1[3], radius, scale[3];
+
+    IMP_TRY(imp__shape_placement(b, s, &at));
+    IMP_TRY(imp__props_vector(b->ctx, b->node, "p0", (double[3]){0, 0, 0}, p0));
+    IMP_TRY(imp__props_vector(b->ctx, b->node, "p1", (double[3]){0, 0, 1}, p1));
+    IMP_TRY(imp__props_float(b->ctx, b->node, "radius", 1, &radius));
+    const imp_v3 a = imp__v3(p0[0], p0[1], p0[2]), e = imp__v3(p1[0], p1[1], p1[2]) - a;
+    const double length = imp__length(e);
+    if (!(length > 0) || !isfinite(length))
+        IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "p1"), IMP_E_SCENE,
+                                "p0 and p1 are %g apart", length));
+    /* to_world T(p0) frame(p1 - p0) S(r, r, length), scene-format 4.2. */
+    const struct imp_frame f = imp__frame_from_normal(e * (1 / length));
+    const struct imp_mat4 local = {{f.s[0], f.t[0], f.n[0], a[0], f.s[1], f.t[1], f.n[1], a[1],
+                                    f.s[2], f.t[2], f.n[2], a[2], 0, 0, 0, 1}};
+    const struct imp_mat4 placed = imp__mat4_multiply(&at.to_world, &local);
+    imp__placement_frame(b, &placed, 2, &c->axes, scale);
+    c->base = imp__point(&placed, imp__v3(0, 0, 0));
+    c->radius = fabs(radius) * scale[0];
+    c->length = length * scale[2];
+    s->area = IMP_2PI * c->radius * c->length;
+    if (!(s->area > 0) || !isfinite(s->area) || !imp__is_finite(c->base))
+        IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "radius"),
+                                IMP_E_SCENE, "its radius is %g, its area %g", c->radius,
+                                s->area));
+    c->side = (at.mirrored != s->flip_normals) ? -1 : 1;
+    /* A circle about n reaches r sqrt(1 - n_i^2) along axis i. */
+    const imp_v3 top = c->base + c->axes.n * c->length;
+    for (int i = 0; i < 3; i++) {
+        const double reach = c->radius * hypot(c->axes.s[i], c->axes.t[i]);
+        s->lo[i] = fmin(c->base[i], top[i]) - reach;
+        s->hi[i] = fmax(c->base[i], top[i]) + reach;
+    }
+    s->lo[3] = s->hi[3] = 0;
+    s->geometry = IMP_ANALYTIC;
+out:
+    return st;
+}
+
+/* v of the hit: the height along the axis, 0..1. As for the sphere, in the plane across. */
+static bool cylinder_intersect(const struct imp_shape *s, const imp_v3 *o, const imp_v3 *d,
+                               double tmin, double tmax, struct imp_hit *hit)
+{
+    const struct cylinder *k = s->self;
+    const imp_v3 p = imp__to_local(&k->axes, *o - k->base), w = imp__to_local(&k->axes, *d);
+    const double a = w[0] * w[0] + w[1] * w[1], b = -(p[0] * w[0] + p[1] * w[1]);
+    const double lx = p[0] + w[0] * (b / a), ly = p[1] + w[1] * (b / a);
+    const double r2 = k->radius * k->radius, e = r2 - (lx * lx + ly * ly);
+    if (!(e >= 0)) return false; /* and rays along the axis, where a is 0 */
+    const double q = b + copysign(sqrt(a * e), b), c = p[0] * p[0] + p[1] * p[1] - r2;
+    const double ta = q / a, tb = q != 0 ? c / q : ta;
+    const double t[2] = {fmin(ta, tb), fmax(ta, tb)};
+    for (int i = 0; i < 2; i++) {
+        const double z = p[2] + t[i] * w[2];
+        if (!(t[i] > tmin && t[i] < tmax && z >= 0 && z <= k->length)) continue;
+        hit->t = t[i];
+        hit->u = 0;
+        hit->v = z / k->length;
+        hit->prim = 0;
+        return true;
+    }
+    return false;
+}
+
+/* x, y: a unit vector across the axis. */
+static void surface_at(const struct cylinder *k, double x, double y, double v,
+                       struct imp_surface *out)
+{
+    const imp_v3 outward = k->axes.s * x + k->axes.t * y;
+    out->p = k->base + k->axes.n * (v * k->length) + outward * k->radius;
+    out->ng = out->n = outward * k->side;
+    out->uv[0] = imp__turn(x, y);
+    out->uv[1] = v;
+    out->dp_du = (k->axes.t * x - k->axes.s * y) * (IMP_2PI * k->radius);
+    out->dp_dv = k->axes.n * k->length;
+    imp__surface_frame(out);
+}
+
+static void cylinder_surface(const struct imp_shape *s, const struct imp_hit *hit,
+                             const imp_v3 *o, const imp_v3 *d, struct imp_surface *out)
+{
+    const struct cylinder *k = s->self;
+    const imp_v3 p = *o + *d * hit->t - k->base;
+    const double x = imp__dot(p, k->axes.s), y = imp__dot(p, k->axes.t);
+    const double r = 1 / sqrt(x * x + y * y);
+    surface_at(k, x * r, y * r, hit->v, out);
+}
+
+static bool cylinder_sample(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
+                            struct imp_light_sample *out)
+{
+    const struct cylinder *k = s->self;
+    struct imp_surface at;
+    surface_at(k, cos(IMP_2PI * u[0]), sin(IMP_2PI * u[0]), u[1], &at);
+    out->uv[0] = at.uv[0];
+    out->uv[1] = at.uv[1];
+    return imp__light_from_area(*ref, at.p, at.ng, at.n, 1 / s->area, out);
+}
+
+static double cylinder_pdf(const struct imp_shape *s, const imp_v3 *ref,
+                           const struct imp_hit *hit, const struct imp_surface *at)
+{
+    (void)hit;
+    return imp__area_to_angle(*ref, at->p, at->ng, 1 / s->area);
+}
+
+const struct imp_shape_ops imp__cylinder = {
+    sizeof(struct imp_shape_ops), "cylinder", sizeof(struct cylinder), cylinder_build,
+    cylinder_intersect, cylinder_surface, cylinder_sample, cylinder_pdf};

@@ -1,0 +1,98 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The unit disk at z = 0 under an affine map, hence any ellipse. */
+#include "math/warp.h"
+#include "shape.h"
+
+struct disk {
+    struct imp_mat4 to_world, to_local;
+    imp_v3 n;
+    double inv_area;
+};
+
+static enum imp_status disk_build(const struct imp_build *b, void *self, struct imp_shape *s)
+{
+    struct disk *k = self;
+    struct imp_placement at;
+    const enum imp_status st = imp__shape_placement(b, s, &at);
+    if (st != IMP_OK) return st;
+    k->to_world = at.to_world;
+    k->to_local = at.to_local;
+    const imp_v3 a = imp__mat4_column(&at.to_world, 0), c = imp__mat4_column(&at.to_world, 1);
+    s->area = IMP_PI * imp__length(imp__cross(a, c));
+    if (!(s->area > 0) || !isfinite(s->area))
+        return imp__node_error(b->ctx, b->node, IMP_E_SCENE, "its area is %g", s->area);
+    k->inv_area = 1 / s->area;
+    k->n = imp__normalize(imp__cross(a, c)) *
+           ((at.mirrored != s->flip_normals) ? -1.0 : 1.0);
+    /* |x a_i + y c_i| is largest on the unit circle where (x, y) is along (a_i, c_i). */
+    const imp_v3 center = imp__point(&at.to_world, imp__v3(0, 0, 0));
+    for (int i = 0; i < 3; i++) {
+        const double reach = hypot(a[i], c[i]);
+        s->lo[i] = center[i] - reach;
+        s->hi[i] = center[i] + reach;
+    }
+    s->lo[3] = s->hi[3] = 0;
+    s->geometry = IMP_ANALYTIC;
+    return IMP_OK;
+}
+
+/* u, v of the hit: x and y on the unit disk. */
+static bool disk_intersect(const struct imp_shape *s, const imp_v3 *o, const imp_v3 *d,
+                           double tmin, double tmax, struct imp_hit *hit)
+{
+    const struct disk *k = s->self;
+    const imp_v3 p = imp__point(&k->to_local, *o), w = imp__vector(&k->to_local, *d);
+    const double t = -p[2] / w[2];
+    const double x = p[0] + t * w[0], y = p[1] + t * w[1];
+    if (!(t > tmin && t < tmax) || !(x * x + y * y <= 1)) return false;
+    hit->t = t;
+    hit->u = x;
+    hit->v = y;
+    hit->prim = 0;
+    return true;
+}
+
+static void surface_at(const struct disk *k, double x, double y, struct imp_surface *out)
+{
+    const double r = sqrt(x * x + y * y);
+    out->p = imp__point(&k->to_world, imp__v3(x, y, 0));
+    out->ng = out->n = k->n;
+    out->uv[0] = r;
+    out->uv[1] = imp__turn(x, y);
+    out->dp_du = imp__vector(&k->to_world, r > 0 ? imp__v3(x / r, y / r, 0)
+                                                 : imp__v3(1, 0, 0));
+    out->dp_dv = imp__vector(&k->to_world, imp__v3(-y, x, 0)) * IMP_2PI;
+    imp__surface_frame(out);
+}
+
+static void disk_surface(const struct imp_shape *s, const struct imp_hit *hit,
+                         const imp_v3 *o, const imp_v3 *d, struct imp_surface *out)
+{
+    (void)o, (void)d;
+    surface_at(s->self, hit->u, hit->v, out);
+}
+
+static bool disk_sample(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
+                        struct imp_light_sample *out)
+{
+    const struct disk *k = s->self;
+    double xy[2];
+    imp__concentric_disk(u, xy);
+    out->uv[0] = sqrt(xy[0] * xy[0] + xy[1] * xy[1]);
+    out->uv[1] = imp__turn(xy[0], xy[1]);
+    return imp__light_from_area(*ref, imp__point(&k->to_world, imp__v3(xy[0], xy[1], 0)),
+                                k->n, k->n, k->inv_area, out);
+}
+
+static double disk_pdf(const struct imp_shape *s, const imp_v3 *ref,
+                       const struct imp_hit *hit, const struct imp_surface *at)
+{
+    (void)hit;
+    const struct disk *k = s->self;
+    return imp__area_to_angle(*ref, at->p, at->ng, k->inv_area);
+}
+
+const struct imp_shape_ops imp__disk = {
+    sizeof(struct imp_shape_ops), "disk", sizeof(struct disk), disk_build,
+    disk_intersect, disk_surface, disk_sample, disk_pdf};

@@ -1,0 +1,253 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Triangle meshes, from files (`obj`, `ply`) or from calls (`mesh`), in world space after
+ * build. A mirroring to_world or flip_normals reverses the winding, so that geometric and
+ * shading normals agree (scene-format 4.3, as Mitsuba 3.10). */
+#include "shape.h"
+#include "math/warp.h"
+
+/* Embree takes larger coordinates for invalid. */
+#define COORDINATE_MAX 1e18
+
+static imp_v3 load3(const float *array, uint32_t index)
+{
+    const float *p = array + 3 * (size_t)index;
+    return imp__v3(p[0], p[1], p[2]);
+}
+
+static enum imp_status positions_place(const struct imp_build *b, struct imp_shape *s,
+                                       const struct imp_mesh_data *data,
+                                       const struct imp_placement *at, float *out)
+{
+    s->lo = imp__v3(INFINITY, INFINITY, INFINITY);
+    s->hi = -s->lo;
+    for (size_t k = 0; k < data->n_vertices; k++) {
+        const float *q = data->positions + 3 * k;
+        const imp_v3 p = imp__point(&at->to_world, imp__v3(q[0], q[1], q[2]));
+        for (int i = 0; i < 3; i++) {
+            if (!(fabs(p[i]) < COORDINATE_MAX))
+                return imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+                                       "vertex %zu is not finite, or further out than %g", k,
+                                       COORDINATE_MAX);
+            const float x = (float)p[i];
+            out[3 * k + i] = x;
+            s->lo[i] = fmin(s->lo[i], x);
+            s->hi[i] = fmax(s->hi[i], x);
+        }
+    }
+    s->lo[3] = s->hi[3] = 0;
+    return IMP_OK;
+}
+
+static enum imp_status normals_place(const struct imp_build *b, const struct imp_shape *s,
+                                     const struct imp_mesh_data *data,
+                                     const struct imp_placement *at, float *out)
+{
+    for (size_t k = 0; k < data->n_vertices; k++) {
+        const float *q = data->normals + 3 * k;
+        imp_v3 n = imp__normal(&at->to_local, imp__v3(q[0], q[1], q[2]));
+        const double length = imp__length(n);
+        if (!isfinite(length))
+            return imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+                                   "the normal of vertex %zu is not finite", k);
+        if (length > 0) n = n * ((s->flip_normals ? -1 : 1) / length);
+        for (int i = 0; i < 3; i++) out[3 * k + i] = (float)n[i];
+    }
+    return IMP_OK;
+}
+
+static enum imp_status data_check(const struct imp_build *b, const struct imp_mesh_data *data)
+{
+    if (data->n_triangles == 0 || data->n_vertices == 0)
+        return imp__node_error(b->ctx, b->node, IMP_E_SCENE, "it has no triangles");
+    if (data->n_triangles > INT32_MAX || data->n_vertices > INT32_MAX)
+        return imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+                               "it has more than 2^31 triangles or vertices");
+    for (size_t k = 0; k < 3 * data->n_triangles; k++)
+        if (data->indices[k] >= data->n_vertices)
+            return imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+                                   "triangle %zu names vertex %u; there are %zu", k / 3,
+                                   data->indices[k], data->n_vertices);
+    for (size_t k = 0; data->uvs && k < 2 * data->n_vertices; k++)
+        if (!isfinite(data->uvs[k]))
+            return imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+                                   "the uv of vertex %zu is not finite", k / 2);
+    return IMP_OK;
+}
+
+static enum imp_status areas_sum(const struct imp_build *b, struct imp__mesh *m,
+                                 struct imp_shape *s, size_t n)
+{
+    m->cumulative = imp__arena_take(b->arena, n, sizeof *m->cumulative);
+    if (!m->cumulative)
+        return imp__node_error(b->ctx, b->node, IMP_E_NOMEM, "out of memory");
+    double sum = 0;
+    for (size_t k = 0; k < n; k++) {
+        const uint32_t *i = m->indices + 3 * k;
+        const imp_v3 p = load3(m->positions, i[0]);
+        const imp_v3 c = imp__cross(load3(m->positions, i[1]) - p,
+                                    load3(m->positions, i[2]) - p);
+        const double before = sum;
+        sum += imp__length(c) / 2;
+        if (sum > before) m->last = k;
+        m->cumulative[k] = sum;
+    }
+    if (!isfinite(sum))
+        return imp__node_error(b->ctx, b->node, IMP_E_SCENE, "its area is not finite");
+    s->area = sum;
+    m->inv_area = sum > 0 ? 1 / sum : 0;
+    return IMP_OK;
+}
+
+enum imp_status imp__mesh_build(const struct imp_build *b, void *self, struct imp_shape *s,
+                                const struct imp_mesh_data *data, bool face_normals)
+{
+    enum imp_status st = IMP_OK;
+    struct imp__mesh *m = self;
+    struct imp_placement at;
+
+    IMP_TRY(imp__shape_placement(b, s, &at));
+    IMP_TRY(data_check(b, data));
+    const size_t n = data->n_vertices;
+    float *positions = imp__arena_array(b->arena, 3 * n + 4, sizeof *positions);
+    float *normals = face_normals ? NULL : imp__arena_take(b->arena, 3 * n, sizeof *normals);
+    if (!positions || (!normals && !face_normals))
+        IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_NOMEM, "out of memory"));
+    IMP_TRY(positions_place(b, s, data, &at, positions));
+    m->positions = positions;
+    m->uvs = data->uvs;
+    m->indices = data->indices;
+    m->reversed = at.mirrored != s->flip_normals;
+    if (m->reversed) {
+        uint32_t *indices = imp__arena_take(b->arena, 3 * data->n_triangles, sizeof *indices);
+        if (!indices) IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_NOMEM, "out of memory"));
+        for (size_t k = 0; k < data->n_triangles; k++) {
+            indices[3 * k] = data->indices[3 * k];
+            indices[3 * k + 1] = data->indices[3 * k + 2];
+            indices[3 * k + 2] = data->indices[3 * k + 1];
+        }
+        m->indices = indices;
+    }
+    if (normals && data->normals)
+        IMP_TRY(normals_place(b, s, data, &at, normals));
+    else if (normals)
+        IMP_TRY(imp__mesh_normals(b->ctx, n, data->n_triangles, m->positions, m->indices,
+                                  normals));
+    m->normals = normals;
+    IMP_TRY(areas_sum(b, m, s, data->n_triangles));
+    s->geometry = IMP_TRIANGLES;
+    s->triangles =
+        (struct imp_triangles){n, data->n_triangles, m->positions, m->indices};
+out:
+    return st;
+}
+
+void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit, const imp_v3 *o,
+                       const imp_v3 *d, struct imp_surface *out)
+{
+    (void)o, (void)d;
+    const struct imp__mesh *m = s->self;
+    const uint32_t *i = m->indices + 3 * (size_t)hit->prim;
+    const double b1 = hit->u, b2 = hit->v, b0 = 1 - b1 - b2;
+    const imp_v3 p0 = load3(m->positions, i[0]);
+    const imp_v3 e1 = load3(m->positions, i[1]) - p0, e2 = load3(m->positions, i[2]) - p0;
+    const imp_v3 c = imp__cross(e1, e2);
+    const double length = imp__length(c);
+    out->p = p0 + e1 * b1 + e2 * b2;
+    out->ng = length > 0 ? c * (1 / length) : imp__v3(0, 0, 1);
+
+    out->n = out->ng;
+    if (m->normals) {
+        const imp_v3 n = load3(m->normals, i[0]) * b0 + load3(m->normals, i[1]) * b1 +
+                         load3(m->normals, i[2]) * b2;
+        const double l = imp__length(n);
+        if (l > 1e-6) out->n = n * (1 / l);
+    }
+
+    /* Without uv they are the weights of the file's second and third vertex. */
+    out->uv[0] = m->reversed ? b2 : b1;
+    out->uv[1] = m->reversed ? b1 : b2;
+    out->dp_du = m->reversed ? e2 : e1;
+    out->dp_dv = m->reversed ? e1 : e2;
+    if (m->uvs) {
+        const float *t0 = m->uvs + 2 * (size_t)i[0], *t1 = m->uvs + 2 * (size_t)i[1],
+                    *t2 = m->uvs + 2 * (size_t)i[2];
+        const double u1 = (double)t1[0] - t0[0], v1 = (double)t1[1] - t0[1];
+        const double u2 = (double)t2[0] - t0[0], v2 = (double)t2[1] - t0[1];
+        const double det = u1 * v2 - v1 * u2;
+        out->uv[0] = t0[0] + b1 * u1 + b2 * u2;
+        out->uv[1] = t0[1] + b1 * v1 + b2 * v2;
+        /* Solve e_k = u_k dp_du + v_k dp_dv unless the uv triangle is a sliver. */
+        if (fabs(det) > 1e-12 * ((u1 * u1 + v1 * v1) + (u2 * u2 + v2 * v2))) {
+            out->dp_du = (e1 * v2 - e2 * v1) * (1 / det);
+            out->dp_dv = (e2 * u1 - e1 * u2) * (1 / det);
+        }
+    }
+    imp__surface_frame(out);
+}
+
+bool imp__mesh_sample(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
+                      struct imp_light_sample *out)
+{
+    const struct imp__mesh *m = s->self;
+    if (!(s->area > 0)) return false;
+    /* The first triangle whose cumulative area exceeds x: those without area never are. */
+    const double x = u[0] * s->area;
+    size_t lo = 0, hi = m->last;
+    while (lo < hi) {
+        const size_t middle = lo + (hi - lo) / 2;
+        if (m->cumulative[middle] > x) hi = middle;
+        else lo = middle + 1;
+    }
+    const double below = lo ? m->cumulative[lo - 1] : 0, width = m->cumulative[lo] - below;
+    double b[2];
+    imp__uniform_triangle((double[2]){imp_clamp((x - below) / width, 0.0, 0x1.fffffffffffffp-1),
+                                      u[1]}, b);
+    const struct imp_hit hit = {.prim = (int)lo, .u = b[0], .v = b[1]};
+    struct imp_surface at;
+    imp__mesh_surface(s, &hit, NULL, NULL, &at);
+    out->uv[0] = at.uv[0];
+    out->uv[1] = at.uv[1];
+    return imp__light_from_area(*ref, at.p, at.ng, at.n, m->inv_area, out);
+}
+
+double imp__mesh_pdf(const struct imp_shape *s, const imp_v3 *ref, const struct imp_hit *hit,
+                     const struct imp_surface *at)
+{
+    (void)hit;
+    const struct imp__mesh *m = s->self;
+    return imp__area_to_angle(*ref, at->p, at->ng, m->inv_area);
+}
+
+static enum imp_status mesh_build(const struct imp_build *b, void *self, struct imp_shape *s)
+{
+    bool face_normals;
+    const enum imp_status st =
+        imp__props_bool(b->ctx, b->node, "face_normals", false, &face_normals);
+    if (st != IMP_OK) return st;
+    if (!b->node->mesh)
+        return imp__node_error(b->ctx, b->node, IMP_E_SCENE, "no triangles were given to it");
+    return imp__mesh_build(b, self, s, b->node->mesh, face_normals);
+}
+
+/* The file has been read by now; its properties are only marked as known. */
+static enum imp_status file_build(const struct imp_build *b, void *self, struct imp_shape *s)
+{
+    const char *filename;
+    bool flip;
+    enum imp_status st = imp__props_string(b->ctx, b->node, "filename", NULL, &filename);
+    if (st == IMP_OK)
+        st = imp__props_bool(b->ctx, b->node, "flip_tex_coords", false, &flip);
+    if (st != IMP_OK) return st;
+    return mesh_build(b, self, s);
+}
+
+const struct imp_shape_ops imp__mesh = {
+    sizeof(struct imp_shape_ops), "mesh", sizeof(struct imp__mesh), mesh_build, NULL,
+    imp__mesh_surface, imp__mesh_sample, imp__mesh_pdf};
+const struct imp_shape_ops imp__obj = {
+    sizeof(struct imp_shape_ops), "obj", sizeof(struct imp__mesh), file_build, NULL,
+    imp__mesh_surface, imp__mesh_sample, imp__mesh_pdf};
+const struct imp_shape_ops imp__ply = {
+    sizeof(struct imp_shape_ops), "ply", sizeof(struct imp__mesh), file_build, NULL,
+    imp__mesh_surface, imp__mesh_sample, imp__mesh_pdf};

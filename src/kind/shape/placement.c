@@ -1,0 +1,55 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "shape.h"
+
+enum imp_status imp__shape_placement(const struct imp_build *b, struct imp_shape *s,
+                                     struct imp_placement *out)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_placement p;
+    double weight;
+
+    IMP_TRY(imp__props_transform(b->ctx, b->node, "to_world", p.to_world.m));
+    IMP_TRY(imp__props_bool(b->ctx, b->node, "flip_normals", false, &s->flip_normals));
+    IMP_TRY(imp__props_float(b->ctx, b->node, "silhouette_sampling_weight", 1, &weight));
+    const struct imp_prop *prop = imp__node_prop(b->node, "to_world");
+    if (!imp__mat4_is_finite(&p.to_world))
+        IMP_TRY(imp__prop_error(b->ctx, b->node, prop, IMP_E_SCENE,
+                                "to_world is not finite"));
+    if (!imp__mat4_is_affine(&p.to_world))
+        IMP_TRY(imp__prop_error(b->ctx, b->node, prop, IMP_E_SCENE,
+                                "to_world is not affine: its last row must be 0 0 0 1"));
+    if (!imp__mat4_inverse(&p.to_world, &p.to_local))
+        IMP_TRY(imp__prop_error(b->ctx, b->node, prop, IMP_E_SCENE,
+                                "to_world is singular: it flattens the shape"));
+    p.mirrored = imp__mat4_det3(&p.to_world) < 0;
+    *out = p;
+out:
+    return st;
+}
+
+/* Gram and Schmidt, x first: for a rotation and scales it is the exact decomposition. */
+void imp__placement_frame(const struct imp_build *b, const struct imp_mat4 *to_world,
+                          int equal, struct imp_frame *frame, double length[3])
+{
+    imp_v3 e[3];
+    bool exact = true;
+    for (int i = 0; i < 3; i++) {
+        e[i] = imp__mat4_column(to_world, i);
+        length[i] = imp__length(e[i]);
+        e[i] = e[i] * (1 / length[i]);
+        for (int j = 0; j < i; j++) {
+            exact &= fabs(imp__dot(e[i], e[j])) < 1e-6;
+            e[i] = e[i] - e[j] * imp__dot(e[i], e[j]);
+        }
+        e[i] = imp__normalize(e[i]);
+    }
+    for (int i = 1; i < equal; i++) exact &= fabs(length[i] - length[0]) < 1e-6 * length[0];
+    if (!exact) {
+        char where[512];
+        imp__warn(b->ctx, "%s: shape '%s' (%s): to_world shears it or scales it unevenly; it "
+                  "stays round, with the scale of its x axis",
+                  imp__loc_text(b->node->loc, where, sizeof where),
+                  b->node->id ? b->node->id : "", b->node->type);
+    }
+    *frame = (struct imp_frame){e[0], e[1], e[2]};
+}

@@ -1,0 +1,94 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The square [-1,1]^2 at z = 0 under an affine map: a parallelogram. Embree sees two
+ * triangles; the surface is computed from the parallelogram itself, in double. */
+#include "shape.h"
+
+struct rectangle {
+    imp_v3 corner, eu, ev;   /* p = corner + u eu + v ev, so eu and ev are dp_du, dp_dv */
+    imp_v3 s, t, n;          /* the shading frame is the same everywhere */
+    double inv_area;
+    float positions[12 + 4]; /* and Embree's 16 bytes */
+    uint32_t indices[6];
+};
+
+static enum imp_status rectangle_build(const struct imp_build *b, void *self,
+                                       struct imp_shape *s)
+{
+    struct rectangle *r = self;
+    struct imp_placement at;
+    const enum imp_status st = imp__shape_placement(b, s, &at);
+    if (st != IMP_OK) return st;
+
+    r->corner = imp__point(&at.to_world, imp__v3(-1, -1, 0));
+    r->eu = imp__vector(&at.to_world, imp__v3(2, 0, 0));
+    r->ev = imp__vector(&at.to_world, imp__v3(0, 2, 0));
+    s->area = imp__length(imp__cross(r->eu, r->ev));
+    if (!(s->area > 0) || !isfinite(s->area))
+        return imp__node_error(b->ctx, b->node, IMP_E_SCENE, "its area is %g", s->area);
+    r->inv_area = 1 / s->area;
+    /* The image of local +z as normals go, so that mirroring in the plane keeps its side. */
+    r->n = imp__normalize(imp__cross(r->eu, r->ev)) *
+           ((at.mirrored != s->flip_normals) ? -1.0 : 1.0);
+    struct imp_surface frame = {.n = r->n, .dp_du = r->eu};
+    imp__surface_frame(&frame);
+    r->s = frame.s;
+    r->t = frame.t;
+
+    static const uint32_t indices[6] = {0, 1, 2, 0, 2, 3};
+    memcpy(r->indices, indices, sizeof indices);
+    s->lo = imp__v3(INFINITY, INFINITY, INFINITY);
+    s->hi = -s->lo;
+    for (int k = 0; k < 4; k++) {
+        const imp_v3 p = r->corner + r->eu * (double)(k == 1 || k == 2) +
+                         r->ev * (double)(k >= 2);
+        for (int i = 0; i < 3; i++) {
+            r->positions[3 * k + i] = (float)p[i];
+            s->lo[i] = fmin(s->lo[i], p[i]);
+            s->hi[i] = fmax(s->hi[i], p[i]);
+        }
+    }
+    s->lo[3] = s->hi[3] = 0;
+    s->geometry = IMP_TRIANGLES;
+    s->triangles = (struct imp_triangles){4, 2, r->positions, r->indices};
+    return IMP_OK;
+}
+
+static void rectangle_surface(const struct imp_shape *s, const struct imp_hit *hit,
+                              const imp_v3 *o, const imp_v3 *d, struct imp_surface *out)
+{
+    (void)o, (void)d;
+    const struct rectangle *r = s->self;
+    /* Corners (0,0) (1,0) (1,1) (0,1), triangles 012 and 023. */
+    const double sum = hit->u + hit->v;
+    out->uv[0] = hit->prim == 0 ? sum : hit->u;
+    out->uv[1] = hit->prim == 0 ? hit->v : sum;
+    out->p = r->corner + r->eu * out->uv[0] + r->ev * out->uv[1];
+    out->ng = out->n = r->n;
+    out->s = r->s;
+    out->t = r->t;
+    out->dp_du = r->eu;
+    out->dp_dv = r->ev;
+}
+
+static bool rectangle_sample(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
+                             struct imp_light_sample *out)
+{
+    const struct rectangle *r = s->self;
+    out->uv[0] = u[0];
+    out->uv[1] = u[1];
+    return imp__light_from_area(*ref, r->corner + r->eu * u[0] + r->ev * u[1], r->n, r->n,
+                                r->inv_area, out);
+}
+
+static double rectangle_pdf(const struct imp_shape *s, const imp_v3 *ref,
+                            const struct imp_hit *hit, const struct imp_surface *at)
+{
+    (void)hit;
+    const struct rectangle *r = s->self;
+    return imp__area_to_angle(*ref, at->p, at->ng, r->inv_area);
+}
+
+const struct imp_shape_ops imp__rectangle = {
+    sizeof(struct imp_shape_ops), "rectangle", sizeof(struct rectangle), rectangle_build,
+    NULL, rectangle_surface, rectangle_sample, rectangle_pdf};

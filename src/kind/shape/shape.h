@@ -1,0 +1,110 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What shapes share: where they are placed, the shading frame, and the change of measure
+ * between area and solid angle. */
+#ifndef IMP_KIND_SHAPE_H
+#define IMP_KIND_SHAPE_H
+
+#include "base/compiler.h"
+#include "kind/build.h"
+#include "math/transform.h"
+
+struct imp_placement {
+    struct imp_mat4 to_world, to_local;
+    bool mirrored;   /* to_world turns right hands into left hands */
+};
+
+/* Read the properties that all shapes have: to_world (affine and invertible, or an error),
+ * flip_normals, and silhouette_sampling_weight, which forward pictures ignore. */
+enum imp_status imp__shape_placement(const struct imp_build *b, struct imp_shape *s,
+                                     struct imp_placement *out);
+
+/* A column of the upper left 3x3: the image of a unit vector. */
+static inline imp_v3 imp__mat4_column(const struct imp_mat4 *a, int j)
+{
+    return imp__v3(a->m[j], a->m[4 + j], a->m[8 + j]);
+}
+
+/* For shapes that stay round: the images of x, y, z as an orthonormal frame (of either
+ * hand) and their lengths; warns that `what` is not exact if to_world shears or if
+ * `equal` of the lengths differ. */
+void imp__placement_frame(const struct imp_build *b, const struct imp_mat4 *to_world,
+                          int equal, struct imp_frame *frame, double length[3]);
+
+/* s and t from n and dp_du (scene-format 3.2); the basis of n alone where dp_du vanishes. */
+static inline void imp__surface_frame(struct imp_surface *x)
+{
+    const imp_v3 s = x->dp_du - x->n * imp__dot(x->n, x->dp_du);
+    const double l2 = imp__dot(s, s);
+    if (imp_likely(l2 > 1e-20 * imp__dot(x->dp_du, x->dp_du))) {
+        x->s = s * (1 / sqrt(l2));
+        x->t = imp__cross(x->n, x->s);
+    } else {
+        const struct imp_frame f = imp__frame_from_normal(x->n);
+        x->s = f.s;
+        x->t = f.t;
+    }
+}
+
+/* Points nearer to edge-on than this are neither drawn nor given a density. */
+#define IMP_GRAZING 1e-12
+
+/* Density per solid angle at ref of the point p, drawn uniformly from `area`:
+ * p(w) = r^2 / (area |cos|) with the geometric normal (PBR 4e, eq. 6.30). */
+static inline double imp__area_to_angle(imp_v3 ref, imp_v3 p, imp_v3 ng, double inv_area)
+{
+    const imp_v3 d = p - ref;
+    const double r2 = imp__dot(d, d), c = fabs(imp__dot(d, ng));
+    return c > IMP_GRAZING * sqrt(r2) ? r2 * sqrt(r2) * inv_area / c : 0;
+}
+
+/* The light sample of a point drawn uniformly by area; n is the shading normal. */
+static inline bool imp__light_from_area(imp_v3 ref, imp_v3 p, imp_v3 ng, imp_v3 n,
+                                        double inv_area, struct imp_light_sample *out)
+{
+    const imp_v3 d = p - ref;
+    const double r = imp__length(d);
+    out->pdf = imp__area_to_angle(ref, p, ng, inv_area);
+    if (!(out->pdf > 0) || !(r < INFINITY)) return false;
+    out->wi = d * (1 / r);
+    out->dist = r;
+    out->cos_light = -imp__dot(out->wi, n);
+    out->p = p;
+    out->ng = ng;
+    return true;
+}
+
+/* Angle about the axis over 2 pi, in [0, 1). */
+static inline double imp__turn(double x, double y)
+{
+    const double phi = atan2(y, x) * (1 / IMP_2PI), turn = phi < 0 ? phi + 1 : phi;
+    return turn < 1 ? turn : 0;
+}
+
+/* A mesh from arrays that live as long as the scene (mesh.c); b, s as in build. */
+enum imp_status imp__mesh_build(const struct imp_build *b, void *self, struct imp_shape *s,
+                                const struct imp_mesh_data *data, bool face_normals);
+/* Angle-weighted vertex normals, averaged over vertices at equal positions (mesh_normals.c).
+ * out [3 n_vertices]. */
+enum imp_status imp__mesh_normals(imp_context *ctx, size_t n_vertices, size_t n_triangles,
+                                  const float *positions, const uint32_t *indices,
+                                  float *out);
+struct imp__mesh {
+    const float *positions, *normals, *uvs; /* world; normals, uvs may be NULL */
+    const uint32_t *indices;
+    bool reversed;      /* second and third vertex were exchanged */
+    double *cumulative; /* [n] area of the triangles up to and with this one */
+    size_t last;        /* the last triangle that has area */
+    double inv_area;
+};
+void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit, const imp_v3 *o,
+                       const imp_v3 *d, struct imp_surface *out);
+bool imp__mesh_sample(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
+                      struct imp_light_sample *out);
+double imp__mesh_pdf(const struct imp_shape *s, const imp_v3 *ref, const struct imp_hit *hit,
+                     const struct imp_surface *at);
+
+extern const struct imp_shape_ops imp__rectangle, imp__disk, imp__sphere, imp__cylinder,
+    imp__cube, imp__mesh, imp__obj, imp__ply;
+
+#endif

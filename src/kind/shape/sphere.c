@@ -1,0 +1,152 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The sphere, in double precision. Seen from outside it is sampled by the cone of directions
+ * it fills, from inside by area. */
+#include "math/warp.h"
+#include "shape.h"
+
+struct sphere {
+    imp_v3 center;
+    struct imp_frame axes;  /* orthonormal, local x, y, z; of the left hand if mirrored */
+    double radius;
+    double side;            /* 1: the normal points outwards */
+};
+
+static enum imp_status sphere_build(const struct imp_build *b, void *self,
+                                    struct imp_shape *s)
+{
+    enum imp_status st = IMP_OK;
+    struct sphere *p = self;
+    struct imp_placement at;
+    double center[3], radius, scale[3];
+
+    IMP_TRY(imp__shape_placement(b, s, &at));
+    IMP_TRY(imp__props_vector(b->ctx, b->node, "center", (double[3]){0, 0, 0}, center));
+    IMP_TRY(imp__props_float(b->ctx, b->node, "radius", 1, &radius));
+    imp__placement_frame(b, &at.to_world, 3, &p->axes, scale);
+    p->center = imp__point(&at.to_world, imp__v3(center[0], center[1], center[2]));
+    p->radius = fabs(radius) * scale[0];
+    s->area = 4 * IMP_PI * p->radius * p->radius;
+    if (!(s->area > 0) || !isfinite(s->area) || !imp__is_finite(p->center))
+        IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "radius"),
+                                IMP_E_SCENE, "its radius is %g, its area %g", p->radius,
+                                s->area));
+    /* A mirroring placement turns the normal inwards, flip_normals turns it back
+     * (scene-format 4.2). A negative radius mirrors all three axes. */
+    if (radius < 0) p->axes = (struct imp_frame){-p->axes.s, -p->axes.t, -p->axes.n};
+    p->side = ((at.mirrored != (radius < 0)) != s->flip_normals) ? -1 : 1;
+    const imp_v3 r = imp__v3(p->radius, p->radius, p->radius);
+    s->lo = p->center - r;
+    s->hi = p->center + r;
+    s->geometry = IMP_ANALYTIC;
+out:
+    return st;
+}
+
+/* Discriminant from the distance of the centre to the line, not from b^2 - ac, and the
+ * small root from the product of the roots: no digits are lost far away or for small
+ * spheres (Haines et al., Ray Tracing Gems, ch. 7). */
+static bool sphere_intersect(const struct imp_shape *s, const imp_v3 *o, const imp_v3 *d,
+                             double tmin, double tmax, struct imp_hit *hit)
+{
+    const struct sphere *p = s->self;
+    const imp_v3 oc = *o - p->center;
+    const double a = imp__dot(*d, *d), b = -imp__dot(oc, *d);
+    const imp_v3 l = oc + *d * (b / a);
+    const double r2 = p->radius * p->radius, e = r2 - imp__dot(l, l);
+    if (!(e >= 0)) return false;
+    const double q = b + copysign(sqrt(a * e), b), c = imp__dot(oc, oc) - r2;
+    const double ta = q / a, tb = q != 0 ? c / q : ta;
+    const double t0 = fmin(ta, tb), t1 = fmax(ta, tb);
+    const double t = t0 > tmin ? t0 : t1;
+    if (!(t > tmin && t < tmax)) return false;
+    hit->t = t;
+    hit->u = hit->v = 0;
+    hit->prim = 0;
+    return true;
+}
+
+/* uv, derivatives and frame from the outward unit normal. */
+static void surface_at(const struct sphere *p, imp_v3 outward, struct imp_surface *out)
+{
+    const imp_v3 q = imp__to_local(&p->axes, outward);
+    const double rho = sqrt(q[0] * q[0] + q[1] * q[1]);
+    out->p = p->center + outward * p->radius;
+    out->ng = out->n = outward * p->side;
+    out->uv[0] = imp__turn(q[0], q[1]);
+    out->uv[1] = atan2(rho, q[2]) * IMP_INV_PI;
+    out->dp_du = imp__to_world(&p->axes, imp__v3(-q[1], q[0], 0)) * (IMP_2PI * p->radius);
+    const double c = rho > 0 ? q[0] / rho : 1, si = rho > 0 ? q[1] / rho : 0;
+    out->dp_dv = imp__to_world(&p->axes, imp__v3(q[2] * c, q[2] * si, -rho)) *
+                 (IMP_PI * p->radius);
+    imp__surface_frame(out);
+}
+
+static void sphere_surface(const struct imp_shape *s, const struct imp_hit *hit,
+                           const imp_v3 *o, const imp_v3 *d, struct imp_surface *out)
+{
+    const struct sphere *p = s->self;
+    surface_at(p, imp__normalize(*o + *d * hit->t - p->center), out);
+}
+
+/* 1 - cos(theta_max) of the cone seen from distance r; < 0 on and inside the sphere. */
+static double cone_height(const struct sphere *p, double distance)
+{
+    if (!(distance > p->radius)) return -1;
+    const double s2 = imp__sqr(p->radius / distance);
+    return s2 / (1 + sqrt(fmax(0, 1 - s2)));
+}
+
+static bool sphere_sample(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
+                          struct imp_light_sample *out)
+{
+    const struct sphere *p = s->self;
+    const imp_v3 to_center = p->center - *ref;
+    const double distance = imp__length(to_center), height = cone_height(p, distance);
+    struct imp_surface at;
+    if (height < 0) {
+        const imp_v3 w = imp__uniform_sphere(u);
+        surface_at(p, imp__to_world(&p->axes, w), &at);
+        out->uv[0] = at.uv[0];
+        out->uv[1] = at.uv[1];
+        return imp__light_from_area(*ref, at.p, at.ng, at.n, 1 / s->area, out);
+    }
+    if (!(distance < INFINITY)) return false;
+    /* Everything from 1 - cos(theta), so that a distant sphere keeps its digits. gamma is
+     * the angle at the near point between the ray and the normal: sin(gamma) = sin(theta) /
+     * sin(theta_max); alpha = gamma - theta the angle at the centre. */
+    const double k = u[0] * height, sin2 = k * (2 - k), cos_theta = 1 - k;
+    const double sin_theta = sqrt(sin2), sin2_max = height * (2 - height);
+    const double sin2_gamma = fmin(1, sin2 / sin2_max);
+    const double sin_gamma = sqrt(sin2_gamma), cos_gamma = sqrt(1 - sin2_gamma);
+    const double cos_alpha = cos_gamma * cos_theta + sin_gamma * sin_theta;
+    const double sin_alpha = sin_gamma * cos_theta - cos_gamma * sin_theta;
+    const double phi = IMP_2PI * u[1];
+    const struct imp_frame f = imp__frame_from_normal(to_center * (1 / distance));
+    const imp_v3 across = f.s * cos(phi) + f.t * sin(phi);
+    const imp_v3 outward = across * sin_alpha - f.n * cos_alpha;
+    surface_at(p, imp__normalize(outward), &at);
+    out->wi = across * sin_theta + f.n * cos_theta;
+    out->dist = imp__length(at.p - *ref);
+    out->pdf = 1 / (IMP_2PI * height);
+    out->uv[0] = at.uv[0];
+    out->uv[1] = at.uv[1];
+    out->cos_light = -imp__dot(out->wi, at.n);
+    out->p = at.p;
+    out->ng = at.ng;
+    return out->dist > 0;
+}
+
+static double sphere_pdf(const struct imp_shape *s, const imp_v3 *ref,
+                         const struct imp_hit *hit, const struct imp_surface *at)
+{
+    (void)hit;
+    const struct sphere *p = s->self;
+    const double height = cone_height(p, imp__length(p->center - *ref));
+    return height >= 0 ? 1 / (IMP_2PI * height)
+                       : imp__area_to_angle(*ref, at->p, at->ng, 1 / s->area);
+}
+
+const struct imp_shape_ops imp__sphere = {
+    sizeof(struct imp_shape_ops), "sphere", sizeof(struct sphere), sphere_build,
+    sphere_intersect, sphere_surface, sphere_sample, sphere_pdf};

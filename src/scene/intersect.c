@@ -1,0 +1,304 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Rays against the scene: the one file that includes Embree. Triangles are Embree's own
+ * work, in float; analytic shapes answer through their ops, in double, and their hits never
+ * pass through a float (struct query carries ray and hit past it).
+ *
+ * One device a context, made on first use. It runs in the thread that commits: the scene is
+ * built the same way each time, and no thread of Embree's outlives a call. */
+#include <embree3/rtcore.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <string.h>
+#include "scene.h"
+
+struct device {
+    imp_context *ctx;
+    RTCDevice rtc;
+    _Atomic int64_t bytes;       /* held by Embree */
+    pthread_mutex_t lock;        /* one commit at a time: bytes and message belong to it */
+    enum RTCError error;
+    char message[256];
+};
+
+struct intersector {
+    RTCScene rtc;
+    bool analytic;               /* some shape answers through its ops */
+    int64_t bytes;
+};
+
+static void error_keep(void *user, enum RTCError error, const char *text)
+{
+    struct device *dev = user;
+    if (dev->error != RTC_ERROR_NONE) return;
+    dev->error = error;
+    snprintf(dev->message, sizeof dev->message, "%s", text ? text : "");
+}
+
+static bool bytes_count(void *user, ssize_t bytes, bool post)
+{
+    struct device *dev = user;
+    (void)post;
+    atomic_fetch_add_explicit(&dev->bytes, bytes, memory_order_relaxed);
+    return true;
+}
+
+static void device_release(void *memory)
+{
+    struct device *dev = memory;
+    if (dev->rtc) {
+        rtcSetDeviceErrorFunction(dev->rtc, NULL, NULL);
+        rtcReleaseDevice(dev->rtc);
+    }
+    pthread_mutex_destroy(&dev->lock);
+    imp__release(dev->ctx, dev);
+}
+
+static enum imp_status device_error(imp_context *ctx, enum RTCError error, const char *text)
+{
+    return imp__error(ctx, error == RTC_ERROR_OUT_OF_MEMORY ? IMP_E_NOMEM : IMP_E_UNSUPPORTED,
+                      "Embree: error %d%s%s", (int)error, *text ? ": " : "", text);
+}
+
+/* The context's device; two threads may ask for the first time at once. */
+static enum imp_status device_get(imp_context *ctx, struct device **out)
+{
+    enum imp_status st = IMP_OK;
+    struct device *dev = NULL;
+
+    pthread_mutex_lock(&ctx->lock);
+    *out = ctx->device;
+    pthread_mutex_unlock(&ctx->lock);
+    if (*out) return IMP_OK;
+    dev = imp__alloc(ctx, 1, sizeof *dev);
+    if (!dev) return imp__error(ctx, IMP_E_NOMEM, "out of memory for Embree's device");
+    dev->ctx = ctx;
+    pthread_mutex_init(&dev->lock, NULL);
+    dev->rtc = rtcNewDevice("threads=1,ignore_config_files=1");
+    if (!dev->rtc) IMP_TRY(device_error(ctx, rtcGetDeviceError(NULL), "no device"));
+    rtcSetDeviceErrorFunction(dev->rtc, error_keep, dev);
+    rtcSetDeviceMemoryMonitorFunction(dev->rtc, bytes_count, dev);
+
+    pthread_mutex_lock(&ctx->lock);
+    if (!ctx->device) {
+        ctx->device_release = device_release;
+        ctx->device = dev;
+        dev = NULL;
+    }
+    *out = ctx->device;
+    pthread_mutex_unlock(&ctx->lock);
+out:
+    if (dev) device_release(dev);
+    return st;
+}
+
+/* ---- analytic shapes --------------------------------------------------------------- */
+
+/* What Embree hands on to the callbacks: the ray and the best analytic hit, in double. */
+struct query {
+    struct RTCIntersectContext context; /* first: callbacks get its address */
+    const imp_v3 *o, *d;
+    double tmin, tmax;
+    struct imp_hit hit;                 /* hit.shape -1: none yet */
+};
+
+static void analytic_bounds(const struct RTCBoundsFunctionArguments *args)
+{
+    const struct imp_shape *s = args->geometryUserPtr;
+    struct RTCBounds *b = args->bounds_o;
+    b->lower_x = nextafterf((float)s->lo[0], -INFINITY);
+    b->lower_y = nextafterf((float)s->lo[1], -INFINITY);
+    b->lower_z = nextafterf((float)s->lo[2], -INFINITY);
+    b->upper_x = nextafterf((float)s->hi[0], INFINITY);
+    b->upper_y = nextafterf((float)s->hi[1], INFINITY);
+    b->upper_z = nextafterf((float)s->hi[2], INFINITY);
+}
+
+static void analytic_intersect(const struct RTCIntersectFunctionNArguments *args)
+{
+    const struct imp_shape *s = args->geometryUserPtr;
+    struct query *q = (struct query *)args->context;
+    struct RTCRayHit *r = (struct RTCRayHit *)args->rayhit; /* N is 1 for rtcIntersect1 */
+    struct imp_hit hit;
+    if (!args->valid[0]) return;
+    const double tmax = fmin(r->ray.tfar, q->tmax);
+    if (!s->ops->intersect(s, q->o, q->d, q->tmin, tmax, &hit)) return;
+    hit.shape = s->index;
+    q->hit = hit;
+    q->tmax = hit.t;
+    r->ray.tfar = (float)hit.t;
+    r->hit.geomID = args->geomID;
+    r->hit.primID = (unsigned)hit.prim;
+    r->hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+}
+
+static void analytic_occluded(const struct RTCOccludedFunctionNArguments *args)
+{
+    const struct imp_shape *s = args->geometryUserPtr;
+    const struct query *q = (const struct query *)args->context;
+    struct imp_hit hit;
+    if (!args->valid[0]) return;
+    if (s->ops->intersect(s, q->o, q->d, q->tmin, q->tmax, &hit))
+        ((struct RTCRay *)args->ray)->tfar = -INFINITY;
+}
+
+/* ---- building ---------------------------------------------------------------------- */
+
+static RTCGeometry geometry_create(RTCDevice rtc, struct imp_shape *s)
+{
+    const bool analytic = s->geometry == IMP_ANALYTIC;
+    RTCGeometry g = rtcNewGeometry(rtc, analytic ? RTC_GEOMETRY_TYPE_USER
+                                                 : RTC_GEOMETRY_TYPE_TRIANGLE);
+    if (!g) return NULL;
+    if (analytic) {
+        rtcSetGeometryUserPrimitiveCount(g, 1);
+        rtcSetGeometryUserData(g, s);
+        rtcSetGeometryBoundsFunction(g, analytic_bounds, NULL);
+        rtcSetGeometryIntersectFunction(g, analytic_intersect);
+        rtcSetGeometryOccludedFunction(g, analytic_occluded);
+    } else {
+        const struct imp_triangles *t = &s->triangles;
+        rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
+                                   t->positions, 0, 3 * sizeof(float), t->n_vertices);
+        rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                                   t->indices, 0, 3 * sizeof(uint32_t), t->n_triangles);
+    }
+    rtcCommitGeometry(g);
+    return g;
+}
+
+enum imp_status imp__intersector_create(struct imp_scene *scene)
+{
+    enum imp_status st = IMP_OK;
+    struct device *dev;
+    char message[sizeof dev->message] = "";
+
+    IMP_TRY(device_get(scene->ctx, &dev));
+    struct intersector *x = imp__alloc(scene->ctx, 1, sizeof *x);
+    if (!x) IMP_TRY(imp__error(scene->ctx, IMP_E_NOMEM, "out of memory for the intersector"));
+
+    pthread_mutex_lock(&dev->lock);
+    const int64_t before = atomic_load(&dev->bytes);
+    dev->error = RTC_ERROR_NONE;
+    dev->message[0] = 0;
+    x->rtc = rtcNewScene(dev->rtc);
+    /* Robust: rays through shared edges do not fall between two triangles. */
+    if (x->rtc) rtcSetSceneFlags(x->rtc, RTC_SCENE_FLAG_ROBUST);
+    for (int i = 0; x->rtc && i < scene->n_shapes && dev->error == RTC_ERROR_NONE; i++) {
+        RTCGeometry g = geometry_create(dev->rtc, scene->shapes[i]);
+        if (!g) break;
+        rtcAttachGeometryByID(x->rtc, g, (unsigned)i);
+        rtcReleaseGeometry(g); /* the scene holds it now */
+        x->analytic |= scene->shapes[i]->geometry == IMP_ANALYTIC;
+    }
+    if (x->rtc && dev->error == RTC_ERROR_NONE) rtcCommitScene(x->rtc);
+    const enum RTCError error =
+        !x->rtc && dev->error == RTC_ERROR_NONE ? RTC_ERROR_UNKNOWN : dev->error;
+    memcpy(message, dev->message, sizeof message);
+    x->bytes = atomic_load(&dev->bytes) - before;
+    if (error != RTC_ERROR_NONE && x->rtc) rtcReleaseScene(x->rtc);
+    pthread_mutex_unlock(&dev->lock);
+
+    if (error != RTC_ERROR_NONE) {
+        imp__release(scene->ctx, x);
+        IMP_TRY(device_error(scene->ctx, error, message));
+    }
+    scene->intersector = x;
+out:
+    return st;
+}
+
+void imp__intersector_destroy(struct imp_scene *scene)
+{
+    struct intersector *x = scene->intersector;
+    if (!x) return;
+    rtcReleaseScene(x->rtc);
+    imp__release(scene->ctx, x);
+    scene->intersector = NULL;
+}
+
+size_t imp__intersector_bytes(const struct imp_scene *scene)
+{
+    const struct intersector *x = scene->intersector;
+    return x && x->bytes > 0 ? (size_t)x->bytes : 0;
+}
+
+/* ---- queries ----------------------------------------------------------------------- */
+
+/* Embree takes larger numbers, and NaN, for a mistake of the caller, and where it was built
+ * with assertions it ends the process. Such rays hit nothing. */
+#define EMBREE_MAX 1e18
+
+static inline bool ray_valid(const imp_v3 *o, const imp_v3 *d, double tmin, double tmax)
+{
+    const double size = ((fabs((*o)[0]) + fabs((*o)[1])) + (fabs((*o)[2]) + fabs((*d)[0]))) +
+                        (fabs((*d)[1]) + fabs((*d)[2]));
+    return size < EMBREE_MAX && tmin >= 0 && tmin < tmax;
+}
+
+static inline void ray_fill(struct RTCRay *r, const imp_v3 *o, const imp_v3 *d, double tmin,
+                            double tmax)
+{
+    r->org_x = (float)(*o)[0];
+    r->org_y = (float)(*o)[1];
+    r->org_z = (float)(*o)[2];
+    r->dir_x = (float)(*d)[0];
+    r->dir_y = (float)(*d)[1];
+    r->dir_z = (float)(*d)[2];
+    r->tnear = (float)tmin;
+    r->tfar = (float)tmax;
+    r->time = 0;
+    r->mask = ~0u;
+    r->id = 0;
+    r->flags = 0;
+}
+
+static inline void query_fill(struct query *q, const struct intersector *x, const imp_v3 *o,
+                              const imp_v3 *d, double tmin, double tmax)
+{
+    rtcInitIntersectContext(&q->context);
+    q->hit.shape = -1;
+    if (!x->analytic) return;
+    q->o = o;
+    q->d = d;
+    q->tmin = tmin;
+    q->tmax = tmax;
+}
+
+bool imp__intersect(const struct imp_scene *scene, const imp_v3 *o, const imp_v3 *d,
+                    double tmin, double tmax, struct imp_hit *hit)
+{
+    const struct intersector *x = scene->intersector;
+    struct query q;
+    struct RTCRayHit r;
+    if (imp_unlikely(!ray_valid(o, d, tmin, tmax))) return false;
+    query_fill(&q, x, o, d, tmin, tmax);
+    ray_fill(&r.ray, o, d, tmin, tmax);
+    r.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    r.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    rtcIntersect1(x->rtc, &q.context, &r);
+    if (r.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+    if (q.hit.shape == (int)r.hit.geomID) {
+        *hit = q.hit;
+        return true;
+    }
+    hit->shape = (int)r.hit.geomID;
+    hit->prim = (int)r.hit.primID;
+    hit->t = r.ray.tfar;
+    hit->u = r.hit.u;
+    hit->v = r.hit.v;
+    return true;
+}
+
+bool imp__occluded(const struct imp_scene *scene, const imp_v3 *o, const imp_v3 *d,
+                   double tmin, double tmax)
+{
+    const struct intersector *x = scene->intersector;
+    struct query q;
+    struct RTCRay r;
+    if (imp_unlikely(!ray_valid(o, d, tmin, tmax))) return false;
+    query_fill(&q, x, o, d, tmin, tmax);
+    ray_fill(&r, o, d, tmin, tmax);
+    rtcOccluded1(x->rtc, &q.context, &r);
+    return r.tfar < 0;
+}
