@@ -1,0 +1,287 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "command.h"
+
+#include "progress.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+struct cli cli;
+
+static const char *const mode_words[] = {"rgb", "mono", NULL};
+static const char *const progress_words[] = {"auto", "always", "never", NULL};
+
+const struct arg_option options_general[] = {
+    {ARG_TEXT, 'o', "output", "FILE", "where the data goes; '-' is standard output",
+     &cli.out, 0, 0, NULL},
+    {ARG_INT, 't', "threads", "N", "threads; 0: all cores (default)", &cli.threads, 0, 4096,
+     NULL},
+    {ARG_FLAG, 0, "json", NULL, "answer in JSON on standard output", &cli.json, 0, 0, NULL},
+    {ARG_CHOICE, 0, "progress", "WHEN", "auto (on a terminal), always or never",
+     &cli.progress, 0, 0, progress_words},
+    {ARG_FLAG, 'q', "quiet", NULL, "say nothing but errors on standard error", &cli.quiet, 0,
+     0, NULL},
+    {ARG_FLAG, 'h', "help", NULL, "this text", &cli.help, 0, 0, NULL},
+    {0}};
+
+const struct arg_option options_scene[] = {
+    {ARG_LIST, 'D', "define", "NAME=VALUE", "set a $parameter of the scene file",
+     &cli.defines, 0, 0, NULL},
+    {ARG_LIST, 0, "set", "ID=V[,V..]", "set a scene parameter ('importon info' lists them)",
+     &cli.sets, 0, 0, NULL},
+    {ARG_TEXT, 'a', "search", "DIR[;DIR..]", "more folders to look for files in",
+     &cli.search, 0, 0, NULL},
+    {ARG_CHOICE, 'm', "mode", "MODE", "colour: rgb (default) or mono", &cli.mode, 0, 0,
+     mode_words},
+    {ARG_FLAG, 0, "dump", NULL, "print the parameters and their values, and stop",
+     &cli.dump, 0, 0, NULL},
+    {0}};
+
+const struct arg_option options_run[] = {
+    {ARG_INT, 's', "sensor", "N", "which sensor, from 0", &cli.sensor, 0, 1e6, NULL},
+    {ARG_INT, 0, "spp", "N", "samples per pixel; default: what the scene asks for",
+     &cli.spp, 1, 1e9, NULL},
+    {ARG_SEED, 0, "seed", "N", "of the random numbers (default 0)", &cli.seed, 0, 0, NULL},
+    {ARG_NUMBER, 0, "time", "SECONDS", "stop after this time with what there is",
+     &cli.time_s, 1e-3, 1e9, NULL},
+    {0}};
+
+/* ---- Talking ------------------------------------------------------------------------ */
+
+int cli_error(int code, const char *format, ...)
+{
+    va_list args;
+    progress_clear();
+    fprintf(stderr, "importon: ");
+    va_start(args, format);
+    vfprintf(stderr, format, args);
+    va_end(args);
+    fprintf(stderr, "\n");
+    return code;
+}
+
+static int exit_code(enum imp_status status)
+{
+    switch (status) {
+    case IMP_OK: return EXIT_DONE;
+    case IMP_CANCELLED: return cli_done();
+    case IMP_E_ARG:
+    case IMP_E_SCENE:
+    case IMP_E_UNSUPPORTED:
+    case IMP_E_BIAS: return EXIT_USAGE;
+    case IMP_E_IO:
+    case IMP_E_NOMEM:
+    case IMP_E_PATHS:
+    case IMP_E_NUMERIC: return EXIT_RUN;
+    }
+    return EXIT_RUN;
+}
+int cli_fail(enum imp_status status, const char *what)
+{
+    const char *message = cli.context ? imp_last_error(cli.context) : "";
+    if (!message[0]) message = imp_status_text(status);
+    if (what) return cli_error(exit_code(status), "%s: %s", what, message);
+    return cli_error(exit_code(status), "%s", message);
+}
+int cli_done(void) { return progress_interrupted() ? EXIT_INTERRUPTED : EXIT_DONE; }
+
+void cli_say(const char *format, ...)
+{
+    va_list args;
+    if (cli.quiet) return;
+    progress_clear();
+    va_start(args, format);
+    vfprintf(stderr, format, args);
+    va_end(args);
+    fprintf(stderr, "\n");
+}
+
+struct json cli_json(void)
+{
+    struct json j = {stdout, 0};
+    json_object(&j, NULL);
+    json_text(&j, "importon", imp_version());
+    json_text(&j, "command", cli.name);
+    return j;
+}
+void cli_json_end(struct json *j)
+{
+    json_end_object(j);
+    fputc('\n', j->file);
+}
+
+void *cli_alloc(size_t n, size_t size)
+{
+    void *memory = calloc(n ? n : 1, size);
+    if (!memory) exit(cli_error(EXIT_RUN, "out of memory"));
+    return memory;
+}
+
+/* ---- Opening ------------------------------------------------------------------------- */
+
+static void on_log(enum imp_log_level level, const char *message, void *payload)
+{
+    (void)payload;
+    cli_say("importon: %s%s", level == IMP_LOG_WARNING ? "warning: " : "", message);
+}
+
+int cli_open(void)
+{
+    struct imp_context_options options = IMP_CONTEXT_OPTIONS_INIT;
+    options.threads = cli.threads;
+    options.log = on_log;
+    const enum imp_status st = imp_context_create(&options, &cli.context);
+    return st == IMP_OK ? 0 : cli_fail(st, NULL);
+}
+
+/* All of stdin. */
+static char *read_stdin(size_t *length)
+{
+    size_t capacity = 1 << 16, n = 0;
+    char *text = cli_alloc(capacity, 1);
+    for (size_t got; (got = fread(text + n, 1, capacity - n, stdin)) > 0;) {
+        n += got;
+        if (n < capacity) continue;
+        char *grown = realloc(text, capacity *= 2);
+        if (!grown) exit(cli_error(EXIT_RUN, "out of memory"));
+        text = grown;
+    }
+    *length = n;
+    return text;
+}
+
+/* Cut "a;b;c" into a list; the text lives as long as the process. */
+static void split_search(const char *paths, struct arg_list *list)
+{
+    char *copy = strdup(paths), *save = NULL;
+    if (!copy) exit(cli_error(EXIT_RUN, "out of memory"));
+    for (char *p = strtok_r(copy, ";", &save); p; p = strtok_r(NULL, ";", &save))
+        args_list_add(list, p);
+}
+
+/* One --set: "name=v" or "name=v,v,..". */
+static int apply_set(const char *text)
+{
+    const char *equal = strchr(text, '=');
+    char *name, *end;
+    double *values = NULL;
+    size_t index, n = 0;
+    int rc = 0;
+    enum imp_status st;
+
+    if (!equal || equal == text)
+        return cli_error(EXIT_USAGE, "--set %s: expected ID=VALUE", text);
+    name = cli_alloc((size_t)(equal - text) + 1, 1);
+    memcpy(name, text, (size_t)(equal - text));
+    values = cli_alloc(strlen(equal), sizeof *values); /* more than there can be */
+    for (const char *p = equal + 1;; p = end + 1) {
+        values[n++] = strtod(p, &end);
+        if (end == p || (*end && *end != ',')) {
+            rc = cli_error(EXIT_USAGE, "--set %s: '%s' is not a number", text, p);
+            goto out;
+        }
+        if (!*end) break;
+    }
+    st = imp_scene_find_param(cli.scene, name, &index);
+    if (st == IMP_OK) st = imp_scene_set_values(cli.scene, index, n, values);
+    if (st != IMP_OK) rc = cli_fail(st, cli.scene_path);
+out:
+    free(name);
+    free(values);
+    return rc;
+}
+
+/* The parameters as --set takes them. Long ones are cut short. */
+static int dump(void)
+{
+    enum { SHOWN = 12 };
+    for (size_t i = 0; i < imp_scene_n_params(cli.scene); i++) {
+        struct imp_param_info info = {.size = sizeof info};
+        double *values;
+        enum imp_status st = imp_scene_get_param(cli.scene, i, &info);
+        if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+        values = cli_alloc(info.count, sizeof *values);
+        st = imp_scene_get_values(cli.scene, i, values);
+        if (st == IMP_OK) {
+            printf("%s=", info.name);
+            for (size_t k = 0; k < info.count && k < SHOWN; k++)
+                printf("%s%.9g", k ? "," : "", values[k]);
+            printf("%s\n", info.count > SHOWN ? ",..." : "");
+        }
+        free(values);
+        if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+    }
+    return EXIT_STOP;
+}
+
+int cli_load(const char *path)
+{
+    struct imp_load_options options = IMP_LOAD_OPTIONS_INIT;
+    struct arg_list search = {0};
+    enum imp_status st;
+    int rc = cli_open();
+    if (rc) return rc;
+
+    cli.scene_path = path;
+    options.mode = cli.mode == 1 ? IMP_MONO : IMP_RGB;
+    options.defines = cli.defines.item;
+    options.n_defines = cli.defines.n;
+    if (cli.search) split_search(cli.search, &search);
+    options.search = search.item;
+    options.n_search = search.n;
+    if (!strcmp(path, "-")) {
+        size_t length;
+        char *xml = read_stdin(&length);
+        cli.scene_path = "<stdin>";
+        st = imp_scene_load_string(cli.context, xml, length, cli.scene_path, &options,
+                                   &cli.scene);
+        free(xml);
+    } else {
+        st = imp_scene_load(cli.context, path, &options, &cli.scene);
+    }
+    args_list_free(&search);
+    if (st != IMP_OK) {
+        rc = cli_fail(st, NULL);
+        return st == IMP_E_IO ? EXIT_USAGE : rc;
+    }
+    for (size_t i = 0; i < cli.sets.n && !rc; i++) rc = apply_set(cli.sets.item[i]);
+    if (!rc && cli.dump) rc = dump();
+    return rc;
+}
+
+void cli_close(void)
+{
+    imp_scene_destroy(cli.scene);
+    imp_context_destroy(cli.context);
+    args_list_free(&cli.defines);
+    args_list_free(&cli.sets);
+}
+
+struct imp_run cli_run(void)
+{
+    struct imp_run run = IMP_RUN_INIT;
+    run.sensor = cli.sensor;
+    run.spp = cli.spp;
+    run.seed = cli.seed;
+    run.time_limit_s = cli.time_s;
+    run.progress = progress_report;
+    return run;
+}
+int cli_spp(const struct imp_run *run)
+{
+    struct imp_sensor_info info = {.size = sizeof info};
+    if (run->spp > 0) return run->spp;
+    if (imp_scene_get_sensor(cli.scene, run->sensor, &info) != IMP_OK) return 0;
+    return info.spp;
+}
+
+const char *cli_number_name(const struct imp_param_info *info, size_t element, char *text,
+                            size_t size)
+{
+    if (info->count == 1) snprintf(text, size, "%s", info->name);
+    else snprintf(text, size, "%s[%zu]", info->name, element);
+    return text;
+}

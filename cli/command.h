@@ -1,0 +1,96 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What all commands share: the options every one understands, the context and scene they
+ * work on, and how they end. A command is a table entry (main.c) with its own option table;
+ * its run function returns an exit code. */
+#ifndef IMP_CLI_COMMAND_H
+#define IMP_CLI_COMMAND_H
+
+#include <importon/importon.h>
+#include <stdio.h>
+#include "args.h"
+#include "json.h"
+
+/* Exit codes; the manual page is the contract. */
+enum {
+    EXIT_DONE = 0,
+    EXIT_NO = 1,          /* check, compare: the answer is no */
+    EXIT_USAGE = 2,       /* usage or scene error */
+    EXIT_RUN = 3,         /* the run failed */
+    EXIT_INTERRUPTED = 130,
+    EXIT_STOP = -1        /* inside: end now, all is done */
+};
+
+struct command {
+    struct args_spec args;
+    int (*run)(int n, char **operand);
+};
+extern const struct command command_render, command_gradient, command_jacobian, command_check,
+    command_fit, command_compare, command_info, command_bench;
+
+/* Option tables, to be named in args_spec.group. */
+extern const struct arg_option options_general[], options_scene[], options_run[];
+
+/* The running command. A process runs one, so there is one. */
+struct cli {
+    const char *name;          /* of the command */
+    int argc;
+    char **argv;               /* as typed, for provenance */
+    /* options_general */
+    const char *out;
+    int threads, json, progress, help, quiet;
+    /* options_scene */
+    struct arg_list defines, sets;
+    const char *search;
+    int mode, dump;
+    /* options_run */
+    int sensor, spp;
+    uint64_t seed;
+    double time_s;
+    /* what cli_load opened */
+    const char *scene_path;
+    imp_context *context;
+    imp_scene *scene;
+};
+extern struct cli cli;
+
+/* Make the context. 0, or an exit code with the reason printed. */
+int cli_open(void);
+/* Make the context, load the scene ("-": from stdin), apply --set. 0, EXIT_STOP after
+ * --dump, or an exit code. */
+int cli_load(const char *path);
+void cli_close(void);
+
+/* The run the options ask for. */
+struct imp_run cli_run(void);
+/* Samples per pixel that `run` will take. */
+int cli_spp(const struct imp_run *run);
+
+/* Print "importon: what: message of the last error" and return the exit code that belongs to
+ * `status`. `what` NULL: without it. */
+int cli_fail(enum imp_status status, const char *what);
+/* Print "importon: message" and return `code`. */
+int cli_error(int code, const char *format, ...) __attribute__((format(printf, 2, 3)));
+/* IMP_OK and IMP_CANCELLED go on; anything else has failed. */
+static inline int cli_failed(enum imp_status status)
+{
+    return status != IMP_OK && status != IMP_CANCELLED;
+}
+/* The exit code of a run that was not refused: 130 after Ctrl-C. */
+int cli_done(void);
+
+/* Talk on stderr, unless --quiet. */
+void cli_say(const char *format, ...) __attribute__((format(printf, 1, 2)));
+
+/* Start a JSON answer with "importon" and "command"; end it with a newline. */
+struct json cli_json(void);
+void cli_json_end(struct json *j);
+
+/* malloc that ends the process when there is no memory; the cli may. */
+void *cli_alloc(size_t n, size_t size);
+
+/* "name" of a parameter, or "name[element]" when it has several numbers. */
+const char *cli_number_name(const struct imp_param_info *info, size_t element, char *text,
+                            size_t size);
+
+#endif

@@ -1,0 +1,296 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * importon fit: pictures go in, the scene's numbers come out. Writes, into -o DIR, the
+ * picture before and after, the target, the loss curve and the parameters with their 95 %
+ * intervals. */
+#include "command.h"
+#include "picture.h"
+#include "plot.h"
+#include "problem.h"
+#include "progress.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char *const optimizer_words[] = {"adam", "lm", "lbfgs", "mma", "slsqp", NULL};
+
+static struct {
+    int optimizer, iterations, no_intervals, resume, picture_spp;
+    double learning_rate, tolerance;
+    const char *checkpoint;
+} o;
+
+static const struct arg_option options[] = {
+    {ARG_CHOICE, 0, "optimizer", "NAME", "adam (default), lm, lbfgs, mma or slsqp",
+     &o.optimizer, 0, 0, optimizer_words},
+    {ARG_INT, 'n', "iterations", "N", "at most; default 200 (adam), 30 (others)",
+     &o.iterations, 1, 1e9, NULL},
+    {ARG_NUMBER, 0, "lr", "RATE", "learning rate of adam (default 0.05)", &o.learning_rate,
+     1e-12, 1e6, NULL},
+    {ARG_NUMBER, 0, "tolerance", "T", "stop when relative steps stay below (default 1e-4)",
+     &o.tolerance, 1e-15, 1, NULL},
+    {ARG_FLAG, 0, "no-intervals", NULL, "do not estimate 95 % intervals at the end",
+     &o.no_intervals, 0, 0, NULL},
+    {ARG_TEXT, 0, "checkpoint", "FILE", "rewritten while the fit runs, and at Ctrl-C",
+     &o.checkpoint, 0, 0, NULL},
+    {ARG_FLAG, 0, "resume", NULL, "go on from the checkpoint, if it is there", &o.resume, 0,
+     0, NULL},
+    {ARG_INT, 0, "picture-spp", "N", "samples per pixel of the pictures written",
+     &o.picture_spp, 1, 1e9, NULL},
+    {0}};
+
+/* ---- Pictures --------------------------------------------------------------------------- */
+
+/* "name.exr", or "name-1.exr" for the second of several targets. */
+static char *picture_path(const char *name, size_t i)
+{
+    char file[64];
+    if (problem_options.targets.n == 1) snprintf(file, sizeof file, "%s.exr", name);
+    else snprintf(file, sizeof file, "%s-%zu.exr", name, i);
+    return join_path(cli.out, file);
+}
+
+static int write_one(const char *name, size_t i)
+{
+    struct imp_target target = IMP_TARGET_INIT;
+    struct imp_run run = cli_run();
+    const struct picture_options po = {.standard_error = 1};
+    imp_film *film = NULL;
+    int rc = picture_target(problem_options.targets.item[i], NULL, &target);
+    if (rc) return rc;
+    run.sensor = target.sensor;
+    picture_target_free(&target);
+    run.time_limit_s = 0;
+    if (o.picture_spp) run.spp = o.picture_spp;
+    const enum imp_status st = imp_render(cli.scene, &run, &film);
+    if (cli_failed(st)) return cli_fail(st, cli.scene_path);
+    if (!film) return cli_done();
+    char *path = picture_path(name, i);
+    picture_stamp(film, &run);
+    rc = picture_write(film, path, &po);
+    free(path);
+    imp_film_destroy(film);
+    return rc;
+}
+
+/* The scene as it is now, through the sensor of every target. */
+static int write_pictures(const char *name)
+{
+    int rc = 0;
+    for (size_t i = 0; i < problem_options.targets.n && !rc; i++) rc = write_one(name, i);
+    return rc;
+}
+
+/* A copy of each target, so that the folder tells the whole story. */
+static int write_targets(void)
+{
+    int rc = 0;
+    for (size_t i = 0; i < problem_options.targets.n && !rc; i++) {
+        struct imp_target t = IMP_TARGET_INIT;
+        struct imp_write_options w = IMP_WRITE_OPTIONS_INIT;
+        imp_film *film = NULL;
+        rc = picture_target(problem_options.targets.item[i], NULL, &t);
+        if (rc) return rc;
+        enum imp_status st = imp_film_create(cli.context, t.width, t.height,
+                                             t.channels == 3 ? "R,G,B" : "Y", &film);
+        char *path = picture_path("target", i);
+        memcpy(strrchr(path, '.'), ".png", 4);
+        if (st == IMP_OK) {
+            memcpy(imp_film_mean(film), t.pixels,
+                   (size_t)t.width * (size_t)t.height * (size_t)t.channels * sizeof(float));
+            st = imp_film_write(film, path, &w);
+        }
+        if (st != IMP_OK) rc = cli_fail(st, path);
+        imp_film_destroy(film);
+        picture_target_free(&t);
+        free(path);
+    }
+    return rc;
+}
+
+/* ---- Numbers ---------------------------------------------------------------------------- */
+
+static int write_history(const struct imp_fit_result *r)
+{
+    char *csv = join_path(cli.out, "loss.csv"), *svg = join_path(cli.out, "loss.svg");
+    FILE *f = fopen(csv, "w");
+    int rc = 0;
+    if (f) {
+        fprintf(f, "iteration,loss,se\n");
+        for (size_t i = 0; i < r->n_history; i++)
+            fprintf(f, "%zu,%.9g,%.3g\n", i, r->history[i],
+                    r->history_se ? r->history_se[i] : NAN);
+        if (fclose(f) != 0) f = NULL;
+    }
+    if (!f) rc = cli_error(EXIT_RUN, "%s: %s", csv, strerror(errno));
+    if (!rc)
+        rc = plot_curve(svg, "Loss", "iteration", loss_word(), r->n_history, r->history,
+                        r->history_se);
+    free(csv);
+    free(svg);
+    return rc;
+}
+
+static void put_variable(struct json *j, const struct imp_fit_variable *v, const char *unit,
+                         const char *name)
+{
+    json_object(j, NULL);
+    json_text(j, "name", name);
+    json_text(j, "unit", unit);
+    json_number(j, "start", v->start);
+    json_number(j, "value", v->value);
+    json_number(j, "se", v->se);
+    json_number(j, "lo95", v->lo95);
+    json_number(j, "hi95", v->hi95);
+    json_integer(j, "at_bound", v->at_bound);
+    json_bool(j, "determined", v->determined);
+    json_end_object(j);
+}
+
+/* Numbers of textures are in their pictures, not in lists. */
+static void put_json(struct json *j, const struct imp_fit_result *r,
+                     const struct block *blocks, size_t n_blocks)
+{
+    json_text(j, "optimizer", optimizer_words[o.optimizer]);
+    json_text(j, "loss", loss_word());
+    json_seed(j, "seed", cli.seed);
+    const struct imp_run run = cli_run();
+    json_integer(j, "spp", cli_spp(&run));
+    json_integer(j, "iterations", r->iterations);
+    json_number(j, "value", r->objective.value);
+    json_number(j, "se", r->objective.se);
+    json_number(j, "condition", r->condition);
+    json_text(j, "reason", r->reason);
+    json_text(j, "warning", r->warning);
+    json_bool(j, "complete", !progress_interrupted());
+    json_array(j, "params");
+    for (size_t k = 0; k < n_blocks; k++) {
+        const struct block *b = &blocks[k];
+        char name[512];
+        for (size_t i = 0; i < b->n && !block_is_large(b); i++)
+            put_variable(j, &r->variables[b->first + i], b->info.unit,
+                         cli_number_name(&b->info, i, name, sizeof name));
+    }
+    json_end_array(j);
+}
+
+static int write_json(const struct imp_fit_result *r, const struct block *blocks,
+                      size_t n_blocks)
+{
+    char *path = join_path(cli.out, "parameters.json");
+    struct json j = {fopen(path, "w"), 0};
+    int rc = 0;
+    if (j.file) {
+        json_object(&j, NULL);
+        json_text(&j, "importon", imp_version());
+        json_text(&j, "command", "fit");
+        put_json(&j, r, blocks, n_blocks);
+        cli_json_end(&j);
+        if (fclose(j.file) != 0) j.file = NULL;
+    }
+    if (!j.file) rc = cli_error(EXIT_RUN, "%s: %s", path, strerror(errno));
+    free(path);
+    return rc;
+}
+
+static void print_table(const struct imp_fit_result *r, const struct block *blocks,
+                        size_t n_blocks)
+{
+    int width = 9;
+    for (size_t k = 0; k < n_blocks; k++)
+        if ((int)strlen(blocks[k].info.name) + 3 > width)
+            width = (int)strlen(blocks[k].info.name) + 3;
+    printf("%-*s  %-11s %-11s %s\n", width, "parameter", "start", "value", "95 % interval");
+    for (size_t k = 0; k < n_blocks; k++) {
+        const struct block *b = &blocks[k];
+        char name[512];
+        if (block_is_large(b)) {
+            printf("%-*s  %zu numbers\n", width, b->info.name, b->n);
+            continue;
+        }
+        for (size_t i = 0; i < b->n; i++) {
+            const struct imp_fit_variable *v = &r->variables[b->first + i];
+            printf("%-*s  %-11.6g %-11.6g ", width,
+                   cli_number_name(&b->info, i, name, sizeof name), v->start, v->value);
+            if (isfinite(v->lo95) && isfinite(v->hi95))
+                printf("[%.6g, %.6g]", v->lo95, v->hi95);
+            else if (!o.no_intervals && !v->determined) printf("not determined");
+            else printf("-");
+            printf("%s\n", v->at_bound < 0   ? "  at its lower bound"
+                           : v->at_bound > 0 ? "  at its upper bound" : "");
+        }
+    }
+    printf("\n%s %.6g +- %.2g after %d iterations: %s\n", loss_word(), r->objective.value,
+           r->objective.se, r->iterations, r->reason ? r->reason : "");
+}
+
+static int answer(imp_problem *problem, const struct imp_fit_result *r)
+{
+    size_t n_blocks;
+    struct block *blocks = problem_blocks(problem, &n_blocks);
+    int rc = 0;
+    if (cli.out) {
+        rc = write_history(r);
+        if (!rc) rc = write_json(r, blocks, n_blocks);
+    }
+    if (cli.json) {
+        struct json j = cli_json();
+        put_json(&j, r, blocks, n_blocks);
+        cli_json_end(&j);
+    } else {
+        print_table(r, blocks, n_blocks);
+    }
+    if (r->warning) cli_say("importon: warning: %s", r->warning);
+    free(blocks);
+    return rc;
+}
+
+static int run_fit(int n, char **operand)
+{
+    static const enum imp_optimizer optimizers[] = {IMP_ADAM, IMP_LM, IMP_LBFGS, IMP_MMA,
+                                                    IMP_SLSQP};
+    struct imp_fit_options fit = IMP_FIT_OPTIONS_INIT;
+    const struct imp_fit_result *result = NULL;
+    imp_problem *problem = NULL;
+    (void)n;
+    int rc = cli_load(operand[0]);
+    if (!rc && !problem_options.targets.n)
+        rc = cli_error(EXIT_USAGE, "fit: --target FILE is needed");
+    if (!rc && o.resume && !o.checkpoint)
+        rc = cli_error(EXIT_USAGE, "fit: --resume needs --checkpoint FILE");
+    if (!rc) rc = problem_open(&problem);
+    if (rc) return rc;
+
+    fit.optimizer = optimizers[o.optimizer];
+    fit.max_iterations = o.iterations;
+    fit.learning_rate = o.learning_rate;
+    fit.tolerance = o.tolerance;
+    fit.intervals = !o.no_intervals;
+    fit.checkpoint = o.checkpoint;
+    fit.resume = o.resume;
+    if (cli.out) {
+        rc = make_folder(cli.out);
+        if (!rc) rc = write_targets();
+        if (!rc) rc = write_pictures("before");
+    }
+    if (!rc) {
+        const struct imp_run run = cli_run();
+        const enum imp_status st = imp_fit(problem, &fit, &run, &result);
+        if (cli_failed(st)) rc = cli_fail(st, cli.scene_path);
+    }
+    if (!rc && result) rc = answer(problem, result);
+    if (!rc && result && cli.out) {
+        progress_resume(); /* after Ctrl-C the state reached is still written */
+        rc = write_pictures("recovered");
+    }
+    problem_close(problem);
+    return rc ? rc : cli_done();
+}
+
+const struct command command_fit = {
+    {"fit", "SCENE --target FILE", "recover parameters from target pictures",
+     {options, options_targets, options_params, options_run, options_scene, options_general},
+     1, 1},
+    run_fit};

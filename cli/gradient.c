@@ -1,0 +1,246 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * importon gradient: the derivative of a number with respect to the scene's parameters, with
+ * standard errors. The number is a loss against target pictures; or the inner product of the
+ * picture with a given adjoint image; or, with neither, the mean of the picture. */
+#include "command.h"
+#include "picture.h"
+#include "problem.h"
+#include "progress.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char *adjoint_path;
+static const struct arg_option options[] = {
+    {ARG_TEXT, 0, "adjoint", "FILE", "derivative of sum(FILE * picture), in place of a loss",
+     &adjoint_path, 0, 0, NULL},
+    {0}};
+
+struct result {
+    struct imp_estimate value;
+    const char *functional; /* "loss", "mean" or "adjoint" */
+    double *x, *grad, *se;
+};
+
+/* sum(seed * picture) with its standard error. Pixels through a box filter are independent,
+ * so squares of errors add. */
+static struct imp_estimate inner_product(imp_film *film, const float *seed)
+{
+    struct imp_film_info info = {.size = sizeof info};
+    struct imp_estimate sum = {0, 0, 0};
+    imp_film_get_info(film, &info);
+    const size_t n = (size_t)info.width * (size_t)info.height * (size_t)info.channels;
+    const float *mean = imp_film_mean(film), *se = imp_film_se(film);
+    for (size_t i = 0; i < n; i++) {
+        sum.value += (double)seed[i] * mean[i];
+        if (se) sum.se += pow((double)seed[i] * se[i], 2);
+    }
+    sum.se = se ? sqrt(sum.se) : NAN;
+    return sum;
+}
+
+/* The adjoint image: from the file, or 1 / (number of pixels and channels) everywhere. */
+static int adjoint_image(const struct imp_run *run, float **seed)
+{
+    struct imp_scene_info scene = {.size = sizeof scene};
+    struct imp_sensor_info sensor = {.size = sizeof sensor};
+    imp_scene_get_info(cli.scene, &scene);
+    const enum imp_status st = imp_scene_get_sensor(cli.scene, run->sensor, &sensor);
+    if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+    const size_t n =
+        (size_t)sensor.width * (size_t)sensor.height * (size_t)scene.channels;
+    if (adjoint_path) {
+        struct imp_target t = IMP_TARGET_INIT;
+        const int rc = picture_target(adjoint_path, NULL, &t);
+        if (rc) return rc;
+        if (t.width == sensor.width && t.height == sensor.height &&
+            t.channels == scene.channels) {
+            *seed = (float *)t.pixels;
+            t.pixels = NULL;
+            picture_target_free(&t);
+            return 0;
+        }
+        picture_target_free(&t);
+        return cli_error(EXIT_USAGE,
+                         "%s is %d x %d with %d channels; the sensor is %d x %d with %d",
+                         adjoint_path, t.width, t.height, t.channels, sensor.width,
+                         sensor.height, scene.channels);
+    }
+    *seed = cli_alloc(n, sizeof **seed);
+    for (size_t i = 0; i < n; i++) (*seed)[i] = (float)(1 / (double)n);
+    return 0;
+}
+
+static int compute_adjoint(imp_problem *problem, const struct imp_run *run, struct result *r)
+{
+    imp_film *film = NULL;
+    float *seed = NULL;
+    int rc = adjoint_image(run, &seed);
+    if (rc) return rc;
+    r->functional = adjoint_path ? "adjoint" : "mean";
+    enum imp_status st = imp_render(cli.scene, run, &film);
+    if (film) r->value = inner_product(film, seed);
+    imp_film_destroy(film);
+    if (st == IMP_OK) st = imp_problem_reverse(problem, seed, run, r->grad, r->se);
+    free(seed);
+    if (st == IMP_OK) return 0;
+    return st == IMP_CANCELLED && !progress_interrupted() ? 0 : cli_fail(st, cli.scene_path);
+}
+
+static int compute_loss(imp_problem *problem, const struct imp_run *run, struct result *r)
+{
+    r->functional = "loss";
+    const enum imp_status st =
+        imp_problem_objective(problem, NULL, run, &r->value, r->grad, r->se);
+    return cli_failed(st) ? cli_fail(st, cli.scene_path) : 0;
+}
+
+/* ---- Answers ---------------------------------------------------------------------------- */
+
+/* A texture's gradient as a picture: [h][w] or [h][w][1 or 3]. Others are a row. */
+static int write_block(const struct block *b, const struct result *r, char **path)
+{
+    const struct imp_param_info *p = &b->info;
+    const size_t channels = p->n_dims == 3 && (p->dims[2] == 1 || p->dims[2] == 3)
+                                ? p->dims[2] : p->n_dims == 2 && p->dims[1] == 3 ? 3 : 1;
+    const size_t width = p->n_dims >= 2 && !(p->n_dims == 2 && channels == 3)
+                             ? p->dims[1] : b->n / channels;
+    const size_t height = b->n / channels / (width ? width : 1);
+    struct picture_options o = {.standard_error = 1, .diverging = 1};
+    const struct imp_run run = cli_run();
+    imp_film *film = NULL;
+    char name[512];
+    snprintf(name, sizeof name, "%s.exr", p->name);
+    *path = join_path(cli.out, name);
+    enum imp_status st = imp_film_create(cli.context, (int)width, (int)height,
+                                         channels == 3 ? "R,G,B" : "Y", &film);
+    if (st != IMP_OK) return cli_fail(st, *path);
+    float *mean = imp_film_mean(film), *se = imp_film_se(film);
+    for (size_t i = 0; i < b->n; i++) {
+        mean[i] = (float)r->grad[b->first + i];
+        if (se) se[i] = (float)r->se[b->first + i];
+    }
+    o.standard_error = se != NULL;
+    picture_stamp(film, &run);
+    const int rc = picture_write(film, *path, &o);
+    imp_film_destroy(film);
+    return rc;
+}
+
+static void print_json(const struct imp_run *run, const struct result *r,
+                       const struct block *blocks, size_t n_blocks, char **paths)
+{
+    static const char *const bias[] = {"none", "O(1/N)", "O(1/N^2)"};
+    struct json j = cli_json();
+    json_seed(&j, "seed", run->seed);
+    json_integer(&j, "spp", cli_spp(run));
+    json_text(&j, "functional", r->functional);
+    if (!strcmp(r->functional, "loss")) json_text(&j, "loss", loss_word());
+    json_number(&j, "value", r->value.value);
+    json_number(&j, "se", r->value.se);
+    json_text(&j, "bias", bias[r->value.bias_order >= 0 && r->value.bias_order <= 2
+                                   ? r->value.bias_order : 0]);
+    json_array(&j, "params");
+    for (size_t k = 0; k < n_blocks; k++) {
+        const struct block *b = &blocks[k];
+        block_json(&j, b);
+        if (block_is_large(b)) {
+            json_integer(&j, "count", (int64_t)b->n);
+            json_text(&j, "file", paths[k]);
+        } else if (b->n == 1) {
+            json_number(&j, "value", r->x[b->first]);
+            json_number(&j, "grad", r->grad[b->first]);
+            json_number(&j, "se", r->se[b->first]);
+        } else {
+            json_numbers(&j, "value", b->n, r->x + b->first);
+            json_numbers(&j, "grad", b->n, r->grad + b->first);
+            json_numbers(&j, "se", b->n, r->se + b->first);
+        }
+        json_end_object(&j);
+    }
+    json_end_array(&j);
+    cli_json_end(&j);
+}
+
+static void print_text(const struct result *r, const struct block *blocks, size_t n_blocks,
+                       char **paths)
+{
+    int width = 9;
+    for (size_t k = 0; k < n_blocks; k++)
+        if ((int)strlen(blocks[k].info.name) + 3 > width)
+            width = (int)strlen(blocks[k].info.name) + 3;
+    printf("%-*s  %-14.8g +- %.2g%s\n\n", width, r->functional, r->value.value, r->value.se,
+           r->value.bias_order == 1   ? "  (biased, O(1/N))"
+           : r->value.bias_order == 2 ? "  (biased, O(1/N^2))" : "");
+    printf("%-*s  %-14s %-14s %s\n", width, "parameter", "value", "gradient", "se");
+    for (size_t k = 0; k < n_blocks; k++) {
+        const struct block *b = &blocks[k];
+        char name[512];
+        if (block_is_large(b)) {
+            double norm = 0, sum = 0;
+            for (size_t i = 0; i < b->n; i++) {
+                norm += r->grad[b->first + i] * r->grad[b->first + i];
+                sum += r->grad[b->first + i];
+            }
+            printf("%-*s  %zu numbers: sum of gradient %.6g, norm %.6g%s%s\n", width,
+                   b->info.name, b->n, sum, sqrt(norm), paths[k] ? " -> " : "",
+                   paths[k] ? paths[k] : "");
+            continue;
+        }
+        for (size_t i = 0; i < b->n; i++) {
+            const size_t at = b->first + i;
+            printf("%-*s  %-14.8g %-14.7g %.2g\n", width,
+                   cli_number_name(&b->info, i, name, sizeof name), r->x[at], r->grad[at],
+                   r->se[at]);
+        }
+    }
+}
+
+static int run_gradient(int n, char **operand)
+{
+    imp_problem *problem = NULL;
+    struct result r = {{0, 0, 0}, "", NULL, NULL, NULL};
+    struct block *blocks = NULL;
+    char **paths = NULL;
+    size_t n_blocks = 0;
+    (void)n;
+    int rc = cli_load(operand[0]);
+    if (!rc && adjoint_path && problem_options.targets.n)
+        rc = cli_error(EXIT_USAGE, "--adjoint and --target exclude each other");
+    if (!rc) rc = problem_open(&problem);
+    if (rc) return rc;
+    const size_t n_x = imp_problem_n(problem);
+    const struct imp_run run = cli_run();
+    r.x = cli_alloc(n_x, sizeof *r.x);
+    r.grad = cli_alloc(n_x, sizeof *r.grad);
+    r.se = cli_alloc(n_x, sizeof *r.se);
+    imp_problem_get_x(problem, r.x);
+    blocks = problem_blocks(problem, &n_blocks);
+    paths = cli_alloc(n_blocks, sizeof *paths);
+
+    rc = problem_options.targets.n ? compute_loss(problem, &run, &r)
+                                   : compute_adjoint(problem, &run, &r);
+    if (!rc && cli.out) rc = make_folder(cli.out);
+    for (size_t k = 0; k < n_blocks && !rc && cli.out; k++)
+        if (block_is_large(&blocks[k])) rc = write_block(&blocks[k], &r, &paths[k]);
+    if (!rc) {
+        if (cli.json) print_json(&run, &r, blocks, n_blocks, paths);
+        else print_text(&r, blocks, n_blocks, paths);
+        rc = cli_done();
+    }
+    for (size_t k = 0; k < n_blocks; k++) free(paths[k]);
+    free(paths);
+    free(blocks);
+    free(r.x);
+    free(r.grad);
+    free(r.se);
+    problem_close(problem);
+    return rc;
+}
+
+const struct command command_gradient = {
+    {"gradient", "SCENE", "derivatives of a loss (or of the picture's mean), with errors",
+     {options, options_targets, options_params, options_run, options_scene, options_general}, 1, 1},
+    run_gradient};

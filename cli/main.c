@@ -1,0 +1,87 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * importon: the command line of libimporton. Data goes to standard output or -o, talk to
+ * standard error. */
+#include "command.h"
+#include "progress.h"
+
+#include <errno.h>
+#include <string.h>
+
+static const struct command *const commands[] = {
+    &command_render, &command_gradient, &command_jacobian, &command_check,
+    &command_fit,    &command_compare,  &command_info,     &command_bench};
+#define N_COMMANDS (sizeof commands / sizeof *commands)
+
+static void print_usage(FILE *to)
+{
+    fprintf(to, "usage: importon COMMAND [options] ...\n\n");
+    for (size_t i = 0; i < N_COMMANDS; i++)
+        fprintf(to, "  %-10s %s\n", commands[i]->args.command, commands[i]->args.summary);
+    fprintf(to, "\n'importon help COMMAND' lists the options of one;"
+                " 'man importon' explains them.\n");
+}
+
+static const struct command *find(const char *name)
+{
+    const char *names[N_COMMANDS + 1] = {0};
+    for (size_t i = 0; i < N_COMMANDS; i++) {
+        names[i] = commands[i]->args.command;
+        if (!strcmp(name, names[i])) return commands[i];
+    }
+    const char *near = args_nearest(name, names);
+    fprintf(stderr, "importon: unknown command '%s'", name);
+    if (near) fprintf(stderr, "; did you mean '%s'?", near);
+    fprintf(stderr, "\nTry 'importon help'.\n");
+    return NULL;
+}
+
+/* A full disk shows only when the last bytes are flushed. */
+static int finish(int rc)
+{
+    if (fflush(stdout) != 0 || ferror(stdout))
+        return cli_error(EXIT_RUN, "standard output: %s", strerror(errno ? errno : EIO));
+    return rc;
+}
+
+int main(int argc, char **argv)
+{
+    const char *name = argc > 1 ? argv[1] : "";
+    const struct command *command;
+    int first, rc;
+
+    if (!*name) {
+        print_usage(stderr);
+        return EXIT_USAGE;
+    }
+    if (!strcmp(name, "--version") || !strcmp(name, "-V")) {
+        printf("importon %s\n", imp_version());
+        return finish(EXIT_DONE);
+    }
+    if (!strcmp(name, "--help") || !strcmp(name, "-h") || !strcmp(name, "help")) {
+        if (argc > 2 && !(command = find(argv[2]))) return EXIT_USAGE;
+        if (argc > 2) args_help(&command->args, stdout);
+        else print_usage(stdout);
+        return finish(EXIT_DONE);
+    }
+    if (!(command = find(name))) return EXIT_USAGE;
+
+    cli.name = command->args.command;
+    cli.argc = argc - 1;
+    cli.argv = cli_alloc((size_t)argc, sizeof *cli.argv);
+    memcpy(cli.argv, argv + 1, (size_t)(argc - 1) * sizeof *argv); /* getopt reorders argv */
+    /* --help needs no operands. */
+    for (int i = 2; i < argc && strcmp(argv[i], "--"); i++)
+        if (!strcmp(argv[i], "--help") || !strcmp(argv[i], "-h")) {
+            args_help(&command->args, stdout);
+            return finish(EXIT_DONE);
+        }
+    rc = args_parse(&command->args, argc - 1, argv + 1, &first);
+    if (rc == 0) {
+        progress_init((enum progress_mode)cli.progress);
+        rc = command->run(argc - 1 - first, argv + 1 + first);
+        progress_clear();
+    }
+    cli_close();
+    return finish(rc == EXIT_STOP ? EXIT_DONE : rc);
+}

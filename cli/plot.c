@@ -1,0 +1,126 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "plot.h"
+
+#include "command.h"
+
+#include <errno.h>
+#include <math.h>
+#include <string.h>
+
+enum { WIDTH = 720, HEIGHT = 440, LEFT = 84, RIGHT = 24, TOP = 44, BOTTOM = 58 };
+
+struct axes {
+    double n;
+    double lo, hi; /* of y, or of log10 y */
+    int log;
+};
+
+static double x_at(const struct axes *a, double i)
+{
+    return LEFT + (WIDTH - LEFT - RIGHT) * (a->n > 1 ? i / (a->n - 1) : 0.5);
+}
+static double y_at(const struct axes *a, double y)
+{
+    const double v = a->log ? log10(fmax(y, pow(10, a->lo))) : y;
+    const double t = (fmin(fmax(v, a->lo), a->hi) - a->lo) / (a->hi - a->lo);
+    return HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * t;
+}
+
+static struct axes find_axes(size_t n, const double *y)
+{
+    struct axes a = {(double)n, INFINITY, -INFINITY, 0};
+    double least = INFINITY; /* positive one */
+    for (size_t i = 0; i < n; i++) {
+        if (!isfinite(y[i])) continue;
+        if (y[i] > 0) least = fmin(least, y[i]);
+        a.lo = fmin(a.lo, y[i]);
+        a.hi = fmax(a.hi, y[i]);
+    }
+    if (!(a.lo <= a.hi)) a.lo = 0, a.hi = 1;
+    a.log = isfinite(least) && a.hi > 0;
+    if (a.log) { /* an unbiased loss may be negative near its end: those sit at the bottom */
+        a.lo = floor(log10(fmax(least, 1e-8 * a.hi)));
+        a.hi = ceil(log10(a.hi) + 1e-9);
+    }
+    if (a.hi - a.lo < 1e-12 * fmax(fabs(a.lo), 1)) a.hi = a.lo + 1;
+    return a;
+}
+
+/* 1, 2 or 5 times a power of ten, about a sixth of the range. */
+static double nice_step(double range)
+{
+    const double rough = range / 6, power = pow(10, floor(log10(rough)));
+    const double m = rough / power;
+    return power * (m < 1.5 ? 1 : m < 3.5 ? 2 : m < 7.5 ? 5 : 10);
+}
+
+static void put_tick(FILE *f, double x, double y, const char *anchor, const char *text)
+{
+    fprintf(f, "<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"%s\">%s</text>\n", x, y, anchor,
+            text);
+}
+
+static void put_axes(FILE *f, const struct axes *a)
+{
+    const double step_y = a->log ? fmax(1, ceil((a->hi - a->lo) / 8)) : nice_step(a->hi - a->lo);
+    const double step_x = a->n > 2 ? fmax(1, nice_step(a->n - 1)) : 1;
+    char text[32];
+    fprintf(f, "<g stroke=\"#d0d0d0\" stroke-width=\"1\">\n");
+    for (double v = ceil(a->lo / step_y) * step_y; v <= a->hi + 1e-9; v += step_y) {
+        const double y = y_at(a, a->log ? pow(10, v) : v);
+        fprintf(f, "<line x1=\"%d\" y1=\"%.1f\" x2=\"%d\" y2=\"%.1f\"/>\n", LEFT, y,
+                WIDTH - RIGHT, y);
+    }
+    fprintf(f, "</g>\n");
+    for (double v = ceil(a->lo / step_y) * step_y; v <= a->hi + 1e-9; v += step_y) {
+        if (a->log) snprintf(text, sizeof text, "1e%.0f", v);
+        else snprintf(text, sizeof text, "%.4g", v);
+        put_tick(f, LEFT - 8, y_at(a, a->log ? pow(10, v) : v) + 4, "end", text);
+    }
+    for (double i = 0; i < a->n; i += step_x) {
+        snprintf(text, sizeof text, "%.0f", i);
+        put_tick(f, x_at(a, i), HEIGHT - BOTTOM + 20, "middle", text);
+    }
+}
+
+static void put_band(FILE *f, const struct axes *a, size_t n, const double *y,
+                     const double *se)
+{
+    fprintf(f, "<path fill=\"#3060c0\" fill-opacity=\"0.2\" d=\"");
+    for (size_t i = 0; i < n; i++)
+        fprintf(f, "%c%.2f %.2f ", i ? 'L' : 'M', x_at(a, (double)i), y_at(a, y[i] + se[i]));
+    for (size_t i = n; i-- > 0;)
+        fprintf(f, "L%.2f %.2f ", x_at(a, (double)i), y_at(a, y[i] - se[i]));
+    fprintf(f, "Z\"/>\n");
+}
+
+int plot_curve(const char *path, const char *title, const char *x_label, const char *y_label,
+               size_t n, const double *y, const double *se)
+{
+    const struct axes a = find_axes(n, y);
+    int finite = 1;
+    FILE *f = fopen(path, "w");
+    if (!f) return cli_error(EXIT_RUN, "%s: %s", path, strerror(errno));
+    fprintf(f,
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%d\" height=\"%d\" "
+            "viewBox=\"0 0 %d %d\" font-family=\"sans-serif\" font-size=\"13\">\n"
+            "<rect width=\"100%%\" height=\"100%%\" fill=\"white\"/>\n",
+            WIDTH, HEIGHT, WIDTH, HEIGHT);
+    put_axes(f, &a);
+    for (size_t i = 0; i < n; i++)
+        if (!isfinite(y[i]) || (se && !isfinite(se[i]))) finite = 0;
+    if (se && n > 1 && finite) put_band(f, &a, n, y, se);
+    fprintf(f, "<path fill=\"none\" stroke=\"#3060c0\" stroke-width=\"2\" d=\"");
+    for (size_t i = 0, started = 0; i < n; i++) {
+        if (!isfinite(y[i])) continue;
+        fprintf(f, "%c%.2f %.2f ", started ? 'L' : 'M', x_at(&a, (double)i), y_at(&a, y[i]));
+        started = 1;
+    }
+    fprintf(f, "\"/>\n<text x=\"%d\" y=\"26\" text-anchor=\"middle\" font-size=\"16\">%s"
+               "</text>\n", WIDTH / 2, title);
+    put_tick(f, (LEFT + WIDTH - RIGHT) / 2.0, HEIGHT - 14, "middle", x_label);
+    fprintf(f, "<text transform=\"translate(20 %d) rotate(-90)\" text-anchor=\"middle\">%s"
+               "</text>\n</svg>\n", (TOP + HEIGHT - BOTTOM) / 2, y_label);
+    if (fclose(f) != 0) return cli_error(EXIT_RUN, "%s: %s", path, strerror(errno));
+    return 0;
+}

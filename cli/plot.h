@@ -1,0 +1,12 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef IMP_CLI_PLOT_H
+#define IMP_CLI_PLOT_H
+
+#include <stddef.h>
+
+/* An SVG file of y [n] against 0, 1, .. n-1 with a band of one standard error (se may be
+ * NULL), y on a logarithmic scale unless none is positive. 0, or an exit code. */
+int plot_curve(const char *path, const char *title, const char *x_label, const char *y_label,
+               size_t n, const double *y, const double *se);
+
+#endif

@@ -1,0 +1,151 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "problem.h"
+
+#include "picture.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+struct problem_options problem_options;
+
+static const char *const loss_words[] = {"l2", "relative", "l1", "log", NULL};
+static const enum imp_loss losses[] = {IMP_LOSS_L2, IMP_LOSS_RELATIVE_L2, IMP_LOSS_L1,
+                                       IMP_LOSS_LOG};
+
+const struct arg_option options_params[] = {
+    {ARG_LIST, 'p', "param", "GLOB", "active parameters: a name or a pattern (default '*')",
+     &problem_options.params, 0, 0, NULL},
+    {0}};
+
+const struct arg_option options_targets[] = {
+    {ARG_LIST, 'T', "target", "FILE[@N]", "picture to match, through sensor N; repeatable",
+     &problem_options.targets, 0, 0, NULL},
+    {ARG_LIST, 0, "mask", "FILE", "weights of the pixels, one for each --target in order",
+     &problem_options.masks, 0, 0, NULL},
+    {ARG_CHOICE, 0, "loss", "LOSS", "l2 (default), relative, l1 or log",
+     &problem_options.loss, 0, 0, loss_words},
+    {ARG_NUMBER, 0, "epsilon", "E", "of the relative and log losses (default 0.01)",
+     &problem_options.epsilon, 1e-12, 1e12, NULL},
+    {ARG_LIST, 0, "tikhonov", "GLOB=W", "add W/2 |x|^2 over these parameters",
+     &problem_options.tikhonov, 0, 0, NULL},
+    {ARG_LIST, 0, "stay", "GLOB=W", "add W/2 |x - start|^2 over these parameters",
+     &problem_options.stay, 0, 0, NULL},
+    {ARG_LIST, 0, "smooth", "GLOB=W", "add W/2 |grad x|^2 over these textures",
+     &problem_options.smooth, 0, 0, NULL},
+    {0}};
+
+const char *loss_word(void) { return loss_words[problem_options.loss]; }
+
+/* "GLOB=W"; the glob is a new string. */
+static int split_weight(const char *option, const char *text, char **glob, double *weight)
+{
+    const char *equal = strrchr(text, '=');
+    char *end;
+    if (equal && equal > text) {
+        *weight = strtod(equal + 1, &end);
+        if (end != equal + 1 && !*end && *weight >= 0) {
+            if (!(*glob = strndup(text, (size_t)(equal - text))))
+                return cli_error(EXIT_RUN, "out of memory");
+            return 0;
+        }
+    }
+    return cli_error(EXIT_USAGE, "--%s %s: expected GLOB=WEIGHT, the weight not negative",
+                     option, text);
+}
+
+enum regulariser { TIKHONOV, STAY, SMOOTH };
+static int add_regularisers(imp_problem *problem, enum regulariser kind, const char *option,
+                            const struct arg_list *list)
+{
+    for (size_t i = 0; i < list->n; i++) {
+        char *glob = NULL;
+        double weight = 0;
+        int rc = split_weight(option, list->item[i], &glob, &weight);
+        if (rc) return rc;
+        const enum imp_status st =
+            kind == SMOOTH ? imp_problem_add_smoothness(problem, glob, weight)
+                           : imp_problem_add_tikhonov(problem, glob, weight, kind == STAY);
+        free(glob);
+        if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+    }
+    return 0;
+}
+
+static int add_targets(imp_problem *problem)
+{
+    const struct problem_options *o = &problem_options;
+    if (o->masks.n > o->targets.n)
+        return cli_error(EXIT_USAGE, "%zu masks for %zu targets", o->masks.n, o->targets.n);
+    for (size_t i = 0; i < o->targets.n; i++) {
+        struct imp_target target = IMP_TARGET_INIT;
+        const char *mask = i < o->masks.n ? o->masks.item[i] : NULL;
+        const int rc = picture_target(o->targets.item[i], mask, &target);
+        if (rc) return rc;
+        target.loss = losses[o->loss];
+        target.epsilon = o->epsilon;
+        const enum imp_status st = imp_problem_add_target(problem, &target);
+        picture_target_free(&target);
+        if (st != IMP_OK) return cli_fail(st, o->targets.item[i]);
+    }
+    return 0;
+}
+
+int problem_open(imp_problem **out)
+{
+    const struct problem_options *o = &problem_options;
+    imp_problem *problem = NULL;
+    int rc = 0;
+    enum imp_status st = imp_problem_create(cli.scene, &problem);
+    for (size_t i = 0; i < o->params.n && st == IMP_OK; i++)
+        st = imp_problem_activate(problem, o->params.item[i]);
+    if (st == IMP_OK && o->params.n == 0) st = imp_problem_activate(problem, "*");
+    if (st != IMP_OK) rc = cli_fail(st, cli.scene_path);
+    if (!rc) rc = add_targets(problem);
+    if (!rc) rc = add_regularisers(problem, TIKHONOV, "tikhonov", &o->tikhonov);
+    if (!rc) rc = add_regularisers(problem, STAY, "stay", &o->stay);
+    if (!rc) rc = add_regularisers(problem, SMOOTH, "smooth", &o->smooth);
+    if (rc) imp_problem_destroy(problem);
+    else *out = problem;
+    return rc;
+}
+
+void problem_close(imp_problem *problem)
+{
+    struct problem_options *o = &problem_options;
+    imp_problem_destroy(problem);
+    args_list_free(&o->params);
+    args_list_free(&o->targets);
+    args_list_free(&o->masks);
+    args_list_free(&o->tikhonov);
+    args_list_free(&o->stay);
+    args_list_free(&o->smooth);
+}
+
+struct block *problem_blocks(const imp_problem *problem, size_t *n_blocks)
+{
+    const size_t n = imp_problem_n(problem);
+    struct block *blocks = cli_alloc(imp_scene_n_params(cli.scene), sizeof *blocks);
+    *n_blocks = 0;
+    for (size_t i = 0; i < n;) {
+        struct block *b = &blocks[*n_blocks];
+        size_t param;
+        b->info.size = sizeof b->info;
+        if (imp_problem_variable(problem, i, &param, NULL, NULL, NULL) != IMP_OK ||
+            imp_scene_get_param(cli.scene, param, &b->info) != IMP_OK || !b->info.count)
+            break;
+        b->first = i;
+        b->n = b->info.count; /* parameters are active as a whole */
+        i += b->n;
+        ++*n_blocks;
+    }
+    return blocks;
+}
+
+int block_is_large(const struct block *b) { return b->n > 12; }
+
+void block_json(struct json *j, const struct block *b)
+{
+    json_object(j, NULL);
+    json_text(j, "name", b->info.name);
+    json_text(j, "unit", b->info.unit);
+}

@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The options that say which parameters, which targets, which loss; and the imp_problem they
+ * make. Shared by gradient, jacobian, check and fit. */
+#ifndef IMP_CLI_PROBLEM_H
+#define IMP_CLI_PROBLEM_H
+
+#include "command.h"
+
+struct problem_options {
+    struct arg_list params, targets, masks, tikhonov, stay, smooth;
+    int loss;
+    double epsilon;
+};
+extern struct problem_options problem_options;
+extern const struct arg_option options_params[], options_targets[];
+
+/* A problem on cli.scene with --param active ("*" if none is given), and --target,
+ * --tikhonov, --stay and --smooth added. 0, or an exit code with the reason printed. */
+int problem_open(imp_problem **out);
+void problem_close(imp_problem *problem);
+
+/* x in pieces: one for each active parameter. */
+struct block {
+    struct imp_param_info info;
+    size_t first, n; /* x[first .. first + n) */
+};
+struct block *problem_blocks(const imp_problem *problem, size_t *n_blocks);
+/* Too long for a line of numbers: goes to a picture, or is summed up. */
+int block_is_large(const struct block *b);
+/* {"name":..,"unit":..} and what the caller adds before json_end_object. */
+void block_json(struct json *j, const struct block *b);
+const char *loss_word(void);
+
+#endif

@@ -1,0 +1,77 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "progress.h"
+
+#include <math.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+static volatile sig_atomic_t stop_asked; /* the library shall stop */
+static volatile sig_atomic_t interrupted;
+static int show, drawn;
+
+static void on_interrupt(int signal_number)
+{
+    (void)signal_number;
+    stop_asked = interrupted = 1;
+}
+
+void progress_init(enum progress_mode mode)
+{
+    /* SA_RESETHAND: the second signal finds the default action, which ends the process. */
+    const struct sigaction action = {.sa_handler = on_interrupt, .sa_flags = SA_RESETHAND};
+    sigaction(SIGINT, &action, NULL);
+    sigaction(SIGTERM, &action, NULL);
+    show = mode == PROGRESS_ALWAYS || (mode == PROGRESS_AUTO && isatty(STDERR_FILENO));
+}
+int progress_interrupted(void) { return interrupted; }
+void progress_resume(void) { stop_asked = 0; }
+
+void progress_clear(void)
+{
+    if (drawn) fputs("\r\033[K", stderr);
+    drawn = 0;
+}
+
+static void format_time(double seconds, char *text, size_t size)
+{
+    const long s = lround(seconds);
+    if (!(seconds >= 0) || seconds > 1e7) snprintf(text, size, "--:--");
+    else if (s < 3600) snprintf(text, size, "%ld:%02ld", s / 60, s % 60);
+    else snprintf(text, size, "%ld:%02ld:%02ld", s / 3600, s / 60 % 60, s % 60);
+}
+
+static void format_rate(double rate, const char *unit, char *text, size_t size)
+{
+    static const char prefix[] = " kMGT";
+    int k = 0;
+    if (!(rate > 0) || !unit) {
+        text[0] = 0;
+        return;
+    }
+    for (; rate >= 1000 && k < 4; k++) rate /= 1000;
+    snprintf(text, size, "%.3g %.*s%s/s", rate, k > 0, prefix + k, unit);
+}
+
+int progress_report(const struct imp_progress *p, void *payload)
+{
+    enum { WIDTH = 24 };
+    char bar[WIDTH + 1], eta[16], elapsed[16], rate[48];
+    (void)payload;
+    if (!show) return stop_asked;
+    const double fraction = fmin(fmax(p->fraction, 0), 1);
+    const int full = (int)(fraction * WIDTH + 0.5);
+    memset(bar, '#', (size_t)full);
+    memset(bar + full, '.', (size_t)(WIDTH - full));
+    bar[WIDTH] = 0;
+    format_time(p->eta_s, eta, sizeof eta);
+    format_time(p->elapsed_s, elapsed, sizeof elapsed);
+    format_rate(p->rate, p->rate_unit, rate, sizeof rate);
+    fprintf(stderr, "\r\033[K%-8s [%s] %3.0f%% %s ETA %s%s%s%s%s", p->stage ? p->stage : "",
+            bar, 100 * fraction, elapsed, eta, rate[0] ? "  " : "", rate,
+            p->note ? "  " : "", p->note ? p->note : "");
+    fflush(stderr);
+    drawn = 1;
+    return stop_asked;
+}

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+# shellcheck shell=bash
+#
+# Sourced by ./quickstart and ./test: install what is missing, configure, build.
+
+packages=(meson ninja-build gcc libc6-dev pkg-config libembree-dev libopenexr-dev libnlopt-dev
+    libpng-dev libjpeg-dev libexpat1-dev zlib1g-dev)
+
+say() { printf '\033[1m%s\033[0m\n' "== $*" >&2; }
+die() { printf '%s\n' "$0: $*" >&2; exit 1; }
+
+# install_packages NAME...: with apt, asking for sudo only if not root.
+install_packages() {
+    local missing=() name as_root=()
+    if ! command -v dpkg-query >/dev/null; then
+        command -v meson >/dev/null ||
+            die "this is no Debian: install by hand what these are called there: $*"
+        return 0
+    fi
+    for name in "$@"; do
+        dpkg-query -W -f '${db:Status-Status}\n' "$name" 2>/dev/null | grep -qx installed ||
+            missing+=("$name")
+    done
+    ((${#missing[@]})) || return 0
+    say "installing ${missing[*]}"
+    if ((EUID != 0)); then
+        command -v sudo >/dev/null || die "not root, and no sudo: install ${missing[*]}"
+        as_root=(sudo)
+    fi
+    "${as_root[@]}" apt-get update -qq >&2 || true # an old list may still do
+    "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
+        apt-get install -y -qq --no-install-recommends "${missing[@]}" >&2 ||
+        die "apt-get could not install ${missing[*]}"
+}
+
+# The instruction set to build for: x86-64-v3 if this processor has all of it.
+cpu_level() {
+    local flag flags
+    flags=" $(sed -n '/^flags/{s/^[^:]*://p;q}' /proc/cpuinfo 2>/dev/null) "
+    for flag in avx avx2 bmi1 bmi2 f16c fma abm movbe; do
+        [[ $flags == *" $flag "* ]] || { echo baseline; return; }
+    done
+    echo x86-64-v3
+}
+
+# configure FOLDER [meson options]: once; later calls only build.
+configure() {
+    local folder=$1
+    shift
+    [[ -f $folder/build.ninja ]] && return 0
+    meson setup "$folder" "-Dcpu=$(cpu_level)" "$@" >"$folder.log" 2>&1 ||
+        { cat "$folder.log" >&2; die "meson could not configure $folder"; }
+    rm -f "$folder.log"
+}
+build() { ninja -C "$1" >"$1/ninja.log" 2>&1 || { tail -n 40 "$1/ninja.log" >&2; die "$1 does not build"; }; }
