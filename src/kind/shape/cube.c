@@ -21,11 +21,12 @@ static const struct imp_mesh_data cube = {
     .n_vertices = 24, .n_triangles = 12, .positions = positions, .uvs = uvs,
     .indices = indices};
 
-static enum imp_status cube_build(const struct imp_build *b, void *self, struct imp_shape *s)
+static enum imp_status build(const struct imp_build *b, void *self, struct imp_shape *s)
 {
     return imp__mesh_build(b, self, s, &cube, true);
 }
 
 const struct imp_shape_ops imp__cube = {
-    sizeof(struct imp_shape_ops), "cube", sizeof(struct imp__mesh), cube_build, NULL,
-    imp__mesh_surface, imp__mesh_sample, imp__mesh_pdf};
+    .size = sizeof(struct imp_shape_ops), .name = "cube",
+    .object_size = sizeof(struct imp__mesh), .build = build, .surface = imp__mesh_surface,
+    .sample_toward = imp__mesh_sample, .pdf_toward = imp__mesh_pdf};

@@ -10,7 +10,7 @@ struct cylinder {
     double side;            /* 1: the normal points outwards */
 };
 
-static enum imp_status cylinder_build(const struct imp_build *b, void *self,
+static enum imp_status build(const struct imp_build *b, void *self,
                                       struct imp_shape *s)
 {
     enum imp_status st = IMP_OK;
@@ -56,7 +56,7 @@ out:
 }
 
 /* v of the hit: the height along the axis, 0..1. As for the sphere, in the plane across. */
-static bool cylinder_intersect(const struct imp_shape *s, const imp_v3 *o, const imp_v3 *d,
+static bool intersect(const struct imp_shape *s, const imp_v3 *o, const imp_v3 *d,
                                double tmin, double tmax, struct imp_hit *hit)
 {
     const struct cylinder *k = s->self;
@@ -94,7 +94,7 @@ static void surface_at(const struct cylinder *k, double x, double y, double v,
     imp__surface_frame(out);
 }
 
-static void cylinder_surface(const struct imp_shape *s, const struct imp_hit *hit,
+static void surface(const struct imp_shape *s, const struct imp_hit *hit,
                              const imp_v3 *o, const imp_v3 *d, struct imp_surface *out)
 {
     const struct cylinder *k = s->self;
@@ -104,7 +104,7 @@ static void cylinder_surface(const struct imp_shape *s, const struct imp_hit *hi
     surface_at(k, x * r, y * r, hit->v, out);
 }
 
-static bool cylinder_sample(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
+static bool sample_toward(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
                             struct imp_light_sample *out)
 {
     const struct cylinder *k = s->self;
@@ -115,7 +115,7 @@ static bool cylinder_sample(const struct imp_shape *s, const imp_v3 *ref, const 
     return imp__light_from_area(*ref, at.p, at.ng, at.n, 1 / s->area, out);
 }
 
-static double cylinder_pdf(const struct imp_shape *s, const imp_v3 *ref,
+static double pdf_toward(const struct imp_shape *s, const imp_v3 *ref,
                            const struct imp_hit *hit, const struct imp_surface *at)
 {
     (void)hit;
@@ -123,5 +123,6 @@ static double cylinder_pdf(const struct imp_shape *s, const imp_v3 *ref,
 }
 
 const struct imp_shape_ops imp__cylinder = {
-    sizeof(struct imp_shape_ops), "cylinder", sizeof(struct cylinder), cylinder_build,
-    cylinder_intersect, cylinder_surface, cylinder_sample, cylinder_pdf};
+    .size = sizeof(struct imp_shape_ops), .name = "cylinder",
+    .object_size = sizeof(struct cylinder), .build = build, .intersect = intersect,
+    .surface = surface, .sample_toward = sample_toward, .pdf_toward = pdf_toward};

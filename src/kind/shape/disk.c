@@ -10,7 +10,7 @@ struct disk {
     double inv_area;
 };
 
-static enum imp_status disk_build(const struct imp_build *b, void *self, struct imp_shape *s)
+static enum imp_status build(const struct imp_build *b, void *self, struct imp_shape *s)
 {
     struct disk *k = self;
     struct imp_placement at;
@@ -38,7 +38,7 @@ static enum imp_status disk_build(const struct imp_build *b, void *self, struct 
 }
 
 /* u, v of the hit: x and y on the unit disk. */
-static bool disk_intersect(const struct imp_shape *s, const imp_v3 *o, const imp_v3 *d,
+static bool intersect(const struct imp_shape *s, const imp_v3 *o, const imp_v3 *d,
                            double tmin, double tmax, struct imp_hit *hit)
 {
     const struct disk *k = s->self;
@@ -66,14 +66,14 @@ static void surface_at(const struct disk *k, double x, double y, struct imp_surf
     imp__surface_frame(out);
 }
 
-static void disk_surface(const struct imp_shape *s, const struct imp_hit *hit,
+static void surface(const struct imp_shape *s, const struct imp_hit *hit,
                          const imp_v3 *o, const imp_v3 *d, struct imp_surface *out)
 {
     (void)o, (void)d;
     surface_at(s->self, hit->u, hit->v, out);
 }
 
-static bool disk_sample(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
+static bool sample_toward(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
                         struct imp_light_sample *out)
 {
     const struct disk *k = s->self;
@@ -85,7 +85,7 @@ static bool disk_sample(const struct imp_shape *s, const imp_v3 *ref, const doub
                                 k->n, k->n, k->inv_area, out);
 }
 
-static double disk_pdf(const struct imp_shape *s, const imp_v3 *ref,
+static double pdf_toward(const struct imp_shape *s, const imp_v3 *ref,
                        const struct imp_hit *hit, const struct imp_surface *at)
 {
     (void)hit;
@@ -94,5 +94,6 @@ static double disk_pdf(const struct imp_shape *s, const imp_v3 *ref,
 }
 
 const struct imp_shape_ops imp__disk = {
-    sizeof(struct imp_shape_ops), "disk", sizeof(struct disk), disk_build,
-    disk_intersect, disk_surface, disk_sample, disk_pdf};
+    .size = sizeof(struct imp_shape_ops), .name = "disk",
+    .object_size = sizeof(struct disk), .build = build, .intersect = intersect,
+    .surface = surface, .sample_toward = sample_toward, .pdf_toward = pdf_toward};

@@ -243,11 +243,14 @@ static enum imp_status file_build(const struct imp_build *b, void *self, struct 
 }
 
 const struct imp_shape_ops imp__mesh = {
-    sizeof(struct imp_shape_ops), "mesh", sizeof(struct imp__mesh), mesh_build, NULL,
-    imp__mesh_surface, imp__mesh_sample, imp__mesh_pdf};
+    .size = sizeof(struct imp_shape_ops), .name = "mesh",
+    .object_size = sizeof(struct imp__mesh), .build = mesh_build, .surface = imp__mesh_surface,
+    .sample_toward = imp__mesh_sample, .pdf_toward = imp__mesh_pdf};
 const struct imp_shape_ops imp__obj = {
-    sizeof(struct imp_shape_ops), "obj", sizeof(struct imp__mesh), file_build, NULL,
-    imp__mesh_surface, imp__mesh_sample, imp__mesh_pdf};
+    .size = sizeof(struct imp_shape_ops), .name = "obj",
+    .object_size = sizeof(struct imp__mesh), .build = file_build, .surface = imp__mesh_surface,
+    .sample_toward = imp__mesh_sample, .pdf_toward = imp__mesh_pdf};
 const struct imp_shape_ops imp__ply = {
-    sizeof(struct imp_shape_ops), "ply", sizeof(struct imp__mesh), file_build, NULL,
-    imp__mesh_surface, imp__mesh_sample, imp__mesh_pdf};
+    .size = sizeof(struct imp_shape_ops), .name = "ply",
+    .object_size = sizeof(struct imp__mesh), .build = file_build, .surface = imp__mesh_surface,
+    .sample_toward = imp__mesh_sample, .pdf_toward = imp__mesh_pdf};

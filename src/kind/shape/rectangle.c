@@ -12,7 +12,7 @@ struct rectangle {
     uint32_t indices[6];
 };
 
-static enum imp_status rectangle_build(const struct imp_build *b, void *self,
+static enum imp_status build(const struct imp_build *b, void *self,
                                        struct imp_shape *s)
 {
     struct rectangle *r = self;
@@ -54,7 +54,7 @@ static enum imp_status rectangle_build(const struct imp_build *b, void *self,
     return IMP_OK;
 }
 
-static void rectangle_surface(const struct imp_shape *s, const struct imp_hit *hit,
+static void surface(const struct imp_shape *s, const struct imp_hit *hit,
                               const imp_v3 *o, const imp_v3 *d, struct imp_surface *out)
 {
     (void)o, (void)d;
@@ -71,7 +71,7 @@ static void rectangle_surface(const struct imp_shape *s, const struct imp_hit *h
     out->dp_dv = r->ev;
 }
 
-static bool rectangle_sample(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
+static bool sample_toward(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
                              struct imp_light_sample *out)
 {
     const struct rectangle *r = s->self;
@@ -81,7 +81,7 @@ static bool rectangle_sample(const struct imp_shape *s, const imp_v3 *ref, const
                                 r->inv_area, out);
 }
 
-static double rectangle_pdf(const struct imp_shape *s, const imp_v3 *ref,
+static double pdf_toward(const struct imp_shape *s, const imp_v3 *ref,
                             const struct imp_hit *hit, const struct imp_surface *at)
 {
     (void)hit;
@@ -90,5 +90,6 @@ static double rectangle_pdf(const struct imp_shape *s, const imp_v3 *ref,
 }
 
 const struct imp_shape_ops imp__rectangle = {
-    sizeof(struct imp_shape_ops), "rectangle", sizeof(struct rectangle), rectangle_build,
-    NULL, rectangle_surface, rectangle_sample, rectangle_pdf};
+    .size = sizeof(struct imp_shape_ops), .name = "rectangle",
+    .object_size = sizeof(struct rectangle), .build = build,
+    .surface = surface, .sample_toward = sample_toward, .pdf_toward = pdf_toward};

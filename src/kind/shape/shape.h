@@ -104,7 +104,4 @@ bool imp__mesh_sample(const struct imp_shape *s, const imp_v3 *ref, const double
 double imp__mesh_pdf(const struct imp_shape *s, const imp_v3 *ref, const struct imp_hit *hit,
                      const struct imp_surface *at);
 
-extern const struct imp_shape_ops imp__rectangle, imp__disk, imp__sphere, imp__cylinder,
-    imp__cube, imp__mesh, imp__obj, imp__ply;
-
 #endif

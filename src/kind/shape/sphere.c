@@ -12,7 +12,7 @@ struct sphere {
     double side;            /* 1: the normal points outwards */
 };
 
-static enum imp_status sphere_build(const struct imp_build *b, void *self,
+static enum imp_status build(const struct imp_build *b, void *self,
                                     struct imp_shape *s)
 {
     enum imp_status st = IMP_OK;
@@ -46,7 +46,7 @@ out:
 /* Discriminant from the distance of the centre to the line, not from b^2 - ac, and the
  * small root from the product of the roots: no digits are lost far away or for small
  * spheres (Haines et al., Ray Tracing Gems, ch. 7). */
-static bool sphere_intersect(const struct imp_shape *s, const imp_v3 *o, const imp_v3 *d,
+static bool intersect(const struct imp_shape *s, const imp_v3 *o, const imp_v3 *d,
                              double tmin, double tmax, struct imp_hit *hit)
 {
     const struct sphere *p = s->self;
@@ -82,7 +82,7 @@ static void surface_at(const struct sphere *p, imp_v3 outward, struct imp_surfac
     imp__surface_frame(out);
 }
 
-static void sphere_surface(const struct imp_shape *s, const struct imp_hit *hit,
+static void surface(const struct imp_shape *s, const struct imp_hit *hit,
                            const imp_v3 *o, const imp_v3 *d, struct imp_surface *out)
 {
     const struct sphere *p = s->self;
@@ -97,7 +97,7 @@ static double cone_height(const struct sphere *p, double distance)
     return s2 / (1 + sqrt(fmax(0, 1 - s2)));
 }
 
-static bool sphere_sample(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
+static bool sample_toward(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
                           struct imp_light_sample *out)
 {
     const struct sphere *p = s->self;
@@ -137,7 +137,7 @@ static bool sphere_sample(const struct imp_shape *s, const imp_v3 *ref, const do
     return out->dist > 0;
 }
 
-static double sphere_pdf(const struct imp_shape *s, const imp_v3 *ref,
+static double pdf_toward(const struct imp_shape *s, const imp_v3 *ref,
                          const struct imp_hit *hit, const struct imp_surface *at)
 {
     (void)hit;
@@ -148,5 +148,6 @@ static double sphere_pdf(const struct imp_shape *s, const imp_v3 *ref,
 }
 
 const struct imp_shape_ops imp__sphere = {
-    sizeof(struct imp_shape_ops), "sphere", sizeof(struct sphere), sphere_build,
-    sphere_intersect, sphere_surface, sphere_sample, sphere_pdf};
+    .size = sizeof(struct imp_shape_ops), .name = "sphere",
+    .object_size = sizeof(struct sphere), .build = build, .intersect = intersect,
+    .surface = surface, .sample_toward = sample_toward, .pdf_toward = pdf_toward};

@@ -1,0 +1,15 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The lights: one line a kind. */
+#include "kind/build.h"
+
+#define EMITTERS(X)                                                                        \
+    X(imp__area)                                                                           \
+    X(imp__stam_m1)                                                                        \
+    X(imp__point_light)                                                                    \
+    X(imp__constant)
+
+#define DECLARE(kind) extern const struct imp_emitter_ops kind;
+EMITTERS(DECLARE)
+#define ADDRESS(kind) &kind,
+const struct imp_emitter_ops *const imp__emitter_kinds[] = {EMITTERS(ADDRESS) NULL};

@@ -1,0 +1,73 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A point that radiates alike in all directions: irradiance I/r^2 across the ray. */
+#include "kind/build.h"
+#include "math/transform.h"
+
+enum { INTENSITY };
+
+struct point { imp_v3 position; };
+
+static const struct imp_input_desc inputs[] = {
+    {.name = "intensity", .role = IMP_EMISSION, .fallback = 1, .unit = "W sr^-1"}, {0}};
+
+static enum imp_status build(const struct imp_build *b, void *self, struct imp_emitter *e)
+{
+    enum imp_status st = IMP_OK;
+    struct point *p = self;
+    struct imp_mat4 to_world;
+    double at[3];
+
+    if (imp__props_has(b->node, "position") && imp__props_has(b->node, "to_world"))
+        IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "to_world"),
+                                IMP_E_SCENE, "give position or to_world, not both"));
+    if (e->n_in > INTENSITY && e->input[INTENSITY]->texture)
+        IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+                                "intensity cannot be a texture: a point has no surface"));
+    IMP_TRY(imp__props_vector(b->ctx, b->node, "position", (double[3]){0, 0, 0}, at));
+    IMP_TRY(imp__props_transform(b->ctx, b->node, "to_world", to_world.m));
+    if (!imp__mat4_is_finite(&to_world) || !imp__mat4_is_affine(&to_world))
+        IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "to_world"),
+                                IMP_E_SCENE, "to_world is not finite and affine"));
+    p->position = imp__point(&to_world, imp__v3(at[0], at[1], at[2]));
+out:
+    return st;
+}
+
+static void eval(const struct imp_emitter *e, const imp_spec *in, const struct imp_emission *x,
+                 imp_spec *le)
+{
+    (void)e;
+    *le = in[INTENSITY] * (1 / (x->dist * x->dist));
+}
+static void eval_d(const struct imp_emitter *e, const imp_spec *in,
+                   const struct imp_emission *x, imp_spec *dle)
+{
+    (void)e, (void)in;
+    dle[INTENSITY] = imp__spec(1 / (x->dist * x->dist));
+}
+static bool sample(const struct imp_emitter *e, const imp_v3 *ref, const double u[2],
+                   struct imp_light_sample *out)
+{
+    (void)u;
+    const struct point *p = e->self;
+    const imp_v3 d = p->position - *ref;
+    const double r = imp__length(d);
+    /* 1/r^2 has to be a number. */
+    if (!(r > 1e-150 && r < INFINITY)) return false;
+    *out = (struct imp_light_sample){.wi = d * (1 / r), .dist = r, .pdf = 1, .cos_light = 1,
+                                     .p = p->position, .ng = d * (-1 / r)};
+    return true;
+}
+/* No ray meets a point by chance. */
+static double pdf(const struct imp_emitter *e, const imp_v3 *ref, const imp_v3 *wi,
+                  const struct imp_hit *hit, const struct imp_surface *at)
+{
+    (void)e, (void)ref, (void)wi, (void)hit, (void)at;
+    return 0;
+}
+
+const struct imp_emitter_ops imp__point_light = {
+    .size = sizeof(struct imp_emitter_ops), .name = "point", .object_size = sizeof(struct point),
+    .flags = IMP_EMITTER_DELTA, .inputs = inputs, .build = build, .eval = eval,
+    .eval_d = eval_d, .sample = sample, .pdf = pdf};

@@ -1,0 +1,19 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A sensor's children: its film and its sampler. The scene builder reads them before the
+ * sensor's own build, which needs the film's aspect. */
+#ifndef IMP_KIND_SENSOR_FILM_H
+#define IMP_KIND_SENSOR_FILM_H
+
+#include "kind/build.h"
+
+/* The film that b->node describes, with its filter (scene-format 10); node NULL: the
+ * default film. Everything in the node and in its rfilter has been asked for, or it is an
+ * error. */
+enum imp_status imp__film_desc_build(const struct imp_build *b, struct imp_film_desc *out);
+
+/* Samples per pixel that b->node, a sampler, asks for, rounded up as its kind does
+ * (scene-format 10); node NULL: 4. */
+enum imp_status imp__sampler_build(const struct imp_build *b, int *spp);
+
+#endif

@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A pinhole: the ray through film position (px, py) runs along
+ * (t (1 - 2X), (t/a)(1 - 2Y), 1), X = px/W + offset_x, Y = py/H + offset_y (scene-format 9). */
+#include "projection.h"
+
+struct perspective {
+    struct imp_projection projection;
+    double x0, dx, y0, dy; /* direction = (x0 + px dx, y0 + py dy, 1) */
+};
+
+static enum imp_status build(const struct imp_build *b, void *self, struct imp_sensor *s)
+{
+    enum imp_status st = IMP_OK;
+    struct perspective *p = self;
+    const double w = s->film.width, h = s->film.height, a = w / h;
+    double t, offset_x, offset_y;
+
+    IMP_TRY(imp__projection_build(b, true, &p->projection));
+    IMP_TRY(imp__fov_build(b, a, &t));
+    IMP_TRY(imp__props_float(b->ctx, b->node, "principal_point_offset_x", 0, &offset_x));
+    IMP_TRY(imp__props_float(b->ctx, b->node, "principal_point_offset_y", 0, &offset_y));
+    p->x0 = t * (1 - 2 * offset_x);
+    p->dx = -2 * t / w;
+    p->y0 = t / a * (1 - 2 * offset_y);
+    p->dy = -2 * t / a / h;
+out:
+    return st;
+}
+
+static void ray(const struct imp_sensor *s, double px, double py, const double lens[2],
+                struct imp_sensor_ray *out)
+{
+    (void)lens;
+    const struct perspective *p = s->self;
+    imp__projection_ray(&p->projection, imp__v3(0, 0, 0),
+                        imp__v3(p->x0 + px * p->dx, p->y0 + py * p->dy, 1), out);
+}
+
+const struct imp_sensor_ops imp__perspective = {
+    .size = sizeof(struct imp_sensor_ops), .name = "perspective",
+    .object_size = sizeof(struct perspective), .build = build, .ray = ray};

@@ -1,0 +1,87 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Samplers. All of them mean independent samples here, of which there are as many as the
+ * kind rounds up to, so that a file costs the same everywhere (scene-format 10). */
+#include <string.h>
+#include "base/compiler.h"
+#include "film.h"
+
+#define SPP_MAX ((int64_t)1 << 30)
+
+static int64_t root_down(int64_t n)
+{
+    int64_t r = 1;
+    while ((r + 1) * (r + 1) <= n) r++;
+    return r;
+}
+static int64_t root_up(int64_t n)
+{
+    const int64_t r = root_down(n);
+    return r * r < n ? r + 1 : r;
+}
+static bool is_prime(int64_t n)
+{
+    for (int64_t k = 2; k * k <= n; k++)
+        if (n % k == 0) return false;
+    return n >= 2;
+}
+
+static int64_t round_none(int64_t n) { return n; }
+static int64_t round_square(int64_t n) { return root_up(n) * root_up(n); }
+static int64_t round_multijitter(int64_t n)
+{
+    const int64_t b = root_down(n);
+    return b * ((n + b - 1) / b);
+}
+static int64_t round_orthogonal(int64_t n)
+{
+    int64_t p = root_up(n);
+    while (!is_prime(p)) p++;
+    return p * p;
+}
+static int64_t round_ldsampler(int64_t n)
+{
+    int64_t r = 4;
+    while (r < n) r *= 4;
+    return r;
+}
+
+enum imp_status imp__sampler_build(const struct imp_build *b, int *spp)
+{
+    static const struct {
+        const char *name;
+        int64_t (*round)(int64_t n);
+        bool jitter, strength;
+    } kinds[] = {{"independent", round_none, false, false},
+                 {"stratified", round_square, true, false},
+                 {"multijitter", round_multijitter, true, false},
+                 {"orthogonal", round_orthogonal, true, true},
+                 {"ldsampler", round_ldsampler, false, false}};
+    enum imp_status st = IMP_OK;
+    int64_t count = 4, ignored;
+    bool jitter = true;
+    size_t kind = 0;
+
+    if (!b->node) {
+        *spp = 4;
+        return IMP_OK;
+    }
+    while (kind < imp_count(kinds) && strcmp(kinds[kind].name, b->node->type) != 0) kind++;
+    if (kind == imp_count(kinds))
+        IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_UNSUPPORTED,
+                                "no such sampler in this version; there are: independent, "
+                                "stratified, multijitter, orthogonal, ldsampler"));
+    IMP_TRY(imp__props_int(b->ctx, b->node, "sample_count", 4, 1, SPP_MAX, &count));
+    IMP_TRY(imp__props_int(b->ctx, b->node, "seed", 0, 0, INT64_MAX, &ignored));
+    if (kinds[kind].jitter)
+        IMP_TRY(imp__props_bool(b->ctx, b->node, "jitter", true, &jitter));
+    if (kinds[kind].strength)
+        IMP_TRY(imp__props_int(b->ctx, b->node, "strength", 2, 1, 100, &ignored));
+    if (!jitter)
+        imp__warn(b->ctx, "sampler '%s': jitter=false is ignored, samples stay random",
+                  b->node->type);
+    IMP_TRY(imp__props_finish(b->ctx, b->node));
+    *spp = (int)imp_min(kinds[kind].round(count), SPP_MAX);
+out:
+    return st;
+}

@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A thin lens: rays of one film position start anywhere on the aperture and meet where the
+ * pinhole's ray reaches z = focus_distance (scene-format 9). */
+#include "math/warp.h"
+#include "projection.h"
+
+struct thinlens {
+    struct imp_projection projection;
+    double aperture_radius;
+    double x0, dx, y0, dy; /* the pinhole's direction (x0 + px dx, y0 + py dy, 1) */
+};
+
+static enum imp_status build(const struct imp_build *b, void *self, struct imp_sensor *s)
+{
+    enum imp_status st = IMP_OK;
+    struct thinlens *p = self;
+    const double w = s->film.width, h = s->film.height, a = w / h;
+    double t;
+
+    IMP_TRY(imp__projection_build(b, true, &p->projection));
+    IMP_TRY(imp__fov_build(b, a, &t));
+    if (!imp__props_has(b->node, "aperture_radius"))
+        IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_SCENE, "aperture_radius is missing"));
+    IMP_TRY(imp__props_float(b->ctx, b->node, "aperture_radius", 0, &p->aperture_radius));
+    if (p->aperture_radius < 0)
+        IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "aperture_radius"),
+                                IMP_E_SCENE, "aperture_radius = %g is negative",
+                                p->aperture_radius));
+    p->x0 = t;
+    p->dx = -2 * t / w;
+    p->y0 = t / a;
+    p->dy = -2 * t / a / h;
+out:
+    return st;
+}
+
+static void ray(const struct imp_sensor *s, double px, double py, const double lens[2],
+                struct imp_sensor_ray *out)
+{
+    const struct thinlens *p = s->self;
+    double xy[2];
+    imp__concentric_disk(lens, xy);
+    const imp_v3 o = imp__v3(p->aperture_radius * xy[0], p->aperture_radius * xy[1], 0);
+    const imp_v3 focus = imp__v3(p->x0 + px * p->dx, p->y0 + py * p->dy, 1) *
+                         p->projection.focus_distance;
+    imp__projection_ray(&p->projection, o, focus - o, out);
+}
+
+const struct imp_sensor_ops imp__thinlens = {
+    .size = sizeof(struct imp_sensor_ops), .name = "thinlens",
+    .object_size = sizeof(struct thinlens), .build = build, .ray = ray};
