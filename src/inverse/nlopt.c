@@ -1,0 +1,143 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * NLopt's gradient methods under common random numbers: with one seed the objective is a
+ * fixed function of x, up to the jumps where a walk's decisions change.
+ *
+ * NLopt cannot be stopped and continued. Its evaluations are kept instead: a continued
+ * search starts again at the first x and is given the recorded answers, which brings the
+ * method into the state it had, to the last bit. */
+#include "optimize.h"
+#include <math.h>
+#include <nlopt.h>
+
+#define RECORD_MAX 200000 /* most variables whose evaluations are kept */
+#define SLSQP_MAX 1000    /* it is O(n^3) per step */
+
+enum { RECORD, START };   /* arrays: rows of (f, se, g[n]); [n] */
+enum { BEST };            /* scalars */
+
+struct call {
+    const struct imp__goal *goal;
+    struct imp__search *s;
+    nlopt_opt opt;
+    double *x;            /* [n] in the goal's units */
+    double *g;            /* [n] */
+    size_t calls;         /* so far, replayed ones included */
+    enum imp_status st;   /* why the goal stopped the search */
+};
+
+static enum imp_status init(const struct imp__goal *goal, const struct imp__opt_options *options,
+                            struct imp__search *s)
+{
+    enum imp_status st = IMP_OK;
+    (void)options;
+    if (s->kind == IMP_SLSQP && goal->n > SLSQP_MAX)
+        IMP_TRY(imp__error(goal->ctx, IMP_E_ARG,
+                           "SLSQP is for at most %d variables, here are %zu: use Adam, MMA or "
+                           "L-BFGS", SLSQP_MAX, goal->n));
+    IMP_TRY(imp__search_array(s, START, goal->n));
+    for (size_t k = 0; k < goal->n; k++) s->array[START][k] = s->x[k];
+    s->scalar[BEST] = INFINITY;
+out:
+    return st;
+}
+
+static enum imp_status evaluate(struct call *c, struct imp_estimate *f)
+{
+    enum imp_status st = IMP_OK;
+    const struct imp__goal *goal = c->goal;
+    struct imp__search *s = c->s;
+    const size_t row = goal->n + 2, at = s->array_n[RECORD];
+
+    IMP_TRY(goal->eval(c->x, imp__search_seed(goal, 0, 0), f, c->g, NULL, goal->payload));
+    if (goal->n <= RECORD_MAX) {
+        IMP_TRY(imp__search_array(s, RECORD, at + row));
+        s->array[RECORD][at] = f->value;
+        s->array[RECORD][at + 1] = f->se;
+        for (size_t k = 0; k < goal->n; k++) s->array[RECORD][at + 2 + k] = c->g[k];
+    }
+    IMP_TRY(imp__search_log(s, *f));
+    if (f->value < s->scalar[BEST]) {
+        s->scalar[BEST] = f->value;
+        for (size_t k = 0; k < goal->n; k++) s->x[k] = c->x[k];
+    }
+    st = imp__search_iterated(goal, s);
+out:
+    return st;
+}
+
+static double objective(unsigned n, const double *y, double *gradient, void *payload)
+{
+    struct call *c = payload;
+    const struct imp__goal *goal = c->goal;
+    const struct imp__search *s = c->s;
+    const size_t row = (size_t)n + 2, at = c->calls * row;
+    struct imp_estimate f;
+
+    if (c->st != IMP_OK) return HUGE_VAL; /* some methods finish a line search first */
+    if (at + row <= s->array_n[RECORD]) { /* replayed */
+        f = (struct imp_estimate){s->array[RECORD][at], s->array[RECORD][at + 1], 0};
+        for (size_t k = 0; k < n; k++) c->g[k] = s->array[RECORD][at + 2 + k];
+    } else {
+        for (size_t k = 0; k < n; k++)
+            c->x[k] = imp__into_bounds(goal, k, y[k] * goal->scale[k]);
+        c->st = evaluate(c, &f);
+        if (c->st != IMP_OK) {
+            nlopt_force_stop(c->opt);
+            return HUGE_VAL;
+        }
+    }
+    c->calls++;
+    for (size_t k = 0; gradient && k < n; k++) gradient[k] = c->g[k] * goal->scale[k];
+    return f.value;
+}
+
+static nlopt_algorithm algorithm(enum imp_optimizer kind)
+{
+    return kind == IMP_MMA ? NLOPT_LD_MMA : kind == IMP_SLSQP ? NLOPT_LD_SLSQP : NLOPT_LD_LBFGS;
+}
+
+static enum imp_status run(const struct imp__goal *goal, const struct imp__opt_options *options,
+                           struct imp__search *s)
+{
+    enum imp_status st = IMP_OK;
+    const size_t n = goal->n;
+    double *work = imp__alloc(goal->ctx, 5 * n + 1, sizeof *work);
+    struct call c = {.goal = goal, .s = s, .x = work, .g = work + n};
+    double *y = work + 2 * n, *lo = work + 3 * n, *hi = work + 4 * n;
+    double value;
+
+    c.opt = nlopt_create(algorithm(s->kind), (unsigned)n);
+    if (!work || !c.opt || n > 0x7fffffff)
+        IMP_TRY(imp__error(goal->ctx, IMP_E_NOMEM, "no memory for %zu variables", n));
+    const bool replay = s->array_n[RECORD] > 0 || s->iteration == 0;
+    for (size_t k = 0; k < n; k++) {
+        y[k] = (replay ? s->array[START] : s->x)[k] / goal->scale[k];
+        lo[k] = goal->lo[k] / goal->scale[k];
+        hi[k] = goal->hi[k] / goal->scale[k];
+        y[k] = imp_clamp(y[k], lo[k], hi[k]);
+    }
+    const int limit = options->max_iterations - (replay ? 0 : s->iteration);
+    if (nlopt_set_min_objective(c.opt, objective, &c) < 0
+        || nlopt_set_lower_bounds(c.opt, lo) < 0 || nlopt_set_upper_bounds(c.opt, hi) < 0
+        || nlopt_set_xtol_abs1(c.opt, options->tolerance) < 0
+        || nlopt_set_maxeval(c.opt, imp_max(limit, 1)) < 0)
+        IMP_TRY(imp__error(goal->ctx, IMP_E_NUMERIC, "NLopt refuses the problem"));
+    const nlopt_result r = nlopt_optimize(c.opt, y, &value);
+    if (c.st != IMP_OK) IMP_TRY(c.st);
+    if (r == NLOPT_OUT_OF_MEMORY)
+        IMP_TRY(imp__error(goal->ctx, IMP_E_NOMEM, "NLopt: no memory for %zu variables", n));
+    if (r == NLOPT_INVALID_ARGS)
+        IMP_TRY(imp__error(goal->ctx, IMP_E_NUMERIC, "NLopt refuses the problem"));
+    if (r == NLOPT_MAXEVAL_REACHED) goto out;
+    s->finished = true;
+    s->reason = r == NLOPT_XTOL_REACHED || r == NLOPT_SUCCESS || r == NLOPT_FTOL_REACHED
+                    ? "steps stay below the tolerance"
+                    : "no step lowers the objective further";
+out:
+    if (c.opt) nlopt_destroy(c.opt);
+    imp__release(goal->ctx, work);
+    return st;
+}
+
+const struct imp__opt_kind imp__opt_nlopt = {init, run};

@@ -1,0 +1,121 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "optimize.h"
+#include "math/rng.h"
+#include <math.h>
+#include <string.h>
+
+static const struct imp__opt_kind *kind_of(enum imp_optimizer kind)
+{
+    switch (kind) {
+    case IMP_ADAM: return &imp__opt_adam;
+    case IMP_LM: return &imp__opt_lm;
+    case IMP_LBFGS:
+    case IMP_MMA:
+    case IMP_SLSQP: return &imp__opt_nlopt;
+    }
+    return NULL;
+}
+
+enum imp_status imp__search_create(const struct imp__goal *goal, enum imp_optimizer kind,
+                                   const struct imp__opt_options *options, const double *x0,
+                                   struct imp__search **out)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = goal->ctx;
+    struct imp__search *s = NULL;
+
+    if (!kind_of(kind)) return imp__error(ctx, IMP_E_ARG, "optimizer %d does not exist", kind);
+    s = imp__alloc(ctx, 1, sizeof *s);
+    if (!s) return imp__error(ctx, IMP_E_NOMEM, "no memory for an optimiser");
+    s->ctx = ctx;
+    s->kind = kind;
+    s->n = goal->n;
+    s->x = imp__alloc(ctx, imp_max(goal->n, (size_t)1), sizeof *s->x);
+    if (!s->x) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for %zu variables", goal->n));
+    for (size_t k = 0; k < goal->n; k++) s->x[k] = imp__into_bounds(goal, k, x0[k]);
+    IMP_TRY(kind_of(kind)->init(goal, options, s));
+    *out = s;
+    return IMP_OK;
+out:
+    imp__search_destroy(s);
+    return st;
+}
+
+void imp__search_destroy(struct imp__search *s)
+{
+    if (!s) return;
+    for (int k = 0; k < IMP_SEARCH_ARRAYS; k++) imp__release(s->ctx, s->array[k]);
+    imp__release(s->ctx, s->history);
+    imp__release(s->ctx, s->history_se);
+    imp__release(s->ctx, s->x);
+    imp__release(s->ctx, s);
+}
+
+enum imp_status imp__optimize(const struct imp__goal *goal,
+                              const struct imp__opt_options *options, struct imp__search *s)
+{
+    if (s->finished) {
+        s->reason = "it had converged";
+        return IMP_OK;
+    }
+    const enum imp_status st = kind_of(s->kind)->run(goal, options, s);
+    if (st == IMP_OK && !s->finished) s->reason = "iteration limit reached";
+    return st;
+}
+
+enum imp_status imp__search_array(struct imp__search *s, int k, size_t n)
+{
+    double *grown = imp__grow(s->ctx, s->array[k], &s->array_cap[k], imp_max(n, (size_t)1),
+                              sizeof *grown);
+    if (!grown) return imp__error(s->ctx, IMP_E_NOMEM, "no memory for %zu numbers of an "
+                                  "optimiser's state", n);
+    s->array[k] = grown;
+    s->array_n[k] = n;
+    return IMP_OK;
+}
+
+enum imp_status imp__search_log(struct imp__search *s, struct imp_estimate f)
+{
+    double *h = imp__grow(s->ctx, s->history, &s->cap_history, s->n_history + 1, sizeof *h);
+    if (h) s->history = h;
+    double *e = imp__grow(s->ctx, s->history_se, &s->cap_history_se, s->n_history + 1,
+                          sizeof *e);
+    if (e) s->history_se = e;
+    if (!h || !e) return imp__error(s->ctx, IMP_E_NOMEM, "no memory for the loss history");
+    h[s->n_history] = f.value;
+    e[s->n_history++] = f.se;
+    return IMP_OK;
+}
+
+enum imp_status imp__search_iterated(const struct imp__goal *goal, struct imp__search *s)
+{
+    s->iteration++;
+    return goal->iterated ? goal->iterated(s, goal->payload) : IMP_OK;
+}
+
+uint64_t imp__search_seed(const struct imp__goal *goal, int i, int k)
+{
+    return imp__mix64(imp__mix64(goal->seed + 0x9e3779b97f4a7c15u) + 64 * (uint64_t)i
+                      + (uint64_t)k);
+}
+
+enum imp_status imp__normal_create(imp_context *ctx, size_t n, struct imp__normal *out)
+{
+    struct imp__normal m = {0};
+    double *all = imp__alloc(ctx, 5 * n * n + n, sizeof *all);
+    if (!all) return imp__error(ctx, IMP_E_NOMEM, "no memory for %zu x %zu matrices", n, n);
+    m.H = all;
+    m.H_same = all + n * n;
+    m.H_prior = all + 2 * n * n;
+    m.cov_g = all + 3 * n * n;
+    m.H_meas = all + 4 * n * n;
+    m.g = all + 5 * n * n;
+    *out = m;
+    return IMP_OK;
+}
+
+void imp__normal_destroy(imp_context *ctx, struct imp__normal *m)
+{
+    imp__release(ctx, m->H);
+    *m = (struct imp__normal){0};
+}

@@ -1,0 +1,118 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Optimisers of noisy objectives, for whoever has one: they know a goal (values, gradients
+ * and their standard errors), bounds and scales, and nothing of light.
+ *
+ * Everything an optimiser knows between two iterations stands in a struct imp__search, in
+ * numbers that a checkpoint can hold: continuing from a copy gives the same bits as not
+ * having stopped. */
+#ifndef IMP_INVERSE_OPTIMIZE_H
+#define IMP_INVERSE_OPTIMIZE_H
+
+#include "base/context.h"
+
+#define IMP_DENSE_MAX 256 /* most variables of methods that hold [n][n] matrices */
+
+/* Normal equations at one x, from one set of random numbers. */
+struct imp__normal {
+    double *H;        /* [n][n] Gauss-Newton matrix, unbiased; may be indefinite */
+    double *H_same;   /* [n][n] biased upwards, positive semi-definite: damps H */
+    double *H_prior;  /* [n][n] the part of H and H_same that is not from data; exact */
+    double *g;        /* [n] gradient */
+    double *cov_g;    /* [n][n] its covariance by Monte Carlo */
+    double *H_meas;   /* [n][n] its covariance by noise of the data */
+    struct imp_estimate f;
+    double chi2;      /* sum of weighted squared residuals, Monte Carlo's part taken off */
+    double n_residuals;
+    bool noise_known; /* H_meas is filled; else the noise is estimated from chi2 */
+};
+
+struct imp__search;
+
+struct imp__goal {
+    imp_context *ctx;
+    size_t n;
+    const double *lo, *hi;     /* [n] bounds, may be infinite */
+    const double *scale;       /* [n] > 0: a large change of each variable */
+    uint64_t seed;
+    /* Value and gradient at x (inside the bounds) from the random numbers of `seed`; equal
+     * seeds are common random numbers. g and g_se may be NULL. */
+    enum imp_status (*eval)(const double *x, uint64_t seed, struct imp_estimate *f, double *g,
+                            double *g_se, void *payload);
+    /* For Levenberg-Marquardt and covariances: sets all of `out`. NULL: not offered. */
+    enum imp_status (*normal)(const double *x, uint64_t seed, struct imp__normal *out,
+                              void *payload);
+    /* Called when an iteration is complete and the search could be continued from a copy:
+     * report, write a checkpoint. IMP_CANCELLED to stop. NULL: nothing. */
+    enum imp_status (*iterated)(const struct imp__search *search, void *payload);
+    void *payload;
+};
+
+struct imp__opt_options {
+    int max_iterations;      /* > 0 */
+    double learning_rate;    /* Adam: of the scale */
+    double tolerance;        /* of the scale */
+};
+
+enum { IMP_SEARCH_ARRAYS = 5, IMP_SEARCH_SCALARS = 12 };
+
+struct imp__search {
+    imp_context *ctx;
+    enum imp_optimizer kind;
+    size_t n;
+    int iteration;           /* completed */
+    bool finished;           /* converged: more iterations would change nothing */
+    const char *reason;      /* why it stopped, a constant string */
+    double *x;               /* [n] the best estimate so far, inside the bounds */
+    size_t n_history, cap_history, cap_history_se;
+    double *history, *history_se;
+    /* Private to the optimiser. */
+    double *array[IMP_SEARCH_ARRAYS];
+    size_t array_n[IMP_SEARCH_ARRAYS], array_cap[IMP_SEARCH_ARRAYS];
+    double scalar[IMP_SEARCH_SCALARS];
+};
+
+/* x0 is moved into the bounds. */
+enum imp_status imp__search_create(const struct imp__goal *goal, enum imp_optimizer kind,
+                                   const struct imp__opt_options *options, const double *x0,
+                                   struct imp__search **out);
+void imp__search_destroy(struct imp__search *search);
+
+/* Iterate until finished. @return IMP_OK; IMP_CANCELLED with the search where its last
+ * complete iteration left it; a failure of the goal. */
+enum imp_status imp__optimize(const struct imp__goal *goal,
+                              const struct imp__opt_options *options,
+                              struct imp__search *search);
+
+/* ---- Between the optimisers' files -------------------------------------------------------- */
+
+struct imp__opt_kind {
+    enum imp_status (*init)(const struct imp__goal *goal, const struct imp__opt_options *options,
+                            struct imp__search *search);
+    enum imp_status (*run)(const struct imp__goal *goal, const struct imp__opt_options *options,
+                           struct imp__search *search);
+};
+extern const struct imp__opt_kind imp__opt_adam, imp__opt_lm, imp__opt_nlopt;
+
+/* Room for n numbers in array k; new ones are zero. */
+enum imp_status imp__search_array(struct imp__search *s, int k, size_t n);
+enum imp_status imp__search_log(struct imp__search *s, struct imp_estimate f);
+/* iteration++, and tell the goal. */
+enum imp_status imp__search_iterated(const struct imp__goal *goal, struct imp__search *s);
+/* Random numbers of iteration i, purpose k: independent of each other. */
+uint64_t imp__search_seed(const struct imp__goal *goal, int i, int k);
+
+enum imp_status imp__normal_create(imp_context *ctx, size_t n, struct imp__normal *out);
+void imp__normal_destroy(imp_context *ctx, struct imp__normal *normal);
+
+/* -1 or 1 if x[k] is at its lower or upper bound, else 0. */
+static inline int imp__at_bound(const struct imp__goal *goal, const double *x, size_t k)
+{
+    return x[k] <= goal->lo[k] ? -1 : x[k] >= goal->hi[k] ? 1 : 0;
+}
+static inline double imp__into_bounds(const struct imp__goal *goal, size_t k, double v)
+{
+    return imp_clamp(v, goal->lo[k], goal->hi[k]);
+}
+
+#endif

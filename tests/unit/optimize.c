@@ -1,0 +1,140 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Every optimiser on a linear model with a known answer: without noise, with noise, with
+ * bounds, cancelled, and continued from a copy of its state. */
+#include "toy_goal.h"
+#include "imp_tap.h"
+
+static imp_context *ctx;
+static const char *const name[] = {"Adam", "LM", "L-BFGS", "MMA", "SLSQP"};
+
+static struct imp__opt_options options_of(enum imp_optimizer kind)
+{
+    return (struct imp__opt_options){kind == IMP_ADAM ? 600 : 60, 0.05, 1e-6};
+}
+
+/* Distance from `ref` in units of the scale, worst variable. */
+static double distance(const struct toy *t, const double *x, const double *ref)
+{
+    double worst = 0;
+    for (int k = 0; k < TOY_N; k++) worst = fmax(worst, fabs(x[k] - ref[k]) / t->scale[k]);
+    return worst;
+}
+
+static struct imp__search *solve(struct toy *t, enum imp_optimizer kind, enum imp_status *st)
+{
+    const struct imp__opt_options o = options_of(kind);
+    struct imp__search *s = NULL;
+    double x0[TOY_N];
+    for (int k = 0; k < TOY_N; k++) x0[k] = 0.5 * t->truth[k];
+    *st = imp__search_create(&t->goal, kind, &o, x0, &s);
+    if (*st == IMP_OK) *st = imp__optimize(&t->goal, &o, s);
+    return s;
+}
+
+static void answers(enum imp_optimizer kind)
+{
+    struct toy t;
+    enum imp_status st;
+    double ls[TOY_N], inv[TOY_N * TOY_N];
+
+    toy_make(&t, ctx, 4, 0.1, 0);
+    toy_least_squares(&t, ls, inv);
+    struct imp__search *s = solve(&t, kind, &st);
+    tap_ok(st == IMP_OK && distance(&t, s->x, ls) < (kind == IMP_ADAM ? 1e-3 : 1e-5),
+           "%s, no noise # distance %.1e after %d iterations: %s", name[kind],
+           distance(&t, s->x, ls), s->iteration, s->reason);
+    imp__search_destroy(s);
+
+    /* With noise: within 5 standard errors of what one evaluation could tell. */
+    toy_make(&t, ctx, 4, 0.1, 0.3);
+    toy_least_squares(&t, ls, inv);
+    s = solve(&t, kind, &st);
+    double worst = 0;
+    for (int k = 0; k < TOY_N; k++)
+        worst = fmax(worst, fabs(s->x[k] - ls[k]) / (t.mc * sqrt(inv[k * TOY_N + k])));
+    tap_ok(st == IMP_OK && worst < 4, "%s, noise # %.2f sd after %d iterations: %s", name[kind],
+           worst, s->iteration, s->reason);
+    tap_ok(s->n_history == (size_t)s->iteration && s->history_se[0] > 0,
+           "%s: a loss and its error for every iteration", name[kind]);
+    imp__search_destroy(s);
+
+    /* The answer is outside: x[0] <= 0.8 of what it wants, the others follow. */
+    toy_make(&t, ctx, 4, 0, 0);
+    t.hi[0] = 0.8 * t.truth[0];
+    t.lo[2] = 0;
+    s = solve(&t, kind, &st);
+    double g[TOY_N];
+    struct imp_estimate f;
+    t.goal.eval(s->x, 0, &f, g, NULL, &t);
+    double others = 0; /* the free gradient, in units of the blocked one */
+    for (int k = 1; k < TOY_N; k++)
+        others = fmax(others, fabs(g[k] * t.scale[k]) / fabs(g[0] * t.scale[0]));
+    tap_ok(st == IMP_OK && fabs(s->x[0] - t.hi[0]) <= 1e-12 && g[0] < 0 && others < 0.02,
+           "%s, at a bound # free gradient %.1e of the blocked one: %s", name[kind], others,
+           s->reason);
+    imp__search_destroy(s);
+}
+
+/* Stop inside evaluation 7, continue the same state: the same bits as never stopped. */
+static void resume(enum imp_optimizer kind)
+{
+    struct toy t;
+    enum imp_status st;
+    toy_make(&t, ctx, 9, 0.1, 0.2);
+    struct imp__search *whole = solve(&t, kind, &st);
+
+    toy_make(&t, ctx, 9, 0.1, 0.2);
+    t.stop_after = 5;
+    struct imp__search *part = solve(&t, kind, &st);
+    tap_ok(st == IMP_CANCELLED && part->iteration >= 2 && part->iteration < 7,
+           "%s: cancelled in evaluation 5, %d iterations done", name[kind], part->iteration);
+    t.stop_after = 0;
+    const struct imp__opt_options o = options_of(kind);
+    st = imp__optimize(&t.goal, &o, part);
+    const int same = st == IMP_OK && part->iteration == whole->iteration
+                     && part->n_history == whole->n_history
+                     && !memcmp(part->x, whole->x, sizeof(double) * TOY_N)
+                     && !memcmp(part->history, whole->history,
+                                sizeof(double) * whole->n_history);
+    tap_ok(same, "%s: continued, the same bits", name[kind]);
+    imp__search_destroy(whole);
+    imp__search_destroy(part);
+
+    toy_make(&t, ctx, 9, 0.1, 0.2);
+    t.stop_iteration = 3;
+    part = solve(&t, kind, &st);
+    tap_ok(st == IMP_CANCELLED && part->iteration == 3, "%s: cancelled between iterations",
+           name[kind]);
+    imp__search_destroy(part);
+}
+
+int main(void)
+{
+    if (imp_context_create(NULL, &ctx) != IMP_OK) return 1;
+    for (int kind = IMP_ADAM; kind <= IMP_SLSQP; kind++) {
+        answers(kind);
+        resume(kind);
+    }
+    /* A variable nothing depends on stays where it was. */
+    struct toy t;
+    enum imp_status st;
+    for (int kind = IMP_ADAM; kind <= IMP_SLSQP; kind++) {
+        toy_make(&t, ctx, 4, 0.1, 0.1);
+        for (int p = 0; p < TOY_M; p++) t.A[p][1] = 0;
+        struct imp__search *s = solve(&t, kind, &st);
+        tap_ok(st == IMP_OK && s->x[1] == 0.5 * t.truth[1], "%s: without effect, without motion",
+               name[kind]);
+        imp__search_destroy(s);
+    }
+    struct imp__search *s = NULL;
+    const struct imp__opt_options o = {10, 0.05, 1e-4};
+    toy_make(&t, ctx, 4, 0.1, 0.1);
+    tap_ok(imp__search_create(&t.goal, 99, &o, t.truth, &s) == IMP_E_ARG && !s,
+           "an optimiser that does not exist");
+    t.goal.n = IMP_DENSE_MAX + 1;
+    tap_ok(imp__search_create(&t.goal, IMP_LM, &o, t.truth, &s) != IMP_OK && !s,
+           "LM refuses many variables # %s", imp_last_error(ctx));
+    imp_context_destroy(ctx);
+    return tap_done();
+}
