@@ -1,0 +1,162 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "file.h"
+#include <errno.h>
+#include <fcntl.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+static enum imp_status io_error(imp_context *ctx, const char *path, const char *what, int code)
+{
+    char text[256];
+    return imp__error(ctx, IMP_E_IO, "%s: %s: %s", path, what,
+                      strerror_r(code, text, sizeof text));
+}
+
+bool imp__bytes_put(imp_context *ctx, struct imp_bytes *b, size_t offset, const void *data,
+                    size_t n)
+{
+    size_t end;
+    if (__builtin_add_overflow(offset, n, &end)) return false;
+    if (end > b->capacity) {
+        unsigned char *grown = imp__grow(ctx, b->data, &b->capacity, end, 1);
+        if (!grown) return false;
+        b->data = grown;
+    }
+    if (n) memcpy(b->data + offset, data, n);
+    if (end > b->size) b->size = end;
+    return true;
+}
+
+void imp__bytes_free(imp_context *ctx, struct imp_bytes *b)
+{
+    imp__release(ctx, b->data);
+    *b = (struct imp_bytes){0};
+}
+
+enum imp_status imp__file_read(imp_context *ctx, const char *path, size_t limit,
+                               struct imp_bytes *out)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_bytes b = {0};
+    const int fd = open(path, O_RDONLY | O_CLOEXEC);
+    if (fd < 0) return io_error(ctx, path, "cannot open", errno);
+
+    struct stat info;
+    if (fstat(fd, &info) != 0) IMP_TRY(io_error(ctx, path, "cannot read", errno));
+    if (S_ISDIR(info.st_mode)) IMP_TRY(io_error(ctx, path, "cannot read", EISDIR));
+    size_t room = 1 << 16; /* pipes say 0 */
+    if (S_ISREG(info.st_mode)) {
+        if ((uint64_t)info.st_size > limit)
+            IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: longer than %zu bytes", path, limit));
+        room = (size_t)info.st_size + 2; /* one to see the end of the file, one for the zero */
+    }
+    for (;;) {
+        if (b.size + room > b.capacity) {
+            unsigned char *grown;
+            if (!b.data) { /* exactly, not doubled */
+                grown = imp__alloc(ctx, room, 1);
+                b.capacity = room;
+            } else
+                grown = imp__grow(ctx, b.data, &b.capacity, b.size + room, 1);
+            if (!grown)
+                IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "%s: no memory for its contents", path));
+            b.data = grown;
+        }
+        const ssize_t n = read(fd, b.data + b.size, imp_min(b.capacity - b.size - 1,
+                                                            (size_t)1 << 30));
+        if (n < 0 && errno == EINTR) continue;
+        if (n < 0) IMP_TRY(io_error(ctx, path, "cannot read", errno));
+        if (n == 0) break;
+        b.size += (size_t)n;
+        if (b.size > limit)
+            IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: longer than %zu bytes", path, limit));
+        room = b.capacity - b.size > 1 ? 1 : 1 << 16;
+    }
+    b.data[b.size] = 0;
+    *out = b;
+out:
+    close(fd);
+    if (st != IMP_OK) imp__bytes_free(ctx, &b);
+    return st;
+}
+
+static int write_all(int fd, const unsigned char *p, size_t size)
+{
+    while (size) {
+        const ssize_t n = write(fd, p, imp_min(size, (size_t)1 << 30));
+        if (n < 0 && errno == EINTR) continue;
+        if (n <= 0) return n < 0 ? errno : EIO;
+        p += n;
+        size -= (size_t)n;
+    }
+    return 0;
+}
+
+/* A name beside `path` that is free: created, never opened over something. */
+static int temporary_open(const char *path, mode_t mode, char *name, size_t size)
+{
+    struct timespec now;
+    clock_gettime(CLOCK_MONOTONIC, &now);
+    for (unsigned k = 0; k < 100; k++) {
+        snprintf(name, size, "%s.%lx%lx%x.tmp", path, (long)getpid(), now.tv_nsec, k);
+        const int fd = open(name, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
+        if (fd >= 0 || errno != EEXIST) return fd;
+    }
+    return -1;
+}
+
+/* The rename itself must survive a crash too; folders that cannot be synced are left. */
+static void folder_sync(const char *path, char *scratch, size_t size)
+{
+    snprintf(scratch, size, "%s", path);
+    char *slash = strrchr(scratch, '/');
+    if (slash) slash[slash == scratch] = 0;
+    const int fd = open(slash ? scratch : ".", O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+    if (fd < 0) return;
+    (void)fsync(fd);
+    close(fd);
+}
+
+enum imp_status imp__file_write(imp_context *ctx, const char *path, const void *data,
+                                size_t size)
+{
+    struct stat info;
+    const bool exists = stat(path, &info) == 0;
+    if (exists && S_ISDIR(info.st_mode)) return io_error(ctx, path, "cannot write", EISDIR);
+    if (exists && !S_ISREG(info.st_mode)) {
+        const int fd = open(path, O_WRONLY | O_CLOEXEC);
+        if (fd < 0) return io_error(ctx, path, "cannot open", errno);
+        const int code = write_all(fd, data, size);
+        if (close(fd) != 0 || code) return io_error(ctx, path, "cannot write", code);
+        return IMP_OK;
+    }
+
+    enum imp_status st = IMP_OK;
+    char *link = exists ? realpath(path, NULL) : NULL; /* write through symbolic links */
+    const char *target = link ? link : path;
+    const size_t room = strlen(target) + 64;
+    char *name = imp__alloc(ctx, room, 1);
+    int fd = -1, code = 0;
+    if (!name) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "%s: out of memory", path));
+    fd = temporary_open(target, 0666, name, room);
+    if (fd < 0) IMP_TRY(io_error(ctx, path, "cannot create", errno));
+    if (exists) (void)fchmod(fd, info.st_mode & 07777);
+    code = write_all(fd, data, size);
+    if (!code && fsync(fd) != 0 && errno != EINVAL && errno != EROFS) code = errno;
+    if (close(fd) != 0 && !code) code = errno;
+    if (!code && rename(name, target) != 0) code = errno;
+    if (code) {
+        unlink(name);
+        IMP_TRY(io_error(ctx, path, "cannot write", code));
+    }
+    if (name) folder_sync(target, name, room);
+out:
+    imp__release(ctx, name);
+    free(link);
+    return st;
+}

@@ -1,0 +1,113 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "number.h"
+#include <locale.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <strings.h>
+
+#define DIGITS_MAX 19 /* always fit 64 bits */
+
+static bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+static bool word(const char **s, const char *end, const char *text, size_t n)
+{
+    if ((size_t)(end - *s) < n || strncasecmp(*s, text, n) != 0) return false;
+    *s += n;
+    return true;
+}
+
+/* mantissa * 10^exponent, correctly rounded. Both factors exact below 2^53 and 10^22: one
+ * rounding (Clinger, "How to read floating point numbers accurately", 1990). Otherwise the C
+ * library does it in its "C" locale; `sticky` says that non-zero digits were cut off. */
+static double scale10(uint64_t mantissa, int exponent, bool sticky)
+{
+    static const double power[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
+                                   1e8,  1e9,  1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
+                                   1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
+    if (mantissa == 0) return 0;
+    if (mantissa <= (uint64_t)1 << 53 && !sticky) {
+        if (exponent >= 0 && exponent <= 22) return (double)mantissa * power[exponent];
+        if (exponent < 0 && exponent >= -22) return (double)mantissa / power[-exponent];
+    }
+    if (exponent > 400) return INFINITY;
+    if (exponent < -400) return 0;
+    char text[64];
+    snprintf(text, sizeof text, "%llu%se%d", (unsigned long long)mantissa, sticky ? "1" : "",
+             exponent - sticky);
+    const locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+    if (!c) return (double)mantissa * pow(10, exponent);
+    const double value = strtod_l(text, NULL, c);
+    freelocale(c);
+    return value;
+}
+
+bool imp__number(const char **s, const char *end, double *out)
+{
+    const char *p = *s;
+    bool negative = false, sticky = false;
+    if (p < end && (*p == '+' || *p == '-')) negative = *p++ == '-';
+
+    uint64_t mantissa = 0;
+    int kept = 0, exponent = 0;
+    bool any = false, fraction = false;
+    for (; p < end; p++) {
+        if (*p == '.' && !fraction) {
+            fraction = true;
+            continue;
+        }
+        if (!is_digit(*p)) break;
+        any = true;
+        if (kept < DIGITS_MAX) {
+            mantissa = 10 * mantissa + (uint64_t)(*p - '0');
+            kept += mantissa != 0; /* leading zeros are free */
+            if (fraction && exponent > -100000) exponent--;
+        } else {
+            sticky |= *p != '0';
+            if (!fraction && exponent < 100000) exponent++;
+        }
+    }
+    if (!any) {
+        p = *s + (*s < end && (**s == '+' || **s == '-'));
+        double value;
+        if (word(&p, end, "infinity", 8) || word(&p, end, "inf", 3)) value = INFINITY;
+        else if (word(&p, end, "nan", 3)) value = NAN;
+        else return false;
+        *s = p;
+        *out = negative ? -value : value;
+        return true;
+    }
+    if (p < end && (*p == 'e' || *p == 'E')) {
+        const char *q = p + 1;
+        bool minus = false;
+        if (q < end && (*q == '+' || *q == '-')) minus = *q++ == '-';
+        if (q < end && is_digit(*q)) {
+            int e = 0;
+            for (; q < end && is_digit(*q); q++)
+                if (e < 100000) e = 10 * e + (*q - '0');
+            exponent += minus ? -e : e;
+            p = q;
+        }
+    }
+    const double value = scale10(mantissa, exponent, sticky);
+    *s = p;
+    *out = negative ? -value : value;
+    return true;
+}
+
+bool imp__integer(const char **s, const char *end, int64_t *out)
+{
+    const char *p = *s;
+    bool negative = false;
+    if (p < end && (*p == '+' || *p == '-')) negative = *p++ == '-';
+    if (p >= end || !is_digit(*p)) return false;
+    int64_t value = 0;
+    for (; p < end && is_digit(*p); p++)
+        if (__builtin_mul_overflow(value, 10, &value) ||
+            (negative ? __builtin_sub_overflow(value, *p - '0', &value)
+                      : __builtin_add_overflow(value, *p - '0', &value)))
+            return false;
+    *s = p;
+    *out = value;
+    return true;
+}
