@@ -90,11 +90,21 @@ struct imp_scene {
  * must have been attached to the nodes (format/resolve.c). */
 enum imp_status imp__scene_build(struct imp_scene *scene);
 
+/* ---- integrator.c ------------------------------------------------------------------ */
+enum imp_status imp__integrator_build(struct imp_scene *scene, struct imp_node *node,
+                                      struct imp_integrator *out);
+
 /* ---- theta.c ---------------------------------------------------------------------- */
 enum imp_status imp__theta_add(struct imp_scene *scene, const struct imp_param *param,
                                int *index);
 /* Give every parameter its offset, in order of addition. */
 void imp__theta_finish(struct imp_scene *scene);
+/* Number k of a parameter. Setting does not look at the bounds. */
+double imp__param_get(const struct imp_param *p, size_t k);
+void imp__param_set(struct imp_param *p, size_t k, double value);
+/* IMP_E_ARG with a message if the value is not finite or outside the bounds. */
+enum imp_status imp__param_check(const struct imp_scene *scene, const struct imp_param *p,
+                                 size_t k, double value);
 
 /* ---- intersect.c -------------------------------------------------------------------- */
 enum imp_status imp__intersector_create(struct imp_scene *scene);

@@ -1,0 +1,188 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * theta: every number that describes the scene, in document order, as places to read and
+ * write. A parameter's numbers live where rendering uses them (an input's lanes, a texture's
+ * texels); theta is a list of addresses, so setting it needs no rebuild. */
+#include <stdio.h>
+#include <string.h>
+#include "scene.h"
+
+enum imp_status imp__theta_add(struct imp_scene *scene, const struct imp_param *param,
+                               int *index)
+{
+    struct imp_param *p = imp__grow(scene->ctx, scene->params, &scene->cap_params,
+                                    scene->n_params + 1, sizeof *p);
+    if (!p) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for parameters");
+    scene->params = p;
+    *index = (int)scene->n_params;
+    p[scene->n_params++] = *param;
+    return IMP_OK;
+}
+
+void imp__theta_finish(struct imp_scene *scene)
+{
+    scene->n_theta = 0;
+    for (size_t i = 0; i < scene->n_params; i++) {
+        struct imp_param_info *info = &scene->params[i].info;
+        info->size = sizeof *info;
+        info->offset = scene->n_theta;
+        info->count = 1;
+        for (int d = 0; d < info->n_dims; d++) info->count *= info->dims[d];
+        scene->n_theta += info->count;
+    }
+}
+
+double imp__param_get(const struct imp_param *p, size_t k)
+{
+    return p->store == IMP_STORE_BULK ? (double)p->bulk[k] : (*p->lanes)[k];
+}
+
+void imp__param_set(struct imp_param *p, size_t k, double value)
+{
+    if (p->store == IMP_STORE_BULK)
+        p->bulk[k] = (float)value;
+    else if (p->info.count == 1)
+        *p->lanes = imp__spec(value);
+    else
+        (*p->lanes)[k] = value;
+}
+
+size_t imp_scene_n_params(const imp_scene *scene) { return scene ? scene->n_params : 0; }
+size_t imp_scene_n_theta(const imp_scene *scene) { return scene ? scene->n_theta : 0; }
+
+enum imp_status imp_scene_get_param(const imp_scene *scene, size_t index,
+                                    struct imp_param_info *info)
+{
+    if (!scene || !info) return IMP_E_ARG;
+    if (index >= scene->n_params)
+        return imp__error(scene->ctx, IMP_E_ARG, "there is no parameter %zu", index);
+    *info = scene->params[index].info;
+    return IMP_OK;
+}
+
+/* Levenshtein distance, for suggestions; long names are not worth it. */
+static size_t edit_distance(const char *a, const char *b)
+{
+    enum { LONGEST = 96 };
+    const size_t n = strlen(a), m = strlen(b);
+    if (n > LONGEST || m > LONGEST) return SIZE_MAX;
+    size_t row[LONGEST + 1];
+    for (size_t j = 0; j <= m; j++) row[j] = j;
+    for (size_t i = 1; i <= n; i++) {
+        size_t diagonal = row[0];
+        row[0] = i;
+        for (size_t j = 1; j <= m; j++) {
+            const size_t above = row[j];
+            const size_t swap = diagonal + (a[i - 1] != b[j - 1]);
+            row[j] = imp_min(swap, imp_min(above, row[j - 1]) + 1);
+            diagonal = above;
+        }
+    }
+    return row[m];
+}
+
+/* Names may leave out the final ".value", and may be written below any parent that reaches
+ * the object ("ball.bsdf.red.reflectance"): the longest matching tail wins. */
+static bool name_matches(const char *given, const char *name)
+{
+    const size_t n = strlen(name), g = strlen(given);
+    if (strcmp(given, name) == 0) return true;
+    const size_t value = strlen(".value");
+    return n == g + value && strncmp(given, name, g) == 0 && strcmp(name + g, ".value") == 0;
+}
+
+enum imp_status imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index)
+{
+    if (!scene || !name || !index) return IMP_E_ARG;
+    for (const char *tail = name; tail; tail = strchr(tail, '.') ? strchr(tail, '.') + 1 : NULL)
+        for (size_t i = 0; i < scene->n_params; i++)
+            if (name_matches(tail, scene->params[i].info.name)) {
+                *index = i;
+                return IMP_OK;
+            }
+    const char *near[3] = {0};
+    size_t distance[3] = {SIZE_MAX, SIZE_MAX, SIZE_MAX};
+    for (size_t i = 0; i < scene->n_params; i++) {
+        const char *candidate = scene->params[i].info.name;
+        size_t d = edit_distance(name, candidate);
+        for (int k = 0; k < 3; k++)
+            if (d < distance[k]) {
+                const size_t old = distance[k];
+                const char *other = near[k];
+                distance[k] = d, near[k] = candidate;
+                d = old, candidate = other;
+            }
+    }
+    char list[512] = "";
+    for (int k = 0; k < 3 && near[k]; k++) {
+        const size_t used = strlen(list);
+        snprintf(list + used, sizeof list - used, "%s%s", k ? ", " : "; the nearest are ",
+                 near[k]);
+    }
+    return imp__error(scene->ctx, IMP_E_ARG, "there is no parameter '%s'%s", name,
+                      *list ? list : "; the scene has none");
+}
+
+void imp_scene_get_theta(const imp_scene *scene, double *theta)
+{
+    for (size_t i = 0; i < scene->n_params; i++) {
+        const struct imp_param *p = &scene->params[i];
+        for (size_t k = 0; k < p->info.count; k++)
+            theta[p->info.offset + k] = imp__param_get(p, k);
+    }
+}
+
+enum imp_status imp__param_check(const struct imp_scene *scene, const struct imp_param *p,
+                                 size_t k, double value)
+{
+    if (isfinite(value) && value >= p->info.lo && value <= p->info.hi) return IMP_OK;
+    char element[32] = "";
+    if (p->info.count > 1) snprintf(element, sizeof element, "[%zu]", k);
+    return imp__error(scene->ctx, IMP_E_ARG, "%s%s = %g is outside [%g, %g]", p->info.name,
+                      element, value, p->info.lo, p->info.hi);
+}
+
+enum imp_status imp_scene_set_theta(imp_scene *scene, const double *theta)
+{
+    if (!scene || !theta) return IMP_E_ARG;
+    for (size_t i = 0; i < scene->n_params; i++) {
+        const struct imp_param *p = &scene->params[i];
+        for (size_t k = 0; k < p->info.count; k++) {
+            const enum imp_status st =
+                imp__param_check(scene, p, k, theta[p->info.offset + k]);
+            if (st != IMP_OK) return st;
+        }
+    }
+    for (size_t i = 0; i < scene->n_params; i++) {
+        struct imp_param *p = &scene->params[i];
+        for (size_t k = 0; k < p->info.count; k++)
+            imp__param_set(p, k, theta[p->info.offset + k]);
+    }
+    return IMP_OK;
+}
+
+enum imp_status imp_scene_set_values(imp_scene *scene, size_t index, size_t n,
+                                     const double *values)
+{
+    if (!scene || !values) return IMP_E_ARG;
+    if (index >= scene->n_params)
+        return imp__error(scene->ctx, IMP_E_ARG, "there is no parameter %zu", index);
+    struct imp_param *p = &scene->params[index];
+    if (n != p->info.count && n != 1)
+        return imp__error(scene->ctx, IMP_E_ARG, "%s has %zu numbers, not %zu", p->info.name,
+                          p->info.count, n);
+    for (size_t k = 0; k < n; k++) {
+        const enum imp_status st = imp__param_check(scene, p, k, values[k]);
+        if (st != IMP_OK) return st;
+    }
+    for (size_t k = 0; k < p->info.count; k++) imp__param_set(p, k, values[n == 1 ? 0 : k]);
+    return IMP_OK;
+}
+
+enum imp_status imp_scene_get_values(const imp_scene *scene, size_t index, double *values)
+{
+    if (!scene || !values || index >= scene->n_params) return IMP_E_ARG;
+    const struct imp_param *p = &scene->params[index];
+    for (size_t k = 0; k < p->info.count; k++) values[k] = imp__param_get(p, k);
+    return IMP_OK;
+}

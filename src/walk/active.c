@@ -1,0 +1,56 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Which objects depend on which active numbers, found once a job so that the sweep can pass
+ * by a material nobody asked about. */
+#include <string.h>
+#include "walk.h"
+
+static bool texture_depends(const struct imp_texture *t, const uint8_t *chosen);
+
+static bool input_depends(const struct imp_input *in, const uint8_t *chosen)
+{
+    if (in->texture) return texture_depends(in->texture, chosen);
+    return in->param >= 0 && chosen[in->param];
+}
+
+static bool texture_depends(const struct imp_texture *t, const uint8_t *chosen)
+{
+    if (t->param >= 0 && chosen[t->param]) return true;
+    for (int k = 0; k < t->n_in; k++)
+        if (input_depends(t->input[k], chosen)) return true;
+    return false;
+}
+
+enum imp_status imp__active_create(const struct imp_scene *scene, const uint8_t *chosen,
+                                   struct imp_active *out)
+{
+    imp_context *ctx = scene->ctx;
+    struct imp_active a = {0};
+    a.base = imp__alloc(ctx, scene->n_params + 1, sizeof *a.base);
+    a.bsdf = imp__alloc(ctx, (size_t)scene->n_bsdfs + 1, 1);
+    a.emitter = imp__alloc(ctx, (size_t)scene->n_emitters + 1, 1);
+    if (!a.base || !a.bsdf || !a.emitter) {
+        imp__active_destroy(ctx, &a);
+        return imp__error(ctx, IMP_E_NOMEM, "no memory for the active parameters");
+    }
+    for (size_t i = 0; i < scene->n_params; i++) {
+        a.base[i] = chosen[i] ? (int64_t)a.n : -1;
+        if (chosen[i]) a.n += scene->params[i].info.count;
+    }
+    for (int b = 0; b < scene->n_bsdfs; b++)
+        for (int k = 0; k < scene->bsdfs[b]->n_in; k++)
+            a.bsdf[b] |= input_depends(scene->bsdfs[b]->input[k], chosen);
+    for (int e = 0; e < scene->n_emitters; e++)
+        for (int k = 0; k < scene->emitters[e]->n_in; k++)
+            a.emitter[e] |= input_depends(scene->emitters[e]->input[k], chosen);
+    *out = a;
+    return IMP_OK;
+}
+
+void imp__active_destroy(imp_context *ctx, struct imp_active *a)
+{
+    imp__release(ctx, a->base);
+    imp__release(ctx, a->bsdf);
+    imp__release(ctx, a->emitter);
+    *a = (struct imp_active){0};
+}

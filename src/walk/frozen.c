@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The same walk at other parameters: vertices, directions, densities, MIS weights and
+ * roulette stay, values are looked up and multiplied again. Differences of this are what a
+ * detached derivative must equal, to rounding (gradients.md 13 A); they are blind to wrong
+ * densities, which fresh-seed differences see. */
+#include "walk.h"
+
+#define MAX_INPUTS 32
+
+static imp_spec radiance(const struct imp_scene *scene, int emitter,
+                         const struct imp_emission *x, imp_v3 p)
+{
+    const struct imp_emitter *e = scene->emitters[emitter];
+    const struct imp_texcoord at = {{x->uv[0], x->uv[1]}, p};
+    imp_spec in[MAX_INPUTS], le;
+    imp__inputs_eval(e->input, e->n_in, &at, in);
+    e->ops->eval(e, in, x, &le);
+    return le;
+}
+
+imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk *walk)
+{
+    imp_spec L = {0};
+    if (walk->dropped || !walk->valid) return L;
+    for (const struct imp_vertex *v = walk->last; v; v = v->prev) {
+        const struct imp_bsdf *b = v->bsdf;
+        imp_spec in[MAX_INPUTS], f, sum = {0};
+        if (b) imp__inputs_eval(b->input, b->n_in, &v->at, in);
+        if (b && v->inv_ps > 0) {
+            b->ops->eval(b, in, &v->dirs, &f);
+            sum += f * v->inv_ps * L;
+        }
+        if (v->emitter >= 0)
+            sum += radiance(tracer->scene, v->emitter, &v->e_at, v->at.p) * v->e_weight;
+        if (v->glows) {
+            b->ops->emit(b, in, &v->dirs.wo, &f);
+            sum += f * v->e_weight;
+        }
+        if (v->light >= 0) {
+            const struct imp_dirs dirs = {v->dirs.wo, v->l_wi, IMP_SMOOTH};
+            b->ops->eval(b, in, &dirs, &f);
+            sum += f * radiance(tracer->scene, v->light, &v->l_at, v->l_p) * v->l_weight;
+        }
+        L = sum;
+    }
+    return L;
+}

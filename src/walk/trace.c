@@ -1,0 +1,324 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * One walk. The step below is the only place where paths are made: rendering, gradients,
+ * replays and frozen checks all start from what it records. Path tracing with light samples,
+ * and Stam's walk that collects emission only where it is absorbed, are settings of it.
+ *
+ * Estimator (gradients.md 8): E_k = w^B Le for emission met by chance, B_k = w^E f Le / p^e
+ * for a light sample, power heuristic with exponent 2, w^B = 1 at the first vertex and after
+ * a delta lobe. Depth: emission at vertex k counts if k < max_depth, scattering goes on and
+ * samples lights if k + 1 < max_depth (scene-format 11). */
+#include "dims.h"
+#include "walk.h"
+
+struct step {
+    const struct imp_tracer *tracer;
+    const struct imp_scene *scene;
+    struct imp_walk *walk;
+    struct imp_arena *arena;
+    imp_v3 o, d;            /* the ray in flight */
+    double t_min, t_max;
+    double pdf;             /* of d per steradian; 0: a delta lobe or the sensor chose it */
+    imp_v3 from;            /* where the ray left, for light densities */
+    imp_spec beta;          /* throughput, zero factors left out: for roulette only */
+    double eta;             /* product of index ratios */
+    int zeros;              /* factors that are zero but have a derivative */
+    int depth;
+};
+
+static double light_pmf(const struct imp_scene *s, int light)
+{
+    return s->light_cdf[light] - (light ? s->light_cdf[light - 1] : 0);
+}
+
+static double power_heuristic(double a, double b)
+{
+    const double a2 = a * a, b2 = b * b;
+    return a2 > 0 ? a2 / (a2 + b2) : 0;
+}
+
+static bool wants_lights(const struct imp_integrator *i)
+{
+    return i->kind == IMP_INTEGRATOR_PATH ||
+           (i->kind == IMP_INTEGRATOR_DIRECT && i->emitter_samples > 0);
+}
+
+static struct imp_vertex *vertex_add(struct step *s)
+{
+    struct imp_vertex *v = imp__arena_take(s->arena, 1, sizeof *v);
+    if (imp_unlikely(!v)) {
+        s->walk->dropped = IMP_DROP_MEMORY;
+        return NULL;
+    }
+    struct imp_walk *w = s->walk;
+    v->prev = w->last;
+    v->next = NULL;
+    if (w->last) w->last->next = v;
+    else w->first = v;
+    w->last = v;
+    w->n++;
+    v->bsdf = NULL;
+    v->shape = NULL;
+    v->in = NULL;
+    v->w = v->e = v->lin = (imp_spec){0};
+    v->inv_ps = v->pdf = 0;
+    v->survive = 1;
+    v->emitter = v->light = -1;
+    v->glows = false;
+    v->e_weight = 1;
+    return v;
+}
+
+/* Radiance of emitter e at x; inputs are looked up on the light. */
+static imp_spec emitter_radiance(const struct imp_emitter *e, const struct imp_emission *x,
+                                 imp_v3 p)
+{
+    imp_spec in[8], le;
+    const struct imp_texcoord at = {{x->uv[0], x->uv[1]}, p};
+    imp__inputs_eval(e->input, e->n_in, &at, in);
+    e->ops->eval(e, in, x, &le);
+    return le;
+}
+
+/* Emission met by the ray at an area light, or the environment (hit NULL). */
+static void emission_meet(struct step *s, struct imp_vertex *v, int emitter,
+                          const struct imp_hit *hit, const struct imp_surface *at)
+{
+    const struct imp_emitter *e = s->scene->emitters[emitter];
+    struct imp_emission *x = &v->e_at;
+    *x = (struct imp_emission){{0, 0}, INFINITY, 1, -s->d};
+    if (at) {
+        x->uv[0] = at->uv[0];
+        x->uv[1] = at->uv[1];
+        x->dist = hit->t;
+        x->cos_light = -imp__dot(at->n, s->d);
+    }
+    v->emitter = emitter;
+    if (s->pdf > 0 && wants_lights(s->tracer->integrator)) {
+        const double pe = light_pmf(s->scene, emitter) *
+                          e->ops->pdf(e, &s->from, &s->d, hit, at);
+        v->e_weight *= power_heuristic(s->pdf, pe);
+    } else if (s->depth > 0 && s->tracer->integrator->bsdf_samples == 0 && s->pdf > 0) {
+        v->e_weight = 0;
+    }
+    v->e += emitter_radiance(e, x, v->at.p) * v->e_weight;
+}
+
+/* Light sample at v: choose an emitter, a point on it, look whether it is visible. */
+static void light_sample(struct step *s, struct imp_vertex *v, const struct imp_surface *at,
+                         const struct imp_frame *frame)
+{
+    const struct imp_scene *scene = s->scene;
+    const struct imp_key key = s->walk->key;
+    const int n = scene->n_emitters;
+    if (n == 0) return;
+    const double choice = imp__u01(key, imp__dim(s->depth, IMP_DIM_LIGHT));
+    int light = 0;
+    while (light < n - 1 && choice >= scene->light_cdf[light]) light++;
+    const double pmf = light_pmf(scene, light);
+    if (!(pmf > 0)) return;
+
+    const struct imp_emitter *e = scene->emitters[light];
+    const double u[2] = {imp__u01(key, imp__dim(s->depth, IMP_DIM_LIGHT_U)),
+                         imp__u01(key, imp__dim(s->depth, IMP_DIM_LIGHT_V))};
+    struct imp_light_sample ls;
+    if (!e->ops->sample(e, &at->p, u, &ls) || !(ls.pdf > 0)) return;
+
+    const struct imp_dirs dirs = {v->dirs.wo, imp__to_local(frame, ls.wi), IMP_SMOOTH};
+    const double pdf_bsdf = v->bsdf->ops->pdf(v->bsdf, v->in, &dirs);
+    if (!(pdf_bsdf > 0)) return; /* structurally zero: nothing to see, no derivative */
+    const struct imp_emission x = {{ls.uv[0], ls.uv[1]}, ls.dist, ls.cos_light, -ls.wi};
+    const imp_spec le = emitter_radiance(e, &x, ls.p);
+    imp_spec f;
+    v->bsdf->ops->eval(v->bsdf, v->in, &dirs, &f);
+    const struct imp_active *active = s->tracer->active;
+    const bool differentiable =
+        active && ((v->bsdf->index >= 0 && active->bsdf[v->bsdf->index]) ||
+                   active->emitter[light]);
+    if (imp__is_zero(f * le) && !differentiable) return;
+
+    const imp_v3 o = imp__offset(at->p, at->ng, ls.wi);
+    const double reach = isfinite(ls.dist) ? ls.dist * (1 - 10 * IMP_RAY_EPSILON) : INFINITY;
+    if (imp__occluded(scene, &o, &ls.wi, 0, reach)) return;
+
+    const bool delta = e->ops->flags & IMP_EMITTER_DELTA;
+    const bool bsdf_samples = s->tracer->integrator->bsdf_samples > 0;
+    const double p = ls.pdf * pmf;
+    v->light = light;
+    v->l_at = x;
+    v->l_wi = dirs.wi;
+    v->l_p = ls.p;
+    v->l_f = f;
+    v->l_le = le;
+    v->l_weight = (delta || !bsdf_samples ? 1 : power_heuristic(p, pdf_bsdf)) / p;
+}
+
+/* Survival probability. Zero factors that still have a derivative are left out of beta, so
+ * roulette sees the walk as if they were not there (gradients.md 9.1, 9.2). */
+static bool roulette(struct step *s, struct imp_vertex *v)
+{
+    const struct imp_integrator *integrator = s->tracer->integrator;
+    if (integrator->kind == IMP_INTEGRATOR_STAM || s->depth + 1 < integrator->rr_depth)
+        return true;
+    const double q = fmin(imp__max3(s->beta) * s->eta * s->eta, 0.95);
+    v->survive = q;
+    return imp__u01(s->walk->key, imp__dim(s->depth, IMP_DIM_SURVIVE)) < q;
+}
+
+/* Draw the continuation at v. False: the walk ends here. */
+static bool scatter(struct step *s, struct imp_vertex *v, const struct imp_surface *at,
+                    const struct imp_frame *frame)
+{
+    const struct imp_key key = s->walk->key;
+    const struct imp_bsdf *b = v->bsdf;
+    const double u[3] = {imp__u01(key, imp__dim(s->depth, IMP_DIM_LOBE)),
+                         imp__u01(key, imp__dim(s->depth, IMP_DIM_DIR_U)),
+                         imp__u01(key, imp__dim(s->depth, IMP_DIM_DIR_V))};
+    struct imp_bsdf_sample sample;
+    v->dirs.lobe = IMP_SMOOTH;
+    if (!b->ops->sample(b, v->in, u, &v->dirs, &sample) || !(sample.pdf > 0)) return false;
+    v->pdf = sample.pdf;
+
+    imp_spec factor = sample.f * (1 / sample.pdf);
+    if (imp__is_zero(factor)) {
+        const struct imp_active *active = s->tracer->active;
+        if (!active || b->index < 0 || !active->bsdf[b->index] || ++s->zeros > 1) return false;
+        factor = imp__spec(0.5); /* stands in for roulette only */
+    }
+    s->beta *= factor;
+    s->eta *= sample.eta;
+    if (!roulette(s, v)) return false;
+    s->beta *= imp__spec(1 / v->survive);
+    v->inv_ps = 1 / (sample.pdf * v->survive);
+    v->w = sample.f * v->inv_ps;
+
+    s->d = imp__to_world(frame, v->dirs.wi);
+    s->o = imp__offset(at->p, at->ng, s->d);
+    s->from = at->p;
+    s->t_min = 0;
+    s->t_max = INFINITY;
+    s->pdf = v->dirs.lobe == IMP_SMOOTH ? sample.pdf : 0;
+    return true;
+}
+
+/* Stam's termination: with probability `absorb` the walk ends and collects what glows here,
+ * divided by it; else it goes on, divided by the rest (gradients.md 6, E22-E24). */
+static bool absorb(struct step *s, struct imp_vertex *v)
+{
+    const double a = v->bsdf->absorb;
+    if (!(a > 0)) return false;
+    if (imp__u01(s->walk->key, imp__dim(s->depth, IMP_DIM_SURVIVE)) < a) {
+        s->walk->absorbed = true;
+        v->e_weight = 1 / a;
+        return true;
+    }
+    v->e_weight = 0;
+    return false;
+}
+
+/* Area lights that a camera ray passes through (hide_emitters). */
+static bool first_hit(struct step *s, struct imp_hit *hit)
+{
+    const bool hide = s->tracer->integrator->hide_emitters && s->depth == 0;
+    while (imp__intersect(s->scene, &s->o, &s->d, s->t_min, s->t_max, hit)) {
+        if (!hide || s->scene->shapes[hit->shape]->emitter < 0) return true;
+        const imp_v3 p = s->o + s->d * hit->t;
+        const double scale = fmax(fabs(p[0]), fmax(fabs(p[1]), fabs(p[2])));
+        s->t_min = hit->t + (1 + scale) * IMP_RAY_EPSILON;
+    }
+    return false;
+}
+
+/* From the ray in flight to the next one; false: the walk ends. */
+static bool step(struct step *s)
+{
+    const struct imp_scene *scene = s->scene;
+    const struct imp_integrator *integrator = s->tracer->integrator;
+    const bool counts = integrator->max_depth < 0 || s->depth < integrator->max_depth;
+    const bool goes_on = integrator->max_depth < 0 || s->depth + 1 < integrator->max_depth;
+    struct imp_hit hit;
+    if (!first_hit(s, &hit)) {
+        const bool hidden = integrator->hide_emitters && s->depth == 0;
+        if (scene->environment < 0 || hidden || !counts) return false;
+        struct imp_vertex *v = vertex_add(s);
+        if (!v) return false;
+        v->t = INFINITY;
+        v->at = (struct imp_texcoord){{0, 0}, s->d};
+        emission_meet(s, v, scene->environment, NULL, NULL);
+        s->walk->valid = true;
+        return false;
+    }
+
+    const struct imp_shape *shape = scene->shapes[hit.shape];
+    struct imp_surface at;
+    shape->ops->surface(shape, &hit, &s->o, &s->d, &at);
+    struct imp_vertex *v = vertex_add(s);
+    if (!v) return false;
+    const struct imp_frame frame = {at.s, at.t, at.n};
+    v->shape = shape;
+    v->bsdf = imp__shape_bsdf(scene, shape);
+    v->t = hit.t;
+    v->ng = at.ng;
+    v->at = (struct imp_texcoord){{at.uv[0], at.uv[1]}, at.p};
+    v->dirs.wo = imp__to_local(&frame, -s->d);
+    v->in = imp__arena_take(s->arena, (size_t)v->bsdf->n_in, sizeof *v->in);
+    if (!v->in) {
+        s->walk->dropped = IMP_DROP_MEMORY;
+        return false;
+    }
+    imp__inputs_eval(v->bsdf->input, v->bsdf->n_in, &v->at, v->in);
+
+    const bool stam = integrator->kind == IMP_INTEGRATOR_STAM;
+    const bool ended = stam && counts && absorb(s, v);
+    if (counts && v->e_weight > 0) {
+        const double weight = v->e_weight;
+        if (v->bsdf->flags & IMP_BSDF_EMIT) {
+            imp_spec glow;
+            v->bsdf->ops->emit(v->bsdf, v->in, &v->dirs.wo, &glow);
+            v->e += glow * weight;
+            v->glows = true;
+        }
+        if (shape->emitter >= 0) {
+            emission_meet(s, v, shape->emitter, &hit, &at);
+            if (!integrator->hide_emitters || s->depth > 0) s->walk->valid = true;
+        }
+    }
+    if (ended || !goes_on) return false;
+    if (v->bsdf->flags & (IMP_BSDF_SMOOTH | IMP_BSDF_DELTA)) s->walk->valid = true;
+    if ((v->bsdf->flags & IMP_BSDF_SMOOTH) && wants_lights(integrator))
+        light_sample(s, v, &at, &frame);
+    if (integrator->kind == IMP_INTEGRATOR_DIRECT && integrator->bsdf_samples == 0)
+        return false;
+    return scatter(s, v, &at, &frame);
+}
+
+void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, int x, int y,
+                     int64_t sample, struct imp_walk *walk)
+{
+    const struct imp_sensor *sensor = tracer->sensor;
+    const struct imp_film_desc *film = &sensor->film;
+    /* Keys use full-film pixels: a crop renders the same samples as the whole picture.
+     * The border of wide filters may lie outside the film, hence the offset. */
+    const uint64_t row = (uint64_t)(y + film->crop_y) + 0x8000;
+    const uint64_t column = (uint64_t)(x + film->crop_x) + 0x8000;
+    const struct imp_key key = imp__key(tracer->seed, row << 32 | column, (uint64_t)sample);
+
+    *walk = (struct imp_walk){.key = key};
+    walk->px = film->crop_x + x + imp__u01(key, IMP_DIM_PIXEL_X);
+    walk->py = film->crop_y + y + imp__u01(key, IMP_DIM_PIXEL_Y);
+    const double lens[2] = {imp__u01(key, IMP_DIM_LENS_U), imp__u01(key, IMP_DIM_LENS_V)};
+    sensor->ops->ray(sensor, walk->px, walk->py, lens, &walk->ray);
+
+    struct step s = {.tracer = tracer, .scene = tracer->scene, .walk = walk, .arena = arena,
+                     .o = walk->ray.o, .d = walk->ray.d, .t_min = walk->ray.t_near,
+                     .t_max = walk->ray.t_far, .from = walk->ray.o,
+                     .beta = {1, 1, 1, 0}, .eta = 1};
+    while (step(&s)) s.depth++;
+
+    const imp_spec L = imp__walk_fold(walk);
+    if (imp_unlikely(!imp__is_finite(L)))
+        walk->dropped = isnan(L[0] + L[1] + L[2]) ? IMP_DROP_NAN : IMP_DROP_INFINITE;
+    else if (imp_unlikely(L[0] < 0 || L[1] < 0 || L[2] < 0))
+        walk->dropped = IMP_DROP_NEGATIVE;
+    walk->L = walk->dropped || !walk->valid ? (imp_spec){0} : L;
+}
