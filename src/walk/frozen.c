@@ -35,7 +35,7 @@ imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk
             sum += radiance(tracer->scene, v->emitter, &v->e_at, v->at.p) * v->e_weight;
         if (v->glows) {
             b->ops->emit(b, in, &v->dirs.wo, &f);
-            sum += f * v->e_weight;
+            sum += f * v->g_weight;
         }
         if (v->light >= 0) {
             const struct imp_dirs dirs = {v->dirs.wo, v->l_wi, IMP_SMOOTH};

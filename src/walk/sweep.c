@@ -30,7 +30,7 @@ static bool bsdf_active(const struct imp_active *a, const struct imp_bsdf *b)
 static void glow_d(const struct imp_vertex *v, imp_spec *d)
 {
     v->bsdf->ops->emit_d(v->bsdf, v->in, &v->dirs.wo, d);
-    for (int j = 0; j < v->bsdf->n_in; j++) d[j] *= v->e_weight;
+    for (int j = 0; j < v->bsdf->n_in; j++) d[j] *= v->g_weight;
 }
 
 /* E_k or B_k through an emitter: d[emitter->n_in], without the factor in front. */

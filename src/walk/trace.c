@@ -22,7 +22,7 @@ struct step {
     imp_v3 from;            /* where the ray left, for light densities */
     imp_spec beta;          /* throughput, zero factors left out: for roulette only */
     double eta;             /* product of index ratios */
-    int zeros;              /* factors that are zero but have a derivative */
+    int zeros[3];           /* per lane: factors that are zero but have a derivative */
     int depth;
 };
 
@@ -65,7 +65,7 @@ static struct imp_vertex *vertex_add(struct step *s)
     v->survive = 1;
     v->emitter = v->light = -1;
     v->glows = false;
-    v->e_weight = 1;
+    v->e_weight = v->g_weight = 1;
     return v;
 }
 
@@ -153,6 +153,22 @@ static void light_sample(struct step *s, struct imp_vertex *v, const struct imp_
     v->l_weight = (delta || !bsdf_samples ? 1 : power_heuristic(p, pdf_bsdf)) / p;
 }
 
+/* beta *= f/p, where a lane's first factor that is zero but has a derivative is left out: the
+ * walk goes on, because what arrives from beyond is that derivative. A second one ends the
+ * lane (gradients.md 9.2). False: all lanes have ended. */
+static bool throughput_add(struct step *s, const struct imp_bsdf *b, imp_spec factor)
+{
+    const struct imp_active *active = s->tracer->active;
+    const bool differentiable = active && b->index >= 0 && active->bsdf[b->index];
+    const double stand_in = fmax(imp__max3(factor), 0.5);
+    for (int c = 0; c < 3; c++) {
+        if (factor[c] != 0) continue;
+        if (differentiable && s->zeros[c]++ == 0) factor[c] = stand_in;
+    }
+    s->beta *= factor;
+    return !imp__is_zero(s->beta);
+}
+
 /* Survival probability. Zero factors that still have a derivative are left out of beta, so
  * roulette sees the walk as if they were not there (gradients.md 9.1, 9.2). */
 static bool roulette(struct step *s, struct imp_vertex *v)
@@ -179,13 +195,7 @@ static bool scatter(struct step *s, struct imp_vertex *v, const struct imp_surfa
     if (!b->ops->sample(b, v->in, u, &v->dirs, &sample) || !(sample.pdf > 0)) return false;
     v->pdf = sample.pdf;
 
-    imp_spec factor = sample.f * (1 / sample.pdf);
-    if (imp__is_zero(factor)) {
-        const struct imp_active *active = s->tracer->active;
-        if (!active || b->index < 0 || !active->bsdf[b->index] || ++s->zeros > 1) return false;
-        factor = imp__spec(0.5); /* stands in for roulette only */
-    }
-    s->beta *= factor;
+    if (!throughput_add(s, b, sample.f * (1 / sample.pdf))) return false;
     s->eta *= sample.eta;
     if (!roulette(s, v)) return false;
     s->beta *= imp__spec(1 / v->survive);
@@ -209,10 +219,10 @@ static bool absorb(struct step *s, struct imp_vertex *v)
     if (!(a > 0)) return false;
     if (imp__u01(s->walk->key, imp__dim(s->depth, IMP_DIM_SURVIVE)) < a) {
         s->walk->absorbed = true;
-        v->e_weight = 1 / a;
+        v->e_weight = v->g_weight = 1 / a;
         return true;
     }
-    v->e_weight = 0;
+    v->e_weight = v->g_weight = 0;
     return false;
 }
 
@@ -270,12 +280,12 @@ static bool step(struct step *s)
 
     const bool stam = integrator->kind == IMP_INTEGRATOR_STAM;
     const bool ended = stam && counts && absorb(s, v);
+    if (stam) s->walk->valid = true;
     if (counts && v->e_weight > 0) {
-        const double weight = v->e_weight;
         if (v->bsdf->flags & IMP_BSDF_EMIT) {
             imp_spec glow;
             v->bsdf->ops->emit(v->bsdf, v->in, &v->dirs.wo, &glow);
-            v->e += glow * weight;
+            v->e += glow * v->g_weight;
             v->glows = true;
         }
         if (shape->emitter >= 0) {

@@ -34,8 +34,9 @@ struct imp_vertex {
     double inv_ps;                 /* 1/(p s); 0: the walk ends here */
 
     int emitter;                   /* met here, -1: none */
-    bool glows;                    /* the BSDF's own emission counts here */
     double e_weight;               /* MIS weight, or 1/absorb */
+    bool glows;                    /* the BSDF's own emission counts here */
+    double g_weight;               /* 1, or 1/absorb */
     struct imp_emission e_at;
     imp_spec e;                    /* E_k: all emission of this vertex, weighted */
 

@@ -1,0 +1,322 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "measure.h"
+#include <stdio.h>
+#include <string.h>
+#include "base/film.h"
+#include "dims.h"
+
+enum imp_status imp__run_sensor(const struct imp_scene *scene, const struct imp_run *run,
+                                const struct imp_sensor **out)
+{
+    if (!scene->committed)
+        return imp__error(scene->ctx, IMP_E_ARG, "the scene has not been committed");
+    if (!scene->has_integrator)
+        return imp__error(scene->ctx, IMP_E_SCENE, "the scene has no integrator");
+    if (scene->n_sensors == 0)
+        return imp__error(scene->ctx, IMP_E_SCENE, "the scene has no sensor");
+    if (run->sensor < 0 || run->sensor >= scene->n_sensors)
+        return imp__error(scene->ctx, IMP_E_ARG, "there is no sensor %d; the scene has %d",
+                          run->sensor, scene->n_sensors);
+    if (run->spp < 0)
+        return imp__error(scene->ctx, IMP_E_ARG, "samples per pixel = %d is negative", run->spp);
+    *out = scene->sensors[run->sensor];
+    return IMP_OK;
+}
+
+static bool is_radiance(const struct imp_integrator *i)
+{
+    return i->kind == IMP_INTEGRATOR_PATH || i->kind == IMP_INTEGRATOR_DIRECT ||
+           i->kind == IMP_INTEGRATOR_STAM;
+}
+
+const struct imp_integrator *imp__radiance_integrator(const struct imp_scene *scene)
+{
+    const struct imp_integrator *i = &scene->integrator;
+    if (is_radiance(i)) return i;
+    for (int k = 0; k < i->n_nested; k++)
+        if (is_radiance(&i->nested[k])) return &i->nested[k];
+    return NULL;
+}
+
+/* ---- Channel names ------------------------------------------------------------------- */
+
+struct names {
+    imp_context *ctx;
+    char *text;
+    size_t used, capacity;
+    int n;
+    bool failed;
+};
+
+static void names_add(struct names *s, const char *prefix, const char *slot, const char *channel)
+{
+    char name[256];
+    snprintf(name, sizeof name, "%s%s%s%s", prefix, slot, *slot ? "." : "", channel);
+    const size_t n = strlen(name) + 2;
+    char *grown = imp__grow(s->ctx, s->text, &s->capacity, s->used + n, 1);
+    if (!grown) {
+        s->failed = true;
+        return;
+    }
+    s->text = grown;
+    s->used += (size_t)snprintf(s->text + s->used, n, "%s%s", s->n ? "," : "", name);
+    s->n++;
+}
+
+static const char *const aov_suffixes[][3] = {
+    [IMP_AOV_ALBEDO] = {"R", "G", "B"},     [IMP_AOV_DEPTH] = {"T"},
+    [IMP_AOV_POSITION] = {"X", "Y", "Z"},   [IMP_AOV_UV] = {"U", "V"},
+    [IMP_AOV_GEO_NORMAL] = {"X", "Y", "Z"}, [IMP_AOV_SH_NORMAL] = {"X", "Y", "Z"},
+    [IMP_AOV_DP_DU] = {"X", "Y", "Z"},      [IMP_AOV_DP_DV] = {"X", "Y", "Z"},
+    [IMP_AOV_DUV_DX] = {"U", "V"},          [IMP_AOV_DUV_DY] = {"U", "V"},
+    [IMP_AOV_PRIM_INDEX] = {"I"},           [IMP_AOV_SHAPE_INDEX] = {"I"}};
+
+static int aov_channels(enum imp_aov_type type)
+{
+    int n = 0;
+    while (n < 3 && aov_suffixes[type][n]) n++;
+    return n;
+}
+
+static int base_channels(enum imp_pixel_format format)
+{
+    static const int n[] = {1, 2, 3, 4, 3, 4};
+    return n[format];
+}
+
+static void names_make(struct names *s, const struct imp_scene *scene,
+                       const struct imp_sensor *sensor)
+{
+    static const char *const base[][4] = {{"Y"}, {"Y", "A"}, {"R", "G", "B"},
+                                          {"R", "G", "B", "A"}, {"X", "Y", "Z"},
+                                          {"X", "Y", "Z", "A"}};
+    static const char *const rgba[] = {"R", "G", "B", "A"}, *const xyz[] = {"X", "Y", "Z"};
+    const struct imp_integrator *top = &scene->integrator;
+    const enum imp_pixel_format format = sensor->film.pixel_format;
+    for (int c = 0; c < base_channels(format); c++) names_add(s, "", "", base[format][c]);
+    if (top->kind == IMP_INTEGRATOR_AOV) {
+        for (int a = 0; a < top->n_aovs; a++)
+            for (int c = 0; c < aov_channels(top->aovs[a].type); c++)
+                names_add(s, "", top->aovs[a].name, aov_suffixes[top->aovs[a].type][c]);
+        for (int k = 0; k < top->n_nested; k++)
+            for (int c = 0; c < 4; c++) names_add(s, "", top->nested[k].name, rgba[c]);
+    }
+    if (top->kind == IMP_INTEGRATOR_MOMENT)
+        for (int moment = 1; moment <= 2; moment++)
+            for (int k = 0; k < top->n_nested; k++)
+                for (int c = 0; c < 3; c++)
+                    names_add(s, moment == 2 ? "m2_" : "", top->nested[k].name, xyz[c]);
+}
+
+enum imp_status imp__measure_create(const struct imp_scene *scene, const struct imp_run *run,
+                                    struct imp_measure *out)
+{
+    const struct imp_sensor *sensor;
+    const enum imp_status st = imp__run_sensor(scene, run, &sensor);
+    if (st != IMP_OK) return st;
+    struct names names = {.ctx = scene->ctx};
+    names_make(&names, scene, sensor);
+    if (names.failed || names.n > IMP_MEASURE_MAX) {
+        imp__release(scene->ctx, names.text);
+        return names.failed ? imp__error(scene->ctx, IMP_E_NOMEM, "no memory for channels")
+                            : imp__error(scene->ctx, IMP_E_SCENE, "more than %d channels",
+                                         IMP_MEASURE_MAX);
+    }
+    *out = (struct imp_measure){.scene = scene, .sensor = sensor, .seed = run->seed,
+                                .spp = run->spp > 0 ? run->spp : sensor->spp,
+                                .n = names.n, .names = names.text};
+    return IMP_OK;
+}
+
+void imp__measure_destroy(struct imp_measure *m) { imp__release(m->scene->ctx, m->names); }
+
+/* ---- Values --------------------------------------------------------------------------- */
+
+static double luminance(imp_spec c) { return 0.212671 * c[0] + 0.715160 * c[1] + 0.072169 * c[2]; }
+
+static void to_xyz(imp_spec c, double xyz[3])
+{
+    xyz[0] = 0.412453 * c[0] + 0.357580 * c[1] + 0.180423 * c[2];
+    xyz[1] = luminance(c);
+    xyz[2] = 0.019334 * c[0] + 0.119193 * c[1] + 0.950227 * c[2];
+}
+
+static int base_value(const struct imp_measure *m, imp_spec L, double alpha, double *value)
+{
+    const enum imp_pixel_format format = m->sensor->film.pixel_format;
+    const int n = base_channels(format);
+    switch (format) {
+    case IMP_PIXEL_LUMINANCE:
+    case IMP_PIXEL_LUMINANCE_ALPHA:
+        value[0] = m->scene->mode == IMP_MONO ? L[0] : luminance(L);
+        break;
+    case IMP_PIXEL_RGB:
+    case IMP_PIXEL_RGBA:
+        for (int c = 0; c < 3; c++) value[c] = L[c];
+        break;
+    case IMP_PIXEL_XYZ:
+    case IMP_PIXEL_XYZA: to_xyz(L, value); break;
+    }
+    if (n == 2 || n == 4) value[n - 1] = alpha;
+    return n;
+}
+
+/* First hit of the ray through a film position; false: none. */
+static bool first_surface(const struct imp_measure *m, double px, double py,
+                          const double lens[2], struct imp_sensor_ray *ray,
+                          struct imp_hit *hit, struct imp_surface *at)
+{
+    m->sensor->ops->ray(m->sensor, px, py, lens, ray);
+    if (!imp__intersect(m->scene, &ray->o, &ray->d, ray->t_near, ray->t_far, hit)) return false;
+    const struct imp_shape *s = m->scene->shapes[hit->shape];
+    s->ops->surface(s, hit, &ray->o, &ray->d, at);
+    return true;
+}
+
+/* How uv changes with the film position: the neighbouring ray on the tangent plane, the
+ * offset found in the basis of dp_du, dp_dv by least squares. */
+static void uv_slope(const struct imp_measure *m, double px, double py, const double lens[2],
+                     const struct imp_surface *at, double duv[2])
+{
+    struct imp_sensor_ray ray;
+    m->sensor->ops->ray(m->sensor, px, py, lens, &ray);
+    const double t = imp__dot(at->ng, at->p - ray.o) / imp__dot(at->ng, ray.d);
+    const imp_v3 dp = ray.o + ray.d * t - at->p;
+    const double a = imp__dot(at->dp_du, at->dp_du), b = imp__dot(at->dp_du, at->dp_dv);
+    const double c = imp__dot(at->dp_dv, at->dp_dv), det = a * c - b * b;
+    const double r = imp__dot(at->dp_du, dp), s = imp__dot(at->dp_dv, dp);
+    duv[0] = det > 0 && isfinite(t) ? (c * r - b * s) / det : 0;
+    duv[1] = det > 0 && isfinite(t) ? (a * s - b * r) / det : 0;
+}
+
+/* pi f(wi = z, wo): the albedo of a diffuse surface, and a stand-in for the others. */
+static imp_spec albedo(const struct imp_measure *m, const struct imp_hit *hit,
+                       const struct imp_surface *at, imp_v3 d)
+{
+    const struct imp_bsdf *b = imp__shape_bsdf(m->scene, m->scene->shapes[hit->shape]);
+    const struct imp_texcoord where = {{at->uv[0], at->uv[1]}, at->p};
+    const struct imp_frame frame = {at->s, at->t, at->n};
+    imp_spec in[32], f;
+    if (!(b->flags & IMP_BSDF_SMOOTH)) return (imp_spec){0};
+    imp__inputs_eval(b->input, b->n_in, &where, in);
+    const struct imp_dirs dirs = {imp__to_local(&frame, -d), {0, 0, 1, 0}, IMP_SMOOTH};
+    b->ops->eval(b, in, &dirs, &f);
+    return f * IMP_PI;
+}
+
+static int aov_value(const struct imp_measure *m, const struct imp_integrator *top,
+                     struct imp_key key, double px, double py, double *value)
+{
+    const double lens[2] = {imp__u01(key, IMP_DIM_LENS_U), imp__u01(key, IMP_DIM_LENS_V)};
+    struct imp_sensor_ray ray;
+    struct imp_hit hit;
+    struct imp_surface at;
+    const bool found = first_surface(m, px, py, lens, &ray, &hit, &at);
+    const double h = 1 / sqrt(fmax(m->spp, 1));
+    int n = 0;
+    for (int a = 0; a < top->n_aovs; a++) {
+        const enum imp_aov_type type = top->aovs[a].type;
+        const int count = aov_channels(type);
+        imp_v3 v = {0};
+        double duv[2];
+        if (found) switch (type) {
+            case IMP_AOV_ALBEDO: v = albedo(m, &hit, &at, ray.d); break;
+            case IMP_AOV_DEPTH: v[0] = hit.t; break;
+            case IMP_AOV_POSITION: v = at.p; break;
+            case IMP_AOV_UV: v = imp__v3(at.uv[0], at.uv[1], 0); break;
+            case IMP_AOV_GEO_NORMAL: v = at.ng; break;
+            case IMP_AOV_SH_NORMAL: v = at.n; break;
+            case IMP_AOV_DP_DU: v = at.dp_du; break;
+            case IMP_AOV_DP_DV: v = at.dp_dv; break;
+            case IMP_AOV_DUV_DX:
+                uv_slope(m, px + h, py, lens, &at, duv);
+                v = imp__v3(duv[0], duv[1], 0);
+                break;
+            case IMP_AOV_DUV_DY:
+                uv_slope(m, px, py + h, lens, &at, duv);
+                v = imp__v3(duv[0], duv[1], 0);
+                break;
+            case IMP_AOV_PRIM_INDEX: v[0] = hit.prim; break;
+            case IMP_AOV_SHAPE_INDEX: v[0] = hit.shape; break;
+            }
+        for (int c = 0; c < count; c++) value[n++] = v[c];
+    }
+    return n;
+}
+
+/* Radiance and alpha of one integrator, on the same random numbers as the others. */
+static bool radiance(const struct imp_measure *m, const struct imp_integrator *integrator,
+                     struct imp_arena *arena, int x, int y, int64_t sample, imp_spec *L,
+                     double *alpha, struct imp_walk *walk)
+{
+    const struct imp_tracer tracer = {m->scene, integrator, m->sensor, NULL, m->seed};
+    if (is_radiance(integrator)) {
+        const struct imp_arena_mark mark = imp__arena_mark(arena);
+        imp__walk_trace(&tracer, arena, x, y, sample, walk);
+        imp__arena_rewind(arena, mark);
+        *L = walk->L;
+        *alpha = walk->valid;
+        return walk->dropped == IMP_DROP_NONE;
+    }
+    /* depth: the walk's film position and lens, its first hit only */
+    static const struct imp_integrator none = {.kind = IMP_INTEGRATOR_PATH, .max_depth = 0,
+                                               .rr_depth = 5};
+    const struct imp_tracer look = {m->scene, &none, m->sensor, NULL, m->seed};
+    const struct imp_arena_mark mark = imp__arena_mark(arena);
+    imp__walk_trace(&look, arena, x, y, sample, walk);
+    *L = imp__spec(walk->first && walk->first->shape ? walk->first->t : 0);
+    *alpha = walk->first && walk->first->shape;
+    imp__arena_rewind(arena, mark);
+    return walk->dropped == IMP_DROP_NONE;
+}
+
+bool imp__measure_sample(const struct imp_measure *m, struct imp_arena *arena, int x, int y,
+                         int64_t sample, double *value, double *px, double *py)
+{
+    const struct imp_integrator *top = &m->scene->integrator;
+    struct imp_walk walk;
+    imp_spec L = {0};
+    double alpha = 0;
+    bool fine = true;
+    int n;
+    if (top->kind != IMP_INTEGRATOR_AOV && top->kind != IMP_INTEGRATOR_MOMENT) {
+        fine = radiance(m, top, arena, x, y, sample, &L, &alpha, &walk);
+        base_value(m, L, alpha, value);
+        *px = walk.px;
+        *py = walk.py;
+        return fine;
+    }
+
+    imp_spec first = {0};
+    double first_alpha = 0;
+    n = base_channels(m->sensor->film.pixel_format);
+    const int after_base = n;
+    if (top->kind == IMP_INTEGRATOR_AOV) {
+        static const struct imp_integrator look = {.kind = IMP_INTEGRATOR_DEPTH};
+        fine &= radiance(m, &look, arena, x, y, sample, &L, &alpha, &walk);
+        n += aov_value(m, top, walk.key, walk.px, walk.py, value + n);
+    }
+    for (int k = 0; k < top->n_nested; k++) {
+        fine &= radiance(m, &top->nested[k], arena, x, y, sample, &L, &alpha, &walk);
+        if (k == 0) first = L, first_alpha = alpha;
+        if (top->kind == IMP_INTEGRATOR_AOV) {
+            for (int c = 0; c < 3; c++) value[n++] = L[c];
+            value[n++] = alpha;
+        } else {
+            if (m->scene->mode == IMP_MONO)
+                value[n] = value[n + 1] = value[n + 2] = L[0];
+            else
+                to_xyz(L, value + n);
+            n += 3;
+        }
+    }
+    if (top->kind == IMP_INTEGRATOR_MOMENT) {
+        const int count = n - after_base;
+        for (int c = 0; c < count; c++) value[n + c] = imp__sqr(value[after_base + c]);
+    }
+    base_value(m, first, first_alpha, value);
+    *px = walk.px;
+    *py = walk.py;
+    if (!fine) memset(value, 0, (size_t)m->n * sizeof *value);
+    return fine;
+}

@@ -1,0 +1,242 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Pictures: samples to pixel means with standard errors. Work is cut into tiles and passes,
+ * whose results are added in one order (base/pool.h). A box filter gives a sample to its own
+ * pixel; wider filters weight it into all pixels within their radius (scene-format 10), and
+ * the pixel is the ratio  sum w v / sum w  with the usual error of a ratio,
+ * sum w^2 (v - mean)^2 / (sum w)^2. */
+#include "picture.h"
+#include <string.h>
+#include "base/pool.h"
+
+#define TILE 8
+#define PASS_SPP 64
+
+/* Per pixel: sum w, sum w^2, then for each channel sum w v, sum w^2 v, sum w^2 v^2. */
+#define SUMS(channels) (2 + 3 * (channels))
+
+struct tile_result {
+    double *sums;   /* [(TILE + 2 border)^2][SUMS] */
+    uint64_t dropped;
+};
+
+struct render {
+    const struct imp_picture *picture;
+    const struct imp_film_desc *film;
+    int n;                          /* channels */
+    double *values;                 /* [threads][n] */
+    int width, height, border;      /* of the picture; reach of the filter in pixels */
+    int margin;                     /* extra pixels sampled on every side */
+    int tiles_x, tiles_y, spp, passes, pass_spp;
+    int first_pass;
+    struct imp_arena *arenas;       /* [threads] */
+    struct tile_result *slots;
+    double *sums;                   /* [height][width][SUMS] */
+    uint64_t dropped;
+};
+
+struct region { int x0, y0, x1, y1, s0, s1; };
+
+static struct region item_region(const struct render *r, size_t item)
+{
+    const size_t tiles = (size_t)r->tiles_x * (size_t)r->tiles_y;
+    const int pass = r->first_pass + (int)(item / tiles), tile = (int)(item % tiles);
+    struct region g;
+    g.x0 = tile % r->tiles_x * TILE - r->margin;
+    g.y0 = tile / r->tiles_x * TILE - r->margin;
+    g.x1 = imp_min(g.x0 + TILE, r->width + r->margin);
+    g.y1 = imp_min(g.y0 + TILE, r->height + r->margin);
+    g.s0 = pass * r->pass_spp;
+    g.s1 = imp_min(g.s0 + r->pass_spp, r->spp);
+    return g;
+}
+
+static void accumulate(double *sums, double w, const double *value, int n)
+{
+    sums[0] += w;
+    sums[1] += w * w;
+    for (int c = 0; c < n; c++) {
+        const double wv = w * value[c];
+        sums[2 + 3 * c] += wv;
+        sums[3 + 3 * c] += w * wv;
+        sums[4 + 3 * c] += wv * wv;
+    }
+}
+
+/* Weight a sample into the pixels that the filter reaches; `tile` begins at (x0, y0) minus
+ * the border. */
+static void splat(const struct render *r, const struct region *g, double *tile, double px,
+                  double py, const double *value)
+{
+    const struct imp_filter *f = &r->film->filter;
+    const int n = r->n, stride = TILE + 2 * r->border;
+    const double cx = px - r->film->crop_x, cy = py - r->film->crop_y;
+    const int i0 = (int)ceil(cx - f->radius - 0.5), i1 = (int)floor(cx + f->radius - 0.5);
+    const int j0 = (int)ceil(cy - f->radius - 0.5), j1 = (int)floor(cy + f->radius - 0.5);
+    for (int j = imp_max(j0, g->y0 - r->border); j <= imp_min(j1, g->y1 - 1 + r->border); j++) {
+        const double wy = f->ops->eval(f, cy - (j + 0.5));
+        for (int i = imp_max(i0, g->x0 - r->border); i <= imp_min(i1, g->x1 - 1 + r->border);
+             i++) {
+            const double w = wy * f->ops->eval(f, cx - (i + 0.5));
+            const int at = (j - g->y0 + r->border) * stride + (i - g->x0 + r->border);
+            if (w != 0) accumulate(tile + (size_t)at * (size_t)SUMS(n), w, value, n);
+        }
+    }
+}
+
+static enum imp_status tile_work(size_t item, int worker, int slot, void *payload)
+{
+    struct render *r = payload;
+    const struct region g = item_region(r, item);
+    const int n = r->n, stride = TILE + 2 * r->border;
+    double *value = r->values + (size_t)worker * (size_t)n;
+    struct tile_result *out = &r->slots[slot];
+    memset(out->sums, 0, (size_t)(stride * stride) * (size_t)SUMS(n) * sizeof *out->sums);
+    out->dropped = 0;
+    for (int y = g.y0; y < g.y1; y++)
+        for (int x = g.x0; x < g.x1; x++) {
+            double *own = out->sums + (size_t)((y - g.y0 + r->border) * stride + x - g.x0 +
+                                               r->border) * (size_t)SUMS(n);
+            for (int s = g.s0; s < g.s1; s++) {
+                double px, py;
+                struct imp_arena *arena = &r->arenas[worker];
+                const struct imp_arena_mark mark = imp__arena_mark(arena);
+                out->dropped += !r->picture->sample(r->picture->payload, arena, x, y, s, value,
+                                                    &px, &py);
+                imp__arena_rewind(arena, mark);
+                if (r->border == 0)
+                    accumulate(own, 1, value, n);
+                else
+                    splat(r, &g, out->sums, px, py, value);
+            }
+        }
+    return IMP_OK;
+}
+
+static enum imp_status tile_commit(size_t item, int slot, void *payload)
+{
+    struct render *r = payload;
+    const struct region g = item_region(r, item);
+    const int n_sums = SUMS(r->n), stride = TILE + 2 * r->border;
+    const struct tile_result *in = &r->slots[slot];
+    for (int y = imp_max(g.y0 - r->border, 0); y < imp_min(g.y1 + r->border, r->height); y++)
+        for (int x = imp_max(g.x0 - r->border, 0); x < imp_min(g.x1 + r->border, r->width); x++) {
+            const double *from = in->sums + (size_t)((y - g.y0 + r->border) * stride + x -
+                                                     g.x0 + r->border) * (size_t)n_sums;
+            double *to = r->sums + ((size_t)y * (size_t)r->width + (size_t)x) * (size_t)n_sums;
+            for (int k = 0; k < n_sums; k++) to[k] += from[k];
+        }
+    r->dropped += in->dropped;
+    return IMP_OK;
+}
+
+static void film_finish(const struct render *r, imp_film *film)
+{
+    const int n = r->n;
+    for (size_t p = 0; p < (size_t)r->width * (size_t)r->height; p++) {
+        const double *s = r->sums + p * (size_t)SUMS(n), W = s[0];
+        const double n_eff = s[1] > 0 ? W * W / s[1] : 0;
+        for (int c = 0; c < n; c++) {
+            const double mean = W != 0 ? s[2 + 3 * c] / W : 0;
+            const double spread = s[4 + 3 * c] - 2 * mean * s[3 + 3 * c] + mean * mean * s[1];
+            film->mean[p * (size_t)n + (size_t)c] = (float)mean;
+            film->se[p * (size_t)n + (size_t)c] =
+                n_eff > 1 ? (float)sqrt(fmax(0, spread) / (W * W) * (n_eff / (n_eff - 1)))
+                          : INFINITY;
+        }
+    }
+    film->dropped = r->dropped;
+}
+
+static enum imp_status buffers_create(struct render *r, imp_context *ctx)
+{
+    const int slots = imp__pool_slots(ctx), n = r->n;
+    r->values = imp__alloc(ctx, (size_t)ctx->threads * (size_t)n, sizeof *r->values);
+    const size_t stride = (size_t)(TILE + 2 * r->border);
+    r->arenas = imp__alloc(ctx, (size_t)ctx->threads, sizeof *r->arenas);
+    r->slots = imp__alloc(ctx, (size_t)slots, sizeof *r->slots);
+    r->sums = imp__alloc(ctx, (size_t)r->width * (size_t)r->height,
+                         (size_t)SUMS(n) * sizeof *r->sums);
+    bool fine = r->arenas && r->slots && r->sums && r->values;
+    for (int k = 0; fine && k < ctx->threads; k++) imp__arena_init(&r->arenas[k], ctx);
+    for (int k = 0; fine && k < slots; k++) {
+        r->slots[k].sums = imp__alloc(ctx, stride * stride, (size_t)SUMS(n) * sizeof(double));
+        fine = r->slots[k].sums;
+    }
+    return fine ? IMP_OK
+                : imp__error(ctx, IMP_E_NOMEM, "no memory for a picture of %d x %d x %d",
+                             r->width, r->height, n);
+}
+
+static void buffers_destroy(struct render *r, imp_context *ctx)
+{
+    for (int k = 0; r->arenas && k < ctx->threads; k++) imp__arena_free(&r->arenas[k]);
+    for (int k = 0; r->slots && k < imp__pool_slots(ctx); k++)
+        imp__release(ctx, r->slots[k].sums);
+    imp__release(ctx, r->arenas);
+    imp__release(ctx, r->slots);
+    imp__release(ctx, r->sums);
+    imp__release(ctx, r->values);
+}
+
+static struct render render_plan(const struct imp_picture *p, const struct imp_run *run)
+{
+    struct render r = {.picture = p, .film = &p->sensor->film, .n = p->n};
+    r.width = r.film->crop_w;
+    r.height = r.film->crop_h;
+    r.border = imp__film_border(r.film);
+    r.margin = r.film->sample_border ? r.border : 0;
+    r.tiles_x = (r.width + 2 * r.margin + TILE - 1) / TILE;
+    r.tiles_y = (r.height + 2 * r.margin + TILE - 1) / TILE;
+    /* With a time limit and no count: until the time is up. */
+    r.spp = run->spp > 0 ? run->spp : run->time_limit_s > 0 ? 1 << 24 : p->sensor->spp;
+    r.pass_spp = run->time_limit_s > 0 ? 4 : PASS_SPP;
+    r.passes = (r.spp + r.pass_spp - 1) / r.pass_spp;
+    return r;
+}
+
+enum imp_status imp__picture_make(imp_context *ctx, const struct imp_picture *picture,
+                                  const struct imp_run *run, imp_film **out)
+{
+    enum imp_status st = IMP_OK;
+    imp_film *film = NULL;
+    struct render r = render_plan(picture, run);
+    IMP_TRY(imp__film_create(ctx, r.width, r.height, picture->names, true, &film));
+    IMP_TRY(buffers_create(&r, ctx));
+
+    /* The first pass reaches every pixel whatever the time limit. */
+    const size_t tiles = (size_t)r.tiles_x * (size_t)r.tiles_y;
+    const double start = imp__now(), pixels = (double)r.width * r.height;
+    const bool timed = run->time_limit_s > 0;
+    struct imp_loop loop = {
+        .n_items = tiles * (size_t)(timed ? 1 : r.passes), .work = tile_work,
+        .commit = tile_commit, .payload = &r, .progress = run->progress,
+        .progress_payload = run->progress_payload, .stage = picture->stage,
+        .rate_unit = "samples", .start_s = start, .units = pixels * (timed ? r.pass_spp : r.spp)};
+    size_t done = 0, passes_done;
+    st = imp__parallel(ctx, &loop, &done);
+    passes_done = done / tiles;
+    if (st == IMP_OK && timed && r.passes > 1) {
+        r.first_pass = 1;
+        loop.n_items = tiles * (size_t)(r.passes - 1);
+        loop.units = pixels * (r.spp - r.pass_spp);
+        loop.deadline_s = start + run->time_limit_s;
+        st = imp__parallel(ctx, &loop, &done);
+        passes_done += done / tiles;
+        if (st == IMP_CANCELLED && imp__now() >= loop.deadline_s) st = IMP_OK;
+    }
+    if (st != IMP_OK && st != IMP_CANCELLED) goto out;
+
+    film_finish(&r, film);
+    film->spp = imp_min((int64_t)passes_done * r.pass_spp, (int64_t)r.spp);
+    if (imp__drops_exceed(run, film->dropped, pixels * (double)film->spp))
+        IMP_TRY(imp__error(ctx, IMP_E_PATHS,
+                           "%llu of %.0f walks had values that are not finite or negative",
+                           (unsigned long long)film->dropped, pixels * (double)film->spp));
+    *out = film;
+    film = NULL;
+out:
+    imp_film_destroy(film);
+    buffers_destroy(&r, ctx);
+    return st;
+}

@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Pictures of anything that can be sampled: radiance, derivatives, first hits. */
+#ifndef IMP_WALK_PICTURE_H
+#define IMP_WALK_PICTURE_H
+
+#include "base/film.h"
+#include "walk.h"
+
+struct imp_picture {
+    const struct imp_sensor *sensor;
+    const char *stage;   /* for progress */
+    const char *names;   /* channels, "R,G,B" */
+    int n;               /* how many */
+    /* Sample number `sample` of pixel (x, y): value [n] and its film position. The arena is
+     * rewound afterwards. False: dropped, value is 0. Called by many threads at once. */
+    bool (*sample)(const void *payload, struct imp_arena *arena, int x, int y, int64_t sample,
+                   double *value, double *px, double *py);
+    const void *payload;
+};
+
+/* @return IMP_OK; IMP_CANCELLED with a valid picture; IMP_E_PATHS; IMP_E_NOMEM. */
+enum imp_status imp__picture_make(imp_context *ctx, const struct imp_picture *picture,
+                                  const struct imp_run *run, imp_film **out);
+
+/* How many pixels beyond its own a sample may reach. */
+static inline int imp__film_border(const struct imp_film_desc *f)
+{
+    return f->filter.radius > 0.5 ? (int)ceil(f->filter.radius - 0.5) : 0;
+}
+/* More dropped walks than the run allows? One is always forgiven. */
+static inline bool imp__drops_exceed(const struct imp_run *run, uint64_t dropped, double walks)
+{
+    const double budget = run->drop_budget > 0 ? run->drop_budget : 1e-4;
+    return (double)dropped > 1 + budget * walks;
+}
+
+#endif
