@@ -135,6 +135,7 @@ static void film_finish(const struct render *r, imp_film *film)
     const int n = r->n;
     for (size_t p = 0; p < (size_t)r->width * (size_t)r->height; p++) {
         const double *s = r->sums + p * (size_t)SUMS(n), W = s[0];
+        if (r->picture->weights) r->picture->weights[p] = W;
         const double n_eff = s[1] > 0 ? W * W / s[1] : 0;
         for (int c = 0; c < n; c++) {
             const double mean = W != 0 ? s[2 + 3 * c] / W : 0;

@@ -17,6 +17,7 @@ struct imp_picture {
     bool (*sample)(const void *payload, struct imp_arena *arena, int x, int y, int64_t sample,
                    double *value, double *px, double *py);
     const void *payload;
+    double *weights;     /* [height][width] sums of filter weights; NULL: not wanted */
 };
 
 /* @return IMP_OK; IMP_CANCELLED with a valid picture; IMP_E_PATHS; IMP_E_NOMEM. */

@@ -302,20 +302,31 @@ static bool step(struct step *s)
     return scatter(s, v, &at, &frame);
 }
 
+/* Keys use full-film pixels: a crop renders the same samples as the whole picture. The border
+ * of wide filters may lie outside the film, hence the offset. */
+static struct imp_key walk_key(const struct imp_tracer *tracer, int x, int y, int64_t sample)
+{
+    const struct imp_film_desc *film = &tracer->sensor->film;
+    const uint64_t row = (uint64_t)(y + film->crop_y + 0x8000);
+    const uint64_t column = (uint64_t)(x + film->crop_x + 0x8000);
+    return imp__key(tracer->seed, row << 32 | column, (uint64_t)sample);
+}
+
+void imp__walk_position(const struct imp_tracer *tracer, int x, int y, int64_t sample,
+                        double *px, double *py)
+{
+    const struct imp_key key = walk_key(tracer, x, y, sample);
+    *px = tracer->sensor->film.crop_x + x + imp__u01(key, IMP_DIM_PIXEL_X);
+    *py = tracer->sensor->film.crop_y + y + imp__u01(key, IMP_DIM_PIXEL_Y);
+}
+
 void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, int x, int y,
                      int64_t sample, struct imp_walk *walk)
 {
     const struct imp_sensor *sensor = tracer->sensor;
-    const struct imp_film_desc *film = &sensor->film;
-    /* Keys use full-film pixels: a crop renders the same samples as the whole picture.
-     * The border of wide filters may lie outside the film, hence the offset. */
-    const uint64_t row = (uint64_t)(y + film->crop_y) + 0x8000;
-    const uint64_t column = (uint64_t)(x + film->crop_x) + 0x8000;
-    const struct imp_key key = imp__key(tracer->seed, row << 32 | column, (uint64_t)sample);
-
+    const struct imp_key key = walk_key(tracer, x, y, sample);
     *walk = (struct imp_walk){.key = key};
-    walk->px = film->crop_x + x + imp__u01(key, IMP_DIM_PIXEL_X);
-    walk->py = film->crop_y + y + imp__u01(key, IMP_DIM_PIXEL_Y);
+    imp__walk_position(tracer, x, y, sample, &walk->px, &walk->py);
     const double lens[2] = {imp__u01(key, IMP_DIM_LENS_U), imp__u01(key, IMP_DIM_LENS_V)};
     sensor->ops->ray(sensor, walk->px, walk->py, lens, &walk->ray);
 

@@ -93,6 +93,10 @@ struct imp_tracer {
 void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, int x, int y,
                      int64_t sample, struct imp_walk *walk);
 
+/* Film position alone of the same walk. */
+void imp__walk_position(const struct imp_tracer *tracer, int x, int y, int64_t sample,
+                        double *px, double *py);
+
 /* L = E + B + w L, from the far end; sets lin of every vertex. */
 imp_spec imp__walk_fold(struct imp_walk *walk);
 

@@ -1,0 +1,167 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "splat.h"
+#include "loss.h"
+#include "walk/picture.h"
+
+struct imp__replicates imp__splat_plan(int spp)
+{
+    struct imp__replicates r = {.R = spp >= 16 ? 4 : 2, .chunks = 1};
+    r.n = imp_max(2, (spp + r.R - 1) / r.R);
+    return r;
+}
+
+struct pass {
+    const struct imp_tracer *tracer;
+    int64_t first;   /* sample number the replicate begins at */
+    int channels;
+};
+
+static bool sample_radiance(const void *payload, struct imp_arena *arena, int x, int y,
+                            int64_t sample, double *value, double *px, double *py)
+{
+    const struct pass *p = payload;
+    struct imp_walk walk;
+    imp__walk_trace(p->tracer, arena, x, y, p->first + sample, &walk);
+    for (int c = 0; c < p->channels; c++) value[c] = walk.L[c];
+    *px = walk.px;
+    *py = walk.py;
+    return walk.dropped == IMP_DROP_NONE;
+}
+
+/* Positions only: an integrator that stops at the sensor. */
+static bool sample_position(const void *payload, struct imp_arena *arena, int x, int y,
+                            int64_t sample, double *value, double *px, double *py)
+{
+    const struct pass *p = payload;
+    imp__walk_position(p->tracer, x, y, p->first + sample, px, py);
+    (void)arena;
+    value[0] = 0;
+    return true;
+}
+
+/* The loss of one replicate's picture; the variance of a quadratic one is taken off. */
+static double picture_loss(const struct imp__splat *s, const imp_film *film)
+{
+    const struct imp_target *t = &s->target->desc;
+    const size_t pixels = (size_t)film->width * (size_t)film->height;
+    double total = 0;
+    for (size_t p = 0; p < pixels; p++) {
+        const double scale = t->scale * (s->target->weights ? s->target->weights[p] : 1);
+        for (int c = 0; c < t->channels; c++) {
+            const size_t k = p * (size_t)s->channels + (size_t)c;
+            double I = film->mean[k], variance = imp__sqr(film->se[k]);
+            if (t->channels != s->channels) { /* luminance; channels of a sample correlate */
+                const float *m = film->mean + p * 3, *e = film->se + p * 3;
+                I = 0.212671 * m[0] + 0.715160 * m[1] + 0.072169 * m[2];
+                variance = imp__sqr(0.212671 * e[0] + 0.715160 * e[1] + 0.072169 * e[2]);
+            }
+            const double T = s->target->pixels[p * (size_t)t->channels + (size_t)c];
+            struct imp__loss_at at;
+            imp__loss_eval(t->loss, scale, t->epsilon, I, T, &at);
+            total += at.value;
+            if (imp__loss_quadratic(t->loss) && isfinite(variance))
+                total -= 0.5 * imp__loss_weight(t->loss, scale, t->epsilon, T) * variance;
+        }
+    }
+    return total;
+}
+
+enum imp_status imp__splat_create(const struct imp_problem *p, const struct imp_tracer *tracer,
+                                  const struct imp__target *target, const float *seed,
+                                  struct imp__replicates plan, const struct imp_run *run,
+                                  struct imp__splat *out)
+{
+    imp_context *ctx = p->ctx;
+    enum imp_status st = IMP_OK;
+    struct imp__splat s = {.target = target, .seed = seed, .film = &tracer->sensor->film,
+                           .channels = p->scene->channels, .R = plan.R};
+    const size_t pixels = (size_t)s.film->crop_w * (size_t)s.film->crop_h;
+    double sum = 0, square = 0;
+    s.weights = imp__alloc(ctx, (size_t)plan.R, sizeof *s.weights);
+    s.films = imp__alloc(ctx, (size_t)plan.R, sizeof *s.films);
+    if (!s.weights || !s.films) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory"));
+    for (int b = 0; b < plan.R; b++) {
+        s.weights[b] = imp__alloc(ctx, pixels, sizeof **s.weights);
+        if (!s.weights[b]) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory"));
+        const struct pass pass = {tracer, (int64_t)b * plan.n, target ? s.channels : 1};
+        struct imp_run own = *run;
+        own.spp = plan.n;
+        own.time_limit_s = 0;
+        const struct imp_picture picture = {
+            tracer->sensor, "picture", pass.channels == 3 ? "R,G,B" : "Y", pass.channels,
+            target ? sample_radiance : sample_position, &pass, s.weights[b]};
+        IMP_TRY(imp__picture_make(ctx, &picture, &own, &s.films[b]));
+        if (!target) continue;
+        const double value = picture_loss(&s, s.films[b]);
+        sum += value;
+        square += value * value;
+    }
+    const double R = plan.R;
+    s.objective = sum / R;
+    s.objective_variance = (square - sum * sum / R) / (R * (R - 1));
+    *out = s;
+out:
+    if (st != IMP_OK) imp__splat_destroy(ctx, &s);
+    return st;
+}
+
+void imp__splat_destroy(imp_context *ctx, struct imp__splat *s)
+{
+    for (int b = 0; b < s->R; b++) {
+        if (s->weights) imp__release(ctx, s->weights[b]);
+        if (s->films) imp_film_destroy(s->films[b]);
+    }
+    imp__release(ctx, s->weights);
+    imp__release(ctx, s->films);
+    *s = (struct imp__splat){0};
+}
+
+/* l' of pixel p without the sample, as an adjoint of radiance. */
+static imp_spec pixel_adjoint(const struct imp__splat *s, int b, size_t p, double w, imp_spec L)
+{
+    const int n = s->channels;
+    imp_spec bar = {0};
+    if (!s->target) {
+        for (int c = 0; c < n; c++) bar[c] = s->seed[p * (size_t)n + (size_t)c];
+        return bar;
+    }
+    static const double lum[3] = {0.212671, 0.715160, 0.072169};
+    const struct imp_target *t = &s->target->desc;
+    const double scale = t->scale * (s->target->weights ? s->target->weights[p] : 1);
+    const double W = s->weights[b][p];
+    const float *mean = s->films[b]->mean + p * (size_t)n;
+    imp_spec rest;
+    for (int c = 0; c < n; c++) /* alone in its pixel: nothing is known without it */
+        rest[c] = W - w > 1e-9 * W ? (mean[c] * W - w * L[c]) / (W - w) : mean[c];
+    for (int c = 0; c < t->channels; c++) {
+        const bool same = t->channels == n;
+        const double I = same ? rest[c]
+                              : lum[0] * rest[0] + lum[1] * rest[1] + lum[2] * rest[2];
+        struct imp__loss_at at;
+        imp__loss_eval(t->loss, scale, t->epsilon, I,
+                       s->target->pixels[p * (size_t)t->channels + (size_t)c], &at);
+        if (same) bar[c] = at.d1;
+        else bar = (imp_spec){lum[0], lum[1], lum[2], 0} * at.d1;
+    }
+    return bar;
+}
+
+imp_spec imp__splat_adjoint(const struct imp__splat *s, int b, double px, double py, imp_spec L)
+{
+    const struct imp_film_desc *film = s->film;
+    const struct imp_filter *f = &film->filter;
+    const double cx = px - film->crop_x, cy = py - film->crop_y;
+    imp_spec P = {0};
+    for (int j = imp_max(0, (int)ceil(cy - f->radius - 0.5));
+         j <= imp_min(film->crop_h - 1, (int)floor(cy + f->radius - 0.5)); j++) {
+        const double wy = f->ops->eval(f, cy - (j + 0.5));
+        for (int i = imp_max(0, (int)ceil(cx - f->radius - 0.5));
+             i <= imp_min(film->crop_w - 1, (int)floor(cx + f->radius - 0.5)); i++) {
+            const double w = wy * f->ops->eval(f, cx - (i + 0.5));
+            const size_t p = (size_t)j * (size_t)film->crop_w + (size_t)i;
+            if (w == 0 || s->weights[b][p] == 0) continue;
+            P += pixel_adjoint(s, b, p, w, L) * (w / s->weights[b][p]);
+        }
+    }
+    return P;
+}

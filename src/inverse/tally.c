@@ -1,0 +1,217 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "tally.h"
+#include <string.h>
+
+#define TABLE_MIN 1024
+
+static void add_dense(struct imp_sink *sink, int param, size_t element, int channels,
+                      const imp_spec *bar)
+{
+    struct imp_tally *t = (struct imp_tally *)sink;
+    const int64_t base = t->active->base[param];
+    if (base < 0) return;
+    double *batch = t->batch + base + element;
+    if (channels == 3)
+        for (int c = 0; c < 3; c++) batch[c] += (*bar)[c];
+    else
+        batch[0] += t->lanes == 3 ? imp__sum3(*bar) : (*bar)[0];
+}
+
+static bool table_grow(struct imp_tally *t)
+{
+    const size_t size = t->table_size ? 2 * t->table_size : TABLE_MIN;
+    uint32_t *table = imp__alloc(t->ctx, size, sizeof *table);
+    if (!table) return false;
+    for (size_t k = 0; k < t->n_entries; k++) {
+        size_t slot = imp__mix64(t->entries[k].key) & (size - 1);
+        while (table[slot]) slot = (slot + 1) & (size - 1);
+        table[slot] = (uint32_t)k + 1;
+    }
+    imp__release(t->ctx, t->table);
+    t->table = table;
+    t->table_size = size;
+    return true;
+}
+
+static struct imp__tally_entry *entry_find(struct imp_tally *t, uint32_t key, int channels)
+{
+    if (2 * t->n_entries >= t->table_size && !table_grow(t)) return NULL;
+    size_t slot = imp__mix64(key) & (t->table_size - 1);
+    while (t->table[slot]) {
+        struct imp__tally_entry *e = &t->entries[t->table[slot] - 1];
+        if (e->key == key) return e;
+        slot = (slot + 1) & (t->table_size - 1);
+    }
+    void *grown = imp__grow(t->ctx, t->entries, &t->cap_entries, t->n_entries + 1,
+                            sizeof *t->entries);
+    if (!grown) return NULL;
+    t->entries = grown;
+    struct imp__tally_entry *e = &t->entries[t->n_entries++];
+    memset(e, 0, sizeof *e);
+    e->key = key;
+    e->channels = (uint32_t)channels;
+    t->table[slot] = (uint32_t)t->n_entries;
+    return e;
+}
+
+static void add_hashed(struct imp_sink *sink, int param, size_t element, int channels,
+                       const imp_spec *bar)
+{
+    struct imp_tally *t = (struct imp_tally *)sink;
+    const int64_t base = t->active->base[param];
+    if (base < 0 || t->failed) return;
+    struct imp__tally_entry *e = entry_find(t, (uint32_t)((size_t)base + element), channels);
+    if (!e) {
+        t->failed = true;
+        return;
+    }
+    if (!e->touched) {
+        void *grown = imp__grow(t->ctx, t->touched, &t->cap_touched, t->n_touched + 1,
+                                sizeof *t->touched);
+        if (!grown) {
+            t->failed = true;
+            return;
+        }
+        t->touched = grown;
+        t->touched[t->n_touched++] = (uint32_t)(e - t->entries);
+        e->touched = true;
+    }
+    if (channels == 3)
+        e->batch += *bar;
+    else
+        e->batch[0] += t->lanes == 3 ? imp__sum3(*bar) : (*bar)[0];
+}
+
+enum imp_status imp__tally_create(imp_context *ctx, const struct imp_active *active, int lanes,
+                                  struct imp_tally *out)
+{
+    struct imp_tally t = {.ctx = ctx, .active = active, .lanes = lanes};
+    t.dense = active->n <= IMP_TALLY_DENSE;
+    t.sink.add = t.dense ? add_dense : add_hashed;
+    if (active->n >= UINT32_MAX)
+        return imp__error(ctx, IMP_E_ARG, "more than %u active numbers", UINT32_MAX);
+    if (t.dense) {
+        t.batch = imp__alloc(ctx, 5 * active->n, sizeof *t.batch);
+        if (!t.batch) return imp__error(ctx, IMP_E_NOMEM, "no memory for gradients");
+        t.sum = t.batch + active->n;
+        t.square = t.sum + active->n;
+        t.mean = t.square + active->n;
+        t.variance = t.mean + active->n;
+    }
+    *out = t;
+    return IMP_OK;
+}
+
+void imp__tally_destroy(struct imp_tally *t)
+{
+    if (!t->ctx) return;
+    imp__release(t->ctx, t->batch);
+    imp__release(t->ctx, t->table);
+    imp__release(t->ctx, t->entries);
+    imp__release(t->ctx, t->touched);
+    *t = (struct imp_tally){0};
+}
+
+void imp__tally_clear(struct imp_tally *t)
+{
+    if (t->dense) {
+        memset(t->batch, 0, 5 * t->active->n * sizeof *t->batch);
+    } else {
+        if (t->table_size) memset(t->table, 0, t->table_size * sizeof *t->table);
+        t->n_entries = t->n_touched = 0;
+    }
+}
+
+void imp__tally_batch(struct imp_tally *t)
+{
+    if (t->dense) {
+        for (size_t k = 0; k < t->active->n; k++) {
+            t->sum[k] += t->batch[k];
+            t->square[k] += t->batch[k] * t->batch[k];
+            t->batch[k] = 0;
+        }
+        return;
+    }
+    for (size_t k = 0; k < t->n_touched; k++) {
+        struct imp__tally_entry *e = &t->entries[t->touched[k]];
+        e->sum += e->batch;
+        e->square += e->batch * e->batch;
+        e->batch = (imp_spec){0};
+    }
+}
+
+void imp__tally_pixel(struct imp_tally *t, double replicates, double by_mean,
+                      double by_variance)
+{
+    const double r = 1 / replicates;
+    if (t->dense) {
+        for (size_t k = 0; k < t->active->n; k++) {
+            t->mean[k] += by_mean * t->sum[k];
+            t->variance[k] += by_variance * (t->square[k] - t->sum[k] * t->sum[k] * r);
+            t->sum[k] = t->square[k] = 0;
+        }
+        return;
+    }
+    for (size_t k = 0; k < t->n_touched; k++) {
+        struct imp__tally_entry *e = &t->entries[t->touched[k]];
+        const imp_spec spread = e->square - e->sum * e->sum * r;
+        for (int c = 0; c < 3; c++) {
+            e->mean[c] += by_mean * e->sum[c];
+            e->variance[c] += by_variance * spread[c];
+        }
+        e->sum = e->square = (imp_spec){0};
+        e->touched = false;
+    }
+    t->n_touched = 0;
+}
+
+enum imp_status imp__tally_export(const struct imp_tally *t, struct imp_tally_result *out)
+{
+    if (t->failed) return imp__error(t->ctx, IMP_E_NOMEM, "no memory for gradients");
+    if (t->dense) {
+        if (!out->dense) out->dense = imp__alloc(t->ctx, 2 * t->active->n, sizeof *out->dense);
+        if (!out->dense) return imp__error(t->ctx, IMP_E_NOMEM, "no memory for gradients");
+        memcpy(out->dense, t->mean, 2 * t->active->n * sizeof *out->dense);
+        return IMP_OK;
+    }
+    void *grown = imp__grow(t->ctx, out->pieces, &out->capacity, t->n_entries + 1,
+                            sizeof *out->pieces);
+    if (!grown) return imp__error(t->ctx, IMP_E_NOMEM, "no memory for gradients");
+    out->pieces = grown;
+    out->n = t->n_entries;
+    for (size_t k = 0; k < t->n_entries; k++) {
+        const struct imp__tally_entry *e = &t->entries[k];
+        struct imp__tally_piece *p = &out->pieces[k];
+        p->key = e->key;
+        p->channels = e->channels;
+        memcpy(p->mean, e->mean, sizeof p->mean);
+        memcpy(p->variance, e->variance, sizeof p->variance);
+    }
+    return IMP_OK;
+}
+
+void imp__tally_add(const struct imp_tally_result *r, size_t n_active, double *gradient,
+                    double *variance)
+{
+    if (r->dense) {
+        for (size_t k = 0; k < n_active; k++) {
+            gradient[k] += r->dense[k];
+            variance[k] += r->dense[n_active + k];
+        }
+        return;
+    }
+    for (size_t k = 0; k < r->n; k++) {
+        const struct imp__tally_piece *p = &r->pieces[k];
+        for (uint32_t c = 0; c < p->channels; c++) {
+            gradient[p->key + c] += p->mean[c];
+            variance[p->key + c] += p->variance[c];
+        }
+    }
+}
+
+void imp__tally_result_destroy(imp_context *ctx, struct imp_tally_result *r)
+{
+    imp__release(ctx, r->pieces);
+    imp__release(ctx, r->dense);
+    *r = (struct imp_tally_result){0};
+}
