@@ -17,7 +17,7 @@ enum imp_status imp_render(const imp_scene *scene, const struct imp_run *run, im
     enum imp_status st = imp__measure_create(scene, run, &measure);
     if (st != IMP_OK) return st;
     const struct imp_picture picture = {measure.sensor, "render", measure.names, measure.n,
-                                        sample, &measure};
+                                        sample, &measure, NULL};
     st = imp__picture_make(scene->ctx, &picture, run, out);
     imp__measure_destroy(&measure);
     return st;

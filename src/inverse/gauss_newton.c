@@ -1,0 +1,306 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * J^T W J and J^T W r without bias (gradients.md 15). With x_ik = dL_i/dx_k of walk i and a
+ * replicate of n walks in one pixel and channel,
+ *
+ *     (J^T J)_kl ~ w [ (sum_i x_ik)(sum_i x_il) - sum_i x_ik x_il ] / (n (n-1))      (i != j)
+ *     (J^T r)_k  ~ w { [S/(n-1) - T] mean(x_k) - sum_i L_i x_ik / (n (n-1)) }        (LOO')
+ *
+ * averaged over replicates; the same-sample matrix, which a naive product of mean pictures
+ * would give, comes along for damping. Losses that are not quadratic enter with
+ * w = l''(mean) and r = l'/l''. */
+#include <string.h>
+#include "estimate.h"
+#include "lanes.h"
+#include "loss.h"
+#include "walk/picture.h"
+
+#define GAUSS_NEWTON_MAX 256
+
+struct sums { /* of one tile; matrices [K*K] */
+    double *H, *H_same, *H_meas, *cov_g, *g;
+    double objective, variance, chi2;
+    uint64_t dropped;
+};
+
+struct job {
+    const struct imp_problem *problem;
+    const struct imp__target *target;
+    struct imp_tracer tracer;
+    struct imp__replicates plan;
+    int width, height, channels;
+    size_t K;
+    struct worker {
+        struct imp_arena arena;
+        double *x;         /* [K][channels] of one walk */
+        double *sum_x;     /* [K][seen] of a replicate */
+        double *sum_lx;    /* [K][seen] */
+        double *sum_xx;    /* [seen][K*K] */
+        double *g;         /* [R][K] of a pixel */
+    } *workers;
+    struct sums *slots, total;
+};
+
+static size_t sums_bytes(size_t K) { return (4 * K * K + K) * sizeof(double); }
+
+static enum imp_status sums_create(imp_context *ctx, size_t K, struct sums *s)
+{
+    double *p = imp__alloc(ctx, 1, sums_bytes(K));
+    if (!p) return imp__error(ctx, IMP_E_NOMEM, "no memory for %zu x %zu matrices", K, K);
+    *s = (struct sums){.H = p, .H_same = p + K * K, .H_meas = p + 2 * K * K,
+                       .cov_g = p + 3 * K * K, .g = p + 4 * K * K};
+    return IMP_OK;
+}
+
+static const double luminance_weight[3] = {0.212671, 0.715160, 0.072169};
+
+/* A walk's L and x as the target sees them: its channels, or their luminance. */
+static int seen_channels(const struct job *j) { return j->target->desc.channels; }
+static double seen(const struct job *j, const double *lanes, int c)
+{
+    if (seen_channels(j) == j->channels) return lanes[c];
+    return luminance_weight[0] * lanes[0] + luminance_weight[1] * lanes[1] +
+           luminance_weight[2] * lanes[2];
+}
+
+/* One replicate of a pixel: adds to the tile's matrices with factor `share`, writes its
+ * gradient, returns its loss. */
+static double replicate(const struct job *j, struct worker *w, struct sums *out, int x, int y,
+                        int b, double share, double *g)
+{
+    const size_t K = j->K, S = (size_t)seen_channels(j);
+    const struct imp_target *t = &j->target->desc;
+    const int n = j->plan.n;
+    const double N = n;
+    double sum[3] = {0}, square[3] = {0}, value = 0;
+    memset(w->sum_x, 0, K * S * sizeof(double));
+    memset(w->sum_lx, 0, K * S * sizeof(double));
+    memset(w->sum_xx, 0, K * K * S * sizeof(double));
+    memset(g, 0, K * sizeof *g);
+
+    for (int i = 0; i < n; i++) {
+        const struct imp_arena_mark mark = imp__arena_mark(&w->arena);
+        struct imp_walk walk;
+        imp__walk_trace(&j->tracer, &w->arena, x, y, (int64_t)b * n + i, &walk);
+        out->dropped += walk.dropped != IMP_DROP_NONE;
+        memset(w->x, 0, K * (size_t)j->channels * sizeof(double));
+        struct imp_lanes lanes = {{imp__lanes_add}, j->tracer.active, j->channels, w->x};
+        imp__walk_sweep(&j->tracer, &walk, imp__lanes_adjoint(j->channels), &lanes.sink);
+        imp__arena_rewind(&w->arena, mark);
+        const double L[3] = {walk.L[0], walk.L[1], walk.L[2]};
+        for (size_t c = 0; c < S; c++) {
+            const double l = seen(j, L, (int)c);
+            double *xx = w->sum_xx + c * K * K;
+            sum[c] += l;
+            square[c] += l * l;
+            for (size_t k = 0; k < K; k++) {
+                const double xk = seen(j, w->x + k * (size_t)j->channels, (int)c);
+                if (xk == 0) continue;
+                w->sum_x[k * S + c] += xk;
+                w->sum_lx[k * S + c] += l * xk;
+                for (size_t m = 0; m <= k; m++)
+                    xx[k * K + m] += xk * seen(j, w->x + m * (size_t)j->channels, (int)c);
+            }
+        }
+    }
+
+    const size_t pixel = (size_t)y * (size_t)j->width + (size_t)x;
+    const double scale = t->scale * (j->target->weights ? j->target->weights[pixel] : 1);
+    for (size_t c = 0; c < S; c++) {
+        const double T = j->target->pixels[pixel * S + c];
+        double weight, T_eff = T;
+        if (imp__loss_quadratic(t->loss)) {
+            weight = imp__loss_weight(t->loss, scale, t->epsilon, T);
+            value += imp__loss_unbiased(weight, T, N, sum[c], square[c]);
+        } else {
+            struct imp__loss_at at;
+            imp__loss_eval(t->loss, scale, t->epsilon, sum[c] / N, T, &at);
+            weight = at.d2 > 0 ? at.d2 : 0;
+            T_eff = weight > 0 ? sum[c] / N - at.d1 / weight : T;
+            value += at.value;
+        }
+        const double sigma = j->target->noise_se ? j->target->noise_se[pixel * S + c] : 1;
+        const double a = weight * share / (N * (N - 1)), same = weight * share / (N * N);
+        const double meas = weight * weight * sigma * sigma * share / (N * (N - 1));
+        const double *xx = w->sum_xx + c * K * K;
+        out->chi2 += 2 * share * imp__loss_unbiased(weight, T_eff, N, sum[c], square[c]);
+        for (size_t k = 0; k < K; k++) {
+            const double xk = w->sum_x[k * S + c];
+            g[k] += weight * ((sum[c] / (N - 1) - T_eff) * xk / N -
+                              w->sum_lx[k * S + c] / (N * (N - 1)));
+            for (size_t m = 0; m <= k; m++) {
+                const double product = xk * w->sum_x[m * S + c], u = product - xx[k * K + m];
+                out->H[k * K + m] += a * u;
+                out->H_same[k * K + m] += same * product;
+                out->H_meas[k * K + m] += meas * u;
+            }
+        }
+    }
+    return value;
+}
+
+static enum imp_status tile_work(size_t item, int worker, int slot, void *payload)
+{
+    struct job *j = payload;
+    struct worker *w = &j->workers[worker];
+    struct sums *out = &j->slots[slot];
+    const size_t K = j->K;
+    const struct imp__tile t = imp__tile_of(item, j->width, j->height, 0, j->plan.chunks);
+    const int b0 = imp__replicates_begin(j->plan, t.chunk);
+    const int b1 = imp__replicates_begin(j->plan, t.chunk + 1);
+    const double R = b1 - b0, all = j->plan.R;
+    memset(out->H, 0, sums_bytes(K));
+    out->objective = out->variance = out->chi2 = 0;
+    out->dropped = 0;
+    for (int y = t.y0; y < t.y1; y++)
+        for (int x = t.x0; x < t.x1; x++) {
+            double sum = 0, square = 0;
+            for (int b = b0; b < b1; b++) {
+                const double v = replicate(j, w, out, x, y, b, 1 / all,
+                                           w->g + (size_t)(b - b0) * K);
+                sum += v;
+                square += v * v;
+            }
+            const double spread = R / ((R - 1) * all * all);
+            out->objective += sum / all;
+            out->variance += (square - sum * sum / R) * spread;
+            for (size_t k = 0; k < K; k++) {
+                double mean_k = 0;
+                for (int b = 0; b < (int)R; b++) mean_k += w->g[(size_t)b * K + k] / R;
+                out->g[k] += mean_k * R / all;
+                for (size_t m = 0; m <= k; m++) {
+                    double s = 0, mean_m = 0;
+                    for (int b = 0; b < (int)R; b++) {
+                        s += w->g[(size_t)b * K + k] * w->g[(size_t)b * K + m];
+                        mean_m += w->g[(size_t)b * K + m] / R;
+                    }
+                    out->cov_g[k * K + m] += (s - R * mean_k * mean_m) * spread;
+                }
+            }
+        }
+    return IMP_OK;
+}
+
+static enum imp_status tile_commit(size_t item, int slot, void *payload)
+{
+    struct job *j = payload;
+    const struct sums *in = &j->slots[slot];
+    (void)item;
+    for (size_t k = 0; k < sums_bytes(j->K) / sizeof(double); k++) j->total.H[k] += in->H[k];
+    j->total.objective += in->objective;
+    j->total.variance += in->variance;
+    j->total.chi2 += in->chi2;
+    j->total.dropped += in->dropped;
+    return IMP_OK;
+}
+
+static enum imp_status workers_create(struct job *j, imp_context *ctx)
+{
+    const size_t K = j->K, S = 3, R = 2 * IMP_BATCHES_PER_ITEM + 2;
+    for (int k = 0; k < ctx->threads; k++) {
+        struct worker *w = &j->workers[k];
+        imp__arena_init(&w->arena, ctx);
+        w->x = imp__alloc(ctx, K * (3 + 2 * S + R) + S * K * K, sizeof(double));
+        if (!w->x) return imp__error(ctx, IMP_E_NOMEM, "no memory for derivatives");
+        w->sum_x = w->x + 3 * K;
+        w->sum_lx = w->sum_x + S * K;
+        w->g = w->sum_lx + S * K;
+        w->sum_xx = w->g + R * K;
+    }
+    return IMP_OK;
+}
+
+static enum imp_status target_add(struct job *j, const struct imp__target *target,
+                                  const struct imp_run *run, double lo, double hi, double start)
+{
+    const struct imp_problem *p = j->problem;
+    struct imp_run own = *run;
+    own.sensor = target->desc.sensor;
+    j->target = target;
+    enum imp_status st = imp__problem_tracer(p, &own, &j->tracer);
+    if (st != IMP_OK) return st;
+    const struct imp_film_desc *film = &j->tracer.sensor->film;
+    if (imp__film_border(film) > 0)
+        return imp__error(p->ctx, IMP_E_UNSUPPORTED,
+                          "Gauss-Newton needs a box filter; sensor %d has a wider one",
+                          own.sensor);
+    j->width = film->crop_w;
+    j->height = film->crop_h;
+    j->plan = imp__replicates_plan(imp_max(own.spp > 0 ? own.spp : j->tracer.sensor->spp, 4),
+                                   IMP_BATCH_MAX);
+    const double walks = (double)j->width * j->height * j->plan.n * j->plan.R;
+    const struct imp_loop loop = {
+        .n_items = imp__tile_count(j->width, j->height, 0) * (size_t)j->plan.chunks,
+        .work = tile_work, .commit = tile_commit, .payload = j, .progress = run->progress,
+        .progress_payload = run->progress_payload, .stage = "gauss-newton",
+        .rate_unit = "walks", .units = walks, .fraction_lo = lo, .fraction_hi = hi,
+        .start_s = start};
+    const uint64_t before = j->total.dropped;
+    st = imp__parallel(p->ctx, &loop, NULL);
+    if (st == IMP_OK && imp__drops_exceed(run, j->total.dropped - before, walks))
+        st = imp__error(p->ctx, IMP_E_PATHS, "too many walks had values that are not finite");
+    return st;
+}
+
+static void matrix_copy(double *to, const double *lower, size_t K)
+{
+    if (!to) return;
+    for (size_t k = 0; k < K; k++)
+        for (size_t m = 0; m <= k; m++) to[k * K + m] = to[m * K + k] = lower[k * K + m];
+}
+
+enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
+                                  const struct imp_run *run, struct imp__gauss_newton *out)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = p->ctx;
+    const struct imp_run own = imp__run_or_default(run);
+    struct job j = {.problem = p, .K = p->n, .channels = p->scene->channels};
+    const int n_slots = imp__pool_slots(ctx);
+    double residuals = 0;
+    int bias_order = 0;
+    if (p->n == 0 || p->n > GAUSS_NEWTON_MAX)
+        IMP_TRY(imp__error(ctx, IMP_E_ARG,
+                           "%zu numbers are active; Gauss-Newton takes 1 to %d", p->n,
+                           GAUSS_NEWTON_MAX));
+    if (x) IMP_TRY(imp_problem_set_x(p, x));
+    j.workers = imp__alloc(ctx, (size_t)ctx->threads, sizeof *j.workers);
+    j.slots = imp__alloc(ctx, (size_t)n_slots, sizeof *j.slots);
+    if (!j.workers || !j.slots) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory"));
+    IMP_TRY(workers_create(&j, ctx));
+    for (int k = 0; k < n_slots; k++) IMP_TRY(sums_create(ctx, j.K, &j.slots[k]));
+    IMP_TRY(sums_create(ctx, j.K, &j.total));
+
+    const double start = p->progress_start_s > 0 ? p->progress_start_s : imp__now();
+    const double lo = p->progress_lo, hi = p->progress_hi > 0 ? p->progress_hi : 1;
+    for (size_t t = 0; t < p->n_targets; t++) {
+        IMP_TRY(target_add(&j, &p->targets[t], &own,
+                           lo + (hi - lo) * (double)t / (double)p->n_targets,
+                           lo + (hi - lo) * (double)(t + 1) / (double)p->n_targets, start));
+        residuals += (double)j.width * j.height * p->targets[t].desc.channels;
+        const int bias = imp__loss_bias_order(p->targets[t].desc.loss);
+        if (bias) bias_order = 1;
+    }
+    matrix_copy(out->H, j.total.H, j.K);
+    matrix_copy(out->H_same, j.total.H_same, j.K);
+    matrix_copy(out->H_meas, j.total.H_meas, j.K);
+    matrix_copy(out->cov_g, j.total.cov_g, j.K);
+    for (size_t k = 0; k < j.K; k++) {
+        if (out->g) out->g[k] = j.total.g[k];
+        if (out->g_se) out->g_se[k] = sqrt(fmax(0, j.total.cov_g[k * j.K + k]));
+    }
+    out->objective = (struct imp_estimate){j.total.objective, sqrt(fmax(0, j.total.variance)),
+                                           bias_order};
+    out->chi2 = j.total.chi2;
+    out->n_residuals = residuals;
+out:
+    for (int k = 0; j.workers && k < ctx->threads; k++) {
+        if (j.workers[k].arena.ctx) imp__arena_free(&j.workers[k].arena);
+        imp__release(ctx, j.workers[k].x);
+    }
+    for (int k = 0; j.slots && k < n_slots; k++) imp__release(ctx, j.slots[k].H);
+    imp__release(ctx, j.total.H);
+    imp__release(ctx, j.workers);
+    imp__release(ctx, j.slots);
+    return st;
+}

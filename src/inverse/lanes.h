@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A sink that keeps the colour channels of a derivative apart: x[k][c] = dL_c / dx_k. By the
+ * lane rule (kinds.h) channel c of a coloured parameter moves channel c of the picture only,
+ * so one sweep with adjoint 1 yields the whole Jacobian of a walk. */
+#ifndef IMP_INVERSE_LANES_H
+#define IMP_INVERSE_LANES_H
+
+#include "walk/walk.h"
+
+struct imp_lanes {
+    struct imp_sink sink;      /* first */
+    const struct imp_active *active;
+    int lanes;                 /* 3 or 1 */
+    double *x;                 /* [active->n][lanes] */
+};
+
+static inline void imp__lanes_add(struct imp_sink *sink, int param, size_t element,
+                                  int channels, const imp_spec *bar)
+{
+    struct imp_lanes *s = (struct imp_lanes *)sink;
+    const int64_t base = s->active->base[param];
+    if (base < 0) return;
+    double *x = s->x + ((size_t)base + element) * (size_t)s->lanes;
+    for (int c = 0; c < s->lanes; c++) /* number c of a colour, channel c */
+        x[(channels == 3 ? c * s->lanes : 0) + c] += (*bar)[c];
+}
+
+static inline imp_spec imp__lanes_adjoint(int lanes)
+{
+    return lanes == 3 ? (imp_spec){1, 1, 1, 0} : (imp_spec){1, 0, 0, 0};
+}
+
+#endif
