@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What a scene holds, for people and host programs. */
+#include "scene.h"
+
+void imp_scene_get_info(const imp_scene *scene, struct imp_scene_info *info)
+{
+    static const char *const integrators[] = {
+        [IMP_INTEGRATOR_PATH] = "path", [IMP_INTEGRATOR_DIRECT] = "direct",
+        [IMP_INTEGRATOR_DEPTH] = "depth", [IMP_INTEGRATOR_AOV] = "aov",
+        [IMP_INTEGRATOR_MOMENT] = "moment", [IMP_INTEGRATOR_STAM] = "stam"};
+    if (!scene || !info) return;
+    *info = (struct imp_scene_info){.size = sizeof *info};
+    info->n_shapes = scene->n_shapes;
+    info->n_emitters = scene->n_emitters;
+    info->n_bsdfs = scene->n_bsdfs;
+    info->n_textures = scene->n_textures;
+    info->n_sensors = scene->n_sensors;
+    info->mode = scene->mode;
+    info->channels = scene->mode == IMP_MONO ? 1 : 3;
+    info->integrator = scene->has_integrator ? integrators[scene->integrator.kind] : "";
+    info->max_depth = scene->integrator.max_depth;
+    for (int s = 0; s < scene->n_shapes; s++)
+        if (scene->shapes[s]->geometry == IMP_TRIANGLES)
+            info->n_triangles += (int64_t)scene->shapes[s]->triangles.n_triangles;
+    for (int c = 0; c < 3; c++) {
+        info->bounds_min[c] = scene->lo[c];
+        info->bounds_max[c] = scene->hi[c];
+    }
+    info->memory_bytes = scene->arena.total + imp__intersector_bytes(scene) +
+                         scene->cap_params * sizeof *scene->params;
+}
+
+enum imp_status imp_scene_get_sensor(const imp_scene *scene, int sensor,
+                                     struct imp_sensor_info *info)
+{
+    if (!scene || !info) return IMP_E_ARG;
+    if (sensor < 0 || sensor >= scene->n_sensors)
+        return imp__error(scene->ctx, IMP_E_ARG, "there is no sensor %d; the scene has %d",
+                          sensor, scene->n_sensors);
+    const struct imp_sensor *s = scene->sensors[sensor];
+    *info = (struct imp_sensor_info){
+        .size = sizeof *info, .name = s->name, .type = s->ops->name,
+        .width = s->film.crop_w, .height = s->film.crop_h, .spp = s->spp,
+        .filter = s->film.filter.ops->name, .filter_radius = s->film.filter.radius,
+        .file_format = s->film.file_format};
+    return IMP_OK;
+}
