@@ -140,6 +140,10 @@ struct imp_bsdf_ops {
      * fixed u). Returns false where not offered; NULL: nowhere (gradients.md 4). */
     bool (*sample_d)(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
                      const struct imp_dirs *d, int j, imp_spec *dweight, imp_v3 *dwi);
+
+    /* Rewrite the node before its inputs are read: named presets become numbers. May be
+     * NULL. */
+    enum imp_status (*prepare)(const struct imp_build *build);
 };
 
 /* ---- Texture ---------------------------------------------------------------------- */

@@ -1,0 +1,66 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * conductor: a smooth mirror of complex index eta + i k. One delta lobe, tint times Fresnel;
+ * its derivatives are those of the coefficient (gradients.md 9.3). Front only. */
+#include "fresnel.h"
+#include "kind/build.h"
+#include "presets.h"
+
+enum { ETA, K, TINT };
+
+static const struct imp_input_desc inputs[] = {
+    {.name = "eta", .role = IMP_UNBOUNDED, .fallback = 0, .unit = "1"},
+    {.name = "k", .role = IMP_UNBOUNDED, .fallback = 1, .unit = "1"},
+    {.name = "specular_reflectance", .role = IMP_REFLECTANCE, .flags = IMP_INPUT_OPTIONAL,
+     .fallback = 1, .hi = 1, .unit = "1"},
+    {0}};
+
+static enum imp_status build(const struct imp_build *build, void *self, struct imp_bsdf *b)
+{
+    (void)build, (void)self;
+    b->flags = IMP_BSDF_DELTA;
+    return IMP_OK;
+}
+static bool lit(const struct imp_dirs *d) { return d->lobe == 0 && d->wo[2] > 0; }
+
+static void eval(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
+                 imp_spec *f)
+{
+    (void)b;
+    *f = imp__spec(0);
+    if (!lit(d)) return;
+    imp__fresnel_conductor(d->wo[2], &in[ETA], &in[K], f);
+    *f *= in[TINT];
+}
+static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
+{
+    (void)b, (void)in;
+    return lit(d) ? 1 : 0;
+}
+static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
+                   struct imp_dirs *d, struct imp_bsdf_sample *s)
+{
+    (void)u;
+    if (!(d->wo[2] > 0)) return false;
+    d->wi = imp__v3(-d->wo[0], -d->wo[1], d->wo[2]);
+    d->lobe = 0;
+    s->pdf = 1;
+    s->eta = 1;
+    eval(b, in, d, &s->f);
+    return true;
+}
+static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
+                   imp_spec *df)
+{
+    (void)b;
+    df[ETA] = df[K] = df[TINT] = imp__spec(0);
+    if (!lit(d)) return;
+    imp__fresnel_conductor_d(d->wo[2], &in[ETA], &in[K], &df[TINT], &df[ETA], &df[K]);
+    df[ETA] *= in[TINT];
+    df[K] *= in[TINT];
+}
+
+const struct imp_bsdf_ops imp__conductor = {
+    .size = sizeof(struct imp_bsdf_ops), .name = "conductor", .inputs = inputs,
+    .prepare = imp__conductor_prepare, .build = build,
+    .sample = sample, .eval = eval, .pdf = pdf, .eval_d = eval_d};

@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "fresnel.h"
+
+double imp__fresnel_dielectric(double c, double eta, double *cos_t, double *eta_t)
+{
+    const double e = c >= 0 ? eta : 1 / eta, ci = fabs(c);
+    const double ct2 = 1 - (1 - ci * ci) / (e * e);
+    *eta_t = e;
+    *cos_t = ct2 > 0 ? sqrt(ct2) : 0;
+    if (e == 1) return 0;
+    if (!(ct2 > 0)) return 1; /* total reflection */
+    const double ct = *cos_t;
+    const double a = (ci - e * ct) / (ci + e * ct), b = (ct - e * ci) / (ct + e * ci);
+    return 0.5 * (a * a + b * b);
+}
+
+/* One lane. With t = eta^2 - k^2 - sin^2, A = sqrt(t^2 + 4 eta^2 k^2), a = sqrt((A + t)/2):
+ *
+ *   Rs = (P - Q)/(P + Q),  P = A + c^2,  Q = 2 a c
+ *   Rp = Rs (U - V)/(U + V),  U = A c^2 + sin^4,  V = Q sin^2,   F = (Rs + Rp)/2
+ *
+ * For t < 0 a is taken as eta k sqrt(2/(A - t)), which is the same number without the
+ * cancellation in A + t, and whose derivatives exist at eta k = 0. */
+static double conductor(double c, double eta, double k, double *d_eta, double *d_k)
+{
+    const double c2 = c * c, s2 = fmax(0, 1 - c2);
+    const double ek = eta * k, t = eta * eta - k * k - s2;
+    const double A = sqrt(t * t + 4 * ek * ek);
+    const double q = t < 0 ? sqrt(2 / (A - t)) : 0;
+    const double a = t < 0 ? ek * q : sqrt(0.5 * (A + t));
+    const double P = A + c2, Q = 2 * a * c, U = A * c2 + s2 * s2, V = Q * s2;
+    const double s_sum = P + Q, p_sum = U + V;
+    const double Rs = s_sum > 0 ? (P - Q) / s_sum : 1;
+    const double ratio = p_sum > 0 ? (U - V) / p_sum : 1;
+    if (d_eta) {
+        const double dt[2] = {2 * eta, -2 * k};
+        const double dek[2] = {k, eta};
+        double dF[2];
+        for (int j = 0; j < 2; j++) {
+            const double dA = A > 0 ? (t * dt[j] + 4 * ek * dek[j]) / A : 0;
+            double da = 0;
+            if (t < 0)
+                da = dek[j] * q - 0.5 * a * (dA - dt[j]) / (A - t);
+            else if (a > 0)
+                da = 0.25 * (dA + dt[j]) / a;
+            const double dQ = 2 * c * da;
+            /* d((P - Q)/(P + Q)) = 2 (Q dP - P dQ)/(P + Q)^2 */
+            const double dRs = s_sum > 0 ? 2 * (Q * dA - P * dQ) / (s_sum * s_sum) : 0;
+            const double dr =
+                p_sum > 0 ? 2 * (V * c2 * dA - U * s2 * dQ) / (p_sum * p_sum) : 0;
+            dF[j] = 0.5 * (dRs * (1 + ratio) + Rs * dr);
+        }
+        *d_eta = dF[0];
+        *d_k = dF[1];
+    }
+    return 0.5 * Rs * (1 + ratio);
+}
+
+void imp__fresnel_conductor(double c, const imp_spec *eta, const imp_spec *k, imp_spec *f)
+{
+    *f = imp__spec(0);
+    for (int i = 0; i < 3; i++) (*f)[i] = conductor(c, (*eta)[i], (*k)[i], NULL, NULL);
+}
+
+void imp__fresnel_conductor_d(double c, const imp_spec *eta, const imp_spec *k, imp_spec *f,
+                              imp_spec *df_deta, imp_spec *df_dk)
+{
+    *f = *df_deta = *df_dk = imp__spec(0);
+    for (int i = 0; i < 3; i++) {
+        double de, dk;
+        (*f)[i] = conductor(c, (*eta)[i], (*k)[i], &de, &dk);
+        (*df_deta)[i] = de;
+        (*df_dk)[i] = dk;
+    }
+}

@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Fresnel reflectance of unpolarised light at a smooth interface (scene-format 5.1). */
+#ifndef IMP_KIND_BSDF_FRESNEL_H
+#define IMP_KIND_BSDF_FRESNEL_H
+
+#include "math/vec.h"
+
+/* Dielectric: c is the cosine on the side of the ray, its sign the side (c > 0: outside);
+ * eta = inside/outside. *cos_t: cosine of refraction, >= 0, 0 under total reflection;
+ * *eta_t: index on the far side over index on the near side. */
+double imp__fresnel_dielectric(double c, double eta, double *cos_t, double *eta_t);
+
+/* Conductor in vacuum, c = cosine of incidence, lane by lane. */
+void imp__fresnel_conductor(double c, const imp_spec *eta, const imp_spec *k, imp_spec *f);
+/* With derivatives. At eta = 0 or k = 0 they are the one-sided ones: F depends on eta k
+ * where the root vanishes, and a mirror (eta = 0, k = 1) must know how it could absorb. */
+void imp__fresnel_conductor_d(double c, const imp_spec *eta, const imp_spec *k, imp_spec *f,
+                              imp_spec *df_deta, imp_spec *df_dk);
+
+#endif

@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The Lambertian lobe: cos(theta_i)/pi on the front, times an albedo. Value over albedo,
+ * density and derivative by albedo are this one number. */
+#ifndef IMP_KIND_BSDF_LAMBERT_H
+#define IMP_KIND_BSDF_LAMBERT_H
+
+#include "math/warp.h"
+
+/* Both directions on the front: else every one-sided lobe is structurally 0. */
+static inline bool imp__front(const struct imp_dirs *d)
+{
+    return d->wo[2] > 0 && d->wi[2] > 0;
+}
+static inline double imp__lambert(const struct imp_dirs *d)
+{
+    return imp__front(d) ? d->wi[2] * IMP_INV_PI : 0;
+}
+/* Draw wi with density cos/pi: value over density is the albedo, for every draw. */
+static inline bool imp__lambert_sample(const double u[2], struct imp_dirs *d)
+{
+    if (!(d->wo[2] > 0)) return false;
+    d->wi = imp__cosine_hemisphere(u);
+    d->lobe = IMP_SMOOTH;
+    return d->wi[2] > 0;
+}
+
+#endif

@@ -1,0 +1,67 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * stam_m3: Lambert with an ambient term that acts as emission (Stam 2020, App. C; controls
+ * theta_6, theta_7 of gradients.md 2.1). `absorb` is the chance that a walk of integrator
+ * `stam` ends here: it is sampling, no expectation depends on it. */
+#include "kind/build.h"
+#include "lambert.h"
+#include "stam.h"
+
+enum { AMBIENT, DIFFUSE };
+
+static const struct imp_input_desc inputs[] = {
+    IMP_STAM_AMBIENT,
+    {.name = "diffuse", .role = IMP_REFLECTANCE, .fallback = 0.5, .hi = 1, .unit = "1"},
+    {0}};
+
+static enum imp_status build(const struct imp_build *build, void *self, struct imp_bsdf *b)
+{
+    (void)self;
+    b->flags = IMP_BSDF_SMOOTH | IMP_BSDF_EMIT;
+    return imp__stam_absorb_read(build, &b->absorb);
+}
+static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
+                   struct imp_dirs *d, struct imp_bsdf_sample *s)
+{
+    (void)b;
+    if (!imp__lambert_sample(&u[1], d)) return false;
+    s->pdf = imp__lambert(d);
+    s->f = in[DIFFUSE] * s->pdf;
+    s->eta = 1;
+    return true;
+}
+static void eval(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
+                 imp_spec *f)
+{
+    (void)b;
+    *f = in[DIFFUSE] * imp__lambert(d);
+}
+static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
+{
+    (void)b, (void)in;
+    return imp__lambert(d);
+}
+static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
+                   imp_spec *df)
+{
+    (void)b, (void)in;
+    df[AMBIENT] = imp__spec(0);
+    df[DIFFUSE] = imp__spec(imp__lambert(d));
+}
+static void emit(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo, imp_spec *e)
+{
+    (void)b;
+    *e = (*wo)[2] > 0 ? in[AMBIENT] : imp__spec(0);
+}
+static void emit_d(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
+                   imp_spec *de)
+{
+    (void)b, (void)in;
+    de[AMBIENT] = imp__spec((*wo)[2] > 0);
+    de[DIFFUSE] = imp__spec(0);
+}
+
+const struct imp_bsdf_ops imp__stam_m3 = {
+    .size = sizeof(struct imp_bsdf_ops), .name = "stam_m3", .inputs = inputs, .build = build,
+    .sample = sample, .eval = eval, .pdf = pdf, .eval_d = eval_d,
+    .emit = emit, .emit_d = emit_d};

@@ -1,0 +1,248 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * eval_d and emit_d of every material against central differences of eval and emit, at
+ * random inputs and at inputs that are exactly 0 (one-sided there); a density wherever there
+ * is a derivative; sample_d against differences at fixed random numbers; and the checker
+ * itself against planted mistakes. */
+#include "imp_kinds.h"
+#include "imp_tap.h"
+
+enum { TRIALS = 60 };
+
+typedef void value_fn(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
+                      imp_spec *f);
+
+static void emit_value(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
+                       imp_spec *f)
+{
+    b->ops->emit(b, in, &d->wo, f);
+}
+static void eval_value(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
+                       imp_spec *f)
+{
+    b->ops->eval(b, in, d, f);
+}
+
+/* Fourth-order differences of lane c, central where there is room and one-sided at a bound,
+ * with steps `scale` times the usual. The base value is taken off first, so that what does
+ * not move gives exactly 0. */
+static double difference(const struct imp_bsdf *b, imp_spec *in, const struct imp_dirs *d,
+                         int j, int c, value_fn *value, double scale, bool *lanes_mixed)
+{
+    static const double central[4][2] = {{-2, 1.0 / 12}, {-1, -8.0 / 12}, {1, 8.0 / 12},
+                                         {2, -1.0 / 12}};
+    static const double forward[4][2] = {{1, 4}, {2, -3}, {3, 4.0 / 3}, {4, -0.25}};
+    const struct imp_input_desc *desc = kind_input(b, j);
+    const bool scalar = desc->flags & IMP_INPUT_SCALAR;
+    const imp_spec x = in[j];
+    double lo, hi;
+    kind_bounds(desc, &lo, &hi);
+    const double h = scale * 4e-5 * fmax(fabs(x[c]), 0.02);
+    const bool room_lo = x[c] - 2 * h >= lo, two = room_lo && x[c] + 2 * h <= hi;
+    const double sign = room_lo && !two ? -1 : 1;
+    imp_spec sum = imp__spec(0), f0, f;
+    value(b, in, d, &f0);
+    for (int k = 0; k < 4; k++) {
+        const double step = two ? central[k][0] : sign * forward[k][0];
+        const double weight = two ? central[k][1] : sign * forward[k][1];
+        if (scalar) in[j] = x + step * h;
+        else in[j][c] = x[c] + step * h;
+        value(b, in, d, &f);
+        in[j] = x;
+        sum += (f - f0) * (weight / h);
+    }
+    for (int o = 0; o < 3; o++)
+        if (o != c && !scalar && sum[o] != 0) *lanes_mixed = true;
+    return sum[c];
+}
+
+struct tally {
+    double value, emission;   /* largest relative errors */
+    long points, nonzero, no_density, numbers, kinks;
+    bool lanes_mixed;
+};
+
+/* Largest error of the derivatives at one point, relative to the derivative and to what
+ * rounding of f allows a difference to see. Two steps that disagree mean that the value is
+ * not smooth there (the fit of Beckmann's masking has a step): such points are counted, not
+ * compared. A wrong derivative does not hide there: it has two steps that agree. */
+static double point_error(const struct imp_bsdf *b, imp_spec *in, const struct imp_dirs *d,
+                          value_fn *value, const imp_spec *df, struct tally *t)
+{
+    imp_spec f;
+    double worst = 0;
+    value(b, in, d, &f);
+    for (int j = 0; j < b->n_in; j++)
+        for (int c = 0; c < 3; c++) {
+            const double scale = fabs(df[j][c]) + 1e-5 * fabs(f[c]) / fmax(fabs(in[j][c]), 0.02);
+            const double fd = difference(b, in, d, j, c, value, 1, &t->lanes_mixed);
+            const double e = fabs(fd - df[j][c]);
+            t->numbers++;
+            if (e <= 1e-280) continue;
+            if (e > 1e-6 * scale) {
+                const double finer = difference(b, in, d, j, c, value, 0.25, &t->lanes_mixed);
+                if (fabs(fd - finer) > 0.2 * e) {
+                    t->kinks++;
+                    continue;
+                }
+            }
+            worst = fmax(worst, isfinite(e) ? e / scale : INFINITY);
+        }
+    return worst;
+}
+
+static struct tally check_case(const struct imp_bsdf *b, enum kind_set set)
+{
+    struct tally t = {0};
+    imp_spec in[KINDS_MAX_INPUTS], df[KINDS_MAX_INPUTS];
+    for (int i = 0; i < TRIALS; i++) {
+        kind_inputs(b, set, 1000 + (uint64_t)i, in);
+        struct imp_dirs d = {kind_direction(i, 5), {0}, IMP_SMOOTH};
+        struct imp_bsdf_sample s;
+        const struct imp_key key = imp__key(9, (uint64_t)i, 0);
+        const double u[3] = {imp__u01(key, 0), imp__u01(key, 1), imp__u01(key, 2)};
+        /* Directions that are drawn (every delta lobe is met), and any. */
+        if (i % 3 == 0)
+            d.wi = kind_direction(i / 3 + (i % 2), 6);
+        else if (!b->ops->sample(b, in, u, &d, &s))
+            continue;
+        b->ops->eval_d(b, in, &d, df);
+        t.value = fmax(t.value, point_error(b, in, &d, eval_value, df, &t));
+        t.points++;
+        double size = 0;
+        for (int j = 0; j < b->n_in; j++) size = fmax(size, imp__max3(df[j] * df[j]));
+        if (size > 0) t.nonzero++;
+        if (size > 1e-200 && !(b->ops->pdf(b, in, &d) > 0)) t.no_density++;
+        if (b->flags & IMP_BSDF_EMIT) {
+            b->ops->emit_d(b, in, &d.wo, df);
+            t.emission = fmax(t.emission, point_error(b, in, &d, emit_value, df, &t));
+        }
+    }
+    return t;
+}
+
+static void visit(const struct kind_case *c, void *payload)
+{
+    static const char *const names[] = {"fallback", "random", "wide", "lowest"};
+    const struct imp_bsdf *b = &c->bsdf;
+    (void)payload;
+    for (int set = 0; set <= KIND_LOWEST; set++) {
+        const struct tally t = check_case(b, (enum kind_set)set);
+        tap_ok(t.value < 1e-6 && t.emission < 1e-6 && t.kinks * 50 <= t.numbers,
+               "%s: derivatives, %s inputs # %.1e %.1e, %ld of %ld at kinks", c->label,
+               names[set], t.value, t.emission, t.kinks, t.numbers);
+        tap_ok(!t.lanes_mixed, "%s: lanes stay apart, %s inputs", c->label, names[set]);
+        tap_ok(t.no_density == 0 && (t.nonzero > t.points / 8 || !b->n_in),
+               "%s: a density wherever a derivative is, %s # %ld of %ld points", c->label,
+               names[set], t.nonzero, t.points);
+    }
+    tap_ok((b->ops->emit != NULL) == (b->ops->emit_d != NULL), "%s: emit and emit_d", c->label);
+}
+
+/* ---- sample_d ------------------------------------------------------------------------ */
+
+static bool weight_at(const struct imp_bsdf *b, imp_spec *in, int j, double x,
+                      const double u[3], imp_v3 wo, imp_spec *w, imp_v3 *wi)
+{
+    struct imp_dirs d = {wo, {0}, IMP_SMOOTH};
+    struct imp_bsdf_sample s;
+    const imp_spec old = in[j];
+    in[j] = imp__spec(x);
+    const bool ok = b->ops->sample(b, in, u, &d, &s);
+    in[j] = old;
+    *w = s.f / s.pdf;
+    *wi = d.wi;
+    return ok;
+}
+
+static void visit_attached(const struct kind_case *c, void *payload)
+{
+    const struct imp_bsdf *b = &c->bsdf;
+    int *offered = payload;
+    imp_spec in[KINDS_MAX_INPUTS];
+    double worst = 0;
+    int n = 0;
+    if (!b->ops->sample_d) return;
+    for (int i = 0; i < 300; i++) {
+        kind_inputs(b, KIND_RANDOM, 40 + (uint64_t)i, in);
+        const struct imp_key key = imp__key(11, (uint64_t)i, 0);
+        const double u[3] = {imp__u01(key, 0), imp__u01(key, 1), imp__u01(key, 2)};
+        struct imp_dirs d = {kind_direction(i, 12), {0}, IMP_SMOOTH};
+        struct imp_bsdf_sample s;
+        if (!b->ops->sample(b, in, u, &d, &s)) continue;
+        for (int j = 0; j < b->n_in; j++) {
+            imp_spec dw, wp, wm;
+            imp_v3 dwi, ip, im;
+            if (!b->ops->sample_d(b, in, u, &d, j, &dw, &dwi)) continue;
+            const double x = in[j][0], h = 1e-5 * x;
+            if (!weight_at(b, in, j, x + h, u, d.wo, &wp, &ip) ||
+                !weight_at(b, in, j, x - h, u, d.wo, &wm, &im))
+                continue;
+            /* The kink of min(1, cos_i/cos_o) is not differentiable: step over it. */
+            if ((ip[2] < fabs(d.wo[2])) != (im[2] < fabs(d.wo[2]))) continue;
+            n++;
+            const imp_spec fw = (wp - wm) / (2 * h) - dw;
+            const imp_v3 fi = (ip - im) / (2 * h) - dwi;
+            for (int k = 0; k < 3; k++) {
+                worst = fmax(worst, fabs(fw[k]) / (fabs(dw[k]) + 1e-2 * (wp[k] + 1e-3) / x));
+                worst = fmax(worst, fabs(fi[k]) / (imp__length(dwi) + 1e-2 / x));
+            }
+        }
+    }
+    *offered += n > 0;
+    if (n)
+        tap_ok(worst < 1e-6, "%s: attached derivative, %d draws # %.1e", c->label, n, worst);
+}
+
+/* ---- The checker, checked ------------------------------------------------------------- */
+
+static const struct imp_bsdf_ops *honest;
+static int mistake;
+static void planted(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
+                    imp_spec *df)
+{
+    honest->eval_d(b, in, d, df);
+    const imp_spec first = df[0];
+    switch (mistake) {
+    case 0: df[0] = -df[0]; break;                               /* sign */
+    case 1: df[0] = df[0] * 2.0; break;                          /* factor */
+    case 2: df[0] = df[b->n_in - 1]; df[b->n_in - 1] = first; break; /* index */
+    case 3: df[b->n_in - 1] = df[b->n_in - 1] * (1 + 1e-5); break;   /* small */
+    case 4: df[0] = (imp_spec){first[1], first[0], first[2], 0}; break; /* lanes */
+    }
+}
+static void visit_planted(const struct kind_case *c, void *payload)
+{
+    static const char *const names[] = {"sign", "factor 2", "another index", "1e-5 off",
+                                        "lanes swapped"};
+    (void)payload;
+    if (strcmp(c->label, "stam_m2 variant=reciprocal sampling=cosine absorb=0.3") != 0 &&
+        strcmp(c->label, "roughconductor distribution=ggx alpha_u=0.4 alpha_v=0.1") != 0)
+        return;
+    struct imp_bsdf_ops ops = *c->bsdf.ops;
+    struct imp_bsdf b = c->bsdf;
+    const bool m2 = strcmp(c->kind, "stam_m2") == 0;
+    honest = c->bsdf.ops;
+    ops.eval_d = planted;
+    b.ops = &ops;
+    for (mistake = 0; mistake < 5; mistake++) {
+        if (m2 && (mistake < 2 || mistake == 4)) continue; /* input 0 is emission: eval_d 0 */
+        const struct tally t = check_case(&b, KIND_RANDOM);
+        tap_ok(t.value > 1e-6, "%s: a planted mistake (%s) is caught # %.1e", c->kind,
+               names[mistake], t.value);
+    }
+}
+
+int main(void)
+{
+    struct kind_factory f;
+    int attached = 0;
+    if (!kinds_open(&f)) return 1;
+    const int n = kinds_visit(&f, visit, NULL);
+    tap_ok(n > 20, "%d materials were visited", n);
+    kinds_visit(&f, visit_attached, &attached);
+    tap_ok(attached > 0, "sample_d is offered by %d", attached);
+    kinds_visit(&f, visit_planted, NULL);
+    kinds_close(&f);
+    return tap_done();
+}

@@ -1,0 +1,221 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Every material, ready to be tested. kinds_visit calls back with one instance of every kind
+ * of the registry: in its default configuration, in the configurations listed below, and,
+ * for kinds with children, around every other kind. Inputs are drawn from what each kind
+ * declares, so a new kind is tested by existing; it adds a line here only for properties
+ * that are not inputs.
+ */
+#ifndef IMP_KINDS_H
+#define IMP_KINDS_H
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "kind/build.h"
+#include "math/rng.h"
+#include "math/warp.h"
+
+/* Properties "name=text": a number, true, false, or a word. */
+static const struct { const char *kind, *props[6]; } kind_configs[] = {
+    {"dielectric", {"int_ior=1.5", "ext_ior=1.0"}},
+    {"dielectric", {"int_ior=air", "ext_ior=diamond"}},
+    {"conductor", {"material=Au"}},
+    {"roughconductor", {"distribution=beckmann", "alpha=0.3"}},
+    {"roughconductor", {"distribution=ggx", "alpha=0.3", "material=Cu"}},
+    {"roughconductor", {"distribution=beckmann", "alpha_u=0.1", "alpha_v=0.4"}},
+    {"roughconductor", {"distribution=ggx", "alpha_u=0.4", "alpha_v=0.1"}},
+    {"roughconductor", {"distribution=beckmann", "alpha_u=0.1", "alpha_v=0.4",
+                        "sample_visible=false"}},
+    {"roughconductor", {"distribution=ggx", "alpha=0.3", "sample_visible=false"}},
+    {"stam_m2", {"variant=reciprocal", "sampling=cosine", "absorb=0.3"}},
+    {"stam_m2", {"variant=microfacet", "sampling=phong"}},
+    {"stam_m2", {"variant=microfacet", "sampling=mixture"}},
+    {"stam_m2", {"variant=paper", "sampling=mixture"}},
+    {"stam_m2", {"variant=paper", "sampling=phong"}},
+};
+
+#define KINDS_MAX_INPUTS 24
+
+struct kind_case {
+    char label[128];
+    const char *kind;
+    const char *const *props;   /* of its configuration, NULL-terminated, or NULL */
+    struct imp_bsdf bsdf, child[2];
+};
+
+struct kind_factory {
+    imp_context *ctx;
+    struct imp_arena arena;
+};
+
+static bool kind_make(struct kind_factory *f, const struct imp_bsdf_ops *ops,
+                      const char *const *props, int n_props, const struct imp_bsdf *child,
+                      int n_child, struct imp_bsdf *out)
+{
+    struct imp_node *node = imp__node_create(&f->arena, "bsdf", ops->name, NULL, NULL,
+                                             (struct imp_loc){0});
+    for (int i = 0; i < n_props && props[i]; i++) {
+        char name[64];
+        const char *eq = strchr(props[i], '=');
+        snprintf(name, sizeof name, "%.*s", (int)(eq - props[i]), props[i]);
+        char *end;
+        const double number = strtod(eq + 1, &end);
+        const bool truth = strcmp(eq + 1, "true") == 0, lie = strcmp(eq + 1, "false") == 0;
+        struct imp_prop *p = imp__node_add(&f->arena, node, name,
+                                           !*end ? IMP_PROP_FLOAT : truth || lie ? IMP_PROP_BOOL
+                                                                                 : IMP_PROP_STRING,
+                                           (struct imp_loc){0});
+        p->number[0] = number;
+        p->integer = truth;
+        p->string = eq + 1;
+    }
+    void *self = imp__arena_array(&f->arena, 1, ops->object_size + 1);
+    *out = (struct imp_bsdf){.ops = ops, .self = self, .flags = IMP_BSDF_SMOOTH, .index = 0,
+                             .name = ops->name};
+    while (ops->inputs[out->n_own].name) out->n_own++;
+    out->n_in = out->n_own;
+    for (int k = 0; k < n_child; k++) {
+        out->child[k] = &child[k];
+        out->child_in[k] = out->n_in;
+        out->n_in += child[k].n_in;
+    }
+    out->n_child = n_child;
+    const struct imp_build b = {.ctx = f->ctx, .node = node, .arena = &f->arena};
+    if (ops->prepare && ops->prepare(&b) != IMP_OK) return false;
+    return !ops->build || ops->build(&b, self, out) == IMP_OK;
+}
+
+/* Description of input j, children's inputs included. */
+static inline const struct imp_input_desc *kind_input(const struct imp_bsdf *b, int j)
+{
+    if (j < b->n_own) return &b->ops->inputs[j];
+    for (int k = b->n_child - 1; k >= 0; k--)
+        if (j >= b->child_in[k]) return kind_input(b->child[k], j - b->child_in[k]);
+    return NULL;
+}
+static inline void kind_bounds(const struct imp_input_desc *d, double *lo, double *hi)
+{
+    *lo = d->lo;
+    *hi = d->lo == 0 && d->hi == 0 ? INFINITY : d->hi;
+}
+
+enum kind_set {
+    KIND_FALLBACK,  /* what the kind declares */
+    KIND_RANDOM,    /* near it, another value in every lane */
+    KIND_WIDE,      /* far around it */
+    KIND_LOWEST     /* every input at its lower bound: zeros */
+};
+static inline void kind_inputs(const struct imp_bsdf *b, enum kind_set set, uint64_t seed,
+                               imp_spec *in)
+{
+    const struct imp_key key = imp__key(seed, (uint64_t)set, 0);
+    for (int j = 0; j < b->n_in; j++) {
+        const struct imp_input_desc *d = kind_input(b, j);
+        double lo, hi;
+        kind_bounds(d, &lo, &hi);
+        in[j] = imp__spec(0);
+        for (int c = 0; c < 3; c++) {
+            const double u = imp__u01(key, (uint32_t)(4 * j + (d->flags & IMP_INPUT_SCALAR ? 0 : c)));
+            double v = d->fallback;
+            if (set == KIND_LOWEST) v = lo;
+            else if (set == KIND_FALLBACK) v = d->fallback;
+            else if (isfinite(hi)) v = lo + u * (hi - lo);
+            else if (d->fallback > 0) v = d->fallback * exp2(set == KIND_WIDE ? 7 * u - 3.5 : 3 * u - 1.5);
+            else v = lo + 3 * u;
+            in[j][c] = imp_clamp(v, lo, hi);
+        }
+        in[j][3] = d->flags & IMP_INPUT_SCALAR ? in[j][0] : NAN; /* nobody may read it */
+    }
+}
+
+static inline bool kind_has_config(const struct kind_case *c, const char *prop)
+{
+    for (int i = 0; c->props && i < 6 && c->props[i]; i++)
+        if (strcmp(c->props[i], prop) == 0) return true;
+    return false;
+}
+
+static inline int kinds_visit(struct kind_factory *f,
+                              void (*visit)(const struct kind_case *c, void *payload),
+                              void *payload)
+{
+    int visited = 0;
+    for (int k = 0; imp__bsdf_kinds[k]; k++) {
+        const struct imp_bsdf_ops *ops = imp__bsdf_kinds[k];
+        struct kind_case c = {.kind = ops->name};
+        if (ops->min_children == 0) {
+            snprintf(c.label, sizeof c.label, "%s", ops->name);
+            if (!kind_make(f, ops, NULL, 0, NULL, 0, &c.bsdf)) {
+                fprintf(stderr, "%s\n", imp_last_error(f->ctx));
+                return -1;
+            }
+            visit(&c, payload);
+            visited++;
+        }
+        for (size_t i = 0; i < imp_count(kind_configs); i++) {
+            if (strcmp(kind_configs[i].kind, ops->name) != 0) continue;
+            c.props = kind_configs[i].props;
+            int n = snprintf(c.label, sizeof c.label, "%s", ops->name);
+            for (int j = 0; j < 6 && c.props[j]; j++)
+                n += snprintf(c.label + n, sizeof c.label - (size_t)n, " %s", c.props[j]);
+            if (!kind_make(f, ops, c.props, 6, NULL, 0, &c.bsdf)) {
+                fprintf(stderr, "%s\n", imp_last_error(f->ctx));
+                return -1;
+            }
+            visit(&c, payload);
+            visited++;
+        }
+        c.props = NULL;
+        for (int i = 0; ops->max_children && imp__bsdf_kinds[i]; i++) {
+            const struct imp_bsdf_ops *front = imp__bsdf_kinds[i];
+            const char *allow[] = {"allow_transmission=true", NULL};
+            if (front->max_children) continue;
+            const int n = imp_min(ops->max_children, 1 + i % 2); /* one and two in turn */
+            if (n < ops->min_children) continue;
+            const struct imp_bsdf_ops *back = imp__bsdf_kinds[0];
+            for (int b = 0; imp__bsdf_kinds[b]; b++)
+                if (strcmp(imp__bsdf_kinds[b]->name, "diffuse") == 0) back = imp__bsdf_kinds[b];
+            if (!kind_make(f, front, NULL, 0, NULL, 0, &c.child[0]) ||
+                !kind_make(f, back, NULL, 0, NULL, 0, &c.child[1]))
+                return -1;
+            const bool transmits = c.child[0].flags & IMP_BSDF_TRANSMIT;
+            snprintf(c.label, sizeof c.label, "%s(%s%s%s)", ops->name, front->name,
+                     n > 1 ? ", " : "", n > 1 ? back->name : "");
+            if (!kind_make(f, ops, allow, transmits, c.child, n, &c.bsdf)) return -1;
+            visit(&c, payload);
+            visited++;
+        }
+    }
+    return visited;
+}
+
+static inline bool kinds_open(struct kind_factory *f)
+{
+    const struct imp_context_options options = {.size = sizeof options, .threads = 1};
+    if (imp_context_create(&options, &f->ctx) != IMP_OK) return false;
+    imp__arena_init(&f->arena, f->ctx);
+    return true;
+}
+static inline void kinds_close(struct kind_factory *f)
+{
+    imp__arena_free(&f->arena);
+    imp_context_destroy(f->ctx);
+}
+
+/* A direction away from the horizon, above it for even i. */
+static inline imp_v3 kind_direction(int i, uint64_t seed)
+{
+    const struct imp_key key = imp__key(seed, 77, (uint64_t)i);
+    imp_v3 w;
+    uint32_t dim = 0;
+    do {
+        const double u[2] = {imp__u01(key, dim), imp__u01(key, dim + 1)};
+        w = imp__uniform_sphere(u);
+        dim += 2;
+    } while (fabs(w[2]) < 0.02);
+    w[2] = i % 2 ? -fabs(w[2]) : fabs(w[2]);
+    return w;
+}
+
+#endif
