@@ -150,6 +150,7 @@ static enum imp_status param_add(struct imp_scene *scene, const char *name, cons
     struct imp_param p = {.store = IMP_STORE_LANES, .lanes = &in->value};
     p.info.name = name_join(scene, name, path);
     if (!p.info.name) return no_memory(scene);
+    in->count = count;
     p.info.unit = d->unit ? d->unit : "1";
     p.info.n_dims = count > 1;
     p.info.dims[0] = (size_t)count;
@@ -208,6 +209,7 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
     } else {
         imp__color_default(d->fallback, scalar ? IMP_REFLECTANCE : d->role, scene->mode,
                            &in->value, &count);
+        in->count = count;
         if (d->flags & IMP_INPUT_OPTIONAL) return IMP_OK;
     }
     for (int k = 0; k < count; k++) {
@@ -263,6 +265,8 @@ static enum imp_status bsdf_build(struct imp_scene *scene, struct imp_node *node
                            .name = object_name(scene, node, parent, slot)};
     if (!b->name) IMP_TRY(no_memory(scene));
 
+    const struct imp_build build = build_make(scene, node);
+    if (ops->prepare) IMP_TRY(ops->prepare(&build));
     int n_own = 0;
     while (ops->inputs && ops->inputs[n_own].name) n_own++;
     const struct imp_input **own = imp__arena_array(&scene->arena, (size_t)n_own + 1, sizeof *own);
@@ -298,7 +302,6 @@ static enum imp_status bsdf_build(struct imp_scene *scene, struct imp_node *node
             memcpy(b->input + b->child_in[k], b->child[k]->input,
                    (size_t)b->child[k]->n_in * sizeof *b->input);
 
-    const struct imp_build build = build_make(scene, node);
     if (ops->build) IMP_TRY(ops->build(&build, self, b));
     IMP_TRY(imp__props_finish(ctx, node));
     b->index = scene->n_bsdfs;
