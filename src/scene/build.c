@@ -163,17 +163,6 @@ static enum imp_status param_add(struct imp_scene *scene, const char *name, cons
     return imp__theta_add(scene, &p, &in->param);
 }
 
-/* Is this child an object that stands for a colour? */
-static bool is_color_object(const struct imp_node *node)
-{
-    static const char *const types[] = {"uniform", "srgb", "rawconstant", "d65", "regular",
-                                        "irregular", "blackbody"};
-    if (strcmp(node->tag, "spectrum") == 0) return true;
-    for (size_t i = 0; i < imp_count(types); i++)
-        if (strcmp(types[i], node->type) == 0) return true;
-    return false;
-}
-
 static enum imp_status input_build(struct imp_scene *scene, struct imp_node *node,
                                    const char *name, const struct imp_input_desc *d,
                                    struct imp_input *in)
@@ -183,6 +172,7 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
     const bool scalar = d->flags & IMP_INPUT_SCALAR;
     struct imp_prop *prop = imp__node_prop(node, d->name);
     struct imp_child *child = imp__node_child(node, d->name);
+    const char *key = "value";
     int count = 1;
     *in = (struct imp_input){.param = -1, .scalar = scalar};
 
@@ -190,8 +180,7 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
         prop->used = true;
         IMP_TRY(imp__color_convert(ctx, node, prop, d->role, scalar, scene->mode, &in->value,
                                    &count));
-    } else if (child && is_color_object(child->node)) {
-        const char *key = "value";
+    } else if (child && imp__color_is_object(child->node)) {
         child->used = true;
         IMP_TRY(imp__color_object(ctx, child->node, d->role, scalar, scene->mode, &in->value,
                                   &count, &key));
@@ -212,13 +201,14 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
         in->count = count;
         if (d->flags & IMP_INPUT_OPTIONAL) return IMP_OK;
     }
+    in->count = count;
     for (int k = 0; k < count; k++) {
         const double v = in->value[k], hi = d->lo == 0 && d->hi == 0 ? INFINITY : d->hi;
         if (!isfinite(v) || v < d->lo || v > hi)
             IMP_TRY(imp__prop_error(ctx, node, prop, IMP_E_SCENE, "%s = %g is outside [%g, %g]",
                                     d->name, v, d->lo, hi));
     }
-    IMP_TRY(param_add(scene, name, "value", d, in, count));
+    IMP_TRY(param_add(scene, name, key, d, in, count));
 out:
     return st;
 }
@@ -322,7 +312,7 @@ static enum imp_status black_build(struct imp_scene *scene, struct imp_bsdf **ou
     struct imp_bsdf *b = imp__arena_array(&scene->arena, 1, sizeof *b);
     struct imp_input *in = imp__arena_array(&scene->arena, 1, sizeof *in);
     if (!b || !in || !ops) return no_memory(scene);
-    *in = (struct imp_input){.param = -1};
+    *in = (struct imp_input){.param = -1, .count = 1};
     *b = (struct imp_bsdf){.ops = ops, .n_own = 1, .n_in = 1, .index = -1, .name = "",
                            .self = imp__arena_array(&scene->arena, 1, ops->object_size + 1),
                            .input = imp__arena_array(&scene->arena, 1, sizeof *b->input)};
@@ -525,7 +515,7 @@ static enum imp_status top_build(struct imp_scene *scene, struct imp_child *chil
         IMP_TRY(bsdf_build(scene, node, "", "", &b));
     } else if (strcmp(tag, "texture") == 0 || strcmp(tag, "spectrum") == 0) {
         struct imp_texture *t;
-        if (strcmp(tag, "texture") == 0 && !is_color_object(node)) {
+        if (strcmp(tag, "texture") == 0 && !imp__color_is_object(node)) {
             node->id = name;
             IMP_TRY(texture_build(scene, node, "", "", &t));
         }
