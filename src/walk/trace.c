@@ -174,8 +174,11 @@ static bool throughput_add(struct step *s, const struct imp_bsdf *b, imp_spec fa
 static bool roulette(struct step *s, struct imp_vertex *v)
 {
     const struct imp_integrator *integrator = s->tracer->integrator;
-    if (integrator->kind == IMP_INTEGRATOR_STAM || s->depth + 1 < integrator->rr_depth)
+    if (integrator->kind == IMP_INTEGRATOR_STAM) { /* `absorb` has drawn already */
+        v->survive = 1 - v->bsdf->absorb;
         return true;
+    }
+    if (s->depth + 1 < integrator->rr_depth) return true;
     const double q = fmin(imp__max3(s->beta) * s->eta * s->eta, 0.95);
     v->survive = q;
     return imp__u01(s->walk->key, imp__dim(s->depth, IMP_DIM_SURVIVE)) < q;
