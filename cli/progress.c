@@ -23,6 +23,7 @@ void progress_init(enum progress_mode mode)
     const struct sigaction action = {.sa_handler = on_interrupt, .sa_flags = SA_RESETHAND};
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
+    signal(SIGXFSZ, SIG_IGN); /* over a size limit writes fail, as on a full disk */
     show = mode == PROGRESS_ALWAYS || (mode == PROGRESS_AUTO && isatty(STDERR_FILENO));
 }
 int progress_interrupted(void) { return interrupted; }

@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: Apache-2.0
+# The ball's reflectance comes back, and its interval holds the truth.
+scene=$ROOT/scenes/furnace.xml
+importon render "$scene" -D res=8 --spp 1024 -q --seed 1 --se -o t.exr || exit 9
+importon fit "$scene" -D res=8 --spp 32 -q --target t.exr --set ball.reflectance.value=0.8 \
+    -p 'ball.*' --optimizer lm --json -o result >answer.json || exit 9
+ls result
+python3 - <<'END'
+import json
+a = json.load(open("answer.json"))
+assert json.load(open("result/parameters.json"))["params"] == a["params"]
+(p,) = a["params"]
+assert p["start"] == 0.8 and abs(p["value"] - 0.5) < 0.01, p
+assert p["lo95"] < p["value"] < p["hi95"] and abs(p["value"] - 0.5) < 5 * p["se"], p
+END
