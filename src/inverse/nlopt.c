@@ -13,7 +13,7 @@
 #define RECORD_MAX 200000 /* most variables whose evaluations are kept */
 #define SLSQP_MAX 1000    /* it is O(n^3) per step */
 
-enum { RECORD, START };   /* arrays: rows of (f, se, g[n]); [n] */
+enum { RECORD };          /* arrays: rows of (f, se, g[n]) */
 enum { BEST };            /* scalars */
 
 struct call {
@@ -29,17 +29,13 @@ struct call {
 static enum imp_status init(const struct imp__goal *goal, const struct imp__opt_options *options,
                             struct imp__search *s)
 {
-    enum imp_status st = IMP_OK;
     (void)options;
     if (s->kind == IMP_SLSQP && goal->n > SLSQP_MAX)
-        IMP_TRY(imp__error(goal->ctx, IMP_E_ARG,
-                           "SLSQP is for at most %d variables, here are %zu: use Adam, MMA or "
-                           "L-BFGS", SLSQP_MAX, goal->n));
-    IMP_TRY(imp__search_array(s, START, goal->n));
-    for (size_t k = 0; k < goal->n; k++) s->array[START][k] = s->x[k];
+        return imp__error(goal->ctx, IMP_E_ARG,
+                          "SLSQP is for at most %d variables, here are %zu: use Adam, MMA or "
+                          "L-BFGS", SLSQP_MAX, goal->n);
     s->scalar[BEST] = INFINITY;
-out:
-    return st;
+    return IMP_OK;
 }
 
 static enum imp_status evaluate(struct call *c, struct imp_estimate *f)
@@ -112,7 +108,7 @@ static enum imp_status run(const struct imp__goal *goal, const struct imp__opt_o
         IMP_TRY(imp__error(goal->ctx, IMP_E_NOMEM, "no memory for %zu variables", n));
     const bool replay = s->array_n[RECORD] > 0 || s->iteration == 0;
     for (size_t k = 0; k < n; k++) {
-        y[k] = (replay ? s->array[START] : s->x)[k] / goal->scale[k];
+        y[k] = (replay ? s->start : s->x)[k] / goal->scale[k];
         lo[k] = goal->lo[k] / goal->scale[k];
         hi[k] = goal->hi[k] / goal->scale[k];
         y[k] = imp_clamp(y[k], lo[k], hi[k]);

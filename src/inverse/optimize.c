@@ -31,8 +31,11 @@ enum imp_status imp__search_create(const struct imp__goal *goal, enum imp_optimi
     s->kind = kind;
     s->n = goal->n;
     s->x = imp__alloc(ctx, imp_max(goal->n, (size_t)1), sizeof *s->x);
-    if (!s->x) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for %zu variables", goal->n));
-    for (size_t k = 0; k < goal->n; k++) s->x[k] = imp__into_bounds(goal, k, x0[k]);
+    s->start = imp__alloc(ctx, imp_max(goal->n, (size_t)1), sizeof *s->start);
+    if (!s->x || !s->start)
+        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for %zu variables", goal->n));
+    for (size_t k = 0; k < goal->n; k++)
+        s->start[k] = s->x[k] = imp__into_bounds(goal, k, x0[k]);
     IMP_TRY(kind_of(kind)->init(goal, options, s));
     *out = s;
     return IMP_OK;
@@ -47,6 +50,7 @@ void imp__search_destroy(struct imp__search *s)
     for (int k = 0; k < IMP_SEARCH_ARRAYS; k++) imp__release(s->ctx, s->array[k]);
     imp__release(s->ctx, s->history);
     imp__release(s->ctx, s->history_se);
+    imp__release(s->ctx, s->start);
     imp__release(s->ctx, s->x);
     imp__release(s->ctx, s);
 }

@@ -63,6 +63,7 @@ struct imp__search {
     int iteration;           /* completed */
     bool finished;           /* converged: more iterations would change nothing */
     const char *reason;      /* why it stopped, a constant string */
+    double *start;           /* [n] where it began */
     double *x;               /* [n] the best estimate so far, inside the bounds */
     size_t n_history, cap_history, cap_history_se;
     double *history, *history_se;

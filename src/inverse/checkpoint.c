@@ -1,0 +1,244 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "checkpoint.h"
+#include "math/rng.h"
+#include <errno.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+#define MAGIC "importon checkpoint 1\n"
+
+uint64_t imp__hash(uint64_t h, const void *bytes, size_t n)
+{
+    const unsigned char *b = bytes;
+    for (; n >= 8; n -= 8, b += 8) {
+        uint64_t word;
+        memcpy(&word, b, 8);
+        h = imp__mix64(h ^ word) + 0x9e3779b97f4a7c15u;
+    }
+    for (; n > 0; n--, b++) h = imp__mix64(h ^ *b) + 0x9e3779b97f4a7c15u;
+    return h;
+}
+
+/* ---- Writing ------------------------------------------------------------------------------ */
+
+struct sink {
+    FILE *f;
+    uint64_t hash;  /* of all numbers, against damage */
+};
+
+static void put_array(struct sink *s, const char *name, const double *v, size_t n)
+{
+    static const char digit[] = "0123456789abcdef";
+    fprintf(s->f, "%s %zu\n", name, n);
+    for (size_t i = 0; i < n; i++) {
+        char text[17];
+        uint64_t bits;
+        memcpy(&bits, &v[i], 8);
+        for (int k = 0; k < 16; k++) text[k] = digit[(bits >> (60 - 4 * k)) & 15];
+        text[16] = '\n';
+        fwrite(text, 1, sizeof text, s->f);
+    }
+    s->hash = imp__hash(s->hash, v, n * sizeof *v);
+}
+
+enum imp_status imp__checkpoint_write(imp_context *ctx, const char *path,
+                                      const struct imp__fingerprint *of,
+                                      const struct imp__search *search)
+{
+    enum imp_status st = IMP_OK;
+    struct sink s = {0};
+    char name[16];
+    const size_t length = strlen(path) + sizeof ".part";
+    char *part = imp__alloc(ctx, length, 1);
+
+    if (!part) return imp__error(ctx, IMP_E_NOMEM, "no memory for a file name");
+    snprintf(part, length, "%s.part", path);
+    s.f = fopen(part, "wb");
+    if (!s.f) IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: %s", part, strerror(errno)));
+    fprintf(s.f, MAGIC "optimizer %d\nvariables %zu\n", (int)search->kind, search->n);
+    fprintf(s.f, "of %016llx %016llx %016llx %016llx\n", (unsigned long long)of->parameters,
+            (unsigned long long)of->scene, (unsigned long long)of->targets,
+            (unsigned long long)of->options);
+    fprintf(s.f, "iteration %d\nfinished %d\n", search->iteration, (int)search->finished);
+    put_array(&s, "start", search->start, search->n);
+    put_array(&s, "x", search->x, search->n);
+    put_array(&s, "history", search->history, search->n_history);
+    put_array(&s, "history_se", search->history_se, search->n_history);
+    put_array(&s, "scalars", search->scalar, IMP_SEARCH_SCALARS);
+    for (int k = 0; k < IMP_SEARCH_ARRAYS; k++) {
+        snprintf(name, sizeof name, "array%d", k);
+        put_array(&s, name, search->array[k], search->array_n[k]);
+    }
+    fprintf(s.f, "end %016llx\n", (unsigned long long)s.hash);
+    const bool whole = fflush(s.f) == 0 && !ferror(s.f) && fsync(fileno(s.f)) == 0;
+    const int why = errno;
+    const bool closed = fclose(s.f) == 0;
+    s.f = NULL;
+    if (!whole || !closed)
+        IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: %s", part, strerror(whole ? errno : why)));
+    if (rename(part, path) != 0)
+        IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: %s", path, strerror(errno)));
+out:
+    if (s.f) fclose(s.f);
+    if (st != IMP_OK) remove(part);
+    imp__release(ctx, part);
+    return st;
+}
+
+/* ---- Reading ------------------------------------------------------------------------------ */
+
+struct source {
+    FILE *f;
+    imp_context *ctx;
+    const char *path;
+    size_t max;     /* numbers the file has room for */
+    uint64_t hash;
+};
+
+static enum imp_status damaged(const struct source *s, const char *what)
+{
+    return imp__error(s->ctx, IMP_E_IO, "%s: damaged checkpoint (%s)", s->path, what);
+}
+
+/* "name count" with a count that fits the file. */
+static enum imp_status get_head(struct source *s, const char *name, size_t *n)
+{
+    char line[64], word[32];
+    unsigned long long count;
+    if (!fgets(line, sizeof line, s->f) || sscanf(line, "%31s %llu", word, &count) != 2
+        || strcmp(word, name) != 0 || count > s->max)
+        return damaged(s, name);
+    *n = (size_t)count;
+    return IMP_OK;
+}
+
+static enum imp_status get_numbers(struct source *s, const char *name, double *v, size_t n)
+{
+    for (size_t i = 0; i < n; i++) {
+        char text[17];
+        uint64_t bits = 0;
+        if (fread(text, 1, 17, s->f) != 17 || text[16] != '\n') return damaged(s, name);
+        for (int k = 0; k < 16; k++) {
+            const char c = text[k];
+            const int d = c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
+            if (d < 0) return damaged(s, name);
+            bits = bits << 4 | (uint64_t)d;
+        }
+        memcpy(&v[i], &bits, 8);
+    }
+    s->hash = imp__hash(s->hash, v, n * sizeof *v);
+    return IMP_OK;
+}
+
+static enum imp_status get_array(struct source *s, const char *name, double *v, size_t n)
+{
+    size_t count = 0;
+    const enum imp_status st = get_head(s, name, &count);
+    if (st != IMP_OK) return st;
+    return count == n ? get_numbers(s, name, v, n) : damaged(s, name);
+}
+
+static enum imp_status same_problem(const struct source *s, const struct imp__fingerprint *is,
+                                    const struct imp__fingerprint *of)
+{
+    const char *what = is->parameters != of->parameters ? "other parameters are active"
+                       : is->targets != of->targets     ? "its targets or regularisers differ"
+                       : is->scene != of->scene ? "the scene's other parameters differ"
+                       : is->options != of->options
+                           ? "seed, samples per pixel or optimiser's options differ"
+                           : NULL;
+    if (!what) return IMP_OK;
+    return imp__error(s->ctx, IMP_E_ARG, "%s: the checkpoint is of another fit: %s", s->path,
+                      what);
+}
+
+static enum imp_status read_head(struct source *s, const struct imp__fingerprint *of,
+                                 const struct imp__search *search, int *iteration, int *finished)
+{
+    char magic[sizeof MAGIC];
+    int kind;
+    unsigned long long n, h[4];
+    if (!fgets(magic, sizeof magic, s->f) || strcmp(magic, MAGIC) != 0)
+        return imp__error(s->ctx, IMP_E_IO, "%s: not a checkpoint of this version", s->path);
+    if (fscanf(s->f, "optimizer %d variables %llu of %llx %llx %llx %llx iteration %d finished %d",
+               &kind, &n, &h[0], &h[1], &h[2], &h[3], iteration, finished) != 8
+        || fgetc(s->f) != '\n' || *iteration < 0 || *iteration > 1000000000)
+        return damaged(s, "head");
+    const struct imp__fingerprint is = {h[0], h[1], h[2], h[3]};
+    const enum imp_status st = same_problem(s, &is, of);
+    if (st != IMP_OK) return st;
+    return n == search->n && kind == (int)search->kind ? IMP_OK : damaged(s, "head");
+}
+
+static enum imp_status read_body(struct source *s, const struct imp__goal *goal,
+                                 struct imp__search *t)
+{
+    enum imp_status st = IMP_OK;
+    size_t n = 0;
+    char name[16];
+
+    IMP_TRY(get_array(s, "start", t->start, t->n));
+    IMP_TRY(get_array(s, "x", t->x, t->n));
+    for (size_t k = 0; k < t->n; k++)
+        if (!(t->x[k] >= goal->lo[k]) || !(t->x[k] <= goal->hi[k]) || !isfinite(t->start[k]))
+            IMP_TRY(damaged(s, "values outside their bounds"));
+    IMP_TRY(get_head(s, "history", &n));
+    for (size_t k = 0; k < n; k++) IMP_TRY(imp__search_log(t, (struct imp_estimate){0}));
+    IMP_TRY(get_numbers(s, "history", t->history, n));
+    IMP_TRY(get_array(s, "history_se", t->history_se, n));
+    IMP_TRY(get_array(s, "scalars", t->scalar, IMP_SEARCH_SCALARS));
+    for (int k = 0; k < IMP_SEARCH_ARRAYS; k++) {
+        snprintf(name, sizeof name, "array%d", k);
+        IMP_TRY(get_head(s, name, &n));
+        /* Arrays that exist from the start have their size; the others grow. */
+        if (t->array_n[k] != 0 && t->array_n[k] != n) IMP_TRY(damaged(s, name));
+        if (n > 0) IMP_TRY(imp__search_array(t, k, n));
+        IMP_TRY(get_numbers(s, name, t->array[k], n));
+    }
+    const uint64_t hash = s->hash;
+    unsigned long long end;
+    if (fscanf(s->f, "end %llx", &end) != 1 || end != hash) IMP_TRY(damaged(s, "checksum"));
+out:
+    return st;
+}
+
+/* Put what `from` holds into `to`; both stay valid. */
+static void swap(struct imp__search *to, struct imp__search *from)
+{
+    const struct imp__search t = *to;
+    *to = *from;
+    *from = t;
+}
+
+enum imp_status imp__checkpoint_read(imp_context *ctx, const char *path,
+                                     const struct imp__fingerprint *of,
+                                     const struct imp__goal *goal, struct imp__search *search,
+                                     bool *found)
+{
+    enum imp_status st = IMP_OK;
+    struct source s = {.ctx = ctx, .path = path, .f = fopen(path, "rb")};
+    struct imp__search *fresh = NULL;
+    const struct imp__opt_options none = {.max_iterations = 1};
+    int finished = 0;
+
+    *found = s.f != NULL;
+    if (!s.f)
+        return errno == ENOENT ? IMP_OK
+                               : imp__error(ctx, IMP_E_IO, "%s: %s", path, strerror(errno));
+    if (fseek(s.f, 0, SEEK_END) != 0) IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: cannot be read", path));
+    const long size = ftell(s.f);
+    if (size < 0 || fseek(s.f, 0, SEEK_SET) != 0)
+        IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: cannot be read", path));
+    s.max = (size_t)size / 17;
+    IMP_TRY(imp__search_create(goal, search->kind, &none, search->x, &fresh));
+    IMP_TRY(read_head(&s, of, search, &fresh->iteration, &finished));
+    IMP_TRY(read_body(&s, goal, fresh));
+    fresh->finished = finished != 0;
+    swap(search, fresh);
+out:
+    imp__search_destroy(fresh);
+    fclose(s.f);
+    return st;
+}
