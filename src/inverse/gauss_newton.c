@@ -242,6 +242,15 @@ static enum imp_status target_add(struct job *j, const struct imp__target *targe
     return st;
 }
 
+/* Pixels whose weight is not 0. */
+static double pixels_in_use(const struct imp__target *t)
+{
+    const size_t n = (size_t)t->desc.width * (size_t)t->desc.height;
+    double count = 0;
+    for (size_t i = 0; i < n; i++) count += !t->weights || t->weights[i] > 0;
+    return count;
+}
+
 static void matrix_copy(double *to, const double *lower, size_t K)
 {
     if (!to) return;
@@ -277,7 +286,7 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
         IMP_TRY(target_add(&j, &p->targets[t], &own,
                            lo + (hi - lo) * (double)t / (double)p->n_targets,
                            lo + (hi - lo) * (double)(t + 1) / (double)p->n_targets, start));
-        residuals += (double)j.width * j.height * p->targets[t].desc.channels;
+        residuals += (double)(p->targets[t].desc.channels) * pixels_in_use(&p->targets[t]);
         const int bias = imp__loss_bias_order(p->targets[t].desc.loss);
         if (bias) bias_order = 1;
     }
