@@ -141,8 +141,7 @@ void imp_problem_get_x(const imp_problem *p, double *x)
         if (base < 0) continue;
         const struct imp_param *param = &p->scene->params[k];
         for (size_t e = 0; e < param->info.count; e++)
-            x[(size_t)base + e] = param->store == IMP_STORE_LANES ? (*param->lanes)[e]
-                                                                   : param->bulk[e];
+            x[(size_t)base + e] = imp__param_get(param, e);
     }
 }
 

@@ -1,0 +1,160 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Do two pictures have the same expectation? A z-test of every pixel and channel, with
+ * Sidak's level so that the picture as a whole fails by chance once in a hundred, and one of
+ * every channel's mean, which sees a bias far below a pixel's noise (scene-format 14). Pixels
+ * must be independent: compare pictures made with box filters. */
+#include "base/film.h"
+#include <math.h>
+#include <string.h>
+
+#define LEVEL 0.01             /* of the whole picture */
+#define PIXELS_MAX_FAIL 0.0025 /* pixels beyond the level: fireflies are not normal */
+#define MEAN_Z_MAX 4
+#define OVER2_MAX 0.1          /* 0.0455 by chance; only where the variance is a reference's */
+#define WITHOUT_Z 1e-3         /* relative rmse that agrees where nothing is known of noise */
+
+struct pair {
+    const imp_film *test, *reference;
+    const struct imp_compare_options *options;
+    int *of_test, *of_variance; /* [reference->channels] the channels with the same name */
+    size_t pixels;
+};
+
+struct sums {
+    double square, reference_square, max_abs, a, b, n;
+    double fail, over2, n_z, mean_z;
+    bool broken; /* not finite in one picture only */
+};
+
+/* Channel of `film` to set beside channel c of the reference: by name, else by place. */
+static int partner(const imp_film *film, const imp_film *reference, int c)
+{
+    const int by_name = imp__film_find(film, reference->names[c]);
+    if (by_name >= 0) return by_name;
+    return film->channels == reference->channels ? c : -1;
+}
+
+static enum imp_status match(imp_context *ctx, const imp_film *film, const imp_film *reference,
+                             const char *what, int *of)
+{
+    if (film->width != reference->width || film->height != reference->height)
+        return imp__error(ctx, IMP_E_ARG, "the %s is %d x %d, the reference %d x %d", what,
+                          film->width, film->height, reference->width, reference->height);
+    for (int c = 0; c < reference->channels; c++)
+        if ((of[c] = partner(film, reference, c)) < 0)
+            return imp__error(ctx, IMP_E_ARG, "the %s has no channel '%s'", what,
+                              reference->names[c]);
+    return IMP_OK;
+}
+
+/* Variance of test - reference in value i of channel c, from whatever is known; < 0: nothing.
+ * `floor` is of the variance of one sample. */
+static double variance_at(const struct pair *p, size_t pixel, int c, double floor)
+{
+    const struct imp_compare_options *o = p->options;
+    const size_t r = pixel * (size_t)p->reference->channels + (size_t)c;
+    const size_t t = pixel * (size_t)p->test->channels + (size_t)p->of_test[c];
+    if (o->variance) {
+        const size_t v = pixel * (size_t)o->variance->channels + (size_t)p->of_variance[c];
+        const double one = fmax(o->variance->mean[v], floor);
+        return one / o->n_test + (o->n_reference > 0 ? one / o->n_reference : 0);
+    }
+    if (!p->test->se && !p->reference->se) return -1;
+    const double n = fmax(o->n_test > 0 ? o->n_test : (double)p->test->spp, 1);
+    double var = 0;
+    if (p->test->se) var += (double)p->test->se[t] * p->test->se[t];
+    if (p->reference->se) var += (double)p->reference->se[r] * p->reference->se[r];
+    return fmax(var, floor / n);
+}
+
+static void channel(const struct pair *p, int c, double level, struct sums *s)
+{
+    double a = 0, b = 0, n = 0, var = 0;
+    bool has_z = true;
+    for (size_t i = 0; i < p->pixels; i++) {
+        const double r = p->reference->mean[i * (size_t)p->reference->channels + (size_t)c];
+        if (isfinite(r)) b += r, n++;
+    }
+    const double mean = n > 0 ? b / n : 0;
+    const double floor = p->options->floor > 0 ? p->options->floor : 1e-4 * mean * mean;
+    b = n = 0;
+    for (size_t i = 0; i < p->pixels; i++) {
+        const double t = p->test->mean[i * (size_t)p->test->channels + (size_t)p->of_test[c]];
+        const double r = p->reference->mean[i * (size_t)p->reference->channels + (size_t)c];
+        if (!isfinite(t) || !isfinite(r)) {
+            s->broken |= isfinite(t) != isfinite(r) || (isinf(t) && t != r);
+            continue;
+        }
+        const double d = t - r, v = variance_at(p, i, c, floor);
+        a += t, b += r, n++;
+        s->square += d * d;
+        s->reference_square += r * r;
+        s->max_abs = fmax(s->max_abs, fabs(d));
+        has_z &= v >= 0;
+        if (v < 0 || (v == 0 && d == 0)) continue;
+        const double z = fabs(d) / sqrt(v);
+        s->n_z++;
+        s->fail += !(erfc(z / sqrt(2)) > level);
+        s->over2 += z > 2;
+        var += v;
+    }
+    s->a += a;
+    s->b += b;
+    s->n += n;
+    if (has_z && n > 0 && a != b)
+        s->mean_z = fmax(s->mean_z, var > 0 ? fabs(a - b) / sqrt(var) : INFINITY);
+}
+
+static enum imp_status options_check(imp_context *ctx, const struct imp_compare_options *o)
+{
+    if (!(o->n_test >= 0) || !(o->n_reference >= 0) || !(o->floor >= 0))
+        return imp__error(ctx, IMP_E_ARG, "sample counts and floor must be >= 0");
+    if (o->variance && !(o->n_test > 0))
+        return imp__error(ctx, IMP_E_ARG, "a variance picture needs the test's samples per pixel");
+    return IMP_OK;
+}
+
+enum imp_status imp_compare(imp_context *ctx, imp_film *test, imp_film *reference,
+                            const struct imp_compare_options *options,
+                            struct imp_compare_result *result)
+{
+    if (!ctx || !test || !reference || !result)
+        return ctx ? imp__error(ctx, IMP_E_ARG, "two pictures and a result are needed")
+                   : IMP_E_ARG;
+    enum imp_status st = IMP_OK;
+    struct imp_compare_options own = IMP_COMPARE_OPTIONS_INIT;
+    struct pair p = {.test = test, .reference = reference, .options = &own};
+    struct sums s = {0};
+    const size_t channels = (size_t)reference->channels;
+
+    if (options) memcpy(&own, options, imp_min(options->size, sizeof own));
+    if (own.variance && own.n_test == 0) own.n_test = (double)test->spp;
+    IMP_TRY(options_check(ctx, &own));
+    p.pixels = (size_t)reference->width * (size_t)reference->height;
+    p.of_test = imp__alloc(ctx, 2 * channels, sizeof *p.of_test);
+    if (!p.of_test) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory to compare pictures"));
+    p.of_variance = p.of_test + channels;
+    IMP_TRY(match(ctx, test, reference, "test", p.of_test));
+    if (own.variance) IMP_TRY(match(ctx, own.variance, reference, "variance", p.of_variance));
+
+    const double level = -expm1(log1p(-LEVEL) / (double)p.pixels);
+    for (int c = 0; c < reference->channels; c++) channel(&p, c, level, &s);
+    const double n = fmax(s.n, 1), n_z = fmax(s.n_z, 1);
+    const struct imp_compare_result r = {
+        .size = sizeof r, .rmse = sqrt(s.square / n),
+        .relative_rmse = s.square > 0 ? sqrt(s.square / s.reference_square) : 0,
+        .max_abs = s.broken ? INFINITY : s.max_abs, .mean_a = s.a / n, .mean_b = s.b / n,
+        .p_fail_fraction = s.fail / n_z, .mean_z = s.mean_z, .over2 = s.over2 / n_z,
+        .has_z = own.variance || test->se || reference->se,
+        .agree = !s.broken && s.n > 0};
+    *result = r;
+    if (r.has_z)
+        result->agree &= r.p_fail_fraction <= PIXELS_MAX_FAIL && r.mean_z < MEAN_Z_MAX
+                         && (!own.variance || r.over2 <= OVER2_MAX);
+    else
+        result->agree &= r.relative_rmse <= WITHOUT_Z;
+out:
+    imp__release(ctx, p.of_test);
+    return st;
+}

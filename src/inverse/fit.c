@@ -1,0 +1,139 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Fit: run an optimiser on a problem, and say how well its answer is known. */
+#include "fit.h"
+#include "covariance.h"
+#include <math.h>
+#include <string.h>
+
+#define REPLICATES 6     /* independent normal equations behind intervals */
+#define FINAL_SEED 0x40000001
+
+/* Evaluate what the search found with random numbers that it has not seen. */
+static enum imp_status final_objective(struct imp__fit *f, const double *x,
+                                       struct imp_estimate *out)
+{
+    return f->goal.eval(x, imp__search_seed(&f->goal, FINAL_SEED, 0), out, NULL, NULL, f);
+}
+
+/* Covariance, intervals, and the last Newton step that belongs to them. *why: the reason
+ * when there are none. */
+static enum imp_status intervals(struct imp__fit *f, double *x,
+                                 struct imp_fit_variable *variables,
+                                 struct imp__uncertainty *u, const char **why)
+{
+    imp_context *ctx = f->problem->ctx;
+    if (f->problem->n > IMP_DENSE_MAX) {
+        *why = "they are for at most 256 numbers";
+        return IMP_OK;
+    }
+    const enum imp_status st = imp__covariance(&f->goal, x, REPLICATES, variables, u);
+    if (st == IMP_OK) memcpy(x, u->x, f->problem->n * sizeof *x);
+    if (st != IMP_E_NUMERIC && st != IMP_E_UNSUPPORTED) return st;
+    *why = imp__arena_strdup(&f->problem->fit_arena, imp_last_error(ctx));
+    return IMP_OK;
+}
+
+static enum imp_status result_make(struct imp__fit *f, const struct imp__search *s,
+                                   const double *x, struct imp_estimate objective,
+                                   const struct imp__uncertainty *u,
+                                   struct imp_fit_variable *variables, const char *why,
+                                   const struct imp_fit_result **out)
+{
+    struct imp_arena *arena = &f->problem->fit_arena;
+    const size_t n = f->problem->n;
+    struct imp_fit_result *r = imp__arena_array(arena, 1, sizeof *r);
+    double *history = imp__arena_array(arena, 2 * s->n_history + 1, sizeof *history);
+
+    if (!r || !history)
+        return imp__error(f->problem->ctx, IMP_E_NOMEM, "no memory for the result of a fit");
+    for (size_t k = 0; k < n; k++) {
+        struct imp_fit_variable *v = &variables[k];
+        v->start = s->start[k];
+        v->value = x[k];
+        v->at_bound = imp__at_bound(&f->goal, x, k);
+        if (u->n) continue;
+        v->se = v->lo95 = v->hi95 = NAN;
+        v->determined = 1; /* nothing says the contrary */
+    }
+    if (s->n_history > 0) {
+        memcpy(history, s->history, s->n_history * sizeof *history);
+        memcpy(history + s->n_history, s->history_se, s->n_history * sizeof *history);
+    }
+    *r = (struct imp_fit_result){
+        .size = sizeof *r, .iterations = s->iteration, .objective = objective,
+        .n_history = s->n_history, .history = history, .history_se = history + s->n_history,
+        .n = n, .variables = variables, .condition = u->condition,
+        .reason = !f->stopped ? s->reason
+                  : f->deadline_s > 0 && imp__now() > f->deadline_s ? "time limit reached"
+                                                                    : "cancelled",
+        .warning = imp__fit_warning(f, objective.bias_order, variables, u->loosest, why)};
+    *out = r;
+    return IMP_OK;
+}
+
+enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
+                        const struct imp_run *run, const struct imp_fit_result **result)
+{
+    if (!p) return IMP_E_ARG;
+    enum imp_status st = IMP_OK, ended = IMP_OK;
+    imp_context *ctx = p->ctx;
+    struct imp__fit f = {0};
+    struct imp__search *s = NULL;
+    struct imp__uncertainty u = {0};
+    struct imp_fit_variable *variables = NULL;
+    double *start = NULL, *x;
+    const char *why = NULL;
+
+    IMP_TRY(imp__fit_begin(p, options, run, &f));
+    start = imp__alloc(ctx, 2 * p->n, sizeof *start);
+    if (!start) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for %zu variables", p->n));
+    x = start + p->n;
+    imp_problem_get_x(p, start);
+    const struct imp__opt_options o = {f.options.max_iterations, f.options.learning_rate,
+                                       f.options.tolerance};
+    IMP_TRY(imp__search_create(&f.goal, f.options.optimizer, &o, start, &s));
+    bool found = false;
+    if (f.options.resume)
+        IMP_TRY(imp__checkpoint_read(ctx, f.options.checkpoint, &f.fingerprint, &f.goal, s,
+                                     &found));
+    imp__fit_scales(&f, s->start);
+    f.search = s;
+    f.first_iteration = s->iteration;
+
+    st = imp__optimize(&f.goal, &o, s);
+    if (st != IMP_OK && st != IMP_CANCELLED) goto out;
+    ended = st;
+    st = IMP_OK;
+    if (f.options.checkpoint)
+        IMP_TRY(imp__checkpoint_write(ctx, f.options.checkpoint, &f.fingerprint, s));
+
+    imp__arena_free(&p->fit_arena);
+    variables = imp__arena_array(&p->fit_arena, p->n, sizeof *variables);
+    if (!variables) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for the result of a fit"));
+    memcpy(x, s->x, p->n * sizeof *x);
+    struct imp_estimate objective = {NAN, NAN, 0};
+    if (s->n_history > 0)
+        objective = (struct imp_estimate){s->history[s->n_history - 1],
+                                          s->history_se[s->n_history - 1], 0};
+    if (ended == IMP_OK && f.options.intervals) ended = intervals(&f, x, variables, &u, &why);
+    if (ended == IMP_OK) ended = final_objective(&f, x, &objective);
+    if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
+    IMP_TRY(imp_problem_set_x(p, x));
+    IMP_TRY(result_make(&f, s, x, objective, &u, variables, why, result));
+    if (f.outer.progress && ended == IMP_OK) {
+        const struct imp_progress last = {.size = sizeof last, .stage = "fit", .fraction = 1,
+                                          .elapsed_s = imp__now() - f.start_s,
+                                          .rate_unit = "iterations", .note = f.note};
+        f.outer.progress(&last, f.outer.progress_payload);
+    }
+    st = ended;
+out:
+    if (st != IMP_OK && st != IMP_CANCELLED && start && s) /* as if nothing had been tried */
+        (void)!imp_problem_set_x(p, start);
+    imp__uncertainty_destroy(ctx, &u);
+    imp__search_destroy(s);
+    imp__release(ctx, start);
+    imp__fit_end(&f);
+    return st;
+}

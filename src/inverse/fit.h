@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Between imp_fit, which runs a search on a problem, and the pieces it is made of. */
+#ifndef IMP_INVERSE_FIT_H
+#define IMP_INVERSE_FIT_H
+
+#include "checkpoint.h"
+#include "problem.h"
+
+struct imp__fit {
+    struct imp_problem *problem;
+    struct imp_fit_options options;      /* defaults filled in */
+    struct imp_run run;                  /* of one evaluation; its progress is ours */
+    struct imp_run outer;                /* the caller's */
+    struct imp__goal goal;
+    struct imp__fingerprint fingerprint;
+    double *lo, *hi, *scale;             /* [n] */
+    double *g_se;                        /* [n], for Gauss-Newton */
+    double *H_prior;                     /* [n][n] second derivative of the regularisers */
+    bool noise_known;                    /* every target has noise_se */
+
+    const struct imp__search *search;    /* being run, for reports */
+    double start_s, deadline_s;          /* deadline 0: none */
+    double last_report_s, last_checkpoint_s, checkpoint_cost_s;
+    double fraction;
+    int first_iteration;                 /* of this call: not 0 when continued */
+    bool stopped;                        /* by the caller or the deadline */
+    char note[96];
+};
+
+/* fit_goal.c: the goal of `problem`, everything of `fit` but the search. */
+enum imp_status imp__fit_begin(struct imp_problem *problem,
+                               const struct imp_fit_options *options, const struct imp_run *run,
+                               struct imp__fit *fit);
+/* Scales of the variables, from where the search starts. */
+void imp__fit_scales(struct imp__fit *fit, const double *start);
+void imp__fit_end(struct imp__fit *fit);
+
+/* fit_report.c: names and warnings. Text in the problem's fit_arena; NULL: out of memory. */
+const char *imp__fit_warning(const struct imp__fit *fit, int bias_order,
+                             const struct imp_fit_variable *variables, const double *loosest,
+                             const char *no_intervals);
+
+#endif

@@ -1,0 +1,251 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A problem as an optimiser sees it. */
+#include "fit.h"
+#include <float.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define CHECKPOINT_S 2      /* seconds between checkpoints, and at most */
+#define CHECKPOINT_SHARE 20 /* 1/20 of the time */
+#define REPORT_S 0.1
+
+/* ---- Progress ------------------------------------------------------------------------------ */
+
+static void report(struct imp__fit *f, double fraction)
+{
+    const double now = imp__now();
+    if (f->deadline_s > 0 && now > f->deadline_s) f->stopped = true;
+    f->fraction = fmax(f->fraction, fmin(fraction, 1));
+    if (!f->outer.progress || (now - f->last_report_s < REPORT_S && fraction < 1)) return;
+    f->last_report_s = now;
+    const double elapsed = now - f->start_s;
+    const int done = f->search ? f->search->iteration - f->first_iteration : 0;
+    const struct imp_progress p = {
+        .size = sizeof p, .stage = "fit", .fraction = f->fraction, .elapsed_s = elapsed,
+        .eta_s = f->fraction > 1e-3 ? elapsed * (1 - f->fraction) / f->fraction : -1,
+        .rate = elapsed > 0 ? done / elapsed : 0, .rate_unit = "iterations",
+        .note = f->note[0] ? f->note : NULL};
+    if (f->outer.progress(&p, f->outer.progress_payload) != 0) f->stopped = true;
+}
+
+/* From inside an evaluation. */
+static int inner_progress(const struct imp_progress *p, void *payload)
+{
+    struct imp__fit *f = payload;
+    const double done = f->search ? f->search->iteration : 0;
+    report(f, 0.98 * (done + 0.5 * p->fraction) / f->options.max_iterations);
+    return f->stopped;
+}
+
+static enum imp_status iterated(const struct imp__search *s, void *payload)
+{
+    struct imp__fit *f = payload;
+    const double now = imp__now();
+    snprintf(f->note, sizeof f->note, "loss %.3g +- %.1g", s->history[s->n_history - 1],
+             s->history_se[s->n_history - 1]);
+    if (f->options.checkpoint
+        && now - f->last_checkpoint_s > fmax(CHECKPOINT_S,
+                                             CHECKPOINT_SHARE * f->checkpoint_cost_s)) {
+        const enum imp_status st = imp__checkpoint_write(f->problem->ctx, f->options.checkpoint,
+                                                         &f->fingerprint, s);
+        if (st != IMP_OK) return st;
+        f->last_checkpoint_s = imp__now();
+        f->checkpoint_cost_s = f->last_checkpoint_s - now;
+    }
+    report(f, 0.98 * s->iteration / f->options.max_iterations);
+    return f->stopped ? IMP_CANCELLED : IMP_OK;
+}
+
+/* ---- Evaluations --------------------------------------------------------------------------- */
+
+static enum imp_status eval(const double *x, uint64_t seed, struct imp_estimate *f, double *g,
+                            double *g_se, void *payload)
+{
+    struct imp__fit *fit = payload;
+    fit->run.seed = seed;
+    return imp_problem_objective(fit->problem, x, &fit->run, f, g, g_se);
+}
+
+static enum imp_status normal(const double *x, uint64_t seed, struct imp__normal *out,
+                              void *payload)
+{
+    struct imp__fit *fit = payload;
+    const size_t n = fit->problem->n;
+    struct imp__gauss_newton gn = {.H = out->H, .H_same = out->H_same, .H_meas = out->H_meas,
+                                   .g = out->g, .g_se = fit->g_se, .cov_g = out->cov_g};
+    fit->run.seed = seed;
+    const enum imp_status st = imp__gauss_newton(fit->problem, x, &fit->run, &gn);
+    if (st != IMP_OK) return st;
+    out->f = gn.objective;
+    out->f.value += imp__regularise(fit->problem, x, out->g);
+    out->chi2 = gn.chi2;
+    out->n_residuals = gn.n_residuals;
+    out->noise_known = fit->noise_known;
+    for (size_t i = 0; i < n * n; i++) {
+        out->H_prior[i] = fit->H_prior[i];
+        out->H[i] += fit->H_prior[i];
+        out->H_same[i] += fit->H_prior[i];
+    }
+    return IMP_OK;
+}
+
+/* The regularisers are quadratic: column k of their second derivative is a difference of
+ * gradients, without error. */
+static enum imp_status prior(struct imp__fit *f)
+{
+    const size_t n = f->problem->n;
+    double *x = imp__alloc(f->problem->ctx, 2 * n, sizeof *x), *g0 = x + n;
+    if (!x) return imp__error(f->problem->ctx, IMP_E_NOMEM, "no memory for regularisers");
+    imp__regularise(f->problem, x, g0);
+    for (size_t k = 0; k < n; k++) {
+        double *row = f->H_prior + k * n;
+        x[k] = 1;
+        imp__regularise(f->problem, x, row);
+        x[k] = 0;
+        for (size_t l = 0; l < n; l++) row[l] -= g0[l];
+    }
+    imp__release(f->problem->ctx, x);
+    return IMP_OK;
+}
+
+/* ---- What the fit belongs to --------------------------------------------------------------- */
+
+static void fingerprint(struct imp__fit *f)
+{
+    const struct imp_problem *p = f->problem;
+    struct imp__fingerprint *h = &f->fingerprint;
+    double value[3];
+
+    for (size_t k = 0; k < p->scene->n_params; k++) {
+        const struct imp_param *q = &p->scene->params[k];
+        const size_t n = q->info.count;
+        if (p->active.base[k] >= 0) {
+            h->parameters = imp__hash(h->parameters, q->info.name, strlen(q->info.name));
+            h->parameters = imp__hash(h->parameters, &n, sizeof n);
+        } else if (q->store == IMP_STORE_BULK) {
+            h->scene = imp__hash(h->scene, q->bulk, n * sizeof *q->bulk);
+        } else {
+            for (size_t e = 0; e < imp_min(n, (size_t)3); e++) value[e] = imp__param_get(q, e);
+            h->scene = imp__hash(h->scene, value, imp_min(n, (size_t)3) * sizeof *value);
+        }
+    }
+    for (size_t i = 0; i < p->n_targets; i++) {
+        const struct imp__target *t = &p->targets[i];
+        const size_t n = (size_t)t->desc.width * (size_t)t->desc.height;
+        const size_t c = n * (size_t)t->desc.channels * sizeof(float);
+        const double number[8] = {t->desc.sensor, t->desc.width, t->desc.height,
+                                  t->desc.channels, t->desc.loss, t->desc.epsilon,
+                                  t->desc.scale, t->weights != NULL};
+        h->targets = imp__hash(h->targets, number, sizeof number);
+        h->targets = imp__hash(h->targets, t->pixels, c);
+        if (t->weights) h->targets = imp__hash(h->targets, t->weights, n * sizeof(float));
+        if (t->noise_se) h->targets = imp__hash(h->targets, t->noise_se, c);
+    }
+    for (size_t i = 0; i < p->n_regularisers; i++) {
+        const struct imp__regulariser *r = &p->regularisers[i];
+        const double number[2] = {r->kind, r->weight};
+        h->targets = imp__hash(h->targets, number, sizeof number);
+        h->targets = imp__hash(h->targets, r->on, p->scene->n_params);
+        if (r->origin)
+            h->targets = imp__hash(h->targets, r->origin, p->scene->n_theta * sizeof *r->origin);
+    }
+    const double number[4] = {f->options.optimizer, f->options.learning_rate,
+                              f->options.tolerance, f->run.spp};
+    h->options = imp__hash(f->outer.seed, number, sizeof number);
+}
+
+/* A large change of a variable: its whole range, or its size at the start. Zeros take the
+ * size of their neighbours in the same parameter, or 1 in the parameter's unit. */
+void imp__fit_scales(struct imp__fit *f, const double *start)
+{
+    const struct imp_problem *p = f->problem;
+    for (size_t k = 0; k < p->scene->n_params; k++) {
+        const struct imp_param_info *info = &p->scene->params[k].info;
+        const int64_t base = p->active.base[k];
+        double square = 0;
+        if (base < 0) continue;
+        for (size_t e = 0; e < info->count; e++) square += start[base + (int64_t)e] * start[base + (int64_t)e];
+        const double typical = square > 0 ? sqrt(square / (double)info->count) : 1;
+        for (size_t e = 0; e < info->count; e++) {
+            double *scale = &f->scale[(size_t)base + e];
+            if (isfinite(info->lo) && isfinite(info->hi) && info->hi - info->lo < DBL_MAX)
+                *scale = info->hi - info->lo;
+            else
+                *scale = fmax(fabs(start[(size_t)base + e]), typical);
+            if (!(*scale > 0)) *scale = 1;
+        }
+    }
+}
+
+enum imp_status imp__fit_begin(struct imp_problem *p, const struct imp_fit_options *options,
+                               const struct imp_run *run, struct imp__fit *out)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = p->ctx;
+    const size_t n = p->n;
+    struct imp__fit f = {.problem = p, .options = IMP_FIT_OPTIONS_INIT, .outer = IMP_RUN_INIT};
+
+    if (options) memcpy(&f.options, options, imp_min(options->size, sizeof f.options));
+    if (run) memcpy(&f.outer, run, imp_min(run->size, sizeof f.outer));
+    if (n == 0) return imp__error(ctx, IMP_E_ARG, "nothing to fit: no parameter is active");
+    if (p->n_targets == 0) return imp__error(ctx, IMP_E_ARG, "nothing to fit to: no target");
+    if (f.options.max_iterations < 0 || !(f.options.learning_rate >= 0)
+        || !(f.options.tolerance >= 0) || f.options.learning_rate > 1)
+        return imp__error(ctx, IMP_E_ARG,
+                          "max_iterations %d, learning_rate %g (0 to 1), tolerance %g: out of "
+                          "range", f.options.max_iterations, f.options.learning_rate,
+                          f.options.tolerance);
+    if (f.options.resume && !f.options.checkpoint)
+        return imp__error(ctx, IMP_E_ARG, "resume needs the name of a checkpoint");
+    if (f.options.max_iterations == 0)
+        f.options.max_iterations = f.options.optimizer == IMP_ADAM ? 200 : 30;
+    if (f.options.learning_rate == 0) f.options.learning_rate = 0.05;
+    if (f.options.tolerance == 0) f.options.tolerance = 1e-4;
+
+    f.lo = imp__alloc(ctx, 4 * n, sizeof *f.lo);
+    if (!f.lo) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for %zu variables", n));
+    f.hi = f.lo + n;
+    f.scale = f.lo + 2 * n;
+    f.g_se = f.lo + 3 * n;
+    for (size_t k = 0; k < p->scene->n_params; k++) {
+        const struct imp_param_info *info = &p->scene->params[k].info;
+        for (size_t e = 0; p->active.base[k] >= 0 && e < info->count; e++) {
+            f.lo[(size_t)p->active.base[k] + e] = info->lo;
+            f.hi[(size_t)p->active.base[k] + e] = info->hi;
+        }
+    }
+    if (n <= IMP_DENSE_MAX) {
+        f.H_prior = imp__alloc(ctx, n * n, sizeof *f.H_prior);
+        if (!f.H_prior) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for regularisers"));
+        IMP_TRY(prior(&f));
+    }
+    f.noise_known = true;
+    for (size_t i = 0; i < p->n_targets; i++) f.noise_known &= p->targets[i].noise_se != NULL;
+    f.start_s = imp__now();
+    f.last_checkpoint_s = f.start_s;
+    f.deadline_s = f.outer.time_limit_s > 0 ? f.start_s + f.outer.time_limit_s : 0;
+    f.run = f.outer;
+    f.run.time_limit_s = 0;
+    fingerprint(&f);
+    *out = f;
+    /* Pointers to the fit itself: it does not move any more. */
+    out->run.progress = inner_progress;
+    out->run.progress_payload = out;
+    out->goal = (struct imp__goal){.ctx = ctx, .n = n, .lo = out->lo, .hi = out->hi,
+                                   .scale = out->scale, .seed = out->outer.seed, .eval = eval,
+                                   .normal = n <= IMP_DENSE_MAX ? normal : NULL,
+                                   .iterated = iterated, .payload = out};
+    return IMP_OK;
+out:
+    imp__fit_end(&f);
+    return st;
+}
+
+void imp__fit_end(struct imp__fit *f)
+{
+    if (!f->problem) return;
+    imp__release(f->problem->ctx, f->lo);
+    imp__release(f->problem->ctx, f->H_prior);
+}

@@ -1,0 +1,71 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "fit.h"
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define NAMES_MAX 6
+
+struct text {
+    char buffer[1536];
+    size_t used;
+};
+
+IMP_PRINTF(2, 3) static void put(struct text *t, const char *format, ...)
+{
+    va_list args;
+    va_start(args, format);
+    const int n = vsnprintf(t->buffer + t->used, sizeof t->buffer - t->used, format, args);
+    va_end(args);
+    if (n > 0) t->used = imp_min(t->used + (size_t)n, sizeof t->buffer - 1);
+}
+
+static void put_name(struct text *t, const struct imp__fit *f, size_t i)
+{
+    size_t k = 0, e = 0;
+    if (imp_problem_variable(f->problem, i, &k, &e, NULL, NULL) != IMP_OK) return;
+    const struct imp_param_info *info = &f->problem->scene->params[k].info;
+    put(t, info->count > 1 ? "%s[%zu]" : "%s", info->name, e);
+}
+
+static void put_loose(struct text *t, const struct imp__fit *f,
+                      const struct imp_fit_variable *v, const double *direction)
+{
+    const size_t n = f->problem->n;
+    size_t count = 0, shown = 0;
+    for (size_t i = 0; i < n; i++) count += !v[i].determined;
+    if (count == 0) return;
+    put(t, "the pictures do not determine ");
+    for (size_t i = 0; i < n && shown < NAMES_MAX; i++) {
+        if (v[i].determined) continue;
+        if (shown++) put(t, ", ");
+        put_name(t, f, i);
+    }
+    if (count > shown) put(t, " and %zu more", count - shown);
+    /* A combination is worth naming; a single variable has been. */
+    double largest = 0;
+    for (size_t i = 0; i < n; i++) largest = fmax(largest, fabs(direction[i]));
+    if (largest < 0.98) {
+        put(t, " (least: ");
+        shown = 0;
+        for (size_t i = 0; i < n && shown < NAMES_MAX; i++) {
+            if (fabs(direction[i]) < 0.2) continue;
+            put(t, "%s%+.2f ", shown++ ? " " : "", direction[i]);
+            put_name(t, f, i);
+        }
+        put(t, ", in units of their scales)");
+    }
+}
+
+const char *imp__fit_warning(const struct imp__fit *f, int bias_order,
+                             const struct imp_fit_variable *variables, const double *loosest,
+                             const char *no_intervals)
+{
+    struct text t = {.used = 0};
+    if (loosest) put_loose(&t, f, variables, loosest);
+    if (no_intervals) put(&t, "%sno intervals: %s", t.used ? "; " : "", no_intervals);
+    if (bias_order > 0)
+        put(&t, "%sthis loss leaves a bias of order 1/spp%s in value and gradient",
+            t.used ? "; " : "", bias_order == 2 ? "^2" : "");
+    return t.used ? imp__arena_strdup(&f->problem->fit_arena, t.buffer) : NULL;
+}
