@@ -5,6 +5,7 @@
  * every channel's mean, which sees a bias far below a pixel's noise (scene-format 14). Pixels
  * must be independent: compare pictures made with box filters. */
 #include "base/film.h"
+#include "math/stat.h"
 #include <math.h>
 #include <string.h>
 
@@ -138,7 +139,7 @@ enum imp_status imp_compare(imp_context *ctx, imp_film *test, imp_film *referenc
     IMP_TRY(match(ctx, test, reference, "test", p.of_test));
     if (own.variance) IMP_TRY(match(ctx, own.variance, reference, "variance", p.of_variance));
 
-    const double level = -expm1(log1p(-LEVEL) / (double)p.pixels);
+    const double level = imp__sidak(LEVEL, (double)p.pixels);
     for (int c = 0; c < reference->channels; c++) channel(&p, c, level, &s);
     const double n = fmax(s.n, 1), n_z = fmax(s.n_z, 1);
     const struct imp_compare_result r = {
