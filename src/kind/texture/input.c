@@ -58,7 +58,7 @@ void imp__inputs_eval(const struct imp_input *const *input, int n,
                       const struct imp_texcoord *at, imp_spec *in)
 {
     for (int j = 0; j < n; j++) {
-        if (imp_likely(!input[j]->texture))
+        if (imp_likely(!input[j]->texture && !input[j]->scalar))
             in[j] = input[j]->value;
         else
             imp__input_eval(input[j], input[j]->scalar, at, &in[j]);
