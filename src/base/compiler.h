@@ -9,8 +9,8 @@
 #define IMP_PRINTF(f, a) __attribute__((format(printf, f, a)))
 #define IMP_HIDDEN __attribute__((visibility("hidden")))
 
-#define imp_min(a, b) ({ __typeof__(a) a_ = (a), b_ = (b); a_ < b_ ? a_ : b_; })
-#define imp_max(a, b) ({ __typeof__(a) a_ = (a), b_ = (b); a_ > b_ ? a_ : b_; })
+#define imp_min(a, b) ({ __typeof__(a) a_ = (a); __typeof__(b) b_ = (b); a_ < b_ ? a_ : b_; })
+#define imp_max(a, b) ({ __typeof__(a) a_ = (a); __typeof__(b) b_ = (b); a_ > b_ ? a_ : b_; })
 #define imp_clamp(x, lo, hi) imp_max(imp_min((x), (hi)), (lo))
 #define imp_count(array) (sizeof(array) / sizeof((array)[0]))
 

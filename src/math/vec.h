@@ -30,7 +30,7 @@ static inline imp_v3 imp__cross(imp_v3 a, imp_v3 b)
 static inline double imp__length(imp_v3 a) { return sqrt(imp__dot(a, a)); }
 static inline imp_v3 imp__normalize(imp_v3 a) { return a * (1 / imp__length(a)); }
 
-static inline double imp__max3(imp_spec s) { return fmax(s[0], fmax(s[1], s[2])); }
+static inline double imp__max3(imp_spec s) { return imp_max(s[0], imp_max(s[1], s[2])); }
 static inline double imp__sum3(imp_spec s) { return (s[0] + s[1]) + s[2]; }
 static inline bool imp__is_zero(imp_spec s) { return s[0] == 0 && s[1] == 0 && s[2] == 0; }
 static inline bool imp__is_finite(imp_spec s)

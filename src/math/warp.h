@@ -4,6 +4,7 @@
 #ifndef IMP_MATH_WARP_H
 #define IMP_MATH_WARP_H
 
+#include "trig.h"
 #include "vec.h"
 
 /* Uniform unit disk, concentric map (Shirley and Chiu 1997). Density 1/pi. */
@@ -14,16 +15,12 @@ static inline void imp__concentric_disk(const double u[2], double xy[2])
         xy[0] = xy[1] = 0;
         return;
     }
-    double r, phi;
-    if (fabs(a) > fabs(b)) {
-        r = a;
-        phi = IMP_PI / 4 * (b / a);
-    } else {
-        r = b;
-        phi = IMP_PI / 2 - IMP_PI / 4 * (a / b);
-    }
-    xy[0] = r * cos(phi);
-    xy[1] = r * sin(phi);
+    /* phi = pi/4 b/a, or pi/2 - pi/4 a/b: sine and cosine change places. */
+    const bool wide = fabs(a) > fabs(b);
+    const double r = wide ? a : b, x = IMP_PI / 4 * (wide ? b / a : a / b);
+    const double s = imp__sin_eighth(x), c = imp__cos_eighth(x);
+    xy[0] = r * (wide ? c : s);
+    xy[1] = r * (wide ? s : c);
 }
 static inline void imp__concentric_disk_inverse(const double xy[2], double u[2])
 {
@@ -44,7 +41,7 @@ static inline imp_v3 imp__cosine_hemisphere(const double u[2])
 {
     double d[2];
     imp__concentric_disk(u, d);
-    return imp__v3(d[0], d[1], sqrt(fmax(0, 1 - d[0] * d[0] - d[1] * d[1])));
+    return imp__v3(d[0], d[1], sqrt(imp_max(0, 1 - d[0] * d[0] - d[1] * d[1])));
 }
 static inline double imp__cosine_hemisphere_pdf(imp_v3 w) { return w[2] > 0 ? w[2] * IMP_INV_PI : 0; }
 static inline void imp__cosine_hemisphere_inverse(imp_v3 w, double u[2])
@@ -56,8 +53,10 @@ static inline void imp__cosine_hemisphere_inverse(imp_v3 w, double u[2])
 /* Uniform sphere. Density 1/(4 pi). */
 static inline imp_v3 imp__uniform_sphere(const double u[2])
 {
-    const double z = 1 - 2 * u[0], r = sqrt(fmax(0, 1 - z * z)), phi = IMP_2PI * u[1];
-    return imp__v3(r * cos(phi), r * sin(phi), z);
+    const double z = 1 - 2 * u[0], r = sqrt(imp_max(0, 1 - z * z));
+    double s, c;
+    imp__sincos_turn(u[1], &s, &c);
+    return imp__v3(r * c, r * s, z);
 }
 static inline void imp__uniform_sphere_inverse(imp_v3 w, double u[2])
 {
@@ -69,9 +68,10 @@ static inline void imp__uniform_sphere_inverse(imp_v3 w, double u[2])
 /* Uniform in the cone cos >= cos_max about +z. Density 1/(2 pi (1 - cos_max)). */
 static inline imp_v3 imp__uniform_cone(const double u[2], double cos_max)
 {
-    const double z = 1 - u[0] * (1 - cos_max), r = sqrt(fmax(0, 1 - z * z));
-    const double phi = IMP_2PI * u[1];
-    return imp__v3(r * cos(phi), r * sin(phi), z);
+    const double z = 1 - u[0] * (1 - cos_max), r = sqrt(imp_max(0, 1 - z * z));
+    double s, c;
+    imp__sincos_turn(u[1], &s, &c);
+    return imp__v3(r * c, r * s, z);
 }
 static inline double imp__uniform_cone_pdf(double cos_max)
 {
@@ -81,7 +81,7 @@ static inline double imp__uniform_cone_pdf(double cos_max)
 /* Uniform triangle: barycentric weights of the second and third vertex. Density 1/area. */
 static inline void imp__uniform_triangle(const double u[2], double b[2])
 {
-    const double t = sqrt(fmax(0, 1 - u[0]));
+    const double t = sqrt(imp_max(0, 1 - u[0]));
     b[0] = 1 - t;
     b[1] = t * u[1];
 }

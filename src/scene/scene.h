@@ -122,7 +122,7 @@ bool imp__occluded(const struct imp_scene *scene, const imp_v3 *o, const imp_v3 
 #define IMP_RAY_EPSILON (1500 * 0x1p-24)
 static inline imp_v3 imp__offset(imp_v3 p, imp_v3 ng, imp_v3 d)
 {
-    const double scale = fmax(fabs(p[0]), fmax(fabs(p[1]), fabs(p[2])));
+    const double scale = imp_max(fabs(p[0]), imp_max(fabs(p[1]), fabs(p[2])));
     return p + ng * copysign((1 + scale) * IMP_RAY_EPSILON, imp__dot(ng, d));
 }
 
