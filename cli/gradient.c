@@ -25,17 +25,23 @@ struct result {
 };
 
 /* sum(seed * picture) with its standard error. Pixels through a box filter are independent,
- * so squares of errors add. */
+ * so squares of their errors add; the channels of a pixel share walks, so theirs are added
+ * as they are: exact for grey, an upper bound for colours. */
 static struct imp_estimate inner_product(imp_film *film, const float *seed)
 {
     struct imp_film_info info = {.size = sizeof info};
     struct imp_estimate sum = {0, 0, 0};
     imp_film_get_info(film, &info);
-    const size_t n = (size_t)info.width * (size_t)info.height * (size_t)info.channels;
+    const size_t n = (size_t)info.width * (size_t)info.height;
     const float *mean = imp_film_mean(film), *se = imp_film_se(film);
     for (size_t i = 0; i < n; i++) {
-        sum.value += (double)seed[i] * mean[i];
-        if (se) sum.se += pow((double)seed[i] * se[i], 2);
+        double error = 0;
+        for (int c = 0; c < info.channels; c++) {
+            const size_t k = i * (size_t)info.channels + (size_t)c;
+            sum.value += (double)seed[k] * mean[k];
+            if (se) error += fabs((double)seed[k] * se[k]);
+        }
+        sum.se += error * error;
     }
     sum.se = se ? sqrt(sum.se) : NAN;
     return sum;

@@ -32,19 +32,24 @@ static void add_film(imp_film *sum, imp_film *film)
     }
 }
 
+/* Mean over pixels and channels. */
 static void film_sums(imp_film *film, double *mean, double *mean_se)
 {
     struct imp_film_info info = {.size = sizeof info};
     double sum = 0, squares = 0;
     imp_film_get_info(film, &info);
-    const size_t n = (size_t)info.width * (size_t)info.height * (size_t)info.channels;
+    const size_t n = (size_t)info.width * (size_t)info.height, c = (size_t)info.channels;
     const float *m = imp_film_mean(film), *se = imp_film_se(film);
     for (size_t i = 0; i < n; i++) {
-        sum += m[i];
-        if (se) squares += (double)se[i] * se[i];
+        double error = 0; /* the channels of a pixel share walks */
+        for (size_t k = i * c; k < (i + 1) * c; k++) {
+            sum += m[k];
+            if (se) error += se[k];
+        }
+        squares += error * error;
     }
-    *mean = sum / (double)n;
-    *mean_se = se ? sqrt(squares) / (double)n : NAN;
+    *mean = sum / (double)(n * c);
+    *mean_se = se ? sqrt(squares) / (double)(n * c) : NAN;
 }
 
 static int write_control(struct json *j, imp_film *film, const char *name,
