@@ -9,7 +9,6 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
 
 static int repeats = 3;
@@ -24,13 +23,6 @@ struct times {
     double samples; /* of one picture */
     size_t n;       /* numbers with a gradient */
 };
-
-static double now(void)
-{
-    struct timespec t;
-    clock_gettime(CLOCK_MONOTONIC, &t);
-    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 /* Loss against the scene's own picture, of other random numbers, with the gradient of
  * everything. */
@@ -58,9 +50,9 @@ static int time_gradient(const struct imp_run *run, imp_film *film, struct times
     for (int i = 0; i < repeats && st == IMP_OK; i++) {
         struct imp_run again = *run;
         again.seed += 1;
-        const double start = now();
+        const double start = cli_now();
         st = imp_problem_objective(problem, NULL, &again, &loss, grad, NULL);
-        t->gradient = fmin(t->gradient, now() - start);
+        t->gradient = fmin(t->gradient, cli_now() - start);
     }
     imp_problem_destroy(problem);
     free(grad);
@@ -71,18 +63,18 @@ static int measure(const char *path, int threads, struct times *t)
 {
     imp_film *film = NULL;
     t->threads = cli.threads = threads;
-    double start = now();
+    double start = cli_now();
     int rc = cli_load(path);
-    t->load = now() - start;
+    t->load = cli_now() - start;
     if (rc) return rc;
     const struct imp_run run = cli_run();
     t->render = INFINITY;
     for (int i = 0; i < repeats; i++) {
         imp_film_destroy(film);
         film = NULL;
-        start = now();
+        start = cli_now();
         const enum imp_status st = imp_render(cli.scene, &run, &film);
-        t->render = fmin(t->render, now() - start);
+        t->render = fmin(t->render, cli_now() - start);
         if (st != IMP_OK) {
             imp_film_destroy(film);
             return cli_fail(st, cli.scene_path);

@@ -8,6 +8,7 @@
 #include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 struct cli cli;
 
@@ -118,6 +119,13 @@ void *cli_alloc(size_t n, size_t size)
     void *memory = calloc(n ? n : 1, size);
     if (!memory) exit(cli_error(EXIT_RUN, "out of memory"));
     return memory;
+}
+
+double cli_now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
 /* ---- Opening ------------------------------------------------------------------------- */

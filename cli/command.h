@@ -86,6 +86,9 @@ void cli_say(const char *format, ...) __attribute__((format(printf, 1, 2)));
 struct json cli_json(void);
 void cli_json_end(struct json *j);
 
+/* Seconds on a monotonic clock. */
+double cli_now(void);
+
 /* malloc that ends the process when there is no memory; the cli may. */
 void *cli_alloc(size_t n, size_t size);
 

@@ -22,6 +22,7 @@ struct result {
     struct imp_estimate value;
     const char *functional; /* "loss", "mean" or "adjoint" */
     double *x, *grad, *se;
+    int rounds; /* of the run, each with spp samples */
 };
 
 /* sum(seed * picture) with its standard error. Pixels through a box filter are independent,
@@ -79,28 +80,71 @@ static int adjoint_image(const struct imp_run *run, float **seed)
     return 0;
 }
 
-static int compute_adjoint(imp_problem *problem, const struct imp_run *run, struct result *r)
+/* One estimate of value, gradient and errors with the random numbers of `run`. */
+static enum imp_status estimate(imp_problem *problem, const struct imp_run *run,
+                                const float *seed, struct result *r)
 {
     imp_film *film = NULL;
-    float *seed = NULL;
-    int rc = adjoint_image(run, &seed);
-    if (rc) return rc;
-    r->functional = adjoint_path ? "adjoint" : "mean";
-    enum imp_status st = imp_render(cli.scene, run, &film);
-    if (film) r->value = inner_product(film, seed);
+    if (!seed) return imp_problem_objective(problem, NULL, run, &r->value, r->grad, r->se);
+    enum imp_status st = imp_problem_reverse(problem, seed, run, r->grad, r->se);
+    if (st == IMP_OK) st = imp_render(cli.scene, run, &film);
+    if (st == IMP_OK) r->value = inner_product(film, seed);
     imp_film_destroy(film);
-    if (st == IMP_OK) st = imp_problem_reverse(problem, seed, run, r->grad, r->se);
-    free(seed);
-    if (st == IMP_OK) return 0;
-    return st == IMP_CANCELLED && !progress_interrupted() ? 0 : cli_fail(st, cli.scene_path);
+    return st;
 }
 
-static int compute_loss(imp_problem *problem, const struct imp_run *run, struct result *r)
+/* Mean of two independent estimates of k and 1 rounds. */
+static void merge(double *mean, double *se, double k, double value, double value_se)
 {
-    r->functional = "loss";
-    const enum imp_status st =
-        imp_problem_objective(problem, NULL, run, &r->value, r->grad, r->se);
-    return cli_failed(st) ? cli_fail(st, cli.scene_path) : 0;
+    *mean = (k * *mean + value) / (k + 1);
+    *se = hypot(k * *se, value_se) / (k + 1);
+}
+
+/* With --time: rounds of the run with other random numbers, as many as fit. The mean of
+ * unbiased estimates is one, and rounds that were done survive an interrupt. */
+static int estimate_for(imp_problem *problem, struct imp_run run, const float *seed,
+                        struct result *sum)
+{
+    const size_t n = imp_problem_n(problem);
+    struct result r = *sum;
+    enum imp_status st = IMP_OK;
+    const double start = cli_now();
+    r.grad = cli_alloc(n, sizeof *r.grad);
+    r.se = cli_alloc(n, sizeof *r.se);
+    run.time_limit_s = 0;
+    sum->rounds = 0;
+    do {
+        st = estimate(problem, &run, seed, &r);
+        if (st != IMP_OK) break;
+        const double k = sum->rounds++;
+        merge(&sum->value.value, &sum->value.se, k, r.value.value, r.value.se);
+        for (size_t i = 0; i < n; i++)
+            merge(&sum->grad[i], &sum->se[i], k, r.grad[i], r.se[i]);
+        sum->value.bias_order = r.value.bias_order;
+        run.seed += 0x9e3779b97f4a7c15u; /* far from the seeds people choose */
+    } while (cli_now() - start < cli.time_s && !progress_interrupted());
+    free(r.grad);
+    free(r.se);
+    if (st == IMP_CANCELLED && sum->rounds) st = IMP_OK;
+    return st == IMP_OK ? 0 : cli_fail(st, cli.scene_path);
+}
+
+static int compute(imp_problem *problem, const struct imp_run *run, struct result *r)
+{
+    float *seed = NULL;
+    int rc = 0;
+    const int loss = problem_options.targets.n > 0;
+    r->functional = loss ? "loss" : adjoint_path ? "adjoint" : "mean";
+    r->rounds = 1;
+    if (!loss) rc = adjoint_image(run, &seed);
+    if (!rc && cli.time_s > 0) {
+        rc = estimate_for(problem, *run, seed, r);
+    } else if (!rc) {
+        const enum imp_status st = estimate(problem, run, seed, r);
+        if (st != IMP_OK) rc = cli_fail(st, cli.scene_path);
+    }
+    free(seed);
+    return rc;
 }
 
 /* ---- Answers ---------------------------------------------------------------------------- */
@@ -141,7 +185,7 @@ static void print_json(const struct imp_run *run, const struct result *r,
     static const char *const bias[] = {"none", "O(1/N)", "O(1/N^2)"};
     struct json j = cli_json();
     json_seed(&j, "seed", run->seed);
-    json_integer(&j, "spp", cli_spp(run));
+    json_integer(&j, "spp", (int64_t)cli_spp(run) * r->rounds);
     json_text(&j, "functional", r->functional);
     if (!strcmp(r->functional, "loss")) json_text(&j, "loss", loss_word());
     json_number(&j, "value", r->value.value);
@@ -207,7 +251,7 @@ static void print_text(const struct result *r, const struct block *blocks, size_
 static int run_gradient(int n, char **operand)
 {
     imp_problem *problem = NULL;
-    struct result r = {{0, 0, 0}, "", NULL, NULL, NULL};
+    struct result r = {.functional = ""};
     struct block *blocks = NULL;
     char **paths = NULL;
     size_t n_blocks = 0;
@@ -226,8 +270,7 @@ static int run_gradient(int n, char **operand)
     blocks = problem_blocks(problem, &n_blocks);
     paths = cli_alloc(n_blocks, sizeof *paths);
 
-    rc = problem_options.targets.n ? compute_loss(problem, &run, &r)
-                                   : compute_adjoint(problem, &run, &r);
+    rc = compute(problem, &run, &r);
     if (!rc && cli.out) rc = make_folder(cli.out);
     for (size_t k = 0; k < n_blocks && !rc && cli.out; k++)
         if (block_is_large(&blocks[k])) rc = write_block(&blocks[k], &r, &paths[k]);
