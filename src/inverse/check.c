@@ -1,0 +1,93 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "check.h"
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+enum imp_status imp__check_row(struct imp__check *c, const char *method, const char *param,
+                               int64_t element, const struct imp_check_row *row)
+{
+    char name[512];
+    struct imp_check_row *grown = imp__grow(c->ctx, c->rows, &c->cap_rows, c->n_rows + 1,
+                                            sizeof *grown);
+    if (grown) c->rows = grown;
+    if (element >= 0) snprintf(name, sizeof name, "%s[%lld]", param, (long long)element);
+    else snprintf(name, sizeof name, "%s", param ? param : "*");
+    char *copy = imp__arena_strdup(&c->problem->check_arena, name);
+    if (!grown || !copy) return imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check");
+    c->rows[c->n_rows] = *row;
+    c->rows[c->n_rows].method = method;
+    c->rows[c->n_rows++].param = copy;
+    return IMP_OK;
+}
+
+double imp__check_scale(const struct imp_param *p, size_t e)
+{
+    const double value = fabs(imp__param_get(p, e)), range = p->info.hi - p->info.lo;
+    const double size = isfinite(range) && range > 0 ? fmax(value, 1e-3 * range) : value;
+    return size > 0 ? size : 1;
+}
+
+static bool report(struct imp__check *c, double fraction)
+{
+    if (!c->outer.progress) return false;
+    const double elapsed = imp__now() - c->start_s;
+    const struct imp_progress p = {
+        .size = sizeof p, .stage = "check", .fraction = fmin(fraction, 1), .elapsed_s = elapsed,
+        .eta_s = fraction > 1e-3 ? elapsed * (1 - fraction) / fraction : -1,
+        .rate = elapsed > 0 ? c->done / elapsed : 0, .rate_unit = "pieces"};
+    c->stopped |= c->outer.progress(&p, c->outer.progress_payload) != 0;
+    return c->stopped;
+}
+
+enum imp_status imp__check_progress(struct imp__check *c, double work)
+{
+    c->done += work;
+    if (c->outer.time_limit_s > 0 && imp__now() - c->start_s > c->outer.time_limit_s)
+        c->stopped = true;
+    return report(c, c->done / fmax(c->total, 1)) || c->stopped ? IMP_CANCELLED : IMP_OK;
+}
+
+/* One evaluation is one piece. */
+static int inner_progress(const struct imp_progress *p, void *payload)
+{
+    struct imp__check *c = payload;
+    return report(c, (c->done + p->fraction) / fmax(c->total, 1));
+}
+
+enum imp_status imp_check(imp_problem *p, const struct imp_check_options *options,
+                          const struct imp_run *run, const struct imp_check_row **rows,
+                          size_t *n_rows)
+{
+    if (!p || !rows || !n_rows) return IMP_E_ARG;
+    enum imp_status st = IMP_OK, ended = IMP_OK;
+    struct imp__check c = {.problem = p, .ctx = p->ctx, .options = IMP_CHECK_OPTIONS_INIT,
+                           .outer = IMP_RUN_INIT, .start_s = imp__now()};
+
+    if (p->n == 0) IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "nothing to check: no parameter is active"));
+    if (options) memcpy(&c.options, options, imp_min(options->size, sizeof c.options));
+    if (run) memcpy(&c.outer, run, imp_min(run->size, sizeof c.outer));
+    if (c.options.paths < 0 || c.options.fresh_spp < 0)
+        IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "paths and fresh_spp must be >= 0"));
+    if (c.options.paths == 0) c.options.paths = 1000;
+    c.run = c.outer;
+    c.run.time_limit_s = 0;
+    c.run.progress = inner_progress;
+    c.run.progress_payload = &c;
+    if (c.options.fresh_spp > 0) c.run.spp = c.options.fresh_spp;
+    IMP_TRY(imp__problem_tracer(p, &c.outer, &c.tracer));
+    imp__arena_free(&p->check_arena);
+
+    ended = imp__check_frozen(&c);
+    if (ended == IMP_OK) ended = imp__check_fresh(&c);
+    if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
+    struct imp_check_row *kept = imp__arena_array(&p->check_arena, c.n_rows + 1, sizeof *kept);
+    if (!kept) IMP_TRY(imp__error(p->ctx, IMP_E_NOMEM, "no memory for a check"));
+    if (c.n_rows > 0) memcpy(kept, c.rows, c.n_rows * sizeof *kept);
+    *rows = kept;
+    *n_rows = c.n_rows;
+    st = ended;
+out:
+    imp__release(p->ctx, c.rows);
+    return st;
+}

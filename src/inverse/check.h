@@ -1,0 +1,34 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Gradient checks: what imp_check's files share. Frozen checks see wrong derivative code and
+ * are blind to wrong densities; fresh seeds see those too, with noise (gradients.md 13). */
+#ifndef IMP_INVERSE_CHECK_H
+#define IMP_INVERSE_CHECK_H
+
+#include "estimate.h"
+
+struct imp__check {
+    struct imp_problem *problem;
+    imp_context *ctx;
+    struct imp_run run, outer;      /* of an evaluation, with our progress; the caller's */
+    struct imp_check_options options;
+    struct imp_tracer tracer;
+    struct imp_check_row *rows;     /* [n_rows], names in the problem's check_arena */
+    size_t n_rows, cap_rows;
+    double start_s, done, total;    /* pieces of work */
+    bool stopped;
+};
+
+/* A row; `element` < 0: of the parameter as a whole, param NULL: of all of them. */
+enum imp_status imp__check_row(struct imp__check *c, const char *method, const char *param,
+                               int64_t element, const struct imp_check_row *row);
+/* Done with `work` more; IMP_CANCELLED if the caller wants to stop. */
+enum imp_status imp__check_progress(struct imp__check *c, double work);
+
+/* Typical size of number e of a parameter: its value, not below 1e-3 of its range. */
+double imp__check_scale(const struct imp_param *p, size_t e);
+
+enum imp_status imp__check_frozen(struct imp__check *c); /* frozen, dot, euler */
+enum imp_status imp__check_fresh(struct imp__check *c);
+
+#endif

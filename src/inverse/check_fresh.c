@@ -1,0 +1,284 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Gradients against differences of pictures that share no random number with them or with
+ * each other: what a frozen walk cannot see (wrong densities, missing terms) shows here as z.
+ *
+ * The functional is F = sum_pc s_pc I_pc with a smooth positive pattern s of mean 1/pixels.
+ * F is linear in emission: one central difference with a large step. Elsewhere two steps and
+ * Richardson's combination (4 D(h/2) - D(h))/3, whose error is O(h^4). */
+#include "check.h"
+#include "walk/picture.h"
+#include <math.h>
+#include <string.h>
+
+#define Z_LIMIT 4
+#define STEP 0.3         /* of the room a number has */
+#define STEP_LINEAR 0.8
+#define BATCHES 16       /* independent pictures behind an SE where pixels share samples */
+
+struct fresh {
+    struct imp__check *check;
+    float *pattern;      /* [height][width][channels] */
+    uint64_t next_seed;
+    double *gradient, *gradient_se; /* [n] */
+    int channels;
+};
+
+static bool sample_radiance(const void *payload, struct imp_arena *arena, int x, int y,
+                            int64_t sample, double *value, double *px, double *py)
+{
+    const struct imp_tracer *tracer = payload;
+    struct imp_walk walk;
+    imp__walk_trace(tracer, arena, x, y, sample, &walk);
+    for (int c = 0; c < tracer->scene->channels; c++) value[c] = walk.L[c];
+    *px = walk.px;
+    *py = walk.py;
+    return walk.dropped == IMP_DROP_NONE;
+}
+
+struct tangent {
+    struct imp_tracer tracer;
+    const double *x_dot;
+};
+
+static bool sample_derivative(const void *payload, struct imp_arena *arena, int x, int y,
+                              int64_t sample, double *value, double *px, double *py)
+{
+    const struct tangent *t = payload;
+    struct imp_walk walk;
+    imp__walk_trace(&t->tracer, arena, x, y, sample, &walk);
+    const imp_spec d = imp__walk_tangent(&t->tracer, &walk, t->x_dot);
+    for (int c = 0; c < t->tracer.scene->channels; c++) value[c] = d[c];
+    *px = walk.px;
+    *py = walk.py;
+    return walk.dropped == IMP_DROP_NONE;
+}
+
+static uint64_t seed_of(struct fresh *f)
+{
+    return imp__mix64(f->check->outer.seed ^ (0xf7e5u + ++f->next_seed * 0x9e3779b97f4a7c15u));
+}
+
+/* sum s value of one picture, and its variance from the pixels' standard errors. */
+static enum imp_status functional_once(struct fresh *f, struct imp_picture *picture,
+                                       struct imp_run *run, double *value, double *variance)
+{
+    imp_film *film = NULL;
+    const enum imp_status st = imp__picture_make(f->check->ctx, picture, run, &film);
+    if (st == IMP_OK) {
+        *value = *variance = 0;
+        for (size_t i = 0; i < imp__film_values(film); i++) {
+            const double s = f->pattern[i], se = film->se ? film->se[i] : 0;
+            *value += s * film->mean[i];
+            *variance += s * s * se * se;
+        }
+    }
+    imp_film_destroy(film);
+    return st;
+}
+
+/* F, or its derivative along x_dot, from random numbers of its own. */
+static enum imp_status functional(struct fresh *f, const double *x_dot, struct imp_estimate *out)
+{
+    enum imp_status st = IMP_OK;
+    const struct imp_sensor *sensor = f->check->tracer.sensor;
+    struct imp_run run = f->check->run;
+    struct tangent t = {f->check->tracer, x_dot};
+    struct imp_picture picture = {sensor, "check", f->channels == 3 ? "R,G,B" : "Y",
+                                  f->channels, x_dot ? sample_derivative : sample_radiance,
+                                  x_dot ? (void *)&t : (void *)&t.tracer, NULL};
+    if (!x_dot) t.tracer.active = NULL;
+    if (run.spp == 0) run.spp = sensor->spp;
+    run.seed = t.tracer.seed = seed_of(f);
+    double value, variance, sum = 0, square = 0;
+    if (imp__film_border(&sensor->film) == 0) {
+        run.spp = imp_max(run.spp, 2);
+        IMP_TRY(functional_once(f, &picture, &run, &value, &variance));
+        *out = (struct imp_estimate){value, sqrt(variance), 0};
+    } else {
+        run.spp = imp_max((run.spp + BATCHES - 1) / BATCHES, 1);
+        for (int b = 0; b < BATCHES; b++) {
+            IMP_TRY(functional_once(f, &picture, &run, &value, &variance));
+            sum += value;
+            square += value * value;
+            run.seed = t.tracer.seed = seed_of(f);
+        }
+        const double mean = sum / BATCHES;
+        variance = fmax(square / BATCHES - mean * mean, 0) / (BATCHES - 1);
+        *out = (struct imp_estimate){mean, sqrt(variance), 0};
+    }
+    st = imp__check_progress(f->check, 1);
+out:
+    return st;
+}
+
+/* ---- Differences --------------------------------------------------------------------------- */
+
+/* A parameter moved by step * weight[e]. */
+struct motion {
+    const struct imp_param *param;
+    const double *old, *weight; /* [count] */
+};
+
+static enum imp_status at(struct fresh *f, const struct motion *m, double step,
+                          struct imp_estimate *out)
+{
+    struct imp_param p = *m->param;
+    for (size_t e = 0; e < p.info.count; e++)
+        if (m->weight[e] != 0) imp__param_set(&p, e, m->old[e] + step * m->weight[e]);
+    const enum imp_status st = functional(f, NULL, out);
+    for (size_t e = 0; e < p.info.count; e++) imp__param_set(&p, e, m->old[e]);
+    return st;
+}
+
+/* Combine values at places with factors: value and SE of sum factor F(place). */
+static enum imp_status combine(struct fresh *f, const struct motion *m, int n,
+                               const double *place, const double *factor,
+                               struct imp_estimate *out)
+{
+    double sum = 0, variance = 0;
+    for (int i = 0; i < n; i++) {
+        struct imp_estimate e;
+        const enum imp_status st = at(f, m, place[i], &e);
+        if (st != IMP_OK) return st;
+        sum += factor[i] * e.value;
+        variance += factor[i] * factor[i] * e.se * e.se;
+    }
+    *out = (struct imp_estimate){sum, sqrt(variance), 0};
+    return IMP_OK;
+}
+
+/* Room of all moving numbers below and above, in units of their weights. */
+static void room(const struct motion *m, double *below, double *above)
+{
+    *below = *above = INFINITY;
+    for (size_t e = 0; e < m->param->info.count; e++) {
+        if (m->weight[e] == 0) continue;
+        *below = fmin(*below, (m->old[e] - m->param->info.lo) / m->weight[e]);
+        *above = fmin(*above, (m->param->info.hi - m->old[e]) / m->weight[e]);
+    }
+}
+
+static enum imp_status difference(struct fresh *f, const struct motion *m, bool linear,
+                                  double *step, struct imp_estimate *out)
+{
+    double below, above, scale = 0;
+    room(m, &below, &above);
+    for (size_t e = 0; e < m->param->info.count; e++)
+        if (m->weight[e] != 0) scale = fmax(scale, imp__check_scale(m->param, e));
+    const double least = 1e-3 * scale, part = linear ? STEP_LINEAR : STEP;
+    const double both = fmin(fmin(below, above), scale);
+    if (both > least) {
+        const double h = *step = part * both;
+        const double place[4] = {h, -h, h / 2, -h / 2};
+        const double one[2] = {0.5 / h, -0.5 / h};
+        const double two[4] = {-1 / (6 * h), 1 / (6 * h), 4 / (3 * h), -4 / (3 * h)};
+        return combine(f, m, linear ? 2 : 4, place, linear ? one : two, out);
+    }
+    /* At a bound: (-3 F(0) + 4 F(h) - F(2h)) / 2h, to the side where there is room. */
+    const double side = above >= below ? 1 : -1;
+    const double h = *step = side * 0.5 * part * fmin(fmax(below, above), fmax(scale, 1e-3));
+    const double place[3] = {0, h, 2 * h};
+    const double factor[3] = {-1.5 / h, 2 / h, -0.5 / h};
+    return combine(f, m, 3, place, factor, out);
+}
+
+static enum imp_status compare(struct fresh *f, const struct motion *m, int64_t element,
+                               bool linear, struct imp_estimate mine)
+{
+    struct imp_estimate fd;
+    struct imp_check_row row = {.limit = Z_LIMIT};
+    const enum imp_status st = difference(f, m, linear, &row.step, &fd);
+    if (st != IMP_OK) return st;
+    row.value = mine.value;
+    row.reference = fd.value;
+    row.se = sqrt(mine.se * mine.se + fd.se * fd.se);
+    const double off = fabs(mine.value - fd.value);
+    /* Without any noise (a furnace) the difference is rounding of the pictures' floats. */
+    const double rounding = 1e-6 * fmax(fabs(mine.value), fabs(fd.value));
+    row.error = row.se > 0 ? fmax(off - rounding, 0) / row.se : off <= rounding ? 0 : INFINITY;
+    row.ok = row.error <= row.limit;
+    return imp__check_row(f->check, "fresh", m->param->info.name, element, &row);
+}
+
+/* Does F depend on this parameter through emission alone? */
+static bool is_emission(const struct imp_scene *s, size_t param)
+{
+    bool emission = false, other = false;
+    for (int i = 0; i < s->n_emitters; i++)
+        for (int j = 0; j < s->emitters[i]->n_in; j++)
+            if (s->emitters[i]->input[j]->param == (int)param && !s->emitters[i]->input[j]->texture)
+                emission = true;
+    for (int i = 0; i < s->n_bsdfs; i++)
+        for (int j = 0; j < s->bsdfs[i]->n_own; j++)
+            if (s->bsdfs[i]->input[j]->param == (int)param && !s->bsdfs[i]->input[j]->texture) {
+                if (s->bsdfs[i]->ops->inputs[j].role == IMP_EMISSION) emission = true;
+                else other = true;
+            }
+    return emission && !other;
+}
+
+static enum imp_status check_param(struct fresh *f, size_t param)
+{
+    enum imp_status st = IMP_OK;
+    const struct imp_problem *p = f->check->problem;
+    const struct imp_param *q = &p->scene->params[param];
+    const size_t count = q->info.count, base = (size_t)p->active.base[param];
+    const bool linear = is_emission(p->scene, param);
+    double *buffer = imp__alloc(f->check->ctx, 2 * count + p->n, sizeof *buffer);
+    double *old = buffer, *weight = buffer + count, *x_dot = buffer + 2 * count;
+
+    if (!buffer) return imp__error(f->check->ctx, IMP_E_NOMEM, "no memory for a check");
+    for (size_t e = 0; e < count; e++) old[e] = imp__param_get(q, e);
+    const struct motion m = {q, old, weight};
+    for (size_t e = 0; count <= 3 && e < count; e++) {
+        memset(weight, 0, count * sizeof *weight);
+        weight[e] = 1;
+        const struct imp_estimate g = {f->gradient[base + e], f->gradient_se[base + e], 0};
+        IMP_TRY(compare(f, &m, count > 1 ? (int64_t)e : -1, linear, g));
+    }
+    if (count > 3) { /* one direction through all of them */
+        struct imp_estimate g;
+        for (size_t e = 0; e < count; e++)
+            weight[e] = x_dot[base + e] = 0.5 + imp__u01(imp__key(9, 9, 9), (uint32_t)e);
+        IMP_TRY(functional(f, x_dot, &g));
+        IMP_TRY(compare(f, &m, -1, linear, g));
+    }
+out:
+    imp__release(f->check->ctx, buffer);
+    return st;
+}
+
+enum imp_status imp__check_fresh(struct imp__check *c)
+{
+    enum imp_status st = IMP_OK;
+    const struct imp_problem *p = c->problem;
+    const struct imp_film_desc *film = &c->tracer.sensor->film;
+    const size_t w = (size_t)film->crop_w, h = (size_t)film->crop_h;
+    struct fresh f = {.check = c, .channels = p->scene->channels};
+    const size_t C = (size_t)f.channels;
+
+    f.pattern = imp__alloc(c->ctx, w * h * C, sizeof *f.pattern);
+    f.gradient = imp__alloc(c->ctx, 2 * p->n, sizeof *f.gradient);
+    if (!f.pattern || !f.gradient) IMP_TRY(imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check"));
+    f.gradient_se = f.gradient + p->n;
+    for (size_t i = 0; i < w * h * C; i++) {
+        const double x = (double)(i / C % w) / (double)w, y = (double)(i / C / w) / (double)h;
+        f.pattern[i] = (float)((1 + 0.5 * cos(5 * x + 3 * y + (double)(i % C))) / (double)(w * h));
+    }
+    c->done = 0;
+    c->total = 1;
+    for (size_t k = 0; k < p->scene->n_params; k++)
+        if (p->active.base[k] >= 0)
+            c->total += 4 * (double)imp_min(p->scene->params[k].info.count, (size_t)3);
+    struct imp_run run = c->run;
+    run.seed = seed_of(&f);
+    IMP_TRY(imp_problem_reverse(c->problem, f.pattern, &run, f.gradient, f.gradient_se));
+    IMP_TRY(imp__check_progress(c, 1));
+    for (size_t k = 0; k < p->scene->n_params; k++)
+        if (p->active.base[k] >= 0) IMP_TRY(check_param(&f, k));
+out:
+    imp__release(c->ctx, f.pattern);
+    imp__release(c->ctx, f.gradient);
+    return st;
+}
