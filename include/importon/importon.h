@@ -501,7 +501,7 @@ struct imp_check_row {
     double step;        /**< of a difference; 0: none */
     double value, reference, se; /**< se of the difference; 0: deterministic */
     double error;       /**< relative error, or |z| where se > 0 */
-    double limit;
+    double limit;       /**< of error; 0: a row for information (a step that is not the best) */
     int ok;
 };
 struct imp_check_options {

@@ -23,7 +23,7 @@
 #define N_STEPS 4
 #define FROZEN_LIMIT 1e-6
 #define EXACT_LIMIT 1e-12
-#define TINY 1e-6 /* of the walk's L: logarithmic derivatives below it count as 0 */
+#define TINY 1e-3 /* of the walk's L: logarithmic derivatives below it count as 0 */
 
 static const double steps[N_STEPS] = {1e-3, 1e-4, 1e-5, 1e-6};
 static const double lane[3] = {1, 0.7, 1.3};
