@@ -1,0 +1,115 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What all index fields share: numbers, names, and calls by plain arrays. */
+#include "curved.h"
+#include <string.h>
+
+enum imp_status imp__field_new(imp_context *ctx, const struct imp__field_ops *ops,
+                               size_t size, size_t n_theta, imp_field **out)
+{
+    imp_field *f = imp__alloc(ctx, 1, size);
+    if (!f) return imp__error(ctx, IMP_E_NOMEM, "no memory for an index field");
+    f->ops = ops;
+    f->ctx = ctx;
+    f->n_theta = n_theta;
+    f->lo = imp__v3(-INFINITY, -INFINITY, -INFINITY);
+    f->hi = -f->lo;
+    f->lo[3] = f->hi[3] = 0;
+    f->theta = imp__alloc(ctx, imp_max(n_theta, (size_t)1), sizeof *f->theta);
+    if (!f->theta) {
+        imp__release(ctx, f);
+        return imp__error(ctx, IMP_E_NOMEM, "no memory for %zu numbers of an index field",
+                          n_theta);
+    }
+    *out = f;
+    return IMP_OK;
+}
+
+void imp_field_destroy(imp_field *f)
+{
+    if (!f) return;
+    if (f->ops->destroy) f->ops->destroy(f);
+    if (!f->borrowed) imp__release(f->ctx, f->theta);
+    imp__release(f->ctx, f);
+}
+
+const char *imp_field_kind(const imp_field *f) { return f->ops->name; }
+size_t imp_field_n_theta(const imp_field *f) { return f->n_theta; }
+
+void imp_field_get_theta(const imp_field *f, double *theta)
+{
+    memcpy(theta, f->theta, f->n_theta * sizeof *theta);
+}
+
+enum imp_status imp_field_set_theta(imp_field *f, const double *theta)
+{
+    for (size_t i = 0; i < f->n_theta; i++)
+        if (!isfinite(theta[i]))
+            return imp__error(f->ctx, IMP_E_ARG, "number %zu of the %s field is not finite", i,
+                              f->ops->name);
+    memcpy(f->theta, theta, f->n_theta * sizeof *theta);
+    if (f->ops->changed) f->ops->changed(f);
+    return IMP_OK;
+}
+
+const char *imp_field_param_name(const imp_field *f, size_t i)
+{
+    return f->ops->param_name && i < f->n_theta ? f->ops->param_name(f, i) : NULL;
+}
+
+void imp_field_bounds(const imp_field *f, double lo[3], double hi[3])
+{
+    imp__v3_store(f->lo, lo);
+    imp__v3_store(f->hi, hi);
+}
+
+void imp_field_eval(const imp_field *f, const double x[3], double *eta, double *gradient,
+                    double *hessian)
+{
+    const imp_v3 at = imp__v3_load(x);
+    struct imp__jet j;
+    imp__field_eval1(f, &at, hessian ? 2 : 1, &j);
+    *eta = j.eta;
+    if (gradient) imp__v3_store(j.g, gradient);
+    if (hessian) {
+        hessian[0] = j.h[0][0], hessian[1] = j.h[1][1], hessian[2] = j.h[2][2];
+        hessian[3] = j.h[0][1], hessian[4] = j.h[0][2], hessian[5] = j.h[1][2];
+    }
+}
+
+void imp_field_splat(const imp_field *f, const double x[3], double a, const double b[3],
+                     double *theta_bar)
+{
+    const imp_v3 at = imp__v3_load(x), gb = imp__v3_load(b);
+    f->ops->splat(f, &at, a, &gb, theta_bar);
+}
+
+void imp_field_tangent(const imp_field *f, const double x[3], const double *theta_dot,
+                       double *eta_dot, double gradient_dot[3])
+{
+    const imp_v3 at = imp__v3_load(x);
+    imp_v3 g;
+    f->ops->tangent(f, &at, theta_dot, eta_dot, &g);
+    imp__v3_store(g, gradient_dot);
+}
+
+double imp__field_index_max(const imp_field *f)
+{
+    if (imp__field_is_grid(f)) {
+        const struct imp__grid *g = (const struct imp__grid *)f;
+        double m = 0;
+        for (size_t i = 0; i < f->n_theta; i++) m = fmax(m, f->theta[i]);
+        return g->desc.param == IMP_FIELD_ETA2 ? sqrt(2 * m) : m;
+    }
+    double m = 0;
+    for (int i = 0; i <= 64; i++) {
+        imp_v3 x = {0};
+        for (int k = 0; k < 3; k++)
+            if (isfinite(f->lo[k]) && isfinite(f->hi[k]))
+                x[k] = f->lo[k] + (f->hi[k] - f->lo[k]) * i / 64;
+        struct imp__jet j;
+        imp__field_eval1(f, &x, 1, &j);
+        if (isfinite(j.eta)) m = fmax(m, j.eta);
+    }
+    return m;
+}

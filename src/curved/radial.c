@@ -1,0 +1,119 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Radial spline: eta = f(u), a cubic B-spline in u = r^2 on [0, radius^2], with r from a
+ * centre or an axis. In r^2 nothing is singular at r = 0:
+ *     g = 2 f' y,  H = 2 f' P + 4 f'' y y^T,
+ *     theta_bar_k += a B_k(u) + 2 (b.y) B_k'(u)                     (curved-rays 3.2) */
+#include "curved.h"
+#include <string.h>
+
+#define CELLS_MAX 65536
+
+struct basis { int first; double b[4], d[4], dd[4]; };
+
+static inline imp_v3 offset_of(const struct imp__radial *r, imp_v3 x)
+{
+    imp_v3 y = x - r->centre;
+    if (r->desc.cylinder) y -= r->axis * imp__dot(y, r->axis);
+    return y;
+}
+
+static struct basis basis_of(const struct imp__radial *r, double u2)
+{
+    struct basis b;
+    const double t = u2 / r->h;
+    b.first = (int)imp_clamp(t, 0.0, (double)(r->desc.cells - 1));
+    const double u = t - b.first, m = 1 - u, k = 1 / r->h;
+    b.b[0] = m * m * m / 6;
+    b.b[1] = (3 * u * u * u - 6 * u * u + 4) / 6;
+    b.b[2] = (-3 * u * u * u + 3 * u * u + 3 * u + 1) / 6;
+    b.b[3] = u * u * u / 6;
+    b.d[0] = -m * m / 2 * k;
+    b.d[1] = (3 * u * u - 4 * u) / 2 * k;
+    b.d[2] = (-3 * u * u + 2 * u + 1) / 2 * k;
+    b.d[3] = u * u / 2 * k;
+    b.dd[0] = (1 - u) * k * k;
+    b.dd[1] = (3 * u - 2) * k * k;
+    b.dd[2] = (1 - 3 * u) * k * k;
+    b.dd[3] = u * k * k;
+    return b;
+}
+
+static void radial_eval(const imp_field *f, int n, const imp_v3 *x, int order,
+                        struct imp__jet *jet)
+{
+    const struct imp__radial *r = (const struct imp__radial *)f;
+    for (int i = 0; i < n; i++) {
+        const imp_v3 y = offset_of(r, x[i]);
+        const struct basis b = basis_of(r, imp__dot(y, y));
+        double f0 = 0, f1 = 0, f2 = 0;
+        for (int k = 0; k < 4; k++) {
+            const double c = f->theta[b.first + k];
+            f0 += c * b.b[k], f1 += c * b.d[k], f2 += c * b.dd[k];
+        }
+        jet[i].eta = f0;
+        jet[i].g = y * (2 * f1);
+        if (order < 2) continue;
+        for (int k = 0; k < 3; k++) {
+            imp_v3 e = {0};
+            e[k] = 1;
+            if (r->desc.cylinder) e -= r->axis * r->axis[k];
+            jet[i].h[k] = e * (2 * f1) + y * (4 * f2 * y[k]);
+        }
+    }
+}
+
+static void radial_splat(const imp_field *f, const imp_v3 *x, double a, const imp_v3 *b,
+                         double *theta_bar)
+{
+    const struct imp__radial *r = (const struct imp__radial *)f;
+    const imp_v3 y = offset_of(r, *x);
+    const struct basis s = basis_of(r, imp__dot(y, y));
+    const double slope = 2 * imp__dot(*b, y);
+    for (int k = 0; k < 4; k++) theta_bar[s.first + k] += a * s.b[k] + slope * s.d[k];
+}
+
+static void radial_tangent(const imp_field *f, const imp_v3 *x, const double *theta_dot,
+                           double *eta_dot, imp_v3 *g_dot)
+{
+    const struct imp__radial *r = (const struct imp__radial *)f;
+    const imp_v3 y = offset_of(r, *x);
+    const struct basis s = basis_of(r, imp__dot(y, y));
+    double f0 = 0, f1 = 0;
+    for (int k = 0; k < 4; k++)
+        f0 += theta_dot[s.first + k] * s.b[k], f1 += theta_dot[s.first + k] * s.d[k];
+    *eta_dot = f0;
+    *g_dot = y * (2 * f1);
+}
+
+const struct imp__field_ops imp__field_radial = {
+    .name = "radial", .eval = radial_eval, .splat = radial_splat, .tangent = radial_tangent};
+
+enum imp_status imp_field_radial_create(imp_context *ctx, const struct imp_field_radial *desc,
+                                        double index, imp_field **out)
+{
+    const imp_v3 axis = imp__v3_load(desc->axis);
+    const double length = imp__length(axis);
+    imp_field *f = NULL;
+    if (desc->cells < 1 || desc->cells > CELLS_MAX)
+        return imp__error(ctx, IMP_E_ARG, "radial field: %d cells", desc->cells);
+    if (!(desc->radius > 0) || !isfinite(desc->radius))
+        return imp__error(ctx, IMP_E_ARG, "radial field: radius %g", desc->radius);
+    if (desc->cylinder && !(length > 0 && isfinite(length)))
+        return imp__error(ctx, IMP_E_ARG, "radial field: the axis has no direction");
+    if (!(index > 0) || !isfinite(index))
+        return imp__error(ctx, IMP_E_ARG, "radial field: index %g is not positive", index);
+    enum imp_status st = imp__field_new(ctx, &imp__field_radial, sizeof(struct imp__radial),
+                                        (size_t)desc->cells + 3, &f);
+    if (st != IMP_OK) return st;
+    struct imp__radial *r = (struct imp__radial *)f;
+    r->desc = *desc;
+    r->desc.size = sizeof r->desc;
+    r->centre = imp__v3_load(desc->centre);
+    r->axis = desc->cylinder ? axis * (1 / length) : (imp_v3){0};
+    r->h = desc->radius * desc->radius / desc->cells;
+    f->spacing = desc->radius / desc->cells;
+    for (size_t i = 0; i < f->n_theta; i++) f->theta[i] = index;
+    *out = f;
+    return IMP_OK;
+}

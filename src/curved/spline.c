@@ -1,0 +1,200 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Tensor cubic B-spline: eta = sum theta_abc w_a(u) w_b(v) w_c(w). Twice differentiable, so
+ * the adjoint of a traced ray is also the macroscopic derivative (curved-rays 3.1, 3.3).
+ * The x axis is contiguous: rows of four coefficients are vectors, reduced over y, then z,
+ * and only at the end multiplied with the weights of x. */
+#include "curved.h"
+
+struct cell {          /* where a point falls */
+    size_t corner;     /* index of the first coefficient */
+    imp_v3 u;          /* local coordinates, in [0, 1) inside the domain */
+};
+
+static inline struct cell cell_of(const struct imp__grid *g, imp_v3 x)
+{
+    const imp_v3 u = (x - g->origin) * g->inv_h;
+    struct cell c;
+    int i[3];
+    for (int k = 0; k < 3; k++) {
+        /* Outside, the cell is clamped, not u: the polynomial goes on. */
+        const int top = g->desc.cells[k] - 1;
+        const double f = imp_clamp(u[k], 0.0, (double)top);
+        i[k] = (int)f;
+    }
+    c.u = imp__v3(u[0] - i[0], u[1] - i[1], u[2] - i[2]);
+    c.corner = (size_t)i[0] + (size_t)g->nodes[0] * ((size_t)i[1] + (size_t)g->nodes[1] * i[2]);
+    return c;
+}
+
+static inline imp_spec weights(double u)
+{
+    const double m = 1 - u, u2 = u * u, u3 = u2 * u;
+    return (imp_spec){m * m * m, 3 * u3 - 6 * u2 + 4, -3 * u3 + 3 * u2 + 3 * u + 1, u3} *
+           (1.0 / 6);
+}
+static inline imp_spec weights_d(double u, double inv_h)
+{
+    const double m = 1 - u, u2 = u * u;
+    return (imp_spec){-m * m, 3 * u2 - 4 * u, -3 * u2 + 2 * u + 1, u2} * (0.5 * inv_h);
+}
+static inline imp_spec weights_dd(double u, double inv_h)
+{
+    return (imp_spec){1 - u, 3 * u - 2, 1 - 3 * u, u} * (inv_h * inv_h);
+}
+
+typedef float row_f __attribute__((vector_size(16)));
+
+static inline imp_spec row_load(const struct imp__grid *g, size_t i, bool single)
+{
+    imp_spec r;
+    if (single) {
+        row_f f;
+        __builtin_memcpy(&f, g->single + i, sizeof f);
+        r = __builtin_convertvector(f, imp_spec);
+    } else {
+        __builtin_memcpy(&r, g->base.theta + i, sizeof r);
+    }
+    return r;
+}
+static inline double sum4(imp_spec a) { return (a[0] + a[1]) + (a[2] + a[3]); }
+
+static inline __attribute__((always_inline)) void
+eval_first(const struct imp__grid *g, imp_v3 x, bool single, struct imp__jet *j)
+{
+    const struct cell c = cell_of(g, x);
+    const imp_spec wx = weights(c.u[0]), wy = weights(c.u[1]), wz = weights(c.u[2]);
+    const imp_spec dx = weights_d(c.u[0], g->inv_h[0]), dy = weights_d(c.u[1], g->inv_h[1]),
+                   dz = weights_d(c.u[2], g->inv_h[2]);
+    const size_t sy = (size_t)g->nodes[0], sz = sy * (size_t)g->nodes[1];
+    imp_spec a = {0}, ay = {0}, az = {0};
+#pragma GCC unroll 4
+    for (int k = 0; k < 4; k++) {
+        const size_t at = c.corner + (size_t)k * sz;
+        const imp_spec r0 = row_load(g, at, single), r1 = row_load(g, at + sy, single),
+                       r2 = row_load(g, at + 2 * sy, single),
+                       r3 = row_load(g, at + 3 * sy, single);
+        const imp_spec s = (wy[0] * r0 + wy[1] * r1) + (wy[2] * r2 + wy[3] * r3);
+        const imp_spec sd = (dy[0] * r0 + dy[1] * r1) + (dy[2] * r2 + dy[3] * r3);
+        a += wz[k] * s;
+        ay += wz[k] * sd;
+        az += dz[k] * s;
+    }
+    j->eta = sum4(wx * a);
+    j->g = imp__v3(sum4(dx * a), sum4(wx * ay), sum4(wx * az));
+}
+
+static inline __attribute__((always_inline)) void
+eval_second(const struct imp__grid *g, imp_v3 x, bool single, struct imp__jet *j)
+{
+    const struct cell c = cell_of(g, x);
+    const imp_spec wx = weights(c.u[0]), wy = weights(c.u[1]), wz = weights(c.u[2]);
+    const imp_spec dx = weights_d(c.u[0], g->inv_h[0]), dy = weights_d(c.u[1], g->inv_h[1]),
+                   dz = weights_d(c.u[2], g->inv_h[2]);
+    const imp_spec ddx = weights_dd(c.u[0], g->inv_h[0]),
+                   ddy = weights_dd(c.u[1], g->inv_h[1]),
+                   ddz = weights_dd(c.u[2], g->inv_h[2]);
+    const size_t sy = (size_t)g->nodes[0], sz = sy * (size_t)g->nodes[1];
+    imp_spec a = {0}, ay = {0}, az = {0}, ayy = {0}, ayz = {0}, azz = {0};
+#pragma GCC unroll 4
+    for (int k = 0; k < 4; k++) {
+        const size_t at = c.corner + (size_t)k * sz;
+        const imp_spec r0 = row_load(g, at, single), r1 = row_load(g, at + sy, single),
+                       r2 = row_load(g, at + 2 * sy, single),
+                       r3 = row_load(g, at + 3 * sy, single);
+        const imp_spec s = (wy[0] * r0 + wy[1] * r1) + (wy[2] * r2 + wy[3] * r3);
+        const imp_spec sd = (dy[0] * r0 + dy[1] * r1) + (dy[2] * r2 + dy[3] * r3);
+        const imp_spec sdd = (ddy[0] * r0 + ddy[1] * r1) + (ddy[2] * r2 + ddy[3] * r3);
+        a += wz[k] * s;
+        ay += wz[k] * sd;
+        ayy += wz[k] * sdd;
+        az += dz[k] * s;
+        ayz += dz[k] * sd;
+        azz += ddz[k] * s;
+    }
+    const double xy = sum4(dx * ay), xz = sum4(dx * az), yz = sum4(wx * ayz);
+    j->eta = sum4(wx * a);
+    j->g = imp__v3(sum4(dx * a), sum4(wx * ay), sum4(wx * az));
+    j->h[0] = imp__v3(sum4(ddx * a), xy, xz);
+    j->h[1] = imp__v3(xy, sum4(wx * ayy), yz);
+    j->h[2] = imp__v3(xz, yz, sum4(wx * azz));
+}
+
+static void spline_eval(const imp_field *f, int n, const imp_v3 *x, int order,
+                        struct imp__jet *jet)
+{
+    const struct imp__grid *g = (const struct imp__grid *)f;
+    if (order < 2) {
+        if (g->single)
+            for (int i = 0; i < n; i++) eval_first(g, x[i], true, &jet[i]);
+        else
+            for (int i = 0; i < n; i++) eval_first(g, x[i], false, &jet[i]);
+    } else {
+        if (g->single)
+            for (int i = 0; i < n; i++) eval_second(g, x[i], true, &jet[i]);
+        else
+            for (int i = 0; i < n; i++) eval_second(g, x[i], false, &jet[i]);
+    }
+    if (g->desc.param == IMP_FIELD_ETA2)
+        for (int i = 0; i < n; i++) imp__jet_from_eta2(&jet[i], order);
+}
+
+/* theta_bar += a w_a w_b w_c + (1/h)(b_x w_a' w_b w_c + ...): each row gets the x weights and
+ * their derivative, each times a number. */
+static void splat_raw(const struct imp__grid *g, const imp_v3 *x, double va, imp_v3 b,
+                      double *theta_bar)
+{
+    const struct cell c = cell_of(g, *x);
+    const imp_spec wx = weights(c.u[0]), wy = weights(c.u[1]), wz = weights(c.u[2]);
+    const imp_spec dx = weights_d(c.u[0], g->inv_h[0]) * b[0],
+                   dy = weights_d(c.u[1], g->inv_h[1]) * b[1],
+                   dz = weights_d(c.u[2], g->inv_h[2]) * b[2];
+    const size_t sy = (size_t)g->nodes[0], sz = sy * (size_t)g->nodes[1];
+#pragma GCC unroll 4
+    for (int k = 0; k < 4; k++) {
+        const double s = va * wz[k] + dz[k];
+        double *row = theta_bar + c.corner + (size_t)k * sz;
+#pragma GCC unroll 4
+        for (int i = 0; i < 4; i++, row += sy) {
+            const double p = wy[i] * s + dy[i] * wz[k], q = wy[i] * wz[k];
+            imp_spec r;
+            __builtin_memcpy(&r, row, sizeof r);
+            r += wx * p + dx * q;
+            __builtin_memcpy(row, &r, sizeof r);
+        }
+    }
+}
+
+static void spline_splat(const imp_field *f, const imp_v3 *x, double a, const imp_v3 *b,
+                         double *theta_bar)
+{
+    const struct imp__grid *g = (const struct imp__grid *)f;
+    imp_v3 gb = *b;
+    if (g->desc.param == IMP_FIELD_ETA2) {
+        struct imp__jet j;
+        spline_eval(f, 1, x, 1, &j);
+        imp__eta2_vjp(&j, &a, &gb);
+    }
+    splat_raw(g, x, a, gb, theta_bar);
+}
+
+static void spline_tangent(const imp_field *f, const imp_v3 *x, const double *theta_dot,
+                           double *eta_dot, imp_v3 *g_dot)
+{
+    struct imp__grid g = *(const struct imp__grid *)f; /* the same grid, other numbers */
+    struct imp__jet j;
+    g.base.theta = (double *)(uintptr_t)theta_dot;
+    eval_first(&g, *x, false, &j);
+    if (g.desc.param == IMP_FIELD_ETA2) {
+        struct imp__jet at;
+        spline_eval(f, 1, x, 1, &at);
+        imp__eta2_jvp(&at, &j);
+    }
+    *eta_dot = j.eta;
+    *g_dot = j.g;
+}
+
+const struct imp__field_ops imp__field_spline = {
+    .name = "spline", .eval = spline_eval, .splat = spline_splat, .tangent = spline_tangent,
+    .changed = imp__grid_changed,
+    .destroy = imp__grid_destroy};
