@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "convert.h"
-#include <locale.h>
-#include <stdlib.h>
 #include <string.h>
+#include "base/number.h"
 #include "math/vec.h"
 #include "rgb.h"
 
@@ -174,33 +173,28 @@ static enum imp_status list_read(imp_context *ctx, struct imp_node *node, const 
     const char *text = NULL;
     double *values = NULL;
     size_t cap = 0, len = 0;
-    const locale_t c_locale = newlocale(LC_ALL_MASK, "C", NULL);
 
     IMP_TRY(imp__props_string(ctx, node, name, NULL, &text));
     if (!text)
         IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "'%s' is required", name));
-    if (!c_locale) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "out of memory"));
-    for (const char *s = text;;) {
-        s += strspn(s, ", \t\r\n");
-        if (!*s) break;
-        char *end;
-        const double v = strtod_l(s, &end, c_locale);
-        if (end == s || (*end && !strchr(", \t\r\n", *end)) || !isfinite(v))
+    const char *s = text, *end = text + strlen(text);
+    while (*(s += strspn(s, ", \t\r\n"))) {
+        const char *start = s;
+        double v;
+        if (!imp__number(&s, end, &v) || (*s && !strchr(", \t\r\n", *s)) || !isfinite(v))
             IMP_TRY(imp__prop_error(ctx, node, imp__node_prop(node, name), IMP_E_SCENE,
-                                    "'%s': '%.20s' is not a number", name, s));
+                                    "'%s': '%.20s' is not a number", name, start));
         if (len == cap) {
             double *grown = imp__grow(ctx, values, &cap, len + 1, sizeof *values);
             if (!grown) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "out of memory"));
             values = grown;
         }
         values[len++] = v;
-        s = end;
     }
     *list = values;
     *n = len;
     values = NULL;
 out:
-    if (c_locale) freelocale(c_locale);
     imp__release(ctx, values);
     return st;
 }
