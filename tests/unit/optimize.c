@@ -132,8 +132,10 @@ int main(void)
     toy_make(&t, ctx, 4, 0.1, 0.1);
     tap_ok(imp__search_create(&t.goal, 99, &o, t.truth, &s) == IMP_E_ARG && !s,
            "an optimiser that does not exist");
+    static double many[IMP_DENSE_MAX + 1];
     t.goal.n = IMP_DENSE_MAX + 1;
-    tap_ok(imp__search_create(&t.goal, IMP_LM, &o, t.truth, &s) != IMP_OK && !s,
+    t.goal.lo = t.goal.hi = t.goal.scale = many;
+    tap_ok(imp__search_create(&t.goal, IMP_LM, &o, many, &s) != IMP_OK && !s,
            "LM refuses many variables # %s", imp_last_error(ctx));
     imp_context_destroy(ctx);
     return tap_done();
