@@ -33,22 +33,12 @@ install_packages() {
         die "apt-get could not install ${missing[*]}"
 }
 
-# The instruction set to build for: x86-64-v3 if this processor has all of it.
-cpu_level() {
-    local flag flags
-    flags=" $(sed -n '/^flags/{s/^[^:]*://p;q}' /proc/cpuinfo 2>/dev/null) "
-    for flag in avx avx2 bmi1 bmi2 f16c fma abm movbe; do
-        [[ $flags == *" $flag "* ]] || { echo baseline; return; }
-    done
-    echo x86-64-v3
-}
-
 # configure FOLDER [meson options]: once; later calls only build.
 configure() {
     local folder=$1
     shift
     [[ -f $folder/build.ninja ]] && return 0
-    meson setup "$folder" "-Dcpu=$(cpu_level)" "$@" >"$folder.log" 2>&1 ||
+    meson setup "$folder" "$@" >"$folder.log" 2>&1 ||
         { cat "$folder.log" >&2; die "meson could not configure $folder"; }
     rm -f "$folder.log"
 }
