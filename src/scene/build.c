@@ -163,6 +163,21 @@ static enum imp_status param_add(struct imp_scene *scene, const char *name, cons
     return imp__theta_add(scene, &p, &in->param);
 }
 
+/* Texels that stand for an input stay within its bounds, if they are there to begin with:
+ * a search may not raise a reflectance above 1. */
+static void texels_bound(struct imp_scene *scene, int param, const struct imp_input_desc *d)
+{
+    if (param < 0 || scene->params[param].store != IMP_STORE_BULK) return;
+    struct imp_param *p = &scene->params[param];
+    const double hi = d->lo == 0 && d->hi == 0 ? INFINITY : d->hi;
+    size_t n = 1;
+    for (int k = 0; k < p->info.n_dims; k++) n *= p->info.dims[k];
+    for (size_t k = 0; k < n; k++)
+        if (p->bulk[k] < d->lo || p->bulk[k] > hi) return;
+    p->info.lo = imp_max(p->info.lo, d->lo);
+    p->info.hi = imp_min(p->info.hi, hi);
+}
+
 static enum imp_status input_build(struct imp_scene *scene, struct imp_node *node,
                                    const char *name, const struct imp_input_desc *d,
                                    struct imp_input *in)
@@ -192,6 +207,7 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
                                     "'%s' must be a number, a colour or a texture", d->name));
         IMP_TRY(texture_build(scene, child->node, name, d->name, &t));
         in->texture = t;
+        texels_bound(scene, t->param, d);
         return IMP_OK;
     } else if (d->flags & IMP_INPUT_REQUIRED) {
         IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "property '%s' is missing", d->name));
