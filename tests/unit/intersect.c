@@ -272,6 +272,68 @@ static void intervals(imp_context *ctx)
     world_end();
 }
 
+/* Four threads, each with a scene of its own in one context, made at the same time: one
+ * device, and the same hits. */
+struct thread_job { imp_context *ctx; double sum; int ok; };
+static void *thread_run(void *payload)
+{
+    struct thread_job *job = payload;
+    struct imp_scene scene = {.ctx = job->ctx};
+    struct imp_shape *list[8];
+    imp__arena_init(&scene.arena, job->ctx);
+    for (int k = 0; k < 8 && imp__shape_kinds[k]; k++) {
+        struct imp_node *n = imp__node_create(&scene.arena, "shape", imp__shape_kinds[k]->name,
+                                              NULL, NULL, (struct imp_loc){0});
+        n->mesh = &octahedron;
+        struct imp_prop *p =
+            imp__node_add(&scene.arena, n, "to_world", IMP_PROP_TRANSFORM, n->loc);
+        memcpy(p->number, imp__translate(imp__v3(3 * (k % 3), 3 * (k / 3), k)).m,
+               sizeof p->number);
+        struct imp_shape *s = imp__arena_array(&scene.arena, 1, sizeof *s);
+        *s = (struct imp_shape){.ops = imp__shape_kinds[k], .index = k,
+                                .self = imp__arena_array(&scene.arena, 1,
+                                                         imp__shape_kinds[k]->object_size)};
+        const struct imp_build b = {.ctx = job->ctx, .node = n, .arena = &scene.arena};
+        if (s->ops->build(&b, s->self, s) != IMP_OK) return NULL;
+        list[scene.n_shapes++] = s;
+    }
+    scene.shapes = list;
+    for (int round = 0; round < 20; round++) {
+        if (imp__intersector_create(&scene) != IMP_OK) return NULL;
+        for (uint32_t i = 0; i < 500; i++) {
+            const struct imp_key key = imp__key(77, (uint64_t)round, i);
+            const imp_v3 o = imp__v3(3, 3, -20), to = uniform3(key, 0, 8) + imp__v3(3, 3, 3);
+            const imp_v3 d = imp__normalize(to - o);
+            struct imp_hit hit;
+            if (imp__intersect(&scene, &o, &d, 0, INFINITY, &hit))
+                job->sum += hit.t + hit.shape + hit.u;
+        }
+        imp__intersector_destroy(&scene);
+    }
+    imp__arena_free(&scene.arena);
+    job->ok = 1;
+    return NULL;
+}
+static void threads(void)
+{
+    enum { N = 4 };
+    imp_context *ctx;
+    struct thread_job job[N];
+    pthread_t thread[N];
+    if (imp_context_create(NULL, &ctx) != IMP_OK) return;
+    for (int i = 0; i < N; i++) {
+        job[i] = (struct thread_job){.ctx = ctx};
+        pthread_create(&thread[i], NULL, thread_run, &job[i]);
+    }
+    int same = 1;
+    for (int i = 0; i < N; i++) {
+        pthread_join(thread[i], NULL);
+        same &= job[i].ok && job[i].sum == job[0].sum && job[i].sum > 0;
+    }
+    tap_ok(same, "four threads make and trace scenes in one context # sum %.17g", job[0].sum);
+    imp_context_destroy(ctx);
+}
+
 int main(void)
 {
     imp_context *ctx;
@@ -281,5 +343,6 @@ int main(void)
     together(ctx);
     intervals(ctx);
     imp_context_destroy(ctx);
+    threads();
     return tap_done();
 }

@@ -2,6 +2,7 @@
  *
  * Shapes alone: areas, bounds, orientation, uv and their derivatives, vertex normals, and
  * what hostile input gets. */
+#include "imp_fail_alloc.h"
 #include "imp_tap.h"
 #include "math/rng.h"
 #include "math/warp.h"
@@ -371,6 +372,13 @@ static void errors(void)
     n = node_new("shape", "cylinder");
     node_vector(n, "p1", imp__v3(0, 0, 0));
     expect_error(n, IMP_E_SCENE, "p0 and p1 are 0 apart");
+    n = node_new("shape", "rectangle");
+    node_transform(n, imp__translate(imp__v3(0, 2e18, 0)));
+    shape_build(n, NULL);
+    tap_ok(imp__intersector_create(&world) == IMP_E_SCENE &&
+               strstr(imp_last_error(ctx), "'rectangle' (rectangle) reaches further"),
+           "error: out of Embree's reach # %s", imp_last_error(ctx));
+    world.n_shapes = 0;
     n = node_new("shape", "sphere");
     node_string(n, "radius", "large");
     expect_error(n, IMP_E_SCENE, "must be a float, not a string");
@@ -467,32 +475,16 @@ static void degenerate(void)
 
 /* ---- the n-th allocation fails ------------------------------------------------------ */
 
-struct budget { long left, live; };
-static void *budget_allocate(size_t bytes, void *payload)
-{
-    struct budget *b = payload;
-    if (b->left-- <= 0) return NULL;
-    void *p = aligned_alloc(64, (bytes + 63) / 64 * 64);
-    b->live += p != NULL;
-    return p;
-}
-static void budget_release(void *memory, void *payload)
-{
-    struct budget *b = payload;
-    b->live -= memory != NULL;
-    free(memory);
-}
-
 static void starved(void)
 {
     imp_context *whole = ctx;
     int tries = 0, wrong = 0, done = 0;
     long leaked = 0;
-    for (long n = 0; n < 200 && !done; n++) {
-        struct budget budget = {.left = n};
+    for (long n = 1; n < 200 && !done; n++) {
+        struct fail_alloc heap = {.fail_at = n};
         struct imp_context_options options = IMP_CONTEXT_OPTIONS_INIT;
         options.threads = 1;
-        options.allocator = (struct imp_allocator){budget_allocate, budget_release, &budget};
+        options.allocator = fail_alloc_hooks(&heap);
         tries++;
         if (imp_context_create(&options, &ctx) != IMP_OK) continue;
         world_begin(ctx);
@@ -513,7 +505,7 @@ static void starved(void)
         wrong += st != IMP_OK && st != IMP_E_NOMEM;
         world_end();
         imp_context_destroy(ctx);
-        leaked += budget.live;
+        leaked += heap.live;
     }
     ctx = whole;
     tap_ok(done && wrong == 0 && leaked == 0 && tries > 4,
