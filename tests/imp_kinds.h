@@ -19,7 +19,6 @@
 /* Properties "name=text": a number, true, false, or a word. */
 static const struct { const char *kind, *props[6]; } kind_configs[] = {
     {"dielectric", {"int_ior=1.5", "ext_ior=1.0"}},
-    {"dielectric", {"int_ior=air", "ext_ior=diamond"}},
     {"conductor", {"material=Au"}},
     {"roughconductor", {"distribution=beckmann", "alpha=0.3"}},
     {"roughconductor", {"distribution=ggx", "alpha=0.3", "material=Cu"}},

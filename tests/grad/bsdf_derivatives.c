@@ -72,7 +72,11 @@ static double point_error(const struct imp_bsdf *b, imp_spec *in, const struct i
     imp_spec f;
     double worst = 0;
     value(b, in, d, &f);
-    for (int j = 0; j < b->n_in; j++)
+    for (int j = 0; j < b->n_in; j++) {
+        if (kind_input(b, j)->flags & IMP_INPUT_FIXED) { /* no gradient is offered */
+            if (!imp__is_zero(df[j])) worst = INFINITY;
+            continue;
+        }
         for (int c = 0; c < 3; c++) {
             const double scale = fabs(df[j][c]) + 1e-5 * fabs(f[c]) / fmax(fabs(in[j][c]), 0.02);
             const double fd = difference(b, in, d, j, c, value, 1, &t->lanes_mixed);
@@ -88,6 +92,7 @@ static double point_error(const struct imp_bsdf *b, imp_spec *in, const struct i
             }
             worst = fmax(worst, isfinite(e) ? e / scale : INFINITY);
         }
+    }
     return worst;
 }
 

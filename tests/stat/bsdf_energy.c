@@ -287,7 +287,6 @@ static void microfacets(void)
 static void dielectric_visit(const struct kind_case *c, void *payload)
 {
     const struct imp_bsdf *b = &c->bsdf;
-    const imp_spec in[2] = {imp__spec(0.7), imp__spec(0.4)};
     double reciprocal = 0, snell = 0, sum = 0;
     int n = 0;
     (void)payload;
@@ -297,6 +296,7 @@ static void dielectric_visit(const struct kind_case *c, void *payload)
         struct imp_bsdf_sample s;
         imp_spec back;
         const double u[3] = {1 - 1e-15, 0.5, 0.5};
+        const imp_spec in[3] = {imp__spec(0.7), imp__spec(0.4), imp__spec(0.5 + 0.01 * i)};
         if (!b->ops->sample(b, in, u, &d, &s)) continue;
         const struct imp_dirs r = {d.wo, {0}, 0};
         if (d.lobe == 0) continue; /* total reflection */

@@ -64,6 +64,7 @@ int main(void)
     refused("dielectric", "int_ior=-1.5", NULL, "positive");
     refused("dielectric", "ext_ior=0", NULL, "positive");
     refused("dielectric", "int_ior=kryptonite", NULL, "known are vacuum, helium");
+    refused("dielectric", "eta=1.5", NULL, "int_ior");
     refused("dielectric", "int_ior=true", NULL, "must be a");
     made("conductor", "material=none", NULL);
     made("conductor", "material=TiO2_palik", NULL);
@@ -84,6 +85,11 @@ int main(void)
     tap_ok(eta && k && eta->type == IMP_PROP_RGB && eta->number[1] == 0.92375 &&
                k->number[2] == 2.1421,
            "copper becomes numbers");
+    n = prepared("dielectric", "int_ior", IMP_PROP_STRING, 0, "polypropylene");
+    tap_ok(n && fabs(imp__node_prop(n, "eta")->number[0] - 1.489587) < 1e-6,
+           "polypropylene in air");
+    n = prepared("dielectric", "int_ior", IMP_PROP_STRING, 0, "water");
+    tap_ok(n && fabs(imp__node_prop(n, "eta")->number[0] - 1.332631) < 1e-6, "water in air");
     n = prepared("roughconductor", NULL, IMP_PROP_FLOAT, 0, NULL);
     tap_ok(n && imp__node_prop(n, "alpha") && imp__node_prop(n, "alpha")->number[0] == 0.1,
            "a roughness that is not given is a parameter too");

@@ -32,6 +32,8 @@ static enum imp_status data_convert(const struct imp_build *b, const struct imp_
     t->data = imp__arena_take(b->arena, n * (size_t)t->channels + 1, sizeof *t->data);
     if (!t->data) return imp__error(b->ctx, IMP_E_NOMEM, "bitmap does not fit");
     t->data[n * (size_t)t->channels] = 0;
+    double decoded[256]; /* 8-bit files have no other values, and pow takes its time */
+    for (int k = 0; k < 256 && im->srgb; k++) decoded[k] = imp__srgb_decode(k / 255.0);
     for (size_t i = 0; i < n; i++) {
         double p[3] = {0, 0, 0};
         for (int c = 0; c < im->channels; c++) {
@@ -40,7 +42,11 @@ static enum imp_status data_convert(const struct imp_build *b, const struct imp_
                 return imp__node_error(b->ctx, b->node, IMP_E_SCENE,
                                        "pixel (%zu, %zu) of the picture is not finite",
                                        i % (size_t)im->width, i / (size_t)im->width);
-            if (im->srgb && !raw) p[c] = imp__srgb_decode(p[c]);
+            if (im->srgb && !raw) {
+                const double k = rint(p[c] * 255);
+                const bool byte = k >= 0 && k <= 255 && (float)(k / 255) == (float)p[c];
+                p[c] = byte ? decoded[(int)k] : imp__srgb_decode(p[c]);
+            }
         }
         if (grey) p[0] = imp__luminance(p[0], p[1], p[2]);
         for (int c = 0; c < t->channels; c++)
