@@ -9,40 +9,43 @@
 
 enum { WIDTH = 720, HEIGHT = 440, LEFT = 84, RIGHT = 24, TOP = 44, BOTTOM = 58 };
 
+/* y is drawn as asinh(y / (2 unit)): logarithmic where |y| is far above `unit`, linear below.
+ * An unbiased loss may be negative near its end, and such a scale has room for it. */
 struct axes {
     double n;
-    double lo, hi; /* of y, or of log10 y */
-    int log;
+    double unit;
+    double lo, hi; /* of y */
 };
 
 static double x_at(const struct axes *a, double i)
 {
     return LEFT + (WIDTH - LEFT - RIGHT) * (a->n > 1 ? i / (a->n - 1) : 0.5);
 }
+static double bend(const struct axes *a, double y) { return asinh(0.5 * y / a->unit); }
 static double y_at(const struct axes *a, double y)
 {
-    const double v = a->log ? log10(fmax(y, pow(10, a->lo))) : y;
-    const double t = (fmin(fmax(v, a->lo), a->hi) - a->lo) / (a->hi - a->lo);
+    const double lo = bend(a, a->lo), hi = bend(a, a->hi);
+    const double t = (bend(a, fmin(fmax(y, a->lo), a->hi)) - lo) / (hi - lo);
     return HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * t;
 }
 
-static struct axes find_axes(size_t n, const double *y)
+/* The unit is the least error where there are errors, else the least positive value; at
+ * most eight decades are shown. */
+static struct axes find_axes(size_t n, const double *y, const double *se)
 {
-    struct axes a = {(double)n, INFINITY, -INFINITY, 0};
-    double least = INFINITY; /* positive one */
+    struct axes a = {(double)n, INFINITY, INFINITY, -INFINITY};
     for (size_t i = 0; i < n; i++) {
         if (!isfinite(y[i])) continue;
-        if (y[i] > 0) least = fmin(least, y[i]);
+        const double small = se && se[i] > 0 ? se[i] : fabs(y[i]);
+        if (small > 0) a.unit = fmin(a.unit, small);
         a.lo = fmin(a.lo, y[i]);
         a.hi = fmax(a.hi, y[i]);
     }
     if (!(a.lo <= a.hi)) a.lo = 0, a.hi = 1;
-    a.log = isfinite(least) && a.hi > 0;
-    if (a.log) { /* an unbiased loss may be negative near its end: those sit at the bottom */
-        a.lo = floor(log10(fmax(least, 1e-8 * a.hi)));
-        a.hi = ceil(log10(a.hi) + 1e-9);
-    }
-    if (a.hi - a.lo < 1e-12 * fmax(fabs(a.lo), 1)) a.hi = a.lo + 1;
+    const double largest = fmax(fabs(a.lo), fabs(a.hi));
+    a.unit = fmax(isfinite(a.unit) ? a.unit : 1, fmax(1e-8 * largest, 1e-300));
+    a.lo = fmin(a.lo - 0.5 * a.unit, 0);
+    a.hi = fmax(1.2 * a.hi, a.lo + a.unit);
     return a;
 }
 
@@ -60,22 +63,27 @@ static void put_tick(FILE *f, double x, double y, const char *anchor, const char
             text);
 }
 
+static void put_level(FILE *f, const struct axes *a, double value)
+{
+    char text[32];
+    const double y = y_at(a, value);
+    if (value < a->lo || value > a->hi) return;
+    fprintf(f, "<line x1=\"%d\" y1=\"%.1f\" x2=\"%d\" y2=\"%.1f\" stroke=\"#d0d0d0\"/>\n",
+            LEFT, y, WIDTH - RIGHT, y);
+    snprintf(text, sizeof text, "%g", value);
+    put_tick(f, LEFT - 8, y + 4, "end", text);
+}
+
 static void put_axes(FILE *f, const struct axes *a)
 {
-    const double step_y = a->log ? fmax(1, ceil((a->hi - a->lo) / 8)) : nice_step(a->hi - a->lo);
     const double step_x = a->n > 2 ? fmax(1, nice_step(a->n - 1)) : 1;
+    const double first = ceil(log10(a->unit)), last = log10(fmax(a->hi, -a->lo));
+    const double step_y = fmax(1, ceil((last - first) / 8));
     char text[32];
-    fprintf(f, "<g stroke=\"#d0d0d0\" stroke-width=\"1\">\n");
-    for (double v = ceil(a->lo / step_y) * step_y; v <= a->hi + 1e-9; v += step_y) {
-        const double y = y_at(a, a->log ? pow(10, v) : v);
-        fprintf(f, "<line x1=\"%d\" y1=\"%.1f\" x2=\"%d\" y2=\"%.1f\"/>\n", LEFT, y,
-                WIDTH - RIGHT, y);
-    }
-    fprintf(f, "</g>\n");
-    for (double v = ceil(a->lo / step_y) * step_y; v <= a->hi + 1e-9; v += step_y) {
-        if (a->log) snprintf(text, sizeof text, "1e%.0f", v);
-        else snprintf(text, sizeof text, "%.4g", v);
-        put_tick(f, LEFT - 8, y_at(a, a->log ? pow(10, v) : v) + 4, "end", text);
+    put_level(f, a, 0);
+    for (double k = first; k <= last; k += step_y) {
+        put_level(f, a, pow(10, k));
+        put_level(f, a, -pow(10, k));
     }
     for (double i = 0; i < a->n; i += step_x) {
         snprintf(text, sizeof text, "%.0f", i);
@@ -86,7 +94,7 @@ static void put_axes(FILE *f, const struct axes *a)
 static void put_band(FILE *f, const struct axes *a, size_t n, const double *y,
                      const double *se)
 {
-    fprintf(f, "<path fill=\"#3060c0\" fill-opacity=\"0.2\" d=\"");
+    fprintf(f, "<path fill=\"#c8d4f0\" d=\"");
     for (size_t i = 0; i < n; i++)
         fprintf(f, "%c%.2f %.2f ", i ? 'L' : 'M', x_at(a, (double)i), y_at(a, y[i] + se[i]));
     for (size_t i = n; i-- > 0;)
@@ -97,7 +105,7 @@ static void put_band(FILE *f, const struct axes *a, size_t n, const double *y,
 int plot_curve(const char *path, const char *title, const char *x_label, const char *y_label,
                size_t n, const double *y, const double *se)
 {
-    const struct axes a = find_axes(n, y);
+    const struct axes a = find_axes(n, y, se);
     int finite = 1;
     FILE *f = fopen(path, "w");
     if (!f) return cli_error(EXIT_RUN, "%s: %s", path, strerror(errno));
