@@ -137,9 +137,18 @@ static void light_sample(struct step *s, struct imp_vertex *v, const struct imp_
                    active->emitter[light]);
     if (imp__is_zero(f * le) && !differentiable) return;
 
+    /* Aimed from the moved origin at the point itself: a ray parallel to wi would meet a
+     * concave light before its end. */
     const imp_v3 o = imp__offset(at->p, at->ng, ls.wi);
-    const double reach = isfinite(ls.dist) ? ls.dist * (1 - 10 * IMP_RAY_EPSILON) : INFINITY;
-    if (imp__occluded(scene, &o, &ls.wi, 0, reach)) return;
+    imp_v3 d = ls.wi;
+    double reach = INFINITY;
+    if (isfinite(ls.dist)) {
+        d = ls.p - o;
+        reach = imp__length(d);
+        d *= 1 / reach;
+        reach *= 1 - 10 * IMP_RAY_EPSILON;
+    }
+    if (imp__occluded(scene, &o, &d, 0, reach)) return;
 
     const bool delta = e->ops->flags & IMP_EMITTER_DELTA;
     const bool bsdf_samples = s->tracer->integrator->bsdf_samples > 0;

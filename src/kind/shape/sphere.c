@@ -89,10 +89,11 @@ static void surface(const struct imp_shape *s, const struct imp_hit *hit,
     surface_at(p, imp__normalize(*o + *d * hit->t - p->center), out);
 }
 
-/* 1 - cos(theta_max) of the cone seen from distance r; < 0 on and inside the sphere. */
+/* 1 - cos(theta_max) of the cone seen from distance r; < 0 on and inside the sphere. A point
+ * of the sphere itself may lie outside by rounding: its cone would hold nothing but itself. */
 static double cone_height(const struct sphere *p, double distance)
 {
-    if (!(distance > p->radius)) return -1;
+    if (!(distance > p->radius * (1 + 1e-9))) return -1;
     const double s2 = imp__sqr(p->radius / distance);
     return s2 / (1 + sqrt(fmax(0, 1 - s2)));
 }
