@@ -473,6 +473,75 @@ static void degenerate(void)
     }
 }
 
+/* Numbers of any size where numbers go: an error, or a shape whose answers are numbers. */
+static double wild(struct imp_key key, uint32_t dim)
+{
+    static const double special[] = {0, -0.0, 1, -1, 1e-300, 1e300, 1e-30, 1e17, 1e18, 1e19,
+                                     INFINITY, NAN, 3e38, 1e-45};
+    const double u = imp__u01(key, dim);
+    if (u < 0.15) return special[(int)(imp__u01(key, dim + 1) * imp_count(special))];
+    const double size = pow(10, 24 * imp__u01(key, dim + 1) - 12);
+    return u < 0.6 ? 2 * u : (u < 0.8 ? -size : size);
+}
+static void hostile(void)
+{
+    int refused = 0, built = 0, hits = 0, bad = 0;
+    for (uint64_t round = 0; round < 4000; round++) {
+        const struct imp_key key = imp__key(99, 0, round);
+        int n_kinds = 0;
+        while (imp__shape_kinds[n_kinds]) n_kinds++;
+        const struct imp_shape_ops *ops = imp__shape_kinds[round % (uint64_t)n_kinds];
+        float p[18 + 4] = {0};
+        for (uint32_t i = 0; i < 18; i++)
+            p[i] = imp__u01(key, 100 + i) < 0.9 ? octa_positions[i]
+                                                : (float)wild(key, 200 + 2 * i);
+        struct imp_mesh_data m = octahedron;
+        m.positions = p;
+        world_begin(ctx);
+        struct imp_node *n = node_new("shape", ops->name);
+        if (kind_node(ops)->mesh) n->mesh = &m;
+        struct imp_mat4 to_world = imp__mat4_identity();
+        for (uint32_t i = 0; i < 12; i++)
+            if (imp__u01(key, i) < 0.3) to_world.m[i] = wild(key, 20 + 2 * i);
+        node_transform(n, to_world);
+        if (!strcmp(ops->name, "sphere") || !strcmp(ops->name, "cylinder"))
+            node_float(n, "radius", wild(key, 60));
+        if (!strcmp(ops->name, "cylinder"))
+            node_vector(n, "p1", imp__v3(wild(key, 62), wild(key, 64), wild(key, 66)));
+        struct imp_shape *s = shape_build(n, NULL);
+        if (!s || imp__intersector_create(&world) != IMP_OK) {
+            refused++;
+            bad += !*imp_last_error(ctx);
+            world_end();
+            continue;
+        }
+        built++;
+        bad += !isfinite(s->area) || !(s->area >= 0);
+        const imp_v3 center = (s->lo + s->hi) * 0.5;
+        const double size = imp__length(s->hi - s->lo);
+        for (uint32_t i = 0; i < 8; i++) {
+            const double u[2] = {imp__u01(key, 300 + 2 * i), imp__u01(key, 301 + 2 * i)};
+            const imp_v3 d = imp__uniform_sphere(u), o = center - d * size;
+            struct imp_hit hit;
+            struct imp_surface at;
+            if (imp__intersect(&world, &o, &d, 0, INFINITY, &hit)) {
+                hits++;
+                ops->surface(s, &hit, &o, &d, &at);
+                bad += !imp__is_finite(at.p) || !(fabs(imp__length(at.n) - 1) < 1e-6) ||
+                       !(fabs(imp__length(at.s) - 1) < 1e-6) || !isfinite(at.uv[0]) ||
+                       !(ops->pdf_toward(s, &o, &hit, &at) >= 0);
+            }
+            struct imp_light_sample l;
+            if (ops->sample_toward(s, &o, u, &l))
+                bad += !(l.pdf > 0) || !(fabs(imp__length(l.wi) - 1) < 1e-6) ||
+                       !isfinite(l.dist) || !isfinite(l.cos_light);
+        }
+        world_end();
+    }
+    tap_ok(bad == 0 && refused > 500 && built > 500 && hits > 1000,
+           "numbers of any size # refused %d built %d hits %d bad %d", refused, built, hits, bad);
+}
+
 /* ---- the n-th allocation fails ------------------------------------------------------ */
 
 static void starved(void)
@@ -533,6 +602,7 @@ int main(void)
     vertex_normals();
     errors();
     degenerate();
+    hostile();
     starved();
     imp_context_destroy(ctx);
     return tap_done();
