@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "checkpoint.h"
+#include "base/file.h"
 #include "math/rng.h"
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 #define MAGIC "importon checkpoint 1\n"
 
@@ -24,23 +24,41 @@ uint64_t imp__hash(uint64_t h, const void *bytes, size_t n)
 /* ---- Writing ------------------------------------------------------------------------------ */
 
 struct sink {
-    FILE *f;
-    uint64_t hash;  /* of all numbers, against damage */
+    imp_context *ctx;
+    struct imp_bytes text;
+    uint64_t hash;  /* of everything but the fingerprint, against damage */
+    bool failed;    /* out of memory */
 };
+
+IMP_PRINTF(2, 3) static void put(struct sink *s, const char *format, ...)
+{
+    char line[160];
+    va_list args;
+    va_start(args, format);
+    const int n = vsnprintf(line, sizeof line, format, args);
+    va_end(args);
+    s->failed |= n < 0 || !imp__bytes_add(s->ctx, &s->text, line, (size_t)n);
+}
 
 static void put_array(struct sink *s, const char *name, const double *v, size_t n)
 {
     static const char digit[] = "0123456789abcdef";
-    fprintf(s->f, "%s %zu\n", name, n);
-    for (size_t i = 0; i < n; i++) {
+    put(s, "%s %zu\n", name, n);
+    for (size_t i = 0; i < n && !s->failed; i++) {
         char text[17];
         uint64_t bits;
         memcpy(&bits, &v[i], 8);
         for (int k = 0; k < 16; k++) text[k] = digit[(bits >> (60 - 4 * k)) & 15];
         text[16] = '\n';
-        fwrite(text, 1, sizeof text, s->f);
+        s->failed |= !imp__bytes_add(s->ctx, &s->text, text, sizeof text);
     }
     s->hash = imp__hash(s->hash, v, n * sizeof *v);
+}
+
+static uint64_t head_hash(int kind, size_t n, int iteration, int finished)
+{
+    const uint64_t head[4] = {(uint64_t)kind, n, (uint64_t)iteration, (uint64_t)finished};
+    return imp__hash(0, head, sizeof head);
 }
 
 enum imp_status imp__checkpoint_write(imp_context *ctx, const char *path,
@@ -48,20 +66,15 @@ enum imp_status imp__checkpoint_write(imp_context *ctx, const char *path,
                                       const struct imp__search *search)
 {
     enum imp_status st = IMP_OK;
-    struct sink s = {0};
     char name[16];
-    const size_t length = strlen(path) + sizeof ".part";
-    char *part = imp__alloc(ctx, length, 1);
+    struct sink s = {.ctx = ctx, .hash = head_hash((int)search->kind, search->n,
+                                                   search->iteration, search->finished)};
 
-    if (!part) return imp__error(ctx, IMP_E_NOMEM, "no memory for a file name");
-    snprintf(part, length, "%s.part", path);
-    s.f = fopen(part, "wb");
-    if (!s.f) IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: %s", part, strerror(errno)));
-    fprintf(s.f, MAGIC "optimizer %d\nvariables %zu\n", (int)search->kind, search->n);
-    fprintf(s.f, "of %016llx %016llx %016llx %016llx\n", (unsigned long long)of->parameters,
-            (unsigned long long)of->scene, (unsigned long long)of->targets,
-            (unsigned long long)of->options);
-    fprintf(s.f, "iteration %d\nfinished %d\n", search->iteration, (int)search->finished);
+    put(&s, MAGIC "optimizer %d\nvariables %zu\n", (int)search->kind, search->n);
+    put(&s, "of %016llx %016llx %016llx %016llx\n", (unsigned long long)of->parameters,
+        (unsigned long long)of->scene, (unsigned long long)of->targets,
+        (unsigned long long)of->options);
+    put(&s, "iteration %d\nfinished %d\n", search->iteration, (int)search->finished);
     put_array(&s, "start", search->start, search->n);
     put_array(&s, "x", search->x, search->n);
     put_array(&s, "history", search->history, search->n_history);
@@ -71,19 +84,11 @@ enum imp_status imp__checkpoint_write(imp_context *ctx, const char *path,
         snprintf(name, sizeof name, "array%d", k);
         put_array(&s, name, search->array[k], search->array_n[k]);
     }
-    fprintf(s.f, "end %016llx\n", (unsigned long long)s.hash);
-    const bool whole = fflush(s.f) == 0 && !ferror(s.f) && fsync(fileno(s.f)) == 0;
-    const int why = errno;
-    const bool closed = fclose(s.f) == 0;
-    s.f = NULL;
-    if (!whole || !closed)
-        IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: %s", part, strerror(whole ? errno : why)));
-    if (rename(part, path) != 0)
-        IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: %s", path, strerror(errno)));
+    put(&s, "end %016llx\n", (unsigned long long)s.hash);
+    if (s.failed) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a checkpoint"));
+    IMP_TRY(imp__file_write(ctx, path, s.text.data, s.text.size));
 out:
-    if (s.f) fclose(s.f);
-    if (st != IMP_OK) remove(part);
-    imp__release(ctx, part);
+    imp__bytes_free(ctx, &s.text);
     return st;
 }
 
@@ -234,6 +239,7 @@ enum imp_status imp__checkpoint_read(imp_context *ctx, const char *path,
     s.max = (size_t)size / 17;
     IMP_TRY(imp__search_create(goal, search->kind, &none, search->x, &fresh));
     IMP_TRY(read_head(&s, of, search, &fresh->iteration, &finished));
+    s.hash = head_hash((int)fresh->kind, fresh->n, fresh->iteration, finished);
     IMP_TRY(read_body(&s, goal, fresh));
     fresh->finished = finished != 0;
     swap(search, fresh);

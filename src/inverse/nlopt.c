@@ -12,6 +12,7 @@
 
 #define RECORD_MAX 200000 /* most variables whose evaluations are kept */
 #define SLSQP_MAX 1000    /* it is O(n^3) per step */
+#define FIRST_STEP 0.1
 
 enum { RECORD };          /* arrays: rows of (f, se, g[n]) */
 enum { BEST };            /* scalars */
@@ -22,6 +23,7 @@ struct call {
     nlopt_opt opt;
     double *x;            /* [n] in the goal's units */
     double *g;            /* [n] */
+    double unit;          /* of the objective: the first steps are FIRST_STEP scales long */
     size_t calls;         /* so far, replayed ones included */
     enum imp_status st;   /* why the goal stopped the search */
 };
@@ -83,9 +85,14 @@ static double objective(unsigned n, const double *y, double *gradient, void *pay
             return HUGE_VAL;
         }
     }
-    c->calls++;
-    for (size_t k = 0; gradient && k < n; k++) gradient[k] = c->g[k] * goal->scale[k];
-    return f.value;
+    /* The methods begin with a step of the length of the gradient. */
+    if (c->calls++ == 0) {
+        double square = 0;
+        for (size_t k = 0; k < n; k++) square += c->g[k] * goal->scale[k] * c->g[k] * goal->scale[k];
+        c->unit = square > 0 && isfinite(square) ? FIRST_STEP / sqrt(square) : 1;
+    }
+    for (size_t k = 0; gradient && k < n; k++) gradient[k] = c->unit * c->g[k] * goal->scale[k];
+    return c->unit * f.value;
 }
 
 static nlopt_algorithm algorithm(enum imp_optimizer kind)
