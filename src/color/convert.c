@@ -277,7 +277,8 @@ static enum imp_status d65_object(imp_context *ctx, struct imp_node *node, enum 
 
     IMP_TRY(imp__props_float(ctx, node, "scale", 1, &scale));
     if (!isfinite(scale) || scale < 0)
-        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "'scale' must be finite and not negative"));
+        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
+                                "'scale' must be finite and not negative"));
     struct imp_prop *color = imp__node_prop(node, "color");
     if (color) {
         color->used = true;
@@ -319,7 +320,8 @@ enum imp_status imp__color_object(imp_context *ctx, struct imp_node *node,
         IMP_TRY(imp__props_float(ctx, node, "wavelength_min", 360, &ignored));
         IMP_TRY(imp__props_float(ctx, node, "wavelength_max", 830, &ignored));
         if (!isfinite(c) || (role == IMP_EMISSION && c < 0))
-            IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "'value' %g is not allowed here", c));
+            IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "'value' %g is not allowed here",
+                                    c));
         number_set(c, role, scalar, mode, &v, &n);
         break;
     }

@@ -98,7 +98,8 @@ static void eval(const struct imp_bsdf *b, const imp_spec *in, const struct imp_
     const struct imp__microfacet m = distribution(b, in);
     const imp_v3 h = imp__normalize(d->wo + d->wi);
     const double D = imp__microfacet_d(&m, &h, NULL);
-    const double G = imp__microfacet_g1(&m, &d->wi, NULL) * imp__microfacet_g1(&m, &d->wo, NULL);
+    const double G =
+        imp__microfacet_g1(&m, &d->wi, NULL) * imp__microfacet_g1(&m, &d->wo, NULL);
     imp__fresnel_conductor(fmin(1, imp__dot(d->wo, h)), &in[ETA], &in[K], f);
     *f *= in[TINT] * (D * G / (4 * d->wo[2]));
 }
