@@ -48,6 +48,7 @@ static int64_t on_write(exr_const_context_t c, void *payload, const void *data, 
 exr_context_initializer_t imp__exr_begin(struct imp_exr *io)
 {
     io->previous = imp__hooks_enter(io->ctx);
+    (void)imp__hooks_failed();
     io->outer = current;
     current = io;
     exr_context_initializer_t setup = EXR_DEFAULT_CONTEXT_INITIALIZER;
@@ -71,7 +72,7 @@ void imp__exr_end(struct imp_exr *io)
 
 enum imp_status imp__exr_error(const struct imp_exr *io, exr_result_t code)
 {
-    if (code == EXR_ERR_OUT_OF_MEMORY || io->no_memory)
+    if (code == EXR_ERR_OUT_OF_MEMORY || io->no_memory || imp__hooks_failed())
         return imp__error(io->ctx, IMP_E_NOMEM, "%s: no memory for the picture",
                           io->name ? io->name : "EXR");
     const char *text = *io->message ? io->message : exr_get_default_error_message(code);

@@ -4,6 +4,7 @@
 #include <string.h>
 
 static _Thread_local imp_context *current;
+static _Thread_local bool failed;
 
 struct header {
     _Alignas(64) imp_context *ctx;
@@ -19,10 +20,18 @@ imp_context *imp__hooks_enter(imp_context *ctx)
 
 void imp__hooks_leave(imp_context *previous) { current = previous; }
 
+bool imp__hooks_failed(void)
+{
+    const bool was = failed;
+    failed = false;
+    return was;
+}
+
 static void *allocate(imp_context *ctx, size_t bytes)
 {
-    if (!ctx || bytes > SIZE_MAX / 8) return NULL;
-    struct header *h = imp__alloc(ctx, 1, sizeof *h + bytes);
+    struct header *h =
+        ctx && bytes < SIZE_MAX / 8 ? imp__alloc(ctx, 1, sizeof *h + bytes) : NULL;
+    failed |= !h;
     if (!h) return NULL;
     h->ctx = ctx;
     h->bytes = bytes;

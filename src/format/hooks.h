@@ -10,6 +10,9 @@
 /* Allocate for `ctx` on this thread until imp__hooks_leave with the value returned here. */
 imp_context *imp__hooks_enter(imp_context *ctx);
 void imp__hooks_leave(imp_context *previous);
+/* Has an allocation failed on this thread since the last call of this? Libraries do not
+ * always say so themselves. */
+bool imp__hooks_failed(void);
 
 void *imp__hooks_malloc(size_t bytes);
 void *imp__hooks_realloc(void *memory, size_t bytes);

@@ -64,6 +64,8 @@ struct imp_scene {
     char *build_error;
     char **search;                 /* [n_search] folders for files */
     size_t n_search;
+    struct imp_tree *tree;         /* of the building calls, until commit (format/tree.h) */
+    struct imp_arena files;        /* what files held and objects copy; freed by commit */
 
     int n_shapes, n_bsdfs, n_emitters, n_sensors, n_textures;
     struct imp_shape **shapes;

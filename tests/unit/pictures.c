@@ -126,7 +126,7 @@ static void check_raw(void)
     tap_ok(imp__image_parse(ctx, "b.pfm", &b, &g, &srgb) == IMP_OK && g->mean[0] == -1 &&
                g->mean[3] == 1 && g->mean[5] == 3, "big-endian PFM, rows from the bottom");
     imp_film_destroy(g);
-    static const char npy[] = "\x93NUMPY\x01\x00\x3e\x00{'descr': '<f8', 'fortran_order': False, "
+    static const char npy[] = "\x93NUMPY\x01\x00\x40\x00{'descr': '<f8', 'fortran_order': False, "
                               "'shape': (1, 2), }    \n\0\0\0\0\0\0\xf0\x3f\0\0\0\0\0\0\0\x40";
     b = (struct imp_bytes){(unsigned char *)npy, sizeof npy - 1, 0};
     g = NULL;
@@ -315,7 +315,9 @@ static struct imp_bytes exr_make(exr_compression_t compression, int tiled)
     int part, bad = exr_start_write(&exr, in_folder("v.exr"), EXR_WRITE_FILE_DIRECTLY, &setup);
     bad |= exr_add_part(exr, NULL, tiled ? EXR_STORAGE_TILED : EXR_STORAGE_SCANLINE, &part);
     bad |= exr_initialize_required_attr_simple(exr, part, W, H, compression);
-    const exr_attr_box2i_t window = {{{-3, 5}}, {{-3 + W - 1, 5 + H - 1}}};
+    exr_attr_box2i_t window;
+    window.min.x = -3, window.max.x = window.min.x + W - 1;
+    window.min.y = 5, window.max.y = window.min.y + H - 1;
     bad |= exr_set_data_window(exr, part, &window);
     if (tiled) bad |= exr_set_tile_descriptor(exr, part, 8, 8, EXR_TILE_ONE_LEVEL, EXR_TILE_ROUND_DOWN);
     for (int c = 0; c < 4; c++)

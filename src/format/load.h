@@ -1,0 +1,20 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * From files to a scene that is ready: the part that file and building calls share. */
+#ifndef IMP_FORMAT_LOAD_H
+#define IMP_FORMAT_LOAD_H
+
+#include "scene/scene.h"
+
+/* The caller's options, complete whatever `size` says. @return IMP_E_ARG if malformed. */
+enum imp_status imp__load_options(imp_context *ctx, const struct imp_load_options *from,
+                                  struct imp_load_options *to);
+/* An empty scene, `folder` (may be NULL) at the end of its search list. */
+enum imp_status imp__scene_new(imp_context *ctx, const struct imp_load_options *options,
+                               const char *folder, struct imp_scene **out);
+/* resolve.c: attach meshes and pictures to the nodes that name files. */
+enum imp_status imp__files_attach(struct imp_scene *scene);
+/* Attach files, make objects, release what only they needed. References are resolved. */
+enum imp_status imp__scene_finish(struct imp_scene *scene);
+
+#endif
