@@ -104,11 +104,8 @@ static void rays_record(imp_context *ctx, imp_scene *scene, struct rays *out)
                 const struct imp_arena_mark mark = imp__arena_mark(&arena);
                 struct imp_walk walk;
                 imp__walk_trace(&tracer, &arena, x, y, s, &walk);
-                if (out->n + 64 > capacity) {
-                    capacity = capacity ? 2 * capacity : 1 << 16;
-                    out->list = realloc(out->list, capacity * sizeof *out->list);
-                    if (!out->list) exit(3);
-                }
+                out->list = imp__grow(ctx, out->list, &capacity, out->n + 64, sizeof *out->list);
+                if (!out->list) exit(3);
                 imp_v3 o = walk.ray.o;
                 for (const struct imp_vertex *v = walk.first; v; v = v->next) {
                     if (!v->shape) break;
@@ -166,7 +163,7 @@ static void bench_rays(void)
     }
     printf("  \"rays_over_render\": %.3f,\n  \"rays_per_second\": %.3g,\n",
            median(ratio, repeats), median(rate, repeats));
-    free(rays.list);
+    imp__release(ctx, rays.list);
     imp_scene_destroy(scene);
     imp_context_destroy(ctx);
 }

@@ -23,7 +23,7 @@ static const char textured[] =
     "<integer name='width' value='21'/><integer name='height' value='17'/>"
     "<rfilter type='%s'/></film></sensor><emitter type='constant' id='sky'/>"
     "<bsdf type='diffuse' id='floor'><texture type='bitmap' name='reflectance' id='map'>"
-    "<string name='filename' value='%s/texture/wood.png'/></texture></bsdf>"
+    "<string name='filename' value='%s/textured/waves.png'/></texture></bsdf>"
     "<bsdf type='diffuse' id='ball'/>"
     "<shape type='rectangle'><transform name='to_world'><rotate x='1' angle='-90'/>"
     "<scale value='3'/><translate y='-1'/></transform><ref id='floor'/></shape>"
