@@ -191,8 +191,9 @@ static void place(struct direction *d, double step)
     struct imp_param param = *d->param;
     for (size_t e = 0; e < param.info.count; e++) {
         const double move = component(d, e) * step;
-        imp__param_set(&param, e, move == 0 ? d->old[e]
-                                            : d->old[e] + move * imp__check_scale(&param, e));
+        imp__param_set(&param, e, d->old[e]); /* the scale is the start's, wherever we are */
+        if (move != 0)
+            imp__param_set(&param, e, d->old[e] + move * imp__check_scale(&param, e));
     }
 }
 
