@@ -76,6 +76,7 @@ static int run_check(int n, char **operand)
     if (!rc) rc = problem_open(&problem);
     if (rc) return rc;
     const struct imp_run run = cli_run();
+    progress_deadline(cli.time_s);
     check.paths = o.paths;
     check.fresh_spp = o.fresh_spp;
     const enum imp_status st = imp_check(problem, &check, &run, &rows, &n_rows);
@@ -96,4 +97,4 @@ static int run_check(int n, char **operand)
 const struct command command_check = {
     {"check", "SCENE", "check the gradients against differences and identities",
      {options, options_params, options_run, options_scene, options_general}, 1, 1},
-    run_check};
+    run_check, 1};

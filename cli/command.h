@@ -24,6 +24,7 @@ enum {
 struct command {
     struct args_spec args;
     int (*run)(int n, char **operand);
+    int prints; /* all its data is text, so -o stands for standard output */
 };
 extern const struct command command_render, command_gradient, command_jacobian, command_check,
     command_fit, command_compare, command_info, command_bench;

@@ -89,4 +89,4 @@ out:
 const struct command command_compare = {
     {"compare", "TEST REFERENCE", "do two pictures have the same expectation?",
      {options, options_general}, 2, 2},
-    run_compare};
+    run_compare, 1};

@@ -293,4 +293,4 @@ const struct command command_fit = {
     {"fit", "SCENE --target FILE", "recover parameters from target pictures",
      {options, options_targets, options_params, options_run, options_scene, options_general},
      1, 1},
-    run_fit};
+    run_fit, 0};

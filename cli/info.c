@@ -149,4 +149,4 @@ static int run_info(int n, char **operand)
 const struct command command_info = {
     {"info", "SCENE", "list a scene's objects and parameters",
      {options_scene, options_general}, 1, 1},
-    run_info};
+    run_info, 1};

@@ -110,6 +110,7 @@ static int run_jacobian(int n, char **operand)
     rc = problem_open(&problem);
     if (rc) return rc;
     const struct imp_run run = cli_run();
+    progress_deadline(cli.time_s);
     const size_t n_x = imp_problem_n(problem);
     films = cli_alloc(n_x, sizeof *films);
     const enum imp_status st = imp_problem_jacobian(problem, &run, &primal, films);
@@ -149,4 +150,4 @@ static int run_jacobian(int n, char **operand)
 const struct command command_jacobian = {
     {"jacobian", "SCENE", "one derivative picture per parameter, from one set of walks",
      {options, options_params, options_run, options_scene, options_general}, 1, 1},
-    run_jacobian};
+    run_jacobian, 0};

@@ -36,11 +36,13 @@ static const struct command *find(const char *name)
     return NULL;
 }
 
+static const char *stdout_name = "standard output";
+
 /* A full disk shows only when the last bytes are flushed. */
 static int finish(int rc)
 {
     if (fflush(stdout) != 0 || ferror(stdout))
-        return cli_error(EXIT_RUN, "standard output: %s", strerror(errno ? errno : EIO));
+        return cli_error(EXIT_RUN, "%s: %s", stdout_name, strerror(errno ? errno : EIO));
     return rc;
 }
 
@@ -77,6 +79,11 @@ int main(int argc, char **argv)
             return finish(EXIT_DONE);
         }
     rc = args_parse(&command->args, argc - 1, argv + 1, &first);
+    if (rc == 0 && command->prints && cli.out && strcmp(cli.out, "-")) {
+        stdout_name = cli.out;
+        if (!freopen(cli.out, "w", stdout))
+            rc = cli_error(EXIT_RUN, "%s: %s", cli.out, strerror(errno));
+    }
     if (rc == 0) {
         progress_init((enum progress_mode)cli.progress);
         rc = command->run(argc - 1 - first, argv + 1 + first);

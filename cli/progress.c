@@ -5,11 +5,13 @@
 #include <signal.h>
 #include <stdio.h>
 #include <string.h>
+#include <time.h>
 #include <unistd.h>
 
 static volatile sig_atomic_t stop_asked; /* the library shall stop */
 static volatile sig_atomic_t interrupted;
 static int show, drawn;
+static double deadline; /* on the monotonic clock; 0: none */
 
 static void on_interrupt(int signal_number)
 {
@@ -27,7 +29,20 @@ void progress_init(enum progress_mode mode)
     show = mode == PROGRESS_ALWAYS || (mode == PROGRESS_AUTO && isatty(STDERR_FILENO));
 }
 int progress_interrupted(void) { return interrupted; }
-void progress_resume(void) { stop_asked = 0; }
+void progress_resume(void)
+{
+    stop_asked = 0;
+    deadline = 0;
+}
+
+static double seconds_now(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_MONOTONIC, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+void progress_deadline(double seconds) { deadline = seconds > 0 ? seconds_now() + seconds : 0; }
+static int shall_stop(void) { return stop_asked || (deadline > 0 && seconds_now() > deadline); }
 
 void progress_clear(void)
 {
@@ -60,7 +75,7 @@ int progress_report(const struct imp_progress *p, void *payload)
     enum { WIDTH = 24 };
     char bar[WIDTH + 1], eta[16], elapsed[16], rate[48];
     (void)payload;
-    if (!show) return stop_asked;
+    if (!show) return shall_stop();
     const double fraction = fmin(fmax(p->fraction, 0), 1);
     const int full = (int)(fraction * WIDTH + 0.5);
     memset(bar, '#', (size_t)full);
@@ -74,5 +89,5 @@ int progress_report(const struct imp_progress *p, void *payload)
             p->note ? "  " : "", p->note ? p->note : "");
     fflush(stderr);
     drawn = 1;
-    return stop_asked;
+    return shall_stop();
 }

@@ -17,6 +17,8 @@ int progress_report(const struct imp_progress *progress, void *payload);
 void progress_clear(void);
 /* Was Ctrl-C pressed? */
 int progress_interrupted(void);
+/* From now on, ask the library to stop after this time, too; 0: never. */
+void progress_deadline(double seconds);
 /* Go on after a Ctrl-C, to write what is there; the exit code stays 130. */
 void progress_resume(void);
 
