@@ -73,7 +73,7 @@ static void format_rate(double rate, const char *unit, char *text, size_t size)
 int progress_report(const struct imp_progress *p, void *payload)
 {
     enum { WIDTH = 24 };
-    char bar[WIDTH + 1], eta[16], elapsed[16], rate[48];
+    char bar[WIDTH + 1], eta[64], elapsed[64], rate[48];
     (void)payload;
     if (!show) return shall_stop();
     const double fraction = fmin(fmax(p->fraction, 0), 1);

@@ -1,3 +1,3 @@
 # SPDX-License-Identifier: Apache-2.0
 # A parameter that does not exist, and one without a gradient, are refused.
-importon gradient "$ROOT/scenes/furnace.xml" -p 'bell.*'
+cd "$ROOT/scenes" && importon gradient furnace.xml -p 'bell.*'

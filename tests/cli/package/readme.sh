@@ -6,6 +6,5 @@ importon render photo.xml --spp 4 -q --no-preview -o photo.exr || exit 9
 sed -n 's/^    \(importon [^#]*\).*/\1/p' "$ROOT/README.md" >commands
 while read -r line; do
     [[ $line == *scenes/* ]] && continue
-    echo "+ $line"
-    $line >/dev/null 2>log || { cat log; exit 9; }
+    eval "$line" >/dev/null 2>log || { echo "+ $line"; cat log; exit 9; }
 done <commands
