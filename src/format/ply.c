@@ -184,6 +184,7 @@ static enum imp_status header_read(struct ply *p)
             IMP_TRY(ply_error(p, "line %lld: unknown header line '%.40s'", (long long)p->line,
                               words[0]));
     }
+    p->line++; /* of what follows */
     if (!format) IMP_TRY(ply_error(p, "the header names no format"));
     if (p->vertex < 0 || p->elements[p->vertex].n == 0) IMP_TRY(ply_error(p, "has no vertices"));
     if (p->face < 0 || p->elements[p->face].n == 0) IMP_TRY(ply_error(p, "has no faces"));
