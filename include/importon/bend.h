@@ -320,6 +320,159 @@ imp_bend_path(const imp_field *field, const struct imp_bend_options *options,
               const struct imp_bend_rays *rays, size_t ray, double (**points)[4],
               size_t *n_points, struct imp_bend_exit *exit);
 
+/* ---- Problems: rays, targets, and a field that is to meet them ------------------------ */
+
+typedef struct imp_bend imp_bend;
+
+/** Takes the field over, also on failure. The theta of the field is what a fit changes. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_bend_create(imp_context *context, imp_field *field,
+                                                       imp_bend **out);
+IMP_API void imp_bend_destroy(imp_bend *bend);
+/** The field: lives until the bend is destroyed or a fit refines it. */
+IMP_API imp_field *imp_bend_field(imp_bend *bend);
+
+/** Scheme, step, ... of all rays; surfaces and taps are copied. `step` 0 follows the grid:
+ * min(step_max, step_cells * cell), see imp_bend_set_step. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_bend_set_options(imp_bend *bend,
+                                                            const struct imp_bend_options *o);
+/** The step when options.step is 0: cells * spacing, at most `most` (0: no limit). */
+IMP_API void imp_bend_set_step(imp_bend *bend, double cells, double most);
+
+/** A bundle: rays that share surfaces, taps and targets by its number (their group).
+ * x, d [n]; power [n] or NULL (1/n each). *bundle may be NULL. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_bend_add_rays(imp_bend *bend, size_t n,
+                                                         const double (*x)[3],
+                                                         const double (*d)[3],
+                                                         const double *power, int *bundle);
+IMP_API size_t imp_bend_n_rays(const imp_bend *bend);
+IMP_API int imp_bend_n_bundles(const imp_bend *bend);
+
+enum imp_bend_target_type {
+    IMP_BEND_FOCUS = 0,   /**< mean |x - point|^2/2 */
+    IMP_BEND_SPOT,        /**< mean |x - centroid|^2/2 */
+    IMP_BEND_POINTS,      /**< mean |x - data_i|^2/2, data [n][3] */
+    IMP_BEND_DIRECTION,   /**< mean |d - point|^2/2 */
+    IMP_BEND_DIRECTIONS,  /**< mean |d - data_i|^2/2, data [n][3] */
+    IMP_BEND_DEFLECTION,  /**< mean |P(v - v0) - data_i|^2/2, P across the first direction */
+    IMP_BEND_PATH,        /**< mean (S - data_i)^2/2, data [n] */
+    IMP_BEND_WAVEFRONT,   /**< variance of S / 2 */
+    IMP_BEND_IMAGE,       /**< mean over pixels (E/mean - T/mean)^2/2 of the irradiance */
+    IMP_BEND_FARFIELD,    /**< the same of directions: u and v span direction cosines */
+    IMP_BEND_SHAPE        /**< mean G(x)^2/2, G the distance to `sdf` */
+};
+#define IMP_BEND_N_TARGETS 11
+
+struct imp_bend_target {
+    size_t size;
+    enum imp_bend_target_type type;
+    int bundle;            /**< -1: all rays */
+    int tap;               /**< -1: where rays exit; else the tap they cross */
+    double weight;         /**< 0: 1 */
+    int at_plane;          /**< go on straight, in index `outside`, to normal.x = offset */
+    double normal[3], offset, outside;
+    double point[3];
+    const double *data;    /**< copied */
+    const imp_field *sdf;  /**< shared */
+    /** Picture: pixel (0, 0) has its corner at origin, u runs along a row, v down a column;
+     * both as long as the whole picture (of unit length in a far field: direction cosines
+     * origin + a u + b v). pixels [height][width], copied. */
+    int width, height;
+    double origin[3], u[3], v[3];
+    const float *pixels;
+};
+#define IMP_BEND_TARGET_INIT                                                               \
+    {sizeof(struct imp_bend_target), IMP_BEND_FOCUS, -1, -1, 0, 0, {0, 0, 1}, 0, 1, {0}, 0, \
+     0, 0, 0, {0}, {0}, {0}, 0}
+/** Rays on a plane at a slant below 0.05 do not count, between 0.05 and 0.15 they count less
+ * and less: a smooth weight, differentiated. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_bend_add_target(imp_bend *bend,
+                                                           const struct imp_bend_target *t);
+
+/** weight/2 sum of squared differences of grid coefficients along each axis, of order 1 or 2;
+ * edge > 0: sum sqrt(D^2 + edge^2) instead. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_bend_add_smoothness(imp_bend *bend, double weight,
+                                                               int order, double edge);
+/** Bounds of every number of the field; default for grids of the index: 1 .. infinity. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_bend_set_bounds(imp_bend *bend, double lo, double hi);
+/** Hold what a fit may not change, here and on finer levels: grid coefficients in the
+ * `layers` outermost layers, those whose node is outside a sphere, or one number; each set to
+ * `value` (NaN: left as it is). */
+IMP_API IMP_MUST_CHECK enum imp_status imp_bend_hold_rim(imp_bend *bend, int layers,
+                                                         double value);
+IMP_API IMP_MUST_CHECK enum imp_status imp_bend_hold_outside(imp_bend *bend,
+                                                             const double centre[3],
+                                                             double radius, double value);
+IMP_API IMP_MUST_CHECK enum imp_status imp_bend_hold_number(imp_bend *bend, size_t i,
+                                                            double value);
+
+/** Objective and its gradient with respect to all numbers of the field (held ones: 0). The
+ * rays are fixed, so both are exact: no standard error belongs to them.
+ * gradient [n_theta], stats may be NULL. targets [n targets]: their parts; may be NULL. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_bend_objective(imp_bend *bend, double *value,
+                                                          double *gradient, double *targets,
+                                                          struct imp_bend_stats *stats);
+/** Exits of all rays with the field as it is; taps [n][n_taps] may be NULL. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_bend_run(imp_bend *bend, struct imp_bend_exit *exits,
+                                                    struct imp_bend_exit *taps,
+                                                    struct imp_bend_stats *stats);
+/** Position, direction and path of a ray at a target's plane; weight 0: it does not count. */
+struct imp_bend_arrival { double x[3], d[3], path, weight; uint32_t ray; };
+/** arrivals [imp_bend_n_rays]; *n is set. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_bend_arrivals(imp_bend *bend, size_t target,
+                                                         struct imp_bend_arrival *arrivals,
+                                                         size_t *n);
+/** Irradiance that an image target sees, [height][width], mean 1 when all power arrives. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_bend_image(imp_bend *bend, size_t target,
+                                                      float *pixels);
+IMP_API size_t imp_bend_n_targets(const imp_bend *bend);
+IMP_API IMP_MUST_CHECK enum imp_status imp_bend_get_target(const imp_bend *bend, size_t i,
+                                                           struct imp_bend_target *target);
+IMP_API void imp_bend_get_rays(const imp_bend *bend, struct imp_bend_rays *rays);
+/** The options in use, with the step that rays take. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_bend_get_options(const imp_bend *bend,
+                                                            struct imp_bend_options *o);
+
+#define IMP_BEND_LEVELS_MAX 8
+struct imp_bend_fit_options {
+    size_t size;
+    enum imp_optimizer optimizer; /**< IMP_LBFGS, IMP_ADAM, IMP_MMA */
+    int levels;                   /**< grids: refined levels - 1 times; 0: 1 */
+    int iterations[IMP_BEND_LEVELS_MAX]; /**< 0: as the level before; first 0: 50 */
+    double learning_rate;         /**< Adam: of `scale`; halved at each level; 0: 0.05 */
+    double tolerance;             /**< of `scale`; 0: 1e-6 */
+    double scale;                 /**< a large change of a number; 0: 0.1 */
+    const char *checkpoint;       /**< rewritten at every level and every few seconds */
+    int resume;
+    imp_progress_fn progress;
+    void *progress_payload;
+};
+#define IMP_BEND_FIT_OPTIONS_INIT                                                          \
+    {sizeof(struct imp_bend_fit_options), IMP_LBFGS, 0, {0}, 0, 0, 0, 0, 0, 0, 0}
+
+struct imp_bend_fit_result {
+    size_t size;
+    int iterations, levels;       /**< done */
+    double start, value;          /**< objective before (first level) and after (last) */
+    size_t n_history;
+    const double *history;        /**< [n_history] objective of every evaluation */
+    const char *reason;
+    struct imp_bend_stats stats;  /**< of the final field */
+};
+/** The result's arrays belong to the bend and live until its next fit.
+ * @return IMP_OK; IMP_CANCELLED (the best field so far is set); IMP_E_ARG. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_bend_fit(imp_bend *bend,
+                                                    const struct imp_bend_fit_options *options,
+                                                    struct imp_bend_fit_result *result);
+
+/** A bend from a file: <scene> with a <medium type="graded">, <rays> and <target>s
+ * (docs/curved-rays.md). options may be NULL. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_bend_load(imp_context *context, const char *path,
+                                                     const struct imp_load_options *options,
+                                                     imp_bend **out);
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_bend_load_string(imp_context *context, const char *xml, size_t length, const char *name,
+                     const struct imp_load_options *options, imp_bend **out);
+
 #ifdef __cplusplus
 }
 #endif

@@ -2,7 +2,7 @@
  *
  * A sum of fields. Its numbers are those of the parts, one after the other; the parts keep
  * none of their own. */
-#include "curved.h"
+#include "bend.h"
 #include <string.h>
 
 #define PARTS_MAX 1024
@@ -127,4 +127,17 @@ out:
     imp_field_destroy(f);
     for (size_t p = 0; p < n; p++) imp_field_destroy(parts[p]);
     return st;
+}
+
+void imp__field_leaves(imp_field *f, size_t offset,
+                       void (*each)(imp_field *leaf, size_t offset, void *payload),
+                       void *payload)
+{
+    if (f->ops != &imp__field_sum) {
+        each(f, offset, payload);
+        return;
+    }
+    const struct sum *s = (const struct sum *)f;
+    for (size_t p = 0; p < s->n; offset += s->part[p]->n_theta, p++)
+        imp__field_leaves(s->part[p], offset, each, payload);
 }

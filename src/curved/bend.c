@@ -1,0 +1,366 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Making a problem of bent rays. */
+#include "bend.h"
+#include <string.h>
+
+#define RAYS_MAX ((size_t)1 << 31)
+#define PIXELS_MAX ((size_t)1 << 26)
+
+enum imp_status imp_bend_create(imp_context *ctx, imp_field *field, imp_bend **out)
+{
+    imp_bend *b = imp__alloc(ctx, 1, sizeof *b);
+    if (!b) {
+        imp_field_destroy(field);
+        return imp__error(ctx, IMP_E_NOMEM, "no memory for a problem of bent rays");
+    }
+    b->ctx = ctx;
+    b->field = field;
+    b->options = (struct imp_bend_options)IMP_BEND_OPTIONS_INIT;
+    b->lo = 1, b->hi = INFINITY;
+    b->step_cells = field->ops == &imp__field_trilinear ? 0.5 : 1;
+    *out = b;
+    return IMP_OK;
+}
+
+void imp_bend_destroy(imp_bend *b)
+{
+    if (!b) return;
+    imp_context *ctx = b->ctx;
+    for (size_t i = 0; i < b->n_targets; i++) {
+        imp__release(ctx, b->targets[i].data);
+        imp__release(ctx, b->targets[i].pixels);
+    }
+    for (size_t i = 0; i < b->n_sdfs; i++) imp_field_destroy(b->sdfs[i]);
+    void *const owned[] = {b->surfaces, b->taps, b->x, b->d, b->power, b->group,
+                           b->bundle_first, b->targets, b->holds, b->smooths, b->sdfs,
+                           b->history};
+    for (size_t i = 0; i < imp_count(owned); i++) imp__release(ctx, owned[i]);
+    imp_field_destroy(b->field);
+    imp__release(ctx, b);
+}
+
+imp_field *imp_bend_field(imp_bend *b) { return b->field; }
+size_t imp_bend_n_rays(const imp_bend *b) { return b->n; }
+int imp_bend_n_bundles(const imp_bend *b) { return b->n_bundles; }
+size_t imp_bend_n_targets(const imp_bend *b) { return b->n_targets; }
+void imp_bend_get_rays(const imp_bend *b, struct imp_bend_rays *r) { *r = imp__bend_rays(b); }
+
+enum imp_status imp_bend_get_target(const imp_bend *b, size_t i, struct imp_bend_target *t)
+{
+    if (i >= b->n_targets) return imp__error(b->ctx, IMP_E_ARG, "no target %zu", i);
+    *t = b->targets[i].desc;
+    return IMP_OK;
+}
+
+enum imp_status imp_bend_set_options(imp_bend *b, const struct imp_bend_options *o)
+{
+    imp_context *ctx = b->ctx;
+    struct imp_bend_surface *s = imp__alloc(ctx, o->n_surfaces + 1, sizeof *s);
+    struct imp_bend_tap *t = imp__alloc(ctx, o->n_taps + 1, sizeof *t);
+    if (!s || !t) {
+        imp__release(ctx, s), imp__release(ctx, t);
+        return imp__error(ctx, IMP_E_NOMEM, "no memory for surfaces");
+    }
+    if (o->n_surfaces) memcpy(s, o->surfaces, o->n_surfaces * sizeof *s);
+    if (o->n_taps) memcpy(t, o->taps, o->n_taps * sizeof *t);
+    imp__release(ctx, b->surfaces), imp__release(ctx, b->taps);
+    b->surfaces = s, b->taps = t;
+    b->options = *o;
+    b->options.surfaces = s, b->options.taps = t;
+    return IMP_OK;
+}
+
+void imp_bend_set_step(imp_bend *b, double cells, double most)
+{
+    b->step_cells = cells;
+    b->step_max = most;
+}
+
+void imp__bend_options(const imp_bend *b, struct imp_bend_options *o)
+{
+    *o = b->options;
+    if (o->step > 0) return;
+    const double cells = b->field->spacing > 0 ? b->step_cells * b->field->spacing : 0;
+    o->step = cells > 0 && b->step_max > 0 ? fmin(cells, b->step_max)
+              : b->step_max > 0            ? b->step_max
+                                           : cells;
+}
+
+enum imp_status imp_bend_get_options(const imp_bend *b, struct imp_bend_options *o)
+{
+    imp__bend_options(b, o);
+    return o->step > 0 ? IMP_OK
+                       : imp__error(b->ctx, IMP_E_ARG, "a %s field has no cells to choose a "
+                                    "step by: give one", b->field->ops->name);
+}
+
+static bool room(imp_context *ctx, void *array, size_t *capacity, size_t n, size_t size)
+{
+    void **p = array;
+    void *grown = imp__grow(ctx, *p, capacity, n, size);
+    if (grown) *p = grown;
+    return grown != NULL;
+}
+
+enum imp_status imp_bend_add_rays(imp_bend *b, size_t n, const double (*x)[3],
+                                  const double (*d)[3], const double *power, int *bundle)
+{
+    const size_t total = b->n + n;
+    if (n == 0 || total > RAYS_MAX)
+        return imp__error(b->ctx, IMP_E_ARG, "a bundle of %zu rays", n);
+    if (b->n_bundles >= 60000)
+        return imp__error(b->ctx, IMP_E_ARG, "more than 60000 bundles of rays");
+    for (size_t i = 0; i < n; i++)
+        for (int k = 0; k < 3; k++)
+            if (!isfinite(x[i][k]) || !isfinite(d[i][k]))
+                return imp__error(b->ctx, IMP_E_ARG, "ray %zu of the bundle is not finite", i);
+    for (size_t i = 0; power && i < n; i++)
+        if (!(power[i] >= 0) || !isfinite(power[i]))
+            return imp__error(b->ctx, IMP_E_ARG, "ray %zu of the bundle has power %g", i,
+                              power[i]);
+    if (!room(b->ctx, &b->x, &b->cap_x, total, sizeof *b->x) ||
+        !room(b->ctx, &b->d, &b->cap_d, total, sizeof *b->d) ||
+        !room(b->ctx, &b->group, &b->cap_group, total, sizeof *b->group) ||
+        !room(b->ctx, &b->power, &b->cap_power, total, sizeof *b->power) ||
+        !room(b->ctx, &b->bundle_first, &b->cap_bundles, (size_t)b->n_bundles + 2,
+              sizeof *b->bundle_first))
+        return imp__error(b->ctx, IMP_E_NOMEM, "no memory for %zu rays", n);
+    memcpy(b->x + b->n, x, n * sizeof *x);
+    memcpy(b->d + b->n, d, n * sizeof *d);
+    for (size_t i = 0; i < n; i++) {
+        b->group[b->n + i] = (uint16_t)b->n_bundles;
+        b->power[b->n + i] = power ? power[i] : 1 / (double)n;
+    }
+    b->bundle_first[b->n_bundles] = b->n;
+    if (bundle) *bundle = b->n_bundles;
+    b->n_bundles++;
+    b->n = total;
+    b->bundle_first[b->n_bundles] = total;
+    return IMP_OK;
+}
+
+static enum imp_status target_check(const imp_bend *b, const struct imp_bend_target *t)
+{
+    const bool image = t->type == IMP_BEND_IMAGE || t->type == IMP_BEND_FARFIELD;
+    if ((int)t->type < 0 || t->type >= IMP_BEND_N_TARGETS)
+        return imp__error(b->ctx, IMP_E_ARG, "no such target");
+    if (t->bundle >= b->n_bundles || b->n == 0)
+        return imp__error(b->ctx, IMP_E_ARG, "target of bundle %d: there are %d", t->bundle,
+                          b->n_bundles);
+    if (t->tap >= (int)b->options.n_taps)
+        return imp__error(b->ctx, IMP_E_ARG, "target at tap %d: there are %zu", t->tap,
+                          b->options.n_taps);
+    if (!(t->weight >= 0) || !isfinite(t->weight))
+        return imp__error(b->ctx, IMP_E_ARG, "target of weight %g", t->weight);
+    const imp_v3 n = imp__v3_load(t->normal);
+    if (t->at_plane && (!(imp__length(n) > 0) || !imp__is_finite(n) || !isfinite(t->offset) ||
+                        !(t->outside > 0)))
+        return imp__error(b->ctx, IMP_E_ARG, "target: no such plane");
+    if ((t->type == IMP_BEND_POINTS || t->type == IMP_BEND_DIRECTIONS) && !t->data)
+        return imp__error(b->ctx, IMP_E_ARG, "target without its data");
+    if (t->type == IMP_BEND_SHAPE && !t->sdf)
+        return imp__error(b->ctx, IMP_E_ARG, "target without its distance field");
+    if (image && (!t->pixels || t->width < 4 || t->height < 4 ||
+                  (size_t)t->width * (size_t)t->height > PIXELS_MAX ||
+                  !(imp__length(imp__v3_load(t->u)) > 0) ||
+                  !(imp__length(imp__v3_load(t->v)) > 0)))
+        return imp__error(b->ctx, IMP_E_ARG, "image target: no picture, %d x %d, or no extent",
+                          t->width, t->height);
+    return IMP_OK;
+}
+
+static size_t data_size(enum imp_bend_target_type type)
+{
+    switch (type) {
+    case IMP_BEND_POINTS:
+    case IMP_BEND_DIRECTIONS:
+    case IMP_BEND_DEFLECTION: return 3;
+    case IMP_BEND_PATH: return 1;
+    case IMP_BEND_FOCUS: case IMP_BEND_SPOT: case IMP_BEND_DIRECTION: case IMP_BEND_WAVEFRONT:
+    case IMP_BEND_IMAGE: case IMP_BEND_FARFIELD: case IMP_BEND_SHAPE: break;
+    }
+    return 0;
+}
+
+enum imp_status imp_bend_add_target(imp_bend *b, const struct imp_bend_target *desc)
+{
+    enum imp_status st = target_check(b, desc);
+    imp_context *ctx = b->ctx;
+    if (st != IMP_OK) return st;
+    struct imp__target_of_rays t = {.desc = *desc};
+    t.first = desc->bundle < 0 ? 0 : b->bundle_first[desc->bundle];
+    t.last = desc->bundle < 0 ? b->n : b->bundle_first[desc->bundle + 1];
+    const size_t n = (t.last - t.first) * data_size(desc->type);
+    const size_t n_pixels = desc->pixels ? (size_t)desc->width * (size_t)desc->height : 0;
+    if (t.desc.weight == 0) t.desc.weight = 1;
+    imp_v3 normal = imp__v3_load(desc->normal);
+    const double length = imp__length(normal);
+    if (desc->at_plane) {
+        imp__v3_store(normal * (1 / length), t.desc.normal);
+        t.desc.offset /= length;
+    }
+    for (size_t i = t.first; i < t.last; i++) t.power += b->power[i];
+    if (!(t.power > 0)) IMP_TRY(imp__error(ctx, IMP_E_ARG, "target of rays without power"));
+    if (n > 0) {
+        t.data = imp__alloc(ctx, n, sizeof *t.data);
+        if (!t.data) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a target"));
+        if (desc->data) memcpy(t.data, desc->data, n * sizeof *t.data);
+        for (size_t i = 0; i < n; i++)
+            if (!isfinite(t.data[i]))
+                IMP_TRY(imp__error(ctx, IMP_E_ARG, "number %zu of a target is not finite", i));
+    }
+    if (n_pixels > 0) {
+        double mean = 0;
+        t.pixels = imp__alloc(ctx, n_pixels, sizeof *t.pixels);
+        if (!t.pixels) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a picture"));
+        for (size_t i = 0; i < n_pixels; i++) {
+            if (!isfinite(desc->pixels[i]) || desc->pixels[i] < 0)
+                IMP_TRY(imp__error(ctx, IMP_E_ARG, "pixel %zu of a target is %g", i,
+                                   (double)desc->pixels[i]));
+            mean += desc->pixels[i] / (double)n_pixels;
+        }
+        if (!(mean > 0)) IMP_TRY(imp__error(ctx, IMP_E_ARG, "a target picture that is black"));
+        for (size_t i = 0; i < n_pixels; i++) t.pixels[i] = (float)(desc->pixels[i] / mean);
+    }
+    t.desc.data = t.data;
+    t.desc.pixels = t.pixels;
+    if (!room(ctx, &b->targets, &b->cap_targets, b->n_targets + 1, sizeof *b->targets))
+        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a target"));
+    b->targets[b->n_targets++] = t;
+    return IMP_OK;
+out:
+    imp__release(ctx, t.data);
+    imp__release(ctx, t.pixels);
+    return st;
+}
+
+enum imp_status imp_bend_add_smoothness(imp_bend *b, double weight, int order, double edge)
+{
+    if (!(weight >= 0) || !isfinite(weight) || order < 1 || order > 2 || !(edge >= 0))
+        return imp__error(b->ctx, IMP_E_ARG, "smoothness of weight %g, order %d, edge %g", weight,
+                          order, edge);
+    if (!room(b->ctx, &b->smooths, &b->cap_smooths, b->n_smooths + 1, sizeof *b->smooths))
+        return imp__error(b->ctx, IMP_E_NOMEM, "no memory for a regulariser");
+    b->smooths[b->n_smooths++] = (struct imp__smooth){weight, edge, order};
+    return IMP_OK;
+}
+
+enum imp_status imp_bend_set_bounds(imp_bend *b, double lo, double hi)
+{
+    if (!(lo < hi)) return imp__error(b->ctx, IMP_E_ARG, "bounds %g to %g", lo, hi);
+    b->lo = lo, b->hi = hi;
+    b->bounds_set = true;
+    return IMP_OK;
+}
+
+/* ---- Holds and bounds ----------------------------------------------------------------- */
+
+static enum imp_status hold_add(imp_bend *b, const struct imp__hold *h)
+{
+    enum imp_status st = IMP_OK;
+    double *theta = imp__alloc(b->ctx, b->field->n_theta + 1, sizeof *theta);
+    uint8_t *mask = imp__alloc(b->ctx, b->field->n_theta + 1, 1);
+    if (!theta || !mask ||
+        !room(b->ctx, &b->holds, &b->cap_holds, b->n_holds + 1, sizeof *b->holds))
+        IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "no memory for held numbers"));
+    b->holds[b->n_holds++] = *h;
+    imp_field_get_theta(b->field, theta);
+    imp__bend_hold(b, mask, theta);
+    IMP_TRY(imp_field_set_theta(b->field, theta));
+out:
+    imp__release(b->ctx, theta);
+    imp__release(b->ctx, mask);
+    return st;
+}
+
+enum imp_status imp_bend_hold_rim(imp_bend *b, int layers, double value)
+{
+    if (layers < 1 || layers > 1000)
+        return imp__error(b->ctx, IMP_E_ARG, "a rim of %d layers", layers);
+    return hold_add(b, &(struct imp__hold){.kind = IMP_HOLD_RIM, .layers = layers,
+                                           .value = value});
+}
+enum imp_status imp_bend_hold_outside(imp_bend *b, const double centre[3], double radius,
+                                      double value)
+{
+    if (!(radius > 0)) return imp__error(b->ctx, IMP_E_ARG, "a sphere of radius %g", radius);
+    return hold_add(b, &(struct imp__hold){.kind = IMP_HOLD_OUTSIDE, .radius = radius,
+                                           .centre = imp__v3_load(centre), .value = value});
+}
+enum imp_status imp_bend_hold_number(imp_bend *b, size_t i, double value)
+{
+    if (i >= b->field->n_theta)
+        return imp__error(b->ctx, IMP_E_ARG, "number %zu of a field that has %zu", i,
+                          b->field->n_theta);
+    return hold_add(b, &(struct imp__hold){.kind = IMP_HOLD_NUMBER, .number = i,
+                                           .value = value});
+}
+
+struct hold_job { const struct imp__hold *hold; uint8_t *mask; double *theta; };
+
+static void hold_leaf(imp_field *f, size_t offset, void *payload)
+{
+    const struct hold_job *j = payload;
+    const struct imp__hold *h = j->hold;
+    if (!imp__field_is_grid(f)) return;
+    const struct imp__grid *g = (const struct imp__grid *)f;
+    const int first = g->desc.interp == IMP_FIELD_SPLINE ? -1 : 0;
+    const double value = g->desc.param == IMP_FIELD_ETA2 ? h->value * h->value / 2 : h->value;
+    size_t at = offset;
+    for (int k = 0; k < g->nodes[2]; k++)
+        for (int jj = 0; jj < g->nodes[1]; jj++)
+            for (int i = 0; i < g->nodes[0]; i++, at++) {
+                const int index[3] = {i, jj, k};
+                bool held = false;
+                if (h->kind == IMP_HOLD_RIM) {
+                    for (int a = 0; a < 3; a++)
+                        held |= index[a] < h->layers || index[a] >= g->nodes[a] - h->layers;
+                } else {
+                    imp_v3 x = {0};
+                    for (int a = 0; a < 3; a++)
+                        x[a] = g->origin[a] + (index[a] + first) / g->inv_h[a];
+                    held = imp__length(x - h->centre) > h->radius;
+                }
+                if (!held) continue;
+                j->mask[at] = 1;
+                if (j->theta && isfinite(value)) j->theta[at] = value;
+            }
+}
+
+void imp__bend_hold(const imp_bend *b, uint8_t *mask, double *theta)
+{
+    for (size_t i = 0; i < b->n_holds; i++) {
+        struct hold_job j = {&b->holds[i], mask, theta};
+        if (b->holds[i].kind != IMP_HOLD_NUMBER) {
+            imp__field_leaves(b->field, 0, hold_leaf, &j);
+        } else if (b->holds[i].number < b->field->n_theta) {
+            mask[b->holds[i].number] = 1;
+            if (theta && isfinite(b->holds[i].value))
+                theta[b->holds[i].number] = b->holds[i].value;
+        }
+    }
+}
+
+struct bounds_job { const imp_bend *b; double *lo, *hi; };
+
+/* Bounds are on the index: on coefficients where these are indices (spline weights are >= 0
+ * and sum to 1), not on the numbers of profiles. */
+static void bounds_leaf(imp_field *f, size_t offset, void *payload)
+{
+    const struct bounds_job *j = payload;
+    const bool grid = imp__field_is_grid(f);
+    double lo = j->b->lo, hi = j->b->hi;
+    if (grid && ((const struct imp__grid *)f)->desc.param == IMP_FIELD_ETA2)
+        lo = lo * fabs(lo) / 2, hi = hi * hi / 2;
+    if (!grid && f->ops != &imp__field_radial) lo = -INFINITY, hi = INFINITY;
+    for (size_t i = 0; i < f->n_theta; i++) j->lo[offset + i] = lo, j->hi[offset + i] = hi;
+}
+void imp__bend_bounds(const imp_bend *b, double *lo, double *hi)
+{
+    struct bounds_job j = {b, lo, hi};
+    imp__field_leaves(b->field, 0, bounds_leaf, &j);
+    /* In a sum a part may be below the index's bound: the sum is what is bounded. */
+    if (b->field->ops == &imp__field_sum && !b->bounds_set)
+        for (size_t i = 0; i < b->field->n_theta; i++) lo[i] = -INFINITY, hi[i] = INFINITY;
+}

@@ -1,0 +1,281 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Fits: the objective of a problem handed to inverse/'s optimisers, level by level. At each
+ * level the grid is refined (the function stays the same) and the optimiser begins anew from
+ * there: curvature and moments of the coarse numbers are not those of the fine ones
+ * (curved-rays 3.4). Adam's rate is halved explicitly. */
+#include "bend.h"
+#include "inverse/checkpoint.h"
+#include <stdio.h>
+#include <string.h>
+
+struct fit {
+    imp_bend *b;
+    const struct imp_bend_fit_options *o;
+    struct imp__goal goal;
+    struct imp__opt_options opt;
+    struct imp__fingerprint print;
+    uint8_t *held;
+    double *theta, *bar, *lo, *hi, *scale, *x0; /* [n_theta], of active numbers where [n] */
+    size_t *at;                                 /* [n] index in theta */
+    int level, levels, done_iterations;
+    double fraction_lo, fraction_hi, start_s, last_report_s, last_checkpoint_s;
+    double last_value, best_value, rays_done;
+    struct imp_bend_stats stats;
+    char note[80];
+};
+
+static void level_free(struct fit *f)
+{
+    imp_context *ctx = f->b->ctx;
+    void *const owned[] = {f->held, f->theta, f->bar, f->lo, f->hi, f->scale, f->x0, f->at};
+    for (size_t i = 0; i < imp_count(owned); i++) imp__release(ctx, owned[i]);
+    f->held = NULL;
+    f->theta = f->bar = f->lo = f->hi = f->scale = f->x0 = NULL;
+    f->at = NULL;
+}
+
+static enum imp_status theta_set(struct fit *f, const double *x)
+{
+    for (size_t k = 0; k < f->goal.n; k++) f->theta[f->at[k]] = x[k];
+    return imp_field_set_theta(f->b->field, f->theta);
+}
+
+static bool report(struct fit *f, bool force)
+{
+    const double now = imp__now();
+    if (!f->o->progress || (!force && now - f->last_report_s < 0.1)) return false;
+    f->last_report_s = now;
+    const double elapsed = now - f->start_s;
+    snprintf(f->note, sizeof f->note, "level %d of %d, objective %.4g", f->level + 1, f->levels,
+             f->best_value);
+    const double part = imp_min(1.0, (double)f->done_iterations / f->opt.max_iterations);
+    const double fraction = f->fraction_lo + (f->fraction_hi - f->fraction_lo) * part;
+    const struct imp_progress p = {
+        .size = sizeof p, .stage = "fit", .fraction = fraction, .elapsed_s = elapsed,
+        .eta_s = fraction > 1e-3 ? elapsed * (1 - fraction) / fraction : -1,
+        .rate = elapsed > 0 ? f->rays_done / elapsed : 0, .rate_unit = "rays",
+        .note = f->note};
+    return f->o->progress(&p, f->o->progress_payload) != 0;
+}
+
+static enum imp_status goal_eval(const double *x, uint64_t seed, struct imp_estimate *e,
+                                 double *g, double *g_se, void *payload)
+{
+    struct fit *f = payload;
+    (void)seed; /* the rays are fixed */
+    enum imp_status st = theta_set(f, x);
+    double value = 0;
+    if (st != IMP_OK) return st;
+    st = imp_bend_objective(f->b, &value, g ? f->bar : NULL, NULL, &f->stats);
+    if (st != IMP_OK) return st;
+    f->rays_done += (double)f->b->n;
+    f->last_value = value;
+    if (value < f->best_value) f->best_value = value;
+    *e = (struct imp_estimate){value, 0, 0};
+    for (size_t k = 0; g && k < f->goal.n; k++) g[k] = f->bar[f->at[k]];
+    for (size_t k = 0; g_se && k < f->goal.n; k++) g_se[k] = 0;
+    return IMP_OK;
+}
+
+static enum imp_status goal_iterated(const struct imp__search *s, void *payload)
+{
+    struct fit *f = payload;
+    f->done_iterations = s->iteration;
+    const double now = imp__now();
+    if (f->o->checkpoint && now - f->last_checkpoint_s > 5) {
+        f->last_checkpoint_s = now;
+        const enum imp_status st = imp__checkpoint_write(f->b->ctx, f->o->checkpoint, &f->print, s);
+        if (st != IMP_OK) return st;
+    }
+    return report(f, false) ? IMP_CANCELLED : IMP_OK;
+}
+
+/* What a checkpoint belongs to. */
+static void fingerprint(struct fit *f)
+{
+    const imp_bend *b = f->b;
+    uint64_t h = imp__hash(0, &b->n, sizeof b->n);
+    h = imp__hash(h, b->x, b->n * sizeof *b->x);
+    h = imp__hash(h, b->d, b->n * sizeof *b->d);
+    f->print.scene = h;
+    h = 1;
+    for (size_t i = 0; i < b->n_targets; i++) {
+        const struct imp_bend_target *t = &b->targets[i].desc;
+        h = imp__hash(h, &t->type, sizeof t->type);
+        h = imp__hash(h, &t->weight, sizeof t->weight);
+        h = imp__hash(h, t->point, sizeof t->point);
+        h = imp__hash(h, t->normal, sizeof t->normal);
+        h = imp__hash(h, &t->offset, sizeof t->offset);
+    }
+    f->print.targets = h;
+    f->print.parameters = imp__hash(2, &b->field->n_theta, sizeof b->field->n_theta);
+    h = imp__hash(3, &f->o->optimizer, sizeof f->o->optimizer);
+    f->print.options = imp__hash(h, &f->level, sizeof f->level);
+}
+
+static enum imp_status level_begin(struct fit *f)
+{
+    enum imp_status st = IMP_OK;
+    imp_bend *b = f->b;
+    imp_context *ctx = b->ctx;
+    const size_t n = b->field->n_theta;
+    level_free(f);
+    f->held = imp__alloc(ctx, n + 1, 1);
+    f->theta = imp__alloc(ctx, n + 1, sizeof(double));
+    f->bar = imp__alloc(ctx, n + 1, sizeof(double));
+    f->lo = imp__alloc(ctx, n + 1, sizeof(double));
+    f->hi = imp__alloc(ctx, n + 1, sizeof(double));
+    f->scale = imp__alloc(ctx, n + 1, sizeof(double));
+    f->x0 = imp__alloc(ctx, n + 1, sizeof(double));
+    f->at = imp__alloc(ctx, n + 1, sizeof *f->at);
+    if (!f->held || !f->theta || !f->bar || !f->lo || !f->hi || !f->scale || !f->x0 || !f->at)
+        return imp__error(ctx, IMP_E_NOMEM, "no memory for a fit of %zu numbers", n);
+    imp_field_get_theta(b->field, f->theta);
+    imp__bend_hold(b, f->held, f->theta);
+    IMP_TRY(imp_field_set_theta(b->field, f->theta));
+    imp__bend_bounds(b, f->lo, f->hi);
+    size_t k = 0;
+    for (size_t i = 0; i < n; i++) {
+        if (f->held[i]) continue;
+        f->lo[k] = f->lo[i], f->hi[k] = f->hi[i]; /* k <= i */
+        f->scale[k] = f->o->scale > 0 ? f->o->scale : 0.1;
+        f->x0[k] = f->theta[i];
+        f->at[k++] = i;
+    }
+    if (k == 0) IMP_TRY(imp__error(ctx, IMP_E_ARG, "nothing to fit: every number is held"));
+    f->goal = (struct imp__goal){.ctx = ctx, .n = k, .lo = f->lo, .hi = f->hi,
+                                 .scale = f->scale, .eval = goal_eval,
+                                 .iterated = goal_iterated, .payload = f};
+    int iterations = 50;
+    double rate = f->o->learning_rate > 0 ? f->o->learning_rate : 0.05;
+    for (int l = 0; l <= f->level; l++)
+        if (f->o->iterations[l] > 0) iterations = f->o->iterations[l];
+    for (int l = 0; l < f->level; l++) rate /= 2;
+    f->opt = (struct imp__opt_options){iterations, rate,
+                                       f->o->tolerance > 0 ? f->o->tolerance : 1e-6};
+    f->done_iterations = 0;
+    fingerprint(f);
+out:
+    return st;
+}
+
+static enum imp_status level_run(struct fit *f, bool resume, bool *found, const char **reason,
+                                 int *iterations)
+{
+    enum imp_status st = IMP_OK, ended;
+    imp_bend *b = f->b;
+    struct imp__search *s = NULL;
+    IMP_TRY(imp__search_create(&f->goal, f->o->optimizer, &f->opt, f->x0, &s));
+    if (resume) {
+        IMP_TRY(imp__checkpoint_read(b->ctx, f->o->checkpoint, &f->print, &f->goal, s, found));
+        if (!*found) goto out;
+    }
+    f->best_value = INFINITY;
+    ended = imp__optimize(&f->goal, &f->opt, s);
+    if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
+    IMP_TRY(theta_set(f, s->x));
+    *reason = s->reason ? s->reason : ended == IMP_CANCELLED ? "stopped" : "all iterations done";
+    *iterations += s->iteration;
+    const size_t n = b->n_history + s->n_history;
+    void *grown = imp__grow(b->ctx, b->history, &b->cap_history, n + 1, sizeof *b->history);
+    if (!grown) IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "no memory for the history"));
+    b->history = grown;
+    if (s->n_history)
+        memcpy(b->history + b->n_history, s->history, s->n_history * sizeof *b->history);
+    b->n_history = n;
+    if (f->o->checkpoint)
+        IMP_TRY(imp__checkpoint_write(b->ctx, f->o->checkpoint, &f->print, s));
+    st = ended;
+out:
+    imp__search_destroy(s);
+    return st;
+}
+
+/* The field of level `level`, as far as its shape goes. */
+static enum imp_status refine(imp_bend *b)
+{
+    imp_field *fine;
+    const enum imp_status st = imp_field_refine(b->field, &fine);
+    if (st != IMP_OK) return st;
+    imp_field_destroy(b->field);
+    b->field = fine;
+    return IMP_OK;
+}
+
+/* Find the level the checkpoint belongs to, refining until it fits. */
+static enum imp_status resume(struct fit *f, bool *found, const char **reason, int *iterations)
+{
+    enum imp_status st = IMP_OK;
+    for (f->level = 0; f->level < f->levels; f->level++) {
+        if (f->level > 0) IMP_TRY(refine(f->b));
+        IMP_TRY(level_begin(f));
+        f->fraction_lo = (double)f->level / f->levels;
+        f->fraction_hi = (double)(f->level + 1) / f->levels;
+        st = level_run(f, true, found, reason, iterations);
+        if (st != IMP_E_ARG) return st;
+    }
+    st = imp__error(f->b->ctx, IMP_E_ARG, "%s: belongs to another problem", f->o->checkpoint);
+out:
+    return st;
+}
+
+enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *options,
+                             struct imp_bend_fit_result *result)
+{
+    static const struct imp_bend_fit_options defaults = IMP_BEND_FIT_OPTIONS_INIT;
+    const struct imp_bend_fit_options *o = options ? options : &defaults;
+    struct fit f = {.b = b, .o = o, .levels = imp_max(o->levels, 1), .start_s = imp__now()};
+    enum imp_status st = IMP_OK;
+    const char *reason = "nothing was done";
+    int iterations = 0, first = 0;
+    double start = 0, value = 0;
+    bool found = false;
+
+    if (f.levels > IMP_BEND_LEVELS_MAX)
+        return imp__error(b->ctx, IMP_E_ARG, "%d levels: at most %d", f.levels,
+                          IMP_BEND_LEVELS_MAX);
+    if (o->optimizer == IMP_LM)
+        return imp__error(b->ctx, IMP_E_UNSUPPORTED, "bent rays are fitted by lbfgs, adam, mma");
+    if (f.levels > 1 && !imp__field_is_grid(b->field))
+        return imp__error(b->ctx, IMP_E_ARG, "levels are for grids, not for a %s field",
+                          b->field->ops->name);
+    b->n_history = 0;
+    if (o->checkpoint && o->resume) {
+        st = resume(&f, &found, &reason, &iterations);
+        if (st != IMP_OK && st != IMP_CANCELLED) goto out;
+        if (found) first = f.level + 1;
+    }
+    if (!found) {
+        f.level = 0;
+        IMP_TRY(level_begin(&f));
+        IMP_TRY(imp_bend_objective(b, &start, NULL, NULL, NULL));
+    }
+    for (int level = first; level < f.levels && st == IMP_OK; level++) {
+        f.level = level;
+        if (level > 0) {
+            IMP_TRY(refine(b));
+            IMP_TRY(level_begin(&f));
+        }
+        f.fraction_lo = (double)level / f.levels;
+        f.fraction_hi = (double)(level + 1) / f.levels;
+        st = level_run(&f, false, &found, &reason, &iterations);
+        if (st != IMP_OK && st != IMP_CANCELLED) goto out;
+    }
+    const enum imp_status ended = st;
+    IMP_TRY(imp_bend_objective(b, &value, NULL, NULL, &f.stats));
+    f.best_value = value;
+    f.done_iterations = f.opt.max_iterations;
+    report(&f, true);
+    if (result) {
+        *result = (struct imp_bend_fit_result){
+            .size = sizeof *result, .iterations = iterations, .levels = f.level + 1,
+            .start = found && first > 0 && b->n_history ? b->history[0] : start,
+            .value = value, .n_history = b->n_history, .history = b->history,
+            .reason = reason, .stats = f.stats};
+    }
+    st = ended;
+out:
+    level_free(&f);
+    return st;
+}
