@@ -17,7 +17,7 @@ static inline void imp__concentric_disk(const double u[2], double xy[2])
     }
     /* phi = pi/4 b/a, or pi/2 - pi/4 a/b: sine and cosine change places. */
     const bool wide = fabs(a) > fabs(b);
-    const double r = wide ? a : b, x = IMP_PI / 4 * (wide ? b / a : a / b);
+    const double r = wide ? a : b, other = wide ? b : a, x = IMP_PI / 4 * (other / r);
     const double s = imp__sin_eighth(x), c = imp__cos_eighth(x);
     xy[0] = r * (wide ? c : s);
     xy[1] = r * (wide ? s : c);

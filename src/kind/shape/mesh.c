@@ -79,7 +79,9 @@ static enum imp_status areas_sum(const struct imp_build *b, struct imp__mesh *m,
                                  struct imp_shape *s, size_t n)
 {
     m->cumulative = imp__arena_take(b->arena, n, sizeof *m->cumulative);
-    if (!m->cumulative)
+    double *normals = imp__arena_take(b->arena, 3 * n, sizeof *normals);
+    m->face_normals = normals;
+    if (!m->cumulative || !normals)
         return imp__node_error(b->ctx, b->node, IMP_E_NOMEM, "out of memory");
     double sum = 0;
     for (size_t k = 0; k < n; k++) {
@@ -87,8 +89,10 @@ static enum imp_status areas_sum(const struct imp_build *b, struct imp__mesh *m,
         const imp_v3 p = load3(m->positions, i[0]);
         const imp_v3 c = imp__cross(load3(m->positions, i[1]) - p,
                                     load3(m->positions, i[2]) - p);
-        const double before = sum;
-        sum += imp__length(c) / 2;
+        const double before = sum, length = imp__length(c);
+        const imp_v3 ng = length > 0 ? c * (1 / length) : imp__v3(0, 0, 1);
+        for (int j = 0; j < 3; j++) normals[3 * k + (size_t)j] = ng[j];
+        sum += length / 2;
         if (sum > before) m->last = k;
         m->cumulative[k] = sum;
     }
@@ -97,6 +101,17 @@ static enum imp_status areas_sum(const struct imp_build *b, struct imp__mesh *m,
     s->area = sum;
     m->inv_area = sum > 0 ? 1 / sum : 0;
     return IMP_OK;
+}
+
+/* Do all vertex normals say what the faces say? Then they are not worth looking up. */
+static bool is_flat(const struct imp__mesh *m, const float *normals, size_t n)
+{
+    for (size_t k = 0; k < 3 * n; k++) {
+        const double *ng = m->face_normals + k / 3 * 3;
+        const imp_v3 d = load3(normals, m->indices[k]) - imp__v3(ng[0], ng[1], ng[2]);
+        if (!(imp__dot(d, d) < 1e-13)) return false;
+    }
+    return true;
 }
 
 enum imp_status imp__mesh_build(const struct imp_build *b, void *self, struct imp_shape *s,
@@ -133,8 +148,8 @@ enum imp_status imp__mesh_build(const struct imp_build *b, void *self, struct im
     else if (normals)
         IMP_TRY(imp__mesh_normals(b->ctx, n, data->n_triangles, m->positions, m->indices,
                                   normals));
-    m->normals = normals;
     IMP_TRY(areas_sum(b, m, s, data->n_triangles));
+    m->normals = normals && !is_flat(m, normals, data->n_triangles) ? normals : NULL;
     s->geometry = IMP_TRIANGLES;
     s->triangles =
         (struct imp_triangles){n, data->n_triangles, m->positions, m->indices};
@@ -142,20 +157,20 @@ out:
     return st;
 }
 
-void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit, const imp_v3 *o,
-                       const imp_v3 *d, struct imp_surface *out)
+/* Edges of a triangle from its first vertex. */
+struct edges { imp_v3 e1, e2; };
+
+/* Position, normals and uv: all that a light sample needs. */
+static inline struct edges point(const struct imp__mesh *m, const struct imp_hit *hit,
+                                 struct imp_surface *out)
 {
-    (void)o, (void)d;
-    const struct imp__mesh *m = s->self;
     const uint32_t *i = m->indices + 3 * (size_t)hit->prim;
+    const double *ng = m->face_normals + 3 * (size_t)hit->prim;
     const double b1 = hit->u, b2 = hit->v, b0 = 1 - b1 - b2;
     const imp_v3 p0 = load3(m->positions, i[0]);
-    const imp_v3 e1 = load3(m->positions, i[1]) - p0, e2 = load3(m->positions, i[2]) - p0;
-    const imp_v3 c = imp__cross(e1, e2);
-    const double length = imp__length(c);
-    out->p = p0 + e1 * b1 + e2 * b2;
-    out->ng = length > 0 ? c * (1 / length) : imp__v3(0, 0, 1);
-
+    const struct edges e = {load3(m->positions, i[1]) - p0, load3(m->positions, i[2]) - p0};
+    out->p = p0 + e.e1 * b1 + e.e2 * b2;
+    out->ng = imp__v3(ng[0], ng[1], ng[2]);
     out->n = out->ng;
     if (m->normals) {
         const imp_v3 n = load3(m->normals, i[0]) * b0 + load3(m->normals, i[1]) * b1 +
@@ -163,24 +178,37 @@ void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit, con
         const double l = imp__length(n);
         if (l > 1e-6) out->n = n * (1 / l);
     }
-
     /* Without uv they are the weights of the file's second and third vertex. */
     out->uv[0] = m->reversed ? b2 : b1;
     out->uv[1] = m->reversed ? b1 : b2;
-    out->dp_du = m->reversed ? e2 : e1;
-    out->dp_dv = m->reversed ? e1 : e2;
     if (m->uvs) {
+        const float *t0 = m->uvs + 2 * (size_t)i[0], *t1 = m->uvs + 2 * (size_t)i[1],
+                    *t2 = m->uvs + 2 * (size_t)i[2];
+        for (int k = 0; k < 2; k++)
+            out->uv[k] = t0[k] + b1 * ((double)t1[k] - t0[k]) + b2 * ((double)t2[k] - t0[k]);
+    }
+    return e;
+}
+
+void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit, const imp_v3 *o,
+                       const imp_v3 *d, struct imp_surface *out)
+{
+    (void)o, (void)d;
+    const struct imp__mesh *m = s->self;
+    const struct edges e = point(m, hit, out);
+    out->dp_du = m->reversed ? e.e2 : e.e1;
+    out->dp_dv = m->reversed ? e.e1 : e.e2;
+    if (m->uvs) {
+        const uint32_t *i = m->indices + 3 * (size_t)hit->prim;
         const float *t0 = m->uvs + 2 * (size_t)i[0], *t1 = m->uvs + 2 * (size_t)i[1],
                     *t2 = m->uvs + 2 * (size_t)i[2];
         const double u1 = (double)t1[0] - t0[0], v1 = (double)t1[1] - t0[1];
         const double u2 = (double)t2[0] - t0[0], v2 = (double)t2[1] - t0[1];
         const double det = u1 * v2 - v1 * u2;
-        out->uv[0] = t0[0] + b1 * u1 + b2 * u2;
-        out->uv[1] = t0[1] + b1 * v1 + b2 * v2;
         /* Solve e_k = u_k dp_du + v_k dp_dv unless the uv triangle is a sliver. */
         if (fabs(det) > 1e-12 * ((u1 * u1 + v1 * v1) + (u2 * u2 + v2 * v2))) {
-            out->dp_du = (e1 * v2 - e2 * v1) * (1 / det);
-            out->dp_dv = (e2 * u1 - e1 * u2) * (1 / det);
+            out->dp_du = (e.e1 * v2 - e.e2 * v1) * (1 / det);
+            out->dp_dv = (e.e2 * u1 - e.e1 * u2) * (1 / det);
         }
     }
     imp__surface_frame(out);
@@ -205,7 +233,7 @@ bool imp__mesh_sample(const struct imp_shape *s, const imp_v3 *ref, const double
                                       u[1]}, b);
     const struct imp_hit hit = {.prim = (int)lo, .u = b[0], .v = b[1]};
     struct imp_surface at;
-    imp__mesh_surface(s, &hit, NULL, NULL, &at);
+    point(m, &hit, &at);
     out->uv[0] = at.uv[0];
     out->uv[1] = at.uv[1];
     return imp__light_from_area(*ref, at.p, at.ng, at.n, m->inv_area, out);

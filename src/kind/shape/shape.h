@@ -96,6 +96,7 @@ struct imp__mesh {
     double *cumulative; /* [n] area of the triangles up to and with this one */
     size_t last;        /* the last triangle that has area */
     double inv_area;
+    const double *face_normals;  /* [3 n_triangles], 0 0 1 of those without area */
 };
 void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit, const imp_v3 *o,
                        const imp_v3 *d, struct imp_surface *out);
