@@ -10,6 +10,9 @@
 #include <time.h>
 #include <unistd.h>
 
+/* Of what has no size of its own: pipes, and devices that never end. */
+#define ENDLESS_MAX ((size_t)1 << 30)
+
 static enum imp_status io_error(imp_context *ctx, const char *path, const char *what, int code)
 {
     char text[256];
@@ -50,7 +53,8 @@ enum imp_status imp__file_read(imp_context *ctx, const char *path, size_t limit,
     if (fstat(fd, &info) != 0) IMP_TRY(io_error(ctx, path, "cannot read", errno));
     if (S_ISDIR(info.st_mode)) IMP_TRY(io_error(ctx, path, "cannot read", EISDIR));
     size_t room = 1 << 16; /* pipes say 0 */
-    if (S_ISREG(info.st_mode)) {
+    if (!S_ISREG(info.st_mode)) limit = imp_min(limit, ENDLESS_MAX);
+    else {
         if ((uint64_t)info.st_size > limit)
             IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: longer than %zu bytes", path, limit));
         room = (size_t)info.st_size + 2; /* one to see the end of the file, one for the zero */

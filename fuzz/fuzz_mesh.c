@@ -1,0 +1,41 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Meshes: the first byte chooses OBJ or PLY and whether v is flipped. What is read has
+ * indices in range and finite numbers. */
+#include <math.h>
+#include <stdlib.h>
+#include "format/mesh.h"
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+static void check(const struct imp_mesh_data *m)
+{
+    if (m->n_triangles == 0 || m->n_vertices == 0) abort();
+    for (size_t i = 0; i < 3 * m->n_triangles; i++)
+        if (m->indices[i] >= m->n_vertices) abort();
+    for (size_t i = 0; i < 3 * m->n_vertices; i++)
+        if (!isfinite(m->positions[i]) || (m->normals && !isfinite(m->normals[i]))) abort();
+    for (size_t i = 0; m->uvs && i < 2 * m->n_vertices; i++)
+        if (!isfinite(m->uvs[i])) abort();
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    static imp_context *ctx;
+    if (!ctx && imp_context_create(NULL, &ctx) != IMP_OK) abort();
+    if (size < 1) return 0;
+    const int choice = *data++;
+    size--;
+    struct imp_arena keep, temporary;
+    imp__arena_init(&keep, ctx);
+    imp__arena_init(&temporary, ctx);
+    const struct imp_mesh_source source = {
+        .ctx = ctx, .keep = &keep, .temporary = &temporary, .name = "fuzz",
+        .text = {(unsigned char *)data, size, size}, .flip_v = choice & 2};
+    struct imp_mesh_data mesh;
+    if ((choice & 1 ? imp__ply_parse(&source, &mesh) : imp__obj_parse(&source, &mesh)) == IMP_OK)
+        check(&mesh);
+    imp__arena_free(&keep);
+    imp__arena_free(&temporary);
+    return 0;
+}
