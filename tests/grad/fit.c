@@ -1,0 +1,344 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Parameters back from pictures: with every optimiser, from one sensor and from two, with
+ * masks, at bounds, with what is not determined, stopped and resumed, on one thread and on
+ * three. */
+#include <math.h>
+#include <unistd.h>
+#include "inverse_scenes.h"
+#include "imp_tap.h"
+
+static imp_context *ctx;
+static const char *const optimizer[] = {"Adam", "LM", "L-BFGS", "MMA", "SLSQP"};
+
+static struct imp_run run_of(int spp, uint64_t seed)
+{
+    struct imp_run run = IMP_RUN_INIT;
+    run.spp = spp;
+    run.seed = seed;
+    return run;
+}
+
+static imp_problem *problem_of(imp_scene *s, const char *const *globs, int n)
+{
+    imp_problem *p = NULL;
+    enum imp_status st = imp_problem_create(s, &p);
+    for (int i = 0; i < n && st == IMP_OK; i++) st = imp_problem_activate(p, globs[i]);
+    if (st != IMP_OK) {
+        printf("Bail out! %s\n", imp_last_error(ctx));
+        exit(1);
+    }
+    return p;
+}
+
+/* The ball's pixels are rho E exactly: with E known, rho comes back in closed form. */
+static void ball(void)
+{
+    imp_scene *s = scene_open(ctx, ball_xml, IMP_RGB);
+    const char *const glob = "ball.reflectance.value";
+    float pixels[12 * 10 * 3];
+    const double rho[3] = {0.42, 0.1, 0.8};
+    for (int i = 0; i < 360; i++) pixels[i] = (float)(2 * rho[i % 3]);
+    struct imp_target t = IMP_TARGET_INIT;
+    t.width = 12, t.height = 10, t.channels = 3, t.pixels = pixels;
+    for (int kind = IMP_ADAM; kind <= IMP_SLSQP; kind++) {
+        imp_problem *p = problem_of(s, &glob, 1);
+        const double start[3] = {0.3, 0.5, 0.7};
+        struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
+        o.optimizer = (enum imp_optimizer)kind;
+        o.intervals = 1;
+        o.max_iterations = kind == IMP_ADAM ? 80 : 20;
+        const struct imp_run run = run_of(16, 3);
+        const struct imp_fit_result *r = NULL;
+        enum imp_status st = imp_problem_add_target(p, &t);
+        if (st == IMP_OK) st = imp_problem_set_x(p, start);
+        if (st == IMP_OK) st = imp_fit(p, &o, &run, &r);
+        double worst = 0, worst_z = 0;
+        for (int k = 0; st == IMP_OK && k < 3; k++) {
+            worst = fmax(worst, fabs(r->variables[k].value - rho[k]) / rho[k]);
+            worst_z = fmax(worst_z, fabs(r->variables[k].value - rho[k]) / r->variables[k].se);
+        }
+        tap_ok(st == IMP_OK && worst < 0.03 && worst_z < 4.5 && r->condition >= 1
+               && r->variables[0].start == 0.3 && r->variables[0].determined,
+               "ball, %s # %.2f %%, %.1f se, %d iterations: %s", optimizer[kind], 100 * worst,
+               worst_z, r->iterations, r->reason);
+        double x[3];
+        imp_problem_get_x(p, x);
+        tap_ok(x[1] == r->variables[1].value && r->n == 3
+               && r->n_history == (size_t)r->iterations && !r->warning,
+               "%s: the scene is at the result", optimizer[kind]);
+        imp_problem_destroy(p);
+    }
+
+    /* Brighter than any reflectance: the bound, and a one-sided interval. */
+    for (int i = 0; i < 360; i++) pixels[i] = (float)(i % 3 == 1 ? 2.4 : 2 * rho[i % 3]);
+    imp_problem *p = problem_of(s, &glob, 1);
+    struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
+    o.optimizer = IMP_LM;
+    o.intervals = 1;
+    struct imp_run run = run_of(16, 3);
+    const struct imp_fit_result *r = NULL;
+    enum imp_status st = imp_problem_add_target(p, &t);
+    if (st == IMP_OK) st = imp_fit(p, &o, &run, &r);
+    tap_ok(st == IMP_OK && r->variables[1].value == 1 && r->variables[1].at_bound == 1
+           && r->variables[1].hi95 == 1 && r->variables[1].lo95 < 1
+           && fabs(r->variables[0].value - rho[0]) < 0.02,
+           "at a bound # [%g, %g]", r->variables[1].lo95, r->variables[1].hi95);
+    imp_problem_destroy(p);
+
+    /* Only the product of sky and ball is seen, colour by colour. */
+    const char *const both[2] = {"ball.reflectance.value", "sky.radiance.value"};
+    for (int i = 0; i < 360; i++) pixels[i] = (float)(2 * rho[i % 3]);
+    p = problem_of(s, both, 2);
+    st = imp_problem_add_target(p, &t);
+    if (st == IMP_OK) st = imp_fit(p, &o, &run, &r);
+    int undetermined = 0;
+    for (int k = 0; st == IMP_OK && k < 6; k++)
+        undetermined += !r->variables[k].determined && isnan(r->variables[k].lo95);
+    double x[6] = {0};
+    imp_problem_get_x(p, x);
+    tap_ok(st == IMP_OK && undetermined == 6 && r->warning && strstr(r->warning, "ball.refl")
+           && strstr(r->warning, "sky.rad"), "an ill-posed pair # %s", r->warning);
+    double product = 0;
+    for (int c = 0; c < 3; c++) product = fmax(product, fabs(x[c] * x[c + 3] / (2 * rho[c]) - 1));
+    tap_ok(product < 0.03, "its product is right # %.2f %%", 100 * product);
+    imp_problem_destroy(p);
+
+    /* A prior says which of the two it is. */
+    p = problem_of(s, both, 2);
+    st = imp_problem_add_target(p, &t);
+    if (st == IMP_OK) st = imp_scene_set_values(s, 0, 1, (double[]){2});
+    size_t sky;
+    if (st == IMP_OK) st = imp_scene_find_param(s, "sky.radiance.value", &sky);
+    if (st == IMP_OK) st = imp_scene_set_values(s, sky, 1, (double[]){2});
+    if (st == IMP_OK) st = imp_problem_add_tikhonov(p, "sky.*", 1e4, 1);
+    if (st == IMP_OK) st = imp_fit(p, &o, &run, &r);
+    double at_sky = 0, at_ball = 0;
+    for (size_t k = 0; st == IMP_OK && k < 6; k++) {
+        size_t param, c;
+        if (imp_problem_variable(p, k, &param, &c, NULL, NULL) != IMP_OK) break;
+        const double v = r->variables[k].value;
+        if (param == sky) at_sky = fmax(at_sky, fabs(v - 2));
+        else at_ball = fmax(at_ball, fabs(v / rho[c] - 1));
+    }
+    tap_ok(st == IMP_OK && at_sky < 0.02 && at_ball < 0.03,
+           "with a prior on the sky # sky off by %.4f, ball by %.2f %%", at_sky, 100 * at_ball);
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+}
+
+/* Both lamps of the box from one picture, colour by colour; the wall whose colour is seen by
+ * the other sensor alone, from two. */
+static void box(enum imp_optimizer kind)
+{
+    imp_scene *s = scene_open(ctx, box_xml, IMP_RGB);
+    imp_film *film[2];
+    const struct imp_target t0 = target_of(ctx, s, 0, 1024, 77, &film[0]);
+    const struct imp_target t1 = target_of(ctx, s, 1, 1024, 78, &film[1]);
+    const char *const globs[] = {"lamp*", "green.*"};
+    imp_problem *p = problem_of(s, globs, 2);
+    enum imp_status st = imp_problem_add_target(p, &t0);
+    if (st == IMP_OK) st = imp_problem_add_target(p, &t1);
+    double truth[9], x[9];
+    imp_problem_get_x(p, truth);
+    for (int k = 0; k < 9; k++) x[k] = truth[k] * (k % 2 ? 1.5 : 0.6);
+    if (st == IMP_OK) st = imp_problem_set_x(p, x);
+    struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
+    const struct imp_run run = run_of(32, 5);
+    const struct imp_fit_result *r = NULL;
+    o.optimizer = kind;
+    o.intervals = 1;
+    o.max_iterations = kind == IMP_ADAM ? 100 : 15;
+    if (st == IMP_OK) st = imp_fit(p, &o, &run, &r);
+    double worst = 0, worst_z = 0;
+    for (int k = 0; st == IMP_OK && k < 9; k++) {
+        worst = fmax(worst, fabs(r->variables[k].value / truth[k] - 1));
+        worst_z = fmax(worst_z, fabs(r->variables[k].value - truth[k]) / r->variables[k].se);
+    }
+    tap_ok(st == IMP_OK && worst < 0.06 && worst_z < 4.5,
+           "two lamps and a wall, two sensors, %s # worst %.2f %%, %.1f se, condition %.0f, "
+           "%d iterations: %s", optimizer[kind], 100 * worst, worst_z, r ? r->condition : 0,
+           r ? r->iterations : 0, st == IMP_OK ? r->reason : imp_last_error(ctx));
+    imp_problem_destroy(p);
+
+    /* Masked to the left half and with NaN elsewhere: the lamps still. */
+    float weights[24 * 16], *pixels = imp_film_mean(film[0]);
+    for (int i = 0; i < 24 * 16; i++) {
+        weights[i] = i % 24 < 12;
+        if (i % 24 >= 12) pixels[3 * i] = NAN;
+    }
+    struct imp_target masked = t0;
+    masked.weights = weights;
+    p = problem_of(s, globs, 1);
+    if (imp_problem_set_x(p, truth) != IMP_OK) st = IMP_E_ARG;
+    st = imp_problem_add_target(p, &masked);
+    o.optimizer = IMP_LM;
+    if (st == IMP_OK) st = imp_fit(p, &o, &run, &r);
+    worst_z = 0;
+    size_t param = 0;
+    for (int k = 0; st == IMP_OK && k < 6; k++)
+        worst_z = fmax(worst_z, fabs(r->variables[k].value - r->variables[k].start) / r->variables[k].se);
+    (void)param;
+    tap_ok(st == IMP_OK && worst_z > 0, "half of the picture masked, NaN there # %.1f se", worst_z);
+    imp_problem_destroy(p);
+    for (int k = 0; k < 2; k++) imp_film_destroy(film[k]);
+    imp_scene_destroy(s);
+}
+
+/* ---- Stopping and resuming ---------------------------------------------------------------- */
+
+static int stop_later(const struct imp_progress *p, void *payload)
+{
+    int *left = payload;
+    (void)p;
+    return --*left <= 0;
+}
+
+static void resume(enum imp_optimizer kind)
+{
+    char path[64];
+    imp_scene *s = scene_open(ctx, box_xml, IMP_RGB);
+    imp_film *film;
+    const struct imp_target t = target_of(ctx, s, 0, 64, 77, &film);
+    const char *const glob = "lamp*";
+    double x0[6], whole[6], part[6], h_whole[64], h_part[64];
+    size_t n_whole = 0, n_part = 0;
+    snprintf(path, sizeof path, "fit-test-%d.checkpoint", (int)getpid());
+    remove(path);
+    struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
+    struct imp_run run = run_of(8, 5);
+    const struct imp_fit_result *r = NULL;
+    o.optimizer = kind;
+    o.max_iterations = 25;
+
+    imp_problem *p = problem_of(s, &glob, 1);
+    imp_problem_get_x(p, x0);
+    for (int k = 0; k < 6; k++) x0[k] *= 0.5;
+    enum imp_status st = imp_problem_add_target(p, &t);
+    if (st == IMP_OK) st = imp_problem_set_x(p, x0);
+    if (st == IMP_OK) st = imp_fit(p, &o, &run, &r);
+    if (st == IMP_OK) {
+        n_whole = r->n_history;
+        memcpy(h_whole, r->history, n_whole * sizeof *h_whole);
+    }
+    imp_problem_get_x(p, whole);
+
+    /* Stopped by the callback as often as it likes, resumed from the file each time. */
+    o.checkpoint = path;
+    o.resume = 1;
+    int stops = 0, valid = 1;
+    enum imp_status again = IMP_CANCELLED;
+    for (int round = 0; round < 40 && again == IMP_CANCELLED; round++) {
+        int left = 1; /* the first report */
+        run.progress = round < 8 ? stop_later : NULL;
+        run.progress_payload = &left;
+        usleep(round < 8 ? 1000 : 0);
+        if (imp_problem_set_x(p, x0) != IMP_OK) break;
+        again = imp_fit(p, &o, &run, &r);
+        if (again == IMP_CANCELLED) {
+            stops++;
+            imp_problem_get_x(p, part);
+            for (int k = 0; k < 6; k++) valid &= part[k] == r->variables[k].value && isfinite(part[k]);
+        }
+    }
+    if (again == IMP_OK) {
+        n_part = r->n_history;
+        memcpy(h_part, r->history, n_part * sizeof *h_part);
+    }
+    imp_problem_get_x(p, part);
+    tap_ok(st == IMP_OK && again == IMP_OK && stops >= 1 && valid, "%s: cancelled %d times, state set",
+           optimizer[kind], stops);
+    tap_ok(n_whole > 0 && n_part == n_whole && !memcmp(whole, part, sizeof whole)
+           && !memcmp(h_whole, h_part, n_whole * sizeof *h_whole),
+           "%s: resumed, the same bits as never stopped", optimizer[kind]);
+
+    run.progress = NULL;
+    run.seed = 6;
+    tap_ok(imp_fit(p, &o, &run, &r) == IMP_E_ARG, "resume of another fit # %s", imp_last_error(ctx));
+    imp_problem_destroy(p);
+    imp_film_destroy(film);
+    imp_scene_destroy(s);
+    remove(path);
+}
+
+/* The same bits on one thread and on three. */
+static void threads(void)
+{
+    double x[2][6];
+    for (int k = 0; k < 2; k++) {
+        imp_context *old = ctx, *own = NULL;
+        struct imp_context_options co = IMP_CONTEXT_OPTIONS_INIT;
+        co.threads = k == 0 ? 1 : 3;
+        if (imp_context_create(&co, &own) != IMP_OK) return;
+        ctx = own;
+        imp_scene *s = scene_open(ctx, box_xml, IMP_RGB);
+        imp_film *film;
+        const struct imp_target t = target_of(ctx, s, 0, 32, 77, &film);
+        const char *const glob = "lamp*";
+        imp_problem *p = problem_of(s, &glob, 1);
+        struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
+        const struct imp_run run = run_of(8, 5);
+        const struct imp_fit_result *r = NULL;
+        o.optimizer = IMP_LM;
+        o.intervals = 1;
+        o.max_iterations = 4;
+        if (imp_problem_add_target(p, &t) != IMP_OK || imp_fit(p, &o, &run, &r) != IMP_OK) return;
+        for (int i = 0; i < 6; i++) x[k][i] = r->variables[i].hi95;
+        imp_problem_destroy(p);
+        imp_film_destroy(film);
+        imp_scene_destroy(s);
+        imp_context_destroy(own);
+        ctx = old;
+    }
+    tap_ok(!memcmp(x[0], x[1], sizeof x[0]), "one thread and three: the same bits");
+}
+
+static void arguments(void)
+{
+    imp_scene *s = scene_open(ctx, ball_xml, IMP_RGB);
+    imp_problem *p = NULL;
+    const struct imp_fit_result *r = NULL;
+    struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
+    if (imp_problem_create(s, &p) != IMP_OK) return;
+    tap_ok(imp_fit(p, NULL, NULL, &r) == IMP_E_ARG, "nothing active # %s", imp_last_error(ctx));
+    if (imp_problem_activate(p, "ball*") != IMP_OK) return;
+    tap_ok(imp_fit(p, NULL, NULL, &r) == IMP_E_ARG, "no target # %s", imp_last_error(ctx));
+    imp_film *film;
+    const struct imp_target t = target_of(ctx, s, 0, 4, 1, &film);
+    if (imp_problem_add_target(p, &t) != IMP_OK) return;
+    o.resume = 1;
+    tap_ok(imp_fit(p, &o, NULL, &r) == IMP_E_ARG, "resume from nothing # %s", imp_last_error(ctx));
+    o.resume = 0, o.learning_rate = -1;
+    tap_ok(imp_fit(p, &o, NULL, &r) == IMP_E_ARG, "learning rate # %s", imp_last_error(ctx));
+    o.learning_rate = 0, o.optimizer = 17;
+    tap_ok(imp_fit(p, &o, NULL, &r) == IMP_E_ARG, "optimiser # %s", imp_last_error(ctx));
+    o.optimizer = IMP_ADAM, o.checkpoint = "no/such/folder/x", o.max_iterations = 2;
+    double before[3], after[3];
+    imp_problem_get_x(p, before);
+    tap_ok(imp_fit(p, &o, NULL, &r) == IMP_E_IO, "checkpoint # %s", imp_last_error(ctx));
+    imp_problem_get_x(p, after);
+    tap_ok(!memcmp(before, after, sizeof before) && r == NULL, "a failure leaves the scene as it was");
+    o.checkpoint = NULL;
+    struct imp_run run = run_of(4, 1);
+    run.time_limit_s = 1e-9;
+    tap_ok(imp_fit(p, &o, &run, &r) == IMP_CANCELLED && r && strstr(r->reason, "time"),
+           "time limit # %s", r ? r->reason : "");
+    imp_problem_destroy(p);
+    imp_film_destroy(film);
+    imp_scene_destroy(s);
+}
+
+int main(void)
+{
+    if (imp_context_create(NULL, &ctx) != IMP_OK) return 1;
+    ball();
+    box(IMP_LM);
+    box(IMP_ADAM);
+    resume(IMP_ADAM);
+    resume(IMP_LM);
+    resume(IMP_LBFGS);
+    threads();
+    arguments();
+    imp_context_destroy(ctx);
+    return tap_done();
+}
