@@ -35,11 +35,12 @@ static const char ball_xml[] =
     "  <film type='hdrfilm'><integer name='width' value='24'/>"                            \
     "    <integer name='height' value='16'/><rfilter type='box'/></film></sensor>"
 
-/* A floor and two walls under two lamps; the second sensor sees the right wall alone. */
+/* A floor and two walls under two lamps, which no sensor sees; the second sensor sees the
+ * right wall alone. */
 static const char box_xml[] =
     "<scene version='3.0.0'>"
     "<integrator type='path'><integer name='max_depth' value='4'/></integrator>"
-    BOX_SENSOR("front", "0,1,4", "0,.7,0")
+    BOX_SENSOR("front", "0,1,4", "0,.4,0")
     BOX_SENSOR("side", "-.5,.8,0", "1,.8,0")
     "<bsdf type='diffuse' id='white'><rgb name='reflectance' value='.7'/></bsdf>"
     "<bsdf type='diffuse' id='red'><rgb name='reflectance' value='.6,.1,.05'/></bsdf>"
@@ -51,10 +52,10 @@ static const char box_xml[] =
     "<shape type='rectangle'><transform name='to_world'><rotate y='1' angle='-90'/>"
     "  <translate x='1' y='1'/></transform><ref id='green'/></shape>"
     "<shape type='rectangle'><transform name='to_world'><scale value='.2'/>"
-    "  <rotate x='1' angle='90'/><translate x='-.5' y='1.9'/></transform>"
+    "  <rotate x='1' angle='90'/><translate x='-.6' y='2.2'/></transform>"
     "  <emitter type='area' id='lamp1'><rgb name='radiance' value='9,7,5'/></emitter></shape>"
     "<shape type='rectangle'><transform name='to_world'><scale value='.2'/>"
-    "  <rotate x='1' angle='90'/><translate x='.5' y='1.9'/></transform>"
+    "  <rotate x='1' angle='90'/><translate x='.6' y='2.2'/></transform>"
     "  <emitter type='area' id='lamp2'><rgb name='radiance' value='4,6,8'/></emitter></shape>"
     "</scene>";
 

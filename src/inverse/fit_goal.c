@@ -82,7 +82,11 @@ static enum imp_status normal(const double *x, uint64_t seed, struct imp__normal
     out->f.value += imp__regularise(fit->problem, x, out->g);
     out->chi2 = gn.chi2;
     out->n_residuals = gn.n_residuals;
-    out->noise_known = fit->noise_known;
+    out->noise_known = true;
+    /* Residuals at a minimum are smaller than the noise: M - n of M are free. */
+    const double freedom = gn.n_residuals - (double)n;
+    const double widen = fit->noise_known || freedom < 1 ? 1 : gn.n_residuals / freedom;
+    for (size_t i = 0; i < n * n; i++) out->H_meas[i] *= widen;
     for (size_t i = 0; i < n * n; i++) {
         out->H_prior[i] = fit->H_prior[i];
         out->H[i] += fit->H_prior[i];

@@ -8,7 +8,12 @@
  *
  * averaged over replicates; the same-sample matrix, which a naive product of mean pictures
  * would give, comes along for damping. Losses that are not quadratic enter with
- * w = l''(mean) and r = l'/l''. */
+ * w = l''(mean) and r = l'/l''.
+ *
+ * Noise of the pictures themselves: sum w^2 sigma^2 J^T J is the gradient's covariance by it.
+ * Where sigma is not given, the squared residual stands in for sigma^2, pixel by pixel, which
+ * holds however the noise differs between pixels (White, Econometrica 48, 1980); residual
+ * and J^T J come from different replicates, so that their own noise is not correlated. */
 #include <string.h>
 #include "estimate.h"
 #include "lanes.h"
@@ -37,6 +42,9 @@ struct job {
         double *sum_lx;    /* [K][seen] */
         double *sum_xx;    /* [seen][K*K] */
         double *g;         /* [R][K] of a pixel */
+        double *u, *au;    /* [seen][K*K] of a pixel: sums over its replicates of w^2 J^T J, and
+                              of that times the replicate's squared residual */
+        double a[3];       /* sum over replicates of squared residuals */
     } *workers;
     struct sums *slots, total;
 };
@@ -119,7 +127,12 @@ static double replicate(const struct job *j, struct worker *w, struct sums *out,
             T_eff = weight > 0 ? sum[c] / N - at.d1 / weight : T;
             value += at.value;
         }
-        const double sigma = j->target->noise_se ? j->target->noise_se[pixel * S + c] : 1;
+        const bool known = j->target->noise_se != NULL;
+        const double sigma = known ? j->target->noise_se[pixel * S + c] : 0;
+        const double residual = 2 * imp__loss_unbiased(1, T_eff, N, sum[c], square[c]);
+        const double square_w = weight * weight / (N * (N - 1));
+        double *U = w->u + c * K * K, *AU = w->au + c * K * K;
+        w->a[c] += residual;
         const double a = weight * share / (N * (N - 1)), same = weight * share / (N * N);
         const double meas = weight * weight * sigma * sigma * share / (N * (N - 1));
         const double *xx = w->sum_xx + c * K * K;
@@ -133,6 +146,9 @@ static double replicate(const struct job *j, struct worker *w, struct sums *out,
                 out->H[k * K + m] += a * u;
                 out->H_same[k * K + m] += same * product;
                 out->H_meas[k * K + m] += meas * u;
+                if (known) continue;
+                U[k * K + m] += square_w * u;
+                AU[k * K + m] += square_w * residual * u;
             }
         }
     }
@@ -155,6 +171,8 @@ static enum imp_status tile_work(size_t item, int worker, int slot, void *payloa
     for (int y = t.y0; y < t.y1; y++)
         for (int x = t.x0; x < t.x1; x++) {
             double sum = 0, square = 0;
+            memset(w->u, 0, 2 * (size_t)seen_channels(j) * K * K * sizeof(double));
+            memset(w->a, 0, sizeof w->a);
             for (int b = b0; b < b1; b++) {
                 const double v = replicate(j, w, out, x, y, b, 1 / all,
                                            w->g + (size_t)(b - b0) * K);
@@ -162,6 +180,10 @@ static enum imp_status tile_work(size_t item, int worker, int slot, void *payloa
                 square += v * v;
             }
             const double spread = R / ((R - 1) * all * all);
+            if (!j->target->noise_se)
+                for (size_t i = 0; i < (size_t)seen_channels(j) * K * K; i++)
+                    out->H_meas[i % (K * K)] +=
+                        (w->a[i / (K * K)] * w->u[i] - w->au[i]) / ((R - 1) * all);
             out->objective += sum / all;
             out->variance += (square - sum * sum / R) * spread;
             for (size_t k = 0; k < K; k++) {
@@ -200,12 +222,14 @@ static enum imp_status workers_create(struct job *j, imp_context *ctx)
     for (int k = 0; k < ctx->threads; k++) {
         struct worker *w = &j->workers[k];
         imp__arena_init(&w->arena, ctx);
-        w->x = imp__alloc(ctx, K * (3 + 2 * S + R) + S * K * K, sizeof(double));
+        w->x = imp__alloc(ctx, K * (3 + 2 * S + R) + 3 * S * K * K, sizeof(double));
         if (!w->x) return imp__error(ctx, IMP_E_NOMEM, "no memory for derivatives");
         w->sum_x = w->x + 3 * K;
         w->sum_lx = w->sum_x + S * K;
         w->g = w->sum_lx + S * K;
         w->sum_xx = w->g + R * K;
+        w->u = w->sum_xx + S * K * K;
+        w->au = w->u + S * K * K;
     }
     return IMP_OK;
 }

@@ -46,7 +46,8 @@ double imp__regularise(const struct imp_problem *p, const double *x, double *gra
  * (gradients.md 15):
  *   H [K*K]      U-statistic estimate of J^T W J (unbiased, may be indefinite)
  *   H_same [K*K] the same-sample matrix (biased upwards, positive semi-definite)
- *   H_meas [K*K] sum of w^2 sigma^2 J J^T for the measurement covariance; NULL to skip
+ *   H_meas [K*K] sum of w^2 sigma^2 J J^T for the measurement covariance, sigma^2 from the
+ *                residuals where the target does not give it; NULL to skip
  *   g [K]        leave-one-out gradient of the data term, g_se [K] its standard errors
  *   cov_g [K*K]  covariance of g; NULL to skip
  * Regularisers are not included. Non-quadratic targets: their Gauss-Newton weights at the
