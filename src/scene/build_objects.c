@@ -1,0 +1,257 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Materials, lights, shapes and sensors, each made once, at its first place in document
+ * order, whoever refers to it. */
+#include "build.h"
+#include "kind/sensor/film.h"
+
+/* ---- BSDFs --------------------------------------------------------------------------- */
+
+enum imp_status imp__build_bsdf(struct imp_scene *scene, struct imp_node *node,
+                                  const char *parent, const char *slot,
+                                  struct imp_bsdf **out)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = scene->ctx;
+    if (node->object) {
+        *out = node->object;
+        return IMP_OK;
+    }
+    if (node->visiting)
+        return imp__node_error(ctx, node, IMP_E_SCENE, "the object contains itself");
+    node->visiting = 1;
+    const struct imp_bsdf_ops *ops;
+    KIND_FIND(scene, node, imp__bsdf_kinds, ops);
+
+    struct imp_bsdf *b = imp__arena_array(&scene->arena, 1, sizeof *b);
+    void *self = imp__arena_array(&scene->arena, 1, ops->object_size);
+    if (!b || !self) IMP_TRY(imp__build_no_memory(scene));
+    *b = (struct imp_bsdf){.ops = ops, .self = self, .flags = IMP_BSDF_SMOOTH,
+                           .name = imp__build_object_name(scene, node, parent, slot)};
+    if (!b->name) IMP_TRY(imp__build_no_memory(scene));
+
+    const struct imp_build build = imp__build_make(scene, node);
+    if (ops->prepare) IMP_TRY(ops->prepare(&build));
+    int n_own = 0;
+    while (ops->inputs && ops->inputs[n_own].name) n_own++;
+    const struct imp_input **own = imp__arena_array(&scene->arena, (size_t)n_own + 1, sizeof *own);
+    if (!own) IMP_TRY(imp__build_no_memory(scene));
+    IMP_TRY(imp__build_inputs(scene, node, b->name, ops->inputs, own, &b->n_own));
+
+    b->n_in = b->n_own;
+    for (size_t i = 0; i < node->n_children && ops->max_children > 0; i++) {
+        struct imp_child *c = &node->children[i];
+        if (strcmp(c->node->tag, "bsdf") != 0) continue;
+        c->used = true;
+        if (b->n_child == imp_min(ops->max_children, 2))
+            IMP_TRY(imp__node_error(ctx, c->node, IMP_E_SCENE, "'%s' takes at most %d bsdfs",
+                                    ops->name, ops->max_children));
+        char child_slot[32];
+        snprintf(child_slot, sizeof child_slot,
+                 strcmp(ops->name, "twosided") == 0 ? "brdf_%d"
+                 : ops->max_children == 1           ? "nested_bsdf"
+                                                    : "bsdf_%d", b->n_child);
+        struct imp_bsdf *child;
+        IMP_TRY(imp__build_bsdf(scene, c->node, b->name, child_slot, &child));
+        b->child_in[b->n_child] = b->n_in;
+        b->child[b->n_child++] = child;
+        b->n_in += child->n_in;
+    }
+    if (b->n_child < ops->min_children)
+        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "a nested bsdf is missing"));
+    b->input = imp__arena_array(&scene->arena, (size_t)b->n_in + 1, sizeof *b->input);
+    if (!b->input) IMP_TRY(imp__build_no_memory(scene));
+    memcpy(b->input, own, (size_t)b->n_own * sizeof *own);
+    for (int k = 0; k < b->n_child; k++)
+        if (b->child[k]->n_in)
+            memcpy(b->input + b->child_in[k], b->child[k]->input,
+                   (size_t)b->child[k]->n_in * sizeof *b->input);
+
+    if (ops->build) IMP_TRY(ops->build(&build, self, b));
+    IMP_TRY(imp__props_finish(ctx, node));
+    b->index = scene->n_bsdfs;
+    IMP_TRY(imp__build_list_add(scene, (void ***)&scene->bsdfs, &scene->n_bsdfs, b));
+    node->object = b;
+    *out = b;
+out:
+    node->visiting = 0;
+    return st;
+}
+
+/* A diffuse of this reflectance that has no parameter: emitters' default material. */
+enum imp_status imp__build_black(struct imp_scene *scene, struct imp_bsdf **out)
+{
+    const struct imp_bsdf_ops *ops = NULL;
+    for (size_t k = 0; imp__bsdf_kinds[k]; k++)
+        if (strcmp(imp__bsdf_kinds[k]->name, "diffuse") == 0) ops = imp__bsdf_kinds[k];
+    struct imp_bsdf *b = imp__arena_array(&scene->arena, 1, sizeof *b);
+    struct imp_input *in = imp__arena_array(&scene->arena, 1, sizeof *in);
+    if (!b || !in || !ops) return imp__build_no_memory(scene);
+    *in = (struct imp_input){.param = -1, .count = 1};
+    *b = (struct imp_bsdf){.ops = ops, .n_own = 1, .n_in = 1, .index = -1, .name = "",
+                           .self = imp__arena_array(&scene->arena, 1, ops->object_size + 1),
+                           .input = imp__arena_array(&scene->arena, 1, sizeof *b->input)};
+    if (!b->self || !b->input) return imp__build_no_memory(scene);
+    b->input[0] = in;
+    *out = b; /* flags 0: nothing is reflected, so no light samples and no continuation */
+    return IMP_OK;
+}
+
+/* ---- Emitters, shapes, sensors -------------------------------------------------------- */
+
+enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *node,
+                                     const char *parent, const char *slot,
+                                     struct imp_shape *shape)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = scene->ctx;
+    const struct imp_emitter_ops *ops;
+    KIND_FIND(scene, node, imp__emitter_kinds, ops);
+    const bool area = ops->flags & IMP_EMITTER_AREA;
+    if (area && !shape) return IMP_OK; /* declared only; used where a shape refers to it */
+    if (!area && shape)
+        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "cannot be attached to a shape"));
+    if (node->object)
+        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
+                                "is attached to a second shape; each needs its own"));
+
+    struct imp_emitter *e = imp__arena_array(&scene->arena, 1, sizeof *e);
+    void *self = imp__arena_array(&scene->arena, 1, ops->object_size);
+    if (!e || !self) IMP_TRY(imp__build_no_memory(scene));
+    *e = (struct imp_emitter){.ops = ops, .self = self, .shape = shape,
+                              .index = scene->n_emitters,
+                              .name = imp__build_object_name(scene, node, parent, slot)};
+    if (!e->name) IMP_TRY(imp__build_no_memory(scene));
+    node->object = e;
+    int n = 0;
+    while (ops->inputs && ops->inputs[n].name) n++;
+    const struct imp_input **input = imp__arena_array(&scene->arena, (size_t)n + 1, sizeof *input);
+    if (!input) IMP_TRY(imp__build_no_memory(scene));
+    IMP_TRY(imp__build_inputs(scene, node, e->name, ops->inputs, input, &e->n_in));
+    e->input = input;
+    IMP_TRY(imp__props_float(ctx, node, "sampling_weight", 1, &e->weight));
+    if (e->weight < 0)
+        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "sampling_weight is negative"));
+    const struct imp_build b = imp__build_make(scene, node);
+    if (ops->build) IMP_TRY(ops->build(&b, self, e));
+    IMP_TRY(imp__props_finish(ctx, node));
+    if (ops->flags & IMP_EMITTER_ENVIRONMENT) {
+        if (scene->environment >= 0)
+            IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "a second environment emitter"));
+        scene->environment = e->index;
+    }
+    if (shape) shape->emitter = e->index;
+    IMP_TRY(imp__build_list_add(scene, (void ***)&scene->emitters, &scene->n_emitters, e));
+out:
+    return st;
+}
+
+enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
+                                   const char *name)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = scene->ctx;
+    const struct imp_shape_ops *ops;
+    KIND_FIND(scene, node, imp__shape_kinds, ops);
+    struct imp_shape *s = imp__arena_array(&scene->arena, 1, sizeof *s);
+    void *self = imp__arena_array(&scene->arena, 1, ops->object_size);
+    if (!s || !self) IMP_TRY(imp__build_no_memory(scene));
+    *s = (struct imp_shape){.ops = ops, .self = self, .index = scene->n_shapes, .bsdf = -1,
+                            .emitter = -1, .name = name};
+    node->object = s;
+    /* Has a say in gradients of geometry only; there are none yet. */
+    double silhouette;
+    IMP_TRY(imp__props_float(ctx, node, "silhouette_sampling_weight", 1, &silhouette));
+
+    struct imp_node *bsdf = NULL, *emitter = NULL;
+    for (size_t i = 0; i < node->n_children; i++) {
+        struct imp_child *c = &node->children[i];
+        const char *tag = c->node->tag;
+        if (strcmp(tag, "bsdf") == 0) {
+            if (bsdf) IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "has two bsdfs"));
+            bsdf = c->node;
+        } else if (strcmp(tag, "emitter") == 0) {
+            if (emitter) IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "has two emitters"));
+            emitter = c->node;
+        } else if (strcmp(tag, "medium") == 0 || strcmp(tag, "sensor") == 0) {
+            IMP_TRY(imp__node_error(ctx, c->node, IMP_E_UNSUPPORTED,
+                                    "this version has no %s inside a shape", tag));
+        } else {
+            continue;
+        }
+        c->used = true;
+    }
+    const struct imp_build b = imp__build_make(scene, node);
+    IMP_TRY(ops->build(&b, self, s));
+    IMP_TRY(imp__props_finish(ctx, node));
+
+    if (!bsdf && !emitter) { /* as if <bsdf type="diffuse"/> had been written */
+        bsdf = imp__node_create(&scene->arena, "bsdf", "diffuse", NULL, NULL, node->loc);
+        if (!bsdf) IMP_TRY(imp__build_no_memory(scene));
+    }
+    if (bsdf) {
+        struct imp_bsdf *made;
+        IMP_TRY(imp__build_bsdf(scene, bsdf, name, "bsdf", &made));
+        s->bsdf = made->index;
+    } else {
+        s->bsdf = -2;
+    }
+    if (emitter) {
+        if (!(s->area > 0))
+            IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
+                                    "has an emitter, but no area to emit from"));
+        IMP_TRY(imp__build_emitter(scene, emitter, name, "emitter", s));
+    }
+    IMP_TRY(imp__build_list_add(scene, (void ***)&scene->shapes, &scene->n_shapes, s));
+    scene->lo = (imp_v3){fmin(scene->lo[0], s->lo[0]), fmin(scene->lo[1], s->lo[1]),
+                         fmin(scene->lo[2], s->lo[2]), 0};
+    scene->hi = (imp_v3){fmax(scene->hi[0], s->hi[0]), fmax(scene->hi[1], s->hi[1]),
+                         fmax(scene->hi[2], s->hi[2]), 0};
+out:
+    return st;
+}
+
+/* The child of this tag, or a default one of the given type. */
+static enum imp_status child_or_default(struct imp_scene *scene, struct imp_node *node,
+                                        const char *tag, const char *type,
+                                        struct imp_node **out)
+{
+    *out = NULL;
+    for (size_t i = 0; i < node->n_children; i++) {
+        struct imp_child *c = &node->children[i];
+        if (strcmp(c->node->tag, tag) != 0) continue;
+        if (*out) return imp__node_error(scene->ctx, node, IMP_E_SCENE, "has two %ss", tag);
+        c->used = true;
+        *out = c->node;
+    }
+    if (!*out) *out = imp__node_create(&scene->arena, tag, type, NULL, NULL, node->loc);
+    return *out ? IMP_OK : imp__build_no_memory(scene);
+}
+
+enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node,
+                                    const char *name)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = scene->ctx;
+    const struct imp_sensor_ops *ops;
+    KIND_FIND(scene, node, imp__sensor_kinds, ops);
+    struct imp_sensor *s = imp__arena_array(&scene->arena, 1, sizeof *s);
+    void *self = imp__arena_array(&scene->arena, 1, ops->object_size);
+    if (!s || !self) IMP_TRY(imp__build_no_memory(scene));
+    *s = (struct imp_sensor){.ops = ops, .self = self, .name = name};
+    node->object = s;
+
+    struct imp_node *film, *sampler;
+    IMP_TRY(child_or_default(scene, node, "film", "hdrfilm", &film));
+    IMP_TRY(child_or_default(scene, node, "sampler", "independent", &sampler));
+    const struct imp_build film_build = imp__build_make(scene, film);
+    const struct imp_build sampler_build = imp__build_make(scene, sampler);
+    const struct imp_build b = imp__build_make(scene, node);
+    IMP_TRY(imp__film_desc_build(&film_build, &s->film));
+    IMP_TRY(imp__sampler_build(&sampler_build, &s->spp));
+    IMP_TRY(ops->build(&b, self, s)); /* needs the film's shape */
+    IMP_TRY(imp__props_finish(ctx, node));
+    IMP_TRY(imp__build_list_add(scene, (void ***)&scene->sensors, &scene->n_sensors, s));
+out:
+    return st;
+}
