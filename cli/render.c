@@ -74,9 +74,10 @@ static char *default_output(const struct imp_run *run)
 {
     struct imp_sensor_info info = {.size = sizeof info};
     const char *extension = "exr";
-    if (imp_scene_get_sensor(cli.scene, run->sensor, &info) == IMP_OK && info.file_format &&
-        !strcmp(info.file_format, "pfm"))
-        extension = "pfm";
+    if (imp_scene_get_sensor(cli.scene, run->sensor, &info) == IMP_OK && info.file_format) {
+        if (!strcmp(info.file_format, "pfm")) extension = "pfm";
+        if (!strcmp(info.file_format, "rgbe")) extension = "hdr";
+    }
     const char *base = strrchr(cli.scene_path, '/');
     base = base ? base + 1 : cli.scene_path;
     if (base[0] == '<') base = "render"; /* stdin */

@@ -294,10 +294,11 @@ struct imp_write_options {
 };
 #define IMP_WRITE_OPTIONS_INIT {sizeof(struct imp_write_options), 0, 0, 0, 0, 0}
 
-/** Write by extension: .exr, .pfm, .png (sRGB), .npy. The file appears whole or not at all. */
+/** Write by extension: .exr, .pfm, .hdr, .png (sRGB), .npy. The file appears whole or not at all. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_film_write(const imp_film *film, const char *path,
                                                       const struct imp_write_options *options);
-/** Read .exr, .pfm, .png or .jpg (8-bit files are taken to be sRGB and made linear). */
+/** Read .exr, .pfm, .hdr, .npy, .png or .jpg (8- and 16-bit files are taken to be sRGB and
+ * made linear). */
 IMP_API IMP_MUST_CHECK enum imp_status imp_film_read(imp_context *context, const char *path,
                                                      imp_film **out);
 

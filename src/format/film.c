@@ -116,9 +116,10 @@ enum imp_status imp_film_write(const imp_film *f, const char *path,
     else if (ends_with(path, ".png")) st = preview_encode(f, &o, &bytes);
     else if (ends_with(path, ".pfm")) st = imp__pfm_encode(f, &bytes);
     else if (ends_with(path, ".npy")) st = imp__npy_encode(f, &bytes);
+    else if (ends_with(path, ".hdr")) st = imp__hdr_encode(f, &bytes);
     else
-        return imp__error(ctx, IMP_E_ARG, "%s: the name must end in .exr, .png, .pfm or .npy",
-                          path);
+        return imp__error(ctx, IMP_E_ARG,
+                          "%s: the name must end in .exr, .png, .pfm, .hdr or .npy", path);
     if (st != IMP_OK) return imp__error_prefix(ctx, st, "%s", path);
     st = imp__file_write(ctx, path, bytes.data, bytes.size);
     imp__bytes_free(ctx, &bytes);

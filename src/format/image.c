@@ -30,10 +30,11 @@ enum imp_status imp__image_parse(imp_context *ctx, const char *name,
     if (n >= 6 && memcmp(d, "\x93NUMPY", 6) == 0) return imp__npy_parse(ctx, name, file, out);
     if (n >= 3 && d[0] == 'P' && (d[1] == 'F' || d[1] == 'f'))
         return imp__pfm_parse(ctx, name, file, out);
+    if (n >= 2 && d[0] == '#' && d[1] == '?') return imp__hdr_parse(ctx, name, file, out);
     *srgb = true;
     if (n >= 4 && memcmp(d, "\x89PNG", 4) == 0) return imp__png_parse(ctx, name, file, out);
     if (n >= 2 && d[0] == 0xff && d[1] == 0xd8) return imp__jpeg_parse(ctx, name, file, out);
-    return imp__error(ctx, IMP_E_SCENE, "%s: not an EXR, PNG, JPEG, PFM or NPY picture", name);
+    return imp__error(ctx, IMP_E_SCENE, "%s: not an EXR, PNG, JPEG, HDR, PFM or NPY picture", name);
 }
 
 enum imp_status imp__image_read(imp_context *ctx, const char *path, imp_film **out, bool *srgb)

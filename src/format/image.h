@@ -37,12 +37,16 @@ enum imp_status imp__pfm_parse(imp_context *ctx, const char *name, const struct 
 enum imp_status imp__npy_parse(imp_context *ctx, const char *name, const struct imp_bytes *file,
                                imp_film **out);
 
+enum imp_status imp__hdr_parse(imp_context *ctx, const char *name, const struct imp_bytes *file,
+                               imp_film **out);
+
 enum imp_status imp__exr_encode(const imp_film *film, const struct imp_write_options *options,
                                 struct imp_bytes *out);
 /* rgb [height][width][channels], 8-bit; channels 1 or 3. */
 enum imp_status imp__png_encode(imp_context *ctx, int width, int height, int channels,
                                 const unsigned char *pixels, struct imp_bytes *out);
 enum imp_status imp__pfm_encode(const imp_film *film, struct imp_bytes *out);
+enum imp_status imp__hdr_encode(const imp_film *film, struct imp_bytes *out);
 enum imp_status imp__npy_encode(const imp_film *film, struct imp_bytes *out);
 
 /* A film of width x height for a picture that `bytes` of file claim to hold; refused if no

@@ -136,6 +136,42 @@ static void check_raw(void)
     imp_film_destroy(g);
 }
 
+static void check_hdr(void)
+{
+    for (int i = 0; i < 2; i++) {
+        imp_film *f = sample(11, 4, i ? "Y" : "R,G,B", false), *g = NULL;
+        for (size_t k = 0; k < imp__film_values(f); k++)
+            f->mean[k] = (float)exp(3 * (double)f->mean[k]);
+        f->mean[0] = 0;
+        enum imp_status st = imp_film_write(f, in_folder("a.hdr"), NULL);
+        if (st == IMP_OK) st = imp_film_read(ctx, in_folder("a.hdr"), &g);
+        double worst = g ? 0 : 1; /* half a step of eight bits of the brightest component */
+        for (int p = 0; g && p < 44; p++) {
+            double most = 0, error = 0;
+            for (int c = 0; c < 3; c++) {
+                const double want = (double)f->mean[p * f->channels + (i ? 0 : c)];
+                most = fmax(most, want);
+                error = fmax(error, fabs((double)g->mean[3 * p + c] - want));
+            }
+            worst = fmax(worst, most > 0 ? error / most : error);
+        }
+        tap_ok(worst <= 1.001 / 256, "HDR of %s # relative error %.2e %s", i ? "Y" : "R,G,B", worst,
+               st ? imp_last_error(ctx) : "");
+        imp_film_destroy(f);
+        imp_film_destroy(g);
+    }
+    static const unsigned char runs[] = "#?RADIANCE\nEXPOSURE=1\nFORMAT=32-bit_rle_rgbe\n\n"
+        "-Y 1 +X 8\n\x02\x02\x00\x08\x88\x80\x88\x40\x02\x00\x01\x86\x20\x88\x81";
+    struct imp_bytes b = {(unsigned char *)runs, sizeof runs - 1, 0};
+    imp_film *g = NULL;
+    bool srgb = true;
+    const enum imp_status st = imp__image_parse(ctx, "r.hdr", &b, &g, &srgb);
+    tap_ok(st == IMP_OK && !srgb && g->mean[21] == 128.5f / 128 && g->mean[22] == 64.5f / 128 &&
+               g->mean[2] == 0.5f / 128 && g->mean[5] == 1.5f / 128 && g->mean[23] == 32.5f / 128,
+           "HDR of runs and literals # %s", st ? imp_last_error(ctx) : "");
+    imp_film_destroy(g);
+}
+
 static void check_png(void)
 {
     imp_film *f = sample(16, 16, "R,G,B", false), *g = NULL;
@@ -433,6 +469,7 @@ static void check_hostile(void)
     check_cut("c.exr", film_bytes("c.exr", "R,G,B"), 0);
     check_cut("v.exr", exr_make(EXR_COMPRESSION_PIZ, 1), 0);
     check_cut("c.pfm", film_bytes("c.pfm", "R,G,B"), 0);
+    check_cut("c.hdr", film_bytes("c.hdr", "R,G,B"), 0);
     check_cut("c.npy", film_bytes("c.npy", "R,G,B"), 0);
     check_cut("c.png", film_bytes("c.png", "R,G,B"), 0);
     check_cut("v.png", png_make(PNG_COLOR_TYPE_PALETTE, 1, 1), 0);
@@ -441,8 +478,8 @@ static void check_hostile(void)
         {"PF\n1000000 1000000\n-1\n", 22, "x: cut off"},
         {"PF\nnan 1\n-1\n", 12, "x: PFM of nan x 1, scale -1"},
         {"PF\n-5 1\n-1\n", 11, "x: PFM of -5 x 1, scale -1"},
-        {"GIF89a", 6, "x: not an EXR, PNG, JPEG, PFM or NPY picture"},
-        {"", 0, "x: not an EXR, PNG, JPEG, PFM or NPY picture"},
+        {"GIF89a", 6, "x: not an EXR, PNG, JPEG, HDR, PFM or NPY picture"},
+        {"", 0, "x: not an EXR, PNG, JPEG, HDR, PFM or NPY picture"},
         /* A PNG that claims 2^19 x 2^19 pixels. */
         {"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\x08\0\0\0\x08\0\0\x08\x02\0\0\0\x8c\x17\x3b\x9b", 33, "x: "}};
     for (size_t i = 0; i < imp_count(absurd); i++) {
@@ -551,6 +588,7 @@ int main(void)
     signal(SIGXFSZ, SIG_IGN);
     check_exr();
     check_raw();
+    check_hdr();
     check_png();
     check_png_variants();
     check_jpeg();
