@@ -1,0 +1,130 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The hierarchy: quadtrees on quadrilaterals, one-to-four subdivision of triangles. Children
+ * have larger indices than their parents, so a loop over the array is a walk of the tree. */
+#include "elements.h"
+#include <string.h>
+
+imp_v3 imp__el_point(int corners, const imp_v3 *v, double s, double t)
+{
+    if (corners == 3) return v[0] + (v[1] - v[0]) * s + (v[2] - v[0]) * t;
+    return v[0] * ((1 - s) * (1 - t)) + v[1] * (s * (1 - t)) + v[2] * (s * t) +
+           v[3] * ((1 - s) * t);
+}
+
+/* Triangles: three corner pieces and the middle, which is turned over: its corners run
+ * opposite, so that piece k of a piece keeps a similar shape. */
+static void quarter(int corners, const imp_v3 *p, int q, imp_v3 v[4])
+{
+    if (corners == 3) {
+        const imp_v3 ab = (p[0] + p[1]) * 0.5, bc = (p[1] + p[2]) * 0.5, ca = (p[2] + p[0]) * 0.5;
+        const imp_v3 piece[4][3] = {{p[0], ab, ca}, {ab, p[1], bc}, {ca, bc, p[2]}, {bc, ca, ab}};
+        memcpy(v, piece[q], sizeof piece[q]);
+        v[3] = v[2];
+        return;
+    }
+    const double s = 0.5 * (q & 1), t = 0.5 * (q >> 1);
+    v[0] = imp__el_point(4, p, s, t);
+    v[1] = imp__el_point(4, p, s + 0.5, t);
+    v[2] = imp__el_point(4, p, s + 0.5, t + 0.5);
+    v[3] = imp__el_point(4, p, s, t + 0.5);
+}
+
+void imp__el_quarter(const struct imp__element *x, int q, imp_v3 v[4])
+{
+    quarter(x->corners, x->v, q, v);
+}
+
+static enum imp_status coefficients_grow(imp_elements *e, size_t n)
+{
+    const size_t ch = (size_t)e->ch;
+    struct { double **array; size_t *cap; size_t n; } const all[] = {
+        {&e->l, &e->cap_l, ch * n}, {&e->g, &e->cap_g, ch * n}, {&e->c, &e->cap_c, ch * n},
+        {&e->b, &e->cap_b, ch * n}, {&e->a, &e->cap_a, n}};
+    for (size_t k = 0; k < imp_count(all); k++) {
+        double *grown = imp__grow(e->ctx, *all[k].array, all[k].cap, all[k].n, sizeof *grown);
+        if (!grown) return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for elements");
+        *all[k].array = grown;
+    }
+    return IMP_OK;
+}
+
+enum imp_status imp__el_element_add(imp_elements *e, uint32_t root, uint32_t parent, int k,
+                                    uint32_t *out)
+{
+    const struct imp__el_root *r = &e->roots[root];
+    const int n = el_n(e, r);
+    if (e->n_elements >= EL_NONE - 1)
+        return imp__error(e->ctx, IMP_E_NOMEM, "more than 2^32 elements");
+    struct imp__element *grown = imp__grow(e->ctx, e->elements, &e->cap_elements,
+                                           e->n_elements + 1, sizeof *grown);
+    if (!grown) return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for elements");
+    e->elements = grown;
+    const enum imp_status st = coefficients_grow(e, e->n_coef + (size_t)n + 1);
+    if (st != IMP_OK) return st;
+
+    struct imp__element *x = &grown[e->n_elements];
+    *x = (struct imp__element){.root = root, .parent = parent, .corners = (uint8_t)r->corners,
+                               .coef = e->n_coef};
+    if (parent == EL_NONE) {
+        memcpy(x->v, r->v, sizeof x->v);
+    } else {
+        const struct imp__element *p = &grown[parent];
+        x->level = p->level + 1;
+        imp__el_quarter(p, k, x->v);
+        const size_t bytes = (size_t)(e->ch * n) * sizeof(double);
+        memcpy(el_at(e, e->l, x), el_at(e, e->l, p), bytes);
+        memcpy(el_at(e, e->g, x), el_at(e, e->g, p), bytes);
+    }
+    x->area = imp__polygon_area(r->corners, x->v);
+    x->centre = imp__v3(0, 0, 0);
+    for (int i = 0; i < r->corners; i++) x->centre += x->v[i] * (1.0 / r->corners);
+    for (int i = 0; i < r->corners; i++)
+        x->radius = fmax(x->radius, imp__length(x->v[i] - x->centre));
+    e->n_coef += (size_t)n;
+    *out = (uint32_t)e->n_elements++;
+    return IMP_OK;
+}
+
+enum imp_status imp__el_split(imp_elements *e, uint32_t element)
+{
+    enum imp_status st = IMP_OK;
+    if (e->elements[element].child) return IMP_OK;
+    uint32_t first = 0;
+    for (int k = 0; k < 4; k++) {
+        uint32_t child;
+        IMP_TRY(imp__el_element_add(e, e->elements[element].root, element, k, &child));
+        if (k == 0) first = child;
+    }
+    e->elements[element].child = first; /* all four or none */
+out:
+    return st;
+}
+
+/* Coordinates stay dyadic, so the corners of neighbours compare equal to the bit. */
+uint32_t imp__el_find(const imp_elements *e, uint32_t root, double u, double v,
+                      double uv[4][2])
+{
+    const int corners = e->roots[root].corners;
+    imp_v3 p[4] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+    if (corners == 3) p[2] = imp__v3(0, 1, 0);
+    uint32_t i = e->roots[root].element;
+    while (e->elements[i].child) {
+        imp_v3 sub[4];
+        int q;
+        if (corners == 4) {
+            const imp_v3 mid = (p[0] + p[2]) * 0.5;
+            q = (u >= mid[0]) + 2 * (v >= mid[1]);
+        } else { /* weights of the three corners; half or more belongs to that corner */
+            /* Pieces are the root's (u, v) triangle scaled, some turned by 180 degrees. */
+            const double b1 = (u - p[0][0]) / (p[1][0] - p[0][0]);
+            const double b2 = (v - p[0][1]) / (p[2][1] - p[0][1]);
+            q = 1 - b1 - b2 > 0.5 ? 0 : b1 > 0.5 ? 1 : b2 > 0.5 ? 2 : 3;
+        }
+        quarter(corners, p, q, sub);
+        memcpy(p, sub, sizeof p);
+        i = e->elements[i].child + (uint32_t)q;
+    }
+    for (int k = 0; k < corners && uv; k++) uv[k][0] = p[k][0], uv[k][1] = p[k][1];
+    return i;
+}

@@ -1,0 +1,404 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The schedule: links between whole polygons first, then refinement under a falling
+ * tolerance with a few warm-started sweeps each, until the picture hardly changes (the
+ * paper's rule), the tolerance has reached its end, or a budget is spent. */
+#include "elements.h"
+#include "color/rgb.h"
+#include <stdio.h>
+#include <string.h>
+
+void imp__el_tick(imp_elements *e, const char *stage, double fraction, const char *note)
+{
+    const double now = imp__now();
+    if (e->deadline_s > 0 && now > e->deadline_s && !e->stop) {
+        e->stop = true;
+        e->reason = "time limit";
+    }
+    if (!e->opt.progress) return;
+    if (fraction >= 0) e->fraction = fraction;
+    if (now - e->last_tick_s < 0.1 && fraction < 1) return;
+    e->last_tick_s = now;
+    const double elapsed = now - e->start_s;
+    const struct imp_progress p = {
+        .size = sizeof p, .stage = stage, .fraction = e->fraction, .elapsed_s = elapsed,
+        .eta_s = -1, .rate = elapsed > 0 ? (double)e->n_links / elapsed : 0,
+        .rate_unit = "links", .note = note};
+    if (e->opt.progress(&p, e->opt.progress_payload) && !e->stop) {
+        e->stop = true;
+        e->reason = "asked to stop";
+    }
+}
+
+/* ---- Options ------------------------------------------------------------------------------------ */
+
+static enum imp_status options_take(imp_elements *e, const struct imp_elements_options *options)
+{
+    struct imp_elements_options *o = &e->opt;
+    enum imp_status st = IMP_OK;
+    if (options) memcpy(o, options, imp_min(options->size, sizeof *o));
+    o->size = sizeof *o;
+    if (o->rays == 0) o->rays = 3;
+    if (o->stop == 0) o->stop = 0.01;
+    if (o->eps_first == 0) o->eps_first = 0.05;
+    if (o->eps_last == 0) o->eps_last = 5e-6;
+    if (o->sweeps == 0) o->sweeps = 4;
+    if (o->final_sweeps == 0) o->final_sweeps = 12;
+    if (o->max_level == 0) o->max_level = 9;
+    if (o->max_links == 0) o->max_links = 20000000;
+    if (o->max_bytes == 0) o->max_bytes = (size_t)4 << 30;
+    o->max_links = imp_min(o->max_links, (size_t)UINT32_MAX - 1);
+    if (o->order != 0 && (o->order < 2 || o->order > EL_ORDER_MAX))
+        return imp__error(e->ctx, IMP_E_ARG, "directional order %d is outside 2..%d", o->order,
+                          EL_ORDER_MAX);
+    if (o->rays < 1 || o->rays > 64 || o->sweeps < 1 || o->final_sweeps < 0 ||
+        o->max_level < 0 || o->max_level > EL_LEVEL_MAX)
+        return imp__error(e->ctx, IMP_E_ARG, "an option of the finite elements is outside its "
+                          "range (rays 1..64, sweeps >= 1, level 0..%d)", EL_LEVEL_MAX);
+    if (!(o->eps_first > 0) || !(o->eps_last > 0) || isnan(o->stop) || !(o->time_limit_s >= 0))
+        return imp__error(e->ctx, IMP_E_ARG, "tolerances must be positive");
+    if (e->scene->n_sensors > 0 && (o->sensor < 0 || o->sensor >= e->scene->n_sensors))
+        return imp__error(e->ctx, IMP_E_ARG, "there is no sensor %d; the scene has %d", o->sensor,
+                          e->scene->n_sensors);
+
+    /* Copies: the host's arrays may go. */
+    struct imp_elements_phong *phong = imp__arena_array(&e->arena, o->n_phong + 1, sizeof *phong);
+    struct imp_elements_beam *beams = imp__arena_array(&e->arena, o->n_beams + 1, sizeof *beams);
+    e->n_sources = o->n_sources ? o->n_sources : 1;
+    e->sources = imp__arena_array(&e->arena, e->n_sources, sizeof *e->sources);
+    if (!phong || !beams || !e->sources)
+        IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for options"));
+    for (size_t i = 0; i < o->n_phong; i++) {
+        const struct imp_elements_phong *p = &o->phong[i];
+        phong[i] = *p;
+        if (!p->shape || !(phong[i].shape = imp__arena_strdup(&e->arena, p->shape)))
+            IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "a Phong material needs a shape"));
+        for (int c = 0; c < 3; c++)
+            if (!(p->kd[c] >= 0) || !(p->ks[c] >= 0) || !(p->kd[c] + p->ks[c] <= 1 + 1e-12))
+                IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "shape '%s': Phong coefficients must be "
+                                   ">= 0 with kd + ks <= 1", p->shape));
+        if (!(p->exponent >= 0) || p->exponent > 1e4)
+            IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "shape '%s': Phong exponent %g", p->shape,
+                               p->exponent));
+    }
+    for (size_t i = 0; i < o->n_beams; i++) {
+        const struct imp_elements_beam *b = &o->beams[i];
+        beams[i] = *b;
+        if (!b->shape || !(beams[i].shape = imp__arena_strdup(&e->arena, b->shape)))
+            IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "a beam needs a shape"));
+        if (!(b->exponent >= 0) || b->exponent > 1e6 || !isfinite(b->axis[0]) ||
+            !isfinite(b->axis[1]) || !isfinite(b->axis[2]))
+            IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "shape '%s': beam exponent %g or its axis",
+                               b->shape, b->exponent));
+    }
+    o->phong = phong;
+    o->beams = beams;
+    for (size_t i = 0; i < e->n_sources; i++) {
+        struct imp_elements_source *s = &e->sources[i];
+        *s = (struct imp_elements_source){.size = sizeof *s, .sensor = o->sensor};
+        if (o->n_sources) memcpy(s, &o->sources[i], imp_min(o->sources[i].size, sizeof *s));
+        if (s->weight == 0) s->weight = 1;
+        if (!isfinite(s->weight))
+            IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "the weight of a measurement is not finite"));
+        if (s->kind == IMP_ELEMENTS_SHAPE) {
+            if (!s->shape || !(s->shape = imp__arena_strdup(&e->arena, s->shape)))
+                IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "a measurement has no shape"));
+        } else if (s->kind == IMP_ELEMENTS_CAMERA) {
+            if (s->sensor < 0 || s->sensor >= e->scene->n_sensors)
+                IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "there is no sensor %d; the scene has %d",
+                                   s->sensor, e->scene->n_sensors));
+            const struct imp_film_desc *f = &e->scene->sensors[s->sensor]->film;
+            int *r = s->region;
+            if (!r[0] && !r[1] && !r[2] && !r[3]) r[2] = f->crop_w, r[3] = f->crop_h;
+            if (r[0] < 0 || r[1] < 0 || r[2] > f->crop_w || r[3] > f->crop_h || r[0] >= r[2] ||
+                r[1] >= r[3])
+                IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "region %d,%d,%d,%d is not inside the "
+                                   "picture of %d x %d", r[0], r[1], r[2], r[3], f->crop_w,
+                                   f->crop_h));
+        } else if (s->kind != IMP_ELEMENTS_PLANE) {
+            IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "unknown kind of measurement %d",
+                               (int)s->kind));
+        }
+    }
+    o->sources = e->sources;
+out:
+    return st;
+}
+
+enum imp_status imp_elements_create(const imp_scene *scene,
+                                    const struct imp_elements_options *options,
+                                    imp_elements **out)
+{
+    enum imp_status st = IMP_OK;
+    if (!scene || !out) return IMP_E_ARG;
+    if (!scene->committed)
+        return imp__error(scene->ctx, IMP_E_ARG, "the scene is not committed");
+    imp_elements *e = imp__alloc(scene->ctx, 1, sizeof *e);
+    if (!e) return imp__error(scene->ctx, IMP_E_NOMEM, "out of memory for finite elements");
+    e->ctx = scene->ctx;
+    e->scene = scene;
+    e->ch = scene->channels;
+    e->reason = "not solved";
+    imp__arena_init(&e->arena, e->ctx);
+    if (e->ch == 1) e->lum[0] = 1;
+    else e->lum[0] = IMP_LUM_R, e->lum[1] = IMP_LUM_G, e->lum[2] = IMP_LUM_B;
+    for (int i = 0; i < 3; i++) e->size = fmax(e->size, scene->hi[i] - scene->lo[i]);
+    IMP_TRY(options_take(e, options));
+    IMP_TRY(imp__el_roots(e));
+    IMP_TRY(imp__el_materials(e));
+    for (size_t i = 0; i < e->n_roots; i++)
+        IMP_TRY(imp__el_element_add(e, (uint32_t)i, EL_NONE, 0, &e->roots[i].element));
+    *out = e;
+    e = NULL;
+out:
+    imp_elements_destroy(e);
+    return st;
+}
+
+void imp_elements_destroy(imp_elements *e)
+{
+    if (!e) return;
+    void *const all[] = {e->roots, e->elements, e->l, e->g, e->c, e->b, e->a, e->links,
+                         e->in_start, e->out_start, e->out, e->value, e->hits, e->view,
+                         e->picture, e->log, e->rows};
+    for (size_t k = 0; k < imp_count(all); k++) imp__release(e->ctx, all[k]);
+    imp__arena_free(&e->arena);
+    imp__release(e->ctx, e);
+}
+
+/* ---- Solving -------------------------------------------------------------------------------------- */
+
+static size_t leaves_of(const imp_elements *e)
+{
+    size_t n = 0;
+    for (size_t k = 0; k < e->n_elements; k++) n += e->elements[k].child == 0;
+    return n;
+}
+
+struct view_job { const imp_elements *e; double *out; size_t per; };
+static enum imp_status view_work(size_t item, int worker, int slot, void *payload)
+{
+    const struct view_job *v = payload;
+    const imp_elements *e = v->e;
+    (void)worker, (void)slot;
+    const size_t end = imp_min((item + 1) * 64, e->n_view / v->per);
+    for (size_t p = item * 64; p < end; p++) {
+        double sum = 0;
+        for (size_t k = 0; k < v->per; k++) {
+            double out[3];
+            imp__el_flat(e, &e->view[p * v->per + k], out);
+            for (int c = 0; c < e->ch; c++) sum += e->lum[c] * out[c];
+        }
+        v->out[p] = sum / (double)v->per;
+    }
+    return IMP_OK;
+}
+
+/* Relative RMS change of the picture since the last call; NaN the first time. Without a
+ * sensor it is the relative change of the measurement. */
+static enum imp_status change_of(imp_elements *e, double measure, double *change)
+{
+    enum imp_status st = IMP_OK;
+    struct view_job v = {.e = e, .per = (size_t)(e->opt.rays * e->opt.rays)};
+    const size_t n = e->n_view / v.per;
+    *change = NAN;
+    if (n == 0) {
+        if (e->n_log) *change = fabs(measure - e->log[e->n_log - 1].measure) / fabs(measure);
+        return IMP_OK;
+    }
+    v.out = imp__alloc(e->ctx, n, sizeof *v.out);
+    if (!v.out) return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for the picture");
+    const struct imp_loop loop = {.n_items = (n + 63) / 64, .work = view_work, .payload = &v};
+    IMP_TRY(imp__parallel(e->ctx, &loop, NULL));
+    double apart = 0, sum = 0;
+    for (size_t p = 0; p < n; p++) {
+        sum += v.out[p] * v.out[p];
+        if (e->picture) apart += imp__sqr(v.out[p] - e->picture[p]);
+    }
+    if (e->picture) *change = sum > 0 ? sqrt(apart / sum) : 0;
+    imp__release(e->ctx, e->picture);
+    e->picture = v.out;
+    v.out = NULL;
+out:
+    imp__release(e->ctx, v.out);
+    return st;
+}
+
+static enum imp_status log_add(imp_elements *e)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_elements_step s = {.eps = e->eps, .links = e->n_links, .elements = e->n_elements,
+                                  .leaves = leaves_of(e), .rays = e->rays,
+                                  .measure = imp__el_measure(e, NULL),
+                                  .elapsed_s = imp__now() - e->start_s};
+    if (!isfinite(s.measure))
+        return imp__error(e->ctx, IMP_E_NUMERIC, "reflections grow without end: the surfaces "
+                          "give back more than arrives");
+    IMP_TRY(change_of(e, s.measure, &s.change));
+    struct imp_elements_step *grown = imp__grow(e->ctx, e->log, &e->cap_log, e->n_log + 1,
+                                                sizeof *grown);
+    if (!grown) IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for the log"));
+    e->log = grown;
+    e->log[e->n_log++] = s;
+out:
+    return st;
+}
+
+/* Sum over leaves of area x |constant coefficient|, to see whether sweeps still move it. */
+static double weight_of(const imp_elements *e, bool importance)
+{
+    double sum = 0;
+    for (size_t k = 0; k < e->n_roots; k++) {
+        const struct imp__element *x = &e->elements[e->roots[k].element];
+        const int n = el_n(e, &e->roots[k]);
+        for (int c = 0; c < e->ch && n; c++) sum += x->area * fabs(el_at(e, importance ? e->g : e->l, x)[c * n]);
+    }
+    return sum;
+}
+
+enum imp_status imp__el_settle(imp_elements *e, int n, bool importance, double tolerance)
+{
+    enum imp_status st = IMP_OK;
+    double before[2] = {weight_of(e, false), weight_of(e, true)};
+    const int most = 200;
+    for (int k = 0; k < most; k++) {
+        IMP_TRY(imp__el_sweep(e, n, importance, false));
+        const double now[2] = {weight_of(e, false), importance ? weight_of(e, true) : 0};
+        if (!isfinite(now[0]) || !isfinite(now[1]) || (k > 20 && now[0] > 1e3 * before[0]))
+            IMP_TRY(imp__error(e->ctx, IMP_E_NUMERIC, "reflections grow without end: the surfaces "
+                               "give back more than arrives"));
+        if (fabs(now[0] - before[0]) <= tolerance * now[0] &&
+            (!importance || fabs(now[1] - before[1]) <= tolerance * now[1]))
+            return IMP_OK;
+        before[0] = now[0];
+        before[1] = now[1];
+        imp__el_tick(e, "settle", -1, NULL);
+        if (e->stop) return IMP_OK;
+    }
+    imp__warn(e->ctx, "finite elements: reflections had not died away after %d sweeps", most * n);
+out:
+    return st;
+}
+
+enum imp_status imp_elements_solve(imp_elements *e)
+{
+    enum imp_status st = IMP_OK;
+    if (!e) return IMP_E_ARG;
+    const bool importance = !e->opt.no_importance;
+    bool full = false;
+    e->start_s = imp__now();
+    e->deadline_s = e->opt.time_limit_s > 0 ? e->start_s + e->opt.time_limit_s : 0;
+    e->stop = false;
+    e->reason = "the smallest tolerance was reached";
+    if (!e->n_links) {
+        IMP_TRY(imp__el_links_first(e));
+        IMP_TRY(imp__el_sources(e));
+    }
+    IMP_TRY(imp__el_bin(e));
+    IMP_TRY(imp__el_sweep(e, e->opt.sweeps + 2, importance, !e->solved));
+    e->n_log = 0;
+    imp__release(e->ctx, e->picture);
+    e->picture = NULL;
+    IMP_TRY(log_add(e));
+    const double first = e->opt.eps_first, last = e->opt.eps_last;
+    for (double rel = first; rel >= last && !e->stop; rel /= 2) {
+        char note[96];
+        e->eps = rel * imp__el_total(e, importance);
+        if (!(e->eps > 0)) {
+            e->reason = "no light reaches the measurement";
+            if (e->n_log > 1 || importance) break;
+        }
+        const size_t before = e->n_links;
+        IMP_TRY(imp__el_refine(e, importance, &full));
+        IMP_TRY(imp__el_bin(e));
+        IMP_TRY(imp__el_sweep(e, e->opt.sweeps, importance, false));
+        IMP_TRY(log_add(e));
+        const struct imp_elements_step *s = &e->log[e->n_log - 1];
+        snprintf(note, sizeof note, "%zu links, measure %.6g, change %.3g %%", s->links,
+                 s->measure, 100 * s->change);
+        imp__el_tick(e, "solve", log(rel / first) / log(last / first), note);
+        if (e->stop) break;
+        if (full) {
+            e->reason = "the budget of links or memory is spent";
+            break;
+        }
+        /* A step that changed nothing because it refined nothing says nothing. */
+        if (s->change < e->opt.stop && s->links > before + before / 8) {
+            e->reason = "the picture stands still";
+            break;
+        }
+    }
+    const bool stopped = e->stop;
+    e->stop = false;
+    e->deadline_s = 0;
+    e->solved = true;
+    e->has_importance = importance;
+    IMP_TRY(imp__el_settle(e, imp_max(e->opt.final_sweeps / 3, 1), importance, 1e-7));
+    IMP_TRY(log_add(e));
+    if (stopped || e->stop) {
+        imp__error(e->ctx, IMP_CANCELLED, "stopped: %s", e->reason);
+        return IMP_CANCELLED;
+    }
+out:
+    return st;
+}
+
+/* Lights and reflectances as the scene has them now; the polygons stay. */
+static enum imp_status parameters_read(imp_elements *e)
+{
+    for (size_t i = 0; i < e->n_roots; i++) {
+        struct imp__el_root *r = &e->roots[i];
+        if (r->light == EL_DARK || r->light_param < 0) continue;
+        for (int c = 0; c < 3; c++)
+            r->radiance[c] = r->light_value[c] =
+                imp__param_get(&e->scene->params[r->light_param], r->light_count == 3 ? (size_t)c : 0);
+    }
+    for (int i = 0; i < e->n_materials; i++) {
+        struct imp__el_material *m = &e->materials[i];
+        struct imp__el_material fresh = *m;
+        if (!m->bsdf) continue;
+        const enum imp_status st = imp__el_project(e->ctx, &e->arena, &e->basis, e->ch, "",
+                                                   &fresh);
+        if (st != IMP_OK) return st;
+        if (fresh.n > m->n)
+            return imp__error(e->ctx, IMP_E_UNSUPPORTED, "a material has changed its kind: "
+                              "it needs new elements");
+        fresh.n = m->n;
+        *m = fresh;
+    }
+    return IMP_OK;
+}
+
+enum imp_status imp_elements_update(imp_elements *e)
+{
+    enum imp_status st = IMP_OK;
+    if (!e) return IMP_E_ARG;
+    if (!e->solved) return imp__error(e->ctx, IMP_E_ARG, "the elements are not solved yet");
+    IMP_TRY(parameters_read(e));
+    IMP_TRY(imp__el_bin(e));
+    IMP_TRY(imp__el_settle(e, 4, e->has_importance, 1e-10));
+out:
+    return st;
+}
+
+enum imp_status imp_elements_get_info(const imp_elements *e, struct imp_elements_info *info)
+{
+    if (!e || !info) return IMP_E_ARG;
+    struct imp_elements_info i = {.size = imp_min(info->size, sizeof i),
+        .order = e->basis.order, .functions = e->basis.n, .polygons = e->n_roots,
+        .elements = e->n_elements, .leaves = leaves_of(e), .links = e->n_links,
+        .skipped = e->skipped, .rays = e->rays, .bytes = imp__el_bytes(e),
+        .reason = e->reason, .n_steps = e->n_log, .steps = e->log};
+    i.bytes_per_link = (double)(sizeof *e->links + 4 * (size_t)e->ch * sizeof *e->value +
+                                sizeof *e->out);
+    i.bytes_per_element = (double)(sizeof *e->elements + 2 * sizeof *e->in_start) +
+        (e->n_elements ? 8.0 * (4 * e->ch + 1) * (double)e->n_coef / (double)e->n_elements : 0);
+    for (int k = 0; k < e->n_materials; k++)
+        i.worst_residual = fmax(i.worst_residual, e->materials[k].residual);
+    if (e->solved) {
+        i.measure = imp__el_measure(e, &i.measure_direct);
+        i.measure_adjoint = e->has_importance ? imp__el_measure_adjoint(e) : NAN;
+    }
+    memcpy(info, &i, i.size);
+    return IMP_OK;
+}
