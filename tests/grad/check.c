@@ -1,0 +1,149 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * imp_check passes what is right, on scenes with every kind of row, and catches a planted
+ * derivative that is 0.1 % off. */
+#include <math.h>
+#include "scene/scene.h"
+#include "imp_scene.h"
+#include "inverse_scenes.h"
+#include "imp_tap.h"
+
+static imp_context *ctx;
+
+struct counts {
+    int rows, failed, frozen, dot, euler, fresh;
+    double worst_exact, worst_frozen, worst_z;
+};
+
+static struct counts check(imp_problem *p, int paths, int spp, uint64_t seed)
+{
+    struct counts n = {0};
+    const struct imp_check_row *rows;
+    struct imp_check_options o = IMP_CHECK_OPTIONS_INIT;
+    struct imp_run run = IMP_RUN_INIT;
+    o.paths = paths;
+    o.fresh_spp = spp;
+    run.seed = seed;
+    size_t n_rows = 0;
+    test_must(ctx, imp_check(p, &o, &run, &rows, &n_rows));
+    for (size_t i = 0; i < n_rows; i++) {
+        const struct imp_check_row *r = &rows[i];
+        n.rows++;
+        n.failed += !r->ok;
+        if (!r->ok)
+            printf("# %s %s step %g: %.9g against %.9g, error %.3g, limit %g\n", r->method,
+                   r->param, r->step, r->value, r->reference, r->error, r->limit);
+        if (!strcmp(r->method, "frozen")) {
+            n.frozen++;
+            if (r->limit > 0) n.worst_frozen = fmax(n.worst_frozen, r->error);
+        } else if (!strcmp(r->method, "fresh")) {
+            n.fresh++;
+            n.worst_z = fmax(n.worst_z, r->error);
+        } else {
+            if (!strcmp(r->method, "dot")) n.dot++;
+            else n.euler++;
+            n.worst_exact = fmax(n.worst_exact, r->error);
+        }
+    }
+    return n;
+}
+
+static void passes(imp_scene *s, const char *what, int paths, int spp, int frozen, int euler,
+                   int fresh)
+{
+    imp_problem *p = NULL;
+    test_must(ctx, imp_problem_create(s, &p));
+    test_must(ctx, imp_problem_activate(p, "*"));
+    double before[64], after[64];
+    imp_problem_get_x(p, before);
+    const struct counts n = check(p, paths, spp, 5);
+    imp_problem_get_x(p, after);
+    tap_ok(n.failed == 0 && n.frozen == frozen && n.dot == 1 && n.euler == euler
+           && n.fresh == fresh, "%s # frozen %d (worst %.1e), dot, euler %d (worst %.1e), "
+           "fresh %d (worst z %.2f), failed %d", what, n.frozen, n.worst_frozen, n.euler,
+           n.worst_exact, n.fresh, n.worst_z, n.failed);
+    tap_ok(!memcmp(before, after, imp_problem_n(p) * sizeof *before), "and leaves the scene alone");
+    imp_problem_destroy(p);
+}
+
+/* The kind of a material with eval_d replaced. */
+static void (*right_eval_d)(const struct imp_bsdf *, const imp_spec *, const struct imp_dirs *,
+                            imp_spec *);
+static void wrong_eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
+                         imp_spec *df)
+{
+    right_eval_d(b, in, d, df);
+    df[0] *= 1.001;
+}
+
+static void planted(void)
+{
+    imp_scene *s = scene_open(ctx, box_xml, IMP_RGB);
+    imp_problem *p = NULL;
+    test_must(ctx, imp_problem_create(s, &p));
+    test_must(ctx, imp_problem_activate(p, "red.*"));
+    struct imp_bsdf *b = NULL;
+    for (int i = 0; i < s->n_bsdfs; i++)
+        if (s->bsdfs[i]->name && !strcmp(s->bsdfs[i]->name, "red")) b = s->bsdfs[i];
+    if (!b) return;
+    const struct imp_bsdf_ops *ops = b->ops;
+    struct imp_bsdf_ops wrong = *ops;
+    right_eval_d = ops->eval_d;
+    wrong.eval_d = wrong_eval_d;
+    b->ops = &wrong;
+    const struct counts n = check(p, 100, 4, 5);
+    b->ops = ops;
+    tap_ok(n.failed >= 1 && fabs(n.worst_frozen - 1e-3) < 1e-4,
+           "a derivative 0.1 %% off is caught # worst frozen error %.2e", n.worst_frozen);
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+}
+
+static int stop(const struct imp_progress *p, void *payload)
+{
+    (void)p, (void)payload;
+    return 1;
+}
+
+int main(void)
+{
+    ctx = test_context(0);
+    imp_scene *s = test_scene(ctx, "stam.xml", IMP_MONO, "res=16");
+    /* seven controls; emission, sphere, walls */
+    passes(s, "Stam's box", 1000, 256, 7 * 4, 3, 7);
+    imp_scene_destroy(s);
+    s = test_scene(ctx, "stam.xml", IMP_MONO, "res=16 variant=reciprocal sampling=cosine");
+    passes(s, "Stam's box, reciprocal, cosine sampling", 300, 64, 7 * 4, 3, 7);
+    imp_scene_destroy(s);
+    s = test_scene(ctx, "cornell.xml", IMP_RGB, "res=16");
+    /* white, red, green, lamp, light: three numbers each */
+    passes(s, "Cornell box", 300, 32, 5 * 4, 1, 15);
+    imp_scene_destroy(s);
+    s = scene_open(ctx, ball_xml, IMP_RGB);
+    passes(s, "ball under a sky", 300, 64, 2 * 4, 1, 6);
+
+    /* Parameters that are exactly zero, and at an upper bound. */
+    size_t k;
+    test_must(ctx, imp_scene_find_param(s, "ball.reflectance.value", &k));
+    test_must(ctx, imp_scene_set_values(s, k, 3, (double[]){0, 1, 0.5}));
+    passes(s, "at the bounds", 300, 64, 2 * 4, 1, 6);
+
+    imp_problem *p = NULL;
+    const struct imp_check_row *rows = NULL;
+    size_t n_rows = 0;
+    struct imp_run run = IMP_RUN_INIT;
+    test_must(ctx, imp_problem_create(s, &p));
+    tap_ok(imp_check(p, NULL, NULL, &rows, &n_rows) == IMP_E_ARG, "nothing active");
+    test_must(ctx, imp_problem_activate(p, "*"));
+    run.progress = stop;
+    tap_ok(imp_check(p, NULL, &run, &rows, &n_rows) == IMP_CANCELLED && rows, "cancelled");
+    struct imp_check_options o = IMP_CHECK_OPTIONS_INIT;
+    o.paths = -1;
+    tap_ok(imp_check(p, &o, NULL, &rows, &n_rows) == IMP_E_ARG, "negative count # %s",
+           imp_last_error(ctx));
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+    planted();
+    imp_context_destroy(ctx);
+    return tap_done();
+}
