@@ -35,12 +35,13 @@ static void print_text(const struct imp_check_row *rows, size_t n)
         if (r->se > 0) snprintf(se, sizeof se, "%.1e", r->se);
         printf("%-7s %-*s %-8s %-15.8g %-15.8g %-9s %s%-9.2g %s\n", r->method, width,
                r->param ? r->param : "", step, r->value, r->reference, se,
-               r->se > 0 ? "z " : "", r->error, r->ok ? "ok" : "FAILED");
+               r->se > 0 ? "z " : "", r->error,
+               r->ok > 0 ? "ok" : r->ok < 0 ? "noisy" : "FAILED");
     }
 }
 
 static void print_json(const struct imp_run *run, const struct imp_check_row *rows, size_t n,
-                       size_t failed)
+                       size_t failed, size_t noisy)
 {
     struct json j = cli_json();
     json_seed(&j, "seed", run->seed);
@@ -57,11 +58,13 @@ static void print_json(const struct imp_run *run, const struct imp_check_row *ro
         json_number(&j, "se", r->se);
         json_number(&j, "error", r->error);
         json_number(&j, "limit", r->limit);
-        json_bool(&j, "ok", r->ok);
+        json_bool(&j, "ok", r->ok != 0);
+        json_bool(&j, "resolved", r->ok >= 0);
         json_end_object(&j);
     }
     json_end_array(&j);
     json_integer(&j, "failed", (int64_t)failed);
+    json_integer(&j, "noisy", (int64_t)noisy);
     cli_json_end(&j);
 }
 
@@ -70,7 +73,7 @@ static int run_check(int n, char **operand)
     struct imp_check_options check = IMP_CHECK_OPTIONS_INIT;
     const struct imp_check_row *rows = NULL;
     imp_problem *problem = NULL;
-    size_t n_rows = 0, failed = 0;
+    size_t n_rows = 0, failed = 0, noisy = 0;
     (void)n;
     int rc = cli_load(operand[0]);
     if (!rc) rc = problem_open(&problem);
@@ -83,10 +86,14 @@ static int run_check(int n, char **operand)
     if (cli_failed(st)) {
         rc = cli_fail(st, cli.scene_path);
     } else {
-        for (size_t i = 0; i < n_rows; i++) failed += !rows[i].ok;
-        if (cli.json) print_json(&run, rows, n_rows, failed);
+        for (size_t i = 0; i < n_rows; i++) {
+            failed += !rows[i].ok;
+            noisy += rows[i].ok < 0;
+        }
+        if (cli.json) print_json(&run, rows, n_rows, failed, noisy);
         else print_text(rows, n_rows);
-        cli_say("%zu checks, %zu failed", n_rows, failed);
+        cli_say("%zu checks, %zu failed, %zu too noisy to tell%s", n_rows, failed, noisy,
+                noisy ? " (more --fresh-spp)" : "");
         rc = cli_done();
         if (!rc && failed) rc = EXIT_NO;
     }

@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Gradients against differences of pictures that share no random number with them or with
- * each other: what a frozen walk cannot see (wrong densities, missing terms) shows here as z.
+ * Gradients against differences of pictures that share no random number with them: what a
+ * frozen walk cannot see (wrong densities, missing terms) shows here as z. The pictures of
+ * one difference share theirs, in batches whose spread is the standard error: walks that do
+ * not feel the parameter then cancel (common random numbers, gradients.md 13 B).
  *
  * The functional is F = sum_pc s_pc I_pc with a smooth positive pattern s of mean 1/pixels.
  * F is linear in emission: one central difference with a large step. Elsewhere two steps and
@@ -14,7 +16,8 @@
 #define Z_LIMIT 4
 #define STEP 0.3         /* of the room a number has */
 #define STEP_LINEAR 0.8
-#define BATCHES 16       /* independent pictures behind an SE where pixels share samples */
+#define BATCHES 16       /* independent differences behind an SE */
+#define RESOLVED 0.2     /* an SE larger than this part of the value decides nothing */
 
 struct fresh {
     struct imp__check *check;
@@ -59,54 +62,56 @@ static uint64_t seed_of(struct fresh *f)
     return imp__mix64(f->check->outer.seed ^ (0xf7e5u + ++f->next_seed * 0x9e3779b97f4a7c15u));
 }
 
-/* sum s value of one picture, and its variance from the pixels' standard errors. */
-static enum imp_status functional_once(struct fresh *f, struct imp_picture *picture,
-                                       struct imp_run *run, double *value, double *variance)
+/* Samples of one batch. */
+static int batch_spp(const struct fresh *f)
 {
-    imp_film *film = NULL;
-    const enum imp_status st = imp__picture_make(f->check->ctx, picture, run, &film);
-    if (st == IMP_OK) {
-        *value = *variance = 0;
-        for (size_t i = 0; i < imp__film_values(film); i++) {
-            const double s = f->pattern[i], se = film->se ? film->se[i] : 0;
-            *value += s * film->mean[i];
-            *variance += s * s * se * se;
-        }
-    }
-    imp_film_destroy(film);
-    return st;
+    const int spp = f->check->run.spp > 0 ? f->check->run.spp : f->check->tracer.sensor->spp;
+    return imp_max((spp + BATCHES - 1) / BATCHES, 1);
 }
 
-/* F, or its derivative along x_dot, from random numbers of its own. */
-static enum imp_status functional(struct fresh *f, const double *x_dot, struct imp_estimate *out)
+/* F, or its derivative along x_dot, with the random numbers of `seed`. */
+static enum imp_status functional(struct fresh *f, const double *x_dot, uint64_t seed,
+                                  double *value)
 {
-    enum imp_status st = IMP_OK;
     const struct imp_sensor *sensor = f->check->tracer.sensor;
     struct imp_run run = f->check->run;
     struct tangent t = {f->check->tracer, x_dot};
     struct imp_picture picture = {sensor, "check", f->channels == 3 ? "R,G,B" : "Y",
                                   f->channels, x_dot ? sample_derivative : sample_radiance,
                                   x_dot ? (void *)&t : (void *)&t.tracer, NULL};
+    imp_film *film = NULL;
     if (!x_dot) t.tracer.active = NULL;
-    if (run.spp == 0) run.spp = sensor->spp;
-    run.seed = t.tracer.seed = seed_of(f);
-    double value, variance, sum = 0, square = 0;
-    if (imp__film_border(&sensor->film) == 0) {
-        run.spp = imp_max(run.spp, 2);
-        IMP_TRY(functional_once(f, &picture, &run, &value, &variance));
-        *out = (struct imp_estimate){value, sqrt(variance), 0};
-    } else {
-        run.spp = imp_max((run.spp + BATCHES - 1) / BATCHES, 1);
-        for (int b = 0; b < BATCHES; b++) {
-            IMP_TRY(functional_once(f, &picture, &run, &value, &variance));
-            sum += value;
-            square += value * value;
-            run.seed = t.tracer.seed = seed_of(f);
-        }
-        const double mean = sum / BATCHES;
-        variance = fmax(square / BATCHES - mean * mean, 0) / (BATCHES - 1);
-        *out = (struct imp_estimate){mean, sqrt(variance), 0};
+    run.spp = batch_spp(f);
+    run.seed = t.tracer.seed = seed;
+    const enum imp_status st = imp__picture_make(f->check->ctx, &picture, &run, &film);
+    if (st == IMP_OK) {
+        *value = 0;
+        for (size_t i = 0; i < imp__film_values(film); i++) *value += f->pattern[i] * film->mean[i];
     }
+    imp_film_destroy(film);
+    return st;
+}
+
+/* Mean of batches and its standard error, from sums over them. */
+static struct imp_estimate batches_mean(double sum, double square)
+{
+    const double mean = sum / BATCHES;
+    const double variance = fmax(square / BATCHES - mean * mean, 0) / (BATCHES - 1);
+    return (struct imp_estimate){mean, sqrt(variance), 0};
+}
+
+/* The derivative of F along x_dot. */
+static enum imp_status slope(struct fresh *f, const double *x_dot, struct imp_estimate *out)
+{
+    enum imp_status st = IMP_OK;
+    double sum = 0, square = 0;
+    for (int b = 0; b < BATCHES; b++) {
+        double value;
+        IMP_TRY(functional(f, x_dot, seed_of(f), &value));
+        sum += value;
+        square += value * value;
+    }
+    *out = batches_mean(sum, square);
     st = imp__check_progress(f->check, 1);
 out:
     return st;
@@ -120,32 +125,39 @@ struct motion {
     const double *old, *weight; /* [count] */
 };
 
-static enum imp_status at(struct fresh *f, const struct motion *m, double step,
-                          struct imp_estimate *out)
+static enum imp_status at(struct fresh *f, const struct motion *m, double step, uint64_t seed,
+                          double *value)
 {
     struct imp_param p = *m->param;
     for (size_t e = 0; e < p.info.count; e++)
         if (m->weight[e] != 0) imp__param_set(&p, e, m->old[e] + step * m->weight[e]);
-    const enum imp_status st = functional(f, NULL, out);
+    const enum imp_status st = functional(f, NULL, seed, value);
     for (size_t e = 0; e < p.info.count; e++) imp__param_set(&p, e, m->old[e]);
     return st;
 }
 
-/* Combine values at places with factors: value and SE of sum factor F(place). */
+/* Combine values at places with factors: sum factor F(place), batch by batch. */
 static enum imp_status combine(struct fresh *f, const struct motion *m, int n,
                                const double *place, const double *factor,
                                struct imp_estimate *out)
 {
-    double sum = 0, variance = 0;
-    for (int i = 0; i < n; i++) {
-        struct imp_estimate e;
-        const enum imp_status st = at(f, m, place[i], &e);
-        if (st != IMP_OK) return st;
-        sum += factor[i] * e.value;
-        variance += factor[i] * factor[i] * e.se * e.se;
+    enum imp_status st = IMP_OK;
+    double sum = 0, square = 0;
+    for (int b = 0; b < BATCHES; b++) {
+        const uint64_t seed = seed_of(f);
+        double difference = 0;
+        for (int i = 0; i < n; i++) {
+            double value;
+            IMP_TRY(at(f, m, place[i], seed, &value));
+            difference += factor[i] * value;
+        }
+        sum += difference;
+        square += difference * difference;
     }
-    *out = (struct imp_estimate){sum, sqrt(variance), 0};
-    return IMP_OK;
+    *out = batches_mean(sum, square);
+    st = imp__check_progress(f->check, n);
+out:
+    return st;
 }
 
 /* Room of all moving numbers below and above, in units of their weights. */
@@ -197,7 +209,8 @@ static enum imp_status compare(struct fresh *f, const struct motion *m, int64_t 
     /* Without any noise (a furnace) the difference is rounding of the pictures' floats. */
     const double rounding = 1e-6 * fmax(fabs(mine.value), fabs(fd.value));
     row.error = row.se > 0 ? fmax(off - rounding, 0) / row.se : off <= rounding ? 0 : INFINITY;
-    row.ok = row.error <= row.limit;
+    const double size = fmax(fabs(mine.value), fabs(fd.value));
+    row.ok = !(row.error <= row.limit) ? 0 : row.se <= RESOLVED * size ? 1 : -1;
     return imp__check_row(f->check, "fresh", m->param->info.name, element, &row);
 }
 
@@ -241,7 +254,7 @@ static enum imp_status check_param(struct fresh *f, size_t param)
         struct imp_estimate g;
         for (size_t e = 0; e < count; e++)
             weight[e] = x_dot[base + e] = 0.5 + imp__u01(imp__key(9, 9, 9), (uint32_t)e);
-        IMP_TRY(functional(f, x_dot, &g));
+        IMP_TRY(slope(f, x_dot, &g));
         IMP_TRY(compare(f, &m, -1, linear, g));
     }
 out:
