@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Replays a corpus through a fuzz target as an ordinary test: no fuzzing engine is needed.
+ * Replays a corpus through a fuzz target as an ordinary test: no fuzzing engine is
+ * needed.
  *
  *     replay_xml fuzz/corpus/xml
  */

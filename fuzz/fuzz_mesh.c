@@ -2,9 +2,9 @@
  *
  * Meshes: the first byte chooses OBJ or PLY and whether v is flipped. What is read has
  * indices in range and finite numbers. */
+#include "format/mesh.h"
 #include <math.h>
 #include <stdlib.h>
-#include "format/mesh.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
 
@@ -14,7 +14,8 @@ static void check(const struct imp_mesh_data *m)
     for (size_t i = 0; i < 3 * m->n_triangles; i++)
         if (m->indices[i] >= m->n_vertices) abort();
     for (size_t i = 0; i < 3 * m->n_vertices; i++)
-        if (!isfinite(m->positions[i]) || (m->normals && !isfinite(m->normals[i]))) abort();
+        if (!isfinite(m->positions[i]) || (m->normals && !isfinite(m->normals[i])))
+            abort();
     for (size_t i = 0; m->uvs && i < 2 * m->n_vertices; i++)
         if (!isfinite(m->uvs[i])) abort();
 }
@@ -29,11 +30,15 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
     struct imp_arena keep, temporary;
     imp__arena_init(&keep, ctx);
     imp__arena_init(&temporary, ctx);
-    const struct imp_mesh_source source = {
-        .ctx = ctx, .keep = &keep, .temporary = &temporary, .name = "fuzz",
-        .text = {(unsigned char *)data, size, size}, .flip_v = choice & 2};
+    const struct imp_mesh_source source = {.ctx = ctx,
+                                           .keep = &keep,
+                                           .temporary = &temporary,
+                                           .name = "fuzz",
+                                           .text = {(unsigned char *)data, size, size},
+                                           .flip_v = choice & 2};
     struct imp_mesh_data mesh;
-    if ((choice & 1 ? imp__ply_parse(&source, &mesh) : imp__obj_parse(&source, &mesh)) == IMP_OK)
+    if ((choice & 1 ? imp__ply_parse(&source, &mesh) : imp__obj_parse(&source, &mesh)) ==
+        IMP_OK)
         check(&mesh);
     imp__arena_free(&keep);
     imp__arena_free(&temporary);

@@ -13,15 +13,16 @@
 /* Of what has no size of its own: pipes, and devices that never end. */
 #define ENDLESS_MAX ((size_t)1 << 30)
 
-static enum imp_status io_error(imp_context *ctx, const char *path, const char *what, int code)
+static enum imp_status io_error(imp_context *ctx, const char *path, const char *what,
+                                int code)
 {
     char text[256];
     return imp__error(ctx, IMP_E_IO, "%s: %s: %s", path, what,
                       strerror_r(code, text, sizeof text));
 }
 
-bool imp__bytes_put(imp_context *ctx, struct imp_bytes *b, size_t offset, const void *data,
-                    size_t n)
+bool imp__bytes_put(imp_context *ctx, struct imp_bytes *b, size_t offset,
+                    const void *data, size_t n)
 {
     size_t end;
     if (__builtin_add_overflow(offset, n, &end)) return false;
@@ -53,11 +54,13 @@ enum imp_status imp__file_read(imp_context *ctx, const char *path, size_t limit,
     if (fstat(fd, &info) != 0) IMP_TRY(io_error(ctx, path, "cannot read", errno));
     if (S_ISDIR(info.st_mode)) IMP_TRY(io_error(ctx, path, "cannot read", EISDIR));
     size_t room = 1 << 16; /* pipes say 0 */
-    if (!S_ISREG(info.st_mode)) limit = imp_min(limit, ENDLESS_MAX);
+    if (!S_ISREG(info.st_mode))
+        limit = imp_min(limit, ENDLESS_MAX);
     else {
         if ((uint64_t)info.st_size > limit)
             IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: longer than %zu bytes", path, limit));
-        room = (size_t)info.st_size + 2; /* one to see the end of the file, one for the zero */
+        room = (size_t)info.st_size +
+               2; /* one to see the end of the file, one for the zero */
     }
     for (;;) {
         if (b.size + room > b.capacity) {
@@ -68,11 +71,12 @@ enum imp_status imp__file_read(imp_context *ctx, const char *path, size_t limit,
             } else
                 grown = imp__grow(ctx, b.data, &b.capacity, b.size + room, 1);
             if (!grown)
-                IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "%s: no memory for its contents", path));
+                IMP_TRY(
+                    imp__error(ctx, IMP_E_NOMEM, "%s: no memory for its contents", path));
             b.data = grown;
         }
-        const ssize_t n = read(fd, b.data + b.size, imp_min(b.capacity - b.size - 1,
-                                                            (size_t)1 << 30));
+        const ssize_t n =
+            read(fd, b.data + b.size, imp_min(b.capacity - b.size - 1, (size_t)1 << 30));
         if (n < 0 && errno == EINTR) continue;
         if (n < 0) IMP_TRY(io_error(ctx, path, "cannot read", errno));
         if (n == 0) break;
@@ -131,7 +135,8 @@ enum imp_status imp__file_write(imp_context *ctx, const char *path, const void *
 {
     struct stat info;
     const bool exists = stat(path, &info) == 0;
-    if (exists && S_ISDIR(info.st_mode)) return io_error(ctx, path, "cannot write", EISDIR);
+    if (exists && S_ISDIR(info.st_mode))
+        return io_error(ctx, path, "cannot write", EISDIR);
     if (exists && !S_ISREG(info.st_mode)) {
         const int fd = open(path, O_WRONLY | O_CLOEXEC);
         if (fd < 0) return io_error(ctx, path, "cannot open", errno);

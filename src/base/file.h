@@ -11,18 +11,19 @@ struct imp_bytes { /* growing memory; all zero is empty */
     size_t size, capacity;
 };
 
-/* Read all of it, with a zero byte behind the end. @return IMP_E_IO if it cannot be read, is
- * a folder, or is longer than `limit`; IMP_E_NOMEM. */
+/* Read all of it, with a zero byte behind the end. @return IMP_E_IO if it cannot be read,
+ * is a folder, or is longer than `limit`; IMP_E_NOMEM. */
 enum imp_status imp__file_read(imp_context *ctx, const char *path, size_t limit,
                                struct imp_bytes *out);
 /* Write a temporary file beside it, flush it to the disk, rename it over `path`: at any
- * failure what was there stays. What is not a regular file (/dev/stdout) is written to. */
+ * failure what was there stays. What is not a regular file (/dev/stdout) is written to.
+ */
 enum imp_status imp__file_write(imp_context *ctx, const char *path, const void *data,
                                 size_t size);
 
 /* Put n bytes at `offset`, growing as needed; false if out of memory. */
-bool imp__bytes_put(imp_context *ctx, struct imp_bytes *b, size_t offset, const void *data,
-                    size_t n);
+bool imp__bytes_put(imp_context *ctx, struct imp_bytes *b, size_t offset,
+                    const void *data, size_t n);
 static inline bool imp__bytes_add(imp_context *ctx, struct imp_bytes *b, const void *data,
                                   size_t n)
 {

@@ -2,7 +2,8 @@
 #include "film.h"
 #include <string.h>
 
-/* "R,G,B" -> names; blanks around names do not count, empty and repeated names are errors. */
+/* "R,G,B" -> names; blanks around names do not count, empty and repeated names are
+ * errors. */
 static enum imp_status names_split(imp_film *f, const char *list)
 {
     size_t n = 1;
@@ -18,13 +19,15 @@ static enum imp_status names_split(imp_film *f, const char *list)
         size_t used = length;
         while (used && c[used - 1] == ' ') used--;
         if (!used || used > 200)
-            return imp__error(f->ctx, IMP_E_ARG, "film: bad channel name in '%.200s'", list);
+            return imp__error(f->ctx, IMP_E_ARG, "film: bad channel name in '%.200s'",
+                              list);
         char *name = imp__alloc(f->ctx, used + 1, 1);
         if (!name) return imp__error(f->ctx, IMP_E_NOMEM, "film: out of memory");
         memcpy(name, c, used);
         if (imp__film_find(f, name) >= 0) {
             imp__release(f->ctx, name);
-            return imp__error(f->ctx, IMP_E_ARG, "film: channel name twice in '%.200s'", list);
+            return imp__error(f->ctx, IMP_E_ARG, "film: channel name twice in '%.200s'",
+                              list);
         }
         f->names[f->channels++] = name;
         c += length;
@@ -32,28 +35,31 @@ static enum imp_status names_split(imp_film *f, const char *list)
     }
 }
 
-enum imp_status imp__film_create(imp_context *ctx, int width, int height, const char *names,
-                                 bool with_se, imp_film **out)
+enum imp_status imp__film_create(imp_context *ctx, int width, int height,
+                                 const char *names, bool with_se, imp_film **out)
 {
     enum imp_status st = IMP_OK;
     imp_film *f = imp__alloc(ctx, 1, sizeof *f);
     if (!f) return imp__error(ctx, IMP_E_NOMEM, "film: out of memory");
     f->ctx = ctx;
-    if (width < 1 || height < 1 || width > IMP_FILM_SIDE_MAX || height > IMP_FILM_SIDE_MAX)
-        IMP_TRY(imp__error(ctx, IMP_E_ARG, "film: size %d x %d is not between 1 and %d", width,
-                           height, IMP_FILM_SIDE_MAX));
+    if (width < 1 || height < 1 || width > IMP_FILM_SIDE_MAX ||
+        height > IMP_FILM_SIDE_MAX)
+        IMP_TRY(imp__error(ctx, IMP_E_ARG, "film: size %d x %d is not between 1 and %d",
+                           width, height, IMP_FILM_SIDE_MAX));
     IMP_TRY(names_split(f, names));
     f->width = width;
     f->height = height;
     const size_t n = imp__film_values(f);
     if (n > IMP_FILM_VALUES_MAX)
-        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "film: %d x %d with %d channels is too large",
-                           width, height, f->channels));
+        IMP_TRY(imp__error(ctx, IMP_E_NOMEM,
+                           "film: %d x %d with %d channels is too large", width, height,
+                           f->channels));
     f->mean = imp__alloc(ctx, n, sizeof *f->mean);
     f->se = with_se ? imp__alloc(ctx, n, sizeof *f->se) : NULL;
     if (!f->mean || (with_se && !f->se))
-        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "film: no memory for %d x %d with %d channels",
-                           width, height, f->channels));
+        IMP_TRY(imp__error(ctx, IMP_E_NOMEM,
+                           "film: no memory for %d x %d with %d channels", width, height,
+                           f->channels));
     *out = f;
     return IMP_OK;
 out:
@@ -68,8 +74,8 @@ int imp__film_find(const imp_film *f, const char *name)
     return -1;
 }
 
-enum imp_status imp_film_create(imp_context *ctx, int width, int height, const char *names,
-                                imp_film **out)
+enum imp_status imp_film_create(imp_context *ctx, int width, int height,
+                                const char *names, imp_film **out)
 {
     if (!ctx || !out) return IMP_E_ARG;
     if (!names) return imp__error(ctx, IMP_E_ARG, "film: no channel names");
@@ -95,8 +101,8 @@ void imp_film_destroy(imp_film *f)
 void imp_film_get_info(const imp_film *f, struct imp_film_info *info)
 {
     if (!f || !info) return;
-    const struct imp_film_info all = {sizeof all, f->width, f->height, f->channels,
-                                      f->spp, f->se != NULL, f->dropped};
+    const struct imp_film_info all = {sizeof all, f->width,      f->height, f->channels,
+                                      f->spp,     f->se != NULL, f->dropped};
     const size_t size = info->size && info->size < sizeof all ? info->size : sizeof all;
     memcpy(info, &all, size);
     info->size = size;
@@ -115,7 +121,8 @@ enum imp_status imp_film_set_text(imp_film *f, const char *key, const char *valu
     if (!f) return IMP_E_ARG;
     imp_context *ctx = f->ctx;
     if (!key || !*key || !value || strlen(key) > 200)
-        return imp__error(ctx, IMP_E_ARG, "film: a text needs a key (1 to 200 bytes) and a value");
+        return imp__error(ctx, IMP_E_ARG,
+                          "film: a text needs a key (1 to 200 bytes) and a value");
     char *copy = imp__strdup(ctx, value);
     if (!copy) return imp__error(ctx, IMP_E_NOMEM, "film: out of memory");
     for (size_t i = 0; i < f->n_texts; i++)

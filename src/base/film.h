@@ -1,31 +1,33 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A picture: means and their standard errors, [height][width][channels], row 0 at the top.
- * Renders make it, format/film.c reads and writes it. */
+ * A picture: means and their standard errors, [height][width][channels], row 0 at the
+ * top. Renders make it, format/film.c reads and writes it. */
 #ifndef IMP_BASE_FILM_H
 #define IMP_BASE_FILM_H
 
 #include "context.h"
 
-#define IMP_FILM_SIDE_MAX (1 << 20)      /* pixels along one side */
+#define IMP_FILM_SIDE_MAX (1 << 20) /* pixels along one side */
 #define IMP_FILM_CHANNELS_MAX 1024
 #define IMP_FILM_VALUES_MAX ((size_t)1 << 32)
 
 struct imp_film {
     imp_context *ctx;
     int width, height, channels;
-    char **names;      /* [channels], as in EXR files */
+    char **names; /* [channels], as in EXR files */
     float *mean;
-    float *se;         /* one standard error of each mean; NULL: there are none */
+    float *se; /* one standard error of each mean; NULL: there are none */
     int64_t spp;
-    uint64_t dropped;  /* walks not counted: value not finite */
+    uint64_t dropped; /* walks not counted: value not finite */
     size_t n_texts, cap_texts;
-    struct imp_film_text { char *key, *value; } *texts; /* attributes of EXR files */
+    struct imp_film_text {
+        char *key, *value;
+    } * texts; /* attributes of EXR files */
 };
 
 /* Zeros. `names` is a comma-separated list, one name a channel ("R,G,B"). */
-enum imp_status imp__film_create(imp_context *ctx, int width, int height, const char *names,
-                                 bool with_se, imp_film **out);
+enum imp_status imp__film_create(imp_context *ctx, int width, int height,
+                                 const char *names, bool with_se, imp_film **out);
 static inline size_t imp__film_values(const imp_film *f)
 {
     return (size_t)f->width * (size_t)f->height * (size_t)f->channels;

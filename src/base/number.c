@@ -18,8 +18,9 @@ static bool word(const char **s, const char *end, const char *text, size_t n)
 }
 
 /* mantissa * 10^exponent, correctly rounded. Both factors exact below 2^53 and 10^22: one
- * rounding (Clinger, "How to read floating point numbers accurately", 1990). Otherwise the C
- * library does it in its "C" locale; `sticky` says that non-zero digits were cut off. */
+ * rounding (Clinger, "How to read floating point numbers accurately", 1990). Otherwise
+ * the C library does it in its "C" locale; `sticky` says that non-zero digits were cut
+ * off. */
 static double scale10(uint64_t mantissa, int exponent, bool sticky)
 {
     static const double power[] = {1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
@@ -33,8 +34,8 @@ static double scale10(uint64_t mantissa, int exponent, bool sticky)
     if (exponent > 400) return INFINITY;
     if (exponent < -400) return 0;
     char text[64];
-    snprintf(text, sizeof text, "%llu%se%d", (unsigned long long)mantissa, sticky ? "1" : "",
-             exponent - sticky);
+    snprintf(text, sizeof text, "%llu%se%d", (unsigned long long)mantissa,
+             sticky ? "1" : "", exponent - sticky);
     const locale_t c = newlocale(LC_ALL_MASK, "C", (locale_t)0);
     if (!c) return (double)mantissa * pow(10, exponent);
     const double value = strtod_l(text, NULL, c);
@@ -70,9 +71,12 @@ bool imp__number(const char **s, const char *end, double *out)
     if (!any) {
         p = *s + (*s < end && (**s == '+' || **s == '-'));
         double value;
-        if (word(&p, end, "infinity", 8) || word(&p, end, "inf", 3)) value = INFINITY;
-        else if (word(&p, end, "nan", 3)) value = NAN;
-        else return false;
+        if (word(&p, end, "infinity", 8) || word(&p, end, "inf", 3))
+            value = INFINITY;
+        else if (word(&p, end, "nan", 3))
+            value = NAN;
+        else
+            return false;
         *s = p;
         *out = negative ? -value : value;
         return true;

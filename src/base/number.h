@@ -7,9 +7,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-/* Read a number that starts at *s and ends before `end`, and move *s behind it; false, and
- * nothing moved, if there is none. Decimal with optional sign, fraction and exponent; "inf"
- * and "nan" are read too, callers that mind check with isfinite. */
+/* Read a number that starts at *s and ends before `end`, and move *s behind it; false,
+ * and nothing moved, if there is none. Decimal with optional sign, fraction and exponent;
+ * "inf" and "nan" are read too, callers that mind check with isfinite. */
 bool imp__number(const char **s, const char *end, double *out);
 /* The same for decimal integers; false also if it does not fit. */
 bool imp__integer(const char **s, const char *end, int64_t *out);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "exr.h"
+#include "hooks.h"
 #include <stdio.h>
 #include <string.h>
-#include "hooks.h"
 
 /* The handler cannot ask its context for the user data: while writing, the context is
  * locked when the handler is called. */
@@ -33,8 +33,8 @@ static int64_t on_read(exr_const_context_t c, void *payload, void *buffer, uint6
     return (int64_t)n;
 }
 
-static int64_t on_write(exr_const_context_t c, void *payload, const void *data, uint64_t n,
-                        uint64_t offset, exr_stream_error_func_ptr_t error)
+static int64_t on_write(exr_const_context_t c, void *payload, const void *data,
+                        uint64_t n, uint64_t offset, exr_stream_error_func_ptr_t error)
 {
     (void)c, (void)error;
     struct imp_exr *io = payload;

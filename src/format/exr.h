@@ -4,17 +4,17 @@
 #ifndef IMP_FORMAT_EXR_H
 #define IMP_FORMAT_EXR_H
 
-#include <openexr.h>
 #include "base/file.h"
+#include <openexr.h>
 
 struct imp_exr { /* the user data of an exr context */
     imp_context *ctx;
-    const char *name;              /* NULL when writing */
+    const char *name; /* NULL when writing */
     const struct imp_bytes *from;
     struct imp_bytes *to;
     bool no_memory;
     char message[256];
-    imp_context *previous;         /* of the hooks */
+    imp_context *previous; /* of the hooks */
     struct imp_exr *outer;
 };
 

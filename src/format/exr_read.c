@@ -1,18 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Reading EXR: scanlines or tiles, half, float or uint, any compression that the library
- * knows. Channels are found by name; those called se.NAME beside a NAME are standard errors. */
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
+ * knows. Channels are found by name; those called se.NAME beside a NAME are standard
+ * errors. */
 #include "base/number.h"
 #include "exr.h"
 #include "image.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
-#define EXR(call)                                                                          \
-    do {                                                                                   \
-        const exr_result_t code_ = (call);                                                 \
-        if (code_ != EXR_ERR_SUCCESS) IMP_TRY(imp__exr_error(r->io, code_));               \
+#define EXR(call)                                                                        \
+    do {                                                                                 \
+        const exr_result_t code_ = (call);                                               \
+        if (code_ != EXR_ERR_SUCCESS) IMP_TRY(imp__exr_error(r->io, code_));             \
     } while (0)
 
 struct exr_reader {
@@ -22,8 +23,8 @@ struct exr_reader {
     exr_attr_box2i_t window;
     const exr_attr_chlist_t *list;
     int n_planes, n_se;
-    int *order;      /* of the channels in the film: index in list */
-    float **target;  /* by index in list: first number of the channel */
+    int *order;     /* of the channels in the film: index in list */
+    float **target; /* by index in list: first number of the channel */
     imp_film *film;
 };
 
@@ -39,7 +40,8 @@ static int find(const struct exr_reader *r, const char *name)
     return -1;
 }
 
-/* Index in the list of the channel whose standard error this is; -1: an ordinary channel. */
+/* Index in the list of the channel whose standard error this is; -1: an ordinary channel.
+ */
 static int se_of(const struct exr_reader *r, int i)
 {
     const char *name = channel_name(r, i);
@@ -50,8 +52,10 @@ static int se_of(const struct exr_reader *r, int i)
  * together, channels without a layer come first. */
 static int channel_rank(const char *last)
 {
-    static const struct { char letter; int rank; } ranks[] = {
-        {'R', 0}, {'G', 1}, {'B', 2}, {'X', 0}, {'Y', 1}, {'Z', 2}, {'A', 9}};
+    static const struct {
+        char letter;
+        int rank;
+    } ranks[] = {{'R', 0}, {'G', 1}, {'B', 2}, {'X', 0}, {'Y', 1}, {'Z', 2}, {'A', 9}};
     for (size_t i = 0; last[0] && !last[1] && i < imp_count(ranks); i++)
         if (ranks[i].letter == last[0]) return ranks[i].rank;
     return 5;
@@ -89,21 +93,23 @@ static enum imp_status header_read(struct exr_reader *r, size_t bytes)
                   h = (int64_t)r->window.max.y - r->window.min.y + 1;
     const int n = r->list ? r->list->num_channels : 0;
     if (w < 1 || h < 1 || w > IMP_FILM_SIDE_MAX || h > IMP_FILM_SIDE_MAX)
-        IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: a size of %lld x %lld pixels", r->io->name,
-                           (long long)w, (long long)h));
+        IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: a size of %lld x %lld pixels",
+                           r->io->name, (long long)w, (long long)h));
     if (n < 1 || n > IMP_FILM_CHANNELS_MAX || w * n > 1 << 28)
-        IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: %d channels in a width of %lld", r->io->name,
-                           n, (long long)w));
+        IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: %d channels in a width of %lld",
+                           r->io->name, n, (long long)w));
     for (int i = 0; i < n; i++)
         if (r->list->entries[i].x_sampling != 1 || r->list->entries[i].y_sampling != 1)
             IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED, "%s: channel '%s' is subsampled",
                                r->io->name, channel_name(r, i)));
     /* Deflate packs at most 1032:1, PIZ and RLE less; the others are given more room. */
-    const double ratio = compression == EXR_COMPRESSION_NONE ? 1.0
-                         : compression <= EXR_COMPRESSION_PXR24 ? 1100.0 : 1e5;
+    const double ratio = compression == EXR_COMPRESSION_NONE    ? 1.0
+                         : compression <= EXR_COMPRESSION_PXR24 ? 1100.0
+                                                                : 1e5;
     if ((double)w * (double)h * n * 2 > ratio * (double)bytes + 65536)
-        IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: cut off: %lld x %lld pixels in %zu bytes",
-                           r->io->name, (long long)w, (long long)h, bytes));
+        IMP_TRY(imp__error(ctx, IMP_E_SCENE,
+                           "%s: cut off: %lld x %lld pixels in %zu bytes", r->io->name,
+                           (long long)w, (long long)h, bytes));
     r->width = (int)w;
     r->height = (int)h;
 out:
@@ -137,13 +143,16 @@ static enum imp_status film_make(struct exr_reader *r)
             !imp__bytes_add(ctx, &names, name, strlen(name)))
             IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "%s: out of memory", r->io->name));
         if (strchr(name, ',') || *name == ' ' || !*name)
-            IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: channel name '%s'", r->io->name, name));
+            IMP_TRY(
+                imp__error(ctx, IMP_E_SCENE, "%s: channel name '%s'", r->io->name, name));
     }
     if (!imp__bytes_add(ctx, &names, "", 1))
         IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "%s: out of memory", r->io->name));
-    st = imp__film_create(ctx, r->width, r->height, (char *)names.data, r->n_se > 0, &r->film);
+    st = imp__film_create(ctx, r->width, r->height, (char *)names.data, r->n_se > 0,
+                          &r->film);
     if (st != IMP_OK)
-        IMP_TRY(imp__error_prefix(ctx, st == IMP_E_ARG ? IMP_E_SCENE : st, "%s", r->io->name));
+        IMP_TRY(imp__error_prefix(ctx, st == IMP_E_ARG ? IMP_E_SCENE : st, "%s",
+                                  r->io->name));
     for (int k = 0; k < r->n_planes; k++) r->target[r->order[k]] = r->film->mean + k;
     for (int i = 0; i < n; i++)
         if (se_of(r, i) >= 0 && r->target[se_of(r, i)])
@@ -154,23 +163,27 @@ out:
 }
 
 /* One chunk, whose first pixel is (x, y) of the film, into the film. */
-static enum imp_status chunk_read(struct exr_reader *r, const exr_chunk_info_t *chunk, int64_t x,
-                                  int64_t y, exr_decode_pipeline_t *pipe, bool *open)
+static enum imp_status chunk_read(struct exr_reader *r, const exr_chunk_info_t *chunk,
+                                  int64_t x, int64_t y, exr_decode_pipeline_t *pipe,
+                                  bool *open)
 {
     enum imp_status st = IMP_OK;
-    if (x < 0 || y < 0 || chunk->width < 0 || chunk->height < 0 || x + chunk->width > r->width ||
-        y + chunk->height > r->height)
+    if (x < 0 || y < 0 || chunk->width < 0 || chunk->height < 0 ||
+        x + chunk->width > r->width || y + chunk->height > r->height)
         IMP_TRY(imp__error(r->io->ctx, IMP_E_SCENE, "%s: a block leaves the picture",
                            r->io->name));
-    if (*open) EXR(exr_decoding_update(r->exr, 0, chunk, pipe));
-    else EXR(exr_decoding_initialize(r->exr, 0, chunk, pipe));
+    if (*open)
+        EXR(exr_decoding_update(r->exr, 0, chunk, pipe));
+    else
+        EXR(exr_decoding_initialize(r->exr, 0, chunk, pipe));
     const size_t c = (size_t)r->film->channels;
     for (int i = 0; i < pipe->channel_count; i++) {
         exr_coding_channel_info_t *to = &pipe->channels[i];
         const int k = find(r, to->channel_name);
         float *first = k >= 0 ? r->target[k] : NULL;
         to->decode_to_ptr =
-            first ? (uint8_t *)(first + ((size_t)y * (size_t)r->width + (size_t)x) * c) : NULL;
+            first ? (uint8_t *)(first + ((size_t)y * (size_t)r->width + (size_t)x) * c)
+                  : NULL;
         to->user_data_type = EXR_PIXEL_FLOAT;
         to->user_bytes_per_element = sizeof(float);
         to->user_pixel_stride = (int32_t)(c * sizeof(float));
@@ -195,7 +208,8 @@ static enum imp_status pixels_read(struct exr_reader *r)
         int32_t lines;
         EXR(exr_get_scanlines_per_chunk(r->exr, 0, &lines));
         for (int64_t y = 0; y < r->height; y += imp_max(lines, 1)) {
-            EXR(exr_read_scanline_chunk_info(r->exr, 0, (int)(y + r->window.min.y), &chunk));
+            EXR(exr_read_scanline_chunk_info(r->exr, 0, (int)(y + r->window.min.y),
+                                             &chunk));
             IMP_TRY(chunk_read(r, &chunk, 0, y, &pipe, &open));
         }
     } else {
@@ -232,7 +246,8 @@ static enum imp_status texts_read(struct exr_reader *r)
         int64_t value;
         if (strcmp(a->name, IMP_EXR_SPP) == 0 && imp__integer(&s, end, &value)) {
             r->film->spp = imp_max(value, (int64_t)0);
-        } else if (strcmp(a->name, IMP_EXR_DROPPED) == 0 && imp__integer(&s, end, &value)) {
+        } else if (strcmp(a->name, IMP_EXR_DROPPED) == 0 &&
+                   imp__integer(&s, end, &value)) {
             r->film->dropped = (uint64_t)imp_max(value, (int64_t)0);
         } else
             IMP_TRY(imp_film_set_text(r->film, a->name, a->string->str));
@@ -241,8 +256,8 @@ out:
     return st;
 }
 
-enum imp_status imp__exr_parse(imp_context *ctx, const char *name, const struct imp_bytes *file,
-                               imp_film **out)
+enum imp_status imp__exr_parse(imp_context *ctx, const char *name,
+                               const struct imp_bytes *file, imp_film **out)
 {
     enum imp_status st = IMP_OK;
     struct imp_exr io = {.ctx = ctx, .name = name, .from = file};

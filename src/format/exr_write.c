@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Writing EXR: one part of scanlines, ZIP, half or float. */
+#include "exr.h"
+#include "image.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include "exr.h"
-#include "image.h"
 
-#define EXR(call)                                                                          \
-    do {                                                                                   \
-        const exr_result_t code_ = (call);                                                 \
-        if (code_ != EXR_ERR_SUCCESS) IMP_TRY(imp__exr_error(w->io, code_));               \
+#define EXR(call)                                                                        \
+    do {                                                                                 \
+        const exr_result_t code_ = (call);                                               \
+        if (code_ != EXR_ERR_SUCCESS) IMP_TRY(imp__exr_error(w->io, code_));             \
     } while (0)
 
 #define HALF_MAX 65504.0f
@@ -38,7 +38,8 @@ static enum imp_status header_write(struct exr_writer *w)
     for (int se = 0; se < (w->se ? 2 : 1); se++)
         for (int c = 0; c < f->channels; c++) {
             snprintf(text, sizeof text, "%s%s", se ? "se." : "", f->names[c]);
-            EXR(exr_add_channel(w->exr, part, text, type, EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1));
+            EXR(exr_add_channel(w->exr, part, text, type, EXR_PERCEPTUALLY_LOGARITHMIC, 1,
+                                1));
         }
     if (imp__film_find(f, "X") >= 0 && imp__film_find(f, "Z") >= 0) {
         /* Primaries that say: these numbers are X, Y, Z (equal-energy white). */
@@ -50,7 +51,8 @@ static enum imp_status header_write(struct exr_writer *w)
             exr_attr_set_string(w->exr, part, f->texts[i].key, f->texts[i].value);
         if (code != EXR_ERR_SUCCESS) {
             imp__exr_error(w->io, code);
-            IMP_TRY(imp__error_prefix(w->io->ctx, IMP_E_ARG, "text '%s'", f->texts[i].key));
+            IMP_TRY(
+                imp__error_prefix(w->io->ctx, IMP_E_ARG, "text '%s'", f->texts[i].key));
         }
     }
     if (f->spp > 0) {
@@ -77,8 +79,10 @@ static enum imp_status pixels_write(struct exr_writer *w)
     for (int y = 0; y < f->height; y += lines) {
         exr_chunk_info_t chunk;
         EXR(exr_write_scanline_chunk_info(w->exr, 0, y, &chunk));
-        if (y == 0) EXR(exr_encoding_initialize(w->exr, 0, &chunk, &pipe));
-        else EXR(exr_encoding_update(w->exr, 0, &chunk, &pipe));
+        if (y == 0)
+            EXR(exr_encoding_initialize(w->exr, 0, &chunk, &pipe));
+        else
+            EXR(exr_encoding_update(w->exr, 0, &chunk, &pipe));
         for (int i = 0; i < pipe.channel_count; i++) {
             exr_coding_channel_info_t *from = &pipe.channels[i];
             const char *name = from->channel_name;

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Films in files: reading, and writing by extension. */
+#include "color/rgb.h"
+#include "image.h"
 #include <math.h>
 #include <string.h>
 #include <strings.h>
-#include "color/rgb.h"
-#include "image.h"
 
 /* ---- PNG previews ------------------------------------------------------------------ */
 
@@ -26,7 +26,8 @@ static void preview(const imp_film *f, const struct imp_pick *pick, double expos
     const double gain = exp2(exposure);
     for (size_t i = 0; i < (size_t)f->width * (size_t)f->height; i++) {
         double c[3] = {0};
-        for (int k = 0; k < pick->n; k++) c[k] = gain * (double)pixel(f, i)[pick->channel[k]];
+        for (int k = 0; k < pick->n; k++)
+            c[k] = gain * (double)pixel(f, i)[pick->channel[k]];
         if (pick->xyz) imp__xyz_to_rgb((double[3]){c[0], c[1], c[2]}, c);
         for (int k = 0; k < pick->n; k++)
             *to++ = byte(imp__srgb_encode(imp_clamp(c[k], 0.0, 1.0)));
@@ -54,8 +55,10 @@ static double signed_range(const imp_film *f, const struct imp_pick *pick)
         const double middle = (lo + hi) / 2;
         size_t above = 0;
         for (size_t i = 0; i < n; i++) above += fabs(signed_value(f, pick, i)) > middle;
-        if (above > n / 200) lo = middle;
-        else hi = middle;
+        if (above > n / 200)
+            lo = middle;
+        else
+            hi = middle;
     }
     return hi > 0 ? hi : 1;
 }
@@ -74,7 +77,8 @@ static void diverge(const imp_film *f, const struct imp_pick *pick, double range
     }
 }
 
-static enum imp_status preview_encode(const imp_film *f, const struct imp_write_options *o,
+static enum imp_status preview_encode(const imp_film *f,
+                                      const struct imp_write_options *o,
                                       struct imp_bytes *out)
 {
     struct imp_pick pick = imp__image_pick(f);
@@ -83,15 +87,17 @@ static enum imp_status preview_encode(const imp_film *f, const struct imp_write_
     unsigned char *to =
         imp__alloc(f->ctx, (size_t)f->width * (size_t)f->height, (size_t)channels);
     if (!to) return imp__error(f->ctx, IMP_E_NOMEM, "PNG: no memory for the picture");
-    if (o->diverging) diverge(f, &pick, o->range, to);
-    else preview(f, &pick, o->exposure, to);
+    if (o->diverging)
+        diverge(f, &pick, o->range, to);
+    else
+        preview(f, &pick, o->exposure, to);
     const enum imp_status st =
         imp__png_encode(f->ctx, f->width, f->height, channels, to, out);
     imp__release(f->ctx, to);
     return st;
 }
 
-/* ---- Public calls -------------------------------------------------------------------- */
+/* ---- Public calls ------------------------------------------------------------------ */
 
 static bool ends_with(const char *path, const char *extension)
 {
@@ -106,20 +112,28 @@ enum imp_status imp_film_write(const imp_film *f, const char *path,
     imp_context *ctx = f->ctx;
     if (!path || !*path) return imp__error(ctx, IMP_E_ARG, "film: no file name");
     struct imp_write_options o = IMP_WRITE_OPTIONS_INIT;
-    if (options) memcpy(&o, options, imp_min(options->size ? options->size : sizeof o, sizeof o));
+    if (options)
+        memcpy(&o, options, imp_min(options->size ? options->size : sizeof o, sizeof o));
     if (!isfinite(o.exposure) || !isfinite(o.range) || o.range < 0)
-        return imp__error(ctx, IMP_E_ARG, "film: exposure and range must be finite, range >= 0");
+        return imp__error(ctx, IMP_E_ARG,
+                          "film: exposure and range must be finite, range >= 0");
 
     struct imp_bytes bytes = {0};
     enum imp_status st;
-    if (ends_with(path, ".exr")) st = imp__exr_encode(f, &o, &bytes);
-    else if (ends_with(path, ".png")) st = preview_encode(f, &o, &bytes);
-    else if (ends_with(path, ".pfm")) st = imp__pfm_encode(f, &bytes);
-    else if (ends_with(path, ".npy")) st = imp__npy_encode(f, &bytes);
-    else if (ends_with(path, ".hdr")) st = imp__hdr_encode(f, &bytes);
+    if (ends_with(path, ".exr"))
+        st = imp__exr_encode(f, &o, &bytes);
+    else if (ends_with(path, ".png"))
+        st = preview_encode(f, &o, &bytes);
+    else if (ends_with(path, ".pfm"))
+        st = imp__pfm_encode(f, &bytes);
+    else if (ends_with(path, ".npy"))
+        st = imp__npy_encode(f, &bytes);
+    else if (ends_with(path, ".hdr"))
+        st = imp__hdr_encode(f, &bytes);
     else
         return imp__error(ctx, IMP_E_ARG,
-                          "%s: the name must end in .exr, .png, .pfm, .hdr or .npy", path);
+                          "%s: the name must end in .exr, .png, .pfm, .hdr or .npy",
+                          path);
     if (st != IMP_OK) return imp__error_prefix(ctx, st, "%s", path);
     st = imp__file_write(ctx, path, bytes.data, bytes.size);
     imp__bytes_free(ctx, &bytes);

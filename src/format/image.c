@@ -7,16 +7,19 @@ enum imp_status imp__image_film(imp_context *ctx, const char *name, uint64_t wid
                                 uint64_t height, const char *names, size_t bytes,
                                 double per_byte, imp_film **out)
 {
-    if (width < 1 || height < 1 || width > IMP_FILM_SIDE_MAX || height > IMP_FILM_SIDE_MAX)
+    if (width < 1 || height < 1 || width > IMP_FILM_SIDE_MAX ||
+        height > IMP_FILM_SIDE_MAX)
         return imp__error(ctx, IMP_E_SCENE, "%s: a size of %llu x %llu pixels", name,
                           (unsigned long long)width, (unsigned long long)height);
     if ((double)width * (double)height > per_byte * (double)bytes + 65536)
-        return imp__error(ctx, IMP_E_SCENE, "%s: cut off: %llu x %llu pixels in %zu bytes", name,
+        return imp__error(ctx, IMP_E_SCENE,
+                          "%s: cut off: %llu x %llu pixels in %zu bytes", name,
                           (unsigned long long)width, (unsigned long long)height, bytes);
     const enum imp_status st =
         imp__film_create(ctx, (int)width, (int)height, names, false, out);
-    return st == IMP_OK ? st : imp__error_prefix(ctx, st == IMP_E_ARG ? IMP_E_SCENE : st, "%s",
-                                                 name);
+    return st == IMP_OK
+               ? st
+               : imp__error_prefix(ctx, st == IMP_E_ARG ? IMP_E_SCENE : st, "%s", name);
 }
 
 enum imp_status imp__image_parse(imp_context *ctx, const char *name,
@@ -27,17 +30,22 @@ enum imp_status imp__image_parse(imp_context *ctx, const char *name,
     *srgb = false;
     if (n >= 4 && memcmp(d, "\x76\x2f\x31\x01", 4) == 0)
         return imp__exr_parse(ctx, name, file, out);
-    if (n >= 6 && memcmp(d, "\x93NUMPY", 6) == 0) return imp__npy_parse(ctx, name, file, out);
+    if (n >= 6 && memcmp(d, "\x93NUMPY", 6) == 0)
+        return imp__npy_parse(ctx, name, file, out);
     if (n >= 3 && d[0] == 'P' && (d[1] == 'F' || d[1] == 'f'))
         return imp__pfm_parse(ctx, name, file, out);
     if (n >= 2 && d[0] == '#' && d[1] == '?') return imp__hdr_parse(ctx, name, file, out);
     *srgb = true;
-    if (n >= 4 && memcmp(d, "\x89PNG", 4) == 0) return imp__png_parse(ctx, name, file, out);
-    if (n >= 2 && d[0] == 0xff && d[1] == 0xd8) return imp__jpeg_parse(ctx, name, file, out);
-    return imp__error(ctx, IMP_E_SCENE, "%s: not an EXR, PNG, JPEG, HDR, PFM or NPY picture", name);
+    if (n >= 4 && memcmp(d, "\x89PNG", 4) == 0)
+        return imp__png_parse(ctx, name, file, out);
+    if (n >= 2 && d[0] == 0xff && d[1] == 0xd8)
+        return imp__jpeg_parse(ctx, name, file, out);
+    return imp__error(ctx, IMP_E_SCENE,
+                      "%s: not an EXR, PNG, JPEG, HDR, PFM or NPY picture", name);
 }
 
-enum imp_status imp__image_read(imp_context *ctx, const char *path, imp_film **out, bool *srgb)
+enum imp_status imp__image_read(imp_context *ctx, const char *path, imp_film **out,
+                                bool *srgb)
 {
     struct imp_bytes file;
     enum imp_status st = imp__file_read(ctx, path, IMP_IMAGE_BYTES_MAX, &file);
@@ -59,7 +67,8 @@ static int sibling(const imp_film *f, int like, const char *suffix)
 {
     const size_t n = layer_length(f->names[like]);
     for (int c = 0; c < f->channels; c++)
-        if (layer_length(f->names[c]) == n && memcmp(f->names[c], f->names[like], n) == 0 &&
+        if (layer_length(f->names[c]) == n &&
+            memcmp(f->names[c], f->names[like], n) == 0 &&
             strcasecmp(f->names[c] + n, suffix) == 0)
             return c;
     return -1;

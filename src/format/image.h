@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Picture files (scene-format 13.5). All are read into films, whatever their channels; the
- * format is told from the first bytes, not from the name. */
+ * Picture files (scene-format 13.5). All are read into films, whatever their channels;
+ * the format is told from the first bytes, not from the name. */
 #ifndef IMP_FORMAT_IMAGE_H
 #define IMP_FORMAT_IMAGE_H
 
@@ -13,7 +13,8 @@
 /* *srgb: an 8- or 16-bit file, values in [0,1] and still encoded. Messages begin with
  * `name`. @return IMP_E_SCENE for what is not a valid picture. */
 enum imp_status imp__image_parse(imp_context *ctx, const char *name,
-                                 const struct imp_bytes *file, imp_film **out, bool *srgb);
+                                 const struct imp_bytes *file, imp_film **out,
+                                 bool *srgb);
 enum imp_status imp__image_read(imp_context *ctx, const char *path, imp_film **out,
                                 bool *srgb);
 
@@ -26,21 +27,22 @@ struct imp_pick {
 struct imp_pick imp__image_pick(const imp_film *film);
 
 /* One file format each. */
-enum imp_status imp__exr_parse(imp_context *ctx, const char *name, const struct imp_bytes *file,
-                               imp_film **out);
-enum imp_status imp__png_parse(imp_context *ctx, const char *name, const struct imp_bytes *file,
-                               imp_film **out);
+enum imp_status imp__exr_parse(imp_context *ctx, const char *name,
+                               const struct imp_bytes *file, imp_film **out);
+enum imp_status imp__png_parse(imp_context *ctx, const char *name,
+                               const struct imp_bytes *file, imp_film **out);
 enum imp_status imp__jpeg_parse(imp_context *ctx, const char *name,
                                 const struct imp_bytes *file, imp_film **out);
-enum imp_status imp__pfm_parse(imp_context *ctx, const char *name, const struct imp_bytes *file,
-                               imp_film **out);
-enum imp_status imp__npy_parse(imp_context *ctx, const char *name, const struct imp_bytes *file,
-                               imp_film **out);
+enum imp_status imp__pfm_parse(imp_context *ctx, const char *name,
+                               const struct imp_bytes *file, imp_film **out);
+enum imp_status imp__npy_parse(imp_context *ctx, const char *name,
+                               const struct imp_bytes *file, imp_film **out);
 
-enum imp_status imp__hdr_parse(imp_context *ctx, const char *name, const struct imp_bytes *file,
-                               imp_film **out);
+enum imp_status imp__hdr_parse(imp_context *ctx, const char *name,
+                               const struct imp_bytes *file, imp_film **out);
 
-enum imp_status imp__exr_encode(const imp_film *film, const struct imp_write_options *options,
+enum imp_status imp__exr_encode(const imp_film *film,
+                                const struct imp_write_options *options,
                                 struct imp_bytes *out);
 /* rgb [height][width][channels], 8-bit; channels 1 or 3. */
 enum imp_status imp__png_encode(imp_context *ctx, int width, int height, int channels,
@@ -49,8 +51,8 @@ enum imp_status imp__pfm_encode(const imp_film *film, struct imp_bytes *out);
 enum imp_status imp__hdr_encode(const imp_film *film, struct imp_bytes *out);
 enum imp_status imp__npy_encode(const imp_film *film, struct imp_bytes *out);
 
-/* A film of width x height for a picture that `bytes` of file claim to hold; refused if no
- * file of that length can (`per_byte` pixels at most for every byte). */
+/* A film of width x height for a picture that `bytes` of file claim to hold; refused if
+ * no file of that length can (`per_byte` pixels at most for every byte). */
 enum imp_status imp__image_film(imp_context *ctx, const char *name, uint64_t width,
                                 uint64_t height, const char *names, size_t bytes,
                                 double per_byte, imp_film **out);

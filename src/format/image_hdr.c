@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * RGBE (.hdr; Ward, "Real pixels", Graphics Gems II): three mantissas and one exponent in a
- * byte each, (r, g, b, e) -> (m + 1/2) 2^(e - 136), 0 for e = 0. Rows are run-length coded by
- * component, or flat. Written flat. */
+ * RGBE (.hdr; Ward, "Real pixels", Graphics Gems II): three mantissas and one exponent in
+ * a byte each, (r, g, b, e) -> (m + 1/2) 2^(e - 136), 0 for e = 0. Rows are run-length
+ * coded by component, or flat. Written flat. */
+#include "base/number.h"
+#include "image.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include "base/number.h"
-#include "image.h"
 
 #define RLE_WIDTH_MIN 8
 #define RLE_WIDTH_MAX 32767
@@ -40,8 +40,10 @@ static enum imp_status header_read(struct hdr *h)
 {
     char line[256];
     do {
-        if (!line_next(h, line, sizeof line)) return hdr_error(h, "the header does not end");
-        if (strncmp(line, "FORMAT=", 7) == 0 && strncmp(line + 7, "32-bit_rle_rgbe", 15) != 0)
+        if (!line_next(h, line, sizeof line))
+            return hdr_error(h, "the header does not end");
+        if (strncmp(line, "FORMAT=", 7) == 0 &&
+            strncmp(line + 7, "32-bit_rle_rgbe", 15) != 0)
             return hdr_error(h, "only 32-bit_rle_rgbe is read");
     } while (*line && strcmp(line, "\r") != 0);
     if (!line_next(h, line, sizeof line)) return hdr_error(h, "the header does not end");
@@ -50,14 +52,16 @@ static enum imp_status header_read(struct hdr *h)
     if (strncmp(line, "-Y ", 3) != 0 || !imp__integer(&s, end, &height) ||
         strncmp(s, " +X ", 4) != 0 || (s += 4, !imp__integer(&s, end, &width)))
         return hdr_error(h, "the size is not '-Y height +X width'");
-    if (width < 1 || height < 1 || width > IMP_FILM_SIDE_MAX || height > IMP_FILM_SIDE_MAX)
+    if (width < 1 || height < 1 || width > IMP_FILM_SIDE_MAX ||
+        height > IMP_FILM_SIDE_MAX)
         return hdr_error(h, "a size that cannot be");
     h->width = (size_t)width;
     h->height = (size_t)height;
     return IMP_OK;
 }
 
-/* One component of a row: runs (count > 128: count - 128 times one value) and literals. */
+/* One component of a row: runs (count > 128: count - 128 times one value) and literals.
+ */
 static bool component_read(struct hdr *h, unsigned char *to)
 {
     for (size_t x = 0; x < h->width;) {
@@ -65,9 +69,12 @@ static bool component_read(struct hdr *h, unsigned char *to)
         size_t n = *h->at++;
         const bool run = n > 128;
         if (run) n -= 128;
-        if (n == 0 || n > h->width - x || (!run && (size_t)(h->end - h->at) < n)) return false;
-        if (run) memset(to + x, *h->at, n);
-        else memcpy(to + x, h->at, n);
+        if (n == 0 || n > h->width - x || (!run && (size_t)(h->end - h->at) < n))
+            return false;
+        if (run)
+            memset(to + x, *h->at, n);
+        else
+            memcpy(to + x, h->at, n);
         h->at += run ? 1 : n;
         x += n;
     }
@@ -92,17 +99,18 @@ static bool row_read(struct hdr *h, unsigned char *planes)
     return true;
 }
 
-enum imp_status imp__hdr_parse(imp_context *ctx, const char *name, const struct imp_bytes *file,
-                               imp_film **out)
+enum imp_status imp__hdr_parse(imp_context *ctx, const char *name,
+                               const struct imp_bytes *file, imp_film **out)
 {
     enum imp_status st = IMP_OK;
-    struct hdr h = {.ctx = ctx, .name = name, .at = file->data,
-                    .end = file->data + file->size};
+    struct hdr h = {
+        .ctx = ctx, .name = name, .at = file->data, .end = file->data + file->size};
     imp_film *film = NULL;
     unsigned char *planes = NULL;
     IMP_TRY(header_read(&h));
     /* A run of 127 pixels takes two bytes in each of four components. */
-    IMP_TRY(imp__image_film(ctx, name, h.width, h.height, "R,G,B", file->size, 16, &film));
+    IMP_TRY(
+        imp__image_film(ctx, name, h.width, h.height, "R,G,B", file->size, 16, &film));
     planes = imp__alloc(ctx, h.width, 4);
     if (!planes) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "%s: out of memory", name));
     for (size_t y = 0; y < h.height; y++) {
@@ -125,7 +133,8 @@ out:
 static void pixel_pack(const double rgb[3], unsigned char to[4])
 {
     double c[3];
-    for (int k = 0; k < 3; k++) c[k] = rgb[k] > 0 ? imp_min(rgb[k], 1e38) : 0; /* NaN: 0 */
+    for (int k = 0; k < 3; k++)
+        c[k] = rgb[k] > 0 ? imp_min(rgb[k], 1e38) : 0; /* NaN: 0 */
     const double most = imp_max(c[0], imp_max(c[1], c[2]));
     int e = 0;
     if (most > 1e-38) {
@@ -140,11 +149,12 @@ enum imp_status imp__hdr_encode(const imp_film *f, struct imp_bytes *out)
 {
     const struct imp_pick pick = imp__image_pick(f);
     if (!pick.n || pick.xyz)
-        return imp__error(f->ctx, IMP_E_ARG, "HDR: the film has no R, G, B and no Y channel");
+        return imp__error(f->ctx, IMP_E_ARG,
+                          "HDR: the film has no R, G, B and no Y channel");
     char header[96];
     const int n = snprintf(header, sizeof header,
-                           "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y %d +X %d\n", f->height,
-                           f->width);
+                           "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y %d +X %d\n",
+                           f->height, f->width);
     const size_t pixels = (size_t)f->width * (size_t)f->height;
     struct imp_bytes b = {.size = (size_t)n + 4 * pixels};
     b.capacity = b.size;

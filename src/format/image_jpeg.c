@@ -1,14 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * JPEG, reading only. libjpeg ends the process on errors unless told otherwise: here errors
- * jump back, and a file that ends early is an error, not a grey rest. Its memory manager
- * takes no hooks. */
+ * JPEG, reading only. libjpeg ends the process on errors unless told otherwise: here
+ * errors jump back, and a file that ends early is an error, not a grey rest. Its memory
+ * manager takes no hooks. */
+#include "image.h"
 #include <setjmp.h>
 #include <stdio.h>
 #include <string.h>
-#include <jpeglib.h>
-#include <jerror.h>
-#include "image.h"
+
+#include <jpeglib.h> /* needs stdio.h */
+
+#include <jerror.h> /* needs jpeglib.h */
 
 struct jpeg_job {
     struct jpeg_decompress_struct jpeg;
@@ -42,14 +44,15 @@ static bool decode(struct jpeg_job *j, const struct imp_bytes *file)
     jpeg_mem_src(&j->jpeg, file->data, file->size);
     jpeg_read_header(&j->jpeg, TRUE);
     if (j->jpeg.jpeg_color_space == JCS_CMYK || j->jpeg.jpeg_color_space == JCS_YCCK) {
-        j->st = imp__error(j->ctx, IMP_E_UNSUPPORTED, "%s: CMYK pictures are not read", j->name);
+        j->st = imp__error(j->ctx, IMP_E_UNSUPPORTED, "%s: CMYK pictures are not read",
+                           j->name);
         return false;
     }
     const bool grey = j->jpeg.jpeg_color_space == JCS_GRAYSCALE;
     j->jpeg.out_color_space = grey ? JCS_GRAYSCALE : JCS_RGB;
     j->jpeg.dct_method = JDCT_ISLOW;
-    /* A block of 8 x 8 takes a bit at least (its DC coefficient), and a block may stand for
-     * four where colours are subsampled. */
+    /* A block of 8 x 8 takes a bit at least (its DC coefficient), and a block may stand
+     * for four where colours are subsampled. */
     j->st = imp__image_film(j->ctx, j->name, j->jpeg.image_width, j->jpeg.image_height,
                             grey ? "Y" : "R,G,B", file->size, 4 * 512.0, &j->film);
     if (j->st != IMP_OK) return false;
@@ -71,8 +74,8 @@ static bool decode(struct jpeg_job *j, const struct imp_bytes *file)
     return true;
 }
 
-enum imp_status imp__jpeg_parse(imp_context *ctx, const char *name, const struct imp_bytes *file,
-                                imp_film **out)
+enum imp_status imp__jpeg_parse(imp_context *ctx, const char *name,
+                                const struct imp_bytes *file, imp_film **out)
 {
     enum imp_status st = IMP_OK;
     struct jpeg_job *j = imp__alloc(ctx, 1, sizeof *j);
@@ -88,9 +91,10 @@ enum imp_status imp__jpeg_parse(imp_context *ctx, const char *name, const struct
         *out = j->film;
         j->film = NULL;
     } else
-        st = j->st != IMP_OK ? j->st
-                             : imp__error(ctx, IMP_E_SCENE, "%s: %s", name,
-                                          *j->message ? j->message : "not a JPEG picture");
+        st = j->st != IMP_OK
+                 ? j->st
+                 : imp__error(ctx, IMP_E_SCENE, "%s: %s", name,
+                              *j->message ? j->message : "not a JPEG picture");
     jpeg_destroy_decompress(&j->jpeg);
     imp__release(ctx, j->row);
     imp_film_destroy(j->film);

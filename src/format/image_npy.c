@@ -2,10 +2,10 @@
  *
  * NumPy arrays (H, W, C) or (H, W): <f4 and <f8 are read, <f4 is written. The header is a
  * Python dictionary, of which three entries are looked for. */
-#include <stdio.h>
-#include <string.h>
 #include "base/number.h"
 #include "image.h"
+#include <stdio.h>
+#include <string.h>
 
 #define HEADER_MAX 65536
 
@@ -53,8 +53,8 @@ static double number_at(const unsigned char *d, int bytes)
     return v;
 }
 
-enum imp_status imp__npy_parse(imp_context *ctx, const char *name, const struct imp_bytes *file,
-                               imp_film **out)
+enum imp_status imp__npy_parse(imp_context *ctx, const char *name,
+                               const struct imp_bytes *file, imp_film **out)
 {
     const unsigned char *d = file->data;
     if (file->size < 12) return imp__error(ctx, IMP_E_SCENE, "%s: cut off", name);
@@ -71,14 +71,16 @@ enum imp_status imp__npy_parse(imp_context *ctx, const char *name, const struct 
     const char *type = entry(header, "descr"), *order = entry(header, "fortran_order");
     uint64_t size[3] = {0, 0, 1};
     const int dims = shape_read(entry(header, "shape"), size);
-    const int bytes = !type ? 0 : strncmp(type, "'<f4'", 5) == 0 ? 4
-                      : strncmp(type, "'<f8'", 5) == 0 ? 8 : 0;
+    const int bytes = !type                            ? 0
+                      : strncmp(type, "'<f4'", 5) == 0 ? 4
+                      : strncmp(type, "'<f8'", 5) == 0 ? 8
+                                                       : 0;
     const bool plain = order && strncmp(order, "False", 5) == 0;
     imp__release(ctx, header);
     if (!bytes || !plain || dims < 2)
-        return imp__error(ctx, IMP_E_SCENE,
-                          "%s: must be an array (H, W) or (H, W, C) of <f4 or <f8, in C order",
-                          name);
+        return imp__error(
+            ctx, IMP_E_SCENE,
+            "%s: must be an array (H, W) or (H, W, C) of <f4 or <f8, in C order", name);
     const uint64_t c = size[2], left = file->size - start - length;
     if (c < 1 || c > 4)
         return imp__error(ctx, IMP_E_SCENE, "%s: %llu channels; 1 to 4 are read", name,
@@ -88,8 +90,8 @@ enum imp_status imp__npy_parse(imp_context *ctx, const char *name, const struct 
         return imp__error(ctx, IMP_E_SCENE, "%s: cut off", name);
     static const char *const names[] = {"Y", "Y,A", "R,G,B", "R,G,B,A"};
     imp_film *film;
-    const enum imp_status st = imp__image_film(ctx, name, size[1], size[0], names[c - 1],
-                                               file->size, 1, &film);
+    const enum imp_status st =
+        imp__image_film(ctx, name, size[1], size[0], names[c - 1], file->size, 1, &film);
     if (st != IMP_OK) return st;
     d += start + length;
     for (size_t i = 0; i < imp__film_values(film); i++, d += bytes)
@@ -103,9 +105,10 @@ enum imp_status imp__npy_encode(const imp_film *f, struct imp_bytes *out)
     char header[192]; /* magic, version, length; padded so that the data begin at 128 */
     memset(header, ' ', sizeof header);
     memcpy(header, "\x93NUMPY\x01\x00\x76\x00", 10);
-    const int n = snprintf(header + 10, sizeof header - 10,
-                           "{'descr': '<f4', 'fortran_order': False, 'shape': (%d, %d, %d), }",
-                           f->height, f->width, f->channels);
+    const int n =
+        snprintf(header + 10, sizeof header - 10,
+                 "{'descr': '<f4', 'fortran_order': False, 'shape': (%d, %d, %d), }",
+                 f->height, f->width, f->channels);
     header[10 + n] = ' ';
     header[127] = '\n';
     struct imp_bytes b = {.size = 128 + imp__film_values(f) * 4};

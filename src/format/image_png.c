@@ -2,10 +2,10 @@
  *
  * PNG. Errors of libpng jump back to one setjmp in each direction; all state lives in the
  * job, outside the frame that is jumped over. */
+#include "image.h"
 #include <png.h>
 #include <stdio.h>
 #include <string.h>
-#include "image.h"
 
 struct png_job {
     imp_context *ctx;
@@ -29,7 +29,10 @@ static void on_error(png_structp png, png_const_charp message)
     snprintf(j->message, sizeof j->message, "%s", message);
     png_longjmp(png, 1);
 }
-static void on_warning(png_structp png, png_const_charp message) { (void)png, (void)message; }
+static void on_warning(png_structp png, png_const_charp message)
+{
+    (void)png, (void)message;
+}
 
 static png_voidp on_allocate(png_structp png, png_alloc_size_t bytes)
 {
@@ -94,8 +97,8 @@ static bool decode(struct png_job *j)
     if (channels < 1 || channels > 4) png_error(j->png, "unknown number of channels");
 
     /* Deflate packs at most 1032:1, and a pixel takes a bit at least. */
-    j->st = imp__image_film(j->ctx, j->name, width, height, names[channels - 1], j->from->size,
-                            8 * 1032.0, &j->film);
+    j->st = imp__image_film(j->ctx, j->name, width, height, names[channels - 1],
+                            j->from->size, 8 * 1032.0, &j->film);
     if (j->st != IMP_OK) return false;
     j->pixels = imp__alloc(j->ctx, height, row);
     j->rows = imp__alloc(j->ctx, height, sizeof *j->rows);
@@ -117,8 +120,8 @@ static bool decode(struct png_job *j)
     return true;
 }
 
-enum imp_status imp__png_parse(imp_context *ctx, const char *name, const struct imp_bytes *file,
-                               imp_film **out)
+enum imp_status imp__png_parse(imp_context *ctx, const char *name,
+                               const struct imp_bytes *file, imp_film **out)
 {
     struct png_job j = {.ctx = ctx, .name = name, .from = file};
     j.png = png_create_read_struct_2(PNG_LIBPNG_VER_STRING, &j, on_error, on_warning, &j,
@@ -144,8 +147,9 @@ static bool encode(struct png_job *j, int width, int height, int channels,
     png_set_write_fn(j->png, j, on_write, on_flush);
     png_set_user_limits(j->png, IMP_FILM_SIDE_MAX, IMP_FILM_SIDE_MAX);
     png_set_IHDR(j->png, j->info, (png_uint_32)width, (png_uint_32)height, 8,
-                 channels == 3 ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE,
-                 PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+                 channels == 3 ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_GRAY,
+                 PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
+                 PNG_FILTER_TYPE_DEFAULT);
     png_set_sRGB(j->png, j->info, PNG_sRGB_INTENT_RELATIVE);
     png_write_info(j->png, j->info);
     for (int y = 0; y < height; y++)
@@ -163,10 +167,14 @@ enum imp_status imp__png_encode(imp_context *ctx, int width, int height, int cha
                                       on_allocate, on_free);
     j.info = j.png ? png_create_info_struct(j.png) : NULL;
     enum imp_status st = IMP_OK;
-    if (!j.info) st = imp__error(ctx, IMP_E_NOMEM, "PNG: out of memory");
-    else if (!encode(&j, width, height, channels, pixels)) st = job_error(&j);
+    if (!j.info)
+        st = imp__error(ctx, IMP_E_NOMEM, "PNG: out of memory");
+    else if (!encode(&j, width, height, channels, pixels))
+        st = job_error(&j);
     png_destroy_write_struct(&j.png, &j.info);
-    if (st == IMP_OK) *out = bytes;
-    else imp__bytes_free(ctx, &bytes);
+    if (st == IMP_OK)
+        *out = bytes;
+    else
+        imp__bytes_free(ctx, &bytes);
     return st;
 }

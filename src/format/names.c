@@ -12,7 +12,8 @@ static size_t hash(const void *owner, const char *name)
     return (size_t)((h ^ (h >> 32)) * 0x9e3779b97f4a7c15u >> 16);
 }
 
-static struct imp_name *slot(const struct imp_names *t, const void *owner, const char *name)
+static struct imp_name *slot(const struct imp_names *t, const void *owner,
+                             const char *name)
 {
     for (size_t i = hash(owner, name);; i++) {
         struct imp_name *s = &t->slots[i & (t->capacity - 1)];
@@ -32,8 +33,8 @@ struct imp_name *imp__names_add(struct imp_names *t, const void *owner, const ch
                                 void *value, struct imp_loc loc)
 {
     if (2 * (t->n + 1) > t->capacity) {
-        struct imp_names grown = {.ctx = t->ctx, .n = t->n,
-                                  .capacity = t->capacity ? 2 * t->capacity : 64};
+        struct imp_names grown = {
+            .ctx = t->ctx, .n = t->n, .capacity = t->capacity ? 2 * t->capacity : 64};
         grown.slots = imp__alloc(t->ctx, grown.capacity, sizeof *grown.slots);
         if (!grown.slots) return NULL;
         for (size_t i = 0; i < t->capacity; i++)

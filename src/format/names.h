@@ -15,7 +15,7 @@ struct imp_names {
         const char *name; /* NULL: free */
         void *value;
         struct imp_loc loc;
-    } *slots;
+    } * slots;
 };
 
 /* The entry, or NULL. */

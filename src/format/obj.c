@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Wavefront OBJ: v, vt, vn and f with positive indices; polygons are fanned from their first
- * corner; all other lines are ignored. A vertex is a distinct (v, vt, vn). */
+ * Wavefront OBJ: v, vt, vn and f with positive indices; polygons are fanned from their
+ * first corner; all other lines are ignored. A vertex is a distinct (v, vt, vn). */
+#include "base/number.h"
+#include "mesh.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include "base/number.h"
-#include "mesh.h"
 
 #define LINE_MAX_BYTES 1023
 
@@ -16,7 +16,9 @@ struct column { /* v, vt or vn as read */
     int width;
 };
 
-struct corner { uint32_t v, t, n; }; /* 1-based; 0: none */
+struct corner {
+    uint32_t v, t, n;
+}; /* 1-based; 0: none */
 
 struct obj {
     const struct imp_mesh_source *source;
@@ -27,7 +29,7 @@ struct obj {
     size_t n_vertices, cap_vertices;
     uint32_t *indices;
     size_t n_indices, cap_indices;
-    uint32_t *table;    /* vertex + 1 by hash of its corner; 0: free */
+    uint32_t *table; /* vertex + 1 by hash of its corner; 0: free */
     size_t cap_table;
     bool missing_normal;
 };
@@ -37,15 +39,16 @@ static enum imp_status no_memory(const struct obj *o)
     return imp__error(o->ctx, IMP_E_NOMEM, "%s: no memory for the mesh", o->source->name);
 }
 
-static enum imp_status IMP_PRINTF(2, 3) line_error(const struct obj *o, const char *format, ...)
+static enum imp_status IMP_PRINTF(2, 3)
+    line_error(const struct obj *o, const char *format, ...)
 {
     char text[256];
     va_list args;
     va_start(args, format);
     vsnprintf(text, sizeof text, format, args);
     va_end(args);
-    return imp__error(o->ctx, IMP_E_SCENE, "%s:%lld: %s", o->source->name, (long long)o->line,
-                      text);
+    return imp__error(o->ctx, IMP_E_SCENE, "%s:%lld: %s", o->source->name,
+                      (long long)o->line, text);
 }
 
 static bool blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
@@ -57,10 +60,11 @@ static const char *skip(const char *s, const char *end)
 }
 
 /* Up to `width` numbers; those that may be missing are 0. More than that are ignored. */
-static enum imp_status row_read(struct obj *o, struct column *c, const char *what, int needed,
-                                const char *s, const char *end)
+static enum imp_status row_read(struct obj *o, struct column *c, const char *what,
+                                int needed, const char *s, const char *end)
 {
-    float *grown = imp__grow(o->ctx, c->at, &c->capacity, c->n + (size_t)c->width, sizeof *grown);
+    float *grown =
+        imp__grow(o->ctx, c->at, &c->capacity, c->n + (size_t)c->width, sizeof *grown);
     if (!grown) return no_memory(o);
     c->at = grown;
     for (int i = 0; i < c->width; i++) {
@@ -71,7 +75,8 @@ static enum imp_status row_read(struct obj *o, struct column *c, const char *wha
                 return line_error(o, "%s needs %d numbers", what, needed);
         const float value = (float)x;
         if (!isfinite(value))
-            return line_error(o, "%s %zu is not finite", what, c->n / (size_t)c->width + 1);
+            return line_error(o, "%s %zu is not finite", what,
+                              c->n / (size_t)c->width + 1);
         c->at[c->n + (size_t)i] = value;
     }
     c->n += (size_t)c->width;
@@ -85,9 +90,11 @@ static enum imp_status index_read(struct obj *o, const struct column *c, const c
     const size_t n = c->n / (size_t)c->width;
     int64_t i;
     if (!imp__integer(s, end, &i)) return line_error(o, "malformed index of a %s", what);
-    if (i < 1) return line_error(o, "index %lld of a %s is not positive", (long long)i, what);
+    if (i < 1)
+        return line_error(o, "index %lld of a %s is not positive", (long long)i, what);
     if ((uint64_t)i > n)
-        return line_error(o, "index %lld of a %s: there are %zu so far", (long long)i, what, n);
+        return line_error(o, "index %lld of a %s: there are %zu so far", (long long)i,
+                          what, n);
     *out = (uint32_t)i;
     return IMP_OK;
 }
@@ -158,8 +165,7 @@ static enum imp_status corner_read(struct obj *o, const char **s, const char *en
             IMP_TRY(index_read(o, &o->n, "normal", s, end, &k->n));
         }
     }
-    if (*s < end && !blank(**s))
-        IMP_TRY(line_error(o, "malformed corner of a face"));
+    if (*s < end && !blank(**s)) IMP_TRY(line_error(o, "malformed corner of a face"));
     o->missing_normal |= k->n == 0;
 out:
     return st;
@@ -175,8 +181,8 @@ static enum imp_status face_read(struct obj *o, const char *s, const char *end)
         IMP_TRY(corner_read(o, &s, end, &k));
         IMP_TRY(vertex_of(o, k, &next));
         if (n >= 2) {
-            uint32_t *grown = imp__grow(o->ctx, o->indices, &o->cap_indices, o->n_indices + 3,
-                                        sizeof *grown);
+            uint32_t *grown = imp__grow(o->ctx, o->indices, &o->cap_indices,
+                                        o->n_indices + 3, sizeof *grown);
             if (!grown) IMP_TRY(no_memory(o));
             o->indices = grown;
             o->indices[o->n_indices++] = first;
@@ -217,7 +223,8 @@ static enum imp_status mesh_finish(struct obj *o, struct imp_mesh_data *out)
     if (o->n_indices == 0)
         IMP_TRY(imp__error(o->ctx, IMP_E_SCENE, "%s: has no faces", o->source->name));
     if (o->n.n && o->missing_normal)
-        imp__warn(o->ctx, "%s: some faces have no normals; all are computed", o->source->name);
+        imp__warn(o->ctx, "%s: some faces have no normals; all are computed",
+                  o->source->name);
     const bool normals = o->n.n && !o->missing_normal;
     IMP_TRY(imp__mesh_arrays(o->source, o->n_vertices, o->n_indices / 3, &p,
                              normals ? &n : NULL, o->t.n ? &uv : NULL, &indices, out));
@@ -227,7 +234,8 @@ static enum imp_status mesh_finish(struct obj *o, struct imp_mesh_data *out)
         memcpy(p + 3 * i, o->v.at + 3 * (size_t)(k.v - 1), 3 * sizeof *p);
         if (n) memcpy(n + 3 * i, o->n.at + 3 * (size_t)(k.n - 1), 3 * sizeof *n);
         if (!uv) continue;
-        const float zero[2] = {0, 0}, *from = k.t ? o->t.at + 2 * (size_t)(k.t - 1) : zero;
+        const float zero[2] = {0, 0},
+                    *from = k.t ? o->t.at + 2 * (size_t)(k.t - 1) : zero;
         uv[2 * i] = from[0];
         uv[2 * i + 1] = o->source->flip_v ? 1 - from[1] : from[1];
     }
@@ -235,11 +243,12 @@ out:
     return st;
 }
 
-enum imp_status imp__obj_parse(const struct imp_mesh_source *source, struct imp_mesh_data *out)
+enum imp_status imp__obj_parse(const struct imp_mesh_source *source,
+                               struct imp_mesh_data *out)
 {
     enum imp_status st = IMP_OK;
-    struct obj o = {.source = source, .ctx = source->ctx, .v.width = 3, .t.width = 2,
-                    .n.width = 3};
+    struct obj o = {
+        .source = source, .ctx = source->ctx, .v.width = 3, .t.width = 2, .n.width = 3};
     const char *s = (const char *)source->text.data, *end = s + source->text.size;
     while (s < end) {
         const char *stop = memchr(s, '\n', (size_t)(end - s));

@@ -2,7 +2,8 @@
 #include "params.h"
 #include <string.h>
 
-/* A parameter made of two others doubles with every <default>: bound what may come of it. */
+/* A parameter made of two others doubles with every <default>: bound what may come of it.
+ */
 #define PARAMS_MAX 4096
 #define VALUE_BYTES_MAX ((size_t)16 << 20)
 #define TOTAL_BYTES_MAX ((size_t)256 << 20)
@@ -25,7 +26,8 @@ static enum imp_status add(struct imp_params *p, const char *name, size_t length
 {
     if (p->n >= PARAMS_MAX)
         return imp__error(p->ctx, IMP_E_SCENE, "more than %d parameters", PARAMS_MAX);
-    struct imp_variable *at = imp__grow(p->ctx, p->at, &p->capacity, p->n + 1, sizeof *at);
+    struct imp_variable *at =
+        imp__grow(p->ctx, p->at, &p->capacity, p->n + 1, sizeof *at);
     if (!at) return no_memory(p->ctx);
     p->at = at;
     char *name_copy = imp__arena_array(&p->arena, length + 1, 1);
@@ -69,7 +71,8 @@ void imp__params_free(struct imp_params *p)
     p->at = NULL;
 }
 
-enum imp_status imp__params_default(struct imp_params *p, const char *name, const char *value)
+enum imp_status imp__params_default(struct imp_params *p, const char *name,
+                                    const char *value)
 {
     struct imp_variable *old = find(p, name, strlen(name));
     if (!old) return add(p, name, strlen(name), value, false);
@@ -86,7 +89,8 @@ static struct imp_variable *match(struct imp_params *p, const char *text)
 }
 
 /* One walk over `text`, writing to `to` unless it is NULL; *length is what it makes. */
-static enum imp_status expand(struct imp_params *p, const char *text, char *to, size_t *length)
+static enum imp_status expand(struct imp_params *p, const char *text, char *to,
+                              size_t *length)
 {
     size_t n = 0;
     for (const char *s = text; *s;) {
@@ -105,13 +109,15 @@ static enum imp_status expand(struct imp_params *p, const char *text, char *to, 
             size_t word = 1;
             while (word < 80 && s[word] && !strchr(" \t\r\n,;:/$\"'<>", s[word])) word++;
             return imp__error(p->ctx, IMP_E_SCENE,
-                              "parameter '%.*s' has no value (<default> or -D)", (int)word, s);
+                              "parameter '%.*s' has no value (<default> or -D)",
+                              (int)word, s);
         }
         v->used = true;
         const size_t value = strlen(v->value);
         if (to) memcpy(to + n, v->value, value);
         n += value, s += 1 + v->length;
-        if (n > VALUE_BYTES_MAX) return imp__error(p->ctx, IMP_E_SCENE, "value is too long");
+        if (n > VALUE_BYTES_MAX)
+            return imp__error(p->ctx, IMP_E_SCENE, "value is too long");
     }
     *length = n;
     return IMP_OK;

@@ -10,21 +10,24 @@
 struct imp_params {
     imp_context *ctx;
     struct imp_arena arena;
-    struct imp_variable { /* by falling length of the name: the longest match comes first */
+    struct imp_variable { /* by falling length of the name: the longest match comes first
+                           */
         const char *name, *value;
         size_t length;
-        bool given, used;  /* by the caller; somewhere in the file */
-    } *at;
+        bool given, used; /* by the caller; somewhere in the file */
+    } * at;
     size_t n, capacity;
-    size_t expanded;       /* bytes written by expansion so far */
+    size_t expanded; /* bytes written by expansion so far */
 };
 
-/* defines [n] "name=value"; the last of equal names counts. @return IMP_E_ARG if malformed. */
+/* defines [n] "name=value"; the last of equal names counts. @return IMP_E_ARG if
+ * malformed. */
 enum imp_status imp__params_init(struct imp_params *p, imp_context *ctx,
                                  const char *const *defines, size_t n);
 void imp__params_free(struct imp_params *p);
 /* <default>: sets the value unless the caller gave one. */
-enum imp_status imp__params_default(struct imp_params *p, const char *name, const char *value);
+enum imp_status imp__params_default(struct imp_params *p, const char *name,
+                                    const char *value);
 /* Replace $name and \$. *out is `text` itself if nothing had to be done, else lives in
  * `scratch`. The message has no location. */
 enum imp_status imp__params_expand(struct imp_params *p, struct imp_arena *scratch,

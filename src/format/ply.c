@@ -1,24 +1,44 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * PLY 1.0: ascii, binary_little_endian, binary_big_endian. Of vertices x y z, nx ny nz and uv
- * are read, of faces vertex_index or vertex_indices; other properties are skipped. */
+ * PLY 1.0: ascii, binary_little_endian, binary_big_endian. Of vertices x y z, nx ny nz
+ * and uv are read, of faces vertex_index or vertex_indices; other properties are skipped.
+ */
+#include "base/number.h"
+#include "mesh.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include "base/number.h"
-#include "mesh.h"
 
 #define ELEMENTS_MAX 64
 #define PROPERTIES_MAX 256
 
 enum ply_format { PLY_ASCII, PLY_LITTLE, PLY_BIG };
 enum ply_type {
-    PLY_I8, PLY_U8, PLY_I16, PLY_U16, PLY_I32, PLY_U32, PLY_F32, PLY_F64, PLY_NONE
+    PLY_I8,
+    PLY_U8,
+    PLY_I16,
+    PLY_U16,
+    PLY_I32,
+    PLY_U32,
+    PLY_F32,
+    PLY_F64,
+    PLY_NONE
 };
 static const int type_bytes[] = {1, 1, 2, 2, 4, 4, 4, 8};
 
 /* What a vertex property is for; SKIP: nothing. */
-enum ply_use { USE_X, USE_Y, USE_Z, USE_NX, USE_NY, USE_NZ, USE_U, USE_V, USES, USE_SKIP };
+enum ply_use {
+    USE_X,
+    USE_Y,
+    USE_Z,
+    USE_NX,
+    USE_NY,
+    USE_NZ,
+    USE_U,
+    USE_V,
+    USES,
+    USE_SKIP
+};
 
 struct ply_property {
     enum ply_type type, count; /* count NONE: a scalar */
@@ -28,14 +48,14 @@ struct ply_property {
 struct ply_element {
     char name[32];
     size_t n;
-    int first, n_properties;   /* in ply.properties */
+    int first, n_properties; /* in ply.properties */
 };
 
 struct ply {
     const struct imp_mesh_source *source;
     imp_context *ctx;
     const unsigned char *at, *end;
-    int64_t line;              /* of the header, and of ascii bodies */
+    int64_t line; /* of the header, and of ascii bodies */
     enum ply_format format;
     struct ply_element elements[ELEMENTS_MAX];
     struct ply_property properties[PROPERTIES_MAX];
@@ -44,7 +64,8 @@ struct ply {
     uint32_t *indices;
 };
 
-static enum imp_status IMP_PRINTF(2, 3) ply_error(const struct ply *p, const char *format, ...)
+static enum imp_status IMP_PRINTF(2, 3)
+    ply_error(const struct ply *p, const char *format, ...)
 {
     char text[256];
     va_list args;
@@ -68,10 +89,13 @@ static enum ply_type type_of(const char *word)
 
 static enum ply_use use_of(const char *name)
 {
-    static const struct { const char *name; enum ply_use use; } uses[] = {
-        {"x", USE_X}, {"y", USE_Y}, {"z", USE_Z}, {"nx", USE_NX}, {"ny", USE_NY},
-        {"nz", USE_NZ}, {"u", USE_U}, {"v", USE_V}, {"s", USE_U}, {"t", USE_V},
-        {"texture_u", USE_U}, {"texture_v", USE_V}};
+    static const struct {
+        const char *name;
+        enum ply_use use;
+    } uses[] = {{"x", USE_X},   {"y", USE_Y},         {"z", USE_Z},
+                {"nx", USE_NX}, {"ny", USE_NY},       {"nz", USE_NZ},
+                {"u", USE_U},   {"v", USE_V},         {"s", USE_U},
+                {"t", USE_V},   {"texture_u", USE_U}, {"texture_v", USE_V}};
     for (size_t i = 0; i < imp_count(uses); i++)
         if (strcmp(uses[i].name, name) == 0) return uses[i].use;
     return USE_SKIP;
@@ -104,16 +128,20 @@ static enum imp_status element_add(struct ply *p, const char *name, const char *
     const char *s = count, *end = s + strlen(s);
     int64_t n;
     if (!imp__integer(&s, end, &n) || s != end || n < 0)
-        return ply_error(p, "line %lld: '%.40s' is not a count", (long long)p->line, count);
-    if (p->n_elements == ELEMENTS_MAX) return ply_error(p, "more than %d elements", ELEMENTS_MAX);
+        return ply_error(p, "line %lld: '%.40s' is not a count", (long long)p->line,
+                         count);
+    if (p->n_elements == ELEMENTS_MAX)
+        return ply_error(p, "more than %d elements", ELEMENTS_MAX);
     struct ply_element *e = &p->elements[p->n_elements];
     e->n = (size_t)n;
     e->first = p->n_properties;
     snprintf(e->name, sizeof e->name, "%s", name);
     int *known = strcmp(name, "vertex") == 0 ? &p->vertex
-                 : strcmp(name, "face") == 0 ? &p->face : NULL;
+                 : strcmp(name, "face") == 0 ? &p->face
+                                             : NULL;
     if (known && *known >= 0) return ply_error(p, "element '%s' is there twice", name);
-    if (known && e->n > IMP_MESH_MAX) return ply_error(p, "%zu of element %s: too many", e->n, name);
+    if (known && e->n > IMP_MESH_MAX)
+        return ply_error(p, "%zu of element %s: too many", e->n, name);
     if (known) *known = p->n_elements;
     p->n_elements++;
     return IMP_OK;
@@ -127,15 +155,16 @@ static enum imp_status property_add(struct ply *p, char *const words[5], int n)
     if (p->n_properties == PROPERTIES_MAX)
         return ply_error(p, "more than %d properties", PROPERTIES_MAX);
     struct ply_element *e = &p->elements[p->n_elements - 1];
-    struct ply_property q = {.type = type_of(words[list ? 3 : 1]), .count = PLY_NONE,
-                             .use = USE_SKIP};
+    struct ply_property q = {
+        .type = type_of(words[list ? 3 : 1]), .count = PLY_NONE, .use = USE_SKIP};
     if (list) q.count = type_of(words[2]);
     if (q.type == PLY_NONE || (list && (q.count == PLY_NONE || q.count >= PLY_F32)))
         return ply_error(p, "line %lld: unknown type", (long long)p->line);
     const char *name = words[list ? 4 : 2];
     if (p->vertex == p->n_elements - 1 && !list) q.use = use_of(name);
     if (p->face == p->n_elements - 1 && list)
-        q.indices = strcmp(name, "vertex_index") == 0 || strcmp(name, "vertex_indices") == 0;
+        q.indices =
+            strcmp(name, "vertex_index") == 0 || strcmp(name, "vertex_indices") == 0;
     for (int i = e->first; i < p->n_properties; i++)
         if ((q.use != USE_SKIP && p->properties[i].use == q.use) ||
             (q.indices && p->properties[i].indices))
@@ -163,7 +192,8 @@ static enum imp_status header_read(struct ply *p)
         if (!line_split(p, line, sizeof line, words, &n))
             IMP_TRY(ply_error(p, "the header does not end"));
         if (p->line == 1) {
-            if (n != 1 || strcmp(words[0], "ply") != 0) IMP_TRY(ply_error(p, "not a PLY file"));
+            if (n != 1 || strcmp(words[0], "ply") != 0)
+                IMP_TRY(ply_error(p, "not a PLY file"));
         } else if (n == 3 && strcmp(words[0], "format") == 0) {
             static const char *const names[] = {"ascii", "binary_little_endian",
                                                 "binary_big_endian"};
@@ -180,19 +210,22 @@ static enum imp_status header_read(struct ply *p)
             IMP_TRY(property_add(p, words, n));
         else if (n == 1 && strcmp(words[0], "end_header") == 0)
             break;
-        else if (n > 0 && strcmp(words[0], "comment") != 0 && strcmp(words[0], "obj_info") != 0)
-            IMP_TRY(ply_error(p, "line %lld: unknown header line '%.40s'", (long long)p->line,
-                              words[0]));
+        else if (n > 0 && strcmp(words[0], "comment") != 0 &&
+                 strcmp(words[0], "obj_info") != 0)
+            IMP_TRY(ply_error(p, "line %lld: unknown header line '%.40s'",
+                              (long long)p->line, words[0]));
     }
     p->line++; /* of what follows */
     if (!format) IMP_TRY(ply_error(p, "the header names no format"));
-    if (p->vertex < 0 || p->elements[p->vertex].n == 0) IMP_TRY(ply_error(p, "has no vertices"));
+    if (p->vertex < 0 || p->elements[p->vertex].n == 0)
+        IMP_TRY(ply_error(p, "has no vertices"));
     if (p->face < 0 || p->elements[p->face].n == 0) IMP_TRY(ply_error(p, "has no faces"));
     if (!has_use(p, USE_X) || !has_use(p, USE_Y) || !has_use(p, USE_Z))
         IMP_TRY(ply_error(p, "vertices have no x, y, z"));
     bool indices = false;
     const struct ply_element *e = &p->elements[p->face];
-    for (int i = 0; i < e->n_properties; i++) indices |= p->properties[e->first + i].indices;
+    for (int i = 0; i < e->n_properties; i++)
+        indices |= p->properties[e->first + i].indices;
     if (!indices) IMP_TRY(ply_error(p, "faces have no vertex_index or vertex_indices"));
 out:
     return st;
@@ -207,22 +240,24 @@ static size_t row_bytes_min(const struct ply *p, const struct ply_element *e)
         const struct ply_property *q = &p->properties[e->first + i];
         const enum ply_type type = q->count == PLY_NONE ? q->type : q->count;
         const size_t items = q->indices ? 4 : 1;
-        bytes += p->format == PLY_ASCII ? 2 * items
-                 : (size_t)type_bytes[type] +
-                       (q->indices ? 3 * (size_t)type_bytes[q->type] : 0);
+        bytes += p->format == PLY_ASCII
+                     ? 2 * items
+                     : (size_t)type_bytes[type] +
+                           (q->indices ? 3 * (size_t)type_bytes[q->type] : 0);
     }
     return bytes;
 }
 
 static enum imp_status counts_check(const struct ply *p)
 {
-    size_t left = (size_t)(p->end - p->at) + 1; /* the last blank of ascii may be missing */
+    size_t left =
+        (size_t)(p->end - p->at) + 1; /* the last blank of ascii may be missing */
     for (int i = 0; i < p->n_elements; i++) {
         const struct ply_element *e = &p->elements[i];
         const size_t row = row_bytes_min(p, e);
         if (row && e->n > left / row)
-            return ply_error(p, "is cut off: %zu of element '%s' do not fit in the file", e->n,
-                             e->name);
+            return ply_error(p, "is cut off: %zu of element '%s' do not fit in the file",
+                             e->n, e->name);
         left -= e->n * row;
     }
     return IMP_OK;
@@ -267,11 +302,12 @@ static inline bool number_read(struct ply *p, enum ply_type type, double *out)
     return true;
 }
 
-static enum imp_status row_error(const struct ply *p, const struct ply_element *e, size_t row)
+static enum imp_status row_error(const struct ply *p, const struct ply_element *e,
+                                 size_t row)
 {
     if (p->format == PLY_ASCII && p->at < p->end)
-        return ply_error(p, "line %lld: malformed number in %s %zu", (long long)p->line, e->name,
-                         row);
+        return ply_error(p, "line %lld: malformed number in %s %zu", (long long)p->line,
+                         e->name, row);
     return ply_error(p, "is cut off in %s %zu", e->name, row);
 }
 
@@ -297,7 +333,8 @@ static enum imp_status vertex_store(struct ply *p, size_t row, const double valu
     float f[USES];
     for (int i = 0; i < USES; i++) {
         f[i] = (float)value[i];
-        if (!isfinite(f[i])) return ply_error(p, "vertex %zu: %s is not finite", row, names[i]);
+        if (!isfinite(f[i]))
+            return ply_error(p, "vertex %zu: %s is not finite", row, names[i]);
     }
     memcpy(p->positions + 3 * row, f + USE_X, 3 * sizeof *f);
     if (p->normals) memcpy(p->normals + 3 * row, f + USE_NX, 3 * sizeof *f);
@@ -312,7 +349,8 @@ static enum imp_status corners_read(struct ply *p, const struct ply_property *q,
                                     const struct ply_element *e, size_t row, double count)
 {
     if (count != 3)
-        return ply_error(p, "face %zu has %g corners: only triangles are read", row, count);
+        return ply_error(p, "face %zu has %g corners: only triangles are read", row,
+                         count);
     for (int k = 0; k < 3; k++) {
         double i;
         if (!number_read(p, q->type, &i)) return row_error(p, e, row);
@@ -336,9 +374,12 @@ static enum imp_status element_read(struct ply *p, int index)
             double x;
             if (!number_read(p, q->count == PLY_NONE ? q->type : q->count, &x))
                 IMP_TRY(row_error(p, e, row));
-            if (q->count == PLY_NONE) value[q->use] = x;
-            else if (q->indices) IMP_TRY(corners_read(p, q, e, row, x));
-            else IMP_TRY(list_skip(p, q, e, row, x));
+            if (q->count == PLY_NONE)
+                value[q->use] = x;
+            else if (q->indices)
+                IMP_TRY(corners_read(p, q, e, row, x));
+            else
+                IMP_TRY(list_skip(p, q, e, row, x));
         }
         if (index == p->vertex) IMP_TRY(vertex_store(p, row, value));
     }
@@ -353,23 +394,26 @@ static enum imp_status body_read(struct ply *p, struct imp_mesh_data *out)
                uvs = has_use(p, USE_U) && has_use(p, USE_V);
     IMP_TRY(counts_check(p));
     IMP_TRY(imp__mesh_arrays(p->source, p->elements[p->vertex].n, p->elements[p->face].n,
-                             &p->positions, normals ? &p->normals : NULL, uvs ? &p->uvs : NULL,
-                             &p->indices, out));
+                             &p->positions, normals ? &p->normals : NULL,
+                             uvs ? &p->uvs : NULL, &p->indices, out));
     for (int i = 0; i < p->n_elements; i++) IMP_TRY(element_read(p, i));
     if (p->format == PLY_ASCII)
         while (p->at < p->end && strchr(" \t\r\n", *p->at) && *p->at) p->at++;
     if (p->at != p->end)
-        IMP_TRY(ply_error(p, "%lld bytes after the last element", (long long)(p->end - p->at)));
+        IMP_TRY(ply_error(p, "%lld bytes after the last element",
+                          (long long)(p->end - p->at)));
 out:
     return st;
 }
 
-enum imp_status imp__ply_parse(const struct imp_mesh_source *source, struct imp_mesh_data *out)
+enum imp_status imp__ply_parse(const struct imp_mesh_source *source,
+                               struct imp_mesh_data *out)
 {
     enum imp_status st = IMP_OK;
     struct imp_mesh_data mesh = {0};
     struct ply *p = imp__alloc(source->ctx, 1, sizeof *p);
-    if (!p) return imp__error(source->ctx, IMP_E_NOMEM, "%s: out of memory", source->name);
+    if (!p)
+        return imp__error(source->ctx, IMP_E_NOMEM, "%s: out of memory", source->name);
     p->source = source;
     p->ctx = source->ctx;
     p->at = source->text.data;

@@ -2,13 +2,13 @@
  *
  * Nodes that name files get what the files hold: triangles for obj and ply, pixels for
  * bitmap. */
-#include <string.h>
 #include "base/film.h"
 #include "color/rgb.h"
 #include "image.h"
 #include "load.h"
 #include "mesh.h"
 #include "search.h"
+#include <string.h>
 
 /* The message that is there, with the place of the property and the object before it. */
 static enum imp_status placed(struct imp_scene *scene, const struct imp_node *node,
@@ -25,7 +25,8 @@ static enum imp_status path_of(struct imp_scene *scene, struct imp_node *node,
     const char *name, *first = NULL;
     enum imp_status st = imp__props_string(scene->ctx, node, "filename", NULL, &name);
     if (st != IMP_OK) return st;
-    if (!name) return imp__node_error(scene->ctx, node, IMP_E_SCENE, "'filename' is required");
+    if (!name)
+        return imp__node_error(scene->ctx, node, IMP_E_SCENE, "'filename' is required");
     const char *file = imp__node_prop(node, "filename")->loc.file;
     if (file && file != scene->root->loc.file) {
         first = imp__folder_of(scene, file);
@@ -35,18 +36,20 @@ static enum imp_status path_of(struct imp_scene *scene, struct imp_node *node,
     return st == IMP_OK ? st : placed(scene, node, st);
 }
 
-static enum imp_status mesh_attach(struct imp_scene *scene, struct imp_node *node, bool obj)
+static enum imp_status mesh_attach(struct imp_scene *scene, struct imp_node *node,
+                                   bool obj)
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = scene->ctx;
-    struct imp_mesh_source source = {.ctx = ctx, .keep = &scene->arena,
-                                     .temporary = &scene->files};
+    struct imp_mesh_source source = {
+        .ctx = ctx, .keep = &scene->arena, .temporary = &scene->files};
     struct imp_mesh_data *data = imp__arena_array(&scene->files, 1, sizeof *data);
     if (!data) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "scene: out of memory"));
     IMP_TRY(imp__props_bool(ctx, node, "flip_tex_coords", obj, &source.flip_v));
     IMP_TRY(path_of(scene, node, &source.name));
     st = imp__file_read(ctx, source.name, IMP_MESH_BYTES_MAX, &source.text);
-    if (st == IMP_OK) st = obj ? imp__obj_parse(&source, data) : imp__ply_parse(&source, data);
+    if (st == IMP_OK)
+        st = obj ? imp__obj_parse(&source, data) : imp__ply_parse(&source, data);
     if (st != IMP_OK) IMP_TRY(placed(scene, node, st));
     node->mesh = data;
 out:
@@ -64,7 +67,8 @@ static enum imp_status pixels_copy(struct imp_scene *scene, const imp_film *f, b
         return imp__error(ctx, IMP_E_SCENE, "%s: has no channels R, G, B or Y", path);
     const size_t n = (size_t)f->width * (size_t)f->height;
     float *pixels = imp__arena_take(&scene->files, n, (size_t)pick.n * sizeof *pixels);
-    if (!pixels) return imp__error(ctx, IMP_E_NOMEM, "%s: no memory for the picture", path);
+    if (!pixels)
+        return imp__error(ctx, IMP_E_NOMEM, "%s: no memory for the picture", path);
     float *to = pixels;
     for (size_t i = 0; i < n; i++, to += pick.n) {
         const float *from = f->mean + i * (size_t)f->channels;
@@ -104,9 +108,11 @@ static enum imp_status attach(struct imp_scene *scene, struct imp_node *node)
     const bool shape = strcmp(node->tag, "shape") == 0,
                obj = shape && strcmp(node->type, "obj") == 0,
                ply = shape && strcmp(node->type, "ply") == 0,
-               bitmap = strcmp(node->tag, "texture") == 0 && strcmp(node->type, "bitmap") == 0;
+               bitmap =
+                   strcmp(node->tag, "texture") == 0 && strcmp(node->type, "bitmap") == 0;
     if (obj || ply) IMP_TRY(mesh_attach(scene, node, obj));
-    if (bitmap && !node->image) IMP_TRY(image_attach(scene, node));
+    if (bitmap && !node->image)
+        IMP_TRY(image_attach(scene, node));
     else if (bitmap && imp__node_prop(node, "filename"))
         IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_SCENE,
                                 "has pixels and a 'filename': only one can be"));
@@ -116,4 +122,7 @@ out:
     return st;
 }
 
-enum imp_status imp__files_attach(struct imp_scene *scene) { return attach(scene, scene->root); }
+enum imp_status imp__files_attach(struct imp_scene *scene)
+{
+    return attach(scene, scene->root);
+}

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Scenes built by calls: the same tree that the XML reader makes. The first failure is kept;
- * later calls do nothing, and commit returns it. */
-#include <math.h>
-#include <stdio.h>
-#include <string.h>
+ * Scenes built by calls: the same tree that the XML reader makes. The first failure is
+ * kept; later calls do nothing, and commit returns it. */
 #include "base/film.h"
 #include "load.h"
 #include "mesh.h"
 #include "tree.h"
 #include "value.h"
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
 
 static const struct imp_loc nowhere = {NULL, 0, 0};
 
@@ -94,18 +94,22 @@ void imp_scene_end(imp_scene *scene)
     if (!ready(scene)) return;
     if (scene->n_stack == 1)
         keep(scene, imp__error(scene->ctx, IMP_E_ARG, "scene: end without begin"));
-    else scene->n_stack--;
+    else
+        scene->n_stack--;
 }
 
 /* ---- Properties -------------------------------------------------------------------- */
 
 /* A new property of the open object; NULL: the build has failed. */
-static struct imp_prop *prop(struct imp_scene *scene, const char *name, enum imp_prop_type type)
+static struct imp_prop *prop(struct imp_scene *scene, const char *name,
+                             enum imp_prop_type type)
 {
     struct imp_prop *p = NULL;
     if (!ready(scene)) return NULL;
-    if (!name) keep(scene, imp__error(scene->ctx, IMP_E_ARG, "scene: a property has no name"));
-    else keep(scene, imp__tree_prop(scene->tree, top(scene), name, type, nowhere, &p));
+    if (!name)
+        keep(scene, imp__error(scene->ctx, IMP_E_ARG, "scene: a property has no name"));
+    else
+        keep(scene, imp__tree_prop(scene->tree, top(scene), name, type, nowhere, &p));
     return scene->build_status == IMP_OK ? p : NULL;
 }
 
@@ -161,7 +165,8 @@ void imp_scene_string(imp_scene *scene, const char *name, const char *value)
     struct imp_prop *p = prop(scene, name, IMP_PROP_STRING);
     if (!p) return;
     p->string = imp__arena_strdup(&scene->arena, value ? value : "");
-    if (!p->string) keep(scene, imp__error(scene->ctx, IMP_E_NOMEM, "scene: out of memory"));
+    if (!p->string)
+        keep(scene, imp__error(scene->ctx, IMP_E_NOMEM, "scene: out of memory"));
 }
 
 static enum imp_status spectrum(struct imp_scene *scene, struct imp_prop *p, size_t n,
@@ -194,15 +199,16 @@ void imp_scene_ref(imp_scene *scene, const char *id, const char *name)
         keep(scene, imp__tree_ref(scene->tree, top(scene), id ? id : "", name, nowhere));
 }
 
-/* ---- Bulk data ---------------------------------------------------------------------- */
+/* ---- Bulk data --------------------------------------------------------------------- */
 
 static bool open_is(const struct imp_scene *scene, const char *tag, const char *type)
 {
     return strcmp(top(scene)->tag, tag) == 0 && strcmp(top(scene)->type, type) == 0;
 }
 
-static enum imp_status mesh(struct imp_scene *scene, size_t n_vertices, size_t n_triangles,
-                            const float *positions, const float *normals, const float *uvs,
+static enum imp_status mesh(struct imp_scene *scene, size_t n_vertices,
+                            size_t n_triangles, const float *positions,
+                            const float *normals, const float *uvs,
                             const uint32_t *indices)
 {
     imp_context *ctx = scene->ctx;
@@ -214,8 +220,8 @@ static enum imp_status mesh(struct imp_scene *scene, size_t n_vertices, size_t n
         n_vertices > IMP_MESH_MAX || n_triangles > IMP_MESH_MAX)
         return imp__node_error(ctx, node, IMP_E_ARG,
                                "needs between 1 and 2^31 vertices and triangles");
-    const struct imp_mesh_source source = {.ctx = ctx, .keep = &scene->arena,
-                                           .temporary = &scene->files, .name = "mesh"};
+    const struct imp_mesh_source source = {
+        .ctx = ctx, .keep = &scene->arena, .temporary = &scene->files, .name = "mesh"};
     struct imp_mesh_data *data = imp__arena_array(&scene->files, 1, sizeof *data);
     float *p, *n, *uv;
     uint32_t *i;
@@ -237,7 +243,8 @@ void imp_scene_mesh(imp_scene *scene, size_t n_vertices, size_t n_triangles,
                     const uint32_t *indices)
 {
     if (ready(scene))
-        keep(scene, mesh(scene, n_vertices, n_triangles, positions, normals, uvs, indices));
+        keep(scene,
+             mesh(scene, n_vertices, n_triangles, positions, normals, uvs, indices));
 }
 
 static enum imp_status image(struct imp_scene *scene, int width, int height, int channels,
@@ -250,8 +257,9 @@ static enum imp_status image(struct imp_scene *scene, int width, int height, int
                                "pixels are for a texture of type 'bitmap', once");
     if (!pixels || width < 1 || height < 1 || width > IMP_FILM_SIDE_MAX ||
         height > IMP_FILM_SIDE_MAX || (channels != 1 && channels != 3))
-        return imp__node_error(ctx, node, IMP_E_ARG, "a picture of %d x %d with %d channels",
-                               width, height, channels);
+        return imp__node_error(ctx, node, IMP_E_ARG,
+                               "a picture of %d x %d with %d channels", width, height,
+                               channels);
     const size_t n = (size_t)width * (size_t)height * (size_t)channels;
     struct imp_image_data *data = imp__arena_array(&scene->files, 1, sizeof *data);
     float *copy = data ? imp__arena_take(&scene->files, n, sizeof *copy) : NULL;
@@ -262,12 +270,13 @@ static enum imp_status image(struct imp_scene *scene, int width, int height, int
     return IMP_OK;
 }
 
-void imp_scene_image(imp_scene *scene, int width, int height, int channels, const float *pixels)
+void imp_scene_image(imp_scene *scene, int width, int height, int channels,
+                     const float *pixels)
 {
     if (ready(scene)) keep(scene, image(scene, width, height, channels, pixels));
 }
 
-/* ---- Commit -------------------------------------------------------------------------- */
+/* ---- Commit ------------------------------------------------------------------------ */
 
 enum imp_status imp_scene_commit(imp_scene *scene)
 {
@@ -275,7 +284,8 @@ enum imp_status imp_scene_commit(imp_scene *scene)
     imp_context *ctx = scene->ctx;
     if (scene->build_status != IMP_OK)
         return imp__error(ctx, scene->build_status, "%s",
-                          scene->build_error ? scene->build_error : "scene: out of memory");
+                          scene->build_error ? scene->build_error
+                                             : "scene: out of memory");
     if (!scene->tree) return imp__error(ctx, IMP_E_ARG, "scene: it is committed already");
     enum imp_status st = IMP_OK;
     if (scene->n_stack > 1)

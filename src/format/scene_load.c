@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include <string.h>
 #include "load.h"
 #include "search.h"
 #include "tree.h"
 #include "xml.h"
+#include <string.h>
 
 enum imp_status imp__load_options(imp_context *ctx, const struct imp_load_options *from,
                                   struct imp_load_options *to)
@@ -30,8 +30,10 @@ enum imp_status imp__scene_new(imp_context *ctx, const struct imp_load_options *
     imp__arena_init(&scene->files, ctx);
     const enum imp_status st =
         imp__search_init(scene, options->search, options->n_search, folder);
-    if (st == IMP_OK) *out = scene;
-    else imp_scene_destroy(scene);
+    if (st == IMP_OK)
+        *out = scene;
+    else
+        imp_scene_destroy(scene);
     return st;
 }
 
@@ -71,9 +73,9 @@ enum imp_status imp__scene_finish(struct imp_scene *scene)
 }
 
 /* `name` of the scene file; its folder is the last that is searched. */
-static enum imp_status load(imp_context *ctx, const struct imp_bytes *text, const char *name,
-                            const char *folder, const struct imp_load_options *o,
-                            imp_scene **out)
+static enum imp_status load(imp_context *ctx, const struct imp_bytes *text,
+                            const char *name, const char *folder,
+                            const struct imp_load_options *o, imp_scene **out)
 {
     enum imp_status st = IMP_OK;
     struct imp_scene *scene = NULL;
@@ -110,7 +112,8 @@ out:
 }
 
 enum imp_status imp_scene_load_string(imp_context *ctx, const char *xml, size_t length,
-                                      const char *name, const struct imp_load_options *options,
+                                      const char *name,
+                                      const struct imp_load_options *options,
                                       imp_scene **out)
 {
     if (!ctx || !out) return IMP_E_ARG;

@@ -10,8 +10,8 @@ static enum imp_status no_memory(imp_context *ctx)
     return imp__error(ctx, IMP_E_NOMEM, "search path: out of memory");
 }
 
-enum imp_status imp__search_init(struct imp_scene *scene, const char *const *folders, size_t n,
-                                 const char *folder)
+enum imp_status imp__search_init(struct imp_scene *scene, const char *const *folders,
+                                 size_t n, const char *folder)
 {
     imp_context *ctx = scene->ctx;
     scene->search = imp__alloc(ctx, n + 2, sizeof *scene->search);

@@ -5,7 +5,9 @@
 
 void imp__tree_init(struct imp_tree *t, struct imp_scene *scene)
 {
-    *t = (struct imp_tree){.ctx = scene->ctx, .arena = &scene->arena, .ids.ctx = scene->ctx,
+    *t = (struct imp_tree){.ctx = scene->ctx,
+                           .arena = &scene->arena,
+                           .ids.ctx = scene->ctx,
                            .slots.ctx = scene->ctx};
 }
 
@@ -22,36 +24,38 @@ static enum imp_status no_memory(imp_context *ctx)
     return imp__error(ctx, IMP_E_NOMEM, "scene: out of memory");
 }
 
-enum imp_status imp__loc_error(imp_context *ctx, struct imp_loc loc, enum imp_status status,
-                               const char *format, ...)
+enum imp_status imp__loc_error(imp_context *ctx, struct imp_loc loc,
+                               enum imp_status status, const char *format, ...)
 {
     char where[512], text[1024];
     va_list args;
     va_start(args, format);
     vsnprintf(text, sizeof text, format, args);
     va_end(args);
-    return imp__error(ctx, status, "%s: %s", imp__loc_text(loc, where, sizeof where), text);
+    return imp__error(ctx, status, "%s: %s", imp__loc_text(loc, where, sizeof where),
+                      text);
 }
 
 bool imp__is_object_tag(const char *tag)
 {
-    static const char *const tags[] = {"scene",  "bsdf",    "emitter", "film",   "integrator",
-                                       "medium", "phase",   "rfilter", "sampler", "sensor",
-                                       "shape",  "texture", "volume",  "spectrum"};
+    static const char *const tags[] = {
+        "scene",   "bsdf",    "emitter", "film",  "integrator", "medium", "phase",
+        "rfilter", "sampler", "sensor",  "shape", "texture",    "volume", "spectrum"};
     for (size_t i = 0; i < imp_count(tags); i++)
         if (strcmp(tags[i], tag) == 0) return true;
     return false;
 }
 
 /* One name, one thing: `name` (already in the arena) must be free inside `node`. */
-static enum imp_status slot_take(struct imp_tree *t, struct imp_node *node, const char *name,
-                                 struct imp_loc loc)
+static enum imp_status slot_take(struct imp_tree *t, struct imp_node *node,
+                                 const char *name, struct imp_loc loc)
 {
     char where[512];
     const struct imp_name *old = imp__names_find(&t->slots, node, name);
     if (old)
-        return imp__loc_error(t->ctx, loc, IMP_E_SCENE, "%s: '%s' is given twice (first at %s)",
-                              node->tag, name, imp__loc_text(old->loc, where, sizeof where));
+        return imp__loc_error(t->ctx, loc, IMP_E_SCENE,
+                              "%s: '%s' is given twice (first at %s)", node->tag, name,
+                              imp__loc_text(old->loc, where, sizeof where));
     return imp__names_add(&t->slots, node, name, NULL, loc) ? IMP_OK : no_memory(t->ctx);
 }
 
@@ -61,21 +65,23 @@ static enum imp_status id_take(struct imp_tree *t, const char *id, struct imp_no
     char where[512];
     const struct imp_name *old = imp__names_find(&t->ids, NULL, id);
     if (old)
-        return imp__loc_error(t->ctx, loc, IMP_E_SCENE, "id '%s' is used twice (first at %s)",
-                              id, imp__loc_text(old->loc, where, sizeof where));
+        return imp__loc_error(t->ctx, loc, IMP_E_SCENE,
+                              "id '%s' is used twice (first at %s)", id,
+                              imp__loc_text(old->loc, where, sizeof where));
     return imp__names_add(&t->ids, NULL, id, node, loc) ? IMP_OK : no_memory(t->ctx);
 }
 
-static enum imp_status empty_refused(struct imp_tree *t, const char *what, const char *text,
-                                     struct imp_loc loc)
+static enum imp_status empty_refused(struct imp_tree *t, const char *what,
+                                     const char *text, struct imp_loc loc)
 {
     if (!text || *text) return IMP_OK;
     return imp__loc_error(t->ctx, loc, IMP_E_SCENE, "empty %s", what);
 }
 
-enum imp_status imp__tree_open(struct imp_tree *t, struct imp_node *parent, const char *tag,
-                               const char *type, const char *id, const char *name,
-                               struct imp_loc loc, struct imp_node **out)
+enum imp_status imp__tree_open(struct imp_tree *t, struct imp_node *parent,
+                               const char *tag, const char *type, const char *id,
+                               const char *name, struct imp_loc loc,
+                               struct imp_node **out)
 {
     enum imp_status st = IMP_OK;
     IMP_TRY(empty_refused(t, "id", id, loc));
@@ -87,7 +93,8 @@ enum imp_status imp__tree_open(struct imp_tree *t, struct imp_node *parent, cons
     if (!nodes || !node) IMP_TRY(no_memory(t->ctx));
     if (id) IMP_TRY(id_take(t, node->id, node, loc));
     if (parent) {
-        if (!imp__node_add_child(t->arena, parent, node, name, loc)) IMP_TRY(no_memory(t->ctx));
+        if (!imp__node_add_child(t->arena, parent, node, name, loc))
+            IMP_TRY(no_memory(t->ctx));
         if (name) IMP_TRY(slot_take(t, parent, node->name, loc));
     } else
         t->root = node;
@@ -97,9 +104,9 @@ out:
     return st;
 }
 
-enum imp_status imp__tree_prop(struct imp_tree *t, struct imp_node *node, const char *name,
-                               enum imp_prop_type type, struct imp_loc loc,
-                               struct imp_prop **out)
+enum imp_status imp__tree_prop(struct imp_tree *t, struct imp_node *node,
+                               const char *name, enum imp_prop_type type,
+                               struct imp_loc loc, struct imp_prop **out)
 {
     enum imp_status st = IMP_OK;
     IMP_TRY(empty_refused(t, "name", name, loc));
@@ -144,14 +151,14 @@ out:
     return st;
 }
 
-/* Longest chain of objects below, this one counted, kept in node->visiting; -1 while on the
- * way, so meeting -1 again is a cycle. Recursion is as deep as chains may be. */
-static enum imp_status height(struct imp_tree *t, struct imp_node *node, struct imp_loc loc,
-                              int depth)
+/* Longest chain of objects below, this one counted, kept in node->visiting; -1 while on
+ * the way, so meeting -1 again is a cycle. Recursion is as deep as chains may be. */
+static enum imp_status height(struct imp_tree *t, struct imp_node *node,
+                              struct imp_loc loc, int depth)
 {
     if (depth > IMP_DEPTH_MAX)
-        return imp__loc_error(t->ctx, loc, IMP_E_SCENE, "objects are nested deeper than %d",
-                              IMP_DEPTH_MAX);
+        return imp__loc_error(t->ctx, loc, IMP_E_SCENE,
+                              "objects are nested deeper than %d", IMP_DEPTH_MAX);
     int most = 0;
     node->visiting = -1;
     for (size_t i = 0; i < node->n_children; i++) {

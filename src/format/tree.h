@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Growing the tree of nodes of a scene, for the XML reader and the building calls alike: no
- * property and no id twice, references resolved at the end, cycles refused. */
+ * Growing the tree of nodes of a scene, for the XML reader and the building calls alike:
+ * no property and no id twice, references resolved at the end, cycles refused. */
 #ifndef IMP_FORMAT_TREE_H
 #define IMP_FORMAT_TREE_H
 
@@ -13,10 +13,10 @@
 struct imp_tree {
     imp_context *ctx;
     struct imp_arena *arena;
-    struct imp_node *root;    /* tag "scene" */
-    struct imp_names ids;     /* owner NULL; value: the node */
-    struct imp_names slots;   /* owner: a node */
-    struct imp_node **nodes;  /* all of them, in the order they were opened */
+    struct imp_node *root;   /* tag "scene" */
+    struct imp_names ids;    /* owner NULL; value: the node */
+    struct imp_names slots;  /* owner: a node */
+    struct imp_node **nodes; /* all of them, in the order they were opened */
     size_t n_nodes, cap_nodes;
 };
 
@@ -24,23 +24,25 @@ void imp__tree_init(struct imp_tree *t, struct imp_scene *scene);
 void imp__tree_free(struct imp_tree *t);
 
 /* "file:line:column: message" ("scene: message" for building calls). */
-enum imp_status imp__loc_error(imp_context *ctx, struct imp_loc loc, enum imp_status status,
-                               const char *format, ...) IMP_PRINTF(4, 5);
+enum imp_status imp__loc_error(imp_context *ctx, struct imp_loc loc,
+                               enum imp_status status, const char *format, ...)
+    IMP_PRINTF(4, 5);
 
 bool imp__is_object_tag(const char *tag);
 /* A new object under `parent`; parent NULL: the root of the scene. */
-enum imp_status imp__tree_open(struct imp_tree *t, struct imp_node *parent, const char *tag,
-                               const char *type, const char *id, const char *name,
-                               struct imp_loc loc, struct imp_node **out);
-enum imp_status imp__tree_prop(struct imp_tree *t, struct imp_node *node, const char *name,
-                               enum imp_prop_type type, struct imp_loc loc,
-                               struct imp_prop **out);
+enum imp_status imp__tree_open(struct imp_tree *t, struct imp_node *parent,
+                               const char *tag, const char *type, const char *id,
+                               const char *name, struct imp_loc loc,
+                               struct imp_node **out);
+enum imp_status imp__tree_prop(struct imp_tree *t, struct imp_node *node,
+                               const char *name, enum imp_prop_type type,
+                               struct imp_loc loc, struct imp_prop **out);
 enum imp_status imp__tree_ref(struct imp_tree *t, struct imp_node *parent, const char *id,
                               const char *name, struct imp_loc loc);
 enum imp_status imp__tree_alias(struct imp_tree *t, const char *id, const char *as,
                                 struct imp_loc loc);
-/* Set children[].node of every reference. @return IMP_E_SCENE at the line of a reference to
- * an unknown id, of one that closes a cycle, or of what is nested too deeply. */
+/* Set children[].node of every reference. @return IMP_E_SCENE at the line of a reference
+ * to an unknown id, of one that closes a cycle, or of what is nested too deeply. */
 enum imp_status imp__tree_resolve(struct imp_tree *t);
 
 #endif

@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include <string.h>
 #include "xml.h"
+#include <string.h>
 
 static bool is_lower(char c) { return c >= 'a' && c <= 'z'; }
 static bool is_upper(char c) { return c >= 'A' && c <= 'Z'; }
 
-const char *imp__upgrade_name(struct imp_arena *scratch, const char *type, const char *name)
+const char *imp__upgrade_name(struct imp_arena *scratch, const char *type,
+                              const char *name)
 {
     char *to = imp__arena_array(scratch, strlen(name) + 1, 2);
     if (!to) return NULL;

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "value.h"
+#include "base/file.h"
+#include "base/number.h"
 #include <math.h>
 #include <string.h>
 #include <strings.h>
-#include "base/file.h"
-#include "base/number.h"
 
 #define BLANKS " \t\r\n"
 #define SPD_BYTES_MAX ((size_t)64 << 20)
@@ -81,8 +81,10 @@ static enum imp_status pairs_finish(imp_context *ctx, const struct pairs *p,
         s.list[s.n + i] = p->at[i][1];
     }
     const enum imp_status st = imp__samples_check(ctx, &s);
-    if (st != IMP_OK) imp__release(ctx, s.list);
-    else *out = s;
+    if (st != IMP_OK)
+        imp__release(ctx, s.list);
+    else
+        *out = s;
     return st;
 }
 
@@ -92,7 +94,8 @@ enum imp_status imp__samples_check(imp_context *ctx, const struct imp_samples *s
         return imp__error(ctx, IMP_E_SCENE, "a spectrum needs at least two wavelengths");
     for (size_t i = 0; i < s->n; i++) {
         if (!isfinite(s->list[i]) || !isfinite(s->list[s->n + i]))
-            return imp__error(ctx, IMP_E_SCENE, "sample %zu of the spectrum is not finite", i);
+            return imp__error(ctx, IMP_E_SCENE,
+                              "sample %zu of the spectrum is not finite", i);
         if (i && !(s->list[i] > s->list[i - 1]))
             return imp__error(ctx, IMP_E_SCENE,
                               "wavelengths must increase: %g nm does not follow %g nm",
@@ -101,7 +104,8 @@ enum imp_status imp__samples_check(imp_context *ctx, const struct imp_samples *s
     return IMP_OK;
 }
 
-enum imp_status imp__samples_parse(imp_context *ctx, const char *text, struct imp_samples *out)
+enum imp_status imp__samples_parse(imp_context *ctx, const char *text,
+                                   struct imp_samples *out)
 {
     enum imp_status st = IMP_OK;
     struct pairs p = {0};
@@ -120,7 +124,8 @@ out:
     return st;
 }
 
-enum imp_status imp__samples_read(imp_context *ctx, const char *path, struct imp_samples *out)
+enum imp_status imp__samples_read(imp_context *ctx, const char *path,
+                                  struct imp_samples *out)
 {
     enum imp_status st = IMP_OK;
     struct pairs p = {0};
@@ -137,7 +142,8 @@ enum imp_status imp__samples_read(imp_context *ctx, const char *path, struct imp
                 while (s < stop && strchr(BLANKS, *s)) s++;
                 if (!imp__number(&s, stop, &v[i]) || (s < stop && !strchr(BLANKS, *s)))
                     IMP_TRY(imp__error(ctx, IMP_E_SCENE,
-                                       "%s:%d: a line must be 'wavelength value'", path, line));
+                                       "%s:%d: a line must be 'wavelength value'", path,
+                                       line));
             }
             while (s < stop && strchr(BLANKS, *s)) s++;
             if (s < stop && *s != '#')

@@ -10,8 +10,8 @@
 bool imp__value_float(const char *text, double *out);
 bool imp__value_integer(const char *text, int64_t *out);
 bool imp__value_bool(const char *text, bool *out);
-/* Numbers split at commas and blanks, at most `max`; their count, or -1 if an item is not a
- * number, or max + 1 if there are more. */
+/* Numbers split at commas and blanks, at most `max`; their count, or -1 if an item is not
+ * a number, or max + 1 if there are more. */
 int imp__value_list(const char *text, int max, double *out);
 /* Three numbers, or one for all three; false otherwise. */
 bool imp__value_triple(const char *text, double out[3]);
@@ -22,10 +22,12 @@ struct imp_samples {
     double *list;
 };
 /* "400:0.3, 500:0.4" */
-enum imp_status imp__samples_parse(imp_context *ctx, const char *text, struct imp_samples *out);
+enum imp_status imp__samples_parse(imp_context *ctx, const char *text,
+                                   struct imp_samples *out);
 /* An .spd file: lines "wavelength value"; blank lines and lines that start with # do not
  * count. The message names file and line. */
-enum imp_status imp__samples_read(imp_context *ctx, const char *path, struct imp_samples *out);
+enum imp_status imp__samples_read(imp_context *ctx, const char *path,
+                                  struct imp_samples *out);
 /* At least two, wavelengths strictly increasing, all numbers finite. */
 enum imp_status imp__samples_check(imp_context *ctx, const struct imp_samples *s);
 

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "xml.h"
+#include "hooks.h"
+#include "search.h"
 #include <expat.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
-#include "hooks.h"
-#include "search.h"
 
 #define PIECE_BYTES (1 << 16)
 
@@ -47,7 +47,7 @@ void imp__xml_fail_placed(struct xml_file *f, enum imp_status status)
     if (f->st == IMP_OK && status != IMP_OK) stop(f, status);
 }
 
-/* ---- What expat calls ------------------------------------------------------------- */
+/* ---- What expat calls -------------------------------------------------------------- */
 
 static void on_start(void *payload, const char *tag, const char **attributes)
 {
@@ -80,14 +80,14 @@ static void on_text(void *payload, const char *text, int length)
 }
 
 /* With no document type there are no entities, so none can be expanded without bound. */
-static void on_doctype(void *payload, const char *name, const char *system, const char *public,
-                       int internal)
+static void on_doctype(void *payload, const char *name, const char *system,
+                       const char *public, int internal)
 {
     (void)name, (void)system, (void)public, (void)internal;
     imp__xml_fail(payload, IMP_E_SCENE, "a document type (<!DOCTYPE>) is not allowed");
 }
 
-/* ---- Files ------------------------------------------------------------------------ */
+/* ---- Files ------------------------------------------------------------------------- */
 
 static enum imp_status text_read(struct xml_file *f, const struct imp_bytes *text)
 {
@@ -108,8 +108,8 @@ static enum imp_status text_read(struct xml_file *f, const struct imp_bytes *tex
     for (size_t done = 0;;) {
         const size_t n = imp_min(text->size - done, (size_t)PIECE_BYTES);
         const bool last = done + n == text->size;
-        const enum XML_Status ok = XML_Parse(parser, (const char *)text->data + done, (int)n,
-                                             last);
+        const enum XML_Status ok =
+            XML_Parse(parser, (const char *)text->data + done, (int)n, last);
         if (f->st == IMP_OK && ok != XML_STATUS_OK) {
             const enum XML_Error code = XML_GetErrorCode(parser);
             if (code == XML_ERROR_NO_MEMORY)
@@ -151,7 +151,8 @@ out:
 static bool same_file(const char *a, const char *b)
 {
     struct stat x, y;
-    return stat(a, &x) == 0 && stat(b, &y) == 0 && x.st_dev == y.st_dev && x.st_ino == y.st_ino;
+    return stat(a, &x) == 0 && stat(b, &y) == 0 && x.st_dev == y.st_dev &&
+           x.st_ino == y.st_ino;
 }
 
 void imp__xml_include(struct xml_file *f, const char *name, const char *slot,
@@ -174,7 +175,8 @@ void imp__xml_include(struct xml_file *f, const char *name, const char *slot,
             return;
         }
     if (depth - 1 > XML_INCLUDE_DEPTH) {
-        imp__xml_fail(f, IMP_E_SCENE, "includes are nested deeper than %d", XML_INCLUDE_DEPTH);
+        imp__xml_fail(f, IMP_E_SCENE, "includes are nested deeper than %d",
+                      XML_INCLUDE_DEPTH);
         return;
     }
     if (++r->n_includes > XML_INCLUDES_MAX) {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Reading scene files (scene-format 1). xml.c drives expat over a file and its includes,
- * xml_tags.c is the grammar: what every tag means. */
+ * xml_tags.c is the grammar. */
 #ifndef IMP_FORMAT_XML_H
 #define IMP_FORMAT_XML_H
 
@@ -15,7 +15,7 @@
 enum imp_status imp__xml_read(struct imp_scene *scene, const struct imp_bytes *text,
                               const char *name, const struct imp_load_options *options);
 
-/* ---- Shared by xml.c and xml_tags.c ---- */
+/* ---- Shared by xml.c and xml_tags.c ------------------------------------------------ */
 
 #define XML_INCLUDE_DEPTH 15
 #define XML_INCLUDES_MAX 10000
@@ -25,15 +25,15 @@ enum imp_status imp__xml_read(struct imp_scene *scene, const struct imp_bytes *t
 enum xml_level_kind {
     XML_OBJECT,
     XML_TRANSFORM,
-    XML_LEAF     /* nothing may stand inside */
+    XML_LEAF /* nothing may stand inside */
 };
 struct xml_level {
     enum xml_level_kind kind;
     const char *tag;
-    struct imp_node *node;       /* OBJECT: gets the children; TRANSFORM: the owner */
-    struct imp_node *props;      /* OBJECT: gets the properties; not `node` only in the root
-                                    of an included scene, whose properties are dropped */
-    struct imp_prop *prop;       /* TRANSFORM */
+    struct imp_node *node;  /* OBJECT: gets the children; TRANSFORM: the owner */
+    struct imp_node *props; /* OBJECT: gets the properties; not `node` only in the root
+                               of an included scene, whose properties are dropped */
+    struct imp_prop *prop;  /* TRANSFORM */
     struct imp_mat4 matrix;
 };
 
@@ -42,19 +42,19 @@ struct xml_reader { /* of a scene file and its includes */
     struct imp_scene *scene;
     struct imp_tree tree;
     struct imp_params params;
-    struct imp_arena scratch;    /* values of the tag being read */
+    struct imp_arena scratch; /* values of the tag being read */
     size_t n_includes, n_bytes;
 };
 
 struct xml_file {
     struct xml_reader *reader;
-    struct xml_file *includer;   /* NULL: the scene file itself */
+    struct xml_file *includer; /* NULL: the scene file itself */
     void *parser;
-    const char *name;            /* path, in the scene's arena */
-    const char *folder;          /* searched first by what this file includes */
-    struct imp_node *parent;     /* of what the file holds; NULL for the scene file */
-    const char *slot;            /* name given by the include, or NULL */
-    bool old;                    /* version < 2.0.0: names are upgraded */
+    const char *name;        /* path, in the scene's arena */
+    const char *folder;      /* searched first by what this file includes */
+    struct imp_node *parent; /* of what the file holds; NULL for the scene file */
+    const char *slot;        /* name given by the include, or NULL */
+    bool old;                /* version < 2.0.0: names are upgraded */
     int depth;
     enum imp_status st;
     struct xml_level levels[IMP_DEPTH_MAX + 1];
@@ -63,7 +63,9 @@ struct xml_file {
 /* Attributes of a tag, parameters replaced. Missing: NULL. */
 struct xml_attributes {
     int n;
-    struct { const char *name, *value; } at[XML_ATTRIBUTES_MAX];
+    struct {
+        const char *name, *value;
+    } at[XML_ATTRIBUTES_MAX];
 };
 
 struct imp_loc imp__xml_loc(const struct xml_file *f);
@@ -81,10 +83,29 @@ void imp__xml_include(struct xml_file *f, const char *name, const char *slot,
 void imp__xml_start(struct xml_file *f, const char *tag, const char **attributes);
 void imp__xml_end(struct xml_file *f);
 
-/* ---- upgrade.c: files before version 2.0.0 (scene-format 1.6) ---- */
+/* ---- What tags do: xml_props.c, xml_transform.c ------------------------------------ */
+typedef void imp__xml_act(struct xml_file *f, const struct xml_attributes *a);
+imp__xml_act imp__xml_integer, imp__xml_float, imp__xml_boolean, imp__xml_string,
+    imp__xml_vector, imp__xml_rgb, imp__xml_spectrum;
+imp__xml_act imp__xml_translate, imp__xml_scale, imp__xml_rotate, imp__xml_matrix,
+    imp__xml_lookat;
+
+const char *imp__xml_get(const struct xml_attributes *a, const char *name);
+/* The name attribute, upgraded if the file is old; NULL if there is none or f failed. */
+const char *imp__xml_name(struct xml_file *f, const struct xml_attributes *a);
+struct xml_level *imp__xml_top(struct xml_file *f);
+/* A new property of the open object, named by the attributes; NULL: f failed. */
+struct imp_prop *imp__xml_prop(struct xml_file *f, const struct xml_attributes *a,
+                               enum imp_prop_type type);
+/* x y z with defaults `missing`, or value; false: f failed. */
+bool imp__xml_xyz(struct xml_file *f, const char *tag, const struct xml_attributes *a,
+                  double missing, double out[3]);
+
+/* ---- upgrade.c: files before version 2.0.0 (scene-format 1.6) ---------------------- */
 /* camelCase -> snake_case, and reflectances renamed; `type` is the plugin that has the
  * property. In scratch; NULL: out of memory. */
-const char *imp__upgrade_name(struct imp_arena *scratch, const char *type, const char *name);
+const char *imp__upgrade_name(struct imp_arena *scratch, const char *type,
+                              const char *name);
 /* uoffset, voffset, uscale, vscale -> to_uv. */
 enum imp_status imp__upgrade_texture(struct imp_tree *tree, struct imp_node *node);
 

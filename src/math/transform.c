@@ -69,11 +69,11 @@ struct imp_mat4 imp__rotate(imp_v3 n, double degrees)
     if (fabs(turn) == 90) c = 0, s = copysign(1, turn);
     if (fabs(turn) == 180) c = -1, s = 0;
     const double k = 1 - c;
-    return (struct imp_mat4){
-        {c + k * n[0] * n[0], k * n[0] * n[1] - s * n[2], k * n[0] * n[2] + s * n[1], 0,
-         k * n[1] * n[0] + s * n[2], c + k * n[1] * n[1], k * n[1] * n[2] - s * n[0], 0,
-         k * n[2] * n[0] - s * n[1], k * n[2] * n[1] + s * n[0], c + k * n[2] * n[2], 0,
-         0, 0, 0, 1}};
+    return (struct imp_mat4){{c + k * n[0] * n[0], k * n[0] * n[1] - s * n[2],
+                              k * n[0] * n[2] + s * n[1], 0, k * n[1] * n[0] + s * n[2],
+                              c + k * n[1] * n[1], k * n[1] * n[2] - s * n[0], 0,
+                              k * n[2] * n[0] - s * n[1], k * n[2] * n[1] + s * n[0],
+                              c + k * n[2] * n[2], 0, 0, 0, 0, 1}};
 }
 
 bool imp__lookat(imp_v3 origin, imp_v3 target, imp_v3 up, struct imp_mat4 *out)

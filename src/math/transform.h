@@ -1,14 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * 4x4 matrices, row-major, column vectors: p' = M p (scene-format 1.4). Points divide by w
- * only in imp__project_point; the matrices of shapes and sensors are affine. */
+ * 4x4 matrices, row-major, column vectors: p' = M p (scene-format 1.4). Points divide by
+ * w only in imp__project_point; the matrices of shapes and sensors are affine. */
 #ifndef IMP_MATH_TRANSFORM_H
 #define IMP_MATH_TRANSFORM_H
 
-#include <string.h>
 #include "vec.h"
+#include <string.h>
 
-struct imp_mat4 { double m[16]; };
+struct imp_mat4 {
+    double m[16];
+};
 
 static inline struct imp_mat4 imp__mat4_identity(void)
 {
@@ -82,9 +84,9 @@ struct imp_mat4 imp__translate(imp_v3 t);
 struct imp_mat4 imp__scale(imp_v3 s);
 /* Right-handed about a unit axis (Rodrigues). */
 struct imp_mat4 imp__rotate(imp_v3 axis, double degrees);
-/* Columns (left, newup, dir, origin): a sensor looks along +z, +y is up, +x points left. A
- * zero `up` takes the first tangent of the basis of dir. False: target at the origin, up
- * parallel to dir, or not finite. */
+/* Columns (left, newup, dir, origin): a sensor looks along +z, +y is up, +x points left.
+ * A zero `up` takes the first tangent of the basis of dir. False: target at the origin,
+ * up parallel to dir, or not finite. */
 bool imp__lookat(imp_v3 origin, imp_v3 target, imp_v3 up, struct imp_mat4 *out);
 
 #endif
