@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * OBJ and PLY: what is read (scene-format 13.1, 13.2), the message of every error, files cut
- * off and damaged anywhere, and memory that ends. */
-#include "imp_tap.h"
-#include <stdlib.h>
+ * OBJ and PLY: what is read (scene-format 13.1, 13.2), the message of every error, files
+ * cut off and damaged anywhere, and memory that ends. */
 #include "format/mesh.h"
 #include "imp_fail_alloc.h"
+#include "imp_tap.h"
+#include <stdlib.h>
 
 static imp_context *ctx;
 
@@ -20,8 +20,11 @@ static enum imp_status load(imp_context *c, const void *data, size_t n, const ch
     *l = (struct loaded){0};
     imp__arena_init(&l->keep, c);
     imp__arena_init(&l->temporary, c);
-    const struct imp_mesh_source s = {.ctx = c, .keep = &l->keep, .temporary = &l->temporary,
-                                      .name = name, .flip_v = flip,
+    const struct imp_mesh_source s = {.ctx = c,
+                                      .keep = &l->keep,
+                                      .temporary = &l->temporary,
+                                      .name = name,
+                                      .flip_v = flip,
                                       .text = {(unsigned char *)data, n, n}};
     return strstr(name, ".obj") ? imp__obj_parse(&s, &l->m) : imp__ply_parse(&s, &l->m);
 }
@@ -31,32 +34,37 @@ static void unload(struct loaded *l)
     imp__arena_free(&l->temporary);
 }
 
-/* ---- OBJ ----------------------------------------------------------------------------- */
+/* ---- OBJ --------------------------------------------------------------------------- */
 
 static void check_obj(void)
 {
     static const char text[] =
         "# a quad and a triangle\r\nmtllib x.mtl\no thing\n"
-        "v 0 0 0\nv 1 0 0 1.0\nv\t1 1 0\nv 0 1e0 0\n\nvt 0 0\nvt 1 0.25\nvt 1 1 0\nvn 0 0 1\n"
+        "v 0 0 0\nv 1 0 0 1.0\nv\t1 1 0\nv 0 1e0 0\n\nvt 0 0\nvt 1 0.25\nvt 1 1 0\nvn 0 "
+        "0 1\n"
         "usemtl a\ns off\nf 1/1/1 2/2/1 3/3/1 4/1/1\n  f 1/1/1 2/3/1 4/1/1  \n";
     struct loaded l;
     enum imp_status st = load(ctx, text, sizeof text - 1, "a.obj", true, &l);
     tap_ok(st == IMP_OK && l.m.n_triangles == 3 && l.m.n_vertices == 5,
-           "polygons are fanned, corners shared # %zu triangles %zu vertices %s", l.m.n_triangles,
-           l.m.n_vertices, st ? imp_last_error(ctx) : "");
+           "polygons are fanned, corners shared # %zu triangles %zu vertices %s",
+           l.m.n_triangles, l.m.n_vertices, st ? imp_last_error(ctx) : "");
     if (st == IMP_OK) {
         static const uint32_t want[] = {0, 1, 2, 0, 2, 3, 0, 4, 3};
         tap_ok(memcmp(l.m.indices, want, sizeof want) == 0, "their indices");
-        tap_ok(l.m.positions[6] == 1 && l.m.positions[7] == 1 && l.m.positions[12] == 1, "positions");
+        tap_ok(l.m.positions[6] == 1 && l.m.positions[7] == 1 && l.m.positions[12] == 1,
+               "positions");
         tap_ok(l.m.uvs && l.m.uvs[3] == 0.75f && l.m.uvs[1] == 1, "v is flipped");
         tap_ok(l.m.normals && l.m.normals[14] == 1 && l.m.normals_from_file, "normals");
     }
     unload(&l);
-    static const char slashes[] = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nvt .5 .5\nf 1//1 2//1 3//1";
+    static const char slashes[] =
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nvt .5 .5\nf 1//1 2//1 3//1";
     st = load(ctx, slashes, sizeof slashes - 1, "b.obj", false, &l);
-    tap_ok(st == IMP_OK && l.m.normals && l.m.uvs[0] == 0, "a//n # %s", st ? imp_last_error(ctx) : "");
+    tap_ok(st == IMP_OK && l.m.normals && l.m.uvs[0] == 0, "a//n # %s",
+           st ? imp_last_error(ctx) : "");
     unload(&l);
-    st = load(ctx, "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3", 46, "c.obj", false, &l);
+    st = load(ctx, "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3", 46, "c.obj",
+              false, &l);
     tap_ok(st == IMP_OK && !l.m.normals && !l.m.normals_from_file && !l.m.uvs,
            "normals that not all corners have are computed");
     unload(&l);
@@ -64,7 +72,9 @@ static void check_obj(void)
     static char big[1200];
     memset(big, 'x', sizeof big - 1);
     big[0] = '#';
-    const struct { const char *text, *message; } errors[] = {
+    const struct {
+        const char *text, *message;
+    } errors[] = {
         {"", "e.obj: has no faces"},
         {"v 0 0 0\nv 1 0\n", "e.obj:2: vertex needs 3 numbers"},
         {"v 0 0 0x\n", "e.obj:1: vertex needs 3 numbers"},
@@ -77,26 +87,30 @@ static void check_obj(void)
         {"v 0 0 0\nf 1 1 -1\n", "e.obj:2: index -1 of a vertex is not positive"},
         {"v 0 0 0\nf 1 1 0\n", "e.obj:2: index 0 of a vertex is not positive"},
         {"v 0 0 0\nf 1 1 a\n", "e.obj:2: malformed index of a vertex"},
-        {"v 0 0 0\nf 1/1 1 1\n", "e.obj:2: index 1 of a texture coordinate: there are 0 so far"},
+        {"v 0 0 0\nf 1/1 1 1\n",
+         "e.obj:2: index 1 of a texture coordinate: there are 0 so far"},
         {"v 0 0 0\nf 1//1 1 1\n", "e.obj:2: index 1 of a normal: there are 0 so far"},
         {"v 0 0 0\nf 1/ 1 1x\n", "e.obj:2: malformed corner of a face"},
         {"v 0 0 0\nf 1 1 99999999999999999999\n", "e.obj:2: malformed index of a vertex"},
         {big, "e.obj:1: line is longer than 1023 bytes"}};
     for (size_t i = 0; i < imp_count(errors); i++) {
         st = load(ctx, errors[i].text, strlen(errors[i].text), "e.obj", false, &l);
-        tap_ok(st == IMP_E_SCENE && strcmp(imp_last_error(ctx), errors[i].message) == 0, "%s",
-               errors[i].message);
+        tap_ok(st == IMP_E_SCENE && strcmp(imp_last_error(ctx), errors[i].message) == 0,
+               "%s", errors[i].message);
         if (strcmp(imp_last_error(ctx), errors[i].message) != 0)
             printf("# %d %s\n", st, imp_last_error(ctx));
         unload(&l);
     }
 }
 
-/* ---- PLY ----------------------------------------------------------------------------- */
+/* ---- PLY --------------------------------------------------------------------------- */
 
 enum { ASCII, LITTLE, BIG };
 
-struct text { char at[4096]; size_t n; };
+struct text {
+    char at[4096];
+    size_t n;
+};
 
 static void put(struct text *t, int format, const char *type, double value)
 {
@@ -106,24 +120,39 @@ static void put(struct text *t, int format, const char *type, double value)
     }
     unsigned char b[8];
     size_t n = 4;
-    if (strcmp(type, "float") == 0) { float x = (float)value; memcpy(b, &x, 4); }
-    else if (strcmp(type, "double") == 0) { memcpy(b, &value, n = 8); }
-    else if (strcmp(type, "uchar") == 0) { b[0] = (unsigned char)value; n = 1; }
-    else if (strcmp(type, "short") == 0) { int16_t x = (int16_t)value; memcpy(b, &x, n = 2); }
-    else { int32_t x = (int32_t)value; memcpy(b, &x, 4); }
-    for (size_t i = 0; i < n; i++) t->at[t->n++] = (char)b[format == LITTLE ? i : n - 1 - i];
+    if (strcmp(type, "float") == 0) {
+        float x = (float)value;
+        memcpy(b, &x, 4);
+    } else if (strcmp(type, "double") == 0) {
+        memcpy(b, &value, n = 8);
+    } else if (strcmp(type, "uchar") == 0) {
+        b[0] = (unsigned char)value;
+        n = 1;
+    } else if (strcmp(type, "short") == 0) {
+        int16_t x = (int16_t)value;
+        memcpy(b, &x, n = 2);
+    } else {
+        int32_t x = (int32_t)value;
+        memcpy(b, &x, 4);
+    }
+    for (size_t i = 0; i < n; i++)
+        t->at[t->n++] = (char)b[format == LITTLE ? i : n - 1 - i];
 }
 
 /* Four vertices and two triangles, with an element and properties that nobody knows. */
 static void ply_make(struct text *t, int format, double x1)
 {
-    static const char *const names[] = {"ascii", "binary_little_endian", "binary_big_endian"};
-    t->n = (size_t)sprintf(t->at,
-        "ply\nformat %s 1.0\ncomment a comment of words\nelement vertex 4\nproperty uchar red\n"
+    static const char *const names[] = {"ascii", "binary_little_endian",
+                                        "binary_big_endian"};
+    t->n = (size_t)sprintf(
+        t->at,
+        "ply\nformat %s 1.0\ncomment a comment of words\nelement vertex 4\nproperty "
+        "uchar red\n"
         "property double x\nproperty float y\nproperty float z\nproperty float nx\n"
         "property float ny\nproperty float nz\nproperty float s\nproperty float t\n"
         "element extra 2\nproperty list uchar short junk\nproperty short w\n"
-        "element face 2\nproperty list uchar int vertex_indices\nproperty float q\nend_header\n",
+        "element face 2\nproperty list uchar int vertex_indices\nproperty float "
+        "q\nend_header\n",
         names[format]);
     for (int i = 0; i < 4; i++) {
         put(t, format, "uchar", 7);
@@ -157,36 +186,47 @@ static void check_ply(void)
         ply_make(&t, format, 1);
         enum imp_status st = load(ctx, t.at, t.n, "a.ply", format == BIG, &l);
         tap_ok(st == IMP_OK && l.m.n_vertices == 4 && l.m.n_triangles == 2 &&
-                   l.m.positions[9] == 1 && l.m.positions[10] == 1 && l.m.positions[11] == 0.5f &&
-                   l.m.normals[5] == 1 && l.m.uvs[6] == 0.75f &&
+                   l.m.positions[9] == 1 && l.m.positions[10] == 1 &&
+                   l.m.positions[11] == 0.5f && l.m.normals[5] == 1 &&
+                   l.m.uvs[6] == 0.75f &&
                    l.m.uvs[7] == (format == BIG ? 0.875f : 0.125f) && l.m.indices[5] == 3,
                "PLY format %d # %s", format, st ? imp_last_error(ctx) : "");
         unload(&l);
         ply_make(&t, format, NAN);
         st = load(ctx, t.at, t.n, "a.ply", false, &l);
-        tap_ok(st == IMP_E_SCENE && strcmp(imp_last_error(ctx), "a.ply: vertex 1: x is not finite") == 0,
+        tap_ok(st == IMP_E_SCENE &&
+                   strcmp(imp_last_error(ctx), "a.ply: vertex 1: x is not finite") == 0,
                "NaN in a vertex # %s", imp_last_error(ctx));
         unload(&l);
     }
-#define HEAD "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n" \
-             "property float z\nelement face 1\nproperty list uchar int vertex_index\nend_header\n"
+#define HEAD                                                                             \
+    "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"      \
+    "property float z\nelement face 1\nproperty list uchar int "                         \
+    "vertex_index\nend_header\n"
 #define POINTS "0 0 0\n1 0 0\n0 1 0\n"
-    static const struct { const char *text, *message; } errors[] = {
+    static const struct {
+        const char *text, *message;
+    } errors[] = {
         {"plx\n", "e.ply: not a PLY file"},
         {"ply\nformat ascii 1.0\n", "e.ply: the header does not end"},
         {"ply\nformat xml 1.0\nend_header\n", "e.ply: unknown format 'xml 1.0'"},
         {"ply\nformat ascii 1.0\nend_header\n", "e.ply: has no vertices"},
         {"ply\nelement vertex 3\nend_header\n", "e.ply: the header names no format"},
-        {"ply\nformat ascii 1.0\nelement vertex -3\n", "e.ply: line 3: '-3' is not a count"},
+        {"ply\nformat ascii 1.0\nelement vertex -3\n",
+         "e.ply: line 3: '-3' is not a count"},
         {"ply\nformat ascii 1.0\nelement vertex 99999999999\n",
          "e.ply: 99999999999 of element vertex: too many"},
-        {"ply\nformat ascii 1.0\nelement vertex 3\nelement vertex 3\n", "e.ply: element 'vertex' is there twice"},
-        {"ply\nformat ascii 1.0\nproperty float x\n", "e.ply: line 3: malformed property"},
-        {"ply\nformat ascii 1.0\nelement vertex 3\nproperty quad x\n", "e.ply: line 4: unknown type"},
+        {"ply\nformat ascii 1.0\nelement vertex 3\nelement vertex 3\n",
+         "e.ply: element 'vertex' is there twice"},
+        {"ply\nformat ascii 1.0\nproperty float x\n",
+         "e.ply: line 3: malformed property"},
+        {"ply\nformat ascii 1.0\nelement vertex 3\nproperty quad x\n",
+         "e.ply: line 4: unknown type"},
         {"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float x\n",
          "e.ply: line 5: property 'x' is there twice"},
         {"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nelement face 1\n"
-         "property list uchar int vertex_index\nend_header\n", "e.ply: vertices have no x, y, z"},
+         "property list uchar int vertex_index\nend_header\n",
+         "e.ply: vertices have no x, y, z"},
         {"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
          "property float z\nelement face 1\nend_header\n",
          "e.ply: faces have no vertex_index or vertex_indices"},
@@ -194,24 +234,31 @@ static void check_ply(void)
         {HEAD, "e.ply: is cut off: 3 of element 'vertex' do not fit in the file"},
         {HEAD POINTS "3 0 1 3\n", "e.ply: face 0 names vertex 3; there are 3"},
         {HEAD POINTS "3 0 1 -1\n", "e.ply: face 0 names vertex -1; there are 3"},
-        {HEAD POINTS "4 0 1 2 0\n", "e.ply: face 0 has 4 corners: only triangles are read"},
+        {HEAD POINTS "4 0 1 2 0\n",
+         "e.ply: face 0 has 4 corners: only triangles are read"},
         {HEAD POINTS "2 0 1 2\n", "e.ply: face 0 has 2 corners: only triangles are read"},
         {HEAD POINTS "3 0 1 2\n7\n", "e.ply: 2 bytes after the last element"},
-        {HEAD "0 0 0\n1 0 0\n0 1 z\n3 0 1 2\n", "e.ply: line 12: malformed number in vertex 2"},
-        {"ply\nformat binary_little_endian 1.0\nelement vertex 1000000000\nproperty float x\n"
-         "property float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_index\n"
-         "end_header\n0000", "e.ply: is cut off: 1000000000 of element 'vertex' do not fit in the file"}};
+        {HEAD "0 0 0\n1 0 0\n0 1 z\n3 0 1 2\n",
+         "e.ply: line 12: malformed number in vertex 2"},
+        {"ply\nformat binary_little_endian 1.0\nelement vertex 1000000000\nproperty "
+         "float x\n"
+         "property float y\nproperty float z\nelement face 1\nproperty list uchar int "
+         "vertex_index\n"
+         "end_header\n0000",
+         "e.ply: is cut off: 1000000000 of element 'vertex' do not fit in the file"}};
     for (size_t i = 0; i < imp_count(errors); i++) {
-        const enum imp_status st = load(ctx, errors[i].text, strlen(errors[i].text), "e.ply", false, &l);
-        tap_ok(st == IMP_E_SCENE && strcmp(imp_last_error(ctx), errors[i].message) == 0, "%s",
-               errors[i].message);
+        const enum imp_status st =
+            load(ctx, errors[i].text, strlen(errors[i].text), "e.ply", false, &l);
+        tap_ok(st == IMP_E_SCENE && strcmp(imp_last_error(ctx), errors[i].message) == 0,
+               "%s", errors[i].message);
         if (strcmp(imp_last_error(ctx), errors[i].message) != 0)
             printf("# %d %s\n", st, imp_last_error(ctx));
         unload(&l);
     }
 }
 
-/* ---- Hostile ---------------------------------------------------------------------------- */
+/* ---- Hostile
+ * ---------------------------------------------------------------------------- */
 
 static void check_cut(const char *name, const char *data, size_t size, size_t slack)
 {
@@ -236,8 +283,8 @@ static void check_cut(const char *name, const char *data, size_t size, size_t sl
             unload(&l);
         }
     free(damaged);
-    tap_ok(wrong == 0, "%s cut and damaged anywhere # %zu bytes, %d wrong, %d read", name, size,
-           wrong, read);
+    tap_ok(wrong == 0, "%s cut and damaged anywhere # %zu bytes, %d wrong, %d read", name,
+           size, wrong, read);
 }
 
 static void check_memory(const char *name, const char *data, size_t size)
@@ -260,8 +307,8 @@ static void check_memory(const char *name, const char *data, size_t size)
     }
     imp_context_destroy(fragile);
     tap_ok(steps > 2 && wrong == 0 && heap.live == 0,
-           "%s: no memory at the n-th allocation # %d allocations, %d wrong, %ld leaked", name, steps,
-           wrong, heap.live);
+           "%s: no memory at the n-th allocation # %d allocations, %d wrong, %ld leaked",
+           name, steps, wrong, heap.live);
 }
 
 /* A grid of 300 x 300 quads as OBJ: shared vertices must stay shared. */
@@ -272,17 +319,20 @@ static void check_large(void)
     char line[128];
     for (int y = 0; y <= N; y++)
         for (int x = 0; x <= N; x++)
-            imp__bytes_add(ctx, &b, line, (size_t)sprintf(line, "v %d.25 %d 0.1234567\n", x, y));
+            imp__bytes_add(ctx, &b, line,
+                           (size_t)sprintf(line, "v %d.25 %d 0.1234567\n", x, y));
     for (int y = 0; y < N; y++)
         for (int x = 0; x < N; x++) {
             const int a = y * (N + 1) + x + 1;
-            imp__bytes_add(ctx, &b, line, (size_t)sprintf(line, "f %d %d %d %d\n", a, a + 1,
-                                                          a + N + 2, a + N + 1));
+            imp__bytes_add(
+                ctx, &b, line,
+                (size_t)sprintf(line, "f %d %d %d %d\n", a, a + 1, a + N + 2, a + N + 1));
         }
     struct loaded l;
     const enum imp_status st = load(ctx, b.data, b.size, "g.obj", false, &l);
-    tap_ok(st == IMP_OK && l.m.n_vertices == (N + 1) * (N + 1) && l.m.n_triangles == 2 * N * N &&
-               l.m.positions[5] == 0.1234567f, "a large grid # %zu vertices", l.m.n_vertices);
+    tap_ok(st == IMP_OK && l.m.n_vertices == (N + 1) * (N + 1) &&
+               l.m.n_triangles == 2 * N * N && l.m.positions[5] == 0.1234567f,
+           "a large grid # %zu vertices", l.m.n_vertices);
     unload(&l);
     imp__bytes_free(ctx, &b);
 }
@@ -294,7 +344,8 @@ int main(void)
     if (imp_context_create(&o, &ctx) != IMP_OK) return 1;
     check_obj();
     check_ply();
-    static const char obj[] = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\n";
+    static const char obj[] =
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\nf 1/1/1 2/1/1 3/1/1\n";
     check_cut("h.obj", obj, sizeof obj - 1, 6); /* "3" and "3/1" are corners too */
     struct text t;
     for (int format = ASCII; format <= BIG; format++) {

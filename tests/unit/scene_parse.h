@@ -4,12 +4,13 @@
 #ifndef IMP_TEST_SCENE_PARSE_H
 #define IMP_TEST_SCENE_PARSE_H
 
-#include <string.h>
 #include "format/search.h"
 #include "format/xml.h"
+#include <string.h>
 
 static inline enum imp_status parse_open(imp_context *ctx, const char *xml, size_t size,
-                                         const char *name, const struct imp_load_options *o,
+                                         const char *name,
+                                         const struct imp_load_options *o,
                                          struct imp_scene *scene)
 {
     memset(scene, 0, sizeof *scene);
@@ -25,7 +26,8 @@ static inline enum imp_status parse_open(imp_context *ctx, const char *xml, size
 }
 static inline void parse_close(struct imp_scene *scene)
 {
-    for (size_t i = 0; i < scene->n_search; i++) imp__release(scene->ctx, scene->search[i]);
+    for (size_t i = 0; i < scene->n_search; i++)
+        imp__release(scene->ctx, scene->search[i]);
     imp__release(scene->ctx, scene->search);
     imp__arena_free(&scene->arena);
 }
