@@ -116,7 +116,9 @@ static void materials(imp_context *ctx)
     phong = (struct imp__el_material){.phong = true, .kd = {0.1, 0.1, 0.1},
                                       .ks = {0.6, 0.6, 0.6}, .exponent = 15};
     const enum imp_status st = imp__el_project(ctx, &a, &b, 3, "x", &lambert);
-    tap_ok(st == IMP_OK && lambert.n == 1, "Lambert needs one function");
+    double rest = 0;
+    for (int k = 1; k < 25; k++) rest = fmax(rest, fabs(lambert.r[0][k]));
+    tap_ok(st == IMP_OK && rest < 1e-14, "Lambert needs one function # rest %.1e", rest);
     for (int c = 0; c < 3; c++)
         tap_near(lambert.r[c][0], 2 * lambert.kd[c], 1e-14, 0, "R_00 = 2 kd");
     tap_ok(imp__el_project(ctx, &a, &b, 1, "x", &phong) == IMP_OK && phong.n == 45,
