@@ -6,7 +6,9 @@
 packages=(meson ninja-build gcc libc6-dev pkg-config libembree-dev libopenexr-dev libnlopt-dev
     libpng-dev libjpeg-dev libexpat1-dev zlib1g-dev)
 
-say() { printf '\033[1m%s\033[0m\n' "== $*" >&2; }
+say() {
+    if [[ -t 2 ]]; then printf '\033[1m== %s\033[0m\n' "$*" >&2; else echo "== $*" >&2; fi
+}
 die() { printf '%s\n' "$0: $*" >&2; exit 1; }
 
 # install_packages NAME...: with apt, asking for sudo only if not root.
@@ -42,4 +44,10 @@ configure() {
         { cat "$folder.log" >&2; die "meson could not configure $folder"; }
     rm -f "$folder.log"
 }
-build() { ninja -C "$1" >"$1/ninja.log" 2>&1 || { tail -n 40 "$1/ninja.log" >&2; die "$1 does not build"; }; }
+# build FOLDER [target...]
+build() {
+    local folder=$1
+    shift
+    ninja -C "$folder" "$@" >"$folder/ninja.log" 2>&1 ||
+        { tail -n 40 "$folder/ninja.log" >&2; die "$folder does not build"; }
+}
