@@ -27,33 +27,24 @@ struct fresh {
     int channels;
 };
 
-static bool sample_radiance(const void *payload, struct imp_arena *arena, int x, int y,
-                            int64_t sample, double *value, double *px, double *py)
-{
-    const struct imp_tracer *tracer = payload;
-    struct imp_walk walk;
-    imp__walk_trace(tracer, arena, x, y, sample, &walk);
-    for (int c = 0; c < tracer->scene->channels; c++) value[c] = walk.L[c];
-    *px = walk.px;
-    *py = walk.py;
-    return walk.dropped == IMP_DROP_NONE;
-}
-
-struct tangent {
+/* What pictures are made of: radiance, or its derivative along x_dot. */
+struct sampled {
     struct imp_tracer tracer;
-    const double *x_dot;
+    const double *x_dot;   /* NULL: radiance */
+    bool *no_memory;
 };
 
-static bool sample_derivative(const void *payload, struct imp_arena *arena, int x, int y,
-                              int64_t sample, double *value, double *px, double *py)
+static bool sample(const void *payload, struct imp_arena *arena, int x, int y, int64_t index,
+                   double *value, double *px, double *py)
 {
-    const struct tangent *t = payload;
+    const struct sampled *s = payload;
     struct imp_walk walk;
-    imp__walk_trace(&t->tracer, arena, x, y, sample, &walk);
-    const imp_spec d = imp__walk_tangent(&t->tracer, &walk, t->x_dot);
-    for (int c = 0; c < t->tracer.scene->channels; c++) value[c] = d[c];
+    imp__walk_trace(&s->tracer, arena, x, y, index, &walk);
+    const imp_spec v = s->x_dot ? imp__walk_tangent(&s->tracer, &walk, s->x_dot) : walk.L;
+    for (int c = 0; c < s->tracer.scene->channels; c++) value[c] = v[c];
     *px = walk.px;
     *py = walk.py;
+    if (walk.dropped == IMP_DROP_MEMORY) __atomic_store_n(s->no_memory, true, __ATOMIC_RELAXED);
     return walk.dropped == IMP_DROP_NONE;
 }
 
@@ -75,15 +66,17 @@ static enum imp_status functional(struct fresh *f, const double *x_dot, uint64_t
 {
     const struct imp_sensor *sensor = f->check->tracer.sensor;
     struct imp_run run = f->check->run;
-    struct tangent t = {f->check->tracer, x_dot};
+    bool no_memory = false;
+    struct sampled t = {f->check->tracer, x_dot, &no_memory};
     struct imp_picture picture = {sensor, "check", f->channels == 3 ? "R,G,B" : "Y",
-                                  f->channels, x_dot ? sample_derivative : sample_radiance,
-                                  x_dot ? (void *)&t : (void *)&t.tracer, NULL};
+                                  f->channels, sample, &t, NULL};
     imp_film *film = NULL;
     if (!x_dot) t.tracer.active = NULL;
     run.spp = batch_spp(f);
     run.seed = t.tracer.seed = seed;
-    const enum imp_status st = imp__picture_make(f->check->ctx, &picture, &run, &film);
+    enum imp_status st = imp__picture_make(f->check->ctx, &picture, &run, &film);
+    if (no_memory && st == IMP_E_PATHS)
+        st = imp__error(f->check->ctx, IMP_E_NOMEM, "no memory to record a walk");
     if (st == IMP_OK) {
         *value = 0;
         for (size_t i = 0; i < imp__film_values(film); i++) *value += f->pattern[i] * film->mean[i];

@@ -94,6 +94,11 @@ static void list_add(struct imp_sink *sink, int param, size_t element, int chann
     l->at[l->n++] = (struct entry){(size_t)base + element, sum};
 }
 
+static enum imp_status no_memory(const struct imp__check *c)
+{
+    return imp__error(c->ctx, IMP_E_NOMEM, "no memory to keep %d walks", c->options.paths);
+}
+
 static enum imp_status keep_walks(struct keep *k)
 {
     enum imp_status st = IMP_OK;
@@ -107,13 +112,14 @@ static enum imp_status keep_walks(struct keep *k)
     k->walks = imp__alloc(c->ctx, wanted, sizeof *k->walks);
     for (int i = 0; i < 3; i++) k->value[i] = imp__alloc(c->ctx, wanted, sizeof(double));
     if (!k->walks || !k->value[0] || !k->value[1] || !k->value[2])
-        IMP_TRY(imp__error(c->ctx, IMP_E_NOMEM, "no memory to keep %zu walks", wanted));
+        IMP_TRY(no_memory(c));
     for (size_t t = 0; t < TRIES * wanted && k->n < wanted && k->arena.total < MEMORY_MAX; t++) {
         const uint64_t pixel = imp__mix64(t + 0x51ed270b) % pixels;
         const struct imp_arena_mark mark = imp__arena_mark(&k->arena);
         struct kept *w = &k->walks[k->n];
         imp__walk_trace(&c->tracer, &k->arena, (int)(pixel % (uint64_t)film->crop_w),
                         (int)(pixel / (uint64_t)film->crop_w), (int64_t)t, &w->walk);
+        if (w->walk.dropped == IMP_DROP_MEMORY) IMP_TRY(no_memory(c));
         list.n = 0;
         if (w->walk.dropped == IMP_DROP_NONE)
             imp__walk_sweep(&c->tracer, &w->walk, fold_bar(c), &list.sink);
@@ -127,7 +133,7 @@ static enum imp_status keep_walks(struct keep *k)
         }
         w->gradient = imp__arena_take(&k->arena, list.n + 1, sizeof *w->gradient);
         if (!w->gradient || list.failed)
-            IMP_TRY(imp__error(c->ctx, IMP_E_NOMEM, "no memory to keep %zu walks", wanted));
+            IMP_TRY(no_memory(c));
         if (list.n > 0) memcpy(w->gradient, list.at, list.n * sizeof *list.at);
         k->n++;
     }

@@ -26,6 +26,7 @@ struct sums { /* of one tile; matrices [K*K] */
     double *H, *H_same, *H_meas, *cov_g, *g;
     double objective, variance, chi2;
     uint64_t dropped;
+    bool failed; /* out of memory */
 };
 
 struct job {
@@ -91,6 +92,7 @@ static double replicate(const struct job *j, struct worker *w, struct sums *out,
         struct imp_walk walk;
         imp__walk_trace(&j->tracer, &w->arena, x, y, (int64_t)b * n + i, &walk);
         out->dropped += walk.dropped != IMP_DROP_NONE;
+        out->failed |= walk.dropped == IMP_DROP_MEMORY;
         memset(w->x, 0, K * (size_t)j->channels * sizeof(double));
         struct imp_lanes lanes = {{imp__lanes_add}, j->tracer.active, j->channels, w->x};
         imp__walk_sweep(&j->tracer, &walk, imp__lanes_adjoint(j->channels), &lanes.sink);
@@ -168,6 +170,7 @@ static enum imp_status tile_work(size_t item, int worker, int slot, void *payloa
     memset(out->H, 0, sums_bytes(K));
     out->objective = out->variance = out->chi2 = 0;
     out->dropped = 0;
+    out->failed = false;
     for (int y = t.y0; y < t.y1; y++)
         for (int x = t.x0; x < t.x1; x++) {
             double sum = 0, square = 0;
@@ -200,6 +203,8 @@ static enum imp_status tile_work(size_t item, int worker, int slot, void *payloa
                 }
             }
         }
+    if (out->failed)
+        return imp__error(j->problem->ctx, IMP_E_NOMEM, "no memory to record a walk");
     return IMP_OK;
 }
 

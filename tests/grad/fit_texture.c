@@ -1,0 +1,143 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A texture back from a picture: 24 x 24 texels of three colours, by Adam, with bounds; and
+ * what smoothness does where the picture says nothing. */
+#include <math.h>
+#include "imp_scene.h"
+#include "imp_tap.h"
+
+enum { SIDE = 24, N = SIDE * SIDE * 3 };
+
+/* A textured square under a constant sky, seen from above, two pixels a texel. */
+static imp_scene *square(imp_context *ctx, const float *pixels)
+{
+    /* A camera at z = 5 that looks along -z: turned about y by 180 degrees. */
+    static const double look[16] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 5, 0, 0, 0, 1};
+    imp_scene *s = NULL;
+    test_must(ctx, imp_scene_create(ctx, NULL, &s));
+    imp_scene_begin(s, "integrator", "path", NULL, NULL);
+    imp_scene_integer(s, "max_depth", 2);
+    imp_scene_end(s);
+    imp_scene_begin(s, "sensor", "orthographic", "camera", NULL);
+    imp_scene_transform(s, "to_world", look);
+    imp_scene_begin(s, "film", "hdrfilm", NULL, NULL);
+    imp_scene_integer(s, "width", 2 * SIDE);
+    imp_scene_integer(s, "height", 2 * SIDE);
+    imp_scene_begin(s, "rfilter", "box", NULL, NULL);
+    imp_scene_end(s);
+    imp_scene_end(s);
+    imp_scene_end(s);
+    imp_scene_begin(s, "emitter", "constant", "sky", NULL);
+    imp_scene_float(s, "radiance", 1);
+    imp_scene_end(s);
+    imp_scene_begin(s, "bsdf", "diffuse", "paint", NULL);
+    imp_scene_begin(s, "texture", "bitmap", "picture", "reflectance");
+    imp_scene_bool(s, "raw", 1);
+    imp_scene_image(s, SIDE, SIDE, 3, pixels);
+    imp_scene_end(s);
+    imp_scene_end(s);
+    imp_scene_begin(s, "shape", "rectangle", NULL, NULL);
+    imp_scene_ref(s, "paint", NULL);
+    imp_scene_end(s);
+    test_must(ctx, imp_scene_commit(s));
+    return s;
+}
+
+static double rmse(const double *x, const float *ref)
+{
+    double sum = 0, n = 0;
+    for (int i = 0; i < N; i++)
+        sum += (x[i] - ref[i]) * (x[i] - ref[i]), n++;
+    return sqrt(sum / n);
+}
+
+int main(void)
+{
+    imp_context *ctx = test_context(0);
+    static float truth[N], grey[N];
+    for (int i = 0; i < N; i++) {
+        const int x = i / 3 % SIDE, y = i / 3 / SIDE, c = i % 3;
+        truth[i] = (float)(0.5 + 0.35 * sin(0.5 * x + c) * cos(0.4 * y - c));
+        if (x < 4 && y < 4) truth[i] = c == 0; /* pure red: at both bounds */
+        grey[i] = 0.5f;
+    }
+    imp_scene *s = square(ctx, truth);
+    imp_film *film = NULL;
+    struct imp_run run = IMP_RUN_INIT;
+    run.spp = 256;
+    run.seed = 1;
+    test_must(ctx, imp_render(s, &run, &film));
+    imp_scene_destroy(s);
+
+    s = square(ctx, grey);
+    struct imp_target t = IMP_TARGET_INIT;
+    t.width = t.height = 2 * SIDE;
+    t.channels = 3;
+    t.pixels = imp_film_mean(film);
+    imp_problem *p = NULL;
+    test_must(ctx, imp_problem_create(s, &p));
+    test_must(ctx, imp_problem_activate(p, "picture.*"));
+    test_must(ctx, imp_problem_add_target(p, &t));
+    tap_ok(imp_problem_n(p) == N, "%zu numbers are active", imp_problem_n(p));
+    struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
+    const struct imp_fit_result *r = NULL;
+    static double x[N];
+    run.spp = 4;
+    run.seed = 2;
+    o.max_iterations = 150;
+    o.intervals = 1;
+    test_must(ctx, imp_fit(p, &o, &run, &r));
+    imp_problem_get_x(p, x);
+    double outside = 0;
+    for (int i = 0; i < N; i++) outside += x[i] < 0 || x[i] > 1;
+    tap_ok(rmse(x, truth) < 0.02 && outside == 0,
+           "a texture of %d numbers # rms error %.4f, from %.4f: %s", N, rmse(x, truth),
+           0.25, r->reason);
+    tap_ok(r->warning && strstr(r->warning, "256") && r->variables[0].determined,
+           "no intervals for so many # %s", r->warning);
+    tap_ok(r->history[0] > 50 * fabs(r->objective.value), "loss # from %.3g to %.3g +- %.1g",
+           r->history[0], r->objective.value, r->objective.se);
+
+    /* A third of the picture is masked: texels there stay where they were, unless a
+     * smoothness term joins them to the others. */
+    static float weights[4 * SIDE * SIDE];
+    for (int i = 0; i < 4 * SIDE * SIDE; i++) {
+        const int px = i % (2 * SIDE), py = i / (2 * SIDE);
+        weights[i] = px < 30 || py < 10;
+    }
+    t.weights = weights;
+    for (int smooth = 0; smooth < 2; smooth++) {
+        imp_problem_destroy(p);
+        imp_scene_destroy(s);
+        s = square(ctx, grey);
+        test_must(ctx, imp_problem_create(s, &p));
+        test_must(ctx, imp_problem_activate(p, "picture.*"));
+        test_must(ctx, imp_problem_add_target(p, &t));
+        if (smooth) test_must(ctx, imp_problem_add_smoothness(p, "picture.*", 0.05));
+        struct imp_estimate J;
+        static double g[N], g_se[N]; /* of the data: the smoothness term is flat at first */
+        run.spp = 64; /* enough that every texel in sight is met */
+        test_must(ctx, imp_problem_objective(p, NULL, &run, &J, g, g_se));
+        run.spp = 4;
+        o.intervals = 0;
+        o.max_iterations = 100;
+        test_must(ctx, imp_fit(p, &o, &run, &r));
+        size_t param;
+        test_must(ctx, imp_scene_find_param(s, "picture.data", &param));
+        test_must(ctx, imp_scene_get_values(s, param, x));
+        int still = 0, all = 0;
+        for (int i = 0; i < N; i++) {
+            if (g[i] != 0 || g_se[i] != 0) continue;
+            all++;
+            still += x[i] == 0.5;
+        }
+        tap_ok(all > N / 6 && (smooth ? still == 0 : still == all),
+               "behind the mask, %s # %d of %d where they were",
+               smooth ? "with smoothness all move" : "nothing moves", still, all);
+    }
+    imp_problem_destroy(p);
+    imp_film_destroy(film);
+    imp_scene_destroy(s);
+    imp_context_destroy(ctx);
+    return tap_done();
+}

@@ -1,0 +1,89 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Allocation 1, 2, 3, ... fails, in fits and checks: an error every time, nothing leaks, and
+ * the scene's numbers are what they were. */
+#include <math.h>
+#include "imp_fail_alloc.h"
+#include "imp_scene.h"
+#include "inverse_scenes.h"
+#include "imp_tap.h"
+
+enum job { FIT_ADAM, FIT_LM, FIT_LBFGS, CHECK, N_JOBS };
+static const char *const names[] = {"fit, Adam", "fit, LM and intervals", "fit, L-BFGS", "check"};
+
+/* From a new context to the result; *reached: how far it got. */
+static enum imp_status run_job(enum job job, struct fail_alloc *heap, long fail_at, int *changed)
+{
+    struct imp_context_options co = IMP_CONTEXT_OPTIONS_INIT;
+    struct imp_load_options lo = IMP_LOAD_OPTIONS_INIT;
+    imp_context *ctx = NULL;
+    imp_scene *s = NULL;
+    imp_problem *p = NULL;
+    float pixels[12 * 10 * 3];
+    co.threads = 1;
+    co.allocator = fail_alloc_hooks(heap);
+    heap->fail_at = 0;
+    if (imp_context_create(&co, &ctx) != IMP_OK) return IMP_E_NOMEM;
+    enum imp_status st = imp_scene_load_string(ctx, ball_xml, strlen(ball_xml), "ball", &lo, &s);
+    struct imp_target t = IMP_TARGET_INIT;
+    for (int i = 0; i < 360; i++) pixels[i] = 0.8f;
+    t.width = 12, t.height = 10, t.channels = 3, t.pixels = pixels;
+    double before[6], after[6];
+    /* Everything so far may allocate; what follows fails at its allocation number fail_at. */
+    heap->fail_at = fail_at ? heap->calls + fail_at : 0;
+    if (st == IMP_OK) st = imp_problem_create(s, &p);
+    if (st == IMP_OK) st = imp_problem_activate(p, "ball.*");
+    if (st == IMP_OK) st = imp_problem_add_target(p, &t);
+    if (st == IMP_OK) st = imp_problem_add_tikhonov(p, "ball.*", 0.1, 1);
+    const int ready = st == IMP_OK;
+    if (ready) imp_problem_get_x(p, before);
+    struct imp_run run = IMP_RUN_INIT;
+    run.spp = 4;
+    if (ready && job == CHECK) {
+        const struct imp_check_row *rows;
+        size_t n;
+        struct imp_check_options o = IMP_CHECK_OPTIONS_INIT;
+        o.paths = 10;
+        st = imp_check(p, &o, &run, &rows, &n);
+    } else if (ready) {
+        const struct imp_fit_result *r;
+        struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
+        o.optimizer = job == FIT_ADAM ? IMP_ADAM : job == FIT_LM ? IMP_LM : IMP_LBFGS;
+        o.max_iterations = 3;
+        o.intervals = job == FIT_LM;
+        st = imp_fit(p, &o, &run, &r);
+    }
+    *changed = 0;
+    if (ready && (st != IMP_OK || job == CHECK)) {
+        imp_problem_get_x(p, after);
+        *changed = memcmp(before, after, 3 * sizeof *before) != 0;
+    }
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+    imp_context_destroy(ctx);
+    return st;
+}
+
+int main(void)
+{
+    for (int job = 0; job < N_JOBS; job++) {
+        struct fail_alloc heap = {0};
+        int changed, bad_status = 0, leaks = 0, touched = 0;
+        long n = 0;
+        enum imp_status st = run_job(job, &heap, 0, &changed);
+        tap_ok(st == IMP_OK && heap.live == 0, "%s: works when memory lasts", names[job]);
+        for (n = 1; n < 5000; n += 1 + n / 60) {
+            heap = (struct fail_alloc){0};
+            st = run_job(job, &heap, n, &changed);
+            leaks += heap.live != 0;
+            touched += changed;
+            if (st == IMP_OK) break;
+            if (st != IMP_E_NOMEM) printf("# allocation %ld: status %d\n", n, (int)st);
+            bad_status += st != IMP_E_NOMEM;
+        }
+        tap_ok(st == IMP_OK && bad_status == 0 && leaks == 0 && touched == 0,
+               "%s: allocations up to %ld fail # %d wrong statuses, %d leaks, %d scenes changed",
+               names[job], n, bad_status, leaks, touched);
+    }
+    return tap_done();
+}
