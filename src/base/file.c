@@ -2,6 +2,7 @@
 #include "file.h"
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -146,8 +147,8 @@ enum imp_status imp__file_write(imp_context *ctx, const char *path, const void *
     }
 
     enum imp_status st = IMP_OK;
-    char *link = exists ? realpath(path, NULL) : NULL; /* write through symbolic links */
-    const char *target = link ? link : path;
+    char link[PATH_MAX]; /* write through symbolic links */
+    const char *target = exists && realpath(path, link) ? link : path;
     const size_t room = strlen(target) + 64;
     char *name = imp__alloc(ctx, room, 1);
     int fd = -1, code = 0;
@@ -166,6 +167,5 @@ enum imp_status imp__file_write(imp_context *ctx, const char *path, const void *
     if (name) folder_sync(target, name, room);
 out:
     imp__release(ctx, name);
-    free(link);
     return st;
 }
