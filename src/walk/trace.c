@@ -113,8 +113,12 @@ static void light_sample(struct step *s, struct imp_vertex *v, const struct imp_
     const int n = scene->n_emitters;
     if (n == 0) return;
     const double choice = imp__u01(key, imp__dim(s->depth, IMP_DIM_LIGHT));
-    int light = 0;
-    while (light < n - 1 && choice >= scene->light_cdf[light]) light++;
+    int light = 0, above = n - 1; /* the first whose cumulative weight exceeds choice */
+    while (light < above) {
+        const int middle = (light + above) / 2;
+        if (choice < scene->light_cdf[middle]) above = middle;
+        else light = middle + 1;
+    }
     const double pmf = light_pmf(scene, light);
     if (!(pmf > 0)) return;
 
@@ -140,14 +144,9 @@ static void light_sample(struct step *s, struct imp_vertex *v, const struct imp_
     /* Aimed from the moved origin at the point itself: a ray parallel to wi would meet a
      * concave light before its end. */
     const imp_v3 o = imp__offset(at->p, at->ng, ls.wi);
-    imp_v3 d = ls.wi;
-    double reach = INFINITY;
-    if (isfinite(ls.dist)) {
-        d = ls.p - o;
-        reach = imp__length(d);
-        d *= 1 / reach;
-        reach *= 1 - 10 * IMP_RAY_EPSILON;
-    }
+    const bool far = !isfinite(ls.dist);
+    const imp_v3 d = far ? ls.wi : ls.p - o; /* then t = 1 is the light */
+    const double reach = far ? INFINITY : 1 - 10 * IMP_RAY_EPSILON;
     if (imp__occluded(scene, &o, &d, 0, reach)) return;
 
     const bool delta = e->ops->flags & IMP_EMITTER_DELTA;

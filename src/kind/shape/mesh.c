@@ -114,6 +114,91 @@ static bool is_flat(const struct imp__mesh *m, const float *normals, size_t n)
     return true;
 }
 
+/* Edges of a triangle from its first vertex. */
+struct edges { imp_v3 e1, e2; };
+
+/* Position, normals and uv: all that a light sample needs. */
+static inline struct edges point(const struct imp__mesh *m, const struct imp_hit *hit,
+                                 struct imp_surface *out)
+{
+    const uint32_t *i = m->indices + 3 * (size_t)hit->prim;
+    const double *ng = m->face_normals + 3 * (size_t)hit->prim;
+    const double b1 = hit->u, b2 = hit->v, b0 = 1 - b1 - b2;
+    const imp_v3 p0 = load3(m->positions, i[0]);
+    const struct edges e = {load3(m->positions, i[1]) - p0, load3(m->positions, i[2]) - p0};
+    out->p = p0 + e.e1 * b1 + e.e2 * b2;
+    out->ng = imp__v3(ng[0], ng[1], ng[2]);
+    out->n = out->ng;
+    if (m->normals) {
+        const imp_v3 n = load3(m->normals, i[0]) * b0 + load3(m->normals, i[1]) * b1 +
+                         load3(m->normals, i[2]) * b2;
+        const double l = imp__length(n);
+        if (l > 1e-6) out->n = n * (1 / l);
+    }
+    /* Without uv they are the weights of the file's second and third vertex. */
+    out->uv[0] = m->reversed ? b2 : b1;
+    out->uv[1] = m->reversed ? b1 : b2;
+    if (m->uvs) {
+        const float *t0 = m->uvs + 2 * (size_t)i[0], *t1 = m->uvs + 2 * (size_t)i[1],
+                    *t2 = m->uvs + 2 * (size_t)i[2];
+        for (int k = 0; k < 2; k++)
+            out->uv[k] = t0[k] + b1 * ((double)t1[k] - t0[k]) + b2 * ((double)t2[k] - t0[k]);
+    }
+    return e;
+}
+
+/* dp_du and dp_dv, from uv where they say something. */
+static inline void slopes(const struct imp__mesh *m, const uint32_t *i, const struct edges *e,
+                          struct imp_surface *out)
+{
+    out->dp_du = m->reversed ? e->e2 : e->e1;
+    out->dp_dv = m->reversed ? e->e1 : e->e2;
+    if (!m->uvs) return;
+    const float *t0 = m->uvs + 2 * (size_t)i[0], *t1 = m->uvs + 2 * (size_t)i[1],
+                *t2 = m->uvs + 2 * (size_t)i[2];
+    const double u1 = (double)t1[0] - t0[0], v1 = (double)t1[1] - t0[1];
+    const double u2 = (double)t2[0] - t0[0], v2 = (double)t2[1] - t0[1];
+    const double det = u1 * v2 - v1 * u2;
+    /* Solve e_k = u_k dp_du + v_k dp_dv unless the uv triangle is a sliver. */
+    if (fabs(det) > 1e-12 * ((u1 * u1 + v1 * v1) + (u2 * u2 + v2 * v2))) {
+        out->dp_du = (e->e1 * v2 - e->e2 * v1) * (1 / det);
+        out->dp_dv = (e->e2 * u1 - e->e1 * u2) * (1 / det);
+    }
+}
+
+void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit, const imp_v3 *o,
+                       const imp_v3 *d, struct imp_surface *out)
+{
+    (void)o, (void)d;
+    const struct imp__mesh *m = s->self;
+    const struct edges e = point(m, hit, out);
+    slopes(m, m->indices + 3 * (size_t)hit->prim, &e, out);
+    if (m->face_tangents) {
+        const double *tangent = m->face_tangents + 3 * (size_t)hit->prim;
+        out->s = imp__v3(tangent[0], tangent[1], tangent[2]);
+        out->t = imp__cross(out->n, out->s);
+    } else {
+        imp__surface_frame(out);
+    }
+}
+
+/* Frames of a mesh whose normals are its faces': made once. */
+static enum imp_status tangents_make(const struct imp_build *b, struct imp__mesh *m, size_t n)
+{
+    double *tangents = imp__arena_take(b->arena, 3 * n, sizeof *tangents);
+    if (!tangents) return imp__node_error(b->ctx, b->node, IMP_E_NOMEM, "out of memory");
+    for (size_t k = 0; k < n; k++) {
+        const struct imp_hit hit = {.prim = (int)k};
+        struct imp_surface at;
+        const struct edges e = point(m, &hit, &at);
+        slopes(m, m->indices + 3 * k, &e, &at);
+        imp__surface_frame(&at);
+        for (int j = 0; j < 3; j++) tangents[3 * k + (size_t)j] = at.s[j];
+    }
+    m->face_tangents = tangents;
+    return IMP_OK;
+}
+
 enum imp_status imp__mesh_build(const struct imp_build *b, void *self, struct imp_shape *s,
                                 const struct imp_mesh_data *data, bool face_normals)
 {
@@ -150,68 +235,12 @@ enum imp_status imp__mesh_build(const struct imp_build *b, void *self, struct im
                                   normals));
     IMP_TRY(areas_sum(b, m, s, data->n_triangles));
     m->normals = normals && !is_flat(m, normals, data->n_triangles) ? normals : NULL;
+    if (!m->normals) IMP_TRY(tangents_make(b, m, data->n_triangles));
     s->geometry = IMP_TRIANGLES;
     s->triangles =
         (struct imp_triangles){n, data->n_triangles, m->positions, m->indices};
 out:
     return st;
-}
-
-/* Edges of a triangle from its first vertex. */
-struct edges { imp_v3 e1, e2; };
-
-/* Position, normals and uv: all that a light sample needs. */
-static inline struct edges point(const struct imp__mesh *m, const struct imp_hit *hit,
-                                 struct imp_surface *out)
-{
-    const uint32_t *i = m->indices + 3 * (size_t)hit->prim;
-    const double *ng = m->face_normals + 3 * (size_t)hit->prim;
-    const double b1 = hit->u, b2 = hit->v, b0 = 1 - b1 - b2;
-    const imp_v3 p0 = load3(m->positions, i[0]);
-    const struct edges e = {load3(m->positions, i[1]) - p0, load3(m->positions, i[2]) - p0};
-    out->p = p0 + e.e1 * b1 + e.e2 * b2;
-    out->ng = imp__v3(ng[0], ng[1], ng[2]);
-    out->n = out->ng;
-    if (m->normals) {
-        const imp_v3 n = load3(m->normals, i[0]) * b0 + load3(m->normals, i[1]) * b1 +
-                         load3(m->normals, i[2]) * b2;
-        const double l = imp__length(n);
-        if (l > 1e-6) out->n = n * (1 / l);
-    }
-    /* Without uv they are the weights of the file's second and third vertex. */
-    out->uv[0] = m->reversed ? b2 : b1;
-    out->uv[1] = m->reversed ? b1 : b2;
-    if (m->uvs) {
-        const float *t0 = m->uvs + 2 * (size_t)i[0], *t1 = m->uvs + 2 * (size_t)i[1],
-                    *t2 = m->uvs + 2 * (size_t)i[2];
-        for (int k = 0; k < 2; k++)
-            out->uv[k] = t0[k] + b1 * ((double)t1[k] - t0[k]) + b2 * ((double)t2[k] - t0[k]);
-    }
-    return e;
-}
-
-void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit, const imp_v3 *o,
-                       const imp_v3 *d, struct imp_surface *out)
-{
-    (void)o, (void)d;
-    const struct imp__mesh *m = s->self;
-    const struct edges e = point(m, hit, out);
-    out->dp_du = m->reversed ? e.e2 : e.e1;
-    out->dp_dv = m->reversed ? e.e1 : e.e2;
-    if (m->uvs) {
-        const uint32_t *i = m->indices + 3 * (size_t)hit->prim;
-        const float *t0 = m->uvs + 2 * (size_t)i[0], *t1 = m->uvs + 2 * (size_t)i[1],
-                    *t2 = m->uvs + 2 * (size_t)i[2];
-        const double u1 = (double)t1[0] - t0[0], v1 = (double)t1[1] - t0[1];
-        const double u2 = (double)t2[0] - t0[0], v2 = (double)t2[1] - t0[1];
-        const double det = u1 * v2 - v1 * u2;
-        /* Solve e_k = u_k dp_du + v_k dp_dv unless the uv triangle is a sliver. */
-        if (fabs(det) > 1e-12 * ((u1 * u1 + v1 * v1) + (u2 * u2 + v2 * v2))) {
-            out->dp_du = (e.e1 * v2 - e.e2 * v1) * (1 / det);
-            out->dp_dv = (e.e2 * u1 - e.e1 * u2) * (1 / det);
-        }
-    }
-    imp__surface_frame(out);
 }
 
 bool imp__mesh_sample(const struct imp_shape *s, const imp_v3 *ref, const double u[2],

@@ -97,6 +97,8 @@ struct imp__mesh {
     size_t last;        /* the last triangle that has area */
     double inv_area;
     const double *face_normals;  /* [3 n_triangles], 0 0 1 of those without area */
+    const double *face_tangents; /* [3 n_triangles] s of the shading frame of flat meshes,
+                                    where it does not vary over a triangle; else NULL */
 };
 void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit, const imp_v3 *o,
                        const imp_v3 *d, struct imp_surface *out);
