@@ -144,6 +144,11 @@ struct imp_bsdf_ops {
     /* Rewrite the node before its inputs are read: named presets become numbers. May be
      * NULL. */
     enum imp_status (*prepare)(const struct imp_build *build);
+
+    /* What the aov `albedo` shows: the reflectance of a diffuse surface or base colour, from
+     * either side. NULL: pi f for light along the normal. */
+    void (*albedo)(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
+                   imp_spec *albedo);
 };
 
 /* ---- Texture ---------------------------------------------------------------------- */

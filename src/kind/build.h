@@ -30,6 +30,10 @@ extern const struct imp_emitter_ops *const imp__emitter_kinds[];
 extern const struct imp_sensor_ops *const imp__sensor_kinds[];
 extern const struct imp_filter_ops *const imp__filter_kinds[];
 
+/* The material's albedo, or its stand-in (imp_bsdf_ops.albedo). */
+void imp__bsdf_albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
+                      imp_spec *albedo);
+
 /* Inputs at a point (src/kind/texture/input.c). in [n]. */
 void imp__inputs_eval(const struct imp_input *const *input, int n,
                       const struct imp_texcoord *at, imp_spec *in);

@@ -189,19 +189,17 @@ static void uv_slope(const struct imp_measure *m, double px, double py, const do
     duv[1] = det > 0 && isfinite(t) ? (a * s - b * r) / det : 0;
 }
 
-/* pi f(wi = z, wo): the albedo of a diffuse surface, and a stand-in for the others. */
 static imp_spec albedo(const struct imp_measure *m, const struct imp_hit *hit,
                        const struct imp_surface *at, imp_v3 d)
 {
     const struct imp_bsdf *b = imp__shape_bsdf(m->scene, m->scene->shapes[hit->shape]);
     const struct imp_texcoord where = {{at->uv[0], at->uv[1]}, at->p};
     const struct imp_frame frame = {at->s, at->t, at->n};
-    imp_spec in[32], f;
-    if (!(b->flags & IMP_BSDF_SMOOTH)) return (imp_spec){0};
+    const imp_v3 wo = imp__to_local(&frame, -d);
+    imp_spec in[32], rho;
     imp__inputs_eval(b->input, b->n_in, &where, in);
-    const struct imp_dirs dirs = {imp__to_local(&frame, -d), {0, 0, 1, 0}, IMP_SMOOTH};
-    b->ops->eval(b, in, &dirs, &f);
-    return f * IMP_PI;
+    imp__bsdf_albedo(b, in, &wo, &rho);
+    return rho;
 }
 
 static int aov_value(const struct imp_measure *m, const struct imp_integrator *top,
@@ -244,6 +242,16 @@ static int aov_value(const struct imp_measure *m, const struct imp_integrator *t
     return n;
 }
 
+/* Alpha (scene-format 11): an environment in sight makes every path valid; direct asks for a
+ * surface at the first hit. */
+static double walk_alpha(const struct imp_measure *m, const struct imp_integrator *integrator,
+                         const struct imp_walk *walk)
+{
+    if (integrator->kind == IMP_INTEGRATOR_DIRECT) return walk->first && walk->first->shape;
+    const bool sky = m->scene->environment >= 0 && !integrator->hide_emitters;
+    return walk->valid || (sky && integrator->max_depth != 0);
+}
+
 /* Radiance and alpha of one integrator, on the same random numbers as the others. */
 static bool radiance(const struct imp_measure *m, const struct imp_integrator *integrator,
                      struct imp_arena *arena, int x, int y, int64_t sample, imp_spec *L,
@@ -253,9 +261,9 @@ static bool radiance(const struct imp_measure *m, const struct imp_integrator *i
     if (is_radiance(integrator)) {
         const struct imp_arena_mark mark = imp__arena_mark(arena);
         imp__walk_trace(&tracer, arena, x, y, sample, walk);
-        imp__arena_rewind(arena, mark);
         *L = walk->L;
-        *alpha = walk->valid;
+        *alpha = walk_alpha(m, integrator, walk);
+        imp__arena_rewind(arena, mark);
         return walk->dropped == IMP_DROP_NONE;
     }
     /* depth: the walk's film position and lens, its first hit only */

@@ -2,6 +2,7 @@
  *
  * The materials: one line a kind (docs/kinds.md). */
 #include "kind/build.h"
+#include "math/vec.h"
 
 #define BSDFS(X)                                                                           \
     X(imp__conductor)                                                                      \
@@ -16,3 +17,16 @@
 BSDFS(DECLARE)
 #define ADDRESS(kind) &kind,
 const struct imp_bsdf_ops *const imp__bsdf_kinds[] = {BSDFS(ADDRESS) NULL};
+
+void imp__bsdf_albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
+                      imp_spec *albedo)
+{
+    const struct imp_dirs dirs = {*wo, imp__v3(0, 0, 1), IMP_SMOOTH};
+    *albedo = imp__spec(0);
+    if (b->ops->albedo) {
+        b->ops->albedo(b, in, wo, albedo);
+    } else if (b->flags & IMP_BSDF_SMOOTH) {
+        b->ops->eval(b, in, &dirs, albedo);
+        *albedo *= IMP_PI;
+    }
+}

@@ -38,7 +38,14 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     (void)b, (void)in;
     df[RHO] = imp__spec(imp__lambert(d));
 }
+static void albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
+                   imp_spec *rho)
+{
+    (void)b, (void)wo;
+    *rho = in[RHO];
+}
 
 const struct imp_bsdf_ops imp__diffuse = {
     .size = sizeof(struct imp_bsdf_ops), .name = "diffuse", .inputs = inputs,
-    .sample = sample, .eval = eval, .pdf = pdf, .eval_d = eval_d};
+    .sample = sample, .eval = eval, .pdf = pdf, .eval_d = eval_d,
+    .albedo = albedo};

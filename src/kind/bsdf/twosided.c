@@ -107,6 +107,15 @@ static bool sample_d(const struct imp_bsdf *b, const imp_spec *in, const double 
     *dwi = flip(*dwi, back);
     return true;
 }
+static void albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
+                   imp_spec *rho)
+{
+    bool back;
+    int first;
+    const struct imp_bsdf *c = side(b, wo, &back, &first);
+    const imp_v3 w = flip(*wo, back);
+    imp__bsdf_albedo(c, in + first, &w, rho);
+}
 
 static const struct imp_input_desc inputs[] = {{0}};
 
@@ -114,4 +123,5 @@ const struct imp_bsdf_ops imp__twosided = {
     .size = sizeof(struct imp_bsdf_ops), .name = "twosided", .inputs = inputs,
     .min_children = 1, .max_children = 2, .build = build,
     .sample = sample, .eval = eval, .pdf = pdf, .eval_d = eval_d,
-    .emit = emit, .emit_d = emit_d, .sample_d = sample_d};
+    .emit = emit, .emit_d = emit_d, .sample_d = sample_d,
+    .albedo = albedo};
