@@ -37,7 +37,7 @@ static void run_all(int threads, imp_scene *(*make)(imp_context *), bool few,
     imp_problem *p = test_problem(ctx, scene, "*");
     struct imp_run run = IMP_RUN_INIT;
     imp_film *film;
-    struct imp_film_info info;
+    struct imp_film_info info = {.size = sizeof info};
     run.spp = 20;
     run.seed = 3;
     test_must(ctx, imp_render(scene, &run, &film));
