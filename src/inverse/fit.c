@@ -7,6 +7,7 @@
 #include <string.h>
 
 #define REPLICATES 6     /* independent normal equations behind intervals */
+#define EFFORT_SHARE 4   /* they take at least 1/4 of the samples that the search took */
 #define FINAL_SEED 0x40000001
 
 /* Evaluate what the search found with random numbers that it has not seen. */
@@ -16,9 +17,20 @@ static enum imp_status final_objective(struct imp__fit *f, const double *x,
     return f->goal.eval(x, imp__search_seed(&f->goal, FINAL_SEED, 0), out, NULL, NULL, f);
 }
 
+/* Samples per pixel of each replicate. A search that averaged many evaluations with few
+ * samples (Adam) knows more than a few more of them could tell. */
+static int replicate_spp(const struct imp__fit *f, const struct imp__search *s)
+{
+    const struct imp_problem *p = f->problem;
+    const int spp = f->outer.spp > 0 ? f->outer.spp
+                                     : p->scene->sensors[p->targets[0].desc.sensor]->spp;
+    const double wanted = (double)spp * s->iteration / (EFFORT_SHARE * REPLICATES);
+    return wanted > spp ? (int)fmin(wanted, 1 << 24) : f->outer.spp;
+}
+
 /* Covariance, intervals, and the last Newton step that belongs to them. *why: the reason
  * when there are none. */
-static enum imp_status intervals(struct imp__fit *f, double *x,
+static enum imp_status intervals(struct imp__fit *f, const struct imp__search *s, double *x,
                                  struct imp_fit_variable *variables,
                                  struct imp__uncertainty *u, const char **why)
 {
@@ -27,6 +39,7 @@ static enum imp_status intervals(struct imp__fit *f, double *x,
         *why = "they are for at most 256 numbers";
         return IMP_OK;
     }
+    f->run.spp = replicate_spp(f, s);
     const enum imp_status st = imp__covariance(&f->goal, x, REPLICATES, variables, u);
     if (st == IMP_OK) memcpy(x, u->x, f->problem->n * sizeof *x);
     if (st != IMP_E_NUMERIC && st != IMP_E_UNSUPPORTED) return st;
@@ -116,7 +129,9 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
     if (s->n_history > 0)
         objective = (struct imp_estimate){s->history[s->n_history - 1],
                                           s->history_se[s->n_history - 1], 0};
-    if (ended == IMP_OK && f.options.intervals) ended = intervals(&f, x, variables, &u, &why);
+    f.final_calls = 0;
+    f.final_total = f.options.intervals && p->n <= IMP_DENSE_MAX ? REPLICATES + 3 : 1;
+    if (ended == IMP_OK && f.options.intervals) ended = intervals(&f, s, x, variables, &u, &why);
     if (ended == IMP_OK) ended = final_objective(&f, x, &objective);
     if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
     IMP_TRY(imp_problem_set_x(p, x));

@@ -23,6 +23,8 @@ struct imp__fit {
     double start_s, deadline_s;          /* deadline 0: none */
     double last_report_s, last_checkpoint_s, checkpoint_cost_s;
     double fraction;
+    double search_share;                 /* of the work, the rest is what comes after it */
+    int final_calls, final_total;        /* evaluations after the search; total 0: not there */
     int first_iteration;                 /* of this call: not 0 when continued */
     bool stopped;                        /* by the caller or the deadline */
     char note[96];

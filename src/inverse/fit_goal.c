@@ -35,7 +35,11 @@ static int inner_progress(const struct imp_progress *p, void *payload)
 {
     struct imp__fit *f = payload;
     const double done = f->search ? f->search->iteration : 0;
-    report(f, 0.98 * (done + 0.5 * p->fraction) / f->options.max_iterations);
+    if (f->final_total > 0)
+        report(f, f->search_share + (0.999 - f->search_share)
+                                        * (f->final_calls - 1 + p->fraction) / f->final_total);
+    else
+        report(f, f->search_share * (done + 0.5 * p->fraction) / f->options.max_iterations);
     return f->stopped;
 }
 
@@ -54,7 +58,7 @@ static enum imp_status iterated(const struct imp__search *s, void *payload)
         f->last_checkpoint_s = imp__now();
         f->checkpoint_cost_s = f->last_checkpoint_s - now;
     }
-    report(f, 0.98 * s->iteration / f->options.max_iterations);
+    report(f, f->search_share * s->iteration / f->options.max_iterations);
     return f->stopped ? IMP_CANCELLED : IMP_OK;
 }
 
@@ -65,6 +69,7 @@ static enum imp_status eval(const double *x, uint64_t seed, struct imp_estimate 
 {
     struct imp__fit *fit = payload;
     fit->run.seed = seed;
+    fit->final_calls++;
     return imp_problem_objective(fit->problem, x, &fit->run, f, g, g_se);
 }
 
@@ -76,6 +81,7 @@ static enum imp_status normal(const double *x, uint64_t seed, struct imp__normal
     struct imp__gauss_newton gn = {.H = out->H, .H_same = out->H_same, .H_meas = out->H_meas,
                                    .g = out->g, .g_se = fit->g_se, .cov_g = out->cov_g};
     fit->run.seed = seed;
+    fit->final_calls++;
     const enum imp_status st = imp__gauss_newton(fit->problem, x, &fit->run, &gn);
     if (st != IMP_OK) return st;
     out->f = gn.objective;
@@ -230,6 +236,7 @@ enum imp_status imp__fit_begin(struct imp_problem *p, const struct imp_fit_optio
     f.start_s = imp__now();
     f.last_checkpoint_s = f.start_s;
     f.deadline_s = f.outer.time_limit_s > 0 ? f.start_s + f.outer.time_limit_s : 0;
+    f.search_share = f.options.intervals && n <= IMP_DENSE_MAX ? 0.7 : 0.98;
     f.run = f.outer;
     f.run.time_limit_s = 0;
     fingerprint(&f);
