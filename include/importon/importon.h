@@ -118,7 +118,9 @@ struct imp_progress {
 };
 
 /** Called from one thread at a time, a few times a second. Non-zero asks to stop: the call
- * in progress returns IMP_CANCELLED and its outputs hold valid results of what was done. */
+ * in progress returns IMP_CANCELLED. Pictures then hold the samples taken so far and fits the
+ * state reached, both valid; a loss or gradient of a part of the picture would mean nothing,
+ * so those outputs keep their contents. */
 typedef int (*imp_progress_fn)(const struct imp_progress *progress, void *payload);
 
 /* ---- Scenes ---------------------------------------------------------------------- */
@@ -310,7 +312,8 @@ struct imp_run {
     int sensor;             /**< index; default 0 */
     int spp;                /**< samples per pixel; 0: what the scene asks for */
     uint64_t seed;
-    double time_limit_s;    /**< 0: none. Reached: stops after a whole pass, as if cancelled */
+    double time_limit_s;    /**< pictures: 0: none; else samples are taken until then (every
+                                 pixel gets at least one pass), at most spp if that is given */
     double drop_budget;     /**< fraction of walks that may be dropped; 0: 1e-4 */
     imp_progress_fn progress;
     void *progress_payload;
