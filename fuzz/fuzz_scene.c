@@ -174,7 +174,7 @@ static void use(imp_context *ctx, imp_scene *s)
     run.spp = 4;
     run.drop_budget = 1; /* absurd scenes drop walks; that is not what is looked for */
     if (imp_render(s, &run, &film) != IMP_OK) return;
-    struct imp_film_info info;
+    struct imp_film_info info = {.size = sizeof info};
     imp_film_get_info(film, &info);
     const size_t values = (size_t)info.width * info.height * info.channels;
     for (size_t k = 0; k < values; k++)

@@ -13,7 +13,7 @@ die() { printf '%s\n' "$0: $*" >&2; exit 1; }
 
 # install_packages NAME...: with apt, asking for sudo only if not root.
 install_packages() {
-    local missing=() name as_root=()
+    local missing=() name log as_root=()
     if ! command -v dpkg-query >/dev/null; then
         command -v meson >/dev/null ||
             die "this is no Debian: install by hand what these are called there: $*"
@@ -29,10 +29,12 @@ install_packages() {
         command -v sudo >/dev/null || die "not root, and no sudo: install ${missing[*]}"
         as_root=(sudo)
     fi
-    "${as_root[@]}" apt-get update -qq >&2 || true # an old list may still do
+    log=$(mktemp)
+    "${as_root[@]}" apt-get update -qq >"$log" 2>&1 || true # an old list may still do
     "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive \
-        apt-get install -y -qq --no-install-recommends "${missing[@]}" >&2 ||
-        die "apt-get could not install ${missing[*]}"
+        apt-get install -y -qq --no-install-recommends "${missing[@]}" >>"$log" 2>&1 ||
+        { cat "$log" >&2; die "apt-get could not install ${missing[*]}"; }
+    rm -f "$log"
 }
 
 # configure FOLDER [meson options]: once; later calls only build.
