@@ -311,6 +311,11 @@ static void threads(void)
     tap_ok(!memcmp(x[0], x[1], sizeof x[0]), "one thread and three: the same bits");
 }
 
+static void test_back(imp_problem *p, const double *x)
+{
+    if (imp_problem_set_x(p, x) != IMP_OK) printf("# %s\n", imp_last_error(ctx));
+}
+
 static void arguments(void)
 {
     imp_scene *s = scene_open(ctx, ball_xml, IMP_RGB);
@@ -338,6 +343,21 @@ static void arguments(void)
     tap_ok(!memcmp(before, after, sizeof before) && r == NULL, "a failure leaves the scene as it was");
     o.checkpoint = NULL;
     struct imp_run run = run_of(4, 1);
+
+    /* NLopt's callback: the objective of the run that was set, or HUGE_VAL. */
+    struct imp_estimate J;
+    double g[3], g2[3];
+    imp_problem_set_run(p, &run);
+    enum imp_status st = imp_problem_objective(p, before, &run, &J, g, NULL);
+    tap_ok(st == IMP_OK && imp_problem_nlopt(3, before, g2, p) == J.value
+           && !memcmp(g, g2, sizeof g) && imp_problem_nlopt(3, before, NULL, p) == J.value,
+           "the callback is the objective");
+    const double outside[3] = {0.5, 2, 0.5};
+    tap_ok(imp_problem_nlopt(4, before, NULL, p) == HUGE_VAL
+           && imp_problem_nlopt(3, outside, NULL, p) == HUGE_VAL, "and HUGE_VAL where it fails # %s",
+           imp_last_error(ctx));
+    test_back(p, before);
+
     run.time_limit_s = 1e-9;
     tap_ok(imp_fit(p, &o, &run, &r) == IMP_CANCELLED && r && strstr(r->reason, "time"),
            "time limit # %s", r ? r->reason : "");
