@@ -74,11 +74,9 @@ void imp__params_free(struct imp_params *p)
 enum imp_status imp__params_default(struct imp_params *p, const char *name,
                                     const char *value)
 {
-    struct imp_variable *old = find(p, name, strlen(name));
-    if (!old) return add(p, name, strlen(name), value, false);
-    if (old->given) return IMP_OK;
-    old->value = imp__arena_strdup(&p->arena, value);
-    return old->value ? IMP_OK : no_memory(p->ctx);
+    /* The first one counts: a file sets the defaults of what it includes. */
+    if (find(p, name, strlen(name))) return IMP_OK;
+    return add(p, name, strlen(name), value, false);
 }
 
 static struct imp_variable *match(struct imp_params *p, const char *text)

@@ -15,7 +15,7 @@ static struct result measure(imp_scene *scene, imp_problem *p, int spp, uint64_t
 {
     struct result r = {0};
     struct imp_run run = IMP_RUN_INIT;
-    struct imp_film_info info;
+    struct imp_film_info info = {.size = sizeof info};
     imp_film *film;
     run.spp = spp;
     run.seed = seed;

@@ -134,6 +134,7 @@ static void check_parameters(void)
     struct imp_scene s;
     enum imp_status st =
         parse(IN("<default name='n' value='3'/><default name='a' value='short'/>"
+                 "<default name='a' value='later'/>"
                  "<integer name='i' value='$n'/><string name='s' value='$abc \\$ $a.'/>"
                  "<shape type='sphere'><transform name='t'><scale "
                  "x='$n'/></transform></shape>"),
@@ -142,7 +143,7 @@ static void check_parameters(void)
     if (st == IMP_OK) {
         tap_ok(imp__node_prop(s.root, "i")->integer == 7, "the caller's value wins");
         tap_ok(strcmp(imp__node_prop(s.root, "s")->string, "xc $ short.") == 0,
-               "the longest name first # %s", imp__node_prop(s.root, "s")->string);
+               "the longest name first; the first default counts # %s", imp__node_prop(s.root, "s")->string);
         tap_ok(imp__node_prop(child(s.root, 0), "t")->number[0] == 7,
                "inside transforms");
     }
