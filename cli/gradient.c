@@ -149,7 +149,8 @@ static int compute(imp_problem *problem, const struct imp_run *run, struct resul
 
 /* ---- Answers ---------------------------------------------------------------------------- */
 
-/* A texture's gradient as a picture: [h][w] or [h][w][1 or 3]. Others are a row. */
+/* A texture's gradient as a picture, [h][w] or [h][w][1 or 3], with its standard errors as
+ * further channels. Others are a row. */
 static int write_block(const struct block *b, const struct result *r, char **path)
 {
     const struct imp_param_info *p = &b->info;
@@ -158,21 +159,22 @@ static int write_block(const struct block *b, const struct result *r, char **pat
     const size_t width = p->n_dims >= 2 && !(p->n_dims == 2 && channels == 3)
                              ? p->dims[1] : b->n / channels;
     const size_t height = b->n / channels / (width ? width : 1);
-    struct picture_options o = {.standard_error = 1, .diverging = 1};
+    const struct picture_options o = {.diverging = 1};
     const struct imp_run run = cli_run();
     imp_film *film = NULL;
     char name[512];
     snprintf(name, sizeof name, "%s.exr", p->name);
     *path = join_path(cli.out, name);
     enum imp_status st = imp_film_create(cli.context, (int)width, (int)height,
-                                         channels == 3 ? "R,G,B" : "Y", &film);
+                                         channels == 3 ? "R,G,B,se.R,se.G,se.B" : "Y,se.Y",
+                                         &film);
     if (st != IMP_OK) return cli_fail(st, *path);
-    float *mean = imp_film_mean(film), *se = imp_film_se(film);
+    float *value = imp_film_mean(film);
     for (size_t i = 0; i < b->n; i++) {
-        mean[i] = (float)r->grad[b->first + i];
-        if (se) se[i] = (float)r->se[b->first + i];
+        float *pixel = value + i / channels * 2 * channels;
+        pixel[i % channels] = (float)r->grad[b->first + i];
+        pixel[channels + i % channels] = (float)r->se[b->first + i];
     }
-    o.standard_error = se != NULL;
     picture_stamp(film, &run);
     const int rc = picture_write(film, *path, &o);
     imp_film_destroy(film);
