@@ -383,8 +383,9 @@ struct imp_bend_target {
 #define IMP_BEND_TARGET_INIT                                                               \
     {sizeof(struct imp_bend_target), IMP_BEND_FOCUS, -1, -1, 0, 0, {0, 0, 1}, 0, 1, {0}, 0, \
      0, 0, 0, {0}, {0}, {0}, 0}
-/** Rays on a plane at a slant below 0.05 do not count, between 0.05 and 0.15 they count less
- * and less: a smooth weight, differentiated. */
+/** A plane's normal is turned to look along the rays' first directions. Rays that meet it at
+ * a slant (cosine) below 0.05, or go backwards, do not count; between 0.05 and 0.15 they count
+ * less and less: a smooth weight, differentiated. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_add_target(imp_bend *bend,
                                                            const struct imp_bend_target *t);
 
@@ -463,6 +464,21 @@ struct imp_bend_fit_result {
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_fit(imp_bend *bend,
                                                     const struct imp_bend_fit_options *options,
                                                     struct imp_bend_fit_result *result);
+
+/**
+ * Check a problem as it stands: splat against tangent ("transpose"), reverse against forward
+ * ("dot"), the gradient against central differences of steps 1e-2 to 1e-8 ("difference"),
+ * reversal, energy, and the error of the step by halving it ("step": value is the rms change
+ * of exits, reference the change at half the step, error the error left). Rows belong to the
+ * bend until its next check. @return IMP_OK also when rows fail: look at `ok`.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status imp_bend_check(imp_bend *bend,
+                                                      const struct imp_check_row **rows,
+                                                      size_t *n_rows);
+/** Error of exits by the step, from up to `pilots` rays traced with t, t/2, t/4: rms over
+ * rays, and the order seen (0: not to be seen). Outputs may be NULL. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_bend_step_error(imp_bend *bend, size_t pilots,
+                                                           double *error, double *order);
 
 /** A bend from a file: <scene> with a <medium type="graded">, <rays> and <target>s
  * (docs/curved-rays.md). options may be NULL. */

@@ -34,7 +34,7 @@ void imp_bend_destroy(imp_bend *b)
     for (size_t i = 0; i < b->n_sdfs; i++) imp_field_destroy(b->sdfs[i]);
     void *const owned[] = {b->surfaces, b->taps, b->x, b->d, b->power, b->group,
                            b->bundle_first, b->targets, b->holds, b->smooths, b->sdfs,
-                           b->history};
+                           b->history, b->rows};
     for (size_t i = 0; i < imp_count(owned); i++) imp__release(ctx, owned[i]);
     imp_field_destroy(b->field);
     imp__release(ctx, b);
@@ -197,8 +197,12 @@ enum imp_status imp_bend_add_target(imp_bend *b, const struct imp_bend_target *d
     imp_v3 normal = imp__v3_load(desc->normal);
     const double length = imp__length(normal);
     if (desc->at_plane) {
-        imp__v3_store(normal * (1 / length), t.desc.normal);
-        t.desc.offset /= length;
+        double along = 0; /* the normal looks the way the rays go */
+        for (size_t i = t.first; i < t.last; i++)
+            along += imp__dot(normal, imp__normalize(imp__v3_load(b->d[i])));
+        const double k = along < 0 ? -1 / length : 1 / length;
+        imp__v3_store(normal * k, t.desc.normal);
+        t.desc.offset *= k;
     }
     for (size_t i = t.first; i < t.last; i++) t.power += b->power[i];
     if (!(t.power > 0)) IMP_TRY(imp__error(ctx, IMP_E_ARG, "target of rays without power"));

@@ -52,6 +52,8 @@ struct imp_bend {
     imp_field **sdfs;              /* owned, made by the loader */
     size_t n_sdfs, cap_sdfs;
 
+    struct imp_check_row *rows;    /* of the last check */
+    size_t n_rows, cap_rows;
     double *history;               /* of the last fit */
     size_t n_history, cap_history;
 };

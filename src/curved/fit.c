@@ -6,6 +6,7 @@
  * (curved-rays 3.4). Adam's rate is halved explicitly. */
 #include "bend.h"
 #include "inverse/checkpoint.h"
+#include "lbfgs.h"
 #include <stdio.h>
 #include <string.h>
 
@@ -172,7 +173,8 @@ static enum imp_status level_run(struct fit *f, bool resume, bool *found, const 
         if (!*found) goto out;
     }
     f->best_value = INFINITY;
-    ended = imp__optimize(&f->goal, &f->opt, s);
+    ended = f->o->optimizer == IMP_LBFGS ? imp__lbfgs(&f->goal, &f->opt, s)
+                                         : imp__optimize(&f->goal, &f->opt, s);
     if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
     IMP_TRY(theta_set(f, s->x));
     *reason = s->reason ? s->reason : ended == IMP_CANCELLED ? "stopped" : "all iterations done";

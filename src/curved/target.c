@@ -26,7 +26,7 @@ bool imp__arrive(const struct imp_bend_target *t, const struct imp_bend_exit *e,
     if (!t->at_plane) return true;
     const imp_v3 n = imp__v3_load(t->normal);
     const double nv = imp__dot(n, a->v);
-    a->weight = slant_weight(fabs(nv) / speed, &a->slope);
+    a->weight = slant_weight(nv / speed, &a->slope); /* backwards does not count */
     if (a->weight == 0) return false;
     a->s = (t->offset - imp__dot(n, a->x)) / nv;
     a->x += a->s * a->v;
@@ -47,8 +47,8 @@ void imp__arrive_vjp(const struct imp_bend_target *t, const struct imp__arrival 
         const double s_bar = imp__dot(x_bar, a->v) + path_bar * t->outside * t->outside;
         cx -= n * (s_bar / nv);
         cv += a->s * x_bar - n * (a->s * s_bar / nv);
-        const double c = fabs(nv) / speed, c_bar = weight_bar * a->slope;
-        cv += (n * copysign(1 / speed, nv) - a->d * (c / speed)) * c_bar;
+        const double c = nv / speed, c_bar = weight_bar * a->slope;
+        cv += (n - a->d * c) * (c_bar / speed);
     }
     for (int k = 0; k < 3; k++) bar->x[k] += cx[k], bar->v[k] += cv[k];
     bar->path += path_bar;

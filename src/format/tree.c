@@ -40,7 +40,8 @@ bool imp__is_object_tag(const char *tag)
 {
     static const char *const tags[] = {
         "scene",   "bsdf",    "emitter", "film",  "integrator", "medium", "phase",
-        "rfilter", "sampler", "sensor",  "shape", "texture",    "volume", "spectrum"};
+        "rfilter", "sampler", "sensor",  "shape", "texture",    "volume", "spectrum",
+        "rays",    "surface", "target"}; /* of bent rays */
     for (size_t i = 0; i < imp_count(tags); i++)
         if (strcmp(tags[i], tag) == 0) return true;
     return false;

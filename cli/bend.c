@@ -1,0 +1,378 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * importon bend: rays in graded indices. trace, check, fit and view work on one file with
+ * field, rays and targets (docs/curved-rays.md). */
+#include "bend.h"
+#include "picture.h"
+#include "plot.h"
+#include "progress.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char *const optimizer_words[] = {"lbfgs", "adam", "mma", NULL};
+
+static struct {
+    int optimizer, levels, resume;
+    const char *iterations, *checkpoint;
+    double learning_rate, tolerance, scale;
+} o;
+
+static const struct arg_option options[] = {
+    {ARG_CHOICE, 0, "optimizer", "NAME", "fit: lbfgs (default), adam or mma", &o.optimizer, 0, 0,
+     optimizer_words},
+    {ARG_INT, 0, "levels", "N", "fit: grids are refined N - 1 times (default 1)", &o.levels, 1,
+     IMP_BEND_LEVELS_MAX, NULL},
+    {ARG_TEXT, 0, "iterations", "N[,N..]", "fit: of each level (default 50)", &o.iterations, 0, 0,
+     NULL},
+    {ARG_NUMBER, 0, "learning-rate", "X", "fit, adam: of the scale (default 0.05), halved at "
+     "each level", &o.learning_rate, 1e-12, 1e3, NULL},
+    {ARG_NUMBER, 0, "tolerance", "X", "fit: stop when steps stay below, of the scale (1e-6)",
+     &o.tolerance, 1e-300, 1, NULL},
+    {ARG_NUMBER, 0, "scale", "X", "fit: a large change of an index (default 0.1)", &o.scale, 1e-12,
+     1e12, NULL},
+    {ARG_TEXT, 0, "checkpoint", "FILE", "fit: write the state there every few seconds",
+     &o.checkpoint, 0, 0, NULL},
+    {ARG_FLAG, 0, "resume", NULL, "fit: go on from the checkpoint", &o.resume, 0, 0, NULL},
+    {0}};
+
+static const struct arg_option options_file[] = {
+    {ARG_LIST, 'D', "define", "NAME=VALUE", "set a $parameter of the file", &cli.defines, 0, 0,
+     NULL},
+    {ARG_TEXT, 'a', "search", "DIR", "one more folder to look for files in", &cli.search, 0, 0,
+     NULL},
+    {0}};
+
+/* ---- Loading and counting ---------------------------------------------------------------- */
+
+static imp_bend *bend;
+
+static int load(const char *path)
+{
+    struct imp_load_options lo = IMP_LOAD_OPTIONS_INIT;
+    int rc = cli_open();
+    if (rc) return rc;
+    cli.scene_path = path;
+    lo.defines = cli.defines.item;
+    lo.n_defines = cli.defines.n;
+    if (cli.search) lo.search = &cli.search, lo.n_search = 1;
+    const enum imp_status st = imp_bend_load(cli.context, path, &lo, &bend);
+    if (st == IMP_OK) return 0;
+    rc = cli_fail(st, NULL);
+    return st == IMP_E_IO ? EXIT_USAGE : rc;
+}
+
+struct count { const char *name; uint64_t n; };
+
+static void counts_of(const struct imp_bend_stats *s, struct count c[8])
+{
+    const struct count all[8] = {
+        {"truncated", s->truncated}, {"missed", s->missed}, {"started_outside", s->started_out},
+        {"grazing", s->grazing}, {"broken", s->broken}, {"energy_off", s->energy},
+        {"reflected", s->reflected}, {"taps_missed", s->taps_missed}};
+    memcpy(c, all, sizeof all);
+}
+
+static void print_stats(FILE *to, const struct imp_bend_stats *s)
+{
+    struct count c[8];
+    counts_of(s, c);
+    fprintf(to, "rays      %llu, traced to the end %llu, %.1f steps each\n",
+            (unsigned long long)s->rays, (unsigned long long)s->traced,
+            s->rays ? (double)s->steps / (double)s->rays : 0);
+    for (int k = 0; k < 8; k++)
+        if (c[k].n)
+            fprintf(to, "          %-16s %llu%s\n", c[k].name, (unsigned long long)c[k].n,
+                    (double)c[k].n > 0.01 * (double)s->rays ? "  (more than 1 %)" : "");
+    fprintf(to, "energy    | |v|^2/eta^2 - 1 | <= %.2g at exits\n", s->worst_energy);
+}
+
+static void put_stats(struct json *j, const struct imp_bend_stats *s)
+{
+    struct count c[8];
+    counts_of(s, c);
+    json_object(j, "stats");
+    json_integer(j, "rays", (int64_t)s->rays);
+    json_integer(j, "traced", (int64_t)s->traced);
+    json_integer(j, "steps", (int64_t)s->steps);
+    for (int k = 0; k < 8; k++) json_integer(j, c[k].name, (int64_t)c[k].n);
+    json_number(j, "worst_energy", s->worst_energy);
+    json_end_object(j);
+}
+
+static const char *target_word(enum imp_bend_target_type t)
+{
+    static const char *const words[IMP_BEND_N_TARGETS] = {
+        "focus", "spot", "points", "direction", "directions", "deflection", "path", "wavefront",
+        "image", "far-field", "shape"};
+    return words[t];
+}
+
+/* ---- trace ------------------------------------------------------------------------------ */
+
+/* All exits: one line a ray. */
+static int write_exits(const char *path)
+{
+    const size_t n = imp_bend_n_rays(bend);
+    struct imp_bend_exit *e = cli_alloc(n, sizeof *e);
+    struct imp_bend_rays rays;
+    int rc = 0;
+    const enum imp_status st = imp_bend_run(bend, e, NULL, NULL);
+    if (st != IMP_OK) {
+        free(e);
+        return cli_fail(st, cli.scene_path);
+    }
+    imp_bend_get_rays(bend, &rays);
+    FILE *f = strcmp(path, "-") ? fopen(path, "w") : stdout;
+    if (!f) rc = cli_error(EXIT_RUN, "%s: %s", path, strerror(errno));
+    if (f) fprintf(f, "ray,bundle,x,y,z,vx,vy,vz,path,steps,flags\n");
+    for (size_t i = 0; f && i < n; i++)
+        fprintf(f, "%zu,%d,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%u,%u\n", i, rays.group[i],
+                e[i].x[0], e[i].x[1], e[i].x[2], e[i].v[0], e[i].v[1], e[i].v[2], e[i].path,
+                e[i].steps, e[i].flags);
+    if (f && f != stdout && fclose(f) != 0)
+        rc = cli_error(EXIT_RUN, "%s: %s", path, strerror(errno));
+    free(e);
+    return rc;
+}
+
+static int trace(void)
+{
+    struct imp_bend_stats s = IMP_BEND_STATS_INIT;
+    struct imp_bend_options bo = IMP_BEND_OPTIONS_INIT;
+    const size_t n = imp_bend_n_targets(bend);
+    double value, error, order, *parts = cli_alloc(n, sizeof *parts);
+    const double start = cli_now();
+    enum imp_status st = imp_bend_objective(bend, &value, NULL, parts, &s);
+    const double seconds = cli_now() - start;
+    if (st == IMP_OK) st = imp_bend_step_error(bend, 200, &error, &order);
+    if (st == IMP_OK) st = imp_bend_get_options(bend, &bo);
+    if (st != IMP_OK) {
+        free(parts);
+        return cli_fail(st, cli.scene_path);
+    }
+    if (cli.json) {
+        struct json j = cli_json();
+        put_stats(&j, &s);
+        json_number(&j, "seconds", seconds);
+        json_number(&j, "step", bo.step);
+        json_number(&j, "step_error", error);
+        json_number(&j, "step_order", order);
+        json_number(&j, "objective", value);
+        json_numbers(&j, "targets", n, parts);
+        cli_json_end(&j);
+    } else if (!cli.out || strcmp(cli.out, "-")) {
+        print_stats(stdout, &s);
+        printf("step      %.4g: exits are off by %.2g rms (order %.1f seen by halving)\n", bo.step,
+               error, order);
+        printf("speed     %.3g rays/s, %.3g ray-steps/s\n", (double)s.rays / seconds,
+               (double)s.steps / seconds);
+        printf("objective %.9g\n", value);
+        for (size_t i = 0; i < n && i < 20; i++) {
+            struct imp_bend_target t;
+            if (imp_bend_get_target(bend, i, &t) == IMP_OK)
+                printf("  target %-3zu %-10s %.9g\n", i, target_word(t.type), parts[i]);
+        }
+        if (n > 20) printf("  ... and %zu more\n", n - 20);
+    }
+    free(parts);
+    return cli.out ? write_exits(cli.out) : 0;
+}
+
+/* ---- check ------------------------------------------------------------------------------ */
+
+static int check(void)
+{
+    const struct imp_check_row *rows;
+    size_t n;
+    int ok = 1;
+    const enum imp_status st = imp_bend_check(bend, &rows, &n);
+    if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+    struct json j = {0};
+    if (cli.json) {
+        j = cli_json();
+        json_array(&j, "rows");
+    } else {
+        printf("%-11s %-16s %9s %16s %16s %9s %9s\n", "check", "of", "step", "value", "reference",
+               "error", "limit");
+    }
+    for (size_t i = 0; i < n; i++) {
+        const struct imp_check_row *r = &rows[i];
+        ok = ok && r->ok;
+        if (cli.json) {
+            json_object(&j, NULL);
+            json_text(&j, "method", r->method);
+            json_text(&j, "of", r->param);
+            json_number(&j, "step", r->step);
+            json_number(&j, "value", r->value);
+            json_number(&j, "reference", r->reference);
+            json_number(&j, "error", r->error);
+            json_number(&j, "limit", r->limit);
+            json_bool(&j, "ok", r->ok);
+            json_end_object(&j);
+        } else {
+            printf("%-11s %-16s %9.2g %16.9g %16.9g %9.2g %9.2g  %s\n", r->method, r->param, r->step,
+                   r->value, r->reference, r->error, r->limit,
+                   r->limit <= 0 ? "" : r->ok ? "ok" : "FAILS");
+        }
+    }
+    if (cli.json) {
+        json_end_array(&j);
+        json_bool(&j, "ok", ok);
+        cli_json_end(&j);
+    }
+    return ok ? EXIT_DONE : EXIT_NO;
+}
+
+/* ---- fit -------------------------------------------------------------------------------- */
+
+static int write_field(void)
+{
+    const imp_field *f = imp_bend_field(bend);
+    const char *kind = imp_field_kind(f);
+    const int grid = !strcmp(kind, "spline") || !strcmp(kind, "trilinear");
+    enum imp_status st = IMP_OK;
+    if (grid || !strcmp(kind, "radial")) {
+        char *path = join_path(cli.out, grid ? "field.vol" : "field.txt");
+        st = imp_field_write(f, path);
+        free(path);
+        if (st == IMP_OK && grid) {
+            path = join_path(cli.out, "field.npy");
+            st = imp_field_write(f, path);
+            free(path);
+        }
+    }
+    return st == IMP_OK ? 0 : cli_fail(st, cli.out);
+}
+
+static void put_numbers(FILE *to, struct json *j)
+{
+    const imp_field *f = imp_bend_field(bend);
+    const size_t n = imp_field_n_theta(f);
+    if (!imp_field_param_name(f, 0) && n > 32) return;
+    double *theta = cli_alloc(n, sizeof *theta);
+    imp_field_get_theta(f, theta);
+    for (size_t i = 0; i < n; i++) {
+        const char *name = imp_field_param_name(f, i);
+        if (!name) continue;
+        if (j) json_number(j, name, theta[i]);
+        else fprintf(to, "  %-10s %.9g\n", name, theta[i]);
+    }
+    free(theta);
+}
+
+static int write_history(const struct imp_bend_fit_result *r)
+{
+    char *svg = join_path(cli.out, "loss.svg"), *csv = join_path(cli.out, "loss.csv");
+    int rc = plot_curve(svg, "Objective", "evaluation", "objective", r->n_history, r->history, NULL);
+    FILE *f = fopen(csv, "w");
+    if (f) {
+        fprintf(f, "evaluation,objective\n");
+        for (size_t i = 0; i < r->n_history; i++) fprintf(f, "%zu,%.9g\n", i, r->history[i]);
+        if (fclose(f) != 0) f = NULL;
+    }
+    if (!f && !rc) rc = cli_error(EXIT_RUN, "%s: %s", csv, strerror(errno));
+    free(svg);
+    free(csv);
+    return rc;
+}
+
+static int iterations_read(int out[IMP_BEND_LEVELS_MAX])
+{
+    const char *s = o.iterations;
+    for (int k = 0; s && *s; k++) {
+        char *end;
+        const long n = strtol(s, &end, 10);
+        if (end == s || n < 1 || n > 1000000 || k == IMP_BEND_LEVELS_MAX || (*end && *end != ','))
+            return cli_error(EXIT_USAGE, "--iterations %s: expected N[,N..]", o.iterations);
+        out[k] = (int)n;
+        s = *end ? end + 1 : end;
+    }
+    return 0;
+}
+
+static int fit(void)
+{
+    static const enum imp_optimizer kinds[] = {IMP_LBFGS, IMP_ADAM, IMP_MMA};
+    struct imp_bend_fit_options fo = IMP_BEND_FIT_OPTIONS_INIT;
+    struct imp_bend_fit_result r = {0};
+    int rc = iterations_read(fo.iterations);
+    if (!rc && cli.out) rc = make_folder(cli.out);
+    if (!rc && cli.out) rc = bend_view(bend, cli.out, "before-");
+    if (rc) return rc;
+    fo.optimizer = kinds[o.optimizer];
+    fo.levels = o.levels;
+    fo.learning_rate = o.learning_rate;
+    fo.tolerance = o.tolerance;
+    fo.scale = o.scale;
+    fo.checkpoint = o.checkpoint;
+    fo.resume = o.resume;
+    fo.progress = progress_report;
+    const double start = cli_now();
+    const enum imp_status st = imp_bend_fit(bend, &fo, &r);
+    if (cli_failed(st)) return cli_fail(st, cli.scene_path);
+    const double seconds = cli_now() - start;
+    progress_clear();
+    if (cli.json) {
+        struct json j = cli_json();
+        json_number(&j, "start", r.start);
+        json_number(&j, "value", r.value);
+        json_integer(&j, "evaluations", r.iterations);
+        json_integer(&j, "levels", r.levels);
+        json_number(&j, "seconds", seconds);
+        json_text(&j, "reason", r.reason);
+        json_bool(&j, "complete", !progress_interrupted());
+        put_stats(&j, &r.stats);
+        json_object(&j, "field");
+        put_numbers(NULL, &j);
+        json_end_object(&j);
+        cli_json_end(&j);
+    } else {
+        printf("objective %.9g -> %.9g in %d evaluations, %d level%s, %.1f s: %s\n", r.start, r.value,
+               r.iterations, r.levels, r.levels > 1 ? "s" : "", seconds, r.reason);
+        put_numbers(stdout, NULL);
+        print_stats(stdout, &r.stats);
+    }
+    if (cli.out) rc = write_field();
+    if (cli.out && !rc) rc = write_history(&r);
+    if (cli.out && !rc) rc = bend_view(bend, cli.out, "");
+    return rc ? rc : cli_done();
+}
+
+/* ---- The command ------------------------------------------------------------------------ */
+
+static int view(void)
+{
+    const char *folder = cli.out ? cli.out : "out";
+    int rc = make_folder(folder);
+    if (!rc) rc = bend_view(bend, folder, "");
+    if (!rc) cli_say("pictures in %s", folder);
+    return rc;
+}
+
+static int run(int n, char **operand)
+{
+    static const struct { const char *word; int (*fn)(void); } verbs[] = {
+        {"trace", trace}, {"check", check}, {"fit", fit}, {"view", view}};
+    static const char *const words[] = {"trace", "check", "fit", "view", NULL};
+    (void)n;
+    for (size_t i = 0; i < sizeof verbs / sizeof *verbs; i++) {
+        if (strcmp(operand[0], verbs[i].word)) continue;
+        int rc = load(operand[1]);
+        if (!rc) rc = verbs[i].fn();
+        imp_bend_destroy(bend);
+        bend = NULL;
+        return rc;
+    }
+    const char *near = args_nearest(operand[0], words);
+    return cli_error(EXIT_USAGE, "bend: unknown '%s'%s%s: there are trace, check, fit, view",
+                     operand[0], near ? ", did you mean " : "", near ? near : "");
+}
+
+const struct command command_bend = {
+    {"bend", "trace|check|fit|view FILE",
+     "Rays in a graded index: trace them, check their gradient, fit the field, draw both.",
+     {options_general, options_file, options}, 2, 2},
+    run, 0};

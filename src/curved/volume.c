@@ -1,0 +1,330 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Files of index fields: Mitsuba's .vol (3, float32), NumPy .npy of three dimensions, both
+ * [z][y][x] samples at the corners of cells, and radial splines as text:
+ *
+ *     importon-profile 1
+ *     radial sphere|cylinder
+ *     centre X Y Z
+ *     axis X Y Z
+ *     radius R
+ *     coefficients N  c_1 ... c_N            (cells + 3) */
+#include "curved.h"
+#include "base/file.h"
+#include "base/number.h"
+#include <stdio.h>
+#include <string.h>
+
+#define FILE_BYTES_MAX ((size_t)1 << 34)
+#define HEADER_MAX 65536
+
+static uint32_t u32_at(const unsigned char *d)
+{
+    return (uint32_t)d[0] | (uint32_t)d[1] << 8 | (uint32_t)d[2] << 16 | (uint32_t)d[3] << 24;
+}
+static double f32_at(const unsigned char *d)
+{
+    const uint32_t bits = u32_at(d);
+    float f;
+    memcpy(&f, &bits, sizeof f);
+    return f;
+}
+static double f64_at(const unsigned char *d)
+{
+    const uint64_t bits = u32_at(d) | (uint64_t)u32_at(d + 4) << 32;
+    double f;
+    memcpy(&f, &bits, sizeof f);
+    return f;
+}
+
+/* A grid through samples [z][y][x] of `bytes` each. */
+static enum imp_status grid_make(imp_context *ctx, const char *path,
+                                 const struct imp_field_grid *like, const uint64_t size[3],
+                                 const unsigned char *d, int bytes, imp_field **out)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_field_grid g = *like;
+    imp_field *f = NULL;
+    const size_t n = (size_t)(size[0] * size[1] * size[2]);
+    double *samples = imp__alloc(ctx, n, sizeof *samples);
+    if (!samples) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "%s: no memory", path));
+    for (int k = 0; k < 3; k++) g.cells[k] = (int)size[k] - 1;
+    for (size_t i = 0; i < n; i++, d += bytes) samples[i] = bytes == 8 ? f64_at(d) : f32_at(d);
+    st = imp_field_grid_create(ctx, &g, 1, &f);
+    if (st == IMP_OK) st = imp_field_set_samples(f, samples);
+    if (st != IMP_OK) {
+        st = imp__error_prefix(ctx, st == IMP_E_ARG ? IMP_E_SCENE : st, "%s: ", path);
+        goto out;
+    }
+    *out = f;
+    f = NULL;
+out:
+    imp__release(ctx, samples);
+    imp_field_destroy(f);
+    return st;
+}
+
+/* Sizes from a file, before they become memory. */
+static enum imp_status size_check(imp_context *ctx, const char *path, const uint64_t size[3],
+                                  size_t bytes, size_t left)
+{
+    for (int k = 0; k < 3; k++)
+        if (size[k] < 2 || size[k] > 8193)
+            return imp__error(ctx, IMP_E_SCENE, "%s: %llu samples along an axis: 2 to 8193 are "
+                              "read", path, (unsigned long long)size[k]);
+    if (size[0] * size[1] * size[2] > left / bytes)
+        return imp__error(ctx, IMP_E_SCENE, "%s: cut off", path);
+    return IMP_OK;
+}
+
+static enum imp_status vol_read(imp_context *ctx, const char *path,
+                                const struct imp_field_grid *like, const struct imp_bytes *b,
+                                imp_field **out)
+{
+    const unsigned char *d = b->data;
+    struct imp_field_grid g = *like;
+    if (b->size < 48 || d[3] != 3 || u32_at(d + 4) != 1)
+        return imp__error(ctx, IMP_E_SCENE, "%s: not a grid volume of version 3, float32", path);
+    const uint64_t size[3] = {u32_at(d + 8), u32_at(d + 12), u32_at(d + 16)};
+    if (u32_at(d + 20) != 1)
+        return imp__error(ctx, IMP_E_SCENE, "%s: %u channels: an index has one", path,
+                          u32_at(d + 20));
+    const enum imp_status st = size_check(ctx, path, size, 4, b->size - 48);
+    if (st != IMP_OK) return st;
+    for (int k = 0; k < 3; k++) {
+        g.lo[k] = f32_at(d + 24 + 4 * k);
+        g.hi[k] = f32_at(d + 36 + 4 * k);
+    }
+    return grid_make(ctx, path, &g, size, d + 48, 4, out);
+}
+
+/* What follows 'key': in the header's dictionary; NULL: not there. */
+static const char *npy_entry(const char *header, const char *key)
+{
+    const char *s = strstr(header, key);
+    if (!s) return NULL;
+    s += strlen(key);
+    s += strspn(s, " ");
+    if (*s++ != ':') return NULL;
+    return s + strspn(s, " ");
+}
+
+static enum imp_status npy_read(imp_context *ctx, const char *path,
+                                const struct imp_field_grid *like, const struct imp_bytes *b,
+                                imp_field **out)
+{
+    const unsigned char *d = b->data;
+    char header[HEADER_MAX + 1];
+    if (b->size < 12) return imp__error(ctx, IMP_E_SCENE, "%s: cut off", path);
+    const size_t start = d[6] == 1 ? 10 : 12;
+    const size_t length = d[6] == 1 ? (size_t)(d[8] | d[9] << 8) : u32_at(d + 8);
+    if (d[6] < 1 || d[6] > 3 || length > HEADER_MAX || length > b->size - start)
+        return imp__error(ctx, IMP_E_SCENE, "%s: malformed NPY header", path);
+    memcpy(header, d + start, length);
+    header[length] = 0;
+    const char *type = npy_entry(header, "'descr'"), *order = npy_entry(header, "'fortran_order'"),
+               *shape = npy_entry(header, "'shape'");
+    const int bytes = !type ? 0 : !strncmp(type, "'<f4'", 5) ? 4 : !strncmp(type, "'<f8'", 5) ? 8 : 0;
+    uint64_t zyx[4] = {0};
+    int dims = 0;
+    if (shape && *shape == '(') {
+        const char *s = shape + 1;
+        for (; dims < 4; dims++) {
+            int64_t v;
+            s += strspn(s, " ,");
+            if (*s == ')' || !imp__integer(&s, s + strlen(s), &v) || v < 0) break;
+            zyx[dims] = (uint64_t)v;
+        }
+    }
+    if (!bytes || !order || strncmp(order, "False", 5) != 0 || dims != 3)
+        return imp__error(ctx, IMP_E_SCENE, "%s: must be an array (Z, Y, X) of <f4 or <f8, in C "
+                          "order", path);
+    const uint64_t size[3] = {zyx[2], zyx[1], zyx[0]};
+    const enum imp_status st = size_check(ctx, path, size, (size_t)bytes, b->size - start - length);
+    if (st != IMP_OK) return st;
+    return grid_make(ctx, path, like, size, d + start + length, bytes, out);
+}
+
+/* ---- Profiles as text ------------------------------------------------------------------- */
+
+struct text { const char *s, *end; };
+
+static void blank(struct text *t)
+{
+    while (t->s < t->end) {
+        if (*t->s == '#') {
+            while (t->s < t->end && *t->s != '\n') t->s++;
+        } else if (*t->s == ' ' || *t->s == '\t' || *t->s == '\r' || *t->s == '\n') {
+            t->s++;
+        } else {
+            break;
+        }
+    }
+}
+static bool word_is(struct text *t, const char *word)
+{
+    blank(t);
+    const size_t n = strlen(word);
+    if ((size_t)(t->end - t->s) < n || memcmp(t->s, word, n) != 0) return false;
+    t->s += n;
+    return true;
+}
+static bool numbers(struct text *t, int n, double *out)
+{
+    for (int i = 0; i < n; i++) {
+        blank(t);
+        if (!imp__number(&t->s, t->end, &out[i]) || !isfinite(out[i])) return false;
+    }
+    return true;
+}
+
+static enum imp_status profile_read(imp_context *ctx, const char *path, const struct imp_bytes *b,
+                                    imp_field **out)
+{
+    enum imp_status st = IMP_OK;
+    struct text t = {(const char *)b->data, (const char *)b->data + b->size};
+    struct imp_field_radial r = IMP_FIELD_RADIAL_INIT;
+    double count = 0, *c = NULL;
+    imp_field *f = NULL;
+    bool ok = word_is(&t, "importon-profile") && word_is(&t, "1") && word_is(&t, "radial");
+    if (ok && word_is(&t, "cylinder")) r.cylinder = 1;
+    else ok = ok && word_is(&t, "sphere");
+    ok = ok && word_is(&t, "centre") && numbers(&t, 3, r.centre) && word_is(&t, "axis") &&
+         numbers(&t, 3, r.axis) && word_is(&t, "radius") && numbers(&t, 1, &r.radius) &&
+         word_is(&t, "coefficients") && numbers(&t, 1, &count);
+    if (!ok || !(count >= 4) || !(count <= 65539))
+        IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: not a profile (importon-profile 1)", path));
+    r.cells = (int)count - 3;
+    c = imp__alloc(ctx, (size_t)count, sizeof *c);
+    if (!c) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "%s: no memory", path));
+    if (!numbers(&t, (int)count, c))
+        IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: fewer than %d coefficients", path, (int)count));
+    st = imp_field_radial_create(ctx, &r, 1, &f);
+    if (st == IMP_OK) st = imp_field_set_theta(f, c);
+    if (st != IMP_OK) {
+        st = imp__error_prefix(ctx, IMP_E_SCENE, "%s: ", path);
+        goto out;
+    }
+    *out = f;
+    f = NULL;
+out:
+    imp__release(ctx, c);
+    imp_field_destroy(f);
+    return st;
+}
+
+enum imp_status imp_field_read(imp_context *ctx, const char *path,
+                               const struct imp_field_grid *grid, imp_field **out)
+{
+    struct imp_field_grid like = IMP_FIELD_GRID_INIT;
+    struct imp_bytes b = {0};
+    enum imp_status st = IMP_OK;
+    if (grid) like = *grid;
+    if (!grid || !(like.hi[0] > like.lo[0]))
+        for (int k = 0; k < 3; k++) like.lo[k] = -1, like.hi[k] = 1;
+    IMP_TRY(imp__file_read(ctx, path, FILE_BYTES_MAX, &b));
+    if (b.size >= 6 && memcmp(b.data, "\x93NUMPY", 6) == 0)
+        IMP_TRY(npy_read(ctx, path, &like, &b, out));
+    else if (b.size >= 3 && memcmp(b.data, "VOL", 3) == 0)
+        IMP_TRY(vol_read(ctx, path, &like, &b, out));
+    else
+        IMP_TRY(profile_read(ctx, path, &b, out));
+out:
+    imp__bytes_free(ctx, &b);
+    return st;
+}
+
+/* ---- Writing ---------------------------------------------------------------------------- */
+
+static void put_u32(unsigned char *d, uint32_t v)
+{
+    for (int k = 0; k < 4; k++) d[k] = (unsigned char)(v >> (8 * k));
+}
+static void put_f32(unsigned char *d, double v)
+{
+    const float f = (float)v;
+    uint32_t bits;
+    memcpy(&bits, &f, sizeof bits);
+    put_u32(d, bits);
+}
+
+static enum imp_status grid_write(const imp_field *f, const char *path, bool npy)
+{
+    const struct imp__grid *g = (const struct imp__grid *)f;
+    const int m[3] = {g->desc.cells[0] + 1, g->desc.cells[1] + 1, g->desc.cells[2] + 1};
+    const size_t n = (size_t)m[0] * m[1] * m[2], head = npy ? 128 : 48, bytes = npy ? 8 : 4;
+    unsigned char *data = imp__alloc(f->ctx, head + n * bytes, 1), *d;
+    if (!data) return imp__error(f->ctx, IMP_E_NOMEM, "%s: no memory", path);
+    if (npy) {
+        memset(data, ' ', head);
+        memcpy(data, "\x93NUMPY\x01\x00\x76\x00", 10);
+        const int used = snprintf((char *)data + 10, head - 10,
+                                  "{'descr': '<f8', 'fortran_order': False, 'shape': (%d, %d, "
+                                  "%d), }", m[2], m[1], m[0]);
+        data[10 + used] = ' ';
+        data[127] = '\n';
+    } else {
+        memcpy(data, "VOL\x03", 4);
+        put_u32(data + 4, 1);
+        for (int k = 0; k < 3; k++) {
+            put_u32(data + 8 + 4 * k, (uint32_t)m[k]);
+            put_f32(data + 24 + 4 * k, g->desc.lo[k]);
+            put_f32(data + 36 + 4 * k, g->desc.hi[k]);
+        }
+        put_u32(data + 20, 1);
+    }
+    d = data + head;
+    for (int k = 0; k < m[2]; k++)
+        for (int j = 0; j < m[1]; j++)
+            for (int i = 0; i < m[0]; i++, d += bytes) {
+                const imp_v3 x = g->origin + imp__v3(i / g->inv_h[0], j / g->inv_h[1],
+                                                     k / g->inv_h[2]);
+                struct imp__jet jet;
+                imp__field_eval1(f, &x, 1, &jet);
+                if (!npy) {
+                    put_f32(d, jet.eta);
+                    continue;
+                }
+                uint64_t bits;
+                memcpy(&bits, &jet.eta, sizeof bits);
+                for (int q = 0; q < 8; q++) d[q] = (unsigned char)(bits >> (8 * q));
+            }
+    const enum imp_status st = imp__file_write(f->ctx, path, data, head + n * bytes);
+    imp__release(f->ctx, data);
+    return st;
+}
+
+static enum imp_status profile_write(const imp_field *f, const char *path)
+{
+    const struct imp__radial *r = (const struct imp__radial *)f;
+    const size_t room = 512 + 32 * f->n_theta;
+    char *s = imp__alloc(f->ctx, room, 1);
+    if (!s) return imp__error(f->ctx, IMP_E_NOMEM, "%s: no memory", path);
+    size_t at = (size_t)snprintf(
+        s, room, "importon-profile 1\nradial %s\ncentre %.17g %.17g %.17g\naxis %.17g %.17g %.17g\n"
+        "radius %.17g\ncoefficients %zu\n", r->desc.cylinder ? "cylinder" : "sphere",
+        r->desc.centre[0], r->desc.centre[1], r->desc.centre[2], r->desc.axis[0],
+        r->desc.axis[1], r->desc.axis[2], r->desc.radius, f->n_theta);
+    for (size_t i = 0; i < f->n_theta; i++)
+        at += (size_t)snprintf(s + at, room - at, "%.17g\n", f->theta[i]);
+    for (size_t i = 0; i < at; i++)
+        if (s[i] == ',') s[i] = '.'; /* whatever the host's locale */
+    const enum imp_status st = imp__file_write(f->ctx, path, s, at);
+    imp__release(f->ctx, s);
+    return st;
+}
+
+enum imp_status imp_field_write(const imp_field *f, const char *path)
+{
+    const size_t n = strlen(path);
+    const bool npy = n > 4 && !strcmp(path + n - 4, ".npy");
+    const bool vol = n > 4 && !strcmp(path + n - 4, ".vol");
+    if (npy || vol) {
+        if (!imp__field_is_grid(f))
+            return imp__error(f->ctx, IMP_E_ARG, "%s: a %s field is not a grid", path, f->ops->name);
+        return grid_write(f, path, npy);
+    }
+    if (f->ops == &imp__field_radial) return profile_write(f, path);
+    return imp__error(f->ctx, IMP_E_ARG, "%s: fields are written as .vol, .npy, radial ones as "
+                      "text", path);
+}

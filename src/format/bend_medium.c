@@ -1,0 +1,296 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * <medium type="graded">: the index field from <volume>s, how rays step, what a fit may do. */
+#include "bend.h"
+#include "search.h"
+#include <string.h>
+
+static enum imp_status grid_read(struct bend_loader *l, struct imp_node *node,
+                                 struct imp_field_grid *g)
+{
+    static const char *const interps[] = {"spline", "trilinear"}, *const params[] = {"eta", "eta2"};
+    enum imp_status st = IMP_OK;
+    int interp, param;
+    bool single;
+    const double minus[3] = {-1, -1, -1}, one[3] = {1, 1, 1}, sixteen[3] = {16, 16, 16};
+    double cells[3];
+    *g = (struct imp_field_grid)IMP_FIELD_GRID_INIT;
+    IMP_TRY(imp__props_choice(l->ctx, node, "interpolation", interps, 2, 0, &interp));
+    IMP_TRY(imp__props_choice(l->ctx, node, "parameter", params, 2, 0, &param));
+    IMP_TRY(imp__props_bool(l->ctx, node, "single", false, &single));
+    IMP_TRY(imp__props_vector(l->ctx, node, "lo", minus, g->lo));
+    IMP_TRY(imp__props_vector(l->ctx, node, "hi", one, g->hi));
+    g->interp = (enum imp_field_interp)interp;
+    g->param = (enum imp_field_param)param;
+    g->single = single;
+    struct imp_prop *p = imp__node_prop(node, "cells");
+    if (p && p->type == IMP_PROP_VECTOR) {
+        IMP_TRY(imp__props_vector(l->ctx, node, "cells", sixteen, cells));
+    } else {
+        int64_t n;
+        IMP_TRY(imp__props_int(l->ctx, node, "cells", 16, 1, 8192, &n));
+        cells[0] = cells[1] = cells[2] = (double)n;
+    }
+    for (int k = 0; k < 3; k++) {
+        if (!(cells[k] >= 1 && cells[k] <= 8192))
+            IMP_TRY(imp__prop_error(l->ctx, node, p, IMP_E_SCENE, "%g cells: 1 to 8192", cells[k]));
+        g->cells[k] = (int)cells[k];
+    }
+out:
+    return st;
+}
+
+static enum imp_status placed(struct bend_loader *l, struct imp_node *node, enum imp_status st)
+{
+    if (st == IMP_OK || st == IMP_E_NOMEM) return st;
+    char message[900]; /* the message that is there, with the place before it */
+    strncpy(message, imp_last_error(l->ctx), sizeof message - 1);
+    message[sizeof message - 1] = 0;
+    return imp__node_error(l->ctx, node, st == IMP_E_IO ? st : IMP_E_SCENE, "%s", message);
+}
+
+/* Coefficients of a grid from another field: its values, through a spline's samples. */
+static enum imp_status grid_sample(struct bend_loader *l, imp_field *grid, const imp_field *from)
+{
+    struct imp_field_grid g;
+    enum imp_status st = imp_field_get_grid(grid, &g);
+    const size_t m[3] = {(size_t)g.cells[0] + 1, (size_t)g.cells[1] + 1, (size_t)g.cells[2] + 1};
+    double *samples = imp__alloc(l->ctx, m[0] * m[1] * m[2], sizeof *samples);
+    if (!samples) return imp__error(l->ctx, IMP_E_NOMEM, "no memory for samples");
+    size_t at = 0;
+    for (size_t k = 0; k < m[2]; k++)
+        for (size_t j = 0; j < m[1]; j++)
+            for (size_t i = 0; i < m[0]; i++) {
+                const double x[3] = {g.lo[0] + (g.hi[0] - g.lo[0]) * (double)i / g.cells[0],
+                                     g.lo[1] + (g.hi[1] - g.lo[1]) * (double)j / g.cells[1],
+                                     g.lo[2] + (g.hi[2] - g.lo[2]) * (double)k / g.cells[2]};
+                imp_field_eval(from, x, &samples[at++], NULL, NULL);
+            }
+    if (st == IMP_OK) st = imp_field_set_samples(grid, samples);
+    imp__release(l->ctx, samples);
+    return st;
+}
+
+static struct imp_node *volume_child(struct imp_node *node, const char *name)
+{
+    for (size_t i = 0; i < node->n_children; i++) {
+        struct imp_child *c = &node->children[i];
+        if (strcmp(c->node->tag, "volume") != 0) continue;
+        if (name ? !c->name || strcmp(c->name, name) != 0 : c->name != NULL) continue;
+        c->used = true;
+        return c->node;
+    }
+    return NULL;
+}
+
+static enum imp_status profile_build(struct bend_loader *l, struct imp_node *node,
+                                     imp_field **out)
+{
+    enum imp_status st = IMP_OK;
+    double params[16] = {0}, axis[3], centre[3];
+    const double z[3] = {0, 0, 1}, zero[3] = {0};
+    const size_t n = imp_field_profile_count(node->type);
+    if (n == 0)
+        IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE,
+                                "is of no known type: there are grid, radial, constant, "
+                                "luneburg, maxwell, rod, rod-vendor, rod-power, sech, plume, "
+                                "polynomial, axial, linear"));
+    for (size_t i = 0; i < n - 3; i++) {
+        const char *name = imp__profile_param(node->type, i);
+        const bool optional = i > 0 && (name[0] == 'n' || name[0] == 'h'); /* coefficients */
+        IMP_TRY(bend_number(l, node, name, optional ? 0 : NAN, -1e300, 1e300, &params[i]));
+    }
+    IMP_TRY(imp__props_vector(l->ctx, node, "centre", zero, centre));
+    IMP_TRY(imp__props_vector(l->ctx, node, "axis", z, axis));
+    for (int k = 0; k < 3; k++) params[n - 3 + (size_t)k] = centre[k];
+    IMP_TRY(placed(l, node, imp_field_profile_create(l->ctx, node->type, params, axis, out)));
+out:
+    return st;
+}
+
+static enum imp_status radial_build(struct bend_loader *l, struct imp_node *node, double index,
+                                    imp_field **out)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_field_radial r = IMP_FIELD_RADIAL_INIT;
+    const double z[3] = {0, 0, 1}, zero[3] = {0};
+    int64_t cells;
+    bool cylinder;
+    IMP_TRY(imp__props_bool(l->ctx, node, "cylinder", false, &cylinder));
+    IMP_TRY(imp__props_int(l->ctx, node, "cells", 16, 1, 65536, &cells));
+    IMP_TRY(bend_number(l, node, "radius", 1, 1e-300, 1e300, &r.radius));
+    IMP_TRY(imp__props_vector(l->ctx, node, "centre", zero, r.centre));
+    IMP_TRY(imp__props_vector(l->ctx, node, "axis", z, r.axis));
+    r.cylinder = cylinder;
+    r.cells = (int)cells;
+    IMP_TRY(placed(l, node, imp_field_radial_create(l->ctx, &r, index, out)));
+out:
+    return st;
+}
+
+enum imp_status bend_volume(struct bend_loader *l, struct imp_node *node, imp_field **out)
+{
+    enum imp_status st = IMP_OK;
+    imp_field *f = NULL, *start = NULL;
+    const char *file;
+    double index;
+    struct imp_field_grid g;
+    if (strcmp(node->type, "grid") != 0 && strcmp(node->type, "radial") != 0) {
+        IMP_TRY(profile_build(l, node, &f));
+    } else {
+        const bool grid = node->type[0] == 'g';
+        IMP_TRY(imp__props_string(l->ctx, node, "filename", NULL, &file));
+        if (grid) IMP_TRY(grid_read(l, node, &g));
+        if (file) {
+            const char *path;
+            IMP_TRY(placed(l, node, imp__search(l->scene, NULL, file, &path)));
+            IMP_TRY(placed(l, node, imp_field_read(l->ctx, path, grid ? &g : NULL, &f)));
+            if (imp__field_is_grid(f) != grid)
+                IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "%s holds a %s field", file,
+                                        imp_field_kind(f)));
+        } else {
+            IMP_TRY(bend_number(l, node, "index", 1, 1e-6, 1e6, &index));
+            if (grid) IMP_TRY(placed(l, node, imp_field_grid_create(l->ctx, &g, index, &f)));
+            else IMP_TRY(radial_build(l, node, index, &f));
+        }
+        struct imp_node *from = grid ? volume_child(node, "start") : NULL;
+        if (from) {
+            IMP_TRY(bend_volume(l, from, &start));
+            IMP_TRY(placed(l, node, grid_sample(l, f, start)));
+        }
+    }
+    IMP_TRY(imp__props_finish(l->ctx, node));
+    *out = f;
+    f = NULL;
+out:
+    imp_field_destroy(f);
+    imp_field_destroy(start);
+    return st;
+}
+
+enum imp_status bend_sdf(struct bend_loader *l, struct imp_node *parent, const imp_field **out)
+{
+    imp_bend *b = l->bend;
+    imp_field *f;
+    struct imp_node *node = volume_child(parent, NULL);
+    if (!node)
+        return imp__node_error(l->ctx, parent, IMP_E_SCENE, "needs a <volume> of distances");
+    const enum imp_status st = bend_volume(l, node, &f);
+    if (st != IMP_OK) return st;
+    void *grown = imp__grow(l->ctx, b->sdfs, &b->cap_sdfs, b->n_sdfs + 1, sizeof *b->sdfs);
+    if (!grown) {
+        imp_field_destroy(f);
+        return imp__error(l->ctx, IMP_E_NOMEM, "no memory for a distance field");
+    }
+    b->sdfs = grown;
+    b->sdfs[b->n_sdfs++] = f;
+    *out = f;
+    return IMP_OK;
+}
+
+enum imp_status bend_medium(struct bend_loader *l, struct imp_node *node)
+{
+    static const char *const schemes[] = {"leapfrog", "euler", "verlet", "yoshida4", "arc",
+                                          "arc-index"};
+    static const char *const ways[] = {"reverse", "stored", "pseudo"};
+    enum imp_status st = IMP_OK;
+    imp_field *parts[64], *field = NULL;
+    size_t n = 0;
+    int scheme, way;
+    int64_t max_steps;
+    bool outside;
+    double cells, most;
+    struct imp_bend_options *o = &l->options;
+    *o = (struct imp_bend_options)IMP_BEND_OPTIONS_INIT;
+    if (strcmp(node->type, "graded") != 0)
+        IMP_TRY(imp__node_error(l->ctx, node, IMP_E_UNSUPPORTED, "is not of type 'graded'"));
+    for (size_t i = 0; i < node->n_children; i++) {
+        struct imp_child *c = &node->children[i];
+        if (strcmp(c->node->tag, "volume") != 0) continue;
+        c->used = true;
+        if (c->name && strcmp(c->name, "truth") == 0) {
+            IMP_TRY(bend_volume(l, c->node, &l->truth));
+            continue;
+        }
+        if (n == imp_count(parts))
+            IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "has more than 64 volumes"));
+        IMP_TRY(bend_volume(l, c->node, &parts[n]));
+        n++;
+    }
+    if (n == 0) IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "has no <volume>"));
+    if (n == 1) {
+        field = parts[0];
+    } else {
+        const size_t taken = n;
+        n = 0; /* taken over, also on failure */
+        IMP_TRY(imp_field_sum_create(l->ctx, taken, parts, &field));
+    }
+    n = 0;
+    imp_field *given = field;
+    field = NULL;
+    IMP_TRY(imp_bend_create(l->ctx, given, &l->bend));
+    IMP_TRY(imp__props_choice(l->ctx, node, "scheme", schemes, 6, 0, &scheme));
+    IMP_TRY(imp__props_choice(l->ctx, node, "way", ways, 3, 0, &way));
+    o->scheme = (enum imp_bend_scheme)scheme;
+    o->way = (enum imp_bend_way)way;
+    IMP_TRY(bend_number(l, node, "step", 0, 0, 1e300, &o->step));
+    IMP_TRY(bend_number(l, node, "step_cells", l->bend->step_cells, 1e-6, 1e3, &cells));
+    IMP_TRY(bend_number(l, node, "step_max", 0, 0, 1e300, &most));
+    imp_bend_set_step(l->bend, cells, most);
+    IMP_TRY(imp__props_int(l->ctx, node, "max_steps", 0, 0, 4000000000, &max_steps));
+    o->max_steps = (uint32_t)max_steps;
+    IMP_TRY(imp__props_bool(l->ctx, node, "outside", false, &outside));
+    o->outside = outside;
+    IMP_TRY(bend_number(l, node, "outside_index", 1, 1e-6, 1e6, &o->outside_index));
+    IMP_TRY(bend_number(l, node, "grazing", 0, -1, 1, &o->grazing));
+out:
+    for (size_t i = 0; i < n; i++) imp_field_destroy(parts[i]);
+    imp_field_destroy(field);
+    return st;
+}
+
+enum imp_status bend_rules(struct bend_loader *l, struct imp_node *node)
+{
+    enum imp_status st = IMP_OK;
+    double value, weight, edge, lo, hi, radius;
+    const double zero[3] = {0};
+    double centre[3];
+    int64_t layers, order;
+    IMP_TRY(bend_number(l, node, "index_min", 1, -1e300, 1e300, &lo));
+    IMP_TRY(bend_number(l, node, "index_max", 1e300, -1e300, 1e300, &hi));
+    if (imp__props_has(node, "index_min") || imp__props_has(node, "index_max"))
+        IMP_TRY(placed(l, node, imp_bend_set_bounds(l->bend, lo, hi)));
+    IMP_TRY(bend_number(l, node, "hold_value", 0, 0, 1e6, &value));
+    if (!imp__props_has(node, "hold_value")) value = NAN; /* held where they are */
+    IMP_TRY(imp__props_int(l->ctx, node, "hold_rim", 0, 0, 1000, &layers));
+    IMP_TRY(bend_number(l, node, "hold_outside", 0, 0, 1e300, &radius));
+    IMP_TRY(imp__props_vector(l->ctx, node, "hold_centre", zero, centre));
+    if (layers > 0) IMP_TRY(placed(l, node, imp_bend_hold_rim(l->bend, (int)layers, value)));
+    if (radius > 0)
+        IMP_TRY(placed(l, node, imp_bend_hold_outside(l->bend, centre, radius, value)));
+    IMP_TRY(bend_number(l, node, "smoothness", 0, 0, 1e300, &weight));
+    IMP_TRY(bend_number(l, node, "smoothness_edge", 0, 0, 1e300, &edge));
+    IMP_TRY(imp__props_int(l->ctx, node, "smoothness_order", 2, 1, 2, &order));
+    if (weight > 0) IMP_TRY(imp_bend_add_smoothness(l->bend, weight, (int)order, edge));
+    /* Names of profile numbers that a fit leaves alone: "n0 x y z". */
+    const char *hold;
+    IMP_TRY(imp__props_string(l->ctx, node, "hold", "", &hold));
+    for (const char *s = hold; *s;) {
+        s += strspn(s, " ,");
+        const size_t len = strcspn(s, " ,");
+        if (len == 0) break;
+        bool met = false;
+        for (size_t i = 0; i < l->bend->field->n_theta; i++) {
+            const char *name = imp_field_param_name(l->bend->field, i);
+            if (!name || strlen(name) != len || memcmp(name, s, len) != 0) continue;
+            met = true;
+            IMP_TRY(imp_bend_hold_number(l->bend, i, NAN));
+        }
+        if (!met)
+            IMP_TRY(imp__prop_error(l->ctx, node, imp__node_prop(node, "hold"), IMP_E_SCENE,
+                                    "no number of the field is called '%.*s'", (int)len, s));
+        s += len;
+    }
+out:
+    return st;
+}
