@@ -25,10 +25,9 @@ static const struct arg_option options[] = {
      optimizer_words},
     {ARG_INT, 0, "levels", "N", "fit: grids are refined N - 1 times (default 1)", &o.levels, 1,
      IMP_BEND_LEVELS_MAX, NULL},
-    {ARG_TEXT, 0, "iterations", "N[,N..]", "fit: of each level (default 50)", &o.iterations, 0, 0,
+    {ARG_TEXT, 'n', "iterations", "N[,N..]", "fit: of each level (default 50)", &o.iterations, 0, 0,
      NULL},
-    {ARG_NUMBER, 0, "learning-rate", "X", "fit, adam: of the scale (default 0.05), halved at "
-     "each level", &o.learning_rate, 1e-12, 1e3, NULL},
+    {ARG_NUMBER, 0, "lr", "X", "fit, adam: of the scale (default 0.05), halved at each level", &o.learning_rate, 1e-12, 1e3, NULL},
     {ARG_NUMBER, 0, "tolerance", "X", "fit: stop when steps stay below, of the scale (1e-6)",
      &o.tolerance, 1e-300, 1, NULL},
     {ARG_NUMBER, 0, "scale", "X", "fit: a large change of an index (default 0.1)", &o.scale, 1e-12,
@@ -373,6 +372,6 @@ static int run(int n, char **operand)
 
 const struct command command_bend = {
     {"bend", "trace|check|fit|view FILE",
-     "Rays in a graded index: trace them, check their gradient, fit the field, draw both.",
+     "rays in a graded index: trace, check, fit, view",
      {options_general, options_file, options}, 2, 2},
     run, 0};

@@ -162,8 +162,8 @@ enum imp_status imp__plan_create(const imp_field *field, const struct imp_bend_o
         IMP_TRY(imp__error(ctx, IMP_E_ARG, "index outside %g", p.outside_index));
     IMP_TRY(step_choose(&p));
     bounds_choose(&p, rays);
-    if (p.t > p.size)
-        imp__warn(ctx, "step %g is longer than the field", p.t);
+    if (field->spacing > 0 && p.t > p.size)
+        IMP_TRY(imp__error(ctx, IMP_E_ARG, "step %g is longer than the field, %g", p.t, p.size));
 
     if (o->n_surfaces == 0) {
         box.type = IMP_BEND_BOX;

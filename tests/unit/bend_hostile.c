@@ -44,11 +44,15 @@ static void counts(void)
            "grazing exits are dropped and counted # %d of %d", (int)st.grazing, N);
     s = (struct imp_bend_surface)IMP_BEND_SURFACE_INIT;
     s.offset = 0.9, o.grazing = 0;
-    o.step = 3; /* larger than the field */
+    o.step = 1.5; /* most of the field at once */
     st = trace(f, &o);
     tap_ok(st.traced + st.missed + st.broken + st.grazing + st.started_out + st.truncated >= N,
-           "steps longer than the field: %d traced, %d broken, %d missed", (int)st.traced,
+           "steps as long as the field: %d traced, %d broken, %d missed", (int)st.traced,
            (int)st.broken, (int)st.missed);
+    o.step = 3;
+    struct imp_bend_rays one = kit_beam(1, -0.8, 0.7, 0.2);
+    tap_ok(imp_bend_trace(f, &o, &one, e, NULL, NULL) == IMP_E_ARG, "longer: refused");
+    kit_rays_free(&one);
     imp_field_destroy(f);
 
     /* A jump of the index, and an index below zero. */

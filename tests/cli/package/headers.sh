@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Each public header compiles alone, as C11 and as C++, under strict warnings.
-for header in importon kinds elements; do
+for header in importon kinds elements bend; do
     echo "#include <importon/$header.h>" >alone.c
     echo "#include <importon/$header.h>" >alone.cc
     for cc in gcc clang; do
