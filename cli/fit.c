@@ -150,8 +150,15 @@ static void put_variable(struct json *j, const struct imp_fit_variable *v, const
 }
 
 /* Numbers of textures are in their pictures, not in lists. */
+static void put_texture(struct json *j, const struct block *b, const char *path)
+{
+    block_json(j, b);
+    json_integer(j, "count", (int64_t)b->n);
+    json_text(j, "file", path);
+    json_end_object(j);
+}
 static void put_json(struct json *j, const struct imp_fit_result *r,
-                     const struct block *blocks, size_t n_blocks)
+                     const struct block *blocks, size_t n_blocks, char **paths)
 {
     json_text(j, "optimizer", optimizer_words[o.optimizer]);
     json_text(j, "loss", loss_word());
@@ -169,7 +176,11 @@ static void put_json(struct json *j, const struct imp_fit_result *r,
     for (size_t k = 0; k < n_blocks; k++) {
         const struct block *b = &blocks[k];
         char name[512];
-        for (size_t i = 0; i < b->n && !block_is_large(b); i++)
+        if (block_is_large(b)) {
+            put_texture(j, b, paths[k]);
+            continue;
+        }
+        for (size_t i = 0; i < b->n; i++)
             put_variable(j, &r->variables[b->first + i], b->info.unit,
                          cli_number_name(&b->info, i, name, sizeof name));
     }
@@ -177,7 +188,7 @@ static void put_json(struct json *j, const struct imp_fit_result *r,
 }
 
 static int write_json(const struct imp_fit_result *r, const struct block *blocks,
-                      size_t n_blocks)
+                      size_t n_blocks, char **paths)
 {
     char *path = join_path(cli.out, "parameters.json");
     struct json j = {fopen(path, "w"), 0};
@@ -186,7 +197,7 @@ static int write_json(const struct imp_fit_result *r, const struct block *blocks
         json_object(&j, NULL);
         json_text(&j, "importon", imp_version());
         json_text(&j, "command", "fit");
-        put_json(&j, r, blocks, n_blocks);
+        put_json(&j, r, blocks, n_blocks, paths);
         cli_json_end(&j);
         if (fclose(j.file) != 0) j.file = NULL;
     }
@@ -196,7 +207,7 @@ static int write_json(const struct imp_fit_result *r, const struct block *blocks
 }
 
 static void print_table(const struct imp_fit_result *r, const struct block *blocks,
-                        size_t n_blocks)
+                        size_t n_blocks, char **paths)
 {
     int width = 9;
     for (size_t k = 0; k < n_blocks; k++)
@@ -207,7 +218,8 @@ static void print_table(const struct imp_fit_result *r, const struct block *bloc
         const struct block *b = &blocks[k];
         char name[512];
         if (block_is_large(b)) {
-            printf("%-*s  %zu numbers\n", width, b->info.name, b->n);
+            printf("%-*s  %zu numbers%s%s\n", width, b->info.name, b->n,
+                   paths[k] ? " -> " : "", paths[k] ? paths[k] : "");
             continue;
         }
         for (size_t i = 0; i < b->n; i++) {
@@ -226,23 +238,40 @@ static void print_table(const struct imp_fit_result *r, const struct block *bloc
            r->objective.se, r->iterations, r->reason ? r->reason : "");
 }
 
+/* Recovered textures, as pictures. */
+static int write_textures(const imp_problem *problem, const struct block *blocks,
+                          size_t n_blocks, char **paths)
+{
+    int rc = 0;
+    double *x = cli_alloc(imp_problem_n(problem), sizeof *x);
+    imp_problem_get_x(problem, x);
+    for (size_t k = 0; k < n_blocks && !rc; k++)
+        if (block_is_large(&blocks[k])) rc = block_write(&blocks[k], x, NULL, cli.out, &paths[k]);
+    free(x);
+    return rc;
+}
+
 static int answer(imp_problem *problem, const struct imp_fit_result *r)
 {
     size_t n_blocks;
     struct block *blocks = problem_blocks(problem, &n_blocks);
+    char **paths = cli_alloc(n_blocks, sizeof *paths);
     int rc = 0;
     if (cli.out) {
-        rc = write_history(r);
-        if (!rc) rc = write_json(r, blocks, n_blocks);
+        rc = write_textures(problem, blocks, n_blocks, paths);
+        if (!rc) rc = write_history(r);
+        if (!rc) rc = write_json(r, blocks, n_blocks, paths);
     }
     if (cli.json) {
         struct json j = cli_json();
-        put_json(&j, r, blocks, n_blocks);
+        put_json(&j, r, blocks, n_blocks, paths);
         cli_json_end(&j);
     } else {
-        print_table(r, blocks, n_blocks);
+        print_table(r, blocks, n_blocks, paths);
     }
     if (r->warning) cli_say("importon: warning: %s", r->warning);
+    for (size_t k = 0; k < n_blocks; k++) free(paths[k]);
+    free(paths);
     free(blocks);
     return rc;
 }

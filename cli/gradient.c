@@ -149,38 +149,6 @@ static int compute(imp_problem *problem, const struct imp_run *run, struct resul
 
 /* ---- Answers ---------------------------------------------------------------------------- */
 
-/* A texture's gradient as a picture, [h][w] or [h][w][1 or 3], with its standard errors as
- * further channels. Others are a row. */
-static int write_block(const struct block *b, const struct result *r, char **path)
-{
-    const struct imp_param_info *p = &b->info;
-    const size_t channels = p->n_dims == 3 && (p->dims[2] == 1 || p->dims[2] == 3)
-                                ? p->dims[2] : p->n_dims == 2 && p->dims[1] == 3 ? 3 : 1;
-    const size_t width = p->n_dims >= 2 && !(p->n_dims == 2 && channels == 3)
-                             ? p->dims[1] : b->n / channels;
-    const size_t height = b->n / channels / (width ? width : 1);
-    const struct picture_options o = {.diverging = 1};
-    const struct imp_run run = cli_run();
-    imp_film *film = NULL;
-    char name[512];
-    snprintf(name, sizeof name, "%s.exr", p->name);
-    *path = join_path(cli.out, name);
-    enum imp_status st = imp_film_create(cli.context, (int)width, (int)height,
-                                         channels == 3 ? "R,G,B,se.R,se.G,se.B" : "Y,se.Y",
-                                         &film);
-    if (st != IMP_OK) return cli_fail(st, *path);
-    float *value = imp_film_mean(film);
-    for (size_t i = 0; i < b->n; i++) {
-        float *pixel = value + i / channels * 2 * channels;
-        pixel[i % channels] = (float)r->grad[b->first + i];
-        pixel[channels + i % channels] = (float)r->se[b->first + i];
-    }
-    picture_stamp(film, &run);
-    const int rc = picture_write(film, *path, &o);
-    imp_film_destroy(film);
-    return rc;
-}
-
 static void print_json(const struct imp_run *run, const struct result *r,
                        const struct block *blocks, size_t n_blocks, char **paths)
 {
@@ -275,7 +243,7 @@ static int run_gradient(int n, char **operand)
     rc = compute(problem, &run, &r);
     if (!rc && cli.out) rc = make_folder(cli.out);
     for (size_t k = 0; k < n_blocks && !rc && cli.out; k++)
-        if (block_is_large(&blocks[k])) rc = write_block(&blocks[k], &r, &paths[k]);
+        if (block_is_large(&blocks[k])) rc = block_write(&blocks[k], r.grad, r.se, cli.out, &paths[k]);
     if (!rc) {
         if (cli.json) print_json(&run, &r, blocks, n_blocks, paths);
         else print_text(&r, blocks, n_blocks, paths);

@@ -149,3 +149,37 @@ void block_json(struct json *j, const struct block *b)
     json_text(j, "name", b->info.name);
     json_text(j, "unit", b->info.unit);
 }
+
+int block_write(const struct block *b, const double *x, const double *se, const char *folder,
+                char **path)
+{
+    const struct imp_param_info *p = &b->info;
+    const size_t last = p->n_dims > 0 ? p->dims[p->n_dims - 1] : 1;
+    const size_t channels =
+        p->n_dims == 3 && (last == 1 || last == 3) ? last : p->n_dims == 2 && last == 3 ? 3 : 1;
+    const size_t width =
+        p->n_dims == 3 || (p->n_dims == 2 && channels == 1) ? p->dims[1] : b->n / channels;
+    const size_t height = b->n / channels / (width ? width : 1);
+    const struct picture_options o = {.diverging = se != NULL};
+    static const char *const channel_names[2][2] = {{"Y", "Y,se.Y"},
+                                                    {"R,G,B", "R,G,B,se.R,se.G,se.B"}};
+    const struct imp_run run = cli_run();
+    imp_film *film = NULL;
+    char name[512];
+    snprintf(name, sizeof name, "%s.exr", p->name);
+    *path = join_path(folder, name);
+    const enum imp_status st = imp_film_create(cli.context, (int)width, (int)height,
+                                               channel_names[channels == 3][se != NULL],
+                                               &film);
+    if (st != IMP_OK) return cli_fail(st, *path);
+    float *out = imp_film_mean(film);
+    for (size_t i = 0; i < width * height; i++) {
+        const size_t at = b->first + i * channels;
+        for (size_t c = 0; c < channels; c++) *out++ = (float)x[at + c];
+        for (size_t c = 0; c < channels && se; c++) *out++ = (float)se[at + c];
+    }
+    picture_stamp(film, &run);
+    const int rc = picture_write(film, *path, &o);
+    imp_film_destroy(film);
+    return rc;
+}

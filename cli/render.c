@@ -93,7 +93,9 @@ static void report(const char *path, imp_film *film, const struct imp_run *run)
     struct imp_film_info info = {.size = sizeof info};
     imp_film_get_info(film, &info);
     cli_say("%s: %d x %d, %lld samples per pixel%s", path, info.width, info.height,
-            (long long)info.spp, progress_interrupted() ? ", interrupted" : "");
+            (long long)info.spp, !progress_interrupted() ? ""
+            : info.spp ? ", interrupted"
+                       : ", interrupted in the first pass: a part of the picture is there");
     if (info.dropped)
         cli_say("importon: warning: %llu walks dropped: a value was not finite or negative",
                 (unsigned long long)info.dropped);
