@@ -129,6 +129,13 @@ static int estimate_for(imp_problem *problem, struct imp_run run, const float *s
     return st == IMP_OK ? 0 : cli_fail(st, cli.scene_path);
 }
 
+static int failed(enum imp_status st)
+{
+    if (st != IMP_CANCELLED) return cli_fail(st, cli.scene_path);
+    return cli_error(cli_done(), "interrupted before the gradient was there; with --time, "
+                                 "what was done is kept");
+}
+
 static int compute(imp_problem *problem, const struct imp_run *run, struct result *r)
 {
     float *seed = NULL;
@@ -141,7 +148,7 @@ static int compute(imp_problem *problem, const struct imp_run *run, struct resul
         rc = estimate_for(problem, *run, seed, r);
     } else if (!rc) {
         const enum imp_status st = estimate(problem, run, seed, r);
-        if (st != IMP_OK) rc = cli_fail(st, cli.scene_path);
+        if (st != IMP_OK) rc = failed(st);
     }
     free(seed);
     return rc;
