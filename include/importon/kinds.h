@@ -87,7 +87,9 @@ enum imp_bsdf_flags {
     IMP_BSDF_SMOOTH = 1,    /* has lobes with a density */
     IMP_BSDF_DELTA = 2,     /* has delta lobes */
     IMP_BSDF_TRANSMIT = 4,
-    IMP_BSDF_EMIT = 8       /* has emit: Stam's ambient terms */
+    IMP_BSDF_EMIT = 8,      /* has emit: Stam's ambient terms */
+    IMP_BSDF_JUMP = 16      /* f/pdf of sample jumps at the horizon: sample_d, which has no
+                               boundary term, is not the whole derivative */
 };
 
 struct imp_bsdf {

@@ -33,8 +33,9 @@ struct imp__replicates imp__replicates_plan(int spp, int batch_max)
     return r;
 }
 
-/* Stam's attached form lacks the term with the gradient of what arrives: it is right only
- * where that gradient is zero, a convex object under a constant environment. */
+/* The attached form of the exponent here has neither the gradient of what arrives nor
+ * boundary terms (gradients.md 4): it is right only where both are zero, a convex object
+ * under a constant environment whose weight does not jump at the horizon. */
 static enum imp_status attached_allowed(const struct imp_scene *scene)
 {
     bool fine = scene->n_shapes == 1 && scene->environment >= 0 && scene->n_emitters == 1;
@@ -43,6 +44,12 @@ static enum imp_status attached_allowed(const struct imp_scene *scene)
         fine = strcmp(kind, "sphere") == 0 || strcmp(kind, "rectangle") == 0 ||
                strcmp(kind, "disk") == 0 || strcmp(kind, "cube") == 0;
     }
+    for (int b = 0; fine && b < scene->n_bsdfs; b++)
+        if (scene->bsdfs[b]->flags & IMP_BSDF_JUMP)
+            return imp__error(scene->ctx, IMP_E_BIAS,
+                              "alpha_gradient=attached has no boundary term for the jump of "
+                              "material '%s' at the horizon; use variant=reciprocal, or "
+                              "detached", scene->bsdfs[b]->name);
     if (fine) return IMP_OK;
     return imp__error(scene->ctx, IMP_E_BIAS,
                       "alpha_gradient=attached is unbiased only for one convex shape under a "

@@ -112,6 +112,9 @@ enum imp_status imp__integrator_build(struct imp_scene *scene, struct imp_node *
         IMP_TRY(imp__props_int(ctx, node, "max_depth", 64, -1, INT32_MAX, &depth));
         IMP_TRY(imp__props_choice(ctx, node, "alpha_gradient", words, 3, 0, &choice));
         out->alpha_gradient = (enum imp_stam_alpha)choice;
+        if (out->alpha_gradient == IMP_ALPHA_PAPER)
+            imp__warn(ctx, "alpha_gradient=paper: derivatives of exponents are those of Stam's "
+                      "App. C, which are wrong (docs/stam.md, E9)");
         break;
     }
     case IMP_INTEGRATOR_DIRECT: {

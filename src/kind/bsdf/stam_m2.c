@@ -46,6 +46,9 @@ static enum imp_status build(const struct imp_build *build, void *self, struct i
     m->variant = (enum variant)v;
     m->sampling = (enum sampling)s;
     b->flags = IMP_BSDF_SMOOTH | IMP_BSDF_EMIT;
+    /* Only V = min(1, cos_i/cos_o) takes the lobe's weight to 0 at the horizon, behind which
+     * its draws are lost; a cosine draw does not move. */
+    if (m->variant != RECIPROCAL && m->sampling != COSINE) b->flags |= IMP_BSDF_JUMP;
 out:
     return st;
 }
