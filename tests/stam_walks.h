@@ -10,6 +10,7 @@
 #include <stdbool.h>
 #include "imp_scene.h"
 #include "imp_tap.h"
+#include "walk/dims.h"
 #include "walk/walk.h"
 
 /* theta_1 .. theta_7 of the paper, from 0. */

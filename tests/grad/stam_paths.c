@@ -104,7 +104,8 @@ static void paper(imp_context *ctx)
             const struct dual own = stam_value(&w, STAM_PAPER, s.absorb, s.theta, &n2, &n3);
             stam_gradient(&s, &w, 1, g);
             for (int c = 0; c < N_CONTROLS; c++)
-                keep(&worst[c], off(g[c], own.d[c], c == EXPONENT ? .1 * n2 * w.L[0] / s.theta[c] : 0));
+                keep(&worst[c], off(g[c], own.d[c],
+                                    c == EXPONENT ? .1 * n2 * w.L[0] / s.theta[c] : 0));
             wrong_sign += g[EXPONENT] * own.d[EXPONENT] < 0;
             walks++;
         }
