@@ -18,6 +18,7 @@
 
 struct exr_writer {
     struct imp_exr *io;
+    exr_result_t (*compress)(exr_encode_pipeline_t *); /* the library's own */
     exr_context_t exr;
     const imp_film *film;
     const float *mean, *se; /* se NULL: not written */
@@ -68,6 +69,18 @@ out:
     return st;
 }
 
+/* A chunk as long as its pixels is read as not compressed. OpenEXR 3.1 stores the pixels only
+ * where ZIP makes them longer: at equal length it leaves the ZIP stream, which readers then
+ * take for pixels. */
+static exr_result_t compress(exr_encode_pipeline_t *pipe)
+{
+    const struct exr_writer *w = pipe->encoding_user_data;
+    const exr_result_t code = w->compress(pipe);
+    if (code == EXR_ERR_SUCCESS && pipe->compressed_bytes == pipe->packed_bytes)
+        memmove(pipe->compressed_buffer, pipe->packed_buffer, pipe->packed_bytes);
+    return code;
+}
+
 static enum imp_status pixels_write(struct exr_writer *w)
 {
     enum imp_status st = IMP_OK;
@@ -96,7 +109,12 @@ static enum imp_status pixels_write(struct exr_writer *w)
             from->user_pixel_stride = (int32_t)(c * sizeof(float));
             from->user_line_stride = (int32_t)(row * sizeof(float));
         }
-        if (y == 0) EXR(exr_encoding_choose_default_routines(w->exr, 0, &pipe));
+        if (y == 0) {
+            EXR(exr_encoding_choose_default_routines(w->exr, 0, &pipe));
+            w->compress = pipe.compress_fn;
+            pipe.encoding_user_data = w;
+            if (w->compress) pipe.compress_fn = compress;
+        }
         EXR(exr_encoding_run(w->exr, 0, &pipe));
     }
 out:
