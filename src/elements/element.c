@@ -40,7 +40,7 @@ static enum imp_status coefficients_grow(imp_elements *e, size_t n)
     const size_t ch = (size_t)e->ch;
     struct { double **array; size_t *cap; size_t n; } const all[] = {
         {&e->l, &e->cap_l, ch * n}, {&e->g, &e->cap_g, ch * n}, {&e->c, &e->cap_c, ch * n},
-        {&e->b, &e->cap_b, ch * n}, {&e->a, &e->cap_a, n}};
+        {&e->b, &e->cap_b, ch * n}, {&e->from_above, &e->cap_above, ch * n}, {&e->a, &e->cap_a, n}};
     for (size_t k = 0; k < imp_count(all); k++) {
         double *grown = imp__grow(e->ctx, *all[k].array, all[k].cap, all[k].n, sizeof *grown);
         if (!grown) return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for elements");

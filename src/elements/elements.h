@@ -152,8 +152,9 @@ struct imp_elements {
     struct imp__element *elements;
     size_t n_coef, cap_coef;         /* numbers of one channel */
     double *l, *g, *c, *b;           /* [ch n_coef], an element's channels together */
+    double *from_above;              /* part of c that the parent's links give (sweep.c) */
     double *a;                       /* [n_coef] */
-    size_t cap_l, cap_g, cap_c, cap_b, cap_a;
+    size_t cap_l, cap_g, cap_c, cap_b, cap_above, cap_a;
 
     size_t n_links, cap_links;
     struct imp__el_link *links;      /* sorted by receiver when `sorted` */

@@ -146,7 +146,7 @@ size_t imp__el_bytes(const imp_elements *e)
     return e->cap_links * sizeof *e->links + e->cap_out * sizeof *e->out +
            (e->cap_in + e->cap_out_start) * sizeof *e->in_start +
            e->cap_elements * sizeof *e->elements +
-           (e->cap_l + e->cap_g + e->cap_c + e->cap_b + e->cap_a + e->cap_value) *
+           (e->cap_l + e->cap_g + e->cap_c + e->cap_b + e->cap_above + e->cap_a + e->cap_value) *
                sizeof(double) +
            (e->cap_hits + e->cap_view) * sizeof *e->hits + e->arena.total;
 }

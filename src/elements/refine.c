@@ -157,7 +157,7 @@ static double bytes_after(const imp_elements *e, double links, double elements)
     const double each = (double)(2 * sizeof *e->links + 4 * (size_t)e->ch * sizeof(double) + 4);
     const double per = e->n_elements ? (double)e->n_coef / (double)e->n_elements : 0;
     return (double)(e->n_hits + e->n_view) * sizeof *e->hits + links * each +
-           elements * (sizeof *e->elements + 16 + per * 8 * (4.0 * e->ch + 1));
+           elements * (sizeof *e->elements + 16 + per * 8 * (5.0 * e->ch + 1));
 }
 
 static enum imp_status wave_run(struct wave *v, bool *full)

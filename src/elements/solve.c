@@ -158,7 +158,7 @@ out:
 void imp_elements_destroy(imp_elements *e)
 {
     if (!e) return;
-    void *const all[] = {e->roots, e->elements, e->l, e->g, e->c, e->b, e->a, e->links,
+    void *const all[] = {e->roots, e->elements, e->l, e->g, e->c, e->b, e->from_above, e->a, e->links,
                          e->in_start, e->out_start, e->out, e->value, e->hits, e->view,
                          e->picture, e->log, e->rows};
     for (size_t k = 0; k < imp_count(all); k++) imp__release(e->ctx, all[k]);
@@ -392,7 +392,7 @@ enum imp_status imp_elements_get_info(const imp_elements *e, struct imp_elements
     i.bytes_per_link = (double)(sizeof *e->links + 4 * (size_t)e->ch * sizeof *e->value +
                                 sizeof *e->out);
     i.bytes_per_element = (double)(sizeof *e->elements + 2 * sizeof *e->in_start) +
-        (e->n_elements ? 8.0 * (4 * e->ch + 1) * (double)e->n_coef / (double)e->n_elements : 0);
+        (e->n_elements ? 8.0 * (5 * e->ch + 1) * (double)e->n_coef / (double)e->n_elements : 0);
     for (int k = 0; k < e->n_materials; k++)
         i.worst_residual = fmax(i.worst_residual, e->materials[k].residual);
     if (e->solved) {
