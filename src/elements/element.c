@@ -3,6 +3,8 @@
  * The hierarchy: quadtrees on quadrilaterals, one-to-four subdivision of triangles. Children
  * have larger indices than their parents, so a loop over the array is a walk of the tree. */
 #include "elements.h"
+#include "math/rng.h"
+#include "math/warp.h"
 #include <string.h>
 
 imp_v3 imp__el_point(int corners, const imp_v3 *v, double s, double t)
@@ -33,6 +35,54 @@ static void quarter(int corners, const imp_v3 *p, int q, imp_v3 v[4])
 void imp__el_quarter(const struct imp__element *x, int q, imp_v3 v[4])
 {
     quarter(x->corners, x->v, q, v);
+}
+
+/* ---- What is exposed ------------------------------------------------------------------------ */
+
+/* Does light reach the point at all? Inside a solid that stands on the surface, every ray
+ * meets the wrong side of something. Flat directions come last: they settle the doubt. */
+static bool is_exposed(const imp_elements *e, const struct imp__el_root *r, imp_v3 p,
+                       struct imp_key key)
+{
+    for (uint32_t k = 0; k < 8; k++) {
+        const double u[2] = {imp__u01(key, 2 * k), imp__u01(key, 2 * k + 1)};
+        imp_v3 w = imp__cosine_hemisphere(u);
+        if (k >= 4) {
+            const double phi = IMP_2PI * (u[0] + k) / 4;
+            w = imp__v3(0.995 * cos(phi), 0.995 * sin(phi), 0.1);
+        }
+        const imp_v3 d = imp__to_world(&r->frame, w), o = imp__offset(p, r->frame.n, d);
+        struct imp_hit hit;
+        if (!imp__intersect(e->scene, &o, &d, 0, INFINITY, &hit)) return true;
+        const int root = e->prim_root[hit.shape][hit.prim];
+        if (root < 0) continue;
+        if (imp__dot(e->roots[root].frame.n, d) < 0 || e->roots[root].back >= 0) return true;
+    }
+    return false;
+}
+
+/* The part of an element that is not covered by solids. Radiance and moments are means over
+ * that part: a mean over all of it would darken what stands next to a block twice, as
+ * receiver and as source. */
+static double exposure_of(const imp_elements *e, const struct imp__element *x, uint32_t index)
+{
+    const struct imp__el_root *r = &e->roots[x->root];
+    if (r->shape < 0) return 1;
+    if (x->parent != EL_NONE) {
+        const double above = e->elements[x->parent].exposed;
+        if (above == 1 || above == 0) return above;
+    }
+    const int n = x->parent == EL_NONE ? (e->n_roots > 500 ? 4 : 16) : 6;
+    int count = 0, all = 0;
+    for (int a = 0; a < n; a++)
+        for (int b = 0; b < n; b++) {
+            double s = (a + 0.5) / n, t = (b + 0.5) / n;
+            if (x->corners == 3 && s + t > 1) continue;
+            all++;
+            count += is_exposed(e, r, imp__el_point(x->corners, x->v, s, t),
+                                imp__key(e->opt.seed + 2, index, (uint64_t)(a * n + b)));
+        }
+    return all ? (double)count / all : 1;
 }
 
 static enum imp_status coefficients_grow(imp_elements *e, size_t n)
@@ -76,7 +126,8 @@ enum imp_status imp__el_element_add(imp_elements *e, uint32_t root, uint32_t par
         memcpy(el_at(e, e->l, x), el_at(e, e->l, p), bytes);
         memcpy(el_at(e, e->g, x), el_at(e, e->g, p), bytes);
     }
-    x->area = imp__polygon_area(r->corners, x->v);
+    x->exposed = exposure_of(e, x, (uint32_t)e->n_elements);
+    x->area = imp__polygon_area(r->corners, x->v) * x->exposed;
     x->centre = imp__v3(0, 0, 0);
     for (int i = 0; i < r->corners; i++) x->centre += x->v[i] * (1.0 / r->corners);
     for (int i = 0; i < r->corners; i++)
@@ -96,7 +147,10 @@ enum imp_status imp__el_split(imp_elements *e, uint32_t element)
         IMP_TRY(imp__el_element_add(e, e->elements[element].root, element, k, &child));
         if (k == 0) first = child;
     }
-    e->elements[element].child = first; /* all four or none */
+    struct imp__element *x = &e->elements[element];
+    x->child = first; /* all four or none */
+    x->area = 0;      /* the children know better how much of it is exposed */
+    for (uint32_t k = 0; k < 4; k++) x->area += e->elements[first + k].area;
 out:
     return st;
 }

@@ -109,8 +109,8 @@ struct imp__el_root { /* an input polygon, one side of it */
 struct imp__element {
     uint32_t root, parent, child;    /* child: first of four, 0: leaf */
     uint8_t level, corners;
-    uint8_t turned;                  /* triangles: number of flips of (u, v) on the way */
-    double area, radius;
+    double area, radius;             /* area: of the exposed part */
+    double exposed;                  /* fraction that no solid covers */
     imp_v3 centre, v[4];
     size_t coef;                     /* first coefficient, in units of one channel's number */
 };

@@ -82,11 +82,10 @@ void imp__el_link_make(const imp_elements *e, uint32_t src, uint32_t rcv,
     const struct imp__el_root *ri = el_root(e, i), *rj = el_root(e, j);
     const struct imp_key key = imp__key(e->opt.seed, rcv, src);
     int order[4] = {0, 1, 2, 3};
-    bool any = false;
     *keep = false;
     *out = (struct imp__el_link){.src = src, .rcv = rcv};
     const int front_i = in_front(e, i, j), front_j = in_front(e, j, i);
-    if (front_i == 0 || front_j == 0) return;
+    if (front_i == 0 || front_j == 0 || i->area == 0 || j->area == 0) return;
     for (int s = 3; s > 0; s--) {
         const int other = (int)(imp__u01(key, (uint32_t)s) * (s + 1));
         const int t = order[s];
@@ -105,22 +104,11 @@ void imp__el_link_make(const imp_elements *e, uint32_t src, uint32_t rcv,
         for (int a = 0; a < 3; a++) out->w[a][s] = (float)w[a];
         if (q <= 0) continue;
         ++*rays;
-        if (imp__el_sees(e, ri, x, rj, y)) out->k[s] = q * imp__polygon_area(i->corners, v), any = true;
+        if (imp__el_sees(e, ri, x, rj, y)) out->k[s] = q * imp__polygon_area(i->corners, v);
     }
+    /* Kept even if no ray arrives: dropping those loses energy for good (about 0.3 % of the
+     * picture here), and the oracle looks at them with the kernel that they might have. */
     *keep = true;
-    /* Nothing seen: dropped only if the elements face each other wholly, neither is a whole
-     * polygon, and many rays more are stopped as well. */
-    if (any || front_i < j->corners || front_j < i->corners || i->parent == EL_NONE ||
-        j->parent == EL_NONE)
-        return;
-    const struct imp_key more = imp__key(e->opt.seed + 1, rcv, src);
-    for (uint32_t k = 0; k < 20; k++) {
-        ++*rays;
-        if (imp__el_sees(e, ri, random_point(i->corners, i->v, more, 4 * k), rj,
-                         random_point(j->corners, j->v, more, 4 * k + 2)))
-            return;
-    }
-    *keep = false;
 }
 
 double imp__el_link_bound(const imp_elements *e, const struct imp__el_link *link)
@@ -176,7 +164,8 @@ static enum imp_status first_work(size_t item, int worker, int slot, void *paylo
     if (el_n(e, r) == 0) return IMP_OK;
     for (size_t j = 0; j < e->n_roots; j++) {
         const uint32_t src = e->roots[j].element;
-        bool keep = !(j == item || !is_source(e, &e->roots[j]) ||
+        bool keep = !(j == item || e->elements[src].area == 0 ||
+                      e->elements[r->element].area == 0 || !is_source(e, &e->roots[j]) ||
                       imp__el_back_facing(e, &e->elements[src], &e->elements[r->element]));
         if (!keep) continue;
         if (!f->count_only)

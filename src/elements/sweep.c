@@ -135,7 +135,7 @@ static void by_source(imp_elements *e, uint32_t index, bool importance)
     for (int c = 0; c < ch; c++)
         for (int q = 0; q < n; q++) {
             const imp_spec s = sum[c][q];
-            b[c * n + q] = ((s[0] + s[1]) + (s[2] + s[3])) / j->area;
+            b[c * n + q] = j->area > 0 ? ((s[0] + s[1]) + (s[2] + s[3])) / j->area : 0;
         }
 }
 
@@ -165,13 +165,13 @@ static void by_receiver(imp_elements *e, uint32_t index, bool importance, bool p
     for (int c = 0; c < ch; c++)
         for (int q = 0; q < n; q++) {
             const imp_spec s = sum[c][q];
-            out[c * n + q] = i->child ? 0 : ((s[0] + s[1]) + (s[2] + s[3])) / i->area;
+            out[c * n + q] = i->child || i->area == 0 ? 0 : ((s[0] + s[1]) + (s[2] + s[3])) / i->area;
         }
     for (uint32_t s = 0; s < 4 && i->child; s++) {
         const struct imp__element *child = &e->elements[i->child + s];
         double *below = el_at(e, e->from_above, child);
         for (int c = 0; c < ch; c++)
-            for (int q = 0; q < n; q++) below[c * n + q] = sum[c][q][s] / child->area;
+            for (int q = 0; q < n; q++) below[c * n + q] = child->area > 0 ? sum[c][q][s] / child->area : 0;
     }
 }
 
@@ -215,7 +215,7 @@ static void reflect(imp_elements *e, uint32_t index, bool importance)
             const double *below = el_at(e, e->from_above, y);
             for (int q = 0; q < ch * n; q++) down[q] += in[q] + (importance ? 0 : below[q]);
             reflect(e, k, importance);
-            const double part = y->area / x->area;
+            const double part = x->area > 0 ? y->area / x->area : 0;
             for (int q = 0; q < ch * n; q++) out[q] += part * up[q];
         }
         return;
@@ -224,7 +224,7 @@ static void reflect(imp_elements *e, uint32_t index, bool importance)
         double arrives[EL_N_MAX];
         const double *from = in + c * n;
         if (importance) {
-            const double scale = e->lum[c] / x->area;
+            const double scale = x->area > 0 ? e->lum[c] / x->area : 0;
             for (int q = 0; q < n; q++) arrives[q] = from[q] + e->a[x->coef + (size_t)q] * scale;
             from = arrives;
         }
