@@ -27,7 +27,8 @@ struct command {
     int prints; /* all its data is text, so -o stands for standard output */
 };
 extern const struct command command_render, command_gradient, command_jacobian, command_check,
-    command_fit, command_compare, command_info, command_bench, command_bend;
+    command_fit, command_compare, command_info, command_bench, command_bend,
+    command_elements;
 
 /* Option tables, to be named in args_spec.group. */
 extern const struct arg_option options_general[], options_scene[], options_run[];

@@ -11,7 +11,7 @@
 static const struct command *const commands[] = {
     &command_render, &command_gradient, &command_jacobian, &command_check,
     &command_fit,    &command_compare,  &command_info,     &command_bend,
-    &command_bench};
+    &command_bench,  &command_elements};
 #define N_COMMANDS (sizeof commands / sizeof *commands)
 
 static void print_usage(FILE *to)

@@ -286,6 +286,7 @@ enum imp_status imp_elements_solve(imp_elements *e)
     if (!e) return IMP_E_ARG;
     const bool importance = !e->opt.no_importance;
     bool full = false;
+    int still = 0;
     e->start_s = imp__now();
     e->deadline_s = e->opt.time_limit_s > 0 ? e->start_s + e->opt.time_limit_s : 0;
     e->stop = false;
@@ -322,8 +323,9 @@ enum imp_status imp_elements_solve(imp_elements *e)
             e->reason = "the budget of links or memory is spent";
             break;
         }
-        /* A step that changed nothing because it refined nothing says nothing. */
-        if (s->change < e->opt.stop && s->links > before + before / 8) {
+        /* Twice in a row; a step that refined nothing says nothing. */
+        if (s->links > before + before / 8) still = s->change < e->opt.stop ? still + 1 : 0;
+        if (still == 2) {
             e->reason = "the picture stands still";
             break;
         }

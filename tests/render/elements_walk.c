@@ -181,7 +181,7 @@ static void glossy(imp_context *ctx, int spp)
 int main(void)
 {
     imp_context *ctx = test_context(2);
-    diffuse(ctx, "elements/a.xml", "scene a", 384, 2.5e-5);
+    diffuse(ctx, "elements/a.xml", "scene a", 384, 1e-5);
     diffuse(ctx, "elements/b.xml", "scene b", 1024, 5e-5);
     glossy(ctx, 384);
     imp_context_destroy(ctx);

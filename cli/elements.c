@@ -1,0 +1,274 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * importon elements: the deterministic solver. A picture, the statistics of the solution, and
+ * with --sensitivity what every light and reflectance does to the measurement. */
+#include "elements.h"
+#include "picture.h"
+#include "progress.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static struct {
+    struct picture_options picture;
+    struct elements_sources sources;
+    struct arg_list phong, beams, exports;
+    const char *save, *open;
+    int kind, order, no_importance, rays, level, max_links, sensitivity, no_picture;
+    double stop, eps, max_mb;
+} o = {.kind = IMP_ELEMENTS_GOURAUD};
+
+static const char *const kind_words[] = {"flat", "gouraud", "gather", "importance", NULL};
+
+static const struct arg_option options[] = {
+    {ARG_CHOICE, 0, "image", "KIND", "flat, gouraud (default), gather or importance", &o.kind, 0,
+     0, kind_words},
+    {ARG_FLAG, 0, "no-image", NULL, "no picture", &o.no_picture, 0, 0, NULL},
+    {ARG_NUMBER, 0, "stop", "PERCENT", "stop when the picture changes by less (default 1)",
+     &o.stop, 1e-9, 100, NULL},
+    {ARG_NUMBER, 0, "eps", "E", "smallest link tolerance, relative (default 5e-6)", &o.eps,
+     1e-12, 1, NULL},
+    {ARG_INT, 0, "order", "L", "of the directional basis, 2..12; default: by the materials",
+     &o.order, 2, 12, NULL},
+    {ARG_INT, 0, "level", "N", "of subdivision at most (default 9)", &o.level, 1, 10, NULL},
+    {ARG_INT, 0, "rays", "N", "per side of a pixel (default 3)", &o.rays, 1, 64, NULL},
+    {ARG_INT, 0, "max-links", "N", "budget of links", &o.max_links, 1, 2e9, NULL},
+    {ARG_NUMBER, 0, "max-memory", "MB", "budget of memory (default 4295)", &o.max_mb, 1, 1e9,
+     NULL},
+    {ARG_FLAG, 0, "no-importance", NULL, "refine by radiance alone", &o.no_importance, 0, 0,
+     NULL},
+    {ARG_LIST, 0, "phong", "SHAPE=KD,KS,N", "make a shape glossy ('*': all but lights)",
+     &o.phong, 0, 0, NULL},
+    {ARG_LIST, 0, "beam", "SHAPE=N[,X,Y,Z]", "give a light a cosine-power direction", &o.beams,
+     0, 0, NULL},
+    {ARG_LIST, 0, "region", "[W:]X0,Y0,X1,Y1", "measure a part of the picture",
+     &o.sources.regions, 0, 0, NULL},
+    {ARG_LIST, 0, "plane", "[W:]CORNER,U,V", "measure the irradiance of a virtual patch",
+     &o.sources.planes, 0, 0, NULL},
+    {ARG_LIST, 0, "lux", "[W:]SHAPE", "measure the irradiance of a shape", &o.sources.shapes, 0,
+     0, NULL},
+    {ARG_FLAG, 0, "sensitivity", NULL, "print derivatives of the measurement, largest first",
+     &o.sensitivity, 0, 0, NULL},
+    {ARG_TEXT, 0, "save", "FILE", "keep the solution", &o.save, 0, 0, NULL},
+    {ARG_TEXT, 0, "open", "FILE", "take a kept solution instead of solving", &o.open, 0, 0,
+     NULL},
+    {ARG_LIST, 0, "export", "FILE", "leaves as .ply or .json", &o.exports, 0, 0, NULL},
+    {ARG_NUMBER, 0, "exposure", "STOPS", "of the PNG preview", &o.picture.exposure, -100, 100,
+     NULL},
+    {0}};
+
+static int options_make(struct imp_elements_options *e)
+{
+    struct imp_elements_phong *phong;
+    struct imp_elements_beam *beams;
+    struct imp_elements_source *sources;
+    size_t n;
+    int rc = elements_phong(&o.phong, &phong);
+    if (!rc) rc = elements_beams(&o.beams, &beams);
+    if (!rc) rc = elements_sources(&o.sources, cli.sensor, &sources, &n);
+    if (rc) return rc;
+    e->phong = phong;
+    e->n_phong = o.phong.n;
+    e->beams = beams;
+    e->n_beams = o.beams.n;
+    e->sources = sources;
+    e->n_sources = n;
+    e->order = o.order;
+    e->no_importance = o.no_importance;
+    e->sensor = cli.sensor;
+    e->rays = o.rays;
+    e->stop = o.stop / 100;
+    e->eps_last = o.eps;
+    e->max_level = o.level;
+    e->max_links = (size_t)o.max_links;
+    e->max_bytes = (size_t)(o.max_mb * 1e6);
+    e->time_limit_s = cli.time_s;
+    e->seed = cli.seed;
+    e->progress = progress_report;
+    return 0;
+}
+
+/* Importance spans decades: five of them from dark blue to white. */
+static imp_film *false_colour(imp_film *film)
+{
+    static const double map[6][3] = {{0, 0, 0.05}, {0.05, 0.02, 0.35}, {0.35, 0.02, 0.4},
+                                     {0.8, 0.1, 0.1}, {0.95, 0.6, 0.02}, {1, 1, 0.9}};
+    struct imp_film_info info = {.size = sizeof info};
+    imp_film *out = NULL;
+    imp_film_get_info(film, &info);
+    if (imp_film_create(cli.context, info.width, info.height, "R,G,B", &out) != IMP_OK)
+        return NULL;
+    const size_t n = (size_t)info.width * (size_t)info.height;
+    const float *x = imp_film_mean(film);
+    float *y = imp_film_mean(out);
+    double most = 0;
+    for (size_t i = 0; i < n; i++) most = fmax(most, x[i]);
+    for (size_t i = 0; i < n; i++) {
+        const double t = x[i] > 0 ? fmax(0, 5 + log10(x[i] / most)) : 0;
+        const int k = t >= 5 ? 4 : (int)t;
+        for (int c = 0; c < 3; c++)
+            y[3 * i + (size_t)c] = (float)(map[k][c] + (map[k + 1][c] - map[k][c]) * (t - k));
+    }
+    return out;
+}
+
+static int ends_with(const char *s, const char *tail)
+{
+    const size_t n = strlen(s), m = strlen(tail);
+    return n >= m && !strcmp(s + n - m, tail);
+}
+
+static int write_picture(const imp_elements *e, const struct imp_run *run)
+{
+    const char *path = cli.out ? cli.out : "elements.exr";
+    imp_film *film = NULL;
+    const enum imp_status st =
+        imp_elements_image(e, cli.sensor, (enum imp_elements_image)o.kind, o.rays, &film);
+    if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+    if (o.kind == IMP_ELEMENTS_IMPORTANCE && ends_with(path, ".png")) {
+        imp_film *coloured = false_colour(film);
+        imp_film_destroy(film);
+        film = coloured;
+        if (!film) return cli_fail(IMP_E_NOMEM, NULL);
+    }
+    picture_stamp(film, run);
+    const int rc = picture_write(film, path, &o.picture);
+    if (!rc) cli_say("%s: %s picture", path, kind_words[o.kind]);
+    imp_film_destroy(film);
+    return rc;
+}
+
+static void print_info(struct json *j, const struct imp_elements_info *i, int complete)
+{
+    if (!j) {
+        cli_say("%zu polygons, %zu elements (%zu leaves), %zu links, %lld rays; order %d",
+                i->polygons, i->elements, i->leaves, i->links, (long long)i->rays, i->order);
+        cli_say("measure %.9g (from the lights %.9g); %s", i->measure, i->measure_adjoint,
+                i->reason);
+        return;
+    }
+    json_number(j, "measure", i->measure);
+    json_number(j, "measure_direct", i->measure_direct);
+    json_number(j, "measure_adjoint", i->measure_adjoint);
+    json_bool(j, "complete", complete);
+    json_text(j, "reason", i->reason);
+    json_integer(j, "order", i->order);
+    json_integer(j, "functions", i->functions);
+    json_integer(j, "polygons", (int64_t)i->polygons);
+    json_integer(j, "skipped", (int64_t)i->skipped);
+    json_integer(j, "elements", (int64_t)i->elements);
+    json_integer(j, "leaves", (int64_t)i->leaves);
+    json_integer(j, "links", (int64_t)i->links);
+    json_integer(j, "rays", i->rays);
+    json_integer(j, "bytes", (int64_t)i->bytes);
+    json_number(j, "bytes_per_link", i->bytes_per_link);
+    json_number(j, "bytes_per_element", i->bytes_per_element);
+    json_number(j, "lobe_error", i->worst_residual);
+    json_array(j, "steps");
+    for (size_t k = 0; k < i->n_steps; k++) {
+        const struct imp_elements_step *s = &i->steps[k];
+        json_object(j, NULL);
+        json_number(j, "eps", s->eps);
+        json_integer(j, "links", (int64_t)s->links);
+        json_integer(j, "elements", (int64_t)s->elements);
+        json_number(j, "measure", s->measure);
+        json_number(j, "change", s->change);
+        json_number(j, "seconds", s->elapsed_s);
+        json_end_object(j);
+    }
+    json_end_array(j);
+}
+
+static const char *row_name(const struct imp_elements_row *r, char *text, size_t size)
+{
+    struct imp_param_info info = {.size = sizeof info};
+    if (r->param >= 0 &&
+        imp_scene_get_param(cli.scene, (size_t)r->param, &info) == IMP_OK)
+        return cli_number_name(&info, r->element, text, size);
+    snprintf(text, size, "%s[%zu]", r->name, r->element);
+    return text;
+}
+
+static int print_sensitivity(imp_elements *e, struct json *j)
+{
+    const struct imp_elements_row *rows;
+    size_t n;
+    double sum = 0;
+    char text[256];
+    const enum imp_status st = imp_elements_sensitivity(e, &rows, &n);
+    if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+    if (j) json_array(j, "sensitivity");
+    else printf("%-44s %13s %13s %9s\n", "number", "value", "derivative", "share");
+    for (size_t k = 0; k < n; k++) {
+        const struct imp_elements_row *r = &rows[k];
+        const char *name = row_name(r, text, sizeof text);
+        if (r->emission) sum += r->share;
+        if (j) {
+            json_object(j, NULL);
+            json_text(j, "name", name);
+            json_bool(j, "emission", r->emission);
+            json_number(j, "value", r->value);
+            json_number(j, "derivative", r->derivative);
+            json_number(j, "share", r->share);
+            json_end_object(j);
+        } else {
+            printf("%-44s %13.6g %13.6g %8.3f%%\n", name, r->value, r->derivative,
+                   100 * r->share);
+        }
+    }
+    if (j) {
+        json_end_array(j);
+        json_number(j, "euler", sum);
+    } else {
+        printf("the lights' shares add up to %.6f%%\n", 100 * sum);
+    }
+    return 0;
+}
+
+static int run_elements(int n, char **operand)
+{
+    struct imp_elements_options options_e = IMP_ELEMENTS_OPTIONS_INIT;
+    struct imp_elements_info info = {.size = sizeof info};
+    imp_elements *e = NULL;
+    enum imp_status st;
+    (void)n;
+    int rc = cli_load(operand[0]);
+    if (!rc) rc = options_make(&options_e);
+    if (rc) return rc;
+    const struct imp_run run = cli_run();
+    if (o.open) {
+        st = imp_elements_open(cli.scene, &options_e, o.open, &e);
+    } else {
+        st = imp_elements_create(cli.scene, &options_e, &e);
+        if (st == IMP_OK) st = imp_elements_solve(e);
+    }
+    const int complete = st == IMP_OK;
+    if (cli_failed(st) || !e) {
+        rc = cli_fail(st, cli.scene_path);
+        imp_elements_destroy(e);
+        return rc;
+    }
+    progress_resume();
+    struct json json, *j = NULL;
+    const int to_stdout = cli.out && !strcmp(cli.out, "-");
+    st = imp_elements_get_info(e, &info);
+    if (!o.no_picture) rc = write_picture(e, &run);
+    if (!rc && o.save && (st = imp_elements_save(e, o.save)) != IMP_OK) rc = cli_fail(st, NULL);
+    for (size_t k = 0; k < o.exports.n && !rc; k++)
+        if ((st = imp_elements_export(e, o.exports.item[k])) != IMP_OK) rc = cli_fail(st, NULL);
+    if (!rc && cli.json && !to_stdout) {
+        json = cli_json();
+        j = &json;
+    }
+    if (!rc) print_info(j, &info, complete);
+    if (!rc && o.sensitivity && !to_stdout) rc = print_sensitivity(e, j);
+    if (j) cli_json_end(j);
+    imp_elements_destroy(e);
+    return rc ? rc : cli_done();
+}
+
+const struct command command_elements = {
+    {"elements", "SCENE", "solve a scene without noise, by finite elements",
+     {options, options_run, options_scene, options_general}, 1, 1},
+    run_elements, 0};
