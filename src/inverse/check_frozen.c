@@ -23,6 +23,7 @@
 #define N_STEPS 4
 #define FROZEN_LIMIT 1e-6
 #define EXACT_LIMIT 1e-12
+#define NOTHING 1e-200 /* below it products lose digits to underflow */
 #define TINY 1e-3 /* of the walk's L: logarithmic derivatives below it count as 0 */
 
 static const double steps[N_STEPS] = {1e-3, 1e-4, 1e-5, 1e-6};
@@ -124,10 +125,10 @@ static enum imp_status keep_walks(struct keep *k)
         if (w->walk.dropped == IMP_DROP_NONE)
             imp__walk_sweep(&c->tracer, &w->walk, fold_bar(c), &list.sink);
         bool any = false;
-        for (size_t i = 0; i < list.n; i++) any |= list.at[i].g != 0;
+        for (size_t i = 0; i < list.n; i++) any |= fabs(list.at[i].g) > NOTHING;
         w->L = fold(c, w->walk.L);
         w->n = list.n;
-        if (!any && w->L == 0) { /* nothing to compare */
+        if (!any && fabs(w->L) <= NOTHING) { /* nothing to compare */
             imp__arena_rewind(&k->arena, mark);
             continue;
         }
@@ -385,9 +386,10 @@ static enum imp_status euler(struct keep *k, const uint8_t *chosen, const struct
         if (counted) {
             n = 0;
             for (const struct imp_vertex *v = w->walk.first; v && v->next; v = v->next)
-                n += v->bsdf == counted;
+                /* Light collected on the way, where nothing absorbs: L is no product. */
+                n = imp__is_zero(v->e) ? n + (v->bsdf == counted) : -INFINITY;
         }
-        if (w->L == 0 || n == 0) continue;
+        if (fabs(w->L) <= NOTHING || n <= 0) continue;
         list.n = 0;
         imp__walk_sweep(&tracer, &w->walk, fold_bar(c), &list.sink);
         if (list.failed) IMP_TRY(imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check"));
