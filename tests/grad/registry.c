@@ -17,7 +17,7 @@
 #include "imp_tap.h"
 #include "imp_kinds.h"
 
-#define SIDE 6
+#define SIDE 5
 #define BATCHES 12
 
 static bool is_long;
@@ -292,7 +292,7 @@ static void fresh(imp_scene *s, imp_problem *p, size_t param, const double *v, b
 {
     struct imp_param_info info;
     struct imp_run run = IMP_RUN_INIT;
-    const int spp = is_long ? 64 : 8;
+    const int spp = is_long ? 64 : 4;
     static uint64_t seed = 1000;
     imp_film *film;
     test_must(ctx, imp_scene_get_param(s, param, &info));
