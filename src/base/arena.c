@@ -50,7 +50,10 @@ void *imp__arena_take(struct imp_arena *a, size_t n, size_t size)
     if (__builtin_mul_overflow(n, size, &bytes) || bytes > SIZE_MAX / 4) return NULL;
     bytes = (bytes + 31) & ~(size_t)31;
     if (!a->current || a->used + bytes > a->current->size)
-        if (!block_next(a, bytes)) return NULL;
+        if (!block_next(a, bytes)) {
+            a->failed = true;
+            return NULL;
+        }
     void *p = a->current->bytes + a->used;
     a->used += bytes;
     return p;

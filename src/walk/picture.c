@@ -228,6 +228,10 @@ enum imp_status imp__picture_make(imp_context *ctx, const struct imp_picture *pi
     }
     if (st != IMP_OK && st != IMP_CANCELLED) goto out;
 
+    /* A walk dropped for want of memory is not a walk with a bad value. */
+    for (int k = 0; k < ctx->threads; k++)
+        if (r.arenas[k].failed)
+            IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for the walks of a picture"));
     film_finish(&r, film);
     film->spp = imp_min((int64_t)passes_done * r.pass_spp, (int64_t)r.spp);
     if (imp__drops_exceed(run, film->dropped, pixels * (double)film->spp))
