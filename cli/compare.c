@@ -4,10 +4,12 @@
  * comparison; docs.) */
 #include "command.h"
 #include "picture.h"
+#include <string.h>
 
 static struct {
     const char *variance;
     double n_test, n_reference, floor;
+    int plain;
 } o;
 
 static const struct arg_option options[] = {
@@ -19,7 +21,19 @@ static const struct arg_option options[] = {
      &o.n_reference, 1, 1e15, NULL},
     {ARG_NUMBER, 0, "floor", "V", "least variance (default 1e-4 of the squared mean)",
      &o.floor, 1e-300, 1e300, NULL},
+    {ARG_FLAG, 0, "plain-variance", NULL,
+     "R, G, B of the variance are of R, G, B; else of X, Y, Z, kept as a colour", &o.plain, 0,
+     0, NULL},
     {0}};
+
+static int has_channel(const imp_film *film, const char *name)
+{
+    struct imp_film_info info = {.size = sizeof info};
+    imp_film_get_info(film, &info);
+    for (int c = 0; c < info.channels; c++)
+        if (!strcmp(imp_film_channel(film, c), name)) return 1;
+    return 0;
+}
 
 static void print_text(const struct imp_compare_result *r)
 {
@@ -53,6 +67,7 @@ static int run_compare(int n, char **operand)
     options_z.n_test = o.n_test;
     options_z.n_reference = o.n_reference;
     options_z.floor = o.floor;
+    options_z.xyz = variance && !o.plain && has_channel(variance, "R");
     const enum imp_status st = imp_compare(cli.context, a, b, &options_z, &r);
     if (st != IMP_OK) {
         rc = cli_fail(st, NULL);

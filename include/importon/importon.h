@@ -538,8 +538,11 @@ struct imp_compare_options {
     const imp_film *variance; /**< per-sample variance of `reference`; NULL: use the films' se */
     double n_test, n_reference; /**< samples per pixel; 0: unknown / exact */
     double floor;             /**< of the variance; 0: 1e-4 * squared mean of the channel */
+    int xyz;                  /**< compare X, Y, Z: pictures and variance are made to them from
+                                   R, G, B (or Y alone). Mitsuba's references keep the variance
+                                   of X, Y, Z so, as if it were a colour */
 };
-#define IMP_COMPARE_OPTIONS_INIT {sizeof(struct imp_compare_options), 0, 0, 0, 0}
+#define IMP_COMPARE_OPTIONS_INIT {sizeof(struct imp_compare_options), 0, 0, 0, 0, 0}
 IMP_API IMP_MUST_CHECK enum imp_status imp_compare(imp_context *context, imp_film *test,
                                                    imp_film *reference,
                                                    const struct imp_compare_options *options,

@@ -3,6 +3,7 @@
  * The z-test of pictures, on pictures whose noise is known: it passes what has the same
  * expectation as often as it says, and catches a bias of 1 %. */
 #include "base/film.h"
+#include "color/rgb.h"
 #include "math/rng.h"
 #include "imp_tap.h"
 
@@ -65,6 +66,38 @@ int main(void)
         imp_film_destroy(biased);
         imp_film_destroy(exact);
     }
+    /* A variance of X, Y, Z kept as a colour: independent noise of each. */
+    imp_film *white = NULL, *noisy = NULL, *xyz_variance = NULL;
+    if (imp_film_create(ctx, SIDE, SIDE, "R,G,B", &white) != IMP_OK ||
+        imp_film_create(ctx, SIDE, SIDE, "R,G,B", &noisy) != IMP_OK ||
+        imp_film_create(ctx, SIDE, SIDE, "R,G,B", &xyz_variance) != IMP_OK) return 1;
+    for (int i = 0; i < SIDE * SIDE; i++) {
+        double n[3], rgb[3], v[3];
+        for (int c = 0; c < 3; c++) n[c] = 0.1 / sqrt(N) * gauss(77, (uint64_t)(3 * i + c));
+        imp__xyz_to_rgb(n, rgb);
+        imp__xyz_to_rgb((double[3]){.01, .01, .01}, v);
+        for (int c = 0; c < 3; c++) {
+            imp_film_mean(white)[3 * i + c] = 0.5f;
+            imp_film_mean(noisy)[3 * i + c] = (float)(0.5 + rgb[c]);
+            imp_film_mean(xyz_variance)[3 * i + c] = (float)v[c];
+        }
+    }
+    o = (struct imp_compare_options)IMP_COMPARE_OPTIONS_INIT;
+    o.variance = xyz_variance;
+    o.n_test = N;
+    o.xyz = 1;
+    enum imp_status st = imp_compare(ctx, noisy, white, &o, &r);
+    tap_ok(st == IMP_OK && r.agree &&
+           fabs(r.over2 - 0.0455) < 4 * sqrt(0.0455 / (3 * SIDE * SIDE)),
+           "a variance of X, Y, Z # |z| > 2: %.4f", r.over2);
+    o.xyz = 0;
+    st = imp_compare(ctx, noisy, white, &o, &r);
+    tap_ok(st == IMP_OK && r.over2 > 0.2,
+           "is not one of R, G, B # |z| > 2: %.4f", r.over2);
+    imp_film_destroy(white);
+    imp_film_destroy(noisy);
+    imp_film_destroy(xyz_variance);
+
     static const char *const how[] = {"by the pictures' errors", "by a variance picture",
                                       "against an exact reference"};
     for (int k = 0; k < 3; k++) {

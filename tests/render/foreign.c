@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Mitsuba's own test scenes against Mitsuba's own references, with the z-test that `importon
+ * compare --variance` makes: the orthographic sensor, in rgb and in mono.
+ * The pictures are not ours to copy: IMP_SHARED names the folder that holds `mitsuba-scenes`;
+ * without it the test is skipped. */
+#include "imp_scene.h"
+#include "imp_tap.h"
+
+#define REFERENCE_SPP 32000
+
+static void agrees(imp_context *ctx, const char *folder, const char *scene_file,
+                   const char *reference_stem, enum imp_color_mode mode)
+{
+    const char *suffix = mode == IMP_MONO ? "mono" : "rgb";
+    struct imp_load_options load = IMP_LOAD_OPTIONS_INIT;
+    struct imp_compare_options options = IMP_COMPARE_OPTIONS_INIT;
+    struct imp_compare_result r = {.size = sizeof r};
+    struct imp_film_info info = {.size = sizeof info};
+    struct imp_run run = IMP_RUN_INIT;
+    imp_scene *scene;
+    imp_film *film, *reference, *variance;
+    char path[1024];
+
+    load.mode = mode;
+    snprintf(path, sizeof path, "%s/%s", folder, scene_file);
+    test_must(ctx, imp_scene_load(ctx, path, &load, &scene));
+    snprintf(path, sizeof path, "%s/refs/%s_ref_%s.exr", folder, reference_stem, suffix);
+    test_must(ctx, imp_film_read(ctx, path, &reference));
+    snprintf(path, sizeof path, "%s/refs/%s_ref_%s_var.exr", folder, reference_stem, suffix);
+    test_must(ctx, imp_film_read(ctx, path, &variance));
+    imp_film_get_info(reference, &info);
+    run.spp = (int)(2e6 / (info.width * info.height)); /* scene-format 14 */
+    run.seed = 11;
+    test_must(ctx, imp_render(scene, &run, &film));
+    options.variance = variance;
+    options.n_test = run.spp;
+    options.n_reference = REFERENCE_SPP;
+    options.xyz = 1;
+    test_must(ctx, imp_compare(ctx, film, reference, &options, &r));
+    tap_ok(r.agree, "%s, %s # means %.6g and %.6g, z %.2f, failing %.4f, |z| > 2 %.4f",
+           scene_file, suffix, r.mean_a, r.mean_b, r.mean_z, r.p_fail_fraction, r.over2);
+
+    /* The test can fail: a picture 0.5 % brighter does not agree. */
+    imp_film_get_info(film, &info);
+    for (long k = 0; k < (long)info.width * info.height * info.channels; k++)
+        imp_film_mean(film)[k] *= 1.005f;
+    test_must(ctx, imp_compare(ctx, film, reference, &options, &r));
+    tap_ok(!r.agree, "0.5 %% brighter is caught # z %.2f", r.mean_z);
+    imp_film_destroy(film);
+    imp_film_destroy(reference);
+    imp_film_destroy(variance);
+    imp_scene_destroy(scene);
+}
+
+int main(void)
+{
+    const char *shared = getenv("IMP_SHARED");
+    char folder[900];
+    if (!shared) {
+        tap_skip("Mitsuba's test scenes", "IMP_SHARED is not set");
+        return tap_done();
+    }
+    imp_context *ctx = test_context(0);
+    snprintf(folder, sizeof folder, "%s/mitsuba-scenes/tests/scenes/orthographic_sensor", shared);
+    agrees(ctx, folder, "test_orthographic_path.xml", "test_orthographic", IMP_RGB);
+    agrees(ctx, folder, "test_orthographic_path.xml", "test_orthographic", IMP_MONO);
+    imp_context_destroy(ctx);
+    return tap_done();
+}
