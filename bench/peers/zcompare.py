@@ -94,8 +94,9 @@ def rounding(x):
     return (2e-5 * np.abs(x) + 1e-6) ** 2
 
 
-def compare(mean, se, batches):
-    """Per channel: z of the picture's mean, share of failing pixels, share of |z| > 2."""
+def compare(mean, se, batches, wide):
+    """Per channel: z of the picture's mean, share of failing pixels, share of |z| > 2. With a
+    wide filter pixels share samples: the mean's error is taken from Mitsuba's batches."""
     result = {}
     for name, stack in batches.items():
         if name not in mean:
@@ -112,6 +113,8 @@ def compare(mean, se, batches):
         failed = np.abs(z) > stats.norm.isf(alpha / 2)
         whole_b = stack.mean((1, 2))
         whole_a, whole_se = a.mean(), np.sqrt((se[name] ** 2).sum()) / a.size
+        if wide:
+            whole_se = whole_b.std(ddof=1) / np.sqrt(n)
         mean_z = float(z_equivalent(np.array(whole_a - whole_b.mean()),
                                     np.array(whole_se ** 2 + rounding(whole_a)),
                                     np.array(whole_b.var(ddof=1) / n), n - 1))
@@ -130,11 +133,13 @@ def compare(mean, se, batches):
 class Case:
     def __init__(self, name, words):
         self.name, self.mode, self.sensor, self.defines, self.spp = name, "rgb", 0, [], None
-        self.skip = []
+        self.skip, self.wide = [], False
         self.scene = words[0] if os.path.isabs(words[0]) else os.path.join(root, words[0])
         for w in words[1:]:
             if w == "mono":
                 self.mode = "mono"
+            elif w == "wide":
+                self.wide = True
             elif w.startswith("sensor:"):
                 self.sensor = int(w[7:])
             elif w.startswith("spp:"):
@@ -180,7 +185,7 @@ def main():
             report[case.name] = {"error": str(e)}
             bad += 1
             continue
-        rows = {k: r for k, r in compare(mean, se, batches).items() if k not in case.skip}
+        rows = {k: r for k, r in compare(mean, se, batches, case.wide).items() if k not in case.skip}
         if args.keep:
             os.makedirs(args.keep, exist_ok=True)
             np.savez(os.path.join(args.keep, case.name + ".npz"),
