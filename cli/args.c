@@ -119,8 +119,8 @@ static int store(const struct arg_option *o, const char *text)
 static void explain_value(const struct args_spec *spec, const struct arg_option *o,
                           const char *text)
 {
-    fprintf(stderr, "importon: %s: --%s %s is not good: expected ", spec->command, o->name,
-            text);
+    fprintf(stderr, "importon: %s: --%s %s is not good: expected ", spec->command,
+            o->name, text);
     switch (o->type) {
     case ARG_CHOICE:
         for (int i = 0; o->words[i]; i++)
@@ -195,7 +195,8 @@ int args_parse(const struct args_spec *spec, int argc, char **argv, int *first)
             return usage_error(spec);
         }
         if (c == '?' && o) { /* a flag was given a value */
-            fprintf(stderr, "importon: %s: --%s takes no value\n", spec->command, o->name);
+            fprintf(stderr, "importon: %s: --%s takes no value\n", spec->command,
+                    o->name);
             return usage_error(spec);
         }
         if (c == '?') {
@@ -222,8 +223,8 @@ int args_parse(const struct args_spec *spec, int argc, char **argv, int *first)
 
 void args_help(const struct args_spec *spec, FILE *to)
 {
-    fprintf(to, "usage: importon %s [options] %s\n\n%s\n\n", spec->command, spec->operands,
-            spec->summary);
+    fprintf(to, "usage: importon %s [options] %s\n\n%s\n\n", spec->command,
+            spec->operands, spec->summary);
     for (int g = 0; spec->group[g]; g++) {
         for (const struct arg_option *o = spec->group[g]; o->type; o++) {
             char left[64];

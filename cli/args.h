@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Command-line options from tables: one table says how an option is spelled, where its value
- * goes, which values are good and what help prints about it. */
+ * Command-line options from tables: one table says how an option is spelled, where its
+ * value goes, which values are good and what help prints about it. */
 #ifndef IMP_CLI_ARGS_H
 #define IMP_CLI_ARGS_H
 
@@ -43,15 +43,15 @@ struct args_spec {
     int min_operands, max_operands;                      /* max -1: any number */
 };
 
-/* Parse argv[1..]; operands are moved to the end of argv, *first is the index of the first.
- * Returns 0, or prints what is wrong on stderr and returns 2. */
+/* Parse argv[1..]; operands are moved to the end of argv, *first is the index of the
+ * first. Returns 0, or prints what is wrong on stderr and returns 2. */
 int args_parse(const struct args_spec *spec, int argc, char **argv, int *first);
 void args_help(const struct args_spec *spec, FILE *to);
 void args_list_add(struct arg_list *list, const char *item);
 void args_list_free(struct arg_list *list);
 
-/* The word of `words` (NULL-terminated) with the smallest edit distance, or NULL if none is
- * close. */
+/* The word of `words` (NULL-terminated) with the smallest edit distance, or NULL if none
+ * is close. */
 const char *args_nearest(const char *word, const char *const *words);
 
 #endif

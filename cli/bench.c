@@ -13,8 +13,8 @@
 
 static int repeats = 3;
 static const struct arg_option options[] = {
-    {ARG_INT, 0, "repeat", "N", "the best of N times is reported (default 3)", &repeats, 1,
-     1000, NULL},
+    {ARG_INT, 0, "repeat", "N", "the best of N times is reported (default 3)", &repeats,
+     1, 1000, NULL},
     {0}};
 
 struct times {
@@ -112,8 +112,8 @@ static void print(const struct times *t, size_t n)
         cli_json_end(&j);
         return;
     }
-    printf("%s: %.4g samples, %zu numbers with a gradient\n", cli.scene_path, t[0].samples,
-           t[0].n);
+    printf("%s: %.4g samples, %zu numbers with a gradient\n", cli.scene_path,
+           t[0].samples, t[0].n);
     printf("%-8s %-9s %-10s %-14s %-14s %-14s %s\n", "threads", "load s", "render s",
            "Msamples/s", "loss+grad s", "grad/render", "speed-up render, gradient");
     for (size_t i = 0; i < n; i++)
@@ -142,7 +142,8 @@ static int run_bench(int n, char **operand)
     int rc = 0;
     (void)n;
     if (!strcmp(operand[0], "-"))
-        return cli_error(EXIT_USAGE, "bench reads the scene more than once: not from stdin");
+        return cli_error(EXIT_USAGE,
+                         "bench reads the scene more than once: not from stdin");
     /* 1, 2, 4, ... and all. */
     for (int threads = 1; !rc && rounds < ROUNDS && threads <= most;) {
         if (rounds) close_scene();

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * importon check: are the gradients right? Adjoints against differences and identities. */
+ * importon check: are the gradients right? Adjoints against differences and identities.
+ */
 #include "command.h"
 #include "problem.h"
 #include "progress.h"
@@ -26,8 +27,8 @@ static void print_text(const struct imp_check_row *rows, size_t n)
     for (size_t i = 0; i < n; i++)
         if (rows[i].param && (int)strlen(rows[i].param) > width)
             width = (int)strlen(rows[i].param);
-    printf("%-7s %-*s %-8s %-15s %-15s %-9s %-9s %s\n", "method", width, "parameter", "step",
-           "value", "reference", "se", "error", "verdict");
+    printf("%-7s %-*s %-8s %-15s %-15s %-9s %-9s %s\n", "method", width, "parameter",
+           "step", "value", "reference", "se", "error", "verdict");
     for (size_t i = 0; i < n; i++) {
         const struct imp_check_row *r = &rows[i];
         char step[16] = "", se[16] = "";
@@ -40,8 +41,8 @@ static void print_text(const struct imp_check_row *rows, size_t n)
     }
 }
 
-static void print_json(const struct imp_run *run, const struct imp_check_row *rows, size_t n,
-                       size_t failed, size_t noisy)
+static void print_json(const struct imp_run *run, const struct imp_check_row *rows,
+                       size_t n, size_t failed, size_t noisy)
 {
     struct json j = cli_json();
     json_seed(&j, "seed", run->seed);

@@ -18,21 +18,22 @@ static const char *const progress_words[] = {"auto", "always", "never", NULL};
 const struct arg_option options_general[] = {
     {ARG_TEXT, 'o', "output", "FILE", "where the data goes; '-' is standard output",
      &cli.out, 0, 0, NULL},
-    {ARG_INT, 't', "threads", "N", "threads; 0: all cores (default)", &cli.threads, 0, 4096,
+    {ARG_INT, 't', "threads", "N", "threads; 0: all cores (default)", &cli.threads, 0,
+     4096, NULL},
+    {ARG_FLAG, 0, "json", NULL, "answer in JSON on standard output", &cli.json, 0, 0,
      NULL},
-    {ARG_FLAG, 0, "json", NULL, "answer in JSON on standard output", &cli.json, 0, 0, NULL},
     {ARG_CHOICE, 0, "progress", "WHEN", "auto (on a terminal), always or never",
      &cli.progress, 0, 0, progress_words},
-    {ARG_FLAG, 'q', "quiet", NULL, "say nothing but errors on standard error", &cli.quiet, 0,
-     0, NULL},
+    {ARG_FLAG, 'q', "quiet", NULL, "say nothing but errors on standard error", &cli.quiet,
+     0, 0, NULL},
     {ARG_FLAG, 'h', "help", NULL, "this text", &cli.help, 0, 0, NULL},
     {0}};
 
 const struct arg_option options_scene[] = {
     {ARG_LIST, 'D', "define", "NAME=VALUE", "set a $parameter of the scene file",
      &cli.defines, 0, 0, NULL},
-    {ARG_LIST, 0, "set", "ID=V[,V..]", "set a scene parameter ('importon info' lists them)",
-     &cli.sets, 0, 0, NULL},
+    {ARG_LIST, 0, "set", "ID=V[,V..]",
+     "set a scene parameter ('importon info' lists them)", &cli.sets, 0, 0, NULL},
     {ARG_TEXT, 'a', "search", "DIR[;DIR..]", "more folders to look for files in",
      &cli.search, 0, 0, NULL},
     {ARG_CHOICE, 'm', "mode", "MODE", "colour: rgb (default) or mono", &cli.mode, 0, 0,
@@ -45,12 +46,13 @@ const struct arg_option options_run[] = {
     {ARG_INT, 's', "sensor", "N", "which sensor, from 0", &cli.sensor, 0, 1e6, NULL},
     {ARG_INT, 0, "spp", "N", "samples per pixel; default: what the scene asks for",
      &cli.spp, 1, 1e9, NULL},
-    {ARG_SEED, 0, "seed", "N", "of the random numbers (default 0)", &cli.seed, 0, 0, NULL},
+    {ARG_SEED, 0, "seed", "N", "of the random numbers (default 0)", &cli.seed, 0, 0,
+     NULL},
     {ARG_NUMBER, 0, "time", "SECONDS", "stop after this time with what there is",
      &cli.time_s, 1e-3, 1e9, NULL},
     {0}};
 
-/* ---- Talking ------------------------------------------------------------------------ */
+/* ---- Talking --------------------------------------------- */
 
 int cli_error(int code, const char *format, ...)
 {
@@ -128,7 +130,7 @@ double cli_now(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* ---- Opening ------------------------------------------------------------------------- */
+/* ---- Opening --------------------------------------------- */
 
 static void on_log(enum imp_log_level level, const char *message, void *payload)
 {

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * What all commands share: the options every one understands, the context and scene they
- * work on, and how they end. A command is a table entry (main.c) with its own option table;
- * its run function returns an exit code. */
+ * work on, and how they end. A command is a table entry (main.c) with its own option
+ * table; its run function returns an exit code. */
 #ifndef IMP_CLI_COMMAND_H
 #define IMP_CLI_COMMAND_H
 
@@ -26,9 +26,9 @@ struct command {
     int (*run)(int n, char **operand);
     int prints; /* all its data is text, so -o stands for standard output */
 };
-extern const struct command command_render, command_gradient, command_jacobian, command_check,
-    command_fit, command_compare, command_info, command_bench, command_bend,
-    command_elements;
+extern const struct command command_render, command_gradient, command_jacobian,
+    command_check, command_fit, command_compare, command_info, command_bench,
+    command_bend, command_elements;
 
 /* Option tables, to be named in args_spec.group. */
 extern const struct arg_option options_general[], options_scene[], options_run[];
@@ -68,8 +68,8 @@ struct imp_run cli_run(void);
 /* Samples per pixel that `run` will take. */
 int cli_spp(const struct imp_run *run);
 
-/* Print "importon: what: message of the last error" and return the exit code that belongs to
- * `status`. `what` NULL: without it. */
+/* Print "importon: what: message of the last error" and return the exit code that belongs
+ * to `status`. `what` NULL: without it. */
 int cli_fail(enum imp_status status, const char *what);
 /* Print "importon: message" and return `code`. */
 int cli_error(int code, const char *format, ...) __attribute__((format(printf, 2, 3)));

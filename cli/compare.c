@@ -13,10 +13,10 @@ static struct {
 } o;
 
 static const struct arg_option options[] = {
-    {ARG_TEXT, 0, "variance", "FILE", "per-sample variance of the reference", &o.variance, 0,
-     0, NULL},
-    {ARG_NUMBER, 0, "spp-test", "N", "samples per pixel of the test picture", &o.n_test, 1,
-     1e15, NULL},
+    {ARG_TEXT, 0, "variance", "FILE", "per-sample variance of the reference", &o.variance,
+     0, 0, NULL},
+    {ARG_NUMBER, 0, "spp-test", "N", "samples per pixel of the test picture", &o.n_test,
+     1, 1e15, NULL},
     {ARG_NUMBER, 0, "spp-ref", "N", "samples per pixel of the reference (default: exact)",
      &o.n_reference, 1, 1e15, NULL},
     {ARG_NUMBER, 0, "floor", "V", "least variance (default 1e-4 of the squared mean)",

@@ -14,7 +14,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char *const optimizer_words[] = {"adam", "lm", "lbfgs", "mma", "slsqp", NULL};
+static const char *const optimizer_words[] = {"adam", "lm",    "lbfgs",
+                                              "mma",  "slsqp", NULL};
 
 static struct {
     int optimizer, iterations, no_intervals, resume, picture_spp;
@@ -27,21 +28,21 @@ static const struct arg_option options[] = {
      &o.optimizer, 0, 0, optimizer_words},
     {ARG_INT, 'n', "iterations", "N", "at most; default 200 (adam), 30 (others)",
      &o.iterations, 1, 1e9, NULL},
-    {ARG_NUMBER, 0, "lr", "RATE", "learning rate of adam (default 0.05)", &o.learning_rate,
-     1e-12, 1e6, NULL},
-    {ARG_NUMBER, 0, "tolerance", "T", "stop when relative steps stay below (default 1e-4)",
-     &o.tolerance, 1e-15, 1, NULL},
+    {ARG_NUMBER, 0, "lr", "RATE", "learning rate of adam (default 0.05)",
+     &o.learning_rate, 1e-12, 1e6, NULL},
+    {ARG_NUMBER, 0, "tolerance", "T",
+     "stop when relative steps stay below (default 1e-4)", &o.tolerance, 1e-15, 1, NULL},
     {ARG_FLAG, 0, "no-intervals", NULL, "do not estimate 95 % intervals at the end",
      &o.no_intervals, 0, 0, NULL},
     {ARG_TEXT, 0, "checkpoint", "FILE", "rewritten while the fit runs, and at Ctrl-C",
      &o.checkpoint, 0, 0, NULL},
-    {ARG_FLAG, 0, "resume", NULL, "go on from the checkpoint, if it is there", &o.resume, 0,
-     0, NULL},
+    {ARG_FLAG, 0, "resume", NULL, "go on from the checkpoint, if it is there", &o.resume,
+     0, 0, NULL},
     {ARG_INT, 0, "picture-spp", "N", "samples per pixel of the pictures written",
      &o.picture_spp, 1, 1e9, NULL},
     {0}};
 
-/* ---- Pictures --------------------------------------------------------------------------- */
+/* ---- Pictures --------------------------------------------- */
 
 /* "name.exr", or "name-1.exr" for the second of several targets. */
 static char *picture_path(const char *name, size_t i)
@@ -99,7 +100,8 @@ static int write_targets(void)
         memcpy(strrchr(path, '.'), ".png", 4);
         if (st == IMP_OK) {
             memcpy(imp_film_mean(film), t.pixels,
-                   (size_t)t.width * (size_t)t.height * (size_t)t.channels * sizeof(float));
+                   (size_t)t.width * (size_t)t.height * (size_t)t.channels *
+                       sizeof(float));
             st = imp_film_write(film, path, &w);
         }
         if (st != IMP_OK) rc = cli_fail(st, path);
@@ -110,7 +112,7 @@ static int write_targets(void)
     return rc;
 }
 
-/* ---- Numbers ---------------------------------------------------------------------------- */
+/* ---- Numbers --------------------------------------------- */
 
 static int write_history(const struct imp_fit_result *r)
 {
@@ -133,8 +135,8 @@ static int write_history(const struct imp_fit_result *r)
     return rc;
 }
 
-static void put_variable(struct json *j, const struct imp_fit_variable *v, const char *unit,
-                         const char *name)
+static void put_variable(struct json *j, const struct imp_fit_variable *v,
+                         const char *unit, const char *name)
 {
     json_object(j, NULL);
     json_text(j, "name", name);
@@ -213,7 +215,8 @@ static void print_table(const struct imp_fit_result *r, const struct block *bloc
     for (size_t k = 0; k < n_blocks; k++)
         if ((int)strlen(blocks[k].info.name) + 3 > width)
             width = (int)strlen(blocks[k].info.name) + 3;
-    printf("%-*s  %-11s %-11s %s\n", width, "parameter", "start", "value", "95 % interval");
+    printf("%-*s  %-11s %-11s %s\n", width, "parameter", "start", "value",
+           "95 % interval");
     for (size_t k = 0; k < n_blocks; k++) {
         const struct block *b = &blocks[k];
         char name[512];
@@ -246,7 +249,8 @@ static int write_textures(const imp_problem *problem, const struct block *blocks
     double *x = cli_alloc(imp_problem_n(problem), sizeof *x);
     imp_problem_get_x(problem, x);
     for (size_t k = 0; k < n_blocks && !rc; k++)
-        if (block_is_large(&blocks[k])) rc = block_write(&blocks[k], x, NULL, cli.out, &paths[k]);
+        if (block_is_large(&blocks[k]))
+            rc = block_write(&blocks[k], x, NULL, cli.out, &paths[k]);
     free(x);
     return rc;
 }
@@ -320,6 +324,7 @@ static int run_fit(int n, char **operand)
 
 const struct command command_fit = {
     {"fit", "SCENE --target FILE", "recover parameters from target pictures",
-     {options, options_targets, options_params, options_run, options_scene, options_general},
+     {options, options_targets, options_params, options_run,
+      options_scene, options_general},
      1, 1},
     run_fit, 0};

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * importon gradient: the derivative of a number with respect to the scene's parameters, with
- * standard errors. The number is a loss against target pictures; or the inner product of the
- * picture with a given adjoint image; or, with neither, the mean of the picture. */
+ * importon gradient: the derivative of a number with respect to the scene's parameters,
+ * with standard errors. The number is a loss against target pictures; or the inner
+ * product of the picture with a given adjoint image; or, with neither, the mean of the
+ * picture. */
 #include "command.h"
 #include "picture.h"
 #include "problem.h"
@@ -14,8 +15,8 @@
 
 static const char *adjoint_path;
 static const struct arg_option options[] = {
-    {ARG_TEXT, 0, "adjoint", "FILE", "derivative of sum(FILE * picture), in place of a loss",
-     &adjoint_path, 0, 0, NULL},
+    {ARG_TEXT, 0, "adjoint", "FILE",
+     "derivative of sum(FILE * picture), in place of a loss", &adjoint_path, 0, 0, NULL},
     {0}};
 
 struct result {
@@ -25,9 +26,9 @@ struct result {
     int rounds; /* of the run, each with spp samples */
 };
 
-/* sum(seed * picture) with its standard error. Pixels through a box filter are independent,
- * so squares of their errors add; the channels of a pixel share walks, so theirs are added
- * as they are: exact for grey, an upper bound for colours. */
+/* sum(seed * picture) with its standard error. Pixels through a box filter are
+ * independent, so squares of their errors add; the channels of a pixel share walks, so
+ * theirs are added as they are: exact for grey, an upper bound for colours. */
 static struct imp_estimate inner_product(imp_film *film, const float *seed)
 {
     struct imp_film_info info = {.size = sizeof info};
@@ -85,7 +86,8 @@ static enum imp_status estimate(imp_problem *problem, const struct imp_run *run,
                                 const float *seed, struct result *r)
 {
     imp_film *film = NULL;
-    if (!seed) return imp_problem_objective(problem, NULL, run, &r->value, r->grad, r->se);
+    if (!seed)
+        return imp_problem_objective(problem, NULL, run, &r->value, r->grad, r->se);
     enum imp_status st = imp_problem_reverse(problem, seed, run, r->grad, r->se);
     if (st == IMP_OK) st = imp_render(cli.scene, run, &film);
     if (st == IMP_OK) r->value = inner_product(film, seed);
@@ -132,8 +134,9 @@ static int estimate_for(imp_problem *problem, struct imp_run run, const float *s
 static int failed(enum imp_status st)
 {
     if (st != IMP_CANCELLED) return cli_fail(st, cli.scene_path);
-    return cli_error(cli_done(), "interrupted before the gradient was there; with --time, "
-                                 "what was done is kept");
+    return cli_error(cli_done(),
+                     "interrupted before the gradient was there; with --time, "
+                     "what was done is kept");
 }
 
 static int compute(imp_problem *problem, const struct imp_run *run, struct result *r)
@@ -154,7 +157,7 @@ static int compute(imp_problem *problem, const struct imp_run *run, struct resul
     return rc;
 }
 
-/* ---- Answers ---------------------------------------------------------------------------- */
+/* ---- Answers --------------------------------------------- */
 
 static void print_json(const struct imp_run *run, const struct result *r,
                        const struct block *blocks, size_t n_blocks, char **paths)
@@ -191,16 +194,18 @@ static void print_json(const struct imp_run *run, const struct result *r,
     cli_json_end(&j);
 }
 
-static void print_text(const struct result *r, const struct block *blocks, size_t n_blocks,
-                       char **paths)
+static void print_text(const struct result *r, const struct block *blocks,
+                       size_t n_blocks, char **paths)
 {
     int width = 9;
     for (size_t k = 0; k < n_blocks; k++)
         if ((int)strlen(blocks[k].info.name) + 3 > width)
             width = (int)strlen(blocks[k].info.name) + 3;
-    printf("%-*s  %-14.8g +- %.2g%s\n\n", width, r->functional, r->value.value, r->value.se,
+    printf("%-*s  %-14.8g +- %.2g%s\n\n", width, r->functional, r->value.value,
+           r->value.se,
            r->value.bias_order == 1   ? "  (biased, O(1/N))"
-           : r->value.bias_order == 2 ? "  (biased, O(1/N^2))" : "");
+           : r->value.bias_order == 2 ? "  (biased, O(1/N^2))"
+                                      : "");
     printf("%-*s  %-14s %-14s %s\n", width, "parameter", "value", "gradient", "se");
     for (size_t k = 0; k < n_blocks; k++) {
         const struct block *b = &blocks[k];
@@ -250,7 +255,8 @@ static int run_gradient(int n, char **operand)
     rc = compute(problem, &run, &r);
     if (!rc && cli.out) rc = make_folder(cli.out);
     for (size_t k = 0; k < n_blocks && !rc && cli.out; k++)
-        if (block_is_large(&blocks[k])) rc = block_write(&blocks[k], r.grad, r.se, cli.out, &paths[k]);
+        if (block_is_large(&blocks[k]))
+            rc = block_write(&blocks[k], r.grad, r.se, cli.out, &paths[k]);
     if (!rc) {
         if (cli.json) print_json(&run, &r, blocks, n_blocks, paths);
         else print_text(&r, blocks, n_blocks, paths);
@@ -267,6 +273,12 @@ static int run_gradient(int n, char **operand)
 }
 
 const struct command command_gradient = {
-    {"gradient", "SCENE", "derivatives of a loss (or of the picture's mean), with errors",
-     {options, options_targets, options_params, options_run, options_scene, options_general}, 1, 1},
-    run_gradient, 0};
+    {"gradient",
+     "SCENE",
+     "derivatives of a loss (or of the picture's mean), with errors",
+     {options, options_targets, options_params, options_run, options_scene,
+      options_general},
+     1,
+     1},
+    run_gradient,
+    0};

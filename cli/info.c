@@ -68,11 +68,13 @@ static int print_params(struct json *j)
     int width = 4;
     for (size_t i = 0; i < n; i++) {
         struct imp_param_info p = {.size = sizeof p};
-        if (imp_scene_get_param(cli.scene, i, &p) == IMP_OK && (int)strlen(p.name) > width)
+        if (imp_scene_get_param(cli.scene, i, &p) == IMP_OK &&
+            (int)strlen(p.name) > width)
             width = (int)strlen(p.name);
     }
-    if (!j) printf("\n%-*s  %-32s %-16s %-14s %s\n", width, "name", "value", "bounds", "unit",
-                   "gradient");
+    if (!j)
+        printf("\n%-*s  %-32s %-16s %-14s %s\n", width, "name", "value", "bounds", "unit",
+               "gradient");
     for (size_t i = 0; i < n; i++) {
         struct imp_param_info p = {.size = sizeof p};
         char value[96] = "", bounds[48];
@@ -140,8 +142,9 @@ static int run_info(int n, char **operand)
     for (int i = 0; i < s.n_sensors; i++) {
         struct imp_sensor_info c = {.size = sizeof c};
         if (imp_scene_get_sensor(cli.scene, i, &c) != IMP_OK) continue;
-        printf("sensor %d: %s (%s), %d x %d, %d samples per pixel, %s filter of radius %g\n",
-               i, c.name, c.type, c.width, c.height, c.spp, c.filter, c.filter_radius);
+        printf(
+            "sensor %d: %s (%s), %d x %d, %d samples per pixel, %s filter of radius %g\n",
+            i, c.name, c.type, c.width, c.height, c.spp, c.filter, c.filter_radius);
     }
     return print_params(NULL);
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * importon jacobian: one picture per control, dI/dtheta, all from one set of walks. A colour
- * is one control: lane c of a picture depends on lane c of a colour only, so the three
- * derivatives share one picture without loss (CONVENTIONS.md). */
+ * importon jacobian: one picture per control, dI/dtheta, all from one set of walks. A
+ * colour is one control: lane c of a picture depends on lane c of a colour only, so the
+ * three derivatives share one picture without loss (CONVENTIONS.md). */
 #include "command.h"
 #include "picture.h"
 #include "problem.h"
@@ -13,10 +13,10 @@
 #include <string.h>
 
 static int separate;
-static const struct arg_option options[] = {
-    {ARG_FLAG, 0, "separate", NULL, "one picture per number, also for colours", &separate, 0,
-     0, NULL},
-    {0}};
+static const struct arg_option options[] = {{ARG_FLAG, 0, "separate", NULL,
+                                             "one picture per number, also for colours",
+                                             &separate, 0, 0, NULL},
+                                            {0}};
 
 /* Sum of the films of one colour; they do not overlap, so errors add in squares. */
 static void add_film(imp_film *sum, imp_film *film)
@@ -105,8 +105,9 @@ static int run_jacobian(int n, char **operand)
     (void)n;
     int rc = cli_load(operand[0]);
     if (rc) return rc;
-    if (!cli.out) return cli_error(EXIT_USAGE, "jacobian: -o DIR is needed: a picture for "
-                                               "each control goes there");
+    if (!cli.out)
+        return cli_error(EXIT_USAGE, "jacobian: -o DIR is needed: a picture for "
+                                     "each control goes there");
     rc = problem_open(&problem);
     if (rc) return rc;
     const struct imp_run run = cli_run();

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A JSON writer: always valid JSON, on one line. What is not finite becomes null. `key` is
- * NULL inside arrays and for the outermost value. */
+ * A JSON writer: always valid JSON, on one line. What is not finite becomes null. `key`
+ * is NULL inside arrays and for the outermost value. */
 #ifndef IMP_CLI_JSON_H
 #define IMP_CLI_JSON_H
 

@@ -72,7 +72,8 @@ int main(int argc, char **argv)
     cli.name = command->args.command;
     cli.argc = argc - 1;
     cli.argv = cli_alloc((size_t)argc, sizeof *cli.argv);
-    memcpy(cli.argv, argv + 1, (size_t)(argc - 1) * sizeof *argv); /* getopt reorders argv */
+    memcpy(cli.argv, argv + 1,
+           (size_t)(argc - 1) * sizeof *argv); /* getopt reorders argv */
     /* --help needs no operands. */
     for (int i = 2; i < argc && strcmp(argv[i], "--"); i++)
         if (!strcmp(argv[i], "--help") || !strcmp(argv[i], "-h")) {

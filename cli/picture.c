@@ -16,7 +16,7 @@
 /* Luminance of linear sRGB, as the scene format defines it (section 2). */
 static const double luminance[3] = {0.212671, 0.715160, 0.072169};
 
-/* ---- Files ---------------------------------------------------------------------------- */
+/* ---- Files --------------------------------------------- */
 
 char *join_path(const char *folder, const char *name)
 {
@@ -124,9 +124,10 @@ int picture_write(const imp_film *film, const char *path, const struct picture_o
     return st == IMP_OK ? 0 : cli_fail(st, NULL);
 }
 
-/* ---- Provenance ------------------------------------------------------------------------ */
+/* ---- Provenance --------------------------------------------- */
 
-/* Append `word` to a shell command line, quoted where the shell would split or expand it. */
+/* Append `word` to a shell command line, quoted where the shell would split or expand it.
+ */
 static void quote_word(FILE *f, const char *word)
 {
     const char *p = word;
@@ -177,7 +178,7 @@ void picture_stamp(imp_film *film, const struct imp_run *run)
         set_text(film, "importon.time", text);
 }
 
-/* ---- Targets --------------------------------------------------------------------------- */
+/* ---- Targets --------------------------------------------- */
 
 static int channel_index(imp_film *film, int n, const char *name)
 {
@@ -235,7 +236,8 @@ static char *split_sensor(const char *spec, int *sensor)
 
 int picture_target(const char *spec, const char *mask, struct imp_target *target)
 {
-    struct imp_film_info info = {.size = sizeof info}, mask_info = {.size = sizeof mask_info};
+    struct imp_film_info info = {.size = sizeof info},
+                         mask_info = {.size = sizeof mask_info};
     struct imp_scene_info scene = {.size = sizeof scene};
     imp_film *film = NULL, *weights = NULL;
     int index[3], sensor = cli.sensor;
@@ -261,7 +263,8 @@ int picture_target(const char *spec, const char *mask, struct imp_target *target
         imp_film_get_info(weights, &mask_info);
         if (mask_info.width != info.width || mask_info.height != info.height) {
             rc = cli_error(EXIT_USAGE, "%s is %d x %d, but %s is %d x %d", mask,
-                           mask_info.width, mask_info.height, path, info.width, info.height);
+                           mask_info.width, mask_info.height, path, info.width,
+                           info.height);
             goto out;
         }
         colour_channels(weights, mask_info.channels, index);

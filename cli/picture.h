@@ -21,11 +21,12 @@ struct picture_options {
     double exposure;
 };
 /* Write `path` ("-": EXR to stdout) and, unless it is a PNG itself, a PNG beside it. */
-int picture_write(const imp_film *film, const char *path, const struct picture_options *o);
+int picture_write(const imp_film *film, const char *path,
+                  const struct picture_options *o);
 
-/* A target for a loss: "FILE[@SENSOR]", with an optional mask file (NULL: none). Pixels are
- * brought to the scene's channels: its R, G, B, or its Y, or in mono mode their luminance.
- * target->pixels, weights and noise_se are to be freed. */
+/* A target for a loss: "FILE[@SENSOR]", with an optional mask file (NULL: none). Pixels
+ * are brought to the scene's channels: its R, G, B, or its Y, or in mono mode their
+ * luminance. target->pixels, weights and noise_se are to be freed. */
 int picture_target(const char *spec, const char *mask, struct imp_target *target);
 void picture_target_free(struct imp_target *target);
 

@@ -9,8 +9,9 @@
 
 enum { WIDTH = 720, HEIGHT = 440, LEFT = 84, RIGHT = 24, TOP = 44, BOTTOM = 58 };
 
-/* y is drawn as asinh(y / (2 unit)): logarithmic where |y| is far above `unit`, linear below.
- * An unbiased loss may be negative near its end, and such a scale has room for it. */
+/* y is drawn as asinh(y / (2 unit)): logarithmic where |y| is far above `unit`, linear
+ * below. An unbiased loss may be negative near its end, and such a scale has room for it.
+ */
 struct axes {
     double n;
     double unit;
@@ -96,14 +97,15 @@ static void put_band(FILE *f, const struct axes *a, size_t n, const double *y,
 {
     fprintf(f, "<path fill=\"#c8d4f0\" d=\"");
     for (size_t i = 0; i < n; i++)
-        fprintf(f, "%c%.2f %.2f ", i ? 'L' : 'M', x_at(a, (double)i), y_at(a, y[i] + se[i]));
+        fprintf(f, "%c%.2f %.2f ", i ? 'L' : 'M', x_at(a, (double)i),
+                y_at(a, y[i] + se[i]));
     for (size_t i = n; i-- > 0;)
         fprintf(f, "L%.2f %.2f ", x_at(a, (double)i), y_at(a, y[i] - se[i]));
     fprintf(f, "Z\"/>\n");
 }
 
-int plot_curve(const char *path, const char *title, const char *x_label, const char *y_label,
-               size_t n, const double *y, const double *se)
+int plot_curve(const char *path, const char *title, const char *x_label,
+               const char *y_label, size_t n, const double *y, const double *se)
 {
     const struct axes a = find_axes(n, y, se);
     int finite = 1;
@@ -121,14 +123,17 @@ int plot_curve(const char *path, const char *title, const char *x_label, const c
     fprintf(f, "<path fill=\"none\" stroke=\"#3060c0\" stroke-width=\"2\" d=\"");
     for (size_t i = 0, started = 0; i < n; i++) {
         if (!isfinite(y[i])) continue;
-        fprintf(f, "%c%.2f %.2f ", started ? 'L' : 'M', x_at(&a, (double)i), y_at(&a, y[i]));
+        fprintf(f, "%c%.2f %.2f ", started ? 'L' : 'M', x_at(&a, (double)i),
+                y_at(&a, y[i]));
         started = 1;
     }
     fprintf(f, "\"/>\n<text x=\"%d\" y=\"26\" text-anchor=\"middle\" font-size=\"16\">%s"
                "</text>\n", WIDTH / 2, title);
     put_tick(f, (LEFT + WIDTH - RIGHT) / 2.0, HEIGHT - 14, "middle", x_label);
-    fprintf(f, "<text transform=\"translate(20 %d) rotate(-90)\" text-anchor=\"middle\">%s"
-               "</text>\n</svg>\n", (TOP + HEIGHT - BOTTOM) / 2, y_label);
+    fprintf(f,
+            "<text transform=\"translate(20 %d) rotate(-90)\" text-anchor=\"middle\">%s"
+            "</text>\n</svg>\n",
+            (TOP + HEIGHT - BOTTOM) / 2, y_label);
     if (fclose(f) != 0) return cli_error(EXIT_RUN, "%s: %s", path, strerror(errno));
     return 0;
 }

@@ -6,7 +6,7 @@
 
 /* An SVG file of y [n] against 0, 1, .. n-1, with a band of one standard error (se may be
  * NULL). 0, or an exit code with the reason printed. */
-int plot_curve(const char *path, const char *title, const char *x_label, const char *y_label,
-               size_t n, const double *y, const double *se);
+int plot_curve(const char *path, const char *title, const char *x_label,
+               const char *y_label, size_t n, const double *y, const double *se);
 
 #endif

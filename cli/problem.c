@@ -13,13 +13,15 @@ static const enum imp_loss losses[] = {IMP_LOSS_L2, IMP_LOSS_RELATIVE_L2, IMP_LO
                                        IMP_LOSS_LOG};
 
 const struct arg_option options_params[] = {
-    {ARG_LIST, 'p', "param", "GLOB", "active parameters: a name or a pattern (default '*')",
-     &problem_options.params, 0, 0, NULL},
+    {ARG_LIST, 'p', "param", "GLOB",
+     "active parameters: a name or a pattern (default '*')", &problem_options.params, 0,
+     0, NULL},
     {0}};
 
 const struct arg_option options_targets[] = {
-    {ARG_LIST, 'T', "target", "FILE[@N]", "picture to match, through sensor N; repeatable",
-     &problem_options.targets, 0, 0, NULL},
+    {ARG_LIST, 'T', "target", "FILE[@N]",
+     "picture to match, through sensor N; repeatable", &problem_options.targets, 0, 0,
+     NULL},
     {ARG_LIST, 0, "mask", "FILE", "weights of the pixels, one for each --target in order",
      &problem_options.masks, 0, 0, NULL},
     {ARG_CHOICE, 0, "loss", "LOSS", "l2 (default), relative, l1 or log",
@@ -54,8 +56,8 @@ static int split_weight(const char *option, const char *text, char **glob, doubl
 }
 
 enum regulariser { TIKHONOV, STAY, SMOOTH };
-static int add_regularisers(imp_problem *problem, enum regulariser kind, const char *option,
-                            const struct arg_list *list)
+static int add_regularisers(imp_problem *problem, enum regulariser kind,
+                            const char *option, const struct arg_list *list)
 {
     for (size_t i = 0; i < list->n; i++) {
         char *glob = NULL;
@@ -63,8 +65,9 @@ static int add_regularisers(imp_problem *problem, enum regulariser kind, const c
         int rc = split_weight(option, list->item[i], &glob, &weight);
         if (rc) return rc;
         const enum imp_status st =
-            kind == SMOOTH ? imp_problem_add_smoothness(problem, glob, weight)
-                           : imp_problem_add_tikhonov(problem, glob, weight, kind == STAY);
+            kind == SMOOTH
+                ? imp_problem_add_smoothness(problem, glob, weight)
+                : imp_problem_add_tikhonov(problem, glob, weight, kind == STAY);
         free(glob);
         if (st != IMP_OK) return cli_fail(st, cli.scene_path);
     }
@@ -75,7 +78,8 @@ static int add_targets(imp_problem *problem)
 {
     const struct problem_options *o = &problem_options;
     if (o->masks.n > o->targets.n)
-        return cli_error(EXIT_USAGE, "%zu masks for %zu targets", o->masks.n, o->targets.n);
+        return cli_error(EXIT_USAGE, "%zu masks for %zu targets", o->masks.n,
+                         o->targets.n);
     for (size_t i = 0; i < o->targets.n; i++) {
         struct imp_target target = IMP_TARGET_INIT;
         const char *mask = i < o->masks.n ? o->masks.item[i] : NULL;
@@ -150,15 +154,17 @@ void block_json(struct json *j, const struct block *b)
     json_text(j, "unit", b->info.unit);
 }
 
-int block_write(const struct block *b, const double *x, const double *se, const char *folder,
-                char **path)
+int block_write(const struct block *b, const double *x, const double *se,
+                const char *folder, char **path)
 {
     const struct imp_param_info *p = &b->info;
     const size_t last = p->n_dims > 0 ? p->dims[p->n_dims - 1] : 1;
-    const size_t channels =
-        p->n_dims == 3 && (last == 1 || last == 3) ? last : p->n_dims == 2 && last == 3 ? 3 : 1;
-    const size_t width =
-        p->n_dims == 3 || (p->n_dims == 2 && channels == 1) ? p->dims[1] : b->n / channels;
+    const size_t channels = p->n_dims == 3 && (last == 1 || last == 3) ? last
+                            : p->n_dims == 2 && last == 3              ? 3
+                                                                       : 1;
+    const size_t width = p->n_dims == 3 || (p->n_dims == 2 && channels == 1)
+                             ? p->dims[1]
+                             : b->n / channels;
     const size_t height = b->n / channels / (width ? width : 1);
     const struct picture_options o = {.diverging = se != NULL};
     static const char *const channel_names[2][2] = {{"Y", "Y,se.Y"},

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The options that say which parameters, which targets, which loss; and the imp_problem they
- * make. Shared by gradient, jacobian, check and fit. */
+ * The options that say which parameters, which targets, which loss; and the imp_problem
+ * they make. Shared by gradient, jacobian, check and fit. */
 #ifndef IMP_CLI_PROBLEM_H
 #define IMP_CLI_PROBLEM_H
 
@@ -30,11 +30,12 @@ struct block *problem_blocks(const imp_problem *problem, size_t *n_blocks);
 int block_is_large(const struct block *b);
 /* {"name":..,"unit":..} and what the caller adds before json_end_object. */
 void block_json(struct json *j, const struct block *b);
-/* A texture's numbers as a picture in `folder`, named by the parameter: `x` in plain colours,
- * or, with `se` of the same length, signed. [h][w] or [h][w][1 or 3]; what has another shape
- * is a row. *path is to be freed. 0, or an exit code with the reason printed. */
-int block_write(const struct block *b, const double *x, const double *se, const char *folder,
-                char **path);
+/* A texture's numbers as a picture in `folder`, named by the parameter: `x` in plain
+ * colours, or, with `se` of the same length, signed. [h][w] or [h][w][1 or 3]; what has
+ * another shape is a row. *path is to be freed. 0, or an exit code with the reason
+ * printed. */
+int block_write(const struct block *b, const double *x, const double *se,
+                const char *folder, char **path);
 const char *loss_word(void);
 
 #endif

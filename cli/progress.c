@@ -21,8 +21,10 @@ static void on_interrupt(int signal_number)
 
 void progress_init(enum progress_mode mode)
 {
-    /* SA_RESETHAND: the second signal finds the default action, which ends the process. */
-    const struct sigaction action = {.sa_handler = on_interrupt, .sa_flags = SA_RESETHAND};
+    /* SA_RESETHAND: the second signal finds the default action, which ends the process.
+     */
+    const struct sigaction action = {.sa_handler = on_interrupt,
+                                     .sa_flags = SA_RESETHAND};
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
     signal(SIGXFSZ, SIG_IGN); /* over a size limit writes fail, as on a full disk */
@@ -41,8 +43,14 @@ static double seconds_now(void)
     clock_gettime(CLOCK_MONOTONIC, &t);
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
-void progress_deadline(double seconds) { deadline = seconds > 0 ? seconds_now() + seconds : 0; }
-static int shall_stop(void) { return stop_asked || (deadline > 0 && seconds_now() > deadline); }
+void progress_deadline(double seconds)
+{
+    deadline = seconds > 0 ? seconds_now() + seconds : 0;
+}
+static int shall_stop(void)
+{
+    return stop_asked || (deadline > 0 && seconds_now() > deadline);
+}
 
 void progress_clear(void)
 {
@@ -84,9 +92,9 @@ int progress_report(const struct imp_progress *p, void *payload)
     format_time(p->eta_s, eta, sizeof eta);
     format_time(p->elapsed_s, elapsed, sizeof elapsed);
     format_rate(p->rate, p->rate_unit, rate, sizeof rate);
-    fprintf(stderr, "\r\033[K%-8s [%s] %3.0f%% %s ETA %s%s%s%s%s", p->stage ? p->stage : "",
-            bar, 100 * fraction, elapsed, eta, rate[0] ? "  " : "", rate,
-            p->note ? "  " : "", p->note ? p->note : "");
+    fprintf(stderr, "\r\033[K%-8s [%s] %3.0f%% %s ETA %s%s%s%s%s",
+            p->stage ? p->stage : "", bar, 100 * fraction, elapsed, eta,
+            rate[0] ? "  " : "", rate, p->note ? "  " : "", p->note ? p->note : "");
     fflush(stderr);
     drawn = 1;
     return shall_stop();

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The progress bar on stderr, and Ctrl-C: the first asks the library to stop after what it
- * is doing, and results so far are written; the second ends the process at once. */
+ * The progress bar on stderr, and Ctrl-C: the first asks the library to stop after what
+ * it is doing, and results so far are written; the second ends the process at once. */
 #ifndef IMP_CLI_PROGRESS_H
 #define IMP_CLI_PROGRESS_H
 

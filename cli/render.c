@@ -19,19 +19,20 @@ static struct {
 static const struct arg_option options[] = {
     {ARG_FLAG, 0, "se", NULL, "add the standard error of every channel to the EXR file",
      &o.picture.standard_error, 0, 0, NULL},
-    {ARG_FLAG, 0, "half", NULL, "16-bit floats in the EXR file", &o.picture.half, 0, 0, NULL},
+    {ARG_FLAG, 0, "half", NULL, "16-bit floats in the EXR file", &o.picture.half, 0, 0,
+     NULL},
     {ARG_NUMBER, 0, "exposure", "STOPS", "of the PNG preview", &o.picture.exposure, -100,
      100, NULL},
     {ARG_FLAG, 0, "no-preview", NULL, "write no PNG beside the picture",
      &o.picture.no_preview, 0, 0, NULL},
-    {ARG_PAIR, 0, "pixel", "X,Y", "print one walk of this pixel, vertex by vertex", o.pixel,
-     0, 0, NULL},
+    {ARG_PAIR, 0, "pixel", "X,Y", "print one walk of this pixel, vertex by vertex",
+     o.pixel, 0, 0, NULL},
     {ARG_INT, 0, "sample", "K", "which walk of the pixel (default 0)", &o.sample, 0, 1e9,
      NULL},
     {ARG_TEXT, 0, "paths", "FILE", "write walks all over the picture, one JSON a line",
      &o.paths, 0, 0, NULL},
-    {ARG_INT, 0, "count", "N", "how many walks for --paths (default 100)", &o.count, 1, 1e7,
-     NULL},
+    {ARG_INT, 0, "count", "N", "how many walks for --paths (default 100)", &o.count, 1,
+     1e7, NULL},
     {0}};
 
 static int describe(const struct imp_run *run, int x, int y, int64_t sample, int json,
@@ -48,8 +49,8 @@ static int describe(const struct imp_run *run, int x, int y, int64_t sample, int
     return 0;
 }
 
-/* Walks spread evenly over the picture by the golden ratio and its square in two dimensions
- * (the R2 sequence, M. Roberts 2018). */
+/* Walks spread evenly over the picture by the golden ratio and its square in two
+ * dimensions (the R2 sequence, M. Roberts 2018). */
 static int write_paths(const struct imp_run *run)
 {
     struct imp_sensor_info info = {.size = sizeof info};
@@ -74,7 +75,8 @@ static char *default_output(const struct imp_run *run)
 {
     struct imp_sensor_info info = {.size = sizeof info};
     const char *extension = "exr";
-    if (imp_scene_get_sensor(cli.scene, run->sensor, &info) == IMP_OK && info.file_format) {
+    if (imp_scene_get_sensor(cli.scene, run->sensor, &info) == IMP_OK &&
+        info.file_format) {
         if (!strcmp(info.file_format, "pfm")) extension = "pfm";
         if (!strcmp(info.file_format, "rgbe")) extension = "hdr";
     }
@@ -93,12 +95,15 @@ static void report(const char *path, imp_film *film, const struct imp_run *run)
     struct imp_film_info info = {.size = sizeof info};
     imp_film_get_info(film, &info);
     cli_say("%s: %d x %d, %lld samples per pixel%s", path, info.width, info.height,
-            (long long)info.spp, !progress_interrupted() ? ""
-            : info.spp ? ", interrupted"
-                       : ", interrupted in the first pass: a part of the picture is there");
+            (long long)info.spp,
+            !progress_interrupted() ? ""
+            : info.spp
+                ? ", interrupted"
+                : ", interrupted in the first pass: a part of the picture is there");
     if (info.dropped)
-        cli_say("importon: warning: %llu walks dropped: a value was not finite or negative",
-                (unsigned long long)info.dropped);
+        cli_say(
+            "importon: warning: %llu walks dropped: a value was not finite or negative",
+            (unsigned long long)info.dropped);
     if (!cli.json || !strcmp(path, "-")) return;
     struct json j = cli_json();
     json_text(&j, "file", path);

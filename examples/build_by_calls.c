@@ -3,8 +3,8 @@
  * build_by_calls: a scene without a file. The calls mirror the file format: begin and end
  * open and close an object, the others give it properties.
  *
- * A point light of intensity I at height h over a diffuse floor of reflectance rho: straight
- * below it the irradiance is I / h^2, so the floor's radiance there is
+ * A point light of intensity I at height h over a diffuse floor of reflectance rho:
+ * straight below it the irradiance is I / h^2, so the floor's radiance there is
  *
  *     L = (rho / pi) I / h^2.
  *

@@ -7,9 +7,9 @@
  *
  *     dI/drho = 1/N sum_i sum_k (w_1 .. w_{k-1}) (dw_k/drho) (w_{k+1} .. w_m Le)
  *
- * over the vertices k of walk i (gradients of the walk's factors, one at a time). It is the
- * forward derivative J v, with v = 1 for the wall's three numbers: red changes red only, so
- * one picture holds all three derivatives.
+ * over the vertices k of walk i (gradients of the walk's factors, one at a time). It is
+ * the forward derivative J v, with v = 1 for the wall's three numbers: red changes red
+ * only, so one picture holds all three derivatives.
  */
 #include <importon/importon.h>
 #include <stdio.h>

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * nlopt_fit: an optimiser of somebody else's. imp_problem_nlopt has the callback shape of
- * NLopt, so any of its algorithms fits a scene. The picture of a ball (reflectance rho) under
- * a sky (radiance E) has
+ * NLopt, so any of its algorithms fits a scene. The picture of a ball (reflectance rho)
+ * under a sky (radiance E) has
  *
  *     I_ball = rho E,    I_sky = E,    J = 1/2 sum (I - T)^2,
  *
- * and both numbers follow from one picture that shows ball and sky. The seed is the same in
- * every call: with common random numbers J is an ordinary smooth function, which is what
- * L-BFGS expects.
+ * and both numbers follow from one picture that shows ball and sky. The seed is the same
+ * in every call: with common random numbers J is an ordinary smooth function, which is
+ * what L-BFGS expects.
  */
 #include <importon/importon.h>
 #include <math.h>
@@ -93,8 +93,8 @@ int main(void)
 
     options.mode = IMP_MONO; /* one number each */
     if (st == IMP_OK)
-        st = imp_scene_load_string(context, scene_xml, strlen(scene_xml), "ball", &options,
-                                   &scene);
+        st = imp_scene_load_string(context, scene_xml, strlen(scene_xml), "ball",
+                                   &options, &scene);
     if (st == IMP_OK) st = make_target(scene, &film);
     if (st == IMP_OK) st = imp_problem_create(scene, &problem);
     if (st == IMP_OK) st = imp_problem_activate(problem, "ball.reflectance.value");
@@ -122,6 +122,8 @@ int main(void)
     imp_problem_destroy(problem);
     imp_scene_destroy(scene);
     imp_context_destroy(context);
-    return st == IMP_OK && fabs(x[at_ball] - 0.25) < 0.01 && fabs(x[1 - at_ball] - 2) < 0.02
-               ? 0 : 1;
+    return st == IMP_OK && fabs(x[at_ball] - 0.25) < 0.01 &&
+                   fabs(x[1 - at_ball] - 2) < 0.02
+               ? 0
+               : 1;
 }

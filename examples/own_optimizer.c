@@ -1,15 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * own_optimizer: a host with its own optimiser. A grey ball of unknown reflectance rho under
- * a white sky; the target is the picture of rho = 0.3. Plain gradient descent,
+ * own_optimizer: a host with its own optimiser. A grey ball of unknown reflectance rho
+ * under a white sky; the target is the picture of rho = 0.3. Plain gradient descent,
  *
  *     J(rho) = 1/2 sum_pixels (I(rho) - T)^2,    rho <- rho - a dJ/drho,
  *
- * with loss and gradient from one call (imp_problem_objective), fresh random numbers in each
- * step, and the standard error of the gradient as the rule to stop: |dJ/drho| < 2 se.
+ * with loss and gradient from one call (imp_problem_objective), fresh random numbers in
+ * each step, and the standard error of the gradient as the rule to stop: |dJ/drho| < 2
+ * se.
  *
- * The ball fills the picture of P pixels and a convex body under a sky of 1 has radiance rho,
- * so J'' = 3 P and a = 1 / (6 P) halves the error in every step.
+ * The ball fills the picture of P pixels and a convex body under a sky of 1 has radiance
+ * rho, so J'' = 3 P and a = 1 / (6 P) halves the error in every step.
  */
 #include <importon/importon.h>
 #include <math.h>

@@ -2,8 +2,8 @@
  *
  * render SCENE OUT.exr: the smallest complete program.
  *
- * A pixel is the mean of the radiance L over its area and over the light that arrives from
- * everywhere, estimated by N random walks (Kajiya 1986):
+ * A pixel is the mean of the radiance L over its area and over the light that arrives
+ * from everywhere, estimated by N random walks (Kajiya 1986):
  *
  *     I = 1/N sum_i L_i,    se = sqrt( sum_i (L_i - I)^2 / (N (N - 1)) )
  */
