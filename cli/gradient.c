@@ -273,12 +273,8 @@ static int run_gradient(int n, char **operand)
 }
 
 const struct command command_gradient = {
-    {"gradient",
-     "SCENE",
-     "derivatives of a loss (or of the picture's mean), with errors",
+    {"gradient", "SCENE", "derivatives of a loss (or of the picture's mean), with errors",
      {options, options_targets, options_params, options_run, options_scene,
       options_general},
-     1,
-     1},
-    run_gradient,
-    0};
+     1, 1},
+    run_gradient, 0};
