@@ -89,12 +89,18 @@ const char *imp_last_error(const imp_context *ctx)
     return e ? e->text : "";
 }
 
+/* Said where there is no memory for a text of its own. */
+static const struct imp__error_text no_memory = {NULL, "out of memory"};
+
 static struct imp__error_text *error_text(imp_context *ctx)
 {
     struct imp__error_text *e = pthread_getspecific(ctx->error_key);
-    if (e) return e;
+    if (e && e != &no_memory) return e;
     e = imp__alloc(ctx, 1, sizeof *e);
-    if (!e) return NULL;
+    if (!e) {
+        pthread_setspecific(ctx->error_key, &no_memory);
+        return NULL;
+    }
     if (pthread_setspecific(ctx->error_key, e) != 0) {
         imp__release(ctx, e);
         return NULL;

@@ -51,9 +51,8 @@ static enum imp_status header_write(struct exr_writer *w)
         const exr_result_t code =
             exr_attr_set_string(w->exr, part, f->texts[i].key, f->texts[i].value);
         if (code != EXR_ERR_SUCCESS) {
-            imp__exr_error(w->io, code);
-            IMP_TRY(
-                imp__error_prefix(w->io->ctx, IMP_E_ARG, "text '%s'", f->texts[i].key));
+            st = imp__exr_error(w->io, code);
+            IMP_TRY(imp__error_prefix(w->io->ctx, st, "text '%s'", f->texts[i].key));
         }
     }
     if (f->spp > 0) {
