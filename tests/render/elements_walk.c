@@ -67,6 +67,45 @@ static void diffuse(imp_context *ctx, const char *file, const char *name, int sp
     imp_scene_destroy(s);
 }
 
+/* Derivatives of the mean picture: adjoint elements against the library's walks. */
+static void gradient(imp_context *ctx)
+{
+    imp_scene *s = test_scene(ctx, "elements/b.xml", IMP_MONO, "res=32");
+    imp_problem *p = test_problem(ctx, s, "*");
+    static float seed[RES * RES];
+    double g[64], se[64];
+    struct imp_run run = IMP_RUN_INIT;
+    const size_t n = imp_problem_n(p);
+    for (int k = 0; k < RES * RES; k++) seed[k] = 1.0f / (RES * RES);
+    run.spp = 256;
+    if (n > 64) return;
+    test_must(ctx, imp_problem_reverse(p, seed, &run, g, se));
+    struct imp_elements_options o = IMP_ELEMENTS_OPTIONS_INIT;
+    const struct imp_elements_row *rows;
+    imp_elements *e;
+    size_t n_rows;
+    o.stop = -1;
+    o.eps_last = 1e-5;
+    test_must(ctx, imp_elements_create(s, &o, &e));
+    test_must(ctx, imp_elements_solve(e));
+    test_must(ctx, imp_elements_sensitivity(e, &rows, &n_rows));
+    for (size_t i = 0; i < n; i++) {
+        size_t param;
+        test_must(ctx, imp_problem_variable(p, i, &param, NULL, NULL, NULL));
+        for (size_t k = 0; k < n_rows; k++)
+            if (rows[k].param == (int)param) {
+                const double off = rows[k].derivative - g[i];
+                /* 3 standard errors, and 2 % for the mesh: at 160,000 links. */
+                tap_ok(fabs(off) < 3 * se[i] + 0.02 * fabs(g[i]) && se[i] < 0.05 * fabs(g[i]),
+                       "d mean / d %s # %.5g walks %.5g se %.2g z %.2f", rows[k].name,
+                       rows[k].derivative, g[i], se[i], off / se[i]);
+            }
+    }
+    imp_elements_destroy(e);
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+}
+
 /* ---- Scene d: beams and glossy walls ------------------------------------------------------- */
 
 static double beam(const imp_scene *s, int shape, imp_v3 n, imp_v3 w)
@@ -183,6 +222,7 @@ int main(void)
     imp_context *ctx = test_context(2);
     diffuse(ctx, "elements/a.xml", "scene a", 384, 1e-5);
     diffuse(ctx, "elements/b.xml", "scene b", 1024, 5e-5);
+    gradient(ctx);
     glossy(ctx, 384);
     imp_context_destroy(ctx);
     return tap_done();

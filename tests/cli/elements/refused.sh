@@ -1,0 +1,13 @@
+# SPDX-License-Identifier: Apache-2.0
+# What cannot be projected is refused by its name, and nothing is written.
+cp "$ROOT/scenes/elements/b.xml" . || exit 9
+cat >glass.xml <<END
+<scene version="3.0.0"><sensor type="perspective"/>
+<shape type="sphere" id="ball"/><shape type="rectangle"><emitter type="area"/></shape></scene>
+END
+importon elements glass.xml -o out.png
+code=$?
+[[ ! -e out.png ]] || exit 9
+importon elements b.xml --phong 'floor=1' -o out.png && exit 9
+importon elements b.xml --lux 'nothing' -o out.png && exit 9
+exit $code
