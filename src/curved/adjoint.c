@@ -413,12 +413,15 @@ static enum imp_status commit(size_t item, int slot_index, void *payload)
     return IMP_OK;
 }
 
-/* Slices: enough for many threads while a gradient is small, few when it is large; their
- * number depends on the problem alone, so that the sums have one order. */
+/* Slices: enough for many threads, few while adding up a large gradient would cost more than
+ * the rays (n_theta numbers a slice, against n_theta^(1/3) steps or so a ray). Their number
+ * depends on the problem alone, so that the sums have one order. */
 static size_t slice_rays(size_t n, size_t n_theta)
 {
-    size_t slices = imp_clamp(((size_t)1 << 24) / imp_max(n_theta, (size_t)1), (size_t)8,
-                              (size_t)64);
+    const double worth = 3 * (double)n / pow(imp_max((double)n_theta, 1.0), 2.0 / 3);
+    const size_t most = imp_clamp(((size_t)1 << 24) / imp_max(n_theta, (size_t)1), (size_t)8,
+                                  (size_t)64);
+    const size_t slices = (size_t)imp_clamp(worth, 4.0, (double)most);
     return imp_max((n + slices - 1) / slices, (size_t)4 * IMP_LANES);
 }
 

@@ -57,7 +57,16 @@ static inline imp_spec row_load(const struct imp__grid *g, size_t i, bool single
     }
     return r;
 }
-static inline double sum4(imp_spec a) { return (a[0] + a[1]) + (a[2] + a[3]); }
+/* The sums of the lanes of four vectors: (a0 + a1) + (a2 + a3), ... */
+static inline imp_spec sum4(imp_spec a, imp_spec b, imp_spec c, imp_spec d)
+{
+    const imp_spec ab = __builtin_shufflevector(a, b, 0, 4, 2, 6) +
+                        __builtin_shufflevector(a, b, 1, 5, 3, 7);
+    const imp_spec cd = __builtin_shufflevector(c, d, 0, 4, 2, 6) +
+                        __builtin_shufflevector(c, d, 1, 5, 3, 7);
+    return __builtin_shufflevector(ab, cd, 0, 1, 4, 5) +
+           __builtin_shufflevector(ab, cd, 2, 3, 6, 7);
+}
 
 static inline __attribute__((always_inline)) void
 eval_first(const struct imp__grid *g, imp_v3 x, bool single, struct imp__jet *j)
@@ -80,8 +89,9 @@ eval_first(const struct imp__grid *g, imp_v3 x, bool single, struct imp__jet *j)
         ay += wz[k] * sd;
         az += dz[k] * s;
     }
-    j->eta = sum4(wx * a);
-    j->g = imp__v3(sum4(dx * a), sum4(wx * ay), sum4(wx * az));
+    const imp_spec r = sum4(dx * a, wx * ay, wx * az, wx * a), zero = {0};
+    j->eta = r[3];
+    j->g = __builtin_shufflevector(r, zero, 0, 1, 2, 7);
 }
 
 static inline __attribute__((always_inline)) void
@@ -112,12 +122,15 @@ eval_second(const struct imp__grid *g, imp_v3 x, bool single, struct imp__jet *j
         ayz += dz[k] * sd;
         azz += ddz[k] * s;
     }
-    const double xy = sum4(dx * ay), xz = sum4(dx * az), yz = sum4(wx * ayz);
-    j->eta = sum4(wx * a);
-    j->g = imp__v3(sum4(dx * a), sum4(wx * ay), sum4(wx * az));
-    j->h[0] = imp__v3(sum4(ddx * a), xy, xz);
-    j->h[1] = imp__v3(xy, sum4(wx * ayy), yz);
-    j->h[2] = imp__v3(xz, yz, sum4(wx * azz));
+    const imp_spec zero = {0};
+    const imp_spec r = sum4(dx * a, wx * ay, wx * az, wx * a);
+    const imp_spec h = sum4(ddx * a, dx * ay, dx * az, wx * ayy); /* xx xy xz yy */
+    const imp_spec q = sum4(wx * ayz, wx * azz, zero, zero);      /* yz zz */
+    j->eta = r[3];
+    j->g = __builtin_shufflevector(r, zero, 0, 1, 2, 7);
+    j->h[0] = __builtin_shufflevector(h, zero, 0, 1, 2, 7);
+    j->h[1] = (imp_v3){h[1], h[3], q[0], 0};
+    j->h[2] = (imp_v3){h[2], q[0], q[1], 0};
 }
 
 static void spline_eval(const imp_field *f, int n, const imp_v3 *x, int order,
@@ -152,14 +165,13 @@ static void splat_raw(const struct imp__grid *g, const imp_v3 *x, double va, imp
     const size_t sy = (size_t)g->nodes[0], sz = sy * (size_t)g->nodes[1];
 #pragma GCC unroll 4
     for (int k = 0; k < 4; k++) {
-        const double s = va * wz[k] + dz[k];
+        const imp_spec q = wy * wz[k], p = wy * (va * wz[k] + dz[k]) + dy * wz[k];
         double *row = theta_bar + c.corner + (size_t)k * sz;
 #pragma GCC unroll 4
         for (int i = 0; i < 4; i++, row += sy) {
-            const double p = wy[i] * s + dy[i] * wz[k], q = wy[i] * wz[k];
             imp_spec r;
             __builtin_memcpy(&r, row, sizeof r);
-            r += wx * p + dx * q;
+            r += wx * p[i] + dx * q[i];
             __builtin_memcpy(row, &r, sizeof r);
         }
     }
