@@ -311,7 +311,9 @@ enum imp_status imp_field_profile_create(imp_context *ctx, const char *kind,
                               imp__profile_param(kind, i));
     for (int i = 0; i < kinds[k].n_own; i++) {
         const char *name = kinds[k].names[i];
-        if ((!strcmp(name, "radius") || !strcmp(name, "width") || !strcmp(name, "n0")) &&
+        const bool part = kinds[k].at == plume_at || kinds[k].at == polynomial_at; /* of sums */
+        if ((!strcmp(name, "radius") || !strcmp(name, "width") ||
+             (!strcmp(name, "n0") && !part)) &&
             !(params[i] > 0))
             return imp__error(ctx, IMP_E_ARG, "%s profile: %s = %g must be positive", kind,
                               name, params[i]);
