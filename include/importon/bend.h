@@ -167,7 +167,7 @@ enum imp_bend_surface_type {
     IMP_BEND_BOX,          /**< lo .. hi, from inside */
     IMP_BEND_SDF,          /**< field = 0, from negative to positive */
     IMP_BEND_APPROACH,     /**< first closest approach to centre */
-    IMP_BEND_MESH          /**< triangles, from inside */
+    IMP_BEND_MESH          /**< the shapes of `scene`, from inside; facets are planes */
 };
 
 /** What happens to a ray at a surface. */
@@ -190,13 +190,11 @@ struct imp_bend_surface {
     double lo[3], hi[3];   /**< of a box */
     double index;          /**< outside, for IMP_BEND_REFRACT */
     const imp_field *sdf;  /**< its value is the distance; shared, not copied */
-    const float *positions;       /**< mesh: [3 n_vertices], copied */
-    const uint32_t *triangles;    /**< [3 n_triangles], counter-clockwise from outside */
-    size_t n_vertices, n_triangles;
+    const imp_scene *scene;/**< of a mesh: committed, its shapes are closed; shared, not copied */
 };
 #define IMP_BEND_SURFACE_INIT                                                              \
     {sizeof(struct imp_bend_surface), IMP_BEND_PLANE, IMP_BEND_END, -1, {0, 0, 1}, 0, {0}, \
-     1, {0}, {0}, 1, 0, 0, 0, 0, 0}
+     1, {0}, {0}, 1, 0, 0}
 
 /** A plane whose crossing is recorded and does not end the ray. */
 struct imp_bend_tap { double normal[3], offset; int group; };

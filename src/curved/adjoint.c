@@ -172,7 +172,9 @@ static enum imp_status lane_begin(const struct job *job, struct slot *slot, size
     b->lam[i] = imp__v3_load(bar->x);
     b->mu[i] = imp__v3_load(bar->v);
     b->path_bar[i] = bar->path;
-    if (stored || e->segments > 1) {
+    s = imp__exit_surface(p, group, e);
+    /* What is not in the record (turns, the facet of a mesh) is traced again. */
+    if (stored || e->segments > 1 || s->kind == IMP__MESH) {
         track->states = stored;
         const enum imp_status st = imp__track_ray(p, job->rays, ray, track);
         if (st != IMP_OK) return st;
@@ -182,7 +184,6 @@ static enum imp_status lane_begin(const struct job *job, struct slot *slot, size
         x = track->segment[l->segment].at.x;
         v_in = track->segment[l->segment].at.v;
     } else {
-        s = imp__exit_surface(p, group, e);
         x = imp__v3_load(e->x);
         v_in = imp__v3_load(e->v);
     }
@@ -259,12 +260,13 @@ static void lane_end(const struct job *job, struct slot *slot, struct lane *l,
                                  b->path_bar[i] * eta * eta;
     }
     if (s->entry) {
+        const struct imp__surface *entry = imp__start_entry(s);
         struct imp__surface_at sa;
         const imp_v3 v0 = p->outside_index * s->d0;
-        imp__surface_eval(s->entry, &s->at.x, &v0, &sa);
-        if (s->entry->event == IMP_BEND_REFRACT) {
+        imp__surface_eval(entry, &s->at.x, &v0, &sa);
+        if (entry->event == IMP_BEND_REFRACT) {
             double eta_bar;
-            turn_back(slot, s->entry, s->at.x, v0, sa.gx, false, eta, &lam, &mu, &eta_bar);
+            turn_back(slot, entry, s->at.x, v0, sa.gx, false, eta, &lam, &mu, &eta_bar);
             if (theta_bar) p->field->ops->splat(p->field, &s->at.x, eta_bar, &zero, theta_bar);
             lam += eta_bar * g;
         }
@@ -272,7 +274,7 @@ static void lane_end(const struct job *job, struct slot *slot, struct lane *l,
         const double n2 = p->outside_index * p->outside_index;
         const double rho = (imp__dot(lam, v0) + b->path_bar[i] * n2) / imp__dot(sa.gx, v0);
         lam -= rho * sa.gx;
-        surface_bar(slot, s->entry, s->at.x, rho, zero, zero, 0);
+        surface_bar(slot, entry, s->at.x, rho, zero, zero, 0);
         mu += s->tau * lam;
         d_bar = p->outside_index * mu;
     } else { /* v0 = eta(x0) d0: the term that the paper's supplement leaves out (5)-(6) */

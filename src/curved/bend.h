@@ -51,6 +51,8 @@ struct imp_bend {
 
     imp_field **sdfs;              /* owned, made by the loader */
     size_t n_sdfs, cap_sdfs;
+    imp_scene **scenes;            /* of mesh surfaces, likewise */
+    size_t n_scenes, cap_scenes;
 
     struct imp_check_row *rows;    /* of the last check */
     size_t n_rows, cap_rows;

@@ -160,8 +160,6 @@ void imp__step_adjoint(const struct imp__scheme *s, const imp_field *f, double t
 enum imp__surface_kind {
     IMP__PLANE, IMP__SPHERE, IMP__CYLINDER, IMP__DISC, IMP__SDF, IMP__APPROACH, IMP__MESH
 };
-struct imp__mesh_accel; /* surface_mesh.c */
-
 /* Where a box has become six planes. G < 0 inside; a crossing is G going from <= 0 to > 0. */
 struct imp__surface {
     enum imp__surface_kind kind;
@@ -170,7 +168,7 @@ struct imp__surface {
     imp_v3 n, c;           /* normal or axis; centre */
     double offset, radius, index;
     const imp_field *sdf;
-    const struct imp__mesh_accel *mesh;
+    const imp_scene *scene; /* MESH: what is hit gives n and offset of the facet */
 };
 /* G, its gradients in x and v, and Hess_x G times a vector. */
 struct imp__surface_at { double g; imp_v3 gx, gv; };
@@ -179,6 +177,10 @@ void imp__surface_eval(const struct imp__surface *s, const imp_v3 *x, const imp_
 void imp__surface_hess(const struct imp__surface *s, const imp_v3 *x, const imp_v3 *m,
                        imp_v3 *out);
 /* Is a crossing at x one (a disc has a rim)? */
+/* The first facet of a MESH surface that the way from a to b crosses outwards (inwards: from
+ * outside), as a plane. */
+bool imp__facet(const struct imp__surface *s, const imp_v3 *a, const imp_v3 *b, bool inwards,
+                double nearest, struct imp__surface *facet);
 bool imp__surface_covers(const struct imp__surface *s, const imp_v3 *x);
 
 /* Momentum v through a surface at unit normal n into index e2 (curved-rays 3.5). */
@@ -213,8 +215,6 @@ struct imp__plan {
     struct imp__surface taps[IMP_BEND_TAPS_MAX];
     int tap_group[IMP_BEND_TAPS_MAX];
     int n_taps;
-    struct imp__mesh_accel **meshes;
-    size_t n_meshes;
 };
 enum imp_status imp__plan_create(const imp_field *field, const struct imp_bend_options *options,
                                  const struct imp_bend_rays *rays, struct imp__plan *out);
@@ -237,7 +237,13 @@ struct imp__start {
     double tau;            /* of the straight way to the entry, in sigma */
     struct imp__jet jet;   /* value and gradient of the field at `at` */
     unsigned flags;
+    struct imp__surface facet;        /* the entry itself if that is a mesh */
 };
+/* Where it entered; starts are copied, so not a pointer into one. */
+static inline const struct imp__surface *imp__start_entry(const struct imp__start *s)
+{
+    return s->entry && s->entry->kind == IMP__MESH ? &s->facet : s->entry;
+}
 void imp__start_ray(const struct imp__plan *p, const struct imp_bend_rays *rays, size_t i,
                     struct imp__start *out);
 
@@ -252,6 +258,7 @@ struct imp__segment {
     const struct imp__surface *surface;
     double tau;
     uint32_t steps;
+    struct imp__surface facet;     /* surface points here if that is a mesh */
 };
 /* One ray with everything noted. Same bits as the many-ray tracer. */
 struct imp__track {

@@ -2,6 +2,7 @@
  *
  * Options checked and made ready: step length, surfaces by group, boxes cut into faces. */
 #include "curved.h"
+#include "scene/scene.h"
 #include <string.h>
 
 #define MAX_STEPS_DEFAULT 100000
@@ -22,7 +23,7 @@ static enum imp_status surface_make(imp_context *ctx, const struct imp_bend_surf
     struct imp__surface s = {.kind = kinds[in->type], .event = in->event, .id = id,
                              .n = imp__v3_load(in->normal), .c = imp__v3_load(in->centre),
                              .offset = in->offset, .radius = in->radius, .index = in->index,
-                             .sdf = in->sdf};
+                             .sdf = in->sdf, .scene = in->scene};
     const double length = imp__length(s.n);
     *n = 1;
     if (in->event == IMP_BEND_REFRACT && !(in->index > 0 && isfinite(in->index)))
@@ -68,7 +69,9 @@ static enum imp_status surface_make(imp_context *ctx, const struct imp_bend_surf
             return imp__error(ctx, IMP_E_ARG, "surface %d: rays end at a closest approach", id);
         break;
     case IMP_BEND_MESH:
-        return imp__error(ctx, IMP_E_UNSUPPORTED, "surface %d: meshes are not available", id);
+        if (!in->scene || in->scene->n_shapes == 0)
+            return imp__error(ctx, IMP_E_ARG, "surface %d: no scene with shapes", id);
+        break;
     }
     out[0] = s;
     return IMP_OK;

@@ -3,6 +3,7 @@
  * Surfaces where rays end or turn: G(x, v), negative inside, with its derivatives, and the
  * momentum's map there (curved-rays 2.6, 3.5). */
 #include "curved.h"
+#include "scene/scene.h"
 
 /* x - c across the axis */
 static inline imp_v3 across(const struct imp__surface *s, imp_v3 x)
@@ -125,4 +126,29 @@ void imp__turn_jvp(const struct imp__turn *t, const imp_v3 *n, const imp_v3 *v, 
     if (!t->reflected)
         c_dot = t->sign * (e2 * e2_dot - imp__dot(*v, *v_dot) + t->a * a_dot) / t->q - a_dot;
     *dot = *v_dot + c_dot * *n + t->c * *n_dot;
+}
+
+bool imp__facet(const struct imp__surface *s, const imp_v3 *a, const imp_v3 *b, bool inwards,
+                double nearest, struct imp__surface *facet)
+{
+    const imp_v3 way = *b - *a;
+    const double length = imp__length(way);
+    const imp_v3 d = way * (1 / length);
+    double from = nearest;
+    struct imp_hit hit;
+    for (int tries = 0; tries < 16; tries++) {
+        if (!(length > from) || !imp__intersect(s->scene, a, &d, from, length, &hit)) return false;
+        const struct imp_shape *shape = s->scene->shapes[hit.shape];
+        struct imp_surface at;
+        shape->ops->surface(shape, &hit, a, &d, &at);
+        const double out = imp__dot(at.ng, d);
+        if (inwards ? out < 0 : out > 0) {
+            *facet = *s;
+            facet->n = at.ng;
+            facet->offset = imp__dot(at.ng, at.p);
+            return true;
+        }
+        from = hit.t * (1 + 1e-6) + nearest; /* the other side of a thin wall */
+    }
+    return false;
 }

@@ -64,18 +64,19 @@ static void start_dot(const struct job *job, size_t i, const struct imp__start *
     dd = (dd - s->d0 * imp__dot(dd, s->d0)) * (1 / s->length);
     *dot = (struct imp__state){.x = xd};
     if (s->entry) {
+        const struct imp__surface *entry = imp__start_entry(s);
         struct imp__surface_at sa;
         const imp_v3 v0 = p->outside_index * s->d0, vd = p->outside_index * dd;
-        imp__surface_eval(s->entry, &s->at.x, &v0, &sa);
+        imp__surface_eval(entry, &s->at.x, &v0, &sa);
         dot->x = xd + s->tau * vd;
         dot->v = vd;
         const double tau_dot = -imp__dot(sa.gx, dot->x) / imp__dot(sa.gx, v0);
         dot->x += tau_dot * v0;
         dot->path = p->outside_index * p->outside_index * tau_dot;
-        if (s->entry->event != IMP_BEND_REFRACT) return;
+        if (entry->event != IMP_BEND_REFRACT) return;
         struct imp__turn turn;
         const imp_v3 n = imp__normalize(sa.gx);
-        const imp_v3 n_dot = normal_dot(s->entry, s->at.x, sa.gx, dot->x);
+        const imp_v3 n_dot = normal_dot(entry, s->at.x, sa.gx, dot->x);
         double eta_dot = 0;
         imp_v3 g_dot;
         if (job->theta_dot)

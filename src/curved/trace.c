@@ -110,6 +110,16 @@ void imp__start_ray(const struct imp__plan *p, const struct imp_bend_rays *rays,
         double in = -INFINITY, out = INFINITY;
         for (int k = 0; k < dom->n; k++) {
             double a, b;
+            if (dom->surface[k].kind == IMP__MESH) {
+                const imp_v3 end = s->x0 + s->d0 * (1e3 * p->size);
+                if (!imp__facet(&dom->surface[k], &s->x0, &end, true, 1e-6 * p->size, &s->facet)) {
+                    s->flags = IMP_BEND_MISSED;
+                    return;
+                }
+                a = (s->facet.offset - imp__dot(s->facet.n, s->x0)) / imp__dot(s->facet.n, s->d0);
+                if (a > in) in = a, s->entry = &dom->surface[k];
+                continue;
+            }
             if (!straight(&dom->surface[k], s->x0, s->d0, &a, &b)) {
                 s->flags = IMP_BEND_MISSED;
                 return;
@@ -130,7 +140,7 @@ void imp__start_ray(const struct imp__plan *p, const struct imp_bend_rays *rays,
         if (s->entry->event == IMP_BEND_REFRACT) {
             struct imp__surface_at at;
             struct imp__turn turn;
-            imp__surface_eval(s->entry, &s->at.x, &s->at.v, &at);
+            imp__surface_eval(imp__start_entry(s), &s->at.x, &s->at.v, &at);
             const imp_v3 n = imp__normalize(at.gx);
             if (fabs(imp__dot(n, s->d0)) < p->grazing) s->flags = IMP_BEND_GRAZING;
             imp__turn(&n, &s->at.v, s->jet.eta, false, &turn);
@@ -193,16 +203,22 @@ double imp__land_on(const struct imp__plan *p, const struct imp__surface *s,
     return tau;
 }
 
-/* The first surface passed by the step from `from` to (x1, v1); NULL: none. */
+/* The first surface passed by the step from `from` to (x1, v1); NULL: none. `facet` is room
+ * for the one of a mesh. */
 static const struct imp__surface *land(const struct imp__plan *p, const struct imp__domain *d,
                                        const struct imp__state *from, const imp_v3 *x1,
-                                       const imp_v3 *v1, double *tau, struct imp__state *at)
+                                       const imp_v3 *v1, double *tau, struct imp__state *at,
+                                       struct imp__surface *facet)
 {
     const struct imp__surface *hit = NULL;
     for (int i = 0; i < d->n; i++) {
         const struct imp__surface *s = &d->surface[i];
         struct imp__surface_at a0, a1;
         struct imp__state there;
+        if (s->kind == IMP__MESH) {
+            if (!imp__facet(s, &from->x, x1, false, 1e-6 * p->size, facet)) continue;
+            s = facet;
+        }
         imp__surface_eval(s, x1, v1, &a1);
         if (!(a1.g > 0)) continue;
         imp__surface_eval(s, &from->x, &from->v, &a0);
@@ -351,21 +367,23 @@ static enum imp_status trace(const struct imp__plan *p, const struct imp_bend_ra
         for (int i = 0; i < n; i++) {
             struct lane *l = &lane[i];
             struct imp__state at;
+            struct imp__surface facet;
             const struct imp__surface *hit = NULL;
             const bool inside = imp__inside(&x[i], &l->domain->lo, &l->domain->hi);
             bool ended = false;
             double tau = p->t;
             if (!inside || l->domain->n_general > 0)
-                hit = land(p, l->domain, &from[i], &x[i], &v[i], &tau, &at);
+                hit = land(p, l->domain, &from[i], &x[i], &v[i], &tau, &at, &facet);
             if (imp_unlikely(l->pending)) {
                 const struct imp__state to = hit ? at : (struct imp__state){x[i], v[i], 0};
                 taps_look(p, l, &from[i], &to, tau, taps + l->ray * n_taps);
             }
             if (hit) {
                 if (track) {
-                    track->segment[track->n_segments++] = (struct imp__segment){
-                        .at = at, .from = from[i], .surface = hit, .tau = tau,
-                        .steps = l->steps};
+                    struct imp__segment *g = &track->segment[track->n_segments++];
+                    *g = (struct imp__segment){.at = at, .from = from[i], .surface = hit,
+                                               .tau = tau, .steps = l->steps};
+                    if (hit == &facet) g->facet = facet, g->surface = &g->facet;
                 }
                 ended = event(p, l, hit, &at, tau, &exits[l->ray]);
                 x[i] = at.x, v[i] = at.v, path[i] = at.path;
@@ -428,6 +446,7 @@ const struct imp__surface *imp__exit_surface(const struct imp__plan *p, int grou
     for (int i = 0; i < d->n; i++) {
         struct imp__surface_at at;
         if (d->surface[i].id != e->surface) continue;
+        if (d->surface[i].kind == IMP__MESH) return &d->surface[i];
         imp__surface_eval(&d->surface[i], &x, &v, &at);
         if (!best || fabs(at.g) < least) best = &d->surface[i], least = fabs(at.g);
     }

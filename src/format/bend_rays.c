@@ -161,6 +161,37 @@ out:
     return st;
 }
 
+/* A scene of one mesh, which the bend keeps. */
+static enum imp_status mesh_load(struct bend_loader *l, struct imp_node *node,
+                                 const imp_scene **out)
+{
+    enum imp_status st = IMP_OK;
+    const char *file, *path;
+    imp_bend *b = l->bend;
+    imp_scene *scene = NULL;
+    IMP_TRY(imp__props_string(l->ctx, node, "filename", NULL, &file));
+    if (!file) IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "needs a 'filename'"));
+    IMP_TRY(imp__search(l->scene, NULL, file, &path));
+    const size_t n = strlen(path);
+    IMP_TRY(imp_scene_create(l->ctx, NULL, &scene));
+    imp_scene_begin(scene, "shape", n > 4 && strcmp(path + n - 4, ".obj") == 0 ? "obj" : "ply",
+                    NULL, NULL);
+    imp_scene_string(scene, "filename", path);
+    imp_scene_bool(scene, "face_normals", 1);
+    imp_scene_end(scene);
+    IMP_TRY(imp_scene_commit(scene));
+    void *grown = imp__grow(l->ctx, b->scenes, &b->cap_scenes, b->n_scenes + 1,
+                            sizeof *b->scenes);
+    if (!grown) IMP_TRY(imp__error(l->ctx, IMP_E_NOMEM, "no memory for a mesh"));
+    b->scenes = grown;
+    b->scenes[b->n_scenes++] = scene;
+    *out = scene;
+    scene = NULL;
+out:
+    imp_scene_destroy(scene);
+    return st;
+}
+
 /* ---- Surfaces --------------------------------------------------------------------------- */
 
 enum imp_status bend_surface(struct bend_loader *l, struct imp_node *node,
@@ -174,12 +205,12 @@ enum imp_status bend_surface(struct bend_loader *l, struct imp_node *node,
     const double z[3] = {0, 0, 1}, zero[3] = {0}, minus[3] = {-1, -1, -1}, one[3] = {1, 1, 1};
     double normal[3], centre[3];
     int event, type = -1;
-    for (int k = 0; k < 7; k++)
+    for (int k = 0; k < 8; k++)
         if (strcmp(node->type, types[k]) == 0) type = k;
     if (type < 0)
         IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE,
                                 "is of no known type: there are plane, sphere, cylinder, disc, "
-                                "box, distance, closest-approach"));
+                                "box, distance, closest-approach, mesh"));
     IMP_TRY(imp__props_choice(l->ctx, node, "event", events, 5, 0, &event));
     s.type = (enum imp_bend_surface_type)type;
     s.event = event == 4 ? IMP_BEND_END : (enum imp_bend_event)event;
@@ -220,7 +251,7 @@ enum imp_status bend_surface(struct bend_loader *l, struct imp_node *node,
         IMP_TRY(imp__props_vector(l->ctx, node, "hi", one, s.hi));
         break;
     case IMP_BEND_SDF: IMP_TRY(bend_sdf(l, node, &s.sdf)); break;
-    case IMP_BEND_MESH: break;
+    case IMP_BEND_MESH: IMP_TRY(mesh_load(l, node, &s.scene)); break;
     }
     IMP_TRY(imp__props_finish(l->ctx, node));
     if (event == 4) {

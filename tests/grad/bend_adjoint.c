@@ -17,6 +17,24 @@ struct setup {
 };
 
 static imp_field *sdf;
+static imp_scene *mesh; /* a box of twelve triangles, tilted */
+
+static void mesh_make(void)
+{
+    float p[24];
+    static const uint32_t t[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
+                                   2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
+    for (int i = 0; i < 8; i++) {
+        const double x = i & 1 ? 0.9 : -0.9, y = i & 2 ? 0.9 : -0.9, z = i & 4 ? 0.7 : -0.9;
+        p[3 * i] = (float)(x + 0.1 * z), p[3 * i + 1] = (float)(y - 0.1 * z + 0.05 * x);
+        p[3 * i + 2] = (float)(z - 0.1 * x + 0.07 * y);
+    }
+    KIT_CHECK(imp_scene_create(kit_ctx, NULL, &mesh));
+    imp_scene_begin(mesh, "shape", "mesh", NULL, NULL);
+    imp_scene_mesh(mesh, 8, 12, p, NULL, NULL, t);
+    imp_scene_end(mesh);
+    KIT_CHECK(imp_scene_commit(mesh));
+}
 
 static struct imp_bend_surface surface(enum imp_bend_surface_type type)
 {
@@ -33,7 +51,8 @@ static void setups_make(void)
     struct imp_bend_surface box = surface(IMP_BEND_BOX), plane = surface(IMP_BEND_PLANE),
                             sphere = surface(IMP_BEND_SPHERE), disc = surface(IMP_BEND_DISC),
                             cylinder = surface(IMP_BEND_CYLINDER),
-                            near = surface(IMP_BEND_APPROACH), dist = surface(IMP_BEND_SDF);
+                            near = surface(IMP_BEND_APPROACH), dist = surface(IMP_BEND_SDF),
+                            facets = surface(IMP_BEND_MESH);
     for (int k = 0; k < 3; k++) box.lo[k] = -1, box.hi[k] = 1;
     plane.normal[0] = 0.2, plane.normal[1] = -0.1, plane.normal[2] = 1, plane.offset = 0.5;
     sphere.radius = 0.95, sphere.centre[0] = 0.02;
@@ -41,6 +60,7 @@ static void setups_make(void)
     cylinder.radius = 0.45;
     near.centre[0] = 0.1, near.centre[2] = 0.5;
     dist.sdf = sdf;
+    facets.scene = mesh;
     int n = 0;
 #define SETUP(...) setups[n++] = (struct setup){__VA_ARGS__}
     SETUP("box", {box}, 1, false, true, false, -0.8, 0.6, 1);
@@ -60,6 +80,9 @@ static void setups_make(void)
     setups[n - 1].s[0].event = setups[n - 1].s[1].event = IMP_BEND_REFRACT;
     SETUP("mirror", {cylinder, plane}, 2, false, true, true, -0.8, 0.3, 1);
     setups[n - 1].s[0].event = IMP_BEND_MIRROR;
+    SETUP("mesh", {facets}, 1, false, true, false, -0.6, 0.5, 1);
+    SETUP("refracting mesh from outside", {facets}, 1, true, false, true, -2, 0.5, 1);
+    setups[n - 1].s[0].event = IMP_BEND_REFRACT;
     n_setups = n;
 }
 
@@ -333,6 +356,7 @@ int main(void)
             }
     KIT_CHECK(imp_field_set_theta(sdf, t));
     free(t);
+    mesh_make();
     setups_make();
     imp_field *f = kit_grid(IMP_FIELD_SPLINE, IMP_FIELD_ETA, 8, 1.2, 0.05);
     imp_field *lin = kit_grid(IMP_FIELD_TRILINEAR, IMP_FIELD_ETA, 8, 1.2, 0.03);
@@ -353,6 +377,7 @@ int main(void)
     imp_field_destroy(f);
     imp_field_destroy(lin);
     imp_field_destroy(sdf);
+    imp_scene_destroy(mesh);
     imp_context_destroy(kit_ctx);
     return tap_done();
 }
