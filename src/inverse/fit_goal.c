@@ -106,8 +106,9 @@ static enum imp_status normal(const double *x, uint64_t seed, struct imp__normal
 static enum imp_status prior(struct imp__fit *f)
 {
     const size_t n = f->problem->n;
-    double *x = imp__alloc(f->problem->ctx, 2 * n, sizeof *x), *g0 = x + n;
+    double *x = imp__alloc(f->problem->ctx, 2 * n, sizeof *x);
     if (!x) return imp__error(f->problem->ctx, IMP_E_NOMEM, "no memory for regularisers");
+    double *g0 = x + n;
     imp__regularise(f->problem, x, g0);
     for (size_t k = 0; k < n; k++) {
         double *row = f->H_prior + k * n;
