@@ -162,7 +162,10 @@ static enum object object_kind(const struct imp_node *node)
 
 bool imp__color_is_object(const struct imp_node *node)
 {
-    return object_kind(node) != N_OBJECTS;
+    const enum object kind = object_kind(node);
+    if (kind == D65 && node->n_children && node->children[0].node) /* around a texture? */
+        return object_kind(node->children[0].node) != N_OBJECTS;
+    return kind != N_OBJECTS;
 }
 
 /* Numbers separated by commas and blanks; *list is released by the caller. */
@@ -292,8 +295,7 @@ static enum imp_status d65_object(imp_context *ctx, struct imp_node *node, enum 
         child->used = true;
         if (!child->node || !imp__color_is_object(child->node))
             IMP_TRY(imp__node_error(ctx, node, IMP_E_UNSUPPORTED,
-                                    "d65 around a texture is not available; in rgb and mono "
-                                    "modes it only scales: use the texture itself"));
+                                    "d65 around a texture cannot be nested"));
         IMP_TRY(imp__color_object(ctx, child->node, role, scalar, mode, &v, &n, &key));
     } else {
         color_set(white, scalar, mode, &v, &n);

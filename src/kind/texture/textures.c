@@ -5,7 +5,8 @@
 
 #define TEXTURES(X)                                                                        \
     X(imp__bitmap)                                                                         \
-    X(imp__checkerboard)
+    X(imp__checkerboard)                                                                   \
+    X(imp__d65)
 
 #define DECLARE(kind) extern const struct imp_texture_ops kind;
 TEXTURES(DECLARE)

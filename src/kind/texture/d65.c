@@ -1,0 +1,50 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * d65 around a texture: daylight of the texture's colour. In rgb and mono modes it scales
+ * (scene-format 2.4); d65 around a colour is a constant (color/convert.c). */
+#include "input.h"
+#include "math/vec.h"
+
+struct d65 { double scale; };
+
+static const struct imp_input_desc inputs[] = {
+    {.name = "nested_texture", .role = IMP_EMISSION, .flags = IMP_INPUT_REQUIRED,
+     .fallback = 1, .unit = "1"},
+    {0}};
+
+static enum imp_status build(const struct imp_build *b, void *self, struct imp_texture *t)
+{
+    struct d65 *d = self;
+    t->param = -1;
+    const enum imp_status st = imp__props_float(b->ctx, b->node, "scale", 1, &d->scale);
+    if (st != IMP_OK) return st;
+    if (!isfinite(d->scale) || d->scale < 0)
+        return imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+                               "'scale' must be finite and not negative");
+    return IMP_OK;
+}
+static void eval(const struct imp_texture *t, const struct imp_texcoord *at, bool scalar,
+                 imp_spec *value)
+{
+    const struct d65 *d = t->self;
+    imp__input_eval(t->input[0], scalar, at, value);
+    *value *= d->scale;
+}
+static void scatter(const struct imp_texture *t, const struct imp_texcoord *at, bool scalar,
+                    const imp_spec *bar, struct imp_sink *sink)
+{
+    const struct d65 *d = t->self;
+    const imp_spec scaled = *bar * d->scale;
+    imp__input_scatter(t->input[0], scalar, at, &scaled, sink);
+}
+static void tangent(const struct imp_texture *t, const struct imp_texcoord *at, bool scalar,
+                    imp_dot_fn *dot, const void *x_dot, imp_spec *value_dot)
+{
+    const struct d65 *d = t->self;
+    imp__input_tangent(t->input[0], scalar, at, dot, x_dot, value_dot);
+    *value_dot *= d->scale;
+}
+
+const struct imp_texture_ops imp__d65 = {
+    .size = sizeof(struct imp_texture_ops), .name = "d65", .object_size = sizeof(struct d65),
+    .inputs = inputs, .build = build, .eval = eval, .scatter = scatter, .tangent = tangent};
