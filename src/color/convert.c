@@ -163,6 +163,7 @@ static enum object object_kind(const struct imp_node *node)
 bool imp__color_is_object(const struct imp_node *node)
 {
     const enum object kind = object_kind(node);
+    if (kind == D65 && imp__node_prop(node, "nested_texture")) return false;
     if (kind == D65 && node->n_children && node->children[0].node) /* around a texture? */
         return object_kind(node->children[0].node) != N_OBJECTS;
     return kind != N_OBJECTS;

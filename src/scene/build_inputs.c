@@ -169,7 +169,8 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
         struct imp_texture *t;
         child->used = true;
         const bool daylight = strcmp(child->node->type, "d65") == 0;
-        if (daylight) child->node->children[0].name = "nested_texture";
+        if (daylight && child->node->n_children)
+            child->node->children[0].name = "nested_texture";
         if (strcmp(child->node->tag, "texture") != 0 && !daylight)
             IMP_TRY(imp__node_error(ctx, child->node, IMP_E_SCENE,
                                     "'%s' must be a number, a colour or a texture", d->name));
