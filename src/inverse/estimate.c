@@ -372,9 +372,9 @@ enum imp_status imp_problem_objective(imp_problem *p, const double *x, const str
     imp_context *ctx = p->ctx;
     const struct imp_run own = imp__run_or_default(run);
     double *buffer = imp__alloc(ctx, 3 * p->n, sizeof *buffer);
-    double *g = buffer, *v = buffer + p->n, *at = v + p->n;
     struct imp_estimate estimate = {0};
-    if (!buffer) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for gradients"));
+    if (!buffer) return imp__error(ctx, IMP_E_NOMEM, "no memory for gradients");
+    double *g = buffer, *v = buffer + p->n, *at = v + p->n;
     if (x) IMP_TRY(imp_problem_set_x(p, x));
     imp_problem_get_x(p, at);
 

@@ -106,12 +106,13 @@ static enum imp_status run(const struct imp__goal *goal, const struct imp__opt_o
     enum imp_status st = IMP_OK;
     const size_t n = goal->n;
     double *work = imp__alloc(goal->ctx, 5 * n + 1, sizeof *work);
+    if (!work) return imp__error(goal->ctx, IMP_E_NOMEM, "no memory for %zu variables", n);
     struct call c = {.goal = goal, .s = s, .x = work, .g = work + n};
     double *y = work + 2 * n, *lo = work + 3 * n, *hi = work + 4 * n;
     double value;
 
     c.opt = nlopt_create(algorithm(s->kind), (unsigned)n);
-    if (!work || !c.opt || n > 0x7fffffff)
+    if (!c.opt || n > 0x7fffffff)
         IMP_TRY(imp__error(goal->ctx, IMP_E_NOMEM, "no memory for %zu variables", n));
     const bool replay = s->array_n[RECORD] > 0 || s->iteration == 0;
     for (size_t k = 0; k < n; k++) {
