@@ -127,6 +127,7 @@ int main(void)
     means(ctx, "microfacet", "mixture", 4096, m2, .006);
     means(ctx, "microfacet", "cosine", 2048, m2, .06);
     means(ctx, "paper", "mixture", 2048, m2p, .01);
+    means(ctx, "microfacet", "mixture integrator=path", 2048, m2, .011); /* lights sampled */
     loss(ctx, 2, 4000);
     loss(ctx, 8, 1600);
     loss(ctx, 256, 60);
