@@ -8,6 +8,7 @@
 #include "plot.h"
 #include "problem.h"
 #include "progress.h"
+#include "sheet.h"
 
 #include <errno.h>
 #include <math.h>
@@ -20,7 +21,7 @@ static const char *const optimizer_words[] = {"adam", "lm",    "lbfgs",
 static struct {
     int optimizer, iterations, no_intervals, resume, picture_spp;
     double learning_rate, tolerance;
-    const char *checkpoint;
+    const char *checkpoint, *sheet;
 } o;
 
 static const struct arg_option options[] = {
@@ -40,6 +41,8 @@ static const struct arg_option options[] = {
      0, 0, NULL},
     {ARG_INT, 0, "picture-spp", "N", "samples per pixel of the pictures written",
      &o.picture_spp, 1, 1e9, NULL},
+    {ARG_TEXT, 0, "sheet", "FILE.png", "one PNG of before, target and recovered (with -o)",
+     &o.sheet, 0, 0, NULL},
     {0}};
 
 /* ---- Pictures --------------------------------------------- */
@@ -109,6 +112,22 @@ static int write_targets(void)
         picture_target_free(&t);
         free(path);
     }
+    return rc;
+}
+
+/* A row for each target. */
+static int write_sheet(void)
+{
+    static const char *const name[] = {"before", "target", "recovered"};
+    struct sheet sheet = {NULL, 0};
+    for (size_t i = 0; i < problem_options.targets.n; i++)
+        for (int k = 0; k < 3; k++) {
+            char *path = picture_path(name[k], i);
+            sheet_add(&sheet, path);
+            free(path);
+        }
+    const int rc = sheet_write(&sheet, 3, o.sheet);
+    sheet_free(&sheet);
     return rc;
 }
 
@@ -291,6 +310,8 @@ static int run_fit(int n, char **operand)
     int rc = cli_load(operand[0]);
     if (!rc && !problem_options.targets.n)
         rc = cli_error(EXIT_USAGE, "fit: --target FILE is needed");
+    if (!rc && o.sheet && !cli.out)
+        rc = cli_error(EXIT_USAGE, "fit: --sheet needs -o DIR, where the pictures go");
     if (!rc && o.resume && !o.checkpoint)
         rc = cli_error(EXIT_USAGE, "fit: --resume needs --checkpoint FILE");
     if (!rc) rc = problem_open(&problem);
@@ -317,6 +338,7 @@ static int run_fit(int n, char **operand)
     if (!rc && result && cli.out) {
         progress_resume(); /* after Ctrl-C the state reached is still written */
         rc = write_pictures("recovered");
+        if (!rc && o.sheet) rc = write_sheet();
     }
     problem_close(problem);
     return rc ? rc : cli_done();

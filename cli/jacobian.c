@@ -7,16 +7,21 @@
 #include "picture.h"
 #include "problem.h"
 #include "progress.h"
+#include "sheet.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 static int separate;
-static const struct arg_option options[] = {{ARG_FLAG, 0, "separate", NULL,
-                                             "one picture per number, also for colours",
-                                             &separate, 0, 0, NULL},
-                                            {0}};
+static const char *sheet_path;
+static struct sheet sheet;
+static const struct arg_option options[] = {
+    {ARG_FLAG, 0, "separate", NULL, "one picture per number, also for colours", &separate, 0,
+     0, NULL},
+    {ARG_TEXT, 0, "sheet", "FILE.png", "one PNG with all the pictures side by side",
+     &sheet_path, 0, 0, NULL},
+    {0}};
 
 /* Sum of the films of one colour; they do not overlap, so errors add in squares. */
 static void add_film(imp_film *sum, imp_film *film)
@@ -62,6 +67,7 @@ static int write_control(struct json *j, imp_film *film, const char *name,
     picture_stamp(film, run);
     const int rc = picture_write(film, path, o);
     film_sums(film, &mean, &se);
+    sheet_add(&sheet, path);
     if (!rc && cli.json) {
         json_object(j, NULL);
         json_text(j, "name", name);
@@ -130,6 +136,7 @@ static int run_jacobian(int n, char **operand)
         char *path = join_path(cli.out, "picture.exr");
         picture_stamp(primal, &run);
         rc = picture_write(primal, path, &plain);
+        sheet_add(&sheet, path);
         free(path);
         blocks = problem_blocks(problem, &n_blocks);
         for (size_t k = 0; k < n_blocks && !rc; k++)
@@ -138,8 +145,10 @@ static int run_jacobian(int n, char **operand)
             json_end_array(&j);
             cli_json_end(&j);
         }
+        if (!rc && sheet_path) rc = sheet_write(&sheet, 4, sheet_path);
         if (!rc) rc = cli_done();
     }
+    sheet_free(&sheet);
     imp_film_destroy(primal);
     for (size_t i = 0; i < n_x; i++) imp_film_destroy(films[i]);
     free(films);
