@@ -21,6 +21,13 @@ static const struct arg_option options[] = {
      &o.fresh_spp, 1, 1e9, NULL},
     {0}};
 
+/* Steps that are not the best have none. */
+static const char *verdict(const struct imp_check_row *r)
+{
+    if (r->limit == 0) return "";
+    return r->ok > 0 ? "ok" : r->ok < 0 ? "noisy" : "FAILED";
+}
+
 static void print_text(const struct imp_check_row *rows, size_t n)
 {
     int width = 9;
@@ -37,7 +44,7 @@ static void print_text(const struct imp_check_row *rows, size_t n)
         printf("%-7s %-*s %-8s %-15.8g %-15.8g %-9s %s%-9.2g %s\n", r->method, width,
                r->param ? r->param : "", step, r->value, r->reference, se,
                r->se > 0 ? "z " : "", r->error,
-               r->ok > 0 ? "ok" : r->ok < 0 ? "noisy" : "FAILED");
+               verdict(r));
     }
 }
 

@@ -8,9 +8,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define TILE 128           /* pixels that the longer side of a picture should have at least */
+#define TILE 128 /* pixels that the longer side of a picture should have at least */
 #define GAP 4
-#define LARGEST (1 << 26)  /* pixels of a sheet */
+#define LARGEST (1 << 26) /* pixels of a sheet */
 
 void sheet_add(struct sheet *s, const char *path)
 {
@@ -46,7 +46,8 @@ static void place(imp_film *from, imp_film *sheet, size_t x0, size_t y0, size_t 
             for (size_t c = 0; c < 3; c++) {
                 const size_t channel = a.channels >= 3 ? c : 0;
                 out[((y0 + y) * (size_t)b.width + x0 + x) * 3 + c] =
-                    in[(y / zoom * (size_t)a.width + x / zoom) * (size_t)a.channels + channel];
+                    in[(y / zoom * (size_t)a.width + x / zoom) * (size_t)a.channels +
+                       channel];
             }
 }
 
@@ -71,16 +72,18 @@ int sheet_write(const struct sheet *s, size_t columns, const char *path)
             h = (size_t)info.height * zoom + GAP;
             const size_t width = columns * w - GAP, height = rows * h - GAP;
             if (width > LARGEST / height)
-                rc = cli_error(EXIT_USAGE, "%s: a sheet of %zu x %zu pixels is too large", path,
-                               width, height);
-            else if (cli_failed(imp_film_create(cli.context, (int)width, (int)height, "R,G,B",
-                                                &sheet)))
+                rc = cli_error(EXIT_USAGE, "%s: a sheet of %zu x %zu pixels is too large",
+                               path, width, height);
+            else if (cli_failed(imp_film_create(cli.context, (int)width, (int)height,
+                                                "R,G,B", &sheet)))
                 rc = cli_fail(IMP_E_NOMEM, path);
             else
-                for (size_t k = 0; k < width * height * 3; k++) imp_film_mean(sheet)[k] = 1;
+                for (size_t k = 0; k < width * height * 3; k++)
+                    imp_film_mean(sheet)[k] = 1;
         }
         if (!rc && (info.width != first.width || info.height != first.height))
-            rc = cli_error(EXIT_USAGE, "%s: pictures of a sheet must have one size, %s is %d x %d",
+            rc = cli_error(EXIT_USAGE,
+                           "%s: pictures of a sheet must have one size, %s is %d x %d",
                            path, s->picture[i], info.width, info.height);
         if (!rc) place(film, sheet, i % columns * w, i / columns * h, zoom);
         imp_film_destroy(film);

@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * For tests of Stam's system: the walks of a scene, the gradient the library drops from one,
- * and this test's own value of the same walk in dual numbers. The record supplies where the
- * walk went, its cosines and the densities it was drawn with; values, derivatives and the
- * densities once more are made here, from formulas of their own. */
+ * For tests of Stam's system: the walks of a scene, the gradient the library drops from
+ * one, and this test's own value of the same walk in dual numbers. The record supplies
+ * where the walk went, its cosines and the densities it was drawn with; values,
+ * derivatives and the densities once more are made here, from formulas of their own. */
 #ifndef STAM_WALKS_H
 #define STAM_WALKS_H
 
-#include <stdbool.h>
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "walk/dims.h"
 #include "walk/walk.h"
+#include <stdbool.h>
 
 /* theta_1 .. theta_7 of the paper, from 0. */
 enum { EMISSION, AMBIENT2, DIFFUSE2, SPECULAR, EXPONENT, AMBIENT3, DIFFUSE3, N_CONTROLS };
@@ -23,13 +23,13 @@ static const char *const control_name[N_CONTROLS] = {
 struct stam {
     imp_context *ctx;
     imp_scene *scene;
-    uint8_t *chosen;              /* [n_params] all */
+    uint8_t *chosen; /* [n_params] all */
     struct imp_active active;
     struct imp_tracer tracer;
     struct imp_arena arena;
     int width, height;
-    double absorb;                /* of all its materials */
-    int64_t at[N_CONTROLS];       /* in x; -1: this scene has no such parameter */
+    double absorb;          /* of all its materials */
+    int64_t at[N_CONTROLS]; /* in x; -1: this scene has no such parameter */
     double theta[N_CONTROLS];
 };
 
@@ -73,21 +73,22 @@ static inline void stam_close(struct stam *s)
     imp_scene_destroy(s->scene);
 }
 
-/* ---- The library's gradient of one walk ---------------------------------------------------- */
+/* ---- The library's gradient of one walk ---- */
 
 struct stam_sink {
     struct imp_sink sink; /* first */
     const struct stam *s;
-    double *g;            /* [N_CONTROLS] */
+    double *g; /* [N_CONTROLS] */
 };
 
-static inline void stam_sink_add(struct imp_sink *sink, int param, size_t element, int channels,
-                                 const imp_spec *bar)
+static inline void stam_sink_add(struct imp_sink *sink, int param, size_t element,
+                                 int channels, const imp_spec *bar)
 {
     struct stam_sink *to = (struct stam_sink *)sink;
     (void)element, (void)channels;
     for (int k = 0; k < N_CONTROLS; k++)
-        if (to->s->at[k] >= 0 && to->s->at[k] == to->s->active.base[param]) to->g[k] += (*bar)[0];
+        if (to->s->at[k] >= 0 && to->s->at[k] == to->s->active.base[param])
+            to->g[k] += (*bar)[0];
 }
 
 static inline void stam_gradient(const struct stam *s, const struct imp_walk *walk,
@@ -98,12 +99,14 @@ static inline void stam_gradient(const struct stam *s, const struct imp_walk *wa
     imp__walk_sweep(&s->tracer, walk, (imp_spec){adjoint}, &to.sink);
 }
 
-/* ---- This test's own value ------------------------------------------------------------------ */
+/* ---- This test's own value ---- */
 
 enum stam_variant { STAM_RECIPROCAL, STAM_MICROFACET, STAM_PAPER };
 enum stam_sampling { STAM_MIXTURE, STAM_COSINE, STAM_PHONG };
 
-struct dual { double v, d[N_CONTROLS]; };
+struct dual {
+    double v, d[N_CONTROLS];
+};
 
 static inline struct dual dual_of(double v) { return (struct dual){.v = v}; }
 static inline struct dual dual_control(const double *theta, int k)
@@ -124,7 +127,10 @@ static inline struct dual dual_mul(struct dual a, struct dual b)
     for (int k = 0; k < N_CONTROLS; k++) c.d[k] = a.d[k] * b.v + a.v * b.d[k];
     return c;
 }
-static inline struct dual dual_scale(struct dual a, double s) { return dual_mul(a, dual_of(s)); }
+static inline struct dual dual_scale(struct dual a, double s)
+{
+    return dual_mul(a, dual_of(s));
+}
 static inline struct dual dual_exp(struct dual a)
 {
     struct dual e = {.v = exp(a.v)};
@@ -132,29 +138,34 @@ static inline struct dual dual_exp(struct dual a)
     return e;
 }
 
-struct stam_half { double c, sin, mo; };
+struct stam_half {
+    double c, sin, mo;
+};
 static inline struct stam_half stam_half(const struct imp_dirs *d)
 {
-    const double x = d->wi[0] + d->wo[0], y = d->wi[1] + d->wo[1], z = d->wi[2] + d->wo[2];
+    const double x = d->wi[0] + d->wo[0], y = d->wi[1] + d->wo[1],
+                 z = d->wi[2] + d->wo[2];
     const double length = sqrt(x * x + y * y + z * z);
     const double along = x * d->wo[0] + y * d->wo[1] + z * d->wo[2];
     return (struct stam_half){z / length, sqrt(x * x + y * y) / length, along / length};
 }
 
-/* M2's f cos(theta_i): theta_3 cos/pi + theta_4 (a + 2)/(8 pi mo) exp((a + 1) ln cos_m) V. */
+/* M2's f cos(theta_i): theta_3 cos/pi + theta_4 (a + 2)/(8 pi mo) exp((a + 1) ln cos_m)
+ * V. */
 static inline struct dual stam_m2(const struct imp_dirs *d, enum stam_variant variant,
                                   const double *theta)
 {
     const struct stam_half h = stam_half(d);
-    const double V = variant == STAM_PAPER       ? h.sin
+    const double V = variant == STAM_PAPER        ? h.sin
                      : variant == STAM_MICROFACET ? 1
-                     : d->wi[2] < d->wo[2]        ? d->wi[2] / d->wo[2] : 1;
+                     : d->wi[2] < d->wo[2]        ? d->wi[2] / d->wo[2]
+                                                  : 1;
     const struct dual alpha = dual_control(theta, EXPONENT);
     const struct dual power = dual_exp(dual_scale(dual_add(alpha, dual_of(1)), log(h.c)));
     const struct dual lobe = dual_mul(dual_add(alpha, dual_of(2)), power);
-    return dual_add(dual_scale(dual_control(theta, DIFFUSE2), d->wi[2] / M_PI),
-                    dual_scale(dual_mul(dual_control(theta, SPECULAR), lobe),
-                               V / (8 * M_PI * h.mo)));
+    return dual_add(
+        dual_scale(dual_control(theta, DIFFUSE2), d->wi[2] / M_PI),
+        dual_scale(dual_mul(dual_control(theta, SPECULAR), lobe), V / (8 * M_PI * h.mo)));
 }
 
 /* Density of M2's draws per steradian. */
@@ -172,10 +183,10 @@ static inline bool stam_is(const struct imp_vertex *v, const char *material)
     return v->bsdf && v->bsdf->name && strcmp(v->bsdf->name, material) == 0;
 }
 
-/* L in the order the walk goes (the library folds from the far end). Counts scatterings. */
+/* L in the order the walk goes (the library folds from the far end). Counts scatterings.
+ */
 static inline struct dual stam_value(const struct imp_walk *w, enum stam_variant variant,
-                                     double absorb, const double *theta, int *n2,
-                                     int *n3)
+                                     double absorb, const double *theta, int *n2, int *n3)
 {
     struct dual T = dual_of(1);
     *n2 = *n3 = 0;
@@ -186,9 +197,9 @@ static inline struct dual stam_value(const struct imp_walk *w, enum stam_variant
             const struct dual glow = dual_control(theta, sphere ? AMBIENT2 : AMBIENT3);
             return w->absorbed ? dual_mul(T, dual_scale(glow, 1 / absorb)) : dual_of(0);
         }
-        const struct dual f = sphere ? stam_m2(&v->dirs, variant, theta)
-                                     : dual_scale(dual_control(theta, DIFFUSE3),
-                                                  v->dirs.wi[2] / M_PI);
+        const struct dual f =
+            sphere ? stam_m2(&v->dirs, variant, theta)
+                   : dual_scale(dual_control(theta, DIFFUSE3), v->dirs.wi[2] / M_PI);
         T = dual_mul(T, dual_scale(f, v->inv_ps));
         ++*(sphere ? n2 : n3);
     }

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Stam's Figures 7 and 8 (gradients.md 2.3, T4): the picture and seven derivative pictures,
- * with cosine draws and with half of the draws from the Phong-Blinn lobe. The sampler changes
- * the noise and nothing else: chi-square over blocks of pixels, and the ratios of noise. */
+ * Stam's Figures 7 and 8 (gradients.md 2.3, T4): the picture and seven derivative
+ * pictures, with cosine draws and with half of the draws from the Phong-Blinn lobe. The
+ * sampler changes the noise and nothing else: chi-square over blocks of pixels, and the
+ * ratios of noise. */
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "math/stat.h"
@@ -10,7 +11,9 @@
 enum { RES = 32, BLOCK = 8, N = RES / BLOCK, N_CONTROLS = 7 };
 
 /* Block means of the picture (first) and the derivatives, and their variances. */
-struct pictures { double mean[1 + N_CONTROLS][N * N], var[1 + N_CONTROLS][N * N]; };
+struct pictures {
+    double mean[1 + N_CONTROLS][N * N], var[1 + N_CONTROLS][N * N];
+};
 
 static void blocks(imp_film *film, double *mean, double *var)
 {
@@ -25,8 +28,8 @@ static void blocks(imp_film *film, double *mean, double *var)
     imp_film_destroy(film);
 }
 
-static struct pictures pictures(imp_context *ctx, const char *defines, int spp, uint64_t seed,
-                                char name[][64])
+static struct pictures pictures(imp_context *ctx, const char *defines, int spp,
+                                uint64_t seed, char name[][64])
 {
     struct pictures p;
     struct imp_run run = IMP_RUN_INIT;
@@ -42,7 +45,8 @@ static struct pictures pictures(imp_context *ctx, const char *defines, int spp, 
     for (int k = 0; k < N_CONTROLS; k++) {
         size_t param;
         struct imp_param_info info = {.size = sizeof info};
-        test_must(ctx, imp_problem_variable(problem, (size_t)k, &param, NULL, NULL, NULL));
+        test_must(ctx,
+                  imp_problem_variable(problem, (size_t)k, &param, NULL, NULL, NULL));
         test_must(ctx, imp_scene_get_param(scene, param, &info));
         snprintf(name[k + 1], 64, "%s", info.name);
         blocks(films[k], p.mean[k + 1], p.var[k + 1]);
@@ -72,8 +76,9 @@ static void compare(imp_context *ctx, const char *variant, int spp)
             dof++;
         }
         const double p = imp__chi2_tail(chi2, dof), ratio = sqrt(vc / vm);
-        tap_ok(p > 1e-4 && p < 1 - 1e-4, "%s: %s, cosine and mixture # chi2 %.1f of %d, p %.3f",
-               variant, name[k], chi2, dof, p);
+        tap_ok(p > 1e-4 && p < 1 - 1e-4,
+               "%s: %s, cosine and mixture # chi2 %.1f of %d, p %.3f", variant, name[k],
+               chi2, dof, p);
         /* At equal walks: what the lobe is for, and what it must not spoil. */
         const int specular = strstr(name[k], "specular") || strstr(name[k], "exponent");
         tap_ok(specular ? ratio > 2 && ratio < 20 : ratio > .7 && ratio < 10,

@@ -1,22 +1,24 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Stam's optimiser loop (gradients.md 2.3, T6): all seven controls back from one 32 x 32
- * picture, from values that are wrong by 30 %. Without an argument a quick run, judged by its
- * own error bars; with "long" enough walks for 2 %.
+ * picture, from values that are wrong by 30 %. Without an argument a quick run, judged by
+ * its own error bars; with "long" enough walks for 2 %.
  *
- * Walks that sample the light (integrator=path) and the loss relative to the target, whose
- * weights are nearly those of the noise: the paper's walk and equal weights would need 50
- * times the samples (docs/stam.md). The sphere's ambient term is what the picture says least
- * about. */
+ * Walks that sample the light (integrator=path) and the loss relative to the target,
+ * whose weights are nearly those of the noise: the paper's walk and equal weights would
+ * need 50 times the samples (docs/stam.md). The sphere's ambient term is what the picture
+ * says least about. */
 #include "stam_walks.h"
 
 static imp_context *ctx;
 
 /* Worst |value/truth - 1| and worst |value - truth|/se. */
-struct errors { double relative, z; };
+struct errors {
+    double relative, z;
+};
 
-static struct errors fit(imp_problem *p, imp_scene *scene, enum imp_optimizer optimizer, int spp,
-                         int iterations, const double *truth)
+static struct errors fit(imp_problem *p, imp_scene *scene, enum imp_optimizer optimizer,
+                         int spp, int iterations, const double *truth)
 {
     static const char *const name[] = {"Adam", "LM"};
     struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
@@ -29,7 +31,8 @@ static struct errors fit(imp_problem *p, imp_scene *scene, enum imp_optimizer op
     run.spp = spp;
     run.seed = 2;
     test_must(ctx, imp_fit(p, &o, &run, &r));
-    printf("# %s, %d spp, %d iterations: %s\n", name[optimizer], spp, r->iterations, r->reason);
+    printf("# %s, %d spp, %d iterations: %s\n", name[optimizer], spp, r->iterations,
+           r->reason);
     for (int c = 0; c < N_CONTROLS; c++) {
         const size_t i = test_variable(p, scene, ctx, control_name[c]);
         const struct imp_fit_variable *v = &r->variables[i];
@@ -69,15 +72,16 @@ int main(int argc, char **argv)
     test_must(ctx, imp_problem_set_x(p, start));
     struct errors e = fit(p, scene, IMP_LM, lengthy ? 512 : 64, 0, truth);
     tap_ok(e.z < 4 && e.relative < (lengthy ? .12 : .5),
-           "seven controls, LM, few walks # worst %.1f %%, %.1f se", 100 * e.relative, e.z);
+           "seven controls, LM, few walks # worst %.1f %%, %.1f se", 100 * e.relative,
+           e.z);
     if (lengthy) {
         e = fit(p, scene, IMP_LM, 16384, 0, truth); /* from where the first ended */
-        tap_ok(e.z < 4 && e.relative <= .02, "seven controls, LM # worst %.2f %%, %.1f se",
-               100 * e.relative, e.z);
+        tap_ok(e.z < 4 && e.relative <= .02,
+               "seven controls, LM # worst %.2f %%, %.1f se", 100 * e.relative, e.z);
         test_must(ctx, imp_problem_set_x(p, start));
         e = fit(p, scene, IMP_ADAM, 256, 600, truth);
-        tap_ok(e.z < 4 && e.relative <= .02, "seven controls, Adam # worst %.2f %%, %.1f se",
-               100 * e.relative, e.z);
+        tap_ok(e.z < 4 && e.relative <= .02,
+               "seven controls, Adam # worst %.2f %%, %.1f se", 100 * e.relative, e.z);
     }
     imp_problem_destroy(p);
     imp_film_destroy(film);

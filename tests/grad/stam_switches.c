@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The switches that show the errata (gradients.md 2.3, T7): which of them is refused where,
- * what is warned about, and that the attached exponent, where it is allowed, is the derivative
- * (it lacks the gradient of what arrives and all boundary terms: gradients.md 4). */
+ * The switches that show the errata (gradients.md 2.3, T7): which of them is refused
+ * where, what is warned about, and that the attached exponent, where it is allowed, is
+ * the derivative (it lacks the gradient of what arrives and all boundary terms:
+ * gradients.md 4). */
 #include "imp_scene.h"
 #include "imp_tap.h"
 
@@ -19,24 +20,27 @@ static imp_scene *ball(imp_context *ctx, const char *variant, const char *sampli
                        const char *alpha)
 {
     char xml[2048];
-    snprintf(xml, sizeof xml,
-             "<scene version='3.0.0'><integrator type='stam'>"
-             "<string name='alpha_gradient' value='%s'/></integrator>"
-             "<sensor type='perspective'><float name='fov' value='30'/>"
-             "<transform name='to_world'><lookat origin='0,0,4' target='0,0,0' up='0,1,0'/>"
-             "</transform><film type='hdrfilm'><integer name='width' value='16'/>"
-             "<integer name='height' value='16'/><rfilter type='box'/></film></sensor>"
-             "<emitter type='constant'><float name='radiance' value='1'/></emitter>"
-             "<shape type='sphere'><bsdf type='stam_m2' id='ball'>"
-             "<string name='variant' value='%s'/><string name='sampling' value='%s'/>"
-             "<float name='diffuse' value='.2'/><float name='specular' value='.7'/>"
-             "<float name='exponent' value='5'/><float name='absorb' value='.3'/>"
-             "</bsdf></shape></scene>", alpha, variant, sampling);
+    snprintf(
+        xml, sizeof xml,
+        "<scene version='3.0.0'><integrator type='stam'>"
+        "<string name='alpha_gradient' value='%s'/></integrator>"
+        "<sensor type='perspective'><float name='fov' value='30'/>"
+        "<transform name='to_world'><lookat origin='0,0,4' target='0,0,0' up='0,1,0'/>"
+        "</transform><film type='hdrfilm'><integer name='width' value='16'/>"
+        "<integer name='height' value='16'/><rfilter type='box'/></film></sensor>"
+        "<emitter type='constant'><float name='radiance' value='1'/></emitter>"
+        "<shape type='sphere'><bsdf type='stam_m2' id='ball'>"
+        "<string name='variant' value='%s'/><string name='sampling' value='%s'/>"
+        "<float name='diffuse' value='.2'/><float name='specular' value='.7'/>"
+        "<float name='exponent' value='5'/><float name='absorb' value='.3'/>"
+        "</bsdf></shape></scene>",
+        alpha, variant, sampling);
     return test_scene_text(ctx, xml, IMP_MONO);
 }
 
 /* d (mean of the picture)/d exponent. */
-static enum imp_status slope(imp_context *ctx, imp_scene *scene, int spp, double *g, double *se)
+static enum imp_status slope(imp_context *ctx, imp_scene *scene, int spp, double *g,
+                             double *se)
 {
     imp_problem *p = test_problem(ctx, scene, "*.exponent.value");
     struct imp_run run = IMP_RUN_INIT;
@@ -72,7 +76,8 @@ static void attached(imp_context *ctx)
             else
                 tap_ok(st == IMP_OK && fabs(a - d) <= 4 * hypot(a_se, d_se) &&
                            a_se < .1 * fabs(d),
-                       "attached, %s, %s: is the derivative # %.6f +- %.6f, detached %.6f +- %.6f",
+                       "attached, %s, %s: is the derivative # %.6f +- %.6f, detached "
+                       "%.6f +- %.6f",
                        variants[v], samplings[q], a, a_se, d, d_se);
             imp_scene_destroy(s);
         }
@@ -85,8 +90,8 @@ static void attached(imp_context *ctx)
     imp_scene_destroy(box);
 }
 
-/* The horizon's part is what the refusal is about: the paper's term, which has neither it nor
- * the gradient of what arrives, is wrong even under a constant sky. */
+/* The horizon's part is what the refusal is about: the paper's term, which has neither it
+ * nor the gradient of what arrives, is wrong even under a constant sky. */
 static void horizon(imp_context *ctx)
 {
     for (int v = 0; v < 2; v++) {
@@ -99,7 +104,8 @@ static void horizon(imp_context *ctx)
         test_must(ctx, slope(ctx, s, 2000, &a, &a_se));
         imp_scene_destroy(s);
         tap_ok(fabs(a - d) > 20 * hypot(a_se, d_se),
-               "first attached term alone, %s, under a constant sky: wrong # %.5f, truth %.5f",
+               "first attached term alone, %s, under a constant sky: wrong # %.5f, truth "
+               "%.5f",
                variant, a, d);
     }
 }
@@ -124,7 +130,8 @@ static void words(imp_context *ctx)
     imp_scene_destroy(test_scene(ctx, "stam.xml", IMP_MONO, "alpha_gradient=detached"));
     tap_ok(last_warning[0] == 0, "detached: nothing to warn about");
     imp_scene_destroy(test_scene(ctx, "stam.xml", IMP_MONO, "alpha_gradient=paper"));
-    tap_ok(strstr(last_warning, "wrong") != NULL, "the paper's: announced # %s", last_warning);
+    tap_ok(strstr(last_warning, "wrong") != NULL, "the paper's: announced # %s",
+           last_warning);
 }
 
 int main(void)
