@@ -238,7 +238,7 @@ static void boxes(imp_context *ctx)
     report("E9, D with the sine", stat, table_paper, 1 + N_CONTROLS, alpha);
 }
 
-/* ---- E25: the loss of 16 x 16 pixels against T = 0.12, N walks a pixel (2.3 T5, 5.1) ---- */
+/* ---- E25: the loss of 16 x 16 pixels against T = 0.12, N walks a pixel (2.3 T5) ---- */
 
 enum estimator { PRINTED, PER_SAMPLE, SAME, LEAVE_ONE_OUT, N_ESTIMATORS };
 static const char *const estimator_name[] = {"as printed", "cost of every sample",

@@ -18,7 +18,7 @@ struct errors {
 };
 
 static struct errors fit(imp_problem *p, imp_scene *scene, enum imp_optimizer optimizer,
-                         int spp, int iterations, const double *truth)
+                         int spp, int iterations, double rate, const double *truth)
 {
     static const char *const name[] = {"Adam", "LM"};
     struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
@@ -27,6 +27,7 @@ static struct errors fit(imp_problem *p, imp_scene *scene, enum imp_optimizer op
     struct errors e = {0, 0};
     o.optimizer = optimizer;
     o.max_iterations = iterations;
+    o.learning_rate = rate;
     o.intervals = 1;
     run.spp = spp;
     run.seed = 2;
@@ -57,7 +58,7 @@ int main(int argc, char **argv)
     ctx = test_context(0);
     imp_scene *scene = test_scene(ctx, "stam.xml", IMP_MONO, "integrator=path");
     imp_problem *p = test_problem(ctx, scene, "*");
-    run.spp = lengthy ? 65536 : 512;
+    run.spp = lengthy ? 32768 : 512;
     run.seed = 1;
     test_must(ctx, imp_render(scene, &run, &film));
     target.width = target.height = 32;
@@ -70,16 +71,17 @@ int main(int argc, char **argv)
         start[test_variable(p, scene, ctx, control_name[c])] = wrong[c] * truth[c];
 
     test_must(ctx, imp_problem_set_x(p, start));
-    struct errors e = fit(p, scene, IMP_LM, lengthy ? 512 : 64, 0, truth);
+    struct errors e = fit(p, scene, IMP_LM, lengthy ? 512 : 64, 0, 0, truth);
     tap_ok(e.z < 4 && e.relative < (lengthy ? .12 : .5),
            "seven controls, LM, few walks # worst %.1f %%, %.1f se", 100 * e.relative,
            e.z);
-    if (lengthy) {
-        e = fit(p, scene, IMP_LM, 16384, 0, truth); /* from where the first ended */
+    if (lengthy) { /* each goes on from where the one before ended */
+        e = fit(p, scene, IMP_LM, 8192, 0, 0, truth);
         tap_ok(e.z < 4 && e.relative <= .02,
                "seven controls, LM # worst %.2f %%, %.1f se", 100 * e.relative, e.z);
         test_must(ctx, imp_problem_set_x(p, start));
-        e = fit(p, scene, IMP_ADAM, 256, 600, truth);
+        fit(p, scene, IMP_ADAM, 64, 300, 0, truth);
+        e = fit(p, scene, IMP_ADAM, 512, 100, .005, truth);
         tap_ok(e.z < 4 && e.relative <= .02,
                "seven controls, Adam # worst %.2f %%, %.1f se", 100 * e.relative, e.z);
     }
