@@ -17,10 +17,19 @@ struct imp__error_text {
     char text[ERROR_LENGTH];
 };
 
+/* More than the machine has is refused here: an overcommitting kernel would grant it, and end
+ * the process when it is touched. */
+static bool fits_machine(size_t bytes)
+{
+    if (bytes < (size_t)1 << 30) return true;
+    const long pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGE_SIZE);
+    return pages <= 0 || page <= 0 || bytes / (size_t)page < (size_t)pages;
+}
 static void *default_allocate(size_t bytes, void *payload)
 {
     (void)payload;
     void *p = NULL;
+    if (!fits_machine(bytes)) return NULL;
     return posix_memalign(&p, 64, bytes) == 0 ? p : NULL;
 }
 static void default_release(void *memory, void *payload)

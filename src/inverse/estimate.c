@@ -28,7 +28,7 @@ struct imp__replicates imp__replicates_plan(int spp, int batch_max)
     struct imp__replicates r;
     spp = imp_max(spp, 2);
     r.n = spp < 4 ? spp : imp_min(spp / 2, batch_max);
-    r.R = (spp + r.n - 1) / r.n;
+    r.R = (spp - 1) / r.n + 1;
     r.chunks = imp_max(1, r.R / IMP_BATCHES_PER_ITEM);
     return r;
 }
@@ -78,6 +78,8 @@ enum imp_status imp__problem_tracer(const struct imp_problem *p, const struct im
 
 struct job {
     const struct imp_problem *problem;
+    const struct imp_run *run;
+    double walks;                      /* planned */
     struct imp_tracer tracer;
     struct imp__replicates plan;
     const struct imp__target *target;  /* NULL: fixed adjoint */
@@ -233,6 +235,12 @@ static enum imp_status tile_work(size_t item, int worker, int slot, void *payloa
                 sum += v;
                 square += v * v;
             }
+            if (w->arena.failed)
+                return imp__error(j->problem->ctx, IMP_E_NOMEM, "no memory to record walks");
+            /* Lost already: walks that nothing ends take long. */
+            const enum imp_status st = imp__drops_check(j->problem->ctx, j->run, out->dropped,
+                                                        j->walks);
+            if (st != IMP_OK) return st;
             if (!paired) {
                 /* mean over all R replicates; variance R/(R-1) spread / all^2 */
                 imp__tally_pixel(&w->tally, R, 1 / all, R / ((R - 1) * all * all));
@@ -265,7 +273,7 @@ static enum imp_status tile_commit(size_t item, int slot, void *payload)
     j->variance += in->variance;
     j->dropped += in->dropped;
     imp__tally_add(&in->tally, j->want_gradient ? j->problem->n : 0, j->gradient, j->gradient_variance);
-    return IMP_OK;
+    return imp__drops_check(j->problem->ctx, j->run, j->dropped, j->walks);
 }
 
 static void job_destroy(struct job *j)
@@ -302,16 +310,14 @@ static enum imp_status job_run(struct job *j, const struct imp_run *run, const c
                                   j->channels, &j->workers[k].tally));
     }
     const double walks = (double)j->width * j->height * j->plan.n * j->plan.R;
+    j->run = run;
+    j->walks = walks;
     const struct imp_loop loop = {
         .n_items = imp__tile_count(j->width, j->height, j->margin) * (size_t)j->plan.chunks,
         .work = tile_work, .commit = tile_commit, .payload = j, .progress = run->progress,
         .progress_payload = run->progress_payload, .stage = stage, .rate_unit = "walks",
         .units = walks, .fraction_lo = lo, .fraction_hi = hi, .start_s = start_s};
     IMP_TRY(imp__parallel(ctx, &loop, NULL));
-    if (imp__drops_exceed(run, j->dropped, walks))
-        IMP_TRY(imp__error(ctx, IMP_E_PATHS,
-                           "%llu of %.0f walks had values that are not finite or negative",
-                           (unsigned long long)j->dropped, walks));
 out:
     job_destroy(j);
     return st;

@@ -31,6 +31,8 @@ struct sums { /* of one tile; matrices [K*K] */
 
 struct job {
     const struct imp_problem *problem;
+    const struct imp_run *run;
+    double walks;                 /* planned, through one target's sensor */
     const struct imp__target *target;
     struct imp_tracer tracer;
     struct imp__replicates plan;
@@ -182,6 +184,11 @@ static enum imp_status tile_work(size_t item, int worker, int slot, void *payloa
                 sum += v;
                 square += v * v;
             }
+            if (out->failed)
+                return imp__error(j->problem->ctx, IMP_E_NOMEM, "no memory to record a walk");
+            const enum imp_status st = imp__drops_check(j->problem->ctx, j->run, out->dropped,
+                                                        j->walks);
+            if (st != IMP_OK) return st;
             const double spread = R / ((R - 1) * all * all);
             if (!j->target->noise_se)
                 for (size_t i = 0; i < (size_t)seen_channels(j) * K * K; i++)
@@ -203,8 +210,6 @@ static enum imp_status tile_work(size_t item, int worker, int slot, void *payloa
                 }
             }
         }
-    if (out->failed)
-        return imp__error(j->problem->ctx, IMP_E_NOMEM, "no memory to record a walk");
     return IMP_OK;
 }
 
@@ -258,6 +263,8 @@ static enum imp_status target_add(struct job *j, const struct imp__target *targe
     j->plan = imp__replicates_plan(imp_max(own.spp > 0 ? own.spp : j->tracer.sensor->spp, 4),
                                    IMP_BATCH_MAX);
     const double walks = (double)j->width * j->height * j->plan.n * j->plan.R;
+    j->run = run;
+    j->walks = walks;
     const struct imp_loop loop = {
         .n_items = imp__tile_count(j->width, j->height, 0) * (size_t)j->plan.chunks,
         .work = tile_work, .commit = tile_commit, .payload = j, .progress = run->progress,
@@ -266,8 +273,8 @@ static enum imp_status target_add(struct job *j, const struct imp__target *targe
         .start_s = start};
     const uint64_t before = j->total.dropped;
     st = imp__parallel(p->ctx, &loop, NULL);
-    if (st == IMP_OK && imp__drops_exceed(run, j->total.dropped - before, walks))
-        st = imp__error(p->ctx, IMP_E_PATHS, "too many walks had values that are not finite");
+    if (st == IMP_OK)
+        st = imp__drops_check(p->ctx, run, j->total.dropped - before, walks);
     return st;
 }
 

@@ -6,7 +6,7 @@
 struct imp__replicates imp__splat_plan(int spp)
 {
     struct imp__replicates r = {.R = spp >= 16 ? 4 : 2, .chunks = 1};
-    r.n = imp_max(2, (spp + r.R - 1) / r.R);
+    r.n = imp_max(2, (spp - 1) / r.R + 1);
     return r;
 }
 

@@ -5,25 +5,31 @@
 #include "build.h"
 
 /* Top-level objects without id: <tag><n>, counted per tag. */
-static const char *top_name(struct imp_scene *scene, const struct imp_node *node, size_t index)
+struct tag_counts {
+    int n_tags;
+    struct { const char *tag; size_t n; } tags[16]; /* there are not as many */
+};
+
+static const char *top_name(struct imp_scene *scene, const struct imp_node *node,
+                            struct tag_counts *counts)
 {
     if (node->id) return node->id;
-    const struct imp_child *children = scene->root->children;
-    size_t n = 0;
-    for (size_t i = 0; i < index; i++)
-        n += children[i].node && !children[i].node->id &&
-             strcmp(children[i].node->tag, node->tag) == 0;
+    int k = 0;
+    while (k < counts->n_tags && strcmp(counts->tags[k].tag, node->tag) != 0) k++;
+    if (k == counts->n_tags && k < (int)imp_count(counts->tags))
+        counts->tags[counts->n_tags++].tag = node->tag;
     char text[64];
-    snprintf(text, sizeof text, "%.40s%zu", node->tag, n);
+    snprintf(text, sizeof text, "%.40s%zu", node->tag,
+             k < counts->n_tags ? counts->tags[k].n++ : 0);
     return imp__arena_strdup(&scene->arena, text);
 }
 
 static enum imp_status top_build(struct imp_scene *scene, struct imp_child *child,
-                                 size_t index)
+                                 struct tag_counts *counts)
 {
     enum imp_status st = IMP_OK;
     struct imp_node *node = child->node;
-    const char *tag = node->tag, *name = top_name(scene, node, index);
+    const char *tag = node->tag, *name = top_name(scene, node, counts);
     if (!name) return imp__build_no_memory(scene);
     child->used = true;
     if (strcmp(tag, "shape") == 0) {
@@ -81,6 +87,7 @@ static enum imp_status lights_build(struct imp_scene *scene)
 enum imp_status imp__scene_build(struct imp_scene *scene)
 {
     enum imp_status st = IMP_OK;
+    struct tag_counts counts = {0};
     scene->channels = scene->mode == IMP_MONO ? 1 : 3;
     scene->environment = -1;
     scene->lo = imp__v3(INFINITY, INFINITY, INFINITY);
@@ -88,7 +95,7 @@ enum imp_status imp__scene_build(struct imp_scene *scene)
     IMP_TRY(imp__build_black(scene, &scene->black_bsdf));
     scene->default_bsdf = scene->black_bsdf;
     for (size_t i = 0; i < scene->root->n_children; i++)
-        IMP_TRY(top_build(scene, &scene->root->children[i], i));
+        IMP_TRY(top_build(scene, &scene->root->children[i], &counts));
     IMP_TRY(imp__props_finish(scene->ctx, scene->root));
     if (!scene->has_integrator)
         scene->integrator = (struct imp_integrator){

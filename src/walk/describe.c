@@ -156,7 +156,9 @@ static void plain(struct text *t, const struct imp_scene *scene, const struct im
         beta *= v->w;
     }
     if (!w->first) put(t, "  meets nothing\n");
-    if (w->dropped) put(t, "  dropped: its value is not finite, or negative\n");
+    if (w->dropped) put(t, w->dropped == IMP_DROP_LONG
+                           ? "  dropped: nothing ended it\n"
+                           : "  dropped: its value is not finite, or negative\n");
     plain_spec(t, "radiance", w->L, C);
 }
 

@@ -21,6 +21,9 @@ struct tile_result {
 };
 
 struct render {
+    imp_context *ctx;
+    const struct imp_run *run;
+    double walks;                   /* planned */
     const struct imp_picture *picture;
     const struct imp_film_desc *film;
     int n;                          /* channels */
@@ -47,8 +50,19 @@ static struct region item_region(const struct render *r, size_t item)
     g.x1 = imp_min(g.x0 + TILE, r->width + r->margin);
     g.y1 = imp_min(g.y0 + TILE, r->height + r->margin);
     g.s0 = pass * r->pass_spp;
-    g.s1 = imp_min(g.s0 + r->pass_spp, r->spp);
+    g.s1 = r->spp - g.s0 > r->pass_spp ? g.s0 + r->pass_spp : r->spp;
     return g;
+}
+
+enum imp_status imp__drops_check(imp_context *ctx, const struct imp_run *run,
+                                 uint64_t dropped, double walks)
+{
+    const double budget = run->drop_budget > 0 ? run->drop_budget : 1e-4;
+    if ((double)dropped <= 1 + budget * walks) return IMP_OK;
+    return imp__error(ctx, IMP_E_PATHS,
+                      "%llu of %.0f walks were dropped: their values were not finite or "
+                      "negative, or nothing ended them in %d steps",
+                      (unsigned long long)dropped, walks, IMP_WALK_MAX);
 }
 
 static void accumulate(double *sums, double w, const double *value, int n)
@@ -109,6 +123,12 @@ static enum imp_status tile_work(size_t item, int worker, int slot, void *payloa
                 else
                     splat(r, &g, out->sums, px, py, value);
             }
+            /* A walk dropped for want of memory is not a walk with a bad value. */
+            if (r->arenas[worker].failed)
+                return imp__error(r->ctx, IMP_E_NOMEM, "no memory for the walks of a picture");
+            /* Lost already: walks that nothing ends take long. */
+            const enum imp_status st = imp__drops_check(r->ctx, r->run, out->dropped, r->walks);
+            if (st != IMP_OK) return st;
         }
     return IMP_OK;
 }
@@ -127,7 +147,7 @@ static enum imp_status tile_commit(size_t item, int slot, void *payload)
             for (int k = 0; k < n_sums; k++) to[k] += from[k];
         }
     r->dropped += in->dropped;
-    return IMP_OK;
+    return imp__drops_check(r->ctx, r->run, r->dropped, r->walks);
 }
 
 static void film_finish(const struct render *r, imp_film *film)
@@ -192,7 +212,8 @@ static struct render render_plan(const struct imp_picture *p, const struct imp_r
     /* With a time limit and no count: until the time is up. */
     r.spp = run->spp > 0 ? run->spp : run->time_limit_s > 0 ? 1 << 24 : p->sensor->spp;
     r.pass_spp = run->time_limit_s > 0 ? 4 : PASS_SPP;
-    r.passes = (r.spp + r.pass_spp - 1) / r.pass_spp;
+    r.passes = (r.spp - 1) / r.pass_spp + 1;
+    r.walks = (double)(r.width + 2 * r.margin) * (r.height + 2 * r.margin) * r.spp;
     return r;
 }
 
@@ -202,6 +223,8 @@ enum imp_status imp__picture_make(imp_context *ctx, const struct imp_picture *pi
     enum imp_status st = IMP_OK;
     imp_film *film = NULL;
     struct render r = render_plan(picture, run);
+    r.ctx = ctx;
+    r.run = run;
     IMP_TRY(imp__film_create(ctx, r.width, r.height, picture->names, true, &film));
     IMP_TRY(buffers_create(&r, ctx));
 
@@ -227,17 +250,13 @@ enum imp_status imp__picture_make(imp_context *ctx, const struct imp_picture *pi
         if (st == IMP_CANCELLED && imp__now() >= loop.deadline_s) st = IMP_OK;
     }
     if (st != IMP_OK && st != IMP_CANCELLED) goto out;
+    const enum imp_status ended = st;
 
-    /* A walk dropped for want of memory is not a walk with a bad value. */
-    for (int k = 0; k < ctx->threads; k++)
-        if (r.arenas[k].failed)
-            IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for the walks of a picture"));
     film_finish(&r, film);
     film->spp = imp_min((int64_t)passes_done * r.pass_spp, (int64_t)r.spp);
-    if (imp__drops_exceed(run, film->dropped, pixels * (double)film->spp))
-        IMP_TRY(imp__error(ctx, IMP_E_PATHS,
-                           "%llu of %.0f walks had values that are not finite or negative",
-                           (unsigned long long)film->dropped, pixels * (double)film->spp));
+    IMP_TRY(imp__drops_check(ctx, run, film->dropped,
+                             pixels * (double)imp_max(film->spp, (int64_t)r.pass_spp)));
+    st = ended;
     *out = film;
     film = NULL;
 out:

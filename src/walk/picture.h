@@ -29,11 +29,9 @@ static inline int imp__film_border(const struct imp_film_desc *f)
 {
     return f->filter.radius > 0.5 ? (int)ceil(f->filter.radius - 0.5) : 0;
 }
-/* More dropped walks than the run allows? One is always forgiven. */
-static inline bool imp__drops_exceed(const struct imp_run *run, uint64_t dropped, double walks)
-{
-    const double budget = run->drop_budget > 0 ? run->drop_budget : 1e-4;
-    return (double)dropped > 1 + budget * walks;
-}
+/* IMP_E_PATHS if more walks of all `walks` were dropped than the run allows; one is always
+ * forgiven. */
+enum imp_status imp__drops_check(imp_context *ctx, const struct imp_run *run,
+                                 uint64_t dropped, double walks);
 
 #endif

@@ -45,6 +45,10 @@ static bool wants_lights(const struct imp_integrator *i)
 
 static struct imp_vertex *vertex_add(struct step *s)
 {
+    if (imp_unlikely(s->walk->n == IMP_WALK_MAX)) {
+        s->walk->dropped = IMP_DROP_LONG;
+        return NULL;
+    }
     struct imp_vertex *v = imp__arena_take(s->arena, 1, sizeof *v);
     if (imp_unlikely(!v)) {
         s->walk->dropped = IMP_DROP_MEMORY;

@@ -52,7 +52,11 @@ struct imp_vertex {
 };
 
 enum imp_drop { IMP_DROP_NONE, IMP_DROP_NAN, IMP_DROP_INFINITE, IMP_DROP_NEGATIVE,
-                IMP_DROP_MEMORY };
+                IMP_DROP_MEMORY, IMP_DROP_LONG };
+
+/* Vertices of a walk. One of more is dropped: nothing ends it, as in a closed white room
+ * without roulette. With roulette at 0.95 the chance to get here is 1e-365. */
+#define IMP_WALK_MAX (1 << 14)
 
 struct imp_walk {
     struct imp_vertex *first, *last;
