@@ -33,7 +33,8 @@ const struct arg_option options_scene[] = {
     {ARG_LIST, 'D', "define", "NAME=VALUE", "set a $parameter of the scene file",
      &cli.defines, 0, 0, NULL},
     {ARG_LIST, 0, "set", "ID=V[,V..]",
-     "set a scene parameter ('importon info' lists them)", &cli.sets, 0, 0, NULL},
+     "set a scene parameter ('importon info' lists them); @FILE: many", &cli.sets, 0, 0,
+     NULL},
     {ARG_TEXT, 'a', "search", "DIR[;DIR..]", "more folders to look for files in",
      &cli.search, 0, 0, NULL},
     {ARG_CHOICE, 'm', "mode", "MODE", "colour: rgb (default) or mono", &cli.mode, 0, 0,
@@ -204,6 +205,24 @@ out:
     return rc;
 }
 
+/* "@FILE": one ID=VALUE a line; empty lines and lines that begin with # are skipped. */
+static int apply_set_file(const char *path)
+{
+    FILE *f = fopen(path, "r");
+    char *line = NULL;
+    size_t size = 0;
+    int rc = 0;
+    if (!f) return cli_error(EXIT_USAGE, "--set @%s: %s", path, strerror(errno));
+    while (!rc && getline(&line, &size, f) >= 0) {
+        line[strcspn(line, "\r\n")] = 0;
+        if (*line && *line != '#') rc = apply_set(line);
+    }
+    if (!rc && ferror(f)) rc = cli_error(EXIT_USAGE, "--set @%s: cannot read", path);
+    free(line);
+    fclose(f);
+    return rc;
+}
+
 /* The parameters as --set takes them. Long ones are cut short. */
 static int dump(void)
 {
@@ -257,7 +276,10 @@ int cli_load(const char *path)
         rc = cli_fail(st, NULL);
         return st == IMP_E_IO ? EXIT_USAGE : rc;
     }
-    for (size_t i = 0; i < cli.sets.n && !rc; i++) rc = apply_set(cli.sets.item[i]);
+    for (size_t i = 0; i < cli.sets.n && !rc; i++) {
+        const char *set = cli.sets.item[i];
+        rc = *set == '@' ? apply_set_file(set + 1) : apply_set(set);
+    }
     if (!rc && cli.dump) rc = dump();
     return rc;
 }
@@ -291,7 +313,9 @@ int cli_spp(const struct imp_run *run)
 const char *cli_number_name(const struct imp_param_info *info, size_t element, char *text,
                             size_t size)
 {
-    if (info->count == 1) snprintf(text, size, "%s", info->name);
-    else snprintf(text, size, "%s[%zu]", info->name, element);
+    if (info->count == 1)
+        snprintf(text, size, "%s", info->name);
+    else
+        snprintf(text, size, "%s[%zu]", info->name, element);
     return text;
 }

@@ -41,8 +41,8 @@ static const struct arg_option options[] = {
      0, 0, NULL},
     {ARG_INT, 0, "picture-spp", "N", "samples per pixel of the pictures written",
      &o.picture_spp, 1, 1e9, NULL},
-    {ARG_TEXT, 0, "sheet", "FILE.png", "one PNG of before, target and recovered (with -o)",
-     &o.sheet, 0, 0, NULL},
+    {ARG_TEXT, 0, "sheet", "FILE.png",
+     "one PNG of before, target and recovered (with -o)", &o.sheet, 0, 0, NULL},
     {0}};
 
 /* ---- Pictures --------------------------------------------- */
@@ -51,8 +51,10 @@ static const struct arg_option options[] = {
 static char *picture_path(const char *name, size_t i)
 {
     char file[64];
-    if (problem_options.targets.n == 1) snprintf(file, sizeof file, "%s.exr", name);
-    else snprintf(file, sizeof file, "%s-%zu.exr", name, i);
+    if (problem_options.targets.n == 1)
+        snprintf(file, sizeof file, "%s.exr", name);
+    else
+        snprintf(file, sizeof file, "%s-%zu.exr", name, i);
     return join_path(cli.out, file);
 }
 
@@ -250,10 +252,13 @@ static void print_table(const struct imp_fit_result *r, const struct block *bloc
                    cli_number_name(&b->info, i, name, sizeof name), v->start, v->value);
             if (isfinite(v->lo95) && isfinite(v->hi95))
                 printf("[%.6g, %.6g]", v->lo95, v->hi95);
-            else if (!o.no_intervals && !v->determined) printf("not determined");
-            else printf("-");
+            else if (!o.no_intervals && !v->determined)
+                printf("not determined");
+            else
+                printf("-");
             printf("%s\n", v->at_bound < 0   ? "  at its lower bound"
-                           : v->at_bound > 0 ? "  at its upper bound" : "");
+                           : v->at_bound > 0 ? "  at its upper bound"
+                                             : "");
         }
     }
     printf("\n%s %.6g +- %.2g after %d iterations: %s\n", loss_word(), r->objective.value,
@@ -274,6 +279,26 @@ static int write_textures(const imp_problem *problem, const struct block *blocks
     return rc;
 }
 
+/* What was recovered as --set @FILE takes it, for the next fit, or a render. */
+static int write_set(const struct imp_fit_result *r, const struct block *blocks,
+                     size_t n_blocks)
+{
+    char *path = join_path(cli.out, "recovered.txt");
+    FILE *f = fopen(path, "w");
+    int rc = 0;
+    for (size_t k = 0; f && k < n_blocks; k++) {
+        const struct block *b = &blocks[k];
+        if (block_is_large(b)) continue;
+        fprintf(f, "%s=", b->info.name);
+        for (size_t i = 0; i < b->n; i++)
+            fprintf(f, "%s%.17g", i ? "," : "", r->variables[b->first + i].value);
+        fprintf(f, "\n");
+    }
+    if (!f || fclose(f) != 0) rc = cli_error(EXIT_RUN, "%s: %s", path, strerror(errno));
+    free(path);
+    return rc;
+}
+
 static int answer(imp_problem *problem, const struct imp_fit_result *r)
 {
     size_t n_blocks;
@@ -284,6 +309,7 @@ static int answer(imp_problem *problem, const struct imp_fit_result *r)
         rc = write_textures(problem, blocks, n_blocks, paths);
         if (!rc) rc = write_history(r);
         if (!rc) rc = write_json(r, blocks, n_blocks, paths);
+        if (!rc) rc = write_set(r, blocks, n_blocks);
     }
     if (cli.json) {
         struct json j = cli_json();
@@ -344,9 +370,12 @@ static int run_fit(int n, char **operand)
     return rc ? rc : cli_done();
 }
 
-const struct command command_fit = {
-    {"fit", "SCENE --target FILE", "recover parameters from target pictures",
-     {options, options_targets, options_params, options_run,
-      options_scene, options_general},
-     1, 1},
-    run_fit, 0};
+const struct command command_fit = {{"fit",
+                                     "SCENE --target FILE",
+                                     "recover parameters from target pictures",
+                                     {options, options_targets, options_params,
+                                      options_run, options_scene, options_general},
+                                     1,
+                                     1},
+                                    run_fit,
+                                    0};

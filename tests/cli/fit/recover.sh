@@ -13,3 +13,12 @@ assert json.load(open("result/parameters.json"))["params"] == a["params"]
 assert p["start"] == 0.8 and abs(p["value"] - 0.5) < 0.01, p
 assert p["lo95"] < p["value"] < p["hi95"] and abs(p["value"] - 0.5) < 5 * p["se"], p
 END
+# What was recovered goes into the next command.
+importon info "$scene" --set @result/recovered.txt --json | python3 -c '
+import json, sys
+a = json.load(open("answer.json"))["params"][0]
+(p,) = [p for p in json.load(sys.stdin)["params"] if p["name"] == a["name"]]
+assert abs(p["value"][0] - a["value"]) < 1e-8, (p, a)'
+printf '# a comment\n\nball.reflectance.value=much\n' >bad.txt
+importon info "$scene" --set @bad.txt
+importon info "$scene" --set @no.txt
