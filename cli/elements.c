@@ -58,22 +58,27 @@ static const struct arg_option options[] = {
      NULL},
     {0}};
 
-static int options_make(struct imp_elements_options *e)
-{
+/* What options name, in use until the process ends. */
+static struct {
     struct imp_elements_phong *phong;
     struct imp_elements_beam *beams;
     struct imp_elements_source *sources;
-    size_t n;
-    int rc = elements_phong(&o.phong, &phong);
-    if (!rc) rc = elements_beams(&o.beams, &beams);
-    if (!rc) rc = elements_sources(&o.sources, cli.sensor, &sources, &n);
+    size_t n_sources;
+} named;
+
+static int options_make(struct imp_elements_options *e)
+{
+    int rc = elements_phong(&o.phong, &named.phong);
+    if (!rc) rc = elements_beams(&o.beams, &named.beams);
+    if (!rc)
+        rc = elements_sources(&o.sources, cli.sensor, &named.sources, &named.n_sources);
     if (rc) return rc;
-    e->phong = phong;
+    e->phong = named.phong;
     e->n_phong = o.phong.n;
-    e->beams = beams;
+    e->beams = named.beams;
     e->n_beams = o.beams.n;
-    e->sources = sources;
-    e->n_sources = n;
+    e->sources = named.sources;
+    e->n_sources = named.n_sources;
     e->order = o.order;
     e->no_importance = o.no_importance;
     e->sensor = cli.sensor;

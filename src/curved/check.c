@@ -97,7 +97,7 @@ static enum imp_status check_dot(imp_bend *b, const double *dot, double *bar)
     const size_t taps = b->n * b->options.n_taps;
     struct imp_bend_exit *e = imp__alloc(b->ctx, b->n, sizeof *e);
     struct imp_bend_exit *te = imp__alloc(b->ctx, taps + 1, sizeof *te);
-    struct imp_bend_cotangent *c = imp__alloc(b->ctx, 2 * b->n, sizeof *c), *d = c + b->n;
+    struct imp_bend_cotangent *c = imp__alloc(b->ctx, 2 * b->n, sizeof *c), *d = c ? c + b->n : NULL;
     struct imp_bend_gradient g = IMP_BEND_GRADIENT_INIT;
     double left = 0, right = 0, scale = 1e-300;
     if (!e || !te || !c) IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "no memory for a check"));
@@ -139,7 +139,7 @@ static enum imp_status check_differences(imp_bend *b, double *dot, double *bar)
 {
     enum imp_status st = IMP_OK;
     const size_t n = b->field->n_theta;
-    double *theta = imp__alloc(b->ctx, 2 * n + 1, sizeof *theta), *moved = theta + n;
+    double *theta = imp__alloc(b->ctx, 2 * n + 1, sizeof *theta), *moved = theta ? theta + n : NULL;
     double value, want = 0, most = 0, f[2];
     if (!theta) return imp__error(b->ctx, IMP_E_NOMEM, "no memory for a check");
     imp_field_get_theta(b->field, theta);
@@ -177,7 +177,7 @@ enum imp_status imp_bend_check(imp_bend *b, const struct imp_check_row **rows, s
 {
     enum imp_status st = IMP_OK;
     const size_t n = b->field->n_theta;
-    double *dot = imp__alloc(b->ctx, 2 * n + 1, sizeof *dot), *bar = dot + n;
+    double *dot = imp__alloc(b->ctx, 2 * n + 1, sizeof *dot), *bar = dot ? dot + n : NULL;
     double error, order;
     if (!dot) return imp__error(b->ctx, IMP_E_NOMEM, "no memory for a check");
     if (b->n == 0) IMP_TRY(imp__error(b->ctx, IMP_E_ARG, "a problem without rays"));

@@ -420,7 +420,7 @@ enum imp_status imp_problem_reverse(imp_problem *p, const float *seed_image,
     struct imp__splat splat = {0};
     double *g = imp__alloc(ctx, 2 * p->n, sizeof *g);
     struct job j = {.problem = p, .seed = seed_image, .want_gradient = true, .gradient = g,
-                    .gradient_variance = g + p->n};
+                    .gradient_variance = g ? g + p->n : NULL};
     if (!g) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for gradients"));
     IMP_TRY(imp__problem_tracer(p, &own, &j.tracer));
     const int spp = own.spp > 0 ? own.spp : j.tracer.sensor->spp;

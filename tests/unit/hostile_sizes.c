@@ -115,8 +115,8 @@ static void samples(void)
     run.progress_payload = &calls;
     enum imp_status st = imp_render(s, &run, &film);
     imp_film_get_info(film, &info);
-    tap_ok(st == IMP_CANCELLED && film && calls >= 1 && info.spp == 0,
-           "2^31 - 1 samples, cancelled in the first pass # %s, %d calls, %lld samples",
+    tap_ok(st == IMP_CANCELLED && film && calls >= 1 && info.spp < 100000,
+           "2^31 - 1 samples, cancelled at the first report # %s, %d calls, %lld samples",
            imp_status_text(st), calls, (long long)info.spp);
     imp_film_destroy(film);
 
