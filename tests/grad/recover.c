@@ -10,29 +10,7 @@
 
 static imp_scene *box(imp_context *ctx)
 {
-    static char text[1 << 16];
-    char path[1024];
-    imp_scene *scene = NULL;
-    struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
-    const char *defines[] = {"res=32"};
-    snprintf(path, sizeof path, "%s/stam.xml", IMP_SCENES);
-    FILE *f = fopen(path, "rb");
-    const size_t n = f ? fread(text, 1, sizeof text - 1, f) : 0;
-    if (f) fclose(f);
-    text[n] = 0;
-    char *type = strstr(text, "<integrator type=\"stam\">");
-    char *alpha = type ? strstr(type, "<string name=\"alpha_gradient\"") : NULL;
-    if (!alpha) {
-        printf("Bail out! %s is not what it was\n", path);
-        exit(99);
-    }
-    memcpy(type, "<integrator type=\"path\">", strlen("<integrator type=\"path\">"));
-    memset(alpha, ' ', (size_t)(strstr(alpha, "/>") + 2 - alpha));
-    o.mode = IMP_MONO;
-    o.defines = defines;
-    o.n_defines = 1;
-    test_must(ctx, imp_scene_load_string(ctx, text, strlen(text), path, &o, &scene));
-    return scene;
+    return test_scene(ctx, "stam.xml", IMP_MONO, "res=32 integrator=path");
 }
 
 int main(void)
