@@ -1,0 +1,175 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Files of index fields: written and read back, cut off at every length, and hostile headers;
+ * files of problems: what they make, random damage. */
+#include "bend_kit.h"
+#include "curved/bend.h"
+#include <unistd.h>
+
+static unsigned char *slurp(const char *path, size_t *n)
+{
+    FILE *f = fopen(path, "rb");
+    if (!f) return NULL;
+    fseek(f, 0, SEEK_END);
+    *n = (size_t)ftell(f);
+    rewind(f);
+    unsigned char *d = malloc(*n + 1);
+    if (fread(d, 1, *n, f) != *n) *n = 0;
+    fclose(f);
+    return d;
+}
+static void spill(const char *path, const unsigned char *d, size_t n)
+{
+    FILE *f = fopen(path, "wb");
+    if (f && fwrite(d, 1, n, f) != n) printf("# cannot write %s\n", path);
+    if (f) fclose(f);
+}
+
+static void round_trip(const char *path, imp_field *f, double limit)
+{
+    struct imp_field_grid g = IMP_FIELD_GRID_INIT;
+    imp_field *back;
+    if (imp__field_is_grid(f)) KIT_CHECK(imp_field_get_grid(f, &g));
+    KIT_CHECK(imp_field_write(f, path));
+    KIT_CHECK(imp_field_read(kit_ctx, path, imp__field_is_grid(f) ? &g : NULL, &back));
+    double worst = 0;
+    for (int i = 0; i < 200; i++) {
+        const double x[3] = {0.9 * kit_pm(500, i), 0.9 * kit_pm(501, i), 0.9 * kit_pm(502, i)};
+        double a, b;
+        imp_field_eval(f, x, &a, NULL, NULL);
+        imp_field_eval(back, x, &b, NULL, NULL);
+        worst = fmax(worst, fabs(a - b));
+    }
+    tap_ok(worst < limit, "%s: read back # worst %.1e", path, worst);
+    imp_field_destroy(back);
+
+    size_t n = 0;
+    unsigned char *d = slurp(path, &n);
+    int refused = 0, tried = 0;
+    for (size_t cut = 0; cut < n; cut += cut < 60 ? 1 : 97) {
+        imp_field *h = NULL;
+        spill("cut", d, cut);
+        tried++;
+        if (imp_field_read(kit_ctx, "cut", NULL, &h) != IMP_OK) refused++;
+        imp_field_destroy(h);
+    }
+    /* The last byte of a text is the end of a line. */
+    tap_ok(refused >= tried - 1, "%s: cut off, refused %d of %d", path, refused, tried);
+    int survived = 0;
+    for (int i = 0; i < 100; i++) { /* damaged: an error or a field, never a crash */
+        imp_field *h = NULL;
+        unsigned char *c = malloc(n);
+        memcpy(c, d, n);
+        for (int k = 0; k < 3; k++)
+            c[(size_t)(kit_u(510 + k, i) * (double)imp_min(n, (size_t)160))] =
+                (unsigned char)(256 * kit_u(520 + k, i));
+        spill("cut", c, n);
+        survived += imp_field_read(kit_ctx, "cut", NULL, &h) == IMP_OK || h == NULL;
+        imp_field_destroy(h);
+        free(c);
+    }
+    tap_ok(survived == 100, "%s: damaged, none crashes", path);
+    free(d);
+    unlink("cut");
+    unlink(path);
+}
+
+static const char problem[] =
+    "<scene version='3.0.0'>\n"
+    "<medium type='graded'>\n"
+    " <volume type='grid'><integer name='cells' value='5'/></volume>\n"
+    " <volume type='plume'><float name='n0' value='0'/><float name='b' value='0.1'/>"
+    "<float name='width' value='0.4'/></volume>\n"
+    " <volume type='luneburg' name='truth'><float name='radius' value='0.9'/></volume>\n"
+    " <integer name='hold_rim' value='2'/><string name='hold' value='x y'/>\n"
+    " <float name='smoothness' value='1e-6'/><float name='step' value='0.1'/>\n"
+    " <surface type='box'/>\n"
+    "</medium>\n"
+    "<rays type='beam'><integer name='views' value='3'/><integer name='count' value='16'/>"
+    "<float name='radius' value='0.5'/><float name='start' value='-0.7'/>"
+    "<surface type='plane'><string name='event' value='tap'/></surface>"
+    "<target type='points'><boolean name='from_truth' value='true'/></target>"
+    "<target type='focus'><integer name='tap' value='0'/></target></rays>\n"
+    "<rays type='point'><float name='angle' value='20'/><integer name='count' value='9'/>"
+    "<string name='pattern' value='fan'/></rays>\n"
+    "<target type='wavefront'><float name='plane' value='2'/></target>\n"
+    "</scene>\n";
+
+static void problems(void)
+{
+    imp_bend *b;
+    double value, *g;
+    KIT_CHECK(imp_bend_load_string(kit_ctx, problem, strlen(problem), "p", NULL, &b));
+    tap_ok(imp_bend_n_rays(b) == 3 * 16 + 9 && imp_bend_n_bundles(b) == 4 &&
+               imp_bend_n_targets(b) == 7 && b->options.n_taps == 3,
+           "problem: %zu rays, %d bundles, %zu targets", imp_bend_n_rays(b),
+           imp_bend_n_bundles(b), imp_bend_n_targets(b));
+    struct imp_bend_rays r;
+    imp_bend_get_rays(b, &r);
+    const double want[3] = {-0.7 * sin(IMP_PI / 3), 0, -0.7 * cos(IMP_PI / 3)};
+    double mid[3] = {0};
+    for (int i = 16; i < 32; i++)
+        for (int k = 0; k < 3; k++) mid[k] += r.x[i][k] / 16;
+    tap_ok(fabs(mid[0] - want[0]) + fabs(mid[1] - want[1]) + fabs(mid[2] - want[2]) < 0.1 &&
+               fabs(r.d[20][0] - sin(IMP_PI / 3)) < 1e-12,
+           "second view: turned by 60 degrees");
+    g = calloc(imp_field_n_theta(imp_bend_field(b)), sizeof *g);
+    KIT_CHECK(imp_bend_objective(b, &value, g, NULL, NULL));
+    const struct imp_check_row *rows;
+    size_t n_rows;
+    int ok = 1;
+    KIT_CHECK(imp_bend_check(b, &rows, &n_rows));
+    for (size_t i = 0; i < n_rows; i++) {
+        if (!strcmp(rows[i].method, "dot") || !strcmp(rows[i].method, "transpose") ||
+            (!strcmp(rows[i].method, "difference") && rows[i].step == 1e-6))
+            ok = ok && rows[i].error < 1e-5;
+    }
+    tap_ok(ok && n_rows > 8, "problem checks itself # %zu rows", n_rows);
+    free(g);
+    imp_bend_destroy(b);
+
+    int good = 0, bad = 0;
+    const size_t n = strlen(problem);
+    for (int i = 0; i < 600; i++) { /* a letter or two changed */
+        char text[sizeof problem];
+        memcpy(text, problem, sizeof text);
+        for (int k = 0; k <= i % 3; k++) {
+            static const char letters[] = "<>'/=0123456789-.eabxz \n$";
+            text[(size_t)(kit_u(530 + k, i) * (double)n)] =
+                letters[(size_t)(kit_u(540 + k, i) * (sizeof letters - 1))];
+        }
+        b = NULL;
+        if (imp_bend_load_string(kit_ctx, text, n, "p", NULL, &b) == IMP_OK && b) {
+            good++;
+            imp_bend_destroy(b);
+        } else {
+            bad += imp_last_error(kit_ctx)[0] != 0 && b == NULL;
+        }
+    }
+    tap_ok(good + bad == 600 && bad > 300, "damaged problems: %d refused with a message, %d read",
+           bad, good);
+}
+
+int main(void)
+{
+    char folder[] = "/tmp/bend_files.XXXXXX";
+    if (!mkdtemp(folder) || chdir(folder)) return 99;
+    kit_begin(1);
+    imp_field *f = kit_grid(IMP_FIELD_SPLINE, IMP_FIELD_ETA, 5, 1, 0.05);
+    double s[6 * 7 * 8]; /* through samples: natural ends, which files imply */
+    for (int i = 0; i < 6 * 7 * 8; i++) s[i] = 1.2 + 0.1 * kit_u(550, i);
+    KIT_CHECK(imp_field_set_samples(f, s));
+    round_trip("a.npy", f, 1e-13);
+    imp_field_destroy(f);
+    f = kit_grid(IMP_FIELD_TRILINEAR, IMP_FIELD_ETA, 5, 1, 0.05);
+    round_trip("a.vol", f, 1e-6);
+    imp_field_destroy(f);
+    const char *name;
+    f = kit_field(12, &name);
+    round_trip("a.txt", f, 1e-15);
+    imp_field_destroy(f);
+    problems();
+    imp_context_destroy(kit_ctx);
+    if (chdir("/") == 0) rmdir(folder);
+    return tap_done();
+}
