@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The numbers to hold, measured in one run and printed as JSON: ratios, because machines are
- * noisy and differ. Each pair is timed in turn, A B A B ..., and the median of the pairs'
- * ratios is reported.
+ * The numbers to hold, measured in one run and printed as JSON: ratios, because machines
+ * are noisy and differ. Each pair is timed in turn, A B A B ..., and the median of the
+ * pairs' ratios is reported.
  *
  *     bench [--repeats N] [--spp N] [--scene FILE]
  *
@@ -12,6 +12,8 @@
  *   threads          one thread over two
  *   first_gradient_s process start to the first gradient, 64 x 64, 4 spp
  *   memory           peak memory at 65,536 spp over that at 16 spp, 16 x 16 pixels */
+#include "base/pool.h"
+#include "walk/walk.h"
 #include <importon/importon.h>
 #include <math.h>
 #include <stdio.h>
@@ -20,8 +22,6 @@
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
-#include "base/pool.h"
-#include "walk/walk.h"
 
 static const char *scene_file = IMP_SCENES "/cornell.xml";
 static int repeats = 5, spp = 16;
@@ -29,7 +29,8 @@ static int repeats = 5, spp = 16;
 static void must(imp_context *ctx, enum imp_status st)
 {
     if (st == IMP_OK) return;
-    fprintf(stderr, "bench: %s: %s\n", imp_status_text(st), ctx ? imp_last_error(ctx) : "");
+    fprintf(stderr, "bench: %s: %s\n", imp_status_text(st),
+            ctx ? imp_last_error(ctx) : "");
     exit(3);
 }
 
@@ -79,9 +80,13 @@ static double time_render(imp_context *ctx, imp_scene *scene, uint64_t seed)
     return time;
 }
 
-/* ---- rays/render ------------------------------------------------------------------------ */
+/* ---- rays/render --------------------------------------------------------------- */
 
-struct ray { imp_v3 o, d; double t_max; bool shadow; };
+struct ray {
+    imp_v3 o, d;
+    double t_max;
+    bool shadow;
+};
 struct rays {
     struct ray *list;
     size_t n, per_item;
@@ -104,16 +109,18 @@ static void rays_record(imp_context *ctx, imp_scene *scene, struct rays *out)
                 const struct imp_arena_mark mark = imp__arena_mark(&arena);
                 struct imp_walk walk;
                 imp__walk_trace(&tracer, &arena, x, y, s, &walk);
-                out->list = imp__grow(ctx, out->list, &capacity, out->n + 64, sizeof *out->list);
+                out->list =
+                    imp__grow(ctx, out->list, &capacity, out->n + 64, sizeof *out->list);
                 if (!out->list) exit(3);
                 imp_v3 o = walk.ray.o;
                 for (const struct imp_vertex *v = walk.first; v; v = v->next) {
                     if (!v->shape) break;
-                    out->list[out->n++] = (struct ray){o, imp__normalize(v->at.p - o), INFINITY, false};
+                    out->list[out->n++] =
+                        (struct ray){o, imp__normalize(v->at.p - o), INFINITY, false};
                     if (v->light >= 0) {
                         const imp_v3 d = imp__normalize(v->l_p - v->at.p);
-                        out->list[out->n++] = (struct ray){imp__offset(v->at.p, v->ng, d), d,
-                                                           v->l_at.dist * .9999, true};
+                        out->list[out->n++] = (struct ray){imp__offset(v->at.p, v->ng, d),
+                                                           d, v->l_at.dist * .9999, true};
                     }
                     if (v->next && v->next->shape)
                         o = imp__offset(v->at.p, v->ng, v->next->at.p - v->at.p);
@@ -130,7 +137,8 @@ static enum imp_status rays_work(size_t item, int worker, int slot, void *payloa
     struct rays *r = payload;
     size_t hits = 0;
     (void)worker, (void)slot;
-    for (size_t k = item * r->per_item; k < imp_min(r->n, (item + 1) * r->per_item); k++) {
+    for (size_t k = item * r->per_item; k < imp_min(r->n, (item + 1) * r->per_item);
+         k++) {
         const struct ray *ray = &r->list[k];
         struct imp_hit hit;
         if (ray->shadow) hits += imp__occluded(r->scene, &ray->o, &ray->d, 0, ray->t_max);
@@ -143,7 +151,8 @@ static enum imp_status rays_work(size_t item, int worker, int slot, void *payloa
 static double time_rays(imp_context *ctx, struct rays *r)
 {
     const struct imp_loop loop = {.n_items = (r->n + r->per_item - 1) / r->per_item,
-                                  .work = rays_work, .payload = r};
+                                  .work = rays_work,
+                                  .payload = r};
     const double start = imp__now();
     must(ctx, imp__parallel(ctx, &loop, NULL));
     return imp__now() - start;
@@ -168,7 +177,7 @@ static void bench_rays(void)
     imp_context_destroy(ctx);
 }
 
-/* ---- gradient/render ---------------------------------------------------------------------- */
+/* ---- gradient/render ----------------------------------------------------------- */
 
 static double time_gradient(imp_context *ctx, imp_problem *p, double *g, uint64_t seed)
 {
@@ -267,7 +276,8 @@ static void bench_threads(void)
     imp_context *one = context(1), *two = context(2);
     imp_scene *a = load(one, scene_file, 256), *b = load(two, scene_file, 256);
     double ratio[64];
-    for (int k = 0; k < repeats; k++) ratio[k] = time_render(one, a, 3) / time_render(two, b, 3);
+    for (int k = 0; k < repeats; k++)
+        ratio[k] = time_render(one, a, 3) / time_render(two, b, 3);
     printf("  \"two_threads_speedup\": %.3f,\n", median(ratio, repeats));
     imp_scene_destroy(a);
     imp_scene_destroy(b);
@@ -275,7 +285,7 @@ static void bench_threads(void)
     imp_context_destroy(two);
 }
 
-/* ---- in processes of their own ------------------------------------------------------------ */
+/* ---- in processes of their own ------------------------------------------------- */
 
 static int child(int res, int child_spp)
 {
@@ -329,8 +339,8 @@ int main(int argc, char **argv)
     repeats = imp_clamp(repeats, 1, 64);
     if (child_res) return child(child_res, child_spp);
 
-    printf("{\n  \"importon\": \"%s\",\n  \"repeats\": %d,\n  \"spp\": %d,\n", imp_version(),
-           repeats, spp);
+    printf("{\n  \"importon\": \"%s\",\n  \"repeats\": %d,\n  \"spp\": %d,\n",
+           imp_version(), repeats, spp);
     bench_rays();
     imp_context *ctx = context(2);
     imp_scene *scene = load(ctx, scene_file, 256);

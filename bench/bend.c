@@ -4,11 +4,11 @@
  *
  *     bend_bench [--repeats N] [--rays N] [--full]
  *
- *   fields      ray-steps per second and thread (processor time) forwards, and the time of the
- *               adjoint over it, for both interpolations at 33^3, 129^3 and 257^3
- *   threads     wall time on one thread over two, forward and adjoint
- *   memory      peak of allocations at 16 times the steps over that at 1
- *   iteration   --full: one forward and adjoint of 772,000 rays at 129^3, wall seconds */
+ *   fields      ray-steps per second and thread (processor time) forwards, and the time
+ * of the adjoint over it, for both interpolations at 33^3, 129^3 and 257^3 threads wall
+ * time on one thread over two, forward and adjoint memory      peak of allocations at 16
+ * times the steps over that at 1 iteration   --full: one forward and adjoint of 772,000
+ * rays at 129^3, wall seconds */
 #include <importon/bend.h>
 #include <math.h>
 #include <stdio.h>
@@ -28,8 +28,9 @@ static void *count_alloc(size_t bytes, void *payload)
     *p = bytes;
     const size_t now = __atomic_add_fetch(&now_bytes, bytes, __ATOMIC_RELAXED);
     size_t peak = peak_bytes;
-    while (now > peak && !__atomic_compare_exchange_n(&peak_bytes, &peak, now, 0,
-                                                      __ATOMIC_RELAXED, __ATOMIC_RELAXED)) {}
+    while (now > peak &&
+           !__atomic_compare_exchange_n(&peak_bytes, &peak, now, 0, __ATOMIC_RELAXED,
+                                        __ATOMIC_RELAXED)) {}
     return (char *)p + 64;
 }
 static void count_release(void *memory, void *payload)
@@ -88,8 +89,8 @@ struct work {
     struct imp_bend_stats stats;
 };
 
-static void work_make(struct work *w, int threads, enum imp_field_interp interp, int single,
-                      int nodes, size_t n, double step_cells)
+static void work_make(struct work *w, int threads, enum imp_field_interp interp,
+                      int single, int nodes, size_t n, double step_cells)
 {
     memset(w, 0, sizeof *w);
     w->ctx = context(threads);
@@ -124,7 +125,8 @@ static void work_make(struct work *w, int threads, enum imp_field_interp interp,
         w->x[i][0] = 0.63 * u, w->x[i][1] = 0.63 * v, w->x[i][2] = -0.99999;
         w->d[i][2] = 1;
     }
-    w->rays = (struct imp_bend_rays){n, (const double (*)[3])w->x, (const double (*)[3])w->d, NULL};
+    w->rays = (struct imp_bend_rays){n, (const double(*)[3])w->x,
+                                     (const double(*)[3])w->d, NULL};
     w->exits = calloc(n, sizeof *w->exits);
     w->bars = calloc(n, sizeof *w->bars);
     w->theta_bar = calloc(imp_field_n_theta(w->f), sizeof(double));
@@ -149,15 +151,21 @@ static double backward(struct work *w, clockid_t clock)
     struct imp_bend_gradient g = IMP_BEND_GRADIENT_INIT;
     g.theta = w->theta_bar;
     const double start = seconds(clock);
-    must(w->ctx, imp_bend_adjoint(w->f, &w->o, &w->rays, w->exits, NULL, w->bars, NULL, &g, NULL));
+    must(w->ctx, imp_bend_adjoint(w->f, &w->o, &w->rays, w->exits, NULL, w->bars, NULL,
+                                  &g, NULL));
     return seconds(clock) - start;
 }
 
 static void fields(void)
 {
-    static const struct { const char *name; enum imp_field_interp interp; int single; } kinds[] = {
-        {"trilinear float", IMP_FIELD_TRILINEAR, 1}, {"trilinear", IMP_FIELD_TRILINEAR, 0},
-        {"spline float", IMP_FIELD_SPLINE, 1}, {"spline", IMP_FIELD_SPLINE, 0}};
+    static const struct {
+        const char *name;
+        enum imp_field_interp interp;
+        int single;
+    } kinds[] = {{"trilinear float", IMP_FIELD_TRILINEAR, 1},
+                 {"trilinear", IMP_FIELD_TRILINEAR, 0},
+                 {"spline float", IMP_FIELD_SPLINE, 1},
+                 {"spline", IMP_FIELD_SPLINE, 0}};
     static const int sizes[] = {33, 129, 257};
     printf(" \"fields\": [");
     for (int k = 0; k < 4; k++)
@@ -173,9 +181,11 @@ static void fields(void)
                 rate[r] = (double)w.stats.steps / f * 1e-6;
                 ratio[r] = b / f;
             }
-            printf("%s\n  {\"field\": \"%s\", \"nodes\": %d, \"million_ray_steps_per_s\": %.2f, "
-                   "\"adjoint/forward\": %.3f}", k || s ? "," : "", kinds[k].name, sizes[s],
-                   median(rate, repeats), median(ratio, repeats));
+            printf("%s\n  {\"field\": \"%s\", \"nodes\": %d, "
+                   "\"million_ray_steps_per_s\": %.2f, "
+                   "\"adjoint/forward\": %.3f}",
+                   k || s ? "," : "", kinds[k].name, sizes[s], median(rate, repeats),
+                   median(ratio, repeats));
             fflush(stdout);
             work_free(&w);
         }
@@ -195,8 +205,8 @@ static void threads(void)
         b[r] = backward(&one, CLOCK_MONOTONIC);
         b[r] /= backward(&two, CLOCK_MONOTONIC);
     }
-    printf(" \"threads\": {\"forward 1/2\": %.3f, \"adjoint 1/2\": %.3f},\n", median(f, repeats),
-           median(b, repeats));
+    printf(" \"threads\": {\"forward 1/2\": %.3f, \"adjoint 1/2\": %.3f},\n",
+           median(f, repeats), median(b, repeats));
     work_free(&one);
     work_free(&two);
 }
@@ -223,7 +233,8 @@ static void iteration(void)
     work_make(&w, 2, IMP_FIELD_SPLINE, 0, 129, 772000, 0.5);
     peak_bytes = now_bytes;
     const double f = forward(&w, CLOCK_MONOTONIC), b = backward(&w, CLOCK_MONOTONIC);
-    printf(",\n \"iteration\": {\"rays\": 772000, \"nodes\": 129, \"threads\": 2, \"steps\": %.0f, "
+    printf(",\n \"iteration\": {\"rays\": 772000, \"nodes\": 129, \"threads\": 2, "
+           "\"steps\": %.0f, "
            "\"forward_s\": %.2f, \"adjoint_s\": %.2f, \"peak_bytes\": %.0f}",
            (double)w.stats.steps, f, b, (double)peak_bytes);
     work_free(&w);
@@ -235,7 +246,8 @@ int main(int argc, char **argv)
     for (int i = 1; i < argc; i++) {
         if (!strcmp(argv[i], "--full")) full = 1;
         else if (i + 1 < argc && !strcmp(argv[i], "--repeats")) repeats = atoi(argv[++i]);
-        else if (i + 1 < argc && !strcmp(argv[i], "--rays")) n_rays = (size_t)atol(argv[++i]);
+        else if (i + 1 < argc && !strcmp(argv[i], "--rays"))
+            n_rays = (size_t)atol(argv[++i]);
         else {
             fprintf(stderr, "usage: bend_bench [--repeats N] [--rays N] [--full]\n");
             return 2;

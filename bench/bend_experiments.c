@@ -2,16 +2,17 @@
  *
  * The experiments of docs/curved-rays.md, each a table on standard output:
  *
- *     bend_experiments luneburg|maxwell|focus|slice|tape|fibre|display|gas|rod ... [--full]
+ *     bend_experiments luneburg|maxwell|focus|slice|tape|fibre|display|gas|rod ...
+ * [--full]
  *
  * Settings are scaled to minutes on two cores; --full takes the published sizes. */
+#include "bend_tape.h"
 #include <importon/bend.h>
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
-#include "bend_tape.h"
 
 static imp_context *ctx;
 static int full;
@@ -40,7 +41,7 @@ static imp_field *grid(int cells, double half, double index, enum imp_field_inte
     return f;
 }
 
-/* ---- Luneburg, Maxwell: files ---------------------------------------------------------- */
+/* ---- Luneburg, Maxwell: files -------------------------------------------------- */
 
 static double luneburg(double r2) { return sqrt(2 - fmin(r2, 1)); }
 static double maxwell(double r2) { return 2 / (1 + r2); }
@@ -53,9 +54,10 @@ static void recover(const char *file, double (*truth)(double), const int iterati
     char define[2][32];
     const char *const defines[2] = {define[0], define[1]};
     struct imp_load_options lo = IMP_LOAD_OPTIONS_INIT;
-    printf("%-10s %6s %12s %12s %12s %12s %8s\n", "", "cells", "objective", "rms eta", "centre",
-           "rms spot", "s");
-    for (int levels = 1; levels <= 3; levels++) { /* each from the start: what a level is worth */
+    printf("%-10s %6s %12s %12s %12s %12s %8s\n", "", "cells", "objective", "rms eta",
+           "centre", "rms spot", "s");
+    for (int levels = 1; levels <= 3;
+         levels++) { /* each from the start: what a level is worth */
         snprintf(define[0], 32, "count=%d", full ? 600 : 150);
         lo.defines = defines, lo.n_defines = 1;
         must(imp_bend_load(ctx, file, &lo, &b));
@@ -82,23 +84,26 @@ static void recover(const char *file, double (*truth)(double), const int iterati
         double *parts = calloc(imp_bend_n_targets(b), sizeof *parts), value;
         must(imp_bend_objective(b, &value, NULL, parts, NULL));
         for (size_t i = 0; i < imp_bend_n_targets(b); i++) spot += 2 * parts[i];
-        printf("%-10s %6d %12.3e %12.4f %12.4f %12.2e %8.1f\n", levels == 1 ? "from file" : "",
-               6 << (levels - 1), r.value, sqrt(sum / n), centre, sqrt(spot), s);
+        printf("%-10s %6d %12.3e %12.4f %12.4f %12.2e %8.1f\n",
+               levels == 1 ? "from file" : "", 6 << (levels - 1), r.value, sqrt(sum / n),
+               centre, sqrt(spot), s);
         fflush(stdout);
         free(parts);
         imp_bend_destroy(b);
     }
 }
 
-/* ---- Focusing, canonical and arc length (supplement Fig. 2) ------------------------------- */
+/* ---- Focusing, canonical and arc length (supplement Fig. 2) -------------------- */
 
-static imp_bend *focus_problem(int cells, enum imp_bend_scheme scheme, enum imp_bend_way way)
+static imp_bend *focus_problem(int cells, enum imp_bend_scheme scheme,
+                               enum imp_bend_way way)
 {
     imp_bend *b;
     const size_t n = 600;
-    double (*x)[3] = calloc(n, sizeof *x), (*d)[3] = calloc(n, sizeof *d);
+    double(*x)[3] = calloc(n, sizeof *x), (*d)[3] = calloc(n, sizeof *d);
     for (size_t i = 0; i < n; i++) {
-        const double r = 0.8 * sqrt(((double)i + 0.5) / (double)n), a = 2.399963229728653 * (double)i;
+        const double r = 0.8 * sqrt(((double)i + 0.5) / (double)n),
+                     a = 2.399963229728653 * (double)i;
         x[i][0] = r * cos(a), x[i][1] = r * sin(a), x[i][2] = -1, d[i][2] = 1;
     }
     must(imp_bend_create(ctx, grid(cells, 1.01, 1, IMP_FIELD_SPLINE), &b));
@@ -106,9 +111,11 @@ static imp_bend *focus_problem(int cells, enum imp_bend_scheme scheme, enum imp_
     struct imp_bend_options o = IMP_BEND_OPTIONS_INIT;
     struct imp_bend_target t = IMP_BEND_TARGET_INIT;
     s.offset = 1;
-    o.surfaces = &s, o.n_surfaces = 1, o.scheme = scheme, o.way = way, o.step = 1.01 / cells;
+    o.surfaces = &s, o.n_surfaces = 1, o.scheme = scheme, o.way = way,
+    o.step = 1.01 / cells;
     must(imp_bend_set_options(b, &o));
-    must(imp_bend_add_rays(b, n, (const double (*)[3])x, (const double (*)[3])d, NULL, NULL));
+    must(imp_bend_add_rays(b, n, (const double(*)[3])x, (const double(*)[3])d, NULL,
+                           NULL));
     t.at_plane = 1, t.offset = 1.1, t.point[2] = 1.1;
     must(imp_bend_add_target(b, &t));
     must(imp_bend_hold_rim(b, 3, 1));
@@ -118,14 +125,18 @@ static imp_bend *focus_problem(int cells, enum imp_bend_scheme scheme, enum imp_
 
 static void focus(void)
 {
-    static const struct { const char *name; enum imp_bend_scheme s; enum imp_bend_way w; } rows[] = {
+    static const struct {
+        const char *name;
+        enum imp_bend_scheme s;
+        enum imp_bend_way w;
+    } rows[] = {
         {"canonical leapfrog, reversed", IMP_BEND_LEAPFROG, IMP_BEND_REVERSE},
         {"arc length x' = v/|v|, reversed", IMP_BEND_ARC, IMP_BEND_REVERSE},
         {"arc length (23), stored", IMP_BEND_ARC_INDEX, IMP_BEND_STORED},
         {"arc length (23), pseudo-reversed", IMP_BEND_ARC_INDEX, IMP_BEND_PSEUDO}};
     const int steps[] = {20, 80, full ? 400 : 200};
-    printf("%-34s %12s %12s %12s %14s\n", "mean r^2/2 after", "20", "80", full ? "400" : "200",
-           "|g' - g|/|g|");
+    printf("%-34s %12s %12s %12s %14s\n", "mean r^2/2 after", "20", "80",
+           full ? "400" : "200", "|g' - g|/|g|");
     for (int k = 0; k < 4; k++) {
         printf("%-34s", rows[k].name);
         double bias = 0;
@@ -137,10 +148,12 @@ static void focus(void)
             fo.tolerance = 1e-12;
             must(imp_bend_fit(b, &fo, &r));
             printf(" %12.2e", r.value);
-            if (m == 1 && k >= 2) { /* this way's gradient against the exact one, same program */
+            if (m == 1 &&
+                k >= 2) { /* this way's gradient against the exact one, same program */
                 imp_bend *e = focus_problem(16, IMP_BEND_ARC_INDEX, IMP_BEND_STORED);
                 const size_t n = imp_field_n_theta(imp_bend_field(b));
-                double *g = calloc(n, 8), *h = calloc(n, 8), *theta = calloc(n, 8), v, dd = 0, gg = 0;
+                double *g = calloc(n, 8), *h = calloc(n, 8), *theta = calloc(n, 8), v,
+                       dd = 0, gg = 0;
                 imp_field_get_theta(imp_bend_field(b), theta);
                 must(imp_field_set_theta(imp_bend_field(e), theta));
                 must(imp_bend_objective(b, &v, h, NULL, NULL));
@@ -157,9 +170,16 @@ static void focus(void)
     }
 }
 
-/* ---- Adjoint, tape and differences: a slice (supplement Fig. 1), memory and time (Table 1) -- */
+/* ---- Adjoint, tape and differences: a slice (supplement Fig. 1), memory and time (Table
+ * 1) -- */
 
-struct lens { imp_field *f; size_t n; double (*x)[3], (*d)[3]; double t; int nodes; };
+struct lens {
+    imp_field *f;
+    size_t n;
+    double (*x)[3], (*d)[3];
+    double t;
+    int nodes;
+};
 
 static struct lens lens_make(enum imp_field_interp interp, int cells, size_t n)
 {
@@ -171,7 +191,8 @@ static struct lens lens_make(enum imp_field_interp interp, int cells, size_t n)
     for (size_t k = 0; k < m; k++)
         for (size_t j = 0; j < m; j++)
             for (size_t i = 0; i < m; i++) {
-                const double x = -1 + h * ((double)i - extra), y = -1 + h * ((double)j - extra),
+                const double x = -1 + h * ((double)i - extra),
+                             y = -1 + h * ((double)j - extra),
                              z = -1 + h * ((double)k - extra), r2 = x * x + y * y + z * z;
                 t[i + m * (j + m * k)] = luneburg(r2);
             }
@@ -179,7 +200,8 @@ static struct lens lens_make(enum imp_field_interp interp, int cells, size_t n)
     free(t);
     l.x = calloc(n, sizeof *l.x), l.d = calloc(n, sizeof *l.d);
     for (size_t i = 0; i < n; i++) {
-        const double r = 0.9 * sqrt(((double)i + 0.5) / (double)n), a = 2.399963229728653 * (double)i;
+        const double r = 0.9 * sqrt(((double)i + 0.5) / (double)n),
+                     a = 2.399963229728653 * (double)i;
         l.x[i][0] = r * cos(a), l.x[i][1] = r * sin(a), l.x[i][2] = -0.99, l.d[i][2] = 1;
     }
     l.t = h / 2;
@@ -191,12 +213,15 @@ static void lens_free(struct lens *l)
     imp_field_destroy(l->f);
 }
 
-/* C = sum of the coordinates of the exits at z = 0.95: value, and gradient by the adjoint. */
-static double lens_adjoint(const struct lens *l, double *bar, double *forward_s, double *back_s)
+/* C = sum of the coordinates of the exits at z = 0.95: value, and gradient by the
+ * adjoint. */
+static double lens_adjoint(const struct lens *l, double *bar, double *forward_s,
+                           double *back_s)
 {
     struct imp_bend_surface s = IMP_BEND_SURFACE_INIT;
     struct imp_bend_options o = IMP_BEND_OPTIONS_INIT;
-    struct imp_bend_rays r = {l->n, (const double (*)[3])l->x, (const double (*)[3])l->d, NULL};
+    struct imp_bend_rays r = {l->n, (const double(*)[3])l->x, (const double(*)[3])l->d,
+                              NULL};
     struct imp_bend_exit *e = calloc(l->n, sizeof *e);
     struct imp_bend_cotangent *c = calloc(l->n, sizeof *c);
     struct imp_bend_gradient g = IMP_BEND_GRADIENT_INIT;
@@ -221,7 +246,8 @@ static void slice(void)
 {
     for (int kind = 0; kind < 2; kind++) {
         const int cells = full ? 64 : 24;
-        struct lens l = lens_make(kind ? IMP_FIELD_SPLINE : IMP_FIELD_TRILINEAR, cells, full ? 20000 : 2000);
+        struct lens l = lens_make(kind ? IMP_FIELD_SPLINE : IMP_FIELD_TRILINEAR, cells,
+                                  full ? 20000 : 2000);
         const size_t n = imp_field_n_theta(l.f), side = (size_t)(l.nodes + 2 * kind);
         double *adj = calloc(n, 8), *tape = calloc(n, 8), *theta = calloc(n, 8), f, b;
         lens_adjoint(&l, adj, &f, &b);
@@ -230,9 +256,10 @@ static void slice(void)
         tape_gradient(theta, (int)side, kind, 1, l.n, l.x, l.d, l.t, 0.95, tape, &cost);
         double dt = 0, norm = 0;
         for (size_t i = 0; i < n; i++) dt += sqr(adj[i] - tape[i]), norm += sqr(adj[i]);
-        printf("%s, %d cells: |adjoint - tape|/|adjoint| = %.1e\n", kind ? "cubic" : "trilinear", cells,
-               sqrt(dt / norm));
-        printf("  middle z slice, central differences against the adjoint, rms relative:");
+        printf("%s, %d cells: |adjoint - tape|/|adjoint| = %.1e\n",
+               kind ? "cubic" : "trilinear", cells, sqrt(dt / norm));
+        printf(
+            "  middle z slice, central differences against the adjoint, rms relative:");
         for (int p = 2; p <= 8; p += 2) {
             double dd = 0, gg = 0;
             const double eps = pow(10, -p);
@@ -258,13 +285,14 @@ static void slice(void)
 
 static void tape(void)
 {
-    printf("%-10s %6s %8s %14s %14s %10s %10s %10s\n", "field", "nodes", "rays", "tape bytes",
-           "exits, grad", "ratio", "tape s", "adjoint s");
+    printf("%-10s %6s %8s %14s %14s %10s %10s %10s\n", "field", "nodes", "rays",
+           "tape bytes", "exits, grad", "ratio", "tape s", "adjoint s");
     const int sizes[] = {32, 64, 128};
     for (int kind = 0; kind < 2; kind++)
         for (int s = 0; s < (full ? 3 : 2); s++) {
             const size_t rays = full ? 20000 : 2000;
-            struct lens l = lens_make(kind ? IMP_FIELD_SPLINE : IMP_FIELD_TRILINEAR, sizes[s], rays);
+            struct lens l =
+                lens_make(kind ? IMP_FIELD_SPLINE : IMP_FIELD_TRILINEAR, sizes[s], rays);
             const size_t n = imp_field_n_theta(l.f);
             double *bar = calloc(n, 8), *theta = calloc(n, 8), f, b;
             struct tape_cost cost;
@@ -272,20 +300,24 @@ static void tape(void)
             lens_adjoint(&l, bar, &f, &b);
             memset(bar, 0, n * 8);
             const double start = now();
-            /* All rays on one tape: what automatic differentiation of the program keeps. */
-            tape_gradient(theta, l.nodes + 2 * kind, kind, 1, rays, l.x, l.d, l.t, 0.95, bar, &cost);
+            /* All rays on one tape: what automatic differentiation of the program keeps.
+             */
+            tape_gradient(theta, l.nodes + 2 * kind, kind, 1, rays, l.x, l.d, l.t, 0.95,
+                          bar, &cost);
             const double ts = now() - start;
             const double ours = (double)rays * (sizeof(struct imp_bend_exit) +
-                                                sizeof(struct imp_bend_cotangent)) + 8.0 * (double)n;
-            printf("%-10s %6d %8zu %14.3e %14.3e %10.1f %10.2f %10.2f\n", kind ? "cubic" : "trilinear",
-                   l.nodes, rays, cost.bytes, ours, cost.bytes / ours, ts, f + b);
+                                                sizeof(struct imp_bend_cotangent)) +
+                                8.0 * (double)n;
+            printf("%-10s %6d %8zu %14.3e %14.3e %10.1f %10.2f %10.2f\n",
+                   kind ? "cubic" : "trilinear", l.nodes, rays, cost.bytes, ours,
+                   cost.bytes / ours, ts, f + b);
             fflush(stdout);
             free(bar), free(theta);
             lens_free(&l);
         }
 }
 
-/* ---- GRIN fibre ----------------------------------------------------------------------------- */
+/* ---- GRIN fibre ---------------------------------------------------------------- */
 
 static void fibre_run(const char *name, double curve, int cells)
 {
@@ -298,7 +330,8 @@ static void fibre_run(const char *name, double curve, int cells)
     must(imp_field_radial_create(ctx, &rd, 1.5, &f));
     const size_t m = imp_field_n_theta(f);
     theta = calloc(m, 8);
-    for (size_t i = 0; i < m; i++) theta[i] = 1.5 * (1 - curve * ((double)i - 1) * 0.5 / cells);
+    for (size_t i = 0; i < m; i++)
+        theta[i] = 1.5 * (1 - curve * ((double)i - 1) * 0.5 / cells);
     must(imp_field_set_theta(f, theta));
     for (int i = 0; i < n; i++) {
         const double a = acos(-1) / 6 * (2 * (i + 0.5) / n - 1);
@@ -311,7 +344,8 @@ static void fibre_run(const char *name, double curve, int cells)
     s.offset = 2 * acos(-1);
     o.surfaces = &s, o.n_surfaces = 1, o.taps = &tap, o.n_taps = 1, o.step = 0.02;
     must(imp_bend_set_options(b, &o));
-    must(imp_bend_add_rays(b, (size_t)n, (const double (*)[3])x, (const double (*)[3])d, NULL, NULL));
+    must(imp_bend_add_rays(b, (size_t)n, (const double(*)[3])x, (const double(*)[3])d,
+                           NULL, NULL));
     struct imp_bend_target t = IMP_BEND_TARGET_INIT;
     t.tap = 0, t.point[2] = acos(-1);
     must(imp_bend_add_target(b, &t));
@@ -334,22 +368,23 @@ static void fibre_run(const char *name, double curve, int cells)
         imp_field_eval(imp_bend_field(b), p, &eta, NULL, NULL);
         worst = fmax(worst, fabs(eta / axis * 1.5 - 1.5 / cosh(0.01 * i)));
     }
-    printf("%-26s %5d %9.3g %9.3g %10.2e %10.2e %12.1e %6d\n", name, cells, sqrt(2 * spots[0]),
-           sqrt(20 * spots[1]), sqrt(2 * spots[2]), sqrt(20 * spots[3]), worst, r.iterations);
+    printf("%-26s %5d %9.3g %9.3g %10.2e %10.2e %12.1e %6d\n", name, cells,
+           sqrt(2 * spots[0]), sqrt(20 * spots[1]), sqrt(2 * spots[2]),
+           sqrt(20 * spots[3]), worst, r.iterations);
     free(theta);
     imp_bend_destroy(b);
 }
 
 static void fibre(void)
 {
-    printf("%-26s %5s %9s %9s %10s %10s %12s %6s\n", "start", "cells", "spot pi", "2 pi", "after: pi",
-           "2 pi", "off sech", "steps");
+    printf("%-26s %5s %9s %9s %10s %10s %12s %6s\n", "start", "cells", "spot pi", "2 pi",
+           "after: pi", "2 pi", "off sech", "steps");
     fibre_run("n0 (1 - r^2/2)", 0.5, 8);
     fibre_run("n0 (1 - r^2/2)", 0.5, 16);
     fibre_run("n0 (1 - 0.3 r^2)", 0.3, 16);
 }
 
-/* ---- Two pictures from two sides -------------------------------------------------------------- */
+/* ---- Two pictures from two sides ----------------------------------------------- */
 
 static void letter(const char *const rows[8], int side, float *p)
 {
@@ -358,7 +393,8 @@ static void letter(const char *const rows[8], int side, float *p)
             p[j * side + i] = rows[j * 8 / side][i * 8 / side] == '#' ? 1 : 0.15f;
 }
 
-static imp_bend *display_problem(imp_field *f, int layers, int beam, int side, const float *const img[2])
+static imp_bend *display_problem(imp_field *f, int layers, int beam, int side,
+                                 const float *const img[2])
 {
     imp_bend *b;
     must(imp_bend_create(ctx, f, &b));
@@ -370,7 +406,7 @@ static imp_bend *display_problem(imp_field *f, int layers, int beam, int side, c
     must(imp_bend_set_options(b, &o));
     imp_bend_set_step(b, 0.5, 0.1);
     const size_t n = (size_t)beam * (size_t)beam;
-    double (*x)[3] = calloc(n, sizeof *x), (*d)[3] = calloc(n, sizeof *d);
+    double(*x)[3] = calloc(n, sizeof *x), (*d)[3] = calloc(n, sizeof *d);
     for (int v = 0; v < 2; v++) {
         const int along = v ? 0 : 2, u = v ? 2 : 0;
         for (size_t i = 0; i < n; i++) {
@@ -380,7 +416,8 @@ static imp_bend *display_problem(imp_field *f, int layers, int beam, int side, c
             d[i][0] = d[i][1] = d[i][2] = 0;
             d[i][along] = 1;
         }
-        must(imp_bend_add_rays(b, n, (const double (*)[3])x, (const double (*)[3])d, NULL, NULL));
+        must(imp_bend_add_rays(b, n, (const double(*)[3])x, (const double(*)[3])d, NULL,
+                               NULL));
         struct imp_bend_target t = IMP_BEND_TARGET_INIT;
         t.type = IMP_BEND_IMAGE, t.bundle = v, t.at_plane = 1, t.offset = 2;
         t.normal[2] = 0, t.normal[along] = 1;
@@ -397,10 +434,10 @@ static imp_bend *display_problem(imp_field *f, int layers, int beam, int side, c
 
 static void display(void)
 {
-    static const char *const one[8] = {"........", ".######.", ".#......", ".####...", ".#......",
-                                       ".#......", ".######.", "........"};
-    static const char *const two[8] = {"........", ".#....#.", ".##..##.", ".#.##.#.", ".#....#.",
-                                       ".#....#.", ".#....#.", "........"};
+    static const char *const one[8] = {"........", ".######.", ".#......", ".####...",
+                                       ".#......", ".#......", ".######.", "........"};
+    static const char *const two[8] = {"........", ".#....#.", ".##..##.", ".#.##.#.",
+                                       ".#....#.", ".#....#.", ".#....#.", "........"};
     const int side = full ? 64 : 32, beam = full ? 256 : 64;
     float *img[2] = {malloc(sizeof(float) * 64 * 64), malloc(sizeof(float) * 64 * 64)};
     float *seen = malloc(sizeof(float) * 64 * 64);
@@ -438,7 +475,8 @@ static void display(void)
             must(imp_bend_get_target(b, t, &desc));
             must(imp_bend_image(b, t, seen));
             for (int i = 0; i < np; i++) {
-                a += seen[i], c += desc.pixels[i], aa += sqr(seen[i]), cc += sqr(desc.pixels[i]);
+                a += seen[i], c += desc.pixels[i], aa += sqr(seen[i]),
+                    cc += sqr(desc.pixels[i]);
                 ac += seen[i] * desc.pixels[i];
             }
             corr += 0.5 * (ac - a * c / np) / sqrt((aa - a * a / np) * (cc - c * c / np));
@@ -446,8 +484,8 @@ static void display(void)
         imp_field_get_theta(imp_bend_field(b), theta);
         must(imp_field_set_theta(f, theta));
         for (size_t i = 0; i < n; i++) lo = fmin(lo, theta[i]), hi = fmax(hi, theta[i]);
-        printf("%6d %10.4f %12.3f    %.3f .. %.3f %8.1f\n", g.cells[0], parts[0] + parts[1], corr, lo, hi,
-               now() - start);
+        printf("%6d %10.4f %12.3f    %.3f .. %.3f %8.1f\n", g.cells[0],
+               parts[0] + parts[1], corr, lo, hi, now() - start);
         fflush(stdout);
         free(theta);
         imp_bend_destroy(b);
@@ -456,11 +494,13 @@ static void display(void)
     free(img[0]), free(img[1]), free(seen);
 }
 
-/* ---- Gas: tomography from deflections ---------------------------------------------------------- */
+/* ---- Gas: tomography from deflections ------------------------------------------ */
 
 #define VIEWS 16
-static const double blobs[5][5] = {{0, -.35, 0, .22, .8}, {.12, -.05, .05, .20, .5},
-                                   {-.15, .2, -.1, .18, .5}, {.1, .4, .12, .20, .4},
+static const double blobs[5][5] = {{0, -.35, 0, .22, .8},
+                                   {.12, -.05, .05, .20, .5},
+                                   {-.15, .2, -.1, .18, .5},
+                                   {.1, .4, .12, .20, .4},
                                    {-.1, .05, .25, .14, .35}};
 static double phantom(const double x[3])
 {
@@ -473,19 +513,26 @@ static double phantom(const double x[3])
     return s;
 }
 
-struct gas { size_t n; double (*x)[3], (*d)[3], (*data)[3]; struct imp_bend_surface box;
-             struct imp_bend_options o; int cells; };
+struct gas {
+    size_t n;
+    double (*x)[3], (*d)[3], (*data)[3];
+    struct imp_bend_surface box;
+    struct imp_bend_options o;
+    int cells;
+};
 
-static imp_bend *gas_problem(const struct gas *g, const double *theta, double contrast, double scale_data)
+static imp_bend *gas_problem(const struct gas *g, const double *theta, double contrast,
+                             double scale_data)
 {
     imp_bend *b;
     imp_field *f = grid(g->cells, 1.25, 1, IMP_FIELD_SPLINE);
-    double (*data)[3] = calloc(g->n, sizeof *data);
+    double(*data)[3] = calloc(g->n, sizeof *data);
     if (theta) must(imp_field_set_theta(f, theta));
     must(imp_bend_create(ctx, f, &b));
     must(imp_bend_set_options(b, &g->o));
     imp_bend_set_step(b, 1, 0);
-    must(imp_bend_add_rays(b, g->n, (const double (*)[3])g->x, (const double (*)[3])g->d, NULL, NULL));
+    must(imp_bend_add_rays(b, g->n, (const double(*)[3])g->x, (const double(*)[3])g->d,
+                           NULL, NULL));
     for (size_t i = 0; i < g->n; i++)
         for (int k = 0; k < 3; k++) data[i][k] = scale_data * g->data[i][k];
     struct imp_bend_target t = IMP_BEND_TARGET_INIT;
@@ -518,11 +565,14 @@ static void gas(void)
     struct gas g = {.cells = full ? 40 : 20};
     const size_t side = full ? 64 : 24;
     g.n = VIEWS * side * side;
-    g.x = calloc(g.n, sizeof *g.x), g.d = calloc(g.n, sizeof *g.d), g.data = calloc(g.n, sizeof *g.data);
+    g.x = calloc(g.n, sizeof *g.x), g.d = calloc(g.n, sizeof *g.d),
+    g.data = calloc(g.n, sizeof *g.data);
     for (size_t i = 0; i < g.n; i++) {
-        const double a = acos(-1) * (double)(i / (side * side)) / VIEWS, s = sin(a), c = cos(a);
+        const double a = acos(-1) * (double)(i / (side * side)) / VIEWS, s = sin(a),
+                     c = cos(a);
         const double u = 1.15 * (2 * ((double)(i % side) + 0.5) / (double)side - 1);
-        const double v = 1.15 * (2 * ((double)(i / side % side) + 0.5) / (double)side - 1);
+        const double v =
+            1.15 * (2 * ((double)(i / side % side) + 0.5) / (double)side - 1);
         g.d[i][0] = s, g.d[i][2] = c;
         g.x[i][0] = u * c - 3 * s, g.x[i][1] = v, g.x[i][2] = -u * s - 3 * c;
     }
@@ -531,29 +581,34 @@ static void gas(void)
     for (int k = 0; k < 3; k++) g.box.lo[k] = -1.25, g.box.hi[k] = 1.25;
     g.o = (struct imp_bend_options)IMP_BEND_OPTIONS_INIT;
     g.o.surfaces = &g.box, g.o.n_surfaces = 1, g.o.outside = 1, g.o.grazing = -1;
-    printf("%10s %10s %10s %12s %8s\n", "contrast", "linear", "curved", "from empty", "s");
+    printf("%10s %10s %10s %12s %8s\n", "contrast", "linear", "curved", "from empty",
+           "s");
     for (double c = 3e-4; c < 1; c *= 10) {
         const double start = now();
         imp_field *parts[6], *truth;
         const double one[4] = {1, 0, 0, 0};
         must(imp_field_profile_create(ctx, "constant", one, NULL, &parts[0]));
         for (int k = 0; k < 5; k++) {
-            const double p[6] = {0, c * blobs[k][4], blobs[k][3], blobs[k][0], blobs[k][1], blobs[k][2]};
+            const double p[6] = {0,           c * blobs[k][4], blobs[k][3],
+                                 blobs[k][0], blobs[k][1],     blobs[k][2]};
             must(imp_field_profile_create(ctx, "plume", p, NULL, &parts[k + 1]));
         }
         must(imp_field_sum_create(ctx, 6, parts, &truth));
         struct imp_bend_options o = g.o;
         o.scheme = IMP_BEND_YOSHIDA4, o.step = 0.02;
-        struct imp_bend_rays r = {g.n, (const double (*)[3])g.x, (const double (*)[3])g.d, NULL};
+        struct imp_bend_rays r = {g.n, (const double(*)[3])g.x, (const double(*)[3])g.d,
+                                  NULL};
         struct imp_bend_exit *e = calloc(g.n, sizeof *e);
         must(imp_bend_trace(truth, &o, &r, e, NULL, NULL));
         for (size_t i = 0; i < g.n; i++) {
-            const double dv = e[i].v[0] * g.d[i][0] + e[i].v[1] * g.d[i][1] + e[i].v[2] * g.d[i][2];
+            const double dv =
+                e[i].v[0] * g.d[i][0] + e[i].v[1] * g.d[i][1] + e[i].v[2] * g.d[i][2];
             for (int k = 0; k < 3; k++) g.data[i][k] = e[i].v[k] - dv * g.d[i][k];
         }
         free(e);
         imp_field_destroy(truth);
-        /* Straight rays: the same program so close to the empty field that it is linear. */
+        /* Straight rays: the same program so close to the empty field that it is linear.
+         */
         const double tiny = 1e-6;
         struct imp_bend_fit_options fo = IMP_BEND_FIT_OPTIONS_INIT;
         struct imp_bend_fit_result res;
@@ -579,24 +634,29 @@ static void gas(void)
             }
             imp_bend_destroy(b);
         }
-        printf("%10.0e %10.4f %10.4f %12.4f %8.1f\n", c, e_lin, err[0], err[1], now() - start);
+        printf("%10.0e %10.4f %10.4f %12.4f %8.1f\n", c, e_lin, err[0], err[1],
+               now() - start);
         fflush(stdout);
         free(theta);
     }
     free(g.x), free(g.d), free(g.data);
 }
 
-/* ---- Rods from vendor data ---------------------------------------------------------------------- */
+/* ---- Rods from vendor data ----------------------------------------------------- */
 
 static void rod(void)
 {
-    static const struct { const char *name; double n0, g, L; } rods[] = {
-        {"quarter pitch", 1.6, 0.33, 4.759989}, {"0.23 pitch", 1.6, 0.33, 4.379190},
-        {"catalogue 0.29", 1.608, 0.339, 5.37}};
-    printf("%-16s %8s %10s %10s %10s %12s %12s\n", "rod", "pitch", "f", "back", "M (l1=10)", "f traced",
-           "M traced");
+    static const struct {
+        const char *name;
+        double n0, g, L;
+    } rods[] = {{"quarter pitch", 1.6, 0.33, 4.759989},
+                {"0.23 pitch", 1.6, 0.33, 4.379190},
+                {"catalogue 0.29", 1.608, 0.339, 5.37}};
+    printf("%-16s %8s %10s %10s %10s %12s %12s\n", "rod", "pitch", "f", "back",
+           "M (l1=10)", "f traced", "M traced");
     for (int k = 0; k < 3; k++) {
-        const double n0 = rods[k].n0, g = rods[k].g, L = rods[k].L, c = cos(g * L), s = sin(g * L);
+        const double n0 = rods[k].n0, g = rods[k].g, L = rods[k].L, c = cos(g * L),
+                     s = sin(g * L);
         const double p[5] = {n0, g, 0, 0, 0}, M = 1 / (c - n0 * g * 10 * s);
         const double l2 = (n0 * g * 10 * c + s) / (n0 * g * (n0 * g * 10 * s - c));
         imp_field *f;
@@ -605,7 +665,8 @@ static void rod(void)
         faces[0].normal[2] = -1, faces[1].offset = L;
         faces[0].event = faces[1].event = IMP_BEND_REFRACT;
         struct imp_bend_options o = IMP_BEND_OPTIONS_INIT;
-        o.scheme = IMP_BEND_YOSHIDA4, o.surfaces = faces, o.n_surfaces = 2, o.outside = 1, o.step = 0.01;
+        o.scheme = IMP_BEND_YOSHIDA4, o.surfaces = faces, o.n_surfaces = 2, o.outside = 1,
+        o.step = 0.01;
         const double x[3][3] = {{1e-4, 0, -1}, {1e-4, 0, -10}, {1e-4, 0, -10}};
         const double d[3][3] = {{0, 0, 1}, {1e-5, 0, 1}, {-1e-5, 0, 1}};
         struct imp_bend_exit e[3];
@@ -613,8 +674,9 @@ static void rod(void)
         must(imp_bend_trace(f, &o, &r, e, NULL, NULL));
         double h = 0;
         for (int q = 1; q < 3; q++) h += 0.5 * (e[q].x[0] + l2 * e[q].v[0] / e[q].v[2]);
-        printf("%-16s %8.4f %10.6f %10.6f %10.6f %12.6f %12.6f\n", rods[k].name, g * L / 2 / acos(-1),
-               1 / (n0 * g * s), c / (n0 * g * s), M, -1e-4 * e[0].v[2] / e[0].v[0], h / 1e-4);
+        printf("%-16s %8.4f %10.6f %10.6f %10.6f %12.6f %12.6f\n", rods[k].name,
+               g * L / 2 / acos(-1), 1 / (n0 * g * s), c / (n0 * g * s), M,
+               -1e-4 * e[0].v[2] / e[0].v[0], h / 1e-4);
         imp_field_destroy(f);
     }
 }
@@ -630,8 +692,10 @@ int main(int argc, char **argv)
         const char *a = argv[i];
         if (!strcmp(a, "--full")) continue;
         did++;
-        if (!strcmp(a, "luneburg")) recover(IMP_SCENES "/bend/luneburg.xml", luneburg, it);
-        else if (!strcmp(a, "maxwell")) recover(IMP_SCENES "/bend/maxwell.xml", maxwell, it);
+        if (!strcmp(a, "luneburg"))
+            recover(IMP_SCENES "/bend/luneburg.xml", luneburg, it);
+        else if (!strcmp(a, "maxwell"))
+            recover(IMP_SCENES "/bend/maxwell.xml", maxwell, it);
         else if (!strcmp(a, "focus")) focus();
         else if (!strcmp(a, "slice")) slice();
         else if (!strcmp(a, "tape")) tape();
@@ -643,7 +707,9 @@ int main(int argc, char **argv)
     }
     imp_context_destroy(ctx);
     if (did > 0) return 0;
-    fprintf(stderr, "usage: bend_experiments luneburg|maxwell|focus|slice|tape|fibre|display|gas|rod "
-                    "... [--full]\n");
+    fprintf(
+        stderr,
+        "usage: bend_experiments luneburg|maxwell|focus|slice|tape|fibre|display|gas|rod "
+        "... [--full]\n");
     return 2;
 }

@@ -8,8 +8,14 @@
 
 #define NONE UINT32_MAX
 
-struct op { double da, db; uint32_t a, b; };
-typedef struct { double v; uint32_t id; } num;
+struct op {
+    double da, db;
+    uint32_t a, b;
+};
+typedef struct {
+    double v;
+    uint32_t id;
+} num;
 
 static struct op *tape;
 static size_t used, room, n_theta;
@@ -32,9 +38,16 @@ static num C(double v) { return (num){v, NONE}; }
 static num add(num a, num b) { return push(a.v + b.v, a, 1, b, 1); }
 static num sub(num a, num b) { return push(a.v - b.v, a, 1, b, -1); }
 static num mul(num a, num b) { return push(a.v * b.v, a, b.v, b, a.v); }
-static num quo(num a, num b) { return push(a.v / b.v, a, 1 / b.v, b, -a.v / (b.v * b.v)); }
+static num quo(num a, num b)
+{
+    return push(a.v / b.v, a, 1 / b.v, b, -a.v / (b.v * b.v));
+}
 
-struct grid { const double *theta; int side, cubic; double half, inv_h; };
+struct grid {
+    const double *theta;
+    int side, cubic;
+    double half, inv_h;
+};
 
 static void weights(const struct grid *g, num u, num w[4], num d[4])
 {
@@ -43,7 +56,8 @@ static void weights(const struct grid *g, num u, num w[4], num d[4])
         w[0] = m, w[1] = u, d[0] = C(-g->inv_h), d[1] = k;
         return;
     }
-    const num u2 = mul(u, u), u3 = mul(u2, u), m2 = mul(m, m), sixth = C(1.0 / 6), half = C(0.5);
+    const num u2 = mul(u, u), u3 = mul(u2, u), m2 = mul(m, m), sixth = C(1.0 / 6),
+              half = C(0.5);
     w[0] = mul(sixth, mul(m2, m));
     w[1] = mul(sixth, add(sub(mul(C(3), u3), mul(C(6), u2)), C(4)));
     w[2] = mul(sixth, add(add(sub(mul(C(3), u2), mul(C(3), u3)), mul(C(3), u)), C(1)));
@@ -67,12 +81,14 @@ static void field(const struct grid *g, const num x[3], num *eta, num grad[3])
     *eta = grad[0] = grad[1] = grad[2] = C(0);
     for (int c = 0; c < m; c++)
         for (int b = 0; b < m; b++) {
-            const num ww = mul(w[1][b], w[2][c]), dw = mul(d[1][b], w[2][c]), wd = mul(w[1][b], d[2][c]);
+            const num ww = mul(w[1][b], w[2][c]), dw = mul(d[1][b], w[2][c]),
+                      wd = mul(w[1][b], d[2][c]);
             num row = C(0), slope = C(0);
             for (int a = 0; a < m; a++) {
-                const size_t i = (size_t)(first[0] + a) +
-                                 (size_t)g->side * ((size_t)(first[1] + b) +
-                                                    (size_t)g->side * (size_t)(first[2] + c));
+                const size_t i =
+                    (size_t)(first[0] + a) +
+                    (size_t)g->side * ((size_t)(first[1] + b) +
+                                       (size_t)g->side * (size_t)(first[2] + c));
                 const num t = {g->theta[i], (uint32_t)i};
                 row = add(row, mul(t, w[0][a]));
                 slope = add(slope, mul(t, d[0][a]));
@@ -136,9 +152,11 @@ void tape_gradient(const double *theta, int side, int cubic, double half, size_t
         num y[3] = {x[0], x[1], x[2]}, w[3] = {v[0], v[1], v[2]};
         step(&g, C(tau), y, w);
         const size_t mark = used;
-        double rate; /* dz/dtau by reading the tape of a step whose length is a variable */
+        double
+            rate; /* dz/dtau by reading the tape of a step whose length is a variable */
         {
-            num a[3] = {C(x[0].v), C(x[1].v), C(x[2].v)}, b[3] = {C(v[0].v), C(v[1].v), C(v[2].v)};
+            num a[3] = {C(x[0].v), C(x[1].v), C(x[2].v)},
+                b[3] = {C(v[0].v), C(v[1].v), C(v[2].v)};
             const num var = push(tau, (num){0, 0}, 0, C(0), 0);
             step(&g, var, a, b);
             const size_t m = used - mark;
@@ -146,8 +164,10 @@ void tape_gradient(const double *theta, int side, int cubic, double half, size_t
             s[a[2].id - n_theta - mark] = 1;
             for (size_t q = m; q-- > 1;) {
                 const struct op *o = &tape[mark + q];
-                if (o->a != NONE && o->a >= n_theta + mark) s[o->a - n_theta - mark] += s[q] * o->da;
-                if (o->b != NONE && o->b >= n_theta + mark) s[o->b - n_theta - mark] += s[q] * o->db;
+                if (o->a != NONE && o->a >= n_theta + mark)
+                    s[o->a - n_theta - mark] += s[q] * o->da;
+                if (o->b != NONE && o->b >= n_theta + mark)
+                    s[o->b - n_theta - mark] += s[q] * o->db;
             }
             rate = s[0];
             free(s);
@@ -158,7 +178,8 @@ void tape_gradient(const double *theta, int side, int cubic, double half, size_t
         step(&g, length, z, u);
         for (int k = 0; k < 3; k++) ends[3 * i + (size_t)k] = z[k];
     }
-    cost->bytes = (double)used * (sizeof *tape + sizeof(double)); /* with one adjoint each */
+    cost->bytes =
+        (double)used * (sizeof *tape + sizeof(double)); /* with one adjoint each */
     double *s = calloc(n_theta + used, sizeof *s);
     for (size_t i = 0; i < 3 * n; i++)
         if (ends[i].id != NONE) s[ends[i].id] += 1;

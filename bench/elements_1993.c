@@ -8,8 +8,8 @@
  * writes figure 1 (a to d, interpolated), figure 2 (b and d, flat) and figure 3 (error
  * against links: figure3.svg) to the folder, and the table to standard output as JSON.
  * Errors are RMS over the flat picture, relative to the RMS of a reference that the same
- * program made without importance with several times the links. "Total" counts a link once
- * for radiance and once more for importance. */
+ * program made without importance with several times the links. "Total" counts a link
+ * once for radiance and once more for importance. */
 #include <importon/elements.h>
 #include <math.h>
 #include <stdio.h>
@@ -59,12 +59,14 @@ static imp_scene *scene_of(const char *file)
     return s;
 }
 
-static imp_elements *solved(const struct experiment *x, imp_scene *s, double eps, int without)
+static imp_elements *solved(const struct experiment *x, imp_scene *s, double eps,
+                            int without)
 {
-    static const struct imp_elements_phong wall = {"*", {0.1, 0.1, 0.1}, {0.6, 0.6, 0.6}, 15};
-    static const char *const lamp[12] = {"light_left", "light_right", "light_ceiling",
-        "light_back", "extra_0", "extra_1", "extra_2", "extra_3", "extra_4", "extra_5",
-        "extra_6", "extra_7"};
+    static const struct imp_elements_phong wall = {
+        "*", {0.1, 0.1, 0.1}, {0.6, 0.6, 0.6}, 15};
+    static const char *const lamp[12] = {
+        "light_left", "light_right", "light_ceiling", "light_back", "extra_0", "extra_1",
+        "extra_2",    "extra_3",     "extra_4",       "extra_5",    "extra_6", "extra_7"};
     struct imp_elements_beam beams[12] = {{0}};
     struct imp_elements_options o = IMP_ELEMENTS_OPTIONS_INIT;
     imp_elements *e;
@@ -165,9 +167,10 @@ static double links_at(const struct curve *c, double level)
     return NAN;
 }
 
-/* ---- Figure 3 ------------------------------------------------------------------------------- */
+/* ---- Figure 3 ------------------------------------------------------------------ */
 
-static void draw(FILE *f, const struct curve *c, double factor, double left, const char *style)
+static void draw(FILE *f, const struct curve *c, double factor, double left,
+                 const char *style)
 {
     fprintf(f, "<path fill=\"none\" stroke-width=\"2\" %s d=\"", style);
     for (int k = 0; k < c->n; k++)
@@ -186,18 +189,24 @@ static void figure3(const struct experiment *x, int n)
         perror(path);
         exit(3);
     }
-    fprintf(f, "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%d\" height=\"420\" "
-               "font-family=\"sans-serif\" font-size=\"12\">\n<rect width=\"100%%\" "
-               "height=\"100%%\" fill=\"white\"/>\n", 400 * n + 20);
+    fprintf(f,
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%d\" height=\"420\" "
+            "font-family=\"sans-serif\" font-size=\"12\">\n<rect width=\"100%%\" "
+            "height=\"100%%\" fill=\"white\"/>\n",
+            400 * n + 20);
     for (int i = 0; i < n; i++) {
         const double left = 60 + 400 * i;
-        fprintf(f, "<text x=\"%g\" y=\"24\" font-size=\"15\">scene %s: RMS error (%%) against "
-                   "links</text>\n", left, x[i].name);
+        fprintf(
+            f,
+            "<text x=\"%g\" y=\"24\" font-size=\"15\">scene %s: RMS error (%%) against "
+            "links</text>\n",
+            left, x[i].name);
         for (int k = -1; k <= 2; k++)
-            fprintf(f, "<line x1=\"%g\" x2=\"%g\" y1=\"%d\" y2=\"%d\" stroke=\"#ccc\"/>"
-                       "<text x=\"%g\" y=\"%d\" text-anchor=\"end\">%g</text>\n", left,
-                    left + 320, 260 - 100 * k, 260 - 100 * k, left - 6, 264 - 100 * k,
-                    pow(10, k));
+            fprintf(f,
+                    "<line x1=\"%g\" x2=\"%g\" y1=\"%d\" y2=\"%d\" stroke=\"#ccc\"/>"
+                    "<text x=\"%g\" y=\"%d\" text-anchor=\"end\">%g</text>\n",
+                    left, left + 320, 260 - 100 * k, 260 - 100 * k, left - 6,
+                    264 - 100 * k, pow(10, k));
         for (int k = 2; k <= 7; k++)
             fprintf(f, "<text x=\"%g\" y=\"380\" text-anchor=\"middle\">1e%d</text>\n",
                     left + 64 * (k - 2), k);
@@ -205,9 +214,11 @@ static void figure3(const struct experiment *x, int n)
         draw(f, &x[i].with, 2, left, "stroke=\"#2050b0\"");
         draw(f, &x[i].with, 1, left, "stroke=\"#2050b0\" stroke-dasharray=\"5 4\"");
     }
-    fprintf(f, "<text x=\"60\" y=\"408\"><tspan fill=\"#b03030\">without importance</tspan>"
-               "<tspan fill=\"#2050b0\" dx=\"20\">with importance: all links; dashed: those of "
-               "radiance</tspan></text>\n</svg>\n");
+    fprintf(
+        f,
+        "<text x=\"60\" y=\"408\"><tspan fill=\"#b03030\">without importance</tspan>"
+        "<tspan fill=\"#2050b0\" dx=\"20\">with importance: all links; dashed: those of "
+        "radiance</tspan></text>\n</svg>\n");
     fclose(f);
 }
 
@@ -215,8 +226,8 @@ static void print_curve(const char *name, const struct curve *c)
 {
     printf("\"%s\":[", name);
     for (int k = 0; k < c->n; k++)
-        printf("%s{\"links\":%.0f,\"rms\":%.6f,\"seconds\":%.3f}", k ? "," : "", c->links[k],
-               c->rms[k], c->seconds[k]);
+        printf("%s{\"links\":%.0f,\"rms\":%.6f,\"seconds\":%.3f}", k ? "," : "",
+               c->links[k], c->rms[k], c->seconds[k]);
     printf("]");
 }
 
@@ -229,15 +240,18 @@ static void print_number(double x)
 static void print(const struct experiment *x)
 {
     static const double levels[] = {0.08, 0.05, 0.035, 0.025, 0.015};
-    printf("{\"scene\":\"%s\",\"reference_links\":%.0f,\"mean\":%.6g,\"bytes_per_link\":%.0f,"
-           "\"bytes_per_element\":%.0f,", x->name, x->links_reference, x->mean_reference,
-           x->bytes_link, x->bytes_element);
+    printf("{\"scene\":\"%s\",\"reference_links\":%.0f,\"mean\":%.6g,\"bytes_per_link\":%"
+           ".0f,"
+           "\"bytes_per_element\":%.0f,",
+           x->name, x->links_reference, x->mean_reference, x->bytes_link,
+           x->bytes_element);
     print_curve("without", &x->without);
     printf(",");
     print_curve("with", &x->with);
     printf(",\"at\":[");
     for (size_t k = 0; k < sizeof levels / sizeof *levels; k++) {
-        const double a = links_at(&x->without, levels[k]), b = links_at(&x->with, levels[k]);
+        const double a = links_at(&x->without, levels[k]),
+                     b = links_at(&x->with, levels[k]);
         printf("%s{\"rms\":%g,\"links_without\":", k ? "," : "", levels[k]);
         print_number(a);
         printf(",\"radiance_links_with\":");
@@ -256,9 +270,17 @@ int main(int argc, char **argv)
     struct imp_context_options co = IMP_CONTEXT_OPTIONS_INIT;
     static struct experiment x[] = {
         {.name = "b", .file = "b.xml", .steps = 12, .reference_eps = 2e-6},
-        {.name = "d", .file = "d.xml", .glossy = 1, .beams = 4, .steps = 12,
+        {.name = "d",
+         .file = "d.xml",
+         .glossy = 1,
+         .beams = 4,
+         .steps = 12,
          .reference_eps = 3e-6},
-        {.name = "d_lamps", .file = "d_lamps.xml", .glossy = 1, .beams = 12, .steps = 12,
+        {.name = "d_lamps",
+         .file = "d_lamps.xml",
+         .glossy = 1,
+         .beams = 12,
+         .steps = 12,
          .reference_eps = 3e-6},
         {.name = "a", .file = "a.xml", .reference_eps = 1e-5},
         {.name = "c", .file = "d.xml", .beams = 4, .reference_eps = 1e-5}};

@@ -9,7 +9,7 @@
 #include <string.h>
 
 #define MAX_OPTIONS 64
-#define MAX_WORD 64
+#define MAX_WORD    64
 
 void args_list_add(struct arg_list *list, const char *item)
 {
@@ -175,8 +175,9 @@ int args_parse(const struct args_spec *spec, int argc, char **argv, int *first)
     const int n = flatten(spec, all);
 
     for (int i = 0; i < n; i++) {
-        options[i] = (struct option){all[i]->name,
-            all[i]->type == ARG_FLAG ? no_argument : required_argument, NULL, 256 + i};
+        options[i] = (struct option){
+            all[i]->name, all[i]->type == ARG_FLAG ? no_argument : required_argument,
+            NULL, 256 + i};
         if (!all[i]->letter) continue;
         *letter++ = all[i]->letter;
         if (all[i]->type != ARG_FLAG) *letter++ = ':';

@@ -27,12 +27,12 @@ struct arg_list {
 
 struct arg_option { /* tables end with {0} */
     enum arg_type type;
-    char letter;       /* 0: long name only */
+    char letter; /* 0: long name only */
     const char *name;
     const char *value; /* what help calls the value; NULL for flags */
     const char *help;
     void *target;
-    double lo, hi;     /* of ARG_INT and ARG_NUMBER; both 0: no bounds */
+    double lo, hi;            /* of ARG_INT and ARG_NUMBER; both 0: no bounds */
     const char *const *words; /* of ARG_CHOICE, NULL-terminated */
 };
 

@@ -156,6 +156,11 @@ static int run_bench(int n, char **operand)
 }
 
 const struct command command_bench = {
-    {"bench", "SCENE", "time loading, rendering and gradients of a scene",
-     {options, options_run, options_scene, options_general}, 1, 1},
-    run_bench, 1};
+    {"bench",
+     "SCENE",
+     "time loading, rendering and gradients of a scene",
+     {options, options_run, options_scene, options_general},
+     1,
+     1},
+    run_bench,
+    1};

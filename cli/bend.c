@@ -21,30 +21,34 @@ static struct {
 } o;
 
 static const struct arg_option options[] = {
-    {ARG_CHOICE, 0, "optimizer", "NAME", "fit: lbfgs (default), adam or mma", &o.optimizer, 0, 0,
-     optimizer_words},
-    {ARG_INT, 0, "levels", "N", "fit: grids are refined N - 1 times (default 1)", &o.levels, 1,
-     IMP_BEND_LEVELS_MAX, NULL},
-    {ARG_TEXT, 'n', "iterations", "N[,N..]", "fit: of each level (default 50)", &o.iterations, 0, 0,
+    {ARG_CHOICE, 0, "optimizer", "NAME", "fit: lbfgs (default), adam or mma",
+     &o.optimizer, 0, 0, optimizer_words},
+    {ARG_INT, 0, "levels", "N", "fit: grids are refined N - 1 times (default 1)",
+     &o.levels, 1, IMP_BEND_LEVELS_MAX, NULL},
+    {ARG_TEXT, 'n', "iterations", "N[,N..]", "fit: of each level (default 50)",
+     &o.iterations, 0, 0, NULL},
+    {ARG_NUMBER, 0, "lr", "X",
+     "fit, adam: of the scale (default 0.05), halved at each level", &o.learning_rate,
+     1e-12, 1e3, NULL},
+    {ARG_NUMBER, 0, "tolerance", "X",
+     "fit: stop when steps stay below, of the scale (1e-6)", &o.tolerance, 1e-300, 1,
      NULL},
-    {ARG_NUMBER, 0, "lr", "X", "fit, adam: of the scale (default 0.05), halved at each level", &o.learning_rate, 1e-12, 1e3, NULL},
-    {ARG_NUMBER, 0, "tolerance", "X", "fit: stop when steps stay below, of the scale (1e-6)",
-     &o.tolerance, 1e-300, 1, NULL},
-    {ARG_NUMBER, 0, "scale", "X", "fit: a large change of an index (default 0.1)", &o.scale, 1e-12,
-     1e12, NULL},
+    {ARG_NUMBER, 0, "scale", "X", "fit: a large change of an index (default 0.1)",
+     &o.scale, 1e-12, 1e12, NULL},
     {ARG_TEXT, 0, "checkpoint", "FILE", "fit: write the state there every few seconds",
      &o.checkpoint, 0, 0, NULL},
-    {ARG_FLAG, 0, "resume", NULL, "fit: go on from the checkpoint", &o.resume, 0, 0, NULL},
+    {ARG_FLAG, 0, "resume", NULL, "fit: go on from the checkpoint", &o.resume, 0, 0,
+     NULL},
     {0}};
 
 static const struct arg_option options_file[] = {
-    {ARG_LIST, 'D', "define", "NAME=VALUE", "set a $parameter of the file", &cli.defines, 0, 0,
-     NULL},
-    {ARG_TEXT, 'a', "search", "DIR", "one more folder to look for files in", &cli.search, 0, 0,
-     NULL},
+    {ARG_LIST, 'D', "define", "NAME=VALUE", "set a $parameter of the file", &cli.defines,
+     0, 0, NULL},
+    {ARG_TEXT, 'a', "search", "DIR", "one more folder to look for files in", &cli.search,
+     0, 0, NULL},
     {0}};
 
-/* ---- Loading and counting ---------------------------------------------------------------- */
+/* ---- Loading and counting ------------------------------------------------------ */
 
 static imp_bend *bend;
 
@@ -63,14 +67,21 @@ static int load(const char *path)
     return st == IMP_E_IO ? EXIT_USAGE : rc;
 }
 
-struct count { const char *name; uint64_t n; };
+struct count {
+    const char *name;
+    uint64_t n;
+};
 
 static void counts_of(const struct imp_bend_stats *s, struct count c[8])
 {
-    const struct count all[8] = {
-        {"truncated", s->truncated}, {"missed", s->missed}, {"started_outside", s->started_out},
-        {"grazing", s->grazing}, {"broken", s->broken}, {"energy_off", s->energy},
-        {"reflected", s->reflected}, {"taps_missed", s->taps_missed}};
+    const struct count all[8] = {{"truncated", s->truncated},
+                                 {"missed", s->missed},
+                                 {"started_outside", s->started_out},
+                                 {"grazing", s->grazing},
+                                 {"broken", s->broken},
+                                 {"energy_off", s->energy},
+                                 {"reflected", s->reflected},
+                                 {"taps_missed", s->taps_missed}};
     memcpy(c, all, sizeof all);
 }
 
@@ -104,12 +115,12 @@ static void put_stats(struct json *j, const struct imp_bend_stats *s)
 static const char *target_word(enum imp_bend_target_type t)
 {
     static const char *const words[IMP_BEND_N_TARGETS] = {
-        "focus", "spot", "points", "direction", "directions", "deflection", "path", "wavefront",
-        "image", "far-field", "shape"};
+        "focus", "spot",      "points", "direction", "directions", "deflection",
+        "path",  "wavefront", "image",  "far-field", "shape"};
     return words[t];
 }
 
-/* ---- trace ------------------------------------------------------------------------------ */
+/* ---- trace --------------------------------------------------------------------- */
 
 /* All exits: one line a ray. */
 static int write_exits(const char *path)
@@ -128,9 +139,9 @@ static int write_exits(const char *path)
     if (!f) rc = cli_error(EXIT_RUN, "%s: %s", path, strerror(errno));
     if (f) fprintf(f, "ray,bundle,x,y,z,vx,vy,vz,path,steps,flags\n");
     for (size_t i = 0; f && i < n; i++)
-        fprintf(f, "%zu,%d,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%u,%u\n", i, rays.group[i],
-                e[i].x[0], e[i].x[1], e[i].x[2], e[i].v[0], e[i].v[1], e[i].v[2], e[i].path,
-                e[i].steps, e[i].flags);
+        fprintf(f, "%zu,%d,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%u,%u\n", i,
+                rays.group[i], e[i].x[0], e[i].x[1], e[i].x[2], e[i].v[0], e[i].v[1],
+                e[i].v[2], e[i].path, e[i].steps, e[i].flags);
     if (f && f != stdout && fclose(f) != 0)
         rc = cli_error(EXIT_RUN, "%s: %s", path, strerror(errno));
     free(e);
@@ -164,8 +175,8 @@ static int trace(void)
         cli_json_end(&j);
     } else if (!cli.out || strcmp(cli.out, "-")) {
         print_stats(stdout, &s);
-        printf("step      %.4g: exits are off by %.2g rms (order %.1f seen by halving)\n", bo.step,
-               error, order);
+        printf("step      %.4g: exits are off by %.2g rms (order %.1f seen by halving)\n",
+               bo.step, error, order);
         printf("speed     %.3g rays/s, %.3g ray-steps/s\n", (double)s.rays / seconds,
                (double)s.steps / seconds);
         printf("objective %.9g\n", value);
@@ -180,7 +191,7 @@ static int trace(void)
     return cli.out ? write_exits(cli.out) : 0;
 }
 
-/* ---- check ------------------------------------------------------------------------------ */
+/* ---- check --------------------------------------------------------------------- */
 
 static int check(void)
 {
@@ -194,8 +205,8 @@ static int check(void)
         j = cli_json();
         json_array(&j, "rows");
     } else {
-        printf("%-11s %-16s %9s %16s %16s %9s %9s\n", "check", "of", "step", "value", "reference",
-               "error", "limit");
+        printf("%-11s %-16s %9s %16s %16s %9s %9s\n", "check", "of", "step", "value",
+               "reference", "error", "limit");
     }
     for (size_t i = 0; i < n; i++) {
         const struct imp_check_row *r = &rows[i];
@@ -212,9 +223,11 @@ static int check(void)
             json_bool(&j, "ok", r->ok);
             json_end_object(&j);
         } else {
-            printf("%-11s %-16s %9.2g %16.9g %16.9g %9.2g %9.2g  %s\n", r->method, r->param, r->step,
-                   r->value, r->reference, r->error, r->limit,
-                   r->limit <= 0 ? "" : r->ok ? "ok" : "FAILS");
+            printf("%-11s %-16s %9.2g %16.9g %16.9g %9.2g %9.2g  %s\n", r->method,
+                   r->param, r->step, r->value, r->reference, r->error, r->limit,
+                   r->limit <= 0 ? ""
+                   : r->ok       ? "ok"
+                                 : "FAILS");
         }
     }
     if (cli.json) {
@@ -225,7 +238,7 @@ static int check(void)
     return ok ? EXIT_DONE : EXIT_NO;
 }
 
-/* ---- fit -------------------------------------------------------------------------------- */
+/* ---- fit ----------------------------------------------------------------------- */
 
 static int write_field(void)
 {
@@ -265,11 +278,13 @@ static void put_numbers(FILE *to, struct json *j)
 static int write_history(const struct imp_bend_fit_result *r)
 {
     char *svg = join_path(cli.out, "loss.svg"), *csv = join_path(cli.out, "loss.csv");
-    int rc = plot_curve(svg, "Objective", "evaluation", "objective", r->n_history, r->history, NULL);
+    int rc = plot_curve(svg, "Objective", "evaluation", "objective", r->n_history,
+                        r->history, NULL);
     FILE *f = fopen(csv, "w");
     if (f) {
         fprintf(f, "evaluation,objective\n");
-        for (size_t i = 0; i < r->n_history; i++) fprintf(f, "%zu,%.9g\n", i, r->history[i]);
+        for (size_t i = 0; i < r->n_history; i++)
+            fprintf(f, "%zu,%.9g\n", i, r->history[i]);
         if (fclose(f) != 0) f = NULL;
     }
     if (!f && !rc) rc = cli_error(EXIT_RUN, "%s: %s", csv, strerror(errno));
@@ -284,8 +299,10 @@ static int iterations_read(int out[IMP_BEND_LEVELS_MAX])
     for (int k = 0; s && *s; k++) {
         char *end;
         const long n = strtol(s, &end, 10);
-        if (end == s || n < 1 || n > 1000000 || k == IMP_BEND_LEVELS_MAX || (*end && *end != ','))
-            return cli_error(EXIT_USAGE, "--iterations %s: expected N[,N..]", o.iterations);
+        if (end == s || n < 1 || n > 1000000 || k == IMP_BEND_LEVELS_MAX ||
+            (*end && *end != ','))
+            return cli_error(EXIT_USAGE, "--iterations %s: expected N[,N..]",
+                             o.iterations);
         out[k] = (int)n;
         s = *end ? end + 1 : end;
     }
@@ -329,8 +346,9 @@ static int fit(void)
         json_end_object(&j);
         cli_json_end(&j);
     } else {
-        printf("objective %.9g -> %.9g in %d evaluations, %d level%s, %.1f s: %s\n", r.start, r.value,
-               r.iterations, r.levels, r.levels > 1 ? "s" : "", seconds, r.reason);
+        printf("objective %.9g -> %.9g in %d evaluations, %d level%s, %.1f s: %s\n",
+               r.start, r.value, r.iterations, r.levels, r.levels > 1 ? "s" : "", seconds,
+               r.reason);
         put_numbers(stdout, NULL);
         print_stats(stdout, &r.stats);
     }
@@ -340,7 +358,7 @@ static int fit(void)
     return rc ? rc : cli_done();
 }
 
-/* ---- The command ------------------------------------------------------------------------ */
+/* ---- The command --------------------------------------------------------------- */
 
 static int view(void)
 {
@@ -353,8 +371,10 @@ static int view(void)
 
 static int run(int n, char **operand)
 {
-    static const struct { const char *word; int (*fn)(void); } verbs[] = {
-        {"trace", trace}, {"check", check}, {"fit", fit}, {"view", view}};
+    static const struct {
+        const char *word;
+        int (*fn)(void);
+    } verbs[] = {{"trace", trace}, {"check", check}, {"fit", fit}, {"view", view}};
     static const char *const words[] = {"trace", "check", "fit", "view", NULL};
     (void)n;
     for (size_t i = 0; i < sizeof verbs / sizeof *verbs; i++) {
@@ -366,12 +386,16 @@ static int run(int n, char **operand)
         return rc;
     }
     const char *near = args_nearest(operand[0], words);
-    return cli_error(EXIT_USAGE, "bend: unknown '%s'%s%s: there are trace, check, fit, view",
+    return cli_error(EXIT_USAGE,
+                     "bend: unknown '%s'%s%s: there are trace, check, fit, view",
                      operand[0], near ? ", did you mean " : "", near ? near : "");
 }
 
-const struct command command_bend = {
-    {"bend", "trace|check|fit|view FILE",
-     "rays in a graded index: trace, check, fit, view",
-     {options_general, options_file, options}, 2, 2},
-    run, 0};
+const struct command command_bend = {{"bend",
+                                      "trace|check|fit|view FILE",
+                                      "rays in a graded index: trace, check, fit, view",
+                                      {options_general, options_file, options},
+                                      2,
+                                      2},
+                                     run,
+                                     0};

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Pictures of bent rays: slices of the index through the middle, the rays' ways projected on
- * them, spot diagrams, and what image targets see. */
+ * Pictures of bent rays: slices of the index through the middle, the rays' ways projected
+ * on them, spot diagrams, and what image targets see. */
 #include "bend.h"
 #include "picture.h"
 
@@ -11,7 +11,8 @@
 
 enum { SIDE = 512, PATHS = 60 };
 
-static int picture_save(imp_film *film, const char *folder, const char *prefix, const char *name)
+static int picture_save(imp_film *film, const char *folder, const char *prefix,
+                        const char *name)
 {
     char file[128];
     struct imp_write_options w = IMP_WRITE_OPTIONS_INIT;
@@ -47,7 +48,7 @@ static void line(float *p, double x0, double y0, double x1, double y1, const flo
     }
 }
 
-/* ---- What is seen: the box of the picture ------------------------------------------------ */
+/* ---- What is seen: the box of the picture -------------------------------------- */
 
 /* The field's box, or that of the rays and their ends; a square per pair of axes. */
 static void box_of(imp_bend *b, double lo[3], double hi[3])
@@ -74,8 +75,8 @@ static void box_of(imp_bend *b, double lo[3], double hi[3])
 }
 
 /* Grey from the least index to the greatest, on the plane through the middle. */
-static void slice(const imp_field *f, int u, int v, const double lo[3], const double hi[3],
-                  float *p, double range[2])
+static void slice(const imp_field *f, int u, int v, const double lo[3],
+                  const double hi[3], float *p, double range[2])
 {
     double *eta = cli_alloc((size_t)SIDE * SIDE, sizeof *eta);
     range[0] = INFINITY, range[1] = -INFINITY;
@@ -86,12 +87,14 @@ static void slice(const imp_field *f, int u, int v, const double lo[3], const do
             x[u] = lo[u] + (hi[u] - lo[u]) * (i + 0.5) / SIDE;
             x[v] = hi[v] - (hi[v] - lo[v]) * (j + 0.5) / SIDE;
             imp_field_eval(f, x, e, NULL, NULL);
-            if (isfinite(*e)) range[0] = fmin(range[0], *e), range[1] = fmax(range[1], *e);
+            if (isfinite(*e))
+                range[0] = fmin(range[0], *e), range[1] = fmax(range[1], *e);
         }
     const double span = range[1] - range[0];
     for (size_t i = 0; i < (size_t)SIDE * SIDE; i++) {
         const double t = span > 0 ? (eta[i] - range[0]) / span : 0.5;
-        const float s = (float)pow(0.15 + 0.8 * (isfinite(t) ? t : 0), 2.2); /* sRGB later */
+        const float s =
+            (float)pow(0.15 + 0.8 * (isfinite(t) ? t : 0), 2.2); /* sRGB later */
         p[3 * i] = 0.85f * s, p[3 * i + 1] = 0.95f * s, p[3 * i + 2] = s;
     }
     free(eta);
@@ -100,8 +103,9 @@ static void slice(const imp_field *f, int u, int v, const double lo[3], const do
 static void paths_draw(imp_bend *b, int u, int v, const double lo[3], const double hi[3],
                        float *p)
 {
-    static const float colours[6][3] = {{.9f, .1f, .05f}, {.05f, .4f, .9f}, {.05f, .6f, .1f},
-                                        {.9f, .5f, 0}, {.5f, .1f, .7f}, {0, .6f, .6f}};
+    static const float colours[6][3] = {{.9f, .1f, .05f}, {.05f, .4f, .9f},
+                                        {.05f, .6f, .1f}, {.9f, .5f, 0},
+                                        {.5f, .1f, .7f},  {0, .6f, .6f}};
     struct imp_bend_rays r;
     struct imp_bend_options o = IMP_BEND_OPTIONS_INIT;
     imp_bend_get_rays(b, &r);
@@ -109,7 +113,7 @@ static void paths_draw(imp_bend *b, int u, int v, const double lo[3], const doub
     o.n_taps = 0;
     const size_t stride = r.n > PATHS ? r.n / PATHS : 1;
     for (size_t i = stride / 2; i < r.n; i += stride) {
-        double (*q)[4];
+        double(*q)[4];
         size_t n;
         if (imp_bend_path(imp_bend_field(b), &o, &r, i, &q, &n, NULL) != IMP_OK) continue;
         for (size_t k = 1; k < n; k++)
@@ -163,14 +167,15 @@ static int spots(imp_bend *b, size_t target, const char *folder, const char *pre
     char name[64];
     snprintf(name, sizeof name, "spot-%zu", target);
     const int rc = picture_save(film, folder, prefix, name);
-    cli_say("target %zu: %zu rays, rms spot %.4g; the picture is %.4g wide", target, n, rms, 6 * rms);
+    cli_say("target %zu: %zu rays, rms spot %.4g; the picture is %.4g wide", target, n,
+            rms, 6 * rms);
     imp_film_destroy(film);
     free(a);
     return rc;
 }
 
-static int image(imp_bend *b, size_t target, const struct imp_bend_target *t, const char *folder,
-                 const char *prefix)
+static int image(imp_bend *b, size_t target, const struct imp_bend_target *t,
+                 const char *folder, const char *prefix)
 {
     imp_film *film;
     enum imp_status st = imp_film_create(cli.context, t->width, t->height, "Y", &film);
@@ -199,13 +204,15 @@ int bend_view(imp_bend *b, const char *folder, const char *prefix)
     for (int k = 0; k < 3 && !rc; k++) {
         imp_film *film;
         char name[32];
-        const enum imp_status st = imp_film_create(cli.context, SIDE, SIDE, "R,G,B", &film);
+        const enum imp_status st =
+            imp_film_create(cli.context, SIDE, SIDE, "R,G,B", &film);
         if (st != IMP_OK) return cli_fail(st, NULL);
-        slice(imp_bend_field(b), axes[k][0], axes[k][1], lo, hi, imp_film_mean(film), range);
+        slice(imp_bend_field(b), axes[k][0], axes[k][1], lo, hi, imp_film_mean(film),
+              range);
         snprintf(name, sizeof name, "slice-%c", "xyz"[k]);
         rc = picture_save(film, folder, prefix, name);
-        cli_say("slice %c = %.4g: index %.6g to %.6g", "xyz"[k], (lo[k] + hi[k]) / 2, range[0],
-                range[1]);
+        cli_say("slice %c = %.4g: index %.6g to %.6g", "xyz"[k], (lo[k] + hi[k]) / 2,
+                range[0], range[1]);
         if (!rc && k < 2) {
             paths_draw(b, axes[k][0], axes[k][1], lo, hi, imp_film_mean(film));
             snprintf(name, sizeof name, "rays-%c", "xyz"[k]);

@@ -43,8 +43,7 @@ static void print_text(const struct imp_check_row *rows, size_t n)
         if (r->se > 0) snprintf(se, sizeof se, "%.1e", r->se);
         printf("%-7s %-*s %-8s %-15.8g %-15.8g %-9s %s%-9.2g %s\n", r->method, width,
                r->param ? r->param : "", step, r->value, r->reference, se,
-               r->se > 0 ? "z " : "", r->error,
-               verdict(r));
+               r->se > 0 ? "z " : "", r->error, verdict(r));
     }
 }
 
@@ -110,6 +109,11 @@ static int run_check(int n, char **operand)
 }
 
 const struct command command_check = {
-    {"check", "SCENE", "check the gradients against differences and identities",
-     {options, options_params, options_run, options_scene, options_general}, 1, 1},
-    run_check, 1};
+    {"check",
+     "SCENE",
+     "check the gradients against differences and identities",
+     {options, options_params, options_run, options_scene, options_general},
+     1,
+     1},
+    run_check,
+    1};

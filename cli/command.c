@@ -53,7 +53,7 @@ const struct arg_option options_run[] = {
      &cli.time_s, 1e-3, 1e9, NULL},
     {0}};
 
-/* ---- Talking --------------------------------------------- */
+/* ---- Talking ------------------------------------------------------------------- */
 
 int cli_error(int code, const char *format, ...)
 {
@@ -131,7 +131,7 @@ double cli_now(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-/* ---- Opening --------------------------------------------- */
+/* ---- Opening ------------------------------------------------------------------- */
 
 static void on_log(enum imp_log_level level, const char *message, void *payload)
 {
@@ -313,9 +313,7 @@ int cli_spp(const struct imp_run *run)
 const char *cli_number_name(const struct imp_param_info *info, size_t element, char *text,
                             size_t size)
 {
-    if (info->count == 1)
-        snprintf(text, size, "%s", info->name);
-    else
-        snprintf(text, size, "%s[%zu]", info->name, element);
+    if (info->count == 1) snprintf(text, size, "%s", info->name);
+    else snprintf(text, size, "%s[%zu]", info->name, element);
     return text;
 }

@@ -6,19 +6,19 @@
 #ifndef IMP_CLI_COMMAND_H
 #define IMP_CLI_COMMAND_H
 
-#include <importon/importon.h>
-#include <stdio.h>
 #include "args.h"
 #include "json.h"
+#include <importon/importon.h>
+#include <stdio.h>
 
 /* Exit codes; the manual page is the contract. */
 enum {
     EXIT_DONE = 0,
-    EXIT_NO = 1,          /* check, compare: the answer is no */
-    EXIT_USAGE = 2,       /* usage or scene error */
-    EXIT_RUN = 3,         /* the run failed */
+    EXIT_NO = 1,    /* check, compare: the answer is no */
+    EXIT_USAGE = 2, /* usage or scene error */
+    EXIT_RUN = 3,   /* the run failed */
     EXIT_INTERRUPTED = 130,
-    EXIT_STOP = -1        /* inside: end now, all is done */
+    EXIT_STOP = -1 /* inside: end now, all is done */
 };
 
 struct command {
@@ -35,9 +35,9 @@ extern const struct arg_option options_general[], options_scene[], options_run[]
 
 /* The running command. A process runs one, so there is one. */
 struct cli {
-    const char *name;          /* of the command */
+    const char *name; /* of the command */
     int argc;
-    char **argv;               /* as typed, for provenance */
+    char **argv; /* as typed, for provenance */
     /* options_general */
     const char *out;
     int threads, json, progress, help, quiet;

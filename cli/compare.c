@@ -22,8 +22,8 @@ static const struct arg_option options[] = {
     {ARG_NUMBER, 0, "floor", "V", "least variance (default 1e-4 of the squared mean)",
      &o.floor, 1e-300, 1e300, NULL},
     {ARG_FLAG, 0, "plain-variance", NULL,
-     "R, G, B of the variance are of R, G, B; else of X, Y, Z, kept as a colour", &o.plain, 0,
-     0, NULL},
+     "R, G, B of the variance are of R, G, B; else of X, Y, Z, kept as a colour",
+     &o.plain, 0, 0, NULL},
     {0}};
 
 static int has_channel(const imp_film *film, const char *name)
@@ -101,7 +101,11 @@ out:
     return rc;
 }
 
-const struct command command_compare = {
-    {"compare", "TEST REFERENCE", "do two pictures have the same expectation?",
-     {options, options_general}, 2, 2},
-    run_compare, 1};
+const struct command command_compare = {{"compare",
+                                         "TEST REFERENCE",
+                                         "do two pictures have the same expectation?",
+                                         {options, options_general},
+                                         2,
+                                         2},
+                                        run_compare,
+                                        1};

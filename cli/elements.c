@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * importon elements: the deterministic solver. A picture, the statistics of the solution, and
- * with --sensitivity what every light and reflectance does to the measurement. */
+ * importon elements: the deterministic solver. A picture, the statistics of the solution,
+ * and with --sensitivity what every light and reflectance does to the measurement. */
 #include "elements.h"
 #include "picture.h"
 #include "progress.h"
@@ -22,40 +22,41 @@ static struct {
 static const char *const kind_words[] = {"flat", "gouraud", "gather", "importance", NULL};
 
 static const struct arg_option options[] = {
-    {ARG_CHOICE, 0, "image", "KIND", "flat, gouraud (default), gather or importance", &o.kind, 0,
-     0, kind_words},
+    {ARG_CHOICE, 0, "image", "KIND", "flat, gouraud (default), gather or importance",
+     &o.kind, 0, 0, kind_words},
     {ARG_FLAG, 0, "no-image", NULL, "no picture", &o.no_picture, 0, 0, NULL},
-    {ARG_NUMBER, 0, "stop", "PERCENT", "stop when the picture changes by less (default 1)",
-     &o.stop, 1e-9, 100, NULL},
-    {ARG_NUMBER, 0, "eps", "E", "smallest link tolerance, relative (default 5e-6)", &o.eps,
-     1e-12, 1, NULL},
-    {ARG_INT, 0, "order", "L", "of the directional basis, 2..12; default: by the materials",
-     &o.order, 2, 12, NULL},
-    {ARG_INT, 0, "level", "N", "of subdivision at most (default 9)", &o.level, 1, 10, NULL},
+    {ARG_NUMBER, 0, "stop", "PERCENT",
+     "stop when the picture changes by less (default 1)", &o.stop, 1e-9, 100, NULL},
+    {ARG_NUMBER, 0, "eps", "E", "smallest link tolerance, relative (default 5e-6)",
+     &o.eps, 1e-12, 1, NULL},
+    {ARG_INT, 0, "order", "L",
+     "of the directional basis, 2..12; default: by the materials", &o.order, 2, 12, NULL},
+    {ARG_INT, 0, "level", "N", "of subdivision at most (default 9)", &o.level, 1, 10,
+     NULL},
     {ARG_INT, 0, "rays", "N", "per side of a pixel (default 3)", &o.rays, 1, 64, NULL},
     {ARG_INT, 0, "max-links", "N", "budget of links", &o.max_links, 1, 2e9, NULL},
-    {ARG_NUMBER, 0, "max-memory", "MB", "budget of memory (default 4295)", &o.max_mb, 1, 1e9,
-     NULL},
-    {ARG_FLAG, 0, "no-importance", NULL, "refine by radiance alone", &o.no_importance, 0, 0,
-     NULL},
+    {ARG_NUMBER, 0, "max-memory", "MB", "budget of memory (default 4295)", &o.max_mb, 1,
+     1e9, NULL},
+    {ARG_FLAG, 0, "no-importance", NULL, "refine by radiance alone", &o.no_importance, 0,
+     0, NULL},
     {ARG_LIST, 0, "phong", "SHAPE=KD,KS,N", "make a shape glossy ('*': all but lights)",
      &o.phong, 0, 0, NULL},
-    {ARG_LIST, 0, "beam", "SHAPE=N[,X,Y,Z]", "give a light a cosine-power direction", &o.beams,
-     0, 0, NULL},
+    {ARG_LIST, 0, "beam", "SHAPE=N[,X,Y,Z]", "give a light a cosine-power direction",
+     &o.beams, 0, 0, NULL},
     {ARG_LIST, 0, "region", "[W:]X0,Y0,X1,Y1", "measure a part of the picture",
      &o.sources.regions, 0, 0, NULL},
     {ARG_LIST, 0, "plane", "[W:]CORNER,U,V", "measure the irradiance of a virtual patch",
      &o.sources.planes, 0, 0, NULL},
-    {ARG_LIST, 0, "lux", "[W:]SHAPE", "measure the irradiance of a shape", &o.sources.shapes, 0,
-     0, NULL},
-    {ARG_FLAG, 0, "sensitivity", NULL, "print derivatives of the measurement, largest first",
-     &o.sensitivity, 0, 0, NULL},
+    {ARG_LIST, 0, "lux", "[W:]SHAPE", "measure the irradiance of a shape",
+     &o.sources.shapes, 0, 0, NULL},
+    {ARG_FLAG, 0, "sensitivity", NULL,
+     "print derivatives of the measurement, largest first", &o.sensitivity, 0, 0, NULL},
     {ARG_TEXT, 0, "save", "FILE", "keep the solution", &o.save, 0, 0, NULL},
-    {ARG_TEXT, 0, "open", "FILE", "take a kept solution instead of solving", &o.open, 0, 0,
-     NULL},
+    {ARG_TEXT, 0, "open", "FILE", "take a kept solution instead of solving", &o.open, 0,
+     0, NULL},
     {ARG_LIST, 0, "export", "FILE", "leaves as .ply or .json", &o.exports, 0, 0, NULL},
-    {ARG_NUMBER, 0, "exposure", "STOPS", "of the PNG preview", &o.picture.exposure, -100, 100,
-     NULL},
+    {ARG_NUMBER, 0, "exposure", "STOPS", "of the PNG preview", &o.picture.exposure, -100,
+     100, NULL},
     {0}};
 
 /* What options name, in use until the process ends. */
@@ -97,8 +98,9 @@ static int options_make(struct imp_elements_options *e)
 /* Importance spans decades: five of them from dark blue to white. */
 static imp_film *false_colour(imp_film *film)
 {
-    static const double map[6][3] = {{0, 0, 0.05}, {0.05, 0.02, 0.35}, {0.35, 0.02, 0.4},
-                                     {0.8, 0.1, 0.1}, {0.95, 0.6, 0.02}, {1, 1, 0.9}};
+    static const double map[6][3] = {{0, 0, 0.05},      {0.05, 0.02, 0.35},
+                                     {0.35, 0.02, 0.4}, {0.8, 0.1, 0.1},
+                                     {0.95, 0.6, 0.02}, {1, 1, 0.9}};
     struct imp_film_info info = {.size = sizeof info};
     imp_film *out = NULL;
     imp_film_get_info(film, &info);
@@ -113,7 +115,8 @@ static imp_film *false_colour(imp_film *film)
         const double t = x[i] > 0 ? fmax(0, 5 + log10(x[i] / most)) : 0;
         const int k = t >= 5 ? 4 : (int)t;
         for (int c = 0; c < 3; c++)
-            y[3 * i + (size_t)c] = (float)(map[k][c] + (map[k + 1][c] - map[k][c]) * (t - k));
+            y[3 * i + (size_t)c] =
+                (float)(map[k][c] + (map[k + 1][c] - map[k][c]) * (t - k));
     }
     return out;
 }
@@ -148,7 +151,8 @@ static void print_info(struct json *j, const struct imp_elements_info *i, int co
 {
     if (!j) {
         cli_say("%zu polygons, %zu elements (%zu leaves), %zu links, %lld rays; order %d",
-                i->polygons, i->elements, i->leaves, i->links, (long long)i->rays, i->order);
+                i->polygons, i->elements, i->leaves, i->links, (long long)i->rays,
+                i->order);
         cli_say("measure %.9g (from the lights %.9g); %s", i->measure, i->measure_adjoint,
                 i->reason);
         return;
@@ -259,9 +263,11 @@ static int run_elements(int n, char **operand)
     const int to_stdout = cli.out && !strcmp(cli.out, "-");
     st = imp_elements_get_info(e, &info);
     if (!o.no_picture) rc = write_picture(e, &run);
-    if (!rc && o.save && (st = imp_elements_save(e, o.save)) != IMP_OK) rc = cli_fail(st, NULL);
+    if (!rc && o.save && (st = imp_elements_save(e, o.save)) != IMP_OK)
+        rc = cli_fail(st, NULL);
     for (size_t k = 0; k < o.exports.n && !rc; k++)
-        if ((st = imp_elements_export(e, o.exports.item[k])) != IMP_OK) rc = cli_fail(st, NULL);
+        if ((st = imp_elements_export(e, o.exports.item[k])) != IMP_OK)
+            rc = cli_fail(st, NULL);
     if (!rc && cli.json && !to_stdout) {
         json = cli_json();
         j = &json;
@@ -274,6 +280,11 @@ static int run_elements(int n, char **operand)
 }
 
 const struct command command_elements = {
-    {"elements", "SCENE", "solve a scene without noise, by finite elements",
-     {options, options_run, options_scene, options_general}, 1, 1},
-    run_elements, 0};
+    {"elements",
+     "SCENE",
+     "solve a scene without noise, by finite elements",
+     {options, options_run, options_scene, options_general},
+     1,
+     1},
+    run_elements,
+    0};

@@ -44,8 +44,10 @@ int elements_phong(const struct arg_list *list, struct imp_elements_phong **out)
         int n = 0;
         p->shape = named(list->item[i], v, 3, 7, &n);
         if (!p->shape || (n != 3 && n != 7))
-            return cli_error(EXIT_USAGE, "--phong '%s': SHAPE=KD,KS,N or "
-                             "SHAPE=R,G,B,R,G,B,N", list->item[i]);
+            return cli_error(EXIT_USAGE,
+                             "--phong '%s': SHAPE=KD,KS,N or "
+                             "SHAPE=R,G,B,R,G,B,N",
+                             list->item[i]);
         for (int c = 0; c < 3; c++) {
             p->kd[c] = n == 3 ? v[0] : v[c];
             p->ks[c] = n == 3 ? v[1] : v[3 + c];
@@ -102,14 +104,17 @@ int elements_sources(const struct elements_sources *s, int sensor,
                              s->regions.item[i]);
         p->kind = IMP_ELEMENTS_CAMERA;
         p->sensor = sensor;
-        for (int k = 0; k < 4; k++) p->region[k] = v[k] >= 0 && v[k] < 1e9 ? (int)v[k] : -1;
+        for (int k = 0; k < 4; k++)
+            p->region[k] = v[k] >= 0 && v[k] < 1e9 ? (int)v[k] : -1;
     }
     for (size_t i = 0; i < s->planes.n; i++, at++) {
         struct imp_elements_source *p = &(*out)[at];
         double v[9];
         if (numbers(weight_of(s->planes.item[i], &p->weight), v, 9, 9) != 9)
-            return cli_error(EXIT_USAGE, "--plane '%s': [WEIGHT:] a corner and two edges, nine "
-                             "numbers", s->planes.item[i]);
+            return cli_error(EXIT_USAGE,
+                             "--plane '%s': [WEIGHT:] a corner and two edges, nine "
+                             "numbers",
+                             s->planes.item[i]);
         p->kind = IMP_ELEMENTS_PLANE;
         memcpy(p->origin, v, sizeof p->origin);
         memcpy(p->edge_u, v + 3, sizeof p->edge_u);

@@ -45,16 +45,14 @@ static const struct arg_option options[] = {
      "one PNG of before, target and recovered (with -o)", &o.sheet, 0, 0, NULL},
     {0}};
 
-/* ---- Pictures --------------------------------------------- */
+/* ---- Pictures ------------------------------------------------------------------ */
 
 /* "name.exr", or "name-1.exr" for the second of several targets. */
 static char *picture_path(const char *name, size_t i)
 {
     char file[64];
-    if (problem_options.targets.n == 1)
-        snprintf(file, sizeof file, "%s.exr", name);
-    else
-        snprintf(file, sizeof file, "%s-%zu.exr", name, i);
+    if (problem_options.targets.n == 1) snprintf(file, sizeof file, "%s.exr", name);
+    else snprintf(file, sizeof file, "%s-%zu.exr", name, i);
     return join_path(cli.out, file);
 }
 
@@ -133,7 +131,7 @@ static int write_sheet(void)
     return rc;
 }
 
-/* ---- Numbers --------------------------------------------- */
+/* ---- Numbers ------------------------------------------------------------------- */
 
 static int write_history(const struct imp_fit_result *r)
 {
@@ -252,10 +250,8 @@ static void print_table(const struct imp_fit_result *r, const struct block *bloc
                    cli_number_name(&b->info, i, name, sizeof name), v->start, v->value);
             if (isfinite(v->lo95) && isfinite(v->hi95))
                 printf("[%.6g, %.6g]", v->lo95, v->hi95);
-            else if (!o.no_intervals && !v->determined)
-                printf("not determined");
-            else
-                printf("-");
+            else if (!o.no_intervals && !v->determined) printf("not determined");
+            else printf("-");
             printf("%s\n", v->at_bound < 0   ? "  at its lower bound"
                            : v->at_bound > 0 ? "  at its upper bound"
                                              : "");

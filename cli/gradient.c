@@ -157,7 +157,7 @@ static int compute(imp_problem *problem, const struct imp_run *run, struct resul
     return rc;
 }
 
-/* ---- Answers --------------------------------------------- */
+/* ---- Answers ------------------------------------------------------------------- */
 
 static void print_json(const struct imp_run *run, const struct result *r,
                        const struct block *blocks, size_t n_blocks, char **paths)
@@ -170,8 +170,10 @@ static void print_json(const struct imp_run *run, const struct result *r,
     if (!strcmp(r->functional, "loss")) json_text(&j, "loss", loss_word());
     json_number(&j, "value", r->value.value);
     json_number(&j, "se", r->value.se);
-    json_text(&j, "bias", bias[r->value.bias_order >= 0 && r->value.bias_order <= 2
-                                   ? r->value.bias_order : 0]);
+    json_text(
+        &j, "bias",
+        bias[r->value.bias_order >= 0 && r->value.bias_order <= 2 ? r->value.bias_order
+                                                                  : 0]);
     json_array(&j, "params");
     for (size_t k = 0; k < n_blocks; k++) {
         const struct block *b = &blocks[k];
@@ -273,8 +275,12 @@ static int run_gradient(int n, char **operand)
 }
 
 const struct command command_gradient = {
-    {"gradient", "SCENE", "derivatives of a loss (or of the picture's mean), with errors",
+    {"gradient",
+     "SCENE",
+     "derivatives of a loss (or of the picture's mean), with errors",
      {options, options_targets, options_params, options_run, options_scene,
       options_general},
-     1, 1},
-    run_gradient, 0};
+     1,
+     1},
+    run_gradient,
+    0};

@@ -149,7 +149,11 @@ static int run_info(int n, char **operand)
     return print_params(NULL);
 }
 
-const struct command command_info = {
-    {"info", "SCENE", "list a scene's objects and parameters",
-     {options_scene, options_general}, 1, 1},
-    run_info, 1};
+const struct command command_info = {{"info",
+                                      "SCENE",
+                                      "list a scene's objects and parameters",
+                                      {options_scene, options_general},
+                                      1,
+                                      1},
+                                     run_info,
+                                     1};

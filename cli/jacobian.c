@@ -17,8 +17,8 @@ static int separate;
 static const char *sheet_path;
 static struct sheet sheet;
 static const struct arg_option options[] = {
-    {ARG_FLAG, 0, "separate", NULL, "one picture per number, also for colours", &separate, 0,
-     0, NULL},
+    {ARG_FLAG, 0, "separate", NULL, "one picture per number, also for colours", &separate,
+     0, 0, NULL},
     {ARG_TEXT, 0, "sheet", "FILE.png", "one PNG with all the pictures side by side",
      &sheet_path, 0, 0, NULL},
     {0}};
@@ -158,6 +158,11 @@ static int run_jacobian(int n, char **operand)
 }
 
 const struct command command_jacobian = {
-    {"jacobian", "SCENE", "one derivative picture per parameter, from one set of walks",
-     {options, options_params, options_run, options_scene, options_general}, 1, 1},
-    run_jacobian, 0};
+    {"jacobian",
+     "SCENE",
+     "one derivative picture per parameter, from one set of walks",
+     {options, options_params, options_run, options_scene, options_general},
+     1,
+     1},
+    run_jacobian,
+    0};

@@ -16,7 +16,7 @@
 /* Luminance of linear sRGB, as the scene format defines it (section 2). */
 static const double luminance[3] = {0.212671, 0.715160, 0.072169};
 
-/* ---- Files --------------------------------------------- */
+/* ---- Files --------------------------------------------------------------------- */
 
 char *join_path(const char *folder, const char *name)
 {
@@ -124,7 +124,7 @@ int picture_write(const imp_film *film, const char *path, const struct picture_o
     return st == IMP_OK ? 0 : cli_fail(st, NULL);
 }
 
-/* ---- Provenance --------------------------------------------- */
+/* ---- Provenance ---------------------------------------------------------------- */
 
 /* Append `word` to a shell command line, quoted where the shell would split or expand it.
  */
@@ -178,7 +178,7 @@ void picture_stamp(imp_film *film, const struct imp_run *run)
         set_text(film, "importon.time", text);
 }
 
-/* ---- Targets --------------------------------------------- */
+/* ---- Targets ------------------------------------------------------------------- */
 
 static int channel_index(imp_film *film, int n, const char *name)
 {

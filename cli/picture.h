@@ -16,7 +16,7 @@ void picture_stamp(imp_film *film, const struct imp_run *run);
 struct picture_options {
     int standard_error;
     int half;
-    int diverging;     /* preview of a signed picture */
+    int diverging; /* preview of a signed picture */
     int no_preview;
     double exposure;
 };

@@ -127,8 +127,10 @@ int plot_curve(const char *path, const char *title, const char *x_label,
                 y_at(&a, y[i]));
         started = 1;
     }
-    fprintf(f, "\"/>\n<text x=\"%d\" y=\"26\" text-anchor=\"middle\" font-size=\"16\">%s"
-               "</text>\n", WIDTH / 2, title);
+    fprintf(f,
+            "\"/>\n<text x=\"%d\" y=\"26\" text-anchor=\"middle\" font-size=\"16\">%s"
+            "</text>\n",
+            WIDTH / 2, title);
     put_tick(f, (LEFT + WIDTH - RIGHT) / 2.0, HEIGHT - 14, "middle", x_label);
     fprintf(f,
             "<text transform=\"translate(20 %d) rotate(-90)\" text-anchor=\"middle\">%s"

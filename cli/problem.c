@@ -174,9 +174,9 @@ int block_write(const struct block *b, const double *x, const double *se,
     char name[512];
     snprintf(name, sizeof name, "%s.exr", p->name);
     *path = join_path(folder, name);
-    const enum imp_status st = imp_film_create(cli.context, (int)width, (int)height,
-                                               channel_names[channels == 3][se != NULL],
-                                               &film);
+    const enum imp_status st =
+        imp_film_create(cli.context, (int)width, (int)height,
+                        channel_names[channels == 3][se != NULL], &film);
     if (st != IMP_OK) return cli_fail(st, *path);
     float *out = imp_film_mean(film);
     for (size_t i = 0; i < width * height; i++) {

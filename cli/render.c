@@ -158,6 +158,11 @@ static int run_render(int n, char **operand)
 }
 
 const struct command command_render = {
-    {"render", "SCENE", "render a scene; or print its random walks",
-     {options, options_run, options_scene, options_general}, 1, 1},
-    run_render, 0};
+    {"render",
+     "SCENE",
+     "render a scene; or print its random walks",
+     {options, options_run, options_scene, options_general},
+     1,
+     1},
+    run_render,
+    0};

@@ -8,8 +8,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define TILE 128 /* pixels that the longer side of a picture should have at least */
-#define GAP 4
+#define TILE    128 /* pixels that the longer side of a picture should have at least */
+#define GAP     4
 #define LARGEST (1 << 26) /* pixels of a sheet */
 
 void sheet_add(struct sheet *s, const char *path)

@@ -20,10 +20,7 @@ static void add_camera(imp_scene *scene)
     /* Looks along its local +z; +y is up. From (1, 0, 1) towards the origin: columns are
      * left, up, direction and position. */
     const double s = sqrt(0.5);
-    const double to_world[16] = {-s, 0, -s, 1,
-                                 0,  1, 0,  0,
-                                 s,  0, -s, 1,
-                                 0,  0, 0,  1};
+    const double to_world[16] = {-s, 0, -s, 1, 0, 1, 0, 0, s, 0, -s, 1, 0, 0, 0, 1};
     imp_scene_begin(scene, "sensor", "perspective", NULL, NULL);
     imp_scene_float(scene, "fov", 0.1);
     imp_scene_transform(scene, "to_world", to_world);

@@ -75,7 +75,8 @@ static enum imp_status minimise(imp_problem *problem, double x[2])
     nlopt_destroy(opt);
     /* At the noise floor a line search may find nothing better: that is an end, too. */
     return result > 0 || result == NLOPT_FAILURE || result == NLOPT_ROUNDOFF_LIMITED
-               ? IMP_OK : IMP_E_NUMERIC;
+               ? IMP_OK
+               : IMP_E_NUMERIC;
 }
 
 int main(void)
@@ -115,8 +116,7 @@ int main(void)
     if (st == IMP_OK) st = minimise(problem, x);
     if (st == IMP_OK)
         printf("rho = %.4f (0.25), E = %.4f (2)\n", x[at_ball], x[1 - at_ball]);
-    else
-        fprintf(stderr, "%s\n", context ? imp_last_error(context) : imp_status_text(st));
+    else fprintf(stderr, "%s\n", context ? imp_last_error(context) : imp_status_text(st));
 
     imp_film_destroy(film);
     imp_problem_destroy(problem);

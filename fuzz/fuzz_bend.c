@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Files of bent rays: any bytes are a problem that can be traced and differentiated, or an
- * error. Memory is limited, so that absurd sizes are refused and not swapped. */
+ * Files of bent rays: any bytes are a problem that can be traced and differentiated, or
+ * an error. Memory is limited, so that absurd sizes are refused and not swapped. */
 #include <importon/bend.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -50,7 +50,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
         imp_field_n_theta(imp_bend_field(b)) <= 4096 &&
         imp_bend_get_options(b, &o) == IMP_OK && o.step > 1e-3) {
         double value, *g = calloc(imp_field_n_theta(imp_bend_field(b)), sizeof *g);
-        if (imp_bend_objective(b, &value, g, NULL, NULL) != IMP_OK && !imp_last_error(ctx)[0])
+        if (imp_bend_objective(b, &value, g, NULL, NULL) != IMP_OK &&
+            !imp_last_error(ctx)[0])
             abort();
         free(g);
     }

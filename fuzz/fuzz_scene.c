@@ -1,15 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Random small scenes through rendering and gradients. Bytes choose objects and their
- * numbers, hostile ones among them (huge, tiny, negative, zero, NaN); whatever happens must
- * be a status, and what succeeds must be finite. */
+ * numbers, hostile ones among them (huge, tiny, negative, zero, NaN); whatever happens
+ * must be a status, and what succeeds must be finite. */
 #include <importon/importon.h>
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 
-struct bytes { const uint8_t *data; size_t left; };
+struct bytes {
+    const uint8_t *data;
+    size_t left;
+};
 
 static unsigned byte(struct bytes *b)
 {
@@ -74,8 +77,9 @@ static void color(struct bytes *b, imp_scene *s, const char *name, int light)
 
 static void material(struct bytes *b, imp_scene *s, int depth)
 {
-    static const char *const types[] = {"diffuse", "dielectric", "conductor", "roughconductor",
-                                        "stam_m2", "stam_m3", "twosided", "diffuse"};
+    static const char *const types[] = {"diffuse",        "dielectric", "conductor",
+                                        "roughconductor", "stam_m2",    "stam_m3",
+                                        "twosided",       "diffuse"};
     const unsigned t = byte(b) % (depth ? 6 : 8);
     imp_scene_begin(s, "bsdf", types[t], NULL, NULL);
     switch (t) {
@@ -104,7 +108,8 @@ static void material(struct bytes *b, imp_scene *s, int depth)
 
 static void shape(struct bytes *b, imp_scene *s)
 {
-    static const char *const types[] = {"rectangle", "disk", "sphere", "cube", "cylinder", "mesh"};
+    static const char *const types[] = {"rectangle", "disk",     "sphere",
+                                        "cube",      "cylinder", "mesh"};
     const unsigned t = byte(b) % 6;
     imp_scene_begin(s, "shape", types[t], NULL, NULL);
     if (t == 5) {
@@ -178,7 +183,8 @@ static void use(imp_context *ctx, imp_scene *s)
     imp_film_get_info(film, &info);
     const size_t values = (size_t)info.width * info.height * info.channels;
     for (size_t k = 0; k < values; k++)
-        if (!isfinite(imp_film_mean(film)[k]) && fabsf(imp_film_mean(film)[k]) != INFINITY)
+        if (!isfinite(imp_film_mean(film)[k]) &&
+            fabsf(imp_film_mean(film)[k]) != INFINITY)
             __builtin_trap();
     if (imp_problem_create(s, &p) == IMP_OK && imp_problem_activate(p, "*") == IMP_OK) {
         const size_t n = imp_problem_n(p);

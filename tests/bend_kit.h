@@ -4,8 +4,8 @@
 #ifndef BEND_KIT_H
 #define BEND_KIT_H
 
-#include "imp_tap.h"
 #include "curved/curved.h"
+#include "imp_tap.h"
 #include "math/rng.h"
 #include <stdlib.h>
 
@@ -13,16 +13,19 @@ static inline double kit_u(uint64_t stream, uint64_t i) /* uniform on [0, 1) */
 {
     return imp__u01(imp__key(20220701, stream, i), 0);
 }
-static inline double kit_pm(uint64_t stream, uint64_t i) { return 2 * kit_u(stream, i) - 1; }
+static inline double kit_pm(uint64_t stream, uint64_t i)
+{
+    return 2 * kit_u(stream, i) - 1;
+}
 
-#define KIT_CHECK(call)                                                                    \
-    do {                                                                                   \
-        const enum imp_status st_ = (call);                                                \
-        if (st_ != IMP_OK) {                                                               \
-            printf("Bail out! %s:%d: %s (%s)\n", __FILE__, __LINE__, #call,                \
-                   imp_last_error(kit_ctx));                                               \
-            exit(1);                                                                       \
-        }                                                                                  \
+#define KIT_CHECK(call)                                                                  \
+    do {                                                                                 \
+        const enum imp_status st_ = (call);                                              \
+        if (st_ != IMP_OK) {                                                             \
+            printf("Bail out! %s:%d: %s (%s)\n", __FILE__, __LINE__, #call,              \
+                   imp_last_error(kit_ctx));                                             \
+            exit(1);                                                                     \
+        }                                                                                \
     } while (0)
 
 static imp_context *kit_ctx;
@@ -34,8 +37,9 @@ static inline void kit_begin(int threads)
 }
 
 /* A grid over the box +-half (a little uneven, to have h differ by axis). */
-static inline imp_field *kit_grid(enum imp_field_interp interp, enum imp_field_param param,
-                                  int cells, double half, double noise)
+static inline imp_field *kit_grid(enum imp_field_interp interp,
+                                  enum imp_field_param param, int cells, double half,
+                                  double noise)
 {
     struct imp_field_grid d = IMP_FIELD_GRID_INIT;
     imp_field *f;
@@ -55,7 +59,8 @@ static inline imp_field *kit_grid(enum imp_field_interp interp, enum imp_field_p
     return f;
 }
 
-static inline imp_field *kit_profile(const char *kind, const double *p, const double *axis)
+static inline imp_field *kit_profile(const char *kind, const double *p,
+                                     const double *axis)
 {
     imp_field *f;
     KIT_CHECK(imp_field_profile_create(kit_ctx, kind, p, axis, &f));
@@ -66,7 +71,10 @@ static inline imp_field *kit_profile(const char *kind, const double *p, const do
 static inline imp_field *kit_field(int i, const char **name)
 {
     static const double tilt[3] = {0.3, -0.2, 0.9};
-    static const struct { const char *kind; double p[8]; } profiles[] = {
+    static const struct {
+        const char *kind;
+        double p[8];
+    } profiles[] = {
         {"constant", {1.4, 0, 0, 0}},
         {"luneburg", {1.3, 0.1, -0.05, 0.02}},
         {"maxwell", {2.0, 1.1, 0.05, 0, -0.1}},
@@ -92,7 +100,8 @@ static inline imp_field *kit_field(int i, const char **name)
     r.centre[0] = 0.1;
     memcpy(r.axis, tilt, sizeof tilt);
     switch (i) {
-    case 11: case 12:
+    case 11:
+    case 12:
         r.cylinder = i == 12;
         snprintf(label, sizeof label, "radial %s", r.cylinder ? "cylinder" : "sphere");
         KIT_CHECK(imp_field_radial_create(kit_ctx, &r, 1.4, &f));
@@ -125,15 +134,16 @@ static inline imp_field *kit_field(int i, const char **name)
 }
 
 /* n rays along +z from the plane z0, in a disc, with a little tilt. Free both arrays. */
-static inline struct imp_bend_rays kit_beam(size_t n, double z0, double radius, double tilt)
+static inline struct imp_bend_rays kit_beam(size_t n, double z0, double radius,
+                                            double tilt)
 {
-    double (*x)[3] = calloc(n, sizeof *x), (*d)[3] = calloc(n, sizeof *d);
+    double(*x)[3] = calloc(n, sizeof *x), (*d)[3] = calloc(n, sizeof *d);
     for (size_t i = 0; i < n; i++) {
         const double r = radius * sqrt(kit_u(3, i)), a = IMP_2PI * kit_u(4, i);
         x[i][0] = r * cos(a), x[i][1] = r * sin(a), x[i][2] = z0;
         d[i][0] = tilt * kit_pm(5, i), d[i][1] = tilt * kit_pm(6, i), d[i][2] = 1;
     }
-    return (struct imp_bend_rays){n, (const double (*)[3])x, (const double (*)[3])d, NULL};
+    return (struct imp_bend_rays){n, (const double(*)[3])x, (const double(*)[3])d, NULL};
 }
 static inline void kit_rays_free(struct imp_bend_rays *r)
 {

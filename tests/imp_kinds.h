@@ -1,31 +1,33 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Every material, ready to be tested. kinds_visit calls back with one instance of every kind
- * of the registry: in its default configuration, in the configurations listed below, and,
- * for kinds with children, around every other kind. Inputs are drawn from what each kind
- * declares, so a new kind is tested by existing; it adds a line here only for properties
- * that are not inputs.
+ * Every material, ready to be tested. kinds_visit calls back with one instance of every
+ * kind of the registry: in its default configuration, in the configurations listed below,
+ * and, for kinds with children, around every other kind. Inputs are drawn from what each
+ * kind declares, so a new kind is tested by existing; it adds a line here only for
+ * properties that are not inputs.
  */
 #ifndef IMP_KINDS_H
 #define IMP_KINDS_H
 
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 #include "kind/build.h"
 #include "math/rng.h"
 #include "math/warp.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
 
 /* Properties "name=text": a number, true, false, or a word. */
-static const struct { const char *kind, *props[6]; } kind_configs[] = {
+static const struct {
+    const char *kind, *props[6];
+} kind_configs[] = {
     {"dielectric", {"int_ior=1.5", "ext_ior=1.0"}},
     {"conductor", {"material=Au"}},
     {"roughconductor", {"distribution=beckmann", "alpha=0.3"}},
     {"roughconductor", {"distribution=ggx", "alpha=0.3", "material=Cu"}},
     {"roughconductor", {"distribution=beckmann", "alpha_u=0.1", "alpha_v=0.4"}},
     {"roughconductor", {"distribution=ggx", "alpha_u=0.4", "alpha_v=0.1"}},
-    {"roughconductor", {"distribution=beckmann", "alpha_u=0.1", "alpha_v=0.4",
-                        "sample_visible=false"}},
+    {"roughconductor",
+     {"distribution=beckmann", "alpha_u=0.1", "alpha_v=0.4", "sample_visible=false"}},
     {"roughconductor", {"distribution=ggx", "alpha=0.3", "sample_visible=false"}},
     {"stam_m2", {"variant=reciprocal", "sampling=cosine", "absorb=0.3"}},
     {"stam_m2", {"variant=microfacet", "sampling=phong"}},
@@ -39,7 +41,7 @@ static const struct { const char *kind, *props[6]; } kind_configs[] = {
 struct kind_case {
     char label[128];
     const char *kind;
-    const char *const *props;   /* of its configuration, NULL-terminated, or NULL */
+    const char *const *props; /* of its configuration, NULL-terminated, or NULL */
     struct imp_bsdf bsdf, child[2];
 };
 
@@ -52,25 +54,30 @@ static bool kind_make(struct kind_factory *f, const struct imp_bsdf_ops *ops,
                       const char *const *props, int n_props, const struct imp_bsdf *child,
                       int n_child, struct imp_bsdf *out)
 {
-    struct imp_node *node = imp__node_create(&f->arena, "bsdf", ops->name, NULL, NULL,
-                                             (struct imp_loc){0});
+    struct imp_node *node =
+        imp__node_create(&f->arena, "bsdf", ops->name, NULL, NULL, (struct imp_loc){0});
     for (int i = 0; i < n_props && props[i]; i++) {
         char name[64];
         const char *eq = strchr(props[i], '=');
         snprintf(name, sizeof name, "%.*s", (int)(eq - props[i]), props[i]);
         char *end;
         const double number = strtod(eq + 1, &end);
-        const bool truth = strcmp(eq + 1, "true") == 0, lie = strcmp(eq + 1, "false") == 0;
+        const bool truth = strcmp(eq + 1, "true") == 0,
+                   lie = strcmp(eq + 1, "false") == 0;
         struct imp_prop *p = imp__node_add(&f->arena, node, name,
-                                           !*end ? IMP_PROP_FLOAT : truth || lie ? IMP_PROP_BOOL
-                                                                                 : IMP_PROP_STRING,
+                                           !*end          ? IMP_PROP_FLOAT
+                                           : truth || lie ? IMP_PROP_BOOL
+                                                          : IMP_PROP_STRING,
                                            (struct imp_loc){0});
         p->number[0] = number;
         p->integer = truth;
         p->string = eq + 1;
     }
     void *self = imp__arena_array(&f->arena, 1, ops->object_size + 1);
-    *out = (struct imp_bsdf){.ops = ops, .self = self, .flags = IMP_BSDF_SMOOTH, .index = 0,
+    *out = (struct imp_bsdf){.ops = ops,
+                             .self = self,
+                             .flags = IMP_BSDF_SMOOTH,
+                             .index = 0,
                              .name = ops->name};
     while (ops->inputs[out->n_own].name) out->n_own++;
     out->n_in = out->n_own;
@@ -100,10 +107,10 @@ static inline void kind_bounds(const struct imp_input_desc *d, double *lo, doubl
 }
 
 enum kind_set {
-    KIND_FALLBACK,  /* what the kind declares */
-    KIND_RANDOM,    /* near it, another value in every lane */
-    KIND_WIDE,      /* far around it */
-    KIND_LOWEST     /* every input at its lower bound: zeros */
+    KIND_FALLBACK, /* what the kind declares */
+    KIND_RANDOM,   /* near it, another value in every lane */
+    KIND_WIDE,     /* far around it */
+    KIND_LOWEST    /* every input at its lower bound: zeros */
 };
 static inline void kind_inputs(const struct imp_bsdf *b, enum kind_set set, uint64_t seed,
                                imp_spec *in)
@@ -115,12 +122,14 @@ static inline void kind_inputs(const struct imp_bsdf *b, enum kind_set set, uint
         kind_bounds(d, &lo, &hi);
         in[j] = imp__spec(0);
         for (int c = 0; c < 3; c++) {
-            const double u = imp__u01(key, (uint32_t)(4 * j + (d->flags & IMP_INPUT_SCALAR ? 0 : c)));
+            const double u =
+                imp__u01(key, (uint32_t)(4 * j + (d->flags & IMP_INPUT_SCALAR ? 0 : c)));
             double v = d->fallback;
             if (set == KIND_LOWEST) v = lo;
             else if (set == KIND_FALLBACK) v = d->fallback;
             else if (isfinite(hi)) v = lo + u * (hi - lo);
-            else if (d->fallback > 0) v = d->fallback * exp2(set == KIND_WIDE ? 7 * u - 3.5 : 3 * u - 1.5);
+            else if (d->fallback > 0)
+                v = d->fallback * exp2(set == KIND_WIDE ? 7 * u - 3.5 : 3 * u - 1.5);
             else v = lo + 3 * u;
             in[j][c] = imp_clamp(v, lo, hi);
         }
@@ -174,7 +183,8 @@ static inline int kinds_visit(struct kind_factory *f,
             if (n < ops->min_children) continue;
             const struct imp_bsdf_ops *back = imp__bsdf_kinds[0];
             for (int b = 0; imp__bsdf_kinds[b]; b++)
-                if (strcmp(imp__bsdf_kinds[b]->name, "diffuse") == 0) back = imp__bsdf_kinds[b];
+                if (strcmp(imp__bsdf_kinds[b]->name, "diffuse") == 0)
+                    back = imp__bsdf_kinds[b];
             if (!kind_make(f, front, NULL, 0, NULL, 0, &c.child[0]) ||
                 !kind_make(f, back, NULL, 0, NULL, 0, &c.child[1]))
                 return -1;

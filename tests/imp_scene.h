@@ -30,8 +30,8 @@ static inline void test_must(imp_context *ctx, enum imp_status st)
 }
 
 /* `defines` is "a=1 b=2", or NULL. */
-static inline imp_scene *test_scene(imp_context *ctx, const char *file, enum imp_color_mode mode,
-                                    const char *defines)
+static inline imp_scene *test_scene(imp_context *ctx, const char *file,
+                                    enum imp_color_mode mode, const char *defines)
 {
     struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
     char path[1024], copy[512], *save = NULL;
@@ -58,7 +58,8 @@ static inline imp_scene *test_scene_text(imp_context *ctx, const char *xml,
     return scene;
 }
 
-static inline imp_problem *test_problem(imp_context *ctx, imp_scene *scene, const char *glob)
+static inline imp_problem *test_problem(imp_context *ctx, imp_scene *scene,
+                                        const char *glob)
 {
     imp_problem *p;
     test_must(ctx, imp_problem_create(scene, &p));

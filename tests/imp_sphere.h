@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Integrals over the sphere in (z, phi), where area is dz dphi, by adaptive Gauss-Legendre,
- * and a tree of cells for histograms of directions. The horizon is always a cell border. */
+ * Integrals over the sphere in (z, phi), where area is dz dphi, by adaptive
+ * Gauss-Legendre, and a tree of cells for histograms of directions. The horizon is always
+ * a cell border. */
 #ifndef IMP_SPHERE_H
 #define IMP_SPHERE_H
 
@@ -13,8 +14,8 @@ typedef double sphere_fn(imp_v3 w, void *payload);
 
 struct sphere_cell {
     double z0, z1, p0, p1;
-    int child;      /* index of the first of four, or 0 */
-    int count;      /* draws in it */
+    int child; /* index of the first of four, or 0 */
+    int count; /* draws in it */
 };
 
 static inline imp_v3 sphere_direction(double z, double phi)
@@ -32,14 +33,17 @@ static inline double sphere_rule(const struct sphere_cell *c, sphere_fn *f, void
     double sum = 0;
     for (int i = 0; i < N; i++)
         for (int j = 0; j < N; j++)
-            sum += w[i] * w[j] * f(sphere_direction(c->z0 + x[i] * dz, c->p0 + x[j] * dp), payload);
+            sum += w[i] * w[j] *
+                   f(sphere_direction(c->z0 + x[i] * dz, c->p0 + x[j] * dp), payload);
     return sum * dz * dp;
 }
 static inline struct sphere_cell sphere_quarter(const struct sphere_cell *c, int k)
 {
     const double zm = 0.5 * (c->z0 + c->z1), pm = 0.5 * (c->p0 + c->p1);
-    return (struct sphere_cell){.z0 = k & 1 ? zm : c->z0, .z1 = k & 1 ? c->z1 : zm,
-                                .p0 = k & 2 ? pm : c->p0, .p1 = k & 2 ? c->p1 : pm};
+    return (struct sphere_cell){.z0 = k & 1 ? zm : c->z0,
+                                .z1 = k & 1 ? c->z1 : zm,
+                                .p0 = k & 2 ? pm : c->p0,
+                                .p1 = k & 2 ? c->p1 : pm};
 }
 /* Until halving changes less than `tolerance` (absolute, shared out by area). */
 static inline double sphere_cell_integral(const struct sphere_cell *c, double whole,
@@ -54,10 +58,12 @@ static inline double sphere_cell_integral(const struct sphere_cell *c, double wh
         sum += part[k];
     }
     /* Wide cells are always cut: a narrow lobe must not hide between the nodes. */
-    if (depth == 0 || (c->z1 - c->z0 < 0.13 && fabs(sum - whole) <= tolerance)) return sum;
+    if (depth == 0 || (c->z1 - c->z0 < 0.13 && fabs(sum - whole) <= tolerance))
+        return sum;
     sum = 0;
     for (int k = 0; k < 4; k++)
-        sum += sphere_cell_integral(&q[k], part[k], f, payload, 0.5 * tolerance, depth - 1);
+        sum +=
+            sphere_cell_integral(&q[k], part[k], f, payload, 0.5 * tolerance, depth - 1);
     return sum;
 }
 /* Over the whole sphere (lo = -1) or part of it; first cut into cells about 1/16 wide. */
@@ -68,15 +74,19 @@ static inline double sphere_integral(sphere_fn *f, void *payload, double lo, dou
     double sum = 0;
     for (int i = 0; i < NZ; i++)
         for (int j = 0; j < NP; j++) {
-            const struct sphere_cell c = {lo + (hi - lo) * i / NZ, lo + (hi - lo) * (i + 1) / NZ,
-                                          IMP_2PI * j / NP, IMP_2PI * (j + 1) / NP, 0, 0};
+            const struct sphere_cell c = {lo + (hi - lo) * i / NZ,
+                                          lo + (hi - lo) * (i + 1) / NZ,
+                                          IMP_2PI * j / NP,
+                                          IMP_2PI * (j + 1) / NP,
+                                          0,
+                                          0};
             sum += sphere_cell_integral(&c, sphere_rule(&c, f, payload), f, payload,
                                         tolerance / 64, 12);
         }
     return sum;
 }
 
-/* ---- Histogram whose cells follow where draws fall -------------------------------------- */
+/* ---- Histogram whose cells follow where draws fall ----------------------------- */
 
 #define SPHERE_MAX_CELLS 4096
 struct sphere_tree {
@@ -100,7 +110,8 @@ static inline struct sphere_cell *sphere_tree_find(struct sphere_tree *t, imp_v3
     }
     return c;
 }
-/* A pilot draw: cells that hold many are cut. The draws that are tested must be others. */
+/* A pilot draw: cells that hold many are cut. The draws that are tested must be others.
+ */
 static inline void sphere_tree_pilot(struct sphere_tree *t, imp_v3 w, int limit)
 {
     struct sphere_cell *c = sphere_tree_find(t, w);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Tests are plain C programs that print TAP. A check prints value, uncertainty and verdict:
- *     ok 1 - albedo is rho # mean 0.50004 se 0.00065 ref 0.5 z 0.06
+ * Tests are plain C programs that print TAP. A check prints value, uncertainty and
+ * verdict: ok 1 - albedo is rho # mean 0.50004 se 0.00065 ref 0.5 z 0.06
  */
 #ifndef IMP_TAP_H
 #define IMP_TAP_H
@@ -14,7 +14,9 @@
 static int tap_count, tap_failed;
 
 /* Running mean and variance (Welford). */
-struct tap_stat { double n, mean, m2; };
+struct tap_stat {
+    double n, mean, m2;
+};
 static inline void tap_add(struct tap_stat *s, double x)
 {
     s->n += 1;
@@ -27,8 +29,8 @@ static inline double tap_se(const struct tap_stat *s)
     return s->n > 1 ? sqrt(s->m2 / (s->n - 1) / s->n) : INFINITY;
 }
 
-__attribute__((format(printf, 2, 3)))
-static inline int tap_ok(int ok, const char *format, ...)
+__attribute__((format(printf, 2, 3))) static inline int tap_ok(int ok, const char *format,
+                                                               ...)
 {
     va_list args;
     va_start(args, format);

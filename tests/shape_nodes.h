@@ -5,9 +5,9 @@
 #ifndef IMP_TEST_SHAPE_NODES_H
 #define IMP_TEST_SHAPE_NODES_H
 
-#include <stdlib.h>
 #include "kind/shape/shape.h"
 #include "scene/scene.h"
+#include <stdlib.h>
 
 static struct imp_scene world;
 
@@ -53,7 +53,8 @@ static inline void node_vector(struct imp_node *n, const char *name, imp_v3 v)
 }
 static inline void node_transform(struct imp_node *n, struct imp_mat4 m)
 {
-    struct imp_prop *p = imp__node_add(&world.arena, n, "to_world", IMP_PROP_TRANSFORM, n->loc);
+    struct imp_prop *p =
+        imp__node_add(&world.arena, n, "to_world", IMP_PROP_TRANSFORM, n->loc);
     memcpy(p->number, m.m, sizeof m.m);
 }
 
@@ -64,7 +65,8 @@ static inline const struct imp_shape_ops *shape_kind(const char *type)
     return NULL;
 }
 /* Build the shape; NULL on failure, with *status set. Appended to world.shapes. */
-static inline struct imp_shape *shape_build(struct imp_node *node, enum imp_status *status)
+static inline struct imp_shape *shape_build(struct imp_node *node,
+                                            enum imp_status *status)
 {
     const struct imp_shape_ops *ops = shape_kind(node->type);
     struct imp_shape *s = imp__arena_array(&world.arena, 1, sizeof *s);
@@ -74,25 +76,32 @@ static inline struct imp_shape *shape_build(struct imp_node *node, enum imp_stat
         if (status) *status = IMP_E_NOMEM;
         return NULL;
     }
-    *s = (struct imp_shape){.ops = ops, .self = self, .index = world.n_shapes, .bsdf = -1,
-                            .emitter = -1, .name = node->type};
+    *s = (struct imp_shape){.ops = ops,
+                            .self = self,
+                            .index = world.n_shapes,
+                            .bsdf = -1,
+                            .emitter = -1,
+                            .name = node->type};
     enum imp_status st = ops->build(&b, self, s);
     if (st == IMP_OK) st = imp__props_finish(world.ctx, node);
     if (status) *status = st;
     if (st != IMP_OK) return NULL;
-    world.shapes = realloc(world.shapes, (size_t)(world.n_shapes + 1) * sizeof *world.shapes);
+    world.shapes =
+        realloc(world.shapes, (size_t)(world.n_shapes + 1) * sizeof *world.shapes);
     world.shapes[world.n_shapes++] = s;
     return s;
 }
 
 /* Every registered kind with some mesh where it wants one: a closed octahedron with
  * unequal axes. */
-static const float octa_positions[6 * 3 + 4] = {1, 0, 0, -1, 0, 0, 0, 0.8f, 0,
-                                                0, -0.8f, 0, 0, 0, 1.5f, 0, 0, -1.5f};
+static const float octa_positions[6 * 3 + 4] = {1, 0,     0, -1, 0, 0,    0, 0.8f, 0,
+                                                0, -0.8f, 0, 0,  0, 1.5f, 0, 0,    -1.5f};
 static const uint32_t octa_indices[8 * 3] = {0, 2, 4, 2, 1, 4, 1, 3, 4, 3, 0, 4,
                                              2, 0, 5, 1, 2, 5, 3, 1, 5, 0, 3, 5};
-static const struct imp_mesh_data octahedron = {
-    .n_vertices = 6, .n_triangles = 8, .positions = octa_positions, .indices = octa_indices};
+static const struct imp_mesh_data octahedron = {.n_vertices = 6,
+                                                .n_triangles = 8,
+                                                .positions = octa_positions,
+                                                .indices = octa_indices};
 
 static inline struct imp_node *kind_node(const struct imp_shape_ops *ops)
 {

@@ -73,7 +73,7 @@ static inline void stam_close(struct stam *s)
     imp_scene_destroy(s->scene);
 }
 
-/* ---- The library's gradient of one walk ---- */
+/* ---- The library's gradient of one walk ---------------------------------------- */
 
 struct stam_sink {
     struct imp_sink sink; /* first */
@@ -99,7 +99,7 @@ static inline void stam_gradient(const struct stam *s, const struct imp_walk *wa
     imp__walk_sweep(&s->tracer, walk, (imp_spec){adjoint}, &to.sink);
 }
 
-/* ---- This test's own value ---- */
+/* ---- This test's own value ----------------------------------------------------- */
 
 enum stam_variant { STAM_RECIPROCAL, STAM_MICROFACET, STAM_PAPER };
 enum stam_sampling { STAM_MIXTURE, STAM_COSINE, STAM_PHONG };

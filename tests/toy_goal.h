@@ -1,24 +1,24 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A linear model seen through noise, whose least-squares answer is known: pixels
- * I = A x, targets T = A x_true + noise, and "renders" I + Monte Carlo noise that depends on
- * the seed alone. Optimisers and covariances are tested on it. */
+ * I = A x, targets T = A x_true + noise, and "renders" I + Monte Carlo noise that depends
+ * on the seed alone. Optimisers and covariances are tested on it. */
 #ifndef TOY_GOAL_H
 #define TOY_GOAL_H
 
-#include <math.h>
-#include <string.h>
 #include "inverse/optimize.h"
 #include "math/rng.h"
+#include <math.h>
+#include <string.h>
 
 enum { TOY_M = 60, TOY_N = 4 };
 
 struct toy {
     double A[TOY_M][TOY_N], T[TOY_M], truth[TOY_N];
     double lo[TOY_N], hi[TOY_N], scale[TOY_N];
-    double mc;                   /* standard deviation of a "rendered" pixel */
-    double H_noise;              /* relative noise of J^T J */
-    int evals, stop_after;       /* cancel in evaluation number stop_after; 0: never */
+    double mc;             /* standard deviation of a "rendered" pixel */
+    double H_noise;        /* relative noise of J^T J */
+    int evals, stop_after; /* cancel in evaluation number stop_after; 0: never */
     int iterations, stop_iteration;
     struct imp__goal goal;
 };
@@ -26,11 +26,13 @@ struct toy {
 static inline double toy_gauss(uint64_t seed, uint64_t i)
 {
     const struct imp_key key = imp__key(seed, i, 77);
-    return sqrt(-2 * log(1 - imp__u01(key, 0))) * cos(2 * 3.14159265358979323846 * imp__u01(key, 1));
+    return sqrt(-2 * log(1 - imp__u01(key, 0))) *
+           cos(2 * 3.14159265358979323846 * imp__u01(key, 1));
 }
 
-static inline enum imp_status toy_eval(const double *x, uint64_t seed, struct imp_estimate *f,
-                                       double *g, double *g_se, void *payload)
+static inline enum imp_status toy_eval(const double *x, uint64_t seed,
+                                       struct imp_estimate *f, double *g, double *g_se,
+                                       void *payload)
 {
     struct toy *t = payload;
     double value = 0, var = 0;
@@ -43,15 +45,16 @@ static inline enum imp_status toy_eval(const double *x, uint64_t seed, struct im
         value += 0.5 * (r * r - t->mc * t->mc);
         var += t->mc * t->mc * (r * r + 0.5 * t->mc * t->mc);
         for (int k = 0; g && k < TOY_N; k++) g[k] += t->A[p][k] * r;
-        for (int k = 0; g_se && k < TOY_N; k++) g_se[k] += t->mc * t->mc * t->A[p][k] * t->A[p][k];
+        for (int k = 0; g_se && k < TOY_N; k++)
+            g_se[k] += t->mc * t->mc * t->A[p][k] * t->A[p][k];
     }
     for (int k = 0; g_se && k < TOY_N; k++) g_se[k] = sqrt(g_se[k]);
     *f = (struct imp_estimate){value, sqrt(var), 0};
     return IMP_OK;
 }
 
-static inline enum imp_status toy_normal(const double *x, uint64_t seed, struct imp__normal *out,
-                                         void *payload)
+static inline enum imp_status toy_normal(const double *x, uint64_t seed,
+                                         struct imp__normal *out, void *payload)
 {
     struct toy *t = payload;
     double r2 = 0;
@@ -69,7 +72,8 @@ static inline enum imp_status toy_normal(const double *x, uint64_t seed, struct 
         for (int l = 0; l <= k; l++) {
             double h = 0;
             for (int p = 0; p < TOY_M; p++) h += t->A[p][k] * t->A[p][l];
-            const double e = t->H_noise * 5 * toy_gauss(seed, 1000 + (uint64_t)(k * TOY_N + l));
+            const double e =
+                t->H_noise * 5 * toy_gauss(seed, 1000 + (uint64_t)(k * TOY_N + l));
             const int at[2] = {k * TOY_N + l, l * TOY_N + k};
             for (int i = 0; i < 2; i++) {
                 out->H[at[i]] = h + e;
@@ -108,9 +112,16 @@ static inline void toy_make(struct toy *t, imp_context *ctx, uint64_t seed, doub
             t->T[p] += t->A[p][k] * t->truth[k];
         }
     }
-    t->goal = (struct imp__goal){.ctx = ctx, .n = TOY_N, .lo = t->lo, .hi = t->hi,
-                                 .scale = t->scale, .seed = seed, .eval = toy_eval,
-                                 .normal = toy_normal, .iterated = toy_iterated, .payload = t};
+    t->goal = (struct imp__goal){.ctx = ctx,
+                                 .n = TOY_N,
+                                 .lo = t->lo,
+                                 .hi = t->hi,
+                                 .scale = t->scale,
+                                 .seed = seed,
+                                 .eval = toy_eval,
+                                 .normal = toy_normal,
+                                 .iterated = toy_iterated,
+                                 .payload = t};
 }
 
 /* Least squares without any noise of ours: x_ls, and (A^T A)^-1. */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Rays that bend in a graded refractive index, and the exact adjoint of their bending (Teh,
- * O'Toole, Gkioulekas 2022). A first program, in order:
+ * Rays that bend in a graded refractive index, and the exact adjoint of their bending
+ * (Teh, O'Toole, Gkioulekas 2022). A first program, in order:
  *
  *     imp_field_grid_create   an index field: spline or trilinear grid, profiles, sums
  *     imp_bend_trace          rays through it -> exits
@@ -11,8 +11,8 @@
  *
  * A ray has position x and optical momentum v, |v| = eta(x), and follows the canonical
  * equations x' = v, v' = eta grad eta. The gradient is the derivative of the program that
- * traces, step by step; memory does not grow with the number of steps. Same conventions as
- * importon.h.
+ * traces, step by step; memory does not grow with the number of steps. Same conventions
+ * as importon.h.
  */
 #ifndef IMPORTON_BEND_H
 #define IMPORTON_BEND_H
@@ -23,72 +23,77 @@
 extern "C" {
 #endif
 
-/* ---- Index fields ------------------------------------------------------------------ */
+/* ---- Index fields -------------------------------------------------------------- */
 
 typedef struct imp_field imp_field;
 
 enum imp_field_interp {
     IMP_FIELD_SPLINE = 0, /**< cubic B-spline: twice differentiable. The default. */
-    IMP_FIELD_TRILINEAR   /**< fast; its adjoint is not the macroscopic derivative (docs) */
+    IMP_FIELD_TRILINEAR /**< fast; its adjoint is not the macroscopic derivative (docs) */
 };
 enum imp_field_param {
-    IMP_FIELD_ETA = 0,    /**< the numbers are the index */
-    IMP_FIELD_ETA2        /**< the numbers are eta^2/2 */
+    IMP_FIELD_ETA = 0, /**< the numbers are the index */
+    IMP_FIELD_ETA2     /**< the numbers are eta^2/2 */
 };
 
 struct imp_field_grid {
     size_t size;
     enum imp_field_interp interp;
     enum imp_field_param param;
-    int cells[3];              /**< x, y, z */
-    double lo[3], hi[3];       /**< the box the cells fill */
-    int single;                /**< trace with float samples; theta stays double */
+    int cells[3];        /**< x, y, z */
+    double lo[3], hi[3]; /**< the box the cells fill */
+    int single;          /**< trace with float samples; theta stays double */
 };
-#define IMP_FIELD_GRID_INIT                                                                \
-    {sizeof(struct imp_field_grid), IMP_FIELD_SPLINE, IMP_FIELD_ETA, {0}, {0}, {0}, 0}
+#define IMP_FIELD_GRID_INIT                                                              \
+    {                                                                                    \
+        sizeof(struct imp_field_grid), IMP_FIELD_SPLINE, IMP_FIELD_ETA, {0}, {0}, {0}, 0 \
+    }
 
-/** A grid with the same index everywhere. theta: [z][y][x] coefficients, cells + 3 along an
- * axis for splines (the first node lies one spacing before lo), cells + 1 for trilinear.
- * @return IMP_OK; IMP_E_ARG for an empty box, absurd sizes or an index that is not positive;
- *         IMP_E_NOMEM. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_field_grid_create(imp_context *context,
-                                                             const struct imp_field_grid *grid,
-                                                             double index, imp_field **out);
+/** A grid with the same index everywhere. theta: [z][y][x] coefficients, cells + 3 along
+ * an axis for splines (the first node lies one spacing before lo), cells + 1 for
+ * trilinear.
+ * @return IMP_OK; IMP_E_ARG for an empty box, absurd sizes or an index that is not
+ * positive; IMP_E_NOMEM. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_field_grid_create(imp_context *context, const struct imp_field_grid *grid,
+                      double index, imp_field **out);
 
-/** Profiles by name: "constant", "luneburg", "maxwell", "rod" (n^2 parabolic), "rod-vendor",
- * "rod-power", "sech", "plume", "polynomial", "axial", "linear". Parameters in the order that
- * imp_field_param_name tells; imp_field_profile_count says how many there are.
- * axis: unit vector of kinds that have one; NULL: z. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_field_profile_create(imp_context *context,
-                                                                const char *kind,
-                                                                const double *params,
-                                                                const double *axis,
-                                                                imp_field **out);
+/** Profiles by name: "constant", "luneburg", "maxwell", "rod" (n^2 parabolic),
+ * "rod-vendor", "rod-power", "sech", "plume", "polynomial", "axial", "linear". Parameters
+ * in the order that imp_field_param_name tells; imp_field_profile_count says how many
+ * there are. axis: unit vector of kinds that have one; NULL: z. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_field_profile_create(imp_context *context, const char *kind, const double *params,
+                         const double *axis, imp_field **out);
 /** Number of parameters of a profile kind, 0 if there is no such kind. */
 IMP_API size_t imp_field_profile_count(const char *kind);
 
 struct imp_field_radial {
     size_t size;
-    int cylinder;         /**< 1: r is the distance from an axis; 0: from the centre */
+    int cylinder; /**< 1: r is the distance from an axis; 0: from the centre */
     double centre[3], axis[3];
-    double radius;        /**< of the last cell; beyond it the outermost polynomial goes on */
-    int cells;            /**< of the cubic spline in r^2: cells + 3 coefficients */
+    double radius; /**< of the last cell; beyond it the outermost polynomial goes on */
+    int cells;     /**< of the cubic spline in r^2: cells + 3 coefficients */
 };
-#define IMP_FIELD_RADIAL_INIT {sizeof(struct imp_field_radial), 0, {0}, {0, 0, 1}, 1, 16}
+#define IMP_FIELD_RADIAL_INIT                                                            \
+    {                                                                                    \
+        sizeof(struct imp_field_radial), 0, {0}, {0, 0, 1}, 1, 16                        \
+    }
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_field_radial_create(imp_context *context, const struct imp_field_radial *radial,
                         double index, imp_field **out);
 
-/** eta = sum of the parts. Takes them over, also on failure; theta is theirs, one after the
- * other. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_field_sum_create(imp_context *context, size_t n,
-                                                            imp_field **parts,
-                                                            imp_field **out);
+/** eta = sum of the parts. Takes them over, also on failure; theta is theirs, one after
+ * the other. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_field_sum_create(imp_context *context, size_t n, imp_field **parts, imp_field **out);
 
-/** Read .vol (Mitsuba's grid volume), .npy (3-D, [z][y][x], float32 or float64) or a profile as
- * text (docs/curved-rays.md). Volumes hold samples at the cell corners; `grid` gives the box of
- * a .npy and the interpolation of both (its `cells` are ignored); NULL: the defaults. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_field_read(imp_context *context, const char *path,
+/** Read .vol (Mitsuba's grid volume), .npy (3-D, [z][y][x], float32 or float64) or a
+ * profile as text (docs/curved-rays.md). Volumes hold samples at the cell corners; `grid`
+ * gives the box of a .npy and the interpolation of both (its `cells` are ignored); NULL:
+ * the defaults. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_field_read(imp_context *context,
+                                                      const char *path,
                                                       const struct imp_field_grid *grid,
                                                       imp_field **out);
 /** Write samples at cell corners (.vol, .npy), or a radial profile (.txt). */
@@ -112,7 +117,8 @@ IMP_API void imp_field_bounds(const imp_field *field, double lo[3], double hi[3]
 IMP_API IMP_MUST_CHECK enum imp_status imp_field_get_grid(const imp_field *field,
                                                           struct imp_field_grid *grid);
 
-/** Index, gradient [3], Hessian [6] = xx yy zz xy xz yz. gradient and hessian may be NULL. */
+/** Index, gradient [3], Hessian [6] = xx yy zz xy xz yz. gradient and hessian may be
+ * NULL. */
 IMP_API void imp_field_eval(const imp_field *field, const double x[3], double *eta,
                             double *gradient, double *hessian);
 /** The transpose: theta_bar += a d eta/d theta + b . d grad eta/d theta. */
@@ -123,8 +129,8 @@ IMP_API void imp_field_tangent(const imp_field *field, const double x[3],
                                const double *theta_dot, double *eta_dot,
                                double gradient_dot[3]);
 
-/** Samples of the index at the corners of cells, [z][y][x], cells + 1 along an axis. A spline
- * passes through them. */
+/** Samples of the index at the corners of cells, [z][y][x], cells + 1 along an axis. A
+ * spline passes through them. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_field_set_samples(imp_field *field,
                                                              const double *samples);
 /** Transpose of imp_field_set_samples, for param eta: samples_bar = (d theta/d samples)^T
@@ -136,11 +142,10 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_field_samples_vjp(const imp_field *fi
  * fine_bar [imp_field_n_theta(fine)] to coarse_bar. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_field_refine(const imp_field *field,
                                                         imp_field **out);
-IMP_API IMP_MUST_CHECK enum imp_status imp_field_refine_vjp(const imp_field *field,
-                                                            const double *fine_bar,
-                                                            double *coarse_bar);
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_field_refine_vjp(const imp_field *field, const double *fine_bar, double *coarse_bar);
 
-/* ---- Rays --------------------------------------------------------------------------- */
+/* ---- Rays ---------------------------------------------------------------------- */
 
 enum imp_bend_scheme {
     IMP_BEND_LEAPFROG = 0, /**< drift-kick-drift (Stoermer-Verlet): order 2 */
@@ -154,110 +159,129 @@ enum imp_bend_scheme {
 
 /** How the adjoint gets the path back. */
 enum imp_bend_way {
-    IMP_BEND_REVERSE = 0,  /**< runs the ray backwards: nothing is stored */
-    IMP_BEND_STORED,       /**< trace again into a buffer of one ray: 48 B a step */
-    IMP_BEND_PSEUDO        /**< of IMP_BEND_ARC_INDEX: biased; for comparisons only */
+    IMP_BEND_REVERSE = 0, /**< runs the ray backwards: nothing is stored */
+    IMP_BEND_STORED,      /**< trace again into a buffer of one ray: 48 B a step */
+    IMP_BEND_PSEUDO       /**< of IMP_BEND_ARC_INDEX: biased; for comparisons only */
 };
 
 enum imp_bend_surface_type {
-    IMP_BEND_PLANE = 0,    /**< n.x = offset; crossed along n */
-    IMP_BEND_SPHERE,       /**< |x - centre| = radius, from inside */
-    IMP_BEND_CYLINDER,     /**< distance from an axis (centre, normal) = radius, from inside */
-    IMP_BEND_DISC,         /**< plane through centre within radius of it */
-    IMP_BEND_BOX,          /**< lo .. hi, from inside */
-    IMP_BEND_SDF,          /**< field = 0, from negative to positive */
-    IMP_BEND_APPROACH,     /**< first closest approach to centre */
-    IMP_BEND_MESH          /**< the shapes of `scene`, from inside; facets are planes */
+    IMP_BEND_PLANE = 0, /**< n.x = offset; crossed along n */
+    IMP_BEND_SPHERE,    /**< |x - centre| = radius, from inside */
+    IMP_BEND_CYLINDER,  /**< distance from an axis (centre, normal) = radius, from inside
+                         */
+    IMP_BEND_DISC,      /**< plane through centre within radius of it */
+    IMP_BEND_BOX,       /**< lo .. hi, from inside */
+    IMP_BEND_SDF,       /**< field = 0, from negative to positive */
+    IMP_BEND_APPROACH,  /**< first closest approach to centre */
+    IMP_BEND_MESH       /**< the shapes of `scene`, from inside; facets are planes */
 };
 
 /** What happens to a ray at a surface. */
 enum imp_bend_event {
-    IMP_BEND_END = 0,      /**< the ray ends; momentum as it is (index-matched) */
-    IMP_BEND_REFRACT,      /**< the ray ends refracted into `index`; total reflection goes on */
-    IMP_BEND_MIRROR,       /**< reflected, goes on */
-    IMP_BEND_STOP          /**< the ray is lost: counted as missed */
+    IMP_BEND_END = 0, /**< the ray ends; momentum as it is (index-matched) */
+    IMP_BEND_REFRACT, /**< the ray ends refracted into `index`; total reflection goes on
+                       */
+    IMP_BEND_MIRROR,  /**< reflected, goes on */
+    IMP_BEND_STOP     /**< the ray is lost: counted as missed */
 };
 
 struct imp_bend_surface {
     size_t size;
     enum imp_bend_surface_type type;
     enum imp_bend_event event;
-    int group;             /**< rays of this group only; -1: all */
-    double normal[3];      /**< of planes and discs; axis of a cylinder. Normalised. */
-    double offset;         /**< of a plane */
+    int group;        /**< rays of this group only; -1: all */
+    double normal[3]; /**< of planes and discs; axis of a cylinder. Normalised. */
+    double offset;    /**< of a plane */
     double centre[3];
     double radius;
-    double lo[3], hi[3];   /**< of a box */
-    double index;          /**< outside, for IMP_BEND_REFRACT */
-    const imp_field *sdf;  /**< its value is the distance; shared, not copied */
-    const imp_scene *scene;/**< of a mesh: committed, its shapes are closed; shared, not copied */
+    double lo[3], hi[3];  /**< of a box */
+    double index;         /**< outside, for IMP_BEND_REFRACT */
+    const imp_field *sdf; /**< its value is the distance; shared, not copied */
+    const imp_scene
+        *scene; /**< of a mesh: committed, its shapes are closed; shared, not copied */
 };
-#define IMP_BEND_SURFACE_INIT                                                              \
-    {sizeof(struct imp_bend_surface), IMP_BEND_PLANE, IMP_BEND_END, -1, {0, 0, 1}, 0, {0}, \
-     1, {0}, {0}, 1, 0, 0}
+#define IMP_BEND_SURFACE_INIT                                                            \
+    {                                                                                    \
+        sizeof(struct imp_bend_surface), IMP_BEND_PLANE, IMP_BEND_END, -1, {0, 0, 1}, 0, \
+            {0}, 1, {0}, {0}, 1, 0, 0                                                    \
+    }
 
 /** A plane whose crossing is recorded and does not end the ray. */
-struct imp_bend_tap { double normal[3], offset; int group; };
+struct imp_bend_tap {
+    double normal[3], offset;
+    int group;
+};
 
 struct imp_bend_options {
     size_t size;
     enum imp_bend_scheme scheme;
     enum imp_bend_way way;
-    double step;           /**< in sigma, or in length for arc-length schemes; 0: half a cell
-                                (trilinear) or one cell (spline) over the greatest index */
-    uint32_t max_steps;    /**< a ray that needs more is dropped and counted; 0: 100000 */
-    int outside;           /**< rays start outside the surfaces, in a medium of index
-                                `outside_index`: they go straight to the first and enter */
-    double outside_index;  /**< 0: 1 */
-    double grazing;        /**< |cos| at the exit below which a ray is dropped; 0: 0.05;
-                                negative: none */
-    double reversal;       /**< reversed start off by more than this (relative) is counted;
-                                0: 1e-10 */
-    size_t n_surfaces;     /**< 0: the field's own box, momentum as it is */
+    double step;        /**< in sigma, or in length for arc-length schemes; 0: half a cell
+                             (trilinear) or one cell (spline) over the greatest index */
+    uint32_t max_steps; /**< a ray that needs more is dropped and counted; 0: 100000 */
+    int outside;        /**< rays start outside the surfaces, in a medium of index
+                             `outside_index`: they go straight to the first and enter */
+    double outside_index; /**< 0: 1 */
+    double grazing;       /**< |cos| at the exit below which a ray is dropped; 0: 0.05;
+                               negative: none */
+    double reversal;      /**< reversed start off by more than this (relative) is counted;
+                               0: 1e-10 */
+    size_t n_surfaces;    /**< 0: the field's own box, momentum as it is */
     const struct imp_bend_surface *surfaces;
-    size_t n_taps;         /**< at most 16 */
+    size_t n_taps; /**< at most 16 */
     const struct imp_bend_tap *taps;
     imp_progress_fn progress;
     void *progress_payload;
 };
-#define IMP_BEND_OPTIONS_INIT                                                              \
-    {sizeof(struct imp_bend_options), IMP_BEND_LEAPFROG, IMP_BEND_REVERSE, 0, 0, 0, 0, 0,  \
-     0, 0, 0, 0, 0, 0, 0}
+#define IMP_BEND_OPTIONS_INIT                                                            \
+    {                                                                                    \
+        sizeof(struct imp_bend_options), IMP_BEND_LEAPFROG, IMP_BEND_REVERSE, 0, 0, 0,   \
+            0, 0, 0, 0, 0, 0, 0, 0, 0                                                    \
+    }
 
-enum imp_bend_flags {      /* of an exit; a ray with one of DROPPED has no derivative */
-    IMP_BEND_TRUNCATED = 1,   /**< more than max_steps */
-    IMP_BEND_MISSED = 2,      /**< left the field, or met IMP_BEND_STOP, or no surface */
-    IMP_BEND_STARTED_OUT = 4, /**< the start is not inside the surfaces */
-    IMP_BEND_GRAZING = 8,     /**< exit too close to the surface's tangent */
-    IMP_BEND_BROKEN = 16,     /**< not finite, or |v|^2 off eta^2 by more than 10 % */
-    IMP_BEND_DROPPED = 31,
-    IMP_BEND_ENERGY = 32,     /**< |v|^2 off eta^2 by more than 1 %: kept */
-    IMP_BEND_REFLECTED = 64,  /**< totally reflected or mirrored on the way: kept */
-    IMP_BEND_TAP_MISSED = 128 /**< of a tap's record: plane not crossed */
+enum imp_bend_flags { /* of an exit; a ray with one of DROPPED has no derivative */
+                      IMP_BEND_TRUNCATED = 1, /**< more than max_steps */
+                      IMP_BEND_MISSED =
+                          2, /**< left the field, or met IMP_BEND_STOP, or no surface */
+                      IMP_BEND_STARTED_OUT =
+                          4, /**< the start is not inside the surfaces */
+                      IMP_BEND_GRAZING =
+                          8, /**< exit too close to the surface's tangent */
+                      IMP_BEND_BROKEN =
+                          16, /**< not finite, or |v|^2 off eta^2 by more than 10 % */
+                      IMP_BEND_DROPPED = 31,
+                      IMP_BEND_ENERGY = 32, /**< |v|^2 off eta^2 by more than 1 %: kept */
+                      IMP_BEND_REFLECTED =
+                          64, /**< totally reflected or mirrored on the way: kept */
+                      IMP_BEND_TAP_MISSED =
+                          128 /**< of a tap's record: plane not crossed */
 };
 
 /** End of a ray, or its crossing of a tap. All that is kept of a ray between passes. */
 struct imp_bend_exit {
-    double x[3], v[3];     /**< position; momentum (after refraction) */
-    double path;           /**< optical path length, int eta ds */
-    double tau;            /**< length of the last, fractional step */
-    double norm2;          /**< |v|^2 before refraction */
-    uint32_t steps;        /**< whole steps before it */
-    uint16_t surface;      /**< index in options.surfaces */
-    uint8_t flags;         /**< enum imp_bend_flags */
-    uint8_t segments;      /**< reflections + 1 */
+    double x[3], v[3]; /**< position; momentum (after refraction) */
+    double path;       /**< optical path length, int eta ds */
+    double tau;        /**< length of the last, fractional step */
+    double norm2;      /**< |v|^2 before refraction */
+    uint32_t steps;    /**< whole steps before it */
+    uint16_t surface;  /**< index in options.surfaces */
+    uint8_t flags;     /**< enum imp_bend_flags */
+    uint8_t segments;  /**< reflections + 1 */
 };
 
 struct imp_bend_stats {
     size_t size;
     uint64_t rays, traced, steps;
-    uint64_t truncated, missed, started_out, grazing, broken, energy, reflected, taps_missed;
-    uint64_t reversal;         /**< of an adjoint: rays not reversed to their start */
-    double worst_energy;       /**< max | |v|^2 - eta^2 | / eta^2 at exits */
-    double worst_reversal;     /**< max |x - x0| / size */
+    uint64_t truncated, missed, started_out, grazing, broken, energy, reflected,
+        taps_missed;
+    uint64_t reversal;     /**< of an adjoint: rays not reversed to their start */
+    double worst_energy;   /**< max | |v|^2 - eta^2 | / eta^2 at exits */
+    double worst_reversal; /**< max |x - x0| / size */
 };
-#define IMP_BEND_STATS_INIT {sizeof(struct imp_bend_stats), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, \
-                             0, 0, 0}
+#define IMP_BEND_STATS_INIT                                                              \
+    {                                                                                    \
+        sizeof(struct imp_bend_stats), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0          \
+    }
 
 /** Rays: arrays of n. group may be NULL (all 0). Directions need not be unit. */
 struct imp_bend_rays {
@@ -280,22 +304,28 @@ imp_bend_trace(const imp_field *field, const struct imp_bend_options *options,
                const struct imp_bend_rays *rays, struct imp_bend_exit *exits,
                struct imp_bend_exit *taps, struct imp_bend_stats *stats);
 
-/** The cotangent of an exit: dC/dx, dC/dv, dC/dpath with x, v, path taken as independent. */
-struct imp_bend_cotangent { double x[3], v[3], path; };
+/** The cotangent of an exit: dC/dx, dC/dv, dC/dpath with x, v, path taken as independent.
+ */
+struct imp_bend_cotangent {
+    double x[3], v[3], path;
+};
 
 /** What the adjoint gives. Arrays may be NULL; all are overwritten. */
 struct imp_bend_gradient {
     size_t size;
-    double *theta;             /**< [n_theta] */
-    double (*x)[3], (*d)[3];   /**< [n] origins, directions (tangent to the unit sphere) */
-    double (*surfaces)[8];     /**< [n_surfaces]: 0-2 normal (plane) or centre, 3 offset or
-                                    radius, 4 index outside; not for box, SDF and mesh */
-    double *energy;            /**< [n] K = lam.v + mu.F at the start: 0 up to truncation */
+    double *theta;           /**< [n_theta] */
+    double (*x)[3], (*d)[3]; /**< [n] origins, directions (tangent to the unit sphere) */
+    double (*surfaces)[8];   /**< [n_surfaces]: 0-2 normal (plane) or centre, 3 offset or
+                                  radius, 4 index outside; not for box, SDF and mesh */
+    double *energy;          /**< [n] K = lam.v + mu.F at the start: 0 up to truncation */
 };
-#define IMP_BEND_GRADIENT_INIT {sizeof(struct imp_bend_gradient), 0, 0, 0, 0, 0}
+#define IMP_BEND_GRADIENT_INIT                                                           \
+    {                                                                                    \
+        sizeof(struct imp_bend_gradient), 0, 0, 0, 0, 0                                  \
+    }
 
-/** The exact derivative of imp_bend_trace with the same arguments. Dropped rays give nothing.
- * exits, taps as traced; bars [n], tap_bars [n][n_taps] (NULL: zero).
+/** The exact derivative of imp_bend_trace with the same arguments. Dropped rays give
+ * nothing. exits, taps as traced; bars [n], tap_bars [n][n_taps] (NULL: zero).
  * @return as imp_bend_trace; IMP_E_BIAS for IMP_BEND_ARC_INDEX with IMP_BEND_REVERSE. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_adjoint(const imp_field *field, const struct imp_bend_options *options,
@@ -312,90 +342,95 @@ imp_bend_tangent(const imp_field *field, const struct imp_bend_options *options,
                  const double (*x_dot)[3], const double (*d_dot)[3],
                  struct imp_bend_cotangent *dots, struct imp_bend_cotangent *tap_dots);
 
-/** One ray as points (x, y, z, path), for drawing: the caller frees *points with imp_free. */
+/** One ray as points (x, y, z, path), for drawing: the caller frees *points with
+ * imp_free. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_path(const imp_field *field, const struct imp_bend_options *options,
               const struct imp_bend_rays *rays, size_t ray, double (**points)[4],
               size_t *n_points, struct imp_bend_exit *exit);
 
-/* ---- Problems: rays, targets, and a field that is to meet them ------------------------ */
+/* ---- Problems: rays, targets, and a field that is to meet them ----------------- */
 
 typedef struct imp_bend imp_bend;
 
-/** Takes the field over, also on failure. The theta of the field is what a fit changes. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_bend_create(imp_context *context, imp_field *field,
-                                                       imp_bend **out);
+/** Takes the field over, also on failure. The theta of the field is what a fit changes.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status imp_bend_create(imp_context *context,
+                                                       imp_field *field, imp_bend **out);
 IMP_API void imp_bend_destroy(imp_bend *bend);
 /** The field: lives until the bend is destroyed or a fit refines it. */
 IMP_API imp_field *imp_bend_field(imp_bend *bend);
 
-/** Scheme, step, ... of all rays; surfaces and taps are copied. `step` 0 follows the grid:
- * min(step_max, step_cells * cell), see imp_bend_set_step. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_bend_set_options(imp_bend *bend,
-                                                            const struct imp_bend_options *o);
+/** Scheme, step, ... of all rays; surfaces and taps are copied. `step` 0 follows the
+ * grid: min(step_max, step_cells * cell), see imp_bend_set_step. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_bend_set_options(imp_bend *bend, const struct imp_bend_options *o);
 /** The step when options.step is 0: cells * spacing, at most `most` (0: no limit). */
 IMP_API void imp_bend_set_step(imp_bend *bend, double cells, double most);
 
 /** A bundle: rays that share surfaces, taps and targets by its number (their group).
  * x, d [n]; power [n] or NULL (1/n each). *bundle may be NULL. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_bend_add_rays(imp_bend *bend, size_t n,
-                                                         const double (*x)[3],
-                                                         const double (*d)[3],
-                                                         const double *power, int *bundle);
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_bend_add_rays(imp_bend *bend, size_t n, const double (*x)[3], const double (*d)[3],
+                  const double *power, int *bundle);
 IMP_API size_t imp_bend_n_rays(const imp_bend *bend);
 IMP_API int imp_bend_n_bundles(const imp_bend *bend);
 
 enum imp_bend_target_type {
-    IMP_BEND_FOCUS = 0,   /**< mean |x - point|^2/2 */
-    IMP_BEND_SPOT,        /**< mean |x - centroid|^2/2 */
-    IMP_BEND_POINTS,      /**< mean |x - data_i|^2/2, data [n][3] */
-    IMP_BEND_DIRECTION,   /**< mean |d - point|^2/2 */
-    IMP_BEND_DIRECTIONS,  /**< mean |d - data_i|^2/2, data [n][3] */
-    IMP_BEND_DEFLECTION,  /**< mean |P(v - v0) - data_i|^2/2, P across the first direction */
-    IMP_BEND_PATH,        /**< mean (S - data_i)^2/2, data [n] */
-    IMP_BEND_WAVEFRONT,   /**< variance of S / 2 */
-    IMP_BEND_IMAGE,       /**< mean over pixels (E/mean - T/mean)^2/2 of the irradiance */
-    IMP_BEND_FARFIELD,    /**< the same of directions: u and v span direction cosines */
-    IMP_BEND_SHAPE        /**< mean G(x)^2/2, G the distance to `sdf` */
+    IMP_BEND_FOCUS = 0,  /**< mean |x - point|^2/2 */
+    IMP_BEND_SPOT,       /**< mean |x - centroid|^2/2 */
+    IMP_BEND_POINTS,     /**< mean |x - data_i|^2/2, data [n][3] */
+    IMP_BEND_DIRECTION,  /**< mean |d - point|^2/2 */
+    IMP_BEND_DIRECTIONS, /**< mean |d - data_i|^2/2, data [n][3] */
+    IMP_BEND_DEFLECTION, /**< mean |P(v - v0) - data_i|^2/2, P across the first direction
+                          */
+    IMP_BEND_PATH,       /**< mean (S - data_i)^2/2, data [n] */
+    IMP_BEND_WAVEFRONT,  /**< variance of S / 2 */
+    IMP_BEND_IMAGE,      /**< mean over pixels (E/mean - T/mean)^2/2 of the irradiance */
+    IMP_BEND_FARFIELD,   /**< the same of directions: u and v span direction cosines */
+    IMP_BEND_SHAPE       /**< mean G(x)^2/2, G the distance to `sdf` */
 };
 #define IMP_BEND_N_TARGETS 11
 
 struct imp_bend_target {
     size_t size;
     enum imp_bend_target_type type;
-    int bundle;            /**< -1: all rays */
-    int tap;               /**< -1: where rays exit; else the tap they cross */
-    double weight;         /**< 0: 1 */
-    int at_plane;          /**< go on straight, in index `outside`, to normal.x = offset */
+    int bundle;    /**< -1: all rays */
+    int tap;       /**< -1: where rays exit; else the tap they cross */
+    double weight; /**< 0: 1 */
+    int at_plane;  /**< go on straight, in index `outside`, to normal.x = offset */
     double normal[3], offset, outside;
     double point[3];
-    const double *data;    /**< copied */
-    const imp_field *sdf;  /**< shared */
-    /** Picture: pixel (0, 0) has its corner at origin, u runs along a row, v down a column;
-     * both as long as the whole picture (of unit length in a far field: direction cosines
-     * origin + a u + b v). pixels [height][width], copied. */
+    const double *data;   /**< copied */
+    const imp_field *sdf; /**< shared */
+    /** Picture: pixel (0, 0) has its corner at origin, u runs along a row, v down a
+     * column; both as long as the whole picture (of unit length in a far field: direction
+     * cosines origin + a u + b v). pixels [height][width], copied. */
     int width, height;
     double origin[3], u[3], v[3];
     const float *pixels;
 };
-#define IMP_BEND_TARGET_INIT                                                               \
-    {sizeof(struct imp_bend_target), IMP_BEND_FOCUS, -1, -1, 0, 0, {0, 0, 1}, 0, 1, {0}, 0, \
-     0, 0, 0, {0}, {0}, {0}, 0}
-/** A plane's normal is turned to look along the rays' first directions. Rays that meet it at
- * a slant (cosine) below 0.05, or go backwards, do not count; between 0.05 and 0.15 they count
- * less and less: a smooth weight, differentiated. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_bend_add_target(imp_bend *bend,
-                                                           const struct imp_bend_target *t);
+#define IMP_BEND_TARGET_INIT                                                             \
+    {                                                                                    \
+        sizeof(struct imp_bend_target), IMP_BEND_FOCUS, -1, -1, 0, 0, {0, 0, 1}, 0, 1,   \
+            {0}, 0, 0, 0, 0, {0}, {0}, {0}, 0                                            \
+    }
+/** A plane's normal is turned to look along the rays' first directions. Rays that meet it
+ * at a slant (cosine) below 0.05, or go backwards, do not count; between 0.05 and 0.15
+ * they count less and less: a smooth weight, differentiated. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_bend_add_target(imp_bend *bend, const struct imp_bend_target *t);
 
-/** weight/2 sum of squared differences of grid coefficients along each axis, of order 1 or 2;
- * edge > 0: sum sqrt(D^2 + edge^2) instead. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_bend_add_smoothness(imp_bend *bend, double weight,
-                                                               int order, double edge);
+/** weight/2 sum of squared differences of grid coefficients along each axis, of order 1
+ * or 2; edge > 0: sum sqrt(D^2 + edge^2) instead. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_bend_add_smoothness(imp_bend *bend, double weight, int order, double edge);
 /** Bounds of every number of the field; default for grids of the index: 1 .. infinity. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_bend_set_bounds(imp_bend *bend, double lo, double hi);
+IMP_API IMP_MUST_CHECK enum imp_status imp_bend_set_bounds(imp_bend *bend, double lo,
+                                                           double hi);
 /** Hold what a fit may not change, here and on finer levels: grid coefficients in the
- * `layers` outermost layers, those whose node is outside a sphere, or one number; each set to
- * `value` (NaN: left as it is). */
+ * `layers` outermost layers, those whose node is outside a sphere, or one number; each
+ * set to `value` (NaN: left as it is). */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_hold_rim(imp_bend *bend, int layers,
                                                          double value);
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_hold_outside(imp_bend *bend,
@@ -404,28 +439,35 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_bend_hold_outside(imp_bend *bend,
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_hold_number(imp_bend *bend, size_t i,
                                                             double value);
 
-/** Objective and its gradient with respect to all numbers of the field (held ones: 0). The
- * rays are fixed, so both are exact: no standard error belongs to them.
- * gradient [n_theta], stats may be NULL. targets [n targets]: their parts; may be NULL. */
+/** Objective and its gradient with respect to all numbers of the field (held ones: 0).
+ * The rays are fixed, so both are exact: no standard error belongs to them. gradient
+ * [n_theta], stats may be NULL. targets [n targets]: their parts; may be NULL. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_objective(imp_bend *bend, double *value,
-                                                          double *gradient, double *targets,
+                                                          double *gradient,
+                                                          double *targets,
                                                           struct imp_bend_stats *stats);
 /** Exits of all rays with the field as it is; taps [n][n_taps] may be NULL. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_bend_run(imp_bend *bend, struct imp_bend_exit *exits,
+IMP_API IMP_MUST_CHECK enum imp_status imp_bend_run(imp_bend *bend,
+                                                    struct imp_bend_exit *exits,
                                                     struct imp_bend_exit *taps,
                                                     struct imp_bend_stats *stats);
-/** Position, direction and path of a ray at a target's plane; weight 0: it does not count. */
-struct imp_bend_arrival { double x[3], d[3], path, weight; uint32_t ray; };
+/** Position, direction and path of a ray at a target's plane; weight 0: it does not
+ * count. */
+struct imp_bend_arrival {
+    double x[3], d[3], path, weight;
+    uint32_t ray;
+};
 /** arrivals [imp_bend_n_rays]; *n is set. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_bend_arrivals(imp_bend *bend, size_t target,
-                                                         struct imp_bend_arrival *arrivals,
-                                                         size_t *n);
-/** Irradiance that an image target sees, [height][width], mean 1 when all power arrives. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_bend_arrivals(imp_bend *bend, size_t target, struct imp_bend_arrival *arrivals,
+                  size_t *n);
+/** Irradiance that an image target sees, [height][width], mean 1 when all power arrives.
+ */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_image(imp_bend *bend, size_t target,
                                                       float *pixels);
 IMP_API size_t imp_bend_n_targets(const imp_bend *bend);
-IMP_API IMP_MUST_CHECK enum imp_status imp_bend_get_target(const imp_bend *bend, size_t i,
-                                                           struct imp_bend_target *target);
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_bend_get_target(const imp_bend *bend, size_t i, struct imp_bend_target *target);
 IMP_API void imp_bend_get_rays(const imp_bend *bend, struct imp_bend_rays *rays);
 /** The options in use, with the step that rays take. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_get_options(const imp_bend *bend,
@@ -434,45 +476,48 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_bend_get_options(const imp_bend *bend
 #define IMP_BEND_LEVELS_MAX 8
 struct imp_bend_fit_options {
     size_t size;
-    enum imp_optimizer optimizer; /**< IMP_LBFGS, IMP_ADAM, IMP_MMA */
-    int levels;                   /**< grids: refined levels - 1 times; 0: 1 */
+    enum imp_optimizer optimizer;        /**< IMP_LBFGS, IMP_ADAM, IMP_MMA */
+    int levels;                          /**< grids: refined levels - 1 times; 0: 1 */
     int iterations[IMP_BEND_LEVELS_MAX]; /**< 0: as the level before; first 0: 50 */
-    double learning_rate;         /**< Adam: of `scale`; halved at each level; 0: 0.05 */
-    double tolerance;             /**< of `scale`; 0: 1e-6 */
-    double scale;                 /**< a large change of a number; 0: 0.1 */
-    const char *checkpoint;       /**< rewritten at every level and every few seconds */
+    double learning_rate;   /**< Adam: of `scale`; halved at each level; 0: 0.05 */
+    double tolerance;       /**< of `scale`; 0: 1e-6 */
+    double scale;           /**< a large change of a number; 0: 0.1 */
+    const char *checkpoint; /**< rewritten at every level and every few seconds */
     int resume;
     imp_progress_fn progress;
     void *progress_payload;
 };
-#define IMP_BEND_FIT_OPTIONS_INIT                                                          \
-    {sizeof(struct imp_bend_fit_options), IMP_LBFGS, 0, {0}, 0, 0, 0, 0, 0, 0, 0}
+#define IMP_BEND_FIT_OPTIONS_INIT                                                        \
+    {                                                                                    \
+        sizeof(struct imp_bend_fit_options), IMP_LBFGS, 0, {0}, 0, 0, 0, 0, 0, 0, 0      \
+    }
 
 struct imp_bend_fit_result {
     size_t size;
-    int iterations, levels;       /**< done */
-    double start, value;          /**< objective before (first level) and after (last) */
+    int iterations, levels; /**< done */
+    double start, value;    /**< objective before (first level) and after (last) */
     size_t n_history;
-    const double *history;        /**< [n_history] objective of every evaluation */
+    const double *history; /**< [n_history] objective of every evaluation */
     const char *reason;
-    struct imp_bend_stats stats;  /**< of the final field */
+    struct imp_bend_stats stats; /**< of the final field */
 };
 /** The result's arrays belong to the bend and live until its next fit.
  * @return IMP_OK; IMP_CANCELLED (the best field so far is set); IMP_E_ARG. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_bend_fit(imp_bend *bend,
-                                                    const struct imp_bend_fit_options *options,
-                                                    struct imp_bend_fit_result *result);
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_bend_fit(imp_bend *bend, const struct imp_bend_fit_options *options,
+             struct imp_bend_fit_result *result);
 
 /**
- * Check a problem as it stands: splat against tangent ("transpose"), reverse against forward
+ * Check a problem as it stands: splat against tangent ("transpose"), reverse against
+ * forward
  * ("dot"), the gradient against central differences of steps 1e-2 to 1e-8 ("difference"),
- * reversal, energy, and the error of the step by halving it ("step": value is the rms change
- * of exits, reference the change at half the step, error the error left). Rows belong to the
- * bend until its next check. @return IMP_OK also when rows fail: look at `ok`.
+ * reversal, energy, and the error of the step by halving it ("step": value is the rms
+ * change of exits, reference the change at half the step, error the error left). Rows
+ * belong to the bend until its next check. @return IMP_OK also when rows fail: look at
+ * `ok`.
  */
-IMP_API IMP_MUST_CHECK enum imp_status imp_bend_check(imp_bend *bend,
-                                                      const struct imp_check_row **rows,
-                                                      size_t *n_rows);
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_bend_check(imp_bend *bend, const struct imp_check_row **rows, size_t *n_rows);
 /** Error of exits by the step, from up to `pilots` rays traced with t, t/2, t/4: rms over
  * rays, and the order seen (0: not to be seen). Outputs may be NULL. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_step_error(imp_bend *bend, size_t pilots,
@@ -480,12 +525,13 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_bend_step_error(imp_bend *bend, size_
 
 /** A bend from a file: <scene> with a <medium type="graded">, <rays> and <target>s
  * (docs/curved-rays.md). options may be NULL. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_bend_load(imp_context *context, const char *path,
-                                                     const struct imp_load_options *options,
-                                                     imp_bend **out);
 IMP_API IMP_MUST_CHECK enum imp_status
-imp_bend_load_string(imp_context *context, const char *xml, size_t length, const char *name,
-                     const struct imp_load_options *options, imp_bend **out);
+imp_bend_load(imp_context *context, const char *path,
+              const struct imp_load_options *options, imp_bend **out);
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_bend_load_string(imp_context *context, const char *xml, size_t length,
+                     const char *name, const struct imp_load_options *options,
+                     imp_bend **out);
 
 #ifdef __cplusplus
 }

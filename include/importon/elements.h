@@ -1,18 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * elements.h: the deterministic solver. Radiance and directional importance travel over one
- * hierarchy of links between surface elements (Christensen, Salesin, DeRose, "A Continuous
- * Adjoint Formulation for Radiance Transport", 1993; docs/elements.md). In the order of use:
+ * elements.h: the deterministic solver. Radiance and directional importance travel over
+ * one hierarchy of links between surface elements (Christensen, Salesin, DeRose, "A
+ * Continuous Adjoint Formulation for Radiance Transport", 1993; docs/elements.md). In the
+ * order of use:
  *
  *     imp_elements_create       polygons and materials of a scene, checked
  *     imp_elements_solve        refine and solve until a stopping rule
  *     imp_elements_image        pictures through the scene's sensors, any number of views
- *     imp_elements_sensitivity  what every light and every reflectance does to the measurement
+ *     imp_elements_sensitivity  what every light and every reflectance does to the
+ * measurement
  *
- * It takes rectangles, cubes and meshes; area lights; materials that are smooth, isotropic
- * and without textures. What cannot be projected is refused by name. Results have no noise,
- * do not depend on the thread count, and are biased by the mesh and the directional order.
- * The conventions of importon.h hold.
+ * It takes rectangles, cubes and meshes; area lights; materials that are smooth,
+ * isotropic and without textures. What cannot be projected is refused by name. Results
+ * have no noise, do not depend on the thread count, and are biased by the mesh and the
+ * directional order. The conventions of importon.h hold.
  */
 #ifndef IMPORTON_ELEMENTS_H
 #define IMPORTON_ELEMENTS_H
@@ -26,52 +28,58 @@ extern "C" {
 typedef struct imp_elements imp_elements;
 
 enum imp_elements_source_kind {
-    IMP_ELEMENTS_CAMERA = 0, /**< mean luminance of a sensor's picture, or of a part of it */
-    IMP_ELEMENTS_PLANE,      /**< mean irradiance of a virtual parallelogram: not occluding */
-    IMP_ELEMENTS_SHAPE       /**< mean irradiance of a shape's front */
+    IMP_ELEMENTS_CAMERA =
+        0,              /**< mean luminance of a sensor's picture, or of a part of it */
+    IMP_ELEMENTS_PLANE, /**< mean irradiance of a virtual parallelogram: not occluding */
+    IMP_ELEMENTS_SHAPE  /**< mean irradiance of a shape's front */
 };
 
 /** A measurement, and so a source of importance. Several are added with their weights. */
 struct imp_elements_source {
     size_t size;
     enum imp_elements_source_kind kind;
-    double weight;           /**< 0: 1 */
-    int sensor;              /**< camera */
-    int region[4];           /**< camera: x0, y0, x1, y1 in pixels, end excluded; all 0: all */
-    double origin[3], edge_u[3], edge_v[3]; /**< plane; its front is along edge_u x edge_v */
-    const char *shape;       /**< shape: its name */
+    double weight; /**< 0: 1 */
+    int sensor;    /**< camera */
+    int region[4]; /**< camera: x0, y0, x1, y1 in pixels, end excluded; all 0: all */
+    double origin[3], edge_u[3],
+        edge_v[3];     /**< plane; its front is along edge_u x edge_v */
+    const char *shape; /**< shape: its name */
 };
-#define IMP_ELEMENTS_SOURCE_INIT {sizeof(struct imp_elements_source), IMP_ELEMENTS_CAMERA, 0, 0, \
-                                  {0}, {0}, {0}, {0}, 0}
+#define IMP_ELEMENTS_SOURCE_INIT                                                         \
+    {                                                                                    \
+        sizeof(struct imp_elements_source), IMP_ELEMENTS_CAMERA, 0, 0, {0}, {0}, {0},    \
+            {0}, 0                                                                       \
+    }
 
 /** Reciprocal modified Phong in place of a shape's material, seen from its front:
  * kd/pi + ks (n+2)/(2 pi) max(0, mirror(wi).wo)^n. */
 struct imp_elements_phong {
-    const char *shape;       /**< name; "*" for all that are not lights */
+    const char *shape; /**< name; "*" for all that are not lights */
     double kd[3], ks[3], exponent;
 };
 /** Give a shape's light a direction: radiance L0 max(0, w.axis)^exponent along w. */
 struct imp_elements_beam {
     const char *shape;
-    double axis[3];          /**< world; all 0: the shape's normal */
+    double axis[3]; /**< world; all 0: the shape's normal */
     double exponent;
 };
 
 struct imp_elements_options {
     size_t size;
-    int order;               /**< of the directional basis, 2..12; 0: by the materials */
-    int no_importance;       /**< refine by radiance alone (the baseline of 1993) */
-    int sensor;              /**< whose picture decides when to stop */
-    int rays;                /**< per side of a pixel's grid; 0: 3 */
-    double stop;             /**< relative RMS change of the picture; 0: 0.01; < 0: never */
-    double eps_first, eps_last; /**< link tolerance relative to what passes; 0: 0.05, 5e-6 */
-    int sweeps, final_sweeps;   /**< 0: 4, 12 */
-    int max_level;           /**< of subdivision; 0: 9 */
-    size_t max_links;        /**< 0: 20 million */
-    size_t max_bytes;        /**< 0: 4 GiB */
-    double time_limit_s;     /**< 0: none; reached: ends as if cancelled */
+    int order;         /**< of the directional basis, 2..12; 0: by the materials */
+    int no_importance; /**< refine by radiance alone (the baseline of 1993) */
+    int sensor;        /**< whose picture decides when to stop */
+    int rays;          /**< per side of a pixel's grid; 0: 3 */
+    double stop;       /**< relative RMS change of the picture; 0: 0.01; < 0: never */
+    double eps_first,
+        eps_last; /**< link tolerance relative to what passes; 0: 0.05, 5e-6 */
+    int sweeps, final_sweeps; /**< 0: 4, 12 */
+    int max_level;            /**< of subdivision; 0: 9 */
+    size_t max_links;         /**< 0: 20 million */
+    size_t max_bytes;         /**< 0: 4 GiB */
+    double time_limit_s;      /**< 0: none; reached: ends as if cancelled */
     uint64_t seed;
-    size_t n_sources;        /**< 0: the sensor's whole picture */
+    size_t n_sources; /**< 0: the sensor's whole picture */
     const struct imp_elements_source *sources;
     size_t n_phong;
     const struct imp_elements_phong *phong;
@@ -80,63 +88,67 @@ struct imp_elements_options {
     imp_progress_fn progress;
     void *progress_payload;
 };
-#define IMP_ELEMENTS_OPTIONS_INIT                                                          \
-    {sizeof(struct imp_elements_options), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,   \
-     0, 0, 0, 0, 0, 0}
+#define IMP_ELEMENTS_OPTIONS_INIT                                                        \
+    {                                                                                    \
+        sizeof(struct imp_elements_options), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,   \
+            0, 0, 0, 0, 0, 0, 0, 0                                                       \
+    }
 
 /**
- * Take the scene's polygons and project its materials. The scene must outlive the result and
- * keep its parameters until imp_elements_update.
- * @return IMP_OK; IMP_E_ARG; IMP_E_UNSUPPORTED, with the shape's name, for a shape, material
- *         or light that has no place here; IMP_E_NOMEM also if the first links alone are over
- *         the budget: the message has the estimate.
+ * Take the scene's polygons and project its materials. The scene must outlive the result
+ * and keep its parameters until imp_elements_update.
+ * @return IMP_OK; IMP_E_ARG; IMP_E_UNSUPPORTED, with the shape's name, for a shape,
+ * material or light that has no place here; IMP_E_NOMEM also if the first links alone are
+ * over the budget: the message has the estimate.
  */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_elements_create(const imp_scene *scene, const struct imp_elements_options *options,
                     imp_elements **out);
 IMP_API void imp_elements_destroy(imp_elements *elements);
 
-/** Refine and solve. @return IMP_OK; IMP_CANCELLED (progress or time limit): what was reached
- * is a valid, coarser solution; IMP_E_NUMERIC if reflections do not die away; IMP_E_NOMEM. */
+/** Refine and solve. @return IMP_OK; IMP_CANCELLED (progress or time limit): what was
+ * reached is a valid, coarser solution; IMP_E_NUMERIC if reflections do not die away;
+ * IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_elements_solve(imp_elements *elements);
 
 /** Read the scene's parameters again and solve on the same links, without refining. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_elements_update(imp_elements *elements);
 
 struct imp_elements_step { /**< one line of the schedule's log */
-    double eps;              /**< absolute */
+    double eps;            /**< absolute */
     size_t links, elements, leaves;
     int64_t rays;
     double measure;
-    double change;           /**< relative RMS change of the picture; NaN at first */
+    double change; /**< relative RMS change of the picture; NaN at first */
     double elapsed_s;
 };
 struct imp_elements_info {
     size_t size;
-    int order, functions;    /**< of the basis */
+    int order, functions; /**< of the basis */
     size_t polygons, elements, leaves, links;
-    size_t skipped;          /**< polygons without area */
+    size_t skipped; /**< polygons without area */
     int64_t rays;
-    size_t bytes;            /**< held */
+    size_t bytes; /**< held */
     double bytes_per_link, bytes_per_element;
-    double measure;          /**< the weighted measurements, radiance side */
-    double measure_direct;   /**< part of it: lights seen by the eye */
-    double measure_adjoint;  /**< the same number from emission x importance */
-    double worst_residual;   /**< relative L2 error of the worst lobe in the basis */
-    const char *reason;      /**< why it stopped */
+    double measure;         /**< the weighted measurements, radiance side */
+    double measure_direct;  /**< part of it: lights seen by the eye */
+    double measure_adjoint; /**< the same number from emission x importance */
+    double worst_residual;  /**< relative L2 error of the worst lobe in the basis */
+    const char *reason;     /**< why it stopped */
     size_t n_steps;
     const struct imp_elements_step *steps;
 };
-IMP_API IMP_MUST_CHECK enum imp_status imp_elements_get_info(const imp_elements *elements,
-                                                             struct imp_elements_info *info);
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_elements_get_info(const imp_elements *elements, struct imp_elements_info *info);
 
 enum imp_elements_image {
-    IMP_ELEMENTS_FLAT = 0,   /**< every element's own value */
-    IMP_ELEMENTS_GOURAUD,    /**< interpolated, without cracks */
-    IMP_ELEMENTS_GATHER,     /**< last reflection by the true material and fresh visibility */
-    IMP_ELEMENTS_IMPORTANCE  /**< mean exitant importance, one channel "importance" */
+    IMP_ELEMENTS_FLAT = 0, /**< every element's own value */
+    IMP_ELEMENTS_GOURAUD,  /**< interpolated, without cracks */
+    IMP_ELEMENTS_GATHER, /**< last reflection by the true material and fresh visibility */
+    IMP_ELEMENTS_IMPORTANCE /**< mean exitant importance, one channel "importance" */
 };
-/** A picture through a sensor; `rays` per side of a pixel's grid, 0: as in the options. */
+/** A picture through a sensor; `rays` per side of a pixel's grid, 0: as in the options.
+ */
 IMP_API IMP_MUST_CHECK enum imp_status imp_elements_image(const imp_elements *elements,
                                                           int sensor,
                                                           enum imp_elements_image kind,
@@ -144,15 +156,15 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_elements_image(const imp_elements *el
 
 /** One derivative of the measurement. */
 struct imp_elements_row {
-    const char *name;        /**< parameter; of overrides "SHAPE.phong.kd" ... */
-    int param;               /**< index in the scene, -1: an override */
-    size_t element;          /**< number inside it */
-    int emission;            /**< it scales a light, linearly */
+    const char *name; /**< parameter; of overrides "SHAPE.phong.kd" ... */
+    int param;        /**< index in the scene, -1: an override */
+    size_t element;   /**< number inside it */
+    int emission;     /**< it scales a light, linearly */
     double value, derivative;
-    double share;            /**< value x derivative / measure; those of emission sum to 1 */
+    double share; /**< value x derivative / measure; those of emission sum to 1 */
 };
-/** Derivatives of the measurement to every light and material number, links fixed, largest
- * |value x derivative| first. Rows belong to the object until the next call. */
+/** Derivatives of the measurement to every light and material number, links fixed,
+ * largest |value x derivative| first. Rows belong to the object until the next call. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_elements_sensitivity(imp_elements *elements, const struct imp_elements_row **rows,
                          size_t *n_rows);

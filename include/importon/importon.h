@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * importon: adjoint and differentiable light transport, for C and everything that calls C.
+ * importon: adjoint and differentiable light transport, for C and everything that calls
+ * C.
  *
  * A host creates a context, loads or builds a scene, renders it, asks for derivatives of
  * what its sensors see, or fits it to pictures. In the order of a first program:
@@ -15,8 +16,8 @@
  * Conventions, for the whole header. Functions that can fail return enum imp_status; the
  * message belongs to the context and the calling thread (imp_last_error). On failure,
  * outputs keep their contents. `destroy(NULL)` does nothing. Strings and arrays handed in
- * are copied unless a comment says otherwise; pointers handed out belong to the object and
- * live until it is destroyed or changed. Structs start with `size`: use their
+ * are copied unless a comment says otherwise; pointers handed out belong to the object
+ * and live until it is destroyed or changed. Structs start with `size`: use their
  * initialisers. Zero in an options struct means the default. Images are [height][width]
  * [channels], row 0 at the top. A scene may be read by several threads at once, but not
  * while its parameters are being set.
@@ -27,13 +28,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define IMP_VERSION_MAJOR 0
-#define IMP_VERSION_MINOR 1
-#define IMP_VERSION_PATCH 0
+#define IMP_VERSION_MAJOR  0
+#define IMP_VERSION_MINOR  1
+#define IMP_VERSION_PATCH  0
 #define IMP_VERSION_STRING "0.1.0"
 
 #if defined(__GNUC__)
-#define IMP_API __attribute__((visibility("default")))
+#define IMP_API        __attribute__((visibility("default")))
 #define IMP_MUST_CHECK __attribute__((warn_unused_result))
 #else
 #define IMP_API
@@ -44,19 +45,19 @@
 extern "C" {
 #endif
 
-/* ---- Status ---------------------------------------------------------------------- */
+/* ---- Status -------------------------------------------------------------------- */
 
 /* Values have gaps so that codes can be added, never renumbered. */
-#define IMP_STATUS_LIST(X)                                                                 \
-    X(IMP_OK, 0, "success")                                                                \
-    X(IMP_CANCELLED, 1, "cancelled by the caller; results so far are valid")               \
-    X(IMP_E_ARG, 10, "argument outside its documented range")                              \
-    X(IMP_E_SCENE, 20, "scene or input file is not valid")                                 \
-    X(IMP_E_UNSUPPORTED, 25, "valid, but not available in this version")                   \
-    X(IMP_E_BIAS, 26, "a derivative that cannot be computed without bias")                 \
-    X(IMP_E_IO, 30, "file cannot be read or written")                                      \
-    X(IMP_E_NOMEM, 40, "out of memory, or over a memory limit")                            \
-    X(IMP_E_PATHS, 50, "more paths dropped than the budget allows")                        \
+#define IMP_STATUS_LIST(X)                                                               \
+    X(IMP_OK, 0, "success")                                                              \
+    X(IMP_CANCELLED, 1, "cancelled by the caller; results so far are valid")             \
+    X(IMP_E_ARG, 10, "argument outside its documented range")                            \
+    X(IMP_E_SCENE, 20, "scene or input file is not valid")                               \
+    X(IMP_E_UNSUPPORTED, 25, "valid, but not available in this version")                 \
+    X(IMP_E_BIAS, 26, "a derivative that cannot be computed without bias")               \
+    X(IMP_E_IO, 30, "file cannot be read or written")                                    \
+    X(IMP_E_NOMEM, 40, "out of memory, or over a memory limit")                          \
+    X(IMP_E_PATHS, 50, "more paths dropped than the budget allows")                      \
     X(IMP_E_NUMERIC, 60, "a computation did not converge or is singular")
 #define IMP_STATUS_ENUM(name, value, text) name = value,
 enum imp_status { IMP_STATUS_LIST(IMP_STATUS_ENUM) };
@@ -67,7 +68,7 @@ IMP_API const char *imp_status_text(enum imp_status status);
 /** "major.minor.patch" of the library that is loaded. */
 IMP_API const char *imp_version(void);
 
-/* ---- Context --------------------------------------------------------------------- */
+/* ---- Context ------------------------------------------------------------------- */
 
 typedef struct imp_context imp_context;
 
@@ -82,12 +83,15 @@ enum imp_log_level { IMP_LOG_INFO = 0, IMP_LOG_WARNING = 1 };
 
 struct imp_context_options {
     size_t size;
-    int threads;                           /**< 0: all cores; 1: the calling thread only */
-    struct imp_allocator allocator;        /**< zero: the C library's */
+    int threads;                    /**< 0: all cores; 1: the calling thread only */
+    struct imp_allocator allocator; /**< zero: the C library's */
     void (*log)(enum imp_log_level level, const char *message, void *payload);
-    void *log_payload;                     /**< log NULL: warnings are dropped */
+    void *log_payload; /**< log NULL: warnings are dropped */
 };
-#define IMP_CONTEXT_OPTIONS_INIT {sizeof(struct imp_context_options), 0, {0, 0, 0}, 0, 0}
+#define IMP_CONTEXT_OPTIONS_INIT                                                         \
+    {                                                                                    \
+        sizeof(struct imp_context_options), 0, {0, 0, 0}, 0, 0                           \
+    }
 
 /**
  * @param options  NULL for the defaults.
@@ -104,26 +108,26 @@ IMP_API const char *imp_last_error(const imp_context *context);
 /** Number of threads in use. */
 IMP_API int imp_context_threads(const imp_context *context);
 
-/* ---- Progress and cancel ---------------------------------------------------------- */
+/* ---- Progress and cancel ------------------------------------------------------- */
 
 struct imp_progress {
     size_t size;
-    const char *stage;   /**< "render", "gradient", "fit" ... */
-    double fraction;     /**< of the work, 0..1 */
+    const char *stage; /**< "render", "gradient", "fit" ... */
+    double fraction;   /**< of the work, 0..1 */
     double elapsed_s;
-    double eta_s;        /**< time still to go; negative: unknown */
-    double rate;         /**< units of rate_unit per second */
+    double eta_s; /**< time still to go; negative: unknown */
+    double rate;  /**< units of rate_unit per second */
     const char *rate_unit;
-    const char *note;    /**< e.g. "loss 3.1e-4 +- 2e-5"; may be NULL */
+    const char *note; /**< e.g. "loss 3.1e-4 +- 2e-5"; may be NULL */
 };
 
-/** Called from one thread at a time, a few times a second. Non-zero asks to stop: the call
- * in progress returns IMP_CANCELLED. Pictures then hold the samples taken so far and fits the
- * state reached, both valid; a loss or gradient of a part of the picture would mean nothing,
- * so those outputs keep their contents. */
+/** Called from one thread at a time, a few times a second. Non-zero asks to stop: the
+ * call in progress returns IMP_CANCELLED. Pictures then hold the samples taken so far and
+ * fits the state reached, both valid; a loss or gradient of a part of the picture would
+ * mean nothing, so those outputs keep their contents. */
 typedef int (*imp_progress_fn)(const struct imp_progress *progress, void *payload);
 
-/* ---- Scenes ---------------------------------------------------------------------- */
+/* ---- Scenes -------------------------------------------------------------------- */
 
 typedef struct imp_scene imp_scene;
 
@@ -132,34 +136,40 @@ enum imp_color_mode { IMP_RGB = 0, IMP_MONO = 1 };
 struct imp_load_options {
     size_t size;
     enum imp_color_mode mode;
-    const char *const *defines;     /**< [n_defines] "name=value", as -D on the command line */
+    const char *const
+        *defines; /**< [n_defines] "name=value", as -D on the command line */
     size_t n_defines;
-    const char *const *search;      /**< [n_search] folders searched for files */
+    const char *const *search; /**< [n_search] folders searched for files */
     size_t n_search;
 };
-#define IMP_LOAD_OPTIONS_INIT {sizeof(struct imp_load_options), IMP_RGB, 0, 0, 0, 0}
+#define IMP_LOAD_OPTIONS_INIT                                                            \
+    {                                                                                    \
+        sizeof(struct imp_load_options), IMP_RGB, 0, 0, 0, 0                             \
+    }
 
-/** Load a scene file (Mitsuba 3 XML). The scene is committed and ready. options may be NULL.
- * @return IMP_OK; IMP_E_IO; IMP_E_SCENE (message begins file:line:column); IMP_E_UNSUPPORTED
- *         for a plugin this version does not have; IMP_E_NOMEM. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_scene_load(imp_context *context, const char *path,
-                                                      const struct imp_load_options *options,
-                                                      imp_scene **out);
-
-/** The same from memory; `name` stands for the file in messages, files are searched for in
- * the working folder. */
+/** Load a scene file (Mitsuba 3 XML). The scene is committed and ready. options may be
+ * NULL.
+ * @return IMP_OK; IMP_E_IO; IMP_E_SCENE (message begins file:line:column);
+ * IMP_E_UNSUPPORTED for a plugin this version does not have; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
-imp_scene_load_string(imp_context *context, const char *xml, size_t length, const char *name,
-                      const struct imp_load_options *options, imp_scene **out);
+imp_scene_load(imp_context *context, const char *path,
+               const struct imp_load_options *options, imp_scene **out);
+
+/** The same from memory; `name` stands for the file in messages, files are searched for
+ * in the working folder. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_scene_load_string(imp_context *context, const char *xml, size_t length,
+                      const char *name, const struct imp_load_options *options,
+                      imp_scene **out);
 
 /**
  * A scene built by calls. The calls mirror the file format: begin/end open and close an
  * object (tag "shape", type "sphere", ...), the property calls give it values. Errors of
  * a build are kept: later calls do nothing, and imp_scene_commit returns the first.
  */
-IMP_API IMP_MUST_CHECK enum imp_status imp_scene_create(imp_context *context,
-                                                        const struct imp_load_options *options,
-                                                        imp_scene **out);
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_scene_create(imp_context *context, const struct imp_load_options *options,
+                 imp_scene **out);
 IMP_API void imp_scene_destroy(imp_scene *scene);
 
 /** Open an object. `id` and `name` may be NULL; `name` is the slot under the parent. */
@@ -176,15 +186,16 @@ IMP_API void imp_scene_rgb(imp_scene *scene, const char *name, const double valu
 IMP_API void imp_scene_spectrum(imp_scene *scene, const char *name, size_t n,
                                 const double *wavelengths_nm, const double *values);
 /** Local-to-world matrix, row-major. */
-IMP_API void imp_scene_transform(imp_scene *scene, const char *name, const double value[16]);
+IMP_API void imp_scene_transform(imp_scene *scene, const char *name,
+                                 const double value[16]);
 /** Refer to the object with this id; `name` may be NULL. Forward references are fine. */
 IMP_API void imp_scene_ref(imp_scene *scene, const char *id, const char *name);
 /** Triangles for the open shape of type "mesh". normals and uvs may be NULL.
  * positions [3*n_vertices], normals [3*n_vertices], uvs [2*n_vertices],
  * indices [3*n_triangles]. */
 IMP_API void imp_scene_mesh(imp_scene *scene, size_t n_vertices, size_t n_triangles,
-                            const float *positions, const float *normals, const float *uvs,
-                            const uint32_t *indices);
+                            const float *positions, const float *normals,
+                            const float *uvs, const uint32_t *indices);
 /** Linear pixels for the open texture of type "bitmap", in place of `filename`.
  * pixels [height][width][channels], channels 1 or 3. */
 IMP_API void imp_scene_image(imp_scene *scene, int width, int height, int channels,
@@ -196,20 +207,21 @@ struct imp_scene_info {
     size_t size;
     int n_shapes, n_emitters, n_bsdfs, n_textures, n_sensors;
     int64_t n_triangles;
-    double bounds_min[3], bounds_max[3]; /**< scene units; min > max if there is no shape */
+    double bounds_min[3],
+        bounds_max[3]; /**< scene units; min > max if there is no shape */
     enum imp_color_mode mode;
-    int channels;                        /**< of pictures: 3 for rgb, 1 for mono */
+    int channels; /**< of pictures: 3 for rgb, 1 for mono */
     const char *integrator;
-    int max_depth;                       /**< -1: unlimited */
-    size_t memory_bytes;                 /**< held by the scene, Embree's part included */
+    int max_depth;       /**< -1: unlimited */
+    size_t memory_bytes; /**< held by the scene, Embree's part included */
 };
 IMP_API void imp_scene_get_info(const imp_scene *scene, struct imp_scene_info *info);
 
 struct imp_sensor_info {
     size_t size;
     const char *name, *type;
-    int width, height;   /**< of the picture: the crop window */
-    int spp;             /**< samples per pixel that the file asks for */
+    int width, height; /**< of the picture: the crop window */
+    int spp;           /**< samples per pixel that the file asks for */
     const char *filter;
     double filter_radius;
     const char *file_format; /**< "openexr", "rgbe" or "pfm" */
@@ -218,13 +230,13 @@ struct imp_sensor_info {
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_get_sensor(const imp_scene *scene, int sensor, struct imp_sensor_info *info);
 
-/* ---- Parameters: theta ------------------------------------------------------------ */
+/* ---- Parameters: theta --------------------------------------------------------- */
 
 enum imp_param_flags {
     IMP_PARAM_DIFFERENTIABLE = 1, /**< a gradient exists, without bias */
     IMP_PARAM_DISCONTINUOUS = 2,  /**< changing it can move edges of the picture */
     IMP_PARAM_INTEGER = 4,
-    IMP_PARAM_COLOR = 8           /**< its last dimension holds the channels */
+    IMP_PARAM_COLOR = 8 /**< its last dimension holds the channels */
 };
 
 struct imp_param_info {
@@ -242,32 +254,33 @@ struct imp_param_info {
 /** Number of parameters, and of numbers in all of them together. */
 IMP_API size_t imp_scene_n_params(const imp_scene *scene);
 IMP_API size_t imp_scene_n_theta(const imp_scene *scene);
-IMP_API IMP_MUST_CHECK enum imp_status imp_scene_get_param(const imp_scene *scene, size_t index,
-                                                           struct imp_param_info *info);
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_scene_get_param(const imp_scene *scene, size_t index, struct imp_param_info *info);
 /** Find by name. @return IMP_OK; IMP_E_ARG with a message that names the nearest ones. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_scene_find_param(const imp_scene *scene,
-                                                            const char *name, size_t *index);
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
 /** theta [imp_scene_n_theta]. */
 IMP_API void imp_scene_get_theta(const imp_scene *scene, double *theta);
-/** @return IMP_OK; IMP_E_ARG if a value is not finite or outside its bounds: nothing is set. */
+/** @return IMP_OK; IMP_E_ARG if a value is not finite or outside its bounds: nothing is
+ * set. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_scene_set_theta(imp_scene *scene,
                                                            const double *theta);
 /** One parameter: values [info.count], or n == 1 to set all of them to one value. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_scene_set_values(imp_scene *scene, size_t index,
-                                                            size_t n, const double *values);
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_scene_set_values(imp_scene *scene, size_t index, size_t n, const double *values);
 IMP_API IMP_MUST_CHECK enum imp_status imp_scene_get_values(const imp_scene *scene,
                                                             size_t index, double *values);
 
-/* ---- Pictures -------------------------------------------------------------------- */
+/* ---- Pictures ------------------------------------------------------------------ */
 
 typedef struct imp_film imp_film;
 
 struct imp_film_info {
     size_t size;
     int width, height, channels;
-    int64_t spp;         /**< samples per pixel in it */
-    int has_se;          /**< standard errors are there */
-    uint64_t dropped;    /**< walks dropped because a value was not finite or negative */
+    int64_t spp;      /**< samples per pixel in it */
+    int has_se;       /**< standard errors are there */
+    uint64_t dropped; /**< walks dropped because a value was not finite or negative */
 };
 
 /** An empty picture to fill by hand, zeros. `names` is "R,G,B", "Y", "albedo.R,..." . */
@@ -288,43 +301,53 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_film_set_text(imp_film *film, const c
 
 struct imp_write_options {
     size_t size;
-    int half;            /**< 16-bit floats instead of 32 (EXR) */
-    int standard_error;  /**< add channels se.R, se.G ... (EXR) */
-    double exposure;     /**< stops, for PNG */
-    int diverging;       /**< PNG of a signed picture: blue-white-red, symmetric about 0 */
-    double range;        /**< of a signed picture; 0: its 99.5 percentile of |value| */
+    int half;           /**< 16-bit floats instead of 32 (EXR) */
+    int standard_error; /**< add channels se.R, se.G ... (EXR) */
+    double exposure;    /**< stops, for PNG */
+    int diverging;      /**< PNG of a signed picture: blue-white-red, symmetric about 0 */
+    double range;       /**< of a signed picture; 0: its 99.5 percentile of |value| */
 };
-#define IMP_WRITE_OPTIONS_INIT {sizeof(struct imp_write_options), 0, 0, 0, 0, 0}
+#define IMP_WRITE_OPTIONS_INIT                                                           \
+    {                                                                                    \
+        sizeof(struct imp_write_options), 0, 0, 0, 0, 0                                  \
+    }
 
-/** Write by extension: .exr, .pfm, .hdr, .png (sRGB), .npy. The file appears whole or not at all. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_film_write(const imp_film *film, const char *path,
-                                                      const struct imp_write_options *options);
-/** Read .exr, .pfm, .hdr, .npy, .png or .jpg (8- and 16-bit files are taken to be sRGB and
- * made linear). */
-IMP_API IMP_MUST_CHECK enum imp_status imp_film_read(imp_context *context, const char *path,
-                                                     imp_film **out);
+/** Write by extension: .exr, .pfm, .hdr, .png (sRGB), .npy. The file appears whole or not
+ * at all. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_film_write(const imp_film *film, const char *path,
+               const struct imp_write_options *options);
+/** Read .exr, .pfm, .hdr, .npy, .png or .jpg (8- and 16-bit files are taken to be sRGB
+ * and made linear). */
+IMP_API IMP_MUST_CHECK enum imp_status imp_film_read(imp_context *context,
+                                                     const char *path, imp_film **out);
 
-/* ---- Rendering -------------------------------------------------------------------- */
+/* ---- Rendering ----------------------------------------------------------------- */
 
-/** How Monte Carlo is run. The same (seed, spp) give the same bits on any thread count. */
+/** How Monte Carlo is run. The same (seed, spp) give the same bits on any thread count.
+ */
 struct imp_run {
     size_t size;
-    int sensor;             /**< index; default 0 */
-    int spp;                /**< samples per pixel; 0: what the scene asks for */
+    int sensor; /**< index; default 0 */
+    int spp;    /**< samples per pixel; 0: what the scene asks for */
     uint64_t seed;
-    double time_limit_s;    /**< pictures: 0: none; else samples are taken until then (every
-                                 pixel gets at least one pass), at most spp if that is given */
-    double drop_budget;     /**< fraction of walks that may be dropped; 0: 1e-4 */
+    double
+        time_limit_s;   /**< pictures: 0: none; else samples are taken until then (every
+                             pixel gets at least one pass), at most spp if that is given */
+    double drop_budget; /**< fraction of walks that may be dropped; 0: 1e-4 */
     imp_progress_fn progress;
     void *progress_payload;
 };
-#define IMP_RUN_INIT {sizeof(struct imp_run), 0, 0, 0, 0, 0, 0, 0}
+#define IMP_RUN_INIT                                                                     \
+    {                                                                                    \
+        sizeof(struct imp_run), 0, 0, 0, 0, 0, 0, 0                                      \
+    }
 
 /** Render the scene's integrator through a sensor.
  * @return IMP_OK; IMP_CANCELLED (*out is valid, with the passes done); IMP_E_ARG;
  *         IMP_E_PATHS; IMP_E_NOMEM. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_render(const imp_scene *scene,
-                                                  const struct imp_run *run, imp_film **out);
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_render(const imp_scene *scene, const struct imp_run *run, imp_film **out);
 
 /** One walk, vertex by vertex, as text (json 0) or JSON. Caller frees with imp_free. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_walk_describe(const imp_scene *scene,
@@ -333,7 +356,7 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_walk_describe(const imp_scene *scene,
                                                          char **text);
 IMP_API void imp_free(imp_context *context, void *memory);
 
-/* ---- Problems: parameters, targets, derivatives ----------------------------------- */
+/* ---- Problems: parameters, targets, derivatives -------------------------------- */
 
 typedef struct imp_problem imp_problem;
 
@@ -343,20 +366,23 @@ struct imp_estimate {
     int bias_order;
 };
 
-/** Nothing is active until imp_problem_activate. The scene must outlive the problem, and is
- * changed by calls that take x. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_problem_create(imp_scene *scene, imp_problem **out);
+/** Nothing is active until imp_problem_activate. The scene must outlive the problem, and
+ * is changed by calls that take x. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_problem_create(imp_scene *scene,
+                                                          imp_problem **out);
 IMP_API void imp_problem_destroy(imp_problem *problem);
 
-/** Make parameters active: a name or a glob ("*.reflectance.value"; "*" is everything that
- * has a gradient). Active parameters keep the scene's order, whatever the order of calls.
+/** Make parameters active: a name or a glob ("*.reflectance.value"; "*" is everything
+ * that has a gradient). Active parameters keep the scene's order, whatever the order of
+ * calls.
  * @return IMP_OK; IMP_E_ARG if nothing matches; IMP_E_BIAS if a parameter named without
  *         wildcards has no unbiased gradient. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_activate(imp_problem *problem,
                                                             const char *glob);
 /** Length of x: how many numbers are active. */
 IMP_API size_t imp_problem_n(const imp_problem *problem);
-/** Of active number i: its parameter, its index inside it, its bounds. Outputs may be NULL. */
+/** Of active number i: its parameter, its index inside it, its bounds. Outputs may be
+ * NULL. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_variable(const imp_problem *problem,
                                                             size_t i, size_t *param,
                                                             size_t *element, double *lo,
@@ -370,11 +396,11 @@ enum imp_loss {
     IMP_LOSS_L2 = 0,      /**< 1/2 w (I - T)^2: unbiased value and gradient */
     IMP_LOSS_RELATIVE_L2, /**< 1/2 w (I - T)^2 / (T^2 + epsilon): unbiased */
     IMP_LOSS_L1,          /**< w |I - T|: biased near I = T */
-    IMP_LOSS_LOG          /**< 1/2 w (log(I + epsilon) - log(T + epsilon))^2: bias O(1/N^2) */
+    IMP_LOSS_LOG /**< 1/2 w (log(I + epsilon) - log(T + epsilon))^2: bias O(1/N^2) */
 };
 
-/** A picture to match through one sensor. The objective is the sum over pixels and channels
- * (Stam 2020, Eq. 10), over targets, plus the regularisers. */
+/** A picture to match through one sensor. The objective is the sum over pixels and
+ * channels (Stam 2020, Eq. 10), over targets, plus the regularisers. */
 struct imp_target {
     size_t size;
     int sensor;
@@ -382,25 +408,29 @@ struct imp_target {
     const float *pixels;         /**< [height][width][channels] */
     const float *weights;        /**< [height][width], >= 0; NULL: 1 everywhere */
     enum imp_loss loss;
-    double epsilon;              /**< 0: 1e-2 */
-    double scale;                /**< factor of this target's loss; 0: 1 */
-    const float *noise_se;       /**< [height][width][channels], 1 sigma of the picture's own
-                                      noise, for covariances; NULL: estimated from residuals */
+    double epsilon;        /**< 0: 1e-2 */
+    double scale;          /**< factor of this target's loss; 0: 1 */
+    const float *noise_se; /**< [height][width][channels], 1 sigma of the picture's own
+                                noise, for covariances; NULL: estimated from residuals */
 };
-#define IMP_TARGET_INIT {sizeof(struct imp_target), 0, 0, 0, 0, 0, 0, IMP_LOSS_L2, 0, 0, 0}
-IMP_API IMP_MUST_CHECK enum imp_status imp_problem_add_target(imp_problem *problem,
-                                                              const struct imp_target *target);
+#define IMP_TARGET_INIT                                                                  \
+    {                                                                                    \
+        sizeof(struct imp_target), 0, 0, 0, 0, 0, 0, IMP_LOSS_L2, 0, 0, 0                \
+    }
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_problem_add_target(imp_problem *problem, const struct imp_target *target);
 
 /** 1/2 weight |x - x0|^2 over the active numbers that match `glob` (Tikhonov, the term
- * 1/2 eps |theta|^2 of Stam's Eq. 10); x0 is 0, or the values at this call if `from_here`. */
+ * 1/2 eps |theta|^2 of Stam's Eq. 10); x0 is 0, or the values at this call if
+ * `from_here`. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_add_tikhonov(imp_problem *problem,
                                                                 const char *glob,
-                                                                double weight, int from_here);
+                                                                double weight,
+                                                                int from_here);
 /** 1/2 weight |grad x|^2, forward differences between neighbours of textures matching
  * `glob`. @return IMP_E_ARG if none has two dimensions. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_problem_add_smoothness(imp_problem *problem,
-                                                                  const char *glob,
-                                                                  double weight);
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_problem_add_smoothness(imp_problem *problem, const char *glob, double weight);
 
 /**
  * Objective and gradient in one call, from the same walks.
@@ -416,21 +446,23 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_problem_add_smoothness(imp_problem *p
  */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_problem_objective(imp_problem *problem, const double *x, const struct imp_run *run,
-                      struct imp_estimate *objective, double *gradient, double *gradient_se);
+                      struct imp_estimate *objective, double *gradient,
+                      double *gradient_se);
 
 /** The same with NLopt's callback shape (payload: the problem). The run is the one set by
  * imp_problem_set_run; equal seeds make common random numbers. Failure gives HUGE_VAL. */
-IMP_API double imp_problem_nlopt(unsigned n, const double *x, double *gradient, void *problem);
+IMP_API double imp_problem_nlopt(unsigned n, const double *x, double *gradient,
+                                 void *problem);
 IMP_API void imp_problem_set_run(imp_problem *problem, const struct imp_run *run);
 
 /**
  * Reverse derivative: gradient = J^T seed, J = d pixel / d x, for a given adjoint image.
- * @param seed_image [height][width][channels] of run->sensor. It must come from other random
- *        numbers than `run`: an adjoint made from the same walks is correlated with J.
+ * @param seed_image [height][width][channels] of run->sensor. It must come from other
+ * random numbers than `run`: an adjoint made from the same walks is correlated with J.
  */
 IMP_API IMP_MUST_CHECK enum imp_status
-imp_problem_reverse(imp_problem *problem, const float *seed_image, const struct imp_run *run,
-                    double *gradient, double *gradient_se);
+imp_problem_reverse(imp_problem *problem, const float *seed_image,
+                    const struct imp_run *run, double *gradient, double *gradient_se);
 
 /** Forward derivative: the picture J x_dot, with standard errors. x_dot [n]. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_forward(imp_problem *problem,
@@ -438,40 +470,44 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_problem_forward(imp_problem *problem,
                                                            const struct imp_run *run,
                                                            imp_film **out);
 
-/** One picture dI/dx_i for every active number, from one set of walks: films [n], each to be
- * destroyed by the caller. n is limited to 256. primal may be NULL. */
+/** One picture dI/dx_i for every active number, from one set of walks: films [n], each to
+ * be destroyed by the caller. n is limited to 256. primal may be NULL. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_jacobian(imp_problem *problem,
                                                             const struct imp_run *run,
                                                             imp_film **primal,
                                                             imp_film **films);
 
-/* ---- Fitting --------------------------------------------------------------------- */
+/* ---- Fitting ------------------------------------------------------------------- */
 
 enum imp_optimizer {
-    IMP_ADAM = 0,        /**< stochastic, fresh walks every iteration */
-    IMP_LM,              /**< Gauss-Newton/Levenberg-Marquardt, unbiased J^T J; n <= 256 */
-    IMP_LBFGS,           /**< NLopt, common random numbers */
-    IMP_MMA, IMP_SLSQP   /**< NLopt, bounded, common random numbers */
+    IMP_ADAM = 0, /**< stochastic, fresh walks every iteration */
+    IMP_LM,       /**< Gauss-Newton/Levenberg-Marquardt, unbiased J^T J; n <= 256 */
+    IMP_LBFGS,    /**< NLopt, common random numbers */
+    IMP_MMA,
+    IMP_SLSQP /**< NLopt, bounded, common random numbers */
 };
 
 struct imp_fit_options {
     size_t size;
     enum imp_optimizer optimizer;
-    int max_iterations;      /**< 0: 200 (Adam), 30 (others) */
-    double learning_rate;    /**< Adam, as a fraction of each variable's scale; 0: 0.05 */
-    double tolerance;        /**< stop when steps stay below this, relative; 0: 1e-4 */
-    int intervals;           /**< estimate covariance and 95 % intervals at the end */
-    const char *checkpoint;  /**< file, rewritten every few seconds; NULL: none */
-    int resume;              /**< start from the checkpoint if it is there */
+    int max_iterations;     /**< 0: 200 (Adam), 30 (others) */
+    double learning_rate;   /**< Adam, as a fraction of each variable's scale; 0: 0.05 */
+    double tolerance;       /**< stop when steps stay below this, relative; 0: 1e-4 */
+    int intervals;          /**< estimate covariance and 95 % intervals at the end */
+    const char *checkpoint; /**< file, rewritten every few seconds; NULL: none */
+    int resume;             /**< start from the checkpoint if it is there */
 };
-#define IMP_FIT_OPTIONS_INIT {sizeof(struct imp_fit_options), IMP_ADAM, 0, 0, 0, 0, 0, 0}
+#define IMP_FIT_OPTIONS_INIT                                                             \
+    {                                                                                    \
+        sizeof(struct imp_fit_options), IMP_ADAM, 0, 0, 0, 0, 0, 0                       \
+    }
 
 struct imp_fit_variable {
     double start, value;
-    double se;               /**< one standard error: measurement and Monte Carlo together */
-    double lo95, hi95;       /**< 95 % interval; NaN if the picture does not determine it */
-    int at_bound;            /**< -1: at the lower bound, 1: at the upper */
-    int determined;          /**< 0: the picture does not determine it */
+    double se;         /**< one standard error: measurement and Monte Carlo together */
+    double lo95, hi95; /**< 95 % interval; NaN if the picture does not determine it */
+    int at_bound;      /**< -1: at the lower bound, 1: at the upper */
+    int determined;    /**< 0: the picture does not determine it */
 };
 
 struct imp_fit_result {
@@ -479,74 +515,79 @@ struct imp_fit_result {
     int iterations;
     struct imp_estimate objective;
     size_t n_history;
-    const double *history;      /**< [n_history] objective of every iteration */
+    const double *history; /**< [n_history] objective of every iteration */
     const double *history_se;
     size_t n;
     const struct imp_fit_variable *variables; /**< [n] */
-    double condition;           /**< of the scaled J^T J; 0: not computed */
-    const char *reason;         /**< why it stopped */
-    const char *warning;        /**< e.g. what is not determined; NULL: none */
+    double condition;                         /**< of the scaled J^T J; 0: not computed */
+    const char *reason;                       /**< why it stopped */
+    const char *warning; /**< e.g. what is not determined; NULL: none */
 };
 
 /** Fit the active parameters to the targets; the scene ends at the best estimate.
- * @return IMP_OK; IMP_CANCELLED (state reached is set, the checkpoint is written); ... 
+ * @return IMP_OK; IMP_CANCELLED (state reached is set, the checkpoint is written); ...
  * The result belongs to the problem and lives until its next fit. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_fit(imp_problem *problem,
                                                const struct imp_fit_options *options,
                                                const struct imp_run *run,
                                                const struct imp_fit_result **result);
 
-/* ---- Checking -------------------------------------------------------------------- */
+/* ---- Checking ------------------------------------------------------------------ */
 
 /** One line of a gradient check: a method, a parameter, two numbers that must agree. */
 struct imp_check_row {
     const char *method; /**< "frozen", "fresh", "dot", "euler" */
     const char *param;
-    double step;        /**< of a difference; 0: none */
+    double step;                 /**< of a difference; 0: none */
     double value, reference, se; /**< se of the difference; 0: deterministic */
-    double error;       /**< relative error, or |z| where se > 0 */
-    double limit;       /**< of error; 0: a row for information (a step that is not the best) */
+    double error;                /**< relative error, or |z| where se > 0 */
+    double limit; /**< of error; 0: a row for information (a step that is not the best) */
     int ok;
 };
 struct imp_check_options {
     size_t size;
-    int paths;          /**< frozen walks looked at; 0: 1000 */
-    int fresh_spp;      /**< samples per pixel of fresh-seed differences; 0: the run's */
+    int paths;     /**< frozen walks looked at; 0: 1000 */
+    int fresh_spp; /**< samples per pixel of fresh-seed differences; 0: the run's */
 };
-#define IMP_CHECK_OPTIONS_INIT {sizeof(struct imp_check_options), 0, 0}
-/** Check the gradients of all active parameters (docs: gradient checks). Rows belong to the
- * problem until its next check. @return IMP_OK also when rows fail: look at `ok`. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_check(imp_problem *problem,
-                                                 const struct imp_check_options *options,
-                                                 const struct imp_run *run,
-                                                 const struct imp_check_row **rows,
-                                                 size_t *n_rows);
+#define IMP_CHECK_OPTIONS_INIT                                                           \
+    {                                                                                    \
+        sizeof(struct imp_check_options), 0, 0                                           \
+    }
+/** Check the gradients of all active parameters (docs: gradient checks). Rows belong to
+ * the problem until its next check. @return IMP_OK also when rows fail: look at `ok`. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_check(imp_problem *problem, const struct imp_check_options *options,
+          const struct imp_run *run, const struct imp_check_row **rows, size_t *n_rows);
 
-/* ---- Comparing pictures ------------------------------------------------------------ */
+/* ---- Comparing pictures -------------------------------------------------------- */
 
 struct imp_compare_result {
     size_t size;
     double rmse, relative_rmse, max_abs;
     double mean_a, mean_b;
-    double p_fail_fraction;  /**< pixels whose z-test fails at 1 % over the whole picture */
-    double mean_z;           /**< |z| of the picture's mean, worst channel */
-    double over2;            /**< fraction of pixels with |z| > 2; 0.0455 expected */
+    double
+        p_fail_fraction; /**< pixels whose z-test fails at 1 % over the whole picture */
+    double mean_z;       /**< |z| of the picture's mean, worst channel */
+    double over2;        /**< fraction of pixels with |z| > 2; 0.0455 expected */
     int has_z, agree;
 };
 struct imp_compare_options {
     size_t size;
-    const imp_film *variance; /**< per-sample variance of `reference`; NULL: use the films' se */
+    const imp_film
+        *variance; /**< per-sample variance of `reference`; NULL: use the films' se */
     double n_test, n_reference; /**< samples per pixel; 0: unknown / exact */
-    double floor;             /**< of the variance; 0: 1e-4 * squared mean of the channel */
-    int xyz;                  /**< compare X, Y, Z: pictures and variance are made to them from
-                                   R, G, B (or Y alone). Mitsuba's references keep the variance
-                                   of X, Y, Z so, as if it were a colour */
+    double floor; /**< of the variance; 0: 1e-4 * squared mean of the channel */
+    int xyz;      /**< compare X, Y, Z: pictures and variance are made to them from
+                       R, G, B (or Y alone). Mitsuba's references keep the variance
+                       of X, Y, Z so, as if it were a colour */
 };
-#define IMP_COMPARE_OPTIONS_INIT {sizeof(struct imp_compare_options), 0, 0, 0, 0, 0}
-IMP_API IMP_MUST_CHECK enum imp_status imp_compare(imp_context *context, imp_film *test,
-                                                   imp_film *reference,
-                                                   const struct imp_compare_options *options,
-                                                   struct imp_compare_result *result);
+#define IMP_COMPARE_OPTIONS_INIT                                                         \
+    {                                                                                    \
+        sizeof(struct imp_compare_options), 0, 0, 0, 0, 0                                \
+    }
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_compare(imp_context *context, imp_film *test, imp_film *reference,
+            const struct imp_compare_options *options, struct imp_compare_result *result);
 
 #ifdef __cplusplus
 }

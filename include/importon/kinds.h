@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * kinds.h: what the author of a new kind needs. A kind is a const table of functions that
- * agree with each other: a material's value, sampling, density and derivative stand side by
- * side in one file, and one line in the concept's table (src/kind/<concept>/) registers it.
- * Tests visit every kind through these tables: a new kind is tested by existing.
+ * agree with each other: a material's value, sampling, density and derivative stand side
+ * by side in one file, and one line in the concept's table (src/kind/<concept>/)
+ * registers it. Tests visit every kind through these tables: a new kind is tested by
+ * existing.
  *
  * Inputs. A kind declares named inputs (colours, numbers, textures). Before any call the
  * engine looks them up at the point in question, so kinds are pure functions of `in`, an
@@ -12,8 +13,9 @@
  * value in all lanes, read it from lane 0.
  *
  * Lane rule. Lane c of every value depends on lane c of each input only. The Jacobian of
- * eval is therefore diagonal in the lanes, and one function (`eval_d`: lane-wise derivatives
- * with respect to each input) serves the reverse sweep, the forward tangent and the tests.
+ * eval is therefore diagonal in the lanes, and one function (`eval_d`: lane-wise
+ * derivatives with respect to each input) serves the reverse sweep, the forward tangent
+ * and the tests.
  *
  * Directions. wo points to the sensor side, wi to the light side, both away from the
  * surface, in the local shading frame whose z is the shading normal (CONVENTIONS.md).
@@ -32,11 +34,11 @@ typedef double imp_v3 __attribute__((vector_size(32)));
 enum imp_role { IMP_REFLECTANCE, IMP_UNBOUNDED, IMP_EMISSION };
 
 enum imp_input_flags {
-    IMP_INPUT_SCALAR = 1,    /* one number: textures are read as scalars */
-    IMP_INPUT_OPTIONAL = 2,  /* absent: the fallback, and no parameter */
+    IMP_INPUT_SCALAR = 1,   /* one number: textures are read as scalars */
+    IMP_INPUT_OPTIONAL = 2, /* absent: the fallback, and no parameter */
     IMP_INPUT_REQUIRED = 4,
-    IMP_INPUT_FIXED = 8,     /* no gradient: changing it bends or moves things */
-    IMP_INPUT_EDGES = 16     /* differentiable, and may move discontinuities */
+    IMP_INPUT_FIXED = 8, /* no gradient: changing it bends or moves things */
+    IMP_INPUT_EDGES = 16 /* differentiable, and may move discontinuities */
 };
 
 struct imp_input_desc { /* the list ends with {0} */
@@ -44,7 +46,7 @@ struct imp_input_desc { /* the list ends with {0} */
     enum imp_role role;
     unsigned flags;
     double fallback;
-    double lo, hi;      /* bounds of every number; both 0: [0, inf) */
+    double lo, hi; /* bounds of every number; both 0: [0, inf) */
     const char *unit;
 };
 
@@ -54,21 +56,21 @@ struct imp_input {
     const struct imp_texture *texture; /* NULL: constant */
     imp_spec value;                    /* the constant, in all used lanes */
     int param;                         /* index of its parameter, -1: none */
-    bool scalar;                       /* declared IMP_INPUT_SCALAR: textures give one number */
-    int count;                         /* numbers of a constant: 3, or 1 (in all lanes) */
+    bool scalar; /* declared IMP_INPUT_SCALAR: textures give one number */
+    int count;   /* numbers of a constant: 3, or 1 (in all lanes) */
 };
 
-struct imp_build;   /* what build functions get: src/kind/build.h */
+struct imp_build; /* what build functions get: src/kind/build.h */
 
-/* Receives pieces of gradient. `param` is a parameter's index, `element` the number inside
- * it; with channels == 3 lane c belongs to element + c, with channels == 1 all lanes belong
- * to the one number. */
+/* Receives pieces of gradient. `param` is a parameter's index, `element` the number
+ * inside it; with channels == 3 lane c belongs to element + c, with channels == 1 all
+ * lanes belong to the one number. */
 struct imp_sink {
     void (*add)(struct imp_sink *sink, int param, size_t element, int channels,
                 const imp_spec *bar);
 };
 
-/* ---- BSDF ------------------------------------------------------------------------- */
+/* ---- BSDF ---------------------------------------------------------------------- */
 
 #define IMP_SMOOTH (-1) /* imp_dirs.lobe: all lobes that have a density */
 
@@ -78,18 +80,18 @@ struct imp_dirs {
 };
 
 struct imp_bsdf_sample {
-    imp_spec f;   /* as eval gives it for the sampled direction */
-    double pdf;   /* per steradian; of a delta lobe: the probability of choosing it */
-    double eta;   /* index ratio crossed, light side over sensor side: 1 for reflection */
+    imp_spec f; /* as eval gives it for the sampled direction */
+    double pdf; /* per steradian; of a delta lobe: the probability of choosing it */
+    double eta; /* index ratio crossed, light side over sensor side: 1 for reflection */
 };
 
 enum imp_bsdf_flags {
-    IMP_BSDF_SMOOTH = 1,    /* has lobes with a density */
-    IMP_BSDF_DELTA = 2,     /* has delta lobes */
+    IMP_BSDF_SMOOTH = 1, /* has lobes with a density */
+    IMP_BSDF_DELTA = 2,  /* has delta lobes */
     IMP_BSDF_TRANSMIT = 4,
-    IMP_BSDF_EMIT = 8,      /* has emit: Stam's ambient terms */
-    IMP_BSDF_JUMP = 16      /* f/pdf of sample jumps at the horizon: sample_d, which has no
-                               boundary term, is not the whole derivative */
+    IMP_BSDF_EMIT = 8, /* has emit: Stam's ambient terms */
+    IMP_BSDF_JUMP = 16 /* f/pdf of sample jumps at the horizon: sample_d, which has no
+                          boundary term, is not the whole derivative */
 };
 
 struct imp_bsdf {
@@ -100,9 +102,9 @@ struct imp_bsdf {
     const struct imp_input **input; /* [n_in] */
     int n_child;
     const struct imp_bsdf *child[2];
-    int child_in[2];                /* where the child's inputs start in `in` */
-    int index;                      /* in the scene; -1 for the default material */
-    double absorb;                  /* Stam's absorption probability; 0: none given */
+    int child_in[2]; /* where the child's inputs start in `in` */
+    int index;       /* in the scene; -1 for the default material */
+    double absorb;   /* Stam's absorption probability; 0: none given */
     const char *name;
 };
 
@@ -113,33 +115,37 @@ struct imp_bsdf_ops {
     const struct imp_input_desc *inputs;
     int min_children, max_children;
 
-    /* Read further properties, set self and bsdf->flags. NULL: flags = IMP_BSDF_SMOOTH. */
-    enum imp_status (*build)(const struct imp_build *build, void *self, struct imp_bsdf *bsdf);
+    /* Read further properties, set self and bsdf->flags. NULL: flags = IMP_BSDF_SMOOTH.
+     */
+    enum imp_status (*build)(const struct imp_build *build, void *self,
+                             struct imp_bsdf *bsdf);
 
     /* Draw d->wi and d->lobe for d->wo. u[0] chooses the lobe, u[1], u[2] the direction.
      * False: no sample (structurally zero: nothing may arrive from there, whatever the
      * inputs). The density must not vanish where the value or a derivative does not. */
     bool (*sample)(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
                    struct imp_dirs *d, struct imp_bsdf_sample *s);
-    /* The BSDF times |cos(theta_i)|, in 1/sr, for d->lobe == IMP_SMOOTH; for a delta lobe its
-     * coefficient. Radiance passing a refraction carries (n_wo/n_wi)^2. */
+    /* The BSDF times |cos(theta_i)|, in 1/sr, for d->lobe == IMP_SMOOTH; for a delta lobe
+     * its coefficient. Radiance passing a refraction carries (n_wo/n_wi)^2. */
     void (*eval)(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
                  imp_spec *f);
     /* Density of sample, per steradian, all smooth lobes together; for a delta lobe the
      * probability of choosing it. 0 exactly where the value is structurally zero. */
     double (*pdf)(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d);
-    /* df[j] = lane-wise derivative of eval with respect to input j, for all n_in; sets all. */
+    /* df[j] = lane-wise derivative of eval with respect to input j, for all n_in; sets
+     * all. */
     void (*eval_d)(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
                    imp_spec *df);
 
     /* Radiance emitted along wo, and its lane-wise derivatives; both or neither. */
-    void (*emit)(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo, imp_spec *e);
+    void (*emit)(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
+                 imp_spec *e);
     void (*emit_d)(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
                    imp_spec *de);
 
     /* Attached derivative of sampling with respect to scalar input `j`, for the direction
-     * that `sample` made from u: dweight is d(f/pdf)/d in[j], dwi the motion of wi (both at
-     * fixed u). Returns false where not offered; NULL: nowhere (gradients.md 4). */
+     * that `sample` made from u: dweight is d(f/pdf)/d in[j], dwi the motion of wi (both
+     * at fixed u). Returns false where not offered; NULL: nowhere (gradients.md 4). */
     bool (*sample_d)(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
                      const struct imp_dirs *d, int j, imp_spec *dweight, imp_v3 *dwi);
 
@@ -147,17 +153,17 @@ struct imp_bsdf_ops {
      * NULL. */
     enum imp_status (*prepare)(const struct imp_build *build);
 
-    /* What the aov `albedo` shows: the reflectance of a diffuse surface or base colour, from
-     * either side. NULL: pi f for light along the normal. */
+    /* What the aov `albedo` shows: the reflectance of a diffuse surface or base colour,
+     * from either side. NULL: pi f for light along the normal. */
     void (*albedo)(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
                    imp_spec *albedo);
 };
 
-/* ---- Texture ---------------------------------------------------------------------- */
+/* ---- Texture ------------------------------------------------------------------- */
 
 struct imp_texcoord {
     double uv[2];
-    imp_v3 p;      /* world position */
+    imp_v3 p; /* world position */
 };
 
 struct imp_texture {
@@ -165,7 +171,7 @@ struct imp_texture {
     void *self;
     int n_in;
     const struct imp_input **input;
-    int param;         /* of its bulk data; -1: none */
+    int param; /* of its bulk data; -1: none */
     const char *name;
 };
 
@@ -174,65 +180,68 @@ struct imp_texture_ops {
     const char *name;
     size_t object_size;
     const struct imp_input_desc *inputs;
-    enum imp_status (*build)(const struct imp_build *build, void *self, struct imp_texture *t);
+    enum imp_status (*build)(const struct imp_build *build, void *self,
+                             struct imp_texture *t);
     /* The value at uv; `scalar`: one number in all lanes. */
     void (*eval)(const struct imp_texture *t, const struct imp_texcoord *at, bool scalar,
                  imp_spec *value);
     /* Transpose of the derivative of eval with respect to its data and inputs. */
-    void (*scatter)(const struct imp_texture *t, const struct imp_texcoord *at, bool scalar,
-                    const imp_spec *bar, struct imp_sink *sink);
-    /* The derivative applied: direction x_dot is read through `dot` (element of param). */
-    void (*tangent)(const struct imp_texture *t, const struct imp_texcoord *at, bool scalar,
+    void (*scatter)(const struct imp_texture *t, const struct imp_texcoord *at,
+                    bool scalar, const imp_spec *bar, struct imp_sink *sink);
+    /* The derivative applied: direction x_dot is read through `dot` (element of param).
+     */
+    void (*tangent)(const struct imp_texture *t, const struct imp_texcoord *at,
+                    bool scalar,
                     double (*dot)(const void *x_dot, int param, size_t element),
                     const void *x_dot, imp_spec *value_dot);
 };
 
-/* ---- Shape ------------------------------------------------------------------------ */
+/* ---- Shape --------------------------------------------------------------------- */
 
 struct imp_hit {
     int shape, prim;
     double t;
-    double u, v;  /* of triangles: barycentric weights of the second and third vertex;
-                     of analytic shapes: what its `intersect` wrote */
+    double u, v; /* of triangles: barycentric weights of the second and third vertex;
+                    of analytic shapes: what its `intersect` wrote */
 };
 
 struct imp_surface {
-    imp_v3 p, ng;       /* position and geometric normal (unit), world */
-    imp_v3 s, t, n;     /* shading frame, world */
+    imp_v3 p, ng;   /* position and geometric normal (unit), world */
+    imp_v3 s, t, n; /* shading frame, world */
     imp_v3 dp_du, dp_dv;
     double uv[2];
 };
 
 /* A point on a light as seen from `ref`. */
 struct imp_light_sample {
-    imp_v3 wi;          /* unit, from ref towards the light */
-    double dist;        /* INFINITY for the environment */
-    double pdf;         /* per steradian at ref; 1 for delta lights */
+    imp_v3 wi;   /* unit, from ref towards the light */
+    double dist; /* INFINITY for the environment */
+    double pdf;  /* per steradian at ref; 1 for delta lights */
     double uv[2];
-    double cos_light;   /* signed cosine at the light's shading normal; 1 if it has none */
-    imp_v3 p;           /* the point, world (not set for the environment) */
-    imp_v3 ng;          /* its geometric normal */
+    double cos_light; /* signed cosine at the light's shading normal; 1 if it has none */
+    imp_v3 p;         /* the point, world (not set for the environment) */
+    imp_v3 ng;        /* its geometric normal */
 };
 
 enum imp_geometry { IMP_TRIANGLES, IMP_ANALYTIC };
 
 struct imp_triangles { /* world space */
     size_t n_vertices, n_triangles;
-    const float *positions;   /* [3 n_vertices], room for 16 bytes after the end */
-    const uint32_t *indices;  /* [3 n_triangles] */
+    const float *positions;  /* [3 n_vertices], room for 16 bytes after the end */
+    const uint32_t *indices; /* [3 n_triangles] */
 };
 
 struct imp_shape {
     const struct imp_shape_ops *ops;
     void *self;
     int index;
-    int bsdf;            /* index; -1: the scene's default, -2: black (emitters' default) */
-    int emitter;         /* index or -1 */
+    int bsdf;    /* index; -1: the scene's default, -2: black (emitters' default) */
+    int emitter; /* index or -1 */
     bool flip_normals;
-    double area;         /* world units; build sets it */
+    double area; /* world units; build sets it */
     enum imp_geometry geometry;
     struct imp_triangles triangles; /* if geometry is IMP_TRIANGLES */
-    imp_v3 lo, hi;       /* bounds; build sets them */
+    imp_v3 lo, hi;                  /* bounds; build sets them */
     const char *name;
 };
 
@@ -240,10 +249,12 @@ struct imp_shape_ops {
     size_t size;
     const char *name;
     size_t object_size;
-    enum imp_status (*build)(const struct imp_build *build, void *self, struct imp_shape *s);
-    /* Nearest hit with tmin < t < tmax, in double; IMP_ANALYTIC only. Sets t, u, v, prim. */
-    bool (*intersect)(const struct imp_shape *s, const imp_v3 *o, const imp_v3 *d, double tmin,
-                      double tmax, struct imp_hit *hit);
+    enum imp_status (*build)(const struct imp_build *build, void *self,
+                             struct imp_shape *s);
+    /* Nearest hit with tmin < t < tmax, in double; IMP_ANALYTIC only. Sets t, u, v, prim.
+     */
+    bool (*intersect)(const struct imp_shape *s, const imp_v3 *o, const imp_v3 *d,
+                      double tmin, double tmax, struct imp_hit *hit);
     /* The surface at a hit of the ray (o, d), recomputed in double. */
     void (*surface)(const struct imp_shape *s, const struct imp_hit *hit, const imp_v3 *o,
                     const imp_v3 *d, struct imp_surface *out);
@@ -255,10 +266,12 @@ struct imp_shape_ops {
                          const struct imp_hit *hit, const struct imp_surface *at);
 };
 
-/* ---- Emitter ---------------------------------------------------------------------- */
+/* ---- Emitter ------------------------------------------------------------------- */
 
 enum imp_emitter_flags {
-    IMP_EMITTER_DELTA = 1, IMP_EMITTER_AREA = 2, IMP_EMITTER_ENVIRONMENT = 4
+    IMP_EMITTER_DELTA = 1,
+    IMP_EMITTER_AREA = 2,
+    IMP_EMITTER_ENVIRONMENT = 4
 };
 
 struct imp_emission { /* where and whither light leaves */
@@ -273,9 +286,9 @@ struct imp_emitter {
     void *self;
     int n_in;
     const struct imp_input **input;
-    const struct imp_shape *shape;  /* of area lights */
+    const struct imp_shape *shape; /* of area lights */
     int index;
-    double weight;                  /* sampling_weight */
+    double weight; /* sampling_weight */
     const char *name;
 };
 
@@ -285,10 +298,11 @@ struct imp_emitter_ops {
     size_t object_size;
     unsigned flags;
     const struct imp_input_desc *inputs;
-    enum imp_status (*build)(const struct imp_build *build, void *self, struct imp_emitter *e);
+    enum imp_status (*build)(const struct imp_build *build, void *self,
+                             struct imp_emitter *e);
     /* Radiance arriving at the receiver (delta lights: irradiance perpendicular to d). */
-    void (*eval)(const struct imp_emitter *e, const imp_spec *in, const struct imp_emission *x,
-                 imp_spec *le);
+    void (*eval)(const struct imp_emitter *e, const imp_spec *in,
+                 const struct imp_emission *x, imp_spec *le);
     void (*eval_d)(const struct imp_emitter *e, const imp_spec *in,
                    const struct imp_emission *x, imp_spec *dle);
     bool (*sample)(const struct imp_emitter *e, const imp_v3 *ref, const double u[2],
@@ -299,7 +313,7 @@ struct imp_emitter_ops {
                   const struct imp_hit *hit, const struct imp_surface *at);
 };
 
-/* ---- Sensor and filter ------------------------------------------------------------- */
+/* ---- Sensor and filter --------------------------------------------------------- */
 
 struct imp_sensor_ray {
     imp_v3 o, d;          /* d unit */
@@ -315,20 +329,26 @@ struct imp_filter_ops {
     size_t size;
     const char *name;
     size_t object_size;
-    enum imp_status (*build)(const struct imp_build *build, void *self, struct imp_filter *f);
-    double (*eval)(const struct imp_filter *f, double x); /* one dimension, |x| < radius */
+    enum imp_status (*build)(const struct imp_build *build, void *self,
+                             struct imp_filter *f);
+    double (*eval)(const struct imp_filter *f,
+                   double x); /* one dimension, |x| < radius */
 };
 
 enum imp_pixel_format { /* channels of the written picture */
-    IMP_PIXEL_LUMINANCE, IMP_PIXEL_LUMINANCE_ALPHA, IMP_PIXEL_RGB, IMP_PIXEL_RGBA,
-    IMP_PIXEL_XYZ, IMP_PIXEL_XYZA
+                        IMP_PIXEL_LUMINANCE,
+                        IMP_PIXEL_LUMINANCE_ALPHA,
+                        IMP_PIXEL_RGB,
+                        IMP_PIXEL_RGBA,
+                        IMP_PIXEL_XYZ,
+                        IMP_PIXEL_XYZA
 };
 struct imp_film_desc {
     int width, height;                  /* the full film */
     int crop_x, crop_y, crop_w, crop_h; /* the picture */
     bool sample_border, half;
     enum imp_pixel_format pixel_format;
-    const char *file_format;            /* "openexr", "rgbe", "pfm" */
+    const char *file_format; /* "openexr", "rgbe", "pfm" */
     struct imp_filter filter;
 };
 
@@ -343,9 +363,10 @@ struct imp_sensor_ops {
     size_t size;
     const char *name;
     size_t object_size;
-    enum imp_status (*build)(const struct imp_build *build, void *self, struct imp_sensor *s);
-    /* Ray through film position (px, py), pixels from the top-left corner of the full film;
-     * lens: two uniform numbers. */
+    enum imp_status (*build)(const struct imp_build *build, void *self,
+                             struct imp_sensor *s);
+    /* Ray through film position (px, py), pixels from the top-left corner of the full
+     * film; lens: two uniform numbers. */
     void (*ray)(const struct imp_sensor *s, double px, double py, const double lens[2],
                 struct imp_sensor_ray *out);
 };

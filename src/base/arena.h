@@ -12,9 +12,9 @@
 struct imp_arena {
     imp_context *ctx;
     struct imp__arena_block *first, *current;
-    size_t used;       /* in current */
-    size_t total;      /* bytes of all blocks */
-    bool failed;       /* something was asked for that there was no memory for */
+    size_t used;  /* in current */
+    size_t total; /* bytes of all blocks */
+    bool failed;  /* something was asked for that there was no memory for */
 };
 
 struct imp_arena_mark {

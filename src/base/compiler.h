@@ -4,14 +4,24 @@
 #ifndef IMP_BASE_COMPILER_H
 #define IMP_BASE_COMPILER_H
 
-#define imp_likely(x) __builtin_expect(!!(x), 1)
-#define imp_unlikely(x) __builtin_expect(!!(x), 0)
+#define imp_likely(x)    __builtin_expect(!!(x), 1)
+#define imp_unlikely(x)  __builtin_expect(!!(x), 0)
 #define IMP_PRINTF(f, a) __attribute__((format(printf, f, a)))
-#define IMP_HIDDEN __attribute__((visibility("hidden")))
+#define IMP_HIDDEN       __attribute__((visibility("hidden")))
 
-#define imp_min(a, b) ({ __typeof__(a) a_ = (a); __typeof__(b) b_ = (b); a_ < b_ ? a_ : b_; })
-#define imp_max(a, b) ({ __typeof__(a) a_ = (a); __typeof__(b) b_ = (b); a_ > b_ ? a_ : b_; })
+#define imp_min(a, b)                                                                    \
+    ({                                                                                   \
+        __typeof__(a) a_ = (a);                                                          \
+        __typeof__(b) b_ = (b);                                                          \
+        a_ < b_ ? a_ : b_;                                                               \
+    })
+#define imp_max(a, b)                                                                    \
+    ({                                                                                   \
+        __typeof__(a) a_ = (a);                                                          \
+        __typeof__(b) b_ = (b);                                                          \
+        a_ > b_ ? a_ : b_;                                                               \
+    })
 #define imp_clamp(x, lo, hi) imp_max(imp_min((x), (hi)), (lo))
-#define imp_count(array) (sizeof(array) / sizeof((array)[0]))
+#define imp_count(array)     (sizeof(array) / sizeof((array)[0]))
 
 #endif

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Context, errors and memory. Error texts are kept per thread through a pthread key of the
- * context, so the library has no global state. */
+ * Context, errors and memory. Error texts are kept per thread through a pthread key of
+ * the context, so the library has no global state. */
 #include "context.h"
+#include "pool.h"
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-#include "pool.h"
 
 #define ERROR_LENGTH 2048
 
@@ -17,8 +17,8 @@ struct imp__error_text {
     char text[ERROR_LENGTH];
 };
 
-/* More than the machine has is refused here: an overcommitting kernel would grant it, and end
- * the process when it is touched. */
+/* More than the machine has is refused here: an overcommitting kernel would grant it, and
+ * end the process when it is touched. */
 static bool fits_machine(size_t bytes)
 {
     if (bytes < (size_t)1 << 30) return true;
@@ -40,16 +40,19 @@ static void default_release(void *memory, void *payload)
 
 const char *imp_status_text(enum imp_status status)
 {
-#define STATUS_CASE(name, value, text)                                                     \
+#define STATUS_CASE(name, value, text)                                                   \
     case name: return text;
-    switch (status) { IMP_STATUS_LIST(STATUS_CASE) }
+    switch (status) {
+        IMP_STATUS_LIST(STATUS_CASE)
+    }
 #undef STATUS_CASE
     return "unknown status";
 }
 
 const char *imp_version(void) { return IMP_VERSION_STRING; }
 
-enum imp_status imp_context_create(const struct imp_context_options *options, imp_context **out)
+enum imp_status imp_context_create(const struct imp_context_options *options,
+                                   imp_context **out)
 {
     const struct imp_context_options none = IMP_CONTEXT_OPTIONS_INIT;
     const struct imp_context_options *o = options ? options : &none;
@@ -121,7 +124,8 @@ static struct imp__error_text *error_text(imp_context *ctx)
     return e;
 }
 
-enum imp_status imp__error(imp_context *ctx, enum imp_status status, const char *format, ...)
+enum imp_status imp__error(imp_context *ctx, enum imp_status status, const char *format,
+                           ...)
 {
     struct imp__error_text *e = error_text(ctx);
     if (!e) return status;

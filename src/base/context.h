@@ -1,19 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The context: allocator hooks, error messages, log. The rest of the library reports a
- * failure with imp__error, which records the message for the calling thread and returns the
- * status, so that a failing line reads
+ * failure with imp__error, which records the message for the calling thread and returns
+ * the status, so that a failing line reads
  *
  *     IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: cannot open", path));
  */
 #ifndef IMP_BASE_CONTEXT_H
 #define IMP_BASE_CONTEXT_H
 
+#include "compiler.h"
 #include <importon/importon.h>
 #include <pthread.h>
 #include <stdarg.h>
 #include <stdbool.h>
-#include "compiler.h"
 
 struct imp_pool;
 
@@ -22,24 +22,24 @@ struct imp_context {
     void (*log)(enum imp_log_level, const char *, void *);
     void *log_payload;
     int threads;
-    pthread_key_t error_key;   /* struct error_text * of each thread */
-    pthread_mutex_t lock;      /* guards errors and pool creation */
+    pthread_key_t error_key;        /* struct error_text * of each thread */
+    pthread_mutex_t lock;           /* guards errors and pool creation */
     struct imp__error_text *errors; /* list of all threads' texts, freed at the end */
-    struct imp_pool *pool;     /* made on first use */
-    void *device;              /* Embree's device, owned by scene/intersect.c */
+    struct imp_pool *pool;          /* made on first use */
+    void *device;                   /* Embree's device, owned by scene/intersect.c */
     void (*device_release)(void *);
 };
 
 /* Needs a local `enum imp_status st` and a label `out`. */
-#define IMP_TRY(call)                                                                      \
-    do {                                                                                   \
-        if ((st = (call)) != IMP_OK) goto out;                                             \
+#define IMP_TRY(call)                                                                    \
+    do {                                                                                 \
+        if ((st = (call)) != IMP_OK) goto out;                                           \
     } while (0)
 
-/* Record the message for this thread; returns `status`. Never fails: out of memory leaves a
- * fixed text. */
-enum imp_status imp__error(imp_context *ctx, enum imp_status status, const char *format, ...)
-    IMP_PRINTF(3, 4);
+/* Record the message for this thread; returns `status`. Never fails: out of memory leaves
+ * a fixed text. */
+enum imp_status imp__error(imp_context *ctx, enum imp_status status, const char *format,
+                           ...) IMP_PRINTF(3, 4);
 /* Put "prefix: " before the message that is there. */
 enum imp_status imp__error_prefix(imp_context *ctx, enum imp_status status,
                                   const char *format, ...) IMP_PRINTF(3, 4);
@@ -48,8 +48,8 @@ void imp__warn(imp_context *ctx, const char *format, ...) IMP_PRINTF(2, 3);
 /* 64-byte aligned; NULL if out of memory or n*size overflows. Zeroed. */
 void *imp__alloc(imp_context *ctx, size_t n, size_t size);
 void imp__release(imp_context *ctx, void *memory);
-/* Grow an array of `old_n` elements to at least `n` (doubling); keeps the contents, new ones
- * are zero. On failure returns NULL and the old array stays. */
+/* Grow an array of `old_n` elements to at least `n` (doubling); keeps the contents, new
+ * ones are zero. On failure returns NULL and the old array stays. */
 void *imp__grow(imp_context *ctx, void *array, size_t *capacity, size_t n, size_t size);
 char *imp__strdup(imp_context *ctx, const char *text);
 

@@ -55,8 +55,7 @@ enum imp_status imp__file_read(imp_context *ctx, const char *path, size_t limit,
     if (fstat(fd, &info) != 0) IMP_TRY(io_error(ctx, path, "cannot read", errno));
     if (S_ISDIR(info.st_mode)) IMP_TRY(io_error(ctx, path, "cannot read", EISDIR));
     size_t room = 1 << 16; /* pipes say 0 */
-    if (!S_ISREG(info.st_mode))
-        limit = imp_min(limit, ENDLESS_MAX);
+    if (!S_ISREG(info.st_mode)) limit = imp_min(limit, ENDLESS_MAX);
     else {
         if ((uint64_t)info.st_size > limit)
             IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: longer than %zu bytes", path, limit));
@@ -69,8 +68,7 @@ enum imp_status imp__file_read(imp_context *ctx, const char *path, size_t limit,
             if (!b.data) { /* exactly, not doubled */
                 grown = imp__alloc(ctx, room, 1);
                 b.capacity = room;
-            } else
-                grown = imp__grow(ctx, b.data, &b.capacity, b.size + room, 1);
+            } else grown = imp__grow(ctx, b.data, &b.capacity, b.size + room, 1);
             if (!grown)
                 IMP_TRY(
                     imp__error(ctx, IMP_E_NOMEM, "%s: no memory for its contents", path));

@@ -7,9 +7,9 @@
 
 #include "context.h"
 
-#define IMP_FILM_SIDE_MAX (1 << 20) /* pixels along one side */
+#define IMP_FILM_SIDE_MAX     (1 << 20) /* pixels along one side */
 #define IMP_FILM_CHANNELS_MAX 1024
-#define IMP_FILM_VALUES_MAX ((size_t)1 << 32)
+#define IMP_FILM_VALUES_MAX   ((size_t)1 << 32)
 
 struct imp_film {
     imp_context *ctx;

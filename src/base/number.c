@@ -71,12 +71,9 @@ bool imp__number(const char **s, const char *end, double *out)
     if (!any) {
         p = *s + (*s < end && (**s == '+' || **s == '-'));
         double value;
-        if (word(&p, end, "infinity", 8) || word(&p, end, "inf", 3))
-            value = INFINITY;
-        else if (word(&p, end, "nan", 3))
-            value = NAN;
-        else
-            return false;
+        if (word(&p, end, "infinity", 8) || word(&p, end, "inf", 3)) value = INFINITY;
+        else if (word(&p, end, "nan", 3)) value = NAN;
+        else return false;
         *s = p;
         *out = negative ? -value : value;
         return true;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A pool of pthreads, made on first use and kept by the context. One loop runs at a time;
- * a loop started by a second host thread waits for the first one, a loop started by a worker
- * runs inline. */
+ * a loop started by a second host thread waits for the first one, a loop started by a
+ * worker runs inline. */
 #include "pool.h"
 #include <stdio.h>
 #include <string.h>
@@ -12,16 +12,16 @@
 
 struct run {
     const struct imp_loop *loop;
-    size_t next;                /* item to hand out */
-    size_t committed;           /* items committed so far */
+    size_t next;      /* item to hand out */
+    size_t committed; /* items committed so far */
     int n_slots;
-    char *slot_done;            /* [n_slots] item (committed + k) computed, k = slot order */
+    char *slot_done; /* [n_slots] item (committed + k) computed, k = slot order */
     enum imp_status *slot_status;
-    enum imp_status status;     /* first failure, in item order */
+    enum imp_status status; /* first failure, in item order */
     bool stop;
-    bool committing;            /* a thread is inside commit or progress */
+    bool committing; /* a thread is inside commit or progress */
     double last_report_s, start_s;
-    size_t error_item;          /* whose message `error` is: the lowest failed item */
+    size_t error_item; /* whose message `error` is: the lowest failed item */
     char error[1024];
 };
 
@@ -33,16 +33,16 @@ struct worker {
 
 struct imp_pool {
     imp_context *ctx;
-    int n_workers;              /* besides the caller */
+    int n_workers; /* besides the caller */
     struct worker *workers;
     pthread_mutex_t lock;
     pthread_cond_t wake, changed;
-    pthread_mutex_t turn;       /* one loop at a time */
+    pthread_mutex_t turn; /* one loop at a time */
     struct run *run;
     uint64_t generation;
-    int busy;                   /* workers inside the run */
+    int busy; /* workers inside the run */
     bool quit;
-    pthread_key_t inside;       /* non-NULL on a thread that works on a loop */
+    pthread_key_t inside; /* non-NULL on a thread that works on a loop */
 };
 
 double imp__now(void)
@@ -68,7 +68,9 @@ static bool report(struct run *r, size_t committed, bool force)
         const double elapsed = now - r->start_s;
         const double origin = l->start_s > 0 ? l->start_s : r->start_s;
         const struct imp_progress p = {
-            .size = sizeof p, .stage = l->stage, .fraction = fraction,
+            .size = sizeof p,
+            .stage = l->stage,
+            .fraction = fraction,
             .elapsed_s = now - origin,
             .eta_s = fraction > 1e-3 ? (now - origin) * (1 - fraction) / fraction : -1,
             .rate = elapsed > 0 ? l->units * part / elapsed : 0,
@@ -83,7 +85,8 @@ static void work_on(struct imp_pool *pool, struct run *r, int worker)
 {
     const struct imp_loop *l = r->loop;
     while (!r->stop && r->next < l->n_items) {
-        if (r->next >= r->committed + (size_t)r->n_slots) { /* ran ahead: wait for commits */
+        if (r->next >=
+            r->committed + (size_t)r->n_slots) { /* ran ahead: wait for commits */
             pthread_cond_wait(&pool->changed, &pool->lock);
             continue;
         }
@@ -182,7 +185,8 @@ static struct imp_pool *pool_create(imp_context *ctx)
     for (int i = 1; pool->workers && i < ctx->threads; i++) {
         struct worker *w = &pool->workers[pool->n_workers];
         *w = (struct worker){.pool = pool, .index = i};
-        if (pthread_create(&w->thread, NULL, worker_main, w) != 0) break; /* fewer will do */
+        if (pthread_create(&w->thread, NULL, worker_main, w) != 0)
+            break; /* fewer will do */
         pool->n_workers++;
     }
     return pool;
@@ -211,7 +215,8 @@ enum imp_status imp__parallel(imp_context *ctx, const struct imp_loop *loop, siz
         st = IMP_OK;
         for (; r.committed < loop->n_items && st == IMP_OK; r.committed += st == IMP_OK) {
             st = loop->work(r.committed, 0, 0, loop->payload);
-            if (st == IMP_OK && loop->commit) st = loop->commit(r.committed, 0, loop->payload);
+            if (st == IMP_OK && loop->commit)
+                st = loop->commit(r.committed, 0, loop->payload);
         }
     } else {
         pthread_mutex_lock(&pool->turn);
@@ -228,7 +233,8 @@ enum imp_status imp__parallel(imp_context *ctx, const struct imp_loop *loop, siz
         pthread_setspecific(pool->inside, NULL);
         pthread_mutex_unlock(&pool->turn);
         st = r.status;
-        if (st != IMP_OK) imp__error(ctx, st, "%s", r.error); /* from the worker's thread */
+        if (st != IMP_OK)
+            imp__error(ctx, st, "%s", r.error); /* from the worker's thread */
         if (st == IMP_OK && r.committed < loop->n_items) st = IMP_CANCELLED;
         if (st == IMP_OK) report(&r, r.committed, true);
     }

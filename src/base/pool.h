@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Parallel loops whose results do not depend on the number of threads. Work is cut into
- * items whose number is fixed by the problem; any worker computes any item; the results are
- * committed one at a time and in item order. Sums taken in `commit` therefore have one
- * order, whoever computed what. */
+ * items whose number is fixed by the problem; any worker computes any item; the results
+ * are committed one at a time and in item order. Sums taken in `commit` therefore have
+ * one order, whoever computed what. */
 #ifndef IMP_BASE_POOL_H
 #define IMP_BASE_POOL_H
 
@@ -14,28 +14,31 @@ struct imp_loop {
     /* Compute item `i` on worker `worker` (0 <= worker < threads) into the slot's result;
      * `slot` < imp__pool_slots(ctx) names the result buffer to use. */
     enum imp_status (*work)(size_t i, int worker, int slot, void *payload);
-    /* Add the result in `slot`; called for items 0, 1, 2, ... never two at a time. NULL: no
-     * results to collect. */
+    /* Add the result in `slot`; called for items 0, 1, 2, ... never two at a time. NULL:
+     * no results to collect. */
     enum imp_status (*commit)(size_t i, int slot, void *payload);
     void *payload;
     /* Progress, or NULL; item weights are equal. */
     imp_progress_fn progress;
     void *progress_payload;
     const char *stage, *rate_unit;
-    double units;        /* of rate_unit, in the whole loop */
-    double fraction_lo, fraction_hi; /* part of the caller's work this loop is; hi 0: all */
-    double start_s;      /* imp__now() when the caller's work began; 0: now */
-    double deadline_s;   /* imp__now() after which no item starts; 0: none */
+    double units; /* of rate_unit, in the whole loop */
+    double fraction_lo,
+        fraction_hi;   /* part of the caller's work this loop is; hi 0: all */
+    double start_s;    /* imp__now() when the caller's work began; 0: now */
+    double deadline_s; /* imp__now() after which no item starts; 0: none */
 };
 
-/* Result buffers a loop may need at once: a worker that runs ahead of the commits waits. */
+/* Result buffers a loop may need at once: a worker that runs ahead of the commits waits.
+ */
 int imp__pool_slots(const imp_context *ctx);
 
 /* Run the loop. Items are committed in order up to the first that failed; `*done` (may be
  * NULL) is how many. @return the first failure in item order, IMP_CANCELLED if progress
- * asked to stop or the deadline passed, or IMP_OK. A loop inside a loop runs on the calling
- * worker alone. */
-enum imp_status imp__parallel(imp_context *ctx, const struct imp_loop *loop, size_t *done);
+ * asked to stop or the deadline passed, or IMP_OK. A loop inside a loop runs on the
+ * calling worker alone. */
+enum imp_status imp__parallel(imp_context *ctx, const struct imp_loop *loop,
+                              size_t *done);
 
 void imp__pool_destroy(imp_context *ctx, struct imp_pool *pool);
 

@@ -5,9 +5,10 @@
 #include <string.h>
 
 static const char *const type_names[] = {
-    [IMP_PROP_BOOL] = "boolean", [IMP_PROP_INTEGER] = "integer", [IMP_PROP_FLOAT] = "float",
-    [IMP_PROP_STRING] = "string", [IMP_PROP_VECTOR] = "vector", [IMP_PROP_RGB] = "rgb",
-    [IMP_PROP_UNIFORM] = "spectrum", [IMP_PROP_SPECTRUM] = "spectrum",
+    [IMP_PROP_BOOL] = "boolean",        [IMP_PROP_INTEGER] = "integer",
+    [IMP_PROP_FLOAT] = "float",         [IMP_PROP_STRING] = "string",
+    [IMP_PROP_VECTOR] = "vector",       [IMP_PROP_RGB] = "rgb",
+    [IMP_PROP_UNIFORM] = "spectrum",    [IMP_PROP_SPECTRUM] = "spectrum",
     [IMP_PROP_TRANSFORM] = "transform", [IMP_PROP_REF] = "ref"};
 
 struct imp_node *imp__node_create(struct imp_arena *a, const char *tag, const char *type,
@@ -24,7 +25,8 @@ struct imp_node *imp__node_create(struct imp_arena *a, const char *tag, const ch
 }
 
 /* Arrays grow inside the arena; the old ones stay until it is freed (sizes double). */
-static void *array_grow(struct imp_arena *a, void *old, size_t n, size_t *cap, size_t size)
+static void *array_grow(struct imp_arena *a, void *old, size_t n, size_t *cap,
+                        size_t size)
 {
     if (n < *cap) return old;
     const size_t wanted = *cap ? 2 * *cap : 4;
@@ -35,10 +37,12 @@ static void *array_grow(struct imp_arena *a, void *old, size_t n, size_t *cap, s
     return p;
 }
 
-struct imp_prop *imp__node_add(struct imp_arena *a, struct imp_node *node, const char *name,
-                               enum imp_prop_type type, struct imp_loc loc)
+struct imp_prop *imp__node_add(struct imp_arena *a, struct imp_node *node,
+                               const char *name, enum imp_prop_type type,
+                               struct imp_loc loc)
 {
-    struct imp_prop *p = array_grow(a, node->props, node->n_props, &node->cap_props, sizeof *p);
+    struct imp_prop *p =
+        array_grow(a, node->props, node->n_props, &node->cap_props, sizeof *p);
     if (!p) return NULL;
     node->props = p;
     char *copy = imp__arena_strdup(a, name);
@@ -52,8 +56,8 @@ struct imp_child *imp__node_add_child(struct imp_arena *a, struct imp_node *pare
                                       struct imp_node *child, const char *name,
                                       struct imp_loc loc)
 {
-    struct imp_child *c =
-        array_grow(a, parent->children, parent->n_children, &parent->cap_children, sizeof *c);
+    struct imp_child *c = array_grow(a, parent->children, parent->n_children,
+                                     &parent->cap_children, sizeof *c);
     if (!c) return NULL;
     parent->children = c;
     char *copy = name ? imp__arena_strdup(a, name) : NULL;
@@ -81,10 +85,8 @@ struct imp_child *imp__node_child(const struct imp_node *node, const char *name)
 
 const char *imp__loc_text(struct imp_loc loc, char *buffer, size_t size)
 {
-    if (loc.file)
-        snprintf(buffer, size, "%s:%d:%d", loc.file, loc.line, loc.column);
-    else
-        snprintf(buffer, size, "scene");
+    if (loc.file) snprintf(buffer, size, "%s:%d:%d", loc.file, loc.line, loc.column);
+    else snprintf(buffer, size, "scene");
     return buffer;
 }
 
@@ -132,14 +134,15 @@ static enum imp_status find(imp_context *ctx, struct imp_node *node, const char 
     if (!p) {
         const struct imp_child *c = imp__node_child(node, name);
         if (!c) return IMP_OK;
-        return imp__node_error(ctx, node, IMP_E_SCENE, "property '%s' must be a %s, not an object",
-                               name, type_names[type]);
+        return imp__node_error(ctx, node, IMP_E_SCENE,
+                               "property '%s' must be a %s, not an object", name,
+                               type_names[type]);
     }
     p->used = true;
     if (p->type != type && !(type == IMP_PROP_FLOAT && p->type == IMP_PROP_INTEGER))
         return imp__prop_error(ctx, node, p, IMP_E_SCENE,
-                               "property '%s' must be a %s, not a %s", name, type_names[type],
-                               type_names[p->type]);
+                               "property '%s' must be a %s, not a %s", name,
+                               type_names[type], type_names[p->type]);
     *out = p;
     return IMP_OK;
 }
@@ -161,28 +164,32 @@ enum imp_status imp__props_int(imp_context *ctx, struct imp_node *node, const ch
     if (st != IMP_OK) return st;
     const int64_t v = p ? p->integer : fallback;
     if (v < lo || v > hi)
-        return imp__prop_error(ctx, node, p, IMP_E_SCENE, "%s = %lld is outside [%lld, %lld]",
-                               name, (long long)v, (long long)lo, (long long)hi);
+        return imp__prop_error(ctx, node, p, IMP_E_SCENE,
+                               "%s = %lld is outside [%lld, %lld]", name, (long long)v,
+                               (long long)lo, (long long)hi);
     *out = v;
     return IMP_OK;
 }
 
-enum imp_status imp__props_float(imp_context *ctx, struct imp_node *node, const char *name,
-                                 double fallback, double *out)
+enum imp_status imp__props_float(imp_context *ctx, struct imp_node *node,
+                                 const char *name, double fallback, double *out)
 {
     struct imp_prop *p;
     const enum imp_status st = find(ctx, node, name, IMP_PROP_FLOAT, &p);
     if (st != IMP_OK) return st;
-    const double v = !p ? fallback
-                     : p->type == IMP_PROP_INTEGER ? (double)p->integer : p->number[0];
+    const double v = !p                            ? fallback
+                     : p->type == IMP_PROP_INTEGER ? (double)p->integer
+                                                   : p->number[0];
     if (!isfinite(v))
-        return imp__prop_error(ctx, node, p, IMP_E_SCENE, "%s = %g is not finite", name, v);
+        return imp__prop_error(ctx, node, p, IMP_E_SCENE, "%s = %g is not finite", name,
+                               v);
     *out = v;
     return IMP_OK;
 }
 
-enum imp_status imp__props_string(imp_context *ctx, struct imp_node *node, const char *name,
-                                  const char *fallback, const char **out)
+enum imp_status imp__props_string(imp_context *ctx, struct imp_node *node,
+                                  const char *name, const char *fallback,
+                                  const char **out)
 {
     struct imp_prop *p;
     const enum imp_status st = find(ctx, node, name, IMP_PROP_STRING, &p);
@@ -190,8 +197,9 @@ enum imp_status imp__props_string(imp_context *ctx, struct imp_node *node, const
     return st;
 }
 
-enum imp_status imp__props_vector(imp_context *ctx, struct imp_node *node, const char *name,
-                                  const double fallback[3], double out[3])
+enum imp_status imp__props_vector(imp_context *ctx, struct imp_node *node,
+                                  const char *name, const double fallback[3],
+                                  double out[3])
 {
     struct imp_prop *p;
     const enum imp_status st = find(ctx, node, name, IMP_PROP_VECTOR, &p);
@@ -220,8 +228,9 @@ bool imp__props_has(const struct imp_node *node, const char *name)
     return imp__node_prop(node, name) || imp__node_child(node, name);
 }
 
-enum imp_status imp__props_choice(imp_context *ctx, struct imp_node *node, const char *name,
-                                  const char *const *words, int n, int fallback, int *out)
+enum imp_status imp__props_choice(imp_context *ctx, struct imp_node *node,
+                                  const char *name, const char *const *words, int n,
+                                  int fallback, int *out)
 {
     struct imp_prop *p;
     const enum imp_status st = find(ctx, node, name, IMP_PROP_STRING, &p);
@@ -239,8 +248,8 @@ enum imp_status imp__props_choice(imp_context *ctx, struct imp_node *node, const
         const size_t used = strlen(list);
         snprintf(list + used, sizeof list - used, "%s%s", i ? ", " : "", words[i]);
     }
-    return imp__prop_error(ctx, node, p, IMP_E_SCENE, "%s = '%s': must be one of %s", name,
-                           p->string, list);
+    return imp__prop_error(ctx, node, p, IMP_E_SCENE, "%s = '%s': must be one of %s",
+                           name, p->string, list);
 }
 
 enum imp_status imp__props_finish(imp_context *ctx, const struct imp_node *node)
@@ -264,6 +273,6 @@ enum imp_status imp__props_finish(imp_context *ctx, const struct imp_node *node)
                  imp__loc_text(c->loc, where, sizeof where));
     }
     if (!*list) return IMP_OK;
-    return imp__prop_error(ctx, node, first, IMP_E_SCENE, "not a property of this plugin: %s",
-                           list);
+    return imp__prop_error(ctx, node, first, IMP_E_SCENE,
+                           "not a property of this plugin: %s", list);
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Property bags: a scene before its objects exist. The XML reader and the building calls
- * make a tree of imp_node; the kinds read their properties from it. Reading marks a property
- * as used; what nobody asked for is an error that names the place it was written
+ * make a tree of imp_node; the kinds read their properties from it. Reading marks a
+ * property as used; what nobody asked for is an error that names the place it was written
  * (scene-format 1.3). This file knows names and values, and nothing of light. */
 #ifndef IMP_BASE_PROPS_H
 #define IMP_BASE_PROPS_H
@@ -15,22 +15,26 @@ struct imp_loc { /* where something was written; file NULL: built by calls */
 };
 
 enum imp_prop_type {
-    IMP_PROP_BOOL, IMP_PROP_INTEGER, IMP_PROP_FLOAT, IMP_PROP_STRING, IMP_PROP_VECTOR,
+    IMP_PROP_BOOL,
+    IMP_PROP_INTEGER,
+    IMP_PROP_FLOAT,
+    IMP_PROP_STRING,
+    IMP_PROP_VECTOR,
     IMP_PROP_RGB,
-    IMP_PROP_UNIFORM,   /* <spectrum value="c">: number[0] */
-    IMP_PROP_SPECTRUM,  /* n samples: wavelengths in list, values in list + n */
+    IMP_PROP_UNIFORM,  /* <spectrum value="c">: number[0] */
+    IMP_PROP_SPECTRUM, /* n samples: wavelengths in list, values in list + n */
     IMP_PROP_TRANSFORM,
-    IMP_PROP_REF        /* string: id; resolved into a child before objects are made */
+    IMP_PROP_REF /* string: id; resolved into a child before objects are made */
 };
 
 struct imp_prop {
     const char *name;
     enum imp_prop_type type;
     struct imp_loc loc;
-    int64_t integer;         /* BOOL, INTEGER */
-    double number[16];       /* FLOAT [0], VECTOR and RGB [0..2], TRANSFORM row-major */
+    int64_t integer;   /* BOOL, INTEGER */
+    double number[16]; /* FLOAT [0], VECTOR and RGB [0..2], TRANSFORM row-major */
     const char *string;
-    const double *list;      /* SPECTRUM: 2 n numbers */
+    const double *list; /* SPECTRUM: 2 n numbers */
     size_t n;
     bool used;
 };
@@ -40,41 +44,42 @@ struct imp_mesh_data {
     size_t n_vertices, n_triangles;
     const float *positions, *normals, *uvs; /* normals, uvs may be NULL */
     const uint32_t *indices;
-    bool normals_from_file;  /* else: compute them unless face_normals */
+    bool normals_from_file; /* else: compute them unless face_normals */
 };
 struct imp_image_data {
-    int width, height, channels;     /* 1 or 3 */
-    const float *pixels;             /* linear unless `srgb` */
-    bool srgb;                       /* an 8- or 16-bit file, values still encoded */
+    int width, height, channels; /* 1 or 3 */
+    const float *pixels;         /* linear unless `srgb` */
+    bool srgb;                   /* an 8- or 16-bit file, values still encoded */
 };
 
 struct imp_node {
-    const char *tag, *type, *id;     /* id NULL: none */
-    const char *name;                /* slot under the parent; NULL: nameless */
+    const char *tag, *type, *id; /* id NULL: none */
+    const char *name;            /* slot under the parent; NULL: nameless */
     struct imp_loc loc;
     struct imp_prop *props;
     size_t n_props, cap_props;
     struct imp_child {
-        const char *name;            /* slot here; NULL: nameless. Differs from node->name
-                                        when a reference gives one */
-        struct imp_node *node;       /* NULL until a reference is resolved */
-        const char *ref;             /* id referred to; NULL: a direct child */
+        const char *name;      /* slot here; NULL: nameless. Differs from node->name
+                                  when a reference gives one */
+        struct imp_node *node; /* NULL until a reference is resolved */
+        const char *ref;       /* id referred to; NULL: a direct child */
         struct imp_loc loc;
         bool used;
-    } *children;
+    } * children;
     size_t n_children, cap_children;
-    const struct imp_mesh_data *mesh;   /* attached data, or NULL */
+    const struct imp_mesh_data *mesh; /* attached data, or NULL */
     const struct imp_image_data *image;
-    void *object;                    /* what was made from it (scene/build.c) */
-    int visiting;                    /* cycle detection */
+    void *object; /* what was made from it (scene/build.c) */
+    int visiting; /* cycle detection */
 };
 
 /* Nodes and everything in them live in the arena; arrays grow in it too. */
 struct imp_node *imp__node_create(struct imp_arena *a, const char *tag, const char *type,
                                   const char *id, const char *name, struct imp_loc loc);
 /* Append; NULL if out of memory. The name must not be there yet (see imp__node_prop). */
-struct imp_prop *imp__node_add(struct imp_arena *a, struct imp_node *node, const char *name,
-                               enum imp_prop_type type, struct imp_loc loc);
+struct imp_prop *imp__node_add(struct imp_arena *a, struct imp_node *node,
+                               const char *name, enum imp_prop_type type,
+                               struct imp_loc loc);
 struct imp_child *imp__node_add_child(struct imp_arena *a, struct imp_node *parent,
                                       struct imp_node *child, const char *name,
                                       struct imp_loc loc);
@@ -93,25 +98,28 @@ enum imp_status imp__prop_error(imp_context *ctx, const struct imp_node *node,
                                 const char *format, ...) IMP_PRINTF(5, 6);
 
 /* ---- Reading. Each marks the property used, leaves *out at the default if it is absent,
- * and returns IMP_E_SCENE with the place and both types if it is of another type. Integers
- * are taken where floats are read, never the reverse. ---- */
+ * and returns IMP_E_SCENE with the place and both types if it is of another type.
+ * Integers are taken where floats are read, never the reverse. ---- */
 enum imp_status imp__props_bool(imp_context *ctx, struct imp_node *node, const char *name,
                                 bool fallback, bool *out);
 enum imp_status imp__props_int(imp_context *ctx, struct imp_node *node, const char *name,
                                int64_t fallback, int64_t lo, int64_t hi, int64_t *out);
-enum imp_status imp__props_float(imp_context *ctx, struct imp_node *node, const char *name,
-                                 double fallback, double *out);
-enum imp_status imp__props_string(imp_context *ctx, struct imp_node *node, const char *name,
-                                  const char *fallback, const char **out);
-enum imp_status imp__props_vector(imp_context *ctx, struct imp_node *node, const char *name,
-                                  const double fallback[3], double out[3]);
+enum imp_status imp__props_float(imp_context *ctx, struct imp_node *node,
+                                 const char *name, double fallback, double *out);
+enum imp_status imp__props_string(imp_context *ctx, struct imp_node *node,
+                                  const char *name, const char *fallback,
+                                  const char **out);
+enum imp_status imp__props_vector(imp_context *ctx, struct imp_node *node,
+                                  const char *name, const double fallback[3],
+                                  double out[3]);
 /* Identity if absent. */
 enum imp_status imp__props_transform(imp_context *ctx, struct imp_node *node,
                                      const char *name, double out[16]);
 bool imp__props_has(const struct imp_node *node, const char *name);
 /* One of n words, case as spelled; *out its index. The error lists them. */
-enum imp_status imp__props_choice(imp_context *ctx, struct imp_node *node, const char *name,
-                                  const char *const *words, int n, int fallback, int *out);
+enum imp_status imp__props_choice(imp_context *ctx, struct imp_node *node,
+                                  const char *name, const char *const *words, int n,
+                                  int fallback, int *out);
 /* IMP_E_SCENE listing every property and child that nobody asked for. */
 enum imp_status imp__props_finish(imp_context *ctx, const struct imp_node *node);
 

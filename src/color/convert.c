@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "convert.h"
-#include <string.h>
 #include "base/number.h"
 #include "math/vec.h"
 #include "rgb.h"
+#include <string.h>
 
 /* Three numbers, or one where the mode or the input has room for one only. */
 static void color_set(const double rgb[3], bool scalar, enum imp_color_mode mode,
@@ -19,16 +19,16 @@ static void color_set(const double rgb[3], bool scalar, enum imp_color_mode mode
 }
 
 /* One number c; as emission in rgb mode it is a colour whose three numbers are equal. */
-static void number_set(double c, enum imp_role role, bool scalar, enum imp_color_mode mode,
-                       imp_spec *value, int *count)
+static void number_set(double c, enum imp_role role, bool scalar,
+                       enum imp_color_mode mode, imp_spec *value, int *count)
 {
     *value = imp__spec(c);
     *count = role == IMP_EMISSION && !scalar && mode == IMP_RGB ? 3 : 1;
 }
 
 /* Equal-energy white: what a constant spectrum 1 looks like as light. */
-static void equal_energy_set(double c, bool scalar, enum imp_color_mode mode, imp_spec *value,
-                             int *count)
+static void equal_energy_set(double c, bool scalar, enum imp_color_mode mode,
+                             imp_spec *value, int *count)
 {
     static const double white[3] = {1.204794, 0.948291, 0.908916};
     if (scalar || mode == IMP_MONO) {
@@ -41,10 +41,12 @@ static void equal_energy_set(double c, bool scalar, enum imp_color_mode mode, im
 }
 
 static enum imp_status check_number(imp_context *ctx, const struct imp_node *node,
-                                    const struct imp_prop *prop, enum imp_role role, double c)
+                                    const struct imp_prop *prop, enum imp_role role,
+                                    double c)
 {
     if (!isfinite(c))
-        return imp__prop_error(ctx, node, prop, IMP_E_SCENE, "'%s' is not finite", prop->name);
+        return imp__prop_error(ctx, node, prop, IMP_E_SCENE, "'%s' is not finite",
+                               prop->name);
     if (role == IMP_EMISSION && c < 0)
         return imp__prop_error(ctx, node, prop, IMP_E_SCENE,
                                "'%s': emission %g is negative", prop->name, c);
@@ -67,12 +69,13 @@ static enum imp_status check_rgb(imp_context *ctx, const struct imp_node *node,
     return IMP_OK;
 }
 
-/* Samples, checked and turned into a colour: surfaces are seen under D65, lights as they are;
- * what lies outside the gamut is clamped (scene-format 2.1). */
+/* Samples, checked and turned into a colour: surfaces are seen under D65, lights as they
+ * are; what lies outside the gamut is clamped (scene-format 2.1). */
 static enum imp_status spectrum_set(imp_context *ctx, const struct imp_node *node,
-                                    const struct imp_prop *prop, enum imp_role role, size_t n,
-                                    const double *nm, const double *v, bool scalar,
-                                    enum imp_color_mode mode, imp_spec *value, int *count)
+                                    const struct imp_prop *prop, enum imp_role role,
+                                    size_t n, const double *nm, const double *v,
+                                    bool scalar, enum imp_color_mode mode,
+                                    imp_spec *value, int *count)
 {
     if (n < 2)
         return imp__prop_error(ctx, node, prop, IMP_E_SCENE,
@@ -89,7 +92,8 @@ static enum imp_status spectrum_set(imp_context *ctx, const struct imp_node *nod
     double rgb[3];
     imp__spectrum_to_rgb(n, nm, v, role != IMP_EMISSION, rgb);
     for (int c = 0; c < 3; c++)
-        rgb[c] = role == IMP_REFLECTANCE ? imp_clamp(rgb[c], 0.0, 1.0) : imp_max(rgb[c], 0.0);
+        rgb[c] =
+            role == IMP_REFLECTANCE ? imp_clamp(rgb[c], 0.0, 1.0) : imp_max(rgb[c], 0.0);
     color_set(rgb, scalar, mode, value, count);
     return IMP_OK;
 }
@@ -103,7 +107,8 @@ enum imp_status imp__color_convert(imp_context *ctx, const struct imp_node *node
     switch (prop->type) {
     case IMP_PROP_INTEGER:
     case IMP_PROP_FLOAT: {
-        const double c = prop->type == IMP_PROP_FLOAT ? prop->number[0] : (double)prop->integer;
+        const double c =
+            prop->type == IMP_PROP_FLOAT ? prop->number[0] : (double)prop->integer;
         IMP_TRY(check_number(ctx, node, prop, role, c));
         number_set(c, role, scalar, mode, value, count);
         break;
@@ -112,26 +117,26 @@ enum imp_status imp__color_convert(imp_context *ctx, const struct imp_node *node
         IMP_TRY(check_number(ctx, node, prop, role, prop->number[0]));
         if (role == IMP_EMISSION)
             equal_energy_set(prop->number[0], scalar, mode, value, count);
-        else
-            number_set(prop->number[0], role, scalar, mode, value, count);
+        else number_set(prop->number[0], role, scalar, mode, value, count);
         break;
     case IMP_PROP_RGB:
         IMP_TRY(check_rgb(ctx, node, prop, role, prop->number));
         color_set(prop->number, scalar, mode, value, count);
         break;
     case IMP_PROP_SPECTRUM:
-        IMP_TRY(spectrum_set(ctx, node, prop, role, prop->n, prop->list, prop->list + prop->n,
-                             scalar, mode, value, count));
+        IMP_TRY(spectrum_set(ctx, node, prop, role, prop->n, prop->list,
+                             prop->list + prop->n, scalar, mode, value, count));
         break;
     case IMP_PROP_BOOL:
     case IMP_PROP_STRING:
     case IMP_PROP_VECTOR:
     case IMP_PROP_TRANSFORM:
     case IMP_PROP_REF: {
-        static const char *const names[] = {
-            [IMP_PROP_BOOL] = "boolean", [IMP_PROP_STRING] = "string",
-            [IMP_PROP_VECTOR] = "vector", [IMP_PROP_TRANSFORM] = "transform",
-            [IMP_PROP_REF] = "reference"};
+        static const char *const names[] = {[IMP_PROP_BOOL] = "boolean",
+                                            [IMP_PROP_STRING] = "string",
+                                            [IMP_PROP_VECTOR] = "vector",
+                                            [IMP_PROP_TRANSFORM] = "transform",
+                                            [IMP_PROP_REF] = "reference"};
         IMP_TRY(imp__prop_error(ctx, node, prop, IMP_E_SCENE,
                                 "'%s' must be a number, a colour or a texture, not a %s",
                                 prop->name, names[prop->type]));
@@ -147,7 +152,7 @@ void imp__color_default(double fallback, enum imp_role role, enum imp_color_mode
     number_set(fallback, role, false, mode, value, count);
 }
 
-/* ---- Colours written as objects ----------------------------------------------------- */
+/* ---- Colours written as objects ------------------------------------------------ */
 
 enum object { UNIFORM, SRGB, RAWCONSTANT, D65, REGULAR, IRREGULAR, BLACKBODY, N_OBJECTS };
 static const char *const object_names[N_OBJECTS] = {
@@ -170,8 +175,8 @@ bool imp__color_is_object(const struct imp_node *node)
 }
 
 /* Numbers separated by commas and blanks; *list is released by the caller. */
-static enum imp_status list_read(imp_context *ctx, struct imp_node *node, const char *name,
-                                 double **list, size_t *n)
+static enum imp_status list_read(imp_context *ctx, struct imp_node *node,
+                                 const char *name, double **list, size_t *n)
 {
     enum imp_status st = IMP_OK;
     const char *text = NULL;
@@ -179,8 +184,7 @@ static enum imp_status list_read(imp_context *ctx, struct imp_node *node, const 
     size_t cap = 0, len = 0;
 
     IMP_TRY(imp__props_string(ctx, node, name, NULL, &text));
-    if (!text)
-        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "'%s' is required", name));
+    if (!text) IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "'%s' is required", name));
     const char *s = text, *end = text + strlen(text);
     while (*(s += strspn(s, ", \t\r\n"))) {
         const char *start = s;
@@ -203,15 +207,17 @@ out:
     return st;
 }
 
-static enum imp_status require(imp_context *ctx, const struct imp_node *node, const char *name)
+static enum imp_status require(imp_context *ctx, const struct imp_node *node,
+                               const char *name)
 {
     if (imp__props_has(node, name)) return IMP_OK;
     return imp__node_error(ctx, node, IMP_E_SCENE, "'%s' is required", name);
 }
 
-static enum imp_status spectrum_object(imp_context *ctx, struct imp_node *node, bool regular,
-                                       enum imp_role role, bool scalar,
-                                       enum imp_color_mode mode, imp_spec *value, int *count)
+static enum imp_status spectrum_object(imp_context *ctx, struct imp_node *node,
+                                       bool regular, enum imp_role role, bool scalar,
+                                       enum imp_color_mode mode, imp_spec *value,
+                                       int *count)
 {
     enum imp_status st = IMP_OK;
     double *nm = NULL, *v = NULL;
@@ -269,9 +275,9 @@ out:
 }
 
 /* The property's colour, or white. */
-static enum imp_status d65_object(imp_context *ctx, struct imp_node *node, enum imp_role role,
-                                  bool scalar, enum imp_color_mode mode, imp_spec *value,
-                                  int *count)
+static enum imp_status d65_object(imp_context *ctx, struct imp_node *node,
+                                  enum imp_role role, bool scalar,
+                                  enum imp_color_mode mode, imp_spec *value, int *count)
 {
     static const double white[3] = {1, 1, 1};
     enum imp_status st = IMP_OK;
@@ -287,7 +293,8 @@ static enum imp_status d65_object(imp_context *ctx, struct imp_node *node, enum 
     if (color) {
         color->used = true;
         if (color->type != IMP_PROP_RGB)
-            IMP_TRY(imp__prop_error(ctx, node, color, IMP_E_SCENE, "'color' must be an rgb"));
+            IMP_TRY(
+                imp__prop_error(ctx, node, color, IMP_E_SCENE, "'color' must be an rgb"));
         IMP_TRY(check_rgb(ctx, node, color, IMP_EMISSION, color->number));
         color_set(color->number, scalar, mode, &v, &n);
     } else if (node->n_children) {
@@ -308,8 +315,9 @@ out:
 }
 
 enum imp_status imp__color_object(imp_context *ctx, struct imp_node *node,
-                                  enum imp_role role, bool scalar, enum imp_color_mode mode,
-                                  imp_spec *value, int *count, const char **key)
+                                  enum imp_role role, bool scalar,
+                                  enum imp_color_mode mode, imp_spec *value, int *count,
+                                  const char **key)
 {
     enum imp_status st = IMP_OK;
     imp_spec v = imp__spec(0);
@@ -323,8 +331,8 @@ enum imp_status imp__color_object(imp_context *ctx, struct imp_node *node,
         IMP_TRY(imp__props_float(ctx, node, "wavelength_min", 360, &ignored));
         IMP_TRY(imp__props_float(ctx, node, "wavelength_max", 830, &ignored));
         if (!isfinite(c) || (role == IMP_EMISSION && c < 0))
-            IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "'value' %g is not allowed here",
-                                    c));
+            IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
+                                    "'value' %g is not allowed here", c));
         number_set(c, role, scalar, mode, &v, &n);
         break;
     }
@@ -338,24 +346,20 @@ enum imp_status imp__color_object(imp_context *ctx, struct imp_node *node,
         color_set(color->number, scalar, mode, &v, &n);
         break;
     }
-    case RAWCONSTANT:
-        IMP_TRY(raw_object(ctx, node, scalar, mode, &v, &n));
-        break;
-    case D65:
-        IMP_TRY(d65_object(ctx, node, role, scalar, mode, &v, &n));
-        break;
+    case RAWCONSTANT: IMP_TRY(raw_object(ctx, node, scalar, mode, &v, &n)); break;
+    case D65: IMP_TRY(d65_object(ctx, node, role, scalar, mode, &v, &n)); break;
     case REGULAR:
     case IRREGULAR:
-        IMP_TRY(spectrum_object(ctx, node, object_kind(node) == REGULAR, role, scalar, mode,
-                                &v, &n));
+        IMP_TRY(spectrum_object(ctx, node, object_kind(node) == REGULAR, role, scalar,
+                                mode, &v, &n));
         break;
     case BLACKBODY:
-        IMP_TRY(imp__node_error(ctx, node, IMP_E_UNSUPPORTED,
-                                "blackbody exists in spectral mode only; this version has rgb "
-                                "and mono"));
+        IMP_TRY(imp__node_error(
+            ctx, node, IMP_E_UNSUPPORTED,
+            "blackbody exists in spectral mode only; this version has rgb "
+            "and mono"));
         break;
-    case N_OBJECTS:
-        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "is not a colour"));
+    case N_OBJECTS: IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "is not a colour"));
     }
     IMP_TRY(imp__props_finish(ctx, node));
     *value = v;

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The exact adjoint of traced rays (curved-rays 2.2 - 2.4). From the exit state alone the ray
- * runs backwards, its cotangents lam = dC/dx, mu = dC/dv with it, and each kick leaves a
- * piece of gradient in the field. Memory: what the tracer kept of each ray, one gradient per
- * slice of rays, and nothing that grows with the number of steps. */
+ * The exact adjoint of traced rays (curved-rays 2.2 - 2.4). From the exit state alone the
+ * ray runs backwards, its cotangents lam = dC/dx, mu = dC/dv with it, and each kick
+ * leaves a piece of gradient in the field. Memory: what the tracer kept of each ray, one
+ * gradient per slice of rays, and nothing that grows with the number of steps. */
 #include "curved.h"
 #include <string.h>
 
@@ -13,15 +13,15 @@ struct job {
     const struct imp_bend_exit *exits, *taps;
     const struct imp_bend_cotangent *bars, *tap_bars;
     struct imp_bend_gradient *out;
-    size_t slice;            /* rays of one item */
+    size_t slice; /* rays of one item */
     size_t n_surfaces;
     struct slot {
-        double *theta;       /* [n_theta]; NULL: not used yet */
+        double *theta; /* [n_theta]; NULL: not used yet */
         double (*surfaces)[8];
         struct imp__track *track; /* [IMP_LANES] */
         uint64_t reversal;
         double worst;
-    } *slots;
+    } * slots;
     uint64_t reversal;
     double worst;
 };
@@ -29,31 +29,31 @@ struct job {
 struct lane {
     size_t ray;
     struct imp__start start;
-    uint32_t left;           /* whole steps still to undo in this segment */
+    uint32_t left; /* whole steps still to undo in this segment */
     int segment;
-    size_t base;             /* of the segment's states in the track */
-    struct imp__track *track;/* NULL: one segment, reversed */
+    size_t base;              /* of the segment's states in the track */
+    struct imp__track *track; /* NULL: one segment, reversed */
     bool taps;
 };
 
-/* ---- Events ------------------------------------------------------------------------- */
+/* ---- Events -------------------------------------------------------------------- */
 
-/* Gradient of a surface's own numbers: through where the ray meets it (rho), and through its
- * normal (n_bar). [0-2] normal or centre, [3] offset or radius, [4] index outside. */
-static void surface_bar(struct slot *slot, const struct imp__surface *s, imp_v3 x, double rho,
-                        imp_v3 n_bar, imp_v3 x_curved, double e2_bar)
+/* Gradient of a surface's own numbers: through where the ray meets it (rho), and through
+ * its normal (n_bar). [0-2] normal or centre, [3] offset or radius, [4] index outside. */
+static void surface_bar(struct slot *slot, const struct imp__surface *s, imp_v3 x,
+                        double rho, imp_v3 n_bar, imp_v3 x_curved, double e2_bar)
 {
     if (!slot->surfaces) return;
     double *bar = slot->surfaces[s->id];
     imp_v3 c = {0};
     bar[4] += e2_bar;
     switch (s->kind) {
-    case IMP__PLANE:     /* G = n.x - p, tangent to the unit sphere of n */
+    case IMP__PLANE: /* G = n.x - p, tangent to the unit sphere of n */
         c = n_bar - rho * x;
         c -= s->n * imp__dot(c, s->n);
         bar[3] += rho;
         break;
-    case IMP__SPHERE:    /* G = (|x - c|^2 - R^2)/2; the normal moves with the centre */
+    case IMP__SPHERE: /* G = (|x - c|^2 - R^2)/2; the normal moves with the centre */
     case IMP__CYLINDER: {
         imp_v3 y = x - s->c;
         if (s->kind == IMP__CYLINDER) y -= s->n * imp__dot(y, s->n);
@@ -64,16 +64,15 @@ static void surface_bar(struct slot *slot, const struct imp__surface *s, imp_v3 
     case IMP__APPROACH:
     case IMP__DISC:
     case IMP__SDF:
-    case IMP__MESH:
-        return;
+    case IMP__MESH: return;
     }
     for (int k = 0; k < 3; k++) bar[k] += c[k];
 }
 
 /* Pull the cotangents of the momentum after the map back to before it. */
-static void turn_back(struct slot *slot, const struct imp__surface *s, imp_v3 x, imp_v3 v_in,
-                      imp_v3 gx, bool mirror, double e2, imp_v3 *lam, imp_v3 *mu,
-                      double *field_bar)
+static void turn_back(struct slot *slot, const struct imp__surface *s, imp_v3 x,
+                      imp_v3 v_in, imp_v3 gx, bool mirror, double e2, imp_v3 *lam,
+                      imp_v3 *mu, double *field_bar)
 {
     const double length = imp__length(gx);
     const imp_v3 n = gx * (1 / length);
@@ -86,23 +85,24 @@ static void turn_back(struct slot *slot, const struct imp__surface *s, imp_v3 x,
     imp__surface_hess(s, &x, &m, &curved);
     *lam += curved;
     *mu = v_bar;
-    if (field_bar)
-        *field_bar = e2_bar, e2_bar = 0;
+    if (field_bar) *field_bar = e2_bar, e2_bar = 0;
     surface_bar(slot, s, x, 0, n_bar, curved, e2_bar);
 }
 
-/* Undo a segment's fractional step: (lam, mu, path_bar) at its end -> at the start of that
- * step. `from` is where the step began, `v_in` the momentum at the end. */
-static void land_back(const struct imp__plan *p, struct slot *slot, const struct imp__surface *s,
-                      const struct imp__state *from, double tau, imp_v3 x, imp_v3 v_in,
-                      imp_v3 *lam, imp_v3 *mu, double path_bar, double *theta_bar)
+/* Undo a segment's fractional step: (lam, mu, path_bar) at its end -> at the start of
+ * that step. `from` is where the step began, `v_in` the momentum at the end. */
+static void land_back(const struct imp__plan *p, struct slot *slot,
+                      const struct imp__surface *s, const struct imp__state *from,
+                      double tau, imp_v3 x, imp_v3 v_in, imp_v3 *lam, imp_v3 *mu,
+                      double path_bar, double *theta_bar)
 {
     struct imp__state at = *from, rate;
     struct imp__surface_at sa;
     imp__step_rate(p->scheme, p->field, tau, &at, &rate);
     imp__surface_eval(s, &x, &v_in, &sa);
     const double below = imp__dot(sa.gx, rate.x) + imp__dot(sa.gv, rate.v);
-    const double above = imp__dot(*lam, rate.x) + imp__dot(*mu, rate.v) + path_bar * rate.path;
+    const double above =
+        imp__dot(*lam, rate.x) + imp__dot(*mu, rate.v) + path_bar * rate.path;
     const double rho = below != 0 ? above / below : 0;
     struct imp__back b;
     b.x[0] = x, b.v[0] = v_in;
@@ -110,13 +110,14 @@ static void land_back(const struct imp__plan *p, struct slot *slot, const struct
     b.mu[0] = *mu - rho * sa.gv;
     b.path_bar[0] = path_bar;
     if (slot) surface_bar(slot, s, x, rho, (imp_v3){0}, (imp_v3){0}, 0);
-    const struct imp__state *before[1] = {p->options.way == IMP_BEND_STORED ? from : NULL};
+    const struct imp__state *before[1] = {p->options.way == IMP_BEND_STORED ? from
+                                                                            : NULL};
     imp__step_adjoint(p->scheme, p->field, tau, 1, &b, before, theta_bar);
     *lam = b.lam[0];
     *mu = b.mu[0];
 }
 
-/* ---- Lanes -------------------------------------------------------------------------- */
+/* ---- Lanes --------------------------------------------------------------------- */
 
 /* State at the start of the fractional step, by reversal. */
 static void reverse_landing(const struct imp__plan *p, double tau, struct imp__state *a)
@@ -145,8 +146,8 @@ static void segment_begin(const struct imp__plan *p, struct slot *slot, struct l
                           struct imp__back *b, int i, double *theta_bar)
 {
     const struct imp__segment *g = &l->track->segment[l->segment];
-    land_back(p, slot, g->surface, &g->from, g->tau, g->at.x, g->at.v, &b->lam[i], &b->mu[i],
-              b->path_bar[i], theta_bar);
+    land_back(p, slot, g->surface, &g->from, g->tau, g->at.x, g->at.v, &b->lam[i],
+              &b->mu[i], b->path_bar[i], theta_bar);
     b->x[i] = g->from.x;
     b->v[i] = g->from.v;
     l->left = g->steps;
@@ -228,7 +229,8 @@ static void taps_join(const struct job *job, struct lane *l, struct imp__back *b
         const struct imp__state from = {b->x[i], b->v[i], 0};
         imp_v3 lam = imp__v3_load(bar->x), mu = imp__v3_load(bar->v);
         const imp_v3 x = imp__v3_load(t->x), v = imp__v3_load(t->v);
-        land_back(p, NULL, &p->taps[k], &from, t->tau, x, v, &lam, &mu, bar->path, theta_bar);
+        land_back(p, NULL, &p->taps[k], &from, t->tau, x, v, &lam, &mu, bar->path,
+                  theta_bar);
         b->lam[i] += lam;
         b->mu[i] += mu;
         b->path_bar[i] += bar->path;
@@ -254,10 +256,10 @@ static void lane_end(const struct job *job, struct slot *slot, struct lane *l,
     if (job->out->energy) { /* K of curved-rays 1.2 at the start */
         const double speed = imp__length(s->at.v);
         job->out->energy[l->ray] =
-            p->scheme->arc ? imp__dot(lam, s->at.v) / speed + imp__dot(mu, g) +
-                                 b->path_bar[i] * eta
-                           : imp__dot(lam, s->at.v) + eta * imp__dot(mu, g) +
-                                 b->path_bar[i] * eta * eta;
+            p->scheme->arc
+                ? imp__dot(lam, s->at.v) / speed + imp__dot(mu, g) + b->path_bar[i] * eta
+                : imp__dot(lam, s->at.v) + eta * imp__dot(mu, g) +
+                      b->path_bar[i] * eta * eta;
     }
     if (s->entry) {
         const struct imp__surface *entry = imp__start_entry(s);
@@ -267,19 +269,23 @@ static void lane_end(const struct job *job, struct slot *slot, struct lane *l,
         if (entry->event == IMP_BEND_REFRACT) {
             double eta_bar;
             turn_back(slot, entry, s->at.x, v0, sa.gx, false, eta, &lam, &mu, &eta_bar);
-            if (theta_bar) p->field->ops->splat(p->field, &s->at.x, eta_bar, &zero, theta_bar);
+            if (theta_bar)
+                p->field->ops->splat(p->field, &s->at.x, eta_bar, &zero, theta_bar);
             lam += eta_bar * g;
         }
         /* x = x0 + tau v0, path = n^2 tau, tau from G(x) = 0 */
         const double n2 = p->outside_index * p->outside_index;
-        const double rho = (imp__dot(lam, v0) + b->path_bar[i] * n2) / imp__dot(sa.gx, v0);
+        const double rho =
+            (imp__dot(lam, v0) + b->path_bar[i] * n2) / imp__dot(sa.gx, v0);
         lam -= rho * sa.gx;
         surface_bar(slot, entry, s->at.x, rho, zero, zero, 0);
         mu += s->tau * lam;
         d_bar = p->outside_index * mu;
-    } else { /* v0 = eta(x0) d0: the term that the paper's supplement leaves out (5)-(6) */
+    } else { /* v0 = eta(x0) d0: the term that the paper's supplement leaves out (5)-(6)
+              */
         const double eta_bar = imp__dot(mu, s->d0);
-        if (theta_bar) p->field->ops->splat(p->field, &s->at.x, eta_bar, &zero, theta_bar);
+        if (theta_bar)
+            p->field->ops->splat(p->field, &s->at.x, eta_bar, &zero, theta_bar);
         lam += eta_bar * g;
         d_bar = eta * mu;
     }
@@ -296,8 +302,8 @@ static void segment_previous(const struct imp__plan *p, struct slot *slot, struc
     struct imp__surface_at sa;
     imp__surface_eval(g->surface, &g->at.x, &g->at.v, &sa);
     turn_back(slot, g->surface, g->at.x, g->at.v, sa.gx,
-              g->surface->event == IMP_BEND_MIRROR, g->surface->index, &b->lam[i], &b->mu[i],
-              NULL);
+              g->surface->event == IMP_BEND_MIRROR, g->surface->index, &b->lam[i],
+              &b->mu[i], NULL);
     segment_begin(p, slot, l, b, i, theta_bar);
 }
 
@@ -327,7 +333,8 @@ static enum imp_status slot_make(const struct job *job, struct slot *s)
         if (!s->theta) return imp__error(ctx, IMP_E_NOMEM, "no memory for a gradient");
     }
     if (job->out->surfaces) {
-        s->surfaces = imp__alloc(ctx, imp_max(job->n_surfaces, (size_t)1), sizeof *s->surfaces);
+        s->surfaces =
+            imp__alloc(ctx, imp_max(job->n_surfaces, (size_t)1), sizeof *s->surfaces);
         if (!s->surfaces) return imp__error(ctx, IMP_E_NOMEM, "no memory for a gradient");
     }
     s->track = imp__alloc(ctx, IMP_LANES, sizeof *s->track);
@@ -363,7 +370,8 @@ static enum imp_status work(size_t item, int worker, int slot_index, void *paylo
             n++;
         }
         if (n == 0) return IMP_OK;
-        for (int i = 0; i < n; i++) { /* lanes at a start: to the segment before, or done */
+        for (int i = 0; i < n;
+             i++) { /* lanes at a start: to the segment before, or done */
             while (lane[i].left == 0 && lane[i].segment > 0) {
                 segment_previous(p, slot, &lane[i], &b, i, theta_bar);
                 if (lane[i].taps) taps_join(job, &lane[i], &b, i, theta_bar);
@@ -381,12 +389,15 @@ static enum imp_status work(size_t item, int worker, int slot_index, void *paylo
         }
         if (n == 0) continue;
         const struct imp__state *before[IMP_LANES];
-        for (int i = 0; stored && i < n; i++) { /* the known states, not the reversed ones */
-            const struct imp__state *s = lane[i].track->state + lane[i].base + lane[i].left;
+        for (int i = 0; stored && i < n;
+             i++) { /* the known states, not the reversed ones */
+            const struct imp__state *s =
+                lane[i].track->state + lane[i].base + lane[i].left;
             b.x[i] = s->x, b.v[i] = s->v;
             before[i] = s - 1;
         }
-        imp__step_adjoint(p->scheme, p->field, p->t, n, &b, stored ? before : NULL, theta_bar);
+        imp__step_adjoint(p->scheme, p->field, p->t, n, &b, stored ? before : NULL,
+                          theta_bar);
         for (int i = 0; i < n; i++) {
             lane[i].left--;
             if (lane[i].taps) taps_join(job, &lane[i], &b, i, theta_bar);
@@ -400,7 +411,8 @@ static enum imp_status commit(size_t item, int slot_index, void *payload)
     struct slot *s = &job->slots[slot_index];
     (void)item;
     if (s->theta) {
-        for (size_t i = 0; i < job->plan->field->n_theta; i++) job->out->theta[i] += s->theta[i];
+        for (size_t i = 0; i < job->plan->field->n_theta; i++)
+            job->out->theta[i] += s->theta[i];
         memset(s->theta, 0, job->plan->field->n_theta * sizeof *s->theta);
     }
     if (s->surfaces) {
@@ -415,25 +427,24 @@ static enum imp_status commit(size_t item, int slot_index, void *payload)
     return IMP_OK;
 }
 
-/* Slices: enough for many threads, few while adding up a large gradient would cost more than
- * the rays (n_theta numbers a slice, against n_theta^(1/3) steps or so a ray). Their number
- * depends on the problem alone, so that the sums have one order. */
+/* Slices: enough for many threads, few while adding up a large gradient would cost more
+ * than the rays (n_theta numbers a slice, against n_theta^(1/3) steps or so a ray). Their
+ * number depends on the problem alone, so that the sums have one order. */
 static size_t slice_rays(size_t n, size_t n_theta)
 {
     const double worth = 3 * (double)n / pow(imp_max((double)n_theta, 1.0), 2.0 / 3);
-    const size_t most = imp_clamp(((size_t)1 << 24) / imp_max(n_theta, (size_t)1), (size_t)8,
-                                  (size_t)64);
+    const size_t most =
+        imp_clamp(((size_t)1 << 24) / imp_max(n_theta, (size_t)1), (size_t)8, (size_t)64);
     const size_t slices = (size_t)imp_clamp(worth, 4.0, (double)most);
     return imp_max((n + slices - 1) / slices, (size_t)4 * IMP_LANES);
 }
 
-enum imp_status imp_bend_adjoint(const imp_field *field, const struct imp_bend_options *options,
-                                 const struct imp_bend_rays *rays,
-                                 const struct imp_bend_exit *exits,
-                                 const struct imp_bend_exit *taps,
-                                 const struct imp_bend_cotangent *bars,
-                                 const struct imp_bend_cotangent *tap_bars,
-                                 struct imp_bend_gradient *out, struct imp_bend_stats *stats)
+enum imp_status
+imp_bend_adjoint(const imp_field *field, const struct imp_bend_options *options,
+                 const struct imp_bend_rays *rays, const struct imp_bend_exit *exits,
+                 const struct imp_bend_exit *taps, const struct imp_bend_cotangent *bars,
+                 const struct imp_bend_cotangent *tap_bars, struct imp_bend_gradient *out,
+                 struct imp_bend_stats *stats)
 {
     struct imp__plan plan;
     enum imp_status st = imp__plan_create(field, options, rays, &plan);
@@ -441,22 +452,29 @@ enum imp_status imp_bend_adjoint(const imp_field *field, const struct imp_bend_o
     imp_context *ctx = plan.ctx;
     const int n_slots = imp__pool_slots(ctx);
     struct imp_bend_gradient sum = *out;
-    struct job job = {.plan = &plan, .rays = rays, .exits = exits, .taps = taps, .bars = bars,
-                      .tap_bars = plan.n_taps > 0 ? tap_bars : NULL, .out = &sum,
+    struct job job = {.plan = &plan,
+                      .rays = rays,
+                      .exits = exits,
+                      .taps = taps,
+                      .bars = bars,
+                      .tap_bars = plan.n_taps > 0 ? tap_bars : NULL,
+                      .out = &sum,
                       .n_surfaces = options ? options->n_surfaces : 0,
                       .slice = slice_rays(rays->n, field->n_theta)};
     double *theta = NULL, (*surfaces)[8] = NULL;
 
     if (plan.scheme->index_form && plan.options.way == IMP_BEND_REVERSE)
-        IMP_TRY(imp__error(ctx, IMP_E_BIAS,
-                           "rays of scheme arc-index cannot be run backwards without bias: use "
-                           "stored trajectories, or ask for the pseudo-reverse by name"));
+        IMP_TRY(imp__error(
+            ctx, IMP_E_BIAS,
+            "rays of scheme arc-index cannot be run backwards without bias: use "
+            "stored trajectories, or ask for the pseudo-reverse by name"));
     if (plan.options.way == IMP_BEND_PSEUDO && !plan.scheme->index_form)
         IMP_TRY(imp__error(ctx, IMP_E_ARG, "pseudo-reverse belongs to scheme arc-index"));
     if (job.tap_bars && !taps)
         IMP_TRY(imp__error(ctx, IMP_E_ARG, "cotangents of taps without the taps"));
     job.slots = imp__alloc(ctx, (size_t)n_slots, sizeof *job.slots);
-    theta = imp__alloc(ctx, out->theta ? imp_max(field->n_theta, (size_t)1) : 1, sizeof *theta);
+    theta = imp__alloc(ctx, out->theta ? imp_max(field->n_theta, (size_t)1) : 1,
+                       sizeof *theta);
     surfaces = imp__alloc(ctx, job.n_surfaces + 1, sizeof *surfaces);
     if (!job.slots || !theta || !surfaces)
         IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a gradient"));
@@ -466,11 +484,15 @@ enum imp_status imp_bend_adjoint(const imp_field *field, const struct imp_bend_o
     if (sum.d) memset(sum.d, 0, rays->n * sizeof *sum.d);
     if (sum.energy) memset(sum.energy, 0, rays->n * sizeof *sum.energy);
 
-    const struct imp_loop loop = {
-        .n_items = (rays->n + job.slice - 1) / job.slice, .work = work, .commit = commit,
-        .payload = &job, .progress = plan.options.progress,
-        .progress_payload = plan.options.progress_payload, .stage = "adjoint",
-        .rate_unit = "rays", .units = (double)rays->n};
+    const struct imp_loop loop = {.n_items = (rays->n + job.slice - 1) / job.slice,
+                                  .work = work,
+                                  .commit = commit,
+                                  .payload = &job,
+                                  .progress = plan.options.progress,
+                                  .progress_payload = plan.options.progress_payload,
+                                  .stage = "adjoint",
+                                  .rate_unit = "rays",
+                                  .units = (double)rays->n};
     IMP_TRY(imp__parallel(ctx, &loop, NULL));
     if (out->theta) memcpy(out->theta, theta, field->n_theta * sizeof *theta);
     if (sum.surfaces) memcpy(out->surfaces, surfaces, job.n_surfaces * sizeof *surfaces);

@@ -4,7 +4,7 @@
 #include "bend.h"
 #include <string.h>
 
-#define RAYS_MAX ((size_t)1 << 31)
+#define RAYS_MAX   ((size_t)1 << 31)
 #define PIXELS_MAX ((size_t)1 << 26)
 
 enum imp_status imp_bend_create(imp_context *ctx, imp_field *field, imp_bend **out)
@@ -33,9 +33,9 @@ void imp_bend_destroy(imp_bend *b)
     }
     for (size_t i = 0; i < b->n_sdfs; i++) imp_field_destroy(b->sdfs[i]);
     for (size_t i = 0; i < b->n_scenes; i++) imp_scene_destroy(b->scenes[i]);
-    void *const owned[] = {b->surfaces, b->taps, b->x, b->d, b->power, b->group,
-                           b->bundle_first, b->targets, b->holds, b->smooths, b->sdfs,
-                           b->scenes, b->history, b->rows};
+    void *const owned[] = {b->surfaces, b->taps,         b->x,       b->d,     b->power,
+                           b->group,    b->bundle_first, b->targets, b->holds, b->smooths,
+                           b->sdfs,     b->scenes,       b->history, b->rows};
     for (size_t i = 0; i < imp_count(owned); i++) imp__release(ctx, owned[i]);
     imp_field_destroy(b->field);
     imp__release(ctx, b);
@@ -45,9 +45,13 @@ imp_field *imp_bend_field(imp_bend *b) { return b->field; }
 size_t imp_bend_n_rays(const imp_bend *b) { return b->n; }
 int imp_bend_n_bundles(const imp_bend *b) { return b->n_bundles; }
 size_t imp_bend_n_targets(const imp_bend *b) { return b->n_targets; }
-void imp_bend_get_rays(const imp_bend *b, struct imp_bend_rays *r) { *r = imp__bend_rays(b); }
+void imp_bend_get_rays(const imp_bend *b, struct imp_bend_rays *r)
+{
+    *r = imp__bend_rays(b);
+}
 
-enum imp_status imp_bend_get_target(const imp_bend *b, size_t i, struct imp_bend_target *t)
+enum imp_status imp_bend_get_target(const imp_bend *b, size_t i,
+                                    struct imp_bend_target *t)
 {
     if (i >= b->n_targets) return imp__error(b->ctx, IMP_E_ARG, "no target %zu", i);
     *t = b->targets[i].desc;
@@ -92,8 +96,10 @@ enum imp_status imp_bend_get_options(const imp_bend *b, struct imp_bend_options 
 {
     imp__bend_options(b, o);
     return o->step > 0 ? IMP_OK
-                       : imp__error(b->ctx, IMP_E_ARG, "a %s field has no cells to choose a "
-                                    "step by: give one", b->field->ops->name);
+                       : imp__error(b->ctx, IMP_E_ARG,
+                                    "a %s field has no cells to choose a "
+                                    "step by: give one",
+                                    b->field->ops->name);
 }
 
 static bool room(imp_context *ctx, void *array, size_t *capacity, size_t n, size_t size)
@@ -115,7 +121,8 @@ enum imp_status imp_bend_add_rays(imp_bend *b, size_t n, const double (*x)[3],
     for (size_t i = 0; i < n; i++)
         for (int k = 0; k < 3; k++)
             if (!isfinite(x[i][k]) || !isfinite(d[i][k]))
-                return imp__error(b->ctx, IMP_E_ARG, "ray %zu of the bundle is not finite", i);
+                return imp__error(b->ctx, IMP_E_ARG,
+                                  "ray %zu of the bundle is not finite", i);
     for (size_t i = 0; power && i < n; i++)
         if (!(power[i] >= 0) || !isfinite(power[i]))
             return imp__error(b->ctx, IMP_E_ARG, "ray %zu of the bundle has power %g", i,
@@ -147,16 +154,16 @@ static enum imp_status target_check(const imp_bend *b, const struct imp_bend_tar
     if ((int)t->type < 0 || t->type >= IMP_BEND_N_TARGETS)
         return imp__error(b->ctx, IMP_E_ARG, "no such target");
     if (t->bundle >= b->n_bundles || b->n == 0)
-        return imp__error(b->ctx, IMP_E_ARG, "target of bundle %d: there are %d", t->bundle,
-                          b->n_bundles);
+        return imp__error(b->ctx, IMP_E_ARG, "target of bundle %d: there are %d",
+                          t->bundle, b->n_bundles);
     if (t->tap >= (int)b->options.n_taps)
         return imp__error(b->ctx, IMP_E_ARG, "target at tap %d: there are %zu", t->tap,
                           b->options.n_taps);
     if (!(t->weight >= 0) || !isfinite(t->weight))
         return imp__error(b->ctx, IMP_E_ARG, "target of weight %g", t->weight);
     const imp_v3 n = imp__v3_load(t->normal);
-    if (t->at_plane && (!(imp__length(n) > 0) || !imp__is_finite(n) || !isfinite(t->offset) ||
-                        !(t->outside > 0)))
+    if (t->at_plane && (!(imp__length(n) > 0) || !imp__is_finite(n) ||
+                        !isfinite(t->offset) || !(t->outside > 0)))
         return imp__error(b->ctx, IMP_E_ARG, "target: no such plane");
     if ((t->type == IMP_BEND_POINTS || t->type == IMP_BEND_DIRECTIONS) && !t->data)
         return imp__error(b->ctx, IMP_E_ARG, "target without its data");
@@ -166,8 +173,9 @@ static enum imp_status target_check(const imp_bend *b, const struct imp_bend_tar
                   (size_t)t->width * (size_t)t->height > PIXELS_MAX ||
                   !(imp__length(imp__v3_load(t->u)) > 0) ||
                   !(imp__length(imp__v3_load(t->v)) > 0)))
-        return imp__error(b->ctx, IMP_E_ARG, "image target: no picture, %d x %d, or no extent",
-                          t->width, t->height);
+        return imp__error(b->ctx, IMP_E_ARG,
+                          "image target: no picture, %d x %d, or no extent", t->width,
+                          t->height);
     return IMP_OK;
 }
 
@@ -178,8 +186,13 @@ static size_t data_size(enum imp_bend_target_type type)
     case IMP_BEND_DIRECTIONS:
     case IMP_BEND_DEFLECTION: return 3;
     case IMP_BEND_PATH: return 1;
-    case IMP_BEND_FOCUS: case IMP_BEND_SPOT: case IMP_BEND_DIRECTION: case IMP_BEND_WAVEFRONT:
-    case IMP_BEND_IMAGE: case IMP_BEND_FARFIELD: case IMP_BEND_SHAPE: break;
+    case IMP_BEND_FOCUS:
+    case IMP_BEND_SPOT:
+    case IMP_BEND_DIRECTION:
+    case IMP_BEND_WAVEFRONT:
+    case IMP_BEND_IMAGE:
+    case IMP_BEND_FARFIELD:
+    case IMP_BEND_SHAPE: break;
     }
     return 0;
 }
@@ -206,14 +219,16 @@ enum imp_status imp_bend_add_target(imp_bend *b, const struct imp_bend_target *d
         t.desc.offset *= k;
     }
     for (size_t i = t.first; i < t.last; i++) t.power += b->power[i];
-    if (!(t.power > 0)) IMP_TRY(imp__error(ctx, IMP_E_ARG, "target of rays without power"));
+    if (!(t.power > 0))
+        IMP_TRY(imp__error(ctx, IMP_E_ARG, "target of rays without power"));
     if (n > 0) {
         t.data = imp__alloc(ctx, n, sizeof *t.data);
         if (!t.data) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a target"));
         if (desc->data) memcpy(t.data, desc->data, n * sizeof *t.data);
         for (size_t i = 0; i < n; i++)
             if (!isfinite(t.data[i]))
-                IMP_TRY(imp__error(ctx, IMP_E_ARG, "number %zu of a target is not finite", i));
+                IMP_TRY(imp__error(ctx, IMP_E_ARG, "number %zu of a target is not finite",
+                                   i));
     }
     if (n_pixels > 0) {
         double mean = 0;
@@ -225,8 +240,10 @@ enum imp_status imp_bend_add_target(imp_bend *b, const struct imp_bend_target *d
                                    (double)desc->pixels[i]));
             mean += desc->pixels[i] / (double)n_pixels;
         }
-        if (!(mean > 0)) IMP_TRY(imp__error(ctx, IMP_E_ARG, "a target picture that is black"));
-        for (size_t i = 0; i < n_pixels; i++) t.pixels[i] = (float)(desc->pixels[i] / mean);
+        if (!(mean > 0))
+            IMP_TRY(imp__error(ctx, IMP_E_ARG, "a target picture that is black"));
+        for (size_t i = 0; i < n_pixels; i++)
+            t.pixels[i] = (float)(desc->pixels[i] / mean);
     }
     t.desc.data = t.data;
     t.desc.pixels = t.pixels;
@@ -240,11 +257,12 @@ out:
     return st;
 }
 
-enum imp_status imp_bend_add_smoothness(imp_bend *b, double weight, int order, double edge)
+enum imp_status imp_bend_add_smoothness(imp_bend *b, double weight, int order,
+                                        double edge)
 {
     if (!(weight >= 0) || !isfinite(weight) || order < 1 || order > 2 || !(edge >= 0))
-        return imp__error(b->ctx, IMP_E_ARG, "smoothness of weight %g, order %d, edge %g", weight,
-                          order, edge);
+        return imp__error(b->ctx, IMP_E_ARG, "smoothness of weight %g, order %d, edge %g",
+                          weight, order, edge);
     if (!room(b->ctx, &b->smooths, &b->cap_smooths, b->n_smooths + 1, sizeof *b->smooths))
         return imp__error(b->ctx, IMP_E_NOMEM, "no memory for a regulariser");
     b->smooths[b->n_smooths++] = (struct imp__smooth){weight, edge, order};
@@ -259,7 +277,7 @@ enum imp_status imp_bend_set_bounds(imp_bend *b, double lo, double hi)
     return IMP_OK;
 }
 
-/* ---- Holds and bounds ----------------------------------------------------------------- */
+/* ---- Holds and bounds ---------------------------------------------------------- */
 
 static enum imp_status hold_add(imp_bend *b, const struct imp__hold *h)
 {
@@ -283,26 +301,33 @@ enum imp_status imp_bend_hold_rim(imp_bend *b, int layers, double value)
 {
     if (layers < 1 || layers > 1000)
         return imp__error(b->ctx, IMP_E_ARG, "a rim of %d layers", layers);
-    return hold_add(b, &(struct imp__hold){.kind = IMP_HOLD_RIM, .layers = layers,
-                                           .value = value});
+    return hold_add(
+        b, &(struct imp__hold){.kind = IMP_HOLD_RIM, .layers = layers, .value = value});
 }
 enum imp_status imp_bend_hold_outside(imp_bend *b, const double centre[3], double radius,
                                       double value)
 {
-    if (!(radius > 0)) return imp__error(b->ctx, IMP_E_ARG, "a sphere of radius %g", radius);
-    return hold_add(b, &(struct imp__hold){.kind = IMP_HOLD_OUTSIDE, .radius = radius,
-                                           .centre = imp__v3_load(centre), .value = value});
+    if (!(radius > 0))
+        return imp__error(b->ctx, IMP_E_ARG, "a sphere of radius %g", radius);
+    return hold_add(b, &(struct imp__hold){.kind = IMP_HOLD_OUTSIDE,
+                                           .radius = radius,
+                                           .centre = imp__v3_load(centre),
+                                           .value = value});
 }
 enum imp_status imp_bend_hold_number(imp_bend *b, size_t i, double value)
 {
     if (i >= b->field->n_theta)
         return imp__error(b->ctx, IMP_E_ARG, "number %zu of a field that has %zu", i,
                           b->field->n_theta);
-    return hold_add(b, &(struct imp__hold){.kind = IMP_HOLD_NUMBER, .number = i,
-                                           .value = value});
+    return hold_add(
+        b, &(struct imp__hold){.kind = IMP_HOLD_NUMBER, .number = i, .value = value});
 }
 
-struct hold_job { const struct imp__hold *hold; uint8_t *mask; double *theta; };
+struct hold_job {
+    const struct imp__hold *hold;
+    uint8_t *mask;
+    double *theta;
+};
 
 static void hold_leaf(imp_field *f, size_t offset, void *payload)
 {
@@ -311,7 +336,8 @@ static void hold_leaf(imp_field *f, size_t offset, void *payload)
     if (!imp__field_is_grid(f)) return;
     const struct imp__grid *g = (const struct imp__grid *)f;
     const int first = g->desc.interp == IMP_FIELD_SPLINE ? -1 : 0;
-    const double value = g->desc.param == IMP_FIELD_ETA2 ? h->value * h->value / 2 : h->value;
+    const double value =
+        g->desc.param == IMP_FIELD_ETA2 ? h->value * h->value / 2 : h->value;
     size_t at = offset;
     for (int k = 0; k < g->nodes[2]; k++)
         for (int jj = 0; jj < g->nodes[1]; jj++)
@@ -320,7 +346,8 @@ static void hold_leaf(imp_field *f, size_t offset, void *payload)
                 bool held = false;
                 if (h->kind == IMP_HOLD_RIM) {
                     for (int a = 0; a < 3; a++)
-                        held |= index[a] < h->layers || index[a] >= g->nodes[a] - h->layers;
+                        held |=
+                            index[a] < h->layers || index[a] >= g->nodes[a] - h->layers;
                 } else {
                     imp_v3 x = {0};
                     for (int a = 0; a < 3; a++)
@@ -347,10 +374,13 @@ void imp__bend_hold(const imp_bend *b, uint8_t *mask, double *theta)
     }
 }
 
-struct bounds_job { const imp_bend *b; double *lo, *hi; };
+struct bounds_job {
+    const imp_bend *b;
+    double *lo, *hi;
+};
 
-/* Bounds are on the index: on coefficients where these are indices (spline weights are >= 0
- * and sum to 1), not on the numbers of profiles. */
+/* Bounds are on the index: on coefficients where these are indices (spline weights are >=
+ * 0 and sum to 1), not on the numbers of profiles. */
 static void bounds_leaf(imp_field *f, size_t offset, void *payload)
 {
     const struct bounds_job *j = payload;
@@ -359,7 +389,8 @@ static void bounds_leaf(imp_field *f, size_t offset, void *payload)
     if (grid && ((const struct imp__grid *)f)->desc.param == IMP_FIELD_ETA2)
         lo = lo * fabs(lo) / 2, hi = hi * hi / 2;
     if (!grid && f->ops != &imp__field_radial) lo = -INFINITY, hi = INFINITY;
-    for (size_t i = 0; i < f->n_theta; i++) j->lo[offset + i] = lo, j->hi[offset + i] = hi;
+    for (size_t i = 0; i < f->n_theta; i++)
+        j->lo[offset + i] = lo, j->hi[offset + i] = hi;
 }
 void imp__bend_bounds(const imp_bend *b, double *lo, double *hi)
 {
@@ -367,5 +398,6 @@ void imp__bend_bounds(const imp_bend *b, double *lo, double *hi)
     imp__field_leaves(b->field, 0, bounds_leaf, &j);
     /* In a sum a part may be below the index's bound: the sum is what is bounded. */
     if (b->field->ops == &imp__field_sum && !b->bounds_set)
-        for (size_t i = 0; i < b->field->n_theta; i++) lo[i] = -INFINITY, hi[i] = INFINITY;
+        for (size_t i = 0; i < b->field->n_theta; i++)
+            lo[i] = -INFINITY, hi[i] = INFINITY;
 }

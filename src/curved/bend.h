@@ -1,21 +1,21 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A problem of bent rays: what is held between bend.c (making it), target.c and image.c (what
- * the rays should do), objective.c (value and gradient) and fit.c. */
+ * A problem of bent rays: what is held between bend.c (making it), target.c and image.c
+ * (what the rays should do), objective.c (value and gradient) and fit.c. */
 #ifndef IMP_CURVED_BEND_H
 #define IMP_CURVED_BEND_H
 
 #include "curved.h"
 
 struct imp__target_of_rays {
-    struct imp_bend_target desc;   /* data, pixels point to copies */
+    struct imp_bend_target desc; /* data, pixels point to copies */
     double *data;
-    float *pixels;                 /* divided by their mean */
-    size_t first, last;            /* rays */
-    double power;                  /* of these rays together */
+    float *pixels;      /* divided by their mean */
+    size_t first, last; /* rays */
+    double power;       /* of these rays together */
 };
 
-struct imp__hold {                 /* rules, applied again on finer levels */
+struct imp__hold { /* rules, applied again on finer levels */
     enum { IMP_HOLD_RIM, IMP_HOLD_OUTSIDE, IMP_HOLD_NUMBER } kind;
     int layers;
     imp_v3 centre;
@@ -23,7 +23,10 @@ struct imp__hold {                 /* rules, applied again on finer levels */
     size_t number;
 };
 
-struct imp__smooth { double weight, edge; int order; };
+struct imp__smooth {
+    double weight, edge;
+    int order;
+};
 
 struct imp_bend {
     imp_context *ctx;
@@ -39,7 +42,7 @@ struct imp_bend {
     double (*x)[3], (*d)[3], *power;
     uint16_t *group;
     int n_bundles;
-    size_t *bundle_first;          /* [n_bundles + 1] */
+    size_t *bundle_first; /* [n_bundles + 1] */
     size_t cap_bundles;
 
     size_t n_targets, cap_targets;
@@ -49,14 +52,14 @@ struct imp_bend {
     size_t n_smooths, cap_smooths;
     struct imp__smooth *smooths;
 
-    imp_field **sdfs;              /* owned, made by the loader */
+    imp_field **sdfs; /* owned, made by the loader */
     size_t n_sdfs, cap_sdfs;
-    imp_scene **scenes;            /* of mesh surfaces, likewise */
+    imp_scene **scenes; /* of mesh surfaces, likewise */
     size_t n_scenes, cap_scenes;
 
-    struct imp_check_row *rows;    /* of the last check */
+    struct imp_check_row *rows; /* of the last check */
     size_t n_rows, cap_rows;
-    double *history;               /* of the last fit */
+    double *history; /* of the last fit */
     size_t n_history, cap_history;
 };
 
@@ -64,11 +67,12 @@ struct imp_bend {
 void imp__bend_options(const imp_bend *b, struct imp_bend_options *o);
 static inline struct imp_bend_rays imp__bend_rays(const imp_bend *b)
 {
-    return (struct imp_bend_rays){b->n, (const double (*)[3])b->x, (const double (*)[3])b->d,
-                                  b->group};
+    return (struct imp_bend_rays){b->n, (const double(*)[3])b->x,
+                                  (const double(*)[3])b->d, b->group};
 }
 
-/* Leaves of a field: itself, or the parts of a sum. `offset`: of its theta in the whole. */
+/* Leaves of a field: itself, or the parts of a sum. `offset`: of its theta in the whole.
+ */
 void imp__field_leaves(imp_field *f, size_t offset,
                        void (*each)(imp_field *leaf, size_t offset, void *payload),
                        void *payload);
@@ -79,17 +83,19 @@ void imp__bend_hold(const imp_bend *b, uint8_t *mask, double *theta);
 void imp__bend_bounds(const imp_bend *b, double *lo, double *hi);
 
 /* Where a ray arrives, and back. */
-struct imp__arrival { imp_v3 x, d, v; double path, weight, s, slope; };
+struct imp__arrival {
+    imp_v3 x, d, v;
+    double path, weight, s, slope;
+};
 bool imp__arrive(const struct imp_bend_target *t, const struct imp_bend_exit *e,
                  struct imp__arrival *a);
 /* Adds to the exit's cotangent; d_bar of the direction, v_bar of the momentum itself. */
-void imp__arrive_vjp(const struct imp_bend_target *t, const struct imp__arrival *a, imp_v3 x_bar,
-                     imp_v3 d_bar, imp_v3 v_bar, double path_bar, double weight_bar,
-                     struct imp_bend_cotangent *bar);
-static inline const struct imp_bend_exit *imp__target_exit(const struct imp_bend_target *t,
-                                                           const struct imp_bend_exit *exits,
-                                                           const struct imp_bend_exit *taps,
-                                                           size_t n_taps, size_t i)
+void imp__arrive_vjp(const struct imp_bend_target *t, const struct imp__arrival *a,
+                     imp_v3 x_bar, imp_v3 d_bar, imp_v3 v_bar, double path_bar,
+                     double weight_bar, struct imp_bend_cotangent *bar);
+static inline const struct imp_bend_exit *
+imp__target_exit(const struct imp_bend_target *t, const struct imp_bend_exit *exits,
+                 const struct imp_bend_exit *taps, size_t n_taps, size_t i)
 {
     return t->tap < 0 ? &exits[i] : &taps[i * n_taps + (size_t)t->tap];
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A problem of bent rays checks itself: the identities that its gradient must satisfy, and
- * how far its steps are from the rays of the field. */
+ * A problem of bent rays checks itself: the identities that its gradient must satisfy,
+ * and how far its steps are from the rays of the field. */
 #include "bend.h"
 #include "math/rng.h"
 #include <string.h>
@@ -13,7 +13,8 @@ static double random_pm(uint64_t stream, uint64_t i)
 
 static enum imp_status row_add(imp_bend *b, struct imp_check_row row)
 {
-    void *grown = imp__grow(b->ctx, b->rows, &b->cap_rows, b->n_rows + 1, sizeof *b->rows);
+    void *grown =
+        imp__grow(b->ctx, b->rows, &b->cap_rows, b->n_rows + 1, sizeof *b->rows);
     if (!grown) return imp__error(b->ctx, IMP_E_NOMEM, "no memory for a check");
     b->rows = grown;
     row.ok = row.limit <= 0 || row.error <= row.limit;
@@ -21,15 +22,17 @@ static enum imp_status row_add(imp_bend *b, struct imp_check_row row)
     return IMP_OK;
 }
 
-/* ---- The step ------------------------------------------------------------------------- */
+/* ---- The step ------------------------------------------------------------------ */
 
-enum imp_status imp_bend_step_error(imp_bend *b, size_t pilots, double *error, double *order)
+enum imp_status imp_bend_step_error(imp_bend *b, size_t pilots, double *error,
+                                    double *order)
 {
     enum imp_status st = IMP_OK;
     struct imp_bend_options o;
     const size_t stride = imp_max(b->n / imp_max(pilots, (size_t)1), (size_t)1);
     const size_t n = b->n ? (b->n + stride - 1) / stride : 0;
-    double (*x)[3] = imp__alloc(b->ctx, n + 1, sizeof *x), (*d)[3] = imp__alloc(b->ctx, n + 1, sizeof *d);
+    double(*x)[3] = imp__alloc(b->ctx, n + 1, sizeof *x),
+    (*d)[3] = imp__alloc(b->ctx, n + 1, sizeof *d);
     uint16_t *group = imp__alloc(b->ctx, n + 1, sizeof *group);
     struct imp_bend_exit *e = imp__alloc(b->ctx, 3 * n + 1, sizeof *e);
     double sum[2] = {0}, used = 0;
@@ -42,7 +45,8 @@ enum imp_status imp_bend_step_error(imp_bend *b, size_t pilots, double *error, d
         memcpy(d[i], b->d[i * stride], sizeof *d);
         group[i] = b->group[i * stride];
     }
-    const struct imp_bend_rays r = {n, (const double (*)[3])x, (const double (*)[3])d, group};
+    const struct imp_bend_rays r = {n, (const double(*)[3])x, (const double(*)[3])d,
+                                    group};
     for (int k = 0; k < 3; k++, o.step /= 2)
         IMP_TRY(imp_bend_trace(b->field, &o, &r, e + (size_t)k * n, NULL, NULL));
     for (size_t i = 0; i < n; i++) {
@@ -54,7 +58,8 @@ enum imp_status imp_bend_step_error(imp_bend *b, size_t pilots, double *error, d
             sum[1] += imp__sqr(h->x[k] - q->x[k]);
         }
     }
-    const double d0 = used > 0 ? sqrt(sum[0] / used) : NAN, d1 = used > 0 ? sqrt(sum[1] / used) : NAN;
+    const double d0 = used > 0 ? sqrt(sum[0] / used) : NAN,
+                 d1 = used > 0 ? sqrt(sum[1] / used) : NAN;
     const double p = d1 > 1e-14 && d0 > d1 ? log2(d0 / d1) : 0;
     /* |x_t - x_{t/2}| = error(t) (1 - 2^-p) (curved-rays 2.5) */
     if (error) *error = p > 0 ? d0 / (1 - exp2(-p)) : d0;
@@ -65,7 +70,7 @@ out:
     return st;
 }
 
-/* ---- The gradient --------------------------------------------------------------------- */
+/* ---- The gradient -------------------------------------------------------------- */
 
 static enum imp_status check_transpose(imp_bend *b, const double *dot, double *bar)
 {
@@ -84,8 +89,10 @@ static enum imp_status check_transpose(imp_bend *b, const double *dot, double *b
             left += bar[i] * dot[i], scale += fabs(bar[i] * dot[i]);
         worst = fmax(worst, fabs(left - (0.7 * eta_dot + imp__dot(g, g_dot))) / scale);
     }
-    return row_add(b, (struct imp_check_row){.method = "transpose", .param = f->ops->name,
-                                             .error = worst, .limit = 1e-12});
+    return row_add(b, (struct imp_check_row){.method = "transpose",
+                                             .param = f->ops->name,
+                                             .error = worst,
+                                             .limit = 1e-12});
 }
 
 static enum imp_status check_dot(imp_bend *b, const double *dot, double *bar)
@@ -97,15 +104,18 @@ static enum imp_status check_dot(imp_bend *b, const double *dot, double *bar)
     const size_t taps = b->n * b->options.n_taps;
     struct imp_bend_exit *e = imp__alloc(b->ctx, b->n, sizeof *e);
     struct imp_bend_exit *te = imp__alloc(b->ctx, taps + 1, sizeof *te);
-    struct imp_bend_cotangent *c = imp__alloc(b->ctx, 2 * b->n, sizeof *c), *d = c ? c + b->n : NULL;
+    struct imp_bend_cotangent *c = imp__alloc(b->ctx, 2 * b->n, sizeof *c),
+                              *d = c ? c + b->n : NULL;
     struct imp_bend_gradient g = IMP_BEND_GRADIENT_INIT;
     double left = 0, right = 0, scale = 1e-300;
-    if (!e || !te || !c) IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "no memory for a check"));
+    if (!e || !te || !c)
+        IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "no memory for a check"));
     IMP_TRY(imp_bend_get_options(b, &o));
     IMP_TRY(imp_bend_trace(b->field, &o, &r, e, te, NULL));
     for (size_t i = 0; i < b->n; i++) {
         for (int k = 0; k < 3; k++)
-            c[i].x[k] = random_pm(4 + (uint64_t)k, i), c[i].v[k] = random_pm(7 + (uint64_t)k, i);
+            c[i].x[k] = random_pm(4 + (uint64_t)k, i),
+            c[i].v[k] = random_pm(7 + (uint64_t)k, i);
         c[i].path = random_pm(10, i);
     }
     g.theta = bar;
@@ -119,16 +129,22 @@ static enum imp_status check_dot(imp_bend *b, const double *dot, double *bar)
         right += s;
         scale += fabs(s);
     }
-    IMP_TRY(row_add(b, (struct imp_check_row){.method = "dot", .param = b->field->ops->name,
-                                              .value = left, .reference = right,
+    IMP_TRY(row_add(b, (struct imp_check_row){.method = "dot",
+                                              .param = b->field->ops->name,
+                                              .value = left,
+                                              .reference = right,
                                               .error = fabs(left - right) / scale,
                                               .limit = 1e-12}));
-    IMP_TRY(row_add(b, (struct imp_check_row){.method = "reversal", .param = "positions",
+    IMP_TRY(row_add(b, (struct imp_check_row){.method = "reversal",
+                                              .param = "positions",
                                               .value = (double)stats.reversal,
-                                              .error = stats.worst_reversal, .limit = 1e-10}));
-    IMP_TRY(row_add(b, (struct imp_check_row){.method = "energy", .param = "|v|^2/eta^2 - 1",
+                                              .error = stats.worst_reversal,
+                                              .limit = 1e-10}));
+    IMP_TRY(row_add(b, (struct imp_check_row){.method = "energy",
+                                              .param = "|v|^2/eta^2 - 1",
                                               .value = (double)stats.energy,
-                                              .error = stats.worst_energy, .limit = 0.01}));
+                                              .error = stats.worst_energy,
+                                              .limit = 0.01}));
 out:
     imp__release(b->ctx, e), imp__release(b->ctx, te), imp__release(b->ctx, c);
     return st;
@@ -139,7 +155,8 @@ static enum imp_status check_differences(imp_bend *b, double *dot, double *bar)
 {
     enum imp_status st = IMP_OK;
     const size_t n = b->field->n_theta;
-    double *theta = imp__alloc(b->ctx, 2 * n + 1, sizeof *theta), *moved = theta ? theta + n : NULL;
+    double *theta = imp__alloc(b->ctx, 2 * n + 1, sizeof *theta),
+           *moved = theta ? theta + n : NULL;
     double value, want = 0, most = 0, f[2];
     if (!theta) return imp__error(b->ctx, IMP_E_NOMEM, "no memory for a check");
     imp_field_get_theta(b->field, theta);
@@ -149,23 +166,29 @@ static enum imp_status check_differences(imp_bend *b, double *dot, double *bar)
         dot[i] = most > 0 ? bar[i] / most : 0;
         want += bar[i] * dot[i];
     }
-    const bool smooth = b->field->ops != &imp__field_trilinear && b->field->ops != &imp__field_sum;
+    const bool smooth =
+        b->field->ops != &imp__field_trilinear && b->field->ops != &imp__field_sum;
     for (int k = 2; k <= 8 && want > 0; k++) {
         const double eps = pow(10, -k);
         for (int side = 0; side < 2; side++) {
-            for (size_t i = 0; i < n; i++) moved[i] = theta[i] + (side ? -eps : eps) * dot[i];
+            for (size_t i = 0; i < n; i++)
+                moved[i] = theta[i] + (side ? -eps : eps) * dot[i];
             IMP_TRY(imp_field_set_theta(b->field, moved));
             IMP_TRY(imp_bend_objective(b, &f[side], NULL, NULL, NULL));
         }
-        /* Curvature of the objective at large steps, rounding at small ones: the middle must
-         * agree; of trilinear fields, the smallest (curved-rays 3.3). */
+        /* Curvature of the objective at large steps, rounding at small ones: the middle
+         * must agree; of trilinear fields, the smallest (curved-rays 3.3). */
         const double fd = (f[0] - f[1]) / (2 * eps);
         const double rounding = 1e-14 * fabs(value) / eps / want;
         const bool judged = smooth ? k >= 4 && k <= 6 : k == 8;
-        IMP_TRY(row_add(b, (struct imp_check_row){.method = "difference", .param = "objective",
-                                                  .step = eps, .value = want, .reference = fd,
-                                                  .error = fabs(fd / want - 1),
-                                                  .limit = judged ? 1e-4 + rounding : 0}));
+        IMP_TRY(
+            row_add(b, (struct imp_check_row){.method = "difference",
+                                              .param = "objective",
+                                              .step = eps,
+                                              .value = want,
+                                              .reference = fd,
+                                              .error = fabs(fd / want - 1),
+                                              .limit = judged ? 1e-4 + rounding : 0}));
     }
     IMP_TRY(imp_field_set_theta(b->field, theta));
 out:
@@ -173,7 +196,8 @@ out:
     return st;
 }
 
-enum imp_status imp_bend_check(imp_bend *b, const struct imp_check_row **rows, size_t *n_rows)
+enum imp_status imp_bend_check(imp_bend *b, const struct imp_check_row **rows,
+                               size_t *n_rows)
 {
     enum imp_status st = IMP_OK;
     const size_t n = b->field->n_theta;
@@ -187,8 +211,10 @@ enum imp_status imp_bend_check(imp_bend *b, const struct imp_check_row **rows, s
     IMP_TRY(check_dot(b, dot, bar));
     if (b->n_targets > 0) IMP_TRY(check_differences(b, dot, bar));
     IMP_TRY(imp_bend_step_error(b, 200, &error, &order));
-    IMP_TRY(row_add(b, (struct imp_check_row){.method = "step", .param = "rms of exits",
-                                              .value = order, .error = error}));
+    IMP_TRY(row_add(b, (struct imp_check_row){.method = "step",
+                                              .param = "rms of exits",
+                                              .value = order,
+                                              .error = error}));
     *rows = b->rows;
     *n_rows = b->n_rows;
 out:

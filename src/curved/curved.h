@@ -1,23 +1,23 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The room of bent rays. A field kind is a table of functions (eval, splat, tangent); a step
- * scheme is a list of drifts and kicks; a surface is where a ray ends or turns. Everything
- * that moves a ray, forwards, backwards or along a tangent, reads the same list, so the
- * derivative is that of the program that traces. Equation numbers: Teh et al. 2022,
- * supplement, with the corrections of docs/curved-rays.md. */
+ * The room of bent rays. A field kind is a table of functions (eval, splat, tangent); a
+ * step scheme is a list of drifts and kicks; a surface is where a ray ends or turns.
+ * Everything that moves a ray, forwards, backwards or along a tangent, reads the same
+ * list, so the derivative is that of the program that traces. Equation numbers: Teh et
+ * al. 2022, supplement, with the corrections of docs/curved-rays.md. */
 #ifndef IMP_CURVED_CURVED_H
 #define IMP_CURVED_CURVED_H
 
-#include <importon/bend.h>
 #include "base/pool.h"
 #include "math/vec.h"
+#include <importon/bend.h>
 
-#define IMP_LANES 8             /* rays traced side by side, to hide the latency of loads */
-#define IMP_BEND_TAPS_MAX 16
+#define IMP_LANES             8 /* rays traced side by side, to hide the latency of loads */
+#define IMP_BEND_TAPS_MAX     16
 #define IMP_BEND_SEGMENTS_MAX 64
-#define IMP_FIELD_THETA_MAX ((size_t)1 << 30)
+#define IMP_FIELD_THETA_MAX   ((size_t)1 << 30)
 
-/* ---- Fields ------------------------------------------------------------------------ */
+/* ---- Fields -------------------------------------------------------------------- */
 
 /* Value, gradient and (symmetric) Hessian by columns. */
 struct imp__jet {
@@ -28,7 +28,8 @@ struct imp__jet {
 struct imp__field_ops {
     const char *name;
     /* At n <= IMP_LANES points. order 1: h is not touched. */
-    void (*eval)(const imp_field *f, int n, const imp_v3 *x, int order, struct imp__jet *jet);
+    void (*eval)(const imp_field *f, int n, const imp_v3 *x, int order,
+                 struct imp__jet *jet);
     /* theta_bar += a d eta/d theta + b . d g/d theta: the transpose of `tangent`. */
     void (*splat)(const imp_field *f, const imp_v3 *x, double a, const imp_v3 *b,
                   double *theta_bar);
@@ -36,10 +37,11 @@ struct imp__field_ops {
                     double *eta_dot, imp_v3 *g_dot);
     /* theta has new values; NULL: nothing to do. */
     void (*changed)(imp_field *f);
-    void (*destroy)(imp_field *f);   /* what the kind holds besides theta; may be NULL */
+    void (*destroy)(imp_field *f); /* what the kind holds besides theta; may be NULL */
     /* theta is about to live elsewhere (inside a sum); NULL: nothing to do. */
     void (*moved)(imp_field *f);
-    const char *(*param_name)(const imp_field *f, size_t i); /* NULL: numbers without names */
+    const char *(*param_name)(const imp_field *f,
+                              size_t i); /* NULL: numbers without names */
 };
 
 struct imp_field {
@@ -47,13 +49,13 @@ struct imp_field {
     imp_context *ctx;
     size_t n_theta;
     double *theta;
-    bool borrowed;         /* theta belongs to a sum */
-    imp_v3 lo, hi;         /* where it is defined; infinite for profiles */
-    double spacing;        /* of samples, the smallest; 0: none */
+    bool borrowed;  /* theta belongs to a sum */
+    imp_v3 lo, hi;  /* where it is defined; infinite for profiles */
+    double spacing; /* of samples, the smallest; 0: none */
 };
 
-/* Set ops, n_theta, bounds (infinite) and allocate theta. `size` of the kind's struct, whose
- * first member is the field. */
+/* Set ops, n_theta, bounds (infinite) and allocate theta. `size` of the kind's struct,
+ * whose first member is the field. */
 enum imp_status imp__field_new(imp_context *ctx, const struct imp__field_ops *ops,
                                size_t size, size_t n_theta, imp_field **out);
 
@@ -66,17 +68,17 @@ static inline imp_v3 imp__jet_times(const struct imp__jet *j, imp_v3 m) /* H m *
 {
     return j->h[0] * m[0] + j->h[1] * m[1] + j->h[2] * m[2];
 }
-/* Greatest index: of grids the greatest coefficient, otherwise sampled along the diagonals
- * of lo..hi. */
+/* Greatest index: of grids the greatest coefficient, otherwise sampled along the
+ * diagonals of lo..hi. */
 double imp__field_index_max(const imp_field *f);
 
 /* grid.c: spline and trilinear share nodes, files and levels. */
 struct imp__grid {
     imp_field base;
     struct imp_field_grid desc;
-    int nodes[3];          /* x, y, z */
-    imp_v3 origin, inv_h;  /* corner of cell 0; cells per length */
-    float *single;         /* theta as floats, NULL: double is used */
+    int nodes[3];         /* x, y, z */
+    imp_v3 origin, inv_h; /* corner of cell 0; cells per length */
+    float *single;        /* theta as floats, NULL: double is used */
 };
 bool imp__field_is_grid(const imp_field *f);
 void imp__grid_changed(imp_field *f);
@@ -93,7 +95,8 @@ static inline void imp__jet_from_eta2(struct imp__jet *j, int order)
     if (order < 2) return;
     for (int k = 0; k < 3; k++) j->h[k] = (j->h[k] - j->g * j->g[k]) * inv;
 }
-/* d eta = du/eta, dg = (d grad u - g d eta)/eta: cotangents of eta, g -> of u, grad u ... */
+/* d eta = du/eta, dg = (d grad u - g d eta)/eta: cotangents of eta, g -> of u, grad u ...
+ */
 static inline void imp__eta2_vjp(const struct imp__jet *at, double *a, imp_v3 *b)
 {
     const double inv = 1 / at->eta;
@@ -112,36 +115,43 @@ struct imp__radial {
     imp_field base;
     struct imp_field_radial desc;
     imp_v3 centre, axis;
-    double h;              /* spacing in u = r^2 */
+    double h; /* spacing in u = r^2 */
 };
 
 /* Profile kinds by index, NULL past the last; names of their numbers. */
 const char *imp__profile_kind(size_t i);
 const char *imp__profile_param(const char *kind, size_t i);
 
-/* ---- Schemes ----------------------------------------------------------------------- */
+/* ---- Schemes ------------------------------------------------------------------- */
 
-struct imp__stage { bool kick; double part; };
+struct imp__stage {
+    bool kick;
+    double part;
+};
 struct imp__scheme {
     const char *name;
     int order;
-    bool arc;              /* the parameter is length, the kick is linear in eta */
-    bool index_form;       /* supplement (23), (24): its own step, no stages */
+    bool arc;        /* the parameter is length, the kick is linear in eta */
+    bool index_form; /* supplement (23), (24): its own step, no stages */
     int n_stages;
     struct imp__stage stage[8];
 };
 extern const struct imp__scheme imp__schemes[IMP_BEND_N_SCHEMES];
 
 /* Position, momentum, optical path. */
-struct imp__state { imp_v3 x, v; double path; };
+struct imp__state {
+    imp_v3 x, v;
+    double path;
+};
 
 /* One step of length t for n <= IMP_LANES rays; arrays beside each other. */
-void imp__step(const struct imp__scheme *s, const imp_field *f, double t, int n, imp_v3 *x,
-               imp_v3 *v, double *path);
+void imp__step(const struct imp__scheme *s, const imp_field *f, double t, int n,
+               imp_v3 *x, imp_v3 *v, double *path);
 /* The same for one ray, with d/dt of everything. */
 void imp__step_rate(const struct imp__scheme *s, const imp_field *f, double t,
                     struct imp__state *state, struct imp__state *rate);
-/* Tangent: `dot` goes with `state` (dot->path too); t is held fixed; theta_dot may be NULL. */
+/* Tangent: `dot` goes with `state` (dot->path too); t is held fixed; theta_dot may be
+ * NULL. */
 void imp__step_tangent(const struct imp__scheme *s, const imp_field *f, double t,
                        const double *theta_dot, struct imp__state *state,
                        struct imp__state *dot);
@@ -155,36 +165,50 @@ void imp__step_adjoint(const struct imp__scheme *s, const imp_field *f, double t
                        struct imp__back *b, const struct imp__state *const *before,
                        double *theta_bar);
 
-/* ---- Surfaces ---------------------------------------------------------------------- */
+/* ---- Surfaces ------------------------------------------------------------------ */
 
 enum imp__surface_kind {
-    IMP__PLANE, IMP__SPHERE, IMP__CYLINDER, IMP__DISC, IMP__SDF, IMP__APPROACH, IMP__MESH
+    IMP__PLANE,
+    IMP__SPHERE,
+    IMP__CYLINDER,
+    IMP__DISC,
+    IMP__SDF,
+    IMP__APPROACH,
+    IMP__MESH
 };
-/* Where a box has become six planes. G < 0 inside; a crossing is G going from <= 0 to > 0. */
+/* Where a box has become six planes. G < 0 inside; a crossing is G going from <= 0 to >
+ * 0. */
 struct imp__surface {
     enum imp__surface_kind kind;
     enum imp_bend_event event;
-    int id;                /* index in options.surfaces */
-    imp_v3 n, c;           /* normal or axis; centre */
+    int id;      /* index in options.surfaces */
+    imp_v3 n, c; /* normal or axis; centre */
     double offset, radius, index;
     const imp_field *sdf;
     const imp_scene *scene; /* MESH: what is hit gives n and offset of the facet */
 };
 /* G, its gradients in x and v, and Hess_x G times a vector. */
-struct imp__surface_at { double g; imp_v3 gx, gv; };
+struct imp__surface_at {
+    double g;
+    imp_v3 gx, gv;
+};
 void imp__surface_eval(const struct imp__surface *s, const imp_v3 *x, const imp_v3 *v,
                        struct imp__surface_at *at);
 void imp__surface_hess(const struct imp__surface *s, const imp_v3 *x, const imp_v3 *m,
                        imp_v3 *out);
 /* Is a crossing at x one (a disc has a rim)? */
-/* The first facet of a MESH surface that the way from a to b crosses outwards (inwards: from
- * outside), as a plane. */
-bool imp__facet(const struct imp__surface *s, const imp_v3 *a, const imp_v3 *b, bool inwards,
-                double nearest, struct imp__surface *facet);
+/* The first facet of a MESH surface that the way from a to b crosses outwards (inwards:
+ * from outside), as a plane. */
+bool imp__facet(const struct imp__surface *s, const imp_v3 *a, const imp_v3 *b,
+                bool inwards, double nearest, struct imp__surface *facet);
 bool imp__surface_covers(const struct imp__surface *s, const imp_v3 *x);
 
 /* Momentum v through a surface at unit normal n into index e2 (curved-rays 3.5). */
-struct imp__turn { imp_v3 v; bool reflected; double a, q, c, sign; };
+struct imp__turn {
+    imp_v3 v;
+    bool reflected;
+    double a, q, c, sign;
+};
 void imp__turn(const imp_v3 *n, const imp_v3 *v, double e2, bool mirror,
                struct imp__turn *out);
 /* Cotangents of v', -> of v, n, e2. */
@@ -193,11 +217,11 @@ void imp__turn_vjp(const struct imp__turn *t, const imp_v3 *n, const imp_v3 *v, 
 void imp__turn_jvp(const struct imp__turn *t, const imp_v3 *n, const imp_v3 *v, double e2,
                    const imp_v3 *v_dot, const imp_v3 *n_dot, double e2_dot, imp_v3 *dot);
 
-/* ---- Plans: options made ready ------------------------------------------------------ */
+/* ---- Plans: options made ready ------------------------------------------------- */
 
-struct imp__domain {       /* what one group of rays meets */
-    imp_v3 lo, hi;         /* inside this box no box face is met and the field is defined */
-    int n, n_general;      /* the last n_general are not faces of boxes */
+struct imp__domain {  /* what one group of rays meets */
+    imp_v3 lo, hi;    /* inside this box no box face is met and the field is defined */
+    int n, n_general; /* the last n_general are not faces of boxes */
     struct imp__surface *surface;
 };
 struct imp__plan {
@@ -206,38 +230,40 @@ struct imp__plan {
     const struct imp__scheme *scheme;
     struct imp_bend_options options;
     double t, grazing, outside_index, reversal;
-    double size;           /* a length of the whole: the field's or the rays' box */
-    imp_v3 lo, hi;         /* a ray outside this has left the field: its box and a margin */
+    double size;   /* a length of the whole: the field's or the rays' box */
+    imp_v3 lo, hi; /* a ray outside this has left the field: its box and a margin */
     uint32_t max_steps;
     int n_groups;
-    struct imp__domain *domain;   /* [n_groups + 1]; the last: groups without their own */
+    struct imp__domain *domain; /* [n_groups + 1]; the last: groups without their own */
     struct imp__surface *surfaces;
     struct imp__surface taps[IMP_BEND_TAPS_MAX];
     int tap_group[IMP_BEND_TAPS_MAX];
     int n_taps;
 };
-enum imp_status imp__plan_create(const imp_field *field, const struct imp_bend_options *options,
+enum imp_status imp__plan_create(const imp_field *field,
+                                 const struct imp_bend_options *options,
                                  const struct imp_bend_rays *rays, struct imp__plan *out);
 void imp__plan_destroy(struct imp__plan *plan);
 static inline int imp__ray_group(const struct imp_bend_rays *rays, size_t i)
 {
     return rays->group ? rays->group[i] : 0;
 }
-static inline const struct imp__domain *imp__plan_domain(const struct imp__plan *p, int group)
+static inline const struct imp__domain *imp__plan_domain(const struct imp__plan *p,
+                                                         int group)
 {
     return &p->domain[group < p->n_groups ? group : p->n_groups];
 }
 
 /* Start of ray i: position, momentum; for rays from outside also where they come from. */
 struct imp__start {
-    imp_v3 x0, d0;         /* as given, d0 unit */
-    double length;         /* |d| as given */
-    struct imp__state at;  /* where the steps begin */
+    imp_v3 x0, d0;                    /* as given, d0 unit */
+    double length;                    /* |d| as given */
+    struct imp__state at;             /* where the steps begin */
     const struct imp__surface *entry; /* NULL: begins at x0 */
-    double tau;            /* of the straight way to the entry, in sigma */
-    struct imp__jet jet;   /* value and gradient of the field at `at` */
+    double tau;                       /* of the straight way to the entry, in sigma */
+    struct imp__jet jet;              /* value and gradient of the field at `at` */
     unsigned flags;
-    struct imp__surface facet;        /* the entry itself if that is a mesh */
+    struct imp__surface facet; /* the entry itself if that is a mesh */
 };
 /* Where it entered; starts are copied, so not a pointer into one. */
 static inline const struct imp__surface *imp__start_entry(const struct imp__start *s)
@@ -254,29 +280,31 @@ double imp__land_on(const struct imp__plan *p, const struct imp__surface *s,
 
 /* End of a segment of a ray, before the event's map. */
 struct imp__segment {
-    struct imp__state at, from;    /* there; at the start of its fractional step */
+    struct imp__state at, from; /* there; at the start of its fractional step */
     const struct imp__surface *surface;
     double tau;
     uint32_t steps;
-    struct imp__surface facet;     /* surface points here if that is a mesh */
+    struct imp__surface facet; /* surface points here if that is a mesh */
 };
 /* One ray with everything noted. Same bits as the many-ray tracer. */
 struct imp__track {
     imp_context *ctx;
-    bool states;                   /* keep the states at the start of each step, too */
-    struct imp__state *state;      /* [n]; those of segment k begin at sum (steps + 1) */
+    bool states;              /* keep the states at the start of each step, too */
+    struct imp__state *state; /* [n]; those of segment k begin at sum (steps + 1) */
     size_t n, capacity;
     int n_segments;
     struct imp__segment segment[IMP_BEND_SEGMENTS_MAX];
     struct imp_bend_exit exit, tap[IMP_BEND_TAPS_MAX];
 };
-enum imp_status imp__track_ray(const struct imp__plan *p, const struct imp_bend_rays *rays,
-                               size_t i, struct imp__track *track);
+enum imp_status imp__track_ray(const struct imp__plan *p,
+                               const struct imp_bend_rays *rays, size_t i,
+                               struct imp__track *track);
 void imp__track_free(struct imp__track *track);
 
 /* Rays first .. last - 1, on the calling thread. */
-enum imp_status imp__trace_some(const struct imp__plan *p, const struct imp_bend_rays *rays,
-                                size_t first, size_t last, struct imp_bend_exit *exits,
+enum imp_status imp__trace_some(const struct imp__plan *p,
+                                const struct imp_bend_rays *rays, size_t first,
+                                size_t last, struct imp_bend_exit *exits,
                                 struct imp_bend_exit *taps);
 void imp__count(const struct imp__plan *p, size_t n, const struct imp_bend_exit *exits,
                 const struct imp_bend_exit *taps, struct imp_bend_stats *stats);

@@ -45,7 +45,8 @@ enum imp_status imp_field_set_theta(imp_field *f, const double *theta)
 {
     for (size_t i = 0; i < f->n_theta; i++)
         if (!isfinite(theta[i]))
-            return imp__error(f->ctx, IMP_E_ARG, "number %zu of the %s field is not finite", i,
+            return imp__error(f->ctx, IMP_E_ARG,
+                              "number %zu of the %s field is not finite", i,
                               f->ops->name);
     memcpy(f->theta, theta, f->n_theta * sizeof *theta);
     if (f->ops->changed) f->ops->changed(f);

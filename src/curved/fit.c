@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Fits: the objective of a problem handed to inverse/'s optimisers, level by level. At each
- * level the grid is refined (the function stays the same) and the optimiser begins anew from
- * there: curvature and moments of the coarse numbers are not those of the fine ones
- * (curved-rays 3.4). Adam's rate is halved explicitly. */
+ * Fits: the objective of a problem handed to inverse/'s optimisers, level by level. At
+ * each level the grid is refined (the function stays the same) and the optimiser begins
+ * anew from there: curvature and moments of the coarse numbers are not those of the fine
+ * ones (curved-rays 3.4). Adam's rate is halved explicitly. */
 #include "bend.h"
 #include "inverse/checkpoint.h"
 #include "lbfgs.h"
@@ -17,8 +17,9 @@ struct fit {
     struct imp__opt_options opt;
     struct imp__fingerprint print;
     uint8_t *held;
-    double *theta, *bar, *lo, *hi, *scale, *x0; /* [n_theta], of active numbers where [n] */
-    size_t *at;                                 /* [n] index in theta */
+    double *theta, *bar, *lo, *hi, *scale,
+        *x0;    /* [n_theta], of active numbers where [n] */
+    size_t *at; /* [n] index in theta */
     int level, levels, done_iterations;
     double fraction_lo, fraction_hi, start_s, last_report_s, last_checkpoint_s;
     double last_value, best_value, rays_done;
@@ -29,7 +30,8 @@ struct fit {
 static void level_free(struct fit *f)
 {
     imp_context *ctx = f->b->ctx;
-    void *const owned[] = {f->held, f->theta, f->bar, f->lo, f->hi, f->scale, f->x0, f->at};
+    void *const owned[] = {f->held, f->theta, f->bar, f->lo,
+                           f->hi,   f->scale, f->x0,  f->at};
     for (size_t i = 0; i < imp_count(owned); i++) imp__release(ctx, owned[i]);
     f->held = NULL;
     f->theta = f->bar = f->lo = f->hi = f->scale = f->x0 = NULL;
@@ -48,14 +50,18 @@ static bool report(struct fit *f, bool force)
     if (!f->o->progress || (!force && now - f->last_report_s < 0.1)) return false;
     f->last_report_s = now;
     const double elapsed = now - f->start_s;
-    snprintf(f->note, sizeof f->note, "level %d of %d, objective %.4g", f->level + 1, f->levels,
-             f->best_value);
+    snprintf(f->note, sizeof f->note, "level %d of %d, objective %.4g", f->level + 1,
+             f->levels, f->best_value);
     const double part = imp_min(1.0, (double)f->done_iterations / f->opt.max_iterations);
     const double fraction = f->fraction_lo + (f->fraction_hi - f->fraction_lo) * part;
     const struct imp_progress p = {
-        .size = sizeof p, .stage = "fit", .fraction = fraction, .elapsed_s = elapsed,
+        .size = sizeof p,
+        .stage = "fit",
+        .fraction = fraction,
+        .elapsed_s = elapsed,
         .eta_s = fraction > 1e-3 ? elapsed * (1 - fraction) / fraction : -1,
-        .rate = elapsed > 0 ? f->rays_done / elapsed : 0, .rate_unit = "rays",
+        .rate = elapsed > 0 ? f->rays_done / elapsed : 0,
+        .rate_unit = "rays",
         .note = f->note};
     return f->o->progress(&p, f->o->progress_payload) != 0;
 }
@@ -86,7 +92,8 @@ static enum imp_status goal_iterated(const struct imp__search *s, void *payload)
     const double now = imp__now();
     if (f->o->checkpoint && now - f->last_checkpoint_s > 5) {
         f->last_checkpoint_s = now;
-        const enum imp_status st = imp__checkpoint_write(f->b->ctx, f->o->checkpoint, &f->print, s);
+        const enum imp_status st =
+            imp__checkpoint_write(f->b->ctx, f->o->checkpoint, &f->print, s);
         if (st != IMP_OK) return st;
     }
     return report(f, false) ? IMP_CANCELLED : IMP_OK;
@@ -130,7 +137,8 @@ static enum imp_status level_begin(struct fit *f)
     f->scale = imp__alloc(ctx, n + 1, sizeof(double));
     f->x0 = imp__alloc(ctx, n + 1, sizeof(double));
     f->at = imp__alloc(ctx, n + 1, sizeof *f->at);
-    if (!f->held || !f->theta || !f->bar || !f->lo || !f->hi || !f->scale || !f->x0 || !f->at)
+    if (!f->held || !f->theta || !f->bar || !f->lo || !f->hi || !f->scale || !f->x0 ||
+        !f->at)
         return imp__error(ctx, IMP_E_NOMEM, "no memory for a fit of %zu numbers", n);
     imp_field_get_theta(b->field, f->theta);
     imp__bend_hold(b, f->held, f->theta);
@@ -144,10 +152,16 @@ static enum imp_status level_begin(struct fit *f)
         f->x0[k] = f->theta[i];
         f->at[k++] = i;
     }
-    if (k == 0) IMP_TRY(imp__error(ctx, IMP_E_ARG, "nothing to fit: every number is held"));
-    f->goal = (struct imp__goal){.ctx = ctx, .n = k, .lo = f->lo, .hi = f->hi,
-                                 .scale = f->scale, .eval = goal_eval,
-                                 .iterated = goal_iterated, .payload = f};
+    if (k == 0)
+        IMP_TRY(imp__error(ctx, IMP_E_ARG, "nothing to fit: every number is held"));
+    f->goal = (struct imp__goal){.ctx = ctx,
+                                 .n = k,
+                                 .lo = f->lo,
+                                 .hi = f->hi,
+                                 .scale = f->scale,
+                                 .eval = goal_eval,
+                                 .iterated = goal_iterated,
+                                 .payload = f};
     int iterations = 50;
     double rate = f->o->learning_rate > 0 ? f->o->learning_rate : 0.05;
     for (int l = 0; l <= f->level; l++)
@@ -161,15 +175,16 @@ out:
     return st;
 }
 
-static enum imp_status level_run(struct fit *f, bool resume, bool *found, const char **reason,
-                                 int *iterations)
+static enum imp_status level_run(struct fit *f, bool resume, bool *found,
+                                 const char **reason, int *iterations)
 {
     enum imp_status st = IMP_OK, ended;
     imp_bend *b = f->b;
     struct imp__search *s = NULL;
     IMP_TRY(imp__search_create(&f->goal, f->o->optimizer, &f->opt, f->x0, &s));
     if (resume) {
-        IMP_TRY(imp__checkpoint_read(b->ctx, f->o->checkpoint, &f->print, &f->goal, s, found));
+        IMP_TRY(imp__checkpoint_read(b->ctx, f->o->checkpoint, &f->print, &f->goal, s,
+                                     found));
         if (!*found) goto out;
     }
     f->best_value = INFINITY;
@@ -177,10 +192,13 @@ static enum imp_status level_run(struct fit *f, bool resume, bool *found, const 
                                          : imp__optimize(&f->goal, &f->opt, s);
     if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
     IMP_TRY(theta_set(f, s->x));
-    *reason = s->reason ? s->reason : ended == IMP_CANCELLED ? "stopped" : "all iterations done";
+    *reason = s->reason                ? s->reason
+              : ended == IMP_CANCELLED ? "stopped"
+                                       : "all iterations done";
     *iterations += s->iteration;
     const size_t n = b->n_history + s->n_history;
-    void *grown = imp__grow(b->ctx, b->history, &b->cap_history, n + 1, sizeof *b->history);
+    void *grown =
+        imp__grow(b->ctx, b->history, &b->cap_history, n + 1, sizeof *b->history);
     if (!grown) IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "no memory for the history"));
     b->history = grown;
     if (s->n_history)
@@ -206,7 +224,8 @@ static enum imp_status refine(imp_bend *b)
 }
 
 /* Find the level the checkpoint belongs to, refining until it fits. */
-static enum imp_status resume(struct fit *f, bool *found, const char **reason, int *iterations)
+static enum imp_status resume(struct fit *f, bool *found, const char **reason,
+                              int *iterations)
 {
     enum imp_status st = IMP_OK;
     for (f->level = 0; f->level < f->levels; f->level++) {
@@ -217,7 +236,8 @@ static enum imp_status resume(struct fit *f, bool *found, const char **reason, i
         st = level_run(f, true, found, reason, iterations);
         if (st != IMP_E_ARG) return st;
     }
-    st = imp__error(f->b->ctx, IMP_E_ARG, "%s: belongs to another problem", f->o->checkpoint);
+    st = imp__error(f->b->ctx, IMP_E_ARG, "%s: belongs to another problem",
+                    f->o->checkpoint);
 out:
     return st;
 }
@@ -227,7 +247,8 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
 {
     static const struct imp_bend_fit_options defaults = IMP_BEND_FIT_OPTIONS_INIT;
     const struct imp_bend_fit_options *o = options ? options : &defaults;
-    struct fit f = {.b = b, .o = o, .levels = imp_max(o->levels, 1), .start_s = imp__now()};
+    struct fit f = {
+        .b = b, .o = o, .levels = imp_max(o->levels, 1), .start_s = imp__now()};
     enum imp_status st = IMP_OK;
     const char *reason = "nothing was done";
     int iterations = 0, first = 0;
@@ -238,7 +259,8 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
         return imp__error(b->ctx, IMP_E_ARG, "%d levels: at most %d", f.levels,
                           IMP_BEND_LEVELS_MAX);
     if (o->optimizer == IMP_LM)
-        return imp__error(b->ctx, IMP_E_UNSUPPORTED, "bent rays are fitted by lbfgs, adam, mma");
+        return imp__error(b->ctx, IMP_E_UNSUPPORTED,
+                          "bent rays are fitted by lbfgs, adam, mma");
     if (f.levels > 1 && !imp__field_is_grid(b->field))
         return imp__error(b->ctx, IMP_E_ARG, "levels are for grids, not for a %s field",
                           b->field->ops->name);
@@ -271,10 +293,15 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
     report(&f, true);
     if (result) {
         *result = (struct imp_bend_fit_result){
-            .size = sizeof *result, .iterations = iterations, .levels = f.level + 1,
+            .size = sizeof *result,
+            .iterations = iterations,
+            .levels = f.level + 1,
             .start = found && first > 0 && b->n_history ? b->history[0] : start,
-            .value = value, .n_history = b->n_history, .history = b->history,
-            .reason = reason, .stats = f.stats};
+            .value = value,
+            .n_history = b->n_history,
+            .history = b->history,
+            .reason = reason,
+            .stats = f.stats};
     }
     st = ended;
 out:

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Grids of coefficients: making them, samples, levels, and the transposes of both. The
- * interpolation itself is in spline.c and trilinear.c. Along an axis of M cells a spline has
- * nodes -1 .. M+1, a trilinear grid 0 .. M; [z][y][x]. */
+ * interpolation itself is in spline.c and trilinear.c. Along an axis of M cells a spline
+ * has nodes -1 .. M+1, a trilinear grid 0 .. M; [z][y][x]. */
 #include "curved.h"
 #include <string.h>
 
@@ -19,7 +19,10 @@ void imp__grid_changed(imp_field *f)
     if (g->single)
         for (size_t i = 0; i < f->n_theta; i++) g->single[i] = (float)f->theta[i];
 }
-void imp__grid_destroy(imp_field *f) { imp__release(f->ctx, ((struct imp__grid *)f)->single); }
+void imp__grid_destroy(imp_field *f)
+{
+    imp__release(f->ctx, ((struct imp__grid *)f)->single);
+}
 
 enum imp_status imp_field_grid_create(imp_context *ctx, const struct imp_field_grid *desc,
                                       double index, imp_field **out)
@@ -33,10 +36,12 @@ enum imp_status imp_field_grid_create(imp_context *ctx, const struct imp_field_g
         return imp__error(ctx, IMP_E_ARG, "index grid: index %g is not positive", index);
     for (int k = 0; k < 3; k++) {
         if (desc->cells[k] < 1 || desc->cells[k] > CELLS_MAX)
-            return imp__error(ctx, IMP_E_ARG, "index grid: %d cells along axis %d", 
+            return imp__error(ctx, IMP_E_ARG, "index grid: %d cells along axis %d",
                               desc->cells[k], k);
-        if (!(desc->hi[k] > desc->lo[k]) || !isfinite(desc->lo[k]) || !isfinite(desc->hi[k]))
-            return imp__error(ctx, IMP_E_ARG, "index grid: empty box, %g to %g along axis %d",
+        if (!(desc->hi[k] > desc->lo[k]) || !isfinite(desc->lo[k]) ||
+            !isfinite(desc->hi[k]))
+            return imp__error(ctx, IMP_E_ARG,
+                              "index grid: empty box, %g to %g along axis %d",
                               desc->lo[k], desc->hi[k], k);
         nodes[k] = desc->cells[k] + (spline ? 3 : 1);
         n *= (size_t)nodes[k];
@@ -84,7 +89,7 @@ enum imp_status imp_field_get_grid(const imp_field *f, struct imp_field_grid *gr
     return IMP_OK;
 }
 
-/* ---- Lines along an axis ------------------------------------------------------------ */
+/* ---- Lines along an axis ------------------------------------------------------- */
 
 /* One linear map along each axis in turn: a line of n_in numbers gives n_out. */
 typedef void line_fn(int n_in, const double *in, int n_out, double *out);
@@ -97,7 +102,8 @@ static enum imp_status along_axes(imp_context *ctx, line_fn *fn, const int n_in[
     for (int k = 0; k < 3; k++) widest *= (size_t)imp_max(n_in[k], n_out[k]);
     const int longest = imp_max(imp_max(imp_max(n_in[0], n_in[1]), n_in[2]),
                                 imp_max(imp_max(n_out[0], n_out[1]), n_out[2]));
-    double *a = imp__alloc(ctx, widest, sizeof *a), *b = imp__alloc(ctx, widest, sizeof *b);
+    double *a = imp__alloc(ctx, widest, sizeof *a),
+           *b = imp__alloc(ctx, widest, sizeof *b);
     double *line = imp__alloc(ctx, 2 * (size_t)longest, sizeof *line);
     if (!a || !b || !line) {
         imp__release(ctx, a), imp__release(ctx, b), imp__release(ctx, line);
@@ -108,17 +114,21 @@ static enum imp_status along_axes(imp_context *ctx, line_fn *fn, const int n_in[
         int m[3] = {n[0], n[1], n[2]};
         m[k] = n_out[k];
         const size_t in_stride = k == 0 ? 1 : k == 1 ? (size_t)n[0] : (size_t)n[0] * n[1];
-        const size_t out_stride = k == 0 ? 1 : k == 1 ? (size_t)m[0] : (size_t)m[0] * m[1];
-        const int u = k == 0 ? 1 : 0, w = k == 2 ? 1 : 2;  /* the other two axes, u < w */
+        const size_t out_stride = k == 0   ? 1
+                                  : k == 1 ? (size_t)m[0]
+                                           : (size_t)m[0] * m[1];
+        const int u = k == 0 ? 1 : 0, w = k == 2 ? 1 : 2; /* the other two axes, u < w */
         for (int j = 0; j < n[w]; j++)
             for (int i = 0; i < n[u]; i++) {
                 int p[3] = {0};
                 p[u] = i, p[w] = j;
-                const double *src = a + p[0] + (size_t)n[0] * (p[1] + (size_t)n[1] * p[2]);
+                const double *src =
+                    a + p[0] + (size_t)n[0] * (p[1] + (size_t)n[1] * p[2]);
                 double *dst = b + p[0] + (size_t)m[0] * (p[1] + (size_t)m[1] * p[2]);
                 for (int q = 0; q < n[k]; q++) line[q] = src[(size_t)q * in_stride];
                 fn(n[k], line, m[k], line + longest);
-                for (int q = 0; q < m[k]; q++) dst[(size_t)q * out_stride] = line[longest + q];
+                for (int q = 0; q < m[k]; q++)
+                    dst[(size_t)q * out_stride] = line[longest + q];
             }
         memcpy(n, m, sizeof n);
         double *swap = a;
@@ -129,8 +139,8 @@ static enum imp_status along_axes(imp_context *ctx, line_fn *fn, const int n_in[
     return IMP_OK;
 }
 
-/* (y_{i-1} + 4 y_i + y_{i+1}) / 6 = r_i for i = 1 .. n, y_0 = y_{n+1} = 0. In place; `w` [n].
- * The matrix is symmetric, so the transpose uses the same solve. */
+/* (y_{i-1} + 4 y_i + y_{i+1}) / 6 = r_i for i = 1 .. n, y_0 = y_{n+1} = 0. In place; `w`
+ * [n]. The matrix is symmetric, so the transpose uses the same solve. */
 static void thomas_141(int n, double *r, double *w)
 {
     if (n < 1) return;
@@ -176,13 +186,14 @@ static void line_from_samples_vjp(int n_in, const double *c_bar, int n_out, doub
     }
 }
 
-/* Masks (1 4 6 4 1)/8 and (1 2 1)/2: the function stays the same. Fine node j is at coarse
- * node j/2; arrays of a spline begin at node -1. */
+/* Masks (1 4 6 4 1)/8 and (1 2 1)/2: the function stays the same. Fine node j is at
+ * coarse node j/2; arrays of a spline begin at node -1. */
 static void line_refine_spline(int n_in, const double *c, int n_out, double *fine)
 {
     (void)n_in;
     for (int k = 0; k < n_out; k++) {
-        const int i = k / 2; /* array index of the lower coarse node of the pair or triple */
+        const int i =
+            k / 2; /* array index of the lower coarse node of the pair or triple */
         fine[k] = k % 2 ? (c[i] + 6 * c[i + 1] + c[i + 2]) / 8 : (c[i] + c[i + 1]) / 2;
     }
 }
@@ -193,8 +204,7 @@ static void line_refine_spline_vjp(int n_in, const double *fine, int n_out, doub
         const int i = k / 2;
         if (k % 2)
             c[i] += fine[k] / 8, c[i + 1] += 6 * fine[k] / 8, c[i + 2] += fine[k] / 8;
-        else
-            c[i] += fine[k] / 2, c[i + 1] += fine[k] / 2;
+        else c[i] += fine[k] / 2, c[i + 1] += fine[k] / 2;
     }
 }
 static void line_refine_linear(int n_in, const double *c, int n_out, double *fine)
@@ -207,19 +217,17 @@ static void line_refine_linear_vjp(int n_in, const double *fine, int n_out, doub
 {
     memset(c, 0, (size_t)n_out * sizeof *c);
     for (int k = 0; k < n_in; k++)
-        if (k % 2)
-            c[k / 2] += fine[k] / 2, c[k / 2 + 1] += fine[k] / 2;
-        else
-            c[k / 2] += fine[k];
+        if (k % 2) c[k / 2] += fine[k] / 2, c[k / 2 + 1] += fine[k] / 2;
+        else c[k / 2] += fine[k];
 }
 
-/* ---- Samples ------------------------------------------------------------------------ */
+/* ---- Samples ------------------------------------------------------------------- */
 
 static const struct imp__grid *grid_of(const imp_field *f, enum imp_status *st)
 {
-    *st = imp__field_is_grid(f) ? IMP_OK
-                                : imp__error(f->ctx, IMP_E_ARG, "a %s field is not a grid",
-                                             f->ops->name);
+    *st = imp__field_is_grid(f)
+              ? IMP_OK
+              : imp__error(f->ctx, IMP_E_ARG, "a %s field is not a grid", f->ops->name);
     return (const struct imp__grid *)f;
 }
 
@@ -229,7 +237,8 @@ enum imp_status imp_field_set_samples(imp_field *f, const double *samples)
     double *values = NULL, *theta = NULL;
     const struct imp__grid *g = grid_of(f, &st);
     if (st != IMP_OK) return st;
-    const int *cells = g->desc.cells, corners[3] = {cells[0] + 1, cells[1] + 1, cells[2] + 1};
+    const int *cells = g->desc.cells,
+              corners[3] = {cells[0] + 1, cells[1] + 1, cells[2] + 1};
     const size_t n = (size_t)corners[0] * corners[1] * corners[2];
 
     values = imp__alloc(f->ctx, n, sizeof *values);
@@ -239,14 +248,14 @@ enum imp_status imp_field_set_samples(imp_field *f, const double *samples)
     for (size_t i = 0; i < n; i++) {
         if (!isfinite(samples[i]) || !(samples[i] > 0))
             IMP_TRY(imp__error(f->ctx, IMP_E_ARG,
-                               "sample %zu of the index grid is %g: an index is positive", i,
-                               samples[i]));
-        values[i] = g->desc.param == IMP_FIELD_ETA2 ? samples[i] * samples[i] / 2 : samples[i];
+                               "sample %zu of the index grid is %g: an index is positive",
+                               i, samples[i]));
+        values[i] =
+            g->desc.param == IMP_FIELD_ETA2 ? samples[i] * samples[i] / 2 : samples[i];
     }
     if (g->desc.interp == IMP_FIELD_SPLINE)
         IMP_TRY(along_axes(f->ctx, line_from_samples, corners, g->nodes, values, theta));
-    else
-        memcpy(theta, values, n * sizeof *theta);
+    else memcpy(theta, values, n * sizeof *theta);
     IMP_TRY(imp_field_set_theta(f, theta));
 out:
     imp__release(f->ctx, values);
@@ -261,8 +270,10 @@ enum imp_status imp_field_samples_vjp(const imp_field *f, const double *theta_ba
     const struct imp__grid *g = grid_of(f, &st);
     if (st != IMP_OK) return st;
     if (g->desc.param != IMP_FIELD_ETA)
-        return imp__error(f->ctx, IMP_E_UNSUPPORTED, "samples of eta^2 have no transpose here");
-    const int *cells = g->desc.cells, corners[3] = {cells[0] + 1, cells[1] + 1, cells[2] + 1};
+        return imp__error(f->ctx, IMP_E_UNSUPPORTED,
+                          "samples of eta^2 have no transpose here");
+    const int *cells = g->desc.cells,
+              corners[3] = {cells[0] + 1, cells[1] + 1, cells[2] + 1};
     if (g->desc.interp == IMP_FIELD_SPLINE)
         return along_axes(f->ctx, line_from_samples_vjp, g->nodes, corners, theta_bar,
                           samples_bar);
@@ -270,7 +281,7 @@ enum imp_status imp_field_samples_vjp(const imp_field *f, const double *theta_ba
     return IMP_OK;
 }
 
-/* ---- Levels ------------------------------------------------------------------------- */
+/* ---- Levels -------------------------------------------------------------------- */
 
 enum imp_status imp_field_refine(const imp_field *f, imp_field **out)
 {
@@ -281,9 +292,9 @@ enum imp_status imp_field_refine(const imp_field *f, imp_field **out)
     struct imp_field_grid desc = g->desc;
     for (int k = 0; k < 3; k++) desc.cells[k] *= 2;
     IMP_TRY(imp_field_grid_create(f->ctx, &desc, 1, &fine));
-    IMP_TRY(along_axes(f->ctx, desc.interp == IMP_FIELD_SPLINE ? line_refine_spline
-                                                               : line_refine_linear,
-                       g->nodes, ((struct imp__grid *)fine)->nodes, f->theta, fine->theta));
+    IMP_TRY(along_axes(
+        f->ctx, desc.interp == IMP_FIELD_SPLINE ? line_refine_spline : line_refine_linear,
+        g->nodes, ((struct imp__grid *)fine)->nodes, f->theta, fine->theta));
     if (fine->ops->changed) fine->ops->changed(fine);
     *out = fine;
     fine = NULL;
@@ -301,6 +312,6 @@ enum imp_status imp_field_refine_vjp(const imp_field *f, const double *fine_bar,
     const bool spline = g->desc.interp == IMP_FIELD_SPLINE;
     int fine[3];
     for (int k = 0; k < 3; k++) fine[k] = 2 * g->desc.cells[k] + (spline ? 3 : 1);
-    return along_axes(f->ctx, spline ? line_refine_spline_vjp : line_refine_linear_vjp, fine,
-                      g->nodes, fine_bar, coarse_bar);
+    return along_axes(f->ctx, spline ? line_refine_spline_vjp : line_refine_linear_vjp,
+                      fine, g->nodes, fine_bar, coarse_bar);
 }

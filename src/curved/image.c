@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Irradiance of rays on a picture, and its adjoint. The kernel is a cubic B-spline one pixel
- * wide on each axis: a partition of unity, so energy is exact, and twice differentiable
- * (curved-rays 4). Pictures are normalised by constants, the power of the rays and the
- * target's mean: 1 is the mean of all power spread over the picture. */
+ * Irradiance of rays on a picture, and its adjoint. The kernel is a cubic B-spline one
+ * pixel wide on each axis: a partition of unity, so energy is exact, and twice
+ * differentiable (curved-rays 4). Pictures are normalised by constants, the power of the
+ * rays and the target's mean: 1 is the mean of all power spread over the picture. */
 #include "bend.h"
 #include <string.h>
 
@@ -22,7 +22,10 @@ static int kernel(double c, double w[4], double wd[4])
     return (int)f - 1;
 }
 
-struct spot { double w[4], wd[4], h[4], hd[4]; int x, y; };
+struct spot {
+    double w[4], wd[4], h[4], hd[4];
+    int x, y;
+};
 
 /* false: beside the picture. */
 static bool spot_of(const struct imp_bend_target *t, imp_v3 at, struct spot *s)
@@ -45,7 +48,8 @@ enum imp_status imp__image_value(const imp_bend *b, const struct imp__target_of_
 {
     const struct imp_bend_target *desc = &t->desc;
     const bool far = desc->type == IMP_BEND_FARFIELD;
-    const size_t n_taps = b->options.n_taps, n = (size_t)desc->width * (size_t)desc->height;
+    const size_t n_taps = b->options.n_taps,
+                 n = (size_t)desc->width * (size_t)desc->height;
     const double scale = (double)n / t->power;
     const imp_v3 u = imp__v3_load(desc->u), v = imp__v3_load(desc->v);
     double *e = imp__alloc(b->ctx, n, sizeof *e);
@@ -54,7 +58,8 @@ enum imp_status imp__image_value(const imp_bend *b, const struct imp__target_of_
     if (!e) return imp__error(b->ctx, IMP_E_NOMEM, "no memory for a picture");
 
     for (size_t i = t->first; i < t->last; i++) {
-        if (!imp__arrive(desc, imp__target_exit(desc, exits, taps, n_taps, i), &a)) continue;
+        if (!imp__arrive(desc, imp__target_exit(desc, exits, taps, n_taps, i), &a))
+            continue;
         if (!spot_of(desc, far ? a.d : a.x, &s)) continue;
         const double p = scale * b->power[i] * a.weight;
         for (int q = 0; q < 4; q++)
@@ -71,7 +76,8 @@ enum imp_status imp__image_value(const imp_bend *b, const struct imp__target_of_
     }
     *value = desc->weight * sum / (2 * (double)n);
     for (size_t i = t->first; bars && i < t->last; i++) {
-        if (!imp__arrive(desc, imp__target_exit(desc, exits, taps, n_taps, i), &a)) continue;
+        if (!imp__arrive(desc, imp__target_exit(desc, exits, taps, n_taps, i), &a))
+            continue;
         if (!spot_of(desc, far ? a.d : a.x, &s)) continue;
         double c = 0, cx = 0, cy = 0;
         for (int q = 0; q < 4; q++)
@@ -85,10 +91,12 @@ enum imp_status imp__image_value(const imp_bend *b, const struct imp__target_of_
                 }
         const double p = desc->weight / (double)n * scale * b->power[i];
         const imp_v3 y = (u * (cx * desc->width / imp__dot(u, u)) +
-                          v * (cy * desc->height / imp__dot(v, v))) * (p * a.weight);
+                          v * (cy * desc->height / imp__dot(v, v))) *
+                         (p * a.weight);
         const imp_v3 zero = {0};
         imp__arrive_vjp(desc, &a, far ? zero : y, far ? y : zero, zero, 0, p * c,
-                        desc->tap < 0 ? &bars[i] : &tap_bars[i * n_taps + (size_t)desc->tap]);
+                        desc->tap < 0 ? &bars[i]
+                                      : &tap_bars[i * n_taps + (size_t)desc->tap]);
     }
     imp__release(b->ctx, e);
     return IMP_OK;

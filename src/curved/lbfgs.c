@@ -1,20 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * L-BFGS with bounds for exact objectives (fixed rays): two-loop recursion over the variables
- * that are free, steps projected onto the bounds, backtracking by quadratic interpolation
- * (Bertsekas 1982 for the active set). NLopt's L-BFGS loses its way on these problems: as
- * curvature is negative in many directions its line search stays at a few points and
- * returns. State lives in inverse/'s search, so checkpoints are shared. */
+ * L-BFGS with bounds for exact objectives (fixed rays): two-loop recursion over the
+ * variables that are free, steps projected onto the bounds, backtracking by quadratic
+ * interpolation (Bertsekas 1982 for the active set). NLopt's L-BFGS loses its way on
+ * these problems: as curvature is negative in many directions its line search stays at a
+ * few points and returns. State lives in inverse/'s search, so checkpoints are shared. */
 #include "lbfgs.h"
 #include <math.h>
 #include <string.h>
 
 #define MEMORY 12
 #define ARMIJO 1e-4
-#define TRIES 25
+#define TRIES  25
 
-enum { S, Y, X, G, WORK };                     /* arrays: [MEMORY][n], [MEMORY][n], [n], .. */
-enum { PAIRS, VALUE, HAVE };                   /* scalars */
+enum { S, Y, X, G, WORK };   /* arrays: [MEMORY][n], [MEMORY][n], [n], .. */
+enum { PAIRS, VALUE, HAVE }; /* scalars */
 
 struct run {
     const struct imp__goal *goal;
@@ -31,12 +31,14 @@ static double dot(size_t n, const double *a, const double *b)
 }
 
 /* At a bound, and down leads outside? In units of the scale. */
-static bool pinned(const struct imp__goal *goal, const double *x, const double *g, size_t k)
+static bool pinned(const struct imp__goal *goal, const double *x, const double *g,
+                   size_t k)
 {
     return (x[k] <= goal->lo[k] && g[k] > 0) || (x[k] >= goal->hi[k] && g[k] < 0);
 }
 
-/* d = -H g on the free variables (Nocedal, Wright 2006, algorithm 7.4); pairs newest last. */
+/* d = -H g on the free variables (Nocedal, Wright 2006, algorithm 7.4); pairs newest
+ * last. */
 static void direction(struct run *r)
 {
     struct imp__search *s = r->s;
@@ -52,7 +54,8 @@ static void direction(struct run *r)
         for (size_t k = 0; k < n; k++) r->d[k] -= alpha[i] * yi[k];
     }
     if (m > 0) {
-        const double *sl = s->array[S] + (size_t)(m - 1) * n, *yl = s->array[Y] + (size_t)(m - 1) * n;
+        const double *sl = s->array[S] + (size_t)(m - 1) * n,
+                     *yl = s->array[Y] + (size_t)(m - 1) * n;
         const double gamma = dot(n, sl, yl) / dot(n, yl, yl);
         for (size_t k = 0; k < n; k++) r->d[k] *= gamma;
     }
@@ -105,7 +108,8 @@ static enum imp_status line(struct run *r, bool *found)
             r->trial[k] = imp__into_bounds(goal, k, x[k] + step * r->d[k]);
             slope += g[k] * (r->trial[k] - x[k]);
         }
-        const enum imp_status st = goal->eval(r->trial, 0, &e, r->g_trial, NULL, goal->payload);
+        const enum imp_status st =
+            goal->eval(r->trial, 0, &e, r->g_trial, NULL, goal->payload);
         if (st != IMP_OK) return st;
         if (isfinite(e.value) && e.value <= f0 + ARMIJO * slope && slope < 0) {
             remember(r, r->trial, r->g_trial);
@@ -124,8 +128,8 @@ static enum imp_status line(struct run *r, bool *found)
     return IMP_OK;
 }
 
-enum imp_status imp__lbfgs(const struct imp__goal *goal, const struct imp__opt_options *options,
-                           struct imp__search *s)
+enum imp_status imp__lbfgs(const struct imp__goal *goal,
+                           const struct imp__opt_options *options, struct imp__search *s)
 {
     enum imp_status st = IMP_OK;
     const size_t n = goal->n;

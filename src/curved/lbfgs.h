@@ -5,7 +5,7 @@
 #include "inverse/optimize.h"
 
 /* As imp__optimize, for objectives without noise; `s` was created for IMP_LBFGS. */
-enum imp_status imp__lbfgs(const struct imp__goal *goal, const struct imp__opt_options *options,
-                           struct imp__search *s);
+enum imp_status imp__lbfgs(const struct imp__goal *goal,
+                           const struct imp__opt_options *options, struct imp__search *s);
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Objective and gradient of a problem of bent rays: trace, targets, adjoint, regularisers.
- * Between the passes only the exits are kept. */
+ * Objective and gradient of a problem of bent rays: trace, targets, adjoint,
+ * regularisers. Between the passes only the exits are kept. */
 #include "bend.h"
 #include <string.h>
 
@@ -32,12 +32,13 @@ static enum imp_status passes_trace(const imp_bend *b, bool adjoint, struct pass
     if (adjoint && n_taps) p->tap_bars = imp__alloc(b->ctx, n_taps, sizeof *p->tap_bars);
     if (!p->exits || (n_taps && !p->taps) || (adjoint && !p->bars) ||
         (adjoint && n_taps && !p->tap_bars))
-        return imp__error(b->ctx, IMP_E_NOMEM, "no memory for the exits of %zu rays", b->n);
+        return imp__error(b->ctx, IMP_E_NOMEM, "no memory for the exits of %zu rays",
+                          b->n);
     return imp_bend_trace(b->field, &p->options, &p->rays, p->exits, p->taps, stats);
 }
 
-enum imp_status imp_bend_objective(imp_bend *b, double *value, double *gradient, double *targets,
-                                   struct imp_bend_stats *stats)
+enum imp_status imp_bend_objective(imp_bend *b, double *value, double *gradient,
+                                   double *targets, struct imp_bend_stats *stats)
 {
     struct passes p;
     uint8_t *mask = NULL;
@@ -57,7 +58,8 @@ enum imp_status imp_bend_objective(imp_bend *b, double *value, double *gradient,
         struct imp_bend_gradient g = IMP_BEND_GRADIENT_INIT;
         mask = imp__alloc(b->ctx, n + 1, 1);
         bar = imp__alloc(b->ctx, n + 1, sizeof *bar);
-        if (!mask || !bar) IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "no memory for a gradient"));
+        if (!mask || !bar)
+            IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "no memory for a gradient"));
         g.theta = bar;
         IMP_TRY(imp_bend_adjoint(b->field, &p.options, &p.rays, p.exits, p.taps, p.bars,
                                  p.tap_bars, &g, &s));
@@ -91,19 +93,22 @@ enum imp_status imp_bend_run(imp_bend *b, struct imp_bend_exit *exits,
     return st;
 }
 
-enum imp_status imp_bend_arrivals(imp_bend *b, size_t target, struct imp_bend_arrival *arrivals,
-                                  size_t *n)
+enum imp_status imp_bend_arrivals(imp_bend *b, size_t target,
+                                  struct imp_bend_arrival *arrivals, size_t *n)
 {
     struct passes p;
-    if (target >= b->n_targets) return imp__error(b->ctx, IMP_E_ARG, "no target %zu", target);
+    if (target >= b->n_targets)
+        return imp__error(b->ctx, IMP_E_ARG, "no target %zu", target);
     const struct imp__target_of_rays *t = &b->targets[target];
     const enum imp_status st = passes_trace(b, false, &p, NULL);
     if (st == IMP_OK) {
         size_t k = 0;
         for (size_t i = t->first; i < t->last; i++) {
             struct imp__arrival a;
-            if (!imp__arrive(&t->desc, imp__target_exit(&t->desc, p.exits, p.taps,
-                                                        b->options.n_taps, i), &a))
+            if (!imp__arrive(
+                    &t->desc,
+                    imp__target_exit(&t->desc, p.exits, p.taps, b->options.n_taps, i),
+                    &a))
                 continue;
             struct imp_bend_arrival *o = &arrivals[k++];
             imp__v3_store(a.x, o->x);

@@ -1,34 +1,41 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Options checked and made ready: step length, surfaces by group, boxes cut into faces. */
+ * Options checked and made ready: step length, surfaces by group, boxes cut into faces.
+ */
 #include "curved.h"
 #include "scene/scene.h"
 #include <string.h>
 
 #define MAX_STEPS_DEFAULT 100000
-#define GROUPS_MAX 65535
-#define SURFACES_MAX 60000
+#define GROUPS_MAX        65535
+#define SURFACES_MAX      60000
 
-static enum imp_status surface_make(imp_context *ctx, const struct imp_bend_surface *in, int id,
-                                    struct imp__surface out[6], int *n)
+static enum imp_status surface_make(imp_context *ctx, const struct imp_bend_surface *in,
+                                    int id, struct imp__surface out[6], int *n)
 {
     static const enum imp__surface_kind kinds[] = {
-        [IMP_BEND_PLANE] = IMP__PLANE, [IMP_BEND_SPHERE] = IMP__SPHERE,
+        [IMP_BEND_PLANE] = IMP__PLANE,       [IMP_BEND_SPHERE] = IMP__SPHERE,
         [IMP_BEND_CYLINDER] = IMP__CYLINDER, [IMP_BEND_DISC] = IMP__DISC,
-        [IMP_BEND_BOX] = IMP__PLANE, [IMP_BEND_SDF] = IMP__SDF,
+        [IMP_BEND_BOX] = IMP__PLANE,         [IMP_BEND_SDF] = IMP__SDF,
         [IMP_BEND_APPROACH] = IMP__APPROACH, [IMP_BEND_MESH] = IMP__MESH};
     if ((int)in->type < 0 || in->type > IMP_BEND_MESH || (int)in->event < 0 ||
         in->event > IMP_BEND_STOP)
         return imp__error(ctx, IMP_E_ARG, "surface %d: no such type or event", id);
-    struct imp__surface s = {.kind = kinds[in->type], .event = in->event, .id = id,
-                             .n = imp__v3_load(in->normal), .c = imp__v3_load(in->centre),
-                             .offset = in->offset, .radius = in->radius, .index = in->index,
-                             .sdf = in->sdf, .scene = in->scene};
+    struct imp__surface s = {.kind = kinds[in->type],
+                             .event = in->event,
+                             .id = id,
+                             .n = imp__v3_load(in->normal),
+                             .c = imp__v3_load(in->centre),
+                             .offset = in->offset,
+                             .radius = in->radius,
+                             .index = in->index,
+                             .sdf = in->sdf,
+                             .scene = in->scene};
     const double length = imp__length(s.n);
     *n = 1;
     if (in->event == IMP_BEND_REFRACT && !(in->index > 0 && isfinite(in->index)))
-        return imp__error(ctx, IMP_E_ARG, "surface %d: index %g outside is not positive", id,
-                          in->index);
+        return imp__error(ctx, IMP_E_ARG, "surface %d: index %g outside is not positive",
+                          id, in->index);
     if (!imp__is_finite(s.c) || !isfinite(s.offset))
         return imp__error(ctx, IMP_E_ARG, "surface %d: not finite", id);
     switch (in->type) {
@@ -36,7 +43,8 @@ static enum imp_status surface_make(imp_context *ctx, const struct imp_bend_surf
     case IMP_BEND_DISC:
     case IMP_BEND_CYLINDER:
         if (!(length > 0) || !isfinite(length))
-            return imp__error(ctx, IMP_E_ARG, "surface %d: the normal has no direction", id);
+            return imp__error(ctx, IMP_E_ARG, "surface %d: the normal has no direction",
+                              id);
         s.n *= 1 / length;
         s.offset /= length;
         if (in->type == IMP_BEND_DISC) s.offset = imp__dot(s.n, s.c);
@@ -50,8 +58,9 @@ static enum imp_status surface_make(imp_context *ctx, const struct imp_bend_surf
         *n = 6;
         for (int k = 0; k < 3; k++) {
             if (!(in->hi[k] > in->lo[k]))
-                return imp__error(ctx, IMP_E_ARG, "surface %d: empty box, %g to %g along axis %d",
-                                  id, in->lo[k], in->hi[k], k);
+                return imp__error(ctx, IMP_E_ARG,
+                                  "surface %d: empty box, %g to %g along axis %d", id,
+                                  in->lo[k], in->hi[k], k);
             for (int side = 0; side < 2; side++) {
                 struct imp__surface *face = &out[2 * k + side];
                 *face = s;
@@ -62,11 +71,13 @@ static enum imp_status surface_make(imp_context *ctx, const struct imp_bend_surf
         }
         return IMP_OK;
     case IMP_BEND_SDF:
-        if (!in->sdf) return imp__error(ctx, IMP_E_ARG, "surface %d: no distance field", id);
+        if (!in->sdf)
+            return imp__error(ctx, IMP_E_ARG, "surface %d: no distance field", id);
         break;
     case IMP_BEND_APPROACH:
         if (in->event != IMP_BEND_END)
-            return imp__error(ctx, IMP_E_ARG, "surface %d: rays end at a closest approach", id);
+            return imp__error(ctx, IMP_E_ARG,
+                              "surface %d: rays end at a closest approach", id);
         break;
     case IMP_BEND_MESH:
         if (!in->scene || in->scene->n_shapes == 0)
@@ -89,7 +100,8 @@ static void domain_make(const struct imp_bend_options *o, const struct imp__surf
     for (int boxes = 1; boxes >= 0; boxes--)
         for (size_t i = 0; i < o->n_surfaces; i++) {
             const struct imp_bend_surface *s = &o->surfaces[i];
-            if ((s->group >= 0 && s->group != g) || (s->type == IMP_BEND_BOX) != boxes) continue;
+            if ((s->group >= 0 && s->group != g) || (s->type == IMP_BEND_BOX) != boxes)
+                continue;
             for (int k = first[i]; k < first[i + 1]; k++) d->surface[d->n++] = all[k];
             if (!boxes) d->n_general++;
             for (int k = 0; boxes && k < 3; k++) {
@@ -108,7 +120,8 @@ static enum imp_status step_choose(struct imp__plan *p)
     if (p->t > 0) return IMP_OK;
     if (!(f->spacing > 0))
         return imp__error(p->ctx, IMP_E_ARG,
-                          "a %s field has no cells to choose a step by: give one", f->ops->name);
+                          "a %s field has no cells to choose a step by: give one",
+                          f->ops->name);
     const double part = f->ops == &imp__field_trilinear ? 0.5 : 1;
     p->t = part * f->spacing;
     if (!p->scheme->arc) p->t /= fmax(imp__field_index_max(f), 1e-3);
@@ -131,10 +144,12 @@ static void bounds_choose(struct imp__plan *p, const struct imp_bend_rays *rays)
     if (!(p->size > 0)) p->size = 1;
     /* One step beyond the field is allowed: the exit lies behind. */
     const double margin = p->t * (p->scheme->arc ? 1 : fmax(imp__field_index_max(f), 1));
-    for (int k = 0; k < 3; k++) p->lo[k] = f->lo[k] - margin, p->hi[k] = f->hi[k] + margin;
+    for (int k = 0; k < 3; k++)
+        p->lo[k] = f->lo[k] - margin, p->hi[k] = f->hi[k] + margin;
 }
 
-enum imp_status imp__plan_create(const imp_field *field, const struct imp_bend_options *options,
+enum imp_status imp__plan_create(const imp_field *field,
+                                 const struct imp_bend_options *options,
                                  const struct imp_bend_rays *rays, struct imp__plan *out)
 {
     enum imp_status st = IMP_OK;
@@ -154,7 +169,8 @@ enum imp_status imp__plan_create(const imp_field *field, const struct imp_bend_o
     if (rays->n > 0 && (!rays->x || !rays->d))
         IMP_TRY(imp__error(ctx, IMP_E_ARG, "rays without origins or directions"));
     if (o->n_taps > IMP_BEND_TAPS_MAX)
-        IMP_TRY(imp__error(ctx, IMP_E_ARG, "%zu taps: at most %d", o->n_taps, IMP_BEND_TAPS_MAX));
+        IMP_TRY(imp__error(ctx, IMP_E_ARG, "%zu taps: at most %d", o->n_taps,
+                           IMP_BEND_TAPS_MAX));
     if (o->n_surfaces > SURFACES_MAX)
         IMP_TRY(imp__error(ctx, IMP_E_ARG, "%zu surfaces", o->n_surfaces));
     p.max_steps = o->max_steps ? o->max_steps : MAX_STEPS_DEFAULT;
@@ -166,16 +182,18 @@ enum imp_status imp__plan_create(const imp_field *field, const struct imp_bend_o
     IMP_TRY(step_choose(&p));
     bounds_choose(&p, rays);
     if (field->spacing > 0 && p.t > p.size)
-        IMP_TRY(imp__error(ctx, IMP_E_ARG, "step %g is longer than the field, %g", p.t, p.size));
+        IMP_TRY(imp__error(ctx, IMP_E_ARG, "step %g is longer than the field, %g", p.t,
+                           p.size));
 
     if (o->n_surfaces == 0) {
         box.type = IMP_BEND_BOX;
         for (int k = 0; k < 3; k++) {
             box.lo[k] = field->lo[k], box.hi[k] = field->hi[k];
             if (!isfinite(box.lo[k]) || !isfinite(box.hi[k]))
-                IMP_TRY(imp__error(ctx, IMP_E_ARG,
-                                   "a %s field has no end: give a surface where rays exit",
-                                   field->ops->name));
+                IMP_TRY(
+                    imp__error(ctx, IMP_E_ARG,
+                               "a %s field has no end: give a surface where rays exit",
+                               field->ops->name));
         }
         o->surfaces = &box;
         o->n_surfaces = 1;
@@ -197,7 +215,8 @@ enum imp_status imp__plan_create(const imp_field *field, const struct imp_bend_o
     const size_t n_domains = (size_t)p.n_groups + 1;
     p.domain = imp__alloc(ctx, n_domains, sizeof *p.domain);
     p.surfaces = imp__alloc(ctx, own + n_domains * shared + 1, sizeof *p.surfaces);
-    if (!p.domain || !p.surfaces) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for surfaces"));
+    if (!p.domain || !p.surfaces)
+        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for surfaces"));
     struct imp__surface *room = p.surfaces;
     for (int g = 0; g <= p.n_groups; g++) {
         domain_make(o, all, first, g < p.n_groups ? g : -2, &p, &p.domain[g], room);
@@ -205,7 +224,9 @@ enum imp_status imp__plan_create(const imp_field *field, const struct imp_bend_o
     }
     p.n_taps = (int)o->n_taps;
     for (int i = 0; i < p.n_taps; i++) {
-        struct imp__surface s = {.kind = IMP__PLANE, .id = i, .n = imp__v3_load(o->taps[i].normal),
+        struct imp__surface s = {.kind = IMP__PLANE,
+                                 .id = i,
+                                 .n = imp__v3_load(o->taps[i].normal),
                                  .offset = o->taps[i].offset};
         const double length = imp__length(s.n);
         if (!(length > 0) || !isfinite(length) || !isfinite(s.offset))

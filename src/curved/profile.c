@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Analytic fields. Each is a function f(u; p) of one coordinate: u = |x - c|^2 about a centre,
- * u = |P(x - c)|^2 about an axis a (P projects across it), or u = a.(x - c) along one. Then,
- * with y = x - c or P(x - c),
+ * Analytic fields. Each is a function f(u; p) of one coordinate: u = |x - c|^2 about a
+ * centre, u = |P(x - c)|^2 about an axis a (P projects across it), or u = a.(x - c) along
+ * one. Then, with y = x - c or P(x - c),
  *
  *     g = 2 f' y,   H = 2 f' P + 4 f'' y y^T        (along: g = f' a, H = f'' a a^T)
  *
@@ -11,9 +11,11 @@
 #include "curved.h"
 #include <string.h>
 
-#define OWN_MAX 8   /* parameters of a profile besides the centre */
+#define OWN_MAX 8 /* parameters of a profile besides the centre */
 
-struct shape_at { double f, f1, f2, fp[OWN_MAX], f1p[OWN_MAX]; };
+struct shape_at {
+    double f, f1, f2, fp[OWN_MAX], f1p[OWN_MAX];
+};
 
 enum about { ABOUT_CENTRE, ABOUT_AXIS, ALONG_AXIS };
 
@@ -42,7 +44,7 @@ static void luneburg_at(const double *p, double u, struct shape_at *s)
     s->f = f;
     s->f1 = -0.5 / (f * R * R);
     s->f2 = s->f1 * 0.5 / (f * f * R * R);
-    s->fp[0] = q / (f * R);                          /* -(1/2f) dq/dR, dq/dR = -2 q/R */
+    s->fp[0] = q / (f * R); /* -(1/2f) dq/dR, dq/dR = -2 q/R */
     s->f1p[0] = -s->f1 / f * s->fp[0] - 2 * s->f1 / R;
 }
 /* n0/(1 + r^2/a^2) */
@@ -64,7 +66,8 @@ static void power_at(const double *p, double u, struct shape_at *s)
     const double B = 1 + w * (-1 + w * (p[2] + w * p[3]));
     const double B1 = -1 + w * (2 * p[2] + w * 3 * p[3]), B2 = 2 * p[2] + 6 * p[3] * w;
     const double r = sqrt(B), g2 = g * g;
-    const double F1 = B1 / (2 * r), F2 = B2 / (2 * r) - B1 * B1 / (4 * r * B); /* d/dw of r */
+    const double F1 = B1 / (2 * r),
+                 F2 = B2 / (2 * r) - B1 * B1 / (4 * r * B); /* d/dw of r */
     s->f = n0 * r;
     s->f1 = n0 * F1 * g2;
     s->f2 = n0 * F2 * g2 * g2;
@@ -72,7 +75,7 @@ static void power_at(const double *p, double u, struct shape_at *s)
     s->f1p[0] = F1 * g2;
     s->fp[1] = n0 * F1 * 2 * g * u;
     s->f1p[1] = n0 * (F2 * 2 * g * u * g2 + F1 * 2 * g);
-    for (int k = 0; k < 2; k++) {     /* dB/dh = w^2, w^3 */
+    for (int k = 0; k < 2; k++) { /* dB/dh = w^2, w^3 */
         const double b = k ? w * w * w : w * w, b1 = k ? 3 * w * w : 2 * w;
         s->fp[2 + k] = n0 * b / (2 * r);
         s->f1p[2 + k] = n0 * g2 * (b1 / (2 * r) - B1 * b / (4 * r * B));
@@ -102,7 +105,8 @@ static void sech_at(const double *p, double u, struct shape_at *s)
     double T, T1;
     if (q < 1e-3) { /* series: the closed form cancels */
         T = 1 - q / 3 + q * q * (2.0 / 15) - q * q * q * (17.0 / 315);
-        T1 = -1.0 / 3 + q * (4.0 / 15) - q * q * (17.0 / 105) + q * q * q * (4 * 62.0 / 2835);
+        T1 = -1.0 / 3 + q * (4.0 / 15) - q * q * (17.0 / 105) +
+             q * q * q * (4 * 62.0 / 2835);
     } else {
         T = tanh(r) / r;
         T1 = (c * c - T) / (2 * q);
@@ -119,7 +123,8 @@ static void sech_at(const double *p, double u, struct shape_at *s)
 /* n0 + b exp(-r^2/2s^2) */
 static void plume_at(const double *p, double u, struct shape_at *s)
 {
-    const double b = p[1], w = p[2], k = -0.5 / (w * w), e = exp(k * u), kw = 1 / (w * w * w);
+    const double b = p[1], w = p[2], k = -0.5 / (w * w), e = exp(k * u),
+                 kw = 1 / (w * w * w);
     s->f = p[0] + b * e;
     s->f1 = b * k * e;
     s->f2 = b * k * k * e;
@@ -191,8 +196,8 @@ static inline imp_v3 offset_of(const struct profile *p, imp_v3 x, double *u)
 }
 
 /* H m */
-static inline imp_v3 hess_times(const struct profile *p, const struct shape_at *s, imp_v3 y,
-                                imp_v3 m)
+static inline imp_v3 hess_times(const struct profile *p, const struct shape_at *s,
+                                imp_v3 y, imp_v3 m)
 {
     if (p->kind->about == ALONG_AXIS) return p->axis * (s->f2 * imp__dot(p->axis, m));
     imp_v3 pm = m;
@@ -231,7 +236,8 @@ static void profile_splat(const imp_field *f, const imp_v3 *x, double a, const i
     const bool along = p->kind->about == ALONG_AXIS;
     /* g = 2 f' y or f' a: what f' is multiplied with in b.g */
     const double slope = along ? imp__dot(*b, p->axis) : 2 * imp__dot(*b, y);
-    for (int k = 0; k < p->kind->n_own; k++) theta_bar[k] += a * s.fp[k] + slope * s.f1p[k];
+    for (int k = 0; k < p->kind->n_own; k++)
+        theta_bar[k] += a * s.fp[k] + slope * s.f1p[k];
     const imp_v3 g = along ? p->axis * s.f1 : y * (2 * s.f1);
     const imp_v3 c = -(g * a + hess_times(p, &s, y, *b));
     for (int k = 0; k < 3; k++) theta_bar[p->kind->n_own + k] += c[k];
@@ -262,13 +268,15 @@ static const char *profile_param_name(const imp_field *f, size_t i)
 }
 
 /* The kinds share one table but for the name. */
-#define PROFILE(text)                                                                       \
-    {.name = text, .eval = profile_eval, .splat = profile_splat, .tangent = profile_tangent, \
-     .param_name = profile_param_name}
+#define PROFILE(text)                                                                    \
+    {                                                                                    \
+        .name = text, .eval = profile_eval, .splat = profile_splat,                      \
+        .tangent = profile_tangent, .param_name = profile_param_name                     \
+    }
 static const struct imp__field_ops profile_ops[] = {
-    PROFILE("constant"), PROFILE("luneburg"), PROFILE("maxwell"), PROFILE("rod"),
-    PROFILE("rod-vendor"), PROFILE("rod-power"), PROFILE("sech"), PROFILE("plume"),
-    PROFILE("polynomial"), PROFILE("axial"), PROFILE("linear")};
+    PROFILE("constant"),   PROFILE("luneburg"),  PROFILE("maxwell"), PROFILE("rod"),
+    PROFILE("rod-vendor"), PROFILE("rod-power"), PROFILE("sech"),    PROFILE("plume"),
+    PROFILE("polynomial"), PROFILE("axial"),     PROFILE("linear")};
 _Static_assert(imp_count(profile_ops) == imp_count(kinds), "one table a kind");
 
 static int kind_find(const char *name)
@@ -278,13 +286,17 @@ static int kind_find(const char *name)
     return -1;
 }
 
-const char *imp__profile_kind(size_t i) { return i < imp_count(kinds) ? kinds[i].name : NULL; }
+const char *imp__profile_kind(size_t i)
+{
+    return i < imp_count(kinds) ? kinds[i].name : NULL;
+}
 
 const char *imp__profile_param(const char *kind, size_t i)
 {
     const int k = kind_find(kind);
     if (k < 0 || i >= (size_t)kinds[k].n_own + 3) return NULL;
-    return i < (size_t)kinds[k].n_own ? kinds[k].names[i] : centre_names[i - kinds[k].n_own];
+    return i < (size_t)kinds[k].n_own ? kinds[k].names[i]
+                                      : centre_names[i - kinds[k].n_own];
 }
 
 size_t imp_field_profile_count(const char *kind)
@@ -301,31 +313,36 @@ enum imp_status imp_field_profile_create(imp_context *ctx, const char *kind,
     imp_v3 a = imp__v3(0, 0, 1);
     imp_field *f = NULL;
     if (k < 0)
-        return imp__error(ctx, IMP_E_ARG,
-                          "no index profile '%s': there are constant, luneburg, maxwell, rod, "
-                          "rod-vendor, rod-power, sech, plume, polynomial, axial, linear", kind);
+        return imp__error(
+            ctx, IMP_E_ARG,
+            "no index profile '%s': there are constant, luneburg, maxwell, rod, "
+            "rod-vendor, rod-power, sech, plume, polynomial, axial, linear",
+            kind);
     const size_t n = (size_t)kinds[k].n_own + 3;
     for (size_t i = 0; i < n; i++)
         if (!isfinite(params[i]))
-            return imp__error(ctx, IMP_E_ARG, "%s profile: parameter '%s' is not finite", kind,
-                              imp__profile_param(kind, i));
+            return imp__error(ctx, IMP_E_ARG, "%s profile: parameter '%s' is not finite",
+                              kind, imp__profile_param(kind, i));
     for (int i = 0; i < kinds[k].n_own; i++) {
         const char *name = kinds[k].names[i];
-        const bool part = kinds[k].at == plume_at || kinds[k].at == polynomial_at; /* of sums */
+        const bool part =
+            kinds[k].at == plume_at || kinds[k].at == polynomial_at; /* of sums */
         if ((!strcmp(name, "radius") || !strcmp(name, "width") ||
              (!strcmp(name, "n0") && !part)) &&
             !(params[i] > 0))
-            return imp__error(ctx, IMP_E_ARG, "%s profile: %s = %g must be positive", kind,
-                              name, params[i]);
+            return imp__error(ctx, IMP_E_ARG, "%s profile: %s = %g must be positive",
+                              kind, name, params[i]);
     }
     if (axis) {
         a = imp__v3_load(axis);
         const double length = imp__length(a);
         if (!(length > 0) || !isfinite(length))
-            return imp__error(ctx, IMP_E_ARG, "%s profile: the axis has no direction", kind);
+            return imp__error(ctx, IMP_E_ARG, "%s profile: the axis has no direction",
+                              kind);
         a *= 1 / length;
     }
-    enum imp_status st = imp__field_new(ctx, &profile_ops[k], sizeof(struct profile), n, &f);
+    enum imp_status st =
+        imp__field_new(ctx, &profile_ops[k], sizeof(struct profile), n, &f);
     if (st != IMP_OK) return st;
     struct profile *p = (struct profile *)f;
     p->kind = &kinds[k];

@@ -9,7 +9,10 @@
 
 #define CELLS_MAX 65536
 
-struct basis { int first; double b[4], d[4], dd[4]; };
+struct basis {
+    int first;
+    double b[4], d[4], dd[4];
+};
 
 static inline imp_v3 offset_of(const struct imp__radial *r, imp_v3 x)
 {
@@ -86,11 +89,14 @@ static void radial_tangent(const imp_field *f, const imp_v3 *x, const double *th
     *g_dot = y * (2 * f1);
 }
 
-const struct imp__field_ops imp__field_radial = {
-    .name = "radial", .eval = radial_eval, .splat = radial_splat, .tangent = radial_tangent};
+const struct imp__field_ops imp__field_radial = {.name = "radial",
+                                                 .eval = radial_eval,
+                                                 .splat = radial_splat,
+                                                 .tangent = radial_tangent};
 
-enum imp_status imp_field_radial_create(imp_context *ctx, const struct imp_field_radial *desc,
-                                        double index, imp_field **out)
+enum imp_status imp_field_radial_create(imp_context *ctx,
+                                        const struct imp_field_radial *desc, double index,
+                                        imp_field **out)
 {
     const imp_v3 axis = imp__v3_load(desc->axis);
     const double length = imp__length(axis);
@@ -102,9 +108,10 @@ enum imp_status imp_field_radial_create(imp_context *ctx, const struct imp_field
     if (desc->cylinder && !(length > 0 && isfinite(length)))
         return imp__error(ctx, IMP_E_ARG, "radial field: the axis has no direction");
     if (!(index > 0) || !isfinite(index))
-        return imp__error(ctx, IMP_E_ARG, "radial field: index %g is not positive", index);
-    enum imp_status st = imp__field_new(ctx, &imp__field_radial, sizeof(struct imp__radial),
-                                        (size_t)desc->cells + 3, &f);
+        return imp__error(ctx, IMP_E_ARG, "radial field: index %g is not positive",
+                          index);
+    enum imp_status st = imp__field_new(
+        ctx, &imp__field_radial, sizeof(struct imp__radial), (size_t)desc->cells + 3, &f);
     if (st != IMP_OK) return st;
     struct imp__radial *r = (struct imp__radial *)f;
     r->desc = *desc;

@@ -6,21 +6,32 @@
  *     canonical    drift x += c t v        kick v += d t eta g,   path += d t eta^2
  *     arc length   drift x += c t v/|v|    kick v += d t g,       path += d t eta
  *
- * Each line below is one of these, its tangent or its transpose. Supplement (23), (24), which
- * has x' = v/eta(x) and no explicit inverse, stands apart at the end. */
+ * Each line below is one of these, its tangent or its transpose. Supplement (23), (24),
+ * which has x' = v/eta(x) and no explicit inverse, stands apart at the end. */
 #include "curved.h"
 
 /* Yoshida 1990: w1 = 1/(2 - 2^(1/3)), w0 = 1 - 2 w1. */
 #define W1 1.3512071919596578
 #define W0 (-1.7024143839193153)
-#define DRIFT(c) {false, c}
-#define KICK(d) {true, d}
+#define DRIFT(c)                                                                         \
+    {                                                                                    \
+        false, c                                                                         \
+    }
+#define KICK(d)                                                                          \
+    {                                                                                    \
+        true, d                                                                          \
+    }
 
 const struct imp__scheme imp__schemes[IMP_BEND_N_SCHEMES] = {
-    [IMP_BEND_LEAPFROG] = {"leapfrog", 2, false, false, 3, {DRIFT(.5), KICK(1), DRIFT(.5)}},
+    [IMP_BEND_LEAPFROG] =
+        {"leapfrog", 2, false, false, 3, {DRIFT(.5), KICK(1), DRIFT(.5)}},
     [IMP_BEND_EULER] = {"euler", 1, false, false, 2, {KICK(1), DRIFT(1)}},
     [IMP_BEND_VERLET] = {"verlet", 2, false, false, 3, {KICK(.5), DRIFT(1), KICK(.5)}},
-    [IMP_BEND_YOSHIDA4] = {"yoshida4", 4, false, false, 7,
+    [IMP_BEND_YOSHIDA4] = {"yoshida4",
+                           4,
+                           false,
+                           false,
+                           7,
                            {DRIFT(W1 / 2), KICK(W1), DRIFT((W1 + W0) / 2), KICK(W0),
                             DRIFT((W1 + W0) / 2), KICK(W1), DRIFT(W1 / 2)}},
     [IMP_BEND_ARC] = {"arc", 2, true, false, 3, {DRIFT(.5), KICK(1), DRIFT(.5)}},
@@ -36,8 +47,8 @@ static void index_step_tangent(const imp_field *f, double t, const double *theta
 static void index_step_adjoint(const imp_field *f, double t, int n, struct imp__back *b,
                                const struct imp__state *const *before, double *theta_bar);
 
-void imp__step(const struct imp__scheme *s, const imp_field *f, double t, int n, imp_v3 *x,
-               imp_v3 *v, double *path)
+void imp__step(const struct imp__scheme *s, const imp_field *f, double t, int n,
+               imp_v3 *x, imp_v3 *v, double *path)
 {
     struct imp__jet jet[IMP_LANES];
     if (s->index_form) {
@@ -49,7 +60,8 @@ void imp__step(const struct imp__scheme *s, const imp_field *f, double t, int n,
         if (s->stage[k].kick) {
             f->ops->eval(f, n, x, 1, jet);
             if (s->arc)
-                for (int i = 0; i < n; i++) v[i] += dt * jet[i].g, path[i] += dt * jet[i].eta;
+                for (int i = 0; i < n; i++)
+                    v[i] += dt * jet[i].g, path[i] += dt * jet[i].eta;
             else
                 for (int i = 0; i < n; i++) {
                     const double te = dt * jet[i].eta;
@@ -111,7 +123,8 @@ void imp__step_rate(const struct imp__scheme *s, const imp_field *f, double t,
 }
 
 void imp__step_tangent(const struct imp__scheme *s, const imp_field *f, double t,
-                       const double *theta_dot, struct imp__state *a, struct imp__state *r)
+                       const double *theta_dot, struct imp__state *a,
+                       struct imp__state *r)
 {
     if (s->index_form) {
         index_step_tangent(f, t, theta_dot, a, r);
@@ -196,9 +209,10 @@ void imp__step_adjoint(const struct imp__scheme *s, const imp_field *f, double t
     }
 }
 
-/* ---- Supplement (23), (24): v1 = v + s g(x), x1 = x + s v1/eta(x) --------------------- */
+/* ---- Supplement (23), (24): v1 = v + s g(x), x1 = x + s v1/eta(x) -------------- */
 
-static void index_step(const imp_field *f, double t, int n, imp_v3 *x, imp_v3 *v, double *path)
+static void index_step(const imp_field *f, double t, int n, imp_v3 *x, imp_v3 *v,
+                       double *path)
 {
     struct imp__jet jet[IMP_LANES];
     f->ops->eval(f, n, x, 1, jet);
@@ -241,8 +255,8 @@ static void index_step_tangent(const imp_field *f, double t, const double *theta
     r->path += t * eta_dot;
 }
 
-/* Exact with the states before the step; without them (25), (26) with eta and g taken at the
- * nearest point that is known explicitly: biased, O(s) (curved-rays 1.3). */
+/* Exact with the states before the step; without them (25), (26) with eta and g taken at
+ * the nearest point that is known explicitly: biased, O(s) (curved-rays 1.3). */
 static void index_step_adjoint(const imp_field *f, double t, int n, struct imp__back *b,
                                const struct imp__state *const *before, double *theta_bar)
 {

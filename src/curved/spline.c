@@ -1,14 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Tensor cubic B-spline: eta = sum theta_abc w_a(u) w_b(v) w_c(w). Twice differentiable, so
- * the adjoint of a traced ray is also the macroscopic derivative (curved-rays 3.1, 3.3).
- * The x axis is contiguous: rows of four coefficients are vectors, reduced over y, then z,
- * and only at the end multiplied with the weights of x. */
+ * Tensor cubic B-spline: eta = sum theta_abc w_a(u) w_b(v) w_c(w). Twice differentiable,
+ * so the adjoint of a traced ray is also the macroscopic derivative
+ * (curved-rays 3.1, 3.3). The x axis is contiguous: rows of four coefficients are
+ * vectors, reduced over y, then z, and only at the end multiplied with the weights of x.
+ */
 #include "curved.h"
 
-struct cell {          /* where a point falls */
-    size_t corner;     /* index of the first coefficient */
-    imp_v3 u;          /* local coordinates, in [0, 1) inside the domain */
+struct cell {      /* where a point falls */
+    size_t corner; /* index of the first coefficient */
+    imp_v3 u;      /* local coordinates, in [0, 1) inside the domain */
 };
 
 static inline struct cell cell_of(const struct imp__grid *g, imp_v3 x)
@@ -23,7 +24,8 @@ static inline struct cell cell_of(const struct imp__grid *g, imp_v3 x)
         i[k] = (int)f;
     }
     c.u = imp__v3(u[0] - i[0], u[1] - i[1], u[2] - i[2]);
-    c.corner = (size_t)i[0] + (size_t)g->nodes[0] * ((size_t)i[1] + (size_t)g->nodes[1] * i[2]);
+    c.corner =
+        (size_t)i[0] + (size_t)g->nodes[0] * ((size_t)i[1] + (size_t)g->nodes[1] * i[2]);
     return c;
 }
 
@@ -73,7 +75,8 @@ eval_first(const struct imp__grid *g, imp_v3 x, bool single, struct imp__jet *j)
 {
     const struct cell c = cell_of(g, x);
     const imp_spec wx = weights(c.u[0]), wy = weights(c.u[1]), wz = weights(c.u[2]);
-    const imp_spec dx = weights_d(c.u[0], g->inv_h[0]), dy = weights_d(c.u[1], g->inv_h[1]),
+    const imp_spec dx = weights_d(c.u[0], g->inv_h[0]),
+                   dy = weights_d(c.u[1], g->inv_h[1]),
                    dz = weights_d(c.u[2], g->inv_h[2]);
     const size_t sy = (size_t)g->nodes[0], sz = sy * (size_t)g->nodes[1];
     imp_spec a = {0}, ay = {0}, az = {0};
@@ -99,7 +102,8 @@ eval_second(const struct imp__grid *g, imp_v3 x, bool single, struct imp__jet *j
 {
     const struct cell c = cell_of(g, x);
     const imp_spec wx = weights(c.u[0]), wy = weights(c.u[1]), wz = weights(c.u[2]);
-    const imp_spec dx = weights_d(c.u[0], g->inv_h[0]), dy = weights_d(c.u[1], g->inv_h[1]),
+    const imp_spec dx = weights_d(c.u[0], g->inv_h[0]),
+                   dy = weights_d(c.u[1], g->inv_h[1]),
                    dz = weights_d(c.u[2], g->inv_h[2]);
     const imp_spec ddx = weights_dd(c.u[0], g->inv_h[0]),
                    ddy = weights_dd(c.u[1], g->inv_h[1]),
@@ -152,8 +156,8 @@ static void spline_eval(const imp_field *f, int n, const imp_v3 *x, int order,
         for (int i = 0; i < n; i++) imp__jet_from_eta2(&jet[i], order);
 }
 
-/* theta_bar += a w_a w_b w_c + (1/h)(b_x w_a' w_b w_c + ...): each row gets the x weights and
- * their derivative, each times a number. */
+/* theta_bar += a w_a w_b w_c + (1/h)(b_x w_a' w_b w_c + ...): each row gets the x weights
+ * and their derivative, each times a number. */
 static void splat_raw(const struct imp__grid *g, const imp_v3 *x, double va, imp_v3 b,
                       double *theta_bar)
 {
@@ -206,7 +210,9 @@ static void spline_tangent(const imp_field *f, const imp_v3 *x, const double *th
     *g_dot = j.g;
 }
 
-const struct imp__field_ops imp__field_spline = {
-    .name = "spline", .eval = spline_eval, .splat = spline_splat, .tangent = spline_tangent,
-    .changed = imp__grid_changed,
-    .destroy = imp__grid_destroy};
+const struct imp__field_ops imp__field_spline = {.name = "spline",
+                                                 .eval = spline_eval,
+                                                 .splat = spline_splat,
+                                                 .tangent = spline_tangent,
+                                                 .changed = imp__grid_changed,
+                                                 .destroy = imp__grid_destroy};

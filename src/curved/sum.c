@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A sum of fields. Its numbers are those of the parts, one after the other; the parts keep
- * none of their own. */
+ * A sum of fields. Its numbers are those of the parts, one after the other; the parts
+ * keep none of their own. */
 #include "bend.h"
 #include <string.h>
 
@@ -83,10 +83,14 @@ static const char *sum_param_name(const imp_field *f, size_t i)
     return NULL;
 }
 
-const struct imp__field_ops imp__field_sum = {
-    .name = "sum", .eval = sum_eval, .splat = sum_splat, .tangent = sum_tangent,
-    .changed = sum_changed, .moved = sum_moved, .destroy = sum_destroy,
-    .param_name = sum_param_name};
+const struct imp__field_ops imp__field_sum = {.name = "sum",
+                                              .eval = sum_eval,
+                                              .splat = sum_splat,
+                                              .tangent = sum_tangent,
+                                              .changed = sum_changed,
+                                              .moved = sum_moved,
+                                              .destroy = sum_destroy,
+                                              .param_name = sum_param_name};
 
 enum imp_status imp_field_sum_create(imp_context *ctx, size_t n, imp_field **parts,
                                      imp_field **out)
@@ -98,7 +102,8 @@ enum imp_status imp_field_sum_create(imp_context *ctx, size_t n, imp_field **par
         IMP_TRY(imp__error(ctx, IMP_E_ARG, "a sum of %zu index fields", n));
     for (size_t p = 0; p < n; p++) n_theta += parts[p]->n_theta;
     if (n_theta > IMP_FIELD_THETA_MAX)
-        IMP_TRY(imp__error(ctx, IMP_E_ARG, "a sum of index fields with %zu numbers", n_theta));
+        IMP_TRY(imp__error(ctx, IMP_E_ARG, "a sum of index fields with %zu numbers",
+                           n_theta));
     IMP_TRY(imp__field_new(ctx, &imp__field_sum, sizeof(struct sum), n_theta, &f));
     struct sum *s = (struct sum *)f;
     s->part = imp__alloc(ctx, n, sizeof(imp_field *));

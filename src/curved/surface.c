@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Surfaces where rays end or turn: G(x, v), negative inside, with its derivatives, and the
- * momentum's map there (curved-rays 2.6, 3.5). */
+ * Surfaces where rays end or turn: G(x, v), negative inside, with its derivatives, and
+ * the momentum's map there (curved-rays 2.6, 3.5). */
 #include "curved.h"
 #include "scene/scene.h"
 
@@ -59,15 +59,9 @@ void imp__surface_hess(const struct imp__surface *s, const imp_v3 *x, const imp_
     case IMP__PLANE:
     case IMP__DISC:
     case IMP__MESH:
-    case IMP__APPROACH:
-        *out = (imp_v3){0};
-        break;
-    case IMP__SPHERE:
-        *out = *m;
-        break;
-    case IMP__CYLINDER:
-        *out = *m - s->n * imp__dot(*m, s->n);
-        break;
+    case IMP__APPROACH: *out = (imp_v3){0}; break;
+    case IMP__SPHERE: *out = *m; break;
+    case IMP__CYLINDER: *out = *m - s->n * imp__dot(*m, s->n); break;
     case IMP__SDF: {
         struct imp__jet j;
         imp__field_eval1(s->sdf, x, 2, &j);
@@ -84,8 +78,10 @@ bool imp__surface_covers(const struct imp__surface *s, const imp_v3 *x)
     return imp__dot(y, y) <= s->radius * s->radius;
 }
 
-/* a = n.v; q^2 = e2^2 - |v|^2 + a^2; v' = v + (sign(a) q - a) n, or reflected if q^2 < 0. */
-void imp__turn(const imp_v3 *n, const imp_v3 *v, double e2, bool mirror, struct imp__turn *t)
+/* a = n.v; q^2 = e2^2 - |v|^2 + a^2; v' = v + (sign(a) q - a) n, or reflected if q^2 < 0.
+ */
+void imp__turn(const imp_v3 *n, const imp_v3 *v, double e2, bool mirror,
+               struct imp__turn *t)
 {
     t->a = imp__dot(*n, *v);
     const double q2 = e2 * e2 - imp__dot(*v, *v) + t->a * t->a;
@@ -124,12 +120,13 @@ void imp__turn_jvp(const struct imp__turn *t, const imp_v3 *n, const imp_v3 *v, 
     const double a_dot = imp__dot(*n, *v_dot) + imp__dot(*n_dot, *v);
     double c_dot = -2 * a_dot;
     if (!t->reflected)
-        c_dot = t->sign * (e2 * e2_dot - imp__dot(*v, *v_dot) + t->a * a_dot) / t->q - a_dot;
+        c_dot =
+            t->sign * (e2 * e2_dot - imp__dot(*v, *v_dot) + t->a * a_dot) / t->q - a_dot;
     *dot = *v_dot + c_dot * *n + t->c * *n_dot;
 }
 
-bool imp__facet(const struct imp__surface *s, const imp_v3 *a, const imp_v3 *b, bool inwards,
-                double nearest, struct imp__surface *facet)
+bool imp__facet(const struct imp__surface *s, const imp_v3 *a, const imp_v3 *b,
+                bool inwards, double nearest, struct imp__surface *facet)
 {
     const imp_v3 way = *b - *a;
     const double length = imp__length(way);
@@ -137,7 +134,8 @@ bool imp__facet(const struct imp__surface *s, const imp_v3 *a, const imp_v3 *b, 
     double from = nearest;
     struct imp_hit hit;
     for (int tries = 0; tries < 16; tries++) {
-        if (!(length > from) || !imp__intersect(s->scene, a, &d, from, length, &hit)) return false;
+        if (!(length > from) || !imp__intersect(s->scene, a, &d, from, length, &hit))
+            return false;
         const struct imp_shape *shape = s->scene->shapes[hit.shape];
         struct imp_surface at;
         shape->ops->surface(shape, &hit, a, &d, &at);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Forward derivatives of rays: the tangent of every line of the tracer, in the same order.
- * They give Gauss-Newton products, and the dot-product test of the adjoint. */
+ * Forward derivatives of rays: the tangent of every line of the tracer, in the same
+ * order. They give Gauss-Newton products, and the dot-product test of the adjoint. */
 #include "curved.h"
 #include <string.h>
 
@@ -94,7 +94,8 @@ static void start_dot(const struct job *job, size_t i, const struct imp__start *
     dot->v = eta_dot * s->d0 + s->jet.eta * dd;
 }
 
-static enum imp_status ray_tangent(const struct job *job, size_t i, struct imp__track *track)
+static enum imp_status ray_tangent(const struct job *job, size_t i,
+                                   struct imp__track *track)
 {
     const struct imp__plan *p = job->plan;
     const size_t n_taps = (size_t)p->n_taps;
@@ -103,7 +104,8 @@ static enum imp_status ray_tangent(const struct job *job, size_t i, struct imp__
     struct imp__state dot;
 
     memset(out, 0, sizeof *out);
-    if (job->tap_dots) memset(&job->tap_dots[i * n_taps], 0, n_taps * sizeof *job->tap_dots);
+    if (job->tap_dots)
+        memset(&job->tap_dots[i * n_taps], 0, n_taps * sizeof *job->tap_dots);
     track->states = false;
     const enum imp_status st = imp__track_ray(p, job->rays, i, track);
     if (st != IMP_OK || (track->exit.flags & IMP_BEND_DROPPED)) return st;
@@ -118,7 +120,8 @@ static enum imp_status ray_tangent(const struct job *job, size_t i, struct imp__
             for (size_t t = 0; job->tap_dots && t < n_taps; t++) {
                 const struct imp_bend_exit *e = &track->tap[t];
                 struct imp__state at, tap_dot;
-                if ((e->flags & IMP_BEND_TAP_MISSED) || e->steps != n || e->segments != k + 1)
+                if ((e->flags & IMP_BEND_TAP_MISSED) || e->steps != n ||
+                    e->segments != k + 1)
                     continue;
                 land_dot(p, &p->taps[t], &s, &dot, e->tau, job->theta_dot, &at, &tap_dot);
                 cotangent_store(&tap_dot, &job->tap_dots[i * n_taps + t]);
@@ -130,11 +133,13 @@ static enum imp_status ray_tangent(const struct job *job, size_t i, struct imp__
         land_dot(p, g->surface, &s, &dot, g->tau, job->theta_dot, &at, &end);
         s = at, dot = end;
         imp__surface_eval(g->surface, &s.x, &s.v, &sa);
-        if (g->surface->event == IMP_BEND_REFRACT || g->surface->event == IMP_BEND_MIRROR) {
+        if (g->surface->event == IMP_BEND_REFRACT ||
+            g->surface->event == IMP_BEND_MIRROR) {
             struct imp__turn turn;
             const imp_v3 n = imp__normalize(sa.gx), vd = dot.v;
             const imp_v3 n_dot = normal_dot(g->surface, s.x, sa.gx, dot.x);
-            imp__turn(&n, &s.v, g->surface->index, g->surface->event == IMP_BEND_MIRROR, &turn);
+            imp__turn(&n, &s.v, g->surface->index, g->surface->event == IMP_BEND_MIRROR,
+                      &turn);
             imp__turn_jvp(&turn, &n, &s.v, g->surface->index, &vd, &n_dot, 0, &dot.v);
             s.v = turn.v;
         }
@@ -155,22 +160,23 @@ static enum imp_status work(size_t item, int worker, int slot, void *payload)
     return IMP_OK;
 }
 
-enum imp_status imp_bend_tangent(const imp_field *field, const struct imp_bend_options *options,
-                                 const struct imp_bend_rays *rays, const double *theta_dot,
-                                 const double (*x_dot)[3], const double (*d_dot)[3],
-                                 struct imp_bend_cotangent *dots,
-                                 struct imp_bend_cotangent *tap_dots)
+enum imp_status
+imp_bend_tangent(const imp_field *field, const struct imp_bend_options *options,
+                 const struct imp_bend_rays *rays, const double *theta_dot,
+                 const double (*x_dot)[3], const double (*d_dot)[3],
+                 struct imp_bend_cotangent *dots, struct imp_bend_cotangent *tap_dots)
 {
     struct imp__plan plan;
     enum imp_status st = imp__plan_create(field, options, rays, &plan);
     if (st != IMP_OK) return st;
     const int n_slots = imp__pool_slots(plan.ctx);
-    struct job job = {&plan, rays, theta_dot, x_dot, d_dot, dots,
-                      plan.n_taps > 0 ? tap_dots : NULL, NULL};
+    struct job job = {
+        &plan, rays, theta_dot, x_dot, d_dot, dots, plan.n_taps > 0 ? tap_dots : NULL,
+        NULL};
     job.tracks = imp__alloc(plan.ctx, (size_t)n_slots, sizeof *job.tracks);
     if (!job.tracks) IMP_TRY(imp__error(plan.ctx, IMP_E_NOMEM, "no memory for tangents"));
-    const struct imp_loop loop = {.n_items = (rays->n + CHUNK - 1) / CHUNK, .work = work,
-                                  .payload = &job};
+    const struct imp_loop loop = {
+        .n_items = (rays->n + CHUNK - 1) / CHUNK, .work = work, .payload = &job};
     IMP_TRY(imp__parallel(plan.ctx, &loop, NULL));
 out:
     for (int i = 0; job.tracks && i < n_slots; i++) imp__track_free(&job.tracks[i]);
@@ -179,14 +185,15 @@ out:
     return st;
 }
 
-enum imp_status imp_bend_path(const imp_field *field, const struct imp_bend_options *options,
+enum imp_status imp_bend_path(const imp_field *field,
+                              const struct imp_bend_options *options,
                               const struct imp_bend_rays *rays, size_t ray,
                               double (**points)[4], size_t *n_points,
                               struct imp_bend_exit *exit)
 {
     struct imp__plan plan;
     struct imp__track track = {.states = true};
-    double (*list)[4] = NULL;
+    double(*list)[4] = NULL;
     enum imp_status st = imp__plan_create(field, options, rays, &plan);
     if (st != IMP_OK) return st;
     if (ray >= rays->n) IMP_TRY(imp__error(plan.ctx, IMP_E_ARG, "no ray %zu", ray));

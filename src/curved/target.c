@@ -35,9 +35,9 @@ bool imp__arrive(const struct imp_bend_target *t, const struct imp_bend_exit *e,
 }
 
 /* s = (p - n.x)/(n.v): ds/dx = -n/(n.v), ds/dv = -s n/(n.v). */
-void imp__arrive_vjp(const struct imp_bend_target *t, const struct imp__arrival *a, imp_v3 x_bar,
-                     imp_v3 d_bar, imp_v3 v_bar, double path_bar, double weight_bar,
-                     struct imp_bend_cotangent *bar)
+void imp__arrive_vjp(const struct imp_bend_target *t, const struct imp__arrival *a,
+                     imp_v3 x_bar, imp_v3 d_bar, imp_v3 v_bar, double path_bar,
+                     double weight_bar, struct imp_bend_cotangent *bar)
 {
     const double speed = imp__length(a->v);
     imp_v3 cx = x_bar, cv = v_bar + (d_bar - a->d * imp__dot(a->d, d_bar)) * (1 / speed);
@@ -54,9 +54,13 @@ void imp__arrive_vjp(const struct imp_bend_target *t, const struct imp__arrival 
     bar->path += path_bar;
 }
 
-/* ---- Targets ray by ray: f and its gradients --------------------------------------------- */
+/* ---- Targets ray by ray: f and its gradients ----------------------------------- */
 
-struct part { double f; imp_v3 x, d, v; double path; };
+struct part {
+    double f;
+    imp_v3 x, d, v;
+    double path;
+};
 
 static void part_of(const imp_bend *b, const struct imp__target_of_rays *t, size_t i,
                     const struct imp__arrival *a, imp_v3 centre, double mean_path,
@@ -70,7 +74,8 @@ static void part_of(const imp_bend *b, const struct imp__target_of_rays *t, size
     case IMP_BEND_FOCUS:
     case IMP_BEND_SPOT:
     case IMP_BEND_POINTS:
-        r = a->x - (desc->type == IMP_BEND_POINTS ? imp__v3_load(t->data + 3 * own) : centre);
+        r = a->x -
+            (desc->type == IMP_BEND_POINTS ? imp__v3_load(t->data + 3 * own) : centre);
         p->f = imp__dot(r, r) / 2;
         p->x = r;
         break;
@@ -90,7 +95,8 @@ static void part_of(const imp_bend *b, const struct imp__target_of_rays *t, size
     }
     case IMP_BEND_PATH:
     case IMP_BEND_WAVEFRONT: {
-        const double s = a->path - (desc->type == IMP_BEND_PATH ? t->data[own] : mean_path);
+        const double s =
+            a->path - (desc->type == IMP_BEND_PATH ? t->data[own] : mean_path);
         p->f = s * s / 2;
         p->path = s;
         break;
@@ -125,7 +131,8 @@ enum imp_status imp__target_value(const imp_bend *b, const struct imp__target_of
         imp_v3 sum = {0};
         double weight = 0;
         for (size_t i = t->first; i < t->last; i++) {
-            if (!imp__arrive(desc, imp__target_exit(desc, exits, taps, n_taps, i), &a)) continue;
+            if (!imp__arrive(desc, imp__target_exit(desc, exits, taps, n_taps, i), &a))
+                continue;
             const double share = a.weight * b->power[i];
             sum += share * a.x;
             mean_path += share * a.path;
@@ -138,13 +145,15 @@ enum imp_status imp__target_value(const imp_bend *b, const struct imp__target_of
     const double scale = desc->weight / t->power;
     for (size_t i = t->first; i < t->last; i++) {
         struct part p;
-        if (!imp__arrive(desc, imp__target_exit(desc, exits, taps, n_taps, i), &a)) continue;
+        if (!imp__arrive(desc, imp__target_exit(desc, exits, taps, n_taps, i), &a))
+            continue;
         part_of(b, t, i, &a, centre, mean_path, &p);
         const double share = scale * b->power[i], k = share * a.weight;
         total += k * p.f;
         if (!bars) continue;
         imp__arrive_vjp(desc, &a, k * p.x, k * p.d, k * p.v, k * p.path, share * p.f,
-                        desc->tap < 0 ? &bars[i] : &tap_bars[i * n_taps + (size_t)desc->tap]);
+                        desc->tap < 0 ? &bars[i]
+                                      : &tap_bars[i * n_taps + (size_t)desc->tap]);
     }
     *value = total;
     return IMP_OK;

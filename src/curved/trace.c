@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Rays forwards. IMP_LANES rays take whole steps side by side; a ray that has passed a
- * surface lands on it with a fractional step (curved-rays 2.3), and ends or turns there. */
+ * surface lands on it with a fractional step (curved-rays 2.3), and ends or turns there.
+ */
 #include "curved.h"
 #include <string.h>
 
-#define CHUNK 512   /* rays of one work item */
+#define CHUNK 512 /* rays of one work item */
 
-/* ---- Starts ------------------------------------------------------------------------- */
+/* ---- Starts -------------------------------------------------------------------- */
 
 /* Straight line x + s d against a surface: *s_in where it enters, *s_out where it leaves.
  * false: it never gets inside. */
@@ -70,8 +71,7 @@ static bool straight(const struct imp__surface *s, imp_v3 x, imp_v3 d, double *s
     }
     case IMP__DISC:
     case IMP__APPROACH:
-    case IMP__MESH:
-        return true;
+    case IMP__MESH: return true;
     }
     return true;
 }
@@ -97,7 +97,8 @@ void imp__start_ray(const struct imp__plan *p, const struct imp_bend_rays *rays,
                     struct imp__start *s)
 {
     const struct imp__domain *dom = imp__plan_domain(p, imp__ray_group(rays, i));
-    *s = (struct imp__start){.x0 = imp__v3_load(rays->x[i]), .d0 = imp__v3_load(rays->d[i])};
+    *s = (struct imp__start){.x0 = imp__v3_load(rays->x[i]),
+                             .d0 = imp__v3_load(rays->d[i])};
     s->length = imp__length(s->d0);
     s->d0 *= 1 / s->length;
     s->at.x = s->x0;
@@ -112,11 +113,13 @@ void imp__start_ray(const struct imp__plan *p, const struct imp_bend_rays *rays,
             double a, b;
             if (dom->surface[k].kind == IMP__MESH) {
                 const imp_v3 end = s->x0 + s->d0 * (1e3 * p->size);
-                if (!imp__facet(&dom->surface[k], &s->x0, &end, true, 1e-6 * p->size, &s->facet)) {
+                if (!imp__facet(&dom->surface[k], &s->x0, &end, true, 1e-6 * p->size,
+                                &s->facet)) {
                     s->flags = IMP_BEND_MISSED;
                     return;
                 }
-                a = (s->facet.offset - imp__dot(s->facet.n, s->x0)) / imp__dot(s->facet.n, s->d0);
+                a = (s->facet.offset - imp__dot(s->facet.n, s->x0)) /
+                    imp__dot(s->facet.n, s->d0);
                 if (a > in) in = a, s->entry = &dom->surface[k];
                 continue;
             }
@@ -153,11 +156,10 @@ void imp__start_ray(const struct imp__plan *p, const struct imp_bend_rays *rays,
     }
     if (!(s->jet.eta > 0) || !isfinite(s->jet.eta) || !imp__is_finite(s->jet.g))
         s->flags = IMP_BEND_BROKEN;
-    else if (!s->flags && !starts_inside(p, dom, &s->at))
-        s->flags = IMP_BEND_STARTED_OUT;
+    else if (!s->flags && !starts_inside(p, dom, &s->at)) s->flags = IMP_BEND_STARTED_OUT;
 }
 
-/* ---- Landing ------------------------------------------------------------------------ */
+/* ---- Landing ------------------------------------------------------------------- */
 
 /* Solve G(Phi_tau(from)) = 0 on (0, t]: Newton with dG/dtau, kept inside a bracket. */
 double imp__land_on(const struct imp__plan *p, const struct imp__surface *s,
@@ -193,7 +195,8 @@ double imp__land_on(const struct imp__plan *p, const struct imp__surface *s,
             tau = imp_clamp(tau - newton, 0.0, t);
             break;
         }
-        if (sa.g > 0) hi = tau; else lo = tau;
+        if (sa.g > 0) hi = tau;
+        else lo = tau;
         const double next = tau - newton;
         tau = next > lo && next < hi ? next : (lo + hi) / 2;
         if (!(hi - lo > 1e-16 * t)) break;
@@ -203,12 +206,13 @@ double imp__land_on(const struct imp__plan *p, const struct imp__surface *s,
     return tau;
 }
 
-/* The first surface passed by the step from `from` to (x1, v1); NULL: none. `facet` is room
- * for the one of a mesh. */
-static const struct imp__surface *land(const struct imp__plan *p, const struct imp__domain *d,
+/* The first surface passed by the step from `from` to (x1, v1); NULL: none. `facet` is
+ * room for the one of a mesh. */
+static const struct imp__surface *land(const struct imp__plan *p,
+                                       const struct imp__domain *d,
                                        const struct imp__state *from, const imp_v3 *x1,
-                                       const imp_v3 *v1, double *tau, struct imp__state *at,
-                                       struct imp__surface *facet)
+                                       const imp_v3 *v1, double *tau,
+                                       struct imp__state *at, struct imp__surface *facet)
 {
     const struct imp__surface *hit = NULL;
     for (int i = 0; i < d->n; i++) {
@@ -231,7 +235,7 @@ static const struct imp__surface *land(const struct imp__plan *p, const struct i
     return hit;
 }
 
-/* ---- Many rays ---------------------------------------------------------------------- */
+/* ---- Many rays ----------------------------------------------------------------- */
 
 struct lane {
     size_t ray;
@@ -257,8 +261,9 @@ static void exit_write(const struct imp__state *a, double tau, const struct lane
 }
 
 /* Taps crossed on the way from `from` to `to`, `t` long. */
-static void taps_look(const struct imp__plan *p, struct lane *l, const struct imp__state *from,
-                      const struct imp__state *to, double t, struct imp_bend_exit *taps)
+static void taps_look(const struct imp__plan *p, struct lane *l,
+                      const struct imp__state *from, const struct imp__state *to,
+                      double t, struct imp_bend_exit *taps)
 {
     for (int k = 0; k < p->n_taps; k++) {
         struct imp__surface s = p->taps[k];
@@ -315,8 +320,10 @@ static bool event(const struct imp__plan *p, struct lane *l, const struct imp__s
 static enum imp_status track_state(struct imp__track *k, const struct imp__state *s)
 {
     if (k->n >= k->capacity) {
-        void *grown = imp__grow(k->ctx, k->state, &k->capacity, k->n + 1, sizeof *k->state);
-        if (!grown) return imp__error(k->ctx, IMP_E_NOMEM, "no memory for a ray's trajectory");
+        void *grown =
+            imp__grow(k->ctx, k->state, &k->capacity, k->n + 1, sizeof *k->state);
+        if (!grown)
+            return imp__error(k->ctx, IMP_E_NOMEM, "no memory for a ray's trajectory");
         k->state = grown;
     }
     k->state[k->n++] = *s;
@@ -342,10 +349,13 @@ static enum imp_status trace(const struct imp__plan *p, const struct imp_bend_ra
             const size_t i = next++, out = i - first;
             const int group = imp__ray_group(rays, i);
             imp__start_ray(p, rays, i, &s);
-            lane[n] = (struct lane){.ray = out, .domain = imp__plan_domain(p, group),
-                                    .flags = s.flags, .segments = 1};
+            lane[n] = (struct lane){.ray = out,
+                                    .domain = imp__plan_domain(p, group),
+                                    .flags = s.flags,
+                                    .segments = 1};
             for (size_t k = 0; k < n_taps; k++) {
-                if (p->tap_group[k] < 0 || p->tap_group[k] == group) lane[n].pending |= 1u << k;
+                if (p->tap_group[k] < 0 || p->tap_group[k] == group)
+                    lane[n].pending |= 1u << k;
                 memset(&taps[out * n_taps + k], 0, sizeof *taps);
                 taps[out * n_taps + k].flags = IMP_BEND_TAP_MISSED;
             }
@@ -375,14 +385,18 @@ static enum imp_status trace(const struct imp__plan *p, const struct imp_bend_ra
             if (!inside || l->domain->n_general > 0)
                 hit = land(p, l->domain, &from[i], &x[i], &v[i], &tau, &at, &facet);
             if (imp_unlikely(l->pending)) {
-                const struct imp__state to = hit ? at : (struct imp__state){x[i], v[i], 0};
+                const struct imp__state to =
+                    hit ? at : (struct imp__state){x[i], v[i], 0};
                 taps_look(p, l, &from[i], &to, tau, taps + l->ray * n_taps);
             }
             if (hit) {
                 if (track) {
                     struct imp__segment *g = &track->segment[track->n_segments++];
-                    *g = (struct imp__segment){.at = at, .from = from[i], .surface = hit,
-                                               .tau = tau, .steps = l->steps};
+                    *g = (struct imp__segment){.at = at,
+                                               .from = from[i],
+                                               .surface = hit,
+                                               .tau = tau,
+                                               .steps = l->steps};
                     if (hit == &facet) g->facet = facet, g->surface = &g->facet;
                 }
                 ended = event(p, l, hit, &at, tau, &exits[l->ray]);
@@ -392,7 +406,8 @@ static enum imp_status trace(const struct imp__plan *p, const struct imp_bend_ra
                 l->total++;
                 unsigned lost = 0;
                 if (imp_unlikely(!inside)) {
-                    if (!imp__is_finite(x[i]) || !imp__is_finite(v[i])) lost = IMP_BEND_BROKEN;
+                    if (!imp__is_finite(x[i]) || !imp__is_finite(v[i]))
+                        lost = IMP_BEND_BROKEN;
                     else if (!imp__inside(&x[i], &p->lo, &p->hi)) lost = IMP_BEND_MISSED;
                 }
                 if (imp_unlikely(l->total >= p->max_steps)) lost |= IMP_BEND_TRUNCATED;
@@ -413,16 +428,18 @@ static enum imp_status trace(const struct imp__plan *p, const struct imp_bend_ra
     }
 }
 
-enum imp_status imp__trace_some(const struct imp__plan *p, const struct imp_bend_rays *rays,
-                                size_t first, size_t last, struct imp_bend_exit *exits,
+enum imp_status imp__trace_some(const struct imp__plan *p,
+                                const struct imp_bend_rays *rays, size_t first,
+                                size_t last, struct imp_bend_exit *exits,
                                 struct imp_bend_exit *taps)
 {
     return trace(p, rays, first, last, exits + first,
                  taps ? taps + first * (size_t)p->n_taps : NULL, NULL);
 }
 
-enum imp_status imp__track_ray(const struct imp__plan *p, const struct imp_bend_rays *rays,
-                               size_t i, struct imp__track *track)
+enum imp_status imp__track_ray(const struct imp__plan *p,
+                               const struct imp_bend_rays *rays, size_t i,
+                               struct imp__track *track)
 {
     track->ctx = p->ctx;
     track->n = 0;
@@ -453,7 +470,7 @@ const struct imp__surface *imp__exit_surface(const struct imp__plan *p, int grou
     return best;
 }
 
-/* ---- The call ----------------------------------------------------------------------- */
+/* ---- The call ------------------------------------------------------------------ */
 
 void imp__count(const struct imp__plan *p, size_t n, const struct imp_bend_exit *exits,
                 const struct imp_bend_exit *taps, struct imp_bend_stats *out)
@@ -472,7 +489,8 @@ void imp__count(const struct imp__plan *p, size_t n, const struct imp_bend_exit 
         s.energy += (e->flags & IMP_BEND_ENERGY) != 0;
         s.reflected += (e->flags & IMP_BEND_REFLECTED) != 0;
         for (int k = 0; taps && k < p->n_taps; k++)
-            s.taps_missed += (taps[i * (size_t)p->n_taps + k].flags & IMP_BEND_TAP_MISSED) != 0;
+            s.taps_missed +=
+                (taps[i * (size_t)p->n_taps + k].flags & IMP_BEND_TAP_MISSED) != 0;
         if (e->flags & IMP_BEND_DROPPED) continue;
         s.traced++;
         struct imp__jet j;
@@ -497,9 +515,11 @@ static enum imp_status job_work(size_t i, int worker, int slot, void *payload)
                            j->exits, j->taps);
 }
 
-enum imp_status imp_bend_trace(const imp_field *field, const struct imp_bend_options *options,
-                               const struct imp_bend_rays *rays, struct imp_bend_exit *exits,
-                               struct imp_bend_exit *taps, struct imp_bend_stats *stats)
+enum imp_status imp_bend_trace(const imp_field *field,
+                               const struct imp_bend_options *options,
+                               const struct imp_bend_rays *rays,
+                               struct imp_bend_exit *exits, struct imp_bend_exit *taps,
+                               struct imp_bend_stats *stats)
 {
     struct imp__plan plan;
     enum imp_status st = imp__plan_create(field, options, rays, &plan);
@@ -507,10 +527,14 @@ enum imp_status imp_bend_trace(const imp_field *field, const struct imp_bend_opt
     if (plan.n_taps > 0 && !taps)
         IMP_TRY(imp__error(plan.ctx, IMP_E_ARG, "taps are asked for and have no room"));
     struct job job = {&plan, rays, exits, taps};
-    const struct imp_loop loop = {
-        .n_items = (rays->n + CHUNK - 1) / CHUNK, .work = job_work, .payload = &job,
-        .progress = plan.options.progress, .progress_payload = plan.options.progress_payload,
-        .stage = "trace", .rate_unit = "rays", .units = (double)rays->n};
+    const struct imp_loop loop = {.n_items = (rays->n + CHUNK - 1) / CHUNK,
+                                  .work = job_work,
+                                  .payload = &job,
+                                  .progress = plan.options.progress,
+                                  .progress_payload = plan.options.progress_payload,
+                                  .stage = "trace",
+                                  .rate_unit = "rays",
+                                  .units = (double)rays->n};
     IMP_TRY(imp__parallel(plan.ctx, &loop, NULL));
     imp__count(&plan, rays->n, exits, taps, stats);
 out:

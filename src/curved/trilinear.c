@@ -1,11 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Trilinear grid. The index is continuous, its gradient jumps at cell faces, and inside cells
- * the diagonal of the Hessian is zero: the derivative of the traced program is exact, and not
- * the macroscopic one (curved-rays 3.3). */
+ * Trilinear grid. The index is continuous, its gradient jumps at cell faces, and inside
+ * cells the diagonal of the Hessian is zero: the derivative of the traced program is
+ * exact, and not the macroscopic one (curved-rays 3.3). */
 #include "curved.h"
 
-struct corners { double c[8]; double u, v, w; size_t at; };
+struct corners {
+    double c[8];
+    double u, v, w;
+    size_t at;
+};
 
 static inline __attribute__((always_inline)) struct corners
 corners_of(const struct imp__grid *g, imp_v3 x, bool single)
@@ -20,10 +24,8 @@ corners_of(const struct imp__grid *g, imp_v3 x, bool single)
     r.at = (size_t)i + sy * (size_t)j + sz * (size_t)k;
     const size_t at[4] = {r.at, r.at + sy, r.at + sz, r.at + sz + sy};
     for (int p = 0; p < 4; p++)
-        if (single)
-            r.c[2 * p] = g->single[at[p]], r.c[2 * p + 1] = g->single[at[p] + 1];
-        else
-            r.c[2 * p] = g->base.theta[at[p]], r.c[2 * p + 1] = g->base.theta[at[p] + 1];
+        if (single) r.c[2 * p] = g->single[at[p]], r.c[2 * p + 1] = g->single[at[p] + 1];
+        else r.c[2 * p] = g->base.theta[at[p]], r.c[2 * p + 1] = g->base.theta[at[p] + 1];
     return r;
 }
 
@@ -33,8 +35,9 @@ eval_one(const struct imp__grid *g, imp_v3 x, bool single, int order, struct imp
     const struct corners r = corners_of(g, x, single);
     const double *c = r.c, u = r.u, v = r.v, w = r.w;
     const double d0 = c[1] - c[0], d1 = c[3] - c[2], d2 = c[5] - c[4], d3 = c[7] - c[6];
-    const double e0 = c[0] + u * d0, e1 = c[2] + u * d1, e2 = c[4] + u * d2, e3 = c[6] + u * d3;
-    const double f0 = e1 - e0, f1 = e3 - e2;          /* along y, at w = 0 and 1 */
+    const double e0 = c[0] + u * d0, e1 = c[2] + u * d1, e2 = c[4] + u * d2,
+                 e3 = c[6] + u * d3;
+    const double f0 = e1 - e0, f1 = e3 - e2; /* along y, at w = 0 and 1 */
     const double s0 = e0 + v * f0, s1 = e2 + v * f1;
     const double dx0 = d0 + v * (d1 - d0), dx1 = d2 + v * (d3 - d2);
     j->eta = s0 + w * (s1 - s0);
@@ -60,8 +63,8 @@ static void trilinear_eval(const imp_field *f, int n, const imp_v3 *x, int order
         for (int i = 0; i < n; i++) imp__jet_from_eta2(&jet[i], order);
 }
 
-static void trilinear_splat(const imp_field *f, const imp_v3 *x, double a, const imp_v3 *b,
-                            double *theta_bar)
+static void trilinear_splat(const imp_field *f, const imp_v3 *x, double a,
+                            const imp_v3 *b, double *theta_bar)
 {
     const struct imp__grid *g = (const struct imp__grid *)f;
     imp_v3 gb = *b;
@@ -78,14 +81,15 @@ static void trilinear_splat(const imp_field *f, const imp_v3 *x, double a, const
         for (int i = 0; i < 2; i++) {
             double *row = theta_bar + r.at + (i ? sy : 0) + (k ? sz : 0);
             const double q = wy[i] * wz[k];
-            const double p = a * q + (i ? gb[1] : -gb[1]) * wz[k] + wy[i] * (k ? gb[2] : -gb[2]);
+            const double p =
+                a * q + (i ? gb[1] : -gb[1]) * wz[k] + wy[i] * (k ? gb[2] : -gb[2]);
             row[0] += p * wx[0] - gb[0] * q;
             row[1] += p * wx[1] + gb[0] * q;
         }
 }
 
-static void trilinear_tangent(const imp_field *f, const imp_v3 *x, const double *theta_dot,
-                              double *eta_dot, imp_v3 *g_dot)
+static void trilinear_tangent(const imp_field *f, const imp_v3 *x,
+                              const double *theta_dot, double *eta_dot, imp_v3 *g_dot)
 {
     struct imp__grid g = *(const struct imp__grid *)f;
     struct imp__jet j;
@@ -100,7 +104,9 @@ static void trilinear_tangent(const imp_field *f, const imp_v3 *x, const double 
     *g_dot = j.g;
 }
 
-const struct imp__field_ops imp__field_trilinear = {
-    .name = "trilinear", .eval = trilinear_eval, .splat = trilinear_splat,
-    .tangent = trilinear_tangent, .changed = imp__grid_changed,
-    .destroy = imp__grid_destroy};
+const struct imp__field_ops imp__field_trilinear = {.name = "trilinear",
+                                                    .eval = trilinear_eval,
+                                                    .splat = trilinear_splat,
+                                                    .tangent = trilinear_tangent,
+                                                    .changed = imp__grid_changed,
+                                                    .destroy = imp__grid_destroy};

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Files of index fields: Mitsuba's .vol (3, float32), NumPy .npy of three dimensions, both
- * [z][y][x] samples at the corners of cells, and radial splines as text:
+ * Files of index fields: Mitsuba's .vol (3, float32), NumPy .npy of three dimensions,
+ * both [z][y][x] samples at the corners of cells, and radial splines as text:
  *
  *     importon-profile 1
  *     radial sphere|cylinder
@@ -9,18 +9,19 @@
  *     axis X Y Z
  *     radius R
  *     coefficients N  c_1 ... c_N            (cells + 3) */
-#include "curved.h"
 #include "base/file.h"
 #include "base/number.h"
+#include "curved.h"
 #include <stdio.h>
 #include <string.h>
 
 #define FILE_BYTES_MAX ((size_t)1 << 34)
-#define HEADER_MAX 65536
+#define HEADER_MAX     65536
 
 static uint32_t u32_at(const unsigned char *d)
 {
-    return (uint32_t)d[0] | (uint32_t)d[1] << 8 | (uint32_t)d[2] << 16 | (uint32_t)d[3] << 24;
+    return (uint32_t)d[0] | (uint32_t)d[1] << 8 | (uint32_t)d[2] << 16 |
+           (uint32_t)d[3] << 24;
 }
 static double f32_at(const unsigned char *d)
 {
@@ -39,8 +40,9 @@ static double f64_at(const unsigned char *d)
 
 /* A grid through samples [z][y][x] of `bytes` each. */
 static enum imp_status grid_make(imp_context *ctx, const char *path,
-                                 const struct imp_field_grid *like, const uint64_t size[3],
-                                 const unsigned char *d, int bytes, imp_field **out)
+                                 const struct imp_field_grid *like,
+                                 const uint64_t size[3], const unsigned char *d,
+                                 int bytes, imp_field **out)
 {
     enum imp_status st = IMP_OK;
     struct imp_field_grid g = *like;
@@ -49,7 +51,8 @@ static enum imp_status grid_make(imp_context *ctx, const char *path,
     double *samples = imp__alloc(ctx, n, sizeof *samples);
     if (!samples) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "%s: no memory", path));
     for (int k = 0; k < 3; k++) g.cells[k] = (int)size[k] - 1;
-    for (size_t i = 0; i < n; i++, d += bytes) samples[i] = bytes == 8 ? f64_at(d) : f32_at(d);
+    for (size_t i = 0; i < n; i++, d += bytes)
+        samples[i] = bytes == 8 ? f64_at(d) : f32_at(d);
     st = imp_field_grid_create(ctx, &g, 1, &f);
     if (st == IMP_OK) st = imp_field_set_samples(f, samples);
     if (st != IMP_OK) {
@@ -65,26 +68,29 @@ out:
 }
 
 /* Sizes from a file, before they become memory. */
-static enum imp_status size_check(imp_context *ctx, const char *path, const uint64_t size[3],
-                                  size_t bytes, size_t left)
+static enum imp_status size_check(imp_context *ctx, const char *path,
+                                  const uint64_t size[3], size_t bytes, size_t left)
 {
     for (int k = 0; k < 3; k++)
         if (size[k] < 2 || size[k] > 8193)
-            return imp__error(ctx, IMP_E_SCENE, "%s: %llu samples along an axis: 2 to 8193 are "
-                              "read", path, (unsigned long long)size[k]);
+            return imp__error(ctx, IMP_E_SCENE,
+                              "%s: %llu samples along an axis: 2 to 8193 are "
+                              "read",
+                              path, (unsigned long long)size[k]);
     if (size[0] * size[1] * size[2] > left / bytes)
         return imp__error(ctx, IMP_E_SCENE, "%s: cut off", path);
     return IMP_OK;
 }
 
 static enum imp_status vol_read(imp_context *ctx, const char *path,
-                                const struct imp_field_grid *like, const struct imp_bytes *b,
-                                imp_field **out)
+                                const struct imp_field_grid *like,
+                                const struct imp_bytes *b, imp_field **out)
 {
     const unsigned char *d = b->data;
     struct imp_field_grid g = *like;
     if (b->size < 48 || d[3] != 3 || u32_at(d + 4) != 1)
-        return imp__error(ctx, IMP_E_SCENE, "%s: not a grid volume of version 3, float32", path);
+        return imp__error(ctx, IMP_E_SCENE, "%s: not a grid volume of version 3, float32",
+                          path);
     const uint64_t size[3] = {u32_at(d + 8), u32_at(d + 12), u32_at(d + 16)};
     if (u32_at(d + 20) != 1)
         return imp__error(ctx, IMP_E_SCENE, "%s: %u channels: an index has one", path,
@@ -110,8 +116,8 @@ static const char *npy_entry(const char *header, const char *key)
 }
 
 static enum imp_status npy_read(imp_context *ctx, const char *path,
-                                const struct imp_field_grid *like, const struct imp_bytes *b,
-                                imp_field **out)
+                                const struct imp_field_grid *like,
+                                const struct imp_bytes *b, imp_field **out)
 {
     const unsigned char *d = b->data;
     char header[HEADER_MAX + 1];
@@ -122,9 +128,13 @@ static enum imp_status npy_read(imp_context *ctx, const char *path,
         return imp__error(ctx, IMP_E_SCENE, "%s: malformed NPY header", path);
     memcpy(header, d + start, length);
     header[length] = 0;
-    const char *type = npy_entry(header, "'descr'"), *order = npy_entry(header, "'fortran_order'"),
+    const char *type = npy_entry(header, "'descr'"),
+               *order = npy_entry(header, "'fortran_order'"),
                *shape = npy_entry(header, "'shape'");
-    const int bytes = !type ? 0 : !strncmp(type, "'<f4'", 5) ? 4 : !strncmp(type, "'<f8'", 5) ? 8 : 0;
+    const int bytes = !type                        ? 0
+                      : !strncmp(type, "'<f4'", 5) ? 4
+                      : !strncmp(type, "'<f8'", 5) ? 8
+                                                   : 0;
     uint64_t zyx[4] = {0};
     int dims = 0;
     if (shape && *shape == '(') {
@@ -137,17 +147,22 @@ static enum imp_status npy_read(imp_context *ctx, const char *path,
         }
     }
     if (!bytes || !order || strncmp(order, "False", 5) != 0 || dims != 3)
-        return imp__error(ctx, IMP_E_SCENE, "%s: must be an array (Z, Y, X) of <f4 or <f8, in C "
-                          "order", path);
+        return imp__error(ctx, IMP_E_SCENE,
+                          "%s: must be an array (Z, Y, X) of <f4 or <f8, in C "
+                          "order",
+                          path);
     const uint64_t size[3] = {zyx[2], zyx[1], zyx[0]};
-    const enum imp_status st = size_check(ctx, path, size, (size_t)bytes, b->size - start - length);
+    const enum imp_status st =
+        size_check(ctx, path, size, (size_t)bytes, b->size - start - length);
     if (st != IMP_OK) return st;
     return grid_make(ctx, path, like, size, d + start + length, bytes, out);
 }
 
-/* ---- Profiles as text ------------------------------------------------------------------- */
+/* ---- Profiles as text ---------------------------------------------------------- */
 
-struct text { const char *s, *end; };
+struct text {
+    const char *s, *end;
+};
 
 static void blank(struct text *t)
 {
@@ -178,27 +193,30 @@ static bool numbers(struct text *t, int n, double *out)
     return true;
 }
 
-static enum imp_status profile_read(imp_context *ctx, const char *path, const struct imp_bytes *b,
-                                    imp_field **out)
+static enum imp_status profile_read(imp_context *ctx, const char *path,
+                                    const struct imp_bytes *b, imp_field **out)
 {
     enum imp_status st = IMP_OK;
     struct text t = {(const char *)b->data, (const char *)b->data + b->size};
     struct imp_field_radial r = IMP_FIELD_RADIAL_INIT;
     double count = 0, *c = NULL;
     imp_field *f = NULL;
-    bool ok = word_is(&t, "importon-profile") && word_is(&t, "1") && word_is(&t, "radial");
+    bool ok =
+        word_is(&t, "importon-profile") && word_is(&t, "1") && word_is(&t, "radial");
     if (ok && word_is(&t, "cylinder")) r.cylinder = 1;
     else ok = ok && word_is(&t, "sphere");
     ok = ok && word_is(&t, "centre") && numbers(&t, 3, r.centre) && word_is(&t, "axis") &&
          numbers(&t, 3, r.axis) && word_is(&t, "radius") && numbers(&t, 1, &r.radius) &&
          word_is(&t, "coefficients") && numbers(&t, 1, &count);
     if (!ok || !(count >= 4) || !(count <= 65539))
-        IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: not a profile (importon-profile 1)", path));
+        IMP_TRY(
+            imp__error(ctx, IMP_E_SCENE, "%s: not a profile (importon-profile 1)", path));
     r.cells = (int)count - 3;
     c = imp__alloc(ctx, (size_t)count, sizeof *c);
     if (!c) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "%s: no memory", path));
     if (!numbers(&t, (int)count, c))
-        IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: fewer than %d coefficients", path, (int)count));
+        IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: fewer than %d coefficients", path,
+                           (int)count));
     st = imp_field_radial_create(ctx, &r, 1, &f);
     if (st == IMP_OK) st = imp_field_set_theta(f, c);
     if (st != IMP_OK) {
@@ -227,14 +245,13 @@ enum imp_status imp_field_read(imp_context *ctx, const char *path,
         IMP_TRY(npy_read(ctx, path, &like, &b, out));
     else if (b.size >= 3 && memcmp(b.data, "VOL", 3) == 0)
         IMP_TRY(vol_read(ctx, path, &like, &b, out));
-    else
-        IMP_TRY(profile_read(ctx, path, &b, out));
+    else IMP_TRY(profile_read(ctx, path, &b, out));
 out:
     imp__bytes_free(ctx, &b);
     return st;
 }
 
-/* ---- Writing ---------------------------------------------------------------------------- */
+/* ---- Writing ------------------------------------------------------------------- */
 
 static void put_u32(unsigned char *d, uint32_t v)
 {
@@ -252,15 +269,18 @@ static enum imp_status grid_write(const imp_field *f, const char *path, bool npy
 {
     const struct imp__grid *g = (const struct imp__grid *)f;
     const int m[3] = {g->desc.cells[0] + 1, g->desc.cells[1] + 1, g->desc.cells[2] + 1};
-    const size_t n = (size_t)m[0] * m[1] * m[2], head = npy ? 128 : 48, bytes = npy ? 8 : 4;
+    const size_t n = (size_t)m[0] * m[1] * m[2], head = npy ? 128 : 48,
+                 bytes = npy ? 8 : 4;
     unsigned char *data = imp__alloc(f->ctx, head + n * bytes, 1), *d;
     if (!data) return imp__error(f->ctx, IMP_E_NOMEM, "%s: no memory", path);
     if (npy) {
         memset(data, ' ', head);
         memcpy(data, "\x93NUMPY\x01\x00\x76\x00", 10);
-        const int used = snprintf((char *)data + 10, head - 10,
-                                  "{'descr': '<f8', 'fortran_order': False, 'shape': (%d, %d, "
-                                  "%d), }", m[2], m[1], m[0]);
+        const int used =
+            snprintf((char *)data + 10, head - 10,
+                     "{'descr': '<f8', 'fortran_order': False, 'shape': (%d, %d, "
+                     "%d), }",
+                     m[2], m[1], m[0]);
         data[10 + used] = ' ';
         data[127] = '\n';
     } else {
@@ -300,11 +320,14 @@ static enum imp_status profile_write(const imp_field *f, const char *path)
     const size_t room = 512 + 32 * f->n_theta;
     char *s = imp__alloc(f->ctx, room, 1);
     if (!s) return imp__error(f->ctx, IMP_E_NOMEM, "%s: no memory", path);
-    size_t at = (size_t)snprintf(
-        s, room, "importon-profile 1\nradial %s\ncentre %.17g %.17g %.17g\naxis %.17g %.17g %.17g\n"
-        "radius %.17g\ncoefficients %zu\n", r->desc.cylinder ? "cylinder" : "sphere",
-        r->desc.centre[0], r->desc.centre[1], r->desc.centre[2], r->desc.axis[0],
-        r->desc.axis[1], r->desc.axis[2], r->desc.radius, f->n_theta);
+    size_t at =
+        (size_t)snprintf(s, room,
+                         "importon-profile 1\nradial %s\ncentre %.17g %.17g %.17g\naxis "
+                         "%.17g %.17g %.17g\n"
+                         "radius %.17g\ncoefficients %zu\n",
+                         r->desc.cylinder ? "cylinder" : "sphere", r->desc.centre[0],
+                         r->desc.centre[1], r->desc.centre[2], r->desc.axis[0],
+                         r->desc.axis[1], r->desc.axis[2], r->desc.radius, f->n_theta);
     for (size_t i = 0; i < f->n_theta; i++)
         at += (size_t)snprintf(s + at, room - at, "%.17g\n", f->theta[i]);
     for (size_t i = 0; i < at; i++)
@@ -321,10 +344,13 @@ enum imp_status imp_field_write(const imp_field *f, const char *path)
     const bool vol = n > 4 && !strcmp(path + n - 4, ".vol");
     if (npy || vol) {
         if (!imp__field_is_grid(f))
-            return imp__error(f->ctx, IMP_E_ARG, "%s: a %s field is not a grid", path, f->ops->name);
+            return imp__error(f->ctx, IMP_E_ARG, "%s: a %s field is not a grid", path,
+                              f->ops->name);
         return grid_write(f, path, npy);
     }
     if (f->ops == &imp__field_radial) return profile_write(f, path);
-    return imp__error(f->ctx, IMP_E_ARG, "%s: fields are written as .vol, .npy, radial ones as "
-                      "text", path);
+    return imp__error(f->ctx, IMP_E_ARG,
+                      "%s: fields are written as .vol, .npy, radial ones as "
+                      "text",
+                      path);
 }

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Even-parity real spherical harmonics. Products of two are even, so the functions are
- * orthonormal on the hemisphere and complete there: they expand the mirror extension, which
- * is continuous at the horizon. */
+ * orthonormal on the hemisphere and complete there: they expand the mirror extension,
+ * which is continuous at the horizon. */
 #include "elements.h"
 
-/* z P_l = alpha_{l+1} P_{l+1} + alpha_l P_{l-1} for normalised associated Legendre functions
- * of one m; applying it twice steps over the odd ones:
- * z^2 P_l = alpha_{l+1} alpha_{l+2} P_{l+2} + (alpha_{l+1}^2 + alpha_l^2) P_l
+/* z P_l = alpha_{l+1} P_{l+1} + alpha_l P_{l-1} for normalised associated Legendre
+ * functions of one m; applying it twice steps over the odd ones: z^2 P_l = alpha_{l+1}
+ * alpha_{l+2} P_{l+2} + (alpha_{l+1}^2 + alpha_l^2) P_l
  *         + alpha_l alpha_{l-1} P_{l-2}. */
 static double alpha(int l, int m)
 {
@@ -47,7 +47,8 @@ void imp__basis_eval4(const struct imp__basis *b, imp_spec x, imp_spec y, imp_sp
             out[k] = p * re;
             if (m) out[k + n] = p * im;
             if (k + 1 == n) break;
-            const imp_spec next = ((t - b->mid[m][k]) * p - b->low[m][k] * before) * b->inv[m][k];
+            const imp_spec next =
+                ((t - b->mid[m][k]) * p - b->low[m][k] * before) * b->inv[m][k];
             before = p;
             p = next;
         }

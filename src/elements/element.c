@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The hierarchy: quadtrees on quadrilaterals, one-to-four subdivision of triangles. Children
- * have larger indices than their parents, so a loop over the array is a walk of the tree. */
+ * The hierarchy: quadtrees on quadrilaterals, one-to-four subdivision of triangles.
+ * Children have larger indices than their parents, so a loop over the array is a walk of
+ * the tree. */
 #include "elements.h"
 #include "math/rng.h"
 #include "math/warp.h"
@@ -19,8 +20,10 @@ imp_v3 imp__el_point(int corners, const imp_v3 *v, double s, double t)
 static void quarter(int corners, const imp_v3 *p, int q, imp_v3 v[4])
 {
     if (corners == 3) {
-        const imp_v3 ab = (p[0] + p[1]) * 0.5, bc = (p[1] + p[2]) * 0.5, ca = (p[2] + p[0]) * 0.5;
-        const imp_v3 piece[4][3] = {{p[0], ab, ca}, {ab, p[1], bc}, {ca, bc, p[2]}, {bc, ca, ab}};
+        const imp_v3 ab = (p[0] + p[1]) * 0.5, bc = (p[1] + p[2]) * 0.5,
+                     ca = (p[2] + p[0]) * 0.5;
+        const imp_v3 piece[4][3] = {
+            {p[0], ab, ca}, {ab, p[1], bc}, {ca, bc, p[2]}, {bc, ca, ab}};
         memcpy(v, piece[q], sizeof piece[q]);
         v[3] = v[2];
         return;
@@ -37,7 +40,7 @@ void imp__el_quarter(const struct imp__element *x, int q, imp_v3 v[4])
     quarter(x->corners, x->v, q, v);
 }
 
-/* ---- What is exposed ------------------------------------------------------------------------ */
+/* ---- What is exposed ----------------------------------------------------------- */
 
 /* Does light reach the point at all? Inside a solid that stands on the surface, every ray
  * meets the wrong side of something. Flat directions come last: they settle the doubt. */
@@ -56,15 +59,17 @@ static bool is_exposed(const imp_elements *e, const struct imp__el_root *r, imp_
         if (!imp__intersect(e->scene, &o, &d, 0, INFINITY, &hit)) return true;
         const int root = e->prim_root[hit.shape][hit.prim];
         if (root < 0) continue;
-        if (imp__dot(e->roots[root].frame.n, d) < 0 || e->roots[root].back >= 0) return true;
+        if (imp__dot(e->roots[root].frame.n, d) < 0 || e->roots[root].back >= 0)
+            return true;
     }
     return false;
 }
 
-/* The part of an element that is not covered by solids. Radiance and moments are means over
- * that part: a mean over all of it would darken what stands next to a block twice, as
- * receiver and as source. */
-static double exposure_of(const imp_elements *e, const struct imp__element *x, uint32_t index)
+/* The part of an element that is not covered by solids. Radiance and moments are means
+ * over that part: a mean over all of it would darken what stands next to a block twice,
+ * as receiver and as source. */
+static double exposure_of(const imp_elements *e, const struct imp__element *x,
+                          uint32_t index)
 {
     const struct imp__el_root *r = &e->roots[x->root];
     if (r->shape < 0) return 1;
@@ -88,19 +93,27 @@ static double exposure_of(const imp_elements *e, const struct imp__element *x, u
 static enum imp_status coefficients_grow(imp_elements *e, size_t n)
 {
     const size_t ch = (size_t)e->ch;
-    struct { double **array; size_t *cap; size_t n; } const all[] = {
-        {&e->l, &e->cap_l, ch * n}, {&e->g, &e->cap_g, ch * n}, {&e->c, &e->cap_c, ch * n},
-        {&e->b, &e->cap_b, ch * n}, {&e->from_above, &e->cap_above, ch * n}, {&e->a, &e->cap_a, n}};
+    struct {
+        double **array;
+        size_t *cap;
+        size_t n;
+    } const all[] = {{&e->l, &e->cap_l, ch * n},
+                     {&e->g, &e->cap_g, ch * n},
+                     {&e->c, &e->cap_c, ch * n},
+                     {&e->b, &e->cap_b, ch * n},
+                     {&e->from_above, &e->cap_above, ch * n},
+                     {&e->a, &e->cap_a, n}};
     for (size_t k = 0; k < imp_count(all); k++) {
-        double *grown = imp__grow(e->ctx, *all[k].array, all[k].cap, all[k].n, sizeof *grown);
+        double *grown =
+            imp__grow(e->ctx, *all[k].array, all[k].cap, all[k].n, sizeof *grown);
         if (!grown) return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for elements");
         *all[k].array = grown;
     }
     return IMP_OK;
 }
 
-enum imp_status imp__el_element_add(imp_elements *e, uint32_t root, uint32_t parent, int k,
-                                    uint32_t *out)
+enum imp_status imp__el_element_add(imp_elements *e, uint32_t root, uint32_t parent,
+                                    int k, uint32_t *out)
 {
     const struct imp__el_root *r = &e->roots[root];
     const int n = el_n(e, r);
@@ -114,7 +127,9 @@ enum imp_status imp__el_element_add(imp_elements *e, uint32_t root, uint32_t par
     if (st != IMP_OK) return st;
 
     struct imp__element *x = &grown[e->n_elements];
-    *x = (struct imp__element){.root = root, .parent = parent, .corners = (uint8_t)r->corners,
+    *x = (struct imp__element){.root = root,
+                               .parent = parent,
+                               .corners = (uint8_t)r->corners,
                                .coef = e->n_coef};
     if (parent == EL_NONE) {
         memcpy(x->v, r->v, sizeof x->v);
@@ -170,7 +185,8 @@ uint32_t imp__el_find(const imp_elements *e, uint32_t root, double u, double v,
             const imp_v3 mid = (p[0] + p[2]) * 0.5;
             q = (u >= mid[0]) + 2 * (v >= mid[1]);
         } else { /* weights of the three corners; half or more belongs to that corner */
-            /* Pieces are the root's (u, v) triangle scaled, some turned by 180 degrees. */
+            /* Pieces are the root's (u, v) triangle scaled, some turned by 180 degrees.
+             */
             const double b1 = (u - p[0][0]) / (p[1][0] - p[0][0]);
             const double b2 = (v - p[0][1]) / (p[2][1] - p[0][1]);
             q = 1 - b1 - b2 > 0.5 ? 0 : b1 > 0.5 ? 1 : b2 > 0.5 ? 2 : 3;

@@ -3,36 +3,37 @@
  * Finite elements with directional radiance and importance (Christensen, Salesin, DeRose
  * 1993; docs/elements.md). Surfaces are cut into a hierarchy of elements; a link carries
  * radiance from its source element to its receiver, and importance back. Cosine-weighted
- * moments of what arrives are gathered over the links; reflection is one matrix per element.
+ * moments of what arrives are gathered over the links; reflection is one matrix per
+ * element.
  *
- * With A_i areas, R the material in the basis, and link samples of weight K_s, direction w_s:
- *     c_i  = sum K_s/A_i (l_j . H_j(-w_s) + Le_j(-w_s)) H_i(w_s)      moments of radiance
- *     b_j  = sum K_s/A_j (g_i . H_i(w_s)) H_j(-w_s)                   moments of importance
- *     l_i  = R c_i,   g_i = R (b_i + a_i/A_i) + s_i
- * where a is importance that arrives from the eye and s what a measuring patch emits. R is
- * symmetric and both sums are over the same links, so a.l = Le . (S^T g) to rounding. */
+ * With A_i areas, R the material in the basis, and link samples of weight K_s, direction
+ * w_s: c_i  = sum K_s/A_i (l_j . H_j(-w_s) + Le_j(-w_s)) H_i(w_s)      moments of
+ * radiance b_j  = sum K_s/A_j (g_i . H_i(w_s)) H_j(-w_s)                   moments of
+ * importance l_i  = R c_i,   g_i = R (b_i + a_i/A_i) + s_i where a is importance that
+ * arrives from the eye and s what a measuring patch emits. R is symmetric and both sums
+ * are over the same links, so a.l = Le . (S^T g) to rounding. */
 #ifndef IMP_ELEMENTS_H
 #define IMP_ELEMENTS_H
 
-#include <importon/elements.h>
 #include "base/pool.h"
 #include "scene/scene.h"
+#include <importon/elements.h>
 
 #define EL_ORDER_MAX 12
-#define EL_N_MAX 91          /* (order + 1)(order + 2)/2 */
-#define EL_BLOCK_MAX 231     /* sum over m of squared block sizes at order 12 */
+#define EL_N_MAX     91  /* (order + 1)(order + 2)/2 */
+#define EL_BLOCK_MAX 231 /* sum over m of squared block sizes at order 12 */
 #define EL_LEVEL_MAX 10
-#define EL_NONE UINT32_MAX
+#define EL_NONE      UINT32_MAX
 
-/* ---- basis.c: even-parity real spherical harmonics on the hemisphere ------------------- */
+/* ---- basis.c: even-parity real spherical harmonics on the hemisphere ----------- */
 
-/* H_lm = sqrt(2) Y_lm, l + m even: orthonormal on z > 0. Stored by m: all l of m = 0, then of
- * m = 1 with cosine, m = 1 with sine, m = 2 ... */
+/* H_lm = sqrt(2) Y_lm, l + m even: orthonormal on z > 0. Stored by m: all l of m = 0,
+ * then of m = 1 with cosine, m = 1 with sine, m = 2 ... */
 struct imp__basis {
     int order, n;
-    int size[EL_ORDER_MAX + 1];      /* number of l for each m */
-    int start[EL_ORDER_MAX + 1];     /* index of the first function of m (cosine) */
-    double lead[EL_ORDER_MAX + 1];   /* H_mm without (x + iy)^m */
+    int size[EL_ORDER_MAX + 1];    /* number of l for each m */
+    int start[EL_ORDER_MAX + 1];   /* index of the first function of m (cosine) */
+    double lead[EL_ORDER_MAX + 1]; /* H_mm without (x + iy)^m */
     double inv[EL_ORDER_MAX + 1][EL_ORDER_MAX / 2 + 1];
     double mid[EL_ORDER_MAX + 1][EL_ORDER_MAX / 2 + 1];
     double low[EL_ORDER_MAX + 1][EL_ORDER_MAX / 2 + 1];
@@ -43,39 +44,40 @@ void imp__basis_eval4(const struct imp__basis *b, imp_spec x, imp_spec y, imp_sp
                       imp_spec *h);
 void imp__basis_eval(const struct imp__basis *b, imp_v3 w, double *h);
 
-/* ---- polygon.c ---------------------------------------------------------------------- */
+/* ---- polygon.c ----------------------------------------------------------------- */
 
 /* Integral of cos cos'/r^2 over the polygon v [n], n <= 4, as seen from x on a plane with
- * normal `normal`: pi times the point-to-polygon form factor, exact, with what lies behind
- * the plane cut away. `facing` is the polygon's normal; 0 from behind. */
-double imp__polygon_factor(imp_v3 x, imp_v3 normal, int n, const imp_v3 *v, imp_v3 facing);
+ * normal `normal`: pi times the point-to-polygon form factor, exact, with what lies
+ * behind the plane cut away. `facing` is the polygon's normal; 0 from behind. */
+double imp__polygon_factor(imp_v3 x, imp_v3 normal, int n, const imp_v3 *v,
+                           imp_v3 facing);
 double imp__polygon_area(int n, const imp_v3 *v);
 
-/* ---- material.c --------------------------------------------------------------------- */
+/* ---- material.c ---------------------------------------------------------------- */
 
 struct imp__el_material {
-    const struct imp_bsdf *bsdf;     /* NULL: phong, or black */
-    bool flipped;                    /* the back of a two-sided one */
+    const struct imp_bsdf *bsdf; /* NULL: phong, or black */
+    bool flipped;                /* the back of a two-sided one */
     bool phong;
-    const char *label;               /* of a Phong override: its shape */
+    const char *label; /* of a Phong override: its shape */
     double kd[3], ks[3], exponent;
-    int n;                           /* basis functions: 0 black, 1 Lambert, else basis.n */
-    double r[3][EL_BLOCK_MAX];       /* R by blocks of m, per channel */
-    double albedo[3];                /* hemispherical: R_00/2 */
-    double albedo_max;               /* largest directional albedo */
-    double residual;                 /* worst relative L2 error of a lobe in the basis */
-    int n_d;                         /* derivatives of R, one for each input with a parameter */
+    int n;                     /* basis functions: 0 black, 1 Lambert, else basis.n */
+    double r[3][EL_BLOCK_MAX]; /* R by blocks of m, per channel */
+    double albedo[3];          /* hemispherical: R_00/2 */
+    double albedo_max;         /* largest directional albedo */
+    double residual;           /* worst relative L2 error of a lobe in the basis */
+    int n_d;                   /* derivatives of R, one for each input with a parameter */
     struct imp__el_material_d {
-        int param, count;            /* count 3: one a channel; 1: all channels together */
-        const char *name;            /* of a Phong coefficient, else NULL */
+        int param, count; /* count 3: one a channel; 1: all channels together */
+        const char *name; /* of a Phong coefficient, else NULL */
         double value[3];
-        double (*r)[EL_BLOCK_MAX];   /* [3] */
-    } *d;
+        double (*r)[EL_BLOCK_MAX]; /* [3] */
+    } * d;
 };
 /* BRDF (without cosine), 1/sr, local directions, all channels. */
 void imp__el_brdf(const struct imp__el_material *m, imp_v3 wo, imp_v3 wi, double f[3]);
-/* Fill r, albedo, residual and d for basis b. @return IMP_E_UNSUPPORTED with `shape` in the
- * message. m->n is set to 0, 1 or b->n. */
+/* Fill r, albedo, residual and d for basis b. @return IMP_E_UNSUPPORTED with `shape` in
+ * the message. m->n is set to 0, 1 or b->n. */
 enum imp_status imp__el_project(imp_context *ctx, struct imp_arena *a,
                                 const struct imp__basis *b, int ch, const char *shape,
                                 struct imp__el_material *m);
@@ -83,49 +85,49 @@ enum imp_status imp__el_project(imp_context *ctx, struct imp_arena *a,
 void imp__el_apply(const struct imp__basis *b, int n, const double *r, const double *x,
                    double *y);
 
-/* ---- Geometry ------------------------------------------------------------------------ */
+/* ---- Geometry ------------------------------------------------------------------ */
 
 enum imp__el_light { EL_DARK, EL_UNIFORM, EL_LOBE };
 
 struct imp__el_root { /* an input polygon, one side of it */
-    int shape;                       /* -1: a virtual patch */
-    int corners;                     /* 3 or 4 */
-    int material;                    /* index */
+    int shape;        /* -1: a virtual patch */
+    int corners;      /* 3 or 4 */
+    int material;     /* index */
     struct imp_frame frame;
     imp_v3 v[4];
     double area;
     enum imp__el_light light;
-    double radiance[3];              /* L0 */
-    imp_v3 axis;                     /* EL_LOBE, world: L0 max(0, w.axis)^power */
+    double radiance[3]; /* L0 */
+    imp_v3 axis;        /* EL_LOBE, world: L0 max(0, w.axis)^power */
     double power;
-    int light_param, light_count;    /* its parameter, -1: none */
+    int light_param, light_count; /* its parameter, -1: none */
     const char *light_name;
     double light_value[3];
-    double measure;                  /* importance that it emits, a constant; 0: none */
+    double measure; /* importance that it emits, a constant; 0: none */
     uint32_t element;
-    int back;                        /* root of its other side, -1: none */
+    int back; /* root of its other side, -1: none */
 };
 
 struct imp__element {
-    uint32_t root, parent, child;    /* child: first of four, 0: leaf */
+    uint32_t root, parent, child; /* child: first of four, 0: leaf */
     uint8_t level, corners;
-    double area, radius;             /* area: of the exposed part */
-    double exposed;                  /* fraction that no solid covers */
+    double area, radius; /* area: of the exposed part */
+    double exposed;      /* fraction that no solid covers */
     imp_v3 centre, v[4];
-    size_t coef;                     /* first coefficient, in units of one channel's number */
+    size_t coef; /* first coefficient, in units of one channel's number */
 };
 
 struct imp__el_link { /* src -> rcv */
     uint32_t src, rcv;
-    double k[4];                     /* K_s: area of the receiver's quarter x Q x V */
-    float w[3][4];                   /* from receiver to source, world, [axis][sample] */
+    double k[4];   /* K_s: area of the receiver's quarter x Q x V */
+    float w[3][4]; /* from receiver to source, world, [axis][sample] */
 };
 
 struct imp__el_hit { /* where a ray of the eye ended */
-    uint32_t root;                   /* EL_NONE: nowhere, or on a black side */
-    uint32_t source;                 /* importance source it belongs to */
+    uint32_t root;   /* EL_NONE: nowhere, or on a black side */
+    uint32_t source; /* importance source it belongs to */
     double u, v;
-    imp_v3 w;                        /* towards the eye, world */
+    imp_v3 w; /* towards the eye, world */
     double weight;
 };
 
@@ -134,57 +136,58 @@ struct imp_elements {
     const struct imp_scene *scene;
     struct imp_elements_options opt;
     struct imp_arena arena;
-    int ch;                          /* channels */
-    double lum[3];                   /* weights of the channels in a measurement */
+    int ch;        /* channels */
+    double lum[3]; /* weights of the channels in a measurement */
     struct imp__basis basis;
-    double eps;                      /* now */
+    double eps; /* now */
 
     int n_materials;
     struct imp__el_material *materials;
     size_t n_roots, cap_roots;
     struct imp__el_root *roots;
-    int **prim_root;                 /* [n_shapes][n_prims]: front root, -1: none */
+    int **prim_root; /* [n_shapes][n_prims]: front root, -1: none */
     size_t n_sources;
     struct imp_elements_source *sources;
-    double size;                     /* of the scene, for tolerances */
+    double size; /* of the scene, for tolerances */
 
     size_t n_elements, cap_elements;
     struct imp__element *elements;
-    size_t n_coef, cap_coef;         /* numbers of one channel */
-    double *l, *g, *c, *b;           /* [ch n_coef], an element's channels together */
-    double *from_above;              /* part of c that the parent's links give (sweep.c) */
-    double *a;                       /* [n_coef] */
+    size_t n_coef, cap_coef; /* numbers of one channel */
+    double *l, *g, *c, *b;   /* [ch n_coef], an element's channels together */
+    double *from_above;      /* part of c that the parent's links give (sweep.c) */
+    double *a;               /* [n_coef] */
     size_t cap_l, cap_g, cap_c, cap_b, cap_above, cap_a;
 
     size_t n_links, cap_links;
-    struct imp__el_link *links;      /* sorted by receiver when `sorted` */
-    size_t *in_start;                /* [n_elements + 1] into links */
-    size_t *out_start;               /* [n_elements + 1] into out */
-    uint32_t *out;                   /* link indices by source */
-    double *value;                   /* [4 ch n_links], see sweep.c */
+    struct imp__el_link *links; /* sorted by receiver when `sorted` */
+    size_t *in_start;           /* [n_elements + 1] into links */
+    size_t *out_start;          /* [n_elements + 1] into out */
+    uint32_t *out;              /* link indices by source */
+    double *value;              /* [4 ch n_links], see sweep.c */
     size_t cap_in, cap_out_start, cap_out, cap_value;
     bool sorted;
 
     size_t n_hits, cap_hits;
-    struct imp__el_hit *hits;        /* of camera sources */
+    struct imp__el_hit *hits; /* of camera sources */
     size_t n_view, cap_view;
-    struct imp__el_hit *view;        /* of the picture that decides when to stop */
-    double *picture;                 /* its pixels at the last step */
+    struct imp__el_hit *view; /* of the picture that decides when to stop */
+    double *picture;          /* its pixels at the last step */
 
     int64_t rays;
-    size_t skipped;                  /* polygons without area */
+    size_t skipped; /* polygons without area */
     size_t n_log, cap_log;
     struct imp_elements_step *log;
     double start_s, deadline_s;
     double last_tick_s, fraction;
-    bool stop;                       /* progress asked for it, or the deadline passed */
+    bool stop; /* progress asked for it, or the deadline passed */
     bool solved, has_importance;
     const char *reason;
     struct imp_elements_row *rows;
     size_t n_rows, cap_rows;
 };
 
-static inline double *el_at(const imp_elements *e, double *array, const struct imp__element *x)
+static inline double *el_at(const imp_elements *e, double *array,
+                            const struct imp__element *x)
 {
     return array + (size_t)e->ch * x->coef;
 }
@@ -221,8 +224,8 @@ enum imp_status imp__el_material_add(imp_elements *e, const struct imp__el_mater
                                      int *index);
 
 /* element.c */
-enum imp_status imp__el_element_add(imp_elements *e, uint32_t root, uint32_t parent, int k,
-                                    uint32_t *out);
+enum imp_status imp__el_element_add(imp_elements *e, uint32_t root, uint32_t parent,
+                                    int k, uint32_t *out);
 /* Four children, made if they are not there; they inherit l and g. */
 enum imp_status imp__el_split(imp_elements *e, uint32_t element);
 /* The leaf at (u, v) of a root, and its corners there (uv [corners][2], may be NULL). */
@@ -259,14 +262,14 @@ double imp__el_total(const imp_elements *e, bool importance);
 enum imp_status imp__el_sweep(imp_elements *e, int n, bool importance, bool cold);
 /* What the four samples of a link carry, [channels]: radiance from the source, importance
  * from the receiver; either may be NULL. */
-void imp__el_ends(const imp_elements *e, const struct imp__el_link *link, imp_spec *radiance,
-                  imp_spec *importance);
+void imp__el_ends(const imp_elements *e, const struct imp__el_link *link,
+                  imp_spec *radiance, imp_spec *importance);
 void imp__el_emission(const imp_elements *e, const struct imp__el_link *link,
                       const struct imp__el_root *r, imp_spec *radiance);
 
 /* source.c */
-enum imp_status imp__el_sources(imp_elements *e);  /* camera hits; before links */
-enum imp_status imp__el_bin(imp_elements *e);      /* a from the hits */
+enum imp_status imp__el_sources(imp_elements *e); /* camera hits; before links */
+enum imp_status imp__el_bin(imp_elements *e);     /* a from the hits */
 /* The measurement from radiance; `direct` (may be NULL): emitters that the eye sees. */
 double imp__el_measure(const imp_elements *e, double *direct);
 /* The same from the emitters: emission x importance. */

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The leaves, for other programs: a binary PLY mesh with colours, or JSON. */
-#include "elements.h"
 #include "base/file.h"
 #include "color/rgb.h"
+#include "elements.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -45,7 +45,8 @@ static void put_number(struct writer *w, double x)
     }
     snprintf(text, sizeof text, "%.9e", x);
     for (const char *s = text; *s; s++) {
-        const bool digit = (*s >= '0' && *s <= '9') || *s == '-' || *s == '+' || *s == 'e';
+        const bool digit =
+            (*s >= '0' && *s <= '9') || *s == '-' || *s == '+' || *s == 'e';
         if (digit) clean[n++] = *s;
         else if (n && clean[n - 1] != '.') clean[n++] = '.';
     }
@@ -66,8 +67,8 @@ static void put_string(struct writer *w, const char *s)
 }
 
 /* Mean exitant radiance over the hemisphere and importance, per solid angle. */
-static void means_of(const imp_elements *e, const struct imp__element *x, double radiance[3],
-                     double *importance)
+static void means_of(const imp_elements *e, const struct imp__element *x,
+                     double radiance[3], double *importance)
 {
     const struct imp__el_root *r = el_root(e, x);
     const int n = el_n(e, r);
@@ -114,8 +115,10 @@ static enum imp_status ply(const imp_elements *e, struct writer *w)
              "element vertex %zu\nproperty float x\nproperty float y\nproperty float z\n"
              "element face %zu\nproperty list uchar int vertex_indices\n"
              "property uchar red\nproperty uchar green\nproperty uchar blue\n"
-             "property float radiance_r\nproperty float radiance_g\nproperty float radiance_b\n"
-             "property float importance\nend_header\n", vertices, faces);
+             "property float radiance_r\nproperty float radiance_g\nproperty float "
+             "radiance_b\n"
+             "property float importance\nend_header\n",
+             vertices, faces);
     put_text(w, head);
     for (size_t k = 0; k < e->n_elements; k++)
         for (int i = 0; i < e->elements[k].corners && is_leaf(e, k); i++)
@@ -151,7 +154,8 @@ static void json(const imp_elements *e, struct writer *w)
         put_text(w, first ? "\n{\"shape\":" : ",\n{\"shape\":");
         first = false;
         put_string(w, e->scene->shapes[el_root(e, x)->shape]->name);
-        snprintf(text, sizeof text, ",\"polygon\":%u,\"level\":%d,\"area\":", x->root, x->level);
+        snprintf(text, sizeof text, ",\"polygon\":%u,\"level\":%d,\"area\":", x->root,
+                 x->level);
         put_text(w, text);
         put_number(w, x->area);
         put_text(w, ",\"corners\":[");
@@ -179,10 +183,13 @@ enum imp_status imp_elements_export(const imp_elements *e, const char *path)
     if (!e || !path) return IMP_E_ARG;
     struct writer w = {.ctx = e->ctx, .ok = true};
     const char *dot = strrchr(path, '.');
-    if (!e->solved) return imp__error(e->ctx, IMP_E_ARG, "the elements are not solved yet");
+    if (!e->solved)
+        return imp__error(e->ctx, IMP_E_ARG, "the elements are not solved yet");
     if (dot && strcmp(dot, ".ply") == 0) IMP_TRY(ply(e, &w));
     else if (dot && strcmp(dot, ".json") == 0) json(e, &w);
-    else IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "%s: elements are written as .ply or .json", path));
+    else
+        IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "%s: elements are written as .ply or .json",
+                           path));
     if (!w.ok) IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for %s", path));
     IMP_TRY(imp__file_write(e->ctx, path, w.out.data, w.out.size));
 out:

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A solution in a file: which elements were split, their coefficients, the links. Geometry
- * and materials come from the scene again and must be the same; nothing in the file is
- * believed before it is checked. */
-#include "elements.h"
+ * A solution in a file: which elements were split, their coefficients, the links.
+ * Geometry and materials come from the scene again and must be the same; nothing in the
+ * file is believed before it is checked. */
 #include "base/file.h"
+#include "elements.h"
 #include "math/rng.h"
 #include <string.h>
 
@@ -57,12 +57,18 @@ enum imp_status imp_elements_save(const imp_elements *e, const char *path)
     enum imp_status st = IMP_OK;
     struct imp_bytes out = {0};
     if (!e || !path) return IMP_E_ARG;
-    if (!e->solved) return imp__error(e->ctx, IMP_E_ARG, "the elements are not solved yet");
-    struct header h = {.order_mark = 0x01020304, .order = (uint32_t)e->basis.order,
-                       .channels = (uint32_t)e->ch, .link_bytes = sizeof *e->links,
-                       .polygons = e->n_roots, .splits = (e->n_elements - e->n_roots) / 4,
-                       .links = e->n_links, .coefficients = (size_t)e->ch * e->n_coef,
-                       .geometry = geometry_of(e), .sources = sources_of(e)};
+    if (!e->solved)
+        return imp__error(e->ctx, IMP_E_ARG, "the elements are not solved yet");
+    struct header h = {.order_mark = 0x01020304,
+                       .order = (uint32_t)e->basis.order,
+                       .channels = (uint32_t)e->ch,
+                       .link_bytes = sizeof *e->links,
+                       .polygons = e->n_roots,
+                       .splits = (e->n_elements - e->n_roots) / 4,
+                       .links = e->n_links,
+                       .coefficients = (size_t)e->ch * e->n_coef,
+                       .geometry = geometry_of(e),
+                       .sources = sources_of(e)};
     memcpy(h.magic, magic, sizeof magic);
     bool ok = imp__bytes_add(e->ctx, &out, &h, sizeof h);
     /* Children come in fours behind the polygons, in the order of their making. */
@@ -70,9 +76,11 @@ enum imp_status imp_elements_save(const imp_elements *e, const char *path)
         ok = imp__bytes_add(e->ctx, &out, &e->elements[k].parent, sizeof(uint32_t));
     const double *const all[] = {e->l, e->g, e->c, e->b};
     for (size_t k = 0; k < imp_count(all) && ok; k++)
-        ok = imp__bytes_add(e->ctx, &out, all[k], (size_t)e->ch * e->n_coef * sizeof(double));
+        ok = imp__bytes_add(e->ctx, &out, all[k],
+                            (size_t)e->ch * e->n_coef * sizeof(double));
     ok = ok && imp__bytes_add(e->ctx, &out, e->links, e->n_links * sizeof *e->links);
-    if (!ok) IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for the elements' file"));
+    if (!ok)
+        IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for the elements' file"));
     IMP_TRY(imp__file_write(e->ctx, path, out.data, out.size));
 out:
     imp__bytes_free(e->ctx, &out);
@@ -89,14 +97,15 @@ static enum imp_status links_check(imp_elements *e, const char *path)
             for (int a = 0; a < 3; a++) good &= fabsf(l->w[a][s]) <= 1.001f;
         }
         if (!good || el_n(e, el_root(e, &e->elements[l->rcv])) == 0)
-            return imp__error(e->ctx, IMP_E_SCENE, "%s: link %zu makes no sense", path, k);
+            return imp__error(e->ctx, IMP_E_SCENE, "%s: link %zu makes no sense", path,
+                              k);
     }
     return IMP_OK;
 }
 
 enum imp_status imp_elements_open(const imp_scene *scene,
-                                  const struct imp_elements_options *options, const char *path,
-                                  imp_elements **out)
+                                  const struct imp_elements_options *options,
+                                  const char *path, imp_elements **out)
 {
     enum imp_status st = IMP_OK;
     struct imp_bytes in = {0};
@@ -110,14 +119,17 @@ enum imp_status imp_elements_open(const imp_scene *scene,
         IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: not a file of finite elements", path));
     memcpy(&h, in.data, sizeof h);
     if (h.order_mark != 0x01020304 || h.link_bytes != sizeof *e->links)
-        IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED, "%s: from another kind of machine", path));
+        IMP_TRY(
+            imp__error(ctx, IMP_E_UNSUPPORTED, "%s: from another kind of machine", path));
     if (h.order != (uint32_t)e->basis.order || h.channels != (uint32_t)e->ch ||
         h.polygons != e->n_roots || h.geometry != geometry_of(e))
-        IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: was made from another scene, or with other "
-                           "options (order %u, %u channels, %llu polygons)", path, h.order,
-                           h.channels, (unsigned long long)h.polygons));
+        IMP_TRY(imp__error(ctx, IMP_E_SCENE,
+                           "%s: was made from another scene, or with other "
+                           "options (order %u, %u channels, %llu polygons)",
+                           path, h.order, h.channels, (unsigned long long)h.polygons));
     const uint64_t limit = UINT32_MAX;
-    if (h.splits > limit / 4 || h.links > limit || h.coefficients > limit * EL_N_MAX * 3 ||
+    if (h.splits > limit / 4 || h.links > limit ||
+        h.coefficients > limit * EL_N_MAX * 3 ||
         in.size != sizeof h + h.splits * sizeof(uint32_t) +
                        4 * h.coefficients * sizeof(double) + h.links * sizeof *e->links)
         IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: is cut short or damaged", path));
@@ -128,8 +140,10 @@ enum imp_status imp_elements_open(const imp_scene *scene,
         memcpy(&parent, at, sizeof parent);
         if (parent >= e->n_elements || e->elements[parent].child ||
             e->elements[parent].level >= EL_LEVEL_MAX)
-            IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: element %u is split in a way that makes "
-                               "no sense", path, parent));
+            IMP_TRY(imp__error(ctx, IMP_E_SCENE,
+                               "%s: element %u is split in a way that makes "
+                               "no sense",
+                               path, parent));
         IMP_TRY(imp__el_split(e, parent));
     }
     if (h.coefficients != (size_t)e->ch * e->n_coef)
@@ -140,7 +154,8 @@ enum imp_status imp_elements_open(const imp_scene *scene,
     for (size_t k = 0; k < imp_count(all); k++)
         for (uint64_t i = 0; i < h.coefficients; i++)
             if (!isfinite(all[k][i]))
-                IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: a coefficient is not finite", path));
+                IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: a coefficient is not finite",
+                                   path));
     e->links = imp__grow(ctx, NULL, &e->cap_links, (size_t)h.links + 1, sizeof *e->links);
     if (!e->links) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "out of memory for links"));
     memcpy(e->links, at, h.links * sizeof *e->links);
@@ -153,7 +168,8 @@ enum imp_status imp_elements_open(const imp_scene *scene,
     e->reason = "read from a file";
     e->has_importance = !e->opt.no_importance;
     /* Other measurements than those it was solved for need their importance. */
-    if (h.sources != sources_of(e) && e->has_importance) IMP_TRY(imp__el_settle(e, 8, true, 1e-7));
+    if (h.sources != sources_of(e) && e->has_importance)
+        IMP_TRY(imp__el_settle(e, 8, true, 1e-7));
     *out = e;
     e = NULL;
 out:

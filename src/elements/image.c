@@ -1,18 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Pictures of a solution: flat, interpolated without cracks, with a final gather, and of the
- * importance. */
-#include "elements.h"
+ * Pictures of a solution: flat, interpolated without cracks, with a final gather, and of
+ * the importance. */
 #include "base/film.h"
+#include "elements.h"
 #include <string.h>
 
-static void basis_at(const imp_elements *e, const struct imp__el_root *r, imp_v3 w, double *h)
+static void basis_at(const imp_elements *e, const struct imp__el_root *r, imp_v3 w,
+                     double *h)
 {
     h[0] = e->basis.lead[0];
     if (el_n(e, r) > 1) imp__basis_eval(&e->basis, imp__to_local(&r->frame, w), h);
 }
 
-static void reflected(const imp_elements *e, uint32_t element, const double *h, double out[3])
+static void reflected(const imp_elements *e, uint32_t element, const double *h,
+                      double out[3])
 {
     const struct imp__element *x = &e->elements[element];
     const int n = el_n(e, el_root(e, x));
@@ -42,22 +44,23 @@ void imp__el_flat(const imp_elements *e, const struct imp__el_hit *hit, double o
     emitted_add(e, r, hit->w, out);
 }
 
-/* ---- Gouraud ------------------------------------------------------------------------------------ */
+/* ---- Gouraud ------------------------------------------------------------------- */
 
 struct shade {
     const imp_elements *e;
     uint32_t root;
     int corners;
-    const double *h;  /* of the direction to the eye, the same for all leaves of a root */
+    const double *h; /* of the direction to the eye, the same for all leaves of a root */
 };
 
-/* The value at (u, v), a corner of some leaf. The leaves around it are averaged, unless one
- * has it on an edge (a T-vertex): then it is what that edge's own interpolation gives, so
- * that both sides of the edge agree. Edges get longer each time, so this ends. */
+/* The value at (u, v), a corner of some leaf. The leaves around it are averaged, unless
+ * one has it on an edge (a T-vertex): then it is what that edge's own interpolation
+ * gives, so that both sides of the edge agree. Edges get longer each time, so this ends.
+ */
 static void vertex_value(const struct shade *s, double u, double v, double out[3])
 {
     const double tiny = 0x1p-16;
-    static const double around[8][2] = {{1, 1},    {-1, 1},  {-1, -1}, {1, -1},
+    static const double around[8][2] = {{1, 1},    {-1, 1},   {-1, -1},  {1, -1},
                                         {2.1, -1}, {-1, 2.1}, {-2.1, 1}, {1, -2.1}};
     double sum[3] = {0}, best_uv[4][2] = {{0}};
     int count = 0, hanging = -1;
@@ -66,7 +69,8 @@ static void vertex_value(const struct shade *s, double u, double v, double out[3
     for (int k = 0; k < (s->corners == 4 ? 4 : 8); k++) {
         const double uu = u + tiny * around[k][0], vv = v + tiny * around[k][1];
         double uv[4][2];
-        if (uu < 0 || vv < 0 || (s->corners == 4 ? uu >= 1 || vv >= 1 : uu + vv >= 1)) continue;
+        if (uu < 0 || vv < 0 || (s->corners == 4 ? uu >= 1 || vv >= 1 : uu + vv >= 1))
+            continue;
         const uint32_t leaf = imp__el_find(s->e, s->root, uu, vv, uv);
         bool again = false, corner = false;
         for (int i = 0; i < count; i++) again |= seen[i] == leaf;
@@ -120,8 +124,7 @@ static void gouraud(const imp_elements *e, const struct imp__el_hit *hit, double
         if (r->corners == 4)
             weight[0] = (1 - x) * (1 - y), weight[1] = x * (1 - y), weight[2] = x * y,
             weight[3] = (1 - x) * y;
-        else
-            weight[0] = 1 - x - y, weight[1] = x, weight[2] = y;
+        else weight[0] = 1 - x - y, weight[1] = x, weight[2] = y;
         for (int k = 0; k < r->corners; k++) {
             vertex_value(&s, uv[k][0], uv[k][1], value[k]);
             for (int c = 0; c < e->ch; c++) out[c] += weight[k] * value[k][c];
@@ -130,10 +133,11 @@ static void gouraud(const imp_elements *e, const struct imp__el_hit *hit, double
     emitted_add(e, r, hit->w, out);
 }
 
-/* ---- Final gather --------------------------------------------------------------------------------- */
+/* ---- Final gather -------------------------------------------------------------- */
 
 /* The links of the leaf and of all above it, evaluated for this very point with the true
- * BRDF: four pieces of the source each, with the kernel exact and a ray to their centres. */
+ * BRDF: four pieces of the source each, with the kernel exact and a ray to their centres.
+ */
 static void gather(const imp_elements *e, const struct imp__el_hit *hit, double out[3])
 {
     out[0] = out[1] = out[2] = 0;
@@ -172,17 +176,19 @@ static void gather(const imp_elements *e, const struct imp__el_hit *hit, double 
         }
 }
 
-static void importance(const imp_elements *e, const struct imp__el_hit *hit, double out[3])
+static void importance(const imp_elements *e, const struct imp__el_hit *hit,
+                       double out[3])
 {
     out[0] = 0;
     if (hit->root == EL_NONE) return;
-    const struct imp__element *x = &e->elements[imp__el_find(e, hit->root, hit->u, hit->v, NULL)];
+    const struct imp__element *x =
+        &e->elements[imp__el_find(e, hit->root, hit->u, hit->v, NULL)];
     const int n = el_n(e, el_root(e, x));
     for (int c = 0; c < e->ch && n; c++) /* mean over the hemisphere, per solid angle */
         out[0] += el_at(e, e->g, x)[c * n] / sqrt(IMP_2PI);
 }
 
-/* ---- Pictures -------------------------------------------------------------------------------------- */
+/* ---- Pictures ------------------------------------------------------------------ */
 
 struct picture {
     const imp_elements *e;
@@ -214,7 +220,8 @@ static enum imp_status row_work(size_t item, int worker, int slot, void *payload
             }
             for (int c = 0; c < channels; c++) sum[c] += out[c];
         }
-        float *pixel = p->film->mean + (item * (size_t)p->film->width + (size_t)x) * (size_t)channels;
+        float *pixel = p->film->mean +
+                       (item * (size_t)p->film->width + (size_t)x) * (size_t)channels;
         for (int c = 0; c < channels; c++) pixel[c] = (float)(sum[c] / n);
     }
     return IMP_OK;
@@ -226,20 +233,27 @@ enum imp_status imp_elements_image(const imp_elements *e, int sensor,
     enum imp_status st = IMP_OK;
     if (!e || !out) return IMP_E_ARG;
     if (sensor < 0 || sensor >= e->scene->n_sensors)
-        return imp__error(e->ctx, IMP_E_ARG, "there is no sensor %d; the scene has %d", sensor,
-                          e->scene->n_sensors);
-    if (!e->solved) return imp__error(e->ctx, IMP_E_ARG, "the elements are not solved yet");
-    if (rays < 0 || rays > 64 || kind < IMP_ELEMENTS_FLAT || kind > IMP_ELEMENTS_IMPORTANCE)
-        return imp__error(e->ctx, IMP_E_ARG, "there is no such picture of finite elements");
-    struct picture p = {.e = e, .sensor = e->scene->sensors[sensor], .kind = kind,
+        return imp__error(e->ctx, IMP_E_ARG, "there is no sensor %d; the scene has %d",
+                          sensor, e->scene->n_sensors);
+    if (!e->solved)
+        return imp__error(e->ctx, IMP_E_ARG, "the elements are not solved yet");
+    if (rays < 0 || rays > 64 || kind < IMP_ELEMENTS_FLAT ||
+        kind > IMP_ELEMENTS_IMPORTANCE)
+        return imp__error(e->ctx, IMP_E_ARG,
+                          "there is no such picture of finite elements");
+    struct picture p = {.e = e,
+                        .sensor = e->scene->sensors[sensor],
+                        .kind = kind,
                         .side = rays ? rays : e->opt.rays};
     const struct imp_film_desc *f = &p.sensor->film;
     IMP_TRY(imp__film_create(e->ctx, f->crop_w, f->crop_h,
                              kind == IMP_ELEMENTS_IMPORTANCE ? "importance"
                              : e->ch == 1                    ? "Y"
-                                                             : "R,G,B", false, &p.film));
+                                                             : "R,G,B",
+                             false, &p.film));
     p.film->spp = (int64_t)p.side * p.side;
-    const struct imp_loop loop = {.n_items = (size_t)f->crop_h, .work = row_work, .payload = &p};
+    const struct imp_loop loop = {
+        .n_items = (size_t)f->crop_h, .work = row_work, .payload = &p};
     IMP_TRY(imp__parallel(e->ctx, &loop, NULL));
     *out = p.film;
     p.film = NULL;

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Links: four samples each, one for every quarter of the receiver. The kernel is integrated
- * exactly over the source (so that it stays bounded where patches touch) and sampled at the
- * fixed centres of the quarters (so that a closed furnace is exact); the visibility ray ends
- * at a random point of a quarter of the source, the quarters permuted. */
+ * Links: four samples each, one for every quarter of the receiver. The kernel is
+ * integrated exactly over the source (so that it stays bounded where patches touch) and
+ * sampled at the fixed centres of the quarters (so that a closed furnace is exact); the
+ * visibility ray ends at a random point of a quarter of the source, the quarters
+ * permuted. */
 #include "elements.h"
 #include "math/rng.h"
 #include <string.h>
@@ -15,8 +16,7 @@ static int in_front(const imp_elements *e, const struct imp__element *at,
     const imp_v3 n = el_root(e, at)->frame.n;
     const double least = 1e-9 * (at->radius + imp__length(x->centre - at->centre));
     int count = 0;
-    for (int k = 0; k < x->corners; k++)
-        count += imp__dot(x->v[k] - at->v[0], n) > least;
+    for (int k = 0; k < x->corners; k++) count += imp__dot(x->v[k] - at->v[0], n) > least;
     return count;
 }
 
@@ -55,8 +55,9 @@ static imp_v3 random_point(int corners, const imp_v3 *v, struct imp_key key, uin
     return imp__el_point(corners, v, s, t);
 }
 
-static imp_v3 source_point(const imp_elements *e, const struct imp__element *rcv, imp_v3 x,
-                           const struct imp__element *src, int q, struct imp_key key, int s)
+static imp_v3 source_point(const imp_elements *e, const struct imp__element *rcv,
+                           imp_v3 x, const struct imp__element *src, int q,
+                           struct imp_key key, int s)
 {
     const imp_v3 n = el_root(e, rcv)->frame.n;
     imp_v3 v[4];
@@ -96,7 +97,8 @@ void imp__el_link_make(const imp_elements *e, uint32_t src, uint32_t rcv,
         imp_v3 v[4];
         imp__el_quarter(i, s, v);
         const imp_v3 x = mean_of(i->corners, v);
-        const double q = imp__polygon_factor(x, ri->frame.n, j->corners, j->v, rj->frame.n);
+        const double q =
+            imp__polygon_factor(x, ri->frame.n, j->corners, j->v, rj->frame.n);
         const imp_v3 y = source_point(e, i, x, j, order[s], key, s);
         const imp_v3 d = y - x;
         const double length = imp__length(d);
@@ -104,10 +106,12 @@ void imp__el_link_make(const imp_elements *e, uint32_t src, uint32_t rcv,
         for (int a = 0; a < 3; a++) out->w[a][s] = (float)w[a];
         if (q <= 0) continue;
         ++*rays;
-        if (imp__el_sees(e, ri, x, rj, y)) out->k[s] = q * imp__polygon_area(i->corners, v);
+        if (imp__el_sees(e, ri, x, rj, y))
+            out->k[s] = q * imp__polygon_area(i->corners, v);
     }
-    /* Kept even if no ray arrives: dropping those loses energy for good (about 0.3 % of the
-     * picture here), and the oracle looks at them with the kernel that they might have. */
+    /* Kept even if no ray arrives: dropping those loses energy for good (about 0.3 % of
+     * the picture here), and the oracle looks at them with the kernel that they might
+     * have. */
     *keep = true;
 }
 
@@ -134,12 +138,13 @@ size_t imp__el_bytes(const imp_elements *e)
     return e->cap_links * sizeof *e->links + e->cap_out * sizeof *e->out +
            (e->cap_in + e->cap_out_start) * sizeof *e->in_start +
            e->cap_elements * sizeof *e->elements +
-           (e->cap_l + e->cap_g + e->cap_c + e->cap_b + e->cap_above + e->cap_a + e->cap_value) *
+           (e->cap_l + e->cap_g + e->cap_c + e->cap_b + e->cap_above + e->cap_a +
+            e->cap_value) *
                sizeof(double) +
            (e->cap_hits + e->cap_view) * sizeof *e->hits + e->arena.total;
 }
 
-/* ---- The first links: all pairs of polygons that may see each other ------------------------ */
+/* ---- The first links: all pairs of polygons that may see each other ------------ */
 
 static bool is_source(const imp_elements *e, const struct imp__el_root *r)
 {
@@ -148,7 +153,11 @@ static bool is_source(const imp_elements *e, const struct imp__el_root *r)
 
 struct first {
     imp_elements *e;
-    struct { struct imp__el_link *links; size_t n; int64_t rays; } *slot;
+    struct {
+        struct imp__el_link *links;
+        size_t n;
+        int64_t rays;
+    } * slot;
     size_t total;
     bool count_only;
 };
@@ -164,13 +173,14 @@ static enum imp_status first_work(size_t item, int worker, int slot, void *paylo
     if (el_n(e, r) == 0) return IMP_OK;
     for (size_t j = 0; j < e->n_roots; j++) {
         const uint32_t src = e->roots[j].element;
-        bool keep = !(j == item || e->elements[src].area == 0 ||
-                      e->elements[r->element].area == 0 || !is_source(e, &e->roots[j]) ||
-                      imp__el_back_facing(e, &e->elements[src], &e->elements[r->element]));
+        bool keep =
+            !(j == item || e->elements[src].area == 0 ||
+              e->elements[r->element].area == 0 || !is_source(e, &e->roots[j]) ||
+              imp__el_back_facing(e, &e->elements[src], &e->elements[r->element]));
         if (!keep) continue;
         if (!f->count_only)
-            imp__el_link_make(e, src, r->element, &f->slot[slot].links[f->slot[slot].n], &keep,
-                              &f->slot[slot].rays);
+            imp__el_link_make(e, src, r->element, &f->slot[slot].links[f->slot[slot].n],
+                              &keep, &f->slot[slot].rays);
         f->slot[slot].n += keep;
     }
     return IMP_OK;
@@ -194,26 +204,28 @@ enum imp_status imp__el_links_first(imp_elements *e)
     enum imp_status st = IMP_OK;
     const size_t slots = (size_t)imp__pool_slots(e->ctx);
     struct first f = {.e = e, .count_only = true};
-    struct imp_loop loop = {.n_items = e->n_roots, .work = first_work, .commit = first_commit,
-                            .payload = &f};
+    struct imp_loop loop = {
+        .n_items = e->n_roots, .work = first_work, .commit = first_commit, .payload = &f};
     f.slot = imp__alloc(e->ctx, slots, sizeof *f.slot);
     if (!f.slot) IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for links"));
     IMP_TRY(imp__parallel(e->ctx, &loop, NULL));
 
-    const double each = (double)(sizeof *e->links + 4 * (size_t)e->ch * sizeof(double) +
-                                 sizeof *e->out);
+    const double each =
+        (double)(sizeof *e->links + 4 * (size_t)e->ch * sizeof(double) + sizeof *e->out);
     if (f.total > e->opt.max_links || (double)f.total * each > (double)e->opt.max_bytes)
-        IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM,
-                           "%zu polygons need %zu first links, about %.0f MB; the budget is "
-                           "%zu links and %.0f MB", e->n_roots, f.total,
-                           (double)f.total * each / 1e6, e->opt.max_links,
-                           (double)e->opt.max_bytes / 1e6));
+        IMP_TRY(
+            imp__error(e->ctx, IMP_E_NOMEM,
+                       "%zu polygons need %zu first links, about %.0f MB; the budget is "
+                       "%zu links and %.0f MB",
+                       e->n_roots, f.total, (double)f.total * each / 1e6,
+                       e->opt.max_links, (double)e->opt.max_bytes / 1e6));
     for (size_t k = 0; k < slots; k++) {
         f.slot[k].links = imp__alloc(e->ctx, e->n_roots, sizeof *f.slot[k].links);
-        if (!f.slot[k].links) IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for links"));
+        if (!f.slot[k].links)
+            IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for links"));
     }
-    struct imp__el_link *grown = imp__grow(e->ctx, e->links, &e->cap_links, f.total + 1,
-                                           sizeof *grown);
+    struct imp__el_link *grown =
+        imp__grow(e->ctx, e->links, &e->cap_links, f.total + 1, sizeof *grown);
     if (!grown) IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for links"));
     e->links = grown;
     f.total = 0;
@@ -227,13 +239,14 @@ out:
     return st;
 }
 
-/* ---- Order ------------------------------------------------------------------------------------ */
+/* ---- Order --------------------------------------------------------------------- */
 
-#define EL_GROW(array, cap, n)                                                             \
-    do {                                                                                   \
-        void *grown_ = imp__grow(e->ctx, array, &(cap), n, sizeof *(array));               \
-        if (!grown_) IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for links"));  \
-        (array) = grown_;                                                                  \
+#define EL_GROW(array, cap, n)                                                           \
+    do {                                                                                 \
+        void *grown_ = imp__grow(e->ctx, array, &(cap), n, sizeof *(array));             \
+        if (!grown_)                                                                     \
+            IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for links"));         \
+        (array) = grown_;                                                                \
     } while (0)
 
 enum imp_status imp__el_links_sort(imp_elements *e)
@@ -252,13 +265,15 @@ enum imp_status imp__el_links_sort(imp_elements *e)
     memset(e->in_start, 0, (m + 2) * sizeof *e->in_start);
     for (size_t k = 0; k < n; k++) e->in_start[e->links[k].rcv + 2]++;
     for (size_t k = 1; k < m + 2; k++) e->in_start[k] += e->in_start[k - 1];
-    for (size_t k = 0; k < n; k++) sorted[e->in_start[e->links[k].rcv + 1]++] = e->links[k];
+    for (size_t k = 0; k < n; k++)
+        sorted[e->in_start[e->links[k].rcv + 1]++] = e->links[k];
     imp__release(e->ctx, e->links);
     e->links = sorted;
     memset(e->out_start, 0, (m + 2) * sizeof *e->out_start);
     for (size_t k = 0; k < n; k++) e->out_start[e->links[k].src + 2]++;
     for (size_t k = 1; k < m + 2; k++) e->out_start[k] += e->out_start[k - 1];
-    for (size_t k = 0; k < n; k++) e->out[e->out_start[e->links[k].src + 1]++] = (uint32_t)k;
+    for (size_t k = 0; k < n; k++)
+        e->out[e->out_start[e->links[k].src + 1]++] = (uint32_t)k;
     e->sorted = true;
 out:
     return st;

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Materials in the basis: R_km = int int f(wi, wo) H_k(wo) H_m(wi) dwo dwi, without cosine.
- * An isotropic f depends on phi_o - phi_i only, so R couples functions of the same m (and
- * cosine with cosine), and its blocks come from the Fourier coefficients of f. */
+ * Materials in the basis: R_km = int int f(wi, wo) H_k(wo) H_m(wi) dwo dwi, without
+ * cosine. An isotropic f depends on phi_o - phi_i only, so R couples functions of the
+ * same m (and cosine with cosine), and its blocks come from the Fourier coefficients of
+ * f. */
 #include "elements.h"
 #include "math/quadrature.h"
 #include <stdio.h>
@@ -17,7 +18,8 @@ static double phong(const struct imp__el_material *m, imp_v3 wo, imp_v3 wi, int 
     return m->kd[c] * IMP_INV_PI + m->ks[c] * lobe;
 }
 
-/* f and, if df is given, its derivative by every input that has a parameter: df [n_d][3]. */
+/* f and, if df is given, its derivative by every input that has a parameter: df [n_d][3].
+ */
 static void eval(const struct imp__el_material *m, imp_v3 wo, imp_v3 wi, imp_spec *in,
                  imp_spec *din, double f[3], double (*df)[3])
 {
@@ -26,9 +28,11 @@ static void eval(const struct imp__el_material *m, imp_v3 wo, imp_v3 wi, imp_spe
         for (int c = 0; c < 3; c++) f[c] = phong(m, wo, wi, c);
         for (int c = 0; c < 3 && df; c++) {
             df[0][c] = IMP_INV_PI;
-            df[1][c] = m->ks[c] > 0 ? (f[c] - m->kd[c] * IMP_INV_PI) / m->ks[c]
-                                    : phong(&(struct imp__el_material){.ks = {1, 1, 1},
-                                                  .exponent = m->exponent}, wo, wi, c);
+            df[1][c] = m->ks[c] > 0
+                           ? (f[c] - m->kd[c] * IMP_INV_PI) / m->ks[c]
+                           : phong(&(struct imp__el_material){.ks = {1, 1, 1},
+                                                              .exponent = m->exponent},
+                                   wo, wi, c);
         }
         return;
     }
@@ -63,7 +67,7 @@ void imp__el_brdf(const struct imp__el_material *m, imp_v3 wo, imp_v3 wi, double
     if (wo[2] > 0 && wi[2] > 0) eval(m, wo, wi, in, NULL, f, NULL);
 }
 
-/* ---- May it be projected? -------------------------------------------------------------- */
+/* ---- May it be projected? ------------------------------------------------------ */
 
 static imp_v3 at_angles(double z, double phi)
 {
@@ -81,7 +85,8 @@ static bool is_isotropic(const struct imp__el_material *m, imp_spec *in)
         eval(m, at_angles(zo, 1 + k), at_angles(zi, phi + 1 + k), in, NULL, turned, NULL);
         eval(m, wo, at_angles(zi, -phi), in, NULL, mirrored, NULL);
         for (int c = 0; c < 3; c++)
-            if (fabs(f[c] - turned[c]) + fabs(f[c] - mirrored[c]) > 1e-6 * fabs(f[c]) + 1e-12)
+            if (fabs(f[c] - turned[c]) + fabs(f[c] - mirrored[c]) >
+                1e-6 * fabs(f[c]) + 1e-12)
                 return false;
     }
     return true;
@@ -94,28 +99,35 @@ static enum imp_status check(imp_context *ctx, const char *shape,
     if (!b || m->phong) return IMP_OK;
     const char *name = b->name && *b->name ? b->name : b->ops->name;
     if (b->n_in > INPUTS_MAX)
-        return imp__error(ctx, IMP_E_UNSUPPORTED, "shape '%s': material '%s' has too many inputs",
-                          shape, name);
-    if (b->flags & (IMP_BSDF_DELTA | IMP_BSDF_TRANSMIT))
         return imp__error(ctx, IMP_E_UNSUPPORTED,
-                          "shape '%s': material '%s' (%s) cannot be projected: finite elements "
-                          "have no mirrors and no glass", shape, name, b->ops->name);
+                          "shape '%s': material '%s' has too many inputs", shape, name);
+    if (b->flags & (IMP_BSDF_DELTA | IMP_BSDF_TRANSMIT))
+        return imp__error(
+            ctx, IMP_E_UNSUPPORTED,
+            "shape '%s': material '%s' (%s) cannot be projected: finite elements "
+            "have no mirrors and no glass",
+            shape, name, b->ops->name);
     for (int j = 0; j < b->n_in; j++)
         if (b->input[j]->texture)
-            return imp__error(ctx, IMP_E_UNSUPPORTED,
-                              "shape '%s': material '%s' (%s) has a texture, which finite "
-                              "elements cannot project", shape, name, b->ops->name);
+            return imp__error(
+                ctx, IMP_E_UNSUPPORTED,
+                "shape '%s': material '%s' (%s) has a texture, which finite "
+                "elements cannot project",
+                shape, name, b->ops->name);
     inputs_at(m, in);
     if (!is_isotropic(m, in))
         return imp__error(ctx, IMP_E_UNSUPPORTED,
                           "shape '%s': material '%s' (%s) is not isotropic, which finite "
-                          "elements cannot project", shape, name, b->ops->name);
+                          "elements cannot project",
+                          shape, name, b->ops->name);
     return IMP_OK;
 }
 
-/* ---- Projection ------------------------------------------------------------------------- */
+/* ---- Projection ---------------------------------------------------------------- */
 
-struct table { double f[NZ][NZ][NM]; }; /* Fourier coefficients in phi, [zo][zi][m] */
+struct table {
+    double f[NZ][NZ][NM];
+}; /* Fourier coefficients in phi, [zo][zi][m] */
 
 static void blocks(const struct imp__basis *b, const struct table *t, const double *w,
                    double (*h)[EL_N_MAX], double *r)
@@ -127,7 +139,8 @@ static void blocks(const struct imp__basis *b, const struct table *t, const doub
                 double sum = 0;
                 for (int o = 0; o < NZ; o++)
                     for (int i = 0; i < NZ; i++)
-                        sum += w[o] * w[i] * h[o][first + k] * h[i][first + j] * t->f[o][i][m];
+                        sum += w[o] * w[i] * h[o][first + k] * h[i][first + j] *
+                               t->f[o][i][m];
                 r[k * n + j] = sum * (m ? IMP_PI : IMP_2PI);
             }
         for (int k = 0; k < n; k++) /* reciprocity, to the last bit */
@@ -137,7 +150,8 @@ static void blocks(const struct imp__basis *b, const struct table *t, const doub
     }
 }
 
-/* Relative L2 error of lobes with zo > cos 80 degrees, and the largest directional albedo. */
+/* Relative L2 error of lobes with zo > cos 80 degrees, and the largest directional
+ * albedo. */
 static void quality(const struct imp__basis *b, const struct table *t, const double *z,
                     const double *w, double (*h)[EL_N_MAX], const double *norm,
                     struct imp__el_material *m)
@@ -159,7 +173,8 @@ static void quality(const struct imp__basis *b, const struct table *t, const dou
 }
 
 static enum imp_status derivatives_make(imp_context *ctx, struct imp_arena *a,
-                                        const char *shape, struct imp__el_material *m, const imp_spec *in)
+                                        const char *shape, struct imp__el_material *m,
+                                        const imp_spec *in)
 {
     const int n_in = m->phong ? 2 : m->bsdf ? m->bsdf->n_in : 0;
     m->n_d = 0;
@@ -174,7 +189,8 @@ static enum imp_status derivatives_make(imp_context *ctx, struct imp_arena *a,
             snprintf(name, sizeof name, "%s.phong.%s", m->label ? m->label : shape,
                      j ? "ks" : "kd");
             d->name = imp__arena_strdup(a, name);
-            if (!d->name) return imp__error(ctx, IMP_E_NOMEM, "out of memory for materials");
+            if (!d->name)
+                return imp__error(ctx, IMP_E_NOMEM, "out of memory for materials");
             memcpy(d->value, j ? m->ks : m->kd, sizeof d->value);
         } else {
             d->param = m->bsdf->input[j]->param;
@@ -213,13 +229,14 @@ enum imp_status imp__el_project(imp_context *ctx, struct imp_arena *a,
     IMP_TRY(derivatives_make(ctx, a, shape, m, in));
     const size_t n_tables = 3 * (1 + (size_t)m->n_d);
     t = imp__alloc(ctx, n_tables, sizeof *t);
-    double (*df)[3] = imp__arena_array(a, (size_t)m->n_d + 1, sizeof *df);
+    double(*df)[3] = imp__arena_array(a, (size_t)m->n_d + 1, sizeof *df);
     if (!t || !df) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "out of memory for materials"));
 
     imp__gauss_legendre(NZ, 0, 1, z, w);
     for (int i = 0; i < NZ; i++) imp__basis_eval(b, at_angles(z[i], 0), h[i]);
     for (int p = 0; p < NPHI; p++)
-        for (int q = 0; q < NM; q++) cosine[p][q] = cos(IMP_2PI * p * q / NPHI) * IMP_2PI / NPHI;
+        for (int q = 0; q < NM; q++)
+            cosine[p][q] = cos(IMP_2PI * p * q / NPHI) * IMP_2PI / NPHI;
     double norm[3][NZ] = {{0}};
     for (int o = 0; o < NZ; o++)
         for (int i = 0; i < NZ; i++)
@@ -249,7 +266,8 @@ enum imp_status imp__el_project(imp_context *ctx, struct imp_arena *a,
         }
     }
     if (!isfinite(m->albedo_max) || !isfinite(m->residual))
-        IMP_TRY(imp__error(ctx, IMP_E_NUMERIC, "shape '%s': its material is not finite", shape));
+        IMP_TRY(imp__error(ctx, IMP_E_NUMERIC, "shape '%s': its material is not finite",
+                           shape));
     if (m->n == 1) m->residual = 0;
 out:
     imp__release(ctx, in);

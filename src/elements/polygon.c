@@ -32,7 +32,8 @@ double imp__polygon_factor(imp_v3 x, imp_v3 normal, int n, const imp_v3 *v, imp_
         const int next = k + 1 < n ? k + 1 : 0;
         if (height[k] >= 0) cut[m++] = at[k];
         if ((height[k] > 0 && height[next] < 0) || (height[k] < 0 && height[next] > 0))
-            cut[m++] = at[k] + (at[next] - at[k]) * (height[k] / (height[k] - height[next]));
+            cut[m++] =
+                at[k] + (at[next] - at[k]) * (height[k] / (height[k] - height[next]));
     }
     double sum = 0;
     for (int k = 0; k < m; k++) {

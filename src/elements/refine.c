@@ -3,9 +3,9 @@
  * Refinement. The image contribution of a link sample is the bilinear form itself,
  * q_s = 4 K_s |g_i(w_s)| |L_j(-w_s)|; a link is refined while
  *     max( max_s q_s - min_s q_s, 4 max_s K_s L_bound g_bound ) > eps.
- * Without importance g_i is replaced by albedo/pi (Hanrahan's BF criterion) and everything
- * else stays. The bounds are what keeps narrow lobes and half-hidden links honest: four
- * samples may miss a beam altogether. */
+ * Without importance g_i is replaced by albedo/pi (Hanrahan's BF criterion) and
+ * everything else stays. The bounds are what keeps narrow lobes and half-hidden links
+ * honest: four samples may miss a beam altogether. */
 #include "elements.h"
 #include <string.h>
 
@@ -50,8 +50,8 @@ static double beam_bound(const imp_elements *e, const struct imp__el_root *r,
     const imp_v3 d = i->centre - j->centre;
     const double dist = imp__length(d), reach = i->radius + j->radius;
     if (dist <= reach) return peak;
-    const double angle = acos(imp_clamp(imp__dot(d, r->axis) / dist, -1.0, 1.0)) -
-                         asin(reach / dist);
+    const double angle =
+        acos(imp_clamp(imp__dot(d, r->axis) / dist, -1.0, 1.0)) - asin(reach / dist);
     return angle <= 0 ? peak : angle >= IMP_PI / 2 ? 0 : peak * pow(cos(angle), r->power);
 }
 
@@ -63,11 +63,12 @@ static double sum_of(int ch, const imp_spec *x, int s)
 }
 
 /* Links across a shadow's edge count more: an element that is half in shadow is too dark
- * twice, as a receiver for its lit part and as a source. With 4 instead of 1, scene a comes to
- * the same mean with a third of the links (docs/elements.md). */
+ * twice, as a receiver for its lit part and as a source. With 4 instead of 1, scene a
+ * comes to the same mean with a third of the links (docs/elements.md). */
 #define HALF_HIDDEN 4
 
-static double error_of(const imp_elements *e, const struct imp__el_link *k, bool importance)
+static double error_of(const imp_elements *e, const struct imp__el_link *k,
+                       bool importance)
 {
     const struct imp__element *i = &e->elements[k->rcv], *j = &e->elements[k->src];
     const struct imp__el_root *ri = el_root(e, i), *rj = el_root(e, j);
@@ -75,8 +76,9 @@ static double error_of(const imp_elements *e, const struct imp__el_link *k, bool
     imp__el_ends(e, k, l, importance ? g : NULL);
     if (!importance)
         for (int c = 0; c < e->ch; c++)
-            g[c] = imp__spec(e->lum[c] * (e->materials[ri->material].albedo[c] * IMP_INV_PI +
-                                          (ri->measure != 0 ? IMP_INV_PI : 0)));
+            g[c] =
+                imp__spec(e->lum[c] * (e->materials[ri->material].albedo[c] * IMP_INV_PI +
+                                       (ri->measure != 0 ? IMP_INV_PI : 0)));
     double q_min = INFINITY, q_max = 0, k_max = 0, l_max = 0, g_max = 0;
     for (int s = 0; s < 4; s++) {
         double q = 0;
@@ -109,7 +111,7 @@ static double error_of(const imp_elements *e, const struct imp__el_link *k, bool
            fmax(q_max - q_min, 4 * k_max * l_max * g_max / e->ch);
 }
 
-/* ---- One wave: look at links [from, n), split, make their children's links ------------------- */
+/* ---- One wave: look at links [from, n), split, make their children's links ----- */
 
 enum { LINKS_PER_ITEM = 256, KEEP = 0, SPLIT_RECEIVER, SPLIT_SOURCE };
 
@@ -117,14 +119,16 @@ struct wave {
     imp_elements *e;
     bool importance;
     size_t from, n;
-    unsigned char *verdict;           /* [n - from] */
-    double *part;                     /* of the total, one a slot */
+    unsigned char *verdict; /* [n - from] */
+    double *part;           /* of the total, one a slot */
     double total;
     size_t n_new;
-    struct { uint32_t src, rcv; } *pair;
+    struct {
+        uint32_t src, rcv;
+    } * pair;
     struct imp__el_link *made;
     bool *keep;
-    int64_t *rays;                    /* one an item */
+    int64_t *rays; /* one an item */
 };
 
 static enum imp_status judge(size_t item, int worker, int slot, void *payload)
@@ -136,11 +140,13 @@ static enum imp_status judge(size_t item, int worker, int slot, void *payload)
     const size_t end = imp_min(first + LINKS_PER_ITEM, v->n);
     for (size_t k = first; k < end; k++) {
         const struct imp__el_link *link = &e->links[k];
-        const struct imp__element *i = &e->elements[link->rcv], *j = &e->elements[link->src];
+        const struct imp__element *i = &e->elements[link->rcv],
+                                  *j = &e->elements[link->src];
         const bool can_i = refinable(e, i), can_j = refinable(e, j);
         unsigned char what = KEEP;
         if ((can_i || can_j) && error_of(e, link, v->importance) > e->eps)
-            what = can_i && (!can_j || i->area >= j->area) ? SPLIT_RECEIVER : SPLIT_SOURCE;
+            what =
+                can_i && (!can_j || i->area >= j->area) ? SPLIT_RECEIVER : SPLIT_SOURCE;
         v->verdict[k - v->from] = what;
     }
     return IMP_OK;
@@ -162,7 +168,8 @@ static size_t items_of(size_t n) { return (n + LINKS_PER_ITEM - 1) / LINKS_PER_I
 /* Bytes that refinement would hold with so many links and elements more. */
 static double bytes_after(const imp_elements *e, double links, double elements)
 {
-    const double each = (double)(2 * sizeof *e->links + 4 * (size_t)e->ch * sizeof(double) + 4);
+    const double each =
+        (double)(2 * sizeof *e->links + 4 * (size_t)e->ch * sizeof(double) + 4);
     const double per = e->n_elements ? (double)e->n_coef / (double)e->n_elements : 0;
     return (double)(e->n_hits + e->n_view) * sizeof *e->hits + links * each +
            elements * (sizeof *e->elements + 16 + per * 8 * (5.0 * e->ch + 1));
@@ -175,8 +182,8 @@ static enum imp_status wave_run(struct wave *v, bool *full)
     size_t n_split = 0;
     v->verdict = imp__alloc(e->ctx, v->n - v->from + 1, 1);
     if (!v->verdict) IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for links"));
-    const struct imp_loop look = {.n_items = items_of(v->n - v->from), .work = judge,
-                                  .payload = v};
+    const struct imp_loop look = {
+        .n_items = items_of(v->n - v->from), .work = judge, .payload = v};
     IMP_TRY(imp__parallel(e->ctx, &look, NULL));
     for (size_t k = 0; k < v->n - v->from; k++) n_split += v->verdict[k] != KEEP;
     v->n_new = 0;
@@ -206,10 +213,11 @@ static enum imp_status wave_run(struct wave *v, bool *full)
             v->pair[v->n_new++].rcv = what == SPLIT_RECEIVER ? child : link->rcv;
         }
     }
-    const struct imp_loop build = {.n_items = items_of(v->n_new), .work = make, .payload = v};
+    const struct imp_loop build = {
+        .n_items = items_of(v->n_new), .work = make, .payload = v};
     IMP_TRY(imp__parallel(e->ctx, &build, NULL));
-    struct imp__el_link *grown = imp__grow(e->ctx, e->links, &e->cap_links,
-                                           e->n_links + v->n_new, sizeof *grown);
+    struct imp__el_link *grown =
+        imp__grow(e->ctx, e->links, &e->cap_links, e->n_links + v->n_new, sizeof *grown);
     if (!grown) IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for links"));
     e->links = grown;
     /* From here nothing fails: the split links go, their children come. */
@@ -247,7 +255,7 @@ enum imp_status imp__el_refine(imp_elements *e, bool importance, bool *full)
     return st;
 }
 
-/* ---- The scale of eps ------------------------------------------------------------------------- */
+/* ---- The scale of eps ---------------------------------------------------------- */
 
 static enum imp_status total_work(size_t item, int worker, int slot, void *payload)
 {
@@ -263,8 +271,9 @@ static enum imp_status total_work(size_t item, int worker, int slot, void *paylo
         imp__el_ends(e, link, l, v->importance ? g : NULL);
         for (int c = 0; c < e->ch; c++) {
             if (!v->importance)
-                g[c] = imp__spec(e->lum[c] * (e->materials[r->material].albedo[c] * IMP_INV_PI +
-                                              (r->measure != 0 ? IMP_INV_PI : 0)));
+                g[c] = imp__spec(e->lum[c] *
+                                 (e->materials[r->material].albedo[c] * IMP_INV_PI +
+                                  (r->measure != 0 ? IMP_INV_PI : 0)));
             for (int s = 0; s < 4; s++) sum += link->k[s] * fabs(l[c][s] * g[c][s]);
         }
     }
@@ -284,8 +293,10 @@ double imp__el_total(const imp_elements *e, bool importance)
     struct wave v = {.e = (imp_elements *)e, .importance = importance};
     v.part = imp__alloc(e->ctx, (size_t)imp__pool_slots(e->ctx), sizeof *v.part);
     if (!v.part) return 0;
-    const struct imp_loop loop = {.n_items = items_of(e->n_links), .work = total_work,
-                                  .commit = total_commit, .payload = &v};
+    const struct imp_loop loop = {.n_items = items_of(e->n_links),
+                                  .work = total_work,
+                                  .commit = total_commit,
+                                  .payload = &v};
     const enum imp_status st = imp__parallel(e->ctx, &loop, NULL);
     imp__release(e->ctx, v.part);
     return st == IMP_OK ? v.total : 0;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * From the scene's shapes to polygons with a material and a light each. What has no place in
- * finite elements is refused here, by the shape's name. */
+ * From the scene's shapes to polygons with a material and a light each. What has no place
+ * in finite elements is refused here, by the shape's name. */
 #include "elements.h"
 #include <string.h>
 
@@ -16,8 +16,8 @@ enum imp_status imp__el_material_add(imp_elements *e, const struct imp__el_mater
     for (int i = 0; i < e->n_materials; i++) {
         const struct imp__el_material *k = &e->materials[i];
         if (k->bsdf == m->bsdf && k->flipped == m->flipped && k->phong == m->phong &&
-            memcmp(k->kd, m->kd, sizeof m->kd) == 0 && memcmp(k->ks, m->ks, sizeof m->ks) == 0 &&
-            k->exponent == m->exponent) {
+            memcmp(k->kd, m->kd, sizeof m->kd) == 0 &&
+            memcmp(k->ks, m->ks, sizeof m->ks) == 0 && k->exponent == m->exponent) {
             *index = i;
             return IMP_OK;
         }
@@ -35,7 +35,7 @@ enum imp_status imp__el_material_add(imp_elements *e, const struct imp__el_mater
     return IMP_OK;
 }
 
-/* ---- Lights ------------------------------------------------------------------------------ */
+/* ---- Lights -------------------------------------------------------------------- */
 
 static double channels_apart(imp_spec a, imp_spec b, int ch)
 {
@@ -44,7 +44,8 @@ static double channels_apart(imp_spec a, imp_spec b, int ch)
     return d;
 }
 
-static void light_set(struct imp__el_root *r, const struct imp_input *in, const char *name)
+static void light_set(struct imp__el_root *r, const struct imp_input *in,
+                      const char *name)
 {
     r->light = EL_UNIFORM;
     r->light_param = in->param;
@@ -58,25 +59,33 @@ static enum imp_status emitter_take(imp_elements *e, const struct imp_shape *s,
 {
     const struct imp_emitter *em = e->scene->emitters[s->emitter];
     if (em->n_in < 1 || em->input[0]->texture)
-        return imp__error(e->ctx, IMP_E_UNSUPPORTED,
-                          "shape '%s': its light (%s) has a texture, which finite elements "
-                          "cannot project", s->name, em->ops->name);
+        return imp__error(
+            e->ctx, IMP_E_UNSUPPORTED,
+            "shape '%s': its light (%s) has a texture, which finite elements "
+            "cannot project",
+            s->name, em->ops->name);
     imp_spec in[8];
-    if (em->n_in > 8) return imp__error(e->ctx, IMP_E_UNSUPPORTED, "shape '%s': its light (%s) "
-                                        "has too many inputs", s->name, em->ops->name);
+    if (em->n_in > 8)
+        return imp__error(e->ctx, IMP_E_UNSUPPORTED,
+                          "shape '%s': its light (%s) "
+                          "has too many inputs",
+                          s->name, em->ops->name);
     imp__inputs_eval(em->input, em->n_in, &(struct imp_texcoord){.uv = {0.5, 0.5}}, in);
     for (int k = 1; k < 16; k++) {
         const double z = k / 16.0, x = sqrt(1 - z * z);
-        const struct imp_emission at = {
-            .uv = {0.1 * (k % 7), 0.06 * k}, .dist = 1, .cos_light = z,
-            .d = r->frame.s * (x * cos(k)) + r->frame.t * (x * sin(k)) + r->frame.n * z};
+        const struct imp_emission at = {.uv = {0.1 * (k % 7), 0.06 * k},
+                                        .dist = 1,
+                                        .cos_light = z,
+                                        .d = r->frame.s * (x * cos(k)) +
+                                             r->frame.t * (x * sin(k)) + r->frame.n * z};
         imp_spec le;
         em->ops->eval(em, in, &at, &le);
         if (channels_apart(in[0], le, e->ch) > 1e-9)
-            return imp__error(e->ctx, IMP_E_UNSUPPORTED,
-                              "shape '%s': its light (%s) is not the same in all directions and "
-                              "places; finite elements cannot project it", s->name,
-                              em->ops->name);
+            return imp__error(
+                e->ctx, IMP_E_UNSUPPORTED,
+                "shape '%s': its light (%s) is not the same in all directions and "
+                "places; finite elements cannot project it",
+                s->name, em->ops->name);
     }
     light_set(r, em->input[0], em->name);
     return IMP_OK;
@@ -96,9 +105,11 @@ static enum imp_status ambient_take(imp_elements *e, const struct imp_shape *s,
         b->ops->emit(b, in, &wo, &emitted);
         if (k == 1) first = emitted;
         if (channels_apart(first, emitted, e->ch) > 1e-9)
-            return imp__error(e->ctx, IMP_E_UNSUPPORTED, "shape '%s': what its material emits "
-                              "depends on the direction; finite elements cannot project it",
-                              s->name);
+            return imp__error(
+                e->ctx, IMP_E_UNSUPPORTED,
+                "shape '%s': what its material emits "
+                "depends on the direction; finite elements cannot project it",
+                s->name);
         b->ops->emit_d(b, in, &wo, d);
     }
     for (int j = 0; j < b->n_in; j++)
@@ -107,14 +118,16 @@ static enum imp_status ambient_take(imp_elements *e, const struct imp_shape *s,
     if (imp__is_zero(first) && r->light != EL_DARK) return IMP_OK;
     if (r->light != EL_DARK)
         return imp__error(e->ctx, IMP_E_UNSUPPORTED,
-                          "shape '%s': light of its own and an ambient term together", s->name);
+                          "shape '%s': light of its own and an ambient term together",
+                          s->name);
     light_set(r, b->input[source], b->name);
     return IMP_OK;
 }
 
-/* ---- Materials and overrides --------------------------------------------------------------- */
+/* ---- Materials and overrides --------------------------------------------------- */
 
-static const struct imp_elements_phong *phong_of(const imp_elements *e, const struct imp_shape *s)
+static const struct imp_elements_phong *phong_of(const imp_elements *e,
+                                                 const struct imp_shape *s)
 {
     const struct imp_elements_phong *found = NULL;
     for (size_t i = 0; i < e->opt.n_phong; i++)
@@ -140,7 +153,8 @@ static bool reflects_behind(const struct imp_bsdf *b)
     return false;
 }
 
-static enum imp_status root_append(imp_elements *e, const struct imp__el_root *r, int *index)
+static enum imp_status root_append(imp_elements *e, const struct imp__el_root *r,
+                                   int *index)
 {
     struct imp__el_root *grown =
         imp__grow(e->ctx, e->roots, &e->cap_roots, e->n_roots + 1, sizeof *grown);
@@ -152,24 +166,27 @@ static enum imp_status root_append(imp_elements *e, const struct imp__el_root *r
 }
 
 /* One polygon: its front, and its back if that reflects or shines. */
-static enum imp_status polygon_add(imp_elements *e, const struct imp_shape *s, int corners,
-                                   const imp_v3 *v, imp_v3 normal, int *index)
+static enum imp_status polygon_add(imp_elements *e, const struct imp_shape *s,
+                                   int corners, const imp_v3 *v, imp_v3 normal,
+                                   int *index)
 {
     enum imp_status st = IMP_OK;
     const struct imp_bsdf *b = imp__shape_bsdf(e->scene, s);
     const struct imp_elements_phong *p = phong_of(e, s);
     for (int side = 0; side < 2; side++) {
-        struct imp__el_root r = {.shape = s->index, .corners = corners, .light_param = -1,
-                                 .back = -1};
+        struct imp__el_root r = {
+            .shape = s->index, .corners = corners, .light_param = -1, .back = -1};
         struct imp__el_material m = {.bsdf = p ? NULL : b, .flipped = side};
         const imp_v3 n = side ? -normal : normal;
         int made = -1;
         if (side && (p || !reflects_behind(b))) break;
         r.frame = imp__frame_from_normal(n);
         imp_v3 sum = imp__v3(0, 0, 0);
-        for (int k = 1; k + 1 < corners; k++) sum += imp__cross(v[k] - v[0], v[k + 1] - v[0]);
+        for (int k = 1; k + 1 < corners; k++)
+            sum += imp__cross(v[k] - v[0], v[k + 1] - v[0]);
         const bool reverse = imp__dot(sum, n) < 0;
-        for (int k = 0; k < corners; k++) r.v[k] = v[reverse ? (corners - k) % corners : k];
+        for (int k = 0; k < corners; k++)
+            r.v[k] = v[reverse ? (corners - k) % corners : k];
         r.area = imp__length(sum) / 2;
         if (p && side == 0) {
             m.phong = true;
@@ -199,14 +216,16 @@ out:
     return st;
 }
 
-/* ---- Polygons of a shape -------------------------------------------------------------------- */
+/* ---- Polygons of a shape ------------------------------------------------------- */
 
-static void corners_of(const struct imp_shape *s, int prim, imp_v3 v[3], imp_v3 *ng, bool *smooth)
+static void corners_of(const struct imp_shape *s, int prim, imp_v3 v[3], imp_v3 *ng,
+                       bool *smooth)
 {
     static const double uv[3][2] = {{0, 0}, {1, 0}, {0, 1}};
     for (int k = 0; k < 3; k++) {
         struct imp_surface at;
-        const struct imp_hit hit = {.shape = s->index, .prim = prim, .u = uv[k][0], .v = uv[k][1]};
+        const struct imp_hit hit = {
+            .shape = s->index, .prim = prim, .u = uv[k][0], .v = uv[k][1]};
         s->ops->surface(s, &hit, &(imp_v3){0}, &(imp_v3){0}, &at);
         v[k] = at.p;
         *ng = at.ng;
@@ -215,7 +234,8 @@ static void corners_of(const struct imp_shape *s, int prim, imp_v3 v[3], imp_v3 
 }
 
 /* Two triangles that share an edge, lie in one plane and make a convex quadrilateral. */
-static bool quad_of(const imp_v3 a[3], imp_v3 na, const imp_v3 b[3], imp_v3 nb, imp_v3 quad[4])
+static bool quad_of(const imp_v3 a[3], imp_v3 na, const imp_v3 b[3], imp_v3 nb,
+                    imp_v3 quad[4])
 {
     int shared[3] = {-1, -1, -1}, count = 0, lone = 0;
     double size = 0;
@@ -237,15 +257,18 @@ static bool quad_of(const imp_v3 a[3], imp_v3 na, const imp_v3 b[3], imp_v3 nb, 
     }
     if (n != 4) return false;
     for (int k = 0; k < 4; k++) { /* every corner turns the same way, and clearly */
-        const imp_v3 c = imp__cross(quad[(k + 1) % 4] - quad[k], quad[(k + 2) % 4] - quad[(k + 1) % 4]);
-        if (imp__dot(c, na) * (imp__dot(imp__cross(a[1] - a[0], a[2] - a[0]), na) < 0 ? -1 : 1) <
+        const imp_v3 c = imp__cross(quad[(k + 1) % 4] - quad[k],
+                                    quad[(k + 2) % 4] - quad[(k + 1) % 4]);
+        if (imp__dot(c, na) *
+                (imp__dot(imp__cross(a[1] - a[0], a[2] - a[0]), na) < 0 ? -1 : 1) <
             1e-6 * size * size)
             return false;
     }
     return true;
 }
 
-static enum imp_status shape_take(imp_elements *e, const struct imp_shape *s, int *prim_root)
+static enum imp_status shape_take(imp_elements *e, const struct imp_shape *s,
+                                  int *prim_root)
 {
     enum imp_status st = IMP_OK;
     bool smooth = false;
@@ -256,7 +279,8 @@ static enum imp_status shape_take(imp_elements *e, const struct imp_shape *s, in
         corners_of(s, t, a, &na, &smooth);
         prim_root[t] = -1;
         double longest = 0;
-        for (int k = 0; k < 3; k++) longest = fmax(longest, imp__length(a[k] - a[(k + 1) % 3]));
+        for (int k = 0; k < 3; k++)
+            longest = fmax(longest, imp__length(a[k] - a[(k + 1) % 3]));
         if (!(imp__polygon_area(3, a) > 1e-14 * longest * longest)) {
             e->skipped++;
             continue;
@@ -269,8 +293,10 @@ static enum imp_status shape_take(imp_elements *e, const struct imp_shape *s, in
         if (joined) prim_root[t + 1] = prim_root[t], t++;
     }
     if (smooth)
-        imp__warn(e->ctx, "shape '%s': finite elements see its faces flat, without the "
-                  "interpolated normals", s->name);
+        imp__warn(e->ctx,
+                  "shape '%s': finite elements see its faces flat, without the "
+                  "interpolated normals",
+                  s->name);
 out:
     return st;
 }
@@ -280,7 +306,10 @@ static enum imp_status plane_add(imp_elements *e, const struct imp_elements_sour
     const imp_v3 o = imp__v3(src->origin[0], src->origin[1], src->origin[2]);
     const imp_v3 u = imp__v3(src->edge_u[0], src->edge_u[1], src->edge_u[2]);
     const imp_v3 v = imp__v3(src->edge_v[0], src->edge_v[1], src->edge_v[2]);
-    struct imp__el_root r = {.shape = -1, .corners = 4, .light_param = -1, .back = -1,
+    struct imp__el_root r = {.shape = -1,
+                             .corners = 4,
+                             .light_param = -1,
+                             .back = -1,
                              .v = {o, o + u, o + u + v, o + v}};
     const imp_v3 c = imp__cross(u, v);
     int index;
@@ -294,19 +323,22 @@ static enum imp_status plane_add(imp_elements *e, const struct imp_elements_sour
     return st == IMP_OK ? root_append(e, &r, &index) : st;
 }
 
-static enum imp_status measure_shape(imp_elements *e, const struct imp_elements_source *src)
+static enum imp_status measure_shape(imp_elements *e,
+                                     const struct imp_elements_source *src)
 {
     double area = 0;
     for (int pass = 0; pass < 2; pass++)
         for (size_t i = 0; i < e->n_roots; i++) {
             struct imp__el_root *r = &e->roots[i];
-            if (r->shape < 0 || strcmp(e->scene->shapes[r->shape]->name, src->shape) != 0) continue;
+            if (r->shape < 0 || strcmp(e->scene->shapes[r->shape]->name, src->shape) != 0)
+                continue;
             if (r->back >= 0 && r->back < (int)i) continue; /* that is a back */
             if (pass) r->measure += src->weight / area;
             else area += r->area;
         }
     if (!(area > 0))
-        return imp__error(e->ctx, IMP_E_ARG, "there is no shape '%s' to measure", src->shape);
+        return imp__error(e->ctx, IMP_E_ARG, "there is no shape '%s' to measure",
+                          src->shape);
     return IMP_OK;
 }
 
@@ -323,31 +355,38 @@ enum imp_status imp__el_roots(imp_elements *e)
     const struct imp_scene *scene = e->scene;
     for (int i = 0; i < scene->n_emitters; i++)
         if (!(scene->emitters[i]->ops->flags & IMP_EMITTER_AREA))
-            IMP_TRY(imp__error(e->ctx, IMP_E_UNSUPPORTED,
-                               "emitter '%s' (%s): finite elements take lights that are surfaces",
-                               scene->emitters[i]->name, scene->emitters[i]->ops->name));
+            IMP_TRY(imp__error(
+                e->ctx, IMP_E_UNSUPPORTED,
+                "emitter '%s' (%s): finite elements take lights that are surfaces",
+                scene->emitters[i]->name, scene->emitters[i]->ops->name));
     for (size_t i = 0; i < e->opt.n_phong; i++)
-        if (strcmp(e->opt.phong[i].shape, "*") != 0 && !name_is_shape(e, e->opt.phong[i].shape))
+        if (strcmp(e->opt.phong[i].shape, "*") != 0 &&
+            !name_is_shape(e, e->opt.phong[i].shape))
             IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "there is no shape '%s' to make glossy",
                                e->opt.phong[i].shape));
     for (size_t i = 0; i < e->opt.n_beams; i++)
         if (!name_is_shape(e, e->opt.beams[i].shape))
             IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "there is no shape '%s' to direct",
                                e->opt.beams[i].shape));
-    e->prim_root = imp__arena_array(&e->arena, (size_t)scene->n_shapes + 1, sizeof *e->prim_root);
+    e->prim_root =
+        imp__arena_array(&e->arena, (size_t)scene->n_shapes + 1, sizeof *e->prim_root);
     if (!e->prim_root) IMP_TRY(no_memory(e));
     for (int i = 0; i < scene->n_shapes; i++) {
         const struct imp_shape *s = scene->shapes[i];
         if (s->geometry != IMP_TRIANGLES)
-            IMP_TRY(imp__error(e->ctx, IMP_E_UNSUPPORTED,
-                               "shape '%s' (%s): finite elements take rectangles, cubes and "
-                               "meshes", s->name, s->ops->name));
-        e->prim_root[i] = imp__arena_array(&e->arena, s->triangles.n_triangles + 1, sizeof(int));
+            IMP_TRY(
+                imp__error(e->ctx, IMP_E_UNSUPPORTED,
+                           "shape '%s' (%s): finite elements take rectangles, cubes and "
+                           "meshes",
+                           s->name, s->ops->name));
+        e->prim_root[i] =
+            imp__arena_array(&e->arena, s->triangles.n_triangles + 1, sizeof(int));
         if (!e->prim_root[i]) IMP_TRY(no_memory(e));
         IMP_TRY(shape_take(e, s, e->prim_root[i]));
     }
     if (e->n_roots == 0)
-        IMP_TRY(imp__error(e->ctx, IMP_E_SCENE, "the scene has no surfaces with an area"));
+        IMP_TRY(
+            imp__error(e->ctx, IMP_E_SCENE, "the scene has no surfaces with an area"));
     for (size_t i = 0; i < e->n_sources; i++) {
         const struct imp_elements_source *src = &e->sources[i];
         if (src->kind == IMP_ELEMENTS_PLANE) IMP_TRY(plane_add(e, src));
@@ -357,7 +396,7 @@ out:
     return st;
 }
 
-/* ---- Projection, all together ---------------------------------------------------------------- */
+/* ---- Projection, all together -------------------------------------------------- */
 
 static const char *user_of(const imp_elements *e, int material)
 {
@@ -367,8 +406,8 @@ static const char *user_of(const imp_elements *e, int material)
     return "";
 }
 
-#define RESIDUAL_GOOD 0.17  /* chooses order 8 for a Phong lobe of exponent 15 */
-#define RESIDUAL_BAD 0.6
+#define RESIDUAL_GOOD 0.17 /* chooses order 8 for a Phong lobe of exponent 15 */
+#define RESIDUAL_BAD  0.6
 
 enum imp_status imp__el_materials(imp_elements *e)
 {
@@ -391,16 +430,21 @@ enum imp_status imp__el_materials(imp_elements *e)
         const struct imp__el_material *m = &e->materials[i];
         const char *shape = user_of(e, i);
         if (m->residual > RESIDUAL_BAD)
-            IMP_TRY(imp__error(e->ctx, IMP_E_UNSUPPORTED,
-                               "shape '%s': its material is too narrow for directional order %d "
-                               "(relative error %.0f %%)", shape, order, 100 * m->residual));
+            IMP_TRY(imp__error(
+                e->ctx, IMP_E_UNSUPPORTED,
+                "shape '%s': its material is too narrow for directional order %d "
+                "(relative error %.0f %%)",
+                shape, order, 100 * m->residual));
         if (m->residual > RESIDUAL_GOOD)
-            imp__warn(e->ctx, "shape '%s': its lobe in directional order %d has a relative error "
-                      "of %.0f %%", shape, order, 100 * m->residual);
+            imp__warn(e->ctx,
+                      "shape '%s': its lobe in directional order %d has a relative error "
+                      "of %.0f %%",
+                      shape, order, 100 * m->residual);
         if (m->albedo_max > 1 + 1e-4)
-            IMP_TRY(imp__error(e->ctx, IMP_E_UNSUPPORTED,
-                               "shape '%s': its material reflects more than arrives (albedo %.4g)",
-                               shape, m->albedo_max));
+            IMP_TRY(imp__error(
+                e->ctx, IMP_E_UNSUPPORTED,
+                "shape '%s': its material reflects more than arrives (albedo %.4g)",
+                shape, m->albedo_max));
     }
 out:
     return st;

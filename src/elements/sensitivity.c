@@ -3,14 +3,16 @@
  * Derivatives of the measurement from one pair of solutions, links fixed:
  *     dJ/dp  = sum over leaves A (b + a/A)^T (dR/dp) c       material numbers
  *     dJ/dL0 = sum over the source's samples K g lobe        lights (linear, exact)
- * They are those of the discrete system, so central differences of it agree to rounding; the
- * mesh is not differentiated. J is linear in the lights: value x derivative sums to it. */
+ * They are those of the discrete system, so central differences of it agree to rounding;
+ * the mesh is not differentiated. J is linear in the lights: value x derivative sums to
+ * it. */
 #include "elements.h"
 #include <stdlib.h>
 #include <string.h>
 
-static enum imp_status row_find(imp_elements *e, const char *name, int param, size_t element,
-                                bool emission, double value, struct imp_elements_row **out)
+static enum imp_status row_find(imp_elements *e, const char *name, int param,
+                                size_t element, bool emission, double value,
+                                struct imp_elements_row **out)
 {
     for (size_t k = 0; k < e->n_rows; k++) {
         struct imp_elements_row *r = &e->rows[k];
@@ -20,14 +22,17 @@ static enum imp_status row_find(imp_elements *e, const char *name, int param, si
             return IMP_OK;
         }
     }
-    struct imp_elements_row *grown = imp__grow(e->ctx, e->rows, &e->cap_rows, e->n_rows + 1,
-                                               sizeof *grown);
+    struct imp_elements_row *grown =
+        imp__grow(e->ctx, e->rows, &e->cap_rows, e->n_rows + 1, sizeof *grown);
     if (!grown) return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for sensitivities");
     e->rows = grown;
     *out = &grown[e->n_rows++];
     **out = (struct imp_elements_row){
-        .name = param >= 0 ? e->scene->params[param].info.name : name, .param = param,
-        .element = element, .emission = emission, .value = value};
+        .name = param >= 0 ? e->scene->params[param].info.name : name,
+        .param = param,
+        .element = element,
+        .emission = emission,
+        .value = value};
     return IMP_OK;
 }
 
@@ -51,8 +56,8 @@ static enum imp_status lights_take(imp_elements *e)
     for (size_t k = 0; k < e->n_roots; k++) { /* what the eye sees of them */
         const struct imp__el_root *r = &e->roots[k];
         if (r->light == EL_DARK) continue;
-        IMP_TRY(rows_add(e, r->light_name, r->light_param, r->light_count, true, r->light_value,
-                         (double[3]){0}));
+        IMP_TRY(rows_add(e, r->light_name, r->light_param, r->light_count, true,
+                         r->light_value, (double[3]){0}));
     }
     for (size_t k = 0; k < e->n_hits; k++) {
         const struct imp__el_hit *hit = &e->hits[k];
@@ -61,8 +66,8 @@ static enum imp_status lights_take(imp_elements *e)
         const double lobe = el_lobe(r, hit->w) * hit->weight;
         if (r->light == EL_DARK || lobe == 0) continue;
         const double d[3] = {e->lum[0] * lobe, e->lum[1] * lobe, e->lum[2] * lobe};
-        IMP_TRY(rows_add(e, r->light_name, r->light_param, r->light_count, true, r->light_value,
-                         d));
+        IMP_TRY(rows_add(e, r->light_name, r->light_param, r->light_count, true,
+                         r->light_value, d));
     }
     for (size_t j = 0; j < e->n_elements; j++) {
         struct imp__el_root r = *el_root(e, &e->elements[j]);
@@ -77,7 +82,8 @@ static enum imp_status lights_take(imp_elements *e)
             for (int c = 0; c < e->ch; c++)
                 for (int s = 0; s < 4; s++) d[c] += k->k[s] * lobe[c][s] * g[c][s];
         }
-        IMP_TRY(rows_add(e, r.light_name, r.light_param, r.light_count, true, r.light_value, d));
+        IMP_TRY(rows_add(e, r.light_name, r.light_param, r.light_count, true,
+                         r.light_value, d));
     }
 out:
     return st;
@@ -86,7 +92,9 @@ out:
 static enum imp_status materials_take(imp_elements *e)
 {
     enum imp_status st = IMP_OK;
-    struct sum { double d[3]; };
+    struct sum {
+        double d[3];
+    };
     size_t n = 0;
     for (int k = 0; k < e->n_materials; k++) n += (size_t)e->materials[k].n_d;
     struct sum *sums = imp__alloc(e->ctx, n + 1, sizeof *sums);
@@ -96,14 +104,17 @@ static enum imp_status materials_take(imp_elements *e)
         const struct imp__el_material *m = el_material(e, x);
         if (x->child || m->n == 0 || m->n_d == 0) continue;
         size_t at = 0;
-        for (const struct imp__el_material *o = e->materials; o < m; o++) at += (size_t)o->n_d;
+        for (const struct imp__el_material *o = e->materials; o < m; o++)
+            at += (size_t)o->n_d;
         for (int j = 0; j < m->n_d; j++)
             for (int c = 0; c < e->ch; c++) {
-                const double *in = el_at(e, e->c, x) + c * m->n, *b = el_at(e, e->b, x) + c * m->n;
+                const double *in = el_at(e, e->c, x) + c * m->n,
+                             *b = el_at(e, e->b, x) + c * m->n;
                 double y[EL_N_MAX], sum = 0;
                 imp__el_apply(&e->basis, m->n, m->d[j].r[c], in, y);
                 for (int q = 0; q < m->n; q++)
-                    sum += (x->area * b[q] + e->lum[c] * e->a[x->coef + (size_t)q]) * y[q];
+                    sum +=
+                        (x->area * b[q] + e->lum[c] * e->a[x->coef + (size_t)q]) * y[q];
                 sums[at + (size_t)j].d[c] += sum;
             }
     }
@@ -114,7 +125,8 @@ static enum imp_status materials_take(imp_elements *e)
             bool used = false;
             for (size_t i = 0; i < e->n_roots; i++) used |= e->roots[i].material == k;
             if (used)
-                IMP_TRY(rows_add(e, d->name, d->param, d->count, false, d->value, sums[at].d));
+                IMP_TRY(rows_add(e, d->name, d->param, d->count, false, d->value,
+                                 sums[at].d));
         }
 out:
     imp__release(e->ctx, sums);
@@ -130,12 +142,14 @@ static int by_size(const void *a, const void *b)
     return names ? names : (x->element > y->element) - (x->element < y->element);
 }
 
-enum imp_status imp_elements_sensitivity(imp_elements *e, const struct imp_elements_row **rows,
+enum imp_status imp_elements_sensitivity(imp_elements *e,
+                                         const struct imp_elements_row **rows,
                                          size_t *n_rows)
 {
     enum imp_status st = IMP_OK;
     if (!e || !rows || !n_rows) return IMP_E_ARG;
-    if (!e->solved) return imp__error(e->ctx, IMP_E_ARG, "the elements are not solved yet");
+    if (!e->solved)
+        return imp__error(e->ctx, IMP_E_ARG, "the elements are not solved yet");
     e->n_rows = 0;
     IMP_TRY(imp__el_settle(e, 8, true, 1e-13));
     e->has_importance = true;

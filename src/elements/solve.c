@@ -3,8 +3,8 @@
  * The schedule: links between whole polygons first, then refinement under a falling
  * tolerance with a few warm-started sweeps each, until the picture hardly changes (the
  * paper's rule), the tolerance has reached its end, or a budget is spent. */
-#include "elements.h"
 #include "color/rgb.h"
+#include "elements.h"
 #include <stdio.h>
 #include <string.h>
 
@@ -20,19 +20,24 @@ void imp__el_tick(imp_elements *e, const char *stage, double fraction, const cha
     if (now - e->last_tick_s < 0.1 && fraction < 1) return;
     e->last_tick_s = now;
     const double elapsed = now - e->start_s;
-    const struct imp_progress p = {
-        .size = sizeof p, .stage = stage, .fraction = e->fraction, .elapsed_s = elapsed,
-        .eta_s = -1, .rate = elapsed > 0 ? (double)e->n_links / elapsed : 0,
-        .rate_unit = "links", .note = note};
+    const struct imp_progress p = {.size = sizeof p,
+                                   .stage = stage,
+                                   .fraction = e->fraction,
+                                   .elapsed_s = elapsed,
+                                   .eta_s = -1,
+                                   .rate = elapsed > 0 ? (double)e->n_links / elapsed : 0,
+                                   .rate_unit = "links",
+                                   .note = note};
     if (e->opt.progress(&p, e->opt.progress_payload) && !e->stop) {
         e->stop = true;
         e->reason = "asked to stop";
     }
 }
 
-/* ---- Options ------------------------------------------------------------------------------------ */
+/* ---- Options ------------------------------------------------------------------- */
 
-static enum imp_status options_take(imp_elements *e, const struct imp_elements_options *options)
+static enum imp_status options_take(imp_elements *e,
+                                    const struct imp_elements_options *options)
 {
     struct imp_elements_options *o = &e->opt;
     enum imp_status st = IMP_OK;
@@ -49,21 +54,26 @@ static enum imp_status options_take(imp_elements *e, const struct imp_elements_o
     if (o->max_bytes == 0) o->max_bytes = (size_t)4 << 30;
     o->max_links = imp_min(o->max_links, (size_t)UINT32_MAX - 1);
     if (o->order != 0 && (o->order < 2 || o->order > EL_ORDER_MAX))
-        return imp__error(e->ctx, IMP_E_ARG, "directional order %d is outside 2..%d", o->order,
-                          EL_ORDER_MAX);
+        return imp__error(e->ctx, IMP_E_ARG, "directional order %d is outside 2..%d",
+                          o->order, EL_ORDER_MAX);
     if (o->rays < 1 || o->rays > 64 || o->sweeps < 1 || o->final_sweeps < 0 ||
         o->max_level < 0 || o->max_level > EL_LEVEL_MAX)
-        return imp__error(e->ctx, IMP_E_ARG, "an option of the finite elements is outside its "
-                          "range (rays 1..64, sweeps >= 1, level 0..%d)", EL_LEVEL_MAX);
-    if (!(o->eps_first > 0) || !(o->eps_last > 0) || isnan(o->stop) || !(o->time_limit_s >= 0))
+        return imp__error(e->ctx, IMP_E_ARG,
+                          "an option of the finite elements is outside its "
+                          "range (rays 1..64, sweeps >= 1, level 0..%d)",
+                          EL_LEVEL_MAX);
+    if (!(o->eps_first > 0) || !(o->eps_last > 0) || isnan(o->stop) ||
+        !(o->time_limit_s >= 0))
         return imp__error(e->ctx, IMP_E_ARG, "tolerances must be positive");
     if (e->scene->n_sensors > 0 && (o->sensor < 0 || o->sensor >= e->scene->n_sensors))
-        return imp__error(e->ctx, IMP_E_ARG, "there is no sensor %d; the scene has %d", o->sensor,
-                          e->scene->n_sensors);
+        return imp__error(e->ctx, IMP_E_ARG, "there is no sensor %d; the scene has %d",
+                          o->sensor, e->scene->n_sensors);
 
     /* Copies: the host's arrays may go. */
-    struct imp_elements_phong *phong = imp__arena_array(&e->arena, o->n_phong + 1, sizeof *phong);
-    struct imp_elements_beam *beams = imp__arena_array(&e->arena, o->n_beams + 1, sizeof *beams);
+    struct imp_elements_phong *phong =
+        imp__arena_array(&e->arena, o->n_phong + 1, sizeof *phong);
+    struct imp_elements_beam *beams =
+        imp__arena_array(&e->arena, o->n_beams + 1, sizeof *beams);
     e->n_sources = o->n_sources ? o->n_sources : 1;
     e->sources = imp__arena_array(&e->arena, e->n_sources, sizeof *e->sources);
     if (!phong || !beams || !e->sources)
@@ -74,12 +84,15 @@ static enum imp_status options_take(imp_elements *e, const struct imp_elements_o
         if (!p->shape || !(phong[i].shape = imp__arena_strdup(&e->arena, p->shape)))
             IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "a Phong material needs a shape"));
         for (int c = 0; c < 3; c++)
-            if (!(p->kd[c] >= 0) || !(p->ks[c] >= 0) || !(p->kd[c] + p->ks[c] <= 1 + 1e-12))
-                IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "shape '%s': Phong coefficients must be "
-                                   ">= 0 with kd + ks <= 1", p->shape));
+            if (!(p->kd[c] >= 0) || !(p->ks[c] >= 0) ||
+                !(p->kd[c] + p->ks[c] <= 1 + 1e-12))
+                IMP_TRY(imp__error(e->ctx, IMP_E_ARG,
+                                   "shape '%s': Phong coefficients must be "
+                                   ">= 0 with kd + ks <= 1",
+                                   p->shape));
         if (!(p->exponent >= 0) || p->exponent > 1e4)
-            IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "shape '%s': Phong exponent %g", p->shape,
-                               p->exponent));
+            IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "shape '%s': Phong exponent %g",
+                               p->shape, p->exponent));
     }
     for (size_t i = 0; i < o->n_beams; i++) {
         const struct imp_elements_beam *b = &o->beams[i];
@@ -88,33 +101,38 @@ static enum imp_status options_take(imp_elements *e, const struct imp_elements_o
             IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "a beam needs a shape"));
         if (!(b->exponent >= 0) || b->exponent > 1e6 || !isfinite(b->axis[0]) ||
             !isfinite(b->axis[1]) || !isfinite(b->axis[2]))
-            IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "shape '%s': beam exponent %g or its axis",
-                               b->shape, b->exponent));
+            IMP_TRY(imp__error(e->ctx, IMP_E_ARG,
+                               "shape '%s': beam exponent %g or its axis", b->shape,
+                               b->exponent));
     }
     o->phong = phong;
     o->beams = beams;
     for (size_t i = 0; i < e->n_sources; i++) {
         struct imp_elements_source *s = &e->sources[i];
         *s = (struct imp_elements_source){.size = sizeof *s, .sensor = o->sensor};
-        if (o->n_sources) memcpy(s, &o->sources[i], imp_min(o->sources[i].size, sizeof *s));
+        if (o->n_sources)
+            memcpy(s, &o->sources[i], imp_min(o->sources[i].size, sizeof *s));
         if (s->weight == 0) s->weight = 1;
         if (!isfinite(s->weight))
-            IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "the weight of a measurement is not finite"));
+            IMP_TRY(imp__error(e->ctx, IMP_E_ARG,
+                               "the weight of a measurement is not finite"));
         if (s->kind == IMP_ELEMENTS_SHAPE) {
             if (!s->shape || !(s->shape = imp__arena_strdup(&e->arena, s->shape)))
                 IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "a measurement has no shape"));
         } else if (s->kind == IMP_ELEMENTS_CAMERA) {
             if (s->sensor < 0 || s->sensor >= e->scene->n_sensors)
-                IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "there is no sensor %d; the scene has %d",
-                                   s->sensor, e->scene->n_sensors));
+                IMP_TRY(imp__error(e->ctx, IMP_E_ARG,
+                                   "there is no sensor %d; the scene has %d", s->sensor,
+                                   e->scene->n_sensors));
             const struct imp_film_desc *f = &e->scene->sensors[s->sensor]->film;
             int *r = s->region;
             if (!r[0] && !r[1] && !r[2] && !r[3]) r[2] = f->crop_w, r[3] = f->crop_h;
-            if (r[0] < 0 || r[1] < 0 || r[2] > f->crop_w || r[3] > f->crop_h || r[0] >= r[2] ||
-                r[1] >= r[3])
-                IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "region %d,%d,%d,%d is not inside the "
-                                   "picture of %d x %d", r[0], r[1], r[2], r[3], f->crop_w,
-                                   f->crop_h));
+            if (r[0] < 0 || r[1] < 0 || r[2] > f->crop_w || r[3] > f->crop_h ||
+                r[0] >= r[2] || r[1] >= r[3])
+                IMP_TRY(imp__error(e->ctx, IMP_E_ARG,
+                                   "region %d,%d,%d,%d is not inside the "
+                                   "picture of %d x %d",
+                                   r[0], r[1], r[2], r[3], f->crop_w, f->crop_h));
         } else if (s->kind != IMP_ELEMENTS_PLANE) {
             IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "unknown kind of measurement %d",
                                (int)s->kind));
@@ -134,7 +152,8 @@ enum imp_status imp_elements_create(const imp_scene *scene,
     if (!scene->committed)
         return imp__error(scene->ctx, IMP_E_ARG, "the scene is not committed");
     imp_elements *e = imp__alloc(scene->ctx, 1, sizeof *e);
-    if (!e) return imp__error(scene->ctx, IMP_E_NOMEM, "out of memory for finite elements");
+    if (!e)
+        return imp__error(scene->ctx, IMP_E_NOMEM, "out of memory for finite elements");
     e->ctx = scene->ctx;
     e->scene = scene;
     e->ch = scene->channels;
@@ -158,15 +177,16 @@ out:
 void imp_elements_destroy(imp_elements *e)
 {
     if (!e) return;
-    void *const all[] = {e->roots, e->elements, e->l, e->g, e->c, e->b, e->from_above, e->a, e->links,
-                         e->in_start, e->out_start, e->out, e->value, e->hits, e->view,
-                         e->picture, e->log, e->rows};
+    void *const all[] = {e->roots,     e->elements,   e->l,     e->g,     e->c,
+                         e->b,         e->from_above, e->a,     e->links, e->in_start,
+                         e->out_start, e->out,        e->value, e->hits,  e->view,
+                         e->picture,   e->log,        e->rows};
     for (size_t k = 0; k < imp_count(all); k++) imp__release(e->ctx, all[k]);
     imp__arena_free(&e->arena);
     imp__release(e->ctx, e);
 }
 
-/* ---- Solving -------------------------------------------------------------------------------------- */
+/* ---- Solving ------------------------------------------------------------------- */
 
 static size_t leaves_of(const imp_elements *e)
 {
@@ -175,7 +195,11 @@ static size_t leaves_of(const imp_elements *e)
     return n;
 }
 
-struct view_job { const imp_elements *e; double *out; size_t per; };
+struct view_job {
+    const imp_elements *e;
+    double *out;
+    size_t per;
+};
 static enum imp_status view_work(size_t item, int worker, int slot, void *payload)
 {
     const struct view_job *v = payload;
@@ -203,12 +227,14 @@ static enum imp_status change_of(imp_elements *e, double measure, double *change
     const size_t n = e->n_view / v.per;
     *change = NAN;
     if (n == 0) {
-        if (e->n_log) *change = fabs(measure - e->log[e->n_log - 1].measure) / fabs(measure);
+        if (e->n_log)
+            *change = fabs(measure - e->log[e->n_log - 1].measure) / fabs(measure);
         return IMP_OK;
     }
     v.out = imp__alloc(e->ctx, n, sizeof *v.out);
     if (!v.out) return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for the picture");
-    const struct imp_loop loop = {.n_items = (n + 63) / 64, .work = view_work, .payload = &v};
+    const struct imp_loop loop = {
+        .n_items = (n + 63) / 64, .work = view_work, .payload = &v};
     IMP_TRY(imp__parallel(e->ctx, &loop, NULL));
     double apart = 0, sum = 0;
     for (size_t p = 0; p < n; p++) {
@@ -227,16 +253,20 @@ out:
 static enum imp_status log_add(imp_elements *e)
 {
     enum imp_status st = IMP_OK;
-    struct imp_elements_step s = {.eps = e->eps, .links = e->n_links, .elements = e->n_elements,
-                                  .leaves = leaves_of(e), .rays = e->rays,
+    struct imp_elements_step s = {.eps = e->eps,
+                                  .links = e->n_links,
+                                  .elements = e->n_elements,
+                                  .leaves = leaves_of(e),
+                                  .rays = e->rays,
                                   .measure = imp__el_measure(e, NULL),
                                   .elapsed_s = imp__now() - e->start_s};
     if (!isfinite(s.measure))
-        return imp__error(e->ctx, IMP_E_NUMERIC, "reflections grow without end: the surfaces "
+        return imp__error(e->ctx, IMP_E_NUMERIC,
+                          "reflections grow without end: the surfaces "
                           "give back more than arrives");
     IMP_TRY(change_of(e, s.measure, &s.change));
-    struct imp_elements_step *grown = imp__grow(e->ctx, e->log, &e->cap_log, e->n_log + 1,
-                                                sizeof *grown);
+    struct imp_elements_step *grown =
+        imp__grow(e->ctx, e->log, &e->cap_log, e->n_log + 1, sizeof *grown);
     if (!grown) IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for the log"));
     e->log = grown;
     e->log[e->n_log++] = s;
@@ -244,14 +274,16 @@ out:
     return st;
 }
 
-/* Sum over leaves of area x |constant coefficient|, to see whether sweeps still move it. */
+/* Sum over leaves of area x |constant coefficient|, to see whether sweeps still move it.
+ */
 static double weight_of(const imp_elements *e, bool importance)
 {
     double sum = 0;
     for (size_t k = 0; k < e->n_roots; k++) {
         const struct imp__element *x = &e->elements[e->roots[k].element];
         const int n = el_n(e, &e->roots[k]);
-        for (int c = 0; c < e->ch && n; c++) sum += x->area * fabs(el_at(e, importance ? e->g : e->l, x)[c * n]);
+        for (int c = 0; c < e->ch && n; c++)
+            sum += x->area * fabs(el_at(e, importance ? e->g : e->l, x)[c * n]);
     }
     return sum;
 }
@@ -264,8 +296,10 @@ enum imp_status imp__el_settle(imp_elements *e, int n, bool importance, double t
     for (int k = 0; k < most; k++) {
         IMP_TRY(imp__el_sweep(e, n, importance, false));
         const double now[2] = {weight_of(e, false), importance ? weight_of(e, true) : 0};
-        if (!isfinite(now[0]) || !isfinite(now[1]) || (k > 20 && now[0] > 1e3 * before[0]))
-            IMP_TRY(imp__error(e->ctx, IMP_E_NUMERIC, "reflections grow without end: the surfaces "
+        if (!isfinite(now[0]) || !isfinite(now[1]) ||
+            (k > 20 && now[0] > 1e3 * before[0]))
+            IMP_TRY(imp__error(e->ctx, IMP_E_NUMERIC,
+                               "reflections grow without end: the surfaces "
                                "give back more than arrives"));
         if (fabs(now[0] - before[0]) <= tolerance * now[0] &&
             (!importance || fabs(now[1] - before[1]) <= tolerance * now[1]))
@@ -275,7 +309,8 @@ enum imp_status imp__el_settle(imp_elements *e, int n, bool importance, double t
         imp__el_tick(e, "settle", -1, NULL);
         if (e->stop) return IMP_OK;
     }
-    imp__warn(e->ctx, "finite elements: reflections had not died away after %d sweeps", most * n);
+    imp__warn(e->ctx, "finite elements: reflections had not died away after %d sweeps",
+              most * n);
 out:
     return st;
 }
@@ -324,7 +359,8 @@ enum imp_status imp_elements_solve(imp_elements *e)
             break;
         }
         /* Twice in a row; a step that refined nothing says nothing. */
-        if (s->links > before + before / 8) still = s->change < e->opt.stop ? still + 1 : 0;
+        if (s->links > before + before / 8)
+            still = s->change < e->opt.stop ? still + 1 : 0;
         if (still == 2) {
             e->reason = "the picture stands still";
             break;
@@ -352,18 +388,19 @@ static enum imp_status parameters_read(imp_elements *e)
         struct imp__el_root *r = &e->roots[i];
         if (r->light == EL_DARK || r->light_param < 0) continue;
         for (int c = 0; c < 3; c++)
-            r->radiance[c] = r->light_value[c] =
-                imp__param_get(&e->scene->params[r->light_param], r->light_count == 3 ? (size_t)c : 0);
+            r->radiance[c] = r->light_value[c] = imp__param_get(
+                &e->scene->params[r->light_param], r->light_count == 3 ? (size_t)c : 0);
     }
     for (int i = 0; i < e->n_materials; i++) {
         struct imp__el_material *m = &e->materials[i];
         struct imp__el_material fresh = *m;
         if (!m->bsdf) continue;
-        const enum imp_status st = imp__el_project(e->ctx, &e->arena, &e->basis, e->ch, "",
-                                                   &fresh);
+        const enum imp_status st =
+            imp__el_project(e->ctx, &e->arena, &e->basis, e->ch, "", &fresh);
         if (st != IMP_OK) return st;
         if (fresh.n > m->n)
-            return imp__error(e->ctx, IMP_E_UNSUPPORTED, "a material has changed its kind: "
+            return imp__error(e->ctx, IMP_E_UNSUPPORTED,
+                              "a material has changed its kind: "
                               "it needs new elements");
         fresh.n = m->n;
         *m = fresh;
@@ -375,7 +412,8 @@ enum imp_status imp_elements_update(imp_elements *e)
 {
     enum imp_status st = IMP_OK;
     if (!e) return IMP_E_ARG;
-    if (!e->solved) return imp__error(e->ctx, IMP_E_ARG, "the elements are not solved yet");
+    if (!e->solved)
+        return imp__error(e->ctx, IMP_E_ARG, "the elements are not solved yet");
     IMP_TRY(parameters_read(e));
     IMP_TRY(imp__el_bin(e));
     IMP_TRY(imp__el_settle(e, 4, e->has_importance, 1e-10));
@@ -383,18 +421,29 @@ out:
     return st;
 }
 
-enum imp_status imp_elements_get_info(const imp_elements *e, struct imp_elements_info *info)
+enum imp_status imp_elements_get_info(const imp_elements *e,
+                                      struct imp_elements_info *info)
 {
     if (!e || !info) return IMP_E_ARG;
     struct imp_elements_info i = {.size = imp_min(info->size, sizeof i),
-        .order = e->basis.order, .functions = e->basis.n, .polygons = e->n_roots,
-        .elements = e->n_elements, .leaves = leaves_of(e), .links = e->n_links,
-        .skipped = e->skipped, .rays = e->rays, .bytes = imp__el_bytes(e),
-        .reason = e->reason, .n_steps = e->n_log, .steps = e->log};
+                                  .order = e->basis.order,
+                                  .functions = e->basis.n,
+                                  .polygons = e->n_roots,
+                                  .elements = e->n_elements,
+                                  .leaves = leaves_of(e),
+                                  .links = e->n_links,
+                                  .skipped = e->skipped,
+                                  .rays = e->rays,
+                                  .bytes = imp__el_bytes(e),
+                                  .reason = e->reason,
+                                  .n_steps = e->n_log,
+                                  .steps = e->log};
     i.bytes_per_link = (double)(sizeof *e->links + 4 * (size_t)e->ch * sizeof *e->value +
                                 sizeof *e->out);
-    i.bytes_per_element = (double)(sizeof *e->elements + 2 * sizeof *e->in_start) +
-        (e->n_elements ? 8.0 * (5 * e->ch + 1) * (double)e->n_coef / (double)e->n_elements : 0);
+    i.bytes_per_element =
+        (double)(sizeof *e->elements + 2 * sizeof *e->in_start) +
+        (e->n_elements ? 8.0 * (5 * e->ch + 1) * (double)e->n_coef / (double)e->n_elements
+                       : 0);
     for (int k = 0; k < e->n_materials; k++)
         i.worst_residual = fmax(i.worst_residual, e->materials[k].residual);
     if (e->solved) {

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Where importance comes from. The eye is never an element: its rays are binned into the
- * elements that they hit, a_i,m += weight H_m(to the eye), which is the projected area that
- * the paper speaks of. Measuring patches emit a constant importance (elements.h: s). */
+ * elements that they hit, a_i,m += weight H_m(to the eye), which is the projected area
+ * that the paper speaks of. Measuring patches emit a constant importance (elements.h: s).
+ */
 #include "elements.h"
 #include <string.h>
 
-/* (u, v) of a point of a root: Newton's method on the bilinear map, exact after one step for
- * triangles and parallelograms. */
+/* (u, v) of a point of a root: Newton's method on the bilinear map, exact after one step
+ * for triangles and parallelograms. */
 static void locate(const struct imp__el_root *r, imp_v3 p, double *u, double *v)
 {
     const imp_v3 a = r->v[0], eu = r->v[1] - a;
@@ -45,7 +46,8 @@ bool imp__el_trace(const imp_elements *e, const struct imp_sensor_ray *ray,
     struct imp_surface surface;
     hit->root = EL_NONE;
     hit->w = -ray->d;
-    if (!imp__intersect(e->scene, &ray->o, &ray->d, ray->t_near, ray->t_far, &at)) return false;
+    if (!imp__intersect(e->scene, &ray->o, &ray->d, ray->t_near, ray->t_far, &at))
+        return false;
     int root = e->prim_root[at.shape][at.prim];
     if (root < 0) return false;
     if (imp__dot(e->roots[root].frame.n, ray->d) > 0) root = e->roots[root].back;
@@ -57,7 +59,7 @@ bool imp__el_trace(const imp_elements *e, const struct imp_sensor_ray *ray,
     return true;
 }
 
-/* ---- Hits of a picture, row by row ------------------------------------------------------------- */
+/* ---- Hits of a picture, row by row --------------------------------------------- */
 
 struct rows {
     const imp_elements *e;
@@ -84,18 +86,27 @@ static enum imp_status hits_take(imp_elements *e, int sensor, const int region[4
                                  struct imp__el_hit **array, size_t *cap, size_t *count)
 {
     enum imp_status st = IMP_OK;
-    struct rows r = {.e = e, .sensor = e->scene->sensors[sensor], .x0 = region[0],
-                     .y0 = region[1], .width = region[2] - region[0], .side = e->opt.rays};
+    struct rows r = {.e = e,
+                     .sensor = e->scene->sensors[sensor],
+                     .x0 = region[0],
+                     .y0 = region[1],
+                     .width = region[2] - region[0],
+                     .side = e->opt.rays};
     const int height = region[3] - region[1];
     const size_t n = (size_t)r.width * (size_t)height * (size_t)(r.side * r.side);
     if ((double)n * sizeof **array > (double)e->opt.max_bytes)
-        return imp__error(e->ctx, IMP_E_NOMEM, "%d x %d pixels with %d rays each are over the "
-                          "memory budget", r.width, height, r.side * r.side);
-    struct imp__el_hit *grown = imp__grow(e->ctx, *array, cap, *count + n + 1, sizeof *grown);
-    if (!grown) return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for the picture's rays");
+        return imp__error(e->ctx, IMP_E_NOMEM,
+                          "%d x %d pixels with %d rays each are over the "
+                          "memory budget",
+                          r.width, height, r.side * r.side);
+    struct imp__el_hit *grown =
+        imp__grow(e->ctx, *array, cap, *count + n + 1, sizeof *grown);
+    if (!grown)
+        return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for the picture's rays");
     *array = grown;
     r.out = grown + *count;
-    const struct imp_loop loop = {.n_items = (size_t)height, .work = row_work, .payload = &r};
+    const struct imp_loop loop = {
+        .n_items = (size_t)height, .work = row_work, .payload = &r};
     IMP_TRY(imp__parallel(e->ctx, &loop, NULL));
     *count += n;
     e->rays += (int64_t)n;
@@ -110,7 +121,8 @@ enum imp_status imp__el_sources(imp_elements *e)
         const struct imp_elements_source *src = &e->sources[k];
         if (src->kind != IMP_ELEMENTS_CAMERA) continue;
         const size_t first = e->n_hits;
-        IMP_TRY(hits_take(e, src->sensor, src->region, &e->hits, &e->cap_hits, &e->n_hits));
+        IMP_TRY(
+            hits_take(e, src->sensor, src->region, &e->hits, &e->cap_hits, &e->n_hits));
         for (size_t i = first; i < e->n_hits; i++) {
             e->hits[i].source = (uint32_t)k;
             e->hits[i].weight = src->weight / (double)(e->n_hits - first);
@@ -144,7 +156,7 @@ enum imp_status imp__el_bin(imp_elements *e)
     return IMP_OK;
 }
 
-/* ---- The measurement, from both sides ----------------------------------------------------------- */
+/* ---- The measurement, from both sides ------------------------------------------ */
 
 static double direct_of(const imp_elements *e)
 {
@@ -154,7 +166,8 @@ static double direct_of(const imp_elements *e)
         if (hit->root == EL_NONE) continue;
         const struct imp__el_root *r = &e->roots[hit->root];
         const double lobe = el_lobe(r, hit->w) * hit->weight;
-        for (int c = 0; c < e->ch && lobe > 0; c++) sum += e->lum[c] * r->radiance[c] * lobe;
+        for (int c = 0; c < e->ch && lobe > 0; c++)
+            sum += e->lum[c] * r->radiance[c] * lobe;
     }
     return sum;
 }

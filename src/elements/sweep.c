@@ -1,28 +1,30 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Jacobi sweeps of radiance and importance over the same links. A sweep passes twice over the
- * samples and evaluates the basis once at each end: by source, where l becomes the radiance
- * that a sample carries and its importance is added to b; by receiver, where that radiance is
- * added to c and g becomes the importance that the sample carries back. One number a sample
- * and channel (`value`) holds whichever of the two is under way. Each element's sum is taken
- * by one worker in the order of its links, so it does not depend on the threads.
+ * Jacobi sweeps of radiance and importance over the same links. A sweep passes twice over
+ * the samples and evaluates the basis once at each end: by source, where l becomes the
+ * radiance that a sample carries and its importance is added to b; by receiver, where
+ * that radiance is added to c and g becomes the importance that the sample carries back.
+ * One number a sample and channel (`value`) holds whichever of the two is under way. Each
+ * element's sum is taken by one worker in the order of its links, so it does not depend
+ * on the threads.
  *
  * A link's sample s is the kernel at quarter s of the receiver. Where the receiver has
- * children, the sample belongs to child s alone (`from_above` of the child) instead of being
- * spread over all four: without that, what comes from far patches is too flat across a wall
- * whose near patches are linked to its parts, and furnaces are 2 % off where they need not. */
+ * children, the sample belongs to child s alone (`from_above` of the child) instead of
+ * being spread over all four: without that, what comes from far patches is too flat
+ * across a wall whose near patches are linked to its parts, and furnaces are 2 % off
+ * where they need not. */
 #include "elements.h"
 #include <string.h>
 
 struct pass {
     imp_elements *e;
-    bool importance, prime;  /* prime: only make the values from g */
+    bool importance, prime; /* prime: only make the values from g */
 };
 
 enum { ELEMENTS_PER_ITEM = 8 };
 
-static void direction(const struct imp__el_link *k, const struct imp_frame *f, double sign,
-                      imp_spec w[3])
+static void direction(const struct imp__el_link *k, const struct imp_frame *f,
+                      double sign, imp_spec w[3])
 {
     imp_spec d[3];
     for (int a = 0; a < 3; a++)
@@ -46,8 +48,8 @@ static imp_spec dot_of(int n, const double *x, const imp_spec *h)
 }
 
 /* Coefficients by lane: of the children where there are any, else all the same. */
-static void by_lane(const imp_elements *e, const struct imp__element *i, double *array, int n,
-                    imp_spec *out)
+static void by_lane(const imp_elements *e, const struct imp__element *i, double *array,
+                    int n, imp_spec *out)
 {
     const double *own = el_at(e, array, i);
     if (!i->child) {
@@ -154,7 +156,8 @@ static void by_receiver(imp_elements *e, uint32_t index, bool importance, bool p
         basis_of(e, n, w, h);
         for (int c = 0; c < ch; c++) {
             if (!prime) {
-                const imp_spec kl = (imp_spec){k->k[0], k->k[1], k->k[2], k->k[3]} * value[c];
+                const imp_spec kl =
+                    (imp_spec){k->k[0], k->k[1], k->k[2], k->k[3]} * value[c];
                 for (int q = 0; q < n; q++) sum[c][q] += kl * h[q];
             }
             value[c] = importance ? dot_of4(n, g + c * n, h) : imp__spec(0);
@@ -165,13 +168,15 @@ static void by_receiver(imp_elements *e, uint32_t index, bool importance, bool p
     for (int c = 0; c < ch; c++)
         for (int q = 0; q < n; q++) {
             const imp_spec s = sum[c][q];
-            out[c * n + q] = i->child || i->area == 0 ? 0 : ((s[0] + s[1]) + (s[2] + s[3])) / i->area;
+            out[c * n + q] =
+                i->child || i->area == 0 ? 0 : ((s[0] + s[1]) + (s[2] + s[3])) / i->area;
         }
     for (uint32_t s = 0; s < 4 && i->child; s++) {
         const struct imp__element *child = &e->elements[i->child + s];
         double *below = el_at(e, e->from_above, child);
         for (int c = 0; c < ch; c++)
-            for (int q = 0; q < n; q++) below[c * n + q] = child->area > 0 ? sum[c][q][s] / child->area : 0;
+            for (int q = 0; q < n; q++)
+                below[c * n + q] = child->area > 0 ? sum[c][q][s] / child->area : 0;
     }
 }
 
@@ -194,10 +199,10 @@ static enum imp_status receiver_work(size_t item, int worker, int slot, void *pa
     return IMP_OK;
 }
 
-/* ---- Push, reflect, pull ---------------------------------------------------------------------- */
+/* ---- Push, reflect, pull ------------------------------------------------------- */
 
-/* What is gathered goes down unchanged (it is per area); what is reflected comes up as the
- * area-weighted mean. */
+/* What is gathered goes down unchanged (it is per area); what is reflected comes up as
+ * the area-weighted mean. */
 static void reflect(imp_elements *e, uint32_t index, bool importance)
 {
     const struct imp__element *x = &e->elements[index];
@@ -213,7 +218,8 @@ static void reflect(imp_elements *e, uint32_t index, bool importance)
             double *down = el_at(e, importance ? e->b : e->c, y);
             const double *up = el_at(e, importance ? e->g : e->l, y);
             const double *below = el_at(e, e->from_above, y);
-            for (int q = 0; q < ch * n; q++) down[q] += in[q] + (importance ? 0 : below[q]);
+            for (int q = 0; q < ch * n; q++)
+                down[q] += in[q] + (importance ? 0 : below[q]);
             reflect(e, k, importance);
             const double part = x->area > 0 ? y->area / x->area : 0;
             for (int q = 0; q < ch * n; q++) out[q] += part * up[q];
@@ -225,7 +231,8 @@ static void reflect(imp_elements *e, uint32_t index, bool importance)
         const double *from = in + c * n;
         if (importance) {
             const double scale = x->area > 0 ? e->lum[c] / x->area : 0;
-            for (int q = 0; q < n; q++) arrives[q] = from[q] + e->a[x->coef + (size_t)q] * scale;
+            for (int q = 0; q < n; q++)
+                arrives[q] = from[q] + e->a[x->coef + (size_t)q] * scale;
             from = arrives;
         }
         if (m->n) imp__el_apply(&e->basis, n, m->r[c], from, out + c * n);
@@ -263,7 +270,8 @@ enum imp_status imp__el_sweep(imp_elements *e, int n, bool importance, bool cold
     }
     for (int k = 0; k < n; k++) {
         IMP_TRY(run(&(struct pass){e, importance, false}, items, source_work));
-        if (importance) IMP_TRY(run(&(struct pass){e, true, false}, e->n_roots, reflect_work));
+        if (importance)
+            IMP_TRY(run(&(struct pass){e, true, false}, e->n_roots, reflect_work));
         IMP_TRY(run(&(struct pass){e, importance, false}, items, receiver_work));
         IMP_TRY(run(&(struct pass){e, false, false}, e->n_roots, reflect_work));
     }

@@ -1,27 +1,30 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Files of bent rays (docs/curved-rays.md): between bend_load.c, which drives it, the medium
- * with its field (bend_medium.c) and the rays with what they meet (bend_rays.c). */
+ * Files of bent rays (docs/curved-rays.md): between bend_load.c, which drives it, the
+ * medium with its field (bend_medium.c) and the rays with what they meet (bend_rays.c).
+ */
 #ifndef IMP_FORMAT_BEND_H
 #define IMP_FORMAT_BEND_H
 
 #include "curved/bend.h"
 #include "scene/scene.h"
 
-struct bend_frame { imp_v3 o, s, t, n; };  /* of a bundle: z along its rays */
+struct bend_frame {
+    imp_v3 o, s, t, n;
+}; /* of a bundle: z along its rays */
 
 struct bend_loader {
     imp_context *ctx;
-    struct imp_scene *scene;       /* of the tree and the search list; never built */
+    struct imp_scene *scene; /* of the tree and the search list; never built */
     imp_bend *bend;
-    imp_field *truth;              /* what `from_truth` targets are made with */
+    imp_field *truth; /* what `from_truth` targets are made with */
     struct imp_bend_options options;
     struct imp_bend_surface *surfaces;
     size_t n_surfaces, cap_surfaces;
     struct imp_bend_tap taps[16];
     size_t n_taps;
-    struct bend_frame *frames;     /* [bundles] */
-    struct imp_node **nodes;       /* [bundles] the <rays> it comes from */
+    struct bend_frame *frames; /* [bundles] */
+    struct imp_node **nodes;   /* [bundles] the <rays> it comes from */
     size_t cap_frames, cap_nodes;
 };
 
@@ -35,9 +38,11 @@ static inline imp_v3 bend_turn(const struct bend_frame *f, imp_v3 d)
 }
 
 /* A <volume>: grid, radial, a file or a profile. */
-enum imp_status bend_volume(struct bend_loader *l, struct imp_node *node, imp_field **out);
+enum imp_status bend_volume(struct bend_loader *l, struct imp_node *node,
+                            imp_field **out);
 /* A distance field that the bend keeps. */
-enum imp_status bend_sdf(struct bend_loader *l, struct imp_node *parent, const imp_field **out);
+enum imp_status bend_sdf(struct bend_loader *l, struct imp_node *parent,
+                         const imp_field **out);
 enum imp_status bend_medium(struct bend_loader *l, struct imp_node *node);
 /* Bounds, holds and smoothness: when the bend is there. */
 enum imp_status bend_rules(struct bend_loader *l, struct imp_node *node);
@@ -48,7 +53,8 @@ enum imp_status bend_surface(struct bend_loader *l, struct imp_node *node,
 enum imp_status bend_target(struct bend_loader *l, struct imp_node *node,
                             const struct bend_frame *f, int bundle);
 /* A float property that must be there, or have a fallback that is not NaN. */
-enum imp_status bend_number(struct bend_loader *l, struct imp_node *node, const char *name,
-                            double fallback, double lo, double hi, double *out);
+enum imp_status bend_number(struct bend_loader *l, struct imp_node *node,
+                            const char *name, double fallback, double lo, double hi,
+                            double *out);
 
 #endif

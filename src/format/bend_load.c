@@ -8,15 +8,17 @@
 #include "xml.h"
 #include <string.h>
 
-static const struct bend_frame world = {{0, 0, 0, 0}, {1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
+static const struct bend_frame world = {
+    {0, 0, 0, 0}, {1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
 
-enum imp_status bend_number(struct bend_loader *l, struct imp_node *node, const char *name,
-                            double fallback, double lo, double hi, double *out)
+enum imp_status bend_number(struct bend_loader *l, struct imp_node *node,
+                            const char *name, double fallback, double lo, double hi,
+                            double *out)
 {
     if (isnan(fallback) && !imp__props_has(node, name))
         return imp__node_error(l->ctx, node, IMP_E_SCENE, "needs the float '%s'", name);
-    const enum imp_status st = imp__props_float(l->ctx, node, name,
-                                                isnan(fallback) ? 0 : fallback, out);
+    const enum imp_status st =
+        imp__props_float(l->ctx, node, name, isnan(fallback) ? 0 : fallback, out);
     if (st != IMP_OK) return st;
     if (!(*out >= lo && *out <= hi))
         return imp__prop_error(l->ctx, node, imp__node_prop(node, name), IMP_E_SCENE,
@@ -24,8 +26,8 @@ enum imp_status bend_number(struct bend_loader *l, struct imp_node *node, const 
     return IMP_OK;
 }
 
-/* What `from_truth` targets want: the exits of the same rays through the other field, traced
- * well. */
+/* What `from_truth` targets want: the exits of the same rays through the other field,
+ * traced well. */
 static enum imp_status truth_trace(struct bend_loader *l, struct imp_bend_exit **out)
 {
     struct imp_bend_rays r;
@@ -62,8 +64,10 @@ static enum imp_status truth_apply(struct bend_loader *l)
         if (t->power >= 0) continue; /* marked by bend_target */
         t->power = -t->power;
         if (!l->truth)
-            IMP_TRY(imp__error(l->ctx, IMP_E_SCENE, "%s: a target from_truth, and no <volume "
-                               "name=\"truth\"> in the medium", l->scene->root->loc.file));
+            IMP_TRY(imp__error(l->ctx, IMP_E_SCENE,
+                               "%s: a target from_truth, and no <volume "
+                               "name=\"truth\"> in the medium",
+                               l->scene->root->loc.file));
         if (!e) IMP_TRY(truth_trace(l, &e));
         for (size_t k = t->first; k < t->last; k++) {
             struct imp__arrival a;
@@ -76,8 +80,12 @@ static enum imp_status truth_apply(struct bend_loader *l)
             case IMP_BEND_DIRECTIONS: value = a.d; break;
             case IMP_BEND_DEFLECTION: value = a.v - d0 * imp__dot(d0, a.v); break;
             case IMP_BEND_PATH: t->data[own] = a.path; continue;
-            case IMP_BEND_FOCUS: case IMP_BEND_SPOT: case IMP_BEND_DIRECTION:
-            case IMP_BEND_WAVEFRONT: case IMP_BEND_IMAGE: case IMP_BEND_FARFIELD:
+            case IMP_BEND_FOCUS:
+            case IMP_BEND_SPOT:
+            case IMP_BEND_DIRECTION:
+            case IMP_BEND_WAVEFRONT:
+            case IMP_BEND_IMAGE:
+            case IMP_BEND_FARFIELD:
             case IMP_BEND_SHAPE: break;
             }
             imp__v3_store(value, t->data + 3 * own);
@@ -89,7 +97,8 @@ out:
 }
 
 static enum imp_status each(struct bend_loader *l, struct imp_node *node, const char *tag,
-                            enum imp_status (*fn)(struct bend_loader *, struct imp_node *))
+                            enum imp_status (*fn)(struct bend_loader *,
+                                                  struct imp_node *))
 {
     for (size_t i = 0; i < node->n_children; i++) {
         struct imp_child *c = &node->children[i];
@@ -117,12 +126,14 @@ static enum imp_status build(struct bend_loader *l)
     for (size_t i = 0; i < root->n_children; i++) {
         struct imp_child *c = &root->children[i];
         if (strcmp(c->node->tag, "medium") != 0) continue;
-        if (medium) IMP_TRY(imp__node_error(l->ctx, c->node, IMP_E_SCENE, "is a second medium"));
+        if (medium)
+            IMP_TRY(imp__node_error(l->ctx, c->node, IMP_E_SCENE, "is a second medium"));
         medium = c->node;
         c->used = true;
     }
     if (!medium)
-        IMP_TRY(imp__node_error(l->ctx, root, IMP_E_SCENE, "has no <medium type=\"graded\">"));
+        IMP_TRY(imp__node_error(l->ctx, root, IMP_E_SCENE,
+                                "has no <medium type=\"graded\">"));
     IMP_TRY(bend_medium(l, medium));
     IMP_TRY(each(l, root, "surface", surface_of_all));
     IMP_TRY(each(l, medium, "surface", surface_of_all));
@@ -151,8 +162,9 @@ out:
     return st;
 }
 
-static enum imp_status load(imp_context *ctx, const struct imp_bytes *text, const char *name,
-                            const char *folder, const struct imp_load_options *o, imp_bend **out)
+static enum imp_status load(imp_context *ctx, const struct imp_bytes *text,
+                            const char *name, const char *folder,
+                            const struct imp_load_options *o, imp_bend **out)
 {
     enum imp_status st = IMP_OK;
     struct bend_loader l = {.ctx = ctx};
@@ -193,7 +205,8 @@ out:
 }
 
 enum imp_status imp_bend_load_string(imp_context *ctx, const char *xml, size_t length,
-                                     const char *name, const struct imp_load_options *options,
+                                     const char *name,
+                                     const struct imp_load_options *options,
                                      imp_bend **out)
 {
     struct imp_load_options o;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * <medium type="graded">: the index field from <volume>s, how rays step, what a fit may do. */
+ * <medium type="graded">: the index field from <volume>s, how rays step, what a fit may
+ * do. */
 #include "bend.h"
 #include "search.h"
 #include <string.h>
@@ -8,7 +9,8 @@
 static enum imp_status grid_read(struct bend_loader *l, struct imp_node *node,
                                  struct imp_field_grid *g)
 {
-    static const char *const interps[] = {"spline", "trilinear"}, *const params[] = {"eta", "eta2"};
+    static const char *const interps[] = {"spline", "trilinear"}, *const params[] = {
+                                                                      "eta", "eta2"};
     enum imp_status st = IMP_OK;
     int interp, param;
     bool single;
@@ -33,37 +35,43 @@ static enum imp_status grid_read(struct bend_loader *l, struct imp_node *node,
     }
     for (int k = 0; k < 3; k++) {
         if (!(cells[k] >= 1 && cells[k] <= 8192))
-            IMP_TRY(imp__prop_error(l->ctx, node, p, IMP_E_SCENE, "%g cells: 1 to 8192", cells[k]));
+            IMP_TRY(imp__prop_error(l->ctx, node, p, IMP_E_SCENE, "%g cells: 1 to 8192",
+                                    cells[k]));
         g->cells[k] = (int)cells[k];
     }
 out:
     return st;
 }
 
-static enum imp_status placed(struct bend_loader *l, struct imp_node *node, enum imp_status st)
+static enum imp_status placed(struct bend_loader *l, struct imp_node *node,
+                              enum imp_status st)
 {
     if (st == IMP_OK || st == IMP_E_NOMEM) return st;
     char message[900]; /* the message that is there, with the place before it */
     strncpy(message, imp_last_error(l->ctx), sizeof message - 1);
     message[sizeof message - 1] = 0;
-    return imp__node_error(l->ctx, node, st == IMP_E_IO ? st : IMP_E_SCENE, "%s", message);
+    return imp__node_error(l->ctx, node, st == IMP_E_IO ? st : IMP_E_SCENE, "%s",
+                           message);
 }
 
 /* Coefficients of a grid from another field: its values, through a spline's samples. */
-static enum imp_status grid_sample(struct bend_loader *l, imp_field *grid, const imp_field *from)
+static enum imp_status grid_sample(struct bend_loader *l, imp_field *grid,
+                                   const imp_field *from)
 {
     struct imp_field_grid g;
     enum imp_status st = imp_field_get_grid(grid, &g);
-    const size_t m[3] = {(size_t)g.cells[0] + 1, (size_t)g.cells[1] + 1, (size_t)g.cells[2] + 1};
+    const size_t m[3] = {(size_t)g.cells[0] + 1, (size_t)g.cells[1] + 1,
+                         (size_t)g.cells[2] + 1};
     double *samples = imp__alloc(l->ctx, m[0] * m[1] * m[2], sizeof *samples);
     if (!samples) return imp__error(l->ctx, IMP_E_NOMEM, "no memory for samples");
     size_t at = 0;
     for (size_t k = 0; k < m[2]; k++)
         for (size_t j = 0; j < m[1]; j++)
             for (size_t i = 0; i < m[0]; i++) {
-                const double x[3] = {g.lo[0] + (g.hi[0] - g.lo[0]) * (double)i / g.cells[0],
-                                     g.lo[1] + (g.hi[1] - g.lo[1]) * (double)j / g.cells[1],
-                                     g.lo[2] + (g.hi[2] - g.lo[2]) * (double)k / g.cells[2]};
+                const double x[3] = {
+                    g.lo[0] + (g.hi[0] - g.lo[0]) * (double)i / g.cells[0],
+                    g.lo[1] + (g.hi[1] - g.lo[1]) * (double)j / g.cells[1],
+                    g.lo[2] + (g.hi[2] - g.lo[2]) * (double)k / g.cells[2]};
                 imp_field_eval(from, x, &samples[at++], NULL, NULL);
             }
     if (st == IMP_OK) st = imp_field_set_samples(grid, samples);
@@ -91,25 +99,29 @@ static enum imp_status profile_build(struct bend_loader *l, struct imp_node *nod
     const double z[3] = {0, 0, 1}, zero[3] = {0};
     const size_t n = imp_field_profile_count(node->type);
     if (n == 0)
-        IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE,
-                                "is of no known type: there are grid, radial, constant, "
-                                "luneburg, maxwell, rod, rod-vendor, rod-power, sech, plume, "
-                                "polynomial, axial, linear"));
+        IMP_TRY(
+            imp__node_error(l->ctx, node, IMP_E_SCENE,
+                            "is of no known type: there are grid, radial, constant, "
+                            "luneburg, maxwell, rod, rod-vendor, rod-power, sech, plume, "
+                            "polynomial, axial, linear"));
     for (size_t i = 0; i < n - 3; i++) {
         const char *name = imp__profile_param(node->type, i);
-        const bool optional = i > 0 && (name[0] == 'n' || name[0] == 'h'); /* coefficients */
-        IMP_TRY(bend_number(l, node, name, optional ? 0 : NAN, -1e300, 1e300, &params[i]));
+        const bool optional =
+            i > 0 && (name[0] == 'n' || name[0] == 'h'); /* coefficients */
+        IMP_TRY(
+            bend_number(l, node, name, optional ? 0 : NAN, -1e300, 1e300, &params[i]));
     }
     IMP_TRY(imp__props_vector(l->ctx, node, "centre", zero, centre));
     IMP_TRY(imp__props_vector(l->ctx, node, "axis", z, axis));
     for (int k = 0; k < 3; k++) params[n - 3 + (size_t)k] = centre[k];
-    IMP_TRY(placed(l, node, imp_field_profile_create(l->ctx, node->type, params, axis, out)));
+    IMP_TRY(
+        placed(l, node, imp_field_profile_create(l->ctx, node->type, params, axis, out)));
 out:
     return st;
 }
 
-static enum imp_status radial_build(struct bend_loader *l, struct imp_node *node, double index,
-                                    imp_field **out)
+static enum imp_status radial_build(struct bend_loader *l, struct imp_node *node,
+                                    double index, imp_field **out)
 {
     enum imp_status st = IMP_OK;
     struct imp_field_radial r = IMP_FIELD_RADIAL_INIT;
@@ -146,11 +158,12 @@ enum imp_status bend_volume(struct bend_loader *l, struct imp_node *node, imp_fi
             IMP_TRY(placed(l, node, imp__search(l->scene, NULL, file, &path)));
             IMP_TRY(placed(l, node, imp_field_read(l->ctx, path, grid ? &g : NULL, &f)));
             if (imp__field_is_grid(f) != grid)
-                IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "%s holds a %s field", file,
-                                        imp_field_kind(f)));
+                IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "%s holds a %s field",
+                                        file, imp_field_kind(f)));
         } else {
             IMP_TRY(bend_number(l, node, "index", 1, 1e-6, 1e6, &index));
-            if (grid) IMP_TRY(placed(l, node, imp_field_grid_create(l->ctx, &g, index, &f)));
+            if (grid)
+                IMP_TRY(placed(l, node, imp_field_grid_create(l->ctx, &g, index, &f)));
             else IMP_TRY(radial_build(l, node, index, &f));
         }
         struct imp_node *from = grid ? volume_child(node, "start") : NULL;
@@ -168,16 +181,19 @@ out:
     return st;
 }
 
-enum imp_status bend_sdf(struct bend_loader *l, struct imp_node *parent, const imp_field **out)
+enum imp_status bend_sdf(struct bend_loader *l, struct imp_node *parent,
+                         const imp_field **out)
 {
     imp_bend *b = l->bend;
     imp_field *f;
     struct imp_node *node = volume_child(parent, NULL);
     if (!node)
-        return imp__node_error(l->ctx, parent, IMP_E_SCENE, "needs a <volume> of distances");
+        return imp__node_error(l->ctx, parent, IMP_E_SCENE,
+                               "needs a <volume> of distances");
     const enum imp_status st = bend_volume(l, node, &f);
     if (st != IMP_OK) return st;
-    void *grown = imp__grow(l->ctx, b->sdfs, &b->cap_sdfs, b->n_sdfs + 1, sizeof *b->sdfs);
+    void *grown =
+        imp__grow(l->ctx, b->sdfs, &b->cap_sdfs, b->n_sdfs + 1, sizeof *b->sdfs);
     if (!grown) {
         imp_field_destroy(f);
         return imp__error(l->ctx, IMP_E_NOMEM, "no memory for a distance field");
@@ -190,8 +206,8 @@ enum imp_status bend_sdf(struct bend_loader *l, struct imp_node *parent, const i
 
 enum imp_status bend_medium(struct bend_loader *l, struct imp_node *node)
 {
-    static const char *const schemes[] = {"leapfrog", "euler", "verlet", "yoshida4", "arc",
-                                          "arc-index"};
+    static const char *const schemes[] = {"leapfrog", "euler", "verlet",
+                                          "yoshida4", "arc",   "arc-index"};
     static const char *const ways[] = {"reverse", "stored", "pseudo"};
     enum imp_status st = IMP_OK;
     imp_field *parts[64], *field = NULL;
@@ -203,7 +219,8 @@ enum imp_status bend_medium(struct bend_loader *l, struct imp_node *node)
     struct imp_bend_options *o = &l->options;
     *o = (struct imp_bend_options)IMP_BEND_OPTIONS_INIT;
     if (strcmp(node->type, "graded") != 0)
-        IMP_TRY(imp__node_error(l->ctx, node, IMP_E_UNSUPPORTED, "is not of type 'graded'"));
+        IMP_TRY(
+            imp__node_error(l->ctx, node, IMP_E_UNSUPPORTED, "is not of type 'graded'"));
     for (size_t i = 0; i < node->n_children; i++) {
         struct imp_child *c = &node->children[i];
         if (strcmp(c->node->tag, "volume") != 0) continue;
@@ -213,7 +230,8 @@ enum imp_status bend_medium(struct bend_loader *l, struct imp_node *node)
             continue;
         }
         if (n == imp_count(parts))
-            IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "has more than 64 volumes"));
+            IMP_TRY(
+                imp__node_error(l->ctx, node, IMP_E_SCENE, "has more than 64 volumes"));
         IMP_TRY(bend_volume(l, c->node, &parts[n]));
         n++;
     }
@@ -265,7 +283,8 @@ enum imp_status bend_rules(struct bend_loader *l, struct imp_node *node)
     IMP_TRY(imp__props_int(l->ctx, node, "hold_rim", 0, 0, 1000, &layers));
     IMP_TRY(bend_number(l, node, "hold_outside", 0, 0, 1e300, &radius));
     IMP_TRY(imp__props_vector(l->ctx, node, "hold_centre", zero, centre));
-    if (layers > 0) IMP_TRY(placed(l, node, imp_bend_hold_rim(l->bend, (int)layers, value)));
+    if (layers > 0)
+        IMP_TRY(placed(l, node, imp_bend_hold_rim(l->bend, (int)layers, value)));
     if (radius > 0)
         IMP_TRY(placed(l, node, imp_bend_hold_outside(l->bend, centre, radius, value)));
     IMP_TRY(bend_number(l, node, "smoothness", 0, 0, 1e300, &weight));
@@ -287,8 +306,9 @@ enum imp_status bend_rules(struct bend_loader *l, struct imp_node *node)
             IMP_TRY(imp_bend_hold_number(l->bend, i, NAN));
         }
         if (!met)
-            IMP_TRY(imp__prop_error(l->ctx, node, imp__node_prop(node, "hold"), IMP_E_SCENE,
-                                    "no number of the field is called '%.*s'", (int)len, s));
+            IMP_TRY(
+                imp__prop_error(l->ctx, node, imp__node_prop(node, "hold"), IMP_E_SCENE,
+                                "no number of the field is called '%.*s'", (int)len, s));
         s += len;
     }
 out:

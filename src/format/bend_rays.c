@@ -1,20 +1,21 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * <rays>, <surface> and <target>. Rays come in bundles, each with a frame: its z runs along
- * the beam (or from a point source to the centre), and what stands inside <rays> is written
- * in that frame, once for all bundles of the element. */
+ * <rays>, <surface> and <target>. Rays come in bundles, each with a frame: its z runs
+ * along the beam (or from a point source to the centre), and what stands inside <rays> is
+ * written in that frame, once for all bundles of the element. */
 #include "bend.h"
 #include "search.h"
 #include <string.h>
 
 #define GOLDEN_ANGLE 2.39996322972865332
-#define RAYS_MAX 100000000
+#define RAYS_MAX     100000000
 
 /* Axes so that x and y are those of the world for z = (0, 0, 1). */
 static struct bend_frame frame_of(imp_v3 origin, imp_v3 direction)
 {
     struct bend_frame f = {.o = origin, .n = imp__normalize(direction)};
-    const imp_v3 up = fabs(f.n[1]) < 0.999 ? imp__v3(0, 1, 0) : imp__v3(0, 0, -copysign(1, f.n[1]));
+    const imp_v3 up =
+        fabs(f.n[1]) < 0.999 ? imp__v3(0, 1, 0) : imp__v3(0, 0, -copysign(1, f.n[1]));
     f.s = imp__normalize(imp__cross(up, f.n));
     f.t = imp__cross(f.n, f.s);
     return f;
@@ -24,7 +25,8 @@ static struct bend_frame frame_of(imp_v3 origin, imp_v3 direction)
 static imp_v3 sphere_point(int64_t i, int64_t n)
 {
     const double z = 1 - (2 * (double)i + 1) / (double)n, r = sqrt(fmax(0, 1 - z * z));
-    return imp__v3(r * cos(GOLDEN_ANGLE * (double)i), r * sin(GOLDEN_ANGLE * (double)i), z);
+    return imp__v3(r * cos(GOLDEN_ANGLE * (double)i), r * sin(GOLDEN_ANGLE * (double)i),
+                   z);
 }
 
 enum pattern { DISC, GRID, FAN };
@@ -54,8 +56,8 @@ struct bundle {
     double radius, start, on_sphere, angle;
 };
 
-static void bundle_rays(const struct bundle *b, const struct bend_frame *f, double (*x)[3],
-                        double (*d)[3])
+static void bundle_rays(const struct bundle *b, const struct bend_frame *f,
+                        double (*x)[3], double (*d)[3])
 {
     for (int64_t i = 0; i < b->count; i++) {
         const imp_v3 q = pattern_point(b->pattern, i, b->count);
@@ -73,7 +75,8 @@ static void bundle_rays(const struct bundle *b, const struct bend_frame *f, doub
         } else {
             p = q * b->radius;
             const double r2 = imp__dot(p, p);
-            p[2] = b->on_sphere > 0 ? -sqrt(fmax(0, b->on_sphere * b->on_sphere - r2)) : b->start;
+            p[2] = b->on_sphere > 0 ? -sqrt(fmax(0, b->on_sphere * b->on_sphere - r2))
+                                    : b->start;
         }
         imp__v3_store(bend_place(f, p), x[i]);
         imp__v3_store(bend_turn(f, v), d[i]);
@@ -84,18 +87,18 @@ static enum imp_status bundle_add(struct bend_loader *l, struct imp_node *node,
                                   const struct bundle *b, const struct bend_frame *f)
 {
     enum imp_status st = IMP_OK;
-    double (*x)[3] = imp__alloc(l->ctx, (size_t)b->count, sizeof *x);
-    double (*d)[3] = imp__alloc(l->ctx, (size_t)b->count, sizeof *d);
+    double(*x)[3] = imp__alloc(l->ctx, (size_t)b->count, sizeof *x);
+    double(*d)[3] = imp__alloc(l->ctx, (size_t)b->count, sizeof *d);
     int bundle;
     if (!x || !d) IMP_TRY(imp__error(l->ctx, IMP_E_NOMEM, "no memory for rays"));
     bundle_rays(b, f, x, d);
-    IMP_TRY(imp_bend_add_rays(l->bend, (size_t)b->count, (const double (*)[3])x,
-                              (const double (*)[3])d, NULL, &bundle));
+    IMP_TRY(imp_bend_add_rays(l->bend, (size_t)b->count, (const double(*)[3])x,
+                              (const double(*)[3])d, NULL, &bundle));
     void *grown = imp__grow(l->ctx, l->frames, &l->cap_frames, (size_t)bundle + 1,
                             sizeof *l->frames);
     if (grown) l->frames = grown;
-    void *nodes = imp__grow(l->ctx, l->nodes, &l->cap_nodes, (size_t)bundle + 1,
-                            sizeof *l->nodes);
+    void *nodes =
+        imp__grow(l->ctx, l->nodes, &l->cap_nodes, (size_t)bundle + 1, sizeof *l->nodes);
     if (nodes) l->nodes = nodes;
     if (!grown || !nodes) IMP_TRY(imp__error(l->ctx, IMP_E_NOMEM, "no memory for rays"));
     l->frames[bundle] = *f;
@@ -123,7 +126,8 @@ enum imp_status bend_rays(struct bend_loader *l, struct imp_node *node)
     int pattern;
     b.point = strcmp(node->type, "point") == 0;
     if (!b.point && strcmp(node->type, "beam") != 0)
-        IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "is of no known type: there are beam "
+        IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE,
+                                "is of no known type: there are beam "
                                 "and point"));
     IMP_TRY(imp__props_choice(l->ctx, node, "pattern", patterns, 3, 0, &pattern));
     IMP_TRY(imp__props_int(l->ctx, node, "count", 1000, 1, RAYS_MAX, &b.count));
@@ -140,8 +144,10 @@ enum imp_status bend_rays(struct bend_loader *l, struct imp_node *node)
         IMP_TRY(bend_number(l, node, "radius", 1, 0, 1e300, &b.radius));
         IMP_TRY(bend_number(l, node, "on_sphere", 0, 0, 1e300, &b.on_sphere));
         if (b.on_sphere > 0 && b.on_sphere < b.radius)
-            IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "starts on a sphere of radius %g "
-                                    "and is %g wide", b.on_sphere, b.radius));
+            IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE,
+                                    "starts on a sphere of radius %g "
+                                    "and is %g wide",
+                                    b.on_sphere, b.radius));
     }
     if (!(imp__length(imp__v3_load(direction)) > 0))
         IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "has no direction"));
@@ -174,14 +180,15 @@ static enum imp_status mesh_load(struct bend_loader *l, struct imp_node *node,
     IMP_TRY(imp__search(l->scene, NULL, file, &path));
     const size_t n = strlen(path);
     IMP_TRY(imp_scene_create(l->ctx, NULL, &scene));
-    imp_scene_begin(scene, "shape", n > 4 && strcmp(path + n - 4, ".obj") == 0 ? "obj" : "ply",
-                    NULL, NULL);
+    imp_scene_begin(scene, "shape",
+                    n > 4 && strcmp(path + n - 4, ".obj") == 0 ? "obj" : "ply", NULL,
+                    NULL);
     imp_scene_string(scene, "filename", path);
     imp_scene_bool(scene, "face_normals", 1);
     imp_scene_end(scene);
     IMP_TRY(imp_scene_commit(scene));
-    void *grown = imp__grow(l->ctx, b->scenes, &b->cap_scenes, b->n_scenes + 1,
-                            sizeof *b->scenes);
+    void *grown =
+        imp__grow(l->ctx, b->scenes, &b->cap_scenes, b->n_scenes + 1, sizeof *b->scenes);
     if (!grown) IMP_TRY(imp__error(l->ctx, IMP_E_NOMEM, "no memory for a mesh"));
     b->scenes = grown;
     b->scenes[b->n_scenes++] = scene;
@@ -192,25 +199,27 @@ out:
     return st;
 }
 
-/* ---- Surfaces --------------------------------------------------------------------------- */
+/* ---- Surfaces ------------------------------------------------------------------ */
 
 enum imp_status bend_surface(struct bend_loader *l, struct imp_node *node,
                              const struct bend_frame *f, int group)
 {
-    static const char *const types[] = {"plane", "sphere", "cylinder", "disc", "box",
-                                        "distance", "closest-approach", "mesh"};
+    static const char *const types[] = {"plane", "sphere",   "cylinder",         "disc",
+                                        "box",   "distance", "closest-approach", "mesh"};
     static const char *const events[] = {"end", "refract", "mirror", "stop", "tap"};
     enum imp_status st = IMP_OK;
     struct imp_bend_surface s = IMP_BEND_SURFACE_INIT;
-    const double z[3] = {0, 0, 1}, zero[3] = {0}, minus[3] = {-1, -1, -1}, one[3] = {1, 1, 1};
+    const double z[3] = {0, 0, 1}, zero[3] = {0}, minus[3] = {-1, -1, -1},
+                 one[3] = {1, 1, 1};
     double normal[3], centre[3];
     int event, type = -1;
     for (int k = 0; k < 8; k++)
         if (strcmp(node->type, types[k]) == 0) type = k;
     if (type < 0)
-        IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE,
-                                "is of no known type: there are plane, sphere, cylinder, disc, "
-                                "box, distance, closest-approach, mesh"));
+        IMP_TRY(imp__node_error(
+            l->ctx, node, IMP_E_SCENE,
+            "is of no known type: there are plane, sphere, cylinder, disc, "
+            "box, distance, closest-approach, mesh"));
     IMP_TRY(imp__props_choice(l->ctx, node, "event", events, 5, 0, &event));
     s.type = (enum imp_bend_surface_type)type;
     s.event = event == 4 ? IMP_BEND_END : (enum imp_bend_event)event;
@@ -223,7 +232,10 @@ enum imp_status bend_surface(struct bend_loader *l, struct imp_node *node,
         IMP_TRY(imp__props_vector(l->ctx, node, "normal", z, normal));
         imp__v3_store(bend_turn(f, imp__v3_load(normal)), s.normal);
         break;
-    case IMP_BEND_SPHERE: case IMP_BEND_BOX: case IMP_BEND_SDF: case IMP_BEND_APPROACH:
+    case IMP_BEND_SPHERE:
+    case IMP_BEND_BOX:
+    case IMP_BEND_SDF:
+    case IMP_BEND_APPROACH:
     case IMP_BEND_MESH: break;
     }
     switch (s.type) {
@@ -231,7 +243,8 @@ enum imp_status bend_surface(struct bend_loader *l, struct imp_node *node,
         const double length = imp__length(imp__v3_load(s.normal));
         IMP_TRY(bend_number(l, node, "offset", 0, -1e300, 1e300, &s.offset));
         s.offset += imp__dot(imp__v3_load(s.normal), f->o);
-        if (!(length > 0)) IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "has no normal"));
+        if (!(length > 0))
+            IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "has no normal"));
         break;
     }
     case IMP_BEND_SPHERE:
@@ -245,7 +258,8 @@ enum imp_status bend_surface(struct bend_loader *l, struct imp_node *node,
         break;
     case IMP_BEND_BOX:
         if (group >= 0)
-            IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "is a box, which cannot turn "
+            IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE,
+                                    "is a box, which cannot turn "
                                     "with the rays: put it into the medium"));
         IMP_TRY(imp__props_vector(l->ctx, node, "lo", minus, s.lo));
         IMP_TRY(imp__props_vector(l->ctx, node, "hi", one, s.hi));
@@ -256,7 +270,8 @@ enum imp_status bend_surface(struct bend_loader *l, struct imp_node *node,
     IMP_TRY(imp__props_finish(l->ctx, node));
     if (event == 4) {
         if (s.type != IMP_BEND_PLANE || l->n_taps >= imp_count(l->taps))
-            IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "taps are planes, at most 16"));
+            IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE,
+                                    "taps are planes, at most 16"));
         struct imp_bend_tap *t = &l->taps[l->n_taps++];
         memcpy(t->normal, s.normal, sizeof t->normal);
         t->offset = s.offset;
@@ -272,11 +287,12 @@ out:
     return st;
 }
 
-/* ---- Targets ---------------------------------------------------------------------------- */
+/* ---- Targets ------------------------------------------------------------------- */
 
 /* Picture or numbers of a target from its file. */
-static enum imp_status target_file(struct bend_loader *l, struct imp_node *node, const char *file,
-                                   bool image, struct imp_bend_target *t, imp_film **film,
+static enum imp_status target_file(struct bend_loader *l, struct imp_node *node,
+                                   const char *file, bool image,
+                                   struct imp_bend_target *t, imp_film **film,
                                    double **data, float **pixels)
 {
     enum imp_status st = IMP_OK;
@@ -302,8 +318,10 @@ static enum imp_status target_file(struct bend_loader *l, struct imp_node *node,
     const size_t last = t->bundle < 0 ? l->bend->n : l->bend->bundle_first[t->bundle + 1];
     const size_t each = t->type == IMP_BEND_PATH ? 1 : 3;
     if (n * c != (last - first) * each)
-        IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "%s holds %zu numbers, %zu rays need "
-                                "%zu each", file, n * c, last - first, each));
+        IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE,
+                                "%s holds %zu numbers, %zu rays need "
+                                "%zu each",
+                                file, n * c, last - first, each));
     *data = imp__alloc(l->ctx, n * c, sizeof **data);
     if (!*data) IMP_TRY(imp__error(l->ctx, IMP_E_NOMEM, "%s: no memory", file));
     for (size_t i = 0; i < n * c; i++) (*data)[i] = p[i];
@@ -316,12 +334,12 @@ enum imp_status bend_target(struct bend_loader *l, struct imp_node *node,
                             const struct bend_frame *f, int bundle)
 {
     static const char *const types[IMP_BEND_N_TARGETS] = {
-        "focus", "spot", "points", "direction", "directions", "deflection", "path", "wavefront",
-        "image", "far-field", "shape"};
+        "focus", "spot",      "points", "direction", "directions", "deflection",
+        "path",  "wavefront", "image",  "far-field", "shape"};
     enum imp_status st = IMP_OK;
     struct imp_bend_target t = IMP_BEND_TARGET_INIT;
-    const double z[3] = {0, 0, 1}, zero[3] = {0}, corner[3] = {-1, 1, 0}, right[3] = {2, 0, 0},
-                 down[3] = {0, -2, 0};
+    const double z[3] = {0, 0, 1}, zero[3] = {0}, corner[3] = {-1, 1, 0},
+                 right[3] = {2, 0, 0}, down[3] = {0, -2, 0};
     double normal[3], point[3], origin[3], u[3], v[3];
     const char *file;
     imp_film *film = NULL;
@@ -333,10 +351,11 @@ enum imp_status bend_target(struct bend_loader *l, struct imp_node *node,
     for (int k = 0; k < IMP_BEND_N_TARGETS; k++)
         if (strcmp(node->type, types[k]) == 0) type = k;
     if (type < 0)
-        IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE,
-                                "is of no known type: there are focus, spot, points, direction, "
-                                "directions, deflection, path, wavefront, image, far-field, "
-                                "shape"));
+        IMP_TRY(imp__node_error(
+            l->ctx, node, IMP_E_SCENE,
+            "is of no known type: there are focus, spot, points, direction, "
+            "directions, deflection, path, wavefront, image, far-field, "
+            "shape"));
     t.type = (enum imp_bend_target_type)type;
     t.bundle = bundle;
     const bool image = t.type == IMP_BEND_IMAGE || t.type == IMP_BEND_FARFIELD;
@@ -346,13 +365,15 @@ enum imp_status bend_target(struct bend_loader *l, struct imp_node *node,
     t.at_plane = imp__props_has(node, "plane");
     IMP_TRY(bend_number(l, node, "plane", 0, -1e300, 1e300, &t.offset));
     IMP_TRY(imp__props_vector(l->ctx, node, "normal", z, normal));
-    IMP_TRY(bend_number(l, node, "index", l->options.outside_index, 1e-6, 1e6, &t.outside));
+    IMP_TRY(
+        bend_number(l, node, "index", l->options.outside_index, 1e-6, 1e6, &t.outside));
     IMP_TRY(imp__props_vector(l->ctx, node, "point", zero, point));
     imp__v3_store(bend_turn(f, imp__v3_load(normal)), t.normal);
     t.offset += imp__dot(imp__v3_load(t.normal), f->o);
     const bool directions = t.type == IMP_BEND_DIRECTION;
     imp__v3_store(directions ? bend_turn(f, imp__v3_load(point))
-                             : bend_place(f, imp__v3_load(point)), t.point);
+                             : bend_place(f, imp__v3_load(point)),
+                  t.point);
     IMP_TRY(imp__props_bool(l->ctx, node, "from_truth", false, &from_truth));
     IMP_TRY(imp__props_string(l->ctx, node, "filename", NULL, &file));
     if (image) {
@@ -365,16 +386,19 @@ enum imp_status bend_target(struct bend_loader *l, struct imp_node *node,
             IMP_TRY(bend_number(l, node, "plane", 0, -1e300, 1e300, &p));
             o[2] = p;
         }
-        imp__v3_store(t.type == IMP_BEND_FARFIELD ? bend_turn(f, o) : bend_place(f, o), t.origin);
+        imp__v3_store(t.type == IMP_BEND_FARFIELD ? bend_turn(f, o) : bend_place(f, o),
+                      t.origin);
         imp__v3_store(bend_turn(f, imp__v3_load(u)), t.u);
         imp__v3_store(bend_turn(f, imp__v3_load(v)), t.v);
-        if (!file) IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "needs a 'filename'"));
+        if (!file)
+            IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "needs a 'filename'"));
     }
     if (file) IMP_TRY(target_file(l, node, file, image, &t, &film, &data, &pixels));
     if (t.type == IMP_BEND_SHAPE) IMP_TRY(bend_sdf(l, node, &t.sdf));
     IMP_TRY(imp__props_finish(l->ctx, node));
-    const size_t n = bundle < 0 ? l->bend->n
-                                : l->bend->bundle_first[bundle + 1] - l->bend->bundle_first[bundle];
+    const size_t n =
+        bundle < 0 ? l->bend->n
+                   : l->bend->bundle_first[bundle + 1] - l->bend->bundle_first[bundle];
     if (from_truth && !t.data) { /* filled when all is there */
         data = imp__alloc(l->ctx, 3 * n, sizeof *data);
         if (!data) IMP_TRY(imp__error(l->ctx, IMP_E_NOMEM, "no memory for a target"));

@@ -24,7 +24,7 @@ void imp__exr_end(struct imp_exr *io);
 /* The library's message, as ours. */
 enum imp_status imp__exr_error(const struct imp_exr *io, exr_result_t code);
 
-#define IMP_EXR_SPP "importon.spp"
+#define IMP_EXR_SPP     "importon.spp"
 #define IMP_EXR_DROPPED "importon.dropped"
 
 #endif

@@ -172,10 +172,8 @@ static enum imp_status chunk_read(struct exr_reader *r, const exr_chunk_info_t *
         x + chunk->width > r->width || y + chunk->height > r->height)
         IMP_TRY(imp__error(r->io->ctx, IMP_E_SCENE, "%s: a block leaves the picture",
                            r->io->name));
-    if (*open)
-        EXR(exr_decoding_update(r->exr, 0, chunk, pipe));
-    else
-        EXR(exr_decoding_initialize(r->exr, 0, chunk, pipe));
+    if (*open) EXR(exr_decoding_update(r->exr, 0, chunk, pipe));
+    else EXR(exr_decoding_initialize(r->exr, 0, chunk, pipe));
     const size_t c = (size_t)r->film->channels;
     for (int i = 0; i < pipe->channel_count; i++) {
         exr_coding_channel_info_t *to = &pipe->channels[i];
@@ -249,8 +247,7 @@ static enum imp_status texts_read(struct exr_reader *r)
         } else if (strcmp(a->name, IMP_EXR_DROPPED) == 0 &&
                    imp__integer(&s, end, &value)) {
             r->film->dropped = (uint64_t)imp_max(value, (int64_t)0);
-        } else
-            IMP_TRY(imp_film_set_text(r->film, a->name, a->string->str));
+        } else IMP_TRY(imp_film_set_text(r->film, a->name, a->string->str));
     }
 out:
     return st;

@@ -13,7 +13,7 @@
         if (code_ != EXR_ERR_SUCCESS) IMP_TRY(imp__exr_error(w->io, code_));             \
     } while (0)
 
-#define HALF_MAX 65504.0f
+#define HALF_MAX  65504.0f
 #define NAME_ROOM 256
 
 struct exr_writer {
@@ -68,9 +68,9 @@ out:
     return st;
 }
 
-/* A chunk as long as its pixels is read as not compressed. OpenEXR 3.1 stores the pixels only
- * where ZIP makes them longer: at equal length it leaves the ZIP stream, which readers then
- * take for pixels. */
+/* A chunk as long as its pixels is read as not compressed. OpenEXR 3.1 stores the pixels
+ * only where ZIP makes them longer: at equal length it leaves the ZIP stream, which
+ * readers then take for pixels. */
 static exr_result_t compress(exr_encode_pipeline_t *pipe)
 {
     const struct exr_writer *w = pipe->encoding_user_data;
@@ -91,10 +91,8 @@ static enum imp_status pixels_write(struct exr_writer *w)
     for (int y = 0; y < f->height; y += lines) {
         exr_chunk_info_t chunk;
         EXR(exr_write_scanline_chunk_info(w->exr, 0, y, &chunk));
-        if (y == 0)
-            EXR(exr_encoding_initialize(w->exr, 0, &chunk, &pipe));
-        else
-            EXR(exr_encoding_update(w->exr, 0, &chunk, &pipe));
+        if (y == 0) EXR(exr_encoding_initialize(w->exr, 0, &chunk, &pipe));
+        else EXR(exr_encoding_update(w->exr, 0, &chunk, &pipe));
         for (int i = 0; i < pipe.channel_count; i++) {
             exr_coding_channel_info_t *from = &pipe.channels[i];
             const char *name = from->channel_name;

@@ -7,7 +7,7 @@
 #include <string.h>
 #include <strings.h>
 
-/* ---- PNG previews ------------------------------------------------------------------ */
+/* ---- PNG previews -------------------------------------------------------------- */
 
 static unsigned char byte(double c)
 {
@@ -55,10 +55,8 @@ static double signed_range(const imp_film *f, const struct imp_pick *pick)
         const double middle = (lo + hi) / 2;
         size_t above = 0;
         for (size_t i = 0; i < n; i++) above += fabs(signed_value(f, pick, i)) > middle;
-        if (above > n / 200)
-            lo = middle;
-        else
-            hi = middle;
+        if (above > n / 200) lo = middle;
+        else hi = middle;
     }
     return hi > 0 ? hi : 1;
 }
@@ -87,17 +85,15 @@ static enum imp_status preview_encode(const imp_film *f,
     unsigned char *to =
         imp__alloc(f->ctx, (size_t)f->width * (size_t)f->height, (size_t)channels);
     if (!to) return imp__error(f->ctx, IMP_E_NOMEM, "PNG: no memory for the picture");
-    if (o->diverging)
-        diverge(f, &pick, o->range, to);
-    else
-        preview(f, &pick, o->exposure, to);
+    if (o->diverging) diverge(f, &pick, o->range, to);
+    else preview(f, &pick, o->exposure, to);
     const enum imp_status st =
         imp__png_encode(f->ctx, f->width, f->height, channels, to, out);
     imp__release(f->ctx, to);
     return st;
 }
 
-/* ---- Public calls ------------------------------------------------------------------ */
+/* ---- Public calls -------------------------------------------------------------- */
 
 static bool ends_with(const char *path, const char *extension)
 {
@@ -120,16 +116,11 @@ enum imp_status imp_film_write(const imp_film *f, const char *path,
 
     struct imp_bytes bytes = {0};
     enum imp_status st;
-    if (ends_with(path, ".exr"))
-        st = imp__exr_encode(f, &o, &bytes);
-    else if (ends_with(path, ".png"))
-        st = preview_encode(f, &o, &bytes);
-    else if (ends_with(path, ".pfm"))
-        st = imp__pfm_encode(f, &bytes);
-    else if (ends_with(path, ".npy"))
-        st = imp__npy_encode(f, &bytes);
-    else if (ends_with(path, ".hdr"))
-        st = imp__hdr_encode(f, &bytes);
+    if (ends_with(path, ".exr")) st = imp__exr_encode(f, &o, &bytes);
+    else if (ends_with(path, ".png")) st = preview_encode(f, &o, &bytes);
+    else if (ends_with(path, ".pfm")) st = imp__pfm_encode(f, &bytes);
+    else if (ends_with(path, ".npy")) st = imp__npy_encode(f, &bytes);
+    else if (ends_with(path, ".hdr")) st = imp__hdr_encode(f, &bytes);
     else
         return imp__error(ctx, IMP_E_ARG,
                           "%s: the name must end in .exr, .png, .pfm, .hdr or .npy",

@@ -71,10 +71,8 @@ static bool component_read(struct hdr *h, unsigned char *to)
         if (run) n -= 128;
         if (n == 0 || n > h->width - x || (!run && (size_t)(h->end - h->at) < n))
             return false;
-        if (run)
-            memset(to + x, *h->at, n);
-        else
-            memcpy(to + x, h->at, n);
+        if (run) memset(to + x, *h->at, n);
+        else memcpy(to + x, h->at, n);
         h->at += run ? 1 : n;
         x += n;
     }
@@ -141,8 +139,7 @@ static void pixel_pack(const double rgb[3], unsigned char to[4])
         const double scale = frexp(most, &e) * 256 / most;
         for (int k = 0; k < 3; k++) to[k] = (unsigned char)imp_min(c[k] * scale, 255.0);
         to[3] = (unsigned char)(e + 128);
-    } else
-        memset(to, 0, 4);
+    } else memset(to, 0, 4);
 }
 
 enum imp_status imp__hdr_encode(const imp_film *f, struct imp_bytes *out)

@@ -128,13 +128,11 @@ enum imp_status imp__png_parse(imp_context *ctx, const char *name,
                                      on_allocate, on_free);
     j.info = j.png ? png_create_info_struct(j.png) : NULL;
     enum imp_status st = IMP_OK;
-    if (!j.info)
-        st = imp__error(ctx, IMP_E_NOMEM, "%s: out of memory", name);
+    if (!j.info) st = imp__error(ctx, IMP_E_NOMEM, "%s: out of memory", name);
     else if (decode(&j)) {
         *out = j.film;
         j.film = NULL;
-    } else
-        st = job_error(&j);
+    } else st = job_error(&j);
     png_destroy_read_struct(&j.png, &j.info, NULL);
     job_close(&j);
     return st;
@@ -167,14 +165,10 @@ enum imp_status imp__png_encode(imp_context *ctx, int width, int height, int cha
                                       on_allocate, on_free);
     j.info = j.png ? png_create_info_struct(j.png) : NULL;
     enum imp_status st = IMP_OK;
-    if (!j.info)
-        st = imp__error(ctx, IMP_E_NOMEM, "PNG: out of memory");
-    else if (!encode(&j, width, height, channels, pixels))
-        st = job_error(&j);
+    if (!j.info) st = imp__error(ctx, IMP_E_NOMEM, "PNG: out of memory");
+    else if (!encode(&j, width, height, channels, pixels)) st = job_error(&j);
     png_destroy_write_struct(&j.png, &j.info);
-    if (st == IMP_OK)
-        *out = bytes;
-    else
-        imp__bytes_free(ctx, &bytes);
+    if (st == IMP_OK) *out = bytes;
+    else imp__bytes_free(ctx, &bytes);
     return st;
 }

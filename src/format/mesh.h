@@ -10,7 +10,7 @@
 #include "base/file.h"
 #include "base/props.h"
 
-#define IMP_MESH_MAX ((size_t)INT32_MAX) /* vertices, triangles */
+#define IMP_MESH_MAX       ((size_t)INT32_MAX) /* vertices, triangles */
 #define IMP_MESH_BYTES_MAX ((size_t)1 << 37)
 
 struct imp_mesh_source {

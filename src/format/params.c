@@ -4,7 +4,7 @@
 
 /* A parameter made of two others doubles with every <default>: bound what may come of it.
  */
-#define PARAMS_MAX 4096
+#define PARAMS_MAX      4096
 #define VALUE_BYTES_MAX ((size_t)16 << 20)
 #define TOTAL_BYTES_MAX ((size_t)256 << 20)
 

@@ -9,7 +9,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define ELEMENTS_MAX 64
+#define ELEMENTS_MAX   64
 #define PROPERTIES_MAX 256
 
 enum ply_format { PLY_ASCII, PLY_LITTLE, PLY_BIG };
@@ -75,7 +75,7 @@ static enum imp_status IMP_PRINTF(2, 3)
     return imp__error(p->ctx, IMP_E_SCENE, "%s: %s", p->source->name, text);
 }
 
-/* ---- Header ------------------------------------------------------------------------ */
+/* ---- Header -------------------------------------------------------------------- */
 
 static enum ply_type type_of(const char *word)
 {
@@ -208,8 +208,7 @@ static enum imp_status header_read(struct ply *p)
             IMP_TRY(element_add(p, words[1], words[2]));
         else if (n >= 1 && strcmp(words[0], "property") == 0)
             IMP_TRY(property_add(p, words, n));
-        else if (n == 1 && strcmp(words[0], "end_header") == 0)
-            break;
+        else if (n == 1 && strcmp(words[0], "end_header") == 0) break;
         else if (n > 0 && strcmp(words[0], "comment") != 0 &&
                  strcmp(words[0], "obj_info") != 0)
             IMP_TRY(ply_error(p, "line %lld: unknown header line '%.40s'",
@@ -263,7 +262,7 @@ static enum imp_status counts_check(const struct ply *p)
     return IMP_OK;
 }
 
-/* ---- Body -------------------------------------------------------------------------- */
+/* ---- Body ---------------------------------------------------------------------- */
 
 /* The next number; false at the end of the file, or if it is none. */
 static inline bool number_read(struct ply *p, enum ply_type type, double *out)
@@ -374,12 +373,9 @@ static enum imp_status element_read(struct ply *p, int index)
             double x;
             if (!number_read(p, q->count == PLY_NONE ? q->type : q->count, &x))
                 IMP_TRY(row_error(p, e, row));
-            if (q->count == PLY_NONE)
-                value[q->use] = x;
-            else if (q->indices)
-                IMP_TRY(corners_read(p, q, e, row, x));
-            else
-                IMP_TRY(list_skip(p, q, e, row, x));
+            if (q->count == PLY_NONE) value[q->use] = x;
+            else if (q->indices) IMP_TRY(corners_read(p, q, e, row, x));
+            else IMP_TRY(list_skip(p, q, e, row, x));
         }
         if (index == p->vertex) IMP_TRY(vertex_store(p, row, value));
     }

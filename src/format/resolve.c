@@ -111,8 +111,7 @@ static enum imp_status attach(struct imp_scene *scene, struct imp_node *node)
                bitmap =
                    strcmp(node->tag, "texture") == 0 && strcmp(node->type, "bitmap") == 0;
     if (obj || ply) IMP_TRY(mesh_attach(scene, node, obj));
-    if (bitmap && !node->image)
-        IMP_TRY(image_attach(scene, node));
+    if (bitmap && !node->image) IMP_TRY(image_attach(scene, node));
     else if (bitmap && imp__node_prop(node, "filename"))
         IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_SCENE,
                                 "has pixels and a 'filename': only one can be"));

@@ -94,11 +94,10 @@ void imp_scene_end(imp_scene *scene)
     if (!ready(scene)) return;
     if (scene->n_stack == 1)
         keep(scene, imp__error(scene->ctx, IMP_E_ARG, "scene: end without begin"));
-    else
-        scene->n_stack--;
+    else scene->n_stack--;
 }
 
-/* ---- Properties -------------------------------------------------------------------- */
+/* ---- Properties ---------------------------------------------------------------- */
 
 /* A new property of the open object; NULL: the build has failed. */
 static struct imp_prop *prop(struct imp_scene *scene, const char *name,
@@ -108,8 +107,7 @@ static struct imp_prop *prop(struct imp_scene *scene, const char *name,
     if (!ready(scene)) return NULL;
     if (!name)
         keep(scene, imp__error(scene->ctx, IMP_E_ARG, "scene: a property has no name"));
-    else
-        keep(scene, imp__tree_prop(scene->tree, top(scene), name, type, nowhere, &p));
+    else keep(scene, imp__tree_prop(scene->tree, top(scene), name, type, nowhere, &p));
     return scene->build_status == IMP_OK ? p : NULL;
 }
 
@@ -199,7 +197,7 @@ void imp_scene_ref(imp_scene *scene, const char *id, const char *name)
         keep(scene, imp__tree_ref(scene->tree, top(scene), id ? id : "", name, nowhere));
 }
 
-/* ---- Bulk data --------------------------------------------------------------------- */
+/* ---- Bulk data ----------------------------------------------------------------- */
 
 static bool open_is(const struct imp_scene *scene, const char *tag, const char *type)
 {
@@ -276,7 +274,7 @@ void imp_scene_image(imp_scene *scene, int width, int height, int channels,
     if (ready(scene)) keep(scene, image(scene, width, height, channels, pixels));
 }
 
-/* ---- Commit ------------------------------------------------------------------------ */
+/* ---- Commit -------------------------------------------------------------------- */
 
 enum imp_status imp_scene_commit(imp_scene *scene)
 {

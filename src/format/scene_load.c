@@ -30,10 +30,8 @@ enum imp_status imp__scene_new(imp_context *ctx, const struct imp_load_options *
     imp__arena_init(&scene->files, ctx);
     const enum imp_status st =
         imp__search_init(scene, options->search, options->n_search, folder);
-    if (st == IMP_OK)
-        *out = scene;
-    else
-        imp_scene_destroy(scene);
+    if (st == IMP_OK) *out = scene;
+    else imp_scene_destroy(scene);
     return st;
 }
 

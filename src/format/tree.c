@@ -39,9 +39,9 @@ enum imp_status imp__loc_error(imp_context *ctx, struct imp_loc loc,
 bool imp__is_object_tag(const char *tag)
 {
     static const char *const tags[] = {
-        "scene",   "bsdf",    "emitter", "film",  "integrator", "medium", "phase",
-        "rfilter", "sampler", "sensor",  "shape", "texture",    "volume", "spectrum",
-        "rays",    "surface", "target"}; /* of bent rays */
+        "scene",  "bsdf",     "emitter", "film",    "integrator", "medium",
+        "phase",  "rfilter",  "sampler", "sensor",  "shape",      "texture",
+        "volume", "spectrum", "rays",    "surface", "target"}; /* of bent rays */
     for (size_t i = 0; i < imp_count(tags); i++)
         if (strcmp(tags[i], tag) == 0) return true;
     return false;
@@ -97,8 +97,7 @@ enum imp_status imp__tree_open(struct imp_tree *t, struct imp_node *parent,
         if (!imp__node_add_child(t->arena, parent, node, name, loc))
             IMP_TRY(no_memory(t->ctx));
         if (name) IMP_TRY(slot_take(t, parent, node->name, loc));
-    } else
-        t->root = node;
+    } else t->root = node;
     t->nodes[t->n_nodes++] = node;
     *out = node;
 out:

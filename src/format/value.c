@@ -6,7 +6,7 @@
 #include <string.h>
 #include <strings.h>
 
-#define BLANKS " \t\r\n"
+#define BLANKS        " \t\r\n"
 #define SPD_BYTES_MAX ((size_t)64 << 20)
 
 bool imp__value_float(const char *text, double *out)
@@ -81,10 +81,8 @@ static enum imp_status pairs_finish(imp_context *ctx, const struct pairs *p,
         s.list[s.n + i] = p->at[i][1];
     }
     const enum imp_status st = imp__samples_check(ctx, &s);
-    if (st != IMP_OK)
-        imp__release(ctx, s.list);
-    else
-        *out = s;
+    if (st != IMP_OK) imp__release(ctx, s.list);
+    else *out = s;
     return st;
 }
 

@@ -47,7 +47,7 @@ void imp__xml_fail_placed(struct xml_file *f, enum imp_status status)
     if (f->st == IMP_OK && status != IMP_OK) stop(f, status);
 }
 
-/* ---- What expat calls -------------------------------------------------------------- */
+/* ---- What expat calls ---------------------------------------------------------- */
 
 static void on_start(void *payload, const char *tag, const char **attributes)
 {
@@ -87,7 +87,7 @@ static void on_doctype(void *payload, const char *name, const char *system,
     imp__xml_fail(payload, IMP_E_SCENE, "a document type (<!DOCTYPE>) is not allowed");
 }
 
-/* ---- Files ------------------------------------------------------------------------- */
+/* ---- Files --------------------------------------------------------------------- */
 
 static enum imp_status text_read(struct xml_file *f, const struct imp_bytes *text)
 {

@@ -15,10 +15,10 @@
 enum imp_status imp__xml_read(struct imp_scene *scene, const struct imp_bytes *text,
                               const char *name, const struct imp_load_options *options);
 
-/* ---- Shared by xml.c and xml_tags.c ------------------------------------------------ */
+/* ---- Shared by xml.c and xml_tags.c -------------------------------------------- */
 
-#define XML_INCLUDE_DEPTH 15
-#define XML_INCLUDES_MAX 10000
+#define XML_INCLUDE_DEPTH  15
+#define XML_INCLUDES_MAX   10000
 #define XML_FILE_BYTES_MAX ((size_t)1 << 30)
 #define XML_ATTRIBUTES_MAX 8
 
@@ -83,7 +83,7 @@ void imp__xml_include(struct xml_file *f, const char *name, const char *slot,
 void imp__xml_start(struct xml_file *f, const char *tag, const char **attributes);
 void imp__xml_end(struct xml_file *f);
 
-/* ---- What tags do: xml_props.c, xml_transform.c ------------------------------------ */
+/* ---- What tags do: xml_props.c, xml_transform.c -------------------------------- */
 typedef void imp__xml_act(struct xml_file *f, const struct xml_attributes *a);
 imp__xml_act imp__xml_integer, imp__xml_float, imp__xml_boolean, imp__xml_string,
     imp__xml_vector, imp__xml_rgb, imp__xml_spectrum;
@@ -101,7 +101,7 @@ struct imp_prop *imp__xml_prop(struct xml_file *f, const struct xml_attributes *
 bool imp__xml_xyz(struct xml_file *f, const char *tag, const struct xml_attributes *a,
                   double missing, double out[3]);
 
-/* ---- upgrade.c: files before version 2.0.0 (scene-format 1.6) ---------------------- */
+/* ---- upgrade.c: files before version 2.0.0 (scene-format 1.6) ------------------ */
 /* camelCase -> snake_case, and reflectances renamed; `type` is the plugin that has the
  * property. In scratch; NULL: out of memory. */
 const char *imp__upgrade_name(struct imp_arena *scratch, const char *type,

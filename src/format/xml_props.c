@@ -161,7 +161,6 @@ void imp__xml_spectrum(struct xml_file *f, const struct xml_attributes *a)
         memcpy(list, s.list, 2 * s.n * sizeof *list);
         p->list = list;
         p->n = s.n;
-    } else
-        imp__xml_fail(f, IMP_E_NOMEM, "out of memory");
+    } else imp__xml_fail(f, IMP_E_NOMEM, "out of memory");
     imp__release(f->reader->ctx, s.list);
 }

@@ -8,7 +8,7 @@
 #include <stdio.h>
 #include <string.h>
 
-/* ---- Attributes -------------------------------------------------------------------- */
+/* ---- Attributes ---------------------------------------------------------------- */
 
 const char *imp__xml_get(const struct xml_attributes *a, const char *name)
 {
@@ -64,7 +64,7 @@ static bool attributes_read(struct xml_file *f, const char *tag, const char *req
     return true;
 }
 
-/* ---- Levels ------------------------------------------------------------------------ */
+/* ---- Levels -------------------------------------------------------------------- */
 
 struct xml_level *imp__xml_top(struct xml_file *f)
 {
@@ -91,7 +91,7 @@ const char *imp__xml_name(struct xml_file *f, const struct xml_attributes *a)
     return name;
 }
 
-/* ---- References, parameters, files ------------------------------------------------- */
+/* ---- References, parameters, files --------------------------------------------- */
 
 static void act_ref(struct xml_file *f, const struct xml_attributes *a)
 {
@@ -139,7 +139,7 @@ static void act_path(struct xml_file *f, const struct xml_attributes *a)
     if (st != IMP_OK) imp__xml_fail_here(f, st);
 }
 
-/* ---- The table --------------------------------------------------------------------- */
+/* ---- The table ----------------------------------------------------------------- */
 
 static const struct rule {
     const char *tag, *required, *optional;
@@ -298,8 +298,7 @@ void imp__xml_start(struct xml_file *f, const char *tag, const char **from)
     for (size_t i = 0; i < imp_count(rules); i++) known |= strcmp(rules[i].tag, tag) == 0;
     if (known)
         imp__xml_fail(f, IMP_E_SCENE, "<%s> cannot stand inside <%s>", tag, l->tag);
-    else
-        imp__xml_fail(f, IMP_E_SCENE, "unknown tag <%s>", tag);
+    else imp__xml_fail(f, IMP_E_SCENE, "unknown tag <%s>", tag);
 }
 
 void imp__xml_end(struct xml_file *f)

@@ -4,12 +4,13 @@
 #include <stdio.h>
 #include <string.h>
 
-enum imp_status imp__check_row(struct imp__check *c, const char *method, const char *param,
-                               int64_t element, const struct imp_check_row *row)
+enum imp_status imp__check_row(struct imp__check *c, const char *method,
+                               const char *param, int64_t element,
+                               const struct imp_check_row *row)
 {
     char name[512];
-    struct imp_check_row *grown = imp__grow(c->ctx, c->rows, &c->cap_rows, c->n_rows + 1,
-                                            sizeof *grown);
+    struct imp_check_row *grown =
+        imp__grow(c->ctx, c->rows, &c->cap_rows, c->n_rows + 1, sizeof *grown);
     if (grown) c->rows = grown;
     if (element >= 0) snprintf(name, sizeof name, "%s[%lld]", param, (long long)element);
     else snprintf(name, sizeof name, "%s", param ? param : "*");
@@ -33,9 +34,13 @@ static bool report(struct imp__check *c, double fraction)
     if (!c->outer.progress) return false;
     const double elapsed = imp__now() - c->start_s;
     const struct imp_progress p = {
-        .size = sizeof p, .stage = "check", .fraction = fmin(fraction, 1), .elapsed_s = elapsed,
+        .size = sizeof p,
+        .stage = "check",
+        .fraction = fmin(fraction, 1),
+        .elapsed_s = elapsed,
         .eta_s = fraction > 1e-3 ? elapsed * (1 - fraction) / fraction : -1,
-        .rate = elapsed > 0 ? c->done / elapsed : 0, .rate_unit = "pieces"};
+        .rate = elapsed > 0 ? c->done / elapsed : 0,
+        .rate_unit = "pieces"};
     c->stopped |= c->outer.progress(&p, c->outer.progress_payload) != 0;
     return c->stopped;
 }
@@ -61,10 +66,15 @@ enum imp_status imp_check(imp_problem *p, const struct imp_check_options *option
 {
     if (!p || !rows || !n_rows) return IMP_E_ARG;
     enum imp_status st = IMP_OK, ended = IMP_OK;
-    struct imp__check c = {.problem = p, .ctx = p->ctx, .options = IMP_CHECK_OPTIONS_INIT,
-                           .outer = IMP_RUN_INIT, .start_s = imp__now()};
+    struct imp__check c = {.problem = p,
+                           .ctx = p->ctx,
+                           .options = IMP_CHECK_OPTIONS_INIT,
+                           .outer = IMP_RUN_INIT,
+                           .start_s = imp__now()};
 
-    if (p->n == 0) IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "nothing to check: no parameter is active"));
+    if (p->n == 0)
+        IMP_TRY(
+            imp__error(p->ctx, IMP_E_ARG, "nothing to check: no parameter is active"));
     if (options) memcpy(&c.options, options, imp_min(options->size, sizeof c.options));
     if (run) memcpy(&c.outer, run, imp_min(run->size, sizeof c.outer));
     if (c.options.paths < 0 || c.options.fresh_spp < 0)
@@ -81,7 +91,8 @@ enum imp_status imp_check(imp_problem *p, const struct imp_check_options *option
     ended = imp__check_frozen(&c);
     if (ended == IMP_OK) ended = imp__check_fresh(&c);
     if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
-    struct imp_check_row *kept = imp__arena_array(&p->check_arena, c.n_rows + 1, sizeof *kept);
+    struct imp_check_row *kept =
+        imp__arena_array(&p->check_arena, c.n_rows + 1, sizeof *kept);
     if (!kept) IMP_TRY(imp__error(p->ctx, IMP_E_NOMEM, "no memory for a check"));
     if (c.n_rows > 0) memcpy(kept, c.rows, c.n_rows * sizeof *kept);
     *rows = kept;

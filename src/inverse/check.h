@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Gradient checks: what imp_check's files share. Frozen checks see wrong derivative code and
- * are blind to wrong densities; fresh seeds see those too, with noise (gradients.md 13). */
+ * Gradient checks: what imp_check's files share. Frozen checks see wrong derivative code
+ * and are blind to wrong densities; fresh seeds see those too, with noise (gradients.md
+ * 13). */
 #ifndef IMP_INVERSE_CHECK_H
 #define IMP_INVERSE_CHECK_H
 
@@ -10,18 +11,19 @@
 struct imp__check {
     struct imp_problem *problem;
     imp_context *ctx;
-    struct imp_run run, outer;      /* of an evaluation, with our progress; the caller's */
+    struct imp_run run, outer; /* of an evaluation, with our progress; the caller's */
     struct imp_check_options options;
     struct imp_tracer tracer;
-    struct imp_check_row *rows;     /* [n_rows], names in the problem's check_arena */
+    struct imp_check_row *rows; /* [n_rows], names in the problem's check_arena */
     size_t n_rows, cap_rows;
-    double start_s, done, total;    /* pieces of work */
+    double start_s, done, total; /* pieces of work */
     bool stopped;
 };
 
 /* A row; `element` < 0: of the parameter as a whole, param NULL: of all of them. */
-enum imp_status imp__check_row(struct imp__check *c, const char *method, const char *param,
-                               int64_t element, const struct imp_check_row *row);
+enum imp_status imp__check_row(struct imp__check *c, const char *method,
+                               const char *param, int64_t element,
+                               const struct imp_check_row *row);
 /* Done with `work` more; IMP_CANCELLED if the caller wants to stop. */
 enum imp_status imp__check_progress(struct imp__check *c, double work);
 

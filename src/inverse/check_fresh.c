@@ -1,27 +1,27 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Gradients against differences of pictures that share no random number with them: what a
- * frozen walk cannot see (wrong densities, missing terms) shows here as z. The pictures of
- * one difference share theirs, in batches whose spread is the standard error: walks that do
- * not feel the parameter then cancel (common random numbers, gradients.md 13 B).
+ * frozen walk cannot see (wrong densities, missing terms) shows here as z. The pictures
+ * of one difference share theirs, in batches whose spread is the standard error: walks
+ * that do not feel the parameter then cancel (common random numbers, gradients.md 13 B).
  *
- * The functional is F = sum_pc s_pc I_pc with a smooth positive pattern s of mean 1/pixels.
- * F is linear in emission: one central difference with a large step. Elsewhere two steps and
- * Richardson's combination (4 D(h/2) - D(h))/3, whose error is O(h^4). */
+ * The functional is F = sum_pc s_pc I_pc with a smooth positive pattern s of mean
+ * 1/pixels. F is linear in emission: one central difference with a large step. Elsewhere
+ * two steps and Richardson's combination (4 D(h/2) - D(h))/3, whose error is O(h^4). */
 #include "check.h"
 #include "walk/picture.h"
 #include <math.h>
 #include <string.h>
 
-#define Z_LIMIT 4
-#define STEP 0.3         /* of the room a number has */
+#define Z_LIMIT     4
+#define STEP        0.3 /* of the room a number has */
 #define STEP_LINEAR 0.8
-#define BATCHES 16       /* independent differences behind an SE */
-#define RESOLVED 0.2     /* an SE larger than this part of the value decides nothing */
+#define BATCHES     16  /* independent differences behind an SE */
+#define RESOLVED    0.2 /* an SE larger than this part of the value decides nothing */
 
 struct fresh {
     struct imp__check *check;
-    float *pattern;      /* [height][width][channels] */
+    float *pattern; /* [height][width][channels] */
     uint64_t next_seed;
     double *gradient, *gradient_se; /* [n] */
     int channels;
@@ -30,12 +30,12 @@ struct fresh {
 /* What pictures are made of: radiance, or its derivative along x_dot. */
 struct sampled {
     struct imp_tracer tracer;
-    const double *x_dot;   /* NULL: radiance */
+    const double *x_dot; /* NULL: radiance */
     bool *no_memory;
 };
 
-static bool sample(const void *payload, struct imp_arena *arena, int x, int y, int64_t index,
-                   double *value, double *px, double *py)
+static bool sample(const void *payload, struct imp_arena *arena, int x, int y,
+                   int64_t index, double *value, double *px, double *py)
 {
     const struct sampled *s = payload;
     struct imp_walk walk;
@@ -44,19 +44,22 @@ static bool sample(const void *payload, struct imp_arena *arena, int x, int y, i
     for (int c = 0; c < s->tracer.scene->channels; c++) value[c] = v[c];
     *px = walk.px;
     *py = walk.py;
-    if (walk.dropped == IMP_DROP_MEMORY) __atomic_store_n(s->no_memory, true, __ATOMIC_RELAXED);
+    if (walk.dropped == IMP_DROP_MEMORY)
+        __atomic_store_n(s->no_memory, true, __ATOMIC_RELAXED);
     return walk.dropped == IMP_DROP_NONE;
 }
 
 static uint64_t seed_of(struct fresh *f)
 {
-    return imp__mix64(f->check->outer.seed ^ (0xf7e5u + ++f->next_seed * 0x9e3779b97f4a7c15u));
+    return imp__mix64(f->check->outer.seed ^
+                      (0xf7e5u + ++f->next_seed * 0x9e3779b97f4a7c15u));
 }
 
 /* Samples of one batch. */
 static int batch_spp(const struct fresh *f)
 {
-    const int spp = f->check->run.spp > 0 ? f->check->run.spp : f->check->tracer.sensor->spp;
+    const int spp =
+        f->check->run.spp > 0 ? f->check->run.spp : f->check->tracer.sensor->spp;
     return imp_max((spp + BATCHES - 1) / BATCHES, 1);
 }
 
@@ -68,8 +71,8 @@ static enum imp_status functional(struct fresh *f, const double *x_dot, uint64_t
     struct imp_run run = f->check->run;
     bool no_memory = false;
     struct sampled t = {f->check->tracer, x_dot, &no_memory};
-    struct imp_picture picture = {sensor, "check", f->channels == 3 ? "R,G,B" : "Y",
-                                  f->channels, sample, &t, NULL};
+    struct imp_picture picture = {
+        sensor, "check", f->channels == 3 ? "R,G,B" : "Y", f->channels, sample, &t, NULL};
     imp_film *film = NULL;
     if (!x_dot) t.tracer.active = NULL;
     run.spp = batch_spp(f);
@@ -79,7 +82,8 @@ static enum imp_status functional(struct fresh *f, const double *x_dot, uint64_t
         st = imp__error(f->check->ctx, IMP_E_NOMEM, "no memory to record a walk");
     if (st == IMP_OK) {
         *value = 0;
-        for (size_t i = 0; i < imp__film_values(film); i++) *value += f->pattern[i] * film->mean[i];
+        for (size_t i = 0; i < imp__film_values(film); i++)
+            *value += f->pattern[i] * film->mean[i];
     }
     imp_film_destroy(film);
     return st;
@@ -94,7 +98,8 @@ static struct imp_estimate batches_mean(double sum, double square)
 }
 
 /* The derivative of F along x_dot. */
-static enum imp_status slope(struct fresh *f, const double *x_dot, struct imp_estimate *out)
+static enum imp_status slope(struct fresh *f, const double *x_dot,
+                             struct imp_estimate *out)
 {
     enum imp_status st = IMP_OK;
     double sum = 0, square = 0;
@@ -110,7 +115,7 @@ out:
     return st;
 }
 
-/* ---- Differences --------------------------------------------------------------------------- */
+/* ---- Differences --------------------------------------------------------------- */
 
 /* A parameter moved by step * weight[e]. */
 struct motion {
@@ -118,8 +123,8 @@ struct motion {
     const double *old, *weight; /* [count] */
 };
 
-static enum imp_status at(struct fresh *f, const struct motion *m, double step, uint64_t seed,
-                          double *value)
+static enum imp_status at(struct fresh *f, const struct motion *m, double step,
+                          uint64_t seed, double *value)
 {
     struct imp_param p = *m->param;
     for (size_t e = 0; e < p.info.count; e++)
@@ -182,7 +187,8 @@ static enum imp_status difference(struct fresh *f, const struct motion *m, bool 
     }
     /* At a bound: (-3 F(0) + 4 F(h) - F(2h)) / 2h, to the side where there is room. */
     const double side = above >= below ? 1 : -1;
-    const double h = *step = side * 0.5 * part * fmin(fmax(below, above), fmax(scale, 1e-3));
+    const double h = *step =
+        side * 0.5 * part * fmin(fmax(below, above), fmax(scale, 1e-3));
     const double place[3] = {0, h, 2 * h};
     const double factor[3] = {-1.5 / h, 2 / h, -0.5 / h};
     return combine(f, m, 3, place, factor, out);
@@ -199,9 +205,12 @@ static enum imp_status compare(struct fresh *f, const struct motion *m, int64_t 
     row.reference = fd.value;
     row.se = sqrt(mine.se * mine.se + fd.se * fd.se);
     const double off = fabs(mine.value - fd.value);
-    /* Without any noise (a furnace) the difference is rounding of the pictures' floats. */
+    /* Without any noise (a furnace) the difference is rounding of the pictures' floats.
+     */
     const double rounding = 1e-6 * fmax(fabs(mine.value), fabs(fd.value));
-    row.error = row.se > 0 ? fmax(off - rounding, 0) / row.se : off <= rounding ? 0 : INFINITY;
+    row.error = row.se > 0        ? fmax(off - rounding, 0) / row.se
+                : off <= rounding ? 0
+                                  : INFINITY;
     const double size = fmax(fabs(mine.value), fabs(fd.value));
     row.ok = !(row.error <= row.limit) ? 0 : row.se <= RESOLVED * size ? 1 : -1;
     return imp__check_row(f->check, "fresh", m->param->info.name, element, &row);
@@ -213,11 +222,13 @@ static bool is_emission(const struct imp_scene *s, size_t param)
     bool emission = false, other = false;
     for (int i = 0; i < s->n_emitters; i++)
         for (int j = 0; j < s->emitters[i]->n_in; j++)
-            if (s->emitters[i]->input[j]->param == (int)param && !s->emitters[i]->input[j]->texture)
+            if (s->emitters[i]->input[j]->param == (int)param &&
+                !s->emitters[i]->input[j]->texture)
                 emission = true;
     for (int i = 0; i < s->n_bsdfs; i++)
         for (int j = 0; j < s->bsdfs[i]->n_own; j++)
-            if (s->bsdfs[i]->input[j]->param == (int)param && !s->bsdfs[i]->input[j]->texture) {
+            if (s->bsdfs[i]->input[j]->param == (int)param &&
+                !s->bsdfs[i]->input[j]->texture) {
                 if (s->bsdfs[i]->ops->inputs[j].role == IMP_EMISSION) emission = true;
                 else other = true;
             }
@@ -240,7 +251,8 @@ static enum imp_status check_param(struct fresh *f, size_t param)
     for (size_t e = 0; count <= 3 && e < count; e++) {
         memset(weight, 0, count * sizeof *weight);
         weight[e] = 1;
-        const struct imp_estimate g = {f->gradient[base + e], f->gradient_se[base + e], 0};
+        const struct imp_estimate g = {f->gradient[base + e], f->gradient_se[base + e],
+                                       0};
         IMP_TRY(compare(f, &m, count > 1 ? (int64_t)e : -1, linear, g));
     }
     if (count > 3) { /* one direction through all of them */
@@ -266,11 +278,14 @@ enum imp_status imp__check_fresh(struct imp__check *c)
 
     f.pattern = imp__alloc(c->ctx, w * h * C, sizeof *f.pattern);
     f.gradient = imp__alloc(c->ctx, 2 * p->n, sizeof *f.gradient);
-    if (!f.pattern || !f.gradient) IMP_TRY(imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check"));
+    if (!f.pattern || !f.gradient)
+        IMP_TRY(imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check"));
     f.gradient_se = f.gradient + p->n;
     for (size_t i = 0; i < w * h * C; i++) {
-        const double x = (double)(i / C % w) / (double)w, y = (double)(i / C / w) / (double)h;
-        f.pattern[i] = (float)((1 + 0.5 * cos(5 * x + 3 * y + (double)(i % C))) / (double)(w * h));
+        const double x = (double)(i / C % w) / (double)w,
+                     y = (double)(i / C / w) / (double)h;
+        f.pattern[i] =
+            (float)((1 + 0.5 * cos(5 * x + 3 * y + (double)(i % C))) / (double)(w * h));
     }
     c->done = 0;
     c->total = 1;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Checks on walks that are kept: vertices, directions, densities and decisions are frozen,
- * so nothing here has noise.
+ * Checks on walks that are kept: vertices, directions, densities and decisions are
+ * frozen, so nothing here has noise.
  *
  *   frozen  sweep against central differences of the same product at other parameters
  *   dot     <J v, w> = <v, J^T w>: tangent against sweep
@@ -16,21 +16,21 @@
 #include <stdio.h>
 #include <string.h>
 
-#define MEMORY_MAX ((size_t)512 << 20) /* of kept walks */
-#define TRIES 50                       /* walks traced for one that is kept */
-#define SINGLE_MAX 12                  /* numbers of a parameter looked at one by one; more: */
-#define DIRECTIONS 6                   /* random directions */
-#define N_STEPS 4
+#define MEMORY_MAX   ((size_t)512 << 20) /* of kept walks */
+#define TRIES        50                  /* walks traced for one that is kept */
+#define SINGLE_MAX   12 /* numbers of a parameter looked at one by one; more: */
+#define DIRECTIONS   6  /* random directions */
+#define N_STEPS      4
 #define FROZEN_LIMIT 1e-6
-#define EXACT_LIMIT 1e-12
-#define NOTHING 1e-200 /* below it products lose digits to underflow */
-#define TINY 1e-3 /* of the walk's L: logarithmic derivatives below it count as 0 */
+#define EXACT_LIMIT  1e-12
+#define NOTHING      1e-200 /* below it products lose digits to underflow */
+#define TINY         1e-3 /* of the walk's L: logarithmic derivatives below it count as 0 */
 
 static const double steps[N_STEPS] = {1e-3, 1e-4, 1e-5, 1e-6};
 static const double lane[3] = {1, 0.7, 1.3};
 
 struct entry {
-    size_t i;  /* in x */
+    size_t i; /* in x */
     double g;
 };
 
@@ -46,7 +46,7 @@ struct keep {
     struct imp_arena arena;
     struct kept *walks;
     size_t n;
-    double *value[3];       /* [n] frozen values at up to three places */
+    double *value[3]; /* [n] frozen values at up to three places */
 };
 
 static double fold(const struct imp__check *c, imp_spec L)
@@ -61,7 +61,7 @@ static imp_spec fold_bar(const struct imp__check *c)
                                             : (imp_spec){lane[0]};
 }
 
-/* ---- Keeping walks ------------------------------------------------------------------------ */
+/* ---- Keeping walks ------------------------------------------------------------- */
 
 struct list {
     struct imp_sink sink; /* first */
@@ -97,7 +97,8 @@ static void list_add(struct imp_sink *sink, int param, size_t element, int chann
 
 static enum imp_status no_memory(const struct imp__check *c)
 {
-    return imp__error(c->ctx, IMP_E_NOMEM, "no memory to keep %d walks", c->options.paths);
+    return imp__error(c->ctx, IMP_E_NOMEM, "no memory to keep %d walks",
+                      c->options.paths);
 }
 
 static enum imp_status keep_walks(struct keep *k)
@@ -107,14 +108,15 @@ static enum imp_status keep_walks(struct keep *k)
     const struct imp_film_desc *film = &c->tracer.sensor->film;
     const uint64_t pixels = (uint64_t)film->crop_w * (uint64_t)film->crop_h;
     const size_t wanted = (size_t)c->options.paths;
-    struct list list = {{list_add}, c->tracer.active, c->ctx, c->problem->scene->channels,
-                        NULL, 0, 0, false};
+    struct list list = {
+        {list_add}, c->tracer.active, c->ctx, c->problem->scene->channels, NULL, 0, 0,
+        false};
 
     k->walks = imp__alloc(c->ctx, wanted, sizeof *k->walks);
     for (int i = 0; i < 3; i++) k->value[i] = imp__alloc(c->ctx, wanted, sizeof(double));
-    if (!k->walks || !k->value[0] || !k->value[1] || !k->value[2])
-        IMP_TRY(no_memory(c));
-    for (size_t t = 0; t < TRIES * wanted && k->n < wanted && k->arena.total < MEMORY_MAX; t++) {
+    if (!k->walks || !k->value[0] || !k->value[1] || !k->value[2]) IMP_TRY(no_memory(c));
+    for (size_t t = 0; t < TRIES * wanted && k->n < wanted && k->arena.total < MEMORY_MAX;
+         t++) {
         const uint64_t pixel = imp__mix64(t + 0x51ed270b) % pixels;
         const struct imp_arena_mark mark = imp__arena_mark(&k->arena);
         struct kept *w = &k->walks[k->n];
@@ -133,8 +135,7 @@ static enum imp_status keep_walks(struct keep *k)
             continue;
         }
         w->gradient = imp__arena_take(&k->arena, list.n + 1, sizeof *w->gradient);
-        if (!w->gradient || list.failed)
-            IMP_TRY(no_memory(c));
+        if (!w->gradient || list.failed) IMP_TRY(no_memory(c));
         if (list.n > 0) memcpy(w->gradient, list.at, list.n * sizeof *list.at);
         k->n++;
     }
@@ -150,7 +151,7 @@ static void keep_destroy(struct keep *k)
     for (int i = 0; i < 3; i++) imp__release(k->check->ctx, k->value[i]);
 }
 
-/* ---- Differences --------------------------------------------------------------------------- */
+/* ---- Differences --------------------------------------------------------------- */
 
 #define PER_ITEM 64
 
@@ -164,8 +165,8 @@ static enum imp_status frozen_work(size_t item, int worker, int slot, void *payl
     const struct frozen_job *j = payload;
     (void)worker, (void)slot;
     for (size_t i = item * PER_ITEM; i < imp_min((item + 1) * PER_ITEM, j->keep->n); i++)
-        j->value[i] = fold(j->keep->check,
-                           imp__walk_frozen(&j->keep->check->tracer, &j->keep->walks[i].walk));
+        j->value[i] = fold(j->keep->check, imp__walk_frozen(&j->keep->check->tracer,
+                                                            &j->keep->walks[i].walk));
     return IMP_OK;
 }
 
@@ -174,17 +175,18 @@ static enum imp_status evaluate(const struct keep *k, double *value)
 {
     struct frozen_job job = {k, value};
     const struct imp_loop loop = {.n_items = (k->n + PER_ITEM - 1) / PER_ITEM,
-                                  .work = frozen_work, .payload = &job};
+                                  .work = frozen_work,
+                                  .payload = &job};
     return imp__parallel(k->check->ctx, &loop, NULL);
 }
 
 /* A direction inside one parameter: number `only`, or all of them, with random sizes. */
 struct direction {
     const struct imp_param *param;
-    size_t only;       /* SIZE_MAX: all */
+    size_t only; /* SIZE_MAX: all */
     uint64_t seed;
-    double *old;       /* [count] values at the start */
-    double *moved;     /* [count] what a difference really moved, after rounding */
+    double *old;   /* [count] values at the start */
+    double *moved; /* [count] what a difference really moved, after rounding */
 };
 
 static double component(const struct direction *d, size_t e)
@@ -198,7 +200,8 @@ static void place(struct direction *d, double step)
     struct imp_param param = *d->param;
     for (size_t e = 0; e < param.info.count; e++) {
         const double move = component(d, e) * step;
-        imp__param_set(&param, e, d->old[e]); /* the scale is the start's, wherever we are */
+        imp__param_set(&param, e,
+                       d->old[e]); /* the scale is the start's, wherever we are */
         if (move != 0)
             imp__param_set(&param, e, d->old[e] + move * imp__check_scale(&param, e));
     }
@@ -211,8 +214,8 @@ static void note(struct direction *d, double sign)
         d->moved[e] += sign * imp__param_get(d->param, e);
 }
 
-/* Is there room on both sides? A double at its bound is differenced one-sidedly, to second
- * order; floats (linear in everything they feed) may leave their bounds. */
+/* Is there room on both sides? A double at its bound is differenced one-sidedly, to
+ * second order; floats (linear in everything they feed) may leave their bounds. */
 static bool two_sided(const struct direction *d, double step)
 {
     if (d->param->store == IMP_STORE_BULK || d->only == SIZE_MAX) return true;
@@ -220,7 +223,8 @@ static bool two_sided(const struct direction *d, double step)
     return x - h >= d->param->info.lo && x + h <= d->param->info.hi;
 }
 
-/* Differences of all walks along d: value[0] becomes the difference, d->moved the motion. */
+/* Differences of all walks along d: value[0] becomes the difference, d->moved the motion.
+ */
 static enum imp_status difference(struct keep *k, struct direction *d, double step)
 {
     enum imp_status st = IMP_OK;
@@ -246,7 +250,8 @@ static enum imp_status difference(struct keep *k, struct direction *d, double st
         place(d, 0);
         note(d, -2 * s);
         for (size_t i = 0; i < k->n; i++)
-            k->value[0][i] = s * (-3 * k->value[0][i] + 4 * k->value[1][i] - k->value[2][i]);
+            k->value[0][i] =
+                s * (-3 * k->value[0][i] + 4 * k->value[1][i] - k->value[2][i]);
     }
 out:
     place(d, 0);
@@ -283,15 +288,18 @@ static enum imp_status check_param(struct keep *k, size_t param)
         d.seed = q;
         for (int s = 0; s < N_STEPS; s++) {
             IMP_TRY(difference(k, &d, steps[s]));
-            const double size = 2 * steps[s] * imp__check_scale(p, count <= SINGLE_MAX ? q : 0);
+            const double size =
+                2 * steps[s] * imp__check_scale(p, count <= SINGLE_MAX ? q : 0);
             for (size_t i = 0; i < k->n; i++) {
                 const double a = along(&k->walks[i], base, d.moved, count);
                 const double f = k->value[0][i];
                 const double size_L = TINY * 2 * steps[s] * fabs(k->walks[i].L);
                 const double error = a == f ? 0 : fabs(a - f) / fmax(fabs(a), size_L);
                 if (!(error > row[s].error) && row[s].step > 0) continue;
-                row[s] = (struct imp_check_row){.step = steps[s], .value = a / size,
-                                                .reference = f / size, .error = error};
+                row[s] = (struct imp_check_row){.step = steps[s],
+                                                .value = a / size,
+                                                .reference = f / size,
+                                                .error = error};
             }
         }
     }
@@ -309,7 +317,7 @@ out:
     return st;
 }
 
-/* ---- Dot product --------------------------------------------------------------------------- */
+/* ---- Dot product --------------------------------------------------------------- */
 
 static enum imp_status check_dot(struct keep *k)
 {
@@ -319,7 +327,8 @@ static enum imp_status check_dot(struct keep *k)
     double *v = imp__alloc(c->ctx, n, sizeof *v);
 
     if (!v) return imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check");
-    for (size_t i = 0; i < n; i++) v[i] = 2 * imp__u01(imp__key(3, i >> 31, 3), (uint32_t)i) - 1;
+    for (size_t i = 0; i < n; i++)
+        v[i] = 2 * imp__u01(imp__key(3, i >> 31, 3), (uint32_t)i) - 1;
     for (size_t i = 0; i < k->n; i++) {
         const struct kept *w = &k->walks[i];
         const double forward = fold(c, imp__walk_tangent(&c->tracer, &w->walk, v));
@@ -339,7 +348,7 @@ static enum imp_status check_dot(struct keep *k)
     return imp__check_row(c, "dot", NULL, -1, &row);
 }
 
-/* ---- Euler --------------------------------------------------------------------------------- */
+/* ---- Euler --------------------------------------------------------------------- */
 
 /* Mark the parameters behind an input. */
 static void mark(const struct imp_scene *s, const struct imp_input *in, uint8_t *chosen)
@@ -359,10 +368,11 @@ static bool any_chosen(const struct imp_scene *s, const uint8_t *chosen)
     return false;
 }
 
-/* Sum of theta dL/dtheta over the chosen parameters against n(walk) L, worst walk. Numbers
- * without a parameter (fixed inputs) make the identity fail, so `chosen` must be complete. */
-static enum imp_status euler(struct keep *k, const uint8_t *chosen, const struct imp_bsdf *counted,
-                             const char *name)
+/* Sum of theta dL/dtheta over the chosen parameters against n(walk) L, worst walk.
+ * Numbers without a parameter (fixed inputs) make the identity fail, so `chosen` must be
+ * complete. */
+static enum imp_status euler(struct keep *k, const uint8_t *chosen,
+                             const struct imp_bsdf *counted, const char *name)
 {
     enum imp_status st = IMP_OK;
     struct imp__check *c = k->check;
@@ -392,7 +402,8 @@ static enum imp_status euler(struct keep *k, const uint8_t *chosen, const struct
         if (fabs(w->L) <= NOTHING || n <= 0) continue;
         list.n = 0;
         imp__walk_sweep(&tracer, &w->walk, fold_bar(c), &list.sink);
-        if (list.failed) IMP_TRY(imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check"));
+        if (list.failed)
+            IMP_TRY(imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check"));
         for (size_t q = 0; q < list.n; q++) sum += theta[list.at[q].i] * list.at[q].g;
         const double error = fabs(sum - n * w->L) / (n * w->L);
         if (error <= row.error && row.reference != 0) continue;
@@ -424,7 +435,8 @@ static enum imp_status check_emission(struct keep *k, uint8_t *chosen)
     return any_chosen(s, chosen) ? euler(k, chosen, NULL, "all emission") : IMP_OK;
 }
 
-/* Stam's integrator collects light at the end only, so L is a product over the vertices. */
+/* Stam's integrator collects light at the end only, so L is a product over the vertices.
+ */
 static enum imp_status check_reflectance(struct keep *k, uint8_t *chosen)
 {
     enum imp_status st = IMP_OK;
@@ -455,7 +467,8 @@ enum imp_status imp__check_frozen(struct imp__check *c)
     if (!chosen) IMP_TRY(imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check"));
     IMP_TRY(keep_walks(&k));
     if (k.n == 0)
-        IMP_TRY(imp__error(c->ctx, IMP_E_NUMERIC, "no walk of %d carries light or a derivative",
+        IMP_TRY(imp__error(c->ctx, IMP_E_NUMERIC,
+                           "no walk of %d carries light or a derivative",
                            TRIES * c->options.paths));
     /* The attached form differentiates the sampling too: nothing is frozen then. */
     const bool frozen = c->tracer.integrator->alpha_gradient != IMP_ALPHA_ATTACHED;

@@ -21,13 +21,13 @@ uint64_t imp__hash(uint64_t h, const void *bytes, size_t n)
     return h;
 }
 
-/* ---- Writing ------------------------------------------------------------------------------ */
+/* ---- Writing ------------------------------------------------------------------- */
 
 struct sink {
     imp_context *ctx;
     struct imp_bytes text;
-    uint64_t hash;  /* of everything but the fingerprint, against damage */
-    bool failed;    /* out of memory */
+    uint64_t hash; /* of everything but the fingerprint, against damage */
+    bool failed;   /* out of memory */
 };
 
 IMP_PRINTF(2, 3) static void put(struct sink *s, const char *format, ...)
@@ -67,8 +67,9 @@ enum imp_status imp__checkpoint_write(imp_context *ctx, const char *path,
 {
     enum imp_status st = IMP_OK;
     char name[16];
-    struct sink s = {.ctx = ctx, .hash = head_hash((int)search->kind, search->n,
-                                                   search->iteration, search->finished)};
+    struct sink s = {.ctx = ctx,
+                     .hash = head_hash((int)search->kind, search->n, search->iteration,
+                                       search->finished)};
 
     put(&s, MAGIC "optimizer %d\nvariables %zu\n", (int)search->kind, search->n);
     put(&s, "of %016llx %016llx %016llx %016llx\n", (unsigned long long)of->parameters,
@@ -92,13 +93,13 @@ out:
     return st;
 }
 
-/* ---- Reading ------------------------------------------------------------------------------ */
+/* ---- Reading ------------------------------------------------------------------- */
 
 struct source {
     FILE *f;
     imp_context *ctx;
     const char *path;
-    size_t max;     /* numbers the file has room for */
+    size_t max; /* numbers the file has room for */
     uint64_t hash;
 };
 
@@ -112,14 +113,15 @@ static enum imp_status get_head(struct source *s, const char *name, size_t *n)
 {
     char line[64], word[32];
     unsigned long long count;
-    if (!fgets(line, sizeof line, s->f) || sscanf(line, "%31s %llu", word, &count) != 2
-        || strcmp(word, name) != 0 || count > s->max)
+    if (!fgets(line, sizeof line, s->f) || sscanf(line, "%31s %llu", word, &count) != 2 ||
+        strcmp(word, name) != 0 || count > s->max)
         return damaged(s, name);
     *n = (size_t)count;
     return IMP_OK;
 }
 
-static enum imp_status get_numbers(struct source *s, const char *name, double *v, size_t n)
+static enum imp_status get_numbers(struct source *s, const char *name, double *v,
+                                   size_t n)
 {
     for (size_t i = 0; i < n; i++) {
         char text[17];
@@ -127,7 +129,9 @@ static enum imp_status get_numbers(struct source *s, const char *name, double *v
         if (fread(text, 1, 17, s->f) != 17 || text[16] != '\n') return damaged(s, name);
         for (int k = 0; k < 16; k++) {
             const char c = text[k];
-            const int d = c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
+            const int d = c >= '0' && c <= '9'   ? c - '0'
+                          : c >= 'a' && c <= 'f' ? c - 'a' + 10
+                                                 : -1;
             if (d < 0) return damaged(s, name);
             bits = bits << 4 | (uint64_t)d;
         }
@@ -145,31 +149,36 @@ static enum imp_status get_array(struct source *s, const char *name, double *v, 
     return count == n ? get_numbers(s, name, v, n) : damaged(s, name);
 }
 
-static enum imp_status same_problem(const struct source *s, const struct imp__fingerprint *is,
+static enum imp_status same_problem(const struct source *s,
+                                    const struct imp__fingerprint *is,
                                     const struct imp__fingerprint *of)
 {
     const char *what = is->parameters != of->parameters ? "other parameters are active"
-                       : is->targets != of->targets     ? "its targets or regularisers differ"
+                       : is->targets != of->targets ? "its targets or regularisers differ"
                        : is->scene != of->scene ? "the scene's other parameters differ"
                        : is->options != of->options
                            ? "seed, samples per pixel or optimiser's options differ"
                            : NULL;
     if (!what) return IMP_OK;
-    return imp__error(s->ctx, IMP_E_ARG, "%s: the checkpoint is of another fit: %s", s->path,
-                      what);
+    return imp__error(s->ctx, IMP_E_ARG, "%s: the checkpoint is of another fit: %s",
+                      s->path, what);
 }
 
 static enum imp_status read_head(struct source *s, const struct imp__fingerprint *of,
-                                 const struct imp__search *search, int *iteration, int *finished)
+                                 const struct imp__search *search, int *iteration,
+                                 int *finished)
 {
     char magic[sizeof MAGIC];
     int kind;
     unsigned long long n, h[4];
     if (!fgets(magic, sizeof magic, s->f) || strcmp(magic, MAGIC) != 0)
-        return imp__error(s->ctx, IMP_E_IO, "%s: not a checkpoint of this version", s->path);
-    if (fscanf(s->f, "optimizer %d variables %llu of %llx %llx %llx %llx iteration %d finished %d",
-               &kind, &n, &h[0], &h[1], &h[2], &h[3], iteration, finished) != 8
-        || fgetc(s->f) != '\n' || *iteration < 0 || *iteration > 1000000000)
+        return imp__error(s->ctx, IMP_E_IO, "%s: not a checkpoint of this version",
+                          s->path);
+    if (fscanf(
+            s->f,
+            "optimizer %d variables %llu of %llx %llx %llx %llx iteration %d finished %d",
+            &kind, &n, &h[0], &h[1], &h[2], &h[3], iteration, finished) != 8 ||
+        fgetc(s->f) != '\n' || *iteration < 0 || *iteration > 1000000000)
         return damaged(s, "head");
     const struct imp__fingerprint is = {h[0], h[1], h[2], h[3]};
     const enum imp_status st = same_problem(s, &is, of);
@@ -187,7 +196,8 @@ static enum imp_status read_body(struct source *s, const struct imp__goal *goal,
     IMP_TRY(get_array(s, "start", t->start, t->n));
     IMP_TRY(get_array(s, "x", t->x, t->n));
     for (size_t k = 0; k < t->n; k++)
-        if (!(t->x[k] >= goal->lo[k]) || !(t->x[k] <= goal->hi[k]) || !isfinite(t->start[k]))
+        if (!(t->x[k] >= goal->lo[k]) || !(t->x[k] <= goal->hi[k]) ||
+            !isfinite(t->start[k]))
             IMP_TRY(damaged(s, "values outside their bounds"));
     IMP_TRY(get_head(s, "history", &n));
     for (size_t k = 0; k < n; k++) IMP_TRY(imp__search_log(t, (struct imp_estimate){0}));
@@ -204,7 +214,8 @@ static enum imp_status read_body(struct source *s, const struct imp__goal *goal,
     }
     const uint64_t hash = s->hash;
     unsigned long long end;
-    if (fscanf(s->f, "end %llx", &end) != 1 || end != hash) IMP_TRY(damaged(s, "checksum"));
+    if (fscanf(s->f, "end %llx", &end) != 1 || end != hash)
+        IMP_TRY(damaged(s, "checksum"));
 out:
     return st;
 }
@@ -219,8 +230,8 @@ static void swap(struct imp__search *to, struct imp__search *from)
 
 enum imp_status imp__checkpoint_read(imp_context *ctx, const char *path,
                                      const struct imp__fingerprint *of,
-                                     const struct imp__goal *goal, struct imp__search *search,
-                                     bool *found)
+                                     const struct imp__goal *goal,
+                                     struct imp__search *search, bool *found)
 {
     enum imp_status st = IMP_OK;
     struct source s = {.ctx = ctx, .path = path, .f = fopen(path, "rb")};
@@ -230,9 +241,11 @@ enum imp_status imp__checkpoint_read(imp_context *ctx, const char *path,
 
     *found = s.f != NULL;
     if (!s.f)
-        return errno == ENOENT ? IMP_OK
-                               : imp__error(ctx, IMP_E_IO, "%s: %s", path, strerror(errno));
-    if (fseek(s.f, 0, SEEK_END) != 0) IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: cannot be read", path));
+        return errno == ENOENT
+                   ? IMP_OK
+                   : imp__error(ctx, IMP_E_IO, "%s: %s", path, strerror(errno));
+    if (fseek(s.f, 0, SEEK_END) != 0)
+        IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: cannot be read", path));
     const long size = ftell(s.f);
     if (size < 0 || fseek(s.f, 0, SEEK_SET) != 0)
         IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: cannot be read", path));

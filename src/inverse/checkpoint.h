@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Checkpoints: the state of a search as a text file, numbers as the 64 bits of a double in
- * hexadecimal, so that a continued fit has the bits of one that was never stopped. */
+ * Checkpoints: the state of a search as a text file, numbers as the 64 bits of a double
+ * in hexadecimal, so that a continued fit has the bits of one that was never stopped. */
 #ifndef IMP_INVERSE_CHECKPOINT_H
 #define IMP_INVERSE_CHECKPOINT_H
 
@@ -21,8 +21,8 @@ enum imp_status imp__checkpoint_write(imp_context *ctx, const char *path,
  * *found false: there is no such file. IMP_E_ARG: it belongs to another problem. */
 enum imp_status imp__checkpoint_read(imp_context *ctx, const char *path,
                                      const struct imp__fingerprint *of,
-                                     const struct imp__goal *goal, struct imp__search *search,
-                                     bool *found);
+                                     const struct imp__goal *goal,
+                                     struct imp__search *search, bool *found);
 
 /* Running hash of bytes, for fingerprints. */
 uint64_t imp__hash(uint64_t h, const void *bytes, size_t n);

@@ -1,28 +1,29 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Do two pictures have the same expectation? A z-test of every pixel and channel, with
- * Sidak's level so that the picture as a whole fails by chance once in a hundred, and one of
- * every channel's mean, which sees a bias far below a pixel's noise (scene-format 14). Pixels
- * must be independent: compare pictures made with box filters. */
+ * Sidak's level so that the picture as a whole fails by chance once in a hundred, and one
+ * of every channel's mean, which sees a bias far below a pixel's noise (scene-format 14).
+ * Pixels must be independent: compare pictures made with box filters. */
 #include "base/film.h"
 #include "color/rgb.h"
 #include "math/stat.h"
 #include <math.h>
 #include <string.h>
 
-#define LEVEL 0.01             /* of the whole picture */
+#define LEVEL           0.01   /* of the whole picture */
 #define PIXELS_MAX_FAIL 0.0025 /* pixels beyond the level: fireflies are not normal */
-#define MEAN_Z_MAX 4
-#define OVER2_MAX 0.1          /* 0.0455 by chance; only where the variance is a reference's */
-/* One sigma of what pictures of equal scenes differ by for good, relative: Mitsuba's white has
- * moved by 3e-4 between versions with its colour tables. */
+#define MEAN_Z_MAX      4
+#define OVER2_MAX       0.1 /* 0.0455 by chance; only where the variance is a reference's */
+/* One sigma of what pictures of equal scenes differ by for good, relative: Mitsuba's
+ * white has moved by 3e-4 between versions with its colour tables. */
 #define MEAN_SYSTEMATIC 1e-4
-#define WITHOUT_Z 1e-3         /* relative rmse that agrees where nothing is known of noise */
+#define WITHOUT_Z       1e-3 /* relative rmse that agrees where nothing is known of noise */
 
 struct pair {
     const imp_film *test, *reference;
     const struct imp_compare_options *options;
-    int *of_test, *of_variance; /* [reference->channels] the channels with the same name */
+    int *of_test,
+        *of_variance; /* [reference->channels] the channels with the same name */
     size_t pixels;
 };
 
@@ -40,12 +41,13 @@ static int partner(const imp_film *film, const imp_film *reference, int c)
     return film->channels == reference->channels ? c : -1;
 }
 
-static enum imp_status match(imp_context *ctx, const imp_film *film, const imp_film *reference,
-                             const char *what, int *of)
+static enum imp_status match(imp_context *ctx, const imp_film *film,
+                             const imp_film *reference, const char *what, int *of)
 {
     if (film->width != reference->width || film->height != reference->height)
-        return imp__error(ctx, IMP_E_ARG, "the %s is %d x %d, the reference %d x %d", what,
-                          film->width, film->height, reference->width, reference->height);
+        return imp__error(ctx, IMP_E_ARG, "the %s is %d x %d, the reference %d x %d",
+                          what, film->width, film->height, reference->width,
+                          reference->height);
     for (int c = 0; c < reference->channels; c++)
         if ((of[c] = partner(film, reference, c)) < 0)
             return imp__error(ctx, IMP_E_ARG, "the %s has no channel '%s'", what,
@@ -53,15 +55,16 @@ static enum imp_status match(imp_context *ctx, const imp_film *film, const imp_f
     return IMP_OK;
 }
 
-/* Variance of test - reference in value i of channel c, from whatever is known; < 0: nothing.
- * `floor` is of the variance of one sample. */
+/* Variance of test - reference in value i of channel c, from whatever is known; < 0:
+ * nothing. `floor` is of the variance of one sample. */
 static double variance_at(const struct pair *p, size_t pixel, int c, double floor)
 {
     const struct imp_compare_options *o = p->options;
     const size_t r = pixel * (size_t)p->reference->channels + (size_t)c;
     const size_t t = pixel * (size_t)p->test->channels + (size_t)p->of_test[c];
     if (o->variance) {
-        const size_t v = pixel * (size_t)o->variance->channels + (size_t)p->of_variance[c];
+        const size_t v =
+            pixel * (size_t)o->variance->channels + (size_t)p->of_variance[c];
         const double one = fmax(o->variance->mean[v], floor);
         return one / o->n_test + (o->n_reference > 0 ? one / o->n_reference : 0);
     }
@@ -78,15 +81,18 @@ static void channel(const struct pair *p, int c, double level, struct sums *s)
     double a = 0, b = 0, n = 0, var = 0;
     bool has_z = true;
     for (size_t i = 0; i < p->pixels; i++) {
-        const double r = p->reference->mean[i * (size_t)p->reference->channels + (size_t)c];
+        const double r =
+            p->reference->mean[i * (size_t)p->reference->channels + (size_t)c];
         if (isfinite(r)) b += r, n++;
     }
     const double mean = n > 0 ? b / n : 0;
     const double floor = p->options->floor > 0 ? p->options->floor : 1e-4 * mean * mean;
     b = n = 0;
     for (size_t i = 0; i < p->pixels; i++) {
-        const double t = p->test->mean[i * (size_t)p->test->channels + (size_t)p->of_test[c]];
-        const double r = p->reference->mean[i * (size_t)p->reference->channels + (size_t)c];
+        const double t =
+            p->test->mean[i * (size_t)p->test->channels + (size_t)p->of_test[c]];
+        const double r =
+            p->reference->mean[i * (size_t)p->reference->channels + (size_t)c];
         if (!isfinite(t) || !isfinite(r)) {
             s->broken |= isfinite(t) != isfinite(r) || (isinf(t) && t != r);
             continue;
@@ -112,12 +118,14 @@ static void channel(const struct pair *p, int c, double level, struct sums *s)
         s->mean_z = fmax(s->mean_z, var > 0 ? fabs(a - b) / sqrt(var) : INFINITY);
 }
 
-static enum imp_status options_check(imp_context *ctx, const struct imp_compare_options *o)
+static enum imp_status options_check(imp_context *ctx,
+                                     const struct imp_compare_options *o)
 {
     if (!(o->n_test >= 0) || !(o->n_reference >= 0) || !(o->floor >= 0))
         return imp__error(ctx, IMP_E_ARG, "sample counts and floor must be >= 0");
     if (o->variance && !(o->n_test > 0))
-        return imp__error(ctx, IMP_E_ARG, "a variance picture needs the test's samples per pixel");
+        return imp__error(ctx, IMP_E_ARG,
+                          "a variance picture needs the test's samples per pixel");
     if (o->xyz && !o->variance)
         return imp__error(ctx, IMP_E_ARG, "xyz needs a variance picture");
     return IMP_OK;
@@ -132,16 +140,15 @@ static enum imp_status xyz_make(imp_context *ctx, const imp_film *from, const ch
     const bool rgb = r >= 0 && g >= 0 && b >= 0;
     if (!rgb && y < 0)
         return imp__error(ctx, IMP_E_ARG, "the %s has neither R, G, B nor Y", what);
-    const enum imp_status st = imp_film_create(ctx, from->width, from->height, "X,Y,Z", out);
+    const enum imp_status st =
+        imp_film_create(ctx, from->width, from->height, "X,Y,Z", out);
     if (st != IMP_OK) return st;
     (*out)->spp = from->spp;
     for (size_t i = 0; i < (size_t)from->width * (size_t)from->height; i++) {
         const float *pixel = from->mean + i * (size_t)from->channels;
         double xyz[3];
-        if (rgb)
-            imp__rgb_to_xyz((double[3]){pixel[r], pixel[g], pixel[b]}, xyz);
-        else
-            xyz[0] = xyz[1] = xyz[2] = pixel[y];
+        if (rgb) imp__rgb_to_xyz((double[3]){pixel[r], pixel[g], pixel[b]}, xyz);
+        else xyz[0] = xyz[1] = xyz[2] = pixel[y];
         for (int c = 0; c < 3; c++) (*out)->mean[3 * i + (size_t)c] = (float)xyz[c];
     }
     return IMP_OK;
@@ -174,27 +181,33 @@ enum imp_status imp_compare(imp_context *ctx, imp_film *test, imp_film *referenc
     const size_t channels = (size_t)reference->channels;
     p.pixels = (size_t)reference->width * (size_t)reference->height;
     p.of_test = imp__alloc(ctx, 2 * channels, sizeof *p.of_test);
-    if (!p.of_test) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory to compare pictures"));
+    if (!p.of_test)
+        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory to compare pictures"));
     p.of_variance = p.of_test + channels;
     IMP_TRY(match(ctx, test, reference, "test", p.of_test));
-    if (own.variance) IMP_TRY(match(ctx, own.variance, reference, "variance", p.of_variance));
+    if (own.variance)
+        IMP_TRY(match(ctx, own.variance, reference, "variance", p.of_variance));
 
     const double level = imp__sidak(LEVEL, (double)p.pixels);
     for (int c = 0; c < reference->channels; c++) channel(&p, c, level, &s);
     const double n = fmax(s.n, 1), n_z = fmax(s.n_z, 1);
     const struct imp_compare_result r = {
-        .size = sizeof r, .rmse = sqrt(s.square / n),
+        .size = sizeof r,
+        .rmse = sqrt(s.square / n),
         .relative_rmse = s.square > 0 ? sqrt(s.square / s.reference_square) : 0,
-        .max_abs = s.broken ? INFINITY : s.max_abs, .mean_a = s.a / n, .mean_b = s.b / n,
-        .p_fail_fraction = s.fail / n_z, .mean_z = s.mean_z, .over2 = s.over2 / n_z,
+        .max_abs = s.broken ? INFINITY : s.max_abs,
+        .mean_a = s.a / n,
+        .mean_b = s.b / n,
+        .p_fail_fraction = s.fail / n_z,
+        .mean_z = s.mean_z,
+        .over2 = s.over2 / n_z,
         .has_z = own.variance || test->se || reference->se,
         .agree = !s.broken && s.n > 0};
     *result = r;
     if (r.has_z)
-        result->agree &= r.p_fail_fraction <= PIXELS_MAX_FAIL && r.mean_z < MEAN_Z_MAX
-                         && (!own.variance || r.over2 <= OVER2_MAX);
-    else
-        result->agree &= r.relative_rmse <= WITHOUT_Z;
+        result->agree &= r.p_fail_fraction <= PIXELS_MAX_FAIL && r.mean_z < MEAN_Z_MAX &&
+                         (!own.variance || r.over2 <= OVER2_MAX);
+    else result->agree &= r.relative_rmse <= WITHOUT_Z;
 out:
     imp__release(ctx, p.of_test);
     for (int k = 0; k < 3; k++) imp_film_destroy(xyz[k]);

@@ -14,27 +14,29 @@
 
 #define Z_TWO_SIDED 1.959963984540054
 #define Z_ONE_SIDED 1.6448536269514722
-#define LOOSE_SHARE 0.1  /* part of a variable in a loose direction that makes it loose */
+#define LOOSE_SHARE                                                                      \
+    0.1 /* part of a variable in a loose direction that makes it loose                   \
+         */
 #define SEED_BASE 0x40000000 /* iteration numbers no search reaches */
 
 /* The analysis over a subset of the variables. */
 struct analysis {
-    size_t m;                  /* variables in it */
-    size_t *index;             /* [m] */
-    double *values, *vectors;  /* [m], [m][m] of the scaled H, from data alone */
-    double *se;                /* [m] of the eigenvalues */
+    size_t m;                 /* variables in it */
+    size_t *index;            /* [m] */
+    double *values, *vectors; /* [m], [m][m] of the scaled H, from data alone */
+    double *se;               /* [m] of the eigenvalues */
     size_t n_loose;
-    bool *loose;               /* [m] eigenvalue not above its noise */
-    double *G;                 /* [n][n] generalised inverse, 0 outside */
+    bool *loose; /* [m] eigenvalue not above its noise */
+    double *G;   /* [n][n] generalised inverse, 0 outside */
 };
 
 struct all {
     const struct imp__goal *goal;
     size_t n;
     int replicates;
-    struct imp__normal mean;   /* over the replicates */
-    double *H_each;            /* [replicates][n][n], data part */
-    double *scale;             /* [n] max(|x|, goal's scale) */
+    struct imp__normal mean; /* over the replicates */
+    double *H_each;          /* [replicates][n][n], data part */
+    double *scale;           /* [n] max(|x|, goal's scale) */
 };
 
 void imp__uncertainty_destroy(imp_context *ctx, struct imp__uncertainty *u)
@@ -57,7 +59,7 @@ static void analysis_destroy(imp_context *ctx, struct analysis *a)
     imp__release(ctx, a->G);
 }
 
-/* ---- Replicates -------------------------------------------------------------------------- */
+/* ---- Replicates ---------------------------------------------------------------- */
 
 static enum imp_status replicate(struct all *a, const double *x)
 {
@@ -93,17 +95,18 @@ out:
     return st;
 }
 
-/* ---- Directions -------------------------------------------------------------------------- */
+/* ---- Directions ---------------------------------------------------------------- */
 
 /* v^T D H D v over the subset, v row j of the eigenvectors. */
-static double along(const struct all *all, const struct analysis *a, const double *H, size_t j)
+static double along(const struct all *all, const struct analysis *a, const double *H,
+                    size_t j)
 {
     double sum = 0;
     for (size_t p = 0; p < a->m; p++)
         for (size_t q = 0; q < a->m; q++) {
             const size_t k = a->index[p], l = a->index[q];
-            sum += a->vectors[j * a->m + p] * a->vectors[j * a->m + q] * all->scale[k]
-                   * all->scale[l] * H[k * all->n + l];
+            sum += a->vectors[j * a->m + p] * a->vectors[j * a->m + q] * all->scale[k] *
+                   all->scale[l] * H[k * all->n + l];
         }
     return sum;
 }
@@ -115,23 +118,26 @@ static enum imp_status directions(const struct all *all, struct analysis *a)
     const size_t m = a->m, n = all->n;
     double *A = imp__alloc(all->goal->ctx, m * m, sizeof *A);
 
-    if (!A) IMP_TRY(imp__error(all->goal->ctx, IMP_E_NOMEM, "no memory for a covariance"));
+    if (!A)
+        IMP_TRY(imp__error(all->goal->ctx, IMP_E_NOMEM, "no memory for a covariance"));
     for (size_t p = 0; p < m; p++)
         for (size_t q = 0; q < m; q++) {
             const size_t k = a->index[p], l = a->index[q];
-            A[p * m + q] = all->scale[k] * all->scale[l]
-                           * (all->mean.H[k * n + l] - all->mean.H_prior[k * n + l]);
+            A[p * m + q] = all->scale[k] * all->scale[l] *
+                           (all->mean.H[k * n + l] - all->mean.H_prior[k * n + l]);
         }
     if (!imp__eigen_symmetric(m, A, a->values, a->vectors))
         IMP_TRY(imp__error(all->goal->ctx, IMP_E_NUMERIC, "J^T J is not finite"));
     for (size_t j = 0; j < m; j++) {
         double sum = 0;
         for (int b = 0; b < all->replicates; b++) {
-            const double d = along(all, a, all->H_each + (size_t)b * n * n, j) - a->values[j];
+            const double d =
+                along(all, a, all->H_each + (size_t)b * n * n, j) - a->values[j];
             sum += d * d;
         }
         a->se[j] = sqrt(sum / (all->replicates - 1) / all->replicates);
-        a->loose[j] = !(a->values[j] > 2 * a->se[j]) || a->values[j] <= 1e-12 * a->values[m - 1];
+        a->loose[j] =
+            !(a->values[j] > 2 * a->se[j]) || a->values[j] <= 1e-12 * a->values[m - 1];
         a->n_loose += a->loose[j];
     }
 out:
@@ -145,12 +151,13 @@ static enum imp_status inverse(const struct all *all, struct analysis *a)
     enum imp_status st = IMP_OK;
     imp_context *ctx = all->goal->ctx;
     const size_t m = a->m, n = all->n, r = m - a->n_loose;
-    double *V = imp__alloc(ctx, m * r + 1, sizeof *V);       /* D V, [m][r] */
+    double *V = imp__alloc(ctx, m * r + 1, sizeof *V); /* D V, [m][r] */
     double *HV = imp__alloc(ctx, m * r + 1, sizeof *HV);
     double *M = imp__alloc(ctx, r * r + 1, sizeof *M);
     double *row = imp__alloc(ctx, r + 1, sizeof *row);
 
-    if (!V || !HV || !M || !row) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a covariance"));
+    if (!V || !HV || !M || !row)
+        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a covariance"));
     for (size_t j = 0, c = 0; j < m; j++) {
         if (a->loose[j]) continue;
         for (size_t p = 0; p < m; p++)
@@ -166,7 +173,8 @@ static enum imp_status inverse(const struct all *all, struct analysis *a)
         for (size_t c = 0; c < r; c++)
             for (size_t d = 0; d < r; d++) M[c * r + d] += V[p * r + c] * HV[p * r + d];
     if (r > 0 && !imp__cholesky(r, M))
-        IMP_TRY(imp__error(ctx, IMP_E_NUMERIC, "J^T J is not positive where it is determined"));
+        IMP_TRY(imp__error(ctx, IMP_E_NUMERIC,
+                           "J^T J is not positive where it is determined"));
     for (size_t p = 0; p < m; p++) {
         memcpy(row, V + p * r, r * sizeof *row);
         imp__cholesky_solve(r, M, row);
@@ -184,7 +192,8 @@ out:
     return st;
 }
 
-static enum imp_status analyse(const struct all *all, const bool *fixed, struct analysis *a)
+static enum imp_status analyse(const struct all *all, const bool *fixed,
+                               struct analysis *a)
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = all->goal->ctx;
@@ -219,8 +228,8 @@ static bool loose(const struct analysis *a, size_t k)
 }
 
 /* out = G C G^T */
-static enum imp_status sandwich(imp_context *ctx, size_t n, const double *G, const double *C,
-                                double *out)
+static enum imp_status sandwich(imp_context *ctx, size_t n, const double *G,
+                                const double *C, double *out)
 {
     double *GC = imp__alloc(ctx, n * n, sizeof *GC);
     if (!GC) return imp__error(ctx, IMP_E_NOMEM, "no memory for a covariance");
@@ -237,9 +246,9 @@ static enum imp_status sandwich(imp_context *ctx, size_t n, const double *G, con
     return IMP_OK;
 }
 
-/* Covariance of the gradient by noise of the data. With unknown noise of variance s^2/w the
- * best estimate is s^2 = chi2_min/(M - m), chi2_min the value at the minimum, reached from
- * here by the Newton step; the part of g^T G g that is our own noise is left in. */
+/* Covariance of the gradient by noise of the data. With unknown noise of variance s^2/w
+ * the best estimate is s^2 = chi2_min/(M - m), chi2_min the value at the minimum, reached
+ * from here by the Newton step; the part of g^T G g that is our own noise is left in. */
 static double noise_scale(const struct all *all, const struct analysis *a)
 {
     const size_t n = all->n;
@@ -252,8 +261,8 @@ static double noise_scale(const struct all *all, const struct analysis *a)
     return freedom > 0 ? fmax((e->chi2 - fmax(q, 0)) / freedom, 0) : 0;
 }
 
-static void interval_free(const struct imp__goal *goal, size_t k, bool is_loose, double se,
-                          struct imp_fit_variable *v)
+static void interval_free(const struct imp__goal *goal, size_t k, bool is_loose,
+                          double se, struct imp_fit_variable *v)
 {
     v->determined = !is_loose;
     v->se = is_loose ? NAN : se;
@@ -261,10 +270,10 @@ static void interval_free(const struct imp__goal *goal, size_t k, bool is_loose,
     v->hi95 = is_loose ? NAN : imp__into_bounds(goal, k, v->value + Z_TWO_SIDED * se);
 }
 
-/* At a bound the interval is one-sided: from the bound to what the data still allow, about
- * the point `u` that they would choose without it. */
-static void interval_bound(const struct imp__goal *goal, size_t k, bool is_loose, double u,
-                           double se, struct imp_fit_variable *v)
+/* At a bound the interval is one-sided: from the bound to what the data still allow,
+ * about the point `u` that they would choose without it. */
+static void interval_bound(const struct imp__goal *goal, size_t k, bool is_loose,
+                           double u, double se, struct imp_fit_variable *v)
 {
     interval_free(goal, k, is_loose, se, v);
     if (is_loose) return;
@@ -286,14 +295,16 @@ static enum imp_status newton_point(const struct all *all, const double *x,
         double step = 0;
         for (size_t l = 0; l < n; l++) step += a->G[k * n + l] * all->mean.g[l];
         out[k] = x[k] - step;
-        if (!isfinite(out[k])) return imp__error(goal->ctx, IMP_E_NUMERIC, "no Newton point");
+        if (!isfinite(out[k]))
+            return imp__error(goal->ctx, IMP_E_NUMERIC, "no Newton point");
     }
     return IMP_OK;
 }
 
 /* Is the Newton point worth going to? A model that fails at x (not converged, far outside
  * its range) must not throw away what the search found. */
-static enum imp_status accept(const struct all *all, const double *x, double *point, bool *yes)
+static enum imp_status accept(const struct all *all, const double *x, double *point,
+                              bool *yes)
 {
     const struct imp__goal *goal = all->goal;
     struct imp_estimate old, new;
@@ -302,13 +313,13 @@ static enum imp_status accept(const struct all *all, const double *x, double *po
     for (size_t k = 0; k < all->n; k++) point[k] = imp__into_bounds(goal, k, point[k]);
     IMP_TRY(goal->eval(x, seed, &old, NULL, NULL, goal->payload));
     IMP_TRY(goal->eval(point, seed, &new, NULL, NULL, goal->payload));
-    *yes = new.value <= old.value + 2 * sqrt(old.se * old.se + new.se * new.se);
+    *yes = new.value <= old.value + 2 * sqrt(old.se * old.se + new.se *new.se);
 out:
     return st;
 }
 
-enum imp_status imp__covariance(const struct imp__goal *goal, const double *x, int replicates,
-                                struct imp_fit_variable *variables,
+enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
+                                int replicates, struct imp_fit_variable *variables,
                                 struct imp__uncertainty *out)
 {
     enum imp_status st = IMP_OK;
@@ -318,7 +329,8 @@ enum imp_status imp__covariance(const struct imp__goal *goal, const double *x, i
     struct analysis every = {0}, some = {0};
     struct imp__uncertainty u = {.n = n};
     bool *fixed = imp__alloc(ctx, n, sizeof *fixed), go = false, any_fixed = false;
-    double *cov[2] = {imp__alloc(ctx, n * n, sizeof(double)), imp__alloc(ctx, n * n, sizeof(double))};
+    double *cov[2] = {imp__alloc(ctx, n * n, sizeof(double)),
+                      imp__alloc(ctx, n * n, sizeof(double))};
     double *wish = imp__alloc(ctx, n, sizeof *wish);
 
     IMP_TRY(imp__normal_create(ctx, n, &all.mean));
@@ -328,8 +340,8 @@ enum imp_status imp__covariance(const struct imp__goal *goal, const double *x, i
     u.loosest = imp__alloc(ctx, n, sizeof(double));
     u.measurement = imp__alloc(ctx, n * n, sizeof(double));
     u.monte_carlo = imp__alloc(ctx, n * n, sizeof(double));
-    if (!fixed || !cov[0] || !cov[1] || !wish || !all.H_each || !all.scale || !u.x || !u.loosest
-        || !u.measurement || !u.monte_carlo)
+    if (!fixed || !cov[0] || !cov[1] || !wish || !all.H_each || !all.scale || !u.x ||
+        !u.loosest || !u.measurement || !u.monte_carlo)
         IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a covariance"));
     for (size_t k = 0; k < n; k++) all.scale[k] = fmax(fabs(x[k]), goal->scale[k]);
     IMP_TRY(replicate(&all, x));
@@ -349,8 +361,9 @@ enum imp_status imp__covariance(const struct imp__goal *goal, const double *x, i
     for (size_t round = 0; round < n; round++) {
         bool more = false;
         for (size_t k = 0; k < n; k++)
-            if (!fixed[k] && (u.x[k] < goal->lo[k] || u.x[k] > goal->hi[k])
-                && imp__at_bound(goal, x, k)) fixed[k] = more = any_fixed = true;
+            if (!fixed[k] && (u.x[k] < goal->lo[k] || u.x[k] > goal->hi[k]) &&
+                imp__at_bound(goal, x, k))
+                fixed[k] = more = any_fixed = true;
         if (!more) break;
         analysis_destroy(ctx, &some);
         some = (struct analysis){0};
@@ -371,8 +384,9 @@ enum imp_status imp__covariance(const struct imp__goal *goal, const double *x, i
     IMP_TRY(sandwich(ctx, n, every.G, noise, cov[0]));
     IMP_TRY(sandwich(ctx, n, every.G, all.mean.cov_g, cov[1]));
 
-    u.condition = every.values[0] > 0 && !every.loose[0] ? every.values[n - 1] / every.values[0]
-                                                          : INFINITY;
+    u.condition = every.values[0] > 0 && !every.loose[0]
+                      ? every.values[n - 1] / every.values[0]
+                      : INFINITY;
     u.n_loose = (int)every.n_loose;
     for (size_t k = 0; k < n; k++) {
         struct imp_fit_variable *v = &variables[k];

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What a fit knows about its answer: covariance in two parts, intervals, and directions in
- * which the data say nothing (gradients.md 15). */
+ * What a fit knows about its answer: covariance in two parts, intervals, and directions
+ * in which the data say nothing (gradients.md 15). */
 #ifndef IMP_INVERSE_COVARIANCE_H
 #define IMP_INVERSE_COVARIANCE_H
 
@@ -9,20 +9,21 @@
 
 struct imp__uncertainty {
     size_t n;
-    double *x;             /* [n] a last Newton step from the x handed in, made with random
-                              numbers of its own: its error is what `covariance` describes */
-    double *measurement;   /* [n][n] covariance: noise of the data */
-    double *monte_carlo;   /* [n][n] covariance: noise of the estimator */
-    double condition;      /* of the scaled H; INFINITY if it is singular */
-    int n_loose;           /* directions that are not determined */
-    double *loosest;       /* [n] unit vector, in units of the scales: the worst of them */
-    double noise_scale;    /* estimated variance of the data in units of 1/weight; 0: known */
+    double *x;           /* [n] a last Newton step from the x handed in, made with random
+                            numbers of its own: its error is what `covariance` describes */
+    double *measurement; /* [n][n] covariance: noise of the data */
+    double *monte_carlo; /* [n][n] covariance: noise of the estimator */
+    double condition;    /* of the scaled H; INFINITY if it is singular */
+    int n_loose;         /* directions that are not determined */
+    double *loosest;     /* [n] unit vector, in units of the scales: the worst of them */
+    double
+        noise_scale; /* estimated variance of the data in units of 1/weight; 0: known */
 };
 
 /* Evaluate the normal equations at x `replicates` (>= 2) times with fresh random numbers.
  * Sets value, se, lo95, hi95, at_bound, determined of variables [n]. */
-enum imp_status imp__covariance(const struct imp__goal *goal, const double *x, int replicates,
-                                struct imp_fit_variable *variables,
+enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
+                                int replicates, struct imp_fit_variable *variables,
                                 struct imp__uncertainty *out);
 void imp__uncertainty_destroy(imp_context *ctx, struct imp__uncertainty *u);
 

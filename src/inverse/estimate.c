@@ -5,17 +5,18 @@
  *
  *     P_i = (1/n) l'( (S - L_i)/(n - 1) )                              (leave-one-out)
  *
- * which makes the gradient of a quadratic loss unbiased at any n >= 2, at the price of one
- * render and a sweep (gradients.md 5.2, form B). A smooth loss that is not quadratic uses the
- * jackknife, whose adjoints stand in `adjoints`. A fixed adjoint image needs no mean. Filters wider than a pixel take two passes with the same random numbers
+ * which makes the gradient of a quadratic loss unbiased at any n >= 2, at the price of
+ * one render and a sweep (gradients.md 5.2, form B). A smooth loss that is not quadratic
+ * uses the jackknife, whose adjoints stand in `adjoints`. A fixed adjoint image needs no
+ * mean. Filters wider than a pixel take two passes with the same random numbers
  * (splat.c). */
 #include "estimate.h"
-#include <string.h>
 #include "loss.h"
 #include "splat.h"
 #include "tally.h"
 #include "walk/measure.h"
 #include "walk/picture.h"
+#include <string.h>
 
 struct imp_run imp__run_or_default(const struct imp_run *run)
 {
@@ -46,25 +47,29 @@ static enum imp_status attached_allowed(const struct imp_scene *scene)
     }
     for (int b = 0; fine && b < scene->n_bsdfs; b++)
         if (scene->bsdfs[b]->flags & IMP_BSDF_JUMP)
-            return imp__error(scene->ctx, IMP_E_BIAS,
-                              "alpha_gradient=attached has no boundary term for the jump of "
-                              "material '%s' at the horizon; use variant=reciprocal, or "
-                              "detached", scene->bsdfs[b]->name);
+            return imp__error(
+                scene->ctx, IMP_E_BIAS,
+                "alpha_gradient=attached has no boundary term for the jump of "
+                "material '%s' at the horizon; use variant=reciprocal, or "
+                "detached",
+                scene->bsdfs[b]->name);
     if (fine) return IMP_OK;
-    return imp__error(scene->ctx, IMP_E_BIAS,
-                      "alpha_gradient=attached is unbiased only for one convex shape under a "
-                      "constant environment; use detached");
+    return imp__error(
+        scene->ctx, IMP_E_BIAS,
+        "alpha_gradient=attached is unbiased only for one convex shape under a "
+        "constant environment; use detached");
 }
 
-enum imp_status imp__problem_tracer(const struct imp_problem *p, const struct imp_run *run,
-                                    struct imp_tracer *out)
+enum imp_status imp__problem_tracer(const struct imp_problem *p,
+                                    const struct imp_run *run, struct imp_tracer *out)
 {
     const struct imp_sensor *sensor;
     enum imp_status st = imp__run_sensor(p->scene, run, &sensor);
     if (st != IMP_OK) return st;
     const struct imp_integrator *integrator = imp__radiance_integrator(p->scene);
     if (!integrator)
-        return imp__error(p->ctx, IMP_E_SCENE, "the scene's integrator has no derivative; "
+        return imp__error(p->ctx, IMP_E_SCENE,
+                          "the scene's integrator has no derivative; "
                           "use path, direct or stam");
     if (integrator->alpha_gradient == IMP_ALPHA_ATTACHED) {
         st = attached_allowed(p->scene);
@@ -74,34 +79,35 @@ enum imp_status imp__problem_tracer(const struct imp_problem *p, const struct im
     return IMP_OK;
 }
 
-/* ---- One pixel's replicate ------------------------------------------------------------- */
+/* ---- One pixel's replicate ----------------------------------------------------- */
 
 struct job {
     const struct imp_problem *problem;
     const struct imp_run *run;
-    double walks;                      /* planned */
+    double walks; /* planned */
     struct imp_tracer tracer;
     struct imp__replicates plan;
-    const struct imp__target *target;  /* NULL: fixed adjoint */
-    const float *seed;                 /* fixed adjoint image, [h][w][channels] */
-    const struct imp__splat *splat;    /* wide filters: pass 2; NULL: box */
+    const struct imp__target *target; /* NULL: fixed adjoint */
+    const float *seed;                /* fixed adjoint image, [h][w][channels] */
+    const struct imp__splat *splat;   /* wide filters: pass 2; NULL: box */
     int width, height, margin, channels;
     bool want_gradient;
-    struct imp_active nothing;         /* what the tally keeps without want_gradient */
+    struct imp_active nothing; /* what the tally keeps without want_gradient */
     struct worker {
         struct imp_arena arena;
         struct imp_tally tally;
-    } *workers;
+    } * workers;
     struct slot {
         struct imp_tally_result tally;
         double objective, variance;
         uint64_t dropped;
-    } *slots;
+    } * slots;
     double objective, variance, *gradient, *gradient_variance;
     uint64_t dropped;
 };
 
-/* What the loss sees of a pixel: its channels, or their luminance if the target has one. */
+/* What the loss sees of a pixel: its channels, or their luminance if the target has one.
+ */
 static double seen(const struct job *j, imp_spec L, int c)
 {
     if (j->target->desc.channels == j->channels) return L[c];
@@ -110,15 +116,19 @@ static double seen(const struct job *j, imp_spec L, int c)
 static imp_spec unseen(const struct job *j, const double *bar)
 {
     if (j->target->desc.channels == j->channels)
-        return j->channels == 3 ? (imp_spec){bar[0], bar[1], bar[2], 0} : (imp_spec){bar[0]};
+        return j->channels == 3 ? (imp_spec){bar[0], bar[1], bar[2], 0}
+                                : (imp_spec){bar[0]};
     return (imp_spec){0.212671 * bar[0], 0.715160 * bar[0], 0.072169 * bar[0], 0};
 }
 
-/* Adjoints of the n walks of one replicate, and its estimate of the loss. L [n], P [n]. */
-static double adjoints(const struct job *j, size_t pixel, int n, const imp_spec *L, imp_spec *P)
+/* Adjoints of the n walks of one replicate, and its estimate of the loss. L [n], P [n].
+ */
+static double adjoints(const struct job *j, size_t pixel, int n, const imp_spec *L,
+                       imp_spec *P)
 {
     const struct imp_target *t = &j->target->desc;
-    const double N = n, scale = t->scale * (j->target->weights ? j->target->weights[pixel] : 1);
+    const double N = n,
+                 scale = t->scale * (j->target->weights ? j->target->weights[pixel] : 1);
     double value = 0, bar[3];
     imp_spec channel_bar;
     for (int i = 0; i < n; i++) P[i] = (imp_spec){0};
@@ -141,13 +151,15 @@ static double adjoints(const struct job *j, size_t pixel, int n, const imp_spec 
             }
             continue;
         }
-        /* Jackknife: N g - (N-1)/N sum_i g_-i with g = l'(mean) mean(x) is linear in the x_j;
-         * the factor of x_j is l'(mean) - (A - a_j)/N, a_i = l'(mean without i), A = sum a_i.
-         * L1 has a kink, where the expansion behind the jackknife fails: plain a_j / N. */
+        /* Jackknife: N g - (N-1)/N sum_i g_-i with g = l'(mean) mean(x) is linear in the
+         * x_j; the factor of x_j is l'(mean) - (A - a_j)/N, a_i = l'(mean without i), A =
+         * sum a_i. L1 has a kink, where the expansion behind the jackknife fails: plain
+         * a_j / N. */
         struct imp__loss_at at;
         double A = 0, values = 0;
         for (int i = 0; i < n; i++) {
-            imp__loss_eval(t->loss, scale, t->epsilon, (S - seen(j, L[i], c)) / (N - 1), T, &at);
+            imp__loss_eval(t->loss, scale, t->epsilon, (S - seen(j, L[i], c)) / (N - 1),
+                           T, &at);
             A += at.d1;
             values += at.value;
         }
@@ -156,7 +168,8 @@ static double adjoints(const struct job *j, size_t pixel, int n, const imp_spec 
         const double at_mean = at.d1;
         value += kink ? at.value : N * at.value - (N - 1) / N * values;
         for (int i = 0; i < n; i++) {
-            imp__loss_eval(t->loss, scale, t->epsilon, (S - seen(j, L[i], c)) / (N - 1), T, &at);
+            imp__loss_eval(t->loss, scale, t->epsilon, (S - seen(j, L[i], c)) / (N - 1),
+                           T, &at);
             bar[c] = kink ? at.d1 / N : at_mean - (A - at.d1) / N;
             channel_bar = unseen(j, bar);
             P[i] += channel_bar;
@@ -166,7 +179,8 @@ static double adjoints(const struct job *j, size_t pixel, int n, const imp_spec 
 }
 
 /* Replicate b of a pixel: trace, fold, adjoints, sweep. Returns its loss estimate. */
-static double replicate(struct job *j, struct worker *w, int x, int y, int b, uint64_t *dropped)
+static double replicate(struct job *j, struct worker *w, int x, int y, int b,
+                        uint64_t *dropped)
 {
     const int n = j->plan.n;
     const struct imp_arena_mark mark = imp__arena_mark(&w->arena);
@@ -192,8 +206,10 @@ static double replicate(struct job *j, struct worker *w, int x, int y, int b, ui
             P[0] = imp__splat_adjoint(j->splat, b, walks[i].px, walks[i].py, L[i]);
         else
             for (int c = 0; c < 4; c++)
-                P[0][c] = c < j->channels
-                              ? j->seed[pixel * (size_t)j->channels + (size_t)c] / (double)n : 0;
+                P[0][c] =
+                    c < j->channels
+                        ? j->seed[pixel * (size_t)j->channels + (size_t)c] / (double)n
+                        : 0;
         imp__walk_sweep(&j->tracer, &walks[i], P[0], &w->tally.sink);
         imp__arena_rewind(&w->arena, one);
     }
@@ -209,14 +225,15 @@ out:
     return value;
 }
 
-/* ---- Tiles ------------------------------------------------------------------------------ */
+/* ---- Tiles --------------------------------------------------------------------- */
 
 static enum imp_status tile_work(size_t item, int worker, int slot, void *payload)
 {
     struct job *j = payload;
     struct worker *w = &j->workers[worker];
     struct slot *out = &j->slots[slot];
-    const struct imp__tile t = imp__tile_of(item, j->width, j->height, j->margin, j->plan.chunks);
+    const struct imp__tile t =
+        imp__tile_of(item, j->width, j->height, j->margin, j->plan.chunks);
     const int b0 = imp__replicates_begin(j->plan, t.chunk);
     const int b1 = imp__replicates_begin(j->plan, t.chunk + 1);
     const double R = b1 - b0, all = j->plan.R;
@@ -236,10 +253,11 @@ static enum imp_status tile_work(size_t item, int worker, int slot, void *payloa
                 square += v * v;
             }
             if (w->arena.failed)
-                return imp__error(j->problem->ctx, IMP_E_NOMEM, "no memory to record walks");
+                return imp__error(j->problem->ctx, IMP_E_NOMEM,
+                                  "no memory to record walks");
             /* Lost already: walks that nothing ends take long. */
-            const enum imp_status st = imp__drops_check(j->problem->ctx, j->run, out->dropped,
-                                                        j->walks);
+            const enum imp_status st =
+                imp__drops_check(j->problem->ctx, j->run, out->dropped, j->walks);
             if (st != IMP_OK) return st;
             if (!paired) {
                 /* mean over all R replicates; variance R/(R-1) spread / all^2 */
@@ -272,7 +290,8 @@ static enum imp_status tile_commit(size_t item, int slot, void *payload)
     j->objective += in->objective;
     j->variance += in->variance;
     j->dropped += in->dropped;
-    imp__tally_add(&in->tally, j->want_gradient ? j->problem->n : 0, j->gradient, j->gradient_variance);
+    imp__tally_add(&in->tally, j->want_gradient ? j->problem->n : 0, j->gradient,
+                   j->gradient_variance);
     return imp__drops_check(j->problem->ctx, j->run, j->dropped, j->walks);
 }
 
@@ -290,8 +309,8 @@ static void job_destroy(struct job *j)
 }
 
 /* Adds objective, variance and gradients of this job to the totals in it. */
-static enum imp_status job_run(struct job *j, const struct imp_run *run, const char *stage,
-                               double lo, double hi, double start_s)
+static enum imp_status job_run(struct job *j, const struct imp_run *run,
+                               const char *stage, double lo, double hi, double start_s)
 {
     imp_context *ctx = j->problem->ctx;
     enum imp_status st = IMP_OK;
@@ -312,25 +331,34 @@ static enum imp_status job_run(struct job *j, const struct imp_run *run, const c
     const double walks = (double)j->width * j->height * j->plan.n * j->plan.R;
     j->run = run;
     j->walks = walks;
-    const struct imp_loop loop = {
-        .n_items = imp__tile_count(j->width, j->height, j->margin) * (size_t)j->plan.chunks,
-        .work = tile_work, .commit = tile_commit, .payload = j, .progress = run->progress,
-        .progress_payload = run->progress_payload, .stage = stage, .rate_unit = "walks",
-        .units = walks, .fraction_lo = lo, .fraction_hi = hi, .start_s = start_s};
+    const struct imp_loop loop = {.n_items =
+                                      imp__tile_count(j->width, j->height, j->margin) *
+                                      (size_t)j->plan.chunks,
+                                  .work = tile_work,
+                                  .commit = tile_commit,
+                                  .payload = j,
+                                  .progress = run->progress,
+                                  .progress_payload = run->progress_payload,
+                                  .stage = stage,
+                                  .rate_unit = "walks",
+                                  .units = walks,
+                                  .fraction_lo = lo,
+                                  .fraction_hi = hi,
+                                  .start_s = start_s};
     IMP_TRY(imp__parallel(ctx, &loop, NULL));
 out:
     job_destroy(j);
     return st;
 }
 
-/* ---- Public ------------------------------------------------------------------------------ */
+/* ---- Public -------------------------------------------------------------------- */
 
 /* Pass 1 of a wide filter: the replicates' pictures, and the adjoints of their pixels. */
 static enum imp_status splat_prepare(struct job *j, const struct imp_run *run,
                                      struct imp__splat *splat)
 {
-    const enum imp_status st = imp__splat_create(j->problem, &j->tracer, j->target, j->seed,
-                                                 j->plan, run, splat);
+    const enum imp_status st = imp__splat_create(j->problem, &j->tracer, j->target,
+                                                 j->seed, j->plan, run, splat);
     if (st == IMP_OK) {
         j->splat = splat;
         j->objective += splat->objective;
@@ -339,7 +367,8 @@ static enum imp_status splat_prepare(struct job *j, const struct imp_run *run,
     return st;
 }
 
-static enum imp_status target_estimate(struct imp_problem *p, const struct imp__target *target,
+static enum imp_status target_estimate(struct imp_problem *p,
+                                       const struct imp__target *target,
                                        const struct imp_run *run, double lo, double hi,
                                        double start_s, struct job *total)
 {
@@ -352,7 +381,8 @@ static enum imp_status target_estimate(struct imp_problem *p, const struct imp__
     if (st != IMP_OK) return st;
     const int spp = own.spp > 0 ? own.spp : j.tracer.sensor->spp;
     /* A loss that is not quadratic has its bias cut by longer batches. */
-    const int batch = imp__loss_quadratic(target->desc.loss) ? IMP_BATCH_MAX : 4 * IMP_BATCH_MAX;
+    const int batch =
+        imp__loss_quadratic(target->desc.loss) ? IMP_BATCH_MAX : 4 * IMP_BATCH_MAX;
     if (!j.want_gradient) j.tracer.active = NULL;
     j.plan = imp__replicates_plan(spp, batch);
     if (imp__film_border(&j.tracer.sensor->film) > 0) {
@@ -367,7 +397,8 @@ static enum imp_status target_estimate(struct imp_problem *p, const struct imp__
     return st;
 }
 
-enum imp_status imp_problem_objective(imp_problem *p, const double *x, const struct imp_run *run,
+enum imp_status imp_problem_objective(imp_problem *p, const double *x,
+                                      const struct imp_run *run,
                                       struct imp_estimate *objective, double *gradient,
                                       double *gradient_se)
 {
@@ -384,8 +415,10 @@ enum imp_status imp_problem_objective(imp_problem *p, const double *x, const str
     if (x) IMP_TRY(imp_problem_set_x(p, x));
     imp_problem_get_x(p, at);
 
-    struct job total = {.problem = p, .want_gradient = gradient || gradient_se,
-                        .gradient = g, .gradient_variance = v};
+    struct job total = {.problem = p,
+                        .want_gradient = gradient || gradient_se,
+                        .gradient = g,
+                        .gradient_variance = v};
     const double start = p->progress_start_s > 0 ? p->progress_start_s : imp__now();
     const double lo = p->progress_lo, hi = p->progress_hi > 0 ? p->progress_hi : 1;
     for (size_t t = 0; t < p->n_targets; t++) {
@@ -419,7 +452,10 @@ enum imp_status imp_problem_reverse(imp_problem *p, const float *seed_image,
     const struct imp_run own = imp__run_or_default(run);
     struct imp__splat splat = {0};
     double *g = imp__alloc(ctx, 2 * p->n, sizeof *g);
-    struct job j = {.problem = p, .seed = seed_image, .want_gradient = true, .gradient = g,
+    struct job j = {.problem = p,
+                    .seed = seed_image,
+                    .want_gradient = true,
+                    .gradient = g,
                     .gradient_variance = g ? g + p->n : NULL};
     if (!g) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for gradients"));
     IMP_TRY(imp__problem_tracer(p, &own, &j.tracer));
@@ -431,7 +467,8 @@ enum imp_status imp_problem_reverse(imp_problem *p, const float *seed_image,
     }
     IMP_TRY(job_run(&j, &own, "gradient", 0, 1, imp__now()));
     memcpy(gradient, g, p->n * sizeof *g);
-    for (size_t k = 0; gradient_se && k < p->n; k++) gradient_se[k] = sqrt(fmax(g[p->n + k], 0));
+    for (size_t k = 0; gradient_se && k < p->n; k++)
+        gradient_se[k] = sqrt(fmax(g[p->n + k], 0));
 out:
     imp__splat_destroy(ctx, &splat);
     imp__release(ctx, g);

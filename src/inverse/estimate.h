@@ -6,11 +6,11 @@
 
 #include "problem.h"
 
-#define IMP_BATCH_MAX 64      /* walks of a pixel kept at once (quadratic losses) */
+#define IMP_BATCH_MAX        64 /* walks of a pixel kept at once (quadratic losses) */
 #define IMP_BATCHES_PER_ITEM 8
 
-/* R replicates of n samples; spp = R n >= the spp asked for. R = 1 only where spp < 4: then
- * neighbouring pixels are paired, which makes the variance an upper bound. */
+/* R replicates of n samples; spp = R n >= the spp asked for. R = 1 only where spp < 4:
+ * then neighbouring pixels are paired, which makes the variance an upper bound. */
 struct imp__replicates {
     int n, R, chunks; /* chunks: work items per tile, each with at least 2 replicates */
 };
@@ -23,9 +23,11 @@ static inline int imp__replicates_begin(struct imp__replicates r, int k)
 
 /* A tile of TILE x TILE pixels of the picture, in rows. */
 #define IMP_ESTIMATE_TILE 8
-struct imp__tile { int x0, y0, x1, y1, chunk; };
-static inline struct imp__tile imp__tile_of(size_t item, int width, int height, int margin,
-                                            int chunks)
+struct imp__tile {
+    int x0, y0, x1, y1, chunk;
+};
+static inline struct imp__tile imp__tile_of(size_t item, int width, int height,
+                                            int margin, int chunks)
 {
     const int side = IMP_ESTIMATE_TILE;
     const int across = (width + 2 * margin + side - 1) / side;
@@ -46,8 +48,8 @@ static inline size_t imp__tile_count(int width, int height, int margin)
 }
 
 /* The tracer of a sensor for this problem, with every reason to refuse checked. */
-enum imp_status imp__problem_tracer(const struct imp_problem *p, const struct imp_run *run,
-                                    struct imp_tracer *out);
+enum imp_status imp__problem_tracer(const struct imp_problem *p,
+                                    const struct imp_run *run, struct imp_tracer *out);
 /* The run to use: the given one or the defaults. */
 struct imp_run imp__run_or_default(const struct imp_run *run);
 

@@ -6,9 +6,9 @@
 #include <math.h>
 #include <string.h>
 
-#define REPLICATES 6     /* independent normal equations behind intervals */
-#define EFFORT_SHARE 4   /* they take at least 1/4 of the samples that the search took */
-#define FINAL_SEED 0x40000001
+#define REPLICATES   6 /* independent normal equations behind intervals */
+#define EFFORT_SHARE 4 /* they take at least 1/4 of the samples that the search took */
+#define FINAL_SEED   0x40000001
 
 /* Evaluate what the search found with random numbers that it has not seen. */
 static enum imp_status final_objective(struct imp__fit *f, const double *x,
@@ -30,8 +30,8 @@ static int replicate_spp(const struct imp__fit *f, const struct imp__search *s)
 
 /* Covariance, intervals, and the last Newton step that belongs to them. *why: the reason
  * when there are none. */
-static enum imp_status intervals(struct imp__fit *f, const struct imp__search *s, double *x,
-                                 struct imp_fit_variable *variables,
+static enum imp_status intervals(struct imp__fit *f, const struct imp__search *s,
+                                 double *x, struct imp_fit_variable *variables,
                                  struct imp__uncertainty *u, const char **why)
 {
     imp_context *ctx = f->problem->ctx;
@@ -59,7 +59,8 @@ static enum imp_status result_make(struct imp__fit *f, const struct imp__search 
     double *history = imp__arena_array(arena, 2 * s->n_history + 1, sizeof *history);
 
     if (!r || !history)
-        return imp__error(f->problem->ctx, IMP_E_NOMEM, "no memory for the result of a fit");
+        return imp__error(f->problem->ctx, IMP_E_NOMEM,
+                          "no memory for the result of a fit");
     for (size_t k = 0; k < n; k++) {
         struct imp_fit_variable *v = &variables[k];
         v->start = s->start[k];
@@ -74,10 +75,16 @@ static enum imp_status result_make(struct imp__fit *f, const struct imp__search 
         memcpy(history + s->n_history, s->history_se, s->n_history * sizeof *history);
     }
     *r = (struct imp_fit_result){
-        .size = sizeof *r, .iterations = s->iteration, .objective = objective,
-        .n_history = s->n_history, .history = history, .history_se = history + s->n_history,
-        .n = n, .variables = variables, .condition = u->condition,
-        .reason = !f->stopped ? s->reason
+        .size = sizeof *r,
+        .iterations = s->iteration,
+        .objective = objective,
+        .n_history = s->n_history,
+        .history = history,
+        .history_se = history + s->n_history,
+        .n = n,
+        .variables = variables,
+        .condition = u->condition,
+        .reason = !f->stopped                                       ? s->reason
                   : f->deadline_s > 0 && imp__now() > f->deadline_s ? "time limit reached"
                                                                     : "cancelled",
         .warning = imp__fit_warning(f, objective.bias_order, variables, u->loosest, why)};
@@ -100,7 +107,8 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
 
     IMP_TRY(imp__fit_begin(p, options, run, &f));
     start = imp__alloc(ctx, 2 * p->n, sizeof *start);
-    if (!start) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for %zu variables", p->n));
+    if (!start)
+        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for %zu variables", p->n));
     x = start + p->n;
     imp_problem_get_x(p, start);
     const struct imp__opt_options o = {f.options.max_iterations, f.options.learning_rate,
@@ -108,8 +116,8 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
     IMP_TRY(imp__search_create(&f.goal, f.options.optimizer, &o, start, &s));
     bool found = false;
     if (f.options.resume)
-        IMP_TRY(imp__checkpoint_read(ctx, f.options.checkpoint, &f.fingerprint, &f.goal, s,
-                                     &found));
+        IMP_TRY(imp__checkpoint_read(ctx, f.options.checkpoint, &f.fingerprint, &f.goal,
+                                     s, &found));
     imp__fit_scales(&f, s->start);
     f.search = s;
     f.first_iteration = s->iteration;
@@ -123,7 +131,8 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
 
     imp__arena_free(&p->fit_arena);
     variables = imp__arena_array(&p->fit_arena, p->n, sizeof *variables);
-    if (!variables) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for the result of a fit"));
+    if (!variables)
+        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for the result of a fit"));
     memcpy(x, s->x, p->n * sizeof *x);
     struct imp_estimate objective = {NAN, NAN, 0};
     if (s->n_history > 0)
@@ -131,20 +140,25 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
                                           s->history_se[s->n_history - 1], 0};
     f.final_calls = 0;
     f.final_total = f.options.intervals && p->n <= IMP_DENSE_MAX ? REPLICATES + 3 : 1;
-    if (ended == IMP_OK && f.options.intervals) ended = intervals(&f, s, x, variables, &u, &why);
+    if (ended == IMP_OK && f.options.intervals)
+        ended = intervals(&f, s, x, variables, &u, &why);
     if (ended == IMP_OK) ended = final_objective(&f, x, &objective);
     if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
     IMP_TRY(imp_problem_set_x(p, x));
     IMP_TRY(result_make(&f, s, x, objective, &u, variables, why, result));
     if (f.outer.progress && ended == IMP_OK) {
-        const struct imp_progress last = {.size = sizeof last, .stage = "fit", .fraction = 1,
+        const struct imp_progress last = {.size = sizeof last,
+                                          .stage = "fit",
+                                          .fraction = 1,
                                           .elapsed_s = imp__now() - f.start_s,
-                                          .rate_unit = "iterations", .note = f.note};
+                                          .rate_unit = "iterations",
+                                          .note = f.note};
         f.outer.progress(&last, f.outer.progress_payload);
     }
     st = ended;
 out:
-    if (st != IMP_OK && st != IMP_CANCELLED && start && s) /* as if nothing had been tried */
+    if (st != IMP_OK && st != IMP_CANCELLED && start &&
+        s) /* as if nothing had been tried */
         (void)!imp_problem_set_x(p, start);
     imp__uncertainty_destroy(ctx, &u);
     imp__search_destroy(s);

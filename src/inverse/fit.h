@@ -9,38 +9,39 @@
 
 struct imp__fit {
     struct imp_problem *problem;
-    struct imp_fit_options options;      /* defaults filled in */
-    struct imp_run run;                  /* of one evaluation; its progress is ours */
-    struct imp_run outer;                /* the caller's */
+    struct imp_fit_options options; /* defaults filled in */
+    struct imp_run run;             /* of one evaluation; its progress is ours */
+    struct imp_run outer;           /* the caller's */
     struct imp__goal goal;
     struct imp__fingerprint fingerprint;
-    double *lo, *hi, *scale;             /* [n] */
-    double *g_se;                        /* [n], for Gauss-Newton */
-    double *H_prior;                     /* [n][n] second derivative of the regularisers */
-    bool noise_known;                    /* every target has noise_se */
+    double *lo, *hi, *scale; /* [n] */
+    double *g_se;            /* [n], for Gauss-Newton */
+    double *H_prior;         /* [n][n] second derivative of the regularisers */
+    bool noise_known;        /* every target has noise_se */
 
-    const struct imp__search *search;    /* being run, for reports */
-    double start_s, deadline_s;          /* deadline 0: none */
+    const struct imp__search *search; /* being run, for reports */
+    double start_s, deadline_s;       /* deadline 0: none */
     double last_report_s, last_checkpoint_s, checkpoint_cost_s;
     double fraction;
-    double search_share;                 /* of the work, the rest is what comes after it */
-    int final_calls, final_total;        /* evaluations after the search; total 0: not there */
-    int first_iteration;                 /* of this call: not 0 when continued */
-    bool stopped;                        /* by the caller or the deadline */
+    double search_share;          /* of the work, the rest is what comes after it */
+    int final_calls, final_total; /* evaluations after the search; total 0: not there */
+    int first_iteration;          /* of this call: not 0 when continued */
+    bool stopped;                 /* by the caller or the deadline */
     char note[96];
 };
 
 /* fit_goal.c: the goal of `problem`, everything of `fit` but the search. */
 enum imp_status imp__fit_begin(struct imp_problem *problem,
-                               const struct imp_fit_options *options, const struct imp_run *run,
-                               struct imp__fit *fit);
+                               const struct imp_fit_options *options,
+                               const struct imp_run *run, struct imp__fit *fit);
 /* Scales of the variables, from where the search starts. */
 void imp__fit_scales(struct imp__fit *fit, const double *start);
 void imp__fit_end(struct imp__fit *fit);
 
-/* fit_report.c: names and warnings. Text in the problem's fit_arena; NULL: out of memory. */
+/* fit_report.c: names and warnings. Text in the problem's fit_arena; NULL: out of memory.
+ */
 const char *imp__fit_warning(const struct imp__fit *fit, int bias_order,
-                             const struct imp_fit_variable *variables, const double *loosest,
-                             const char *no_intervals);
+                             const struct imp_fit_variable *variables,
+                             const double *loosest, const char *no_intervals);
 
 #endif

@@ -7,11 +7,11 @@
 #include <stdio.h>
 #include <string.h>
 
-#define CHECKPOINT_S 2      /* seconds between checkpoints, and at most */
+#define CHECKPOINT_S     2  /* seconds between checkpoints, and at most */
 #define CHECKPOINT_SHARE 20 /* 1/20 of the time */
-#define REPORT_S 0.1
+#define REPORT_S         0.1
 
-/* ---- Progress ------------------------------------------------------------------------------ */
+/* ---- Progress ------------------------------------------------------------------ */
 
 static void report(struct imp__fit *f, double fraction)
 {
@@ -23,9 +23,13 @@ static void report(struct imp__fit *f, double fraction)
     const double elapsed = now - f->start_s;
     const int done = f->search ? f->search->iteration - f->first_iteration : 0;
     const struct imp_progress p = {
-        .size = sizeof p, .stage = "fit", .fraction = f->fraction, .elapsed_s = elapsed,
+        .size = sizeof p,
+        .stage = "fit",
+        .fraction = f->fraction,
+        .elapsed_s = elapsed,
         .eta_s = f->fraction > 1e-3 ? elapsed * (1 - f->fraction) / f->fraction : -1,
-        .rate = elapsed > 0 ? done / elapsed : 0, .rate_unit = "iterations",
+        .rate = elapsed > 0 ? done / elapsed : 0,
+        .rate_unit = "iterations",
         .note = f->note[0] ? f->note : NULL};
     if (f->outer.progress(&p, f->outer.progress_payload) != 0) f->stopped = true;
 }
@@ -36,10 +40,12 @@ static int inner_progress(const struct imp_progress *p, void *payload)
     struct imp__fit *f = payload;
     const double done = f->search ? f->search->iteration : 0;
     if (f->final_total > 0)
-        report(f, f->search_share + (0.999 - f->search_share)
-                                        * (f->final_calls - 1 + p->fraction) / f->final_total);
+        report(f, f->search_share + (0.999 - f->search_share) *
+                                        (f->final_calls - 1 + p->fraction) /
+                                        f->final_total);
     else
-        report(f, f->search_share * (done + 0.5 * p->fraction) / f->options.max_iterations);
+        report(f,
+               f->search_share * (done + 0.5 * p->fraction) / f->options.max_iterations);
     return f->stopped;
 }
 
@@ -49,11 +55,11 @@ static enum imp_status iterated(const struct imp__search *s, void *payload)
     const double now = imp__now();
     snprintf(f->note, sizeof f->note, "loss %.3g +- %.1g", s->history[s->n_history - 1],
              s->history_se[s->n_history - 1]);
-    if (f->options.checkpoint
-        && now - f->last_checkpoint_s > fmax(CHECKPOINT_S,
-                                             CHECKPOINT_SHARE * f->checkpoint_cost_s)) {
-        const enum imp_status st = imp__checkpoint_write(f->problem->ctx, f->options.checkpoint,
-                                                         &f->fingerprint, s);
+    if (f->options.checkpoint &&
+        now - f->last_checkpoint_s >
+            fmax(CHECKPOINT_S, CHECKPOINT_SHARE * f->checkpoint_cost_s)) {
+        const enum imp_status st = imp__checkpoint_write(
+            f->problem->ctx, f->options.checkpoint, &f->fingerprint, s);
         if (st != IMP_OK) return st;
         f->last_checkpoint_s = imp__now();
         f->checkpoint_cost_s = f->last_checkpoint_s - now;
@@ -62,10 +68,10 @@ static enum imp_status iterated(const struct imp__search *s, void *payload)
     return f->stopped ? IMP_CANCELLED : IMP_OK;
 }
 
-/* ---- Evaluations --------------------------------------------------------------------------- */
+/* ---- Evaluations --------------------------------------------------------------- */
 
-static enum imp_status eval(const double *x, uint64_t seed, struct imp_estimate *f, double *g,
-                            double *g_se, void *payload)
+static enum imp_status eval(const double *x, uint64_t seed, struct imp_estimate *f,
+                            double *g, double *g_se, void *payload)
 {
     struct imp__fit *fit = payload;
     fit->run.seed = seed;
@@ -78,8 +84,12 @@ static enum imp_status normal(const double *x, uint64_t seed, struct imp__normal
 {
     struct imp__fit *fit = payload;
     const size_t n = fit->problem->n;
-    struct imp__gauss_newton gn = {.H = out->H, .H_same = out->H_same, .H_meas = out->H_meas,
-                                   .g = out->g, .g_se = fit->g_se, .cov_g = out->cov_g};
+    struct imp__gauss_newton gn = {.H = out->H,
+                                   .H_same = out->H_same,
+                                   .H_meas = out->H_meas,
+                                   .g = out->g,
+                                   .g_se = fit->g_se,
+                                   .cov_g = out->cov_g};
     fit->run.seed = seed;
     fit->final_calls++;
     const enum imp_status st = imp__gauss_newton(fit->problem, x, &fit->run, &gn);
@@ -121,7 +131,7 @@ static enum imp_status prior(struct imp__fit *f)
     return IMP_OK;
 }
 
-/* ---- What the fit belongs to --------------------------------------------------------------- */
+/* ---- What the fit belongs to --------------------------------------------------- */
 
 static void fingerprint(struct imp__fit *f)
 {
@@ -138,7 +148,8 @@ static void fingerprint(struct imp__fit *f)
         } else if (q->store == IMP_STORE_BULK) {
             h->scene = imp__hash(h->scene, q->bulk, n * sizeof *q->bulk);
         } else {
-            for (size_t e = 0; e < imp_min(n, (size_t)3); e++) value[e] = imp__param_get(q, e);
+            for (size_t e = 0; e < imp_min(n, (size_t)3); e++)
+                value[e] = imp__param_get(q, e);
             h->scene = imp__hash(h->scene, value, imp_min(n, (size_t)3) * sizeof *value);
         }
     }
@@ -146,9 +157,9 @@ static void fingerprint(struct imp__fit *f)
         const struct imp__target *t = &p->targets[i];
         const size_t n = (size_t)t->desc.width * (size_t)t->desc.height;
         const size_t c = n * (size_t)t->desc.channels * sizeof(float);
-        const double number[8] = {t->desc.sensor, t->desc.width, t->desc.height,
-                                  t->desc.channels, t->desc.loss, t->desc.epsilon,
-                                  t->desc.scale, t->weights != NULL};
+        const double number[8] = {t->desc.sensor,   t->desc.width,     t->desc.height,
+                                  t->desc.channels, t->desc.loss,      t->desc.epsilon,
+                                  t->desc.scale,    t->weights != NULL};
         h->targets = imp__hash(h->targets, number, sizeof number);
         h->targets = imp__hash(h->targets, t->pixels, c);
         if (t->weights) h->targets = imp__hash(h->targets, t->weights, n * sizeof(float));
@@ -160,7 +171,8 @@ static void fingerprint(struct imp__fit *f)
         h->targets = imp__hash(h->targets, number, sizeof number);
         h->targets = imp__hash(h->targets, r->on, p->scene->n_params);
         if (r->origin)
-            h->targets = imp__hash(h->targets, r->origin, p->scene->n_theta * sizeof *r->origin);
+            h->targets =
+                imp__hash(h->targets, r->origin, p->scene->n_theta * sizeof *r->origin);
     }
     const double number[4] = {f->options.optimizer, f->options.learning_rate,
                               f->options.tolerance, f->run.spp};
@@ -177,37 +189,42 @@ void imp__fit_scales(struct imp__fit *f, const double *start)
         const int64_t base = p->active.base[k];
         double square = 0;
         if (base < 0) continue;
-        for (size_t e = 0; e < info->count; e++) square += start[base + (int64_t)e] * start[base + (int64_t)e];
+        for (size_t e = 0; e < info->count; e++)
+            square += start[base + (int64_t)e] * start[base + (int64_t)e];
         const double typical = square > 0 ? sqrt(square / (double)info->count) : 1;
         for (size_t e = 0; e < info->count; e++) {
             double *scale = &f->scale[(size_t)base + e];
             if (isfinite(info->lo) && isfinite(info->hi) && info->hi - info->lo < DBL_MAX)
                 *scale = info->hi - info->lo;
-            else
-                *scale = fmax(fabs(start[(size_t)base + e]), typical);
+            else *scale = fmax(fabs(start[(size_t)base + e]), typical);
             if (!(*scale > 0)) *scale = 1;
         }
     }
 }
 
-enum imp_status imp__fit_begin(struct imp_problem *p, const struct imp_fit_options *options,
+enum imp_status imp__fit_begin(struct imp_problem *p,
+                               const struct imp_fit_options *options,
                                const struct imp_run *run, struct imp__fit *out)
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = p->ctx;
     const size_t n = p->n;
-    struct imp__fit f = {.problem = p, .options = IMP_FIT_OPTIONS_INIT, .outer = IMP_RUN_INIT};
+    struct imp__fit f = {
+        .problem = p, .options = IMP_FIT_OPTIONS_INIT, .outer = IMP_RUN_INIT};
 
     if (options) memcpy(&f.options, options, imp_min(options->size, sizeof f.options));
     if (run) memcpy(&f.outer, run, imp_min(run->size, sizeof f.outer));
-    if (n == 0) return imp__error(ctx, IMP_E_ARG, "nothing to fit: no parameter is active");
-    if (p->n_targets == 0) return imp__error(ctx, IMP_E_ARG, "nothing to fit to: no target");
-    if (f.options.max_iterations < 0 || !(f.options.learning_rate >= 0)
-        || !(f.options.tolerance >= 0) || f.options.learning_rate > 1)
-        return imp__error(ctx, IMP_E_ARG,
-                          "max_iterations %d, learning_rate %g (0 to 1), tolerance %g: out of "
-                          "range", f.options.max_iterations, f.options.learning_rate,
-                          f.options.tolerance);
+    if (n == 0)
+        return imp__error(ctx, IMP_E_ARG, "nothing to fit: no parameter is active");
+    if (p->n_targets == 0)
+        return imp__error(ctx, IMP_E_ARG, "nothing to fit to: no target");
+    if (f.options.max_iterations < 0 || !(f.options.learning_rate >= 0) ||
+        !(f.options.tolerance >= 0) || f.options.learning_rate > 1)
+        return imp__error(
+            ctx, IMP_E_ARG,
+            "max_iterations %d, learning_rate %g (0 to 1), tolerance %g: out of "
+            "range",
+            f.options.max_iterations, f.options.learning_rate, f.options.tolerance);
     if (f.options.resume && !f.options.checkpoint)
         return imp__error(ctx, IMP_E_ARG, "resume needs the name of a checkpoint");
     if (f.options.max_iterations == 0)
@@ -229,11 +246,13 @@ enum imp_status imp__fit_begin(struct imp_problem *p, const struct imp_fit_optio
     }
     if (n <= IMP_DENSE_MAX) {
         f.H_prior = imp__alloc(ctx, n * n, sizeof *f.H_prior);
-        if (!f.H_prior) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for regularisers"));
+        if (!f.H_prior)
+            IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for regularisers"));
         IMP_TRY(prior(&f));
     }
     f.noise_known = true;
-    for (size_t i = 0; i < p->n_targets; i++) f.noise_known &= p->targets[i].noise_se != NULL;
+    for (size_t i = 0; i < p->n_targets; i++)
+        f.noise_known &= p->targets[i].noise_se != NULL;
     f.start_s = imp__now();
     f.last_checkpoint_s = f.start_s;
     f.deadline_s = f.outer.time_limit_s > 0 ? f.start_s + f.outer.time_limit_s : 0;
@@ -245,10 +264,16 @@ enum imp_status imp__fit_begin(struct imp_problem *p, const struct imp_fit_optio
     /* Pointers to the fit itself: it does not move any more. */
     out->run.progress = inner_progress;
     out->run.progress_payload = out;
-    out->goal = (struct imp__goal){.ctx = ctx, .n = n, .lo = out->lo, .hi = out->hi,
-                                   .scale = out->scale, .seed = out->outer.seed, .eval = eval,
+    out->goal = (struct imp__goal){.ctx = ctx,
+                                   .n = n,
+                                   .lo = out->lo,
+                                   .hi = out->hi,
+                                   .scale = out->scale,
+                                   .seed = out->outer.seed,
+                                   .eval = eval,
                                    .normal = n <= IMP_DENSE_MAX ? normal : NULL,
-                                   .iterated = iterated, .payload = out};
+                                   .iterated = iterated,
+                                   .payload = out};
     return IMP_OK;
 out:
     imp__fit_end(&f);

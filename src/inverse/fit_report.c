@@ -15,7 +15,8 @@ IMP_PRINTF(2, 3) static void put(struct text *t, const char *format, ...)
 {
     va_list args;
     va_start(args, format);
-    const int n = vsnprintf(t->buffer + t->used, sizeof t->buffer - t->used, format, args);
+    const int n =
+        vsnprintf(t->buffer + t->used, sizeof t->buffer - t->used, format, args);
     va_end(args);
     if (n > 0) t->used = imp_min(t->used + (size_t)n, sizeof t->buffer - 1);
 }
@@ -58,8 +59,8 @@ static void put_loose(struct text *t, const struct imp__fit *f,
 }
 
 const char *imp__fit_warning(const struct imp__fit *f, int bias_order,
-                             const struct imp_fit_variable *variables, const double *loosest,
-                             const char *no_intervals)
+                             const struct imp_fit_variable *variables,
+                             const double *loosest, const char *no_intervals)
 {
     struct text t = {.used = 0};
     if (loosest) put_loose(&t, f, variables, loosest);

@@ -1,24 +1,25 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * J^T W J and J^T W r without bias (gradients.md 15). With x_ik = dL_i/dx_k of walk i and a
- * replicate of n walks in one pixel and channel,
+ * J^T W J and J^T W r without bias (gradients.md 15). With x_ik = dL_i/dx_k of walk i and
+ * a replicate of n walks in one pixel and channel,
  *
- *     (J^T J)_kl ~ w [ (sum_i x_ik)(sum_i x_il) - sum_i x_ik x_il ] / (n (n-1))      (i != j)
- *     (J^T r)_k  ~ w { [S/(n-1) - T] mean(x_k) - sum_i L_i x_ik / (n (n-1)) }        (LOO')
+ *     (J^T J)_kl ~ w [ (sum_i x_ik)(sum_i x_il) - sum_i x_ik x_il ] / (n (n-1))      (i
+ * != j) (J^T r)_k  ~ w { [S/(n-1) - T] mean(x_k) - sum_i L_i x_ik / (n (n-1)) } (LOO')
  *
- * averaged over replicates; the same-sample matrix, which a naive product of mean pictures
- * would give, comes along for damping. Losses that are not quadratic enter with
+ * averaged over replicates; the same-sample matrix, which a naive product of mean
+ * pictures would give, comes along for damping. Losses that are not quadratic enter with
  * w = l''(mean) and r = l'/l''.
  *
- * Noise of the pictures themselves: sum w^2 sigma^2 J^T J is the gradient's covariance by it.
- * Where sigma is not given, the squared residual stands in for sigma^2, pixel by pixel, which
- * holds however the noise differs between pixels (White, Econometrica 48, 1980); residual
- * and J^T J come from different replicates, so that their own noise is not correlated. */
-#include <string.h>
+ * Noise of the pictures themselves: sum w^2 sigma^2 J^T J is the gradient's covariance by
+ * it. Where sigma is not given, the squared residual stands in for sigma^2, pixel by
+ * pixel, which holds however the noise differs between pixels (White, Econometrica 48,
+ * 1980); residual and J^T J come from different replicates, so that their own noise is
+ * not correlated. */
 #include "estimate.h"
 #include "lanes.h"
 #include "loss.h"
 #include "walk/picture.h"
+#include <string.h>
 
 #define GAUSS_NEWTON_MAX 256
 
@@ -32,7 +33,7 @@ struct sums { /* of one tile; matrices [K*K] */
 struct job {
     const struct imp_problem *problem;
     const struct imp_run *run;
-    double walks;                 /* planned, through one target's sensor */
+    double walks; /* planned, through one target's sensor */
     const struct imp__target *target;
     struct imp_tracer tracer;
     struct imp__replicates plan;
@@ -40,15 +41,15 @@ struct job {
     size_t K;
     struct worker {
         struct imp_arena arena;
-        double *x;         /* [K][channels] of one walk */
-        double *sum_x;     /* [K][seen] of a replicate */
-        double *sum_lx;    /* [K][seen] */
-        double *sum_xx;    /* [seen][K*K] */
-        double *g;         /* [R][K] of a pixel */
-        double *u, *au;    /* [seen][K*K] of a pixel: sums over its replicates of w^2 J^T J, and
-                              of that times the replicate's squared residual */
-        double a[3];       /* sum over replicates of squared residuals */
-    } *workers;
+        double *x;      /* [K][channels] of one walk */
+        double *sum_x;  /* [K][seen] of a replicate */
+        double *sum_lx; /* [K][seen] */
+        double *sum_xx; /* [seen][K*K] */
+        double *g;      /* [R][K] of a pixel */
+        double *u, *au; /* [seen][K*K] of a pixel: sums over its replicates of w^2 J^T J,
+                           and of that times the replicate's squared residual */
+        double a[3];    /* sum over replicates of squared residuals */
+    } * workers;
     struct sums *slots, total;
 };
 
@@ -58,8 +59,11 @@ static enum imp_status sums_create(imp_context *ctx, size_t K, struct sums *s)
 {
     double *p = imp__alloc(ctx, 1, sums_bytes(K));
     if (!p) return imp__error(ctx, IMP_E_NOMEM, "no memory for %zu x %zu matrices", K, K);
-    *s = (struct sums){.H = p, .H_same = p + K * K, .H_meas = p + 2 * K * K,
-                       .cov_g = p + 3 * K * K, .g = p + 4 * K * K};
+    *s = (struct sums){.H = p,
+                       .H_same = p + K * K,
+                       .H_meas = p + 2 * K * K,
+                       .cov_g = p + 3 * K * K,
+                       .g = p + 4 * K * K};
     return IMP_OK;
 }
 
@@ -76,8 +80,8 @@ static double seen(const struct job *j, const double *lanes, int c)
 
 /* One replicate of a pixel: adds to the tile's matrices with factor `share`, writes its
  * gradient, returns its loss. */
-static double replicate(const struct job *j, struct worker *w, struct sums *out, int x, int y,
-                        int b, double share, double *g)
+static double replicate(const struct job *j, struct worker *w, struct sums *out, int x,
+                        int y, int b, double share, double *g)
 {
     const size_t K = j->K, S = (size_t)seen_channels(j);
     const struct imp_target *t = &j->target->desc;
@@ -146,7 +150,8 @@ static double replicate(const struct job *j, struct worker *w, struct sums *out,
             g[k] += weight * ((sum[c] / (N - 1) - T_eff) * xk / N -
                               w->sum_lx[k * S + c] / (N * (N - 1)));
             for (size_t m = 0; m <= k; m++) {
-                const double product = xk * w->sum_x[m * S + c], u = product - xx[k * K + m];
+                const double product = xk * w->sum_x[m * S + c],
+                             u = product - xx[k * K + m];
                 out->H[k * K + m] += a * u;
                 out->H_same[k * K + m] += same * product;
                 out->H_meas[k * K + m] += meas * u;
@@ -179,15 +184,16 @@ static enum imp_status tile_work(size_t item, int worker, int slot, void *payloa
             memset(w->u, 0, 2 * (size_t)seen_channels(j) * K * K * sizeof(double));
             memset(w->a, 0, sizeof w->a);
             for (int b = b0; b < b1; b++) {
-                const double v = replicate(j, w, out, x, y, b, 1 / all,
-                                           w->g + (size_t)(b - b0) * K);
+                const double v =
+                    replicate(j, w, out, x, y, b, 1 / all, w->g + (size_t)(b - b0) * K);
                 sum += v;
                 square += v * v;
             }
             if (out->failed)
-                return imp__error(j->problem->ctx, IMP_E_NOMEM, "no memory to record a walk");
-            const enum imp_status st = imp__drops_check(j->problem->ctx, j->run, out->dropped,
-                                                        j->walks);
+                return imp__error(j->problem->ctx, IMP_E_NOMEM,
+                                  "no memory to record a walk");
+            const enum imp_status st =
+                imp__drops_check(j->problem->ctx, j->run, out->dropped, j->walks);
             if (st != IMP_OK) return st;
             const double spread = R / ((R - 1) * all * all);
             if (!j->target->noise_se)
@@ -218,7 +224,8 @@ static enum imp_status tile_commit(size_t item, int slot, void *payload)
     struct job *j = payload;
     const struct sums *in = &j->slots[slot];
     (void)item;
-    for (size_t k = 0; k < sums_bytes(j->K) / sizeof(double); k++) j->total.H[k] += in->H[k];
+    for (size_t k = 0; k < sums_bytes(j->K) / sizeof(double); k++)
+        j->total.H[k] += in->H[k];
     j->total.objective += in->objective;
     j->total.variance += in->variance;
     j->total.chi2 += in->chi2;
@@ -245,7 +252,8 @@ static enum imp_status workers_create(struct job *j, imp_context *ctx)
 }
 
 static enum imp_status target_add(struct job *j, const struct imp__target *target,
-                                  const struct imp_run *run, double lo, double hi, double start)
+                                  const struct imp_run *run, double lo, double hi,
+                                  double start)
 {
     const struct imp_problem *p = j->problem;
     struct imp_run own = *run;
@@ -260,17 +268,24 @@ static enum imp_status target_add(struct job *j, const struct imp__target *targe
                           own.sensor);
     j->width = film->crop_w;
     j->height = film->crop_h;
-    j->plan = imp__replicates_plan(imp_max(own.spp > 0 ? own.spp : j->tracer.sensor->spp, 4),
-                                   IMP_BATCH_MAX);
+    j->plan = imp__replicates_plan(
+        imp_max(own.spp > 0 ? own.spp : j->tracer.sensor->spp, 4), IMP_BATCH_MAX);
     const double walks = (double)j->width * j->height * j->plan.n * j->plan.R;
     j->run = run;
     j->walks = walks;
-    const struct imp_loop loop = {
-        .n_items = imp__tile_count(j->width, j->height, 0) * (size_t)j->plan.chunks,
-        .work = tile_work, .commit = tile_commit, .payload = j, .progress = run->progress,
-        .progress_payload = run->progress_payload, .stage = "gauss-newton",
-        .rate_unit = "walks", .units = walks, .fraction_lo = lo, .fraction_hi = hi,
-        .start_s = start};
+    const struct imp_loop loop = {.n_items = imp__tile_count(j->width, j->height, 0) *
+                                             (size_t)j->plan.chunks,
+                                  .work = tile_work,
+                                  .commit = tile_commit,
+                                  .payload = j,
+                                  .progress = run->progress,
+                                  .progress_payload = run->progress_payload,
+                                  .stage = "gauss-newton",
+                                  .rate_unit = "walks",
+                                  .units = walks,
+                                  .fraction_lo = lo,
+                                  .fraction_hi = hi,
+                                  .start_s = start};
     const uint64_t before = j->total.dropped;
     st = imp__parallel(p->ctx, &loop, NULL);
     if (st == IMP_OK)
@@ -295,7 +310,8 @@ static void matrix_copy(double *to, const double *lower, size_t K)
 }
 
 enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
-                                  const struct imp_run *run, struct imp__gauss_newton *out)
+                                  const struct imp_run *run,
+                                  struct imp__gauss_newton *out)
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = p->ctx;
@@ -319,10 +335,11 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
     const double start = p->progress_start_s > 0 ? p->progress_start_s : imp__now();
     const double lo = p->progress_lo, hi = p->progress_hi > 0 ? p->progress_hi : 1;
     for (size_t t = 0; t < p->n_targets; t++) {
-        IMP_TRY(target_add(&j, &p->targets[t], &own,
-                           lo + (hi - lo) * (double)t / (double)p->n_targets,
-                           lo + (hi - lo) * (double)(t + 1) / (double)p->n_targets, start));
-        residuals += (double)(p->targets[t].desc.channels) * pixels_in_use(&p->targets[t]);
+        IMP_TRY(target_add(
+            &j, &p->targets[t], &own, lo + (hi - lo) * (double)t / (double)p->n_targets,
+            lo + (hi - lo) * (double)(t + 1) / (double)p->n_targets, start));
+        residuals +=
+            (double)(p->targets[t].desc.channels) * pixels_in_use(&p->targets[t]);
         const int bias = imp__loss_bias_order(p->targets[t].desc.loss);
         if (bias) bias_order = 1;
     }
@@ -334,8 +351,8 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
         if (out->g) out->g[k] = j.total.g[k];
         if (out->g_se) out->g_se[k] = sqrt(fmax(0, j.total.cov_g[k * j.K + k]));
     }
-    out->objective = (struct imp_estimate){j.total.objective, sqrt(fmax(0, j.total.variance)),
-                                           bias_order};
+    out->objective = (struct imp_estimate){j.total.objective,
+                                           sqrt(fmax(0, j.total.variance)), bias_order};
     out->chi2 = j.total.chi2;
     out->n_residuals = residuals;
 out:

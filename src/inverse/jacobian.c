@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Derivative pictures: in one direction (tangent along each walk), or one for every active
- * number from the same walks (sweep with adjoint 1, channels kept apart). */
-#include <stdio.h>
-#include <string.h>
+ * Derivative pictures: in one direction (tangent along each walk), or one for every
+ * active number from the same walks (sweep with adjoint 1, channels kept apart). */
 #include "estimate.h"
 #include "lanes.h"
 #include "walk/picture.h"
+#include <stdio.h>
+#include <string.h>
 
 #define JACOBIAN_MAX 256
 
@@ -37,9 +37,13 @@ enum imp_status imp_problem_forward(imp_problem *p, const double *x_dot,
     struct forward f = {.x_dot = x_dot, .channels = p->scene->channels};
     const enum imp_status st = imp__problem_tracer(p, &own, &f.tracer);
     if (st != IMP_OK) return st;
-    const struct imp_picture picture = {f.tracer.sensor, "derivative",
-                                        f.channels == 3 ? "R,G,B" : "Y", f.channels,
-                                        sample_tangent, &f, NULL};
+    const struct imp_picture picture = {f.tracer.sensor,
+                                        "derivative",
+                                        f.channels == 3 ? "R,G,B" : "Y",
+                                        f.channels,
+                                        sample_tangent,
+                                        &f,
+                                        NULL};
     return imp__picture_make(p->ctx, &picture, &own, out);
 }
 
@@ -58,8 +62,8 @@ static bool sample_jacobian(const void *payload, struct imp_arena *arena, int x,
     imp__walk_trace(&j->tracer, arena, x, y, sample, &walk);
     memset(value, 0, (n + 1) * (size_t)j->channels * sizeof *value);
     for (int c = 0; c < j->channels; c++) value[c] = walk.L[c];
-    struct imp_lanes lanes = {{imp__lanes_add}, j->tracer.active, j->channels,
-                              value + j->channels};
+    struct imp_lanes lanes = {
+        {imp__lanes_add}, j->tracer.active, j->channels, value + j->channels};
     imp__walk_sweep(&j->tracer, &walk, imp__lanes_adjoint(j->channels), &lanes.sink);
     *px = walk.px;
     *py = walk.py;
@@ -67,8 +71,8 @@ static bool sample_jacobian(const void *payload, struct imp_arena *arena, int x,
 }
 
 /* Channels [first, first + n) of a wide film, as a film of its own. */
-static enum imp_status film_slice(imp_context *ctx, const imp_film *from, size_t first, int n,
-                                  imp_film **out)
+static enum imp_status film_slice(imp_context *ctx, const imp_film *from, size_t first,
+                                  int n, imp_film **out)
 {
     imp_film *film;
     const enum imp_status st = imp__film_create(ctx, from->width, from->height,
@@ -78,7 +82,8 @@ static enum imp_status film_slice(imp_context *ctx, const imp_film *from, size_t
     film->dropped = from->dropped;
     for (size_t p = 0; p < (size_t)from->width * (size_t)from->height; p++) {
         const size_t at = p * (size_t)from->channels + first;
-        memcpy(film->mean + p * (size_t)n, from->mean + at, (size_t)n * sizeof *film->mean);
+        memcpy(film->mean + p * (size_t)n, from->mean + at,
+               (size_t)n * sizeof *film->mean);
         memcpy(film->se + p * (size_t)n, from->se + at, (size_t)n * sizeof *film->se);
     }
     *out = film;
@@ -90,9 +95,10 @@ enum imp_status imp_problem_jacobian(imp_problem *p, const struct imp_run *run,
 {
     if (!p || !films) return IMP_E_ARG;
     if (p->n == 0 || p->n > JACOBIAN_MAX)
-        return imp__error(p->ctx, IMP_E_ARG,
-                          "%zu numbers are active; derivative pictures are made of 1 to %d",
-                          p->n, JACOBIAN_MAX);
+        return imp__error(
+            p->ctx, IMP_E_ARG,
+            "%zu numbers are active; derivative pictures are made of 1 to %d", p->n,
+            JACOBIAN_MAX);
     enum imp_status st = IMP_OK;
     imp_context *ctx = p->ctx;
     const struct imp_run own = imp__run_or_default(run);
@@ -105,8 +111,9 @@ enum imp_status imp_problem_jacobian(imp_problem *p, const struct imp_run *run,
     for (size_t k = 0, used = 0; k < (p->n + 1) * C; k++)
         used += (size_t)snprintf(names + used, 12, "%s%zu", k ? "," : "", k);
     IMP_TRY(imp__problem_tracer(p, &own, &j.tracer));
-    const struct imp_picture picture = {j.tracer.sensor, "jacobian", names,
-                                        (int)((p->n + 1) * C), sample_jacobian, &j, NULL};
+    const struct imp_picture picture = {
+        j.tracer.sensor, "jacobian", names, (int)((p->n + 1) * C),
+        sample_jacobian, &j,         NULL};
     st = imp__picture_make(ctx, &picture, &own, &all);
     if (st != IMP_OK && st != IMP_CANCELLED) goto out;
     const enum imp_status ended = st;

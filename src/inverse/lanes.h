@@ -1,18 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A sink that keeps the colour channels of a derivative apart: x[k][c] = dL_c / dx_k. By the
- * lane rule (kinds.h) channel c of a coloured parameter moves channel c of the picture only,
- * so one sweep with adjoint 1 yields the whole Jacobian of a walk. */
+ * A sink that keeps the colour channels of a derivative apart: x[k][c] = dL_c / dx_k. By
+ * the lane rule (kinds.h) channel c of a coloured parameter moves channel c of the
+ * picture only, so one sweep with adjoint 1 yields the whole Jacobian of a walk. */
 #ifndef IMP_INVERSE_LANES_H
 #define IMP_INVERSE_LANES_H
 
 #include "walk/walk.h"
 
 struct imp_lanes {
-    struct imp_sink sink;      /* first */
+    struct imp_sink sink; /* first */
     const struct imp_active *active;
-    int lanes;                 /* 3 or 1 */
-    double *x;                 /* [active->n][lanes] */
+    int lanes; /* 3 or 1 */
+    double *x; /* [active->n][lanes] */
 };
 
 static inline void imp__lanes_add(struct imp_sink *sink, int param, size_t element,

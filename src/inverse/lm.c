@@ -5,39 +5,42 @@
  *
  *     (H + mu diag H_same) delta = -g
  *
- * Every iteration has its own random numbers; the trial steps of one iteration share them,
- * so that the gain is not drowned. The search ends when g^T H^-1 g is what noise in g alone
- * would give, twice in a row; the estimate is the average of the two Newton points. */
-#include "optimize.h"
+ * Every iteration has its own random numbers; the trial steps of one iteration share
+ * them, so that the gain is not drowned. The search ends when g^T H^-1 g is what noise in
+ * g alone would give, twice in a row; the estimate is the average of the two Newton
+ * points. */
 #include "math/linalg.h"
+#include "optimize.h"
 #include <math.h>
 #include <string.h>
 
 #define MU_START 1e-2
-#define MU_MIN 1e-7
-#define MU_MAX 1e8
-#define TRIALS 8
+#define MU_MIN   1e-7
+#define MU_MAX   1e8
+#define TRIALS   8
 
-enum { FIRST };             /* arrays: [n] the first Newton point within noise */
-enum { MU, WITHIN };        /* scalars; WITHIN: iterations within noise, in a row */
+enum { FIRST };      /* arrays: [n] the first Newton point within noise */
+enum { MU, WITHIN }; /* scalars; WITHIN: iterations within noise, in a row */
 
 struct work {
     struct imp__normal eq;
-    double *a;              /* [n_free][n_free] Cholesky factor of the damped system */
-    double *p;              /* [n][n] */
+    double *a;                 /* [n_free][n_free] Cholesky factor of the damped system */
+    double *p;                 /* [n][n] */
     double *delta, *trial, *d; /* [n]; d: (diag H_same)^-1/2 */
-    size_t *free;           /* [n_free] variables that may move */
+    size_t *free;              /* [n_free] variables that may move */
     size_t n_free;
 };
 
-static enum imp_status init(const struct imp__goal *goal, const struct imp__opt_options *options,
-                            struct imp__search *s)
+static enum imp_status init(const struct imp__goal *goal,
+                            const struct imp__opt_options *options, struct imp__search *s)
 {
     (void)options;
     if (goal->n > IMP_DENSE_MAX || !goal->normal)
-        return imp__error(goal->ctx, IMP_E_ARG,
-                          "Levenberg-Marquardt is for at most %d variables, here are %zu: use "
-                          "Adam", IMP_DENSE_MAX, goal->n);
+        return imp__error(
+            goal->ctx, IMP_E_ARG,
+            "Levenberg-Marquardt is for at most %d variables, here are %zu: use "
+            "Adam",
+            IMP_DENSE_MAX, goal->n);
     s->scalar[MU] = MU_START;
     return imp__search_array(s, FIRST, goal->n);
 }
@@ -74,7 +77,8 @@ static void free_set(const struct imp__goal *goal, const double *x, struct work 
         const int wall = imp__at_bound(goal, x, k);
         const double h = w->eq.H_same[k * goal->n + k];
         w->d[k] = h > 0 ? 1 / sqrt(h) : 0;
-        if (!(h > 0) || (wall < 0 && w->eq.g[k] >= 0) || (wall > 0 && w->eq.g[k] <= 0)) continue;
+        if (!(h > 0) || (wall < 0 && w->eq.g[k] >= 0) || (wall > 0 && w->eq.g[k] <= 0))
+            continue;
         w->free[w->n_free++] = k;
     }
 }
@@ -112,8 +116,8 @@ static void solve(size_t n, struct work *w, const double *b, double *out)
     for (size_t i = 0; i < m; i++) out[w->free[i]] = w->d[w->free[i]] * c[i];
 }
 
-/* Is q = g^T A^-1 g no more than Monte Carlo noise alone makes it? Under a zero gradient its
- * mean is tr(A^-1 C) and its variance 2 tr((A^-1 C)^2), C the covariance of g. */
+/* Is q = g^T A^-1 g no more than Monte Carlo noise alone makes it? Under a zero gradient
+ * its mean is tr(A^-1 C) and its variance 2 tr((A^-1 C)^2), C the covariance of g. */
 static bool within_noise(size_t n, struct work *w)
 {
     double q = 0, mean = 0, half_var = 0;
@@ -156,8 +160,8 @@ static double largest_step(const struct imp__goal *goal, const double *delta)
 
 /* One iteration: x moves, or the search is finished. */
 static enum imp_status iterate(const struct imp__goal *goal,
-                               const struct imp__opt_options *options, struct imp__search *s,
-                               struct work *w)
+                               const struct imp__opt_options *options,
+                               struct imp__search *s, struct work *w)
 {
     enum imp_status st = IMP_OK;
     const size_t n = goal->n;
@@ -211,8 +215,8 @@ out:
     return st;
 }
 
-static enum imp_status run(const struct imp__goal *goal, const struct imp__opt_options *options,
-                           struct imp__search *s)
+static enum imp_status run(const struct imp__goal *goal,
+                           const struct imp__opt_options *options, struct imp__search *s)
 {
     enum imp_status st = IMP_OK;
     struct work w = {0};

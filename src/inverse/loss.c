@@ -14,7 +14,11 @@ void imp__loss_eval(enum imp_loss loss, double weight, double epsilon, double I,
         return;
     }
     case IMP_LOSS_L1: /* subgradient 0 at the kink */
-        *at = (struct imp__loss_at){weight * fabs(r), r > 0 ? weight : r < 0 ? -weight : 0, 0, 0};
+        *at = (struct imp__loss_at){weight * fabs(r),
+                                    r > 0   ? weight
+                                    : r < 0 ? -weight
+                                            : 0,
+                                    0, 0};
         return;
     case IMP_LOSS_LOG: {
         /* q = log(I+e) - log(T+e), q' = 1/(I+e) = v: l' = w q v, l'' = w v^2 (1 - q),

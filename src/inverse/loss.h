@@ -24,7 +24,7 @@ double imp__loss_weight(enum imp_loss loss, double weight, double epsilon, doubl
 /* imp_estimate.bias_order of leave-one-out (with jackknife where l is smooth). */
 int imp__loss_bias_order(enum imp_loss loss);
 
-/* ---- One pixel, from sums over its N >= 2 samples ---------------------------------- */
+/* ---- One pixel, from sums over its N >= 2 samples ------------------------------ */
 
 /* Unbiased 1/2 w [(mean - T)^2 - s^2/N], s^2 the sample variance. */
 double imp__loss_unbiased(double weight, double T, double n, double sum, double sum_sq);

@@ -11,31 +11,33 @@
 #include <nlopt.h>
 
 #define RECORD_MAX 200000 /* most variables whose evaluations are kept */
-#define SLSQP_MAX 1000    /* it is O(n^3) per step */
+#define SLSQP_MAX  1000   /* it is O(n^3) per step */
 #define FIRST_STEP 0.1
 
-enum { RECORD };          /* arrays: rows of (f, se, g[n]) */
-enum { BEST };            /* scalars */
+enum { RECORD }; /* arrays: rows of (f, se, g[n]) */
+enum { BEST };   /* scalars */
 
 struct call {
     const struct imp__goal *goal;
     struct imp__search *s;
     nlopt_opt opt;
-    double *x;            /* [n] in the goal's units */
-    double *g;            /* [n] */
-    double unit;          /* of the objective: the first steps are FIRST_STEP scales long */
-    size_t calls;         /* so far, replayed ones included */
-    enum imp_status st;   /* why the goal stopped the search */
+    double *x;          /* [n] in the goal's units */
+    double *g;          /* [n] */
+    double unit;        /* of the objective: the first steps are FIRST_STEP scales long */
+    size_t calls;       /* so far, replayed ones included */
+    enum imp_status st; /* why the goal stopped the search */
 };
 
-static enum imp_status init(const struct imp__goal *goal, const struct imp__opt_options *options,
-                            struct imp__search *s)
+static enum imp_status init(const struct imp__goal *goal,
+                            const struct imp__opt_options *options, struct imp__search *s)
 {
     (void)options;
     if (s->kind == IMP_SLSQP && goal->n > SLSQP_MAX)
-        return imp__error(goal->ctx, IMP_E_ARG,
-                          "SLSQP is for at most %d variables, here are %zu: use Adam, MMA or "
-                          "L-BFGS", SLSQP_MAX, goal->n);
+        return imp__error(
+            goal->ctx, IMP_E_ARG,
+            "SLSQP is for at most %d variables, here are %zu: use Adam, MMA or "
+            "L-BFGS",
+            SLSQP_MAX, goal->n);
     s->scalar[BEST] = INFINITY;
     return IMP_OK;
 }
@@ -88,25 +90,30 @@ static double objective(unsigned n, const double *y, double *gradient, void *pay
     /* The methods begin with a step of the length of the gradient. */
     if (c->calls++ == 0) {
         double square = 0;
-        for (size_t k = 0; k < n; k++) square += c->g[k] * goal->scale[k] * c->g[k] * goal->scale[k];
+        for (size_t k = 0; k < n; k++)
+            square += c->g[k] * goal->scale[k] * c->g[k] * goal->scale[k];
         c->unit = square > 0 && isfinite(square) ? FIRST_STEP / sqrt(square) : 1;
     }
-    for (size_t k = 0; gradient && k < n; k++) gradient[k] = c->unit * c->g[k] * goal->scale[k];
+    for (size_t k = 0; gradient && k < n; k++)
+        gradient[k] = c->unit * c->g[k] * goal->scale[k];
     return c->unit * f.value;
 }
 
 static nlopt_algorithm algorithm(enum imp_optimizer kind)
 {
-    return kind == IMP_MMA ? NLOPT_LD_MMA : kind == IMP_SLSQP ? NLOPT_LD_SLSQP : NLOPT_LD_LBFGS;
+    return kind == IMP_MMA     ? NLOPT_LD_MMA
+           : kind == IMP_SLSQP ? NLOPT_LD_SLSQP
+                               : NLOPT_LD_LBFGS;
 }
 
-static enum imp_status run(const struct imp__goal *goal, const struct imp__opt_options *options,
-                           struct imp__search *s)
+static enum imp_status run(const struct imp__goal *goal,
+                           const struct imp__opt_options *options, struct imp__search *s)
 {
     enum imp_status st = IMP_OK;
     const size_t n = goal->n;
     double *work = imp__alloc(goal->ctx, 5 * n + 1, sizeof *work);
-    if (!work) return imp__error(goal->ctx, IMP_E_NOMEM, "no memory for %zu variables", n);
+    if (!work)
+        return imp__error(goal->ctx, IMP_E_NOMEM, "no memory for %zu variables", n);
     struct call c = {.goal = goal, .s = s, .x = work, .g = work + n};
     double *y = work + 2 * n, *lo = work + 3 * n, *hi = work + 4 * n;
     double value;
@@ -122,15 +129,16 @@ static enum imp_status run(const struct imp__goal *goal, const struct imp__opt_o
         y[k] = imp_clamp(y[k], lo[k], hi[k]);
     }
     const int limit = options->max_iterations - (replay ? 0 : s->iteration);
-    if (nlopt_set_min_objective(c.opt, objective, &c) < 0
-        || nlopt_set_lower_bounds(c.opt, lo) < 0 || nlopt_set_upper_bounds(c.opt, hi) < 0
-        || nlopt_set_xtol_abs1(c.opt, options->tolerance) < 0
-        || nlopt_set_maxeval(c.opt, imp_max(limit, 1)) < 0)
+    if (nlopt_set_min_objective(c.opt, objective, &c) < 0 ||
+        nlopt_set_lower_bounds(c.opt, lo) < 0 || nlopt_set_upper_bounds(c.opt, hi) < 0 ||
+        nlopt_set_xtol_abs1(c.opt, options->tolerance) < 0 ||
+        nlopt_set_maxeval(c.opt, imp_max(limit, 1)) < 0)
         IMP_TRY(imp__error(goal->ctx, IMP_E_NUMERIC, "NLopt refuses the problem"));
     const nlopt_result r = nlopt_optimize(c.opt, y, &value);
     if (c.st != IMP_OK) IMP_TRY(c.st);
     if (r == NLOPT_OUT_OF_MEMORY)
-        IMP_TRY(imp__error(goal->ctx, IMP_E_NOMEM, "NLopt: no memory for %zu variables", n));
+        IMP_TRY(
+            imp__error(goal->ctx, IMP_E_NOMEM, "NLopt: no memory for %zu variables", n));
     if (r == NLOPT_INVALID_ARGS)
         IMP_TRY(imp__error(goal->ctx, IMP_E_NUMERIC, "NLopt refuses the problem"));
     if (r == NLOPT_MAXEVAL_REACHED) goto out;

@@ -17,14 +17,15 @@ static const struct imp__opt_kind *kind_of(enum imp_optimizer kind)
 }
 
 enum imp_status imp__search_create(const struct imp__goal *goal, enum imp_optimizer kind,
-                                   const struct imp__opt_options *options, const double *x0,
-                                   struct imp__search **out)
+                                   const struct imp__opt_options *options,
+                                   const double *x0, struct imp__search **out)
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = goal->ctx;
     struct imp__search *s = NULL;
 
-    if (!kind_of(kind)) return imp__error(ctx, IMP_E_ARG, "optimizer %d does not exist", kind);
+    if (!kind_of(kind))
+        return imp__error(ctx, IMP_E_ARG, "optimizer %d does not exist", kind);
     s = imp__alloc(ctx, 1, sizeof *s);
     if (!s) return imp__error(ctx, IMP_E_NOMEM, "no memory for an optimiser");
     s->ctx = ctx;
@@ -56,7 +57,8 @@ void imp__search_destroy(struct imp__search *s)
 }
 
 enum imp_status imp__optimize(const struct imp__goal *goal,
-                              const struct imp__opt_options *options, struct imp__search *s)
+                              const struct imp__opt_options *options,
+                              struct imp__search *s)
 {
     if (s->finished) {
         s->reason = "it had converged";
@@ -69,10 +71,13 @@ enum imp_status imp__optimize(const struct imp__goal *goal,
 
 enum imp_status imp__search_array(struct imp__search *s, int k, size_t n)
 {
-    double *grown = imp__grow(s->ctx, s->array[k], &s->array_cap[k], imp_max(n, (size_t)1),
-                              sizeof *grown);
-    if (!grown) return imp__error(s->ctx, IMP_E_NOMEM, "no memory for %zu numbers of an "
-                                  "optimiser's state", n);
+    double *grown = imp__grow(s->ctx, s->array[k], &s->array_cap[k],
+                              imp_max(n, (size_t)1), sizeof *grown);
+    if (!grown)
+        return imp__error(s->ctx, IMP_E_NOMEM,
+                          "no memory for %zu numbers of an "
+                          "optimiser's state",
+                          n);
     s->array[k] = grown;
     s->array_n[k] = n;
     return IMP_OK;
@@ -80,12 +85,14 @@ enum imp_status imp__search_array(struct imp__search *s, int k, size_t n)
 
 enum imp_status imp__search_log(struct imp__search *s, struct imp_estimate f)
 {
-    double *h = imp__grow(s->ctx, s->history, &s->cap_history, s->n_history + 1, sizeof *h);
+    double *h =
+        imp__grow(s->ctx, s->history, &s->cap_history, s->n_history + 1, sizeof *h);
     if (h) s->history = h;
-    double *e = imp__grow(s->ctx, s->history_se, &s->cap_history_se, s->n_history + 1,
-                          sizeof *e);
+    double *e =
+        imp__grow(s->ctx, s->history_se, &s->cap_history_se, s->n_history + 1, sizeof *e);
     if (e) s->history_se = e;
-    if (!h || !e) return imp__error(s->ctx, IMP_E_NOMEM, "no memory for the loss history");
+    if (!h || !e)
+        return imp__error(s->ctx, IMP_E_NOMEM, "no memory for the loss history");
     h[s->n_history] = f.value;
     e[s->n_history++] = f.se;
     return IMP_OK;
@@ -99,15 +106,16 @@ enum imp_status imp__search_iterated(const struct imp__goal *goal, struct imp__s
 
 uint64_t imp__search_seed(const struct imp__goal *goal, int i, int k)
 {
-    return imp__mix64(imp__mix64(goal->seed + 0x9e3779b97f4a7c15u) + 64 * (uint64_t)i
-                      + (uint64_t)k);
+    return imp__mix64(imp__mix64(goal->seed + 0x9e3779b97f4a7c15u) + 64 * (uint64_t)i +
+                      (uint64_t)k);
 }
 
 enum imp_status imp__normal_create(imp_context *ctx, size_t n, struct imp__normal *out)
 {
     struct imp__normal m = {0};
     double *all = imp__alloc(ctx, 5 * n * n + n, sizeof *all);
-    if (!all) return imp__error(ctx, IMP_E_NOMEM, "no memory for %zu x %zu matrices", n, n);
+    if (!all)
+        return imp__error(ctx, IMP_E_NOMEM, "no memory for %zu x %zu matrices", n, n);
     m.H = all;
     m.H_same = all + n * n;
     m.H_prior = all + 2 * n * n;

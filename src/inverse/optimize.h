@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Optimisers of noisy objectives, for whoever has one: they know a goal (values, gradients
- * and their standard errors), bounds and scales, and nothing of light.
+ * Optimisers of noisy objectives, for whoever has one: they know a goal (values,
+ * gradients and their standard errors), bounds and scales, and nothing of light.
  *
  * Everything an optimiser knows between two iterations stands in a struct imp__search, in
  * numbers that a checkpoint can hold: continuing from a copy gives the same bits as not
@@ -15,14 +15,14 @@
 
 /* Normal equations at one x, from one set of random numbers. */
 struct imp__normal {
-    double *H;        /* [n][n] Gauss-Newton matrix, unbiased; may be indefinite */
-    double *H_same;   /* [n][n] biased upwards, positive semi-definite: damps H */
-    double *H_prior;  /* [n][n] the part of H and H_same that is not from data; exact */
-    double *g;        /* [n] gradient */
-    double *cov_g;    /* [n][n] its covariance by Monte Carlo */
-    double *H_meas;   /* [n][n] its covariance by noise of the data */
+    double *H;       /* [n][n] Gauss-Newton matrix, unbiased; may be indefinite */
+    double *H_same;  /* [n][n] biased upwards, positive semi-definite: damps H */
+    double *H_prior; /* [n][n] the part of H and H_same that is not from data; exact */
+    double *g;       /* [n] gradient */
+    double *cov_g;   /* [n][n] its covariance by Monte Carlo */
+    double *H_meas;  /* [n][n] its covariance by noise of the data */
     struct imp_estimate f;
-    double chi2;      /* sum of weighted squared residuals, Monte Carlo's part taken off */
+    double chi2; /* sum of weighted squared residuals, Monte Carlo's part taken off */
     double n_residuals;
     bool noise_known; /* H_meas is filled; else the noise is estimated from chi2 */
 };
@@ -32,13 +32,13 @@ struct imp__search;
 struct imp__goal {
     imp_context *ctx;
     size_t n;
-    const double *lo, *hi;     /* [n] bounds, may be infinite */
-    const double *scale;       /* [n] > 0: a large change of each variable */
+    const double *lo, *hi; /* [n] bounds, may be infinite */
+    const double *scale;   /* [n] > 0: a large change of each variable */
     uint64_t seed;
-    /* Value and gradient at x (inside the bounds) from the random numbers of `seed`; equal
-     * seeds are common random numbers. g and g_se may be NULL. */
-    enum imp_status (*eval)(const double *x, uint64_t seed, struct imp_estimate *f, double *g,
-                            double *g_se, void *payload);
+    /* Value and gradient at x (inside the bounds) from the random numbers of `seed`;
+     * equal seeds are common random numbers. g and g_se may be NULL. */
+    enum imp_status (*eval)(const double *x, uint64_t seed, struct imp_estimate *f,
+                            double *g, double *g_se, void *payload);
     /* For Levenberg-Marquardt and covariances: sets all of `out`. NULL: not offered. */
     enum imp_status (*normal)(const double *x, uint64_t seed, struct imp__normal *out,
                               void *payload);
@@ -49,9 +49,9 @@ struct imp__goal {
 };
 
 struct imp__opt_options {
-    int max_iterations;      /* > 0 */
-    double learning_rate;    /* Adam: of the scale */
-    double tolerance;        /* of the scale */
+    int max_iterations;   /* > 0 */
+    double learning_rate; /* Adam: of the scale */
+    double tolerance;     /* of the scale */
 };
 
 enum { IMP_SEARCH_ARRAYS = 5, IMP_SEARCH_SCALARS = 12 };
@@ -60,11 +60,11 @@ struct imp__search {
     imp_context *ctx;
     enum imp_optimizer kind;
     size_t n;
-    int iteration;           /* completed */
-    bool finished;           /* converged: more iterations would change nothing */
-    const char *reason;      /* why it stopped, a constant string */
-    double *start;           /* [n] where it began */
-    double *x;               /* [n] the best estimate so far, inside the bounds */
+    int iteration;      /* completed */
+    bool finished;      /* converged: more iterations would change nothing */
+    const char *reason; /* why it stopped, a constant string */
+    double *start;      /* [n] where it began */
+    double *x;          /* [n] the best estimate so far, inside the bounds */
     size_t n_history, cap_history, cap_history_se;
     double *history, *history_se;
     /* Private to the optimiser. */
@@ -75,8 +75,8 @@ struct imp__search {
 
 /* x0 is moved into the bounds. */
 enum imp_status imp__search_create(const struct imp__goal *goal, enum imp_optimizer kind,
-                                   const struct imp__opt_options *options, const double *x0,
-                                   struct imp__search **out);
+                                   const struct imp__opt_options *options,
+                                   const double *x0, struct imp__search **out);
 void imp__search_destroy(struct imp__search *search);
 
 /* Iterate until finished. @return IMP_OK; IMP_CANCELLED with the search where its last
@@ -85,12 +85,14 @@ enum imp_status imp__optimize(const struct imp__goal *goal,
                               const struct imp__opt_options *options,
                               struct imp__search *search);
 
-/* ---- Between the optimisers' files -------------------------------------------------------- */
+/* ---- Between the optimisers' files --------------------------------------------- */
 
 struct imp__opt_kind {
-    enum imp_status (*init)(const struct imp__goal *goal, const struct imp__opt_options *options,
+    enum imp_status (*init)(const struct imp__goal *goal,
+                            const struct imp__opt_options *options,
                             struct imp__search *search);
-    enum imp_status (*run)(const struct imp__goal *goal, const struct imp__opt_options *options,
+    enum imp_status (*run)(const struct imp__goal *goal,
+                           const struct imp__opt_options *options,
                            struct imp__search *search);
 };
 extern const struct imp__opt_kind imp__opt_adam, imp__opt_lm, imp__opt_nlopt;

@@ -55,7 +55,7 @@ void imp_problem_destroy(imp_problem *p)
     imp__release(p->ctx, p);
 }
 
-/* ---- Active parameters ---------------------------------------------------------------- */
+/* ---- Active parameters --------------------------------------------------------- */
 
 static enum imp_status activate_named(imp_problem *p, const char *name, uint8_t *chosen)
 {
@@ -65,13 +65,15 @@ static enum imp_status activate_named(imp_problem *p, const char *name, uint8_t 
     const struct imp_param_info *info = &p->scene->params[k].info;
     if (info->flags & IMP_PARAM_INTEGER)
         return imp__error(p->ctx, IMP_E_BIAS,
-                          "%s counts in whole numbers, so it has no derivative", info->name);
-    if (!(info->flags & IMP_PARAM_DIFFERENTIABLE))
-        return imp__error(p->ctx, IMP_E_BIAS,
-                          "%s has no unbiased derivative: changing it bends or moves light "
-                          "paths, or the densities they are drawn with, and the terms of that "
-                          "motion are not computed. Leave it at its value, or scan it",
+                          "%s counts in whole numbers, so it has no derivative",
                           info->name);
+    if (!(info->flags & IMP_PARAM_DIFFERENTIABLE))
+        return imp__error(
+            p->ctx, IMP_E_BIAS,
+            "%s has no unbiased derivative: changing it bends or moves light "
+            "paths, or the densities they are drawn with, and the terms of that "
+            "motion are not computed. Leave it at its value, or scan it",
+            info->name);
     chosen[k] = 1;
     return IMP_OK;
 }
@@ -84,7 +86,8 @@ enum imp_status imp_problem_activate(imp_problem *p, const char *glob)
     uint8_t *chosen = imp__alloc(p->ctx, imp_max(s->n_params, (size_t)1), 1);
 
     if (!glob || !*glob) IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "no parameter is named"));
-    if (!chosen) IMP_TRY(imp__error(p->ctx, IMP_E_NOMEM, "no memory for active parameters"));
+    if (!chosen)
+        IMP_TRY(imp__error(p->ctx, IMP_E_NOMEM, "no memory for active parameters"));
     memcpy(chosen, p->chosen, s->n_params);
     if (!imp__has_wildcards(glob)) {
         IMP_TRY(activate_named(p, glob, chosen));
@@ -98,12 +101,15 @@ enum imp_status imp_problem_activate(imp_problem *p, const char *glob)
             chosen[k] = 1;
         }
         if (!met)
-            IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "no parameter matches '%s' (there are %zu)",
-                               glob, s->n_params));
-        if (!usable)
             IMP_TRY(imp__error(p->ctx, IMP_E_ARG,
-                               "none of the %zu parameters that match '%s' has an unbiased "
-                               "derivative", met, glob));
+                               "no parameter matches '%s' (there are %zu)", glob,
+                               s->n_params));
+        if (!usable)
+            IMP_TRY(
+                imp__error(p->ctx, IMP_E_ARG,
+                           "none of the %zu parameters that match '%s' has an unbiased "
+                           "derivative",
+                           met, glob));
     }
     IMP_TRY(imp__active_create(s, chosen, &active));
     imp__active_destroy(p->ctx, &p->active);
@@ -130,8 +136,8 @@ enum imp_status imp_problem_variable(const imp_problem *p, size_t i, size_t *par
         if (hi) *hi = info->hi;
         return IMP_OK;
     }
-    return imp__error(p->ctx, IMP_E_ARG, "there is no active number %zu (there are %zu)", i,
-                      p->n);
+    return imp__error(p->ctx, IMP_E_ARG, "there is no active number %zu (there are %zu)",
+                      i, p->n);
 }
 
 void imp_problem_get_x(const imp_problem *p, double *x)
@@ -169,9 +175,10 @@ out:
     return st;
 }
 
-/* ---- Targets -------------------------------------------------------------------------- */
+/* ---- Targets ------------------------------------------------------------------- */
 
-static enum imp_status plane_copy(imp_context *ctx, const float *from, size_t n, float **to)
+static enum imp_status plane_copy(imp_context *ctx, const float *from, size_t n,
+                                  float **to)
 {
     *to = imp__alloc(ctx, n, sizeof **to);
     if (!*to) return imp__error(ctx, IMP_E_NOMEM, "no memory for a target picture");
@@ -190,22 +197,24 @@ static enum imp_status target_check(imp_problem *p, struct imp__target *t)
         const float w = t->weights ? t->weights[i] : 1;
         if (!(w >= 0) || !isfinite(w))
             return imp__error(p->ctx, IMP_E_ARG,
-                              "weight %g of target pixel (%d, %d) is not a number >= 0", w, x,
-                              y);
+                              "weight %g of target pixel (%d, %d) is not a number >= 0",
+                              w, x, y);
         total += w;
         for (size_t c = 0; c < channels; c++) {
             float *v = &t->pixels[i * channels + c];
             if (w == 0) *v = 0;
             if (!isfinite(*v))
-                return imp__error(p->ctx, IMP_E_ARG,
-                                  "target pixel (%d, %d) is not finite; give it weight 0 to "
-                                  "leave it out", x, y);
+                return imp__error(
+                    p->ctx, IMP_E_ARG,
+                    "target pixel (%d, %d) is not finite; give it weight 0 to "
+                    "leave it out",
+                    x, y);
             float *se = t->noise_se ? &t->noise_se[i * channels + c] : NULL;
             if (se && w == 0) *se = 0;
             if (se && (!(*se >= 0) || !isfinite(*se)))
-                return imp__error(p->ctx, IMP_E_ARG,
-                                  "noise_se of target pixel (%d, %d) is not a number >= 0", x,
-                                  y);
+                return imp__error(
+                    p->ctx, IMP_E_ARG,
+                    "noise_se of target pixel (%d, %d) is not a number >= 0", x, y);
         }
     }
     if (total == 0)
@@ -231,29 +240,31 @@ enum imp_status imp_problem_add_target(imp_problem *p, const struct imp_target *
                            sensor.width, sensor.height));
     if (d->channels != 1 && d->channels != p->scene->channels)
         IMP_TRY(imp__error(p->ctx, IMP_E_ARG,
-                           "target has %d channels; this scene's pictures have %d", d->channels,
-                           p->scene->channels));
+                           "target has %d channels; this scene's pictures have %d",
+                           d->channels, p->scene->channels));
     if (!d->pixels) IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "target without pixels"));
     if ((unsigned)d->loss > IMP_LOSS_LOG)
         IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "loss %d does not exist", (int)d->loss));
-    if (!(d->epsilon >= 0) || !(d->scale >= 0) || !isfinite(d->epsilon) || !isfinite(d->scale))
-        IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "epsilon %g and scale %g must be finite and >= 0",
-                           d->epsilon, d->scale));
+    if (!(d->epsilon >= 0) || !(d->scale >= 0) || !isfinite(d->epsilon) ||
+        !isfinite(d->scale))
+        IMP_TRY(imp__error(p->ctx, IMP_E_ARG,
+                           "epsilon %g and scale %g must be finite and >= 0", d->epsilon,
+                           d->scale));
     if (t.desc.epsilon == 0) t.desc.epsilon = 1e-2;
     if (t.desc.scale == 0) t.desc.scale = 1;
 
     const size_t n = (size_t)d->width * (size_t)d->height;
     IMP_TRY(plane_copy(p->ctx, d->pixels, n * (size_t)d->channels, &t.pixels));
     if (d->weights) IMP_TRY(plane_copy(p->ctx, d->weights, n, &t.weights));
-    if (d->noise_se) IMP_TRY(plane_copy(p->ctx, d->noise_se, n * (size_t)d->channels,
-                                        &t.noise_se));
+    if (d->noise_se)
+        IMP_TRY(plane_copy(p->ctx, d->noise_se, n * (size_t)d->channels, &t.noise_se));
     IMP_TRY(target_check(p, &t));
     t.desc.pixels = t.pixels;
     t.desc.weights = t.weights;
     t.desc.noise_se = t.noise_se;
 
-    struct imp__target *grown = imp__grow(p->ctx, p->targets, &p->cap_targets, p->n_targets + 1,
-                                          sizeof *grown);
+    struct imp__target *grown =
+        imp__grow(p->ctx, p->targets, &p->cap_targets, p->n_targets + 1, sizeof *grown);
     if (!grown) IMP_TRY(imp__error(p->ctx, IMP_E_NOMEM, "no memory for a target"));
     p->targets = grown;
     p->targets[p->n_targets++] = t;
@@ -263,7 +274,7 @@ out:
     return st;
 }
 
-/* ---- NLopt's callback shape ------------------------------------------------------------ */
+/* ---- NLopt's callback shape ---------------------------------------------------- */
 
 void imp_problem_set_run(imp_problem *p, const struct imp_run *run)
 {

@@ -1,41 +1,42 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A problem: which numbers are active, what is to be matched, and the estimates made of it.
- * estimate.c makes loss and gradient from walks (leave-one-out adjoints); jacobian.c makes
- * per-walk derivatives resolved by channel, for pictures and Gauss-Newton. */
+ * A problem: which numbers are active, what is to be matched, and the estimates made of
+ * it. estimate.c makes loss and gradient from walks (leave-one-out adjoints); jacobian.c
+ * makes per-walk derivatives resolved by channel, for pictures and Gauss-Newton. */
 #ifndef IMP_INVERSE_PROBLEM_H
 #define IMP_INVERSE_PROBLEM_H
 
-#include "base/pool.h"
 #include "base/film.h"
+#include "base/pool.h"
 #include "walk/walk.h"
 
 struct imp__target {
-    struct imp_target desc;   /* pixels, weights, noise_se point to copies */
+    struct imp_target desc; /* pixels, weights, noise_se point to copies */
     float *pixels, *weights, *noise_se;
 };
 
 struct imp__regulariser {
     enum { IMP_TIKHONOV, IMP_SMOOTHNESS } kind;
     double weight;
-    uint8_t *on;        /* [n_params] which parameters it covers */
-    double *origin;     /* [n_theta] x0, or NULL for 0 */
+    uint8_t *on;    /* [n_params] which parameters it covers */
+    double *origin; /* [n_theta] x0, or NULL for 0 */
 };
 
 struct imp_problem {
     imp_context *ctx;
     struct imp_scene *scene;
-    uint8_t *chosen;            /* [n_params] */
-    struct imp_active active;   /* follows chosen */
-    size_t n;                   /* active numbers */
+    uint8_t *chosen;          /* [n_params] */
+    struct imp_active active; /* follows chosen */
+    size_t n;                 /* active numbers */
     size_t n_targets, cap_targets;
     struct imp__target *targets;
     size_t n_regularisers, cap_regularisers;
     struct imp__regulariser *regularisers;
-    struct imp_run run;         /* of imp_problem_nlopt */
+    struct imp_run run;           /* of imp_problem_nlopt */
     struct imp_arena fit_arena;   /* of the last fit's result */
     struct imp_arena check_arena; /* of the last check's rows */
-    double progress_lo, progress_hi; /* part of the caller's work an estimate is; 0, 0: all */
+    double progress_lo,
+        progress_hi; /* part of the caller's work an estimate is; 0, 0: all */
     double progress_start_s;
 };
 
@@ -46,20 +47,20 @@ double imp__regularise(const struct imp_problem *p, const double *x, double *gra
  * (gradients.md 15):
  *   H [K*K]      U-statistic estimate of J^T W J (unbiased, may be indefinite)
  *   H_same [K*K] the same-sample matrix (biased upwards, positive semi-definite)
- *   H_meas [K*K] sum of w^2 sigma^2 J J^T for the measurement covariance, sigma^2 from the
- *                residuals where the target does not give it; NULL to skip
- *   g [K]        leave-one-out gradient of the data term, g_se [K] its standard errors
- *   cov_g [K*K]  covariance of g; NULL to skip
- * Regularisers are not included. Non-quadratic targets: their Gauss-Newton weights at the
- * present pictures, and *bias_order > 0. */
+ *   H_meas [K*K] sum of w^2 sigma^2 J J^T for the measurement covariance, sigma^2 from
+ * the residuals where the target does not give it; NULL to skip g [K] leave-one-out
+ * gradient of the data term, g_se [K] its standard errors cov_g [K*K]  covariance of g;
+ * NULL to skip Regularisers are not included. Non-quadratic targets: their Gauss-Newton
+ * weights at the present pictures, and *bias_order > 0. */
 struct imp__gauss_newton {
     double *H, *H_same, *H_meas, *g, *g_se, *cov_g;
-    struct imp_estimate objective;  /* data term */
-    double chi2;      /* sum w (mean - T)^2 - w Var(mean), unbiased */
+    struct imp_estimate objective; /* data term */
+    double chi2;                   /* sum w (mean - T)^2 - w Var(mean), unbiased */
     double n_residuals;
     double *residual_spread; /* unused by callers; may be NULL */
 };
 enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
-                                  const struct imp_run *run, struct imp__gauss_newton *out);
+                                  const struct imp_run *run,
+                                  struct imp__gauss_newton *out);
 
 #endif

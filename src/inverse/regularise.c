@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Regularisers: exact functions of x, added to the estimated data term. */
-#include "problem.h"
 #include "match.h"
+#include "problem.h"
 #include <math.h>
 #include <string.h>
 
@@ -18,7 +18,8 @@ static enum imp_status add(imp_problem *p, const char *glob, double weight, int 
     if (!(weight >= 0) || !isfinite(weight))
         return imp__error(p->ctx, IMP_E_ARG, "weight %g must be finite and >= 0", weight);
     r.on = imp__alloc(p->ctx, imp_max(s->n_params, (size_t)1), 1);
-    if (from_here) r.origin = imp__alloc(p->ctx, imp_max(s->n_theta, (size_t)1), sizeof(double));
+    if (from_here)
+        r.origin = imp__alloc(p->ctx, imp_max(s->n_theta, (size_t)1), sizeof(double));
     if (!r.on || (from_here && !r.origin))
         IMP_TRY(imp__error(p->ctx, IMP_E_NOMEM, "no memory for a regulariser"));
     for (size_t k = 0; k < s->n_params; k++) {
@@ -30,13 +31,16 @@ static enum imp_status add(imp_problem *p, const char *glob, double weight, int 
     }
     if (!met) IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "no parameter matches '%s'", glob));
     if (!usable)
-        IMP_TRY(imp__error(p->ctx, IMP_E_ARG,
-                           "smoothness needs a texture: nothing that matches '%s' has two "
-                           "dimensions", glob));
+        IMP_TRY(
+            imp__error(p->ctx, IMP_E_ARG,
+                       "smoothness needs a texture: nothing that matches '%s' has two "
+                       "dimensions",
+                       glob));
     if (from_here) imp_scene_get_theta(s, r.origin);
 
-    struct imp__regulariser *grown = imp__grow(p->ctx, p->regularisers, &p->cap_regularisers,
-                                               p->n_regularisers + 1, sizeof *grown);
+    struct imp__regulariser *grown =
+        imp__grow(p->ctx, p->regularisers, &p->cap_regularisers, p->n_regularisers + 1,
+                  sizeof *grown);
     if (!grown) IMP_TRY(imp__error(p->ctx, IMP_E_NOMEM, "no memory for a regulariser"));
     p->regularisers = grown;
     p->regularisers[p->n_regularisers++] = r;
@@ -53,7 +57,8 @@ enum imp_status imp_problem_add_tikhonov(imp_problem *p, const char *glob, doubl
     return add(p, glob, weight, IMP_TIKHONOV, from_here != 0);
 }
 
-enum imp_status imp_problem_add_smoothness(imp_problem *p, const char *glob, double weight)
+enum imp_status imp_problem_add_smoothness(imp_problem *p, const char *glob,
+                                           double weight)
 {
     return add(p, glob, weight, IMP_SMOOTHNESS, false);
 }
@@ -71,7 +76,8 @@ static double tikhonov(double w, size_t n, const double *x, const double *x0, do
 }
 
 /* 1/2 w sum over neighbours of (x_q - x_p)^2, along both axes of [h][w][c] */
-static double smoothness(double weight, size_t h, size_t w, size_t c, const double *x, double *g)
+static double smoothness(double weight, size_t h, size_t w, size_t c, const double *x,
+                         double *g)
 {
     double sum = 0;
     for (size_t i = 0; i < h; i++)
@@ -108,8 +114,9 @@ double imp__regularise(const struct imp_problem *p, const double *x, double *gra
                                   r->origin ? r->origin + info->offset : NULL, g);
             else
                 value += smoothness(r->weight, info->dims[0], info->dims[1],
-                                    info->count / imp_max(info->dims[0] * info->dims[1],
-                                                          (size_t)1), at, g);
+                                    info->count /
+                                        imp_max(info->dims[0] * info->dims[1], (size_t)1),
+                                    at, g);
         }
     }
     return value;

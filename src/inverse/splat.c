@@ -12,7 +12,7 @@ struct imp__replicates imp__splat_plan(int spp)
 
 struct pass {
     const struct imp_tracer *tracer;
-    int64_t first;   /* sample number the replicate begins at */
+    int64_t first; /* sample number the replicate begins at */
     int channels;
 };
 
@@ -50,7 +50,8 @@ static double picture_loss(const struct imp__splat *s, const imp_film *film)
         for (int c = 0; c < t->channels; c++) {
             const size_t k = p * (size_t)s->channels + (size_t)c;
             double I = film->mean[k], variance = imp__sqr(film->se[k]);
-            if (t->channels != s->channels) { /* luminance; channels of a sample correlate */
+            if (t->channels !=
+                s->channels) { /* luminance; channels of a sample correlate */
                 const float *m = film->mean + p * 3, *e = film->se + p * 3;
                 I = 0.212671 * m[0] + 0.715160 * m[1] + 0.072169 * m[2];
                 variance = imp__sqr(0.212671 * e[0] + 0.715160 * e[1] + 0.072169 * e[2]);
@@ -66,15 +67,19 @@ static double picture_loss(const struct imp__splat *s, const imp_film *film)
     return total;
 }
 
-enum imp_status imp__splat_create(const struct imp_problem *p, const struct imp_tracer *tracer,
+enum imp_status imp__splat_create(const struct imp_problem *p,
+                                  const struct imp_tracer *tracer,
                                   const struct imp__target *target, const float *seed,
                                   struct imp__replicates plan, const struct imp_run *run,
                                   struct imp__splat *out)
 {
     imp_context *ctx = p->ctx;
     enum imp_status st = IMP_OK;
-    struct imp__splat s = {.target = target, .seed = seed, .film = &tracer->sensor->film,
-                           .channels = p->scene->channels, .R = plan.R};
+    struct imp__splat s = {.target = target,
+                           .seed = seed,
+                           .film = &tracer->sensor->film,
+                           .channels = p->scene->channels,
+                           .R = plan.R};
     const size_t pixels = (size_t)s.film->crop_w * (size_t)s.film->crop_h;
     double sum = 0, square = 0;
     s.weights = imp__alloc(ctx, (size_t)plan.R, sizeof *s.weights);
@@ -87,9 +92,13 @@ enum imp_status imp__splat_create(const struct imp_problem *p, const struct imp_
         struct imp_run own = *run;
         own.spp = plan.n;
         own.time_limit_s = 0;
-        const struct imp_picture picture = {
-            tracer->sensor, "picture", pass.channels == 3 ? "R,G,B" : "Y", pass.channels,
-            target ? sample_radiance : sample_position, &pass, s.weights[b]};
+        const struct imp_picture picture = {tracer->sensor,
+                                            "picture",
+                                            pass.channels == 3 ? "R,G,B" : "Y",
+                                            pass.channels,
+                                            target ? sample_radiance : sample_position,
+                                            &pass,
+                                            s.weights[b]};
         IMP_TRY(imp__picture_make(ctx, &picture, &own, &s.films[b]));
         if (!target) continue;
         const double value = picture_loss(&s, s.films[b]);
@@ -117,7 +126,8 @@ void imp__splat_destroy(imp_context *ctx, struct imp__splat *s)
 }
 
 /* l' of pixel p without the sample, as an adjoint of radiance. */
-static imp_spec pixel_adjoint(const struct imp__splat *s, int b, size_t p, double w, imp_spec L)
+static imp_spec pixel_adjoint(const struct imp__splat *s, int b, size_t p, double w,
+                              imp_spec L)
 {
     const int n = s->channels;
     imp_spec bar = {0};
@@ -135,8 +145,8 @@ static imp_spec pixel_adjoint(const struct imp__splat *s, int b, size_t p, doubl
         rest[c] = W - w > 1e-9 * W ? (mean[c] * W - w * L[c]) / (W - w) : mean[c];
     for (int c = 0; c < t->channels; c++) {
         const bool same = t->channels == n;
-        const double I = same ? rest[c]
-                              : lum[0] * rest[0] + lum[1] * rest[1] + lum[2] * rest[2];
+        const double I =
+            same ? rest[c] : lum[0] * rest[0] + lum[1] * rest[1] + lum[2] * rest[2];
         struct imp__loss_at at;
         imp__loss_eval(t->loss, scale, t->epsilon, I,
                        s->target->pixels[p * (size_t)t->channels + (size_t)c], &at);
@@ -146,7 +156,8 @@ static imp_spec pixel_adjoint(const struct imp__splat *s, int b, size_t p, doubl
     return bar;
 }
 
-imp_spec imp__splat_adjoint(const struct imp__splat *s, int b, double px, double py, imp_spec L)
+imp_spec imp__splat_adjoint(const struct imp__splat *s, int b, double px, double py,
+                            imp_spec L)
 {
     const struct imp_film_desc *film = s->film;
     const struct imp_filter *f = &film->filter;

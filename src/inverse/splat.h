@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Losses seen through filters wider than a pixel. A sample then reaches several pixels, so
- * its adjoint is known only when all of them are: pass 1 makes the picture of each
+ * Losses seen through filters wider than a pixel. A sample then reaches several pixels,
+ * so its adjoint is known only when all of them are: pass 1 makes the picture of each
  * replicate, pass 2 walks the same random numbers again and weights sample i by
  *
  *     P_i = sum_p  w_ip / W_p  l'_p( (S_p - w_ip L_i) / (W_p - w_ip) )
  *
- * over the pixels p it reaches: its own part left out, the normaliser W fixed (it depends on
- * positions only; gradients.md 5.4). */
+ * over the pixels p it reaches: its own part left out, the normaliser W fixed (it depends
+ * on positions only; gradients.md 5.4). */
 #ifndef IMP_INVERSE_SPLAT_H
 #define IMP_INVERSE_SPLAT_H
 
@@ -18,19 +18,21 @@ struct imp__splat {
     const float *seed;
     const struct imp_film_desc *film;
     int channels, R;
-    double **weights;   /* [R][height][width] W_p */
-    imp_film **films;   /* [R] pictures; NULL entries with a fixed adjoint */
+    double **weights; /* [R][height][width] W_p */
+    imp_film **films; /* [R] pictures; NULL entries with a fixed adjoint */
     double objective, objective_variance;
 };
 
 /* Two to four replicates of half the samples or fewer. */
 struct imp__replicates imp__splat_plan(int spp);
-enum imp_status imp__splat_create(const struct imp_problem *p, const struct imp_tracer *tracer,
+enum imp_status imp__splat_create(const struct imp_problem *p,
+                                  const struct imp_tracer *tracer,
                                   const struct imp__target *target, const float *seed,
                                   struct imp__replicates plan, const struct imp_run *run,
                                   struct imp__splat *out);
 void imp__splat_destroy(imp_context *ctx, struct imp__splat *s);
 /* P_i of a sample of replicate b at film position (px, py). */
-imp_spec imp__splat_adjoint(const struct imp__splat *s, int b, double px, double py, imp_spec L);
+imp_spec imp__splat_adjoint(const struct imp__splat *s, int b, double px, double py,
+                            imp_spec L);
 
 #endif

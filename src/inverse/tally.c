@@ -13,8 +13,7 @@ static void add_dense(struct imp_sink *sink, int param, size_t element, int chan
     double *batch = t->batch + base + element;
     if (channels == 3)
         for (int c = 0; c < 3; c++) batch[c] += (*bar)[c];
-    else
-        batch[0] += t->lanes == 3 ? imp__sum3(*bar) : (*bar)[0];
+    else batch[0] += t->lanes == 3 ? imp__sum3(*bar) : (*bar)[0];
 }
 
 static bool table_grow(struct imp_tally *t)
@@ -33,7 +32,8 @@ static bool table_grow(struct imp_tally *t)
     return true;
 }
 
-static struct imp__tally_entry *entry_find(struct imp_tally *t, uint32_t key, int channels)
+static struct imp__tally_entry *entry_find(struct imp_tally *t, uint32_t key,
+                                           int channels)
 {
     if (2 * t->n_entries >= t->table_size && !table_grow(t)) return NULL;
     size_t slot = imp__mix64(key) & (t->table_size - 1);
@@ -60,7 +60,8 @@ static void add_hashed(struct imp_sink *sink, int param, size_t element, int cha
     struct imp_tally *t = (struct imp_tally *)sink;
     const int64_t base = t->active->base[param];
     if (base < 0 || t->failed) return;
-    struct imp__tally_entry *e = entry_find(t, (uint32_t)((size_t)base + element), channels);
+    struct imp__tally_entry *e =
+        entry_find(t, (uint32_t)((size_t)base + element), channels);
     if (!e) {
         t->failed = true;
         return;
@@ -76,14 +77,12 @@ static void add_hashed(struct imp_sink *sink, int param, size_t element, int cha
         t->touched[t->n_touched++] = (uint32_t)(e - t->entries);
         e->touched = true;
     }
-    if (channels == 3)
-        e->batch += *bar;
-    else
-        e->batch[0] += t->lanes == 3 ? imp__sum3(*bar) : (*bar)[0];
+    if (channels == 3) e->batch += *bar;
+    else e->batch[0] += t->lanes == 3 ? imp__sum3(*bar) : (*bar)[0];
 }
 
-enum imp_status imp__tally_create(imp_context *ctx, const struct imp_active *active, int lanes,
-                                  struct imp_tally *out)
+enum imp_status imp__tally_create(imp_context *ctx, const struct imp_active *active,
+                                  int lanes, struct imp_tally *out)
 {
     struct imp_tally t = {.ctx = ctx, .active = active, .lanes = lanes};
     t.dense = active->n <= IMP_TALLY_DENSE;
@@ -169,8 +168,10 @@ enum imp_status imp__tally_export(const struct imp_tally *t, struct imp_tally_re
 {
     if (t->failed) return imp__error(t->ctx, IMP_E_NOMEM, "no memory for gradients");
     if (t->dense) {
-        if (!out->dense) out->dense = imp__alloc(t->ctx, 2 * t->active->n, sizeof *out->dense);
-        if (!out->dense) return imp__error(t->ctx, IMP_E_NOMEM, "no memory for gradients");
+        if (!out->dense)
+            out->dense = imp__alloc(t->ctx, 2 * t->active->n, sizeof *out->dense);
+        if (!out->dense)
+            return imp__error(t->ctx, IMP_E_NOMEM, "no memory for gradients");
         memcpy(out->dense, t->mean, 2 * t->active->n * sizeof *out->dense);
         return IMP_OK;
     }

@@ -1,24 +1,24 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What a kind's build function gets, and the concepts' tables. Inputs (imp_input_desc) are
- * read by the engine before build is called; build reads the remaining properties with
- * imp__props_* of base/props.h. Unread properties are an error afterwards. */
+ * What a kind's build function gets, and the concepts' tables. Inputs (imp_input_desc)
+ * are read by the engine before build is called; build reads the remaining properties
+ * with imp__props_* of base/props.h. Unread properties are an error afterwards. */
 #ifndef IMP_KIND_BUILD_H
 #define IMP_KIND_BUILD_H
 
-#include <importon/kinds.h>
 #include "base/props.h"
+#include <importon/kinds.h>
 
 struct imp_build {
     imp_context *ctx;
     struct imp_node *node;
-    struct imp_arena *arena;      /* lives as long as the scene */
+    struct imp_arena *arena; /* lives as long as the scene */
     enum imp_color_mode mode;
     /* Register the bulk data of a texture as a parameter: `data` [count] in place, shape
      * `dims`. Sets *param. */
     enum imp_status (*add_bulk)(const struct imp_build *b, const char *key, float *data,
-                                int n_dims, const size_t dims[3], unsigned flags, double lo,
-                                double hi, int *param);
+                                int n_dims, const size_t dims[3], unsigned flags,
+                                double lo, double hi, int *param);
     void *scene;
 };
 

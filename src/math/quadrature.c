@@ -2,7 +2,8 @@
 #include "quadrature.h"
 #include <math.h>
 
-/* Roots of P_n by Newton from Tricomi's asymptotic places; w = 2/((1 - x^2) P_n'(x)^2). */
+/* Roots of P_n by Newton from Tricomi's asymptotic places; w = 2/((1 - x^2) P_n'(x)^2).
+ */
 void imp__gauss_legendre(size_t n, double lo, double hi, double *x, double *w)
 {
     const double mid = 0.5 * (hi + lo), half = 0.5 * (hi - lo);

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Random numbers as a pure function of integers: imp__u01(key, dim), key made from (seed,
- * pixel, sample). Nothing to copy or rewind; a replay is the same call again. The mixing is
- * the finaliser of SplitMix64 (Steele, Lea, Flood 2014, variant 13 of Stafford), applied to a
- * Weyl sequence in `dim` from a start that is itself mixed from the key's three integers. */
+ * pixel, sample). Nothing to copy or rewind; a replay is the same call again. The mixing
+ * is the finaliser of SplitMix64 (Steele, Lea, Flood 2014, variant 13 of Stafford),
+ * applied to a Weyl sequence in `dim` from a start that is itself mixed from the key's
+ * three integers. */
 #ifndef IMP_MATH_RNG_H
 #define IMP_MATH_RNG_H
 
@@ -16,7 +17,9 @@ static inline uint64_t imp__mix64(uint64_t z)
     return z ^ (z >> 31);
 }
 
-struct imp_key { uint64_t state; };
+struct imp_key {
+    uint64_t state;
+};
 
 static inline struct imp_key imp__key(uint64_t seed, uint64_t pixel, uint64_t sample)
 {

@@ -24,8 +24,8 @@ double imp__normal_quantile(double p)
     return x;
 }
 
-/* Series for P below the mean, Lentz's continued fraction for Q above (Abramowitz and Stegun
- * 6.5.29, 6.5.31). Both need about sqrt(a) terms near x = a. */
+/* Series for P below the mean, Lentz's continued fraction for Q above (Abramowitz and
+ * Stegun 6.5.29, 6.5.31). Both need about sqrt(a) terms near x = a. */
 double imp__gamma_q(double a, double x)
 {
     if (!(a > 0) || !(x >= 0)) return NAN;
@@ -57,6 +57,9 @@ double imp__gamma_q(double a, double x)
     return front * h;
 }
 
-double imp__chi2_tail(double x, double k) { return x <= 0 ? 1 : imp__gamma_q(k / 2, x / 2); }
+double imp__chi2_tail(double x, double k)
+{
+    return x <= 0 ? 1 : imp__gamma_q(k / 2, x / 2);
+}
 
 double imp__sidak(double alpha, double n) { return -expm1(log1p(-alpha) / n); }

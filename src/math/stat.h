@@ -11,7 +11,8 @@ double imp__normal_quantile(double p);
 double imp__gamma_q(double a, double x);
 /* P(X >= x) for chi-square with k degrees of freedom. */
 double imp__chi2_tail(double x, double k);
-/* Level for each of n tests, so that all together err with probability alpha (Sidak 1967). */
+/* Level for each of n tests, so that all together err with probability alpha (Sidak
+ * 1967). */
 double imp__sidak(double alpha, double n);
 
 #endif

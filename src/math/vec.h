@@ -1,20 +1,24 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Vectors and spectra are four doubles (GCC/Clang vector types), so formulas read as in the
- * papers: f * (cos_i / p). The fourth lane of an imp_v3 is 0. The types come from kinds.h. */
+ * Vectors and spectra are four doubles (GCC/Clang vector types), so formulas read as in
+ * the papers: f * (cos_i / p). The fourth lane of an imp_v3 is 0. The types come from
+ * kinds.h. */
 #ifndef IMP_MATH_VEC_H
 #define IMP_MATH_VEC_H
 
+#include "base/compiler.h"
 #include <importon/kinds.h>
 #include <math.h>
 #include <stdbool.h>
-#include "base/compiler.h"
 
-#define IMP_PI 3.14159265358979323846
+#define IMP_PI     3.14159265358979323846
 #define IMP_INV_PI 0.31830988618379067154
-#define IMP_2PI 6.28318530717958647693
+#define IMP_2PI    6.28318530717958647693
 
-static inline imp_v3 imp__v3(double x, double y, double z) { return (imp_v3){x, y, z, 0}; }
+static inline imp_v3 imp__v3(double x, double y, double z)
+{
+    return (imp_v3){x, y, z, 0};
+}
 static inline imp_spec imp__spec(double c) { return (imp_spec){c, c, c, c}; }
 
 static inline double imp__dot(imp_v3 a, imp_v3 b)
@@ -32,7 +36,10 @@ static inline imp_v3 imp__normalize(imp_v3 a) { return a * (1 / imp__length(a));
 
 static inline double imp__max3(imp_spec s) { return imp_max(s[0], imp_max(s[1], s[2])); }
 static inline double imp__sum3(imp_spec s) { return (s[0] + s[1]) + s[2]; }
-static inline bool imp__is_zero(imp_spec s) { return s[0] == 0 && s[1] == 0 && s[2] == 0; }
+static inline bool imp__is_zero(imp_spec s)
+{
+    return s[0] == 0 && s[1] == 0 && s[2] == 0;
+}
 static inline bool imp__is_finite(imp_spec s)
 {
     return isfinite(s[0]) && isfinite(s[1]) && isfinite(s[2]);
@@ -40,7 +47,9 @@ static inline bool imp__is_finite(imp_spec s)
 static inline double imp__sqr(double x) { return x * x; }
 
 /* Orthonormal frame; local (x, y, z) is x s + y t + z n. */
-struct imp_frame { imp_v3 s, t, n; };
+struct imp_frame {
+    imp_v3 s, t, n;
+};
 
 static inline imp_v3 imp__to_local(const struct imp_frame *f, imp_v3 v)
 {
@@ -50,7 +59,8 @@ static inline imp_v3 imp__to_world(const struct imp_frame *f, imp_v3 v)
 {
     return f->s * v[0] + f->t * v[1] + f->n * v[2];
 }
-/* Branch-free basis about n (Duff et al., "Building an Orthonormal Basis, Revisited", 2017). */
+/* Branch-free basis about n (Duff et al., "Building an Orthonormal Basis, Revisited",
+ * 2017). */
 static inline struct imp_frame imp__frame_from_normal(imp_v3 n)
 {
     const double sign = copysign(1, n[2]), a = -1 / (sign + n[2]), b = n[0] * n[1] * a;

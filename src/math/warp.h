@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * From the unit square to directions and points: each warp with its density and inverse. */
+ * From the unit square to directions and points: each warp with its density and inverse.
+ */
 #ifndef IMP_MATH_WARP_H
 #define IMP_MATH_WARP_H
 
@@ -28,10 +29,19 @@ static inline void imp__concentric_disk_inverse(const double xy[2], double u[2])
     double phi = atan2(xy[1], xy[0]);
     if (phi < -IMP_PI / 4) phi += IMP_2PI;
     double a, b;
-    if (phi < IMP_PI / 4) { a = r; b = phi * a / (IMP_PI / 4); }
-    else if (phi < 3 * IMP_PI / 4) { b = r; a = (IMP_PI / 2 - phi) * b / (IMP_PI / 4); }
-    else if (phi < 5 * IMP_PI / 4) { a = -r; b = (phi - IMP_PI) * a / (IMP_PI / 4); }
-    else { b = -r; a = -(phi - 3 * IMP_PI / 2) * b / (IMP_PI / 4); }
+    if (phi < IMP_PI / 4) {
+        a = r;
+        b = phi * a / (IMP_PI / 4);
+    } else if (phi < 3 * IMP_PI / 4) {
+        b = r;
+        a = (IMP_PI / 2 - phi) * b / (IMP_PI / 4);
+    } else if (phi < 5 * IMP_PI / 4) {
+        a = -r;
+        b = (phi - IMP_PI) * a / (IMP_PI / 4);
+    } else {
+        b = -r;
+        a = -(phi - 3 * IMP_PI / 2) * b / (IMP_PI / 4);
+    }
     u[0] = (a + 1) / 2;
     u[1] = (b + 1) / 2;
 }
@@ -43,7 +53,10 @@ static inline imp_v3 imp__cosine_hemisphere(const double u[2])
     imp__concentric_disk(u, d);
     return imp__v3(d[0], d[1], sqrt(imp_max(0, 1 - d[0] * d[0] - d[1] * d[1])));
 }
-static inline double imp__cosine_hemisphere_pdf(imp_v3 w) { return w[2] > 0 ? w[2] * IMP_INV_PI : 0; }
+static inline double imp__cosine_hemisphere_pdf(imp_v3 w)
+{
+    return w[2] > 0 ? w[2] * IMP_INV_PI : 0;
+}
 static inline void imp__cosine_hemisphere_inverse(imp_v3 w, double u[2])
 {
     const double d[2] = {w[0], w[1]};
@@ -78,7 +91,8 @@ static inline double imp__uniform_cone_pdf(double cos_max)
     return 1 / (IMP_2PI * (1 - cos_max));
 }
 
-/* Uniform triangle: barycentric weights of the second and third vertex. Density 1/area. */
+/* Uniform triangle: barycentric weights of the second and third vertex. Density 1/area.
+ */
 static inline void imp__uniform_triangle(const double u[2], double b[2])
 {
     const double t = sqrt(imp_max(0, 1 - u[0]));

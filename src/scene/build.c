@@ -7,7 +7,10 @@
 /* Top-level objects without id: <tag><n>, counted per tag. */
 struct tag_counts {
     int n_tags;
-    struct { const char *tag; size_t n; } tags[16]; /* there are not as many */
+    struct {
+        const char *tag;
+        size_t n;
+    } tags[16]; /* there are not as many */
 };
 
 static const char *top_name(struct imp_scene *scene, const struct imp_node *node,
@@ -55,7 +58,8 @@ static enum imp_status top_build(struct imp_scene *scene, struct imp_child *chil
                                     "an area emitter must be inside a shape"));
     } else if (strcmp(tag, "integrator") == 0) {
         if (scene->has_integrator)
-            IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_SCENE, "a second integrator"));
+            IMP_TRY(
+                imp__node_error(scene->ctx, node, IMP_E_SCENE, "a second integrator"));
         IMP_TRY(imp__integrator_build(scene, node, &scene->integrator));
         scene->has_integrator = true;
     } else if (strcmp(tag, "film") != 0 && strcmp(tag, "sampler") != 0 &&
@@ -98,9 +102,11 @@ enum imp_status imp__scene_build(struct imp_scene *scene)
         IMP_TRY(top_build(scene, &scene->root->children[i], &counts));
     IMP_TRY(imp__props_finish(scene->ctx, scene->root));
     if (!scene->has_integrator)
-        scene->integrator = (struct imp_integrator){
-            .kind = IMP_INTEGRATOR_PATH, .max_depth = -1, .rr_depth = 5,
-            .emitter_samples = 1, .bsdf_samples = 1};
+        scene->integrator = (struct imp_integrator){.kind = IMP_INTEGRATOR_PATH,
+                                                    .max_depth = -1,
+                                                    .rr_depth = 5,
+                                                    .emitter_samples = 1,
+                                                    .bsdf_samples = 1};
     IMP_TRY(lights_build(scene));
     imp__theta_finish(scene);
     IMP_TRY(imp__intersector_create(scene));

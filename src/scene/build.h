@@ -5,10 +5,10 @@
 #ifndef IMP_SCENE_BUILD_H
 #define IMP_SCENE_BUILD_H
 
-#include <stdio.h>
-#include <string.h>
 #include "color/convert.h"
 #include "scene.h"
+#include <stdio.h>
+#include <string.h>
 
 enum imp_status imp__build_no_memory(struct imp_scene *scene);
 /* "parent.key"; NULL: no memory. */
@@ -31,7 +31,8 @@ enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *nod
                                    struct imp_texture **out);
 
 enum imp_status imp__build_bsdf(struct imp_scene *scene, struct imp_node *node,
-                                const char *parent, const char *slot, struct imp_bsdf **out);
+                                const char *parent, const char *slot,
+                                struct imp_bsdf **out);
 /* A material of reflectance 0 that has no parameter: emitters' default. */
 enum imp_status imp__build_black(struct imp_scene *scene, struct imp_bsdf **out);
 /* An area light without a shape is only declared, and nothing is made. */
@@ -44,28 +45,28 @@ enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node
                                   const char *name);
 
 /* What a concept supports, for "there is no such plugin". */
-#define KIND_LIST(table, buffer)                                                           \
-    do {                                                                                   \
-        (buffer)[0] = 0;                                                                   \
-        for (size_t k_ = 0; (table)[k_]; k_++) {                                           \
-            const size_t n_ = strlen(buffer);                                              \
-            snprintf((buffer) + n_, sizeof(buffer) - n_, "%s%s", k_ ? ", " : "",           \
-                     (table)[k_]->name);                                                   \
-        }                                                                                  \
+#define KIND_LIST(table, buffer)                                                         \
+    do {                                                                                 \
+        (buffer)[0] = 0;                                                                 \
+        for (size_t k_ = 0; (table)[k_]; k_++) {                                         \
+            const size_t n_ = strlen(buffer);                                            \
+            snprintf((buffer) + n_, sizeof(buffer) - n_, "%s%s", k_ ? ", " : "",         \
+                     (table)[k_]->name);                                                 \
+        }                                                                                \
     } while (0)
 /* The kind of this node's type, or an error that says what there is. */
-#define KIND_FIND(scene, node, table, out)                                                 \
-    do {                                                                                   \
-        size_t i_ = 0;                                                                     \
-        while ((table)[i_] && strcmp((table)[i_]->name, (node)->type) != 0) i_++;          \
-        (out) = (table)[i_];                                                               \
-        if (!(out)) {                                                                      \
-            char list_[1024];                                                              \
-            KIND_LIST(table, list_);                                                       \
-            IMP_TRY(imp__node_error((scene)->ctx, node, IMP_E_UNSUPPORTED,                 \
-                                    "this version has no such %s; it has %s", (node)->tag, \
-                                    list_));                                               \
-        }                                                                                  \
+#define KIND_FIND(scene, node, table, out)                                               \
+    do {                                                                                 \
+        size_t i_ = 0;                                                                   \
+        while ((table)[i_] && strcmp((table)[i_]->name, (node)->type) != 0) i_++;        \
+        (out) = (table)[i_];                                                             \
+        if (!(out)) {                                                                    \
+            char list_[1024];                                                            \
+            KIND_LIST(table, list_);                                                     \
+            IMP_TRY(imp__node_error((scene)->ctx, node, IMP_E_UNSUPPORTED,               \
+                                    "this version has no such %s; it has %s",            \
+                                    (node)->tag, list_));                                \
+        }                                                                                \
     } while (0)
 
 #endif

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Inputs of objects: constants, which become parameters, and textures. Names and tools that
- * all builders share stand first. */
+ * Inputs of objects: constants, which become parameters, and textures. Names and tools
+ * that all builders share stand first. */
 #include "build.h"
 
 enum imp_status imp__build_no_memory(struct imp_scene *scene)
@@ -19,17 +19,19 @@ char *imp__build_name(struct imp_scene *scene, const char *parent, const char *k
 
 /* The name of an object: its id, else the slot below the parent. */
 const char *imp__build_object_name(struct imp_scene *scene, const struct imp_node *node,
-                               const char *parent, const char *slot)
+                                   const char *parent, const char *slot)
 {
     return node->id ? node->id : imp__build_name(scene, parent, slot);
 }
 
 /* Append to one of the scene's lists; they live in the arena and double. */
-enum imp_status imp__build_list_add(struct imp_scene *scene, void ***list, int *n, void *object)
+enum imp_status imp__build_list_add(struct imp_scene *scene, void ***list, int *n,
+                                    void *object)
 {
     const size_t count = (size_t)*n;
     if ((count & (count - 1)) == 0) { /* 0, 1, 2, 4, 8: full */
-        void **grown = imp__arena_take(&scene->arena, count ? 2 * count : 1, sizeof *grown);
+        void **grown =
+            imp__arena_take(&scene->arena, count ? 2 * count : 1, sizeof *grown);
         if (!grown) return imp__build_no_memory(scene);
         if (count) memcpy(grown, *list, count * sizeof *grown);
         *list = grown;
@@ -39,20 +41,24 @@ enum imp_status imp__build_list_add(struct imp_scene *scene, void ***list, int *
 }
 
 static enum imp_status add_bulk(const struct imp_build *b, const char *key, float *data,
-                                int n_dims, const size_t dims[3], unsigned flags, double lo,
-                                double hi, int *param);
+                                int n_dims, const size_t dims[3], unsigned flags,
+                                double lo, double hi, int *param);
 
 struct imp_build imp__build_make(struct imp_scene *scene, struct imp_node *node)
 {
-    return (struct imp_build){.ctx = scene->ctx, .node = node, .arena = &scene->arena,
-                              .mode = scene->mode, .add_bulk = add_bulk, .scene = scene};
+    return (struct imp_build){.ctx = scene->ctx,
+                              .node = node,
+                              .arena = &scene->arena,
+                              .mode = scene->mode,
+                              .add_bulk = add_bulk,
+                              .scene = scene};
 }
 
-/* ---- Inputs and textures ------------------------------------------------------------ */
+/* ---- Inputs and textures ------------------------------------------------------- */
 
 static enum imp_status add_bulk(const struct imp_build *b, const char *key, float *data,
-                                int n_dims, const size_t dims[3], unsigned flags, double lo,
-                                double hi, int *param)
+                                int n_dims, const size_t dims[3], unsigned flags,
+                                double lo, double hi, int *param)
 {
     struct imp_scene *scene = b->scene;
     const struct imp_texture *t = b->node->object; /* set before build is called */
@@ -69,8 +75,8 @@ static enum imp_status add_bulk(const struct imp_build *b, const char *key, floa
 }
 
 enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *node,
-                                     const char *parent, const char *slot,
-                                     struct imp_texture **out)
+                                   const char *parent, const char *slot,
+                                   struct imp_texture **out)
 {
     enum imp_status st = IMP_OK;
     struct imp_texture *t = node->object;
@@ -79,7 +85,8 @@ enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *nod
         return IMP_OK;
     }
     if (node->visiting)
-        return imp__node_error(scene->ctx, node, IMP_E_SCENE, "the object contains itself");
+        return imp__node_error(scene->ctx, node, IMP_E_SCENE,
+                               "the object contains itself");
     node->visiting = 1;
     const struct imp_texture_ops *ops;
     KIND_FIND(scene, node, imp__texture_kinds, ops);
@@ -87,29 +94,33 @@ enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *nod
     t = imp__arena_array(&scene->arena, 1, sizeof *t);
     void *self = imp__arena_array(&scene->arena, 1, ops->object_size);
     if (!t || !self) IMP_TRY(imp__build_no_memory(scene));
-    *t = (struct imp_texture){.ops = ops, .self = self, .param = -1,
+    *t = (struct imp_texture){.ops = ops,
+                              .self = self,
+                              .param = -1,
                               .name = imp__build_object_name(scene, node, parent, slot)};
     if (!t->name) IMP_TRY(imp__build_no_memory(scene));
     node->object = t;
     int n = 0;
     while (ops->inputs && ops->inputs[n].name) n++;
-    const struct imp_input **input = imp__arena_array(&scene->arena, (size_t)n + 1, sizeof *input);
+    const struct imp_input **input =
+        imp__arena_array(&scene->arena, (size_t)n + 1, sizeof *input);
     if (!input) IMP_TRY(imp__build_no_memory(scene));
     IMP_TRY(imp__build_inputs(scene, node, t->name, ops->inputs, input, &t->n_in));
     t->input = input;
     const struct imp_build b = imp__build_make(scene, node);
     if (ops->build) IMP_TRY(ops->build(&b, self, t));
     IMP_TRY(imp__props_finish(scene->ctx, node));
-    IMP_TRY(imp__build_list_add(scene, (void ***)&scene->textures, &scene->n_textures, t));
+    IMP_TRY(
+        imp__build_list_add(scene, (void ***)&scene->textures, &scene->n_textures, t));
     *out = t;
 out:
     node->visiting = 0;
     return st;
 }
 
-static enum imp_status param_add(struct imp_scene *scene, const char *name, const char *key,
-                                 const struct imp_input_desc *d, struct imp_input *in,
-                                 int count)
+static enum imp_status param_add(struct imp_scene *scene, const char *name,
+                                 const char *key, const struct imp_input_desc *d,
+                                 struct imp_input *in, int count)
 {
     char path[512];
     snprintf(path, sizeof path, "%s.%s", d->name, key);
@@ -124,14 +135,16 @@ static enum imp_status param_add(struct imp_scene *scene, const char *name, cons
     p.info.lo = d->lo;
     p.info.hi = unbounded ? INFINITY : d->hi;
     if (!(d->flags & IMP_INPUT_FIXED)) p.info.flags |= IMP_PARAM_DIFFERENTIABLE;
-    if (d->flags & (IMP_INPUT_EDGES | IMP_INPUT_FIXED)) p.info.flags |= IMP_PARAM_DISCONTINUOUS;
+    if (d->flags & (IMP_INPUT_EDGES | IMP_INPUT_FIXED))
+        p.info.flags |= IMP_PARAM_DISCONTINUOUS;
     if (count > 1) p.info.flags |= IMP_PARAM_COLOR;
     return imp__theta_add(scene, &p, &in->param);
 }
 
 /* Texels that stand for an input stay within its bounds, if they are there to begin with:
  * a search may not raise a reflectance above 1. */
-static void texels_bound(struct imp_scene *scene, int param, const struct imp_input_desc *d)
+static void texels_bound(struct imp_scene *scene, int param,
+                         const struct imp_input_desc *d)
 {
     if (param < 0 || scene->params[param].store != IMP_STORE_BULK) return;
     struct imp_param *p = &scene->params[param];
@@ -159,12 +172,12 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
 
     if (prop) {
         prop->used = true;
-        IMP_TRY(imp__color_convert(ctx, node, prop, d->role, scalar, scene->mode, &in->value,
-                                   &count));
+        IMP_TRY(imp__color_convert(ctx, node, prop, d->role, scalar, scene->mode,
+                                   &in->value, &count));
     } else if (child && imp__color_is_object(child->node)) {
         child->used = true;
-        IMP_TRY(imp__color_object(ctx, child->node, d->role, scalar, scene->mode, &in->value,
-                                  &count, &key));
+        IMP_TRY(imp__color_object(ctx, child->node, d->role, scalar, scene->mode,
+                                  &in->value, &count, &key));
     } else if (child) {
         struct imp_texture *t;
         child->used = true;
@@ -173,13 +186,15 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
             child->node->children[0].name = "nested_texture";
         if (strcmp(child->node->tag, "texture") != 0 && !daylight)
             IMP_TRY(imp__node_error(ctx, child->node, IMP_E_SCENE,
-                                    "'%s' must be a number, a colour or a texture", d->name));
+                                    "'%s' must be a number, a colour or a texture",
+                                    d->name));
         IMP_TRY(imp__build_texture(scene, child->node, name, d->name, &t));
         in->texture = t;
         texels_bound(scene, t->param, d);
         return IMP_OK;
     } else if (d->flags & IMP_INPUT_REQUIRED) {
-        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "property '%s' is missing", d->name));
+        IMP_TRY(
+            imp__node_error(ctx, node, IMP_E_SCENE, "property '%s' is missing", d->name));
     } else {
         imp__color_default(d->fallback, scalar ? IMP_REFLECTANCE : d->role, scene->mode,
                            &in->value, &count);
@@ -190,8 +205,9 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
     for (int k = 0; k < count; k++) {
         const double v = in->value[k], hi = d->lo == 0 && d->hi == 0 ? INFINITY : d->hi;
         if (!isfinite(v) || v < d->lo || v > hi)
-            IMP_TRY(imp__prop_error(ctx, node, prop, IMP_E_SCENE, "%s = %g is outside [%g, %g]",
-                                    d->name, v, d->lo, hi));
+            IMP_TRY(imp__prop_error(ctx, node, prop, IMP_E_SCENE,
+                                    "%s = %g is outside [%g, %g]", d->name, v, d->lo,
+                                    hi));
     }
     IMP_TRY(param_add(scene, name, key, d, in, count));
 out:
@@ -199,8 +215,8 @@ out:
 }
 
 enum imp_status imp__build_inputs(struct imp_scene *scene, struct imp_node *node,
-                                    const char *name, const struct imp_input_desc *desc,
-                                    const struct imp_input **out, int *n)
+                                  const char *name, const struct imp_input_desc *desc,
+                                  const struct imp_input **out, int *n)
 {
     enum imp_status st = IMP_OK;
     int count = 0;

@@ -5,11 +5,11 @@
 #include "build.h"
 #include "kind/sensor/film.h"
 
-/* ---- BSDFs --------------------------------------------------------------------------- */
+/* ---- BSDFs --------------------------------------------------------------------- */
 
 enum imp_status imp__build_bsdf(struct imp_scene *scene, struct imp_node *node,
-                                  const char *parent, const char *slot,
-                                  struct imp_bsdf **out)
+                                const char *parent, const char *slot,
+                                struct imp_bsdf **out)
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = scene->ctx;
@@ -26,7 +26,9 @@ enum imp_status imp__build_bsdf(struct imp_scene *scene, struct imp_node *node,
     struct imp_bsdf *b = imp__arena_array(&scene->arena, 1, sizeof *b);
     void *self = imp__arena_array(&scene->arena, 1, ops->object_size);
     if (!b || !self) IMP_TRY(imp__build_no_memory(scene));
-    *b = (struct imp_bsdf){.ops = ops, .self = self, .flags = IMP_BSDF_SMOOTH,
+    *b = (struct imp_bsdf){.ops = ops,
+                           .self = self,
+                           .flags = IMP_BSDF_SMOOTH,
                            .name = imp__build_object_name(scene, node, parent, slot)};
     if (!b->name) IMP_TRY(imp__build_no_memory(scene));
 
@@ -34,7 +36,8 @@ enum imp_status imp__build_bsdf(struct imp_scene *scene, struct imp_node *node,
     if (ops->prepare) IMP_TRY(ops->prepare(&build));
     int n_own = 0;
     while (ops->inputs && ops->inputs[n_own].name) n_own++;
-    const struct imp_input **own = imp__arena_array(&scene->arena, (size_t)n_own + 1, sizeof *own);
+    const struct imp_input **own =
+        imp__arena_array(&scene->arena, (size_t)n_own + 1, sizeof *own);
     if (!own) IMP_TRY(imp__build_no_memory(scene));
     IMP_TRY(imp__build_inputs(scene, node, b->name, ops->inputs, own, &b->n_own));
 
@@ -44,13 +47,15 @@ enum imp_status imp__build_bsdf(struct imp_scene *scene, struct imp_node *node,
         if (strcmp(c->node->tag, "bsdf") != 0) continue;
         c->used = true;
         if (b->n_child == imp_min(ops->max_children, 2))
-            IMP_TRY(imp__node_error(ctx, c->node, IMP_E_SCENE, "'%s' takes at most %d bsdfs",
-                                    ops->name, ops->max_children));
+            IMP_TRY(imp__node_error(ctx, c->node, IMP_E_SCENE,
+                                    "'%s' takes at most %d bsdfs", ops->name,
+                                    ops->max_children));
         char child_slot[32];
         snprintf(child_slot, sizeof child_slot,
                  strcmp(ops->name, "twosided") == 0 ? "brdf_%d"
                  : ops->max_children == 1           ? "nested_bsdf"
-                                                    : "bsdf_%d", b->n_child);
+                                                    : "bsdf_%d",
+                 b->n_child);
         struct imp_bsdf *child;
         IMP_TRY(imp__build_bsdf(scene, c->node, b->name, child_slot, &child));
         b->child_in[b->n_child] = b->n_in;
@@ -88,8 +93,13 @@ enum imp_status imp__build_black(struct imp_scene *scene, struct imp_bsdf **out)
     struct imp_input *in = imp__arena_array(&scene->arena, 1, sizeof *in);
     if (!b || !in || !ops) return imp__build_no_memory(scene);
     *in = (struct imp_input){.param = -1, .count = 1};
-    *b = (struct imp_bsdf){.ops = ops, .n_own = 1, .n_in = 1, .index = -1, .name = "",
-                           .self = imp__arena_array(&scene->arena, 1, ops->object_size + 1),
+    *b = (struct imp_bsdf){.ops = ops,
+                           .n_own = 1,
+                           .n_in = 1,
+                           .index = -1,
+                           .name = "",
+                           .self =
+                               imp__arena_array(&scene->arena, 1, ops->object_size + 1),
                            .input = imp__arena_array(&scene->arena, 1, sizeof *b->input)};
     if (!b->self || !b->input) return imp__build_no_memory(scene);
     b->input[0] = in;
@@ -97,18 +107,19 @@ enum imp_status imp__build_black(struct imp_scene *scene, struct imp_bsdf **out)
     return IMP_OK;
 }
 
-/* ---- Emitters, shapes, sensors -------------------------------------------------------- */
+/* ---- Emitters, shapes, sensors ------------------------------------------------- */
 
 enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *node,
-                                     const char *parent, const char *slot,
-                                     struct imp_shape *shape)
+                                   const char *parent, const char *slot,
+                                   struct imp_shape *shape)
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = scene->ctx;
     const struct imp_emitter_ops *ops;
     KIND_FIND(scene, node, imp__emitter_kinds, ops);
     const bool area = ops->flags & IMP_EMITTER_AREA;
-    if (area && !shape) return IMP_OK; /* declared only; used where a shape refers to it */
+    if (area && !shape)
+        return IMP_OK; /* declared only; used where a shape refers to it */
     if (!area && shape)
         IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "cannot be attached to a shape"));
     if (node->object)
@@ -118,14 +129,17 @@ enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *nod
     struct imp_emitter *e = imp__arena_array(&scene->arena, 1, sizeof *e);
     void *self = imp__arena_array(&scene->arena, 1, ops->object_size);
     if (!e || !self) IMP_TRY(imp__build_no_memory(scene));
-    *e = (struct imp_emitter){.ops = ops, .self = self, .shape = shape,
+    *e = (struct imp_emitter){.ops = ops,
+                              .self = self,
+                              .shape = shape,
                               .index = scene->n_emitters,
                               .name = imp__build_object_name(scene, node, parent, slot)};
     if (!e->name) IMP_TRY(imp__build_no_memory(scene));
     node->object = e;
     int n = 0;
     while (ops->inputs && ops->inputs[n].name) n++;
-    const struct imp_input **input = imp__arena_array(&scene->arena, (size_t)n + 1, sizeof *input);
+    const struct imp_input **input =
+        imp__arena_array(&scene->arena, (size_t)n + 1, sizeof *input);
     if (!input) IMP_TRY(imp__build_no_memory(scene));
     IMP_TRY(imp__build_inputs(scene, node, e->name, ops->inputs, input, &e->n_in));
     e->input = input;
@@ -137,17 +151,19 @@ enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *nod
     IMP_TRY(imp__props_finish(ctx, node));
     if (ops->flags & IMP_EMITTER_ENVIRONMENT) {
         if (scene->environment >= 0)
-            IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "a second environment emitter"));
+            IMP_TRY(
+                imp__node_error(ctx, node, IMP_E_SCENE, "a second environment emitter"));
         scene->environment = e->index;
     }
     if (shape) shape->emitter = e->index;
-    IMP_TRY(imp__build_list_add(scene, (void ***)&scene->emitters, &scene->n_emitters, e));
+    IMP_TRY(
+        imp__build_list_add(scene, (void ***)&scene->emitters, &scene->n_emitters, e));
 out:
     return st;
 }
 
 enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
-                                   const char *name)
+                                 const char *name)
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = scene->ctx;
@@ -156,8 +172,12 @@ enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
     struct imp_shape *s = imp__arena_array(&scene->arena, 1, sizeof *s);
     void *self = imp__arena_array(&scene->arena, 1, ops->object_size);
     if (!s || !self) IMP_TRY(imp__build_no_memory(scene));
-    *s = (struct imp_shape){.ops = ops, .self = self, .index = scene->n_shapes, .bsdf = -1,
-                            .emitter = -1, .name = name};
+    *s = (struct imp_shape){.ops = ops,
+                            .self = self,
+                            .index = scene->n_shapes,
+                            .bsdf = -1,
+                            .emitter = -1,
+                            .name = name};
     node->object = s;
     /* Has a say in gradients of geometry only; there are none yet. */
     double silhouette;
@@ -171,7 +191,8 @@ enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
             if (bsdf) IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "has two bsdfs"));
             bsdf = c->node;
         } else if (strcmp(tag, "emitter") == 0) {
-            if (emitter) IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "has two emitters"));
+            if (emitter)
+                IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "has two emitters"));
             emitter = c->node;
         } else if (strcmp(tag, "medium") == 0 || strcmp(tag, "sensor") == 0) {
             IMP_TRY(imp__node_error(ctx, c->node, IMP_E_UNSUPPORTED,
@@ -220,7 +241,8 @@ static enum imp_status child_or_default(struct imp_scene *scene, struct imp_node
     for (size_t i = 0; i < node->n_children; i++) {
         struct imp_child *c = &node->children[i];
         if (strcmp(c->node->tag, tag) != 0) continue;
-        if (*out) return imp__node_error(scene->ctx, node, IMP_E_SCENE, "has two %ss", tag);
+        if (*out)
+            return imp__node_error(scene->ctx, node, IMP_E_SCENE, "has two %ss", tag);
         c->used = true;
         *out = c->node;
     }
@@ -229,7 +251,7 @@ static enum imp_status child_or_default(struct imp_scene *scene, struct imp_node
 }
 
 enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node,
-                                    const char *name)
+                                  const char *name)
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = scene->ctx;

@@ -6,8 +6,8 @@
 void imp_scene_get_info(const imp_scene *scene, struct imp_scene_info *info)
 {
     static const char *const integrators[] = {
-        [IMP_INTEGRATOR_PATH] = "path", [IMP_INTEGRATOR_DIRECT] = "direct",
-        [IMP_INTEGRATOR_DEPTH] = "depth", [IMP_INTEGRATOR_AOV] = "aov",
+        [IMP_INTEGRATOR_PATH] = "path",     [IMP_INTEGRATOR_DIRECT] = "direct",
+        [IMP_INTEGRATOR_DEPTH] = "depth",   [IMP_INTEGRATOR_AOV] = "aov",
         [IMP_INTEGRATOR_MOMENT] = "moment", [IMP_INTEGRATOR_STAM] = "stam"};
     if (!scene || !info) return;
     *info = (struct imp_scene_info){.size = sizeof *info};
@@ -36,13 +36,18 @@ enum imp_status imp_scene_get_sensor(const imp_scene *scene, int sensor,
 {
     if (!scene || !info) return IMP_E_ARG;
     if (sensor < 0 || sensor >= scene->n_sensors)
-        return imp__error(scene->ctx, IMP_E_ARG, "there is no sensor %d; the scene has %d",
-                          sensor, scene->n_sensors);
+        return imp__error(scene->ctx, IMP_E_ARG,
+                          "there is no sensor %d; the scene has %d", sensor,
+                          scene->n_sensors);
     const struct imp_sensor *s = scene->sensors[sensor];
-    *info = (struct imp_sensor_info){
-        .size = sizeof *info, .name = s->name, .type = s->ops->name,
-        .width = s->film.crop_w, .height = s->film.crop_h, .spp = s->spp,
-        .filter = s->film.filter.ops->name, .filter_radius = s->film.filter.radius,
-        .file_format = s->film.file_format};
+    *info = (struct imp_sensor_info){.size = sizeof *info,
+                                     .name = s->name,
+                                     .type = s->ops->name,
+                                     .width = s->film.crop_w,
+                                     .height = s->film.crop_h,
+                                     .spp = s->spp,
+                                     .filter = s->film.filter.ops->name,
+                                     .filter_radius = s->film.filter.radius,
+                                     .file_format = s->film.file_format};
     return IMP_OK;
 }

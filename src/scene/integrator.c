@@ -2,8 +2,8 @@
  *
  * Integrators: what a picture holds. path, direct and stam are settings of the one walk
  * engine; depth and aov look at the first hit; moment and aov contain others. */
-#include <string.h>
 #include "scene.h"
+#include <string.h>
 
 static const struct {
     const char *name;
@@ -37,10 +37,12 @@ static enum imp_status aovs_parse(struct imp_scene *scene, struct imp_node *node
         size_t k = 0;
         while (k < imp_count(aov_types) && strcmp(aov_types[k].name, type) != 0) k++;
         if (k == imp_count(aov_types))
-            return imp__prop_error(scene->ctx, node, prop, IMP_E_SCENE,
-                                   "aovs: unknown type '%s' (albedo, depth, position, uv, "
-                                   "geo_normal, sh_normal, dp_du, dp_dv, duv_dx, duv_dy, "
-                                   "prim_index, shape_index)", type);
+            return imp__prop_error(
+                scene->ctx, node, prop, IMP_E_SCENE,
+                "aovs: unknown type '%s' (albedo, depth, position, uv, "
+                "geo_normal, sh_normal, dp_du, dp_dv, duv_dx, duv_dy, "
+                "prim_index, shape_index)",
+                type);
         out->aovs[out->n_aovs++] = (struct imp_aov){item, aov_types[k].type};
     }
     return IMP_OK;
@@ -50,7 +52,8 @@ static enum imp_status nested_build(struct imp_scene *scene, struct imp_node *no
                                     struct imp_integrator *out)
 {
     enum imp_status st = IMP_OK;
-    out->nested = imp__arena_array(&scene->arena, node->n_children + 1, sizeof *out->nested);
+    out->nested =
+        imp__arena_array(&scene->arena, node->n_children + 1, sizeof *out->nested);
     if (!out->nested) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory");
     int nameless = 0;
     for (size_t i = 0; i < node->n_children; i++) {
@@ -78,18 +81,23 @@ enum imp_status imp__integrator_build(struct imp_scene *scene, struct imp_node *
 {
     imp_context *ctx = scene->ctx;
     enum imp_status st = IMP_OK;
-    static const char *const types[] = {"path", "direct", "depth", "aov", "moment", "stam"};
+    static const char *const types[] = {"path", "direct", "depth",
+                                        "aov",  "moment", "stam"};
     static const enum imp_integrator_kind kinds[] = {
         IMP_INTEGRATOR_PATH, IMP_INTEGRATOR_DIRECT, IMP_INTEGRATOR_DEPTH,
-        IMP_INTEGRATOR_AOV, IMP_INTEGRATOR_MOMENT, IMP_INTEGRATOR_STAM};
+        IMP_INTEGRATOR_AOV,  IMP_INTEGRATOR_MOMENT, IMP_INTEGRATOR_STAM};
     size_t k = 0;
     while (k < imp_count(types) && strcmp(types[k], node->type) != 0) k++;
     if (k == imp_count(types))
-        return imp__node_error(ctx, node, IMP_E_UNSUPPORTED,
-                               "this version has no such integrator; it has path, direct, "
-                               "depth, aov, moment and stam");
-    *out = (struct imp_integrator){.kind = kinds[k], .max_depth = -1, .rr_depth = 5,
-                                   .emitter_samples = 1, .bsdf_samples = 1};
+        return imp__node_error(
+            ctx, node, IMP_E_UNSUPPORTED,
+            "this version has no such integrator; it has path, direct, "
+            "depth, aov, moment and stam");
+    *out = (struct imp_integrator){.kind = kinds[k],
+                                   .max_depth = -1,
+                                   .rr_depth = 5,
+                                   .emitter_samples = 1,
+                                   .bsdf_samples = 1};
 
     /* Accepted, and without meaning here: work is cut and timed by the caller. */
     int64_t block, passes, depth = -1, rr = 5;
@@ -113,20 +121,23 @@ enum imp_status imp__integrator_build(struct imp_scene *scene, struct imp_node *
         IMP_TRY(imp__props_choice(ctx, node, "alpha_gradient", words, 3, 0, &choice));
         out->alpha_gradient = (enum imp_stam_alpha)choice;
         if (out->alpha_gradient == IMP_ALPHA_PAPER)
-            imp__warn(ctx, "alpha_gradient=paper: derivatives of exponents are those of Stam's "
-                      "App. C, which are wrong (docs/stam.md, E9)");
+            imp__warn(
+                ctx, "alpha_gradient=paper: derivatives of exponents are those of Stam's "
+                     "App. C, which are wrong (docs/stam.md, E9)");
         break;
     }
     case IMP_INTEGRATOR_DIRECT: {
         int64_t shading, emitter, bsdf;
         depth = 2;
         if (imp__props_has(node, "shading_samples") &&
-            (imp__props_has(node, "emitter_samples") || imp__props_has(node, "bsdf_samples")))
+            (imp__props_has(node, "emitter_samples") ||
+             imp__props_has(node, "bsdf_samples")))
             IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
                                     "shading_samples cannot be given together with "
                                     "emitter_samples or bsdf_samples"));
         IMP_TRY(imp__props_int(ctx, node, "shading_samples", 1, 1, 1 << 20, &shading));
-        IMP_TRY(imp__props_int(ctx, node, "emitter_samples", shading, 0, 1 << 20, &emitter));
+        IMP_TRY(
+            imp__props_int(ctx, node, "emitter_samples", shading, 0, 1 << 20, &emitter));
         IMP_TRY(imp__props_int(ctx, node, "bsdf_samples", shading, 0, 1 << 20, &bsdf));
         if (emitter + bsdf == 0)
             IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
@@ -138,7 +149,8 @@ enum imp_status imp__integrator_build(struct imp_scene *scene, struct imp_node *
     case IMP_INTEGRATOR_AOV: {
         const char *text;
         if (!imp__props_has(node, "aovs"))
-            IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "property 'aovs' is missing"));
+            IMP_TRY(
+                imp__node_error(ctx, node, IMP_E_SCENE, "property 'aovs' is missing"));
         IMP_TRY(imp__props_string(ctx, node, "aovs", "", &text));
         IMP_TRY(aovs_parse(scene, node, text, out));
         IMP_TRY(nested_build(scene, node, out));

@@ -1,33 +1,34 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Rays against the scene: the one file that includes Embree. Triangles are Embree's own
- * work, in float; analytic shapes answer through their ops, in double, and their hits never
- * pass through a float (struct query carries ray and hit past it).
+ * work, in float; analytic shapes answer through their ops, in double, and their hits
+ * never pass through a float (struct query carries ray and hit past it).
  *
- * One device a context, made on first use. It runs in the thread that commits: the scene is
- * built the same way each time, and no thread of Embree's outlives a call. */
+ * One device a context, made on first use. It runs in the thread that commits: the scene
+ * is built the same way each time, and no thread of Embree's outlives a call. */
+#include "scene.h"
 #include <embree3/rtcore.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <string.h>
-#include "scene.h"
 
 /* Embree takes larger numbers, and NaN, for a mistake of the caller: shapes that reach so
- * far vanish without a word, and rays end the process where it was built with assertions. */
+ * far vanish without a word, and rays end the process where it was built with assertions.
+ */
 #define EMBREE_MAX 1e18
 
 struct device {
     imp_context *ctx;
     RTCDevice rtc;
-    _Atomic int64_t bytes;       /* held by Embree */
-    pthread_mutex_t lock;        /* one commit at a time: bytes and message belong to it */
+    _Atomic int64_t bytes; /* held by Embree */
+    pthread_mutex_t lock;  /* one commit at a time: bytes and message belong to it */
     enum RTCError error;
     char message[256];
 };
 
 struct intersector {
     RTCScene rtc;
-    bool analytic;               /* some shape answers through its ops */
+    bool analytic; /* some shape answers through its ops */
     int64_t bytes;
 };
 
@@ -58,9 +59,11 @@ static void device_release(void *memory)
     imp__release(dev->ctx, dev);
 }
 
-static enum imp_status device_error(imp_context *ctx, enum RTCError error, const char *text)
+static enum imp_status device_error(imp_context *ctx, enum RTCError error,
+                                    const char *text)
 {
-    return imp__error(ctx, error == RTC_ERROR_OUT_OF_MEMORY ? IMP_E_NOMEM : IMP_E_UNSUPPORTED,
+    return imp__error(ctx,
+                      error == RTC_ERROR_OUT_OF_MEMORY ? IMP_E_NOMEM : IMP_E_UNSUPPORTED,
                       "Embree: error %d%s%s", (int)error, *text ? ": " : "", text);
 }
 
@@ -96,14 +99,14 @@ out:
     return st;
 }
 
-/* ---- analytic shapes --------------------------------------------------------------- */
+/* ---- analytic shapes ----------------------------------------------------------- */
 
 /* What Embree hands on to the callbacks: the ray and the best analytic hit, in double. */
 struct query {
     struct RTCIntersectContext context; /* first: callbacks get its address */
     const imp_v3 *o, *d;
     double tmin, tmax;
-    struct imp_hit hit;                 /* hit.shape -1: none yet */
+    struct imp_hit hit; /* hit.shape -1: none yet */
 };
 
 static void analytic_bounds(const struct RTCBoundsFunctionArguments *args)
@@ -146,7 +149,7 @@ static void analytic_occluded(const struct RTCOccludedFunctionNArguments *args)
         ((struct RTCRay *)args->ray)->tfar = -INFINITY;
 }
 
-/* ---- building ---------------------------------------------------------------------- */
+/* ---- building ------------------------------------------------------------------ */
 
 static RTCGeometry geometry_create(RTCDevice rtc, struct imp_shape *s)
 {
@@ -193,7 +196,8 @@ enum imp_status imp__intersector_create(struct imp_scene *scene)
     IMP_TRY(bounds_check(scene));
     IMP_TRY(device_get(scene->ctx, &dev));
     struct intersector *x = imp__alloc(scene->ctx, 1, sizeof *x);
-    if (!x) IMP_TRY(imp__error(scene->ctx, IMP_E_NOMEM, "out of memory for the intersector"));
+    if (!x)
+        IMP_TRY(imp__error(scene->ctx, IMP_E_NOMEM, "out of memory for the intersector"));
 
     pthread_mutex_lock(&dev->lock);
     const int64_t before = atomic_load(&dev->bytes);
@@ -241,22 +245,23 @@ size_t imp__intersector_bytes(const struct imp_scene *scene)
     return x && x->bytes > 0 ? (size_t)x->bytes : 0;
 }
 
-/* ---- queries ----------------------------------------------------------------------- */
+/* ---- queries ------------------------------------------------------------------- */
 
 /* Rays that are not within Embree's numbers hit nothing. */
 static inline bool ray_valid(const imp_v3 *o, const imp_v3 *d, double tmin, double tmax)
 {
-    const double size = ((fabs((*o)[0]) + fabs((*o)[1])) + (fabs((*o)[2]) + fabs((*d)[0]))) +
-                        (fabs((*d)[1]) + fabs((*d)[2]));
+    const double size =
+        ((fabs((*o)[0]) + fabs((*o)[1])) + (fabs((*o)[2]) + fabs((*d)[0]))) +
+        (fabs((*d)[1]) + fabs((*d)[2]));
     return size < EMBREE_MAX && tmin >= 0 && tmin < tmax;
 }
 
 typedef float float4 __attribute__((vector_size(16)));
 
-/* Embree reads (org, tnear) and (dir, time) as 16 bytes each. Written as single floats they
- * could not be forwarded from the store buffer, which costs 10 ns a ray. */
-static inline void ray_fill(struct RTCRay *r, const imp_v3 *o, const imp_v3 *d, double tmin,
-                            double tmax)
+/* Embree reads (org, tnear) and (dir, time) as 16 bytes each. Written as single floats
+ * they could not be forwarded from the store buffer, which costs 10 ns a ray. */
+static inline void ray_fill(struct RTCRay *r, const imp_v3 *o, const imp_v3 *d,
+                            double tmin, double tmax)
 {
     float4 org = __builtin_convertvector(*o, float4);
     float4 dir = __builtin_convertvector(*d, float4);
@@ -270,8 +275,8 @@ static inline void ray_fill(struct RTCRay *r, const imp_v3 *o, const imp_v3 *d, 
     r->flags = 0;
 }
 
-static inline void query_fill(struct query *q, const struct intersector *x, const imp_v3 *o,
-                              const imp_v3 *d, double tmin, double tmax)
+static inline void query_fill(struct query *q, const struct intersector *x,
+                              const imp_v3 *o, const imp_v3 *d, double tmin, double tmax)
 {
     rtcInitIntersectContext(&q->context);
     q->hit.shape = -1;

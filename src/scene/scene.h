@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The scene: what is there, and the numbers that describe it. Objects are made once from a
- * tree of nodes (build.c), theta is a list of places where their numbers live (theta.c),
- * and rays are answered by intersect.c, the one file that includes Embree. */
+ * The scene: what is there, and the numbers that describe it. Objects are made once from
+ * a tree of nodes (build.c), theta is a list of places where their numbers live
+ * (theta.c), and rays are answered by intersect.c, the one file that includes Embree. */
 #ifndef IMP_SCENE_H
 #define IMP_SCENE_H
 
@@ -14,20 +14,32 @@ enum imp_param_store { IMP_STORE_LANES, IMP_STORE_BULK };
 struct imp_param {
     struct imp_param_info info;
     enum imp_param_store store;
-    imp_spec *lanes;   /* LANES: info.count numbers in lanes 0.., a scalar in all of them */
-    float *bulk;       /* BULK: [info.count] in place */
+    imp_spec *lanes; /* LANES: info.count numbers in lanes 0.., a scalar in all of them */
+    float *bulk;     /* BULK: [info.count] in place */
 };
 
 enum imp_integrator_kind {
-    IMP_INTEGRATOR_PATH, IMP_INTEGRATOR_DIRECT, IMP_INTEGRATOR_DEPTH, IMP_INTEGRATOR_AOV,
+    IMP_INTEGRATOR_PATH,
+    IMP_INTEGRATOR_DIRECT,
+    IMP_INTEGRATOR_DEPTH,
+    IMP_INTEGRATOR_AOV,
     IMP_INTEGRATOR_MOMENT,
-    IMP_INTEGRATOR_STAM  /* emission only where the walk is absorbed, no light samples */
+    IMP_INTEGRATOR_STAM /* emission only where the walk is absorbed, no light samples */
 };
 
 enum imp_aov_type {
-    IMP_AOV_ALBEDO, IMP_AOV_DEPTH, IMP_AOV_POSITION, IMP_AOV_UV, IMP_AOV_GEO_NORMAL,
-    IMP_AOV_SH_NORMAL, IMP_AOV_DP_DU, IMP_AOV_DP_DV, IMP_AOV_DUV_DX, IMP_AOV_DUV_DY,
-    IMP_AOV_PRIM_INDEX, IMP_AOV_SHAPE_INDEX
+    IMP_AOV_ALBEDO,
+    IMP_AOV_DEPTH,
+    IMP_AOV_POSITION,
+    IMP_AOV_UV,
+    IMP_AOV_GEO_NORMAL,
+    IMP_AOV_SH_NORMAL,
+    IMP_AOV_DP_DU,
+    IMP_AOV_DP_DV,
+    IMP_AOV_DUV_DX,
+    IMP_AOV_DUV_DY,
+    IMP_AOV_PRIM_INDEX,
+    IMP_AOV_SHAPE_INDEX
 };
 struct imp_aov {
     const char *name;
@@ -38,65 +50,65 @@ enum imp_stam_alpha { IMP_ALPHA_DETACHED, IMP_ALPHA_ATTACHED, IMP_ALPHA_PAPER };
 
 struct imp_integrator {
     enum imp_integrator_kind kind;
-    const char *name;              /* slot name, for channels of nested ones */
-    int max_depth;                 /* -1: unlimited */
+    const char *name; /* slot name, for channels of nested ones */
+    int max_depth;    /* -1: unlimited */
     int rr_depth;
     bool hide_emitters;
-    int emitter_samples, bsdf_samples; /* direct */
+    int emitter_samples, bsdf_samples;  /* direct */
     enum imp_stam_alpha alpha_gradient; /* stam */
     int n_aovs;
     struct imp_aov *aovs;
-    int n_nested;                  /* aov, moment */
+    int n_nested; /* aov, moment */
     struct imp_integrator *nested;
 };
 
 struct imp_scene {
     imp_context *ctx;
-    struct imp_arena arena;        /* nodes, objects, names */
+    struct imp_arena arena; /* nodes, objects, names */
     enum imp_color_mode mode;
-    int channels;                  /* 3 or 1 */
+    int channels; /* 3 or 1 */
     bool committed;
 
-    struct imp_node *root;         /* being built, or what the objects came from */
-    struct imp_node **stack;       /* open objects of imp_scene_begin */
+    struct imp_node *root;   /* being built, or what the objects came from */
+    struct imp_node **stack; /* open objects of imp_scene_begin */
     size_t n_stack, cap_stack;
-    enum imp_status build_status;  /* first failure of the building calls */
+    enum imp_status build_status; /* first failure of the building calls */
     char *build_error;
-    char **search;                 /* [n_search] folders for files */
+    char **search; /* [n_search] folders for files */
     size_t n_search;
-    struct imp_tree *tree;         /* of the building calls, until commit (format/tree.h) */
-    struct imp_arena files;        /* what files held and objects copy; freed by commit */
+    struct imp_tree *tree;  /* of the building calls, until commit (format/tree.h) */
+    struct imp_arena files; /* what files held and objects copy; freed by commit */
 
     int n_shapes, n_bsdfs, n_emitters, n_sensors, n_textures;
     struct imp_shape **shapes;
-    struct imp_bsdf **bsdfs;       /* every node, nested ones too */
+    struct imp_bsdf **bsdfs; /* every node, nested ones too */
     struct imp_emitter **emitters;
     struct imp_sensor **sensors;
     struct imp_texture **textures;
     struct imp_bsdf *default_bsdf, *black_bsdf;
     struct imp_integrator integrator;
     bool has_integrator;
-    int environment;               /* emitter index, -1: none */
-    double *light_cdf;             /* [n_emitters] by sampling_weight, last is 1 */
+    int environment;   /* emitter index, -1: none */
+    double *light_cdf; /* [n_emitters] by sampling_weight, last is 1 */
 
     size_t n_params, cap_params;
     struct imp_param *params;
     size_t n_theta;
 
     void *intersector;
-    imp_v3 lo, hi;                 /* bounds of all shapes */
+    imp_v3 lo, hi; /* bounds of all shapes */
 };
 
-/* ---- build.c ---------------------------------------------------------------------- */
+/* ---- build.c ------------------------------------------------------------------- */
 /* Resolve references, make every object in document order, commit the intersector. Files
  * must have been attached to the nodes (format/resolve.c). */
 enum imp_status imp__scene_build(struct imp_scene *scene);
 
-/* ---- integrator.c ------------------------------------------------------------------ */
+/* ---- integrator.c -------------------------------------------------------------- */
 enum imp_status imp__integrator_build(struct imp_scene *scene, struct imp_node *node,
                                       struct imp_integrator *out);
 
-/* ---- theta.c ---------------------------------------------------------------------- */
+/* ---- theta.c ------------------------------------------------------------------- */
 enum imp_status imp__theta_add(struct imp_scene *scene, const struct imp_param *param,
                                int *index);
 /* Give every parameter its offset, in order of addition. */
@@ -108,11 +120,12 @@ void imp__param_set(struct imp_param *p, size_t k, double value);
 enum imp_status imp__param_check(const struct imp_scene *scene, const struct imp_param *p,
                                  size_t k, double value);
 
-/* ---- intersect.c -------------------------------------------------------------------- */
+/* ---- intersect.c --------------------------------------------------------------- */
 enum imp_status imp__intersector_create(struct imp_scene *scene);
 void imp__intersector_destroy(struct imp_scene *scene);
 size_t imp__intersector_bytes(const struct imp_scene *scene);
-/* Nearest hit of o + t d, tmin < t < tmax, tmin >= 0. Rays that are not finite hit nothing. */
+/* Nearest hit of o + t d, tmin < t < tmax, tmin >= 0. Rays that are not finite hit
+ * nothing. */
 bool imp__intersect(const struct imp_scene *scene, const imp_v3 *o, const imp_v3 *d,
                     double tmin, double tmax, struct imp_hit *hit);
 /* Is anything between? */
@@ -120,9 +133,10 @@ bool imp__occluded(const struct imp_scene *scene, const imp_v3 *o, const imp_v3 
                    double tmin, double tmax);
 
 /* Origin of a ray leaving p on a surface with geometric normal ng towards d, moved to the
- * side of d by (1 + max|p_k|) eps. Hits are recomputed in double, so what has to be cleared
- * is Embree's own rounding, a few units of 2^-24; Mitsuba takes 1500 of them (scene-format
- * 3.1), which shows at grazing angles inside a glowing sphere (tests/grad/closed_forms.c). */
+ * side of d by (1 + max|p_k|) eps. Hits are recomputed in double, so what has to be
+ * cleared is Embree's own rounding, a few units of 2^-24; Mitsuba takes 1500 of them
+ * (scene-format 3.1), which shows at grazing angles inside a glowing sphere
+ * (tests/grad/closed_forms.c). */
 #define IMP_RAY_EPSILON (96 * 0x1p-24)
 static inline imp_v3 imp__offset(imp_v3 p, imp_v3 ng, imp_v3 d)
 {
@@ -133,8 +147,9 @@ static inline imp_v3 imp__offset(imp_v3 p, imp_v3 ng, imp_v3 d)
 static inline const struct imp_bsdf *imp__shape_bsdf(const struct imp_scene *scene,
                                                      const struct imp_shape *s)
 {
-    return s->bsdf >= 0 ? scene->bsdfs[s->bsdf]
-           : s->bsdf == -2 ? scene->black_bsdf : scene->default_bsdf;
+    return s->bsdf >= 0    ? scene->bsdfs[s->bsdf]
+           : s->bsdf == -2 ? scene->black_bsdf
+                           : scene->default_bsdf;
 }
 
 #endif

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * theta: every number that describes the scene, in document order, as places to read and
- * write. A parameter's numbers live where rendering uses them (an input's lanes, a texture's
- * texels); theta is a list of addresses, so setting it needs no rebuild. */
+ * write. A parameter's numbers live where rendering uses them (an input's lanes, a
+ * texture's texels); theta is a list of addresses, so setting it needs no rebuild. */
+#include "scene.h"
 #include <stdio.h>
 #include <string.h>
-#include "scene.h"
 
 enum imp_status imp__theta_add(struct imp_scene *scene, const struct imp_param *param,
                                int *index)
@@ -39,12 +39,9 @@ double imp__param_get(const struct imp_param *p, size_t k)
 
 void imp__param_set(struct imp_param *p, size_t k, double value)
 {
-    if (p->store == IMP_STORE_BULK)
-        p->bulk[k] = (float)value;
-    else if (p->info.count == 1)
-        *p->lanes = imp__spec(value);
-    else
-        (*p->lanes)[k] = value;
+    if (p->store == IMP_STORE_BULK) p->bulk[k] = (float)value;
+    else if (p->info.count == 1) *p->lanes = imp__spec(value);
+    else (*p->lanes)[k] = value;
 }
 
 size_t imp_scene_n_params(const imp_scene *scene) { return scene ? scene->n_params : 0; }
@@ -81,20 +78,23 @@ static size_t edit_distance(const char *a, const char *b)
     return row[m];
 }
 
-/* Names may leave out the final ".value", and may be written below any parent that reaches
- * the object ("ball.bsdf.red.reflectance"): the longest matching tail wins. */
+/* Names may leave out the final ".value", and may be written below any parent that
+ * reaches the object ("ball.bsdf.red.reflectance"): the longest matching tail wins. */
 static bool name_matches(const char *given, const char *name)
 {
     const size_t n = strlen(name), g = strlen(given);
     if (strcmp(given, name) == 0) return true;
     const size_t value = strlen(".value");
-    return n == g + value && strncmp(given, name, g) == 0 && strcmp(name + g, ".value") == 0;
+    return n == g + value && strncmp(given, name, g) == 0 &&
+           strcmp(name + g, ".value") == 0;
 }
 
-enum imp_status imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index)
+enum imp_status imp_scene_find_param(const imp_scene *scene, const char *name,
+                                     size_t *index)
 {
     if (!scene || !name || !index) return IMP_E_ARG;
-    for (const char *tail = name; tail; tail = strchr(tail, '.') ? strchr(tail, '.') + 1 : NULL)
+    for (const char *tail = name; tail;
+         tail = strchr(tail, '.') ? strchr(tail, '.') + 1 : NULL)
         for (size_t i = 0; i < scene->n_params; i++)
             if (name_matches(tail, scene->params[i].info.name)) {
                 *index = i;
@@ -138,8 +138,8 @@ enum imp_status imp__param_check(const struct imp_scene *scene, const struct imp
     if (isfinite(value) && value >= p->info.lo && value <= p->info.hi) return IMP_OK;
     char element[32] = "";
     if (p->info.count > 1) snprintf(element, sizeof element, "[%zu]", k);
-    return imp__error(scene->ctx, IMP_E_ARG, "%s%s = %g is outside [%g, %g]", p->info.name,
-                      element, value, p->info.lo, p->info.hi);
+    return imp__error(scene->ctx, IMP_E_ARG, "%s%s = %g is outside [%g, %g]",
+                      p->info.name, element, value, p->info.lo, p->info.hi);
 }
 
 enum imp_status imp_scene_set_theta(imp_scene *scene, const double *theta)
@@ -169,13 +169,14 @@ enum imp_status imp_scene_set_values(imp_scene *scene, size_t index, size_t n,
         return imp__error(scene->ctx, IMP_E_ARG, "there is no parameter %zu", index);
     struct imp_param *p = &scene->params[index];
     if (n != p->info.count && n != 1)
-        return imp__error(scene->ctx, IMP_E_ARG, "%s has %zu numbers, not %zu", p->info.name,
-                          p->info.count, n);
+        return imp__error(scene->ctx, IMP_E_ARG, "%s has %zu numbers, not %zu",
+                          p->info.name, p->info.count, n);
     for (size_t k = 0; k < n; k++) {
         const enum imp_status st = imp__param_check(scene, p, k, values[k]);
         if (st != IMP_OK) return st;
     }
-    for (size_t k = 0; k < p->info.count; k++) imp__param_set(p, k, values[n == 1 ? 0 : k]);
+    for (size_t k = 0; k < p->info.count; k++)
+        imp__param_set(p, k, values[n == 1 ? 0 : k]);
     return IMP_OK;
 }
 

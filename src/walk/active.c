@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Which objects depend on which active numbers, found once a job so that the sweep can pass
- * by a material nobody asked about. */
-#include <string.h>
+ * Which objects depend on which active numbers, found once a job so that the sweep can
+ * pass by a material nobody asked about. */
 #include "walk.h"
+#include <string.h>
 
 static bool texture_depends(const struct imp_texture *t, const uint8_t *chosen);
 

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * One walk told vertex by vertex: Stam's single-path view, as text to read or JSON to draw. */
+ * One walk told vertex by vertex: Stam's single-path view, as text to read or JSON to
+ * draw. */
+#include "measure.h"
 #include <stdio.h>
 #include <string.h>
-#include "measure.h"
 
 struct text {
     imp_context *ctx;
@@ -50,12 +51,16 @@ static void put_string(struct text *t, const char *key, const char *s)
 {
     put(t, "\"%s\":\"", key);
     for (; *s; s++)
-        put(t, *s == '"' || *s == '\\' ? "\\%c" : (unsigned char)*s < 32 ? "?" : "%c", *s);
+        put(t,
+            *s == '"' || *s == '\\'  ? "\\%c"
+            : (unsigned char)*s < 32 ? "?"
+                                     : "%c",
+            *s);
     put(t, "\"");
 }
 
-static void json(struct text *t, const struct imp_scene *scene, const struct imp_walk *w, int x,
-                 int y, int64_t sample)
+static void json(struct text *t, const struct imp_scene *scene, const struct imp_walk *w,
+                 int x, int y, int64_t sample)
 {
     const int C = scene->channels;
     put(t, "{\"pixel\":[%d,%d],\"sample\":%lld,", x, y, (long long)sample);
@@ -65,8 +70,8 @@ static void json(struct text *t, const struct imp_scene *scene, const struct imp
     put_vector(t, "direction", w->ray.d, 3);
     put(t, ",");
     put_vector(t, "radiance", w->L, C);
-    put(t, ",\"absorbed\":%s,\"dropped\":%d,\"vertices\":[", w->absorbed ? "true" : "false",
-        (int)w->dropped);
+    put(t, ",\"absorbed\":%s,\"dropped\":%d,\"vertices\":[",
+        w->absorbed ? "true" : "false", (int)w->dropped);
     imp_spec beta = imp__spec(1);
     for (const struct imp_vertex *v = w->first; v; v = v->next) {
         put(t, v->prev ? ",{" : "{");
@@ -78,7 +83,8 @@ static void json(struct text *t, const struct imp_scene *scene, const struct imp
             put_vector(t, "position", v->at.p, 3);
             put(t, ",");
             put_vector(t, "normal", v->ng, 3);
-            put(t, ",\"uv\":[%.9g,%.9g],\"distance\":%.9g,", v->at.uv[0], v->at.uv[1], v->t);
+            put(t, ",\"uv\":[%.9g,%.9g],\"distance\":%.9g,", v->at.uv[0], v->at.uv[1],
+                v->t);
         } else {
             put_vector(t, "escapes", v->at.p, 3);
             put(t, ",");
@@ -122,16 +128,16 @@ static void plain(struct text *t, const struct imp_scene *scene, const struct im
                   int x, int y, int64_t sample)
 {
     const int C = scene->channels;
-    put(t, "walk: pixel %d,%d sample %lld, film position %.4f %.4f\n", x, y, (long long)sample,
-        w->px, w->py);
-    put(t, "  from (%.6g, %.6g, %.6g) along (%.6g, %.6g, %.6g)\n", w->ray.o[0], w->ray.o[1],
-        w->ray.o[2], w->ray.d[0], w->ray.d[1], w->ray.d[2]);
+    put(t, "walk: pixel %d,%d sample %lld, film position %.4f %.4f\n", x, y,
+        (long long)sample, w->px, w->py);
+    put(t, "  from (%.6g, %.6g, %.6g) along (%.6g, %.6g, %.6g)\n", w->ray.o[0],
+        w->ray.o[1], w->ray.o[2], w->ray.d[0], w->ray.d[1], w->ray.d[2]);
     imp_spec beta = imp__spec(1);
     int k = 0;
     for (const struct imp_vertex *v = w->first; v; v = v->next, k++) {
         if (v->shape)
-            put(t, "  %d: %s (%s) at (%.6g, %.6g, %.6g), distance %.6g, uv %.4f %.4f\n", k,
-                v->shape->name, *v->bsdf->name ? v->bsdf->name : "black", v->at.p[0],
+            put(t, "  %d: %s (%s) at (%.6g, %.6g, %.6g), distance %.6g, uv %.4f %.4f\n",
+                k, v->shape->name, *v->bsdf->name ? v->bsdf->name : "black", v->at.p[0],
                 v->at.p[1], v->at.p[2], v->t, v->at.uv[0], v->at.uv[1]);
         else
             put(t, "  %d: leaves the scene along (%.6g, %.6g, %.6g)\n", k, v->at.p[0],
@@ -144,9 +150,11 @@ static void plain(struct text *t, const struct imp_scene *scene, const struct im
         }
         if (v->inv_ps > 0) {
             if (v->dirs.lobe == IMP_SMOOTH)
-                put(t, "    goes on      pdf %.6g per sr, survival %.6g\n", v->pdf, v->survive);
+                put(t, "    goes on      pdf %.6g per sr, survival %.6g\n", v->pdf,
+                    v->survive);
             else
-                put(t, "    goes on      delta lobe %d, probability %.6g, survival %.6g\n",
+                put(t,
+                    "    goes on      delta lobe %d, probability %.6g, survival %.6g\n",
                     v->dirs.lobe, v->pdf, v->survive);
             plain_spec(t, "weight", v->w, C);
             plain_spec(t, "arriving", v->lin, C);
@@ -156,14 +164,15 @@ static void plain(struct text *t, const struct imp_scene *scene, const struct im
         beta *= v->w;
     }
     if (!w->first) put(t, "  meets nothing\n");
-    if (w->dropped) put(t, w->dropped == IMP_DROP_LONG
-                           ? "  dropped: nothing ended it\n"
-                           : "  dropped: its value is not finite, or negative\n");
+    if (w->dropped)
+        put(t, w->dropped == IMP_DROP_LONG
+                   ? "  dropped: nothing ended it\n"
+                   : "  dropped: its value is not finite, or negative\n");
     plain_spec(t, "radiance", w->L, C);
 }
 
-enum imp_status imp_walk_describe(const imp_scene *scene, const struct imp_run *run, int x,
-                                  int y, int64_t sample, int as_json, char **out)
+enum imp_status imp_walk_describe(const imp_scene *scene, const struct imp_run *run,
+                                  int x, int y, int64_t sample, int as_json, char **out)
 {
     const struct imp_run none = IMP_RUN_INIT;
     if (!scene || !out) return IMP_E_ARG;
@@ -171,13 +180,16 @@ enum imp_status imp_walk_describe(const imp_scene *scene, const struct imp_run *
     const struct imp_sensor *sensor;
     enum imp_status st = imp__run_sensor(scene, run, &sensor);
     if (st != IMP_OK) return st;
-    if (x < 0 || y < 0 || x >= sensor->film.crop_w || y >= sensor->film.crop_h || sample < 0)
-        return imp__error(scene->ctx, IMP_E_ARG,
-                          "there is no pixel %d,%d in a picture of %d x %d, or sample %lld", x,
-                          y, sensor->film.crop_w, sensor->film.crop_h, (long long)sample);
+    if (x < 0 || y < 0 || x >= sensor->film.crop_w || y >= sensor->film.crop_h ||
+        sample < 0)
+        return imp__error(
+            scene->ctx, IMP_E_ARG,
+            "there is no pixel %d,%d in a picture of %d x %d, or sample %lld", x, y,
+            sensor->film.crop_w, sensor->film.crop_h, (long long)sample);
     const struct imp_integrator *integrator = imp__radiance_integrator(scene);
     if (!integrator)
-        return imp__error(scene->ctx, IMP_E_SCENE, "the scene's integrator makes no walks; "
+        return imp__error(scene->ctx, IMP_E_SCENE,
+                          "the scene's integrator makes no walks; "
                           "use path, direct or stam");
     const struct imp_tracer tracer = {scene, integrator, sensor, NULL, run->seed};
     struct imp_arena arena;

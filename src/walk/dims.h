@@ -1,14 +1,22 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Which dimension of a walk's random numbers is used for what. Each vertex has its own block,
- * so a walk that stops early, or skips a light sample, leaves the others' numbers alone. */
+ * Which dimension of a walk's random numbers is used for what. Each vertex has its own
+ * block, so a walk that stops early, or skips a light sample, leaves the others' numbers
+ * alone. */
 #ifndef IMP_WALK_DIMS_H
 #define IMP_WALK_DIMS_H
 
 enum { IMP_DIM_PIXEL_X, IMP_DIM_PIXEL_Y, IMP_DIM_LENS_U, IMP_DIM_LENS_V, IMP_DIM_VERTEX };
 enum {
-    IMP_DIM_LOBE, IMP_DIM_DIR_U, IMP_DIM_DIR_V, IMP_DIM_LIGHT, IMP_DIM_LIGHT_U,
-    IMP_DIM_LIGHT_V, IMP_DIM_SURVIVE, IMP_DIM_SPARE, IMP_DIMS_PER_VERTEX
+    IMP_DIM_LOBE,
+    IMP_DIM_DIR_U,
+    IMP_DIM_DIR_V,
+    IMP_DIM_LIGHT,
+    IMP_DIM_LIGHT_U,
+    IMP_DIM_LIGHT_V,
+    IMP_DIM_SURVIVE,
+    IMP_DIM_SPARE,
+    IMP_DIMS_PER_VERTEX
 };
 static inline unsigned imp__dim(int vertex, int use)
 {

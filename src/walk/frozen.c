@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The same walk at other parameters: vertices, directions, densities, MIS weights and
- * roulette stay, values are looked up and multiplied again. Differences of this are what a
- * detached derivative must equal, to rounding (gradients.md 13 A); they are blind to wrong
- * densities, which fresh-seed differences see. */
+ * roulette stay, values are looked up and multiplied again. Differences of this are what
+ * a detached derivative must equal, to rounding (gradients.md 13 A); they are blind to
+ * wrong densities, which fresh-seed differences see. */
 #include "walk.h"
 
 #define MAX_INPUTS 32

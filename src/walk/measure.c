@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "measure.h"
-#include <stdio.h>
-#include <string.h>
 #include "base/film.h"
 #include "dims.h"
+#include <stdio.h>
+#include <string.h>
 
 enum imp_status imp__run_sensor(const struct imp_scene *scene, const struct imp_run *run,
                                 const struct imp_sensor **out)
@@ -15,10 +15,12 @@ enum imp_status imp__run_sensor(const struct imp_scene *scene, const struct imp_
     if (scene->n_sensors == 0)
         return imp__error(scene->ctx, IMP_E_SCENE, "the scene has no sensor");
     if (run->sensor < 0 || run->sensor >= scene->n_sensors)
-        return imp__error(scene->ctx, IMP_E_ARG, "there is no sensor %d; the scene has %d",
-                          run->sensor, scene->n_sensors);
+        return imp__error(scene->ctx, IMP_E_ARG,
+                          "there is no sensor %d; the scene has %d", run->sensor,
+                          scene->n_sensors);
     if (run->spp < 0)
-        return imp__error(scene->ctx, IMP_E_ARG, "samples per pixel = %d is negative", run->spp);
+        return imp__error(scene->ctx, IMP_E_ARG, "samples per pixel = %d is negative",
+                          run->spp);
     *out = scene->sensors[run->sensor];
     return IMP_OK;
 }
@@ -38,7 +40,7 @@ const struct imp_integrator *imp__radiance_integrator(const struct imp_scene *sc
     return NULL;
 }
 
-/* ---- Channel names ------------------------------------------------------------------- */
+/* ---- Channel names ------------------------------------------------------------- */
 
 struct names {
     imp_context *ctx;
@@ -48,7 +50,8 @@ struct names {
     bool failed;
 };
 
-static void names_add(struct names *s, const char *prefix, const char *slot, const char *channel)
+static void names_add(struct names *s, const char *prefix, const char *slot,
+                      const char *channel)
 {
     char name[256];
     snprintf(name, sizeof name, "%s%s%s%s", prefix, slot, *slot ? "." : "", channel);
@@ -87,10 +90,11 @@ static int base_channels(enum imp_pixel_format format)
 static void names_make(struct names *s, const struct imp_scene *scene,
                        const struct imp_sensor *sensor)
 {
-    static const char *const base[][4] = {{"Y"}, {"Y", "A"}, {"R", "G", "B"},
-                                          {"R", "G", "B", "A"}, {"X", "Y", "Z"},
-                                          {"X", "Y", "Z", "A"}};
-    static const char *const rgba[] = {"R", "G", "B", "A"}, *const xyz[] = {"X", "Y", "Z"};
+    static const char *const base[][4] = {{"Y"},           {"Y", "A"},
+                                          {"R", "G", "B"}, {"R", "G", "B", "A"},
+                                          {"X", "Y", "Z"}, {"X", "Y", "Z", "A"}};
+    static const char *const rgba[] = {"R", "G", "B", "A"}, *const xyz[] = {"X", "Y",
+                                                                            "Z"};
     const struct imp_integrator *top = &scene->integrator;
     const enum imp_pixel_format format = sensor->film.pixel_format;
     for (int c = 0; c < base_channels(format); c++) names_add(s, "", "", base[format][c]);
@@ -108,8 +112,8 @@ static void names_make(struct names *s, const struct imp_scene *scene,
                     names_add(s, moment == 2 ? "m2_" : "", top->nested[k].name, xyz[c]);
 }
 
-enum imp_status imp__measure_create(const struct imp_scene *scene, const struct imp_run *run,
-                                    struct imp_measure *out)
+enum imp_status imp__measure_create(const struct imp_scene *scene,
+                                    const struct imp_run *run, struct imp_measure *out)
 {
     const struct imp_sensor *sensor;
     const enum imp_status st = imp__run_sensor(scene, run, &sensor);
@@ -118,21 +122,31 @@ enum imp_status imp__measure_create(const struct imp_scene *scene, const struct 
     names_make(&names, scene, sensor);
     if (names.failed || names.n > IMP_MEASURE_MAX) {
         imp__release(scene->ctx, names.text);
-        return names.failed ? imp__error(scene->ctx, IMP_E_NOMEM, "no memory for channels")
-                            : imp__error(scene->ctx, IMP_E_SCENE, "more than %d channels",
-                                         IMP_MEASURE_MAX);
+        return names.failed
+                   ? imp__error(scene->ctx, IMP_E_NOMEM, "no memory for channels")
+                   : imp__error(scene->ctx, IMP_E_SCENE, "more than %d channels",
+                                IMP_MEASURE_MAX);
     }
-    *out = (struct imp_measure){.scene = scene, .sensor = sensor, .seed = run->seed,
+    *out = (struct imp_measure){.scene = scene,
+                                .sensor = sensor,
+                                .seed = run->seed,
                                 .spp = run->spp > 0 ? run->spp : sensor->spp,
-                                .n = names.n, .names = names.text};
+                                .n = names.n,
+                                .names = names.text};
     return IMP_OK;
 }
 
-void imp__measure_destroy(struct imp_measure *m) { imp__release(m->scene->ctx, m->names); }
+void imp__measure_destroy(struct imp_measure *m)
+{
+    imp__release(m->scene->ctx, m->names);
+}
 
-/* ---- Values --------------------------------------------------------------------------- */
+/* ---- Values -------------------------------------------------------------------- */
 
-static double luminance(imp_spec c) { return 0.212671 * c[0] + 0.715160 * c[1] + 0.072169 * c[2]; }
+static double luminance(imp_spec c)
+{
+    return 0.212671 * c[0] + 0.715160 * c[1] + 0.072169 * c[2];
+}
 
 static void to_xyz(imp_spec c, double xyz[3])
 {
@@ -141,7 +155,8 @@ static void to_xyz(imp_spec c, double xyz[3])
     xyz[2] = 0.019334 * c[0] + 0.119193 * c[1] + 0.950227 * c[2];
 }
 
-static int base_value(const struct imp_measure *m, imp_spec L, double alpha, double *value)
+static int base_value(const struct imp_measure *m, imp_spec L, double alpha,
+                      double *value)
 {
     const enum imp_pixel_format format = m->sensor->film.pixel_format;
     const int n = base_channels(format);
@@ -167,7 +182,8 @@ static bool first_surface(const struct imp_measure *m, double px, double py,
                           struct imp_hit *hit, struct imp_surface *at)
 {
     m->sensor->ops->ray(m->sensor, px, py, lens, ray);
-    if (!imp__intersect(m->scene, &ray->o, &ray->d, ray->t_near, ray->t_far, hit)) return false;
+    if (!imp__intersect(m->scene, &ray->o, &ray->d, ray->t_near, ray->t_far, hit))
+        return false;
     const struct imp_shape *s = m->scene->shapes[hit->shape];
     s->ops->surface(s, hit, &ray->o, &ray->d, at);
     return true;
@@ -175,8 +191,8 @@ static bool first_surface(const struct imp_measure *m, double px, double py,
 
 /* How uv changes with the film position: the neighbouring ray on the tangent plane, the
  * offset found in the basis of dp_du, dp_dv by least squares. */
-static void uv_slope(const struct imp_measure *m, double px, double py, const double lens[2],
-                     const struct imp_surface *at, double duv[2])
+static void uv_slope(const struct imp_measure *m, double px, double py,
+                     const double lens[2], const struct imp_surface *at, double duv[2])
 {
     struct imp_sensor_ray ray;
     m->sensor->ops->ray(m->sensor, px, py, lens, &ray);
@@ -242,12 +258,14 @@ static int aov_value(const struct imp_measure *m, const struct imp_integrator *t
     return n;
 }
 
-/* Alpha (scene-format 11): an environment in sight makes every path valid; direct asks for a
- * surface at the first hit. */
-static double walk_alpha(const struct imp_measure *m, const struct imp_integrator *integrator,
+/* Alpha (scene-format 11): an environment in sight makes every path valid; direct asks
+ * for a surface at the first hit. */
+static double walk_alpha(const struct imp_measure *m,
+                         const struct imp_integrator *integrator,
                          const struct imp_walk *walk)
 {
-    if (integrator->kind == IMP_INTEGRATOR_DIRECT) return walk->first && walk->first->shape;
+    if (integrator->kind == IMP_INTEGRATOR_DIRECT)
+        return walk->first && walk->first->shape;
     const bool sky = m->scene->environment >= 0 && !integrator->hide_emitters;
     return walk->valid || (sky && integrator->max_depth != 0);
 }
@@ -267,8 +285,8 @@ static bool radiance(const struct imp_measure *m, const struct imp_integrator *i
         return walk->dropped == IMP_DROP_NONE;
     }
     /* depth: the walk's film position and lens, its first hit only */
-    static const struct imp_integrator none = {.kind = IMP_INTEGRATOR_PATH, .max_depth = 0,
-                                               .rr_depth = 5};
+    static const struct imp_integrator none = {
+        .kind = IMP_INTEGRATOR_PATH, .max_depth = 0, .rr_depth = 5};
     const struct imp_tracer look = {m->scene, &none, m->sensor, NULL, m->seed};
     const struct imp_arena_mark mark = imp__arena_mark(arena);
     imp__walk_trace(&look, arena, x, y, sample, walk);
@@ -278,8 +296,8 @@ static bool radiance(const struct imp_measure *m, const struct imp_integrator *i
     return walk->dropped == IMP_DROP_NONE;
 }
 
-bool imp__measure_sample(const struct imp_measure *m, struct imp_arena *arena, int x, int y,
-                         int64_t sample, double *value, double *px, double *py)
+bool imp__measure_sample(const struct imp_measure *m, struct imp_arena *arena, int x,
+                         int y, int64_t sample, double *value, double *px, double *py)
 {
     const struct imp_integrator *top = &m->scene->integrator;
     struct imp_walk walk;
@@ -311,10 +329,8 @@ bool imp__measure_sample(const struct imp_measure *m, struct imp_arena *arena, i
             for (int c = 0; c < 3; c++) value[n++] = L[c];
             value[n++] = alpha;
         } else {
-            if (m->scene->mode == IMP_MONO)
-                value[n] = value[n + 1] = value[n + 2] = L[0];
-            else
-                to_xyz(L, value + n);
+            if (m->scene->mode == IMP_MONO) value[n] = value[n + 1] = value[n + 2] = L[0];
+            else to_xyz(L, value + n);
             n += 3;
         }
     }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What one sample contributes to each channel of a picture: the integrator's radiance in the
- * film's pixel format, first-hit quantities, moments. */
+ * What one sample contributes to each channel of a picture: the integrator's radiance in
+ * the film's pixel format, first-hit quantities, moments. */
 #ifndef IMP_WALK_MEASURE_H
 #define IMP_WALK_MEASURE_H
 
@@ -14,23 +14,23 @@ struct imp_measure {
     const struct imp_sensor *sensor;
     uint64_t seed;
     int spp;
-    int n;                             /* channels */
-    char *names;                       /* "R,G,B,..." for imp__film_create */
+    int n;       /* channels */
+    char *names; /* "R,G,B,..." for imp__film_create */
 };
 
 /* IMP_E_SCENE without a sensor or integrator; names are released by measure_destroy. */
-enum imp_status imp__measure_create(const struct imp_scene *scene, const struct imp_run *run,
-                                    struct imp_measure *out);
+enum imp_status imp__measure_create(const struct imp_scene *scene,
+                                    const struct imp_run *run, struct imp_measure *out);
 void imp__measure_destroy(struct imp_measure *m);
 /* value [n]; *px, *py the film position. False: the walk was dropped, value is 0. */
-bool imp__measure_sample(const struct imp_measure *m, struct imp_arena *arena, int x, int y,
-                         int64_t sample, double *value, double *px, double *py);
+bool imp__measure_sample(const struct imp_measure *m, struct imp_arena *arena, int x,
+                         int y, int64_t sample, double *value, double *px, double *py);
 
 /* The sensor of a run, or an error that says how many there are. */
 enum imp_status imp__run_sensor(const struct imp_scene *scene, const struct imp_run *run,
                                 const struct imp_sensor **out);
-/* The radiance integrator of a scene: itself, or the first nested in moment or aov; NULL if
- * there is none (depth alone). */
+/* The radiance integrator of a scene: itself, or the first nested in moment or aov; NULL
+ * if there is none (depth alone). */
 const struct imp_integrator *imp__radiance_integrator(const struct imp_scene *scene);
 
 #endif

@@ -1,44 +1,46 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Pictures: samples to pixel means with standard errors. Work is cut into tiles and passes,
- * whose results are added in one order (base/pool.h). A box filter gives a sample to its own
- * pixel; wider filters weight it into all pixels within their radius (scene-format 10), and
- * the pixel is the ratio  sum w v / sum w  with the usual error of a ratio,
- * sum w^2 (v - mean)^2 / (sum w)^2. */
+ * Pictures: samples to pixel means with standard errors. Work is cut into tiles and
+ * passes, whose results are added in one order (base/pool.h). A box filter gives a sample
+ * to its own pixel; wider filters weight it into all pixels within their radius
+ * (scene-format 10), and the pixel is the ratio  sum w v / sum w  with the usual error of
+ * a ratio, sum w^2 (v - mean)^2 / (sum w)^2. */
 #include "picture.h"
-#include <string.h>
 #include "base/pool.h"
+#include <string.h>
 
-#define TILE 8
+#define TILE     8
 #define PASS_SPP 64
 
 /* Per pixel: sum w, sum w^2, then for each channel sum w v, sum w^2 v, sum w^2 v^2. */
 #define SUMS(channels) (2 + 3 * (channels))
 
 struct tile_result {
-    double *sums;   /* [(TILE + 2 border)^2][SUMS] */
+    double *sums; /* [(TILE + 2 border)^2][SUMS] */
     uint64_t dropped;
 };
 
 struct render {
     imp_context *ctx;
     const struct imp_run *run;
-    double walks;                   /* planned */
+    double walks; /* planned */
     const struct imp_picture *picture;
     const struct imp_film_desc *film;
-    int n;                          /* channels */
-    double *values;                 /* [threads][n] */
-    int width, height, border;      /* of the picture; reach of the filter in pixels */
-    int margin;                     /* extra pixels sampled on every side */
+    int n;                     /* channels */
+    double *values;            /* [threads][n] */
+    int width, height, border; /* of the picture; reach of the filter in pixels */
+    int margin;                /* extra pixels sampled on every side */
     int tiles_x, tiles_y, spp, passes, pass_spp;
     int first_pass;
-    struct imp_arena *arenas;       /* [threads] */
+    struct imp_arena *arenas; /* [threads] */
     struct tile_result *slots;
-    double *sums;                   /* [height][width][SUMS] */
+    double *sums; /* [height][width][SUMS] */
     uint64_t dropped;
 };
 
-struct region { int x0, y0, x1, y1, s0, s1; };
+struct region {
+    int x0, y0, x1, y1, s0, s1;
+};
 
 static struct region item_region(const struct render *r, size_t item)
 {
@@ -77,8 +79,8 @@ static void accumulate(double *sums, double w, const double *value, int n)
     }
 }
 
-/* Weight a sample into the pixels that the filter reaches; `tile` begins at (x0, y0) minus
- * the border. */
+/* Weight a sample into the pixels that the filter reaches; `tile` begins at (x0, y0)
+ * minus the border. */
 static void splat(const struct render *r, const struct region *g, double *tile, double px,
                   double py, const double *value)
 {
@@ -87,10 +89,11 @@ static void splat(const struct render *r, const struct region *g, double *tile, 
     const double cx = px - r->film->crop_x, cy = py - r->film->crop_y;
     const int i0 = (int)ceil(cx - f->radius - 0.5), i1 = (int)floor(cx + f->radius - 0.5);
     const int j0 = (int)ceil(cy - f->radius - 0.5), j1 = (int)floor(cy + f->radius - 0.5);
-    for (int j = imp_max(j0, g->y0 - r->border); j <= imp_min(j1, g->y1 - 1 + r->border); j++) {
+    for (int j = imp_max(j0, g->y0 - r->border); j <= imp_min(j1, g->y1 - 1 + r->border);
+         j++) {
         const double wy = f->ops->eval(f, cy - (j + 0.5));
-        for (int i = imp_max(i0, g->x0 - r->border); i <= imp_min(i1, g->x1 - 1 + r->border);
-             i++) {
+        for (int i = imp_max(i0, g->x0 - r->border);
+             i <= imp_min(i1, g->x1 - 1 + r->border); i++) {
             const double w = wy * f->ops->eval(f, cx - (i + 0.5));
             const int at = (j - g->y0 + r->border) * stride + (i - g->x0 + r->border);
             if (w != 0) accumulate(tile + (size_t)at * (size_t)SUMS(n), w, value, n);
@@ -109,25 +112,26 @@ static enum imp_status tile_work(size_t item, int worker, int slot, void *payloa
     out->dropped = 0;
     for (int y = g.y0; y < g.y1; y++)
         for (int x = g.x0; x < g.x1; x++) {
-            double *own = out->sums + (size_t)((y - g.y0 + r->border) * stride + x - g.x0 +
-                                               r->border) * (size_t)SUMS(n);
+            double *own = out->sums + (size_t)((y - g.y0 + r->border) * stride + x -
+                                               g.x0 + r->border) *
+                                          (size_t)SUMS(n);
             for (int s = g.s0; s < g.s1; s++) {
                 double px, py;
                 struct imp_arena *arena = &r->arenas[worker];
                 const struct imp_arena_mark mark = imp__arena_mark(arena);
-                out->dropped += !r->picture->sample(r->picture->payload, arena, x, y, s, value,
-                                                    &px, &py);
+                out->dropped += !r->picture->sample(r->picture->payload, arena, x, y, s,
+                                                    value, &px, &py);
                 imp__arena_rewind(arena, mark);
-                if (r->border == 0)
-                    accumulate(own, 1, value, n);
-                else
-                    splat(r, &g, out->sums, px, py, value);
+                if (r->border == 0) accumulate(own, 1, value, n);
+                else splat(r, &g, out->sums, px, py, value);
             }
             /* A walk dropped for want of memory is not a walk with a bad value. */
             if (r->arenas[worker].failed)
-                return imp__error(r->ctx, IMP_E_NOMEM, "no memory for the walks of a picture");
+                return imp__error(r->ctx, IMP_E_NOMEM,
+                                  "no memory for the walks of a picture");
             /* Lost already: walks that nothing ends take long. */
-            const enum imp_status st = imp__drops_check(r->ctx, r->run, out->dropped, r->walks);
+            const enum imp_status st =
+                imp__drops_check(r->ctx, r->run, out->dropped, r->walks);
             if (st != IMP_OK) return st;
         }
     return IMP_OK;
@@ -139,11 +143,15 @@ static enum imp_status tile_commit(size_t item, int slot, void *payload)
     const struct region g = item_region(r, item);
     const int n_sums = SUMS(r->n), stride = TILE + 2 * r->border;
     const struct tile_result *in = &r->slots[slot];
-    for (int y = imp_max(g.y0 - r->border, 0); y < imp_min(g.y1 + r->border, r->height); y++)
-        for (int x = imp_max(g.x0 - r->border, 0); x < imp_min(g.x1 + r->border, r->width); x++) {
+    for (int y = imp_max(g.y0 - r->border, 0); y < imp_min(g.y1 + r->border, r->height);
+         y++)
+        for (int x = imp_max(g.x0 - r->border, 0);
+             x < imp_min(g.x1 + r->border, r->width); x++) {
             const double *from = in->sums + (size_t)((y - g.y0 + r->border) * stride + x -
-                                                     g.x0 + r->border) * (size_t)n_sums;
-            double *to = r->sums + ((size_t)y * (size_t)r->width + (size_t)x) * (size_t)n_sums;
+                                                     g.x0 + r->border) *
+                                                (size_t)n_sums;
+            double *to =
+                r->sums + ((size_t)y * (size_t)r->width + (size_t)x) * (size_t)n_sums;
             for (int k = 0; k < n_sums; k++) to[k] += from[k];
         }
     r->dropped += in->dropped;
@@ -159,7 +167,8 @@ static void film_finish(const struct render *r, imp_film *film)
         const double n_eff = s[1] > 0 ? W * W / s[1] : 0;
         for (int c = 0; c < n; c++) {
             const double mean = W != 0 ? s[2 + 3 * c] / W : 0;
-            const double spread = s[4 + 3 * c] - 2 * mean * s[3 + 3 * c] + mean * mean * s[1];
+            const double spread =
+                s[4 + 3 * c] - 2 * mean * s[3 + 3 * c] + mean * mean * s[1];
             film->mean[p * (size_t)n + (size_t)c] = (float)mean;
             film->se[p * (size_t)n + (size_t)c] =
                 n_eff > 1 ? (float)sqrt(fmax(0, spread) / (W * W) * (n_eff / (n_eff - 1)))
@@ -181,7 +190,8 @@ static enum imp_status buffers_create(struct render *r, imp_context *ctx)
     bool fine = r->arenas && r->slots && r->sums && r->values;
     for (int k = 0; fine && k < ctx->threads; k++) imp__arena_init(&r->arenas[k], ctx);
     for (int k = 0; fine && k < slots; k++) {
-        r->slots[k].sums = imp__alloc(ctx, stride * stride, (size_t)SUMS(n) * sizeof(double));
+        r->slots[k].sums =
+            imp__alloc(ctx, stride * stride, (size_t)SUMS(n) * sizeof(double));
         fine = r->slots[k].sums;
     }
     return fine ? IMP_OK
@@ -232,11 +242,16 @@ enum imp_status imp__picture_make(imp_context *ctx, const struct imp_picture *pi
     const size_t tiles = (size_t)r.tiles_x * (size_t)r.tiles_y;
     const double start = imp__now(), pixels = (double)r.width * r.height;
     const bool timed = run->time_limit_s > 0;
-    struct imp_loop loop = {
-        .n_items = tiles * (size_t)(timed ? 1 : r.passes), .work = tile_work,
-        .commit = tile_commit, .payload = &r, .progress = run->progress,
-        .progress_payload = run->progress_payload, .stage = picture->stage,
-        .rate_unit = "samples", .start_s = start, .units = pixels * (timed ? r.pass_spp : r.spp)};
+    struct imp_loop loop = {.n_items = tiles * (size_t)(timed ? 1 : r.passes),
+                            .work = tile_work,
+                            .commit = tile_commit,
+                            .payload = &r,
+                            .progress = run->progress,
+                            .progress_payload = run->progress_payload,
+                            .stage = picture->stage,
+                            .rate_unit = "samples",
+                            .start_s = start,
+                            .units = pixels * (timed ? r.pass_spp : r.spp)};
     size_t done = 0, passes_done;
     st = imp__parallel(ctx, &loop, &done);
     passes_done = done / tiles;

@@ -9,15 +9,16 @@
 
 struct imp_picture {
     const struct imp_sensor *sensor;
-    const char *stage;   /* for progress */
-    const char *names;   /* channels, "R,G,B" */
-    int n;               /* how many */
-    /* Sample number `sample` of pixel (x, y): value [n] and its film position. The arena is
-     * rewound afterwards. False: dropped, value is 0. Called by many threads at once. */
-    bool (*sample)(const void *payload, struct imp_arena *arena, int x, int y, int64_t sample,
-                   double *value, double *px, double *py);
+    const char *stage; /* for progress */
+    const char *names; /* channels, "R,G,B" */
+    int n;             /* how many */
+    /* Sample number `sample` of pixel (x, y): value [n] and its film position. The arena
+     * is rewound afterwards. False: dropped, value is 0. Called by many threads at once.
+     */
+    bool (*sample)(const void *payload, struct imp_arena *arena, int x, int y,
+                   int64_t sample, double *value, double *px, double *py);
     const void *payload;
-    double *weights;     /* [height][width] sums of filter weights; NULL: not wanted */
+    double *weights; /* [height][width] sums of filter weights; NULL: not wanted */
 };
 
 /* @return IMP_OK; IMP_CANCELLED with a valid picture; IMP_E_PATHS; IMP_E_NOMEM. */
@@ -29,8 +30,8 @@ static inline int imp__film_border(const struct imp_film_desc *f)
 {
     return f->filter.radius > 0.5 ? (int)ceil(f->filter.radius - 0.5) : 0;
 }
-/* IMP_E_PATHS if more walks of all `walks` were dropped than the run allows; one is always
- * forgiven. */
+/* IMP_E_PATHS if more walks of all `walks` were dropped than the run allows; one is
+ * always forgiven. */
 enum imp_status imp__drops_check(imp_context *ctx, const struct imp_run *run,
                                  uint64_t dropped, double walks);
 

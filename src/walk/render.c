@@ -2,13 +2,14 @@
 #include "measure.h"
 #include "picture.h"
 
-static bool sample(const void *payload, struct imp_arena *arena, int x, int y, int64_t index,
-                   double *value, double *px, double *py)
+static bool sample(const void *payload, struct imp_arena *arena, int x, int y,
+                   int64_t index, double *value, double *px, double *py)
 {
     return imp__measure_sample(payload, arena, x, y, index, value, px, py);
 }
 
-enum imp_status imp_render(const imp_scene *scene, const struct imp_run *run, imp_film **out)
+enum imp_status imp_render(const imp_scene *scene, const struct imp_run *run,
+                           imp_film **out)
 {
     const struct imp_run none = IMP_RUN_INIT;
     if (!scene || !out) return IMP_E_ARG;
@@ -16,8 +17,8 @@ enum imp_status imp_render(const imp_scene *scene, const struct imp_run *run, im
     struct imp_measure measure;
     enum imp_status st = imp__measure_create(scene, run, &measure);
     if (st != IMP_OK) return st;
-    const struct imp_picture picture = {measure.sensor, "render", measure.names, measure.n,
-                                        sample, &measure, NULL};
+    const struct imp_picture picture = {
+        measure.sensor, "render", measure.names, measure.n, sample, &measure, NULL};
     st = imp__picture_make(scene->ctx, &picture, run, out);
     imp__measure_destroy(&measure);
     return st;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The walk visited again: radiance comes down (fold), the adjoint goes up and gradient falls
- * off at every vertex (sweep), or both derivative and radiance come down (tangent). The
- * three differ only in the direction the product rule is read. */
+ * The walk visited again: radiance comes down (fold), the adjoint goes up and gradient
+ * falls off at every vertex (sweep), or both derivative and radiance come down (tangent).
+ * The three differ only in the direction the product rule is read. */
 #include "dims.h"
 #include "walk.h"
 
@@ -24,7 +24,8 @@ static bool bsdf_active(const struct imp_active *a, const struct imp_bsdf *b)
     return b && b->index >= 0 && a->bsdf[b->index];
 }
 
-/* ---- Lane-wise derivatives of a vertex's three pieces with respect to its inputs -------- */
+/* ---- Lane-wise derivatives of a vertex's three pieces with respect to its inputs ----
+ */
 
 /* E_k through the BSDF's own emission: d[n_in]. */
 static void glow_d(const struct imp_vertex *v, imp_spec *d)
@@ -51,8 +52,9 @@ static struct imp_texcoord emission_texcoord(const struct imp_vertex *v)
     return (struct imp_texcoord){{v->e_at.uv[0], v->e_at.uv[1]}, v->at.p};
 }
 
-/* Stam's exponent by the attached form, or only its first term as in his App. C (gradients.md
- * 4, E9): replaces the detached derivative of the inputs where the kind offers it. */
+/* Stam's exponent by the attached form, or only its first term as in his App. C
+ * (gradients.md 4, E9): replaces the detached derivative of the inputs where the kind
+ * offers it. */
 static void attached_d(const struct imp_tracer *tracer, const struct imp_walk *walk,
                        const struct imp_vertex *v, int depth, imp_spec *d)
 {
@@ -64,7 +66,8 @@ static void attached_d(const struct imp_tracer *tracer, const struct imp_walk *w
     (void)tracer;
     for (int j = 0; j < b->n_in; j++) {
         imp_spec dweight;
-        imp_v3 dwi; /* multiplies the gradient of what arrives, which is 0 where allowed */
+        imp_v3
+            dwi; /* multiplies the gradient of what arrives, which is 0 where allowed */
         if (b->ops->sample_d(b, v->in, u, &v->dirs, j, &dweight, &dwi))
             d[j] = dweight * (v->inv_ps * v->pdf); /* 1/s */
     }
@@ -88,7 +91,7 @@ static void light_d(const struct imp_vertex *v, imp_spec *d)
     for (int j = 0; j < v->bsdf->n_in; j++) d[j] *= v->l_le * v->l_weight;
 }
 
-/* ---- Reverse -------------------------------------------------------------------------- */
+/* ---- Reverse ------------------------------------------------------------------- */
 
 static void emitter_scatter(const struct imp_tracer *tracer, int emitter,
                             const struct imp_emission *x, struct imp_texcoord at,
@@ -143,7 +146,7 @@ void imp__walk_sweep(const struct imp_tracer *tracer, const struct imp_walk *wal
     }
 }
 
-/* ---- Forward -------------------------------------------------------------------------- */
+/* ---- Forward ------------------------------------------------------------------- */
 
 struct direction {
     const struct imp_active *active;
@@ -182,10 +185,12 @@ imp_spec imp__walk_tangent(const struct imp_tracer *tracer, const struct imp_wal
         L_dot *= v->w;
         if (v->emitter >= 0 && active->emitter[v->emitter])
             L_dot += emitter_tangent(tracer, v->emitter, &v->e_at, emission_texcoord(v),
-                                     &direction) * v->e_weight;
+                                     &direction) *
+                     v->e_weight;
         if (v->light >= 0 && active->emitter[v->light])
             L_dot += emitter_tangent(tracer, v->light, &v->l_at, light_texcoord(v),
-                                     &direction) * v->l_f * v->l_weight;
+                                     &direction) *
+                     v->l_f * v->l_weight;
         if (!bsdf_active(active, b)) continue;
         imp_spec in_dot[MAX_INPUTS], d[MAX_INPUTS];
         imp__inputs_tangent(b->input, b->n_in, &v->at, direction_at, &direction, in_dot);

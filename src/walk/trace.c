@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * One walk. The step below is the only place where paths are made: rendering, gradients,
- * replays and frozen checks all start from what it records. Path tracing with light samples,
- * and Stam's walk that collects emission only where it is absorbed, are settings of it.
+ * replays and frozen checks all start from what it records. Path tracing with light
+ * samples, and Stam's walk that collects emission only where it is absorbed, are settings
+ * of it.
  *
- * Estimator (gradients.md 8): E_k = w^B Le for emission met by chance, B_k = w^E f Le / p^e
- * for a light sample, power heuristic with exponent 2, w^B = 1 at the first vertex and after
- * a delta lobe. Depth: emission at vertex k counts if k < max_depth, scattering goes on and
- * samples lights if k + 1 < max_depth (scene-format 11). */
+ * Estimator (gradients.md 8): E_k = w^B Le for emission met by chance, B_k = w^E f Le /
+ * p^e for a light sample, power heuristic with exponent 2, w^B = 1 at the first vertex
+ * and after a delta lobe. Depth: emission at vertex k counts if k < max_depth, scattering
+ * goes on and samples lights if k + 1 < max_depth (scene-format 11). */
 #include "dims.h"
 #include "walk.h"
 
@@ -16,13 +17,13 @@ struct step {
     const struct imp_scene *scene;
     struct imp_walk *walk;
     struct imp_arena *arena;
-    imp_v3 o, d;            /* the ray in flight */
+    imp_v3 o, d; /* the ray in flight */
     double t_min, t_max;
-    double pdf;             /* of d per steradian; 0: a delta lobe or the sensor chose it */
-    imp_v3 from;            /* where the ray left, for light densities */
-    imp_spec beta;          /* throughput, zero factors left out: for roulette only */
-    double eta;             /* product of index ratios */
-    int zeros[3];           /* per lane: factors that are zero but have a derivative */
+    double pdf;    /* of d per steradian; 0: a delta lobe or the sensor chose it */
+    imp_v3 from;   /* where the ray left, for light densities */
+    imp_spec beta; /* throughput, zero factors left out: for roulette only */
+    double eta;    /* product of index ratios */
+    int zeros[3];  /* per lane: factors that are zero but have a derivative */
     int depth;
 };
 
@@ -74,8 +75,8 @@ static struct imp_vertex *vertex_add(struct step *s)
 }
 
 /* Radiance of emitter e at x; inputs are looked up on the light. */
-static imp_spec emitter_radiance(const struct imp_emitter *e, const struct imp_emission *x,
-                                 imp_v3 p)
+static imp_spec emitter_radiance(const struct imp_emitter *e,
+                                 const struct imp_emission *x, imp_v3 p)
 {
     imp_spec in[8], le;
     const struct imp_texcoord at = {{x->uv[0], x->uv[1]}, p};
@@ -99,8 +100,8 @@ static void emission_meet(struct step *s, struct imp_vertex *v, int emitter,
     }
     v->emitter = emitter;
     if (s->pdf > 0 && wants_lights(s->tracer->integrator)) {
-        const double pe = light_pmf(s->scene, emitter) *
-                          e->ops->pdf(e, &s->from, &s->d, hit, at);
+        const double pe =
+            light_pmf(s->scene, emitter) * e->ops->pdf(e, &s->from, &s->d, hit, at);
         v->e_weight *= power_heuristic(s->pdf, pe);
     } else if (s->depth > 0 && s->tracer->integrator->bsdf_samples == 0 && s->pdf > 0) {
         v->e_weight = 0;
@@ -109,8 +110,8 @@ static void emission_meet(struct step *s, struct imp_vertex *v, int emitter,
 }
 
 /* Light sample at v: choose an emitter, a point on it, look whether it is visible. */
-static void light_sample(struct step *s, struct imp_vertex *v, const struct imp_surface *at,
-                         const struct imp_frame *frame)
+static void light_sample(struct step *s, struct imp_vertex *v,
+                         const struct imp_surface *at, const struct imp_frame *frame)
 {
     const struct imp_scene *scene = s->scene;
     const struct imp_key key = s->walk->key;
@@ -141,8 +142,8 @@ static void light_sample(struct step *s, struct imp_vertex *v, const struct imp_
     v->bsdf->ops->eval(v->bsdf, v->in, &dirs, &f);
     const struct imp_active *active = s->tracer->active;
     const bool differentiable =
-        active && ((v->bsdf->index >= 0 && active->bsdf[v->bsdf->index]) ||
-                   active->emitter[light]);
+        active &&
+        ((v->bsdf->index >= 0 && active->bsdf[v->bsdf->index]) || active->emitter[light]);
     if (imp__is_zero(f * le) && !differentiable) return;
 
     /* Aimed from the moved origin at the point itself: a ray parallel to wi would meet a
@@ -165,9 +166,9 @@ static void light_sample(struct step *s, struct imp_vertex *v, const struct imp_
     v->l_weight = (delta || !bsdf_samples ? 1 : power_heuristic(p, pdf_bsdf)) / p;
 }
 
-/* beta *= f/p, where a lane's first factor that is zero but has a derivative is left out: the
- * walk goes on, because what arrives from beyond is that derivative. A second one ends the
- * lane (gradients.md 9.2). False: all lanes have ended. */
+/* beta *= f/p, where a lane's first factor that is zero but has a derivative is left out:
+ * the walk goes on, because what arrives from beyond is that derivative. A second one
+ * ends the lane (gradients.md 9.2). False: all lanes have ended. */
 static bool throughput_add(struct step *s, const struct imp_bsdf *b, imp_spec factor)
 {
     const struct imp_active *active = s->tracer->active;
@@ -181,8 +182,8 @@ static bool throughput_add(struct step *s, const struct imp_bsdf *b, imp_spec fa
     return !imp__is_zero(s->beta);
 }
 
-/* Survival probability. Zero factors that still have a derivative are left out of beta, so
- * roulette sees the walk as if they were not there (gradients.md 9.1, 9.2). */
+/* Survival probability. Zero factors that still have a derivative are left out of beta,
+ * so roulette sees the walk as if they were not there (gradients.md 9.1, 9.2). */
 static bool roulette(struct step *s, struct imp_vertex *v)
 {
     const struct imp_integrator *integrator = s->tracer->integrator;
@@ -207,7 +208,8 @@ static bool scatter(struct step *s, struct imp_vertex *v, const struct imp_surfa
                          imp__u01(key, imp__dim(s->depth, IMP_DIM_DIR_V))};
     struct imp_bsdf_sample sample;
     v->dirs.lobe = IMP_SMOOTH;
-    if (!b->ops->sample(b, v->in, u, &v->dirs, &sample) || !(sample.pdf > 0)) return false;
+    if (!b->ops->sample(b, v->in, u, &v->dirs, &sample) || !(sample.pdf > 0))
+        return false;
     v->pdf = sample.pdf;
 
     if (!throughput_add(s, b, sample.f * (1 / sample.pdf))) return false;
@@ -226,8 +228,8 @@ static bool scatter(struct step *s, struct imp_vertex *v, const struct imp_surfa
     return true;
 }
 
-/* Stam's termination: with probability `absorb` the walk ends and collects what glows here,
- * divided by it; else it goes on, divided by the rest (gradients.md 6, E22-E24). */
+/* Stam's termination: with probability `absorb` the walk ends and collects what glows
+ * here, divided by it; else it goes on, divided by the rest (gradients.md 6, E22-E24). */
 static bool absorb(struct step *s, struct imp_vertex *v)
 {
     const double a = v->bsdf->absorb;
@@ -260,7 +262,8 @@ static bool step(struct step *s)
     const struct imp_scene *scene = s->scene;
     const struct imp_integrator *integrator = s->tracer->integrator;
     const bool counts = integrator->max_depth < 0 || s->depth < integrator->max_depth;
-    const bool goes_on = integrator->max_depth < 0 || s->depth + 1 < integrator->max_depth;
+    const bool goes_on =
+        integrator->max_depth < 0 || s->depth + 1 < integrator->max_depth;
     struct imp_hit hit;
     if (!first_hit(s, &hit)) {
         const bool hidden = integrator->hide_emitters && s->depth == 0;
@@ -317,9 +320,10 @@ static bool step(struct step *s)
     return scatter(s, v, &at, &frame);
 }
 
-/* Keys use full-film pixels: a crop renders the same samples as the whole picture. The border
- * of wide filters may lie outside the film, hence the offset. */
-static struct imp_key walk_key(const struct imp_tracer *tracer, int x, int y, int64_t sample)
+/* Keys use full-film pixels: a crop renders the same samples as the whole picture. The
+ * border of wide filters may lie outside the film, hence the offset. */
+static struct imp_key walk_key(const struct imp_tracer *tracer, int x, int y,
+                               int64_t sample)
 {
     const struct imp_film_desc *film = &tracer->sensor->film;
     const uint64_t row = (uint64_t)(y + film->crop_y + 0x8000);
@@ -335,8 +339,8 @@ void imp__walk_position(const struct imp_tracer *tracer, int x, int y, int64_t s
     *py = tracer->sensor->film.crop_y + y + imp__u01(key, IMP_DIM_PIXEL_Y);
 }
 
-void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, int x, int y,
-                     int64_t sample, struct imp_walk *walk)
+void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, int x,
+                     int y, int64_t sample, struct imp_walk *walk)
 {
     const struct imp_sensor *sensor = tracer->sensor;
     const struct imp_key key = walk_key(tracer, x, y, sample);
@@ -345,10 +349,17 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
     const double lens[2] = {imp__u01(key, IMP_DIM_LENS_U), imp__u01(key, IMP_DIM_LENS_V)};
     sensor->ops->ray(sensor, walk->px, walk->py, lens, &walk->ray);
 
-    struct step s = {.tracer = tracer, .scene = tracer->scene, .walk = walk, .arena = arena,
-                     .o = walk->ray.o, .d = walk->ray.d, .t_min = walk->ray.t_near,
-                     .t_max = walk->ray.t_far, .from = walk->ray.o,
-                     .beta = {1, 1, 1, 0}, .eta = 1};
+    struct step s = {.tracer = tracer,
+                     .scene = tracer->scene,
+                     .walk = walk,
+                     .arena = arena,
+                     .o = walk->ray.o,
+                     .d = walk->ray.d,
+                     .t_min = walk->ray.t_near,
+                     .t_max = walk->ray.t_far,
+                     .from = walk->ray.o,
+                     .beta = {1, 1, 1, 0},
+                     .eta = 1};
     while (step(&s)) s.depth++;
 
     const imp_spec L = imp__walk_fold(walk);

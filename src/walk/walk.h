@@ -2,14 +2,16 @@
  *
  * Walk and sweep: the two ideas of the program.
  *
- * A walk is one random path from the sensor, recorded vertex by vertex with everything its
- * value is a product of. With E emission met, B the light sample and w = f/(p s) the step
- * weight (f holds the cosine), the radiance leaving vertex k towards the sensor is
+ * A walk is one random path from the sensor, recorded vertex by vertex with everything
+ * its value is a product of. With E emission met, B the light sample and w = f/(p s) the
+ * step weight (f holds the cosine), the radiance leaving vertex k towards the sensor is
  *
- *     L_k = E_k + B_k + w_k L_{k+1}                                   (fold, far end first)
+ *     L_k = E_k + B_k + w_k L_{k+1}                                   (fold, far end
+ * first)
  *
- * The sweep carries the adjoint P from the sensor outwards, P_{k+1} = P_k w_k, and at every
- * vertex a piece of gradient falls off (Stam 2020, Eq. 14 on one path; gradients.md 6):
+ * The sweep carries the adjoint P from the sensor outwards, P_{k+1} = P_k w_k, and at
+ * every vertex a piece of gradient falls off (Stam 2020, Eq. 14 on one path; gradients.md
+ * 6):
  *
  *     P_k (dE_k + dB_k + dw_k L_{k+1}),   dw = df/(p s): densities are constants
  *
@@ -23,36 +25,42 @@
 
 struct imp_vertex {
     struct imp_vertex *prev, *next;
-    const struct imp_bsdf *bsdf;   /* NULL: the environment, or nothing */
+    const struct imp_bsdf *bsdf; /* NULL: the environment, or nothing */
     const struct imp_shape *shape;
-    imp_spec *in;                  /* [bsdf->n_in] inputs at this point */
+    imp_spec *in; /* [bsdf->n_in] inputs at this point */
     struct imp_texcoord at;
-    struct imp_dirs dirs;          /* of the continuation, shading frame */
+    struct imp_dirs dirs; /* of the continuation, shading frame */
 
-    imp_spec w;                    /* f inv_ps: weight of the step to the next vertex */
-    imp_spec lin;                  /* L_{k+1}, set by fold */
-    double inv_ps;                 /* 1/(p s); 0: the walk ends here */
+    imp_spec w;    /* f inv_ps: weight of the step to the next vertex */
+    imp_spec lin;  /* L_{k+1}, set by fold */
+    double inv_ps; /* 1/(p s); 0: the walk ends here */
 
-    int emitter;                   /* met here, -1: none */
-    double e_weight;               /* MIS weight, or 1/absorb */
-    bool glows;                    /* the BSDF's own emission counts here */
-    double g_weight;               /* 1, or 1/absorb */
+    int emitter;     /* met here, -1: none */
+    double e_weight; /* MIS weight, or 1/absorb */
+    bool glows;      /* the BSDF's own emission counts here */
+    double g_weight; /* 1, or 1/absorb */
     struct imp_emission e_at;
-    imp_spec e;                    /* E_k: all emission of this vertex, weighted */
+    imp_spec e; /* E_k: all emission of this vertex, weighted */
 
-    int light;                     /* emitter sampled and visible, -1: none */
-    double l_weight;               /* MIS weight / density */
+    int light;       /* emitter sampled and visible, -1: none */
+    double l_weight; /* MIS weight / density */
     struct imp_emission l_at;
-    imp_v3 l_wi;                   /* local */
-    imp_v3 l_p;                    /* point on the light */
-    imp_spec l_f, l_le;            /* BSDF and radiance; B_k = l_f l_le l_weight */
+    imp_v3 l_wi;        /* local */
+    imp_v3 l_p;         /* point on the light */
+    imp_spec l_f, l_le; /* BSDF and radiance; B_k = l_f l_le l_weight */
 
-    imp_v3 ng;                     /* geometric normal, world, for describe */
-    double pdf, survive, t;        /* density, survival, distance from the last vertex */
+    imp_v3 ng;              /* geometric normal, world, for describe */
+    double pdf, survive, t; /* density, survival, distance from the last vertex */
 };
 
-enum imp_drop { IMP_DROP_NONE, IMP_DROP_NAN, IMP_DROP_INFINITE, IMP_DROP_NEGATIVE,
-                IMP_DROP_MEMORY, IMP_DROP_LONG };
+enum imp_drop {
+    IMP_DROP_NONE,
+    IMP_DROP_NAN,
+    IMP_DROP_INFINITE,
+    IMP_DROP_NEGATIVE,
+    IMP_DROP_MEMORY,
+    IMP_DROP_LONG
+};
 
 /* Vertices of a walk. One of more is dropped: nothing ends it, as in a closed white room
  * without roulette. With roulette at 0.95 the chance to get here is 1e-365. */
@@ -60,22 +68,22 @@ enum imp_drop { IMP_DROP_NONE, IMP_DROP_NAN, IMP_DROP_INFINITE, IMP_DROP_NEGATIV
 
 struct imp_walk {
     struct imp_vertex *first, *last;
-    int n;                         /* vertices */
-    double px, py;                 /* film position, pixels of the full film */
+    int n;         /* vertices */
+    double px, py; /* film position, pixels of the full film */
     struct imp_key key;
     struct imp_sensor_ray ray;
-    imp_spec L;                    /* radiance at the sensor */
-    bool valid;                    /* alpha 1 (scene-format 11) */
-    bool absorbed;                 /* Stam: ended by absorption */
-    enum imp_drop dropped;         /* then L is 0 and there is nothing to sweep */
+    imp_spec L;            /* radiance at the sensor */
+    bool valid;            /* alpha 1 (scene-format 11) */
+    bool absorbed;         /* Stam: ended by absorption */
+    enum imp_drop dropped; /* then L is 0 and there is nothing to sweep */
 };
 
 /* Which numbers a derivative is wanted for, prepared once a job. */
 struct imp_active {
-    size_t n;               /* numbers in x */
-    int64_t *base;          /* [n_params] index in x of a parameter's first number, or -1 */
-    uint8_t *bsdf;          /* [n_bsdfs] does it depend on an active number */
-    uint8_t *emitter;       /* [n_emitters] */
+    size_t n;         /* numbers in x */
+    int64_t *base;    /* [n_params] index in x of a parameter's first number, or -1 */
+    uint8_t *bsdf;    /* [n_bsdfs] does it depend on an active number */
+    uint8_t *emitter; /* [n_emitters] */
 };
 /* `chosen` [n_params]. */
 enum imp_status imp__active_create(const struct imp_scene *scene, const uint8_t *chosen,
@@ -87,15 +95,16 @@ struct imp_tracer {
     const struct imp_scene *scene;
     const struct imp_integrator *integrator; /* PATH, DIRECT or STAM */
     const struct imp_sensor *sensor;
-    const struct imp_active *active; /* NULL: value only. Else walks go on through factors
-                                        that are zero but have a derivative (gradients.md 9.2) */
+    const struct imp_active
+        *active; /* NULL: value only. Else walks go on through factors
+                    that are zero but have a derivative (gradients.md 9.2) */
     uint64_t seed;
 };
 
-/* Record walk (x, y, sample) of the picture (x, y from the crop's corner) in the arena and
- * fold it. Running out of memory drops the walk. */
-void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, int x, int y,
-                     int64_t sample, struct imp_walk *walk);
+/* Record walk (x, y, sample) of the picture (x, y from the crop's corner) in the arena
+ * and fold it. Running out of memory drops the walk. */
+void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, int x,
+                     int y, int64_t sample, struct imp_walk *walk);
 
 /* Film position alone of the same walk. */
 void imp__walk_position(const struct imp_tracer *tracer, int x, int y, int64_t sample,

@@ -3,9 +3,9 @@
  * The table of gradients.md 4 (its reproducible version): the derivative of
  *   I(alpha) = int f cos(theta_i) L(wi) dwi,  wo = (1/2, 0, sqrt(3)/2),
  *   L(w) = max(0, w_z) exp(2 w.a),  a = (-.6, 0, .8),  specular 1, diffuse 0
- * with respect to Stam's exponent. Exact numbers by quadrature of eval and eval_d; then the
- * estimators: detached (two samplers), fully attached, and Stam's own term, which keeps only
- * the first part of the attached form and is wrong (E9). */
+ * with respect to Stam's exponent. Exact numbers by quadrature of eval and eval_d; then
+ * the estimators: detached (two samplers), fully attached, and Stam's own term, which
+ * keeps only the first part of the attached form and is wrong (E9). */
 #include "imp_kinds.h"
 #include "imp_sphere.h"
 #include "imp_tap.h"
@@ -52,7 +52,9 @@ static const struct row {
                   {10, 0.8272367, 0.0161351, -0.0323467, 2.623, 3.084, 2.204},
                   {40, 0.8456737, -0.0035256, -0.0097902, 5.910, 6.205, 1.584}};
 
-struct estimates { struct tap_stat detached, attached, stam; };
+struct estimates {
+    struct tap_stat detached, attached, stam;
+};
 
 static struct estimates estimate(const struct setting *s, uint32_t n, uint64_t seed)
 {
@@ -80,11 +82,12 @@ static struct estimates estimate(const struct setting *s, uint32_t n, uint64_t s
     return e;
 }
 
-static void sd_check(const struct tap_stat *s, double truth, double relative, const char *what)
+static void sd_check(const struct tap_stat *s, double truth, double relative,
+                     const char *what)
 {
     const double sd = sqrt(s->m2 / (s->n - 1)) / fabs(truth);
-    tap_ok(fabs(sd / relative - 1) < 0.03, "%s: relative sd of a draw # %.3f, table %.3f", what,
-           sd, relative);
+    tap_ok(fabs(sd / relative - 1) < 0.03, "%s: relative sd of a draw # %.3f, table %.3f",
+           what, sd, relative);
 }
 
 static void table(const struct imp_bsdf *phong, const struct imp_bsdf *cosine,
@@ -93,10 +96,12 @@ static void table(const struct imp_bsdf *phong, const struct imp_bsdf *cosine,
     for (int i = 0; i < 3; i++) {
         const struct row *r = &rows[i];
         char what[128];
-        struct setting s = {phong, {imp__spec(0), imp__spec(0), imp__spec(1), imp__spec(r->alpha)}};
+        struct setting s = {
+            phong, {imp__spec(0), imp__spec(0), imp__spec(1), imp__spec(r->alpha)}};
         struct setting c = s;
         c.b = cosine;
-#define WHAT(text) (snprintf(what, sizeof what, "%s D, alpha %g: %s", name, r->alpha, text), what)
+#define WHAT(text)                                                                       \
+    (snprintf(what, sizeof what, "%s D, alpha %g: %s", name, r->alpha, text), what)
         const double I = sphere_integral(primal, &s, 0, 1, 1e-8);
         const double dI = sphere_integral(derivative, &s, 0, 1, 1e-8);
         tap_near(I, r->I, 1e-7, 6e-8, WHAT("I by quadrature"));
@@ -110,8 +115,7 @@ static void table(const struct imp_bsdf *phong, const struct imp_bsdf *cosine,
         if (r->stam == 0)
             tap_ok(fabs(e.stam.mean) < 1e-13, "%s # %.1e", WHAT("Stam's term is 0"),
                    e.stam.mean);
-        else
-            tap_z(&e.stam, r->stam, 0.01 * fabs(r->stam), WHAT("Stam's term"));
+        else tap_z(&e.stam, r->stam, 0.01 * fabs(r->stam), WHAT("Stam's term"));
         tap_ok(fabs(e.stam.mean - dI) > 10 * tap_se(&e.stam), "%s",
                WHAT("Stam's term is not the derivative (E9)"));
         sd_check(&e.detached, dI, r->sd_detached, WHAT("detached"));
@@ -131,7 +135,8 @@ static void mixtures(const struct imp_bsdf *b, const char *name)
     tap_z(&e.attached, dI, 0.02 * fabs(dI), name);
 }
 
-static struct imp_bsdf *make(struct kind_factory *f, const char *variant, const char *sampling)
+static struct imp_bsdf *make(struct kind_factory *f, const char *variant,
+                             const char *sampling)
 {
     struct imp_bsdf *b = imp__arena_array(&f->arena, 1, sizeof *b);
     const char *props[2] = {variant, sampling};

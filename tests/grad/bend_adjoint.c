@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The adjoint of bent rays: every scheme with every exit, events and taps, against the
- * forward tangent (dot test, 1e-12), and against central differences of the tracer with the
- * same number of steps on both sides. */
+ * forward tangent (dot test, 1e-12), and against central differences of the tracer with
+ * the same number of steps on both sides. */
 #include "bend_kit.h"
 
-#define N 48
+#define N    48
 #define TAPS 2
 
 struct setup {
@@ -25,7 +25,8 @@ static void mesh_make(void)
     static const uint32_t t[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
                                    2, 6, 3, 3, 6, 7, 0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
     for (int i = 0; i < 8; i++) {
-        const double x = i & 1 ? 0.9 : -0.9, y = i & 2 ? 0.9 : -0.9, z = i & 4 ? 0.7 : -0.9;
+        const double x = i & 1 ? 0.9 : -0.9, y = i & 2 ? 0.9 : -0.9,
+                     z = i & 4 ? 0.7 : -0.9;
         p[3 * i] = (float)(x + 0.1 * z), p[3 * i + 1] = (float)(y - 0.1 * z + 0.05 * x);
         p[3 * i + 2] = (float)(z - 0.1 * x + 0.07 * y);
     }
@@ -49,12 +50,14 @@ static int n_setups;
 static void setups_make(void)
 {
     struct imp_bend_surface box = surface(IMP_BEND_BOX), plane = surface(IMP_BEND_PLANE),
-                            sphere = surface(IMP_BEND_SPHERE), disc = surface(IMP_BEND_DISC),
+                            sphere = surface(IMP_BEND_SPHERE),
+                            disc = surface(IMP_BEND_DISC),
                             cylinder = surface(IMP_BEND_CYLINDER),
-                            near = surface(IMP_BEND_APPROACH), dist = surface(IMP_BEND_SDF),
-                            facets = surface(IMP_BEND_MESH);
+                            near = surface(IMP_BEND_APPROACH),
+                            dist = surface(IMP_BEND_SDF), facets = surface(IMP_BEND_MESH);
     for (int k = 0; k < 3; k++) box.lo[k] = -1, box.hi[k] = 1;
-    plane.normal[0] = 0.2, plane.normal[1] = -0.1, plane.normal[2] = 1, plane.offset = 0.5;
+    plane.normal[0] = 0.2, plane.normal[1] = -0.1, plane.normal[2] = 1,
+    plane.offset = 0.5;
     sphere.radius = 0.95, sphere.centre[0] = 0.02;
     disc.normal[1] = 0.2, disc.centre[2] = 0.4, disc.radius = 0.7;
     cylinder.radius = 0.45;
@@ -76,7 +79,8 @@ static void setups_make(void)
     SETUP("refracting distance from outside", {dist}, 1, true, false, false, -2, 0.5, 1);
     setups[n - 1].s[0].event = IMP_BEND_REFRACT;
     SETUP("matched sphere from outside", {sphere}, 1, true, false, false, -2, 0.6, 1.3);
-    SETUP("light guide: total reflection", {cylinder, plane}, 2, false, true, true, -0.8, 0.3, 1);
+    SETUP("light guide: total reflection", {cylinder, plane}, 2, false, true, true, -0.8,
+          0.3, 1);
     setups[n - 1].s[0].event = setups[n - 1].s[1].event = IMP_BEND_REFRACT;
     SETUP("mirror", {cylinder, plane}, 2, false, true, true, -0.8, 0.3, 1);
     setups[n - 1].s[0].event = IMP_BEND_MIRROR;
@@ -86,7 +90,8 @@ static void setups_make(void)
     n_setups = n;
 }
 
-static const struct imp_bend_tap taps[TAPS] = {{{0.1, 0, 1}, -0.3, -1}, {{0, 0.1, 1}, 0.1, -1}};
+static const struct imp_bend_tap taps[TAPS] = {{{0.1, 0, 1}, -0.3, -1},
+                                               {{0, 0.1, 1}, 0.1, -1}};
 
 static void options_of(const struct setup *s, enum imp_bend_scheme scheme,
                        struct imp_bend_options *o)
@@ -115,8 +120,8 @@ static double pair(const struct imp_bend_cotangent *a, const struct imp_bend_cot
     return s;
 }
 
-static void dot_test(const imp_field *f, const struct setup *s, enum imp_bend_scheme scheme,
-                     bool stored)
+static void dot_test(const imp_field *f, const struct setup *s,
+                     enum imp_bend_scheme scheme, bool stored)
 {
     struct imp_bend_options o;
     struct imp_bend_stats stats;
@@ -139,13 +144,15 @@ static void dot_test(const imp_field *f, const struct setup *s, enum imp_bend_sc
     KIT_CHECK(imp_bend_trace(f, &o, &rays, exits, tap_exits, &stats));
     struct imp_bend_gradient g = IMP_BEND_GRADIENT_INIT;
     g.theta = bar, g.x = x_bar, g.d = d_bar, g.energy = energy;
-    KIT_CHECK(imp_bend_adjoint(f, &o, &rays, exits, tap_exits, bars, tap_bars, &g, &stats));
-    KIT_CHECK(imp_bend_tangent(f, &o, &rays, dot, (const double (*)[3])x_dot,
-                               (const double (*)[3])d_dot, dots, tap_dots));
+    KIT_CHECK(
+        imp_bend_adjoint(f, &o, &rays, exits, tap_exits, bars, tap_bars, &g, &stats));
+    KIT_CHECK(imp_bend_tangent(f, &o, &rays, dot, (const double(*)[3])x_dot,
+                               (const double(*)[3])d_dot, dots, tap_dots));
     double left = 0, right = 0, scale = 0;
     for (size_t i = 0; i < n; i++) left += bar[i] * dot[i];
     for (int i = 0; i < N; i++) {
-        for (int k = 0; k < 3; k++) left += x_bar[i][k] * x_dot[i][k] + d_bar[i][k] * d_dot[i][k];
+        for (int k = 0; k < 3; k++)
+            left += x_bar[i][k] * x_dot[i][k] + d_bar[i][k] * d_dot[i][k];
         if (exits[i].flags & IMP_BEND_DROPPED) continue;
         right += pair(&bars[i], &dots[i], &scale);
         for (int t = 0; s->taps && t < TAPS; t++)
@@ -156,19 +163,22 @@ static void dot_test(const imp_field *f, const struct setup *s, enum imp_bend_sc
     tap_ok(fabs(left - right) <= 1e-12 * scale && (int)stats.traced >= expected &&
                stats.reversal == 0,
            "dot test, %s, %s%s # %.1e, %d traced, %d reflected, reversal %.1e", s->name,
-           imp__schemes[scheme].name, stored ? ", stored" : "", fabs(left - right) / scale,
-           (int)stats.traced, (int)stats.reflected, stats.worst_reversal);
+           imp__schemes[scheme].name, stored ? ", stored" : "",
+           fabs(left - right) / scale, (int)stats.traced, (int)stats.reflected,
+           stats.worst_reversal);
     free(bar), free(dot);
     kit_rays_free(&rays);
 }
 
 /* A C that knows x, v and the path of exits and taps. */
-static double objective(const struct imp_bend_exit *e, size_t i, struct imp_bend_cotangent *bar)
+static double objective(const struct imp_bend_exit *e, size_t i,
+                        struct imp_bend_cotangent *bar)
 {
     double c = 0.3 * e->path * (1 + 0.1 * e->path);
     struct imp_bend_cotangent b = {.path = 0.3 * (1 + 0.2 * e->path)};
     for (int k = 0; k < 3; k++) {
-        const double dx = e->x[k] - 0.1 * kit_pm(120 + k, i), dv = e->v[k] - kit_pm(123 + k, i);
+        const double dx = e->x[k] - 0.1 * kit_pm(120 + k, i),
+                     dv = e->v[k] - kit_pm(123 + k, i);
         c += 0.5 * dx * dx + 0.25 * dv * dv + 0.2 * e->x[k] * e->v[(k + 1) % 3];
         b.x[k] += dx + 0.2 * e->v[(k + 1) % 3];
         b.v[k] += 0.5 * dv;
@@ -178,8 +188,9 @@ static double objective(const struct imp_bend_exit *e, size_t i, struct imp_bend
     return c;
 }
 
-static double total(const imp_field *f, const struct setup *s, const struct imp_bend_options *o,
-                    const struct imp_bend_rays *rays, const uint8_t *use, uint32_t *steps)
+static double total(const imp_field *f, const struct setup *s,
+                    const struct imp_bend_options *o, const struct imp_bend_rays *rays,
+                    const uint8_t *use, uint32_t *steps)
 {
     struct imp_bend_exit e[N], te[N * TAPS];
     double c = 0;
@@ -199,8 +210,8 @@ static double total(const imp_field *f, const struct setup *s, const struct imp_
 static void move(imp_field *f, const double *theta, const double *dot, int what, double e,
                  const struct imp_bend_rays *rays)
 {
-    double (*x)[3] = (double (*)[3])(uintptr_t)rays->x;
-    double (*d)[3] = (double (*)[3])(uintptr_t)rays->d;
+    double(*x)[3] = (double(*)[3])(uintptr_t)rays->x;
+    double(*d)[3] = (double(*)[3])(uintptr_t)rays->d;
     const size_t n = imp_field_n_theta(f);
     double *moved = calloc(n, sizeof *moved);
     for (size_t i = 0; i < n; i++) moved[i] = theta[i] + (what == 0 ? e * dot[i] : 0);
@@ -214,7 +225,8 @@ static void move(imp_field *f, const double *theta, const double *dot, int what,
 }
 
 /* Directional derivatives: a bump of the field, the origins, the directions. */
-static void difference_test(imp_field *f, const struct setup *s, enum imp_bend_scheme scheme)
+static void difference_test(imp_field *f, const struct setup *s,
+                            enum imp_bend_scheme scheme)
 {
     struct imp_bend_options o;
     options_of(s, scheme, &o);
@@ -231,7 +243,8 @@ static void difference_test(imp_field *f, const struct setup *s, enum imp_bend_s
     KIT_CHECK(imp_bend_trace(f, &o, &rays, exits, tap_exits, NULL));
     for (int i = 0; i < N; i++) use[i] = !(exits[i].flags & IMP_BEND_DROPPED);
     total(f, s, &o, &rays, use, at0);
-    for (int what = 0; what < 3; what++) /* leave out rays whose number of steps changes */
+    for (int what = 0; what < 3;
+         what++) /* leave out rays whose number of steps changes */
         for (int side = -2; side <= 2; side += 4) {
             move(f, theta, dot, what, side * eps, &rays);
             total(f, s, &o, &rays, use, at1);
@@ -330,10 +343,11 @@ static void surface_test(const imp_field *f, struct setup s)
             memcpy(s.s[0].normal, n3, sizeof n3);
             *where[k] = v;
         }
-        worst = fmax(worst, fabs((c[0] - c[1]) / (2 * eps) - sb[0][k]) / (1 + fabs(sb[0][k])));
+        worst = fmax(worst,
+                     fabs((c[0] - c[1]) / (2 * eps) - sb[0][k]) / (1 + fabs(sb[0][k])));
     }
-    tap_ok(worst < 1e-6, "numbers of the surface, %s # worst %.1e, d/d offset %.4f", s.name,
-           worst, sb[0][3]);
+    tap_ok(worst < 1e-6, "numbers of the surface, %s # worst %.1e, d/d offset %.4f",
+           s.name, worst, sb[0][3]);
     kit_rays_free(&rays);
 }
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Every target, at exits, beyond a plane and at taps, with holds and smoothness: gradient of
- * the objective against central differences. Energy of pictures. Fits that find what made
- * their data. */
+ * Every target, at exits, beyond a plane and at taps, with holds and smoothness: gradient
+ * of the objective against central differences. Energy of pictures. Fits that find what
+ * made their data. */
 #include "bend_kit.h"
 #include "curved/bend.h"
 
@@ -35,9 +35,11 @@ static imp_bend *bend_make(bool grid)
 
 static void target_test(enum imp_bend_target_type type, int where)
 {
-    static const char *const names[] = {"focus", "spot", "points", "direction", "directions",
-        "deflection", "path", "wavefront", "image", "far field", "shape"};
-    static const char *const places[] = {"exit", "plane beyond", "tap", "plane from a tap"};
+    static const char *const names[] = {"focus",      "spot",       "points", "direction",
+                                        "directions", "deflection", "path",   "wavefront",
+                                        "image",      "far field",  "shape"};
+    static const char *const places[] = {"exit", "plane beyond", "tap",
+                                         "plane from a tap"};
     imp_bend *b = bend_make(true);
     struct imp_bend_target t = IMP_BEND_TARGET_INIT;
     static double data[3 * N];
@@ -62,8 +64,8 @@ static void target_test(enum imp_bend_target_type type, int where)
     imp_field *f = imp_bend_field(b);
     const size_t n = imp_field_n_theta(f);
     double *g = calloc(n, sizeof *g), *theta = calloc(n, sizeof *theta),
-           *dot = calloc(n, sizeof *dot), *moved = calloc(n, sizeof *moved), value, want = 0,
-           scale = 0, c[4];
+           *dot = calloc(n, sizeof *dot), *moved = calloc(n, sizeof *moved), value,
+           want = 0, scale = 0, c[4];
     imp_field_get_theta(f, theta);
     KIT_CHECK(imp_bend_objective(b, &value, g, NULL, NULL));
     bool held = g[400] == 0 && g[0] == 0 && g[n - 1] == 0;
@@ -79,8 +81,9 @@ static void target_test(enum imp_bend_target_type type, int where)
         KIT_CHECK(imp_bend_objective(b, &c[q], NULL, NULL, NULL));
     }
     const double fd = (8 * (c[0] - c[1]) - (c[2] - c[3])) / (12 * eps);
-    tap_ok(fabs(fd - want) < 1e-6 * sqrt(scale) && held, "%s, %s # value %.4g, error %.1e",
-           names[type], places[where], value, fabs(fd - want) / sqrt(scale));
+    tap_ok(fabs(fd - want) < 1e-6 * sqrt(scale) && held,
+           "%s, %s # value %.4g, error %.1e", names[type], places[where], value,
+           fabs(fd - want) / sqrt(scale));
     free(g), free(theta), free(dot), free(moved);
     imp_bend_destroy(b);
 }
@@ -104,7 +107,8 @@ static void image_energy(void)
 /* Numbers of a plume from the directions it makes; a grid from optical paths. */
 static void fits(void)
 {
-    const double truth[6] = {1, 0.03, 0.35, 0.1, -0.05, 0.02}, guess[6] = {1, 0.02, 0.45, 0, 0, 0};
+    const double truth[6] = {1, 0.03, 0.35, 0.1, -0.05, 0.02},
+                 guess[6] = {1, 0.02, 0.45, 0, 0, 0};
     struct imp_bend_surface s = IMP_BEND_SURFACE_INIT;
     struct imp_bend_options o = IMP_BEND_OPTIONS_INIT;
     s.offset = 1, o.surfaces = &s, o.n_surfaces = 1, o.step = 0.05;
@@ -139,8 +143,8 @@ static void fits(void)
         for (int k = 0; k < 6; k++) worst = fmax(worst, fabs(theta[k] - truth[k]));
         tap_ok(worst < 1e-5 && res.value < 1e-6 * res.start,
                "plume found again from its %s # worst %.1e, %.2e -> %.2e in %d: %s",
-               method ? "paths" : "directions", worst, res.start, res.value, res.iterations,
-               res.reason);
+               method ? "paths" : "directions", worst, res.start, res.value,
+               res.iterations, res.reason);
         imp_bend_destroy(b);
     }
     /* Levels: a grid that makes the paths, 4 -> 8 cells; resume gives the same bits. */
@@ -181,14 +185,16 @@ static void fits(void)
         if (run == 0)
             tap_ok(imp_field_n_theta(imp_bend_field(b)) == 1331 && res.levels == 2 &&
                        res.value < 1e-2 * res.start,
-                   "two levels # %.2e -> %.2e in %d", res.start, res.value, res.iterations);
+                   "two levels # %.2e -> %.2e in %d", res.start, res.value,
+                   res.iterations);
         double lowest = INFINITY;
         for (int i = 0; i < 1331; i++) lowest = fmin(lowest, theta[run][i]);
         if (run == 0) tap_ok(lowest >= 1, "index stays at or above 1 # %.6f", lowest);
         remove(fo.checkpoint);
         imp_bend_destroy(b);
     }
-    tap_ok(!memcmp(theta[0], theta[1], sizeof theta[0]), "continued from a checkpoint: same bits");
+    tap_ok(!memcmp(theta[0], theta[1], sizeof theta[0]),
+           "continued from a checkpoint: same bits");
     kit_rays_free(&r);
 }
 

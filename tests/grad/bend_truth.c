@@ -1,29 +1,40 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The adjoint of bent rays against three independent truths: dual numbers through a tracer
- * written for this test, central differences over seven decades of step (cubic and trilinear:
- * curved-rays 3.3), and a plain adjoint written here in which errors can be planted, each of
- * which must be caught. */
+ * The adjoint of bent rays against three independent truths: dual numbers through a
+ * tracer written for this test, central differences over seven decades of step (cubic and
+ * trilinear: curved-rays 3.3), and a plain adjoint written here in which errors can be
+ * planted, each of which must be caught. */
 #include "bend_kit.h"
 
-/* ---- Dual numbers, a spline by Cox-de Boor, leapfrog, exit ---------------------------- */
+/* ---- Dual numbers, a spline by Cox-de Boor, leapfrog, exit --------------------- */
 
-typedef struct { double v, d; } dual;
+typedef struct {
+    double v, d;
+} dual;
 static dual D(double v) { return (dual){v, 0}; }
 static dual add(dual a, dual b) { return (dual){a.v + b.v, a.d + b.d}; }
 static dual sub(dual a, dual b) { return (dual){a.v - b.v, a.d - b.d}; }
 static dual mul(dual a, dual b) { return (dual){a.v * b.v, a.d * b.v + a.v * b.d}; }
-static dual quo(dual a, dual b) { return (dual){a.v / b.v, (a.d - a.v / b.v * b.d) / b.v}; }
+static dual quo(dual a, dual b)
+{
+    return (dual){a.v / b.v, (a.d - a.v / b.v * b.d) / b.v};
+}
 
-/* Cubic B-spline with knots 0..4 at s, by the recursion; order: 4 cubic, 3 quadratic ... */
+/* Cubic B-spline with knots 0..4 at s, by the recursion; order: 4 cubic, 3 quadratic ...
+ */
 static dual bspline(int order, dual s)
 {
     if (order == 1) return D(s.v >= 0 && s.v < 1 ? 1 : 0);
-    return add(mul(quo(s, D(order - 1)), bspline(order - 1, s)),
-               mul(quo(sub(D(order), s), D(order - 1)), bspline(order - 1, sub(s, D(1)))));
+    return add(
+        mul(quo(s, D(order - 1)), bspline(order - 1, s)),
+        mul(quo(sub(D(order), s), D(order - 1)), bspline(order - 1, sub(s, D(1)))));
 }
 
-struct dfield { struct imp_field_grid g; int m[3]; const double *theta, *dot; };
+struct dfield {
+    struct imp_field_grid g;
+    int m[3];
+    const double *theta, *dot;
+};
 
 /* Value and gradient as duals in x and theta together. */
 static void dfield_eval(const struct dfield *f, const dual x[3], dual *eta, dual g[3])
@@ -34,7 +45,8 @@ static void dfield_eval(const struct dfield *f, const dual x[3], dual *eta, dual
         const double h = (f->g.hi[k] - f->g.lo[k]) / f->g.cells[k];
         const dual u = quo(sub(x[k], D(f->g.lo[k])), D(h));
         first[k] = (int)floor(u.v);
-        for (int a = 0; a < 4; a++) { /* node first + a - 1, support (node - 2, node + 2) */
+        for (int a = 0; a < 4;
+             a++) { /* node first + a - 1, support (node - 2, node + 2) */
             const dual s = sub(u, D(first[k] + a - 1 - 2));
             w[k][a] = bspline(4, s);
             wd[k][a] = quo(sub(bspline(3, s), bspline(3, sub(s, D(1)))), D(h));
@@ -44,9 +56,10 @@ static void dfield_eval(const struct dfield *f, const dual x[3], dual *eta, dual
     for (int c = 0; c < 4; c++)
         for (int b = 0; b < 4; b++)
             for (int a = 0; a < 4; a++) {
-                const size_t i = (size_t)(first[0] + a) +
-                                 (size_t)f->m[0] * ((size_t)(first[1] + b) +
-                                                    (size_t)f->m[1] * (size_t)(first[2] + c));
+                const size_t i =
+                    (size_t)(first[0] + a) +
+                    (size_t)f->m[0] * ((size_t)(first[1] + b) +
+                                       (size_t)f->m[1] * (size_t)(first[2] + c));
                 const dual t = {f->theta[i], f->dot[i]};
                 *eta = add(*eta, mul(t, mul(w[0][a], mul(w[1][b], w[2][c]))));
                 g[0] = add(g[0], mul(t, mul(wd[0][a], mul(w[1][b], w[2][c]))));
@@ -104,7 +117,8 @@ static dual dray(const struct dfield *f, const double x0[3], const double d0[3],
         const double mid = (a + b) / 2;
         dual y[3] = {x[0], x[1], x[2]}, w[3] = {v[0], v[1], v[2]};
         dstep(f, D(mid), y, w);
-        if (dplane(n, p, y).v > 0) b = mid; else a = mid;
+        if (dplane(n, p, y).v > 0) b = mid;
+        else a = mid;
     }
     dual y[3] = {x[0], x[1], x[2]}, w[3] = {v[0], v[1], v[2]};
     dstep(f, D(a), y, w);
@@ -127,7 +141,7 @@ static dual dray(const struct dfield *f, const double x0[3], const double d0[3],
     return dobjective(x, v, ray);
 }
 
-/* ---- The production adjoint on the same rays ------------------------------------------ */
+/* ---- The production adjoint on the same rays ----------------------------------- */
 
 #define N 24
 
@@ -147,8 +161,10 @@ static void bars_make(struct problem *p)
         for (int k = 0; k < 3; k++) {
             const struct imp_bend_exit *e = &p->exits[i];
             p->bars[i].path = 0;
-            p->bars[i].x[k] = e->x[k] - 0.3 * kit_pm(200 + k, i) + 0.2 * e->v[(k + 1) % 3];
-            p->bars[i].v[k] = 0.5 * (e->v[k] - kit_pm(203 + k, i)) + 0.2 * e->x[(k + 2) % 3];
+            p->bars[i].x[k] =
+                e->x[k] - 0.3 * kit_pm(200 + k, i) + 0.2 * e->v[(k + 1) % 3];
+            p->bars[i].v[k] =
+                0.5 * (e->v[k] - kit_pm(203 + k, i)) + 0.2 * e->x[(k + 2) % 3];
         }
 }
 
@@ -159,7 +175,8 @@ static void problem_make(struct problem *p)
     KIT_CHECK(imp_field_get_grid(p->f, &g));
     const size_t n = imp_field_n_theta(p->f);
     double *t = calloc(n, sizeof *t);
-    for (size_t i = 0; i < n; i++) t[i] = 1.4 + 0.12 * kit_pm(210, i / 3) * kit_u(211, i / 50);
+    for (size_t i = 0; i < n; i++)
+        t[i] = 1.4 + 0.12 * kit_pm(210, i / 3) * kit_u(211, i / 50);
     KIT_CHECK(imp_field_set_theta(p->f, t));
     free(t);
     p->s = (struct imp_bend_surface)IMP_BEND_SURFACE_INIT;
@@ -174,12 +191,14 @@ static void problem_make(struct problem *p)
 static void against_duals(struct problem *p)
 {
     const size_t n = imp_field_n_theta(p->f);
-    double *bar = calloc(n, sizeof *bar), *dot = calloc(n, sizeof *dot), *theta = calloc(n, sizeof *theta);
+    double *bar = calloc(n, sizeof *bar), *dot = calloc(n, sizeof *dot),
+           *theta = calloc(n, sizeof *theta);
     imp_field_get_theta(p->f, theta);
     for (size_t i = 0; i < n; i++) dot[i] = kit_pm(220, i);
     struct imp_bend_gradient g = IMP_BEND_GRADIENT_INIT;
     g.theta = bar;
-    KIT_CHECK(imp_bend_adjoint(p->f, &p->o, &p->rays, p->exits, NULL, p->bars, NULL, &g, NULL));
+    KIT_CHECK(
+        imp_bend_adjoint(p->f, &p->o, &p->rays, p->exits, NULL, p->bars, NULL, &g, NULL));
     double got = 0, want = 0, c = 0, c_prod = 0;
     for (size_t i = 0; i < n; i++) got += bar[i] * dot[i];
     struct dfield f = {.theta = theta, .dot = dot};
@@ -190,7 +209,8 @@ static void against_duals(struct problem *p)
     for (size_t i = 0; i < N; i++) {
         const dual d = dray(&f, p->rays.x[i], p->rays.d[i], 0.033, nn, 0.6 / l, i);
         dual x[3], v[3];
-        for (int k = 0; k < 3; k++) x[k] = D(p->exits[i].x[k]), v[k] = D(p->exits[i].v[k]);
+        for (int k = 0; k < 3; k++)
+            x[k] = D(p->exits[i].x[k]), v[k] = D(p->exits[i].v[k]);
         c += d.v, want += d.d;
         c_prod += dobjective(x, v, i).v;
     }
@@ -199,12 +219,15 @@ static void against_duals(struct problem *p)
     free(bar), free(dot), free(theta);
 }
 
-/* K = lam.v + mu.F is zero along the ray of the continuous problem (curved-rays 1.2): at the
- * start it is what the discretisation leaves, O(t^2) with leapfrog and O(t) with Euler. */
+/* K = lam.v + mu.F is zero along the ray of the continuous problem (curved-rays 1.2): at
+ * the start it is what the discretisation leaves, O(t^2) with leapfrog and O(t) with
+ * Euler. */
 static void energy_of_adjoint(struct problem *p)
 {
-    static const struct { enum imp_bend_scheme s; double ratio; } rows[] = {
-        {IMP_BEND_EULER, 2}, {IMP_BEND_LEAPFROG, 4}};
+    static const struct {
+        enum imp_bend_scheme s;
+        double ratio;
+    } rows[] = {{IMP_BEND_EULER, 2}, {IMP_BEND_LEAPFROG, 4}};
     for (size_t k = 0; k < imp_count(rows); k++) {
         double rms[2] = {0}, energy[N];
         p->o.scheme = rows[k].s;
@@ -213,8 +236,8 @@ static void energy_of_adjoint(struct problem *p)
             p->o.step = half ? 0.033 / 4 : 0.033 / 2;
             g.energy = energy;
             bars_make(p);
-            KIT_CHECK(imp_bend_adjoint(p->f, &p->o, &p->rays, p->exits, NULL, p->bars, NULL, &g,
-                                       NULL));
+            KIT_CHECK(imp_bend_adjoint(p->f, &p->o, &p->rays, p->exits, NULL, p->bars,
+                                       NULL, &g, NULL));
             for (int i = 0; i < N; i++) rms[half] += energy[i] * energy[i] / N;
             rms[half] = sqrt(rms[half]);
         }
@@ -228,7 +251,7 @@ static void energy_of_adjoint(struct problem *p)
     bars_make(p);
 }
 
-/* ---- Planted errors ------------------------------------------------------------------- */
+/* ---- Planted errors ------------------------------------------------------------ */
 
 enum plant { NONE, RHO_WITHOUT_V, NO_RHO, NO_START, NO_H, WRONG_SIGN, CONTINUOUS_RHO };
 
@@ -248,9 +271,11 @@ static void plain_adjoint(struct problem *p, enum plant plant, double *bar)
         double a[3], rx[3], rv[3], up = 0, down = 0, gx = 0;
         for (int k = 0; k < 3; k++) a[k] = x[k] - e->tau / 2 * v[k];
         imp_field_eval(p->f, a, &eta, g, H);
-        const double M[3][3] = {{H[0], H[3], H[4]}, {H[3], H[1], H[5]}, {H[4], H[5], H[2]}};
+        const double M[3][3] = {
+            {H[0], H[3], H[4]}, {H[3], H[1], H[5]}, {H[4], H[5], H[2]}};
         double v0[3];
-        for (int k = 0; k < 3; k++) v0[k] = v[k] - e->tau * eta * g[k], gx += g[k] * v0[k] / 2;
+        for (int k = 0; k < 3; k++)
+            v0[k] = v[k] - e->tau * eta * g[k], gx += g[k] * v0[k] / 2;
         for (int k = 0; k < 3; k++) {
             double hx = 0;
             for (int m = 0; m < 3; m++) hx += M[k][m] * v0[m] / 2;
@@ -264,12 +289,14 @@ static void plain_adjoint(struct problem *p, enum plant plant, double *bar)
             down += n[k] * rx[k];
         }
         const double rho = plant == NO_RHO ? 0 : up / down;
-        for (int k = 0; k < 3; k++) lam[k] = p->bars[i].x[k] - rho * n[k], mu[k] = p->bars[i].v[k];
+        for (int k = 0; k < 3; k++)
+            lam[k] = p->bars[i].x[k] - rho * n[k], mu[k] = p->bars[i].v[k];
         for (int s = -1; s < (int)e->steps; s++) {
             const double dt = s < 0 ? e->tau : t;
             for (int k = 0; k < 3; k++) x[k] -= dt / 2 * v[k], mu[k] += dt / 2 * lam[k];
             imp_field_eval(p->f, x, &eta, g, H);
-            const double A[3][3] = {{H[0], H[3], H[4]}, {H[3], H[1], H[5]}, {H[4], H[5], H[2]}};
+            const double A[3][3] = {
+                {H[0], H[3], H[4]}, {H[3], H[1], H[5]}, {H[4], H[5], H[2]}};
             double mg = 0, b[3];
             for (int k = 0; k < 3; k++) {
                 v[k] -= dt * eta * g[k];
@@ -289,25 +316,35 @@ static void plain_adjoint(struct problem *p, enum plant plant, double *bar)
         if (plant == NO_START) continue;
         imp_field_eval(p->f, x, &eta, g, NULL);
         const double zero[3] = {0};
-        imp_field_splat(p->f, x, (mu[0] * v[0] + mu[1] * v[1] + mu[2] * v[2]) / eta, zero, bar);
+        imp_field_splat(p->f, x, (mu[0] * v[0] + mu[1] * v[1] + mu[2] * v[2]) / eta, zero,
+                        bar);
     }
 }
 
 static void planted(struct problem *p)
 {
-    static const struct { enum plant plant; const char *name; double at_least; } rows[] = {
-        {RHO_WITHOUT_V, "rho without C_v.F", 1e-3}, {NO_RHO, "no rho", 1e-2},
-        {NO_START, "no start term", 1e-3}, {NO_H, "no 1/h in the splat", 1e-2},
-        {WRONG_SIGN, "wrong sign", 1e-2}, {CONTINUOUS_RHO, "rho of the continuous ray", 1e-8}};
+    static const struct {
+        enum plant plant;
+        const char *name;
+        double at_least;
+    } rows[] = {{RHO_WITHOUT_V, "rho without C_v.F", 1e-3},
+                {NO_RHO, "no rho", 1e-2},
+                {NO_START, "no start term", 1e-3},
+                {NO_H, "no 1/h in the splat", 1e-2},
+                {WRONG_SIGN, "wrong sign", 1e-2},
+                {CONTINUOUS_RHO, "rho of the continuous ray", 1e-8}};
     const size_t n = imp_field_n_theta(p->f);
     double *bar = calloc(n, sizeof *bar), *plain = calloc(n, sizeof *plain);
     struct imp_bend_gradient g = IMP_BEND_GRADIENT_INIT;
     g.theta = bar;
-    KIT_CHECK(imp_bend_adjoint(p->f, &p->o, &p->rays, p->exits, NULL, p->bars, NULL, &g, NULL));
+    KIT_CHECK(
+        imp_bend_adjoint(p->f, &p->o, &p->rays, p->exits, NULL, p->bars, NULL, &g, NULL));
     plain_adjoint(p, NONE, plain);
     double diff = 0, norm = 0;
-    for (size_t i = 0; i < n; i++) diff += imp__sqr(bar[i] - plain[i]), norm += imp__sqr(bar[i]);
-    tap_ok(sqrt(diff / norm) < 1e-12, "adjoint equals the plain one # %.1e", sqrt(diff / norm));
+    for (size_t i = 0; i < n; i++)
+        diff += imp__sqr(bar[i] - plain[i]), norm += imp__sqr(bar[i]);
+    tap_ok(sqrt(diff / norm) < 1e-12, "adjoint equals the plain one # %.1e",
+           sqrt(diff / norm));
     for (size_t k = 0; k < imp_count(rows); k++) {
         memset(plain, 0, n * sizeof *plain);
         plain_adjoint(p, rows[k].plant, plain);
@@ -319,7 +356,7 @@ static void planted(struct problem *p)
     free(bar), free(plain);
 }
 
-/* ---- Seven decades of step: curved-rays 3.3 -------------------------------------------- */
+/* ---- Seven decades of step: curved-rays 3.3 ------------------------------------ */
 
 #define RAYS 1500
 
@@ -354,17 +391,19 @@ static void sweep(enum imp_field_interp interp)
     for (int k = 0; k < m; k++)
         for (int j = 0; j < m; j++)
             for (int i = 0; i < m; i++, at++) {
-                const double h = 2.0 / 32, x = -1 + h * (i - spline), y = -1 + h * (j - spline),
-                             z = -1 + h * (k - spline), r2 = x * x + y * y + z * z;
+                const double h = 2.0 / 32, x = -1 + h * (i - spline),
+                             y = -1 + h * (j - spline), z = -1 + h * (k - spline),
+                             r2 = x * x + y * y + z * z;
                 theta[at] = 1 + 0.5 * (r2 < 1 ? sqrt(2 - r2) - 1 : 0);
-                bump[at] = exp(-(imp__sqr(x - 0.2) + imp__sqr(y + 0.1) + imp__sqr(z)) / 0.18);
+                bump[at] =
+                    exp(-(imp__sqr(x - 0.2) + imp__sqr(y + 0.1) + imp__sqr(z)) / 0.18);
             }
     struct imp_bend_surface s = IMP_BEND_SURFACE_INIT;
     s.offset = 1;
     struct imp_bend_options o = IMP_BEND_OPTIONS_INIT;
     o.scheme = IMP_BEND_EULER, o.surfaces = &s, o.n_surfaces = 1, o.step = 1.0 / 32;
     struct imp_bend_rays r = kit_beam(RAYS, -0.98, 0.8, 0);
-    double (*x)[3] = (double (*)[3])(uintptr_t)r.x;
+    double(*x)[3] = (double(*)[3])(uintptr_t)r.x;
     for (size_t i = 0; i < RAYS; i++) x[i][2] += 0.01 * kit_pm(230, i); /* jitter */
     static struct imp_bend_exit e[RAYS];
     static struct imp_bend_cotangent bars[RAYS];
@@ -378,7 +417,8 @@ static void sweep(enum imp_field_interp interp)
     for (int k = 2; k <= 8; k++) {
         const double eps = pow(10, -k);
         double c[4];
-        for (int q = 0; q < 4; q++) { /* fourth order: at 1e-2 the objective itself is curved */
+        for (int q = 0; q < 4;
+             q++) { /* fourth order: at 1e-2 the objective itself is curved */
             for (size_t i = 0; i < n; i++)
                 moved[i] = theta[i] + (q % 2 ? -eps : eps) * (1 + q / 2) * bump[i];
             KIT_CHECK(imp_field_set_theta(f, moved));
@@ -389,13 +429,16 @@ static void sweep(enum imp_field_interp interp)
         if (k == 2) first = err;
         last = err;
         worst = fmax(worst, err);
-        printf("# %s: step 1e-%d: difference %.7g, adjoint %.7g\n", imp_field_kind(f), k, fd, want);
+        printf("# %s: step 1e-%d: difference %.7g, adjoint %.7g\n", imp_field_kind(f), k,
+               fd, want);
     }
     if (spline)
-        tap_ok(worst < 1e-4, "cubic: adjoint is the difference from 1e-2 to 1e-8 # worst %.1e", worst);
+        tap_ok(worst < 1e-4,
+               "cubic: adjoint is the difference from 1e-2 to 1e-8 # worst %.1e", worst);
     else
         tap_ok(last < 1e-4 && first > 1e-2,
-               "trilinear: adjoint is the difference at 1e-8 only # %.1e; at 1e-2 %.1e", last, first);
+               "trilinear: adjoint is the difference at 1e-8 only # %.1e; at 1e-2 %.1e",
+               last, first);
     free(theta), free(bump), free(moved), free(bar);
     kit_rays_free(&r);
     imp_field_destroy(f);

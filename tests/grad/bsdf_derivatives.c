@@ -1,36 +1,36 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * eval_d and emit_d of every material against central differences of eval and emit, at
- * random inputs and at inputs that are exactly 0 (one-sided there); a density wherever there
- * is a derivative; sample_d against differences at fixed random numbers; and the checker
- * itself against planted mistakes. */
+ * random inputs and at inputs that are exactly 0 (one-sided there); a density wherever
+ * there is a derivative; sample_d against differences at fixed random numbers; and the
+ * checker itself against planted mistakes. */
 #include "imp_kinds.h"
 #include "imp_tap.h"
 
 enum { TRIALS = 60 };
 
-typedef void value_fn(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
-                      imp_spec *f);
+typedef void value_fn(const struct imp_bsdf *b, const imp_spec *in,
+                      const struct imp_dirs *d, imp_spec *f);
 
-static void emit_value(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
-                       imp_spec *f)
+static void emit_value(const struct imp_bsdf *b, const imp_spec *in,
+                       const struct imp_dirs *d, imp_spec *f)
 {
     b->ops->emit(b, in, &d->wo, f);
 }
-static void eval_value(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
-                       imp_spec *f)
+static void eval_value(const struct imp_bsdf *b, const imp_spec *in,
+                       const struct imp_dirs *d, imp_spec *f)
 {
     b->ops->eval(b, in, d, f);
 }
 
-/* Fourth-order differences of lane c, central where there is room and one-sided at a bound,
- * with steps `scale` times the usual. The base value is taken off first, so that what does
- * not move gives exactly 0. */
+/* Fourth-order differences of lane c, central where there is room and one-sided at a
+ * bound, with steps `scale` times the usual. The base value is taken off first, so that
+ * what does not move gives exactly 0. */
 static double difference(const struct imp_bsdf *b, imp_spec *in, const struct imp_dirs *d,
                          int j, int c, value_fn *value, double scale, bool *lanes_mixed)
 {
-    static const double central[4][2] = {{-2, 1.0 / 12}, {-1, -8.0 / 12}, {1, 8.0 / 12},
-                                         {2, -1.0 / 12}};
+    static const double central[4][2] = {
+        {-2, 1.0 / 12}, {-1, -8.0 / 12}, {1, 8.0 / 12}, {2, -1.0 / 12}};
     static const double forward[4][2] = {{1, 4}, {2, -3}, {3, 4.0 / 3}, {4, -0.25}};
     const struct imp_input_desc *desc = kind_input(b, j);
     const bool scalar = desc->flags & IMP_INPUT_SCALAR;
@@ -57,17 +57,19 @@ static double difference(const struct imp_bsdf *b, imp_spec *in, const struct im
 }
 
 struct tally {
-    double value, emission;   /* largest relative errors */
+    double value, emission; /* largest relative errors */
     long points, nonzero, no_density, numbers, kinks;
     bool lanes_mixed;
 };
 
 /* Largest error of the derivatives at one point, relative to the derivative and to what
- * rounding of f allows a difference to see. Two steps that disagree mean that the value is
- * not smooth there (the fit of Beckmann's masking has a step): such points are counted, not
- * compared. A wrong derivative does not hide there: it has two steps that agree. */
-static double point_error(const struct imp_bsdf *b, imp_spec *in, const struct imp_dirs *d,
-                          value_fn *value, const imp_spec *df, struct tally *t)
+ * rounding of f allows a difference to see. Two steps that disagree mean that the value
+ * is not smooth there (the fit of Beckmann's masking has a step): such points are
+ * counted, not compared. A wrong derivative does not hide there: it has two steps that
+ * agree. */
+static double point_error(const struct imp_bsdf *b, imp_spec *in,
+                          const struct imp_dirs *d, value_fn *value, const imp_spec *df,
+                          struct tally *t)
 {
     imp_spec f;
     double worst = 0;
@@ -78,13 +80,15 @@ static double point_error(const struct imp_bsdf *b, imp_spec *in, const struct i
             continue;
         }
         for (int c = 0; c < 3; c++) {
-            const double scale = fabs(df[j][c]) + 1e-5 * fabs(f[c]) / fmax(fabs(in[j][c]), 0.02);
+            const double scale =
+                fabs(df[j][c]) + 1e-5 * fabs(f[c]) / fmax(fabs(in[j][c]), 0.02);
             const double fd = difference(b, in, d, j, c, value, 1, &t->lanes_mixed);
             const double e = fabs(fd - df[j][c]);
             t->numbers++;
             if (e <= 1e-280) continue;
             if (e > 1e-6 * scale) {
-                const double finer = difference(b, in, d, j, c, value, 0.25, &t->lanes_mixed);
+                const double finer =
+                    difference(b, in, d, j, c, value, 0.25, &t->lanes_mixed);
                 if (fabs(fd - finer) > 0.2 * e) {
                     t->kinks++;
                     continue;
@@ -107,10 +111,8 @@ static struct tally check_case(const struct imp_bsdf *b, enum kind_set set)
         const struct imp_key key = imp__key(9, (uint64_t)i, 0);
         const double u[3] = {imp__u01(key, 0), imp__u01(key, 1), imp__u01(key, 2)};
         /* Directions that are drawn (every delta lobe is met), and any. */
-        if (i % 3 == 0)
-            d.wi = kind_direction(i / 3 + (i % 2), 6);
-        else if (!b->ops->sample(b, in, u, &d, &s))
-            continue;
+        if (i % 3 == 0) d.wi = kind_direction(i / 3 + (i % 2), 6);
+        else if (!b->ops->sample(b, in, u, &d, &s)) continue;
         b->ops->eval_d(b, in, &d, df);
         t.value = fmax(t.value, point_error(b, in, &d, eval_value, df, &t));
         t.points++;
@@ -141,10 +143,11 @@ static void visit(const struct kind_case *c, void *payload)
                "%s: a density wherever a derivative is, %s # %ld of %ld points", c->label,
                names[set], t.nonzero, t.points);
     }
-    tap_ok((b->ops->emit != NULL) == (b->ops->emit_d != NULL), "%s: emit and emit_d", c->label);
+    tap_ok((b->ops->emit != NULL) == (b->ops->emit_d != NULL), "%s: emit and emit_d",
+           c->label);
 }
 
-/* ---- sample_d ------------------------------------------------------------------------ */
+/* ---- sample_d ------------------------------------------------------------------ */
 
 static bool weight_at(const struct imp_bsdf *b, imp_spec *in, int j, double x,
                       const double u[3], imp_v3 wo, imp_spec *w, imp_v3 *wi)
@@ -189,30 +192,35 @@ static void visit_attached(const struct kind_case *c, void *payload)
             const imp_spec fw = (wp - wm) / (2 * h) - dw;
             const imp_v3 fi = (ip - im) / (2 * h) - dwi;
             for (int k = 0; k < 3; k++) {
-                worst = fmax(worst, fabs(fw[k]) / (fabs(dw[k]) + 1e-2 * (wp[k] + 1e-3) / x));
+                worst =
+                    fmax(worst, fabs(fw[k]) / (fabs(dw[k]) + 1e-2 * (wp[k] + 1e-3) / x));
                 worst = fmax(worst, fabs(fi[k]) / (imp__length(dwi) + 1e-2 / x));
             }
         }
     }
     *offered += n > 0;
     if (n)
-        tap_ok(worst < 1e-6, "%s: attached derivative, %d draws # %.1e", c->label, n, worst);
+        tap_ok(worst < 1e-6, "%s: attached derivative, %d draws # %.1e", c->label, n,
+               worst);
 }
 
-/* ---- The checker, checked ------------------------------------------------------------- */
+/* ---- The checker, checked ------------------------------------------------------ */
 
 static const struct imp_bsdf_ops *honest;
 static int mistake;
-static void planted(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
-                    imp_spec *df)
+static void planted(const struct imp_bsdf *b, const imp_spec *in,
+                    const struct imp_dirs *d, imp_spec *df)
 {
     honest->eval_d(b, in, d, df);
     const imp_spec first = df[0];
     switch (mistake) {
-    case 0: df[0] = -df[0]; break;                               /* sign */
-    case 1: df[0] = df[0] * 2.0; break;                          /* factor */
-    case 2: df[0] = df[b->n_in - 1]; df[b->n_in - 1] = first; break; /* index */
-    case 3: df[b->n_in - 1] = df[b->n_in - 1] * (1 + 1e-5); break;   /* small */
+    case 0: df[0] = -df[0]; break;      /* sign */
+    case 1: df[0] = df[0] * 2.0; break; /* factor */
+    case 2:
+        df[0] = df[b->n_in - 1];
+        df[b->n_in - 1] = first;
+        break;                                                          /* index */
+    case 3: df[b->n_in - 1] = df[b->n_in - 1] * (1 + 1e-5); break;      /* small */
     case 4: df[0] = (imp_spec){first[1], first[0], first[2], 0}; break; /* lanes */
     }
 }
@@ -231,7 +239,8 @@ static void visit_planted(const struct kind_case *c, void *payload)
     ops.eval_d = planted;
     b.ops = &ops;
     for (mistake = 0; mistake < 5; mistake++) {
-        if (m2 && (mistake < 2 || mistake == 4)) continue; /* input 0 is emission: eval_d 0 */
+        if (m2 && (mistake < 2 || mistake == 4))
+            continue; /* input 0 is emission: eval_d 0 */
         const struct tally t = check_case(&b, KIND_RANDOM);
         tap_ok(t.value > 1e-6, "%s: a planted mistake (%s) is caught # %.1e", c->kind,
                names[mistake], t.value);

@@ -2,11 +2,11 @@
  *
  * imp_check passes what is right, on scenes with every kind of row, and catches a planted
  * derivative that is 0.1 % off. */
-#include <math.h>
-#include "scene/scene.h"
 #include "imp_scene.h"
-#include "inverse_scenes.h"
 #include "imp_tap.h"
+#include "inverse_scenes.h"
+#include "scene/scene.h"
+#include <math.h>
 
 static imp_context *ctx;
 
@@ -31,8 +31,9 @@ static struct counts check(imp_problem *p, int paths, int spp, uint64_t seed)
         n.rows++;
         n.failed += !r->ok;
         if (!r->ok)
-            printf("# %s %s step %g: %.9g against %.9g, error %.3g, limit %g\n", r->method,
-                   r->param, r->step, r->value, r->reference, r->error, r->limit);
+            printf("# %s %s step %g: %.9g against %.9g, error %.3g, limit %g\n",
+                   r->method, r->param, r->step, r->value, r->reference, r->error,
+                   r->limit);
         if (!strcmp(r->method, "frozen")) {
             n.frozen++;
             if (r->limit > 0) n.worst_frozen = fmax(n.worst_frozen, r->error);
@@ -48,8 +49,8 @@ static struct counts check(imp_problem *p, int paths, int spp, uint64_t seed)
     return n;
 }
 
-static void passes(imp_scene *s, const char *what, int paths, int spp, int frozen, int euler,
-                   int fresh)
+static void passes(imp_scene *s, const char *what, int paths, int spp, int frozen,
+                   int euler, int fresh)
 {
     imp_problem *p = NULL;
     test_must(ctx, imp_problem_create(s, &p));
@@ -58,19 +59,22 @@ static void passes(imp_scene *s, const char *what, int paths, int spp, int froze
     imp_problem_get_x(p, before);
     const struct counts n = check(p, paths, spp, 5);
     imp_problem_get_x(p, after);
-    tap_ok(n.failed == 0 && n.frozen == frozen && n.dot == 1 && n.euler == euler
-           && n.fresh == fresh, "%s # frozen %d (worst %.1e), dot, euler %d (worst %.1e), "
-           "fresh %d (worst z %.2f), failed %d", what, n.frozen, n.worst_frozen, n.euler,
-           n.worst_exact, n.fresh, n.worst_z, n.failed);
-    tap_ok(!memcmp(before, after, imp_problem_n(p) * sizeof *before), "and leaves the scene alone");
+    tap_ok(n.failed == 0 && n.frozen == frozen && n.dot == 1 && n.euler == euler &&
+               n.fresh == fresh,
+           "%s # frozen %d (worst %.1e), dot, euler %d (worst %.1e), "
+           "fresh %d (worst z %.2f), failed %d",
+           what, n.frozen, n.worst_frozen, n.euler, n.worst_exact, n.fresh, n.worst_z,
+           n.failed);
+    tap_ok(!memcmp(before, after, imp_problem_n(p) * sizeof *before),
+           "and leaves the scene alone");
     imp_problem_destroy(p);
 }
 
 /* The kind of a material with eval_d replaced. */
-static void (*right_eval_d)(const struct imp_bsdf *, const imp_spec *, const struct imp_dirs *,
-                            imp_spec *);
-static void wrong_eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
-                         imp_spec *df)
+static void (*right_eval_d)(const struct imp_bsdf *, const imp_spec *,
+                            const struct imp_dirs *, imp_spec *);
+static void wrong_eval_d(const struct imp_bsdf *b, const imp_spec *in,
+                         const struct imp_dirs *d, imp_spec *df)
 {
     right_eval_d(b, in, d, df);
     df[0] *= 1.001;
@@ -112,7 +116,8 @@ int main(void)
     /* seven controls; emission, sphere, walls */
     passes(s, "Stam's box", 1000, 256, 7 * 4, 3, 7);
     imp_scene_destroy(s);
-    s = test_scene(ctx, "stam.xml", IMP_MONO, "res=16 variant=reciprocal sampling=cosine");
+    s = test_scene(ctx, "stam.xml", IMP_MONO,
+                   "res=16 variant=reciprocal sampling=cosine");
     passes(s, "Stam's box, reciprocal, cosine sampling", 300, 64, 7 * 4, 3, 7);
     imp_scene_destroy(s);
     s = test_scene(ctx, "cornell.xml", IMP_RGB, "res=16");
@@ -136,7 +141,8 @@ int main(void)
     tap_ok(imp_check(p, NULL, NULL, &rows, &n_rows) == IMP_E_ARG, "nothing active");
     test_must(ctx, imp_problem_activate(p, "*"));
     run.progress = stop;
-    tap_ok(imp_check(p, NULL, &run, &rows, &n_rows) == IMP_CANCELLED && rows, "cancelled");
+    tap_ok(imp_check(p, NULL, &run, &rows, &n_rows) == IMP_CANCELLED && rows,
+           "cancelled");
     struct imp_check_options o = IMP_CHECK_OPTIONS_INIT;
     o.paths = -1;
     tap_ok(imp_check(p, &o, NULL, &rows, &n_rows) == IMP_E_ARG, "negative count # %s",

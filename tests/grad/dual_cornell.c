@@ -1,24 +1,34 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The gradient picture of the left wall's colour in the Cornell box, against forward-mode
- * automatic differentiation: dual numbers run through this test's own evaluation of the same
- * walks, which shares no code with the library's derivatives, nor with its BSDFs. The walk's
- * record supplies positions, cosines, densities and weights; values are made here. */
+ * automatic differentiation: dual numbers run through this test's own evaluation of the
+ * same walks, which shares no code with the library's derivatives, nor with its BSDFs.
+ * The walk's record supplies positions, cosines, densities and weights; values are made
+ * here. */
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "walk/walk.h"
 
-struct dual { double v, d; }; /* v + d epsilon, epsilon^2 = 0 */
-static struct dual add(struct dual a, struct dual b) { return (struct dual){a.v + b.v, a.d + b.d}; }
+struct dual {
+    double v, d;
+}; /* v + d epsilon, epsilon^2 = 0 */
+static struct dual add(struct dual a, struct dual b)
+{
+    return (struct dual){a.v + b.v, a.d + b.d};
+}
 static struct dual mul(struct dual a, struct dual b)
 {
     return (struct dual){a.v * b.v, a.d * b.v + a.v * b.d};
 }
-static struct dual times(struct dual a, double s) { return (struct dual){a.v * s, a.d * s}; }
+static struct dual times(struct dual a, double s)
+{
+    return (struct dual){a.v * s, a.d * s};
+}
 
-/* Reflectance of a vertex's wall, read from theta by name; the left wall carries epsilon. */
-static struct dual reflectance(imp_context *ctx, imp_scene *scene, const struct imp_vertex *v,
-                               const char *wanted, int c)
+/* Reflectance of a vertex's wall, read from theta by name; the left wall carries epsilon.
+ */
+static struct dual reflectance(imp_context *ctx, imp_scene *scene,
+                               const struct imp_vertex *v, const char *wanted, int c)
 {
     char name[128];
     size_t index;
@@ -44,7 +54,8 @@ static struct dual radiance(imp_context *ctx, imp_scene *scene, const struct imp
         if (v->light >= 0 && v->l_at.cos_light > 0)
             L = add(L, times(mul(throughput, rho),
                              fmax(0, v->l_wi[2]) / M_PI * light_rgb[c] * v->l_weight));
-        throughput = times(mul(throughput, rho), fmax(0, v->dirs.wi[2]) / M_PI * v->inv_ps);
+        throughput =
+            times(mul(throughput, rho), fmax(0, v->dirs.wi[2]) / M_PI * v->inv_ps);
         if (v->inv_ps == 0) break;
     }
     return L;
@@ -73,7 +84,8 @@ int main(void)
     test_must(ctx, imp_scene_find_param(scene, "red.reflectance.value", &red));
     chosen[red] = 1;
     test_must(ctx, imp__active_create(scene, chosen, &active));
-    const struct imp_tracer tracer = {scene, &scene->integrator, scene->sensors[0], &active, 11};
+    const struct imp_tracer tracer = {scene, &scene->integrator, scene->sensors[0],
+                                      &active, 11};
     struct imp_arena arena;
     imp__arena_init(&arena, ctx);
     double worst_value = 0, worst_slope = 0, total = 0, cross = 0, largest = 0;
@@ -85,24 +97,32 @@ int main(void)
                 const struct imp_arena_mark mark = imp__arena_mark(&arena);
                 imp__walk_trace(&tracer, &arena, x, y, s, &walk);
                 for (int c = 0; c < 3; c++)
-                    mean[c] = add(mean[c], times(radiance(ctx, scene, &walk, light_rgb, wall, c),
-                                                 1.0 / SPP));
+                    mean[c] = add(mean[c],
+                                  times(radiance(ctx, scene, &walk, light_rgb, wall, c),
+                                        1.0 / SPP));
                 imp__arena_rewind(&arena, mark);
             }
             for (int c = 0; c < 3; c++) {
                 const size_t at = (size_t)(y * RES + x) * 3 + (size_t)c;
                 const double value = imp_film_mean(primal)[at];
                 const double slope = imp_film_mean(films[c])[at];
-                worst_value = fmax(worst_value, fabs(value - mean[c].v) / (1e-3 + fabs(mean[c].v)));
-                worst_slope = fmax(worst_slope, fabs(slope - mean[c].d) / (1e-3 + fabs(mean[c].d)));
+                worst_value =
+                    fmax(worst_value, fabs(value - mean[c].v) / (1e-3 + fabs(mean[c].v)));
+                worst_slope =
+                    fmax(worst_slope, fabs(slope - mean[c].d) / (1e-3 + fabs(mean[c].d)));
                 largest = fmax(largest, fabs(mean[c].d));
                 total += mean[c].d;
                 for (int other = 0; other < 3; other++)
-                    if (other != c) cross = fmax(cross, fabs(imp_film_mean(films[c])[at - (size_t)c + (size_t)other]));
+                    if (other != c)
+                        cross =
+                            fmax(cross, fabs(imp_film_mean(
+                                            films[c])[at - (size_t)c + (size_t)other]));
             }
         }
-    tap_ok(worst_value < 2e-7, "radiance equals the test's own # worst %.1e", worst_value);
-    tap_ok(worst_slope < 2e-7, "d/d left wall equals dual numbers # worst %.1e", worst_slope);
+    tap_ok(worst_value < 2e-7, "radiance equals the test's own # worst %.1e",
+           worst_value);
+    tap_ok(worst_slope < 2e-7, "d/d left wall equals dual numbers # worst %.1e",
+           worst_slope);
     tap_ok(total > 0 && largest > 0, "and is not zero # largest %.3g", largest);
     tap_ok(cross == 0, "a colour moves its own channel only");
 

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Parameters back from pictures: with every optimiser, from one sensor and from two, with
- * masks, at bounds, with what is not determined, stopped and resumed, on one thread and on
- * three. */
+ * masks, at bounds, with what is not determined, stopped and resumed, on one thread and
+ * on three. */
+#include "imp_tap.h"
+#include "inverse_scenes.h"
 #include <math.h>
 #include <unistd.h>
-#include "inverse_scenes.h"
-#include "imp_tap.h"
 
 static imp_context *ctx;
 static const char *const optimizer[] = {"Adam", "LM", "L-BFGS", "MMA", "SLSQP"};
@@ -56,16 +56,17 @@ static void ball(void)
         double worst = 0, worst_z = 0;
         for (int k = 0; st == IMP_OK && k < 3; k++) {
             worst = fmax(worst, fabs(r->variables[k].value - rho[k]) / rho[k]);
-            worst_z = fmax(worst_z, fabs(r->variables[k].value - rho[k]) / r->variables[k].se);
+            worst_z =
+                fmax(worst_z, fabs(r->variables[k].value - rho[k]) / r->variables[k].se);
         }
-        tap_ok(st == IMP_OK && worst < 0.03 && worst_z < 4.5 && r->condition >= 1
-               && r->variables[0].start == 0.3 && r->variables[0].determined,
-               "ball, %s # %.2f %%, %.1f se, %d iterations: %s", optimizer[kind], 100 * worst,
-               worst_z, r->iterations, r->reason);
+        tap_ok(st == IMP_OK && worst < 0.03 && worst_z < 4.5 && r->condition >= 1 &&
+                   r->variables[0].start == 0.3 && r->variables[0].determined,
+               "ball, %s # %.2f %%, %.1f se, %d iterations: %s", optimizer[kind],
+               100 * worst, worst_z, r->iterations, r->reason);
         double x[3];
         imp_problem_get_x(p, x);
-        tap_ok(x[1] == r->variables[1].value && r->n == 3
-               && r->n_history == (size_t)r->iterations && !r->warning,
+        tap_ok(x[1] == r->variables[1].value && r->n == 3 &&
+                   r->n_history == (size_t)r->iterations && !r->warning,
                "%s: the scene is at the result", optimizer[kind]);
         imp_problem_destroy(p);
     }
@@ -80,9 +81,9 @@ static void ball(void)
     const struct imp_fit_result *r = NULL;
     enum imp_status st = imp_problem_add_target(p, &t);
     if (st == IMP_OK) st = imp_fit(p, &o, &run, &r);
-    tap_ok(st == IMP_OK && r->variables[1].value == 1 && r->variables[1].at_bound == 1
-           && r->variables[1].hi95 == 1 && r->variables[1].lo95 < 1
-           && fabs(r->variables[0].value - rho[0]) < 0.02,
+    tap_ok(st == IMP_OK && r->variables[1].value == 1 && r->variables[1].at_bound == 1 &&
+               r->variables[1].hi95 == 1 && r->variables[1].lo95 < 1 &&
+               fabs(r->variables[0].value - rho[0]) < 0.02,
            "at a bound # [%g, %g]", r->variables[1].lo95, r->variables[1].hi95);
     imp_problem_destroy(p);
 
@@ -97,10 +98,12 @@ static void ball(void)
         undetermined += !r->variables[k].determined && isnan(r->variables[k].lo95);
     double x[6] = {0};
     imp_problem_get_x(p, x);
-    tap_ok(st == IMP_OK && undetermined == 6 && r->warning && strstr(r->warning, "ball.refl")
-           && strstr(r->warning, "sky.rad"), "an ill-posed pair # %s", r->warning);
+    tap_ok(st == IMP_OK && undetermined == 6 && r->warning &&
+               strstr(r->warning, "ball.refl") && strstr(r->warning, "sky.rad"),
+           "an ill-posed pair # %s", r->warning);
     double product = 0;
-    for (int c = 0; c < 3; c++) product = fmax(product, fabs(x[c] * x[c + 3] / (2 * rho[c]) - 1));
+    for (int c = 0; c < 3; c++)
+        product = fmax(product, fabs(x[c] * x[c + 3] / (2 * rho[c]) - 1));
     tap_ok(product < 0.03, "its product is right # %.2f %%", 100 * product);
     imp_problem_destroy(p);
 
@@ -122,13 +125,14 @@ static void ball(void)
         else at_ball = fmax(at_ball, fabs(v / rho[c] - 1));
     }
     tap_ok(st == IMP_OK && at_sky < 0.02 && at_ball < 0.03,
-           "with a prior on the sky # sky off by %.4f, ball by %.2f %%", at_sky, 100 * at_ball);
+           "with a prior on the sky # sky off by %.4f, ball by %.2f %%", at_sky,
+           100 * at_ball);
     imp_problem_destroy(p);
     imp_scene_destroy(s);
 }
 
-/* Both lamps of the box from one picture, colour by colour; the wall whose colour is seen by
- * the other sensor alone, from two. */
+/* Both lamps of the box from one picture, colour by colour; the wall whose colour is seen
+ * by the other sensor alone, from two. */
 static void box(enum imp_optimizer kind)
 {
     imp_scene *s = scene_open(ctx, box_xml, IMP_RGB);
@@ -153,12 +157,15 @@ static void box(enum imp_optimizer kind)
     double worst = 0, worst_z = 0;
     for (int k = 0; st == IMP_OK && k < 9; k++) {
         worst = fmax(worst, fabs(r->variables[k].value / truth[k] - 1));
-        worst_z = fmax(worst_z, fabs(r->variables[k].value - truth[k]) / r->variables[k].se);
+        worst_z =
+            fmax(worst_z, fabs(r->variables[k].value - truth[k]) / r->variables[k].se);
     }
-    tap_ok(st == IMP_OK && worst < 0.06 && worst_z < 4.5,
-           "two lamps and a wall, two sensors, %s # worst %.2f %%, %.1f se, condition %.0f, "
-           "%d iterations: %s", optimizer[kind], 100 * worst, worst_z, r ? r->condition : 0,
-           r ? r->iterations : 0, st == IMP_OK ? r->reason : imp_last_error(ctx));
+    tap_ok(
+        st == IMP_OK && worst < 0.06 && worst_z < 4.5,
+        "two lamps and a wall, two sensors, %s # worst %.2f %%, %.1f se, condition %.0f, "
+        "%d iterations: %s",
+        optimizer[kind], 100 * worst, worst_z, r ? r->condition : 0,
+        r ? r->iterations : 0, st == IMP_OK ? r->reason : imp_last_error(ctx));
     imp_problem_destroy(p);
     for (int k = 0; k < 2; k++) imp_film_destroy(film[k]);
     imp_scene_destroy(s);
@@ -194,16 +201,18 @@ static void mask(void)
     double worst = 0, worst_z = 0;
     for (int k = 0; st == IMP_OK && k < 6; k++) {
         worst = fmax(worst, fabs(r->variables[k].value / truth[k] - 1));
-        worst_z = fmax(worst_z, fabs(r->variables[k].value - truth[k]) / r->variables[k].se);
+        worst_z =
+            fmax(worst_z, fabs(r->variables[k].value - truth[k]) / r->variables[k].se);
     }
     tap_ok(st == IMP_OK && worst < 0.2 && worst_z < 4.5,
-           "half of the picture masked, NaN there # %.2f %%, %.1f se", 100 * worst, worst_z);
+           "half of the picture masked, NaN there # %.2f %%, %.1f se", 100 * worst,
+           worst_z);
     imp_problem_destroy(p);
     imp_film_destroy(film);
     imp_scene_destroy(s);
 }
 
-/* ---- Stopping and resuming ---------------------------------------------------------------- */
+/* ---- Stopping and resuming ----------------------------------------------------- */
 
 static int stop_later(const struct imp_progress *p, void *payload)
 {
@@ -256,7 +265,8 @@ static void resume(enum imp_optimizer kind)
         if (again == IMP_CANCELLED) {
             stops++;
             imp_problem_get_x(p, part);
-            for (int k = 0; k < 6; k++) valid &= part[k] == r->variables[k].value && isfinite(part[k]);
+            for (int k = 0; k < 6; k++)
+                valid &= part[k] == r->variables[k].value && isfinite(part[k]);
         }
     }
     if (again == IMP_OK) {
@@ -264,15 +274,16 @@ static void resume(enum imp_optimizer kind)
         memcpy(h_part, r->history, n_part * sizeof *h_part);
     }
     imp_problem_get_x(p, part);
-    tap_ok(st == IMP_OK && again == IMP_OK && stops >= 1 && valid, "%s: cancelled %d times, state set",
-           optimizer[kind], stops);
-    tap_ok(n_whole > 0 && n_part == n_whole && !memcmp(whole, part, sizeof whole)
-           && !memcmp(h_whole, h_part, n_whole * sizeof *h_whole),
+    tap_ok(st == IMP_OK && again == IMP_OK && stops >= 1 && valid,
+           "%s: cancelled %d times, state set", optimizer[kind], stops);
+    tap_ok(n_whole > 0 && n_part == n_whole && !memcmp(whole, part, sizeof whole) &&
+               !memcmp(h_whole, h_part, n_whole * sizeof *h_whole),
            "%s: resumed, the same bits as never stopped", optimizer[kind]);
 
     run.progress = NULL;
     run.seed = 6;
-    tap_ok(imp_fit(p, &o, &run, &r) == IMP_E_ARG, "resume of another fit # %s", imp_last_error(ctx));
+    tap_ok(imp_fit(p, &o, &run, &r) == IMP_E_ARG, "resume of another fit # %s",
+           imp_last_error(ctx));
     imp_problem_destroy(p);
     imp_film_destroy(film);
     imp_scene_destroy(s);
@@ -300,7 +311,8 @@ static void threads(void)
         o.optimizer = IMP_LM;
         o.intervals = 1;
         o.max_iterations = 4;
-        if (imp_problem_add_target(p, &t) != IMP_OK || imp_fit(p, &o, &run, &r) != IMP_OK) return;
+        if (imp_problem_add_target(p, &t) != IMP_OK || imp_fit(p, &o, &run, &r) != IMP_OK)
+            return;
         for (int i = 0; i < 6; i++) x[k][i] = r->variables[i].hi95;
         imp_problem_destroy(p);
         imp_film_destroy(film);
@@ -323,16 +335,20 @@ static void arguments(void)
     const struct imp_fit_result *r = NULL;
     struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
     if (imp_problem_create(s, &p) != IMP_OK) return;
-    tap_ok(imp_fit(p, NULL, NULL, &r) == IMP_E_ARG, "nothing active # %s", imp_last_error(ctx));
+    tap_ok(imp_fit(p, NULL, NULL, &r) == IMP_E_ARG, "nothing active # %s",
+           imp_last_error(ctx));
     if (imp_problem_activate(p, "ball*") != IMP_OK) return;
-    tap_ok(imp_fit(p, NULL, NULL, &r) == IMP_E_ARG, "no target # %s", imp_last_error(ctx));
+    tap_ok(imp_fit(p, NULL, NULL, &r) == IMP_E_ARG, "no target # %s",
+           imp_last_error(ctx));
     imp_film *film;
     const struct imp_target t = target_of(ctx, s, 0, 4, 1, &film);
     if (imp_problem_add_target(p, &t) != IMP_OK) return;
     o.resume = 1;
-    tap_ok(imp_fit(p, &o, NULL, &r) == IMP_E_ARG, "resume from nothing # %s", imp_last_error(ctx));
+    tap_ok(imp_fit(p, &o, NULL, &r) == IMP_E_ARG, "resume from nothing # %s",
+           imp_last_error(ctx));
     o.resume = 0, o.learning_rate = -1;
-    tap_ok(imp_fit(p, &o, NULL, &r) == IMP_E_ARG, "learning rate # %s", imp_last_error(ctx));
+    tap_ok(imp_fit(p, &o, NULL, &r) == IMP_E_ARG, "learning rate # %s",
+           imp_last_error(ctx));
     o.learning_rate = 0, o.optimizer = 17;
     tap_ok(imp_fit(p, &o, NULL, &r) == IMP_E_ARG, "optimiser # %s", imp_last_error(ctx));
     o.optimizer = IMP_ADAM, o.checkpoint = "no/such/folder/x", o.max_iterations = 2;
@@ -340,7 +356,8 @@ static void arguments(void)
     imp_problem_get_x(p, before);
     tap_ok(imp_fit(p, &o, NULL, &r) == IMP_E_IO, "checkpoint # %s", imp_last_error(ctx));
     imp_problem_get_x(p, after);
-    tap_ok(!memcmp(before, after, sizeof before) && r == NULL, "a failure leaves the scene as it was");
+    tap_ok(!memcmp(before, after, sizeof before) && r == NULL,
+           "a failure leaves the scene as it was");
     o.checkpoint = NULL;
     struct imp_run run = run_of(4, 1);
 
@@ -349,13 +366,14 @@ static void arguments(void)
     double g[3], g2[3];
     imp_problem_set_run(p, &run);
     enum imp_status st = imp_problem_objective(p, before, &run, &J, g, NULL);
-    tap_ok(st == IMP_OK && imp_problem_nlopt(3, before, g2, p) == J.value
-           && !memcmp(g, g2, sizeof g) && imp_problem_nlopt(3, before, NULL, p) == J.value,
+    tap_ok(st == IMP_OK && imp_problem_nlopt(3, before, g2, p) == J.value &&
+               !memcmp(g, g2, sizeof g) &&
+               imp_problem_nlopt(3, before, NULL, p) == J.value,
            "the callback is the objective");
     const double outside[3] = {0.5, 2, 0.5};
-    tap_ok(imp_problem_nlopt(4, before, NULL, p) == HUGE_VAL
-           && imp_problem_nlopt(3, outside, NULL, p) == HUGE_VAL, "and HUGE_VAL where it fails # %s",
-           imp_last_error(ctx));
+    tap_ok(imp_problem_nlopt(4, before, NULL, p) == HUGE_VAL &&
+               imp_problem_nlopt(3, outside, NULL, p) == HUGE_VAL,
+           "and HUGE_VAL where it fails # %s", imp_last_error(ctx));
     test_back(p, before);
 
     run.time_limit_s = 1e-9;

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A texture back from a picture: 24 x 24 texels of three colours, by Adam, with bounds; and
- * what smoothness does where the picture says nothing. */
-#include <math.h>
+ * A texture back from a picture: 24 x 24 texels of three colours, by Adam, with bounds;
+ * and what smoothness does where the picture says nothing. */
 #include "imp_scene.h"
 #include "imp_tap.h"
+#include <math.h>
 
 enum { SIDE = 24, N = SIDE * SIDE * 3 };
 
@@ -46,8 +46,7 @@ static imp_scene *square(imp_context *ctx, const float *pixels)
 static double rmse(const double *x, const float *ref)
 {
     double sum = 0, n = 0;
-    for (int i = 0; i < N; i++)
-        sum += (x[i] - ref[i]) * (x[i] - ref[i]), n++;
+    for (int i = 0; i < N; i++) sum += (x[i] - ref[i]) * (x[i] - ref[i]), n++;
     return sqrt(sum / n);
 }
 
@@ -95,8 +94,9 @@ int main(void)
            0.25, r->reason);
     tap_ok(r->warning && strstr(r->warning, "256") && r->variables[0].determined,
            "no intervals for so many # %s", r->warning);
-    tap_ok(r->history[0] > 50 * fabs(r->objective.value), "loss # from %.3g to %.3g +- %.1g",
-           r->history[0], r->objective.value, r->objective.se);
+    tap_ok(r->history[0] > 50 * fabs(r->objective.value),
+           "loss # from %.3g to %.3g +- %.1g", r->history[0], r->objective.value,
+           r->objective.se);
 
     /* A third of the picture is masked: texels there stay where they were, unless a
      * smoothness term joins them to the others. */
@@ -115,7 +115,8 @@ int main(void)
         test_must(ctx, imp_problem_add_target(p, &t));
         if (smooth) test_must(ctx, imp_problem_add_smoothness(p, "picture.*", 0.05));
         struct imp_estimate J;
-        static double g[N], g_se[N]; /* of the data: the smoothness term is flat at first */
+        static double g[N],
+            g_se[N];  /* of the data: the smoothness term is flat at first */
         run.spp = 64; /* enough that every texel in sight is met */
         test_must(ctx, imp_problem_objective(p, NULL, &run, &J, g, g_se));
         run.spp = 4;

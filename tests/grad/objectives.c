@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Objective and gradient of every loss, through every filter, with masks, crops, several
- * sensors, luminance targets, hidden lights and regularisers: the gradient against central
- * differences of objectives of other seeds. What is said to be without bias is held to z
- * alone, at 4 samples per pixel; the rest also to its distance from a long run. */
-#include <stdbool.h>
+ * sensors, luminance targets, hidden lights and regularisers: the gradient against
+ * central differences of objectives of other seeds. What is said to be without bias is
+ * held to z alone, at 4 samples per pixel; the rest also to its distance from a long run.
+ */
 #include "imp_scene.h"
 #include "imp_tap.h"
+#include <stdbool.h>
 
 #define W 6
 #define H 5
@@ -21,16 +22,19 @@ struct setup {
 };
 
 static const char xml[] =
-    "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='4'/>%s"
+    "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' "
+    "value='4'/>%s"
     "</integrator>"
     "<sensor type='perspective'><transform name='to_world'><lookat origin='0,1,4' "
-    "target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'>%s<rfilter type='%s'/></film>"
+    "target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'>%s<rfilter "
+    "type='%s'/></film>"
     "</sensor>"
     "<sensor type='orthographic'><transform name='to_world'><lookat origin='2,1,3' "
     "target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'>"
     "<integer name='width' value='4'/><integer name='height' value='3'/>"
     "<rfilter type='box'/></film></sensor>"
-    "<emitter type='constant' id='sky'><rgb name='radiance' value='0.3,0.4,0.5'/></emitter>"
+    "<emitter type='constant' id='sky'><rgb name='radiance' "
+    "value='0.3,0.4,0.5'/></emitter>"
     "<shape type='sphere'><bsdf type='roughconductor' id='metal'><float name='alpha' "
     "value='0.4'/></bsdf></shape>"
     "<shape type='rectangle'><transform name='to_world'><scale value='4'/>"
@@ -39,15 +43,17 @@ static const char xml[] =
     "<string name='filename' value='%s/textured/waves.png'/></texture></bsdf></shape>"
     "<shape type='rectangle'><transform name='to_world'><scale value='1.2'/>"
     "<rotate x='1' angle='90'/><translate y='1.4'/></transform>"
-    "<emitter type='area' id='lamp'><rgb name='radiance' value='1.2,0.9,0.6'/></emitter></shape>"
+    "<emitter type='area' id='lamp'><rgb name='radiance' "
+    "value='1.2,0.9,0.6'/></emitter></shape>"
     "</scene>";
 
 #define SIZE "<integer name='width' value='6'/><integer name='height' value='5'/>"
-#define CROP "<integer name='width' value='13'/><integer name='height' value='11'/>"         \
-             "<integer name='crop_offset_x' value='3'/><integer name='crop_offset_y' value='4'/>" \
-             "<integer name='crop_width' value='6'/><integer name='crop_height' value='5'/>"
+#define CROP                                                                             \
+    "<integer name='width' value='13'/><integer name='height' value='11'/>"              \
+    "<integer name='crop_offset_x' value='3'/><integer name='crop_offset_y' value='4'/>" \
+    "<integer name='crop_width' value='6'/><integer name='crop_height' value='5'/>"
 #define BORDER SIZE "<boolean name='sample_border' value='true'/>"
-#define HIDE "<boolean name='hide_emitters' value='true'/>"
+#define HIDE   "<boolean name='hide_emitters' value='true'/>"
 
 static const struct setup setups[] = {
     {"L2", "box", SIZE, "", 4, .loss = IMP_LOSS_L2},
@@ -66,7 +72,8 @@ static const struct setup setups[] = {
     {"L2, gaussian", "gaussian", SIZE, "", 64, .loss = IMP_LOSS_L2},
     {"L2, gaussian, crop", "gaussian", CROP, "", 64, .loss = IMP_LOSS_L2},
     {"L2, gaussian, border", "gaussian", BORDER, "", 64, .loss = IMP_LOSS_L2},
-    {"L2, gaussian, luminance", "gaussian", SIZE, "", 64, .loss = IMP_LOSS_L2, .luminance = true},
+    {"L2, gaussian, luminance", "gaussian", SIZE, "", 64, .loss = IMP_LOSS_L2,
+     .luminance = true},
     {"relative L2, tent", "tent", SIZE, "", 64, .loss = IMP_LOSS_RELATIVE_L2},
     {"L1", "box", SIZE, "", 256, .loss = IMP_LOSS_L1},
     {"log", "box", SIZE, "", 128, .loss = IMP_LOSS_LOG},
@@ -75,8 +82,8 @@ static const struct setup setups[] = {
     {"log, gaussian", "gaussian", SIZE, "", 128, .loss = IMP_LOSS_LOG},
 };
 
-static struct imp_estimate estimate(imp_problem *p, const double *x, int spp, uint64_t seed,
-                                    double *g, double *se)
+static struct imp_estimate estimate(imp_problem *p, const double *x, int spp,
+                                    uint64_t seed, double *g, double *se)
 {
     struct imp_run run = IMP_RUN_INIT;
     struct imp_estimate J;
@@ -119,10 +126,11 @@ static void check(const struct setup *q)
     }
 
     /* Every number moves, in proportion to itself. */
-    double *x = malloc(6 * n * sizeof *x), *v = x + n, *y = v + n, *g = y + n, *se = g + n,
-           *mean = se + n;
+    double *x = malloc(6 * n * sizeof *x), *v = x + n, *y = v + n, *g = y + n,
+           *se = g + n, *mean = se + n;
     imp_problem_get_x(p, x);
-    for (size_t i = 0; i < n; i++) v[i] = (i % 3 + 1) * 0.3 * fmin(x[i], fmax(1 - x[i], 0.5));
+    for (size_t i = 0; i < n; i++)
+        v[i] = (i % 3 + 1) * 0.3 * fmin(x[i], fmax(1 - x[i], 0.5));
     const double h = 0.1;
     const uint64_t batches = q->spp < 8 ? 256 : 16;
     struct tap_stat fd = {0}, slope = {0}, value = {0};
@@ -150,29 +158,35 @@ static void check(const struct setup *q)
     /* Ratios of wide filters leave O(1/N). */
     const bool biased = orders[q->loss] > 0 || strcmp(q->filter, "box") != 0;
     tap_ok(z < 4.5 || (biased && fabs(fd.mean - slope.mean) < 0.02 * fabs(fd.mean)),
-           "%s: gradient # %.5g +- %.2g, differences %.5g +- %.2g, z %.2f", q->what, slope.mean,
-           tap_se(&slope), fd.mean, tap_se(&fd), z);
+           "%s: gradient # %.5g +- %.2g, differences %.5g +- %.2g, z %.2f", q->what,
+           slope.mean, tap_se(&slope), fd.mean, tap_se(&fd), z);
     tap_ok(both < 0.1 * fabs(fd.mean), "%s: the test can tell # %.2g", q->what,
            both / fabs(fd.mean));
     tap_ok(bias == orders[q->loss] || (strcmp(q->filter, "box") != 0 && bias <= 1),
            "%s: bias order %d", q->what, bias);
 
     /* The reported standard error is the spread over seeds (16 of them or 256). */
-    const double ratio = claimed > 0 ? sqrt(claimed / (double)batches) / tap_se(&value) : 0;
-    const double size = strcmp(q->filter, "box") == 0 && q->loss <= IMP_LOSS_RELATIVE_L2 ? 2 : 5;
-    tap_ok(ratio > 0.5 && ratio < size, "%s: standard error # %.2f of the spread", q->what, ratio);
+    const double ratio =
+        claimed > 0 ? sqrt(claimed / (double)batches) / tap_se(&value) : 0;
+    const double size =
+        strcmp(q->filter, "box") == 0 && q->loss <= IMP_LOSS_RELATIVE_L2 ? 2 : 5;
+    tap_ok(ratio > 0.5 && ratio < size, "%s: standard error # %.2f of the spread",
+           q->what, ratio);
 
     /* A long run has next to no bias, and nor has the mean of short ones. */
-    const struct imp_estimate truth = estimate(p, x, q->spp < 32 ? 2048 : 64 * q->spp, 9, g, se);
+    const struct imp_estimate truth =
+        estimate(p, x, q->spp < 32 ? 2048 : 64 * q->spp, 9, g, se);
     double along = 0, along_se = 0;
     for (size_t i = 0; i < n; i++) along += g[i] * v[i], along_se += pow(se[i] * v[i], 2);
     along_se = sqrt(along_se);
-    const double off = fabs(truth.value - value.mean), allowed = 4.5 * hypot(truth.se, tap_se(&value));
+    const double off = fabs(truth.value - value.mean),
+                 allowed = 4.5 * hypot(truth.se, tap_se(&value));
     tap_ok(off < allowed + (biased ? 0.02 * truth.value : 0),
-           "%s: value # %.6g +- %.2g, long run %.6g +- %.2g", q->what, value.mean, tap_se(&value),
-           truth.value, truth.se);
+           "%s: value # %.6g +- %.2g, long run %.6g +- %.2g", q->what, value.mean,
+           tap_se(&value), truth.value, truth.se);
     const double g_off = fabs(along - slope.mean);
-    tap_ok(g_off < 4.5 * hypot(2 * along_se, tap_se(&slope)) + (biased ? 0.03 * fabs(along) : 0),
+    tap_ok(g_off < 4.5 * hypot(2 * along_se, tap_se(&slope)) +
+                       (biased ? 0.03 * fabs(along) : 0),
            "%s: gradient of a long run # %.5g, %.5g +- %.2g", q->what, along, slope.mean,
            tap_se(&slope));
     free(x);

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * T6 of gradients.md: all seven controls of Stam's box back from one 32 x 32 picture, from a
- * start 30 % off. Light samples instead of Stam's own walk (expectations are the same, the
- * noise of a pixel is far smaller), and weights that follow the picture's noise. With
- * IMP_SLOW set, enough samples for 2 %; else what the standard errors promise. */
-#include <math.h>
+ * T6 of gradients.md: all seven controls of Stam's box back from one 32 x 32 picture,
+ * from a start 30 % off. Light samples instead of Stam's own walk (expectations are the
+ * same, the noise of a pixel is far smaller), and weights that follow the picture's
+ * noise. With IMP_SLOW set, enough samples for 2 %; else what the standard errors
+ * promise. */
 #include "imp_scene.h"
 #include "imp_tap.h"
+#include <math.h>
 
 static imp_scene *box(imp_context *ctx)
 {
@@ -28,7 +29,8 @@ int main(void)
     static float weights[32 * 32];
     double mean = 0;
     for (int i = 0; i < 1024; i++) mean += se[i] / 1024;
-    for (int i = 0; i < 1024; i++) weights[i] = (float)(1 / (se[i] * se[i] / (mean * mean) + 0.05));
+    for (int i = 0; i < 1024; i++)
+        weights[i] = (float)(1 / (se[i] * se[i] / (mean * mean) + 0.05));
     t.width = t.height = 32;
     t.channels = 1;
     t.pixels = imp_film_mean(film);
@@ -53,8 +55,9 @@ int main(void)
         run.seed = 7;
         test_must(ctx, imp_fit(p, &o, &run, &r));
         const char *name = kind == IMP_ADAM ? "Adam" : "LM";
-        tap_ok(kind == IMP_ADAM || r->iterations <= 10, "%s # %d iterations, condition %.0f: %s",
-               name, r->iterations, r->condition, r->reason);
+        tap_ok(kind == IMP_ADAM || r->iterations <= 10,
+               "%s # %d iterations, condition %.0f: %s", name, r->iterations,
+               r->condition, r->reason);
         for (int k = 0; k < 7; k++) {
             size_t param;
             struct imp_param_info info = {.size = sizeof info};
@@ -62,11 +65,13 @@ int main(void)
             test_must(ctx, imp_scene_get_param(s, param, &info));
             const struct imp_fit_variable *v = &r->variables[k];
             const double off = v->value / truth[k] - 1, z = (v->value - truth[k]) / v->se;
-            /* Adam's few samples leave the sphere's own light undetermined, and it says so. */
+            /* Adam's few samples leave the sphere's own light undetermined, and it says
+             * so. */
             tap_ok(slow ? fabs(off) < 0.02
-                        : (v->determined && fabs(z) < 4.5) || (kind == IMP_ADAM && isnan(v->se)),
-                   "%s: %s # from %g to %.5g (%+.2f %%), se %.2g, z %.2f", name, info.name,
-                   v->start, v->value, 100 * off, v->se, z);
+                        : (v->determined && fabs(z) < 4.5) ||
+                              (kind == IMP_ADAM && isnan(v->se)),
+                   "%s: %s # from %g to %.5g (%+.2f %%), se %.2g, z %.2f", name,
+                   info.name, v->start, v->value, 100 * off, v->se, z);
         }
         test_must(ctx, imp_problem_set_x(p, truth));
         imp_problem_destroy(p);

@@ -1,23 +1,23 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Gradients of every parameter of every kind of the tables: each material, light and texture
- * in a room lit directly and indirectly, through every integrator that has derivatives, in
- * colour and in mono. For each of its parameters
+ * Gradients of every parameter of every kind of the tables: each material, light and
+ * texture in a room lit directly and indirectly, through every integrator that has
+ * derivatives, in colour and in mono. For each of its parameters
  *
- *   frozen   sweep against central differences of kept walks, 1e-6; forward against reverse
- *            per walk, 1e-12; Euler identities, 1e-12 (imp_check)
- *   dot      forward picture against reverse gradient of the same seed
- *   fresh    forward picture against differences of renders with other seeds: z-scores, at
- *            random values, with one number at its lower bound (0) and at its upper bound
+ *   frozen   sweep against central differences of kept walks, 1e-6; forward against
+ * reverse per walk, 1e-12; Euler identities, 1e-12 (imp_check) dot      forward picture
+ * against reverse gradient of the same seed fresh    forward picture against differences
+ * of renders with other seeds: z-scores, at random values, with one number at its lower
+ * bound (0) and at its upper bound
  *
  * A new kind is tested by existing: its inputs are drawn from what it declares.
  *
  *     registry [short|long [CASE]]    long: every number by itself; CASE as printed */
+#include "imp_kinds.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "imp_kinds.h"
 
-#define SIDE 5
+#define SIDE    5
 #define BATCHES 12
 
 static bool is_long;
@@ -27,7 +27,9 @@ static double worst_z, worst_frozen, worst_dot;
 static int n_z, n_frozen;
 
 /* Inputs not given, by configuration, with the reason. */
-static const struct { const char *kind, *input, *prop, *why; } left_out[] = {
+static const struct {
+    const char *kind, *input, *prop, *why;
+} left_out[] = {
     {"roughconductor", "alpha_u", NULL, "given by alpha"},
     {"roughconductor", "alpha_v", NULL, "given by alpha"},
     {"roughconductor", "alpha", "alpha_u", "given by alpha_u and alpha_v"},
@@ -49,20 +51,22 @@ static bool is_left_out(const char *kind, const char *const *props, const char *
 {
     if (config_has(props, input)) return false;
     for (size_t i = 0; i < imp_count(left_out); i++)
-        if (strcmp(left_out[i].kind, kind) == 0 && strcmp(left_out[i].input, input) == 0 &&
-            (!left_out[i].prop ? !config_has(props, input) : config_has(props, left_out[i].prop)))
+        if (strcmp(left_out[i].kind, kind) == 0 &&
+            strcmp(left_out[i].input, input) == 0 &&
+            (!left_out[i].prop ? !config_has(props, input)
+                               : config_has(props, left_out[i].prop)))
             return true;
     return false;
 }
 
-/* ---- The subject ------------------------------------------------------------------------- */
+/* ---- The subject --------------------------------------------------------------- */
 
 struct subject {
-    const struct imp_bsdf_ops *bsdf, *back;  /* one of these; back: twosided's second */
+    const struct imp_bsdf_ops *bsdf, *back; /* one of these; back: twosided's second */
     const struct imp_emitter_ops *emitter;
-    const char *const *props;                /* configuration of the material */
-    const struct imp_texture_ops *texture;   /* on all its inputs, or NULL */
-    bool nested;                             /* the texture's own inputs are textures too */
+    const char *const *props;              /* configuration of the material */
+    const struct imp_texture_ops *texture; /* on all its inputs, or NULL */
+    bool nested;                           /* the texture's own inputs are textures too */
 };
 
 static double random_in(const struct imp_input_desc *d, uint64_t seed, uint32_t k)
@@ -87,14 +91,17 @@ static void texture_make(imp_scene *s, const struct subject *q, const char *slot
         float pixels[3 * 3 * 3];
         for (uint32_t k = 0; k < 27; k++) pixels[k] = (float)random_in(d, seed, 100 + k);
         imp_scene_image(s, 3, 3, 3, pixels);
-        if (d->flags & IMP_INPUT_SCALAR || d->role != IMP_REFLECTANCE) imp_scene_bool(s, "raw", 1);
+        if (d->flags & IMP_INPUT_SCALAR || d->role != IMP_REFLECTANCE)
+            imp_scene_bool(s, "raw", 1);
     }
     for (int j = 0; t->inputs && t->inputs[j].name; j++) {
         struct imp_input_desc e = t->inputs[j];
         double v[3];
         if (d->role != IMP_REFLECTANCE) e.fallback = d->fallback;
-        for (uint32_t k = 0; k < 3; k++) v[k] = random_in(&e, seed, 50 + 3 * (uint32_t)j + k);
-        if (q->nested && outer) texture_make(s, q, t->inputs[j].name, &e, seed + 7 + (uint64_t)j, false);
+        for (uint32_t k = 0; k < 3; k++)
+            v[k] = random_in(&e, seed, 50 + 3 * (uint32_t)j + k);
+        if (q->nested && outer)
+            texture_make(s, q, t->inputs[j].name, &e, seed + 7 + (uint64_t)j, false);
         else if (d->flags & IMP_INPUT_SCALAR) imp_scene_float(s, t->inputs[j].name, v[0]);
         else imp_scene_rgb(s, t->inputs[j].name, v);
     }
@@ -111,7 +118,8 @@ static void inputs_make(imp_scene *s, const struct subject *q, const char *kind,
         if (d->flags & IMP_INPUT_FIXED || config_has(props, d->name)) continue;
         if (is_left_out(kind, props, d->name)) continue;
         for (uint32_t k = 0; k < 3; k++) v[k] = random_in(d, seed, 3 * (uint32_t)j + k);
-        if (textures && q->texture) texture_make(s, q, d->name, d, seed + (uint64_t)j, true);
+        if (textures && q->texture)
+            texture_make(s, q, d->name, d, seed + (uint64_t)j, true);
         else if (d->flags & IMP_INPUT_SCALAR) imp_scene_float(s, d->name, v[0]);
         else imp_scene_rgb(s, d->name, v);
     }
@@ -131,8 +139,8 @@ static void props_make(imp_scene *s, const char *const *props)
     }
 }
 
-static void bsdf_make(imp_scene *s, const struct subject *q, const struct imp_bsdf_ops *ops,
-                      const char *id, uint64_t seed)
+static void bsdf_make(imp_scene *s, const struct subject *q,
+                      const struct imp_bsdf_ops *ops, const char *id, uint64_t seed)
 {
     imp_scene_begin(s, "bsdf", ops->name, id, NULL);
     if (ops->max_children) {
@@ -142,7 +150,8 @@ static void bsdf_make(imp_scene *s, const struct subject *q, const struct imp_bs
     } else {
         props_make(s, q->props);
     }
-    inputs_make(s, q, ops->name, ops->max_children ? NULL : q->props, ops->inputs, true, seed);
+    inputs_make(s, q, ops->name, ops->max_children ? NULL : q->props, ops->inputs, true,
+                seed);
     imp_scene_end(s);
 }
 
@@ -197,7 +206,8 @@ static imp_scene *scene_make(const struct subject *q, const char *integrator,
         imp_scene_end(s);
     }
     /* Floor and ceiling, seen from inside. */
-    const double floor_at[16] = {0.9, 0, 0, 0, 0, 0, 0.9, -0.95, 0, -0.9, 0, 0, 0, 0, 0, 1};
+    const double floor_at[16] = {0.9, 0,    0, 0, 0, 0, 0.9, -0.95,
+                                 0,   -0.9, 0, 0, 0, 0, 0,   1};
     const double ceiling[16] = {0.8, 0, 0, 0, 0, 0, -0.8, 0.95, 0, 0.8, 0, 0, 0, 0, 0, 1};
     imp_scene_begin(s, "shape", "rectangle", "floor", NULL);
     imp_scene_transform(s, "to_world", floor_at);
@@ -225,7 +235,8 @@ static imp_scene *scene_make(const struct subject *q, const char *integrator,
             imp_scene_end(s);
         }
     }
-    const double ball[16] = {0.5, 0, 0, 0.1, 0, 0.5, 0, -0.2, 0, 0, 0.5, -0.2, 0, 0, 0, 1};
+    const double ball[16] = {0.5, 0, 0,   0.1,  0, 0.5, 0, -0.2,
+                             0,   0, 0.5, -0.2, 0, 0,   0, 1};
     imp_scene_begin(s, "shape", "sphere", "ball", NULL);
     imp_scene_transform(s, "to_world", ball);
     if (q->bsdf) imp_scene_ref(s, "subject", NULL);
@@ -236,14 +247,15 @@ static imp_scene *scene_make(const struct subject *q, const char *integrator,
     return s;
 }
 
-/* ---- Checks -------------------------------------------------------------------------------- */
+/* ---- Checks -------------------------------------------------------------------- */
 
 static double pattern(int x, int y, int c)
 {
     return (1 + 0.5 * cos(0.7 * x + 0.4 * y + c)) / (SIDE * SIDE);
 }
 
-/* sum pattern * film and its standard error; channels of a pixel may be fully correlated. */
+/* sum pattern * film and its standard error; channels of a pixel may be fully correlated.
+ */
 static struct imp_estimate functional(imp_film *film)
 {
     struct imp_film_info info;
@@ -284,11 +296,11 @@ static double moved(imp_scene *s, size_t param, size_t count, const double *old,
     return value;
 }
 
-/* d F / d (parameter along v): the forward picture against differences of pictures of other
- * seeds. The pictures of one difference share their seed: its expectation is the same, and
- * noise that does not follow the parameter cancels. */
-static void fresh(imp_scene *s, imp_problem *p, size_t param, const double *v, bool linear,
-                  const char *what)
+/* d F / d (parameter along v): the forward picture against differences of pictures of
+ * other seeds. The pictures of one difference share their seed: its expectation is the
+ * same, and noise that does not follow the parameter cancels. */
+static void fresh(imp_scene *s, imp_problem *p, size_t param, const double *v,
+                  bool linear, const char *what)
 {
     struct imp_param_info info;
     struct imp_run run = IMP_RUN_INIT;
@@ -338,7 +350,8 @@ static void fresh(imp_scene *s, imp_problem *p, size_t param, const double *v, b
     const double dot = fabs(back - mine.value) / fmax(size, 1e-300);
     if (size > 0) worst_dot = fmax(worst_dot, dot);
     if (size > 0 && dot > 1e-5)
-        tap_ok(0, "%s: %s: forward %.9g, reverse %.9g", what, info.name, mine.value, back);
+        tap_ok(0, "%s: %s: forward %.9g, reverse %.9g", what, info.name, mine.value,
+               back);
 
     struct tap_stat differences = {0};
     double place[4], factor[4], size_F = 0;
@@ -380,8 +393,8 @@ static void fresh(imp_scene *s, imp_problem *p, size_t param, const double *v, b
     n_z++;
     worst_z = fmax(worst_z, z);
     if (only)
-        printf("# %s: %s: gradient %.6g +- %.2g, differences %.6g +- %.2g, z %.2f\n", what,
-               info.name, mine.value, mine.se, fd.value, fd.se, z);
+        printf("# %s: %s: gradient %.6g +- %.2g, differences %.6g +- %.2g, z %.2f\n",
+               what, info.name, mine.value, mine.se, fd.value, fd.se, z);
     if (!(z <= 4.5))
         tap_ok(0, "%s: %s: gradient %.6g +- %.2g, differences %.6g +- %.2g, z %.2f", what,
                info.name, mine.value, mine.se, fd.value, fd.se, z);
@@ -413,8 +426,9 @@ static void frozen(imp_problem *p, const char *what)
             worst_frozen = fmax(worst_frozen, rows[k].error);
         }
         if (is_fresh ? rows[k].error <= 4.5 : rows[k].ok) continue;
-        tap_ok(0, "%s: %s %s step %g: %.9g, reference %.9g, error %.2e", what, rows[k].method,
-               rows[k].param, rows[k].step, rows[k].value, rows[k].reference, rows[k].error);
+        tap_ok(0, "%s: %s %s step %g: %.9g, reference %.9g, error %.2e", what,
+               rows[k].method, rows[k].param, rows[k].step, rows[k].value,
+               rows[k].reference, rows[k].error);
     }
 }
 
@@ -430,17 +444,21 @@ static bool active_has(imp_problem *p, imp_scene *s, const char *part)
     return false;
 }
 
-static void check_one(const struct subject *q, const char *integrator, enum imp_color_mode mode)
+static void check_one(const struct subject *q, const char *integrator,
+                      enum imp_color_mode mode)
 {
     char what[256];
     const struct imp_input_desc *inputs = q->bsdf ? q->bsdf->inputs : q->emitter->inputs;
     int n = snprintf(what, sizeof what, "%s", q->bsdf ? q->bsdf->name : q->emitter->name);
-    if (q->back && n < 200) n += snprintf(what + n, 256 - (size_t)n, "(%s)", q->back->name);
+    if (q->back && n < 200)
+        n += snprintf(what + n, 256 - (size_t)n, "(%s)", q->back->name);
     for (int i = 0; q->props && i < 6 && q->props[i] && n < 200; i++)
         n += snprintf(what + n, 256 - (size_t)n, " %s", q->props[i]);
     if (q->texture && n < 200)
-        n += snprintf(what + n, 256 - (size_t)n, " %s%s", q->nested ? "nested " : "", q->texture->name);
-    snprintf(what + n, 256 - (size_t)n, ", %s, %s", integrator, mode == IMP_RGB ? "rgb" : "mono");
+        n += snprintf(what + n, 256 - (size_t)n, " %s%s", q->nested ? "nested " : "",
+                      q->texture->name);
+    snprintf(what + n, 256 - (size_t)n, ", %s, %s", integrator,
+             mode == IMP_RGB ? "rgb" : "mono");
 
     if (only && strncmp(what, only, strlen(only)) != 0) return;
     const int failed = tap_failed;
@@ -450,7 +468,9 @@ static void check_one(const struct subject *q, const char *integrator, enum imp_
     for (int j = 0; inputs && inputs[j].name; j++) {
         char part[128];
         snprintf(part, sizeof part, "subject.%s", inputs[j].name);
-        if (inputs[j].flags & IMP_INPUT_FIXED || is_left_out(what, q->props, inputs[j].name)) continue;
+        if (inputs[j].flags & IMP_INPUT_FIXED ||
+            is_left_out(what, q->props, inputs[j].name))
+            continue;
         if (q->bsdf && is_left_out(q->bsdf->name, q->props, inputs[j].name)) continue;
         if (!active_has(p, s, part)) tap_ok(0, "%s: %s is a parameter", what, part);
     }
@@ -462,13 +482,15 @@ static void check_one(const struct subject *q, const char *integrator, enum imp_
         if (!(info.flags & IMP_PARAM_DIFFERENTIABLE)) continue;
         double *v = calloc(info.count, sizeof *v), *x = calloc(info.count, sizeof *x);
         const bool linear = q->emitter != NULL;
-        for (size_t e = 0; e < info.count; e++) v[e] = 0.5 + imp__u01(imp__key(2, 2, 2), (uint32_t)e);
+        for (size_t e = 0; e < info.count; e++)
+            v[e] = 0.5 + imp__u01(imp__key(2, 2, 2), (uint32_t)e);
         fresh(s, p, k, v, linear, what);
         /* One number at a bound, the others as they are. */
         for (int side = 0; side < 2; side++) {
             const double bound = side ? info.hi : info.lo;
             if (!isfinite(bound) || (bound != 0 && bound != 1)) continue;
-            if (!is_long && (mode != IMP_RGB || q->texture || strcmp(integrator, "path") != 0))
+            if (!is_long &&
+                (mode != IMP_RGB || q->texture || strcmp(integrator, "path") != 0))
                 continue;
             test_must(ctx, imp_scene_get_values(s, k, x));
             const double old = x[0];
@@ -490,8 +512,8 @@ static void check_one(const struct subject *q, const char *integrator, enum imp_
     imp_problem_destroy(all);
     imp_scene_destroy(s);
     tap_ok(failed == tap_failed,
-           "%s # %d frozen, worst %.1e; forward-reverse %.1e; %d fresh, worst z %.2f", what,
-           n_frozen, worst_frozen, worst_dot, n_z, worst_z);
+           "%s # %d frozen, worst %.1e; forward-reverse %.1e; %d fresh, worst z %.2f",
+           what, n_frozen, worst_frozen, worst_dot, n_z, worst_z);
 }
 
 static void check(const struct subject *q)
@@ -501,7 +523,8 @@ static void check(const struct subject *q)
         for (int mode = IMP_RGB; mode <= IMP_MONO; mode++) {
             /* Stam's walks take no light samples and never meet a point. */
             if (i == 2 && q->emitter && q->emitter->flags & IMP_EMITTER_DELTA) continue;
-            if (!is_long && mode == IMP_MONO && (i != 0 || q->texture || q->back)) continue;
+            if (!is_long && mode == IMP_MONO && (i != 0 || q->texture || q->back))
+                continue;
             if (!is_long && i != 0 && (q->texture || q->back)) continue;
             check_one(q, integrators[i], (enum imp_color_mode)mode);
         }
@@ -525,14 +548,18 @@ int main(int argc, char **argv)
             if (strcmp(kind_configs[i].kind, ops->name) == 0)
                 check(&(struct subject){.bsdf = ops, .props = kind_configs[i].props});
         for (int i = 0; imp__texture_kinds[i]; i++)
-            for (int nested = 0; nested <= (imp__texture_kinds[i]->inputs && imp__texture_kinds[i]->inputs[0].name); nested++)
-                check(&(struct subject){.bsdf = ops, .texture = imp__texture_kinds[i], .nested = nested});
+            for (int nested = 0; nested <= (imp__texture_kinds[i]->inputs &&
+                                            imp__texture_kinds[i]->inputs[0].name);
+                 nested++)
+                check(&(struct subject){
+                    .bsdf = ops, .texture = imp__texture_kinds[i], .nested = nested});
     }
     for (int k = 0; imp__emitter_kinds[k]; k++) {
         check(&(struct subject){.emitter = imp__emitter_kinds[k]});
         if (!(imp__emitter_kinds[k]->flags & IMP_EMITTER_AREA)) continue;
         for (int i = 0; imp__texture_kinds[i]; i++)
-            check(&(struct subject){.emitter = imp__emitter_kinds[k], .texture = imp__texture_kinds[i]});
+            check(&(struct subject){.emitter = imp__emitter_kinds[k],
+                                    .texture = imp__texture_kinds[i]});
     }
     imp_context_destroy(ctx);
     return tap_done();

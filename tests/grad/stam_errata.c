@@ -7,7 +7,7 @@
  * docs/stam.md quotes what this prints. */
 #include "stam_walks.h"
 
-/* ---- Fold and sweep with a mistake ---- */
+/* ---- Fold and sweep with a mistake --------------------------------------------- */
 
 enum mistake {
     NONE,
@@ -33,10 +33,8 @@ static double planted(const struct stam *s, const struct imp_walk *w,
     const struct imp_vertex *last = at[n - 1];
     const int glow = stam_is(last, "sphere") ? AMBIENT2 : AMBIENT3;
     const bool ends = w->absorbed || (mistake == E24_CUT_GLOWS && last->emitter < 0);
-    if (last->emitter >= 0)
-        L = s->theta[EMISSION];
-    else if (ends)
-        L = s->theta[glow] / s->absorb;
+    if (last->emitter >= 0) L = s->theta[EMISSION];
+    else if (ends) L = s->theta[glow] / s->absorb;
 
     for (int k = n - 2; k >= 0; k--) {
         const struct imp_vertex *v = at[k];
@@ -66,8 +64,7 @@ static double planted(const struct stam *s, const struct imp_walk *w,
                  ? f[k].v
                  : f[k].v / (1 - s->absorb);
     }
-    if (last->emitter >= 0)
-        g[EMISSION] += P;
+    if (last->emitter >= 0) g[EMISSION] += P;
     else if (ends)
         g[glow] += P / s->absorb * (mistake == E23_EMISSION_TWICE ? s->theta[glow] : 1);
     return L;
@@ -86,7 +83,7 @@ static void expect(bool same, const struct tap_stat *stat, double ref, double re
            same ? "is right" : "is caught", stat->mean, se, ref, z);
 }
 
-/* ---- The furnace: a sphere seen from inside, rho = 1/2, e = 1/5, a = 2/5 ---- */
+/* ---- The furnace: a sphere seen from inside, rho = 1/2, e = 1/5, a = 2/5 ------- */
 
 static struct stam furnace_walks(imp_context *ctx, double rho, int depth)
 {
@@ -162,7 +159,7 @@ static void furnaces(imp_context *ctx)
     tap_ok(r.g_rho.mean == 0, "df/f at rho = 0: dL/drho is caught # mean 0 truth 0.2");
 }
 
-/* ---- Stam's box against the table of 2.2 ---- */
+/* ---- Stam's box against the table of 2.2 --------------------------------------- */
 
 struct row {
     double value, se;
@@ -187,10 +184,8 @@ static void box(imp_context *ctx, const char *defines, int mistake, int spp,
         const struct imp_walk w =
             stam_trace(&s, (int)(k & 31), (int)(k >> 5 & 31), k >> 10);
         double L = w.L[0];
-        if (mistake < 0)
-            stam_gradient(&s, &w, 1, g);
-        else
-            L = planted(&s, &w, (enum mistake)mistake, g);
+        if (mistake < 0) stam_gradient(&s, &w, 1, g);
+        else L = planted(&s, &w, (enum mistake)mistake, g);
         tap_add(&stat[0], L);
         for (int c = 0; c < N_CONTROLS; c++) tap_add(&stat[c + 1], g[c]);
         imp__arena_rewind(&s.arena, mark);
@@ -211,10 +206,8 @@ static void report(const char *what, const struct tap_stat *stat, const struct r
         printf("#   %-22s mean %10.6f se %.6f truth %10.6f z %7.1f\n",
                control < 0 ? "L" : control_name[control], stat[k].mean, se, ref[k].value,
                z);
-        if (caught >> k & 1)
-            hit |= fabs(z) > CAUGHT;
-        else
-            right &= fabs(z) <= 4;
+        if (caught >> k & 1) hit |= fabs(z) > CAUGHT;
+        else right &= fabs(z) <= 4;
     }
     tap_ok(right && hit, "%s: %s", what,
            caught ? "the truth catches it, and nothing else is off" : "the truth");

@@ -9,7 +9,7 @@
 
 enum { AMBIENT, DIFFUSE, SPECULAR, EXPONENT };
 
-/* ---- The normal distribution ---- */
+/* ---- The normal distribution --------------------------------------------------- */
 
 struct power {
     double alpha;
@@ -79,7 +79,7 @@ static void vector(void)
     }
 }
 
-/* ---- The Phong-Blinn draw ---- */
+/* ---- The Phong-Blinn draw ------------------------------------------------------ */
 
 /* Albedo seen at angle t: the weight is 1 for every draw that is kept. */
 static double albedo(double alpha, double t, int flip)
@@ -126,7 +126,7 @@ static void flipping(void)
            printed[2], right[2]);
 }
 
-/* ---- E4 and E28: M2 is not reciprocal, nor does it conserve energy ---- */
+/* ---- E4 and E28: M2 is not reciprocal, nor does it conserve energy ------------- */
 
 struct lobe {
     const struct imp_bsdf *b;
@@ -176,13 +176,12 @@ static void reciprocity(struct kind_factory *factory)
                 tap_ok(fabs(a / row[k].published - 1) < .01,
                        "E28: light-side albedo at %g degrees # %.3f, published %.2f",
                        row[k].angle, a, row[k].published);
-            else
-                tap_ok(a <= 1, "E28: reciprocal, at %g degrees # %.3f", row[k].angle, a);
+            else tap_ok(a <= 1, "E28: reciprocal, at %g degrees # %.3f", row[k].angle, a);
         }
     }
 }
 
-/* ---- E15 and E16: the adjoint's step ---- */
+/* ---- E15 and E16: the adjoint's step ------------------------------------------- */
 
 /* A glowing sphere from inside, rho 1/2, e 3/10, directions uniform over the hemisphere:
  * dL/drho is e/(1 - rho)^2 = 1.2. A chord meets the sphere at equal angles at both ends,

@@ -1,20 +1,23 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Stam's box against published means: the picture's mean and its seven derivatives (two
- * independent implementations, 7e9 paths: gradients.md 2.2), and the whole-picture loss with
- * its gradient at few samples per pixel, where estimators without leave-one-out are wrong by
- * factors (2.3 T5, 5). Deterministic walks with fixed seeds; z-tests. */
+ * independent implementations, 7e9 paths: gradients.md 2.2), and the whole-picture loss
+ * with its gradient at few samples per pixel, where estimators without leave-one-out are
+ * wrong by factors (2.3 T5, 5). Deterministic walks with fixed seeds; z-tests. */
 #include "imp_scene.h"
 #include "imp_tap.h"
 
-static const char *const names[] = {
-    "light.emission.value",  "sphere.ambient.value", "sphere.diffuse.value",
-    "sphere.specular.value", "sphere.exponent.value", "walls.ambient.value",
-    "walls.diffuse.value"};
+static const char *const names[] = {"light.emission.value",  "sphere.ambient.value",
+                                    "sphere.diffuse.value",  "sphere.specular.value",
+                                    "sphere.exponent.value", "walls.ambient.value",
+                                    "walls.diffuse.value"};
 
-struct row { double value, se; };
+struct row {
+    double value, se;
+};
 
-static void agrees(double value, double se, struct row ref, double se_limit, const char *what)
+static void agrees(double value, double se, struct row ref, double se_limit,
+                   const char *what)
 {
     const double z = (value - ref.value) / sqrt(se * se + ref.se * ref.se);
     tap_ok(fabs(z) <= 4 && se <= se_limit * fabs(ref.value),
@@ -56,7 +59,8 @@ static void means(imp_context *ctx, const char *variant, const char *sampling, i
     /* Euler: the emission terms times their values are the picture, per walk. */
     const double theta[] = {5, .02, 0, 0, 0, .03, 0};
     double euler = 0;
-    for (int k = 0; k < 7; k++) euler += theta[k] * g[test_variable(p, scene, ctx, names[k])];
+    for (int k = 0; k < 7; k++)
+        euler += theta[k] * g[test_variable(p, scene, ctx, names[k])];
     snprintf(what, sizeof what, "%s, %s: emission identity", variant, sampling);
     tap_near(euler, sum / 1024, 1e-6, 0, what); /* the film is in floats */
     imp_problem_destroy(p);
@@ -100,9 +104,9 @@ static void loss(imp_context *ctx, int spp, int repeats)
         char what[160];
         snprintf(what, sizeof what, "loss at %d spp: %s", spp, k ? names[k - 1] : "J");
         agrees(stat[k].mean, tap_se(&stat[k]), ref[k], spp < 16 ? .12 : .06, what);
-        /* The reported variance against the spread of the repeats, whose own relative error
-         * is sqrt(2/repeats) and more, for tails are heavy. Paired pixels give a bound, here
-         * a tight one: neighbours differ little beside the noise. */
+        /* The reported variance against the spread of the repeats, whose own relative
+         * error is sqrt(2/repeats) and more, for tails are heavy. Paired pixels give a
+         * bound, here a tight one: neighbours differ little beside the noise. */
         const double ratio = reported[k] / repeats / (stat[k].m2 / (stat[k].n - 1));
         const double low = repeats < 100 ? .6 : .75, high = repeats < 100 ? 1.7 : 1.3;
         tap_ok(ratio > low && ratio < high,
@@ -115,19 +119,19 @@ static void loss(imp_context *ctx, int spp, int repeats)
 
 int main(void)
 {
-    static const struct row m2[] = {{.149190, .000007}, {.019663, .000002}, {.869446, .000017},
-                                    {.129130, .000009}, {.212496, .000016},
-                                    {.0003882, .0000003}, {1.116213, .000018},
-                                    {.253808, .000015}};
-    static const struct row m2p[] = {{.101409, .000013}, {.011562, .000003}, {.859354, .000054},
-                                     {.123374, .000025}, {.049937, .000012},
-                                     {-.000189, .000001}, {.880400, .000051},
-                                     {.189464, .000043}};
+    static const struct row m2[] = {{.149190, .000007},  {.019663, .000002},
+                                    {.869446, .000017},  {.129130, .000009},
+                                    {.212496, .000016},  {.0003882, .0000003},
+                                    {1.116213, .000018}, {.253808, .000015}};
+    static const struct row m2p[] = {
+        {.101409, .000013}, {.011562, .000003},  {.859354, .000054}, {.123374, .000025},
+        {.049937, .000012}, {-.000189, .000001}, {.880400, .000051}, {.189464, .000043}};
     imp_context *ctx = test_context(0);
     means(ctx, "microfacet", "mixture", 4096, m2, .006);
     means(ctx, "microfacet", "cosine", 2048, m2, .06);
     means(ctx, "paper", "mixture", 2048, m2p, .01);
-    means(ctx, "microfacet", "mixture integrator=path", 2048, m2, .011); /* lights sampled */
+    means(ctx, "microfacet", "mixture integrator=path", 2048, m2,
+          .011); /* lights sampled */
     loss(ctx, 2, 4000);
     loss(ctx, 8, 1600);
     loss(ctx, 256, 60);

@@ -1,17 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Finite elements against Monte Carlo: the library's path tracer on diffuse scenes, and on
- * scene d a small one of this file's own, which shares the scene and the BRDF only. */
-#include "elements/elements.h"
+ * Finite elements against Monte Carlo: the library's path tracer on diffuse scenes, and
+ * on scene d a small one of this file's own, which shares the scene and the BRDF only. */
 #include "base/film.h"
-#include "math/rng.h"
-#include "math/warp.h"
+#include "elements/elements.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
+#include "math/rng.h"
+#include "math/warp.h"
 
 enum { RES = 32, BLOCK = 8 };
 
-static void compare(const char *name, imp_film *fe, const float *mc, double mc_se, double limit)
+static void compare(const char *name, imp_film *fe, const float *mc, double mc_se,
+                    double limit)
 {
     double a = 0, b = 0, apart = 0, sum = 0;
     const size_t n = imp__film_values(fe), ch = (size_t)fe->channels;
@@ -20,7 +21,8 @@ static void compare(const char *name, imp_film *fe, const float *mc, double mc_s
         for (int x = 0; x < RES; x += BLOCK) {
             double p = 0, q = 0;
             for (int k = 0; k < BLOCK * BLOCK; k++) {
-                const size_t i = ((size_t)(y + k / BLOCK) * RES + (size_t)(x + k % BLOCK)) * ch;
+                const size_t i =
+                    ((size_t)(y + k / BLOCK) * RES + (size_t)(x + k % BLOCK)) * ch;
                 for (size_t c = 0; c < ch; c++) p += fe->mean[i + c], q += mc[i + c];
             }
             apart += (p - q) * (p - q);
@@ -34,8 +36,8 @@ static void compare(const char *name, imp_film *fe, const float *mc, double mc_s
            100 * sqrt(apart / sum));
 }
 
-static imp_film *picture(imp_scene *s, struct imp_elements_options *o, enum imp_elements_image kind,
-                         int rays)
+static imp_film *picture(imp_scene *s, struct imp_elements_options *o,
+                         enum imp_elements_image kind, int rays)
 {
     imp_elements *e;
     imp_film *f;
@@ -48,7 +50,8 @@ static imp_film *picture(imp_scene *s, struct imp_elements_options *o, enum imp_
     return f;
 }
 
-static void diffuse(imp_context *ctx, const char *file, const char *name, int spp, double eps)
+static void diffuse(imp_context *ctx, const char *file, const char *name, int spp,
+                    double eps)
 {
     imp_scene *s = test_scene(ctx, file, IMP_MONO, "res=32");
     struct imp_run run = IMP_RUN_INIT;
@@ -60,7 +63,8 @@ static void diffuse(imp_context *ctx, const char *file, const char *name, int sp
     for (size_t k = 0; k < n; k++) var += (double)mc->se[k] * mc->se[k];
     struct imp_elements_options o = IMP_ELEMENTS_OPTIONS_INIT;
     o.eps_last = eps;
-    imp_film *fe = picture(s, &o, IMP_ELEMENTS_FLAT, 12); /* the light's edge needs rays */
+    imp_film *fe =
+        picture(s, &o, IMP_ELEMENTS_FLAT, 12); /* the light's edge needs rays */
     compare(name, fe, mc->mean, sqrt(var) / (double)n, 0.03);
     imp_film_destroy(fe);
     imp_film_destroy(mc);
@@ -97,7 +101,8 @@ static void gradient(imp_context *ctx)
             if (rows[k].param == (int)param) {
                 const double off = rows[k].derivative - g[i];
                 /* 3 standard errors, and 1 % for the mesh. */
-                tap_ok(fabs(off) < 3 * se[i] + 0.01 * fabs(g[i]) && se[i] < 0.05 * fabs(g[i]),
+                tap_ok(fabs(off) < 3 * se[i] + 0.01 * fabs(g[i]) &&
+                           se[i] < 0.05 * fabs(g[i]),
                        "d mean / d %s # %.5g walks %.5g se %.2g z %.2f", rows[k].name,
                        rows[k].derivative, g[i], se[i], off / se[i]);
             }
@@ -107,12 +112,13 @@ static void gradient(imp_context *ctx)
     imp_scene_destroy(s);
 }
 
-/* ---- Scene d: beams and glossy walls ------------------------------------------------------- */
+/* ---- Scene d: beams and glossy walls ------------------------------------------- */
 
 static double beam(const imp_scene *s, int shape, imp_v3 n, imp_v3 w)
 {
     const double c = imp__dot(n, w);
-    return c > 0 ? s->emitters[s->shapes[shape]->emitter]->input[0]->value[0] * pow(c, 20) : 0;
+    return c > 0 ? s->emitters[s->shapes[shape]->emitter]->input[0]->value[0] * pow(c, 20)
+                 : 0;
 }
 
 static double phong(imp_v3 n, imp_v3 wo, imp_v3 wi)
@@ -155,18 +161,20 @@ static double trace(const imp_scene *s, struct imp_sensor_ray ray, struct imp_ke
         dim += 3;
         imp_v3 wi;
         const imp_v3 wo = imp__to_local(&f, -ray.d);
-        /* Half the draws follow the lobe, half the cosine; the density is the mixture's. */
+        /* Half the draws follow the lobe, half the cosine; the density is the mixture's.
+         */
         const imp_v3 r = imp__v3(-wo[0], -wo[1], wo[2]);
         if (u[0] < 0.5) {
             wi = imp__cosine_hemisphere((double[2]){2 * u[0], u[1]});
         } else {
             const double z = pow(2 * u[0] - 1, 1.0 / 16), q = sqrt(fmax(0, 1 - z * z));
             const struct imp_frame lobe = imp__frame_from_normal(r);
-            wi = imp__to_world(&lobe, imp__v3(q * cos(IMP_2PI * u[1]), q * sin(IMP_2PI * u[1]), z));
+            wi = imp__to_world(
+                &lobe, imp__v3(q * cos(IMP_2PI * u[1]), q * sin(IMP_2PI * u[1]), z));
         }
         if (wi[2] <= 0) break;
-        const double pdf = 0.5 * wi[2] / IMP_PI +
-                           0.5 * 16 / IMP_2PI * pow(fmax(0, imp__dot(r, wi)), 15);
+        const double pdf =
+            0.5 * wi[2] / IMP_PI + 0.5 * 16 / IMP_2PI * pow(fmax(0, imp__dot(r, wi)), 15);
         const imp_v3 d = imp__to_world(&f, wi);
         weight *= phong(at.ng, -ray.d, d) * wi[2] / pdf;
         if (bounce > 3) {
@@ -191,8 +199,8 @@ static void glossy(imp_context *ctx, int spp)
             const struct imp_key key = imp__key(3, (uint64_t)p, (uint64_t)k);
             struct imp_sensor_ray ray;
             const struct imp_sensor *sensor = s->sensors[0];
-            sensor->ops->ray(sensor, p % RES + imp__u01(key, 0), p / RES + imp__u01(key, 1),
-                             (double[2]){0.5, 0.5}, &ray);
+            sensor->ops->ray(sensor, p % RES + imp__u01(key, 0),
+                             p / RES + imp__u01(key, 1), (double[2]){0.5, 0.5}, &ray);
             tap_add(&pixel, trace(s, ray, key));
         }
         mc[p] = (float)pixel.mean;
@@ -200,7 +208,9 @@ static void glossy(imp_context *ctx, int spp)
     }
     const struct imp_elements_phong wall = {"*", {0.1, 0.1, 0.1}, {0.6, 0.6, 0.6}, 15};
     static const struct imp_elements_beam beams[4] = {{"light_left", {0}, 20},
-        {"light_right", {0}, 20}, {"light_ceiling", {0}, 20}, {"light_back", {0}, 20}};
+                                                      {"light_right", {0}, 20},
+                                                      {"light_ceiling", {0}, 20},
+                                                      {"light_back", {0}, 20}};
     struct imp_elements_options o = IMP_ELEMENTS_OPTIONS_INIT;
     o.phong = &wall;
     o.beams = beams;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Mitsuba's own test scenes against Mitsuba's own references, with the z-test that `importon
- * compare --variance` makes: the orthographic sensor, in rgb and in mono.
- * The pictures are not ours to copy: IMP_SHARED names the folder that holds `mitsuba-scenes`;
+ * Mitsuba's own test scenes against Mitsuba's own references, with the z-test that
+ * `importon compare --variance` makes: the orthographic sensor, in rgb and in mono. The
+ * pictures are not ours to copy: IMP_SHARED names the folder that holds `mitsuba-scenes`;
  * without it the test is skipped. */
 #include "imp_scene.h"
 #include "imp_tap.h"
@@ -27,7 +27,8 @@ static void agrees(imp_context *ctx, const char *folder, const char *scene_file,
     test_must(ctx, imp_scene_load(ctx, path, &load, &scene));
     snprintf(path, sizeof path, "%s/refs/%s_ref_%s.exr", folder, reference_stem, suffix);
     test_must(ctx, imp_film_read(ctx, path, &reference));
-    snprintf(path, sizeof path, "%s/refs/%s_ref_%s_var.exr", folder, reference_stem, suffix);
+    snprintf(path, sizeof path, "%s/refs/%s_ref_%s_var.exr", folder, reference_stem,
+             suffix);
     test_must(ctx, imp_film_read(ctx, path, &variance));
     imp_film_get_info(reference, &info);
     run.spp = (int)(2e6 / (info.width * info.height)); /* scene-format 14 */
@@ -62,7 +63,8 @@ int main(void)
         return tap_done();
     }
     imp_context *ctx = test_context(0);
-    snprintf(folder, sizeof folder, "%s/mitsuba-scenes/tests/scenes/orthographic_sensor", shared);
+    snprintf(folder, sizeof folder, "%s/mitsuba-scenes/tests/scenes/orthographic_sensor",
+             shared);
     agrees(ctx, folder, "test_orthographic_path.xml", "test_orthographic", IMP_RGB);
     agrees(ctx, folder, "test_orthographic_path.xml", "test_orthographic", IMP_MONO);
     imp_context_destroy(ctx);

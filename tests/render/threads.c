@@ -6,13 +6,17 @@
 #include "imp_tap.h"
 #include "inverse/problem.h"
 
-struct output { double *numbers; size_t n; };
+struct output {
+    double *numbers;
+    size_t n;
+};
 
 static void keep(struct output *o, const void *from, size_t n, size_t size)
 {
     o->numbers = realloc(o->numbers, (o->n + n) * sizeof(double));
     for (size_t k = 0; k < n; k++)
-        o->numbers[o->n + k] = size == 8 ? ((const double *)from)[k] : ((const float *)from)[k];
+        o->numbers[o->n + k] =
+            size == 8 ? ((const double *)from)[k] : ((const float *)from)[k];
     o->n += n;
 }
 
@@ -42,7 +46,8 @@ static void run_all(int threads, imp_scene *(*make)(imp_context *), bool few,
     run.seed = 3;
     test_must(ctx, imp_render(scene, &run, &film));
     imp_film_get_info(film, &info);
-    const size_t values = (size_t)info.width * info.height * info.channels, n = imp_problem_n(p);
+    const size_t values = (size_t)info.width * info.height * info.channels,
+                 n = imp_problem_n(p);
     keep(out, imp_film_mean(film), values, 4);
     keep(out, imp_film_se(film), values, 4);
 
@@ -82,7 +87,10 @@ static void run_all(int threads, imp_scene *(*make)(imp_context *), bool few,
     imp_context_destroy(ctx);
 }
 
-static imp_scene *stam(imp_context *ctx) { return test_scene(ctx, "stam.xml", IMP_MONO, NULL); }
+static imp_scene *stam(imp_context *ctx)
+{
+    return test_scene(ctx, "stam.xml", IMP_MONO, NULL);
+}
 static imp_scene *cornell(imp_context *ctx)
 {
     return test_scene(ctx, "cornell.xml", IMP_RGB, "res=30");
@@ -102,7 +110,8 @@ int main(void)
         const char *name;
         imp_scene *(*make)(imp_context *);
         bool few;
-    } cases[] = {{"stam", stam, true}, {"cornell", cornell, true},
+    } cases[] = {{"stam", stam, true},
+                 {"cornell", cornell, true},
                  {"texture, box filter", map_box, false},
                  {"texture, gaussian filter", map_gaussian, false}};
     for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {

@@ -1,21 +1,22 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Albedo of every material by quadrature and by its own sampling: one number, and not more
- * than 1; reciprocity where the model has it; and the published numbers of the models. */
-#include <complex.h>
+ * Albedo of every material by quadrature and by its own sampling: one number, and not
+ * more than 1; reciprocity where the model has it; and the published numbers of the
+ * models. */
 #include "imp_kinds.h"
 #include "imp_sphere.h"
 #include "imp_tap.h"
 #include "kind/bsdf/fresnel.h"
 #include "kind/bsdf/microfacet.h"
 #include "kind/bsdf/presets.h"
+#include <complex.h>
 
 struct point {
     const struct imp_bsdf *b;
     const imp_spec *in;
     imp_v3 fixed;
     int lane;
-    bool from_light;   /* wi is fixed and wo runs: f cos_o/cos_i */
+    bool from_light; /* wi is fixed and wo runs: f cos_o/cos_i */
 };
 static double value(imp_v3 w, void *payload)
 {
@@ -29,10 +30,11 @@ static double value(imp_v3 w, void *payload)
 
 static bool is_stam_variant(const struct kind_case *c)
 {
-    return kind_has_config(c, "variant=microfacet") || kind_has_config(c, "variant=paper");
+    return kind_has_config(c, "variant=microfacet") ||
+           kind_has_config(c, "variant=paper");
 }
 
-/* ---- Albedo: two ways, and at most 1 ------------------------------------------------- */
+/* ---- Albedo: two ways, and at most 1 ------------------------------------------- */
 
 static void albedo_visit(const struct kind_case *c, void *payload)
 {
@@ -57,23 +59,25 @@ static void albedo_visit(const struct kind_case *c, void *payload)
                     in[k] = imp__spec(k == j);
             }
             struct point p = {b, in, wo, 0, false};
-            const double smooth = b->flags & IMP_BSDF_SMOOTH
-                                      ? sphere_integral(value, &p, -1, 1, 1e-4) : 0;
+            const double smooth =
+                b->flags & IMP_BSDF_SMOOTH ? sphere_integral(value, &p, -1, 1, 1e-4) : 0;
             struct tap_stat mc = {0};
             for (uint32_t n = 0; n < 4000; n++) {
                 const struct imp_key key = imp__key(33, (uint64_t)(100 * i + j), n);
-                const double u[3] = {imp__u01(key, 0), imp__u01(key, 1), imp__u01(key, 2)};
+                const double u[3] = {imp__u01(key, 0), imp__u01(key, 1),
+                                     imp__u01(key, 2)};
                 d.wo = wo;
                 const bool ok = b->ops->sample(b, in, u, &d, &s);
-                if (b->flags & IMP_BSDF_DELTA) /* the delta lobes alone; power, not radiance */
+                if (b->flags &
+                    IMP_BSDF_DELTA) /* the delta lobes alone; power, not radiance */
                     tap_add(&mc, ok && d.lobe >= 0 ? s.f[0] / s.pdf * s.eta * s.eta : 0);
-                else
-                    tap_add(&mc, ok ? s.f[0] / s.pdf : 0);
+                else tap_add(&mc, ok ? s.f[0] / s.pdf : 0);
             }
             /* Lambert drawn from a narrow lobe: the tails are too heavy for a z-test. */
-            const bool heavy = kind_has_config(c, "sampling=phong") &&
-                               strcmp(q->name, "diffuse") == 0;
-            if (!(b->flags & IMP_BSDF_DELTA) && tap_se(&mc) > 0 && smooth > 1e-3 && !heavy)
+            const bool heavy =
+                kind_has_config(c, "sampling=phong") && strcmp(q->name, "diffuse") == 0;
+            if (!(b->flags & IMP_BSDF_DELTA) && tap_se(&mc) > 0 && smooth > 1e-3 &&
+                !heavy)
                 tap_add(&z, (mc.mean - smooth) / (tap_se(&mc) + 1e-5));
             const double all =
                 smooth + (b->flags & IMP_BSDF_DELTA ? mc.mean - 4 * tap_se(&mc) : 0);
@@ -89,11 +93,12 @@ static void albedo_visit(const struct kind_case *c, void *payload)
     if (z.n > 3)
         tap_ok(fabs(z.mean) * sqrt(z.n) < 4.5 &&
                    imp__chi2_tail(z.m2 + z.n * z.mean * z.mean, z.n) > 1e-4,
-               "%s: albedo by sampling is albedo by quadrature # mean z %.2f, sd %.2f of %.0f",
+               "%s: albedo by sampling is albedo by quadrature # mean z %.2f, sd %.2f of "
+               "%.0f",
                c->label, z.mean, sqrt(z.m2 / (z.n - 1)), z.n);
 }
 
-/* ---- Reciprocity --------------------------------------------------------------------- */
+/* ---- Reciprocity --------------------------------------------------------------- */
 
 static void reciprocity_visit(const struct kind_case *c, void *payload)
 {
@@ -120,19 +125,22 @@ static void reciprocity_visit(const struct kind_case *c, void *payload)
         }
     }
     if (is_stam_variant(c))
-        tap_ok(worst > 0.1, "%s: not reciprocal, as documented (E28) # %.2g", c->label, worst);
+        tap_ok(worst > 0.1, "%s: not reciprocal, as documented (E28) # %.2g", c->label,
+               worst);
     else
-        tap_ok(worst < 1e-10 && n > 100, "%s: reciprocal # %.1e in %d", c->label, worst, n);
+        tap_ok(worst < 1e-10 && n > 100, "%s: reciprocal # %.1e in %d", c->label, worst,
+               n);
 }
 
-/* ---- Published numbers ---------------------------------------------------------------- */
+/* ---- Published numbers --------------------------------------------------------- */
 
 static struct imp_bsdf m2[3];
 static void find_m2(const struct kind_case *c, void *payload)
 {
     (void)payload;
     if (strcmp(c->kind, "stam_m2") != 0) return;
-    m2[kind_has_config(c, "variant=paper") ? 2 : kind_has_config(c, "variant=microfacet")] =
+    m2[kind_has_config(c, "variant=paper") ? 2
+                                           : kind_has_config(c, "variant=microfacet")] =
         c->bsdf;
 }
 static double m2_albedo(int variant, double alpha, double degrees, bool from_light)
@@ -149,12 +157,18 @@ static void stam_numbers(void)
     tap_near(m2_albedo(0, 10, 0, false), 0.717, 0, 6e-4, "M2r: albedo at 0 degrees");
     tap_near(m2_albedo(0, 10, 60, false), 0.623, 0, 6e-4, "M2r: albedo at 60 degrees");
     tap_near(m2_albedo(0, 10, 89, false), 0.504, 0, 6e-4, "M2r: albedo at 89 degrees");
-    tap_near(m2_albedo(1, 0, 75, false), 0.500, 0, 6e-4, "M2: lobe albedo, 75 degrees, 0");
-    tap_near(m2_albedo(1, 5, 75, false), 0.610, 0, 6e-4, "M2: lobe albedo, 75 degrees, 5");
-    tap_near(m2_albedo(1, 1, 75, true), 1.08, 0, 6e-3, "M2: light-side albedo, 75 degrees");
-    tap_near(m2_albedo(1, 1, 85, true), 3.0, 0, 6e-2, "M2: light-side albedo, 85 degrees");
-    tap_near(m2_albedo(1, 1, 89, true), 14.7, 0, 6e-2, "M2: light-side albedo, 89 degrees");
-    tap_near(m2_albedo(2, 100, 0, false), 0.123, 0, 6e-4, "M2p: lobe albedo at alpha 100");
+    tap_near(m2_albedo(1, 0, 75, false), 0.500, 0, 6e-4,
+             "M2: lobe albedo, 75 degrees, 0");
+    tap_near(m2_albedo(1, 5, 75, false), 0.610, 0, 6e-4,
+             "M2: lobe albedo, 75 degrees, 5");
+    tap_near(m2_albedo(1, 1, 75, true), 1.08, 0, 6e-3,
+             "M2: light-side albedo, 75 degrees");
+    tap_near(m2_albedo(1, 1, 85, true), 3.0, 0, 6e-2,
+             "M2: light-side albedo, 85 degrees");
+    tap_near(m2_albedo(1, 1, 89, true), 14.7, 0, 6e-2,
+             "M2: light-side albedo, 89 degrees");
+    tap_near(m2_albedo(2, 100, 0, false), 0.123, 0, 6e-4,
+             "M2p: lobe albedo at alpha 100");
 
     /* With the sine, over all half-vectors: (alpha + 2)/2 B(3/2, (alpha + 2)/2). */
     static const double published[3][2] = {{0, 0.667}, {10, 0.341}, {100, 0.123}};
@@ -169,11 +183,13 @@ static void stam_numbers(void)
                                 lgamma_r(0.5 * a + 2.5, &sg));
         tap_near(sum, 0.5 * (a + 2) * beta, 1e-10, 0, "M2p: E[sin] is a beta function");
         tap_near(sum, published[i][1], 0, 6e-4, "M2p: its published value");
-        /* Seen from the normal, half-vectors beyond 45 degrees mirror below the horizon. */
+        /* Seen from the normal, half-vectors beyond 45 degrees mirror below the horizon.
+         */
         imp__gauss_legendre(64, 0, IMP_PI / 4, x, w);
         for (int k = 0; k < 64; k++)
             cut += w[k] * (a + 2) * pow(cos(x[k]), a + 1) * sin(x[k]) * sin(x[k]);
-        tap_near(m2_albedo(2, a, 0, false), cut, 1e-5, 0, "M2p: albedo at normal incidence");
+        tap_near(m2_albedo(2, a, 0, false), cut, 1e-5, 0,
+                 "M2p: albedo at normal incidence");
     }
 }
 
@@ -182,7 +198,8 @@ static double conductor_amplitudes(double c, double eta, double k)
 {
     const double complex n = eta + I * k;
     const double complex ct = csqrt(1 - (1 - c * c) / (n * n));
-    const double complex rs = (c - n * ct) / (c + n * ct), rp = (n * c - ct) / (n * c + ct);
+    const double complex rs = (c - n * ct) / (c + n * ct),
+                         rp = (n * c - ct) / (n * c + ct);
     return 0.5 * (creal(rs * conj(rs)) + creal(rp * conj(rp)));
 }
 
@@ -191,14 +208,16 @@ static void fresnel_numbers(void)
     double ct, et;
     tap_near(imp__fresnel_dielectric(1, 1.5046 / 1.000277, &ct, &et), 0.0405364, 0, 1e-7,
              "bk7 in air, normal incidence");
-    tap_near(imp__fresnel_dielectric(0.5, 1.5046 / 1.000277, &ct, &et), 0.0898799, 0, 1e-7,
-             "bk7 in air at cos 0.5");
+    tap_near(imp__fresnel_dielectric(0.5, 1.5046 / 1.000277, &ct, &et), 0.0898799, 0,
+             1e-7, "bk7 in air at cos 0.5");
     const double R = imp__fresnel_dielectric(1, 1.5046 / 1.000277, &ct, &et);
     tap_near(2 * R / (1 + R), 0.0779144, 0, 1e-7, "bk7: a thin sheet");
     tap_near(imp__fresnel_dielectric(1, 1.3330 / 1.000277, &ct, &et), 0.0203345, 0, 1e-7,
              "water in air");
-    tap_near(imp__fresnel_dielectric(-1, 1.5, &ct, &et), 0.04, 1e-14, 0, "from inside: the same");
-    tap_ok(imp__fresnel_dielectric(-0.5, 1.5, &ct, &et) == 1 && ct == 0, "total reflection");
+    tap_near(imp__fresnel_dielectric(-1, 1.5, &ct, &et), 0.04, 1e-14, 0,
+             "from inside: the same");
+    tap_ok(imp__fresnel_dielectric(-0.5, 1.5, &ct, &et) == 1 && ct == 0,
+           "total reflection");
     tap_ok(imp__fresnel_dielectric(0.3, 1, &ct, &et) == 0, "no boundary, no reflection");
 
     /* A reflected ray and the one refracted into it carry the same share (Stokes). */
@@ -216,7 +235,8 @@ static void fresnel_numbers(void)
     for (int i = 1; i <= 200; i++) {
         const struct imp_key key = imp__key(3, 3, (uint64_t)i);
         const double c = i / 200.0;
-        const imp_spec eta = {0.02 + 5 * imp__u01(key, 0), 0.02 + 2 * imp__u01(key, 1), 0.1, 0},
+        const imp_spec eta = {0.02 + 5 * imp__u01(key, 0), 0.02 + 2 * imp__u01(key, 1),
+                              0.1, 0},
                        k = {8 * imp__u01(key, 2), imp__u01(key, 3), 0, 0};
         imp_spec f;
         imp__fresnel_conductor(c, &eta, &k, &f);
@@ -232,7 +252,8 @@ static void fresnel_numbers(void)
             const double e = m->eta[l], kk = m->k[l];
             imp_spec f;
             imp__fresnel_conductor(1, &eta, &k, &f);
-            const double R0 = ((e - 1) * (e - 1) + kk * kk) / ((e + 1) * (e + 1) + kk * kk);
+            const double R0 =
+                ((e - 1) * (e - 1) + kk * kk) / ((e + 1) * (e + 1) + kk * kk);
             error = fmax(error, fabs(f[0] - R0));
             most = fmax(most, f[0]);
         }
@@ -250,7 +271,7 @@ static void fresnel_numbers(void)
            "names of conductors");
 }
 
-/* ---- Microfacets ---------------------------------------------------------------------- */
+/* ---- Microfacets --------------------------------------------------------------- */
 
 struct facet_point {
     const struct imp__microfacet *f;
@@ -268,7 +289,8 @@ static void microfacets(void)
     const struct imp__microfacet unit = {IMP_BECKMANN, true, 1, 1};
     const double t = 1; /* a = 1/(alpha tan) = 1 */
     const imp_v3 v = imp__normalize(imp__v3(t, 0, 1));
-    tap_near(imp__microfacet_g1(&unit, &v, NULL), 0.976593, 0, 1e-6 * 1, "Beckmann G1 at a = 1");
+    tap_near(imp__microfacet_g1(&unit, &v, NULL), 0.976593, 0, 1e-6 * 1,
+             "Beckmann G1 at a = 1");
     for (int i = 0; i < 8; i++) {
         const struct imp__microfacet f = {i & 1 ? IMP_GGX : IMP_BECKMANN, true,
                                           i & 2 ? 0.1 : 0.5, i & 4 ? 0.9 : 0.5};
@@ -283,7 +305,8 @@ static void microfacets(void)
     }
 }
 
-/* c n_wi^2 is the same both ways through a refraction (radiance over n^2 is conserved). */
+/* c n_wi^2 is the same both ways through a refraction (radiance over n^2 is conserved).
+ */
 static void dielectric_visit(const struct kind_case *c, void *payload)
 {
     const struct imp_bsdf *b = &c->bsdf;
@@ -296,7 +319,8 @@ static void dielectric_visit(const struct kind_case *c, void *payload)
         struct imp_bsdf_sample s;
         imp_spec back;
         const double u[3] = {1 - 1e-15, 0.5, 0.5};
-        const imp_spec in[3] = {imp__spec(0.7), imp__spec(0.4), imp__spec(0.5 + 0.01 * i)};
+        const imp_spec in[3] = {imp__spec(0.7), imp__spec(0.4),
+                                imp__spec(0.5 + 0.01 * i)};
         if (!b->ops->sample(b, in, u, &d, &s)) continue;
         const struct imp_dirs r = {d.wo, {0}, 0};
         if (d.lobe == 0) continue; /* total reflection */
@@ -306,11 +330,13 @@ static void dielectric_visit(const struct kind_case *c, void *payload)
         snell = fmax(snell, fabs(so - s.eta * si));
         e = (struct imp_dirs){d.wi, d.wo, d.lobe};
         b->ops->eval(b, in, &e, &back);
-        reciprocal = fmax(reciprocal, fabs(s.f[0] * s.eta * s.eta - back[0] / (s.eta * s.eta)));
+        reciprocal =
+            fmax(reciprocal, fabs(s.f[0] * s.eta * s.eta - back[0] / (s.eta * s.eta)));
     }
     tap_ok(n > 50 && snell < 1e-14, "%s: Snell # %.1e", c->label, snell);
     tap_ok(sum < 1e-15, "%s: chances sum to 1 # %.1e", c->label, sum);
-    tap_ok(reciprocal < 1e-13, "%s: radiance over n^2 is reciprocal # %.1e", c->label, reciprocal);
+    tap_ok(reciprocal < 1e-13, "%s: radiance over n^2 is reciprocal # %.1e", c->label,
+           reciprocal);
 }
 
 int main(void)

@@ -1,22 +1,23 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Every material's sampling against its density: chi-square over directions of wi (cells cut
- * where a pilot run falls densely, expected counts by adaptive quadrature of pdf), with one
- * cell for each delta lobe and one for "no sample". A density that does not integrate to
- * what is drawn fails as surely as one of the wrong shape. Along the way: what sample says
- * about its draw is what eval and pdf say. */
+ * Every material's sampling against its density: chi-square over directions of wi (cells
+ * cut where a pilot run falls densely, expected counts by adaptive quadrature of pdf),
+ * with one cell for each delta lobe and one for "no sample". A density that does not
+ * integrate to what is drawn fails as surely as one of the wrong shape. Along the way:
+ * what sample says about its draw is what eval and pdf say. */
 #include "imp_kinds.h"
 #include "imp_sphere.h"
 #include "imp_tap.h"
 
 enum {
-    DIRECTIONS = 24,          /* of wo, for every configuration */
+    DIRECTIONS = 24, /* of wo, for every configuration */
     SAMPLES_OF_A_KIND = 2000000,
-    PILOT = 1500, PILOT_LIMIT = 25,
-    MIN_EXPECTED = 10,        /* cells below are pooled: chi-square is an approximation */
+    PILOT = 1500,
+    PILOT_LIMIT = 25,
+    MIN_EXPECTED = 10, /* cells below are pooled: chi-square is an approximation */
     LOBES = 4
 };
-static double level;          /* of one chi-square, so that all together fail 1 % (Sidak) */
+static double level; /* of one chi-square, so that all together fail 1 % (Sidak) */
 
 struct point {
     const struct imp_bsdf *b;
@@ -31,16 +32,16 @@ static double density(imp_v3 wi, void *payload)
 }
 
 struct result {
-    double p;             /* of the chi-square */
+    double p; /* of the chi-square */
     int cells;
-    double total;         /* of the density and the delta lobes */
-    double none;          /* fraction of draws that gave no sample */
+    double total; /* of the density and the delta lobes */
+    double none;  /* fraction of draws that gave no sample */
     double f_error, pdf_error;
     bool sane;
 };
 
-static bool draw(const struct point *p, struct imp_key key, uint32_t i, struct imp_dirs *d,
-                 struct imp_bsdf_sample *s)
+static bool draw(const struct point *p, struct imp_key key, uint32_t i,
+                 struct imp_dirs *d, struct imp_bsdf_sample *s)
 {
     const double u[3] = {imp__u01(key, 3 * i), imp__u01(key, 3 * i + 1),
                          imp__u01(key, 3 * i + 2)};
@@ -61,10 +62,8 @@ static void draw_check(const struct point *p, const struct imp_dirs *d,
     r->pdf_error = fmax(r->pdf_error, fabs(pdf - s->pdf) / pdf);
     r->sane &= isfinite(s->pdf) && s->pdf > 0 && s->eta > 0 && d->lobe < LOBES &&
                fabs(imp__length(d->wi) - 1) < 1e-12 && d->wo[2] == p->wo[2];
-    if (d->lobe == IMP_SMOOTH)
-        r->sane &= (p->b->flags & IMP_BSDF_SMOOTH) != 0;
-    else
-        r->sane &= (p->b->flags & IMP_BSDF_DELTA) != 0;
+    if (d->lobe == IMP_SMOOTH) r->sane &= (p->b->flags & IMP_BSDF_SMOOTH) != 0;
+    else r->sane &= (p->b->flags & IMP_BSDF_DELTA) != 0;
     r->sane &= d->wi[2] * d->wo[2] > 0 || (p->b->flags & IMP_BSDF_TRANSMIT);
 }
 
@@ -83,7 +82,8 @@ static struct result check(const struct point *p, int samples, uint64_t seed)
             sphere_tree_pilot(&tree, d.wi, PILOT_LIMIT);
     sphere_tree_reset(&tree);
     for (int i = 0; i < samples; i++) {
-        if (!draw(p, imp__key(seed, 2, (uint64_t)i / 1000), (uint32_t)(i % 1000), &d, &s)) {
+        if (!draw(p, imp__key(seed, 2, (uint64_t)i / 1000), (uint32_t)(i % 1000), &d,
+                  &s)) {
             none++;
             continue;
         }
@@ -99,22 +99,22 @@ static struct result check(const struct point *p, int samples, uint64_t seed)
 
     double chi2 = 0, pool_expected = 0, pool_count = 0;
     int cells = 0;
-#define CELL(expected, observed)                                                           \
-    do {                                                                                   \
-        const double e_ = (expected), o_ = (observed);                                     \
-        if (e_ < MIN_EXPECTED) {                                                           \
-            pool_expected += e_;                                                           \
-            pool_count += o_;                                                              \
-        } else {                                                                           \
-            chi2 += (o_ - e_) * (o_ - e_) / e_;                                            \
-            cells++;                                                                       \
-        }                                                                                  \
+#define CELL(expected, observed)                                                         \
+    do {                                                                                 \
+        const double e_ = (expected), o_ = (observed);                                   \
+        if (e_ < MIN_EXPECTED) {                                                         \
+            pool_expected += e_;                                                         \
+            pool_count += o_;                                                            \
+        } else {                                                                         \
+            chi2 += (o_ - e_) * (o_ - e_) / e_;                                          \
+            cells++;                                                                     \
+        }                                                                                \
     } while (0)
     for (int i = 0; i < tree.n; i++) {
         struct sphere_cell *c = &tree.cell[i];
         if (c->child || !(p->b->flags & IMP_BSDF_SMOOTH)) continue;
-        const double mass = sphere_cell_integral(c, sphere_rule(c, density, (void *)p), density,
-                                                 (void *)p, 0.02 / samples, 12);
+        const double mass = sphere_cell_integral(c, sphere_rule(c, density, (void *)p),
+                                                 density, (void *)p, 0.02 / samples, 12);
         r.total += mass;
         CELL(samples * mass, c->count);
     }
@@ -128,7 +128,8 @@ static struct result check(const struct point *p, int samples, uint64_t seed)
     if (pool_expected >= 1 || pool_count >= 1) {
         /* At least one expected, so that the pool's term cannot explode. */
         pool_expected = fmax(pool_expected, 1);
-        chi2 += (pool_count - pool_expected) * (pool_count - pool_expected) / pool_expected;
+        chi2 +=
+            (pool_count - pool_expected) * (pool_count - pool_expected) / pool_expected;
         cells++;
     }
 #undef CELL
@@ -139,7 +140,10 @@ static struct result check(const struct point *p, int samples, uint64_t seed)
 }
 
 /* How many configurations a kind has: they share the kind's samples. */
-struct census { const char *kind; int n; };
+struct census {
+    const char *kind;
+    int n;
+};
 static void count_visit(const struct kind_case *c, void *payload)
 {
     struct census *all = payload;
@@ -162,14 +166,17 @@ static void visit(const struct kind_case *c, void *payload)
     bool sane = true;
     for (int i = 0; i < DIRECTIONS; i++) {
         struct point p = {.b = &c->bsdf};
-        kind_inputs(p.b, i % 6 == 5 ? KIND_WIDE : i == 0 ? KIND_LOWEST : KIND_RANDOM,
+        kind_inputs(p.b,
+                    i % 6 == 5 ? KIND_WIDE
+                    : i == 0   ? KIND_LOWEST
+                               : KIND_RANDOM,
                     500 + (uint64_t)i, p.in);
         /* One-sided kinds have nothing below: three of four from above. */
         p.wo = kind_direction(i % 4 == 3 ? 2 * i + 1 : 2 * i, 21);
         const struct result r = check(&p, samples, 900 + (uint64_t)i);
         if (r.p < level)
-            printf("# wo %.3f %.3f %.3f: p %.2g, total %.6f, none %.6f\n", p.wo[0], p.wo[1],
-                   p.wo[2], r.p, r.total, r.none);
+            printf("# wo %.3f %.3f %.3f: p %.2g, total %.6f, none %.6f\n", p.wo[0],
+                   p.wo[1], p.wo[2], r.p, r.total, r.none);
         worst = fmin(worst, r.p);
         above = fmax(above, r.total - 1);
         f_error = fmax(f_error, r.f_error);
@@ -177,11 +184,13 @@ static void visit(const struct kind_case *c, void *payload)
         sane &= r.sane;
         cells += r.cells;
     }
-    tap_ok(worst > level, "%s: draws follow the density # least p %.2g of %d, %d cells, %d draws",
+    tap_ok(worst > level,
+           "%s: draws follow the density # least p %.2g of %d, %d cells, %d draws",
            c->label, worst, DIRECTIONS, cells, samples * DIRECTIONS);
     tap_ok(above < 1e-4, "%s: no more than 1 in all # %.1e above", c->label, above);
     tap_ok(f_error < 1e-12 && pdf_error < 1e-10,
-           "%s: sample says what eval and pdf say # %.1e %.1e", c->label, f_error, pdf_error);
+           "%s: sample says what eval and pdf say # %.1e %.1e", c->label, f_error,
+           pdf_error);
     tap_ok(sane, "%s: draws are unit vectors, finite, on an allowed side", c->label);
     if (!(c->bsdf.flags & IMP_BSDF_DELTA))
         tap_ok(cells >= 1000, "%s: the test looks closely # %d cells", c->label, cells);
@@ -189,11 +198,13 @@ static void visit(const struct kind_case *c, void *payload)
 
 /* The test, tested: densities that are off by little must be caught. */
 static const struct imp_bsdf_ops *honest;
-static double pdf_tilted(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
+static double pdf_tilted(const struct imp_bsdf *b, const imp_spec *in,
+                         const struct imp_dirs *d)
 {
     return honest->pdf(b, in, d) * (1 + 0.3 * (d->wi[2] - 2.0 / 3));
 }
-static double pdf_small(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
+static double pdf_small(const struct imp_bsdf *b, const imp_spec *in,
+                        const struct imp_dirs *d)
 {
     return honest->pdf(b, in, d) * 0.98;
 }

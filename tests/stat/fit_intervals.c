@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Intervals of whole fits: 100 noisy pictures of the box, each fitted with walks of its own;
- * the truth must lie in the 95 % intervals 90 to 99 times, with the pictures' noise given and
- * without. */
-#include <math.h>
-#include "inverse_scenes.h"
+ * Intervals of whole fits: 100 noisy pictures of the box, each fitted with walks of its
+ * own; the truth must lie in the 95 % intervals 90 to 99 times, with the pictures' noise
+ * given and without. */
 #include "imp_tap.h"
+#include "inverse_scenes.h"
+#include <math.h>
 
 enum { SEEDS = 100, N = 3 };
 
@@ -44,8 +44,10 @@ static void coverage(imp_context *ctx, int noise_given)
     }
     tap_ok(failed == 0, "%d fits", SEEDS);
     for (int i = 0; i < N; i++)
-        tap_ok(covered[i] >= 90 && covered[i] <= 99 + 1, "channel %d, noise %s # %d of %d intervals "
-               "hold the truth", i, noise_given ? "given" : "from residuals", covered[i], SEEDS);
+        tap_ok(covered[i] >= 90 && covered[i] <= 99 + 1,
+               "channel %d, noise %s # %d of %d intervals "
+               "hold the truth",
+               i, noise_given ? "given" : "from residuals", covered[i], SEEDS);
     tap_ok(z2.mean < 1.5 && z2.mean > 0.6, "mean z^2 # %.2f", z2.mean);
     imp_scene_destroy(s);
 }

@@ -3,9 +3,9 @@
  * Intervals are right when they hold the truth as often as they say: 100 data sets, each
  * with its own noise, fitted with Monte Carlo noise of about the same size. And they must
  * say nothing about what the data do not determine. */
-#include "toy_goal.h"
-#include "inverse/covariance.h"
 #include "imp_tap.h"
+#include "inverse/covariance.h"
+#include "toy_goal.h"
 
 static imp_context *ctx;
 
@@ -37,8 +37,9 @@ int main(void)
         toy_least_squares(&t, ls, inv);
         for (int k = 0; k < TOY_N; k++) {
             covered[k] += v[k].lo95 <= t.truth[k] && t.truth[k] <= v[k].hi95;
-            tap_add(&ratio, v[k].se * v[k].se
-                    / (inv[k * TOY_N + k] * (0.2 * 0.2 + 0.3 * 0.3 / REPLICATES)));
+            tap_add(&ratio,
+                    v[k].se * v[k].se /
+                        (inv[k * TOY_N + k] * (0.2 * 0.2 + 0.3 * 0.3 / REPLICATES)));
         }
         tap_add(&sigma, u.noise_scale);
         imp__uncertainty_destroy(ctx, &u);
@@ -46,8 +47,8 @@ int main(void)
     }
     tap_ok(failed == 0, "every fit gives intervals");
     for (int k = 0; k < TOY_N; k++)
-        tap_ok(covered[k] >= 88 && covered[k] <= 100, "95 %% interval of variable %d # covers %d of %d",
-               k, covered[k], SEEDS);
+        tap_ok(covered[k] >= 88 && covered[k] <= 100,
+               "95 %% interval of variable %d # covers %d of %d", k, covered[k], SEEDS);
     const int all = covered[0] + covered[1] + covered[2] + covered[3];
     tap_ok(all >= 360 && all <= 396, "95 %% intervals # cover %.1f %%", all / 4.0);
     tap_z(&sigma, 0.04, 2e-3, "variance of the data, estimated from residuals");
@@ -61,11 +62,12 @@ int main(void)
     }
     for (int k = 0; k < TOY_N; k++) t.scale[k] = fabs(t.truth[k]);
     enum imp_status st = imp__covariance(&t.goal, t.truth, REPLICATES, v, &u);
-    tap_ok(st == IMP_OK && !v[0].determined && !v[3].determined && v[1].determined
-           && v[2].determined && isnan(v[0].lo95) && isnan(v[3].hi95) && u.n_loose == 1,
+    tap_ok(st == IMP_OK && !v[0].determined && !v[3].determined && v[1].determined &&
+               v[2].determined && isnan(v[0].lo95) && isnan(v[3].hi95) && u.n_loose == 1,
            "an ill-posed pair is found # loosest (%.2f %.2f %.2f %.2f), condition %g",
            u.loosest[0], u.loosest[1], u.loosest[2], u.loosest[3], u.condition);
-    tap_ok(fabs(u.x[0] - t.truth[0]) < 0.5 && v[1].se > 0, "and the rest is still fitted");
+    tap_ok(fabs(u.x[0] - t.truth[0]) < 0.5 && v[1].se > 0,
+           "and the rest is still fitted");
     imp__uncertainty_destroy(ctx, &u);
 
     /* The truth sits at a bound: one-sided interval. */
@@ -77,8 +79,9 @@ int main(void)
     memcpy(x, t.truth, sizeof x);
     x[2] = t.lo[2];
     st = imp__covariance(&t.goal, x, REPLICATES, v, &u);
-    tap_ok(st == IMP_OK && v[2].at_bound == -1 && v[2].lo95 == t.lo[2] && v[2].hi95 > v[2].lo95
-           && v[2].determined, "at a bound # [%g, %g]", v[2].lo95, v[2].hi95);
+    tap_ok(st == IMP_OK && v[2].at_bound == -1 && v[2].lo95 == t.lo[2] &&
+               v[2].hi95 > v[2].lo95 && v[2].determined,
+           "at a bound # [%g, %g]", v[2].lo95, v[2].hi95);
     imp__uncertainty_destroy(ctx, &u);
     imp_context_destroy(ctx);
     return tap_done();

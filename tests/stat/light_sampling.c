@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Drawing points on shapes towards a reference point: draws against densities over the
- * sphere of directions, solid angles and form factors against closed forms, and the lights
- * that are made of them. */
+ * sphere of directions, solid angles and form factors against closed forms, and the
+ * lights that are made of them. */
 #include "imp_tap.h"
 #include "math/rng.h"
 #include "math/warp.h"
@@ -14,7 +14,10 @@ enum { ROWS = 12, COLUMNS = 24, BINS = ROWS * COLUMNS };
 
 /* The cone of directions from ref that holds the shape's bounding sphere; all directions
  * from inside it. Bins are equal solid angles. */
-struct cone { struct imp_frame f; double height; };
+struct cone {
+    struct imp_frame f;
+    double height;
+};
 static struct cone cone_around(const struct imp_shape *s, imp_v3 ref)
 {
     const imp_v3 to = (s->lo + s->hi) * 0.5 - ref;
@@ -38,13 +41,14 @@ static int cone_bin(const struct cone *c, imp_v3 w)
 static imp_v3 cone_direction(const struct cone *c, double u, double v)
 {
     const double k = u * c->height, sine = sqrt(fmax(0, k * (2 - k)));
-    return imp__to_world(&c->f, imp__v3(sine * cos(IMP_2PI * v), sine * sin(IMP_2PI * v),
-                                        1 - k));
+    return imp__to_world(
+        &c->f, imp__v3(sine * cos(IMP_2PI * v), sine * sin(IMP_2PI * v), 1 - k));
 }
 
-/* Draws whose point is the first that their ray meets, against the integral of the density
- * of first hits. Both sides leave out what the shape itself hides, and what is seen nearly
- * from the edge: densities like 1/cos in directions too thin for the quadrature. */
+/* Draws whose point is the first that their ray meets, against the integral of the
+ * density of first hits. Both sides leave out what the shape itself hides, and what is
+ * seen nearly from the edge: densities like 1/cos in directions too thin for the
+ * quadrature. */
 static void against_density(struct imp_shape *s, imp_v3 ref, const char *where)
 {
     enum { DRAWS = 40000, RAYS = 48 };
@@ -72,11 +76,13 @@ static void against_density(struct imp_shape *s, imp_v3 ref, const char *where)
         const int found = imp__intersect(&world, &ref, &l.wi, 0, INFINITY, &hit);
         struct imp_surface at = {.uv = {0}};
         if (found) s->ops->surface(s, &hit, &ref, &l.wi, &at);
-        if (!found || imp__length(at.p - l.p) > 1e-3 * size || imp__dot(l.ng, at.ng) < 0.99) {
+        if (!found || imp__length(at.p - l.p) > 1e-3 * size ||
+            imp__dot(l.ng, at.ng) < 0.99) {
             tap_add(&angle, 0);
             continue;
         }
-        const double pdf = s->ops->pdf_toward(s, &ref, &hit, &at), c = imp__dot(at.ng, l.wi);
+        const double pdf = s->ops->pdf_toward(s, &ref, &hit, &at),
+                     c = imp__dot(at.ng, l.wi);
         /* Floats of Embree move the point along the surface by 1e-7 / cos. */
         if (fabs(c) > 0.05) {
             const double slack = s->geometry == IMP_ANALYTIC ? 1e-9 : 1e-3;
@@ -118,17 +124,20 @@ static void against_density(struct imp_shape *s, imp_v3 ref, const char *where)
         const double p = count[bin] / DRAWS;
         total += density[bin];
         if (density[bin] * DRAWS < 10) continue;
-        chi2 += imp__sqr(p - density[bin]) /
-                (fmax(p, density[bin]) / DRAWS + variance[bin]);
+        chi2 +=
+            imp__sqr(p - density[bin]) / (fmax(p, density[bin]) / DRAWS + variance[bin]);
         dof++;
     }
     const double z = dof > 0 ? (chi2 - dof) / sqrt(2 * dof) : INFINITY;
-    const double za = (angle.mean - angle_ref.mean) / hypot(tap_se(&angle), tap_se(&angle_ref));
+    const double za =
+        (angle.mean - angle_ref.mean) / hypot(tap_se(&angle), tap_se(&angle_ref));
     tap_ok(z < 5 && fabs(za) < 4.5 && outside == 0 && mismatch <= DRAWS / 2000 &&
                none <= DRAWS / 1000 && visible > DRAWS / 20 && total < 1.02 &&
                tap_se(&angle) < 0.05 * angle.mean,
-           "%s from %s # chi2 z %.2f in %g bins, solid angle %.4g z %.2f, mismatch %d none %d "
-           "visible %d", s->ops->name, where, z, dof, angle.mean, za, mismatch, none, visible);
+           "%s from %s # chi2 z %.2f in %g bins, solid angle %.4g z %.2f, mismatch %d "
+           "none %d "
+           "visible %d",
+           s->ops->name, where, z, dof, angle.mean, za, mismatch, none, visible);
 }
 
 static void densities(void)
@@ -137,13 +146,16 @@ static void densities(void)
     for (int k = 0; imp__shape_kinds[k]; k++)
         for (int place = 0; place < 4; place++) {
             const struct imp_shape_ops *ops = imp__shape_kinds[k];
-            const int flat = !strcmp(ops->name, "rectangle") || !strcmp(ops->name, "disk");
-            const int round = !strcmp(ops->name, "sphere") || !strcmp(ops->name, "cylinder");
+            const int flat =
+                !strcmp(ops->name, "rectangle") || !strcmp(ops->name, "disk");
+            const int round =
+                !strcmp(ops->name, "sphere") || !strcmp(ops->name, "cylinder");
             world_begin(ctx);
             struct imp_node *n = kind_node(ops);
-            const struct imp_mat4 turn = imp__rotate(imp__normalize(imp__v3(1, 1, 3)), 50);
-            const struct imp_mat4 scale = imp__scale(round ? imp__v3(1.3, 1.3, 1.3)
-                                                           : imp__v3(1.5, 1, 0.8));
+            const struct imp_mat4 turn =
+                imp__rotate(imp__normalize(imp__v3(1, 1, 3)), 50);
+            const struct imp_mat4 scale =
+                imp__scale(round ? imp__v3(1.3, 1.3, 1.3) : imp__v3(1.5, 1, 0.8));
             node_transform(n, imp__mat4_multiply(&turn, &scale));
             struct imp_shape *s = shape_build(n, NULL);
             if (!s || imp__intersector_create(&world) != IMP_OK) return;
@@ -175,7 +187,7 @@ static void densities(void)
         }
 }
 
-/* ---- closed forms ------------------------------------------------------------------- */
+/* ---- closed forms -------------------------------------------------------------- */
 
 static struct imp_shape *placed(const char *type, struct imp_mat4 m)
 {
@@ -185,8 +197,8 @@ static struct imp_shape *placed(const char *type, struct imp_mat4 m)
 }
 
 /* Mean of g/pdf over draws whose point is met first. */
-static struct tap_stat measure(const struct imp_shape *s, imp_v3 ref, imp_v3 facing, int seed,
-                               int trace)
+static struct tap_stat measure(const struct imp_shape *s, imp_v3 ref, imp_v3 facing,
+                               int seed, int trace)
 {
     struct tap_stat sum = {0};
     for (uint32_t i = 0; i < 60000; i++) {
@@ -210,10 +222,14 @@ static void solid_angles(void)
 {
     const imp_v3 none = imp__v3(0, 0, 0);
     const struct imp_mat4 one = imp__mat4_identity();
-    static const struct { const char *type; double z, expected; } rows[] = {
-        {"rectangle", 0.3, 0}, {"rectangle", 2, 0}, {"disk", 0.3, 0}, {"disk", 2, 0},
-        {"cube", 2.5, 0}, {"cube", 0, 4 * IMP_PI}, {"mesh", 0, 4 * IMP_PI},
-        {"sphere", 0.4, 4 * IMP_PI}, {"cylinder", 0.5, 0}};
+    static const struct {
+        const char *type;
+        double z, expected;
+    } rows[] = {{"rectangle", 0.3, 0},   {"rectangle", 2, 0},
+                {"disk", 0.3, 0},        {"disk", 2, 0},
+                {"cube", 2.5, 0},        {"cube", 0, 4 * IMP_PI},
+                {"mesh", 0, 4 * IMP_PI}, {"sphere", 0.4, 4 * IMP_PI},
+                {"cylinder", 0.5, 0}};
     for (size_t k = 0; k < imp_count(rows); k++) {
         const double h = rows[k].z;
         double ref = rows[k].expected;
@@ -237,8 +253,8 @@ static void solid_angles(void)
         const double d = distance[k];
         const imp_v3 ref = imp__normalize(imp__v3(1, 2, -2)) * d;
         const long double ld = imp__length(ref);
-        const long double solid = 2 * acosl(-1) * (1 / (ld * ld)) /
-                                  (1 + sqrtl(1 - 1 / (ld * ld)));
+        const long double solid =
+            2 * acosl(-1) * (1 / (ld * ld)) / (1 + sqrtl(1 - 1 / (ld * ld)));
         double worst = 0, on = 0, along = 0;
         for (uint32_t i = 0; s && i < 1000; i++) {
             const struct imp_key key = imp__key(8, 0, i);
@@ -251,14 +267,16 @@ static void solid_angles(void)
             along = fmax(along, imp__length(ref + l.wi * l.dist - l.p) / d);
         }
         tap_ok(s && worst < 1e-8 && on < 1e-14 && along < 1e-7,
-               "sphere from %g: density, point, ray # %.1e %.1e %.1e", d, worst, on, along);
+               "sphere from %g: density, point, ray # %.1e %.1e %.1e", d, worst, on,
+               along);
         world_end();
     }
 }
 
 static void form_factors(void)
 {
-    /* F2a: coaxial discs of radius 0.5 and 1 at distance 1, R = pi A1 F12, from either. */
+    /* F2a: coaxial discs of radius 0.5 and 1 at distance 1, R = pi A1 F12, from either.
+     */
     const struct imp_mat4 half = imp__scale(imp__v3(0.5, 0.5, 0.5));
     struct imp_mat4 up = imp__rotate(imp__v3(1, 0, 0), 180);
     up.m[11] = 1;
@@ -275,12 +293,14 @@ static void form_factors(void)
             const imp_v3 p = imp__v3(xy[0] * radius, xy[1] * radius, k);
             struct imp_light_sample l;
             double f = 0;
-            if (to->ops->sample_toward(to, &p, (double[2]){imp__u01(key, 2), imp__u01(key, 3)},
-                                       &l) && l.cos_light > 0)
+            if (to->ops->sample_toward(
+                    to, &p, (double[2]){imp__u01(key, 2), imp__u01(key, 3)}, &l) &&
+                l.cos_light > 0)
                 f = from->area * fabs(l.wi[2]) / l.pdf;
             tap_add(&r, f);
         }
-        tap_z(&r, 1.1568931, 2e-3, k ? "F2a from the large disc" : "F2a from the small disc");
+        tap_z(&r, 1.1568931, 2e-3,
+              k ? "F2a from the large disc" : "F2a from the small disc");
     }
     world_end();
 
@@ -307,11 +327,12 @@ static void form_factors(void)
             s, &ref, (double[2]){imp__u01(key, 0), imp__u01(key, 1)}, &l);
         tap_add(&flux, ok ? 1 / l.pdf : 0);
     }
-    tap_z(&flux, 4 * IMP_PI, 0.08, "a convex mesh from inside: 4 pi, smooth normals or not");
+    tap_z(&flux, 4 * IMP_PI, 0.08,
+          "a convex mesh from inside: 4 pi, smooth normals or not");
     world_end();
 }
 
-/* ---- emitters ----------------------------------------------------------------------- */
+/* ---- emitters ------------------------------------------------------------------ */
 
 static enum imp_status emitter_status;
 static struct imp_emitter *emitter_build(struct imp_node *n, const struct imp_shape *s,
@@ -319,7 +340,8 @@ static struct imp_emitter *emitter_build(struct imp_node *n, const struct imp_sh
 {
     const struct imp_emitter_ops *ops = NULL;
     for (int i = 0; imp__emitter_kinds[i]; i++)
-        if (strcmp(imp__emitter_kinds[i]->name, n->type) == 0) ops = imp__emitter_kinds[i];
+        if (strcmp(imp__emitter_kinds[i]->name, n->type) == 0)
+            ops = imp__emitter_kinds[i];
     struct imp_emitter *e = imp__arena_array(&world.arena, 1, sizeof *e);
     int n_in = 0;
     while (ops->inputs[n_in].name) n_in++;
@@ -331,7 +353,8 @@ static struct imp_emitter *emitter_build(struct imp_node *n, const struct imp_sh
         x->value = imp__v3(value[0], value[1], value[2]);
         input[i] = x;
     }
-    *e = (struct imp_emitter){.ops = ops, .n_in = n_in, .input = input, .shape = s, .weight = 1};
+    *e = (struct imp_emitter){
+        .ops = ops, .n_in = n_in, .input = input, .shape = s, .weight = 1};
     e->self = imp__arena_array(&world.arena, 1, ops->object_size + 1);
     const struct imp_build b = {.ctx = ctx, .node = n, .arena = &world.arena};
     emitter_status = ops->build ? ops->build(&b, e->self, e) : IMP_OK;
@@ -339,8 +362,8 @@ static struct imp_emitter *emitter_build(struct imp_node *n, const struct imp_sh
     return emitter_status == IMP_OK ? e : NULL;
 }
 
-/* What every kind owes: eval is linear in its input, eval_d is that factor, sample and pdf
- * agree, and light behind an area light is none. */
+/* What every kind owes: eval is linear in its input, eval_d is that factor, sample and
+ * pdf agree, and light behind an area light is none. */
 static void emitters(void)
 {
     const double value[3] = {2, 3, 5};
@@ -364,8 +387,10 @@ static void emitters(void)
             const double u[2] = {imp__u01(key, 3), imp__u01(key, 4)};
             struct imp_light_sample l;
             if (!ops->sample(e, &ref, u, &l)) continue;
-            const struct imp_emission x = {.uv = {l.uv[0], l.uv[1]}, .dist = l.dist,
-                                           .cos_light = l.cos_light, .d = -l.wi};
+            const struct imp_emission x = {.uv = {l.uv[0], l.uv[1]},
+                                           .dist = l.dist,
+                                           .cos_light = l.cos_light,
+                                           .d = -l.wi};
             const imp_spec in[1] = {imp__v3(2, 3, 5)}, twice[1] = {imp__v3(4, 6, 10)};
             imp_spec le, le2, dle[1];
             ops->eval(e, in, &x, &le);
@@ -387,12 +412,13 @@ static void emitters(void)
                          fabs(l.cos_light) < 0.01))
                 continue;
             if (area) s->ops->surface(s, &hit, &ref, &l.wi, &at);
-            const double pdf = ops->pdf(e, &ref, &l.wi, area ? &hit : NULL, area ? &at : NULL);
+            const double pdf =
+                ops->pdf(e, &ref, &l.wi, area ? &hit : NULL, area ? &at : NULL);
             worst = fmax(worst, fabs(pdf / l.pdf - 1));
         }
         tap_ok(worst < 1e-3 && slope < 1e-15 && behind == 0 && lit > 1000 && delta_ok,
-               "%s: eval, eval_d, sample, pdf # pdf %.1e slope %.1e behind %d lit %d", ops->name,
-               worst, slope, behind, lit);
+               "%s: eval, eval_d, sample, pdf # pdf %.1e slope %.1e behind %d lit %d",
+               ops->name, worst, slope, behind, lit);
         world_end();
     }
 
@@ -407,30 +433,38 @@ static void emitters(void)
         struct imp_light_sample l;
         imp_spec le;
         e->ops->sample(e, &ref, (double[2]){0.5, 0.5}, &l);
-        const struct imp_emission at = {.dist = l.dist, .cos_light = l.cos_light, .d = -l.wi};
+        const struct imp_emission at = {
+            .dist = l.dist, .cos_light = l.cos_light, .d = -l.wi};
         e->ops->eval(e, &e->input[0]->value, &at, &le);
-        tap_near(le[0] * l.wi[2], 5 / pow(25 + x[k] * x[k], 1.5), 1e-14, 0, "G1: point light");
+        tap_near(le[0] * l.wi[2], 5 / pow(25 + x[k] * x[k], 1.5), 1e-14, 0,
+                 "G1: point light");
         /* Section 16: over a diffuse floor 0.6, straight below. */
-        if (k == 0) tap_near(le[0] * l.wi[2] * 0.6 / IMP_PI, 0.0076394, 5e-6, 0, "section 16");
+        if (k == 0)
+            tap_near(le[0] * l.wi[2] * 0.6 / IMP_PI, 0.0076394, 5e-6, 0, "section 16");
     }
     struct imp_light_sample l;
     const imp_v3 self = imp__v3(0, 0, 5);
-    tap_ok(e && !e->ops->sample(e, &self, (double[2]){0, 0}, &l), "not from the light itself");
+    tap_ok(e && !e->ops->sample(e, &self, (double[2]){0, 0}, &l),
+           "not from the light itself");
     n = node_new("emitter", "point");
     node_transform(n, imp__translate(imp__v3(1, 2, 3)));
     e = emitter_build(n, NULL, (double[3]){1, 1, 1});
     const imp_v3 ref = imp__v3(1, 2, 0);
-    tap_ok(e && e->ops->sample(e, &ref, (double[2]){0, 0}, &l) && l.wi[2] == 1 && l.dist == 3,
+    tap_ok(e && e->ops->sample(e, &ref, (double[2]){0, 0}, &l) && l.wi[2] == 1 &&
+               l.dist == 3,
            "point light by to_world");
 
     struct imp_shape *flat = placed("rectangle", imp__mat4_identity());
-    const struct { const char *type, *prop, *words; int with_shape; double area; } errors[] = {
-        {"area", NULL, "must be inside a shape", 0, 1},
-        {"area", "to_world", "the light is its shape", 1, 1},
-        {"area", NULL, "its shape 'rectangle' (rectangle) has no area", 1, 0},
-        {"stam_m1", NULL, "has no area", 1, 0},
-        {"point", "both", "position or to_world, not both", 0, 1},
-        {"constant", "to_world", "'to_world'", 0, 1}};
+    const struct {
+        const char *type, *prop, *words;
+        int with_shape;
+        double area;
+    } errors[] = {{"area", NULL, "must be inside a shape", 0, 1},
+                  {"area", "to_world", "the light is its shape", 1, 1},
+                  {"area", NULL, "its shape 'rectangle' (rectangle) has no area", 1, 0},
+                  {"stam_m1", NULL, "has no area", 1, 0},
+                  {"point", "both", "position or to_world, not both", 0, 1},
+                  {"constant", "to_world", "'to_world'", 0, 1}};
     for (size_t k = 0; k < imp_count(errors); k++) {
         n = node_new("emitter", errors[k].type);
         if (errors[k].prop) node_transform(n, imp__mat4_identity());
@@ -438,7 +472,8 @@ static void emitters(void)
             node_vector(n, "position", imp__v3(0, 0, 0));
         flat->area = errors[k].area;
         e = emitter_build(n, errors[k].with_shape ? flat : NULL, (double[3]){1, 1, 1});
-        tap_ok(!e && emitter_status == IMP_E_SCENE && strstr(imp_last_error(ctx), errors[k].words),
+        tap_ok(!e && emitter_status == IMP_E_SCENE &&
+                   strstr(imp_last_error(ctx), errors[k].words),
                "error: %s # %s", errors[k].words, imp_last_error(ctx));
     }
     world_end();

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Every field kind: gradient and Hessian against central differences, splat as the transpose
- * of the tangent (and of the value, for kinds that are linear), sums, samples, levels. */
+ * Every field kind: gradient and Hessian against central differences, splat as the
+ * transpose of the tangent (and of the value, for kinds that are linear), sums, samples,
+ * levels. */
 #include "bend_kit.h"
 
 static void check_kind(int kind)
@@ -15,13 +16,16 @@ static void check_kind(int kind)
     imp_field_get_theta(f, theta);
     for (int p = 0; p < 40; p++) {
         double x[3], eta, g[3], h[6], b[3], eta_dot, g_dot[3];
-        for (int k = 0; k < 3; k++) x[k] = 0.7 * kit_pm(10 + k, p), b[k] = kit_pm(20 + k, p);
+        for (int k = 0; k < 3; k++)
+            x[k] = 0.7 * kit_pm(10 + k, p), b[k] = kit_pm(20 + k, p);
         const double a = kit_pm(30, p);
         imp_field_eval(f, x, &eta, g, h);
-        const double full[3][3] = {{h[0], h[3], h[4]}, {h[3], h[1], h[5]}, {h[4], h[5], h[2]}};
+        const double full[3][3] = {
+            {h[0], h[3], h[4]}, {h[3], h[1], h[5]}, {h[4], h[5], h[2]}};
         for (int k = 0; k < 3; k++) {
             const double e = 1e-6;
-            double xp[3] = {x[0], x[1], x[2]}, xm[3] = {x[0], x[1], x[2]}, ep, em, gp[3], gm[3];
+            double xp[3] = {x[0], x[1], x[2]}, xm[3] = {x[0], x[1], x[2]}, ep, em, gp[3],
+                   gm[3];
             xp[k] += e, xm[k] -= e;
             imp_field_eval(f, xp, &ep, gp, NULL);
             imp_field_eval(f, xm, &em, gm, NULL);
@@ -34,7 +38,8 @@ static void check_kind(int kind)
         imp_field_splat(f, x, a, b, bar);
         imp_field_tangent(f, x, dot, &eta_dot, g_dot);
         double left = 0, right = a * eta_dot, scale = fabs(a * eta_dot);
-        for (size_t i = 0; i < n; i++) left += bar[i] * dot[i], scale += fabs(bar[i] * dot[i]);
+        for (size_t i = 0; i < n; i++)
+            left += bar[i] * dot[i], scale += fabs(bar[i] * dot[i]);
         for (int k = 0; k < 3; k++) right += b[k] * g_dot[k];
         worst_t = fmax(worst_t, fabs(left - right) / scale);
 
@@ -53,7 +58,8 @@ static void check_kind(int kind)
     }
     tap_ok(worst_g < 2e-9, "%s: gradient is the difference # worst %.1e", name, worst_g);
     tap_ok(worst_h < 2e-8, "%s: Hessian is the difference # worst %.1e", name, worst_h);
-    tap_ok(worst_t < 1e-12, "%s: <splat, dot> = <bar, tangent> # worst %.1e", name, worst_t);
+    tap_ok(worst_t < 1e-12, "%s: <splat, dot> = <bar, tangent> # worst %.1e", name,
+           worst_t);
     tap_ok(worst_d < 1e-7, "%s: tangent is the difference # worst %.1e", name, worst_d);
     free(dot), free(bar), free(theta), free(moved);
     imp_field_destroy(f);
@@ -67,13 +73,16 @@ static void check_linear(enum imp_field_interp interp)
     imp_field_get_theta(f, theta);
     for (int p = 0; p < 200; p++) {
         double x[3], b[3], eta, g[3], sum = 0, scale = 0;
-        for (int k = 0; k < 3; k++) x[k] = 0.9 * kit_pm(50 + k, p), b[k] = kit_pm(60 + k, p);
+        for (int k = 0; k < 3; k++)
+            x[k] = 0.9 * kit_pm(50 + k, p), b[k] = kit_pm(60 + k, p);
         memset(bar, 0, n * sizeof *bar);
         imp_field_splat(f, x, 0.7, b, bar);
         imp_field_eval(f, x, &eta, g, NULL);
-        for (size_t i = 0; i < n; i++) sum += bar[i] * theta[i], scale += fabs(bar[i] * theta[i]);
-        worst = fmax(worst, fabs(sum - (0.7 * eta + b[0] * g[0] + b[1] * g[1] + b[2] * g[2])) /
-                                scale);
+        for (size_t i = 0; i < n; i++)
+            sum += bar[i] * theta[i], scale += fabs(bar[i] * theta[i]);
+        worst = fmax(worst,
+                     fabs(sum - (0.7 * eta + b[0] * g[0] + b[1] * g[1] + b[2] * g[2])) /
+                         scale);
     }
     tap_ok(worst < 1e-14, "%s: <splat(a, b), theta> = a eta + b.g, h != 1 # worst %.1e",
            imp_field_kind(f), worst);
@@ -89,9 +98,11 @@ static void check_samples(enum imp_field_interp interp)
     const int m[3] = {d.cells[0] + 1, d.cells[1] + 1, d.cells[2] + 1};
     const size_t n_s = (size_t)m[0] * m[1] * m[2], n = imp_field_n_theta(f);
     double *s = calloc(n_s, sizeof *s), *s2 = calloc(n_s, sizeof *s2);
-    double *sb = calloc(n_s, sizeof *sb), *tb = calloc(n, sizeof *tb), *th = calloc(n, sizeof *th);
+    double *sb = calloc(n_s, sizeof *sb), *tb = calloc(n, sizeof *tb),
+           *th = calloc(n, sizeof *th);
     double worst = 0;
-    for (size_t i = 0; i < n_s; i++) s[i] = 1.2 + 0.1 * kit_u(70, i), s2[i] = 1 + kit_u(71, i);
+    for (size_t i = 0; i < n_s; i++)
+        s[i] = 1.2 + 0.1 * kit_u(70, i), s2[i] = 1 + kit_u(71, i);
     KIT_CHECK(imp_field_set_samples(f, s));
     for (int k = 0; k < m[2]; k++)
         for (int j = 0; j < m[1]; j++)
@@ -103,7 +114,8 @@ static void check_samples(enum imp_field_interp interp)
                 imp_field_eval(f, x, &eta, NULL, NULL);
                 worst = fmax(worst, fabs(eta - s[i + m[0] * (j + (size_t)m[1] * k)]));
             }
-    tap_ok(worst < 1e-14, "%s: passes through the samples # worst %.1e", imp_field_kind(f), worst);
+    tap_ok(worst < 1e-14, "%s: passes through the samples # worst %.1e",
+           imp_field_kind(f), worst);
 
     for (size_t i = 0; i < n; i++) tb[i] = kit_pm(72, i);
     KIT_CHECK(imp_field_samples_vjp(f, tb, sb));
@@ -119,13 +131,15 @@ static void check_samples(enum imp_field_interp interp)
     worst = 0;
     for (int p = 0; p < 300; p++) {
         double x[3], e1, e2, g1[3], g2[3], h1[6], h2[6];
-        for (int k = 0; k < 3; k++) x[k] = d.lo[k] + (d.hi[k] - d.lo[k]) * kit_u(80 + k, p);
+        for (int k = 0; k < 3; k++)
+            x[k] = d.lo[k] + (d.hi[k] - d.lo[k]) * kit_u(80 + k, p);
         imp_field_eval(f, x, &e1, g1, h1);
         imp_field_eval(fine, x, &e2, g2, h2);
         worst = fmax(worst, fabs(e1 - e2));
         for (int k = 0; k < 3; k++) worst = fmax(worst, fabs(g1[k] - g2[k]));
     }
-    tap_ok(worst < 1e-13, "%s: refined, the same function # worst %.1e", imp_field_kind(f), worst);
+    tap_ok(worst < 1e-13, "%s: refined, the same function # worst %.1e",
+           imp_field_kind(f), worst);
     double *fb = calloc(nf, sizeof *fb), *ft = calloc(nf, sizeof *ft);
     for (size_t i = 0; i < nf; i++) fb[i] = kit_pm(90, i);
     KIT_CHECK(imp_field_refine_vjp(f, fb, tb));

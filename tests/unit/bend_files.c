@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Files of index fields: written and read back, cut off at every length, and hostile headers;
- * files of problems: what they make, random damage. */
+ * Files of index fields: written and read back, cut off at every length, and hostile
+ * headers; files of problems: what they make, random damage. */
 #include "bend_kit.h"
 #include "curved/bend.h"
 #include <unistd.h>
@@ -34,7 +34,8 @@ static void round_trip(const char *path, imp_field *f, double limit)
     KIT_CHECK(imp_field_read(kit_ctx, path, imp__field_is_grid(f) ? &g : NULL, &back));
     double worst = 0;
     for (int i = 0; i < 200; i++) {
-        const double x[3] = {0.9 * kit_pm(500, i), 0.9 * kit_pm(501, i), 0.9 * kit_pm(502, i)};
+        const double x[3] = {0.9 * kit_pm(500, i), 0.9 * kit_pm(501, i),
+                             0.9 * kit_pm(502, i)};
         double a, b;
         imp_field_eval(f, x, &a, NULL, NULL);
         imp_field_eval(back, x, &b, NULL, NULL);
@@ -85,7 +86,8 @@ static const char problem[] =
     " <float name='smoothness' value='1e-6'/><float name='step' value='0.1'/>\n"
     " <surface type='box'/>\n"
     "</medium>\n"
-    "<rays type='beam'><integer name='views' value='3'/><integer name='count' value='16'/>"
+    "<rays type='beam'><integer name='views' value='3'/><integer name='count' "
+    "value='16'/>"
     "<float name='radius' value='0.5'/><float name='start' value='-0.7'/>"
     "<surface type='plane'><string name='event' value='tap'/></surface>"
     "<target type='points'><boolean name='from_truth' value='true'/></target>"
@@ -110,7 +112,8 @@ static void problems(void)
     double mid[3] = {0};
     for (int i = 16; i < 32; i++)
         for (int k = 0; k < 3; k++) mid[k] += r.x[i][k] / 16;
-    tap_ok(fabs(mid[0] - want[0]) + fabs(mid[1] - want[1]) + fabs(mid[2] - want[2]) < 0.1 &&
+    tap_ok(fabs(mid[0] - want[0]) + fabs(mid[1] - want[1]) + fabs(mid[2] - want[2]) <
+                   0.1 &&
                fabs(r.d[20][0] - sin(IMP_PI / 3)) < 1e-12,
            "second view: turned by 60 degrees");
     g = calloc(imp_field_n_theta(imp_bend_field(b)), sizeof *g);
@@ -146,8 +149,8 @@ static void problems(void)
             bad += imp_last_error(kit_ctx)[0] != 0 && b == NULL;
         }
     }
-    tap_ok(good + bad == 600 && bad > 300, "damaged problems: %d refused with a message, %d read",
-           bad, good);
+    tap_ok(good + bad == 600 && bad > 300,
+           "damaged problems: %d refused with a message, %d read", bad, good);
 }
 
 int main(void)

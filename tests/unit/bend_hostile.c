@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Bent rays that go wrong are counted, never silent; arguments that cannot be are refused;
- * threads change no bit; memory does not grow with steps; running out of it is an error. */
+ * Bent rays that go wrong are counted, never silent; arguments that cannot be are
+ * refused; threads change no bit; memory does not grow with steps; running out of it is
+ * an error. */
 #include "bend_kit.h"
 #include <stdatomic.h>
 
@@ -46,7 +47,9 @@ static void counts(void)
     s.offset = 0.9, o.grazing = 0;
     o.step = 1.5; /* most of the field at once */
     st = trace(f, &o);
-    tap_ok(st.traced + st.missed + st.broken + st.grazing + st.started_out + st.truncated >= N,
+    tap_ok(st.traced + st.missed + st.broken + st.grazing + st.started_out +
+                   st.truncated >=
+               N,
            "steps as long as the field: %d traced, %d broken, %d missed", (int)st.traced,
            (int)st.broken, (int)st.missed);
     o.step = 3;
@@ -63,13 +66,15 @@ static void counts(void)
     KIT_CHECK(imp_field_set_theta(f, t));
     o.step = 0.4;
     st = trace(f, &o);
-    tap_ok(st.broken > N / 2, "a jump of the index at large steps: energy flagged # %d broken",
+    tap_ok(st.broken > N / 2,
+           "a jump of the index at large steps: energy flagged # %d broken",
            (int)st.broken);
     for (size_t i = 0; i < n; i++) t[i] = i < n / 2 ? 1 : -2.5;
     KIT_CHECK(imp_field_set_theta(f, t));
     o.step = 0.05;
     st = trace(f, &o);
-    tap_ok(st.traced < N / 2, "negative index: no silent exits # %d traced, %d broken, %d lost",
+    tap_ok(st.traced < N / 2,
+           "negative index: no silent exits # %d traced, %d broken, %d lost",
            (int)st.traced, (int)st.broken, (int)(st.missed + st.truncated));
     free(t);
     imp_field_destroy(f);
@@ -84,13 +89,14 @@ static void counts(void)
     tap_ok(st.truncated == N, "bound orbits: truncated and counted");
 
     struct imp_bend_rays r = kit_beam(N, -0.8, 0.7, 0.2);
-    double (*x)[3] = (double (*)[3])(uintptr_t)r.x, (*d)[3] = (double (*)[3])(uintptr_t)r.d;
+    double(*x)[3] = (double(*)[3])(uintptr_t)r.x, (*d)[3] = (double(*)[3])(uintptr_t)r.d;
     x[3][1] = NAN, x[4][2] = INFINITY, d[5][0] = NAN;
     d[6][0] = d[6][1] = d[6][2] = 0;
     s.radius = 1, o.max_steps = 0;
     KIT_CHECK(imp_bend_trace(f, &o, &r, e, NULL, &st));
-    tap_ok(st.broken >= 3 && (e[3].flags & IMP_BEND_DROPPED) && (e[4].flags & IMP_BEND_DROPPED) &&
-               (e[5].flags & IMP_BEND_BROKEN) && (e[6].flags & IMP_BEND_BROKEN),
+    tap_ok(st.broken >= 3 && (e[3].flags & IMP_BEND_DROPPED) &&
+               (e[4].flags & IMP_BEND_DROPPED) && (e[5].flags & IMP_BEND_BROKEN) &&
+               (e[6].flags & IMP_BEND_BROKEN),
            "rays of NaN, infinity and no direction are dropped");
     kit_rays_free(&r);
     imp_field_destroy(f);
@@ -104,8 +110,8 @@ static void refusals(void)
     struct imp_bend_surface s = IMP_BEND_SURFACE_INIT;
     struct imp_bend_options o = IMP_BEND_OPTIONS_INIT;
     enum imp_status st;
-#define REFUSED(what, want)                                                                \
-    st = imp_bend_trace(f, &o, &r, e, NULL, NULL);                                         \
+#define REFUSED(what, want)                                                              \
+    st = imp_bend_trace(f, &o, &r, e, NULL, NULL);                                       \
     tap_ok(st == (want), what " # %s", imp_last_error(kit_ctx))
     REFUSED("no cells to choose a step by", IMP_E_ARG);
     o.step = 0.1;
@@ -138,8 +144,8 @@ static void refusals(void)
     static struct imp_bend_cotangent bars[N];
     KIT_CHECK(imp_bend_trace(f, &o, &r, e, NULL, NULL));
     st = imp_bend_adjoint(f, &o, &r, e, NULL, bars, NULL, &g, NULL);
-    tap_ok(st == IMP_E_BIAS,
-           "index form cannot be reversed # %s", imp_last_error(kit_ctx));
+    tap_ok(st == IMP_E_BIAS, "index form cannot be reversed # %s",
+           imp_last_error(kit_ctx));
     kit_rays_free(&r);
     imp_field_destroy(f);
 }
@@ -160,22 +166,26 @@ static void bits(void)
         n = imp_field_n_theta(f);
         bar[threads - 1] = calloc(n, sizeof(double));
         for (int i = 0; i < N; i++)
-            for (int k = 0; k < 3; k++) bars[i].x[k] = kit_pm(300, i), bars[i].v[k] = kit_pm(301, i);
+            for (int k = 0; k < 3; k++)
+                bars[i].x[k] = kit_pm(300, i), bars[i].v[k] = kit_pm(301, i);
         struct imp_bend_gradient g = IMP_BEND_GRADIENT_INIT;
         g.theta = bar[threads - 1];
         KIT_CHECK(imp_bend_trace(f, &o, &r, exits[threads - 1], NULL, NULL));
-        KIT_CHECK(imp_bend_adjoint(f, &o, &r, exits[threads - 1], NULL, bars, NULL, &g, NULL));
+        KIT_CHECK(
+            imp_bend_adjoint(f, &o, &r, exits[threads - 1], NULL, bars, NULL, &g, NULL));
         kit_rays_free(&r);
         imp_field_destroy(f);
     }
     tap_ok(!memcmp(exits[0], exits[1], sizeof exits[0]) &&
-               !memcmp(exits[0], exits[2], sizeof exits[0]), "exits: same bits, 1, 2, 3 threads");
-    tap_ok(!memcmp(bar[0], bar[1], n * sizeof(double)) && !memcmp(bar[0], bar[2], n * sizeof(double)),
+               !memcmp(exits[0], exits[2], sizeof exits[0]),
+           "exits: same bits, 1, 2, 3 threads");
+    tap_ok(!memcmp(bar[0], bar[1], n * sizeof(double)) &&
+               !memcmp(bar[0], bar[2], n * sizeof(double)),
            "gradients: same bits, 1, 2, 3 threads");
     for (int i = 0; i < 3; i++) free(bar[i]);
 }
 
-/* ---- Memory --------------------------------------------------------------------------- */
+/* ---- Memory -------------------------------------------------------------------- */
 
 static size_t now, peak, left = SIZE_MAX;
 static atomic_int outstanding;
@@ -237,7 +247,8 @@ static void memory(void)
     const size_t few = peak;
     peak = now;
     KIT_CHECK(run_once(0.05 / 16));
-    tap_ok(peak <= few * 1.01, "peak memory, 16 times the steps # %zu against %zu bytes", peak, few);
+    tap_ok(peak <= few * 1.01, "peak memory, 16 times the steps # %zu against %zu bytes",
+           peak, few);
     const int held = outstanding;
     int failures = 0;
     for (size_t k = 0; k < 200; k++) {
@@ -248,8 +259,10 @@ static void memory(void)
         failures += st == IMP_E_NOMEM;
         if (st != IMP_E_NOMEM) failures = -1000;
     }
-    tap_ok(failures > 5 && outstanding == held, "the n-th allocation fails: IMP_E_NOMEM, no leak "
-           "# %d failures", failures);
+    tap_ok(failures > 5 && outstanding == held,
+           "the n-th allocation fails: IMP_E_NOMEM, no leak "
+           "# %d failures",
+           failures);
 }
 
 int main(void)

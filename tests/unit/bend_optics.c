@@ -9,7 +9,8 @@ static struct imp_bend_exit trace_one(const imp_field *f, struct imp_bend_option
 {
     struct imp_bend_exit e;
     double xs[1][3] = {{x[0], x[1], x[2]}}, ds[1][3] = {{d[0], d[1], d[2]}};
-    const struct imp_bend_rays r = {1, (const double (*)[3])xs, (const double (*)[3])ds, NULL};
+    const struct imp_bend_rays r = {1, (const double(*)[3])xs, (const double(*)[3])ds,
+                                    NULL};
     KIT_CHECK(imp_bend_trace(f, o, &r, &e, NULL, NULL));
     return e;
 }
@@ -48,14 +49,16 @@ static void parabola(void)
     struct imp_bend_surface s = plane_z(2);
     struct imp_bend_options o = IMP_BEND_OPTIONS_INIT;
     o.surfaces = &s, o.n_surfaces = 1, o.step = 0.037;
-    const enum imp_bend_scheme exact[] = {IMP_BEND_LEAPFROG, IMP_BEND_VERLET, IMP_BEND_YOSHIDA4};
+    const enum imp_bend_scheme exact[] = {IMP_BEND_LEAPFROG, IMP_BEND_VERLET,
+                                          IMP_BEND_YOSHIDA4};
     for (int k = 0; k < 3; k++) {
         o.scheme = exact[k];
         const struct imp_bend_exit e = trace_one(f, &o, x, d);
         const double l = sqrt(1 + 0.1), eta = sqrt(2.25 + 2 * 0.2 * 0.1);
         const double sigma = 2 / (eta / l);
         const double want = 0.1 + eta * 0.1 / l * sigma + 0.2 * sigma * sigma / 2;
-        tap_near(e.x[0], want, 0, 2e-15 * 4, "linear in eta^2: the parabola, to rounding");
+        tap_near(e.x[0], want, 0, 2e-15 * 4,
+                 "linear in eta^2: the parabola, to rounding");
     }
     imp_field_destroy(f);
 }
@@ -65,8 +68,12 @@ static void luneburg(void)
 {
     const double p[4] = {1, 0, 0, 0};
     imp_field *f = kit_profile("luneburg", p, NULL);
-    static const struct { enum imp_bend_scheme s; double want; } rows[] = {
-        {IMP_BEND_EULER, 1.2e-2}, {IMP_BEND_LEAPFROG, 7.3e-5}, {IMP_BEND_YOSHIDA4, 3.6e-8}};
+    static const struct {
+        enum imp_bend_scheme s;
+        double want;
+    } rows[] = {{IMP_BEND_EULER, 1.2e-2},
+                {IMP_BEND_LEAPFROG, 7.3e-5},
+                {IMP_BEND_YOSHIDA4, 3.6e-8}};
     for (int k = 0; k < 3; k++) {
         double worst = 0, path = 0;
         for (int i = 0; i < 10; i++) {
@@ -83,7 +90,8 @@ static void luneburg(void)
                "Luneburg, %s, 64 steps: miss of the focus # %.2e, published here %.1e",
                imp__schemes[rows[k].s].name, worst, rows[k].want);
         if (rows[k].s == IMP_BEND_YOSHIDA4)
-            tap_ok(path < 1e-6, "Luneburg: all optical paths R(1 + pi/2) # worst %.1e", path);
+            tap_ok(path < 1e-6, "Luneburg: all optical paths R(1 + pi/2) # worst %.1e",
+                   path);
     }
     imp_field_destroy(f);
 }
@@ -96,8 +104,9 @@ static double fisheye_error(const imp_field *f, enum imp_bend_scheme scheme, dou
     o.scheme = scheme, o.surfaces = &s, o.n_surfaces = 1, o.step = t, o.grazing = -1;
     double sum = 0;
     for (int i = 0; i < 20; i++) {
-        /* Circles of the fish-eye (a = 1) through (0, 0, -1) pass (0, 0, 1): centre (-c, 0, 0),
-         * radius sqrt(1 + c^2); start direction at angle phi from +z, tan(phi) = 1/c... */
+        /* Circles of the fish-eye (a = 1) through (0, 0, -1) pass (0, 0, 1): centre (-c,
+         * 0, 0), radius sqrt(1 + c^2); start direction at angle phi from +z, tan(phi) =
+         * 1/c... */
         const double phi = 0.05 + 0.06 * i, c = -cos(phi) / sin(phi);
         const double x[3] = {0, 0, -1}, d[3] = {sin(phi), 0, cos(phi)};
         const double want = c + sqrt(1 + c * c);
@@ -111,15 +120,20 @@ static void fisheye(void)
 {
     const double p[5] = {2, 1, 0, 0, 0};
     imp_field *f = kit_profile("maxwell", p, NULL);
-    static const struct { enum imp_bend_scheme s; double order; } rows[] = {
-        {IMP_BEND_EULER, 1}, {IMP_BEND_LEAPFROG, 2}, {IMP_BEND_VERLET, 2}, {IMP_BEND_YOSHIDA4, 4},
-        {IMP_BEND_ARC, 2}, {IMP_BEND_ARC_INDEX, 1}};
+    static const struct {
+        enum imp_bend_scheme s;
+        double order;
+    } rows[] = {{IMP_BEND_EULER, 1},    {IMP_BEND_LEAPFROG, 2}, {IMP_BEND_VERLET, 2},
+                {IMP_BEND_YOSHIDA4, 4}, {IMP_BEND_ARC, 2},      {IMP_BEND_ARC_INDEX, 1}};
     for (int k = 0; k < 6; k++) {
-        const double t = rows[k].order == 1 ? 0.0102 : 0.081; /* Euler's order shows late */
-        const double e0 = fisheye_error(f, rows[k].s, t), e1 = fisheye_error(f, rows[k].s, t / 8);
+        const double t =
+            rows[k].order == 1 ? 0.0102 : 0.081; /* Euler's order shows late */
+        const double e0 = fisheye_error(f, rows[k].s, t),
+                     e1 = fisheye_error(f, rows[k].s, t / 8);
         const double order = log(e0 / e1) / log(8);
-        tap_ok(fabs(order - rows[k].order) < 0.1, "fish-eye, %s: order %g # %.2f (%.1e, %.1e)",
-               imp__schemes[rows[k].s].name, rows[k].order, order, e0, e1);
+        tap_ok(fabs(order - rows[k].order) < 0.1,
+               "fish-eye, %s: order %g # %.2f (%.1e, %.1e)", imp__schemes[rows[k].s].name,
+               rows[k].order, order, e0, e1);
     }
     /* Imaging: x0 goes to -x0 (|x0| = 1), optical path n0 a pi/2. */
     struct imp_bend_surface s = IMP_BEND_SURFACE_INIT;
@@ -140,7 +154,8 @@ static void rods(void)
 {
     const double n0 = 1.6, g = 0.33, p[5] = {n0, g, 0, 0, 0};
     imp_field *f = kit_profile("rod", p, NULL);
-    /* Closed form of the discrete leapfrog: x_N = x_0 cos(N w t), w = (2/t) asin(n0 g t/2). */
+    /* Closed form of the discrete leapfrog: x_N = x_0 cos(N w t), w = (2/t) asin(n0 g
+     * t/2). */
     const double t = 0.1, w = 2 / t * asin(n0 * g * t / 2);
     imp_v3 x = imp__v3(0.3, 0, 0), v = imp__v3(0, 0, n0 * sqrt(1 - imp__sqr(g * 0.3)));
     double path = 0, worst = 0;
@@ -159,8 +174,8 @@ static void rods(void)
     tap_near(s.offset, 18.448049, 1e-7, 0, "rod: pitch of a meridional ray");
     tap_near(e.x[0], 0, 0, 2e-8, "rod: the ray is back on the axis there");
 
-    /* Quarter pitch, flat faces in air: object at l1 = 10, a height goes to -0.189394 of it at
-     * l2 = 0.358701 behind (ray matrix; curved-rays 6). */
+    /* Quarter pitch, flat faces in air: object at l1 = 10, a height goes to -0.189394 of
+     * it at l2 = 0.358701 behind (ray matrix; curved-rays 6). */
     const double L = 4.759989;
     struct imp_bend_surface faces[2] = {plane_z(0), plane_z(L)};
     faces[0].normal[2] = -1;
@@ -189,7 +204,8 @@ static void rods(void)
     for (int k = -4; k <= 4; k++) {
         const double th = 0.05 * k, xs[3] = {0.4, 0, 0}, d[3] = {sin(th), 0, cos(th)};
         e = trace_one(f, &o, xs, d);
-        const double want = asinh(sinh(0.32) * cos(2.4) + cosh(0.32) * tan(th) * sin(2.4)) / 0.8;
+        const double want =
+            asinh(sinh(0.32) * cos(2.4) + cosh(0.32) * tan(th) * sin(2.4)) / 0.8;
         worst = fmax(worst, fabs(e.x[0] - want));
     }
     tap_ok(worst < 5e-12, "sech rod: closed form # %.1e", worst);
@@ -211,11 +227,12 @@ static void snell(void)
         const imp_v3 local = imp__to_local(&fr, t.v);
         reflected += t.reflected;
         if (t.reflected != (e1 * sin(th) > e2)) worst = 1;
-        const double c2 = t.reflected ? -e1 * c : copysign(sqrt(e2 * e2 - imp__sqr(e1 * sin(th))), c);
+        const double c2 =
+            t.reflected ? -e1 * c : copysign(sqrt(e2 * e2 - imp__sqr(e1 * sin(th))), c);
         worst = fmax(worst, fabs(local[0] - e1 * sin(th)) + fabs(local[2] - c2));
     }
-    tap_ok(worst < 4e-15 && reflected > 20, "Snell, total reflection # %.1e, %d reflected", worst,
-           reflected);
+    tap_ok(worst < 4e-15 && reflected > 20,
+           "Snell, total reflection # %.1e, %d reflected", worst, reflected);
     /* Steep but smooth layer, 1 to 1.5: Snell's limit holds for any profile across z. */
     const double p[8] = {1.25, 0.25 * 1.5, 0, -0.125, 0, 0, 0, 0}, axis[3] = {0, 0, 1};
     imp_field *f = kit_profile("axial", p, axis); /* 1.25 + .375 z - .125 z^3: 1 .. 1.5 */
@@ -231,7 +248,8 @@ static void snell(void)
 
 static void plume(void)
 {
-    /* Deflection at impact p tends to -b (p/s) sqrt(2 pi) exp(-p^2/2s^2)/n0 as b falls. */
+    /* Deflection at impact p tends to -b (p/s) sqrt(2 pi) exp(-p^2/2s^2)/n0 as b falls.
+     */
     double err[2];
     for (int k = 0; k < 2; k++) {
         const double b = k ? 1e-4 : 1e-3, pr[6] = {1, b, 0.2, 0, 0, 0};
@@ -265,7 +283,8 @@ static void invariants(void)
             imp__step(&imp__schemes[k], f, 0.01, 1, &x, &v, &path);
             worst = fmax(worst, imp__length(imp__cross(x, v) - m0));
         }
-        tap_ok(worst < 1e-12, "%s: x cross v over 2000 steps # %.1e", imp__schemes[k].name, worst);
+        tap_ok(worst < 1e-12, "%s: x cross v over 2000 steps # %.1e",
+               imp__schemes[k].name, worst);
         struct imp__back b = {.x = {x}, .v = {v}};
         for (int i = 0; i < 2000; i++)
             imp__step_adjoint(&imp__schemes[k], f, 0.01, 1, &b, NULL, NULL);
@@ -276,8 +295,8 @@ static void invariants(void)
 }
 
 /* Grids whose nodes carry the analytic Luneburg index (curved-rays 6). */
-static double luneburg_grid(enum imp_field_interp interp, enum imp_bend_scheme scheme, int nodes,
-                            double ds, double *drift)
+static double luneburg_grid(enum imp_field_interp interp, enum imp_bend_scheme scheme,
+                            int nodes, double ds, double *drift)
 {
     struct imp_field_grid d = IMP_FIELD_GRID_INIT;
     imp_field *f;
@@ -324,14 +343,19 @@ static void grids(void)
 {
     double drift;
     const double a = luneburg_grid(IMP_FIELD_TRILINEAR, IMP_BEND_EULER, 65, 0.5, &drift);
-    tap_ok(fabs(a / 7.5e-3 - 1) < 0.15, "trilinear 65^3, Euler h/2: rms focus 7.5e-3 # %.2e", a);
+    tap_ok(fabs(a / 7.5e-3 - 1) < 0.15,
+           "trilinear 65^3, Euler h/2: rms focus 7.5e-3 # %.2e", a);
     tap_ok(drift > 1e-2 && drift < 2.2e-2, "same: |v| off 1 at the exit # %.1e", drift);
     const double c = luneburg_grid(IMP_FIELD_SPLINE, IMP_BEND_LEAPFROG, 65, 0.5, NULL);
-    tap_ok(fabs(c / 9.2e-4 - 1) < 0.25, "cubic 65^3, leapfrog h/2: rms focus 9.2e-4 # %.2e", c);
+    tap_ok(fabs(c / 9.2e-4 - 1) < 0.25,
+           "cubic 65^3, leapfrog h/2: rms focus 9.2e-4 # %.2e", c);
     const double l = luneburg_grid(IMP_FIELD_TRILINEAR, IMP_BEND_LEAPFROG, 65, 1, NULL);
-    const double e16 = luneburg_grid(IMP_FIELD_TRILINEAR, IMP_BEND_EULER, 65, 1.0 / 16, NULL);
-    tap_ok(l < 1.06 * e16, "trilinear: leapfrog at h is at the floor that Euler reaches at h/16 "
-           "# %.2e %.2e", l, e16);
+    const double e16 =
+        luneburg_grid(IMP_FIELD_TRILINEAR, IMP_BEND_EULER, 65, 1.0 / 16, NULL);
+    tap_ok(l < 1.06 * e16,
+           "trilinear: leapfrog at h is at the floor that Euler reaches at h/16 "
+           "# %.2e %.2e",
+           l, e16);
 }
 
 int main(void)

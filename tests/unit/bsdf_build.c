@@ -19,21 +19,22 @@ static void refused(const char *kind, const char *a, const char *b, const char *
     const char *props[2] = {a, b};
     struct imp_bsdf out;
     const bool made = kind_make(&f, find(kind), props, 2, NULL, 0, &out);
-    tap_ok(!made && strstr(imp_last_error(f.ctx), words), "%s %s %s # %s", kind, a ? a : "",
-           b ? b : "", made ? "made" : imp_last_error(f.ctx));
+    tap_ok(!made && strstr(imp_last_error(f.ctx), words), "%s %s %s # %s", kind,
+           a ? a : "", b ? b : "", made ? "made" : imp_last_error(f.ctx));
 }
 static void made(const char *kind, const char *a, const char *b)
 {
     const char *props[2] = {a, b};
     struct imp_bsdf out;
-    tap_ok(kind_make(&f, find(kind), props, 2, NULL, 0, &out), "%s %s %s # %s", kind, a, b ? b : "",
-           imp_last_error(f.ctx));
+    tap_ok(kind_make(&f, find(kind), props, 2, NULL, 0, &out), "%s %s %s # %s", kind, a,
+           b ? b : "", imp_last_error(f.ctx));
 }
 
-static struct imp_node *prepared(const char *kind, const char *name, enum imp_prop_type type,
-                                 double number, const char *text)
+static struct imp_node *prepared(const char *kind, const char *name,
+                                 enum imp_prop_type type, double number, const char *text)
 {
-    struct imp_node *n = imp__node_create(&f.arena, "bsdf", kind, NULL, NULL, (struct imp_loc){0});
+    struct imp_node *n =
+        imp__node_create(&f.arena, "bsdf", kind, NULL, NULL, (struct imp_loc){0});
     if (name) {
         struct imp_prop *p = imp__node_add(&f.arena, n, name, type, (struct imp_loc){0});
         p->number[0] = number;
@@ -51,7 +52,8 @@ static void registry(void)
         whole &= o->size == sizeof *o && o->name && o->inputs && o->sample && o->eval &&
                  o->pdf && o->eval_d && !o->emit == !o->emit_d &&
                  o->max_children >= o->min_children && o->max_children <= 2;
-        for (int j = 0; j < k; j++) distinct &= strcmp(o->name, imp__bsdf_kinds[j]->name) != 0;
+        for (int j = 0; j < k; j++)
+            distinct &= strcmp(o->name, imp__bsdf_kinds[j]->name) != 0;
     }
     tap_ok(whole && distinct, "every kind is whole and has a name of its own");
 }
@@ -89,12 +91,15 @@ int main(void)
     tap_ok(n && fabs(imp__node_prop(n, "eta")->number[0] - 1.489587) < 1e-6,
            "polypropylene in air");
     n = prepared("dielectric", "int_ior", IMP_PROP_STRING, 0, "water");
-    tap_ok(n && fabs(imp__node_prop(n, "eta")->number[0] - 1.332631) < 1e-6, "water in air");
+    tap_ok(n && fabs(imp__node_prop(n, "eta")->number[0] - 1.332631) < 1e-6,
+           "water in air");
     n = prepared("roughconductor", NULL, IMP_PROP_FLOAT, 0, NULL);
-    tap_ok(n && imp__node_prop(n, "alpha") && imp__node_prop(n, "alpha")->number[0] == 0.1,
+    tap_ok(n && imp__node_prop(n, "alpha") &&
+               imp__node_prop(n, "alpha")->number[0] == 0.1,
            "a roughness that is not given is a parameter too");
     n = prepared("roughconductor", "alpha", IMP_PROP_FLOAT, 0, NULL);
-    tap_ok(n && imp__node_prop(n, "alpha")->number[0] == 1e-4, "roughness 0 is the smallest");
+    tap_ok(n && imp__node_prop(n, "alpha")->number[0] == 1e-4,
+           "roughness 0 is the smallest");
 
     struct imp_bsdf glass, out;
     kind_make(&f, find("dielectric"), NULL, 0, NULL, 0, &glass);

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A search that went through a file has the bits of one that did not; a file of another fit,
- * a damaged or a truncated one is refused and changes nothing. */
+ * A search that went through a file has the bits of one that did not; a file of another
+ * fit, a damaged or a truncated one is refused and changes nothing. */
+#include "inverse/checkpoint.h"
+#include "imp_tap.h"
+#include "toy_goal.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <unistd.h>
-#include "inverse/checkpoint.h"
-#include "toy_goal.h"
-#include "imp_tap.h"
 
 static imp_context *ctx;
 static char path[64];
@@ -45,16 +45,19 @@ static void round_trip(enum imp_optimizer kind, const char *name)
     imp__search_destroy(part);
 
     part = begin(&t, kind);
-    const enum imp_status read = imp__checkpoint_read(ctx, path, &of, &t.goal, part, &found);
+    const enum imp_status read =
+        imp__checkpoint_read(ctx, path, &of, &t.goal, part, &found);
     const enum imp_status ended = imp__optimize(&t.goal, &o, part);
-    tap_ok(st == IMP_OK && stopped == IMP_CANCELLED && wrote == IMP_OK && read == IMP_OK && found
-           && ended == IMP_OK && part->iteration == whole->iteration
-           && part->n_history == whole->n_history
-           && !memcmp(part->x, whole->x, TOY_N * sizeof(double))
-           && !memcmp(part->history, whole->history, whole->n_history * sizeof(double))
-           && !memcmp(part->history_se, whole->history_se, whole->n_history * sizeof(double)),
-           "%s: stopped after %d of %d iterations, resumed: the same bits", name, at,
-           whole->iteration);
+    tap_ok(
+        st == IMP_OK && stopped == IMP_CANCELLED && wrote == IMP_OK && read == IMP_OK &&
+            found && ended == IMP_OK && part->iteration == whole->iteration &&
+            part->n_history == whole->n_history &&
+            !memcmp(part->x, whole->x, TOY_N * sizeof(double)) &&
+            !memcmp(part->history, whole->history, whole->n_history * sizeof(double)) &&
+            !memcmp(part->history_se, whole->history_se,
+                    whole->n_history * sizeof(double)),
+        "%s: stopped after %d of %d iterations, resumed: the same bits", name, at,
+        whole->iteration);
     imp__search_destroy(part);
     imp__search_destroy(whole);
 }
@@ -89,8 +92,10 @@ int main(void)
     /* A checkpoint with something in every array. */
     struct imp__search *s = begin(&t, IMP_ADAM);
     t.stop_after = 30;
-    if (imp__optimize(&t.goal, &(struct imp__opt_options){90, 0.05, 1e-6}, s) != IMP_CANCELLED
-        || imp__checkpoint_write(ctx, path, &of, s) != IMP_OK) return 1;
+    if (imp__optimize(&t.goal, &(struct imp__opt_options){90, 0.05, 1e-6}, s) !=
+            IMP_CANCELLED ||
+        imp__checkpoint_write(ctx, path, &of, s) != IMP_OK)
+        return 1;
     imp__search_destroy(s);
     const long size = file_size();
     char *bytes = malloc((size_t)size);
@@ -105,11 +110,13 @@ int main(void)
     struct imp__fingerprint other[4] = {of, of, of, of};
     other[0].parameters++, other[1].scene++, other[2].targets++, other[3].options++;
     for (int k = 0; k < 4; k++)
-        tap_ok(imp__checkpoint_read(ctx, path, &other[k], &t.goal, s, &found) == IMP_E_ARG,
+        tap_ok(imp__checkpoint_read(ctx, path, &other[k], &t.goal, s, &found) ==
+                   IMP_E_ARG,
                "of another fit is refused # %s", imp_last_error(ctx));
 
     int refused = 0, tried = 0, crashes = 0;
-    for (long n = 0; n < size - 1; n += 1 + (n > 150) * 6) { /* the last byte is the newline */
+    for (long n = 0; n < size - 1;
+         n += 1 + (n > 150) * 6) { /* the last byte is the newline */
         write_bytes(bytes, (size_t)n);
         tried++;
         refused += imp__checkpoint_read(ctx, path, &of, &t.goal, s, &found) != IMP_OK;
@@ -120,16 +127,19 @@ int main(void)
         const char old = bytes[n];
         bytes[n] = old == '1' ? '2' : '1';
         write_bytes(bytes, (size_t)size);
-        const enum imp_status st = imp__checkpoint_read(ctx, path, &of, &t.goal, s, &found);
+        const enum imp_status st =
+            imp__checkpoint_read(ctx, path, &of, &t.goal, s, &found);
         if (st == IMP_OK) harmless++;
         else if (st != IMP_E_IO && st != IMP_E_ARG) crashes++;
         bytes[n] = old;
     }
-    tap_ok(crashes == 0 && harmless == 0, "one byte changed is refused # %d not noticed", harmless);
+    tap_ok(crashes == 0 && harmless == 0, "one byte changed is refused # %d not noticed",
+           harmless);
     tap_ok(!memcmp(s->x, before, sizeof before), "and changes nothing");
 
     write_bytes("importon checkpoint 1\noptimizer 0\nvariables 4\n"
-                "of 1 2 3 4\niteration 1\nfinished 0\nstart 99999999999999\n", 101);
+                "of 1 2 3 4\niteration 1\nfinished 0\nstart 99999999999999\n",
+                101);
     tap_ok(imp__checkpoint_read(ctx, path, &of, &t.goal, s, &found) == IMP_E_IO,
            "an absurd size is refused # %s", imp_last_error(ctx));
     remove(path);

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Colours: the published numbers of scene-format 16, the table of conversions (2.1) line by
- * line, colour objects (2.4), and what is refused. */
-#include <stdlib.h>
+ * Colours: the published numbers of scene-format 16, the table of conversions (2.1) line
+ * by line, colour objects (2.4), and what is refused. */
 #include "base/arena.h"
 #include "color/cie.h"
 #include "color/convert.h"
 #include "color/rgb.h"
 #include "imp_tap.h"
+#include <stdlib.h>
 
 static imp_context *ctx;
 static struct imp_arena arena;
@@ -17,7 +17,8 @@ static struct imp_node *node_make(const char *type)
     return imp__node_create(&arena, "spectrum", type, NULL, NULL,
                             (struct imp_loc){"a.xml", 3, 5});
 }
-static struct imp_prop *prop_add(struct imp_node *n, const char *name, enum imp_prop_type type)
+static struct imp_prop *prop_add(struct imp_node *n, const char *name,
+                                 enum imp_prop_type type)
 {
     return imp__node_add(&arena, n, name, type, (struct imp_loc){"a.xml", 4, 9});
 }
@@ -31,7 +32,7 @@ static void list_add(struct imp_node *n, size_t count, const double *list)
 }
 
 struct expected {
-    int count;   /* 0: refused */
+    int count; /* 0: refused */
     double v[3];
 };
 static void check(const struct imp_node *node, enum imp_role role, bool scalar,
@@ -40,8 +41,8 @@ static void check(const struct imp_node *node, enum imp_role role, bool scalar,
 {
     imp_spec v = {-7, -7, -7, -7};
     int count = -7;
-    const enum imp_status st = imp__color_convert(ctx, node, imp__node_prop(node, "c"), role,
-                                                  scalar, mode, &v, &count);
+    const enum imp_status st = imp__color_convert(ctx, node, imp__node_prop(node, "c"),
+                                                  role, scalar, mode, &v, &count);
     if (e.count == 0) {
         const char *message = imp_last_error(ctx);
         tap_ok(st == IMP_E_SCENE && count == -7 && v[0] == -7 &&
@@ -50,8 +51,7 @@ static void check(const struct imp_node *node, enum imp_role role, bool scalar,
         return;
     }
     bool ok = st == IMP_OK && count == e.count;
-    for (int c = 0; c < 3; c++)
-        ok &= fabs(v[c] - e.v[e.count == 1 ? 0 : c]) <= tolerance;
+    for (int c = 0; c < 3; c++) ok &= fabs(v[c] - e.v[e.count == 1 ? 0 : c]) <= tolerance;
     tap_ok(ok, "%s # %d: %.6f %.6f %.6f", what, count, v[0], v[1], v[2]);
 }
 
@@ -61,10 +61,11 @@ static void published(void)
 {
     struct imp_node *n = node_make("");
     list_add(n, 4, four);
-    check(n, IMP_REFLECTANCE, false, IMP_RGB, (struct expected){3, {0.958689, 0.446356, 0.105710}},
-          6e-7, "list as reflectance");
-    check(n, IMP_EMISSION, false, IMP_RGB, (struct expected){3, {1.103547, 0.428732, 0.088722}},
-          6e-7, "list as light");
+    check(n, IMP_REFLECTANCE, false, IMP_RGB,
+          (struct expected){3, {0.958689, 0.446356, 0.105710}}, 6e-7,
+          "list as reflectance");
+    check(n, IMP_EMISSION, false, IMP_RGB,
+          (struct expected){3, {1.103547, 0.428732, 0.088722}}, 6e-7, "list as light");
     check(n, IMP_REFLECTANCE, false, IMP_MONO, (struct expected){1, {0.530730}}, 6e-7,
           "list as reflectance, mono");
     check(n, IMP_EMISSION, false, IMP_MONO, (struct expected){1, {0.547707}}, 6e-7,
@@ -73,15 +74,16 @@ static void published(void)
           "list as one number");
     struct imp_node *one = node_make("");
     list_add(one, 2, (double[]){300, 900, 1, 1});
-    check(one, IMP_REFLECTANCE, false, IMP_RGB, (struct expected){3, {0.99899, 0.99887, 0.99880}},
-          6e-6, "constant 1 as list");
+    check(one, IMP_REFLECTANCE, false, IMP_RGB,
+          (struct expected){3, {0.99899, 0.99887, 0.99880}}, 6e-6, "constant 1 as list");
     double sum = 0;
     for (int i = 0; i < IMP_CIE_N; i++) sum += 5 * imp__cie_xyz[1][i];
     tap_near(sum, IMP_CIE_Y_INTEGRAL, 2e-3, 0, "integral of the y curve");
     tap_near(imp__cie_lookup(imp__cie_d65, 560), 100, 0, 0, "D65 at 560 nm");
     tap_near(imp__cie_lookup(imp__cie_xyz[0], 457.5), 0.5 * (0.3187 + 0.2908), 1e-12, 0,
              "linear between the samples");
-    tap_ok(imp__cie_lookup(imp__cie_d65, 359.9) == 0 && imp__cie_lookup(imp__cie_d65, 830.1) == 0 &&
+    tap_ok(imp__cie_lookup(imp__cie_d65, 359.9) == 0 &&
+               imp__cie_lookup(imp__cie_d65, 830.1) == 0 &&
                imp__cie_lookup(imp__cie_d65, 830) == 60.3125,
            "nothing outside 360-830 nm");
     double rgb[3] = {0.2, 0.5, 0.9}, xyz[3], back[3];
@@ -93,7 +95,8 @@ static void published(void)
     tap_near(imp__srgb_decode(0.5), 0.21404114048, 1e-10, 0, "sRGB decode of 0.5");
     double worst = 0;
     for (int i = 0; i <= 255; i++)
-        worst = fmax(worst, fabs(imp__srgb_encode(imp__srgb_decode(i / 255.0)) - i / 255.0));
+        worst =
+            fmax(worst, fabs(imp__srgb_encode(imp__srgb_decode(i / 255.0)) - i / 255.0));
     tap_ok(worst < 1e-7, "sRGB there and back # %.1e", worst);
 }
 
@@ -108,26 +111,39 @@ static void table(void)
     p->number[0] = 0.2, p->number[1] = 0.4, p->number[2] = 0.6;
     const double lum = 0.212671 * 0.2 + 0.715160 * 0.4 + 0.072169 * 0.6;
 
-    check(f, IMP_REFLECTANCE, false, IMP_RGB, (struct expected){1, {0.25}}, 0, "number, R");
+    check(f, IMP_REFLECTANCE, false, IMP_RGB, (struct expected){1, {0.25}}, 0,
+          "number, R");
     check(f, IMP_UNBOUNDED, false, IMP_RGB, (struct expected){1, {0.25}}, 0, "number, U");
-    check(f, IMP_EMISSION, false, IMP_RGB, (struct expected){3, {0.25, 0.25, 0.25}}, 0, "number, E");
-    check(f, IMP_EMISSION, false, IMP_MONO, (struct expected){1, {0.25}}, 0, "number, E, mono");
+    check(f, IMP_EMISSION, false, IMP_RGB, (struct expected){3, {0.25, 0.25, 0.25}}, 0,
+          "number, E");
+    check(f, IMP_EMISSION, false, IMP_MONO, (struct expected){1, {0.25}}, 0,
+          "number, E, mono");
     check(i, IMP_REFLECTANCE, false, IMP_RGB, (struct expected){1, {1}}, 0, "integer, R");
-    check(rgb, IMP_REFLECTANCE, false, IMP_RGB, (struct expected){3, {0.2, 0.4, 0.6}}, 0, "rgb, R");
-    check(rgb, IMP_EMISSION, false, IMP_MONO, (struct expected){1, {lum}}, 1e-15, "rgb, E, mono");
-    check(rgb, IMP_REFLECTANCE, true, IMP_RGB, (struct expected){1, {lum}}, 1e-15, "rgb as one number");
-    check(u, IMP_REFLECTANCE, false, IMP_RGB, (struct expected){1, {0.5}}, 0, "spectrum value, R");
+    check(rgb, IMP_REFLECTANCE, false, IMP_RGB, (struct expected){3, {0.2, 0.4, 0.6}}, 0,
+          "rgb, R");
+    check(rgb, IMP_EMISSION, false, IMP_MONO, (struct expected){1, {lum}}, 1e-15,
+          "rgb, E, mono");
+    check(rgb, IMP_REFLECTANCE, true, IMP_RGB, (struct expected){1, {lum}}, 1e-15,
+          "rgb as one number");
+    check(u, IMP_REFLECTANCE, false, IMP_RGB, (struct expected){1, {0.5}}, 0,
+          "spectrum value, R");
     check(u, IMP_EMISSION, false, IMP_RGB,
-          (struct expected){3, {0.602397, 0.4741455, 0.454458}}, 1e-12, "spectrum value, E");
-    check(u, IMP_EMISSION, false, IMP_MONO, (struct expected){1, {0.5}}, 0, "spectrum value, E, mono");
+          (struct expected){3, {0.602397, 0.4741455, 0.454458}}, 1e-12,
+          "spectrum value, E");
+    check(u, IMP_EMISSION, false, IMP_MONO, (struct expected){1, {0.5}}, 0,
+          "spectrum value, E, mono");
 
     p->number[0] = 3;
-    check(rgb, IMP_UNBOUNDED, false, IMP_RGB, (struct expected){3, {3, 0.4, 0.6}}, 0, "rgb, U, any");
-    check(rgb, IMP_EMISSION, false, IMP_RGB, (struct expected){3, {3, 0.4, 0.6}}, 0, "rgb, E, any");
+    check(rgb, IMP_UNBOUNDED, false, IMP_RGB, (struct expected){3, {3, 0.4, 0.6}}, 0,
+          "rgb, U, any");
+    check(rgb, IMP_EMISSION, false, IMP_RGB, (struct expected){3, {3, 0.4, 0.6}}, 0,
+          "rgb, E, any");
     check(rgb, IMP_REFLECTANCE, false, IMP_RGB, (struct expected){0, {0}}, 0, "rgb 3, R");
-    check(rgb, IMP_REFLECTANCE, false, IMP_MONO, (struct expected){0, {0}}, 0, "rgb 3, R, mono");
+    check(rgb, IMP_REFLECTANCE, false, IMP_MONO, (struct expected){0, {0}}, 0,
+          "rgb 3, R, mono");
     p->number[0] = -0.1;
-    check(rgb, IMP_EMISSION, false, IMP_RGB, (struct expected){0, {0}}, 0, "negative light");
+    check(rgb, IMP_EMISSION, false, IMP_RGB, (struct expected){0, {0}}, 0,
+          "negative light");
     p->number[0] = NAN;
     check(rgb, IMP_UNBOUNDED, false, IMP_RGB, (struct expected){0, {0}}, 0, "NaN");
     struct imp_node *t = node_make("");
@@ -147,7 +163,8 @@ static void table(void)
     tap_ok(count == 3 && v[1] == 1, "default, E");
 }
 
-static enum imp_status object(struct imp_node *n, enum imp_role role, imp_spec *v, int *count)
+static enum imp_status object(struct imp_node *n, enum imp_role role, imp_spec *v,
+                              int *count)
 {
     const char *key = "";
     const enum imp_status st =
@@ -161,8 +178,10 @@ static void objects(void)
     int n;
     struct imp_node *u = node_make("uniform");
     prop_add(u, "value", IMP_PROP_FLOAT)->number[0] = 0.3;
-    tap_ok(object(u, IMP_REFLECTANCE, &v, &n) == IMP_OK && n == 1 && v[1] == 0.3, "uniform, R");
-    tap_ok(object(u, IMP_EMISSION, &v, &n) == IMP_OK && n == 3 && v[1] == 0.3, "uniform, E");
+    tap_ok(object(u, IMP_REFLECTANCE, &v, &n) == IMP_OK && n == 1 && v[1] == 0.3,
+           "uniform, R");
+    tap_ok(object(u, IMP_EMISSION, &v, &n) == IMP_OK && n == 3 && v[1] == 0.3,
+           "uniform, E");
 
     struct imp_node *d = node_make("d65");
     prop_add(d, "scale", IMP_PROP_FLOAT)->number[0] = 2;
@@ -170,7 +189,8 @@ static void objects(void)
            "d65: white times scale");
     struct imp_prop *c = prop_add(d, "color", IMP_PROP_RGB);
     c->number[0] = 1, c->number[1] = 0.5, c->number[2] = 0.25;
-    tap_ok(object(d, IMP_EMISSION, &v, &n) == IMP_OK && v[0] == 2 && v[1] == 1 && v[2] == 0.5,
+    tap_ok(object(d, IMP_EMISSION, &v, &n) == IMP_OK && v[0] == 2 && v[1] == 1 &&
+               v[2] == 0.5,
            "d65: colour times scale");
 
     struct imp_node *r = node_make("regular"), *i = node_make("irregular");
@@ -184,8 +204,8 @@ static void objects(void)
     tap_ok(object(i, IMP_EMISSION, &v, &n) == IMP_OK && fabs(v[0] - 1.103547) < 6e-7,
            "irregular");
     imp__node_prop(i, "wavelengths")->string = "400 500 600";
-    tap_ok(object(i, IMP_EMISSION, &v, &n) == IMP_E_SCENE, "irregular: lengths differ # %s",
-           imp_last_error(ctx));
+    tap_ok(object(i, IMP_EMISSION, &v, &n) == IMP_E_SCENE,
+           "irregular: lengths differ # %s", imp_last_error(ctx));
     imp__node_prop(i, "wavelengths")->string = "400 500 600 7oo";
     tap_ok(object(i, IMP_EMISSION, &v, &n) == IMP_E_SCENE, "irregular: not a number # %s",
            imp_last_error(ctx));
@@ -193,7 +213,8 @@ static void objects(void)
     struct imp_node *raw = node_make("rawconstant");
     struct imp_prop *p = prop_add(raw, "value", IMP_PROP_VECTOR);
     p->number[0] = 4, p->number[1] = 5, p->number[2] = 6;
-    tap_ok(object(raw, IMP_REFLECTANCE, &v, &n) == IMP_OK && n == 3 && v[2] == 6, "rawconstant");
+    tap_ok(object(raw, IMP_REFLECTANCE, &v, &n) == IMP_OK && n == 3 && v[2] == 6,
+           "rawconstant");
 
     tap_ok(object(node_make("blackbody"), IMP_EMISSION, &v, &n) == IMP_E_UNSUPPORTED,
            "blackbody # %s", imp_last_error(ctx));

@@ -1,35 +1,39 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The pieces of the finite elements against closed forms: form factors, basis, materials. */
+ * The pieces of the finite elements against closed forms: form factors, basis, materials.
+ */
 #include "elements/elements.h"
+#include "imp_tap.h"
 #include "math/quadrature.h"
 #include "math/rng.h"
-#include "imp_tap.h"
 
-/* ---- Form factors --------------------------------------------------------------------- */
+/* ---- Form factors -------------------------------------------------------------- */
 
-static double square_to_square(int n, const imp_v3 origin, imp_v3 u, imp_v3 v, imp_v3 normal,
-                               const imp_v3 other[4], imp_v3 facing)
+static double square_to_square(int n, const imp_v3 origin, imp_v3 u, imp_v3 v,
+                               imp_v3 normal, const imp_v3 other[4], imp_v3 facing)
 {
     double x[16], w[16], sum = 0;
     imp__gauss_legendre((size_t)n, 0, 1, x, w);
     for (int i = 0; i < n; i++)
         for (int j = 0; j < n; j++)
             sum += w[i] * w[j] *
-                   imp__polygon_factor(origin + u * x[i] + v * x[j], normal, 4, other, facing);
+                   imp__polygon_factor(origin + u * x[i] + v * x[j], normal, 4, other,
+                                       facing);
     return sum / IMP_PI;
 }
 
 static void form_factors(void)
 {
-    const imp_v3 ex = imp__v3(1, 0, 0), ey = imp__v3(0, 1, 0), ez = imp__v3(0, 0, 1), o = {0};
+    const imp_v3 ex = imp__v3(1, 0, 0), ey = imp__v3(0, 1, 0), ez = imp__v3(0, 0, 1),
+                 o = {0};
     const imp_v3 opposed[4] = {ez, ez + ex, ez + ex + ey, ez + ey};
     const imp_v3 side[4] = {o, ey, ey + ez, ez}; /* at x = 0, faces +x */
     const double par = square_to_square(8, o, ex, ey, ez, opposed, -ez);
     const double perp = square_to_square(8, o, ex, ey, ez, side, ex);
     tap_near(par, 0.19982489569838746, 1e-10, 0, "opposed unit squares");
     tap_near(perp, 0.20004377607540316, 1e-10, 0, "perpendicular unit squares");
-    tap_near(square_to_square(4, o, ex, ey, ez, opposed, -ez), par, 1e-5, 0, "with 4 x 4 nodes");
+    tap_near(square_to_square(4, o, ex, ey, ez, opposed, -ez), par, 1e-5, 0,
+             "with 4 x 4 nodes");
 
     /* A point below the centre of a unit square at distance 1; Siegel and Howell's corner
      * formula gives four times (1/2 pi)(a atan(b)/... ), evaluated to 15 digits. */
@@ -51,24 +55,28 @@ static void form_factors(void)
                                    {ey, ey + ex, ey + ex + ez, ey + ez}};
         const imp_v3 facing[4] = {ex, -ex, ey, -ey};
         double sum = imp__polygon_factor(p, ez, 4, opposed, -ez);
-        for (int i = 0; i < 4; i++) sum += imp__polygon_factor(p, ez, 4, wall[i], facing[i]);
+        for (int i = 0; i < 4; i++)
+            sum += imp__polygon_factor(p, ez, 4, wall[i], facing[i]);
         worst = fmax(worst, fabs(sum / IMP_PI - 1));
     }
     tap_ok(worst < 1e-12, "form factors of a closed box add up to 1 # worst %.2e", worst);
 
-    /* A disk-like polygon cannot be had; a triangle cut by the horizon can: half of what the
-     * whole, mirrored below, would give. */
+    /* A disk-like polygon cannot be had; a triangle cut by the horizon can: half of what
+     * the whole, mirrored below, would give. */
     const imp_v3 t[3] = {imp__v3(2, -1, -1), imp__v3(2, 1, -1), imp__v3(2, 0, 1)};
     double sum = 0, nodes[40], weights[40];
     imp__gauss_legendre(40, 0, 1, nodes, weights);
-    for (int i = 0; i < 40; i++) /* upper part: a triangle with base at z = 0 of half-width 1/2 */
+    for (int i = 0; i < 40;
+         i++) /* upper part: a triangle with base at z = 0 of half-width 1/2 */
         for (int j = 0; j < 40; j++) {
             const double z = nodes[i], half = 0.5 * (1 - z);
             const imp_v3 y = imp__v3(2, half * (2 * nodes[j] - 1), z);
             const double r2 = imp__dot(y, y);
-            sum += weights[i] * weights[j] * 2 * half * (z / sqrt(r2)) * (2 / sqrt(r2)) / r2;
+            sum +=
+                weights[i] * weights[j] * 2 * half * (z / sqrt(r2)) * (2 / sqrt(r2)) / r2;
         }
-    tap_near(imp__polygon_factor(o, ez, 3, t, -ex), sum, 1e-12, 0, "clipped at the horizon");
+    tap_near(imp__polygon_factor(o, ez, 3, t, -ex), sum, 1e-12, 0,
+             "clipped at the horizon");
     tap_ok(imp__polygon_factor(o, ez, 3, t, ex) == 0, "nothing from behind");
     const imp_v3 flat[4] = {-ex - ey, ex - ey, ex + ey, ey - ex};
     tap_ok(imp__polygon_factor(o, ez, 4, flat, -ez) == 0 &&
@@ -79,7 +87,7 @@ static void form_factors(void)
     tap_ok(isfinite(thin) && thin < 2e-13, "a sliver is harmless # %.3g", thin);
 }
 
-/* ---- Basis ------------------------------------------------------------------------------ */
+/* ---- Basis --------------------------------------------------------------------- */
 
 static void gram(int order)
 {
@@ -94,7 +102,8 @@ static void gram(int order)
             const double r = sqrt(1 - z[i] * z[i]), phi = IMP_2PI * p / 48;
             imp__basis_eval(&b, imp__v3(r * cos(phi), r * sin(phi), z[i]), h);
             for (int k = 0; k < b.n; k++)
-                for (int m = 0; m < b.n; m++) g[k][m] += w[i] * IMP_2PI / 48 * h[k] * h[m];
+                for (int m = 0; m < b.n; m++)
+                    g[k][m] += w[i] * IMP_2PI / 48 * h[k] * h[m];
         }
     for (int k = 0; k < b.n; k++)
         for (int m = 0; m < b.n; m++) worst = fmax(worst, fabs(g[k][m] - (k == m)));
@@ -102,7 +111,7 @@ static void gram(int order)
            "order %d: %d functions, Gram matrix is 1 # worst %.2e", order, b.n, worst);
 }
 
-/* ---- Materials ----------------------------------------------------------------------------- */
+/* ---- Materials ----------------------------------------------------------------- */
 
 static void materials(imp_context *ctx)
 {
@@ -113,8 +122,8 @@ static void materials(imp_context *ctx)
     imp__basis_init(&b, 8);
 
     lambert = (struct imp__el_material){.phong = true, .kd = {0.3, 0.5, 0.7}};
-    phong = (struct imp__el_material){.phong = true, .kd = {0.1, 0.1, 0.1},
-                                      .ks = {0.6, 0.6, 0.6}, .exponent = 15};
+    phong = (struct imp__el_material){
+        .phong = true, .kd = {0.1, 0.1, 0.1}, .ks = {0.6, 0.6, 0.6}, .exponent = 15};
     const enum imp_status st = imp__el_project(ctx, &a, &b, 3, "x", &lambert);
     double rest = 0;
     for (int k = 1; k < 25; k++) rest = fmax(rest, fabs(lambert.r[0][k]));
@@ -124,8 +133,8 @@ static void materials(imp_context *ctx)
     tap_ok(imp__el_project(ctx, &a, &b, 1, "x", &phong) == IMP_OK && phong.n == 45,
            "a Phong lobe needs all");
 
-    /* R x for uniform incidence cos: against quadrature of f cos, projected. The lobe is of
-     * higher order than the basis, the matrix elements must be exact all the same. */
+    /* R x for uniform incidence cos: against quadrature of f cos, projected. The lobe is
+     * of higher order than the basis, the matrix elements must be exact all the same. */
     double c[EL_N_MAX] = {0}, y[EL_N_MAX], worst = 0, z[96], w[96];
     c[0] = sqrt(IMP_PI / 2);
     imp__el_apply(&b, phong.n, phong.r[0], c, y);
@@ -142,26 +151,29 @@ static void materials(imp_context *ctx)
             }
             want += w[o] * w[i] * ring;
         }
-    tap_near(phong.r[0][0], want, 1e-6, 0, "R_00 of a Phong lobe against a fine quadrature");
+    tap_near(phong.r[0][0], want, 1e-6, 0,
+             "R_00 of a Phong lobe against a fine quadrature");
     const double *r = phong.r[0];
     for (int m = 0; m <= 8; m++) {
         const int n = b.size[m];
         for (int k = 0; k < n; k++)
-            for (int j = 0; j < n; j++) worst = fmax(worst, fabs(r[k * n + j] - r[j * n + k]));
+            for (int j = 0; j < n; j++)
+                worst = fmax(worst, fabs(r[k * n + j] - r[j * n + k]));
         r += n * n;
     }
     tap_ok(worst == 0, "R is symmetric");
     tap_ok(phong.albedo_max <= 0.7 + 1e-9 && phong.albedo_max > 0.6,
            "directional albedo is at most kd + ks # %.6f", phong.albedo_max);
-    tap_ok(phong.residual < 0.25, "order 8 holds exponent 15 # residual %.3f", phong.residual);
+    tap_ok(phong.residual < 0.25, "order 8 holds exponent 15 # residual %.3f",
+           phong.residual);
     static const int order[] = {2, 4, 6, 8, 10, 12};
     double before = 1;
     for (size_t k = 0; k < imp_count(order); k++) {
         imp__basis_init(&b, order[k]);
         phong.residual = 0;
         if (imp__el_project(ctx, &a, &b, 1, "x", &phong) != IMP_OK) break;
-        tap_ok(phong.residual < before, "the lobe's error falls: order %d # %.4f", order[k],
-               phong.residual);
+        tap_ok(phong.residual < before, "the lobe's error falls: order %d # %.4f",
+               order[k], phong.residual);
         before = phong.residual;
     }
     imp__arena_free(&a);

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The solver against closed forms and against itself: furnaces, the three-patch chain, the
- * adjoint identity, derivatives, threads, files, hostile scenes. */
-#include "elements/elements.h"
+ * The solver against closed forms and against itself: furnaces, the three-patch chain,
+ * the adjoint identity, derivatives, threads, files, hostile scenes. */
 #include "base/film.h"
-#include "math/quadrature.h"
+#include "elements/elements.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
+#include "math/quadrature.h"
 #include <unistd.h>
 
 static struct imp_elements_options options(void)
@@ -24,7 +24,8 @@ static imp_elements *solved(imp_scene *s, const struct imp_elements_options *o)
     return e;
 }
 
-static imp_scene *box(imp_context *ctx, double rho, double emission, enum imp_color_mode mode)
+static imp_scene *box(imp_context *ctx, double rho, double emission,
+                      enum imp_color_mode mode)
 {
     char xml[2048];
     snprintf(xml, sizeof xml,
@@ -32,16 +33,19 @@ static imp_scene *box(imp_context *ctx, double rho, double emission, enum imp_co
              "<sensor type='perspective'><transform name='to_world'>"
              "<lookat origin='0.1,0.2,0.3' target='1,0.5,0.4' up='0,1,0'/></transform>"
              "<float name='fov' value='100'/><film type='hdrfilm'>"
-             "<integer name='width' value='8'/><integer name='height' value='8'/></film></sensor>"
+             "<integer name='width' value='8'/><integer name='height' "
+             "value='8'/></film></sensor>"
              "<shape type='cube' id='box'><boolean name='flip_normals' value='true'/>"
              "<transform name='to_world'><scale x='1' y='0.6' z='1.7'/></transform>"
              "<bsdf type='diffuse'><rgb name='reflectance' value='%g'/></bsdf>"
-             "<emitter type='area'><rgb name='radiance' value='%g'/></emitter></shape></scene>",
+             "<emitter type='area'><rgb name='radiance' "
+             "value='%g'/></emitter></shape></scene>",
              rho, emission);
     return test_scene_text(ctx, xml, mode);
 }
 
-/* Closed box: L = E/(1 - rho) at every level; after k sweeps rho^(k+1)/(1 - rho) is missing. */
+/* Closed box: L = E/(1 - rho) at every level; after k sweeps rho^(k+1)/(1 - rho) is
+ * missing. */
 static void furnace(imp_context *ctx)
 {
     imp_scene *s = box(ctx, 0.6, 1, IMP_MONO);
@@ -50,15 +54,19 @@ static void furnace(imp_context *ctx)
         o.max_level = level;
         o.eps_first = o.eps_last = 1e-12;
         o.no_importance = level == 2;
-        if (level == 0) o.eps_first = 1e12, o.eps_last = 1e11; /* 0 is the default level */
+        if (level == 0)
+            o.eps_first = 1e12, o.eps_last = 1e11; /* 0 is the default level */
         imp_elements *e = solved(s, &o);
         test_must(ctx, imp__el_settle(e, 8, true, 1e-14));
         double worst = 0;
         for (size_t k = 0; k < e->n_elements; k++)
-            worst = fmax(worst, fabs(el_at(e, e->l, &e->elements[k])[0] / sqrt(IMP_2PI) - 1.5));
-        tap_ok(worst < 2e-12 && e->n_elements == (level == 0 ? 6 : level == 1 ? 30 : 126),
-               "furnace, level %d, %zu elements, %zu links # worst %.2e", level, e->n_elements,
-               e->n_links, worst);
+            worst = fmax(worst,
+                         fabs(el_at(e, e->l, &e->elements[k])[0] / sqrt(IMP_2PI) - 1.5));
+        tap_ok(worst < 2e-12 && e->n_elements == (level == 0   ? 6
+                                                  : level == 1 ? 30
+                                                               : 126),
+               "furnace, level %d, %zu elements, %zu links # worst %.2e", level,
+               e->n_elements, e->n_links, worst);
         tap_near(imp__el_measure(e, NULL), 2.5, 1e-12, 0, "what the eye sees");
         tap_near(imp__el_measure_adjoint(e), 2.5, 1e-12, 0, "from the lights' side");
         test_must(ctx, imp__el_sweep(e, 5, true, true));
@@ -66,7 +74,8 @@ static void furnace(imp_context *ctx)
                  "after 5 sweeps the rest is rho^6/(1 - rho)");
         imp_elements_destroy(e);
     }
-    /* Unequal levels: children of different links see different points of the receiver. */
+    /* Unequal levels: children of different links see different points of the receiver.
+     */
     struct imp_elements_options o = options();
     o.eps_last = 1e-4;
     imp_elements *e = solved(s, &o);
@@ -97,14 +106,15 @@ static void furnace(imp_context *ctx)
         most = fmax(most, part);
         least = fmin(least, part);
     }
-    tap_ok(most < 0.6 && least > 0.4, "glossy furnace: %.3f .. %.3f of what arrives leaves",
-           least, most);
+    tap_ok(most < 0.6 && least > 0.4,
+           "glossy furnace: %.3f .. %.3f of what arrives leaves", least, most);
     tap_ok(imp__el_measure(e, NULL) < 2.5, "and nowhere more than kd + ks would give");
     imp_elements_destroy(e);
     imp_scene_destroy(s);
 }
 
-/* Equal sweeps from zero: a.l and e.(S^T g) agree to rounding, whatever the refinement. */
+/* Equal sweeps from zero: a.l and e.(S^T g) agree to rounding, whatever the refinement.
+ */
 static void identity(imp_context *ctx, imp_scene *s, struct imp_elements_options o,
                      const char *name)
 {
@@ -129,16 +139,21 @@ static void identity(imp_context *ctx, imp_scene *s, struct imp_elements_options
             links = e->n_links;
         }
     }
-    tap_ok(worst < 1e-12, "adjoint identity, %s, up to %zu links # worst %.2e", name, links, worst);
+    tap_ok(worst < 1e-12, "adjoint identity, %s, up to %zu links # worst %.2e", name,
+           links, worst);
     test_must(ctx, imp__el_settle(e, 8, true, 1e-12));
     tap_ok(fabs(imp__el_measure_adjoint(e) / imp__el_measure(e, NULL) - 1) < 1e-10,
-           "and converged # %.2e", imp__el_measure_adjoint(e) / imp__el_measure(e, NULL) - 1);
+           "and converged # %.2e",
+           imp__el_measure_adjoint(e) / imp__el_measure(e, NULL) - 1);
     imp_elements_destroy(e);
 }
 
-static const struct imp_elements_phong glossy = {"*", {0.1, 0.1, 0.1}, {0.6, 0.6, 0.6}, 15};
+static const struct imp_elements_phong glossy = {
+    "*", {0.1, 0.1, 0.1}, {0.6, 0.6, 0.6}, 15};
 static const struct imp_elements_beam beams[4] = {{"light_left", {0}, 20},
-    {"light_right", {0}, 20}, {"light_ceiling", {0}, 20}, {"light_back", {0}, 20}};
+                                                  {"light_right", {0}, 20},
+                                                  {"light_ceiling", {0}, 20},
+                                                  {"light_back", {0}, 20}};
 
 static struct imp_elements_options options_d(void)
 {
@@ -162,9 +177,15 @@ static void identities(imp_context *ctx, imp_scene *b, imp_scene *d)
     o = options();
     identity(ctx, rgb, o, "Cornell box, rgb");
     const struct imp_elements_source sources[3] = {
-        {.size = sizeof *sources, .kind = IMP_ELEMENTS_PLANE, .weight = 2,
-         .origin = {100, 100, 100}, .edge_u = {0, 0, 200}, .edge_v = {300, 0, 0}},
-        {.size = sizeof *sources, .kind = IMP_ELEMENTS_SHAPE, .weight = -0.5,
+        {.size = sizeof *sources,
+         .kind = IMP_ELEMENTS_PLANE,
+         .weight = 2,
+         .origin = {100, 100, 100},
+         .edge_u = {0, 0, 200},
+         .edge_v = {300, 0, 0}},
+        {.size = sizeof *sources,
+         .kind = IMP_ELEMENTS_SHAPE,
+         .weight = -0.5,
          .shape = rgb->shapes[0]->name},
         {.size = sizeof *sources, .kind = IMP_ELEMENTS_CAMERA, .region = {2, 3, 9, 12}}};
     o.n_sources = 3;
@@ -174,8 +195,8 @@ static void identities(imp_context *ctx, imp_scene *b, imp_scene *d)
 }
 
 /* Derivatives against central differences of the same discrete system, Euler's budget. */
-static void derivatives(imp_context *ctx, imp_scene *s, const struct imp_elements_options *o,
-                        const char *param)
+static void derivatives(imp_context *ctx, imp_scene *s,
+                        const struct imp_elements_options *o, const char *param)
 {
     const struct imp_elements_row *rows;
     size_t n, index;
@@ -248,22 +269,25 @@ static void chain(imp_context *ctx)
         "<lookat origin='0,0,-3' target='0,0,5' up='0,1,0'/></transform>"
         "<film type='hdrfilm'><integer name='width' value='4'/>"
         "<integer name='height' value='4'/></film></sensor>"
-        "<shape type='rectangle' id='lamp'><transform name='to_world'><scale value='0.005'/>"
+        "<shape type='rectangle' id='lamp'><transform name='to_world'><scale "
+        "value='0.005'/>"
         "<rotate y='1' angle='90'/><translate x='-2' y='0' z='2'/></transform>"
         "<emitter type='area'><float name='radiance' value='1000'/></emitter></shape>"
-        "<shape type='rectangle' id='patch'><transform name='to_world'><scale value='0.005'/>"
+        "<shape type='rectangle' id='patch'><transform name='to_world'><scale "
+        "value='0.005'/>"
         "</transform></shape>"
         "<shape type='rectangle' id='wall'><transform name='to_world'><scale value='1'/>"
         "<rotate y='1' angle='-90'/><translate x='2' y='0' z='2'/></transform>"
-        "<bsdf type='diffuse'><float name='reflectance' value='0.5'/></bsdf></shape></scene>";
+        "<bsdf type='diffuse'><float name='reflectance' "
+        "value='0.5'/></bsdf></shape></scene>";
     const struct imp_elements_phong p = {"patch", {0.1, 0, 0}, {0.6, 0, 0}, 15};
     const double kd = 0.1, ks = 0.6, n = 15, le = 1000, area = 1e-4;
     imp_scene *s = test_scene_text(ctx, xml, IMP_MONO);
     double before = INFINITY;
     for (int order = 4; order <= 12; order += 4) {
         struct imp_elements_options o = options();
-        const struct imp_elements_source src = {.size = sizeof src, .kind = IMP_ELEMENTS_SHAPE,
-                                                .shape = "wall"};
+        const struct imp_elements_source src = {
+            .size = sizeof src, .kind = IMP_ELEMENTS_SHAPE, .shape = "wall"};
         o.order = order;
         o.sources = &src;
         o.n_sources = o.n_phong = 1;
@@ -276,12 +300,14 @@ static void chain(imp_context *ctx)
         const imp_v3 wi = imp__v3(-sqrt(0.5), 0, sqrt(0.5));
         const struct imp__element *x = NULL;
         for (size_t k = 0; k < e->n_elements; k++)
-            if (el_root(e, &e->elements[k])->shape == 1 && e->elements[k].parent == EL_NONE)
+            if (el_root(e, &e->elements[k])->shape == 1 &&
+                e->elements[k].parent == EL_NONE)
                 x = &e->elements[k];
         double apart = 0, sum = 0;
         for (int a = 0; a < 40; a++)
             for (int b = 0; b < 80; b++) {
-                const double z = (a + 0.5) / 40, r = sqrt(1 - z * z), phi = IMP_2PI * b / 80;
+                const double z = (a + 0.5) / 40, r = sqrt(1 - z * z),
+                             phi = IMP_2PI * b / 80;
                 const imp_v3 w = imp__v3(r * cos(phi), r * sin(phi), z);
                 double h[EL_N_MAX], l = 0;
                 imp__basis_eval(&e->basis, imp__to_local(&el_root(e, x)->frame, w), h);
@@ -294,15 +320,16 @@ static void chain(imp_context *ctx)
             }
         const double error = sqrt(apart / sum);
         tap_ok(error < before && error < (order == 12 ? 0.06 : 1),
-               "chain, order %d: the glossy patch's radiance # relative L2 error %.4f", order,
-               error);
+               "chain, order %d: the glossy patch's radiance # relative L2 error %.4f",
+               order, error);
         before = error;
         /* Irradiance of the wall: the lamp's is seen at grazing 0.. here face to face. */
         double irradiance = 0;
         const int m = 200;
         for (int a = 0; a < m; a++)
             for (int b = 0; b < m; b++) {
-                const imp_v3 y = imp__v3(2, -1 + (a + 0.5) * 2 / m, 1 + (b + 0.5) * 2 / m);
+                const imp_v3 y =
+                    imp__v3(2, -1 + (a + 0.5) * 2 / m, 1 + (b + 0.5) * 2 / m);
                 const double r2 = imp__dot(y, y), r = sqrt(r2);
                 const imp_v3 w = y * (1 / r);
                 const double t = w[2] * wi[2] - w[0] * wi[0] - w[1] * wi[1];
@@ -310,7 +337,8 @@ static void chain(imp_context *ctx)
                     g12 * (kd / IMP_PI + ks * (n + 2) / IMP_2PI * pow(fmax(0, t), n));
                 const imp_v3 d = y - imp__v3(-2, 0, 2);
                 const double d2 = imp__dot(d, d);
-                irradiance += l * area * w[2] * w[0] / r2 + le * area * d[0] * d[0] / (d2 * d2);
+                irradiance +=
+                    l * area * w[2] * w[0] / r2 + le * area * d[0] * d[0] / (d2 * d2);
             }
         irradiance /= m * m;
         if (order == 12)
@@ -334,7 +362,8 @@ static void same_bits(imp_scene *d1, const char *xml_defines)
     tap_ok(a->n_links == b->n_links && a->n_coef == b->n_coef &&
                memcmp(a->l, b->l, a->n_coef * sizeof *a->l) == 0 &&
                memcmp(a->g, b->g, a->n_coef * sizeof *a->g) == 0 &&
-               memcmp(f[0]->mean, f[1]->mean, imp__film_values(f[0]) * sizeof(float)) == 0,
+               memcmp(f[0]->mean, f[1]->mean, imp__film_values(f[0]) * sizeof(float)) ==
+                   0,
            "one thread and three: the same bits # %zu links", a->n_links);
     imp_film_destroy(f[0]);
     imp_film_destroy(f[1]);
@@ -357,10 +386,12 @@ static void files(imp_context *ctx, imp_scene *s)
     imp_film *f[2];
     test_must(ctx, imp_elements_save(a, path));
     test_must(ctx, imp_elements_open(s, &o, path, &b));
-    for (enum imp_elements_image kind = IMP_ELEMENTS_FLAT; kind <= IMP_ELEMENTS_IMPORTANCE; kind++) {
+    for (enum imp_elements_image kind = IMP_ELEMENTS_FLAT;
+         kind <= IMP_ELEMENTS_IMPORTANCE; kind++) {
         test_must(ctx, imp_elements_image(a, 0, kind, 1, &f[0]));
         test_must(ctx, imp_elements_image(b, 0, kind, 1, &f[1]));
-        tap_ok(memcmp(f[0]->mean, f[1]->mean, imp__film_values(f[0]) * sizeof(float)) == 0,
+        tap_ok(memcmp(f[0]->mean, f[1]->mean, imp__film_values(f[0]) * sizeof(float)) ==
+                   0,
                "reopened: picture %d has the same bits", (int)kind);
         imp_film_destroy(f[0]);
         imp_film_destroy(f[1]);
@@ -370,7 +401,8 @@ static void files(imp_context *ctx, imp_scene *s)
     other.n_phong = 0;
     const enum imp_status st = imp_elements_open(s, &other, path, &b);
     tap_ok(st == IMP_E_SCENE, "another material is refused # %s", imp_last_error(ctx));
-    /* Damage: every cut and a flip in each of some bytes gives an error or a valid object. */
+    /* Damage: every cut and a flip in each of some bytes gives an error or a valid
+     * object. */
     FILE *file = fopen(path, "rb");
     static unsigned char data[8 << 20];
     const size_t size = file ? fread(data, 1, sizeof data, file) : 0;
@@ -378,27 +410,34 @@ static void files(imp_context *ctx, imp_scene *s)
     int refused = 0, opened = 0;
     for (int k = 0; k < 60 && size; k++) {
         const size_t cut = k < 20 ? size * (size_t)k / 20 : size;
-        const size_t at = k < 20 ? 0 : k < 45 ? (size_t)(k - 20) * 4 : size - (size_t)(k - 40) * 1000;
+        const size_t at = k < 20   ? 0
+                          : k < 45 ? (size_t)(k - 20) * 4
+                                   : size - (size_t)(k - 40) * 1000;
         data[at] ^= 0xc5;
         file = fopen(path, "wb");
         if (file) fwrite(data, 1, cut, file), fclose(file);
         data[at] ^= 0xc5;
-        if (imp_elements_open(s, &o, path, &b) == IMP_OK) opened++, imp_elements_destroy(b);
+        if (imp_elements_open(s, &o, path, &b) == IMP_OK)
+            opened++, imp_elements_destroy(b);
         else refused++;
     }
-    tap_ok(size > 0 && refused >= 35, "damaged files: %d refused, %d still sound", refused, opened);
+    tap_ok(size > 0 && refused >= 35, "damaged files: %d refused, %d still sound",
+           refused, opened);
     close(fd);
     unlink(path);
     imp_elements_destroy(a);
 }
 
-/* ---- Refusals and hostile scenes ---------------------------------------------------------- */
+/* ---- Refusals and hostile scenes ----------------------------------------------- */
 
-static void refuses(imp_context *ctx, const char *shape, enum imp_status want, const char *word)
+static void refuses(imp_context *ctx, const char *shape, enum imp_status want,
+                    const char *word)
 {
     char xml[2048];
-    snprintf(xml, sizeof xml, "<scene version='3.0.0'><sensor type='perspective'/>%s"
-             "<shape type='rectangle'><emitter type='area'/></shape></scene>", shape);
+    snprintf(xml, sizeof xml,
+             "<scene version='3.0.0'><sensor type='perspective'/>%s"
+             "<shape type='rectangle'><emitter type='area'/></shape></scene>",
+             shape);
     imp_scene *s = test_scene_text(ctx, xml, IMP_RGB);
     imp_elements *e = NULL;
     const enum imp_status st = imp_elements_create(s, NULL, &e);
@@ -422,10 +461,15 @@ static void hostile(imp_context *ctx)
             IMP_E_UNSUPPORTED, "glass");
     refuses(ctx, "<shape type='cube' id='mirror'><bsdf type='conductor'/></shape>",
             IMP_E_UNSUPPORTED, "mirror");
-    refuses(ctx, "<shape type='cube' id='tiles'><bsdf type='diffuse'><texture name='reflectance' "
-                 "type='checkerboard'/></bsdf></shape>", IMP_E_UNSUPPORTED, "tiles");
-    refuses(ctx, "<shape type='cube' id='polish'><bsdf type='roughconductor'>"
-                 "<float name='alpha' value='0.02'/></bsdf></shape>", IMP_E_UNSUPPORTED, "polish");
+    refuses(
+        ctx,
+        "<shape type='cube' id='tiles'><bsdf type='diffuse'><texture name='reflectance' "
+        "type='checkerboard'/></bsdf></shape>",
+        IMP_E_UNSUPPORTED, "tiles");
+    refuses(ctx,
+            "<shape type='cube' id='polish'><bsdf type='roughconductor'>"
+            "<float name='alpha' value='0.02'/></bsdf></shape>",
+            IMP_E_UNSUPPORTED, "polish");
     refuses(ctx, "<emitter type='point' id='bulb'/>", IMP_E_UNSUPPORTED, "bulb");
     refuses(ctx, "<emitter type='constant' id='sky'/>", IMP_E_UNSUPPORTED, "sky");
 
@@ -436,13 +480,16 @@ static void hostile(imp_context *ctx)
         "<film type='hdrfilm'><integer name='width' value='8'/>"
         "<integer name='height' value='8'/></film></sensor>"
         "<shape type='rectangle' id='a'/><shape type='rectangle' id='b'/>"
-        "<shape type='rectangle' id='c'><transform name='to_world'><translate x='2'/></transform>"
+        "<shape type='rectangle' id='c'><transform name='to_world'><translate "
+        "x='2'/></transform>"
         "</shape><shape type='rectangle' id='thin'><transform name='to_world'>"
         "<scale x='1e-7' y='1' z='1'/><rotate y='1' angle='90'/></transform></shape>"
-        "<shape type='rectangle' id='both'><transform name='to_world'><rotate x='1' angle='90'/>"
+        "<shape type='rectangle' id='both'><transform name='to_world'><rotate x='1' "
+        "angle='90'/>"
         "</transform><bsdf type='twosided'><bsdf type='diffuse'>"
         "<rgb name='reflectance' value='1,1,1'/></bsdf></bsdf></shape>"
-        "<shape type='rectangle' id='lamp'><transform name='to_world'><rotate y='1' angle='180'/>"
+        "<shape type='rectangle' id='lamp'><transform name='to_world'><rotate y='1' "
+        "angle='180'/>"
         "<translate z='6'/></transform><emitter type='area'/></shape></scene>";
     imp_scene *s = test_scene_text(ctx, xml, IMP_RGB);
     struct imp_elements_options o = options();
@@ -460,8 +507,8 @@ static void hostile(imp_context *ctx)
     o.eps_last = 1e-6;
     o.max_links = 500;
     e = solved(s, &o);
-    tap_ok(e->n_links <= 500 && strstr(e->reason, "budget"), "a budget of 500 links # %zu links",
-           e->n_links);
+    tap_ok(e->n_links <= 500 && strstr(e->reason, "budget"),
+           "a budget of 500 links # %zu links", e->n_links);
     imp_elements_destroy(e);
     int count = 0;
     o.max_links = 0;
@@ -470,7 +517,8 @@ static void hostile(imp_context *ctx)
     test_must(ctx, imp_elements_create(s, &o, &e));
     imp_film *film = NULL;
     const enum imp_status st = imp_elements_solve(e);
-    tap_ok(st == IMP_CANCELLED && imp_elements_image(e, 0, IMP_ELEMENTS_GOURAUD, 1, &film) == IMP_OK,
+    tap_ok(st == IMP_CANCELLED &&
+               imp_elements_image(e, 0, IMP_ELEMENTS_GOURAUD, 1, &film) == IMP_OK,
            "a stopped run has a coarser solution # %zu links", e->n_links);
     imp_film_destroy(film);
     imp_elements_destroy(e);
@@ -509,7 +557,8 @@ static void hostile(imp_context *ctx)
     o.max_links = 100000;
     test_must(ctx, imp_elements_create(s, &o, &e));
     const enum imp_status refused = imp_elements_solve(e);
-    tap_ok(e->n_roots > 5000 && refused == IMP_E_NOMEM && strstr(imp_last_error(ctx), "budget"),
+    tap_ok(e->n_roots > 5000 && refused == IMP_E_NOMEM &&
+               strstr(imp_last_error(ctx), "budget"),
            "%zu polygons # %s", e->n_roots, imp_last_error(ctx));
     imp_elements_destroy(e);
     imp_scene_destroy(s);

@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * EXR chunks of every compressed length round their own: pictures of noise whose ZIP stream is
- * about as long as the pixels, one picture for each number of pixels that are 0. Readers take
- * a chunk of exactly the pixels' length for plain pixels. */
+ * EXR chunks of every compressed length round their own: pictures of noise whose ZIP
+ * stream is about as long as the pixels, one picture for each number of pixels that are
+ * 0. Readers take a chunk of exactly the pixels' length for plain pixels. */
+#include "base/file.h"
+#include "format/image.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "format/image.h"
-#include "base/file.h"
 #include "math/rng.h"
 
 int main(void)

@@ -1,18 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Allocation 1, 2, 3, ... fails, in fits and checks: an error every time, nothing leaks, and
- * the scene's numbers are what they were. */
-#include <math.h>
+ * Allocation 1, 2, 3, ... fails, in fits and checks: an error every time, nothing leaks,
+ * and the scene's numbers are what they were. */
 #include "imp_fail_alloc.h"
 #include "imp_scene.h"
-#include "inverse_scenes.h"
 #include "imp_tap.h"
+#include "inverse_scenes.h"
+#include <math.h>
 
 enum job { FIT_ADAM, FIT_LM, FIT_LBFGS, CHECK, N_JOBS };
-static const char *const names[] = {"fit, Adam", "fit, LM and intervals", "fit, L-BFGS", "check"};
+static const char *const names[] = {"fit, Adam", "fit, LM and intervals", "fit, L-BFGS",
+                                    "check"};
 
 /* From a new context to the result; *reached: how far it got. */
-static enum imp_status run_job(enum job job, struct fail_alloc *heap, long fail_at, int *changed)
+static enum imp_status run_job(enum job job, struct fail_alloc *heap, long fail_at,
+                               int *changed)
 {
     struct imp_context_options co = IMP_CONTEXT_OPTIONS_INIT;
     struct imp_load_options lo = IMP_LOAD_OPTIONS_INIT;
@@ -24,12 +26,14 @@ static enum imp_status run_job(enum job job, struct fail_alloc *heap, long fail_
     co.allocator = fail_alloc_hooks(heap);
     heap->fail_at = 0;
     if (imp_context_create(&co, &ctx) != IMP_OK) return IMP_E_NOMEM;
-    enum imp_status st = imp_scene_load_string(ctx, ball_xml, strlen(ball_xml), "ball", &lo, &s);
+    enum imp_status st =
+        imp_scene_load_string(ctx, ball_xml, strlen(ball_xml), "ball", &lo, &s);
     struct imp_target t = IMP_TARGET_INIT;
     for (int i = 0; i < 360; i++) pixels[i] = 0.8f;
     t.width = 12, t.height = 10, t.channels = 3, t.pixels = pixels;
     double before[6], after[6];
-    /* Everything so far may allocate; what follows fails at its allocation number fail_at. */
+    /* Everything so far may allocate; what follows fails at its allocation number
+     * fail_at. */
     heap->fail_at = fail_at ? heap->calls + fail_at : 0;
     if (st == IMP_OK) st = imp_problem_create(s, &p);
     if (st == IMP_OK) st = imp_problem_activate(p, "ball.*");
@@ -82,7 +86,8 @@ int main(void)
             bad_status += st != IMP_E_NOMEM;
         }
         tap_ok(st == IMP_OK && bad_status == 0 && leaks == 0 && touched == 0,
-               "%s: allocations up to %ld fail # %d wrong statuses, %d leaks, %d scenes changed",
+               "%s: allocations up to %ld fail # %d wrong statuses, %d leaks, %d scenes "
+               "changed",
                names[job], n, bad_status, leaks, touched);
     }
     return tap_done();

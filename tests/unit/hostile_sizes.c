@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Sizes and scenes at the edge of sense: each gives a clear error or a right picture, soon,
- * and without more memory than it needs. */
+ * Sizes and scenes at the edge of sense: each gives a clear error or a right picture,
+ * soon, and without more memory than it needs. */
+#include "base/pool.h"
 #include "imp_fail_alloc.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "base/pool.h"
 #include "walk/walk.h"
 
 static imp_context *ctx;
@@ -35,12 +35,13 @@ static void counting_release(void *memory, void *payload)
 static void scene_text(char *xml, size_t size, const char *integrator, const char *film,
                        const char *rest)
 {
-    snprintf(xml, size,
-             "<scene version='3.0.0'><integrator type='path'>%s</integrator>"
-             "<sensor type='perspective'><transform name='to_world'><lookat origin='0,0,4' "
-             "target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'>%s"
-             "<rfilter type='box'/></film></sensor>%s</scene>",
-             integrator, film, rest);
+    snprintf(
+        xml, size,
+        "<scene version='3.0.0'><integrator type='path'>%s</integrator>"
+        "<sensor type='perspective'><transform name='to_world'><lookat origin='0,0,4' "
+        "target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'>%s"
+        "<rfilter type='box'/></film></sensor>%s</scene>",
+        integrator, film, rest);
 }
 static enum imp_status load(const char *integrator, const char *film, const char *rest,
                             imp_scene **out)
@@ -50,7 +51,8 @@ static enum imp_status load(const char *integrator, const char *film, const char
     *out = NULL;
     return imp_scene_load_string(ctx, xml, strlen(xml), "test", NULL, out);
 }
-#define SIZE(w, h) "<integer name='width' value='" #w "'/><integer name='height' value='" #h "'/>"
+#define SIZE(w, h)                                                                       \
+    "<integer name='width' value='" #w "'/><integer name='height' value='" #h "'/>"
 #define BALL "<emitter type='constant'/><shape type='sphere'/>"
 
 static double mean_of(imp_film *film)
@@ -58,20 +60,29 @@ static double mean_of(imp_film *film)
     struct imp_film_info i = {.size = sizeof i};
     double sum = 0;
     imp_film_get_info(film, &i);
-    for (int k = 0; k < i.width * i.height * i.channels; k++) sum += imp_film_mean(film)[k];
+    for (int k = 0; k < i.width * i.height * i.channels; k++)
+        sum += imp_film_mean(film)[k];
     return sum / (i.width * i.height * i.channels);
 }
 
 static void films(void)
 {
-    static const struct { const char *film; bool loads; } cases[] = {
-        {SIZE(40000, 40000), true}, {SIZE(100000, 100000), false}, {SIZE(1048576, 1048576), false},
-        {SIZE(2147483647, 1), false}, {SIZE(0, 4), false}, {SIZE(-3, 4), false},
+    static const struct {
+        const char *film;
+        bool loads;
+    } cases[] = {
+        {SIZE(40000, 40000), true},
+        {SIZE(100000, 100000), false},
+        {SIZE(1048576, 1048576), false},
+        {SIZE(2147483647, 1), false},
+        {SIZE(0, 4), false},
+        {SIZE(-3, 4), false},
         {SIZE(99999999999999999999, 4), false},
         {SIZE(8, 8) "<integer name='crop_width' value='2147483647'/>", false},
         {SIZE(8, 8) "<integer name='crop_offset_x' value='-2147483648'/>", false},
         {SIZE(8, 8) "<integer name='crop_offset_x' value='4'/>"
-                    "<integer name='crop_width' value='2147483647'/>", false},
+                    "<integer name='crop_width' value='2147483647'/>",
+         false},
     };
     for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
         imp_scene *s;
@@ -129,24 +140,29 @@ static void samples(void)
     double g[64];
     calls = 0;
     st = imp_problem_objective(p, NULL, &run, &J, g, NULL);
-    tap_ok(st == IMP_CANCELLED && calls >= 1, "its objective too # %s", imp_status_text(st));
+    tap_ok(st == IMP_CANCELLED && calls >= 1, "its objective too # %s",
+           imp_status_text(st));
     film = NULL;
     run.spp = -5;
     st = imp_render(s, &run, &film);
-    tap_ok((st == IMP_E_ARG && !film) || st == IMP_CANCELLED, "spp -5 # %s", imp_last_error(ctx));
+    tap_ok((st == IMP_E_ARG && !film) || st == IMP_CANCELLED, "spp -5 # %s",
+           imp_last_error(ctx));
     imp_film_destroy(film);
     run = (struct imp_run)IMP_RUN_INIT;
     run.spp = 1;
     film = NULL;
     run.sensor = 3;
-    tap_ok(imp_render(s, &run, &film) == IMP_E_ARG && !film, "no sensor 3 # %s", imp_last_error(ctx));
+    tap_ok(imp_render(s, &run, &film) == IMP_E_ARG && !film, "no sensor 3 # %s",
+           imp_last_error(ctx));
     run.sensor = -1;
-    tap_ok(imp_render(s, &run, &film) == IMP_E_ARG && !film, "no sensor -1 # %s", imp_last_error(ctx));
+    tap_ok(imp_render(s, &run, &film) == IMP_E_ARG && !film, "no sensor -1 # %s",
+           imp_last_error(ctx));
     imp_problem_destroy(p);
     imp_scene_destroy(s);
 }
 
-/* One pixel, many samples: all threads work, and no walk is kept longer than its batch. */
+/* One pixel, many samples: all threads work, and no walk is kept longer than its batch.
+ */
 static void one_pixel(void)
 {
     imp_scene *s;
@@ -168,11 +184,13 @@ static void one_pixel(void)
         test_must(ctx, imp_problem_objective(p, NULL, &run, &J, g, NULL));
         peaks[k] = peak - live;
     }
-    tap_ok(peaks[1] <= peaks[0] + (512 << 10), "one pixel: memory does not follow spp # %zu, %zu kB",
-           peaks[0] >> 10, peaks[1] >> 10);
+    tap_ok(peaks[1] <= peaks[0] + (512 << 10),
+           "one pixel: memory does not follow spp # %zu, %zu kB", peaks[0] >> 10,
+           peaks[1] >> 10);
     const double se = hypot(imp_film_se(few)[0], imp_film_se(many)[0]);
     tap_ok(fabs(imp_film_mean(few)[0] - imp_film_mean(many)[0]) < 4.5 * se,
-           "the same picture # %.4f +- %.4f, %.4f", imp_film_mean(few)[0], se, imp_film_mean(many)[0]);
+           "the same picture # %.4f +- %.4f, %.4f", imp_film_mean(few)[0], se,
+           imp_film_mean(many)[0]);
     imp_film_destroy(few);
     imp_film_destroy(many);
     imp_problem_destroy(p);
@@ -188,11 +206,14 @@ static void endless(void)
     struct imp_run run = IMP_RUN_INIT;
     imp_film *film = NULL;
     const double start = imp__now();
-    test_must(ctx, load("<integer name='max_depth' value='-1'/><integer name='rr_depth' "
-                        "value='2147483647'/>", SIZE(16, 16),
-                        "<shape type='sphere'><transform name='to_world'><scale value='9'/>"
-                        "</transform><boolean name='flip_normals' value='true'/>" WHITE "</shape>",
-                        &s));
+    test_must(ctx,
+              load("<integer name='max_depth' value='-1'/><integer name='rr_depth' "
+                   "value='2147483647'/>",
+                   SIZE(16, 16),
+                   "<shape type='sphere'><transform name='to_world'><scale value='9'/>"
+                   "</transform><boolean name='flip_normals' value='true'/>" WHITE
+                   "</shape>",
+                   &s));
     run.spp = 64;
     tap_ok(imp_render(s, &run, &film) == IMP_E_PATHS && !film && imp__now() - start < 20,
            "walks without end # %s", imp_last_error(ctx));
@@ -209,10 +230,12 @@ static void endless(void)
     imp_scene_destroy(s);
 
     /* With roulette the same room is dark, and every walk ends. */
-    test_must(ctx, load("<integer name='max_depth' value='2147483647'/>", SIZE(4, 4),
-                        "<shape type='sphere'><transform name='to_world'><scale value='9'/>"
-                        "</transform><boolean name='flip_normals' value='true'/>" WHITE "</shape>",
-                        &s));
+    test_must(ctx,
+              load("<integer name='max_depth' value='2147483647'/>", SIZE(4, 4),
+                   "<shape type='sphere'><transform name='to_world'><scale value='9'/>"
+                   "</transform><boolean name='flip_normals' value='true'/>" WHITE
+                   "</shape>",
+                   &s));
     test_must(ctx, imp_render(s, &run, &film));
     tap_ok(mean_of(film) == 0, "depth 2^31 - 1 with roulette");
     imp_film_destroy(film);
@@ -221,15 +244,22 @@ static void endless(void)
 
 static void empty(void)
 {
-    static const struct { const char *what, *rest; double mean; } cases[] = {
+    static const struct {
+        const char *what, *rest;
+        double mean;
+    } cases[] = {
         {"no light", "<shape type='sphere'/>", 0},
         {"no shape", "<emitter type='constant'/>", 1},
         {"nothing", "", 0},
-        {"looking away", "<shape type='sphere'><transform name='to_world'><translate z='20'/>"
-                         "</transform></shape><emitter type='point'/>", 0},
+        {"looking away",
+         "<shape type='sphere'><transform name='to_world'><translate z='20'/>"
+         "</transform></shape><emitter type='point'/>",
+         0},
         {"a light that is never chosen",
-         "<shape type='sphere'/><emitter type='point'><float name='sampling_weight' value='0'/>"
-         "<point name='position' x='0' y='0' z='8'/></emitter>", 0},
+         "<shape type='sphere'/><emitter type='point'><float name='sampling_weight' "
+         "value='0'/>"
+         "<point name='position' x='0' y='0' z='8'/></emitter>",
+         0},
     };
     for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
         imp_scene *s;
@@ -244,14 +274,16 @@ static void empty(void)
         test_must(ctx, imp_problem_create(s, &p));
         enum imp_status st = imp_problem_activate(p, "*");
         if (imp_scene_n_params(s) == 0) {
-            tap_ok(st == IMP_E_ARG, "%s: nothing to activate # %s", cases[k].what, imp_last_error(ctx));
+            tap_ok(st == IMP_E_ARG, "%s: nothing to activate # %s", cases[k].what,
+                   imp_last_error(ctx));
         } else {
             static float seed[4 * 4 * 3];
             double g[64], x[64];
             for (int i = 0; i < 48; i++) seed[i] = 1;
             test_must(ctx, imp_problem_reverse(p, seed, &run, g, x));
             bool finite = true;
-            for (size_t i = 0; i < imp_problem_n(p); i++) finite &= isfinite(g[i]) && isfinite(x[i]);
+            for (size_t i = 0; i < imp_problem_n(p); i++)
+                finite &= isfinite(g[i]) && isfinite(x[i]);
             tap_ok(finite, "%s: finite gradients", cases[k].what);
         }
         imp_problem_destroy(p);
@@ -267,10 +299,13 @@ static void empty(void)
         run.spp = 2000;
         run.seed = (uint64_t)k;
         snprintf(rest, sizeof rest,
-                 "<shape type='rectangle'/><shape type='sphere'><point name='center' x='0' y='0' "
+                 "<shape type='rectangle'/><shape type='sphere'><point name='center' "
+                 "x='0' y='0' "
                  "z='2'/><float name='radius' value='0.8'/><emitter type='area'>"
-                 "<float name='sampling_weight' value='%d'/></emitter></shape>", k);
-        test_must(ctx, load("<boolean name='hide_emitters' value='true'/>", SIZE(4, 4), rest, &s));
+                 "<float name='sampling_weight' value='%d'/></emitter></shape>",
+                 k);
+        test_must(ctx, load("<boolean name='hide_emitters' value='true'/>", SIZE(4, 4),
+                            rest, &s));
         test_must(ctx, imp_render(s, &run, &film[k]));
         double variance = 0;
         for (int i = 0; i < 48; i += 3) variance += pow(imp_film_se(film[k])[i], 2);
@@ -312,7 +347,8 @@ static void many_shapes(void)
     struct imp_scene_info info = {.size = sizeof info};
     imp_scene_get_info(s, &info);
     test_must(ctx, imp_render(s, &run, &film));
-    tap_ok(info.n_shapes == n && imp_scene_n_params(s) == (size_t)n && imp__now() - start < 20,
+    tap_ok(info.n_shapes == n && imp_scene_n_params(s) == (size_t)n &&
+               imp__now() - start < 20,
            "%d spheres # %zu MB", n, info.memory_bytes >> 20);
     imp_film_destroy(film);
     imp_scene_destroy(s);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Rays against every kind of shape: Embree's answer beside a brute-force intersector of the
- * test's own, in long double, that knows the shapes by their definitions only. */
+ * Rays against every kind of shape: Embree's answer beside a brute-force intersector of
+ * the test's own, in long double, that knows the shapes by their definitions only. */
 #include "imp_tap.h"
 #include "math/rng.h"
 #include "math/warp.h"
@@ -101,7 +101,8 @@ static double brute(const struct imp_shape *s, const struct imp_mat4 *inverse, i
 static imp_v3 uniform3(struct imp_key key, uint32_t dim, double size)
 {
     return imp__v3(imp__u01(key, dim) - 0.5, imp__u01(key, dim + 1) - 0.5,
-                   imp__u01(key, dim + 2) - 0.5) * (2 * size);
+                   imp__u01(key, dim + 2) - 0.5) *
+           (2 * size);
 }
 
 /* One shape alone: random rays, axis-aligned ones, from inside, and aimed at rims. */
@@ -159,8 +160,10 @@ static void single(imp_context *ctx, const struct imp_shape_ops *ops, int place)
             const imp_v3 back = imp__point(&inverse, at.p);
             double off = 0;
             if (strcmp(ops->name, "sphere") == 0) off = fabs(imp__length(back) - 1);
-            else if (strcmp(ops->name, "cylinder") == 0) off = fabs(hypot(back[0], back[1]) - 1);
-            else if (strcmp(ops->name, "disk") == 0 || strcmp(ops->name, "rectangle") == 0)
+            else if (strcmp(ops->name, "cylinder") == 0)
+                off = fabs(hypot(back[0], back[1]) - 1);
+            else if (strcmp(ops->name, "disk") == 0 ||
+                     strcmp(ops->name, "rectangle") == 0)
                 off = fabs(back[2]);
             worst_on = fmax(worst_on, off);
             if (ops->intersect) {
@@ -172,10 +175,11 @@ static void single(imp_context *ctx, const struct imp_shape_ops *ops, int place)
         }
     }
     const int analytic = s && s->geometry == IMP_ANALYTIC;
-    tap_ok(s && rays > 15000 && hits > 2000 && wrong == 0 && shadow == 0 && worst_ops == 0 &&
-               worst_t < (analytic ? 1e-12 : 1e-5) && worst_p < (analytic ? 1e-12 : 1e-5) &&
-               worst_on < 1e-13,
-           "%s, placement %d: nearest hits # rays %d hits %d wrong %d shadow %d t %.1e p %.1e",
+    tap_ok(s && rays > 15000 && hits > 2000 && wrong == 0 && shadow == 0 &&
+               worst_ops == 0 && worst_t < (analytic ? 1e-12 : 1e-5) &&
+               worst_p < (analytic ? 1e-12 : 1e-5) && worst_on < 1e-13,
+           "%s, placement %d: nearest hits # rays %d hits %d wrong %d shadow %d t %.1e p "
+           "%.1e",
            ops->name, place, rays, hits, wrong, shadow, worst_t, worst_p);
     world_end();
 }
@@ -223,8 +227,8 @@ static void together(imp_context *ctx)
         }
     /* A ray within float rounding of a rim may go either way. */
     tap_ok(rays > 18000 && hits > 3000 && wrong <= 2,
-           "24 shapes of all kinds: the nearest # rays %d hits %d wrong %d bytes %zu", rays,
-           hits, wrong, imp__intersector_bytes(&world));
+           "24 shapes of all kinds: the nearest # rays %d hits %d wrong %d bytes %zu",
+           rays, hits, wrong, imp__intersector_bytes(&world));
     tap_ok(imp__intersector_bytes(&world) > 1000, "Embree's memory is counted");
     world_end();
 }
@@ -232,7 +236,8 @@ static void together(imp_context *ctx)
 static void intervals(imp_context *ctx)
 {
     world_begin(ctx);
-    struct imp_node *ball = node_new("shape", "sphere"), *wall = node_new("shape", "rectangle");
+    struct imp_node *ball = node_new("shape", "sphere"),
+                    *wall = node_new("shape", "rectangle");
     node_vector(ball, "center", imp__v3(0, 0, 5));
     node_transform(wall, imp__translate(imp__v3(0, 0, 10)));
     shape_build(ball, NULL);
@@ -240,20 +245,24 @@ static void intervals(imp_context *ctx)
     struct imp_hit hit = {0};
     const imp_v3 o = imp__v3(0, 0, 0), d = imp__v3(0, 0, 1);
     if (imp__intersector_create(&world) != IMP_OK) return;
-    tap_ok(imp__intersect(&world, &o, &d, 0, INFINITY, &hit) && hit.shape == 0 && hit.t == 4,
+    tap_ok(imp__intersect(&world, &o, &d, 0, INFINITY, &hit) && hit.shape == 0 &&
+               hit.t == 4,
            "front of the ball");
-    tap_ok(imp__intersect(&world, &o, &d, 4.5, INFINITY, &hit) && hit.shape == 0 && hit.t == 6,
+    tap_ok(imp__intersect(&world, &o, &d, 4.5, INFINITY, &hit) && hit.shape == 0 &&
+               hit.t == 6,
            "from tmin inside: its back");
-    tap_ok(imp__intersect(&world, &o, &d, 6.5, INFINITY, &hit) && hit.shape == 1 && hit.t == 10,
+    tap_ok(imp__intersect(&world, &o, &d, 6.5, INFINITY, &hit) && hit.shape == 1 &&
+               hit.t == 10,
            "behind the ball: the wall");
     tap_ok(!imp__intersect(&world, &o, &d, 6.5, 9.5, &hit), "nothing in between");
     tap_ok(!imp__occluded(&world, &o, &d, 6.5, 9.5), "nothing in between: no shadow");
     tap_ok(imp__occluded(&world, &o, &d, 0, 9.5), "shadow of the ball");
     tap_ok(imp__occluded(&world, &o, &d, 7, 10.5), "shadow of the wall");
-    tap_ok(!imp__intersect(&world, &o, &d, 5, 5, &hit) && !imp__occluded(&world, &o, &d, 5, 4),
+    tap_ok(!imp__intersect(&world, &o, &d, 5, 5, &hit) &&
+               !imp__occluded(&world, &o, &d, 5, 4),
            "empty intervals");
-    const imp_v3 bad[4] = {imp__v3(NAN, 0, 0), imp__v3(INFINITY, 0, 0), imp__v3(1e30, 0, 0),
-                           imp__v3(0, 0, 0)};
+    const imp_v3 bad[4] = {imp__v3(NAN, 0, 0), imp__v3(INFINITY, 0, 0),
+                           imp__v3(1e30, 0, 0), imp__v3(0, 0, 0)};
     for (int i = 0; i < 4; i++) {
         const int a = imp__intersect(&world, &o, &bad[i], 0, INFINITY, &hit);
         const int b = i < 3 && imp__intersect(&world, &bad[i], &d, 0, INFINITY, &hit);
@@ -274,7 +283,11 @@ static void intervals(imp_context *ctx)
 
 /* Four threads, each with a scene of its own in one context, made at the same time: one
  * device, and the same hits. */
-struct thread_job { imp_context *ctx; double sum; int ok; };
+struct thread_job {
+    imp_context *ctx;
+    double sum;
+    int ok;
+};
 static void *thread_run(void *payload)
 {
     struct thread_job *job = payload;
@@ -282,17 +295,19 @@ static void *thread_run(void *payload)
     struct imp_shape *list[8];
     imp__arena_init(&scene.arena, job->ctx);
     for (int k = 0; k < 8 && imp__shape_kinds[k]; k++) {
-        struct imp_node *n = imp__node_create(&scene.arena, "shape", imp__shape_kinds[k]->name,
-                                              NULL, NULL, (struct imp_loc){0});
+        struct imp_node *n =
+            imp__node_create(&scene.arena, "shape", imp__shape_kinds[k]->name, NULL, NULL,
+                             (struct imp_loc){0});
         n->mesh = &octahedron;
         struct imp_prop *p =
             imp__node_add(&scene.arena, n, "to_world", IMP_PROP_TRANSFORM, n->loc);
         memcpy(p->number, imp__translate(imp__v3(3 * (k % 3), 3 * (k / 3), k)).m,
                sizeof p->number);
         struct imp_shape *s = imp__arena_array(&scene.arena, 1, sizeof *s);
-        *s = (struct imp_shape){.ops = imp__shape_kinds[k], .index = k,
-                                .self = imp__arena_array(&scene.arena, 1,
-                                                         imp__shape_kinds[k]->object_size)};
+        *s = (struct imp_shape){
+            .ops = imp__shape_kinds[k],
+            .index = k,
+            .self = imp__arena_array(&scene.arena, 1, imp__shape_kinds[k]->object_size)};
         const struct imp_build b = {.ctx = job->ctx, .node = n, .arena = &scene.arena};
         if (s->ops->build(&b, s->self, s) != IMP_OK) return NULL;
         list[scene.n_shapes++] = s;
@@ -302,7 +317,8 @@ static void *thread_run(void *payload)
         if (imp__intersector_create(&scene) != IMP_OK) return NULL;
         for (uint32_t i = 0; i < 500; i++) {
             const struct imp_key key = imp__key(77, (uint64_t)round, i);
-            const imp_v3 o = imp__v3(3, 3, -20), to = uniform3(key, 0, 8) + imp__v3(3, 3, 3);
+            const imp_v3 o = imp__v3(3, 3, -20),
+                         to = uniform3(key, 0, 8) + imp__v3(3, 3, 3);
             const imp_v3 d = imp__normalize(to - o);
             struct imp_hit hit;
             if (imp__intersect(&scene, &o, &d, 0, INFINITY, &hit))
@@ -330,7 +346,8 @@ static void threads(void)
         pthread_join(thread[i], NULL);
         same &= job[i].ok && job[i].sum == job[0].sum && job[i].sum > 0;
     }
-    tap_ok(same, "four threads make and trace scenes in one context # sum %.17g", job[0].sum);
+    tap_ok(same, "four threads make and trace scenes in one context # sum %.17g",
+           job[0].sum);
     imp_context_destroy(ctx);
 }
 

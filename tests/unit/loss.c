@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Losses and their derivatives, and the scalar test of gradients.md 5.1: L_i = theta X_i,
- * x_i = X_i, X ~ Exp(1), theta = 1.3, T = 1. The gradient of 1/2 (I - T)^2 is 0.3; estimators
- * that use a sample against itself give something else, and leave-one-out does not. */
+ * x_i = X_i, X ~ Exp(1), theta = 1.3, T = 1. The gradient of 1/2 (I - T)^2 is 0.3;
+ * estimators that use a sample against itself give something else, and leave-one-out does
+ * not. */
 #include "inverse/loss.h"
-#include "math/rng.h"
 #include "imp_tap.h"
+#include "math/rng.h"
 
 static double value_of(enum imp_loss loss, double I, double T)
 {
@@ -16,7 +17,8 @@ static double value_of(enum imp_loss loss, double I, double T)
 
 static void derivatives(enum imp_loss loss, const char *name)
 {
-    static const double at[][2] = {{0.3, 0.5}, {0.8, 0.2}, {0.02, 0.7}, {3, 2.5}, {0.4, 0}};
+    static const double at[][2] = {
+        {0.3, 0.5}, {0.8, 0.2}, {0.02, 0.7}, {3, 2.5}, {0.4, 0}};
     double worst[3] = {0};
     for (int i = 0; i < 5; i++) {
         const double I = at[i][0], T = at[i][1], h = 1e-4 * I;
@@ -65,7 +67,8 @@ int main(void)
     tap_near(value_of(IMP_LOSS_RELATIVE_L2, 0.3, 0.5), 0.5 * 1.7 * 0.04 / 0.26, 1e-15, 0,
              "relative L2");
     tap_near(value_of(IMP_LOSS_L1, 0.3, 0.5), 1.7 * 0.2, 1e-15, 0, "L1");
-    tap_near(value_of(IMP_LOSS_LOG, 0.3, 0.5), 0.85 * pow(log(0.31 / 0.51), 2), 1e-14, 0, "log");
+    tap_near(value_of(IMP_LOSS_LOG, 0.3, 0.5), 0.85 * pow(log(0.31 / 0.51), 2), 1e-14, 0,
+             "log");
     struct imp__loss_at black;
     imp__loss_eval(IMP_LOSS_LOG, 1, 0.01, -1, -2, &black);
     tap_ok(black.value == 0 && isfinite(black.d1), "log: negative noise counts as black");
@@ -88,9 +91,12 @@ int main(void)
         tap_z(&s[3], 0.045, 0.006, what);
         tap_near(sqrt(s[0].m2 / (s[0].n - 1)), sd[i], 0.04, 0, "spread of leave-one-out");
     }
-    tap_ok(imp__loss_quadratic(IMP_LOSS_L2) && imp__loss_quadratic(IMP_LOSS_RELATIVE_L2)
-           && !imp__loss_quadratic(IMP_LOSS_L1) && !imp__loss_quadratic(IMP_LOSS_LOG)
-           && imp__loss_bias_order(IMP_LOSS_L2) == 0 && imp__loss_bias_order(IMP_LOSS_L1) == 1
-           && imp__loss_bias_order(IMP_LOSS_LOG) == 2, "which are unbiased");
+    tap_ok(imp__loss_quadratic(IMP_LOSS_L2) &&
+               imp__loss_quadratic(IMP_LOSS_RELATIVE_L2) &&
+               !imp__loss_quadratic(IMP_LOSS_L1) && !imp__loss_quadratic(IMP_LOSS_LOG) &&
+               imp__loss_bias_order(IMP_LOSS_L2) == 0 &&
+               imp__loss_bias_order(IMP_LOSS_L1) == 1 &&
+               imp__loss_bias_order(IMP_LOSS_LOG) == 2,
+           "which are unbiased");
     return tap_done();
 }

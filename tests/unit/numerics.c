@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Distributions, quadrature and small linear algebra against published or exact numbers. */
+ * Distributions, quadrature and small linear algebra against published or exact numbers.
+ */
 #include "imp_tap.h"
 #include "math/linalg.h"
 #include "math/quadrature.h"
@@ -10,9 +11,12 @@
 static void distributions(void)
 {
     tap_near(imp__normal_cdf(1.959963984540054), 0.975, 1e-14, 0, "normal cdf at 1.96");
-    tap_near(imp__normal_cdf(-10), 7.619853024160527e-24, 1e-12, 0, "normal cdf far left");
-    tap_near(imp__normal_quantile(0.975), 1.959963984540054, 1e-14, 0, "normal quantile .975");
-    tap_near(imp__normal_quantile(1e-20), -9.262340089798408, 1e-13, 0, "quantile of 1e-20");
+    tap_near(imp__normal_cdf(-10), 7.619853024160527e-24, 1e-12, 0,
+             "normal cdf far left");
+    tap_near(imp__normal_quantile(0.975), 1.959963984540054, 1e-14, 0,
+             "normal quantile .975");
+    tap_near(imp__normal_quantile(1e-20), -9.262340089798408, 1e-13, 0,
+             "quantile of 1e-20");
     double worst = 0;
     for (int i = 1; i < 1000; i++) {
         const double p = i / 1000.0;
@@ -23,7 +27,8 @@ static void distributions(void)
     tap_near(imp__gamma_q(1, 3), exp(-3), 1e-14, 0, "Q(1, 3)");
     tap_near(imp__gamma_q(0.5, 0.3), erfc(sqrt(0.3)), 1e-14, 0, "Q(1/2, 0.3)");
     tap_near(imp__gamma_q(0.5, 30), erfc(sqrt(30)), 1e-12, 0, "Q(1/2, 30)");
-    tap_near(imp__chi2_tail(124.342113404004, 100), 0.05, 1e-11, 0, "chi-square, 100, 5 %");
+    tap_near(imp__chi2_tail(124.342113404004, 100), 0.05, 1e-11, 0,
+             "chi-square, 100, 5 %");
     tap_near(imp__chi2_tail(3.841458820694124, 1), 0.05, 1e-13, 0, "chi-square, 1, 5 %");
     /* Q(n, x) is a Poisson sum, also where both expansions meet. */
     double sum = 0;
@@ -47,15 +52,16 @@ static void quadrature(void)
             const double exact = (pow(2, d + 1.0) - pow(-1, d + 1.0)) / (d + 1);
             error = fmax(error, fabs(q - exact) / pow(2, d + 1.0));
         }
-        tap_ok(error < 1e-14, "%zu points are exact to degree %zu # error %.1e", n, 2 * n - 1,
-               error);
+        tap_ok(error < 1e-14, "%zu points are exact to degree %zu # error %.1e", n,
+               2 * n - 1, error);
     }
 }
 
 static void linear_algebra(void)
 {
     enum { N = 12 };
-    double a[N * N], l[N * N], inverse[N * N], b[N], x[N], work[N * N], values[N], v[N * N];
+    double a[N * N], l[N * N], inverse[N * N], b[N], x[N], work[N * N], values[N],
+        v[N * N];
     const struct imp_key key = imp__key(3, 1, 4);
     double m[N * N];
     for (int i = 0; i < N * N; i++) m[i] = imp__u01(key, (unsigned)i) - 0.5;
@@ -95,8 +101,8 @@ static void linear_algebra(void)
             eigen = fmax(eigen, fabs(s - values[k] * v[k * N + i]));
             ortho = fmax(ortho, fabs(o - (i == k)));
         }
-    tap_ok(eigen < 1e-14 && ortho < 1e-14, "A v = lambda v, v orthonormal # %.1e %.1e", eigen,
-           ortho);
+    tap_ok(eigen < 1e-14 && ortho < 1e-14, "A v = lambda v, v orthonormal # %.1e %.1e",
+           eigen, ortho);
     int ascending = 1;
     for (int k = 1; k < N; k++) ascending &= values[k - 1] <= values[k];
     tap_ok(ascending, "eigenvalues ascend");

@@ -2,8 +2,8 @@
  *
  * Every optimiser on a linear model with a known answer: without noise, with noise, with
  * bounds, cancelled, and continued from a copy of its state. */
-#include "toy_goal.h"
 #include "imp_tap.h"
+#include "toy_goal.h"
 
 static imp_context *ctx;
 static const char *const name[] = {"Adam", "LM", "L-BFGS", "MMA", "SLSQP"};
@@ -17,11 +17,13 @@ static struct imp__opt_options options_of(enum imp_optimizer kind)
 static double distance(const struct toy *t, const double *x, const double *ref)
 {
     double worst = 0;
-    for (int k = 0; k < TOY_N; k++) worst = fmax(worst, fabs(x[k] - ref[k]) / t->scale[k]);
+    for (int k = 0; k < TOY_N; k++)
+        worst = fmax(worst, fabs(x[k] - ref[k]) / t->scale[k]);
     return worst;
 }
 
-static struct imp__search *solve(struct toy *t, enum imp_optimizer kind, enum imp_status *st)
+static struct imp__search *solve(struct toy *t, enum imp_optimizer kind,
+                                 enum imp_status *st)
 {
     const struct imp__opt_options o = options_of(kind);
     struct imp__search *s = NULL;
@@ -53,8 +55,8 @@ static void answers(enum imp_optimizer kind)
     double worst = 0;
     for (int k = 0; k < TOY_N; k++)
         worst = fmax(worst, fabs(s->x[k] - ls[k]) / (t.mc * sqrt(inv[k * TOY_N + k])));
-    tap_ok(st == IMP_OK && worst < 4, "%s, noise # %.2f sd after %d iterations: %s", name[kind],
-           worst, s->iteration, s->reason);
+    tap_ok(st == IMP_OK && worst < 4, "%s, noise # %.2f sd after %d iterations: %s",
+           name[kind], worst, s->iteration, s->reason);
     tap_ok(s->n_history == (size_t)s->iteration && s->history_se[0] > 0,
            "%s: a loss and its error for every iteration", name[kind]);
     imp__search_destroy(s);
@@ -71,8 +73,8 @@ static void answers(enum imp_optimizer kind)
     for (int k = 1; k < TOY_N; k++)
         others = fmax(others, fabs(g[k] * t.scale[k]) / fabs(g[0] * t.scale[0]));
     tap_ok(st == IMP_OK && fabs(s->x[0] - t.hi[0]) <= 1e-12 && g[0] < 0 && others < 0.02,
-           "%s, at a bound # free gradient %.1e of the blocked one: %s", name[kind], others,
-           s->reason);
+           "%s, at a bound # free gradient %.1e of the blocked one: %s", name[kind],
+           others, s->reason);
     imp__search_destroy(s);
 }
 
@@ -88,15 +90,16 @@ static void resume(enum imp_optimizer kind)
     t.stop_after = 5;
     struct imp__search *part = solve(&t, kind, &st);
     tap_ok(st == IMP_CANCELLED && part->iteration >= 2 && part->iteration < 7,
-           "%s: cancelled in evaluation 5, %d iterations done", name[kind], part->iteration);
+           "%s: cancelled in evaluation 5, %d iterations done", name[kind],
+           part->iteration);
     t.stop_after = 0;
     const struct imp__opt_options o = options_of(kind);
     st = imp__optimize(&t.goal, &o, part);
-    const int same = st == IMP_OK && part->iteration == whole->iteration
-                     && part->n_history == whole->n_history
-                     && !memcmp(part->x, whole->x, sizeof(double) * TOY_N)
-                     && !memcmp(part->history, whole->history,
-                                sizeof(double) * whole->n_history);
+    const int same =
+        st == IMP_OK && part->iteration == whole->iteration &&
+        part->n_history == whole->n_history &&
+        !memcmp(part->x, whole->x, sizeof(double) * TOY_N) &&
+        !memcmp(part->history, whole->history, sizeof(double) * whole->n_history);
     tap_ok(same, "%s: continued, the same bits", name[kind]);
     imp__search_destroy(whole);
     imp__search_destroy(part);
@@ -104,8 +107,8 @@ static void resume(enum imp_optimizer kind)
     toy_make(&t, ctx, 9, 0.1, 0.2);
     t.stop_iteration = 3;
     part = solve(&t, kind, &st);
-    tap_ok(st == IMP_CANCELLED && part->iteration == 3, "%s: cancelled between iterations",
-           name[kind]);
+    tap_ok(st == IMP_CANCELLED && part->iteration == 3,
+           "%s: cancelled between iterations", name[kind]);
     imp__search_destroy(part);
 }
 
@@ -123,8 +126,8 @@ int main(void)
         toy_make(&t, ctx, 4, 0.1, 0.1);
         for (int p = 0; p < TOY_M; p++) t.A[p][1] = 0;
         struct imp__search *s = solve(&t, kind, &st);
-        tap_ok(st == IMP_OK && s->x[1] == 0.5 * t.truth[1], "%s: without effect, without motion",
-               name[kind]);
+        tap_ok(st == IMP_OK && s->x[1] == 0.5 * t.truth[1],
+               "%s: without effect, without motion", name[kind]);
         imp__search_destroy(s);
     }
     struct imp__search *s = NULL;

@@ -17,7 +17,7 @@ static double difference(const float *a, const float *b, size_t n)
     return worst;
 }
 
-/* ---- Round trips ------------------------------------------------------------------- */
+/* ---- Round trips --------------------------------------------------------------- */
 
 static void check_exr(void)
 {

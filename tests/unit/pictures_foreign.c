@@ -9,7 +9,7 @@
 #include <openexr.h>
 #include <png.h>
 
-/* ---- Foreign variants -------------------------------------------------------------- */
+/* ---- Foreign variants ---------------------------------------------------------- */
 
 /* PNG of every kind: grey, palette, alpha, 1 to 16 bits, interlaced or not; 8 x 4 pixels,
  * pixel (x, y) has the code (x + 8 y) * maximum / 31 (palettes: index mod colours). */
@@ -42,8 +42,7 @@ static struct imp_bytes png_make(int type, int depth, int interlaced)
                 if (depth == 16)
                     rows[y][at / 8] = (unsigned char)(code >> 8),
                                  rows[y][at / 8 + 1] = (unsigned char)code;
-                else
-                    rows[y][at / 8] |= (unsigned char)(code << (8 - depth - at % 8));
+                else rows[y][at / 8] |= (unsigned char)(code << (8 - depth - at % 8));
             }
     }
     png_write_image(png, pointers);

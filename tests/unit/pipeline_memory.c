@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Allocation 1, 2, 3, ... fails inside every call that makes something of a scene: each time
- * IMP_E_NOMEM with a message, outputs untouched, nothing leaked; and the same call on the
- * same objects works when memory is back. */
-#include <unistd.h>
+ * Allocation 1, 2, 3, ... fails inside every call that makes something of a scene: each
+ * time IMP_E_NOMEM with a message, outputs untouched, nothing leaked; and the same call
+ * on the same objects works when memory is back. */
 #include "imp_fail_alloc.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "inverse/problem.h"
+#include <unistd.h>
 
 static struct fail_alloc heap;
 static imp_context *ctx;
@@ -72,7 +72,7 @@ static imp_problem *matching(imp_scene *s, enum imp_loss loss)
     return p;
 }
 
-/* ---- Calls: each makes and destroys its output ------------------------------------------------ */
+/* ---- Calls: each makes and destroys its output --------------------------------- */
 
 static struct imp_run run = IMP_RUN_INIT;
 
@@ -191,7 +191,8 @@ static void check(const char *name, enum imp_status (*call)(void))
 {
     long n, wrong = 0, leaks = 0, silent = 0;
     enum imp_status st = call(); /* the pool and Embree's device are made once */
-    if (!tap_ok(st == IMP_OK, "%s works # %s", name, st ? imp_last_error(ctx) : "")) return;
+    if (!tap_ok(st == IMP_OK, "%s works # %s", name, st ? imp_last_error(ctx) : ""))
+        return;
     for (n = 1; n < 20000; n += 1 + n / 40) {
         const long before = heap.live;
         heap.fail_at = heap.calls + n;
@@ -200,16 +201,19 @@ static void check(const char *name, enum imp_status (*call)(void))
         leaks += heap.live != before;
         if (st == IMP_OK) break;
         if (st != IMP_E_NOMEM)
-            printf("# allocation %ld: %s: %s\n", n, imp_status_text(st), imp_last_error(ctx));
+            printf("# allocation %ld: %s: %s\n", n, imp_status_text(st),
+                   imp_last_error(ctx));
         wrong += st != IMP_E_NOMEM;
         silent += !*imp_last_error(ctx);
         if (call() != IMP_OK || heap.live != before) {
-            tap_ok(0, "%s works again after failure %ld # %s", name, n, imp_last_error(ctx));
+            tap_ok(0, "%s works again after failure %ld # %s", name, n,
+                   imp_last_error(ctx));
             return;
         }
     }
     tap_ok(st == IMP_OK && !wrong && !leaks && !silent,
-           "%s: allocations up to %ld fail # %ld wrong statuses, %ld leaks, %ld without message",
+           "%s: allocations up to %ld fail # %ld wrong statuses, %ld leaks, %ld without "
+           "message",
            name, n, wrong, leaks, silent);
 }
 

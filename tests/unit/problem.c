@@ -1,22 +1,33 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Problems: what can be made active, what a target must be, and the regularisers' values and
- * gradients. */
-#include <math.h>
-#include "inverse/match.h"
+ * Problems: what can be made active, what a target must be, and the regularisers' values
+ * and gradients. */
 #include "inverse/problem.h"
-#include "inverse_scenes.h"
 #include "imp_tap.h"
+#include "inverse/match.h"
+#include "inverse_scenes.h"
+#include <math.h>
 
 static imp_context *ctx;
 
 static void globs(void)
 {
-    static const struct { const char *glob, *text; int yes; } at[] = {
-        {"*", "a.b", 1}, {"*", "", 1}, {"a.b", "a.b", 1}, {"a.b", "a.c", 0}, {"a?b", "a.b", 1},
-        {"*.value", "x.y.value", 1}, {"*.value", "x.value.y", 0}, {"a*b*c", "a-b-b-c", 1},
-        {"a*b*c", "a-c-b", 0}, {"**", "z", 1}, {"?", "", 0}, {"x*", "x", 1}, {"*a*a*a*a*a*b",
-         "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa", 0}};
+    static const struct {
+        const char *glob, *text;
+        int yes;
+    } at[] = {{"*", "a.b", 1},
+              {"*", "", 1},
+              {"a.b", "a.b", 1},
+              {"a.b", "a.c", 0},
+              {"a?b", "a.b", 1},
+              {"*.value", "x.y.value", 1},
+              {"*.value", "x.value.y", 0},
+              {"a*b*c", "a-b-b-c", 1},
+              {"a*b*c", "a-c-b", 0},
+              {"**", "z", 1},
+              {"?", "", 0},
+              {"x*", "x", 1},
+              {"*a*a*a*a*a*b", "aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa", 0}};
     int wrong = 0;
     for (size_t i = 0; i < sizeof at / sizeof at[0]; i++)
         wrong += imp__glob(at[i].glob, at[i].text) != at[i].yes;
@@ -28,38 +39,45 @@ static void activation(imp_scene *s)
     imp_problem *p = NULL;
     size_t param, element;
     double lo, hi, x[16];
-    tap_ok(imp_problem_create(s, &p) == IMP_OK && imp_problem_n(p) == 0, "nothing is active");
-    tap_ok(imp_problem_activate(p, "sky.radiance.value") == IMP_OK && imp_problem_n(p) == 3,
+    tap_ok(imp_problem_create(s, &p) == IMP_OK && imp_problem_n(p) == 0,
+           "nothing is active");
+    tap_ok(imp_problem_activate(p, "sky.radiance.value") == IMP_OK &&
+               imp_problem_n(p) == 3,
            "by name");
-    tap_ok(imp_problem_activate(p, "ball.*") == IMP_OK && imp_problem_n(p) == 6, "by glob");
-    tap_ok(imp_problem_activate(p, "sky.radiance.value") == IMP_OK && imp_problem_n(p) == 6,
+    tap_ok(imp_problem_activate(p, "ball.*") == IMP_OK && imp_problem_n(p) == 6,
+           "by glob");
+    tap_ok(imp_problem_activate(p, "sky.radiance.value") == IMP_OK &&
+               imp_problem_n(p) == 6,
            "twice is once");
     imp_problem_get_x(p, x);
     struct imp_param_info info = {.size = sizeof info}, before = {.size = sizeof before};
     int ordered = 1;
     for (size_t i = 0; i < 6; i++) {
-        if (imp_problem_variable(p, i, &param, &element, &lo, &hi) != IMP_OK
-            || imp_scene_get_param(s, param, &info) != IMP_OK) return;
+        if (imp_problem_variable(p, i, &param, &element, &lo, &hi) != IMP_OK ||
+            imp_scene_get_param(s, param, &info) != IMP_OK)
+            return;
         ordered &= i == 0 || info.offset + element > before.offset;
         before = info;
         before.offset += element;
     }
     tap_ok(ordered, "the scene's order, whatever the order of calls");
-    tap_ok(imp_problem_variable(p, 6, NULL, NULL, NULL, NULL) == IMP_E_ARG, "no number 6 # %s",
-           imp_last_error(ctx));
+    tap_ok(imp_problem_variable(p, 6, NULL, NULL, NULL, NULL) == IMP_E_ARG,
+           "no number 6 # %s", imp_last_error(ctx));
     size_t ball;
     if (imp_scene_find_param(s, "ball.reflectance", &ball) != IMP_OK) return;
     for (size_t i = 0; i < 6; i++) {
         if (imp_problem_variable(p, i, &param, &element, &lo, &hi) != IMP_OK) return;
         if (param == ball)
-            tap_ok(fabs(x[i] - (0.3 + 0.2 * (double)element)) < 1e-7 && lo == 0 && hi == 1,
+            tap_ok(fabs(x[i] - (0.3 + 0.2 * (double)element)) < 1e-7 && lo == 0 &&
+                       hi == 1,
                    "value and bounds of number %zu # %g in [%g, %g]", i, x[i], lo, hi);
     }
 
-    tap_ok(imp_problem_activate(p, "bal.reflectance.value") == IMP_E_ARG
-           && strstr(imp_last_error(ctx), "ball.reflectance.value"), "a misspelling # %s",
+    tap_ok(imp_problem_activate(p, "bal.reflectance.value") == IMP_E_ARG &&
+               strstr(imp_last_error(ctx), "ball.reflectance.value"),
+           "a misspelling # %s", imp_last_error(ctx));
+    tap_ok(imp_problem_activate(p, "nothing*") == IMP_E_ARG, "no match # %s",
            imp_last_error(ctx));
-    tap_ok(imp_problem_activate(p, "nothing*") == IMP_E_ARG, "no match # %s", imp_last_error(ctx));
     tap_ok(imp_problem_activate(p, "") == IMP_E_ARG, "no name");
     for (size_t k = 0; k < imp_scene_n_params(s); k++) {
         if (imp_scene_get_param(s, k, &info) != IMP_OK) return;
@@ -81,7 +99,8 @@ static void activation(imp_scene *s)
     tap_ok(!memcmp(y, z, n * sizeof *y), "what is set is what is there");
     y[0] = 0.1;
     y[n - 1] = -1;
-    tap_ok(imp_problem_set_x(p, y) == IMP_E_ARG, "below a bound # %s", imp_last_error(ctx));
+    tap_ok(imp_problem_set_x(p, y) == IMP_E_ARG, "below a bound # %s",
+           imp_last_error(ctx));
     y[n - 1] = NAN;
     tap_ok(imp_problem_set_x(p, y) == IMP_E_ARG, "NaN # %s", imp_last_error(ctx));
     double after[16];
@@ -103,46 +122,61 @@ static void targets(imp_scene *s)
     struct imp_target bad = t;
     tap_ok(imp_problem_add_target(p, NULL) == IMP_E_ARG, "no target");
     bad.width = 13;
-    tap_ok(imp_problem_add_target(p, &bad) == IMP_E_ARG, "size # %s", imp_last_error(ctx));
+    tap_ok(imp_problem_add_target(p, &bad) == IMP_E_ARG, "size # %s",
+           imp_last_error(ctx));
     bad = t, bad.sensor = 4;
-    tap_ok(imp_problem_add_target(p, &bad) == IMP_E_ARG, "sensor # %s", imp_last_error(ctx));
+    tap_ok(imp_problem_add_target(p, &bad) == IMP_E_ARG, "sensor # %s",
+           imp_last_error(ctx));
     bad = t, bad.channels = 2;
-    tap_ok(imp_problem_add_target(p, &bad) == IMP_E_ARG, "channels # %s", imp_last_error(ctx));
+    tap_ok(imp_problem_add_target(p, &bad) == IMP_E_ARG, "channels # %s",
+           imp_last_error(ctx));
     bad = t, bad.pixels = NULL;
-    tap_ok(imp_problem_add_target(p, &bad) == IMP_E_ARG, "pixels # %s", imp_last_error(ctx));
+    tap_ok(imp_problem_add_target(p, &bad) == IMP_E_ARG, "pixels # %s",
+           imp_last_error(ctx));
     bad = t, bad.loss = 9;
-    tap_ok(imp_problem_add_target(p, &bad) == IMP_E_ARG, "loss # %s", imp_last_error(ctx));
+    tap_ok(imp_problem_add_target(p, &bad) == IMP_E_ARG, "loss # %s",
+           imp_last_error(ctx));
     bad = t, bad.epsilon = -1;
-    tap_ok(imp_problem_add_target(p, &bad) == IMP_E_ARG, "epsilon # %s", imp_last_error(ctx));
+    tap_ok(imp_problem_add_target(p, &bad) == IMP_E_ARG, "epsilon # %s",
+           imp_last_error(ctx));
     bad = t, bad.weights = weights, weights[7] = -1;
-    tap_ok(imp_problem_add_target(p, &bad) == IMP_E_ARG, "weight # %s", imp_last_error(ctx));
+    tap_ok(imp_problem_add_target(p, &bad) == IMP_E_ARG, "weight # %s",
+           imp_last_error(ctx));
     weights[7] = 0, pixels[22] = NAN;
     tap_ok(imp_problem_add_target(p, &t) == IMP_E_ARG, "NaN # %s", imp_last_error(ctx));
-    tap_ok(imp_problem_add_target(p, &bad) == IMP_OK, "NaN where the weight is 0 is left out");
+    tap_ok(imp_problem_add_target(p, &bad) == IMP_OK,
+           "NaN where the weight is 0 is left out");
     pixels[22] = 0;
     bad = t, bad.noise_se = se, se[3] = INFINITY;
-    tap_ok(imp_problem_add_target(p, &bad) == IMP_E_ARG, "noise # %s", imp_last_error(ctx));
+    tap_ok(imp_problem_add_target(p, &bad) == IMP_E_ARG, "noise # %s",
+           imp_last_error(ctx));
     memset(weights, 0, sizeof weights);
     bad = t, bad.weights = weights;
-    tap_ok(imp_problem_add_target(p, &bad) == IMP_E_ARG, "no weight # %s", imp_last_error(ctx));
-    tap_ok(p->n_targets == 1 && p->targets[0].desc.scale == 1 && p->targets[0].desc.epsilon == 1e-2,
+    tap_ok(imp_problem_add_target(p, &bad) == IMP_E_ARG, "no weight # %s",
+           imp_last_error(ctx));
+    tap_ok(p->n_targets == 1 && p->targets[0].desc.scale == 1 &&
+               p->targets[0].desc.epsilon == 1e-2,
            "failures add nothing; 0 is the default");
     imp_problem_destroy(p);
 }
 
-/* A parameter that looks like a texture stands in for one: [h][w][c] of a row of numbers. */
+/* A parameter that looks like a texture stands in for one: [h][w][c] of a row of numbers.
+ */
 static void regularisers(imp_scene *s)
 {
     imp_problem *p = NULL;
-    if (imp_problem_create(s, &p) != IMP_OK || imp_problem_activate(p, "*") != IMP_OK) return;
+    if (imp_problem_create(s, &p) != IMP_OK || imp_problem_activate(p, "*") != IMP_OK)
+        return;
     const size_t n = imp_problem_n(p);
     tap_ok(imp_problem_add_tikhonov(p, "nothing*", 1, 0) == IMP_E_ARG, "no match # %s",
            imp_last_error(ctx));
-    tap_ok(imp_problem_add_tikhonov(p, "*", NAN, 0) == IMP_E_ARG, "NaN # %s", imp_last_error(ctx));
-    tap_ok(imp_problem_add_smoothness(p, "*", 1) == IMP_E_ARG, "smoothness of numbers # %s",
+    tap_ok(imp_problem_add_tikhonov(p, "*", NAN, 0) == IMP_E_ARG, "NaN # %s",
            imp_last_error(ctx));
-    tap_ok(imp_problem_add_tikhonov(p, "ball.*", 3, 0) == IMP_OK
-           && imp_problem_add_tikhonov(p, "sky.*", 2, 1) == IMP_OK, "added");
+    tap_ok(imp_problem_add_smoothness(p, "*", 1) == IMP_E_ARG,
+           "smoothness of numbers # %s", imp_last_error(ctx));
+    tap_ok(imp_problem_add_tikhonov(p, "ball.*", 3, 0) == IMP_OK &&
+               imp_problem_add_tikhonov(p, "sky.*", 2, 1) == IMP_OK,
+           "added");
     double x[16], g[16] = {0}, expect = 0;
     imp_problem_get_x(p, x);
     size_t ball, k;
@@ -168,7 +202,10 @@ static void regularisers(imp_scene *s)
     uint8_t on[1] = {1};
     int64_t base[1] = {0};
     struct imp__regulariser r = {.kind = IMP_SMOOTHNESS, .weight = 2, .on = on};
-    struct imp_problem q = {.scene = &fake, .n = 6, .n_regularisers = 1, .regularisers = &r,
+    struct imp_problem q = {.scene = &fake,
+                            .n = 6,
+                            .n_regularisers = 1,
+                            .regularisers = &r,
                             .active = {.n = 6, .base = base}};
     const double t[6] = {1, 2, 4, 3, 3, 0};
     double gt[6] = {0};
@@ -180,7 +217,8 @@ static void regularisers(imp_scene *s)
         memcpy(a, t, sizeof a);
         memcpy(b, t, sizeof b);
         a[i] += 0.5, b[i] -= 0.5; /* quadratic: central differences are exact */
-        worst = fmax(worst, fabs(imp__regularise(&q, a, NULL) - imp__regularise(&q, b, NULL) - gt[i]));
+        worst = fmax(worst, fabs(imp__regularise(&q, a, NULL) -
+                                 imp__regularise(&q, b, NULL) - gt[i]));
     }
     tap_ok(worst < 1e-13, "its gradient # %.1e", worst);
 }

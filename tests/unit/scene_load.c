@@ -324,10 +324,8 @@ static void check_files(void)
         const enum imp_status st = imp_scene_load(ctx, path, NULL, &s);
         size_t m = 0;
         for (const char *c = cases[i].message ? cases[i].message : ""; *c; c++)
-            if (*c == 'D')
-                m += (size_t)sprintf(want + m, "%s", folder);
-            else
-                want[m++] = *c;
+            if (*c == 'D') m += (size_t)sprintf(want + m, "%s", folder);
+            else want[m++] = *c;
         want[m] = 0;
         const bool ok = st == cases[i].st && (st == IMP_OK) == (s != NULL) &&
                         (st == IMP_OK || strncmp(imp_last_error(ctx), want, m) == 0);

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Materials and textures in a scene built by calls: which parameters they make, with which
- * counts, values and bounds. */
-#include <importon/importon.h>
+ * Materials and textures in a scene built by calls: which parameters they make, with
+ * which counts, values and bounds. */
 #include "imp_tap.h"
+#include <importon/importon.h>
 
 static imp_scene *scene;
 
-static void param(const char *name, size_t count, const double *values, double lo, double hi)
+static void param(const char *name, size_t count, const double *values, double lo,
+                  double hi)
 {
     size_t index;
     struct imp_param_info info = {.size = sizeof info};
@@ -23,12 +24,14 @@ static void param(const char *name, size_t count, const double *values, double l
         error = fmax(error, fabs(v[i] - values[i]));
     tap_ok(info.count == count && error < 1e-7 && info.lo == lo && info.hi == hi &&
                (info.flags & IMP_PARAM_DIFFERENTIABLE),
-           "%s # %zu numbers in [%g, %g], error %.1e", name, info.count, info.lo, info.hi, error);
+           "%s # %zu numbers in [%g, %g], error %.1e", name, info.count, info.lo, info.hi,
+           error);
 }
 static void absent(const char *name)
 {
     size_t index;
-    tap_ok(imp_scene_find_param(scene, name, &index) == IMP_E_ARG, "%s is no parameter", name);
+    tap_ok(imp_scene_find_param(scene, name, &index) == IMP_E_ARG, "%s is no parameter",
+           name);
 }
 
 int main(void)
@@ -37,7 +40,8 @@ int main(void)
     const struct imp_context_options options = {.size = sizeof options, .threads = 1};
     static const double green[3] = {0.1, 0.7, 0.2};
     static const float texels[8] = {0.1f, 0.2f, 0.3f, 0.4f, 0.5f, 0.6f, 0.7f, 0.8f};
-    static const double texel_values[8] = {0.1f, 0.2f, 0.3f, 0.4f, 0.5f, 0.6f, 0.7f, 0.8f};
+    static const double texel_values[8] = {0.1f, 0.2f, 0.3f, 0.4f,
+                                           0.5f, 0.6f, 0.7f, 0.8f};
 
     if (imp_context_create(&options, &ctx) != IMP_OK ||
         imp_scene_create(ctx, NULL, &scene) != IMP_OK)
@@ -74,7 +78,8 @@ int main(void)
     imp_scene_end(scene);
     imp_scene_end(scene);
     const enum imp_status st = imp_scene_commit(scene);
-    tap_ok(st == IMP_OK, "the scene is made # %s", st == IMP_OK ? "" : imp_last_error(ctx));
+    tap_ok(st == IMP_OK, "the scene is made # %s",
+           st == IMP_OK ? "" : imp_last_error(ctx));
 
     param("number.reflectance.value", 1, (double[]){0.4}, 0, 1);
     param("color.reflectance.value", 3, green, 0, 1);

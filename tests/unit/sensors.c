@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Sensors against the formulas of scene-format 9 (written out again here), fields of view,
- * films, samplers, filters, and every error rule. */
+ * Sensors against the formulas of scene-format 9 (written out again here), fields of
+ * view, films, samplers, filters, and every error rule. */
 #include "imp_tap.h"
 #include "kind/filter/filter.h"
 #include "kind/sensor/film.h"
@@ -61,12 +61,16 @@ static void fields_of_view(void)
     const double w = picture_width(s, 100, 100);
     tap_near(w, 0.6118823, 1e-7, 0, "default: 50mm, aspect 1: picture width at z = 1");
     tap_near(2 * atan(w / 2) * 180 / IMP_PI, 34.022, 2e-5, 0, "its horizontal fov");
-    static const struct { const char *axis; double fov; int w, h; double expected; } rows[] = {
-        {NULL, 40, 300, 200, 40}, {"x", 40, 300, 200, 40},
-        {"y", 40, 300, 200, 57.264}, {"Y", 40, 200, 300, 27.27808},
-        {"smaller", 40, 300, 200, 57.264}, {"smaller", 40, 200, 300, 40},
-        {"larger", 40, 300, 200, 40}, {"larger", 40, 200, 300, 27.27808},
-        {"Diagonal", 40, 300, 200, 33.697}, {"diagonal", 90, 100, 100, 70.5288}};
+    static const struct {
+        const char *axis;
+        double fov;
+        int w, h;
+        double expected;
+    } rows[] = {{NULL, 40, 300, 200, 40},           {"x", 40, 300, 200, 40},
+                {"y", 40, 300, 200, 57.264},        {"Y", 40, 200, 300, 27.27808},
+                {"smaller", 40, 300, 200, 57.264},  {"smaller", 40, 200, 300, 40},
+                {"larger", 40, 300, 200, 40},       {"larger", 40, 200, 300, 27.27808},
+                {"Diagonal", 40, 300, 200, 33.697}, {"diagonal", 90, 100, 100, 70.5288}};
     for (size_t k = 0; k < imp_count(rows); k++) {
         struct imp_node *n = sensor_node("perspective");
         node_float(n, "fov", rows[k].fov);
@@ -74,9 +78,13 @@ static void fields_of_view(void)
         s = sensor_build(n, rows[k].w, rows[k].h);
         const double got =
             2 * atan(picture_width(s, rows[k].w, rows[k].h) / 2) * 180 / IMP_PI;
-        tap_near(got, rows[k].expected, 2e-5, 0, rows[k].axis ? rows[k].axis : "fov alone");
+        tap_near(got, rows[k].expected, 2e-5, 0,
+                 rows[k].axis ? rows[k].axis : "fov alone");
     }
-    static const struct { const char *text; double mm; } lengths[] = {
+    static const struct {
+        const char *text;
+        double mm;
+    } lengths[] = {
         {"50mm", 50}, {"35.5mm", 35.5}, {" 85 mm", 85}, {"20", 20}, {"0.5MM", 0.5}};
     for (size_t k = 0; k < imp_count(lengths); k++) {
         struct imp_node *n = sensor_node("thinlens");
@@ -93,7 +101,8 @@ static void rays(void)
     const int w = 640, h = 360;
     const double a = (double)w / h, t = tan(30 * IMP_PI / 180), near = 0.5, far = 20;
     struct imp_mat4 look;
-    if (!imp__lookat(imp__v3(1, 2, 3), imp__v3(-1, 0.5, 7), imp__v3(0.1, 1, 0), &look)) return;
+    if (!imp__lookat(imp__v3(1, 2, 3), imp__v3(-1, 0.5, 7), imp__v3(0.1, 1, 0), &look))
+        return;
     for (int kind = 0; imp__sensor_kinds[kind]; kind++) {
         const char *type = imp__sensor_kinds[kind]->name;
         const int perspective = strcmp(type, "perspective") == 0;
@@ -126,12 +135,13 @@ static void rays(void)
             worst = fmax(worst, fabs(imp__length(r.d) - 1) + fabs(r.t_near));
             struct imp_mat4 inverse;
             imp__mat4_inverse(&m, &inverse);
-            const imp_v3 o = imp__point(&inverse, r.o), end =
-                imp__point(&inverse, r.o + r.d * r.t_far);
+            const imp_v3 o = imp__point(&inverse, r.o),
+                         end = imp__point(&inverse, r.o + r.d * r.t_far);
             /* It begins on the near plane and ends on the far one. */
             worst = fmax(worst, fabs(o[2] - near) + fabs(end[2] - far) / far);
             if (perspective) {
-                worst = fmax(worst, imp__length(o - v * near) + imp__length(end - v * far) / far);
+                worst = fmax(worst, imp__length(o - v * near) +
+                                        imp__length(end - v * far) / far);
             } else if (ortho) {
                 const imp_v3 at = imp__v3(1 - 2 * px / w, (1 - 2 * py / h) / a, near);
                 worst = fmax(worst, imp__length(o - at));
@@ -145,11 +155,12 @@ static void rays(void)
             }
         }
         tap_ok(s && worst < 1e-12 &&
-                   (perspective || ortho || (lens_radius > 0.29 && lens_radius <= 0.3 + 1e-12)),
+                   (perspective || ortho ||
+                    (lens_radius > 0.29 && lens_radius <= 0.3 + 1e-12)),
                "%s: rays of section 9 # worst %.1e", type, worst);
     }
-    /* +x of the sensor is the left of the picture: of a sensor at the origin looking along
-     * +z with +y up, world +x. */
+    /* +x of the sensor is the left of the picture: of a sensor at the origin looking
+     * along +z with +y up, world +x. */
     struct imp_sensor *s = sensor_build(sensor_node("perspective"), 10, 10);
     tap_ok(ray_at(s, 0, 5, 0, 0).d[0] > 0 && ray_at(s, 5, 0, 0, 0).d[1] > 0,
            "left of the picture is +x, its top +y");
@@ -176,12 +187,18 @@ static void sensor_errors(void)
     for (int kind = 0; imp__sensor_kinds[kind]; kind++) {
         const char *type = imp__sensor_kinds[kind]->name;
         const int ortho = strcmp(type, "orthographic") == 0;
-        static const struct { const char *name, *words; double v; } numbers[] = {
-            {"near_clip", "near_clip = 0 must", 0}, {"near_clip", "near_clip = -1 must", -1},
+        static const struct {
+            const char *name, *words;
+            double v;
+        } numbers[] = {
+            {"near_clip", "near_clip = 0 must", 0},
+            {"near_clip", "near_clip = -1 must", -1},
             {"near_clip", "far_clip = 10000 must be greater than near_clip", 20000},
-            {"far_clip", "far_clip = 0.01 must", 0.01}, {"near_clip", "not finite", NAN},
+            {"far_clip", "far_clip = 0.01 must", 0.01},
+            {"near_clip", "not finite", NAN},
             {"focus_distance", "focus_distance = 0 must", 0},
-            {"shutter_close", "before shutter_open", -1}, {"x_fov", "'x_fov'", 3}};
+            {"shutter_close", "before shutter_open", -1},
+            {"x_fov", "'x_fov'", 3}};
         for (size_t k = 0; k < imp_count(numbers); k++) {
             n = sensor_node(type);
             node_float(n, numbers[k].name, numbers[k].v);
@@ -226,8 +243,8 @@ static void sensor_errors(void)
             node_float(n, "fov", fovs[k]);
             refused(n, "outside (0, 180)");
         }
-        static const char *const lengths[] = {"", "mm", "-50mm", "0mm", "50cm", "5e1mm", "5.0.1",
-                                              "nan", "50mm "};
+        static const char *const lengths[] = {"",      "mm",    "-50mm", "0mm",  "50cm",
+                                              "5e1mm", "5.0.1", "nan",   "50mm "};
         for (size_t k = 0; k < imp_count(lengths); k++) {
             n = sensor_node(type);
             node_string(n, "focal_length", lengths[k]);
@@ -243,7 +260,8 @@ static void sensor_errors(void)
 static enum imp_status film_status;
 static struct imp_film_desc film(struct imp_node *n, enum imp_color_mode mode)
 {
-    const struct imp_build b = {.ctx = ctx, .node = n, .arena = &world.arena, .mode = mode};
+    const struct imp_build b = {
+        .ctx = ctx, .node = n, .arena = &world.arena, .mode = mode};
     struct imp_film_desc f = {.width = -1};
     film_status = imp__film_desc_build(&b, &f);
     return f;
@@ -258,9 +276,9 @@ static void film_refused(struct imp_node *n, enum imp_status st, const char *wor
 static void films(void)
 {
     struct imp_film_desc f = film(NULL, IMP_RGB);
-    tap_ok(film_status == IMP_OK && f.width == 768 && f.height == 576 && f.crop_w == 768 &&
-               f.crop_h == 576 && f.crop_x == 0 && f.crop_y == 0 && f.half &&
-               !f.sample_border && f.pixel_format == IMP_PIXEL_RGB &&
+    tap_ok(film_status == IMP_OK && f.width == 768 && f.height == 576 &&
+               f.crop_w == 768 && f.crop_h == 576 && f.crop_x == 0 && f.crop_y == 0 &&
+               f.half && !f.sample_border && f.pixel_format == IMP_PIXEL_RGB &&
                strcmp(f.file_format, "openexr") == 0 &&
                strcmp(f.filter.ops->name, "gaussian") == 0 && f.filter.radius == 2,
            "the default film");
@@ -282,7 +300,8 @@ static void films(void)
     tap_ok(film_status == IMP_OK && f.width == 40 && f.height == 30 && f.crop_x == 8 &&
                f.crop_y == 10 && f.crop_w == 32 && f.crop_h == 20 && !f.half &&
                f.sample_border && f.pixel_format == IMP_PIXEL_RGBA &&
-               strcmp(f.file_format, "openexr") == 0 && strcmp(f.filter.ops->name, "box") == 0,
+               strcmp(f.file_format, "openexr") == 0 &&
+               strcmp(f.filter.ops->name, "box") == 0,
            "every property of the film");
     f = film(n, IMP_MONO);
     tap_ok(f.pixel_format == IMP_PIXEL_LUMINANCE, "mono mode forces luminance");
@@ -296,12 +315,17 @@ static void films(void)
                    strcmp(f.file_format, others[k]) == 0,
                "%s forces rgb and floats", others[k]);
     }
-    static const struct { const char *name, *words; int64_t v; } numbers[] = {
-        {"width", "width = 0", 0}, {"height", "height = -3", -3},
-        {"width", "width = 2000000", 2000000}, {"crop_width", "column 769 of a film of 768", 769},
-        {"crop_offset_x", "column 769 of a film of 768", 1},
-        {"crop_offset_y", "crop_offset_y = -1", -1}, {"crop_height", "crop_height = 0", 0},
-        {"bit_depth", "'bit_depth'", 8}};
+    static const struct {
+        const char *name, *words;
+        int64_t v;
+    } numbers[] = {{"width", "width = 0", 0},
+                   {"height", "height = -3", -3},
+                   {"width", "width = 2000000", 2000000},
+                   {"crop_width", "column 769 of a film of 768", 769},
+                   {"crop_offset_x", "column 769 of a film of 768", 1},
+                   {"crop_offset_y", "crop_offset_y = -1", -1},
+                   {"crop_height", "crop_height = 0", 0},
+                   {"bit_depth", "'bit_depth'", 8}};
     for (size_t k = 0; k < imp_count(numbers); k++) {
         n = node_new("film", "hdrfilm");
         node_int(n, numbers[k].name, numbers[k].v);
@@ -314,7 +338,9 @@ static void films(void)
     n = node_new("film", "hdrfilm");
     node_float(n, "width", 10);
     film_refused(n, IMP_E_SCENE, "must be a integer, not a float");
-    static const struct { const char *name, *value, *words; } strings[] = {
+    static const struct {
+        const char *name, *value, *words;
+    } strings[] = {
         {"file_format", "png", "must be one of openexr, exr, rgbe, pfm"},
         {"pixel_format", "cmyk", "must be one of luminance, luminance_alpha"},
         {"component_format", "double", "must be one of float16, float32, uint32"}};
@@ -344,7 +370,8 @@ static void films(void)
     node_string(n, "component_format", "uint32");
     warnings = 0;
     f = film(n, IMP_RGB);
-    tap_ok(film_status == IMP_OK && !f.half && warnings == 1, "uint32 becomes float, aloud");
+    tap_ok(film_status == IMP_OK && !f.half && warnings == 1,
+           "uint32 becomes float, aloud");
 }
 
 static void filters(void)
@@ -382,17 +409,20 @@ static void filters(void)
     for (int k = 0; k < 4; k++) {
         n = node_new("rfilter", k % 2 ? "tent" : "gaussian");
         node_float(n, k % 2 ? "radius" : "stddev", bad[k]);
-        tap_ok(imp__filter_build(&b, n, &f) == IMP_E_SCENE, "filter of %g is refused", bad[k]);
+        tap_ok(imp__filter_build(&b, n, &f) == IMP_E_SCENE, "filter of %g is refused",
+               bad[k]);
     }
 }
 
 static void samplers(void)
 {
-    static const struct { const char *type; int asked, expected; } rows[] = {
-        {"independent", 7, 7}, {"stratified", 7, 9}, {"stratified", 9, 9},
-        {"multijitter", 7, 8}, {"multijitter", 16, 16}, {"multijitter", 17, 20},
-        {"orthogonal", 1, 4}, {"orthogonal", 10, 25}, {"orthogonal", 26, 49},
-        {"ldsampler", 1, 4}, {"ldsampler", 5, 16}, {"ldsampler", 64, 64}};
+    static const struct {
+        const char *type;
+        int asked, expected;
+    } rows[] = {{"independent", 7, 7}, {"stratified", 7, 9},    {"stratified", 9, 9},
+                {"multijitter", 7, 8}, {"multijitter", 16, 16}, {"multijitter", 17, 20},
+                {"orthogonal", 1, 4},  {"orthogonal", 10, 25},  {"orthogonal", 26, 49},
+                {"ldsampler", 1, 4},   {"ldsampler", 5, 16},    {"ldsampler", 64, 64}};
     int spp = 0, bad = 0;
     struct imp_build b = {.ctx = ctx, .arena = &world.arena};
     for (size_t k = 0; k < imp_count(rows); k++) {

@@ -38,19 +38,25 @@ static double octahedron_area(const struct imp_mat4 *m)
 
 static void areas(void)
 {
-    const struct imp_mat4 even = scale_then_turn(3, 3, 3), uneven = scale_then_turn(2, 3, 5);
-    static const char *const kinds[] = {"rectangle", "disk", "sphere", "cylinder", "cube",
-                                        "mesh", "obj", "ply"};
+    const struct imp_mat4 even = scale_then_turn(3, 3, 3),
+                          uneven = scale_then_turn(2, 3, 5);
+    static const char *const kinds[] = {"rectangle", "disk", "sphere", "cylinder",
+                                        "cube",      "mesh", "obj",    "ply"};
     for (size_t k = 0; k < imp_count(kinds); k++) {
         const int round = k == 2 || k == 3;
-        const double expected[] = {4 * 2 * 3, IMP_PI * 2 * 3, 4 * IMP_PI * 9, IMP_2PI * 9,
-                                   8 * (2 * 3 + 3 * 5 + 5 * 2), octahedron_area(&uneven)};
+        const double expected[] = {4 * 2 * 3,
+                                   IMP_PI * 2 * 3,
+                                   4 * IMP_PI * 9,
+                                   IMP_2PI * 9,
+                                   8 * (2 * 3 + 3 * 5 + 5 * 2),
+                                   octahedron_area(&uneven)};
         world_begin(ctx);
         struct imp_node *n = kind_node(shape_kind(kinds[k]));
         node_transform(n, round ? even : uneven);
         struct imp_shape *s = shape_build(n, NULL);
         /* Meshes hold floats. */
-        tap_near(s ? s->area : NAN, expected[k < 5 ? k : 5], k < 4 ? 1e-13 : 5e-7, 0, kinds[k]);
+        tap_near(s ? s->area : NAN, expected[k < 5 ? k : 5], k < 4 ? 1e-13 : 5e-7, 0,
+                 kinds[k]);
         world_end();
     }
     int n_kinds = 0;
@@ -58,7 +64,8 @@ static void areas(void)
     tap_ok(n_kinds == (int)imp_count(kinds), "every kind has a closed-form area here");
 
     world_begin(ctx);
-    struct imp_node *ball = node_new("shape", "sphere"), *tube = node_new("shape", "cylinder");
+    struct imp_node *ball = node_new("shape", "sphere"),
+                    *tube = node_new("shape", "cylinder");
     node_vector(ball, "center", imp__v3(1, 2, 3));
     node_float(ball, "radius", 0.25);
     node_transform(ball, scale_then_turn(2, 2, 2));
@@ -68,7 +75,8 @@ static void areas(void)
     const struct imp_shape *a = shape_build(ball, NULL), *b = shape_build(tube, NULL);
     const struct imp_mat4 m = scale_then_turn(2, 2, 2);
     tap_near(a ? a->area : NAN, IMP_PI, 1e-13, 0, "sphere of radius 0.25, scaled by 2");
-    tap_ok(a && imp__length((a->lo + a->hi) * 0.5 - imp__point(&m, imp__v3(1, 2, 3))) < 1e-13,
+    tap_ok(a && imp__length((a->lo + a->hi) * 0.5 - imp__point(&m, imp__v3(1, 2, 3))) <
+                    1e-13,
            "its centre went with to_world");
     tap_near(b ? b->area : NAN, 5 * IMP_PI, 1e-13, 0, "cylinder of length 5, radius 0.5");
     tap_ok(b && fabs(b->lo[1] + 0.4) < 1e-13 && fabs(b->hi[2] - 4.3) < 1e-13 &&
@@ -77,11 +85,12 @@ static void areas(void)
     world_end();
 }
 
-/* Random surface points through random rays: the frame is orthonormal, the point is in the
- * bounds, and p(uv) has the derivatives dp_du, dp_dv. */
+/* Random surface points through random rays: the frame is orthonormal, the point is in
+ * the bounds, and p(uv) has the derivatives dp_du, dp_dv. */
 static void surfaces(const struct imp_shape_ops *ops, int flip, int mirror)
 {
-    const int round = strcmp(ops->name, "sphere") == 0 || strcmp(ops->name, "cylinder") == 0;
+    const int round =
+        strcmp(ops->name, "sphere") == 0 || strcmp(ops->name, "cylinder") == 0;
     world_begin(ctx);
     struct imp_node *node = kind_node(ops);
     node_transform(node, round ? scale_then_turn(1.5, 1.5, mirror ? -1.5 : 1.5)
@@ -112,7 +121,8 @@ static void surfaces(const struct imp_shape_ops *ops, int flip, int mirror)
             worst_frame = fmax(worst_frame, fabs(imp__dot(a.s, a.n)));
             worst_frame = fmax(worst_frame, imp__length(imp__cross(a.n, a.s) - a.t));
             for (int k = 0; k < 3; k++)
-                worst_bounds = fmax(worst_bounds, fmax(s->lo[k] - a.p[k], a.p[k] - s->hi[k]));
+                worst_bounds =
+                    fmax(worst_bounds, fmax(s->lo[k] - a.p[k], a.p[k] - s->hi[k]));
             /* Shading and geometric normal on one side, whatever was mirrored. */
             worst_side = fmin(worst_side, imp__dot(a.n, a.ng));
             inward += imp__dot(a.ng, a.p - center) < 0;
@@ -121,16 +131,19 @@ static void surfaces(const struct imp_shape_ops *ops, int flip, int mirror)
             worst_frame = fmax(worst_frame, fabs(imp__dot(a.dp_du, a.ng)) /
                                                 imp__length(a.dp_du) * (1 - 1e-3));
             const double h = 1e-4;
-            const imp_v3 d2 = imp__normalize(d + imp__v3(h * (v[0] - 0.5), h * (u[1] - 0.5),
-                                                         h * (u[0] - 0.5)));
+            const imp_v3 d2 = imp__normalize(
+                d + imp__v3(h * (v[0] - 0.5), h * (u[1] - 0.5), h * (u[0] - 0.5)));
             struct imp_hit near;
-            if (!imp__intersect(&world, &o, &d2, 0, INFINITY, &near) || near.prim != hit.prim)
+            if (!imp__intersect(&world, &o, &d2, 0, INFINITY, &near) ||
+                near.prim != hit.prim)
                 continue;
             ops->surface(s, &near, &o, &d2, &b);
             const double du = b.uv[0] - a.uv[0], dv = b.uv[1] - a.uv[1];
-            if (fabs(du) > 0.1 || fabs(dv) > 0.1) continue; /* over the seam of the angle */
+            if (fabs(du) > 0.1 || fabs(dv) > 0.1)
+                continue; /* over the seam of the angle */
             if (fabs(imp__dot(a.ng, d)) < 0.2) continue;
-            if (imp__length(a.dp_du) < 0.2 || imp__length(a.dp_dv) < 0.2) continue; /* pole */
+            if (imp__length(a.dp_du) < 0.2 || imp__length(a.dp_dv) < 0.2)
+                continue; /* pole */
             pairs++;
             const imp_v3 error = b.p - a.p - a.dp_du * du - a.dp_dv * dv;
             worst_slope = fmax(worst_slope, imp__length(error) / (h * size));
@@ -142,16 +155,17 @@ static void surfaces(const struct imp_shape_ops *ops, int flip, int mirror)
     tap_ok(hits > 1000 && pairs > 500 && worst_frame < 1e-6 && worst_bounds < 1e-6 &&
                worst_side > 0.2 && worst_slope < 3e-3 && bad_uv == 0 &&
                inward == expected,
-           "%s%s%s: frame, bounds, side, derivatives # hits %d pairs %d frame %.1e bounds %.1e "
-           "slope %.1e side %.2f inward %d", ops->name, flip ? " flipped" : "",
-           mirror ? " mirrored" : "", hits, pairs, worst_frame, worst_bounds, worst_slope,
-           worst_side, inward);
+           "%s%s%s: frame, bounds, side, derivatives # hits %d pairs %d frame %.1e "
+           "bounds %.1e "
+           "slope %.1e side %.2f inward %d",
+           ops->name, flip ? " flipped" : "", mirror ? " mirrored" : "", hits, pairs,
+           worst_frame, worst_bounds, worst_slope, worst_side, inward);
     world_end();
 }
 
 /* Normal seen by a ray straight down on a shape around the origin. */
-static void seen_from_above(const char *type, double sx, double sz, int flip, double expected,
-                            const char *what)
+static void seen_from_above(const char *type, double sx, double sz, int flip,
+                            double expected, const char *what)
 {
     world_begin(ctx);
     struct imp_node *n = kind_node(shape_kind(type));
@@ -164,8 +178,8 @@ static void seen_from_above(const char *type, double sx, double sz, int flip, do
     if (s && imp__intersector_create(&world) == IMP_OK &&
         imp__intersect(&world, &o, &d, 0, INFINITY, &hit))
         s->ops->surface(s, &hit, &o, &d, &at);
-    tap_ok(at.ng[2] * expected > 0.5 && at.n[2] * expected > 0.5, "%s: normal %+g # ng_z %g",
-           what, expected, at.ng[2]);
+    tap_ok(at.ng[2] * expected > 0.5 && at.n[2] * expected > 0.5,
+           "%s: normal %+g # ng_z %g", what, expected, at.ng[2]);
     world_end();
 }
 
@@ -186,7 +200,8 @@ static int uv_is(const struct imp_surface *at, double u, double v)
 /* uv by scene-format 4.2, at points whose uv can be said without computing. */
 static void uvs(void)
 {
-    static const char *const kinds[] = {"rectangle", "disk", "sphere", "cylinder", "cube"};
+    static const char *const kinds[] = {"rectangle", "disk", "sphere", "cylinder",
+                                        "cube"};
     world_begin(ctx);
     struct imp_shape *s[5];
     for (int k = 0; k < 5; k++) {
@@ -219,12 +234,13 @@ static void uvs(void)
     tap_ok(uv_is(&a, 0.6, 0.75), "cube uv on -Y # %g %g", a.uv[0], a.uv[1]);
     world_end();
 
-    /* No uv in a mesh: the weights of the file's second and third vertex, also reversed. */
+    /* No uv in a mesh: the weights of the file's second and third vertex, also reversed.
+     */
     for (int flip = 0; flip < 2; flip++) {
         static const float p[9 + 4] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
         static const uint32_t i[3] = {0, 1, 2};
-        const struct imp_mesh_data one = {.n_vertices = 3, .n_triangles = 1, .positions = p,
-                                          .indices = i};
+        const struct imp_mesh_data one = {
+            .n_vertices = 3, .n_triangles = 1, .positions = p, .indices = i};
         world_begin(ctx);
         struct imp_node *n = node_new("shape", "mesh");
         n->mesh = &one;
@@ -244,9 +260,10 @@ static void uvs(void)
 static void vertex_normals(void)
 {
     static const float split[24 * 3 + 4] = {
-        1, -1, -1, 1, -1, 1, -1, -1, 1, -1, -1, -1, 1, 1, -1, -1, 1, -1, -1, 1, 1, 1, 1, 1,
-        1, -1, -1, 1, 1, -1, 1, 1, 1, 1, -1, 1, 1, -1, 1, 1, 1, 1, -1, 1, 1, -1, -1, 1,
-        -1, -1, 1, -1, 1, 1, -1, 1, -1, -1, -1, -1, 1, 1, -1, 1, -1, -1, -1, -1, -1, -1, 1, -1};
+        1,  -1, -1, 1,  -1, 1,  -1, -1, 1,  -1, -1, -1, 1,  1,  -1, -1, 1,  -1,
+        -1, 1,  1,  1,  1,  1,  1,  -1, -1, 1,  1,  -1, 1,  1,  1,  1,  -1, 1,
+        1,  -1, 1,  1,  1,  1,  -1, 1,  1,  -1, -1, 1,  -1, -1, 1,  -1, 1,  1,
+        -1, 1,  -1, -1, -1, -1, 1,  1,  -1, 1,  -1, -1, -1, -1, -1, -1, 1,  -1};
     uint32_t index[36];
     float normal[72];
     for (uint32_t f = 0; f < 6; f++) {
@@ -261,8 +278,8 @@ static void vertex_normals(void)
            "angle-weighted normals over split vertices # worst %.1e", worst);
 
     /* -0 and +0 are one place; an unused vertex has (1,0,0). */
-    static const float tent[7 * 3 + 4] = {0, 0.0f, 0, 1, 0, 0, 0, 1, 0, 0, -0.0f, 0,
-                                          0, 1, 0, 0, 0, 1, 7, 7, 7};
+    static const float tent[7 * 3 + 4] = {0, 0.0f, 0, 1, 0, 0, 0, 1, 0, 0, -0.0f,
+                                          0, 0,    1, 0, 0, 0, 1, 7, 7, 7};
     static const uint32_t two[6] = {0, 1, 2, 3, 4, 5};
     const int st2 = imp__mesh_normals(ctx, 7, 2, tent, two, normal);
     tap_ok(st2 == IMP_OK && fabs(normal[0] - sqrt(0.5)) < 1e-7 &&
@@ -274,8 +291,11 @@ static void vertex_normals(void)
     static const float p[9 + 4] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
     static const float given[9] = {0, 1, 1, 0, 1, 1, 0, 1, 1};
     static const uint32_t i[3] = {0, 1, 2};
-    const struct imp_mesh_data one = {.n_vertices = 3, .n_triangles = 1, .positions = p,
-                                      .normals = given, .indices = i,
+    const struct imp_mesh_data one = {.n_vertices = 3,
+                                      .n_triangles = 1,
+                                      .positions = p,
+                                      .normals = given,
+                                      .indices = i,
                                       .normals_from_file = true};
     for (int k = 0; k < 4; k++) {
         world_begin(ctx);
@@ -290,8 +310,8 @@ static void vertex_normals(void)
         const struct imp_surface a =
             look(s, imp__v3(k == 2 ? -0.2 : 0.2, 0.2, 5), imp__v3(0, 0, -1));
         const double sign = k == 1 ? -1 : 1;
-        const imp_v3 n_ref = k == 3 ? imp__v3(0, 0, 1)
-                                    : imp__normalize(imp__v3(0, 0.5, 1)) * sign;
+        const imp_v3 n_ref =
+            k == 3 ? imp__v3(0, 0, 1) : imp__normalize(imp__v3(0, 0.5, 1)) * sign;
         tap_ok(imp__length(a.n - n_ref) < 1e-6 && a.ng[2] == sign,
                "normals from the file %d # %g %g %g, ng_z %g", k, a.n[0], a.n[1], a.n[2],
                a.ng[2]);
@@ -320,7 +340,8 @@ static void errors(void)
     static float p[12 + 4] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0};
     static float uv[8], normals[12];
     static uint32_t i[6] = {0, 1, 2, 1, 3, 2};
-    struct imp_mesh_data m = {.n_vertices = 4, .n_triangles = 2, .positions = p, .indices = i};
+    struct imp_mesh_data m = {
+        .n_vertices = 4, .n_triangles = 2, .positions = p, .indices = i};
     p[7] = NAN;
     expect_error(mesh_node(&m), IMP_E_SCENE, "vertex 2 is not finite");
     p[7] = INFINITY;
@@ -388,11 +409,11 @@ static void errors(void)
 /* Slivers, degenerate triangles and far-off scenes: finite everywhere, never drawn. */
 static void degenerate(void)
 {
-    static const float p[7 * 3 + 4] = {0, 0, 0, 1, 0, 0, 0.5f, 0, 0, /* collinear */
-                                       0, 1, 0, 1e-30f, 1, 0, 0, 2, 0, 1, 1, 0};
+    static const float p[7 * 3 + 4] = {0, 0, 0, 1,      0, 0, 0.5f, 0, 0, /* collinear */
+                                       0, 1, 0, 1e-30f, 1, 0, 0,    2, 0, 1, 1, 0};
     static const uint32_t i[5 * 3] = {0, 1, 2, 0, 0, 0, 0, 1, 3, 3, 4, 5, 5, 5, 1};
-    const struct imp_mesh_data m = {.n_vertices = 7, .n_triangles = 5, .positions = p,
-                                    .indices = i};
+    const struct imp_mesh_data m = {
+        .n_vertices = 7, .n_triangles = 5, .positions = p, .indices = i};
     world_begin(ctx);
     struct imp_shape *s = shape_build(mesh_node(&m), NULL);
     tap_near(s ? s->area : NAN, 0.5, 1e-12, 0, "only the triangle with area counts");
@@ -400,7 +421,9 @@ static void degenerate(void)
     const imp_v3 ref = imp__v3(0.2, 0.3, 2);
     for (uint32_t k = 0; s && k < 2000; k++) {
         const struct imp_key key = imp__key(1, 0, k);
-        const double u[2] = {k == 0 ? 0 : k == 1 ? 0x1.fffffffffffffp-1 : imp__u01(key, 0),
+        const double u[2] = {k == 0   ? 0
+                             : k == 1 ? 0x1.fffffffffffffp-1
+                                      : imp__u01(key, 0),
                              imp__u01(key, 1)};
         struct imp_light_sample l;
         if (!s->ops->sample_toward(s, &ref, u, &l)) other++;
@@ -413,17 +436,18 @@ static void degenerate(void)
         const struct imp_hit hit = {.prim = k, .u = 0.25, .v = 0.5};
         struct imp_surface at;
         s->ops->surface(s, &hit, &ref, &ref, &at);
-        bad += !(imp__is_finite(at.p) && imp__is_finite(at.ng) && imp__is_finite(at.n) &&
-                 imp__is_finite(at.s) && imp__is_finite(at.t) && isfinite(at.uv[0]) &&
-                 fabs(imp__length(at.s) - 1) < 1e-9 && fabs(imp__length(at.n) - 1) < 1e-6);
+        bad +=
+            !(imp__is_finite(at.p) && imp__is_finite(at.ng) && imp__is_finite(at.n) &&
+              imp__is_finite(at.s) && imp__is_finite(at.t) && isfinite(at.uv[0]) &&
+              fabs(imp__length(at.s) - 1) < 1e-9 && fabs(imp__length(at.n) - 1) < 1e-6);
     }
     tap_ok(bad == 0, "surfaces of degenerate triangles are finite");
     int rays = 0;
     if (s && imp__intersector_create(&world) == IMP_OK)
         for (uint32_t k = 0; k < 5000; k++) {
             const struct imp_key key = imp__key(2, 0, k);
-            const imp_v3 o = imp__v3(imp__u01(key, 0) * 2 - 0.5, imp__u01(key, 1) * 3 - 0.5,
-                                     k % 2 ? 1 : 0);
+            const imp_v3 o = imp__v3(imp__u01(key, 0) * 2 - 0.5,
+                                     imp__u01(key, 1) * 3 - 0.5, k % 2 ? 1 : 0);
             const imp_v3 d = k % 2 ? imp__v3(0, 0, -1) : imp__v3(1, 0, 0);
             struct imp_hit hit;
             if (!imp__intersect(&world, &o, &d, 0, INFINITY, &hit)) continue;
@@ -436,12 +460,13 @@ static void degenerate(void)
     world_end();
 
     /* A mesh that has no area at all is fine until it has to shine. */
-    static const struct imp_mesh_data flat = {.n_vertices = 7, .n_triangles = 2,
-                                              .positions = p, .indices = i};
+    static const struct imp_mesh_data flat = {
+        .n_vertices = 7, .n_triangles = 2, .positions = p, .indices = i};
     world_begin(ctx);
     struct imp_light_sample l;
     s = shape_build(mesh_node(&flat), NULL);
-    tap_ok(s && s->area == 0 && !s->ops->sample_toward(s, &ref, (double[2]){0.5, 0.5}, &l),
+    tap_ok(s && s->area == 0 &&
+               !s->ops->sample_toward(s, &ref, (double[2]){0.5, 0.5}, &l),
            "a mesh without area is not sampled");
     world_end();
 
@@ -457,8 +482,11 @@ static void degenerate(void)
             for (uint32_t r = 0; r < 2000; r++) {
                 const struct imp_key key = imp__key(4, 0, r);
                 const double u[2] = {imp__u01(key, 0), imp__u01(key, 1)};
-                const imp_v3 d = imp__uniform_sphere(u), o = far - d * 40.0 +
-                    imp__v3(imp__u01(key, 2), imp__u01(key, 3), imp__u01(key, 4)) * 0.2;
+                const imp_v3 d = imp__uniform_sphere(u),
+                             o = far - d * 40.0 +
+                                 imp__v3(imp__u01(key, 2), imp__u01(key, 3),
+                                         imp__u01(key, 4)) *
+                                     0.2;
                 struct imp_hit hit;
                 struct imp_surface at;
                 if (!imp__intersect(&world, &o, &d, 0, INFINITY, &hit)) continue;
@@ -467,17 +495,18 @@ static void degenerate(void)
                 bad += !(imp__length(at.p - far) < 2) || !imp__is_finite(at.s) ||
                        fabs(imp__length(at.n) - 1) > 1e-6;
             }
-        tap_ok(hits > 400 && bad == 0, "%s at 1e6 # hits %d bad %d", imp__shape_kinds[k]->name,
-               hits, bad);
+        tap_ok(hits > 400 && bad == 0, "%s at 1e6 # hits %d bad %d",
+               imp__shape_kinds[k]->name, hits, bad);
         world_end();
     }
 }
 
-/* Numbers of any size where numbers go: an error, or a shape whose answers are numbers. */
+/* Numbers of any size where numbers go: an error, or a shape whose answers are numbers.
+ */
 static double wild(struct imp_key key, uint32_t dim)
 {
-    static const double special[] = {0, -0.0, 1, -1, 1e-300, 1e300, 1e-30, 1e17, 1e18, 1e19,
-                                     INFINITY, NAN, 3e38, 1e-45};
+    static const double special[] = {0,    -0.0, 1,    -1,       1e-300, 1e300, 1e-30,
+                                     1e17, 1e18, 1e19, INFINITY, NAN,    3e38,  1e-45};
     const double u = imp__u01(key, dim);
     if (u < 0.15) return special[(int)(imp__u01(key, dim + 1) * imp_count(special))];
     const double size = pow(10, 24 * imp__u01(key, dim + 1) - 12);
@@ -539,10 +568,11 @@ static void hostile(void)
         world_end();
     }
     tap_ok(bad == 0 && refused > 500 && built > 500 && hits > 1000,
-           "numbers of any size # refused %d built %d hits %d bad %d", refused, built, hits, bad);
+           "numbers of any size # refused %d built %d hits %d bad %d", refused, built,
+           hits, bad);
 }
 
-/* ---- the n-th allocation fails ------------------------------------------------------ */
+/* ---- the n-th allocation fails ------------------------------------------------- */
 
 static void starved(void)
 {
@@ -560,8 +590,8 @@ static void starved(void)
         enum imp_status st = IMP_OK;
         for (int k = 0; imp__shape_kinds[k] && st == IMP_OK; k++) {
             struct imp_node *node =
-                imp__node_create(&world.arena, "shape", imp__shape_kinds[k]->name, NULL, NULL,
-                                 (struct imp_loc){0});
+                imp__node_create(&world.arena, "shape", imp__shape_kinds[k]->name, NULL,
+                                 NULL, (struct imp_loc){0});
             if (!node) {
                 st = IMP_E_NOMEM;
                 break;

@@ -1,21 +1,21 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Textures: texel centres, wrap modes, sRGB, to_uv, luminance, the swapped checkerboard; and
- * for every way of reading one, scatter and tangent as exact transposes of each other and
- * exact derivatives of eval. */
-#include <stdlib.h>
+ * Textures: texel centres, wrap modes, sRGB, to_uv, luminance, the swapped checkerboard;
+ * and for every way of reading one, scatter and tangent as exact transposes of each other
+ * and exact derivatives of eval. */
 #include "color/rgb.h"
 #include "imp_tap.h"
 #include "kind/texture/input.h"
 #include "math/rng.h"
 #include "math/vec.h"
+#include <stdlib.h>
 
 static imp_context *ctx;
 static struct imp_arena arena;
 
 static enum imp_status add_bulk(const struct imp_build *b, const char *key, float *data,
-                                int n_dims, const size_t dims[3], unsigned flags, double lo,
-                                double hi, int *param)
+                                int n_dims, const size_t dims[3], unsigned flags,
+                                double lo, double hi, int *param)
 {
     (void)b, (void)data;
     tap_ok(strcmp(key, "data") == 0 && n_dims == 3 && dims[0] * dims[1] * dims[2] > 0 &&
@@ -50,8 +50,8 @@ static enum imp_status make(struct imp_node *n, const struct imp_image_data *ima
                             struct imp_texture *t)
 {
     const struct imp_texture_ops *ops = find(n->type);
-    const struct imp_build b = {.ctx = ctx, .node = n, .arena = &arena, .mode = mode,
-                                .add_bulk = add_bulk};
+    const struct imp_build b = {
+        .ctx = ctx, .node = n, .arena = &arena, .mode = mode, .add_bulk = add_bulk};
     n->image = image;
     *t = (struct imp_texture){.ops = ops, .param = -1, .input = input, .name = "t"};
     t->self = imp__arena_array(&arena, 1, ops->object_size);
@@ -85,11 +85,13 @@ static void lookups(void)
     bool centres = true;
     for (int y = 0; y < 2; y++)
         for (int x = 0; x < 4; x++)
-            centres &= fabs(at(&t, (x + 0.5) / 4, (y + 0.5) / 2, 0) - (10 * y + x)) < 1e-12;
+            centres &=
+                fabs(at(&t, (x + 0.5) / 4, (y + 0.5) / 2, 0) - (10 * y + x)) < 1e-12;
     tap_ok(centres, "texel centres, row 0 at v = 0");
     tap_near(at(&t, 0.375 + 0.1, 0.25, 0), 1.4, 1e-12, 0, "linear between two texels");
     tap_near(at(&t, 0.375, 0.5, 0), 6, 1e-12, 0, "linear between two rows");
-    tap_near(at(&t, 0, 0.25, 0), 1.5, 1e-12, 0, "repeat: the border blends with the far side");
+    tap_near(at(&t, 0, 0.25, 0), 1.5, 1e-12, 0,
+             "repeat: the border blends with the far side");
     tap_near(at(&t, 5.375, -2.75, 0), 1, 1e-12, 0, "repeat: any number of turns");
     tap_near(at(&t, 0.4, 0.4, 1), 100, 1e-12, 0, "green");
 
@@ -112,7 +114,8 @@ static void lookups(void)
     tap_near(at(&t, 0.5, 0.5, 0), 12, 1e-12, 0, "nearest: on its border");
     tap_near(at(&t, -1e-12, 1.0, 0), 3, 1e-12, 0, "nearest: just outside");
 
-    static const double wild[] = {NAN, INFINITY, -INFINITY, 1e300, -1e300, 1e18, 0, -1e-300};
+    static const double wild[] = {NAN,    INFINITY, -INFINITY, 1e300,
+                                  -1e300, 1e18,     0,         -1e-300};
     static const char *const modes[] = {"repeat", "mirror", "clamp"};
     bool finite = true;
     for (int m = 0; m < 6; m++) {
@@ -130,7 +133,8 @@ static void lookups(void)
     n = node_make("bitmap");
     matrix_add(n, (double[]){0, 2, 0, 0.25, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1});
     tap_ok(make(n, ramp(), IMP_RGB, NULL, &t) == IMP_OK, "to_uv");
-    tap_near(at(&t, 0.75, 0.3125, 0), at(&t, 0.75, 0.8125, 0), 1e-12, 0, "to_uv: tiled twice");
+    tap_near(at(&t, 0.75, 0.3125, 0), at(&t, 0.75, 0.8125, 0), 1e-12, 0,
+             "to_uv: tiled twice");
     /* u' = 2 v + .25 = .875, v' = u = .75: texel (3, 1). */
     tap_near(at(&t, 0.75, 0.3125, 0), 13, 1e-12, 0, "to_uv: rotated and moved");
 }
@@ -138,8 +142,10 @@ static void lookups(void)
 static void conversions(void)
 {
     struct imp_texture t;
-    float half[6] = {0.5f, 0.5f, 0.5f, 0.2f, 0.4f, 0.6f}, dot = 0.7f, bad[3] = {1, NAN, 1};
-    const struct imp_image_data coded = {2, 1, 3, half, true}, linear = {2, 1, 3, half, false},
+    float half[6] = {0.5f, 0.5f, 0.5f, 0.2f, 0.4f, 0.6f}, dot = 0.7f,
+          bad[3] = {1, NAN, 1};
+    const struct imp_image_data coded = {2, 1, 3, half, true},
+                                linear = {2, 1, 3, half, false},
                                 one = {1, 1, 1, &dot, false}, nan = {1, 1, 3, bad, false};
     struct imp_node *n = node_make("bitmap");
     tap_ok(make(n, &coded, IMP_RGB, NULL, &t) == IMP_OK, "sRGB");
@@ -149,21 +155,23 @@ static void conversions(void)
     tap_ok(make(n, &coded, IMP_RGB, NULL, &t) == IMP_OK, "raw");
     tap_near(at(&t, 0.25, 0.5, 0), 0.5, 1e-7, 0, "raw: as stored");
     tap_ok(make(node_make("bitmap"), &linear, IMP_MONO, NULL, &t) == IMP_OK, "mono");
-    tap_near(at(&t, 0.75, 0.5, 0), imp__luminance(0.2, 0.4, 0.6), 1e-7, 0, "mono: luminance");
+    tap_near(at(&t, 0.75, 0.5, 0), imp__luminance(0.2, 0.4, 0.6), 1e-7, 0,
+             "mono: luminance");
     tap_ok(make(node_make("bitmap"), &one, IMP_RGB, NULL, &t) == IMP_OK, "one texel");
-    tap_ok(fabs(at(&t, -3.2, 0.1, 0) - 0.7) < 1e-7 && at(&t, 0.9, 7, 2) == at(&t, 0, 0, 0),
+    tap_ok(fabs(at(&t, -3.2, 0.1, 0) - 0.7) < 1e-7 &&
+               at(&t, 0.9, 7, 2) == at(&t, 0, 0, 0),
            "one texel is a constant in all lanes");
-    tap_ok(make(node_make("bitmap"), NULL, IMP_RGB, NULL, &t) == IMP_E_SCENE, "no picture # %s",
-           imp_last_error(ctx));
-    tap_ok(make(node_make("bitmap"), &nan, IMP_RGB, NULL, &t) == IMP_E_SCENE, "NaN texel # %s",
-           imp_last_error(ctx));
+    tap_ok(make(node_make("bitmap"), NULL, IMP_RGB, NULL, &t) == IMP_E_SCENE,
+           "no picture # %s", imp_last_error(ctx));
+    tap_ok(make(node_make("bitmap"), &nan, IMP_RGB, NULL, &t) == IMP_E_SCENE,
+           "NaN texel # %s", imp_last_error(ctx));
     n = node_make("bitmap");
     string_add(n, "wrap_mode", "loop");
     tap_ok(make(n, &one, IMP_RGB, NULL, &t) == IMP_E_SCENE, "unknown wrap mode # %s",
            imp_last_error(ctx));
 }
 
-/* ---- Derivatives ---------------------------------------------------------------------- */
+/* ---- Derivatives --------------------------------------------------------------- */
 
 enum { N = 3 * 7 * 5 };
 struct gather {
@@ -175,7 +183,8 @@ static void gather_add(struct imp_sink *sink, int param, size_t element, int cha
 {
     struct gather *g = (struct gather *)sink;
     for (int c = 0; c < 3; c++)
-        g->g[c][(size_t)param * 4 + element + (channels == 3 ? (size_t)c : 0)] += (*bar)[c];
+        g->g[c][(size_t)param * 4 + element + (channels == 3 ? (size_t)c : 0)] +=
+            (*bar)[c];
 }
 static double read_dot(const void *x_dot, int param, size_t element)
 {
@@ -191,7 +200,8 @@ static void transpose_check(const struct imp_input *in, int spots, const char *w
     for (int i = 0; i < N + 8; i++) x[i] = imp__u01(key, (uint32_t)i) - 0.5;
     for (int i = 0; i < spots; i++) {
         const struct imp_key k = imp__key(5, (uint64_t)i, 0);
-        const struct imp_texcoord c = {{4 * imp__u01(k, 0) - 2, 4 * imp__u01(k, 1) - 2}, {0}};
+        const struct imp_texcoord c = {{4 * imp__u01(k, 0) - 2, 4 * imp__u01(k, 1) - 2},
+                                       {0}};
         const imp_spec bar = {imp__u01(k, 2), imp__u01(k, 3) - 0.5, -imp__u01(k, 4), NAN};
         struct gather g = {.sink = {gather_add}};
         const struct imp_input *const list[1] = {in};
@@ -213,7 +223,8 @@ static void linear_check(const struct imp_input *in, const double *data, const c
     double worst = 0;
     for (int i = 0; i < 200; i++) {
         const struct imp_key k = imp__key(6, (uint64_t)i, 0);
-        const struct imp_texcoord c = {{4 * imp__u01(k, 0) - 2, 4 * imp__u01(k, 1) - 2}, {0}};
+        const struct imp_texcoord c = {{4 * imp__u01(k, 0) - 2, 4 * imp__u01(k, 1) - 2},
+                                       {0}};
         const struct imp_input *const list[1] = {in};
         imp_spec dot, value;
         imp__inputs_tangent(list, 1, &c, read_dot, data, &dot);
@@ -240,11 +251,14 @@ static void derivatives(void)
         struct imp_node *n = node_make("bitmap");
         string_add(n, "wrap_mode", modes[m / 8]);
         string_add(n, "filter_type", nearest ? "nearest" : "bilinear");
-        matrix_add(n, (double[]){1.3, 0.2, 0, 0.1, -0.4, 2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1});
-        if (make(n, &im, IMP_RGB, NULL, &t) != IMP_OK) tap_ok(0, "%s", imp_last_error(ctx));
+        matrix_add(n,
+                   (double[]){1.3, 0.2, 0, 0.1, -0.4, 2, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1});
+        if (make(n, &im, IMP_RGB, NULL, &t) != IMP_OK)
+            tap_ok(0, "%s", imp_last_error(ctx));
         const struct imp_input in = {.texture = &t, .param = -1, .scalar = scalar};
-        snprintf(what, sizeof what, "bitmap %s%s%s%s", modes[m / 8], nearest ? " nearest" : "",
-                 grey ? " grey" : "", scalar ? " as one number" : "");
+        snprintf(what, sizeof what, "bitmap %s%s%s%s", modes[m / 8],
+                 nearest ? " nearest" : "", grey ? " grey" : "",
+                 scalar ? " as one number" : "");
         transpose_check(&in, 100, what);
         linear_check(&in, data, what);
     }
@@ -280,16 +294,21 @@ static void checkerboard(void)
     struct imp_input a = {.value = {0.1, 0.2, 0.3, 0}, .param = -1, .count = 3},
                      b = {.value = imp__spec(0.8), .param = -1, .count = 1};
     const struct imp_input *colors[2] = {&a, &b};
-    tap_ok(make(node_make("checkerboard"), NULL, IMP_RGB, colors, &t) == IMP_OK, "checkerboard");
-    tap_ok(at(&t, 0.2, 0.3, 1) == 0.2 && at(&t, 0.7, 0.9, 1) == 0.2, "equal parity: color0");
-    tap_ok(at(&t, 0.7, 0.3, 1) == 0.8 && at(&t, -0.8, 0.9, 1) == 0.8, "other parity: color1");
-    tap_ok(at(&t, 0.5, 0.5, 1) == 0.2 && at(&t, 3.2, -1.7, 1) == 0.2, "borders and turns");
+    tap_ok(make(node_make("checkerboard"), NULL, IMP_RGB, colors, &t) == IMP_OK,
+           "checkerboard");
+    tap_ok(at(&t, 0.2, 0.3, 1) == 0.2 && at(&t, 0.7, 0.9, 1) == 0.2,
+           "equal parity: color0");
+    tap_ok(at(&t, 0.7, 0.3, 1) == 0.8 && at(&t, -0.8, 0.9, 1) == 0.8,
+           "other parity: color1");
+    tap_ok(at(&t, 0.5, 0.5, 1) == 0.2 && at(&t, 3.2, -1.7, 1) == 0.2,
+           "borders and turns");
     const struct imp_texcoord c = {{0.2, 0.3}, {0}}, d = {{0.7, 0.3}, {0}};
     imp_spec s;
     t.ops->eval(&t, &c, true, &s);
     tap_ok(s[0] == 0.8, "as one number the two are swapped");
     t.ops->eval(&t, &d, true, &s);
-    tap_near(s[1], imp__luminance(0.1, 0.2, 0.3), 1e-15, 0, "and a colour is its luminance");
+    tap_near(s[1], imp__luminance(0.1, 0.2, 0.3), 1e-15, 0,
+             "and a colour is its luminance");
 }
 
 int main(void)

@@ -26,7 +26,7 @@ static enum imp_status parse(const char *xml, const struct imp_load_options *o,
     return parse_open(ctx, xml, strlen(xml), "s.xml", o, scene);
 }
 
-/* ---- What is accepted -------------------------------------------------------------- */
+/* ---- What is accepted ---------------------------------------------------------- */
 
 static struct imp_node *child(struct imp_node *n, size_t i)
 {
@@ -143,7 +143,8 @@ static void check_parameters(void)
     if (st == IMP_OK) {
         tap_ok(imp__node_prop(s.root, "i")->integer == 7, "the caller's value wins");
         tap_ok(strcmp(imp__node_prop(s.root, "s")->string, "xc $ short.") == 0,
-               "the longest name first; the first default counts # %s", imp__node_prop(s.root, "s")->string);
+               "the longest name first; the first default counts # %s",
+               imp__node_prop(s.root, "s")->string);
         tap_ok(imp__node_prop(child(s.root, 0), "t")->number[0] == 7,
                "inside transforms");
     }
@@ -242,7 +243,7 @@ static void check_upgrade(void)
     parse_close(&s);
 }
 
-/* ---- Files ------------------------------------------------------------------------- */
+/* ---- Files --------------------------------------------------------------------- */
 
 static void put(const char *folder, const char *name, const char *text)
 {
@@ -313,10 +314,8 @@ static void check_files(void)
         st = parse_open(ctx, text, strlen(text), main_xml, NULL, &s);
         size_t n = 0;
         for (const char *m = cases[i].message; *m; m++)
-            if (*m == 'D')
-                n += (size_t)sprintf(want + n, "%s", folder);
-            else
-                want[n++] = *m;
+            if (*m == 'D') n += (size_t)sprintf(want + n, "%s", folder);
+            else want[n++] = *m;
         want[n] = 0;
         tap_ok(st != IMP_OK && strcmp(imp_last_error(ctx), want) == 0, "%s",
                cases[i].message);
@@ -344,7 +343,7 @@ static void check_files(void)
     if (system(command) != 0) printf("# %s stays\n", folder);
 }
 
-/* ---- Truncation and memory --------------------------------------------------------- */
+/* ---- Truncation and memory ----------------------------------------------------- */
 
 static const char sample[] =
     "<?xml version='1.0'?><scene version='2.1.0'><default name='r' value='2'/>"

@@ -4,13 +4,13 @@
 #include "kind/build.h"
 #include "math/vec.h"
 
-#define BSDFS(X)                                                                           \
-    X(imp__conductor)                                                                      \
-    X(imp__dielectric)                                                                     \
-    X(imp__diffuse)                                                                        \
-    X(imp__roughconductor)                                                                 \
-    X(imp__stam_m2)                                                                        \
-    X(imp__stam_m3)                                                                        \
+#define BSDFS(X)                                                                         \
+    X(imp__conductor)                                                                    \
+    X(imp__dielectric)                                                                   \
+    X(imp__diffuse)                                                                      \
+    X(imp__roughconductor)                                                               \
+    X(imp__stam_m2)                                                                      \
+    X(imp__stam_m3)                                                                      \
     X(imp__twosided)
 
 #define DECLARE(kind) extern const struct imp_bsdf_ops kind;

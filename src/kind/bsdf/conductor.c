@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * conductor: a smooth mirror of complex index eta + i k. One delta lobe, tint times Fresnel;
- * its derivatives are those of the coefficient (gradients.md 9.3). Front only. */
+ * conductor: a smooth mirror of complex index eta + i k. One delta lobe, tint times
+ * Fresnel; its derivatives are those of the coefficient (gradients.md 9.3). Front only.
+ */
 #include "fresnel.h"
 #include "kind/build.h"
 #include "presets.h"
@@ -11,11 +12,16 @@ enum { ETA, K, TINT };
 static const struct imp_input_desc inputs[] = {
     {.name = "eta", .role = IMP_UNBOUNDED, .fallback = 0, .unit = "1"},
     {.name = "k", .role = IMP_UNBOUNDED, .fallback = 1, .unit = "1"},
-    {.name = "specular_reflectance", .role = IMP_REFLECTANCE, .flags = IMP_INPUT_OPTIONAL,
-     .fallback = 1, .hi = 1, .unit = "1"},
+    {.name = "specular_reflectance",
+     .role = IMP_REFLECTANCE,
+     .flags = IMP_INPUT_OPTIONAL,
+     .fallback = 1,
+     .hi = 1,
+     .unit = "1"},
     {0}};
 
-static enum imp_status build(const struct imp_build *build, void *self, struct imp_bsdf *b)
+static enum imp_status build(const struct imp_build *build, void *self,
+                             struct imp_bsdf *b)
 {
     (void)build, (void)self;
     b->flags = IMP_BSDF_DELTA;
@@ -60,7 +66,12 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     df[K] *= in[TINT];
 }
 
-const struct imp_bsdf_ops imp__conductor = {
-    .size = sizeof(struct imp_bsdf_ops), .name = "conductor", .inputs = inputs,
-    .prepare = imp__conductor_prepare, .build = build,
-    .sample = sample, .eval = eval, .pdf = pdf, .eval_d = eval_d};
+const struct imp_bsdf_ops imp__conductor = {.size = sizeof(struct imp_bsdf_ops),
+                                            .name = "conductor",
+                                            .inputs = inputs,
+                                            .prepare = imp__conductor_prepare,
+                                            .build = build,
+                                            .sample = sample,
+                                            .eval = eval,
+                                            .pdf = pdf,
+                                            .eval_d = eval_d};

@@ -58,8 +58,8 @@ static const struct imp__conductor *conductor_exact(const char *name, size_t len
     return NULL;
 }
 
-/* Data of Palik's handbook may be asked for as NAME_palik; where the two sources differ, or
- * there is no such data, the table or this list says so. */
+/* Data of Palik's handbook may be asked for as NAME_palik; where the two sources differ,
+ * or there is no such data, the table or this list says so. */
 const struct imp__conductor *imp__conductor_find(const char *name)
 {
     static const char *const other_source[] = {"Ag", "Al", "Au", "Cr", "W", "a-C"};
@@ -77,8 +77,8 @@ const struct imp__conductor *imp__conductor_at(size_t i)
     return i < imp_count(conductors) ? &conductors[i] : NULL;
 }
 
-static enum imp_status color_add(const struct imp_build *b, const char *name, struct imp_loc loc,
-                                 const double rgb[3])
+static enum imp_status color_add(const struct imp_build *b, const char *name,
+                                 struct imp_loc loc, const double rgb[3])
 {
     struct imp_prop *p = imp__node_add(b->arena, b->node, name, IMP_PROP_RGB, loc);
     if (!p) return imp__error(b->ctx, IMP_E_NOMEM, "out of memory");
@@ -101,9 +101,11 @@ enum imp_status imp__conductor_prepare(const struct imp_build *b)
     if (strcmp(name, "none") == 0) return IMP_OK; /* the defaults: a perfect mirror */
     const struct imp__conductor *c = imp__conductor_find(name);
     if (!c)
-        IMP_TRY(imp__prop_error(b->ctx, b->node, p, IMP_E_SCENE,
-                                "unknown material '%s'; the manual lists them (Ag, Al, Au, "
-                                "Cu, ...)", name));
+        IMP_TRY(
+            imp__prop_error(b->ctx, b->node, p, IMP_E_SCENE,
+                            "unknown material '%s'; the manual lists them (Ag, Al, Au, "
+                            "Cu, ...)",
+                            name));
     IMP_TRY(color_add(b, "eta", loc, c->eta));
     IMP_TRY(color_add(b, "k", loc, c->k));
 out:

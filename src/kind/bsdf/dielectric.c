@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * dielectric: a smooth boundary of two clear media, two delta lobes. With F the Fresnel
- * reflectance, F tint_r is reflected and (1 - F) tint_t (n_wo/n_wi)^2 refracted: radiance is
- * compressed where the index is higher. Lobes are drawn with probabilities F and 1 - F,
- * whatever the tints are, so that a tint of 0 keeps its derivative. The index bends paths and
- * has no gradient: it can be set, and asking for its derivative is refused (gradients.md
- * 9.3). */
+ * reflectance, F tint_r is reflected and (1 - F) tint_t (n_wo/n_wi)^2 refracted: radiance
+ * is compressed where the index is higher. Lobes are drawn with probabilities F and 1 -
+ * F, whatever the tints are, so that a tint of 0 keeps its derivative. The index bends
+ * paths and has no gradient: it can be set, and asking for its derivative is refused
+ * (gradients.md 9.3). */
 #include "fresnel.h"
 #include "kind/build.h"
 #include "presets.h"
@@ -14,12 +14,25 @@ enum { TINT_R, TINT_T, ETA };
 enum { REFLECT, REFRACT }; /* lobes */
 
 static const struct imp_input_desc inputs[] = {
-    {.name = "specular_reflectance", .role = IMP_REFLECTANCE, .flags = IMP_INPUT_OPTIONAL,
-     .fallback = 1, .hi = 1, .unit = "1"},
-    {.name = "specular_transmittance", .role = IMP_REFLECTANCE, .flags = IMP_INPUT_OPTIONAL,
-     .fallback = 1, .hi = 1, .unit = "1"},
-    {.name = "eta", .role = IMP_UNBOUNDED, .flags = IMP_INPUT_SCALAR | IMP_INPUT_FIXED,
-     .fallback = 1.5046 / 1.000277, .lo = 1e-3, .hi = 1e3, .unit = "1"}, /* inside/outside */
+    {.name = "specular_reflectance",
+     .role = IMP_REFLECTANCE,
+     .flags = IMP_INPUT_OPTIONAL,
+     .fallback = 1,
+     .hi = 1,
+     .unit = "1"},
+    {.name = "specular_transmittance",
+     .role = IMP_REFLECTANCE,
+     .flags = IMP_INPUT_OPTIONAL,
+     .fallback = 1,
+     .hi = 1,
+     .unit = "1"},
+    {.name = "eta",
+     .role = IMP_UNBOUNDED,
+     .flags = IMP_INPUT_SCALAR | IMP_INPUT_FIXED,
+     .fallback = 1.5046 / 1.000277,
+     .lo = 1e-3,
+     .hi = 1e3,
+     .unit = "1"}, /* inside/outside */
     {0}};
 
 /* The two indices become their ratio. */
@@ -28,18 +41,21 @@ static enum imp_status prepare(const struct imp_build *b)
     enum imp_status st = IMP_OK;
     double inside, outside;
     if (imp__props_has(b->node, "eta"))
-        IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "eta"), IMP_E_SCENE,
+        IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "eta"),
+                                IMP_E_SCENE,
                                 "give 'int_ior' and 'ext_ior' instead of 'eta'"));
     IMP_TRY(imp__ior_read(b, "int_ior", "bk7", &inside));
     IMP_TRY(imp__ior_read(b, "ext_ior", "air", &outside));
-    struct imp_prop *p = imp__node_add(b->arena, b->node, "eta", IMP_PROP_FLOAT, b->node->loc);
+    struct imp_prop *p =
+        imp__node_add(b->arena, b->node, "eta", IMP_PROP_FLOAT, b->node->loc);
     if (!p) IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "out of memory"));
     p->number[0] = inside / outside;
 out:
     return st;
 }
 
-static enum imp_status build(const struct imp_build *build, void *self, struct imp_bsdf *b)
+static enum imp_status build(const struct imp_build *build, void *self,
+                             struct imp_bsdf *b)
 {
     (void)build, (void)self;
     b->flags = IMP_BSDF_DELTA | IMP_BSDF_TRANSMIT;
@@ -107,7 +123,12 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     df[TINT_T] = imp__spec(d->lobe == REFRACT ? c : 0);
 }
 
-const struct imp_bsdf_ops imp__dielectric = {
-    .size = sizeof(struct imp_bsdf_ops), .name = "dielectric", .inputs = inputs,
-    .prepare = prepare, .build = build,
-    .sample = sample, .eval = eval, .pdf = pdf, .eval_d = eval_d};
+const struct imp_bsdf_ops imp__dielectric = {.size = sizeof(struct imp_bsdf_ops),
+                                             .name = "dielectric",
+                                             .inputs = inputs,
+                                             .prepare = prepare,
+                                             .build = build,
+                                             .sample = sample,
+                                             .eval = eval,
+                                             .pdf = pdf,
+                                             .eval_d = eval_d};

@@ -1,15 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * diffuse: Lambert. f cos = rho cos(theta_i)/pi on the front, so that the integral over the
- * hemisphere is rho, the albedo. */
+ * diffuse: Lambert. f cos = rho cos(theta_i)/pi on the front, so that the integral over
+ * the hemisphere is rho, the albedo. */
 #include "kind/build.h"
 #include "lambert.h"
 
 enum { RHO };
 
-static const struct imp_input_desc inputs[] = {
-    {.name = "reflectance", .role = IMP_REFLECTANCE, .fallback = 0.5, .hi = 1, .unit = "1"},
-    {0}};
+static const struct imp_input_desc inputs[] = {{.name = "reflectance",
+                                                .role = IMP_REFLECTANCE,
+                                                .fallback = 0.5,
+                                                .hi = 1,
+                                                .unit = "1"},
+                                               {0}};
 
 static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
                    struct imp_dirs *d, struct imp_bsdf_sample *s)
@@ -45,7 +48,11 @@ static void albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *w
     *rho = in[RHO];
 }
 
-const struct imp_bsdf_ops imp__diffuse = {
-    .size = sizeof(struct imp_bsdf_ops), .name = "diffuse", .inputs = inputs,
-    .sample = sample, .eval = eval, .pdf = pdf, .eval_d = eval_d,
-    .albedo = albedo};
+const struct imp_bsdf_ops imp__diffuse = {.size = sizeof(struct imp_bsdf_ops),
+                                          .name = "diffuse",
+                                          .inputs = inputs,
+                                          .sample = sample,
+                                          .eval = eval,
+                                          .pdf = pdf,
+                                          .eval_d = eval_d,
+                                          .albedo = albedo};

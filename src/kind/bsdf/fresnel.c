@@ -14,7 +14,8 @@ double imp__fresnel_dielectric(double c, double eta, double *cos_t, double *eta_
     return 0.5 * (a * a + b * b);
 }
 
-/* One lane. With t = eta^2 - k^2 - sin^2, A = sqrt(t^2 + 4 eta^2 k^2), a = sqrt((A + t)/2):
+/* One lane. With t = eta^2 - k^2 - sin^2, A = sqrt(t^2 + 4 eta^2 k^2), a = sqrt((A +
+ * t)/2):
  *
  *   Rs = (P - Q)/(P + Q),  P = A + c^2,  Q = 2 a c
  *   Rp = Rs (U - V)/(U + V),  U = A c^2 + sin^4,  V = Q sin^2,   F = (Rs + Rp)/2
@@ -39,10 +40,8 @@ static double conductor(double c, double eta, double k, double *d_eta, double *d
         for (int j = 0; j < 2; j++) {
             const double dA = A > 0 ? (t * dt[j] + 4 * ek * dek[j]) / A : 0;
             double da = 0;
-            if (t < 0)
-                da = dek[j] * q - 0.5 * a * (dA - dt[j]) / (A - t);
-            else if (a > 0)
-                da = 0.25 * (dA + dt[j]) / a;
+            if (t < 0) da = dek[j] * q - 0.5 * a * (dA - dt[j]) / (A - t);
+            else if (a > 0) da = 0.25 * (dA + dt[j]) / a;
             const double dQ = 2 * c * da;
             /* d((P - Q)/(P + Q)) = 2 (Q dP - P dQ)/(P + Q)^2 */
             const double dRs = s_sum > 0 ? 2 * (Q * dA - P * dQ) / (s_sum * s_sum) : 0;
@@ -62,8 +61,8 @@ void imp__fresnel_conductor(double c, const imp_spec *eta, const imp_spec *k, im
     for (int i = 0; i < 3; i++) (*f)[i] = conductor(c, (*eta)[i], (*k)[i], NULL, NULL);
 }
 
-void imp__fresnel_conductor_d(double c, const imp_spec *eta, const imp_spec *k, imp_spec *f,
-                              imp_spec *df_deta, imp_spec *df_dk)
+void imp__fresnel_conductor_d(double c, const imp_spec *eta, const imp_spec *k,
+                              imp_spec *f, imp_spec *df_deta, imp_spec *df_dk)
 {
     *f = *df_deta = *df_dk = imp__spec(0);
     for (int i = 0; i < 3; i++) {

@@ -12,10 +12,12 @@
 double imp__fresnel_dielectric(double c, double eta, double *cos_t, double *eta_t);
 
 /* Conductor in vacuum, c = cosine of incidence, lane by lane. */
-void imp__fresnel_conductor(double c, const imp_spec *eta, const imp_spec *k, imp_spec *f);
+void imp__fresnel_conductor(double c, const imp_spec *eta, const imp_spec *k,
+                            imp_spec *f);
 /* With derivatives. At eta = 0 or k = 0 they are the one-sided ones: F depends on eta k
- * where the root vanishes, and a mirror (eta = 0, k = 1) must know how it could absorb. */
-void imp__fresnel_conductor_d(double c, const imp_spec *eta, const imp_spec *k, imp_spec *f,
-                              imp_spec *df_deta, imp_spec *df_dk);
+ * where the root vanishes, and a mirror (eta = 0, k = 1) must know how it could absorb.
+ */
+void imp__fresnel_conductor_d(double c, const imp_spec *eta, const imp_spec *k,
+                              imp_spec *f, imp_spec *df_deta, imp_spec *df_dk);
 
 #endif

@@ -5,34 +5,22 @@
 #include <strings.h>
 
 /* Refractive indices by name (scene-format A.2). */
-static const struct { const char *name; double n; } indices[] = {
-    {"vacuum", 1},
-    {"helium", 1.000036},
-    {"hydrogen", 1.000132},
-    {"air", 1.000277},
-    {"carbon dioxide", 1.00045},
-    {"water", 1.3330},
-    {"acetone", 1.36},
-    {"ethanol", 1.361},
-    {"carbon tetrachloride", 1.461},
-    {"glycerol", 1.4729},
-    {"benzene", 1.501},
-    {"silicone oil", 1.52045},
-    {"bromine", 1.661},
-    {"water ice", 1.31},
-    {"fused quartz", 1.458},
-    {"pyrex", 1.470},
-    {"acrylic glass", 1.49},
-    {"polypropylene", 1.49},
-    {"bk7", 1.5046},
-    {"sodium chloride", 1.544},
-    {"amber", 1.55},
-    {"pet", 1.575},
-    {"diamond", 2.419},
+static const struct {
+    const char *name;
+    double n;
+} indices[] = {
+    {"vacuum", 1},        {"helium", 1.000036},        {"hydrogen", 1.000132},
+    {"air", 1.000277},    {"carbon dioxide", 1.00045}, {"water", 1.3330},
+    {"acetone", 1.36},    {"ethanol", 1.361},          {"carbon tetrachloride", 1.461},
+    {"glycerol", 1.4729}, {"benzene", 1.501},          {"silicone oil", 1.52045},
+    {"bromine", 1.661},   {"water ice", 1.31},         {"fused quartz", 1.458},
+    {"pyrex", 1.470},     {"acrylic glass", 1.49},     {"polypropylene", 1.49},
+    {"bk7", 1.5046},      {"sodium chloride", 1.544},  {"amber", 1.55},
+    {"pet", 1.575},       {"diamond", 2.419},
 };
 
-enum imp_status imp__ior_read(const struct imp_build *b, const char *name, const char *fallback,
-                              double *ior)
+enum imp_status imp__ior_read(const struct imp_build *b, const char *name,
+                              const char *fallback, double *ior)
 {
     enum imp_status st = IMP_OK;
     const struct imp_prop *p = imp__node_prop(b->node, name);
@@ -42,7 +30,8 @@ enum imp_status imp__ior_read(const struct imp_build *b, const char *name, const
         IMP_TRY(imp__props_float(b->ctx, b->node, name, NAN, &n));
         if (!(n > 0) || !isfinite(n))
             IMP_TRY(imp__prop_error(b->ctx, b->node, p, IMP_E_SCENE,
-                                    "'%s' = %g: a refractive index is positive", name, n));
+                                    "'%s' = %g: a refractive index is positive", name,
+                                    n));
     } else {
         const char *material;
         IMP_TRY(imp__props_string(b->ctx, b->node, name, fallback, &material));

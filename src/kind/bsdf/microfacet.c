@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "microfacet.h"
 
-double imp__microfacet_d(const struct imp__microfacet *f, const imp_v3 *m, double d_log[2])
+double imp__microfacet_d(const struct imp__microfacet *f, const imp_v3 *m,
+                         double d_log[2])
 {
     const double au = f->au, av = f->av;
     const double x = (*m)[0] / au, y = (*m)[1] / av, z = (*m)[2];
@@ -64,7 +65,8 @@ static double g1_exact(const struct imp__microfacet *f, const imp_v3 *v)
     return 2 / (1 + erf(a) + exp(-a * a) / (a * sqrt(IMP_PI)));
 }
 
-double imp__microfacet_pdf(const struct imp__microfacet *f, const imp_v3 *v, const imp_v3 *m)
+double imp__microfacet_pdf(const struct imp__microfacet *f, const imp_v3 *v,
+                           const imp_v3 *m)
 {
     const double vm = imp__dot(*v, *m), D = imp__microfacet_d(f, m, NULL);
     if (!(vm > 0) || !((*v)[2] > 0)) return 0;
@@ -78,8 +80,8 @@ static double erf_inverse_start(double y)
     return copysign(sqrt(sqrt(b * b - l / 0.147) - b), y);
 }
 
-/* A draw need not be exact to the last bit, as its density is evaluated where it fell; two
- * steps of third order leave 1e-13. */
+/* A draw need not be exact to the last bit, as its density is evaluated where it fell;
+ * two steps of third order leave 1e-13. */
 static double erf_inverse(double y)
 {
     y = imp_clamp(y, -1 + 1e-16, 1 - 1e-16);
@@ -93,14 +95,14 @@ static double erf_inverse(double y)
     return x;
 }
 
-/* Inverse of the distribution function of the slope along v that is visible from v at unit
- * roughness. Its density on (-inf, cot] is g(x) (c - s x), g = exp(-x^2)/sqrt(pi), c and s
- * cosine and sine of v, up to the factor that makes it 1; the function
+/* Inverse of the distribution function of the slope along v that is visible from v at
+ * unit roughness. Its density on (-inf, cot] is g(x) (c - s x), g = exp(-x^2)/sqrt(pi), c
+ * and s cosine and sine of v, up to the factor that makes it 1; the function
  *
  *   C(x) = c (1 + erf x)/2 + s g(x)/2
  *
- * rises without flat parts. Halley's steps inside a shrinking bracket, from between the two
- * closed cases: the normal distribution (s = 0) and Rayleigh's (c = 0). */
+ * rises without flat parts. Halley's steps inside a shrinking bracket, from between the
+ * two closed cases: the normal distribution (s = 0) and Rayleigh's (c = 0). */
 static double beckmann_slope(double c, double s, double u)
 {
     const double inv_root_pi = 1 / sqrt(IMP_PI);
@@ -113,7 +115,8 @@ static double beckmann_slope(double c, double s, double u)
     for (int i = 0; i < 60; i++) {
         const double g = exp(-x * x) * inv_root_pi, t = c - s * x;
         const double r = 0.5 * (c * erfc(-x) + s * g) - target;
-        if (r > 0) hi = x; else lo = x;
+        if (r > 0) hi = x;
+        else lo = x;
         const double n = r / (t * g), step = n / (1 + n * (0.5 * s / t + x));
         double next = x - step;
         if (!(next > lo && next < hi)) next = 0.5 * (lo + hi);
@@ -124,9 +127,9 @@ static double beckmann_slope(double c, double s, double u)
     return x;
 }
 
-/* Slopes visible from v at unit roughness are an independent normal deviate across v and the
- * one above along v (Heitz and d'Eon 2014); stretching v and the slopes by the roughness
- * gives all other cases. */
+/* Slopes visible from v at unit roughness are an independent normal deviate across v and
+ * the one above along v (Heitz and d'Eon 2014); stretching v and the slopes by the
+ * roughness gives all other cases. */
 static imp_v3 beckmann_visible(const struct imp__microfacet *f, const imp_v3 *v,
                                const double u[2])
 {
@@ -134,12 +137,14 @@ static imp_v3 beckmann_visible(const struct imp__microfacet *f, const imp_v3 *v,
     const double s = hypot(w[0], w[1]);
     const double cp = s > 0 ? w[0] / s : 1, sp = s > 0 ? w[1] / s : 0;
     const double x = beckmann_slope(w[2], s, u[0]), y = erf_inverse(2 * u[1] - 1);
-    return imp__normalize(imp__v3(-f->au * (cp * x - sp * y), -f->av * (sp * x + cp * y), 1));
+    return imp__normalize(
+        imp__v3(-f->au * (cp * x - sp * y), -f->av * (sp * x + cp * y), 1));
 }
 
-/* Spherical caps (Dupuy and Benyoub 2023): mirror images of v, in the stretched space, are
- * uniform on a cap of the sphere. */
-static imp_v3 ggx_visible(const struct imp__microfacet *f, const imp_v3 *v, const double u[2])
+/* Spherical caps (Dupuy and Benyoub 2023): mirror images of v, in the stretched space,
+ * are uniform on a cap of the sphere. */
+static imp_v3 ggx_visible(const struct imp__microfacet *f, const imp_v3 *v,
+                          const double u[2])
 {
     const imp_v3 w = imp__normalize(imp__v3(f->au * (*v)[0], f->av * (*v)[1], (*v)[2]));
     const double phi = IMP_2PI * u[0], z = (1 - u[1]) * (1 + w[2]) - w[2];
@@ -153,7 +158,8 @@ imp_v3 imp__microfacet_sample(const struct imp__microfacet *f, const imp_v3 *v,
 {
     if (f->visible)
         return f->type == IMP_GGX ? ggx_visible(f, v, u) : beckmann_visible(f, v, u);
-    /* Slopes: radius from the distribution of all normals, angle uniform, then stretched. */
+    /* Slopes: radius from the distribution of all normals, angle uniform, then stretched.
+     */
     const double r2 = f->type == IMP_GGX ? u[0] / (1 - u[0]) : -log1p(-u[0]);
     const double r = sqrt(r2), phi = IMP_2PI * u[1];
     return imp__normalize(imp__v3(f->au * r * cos(phi), f->av * r * sin(phi), 1));

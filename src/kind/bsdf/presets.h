@@ -15,12 +15,12 @@ const struct imp__conductor *imp__conductor_find(const char *name);
 /* All of them, in order; NULL after the last. */
 const struct imp__conductor *imp__conductor_at(size_t i);
 
-/* The `material` property of the two conductor kinds: its numbers become the properties eta
- * and k, as if they had been written. */
+/* The `material` property of the two conductor kinds: its numbers become the properties
+ * eta and k, as if they had been written. */
 enum imp_status imp__conductor_prepare(const struct imp_build *b);
 
 /* A refractive index, written as a number or a name (any case). */
-enum imp_status imp__ior_read(const struct imp_build *b, const char *name, const char *fallback,
-                              double *ior);
+enum imp_status imp__ior_read(const struct imp_build *b, const char *name,
+                              const char *fallback, double *ior);
 
 #endif

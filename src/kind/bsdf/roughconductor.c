@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * roughconductor: mirrors of complex index as small facets (Walter et al. 2007). With h the
- * half-vector and c = wo.h = wi.h
+ * roughconductor: mirrors of complex index as small facets (Walter et al. 2007). With h
+ * the half-vector and c = wo.h = wi.h
  *
  *   f cos(theta_i) = tint F(c) D(h) G1(wi) G1(wo) / (4 cos(theta_o)),   front only
  *
- * Light that meets a second facet is lost, as in the format. Drawing a normal and mirroring
- * wo in it gives p(wi) = p(h)/(4 c). */
+ * Light that meets a second facet is lost, as in the format. Drawing a normal and
+ * mirroring wo in it gives p(wi) = p(h)/(4 c). */
 #include "fresnel.h"
 #include "microfacet.h"
 #include "presets.h"
@@ -18,21 +18,28 @@ struct rough {
     bool visible, anisotropic;
 };
 
-#define ROUGHNESS(key)                                                                     \
-    {.name = key, .role = IMP_REFLECTANCE, .flags = IMP_INPUT_SCALAR | IMP_INPUT_OPTIONAL, \
-     .fallback = 0.1, .lo = IMP_ALPHA_MIN, .hi = INFINITY, .unit = "1"}
+#define ROUGHNESS(key)                                                                   \
+    {                                                                                    \
+        .name = key, .role = IMP_REFLECTANCE,                                            \
+        .flags = IMP_INPUT_SCALAR | IMP_INPUT_OPTIONAL, .fallback = 0.1,                 \
+        .lo = IMP_ALPHA_MIN, .hi = INFINITY, .unit = "1"                                 \
+    }
 static const struct imp_input_desc inputs[] = {
     {.name = "eta", .role = IMP_UNBOUNDED, .fallback = 0, .unit = "1"},
     {.name = "k", .role = IMP_UNBOUNDED, .fallback = 1, .unit = "1"},
-    {.name = "specular_reflectance", .role = IMP_REFLECTANCE, .flags = IMP_INPUT_OPTIONAL,
-     .fallback = 1, .hi = 1, .unit = "1"},
+    {.name = "specular_reflectance",
+     .role = IMP_REFLECTANCE,
+     .flags = IMP_INPUT_OPTIONAL,
+     .fallback = 1,
+     .hi = 1,
+     .unit = "1"},
     ROUGHNESS("alpha"),
     ROUGHNESS("alpha_u"),
     ROUGHNESS("alpha_v"),
     {0}};
 
-/* One of alpha and (alpha_u, alpha_v) is there, so that it can be a parameter, and numbers
- * are not below the smallest roughness. */
+/* One of alpha and (alpha_u, alpha_v) is there, so that it can be a parameter, and
+ * numbers are not below the smallest roughness. */
 static enum imp_status prepare(const struct imp_build *b)
 {
     static const char *const names[] = {"alpha", "alpha_u", "alpha_v"};
@@ -46,7 +53,8 @@ static enum imp_status prepare(const struct imp_build *b)
         IMP_TRY(imp__node_error(b->ctx, node, IMP_E_SCENE,
                                 "give either 'alpha', or both 'alpha_u' and 'alpha_v'"));
     if (!iso && !u) {
-        struct imp_prop *p = imp__node_add(b->arena, node, "alpha", IMP_PROP_FLOAT, node->loc);
+        struct imp_prop *p =
+            imp__node_add(b->arena, node, "alpha", IMP_PROP_FLOAT, node->loc);
         if (!p) IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "out of memory"));
         p->number[0] = 0.1;
     }
@@ -70,7 +78,8 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_b
     enum imp_status st = IMP_OK;
     struct rough *r = self;
     int type;
-    IMP_TRY(imp__props_choice(b->ctx, b->node, "distribution", types, 2, IMP_BECKMANN, &type));
+    IMP_TRY(imp__props_choice(b->ctx, b->node, "distribution", types, 2, IMP_BECKMANN,
+                              &type));
     IMP_TRY(imp__props_bool(b->ctx, b->node, "sample_visible", true, &r->visible));
     r->type = (enum imp__distribution)type;
     r->anisotropic = imp__props_has(b->node, "alpha_u");
@@ -141,7 +150,8 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     const double D = imp__microfacet_d(&m, &h, dlog_D);
     const double Gi = imp__microfacet_g1(&m, &d->wi, dGi),
                  Go = imp__microfacet_g1(&m, &d->wo, dGo);
-    imp__fresnel_conductor_d(fmin(1, imp__dot(d->wo, h)), &in[ETA], &in[K], &F, &F_eta, &F_k);
+    imp__fresnel_conductor_d(fmin(1, imp__dot(d->wo, h)), &in[ETA], &in[K], &F, &F_eta,
+                             &F_k);
 
     const double c = D / (4 * d->wo[2]);
     df[TINT] = F * (c * Gi * Go);
@@ -150,12 +160,18 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     for (int j = 0; j < 2; j++) {
         const int input = r->anisotropic ? ALPHA_U + j : ALPHA;
         if (in[input][0] < IMP_ALPHA_MIN) continue;
-        df[input] += in[TINT] * F *
-                     (c * (dlog_D[j] * Gi * Go + dGi[j] * Go + Gi * dGo[j]));
+        df[input] +=
+            in[TINT] * F * (c * (dlog_D[j] * Gi * Go + dGi[j] * Go + Gi * dGo[j]));
     }
 }
 
-const struct imp_bsdf_ops imp__roughconductor = {
-    .size = sizeof(struct imp_bsdf_ops), .name = "roughconductor",
-    .object_size = sizeof(struct rough), .inputs = inputs, .prepare = prepare, .build = build,
-    .sample = sample, .eval = eval, .pdf = pdf, .eval_d = eval_d};
+const struct imp_bsdf_ops imp__roughconductor = {.size = sizeof(struct imp_bsdf_ops),
+                                                 .name = "roughconductor",
+                                                 .object_size = sizeof(struct rough),
+                                                 .inputs = inputs,
+                                                 .prepare = prepare,
+                                                 .build = build,
+                                                 .sample = sample,
+                                                 .eval = eval,
+                                                 .pdf = pdf,
+                                                 .eval_d = eval_d};

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * stam_m2: Lambert and a Phong-Blinn lobe with an ambient term (Stam 2020, App. B and C, with
- * the errata of gradients.md 3). With m the half-vector, c_m = cos(theta_m) and mo = m.wo
+ * stam_m2: Lambert and a Phong-Blinn lobe with an ambient term (Stam 2020, App. B and C,
+ * with the errata of gradients.md 3). With m the half-vector, c_m = cos(theta_m) and mo =
+ * m.wo
  *
  *   f cos(theta_i) = diffuse cos(theta_i)/pi + specular S,
  *   S = (alpha + 2)/(2 pi) c_m^(alpha + 1) / (4 mo) * V
@@ -10,8 +11,8 @@
  *       sin(theta_m)          "paper": as printed, a ring without a mirror limit (E10)
  *
  * The lobe's own sampling draws m with p_m = (alpha + 2)/(2 pi) c_m^(alpha + 1), so that
- * p(wi) = p_m/(4 mo) and S/p = V. Half-vectors with mo <= 0 and directions below the horizon
- * are structural zeros; nothing is flipped (E21). */
+ * p(wi) = p_m/(4 mo) and S/p = V. Half-vectors with mo <= 0 and directions below the
+ * horizon are structural zeros; nothing is flipped (E21). */
 #include "kind/build.h"
 #include "lambert.h"
 #include "stam.h"
@@ -29,25 +30,31 @@ static const struct imp_input_desc inputs[] = {
     IMP_STAM_AMBIENT,
     {.name = "diffuse", .role = IMP_REFLECTANCE, .fallback = 0.5, .hi = 1, .unit = "1"},
     {.name = "specular", .role = IMP_REFLECTANCE, .fallback = 0.3, .hi = 1, .unit = "1"},
-    {.name = "exponent", .role = IMP_UNBOUNDED, .flags = IMP_INPUT_SCALAR, .fallback = 20,
+    {.name = "exponent",
+     .role = IMP_UNBOUNDED,
+     .flags = IMP_INPUT_SCALAR,
+     .fallback = 20,
      .unit = "1"},
     {0}};
 
-static enum imp_status build(const struct imp_build *build, void *self, struct imp_bsdf *b)
+static enum imp_status build(const struct imp_build *build, void *self,
+                             struct imp_bsdf *b)
 {
     static const char *const variants[] = {"reciprocal", "microfacet", "paper"};
     static const char *const samplings[] = {"mixture", "cosine", "phong"};
     enum imp_status st = IMP_OK;
     struct m2 *m = self;
     int v, s;
-    IMP_TRY(imp__props_choice(build->ctx, build->node, "variant", variants, 3, RECIPROCAL, &v));
-    IMP_TRY(imp__props_choice(build->ctx, build->node, "sampling", samplings, 3, MIXTURE, &s));
+    IMP_TRY(imp__props_choice(build->ctx, build->node, "variant", variants, 3, RECIPROCAL,
+                              &v));
+    IMP_TRY(imp__props_choice(build->ctx, build->node, "sampling", samplings, 3, MIXTURE,
+                              &s));
     IMP_TRY(imp__stam_absorb_read(build, &b->absorb));
     m->variant = (enum variant)v;
     m->sampling = (enum sampling)s;
     b->flags = IMP_BSDF_SMOOTH | IMP_BSDF_EMIT;
-    /* Only V = min(1, cos_i/cos_o) takes the lobe's weight to 0 at the horizon, behind which
-     * its draws are lost; a cosine draw does not move. */
+    /* Only V = min(1, cos_i/cos_o) takes the lobe's weight to 0 at the horizon, behind
+     * which its draws are lost; a cosine draw does not move. */
     if (m->variant != RECIPROCAL && m->sampling != COSINE) b->flags |= IMP_BSDF_JUMP;
 out:
     return st;
@@ -57,7 +64,7 @@ out:
 struct half {
     imp_v3 m;
     double c_m, sin_m, mo;
-    double p;      /* p_m/(4 mo): density of the lobe's own sampling */
+    double p; /* p_m/(4 mo): density of the lobe's own sampling */
     double V;
 };
 
@@ -139,7 +146,8 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     df[EXPONENT] = in[SPECULAR] * (h.p * h.V * score(alpha, &h));
 }
 
-static void emit(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo, imp_spec *e)
+static void emit(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
+                 imp_spec *e)
 {
     (void)b;
     *e = (*wo)[2] > 0 ? in[AMBIENT] : imp__spec(0);
@@ -155,7 +163,8 @@ static void emit_d(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *w
 /* The exponent moves what the lobe draws (gradients.md 4): at fixed u
  *   d c_m = -c_m ln c_m/(alpha + 2),   d m = e_theta d theta_m,
  *   d wi = 2 ((dm.wo) m + mo dm)
- * and everything in f/p is carried along. The cosine draw does not move, its weight does. */
+ * and everything in f/p is carried along. The cosine draw does not move, its weight does.
+ */
 static bool sample_d(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
                      const struct imp_dirs *d, int j, imp_spec *dweight, imp_v3 *dwi)
 {
@@ -170,8 +179,8 @@ static bool sample_d(const struct imp_bsdf *b, const imp_spec *in, const double 
         if (h.sin_m > 0) {
             /* d theta = -dc/sin; e_theta = (cos phi c_m, sin phi c_m, -sin_m) */
             const double t = -dc / h.sin_m;
-            const imp_v3 dm = imp__v3(h.m[0] / h.sin_m * h.c_m * t,
-                                      h.m[1] / h.sin_m * h.c_m * t, dc);
+            const imp_v3 dm =
+                imp__v3(h.m[0] / h.sin_m * h.c_m * t, h.m[1] / h.sin_m * h.c_m * t, dc);
             dmo = imp__dot(dm, d->wo);
             *dwi = (h.m * dmo + dm * h.mo) * 2.0;
         }
@@ -191,8 +200,15 @@ static bool sample_d(const struct imp_bsdf *b, const imp_spec *in, const double 
     return p > 0;
 }
 
-const struct imp_bsdf_ops imp__stam_m2 = {
-    .size = sizeof(struct imp_bsdf_ops), .name = "stam_m2", .object_size = sizeof(struct m2),
-    .inputs = inputs, .build = build,
-    .sample = sample, .eval = eval, .pdf = pdf, .eval_d = eval_d,
-    .emit = emit, .emit_d = emit_d, .sample_d = sample_d};
+const struct imp_bsdf_ops imp__stam_m2 = {.size = sizeof(struct imp_bsdf_ops),
+                                          .name = "stam_m2",
+                                          .object_size = sizeof(struct m2),
+                                          .inputs = inputs,
+                                          .build = build,
+                                          .sample = sample,
+                                          .eval = eval,
+                                          .pdf = pdf,
+                                          .eval_d = eval_d,
+                                          .emit = emit,
+                                          .emit_d = emit_d,
+                                          .sample_d = sample_d};

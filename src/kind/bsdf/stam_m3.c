@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * stam_m3: Lambert with an ambient term that acts as emission (Stam 2020, App. C; controls
- * theta_6, theta_7 of gradients.md 2.1). `absorb` is the chance that a walk of integrator
- * `stam` ends here: it is sampling, no expectation depends on it. */
+ * stam_m3: Lambert with an ambient term that acts as emission (Stam 2020, App. C;
+ * controls theta_6, theta_7 of gradients.md 2.1). `absorb` is the chance that a walk of
+ * integrator `stam` ends here: it is sampling, no expectation depends on it. */
 #include "kind/build.h"
 #include "lambert.h"
 #include "stam.h"
@@ -14,7 +14,8 @@ static const struct imp_input_desc inputs[] = {
     {.name = "diffuse", .role = IMP_REFLECTANCE, .fallback = 0.5, .hi = 1, .unit = "1"},
     {0}};
 
-static enum imp_status build(const struct imp_build *build, void *self, struct imp_bsdf *b)
+static enum imp_status build(const struct imp_build *build, void *self,
+                             struct imp_bsdf *b)
 {
     (void)self;
     b->flags = IMP_BSDF_SMOOTH | IMP_BSDF_EMIT;
@@ -48,7 +49,8 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     df[AMBIENT] = imp__spec(0);
     df[DIFFUSE] = imp__spec(imp__lambert(d));
 }
-static void emit(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo, imp_spec *e)
+static void emit(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
+                 imp_spec *e)
 {
     (void)b;
     *e = (*wo)[2] > 0 ? in[AMBIENT] : imp__spec(0);
@@ -61,7 +63,13 @@ static void emit_d(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *w
     de[DIFFUSE] = imp__spec(0);
 }
 
-const struct imp_bsdf_ops imp__stam_m3 = {
-    .size = sizeof(struct imp_bsdf_ops), .name = "stam_m3", .inputs = inputs, .build = build,
-    .sample = sample, .eval = eval, .pdf = pdf, .eval_d = eval_d,
-    .emit = emit, .emit_d = emit_d};
+const struct imp_bsdf_ops imp__stam_m3 = {.size = sizeof(struct imp_bsdf_ops),
+                                          .name = "stam_m3",
+                                          .inputs = inputs,
+                                          .build = build,
+                                          .sample = sample,
+                                          .eval = eval,
+                                          .pdf = pdf,
+                                          .eval_d = eval_d,
+                                          .emit = emit,
+                                          .emit_d = emit_d};

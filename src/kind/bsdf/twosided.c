@@ -1,16 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * twosided: seen from behind, the second child (or the only one) is turned over: the mirror
- * z -> -z is applied to both directions. */
+ * twosided: seen from behind, the second child (or the only one) is turned over: the
+ * mirror z -> -z is applied to both directions. */
 #include "kind/build.h"
 #include "math/vec.h"
 
-static enum imp_status build(const struct imp_build *build, void *self, struct imp_bsdf *b)
+static enum imp_status build(const struct imp_build *build, void *self,
+                             struct imp_bsdf *b)
 {
     enum imp_status st = IMP_OK;
     bool allow;
     (void)self;
-    IMP_TRY(imp__props_bool(build->ctx, build->node, "allow_transmission", false, &allow));
+    IMP_TRY(
+        imp__props_bool(build->ctx, build->node, "allow_transmission", false, &allow));
     b->flags = 0;
     b->absorb = 0;
     for (int k = 0; k < b->n_child; k++) {
@@ -76,7 +78,8 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     for (int j = 0; j < b->n_in; j++) df[j] = imp__spec(0);
     c->ops->eval_d(c, in + first, &e, df + first);
 }
-static void emit(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo, imp_spec *e)
+static void emit(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
+                 imp_spec *e)
 {
     bool back;
     int first;
@@ -119,9 +122,17 @@ static void albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *w
 
 static const struct imp_input_desc inputs[] = {{0}};
 
-const struct imp_bsdf_ops imp__twosided = {
-    .size = sizeof(struct imp_bsdf_ops), .name = "twosided", .inputs = inputs,
-    .min_children = 1, .max_children = 2, .build = build,
-    .sample = sample, .eval = eval, .pdf = pdf, .eval_d = eval_d,
-    .emit = emit, .emit_d = emit_d, .sample_d = sample_d,
-    .albedo = albedo};
+const struct imp_bsdf_ops imp__twosided = {.size = sizeof(struct imp_bsdf_ops),
+                                           .name = "twosided",
+                                           .inputs = inputs,
+                                           .min_children = 1,
+                                           .max_children = 2,
+                                           .build = build,
+                                           .sample = sample,
+                                           .eval = eval,
+                                           .pdf = pdf,
+                                           .eval_d = eval_d,
+                                           .emit = emit,
+                                           .emit_d = emit_d,
+                                           .sample_d = sample_d,
+                                           .albedo = albedo};

@@ -9,9 +9,11 @@
 enum { RADIANCE };
 
 static const struct imp_input_desc area_inputs[] = {
-    {.name = "radiance", .role = IMP_EMISSION, .fallback = 1, .unit = "W m^-2 sr^-1"}, {0}};
+    {.name = "radiance", .role = IMP_EMISSION, .fallback = 1, .unit = "W m^-2 sr^-1"},
+    {0}};
 static const struct imp_input_desc stam_inputs[] = {
-    {.name = "emission", .role = IMP_EMISSION, .fallback = 1, .unit = "W m^-2 sr^-1"}, {0}};
+    {.name = "emission", .role = IMP_EMISSION, .fallback = 1, .unit = "W m^-2 sr^-1"},
+    {0}};
 
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_emitter *e)
 {
@@ -29,8 +31,8 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_e
     return IMP_OK;
 }
 
-static void eval(const struct imp_emitter *e, const imp_spec *in, const struct imp_emission *x,
-                 imp_spec *le)
+static void eval(const struct imp_emitter *e, const imp_spec *in,
+                 const struct imp_emission *x, imp_spec *le)
 {
     (void)e;
     *le = x->cos_light > 0 ? in[RADIANCE] : imp__spec(0);
@@ -53,11 +55,21 @@ static double pdf(const struct imp_emitter *e, const imp_v3 *ref, const imp_v3 *
     return e->shape->ops->pdf_toward(e->shape, ref, hit, at);
 }
 
-const struct imp_emitter_ops imp__area = {
-    .size = sizeof(struct imp_emitter_ops), .name = "area", .flags = IMP_EMITTER_AREA,
-    .inputs = area_inputs, .build = build, .eval = eval, .eval_d = eval_d, .sample = sample,
-    .pdf = pdf};
-const struct imp_emitter_ops imp__stam_m1 = {
-    .size = sizeof(struct imp_emitter_ops), .name = "stam_m1", .flags = IMP_EMITTER_AREA,
-    .inputs = stam_inputs, .build = build, .eval = eval, .eval_d = eval_d, .sample = sample,
-    .pdf = pdf};
+const struct imp_emitter_ops imp__area = {.size = sizeof(struct imp_emitter_ops),
+                                          .name = "area",
+                                          .flags = IMP_EMITTER_AREA,
+                                          .inputs = area_inputs,
+                                          .build = build,
+                                          .eval = eval,
+                                          .eval_d = eval_d,
+                                          .sample = sample,
+                                          .pdf = pdf};
+const struct imp_emitter_ops imp__stam_m1 = {.size = sizeof(struct imp_emitter_ops),
+                                             .name = "stam_m1",
+                                             .flags = IMP_EMITTER_AREA,
+                                             .inputs = stam_inputs,
+                                             .build = build,
+                                             .eval = eval,
+                                             .eval_d = eval_d,
+                                             .sample = sample,
+                                             .pdf = pdf};

@@ -7,7 +7,8 @@
 enum { RADIANCE };
 
 static const struct imp_input_desc inputs[] = {
-    {.name = "radiance", .role = IMP_EMISSION, .fallback = 1, .unit = "W m^-2 sr^-1"}, {0}};
+    {.name = "radiance", .role = IMP_EMISSION, .fallback = 1, .unit = "W m^-2 sr^-1"},
+    {0}};
 
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_emitter *e)
 {
@@ -18,8 +19,8 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_e
     return IMP_OK;
 }
 
-static void eval(const struct imp_emitter *e, const imp_spec *in, const struct imp_emission *x,
-                 imp_spec *le)
+static void eval(const struct imp_emitter *e, const imp_spec *in,
+                 const struct imp_emission *x, imp_spec *le)
 {
     (void)e, (void)x;
     *le = in[RADIANCE];
@@ -34,8 +35,10 @@ static bool sample(const struct imp_emitter *e, const imp_v3 *ref, const double 
                    struct imp_light_sample *out)
 {
     (void)e, (void)ref;
-    *out = (struct imp_light_sample){.wi = imp__uniform_sphere(u), .dist = INFINITY,
-                                     .pdf = IMP_INV_PI / 4, .cos_light = 1};
+    *out = (struct imp_light_sample){.wi = imp__uniform_sphere(u),
+                                     .dist = INFINITY,
+                                     .pdf = IMP_INV_PI / 4,
+                                     .cos_light = 1};
     return true;
 }
 static double pdf(const struct imp_emitter *e, const imp_v3 *ref, const imp_v3 *wi,
@@ -45,7 +48,12 @@ static double pdf(const struct imp_emitter *e, const imp_v3 *ref, const imp_v3 *
     return IMP_INV_PI / 4;
 }
 
-const struct imp_emitter_ops imp__constant = {
-    .size = sizeof(struct imp_emitter_ops), .name = "constant",
-    .flags = IMP_EMITTER_ENVIRONMENT, .inputs = inputs, .build = build, .eval = eval,
-    .eval_d = eval_d, .sample = sample, .pdf = pdf};
+const struct imp_emitter_ops imp__constant = {.size = sizeof(struct imp_emitter_ops),
+                                              .name = "constant",
+                                              .flags = IMP_EMITTER_ENVIRONMENT,
+                                              .inputs = inputs,
+                                              .build = build,
+                                              .eval = eval,
+                                              .eval_d = eval_d,
+                                              .sample = sample,
+                                              .pdf = pdf};

@@ -3,10 +3,10 @@
  * The lights: one line a kind. */
 #include "kind/build.h"
 
-#define EMITTERS(X)                                                                        \
-    X(imp__area)                                                                           \
-    X(imp__stam_m1)                                                                        \
-    X(imp__point_light)                                                                    \
+#define EMITTERS(X)                                                                      \
+    X(imp__area)                                                                         \
+    X(imp__stam_m1)                                                                      \
+    X(imp__point_light)                                                                  \
     X(imp__constant)
 
 #define DECLARE(kind) extern const struct imp_emitter_ops kind;

@@ -6,7 +6,9 @@
 
 enum { INTENSITY };
 
-struct point { imp_v3 position; };
+struct point {
+    imp_v3 position;
+};
 
 static const struct imp_input_desc inputs[] = {
     {.name = "intensity", .role = IMP_EMISSION, .fallback = 1, .unit = "W sr^-1"}, {0}};
@@ -34,8 +36,8 @@ out:
     return st;
 }
 
-static void eval(const struct imp_emitter *e, const imp_spec *in, const struct imp_emission *x,
-                 imp_spec *le)
+static void eval(const struct imp_emitter *e, const imp_spec *in,
+                 const struct imp_emission *x, imp_spec *le)
 {
     (void)e;
     *le = in[INTENSITY] * (1 / (x->dist * x->dist));
@@ -55,8 +57,12 @@ static bool sample(const struct imp_emitter *e, const imp_v3 *ref, const double 
     const double r = imp__length(d);
     /* 1/r^2 has to be a number. */
     if (!(r > 1e-150 && r < INFINITY)) return false;
-    *out = (struct imp_light_sample){.wi = d * (1 / r), .dist = r, .pdf = 1, .cos_light = 1,
-                                     .p = p->position, .ng = d * (-1 / r)};
+    *out = (struct imp_light_sample){.wi = d * (1 / r),
+                                     .dist = r,
+                                     .pdf = 1,
+                                     .cos_light = 1,
+                                     .p = p->position,
+                                     .ng = d * (-1 / r)};
     return true;
 }
 /* No ray meets a point by chance. */
@@ -67,7 +73,13 @@ static double pdf(const struct imp_emitter *e, const imp_v3 *ref, const imp_v3 *
     return 0;
 }
 
-const struct imp_emitter_ops imp__point_light = {
-    .size = sizeof(struct imp_emitter_ops), .name = "point", .object_size = sizeof(struct point),
-    .flags = IMP_EMITTER_DELTA, .inputs = inputs, .build = build, .eval = eval,
-    .eval_d = eval_d, .sample = sample, .pdf = pdf};
+const struct imp_emitter_ops imp__point_light = {.size = sizeof(struct imp_emitter_ops),
+                                                 .name = "point",
+                                                 .object_size = sizeof(struct point),
+                                                 .flags = IMP_EMITTER_DELTA,
+                                                 .inputs = inputs,
+                                                 .build = build,
+                                                 .eval = eval,
+                                                 .eval_d = eval_d,
+                                                 .sample = sample,
+                                                 .pdf = pdf};

@@ -10,8 +10,8 @@
 #define IMP_FILTER_RADIUS_MAX 64.0
 
 /* Read a length in pixels, in (0, limit]. */
-enum imp_status imp__filter_size(const struct imp_build *b, const char *name, double fallback,
-                                 double limit, double *out);
+enum imp_status imp__filter_size(const struct imp_build *b, const char *name,
+                                 double fallback, double limit, double *out);
 
 /* The filter that a node describes; NULL: the default gaussian. The build's node is not
  * looked at. Everything in the node has been asked for, or it is an error. */

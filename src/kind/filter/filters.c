@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The reconstruction filters: one line a kind; and making one from its node. */
+#include "filter.h"
 #include <stdio.h>
 #include <string.h>
-#include "filter.h"
 
-#define FILTERS(X)                                                                         \
-    X(imp__box)                                                                            \
-    X(imp__tent)                                                                           \
+#define FILTERS(X)                                                                       \
+    X(imp__box)                                                                          \
+    X(imp__tent)                                                                         \
     X(imp__gaussian)
 
 #define DECLARE(kind) extern const struct imp_filter_ops kind;
@@ -15,16 +15,17 @@ FILTERS(DECLARE)
 #define ADDRESS(kind) &kind,
 const struct imp_filter_ops *const imp__filter_kinds[] = {FILTERS(ADDRESS) NULL};
 
-enum imp_status imp__filter_size(const struct imp_build *b, const char *name, double fallback,
-                                 double limit, double *out)
+enum imp_status imp__filter_size(const struct imp_build *b, const char *name,
+                                 double fallback, double limit, double *out)
 {
     double v;
     const enum imp_status st = imp__props_float(b->ctx, b->node, name, fallback, &v);
     if (st != IMP_OK) return st;
     /* Below this a sample could miss every pixel centre by rounding. */
     if (!(v >= 1e-3 && v <= limit))
-        return imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, name), IMP_E_SCENE,
-                               "%s = %g is outside [0.001, %g]", name, v, limit);
+        return imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, name),
+                               IMP_E_SCENE, "%s = %g is outside [0.001, %g]", name, v,
+                               limit);
     *out = v;
     return IMP_OK;
 }
@@ -44,10 +45,12 @@ enum imp_status imp__filter_build(const struct imp_build *b, struct imp_node *no
     }
     own.node = node;
     for (int i = 0; imp__filter_kinds[i] && !f.ops; i++)
-        if (strcmp(imp__filter_kinds[i]->name, node->type) == 0) f.ops = imp__filter_kinds[i];
+        if (strcmp(imp__filter_kinds[i]->name, node->type) == 0)
+            f.ops = imp__filter_kinds[i];
     for (int i = 0; imp__filter_kinds[i] && !f.ops; i++) {
         const size_t n = strlen(list);
-        snprintf(list + n, sizeof list - n, "%s%s", i ? ", " : "", imp__filter_kinds[i]->name);
+        snprintf(list + n, sizeof list - n, "%s%s", i ? ", " : "",
+                 imp__filter_kinds[i]->name);
     }
     if (!f.ops)
         IMP_TRY(imp__node_error(b->ctx, node, IMP_E_UNSUPPORTED,

@@ -1,10 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * gaussian: exp(-x^2 / 2 sigma^2), lowered so that it is zero at its radius of 4 sigma. */
-#include <math.h>
+ * gaussian: exp(-x^2 / 2 sigma^2), lowered so that it is zero at its radius of 4 sigma.
+ */
 #include "filter.h"
+#include <math.h>
 
-struct gaussian { double inv_2_sigma2, at_radius; };
+struct gaussian {
+    double inv_2_sigma2, at_radius;
+};
 
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_filter *f)
 {
@@ -24,6 +27,8 @@ static double eval(const struct imp_filter *f, double x)
     return fmax(0, exp(-x * x * g->inv_2_sigma2) - g->at_radius);
 }
 
-const struct imp_filter_ops imp__gaussian = {
-    .size = sizeof(struct imp_filter_ops), .name = "gaussian",
-    .object_size = sizeof(struct gaussian), .build = build, .eval = eval};
+const struct imp_filter_ops imp__gaussian = {.size = sizeof(struct imp_filter_ops),
+                                             .name = "gaussian",
+                                             .object_size = sizeof(struct gaussian),
+                                             .build = build,
+                                             .eval = eval};

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * tent: max(0, 1 - |x|/r). */
-#include <math.h>
 #include "filter.h"
+#include <math.h>
 
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_filter *f)
 {

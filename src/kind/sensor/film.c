@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "film.h"
 #include "base/compiler.h"
+#include "kind/filter/filter.h"
 #include <string.h>
 #include <strings.h>
-#include "kind/filter/filter.h"
 
 /* Sides and pixels of the full film: beyond any picture, within int and double. */
-#define SIDE_MAX 1000000
+#define SIDE_MAX   1000000
 #define PIXELS_MAX ((int64_t)1 << 31)
 
 /* As imp__props_choice, but any case: scene files spell these as they like. */
@@ -31,15 +31,17 @@ static enum imp_status choice(const struct imp_build *b, const char *name,
 static enum imp_status size_read(const struct imp_build *b, struct imp_film_desc *f)
 {
     enum imp_status st = IMP_OK;
-    const struct { const char *name; int64_t lo; } fields[6] = {
-        {"width", 1}, {"height", 1}, {"crop_offset_x", 0}, {"crop_offset_y", 0},
-        {"crop_width", 1}, {"crop_height", 1}};
+    const struct {
+        const char *name;
+        int64_t lo;
+    } fields[6] = {{"width", 1},         {"height", 1},     {"crop_offset_x", 0},
+                   {"crop_offset_y", 0}, {"crop_width", 1}, {"crop_height", 1}};
     int64_t v[6] = {768, 576, 0, 0, 0, 0};
 
     for (int i = 0; i < 6; i++) {
         if (i >= 4) v[i] = v[i - 4]; /* the crop window is the whole film */
-        IMP_TRY(imp__props_int(b->ctx, b->node, fields[i].name, v[i], fields[i].lo, SIDE_MAX,
-                               &v[i]));
+        IMP_TRY(imp__props_int(b->ctx, b->node, fields[i].name, v[i], fields[i].lo,
+                               SIDE_MAX, &v[i]));
     }
     if (v[0] * v[1] > PIXELS_MAX)
         IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_SCENE,
@@ -47,10 +49,10 @@ static enum imp_status size_read(const struct imp_build *b, struct imp_film_desc
                                 (long long)v[1]));
     for (int i = 0; i < 2; i++)
         if (v[2 + i] + v[4 + i] > v[i])
-            IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_SCENE,
-                                    "the crop window ends at %s %lld of a film of %lld pixels",
-                                    i ? "row" : "column", (long long)(v[2 + i] + v[4 + i]),
-                                    (long long)v[i]));
+            IMP_TRY(imp__node_error(
+                b->ctx, b->node, IMP_E_SCENE,
+                "the crop window ends at %s %lld of a film of %lld pixels",
+                i ? "row" : "column", (long long)(v[2 + i] + v[4 + i]), (long long)v[i]));
     f->width = (int)v[0];
     f->height = (int)v[1];
     f->crop_x = (int)v[2];
@@ -64,17 +66,20 @@ out:
 static enum imp_status format_read(const struct imp_build *b, struct imp_film_desc *f)
 {
     static const char *const files[] = {"openexr", "exr", "rgbe", "pfm"};
-    static const char *const pixels[] = {
-        [IMP_PIXEL_LUMINANCE] = "luminance", [IMP_PIXEL_LUMINANCE_ALPHA] = "luminance_alpha",
-        [IMP_PIXEL_RGB] = "rgb", [IMP_PIXEL_RGBA] = "rgba", [IMP_PIXEL_XYZ] = "xyz",
-        [IMP_PIXEL_XYZA] = "xyza"};
+    static const char *const pixels[] = {[IMP_PIXEL_LUMINANCE] = "luminance",
+                                         [IMP_PIXEL_LUMINANCE_ALPHA] = "luminance_alpha",
+                                         [IMP_PIXEL_RGB] = "rgb",
+                                         [IMP_PIXEL_RGBA] = "rgba",
+                                         [IMP_PIXEL_XYZ] = "xyz",
+                                         [IMP_PIXEL_XYZA] = "xyza"};
     static const char *const components[] = {"float16", "float32", "uint32"};
     enum imp_status st = IMP_OK;
     int file, pixel, component;
 
     IMP_TRY(choice(b, "file_format", files, imp_count(files), 0, &file));
     IMP_TRY(choice(b, "pixel_format", pixels, imp_count(pixels), IMP_PIXEL_RGB, &pixel));
-    IMP_TRY(choice(b, "component_format", components, imp_count(components), 0, &component));
+    IMP_TRY(
+        choice(b, "component_format", components, imp_count(components), 0, &component));
     f->file_format = file <= 1 ? "openexr" : files[file];
     f->pixel_format = (enum imp_pixel_format)pixel;
     f->half = component == 0;
@@ -96,7 +101,8 @@ static enum imp_status filter_read(const struct imp_build *b, struct imp_film_de
         struct imp_child *c = &b->node->children[i];
         if (!c->node || strcmp(c->node->tag, "rfilter") != 0) continue;
         if (filter)
-            return imp__node_error(b->ctx, c->node, IMP_E_SCENE, "the film has two filters");
+            return imp__node_error(b->ctx, c->node, IMP_E_SCENE,
+                                   "the film has two filters");
         filter = c->node;
         c->used = true;
     }
@@ -113,7 +119,8 @@ enum imp_status imp__film_desc_build(const struct imp_build *b, struct imp_film_
     if (!own.node) {
         own.node = imp__node_create(b->arena, "film", "hdrfilm", NULL, NULL,
                                     (struct imp_loc){0});
-        if (!own.node) IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "out of memory for a film"));
+        if (!own.node)
+            IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "out of memory for a film"));
     }
     if (strcmp(own.node->type, "hdrfilm") != 0)
         IMP_TRY(imp__node_error(b->ctx, own.node, IMP_E_UNSUPPORTED,

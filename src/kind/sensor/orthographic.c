@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Parallel rays along +z from (1 - 2 px/W, (1 - 2 py/H)/a, near): the picture spans [-1, 1]
- * across, and to_world may scale that (scene-format 9). */
+ * Parallel rays along +z from (1 - 2 px/W, (1 - 2 py/H)/a, near): the picture spans [-1,
+ * 1] across, and to_world may scale that (scene-format 9). */
 #include "projection.h"
 
 struct orthographic {
@@ -28,6 +28,9 @@ static void ray(const struct imp_sensor *s, double px, double py, const double l
                         imp__v3(0, 0, 1), out);
 }
 
-const struct imp_sensor_ops imp__orthographic = {
-    .size = sizeof(struct imp_sensor_ops), .name = "orthographic",
-    .object_size = sizeof(struct orthographic), .build = build, .ray = ray};
+const struct imp_sensor_ops imp__orthographic = {.size = sizeof(struct imp_sensor_ops),
+                                                 .name = "orthographic",
+                                                 .object_size =
+                                                     sizeof(struct orthographic),
+                                                 .build = build,
+                                                 .ray = ray};

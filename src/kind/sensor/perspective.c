@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A pinhole: the ray through film position (px, py) runs along
- * (t (1 - 2X), (t/a)(1 - 2Y), 1), X = px/W + offset_x, Y = py/H + offset_y (scene-format 9). */
+ * (t (1 - 2X), (t/a)(1 - 2Y), 1), X = px/W + offset_x, Y = py/H + offset_y (scene-format
+ * 9). */
 #include "projection.h"
 
 struct perspective {
@@ -37,6 +38,8 @@ static void ray(const struct imp_sensor *s, double px, double py, const double l
                         imp__v3(p->x0 + px * p->dx, p->y0 + py * p->dy, 1), out);
 }
 
-const struct imp_sensor_ops imp__perspective = {
-    .size = sizeof(struct imp_sensor_ops), .name = "perspective",
-    .object_size = sizeof(struct perspective), .build = build, .ray = ray};
+const struct imp_sensor_ops imp__perspective = {.size = sizeof(struct imp_sensor_ops),
+                                                .name = "perspective",
+                                                .object_size = sizeof(struct perspective),
+                                                .build = build,
+                                                .ray = ray};

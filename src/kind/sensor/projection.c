@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "projection.h"
+#include "base/compiler.h"
 #include <string.h>
 #include <strings.h>
-#include "base/compiler.h"
 
 static enum imp_status placement_read(const struct imp_build *b, bool rigid,
                                       struct imp_mat4 *out)
@@ -16,7 +16,8 @@ static enum imp_status placement_read(const struct imp_build *b, bool rigid,
         IMP_TRY(imp__prop_error(b->ctx, b->node, prop, IMP_E_SCENE,
                                 "to_world is not finite and affine"));
     if (!imp__mat4_inverse(&m, &inverse))
-        IMP_TRY(imp__prop_error(b->ctx, b->node, prop, IMP_E_SCENE, "to_world is singular"));
+        IMP_TRY(
+            imp__prop_error(b->ctx, b->node, prop, IMP_E_SCENE, "to_world is singular"));
     /* Rigid up to mirroring: M M^T = 1. */
     for (int i = 0; rigid && i < 3; i++)
         for (int j = 0; j <= i; j++) {
@@ -48,20 +49,21 @@ enum imp_status imp__projection_build(const struct imp_build *b, bool rigid,
                                 p.near_clip));
     if (!(p.far_clip > p.near_clip))
         IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "far_clip"),
-                                IMP_E_SCENE, "far_clip = %g must be greater than near_clip = %g",
+                                IMP_E_SCENE,
+                                "far_clip = %g must be greater than near_clip = %g",
                                 p.far_clip, p.near_clip));
     IMP_TRY(imp__props_float(b->ctx, b->node, "focus_distance", p.far_clip,
                              &p.focus_distance));
     if (!(p.focus_distance > 0))
-        IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "focus_distance"),
-                                IMP_E_SCENE, "focus_distance = %g must be greater than 0",
-                                p.focus_distance));
+        IMP_TRY(imp__prop_error(
+            b->ctx, b->node, imp__node_prop(b->node, "focus_distance"), IMP_E_SCENE,
+            "focus_distance = %g must be greater than 0", p.focus_distance));
     IMP_TRY(imp__props_float(b->ctx, b->node, "shutter_open", 0, &open));
     IMP_TRY(imp__props_float(b->ctx, b->node, "shutter_close", 0, &close));
     if (close < open)
-        IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "shutter_close"),
-                                IMP_E_SCENE, "shutter_close = %g comes before shutter_open = %g",
-                                close, open));
+        IMP_TRY(imp__prop_error(
+            b->ctx, b->node, imp__node_prop(b->node, "shutter_close"), IMP_E_SCENE,
+            "shutter_close = %g comes before shutter_open = %g", close, open));
     *out = p;
 out:
     return st;
@@ -109,19 +111,22 @@ enum imp_status imp__fov_build(const struct imp_build *b, double a, double *tan_
         for (axis = 0; axis <= LARGER && strcasecmp(axes[axis], text) != 0;) axis++;
         if (axis > LARGER)
             IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "fov_axis"),
-                                    IMP_E_SCENE, "fov_axis = '%s': must be one of x, y, "
-                                    "diagonal, smaller, larger", text));
+                                    IMP_E_SCENE,
+                                    "fov_axis = '%s': must be one of x, y, "
+                                    "diagonal, smaller, larger",
+                                    text));
         if (!(fov > 0 && fov < 180))
             IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "fov"),
                                     IMP_E_SCENE, "fov = %g is outside (0, 180)", fov));
         tan_half = tan(fov * (IMP_PI / 360));
-    } else { /* the diagonal of a 36 x 24 mm picture; fov_axis then is an unused property */
+    } else { /* the diagonal of a 36 x 24 mm picture; fov_axis then is an unused property
+              */
         double f = 0;
         IMP_TRY(imp__props_string(b->ctx, b->node, "focal_length", "50mm", &text));
         if (!millimetres_parse(text, &f))
-            IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "focal_length"),
-                                    IMP_E_SCENE, "focal_length = '%s': must be like '50mm'",
-                                    text));
+            IMP_TRY(imp__prop_error(b->ctx, b->node,
+                                    imp__node_prop(b->node, "focal_length"), IMP_E_SCENE,
+                                    "focal_length = '%s': must be like '50mm'", text));
         tan_half = sqrt(36.0 * 36 + 24.0 * 24) / (2 * f);
     }
     if (axis == SMALLER) axis = a > 1 ? Y : X;
@@ -132,8 +137,10 @@ enum imp_status imp__fov_build(const struct imp_build *b, double a, double *tan_
     if (!(tan_half > 1e-12 && tan_half < 1e12))
         IMP_TRY(imp__prop_error(b->ctx, b->node,
                                 imp__node_prop(b->node, by_fov ? "fov" : "focal_length"),
-                                IMP_E_SCENE, "the horizontal field of view, %g degrees, is "
-                                "outside (0, 180)", atan(tan_half) * (360 / IMP_PI)));
+                                IMP_E_SCENE,
+                                "the horizontal field of view, %g degrees, is "
+                                "outside (0, 180)",
+                                atan(tan_half) * (360 / IMP_PI)));
     *tan_half_x = tan_half;
 out:
     return st;

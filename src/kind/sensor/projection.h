@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What the projective sensors share: placement, clipping planes, shutter, field of view. */
+ * What the projective sensors share: placement, clipping planes, shutter, field of view.
+ */
 #ifndef IMP_KIND_PROJECTION_H
 #define IMP_KIND_PROJECTION_H
 
@@ -12,17 +13,18 @@ struct imp_projection {
     double near_clip, far_clip, focus_distance;
 };
 
-/* to_world, near_clip, far_clip, focus_distance and the shutter (accepted: nothing moves).
- * `rigid`: a scale in to_world is an error (tolerance 1e-3). */
+/* to_world, near_clip, far_clip, focus_distance and the shutter (accepted: nothing
+ * moves). `rigid`: a scale in to_world is an error (tolerance 1e-3). */
 enum imp_status imp__projection_build(const struct imp_build *b, bool rigid,
                                       struct imp_projection *out);
 
-/* tan of half the horizontal field of view, from fov and fov_axis, or focal_length; aspect
- * is width/height of the full film (scene-format 9). */
-enum imp_status imp__fov_build(const struct imp_build *b, double aspect, double *tan_half_x);
+/* tan of half the horizontal field of view, from fov and fov_axis, or focal_length;
+ * aspect is width/height of the full film (scene-format 9). */
+enum imp_status imp__fov_build(const struct imp_build *b, double aspect,
+                               double *tan_half_x);
 
-/* A ray through local point o along v (v_z > 0), starting on the near plane: t is measured
- * from there. */
+/* A ray through local point o along v (v_z > 0), starting on the near plane: t is
+ * measured from there. */
 static inline void imp__projection_ray(const struct imp_projection *p, imp_v3 o, imp_v3 v,
                                        struct imp_sensor_ray *out)
 {

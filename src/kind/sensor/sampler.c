@@ -2,9 +2,9 @@
  *
  * Samplers. All of them mean independent samples here, of which there are as many as the
  * kind rounds up to, so that a file costs the same everywhere (scene-format 10). */
-#include <string.h>
 #include "base/compiler.h"
 #include "film.h"
+#include <string.h>
 
 #define SPP_MAX ((int64_t)1 << 30)
 
@@ -66,11 +66,13 @@ enum imp_status imp__sampler_build(const struct imp_build *b, int *spp)
         *spp = 4;
         return IMP_OK;
     }
-    while (kind < imp_count(kinds) && strcmp(kinds[kind].name, b->node->type) != 0) kind++;
+    while (kind < imp_count(kinds) && strcmp(kinds[kind].name, b->node->type) != 0)
+        kind++;
     if (kind == imp_count(kinds))
-        IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_UNSUPPORTED,
-                                "no such sampler in this version; there are: independent, "
-                                "stratified, multijitter, orthogonal, ldsampler"));
+        IMP_TRY(
+            imp__node_error(b->ctx, b->node, IMP_E_UNSUPPORTED,
+                            "no such sampler in this version; there are: independent, "
+                            "stratified, multijitter, orthogonal, ldsampler"));
     IMP_TRY(imp__props_int(b->ctx, b->node, "sample_count", 4, 1, SPP_MAX, &count));
     IMP_TRY(imp__props_int(b->ctx, b->node, "seed", 0, 0, INT64_MAX, &ignored));
     if (kinds[kind].jitter)

@@ -3,9 +3,9 @@
  * The sensors: one line a kind. */
 #include "kind/build.h"
 
-#define SENSORS(X)                                                                         \
-    X(imp__perspective)                                                                    \
-    X(imp__thinlens)                                                                       \
+#define SENSORS(X)                                                                       \
+    X(imp__perspective)                                                                  \
+    X(imp__thinlens)                                                                     \
     X(imp__orthographic)
 
 #define DECLARE(kind) extern const struct imp_sensor_ops kind;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A thin lens: rays of one film position start anywhere on the aperture and meet where the
- * pinhole's ray reaches z = focus_distance (scene-format 9). */
+ * A thin lens: rays of one film position start anywhere on the aperture and meet where
+ * the pinhole's ray reaches z = focus_distance (scene-format 9). */
 #include "math/warp.h"
 #include "projection.h"
 
@@ -21,12 +21,13 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
     IMP_TRY(imp__projection_build(b, true, &p->projection));
     IMP_TRY(imp__fov_build(b, a, &t));
     if (!imp__props_has(b->node, "aperture_radius"))
-        IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_SCENE, "aperture_radius is missing"));
+        IMP_TRY(
+            imp__node_error(b->ctx, b->node, IMP_E_SCENE, "aperture_radius is missing"));
     IMP_TRY(imp__props_float(b->ctx, b->node, "aperture_radius", 0, &p->aperture_radius));
     if (p->aperture_radius < 0)
-        IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "aperture_radius"),
-                                IMP_E_SCENE, "aperture_radius = %g is negative",
-                                p->aperture_radius));
+        IMP_TRY(imp__prop_error(b->ctx, b->node,
+                                imp__node_prop(b->node, "aperture_radius"), IMP_E_SCENE,
+                                "aperture_radius = %g is negative", p->aperture_radius));
     p->x0 = t;
     p->dx = -2 * t / w;
     p->y0 = t / a;
@@ -42,11 +43,13 @@ static void ray(const struct imp_sensor *s, double px, double py, const double l
     double xy[2];
     imp__concentric_disk(lens, xy);
     const imp_v3 o = imp__v3(p->aperture_radius * xy[0], p->aperture_radius * xy[1], 0);
-    const imp_v3 focus = imp__v3(p->x0 + px * p->dx, p->y0 + py * p->dy, 1) *
-                         p->projection.focus_distance;
+    const imp_v3 focus =
+        imp__v3(p->x0 + px * p->dx, p->y0 + py * p->dy, 1) * p->projection.focus_distance;
     imp__projection_ray(&p->projection, o, focus - o, out);
 }
 
-const struct imp_sensor_ops imp__thinlens = {
-    .size = sizeof(struct imp_sensor_ops), .name = "thinlens",
-    .object_size = sizeof(struct thinlens), .build = build, .ray = ray};
+const struct imp_sensor_ops imp__thinlens = {.size = sizeof(struct imp_sensor_ops),
+                                             .name = "thinlens",
+                                             .object_size = sizeof(struct thinlens),
+                                             .build = build,
+                                             .ray = ray};

@@ -4,14 +4,13 @@
 #include "shape.h"
 
 struct cylinder {
-    imp_v3 base;            /* the middle of the end at p0 */
-    struct imp_frame axes;  /* orthonormal; n runs along the axis */
+    imp_v3 base;           /* the middle of the end at p0 */
+    struct imp_frame axes; /* orthonormal; n runs along the axis */
     double radius, length;
-    double side;            /* 1: the normal points outwards */
+    double side; /* 1: the normal points outwards */
 };
 
-static enum imp_status build(const struct imp_build *b, void *self,
-                                      struct imp_shape *s)
+static enum imp_status build(const struct imp_build *b, void *self, struct imp_shape *s)
 {
     enum imp_status st = IMP_OK;
     struct cylinder *c = self;
@@ -25,12 +24,12 @@ static enum imp_status build(const struct imp_build *b, void *self,
     const imp_v3 a = imp__v3(p0[0], p0[1], p0[2]), e = imp__v3(p1[0], p1[1], p1[2]) - a;
     const double length = imp__length(e);
     if (!(length > 0) || !isfinite(length))
-        IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "p1"), IMP_E_SCENE,
-                                "p0 and p1 are %g apart", length));
+        IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "p1"),
+                                IMP_E_SCENE, "p0 and p1 are %g apart", length));
     /* to_world T(p0) frame(p1 - p0) S(r, r, length), scene-format 4.2. */
     const struct imp_frame f = imp__frame_from_normal(e * (1 / length));
-    const struct imp_mat4 local = {{f.s[0], f.t[0], f.n[0], a[0], f.s[1], f.t[1], f.n[1], a[1],
-                                    f.s[2], f.t[2], f.n[2], a[2], 0, 0, 0, 1}};
+    const struct imp_mat4 local = {{f.s[0], f.t[0], f.n[0], a[0], f.s[1], f.t[1], f.n[1],
+                                    a[1], f.s[2], f.t[2], f.n[2], a[2], 0, 0, 0, 1}};
     const struct imp_mat4 placed = imp__mat4_multiply(&at.to_world, &local);
     imp__placement_frame(b, &placed, 2, &c->axes, scale);
     c->base = imp__point(&placed, imp__v3(0, 0, 0));
@@ -55,12 +54,14 @@ out:
     return st;
 }
 
-/* v of the hit: the height along the axis, 0..1. As for the sphere, in the plane across. */
+/* v of the hit: the height along the axis, 0..1. As for the sphere, in the plane across.
+ */
 static bool intersect(const struct imp_shape *s, const imp_v3 *o, const imp_v3 *d,
-                               double tmin, double tmax, struct imp_hit *hit)
+                      double tmin, double tmax, struct imp_hit *hit)
 {
     const struct cylinder *k = s->self;
-    const imp_v3 p = imp__to_local(&k->axes, *o - k->base), w = imp__to_local(&k->axes, *d);
+    const imp_v3 p = imp__to_local(&k->axes, *o - k->base),
+                 w = imp__to_local(&k->axes, *d);
     const double a = w[0] * w[0] + w[1] * w[1], b = -(p[0] * w[0] + p[1] * w[1]);
     const double lx = p[0] + w[0] * (b / a), ly = p[1] + w[1] * (b / a);
     const double r2 = k->radius * k->radius, e = r2 - (lx * lx + ly * ly);
@@ -94,8 +95,8 @@ static void surface_at(const struct cylinder *k, double x, double y, double v,
     imp__surface_frame(out);
 }
 
-static void surface(const struct imp_shape *s, const struct imp_hit *hit,
-                             const imp_v3 *o, const imp_v3 *d, struct imp_surface *out)
+static void surface(const struct imp_shape *s, const struct imp_hit *hit, const imp_v3 *o,
+                    const imp_v3 *d, struct imp_surface *out)
 {
     const struct cylinder *k = s->self;
     const imp_v3 p = *o + *d * hit->t - k->base;
@@ -105,7 +106,7 @@ static void surface(const struct imp_shape *s, const struct imp_hit *hit,
 }
 
 static bool sample_toward(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
-                            struct imp_light_sample *out)
+                          struct imp_light_sample *out)
 {
     const struct cylinder *k = s->self;
     struct imp_surface at;
@@ -116,13 +117,17 @@ static bool sample_toward(const struct imp_shape *s, const imp_v3 *ref, const do
 }
 
 static double pdf_toward(const struct imp_shape *s, const imp_v3 *ref,
-                           const struct imp_hit *hit, const struct imp_surface *at)
+                         const struct imp_hit *hit, const struct imp_surface *at)
 {
     (void)hit;
     return imp__area_to_angle(*ref, at->p, at->ng, 1 / s->area);
 }
 
-const struct imp_shape_ops imp__cylinder = {
-    .size = sizeof(struct imp_shape_ops), .name = "cylinder",
-    .object_size = sizeof(struct cylinder), .build = build, .intersect = intersect,
-    .surface = surface, .sample_toward = sample_toward, .pdf_toward = pdf_toward};
+const struct imp_shape_ops imp__cylinder = {.size = sizeof(struct imp_shape_ops),
+                                            .name = "cylinder",
+                                            .object_size = sizeof(struct cylinder),
+                                            .build = build,
+                                            .intersect = intersect,
+                                            .surface = surface,
+                                            .sample_toward = sample_toward,
+                                            .pdf_toward = pdf_toward};

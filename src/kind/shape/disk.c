@@ -18,7 +18,8 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
     if (st != IMP_OK) return st;
     k->to_world = at.to_world;
     k->to_local = at.to_local;
-    const imp_v3 a = imp__mat4_column(&at.to_world, 0), c = imp__mat4_column(&at.to_world, 1);
+    const imp_v3 a = imp__mat4_column(&at.to_world, 0),
+                 c = imp__mat4_column(&at.to_world, 1);
     s->area = IMP_PI * imp__length(imp__cross(a, c));
     if (!(s->area > 0) || !isfinite(s->area))
         return imp__node_error(b->ctx, b->node, IMP_E_SCENE, "its area is %g", s->area);
@@ -39,7 +40,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
 
 /* u, v of the hit: x and y on the unit disk. */
 static bool intersect(const struct imp_shape *s, const imp_v3 *o, const imp_v3 *d,
-                           double tmin, double tmax, struct imp_hit *hit)
+                      double tmin, double tmax, struct imp_hit *hit)
 {
     const struct disk *k = s->self;
     const imp_v3 p = imp__point(&k->to_local, *o), w = imp__vector(&k->to_local, *d);
@@ -60,21 +61,21 @@ static void surface_at(const struct disk *k, double x, double y, struct imp_surf
     out->ng = out->n = k->n;
     out->uv[0] = r;
     out->uv[1] = imp__turn(x, y);
-    out->dp_du = imp__vector(&k->to_world, r > 0 ? imp__v3(x / r, y / r, 0)
-                                                 : imp__v3(1, 0, 0));
+    out->dp_du =
+        imp__vector(&k->to_world, r > 0 ? imp__v3(x / r, y / r, 0) : imp__v3(1, 0, 0));
     out->dp_dv = imp__vector(&k->to_world, imp__v3(-y, x, 0)) * IMP_2PI;
     imp__surface_frame(out);
 }
 
-static void surface(const struct imp_shape *s, const struct imp_hit *hit,
-                         const imp_v3 *o, const imp_v3 *d, struct imp_surface *out)
+static void surface(const struct imp_shape *s, const struct imp_hit *hit, const imp_v3 *o,
+                    const imp_v3 *d, struct imp_surface *out)
 {
     (void)o, (void)d;
     surface_at(s->self, hit->u, hit->v, out);
 }
 
 static bool sample_toward(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
-                        struct imp_light_sample *out)
+                          struct imp_light_sample *out)
 {
     const struct disk *k = s->self;
     double xy[2];
@@ -86,14 +87,18 @@ static bool sample_toward(const struct imp_shape *s, const imp_v3 *ref, const do
 }
 
 static double pdf_toward(const struct imp_shape *s, const imp_v3 *ref,
-                       const struct imp_hit *hit, const struct imp_surface *at)
+                         const struct imp_hit *hit, const struct imp_surface *at)
 {
     (void)hit;
     const struct disk *k = s->self;
     return imp__area_to_angle(*ref, at->p, at->ng, k->inv_area);
 }
 
-const struct imp_shape_ops imp__disk = {
-    .size = sizeof(struct imp_shape_ops), .name = "disk",
-    .object_size = sizeof(struct disk), .build = build, .intersect = intersect,
-    .surface = surface, .sample_toward = sample_toward, .pdf_toward = pdf_toward};
+const struct imp_shape_ops imp__disk = {.size = sizeof(struct imp_shape_ops),
+                                        .name = "disk",
+                                        .object_size = sizeof(struct disk),
+                                        .build = build,
+                                        .intersect = intersect,
+                                        .surface = surface,
+                                        .sample_toward = sample_toward,
+                                        .pdf_toward = pdf_toward};

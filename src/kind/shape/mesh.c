@@ -3,8 +3,8 @@
  * Triangle meshes, from files (`obj`, `ply`) or from calls (`mesh`), in world space after
  * build. A mirroring to_world or flip_normals reverses the winding, so that geometric and
  * shading normals agree (scene-format 4.3, as Mitsuba 3.10). */
-#include "shape.h"
 #include "math/warp.h"
+#include "shape.h"
 
 /* Embree takes larger coordinates for invalid. */
 #define COORDINATE_MAX 1e18
@@ -27,8 +27,8 @@ static enum imp_status positions_place(const struct imp_build *b, struct imp_sha
         for (int i = 0; i < 3; i++) {
             if (!(fabs(p[i]) < COORDINATE_MAX))
                 return imp__node_error(b->ctx, b->node, IMP_E_SCENE,
-                                       "vertex %zu is not finite, or further out than %g", k,
-                                       COORDINATE_MAX);
+                                       "vertex %zu is not finite, or further out than %g",
+                                       k, COORDINATE_MAX);
             const float x = (float)p[i];
             out[3 * k + i] = x;
             s->lo[i] = fmin(s->lo[i], x);
@@ -56,7 +56,8 @@ static enum imp_status normals_place(const struct imp_build *b, const struct imp
     return IMP_OK;
 }
 
-static enum imp_status data_check(const struct imp_build *b, const struct imp_mesh_data *data)
+static enum imp_status data_check(const struct imp_build *b,
+                                  const struct imp_mesh_data *data)
 {
     if (data->n_triangles == 0 || data->n_vertices == 0)
         return imp__node_error(b->ctx, b->node, IMP_E_SCENE, "it has no triangles");
@@ -87,8 +88,8 @@ static enum imp_status areas_sum(const struct imp_build *b, struct imp__mesh *m,
     for (size_t k = 0; k < n; k++) {
         const uint32_t *i = m->indices + 3 * k;
         const imp_v3 p = load3(m->positions, i[0]);
-        const imp_v3 c = imp__cross(load3(m->positions, i[1]) - p,
-                                    load3(m->positions, i[2]) - p);
+        const imp_v3 c =
+            imp__cross(load3(m->positions, i[1]) - p, load3(m->positions, i[2]) - p);
         const double before = sum, length = imp__length(c);
         const imp_v3 ng = length > 0 ? c * (1 / length) : imp__v3(0, 0, 1);
         for (int j = 0; j < 3; j++) normals[3 * k + (size_t)j] = ng[j];
@@ -115,7 +116,9 @@ static bool is_flat(const struct imp__mesh *m, const float *normals, size_t n)
 }
 
 /* Edges of a triangle from its first vertex. */
-struct edges { imp_v3 e1, e2; };
+struct edges {
+    imp_v3 e1, e2;
+};
 
 /* Position, normals and uv: all that a light sample needs. */
 static inline struct edges point(const struct imp__mesh *m, const struct imp_hit *hit,
@@ -125,7 +128,8 @@ static inline struct edges point(const struct imp__mesh *m, const struct imp_hit
     const double *ng = m->face_normals + 3 * (size_t)hit->prim;
     const double b1 = hit->u, b2 = hit->v, b0 = 1 - b1 - b2;
     const imp_v3 p0 = load3(m->positions, i[0]);
-    const struct edges e = {load3(m->positions, i[1]) - p0, load3(m->positions, i[2]) - p0};
+    const struct edges e = {load3(m->positions, i[1]) - p0,
+                            load3(m->positions, i[2]) - p0};
     out->p = p0 + e.e1 * b1 + e.e2 * b2;
     out->ng = imp__v3(ng[0], ng[1], ng[2]);
     out->n = out->ng;
@@ -142,14 +146,15 @@ static inline struct edges point(const struct imp__mesh *m, const struct imp_hit
         const float *t0 = m->uvs + 2 * (size_t)i[0], *t1 = m->uvs + 2 * (size_t)i[1],
                     *t2 = m->uvs + 2 * (size_t)i[2];
         for (int k = 0; k < 2; k++)
-            out->uv[k] = t0[k] + b1 * ((double)t1[k] - t0[k]) + b2 * ((double)t2[k] - t0[k]);
+            out->uv[k] =
+                t0[k] + b1 * ((double)t1[k] - t0[k]) + b2 * ((double)t2[k] - t0[k]);
     }
     return e;
 }
 
 /* dp_du and dp_dv, from uv where they say something. */
-static inline void slopes(const struct imp__mesh *m, const uint32_t *i, const struct edges *e,
-                          struct imp_surface *out)
+static inline void slopes(const struct imp__mesh *m, const uint32_t *i,
+                          const struct edges *e, struct imp_surface *out)
 {
     out->dp_du = m->reversed ? e->e2 : e->e1;
     out->dp_dv = m->reversed ? e->e1 : e->e2;
@@ -166,8 +171,8 @@ static inline void slopes(const struct imp__mesh *m, const uint32_t *i, const st
     }
 }
 
-void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit, const imp_v3 *o,
-                       const imp_v3 *d, struct imp_surface *out)
+void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit,
+                       const imp_v3 *o, const imp_v3 *d, struct imp_surface *out)
 {
     (void)o, (void)d;
     const struct imp__mesh *m = s->self;
@@ -183,7 +188,8 @@ void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit, con
 }
 
 /* Frames of a mesh whose normals are its faces': made once. */
-static enum imp_status tangents_make(const struct imp_build *b, struct imp__mesh *m, size_t n)
+static enum imp_status tangents_make(const struct imp_build *b, struct imp__mesh *m,
+                                     size_t n)
 {
     double *tangents = imp__arena_take(b->arena, 3 * n, sizeof *tangents);
     if (!tangents) return imp__node_error(b->ctx, b->node, IMP_E_NOMEM, "out of memory");
@@ -199,8 +205,9 @@ static enum imp_status tangents_make(const struct imp_build *b, struct imp__mesh
     return IMP_OK;
 }
 
-enum imp_status imp__mesh_build(const struct imp_build *b, void *self, struct imp_shape *s,
-                                const struct imp_mesh_data *data, bool face_normals)
+enum imp_status imp__mesh_build(const struct imp_build *b, void *self,
+                                struct imp_shape *s, const struct imp_mesh_data *data,
+                                bool face_normals)
 {
     enum imp_status st = IMP_OK;
     struct imp__mesh *m = self;
@@ -210,7 +217,8 @@ enum imp_status imp__mesh_build(const struct imp_build *b, void *self, struct im
     IMP_TRY(data_check(b, data));
     const size_t n = data->n_vertices;
     float *positions = imp__arena_array(b->arena, 3 * n + 4, sizeof *positions);
-    float *normals = face_normals ? NULL : imp__arena_take(b->arena, 3 * n, sizeof *normals);
+    float *normals =
+        face_normals ? NULL : imp__arena_take(b->arena, 3 * n, sizeof *normals);
     if (!positions || (!normals && !face_normals))
         IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_NOMEM, "out of memory"));
     IMP_TRY(positions_place(b, s, data, &at, positions));
@@ -219,8 +227,10 @@ enum imp_status imp__mesh_build(const struct imp_build *b, void *self, struct im
     m->indices = data->indices;
     m->reversed = at.mirrored != s->flip_normals;
     if (m->reversed) {
-        uint32_t *indices = imp__arena_take(b->arena, 3 * data->n_triangles, sizeof *indices);
-        if (!indices) IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_NOMEM, "out of memory"));
+        uint32_t *indices =
+            imp__arena_take(b->arena, 3 * data->n_triangles, sizeof *indices);
+        if (!indices)
+            IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_NOMEM, "out of memory"));
         for (size_t k = 0; k < data->n_triangles; k++) {
             indices[3 * k] = data->indices[3 * k];
             indices[3 * k + 1] = data->indices[3 * k + 2];
@@ -228,8 +238,7 @@ enum imp_status imp__mesh_build(const struct imp_build *b, void *self, struct im
         }
         m->indices = indices;
     }
-    if (normals && data->normals)
-        IMP_TRY(normals_place(b, s, data, &at, normals));
+    if (normals && data->normals) IMP_TRY(normals_place(b, s, data, &at, normals));
     else if (normals)
         IMP_TRY(imp__mesh_normals(b->ctx, n, data->n_triangles, m->positions, m->indices,
                                   normals));
@@ -237,8 +246,7 @@ enum imp_status imp__mesh_build(const struct imp_build *b, void *self, struct im
     m->normals = normals && !is_flat(m, normals, data->n_triangles) ? normals : NULL;
     if (!m->normals) IMP_TRY(tangents_make(b, m, data->n_triangles));
     s->geometry = IMP_TRIANGLES;
-    s->triangles =
-        (struct imp_triangles){n, data->n_triangles, m->positions, m->indices};
+    s->triangles = (struct imp_triangles){n, data->n_triangles, m->positions, m->indices};
 out:
     return st;
 }
@@ -248,7 +256,8 @@ bool imp__mesh_sample(const struct imp_shape *s, const imp_v3 *ref, const double
 {
     const struct imp__mesh *m = s->self;
     if (!(s->area > 0)) return false;
-    /* The first triangle whose cumulative area exceeds x: those without area never are. */
+    /* The first triangle whose cumulative area exceeds x: those without area never are.
+     */
     const double x = u[0] * s->area;
     size_t lo = 0, hi = m->last;
     while (lo < hi) {
@@ -256,10 +265,11 @@ bool imp__mesh_sample(const struct imp_shape *s, const imp_v3 *ref, const double
         if (m->cumulative[middle] > x) hi = middle;
         else lo = middle + 1;
     }
-    const double below = lo ? m->cumulative[lo - 1] : 0, width = m->cumulative[lo] - below;
+    const double below = lo ? m->cumulative[lo - 1] : 0,
+                 width = m->cumulative[lo] - below;
     double b[2];
-    imp__uniform_triangle((double[2]){imp_clamp((x - below) / width, 0.0, 0x1.fffffffffffffp-1),
-                                      u[1]}, b);
+    imp__uniform_triangle(
+        (double[2]){imp_clamp((x - below) / width, 0.0, 0x1.fffffffffffffp-1), u[1]}, b);
     const struct imp_hit hit = {.prim = (int)lo, .u = b[0], .v = b[1]};
     struct imp_surface at;
     point(m, &hit, &at);
@@ -268,27 +278,30 @@ bool imp__mesh_sample(const struct imp_shape *s, const imp_v3 *ref, const double
     return imp__light_from_area(*ref, at.p, at.ng, at.n, m->inv_area, out);
 }
 
-double imp__mesh_pdf(const struct imp_shape *s, const imp_v3 *ref, const struct imp_hit *hit,
-                     const struct imp_surface *at)
+double imp__mesh_pdf(const struct imp_shape *s, const imp_v3 *ref,
+                     const struct imp_hit *hit, const struct imp_surface *at)
 {
     (void)hit;
     const struct imp__mesh *m = s->self;
     return imp__area_to_angle(*ref, at->p, at->ng, m->inv_area);
 }
 
-static enum imp_status mesh_build(const struct imp_build *b, void *self, struct imp_shape *s)
+static enum imp_status mesh_build(const struct imp_build *b, void *self,
+                                  struct imp_shape *s)
 {
     bool face_normals;
     const enum imp_status st =
         imp__props_bool(b->ctx, b->node, "face_normals", false, &face_normals);
     if (st != IMP_OK) return st;
     if (!b->node->mesh)
-        return imp__node_error(b->ctx, b->node, IMP_E_SCENE, "no triangles were given to it");
+        return imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+                               "no triangles were given to it");
     return imp__mesh_build(b, self, s, b->node->mesh, face_normals);
 }
 
 /* The file has been read by now; its properties are only marked as known. */
-static enum imp_status file_build(const struct imp_build *b, void *self, struct imp_shape *s)
+static enum imp_status file_build(const struct imp_build *b, void *self,
+                                  struct imp_shape *s)
 {
     const char *filename;
     bool flip;
@@ -299,15 +312,24 @@ static enum imp_status file_build(const struct imp_build *b, void *self, struct 
     return mesh_build(b, self, s);
 }
 
-const struct imp_shape_ops imp__mesh = {
-    .size = sizeof(struct imp_shape_ops), .name = "mesh",
-    .object_size = sizeof(struct imp__mesh), .build = mesh_build, .surface = imp__mesh_surface,
-    .sample_toward = imp__mesh_sample, .pdf_toward = imp__mesh_pdf};
-const struct imp_shape_ops imp__obj = {
-    .size = sizeof(struct imp_shape_ops), .name = "obj",
-    .object_size = sizeof(struct imp__mesh), .build = file_build, .surface = imp__mesh_surface,
-    .sample_toward = imp__mesh_sample, .pdf_toward = imp__mesh_pdf};
-const struct imp_shape_ops imp__ply = {
-    .size = sizeof(struct imp_shape_ops), .name = "ply",
-    .object_size = sizeof(struct imp__mesh), .build = file_build, .surface = imp__mesh_surface,
-    .sample_toward = imp__mesh_sample, .pdf_toward = imp__mesh_pdf};
+const struct imp_shape_ops imp__mesh = {.size = sizeof(struct imp_shape_ops),
+                                        .name = "mesh",
+                                        .object_size = sizeof(struct imp__mesh),
+                                        .build = mesh_build,
+                                        .surface = imp__mesh_surface,
+                                        .sample_toward = imp__mesh_sample,
+                                        .pdf_toward = imp__mesh_pdf};
+const struct imp_shape_ops imp__obj = {.size = sizeof(struct imp_shape_ops),
+                                       .name = "obj",
+                                       .object_size = sizeof(struct imp__mesh),
+                                       .build = file_build,
+                                       .surface = imp__mesh_surface,
+                                       .sample_toward = imp__mesh_sample,
+                                       .pdf_toward = imp__mesh_pdf};
+const struct imp_shape_ops imp__ply = {.size = sizeof(struct imp_shape_ops),
+                                       .name = "ply",
+                                       .object_size = sizeof(struct imp__mesh),
+                                       .build = file_build,
+                                       .surface = imp__mesh_surface,
+                                       .sample_toward = imp__mesh_sample,
+                                       .pdf_toward = imp__mesh_pdf};

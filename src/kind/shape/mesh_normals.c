@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Vertex normals of a mesh that has none: every face's unit normal weighted by its angle at
- * the vertex (Thuermer and Wuethrich 1998). Files split a vertex where its uv differ, so the
- * sum runs over all vertices at one position, not over one index. */
+ * Vertex normals of a mesh that has none: every face's unit normal weighted by its angle
+ * at the vertex (Thuermer and Wuethrich 1998). Files split a vertex where its uv differ,
+ * so the sum runs over all vertices at one position, not over one index. */
 #include "shape.h"
 
 /* Equal positions are equal bits; +0 and -0 are one place. */

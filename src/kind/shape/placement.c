@@ -43,10 +43,12 @@ void imp__placement_frame(const struct imp_build *b, const struct imp_mat4 *to_w
         }
         e[i] = imp__normalize(e[i]);
     }
-    for (int i = 1; i < equal; i++) exact &= fabs(length[i] - length[0]) < 1e-6 * length[0];
+    for (int i = 1; i < equal; i++)
+        exact &= fabs(length[i] - length[0]) < 1e-6 * length[0];
     if (!exact) {
         char where[512];
-        imp__warn(b->ctx, "%s: shape '%s' (%s): to_world shears it or scales it unevenly; it "
+        imp__warn(b->ctx,
+                  "%s: shape '%s' (%s): to_world shears it or scales it unevenly; it "
                   "stays round, with the scale of its x axis",
                   imp__loc_text(b->node->loc, where, sizeof where),
                   b->node->id ? b->node->id : "", b->node->type);

@@ -5,15 +5,14 @@
 #include "shape.h"
 
 struct rectangle {
-    imp_v3 corner, eu, ev;   /* p = corner + u eu + v ev, so eu and ev are dp_du, dp_dv */
-    imp_v3 s, t, n;          /* the shading frame is the same everywhere */
+    imp_v3 corner, eu, ev; /* p = corner + u eu + v ev, so eu and ev are dp_du, dp_dv */
+    imp_v3 s, t, n;        /* the shading frame is the same everywhere */
     double inv_area;
     float positions[12 + 4]; /* and Embree's 16 bytes */
     uint32_t indices[6];
 };
 
-static enum imp_status build(const struct imp_build *b, void *self,
-                                       struct imp_shape *s)
+static enum imp_status build(const struct imp_build *b, void *self, struct imp_shape *s)
 {
     struct rectangle *r = self;
     struct imp_placement at;
@@ -27,7 +26,8 @@ static enum imp_status build(const struct imp_build *b, void *self,
     if (!(s->area > 0) || !isfinite(s->area))
         return imp__node_error(b->ctx, b->node, IMP_E_SCENE, "its area is %g", s->area);
     r->inv_area = 1 / s->area;
-    /* The image of local +z as normals go, so that mirroring in the plane keeps its side. */
+    /* The image of local +z as normals go, so that mirroring in the plane keeps its side.
+     */
     r->n = imp__normalize(imp__cross(r->eu, r->ev)) *
            ((at.mirrored != s->flip_normals) ? -1.0 : 1.0);
     struct imp_surface frame = {.n = r->n, .dp_du = r->eu};
@@ -40,8 +40,8 @@ static enum imp_status build(const struct imp_build *b, void *self,
     s->lo = imp__v3(INFINITY, INFINITY, INFINITY);
     s->hi = -s->lo;
     for (int k = 0; k < 4; k++) {
-        const imp_v3 p = r->corner + r->eu * (double)(k == 1 || k == 2) +
-                         r->ev * (double)(k >= 2);
+        const imp_v3 p =
+            r->corner + r->eu * (double)(k == 1 || k == 2) + r->ev * (double)(k >= 2);
         for (int i = 0; i < 3; i++) {
             r->positions[3 * k + i] = (float)p[i];
             s->lo[i] = fmin(s->lo[i], p[i]);
@@ -54,8 +54,8 @@ static enum imp_status build(const struct imp_build *b, void *self,
     return IMP_OK;
 }
 
-static void surface(const struct imp_shape *s, const struct imp_hit *hit,
-                              const imp_v3 *o, const imp_v3 *d, struct imp_surface *out)
+static void surface(const struct imp_shape *s, const struct imp_hit *hit, const imp_v3 *o,
+                    const imp_v3 *d, struct imp_surface *out)
 {
     (void)o, (void)d;
     const struct rectangle *r = s->self;
@@ -72,7 +72,7 @@ static void surface(const struct imp_shape *s, const struct imp_hit *hit,
 }
 
 static bool sample_toward(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
-                             struct imp_light_sample *out)
+                          struct imp_light_sample *out)
 {
     const struct rectangle *r = s->self;
     out->uv[0] = u[0];
@@ -82,14 +82,17 @@ static bool sample_toward(const struct imp_shape *s, const imp_v3 *ref, const do
 }
 
 static double pdf_toward(const struct imp_shape *s, const imp_v3 *ref,
-                            const struct imp_hit *hit, const struct imp_surface *at)
+                         const struct imp_hit *hit, const struct imp_surface *at)
 {
     (void)hit;
     const struct rectangle *r = s->self;
     return imp__area_to_angle(*ref, at->p, at->ng, r->inv_area);
 }
 
-const struct imp_shape_ops imp__rectangle = {
-    .size = sizeof(struct imp_shape_ops), .name = "rectangle",
-    .object_size = sizeof(struct rectangle), .build = build,
-    .surface = surface, .sample_toward = sample_toward, .pdf_toward = pdf_toward};
+const struct imp_shape_ops imp__rectangle = {.size = sizeof(struct imp_shape_ops),
+                                             .name = "rectangle",
+                                             .object_size = sizeof(struct rectangle),
+                                             .build = build,
+                                             .surface = surface,
+                                             .sample_toward = sample_toward,
+                                             .pdf_toward = pdf_toward};

@@ -11,11 +11,11 @@
 
 struct imp_placement {
     struct imp_mat4 to_world, to_local;
-    bool mirrored;   /* to_world turns right hands into left hands */
+    bool mirrored; /* to_world turns right hands into left hands */
 };
 
-/* Read the properties that all shapes have: to_world (affine and invertible, or an error),
- * flip_normals, and silhouette_sampling_weight, which forward pictures ignore. */
+/* Read the properties that all shapes have: to_world (affine and invertible, or an
+ * error), flip_normals, and silhouette_sampling_weight, which forward pictures ignore. */
 enum imp_status imp__shape_placement(const struct imp_build *b, struct imp_shape *s,
                                      struct imp_placement *out);
 
@@ -31,7 +31,8 @@ static inline imp_v3 imp__mat4_column(const struct imp_mat4 *a, int j)
 void imp__placement_frame(const struct imp_build *b, const struct imp_mat4 *to_world,
                           int equal, struct imp_frame *frame, double length[3]);
 
-/* s and t from n and dp_du (scene-format 3.2); the basis of n alone where dp_du vanishes. */
+/* s and t from n and dp_du (scene-format 3.2); the basis of n alone where dp_du vanishes.
+ */
 static inline void imp__surface_frame(struct imp_surface *x)
 {
     const imp_v3 s = x->dp_du - x->n * imp__dot(x->n, x->dp_du);
@@ -82,10 +83,11 @@ static inline double imp__turn(double x, double y)
 }
 
 /* A mesh from arrays that live as long as the scene (mesh.c); b, s as in build. */
-enum imp_status imp__mesh_build(const struct imp_build *b, void *self, struct imp_shape *s,
-                                const struct imp_mesh_data *data, bool face_normals);
-/* Angle-weighted vertex normals, averaged over vertices at equal positions (mesh_normals.c).
- * out [3 n_vertices]. */
+enum imp_status imp__mesh_build(const struct imp_build *b, void *self,
+                                struct imp_shape *s, const struct imp_mesh_data *data,
+                                bool face_normals);
+/* Angle-weighted vertex normals, averaged over vertices at equal positions
+ * (mesh_normals.c). out [3 n_vertices]. */
 enum imp_status imp__mesh_normals(imp_context *ctx, size_t n_vertices, size_t n_triangles,
                                   const float *positions, const uint32_t *indices,
                                   float *out);
@@ -100,11 +102,11 @@ struct imp__mesh {
     const double *face_tangents; /* [3 n_triangles] s of the shading frame of flat meshes,
                                     where it does not vary over a triangle; else NULL */
 };
-void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit, const imp_v3 *o,
-                       const imp_v3 *d, struct imp_surface *out);
+void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit,
+                       const imp_v3 *o, const imp_v3 *d, struct imp_surface *out);
 bool imp__mesh_sample(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
                       struct imp_light_sample *out);
-double imp__mesh_pdf(const struct imp_shape *s, const imp_v3 *ref, const struct imp_hit *hit,
-                     const struct imp_surface *at);
+double imp__mesh_pdf(const struct imp_shape *s, const imp_v3 *ref,
+                     const struct imp_hit *hit, const struct imp_surface *at);
 
 #endif

@@ -3,14 +3,14 @@
  * The shapes: one line a kind. */
 #include "kind/build.h"
 
-#define SHAPES(X)                                                                          \
-    X(imp__rectangle)                                                                      \
-    X(imp__disk)                                                                           \
-    X(imp__sphere)                                                                         \
-    X(imp__cylinder)                                                                       \
-    X(imp__cube)                                                                           \
-    X(imp__mesh)                                                                           \
-    X(imp__obj)                                                                            \
+#define SHAPES(X)                                                                        \
+    X(imp__rectangle)                                                                    \
+    X(imp__disk)                                                                         \
+    X(imp__sphere)                                                                       \
+    X(imp__cylinder)                                                                     \
+    X(imp__cube)                                                                         \
+    X(imp__mesh)                                                                         \
+    X(imp__obj)                                                                          \
     X(imp__ply)
 
 #define DECLARE(kind) extern const struct imp_shape_ops kind;

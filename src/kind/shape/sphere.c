@@ -1,19 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The sphere, in double precision. Seen from outside it is sampled by the cone of directions
- * it fills, from inside by area. */
+ * The sphere, in double precision. Seen from outside it is sampled by the cone of
+ * directions it fills, from inside by area. */
 #include "math/warp.h"
 #include "shape.h"
 
 struct sphere {
     imp_v3 center;
-    struct imp_frame axes;  /* orthonormal, local x, y, z; of the left hand if mirrored */
+    struct imp_frame axes; /* orthonormal, local x, y, z; of the left hand if mirrored */
     double radius;
-    double side;            /* 1: the normal points outwards */
+    double side; /* 1: the normal points outwards */
 };
 
-static enum imp_status build(const struct imp_build *b, void *self,
-                                    struct imp_shape *s)
+static enum imp_status build(const struct imp_build *b, void *self, struct imp_shape *s)
 {
     enum imp_status st = IMP_OK;
     struct sphere *p = self;
@@ -47,7 +46,7 @@ out:
  * small root from the product of the roots: no digits are lost far away or for small
  * spheres (Haines et al., Ray Tracing Gems, ch. 7). */
 static bool intersect(const struct imp_shape *s, const imp_v3 *o, const imp_v3 *d,
-                             double tmin, double tmax, struct imp_hit *hit)
+                      double tmin, double tmax, struct imp_hit *hit)
 {
     const struct sphere *p = s->self;
     const imp_v3 oc = *o - p->center;
@@ -82,15 +81,16 @@ static void surface_at(const struct sphere *p, imp_v3 outward, struct imp_surfac
     imp__surface_frame(out);
 }
 
-static void surface(const struct imp_shape *s, const struct imp_hit *hit,
-                           const imp_v3 *o, const imp_v3 *d, struct imp_surface *out)
+static void surface(const struct imp_shape *s, const struct imp_hit *hit, const imp_v3 *o,
+                    const imp_v3 *d, struct imp_surface *out)
 {
     const struct sphere *p = s->self;
     surface_at(p, imp__normalize(*o + *d * hit->t - p->center), out);
 }
 
-/* 1 - cos(theta_max) of the cone seen from distance r; < 0 on and inside the sphere. A point
- * of the sphere itself may lie outside by rounding: its cone would hold nothing but itself. */
+/* 1 - cos(theta_max) of the cone seen from distance r; < 0 on and inside the sphere. A
+ * point of the sphere itself may lie outside by rounding: its cone would hold nothing but
+ * itself. */
 static double cone_height(const struct sphere *p, double distance)
 {
     if (!(distance > p->radius * (1 + 1e-9))) return -1;
@@ -114,8 +114,8 @@ static bool sample_toward(const struct imp_shape *s, const imp_v3 *ref, const do
     }
     if (!(distance < INFINITY)) return false;
     /* Everything from 1 - cos(theta), so that a distant sphere keeps its digits. gamma is
-     * the angle at the near point between the ray and the normal: sin(gamma) = sin(theta) /
-     * sin(theta_max); alpha = gamma - theta the angle at the centre. */
+     * the angle at the near point between the ray and the normal: sin(gamma) = sin(theta)
+     * / sin(theta_max); alpha = gamma - theta the angle at the centre. */
     const double k = u[0] * height, sin2 = k * (2 - k), cos_theta = 1 - k;
     const double sin_theta = sqrt(sin2), sin2_max = height * (2 - height);
     const double sin2_gamma = fmin(1, sin2 / sin2_max);
@@ -148,7 +148,11 @@ static double pdf_toward(const struct imp_shape *s, const imp_v3 *ref,
                        : imp__area_to_angle(*ref, at->p, at->ng, 1 / s->area);
 }
 
-const struct imp_shape_ops imp__sphere = {
-    .size = sizeof(struct imp_shape_ops), .name = "sphere",
-    .object_size = sizeof(struct sphere), .build = build, .intersect = intersect,
-    .surface = surface, .sample_toward = sample_toward, .pdf_toward = pdf_toward};
+const struct imp_shape_ops imp__sphere = {.size = sizeof(struct imp_shape_ops),
+                                          .name = "sphere",
+                                          .object_size = sizeof(struct sphere),
+                                          .build = build,
+                                          .intersect = intersect,
+                                          .surface = surface,
+                                          .sample_toward = sample_toward,
+                                          .pdf_toward = pdf_toward};

@@ -1,30 +1,32 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * bitmap: a picture. Texel (i, j) has its centre at ((i + .5)/W, (j + .5)/H), row 0 at v = 0.
- * The value is linear in the texels, so its derivative is the set of filter weights itself:
- * eval, scatter and tangent all go through `footprint`. */
-#include <math.h>
-#include <string.h>
+ * bitmap: a picture. Texel (i, j) has its centre at ((i + .5)/W, (j + .5)/H), row 0 at v
+ * = 0. The value is linear in the texels, so its derivative is the set of filter weights
+ * itself: eval, scatter and tangent all go through `footprint`. */
 #include "color/rgb.h"
 #include "input.h"
 #include "math/vec.h"
 #include "uv.h"
+#include <math.h>
+#include <string.h>
 
 enum wrap { WRAP_REPEAT, WRAP_MIRROR, WRAP_CLAMP };
 enum filter { FILTER_BILINEAR, FILTER_NEAREST };
 
 struct bitmap {
-    int width, height, channels;  /* 1 or 3 */
+    int width, height, channels; /* 1 or 3 */
     enum wrap wrap;
     enum filter filter;
-    bool identity;                /* to_uv does nothing */
+    bool identity; /* to_uv does nothing */
     struct imp__to_uv to_uv;
-    float *data;                  /* [height][width][channels], and one number more */
+    float *data; /* [height][width][channels], and one number more */
 };
 
-/* Pixels in one more number than needed: three channels are read with one load of four. */
-static enum imp_status data_convert(const struct imp_build *b, const struct imp_image_data *im,
-                                    bool raw, struct bitmap *t)
+/* Pixels in one more number than needed: three channels are read with one load of four.
+ */
+static enum imp_status data_convert(const struct imp_build *b,
+                                    const struct imp_image_data *im, bool raw,
+                                    struct bitmap *t)
 {
     const size_t n = (size_t)im->width * (size_t)im->height;
     const bool grey = im->channels == 3 && b->mode == IMP_MONO;
@@ -55,7 +57,8 @@ static enum imp_status data_convert(const struct imp_build *b, const struct imp_
     return IMP_OK;
 }
 
-static enum imp_status build(const struct imp_build *b, void *self, struct imp_texture *tex)
+static enum imp_status build(const struct imp_build *b, void *self,
+                             struct imp_texture *tex)
 {
     static const char *const wraps[] = {"repeat", "mirror", "clamp"};
     static const char *const filters[] = {"bilinear", "nearest"};
@@ -69,7 +72,8 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_t
 
     IMP_TRY(imp__props_string(b->ctx, b->node, "filename", NULL, &filename));
     IMP_TRY(imp__props_bool(b->ctx, b->node, "raw", false, &raw));
-    IMP_TRY(imp__props_choice(b->ctx, b->node, "wrap_mode", wraps, 3, WRAP_REPEAT, &wrap));
+    IMP_TRY(
+        imp__props_choice(b->ctx, b->node, "wrap_mode", wraps, 3, WRAP_REPEAT, &wrap));
     IMP_TRY(imp__props_choice(b->ctx, b->node, "filter_type", filters, 2, FILTER_BILINEAR,
                               &filter));
     /* How Mitsuba stores texels and looks them up: of no consequence here. */
@@ -80,9 +84,10 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_t
         IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_SCENE,
                                 "needs a picture: 'filename' is required"));
     if (im->width < 1 || im->height < 1 || (im->channels != 1 && im->channels != 3))
-        IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_SCENE,
-                                "picture of %d x %d with %d channels; 1 or 3 are possible",
-                                im->width, im->height, im->channels));
+        IMP_TRY(
+            imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+                            "picture of %d x %d with %d channels; 1 or 3 are possible",
+                            im->width, im->height, im->channels));
     t->width = im->width;
     t->height = im->height;
     t->wrap = (enum wrap)wrap;
@@ -95,8 +100,8 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_t
     float lo = 0;
     for (size_t i = 0; i < dims[0] * dims[1] * dims[2]; i++) lo = imp_min(lo, t->data[i]);
     IMP_TRY(b->add_bulk(b, "data", t->data, 3, dims,
-                        IMP_PARAM_DIFFERENTIABLE | IMP_PARAM_COLOR, lo < 0 ? -INFINITY : 0.0,
-                        INFINITY, &tex->param));
+                        IMP_PARAM_DIFFERENTIABLE | IMP_PARAM_COLOR,
+                        lo < 0 ? -INFINITY : 0.0, INFINITY, &tex->param));
 out:
     return st;
 }
@@ -167,8 +172,8 @@ static inline void footprint(const struct bitmap *t, const struct imp_texcoord *
 
 typedef float texel4 __attribute__((vector_size(16)));
 
-static void eval(const struct imp_texture *tex, const struct imp_texcoord *at, bool scalar,
-                 imp_spec *value)
+static void eval(const struct imp_texture *tex, const struct imp_texcoord *at,
+                 bool scalar, imp_spec *value)
 {
     const struct bitmap *t = tex->self;
     struct footprint f;
@@ -188,8 +193,8 @@ static void eval(const struct imp_texture *tex, const struct imp_texcoord *at, b
     *value = scalar ? imp__spec(imp__luminance(sum[0], sum[1], sum[2])) : sum;
 }
 
-static void scatter(const struct imp_texture *tex, const struct imp_texcoord *at, bool scalar,
-                    const imp_spec *bar, struct imp_sink *sink)
+static void scatter(const struct imp_texture *tex, const struct imp_texcoord *at,
+                    bool scalar, const imp_spec *bar, struct imp_sink *sink)
 {
     const struct bitmap *t = tex->self;
     struct footprint f;
@@ -197,17 +202,14 @@ static void scatter(const struct imp_texture *tex, const struct imp_texcoord *at
     footprint(t, at, &f);
     for (int k = 0; k < f.n; k++) {
         const imp_spec part = *bar * f.weight[k];
-        if (t->channels == 1)
-            sink->add(sink, tex->param, f.texel[k], 1, &part);
-        else if (scalar)
-            imp__luminance_scatter(sink, tex->param, 3 * f.texel[k], part);
-        else
-            sink->add(sink, tex->param, 3 * f.texel[k], 3, &part);
+        if (t->channels == 1) sink->add(sink, tex->param, f.texel[k], 1, &part);
+        else if (scalar) imp__luminance_scatter(sink, tex->param, 3 * f.texel[k], part);
+        else sink->add(sink, tex->param, 3 * f.texel[k], 3, &part);
     }
 }
 
-static void tangent(const struct imp_texture *tex, const struct imp_texcoord *at, bool scalar,
-                    imp_dot_fn *dot, const void *x_dot, imp_spec *value_dot)
+static void tangent(const struct imp_texture *tex, const struct imp_texcoord *at,
+                    bool scalar, imp_dot_fn *dot, const void *x_dot, imp_spec *value_dot)
 {
     const struct bitmap *t = tex->self;
     struct footprint f;
@@ -224,13 +226,18 @@ static void tangent(const struct imp_texture *tex, const struct imp_texcoord *at
         }
         sum += p * f.weight[k];
     }
-    *value_dot = scalar && t->channels == 3 ? imp__spec(imp__luminance(sum[0], sum[1], sum[2]))
-                                            : sum;
+    *value_dot = scalar && t->channels == 3
+                     ? imp__spec(imp__luminance(sum[0], sum[1], sum[2]))
+                     : sum;
 }
 
 static const struct imp_input_desc inputs[] = {{0}};
 
-const struct imp_texture_ops imp__bitmap = {
-    .size = sizeof(struct imp_texture_ops), .name = "bitmap",
-    .object_size = sizeof(struct bitmap), .inputs = inputs,
-    .build = build, .eval = eval, .scatter = scatter, .tangent = tangent};
+const struct imp_texture_ops imp__bitmap = {.size = sizeof(struct imp_texture_ops),
+                                            .name = "bitmap",
+                                            .object_size = sizeof(struct bitmap),
+                                            .inputs = inputs,
+                                            .build = build,
+                                            .eval = eval,
+                                            .scatter = scatter,
+                                            .tangent = tangent};

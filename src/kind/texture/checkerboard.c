@@ -1,11 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * checkerboard: two colours by the parity of the half-unit cells. Read as one number the two
- * are swapped, as in Mitsuba (scene-format 6.1, 15: followed so that pictures agree). */
+ * checkerboard: two colours by the parity of the half-unit cells. Read as one number the
+ * two are swapped, as in Mitsuba (scene-format 6.1, 15: followed so that pictures agree).
+ */
 #include "input.h"
 #include "uv.h"
 
-struct checkerboard { struct imp__to_uv to_uv; };
+struct checkerboard {
+    struct imp__to_uv to_uv;
+};
 
 static const struct imp_input_desc inputs[] = {
     {.name = "color0", .role = IMP_REFLECTANCE, .fallback = 0.4, .hi = 1, .unit = "1"},
@@ -34,18 +37,23 @@ static void eval(const struct imp_texture *t, const struct imp_texcoord *at, boo
 {
     imp__input_eval(choose(t, at, scalar), scalar, at, value);
 }
-static void scatter(const struct imp_texture *t, const struct imp_texcoord *at, bool scalar,
-                    const imp_spec *bar, struct imp_sink *sink)
+static void scatter(const struct imp_texture *t, const struct imp_texcoord *at,
+                    bool scalar, const imp_spec *bar, struct imp_sink *sink)
 {
     imp__input_scatter(choose(t, at, scalar), scalar, at, bar, sink);
 }
-static void tangent(const struct imp_texture *t, const struct imp_texcoord *at, bool scalar,
-                    imp_dot_fn *dot, const void *x_dot, imp_spec *value_dot)
+static void tangent(const struct imp_texture *t, const struct imp_texcoord *at,
+                    bool scalar, imp_dot_fn *dot, const void *x_dot, imp_spec *value_dot)
 {
     imp__input_tangent(choose(t, at, scalar), scalar, at, dot, x_dot, value_dot);
 }
 
-const struct imp_texture_ops imp__checkerboard = {
-    .size = sizeof(struct imp_texture_ops), .name = "checkerboard",
-    .object_size = sizeof(struct checkerboard), .inputs = inputs,
-    .build = build, .eval = eval, .scatter = scatter, .tangent = tangent};
+const struct imp_texture_ops imp__checkerboard = {.size = sizeof(struct imp_texture_ops),
+                                                  .name = "checkerboard",
+                                                  .object_size =
+                                                      sizeof(struct checkerboard),
+                                                  .inputs = inputs,
+                                                  .build = build,
+                                                  .eval = eval,
+                                                  .scatter = scatter,
+                                                  .tangent = tangent};

@@ -5,12 +5,16 @@
 #include "input.h"
 #include "math/vec.h"
 
-struct d65 { double scale; };
+struct d65 {
+    double scale;
+};
 
-static const struct imp_input_desc inputs[] = {
-    {.name = "nested_texture", .role = IMP_EMISSION, .flags = IMP_INPUT_REQUIRED,
-     .fallback = 1, .unit = "1"},
-    {0}};
+static const struct imp_input_desc inputs[] = {{.name = "nested_texture",
+                                                .role = IMP_EMISSION,
+                                                .flags = IMP_INPUT_REQUIRED,
+                                                .fallback = 1,
+                                                .unit = "1"},
+                                               {0}};
 
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_texture *t)
 {
@@ -30,21 +34,26 @@ static void eval(const struct imp_texture *t, const struct imp_texcoord *at, boo
     imp__input_eval(t->input[0], scalar, at, value);
     *value *= d->scale;
 }
-static void scatter(const struct imp_texture *t, const struct imp_texcoord *at, bool scalar,
-                    const imp_spec *bar, struct imp_sink *sink)
+static void scatter(const struct imp_texture *t, const struct imp_texcoord *at,
+                    bool scalar, const imp_spec *bar, struct imp_sink *sink)
 {
     const struct d65 *d = t->self;
     const imp_spec scaled = *bar * d->scale;
     imp__input_scatter(t->input[0], scalar, at, &scaled, sink);
 }
-static void tangent(const struct imp_texture *t, const struct imp_texcoord *at, bool scalar,
-                    imp_dot_fn *dot, const void *x_dot, imp_spec *value_dot)
+static void tangent(const struct imp_texture *t, const struct imp_texcoord *at,
+                    bool scalar, imp_dot_fn *dot, const void *x_dot, imp_spec *value_dot)
 {
     const struct d65 *d = t->self;
     imp__input_tangent(t->input[0], scalar, at, dot, x_dot, value_dot);
     *value_dot *= d->scale;
 }
 
-const struct imp_texture_ops imp__d65 = {
-    .size = sizeof(struct imp_texture_ops), .name = "d65", .object_size = sizeof(struct d65),
-    .inputs = inputs, .build = build, .eval = eval, .scatter = scatter, .tangent = tangent};
+const struct imp_texture_ops imp__d65 = {.size = sizeof(struct imp_texture_ops),
+                                         .name = "d65",
+                                         .object_size = sizeof(struct d65),
+                                         .inputs = inputs,
+                                         .build = build,
+                                         .eval = eval,
+                                         .scatter = scatter,
+                                         .tangent = tangent};

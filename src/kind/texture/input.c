@@ -3,7 +3,8 @@
 #include "color/rgb.h"
 #include "math/vec.h"
 
-void imp__luminance_scatter(struct imp_sink *sink, int param, size_t element, imp_spec bar)
+void imp__luminance_scatter(struct imp_sink *sink, int param, size_t element,
+                            imp_spec bar)
 {
     const double weight[3] = {IMP_LUM_R, IMP_LUM_G, IMP_LUM_B};
     for (size_t c = 0; c < 3; c++) {
@@ -12,15 +13,14 @@ void imp__luminance_scatter(struct imp_sink *sink, int param, size_t element, im
     }
 }
 
-void imp__input_eval(const struct imp_input *input, bool scalar, const struct imp_texcoord *at,
-                     imp_spec *value)
+void imp__input_eval(const struct imp_input *input, bool scalar,
+                     const struct imp_texcoord *at, imp_spec *value)
 {
-    if (input->texture)
-        input->texture->ops->eval(input->texture, at, scalar, value);
+    if (input->texture) input->texture->ops->eval(input->texture, at, scalar, value);
     else if (scalar && input->count == 3)
-        *value = imp__spec(imp__luminance(input->value[0], input->value[1], input->value[2]));
-    else
-        *value = input->value;
+        *value =
+            imp__spec(imp__luminance(input->value[0], input->value[1], input->value[2]));
+    else *value = input->value;
 }
 
 void imp__input_scatter(const struct imp_input *input, bool scalar,
@@ -29,12 +29,10 @@ void imp__input_scatter(const struct imp_input *input, bool scalar,
 {
     if (input->texture)
         input->texture->ops->scatter(input->texture, at, scalar, bar, sink);
-    else if (input->param < 0)
-        return;
+    else if (input->param < 0) return;
     else if (scalar && input->count == 3)
         imp__luminance_scatter(sink, input->param, 0, *bar);
-    else
-        sink->add(sink, input->param, 0, input->count == 3 ? 3 : 1, bar);
+    else sink->add(sink, input->param, 0, input->count == 3 ? 3 : 1, bar);
 }
 
 void imp__input_tangent(const struct imp_input *input, bool scalar,
@@ -58,10 +56,8 @@ void imp__inputs_eval(const struct imp_input *const *input, int n,
                       const struct imp_texcoord *at, imp_spec *in)
 {
     for (int j = 0; j < n; j++) {
-        if (imp_likely(!input[j]->texture && !input[j]->scalar))
-            in[j] = input[j]->value;
-        else
-            imp__input_eval(input[j], input[j]->scalar, at, &in[j]);
+        if (imp_likely(!input[j]->texture && !input[j]->scalar)) in[j] = input[j]->value;
+        else imp__input_eval(input[j], input[j]->scalar, at, &in[j]);
     }
 }
 
@@ -74,8 +70,8 @@ void imp__inputs_scatter(const struct imp_input *const *input, int n,
 }
 
 void imp__inputs_tangent(const struct imp_input *const *input, int n,
-                         const struct imp_texcoord *at, imp_dot_fn *dot, const void *x_dot,
-                         imp_spec *in_dot)
+                         const struct imp_texcoord *at, imp_dot_fn *dot,
+                         const void *x_dot, imp_spec *in_dot)
 {
     for (int j = 0; j < n; j++)
         imp__input_tangent(input[j], input[j]->scalar, at, dot, x_dot, &in_dot[j]);

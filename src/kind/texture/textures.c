@@ -3,9 +3,9 @@
  * The textures: one line a kind. */
 #include "kind/build.h"
 
-#define TEXTURES(X)                                                                        \
-    X(imp__bitmap)                                                                         \
-    X(imp__checkerboard)                                                                   \
+#define TEXTURES(X)                                                                      \
+    X(imp__bitmap)                                                                       \
+    X(imp__checkerboard)                                                                 \
     X(imp__d65)
 
 #define DECLARE(kind) extern const struct imp_texture_ops kind;

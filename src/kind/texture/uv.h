@@ -4,13 +4,16 @@
 #ifndef IMP_KIND_TEXTURE_UV_H
 #define IMP_KIND_TEXTURE_UV_H
 
-#include <math.h>
 #include "kind/build.h"
+#include <math.h>
 
-struct imp__to_uv { double m[2][3]; };
+struct imp__to_uv {
+    double m[2][3];
+};
 
 /* The upper left part of the 4x4 matrix and its translation. */
-static inline enum imp_status imp__to_uv_read(const struct imp_build *b, struct imp__to_uv *t)
+static inline enum imp_status imp__to_uv_read(const struct imp_build *b,
+                                              struct imp__to_uv *t)
 {
     double m[16];
     const enum imp_status st = imp__props_transform(b->ctx, b->node, "to_uv", m);
