@@ -43,6 +43,18 @@ static enum imp_status options_take(imp_elements *e,
     enum imp_status st = IMP_OK;
     if (options) memcpy(o, options, imp_min(options->size, sizeof *o));
     o->size = sizeof *o;
+    if (e->scene->has_integrator &&
+        e->scene->integrator.kind == IMP_INTEGRATOR_ELEMENTS) {
+        const struct imp_integrator_elements *s = &e->scene->integrator.elements;
+        o->no_importance |= s->no_importance;
+        if (o->order == 0) o->order = s->order;
+        if (o->rays == 0) o->rays = s->rays;
+        if (o->stop == 0) o->stop = s->stop;
+        if (o->eps_last == 0) o->eps_last = s->eps;
+        if (o->max_level == 0) o->max_level = s->max_level;
+        if (o->max_links == 0) o->max_links = s->max_links;
+        if (o->max_bytes == 0) o->max_bytes = s->max_bytes;
+    }
     if (o->rays == 0) o->rays = 3;
     if (o->stop == 0) o->stop = 0.01;
     if (o->eps_first == 0) o->eps_first = 0.05;

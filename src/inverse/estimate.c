@@ -67,6 +67,11 @@ enum imp_status imp__problem_tracer(const struct imp_problem *p,
     enum imp_status st = imp__run_sensor(p->scene, run, &sensor);
     if (st != IMP_OK) return st;
     const struct imp_integrator *integrator = imp__radiance_integrator(p->scene);
+    if (!integrator && p->scene->integrator.kind == IMP_INTEGRATOR_ELEMENTS)
+        return imp__error(p->ctx, IMP_E_UNSUPPORTED,
+                          "integrator elements makes no walks, and has derivatives of "
+                          "its own: imp_elements_sensitivity (importon elements "
+                          "--sensitivity); for walks use path, direct or stam");
     if (!integrator)
         return imp__error(p->ctx, IMP_E_SCENE,
                           "the scene's integrator has no derivative; "

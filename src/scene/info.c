@@ -6,9 +6,10 @@
 void imp_scene_get_info(const imp_scene *scene, struct imp_scene_info *info)
 {
     static const char *const integrators[] = {
-        [IMP_INTEGRATOR_PATH] = "path",     [IMP_INTEGRATOR_DIRECT] = "direct",
-        [IMP_INTEGRATOR_DEPTH] = "depth",   [IMP_INTEGRATOR_AOV] = "aov",
-        [IMP_INTEGRATOR_MOMENT] = "moment", [IMP_INTEGRATOR_STAM] = "stam"};
+        [IMP_INTEGRATOR_PATH] = "path",        [IMP_INTEGRATOR_DIRECT] = "direct",
+        [IMP_INTEGRATOR_DEPTH] = "depth",      [IMP_INTEGRATOR_AOV] = "aov",
+        [IMP_INTEGRATOR_MOMENT] = "moment",    [IMP_INTEGRATOR_STAM] = "stam",
+        [IMP_INTEGRATOR_ELEMENTS] = "elements"};
     if (!scene || !info) return;
     *info = (struct imp_scene_info){.size = sizeof *info};
     info->n_shapes = scene->n_shapes;

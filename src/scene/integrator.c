@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Integrators: what a picture holds. path, direct and stam are settings of the one walk
- * engine; depth and aov look at the first hit; moment and aov contain others. */
+ * engine; depth and aov look at the first hit; moment and aov contain others; elements is
+ * the other solver, and makes no walks. */
 #include "scene.h"
 #include <string.h>
 
@@ -62,7 +63,8 @@ static enum imp_status nested_build(struct imp_scene *scene, struct imp_node *no
         c->used = true;
         struct imp_integrator *inner = &out->nested[out->n_nested];
         IMP_TRY(imp__integrator_build(scene, c->node, inner));
-        if (inner->kind == IMP_INTEGRATOR_AOV || inner->kind == IMP_INTEGRATOR_MOMENT)
+        if (inner->kind == IMP_INTEGRATOR_AOV || inner->kind == IMP_INTEGRATOR_MOMENT ||
+            inner->kind == IMP_INTEGRATOR_ELEMENTS)
             IMP_TRY(imp__node_error(scene->ctx, c->node, IMP_E_UNSUPPORTED,
                                     "an integrator of this type cannot be nested"));
         char slot[] = "_arg_0";
@@ -76,23 +78,58 @@ out:
     return st;
 }
 
+/* Ranges are those of imp_elements_create, which has the defaults too. */
+static enum imp_status elements_parse(imp_context *ctx, struct imp_node *node,
+                                      struct imp_integrator_elements *e)
+{
+    static const char *const images[] = {"flat", "gouraud", "gather"};
+    enum imp_status st = IMP_OK;
+    int64_t order, rays, level, links;
+    bool importance;
+    double megabytes;
+    IMP_TRY(imp__props_choice(ctx, node, "image", images, 3, 1, &e->image));
+    IMP_TRY(imp__props_bool(ctx, node, "importance", true, &importance));
+    IMP_TRY(imp__props_int(ctx, node, "order", 0, 0, 12, &order));
+    IMP_TRY(imp__props_int(ctx, node, "rays", 0, 0, 64, &rays));
+    IMP_TRY(imp__props_int(ctx, node, "max_level", 0, 0, 10, &level));
+    IMP_TRY(imp__props_int(ctx, node, "max_links", 0, 0, UINT32_MAX - 1, &links));
+    IMP_TRY(imp__props_float(ctx, node, "max_memory", 0, &megabytes));
+    IMP_TRY(imp__props_float(ctx, node, "stop", 0.01, &e->stop));
+    IMP_TRY(imp__props_float(ctx, node, "eps", 0, &e->eps));
+    if (order == 1 || !(e->stop >= 0) || !(e->eps >= 0) ||
+        !(megabytes >= 0 && megabytes < 1e12))
+        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
+                                "a property is outside its range: order 2..12, and stop, "
+                                "eps, max_memory not negative"));
+    if (e->stop == 0) e->stop = -1;
+    e->no_importance = !importance;
+    e->order = (int)order;
+    e->rays = (int)rays;
+    e->max_level = (int)level;
+    e->max_links = (size_t)links;
+    e->max_bytes = (size_t)(megabytes * 1e6);
+out:
+    return st;
+}
+
 enum imp_status imp__integrator_build(struct imp_scene *scene, struct imp_node *node,
                                       struct imp_integrator *out)
 {
     imp_context *ctx = scene->ctx;
     enum imp_status st = IMP_OK;
-    static const char *const types[] = {"path", "direct", "depth",
-                                        "aov",  "moment", "stam"};
+    static const char *const types[] = {"path",   "direct", "depth",   "aov",
+                                        "moment", "stam",   "elements"};
     static const enum imp_integrator_kind kinds[] = {
-        IMP_INTEGRATOR_PATH, IMP_INTEGRATOR_DIRECT, IMP_INTEGRATOR_DEPTH,
-        IMP_INTEGRATOR_AOV,  IMP_INTEGRATOR_MOMENT, IMP_INTEGRATOR_STAM};
+        IMP_INTEGRATOR_PATH,    IMP_INTEGRATOR_DIRECT, IMP_INTEGRATOR_DEPTH,
+        IMP_INTEGRATOR_AOV,     IMP_INTEGRATOR_MOMENT, IMP_INTEGRATOR_STAM,
+        IMP_INTEGRATOR_ELEMENTS};
     size_t k = 0;
     while (k < imp_count(types) && strcmp(types[k], node->type) != 0) k++;
     if (k == imp_count(types))
         return imp__node_error(
             ctx, node, IMP_E_UNSUPPORTED,
             "this version has no such integrator; it has path, direct, "
-            "depth, aov, moment and stam");
+            "depth, aov, moment, stam and elements");
     *out = (struct imp_integrator){.kind = kinds[k],
                                    .max_depth = -1,
                                    .rr_depth = 5,
@@ -106,7 +143,7 @@ enum imp_status imp__integrator_build(struct imp_scene *scene, struct imp_node *
     IMP_TRY(imp__props_int(ctx, node, "samples_per_pass", 0, 0, INT32_MAX, &passes));
     IMP_TRY(imp__props_float(ctx, node, "timeout", -1, &timeout));
     if (out->kind != IMP_INTEGRATOR_DEPTH && out->kind != IMP_INTEGRATOR_AOV &&
-        out->kind != IMP_INTEGRATOR_MOMENT)
+        out->kind != IMP_INTEGRATOR_MOMENT && out->kind != IMP_INTEGRATOR_ELEMENTS)
         IMP_TRY(imp__props_bool(ctx, node, "hide_emitters", false, &out->hide_emitters));
 
     switch (out->kind) {
@@ -160,6 +197,9 @@ enum imp_status imp__integrator_build(struct imp_scene *scene, struct imp_node *
         IMP_TRY(nested_build(scene, node, out));
         if (out->n_nested == 0)
             IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "no nested integrator"));
+        break;
+    case IMP_INTEGRATOR_ELEMENTS:
+        IMP_TRY(elements_parse(ctx, node, &out->elements));
         break;
     case IMP_INTEGRATOR_DEPTH: break;
     }

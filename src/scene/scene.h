@@ -24,7 +24,8 @@ enum imp_integrator_kind {
     IMP_INTEGRATOR_DEPTH,
     IMP_INTEGRATOR_AOV,
     IMP_INTEGRATOR_MOMENT,
-    IMP_INTEGRATOR_STAM /* emission only where the walk is absorbed, no light samples */
+    IMP_INTEGRATOR_STAM, /* emission only where the walk is absorbed, no light samples */
+    IMP_INTEGRATOR_ELEMENTS /* no walks: finite elements (src/elements) */
 };
 
 enum imp_aov_type {
@@ -48,6 +49,16 @@ struct imp_aov {
 
 enum imp_stam_alpha { IMP_ALPHA_DETACHED, IMP_ALPHA_ATTACHED, IMP_ALPHA_PAPER };
 
+/* What a scene file says to the finite elements; 0 is their default (elements.h). */
+struct imp_integrator_elements {
+    int image; /* enum imp_elements_image: flat, gouraud or gather */
+    int order, rays, max_level;
+    bool no_importance;
+    double stop; /* < 0: never */
+    double eps;
+    size_t max_links, max_bytes;
+};
+
 struct imp_integrator {
     enum imp_integrator_kind kind;
     const char *name; /* slot name, for channels of nested ones */
@@ -60,6 +71,7 @@ struct imp_integrator {
     struct imp_aov *aovs;
     int n_nested; /* aov, moment */
     struct imp_integrator *nested;
+    struct imp_integrator_elements elements;
 };
 
 struct imp_scene {

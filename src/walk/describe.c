@@ -188,7 +188,10 @@ enum imp_status imp_walk_describe(const imp_scene *scene, const struct imp_run *
             sensor->film.crop_w, sensor->film.crop_h, (long long)sample);
     const struct imp_integrator *integrator = imp__radiance_integrator(scene);
     if (!integrator)
-        return imp__error(scene->ctx, IMP_E_SCENE,
+        return imp__error(scene->ctx,
+                          scene->integrator.kind == IMP_INTEGRATOR_ELEMENTS
+                              ? IMP_E_UNSUPPORTED
+                              : IMP_E_SCENE,
                           "the scene's integrator makes no walks; "
                           "use path, direct or stam");
     const struct imp_tracer tracer = {scene, integrator, sensor, NULL, run->seed};

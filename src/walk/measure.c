@@ -155,7 +155,7 @@ static void to_xyz(imp_spec c, double xyz[3])
     xyz[2] = 0.019334 * c[0] + 0.119193 * c[1] + 0.950227 * c[2];
 }
 
-static int base_value(const struct imp_measure *m, imp_spec L, double alpha,
+int imp__measure_base(const struct imp_measure *m, imp_spec L, double alpha,
                       double *value)
 {
     const enum imp_pixel_format format = m->sensor->film.pixel_format;
@@ -307,7 +307,7 @@ bool imp__measure_sample(const struct imp_measure *m, struct imp_arena *arena, i
     int n;
     if (top->kind != IMP_INTEGRATOR_AOV && top->kind != IMP_INTEGRATOR_MOMENT) {
         fine = radiance(m, top, arena, x, y, sample, &L, &alpha, &walk);
-        base_value(m, L, alpha, value);
+        imp__measure_base(m, L, alpha, value);
         *px = walk.px;
         *py = walk.py;
         return fine;
@@ -338,7 +338,7 @@ bool imp__measure_sample(const struct imp_measure *m, struct imp_arena *arena, i
         const int count = n - after_base;
         for (int c = 0; c < count; c++) value[n + c] = imp__sqr(value[after_base + c]);
     }
-    base_value(m, first, first_alpha, value);
+    imp__measure_base(m, first, first_alpha, value);
     *px = walk.px;
     *py = walk.py;
     if (!fine) memset(value, 0, (size_t)m->n * sizeof *value);

@@ -26,6 +26,10 @@ void imp__measure_destroy(struct imp_measure *m);
 bool imp__measure_sample(const struct imp_measure *m, struct imp_arena *arena, int x,
                          int y, int64_t sample, double *value, double *px, double *py);
 
+/* Radiance and alpha in the film's pixel format; how many values. */
+int imp__measure_base(const struct imp_measure *m, imp_spec L, double alpha,
+                      double *value);
+
 /* The sensor of a run, or an error that says how many there are. */
 enum imp_status imp__run_sensor(const struct imp_scene *scene, const struct imp_run *run,
                                 const struct imp_sensor **out);

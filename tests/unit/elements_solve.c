@@ -564,6 +564,93 @@ static void hostile(imp_context *ctx)
     imp_scene_destroy(s);
 }
 
+/* The integrator of a scene file: its settings, the film's pixel formats, cancel. */
+static imp_scene *integrated(imp_context *ctx, const char *integrator, const char *format)
+{
+    char xml[2048];
+    snprintf(xml, sizeof xml,
+             "<scene version='3.0.0'>%s"
+             "<sensor type='perspective'><transform name='to_world'>"
+             "<lookat origin='0,0,4' target='0,0,0' up='0,1,0'/></transform>"
+             "<float name='fov' value='60'/><film type='hdrfilm'>"
+             "<string name='pixel_format' value='%s'/>"
+             "<integer name='width' value='8'/><integer name='height' "
+             "value='8'/></film></sensor>"
+             "<shape type='rectangle' id='wall'>"
+             "<bsdf type='diffuse'><rgb name='reflectance' value='.2,.4,.6'/></bsdf>"
+             "</shape><shape type='rectangle' id='lamp'><transform name='to_world'>"
+             "<rotate y='1' angle='180'/><translate z='6'/></transform>"
+             "<emitter type='area'><rgb name='radiance' value='3,2,1'/></emitter>"
+             "</shape></scene>",
+             integrator, format);
+    return test_scene_text(ctx, xml, IMP_RGB);
+}
+
+static void integrator(imp_context *ctx)
+{
+    static const char text[] = "<integrator type='elements'><integer name='order' "
+                               "value='4'/><float name='eps' value='1e-3'/>"
+                               "<string name='image' value='flat'/></integrator>";
+    struct imp_elements_options o = IMP_ELEMENTS_OPTIONS_INIT;
+    struct imp_run run = IMP_RUN_INIT;
+    imp_scene *a = integrated(ctx, text, "rgba"), *b = integrated(ctx, "", "rgb");
+    imp_film *x, *y;
+    run.spp = 15; /* rounded up to a square */
+    test_must(ctx, imp_render(a, &run, &x));
+    o.order = 4;
+    o.eps_last = 1e-3;
+    imp_elements *e = solved(b, &o), *defaults = solved(a, NULL);
+    test_must(ctx, imp_elements_image(e, 0, IMP_ELEMENTS_FLAT, 4, &y));
+    bool same = x->channels == 4 && y->channels == 3 && x->spp == 16;
+    double inside = 0;
+    for (int k = 0; k < 64; k++) {
+        for (int c = 0; c < 3 && same; c++)
+            same = x->mean[4 * k + c] == y->mean[3 * k + c];
+        inside += x->mean[4 * k + 3] / 64;
+    }
+    /* A wall 2 wide in a field of 8 tan 30; the lamp is behind the eye. */
+    const double area = 4 / imp__sqr(8 * tan(IMP_PI / 6));
+    tap_ok(same, "integrator elements: imp_render equals imp_elements_image");
+    tap_near(inside, area, 0.1, 0, "its alpha is the area that surfaces cover");
+    tap_ok(defaults->opt.order == 4 && defaults->n_links == e->n_links,
+           "its settings are the defaults of imp_elements_create");
+    imp_film_destroy(x);
+    imp_film_destroy(y);
+    imp_elements_destroy(e);
+    imp_elements_destroy(defaults);
+    int count = 1;
+    run.progress = stop_at_once;
+    run.progress_payload = &count;
+    x = NULL;
+    const enum imp_status st = imp_render(a, &run, &x);
+    tap_ok(st == IMP_CANCELLED && x && x->channels == 4, "cancelled: a picture is there");
+    imp_film_destroy(x);
+    imp_problem *p = test_problem(ctx, a, "*");
+    float seed[8 * 8 * 3] = {0};
+    double g[64];
+    tap_ok(imp_problem_reverse(p, seed, NULL, g, NULL) == IMP_E_UNSUPPORTED &&
+               strstr(imp_last_error(ctx), "sensitivity"),
+           "no gradients by walks # %s", imp_last_error(ctx));
+    imp_problem_destroy(p);
+    imp_scene_destroy(a);
+    imp_scene_destroy(b);
+    static const char *const bad[] = {
+        "<integrator type='elements'><integer name='order' value='1'/></integrator>",
+        "<integrator type='elements'><float name='stop' value='-1'/></integrator>",
+        "<integrator type='elements'><integer name='max_depth' value='3'/></integrator>",
+        "<integrator type='elements'><string name='image' value='x'/></integrator>",
+        "<integrator type='moment'><integrator type='elements'/></integrator>"};
+    for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
+        char xml[512];
+        imp_scene *s;
+        snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", bad[k]);
+        const enum imp_status refused =
+            imp_scene_load_string(ctx, xml, strlen(xml), "t", NULL, &s);
+        tap_ok(refused == IMP_E_SCENE || refused == IMP_E_UNSUPPORTED, "refused # %s",
+               imp_last_error(ctx));
+    }
+}
+
 int main(void)
 {
     imp_context *ctx = test_context(1);
@@ -580,6 +667,7 @@ int main(void)
     same_bits(d, "res=24");
     files(ctx, d);
     hostile(ctx);
+    integrator(ctx);
     imp_scene_destroy(b);
     imp_scene_destroy(d);
     imp_context_destroy(ctx);

@@ -10,4 +10,8 @@ code=$?
 [[ ! -e out.png ]] || exit 9
 importon elements b.xml --phong 'floor=1' -o out.png && exit 9
 importon elements b.xml --lux 'nothing' -o out.png && exit 9
+# As an integrator it makes no walks: what needs them says so.
+sed 's/type="path"/type="elements"/' b.xml >e.xml
+importon gradient e.xml && exit 9
+importon render e.xml --pixel 3,4 && exit 9
 exit $code

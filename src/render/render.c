@@ -1,6 +1,9 @@
-/* SPDX-License-Identifier: Apache-2.0 */
-#include "measure.h"
-#include "picture.h"
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * imp_render: the scene's integrator decides which solver makes the picture. */
+#include "render.h"
+#include "walk/measure.h"
+#include "walk/picture.h"
 
 static bool sample(const void *payload, struct imp_arena *arena, int x, int y,
                    int64_t index, double *value, double *px, double *py)
@@ -17,9 +20,13 @@ enum imp_status imp_render(const imp_scene *scene, const struct imp_run *run,
     struct imp_measure measure;
     enum imp_status st = imp__measure_create(scene, run, &measure);
     if (st != IMP_OK) return st;
-    const struct imp_picture picture = {
-        measure.sensor, "render", measure.names, measure.n, sample, &measure, NULL};
-    st = imp__picture_make(scene->ctx, &picture, run, out);
+    if (scene->integrator.kind == IMP_INTEGRATOR_ELEMENTS) {
+        st = imp__render_elements(&measure, run, out);
+    } else {
+        const struct imp_picture picture = {
+            measure.sensor, "render", measure.names, measure.n, sample, &measure, NULL};
+        st = imp__picture_make(scene->ctx, &picture, run, out);
+    }
     imp__measure_destroy(&measure);
     return st;
 }

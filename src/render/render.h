@@ -1,0 +1,15 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Between the solvers: this room stands on walk and elements, which do not know each
+ * other. */
+#ifndef IMP_RENDER_H
+#define IMP_RENDER_H
+
+#include "walk/measure.h"
+
+/* Solve the scene by finite elements and look at it through the measure's sensor, in the
+ * pixel format of its film. IMP_CANCELLED with the picture of a coarser solution. */
+enum imp_status imp__render_elements(const struct imp_measure *measure,
+                                     const struct imp_run *run, imp_film **out);
+
+#endif
