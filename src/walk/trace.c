@@ -44,13 +44,15 @@ static bool wants_lights(const struct imp_integrator *i)
            (i->kind == IMP_INTEGRATOR_DIRECT && i->emitter_samples > 0);
 }
 
-static struct imp_vertex *vertex_add(struct step *s)
+/* With room behind it for n_in inputs of its BSDF. */
+static struct imp_vertex *vertex_add(struct step *s, int n_in)
 {
     if (imp_unlikely(s->walk->n == IMP_WALK_MAX)) {
         s->walk->dropped = IMP_DROP_LONG;
         return NULL;
     }
-    struct imp_vertex *v = imp__arena_take(s->arena, 1, sizeof *v);
+    struct imp_vertex *v =
+        imp__arena_take(s->arena, 1, sizeof *v + (size_t)n_in * sizeof *v->in);
     if (imp_unlikely(!v)) {
         s->walk->dropped = IMP_DROP_MEMORY;
         return NULL;
@@ -64,7 +66,7 @@ static struct imp_vertex *vertex_add(struct step *s)
     w->n++;
     v->bsdf = NULL;
     v->shape = NULL;
-    v->in = NULL;
+    v->in = (imp_spec *)(v + 1);
     v->w = v->e = v->lin = (imp_spec){0};
     v->inv_ps = v->pdf = 0;
     v->survive = 1;
@@ -109,9 +111,18 @@ static void emission_meet(struct step *s, struct imp_vertex *v, int emitter,
     v->e += emitter_radiance(e, x, v->at.p) * v->e_weight;
 }
 
-/* Light sample at v: choose an emitter, a point on it, look whether it is visible. */
+/* The shadow ray of a light sample; light -1: there is nothing to see. */
+struct shadow {
+    imp_v3 o, d;
+    double reach;
+    int light;
+};
+
+/* Light sample at v: choose an emitter and a point on it. Whether it is visible is asked
+ * later, after the continuation is drawn: neither waits for the other's arithmetic. */
 static void light_sample(struct step *s, struct imp_vertex *v,
-                         const struct imp_surface *at, const struct imp_frame *frame)
+                         const struct imp_surface *at, const struct imp_frame *frame,
+                         struct shadow *shadow)
 {
     const struct imp_scene *scene = s->scene;
     const struct imp_key key = s->walk->key;
@@ -148,16 +159,15 @@ static void light_sample(struct step *s, struct imp_vertex *v,
 
     /* Aimed from the moved origin at the point itself: a ray parallel to wi would meet a
      * concave light before its end. */
-    const imp_v3 o = imp__offset(at->p, at->ng, ls.wi);
     const bool far = !isfinite(ls.dist);
-    const imp_v3 d = far ? ls.wi : ls.p - o; /* then t = 1 is the light */
-    const double reach = far ? INFINITY : 1 - 10 * IMP_RAY_EPSILON;
-    if (imp__occluded(scene, &o, &d, 0, reach)) return;
+    shadow->o = imp__offset(at->p, at->ng, ls.wi);
+    shadow->d = far ? ls.wi : ls.p - shadow->o; /* then t = 1 is the light */
+    shadow->reach = far ? INFINITY : 1 - 10 * IMP_RAY_EPSILON;
+    shadow->light = light;
 
     const bool delta = e->ops->flags & IMP_EMITTER_DELTA;
     const bool bsdf_samples = s->tracer->integrator->bsdf_samples > 0;
     const double p = ls.pdf * pmf;
-    v->light = light;
     v->l_at = x;
     v->l_wi = dirs.wi;
     v->l_p = ls.p;
@@ -268,7 +278,7 @@ static bool step(struct step *s)
     if (!first_hit(s, &hit)) {
         const bool hidden = integrator->hide_emitters && s->depth == 0;
         if (scene->environment < 0 || hidden || !counts) return false;
-        struct imp_vertex *v = vertex_add(s);
+        struct imp_vertex *v = vertex_add(s, 0);
         if (!v) return false;
         v->t = INFINITY;
         v->at = (struct imp_texcoord){{0, 0}, s->d};
@@ -280,22 +290,19 @@ static bool step(struct step *s)
     const struct imp_shape *shape = scene->shapes[hit.shape];
     struct imp_surface at;
     shape->ops->surface(shape, &hit, &s->o, &s->d, &at);
-    struct imp_vertex *v = vertex_add(s);
+    const struct imp_bsdf *bsdf = imp__shape_bsdf(scene, shape);
+    struct imp_vertex *v = vertex_add(s, bsdf->n_in);
     if (!v) return false;
     const struct imp_frame frame = {at.s, at.t, at.n};
     v->shape = shape;
-    v->bsdf = imp__shape_bsdf(scene, shape);
+    v->bsdf = bsdf;
     v->t = hit.t;
     v->ng = at.ng;
     v->at = (struct imp_texcoord){{at.uv[0], at.uv[1]}, at.p};
     v->dirs.wo = imp__to_local(&frame, -s->d);
-    v->in = imp__arena_take(s->arena, (size_t)v->bsdf->n_in, sizeof *v->in);
-    if (!v->in) {
-        s->walk->dropped = IMP_DROP_MEMORY;
-        return false;
-    }
     imp__inputs_eval(v->bsdf->input, v->bsdf->n_in, &v->at, v->in);
 
+    struct shadow shadow = {.light = -1};
     const bool stam = integrator->kind == IMP_INTEGRATOR_STAM;
     const bool ended = stam && counts && absorb(s, v);
     if (stam) s->walk->valid = true;
@@ -314,10 +321,14 @@ static bool step(struct step *s)
     if (ended || !goes_on) return false;
     if (v->bsdf->flags & (IMP_BSDF_SMOOTH | IMP_BSDF_DELTA)) s->walk->valid = true;
     if ((v->bsdf->flags & IMP_BSDF_SMOOTH) && wants_lights(integrator))
-        light_sample(s, v, &at, &frame);
-    if (integrator->kind == IMP_INTEGRATOR_DIRECT && integrator->bsdf_samples == 0)
-        return false;
-    return scatter(s, v, &at, &frame);
+        light_sample(s, v, &at, &frame, &shadow);
+    const bool only_lights =
+        integrator->kind == IMP_INTEGRATOR_DIRECT && integrator->bsdf_samples == 0;
+    const bool continues = !only_lights && scatter(s, v, &at, &frame);
+    if (shadow.light >= 0 &&
+        !imp__occluded(scene, &shadow.o, &shadow.d, 0, shadow.reach))
+        v->light = shadow.light;
+    return continues;
 }
 
 /* Keys use full-film pixels: a crop renders the same samples as the whole picture. The

@@ -79,12 +79,13 @@ static enum imp_status data_check(const struct imp_build *b,
 static enum imp_status areas_sum(const struct imp_build *b, struct imp__mesh *m,
                                  struct imp_shape *s, size_t n)
 {
-    m->cumulative = imp__arena_take(b->arena, n, sizeof *m->cumulative);
+    m->cumulative = imp__arena_take(b->arena, n + 1, sizeof *m->cumulative);
     double *normals = imp__arena_take(b->arena, 3 * n, sizeof *normals);
     m->face_normals = normals;
     if (!m->cumulative || !normals)
         return imp__node_error(b->ctx, b->node, IMP_E_NOMEM, "out of memory");
     double sum = 0;
+    m->cumulative[0] = 0;
     for (size_t k = 0; k < n; k++) {
         const uint32_t *i = m->indices + 3 * k;
         const imp_v3 p = load3(m->positions, i[0]);
@@ -95,7 +96,7 @@ static enum imp_status areas_sum(const struct imp_build *b, struct imp__mesh *m,
         for (int j = 0; j < 3; j++) normals[3 * k + (size_t)j] = ng[j];
         sum += length / 2;
         if (sum > before) m->last = k;
-        m->cumulative[k] = sum;
+        m->cumulative[k + 1] = sum;
     }
     if (!isfinite(sum))
         return imp__node_error(b->ctx, b->node, IMP_E_SCENE, "its area is not finite");
@@ -257,19 +258,18 @@ bool imp__mesh_sample(const struct imp_shape *s, const imp_v3 *ref, const double
     const struct imp__mesh *m = s->self;
     if (!(s->area > 0)) return false;
     /* The first triangle whose cumulative area exceeds x: those without area never are.
-     */
+     * Without branches: each would be a coin toss. */
     const double x = u[0] * s->area;
-    size_t lo = 0, hi = m->last;
-    while (lo < hi) {
-        const size_t middle = lo + (hi - lo) / 2;
-        if (m->cumulative[middle] > x) hi = middle;
-        else lo = middle + 1;
+    size_t lo = 0;
+    for (size_t n = m->last + 1; n > 1;) {
+        const size_t half = n / 2;
+        lo += (size_t)!(m->cumulative[lo + half] > x) * half;
+        n -= half;
     }
-    const double below = lo ? m->cumulative[lo - 1] : 0,
-                 width = m->cumulative[lo] - below;
+    const double below = m->cumulative[lo], width = m->cumulative[lo + 1] - below;
+    const double within = imp_min(imp_max((x - below) / width, 0.0), 0x1.fffffffffffffp-1);
     double b[2];
-    imp__uniform_triangle(
-        (double[2]){imp_clamp((x - below) / width, 0.0, 0x1.fffffffffffffp-1), u[1]}, b);
+    imp__uniform_triangle((double[2]){within, u[1]}, b);
     const struct imp_hit hit = {.prim = (int)lo, .u = b[0], .v = b[1]};
     struct imp_surface at;
     point(m, &hit, &at);

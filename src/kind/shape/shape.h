@@ -95,7 +95,7 @@ struct imp__mesh {
     const float *positions, *normals, *uvs; /* world; normals, uvs may be NULL */
     const uint32_t *indices;
     bool reversed;      /* second and third vertex were exchanged */
-    double *cumulative; /* [n] area of the triangles up to and with this one */
+    double *cumulative; /* [n + 1] area of the triangles before this one */
     size_t last;        /* the last triangle that has area */
     double inv_area;
     const double *face_normals;  /* [3 n_triangles], 0 0 1 of those without area */
