@@ -325,8 +325,7 @@ static bool step(struct step *s)
     const bool only_lights =
         integrator->kind == IMP_INTEGRATOR_DIRECT && integrator->bsdf_samples == 0;
     const bool continues = !only_lights && scatter(s, v, &at, &frame);
-    if (shadow.light >= 0 &&
-        !imp__occluded(scene, &shadow.o, &shadow.d, 0, shadow.reach))
+    if (shadow.light >= 0 && !imp__occluded(scene, &shadow.o, &shadow.d, 0, shadow.reach))
         v->light = shadow.light;
     return continues;
 }

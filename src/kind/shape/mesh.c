@@ -263,11 +263,12 @@ bool imp__mesh_sample(const struct imp_shape *s, const imp_v3 *ref, const double
     size_t lo = 0;
     for (size_t n = m->last + 1; n > 1;) {
         const size_t half = n / 2;
-        lo += (size_t)!(m->cumulative[lo + half] > x) * half;
+        lo += (size_t) !(m->cumulative[lo + half] > x) * half;
         n -= half;
     }
     const double below = m->cumulative[lo], width = m->cumulative[lo + 1] - below;
-    const double within = imp_min(imp_max((x - below) / width, 0.0), 0x1.fffffffffffffp-1);
+    const double within =
+        imp_min(imp_max((x - below) / width, 0.0), 0x1.fffffffffffffp-1);
     double b[2];
     imp__uniform_triangle((double[2]){within, u[1]}, b);
     const struct imp_hit hit = {.prim = (int)lo, .u = b[0], .v = b[1]};
