@@ -2,39 +2,57 @@
  *
  * Adam (Kingma and Ba 2015) with bounds, for objectives that are only known with noise:
  * fresh random numbers every iteration, steps in units of each variable's scale,
- * projection on the bounds. The learning rate is halved when a window of iterations
- * brought neither a significantly lower loss nor a net motion: then the steps are noise
- * (or oscillation), and the search goes on from the window's average, whose noise is
- * smaller (Polyak and Juditsky 1992). */
-#include "optimize.h"
+ * projection on the bounds.
+ *
+ * Adam divides every coordinate by the size of its own gradient, so it creeps where
+ * coordinates trade against each other (a lamp and a reflectance). With few variables it
+ * therefore walks along the eigenvectors of the Gauss-Newton matrix (basis.h), where they
+ * do not; the size of its steps stays its own. A variable that meets a bound becomes a
+ * direction of its own: a projected step that is not along the axes need not end in a
+ * minimum (Bertsekas, SIAM J. Control Optim. 20, 1982).
+ *
+ * A direction in which a window of iterations made no net motion only met noise, or
+ * oscillated: it goes on from the window's average with a smaller rate. Once the search
+ * as a whole wanders, the answer is the average of the iterates, the later the heavier,
+ * whose noise falls with their number (Polyak and Juditsky 1992; Shamir and Zhang 2013).
+ */
+#include "basis.h"
 #include <math.h>
+#include <string.h>
 
-#define BETA1  0.9
-#define BETA2  0.99
-#define WINDOW 20
-#define STALLED                                                                          \
-    0.5 /* net motion / length of the way, below which a window only wandered */
+#define BETA1   0.9
+#define BETA2   0.99
+#define WINDOW  20
+#define STALLED 0.5 /* net motion / way, below which a window only wandered */
+#define STEADY  0.8 /* and above which it went somewhere: the rate may grow again */
+#define COOLING 1.5 /* rate ~ (1 + windows wandered)^-COOLING */
+#define FELL    2 /* standard errors, by which a loss is lower than the window's before */
+#define FAR     4 /* by which it is so much lower that older iterates do not count */
 
-enum { FIRST, SECOND, HERE, ORIGIN, SUM }; /* arrays, [n] each */
+/* Arrays: [n] each, but V and A [n][n], empty where the axes are the directions. FIRST,
+ * SECOND, NET, WAY and PACE are along the rows of V. AVERAGE: of the iterates. */
+enum { FIRST, SECOND, HERE, SUM, AVERAGE, ALIGNED, NET, WAY, PACE, V, A };
 enum {
-    RATE,
     COUNT,
-    WAY,
     LARGEST,
     LOSS,
     LOSS_VAR,
     OLD_LOSS,
     OLD_VAR,
-    WANDERS
-}; /* scalars */
+    AGE,                           /* steps in FIRST and SECOND */
+    TURN,                          /* iteration at which the directions are found anew */
+    AVERAGED = IMP_SEARCH_AVERAGED /* 0: the search has not wandered yet */
+};                                 /* scalars */
+
+static bool turned(const struct imp__search *s) { return s->array_n[V] > 0; }
 
 static void window_begin(struct imp__search *s)
 {
     for (size_t k = 0; k < s->n; k++) {
-        s->array[ORIGIN][k] = s->array[HERE][k];
         s->array[SUM][k] = s->array[HERE][k];
+        s->array[NET][k] = s->array[WAY][k] = 0;
     }
-    s->scalar[COUNT] = s->scalar[WAY] = s->scalar[LARGEST] = 0;
+    s->scalar[COUNT] = s->scalar[LARGEST] = 0;
     s->scalar[LOSS] = s->scalar[LOSS_VAR] = 0;
 }
 
@@ -42,92 +60,246 @@ static enum imp_status init(const struct imp__goal *goal,
                             const struct imp__opt_options *options, struct imp__search *s)
 {
     enum imp_status st = IMP_OK;
-    for (int k = 0; k < IMP_SEARCH_ARRAYS; k++) IMP_TRY(imp__search_array(s, k, goal->n));
+    (void)options;
+    for (int k = 0; k <= PACE; k++) IMP_TRY(imp__search_array(s, k, goal->n));
     for (size_t k = 0; k < goal->n; k++) s->array[HERE][k] = s->x[k];
-    s->scalar[RATE] = options->learning_rate;
     s->scalar[OLD_LOSS] = INFINITY;
     window_begin(s);
 out:
     return st;
 }
 
-/* One step from HERE with gradient g. */
-static void step(const struct imp__goal *goal, struct imp__search *s, const double *g)
+/* ---- Directions ---------------------------------------------------------------- */
+
+/* out = V in: numbers of the variables, along the directions. */
+static void along(const struct imp__search *s, const double *in, double *out)
+{
+    const size_t n = s->n;
+    memcpy(out, in, n * sizeof *out);
+    for (size_t j = 0; turned(s) && j < n; j++) {
+        out[j] = 0;
+        for (size_t k = 0; k < n; k++) out[j] += s->array[V][j * n + k] * in[k];
+    }
+}
+
+/* out = V^T in */
+static void back(const struct imp__search *s, const double *in, double *out)
+{
+    const size_t n = s->n;
+    memcpy(out, in, n * sizeof *out);
+    for (size_t k = 0; turned(s) && k < n; k++) {
+        out[k] = 0;
+        for (size_t j = 0; j < n; j++) out[k] += s->array[V][j * n + k] * in[j];
+    }
+}
+
+/* Directions from A and ALIGNED. What is known along the old ones is turned with them;
+ * with R the rotation, a gradient of mean m and variances v has R m and sum R^2 v. */
+static enum imp_status turn(struct imp__search *s)
+{
+    static const int signed_one[] = {FIRST, NET}, positive[] = {SECOND, WAY, PACE};
+    enum imp_status st = IMP_OK;
+    const size_t n = s->n;
+    double *R = imp__alloc(s->ctx, n * n + n, sizeof *R);
+    if (!R) return imp__error(s->ctx, IMP_E_NOMEM, "no memory for %zu directions", n);
+    double *old = R + n * n;
+    IMP_TRY(imp__basis_turn(s->ctx, n, s->array[A], s->array[ALIGNED], s->array[V], R));
+    for (int i = 0; i < 5; i++) {
+        double *a = s->array[i < 2 ? signed_one[i] : positive[i - 2]];
+        memcpy(old, a, n * sizeof *old);
+        for (size_t j = 0; j < n; j++) {
+            a[j] = 0;
+            for (size_t k = 0; k < n; k++)
+                a[j] += R[j * n + k] * (i < 2 ? 1 : R[j * n + k]) * old[k];
+        }
+    }
+out:
+    imp__release(s->ctx, R);
+    return st;
+}
+
+/* Look for the directions: at the start, and after 20, 40, 80, ... iterations. */
+static enum imp_status look_round(const struct imp__goal *goal, struct imp__search *s)
+{
+    enum imp_status st = IMP_OK;
+    const size_t n = s->n;
+    bool known = false;
+    if (n < 2 || n > IMP_BASIS_MAX || !goal->normal) {
+        s->scalar[TURN] = INFINITY;
+        return IMP_OK;
+    }
+    double *a = imp__alloc(s->ctx, n * n, sizeof *a);
+    if (!a) IMP_TRY(imp__error(s->ctx, IMP_E_NOMEM, "no memory for %zu directions", n));
+    IMP_TRY(imp__basis_matrix(goal, s->array[HERE],
+                              imp__search_seed(goal, s->iteration, 1), a, &known));
+    s->scalar[TURN] = known ? fmax(WINDOW, 2 * s->iteration) : INFINITY;
+    if (!known) goto out;
+    if (!turned(s)) {
+        IMP_TRY(imp__search_array(s, A, n * n));
+        IMP_TRY(imp__search_array(s, V, n * n));
+        for (size_t k = 0; k < n; k++) s->array[V][k * n + k] = 1;
+    }
+    memcpy(s->array[A], a, n * n * sizeof *a);
+    IMP_TRY(turn(s));
+    /* Gradients of steep old directions would slow down flat new ones for long. */
+    memset(s->array[FIRST], 0, n * sizeof(double));
+    memset(s->array[SECOND], 0, n * sizeof(double));
+    s->scalar[AGE] = 0;
+out:
+    imp__release(s->ctx, a);
+    return st;
+}
+
+/* Variables that met a bound go their own way, those that left theirs join again. */
+static enum imp_status align(const struct imp__goal *goal, struct imp__search *s,
+                             bool leave)
+{
+    bool changed = false;
+    for (size_t k = 0; k < s->n; k++) {
+        const double wall = imp__at_bound(goal, s->array[HERE], k) != 0;
+        if (wall == s->array[ALIGNED][k] || (!wall && !leave)) continue;
+        s->array[ALIGNED][k] = wall;
+        changed = true;
+    }
+    return changed && turned(s) ? turn(s) : IMP_OK;
+}
+
+/* ---- Steps --------------------------------------------------------------------- */
+
+/* One step from HERE. g: the gradient; it and work [n] are destroyed. */
+static enum imp_status step(const struct imp__goal *goal, double learning_rate,
+                            struct imp__search *s, double *g, double *work)
 {
     double *m = s->array[FIRST], *v = s->array[SECOND], *x = s->array[HERE];
-    const double c1 = 1 - pow(BETA1, s->iteration + 1),
-                 c2 = 1 - pow(BETA2, s->iteration + 1);
+    const double age = ++s->scalar[AGE];
+    const double c1 = 1 - pow(BETA1, age), c2 = 1 - pow(BETA2, age);
     double mean_v = 0;
-    for (size_t k = 0; k < s->n; k++) {
-        const double gk = g[k] * goal->scale[k];
-        m[k] = BETA1 * m[k] + (1 - BETA1) * gk;
-        v[k] = BETA2 * v[k] + (1 - BETA2) * gk * gk;
-        mean_v += v[k] / (double)s->n;
+    for (size_t k = 0; k < s->n; k++) g[k] *= goal->scale[k];
+    along(s, g, work);
+    for (size_t j = 0; j < s->n; j++) {
+        m[j] = BETA1 * m[j] + (1 - BETA1) * work[j];
+        v[j] = BETA2 * v[j] + (1 - BETA2) * work[j] * work[j];
+        mean_v += v[j] / (double)s->n;
     }
     /* Keeps what was never seen at rest, whatever the objective's unit. */
     const double tiny = 1e-8 * sqrt(mean_v / c2) + 1e-300;
+    double pace = 0, rate = learning_rate; /* of many variables, all the same */
+    for (size_t j = 0; j < s->n; j++) {
+        if (s->array[PACE][j] != pace) {
+            pace = s->array[PACE][j];
+            rate = learning_rate * pow(1 + pace, -COOLING);
+        }
+        work[j] = rate * (m[j] / c1) / (sqrt(v[j] / c2) + tiny);
+    }
+    back(s, work, g);
     for (size_t k = 0; k < s->n; k++) {
-        const double move = s->scalar[RATE] * (m[k] / c1) / (sqrt(v[k] / c2) + tiny);
         const double old = x[k];
-        x[k] = imp__into_bounds(goal, k, old - goal->scale[k] * move);
-        const int wall = imp__at_bound(goal, x, k);
-        if ((wall < 0 && m[k] > 0) || (wall > 0 && m[k] < 0))
-            m[k] = 0; /* free to leave */
-        const double moved = fabs(x[k] - old) / goal->scale[k];
-        s->scalar[WAY] += moved;
-        s->scalar[LARGEST] = fmax(s->scalar[LARGEST], moved);
+        x[k] = imp__into_bounds(goal, k, old - goal->scale[k] * g[k]);
+        g[k] = (x[k] - old) / goal->scale[k];
+        s->scalar[LARGEST] = fmax(s->scalar[LARGEST], fabs(g[k]));
         s->array[SUM][k] += x[k];
     }
+    along(s, g, work);
+    for (size_t j = 0; j < s->n; j++) {
+        s->array[NET][j] += work[j];
+        s->array[WAY][j] += fabs(work[j]);
+    }
     s->scalar[COUNT]++;
+    const enum imp_status st = align(goal, s, false);
+    for (size_t k = 0; k < s->n; k++) { /* at a bound: free to leave */
+        const int wall = imp__at_bound(goal, x, k);
+        if ((wall < 0 && m[k] > 0) || (wall > 0 && m[k] < 0)) m[k] = 0;
+    }
+    return st;
 }
 
-static void window_end(const struct imp__goal *goal,
-                       const struct imp__opt_options *options, struct imp__search *s)
+/* Slower, from the window's mean, in directions that only wandered. With many variables,
+ * whose own ways say little, in all or none. work: [2 n]. */
+static void cool(const struct imp__goal *goal, struct imp__search *s, bool all, bool fell,
+                 double *work)
 {
-    double net = 0;
-    for (size_t k = 0; k < s->n; k++)
-        net += fabs(s->array[HERE][k] - s->array[ORIGIN][k]) / goal->scale[k];
+    const size_t n = s->n;
+    double *mean = work, *move = work + n, *pace = s->array[PACE];
+    for (size_t k = 0; k < n; k++)
+        move[k] = (s->array[SUM][k] / (WINDOW + 1) - s->array[HERE][k]) / goal->scale[k];
+    along(s, move, mean);
+    for (size_t j = 0; j < n; j++) {
+        const double net = fabs(s->array[NET][j]), way = s->array[WAY][j];
+        if (turned(s) ? net <= STALLED * way : all && !fell) {
+            /* Many variables have no average in many dimensions to go by: halve. */
+            pace[j] = turned(s) ? pace[j] + 1 : pow(2, 1 / COOLING) * (1 + pace[j]) - 1;
+            continue;
+        }
+        mean[j] = 0;
+        if (turned(s) && net >= STEADY * way) pace[j] = fmax(pace[j] - 1, 0);
+    }
+    back(s, mean, move);
+    for (size_t k = 0; k < n; k++)
+        s->array[HERE][k] =
+            imp__into_bounds(goal, k, s->array[HERE][k] + goal->scale[k] * move[k]);
+}
+
+static enum imp_status window_end(const struct imp__goal *goal,
+                                  const struct imp__opt_options *options,
+                                  struct imp__search *s, double *work)
+{
+    double net = 0, way = 0;
+    for (size_t j = 0; j < s->n; j++) {
+        net += fabs(s->array[NET][j]);
+        way += s->array[WAY][j];
+    }
     const double loss = s->scalar[LOSS] / WINDOW;
     const double var = s->scalar[LOSS_VAR] / (WINDOW * WINDOW);
-    const bool fell = s->scalar[OLD_LOSS] - loss > 2 * sqrt(var + s->scalar[OLD_VAR]);
-    const bool wandered = net <= STALLED * s->scalar[WAY];
+    const double fall = s->scalar[OLD_LOSS] - loss, se = sqrt(var + s->scalar[OLD_VAR]);
+    const bool fell = fall > FELL * se, wandered = net <= STALLED * way;
 
     if (s->scalar[LARGEST] < options->tolerance) {
         s->finished = true;
         s->reason = "steps stay below the tolerance";
     }
-    s->scalar[WANDERS] = wandered && !fell;
-    if (s->scalar[WANDERS]) {
-        s->scalar[RATE] /= 2;
-        for (size_t k = 0; k < s->n; k++)
-            s->array[HERE][k] =
-                imp__into_bounds(goal, k, s->array[SUM][k] / (WINDOW + 1));
+    cool(goal, s, wandered, fell, work);
+    if (fall > FAR * se) s->scalar[AVERAGED] = 0;
+    if (wandered && !fell && s->scalar[AVERAGED] == 0) {
+        memcpy(s->array[AVERAGE], s->array[HERE], s->n * sizeof(double));
+        s->scalar[AVERAGED] = 1;
     }
     s->scalar[OLD_LOSS] = loss;
     s->scalar[OLD_VAR] = var;
     window_begin(s);
+    return align(goal, s, true);
+}
+
+/* x: the iterate, or once the search wanders the average with weights 1, 2, 3, ... */
+static void answer(const struct imp__goal *goal, struct imp__search *s)
+{
+    const double n = s->scalar[AVERAGED];
+    if (n > 0) s->scalar[AVERAGED]++;
+    for (size_t k = 0; k < s->n; k++) {
+        double *mean = &s->array[AVERAGE][k];
+        *mean =
+            n > 0 ? *mean + (s->array[HERE][k] - *mean) * 2 / (n + 1) : s->array[HERE][k];
+        s->x[k] = imp__into_bounds(goal, k, *mean);
+    }
 }
 
 static enum imp_status run(const struct imp__goal *goal,
                            const struct imp__opt_options *options, struct imp__search *s)
 {
     enum imp_status st = IMP_OK;
-    double *g = imp__alloc(goal->ctx, imp_max(goal->n, (size_t)1), sizeof *g);
+    double *g = imp__alloc(goal->ctx, 2 * goal->n + 1, sizeof *g);
     if (!g) IMP_TRY(imp__error(goal->ctx, IMP_E_NOMEM, "no memory for a gradient"));
 
     while (!s->finished && s->iteration < options->max_iterations) {
         struct imp_estimate f;
+        if (s->iteration >= s->scalar[TURN]) IMP_TRY(look_round(goal, s));
         IMP_TRY(goal->eval(s->array[HERE], imp__search_seed(goal, s->iteration, 0), &f, g,
                            NULL, goal->payload));
         IMP_TRY(imp__search_log(s, f));
         s->scalar[LOSS] += f.value;
         s->scalar[LOSS_VAR] += f.se * f.se;
-        step(goal, s, g);
-        if (s->scalar[COUNT] == WINDOW) window_end(goal, options, s);
-        const double n = s->scalar[COUNT] + 1;
-        for (size_t k = 0; k < s->n; k++)
-            s->x[k] = s->scalar[WANDERS] ? imp__into_bounds(goal, k, s->array[SUM][k] / n)
-                                         : s->array[HERE][k];
+        IMP_TRY(step(goal, options->learning_rate, s, g, g + goal->n));
+        if (s->scalar[COUNT] == WINDOW) IMP_TRY(window_end(goal, options, s, g));
+        answer(goal, s);
         IMP_TRY(imp__search_iterated(goal, s));
     }
 out:

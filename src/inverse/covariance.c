@@ -301,6 +301,27 @@ static enum imp_status newton_point(const struct all *all, const double *x,
     return IMP_OK;
 }
 
+/* Is q = g^T G g no more than noise of g alone makes it? Its mean is then tr(G C) and its
+ * variance 2 tr((G C)^2), C the covariance of g. */
+static bool within_noise(const struct all *all, const struct analysis *a)
+{
+    const size_t n = all->n;
+    const double *g = all->mean.g, *C = all->mean.cov_g;
+    double q = 0, mean = 0, half_var = 0;
+    for (size_t k = 0; k < n; k++)
+        for (size_t l = 0; l < n; l++) {
+            double kl = 0, lk = 0; /* of G C */
+            for (size_t p = 0; p < n; p++) {
+                kl += a->G[k * n + p] * C[p * n + l];
+                lk += a->G[l * n + p] * C[p * n + k];
+            }
+            q += g[k] * a->G[k * n + l] * g[l];
+            mean += k == l ? kl : 0;
+            half_var += kl * lk;
+        }
+    return q <= mean + 2 * sqrt(2 * half_var);
+}
+
 /* Is the Newton point worth going to? A model that fails at x (not converged, far outside
  * its range) must not throw away what the search found. */
 static enum imp_status accept(const struct all *all, const double *x, double *point,
@@ -319,7 +340,8 @@ out:
 }
 
 enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
-                                int replicates, struct imp_fit_variable *variables,
+                                int replicates, double share,
+                                struct imp_fit_variable *variables,
                                 struct imp__uncertainty *out)
 {
     enum imp_status st = IMP_OK;
@@ -370,6 +392,8 @@ enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
         IMP_TRY(analyse(&all, fixed, &some));
         IMP_TRY(newton_point(&all, x, &some, u.x));
     }
+    if (share < 1 && within_noise(&all, &some))
+        for (size_t k = 0; k < n; k++) u.x[k] = x[k] + share * (u.x[k] - x[k]);
     IMP_TRY(accept(&all, x, u.x, &go));
     if (!go) memcpy(u.x, x, n * sizeof *x);
 

@@ -10,7 +10,7 @@
 struct imp__uncertainty {
     size_t n;
     double *x;           /* [n] a last Newton step from the x handed in, made with random
-                            numbers of its own: its error is what `covariance` describes */
+                            numbers of its own: its error is what the covariances say */
     double *measurement; /* [n][n] covariance: noise of the data */
     double *monte_carlo; /* [n][n] covariance: noise of the estimator */
     double condition;    /* of the scaled H; INFINITY if it is singular */
@@ -21,9 +21,15 @@ struct imp__uncertainty {
 };
 
 /* Evaluate the normal equations at x `replicates` (>= 2) times with fresh random numbers.
- * Sets value, se, lo95, hi95, at_bound, determined of variables [n]. */
+ * Sets value, se, lo95, hi95, at_bound, determined of variables [n].
+ *
+ * share: the part of all walks behind the answer that these are; less than 1 where x is
+ * an average over a search. If the Newton step is then no longer than its own noise, it
+ * is taken by that share only, as the mean of two estimates would be; the errors stated
+ * are still those of the whole step, and so an upper bound. */
 enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
-                                int replicates, struct imp_fit_variable *variables,
+                                int replicates, double share,
+                                struct imp_fit_variable *variables,
                                 struct imp__uncertainty *out);
 void imp__uncertainty_destroy(imp_context *ctx, struct imp__uncertainty *u);
 

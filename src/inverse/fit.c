@@ -19,13 +19,19 @@ static enum imp_status final_objective(struct imp__fit *f, const double *x,
 
 /* Samples per pixel of each replicate. A search that averaged many evaluations with few
  * samples (Adam) knows more than a few more of them could tell. */
-static int replicate_spp(const struct imp__fit *f, const struct imp__search *s)
+static int replicate_spp(const struct imp__fit *f, const struct imp__search *s, int spp)
 {
-    const struct imp_problem *p = f->problem;
-    const int spp = f->outer.spp > 0 ? f->outer.spp
-                                     : p->scene->sensors[p->targets[0].desc.sensor]->spp;
     const double wanted = (double)spp * s->iteration / (EFFORT_SHARE * REPLICATES);
     return wanted > spp ? (int)fmin(wanted, 1 << 24) : f->outer.spp;
+}
+
+/* The part of the walks behind the answer that the replicates are. Weights that grow with
+ * the iterate's number make n iterates as good as 3/4 n. */
+static double replicate_share(const struct imp__fit *f, const struct imp__search *s,
+                              int spp)
+{
+    const double mine = (double)REPLICATES * (f->run.spp > 0 ? f->run.spp : spp);
+    return mine / (mine + 0.75 * s->scalar[IMP_SEARCH_AVERAGED] * spp);
 }
 
 /* Covariance, intervals, and the last Newton step that belongs to them. *why: the reason
@@ -39,8 +45,12 @@ static enum imp_status intervals(struct imp__fit *f, const struct imp__search *s
         *why = "they are for at most 256 numbers";
         return IMP_OK;
     }
-    f->run.spp = replicate_spp(f, s);
-    const enum imp_status st = imp__covariance(&f->goal, x, REPLICATES, variables, u);
+    const struct imp_problem *p = f->problem;
+    const int spp = f->outer.spp > 0 ? f->outer.spp
+                                     : p->scene->sensors[p->targets[0].desc.sensor]->spp;
+    f->run.spp = replicate_spp(f, s, spp);
+    const enum imp_status st = imp__covariance(&f->goal, x, REPLICATES,
+                                               replicate_share(f, s, spp), variables, u);
     if (st == IMP_OK) memcpy(x, u->x, f->problem->n * sizeof *x);
     if (st != IMP_E_NUMERIC && st != IMP_E_UNSUPPORTED) return st;
     *why = imp__arena_strdup(&f->problem->fit_arena, imp_last_error(ctx));

@@ -54,7 +54,8 @@ struct imp__opt_options {
     double tolerance;     /* of the scale */
 };
 
-enum { IMP_SEARCH_ARRAYS = 5, IMP_SEARCH_SCALARS = 12 };
+/* Of the scalars, one is for all to read: how many iterates x is the average of. */
+enum { IMP_SEARCH_ARRAYS = 11, IMP_SEARCH_SCALARS = 12, IMP_SEARCH_AVERAGED = 11 };
 
 struct imp__search {
     imp_context *ctx;

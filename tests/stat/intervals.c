@@ -27,7 +27,7 @@ int main(void)
         for (int k = 0; k < TOY_N; k++) x0[k] = 0.7 * t.truth[k];
         enum imp_status st = imp__search_create(&t.goal, IMP_LM, &o, x0, &s);
         if (st == IMP_OK) st = imp__optimize(&t.goal, &o, s);
-        if (st == IMP_OK) st = imp__covariance(&t.goal, s->x, REPLICATES, v, &u);
+        if (st == IMP_OK) st = imp__covariance(&t.goal, s->x, REPLICATES, 1, v, &u);
         if (st != IMP_OK) {
             failed++;
             imp__search_destroy(s);
@@ -61,7 +61,7 @@ int main(void)
         t.A[p][3] = t.A[p][0] * t.scale[0] / t.scale[3];
     }
     for (int k = 0; k < TOY_N; k++) t.scale[k] = fabs(t.truth[k]);
-    enum imp_status st = imp__covariance(&t.goal, t.truth, REPLICATES, v, &u);
+    enum imp_status st = imp__covariance(&t.goal, t.truth, REPLICATES, 1, v, &u);
     tap_ok(st == IMP_OK && !v[0].determined && !v[3].determined && v[1].determined &&
                v[2].determined && isnan(v[0].lo95) && isnan(v[3].hi95) && u.n_loose == 1,
            "an ill-posed pair is found # loosest (%.2f %.2f %.2f %.2f), condition %g",
@@ -78,7 +78,7 @@ int main(void)
     double x[TOY_N];
     memcpy(x, t.truth, sizeof x);
     x[2] = t.lo[2];
-    st = imp__covariance(&t.goal, x, REPLICATES, v, &u);
+    st = imp__covariance(&t.goal, x, REPLICATES, 1, v, &u);
     tap_ok(st == IMP_OK && v[2].at_bound == -1 && v[2].lo95 == t.lo[2] &&
                v[2].hi95 > v[2].lo95 && v[2].determined,
            "at a bound # [%g, %g]", v[2].lo95, v[2].hi95);

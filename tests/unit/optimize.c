@@ -112,6 +112,38 @@ static void resume(enum imp_optimizer kind)
     imp__search_destroy(part);
 }
 
+/* A valley across the axes: two columns that nearly say the same. What only looks at one
+ * coordinate at a time creeps along it; with our noise, and at a bound, too. */
+static void valley(void)
+{
+    for (int c = 0; c < 3; c++) {
+        struct toy t;
+        enum imp_status st;
+        double ls[TOY_N], inv[TOY_N * TOY_N];
+        toy_make(&t, ctx, 4, 0.01, c == 1 ? 0.02 : 0);
+        t.H_noise = 1e-5;
+        for (int p = 0; p < TOY_M; p++) {
+            t.T[p] -= t.A[p][1] * t.truth[1];
+            t.A[p][1] = t.scale[0] / t.scale[1] * (t.A[p][0] + 0.01 * t.A[p][1]);
+            t.T[p] += t.A[p][1] * t.truth[1];
+        }
+        toy_least_squares(&t, ls, inv);
+        if (c == 2) { /* the others' best with x[3] at its bound */
+            t.hi[3] = 0.9995 * ls[3];
+            const double by = (t.hi[3] - ls[3]) / inv[15];
+            for (int k = 0; k < TOY_N; k++) ls[k] += inv[k * TOY_N + 3] * by;
+        }
+        struct imp__search *s = solve(&t, IMP_ADAM, &st);
+        double worst = 0;
+        for (int k = 0; k < TOY_N; k++)
+            worst = fmax(worst, fabs(s->x[k] - ls[k]) / sqrt(inv[k * TOY_N + k]));
+        static const char *const name_of[] = {"no noise", "noise", "at a bound"};
+        tap_ok(st == IMP_OK && worst < 0.002, /* of the error that noise 1 would make */
+               "Adam in a valley, %s # %.1e: %s", name_of[c], worst, s->reason);
+        imp__search_destroy(s);
+    }
+}
+
 int main(void)
 {
     if (imp_context_create(NULL, &ctx) != IMP_OK) return 1;
@@ -119,6 +151,7 @@ int main(void)
         answers(kind);
         resume(kind);
     }
+    valley();
     /* A variable nothing depends on stays where it was. */
     struct toy t;
     enum imp_status st;

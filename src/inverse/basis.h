@@ -1,0 +1,24 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Directions in which a method that treats each coordinate for itself should walk: the
+ * eigenvectors of the Gauss-Newton matrix in units of the scales, where the objective has
+ * no valleys across the axes. */
+#ifndef IMP_INVERSE_BASIS_H
+#define IMP_INVERSE_BASIS_H
+
+#include "optimize.h"
+
+#define IMP_BASIS_MAX 64 /* variables: J^T J costs n^2 a walk */
+
+/* A [n][n] = D H D, H = J^T J at x from the random numbers of `seed`, D the scales.
+ * *known false: there is none. */
+enum imp_status imp__basis_matrix(const struct imp__goal *goal, const double *x,
+                                  uint64_t seed, double *A, bool *known);
+
+/* V [n][n], orthonormal rows, from A: row k is direction k. Variables that are `aligned`
+ * (not 0), and those without any effect, keep axes of their own: row k is e_k.
+ * R [n][n] = V V_old^T: what turns numbers along the old directions into the new ones. */
+enum imp_status imp__basis_turn(imp_context *ctx, size_t n, const double *A,
+                                const double *aligned, double *V, double *R);
+
+#endif
