@@ -182,6 +182,10 @@ static void light_sample(struct step *s, struct imp_vertex *v,
 static bool throughput_add(struct step *s, const struct imp_bsdf *b, imp_spec factor)
 {
     const struct imp_active *active = s->tracer->active;
+    if (imp_likely(factor[0] != 0 && factor[1] != 0 && factor[2] != 0)) {
+        s->beta *= factor;
+        return !imp__is_zero(s->beta);
+    }
     const bool differentiable = active && b->index >= 0 && active->bsdf[b->index];
     const double stand_in = fmax(imp__max3(factor), 0.5);
     for (int c = 0; c < 3; c++) {
