@@ -117,7 +117,7 @@ static void rays_record(imp_context *ctx, imp_scene *scene, struct rays *out)
                     if (!v->shape) break;
                     out->list[out->n++] =
                         (struct ray){o, imp__normalize(v->at.p - o), INFINITY, false};
-                    if (v->light >= 0) {
+                    if (v->l_weight > 0) {
                         const imp_v3 d = imp__normalize(v->l_p - v->at.p);
                         out->list[out->n++] = (struct ray){imp__offset(v->at.p, v->ng, d),
                                                            d, v->l_at.dist * .9999, true};

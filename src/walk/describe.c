@@ -102,6 +102,8 @@ static void json(struct text *t, const struct imp_scene *scene, const struct imp
             }
             put_vector(t, "light_sample", v->l_f * v->l_le * v->l_weight, C);
             put(t, ",");
+        } else if (v->l_weight > 0) {
+            put(t, "\"light\":null,\"light_blocked\":true,");
         }
         if (v->inv_ps > 0) {
             put(t, "\"lobe\":%d,\"pdf\":", v->dirs.lobe);
@@ -147,6 +149,8 @@ static void plain(struct text *t, const struct imp_scene *scene, const struct im
         if (v->light >= 0) {
             put(t, "    light        %s\n", scene->emitters[v->light]->name);
             plain_spec(t, "light sample", v->l_f * v->l_le * v->l_weight, C);
+        } else if (v->l_weight > 0) {
+            put(t, "    light        blocked\n");
         }
         if (v->inv_ps > 0) {
             if (v->dirs.lobe == IMP_SMOOTH)
@@ -158,6 +162,7 @@ static void plain(struct text *t, const struct imp_scene *scene, const struct im
                     v->dirs.lobe, v->pdf, v->survive);
             plain_spec(t, "weight", v->w, C);
             plain_spec(t, "arriving", v->lin, C);
+            if (!v->next) put(t, "    leaves the scene\n");
         } else {
             put(t, "    ends here%s\n", w->absorbed && !v->next ? ", absorbed" : "");
         }

@@ -68,7 +68,7 @@ static struct imp_vertex *vertex_add(struct step *s, int n_in)
     v->shape = NULL;
     v->in = (imp_spec *)(v + 1);
     v->w = v->e = v->lin = (imp_spec){0};
-    v->inv_ps = v->pdf = 0;
+    v->inv_ps = v->pdf = v->l_weight = 0;
     v->survive = 1;
     v->emitter = v->light = -1;
     v->glows = false;

@@ -43,7 +43,7 @@ struct imp_vertex {
     imp_spec e; /* E_k: all emission of this vertex, weighted */
 
     int light;       /* emitter sampled and visible, -1: none */
-    double l_weight; /* MIS weight / density */
+    double l_weight; /* MIS weight / density; > 0, light -1: something is in between */
     struct imp_emission l_at;
     imp_v3 l_wi;        /* local */
     imp_v3 l_p;         /* point on the light */
