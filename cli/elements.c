@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * importon elements: the deterministic solver. A picture, the statistics of the solution,
- * and with --sensitivity what every light and reflectance does to the measurement. */
+ * with --sensitivity what every light and reflectance does to the measurement, and with
+ * --fit lights and reflectances for wanted measurements. */
 #include "elements.h"
 #include "picture.h"
+#include "problem.h"
 #include "progress.h"
 
 #include <math.h>
@@ -43,11 +45,11 @@ static const struct arg_option options[] = {
      &o.phong, 0, 0, NULL},
     {ARG_LIST, 0, "beam", "SHAPE=N[,X,Y,Z]", "give a light a cosine-power direction",
      &o.beams, 0, 0, NULL},
-    {ARG_LIST, 0, "region", "[W:]X0,Y0,X1,Y1", "measure a part of the picture",
+    {ARG_LIST, 0, "region", "[W:]X0,Y0,X1,Y1[=T]", "measure a part of the picture",
      &o.sources.regions, 0, 0, NULL},
-    {ARG_LIST, 0, "plane", "[W:]CORNER,U,V", "measure the irradiance of a virtual patch",
-     &o.sources.planes, 0, 0, NULL},
-    {ARG_LIST, 0, "lux", "[W:]SHAPE", "measure the irradiance of a shape",
+    {ARG_LIST, 0, "plane", "[W:]CORNER,U,V[=T]",
+     "measure the irradiance of a virtual patch", &o.sources.planes, 0, 0, NULL},
+    {ARG_LIST, 0, "lux", "[W:]SHAPE[=T]", "measure the irradiance of a shape",
      &o.sources.shapes, 0, 0, NULL},
     {ARG_FLAG, 0, "sensitivity", NULL,
      "print derivatives of the measurement, largest first", &o.sensitivity, 0, 0, NULL},
@@ -64,6 +66,7 @@ static struct {
     struct imp_elements_phong *phong;
     struct imp_elements_beam *beams;
     struct imp_elements_source *sources;
+    double *targets;
     size_t n_sources;
 } named;
 
@@ -72,7 +75,9 @@ static int options_make(struct imp_elements_options *e)
     int rc = elements_phong(&o.phong, &named.phong);
     if (!rc) rc = elements_beams(&o.beams, &named.beams);
     if (!rc)
-        rc = elements_sources(&o.sources, cli.sensor, &named.sources, &named.n_sources);
+        rc = elements_sources(&o.sources, cli.sensor, &named.sources, &named.targets,
+                              &named.n_sources);
+    if (!rc) rc = elements_fit_check(named.targets, named.n_sources);
     if (rc) return rc;
     e->phong = named.phong;
     e->n_phong = o.phong.n;
@@ -242,7 +247,7 @@ static int run_elements(int n, char **operand)
     imp_elements *e = NULL;
     enum imp_status st;
     (void)n;
-    int rc = cli_load(operand[0]);
+    int rc = cli_load(operand[0]), complete = 1;
     if (!rc) rc = options_make(&options_e);
     if (rc) return rc;
     const struct imp_run run = cli_run();
@@ -250,11 +255,12 @@ static int run_elements(int n, char **operand)
         st = imp_elements_open(cli.scene, &options_e, o.open, &e);
     } else {
         st = imp_elements_create(cli.scene, &options_e, &e);
-        if (st == IMP_OK) st = imp_elements_solve(e);
+        if (st == IMP_OK && !elements_fit_wanted()) st = imp_elements_solve(e);
     }
-    const int complete = st == IMP_OK;
-    if (cli_failed(st) || !e) {
-        rc = cli_fail(st, cli.scene_path);
+    if (cli_failed(st) || !e) rc = cli_fail(st, cli.scene_path);
+    complete = st == IMP_OK;
+    if (!rc && elements_fit_wanted()) rc = elements_fit(e, named.targets, &complete);
+    if (rc) {
         imp_elements_destroy(e);
         return rc;
     }
@@ -273,8 +279,11 @@ static int run_elements(int n, char **operand)
         j = &json;
     }
     if (!rc) print_info(j, &info, complete);
+    if (!rc && elements_fit_wanted())
+        rc = elements_fit_answer(j, to_stdout ? NULL : &o.sources);
     if (!rc && o.sensitivity && !to_stdout) rc = print_sensitivity(e, j);
     if (j) cli_json_end(j);
+    elements_fit_close();
     imp_elements_destroy(e);
     return rc ? rc : cli_done();
 }
@@ -283,7 +292,8 @@ const struct command command_elements = {
     {"elements",
      "SCENE",
      "solve a scene without noise, by finite elements",
-     {options, options_run, options_scene, options_general},
+     {options, options_elements_fit, options_params, options_run, options_scene,
+      options_general},
      1,
      1},
     run_elements,

@@ -3,10 +3,12 @@
  * Options of importon elements that hold several numbers: overrides and measurements. */
 #include "elements.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* "a,b,..": at least `least`, at most `most` numbers. How many, or -1. */
+/* "a,b,..": at least `least`, at most `most` numbers, up to the end of the text or a `=`.
+ * How many, or -1. */
 static int numbers(const char *text, double *out, int least, int most)
 {
     int n = 0;
@@ -15,7 +17,7 @@ static int numbers(const char *text, double *out, int least, int most)
         out[n] = strtod(text, &end);
         if (end == text) return -1;
         n++;
-        if (*end == 0) return n >= least ? n : -1;
+        if (*end == 0 || *end == '=') return n >= least ? n : -1;
         if (*end != ',') return -1;
         text = end + 1;
     }
@@ -74,56 +76,101 @@ int elements_beams(const struct arg_list *list, struct imp_elements_beam **out)
     return 0;
 }
 
-/* "numbers" or "weight:numbers". */
-static const char *weight_of(const char *text, double *weight)
+int elements_bounds(const struct arg_list *list, struct imp_elements_bounds **out)
 {
-    const char *colon = strchr(text, ':');
-    *weight = 1;
-    if (!colon) return text;
+    *out = cli_alloc(list->n + 1, sizeof **out);
+    for (size_t i = 0; i < list->n; i++) {
+        double v[2];
+        int n = 0;
+        (*out)[i].glob = named(list->item[i], v, 2, 2, &n);
+        if (!(*out)[i].glob)
+            return cli_error(EXIT_USAGE, "--bounds '%s': GLOB=LO,HI", list->item[i]);
+        (*out)[i].lo = v[0];
+        (*out)[i].hi = v[1];
+    }
+    return 0;
+}
+
+/* "what", "weight:what", "what=target" or both; target NAN: none is given. Returns where
+ * `what` begins. */
+static const char *parts_of(const char *text, double *weight, double *target)
+{
+    const char *colon = strchr(text, ':'), *equals = strrchr(text, '=');
     char *end;
-    *weight = strtod(text, &end);
-    return end == colon ? colon + 1 : text;
+    *weight = 1;
+    *target = NAN;
+    if (equals) {
+        *target = strtod(equals + 1, &end);
+        if (end == equals + 1 || *end) *target = INFINITY;
+    }
+    if (!colon) return text;
+    const double w = strtod(text, &end);
+    if (end != colon) return text;
+    *weight = w;
+    return colon + 1;
+}
+
+static int source_parse(const char *option, const char *text, int n_numbers,
+                        const char *form, struct imp_elements_source *s, double *v,
+                        double *target)
+{
+    const char *what = parts_of(text, &s->weight, target);
+    if (isinf(*target) || (n_numbers && numbers(what, v, n_numbers, n_numbers) < 0))
+        return cli_error(EXIT_USAGE, "--%s '%s': [WEIGHT:]%s[=TARGET]", option, text,
+                         form);
+    if (!n_numbers) {
+        const char *equals = strrchr(what, '=');
+        const size_t n = equals ? (size_t)(equals - what) : strlen(what);
+        char *name = cli_alloc(n + 1, 1);
+        memcpy(name, what, n);
+        s->shape = name;
+    }
+    return 0;
 }
 
 int elements_sources(const struct elements_sources *s, int sensor,
-                     struct imp_elements_source **out, size_t *n_out)
+                     struct imp_elements_source **out, double **targets, size_t *n_out)
 {
+    static const struct imp_elements_source initial = IMP_ELEMENTS_SOURCE_INIT;
     const size_t n = s->regions.n + s->planes.n + s->shapes.n;
     *out = cli_alloc(n + 1, sizeof **out);
+    *targets = cli_alloc(n + 1, sizeof **targets);
     *n_out = n;
-    size_t at = 0;
     for (size_t i = 0; i < n; i++) {
-        static const struct imp_elements_source initial = IMP_ELEMENTS_SOURCE_INIT;
-        (*out)[i] = initial;
-    }
-    for (size_t i = 0; i < s->regions.n; i++, at++) {
-        struct imp_elements_source *p = &(*out)[at];
-        double v[4];
-        if (numbers(weight_of(s->regions.item[i], &p->weight), v, 4, 4) != 4)
-            return cli_error(EXIT_USAGE, "--region '%s': [WEIGHT:]X0,Y0,X1,Y1",
-                             s->regions.item[i]);
-        p->kind = IMP_ELEMENTS_CAMERA;
-        p->sensor = sensor;
-        for (int k = 0; k < 4; k++)
-            p->region[k] = v[k] >= 0 && v[k] < 1e9 ? (int)v[k] : -1;
-    }
-    for (size_t i = 0; i < s->planes.n; i++, at++) {
-        struct imp_elements_source *p = &(*out)[at];
-        double v[9];
-        if (numbers(weight_of(s->planes.item[i], &p->weight), v, 9, 9) != 9)
-            return cli_error(EXIT_USAGE,
-                             "--plane '%s': [WEIGHT:] a corner and two edges, nine "
-                             "numbers",
-                             s->planes.item[i]);
-        p->kind = IMP_ELEMENTS_PLANE;
-        memcpy(p->origin, v, sizeof p->origin);
-        memcpy(p->edge_u, v + 3, sizeof p->edge_u);
-        memcpy(p->edge_v, v + 6, sizeof p->edge_v);
-    }
-    for (size_t i = 0; i < s->shapes.n; i++, at++) {
-        struct imp_elements_source *p = &(*out)[at];
-        p->kind = IMP_ELEMENTS_SHAPE;
-        p->shape = weight_of(s->shapes.item[i], &p->weight);
+        struct imp_elements_source *p = &(*out)[i];
+        double v[9], *target = &(*targets)[i];
+        size_t k = i;
+        int rc;
+        *p = initial;
+        if (k < s->regions.n) {
+            rc = source_parse("region", s->regions.item[k], 4, "X0,Y0,X1,Y1", p, v,
+                              target);
+            p->kind = IMP_ELEMENTS_CAMERA;
+            p->sensor = sensor;
+            for (int a = 0; a < 4 && !rc; a++)
+                p->region[a] = v[a] >= 0 && v[a] < 1e9 ? (int)v[a] : -1;
+        } else if ((k -= s->regions.n) < s->planes.n) {
+            rc = source_parse("plane", s->planes.item[k], 9,
+                              "a corner and two edges, nine numbers", p, v, target);
+            p->kind = IMP_ELEMENTS_PLANE;
+            for (int a = 0; a < 3 && !rc; a++) {
+                p->origin[a] = v[a];
+                p->edge_u[a] = v[3 + a];
+                p->edge_v[a] = v[6 + a];
+            }
+        } else {
+            k -= s->planes.n;
+            rc = source_parse("lux", s->shapes.item[k], 0, "SHAPE", p, v, target);
+            p->kind = IMP_ELEMENTS_SHAPE;
+        }
+        if (rc) return rc;
     }
     return 0;
+}
+
+const char *elements_source_name(const struct elements_sources *s, size_t i)
+{
+    if (i < s->regions.n) return s->regions.item[i];
+    i -= s->regions.n;
+    return i < s->planes.n ? s->planes.item[i] : s->shapes.item[i - s->planes.n];
 }

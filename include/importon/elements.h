@@ -9,7 +9,8 @@
  *     imp_elements_solve        refine and solve until a stopping rule
  *     imp_elements_image        pictures through the scene's sensors, any number of views
  *     imp_elements_sensitivity  what every light and every reflectance does to the
- * measurement
+ *                               measurement
+ *     imp_elements_fit          lights and reflectances for wanted measurements
  *
  * It takes rectangles, cubes and meshes; area lights; materials that are smooth,
  * isotropic and without textures. What cannot be projected is refused by name. Results
@@ -168,6 +169,65 @@ struct imp_elements_row {
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_elements_sensitivity(imp_elements *elements, const struct imp_elements_row **rows,
                          size_t *n_rows);
+
+/* ---- Design: numbers of the scene for wanted measurements ----------------------- */
+
+/** Bounds for the active numbers of parameters that match; inside the scene's own. */
+struct imp_elements_bounds {
+    const char *glob;
+    double lo, hi;
+};
+struct imp_elements_fit_options {
+    size_t size;
+    enum imp_optimizer optimizer; /**< IMP_ADAM, the 0: IMP_LM up to 256 numbers, else
+                                       IMP_LBFGS */
+    int max_iterations;           /**< of every round; 0: 100 */
+    double tolerance;             /**< of steps, relative; 0: 1e-8 */
+    int rounds;            /**< at most, each on links refined at the last answer; 0: 3 */
+    const double *targets; /**< [n_sources] of the elements' options */
+    size_t n_bounds;
+    const struct imp_elements_bounds *bounds;
+};
+#define IMP_ELEMENTS_FIT_OPTIONS_INIT                                                    \
+    {                                                                                    \
+        sizeof(struct imp_elements_fit_options), IMP_ADAM, 0, 0, 0, 0, 0, 0              \
+    }
+struct imp_elements_goal {
+    double target, before, after; /**< a source's measurement, without its weight */
+};
+struct imp_elements_fit_result {
+    size_t size;
+    int iterations, rounds;
+    double objective;
+    int linear; /**< only lights were active: the measurements are linear in x */
+    size_t n_goals;
+    const struct imp_elements_goal *goals; /**< [n_goals] */
+    size_t n;
+    const struct imp_fit_variable *variables; /**< [n]; no intervals: there is no noise */
+    size_t n_history;
+    const double *history;
+    const char *reason;
+};
+
+/**
+ * Find the problem's active numbers (lights, reflectances) for which every source of the
+ * elements measures its target, inside bounds: the least value of
+ *
+ *     1/2 sum over sources of weight ((J - target) / scale)^2 + the problem's
+ * regularisers
+ *
+ * where scale is |target|, or 1 if that is 0, by adjoint sensitivities. With lights alone
+ * it is a linear least-squares problem with bounds, solved from one adjoint solution a
+ * source. The problem needs no targets of its own. Progress and time limit are those of
+ * the elements' options. The scene and the elements end at the answer; the result belongs
+ * to the problem and lives until its next fit.
+ * @return IMP_OK; IMP_CANCELLED (the state reached is set); IMP_E_ARG; IMP_E_UNSUPPORTED
+ * for an active number of which finite elements have no derivative.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_elements_fit(imp_elements *elements, imp_problem *problem,
+                 const struct imp_elements_fit_options *options,
+                 const struct imp_elements_fit_result **result);
 
 /** Write elements and links to a file; open it again with the same scene and options. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_elements_save(const imp_elements *elements,

@@ -103,7 +103,8 @@ struct imp__el_root { /* an input polygon, one side of it */
     int light_param, light_count; /* its parameter, -1: none */
     const char *light_name;
     double light_value[3];
-    double measure; /* importance that it emits, a constant; 0: none */
+    bool measured;  /* by a source: it has a coefficient even if it is black */
+    double measure; /* importance that it emits, a constant */
     uint32_t element;
     int back; /* root of its other side, -1: none */
 };
@@ -205,7 +206,7 @@ static inline const struct imp__el_material *el_material(const imp_elements *e,
 static inline int el_n(const imp_elements *e, const struct imp__el_root *r)
 {
     const int n = e->materials[r->material].n;
-    return n == 0 && r->measure != 0 ? 1 : n;
+    return n == 0 && r->measured ? 1 : n;
 }
 /* Emitted radiance along w (world, away from the surface), relative to L0. */
 static inline double el_lobe(const struct imp__el_root *r, imp_v3 w)
@@ -216,6 +217,9 @@ static inline double el_lobe(const struct imp__el_root *r, imp_v3 w)
     return c > 0 ? pow(c, r->power) : 0;
 }
 
+/* roots.c: give every source the weight w [n_sources]: what the polygons emit as
+ * importance and what the eye's hits weigh. Then imp__el_bin, and sweeps. */
+void imp__el_weigh(imp_elements *e, const double *w);
 /* roots.c: polygons, lights and materials of the scene; errors name the shape. */
 enum imp_status imp__el_roots(imp_elements *e);
 enum imp_status imp__el_materials(imp_elements *e); /* project; after roots */
@@ -285,6 +289,8 @@ void imp__el_ray(const struct imp_sensor *s, int x, int y, int k, int side,
 void imp__el_flat(const imp_elements *e, const struct imp__el_hit *hit, double out[3]);
 /* solve.c: sweeps until the solution moves by less than `tolerance`, `n` at a time. */
 enum imp_status imp__el_settle(imp_elements *e, int n, bool importance, double tolerance);
+/* Lights and reflectances as the scene has them now; the polygons stay. */
+enum imp_status imp__el_parameters(imp_elements *e);
 /* Call the host's progress; sets e->stop. */
 void imp__el_tick(imp_elements *e, const char *stage, double fraction, const char *note);
 

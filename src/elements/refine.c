@@ -78,7 +78,7 @@ static double error_of(const imp_elements *e, const struct imp__el_link *k,
         for (int c = 0; c < e->ch; c++)
             g[c] =
                 imp__spec(e->lum[c] * (e->materials[ri->material].albedo[c] * IMP_INV_PI +
-                                       (ri->measure != 0 ? IMP_INV_PI : 0)));
+                                       (ri->measured ? IMP_INV_PI : 0)));
     double q_min = INFINITY, q_max = 0, k_max = 0, l_max = 0, g_max = 0;
     for (int s = 0; s < 4; s++) {
         double q = 0;
@@ -273,7 +273,7 @@ static enum imp_status total_work(size_t item, int worker, int slot, void *paylo
             if (!v->importance)
                 g[c] = imp__spec(e->lum[c] *
                                  (e->materials[r->material].albedo[c] * IMP_INV_PI +
-                                  (r->measure != 0 ? IMP_INV_PI : 0)));
+                                  (r->measured ? IMP_INV_PI : 0)));
             for (int s = 0; s < 4; s++) sum += link->k[s] * fabs(l[c][s] * g[c][s]);
         }
     }

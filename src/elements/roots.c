@@ -317,29 +317,56 @@ static enum imp_status plane_add(imp_elements *e, const struct imp_elements_sour
     if (!(r.area > 0) || !isfinite(r.area))
         return imp__error(e->ctx, IMP_E_ARG, "a measuring plane has area %g", r.area);
     r.frame = imp__frame_from_normal(c * (1 / r.area));
-    r.measure = src->weight / r.area;
+    r.measured = true;
     const enum imp_status st =
         imp__el_material_add(e, &(struct imp__el_material){.bsdf = NULL}, &r.material);
     return st == IMP_OK ? root_append(e, &r, &index) : st;
 }
 
+/* Is the root a front of the shape that this source measures? */
+static bool is_measured(const imp_elements *e, const struct imp__el_root *r,
+                        const struct imp_elements_source *src)
+{
+    if (r->shape < 0 || strcmp(e->scene->shapes[r->shape]->name, src->shape) != 0)
+        return false;
+    return r->back < 0 || &e->roots[r->back] > r; /* a back comes after its front */
+}
+
 static enum imp_status measure_shape(imp_elements *e,
                                      const struct imp_elements_source *src)
 {
-    double area = 0;
-    for (int pass = 0; pass < 2; pass++)
-        for (size_t i = 0; i < e->n_roots; i++) {
-            struct imp__el_root *r = &e->roots[i];
-            if (r->shape < 0 || strcmp(e->scene->shapes[r->shape]->name, src->shape) != 0)
-                continue;
-            if (r->back >= 0 && r->back < (int)i) continue; /* that is a back */
-            if (pass) r->measure += src->weight / area;
-            else area += r->area;
-        }
-    if (!(area > 0))
+    bool found = false;
+    for (size_t i = 0; i < e->n_roots; i++)
+        if (is_measured(e, &e->roots[i], src)) found = e->roots[i].measured = true;
+    if (!found)
         return imp__error(e->ctx, IMP_E_ARG, "there is no shape '%s' to measure",
                           src->shape);
     return IMP_OK;
+}
+
+void imp__el_weigh(imp_elements *e, const double *w)
+{
+    size_t plane = 0; /* their roots are the last, in the sources' order */
+    while (plane < e->n_roots && e->roots[plane].shape >= 0) plane++;
+    for (size_t i = 0; i < e->n_roots; i++) e->roots[i].measure = 0;
+    for (size_t k = 0; k < e->n_sources; k++) {
+        const struct imp_elements_source *src = &e->sources[k];
+        if (src->kind == IMP_ELEMENTS_CAMERA) {
+            size_t n = 0;
+            for (size_t i = 0; i < e->n_hits; i++) n += e->hits[i].source == k;
+            for (size_t i = 0; i < e->n_hits; i++)
+                if (e->hits[i].source == k) e->hits[i].weight = w[k] / (double)n;
+        } else if (src->kind == IMP_ELEMENTS_PLANE) {
+            struct imp__el_root *r = &e->roots[plane++];
+            r->measure = w[k] / r->area;
+        } else {
+            double area = 0;
+            for (size_t i = 0; i < e->n_roots; i++)
+                if (is_measured(e, &e->roots[i], src)) area += e->roots[i].area;
+            for (size_t i = 0; i < e->n_roots; i++)
+                if (is_measured(e, &e->roots[i], src)) e->roots[i].measure += w[k] / area;
+        }
+    }
 }
 
 static bool name_is_shape(const imp_elements *e, const char *name)
@@ -392,6 +419,10 @@ enum imp_status imp__el_roots(imp_elements *e)
         if (src->kind == IMP_ELEMENTS_PLANE) IMP_TRY(plane_add(e, src));
         if (src->kind == IMP_ELEMENTS_SHAPE) IMP_TRY(measure_shape(e, src));
     }
+    double *w = imp__arena_array(&e->arena, e->n_sources, sizeof *w);
+    if (!w) IMP_TRY(no_memory(e));
+    for (size_t i = 0; i < e->n_sources; i++) w[i] = e->sources[i].weight;
+    imp__el_weigh(e, w);
 out:
     return st;
 }

@@ -393,8 +393,7 @@ out:
     return st;
 }
 
-/* Lights and reflectances as the scene has them now; the polygons stay. */
-static enum imp_status parameters_read(imp_elements *e)
+enum imp_status imp__el_parameters(imp_elements *e)
 {
     for (size_t i = 0; i < e->n_roots; i++) {
         struct imp__el_root *r = &e->roots[i];
@@ -426,7 +425,7 @@ enum imp_status imp_elements_update(imp_elements *e)
     if (!e) return IMP_E_ARG;
     if (!e->solved)
         return imp__error(e->ctx, IMP_E_ARG, "the elements are not solved yet");
-    IMP_TRY(parameters_read(e));
+    IMP_TRY(imp__el_parameters(e));
     IMP_TRY(imp__el_bin(e));
     IMP_TRY(imp__el_settle(e, 4, e->has_importance, 1e-10));
 out:

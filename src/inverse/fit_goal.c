@@ -111,26 +111,6 @@ static enum imp_status normal(const double *x, uint64_t seed, struct imp__normal
     return IMP_OK;
 }
 
-/* The regularisers are quadratic: column k of their second derivative is a difference of
- * gradients, without error. */
-static enum imp_status prior(struct imp__fit *f)
-{
-    const size_t n = f->problem->n;
-    double *x = imp__alloc(f->problem->ctx, 2 * n, sizeof *x);
-    if (!x) return imp__error(f->problem->ctx, IMP_E_NOMEM, "no memory for regularisers");
-    double *g0 = x + n;
-    imp__regularise(f->problem, x, g0);
-    for (size_t k = 0; k < n; k++) {
-        double *row = f->H_prior + k * n;
-        x[k] = 1;
-        imp__regularise(f->problem, x, row);
-        x[k] = 0;
-        for (size_t l = 0; l < n; l++) row[l] -= g0[l];
-    }
-    imp__release(f->problem->ctx, x);
-    return IMP_OK;
-}
-
 /* ---- What the fit belongs to --------------------------------------------------- */
 
 static void fingerprint(struct imp__fit *f)
@@ -248,7 +228,7 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
         f.H_prior = imp__alloc(ctx, n * n, sizeof *f.H_prior);
         if (!f.H_prior)
             IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for regularisers"));
-        IMP_TRY(prior(&f));
+        IMP_TRY(imp__regularise_second(p, f.H_prior));
     }
     f.noise_known = true;
     for (size_t i = 0; i < p->n_targets; i++)

@@ -43,6 +43,9 @@ struct imp_problem {
 /* Regularisers' value; adds their gradient (may be NULL). x [n]. */
 double imp__regularise(const struct imp_problem *p, const double *x, double *gradient);
 
+/* Their second derivative, H [n][n]. */
+enum imp_status imp__regularise_second(const struct imp_problem *p, double *H);
+
 /* Gauss-Newton pieces for all quadratic targets, from one set of walks, K = p->n <= 256
  * (gradients.md 15):
  *   H [K*K]      U-statistic estimate of J^T W J (unbiased, may be indefinite)

@@ -112,6 +112,41 @@ static void gradient(imp_context *ctx)
     imp_scene_destroy(s);
 }
 
+/* A lamp designed for a picture of mean 0.1: walks see that picture. */
+static void design(imp_context *ctx)
+{
+    imp_scene *s = test_scene(ctx, "elements/b.xml", IMP_MONO, "res=32");
+    imp_problem *p = test_problem(ctx, s, "light_left*");
+    struct imp_elements_options o = IMP_ELEMENTS_OPTIONS_INIT;
+    struct imp_elements_fit_options f = IMP_ELEMENTS_FIT_OPTIONS_INIT;
+    struct imp_run run = IMP_RUN_INIT;
+    const struct imp_elements_fit_result *r;
+    const double target = 0.1;
+    imp_elements *e;
+    imp_film *film;
+    o.stop = -1;
+    o.eps_last = 2e-5;
+    o.rays = 12;
+    f.targets = &target;
+    test_must(ctx, imp_elements_create(s, &o, &e));
+    test_must(ctx, imp_elements_fit(e, p, &f, &r));
+    run.spp = 1024;
+    test_must(ctx, imp_render(s, &run, &film));
+    double mean = 0, var = 0;
+    for (int k = 0; k < RES * RES; k++) {
+        mean += film->mean[k] / (RES * RES);
+        var += imp__sqr(film->se[k] / (RES * RES));
+    }
+    tap_ok(fabs(mean - target) < 3 * sqrt(var) + 0.005 * target &&
+               sqrt(var) < 0.0045 * target,
+           "a lamp of %.4g for a mean of %g # walks %.5g se %.1g z %.2f",
+           r->variables[0].value, target, mean, sqrt(var), (mean - target) / sqrt(var));
+    imp_film_destroy(film);
+    imp_elements_destroy(e);
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+}
+
 /* ---- Scene d: beams and glossy walls ------------------------------------------- */
 
 static double beam(const imp_scene *s, int shape, imp_v3 n, imp_v3 w)
@@ -234,6 +269,7 @@ int main(void)
     diffuse(ctx, "elements/a.xml", "scene a", 384, 1e-5);
     diffuse(ctx, "elements/b.xml", "scene b", 1024, 5e-5);
     gradient(ctx);
+    design(ctx);
     glossy(ctx, 384);
     imp_context_destroy(ctx);
     return tap_done();
