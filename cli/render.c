@@ -101,9 +101,9 @@ static void report(const char *path, imp_film *film, const struct imp_run *run)
                 ? ", interrupted"
                 : ", interrupted in the first pass: a part of the picture is there");
     if (info.dropped)
-        cli_say(
-            "importon: warning: %llu walks dropped: a value was not finite or negative",
-            (unsigned long long)info.dropped);
+        cli_say("importon: warning: %llu walks dropped: a value was not finite or "
+                "negative, or a bent ray was lost",
+                (unsigned long long)info.dropped);
     if (!cli.json || !strcmp(path, "-")) return;
     struct json j = cli_json();
     json_text(&j, "file", path);

@@ -89,9 +89,10 @@ enum imp_bsdf_flags {
     IMP_BSDF_SMOOTH = 1, /* has lobes with a density */
     IMP_BSDF_DELTA = 2,  /* has delta lobes */
     IMP_BSDF_TRANSMIT = 4,
-    IMP_BSDF_EMIT = 8, /* has emit: Stam's ambient terms */
-    IMP_BSDF_JUMP = 16 /* f/pdf of sample jumps at the horizon: sample_d, which has no
-                          boundary term, is not the whole derivative */
+    IMP_BSDF_EMIT = 8,  /* has emit: Stam's ambient terms */
+    IMP_BSDF_JUMP = 16, /* f/pdf of sample jumps at the horizon: sample_d, which has no
+                           boundary term, is not the whole derivative */
+    IMP_BSDF_NULL = 32  /* light passes as if nothing were there */
 };
 
 struct imp_bsdf {
@@ -194,6 +195,10 @@ struct imp_texture_ops {
                     bool scalar,
                     double (*dot)(const void *x_dot, int param, size_t element),
                     const void *x_dot, imp_spec *value_dot);
+    /* d value/du, d value/dv, for what moves over the texture. False, or NULL: the value
+     * jumps somewhere, and this derivative is not the whole of it. */
+    bool (*slope)(const struct imp_texture *t, const struct imp_texcoord *at, bool scalar,
+                  imp_spec d_uv[2]);
 };
 
 /* ---- Shape --------------------------------------------------------------------- */
@@ -243,6 +248,14 @@ struct imp_shape {
     struct imp_triangles triangles; /* if geometry is IMP_TRIANGLES */
     imp_v3 lo, hi;                  /* bounds; build sets them */
     const char *name;
+    bool smooth; /* shading normals turn over flat facets; build sets it */
+    const struct imp_medium *interior; /* behind ng; NULL: none */
+};
+
+/* A surface of constant curvature. */
+struct imp_round {
+    imp_v3 centre, axis; /* of a sphere the axis is 0 */
+    double radius;
 };
 
 struct imp_shape_ops {
@@ -264,6 +277,8 @@ struct imp_shape_ops {
     /* Its density for the point found at `at` (hit from ref), per steradian. */
     double (*pdf_toward)(const struct imp_shape *s, const imp_v3 *ref,
                          const struct imp_hit *hit, const struct imp_surface *at);
+    /* The sphere or cylinder that it is part of; NULL: flat where it is hit. */
+    void (*round)(const struct imp_shape *s, struct imp_round *out);
 };
 
 /* ---- Emitter ------------------------------------------------------------------- */

@@ -69,8 +69,9 @@ struct imp_node {
     size_t n_children, cap_children;
     const struct imp_mesh_data *mesh; /* attached data, or NULL */
     const struct imp_image_data *image;
-    void *object; /* what was made from it (scene/build.c) */
-    int visiting; /* cycle detection */
+    struct imp_medium *medium; /* attached: a graded index (format/graded.c), or NULL */
+    void *object;              /* what was made from it (scene/build.c) */
+    int visiting;              /* cycle detection */
 };
 
 /* Nodes and everything in them live in the arena; arrays grow in it too. */

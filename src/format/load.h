@@ -12,6 +12,10 @@ enum imp_status imp__load_options(imp_context *ctx, const struct imp_load_option
 /* An empty scene, `folder` (may be NULL) at the end of its search list. */
 enum imp_status imp__scene_new(imp_context *ctx, const struct imp_load_options *options,
                                const char *folder, struct imp_scene **out);
+/* graded.c: attach the field of a <medium type="graded">; when the scene is built, make
+ * ready to trace. */
+enum imp_status imp__graded_attach(struct imp_scene *scene, struct imp_node *node);
+enum imp_status imp__graded_finish(struct imp_scene *scene);
 /* resolve.c: attach meshes and pictures to the nodes that name files. */
 enum imp_status imp__files_attach(struct imp_scene *scene);
 /* Attach files, make objects, release what only they needed. References are resolved. */

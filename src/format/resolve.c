@@ -111,6 +111,8 @@ static enum imp_status attach(struct imp_scene *scene, struct imp_node *node)
                bitmap =
                    strcmp(node->tag, "texture") == 0 && strcmp(node->type, "bitmap") == 0;
     if (obj || ply) IMP_TRY(mesh_attach(scene, node, obj));
+    if (strcmp(node->tag, "medium") == 0 && strcmp(node->type, "graded") == 0)
+        IMP_TRY(imp__graded_attach(scene, node));
     if (bitmap && !node->image) IMP_TRY(image_attach(scene, node));
     else if (bitmap && imp__node_prop(node, "filename"))
         IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_SCENE,

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include "curved/inside.h"
 #include "load.h"
 #include "search.h"
 #include "tree.h"
@@ -40,6 +41,7 @@ void imp_scene_destroy(imp_scene *scene)
     if (!scene) return;
     imp_context *ctx = scene->ctx;
     imp__intersector_destroy(scene);
+    for (int i = 0; i < scene->n_media; i++) imp__graded_destroy(scene->media[i]->graded);
     if (scene->tree) imp__tree_free(scene->tree);
     imp__release(ctx, scene->tree);
     for (size_t i = 0; i < scene->n_search; i++) imp__release(ctx, scene->search[i]);
@@ -65,6 +67,7 @@ enum imp_status imp__scene_finish(struct imp_scene *scene)
 {
     enum imp_status st = imp__files_attach(scene);
     if (st == IMP_OK) st = imp__scene_build(scene);
+    if (st == IMP_OK) st = imp__graded_finish(scene);
     files_forget(scene->root);
     imp__arena_free(&scene->files);
     return st;

@@ -56,6 +56,8 @@ static enum imp_status top_build(struct imp_scene *scene, struct imp_child *chil
         if (!had_id && !node->object)
             IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_SCENE,
                                     "an area emitter must be inside a shape"));
+    } else if (strcmp(tag, "medium") == 0) {
+        if (!node->id) node->id = name; /* declared; made where a shape refers to it */
     } else if (strcmp(tag, "integrator") == 0) {
         if (scene->has_integrator)
             IMP_TRY(
@@ -108,6 +110,7 @@ enum imp_status imp__scene_build(struct imp_scene *scene)
                                                     .emitter_samples = 1,
                                                     .bsdf_samples = 1};
     IMP_TRY(lights_build(scene));
+    IMP_TRY(imp__media_check(scene));
     imp__theta_finish(scene);
     IMP_TRY(imp__intersector_create(scene));
     scene->committed = true;

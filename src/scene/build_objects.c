@@ -183,7 +183,7 @@ enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
     double silhouette;
     IMP_TRY(imp__props_float(ctx, node, "silhouette_sampling_weight", 1, &silhouette));
 
-    struct imp_node *bsdf = NULL, *emitter = NULL;
+    struct imp_node *bsdf = NULL, *emitter = NULL, *medium = NULL;
     for (size_t i = 0; i < node->n_children; i++) {
         struct imp_child *c = &node->children[i];
         const char *tag = c->node->tag;
@@ -194,7 +194,12 @@ enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
             if (emitter)
                 IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "has two emitters"));
             emitter = c->node;
-        } else if (strcmp(tag, "medium") == 0 || strcmp(tag, "sensor") == 0) {
+        } else if (strcmp(tag, "medium") == 0) {
+            if (medium || !c->name || strcmp(c->name, "interior") != 0)
+                IMP_TRY(imp__node_error(ctx, c->node, IMP_E_UNSUPPORTED,
+                                        "a shape has one medium, named interior"));
+            medium = c->node;
+        } else if (strcmp(tag, "sensor") == 0) {
             IMP_TRY(imp__node_error(ctx, c->node, IMP_E_UNSUPPORTED,
                                     "this version has no %s inside a shape", tag));
         } else {
@@ -216,6 +221,14 @@ enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
         s->bsdf = made->index;
     } else {
         s->bsdf = -2;
+    }
+    if (medium) {
+        if (bsdf && (imp__props_has(bsdf, "int_ior") || imp__props_has(bsdf, "ext_ior")))
+            IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
+                                    "the index inside is its medium's, the one outside "
+                                    "the medium's outside_index: the bsdf has no "
+                                    "int_ior and no ext_ior"));
+        IMP_TRY(imp__build_medium(scene, medium, name, &s->interior));
     }
     if (emitter) {
         if (!(s->area > 0))

@@ -9,13 +9,14 @@
 #include "kind/build.h"
 #include "math/vec.h"
 
-enum imp_param_store { IMP_STORE_LANES, IMP_STORE_BULK };
+enum imp_param_store { IMP_STORE_LANES, IMP_STORE_BULK, IMP_STORE_DOUBLES };
 
 struct imp_param {
     struct imp_param_info info;
     enum imp_param_store store;
     imp_spec *lanes; /* LANES: info.count numbers in lanes 0.., a scalar in all of them */
     float *bulk;     /* BULK: [info.count] in place */
+    double *doubles; /* DOUBLES: [info.count] in place */
 };
 
 enum imp_integrator_kind {
@@ -74,6 +75,29 @@ struct imp_integrator {
     struct imp_integrator_elements elements;
 };
 
+/* A graded index inside shapes. What it is, and how rays step through it, is known to
+ * `curved` alone; its numbers are parameters like all others. */
+struct imp_graded;
+struct imp_medium_numbers {
+    const char *key;     /* below the medium's name: "field.coefficients" */
+    size_t first, count; /* place in the field's theta */
+    int n_dims;
+    size_t dims[3];
+    double *number, lo, hi;
+    int param; /* -1 until the scene is built */
+};
+struct imp_medium {
+    const char *name;
+    struct imp_graded *graded;    /* curved/inside.h; destroyed with the scene */
+    double outside;               /* index around it */
+    imp_v3 lo, hi;                /* of all shapes it fills */
+    const struct imp_shape *ball; /* the sphere it fills, if nothing else is near it */
+    struct imp_node *node;        /* where it was declared */
+    int index;                    /* in the scene; -1: in no shape */
+    int n_numbers;
+    struct imp_medium_numbers *numbers;
+};
+
 struct imp_scene {
     imp_context *ctx;
     struct imp_arena arena; /* nodes, objects, names */
@@ -97,6 +121,8 @@ struct imp_scene {
     struct imp_emitter **emitters;
     struct imp_sensor **sensors;
     struct imp_texture **textures;
+    int n_media;
+    struct imp_medium **media; /* attached to nodes; those in use have an index */
     struct imp_bsdf *default_bsdf, *black_bsdf;
     struct imp_integrator integrator;
     bool has_integrator;
@@ -119,6 +145,14 @@ enum imp_status imp__scene_build(struct imp_scene *scene);
 /* ---- integrator.c -------------------------------------------------------------- */
 enum imp_status imp__integrator_build(struct imp_scene *scene, struct imp_node *node,
                                       struct imp_integrator *out);
+
+/* ---- media.c ------------------------------------------------------------------- */
+/* The medium of a shape: its numbers become parameters where it is met first. */
+enum imp_status imp__build_medium(struct imp_scene *scene, struct imp_node *node,
+                                  const char *parent, const struct imp_medium **out);
+/* When all objects are there: may these media be where they are, and which of their
+ * numbers have a derivative? */
+enum imp_status imp__media_check(struct imp_scene *scene);
 
 /* ---- theta.c ------------------------------------------------------------------- */
 enum imp_status imp__theta_add(struct imp_scene *scene, const struct imp_param *param,

@@ -34,12 +34,18 @@ void imp__theta_finish(struct imp_scene *scene)
 
 double imp__param_get(const struct imp_param *p, size_t k)
 {
-    return p->store == IMP_STORE_BULK ? (double)p->bulk[k] : (*p->lanes)[k];
+    switch (p->store) {
+    case IMP_STORE_BULK: return (double)p->bulk[k];
+    case IMP_STORE_DOUBLES: return p->doubles[k];
+    case IMP_STORE_LANES: break;
+    }
+    return (*p->lanes)[k];
 }
 
 void imp__param_set(struct imp_param *p, size_t k, double value)
 {
     if (p->store == IMP_STORE_BULK) p->bulk[k] = (float)value;
+    else if (p->store == IMP_STORE_DOUBLES) p->doubles[k] = value;
     else if (p->info.count == 1) *p->lanes = imp__spec(value);
     else (*p->lanes)[k] = value;
 }

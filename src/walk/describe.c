@@ -170,9 +170,11 @@ static void plain(struct text *t, const struct imp_scene *scene, const struct im
     }
     if (!w->first) put(t, "  meets nothing\n");
     if (w->dropped)
-        put(t, w->dropped == IMP_DROP_LONG
-                   ? "  dropped: nothing ended it\n"
-                   : "  dropped: its value is not finite, or negative\n");
+        put(t,
+            w->dropped == IMP_DROP_LONG ? "  dropped: nothing ended it\n"
+            : w->dropped == IMP_DROP_BENT
+                ? "  dropped: a bent ray came to no end, or to what media cannot hold\n"
+                : "  dropped: its value is not finite, or negative\n");
     plain_spec(t, "radiance", w->L, C);
 }
 

@@ -4,7 +4,7 @@
  * roulette stay, values are looked up and multiplied again. Differences of this are what
  * a detached derivative must equal, to rounding (gradients.md 13 A); they are blind to
  * wrong densities, which fresh-seed differences see. */
-#include "walk.h"
+#include "bend.h"
 
 #define MAX_INPUTS 32
 
@@ -27,6 +27,7 @@ imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk
         const struct imp_bsdf *b = v->bsdf;
         imp_spec in[MAX_INPUTS], f, sum = {0};
         if (b) imp__inputs_eval(b->input, b->n_in, &v->at, in);
+        if (b && v->shape->interior) imp__bend_inputs(v, in);
         if (b && v->inv_ps > 0) {
             b->ops->eval(b, in, &v->dirs, &f);
             sum += f * v->inv_ps * L;

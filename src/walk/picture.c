@@ -61,10 +61,12 @@ enum imp_status imp__drops_check(imp_context *ctx, const struct imp_run *run,
 {
     const double budget = run->drop_budget > 0 ? run->drop_budget : 1e-4;
     if ((double)dropped <= 1 + budget * walks) return IMP_OK;
-    return imp__error(ctx, IMP_E_PATHS,
-                      "%llu of %.0f walks were dropped: their values were not finite or "
-                      "negative, or nothing ended them in %d steps",
-                      (unsigned long long)dropped, walks, IMP_WALK_MAX);
+    return imp__error(
+        ctx, IMP_E_PATHS,
+        "%llu of %.0f walks were dropped: their values were not finite or "
+        "negative, nothing ended them in %d steps, or they bent without end "
+        "(render --pixel tells which)",
+        (unsigned long long)dropped, walks, IMP_WALK_MAX);
 }
 
 static void accumulate(double *sums, double w, const double *value, int n)

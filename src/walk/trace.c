@@ -9,8 +9,8 @@
  * p^e for a light sample, power heuristic with exponent 2, w^B = 1 at the first vertex
  * and after a delta lobe. Depth: emission at vertex k counts if k < max_depth, scattering
  * goes on and samples lights if k + 1 < max_depth (scene-format 11). */
+#include "bend.h"
 #include "dims.h"
-#include "walk.h"
 
 struct step {
     const struct imp_tracer *tracer;
@@ -25,6 +25,7 @@ struct step {
     double eta;    /* product of index ratios */
     int zeros[3];  /* per lane: factors that are zero but have a derivative */
     int depth;
+    struct imp_bending *bend; /* NULL: no medium in the scene */
 };
 
 static double light_pmf(const struct imp_scene *s, int light)
@@ -66,6 +67,7 @@ static struct imp_vertex *vertex_add(struct step *s, int n_in)
     w->n++;
     v->bsdf = NULL;
     v->shape = NULL;
+    v->leg = NULL;
     v->in = (imp_spec *)(v + 1);
     v->w = v->e = v->lin = (imp_spec){0};
     v->inv_ps = v->pdf = v->l_weight = 0;
@@ -239,6 +241,28 @@ static bool scatter(struct step *s, struct imp_vertex *v, const struct imp_surfa
     s->t_min = 0;
     s->t_max = INFINITY;
     s->pdf = v->dirs.lobe == IMP_SMOOTH ? sample.pdf : 0;
+    if (imp_unlikely(s->bend != NULL)) {
+        imp__bend_leave(s->bend, v, at, s->d);
+        if (s->bend->medium) s->pdf = 0; /* no light sample could have been taken */
+    }
+    return true;
+}
+
+/* The ray in flight, in a medium: to what it meets. The step's weight gets the ratio of
+ * the squared indices at its ends: radiance/n^2 is what stays along a ray. */
+static bool bend_meet(struct step *s, struct imp_hit *hit)
+{
+    struct imp_vertex *last = s->walk->last;
+    double ratio;
+    if (!imp__bend_meet(s->scene, s->bend, &s->from, &s->o, &s->d, hit, &ratio)) {
+        s->walk->dropped = IMP_DROP_BENT;
+        return false;
+    }
+    const double scale = ratio * ratio;
+    last->inv_ps *= scale;
+    last->w *= scale;
+    s->beta *= scale;
+    s->eta /= ratio;
     return true;
 }
 
@@ -279,7 +303,9 @@ static bool step(struct step *s)
     const bool goes_on =
         integrator->max_depth < 0 || s->depth + 1 < integrator->max_depth;
     struct imp_hit hit;
-    if (!first_hit(s, &hit)) {
+    if (imp_unlikely(s->bend != NULL) && s->bend->medium) {
+        if (!bend_meet(s, &hit)) return false;
+    } else if (!first_hit(s, &hit)) {
         const bool hidden = integrator->hide_emitters && s->depth == 0;
         if (scene->environment < 0 || hidden || !counts) return false;
         struct imp_vertex *v = vertex_add(s, 0);
@@ -305,6 +331,9 @@ static bool step(struct step *s)
     v->at = (struct imp_texcoord){{at.uv[0], at.uv[1]}, at.p};
     v->dirs.wo = imp__to_local(&frame, -s->d);
     imp__inputs_eval(v->bsdf->input, v->bsdf->n_in, &v->at, v->in);
+    if (imp_unlikely(s->bend != NULL) &&
+        !imp__bend_arrive(s->tracer, s->arena, s->walk, s->bend, v, &hit, &at, s->d))
+        return false;
 
     struct shadow shadow = {.light = -1};
     const bool stam = integrator->kind == IMP_INTEGRATOR_STAM;
@@ -323,8 +352,11 @@ static bool step(struct step *s)
         }
     }
     if (ended || !goes_on) return false;
-    if (v->bsdf->flags & (IMP_BSDF_SMOOTH | IMP_BSDF_DELTA)) s->walk->valid = true;
-    if ((v->bsdf->flags & IMP_BSDF_SMOOTH) && wants_lights(integrator))
+    if ((v->bsdf->flags & (IMP_BSDF_SMOOTH | IMP_BSDF_DELTA)) &&
+        !(v->bsdf->flags & IMP_BSDF_NULL))
+        s->walk->valid = true;
+    if ((v->bsdf->flags & IMP_BSDF_SMOOTH) && wants_lights(integrator) &&
+        !(s->bend && s->bend->medium))
         light_sample(s, v, &at, &frame, &shadow);
     const bool only_lights =
         integrator->kind == IMP_INTEGRATOR_DIRECT && integrator->bsdf_samples == 0;
@@ -374,6 +406,8 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
                      .from = walk->ray.o,
                      .beta = {1, 1, 1, 0},
                      .eta = 1};
+    struct imp_bending bend = {0};
+    if (imp_unlikely(tracer->scene->n_media > 0)) s.bend = &bend;
     while (step(&s)) s.depth++;
 
     const imp_spec L = imp__walk_fold(walk);

@@ -49,6 +49,8 @@ struct imp_vertex {
     imp_v3 l_p;         /* point on the light */
     imp_spec l_f, l_le; /* BSDF and radiance; B_k = l_f l_le l_weight */
 
+    struct imp_leg *leg; /* the way here, for derivatives of media (bend.h); or NULL */
+
     imp_v3 ng;              /* geometric normal, world, for describe */
     double pdf, survive, t; /* density, survival, distance from the last vertex */
 };
@@ -59,7 +61,8 @@ enum imp_drop {
     IMP_DROP_INFINITE,
     IMP_DROP_NEGATIVE,
     IMP_DROP_MEMORY,
-    IMP_DROP_LONG
+    IMP_DROP_LONG,
+    IMP_DROP_BENT /* a bent ray came to no end, or to what media cannot hold (bend.h) */
 };
 
 /* Vertices of a walk. One of more is dropped: nothing ends it, as in a closed white room
@@ -84,6 +87,7 @@ struct imp_active {
     int64_t *base;    /* [n_params] index in x of a parameter's first number, or -1 */
     uint8_t *bsdf;    /* [n_bsdfs] does it depend on an active number */
     uint8_t *emitter; /* [n_emitters] */
+    uint8_t *medium;  /* [n_media]; NULL: none of them */
 };
 /* `chosen` [n_params]. */
 enum imp_status imp__active_create(const struct imp_scene *scene, const uint8_t *chosen,

@@ -123,6 +123,12 @@ static double pdf_toward(const struct imp_shape *s, const imp_v3 *ref,
     return imp__area_to_angle(*ref, at->p, at->ng, 1 / s->area);
 }
 
+static void round_of(const struct imp_shape *s, struct imp_round *out)
+{
+    const struct cylinder *k = s->self;
+    *out = (struct imp_round){k->base, k->axes.n, k->radius};
+}
+
 const struct imp_shape_ops imp__cylinder = {.size = sizeof(struct imp_shape_ops),
                                             .name = "cylinder",
                                             .object_size = sizeof(struct cylinder),
@@ -130,4 +136,5 @@ const struct imp_shape_ops imp__cylinder = {.size = sizeof(struct imp_shape_ops)
                                             .intersect = intersect,
                                             .surface = surface,
                                             .sample_toward = sample_toward,
-                                            .pdf_toward = pdf_toward};
+                                            .pdf_toward = pdf_toward,
+                                            .round = round_of};

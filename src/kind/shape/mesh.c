@@ -247,6 +247,7 @@ enum imp_status imp__mesh_build(const struct imp_build *b, void *self,
     m->normals = normals && !is_flat(m, normals, data->n_triangles) ? normals : NULL;
     if (!m->normals) IMP_TRY(tangents_make(b, m, data->n_triangles));
     s->geometry = IMP_TRIANGLES;
+    s->smooth = m->normals != NULL;
     s->triangles = (struct imp_triangles){n, data->n_triangles, m->positions, m->indices};
 out:
     return st;

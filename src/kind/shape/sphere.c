@@ -148,6 +148,12 @@ static double pdf_toward(const struct imp_shape *s, const imp_v3 *ref,
                        : imp__area_to_angle(*ref, at->p, at->ng, 1 / s->area);
 }
 
+static void round_of(const struct imp_shape *s, struct imp_round *out)
+{
+    const struct sphere *p = s->self;
+    *out = (struct imp_round){.centre = p->center, .radius = p->radius};
+}
+
 const struct imp_shape_ops imp__sphere = {.size = sizeof(struct imp_shape_ops),
                                           .name = "sphere",
                                           .object_size = sizeof(struct sphere),
@@ -155,4 +161,5 @@ const struct imp_shape_ops imp__sphere = {.size = sizeof(struct imp_shape_ops),
                                           .intersect = intersect,
                                           .surface = surface,
                                           .sample_toward = sample_toward,
-                                          .pdf_toward = pdf_toward};
+                                          .pdf_toward = pdf_toward,
+                                          .round = round_of};

@@ -1,0 +1,428 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A bent ray inside a body, step by step: each step's chord is looked at by the scene's
+ * intersector, and the step that meets a shape is cut to end on it exactly. The same
+ * steps, landings and transposes as in trace.c and adjoint.c; one ray, no turns. */
+#include "inside.h"
+#include <string.h>
+
+#define STEPS_DEFAULT 100 /* across a body whose field has no cells */
+
+enum imp_status imp__graded_create(imp_bend *bend, struct imp_graded **out)
+{
+    struct imp_graded *g = imp__alloc(bend->ctx, 1, sizeof *g);
+    if (!g) {
+        imp_context *ctx = bend->ctx;
+        imp_bend_destroy(bend);
+        return imp__error(ctx, IMP_E_NOMEM, "no memory for a graded medium");
+    }
+    g->bend = bend;
+    *out = g;
+    return IMP_OK;
+}
+
+void imp__graded_destroy(struct imp_graded *g)
+{
+    if (!g) return;
+    imp_context *ctx = g->bend->ctx;
+    if (g->ready) imp__plan_destroy(&g->plan);
+    imp_bend_destroy(g->bend);
+    imp__release(ctx, g);
+}
+
+enum imp_status imp__graded_ready(struct imp_graded *g, imp_v3 lo, imp_v3 hi)
+{
+    enum imp_status st = IMP_OK;
+    const imp_field *f = g->bend->field;
+    struct imp_bend_options o;
+    double size = 0;
+    for (int k = 0; k < 3; k++) size = fmax(size, hi[k] - lo[k]);
+    for (int k = 0; k < 3; k++)
+        if (lo[k] < f->lo[k] - 1e-6 * size || hi[k] > f->hi[k] + 1e-6 * size)
+            IMP_TRY(imp__error(g->bend->ctx, IMP_E_SCENE,
+                               "the field ends at %g .. %g along axis %d (world "
+                               "coordinates), the shape at %g .. %g",
+                               f->lo[k], f->hi[k], k, lo[k], hi[k]));
+    imp__bend_options(g->bend, &o);
+    double corner[2][3];
+    imp__v3_store(lo, corner[0]);
+    imp__v3_store(hi, corner[1]);
+    const struct imp_bend_rays box = {2, (const double(*)[3])corner,
+                                      (const double(*)[3])corner, NULL};
+    if (!(o.step > 0)) {
+        double most = 0; /* the greatest index on a diagonal */
+        for (int i = 0; i <= 64; i++) {
+            const imp_v3 x = lo + (hi - lo) * (i / 64.0);
+            const double eta = imp__graded_index(g, &x);
+            if (isfinite(eta)) most = fmax(most, eta);
+        }
+        o.step = size / (STEPS_DEFAULT * fmax(most, 1e-3));
+    }
+    struct imp_bend_surface end = IMP_BEND_SURFACE_INIT; /* unused: the scene ends rays */
+    o.surfaces = &end;
+    o.n_surfaces = 1;
+    o.n_taps = 0;
+    if (g->ready) imp__plan_destroy(&g->plan);
+    g->ready = false;
+    IMP_TRY(imp__plan_create(f, &o, &box, &g->plan));
+    g->ready = true;
+    const double margin = 0.01 * size + 2 * g->plan.t;
+    for (int k = 0; k < 3; k++) {
+        g->plan.lo[k] = lo[k] - margin;
+        g->plan.hi[k] = hi[k] + margin;
+    }
+    g->plan.size = size;
+out:
+    return st;
+}
+
+/* ---- Shapes -------------------------------------------------------------------- */
+
+void imp__level(const struct imp_shape *s, imp_v3 p, imp_v3 ng, struct imp__surface *l)
+{
+    *l = (struct imp__surface){.kind = IMP__PLANE, .n = ng, .offset = imp__dot(ng, p)};
+    if (!s->ops->round) return;
+    struct imp_round r;
+    s->ops->round(s, &r);
+    const bool sphere = imp__dot(r.axis, r.axis) == 0;
+    *l = (struct imp__surface){.kind = sphere ? IMP__SPHERE : IMP__CYLINDER,
+                               .n = r.axis,
+                               .c = r.centre,
+                               .radius = r.radius};
+}
+
+static inline imp_v3 vertex(const struct imp_triangles *t, uint32_t i)
+{
+    const float *p = t->positions + 3 * (size_t)i;
+    return imp__v3(p[0], p[1], p[2]);
+}
+
+/* Triangles: the weights of x, in double. Analytic shapes answer themselves; the ray is
+ * cut to the last bit of its way, so that they do not find their other side. */
+void imp__hit_at(const struct imp_shape *s, imp_v3 x, imp_v3 d, double far,
+                 struct imp_hit *hit)
+{
+    struct imp_hit found;
+    hit->t = far;
+    if (s->geometry == IMP_ANALYTIC) {
+        const imp_v3 o = x - d * far;
+        if (s->ops->intersect(s, &o, &d, far * (1 - 1e-3), far * (1 + 1e-3), &found)) {
+            found.shape = hit->shape;
+            *hit = found;
+        }
+        return;
+    }
+    const uint32_t *i = s->triangles.indices + 3 * (size_t)hit->prim;
+    const imp_v3 p = vertex(&s->triangles, i[0]);
+    const imp_v3 a = vertex(&s->triangles, i[1]) - p, b = vertex(&s->triangles, i[2]) - p;
+    const imp_v3 y = x - p;
+    const double aa = imp__dot(a, a), ab = imp__dot(a, b), bb = imp__dot(b, b);
+    const double ya = imp__dot(y, a), yb = imp__dot(y, b), det = aa * bb - ab * ab;
+    if (!(det > 0)) return;
+    hit->u = (bb * ya - ab * yb) / det;
+    hit->v = (aa * yb - ab * ya) / det;
+}
+
+/* ---- Forwards ------------------------------------------------------------------ */
+
+/* Cut the step from `from` to end on the surface: Newton from the chord's crossing. */
+static bool land(const struct imp__plan *p, const struct imp__surface *s,
+                 const struct imp__state *from, double first, double *tau,
+                 struct imp__state *at)
+{
+    double t = first;
+    for (int i = 0; i < 50; i++) {
+        struct imp__state rate;
+        struct imp__surface_at sa;
+        *at = *from;
+        imp__step_rate(p->scheme, p->field, t, at, &rate);
+        imp__surface_eval(s, &at->x, &at->v, &sa);
+        const double slope = imp__dot(sa.gx, rate.x) + imp__dot(sa.gv, rate.v);
+        const double move = sa.g / slope;
+        if (!(fabs(t - move - first) <= 0.5 * p->t)) return false;
+        t -= move;
+        if (fabs(move) <= 1e-7 * p->t) { /* the next would be its square */
+            *tau = t;
+            *at = *from;
+            imp__step(p->scheme, p->field, t, 1, &at->x, &at->v, &at->path);
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool end_ride(const struct imp_graded *g, const struct imp_scene *scene,
+                     const struct imp__state *from, imp_v3 way, double first,
+                     struct imp__ride *r, struct imp_hit *hit)
+{
+    const struct imp_shape *shape = scene->shapes[hit->shape];
+    struct imp_surface at;
+    const imp_v3 o = from->x;
+    shape->ops->surface(shape, hit, &o, &way, &at);
+    imp__level(shape, at.p, at.ng, &r->level);
+    if (!land(&g->plan, &r->level, from, first, &r->tau, &r->at)) return false;
+    r->from = *from;
+    imp__field_eval1(g->plan.field, &r->at.x, 1, &r->k);
+    const double v2 = imp__dot(r->at.v, r->at.v), eta2 = r->k.eta * r->k.eta;
+    if (!(r->k.eta > 0) || !(fabs(v2 - eta2) <= 0.1 * eta2)) return false;
+    r->end = r->at.v * (1 / sqrt(v2));
+    r->length += imp__length(r->at.x - from->x);
+    imp__hit_at(shape, r->at.x, r->end, r->length, hit);
+    return true;
+}
+
+bool imp__ride(const struct imp_medium *m, const struct imp_scene *scene, imp_v3 x,
+               imp_v3 ng, imp_v3 d, struct imp__ride *r, struct imp_hit *hit)
+{
+    const struct imp_graded *g = m->graded;
+    struct imp_round ball = {.radius = 0};
+    if (m->ball) m->ball->ops->round(m->ball, &ball);
+    const double inside2 = imp__sqr(ball.radius) * (1 - 1e-9);
+    const struct imp__plan *p = &g->plan;
+    /* Chords overlap by what the intersector's rounding may lose. */
+    const double overlap = IMP_RAY_EPSILON * (p->size + imp__length(x));
+    struct imp__state s = {x, d, 0};
+    *r = (struct imp__ride){.x = x, .d = d};
+    imp__field_eval1(p->field, &x, 1, &r->j);
+    if (!(r->j.eta > 0) || !isfinite(r->j.eta) || !imp__is_finite(r->j.g)) return false;
+    s.v = r->j.eta * d;
+    for (; r->steps < p->max_steps; r->steps++) {
+        const struct imp__state from = s;
+        imp__step(p->scheme, p->field, p->t, 1, &s.x, &s.v, &s.path);
+        const imp_v3 chord = s.x - from.x, y = s.x - ball.centre;
+        if (imp__dot(y, y) < inside2) {
+            r->length += imp__length(chord);
+            continue;
+        }
+        const double length = imp__length(chord);
+        if (!(length > 0) || !isfinite(length)) return false;
+        const imp_v3 along = chord * (1 / length);
+        imp_v3 o = r->steps == 0 ? imp__offset(x, ng, along) : from.x - along * overlap;
+        const double before = imp__dot(from.x - o, along);
+        if (imp__intersect(scene, &o, &along, 0, before + length + overlap, hit)) {
+            const double first = p->t * (hit->t - before) / length;
+            hit->t -= before;
+            return end_ride(g, scene, &from, along, first, r, hit);
+        }
+        if (!imp__inside(&s.x, &p->lo, &p->hi)) return false;
+        r->length += length;
+    }
+    return false;
+}
+
+/* ---- The medium's numbers ------------------------------------------------------ */
+
+#define LEAF_MAX 4096 /* numbers of a field that is not a grid */
+
+struct splat_job {
+    const struct imp__graded_active *to;
+    imp_v3 x, b;
+    double a;
+};
+
+static const struct imp_medium_numbers *numbers_at(const struct imp_medium *m, size_t k)
+{
+    for (int i = 0; i < m->n_numbers; i++)
+        if (k - m->numbers[i].first < m->numbers[i].count) return &m->numbers[i];
+    return NULL;
+}
+
+static void number_add(const struct imp__graded_active *to, size_t k, double bar)
+{
+    const struct imp_medium_numbers *n = numbers_at(to->medium, k);
+    imp_spec s = {0};
+    s[to->lane] = bar;
+    if (n && to->base[n->param] >= 0)
+        to->sink->add(to->sink, n->param, k - n->first, 1, &s);
+}
+
+/* A grid's splat in its own cell alone: the same kind of grid, one cell large. */
+static void grid_splat(const struct splat_job *j, imp_field *f, size_t offset)
+{
+    const struct imp__grid *g = (const struct imp__grid *)f;
+    const int side = g->desc.interp == IMP_FIELD_SPLINE ? 4 : 2;
+    double local[64] = {0};
+    struct imp__grid cell = *g;
+    double a = j->a;
+    imp_v3 b = j->b;
+    size_t corner[3];
+    if (g->desc.param == IMP_FIELD_ETA2) {
+        struct imp__jet at;
+        imp__field_eval1(f, &j->x, 1, &at);
+        imp__eta2_vjp(&at, &a, &b);
+    }
+    const imp_v3 u = (j->x - g->origin) * g->inv_h;
+    for (int k = 0; k < 3; k++) {
+        const int i = (int)imp_clamp(u[k], 0.0, (double)(g->desc.cells[k] - 1));
+        corner[k] = (size_t)i;
+        cell.origin[k] += i / g->inv_h[k];
+        cell.nodes[k] = side;
+        cell.desc.cells[k] = 1;
+    }
+    cell.desc.param = IMP_FIELD_ETA;
+    cell.base.theta = local;
+    cell.single = NULL;
+    double bar[64] = {0};
+    f->ops->splat(&cell.base, &j->x, a, &b, bar);
+    for (int k = 0, n = 0; k < side; k++)
+        for (int jj = 0; jj < side; jj++)
+            for (int i = 0; i < side; i++, n++)
+                number_add(j->to,
+                           offset + corner[0] + (size_t)i +
+                               (size_t)g->nodes[0] *
+                                   (corner[1] + (size_t)jj +
+                                    (size_t)g->nodes[1] * (corner[2] + (size_t)k)),
+                           bar[n]);
+}
+
+static void leaf_splat(imp_field *f, size_t offset, void *payload)
+{
+    const struct splat_job *j = payload;
+    const struct imp_medium_numbers *n = numbers_at(j->to->medium, offset);
+    if (imp__field_is_grid(f)) {
+        if (n && j->to->base[n->param] >= 0) grid_splat(j, f, offset);
+        return;
+    }
+    double bar[LEAF_MAX];
+    const size_t count = imp_min(f->n_theta, (size_t)LEAF_MAX);
+    memset(bar, 0, count * sizeof *bar);
+    f->ops->splat(f, &j->x, j->a, &j->b, bar);
+    for (size_t k = 0; k < count; k++)
+        if (bar[k] != 0) number_add(j->to, offset + k, bar[k]);
+}
+
+void imp__graded_splat(const struct imp__graded_active *to, const imp_v3 *x, double a,
+                       const imp_v3 *b)
+{
+    struct splat_job j = {to, *x, *b, a};
+    if (a == 0 && imp__dot(*b, *b) == 0) return;
+    imp__field_leaves(to->medium->graded->bend->field, 0, leaf_splat, &j);
+}
+
+struct tangent_job {
+    const struct imp__graded_active *along;
+    imp_v3 x, g_dot;
+    double eta_dot;
+};
+
+static void leaf_tangent(imp_field *f, size_t offset, void *payload)
+{
+    struct tangent_job *j = payload;
+    const struct imp__graded_active *a = j->along;
+    const struct imp_medium_numbers *n = numbers_at(a->medium, offset);
+    double dot[64] = {0}, eta_dot;
+    const double *theta_dot = dot;
+    imp_v3 g_dot;
+    if (n && n->count == f->n_theta) { /* one parameter: its numbers lie in a row */
+        if (a->base[n->param] < 0) return;
+        theta_dot = a->x_dot + a->base[n->param];
+    } else {
+        for (size_t k = 0; k < f->n_theta && k < imp_count(dot); k++) {
+            n = numbers_at(a->medium, offset + k);
+            if (n && a->base[n->param] >= 0) dot[k] = a->x_dot[a->base[n->param]];
+        }
+    }
+    f->ops->tangent(f, &j->x, theta_dot, &eta_dot, &g_dot);
+    j->eta_dot += eta_dot;
+    j->g_dot += g_dot;
+}
+
+static void tangent_at(struct tangent_job *j)
+{
+    imp__field_leaves(j->along->medium->graded->bend->field, 0, leaf_tangent, j);
+}
+
+double imp__graded_tangent(const struct imp__graded_active *along, const imp_v3 *x)
+{
+    struct tangent_job j = {.along = along, .x = *x};
+    tangent_at(&j);
+    return j.eta_dot;
+}
+
+/* The field as the steps of scheme.c see it when derivatives go to, or come from, a
+ * scene's parameters: splats reach the sink, and memory follows no grid. */
+struct view {
+    imp_field base;
+    const struct imp__graded_active *active;
+};
+static void view_eval(const imp_field *f, int n, const imp_v3 *x, int order,
+                      struct imp__jet *jet)
+{
+    const imp_field *of =
+        imp__graded_field(((const struct view *)f)->active->medium->graded);
+    of->ops->eval(of, n, x, order, jet);
+}
+static void view_splat(const imp_field *f, const imp_v3 *x, double a, const imp_v3 *b,
+                       double *theta_bar)
+{
+    (void)theta_bar;
+    imp__graded_splat(((const struct view *)f)->active, x, a, b);
+}
+static void view_tangent(const imp_field *f, const imp_v3 *x, const double *theta_dot,
+                         double *eta_dot, imp_v3 *g_dot)
+{
+    (void)theta_dot;
+    struct tangent_job j = {.along = ((const struct view *)f)->active, .x = *x};
+    tangent_at(&j);
+    *eta_dot = j.eta_dot;
+    *g_dot = j.g_dot;
+}
+static const struct imp__field_ops view_ops = {
+    .name = "view", .eval = view_eval, .splat = view_splat, .tangent = view_tangent};
+
+/* ---- Derivatives --------------------------------------------------------------- */
+
+void imp__ride_back(const struct imp__graded_active *to, const struct imp__ride *r,
+                    imp_v3 *lam, imp_v3 *mu)
+{
+    const struct imp__plan *p = &to->medium->graded->plan;
+    const struct view view = {{.ops = &view_ops}, to};
+    double yes; /* theta_bar: where splats go is the view's business */
+    struct imp__state at = r->from, rate;
+    struct imp__surface_at sa;
+    struct imp__back b;
+
+    /* end = v/|v| */
+    const imp_v3 v_bar =
+        (*mu - r->end * imp__dot(r->end, *mu)) * (1 / imp__length(r->at.v));
+    imp__step_rate(p->scheme, p->field, r->tau, &at, &rate);
+    imp__surface_eval(&r->level, &r->at.x, &r->at.v, &sa);
+    const double rho =
+        (imp__dot(*lam, rate.x) + imp__dot(v_bar, rate.v)) / imp__dot(sa.gx, rate.x);
+    b.x[0] = r->at.x, b.v[0] = r->at.v;
+    b.lam[0] = *lam - rho * sa.gx;
+    b.mu[0] = v_bar;
+    b.path_bar[0] = 0;
+    imp__step_adjoint(p->scheme, &view.base, r->tau, 1, &b, NULL, &yes);
+    b.x[0] = r->from.x, b.v[0] = r->from.v;
+    for (uint32_t k = 0; k < r->steps; k++)
+        imp__step_adjoint(p->scheme, &view.base, p->t, 1, &b, NULL, &yes);
+    /* v0 = eta(x0) d0 */
+    const double eta_bar = imp__dot(b.mu[0], r->d);
+    const imp_v3 zero = {0};
+    imp__graded_splat(to, &r->x, eta_bar, &zero);
+    *lam = b.lam[0] + eta_bar * r->j.g;
+    *mu = r->j.eta * b.mu[0];
+}
+
+void imp__ride_tangent(const struct imp__graded_active *along, const struct imp__ride *r,
+                       imp_v3 *x_dot, imp_v3 *d_dot)
+{
+    const struct imp__plan *p = &along->medium->graded->plan;
+    const struct view view = {{.ops = &view_ops}, along};
+    const double yes = 0; /* theta_dot: asks the view */
+    struct imp__state s = {r->x, r->j.eta * r->d, 0}, dot = {*x_dot, {0}, 0}, rate;
+    struct imp__surface_at sa;
+    const double eta_dot = imp__graded_tangent(along, &r->x) + imp__dot(r->j.g, *x_dot);
+    dot.v = eta_dot * r->d + r->j.eta * *d_dot;
+    for (uint32_t k = 0; k < r->steps; k++)
+        imp__step_tangent(p->scheme, &view.base, p->t, &yes, &s, &dot);
+    struct imp__state at = r->from;
+    imp__step_rate(p->scheme, p->field, r->tau, &at, &rate);
+    imp__step_tangent(p->scheme, &view.base, r->tau, &yes, &s, &dot);
+    imp__surface_eval(&r->level, &r->at.x, &r->at.v, &sa);
+    const double tau_dot = -imp__dot(sa.gx, dot.x) / imp__dot(sa.gx, rate.x);
+    *x_dot = dot.x + tau_dot * rate.x;
+    const imp_v3 v_dot = dot.v + tau_dot * rate.v;
+    *d_dot = (v_dot - r->end * imp__dot(r->end, v_dot)) * (1 / imp__length(r->at.v));
+}

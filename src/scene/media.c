@@ -1,0 +1,102 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Graded media: which shapes they fill, their numbers as parameters, and what of them can
+ * be differentiated. */
+#include "build.h"
+
+enum imp_status imp__build_medium(struct imp_scene *scene, struct imp_node *node,
+                                  const char *parent, const struct imp_medium **out)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_medium *m = node->medium;
+    if (!m)
+        return imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
+                               "this version has no such medium; it has graded");
+    if (m->index >= 0) {
+        *out = m;
+        return IMP_OK;
+    }
+    m->name = imp__build_object_name(scene, node, parent, "interior");
+    if (!m->name) return imp__build_no_memory(scene);
+    for (int i = 0; i < m->n_numbers; i++) {
+        struct imp_medium_numbers *n = &m->numbers[i];
+        struct imp_param p = {.store = IMP_STORE_DOUBLES, .doubles = n->number};
+        p.info.name = imp__build_name(scene, m->name, n->key);
+        if (!p.info.name) return imp__build_no_memory(scene);
+        p.info.unit = "1";
+        p.info.n_dims = n->n_dims;
+        for (int d = 0; d < n->n_dims; d++) p.info.dims[d] = n->dims[d];
+        p.info.flags = IMP_PARAM_DISCONTINUOUS;
+        p.info.lo = n->lo;
+        p.info.hi = n->hi;
+        IMP_TRY(imp__theta_add(scene, &p, &n->param));
+    }
+    IMP_TRY(imp__props_finish(scene->ctx, node));
+    m->lo = imp__v3(INFINITY, INFINITY, INFINITY);
+    m->hi = -m->lo;
+    for (int i = 0; i < scene->n_media; i++)
+        if (scene->media[i] == m) m->index = i;
+    *out = m;
+out:
+    return st;
+}
+
+/* A boundary is a null surface, or a dielectric whose index inside is the field's. */
+static enum imp_status boundary_check(const struct imp_scene *scene,
+                                      const struct imp_shape *s)
+{
+    const struct imp_bsdf *b = imp__shape_bsdf(scene, s);
+    const bool dielectric = strcmp(b->ops->name, "dielectric") == 0;
+    if (!dielectric && !(b->flags & IMP_BSDF_NULL))
+        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                          "shape '%s': a graded medium ends at a bsdf of type dielectric "
+                          "or null, not %s",
+                          s->name, b->ops->name);
+    if (s->emitter >= 0)
+        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                          "shape '%s': the boundary of a graded medium cannot emit",
+                          s->name);
+    return IMP_OK;
+}
+
+/* The only shape of a medium, if it is a sphere and no other shape's box meets its own: a
+ * ray inside meets nothing before it is outside. */
+static const struct imp_shape *ball_of(const struct imp_scene *scene,
+                                       const struct imp_medium *m)
+{
+    const struct imp_shape *ball = NULL;
+    struct imp_round round;
+    for (int i = 0; i < scene->n_shapes; i++) {
+        const struct imp_shape *s = scene->shapes[i];
+        bool apart = false;
+        if (s->interior == m) {
+            if (ball) return NULL;
+            ball = s;
+            continue;
+        }
+        for (int k = 0; k < 3; k++) apart |= s->lo[k] > m->hi[k] || s->hi[k] < m->lo[k];
+        if (!apart) return NULL;
+    }
+    if (!ball || !ball->ops->round) return NULL;
+    ball->ops->round(ball, &round);
+    return imp__dot(round.axis, round.axis) == 0 ? ball : NULL;
+}
+
+enum imp_status imp__media_check(struct imp_scene *scene)
+{
+    for (int i = 0; i < scene->n_shapes; i++) {
+        struct imp_shape *s = scene->shapes[i];
+        if (!s->interior) continue;
+        const enum imp_status st = boundary_check(scene, s);
+        if (st != IMP_OK) return st;
+        struct imp_medium *m = scene->media[s->interior->index];
+        for (int k = 0; k < 3; k++) {
+            m->lo[k] = fmin(m->lo[k], s->lo[k]);
+            m->hi[k] = fmax(m->hi[k], s->hi[k]);
+        }
+    }
+    for (int i = 0; i < scene->n_media; i++)
+        if (scene->media[i]->index >= 0)
+            scene->media[i]->ball = ball_of(scene, scene->media[i]);
+    return IMP_OK;
+}
