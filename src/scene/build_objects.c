@@ -210,6 +210,10 @@ enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
     const struct imp_build b = imp__build_make(scene, node);
     IMP_TRY(ops->build(&b, self, s));
     IMP_TRY(imp__props_finish(ctx, node));
+    for (int k = 0; k < 3; k++)
+        if (!(s->lo[k] > -IMP_REACH_MAX && s->hi[k] < IMP_REACH_MAX))
+            IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "reaches further out than %g",
+                                    IMP_REACH_MAX));
 
     if (!bsdf && !emitter) { /* as if <bsdf type="diffuse"/> had been written */
         bsdf = imp__node_create(&scene->arena, "bsdf", "diffuse", NULL, NULL, node->loc);

@@ -12,11 +12,6 @@
 #include <stdio.h>
 #include <string.h>
 
-/* Embree takes larger numbers, and NaN, for a mistake of the caller: shapes that reach so
- * far vanish without a word, and rays end the process where it was built with assertions.
- */
-#define EMBREE_MAX 1e18
-
 struct device {
     imp_context *ctx;
     RTCDevice rtc;
@@ -174,26 +169,12 @@ static RTCGeometry geometry_create(RTCDevice rtc, struct imp_shape *s)
     return g;
 }
 
-static enum imp_status bounds_check(struct imp_scene *scene)
-{
-    for (int i = 0; i < scene->n_shapes; i++) {
-        const struct imp_shape *s = scene->shapes[i];
-        for (int k = 0; k < 3; k++)
-            if (!(s->lo[k] > -EMBREE_MAX && s->hi[k] < EMBREE_MAX))
-                return imp__error(scene->ctx, IMP_E_SCENE,
-                                  "shape '%s' (%s) reaches further out than %g",
-                                  s->name ? s->name : "", s->ops->name, EMBREE_MAX);
-    }
-    return IMP_OK;
-}
-
 enum imp_status imp__intersector_create(struct imp_scene *scene)
 {
     enum imp_status st = IMP_OK;
     struct device *dev;
     char message[sizeof dev->message] = "";
 
-    IMP_TRY(bounds_check(scene));
     IMP_TRY(device_get(scene->ctx, &dev));
     struct intersector *x = imp__alloc(scene->ctx, 1, sizeof *x);
     if (!x)
@@ -253,7 +234,7 @@ static inline bool ray_valid(const imp_v3 *o, const imp_v3 *d, double tmin, doub
     const double size =
         ((fabs((*o)[0]) + fabs((*o)[1])) + (fabs((*o)[2]) + fabs((*d)[0]))) +
         (fabs((*d)[1]) + fabs((*d)[2]));
-    return size < EMBREE_MAX && tmin >= 0 && tmin < tmax;
+    return size < IMP_REACH_MAX && tmin >= 0 && tmin < tmax;
 }
 
 typedef float float4 __attribute__((vector_size(16)));
