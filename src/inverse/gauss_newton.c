@@ -15,20 +15,13 @@
  * pixel, which holds however the noise differs between pixels (White, Econometrica 48,
  * 1980); residual and J^T J come from different replicates, so that their own noise is
  * not correlated. */
-#include "estimate.h"
+#include "gauss_newton.h"
 #include "lanes.h"
 #include "loss.h"
 #include "walk/picture.h"
 #include <string.h>
 
 #define GAUSS_NEWTON_MAX 256
-
-struct sums { /* of one tile; matrices [K*K] */
-    double *H, *H_same, *H_meas, *cov_g, *g;
-    double objective, variance, chi2;
-    uint64_t dropped;
-    bool failed; /* out of memory */
-};
 
 struct job {
     const struct imp_problem *problem;
@@ -50,38 +43,35 @@ struct job {
                            and of that times the replicate's squared residual */
         double a[3];    /* sum over replicates of squared residuals */
     } * workers;
-    struct sums *slots, total;
+    struct imp__normal_sums *slots, total;
 };
 
 static size_t sums_bytes(size_t K) { return (4 * K * K + K) * sizeof(double); }
 
-static enum imp_status sums_create(imp_context *ctx, size_t K, struct sums *s)
+static enum imp_status sums_create(imp_context *ctx, size_t K, struct imp__normal_sums *s)
 {
     double *p = imp__alloc(ctx, 1, sums_bytes(K));
     if (!p) return imp__error(ctx, IMP_E_NOMEM, "no memory for %zu x %zu matrices", K, K);
-    *s = (struct sums){.H = p,
-                       .H_same = p + K * K,
-                       .H_meas = p + 2 * K * K,
-                       .cov_g = p + 3 * K * K,
-                       .g = p + 4 * K * K};
+    *s = (struct imp__normal_sums){.H = p,
+                                   .H_same = p + K * K,
+                                   .H_meas = p + 2 * K * K,
+                                   .cov_g = p + 3 * K * K,
+                                   .g = p + 4 * K * K};
     return IMP_OK;
 }
-
-static const double luminance_weight[3] = {0.212671, 0.715160, 0.072169};
 
 /* A walk's L and x as the target sees them: its channels, or their luminance. */
 static int seen_channels(const struct job *j) { return j->target->desc.channels; }
 static double seen(const struct job *j, const double *lanes, int c)
 {
-    if (seen_channels(j) == j->channels) return lanes[c];
-    return luminance_weight[0] * lanes[0] + luminance_weight[1] * lanes[1] +
-           luminance_weight[2] * lanes[2];
+    return imp__seen(seen_channels(j), j->channels, lanes, c);
 }
 
 /* One replicate of a pixel: adds to the tile's matrices with factor `share`, writes its
  * gradient, returns its loss. */
-static double replicate(const struct job *j, struct worker *w, struct sums *out, int x,
-                        int y, int b, double share, double *g)
+static double replicate(const struct job *j, struct worker *w,
+                        struct imp__normal_sums *out, int x, int y, int b, double share,
+                        double *g)
 {
     const size_t K = j->K, S = (size_t)seen_channels(j);
     const struct imp_target *t = &j->target->desc;
@@ -168,7 +158,7 @@ static enum imp_status tile_work(size_t item, int worker, int slot, void *payloa
 {
     struct job *j = payload;
     struct worker *w = &j->workers[worker];
-    struct sums *out = &j->slots[slot];
+    struct imp__normal_sums *out = &j->slots[slot];
     const size_t K = j->K;
     const struct imp__tile t = imp__tile_of(item, j->width, j->height, 0, j->plan.chunks);
     const int b0 = imp__replicates_begin(j->plan, t.chunk);
@@ -222,7 +212,7 @@ static enum imp_status tile_work(size_t item, int worker, int slot, void *payloa
 static enum imp_status tile_commit(size_t item, int slot, void *payload)
 {
     struct job *j = payload;
-    const struct sums *in = &j->slots[slot];
+    const struct imp__normal_sums *in = &j->slots[slot];
     (void)item;
     for (size_t k = 0; k < sums_bytes(j->K) / sizeof(double); k++)
         j->total.H[k] += in->H[k];
@@ -263,9 +253,7 @@ static enum imp_status target_add(struct job *j, const struct imp__target *targe
     if (st != IMP_OK) return st;
     const struct imp_film_desc *film = &j->tracer.sensor->film;
     if (imp__film_border(film) > 0)
-        return imp__error(p->ctx, IMP_E_UNSUPPORTED,
-                          "Gauss-Newton needs a box filter; sensor %d has a wider one",
-                          own.sensor);
+        return imp__gauss_newton_wide(p, &j->tracer, target, &own, lo, hi, &j->total);
     j->width = film->crop_w;
     j->height = film->crop_h;
     j->plan = imp__replicates_plan(
@@ -309,6 +297,18 @@ static void matrix_copy(double *to, const double *lower, size_t K)
         for (size_t m = 0; m <= k; m++) to[k * K + m] = to[m * K + k] = lower[k * K + m];
 }
 
+static enum imp_status data_term(struct imp_problem *p, const struct imp_run *run,
+                                 struct imp_estimate *out)
+{
+    double *x = imp__alloc(p->ctx, p->n, sizeof *x);
+    if (!x) return imp__error(p->ctx, IMP_E_NOMEM, "no memory for %zu variables", p->n);
+    imp_problem_get_x(p, x);
+    const enum imp_status st = imp_problem_objective(p, NULL, run, out, NULL, NULL);
+    if (st == IMP_OK) out->value -= imp__regularise(p, x, NULL);
+    imp__release(p->ctx, x);
+    return st;
+}
+
 enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
                                   const struct imp_run *run,
                                   struct imp__gauss_newton *out)
@@ -320,6 +320,7 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
     const int n_slots = imp__pool_slots(ctx);
     double residuals = 0;
     int bias_order = 0;
+    bool wide = false;
     if (p->n == 0 || p->n > GAUSS_NEWTON_MAX)
         IMP_TRY(imp__error(ctx, IMP_E_ARG,
                            "%zu numbers are active; Gauss-Newton takes 1 to %d", p->n,
@@ -342,7 +343,12 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
             (double)(p->targets[t].desc.channels) * pixels_in_use(&p->targets[t]);
         const int bias = imp__loss_bias_order(p->targets[t].desc.loss);
         if (bias) bias_order = 1;
+        wide |= imp__film_border(&j.tracer.sensor->film) > 0;
     }
+    /* With wide filters, the same estimate as that of trial steps from the same walks. */
+    struct imp_estimate objective = {j.total.objective, sqrt(fmax(0, j.total.variance)),
+                                     bias_order};
+    if (wide) IMP_TRY(data_term(p, &own, &objective));
     matrix_copy(out->H, j.total.H, j.K);
     matrix_copy(out->H_same, j.total.H_same, j.K);
     matrix_copy(out->H_meas, j.total.H_meas, j.K);
@@ -351,8 +357,7 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
         if (out->g) out->g[k] = j.total.g[k];
         if (out->g_se) out->g_se[k] = sqrt(fmax(0, j.total.cov_g[k * j.K + k]));
     }
-    out->objective = (struct imp_estimate){j.total.objective,
-                                           sqrt(fmax(0, j.total.variance)), bias_order};
+    out->objective = objective;
     out->chi2 = j.total.chi2;
     out->n_residuals = residuals;
 out:

@@ -57,17 +57,7 @@ static bool sample_jacobian(const void *payload, struct imp_arena *arena, int x,
                             int64_t sample, double *value, double *px, double *py)
 {
     const struct jacobian *j = payload;
-    const size_t n = j->tracer.active->n;
-    struct imp_walk walk;
-    imp__walk_trace(&j->tracer, arena, x, y, sample, &walk);
-    memset(value, 0, (n + 1) * (size_t)j->channels * sizeof *value);
-    for (int c = 0; c < j->channels; c++) value[c] = walk.L[c];
-    struct imp_lanes lanes = {
-        {imp__lanes_add}, j->tracer.active, j->channels, value + j->channels};
-    imp__walk_sweep(&j->tracer, &walk, imp__lanes_adjoint(j->channels), &lanes.sink);
-    *px = walk.px;
-    *py = walk.py;
-    return walk.dropped == IMP_DROP_NONE;
+    return imp__lanes_sample(&j->tracer, arena, x, y, sample, j->channels, value, px, py);
 }
 
 /* Channels [first, first + n) of a wide film, as a film of its own. */

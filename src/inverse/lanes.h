@@ -31,4 +31,24 @@ static inline imp_spec imp__lanes_adjoint(int lanes)
     return lanes == 3 ? (imp_spec){1, 1, 1, 0} : (imp_spec){1, 0, 0, 0};
 }
 
+/* A walk's radiance and its derivatives, value [1 + active][channels], as a sample of a
+ * picture (walk/picture.h). */
+static inline bool imp__lanes_sample(const struct imp_tracer *tracer,
+                                     struct imp_arena *arena, int x, int y,
+                                     int64_t sample, int channels, double *value,
+                                     double *px, double *py)
+{
+    const size_t n = (tracer->active->n + 1) * (size_t)channels;
+    struct imp_walk walk;
+    imp__walk_trace(tracer, arena, x, y, sample, &walk);
+    for (size_t k = 0; k < n; k++) value[k] = 0;
+    for (int c = 0; c < channels; c++) value[c] = walk.L[c];
+    struct imp_lanes lanes = {
+        {imp__lanes_add}, tracer->active, channels, value + channels};
+    imp__walk_sweep(tracer, &walk, imp__lanes_adjoint(channels), &lanes.sink);
+    *px = walk.px;
+    *py = walk.py;
+    return walk.dropped == IMP_DROP_NONE;
+}
+
 #endif

@@ -128,16 +128,18 @@ static enum imp_status jacobian(void)
     for (size_t k = 0; k < imp_problem_n(problem); k++) st = keep_nothing(st, &films[k]);
     return keep_nothing(st, &primal);
 }
-static enum imp_status gauss_newton(void)
+static enum imp_status gauss_newton_of(imp_problem *p)
 {
-    const size_t n = imp_problem_n(problem);
+    const size_t n = imp_problem_n(p);
     struct imp__gauss_newton gn = {0};
     gn.H = calloc(2 * n * n, sizeof(double));
     gn.cov_g = gn.H + n * n;
-    const enum imp_status st = imp__gauss_newton(problem, NULL, &run, &gn);
+    const enum imp_status st = imp__gauss_newton(p, NULL, &run, &gn);
     free(gn.H);
     return st;
 }
+static enum imp_status gauss_newton(void) { return gauss_newton_of(problem); }
+static enum imp_status gauss_newton_wide(void) { return gauss_newton_of(wide_problem); }
 static enum imp_status describe_as(int json)
 {
     char *text = NULL;
@@ -252,6 +254,7 @@ int main(void)
         check("forward", forward);
         check("jacobian", jacobian);
         check("Gauss-Newton", gauss_newton);
+        check("Gauss-Newton through a wide filter", gauss_newton_wide);
         check("a walk in words", describe);
         check("a walk in JSON", describe_json);
         check("EXR", film_exr);

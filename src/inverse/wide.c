@@ -1,0 +1,364 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * J^T W J through filters wider than a pixel, where a walk has a part in several pixels
+ * and pixels share walks. R independent replicates, each a picture L and a derivative
+ * picture X_k for every number, take the place of walks (gradients.md 15):
+ *
+ *     (J^T J)_kl ~ w [ (sum_b X_k)(sum_b X_l) - sum_b X_k X_l ] / (R (R-1))
+ *     (J^T r)_k  ~ w [ (sum_b L)(sum_b X_k) - sum_b L X_k ] / (R (R-1)) - w T mean(X_k)
+ *
+ * unbiased but for the pixel itself, a ratio of sums (splat.h).
+ *
+ * Covariance of the gradient: the jackknife over replicates, which counts the part of
+ * second order twice and so errs to the safe side (Efron and Stein, Ann. Statist. 9,
+ * 1981), of sums over blocks of pixels; blocks further apart than the filter reaches
+ * share no walk.
+ *
+ * Noise of the target is taken as correlated from pixel to pixel as the filter makes it,
+ * since targets come through the same filter: H_meas = sum_pq w_p w_q rho(p - q)
+ * sigma_p^2 J_p J_q, with the squared residual for sigma^2 where that is not given. */
+#include "gauss_newton.h"
+#include "lanes.h"
+#include "loss.h"
+#include "walk/picture.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define MANY    8  /* replicates, and */
+#define FEW     4  /* with less than */
+#define MANY_AT 32 /* samples per pixel */
+#define BLOCK   8  /* pixels */
+#define TAPS    16 /* reach of rho in pixels, at most */
+
+struct wide {
+    imp_context *ctx;
+    const struct imp_target *target;
+    const float *weights, *noise_se;
+    const struct imp_film_desc *film;
+    int width, height, channels, seen; /* of the scene, of the target */
+    int R;
+    size_t K;
+    imp_film *films[MANY]; /* channels: the radiance, then [K][channels] */
+    double *L, *X;         /* of a pixel and channel: [R], [R][K] */
+    double *sum;           /* [K] */
+    int blocks_x, blocks_y;
+    double *leave; /* [blocks][R][K] gradient of a block without replicate b */
+    /* Of one channel and half of the replicates, for H_meas: [pixels], [K][pixels]. */
+    double *sigma2, *Xc, *Xd, *row;
+};
+
+/* ---- Replicates ---------------------------------------------------------------- */
+
+struct pass {
+    const struct imp_tracer *tracer;
+    int64_t first;
+    int channels;
+    const struct imp_run *run;
+    double lo, hi;
+};
+
+static bool sample(const void *payload, struct imp_arena *arena, int x, int y, int64_t i,
+                   double *value, double *px, double *py)
+{
+    const struct pass *p = payload;
+    return imp__lanes_sample(p->tracer, arena, x, y, p->first + i, p->channels, value, px,
+                             py);
+}
+
+static int progress(const struct imp_progress *p, void *payload)
+{
+    const struct pass *pass = payload;
+    struct imp_progress own = *p;
+    own.fraction = pass->lo + (pass->hi - pass->lo) * p->fraction;
+    return pass->run->progress(&own, pass->run->progress_payload);
+}
+
+static enum imp_status replicates(struct wide *w, const struct imp_tracer *tracer,
+                                  const struct imp_run *run, double lo, double hi)
+{
+    enum imp_status st = IMP_OK;
+    const int n = (int)(w->K + 1) * w->channels;
+    const int spp = imp_max(run->spp > 0 ? run->spp : tracer->sensor->spp, FEW);
+    w->R = spp < MANY_AT ? FEW : MANY;
+    char *names = imp__alloc(w->ctx, (size_t)n, 12);
+    if (!names) IMP_TRY(imp__error(w->ctx, IMP_E_NOMEM, "no memory"));
+    for (int k = 0, used = 0; k < n; k++)
+        used += snprintf(names + used, 12, "%s%d", k ? "," : "", k);
+    for (int b = 0; b < w->R; b++) {
+        struct imp_run own = *run;
+        own.spp = (spp - 1) / w->R + 1;
+        own.time_limit_s = 0;
+        const struct pass pass = {
+            tracer, (int64_t)b * own.spp,      w->channels,
+            run,    lo + (hi - lo) * b / w->R, lo + (hi - lo) * (b + 1) / w->R};
+        if (run->progress) {
+            own.progress = progress;
+            own.progress_payload = (void *)&pass;
+        }
+        const struct imp_picture picture = {tracer->sensor, "gauss-newton", names, n,
+                                            sample,         &pass,          NULL};
+        IMP_TRY(imp__picture_make(w->ctx, &picture, &own, &w->films[b]));
+    }
+out:
+    imp__release(w->ctx, names);
+    return st;
+}
+
+/* L, X of a pixel and channel, as the target sees them. */
+static void gather(struct wide *w, size_t pixel, int c)
+{
+    const size_t stride = (w->K + 1) * (size_t)w->channels;
+    for (int b = 0; b < w->R; b++) {
+        const float *from = w->films[b]->mean + pixel * stride;
+        for (size_t k = 0; k <= w->K; k++) {
+            double lanes[3];
+            for (int l = 0; l < w->channels; l++)
+                lanes[l] = from[k * (size_t)w->channels + (size_t)l];
+            const double v = imp__seen(w->seen, w->channels, lanes, c);
+            if (k == 0) w->L[b] = v;
+            else w->X[(size_t)b * w->K + k - 1] = v;
+        }
+    }
+}
+
+/* Weight of a pixel and channel, and the target that makes its loss 1/2 w (I - T)^2. */
+static double weight_of(const struct wide *w, size_t pixel, int c, double mean, double *T)
+{
+    const struct imp_target *t = w->target;
+    const double scale = t->scale * (w->weights ? w->weights[pixel] : 1);
+    *T = t->pixels[pixel * (size_t)w->seen + (size_t)c];
+    if (imp__loss_quadratic(t->loss))
+        return imp__loss_weight(t->loss, scale, t->epsilon, *T);
+    struct imp__loss_at at;
+    imp__loss_eval(t->loss, scale, t->epsilon, mean, *T, &at);
+    if (!(at.d2 > 0)) return 0;
+    *T = mean - at.d1 / at.d2;
+    return at.d2;
+}
+
+/* ---- H, g, and the gradient's own noise ---------------------------------------- */
+
+static void pixel_add(struct wide *w, size_t pixel, int c, double *leave,
+                      struct imp__normal_sums *out)
+{
+    const size_t K = w->K;
+    const double R = w->R;
+    double S = 0, S2 = 0, T;
+    gather(w, pixel, c);
+    memset(w->sum, 0, K * sizeof *w->sum);
+    for (int b = 0; b < w->R; b++) {
+        S += w->L[b];
+        S2 += w->L[b] * w->L[b];
+        for (size_t k = 0; k < K; k++) w->sum[k] += w->X[(size_t)b * K + k];
+    }
+    const double weight = weight_of(w, pixel, c, S / R, &T);
+    if (weight == 0) return;
+    out->chi2 += 2 * imp__loss_unbiased(weight, T, R, S, S2);
+    for (size_t k = 0; k < K; k++) {
+        double lx = 0;
+        for (int b = 0; b < w->R; b++) lx += w->L[b] * w->X[(size_t)b * K + k];
+        out->g[k] += weight * ((S * w->sum[k] - lx) / (R * (R - 1)) - T * w->sum[k] / R);
+        for (int b = 0; b < w->R; b++) {
+            const double l = w->L[b], x = w->X[(size_t)b * K + k], x1 = w->sum[k] - x;
+            leave[(size_t)b * K + k] +=
+                weight *
+                (((S - l) * x1 - (lx - l * x)) / ((R - 1) * (R - 2)) - T * x1 / (R - 1));
+        }
+        for (size_t m = 0; m <= k; m++) {
+            double xx = 0;
+            for (int b = 0; b < w->R; b++)
+                xx += w->X[(size_t)b * K + k] * w->X[(size_t)b * K + m];
+            const double product = w->sum[k] * w->sum[m];
+            out->H[k * K + m] += weight * (product - xx) / (R * (R - 1));
+            out->H_same[k * K + m] += weight * product / (R * R);
+        }
+    }
+}
+
+static void normal_add(struct wide *w, struct imp__normal_sums *out)
+{
+    for (int y = 0; y < w->height; y++)
+        for (int x = 0; x < w->width; x++) {
+            const size_t block = (size_t)(y / BLOCK * w->blocks_x + x / BLOCK);
+            for (int c = 0; c < w->seen; c++)
+                pixel_add(w, (size_t)y * (size_t)w->width + (size_t)x, c,
+                          w->leave + block * (size_t)w->R * w->K, out);
+        }
+}
+
+static void covariance_add(struct wide *w, struct imp__normal_sums *out)
+{
+    const size_t K = w->K, R = (size_t)w->R;
+    const int blocks = w->blocks_x * w->blocks_y;
+    for (int t = 0; t < blocks; t++) { /* deviations from the replicates' mean */
+        double *leave = w->leave + (size_t)t * R * K;
+        for (size_t k = 0; k < K; k++) {
+            double mean = 0;
+            for (size_t b = 0; b < R; b++) mean += leave[b * K + k] / (double)R;
+            for (size_t b = 0; b < R; b++) leave[b * K + k] -= mean;
+        }
+    }
+    const int reach = (2 * imp__film_border(w->film) + BLOCK - 1) / BLOCK;
+    for (int t = 0; t < blocks; t++) {
+        const int x = t % w->blocks_x, y = t / w->blocks_x;
+        for (int v = imp_max(0, y - reach); v <= imp_min(w->blocks_y - 1, y + reach); v++)
+            for (int u = imp_max(0, x - reach); u <= imp_min(w->blocks_x - 1, x + reach);
+                 u++) {
+                const double *a = w->leave + (size_t)t * R * K;
+                const double *d = w->leave + (size_t)(v * w->blocks_x + u) * R * K;
+                for (size_t b = 0; b < R; b++)
+                    for (size_t k = 0; k < K; k++)
+                        for (size_t m = 0; m <= k; m++)
+                            out->cov_g[k * K + m] +=
+                                a[b * K + k] * d[b * K + m] * (double)(R - 1) / (double)R;
+            }
+    }
+}
+
+/* ---- Noise of the target ------------------------------------------------------- */
+
+/* rho at 0, 1, 2, ... pixels along one axis; returns how many are not 0. */
+static int correlation(const struct imp_filter *f, double rho[TAPS])
+{
+    const int n = 512;
+    int taps = 0;
+    for (int d = 0; d < TAPS && d < 2 * f->radius; d++) {
+        rho[d] = 0;
+        for (int i = 0; i < n; i++) {
+            const double t = f->radius * (2 * (i + 0.5) / n - 1);
+            if (fabs(t - d) < f->radius)
+                rho[d] += f->ops->eval(f, t) * f->ops->eval(f, t - d);
+        }
+        taps = d + 1;
+    }
+    for (int d = taps - 1; d >= 0; d--) rho[d] /= rho[0];
+    return taps;
+}
+
+/* image = rho * image along one axis: `count` lines of n numbers, `stride` apart. */
+static void smooth(double *image, int n, size_t stride, int count, size_t step,
+                   const double *rho, int taps, double *row)
+{
+    for (int l = 0; l < count; l++) {
+        double *line = image + (size_t)l * step;
+        for (int i = 0; i < n; i++) row[i] = line[(size_t)i * stride];
+        for (int i = 0; i < n; i++) {
+            double sum = 0;
+            for (int j = imp_max(0, i - taps + 1); j <= imp_min(n - 1, i + taps - 1); j++)
+                sum += rho[abs(i - j)] * row[j];
+            line[(size_t)i * stride] = sum;
+        }
+    }
+}
+
+/* sigma^2 from half of the replicates, w J from two quarters each, so that our own noise
+ * is not correlated between the factors. */
+static void measurement_fill(struct wide *w, int c, int half)
+{
+    const size_t K = w->K, pixels = (size_t)w->width * (size_t)w->height;
+    const int h = w->R / 2, quarter = w->R / 4;
+    for (size_t p = 0; p < pixels; p++) {
+        double S = 0, S2 = 0, all = 0, T;
+        gather(w, p, c);
+        for (int b = 0; b < w->R; b++) {
+            all += w->L[b];
+            if (b / h != half) continue;
+            S += w->L[b];
+            S2 += w->L[b] * w->L[b];
+        }
+        const double weight = weight_of(w, p, c, all / w->R, &T);
+        w->sigma2[p] = w->noise_se
+                           ? imp__sqr(w->noise_se[p * (size_t)w->seen + (size_t)c])
+                           : 2 * imp__loss_unbiased(1, T, h, S, S2);
+        for (size_t k = 0; k < K; k++) {
+            double x[2] = {0, 0};
+            for (int b = 0; b < w->R; b++)
+                if (b / h != half)
+                    x[b % h / quarter] += w->X[(size_t)b * K + k] / quarter;
+            w->Xc[k * pixels + p] = weight * x[0];
+            w->Xd[k * pixels + p] = weight * x[1];
+        }
+    }
+}
+
+static void measurement_add(struct wide *w, struct imp__normal_sums *out)
+{
+    const size_t K = w->K, pixels = (size_t)w->width * (size_t)w->height;
+    double rho[TAPS];
+    const int taps = correlation(&w->film->filter, rho);
+    for (int c = 0; c < w->seen; c++)
+        for (int half = 0; half < 2; half++) {
+            measurement_fill(w, c, half);
+            for (size_t k = 0; k < K; k++) {
+                double *image = w->Xd + k * pixels;
+                smooth(image, w->width, 1, w->height, (size_t)w->width, rho, taps,
+                       w->row);
+                smooth(image, w->height, (size_t)w->width, w->width, 1, rho, taps,
+                       w->row);
+            }
+            for (size_t k = 0; k < K; k++)
+                for (size_t m = 0; m <= k; m++) {
+                    double sum = 0;
+                    for (size_t p = 0; p < pixels; p++)
+                        sum += w->sigma2[p] *
+                               (w->Xc[k * pixels + p] * w->Xd[m * pixels + p] +
+                                w->Xc[m * pixels + p] * w->Xd[k * pixels + p]);
+                    out->H_meas[k * K + m] += sum / 4; /* symmetric; two halves */
+                }
+        }
+}
+
+/* ---- All ----------------------------------------------------------------------- */
+
+static enum imp_status buffers(struct wide *w)
+{
+    const size_t K = w->K, pixels = (size_t)w->width * (size_t)w->height;
+    w->blocks_x = (w->width + BLOCK - 1) / BLOCK;
+    w->blocks_y = (w->height + BLOCK - 1) / BLOCK;
+    w->L = imp__alloc(w->ctx, MANY + (MANY + 1) * K, sizeof(double));
+    w->leave = imp__alloc(w->ctx, (size_t)w->blocks_x * (size_t)w->blocks_y,
+                          MANY * K * sizeof(double));
+    w->sigma2 = imp__alloc(w->ctx, pixels, (2 * K + 1) * sizeof(double));
+    w->row = imp__alloc(w->ctx, (size_t)imp_max(w->width, w->height), sizeof(double));
+    if (!w->L || !w->leave || !w->sigma2 || !w->row)
+        return imp__error(w->ctx, IMP_E_NOMEM,
+                          "no memory for %zu derivative pictures of %d x %d", K, w->width,
+                          w->height);
+    w->X = w->L + MANY;
+    w->sum = w->X + MANY * K;
+    w->Xc = w->sigma2 + pixels;
+    w->Xd = w->Xc + K * pixels;
+    return IMP_OK;
+}
+
+enum imp_status imp__gauss_newton_wide(const struct imp_problem *p,
+                                       const struct imp_tracer *tracer,
+                                       const struct imp__target *target,
+                                       const struct imp_run *run, double lo, double hi,
+                                       struct imp__normal_sums *out)
+{
+    enum imp_status st = IMP_OK;
+    struct wide w = {.ctx = p->ctx,
+                     .target = &target->desc,
+                     .weights = target->weights,
+                     .noise_se = target->noise_se,
+                     .film = &tracer->sensor->film,
+                     .width = tracer->sensor->film.crop_w,
+                     .height = tracer->sensor->film.crop_h,
+                     .channels = p->scene->channels,
+                     .seen = target->desc.channels,
+                     .K = p->n};
+    IMP_TRY(buffers(&w));
+    IMP_TRY(replicates(&w, tracer, run, lo, hi));
+    normal_add(&w, out);
+    covariance_add(&w, out);
+    measurement_add(&w, out);
+out:
+    for (int b = 0; b < MANY; b++) imp_film_destroy(w.films[b]);
+    imp__release(w.ctx, w.L);
+    imp__release(w.ctx, w.leave);
+    imp__release(w.ctx, w.sigma2);
+    imp__release(w.ctx, w.row);
+    return st;
+}
