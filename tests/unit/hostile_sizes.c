@@ -106,6 +106,23 @@ static void films(void)
            "a film of 2^62 pixels # %s", imp_last_error(ctx));
 }
 
+static void far_off(void)
+{
+    static const char *const shapes[] = {
+        "<shape type='sphere'><float name='radius' value='2e18'/></shape>",
+        "<shape type='rectangle'><transform name='to_world'><translate y='2e18'/>"
+        "</transform></shape>",
+        "<shape type='cylinder'><point name='p1' value='0, 0, 1e19'/></shape>",
+    };
+    for (size_t k = 0; k < sizeof shapes / sizeof *shapes; k++) {
+        imp_scene *s;
+        tap_ok(load("", SIZE(8, 8), shapes[k], &s) == IMP_E_SCENE && !s &&
+                   strncmp(imp_last_error(ctx), "test:1:", 7) == 0 &&
+                   strstr(imp_last_error(ctx), "reaches further out than 1e+18"),
+               "%s # %s", shapes[k], imp_last_error(ctx));
+    }
+}
+
 static int stop_now(const struct imp_progress *p, void *payload)
 {
     (void)p;
@@ -396,6 +413,7 @@ int main(void)
     o.allocator = (struct imp_allocator){counting_allocate, counting_release, NULL};
     if (imp_context_create(&o, &ctx) != IMP_OK) return 1;
     films();
+    far_off();
     samples();
     one_pixel();
     endless();
