@@ -2,13 +2,14 @@
  *
  * Bent rays, measured in one run and printed as JSON.
  *
- *     bend_bench [--repeats N] [--rays N] [--full]
+ *     bend_bench [--repeats N] [--rays N] [--nodes N] [--full]
  *
- *   fields      ray-steps per second and thread (processor time) forwards, and the time
- * of the adjoint over it, for both interpolations at 33^3, 129^3 and 257^3 threads wall
- * time on one thread over two, forward and adjoint memory      peak of allocations at 16
- * times the steps over that at 1 iteration   --full: one forward and adjoint of 772,000
- * rays at 129^3, wall seconds */
+ *   fields: ray-steps per second and thread (processor time) forwards, and the time of
+ *     the adjoint over it, for both interpolations at 33^3, 129^3 and 257^3 (--nodes: one
+ *     of them)
+ *   threads: wall time on one thread over two, forward and adjoint
+ *   memory: peak of allocations at 16 times the steps over that at 1
+ *   iteration (--full): one forward and adjoint of 772,000 rays at 129^3, wall seconds */
 #include <importon/bend.h>
 #include <math.h>
 #include <stdio.h>
@@ -16,7 +17,7 @@
 #include <string.h>
 #include <time.h>
 
-static int repeats = 5;
+static int repeats = 5, only_nodes;
 static size_t n_rays = 4096;
 
 static size_t now_bytes, peak_bytes;
@@ -167,12 +168,14 @@ static void fields(void)
                  {"spline float", IMP_FIELD_SPLINE, 1},
                  {"spline", IMP_FIELD_SPLINE, 0}};
     static const int sizes[] = {33, 129, 257};
+    const char *comma = "";
     printf(" \"fields\": [");
     for (int k = 0; k < 4; k++)
         for (int s = 0; s < 3; s++) {
             struct work w;
             double rate[64], ratio[64];
-            const size_t n = n_rays * (s == 0 ? 4 : 8);
+            if (only_nodes && only_nodes != sizes[s]) continue;
+            const size_t n = n_rays * (size_t)(4 << s); /* about one a cell of a face */
             work_make(&w, 1, kinds[k].interp, kinds[k].single, sizes[s], n, 0.5);
             forward(&w, CLOCK_PROCESS_CPUTIME_ID);
             for (int r = 0; r < repeats; r++) {
@@ -184,8 +187,9 @@ static void fields(void)
             printf("%s\n  {\"field\": \"%s\", \"nodes\": %d, "
                    "\"million_ray_steps_per_s\": %.2f, "
                    "\"adjoint/forward\": %.3f}",
-                   k || s ? "," : "", kinds[k].name, sizes[s], median(rate, repeats),
+                   comma, kinds[k].name, sizes[s], median(rate, repeats),
                    median(ratio, repeats));
+            comma = ",";
             fflush(stdout);
             work_free(&w);
         }
@@ -248,8 +252,11 @@ int main(int argc, char **argv)
         else if (i + 1 < argc && !strcmp(argv[i], "--repeats")) repeats = atoi(argv[++i]);
         else if (i + 1 < argc && !strcmp(argv[i], "--rays"))
             n_rays = (size_t)atol(argv[++i]);
+        else if (i + 1 < argc && !strcmp(argv[i], "--nodes"))
+            only_nodes = atoi(argv[++i]);
         else {
-            fprintf(stderr, "usage: bend_bench [--repeats N] [--rays N] [--full]\n");
+            fprintf(stderr,
+                    "usage: bend_bench [--repeats N] [--rays N] [--nodes N] [--full]\n");
             return 2;
         }
     }

@@ -168,13 +168,18 @@ void imp__warn(imp_context *ctx, const char *format, ...)
     ctx->log(IMP_LOG_WARNING, text, ctx->log_payload);
 }
 
-void *imp__alloc(imp_context *ctx, size_t n, size_t size)
+void *imp__alloc_raw(imp_context *ctx, size_t n, size_t size)
 {
     size_t bytes;
     if (__builtin_mul_overflow(n, size, &bytes) || bytes > SIZE_MAX / 4) return NULL;
-    bytes = bytes ? bytes : 1;
-    void *p = ctx->allocator.allocate(bytes, ctx->allocator.payload);
-    if (p) memset(p, 0, bytes);
+    return ctx->allocator.allocate(bytes ? bytes : 1, ctx->allocator.payload);
+}
+
+void *imp__alloc(imp_context *ctx, size_t n, size_t size)
+{
+    void *p = imp__alloc_raw(ctx, n, size);
+    const size_t bytes = n * size;
+    if (p) memset(p, 0, bytes > 0 ? bytes : 1);
     return p;
 }
 

@@ -47,6 +47,7 @@ void imp__warn(imp_context *ctx, const char *format, ...) IMP_PRINTF(2, 3);
 
 /* 64-byte aligned; NULL if out of memory or n*size overflows. Zeroed. */
 void *imp__alloc(imp_context *ctx, size_t n, size_t size);
+void *imp__alloc_raw(imp_context *ctx, size_t n, size_t size); /* not zeroed */
 void imp__release(imp_context *ctx, void *memory);
 /* Grow an array of `old_n` elements to at least `n` (doubling); keeps the contents, new
  * ones are zero. On failure returns NULL and the old array stays. */

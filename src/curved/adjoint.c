@@ -4,308 +4,8 @@
  * ray runs backwards, its cotangents lam = dC/dx, mu = dC/dv with it, and each kick
  * leaves a piece of gradient in the field. Memory: what the tracer kept of each ray, one
  * gradient per slice of rays, and nothing that grows with the number of steps. */
-#include "curved.h"
+#include "adjoint.h"
 #include <string.h>
-
-struct job {
-    const struct imp__plan *plan;
-    const struct imp_bend_rays *rays;
-    const struct imp_bend_exit *exits, *taps;
-    const struct imp_bend_cotangent *bars, *tap_bars;
-    struct imp_bend_gradient *out;
-    size_t slice; /* rays of one item */
-    size_t n_surfaces;
-    struct slot {
-        double *theta; /* [n_theta]; NULL: not used yet */
-        double (*surfaces)[8];
-        struct imp__track *track; /* [IMP_LANES] */
-        uint64_t reversal;
-        double worst;
-    } * slots;
-    uint64_t reversal;
-    double worst;
-};
-
-struct lane {
-    size_t ray;
-    struct imp__start start;
-    uint32_t left; /* whole steps still to undo in this segment */
-    int segment;
-    size_t base;              /* of the segment's states in the track */
-    struct imp__track *track; /* NULL: one segment, reversed */
-    bool taps;
-};
-
-/* ---- Events -------------------------------------------------------------------- */
-
-/* Gradient of a surface's own numbers: through where the ray meets it (rho), and through
- * its normal (n_bar). [0-2] normal or centre, [3] offset or radius, [4] index outside. */
-static void surface_bar(struct slot *slot, const struct imp__surface *s, imp_v3 x,
-                        double rho, imp_v3 n_bar, imp_v3 x_curved, double e2_bar)
-{
-    if (!slot->surfaces) return;
-    double *bar = slot->surfaces[s->id];
-    imp_v3 c = {0};
-    bar[4] += e2_bar;
-    switch (s->kind) {
-    case IMP__PLANE: /* G = n.x - p, tangent to the unit sphere of n */
-        c = n_bar - rho * x;
-        c -= s->n * imp__dot(c, s->n);
-        bar[3] += rho;
-        break;
-    case IMP__SPHERE: /* G = (|x - c|^2 - R^2)/2; the normal moves with the centre */
-    case IMP__CYLINDER: {
-        imp_v3 y = x - s->c;
-        if (s->kind == IMP__CYLINDER) y -= s->n * imp__dot(y, s->n);
-        c = rho * y - x_curved;
-        bar[3] += rho * s->radius;
-        break;
-    }
-    case IMP__APPROACH:
-    case IMP__DISC:
-    case IMP__SDF:
-    case IMP__MESH: return;
-    }
-    for (int k = 0; k < 3; k++) bar[k] += c[k];
-}
-
-/* Pull the cotangents of the momentum after the map back to before it. */
-static void turn_back(struct slot *slot, const struct imp__surface *s, imp_v3 x,
-                      imp_v3 v_in, imp_v3 gx, bool mirror, double e2, imp_v3 *lam,
-                      imp_v3 *mu, double *field_bar)
-{
-    const double length = imp__length(gx);
-    const imp_v3 n = gx * (1 / length);
-    struct imp__turn turn;
-    imp_v3 v_bar, n_bar, m, curved;
-    double e2_bar;
-    imp__turn(&n, &v_in, e2, mirror, &turn);
-    imp__turn_vjp(&turn, &n, &v_in, e2, mu, &v_bar, &n_bar, &e2_bar);
-    m = (n_bar - n * imp__dot(n, n_bar)) * (1 / length);
-    imp__surface_hess(s, &x, &m, &curved);
-    *lam += curved;
-    *mu = v_bar;
-    if (field_bar) *field_bar = e2_bar, e2_bar = 0;
-    surface_bar(slot, s, x, 0, n_bar, curved, e2_bar);
-}
-
-/* Undo a segment's fractional step: (lam, mu, path_bar) at its end -> at the start of
- * that step. `from` is where the step began, `v_in` the momentum at the end. */
-static void land_back(const struct imp__plan *p, struct slot *slot,
-                      const struct imp__surface *s, const struct imp__state *from,
-                      double tau, imp_v3 x, imp_v3 v_in, imp_v3 *lam, imp_v3 *mu,
-                      double path_bar, double *theta_bar)
-{
-    struct imp__state at = *from, rate;
-    struct imp__surface_at sa;
-    imp__step_rate(p->scheme, p->field, tau, &at, &rate);
-    imp__surface_eval(s, &x, &v_in, &sa);
-    const double below = imp__dot(sa.gx, rate.x) + imp__dot(sa.gv, rate.v);
-    const double above =
-        imp__dot(*lam, rate.x) + imp__dot(*mu, rate.v) + path_bar * rate.path;
-    const double rho = below != 0 ? above / below : 0;
-    struct imp__back b;
-    b.x[0] = x, b.v[0] = v_in;
-    b.lam[0] = *lam - rho * sa.gx;
-    b.mu[0] = *mu - rho * sa.gv;
-    b.path_bar[0] = path_bar;
-    if (slot) surface_bar(slot, s, x, rho, (imp_v3){0}, (imp_v3){0}, 0);
-    const struct imp__state *before[1] = {p->options.way == IMP_BEND_STORED ? from
-                                                                            : NULL};
-    imp__step_adjoint(p->scheme, p->field, tau, 1, &b, before, theta_bar);
-    *lam = b.lam[0];
-    *mu = b.mu[0];
-}
-
-/* ---- Lanes --------------------------------------------------------------------- */
-
-/* State at the start of the fractional step, by reversal. */
-static void reverse_landing(const struct imp__plan *p, double tau, struct imp__state *a)
-{
-    if (p->scheme->index_form) { /* pseudo-reverse: the same guess as its adjoint makes */
-        struct imp__jet j;
-        imp__field_eval1(p->field, &a->x, 1, &j);
-        a->x -= a->v * (tau / j.eta);
-        imp__field_eval1(p->field, &a->x, 1, &j);
-        a->v -= tau * j.g;
-        return;
-    }
-    double path = 0; /* all other schemes: time-reversed order of the same stages */
-    if (p->options.scheme == IMP_BEND_EULER) {
-        struct imp__jet j;
-        a->x -= tau * a->v;
-        imp__field_eval1(p->field, &a->x, 1, &j);
-        a->v -= (tau * j.eta) * j.g;
-        return;
-    }
-    imp__step(p->scheme, p->field, -tau, 1, &a->x, &a->v, &path);
-}
-
-/* Put segment `k` of a lane's track under way: from the cotangents at its end. */
-static void segment_begin(const struct imp__plan *p, struct slot *slot, struct lane *l,
-                          struct imp__back *b, int i, double *theta_bar)
-{
-    const struct imp__segment *g = &l->track->segment[l->segment];
-    land_back(p, slot, g->surface, &g->from, g->tau, g->at.x, g->at.v, &b->lam[i],
-              &b->mu[i], b->path_bar[i], theta_bar);
-    b->x[i] = g->from.x;
-    b->v[i] = g->from.v;
-    l->left = g->steps;
-    l->base = 0;
-    for (int k = 0; k < l->segment; k++) l->base += l->track->segment[k].steps + 1u;
-}
-
-static enum imp_status lane_begin(const struct job *job, struct slot *slot, size_t ray,
-                                  struct imp__track *track, struct lane *l,
-                                  struct imp__back *b, int i, double *theta_bar)
-{
-    const struct imp__plan *p = job->plan;
-    const struct imp_bend_exit *e = &job->exits[ray];
-    static const struct imp_bend_cotangent none;
-    const struct imp_bend_cotangent *bar = job->bars ? &job->bars[ray] : &none;
-    const int group = imp__ray_group(job->rays, ray);
-    const bool stored = p->options.way == IMP_BEND_STORED;
-    const struct imp__surface *s;
-    imp_v3 x, v_in;
-
-    *l = (struct lane){.ray = ray, .taps = job->tap_bars != NULL};
-    imp__start_ray(p, job->rays, ray, &l->start);
-    b->lam[i] = imp__v3_load(bar->x);
-    b->mu[i] = imp__v3_load(bar->v);
-    b->path_bar[i] = bar->path;
-    s = imp__exit_surface(p, group, e);
-    /* What is not in the record (turns, the facet of a mesh) is traced again. */
-    if (stored || e->segments > 1 || s->kind == IMP__MESH) {
-        track->states = stored;
-        const enum imp_status st = imp__track_ray(p, job->rays, ray, track);
-        if (st != IMP_OK) return st;
-        l->track = track;
-        l->segment = track->n_segments - 1;
-        s = track->segment[l->segment].surface;
-        x = track->segment[l->segment].at.x;
-        v_in = track->segment[l->segment].at.v;
-    } else {
-        x = imp__v3_load(e->x);
-        v_in = imp__v3_load(e->v);
-    }
-    if (s->event == IMP_BEND_REFRACT) {
-        struct imp__surface_at sa;
-        imp__surface_eval(s, &x, &v_in, &sa);
-        if (!l->track) { /* |v|^2 inside was kept: the normal part follows */
-            const imp_v3 n = imp__normalize(sa.gx);
-            const imp_v3 along = v_in - n * imp__dot(n, v_in);
-            const double q2 = e->norm2 - imp__dot(along, along);
-            v_in = along + n * copysign(sqrt(fmax(q2, 0)), imp__dot(n, v_in));
-        }
-        turn_back(slot, s, x, v_in, sa.gx, false, s->index, &b->lam[i], &b->mu[i], NULL);
-    }
-    if (l->track) {
-        segment_begin(p, slot, l, b, i, theta_bar);
-        return IMP_OK;
-    }
-    struct imp__state from = {x, v_in, 0};
-    reverse_landing(p, e->tau, &from);
-    land_back(p, slot, s, &from, e->tau, x, v_in, &b->lam[i], &b->mu[i], b->path_bar[i],
-              theta_bar);
-    b->x[i] = from.x;
-    b->v[i] = from.v;
-    l->left = e->steps;
-    return IMP_OK;
-}
-
-/* Taps inside the step that begins here: their cotangents come in through their own
- * fractional step. */
-static void taps_join(const struct job *job, struct lane *l, struct imp__back *b, int i,
-                      double *theta_bar)
-{
-    const struct imp__plan *p = job->plan;
-    const size_t first = l->ray * (size_t)p->n_taps;
-    for (int k = 0; k < p->n_taps; k++) {
-        const struct imp_bend_exit *t = &job->taps[first + (size_t)k];
-        const struct imp_bend_cotangent *bar = &job->tap_bars[first + (size_t)k];
-        if ((t->flags & IMP_BEND_TAP_MISSED) || t->steps != l->left ||
-            t->segments != l->segment + 1)
-            continue;
-        const struct imp__state from = {b->x[i], b->v[i], 0};
-        imp_v3 lam = imp__v3_load(bar->x), mu = imp__v3_load(bar->v);
-        const imp_v3 x = imp__v3_load(t->x), v = imp__v3_load(t->v);
-        land_back(p, NULL, &p->taps[k], &from, t->tau, x, v, &lam, &mu, bar->path,
-                  theta_bar);
-        b->lam[i] += lam;
-        b->mu[i] += mu;
-        b->path_bar[i] += bar->path;
-    }
-}
-
-/* From the start of the steps back to the ray as it was given. */
-static void lane_end(const struct job *job, struct slot *slot, struct lane *l,
-                     struct imp__back *b, int i, double *theta_bar)
-{
-    const struct imp__plan *p = job->plan;
-    const struct imp__start *s = &l->start;
-    const imp_v3 zero = {0};
-    imp_v3 lam = b->lam[i], mu = b->mu[i], d_bar;
-    const imp_v3 g = s->jet.g;
-    const double eta = s->jet.eta;
-
-    if (p->options.way == IMP_BEND_REVERSE) {
-        const double off = imp__length(b->x[i] - s->at.x) / p->size;
-        if (off > p->reversal || !isfinite(off)) slot->reversal++;
-        slot->worst = fmax(slot->worst, off);
-    }
-    if (job->out->energy) { /* K of curved-rays 1.2 at the start */
-        const double speed = imp__length(s->at.v);
-        job->out->energy[l->ray] =
-            p->scheme->arc
-                ? imp__dot(lam, s->at.v) / speed + imp__dot(mu, g) + b->path_bar[i] * eta
-                : imp__dot(lam, s->at.v) + eta * imp__dot(mu, g) +
-                      b->path_bar[i] * eta * eta;
-    }
-    if (s->entry) {
-        const struct imp__surface *entry = imp__start_entry(s);
-        struct imp__surface_at sa;
-        const imp_v3 v0 = p->outside_index * s->d0;
-        imp__surface_eval(entry, &s->at.x, &v0, &sa);
-        if (entry->event == IMP_BEND_REFRACT) {
-            double eta_bar;
-            turn_back(slot, entry, s->at.x, v0, sa.gx, false, eta, &lam, &mu, &eta_bar);
-            if (theta_bar)
-                p->field->ops->splat(p->field, &s->at.x, eta_bar, &zero, theta_bar);
-            lam += eta_bar * g;
-        }
-        /* x = x0 + tau v0, path = n^2 tau, tau from G(x) = 0 */
-        const double n2 = p->outside_index * p->outside_index;
-        const double rho =
-            (imp__dot(lam, v0) + b->path_bar[i] * n2) / imp__dot(sa.gx, v0);
-        lam -= rho * sa.gx;
-        surface_bar(slot, entry, s->at.x, rho, zero, zero, 0);
-        mu += s->tau * lam;
-        d_bar = p->outside_index * mu;
-    } else { /* v0 = eta(x0) d0: the term that the paper's supplement leaves out (5)-(6)
-              */
-        const double eta_bar = imp__dot(mu, s->d0);
-        if (theta_bar)
-            p->field->ops->splat(p->field, &s->at.x, eta_bar, &zero, theta_bar);
-        lam += eta_bar * g;
-        d_bar = eta * mu;
-    }
-    d_bar = (d_bar - s->d0 * imp__dot(d_bar, s->d0)) * (1 / s->length);
-    if (job->out->x) imp__v3_store(lam, job->out->x[l->ray]);
-    if (job->out->d) imp__v3_store(d_bar, job->out->d[l->ray]);
-}
-
-/* Back through a turn in the middle of the ray, into the segment before it. */
-static void segment_previous(const struct imp__plan *p, struct slot *slot, struct lane *l,
-                             struct imp__back *b, int i, double *theta_bar)
-{
-    const struct imp__segment *g = &l->track->segment[--l->segment];
-    struct imp__surface_at sa;
-    imp__surface_eval(g->surface, &g->at.x, &g->at.v, &sa);
-    turn_back(slot, g->surface, g->at.x, g->at.v, sa.gx,
-              g->surface->event == IMP_BEND_MIRROR, g->surface->index, &b->lam[i],
-              &b->mu[i], NULL);
-    segment_begin(p, slot, l, b, i, theta_bar);
-}
 
 static bool nothing(const struct imp_bend_cotangent *c)
 {
@@ -313,7 +13,7 @@ static bool nothing(const struct imp_bend_cotangent *c)
            c->v[2] == 0 && c->path == 0;
 }
 
-static bool wanted(const struct job *job, size_t ray)
+static bool wanted(const struct imp__adjoint *job, size_t ray)
 {
     const size_t n_taps = (size_t)job->plan->n_taps;
     if (job->exits[ray].flags & IMP_BEND_DROPPED) return false;
@@ -323,15 +23,14 @@ static bool wanted(const struct job *job, size_t ray)
     return false;
 }
 
-static enum imp_status slot_make(const struct job *job, struct slot *s)
+static enum imp_status slot_make(struct imp__adjoint *job, struct imp__adjoint_slot *s)
 {
     imp_context *ctx = job->plan->ctx;
-    if (s->track) return IMP_OK;
     if (job->out->theta) {
-        s->theta = imp__alloc(ctx, imp_max(job->plan->field->n_theta, (size_t)1),
-                              sizeof *s->theta);
-        if (!s->theta) return imp__error(ctx, IMP_E_NOMEM, "no memory for a gradient");
+        const enum imp_status st = imp__partial_take(&job->partials, &s->partial);
+        if (st != IMP_OK) return st;
     }
+    if (s->track) return IMP_OK;
     if (job->out->surfaces) {
         s->surfaces =
             imp__alloc(ctx, imp_max(job->n_surfaces, (size_t)1), sizeof *s->surfaces);
@@ -343,10 +42,10 @@ static enum imp_status slot_make(const struct job *job, struct slot *s)
 
 static enum imp_status work(size_t item, int worker, int slot_index, void *payload)
 {
-    struct job *job = payload;
-    struct slot *slot = &job->slots[slot_index];
+    struct imp__adjoint *job = payload;
+    struct imp__adjoint_slot *slot = &job->slots[slot_index];
     const struct imp__plan *p = job->plan;
-    struct lane lane[IMP_LANES];
+    struct imp__lane lane[IMP_LANES];
     struct imp__track *free_track[IMP_LANES];
     struct imp__back b;
     size_t next = item * job->slice;
@@ -357,27 +56,31 @@ static enum imp_status work(size_t item, int worker, int slot_index, void *paylo
 
     enum imp_status st = slot_make(job, slot);
     if (st != IMP_OK) return st;
-    double *theta_bar = slot->theta;
+    struct imp__bar at = {0}, *bar = NULL;
+    if (slot->partial) {
+        at = (struct imp__bar){slot->partial->theta, 0, slot->partial->touched};
+        bar = &at;
+    }
     for (int i = 0; i < IMP_LANES; i++) free_track[i] = &slot->track[i];
 
     for (;;) {
         while (n < IMP_LANES && next < last) {
             const size_t ray = next++;
             if (!wanted(job, ray)) continue;
-            st = lane_begin(job, slot, ray, free_track[n], &lane[n], &b, n, theta_bar);
+            st = imp__lane_begin(job, slot, ray, free_track[n], &lane[n], &b, n, bar);
             if (st != IMP_OK) return st;
-            if (lane[n].taps) taps_join(job, &lane[n], &b, n, theta_bar);
+            if (lane[n].taps) imp__lane_taps(job, &lane[n], &b, n, bar);
             n++;
         }
         if (n == 0) return IMP_OK;
         for (int i = 0; i < n;
              i++) { /* lanes at a start: to the segment before, or done */
             while (lane[i].left == 0 && lane[i].segment > 0) {
-                segment_previous(p, slot, &lane[i], &b, i, theta_bar);
-                if (lane[i].taps) taps_join(job, &lane[i], &b, i, theta_bar);
+                imp__lane_turn(job, slot, &lane[i], &b, i, bar);
+                if (lane[i].taps) imp__lane_taps(job, &lane[i], &b, i, bar);
             }
             if (lane[i].left > 0) continue;
-            lane_end(job, slot, &lane[i], &b, i, theta_bar);
+            imp__lane_end(job, slot, &lane[i], &b, i, bar);
             struct imp__track *track = free_track[i];
             n--;
             b.x[i] = b.x[n], b.v[i] = b.v[n], b.lam[i] = b.lam[n], b.mu[i] = b.mu[n];
@@ -396,25 +99,21 @@ static enum imp_status work(size_t item, int worker, int slot_index, void *paylo
             b.x[i] = s->x, b.v[i] = s->v;
             before[i] = s - 1;
         }
-        imp__step_adjoint(p->scheme, p->field, p->t, n, &b, stored ? before : NULL,
-                          theta_bar);
+        imp__step_adjoint(p->scheme, p->field, p->t, n, &b, stored ? before : NULL, bar);
         for (int i = 0; i < n; i++) {
             lane[i].left--;
-            if (lane[i].taps) taps_join(job, &lane[i], &b, i, theta_bar);
+            if (lane[i].taps) imp__lane_taps(job, &lane[i], &b, i, bar);
         }
     }
 }
 
 static enum imp_status commit(size_t item, int slot_index, void *payload)
 {
-    struct job *job = payload;
-    struct slot *s = &job->slots[slot_index];
+    struct imp__adjoint *job = payload;
+    struct imp__adjoint_slot *s = &job->slots[slot_index];
     (void)item;
-    if (s->theta) {
-        for (size_t i = 0; i < job->plan->field->n_theta; i++)
-            job->out->theta[i] += s->theta[i];
-        memset(s->theta, 0, job->plan->field->n_theta * sizeof *s->theta);
-    }
+    if (s->partial) imp__partial_add(&job->partials, s->partial);
+    s->partial = NULL;
     if (s->surfaces) {
         for (size_t i = 0; i < job->n_surfaces; i++)
             for (int k = 0; k < 8; k++) job->out->surfaces[i][k] += s->surfaces[i][k];
@@ -428,14 +127,14 @@ static enum imp_status commit(size_t item, int slot_index, void *payload)
 }
 
 /* Slices: enough for many threads, few while adding up a large gradient would cost more
- * than the rays (n_theta numbers a slice, against n_theta^(1/3) steps or so a ray). Their
- * number depends on the problem alone, so that the sums have one order. */
+ * than the rays (at most n_theta numbers a slice, against n_theta^(1/3) steps or so a
+ * ray). Their number depends on the problem alone, so that the sums have one order. */
 static size_t slice_rays(size_t n, size_t n_theta)
 {
     const double worth = 3 * (double)n / pow(imp_max((double)n_theta, 1.0), 2.0 / 3);
     const size_t most =
         imp_clamp(((size_t)1 << 24) / imp_max(n_theta, (size_t)1), (size_t)8, (size_t)64);
-    const size_t slices = (size_t)imp_clamp(worth, 4.0, (double)most);
+    const size_t slices = (size_t)imp_clamp(worth, 8.0, (double)most);
     return imp_max((n + slices - 1) / slices, (size_t)4 * IMP_LANES);
 }
 
@@ -452,16 +151,17 @@ imp_bend_adjoint(const imp_field *field, const struct imp_bend_options *options,
     imp_context *ctx = plan.ctx;
     const int n_slots = imp__pool_slots(ctx);
     struct imp_bend_gradient sum = *out;
-    struct job job = {.plan = &plan,
-                      .rays = rays,
-                      .exits = exits,
-                      .taps = taps,
-                      .bars = bars,
-                      .tap_bars = plan.n_taps > 0 ? tap_bars : NULL,
-                      .out = &sum,
-                      .n_surfaces = options ? options->n_surfaces : 0,
-                      .slice = slice_rays(rays->n, field->n_theta)};
-    double *theta = NULL, (*surfaces)[8] = NULL;
+    struct imp__adjoint job = {.plan = &plan,
+                               .rays = rays,
+                               .exits = exits,
+                               .taps = taps,
+                               .bars = bars,
+                               .tap_bars = plan.n_taps > 0 ? tap_bars : NULL,
+                               .out = &sum,
+                               .n_surfaces = options ? options->n_surfaces : 0,
+                               .slice = slice_rays(rays->n, field->n_theta)};
+    double(*surfaces)[8] = NULL;
+    imp__partials_init(&job.partials, ctx, field->n_theta);
 
     if (plan.scheme->index_form && plan.options.way == IMP_BEND_REVERSE)
         IMP_TRY(imp__error(
@@ -473,12 +173,9 @@ imp_bend_adjoint(const imp_field *field, const struct imp_bend_options *options,
     if (job.tap_bars && !taps)
         IMP_TRY(imp__error(ctx, IMP_E_ARG, "cotangents of taps without the taps"));
     job.slots = imp__alloc(ctx, (size_t)n_slots, sizeof *job.slots);
-    theta = imp__alloc(ctx, out->theta ? imp_max(field->n_theta, (size_t)1) : 1,
-                       sizeof *theta);
     surfaces = imp__alloc(ctx, job.n_surfaces + 1, sizeof *surfaces);
-    if (!job.slots || !theta || !surfaces)
+    if (!job.slots || !surfaces)
         IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a gradient"));
-    sum.theta = out->theta ? theta : NULL;
     sum.surfaces = out->surfaces && job.n_surfaces > 0 ? surfaces : NULL;
     if (sum.x) memset(sum.x, 0, rays->n * sizeof *sum.x);
     if (sum.d) memset(sum.d, 0, rays->n * sizeof *sum.d);
@@ -494,7 +191,7 @@ imp_bend_adjoint(const imp_field *field, const struct imp_bend_options *options,
                                   .rate_unit = "rays",
                                   .units = (double)rays->n};
     IMP_TRY(imp__parallel(ctx, &loop, NULL));
-    if (out->theta) memcpy(out->theta, theta, field->n_theta * sizeof *theta);
+    if (out->theta) imp__partials_sum(&job.partials, out->theta);
     if (sum.surfaces) memcpy(out->surfaces, surfaces, job.n_surfaces * sizeof *surfaces);
     if (stats) {
         imp__count(&plan, rays->n, exits, taps, stats);
@@ -503,14 +200,14 @@ imp_bend_adjoint(const imp_field *field, const struct imp_bend_options *options,
     }
 out:
     for (int i = 0; job.slots && i < n_slots; i++) {
-        imp__release(ctx, job.slots[i].theta);
+        if (job.slots[i].partial) imp__partial_add(&job.partials, job.slots[i].partial);
         imp__release(ctx, job.slots[i].surfaces);
         for (int k = 0; job.slots[i].track && k < IMP_LANES; k++)
             imp__track_free(&job.slots[i].track[k]);
         imp__release(ctx, job.slots[i].track);
     }
     imp__release(ctx, job.slots);
-    imp__release(ctx, theta);
+    imp__partials_free(&job.partials);
     imp__release(ctx, surfaces);
     imp__plan_destroy(&plan);
     return st;

@@ -83,7 +83,7 @@ static enum imp_status check_transpose(imp_bend *b, const double *dot, double *b
         double eta_dot, left = 0, scale = 1e-300;
         imp_v3 g_dot;
         memset(bar, 0, f->n_theta * sizeof *bar);
-        f->ops->splat(f, &x, 0.7, &g, bar);
+        f->ops->splat(f, &x, 0.7, &g, &(struct imp__bar){.theta = bar});
         f->ops->tangent(f, &x, dot, &eta_dot, &g_dot);
         for (size_t i = 0; i < f->n_theta; i++)
             left += bar[i] * dot[i], scale += fabs(bar[i] * dot[i]);

@@ -25,6 +25,37 @@ struct imp__jet {
     imp_v3 g, h[3];
 };
 
+/* Where a gradient is added up. A large gradient is mostly not reached by a slice of
+ * rays, so its blocks are cleared when they are first touched, and only those are added
+ * to the sum (gradient.c). */
+#define IMP_BLOCK_SHIFT 12
+struct imp__bar {
+    double *theta;    /* of the whole field ... */
+    size_t first;     /* ... where the numbers of this part begin */
+    uint8_t *touched; /* by blocks; NULL: theta is all zero or more, nothing is noted */
+};
+void imp__bar_touch(struct imp__bar *bar, size_t first_block, size_t last_block);
+/* The numbers of this part; of them i .. i + n - 1 will be added to. */
+static inline double *imp__bar_reach(struct imp__bar *bar, size_t i, size_t n)
+{
+    if (bar->touched) {
+        const size_t a = (bar->first + i) >> IMP_BLOCK_SHIFT,
+                     b = (bar->first + i + n - 1) >> IMP_BLOCK_SHIFT;
+        if (imp_unlikely(b - a > 1 || !(bar->touched[a] & bar->touched[b])))
+            imp__bar_touch(bar, a, b);
+    }
+    return bar->theta + bar->first;
+}
+
+/* Order in which n lanes add to a gradient: neighbours in a beam reach overlapping rows,
+ * and a load that overlaps a store still under way waits for it. */
+static inline int imp__lane_order(int n, int k)
+{
+    return n == IMP_LANES ? (k >> 1) + IMP_LANES / 2 * (k & 1) : k;
+}
+
+struct imp__back;
+
 struct imp__field_ops {
     const char *name;
     /* At n <= IMP_LANES points. order 1: h is not touched. */
@@ -32,7 +63,11 @@ struct imp__field_ops {
                  struct imp__jet *jet);
     /* theta_bar += a d eta/d theta + b . d g/d theta: the transpose of `tangent`. */
     void (*splat)(const imp_field *f, const imp_v3 *x, double a, const imp_v3 *b,
-                  double *theta_bar);
+                  struct imp__bar *bar);
+    /* Adjoint of a kick for n <= IMP_LANES rays: eval and splat in one, for kinds that
+     * can share work between them. NULL: the two are called. bar may be NULL. */
+    void (*kick_back)(const imp_field *f, bool arc, double dt, int n, struct imp__back *b,
+                      struct imp__bar *bar);
     void (*tangent)(const imp_field *f, const imp_v3 *x, const double *theta_dot,
                     double *eta_dot, imp_v3 *g_dot);
     /* theta has new values; NULL: nothing to do. */
@@ -79,6 +114,7 @@ struct imp__grid {
     int nodes[3];         /* x, y, z */
     imp_v3 origin, inv_h; /* corner of cell 0; cells per length */
     float *single;        /* theta as floats, NULL: double is used */
+    double most;          /* greatest coefficient, since the last change */
 };
 bool imp__field_is_grid(const imp_field *f);
 void imp__grid_changed(imp_field *f);
@@ -163,7 +199,25 @@ struct imp__back {
 };
 void imp__step_adjoint(const struct imp__scheme *s, const imp_field *f, double t, int n,
                        struct imp__back *b, const struct imp__state *const *before,
-                       double *theta_bar);
+                       struct imp__bar *bar);
+/* Adjoint of the kick of ray i, with the field there: what to splat is returned. A path
+ * cotangent adds S_bar 2 t eta to the value's and S_bar t 2F to lam. */
+static inline __attribute__((always_inline)) void
+imp__kick_back(bool arc, double dt, const struct imp__jet *j, struct imp__back *b, int i,
+               double *value, imp_v3 *slope)
+{
+    if (arc) {
+        b->v[i] -= dt * j->g;
+        *value = b->path_bar[i] * dt;
+        *slope = dt * b->mu[i];
+    } else {
+        const double te = dt * j->eta;
+        b->v[i] -= te * j->g;
+        *value = dt * imp__dot(b->mu[i], j->g) + 2 * te * b->path_bar[i];
+        *slope = te * b->mu[i];
+    }
+    b->lam[i] += *value * j->g + imp__jet_times(j, *slope);
+}
 
 /* ---- Surfaces ------------------------------------------------------------------ */
 

@@ -82,7 +82,8 @@ void imp_field_splat(const imp_field *f, const double x[3], double a, const doub
                      double *theta_bar)
 {
     const imp_v3 at = imp__v3_load(x), gb = imp__v3_load(b);
-    f->ops->splat(f, &at, a, &gb, theta_bar);
+    struct imp__bar bar = {.theta = theta_bar};
+    f->ops->splat(f, &at, a, &gb, &bar);
 }
 
 void imp_field_tangent(const imp_field *f, const double x[3], const double *theta_dot,
@@ -98,9 +99,7 @@ double imp__field_index_max(const imp_field *f)
 {
     if (imp__field_is_grid(f)) {
         const struct imp__grid *g = (const struct imp__grid *)f;
-        double m = 0;
-        for (size_t i = 0; i < f->n_theta; i++) m = fmax(m, f->theta[i]);
-        return g->desc.param == IMP_FIELD_ETA2 ? sqrt(2 * m) : m;
+        return g->desc.param == IMP_FIELD_ETA2 ? sqrt(2 * g->most) : g->most;
     }
     double m = 0;
     for (int i = 0; i <= 64; i++) {

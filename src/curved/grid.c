@@ -16,6 +16,9 @@ bool imp__field_is_grid(const imp_field *f)
 void imp__grid_changed(imp_field *f)
 {
     struct imp__grid *g = (struct imp__grid *)f;
+    g->most = 0;
+    for (size_t i = 0; i < f->n_theta; i++)
+        g->most = g->most < f->theta[i] ? f->theta[i] : g->most;
     if (g->single)
         for (size_t i = 0; i < f->n_theta; i++) g->single[i] = (float)f->theta[i];
 }

@@ -226,13 +226,14 @@ static void profile_eval(const imp_field *f, int n, const imp_v3 *x, int order,
 }
 
 static void profile_splat(const imp_field *f, const imp_v3 *x, double a, const imp_v3 *b,
-                          double *theta_bar)
+                          struct imp__bar *bar)
 {
     const struct profile *p = (const struct profile *)f;
     struct shape_at s = {0};
     double u;
     const imp_v3 y = offset_of(p, *x, &u);
     p->kind->at(f->theta, u, &s);
+    double *theta_bar = imp__bar_reach(bar, 0, f->n_theta);
     const bool along = p->kind->about == ALONG_AXIS;
     /* g = 2 f' y or f' a: what f' is multiplied with in b.g */
     const double slope = along ? imp__dot(*b, p->axis) : 2 * imp__dot(*b, y);

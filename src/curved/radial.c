@@ -67,12 +67,13 @@ static void radial_eval(const imp_field *f, int n, const imp_v3 *x, int order,
 }
 
 static void radial_splat(const imp_field *f, const imp_v3 *x, double a, const imp_v3 *b,
-                         double *theta_bar)
+                         struct imp__bar *bar)
 {
     const struct imp__radial *r = (const struct imp__radial *)f;
     const imp_v3 y = offset_of(r, *x);
     const struct basis s = basis_of(r, imp__dot(y, y));
     const double slope = 2 * imp__dot(*b, y);
+    double *theta_bar = imp__bar_reach(bar, (size_t)s.first, 4);
     for (int k = 0; k < 4; k++) theta_bar[s.first + k] += a * s.b[k] + slope * s.d[k];
 }
 

@@ -45,7 +45,8 @@ static void index_step_rate(const imp_field *f, double t, struct imp__state *s,
 static void index_step_tangent(const imp_field *f, double t, const double *theta_dot,
                                struct imp__state *s, struct imp__state *dot);
 static void index_step_adjoint(const imp_field *f, double t, int n, struct imp__back *b,
-                               const struct imp__state *const *before, double *theta_bar);
+                               const struct imp__state *const *before,
+                               struct imp__bar *bar);
 
 void imp__step(const struct imp__scheme *s, const imp_field *f, double t, int n,
                imp_v3 *x, imp_v3 *v, double *path)
@@ -162,15 +163,14 @@ void imp__step_tangent(const struct imp__scheme *s, const imp_field *f, double t
     }
 }
 
-/* kick_adj and drift_adj of curved-rays 2.2, stages from the last to the first. A path
- * cotangent adds S_bar 2 t eta to the value's and S_bar t 2F to lam. */
+/* kick_adj and drift_adj of curved-rays 2.2, stages from the last to the first. */
 void imp__step_adjoint(const struct imp__scheme *s, const imp_field *f, double t, int n,
                        struct imp__back *b, const struct imp__state *const *before,
-                       double *theta_bar)
+                       struct imp__bar *bar)
 {
     struct imp__jet jet[IMP_LANES];
     if (s->index_form) {
-        index_step_adjoint(f, t, n, b, before, theta_bar);
+        index_step_adjoint(f, t, n, b, before, bar);
         return;
     }
     for (int k = s->n_stages - 1; k >= 0; k--) {
@@ -188,23 +188,16 @@ void imp__step_adjoint(const struct imp__scheme *s, const imp_field *f, double t
                 }
             continue;
         }
+        if (f->ops->kick_back) {
+            f->ops->kick_back(f, s->arc, dt, n, b, bar);
+            continue;
+        }
         f->ops->eval(f, n, b->x, 2, jet);
         for (int i = 0; i < n; i++) {
-            const struct imp__jet *j = &jet[i];
             double value;
             imp_v3 slope;
-            if (s->arc) {
-                b->v[i] -= dt * j->g;
-                value = b->path_bar[i] * dt;
-                slope = dt * b->mu[i];
-            } else {
-                const double te = dt * j->eta;
-                b->v[i] -= te * j->g;
-                value = dt * imp__dot(b->mu[i], j->g) + 2 * te * b->path_bar[i];
-                slope = te * b->mu[i];
-            }
-            if (theta_bar) f->ops->splat(f, &b->x[i], value, &slope, theta_bar);
-            b->lam[i] += value * j->g + imp__jet_times(j, slope);
+            imp__kick_back(s->arc, dt, &jet[i], b, i, &value, &slope);
+            if (bar) f->ops->splat(f, &b->x[i], value, &slope, bar);
         }
     }
 }
@@ -258,7 +251,8 @@ static void index_step_tangent(const imp_field *f, double t, const double *theta
 /* Exact with the states before the step; without them (25), (26) with eta and g taken at
  * the nearest point that is known explicitly: biased, O(s) (curved-rays 1.3). */
 static void index_step_adjoint(const imp_field *f, double t, int n, struct imp__back *b,
-                               const struct imp__state *const *before, double *theta_bar)
+                               const struct imp__state *const *before,
+                               struct imp__bar *bar)
 {
     struct imp__jet jet[IMP_LANES];
     imp_v3 v1[IMP_LANES];
@@ -277,7 +271,7 @@ static void index_step_adjoint(const imp_field *f, double t, int n, struct imp__
         const double value = t * b->path_bar[i] - k / j->eta * imp__dot(b->lam[i], v1[i]);
         const imp_v3 slope = t * mu;
         b->v[i] = before && before[0] ? before[i]->v : v1[i] - t * j->g;
-        if (theta_bar) f->ops->splat(f, &b->x[i], value, &slope, theta_bar);
+        if (bar) f->ops->splat(f, &b->x[i], value, &slope, bar);
         b->lam[i] += value * j->g + imp__jet_times(j, slope);
         b->mu[i] = mu;
     }

@@ -45,6 +45,23 @@ static inline imp_spec weights_dd(double u, double inv_h)
     return (imp_spec){1 - u, 3 * u - 2, 1 - 3 * u, u} * (inv_h * inv_h);
 }
 
+/* Weights along the axes at a point; derivatives are times 1/h and 1/h^2. */
+struct basis {
+    size_t corner;
+    imp_spec wx, wy, wz, dx, dy, dz;
+};
+static inline __attribute__((always_inline)) struct basis basis_of(const struct cell *c,
+                                                                   const imp_v3 inv_h)
+{
+    return (struct basis){c->corner,
+                          weights(c->u[0]),
+                          weights(c->u[1]),
+                          weights(c->u[2]),
+                          weights_d(c->u[0], inv_h[0]),
+                          weights_d(c->u[1], inv_h[1]),
+                          weights_d(c->u[2], inv_h[2])};
+}
+
 typedef float row_f __attribute__((vector_size(16)));
 
 static inline imp_spec row_load(const struct imp__grid *g, size_t i, bool single)
@@ -97,22 +114,20 @@ eval_first(const struct imp__grid *g, imp_v3 x, bool single, struct imp__jet *j)
     j->g = __builtin_shufflevector(r, zero, 0, 1, 2, 7);
 }
 
-static inline __attribute__((always_inline)) void
-eval_second(const struct imp__grid *g, imp_v3 x, bool single, struct imp__jet *j)
+static inline __attribute__((always_inline)) void second(const struct imp__grid *g,
+                                                         const struct cell *c,
+                                                         const struct basis *b,
+                                                         bool single, struct imp__jet *j)
 {
-    const struct cell c = cell_of(g, x);
-    const imp_spec wx = weights(c.u[0]), wy = weights(c.u[1]), wz = weights(c.u[2]);
-    const imp_spec dx = weights_d(c.u[0], g->inv_h[0]),
-                   dy = weights_d(c.u[1], g->inv_h[1]),
-                   dz = weights_d(c.u[2], g->inv_h[2]);
-    const imp_spec ddx = weights_dd(c.u[0], g->inv_h[0]),
-                   ddy = weights_dd(c.u[1], g->inv_h[1]),
-                   ddz = weights_dd(c.u[2], g->inv_h[2]);
+    const imp_spec wx = b->wx, wy = b->wy, wz = b->wz, dx = b->dx, dy = b->dy, dz = b->dz;
+    const imp_spec ddx = weights_dd(c->u[0], g->inv_h[0]),
+                   ddy = weights_dd(c->u[1], g->inv_h[1]),
+                   ddz = weights_dd(c->u[2], g->inv_h[2]);
     const size_t sy = (size_t)g->nodes[0], sz = sy * (size_t)g->nodes[1];
     imp_spec a = {0}, ay = {0}, az = {0}, ayy = {0}, ayz = {0}, azz = {0};
 #pragma GCC unroll 4
     for (int k = 0; k < 4; k++) {
-        const size_t at = c.corner + (size_t)k * sz;
+        const size_t at = c->corner + (size_t)k * sz;
         const imp_spec r0 = row_load(g, at, single), r1 = row_load(g, at + sy, single),
                        r2 = row_load(g, at + 2 * sy, single),
                        r3 = row_load(g, at + 3 * sy, single);
@@ -137,6 +152,14 @@ eval_second(const struct imp__grid *g, imp_v3 x, bool single, struct imp__jet *j
     j->h[2] = (imp_v3){h[2], q[0], q[1], 0};
 }
 
+static inline __attribute__((always_inline)) void
+eval_second(const struct imp__grid *g, imp_v3 x, bool single, struct imp__jet *j)
+{
+    const struct cell c = cell_of(g, x);
+    const struct basis b = basis_of(&c, g->inv_h);
+    second(g, &c, &b, single, j);
+}
+
 static void spline_eval(const imp_field *f, int n, const imp_v3 *x, int order,
                         struct imp__jet *jet)
 {
@@ -158,19 +181,19 @@ static void spline_eval(const imp_field *f, int n, const imp_v3 *x, int order,
 
 /* theta_bar += a w_a w_b w_c + (1/h)(b_x w_a' w_b w_c + ...): each row gets the x weights
  * and their derivative, each times a number. */
-static void splat_raw(const struct imp__grid *g, const imp_v3 *x, double va, imp_v3 b,
-                      double *theta_bar)
+static inline __attribute__((always_inline)) void splat_basis(const struct imp__grid *g,
+                                                              const struct basis *s,
+                                                              double va, imp_v3 b,
+                                                              struct imp__bar *bar)
 {
-    const struct cell c = cell_of(g, *x);
-    const imp_spec wx = weights(c.u[0]), wy = weights(c.u[1]), wz = weights(c.u[2]);
-    const imp_spec dx = weights_d(c.u[0], g->inv_h[0]) * b[0],
-                   dy = weights_d(c.u[1], g->inv_h[1]) * b[1],
-                   dz = weights_d(c.u[2], g->inv_h[2]) * b[2];
+    const imp_spec wx = s->wx, wy = s->wy, wz = s->wz;
+    const imp_spec dx = s->dx * b[0], dy = s->dy * b[1], dz = va * wz + s->dz * b[2];
     const size_t sy = (size_t)g->nodes[0], sz = sy * (size_t)g->nodes[1];
 #pragma GCC unroll 4
     for (int k = 0; k < 4; k++) {
-        const imp_spec q = wy * wz[k], p = wy * (va * wz[k] + dz[k]) + dy * wz[k];
-        double *row = theta_bar + c.corner + (size_t)k * sz;
+        const imp_spec q = wy * wz[k], p = wy * dz[k] + dy * wz[k];
+        const size_t at = s->corner + (size_t)k * sz;
+        double *row = imp__bar_reach(bar, at, 3 * sy + 4) + at;
 #pragma GCC unroll 4
         for (int i = 0; i < 4; i++, row += sy) {
             imp_spec r;
@@ -182,16 +205,47 @@ static void splat_raw(const struct imp__grid *g, const imp_v3 *x, double va, imp
 }
 
 static void spline_splat(const imp_field *f, const imp_v3 *x, double a, const imp_v3 *b,
-                         double *theta_bar)
+                         struct imp__bar *bar)
 {
     const struct imp__grid *g = (const struct imp__grid *)f;
+    const struct cell c = cell_of(g, *x);
+    const struct basis s = basis_of(&c, g->inv_h);
     imp_v3 gb = *b;
     if (g->desc.param == IMP_FIELD_ETA2) {
         struct imp__jet j;
         spline_eval(f, 1, x, 1, &j);
         imp__eta2_vjp(&j, &a, &gb);
     }
-    splat_raw(g, x, a, gb, theta_bar);
+    splat_basis(g, &s, a, gb, bar);
+}
+
+/* Weights and addresses are those of value, gradient, Hessian and transpose at once. */
+static inline __attribute__((always_inline)) void
+back_some(const struct imp__grid *g, bool single, bool arc, double dt, int n,
+          struct imp__back *b, struct imp__bar *bar)
+{
+    const bool eta2 = g->desc.param == IMP_FIELD_ETA2;
+    for (int o = 0; o < n; o++) {
+        const int i = imp__lane_order(n, o);
+        const struct cell c = cell_of(g, b->x[i]);
+        const struct basis s = basis_of(&c, g->inv_h);
+        struct imp__jet j;
+        double value;
+        imp_v3 slope;
+        second(g, &c, &s, single, &j);
+        if (eta2) imp__jet_from_eta2(&j, 2);
+        imp__kick_back(arc, dt, &j, b, i, &value, &slope);
+        if (!bar) continue;
+        if (eta2) imp__eta2_vjp(&j, &value, &slope);
+        splat_basis(g, &s, value, slope, bar);
+    }
+}
+static void spline_kick_back(const imp_field *f, bool arc, double dt, int n,
+                             struct imp__back *b, struct imp__bar *bar)
+{
+    const struct imp__grid *g = (const struct imp__grid *)f;
+    if (g->single) back_some(g, true, arc, dt, n, b, bar);
+    else back_some(g, false, arc, dt, n, b, bar);
 }
 
 static void spline_tangent(const imp_field *f, const imp_v3 *x, const double *theta_dot,
@@ -213,6 +267,7 @@ static void spline_tangent(const imp_field *f, const imp_v3 *x, const double *th
 const struct imp__field_ops imp__field_spline = {.name = "spline",
                                                  .eval = spline_eval,
                                                  .splat = spline_splat,
+                                                 .kick_back = spline_kick_back,
                                                  .tangent = spline_tangent,
                                                  .changed = imp__grid_changed,
                                                  .destroy = imp__grid_destroy};

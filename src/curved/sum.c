@@ -30,12 +30,13 @@ static void sum_eval(const imp_field *f, int n, const imp_v3 *x, int order,
     }
 }
 static void sum_splat(const imp_field *f, const imp_v3 *x, double a, const imp_v3 *b,
-                      double *theta_bar)
+                      struct imp__bar *bar)
 {
     const struct sum *s = (const struct sum *)f;
+    struct imp__bar own = *bar;
     for (size_t p = 0; p < s->n; p++) {
-        s->part[p]->ops->splat(s->part[p], x, a, b, theta_bar);
-        theta_bar += s->part[p]->n_theta;
+        s->part[p]->ops->splat(s->part[p], x, a, b, &own);
+        own.first += s->part[p]->n_theta;
     }
 }
 static void sum_tangent(const imp_field *f, const imp_v3 *x, const double *theta_dot,

@@ -30,10 +30,9 @@ corners_of(const struct imp__grid *g, imp_v3 x, bool single)
 }
 
 static inline __attribute__((always_inline)) void
-eval_one(const struct imp__grid *g, imp_v3 x, bool single, int order, struct imp__jet *j)
+jet_of(const struct imp__grid *g, const struct corners *r, int order, struct imp__jet *j)
 {
-    const struct corners r = corners_of(g, x, single);
-    const double *c = r.c, u = r.u, v = r.v, w = r.w;
+    const double *c = r->c, u = r->u, v = r->v, w = r->w;
     const double d0 = c[1] - c[0], d1 = c[3] - c[2], d2 = c[5] - c[4], d3 = c[7] - c[6];
     const double e0 = c[0] + u * d0, e1 = c[2] + u * d1, e2 = c[4] + u * d2,
                  e3 = c[6] + u * d3;
@@ -51,6 +50,13 @@ eval_one(const struct imp__grid *g, imp_v3 x, bool single, int order, struct imp
     j->h[2] = imp__v3(xz, yz, 0);
 }
 
+static inline __attribute__((always_inline)) void
+eval_one(const struct imp__grid *g, imp_v3 x, bool single, int order, struct imp__jet *j)
+{
+    const struct corners r = corners_of(g, x, single);
+    jet_of(g, &r, order, j);
+}
+
 static void trilinear_eval(const imp_field *f, int n, const imp_v3 *x, int order,
                            struct imp__jet *jet)
 {
@@ -63,29 +69,67 @@ static void trilinear_eval(const imp_field *f, int n, const imp_v3 *x, int order
         for (int i = 0; i < n; i++) imp__jet_from_eta2(&jet[i], order);
 }
 
+static inline __attribute__((always_inline)) void splat_corners(const struct imp__grid *g,
+                                                                const struct corners *r,
+                                                                double a, imp_v3 b,
+                                                                struct imp__bar *bar)
+{
+    const size_t sy = (size_t)g->nodes[0], sz = sy * (size_t)g->nodes[1];
+    const double wx[2] = {1 - r->u, r->u}, wy[2] = {1 - r->v, r->v},
+                 wz[2] = {1 - r->w, r->w};
+    b *= g->inv_h;
+    for (int k = 0; k < 2; k++) {
+        const size_t at = r->at + (k ? sz : 0);
+        double *row = imp__bar_reach(bar, at, sy + 2) + at;
+        for (int i = 0; i < 2; i++, row += sy) {
+            const double q = wy[i] * wz[k];
+            const double p =
+                a * q + (i ? b[1] : -b[1]) * wz[k] + wy[i] * (k ? b[2] : -b[2]);
+            row[0] += p * wx[0] - b[0] * q;
+            row[1] += p * wx[1] + b[0] * q;
+        }
+    }
+}
+
 static void trilinear_splat(const imp_field *f, const imp_v3 *x, double a,
-                            const imp_v3 *b, double *theta_bar)
+                            const imp_v3 *b, struct imp__bar *bar)
 {
     const struct imp__grid *g = (const struct imp__grid *)f;
     imp_v3 gb = *b;
+    const struct corners r = corners_of(g, *x, false);
     if (g->desc.param == IMP_FIELD_ETA2) {
         struct imp__jet j;
         trilinear_eval(f, 1, x, 1, &j);
         imp__eta2_vjp(&j, &a, &gb);
     }
-    const struct corners r = corners_of(g, *x, false);
-    const size_t sy = (size_t)g->nodes[0], sz = sy * (size_t)g->nodes[1];
-    const double wx[2] = {1 - r.u, r.u}, wy[2] = {1 - r.v, r.v}, wz[2] = {1 - r.w, r.w};
-    gb *= g->inv_h;
-    for (int k = 0; k < 2; k++)
-        for (int i = 0; i < 2; i++) {
-            double *row = theta_bar + r.at + (i ? sy : 0) + (k ? sz : 0);
-            const double q = wy[i] * wz[k];
-            const double p =
-                a * q + (i ? gb[1] : -gb[1]) * wz[k] + wy[i] * (k ? gb[2] : -gb[2]);
-            row[0] += p * wx[0] - gb[0] * q;
-            row[1] += p * wx[1] + gb[0] * q;
-        }
+    splat_corners(g, &r, a, gb, bar);
+}
+
+static inline __attribute__((always_inline)) void
+back_some(const struct imp__grid *g, bool single, bool arc, double dt, int n,
+          struct imp__back *b, struct imp__bar *bar)
+{
+    const bool eta2 = g->desc.param == IMP_FIELD_ETA2;
+    for (int o = 0; o < n; o++) {
+        const int i = imp__lane_order(n, o);
+        const struct corners r = corners_of(g, b->x[i], single);
+        struct imp__jet j;
+        double value;
+        imp_v3 slope;
+        jet_of(g, &r, 2, &j);
+        if (eta2) imp__jet_from_eta2(&j, 2);
+        imp__kick_back(arc, dt, &j, b, i, &value, &slope);
+        if (!bar) continue;
+        if (eta2) imp__eta2_vjp(&j, &value, &slope);
+        splat_corners(g, &r, value, slope, bar);
+    }
+}
+static void trilinear_kick_back(const imp_field *f, bool arc, double dt, int n,
+                                struct imp__back *b, struct imp__bar *bar)
+{
+    const struct imp__grid *g = (const struct imp__grid *)f;
+    if (g->single) back_some(g, true, arc, dt, n, b, bar);
+    else back_some(g, false, arc, dt, n, b, bar);
 }
 
 static void trilinear_tangent(const imp_field *f, const imp_v3 *x,
@@ -107,6 +151,7 @@ static void trilinear_tangent(const imp_field *f, const imp_v3 *x,
 const struct imp__field_ops imp__field_trilinear = {.name = "trilinear",
                                                     .eval = trilinear_eval,
                                                     .splat = trilinear_splat,
+                                                    .kick_back = trilinear_kick_back,
                                                     .tangent = trilinear_tangent,
                                                     .changed = imp__grid_changed,
                                                     .destroy = imp__grid_destroy};
