@@ -263,7 +263,7 @@ static void grid_splat(const struct splat_job *j, imp_field *f, size_t offset)
     cell.base.theta = local;
     cell.single = NULL;
     double bar[64] = {0};
-    f->ops->splat(&cell.base, &j->x, a, &b, bar);
+    f->ops->splat(&cell.base, &j->x, a, &b, &(struct imp__bar){.theta = bar});
     for (int k = 0, n = 0; k < side; k++)
         for (int jj = 0; jj < side; jj++)
             for (int i = 0; i < side; i++, n++)
@@ -286,7 +286,7 @@ static void leaf_splat(imp_field *f, size_t offset, void *payload)
     double bar[LEAF_MAX];
     const size_t count = imp_min(f->n_theta, (size_t)LEAF_MAX);
     memset(bar, 0, count * sizeof *bar);
-    f->ops->splat(f, &j->x, j->a, &j->b, bar);
+    f->ops->splat(f, &j->x, j->a, &j->b, &(struct imp__bar){.theta = bar});
     for (size_t k = 0; k < count; k++)
         if (bar[k] != 0) number_add(j->to, offset + k, bar[k]);
 }
@@ -353,9 +353,9 @@ static void view_eval(const imp_field *f, int n, const imp_v3 *x, int order,
     of->ops->eval(of, n, x, order, jet);
 }
 static void view_splat(const imp_field *f, const imp_v3 *x, double a, const imp_v3 *b,
-                       double *theta_bar)
+                       struct imp__bar *bar)
 {
-    (void)theta_bar;
+    (void)bar;
     imp__graded_splat(((const struct view *)f)->active, x, a, b);
 }
 static void view_tangent(const imp_field *f, const imp_v3 *x, const double *theta_dot,
@@ -377,7 +377,7 @@ void imp__ride_back(const struct imp__graded_active *to, const struct imp__ride 
 {
     const struct imp__plan *p = &to->medium->graded->plan;
     const struct view view = {{.ops = &view_ops}, to};
-    double yes; /* theta_bar: where splats go is the view's business */
+    struct imp__bar yes = {0}; /* where splats go is the view's business */
     struct imp__state at = r->from, rate;
     struct imp__surface_at sa;
     struct imp__back b;
