@@ -18,6 +18,8 @@
 #define MU_MIN   1e-7
 #define MU_MAX   1e8
 #define TRIALS   8
+#define NEARER   0.8  /* a step goes this part of the way to a bound, */
+#define TOUCH    1e-3 /* and all of it from this near, in scales */
 
 enum { FIRST };      /* arrays: [n] the first Newton point within noise */
 enum { MU, WITHIN }; /* scalars; WITHIN: iterations within noise, in a row */
@@ -132,6 +134,17 @@ static bool within_noise(size_t n, struct work *w)
     return q <= mean + 2 * sqrt(2 * half_var);
 }
 
+/* Newton's point for a variable, cut off on its way to a bound. A step from far away may
+ * promise the bound itself, and some bounds are traps: a lobe as narrow as a mirror's
+ * says next to nothing of its roughness, and the search would end there. */
+static double toward(const struct imp__goal *goal, size_t k, double x, double to)
+{
+    const double lo = goal->lo[k], hi = goal->hi[k], touch = TOUCH * goal->scale[k];
+    if (isfinite(lo) && x - lo > touch) to = fmax(to, x - NEARER * (x - lo));
+    if (isfinite(hi) && hi - x > touch) to = fmin(to, x + NEARER * (hi - x));
+    return imp__into_bounds(goal, k, to);
+}
+
 /* delta, cut off at the bounds; returns the decrease the model promises. */
 static double propose(const struct imp__goal *goal, const double *x, struct work *w)
 {
@@ -139,7 +152,7 @@ static double propose(const struct imp__goal *goal, const double *x, struct work
     double gain = 0;
     solve(n, w, w->eq.g, w->delta);
     for (size_t k = 0; k < n; k++) {
-        w->trial[k] = imp__into_bounds(goal, k, x[k] - w->delta[k]);
+        w->trial[k] = toward(goal, k, x[k], x[k] - w->delta[k]);
         w->delta[k] = w->trial[k] - x[k];
     }
     for (size_t k = 0; k < n; k++) {

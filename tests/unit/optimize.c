@@ -144,6 +144,84 @@ static void valley(void)
     }
 }
 
+/* A lobe of roughness a and a lamp of power p, seen at angles of 0.05 and more:
+ * I = p (a^2/(theta^2 + a^2)^2 + 1/4). From afar, Newton's step for a lands
+ * beyond the bound 1e-4, where the lobe is out of everybody's sight and lowers the
+ * objective all the same, and where noise of its gradient, of 0.3/a, ends the search. */
+static enum imp_status lobe_normal(const double *x, uint64_t seed,
+                                   struct imp__normal *out, void *payload)
+{
+    const double truth[2] = {0.2, 10};
+    const double a2 = x[0] * x[0], *lamp = &x[1];
+    double value = 0, g[2] = {0}, h[4] = {0};
+    (void)payload;
+    for (int p = 0; p < 20; p++) {
+        const double t = 0.05 * (p + 1), t2 = t * t, q = t2 + a2;
+        const double s = t2 + truth[0] * truth[0];
+        const double lobe = a2 / (q * q) + 0.25;
+        const double r = *lamp * lobe + 0.05 * toy_gauss(seed, (uint64_t)p) -
+                         truth[1] * (truth[0] * truth[0] / (s * s) + 0.25);
+        const double J[2] = {*lamp * 2 * x[0] * (t2 - a2) / (q * q * q), lobe};
+        value += 0.5 * r * r;
+        for (int k = 0; k < 2; k++) {
+            g[k] += J[k] * r;
+            for (int l = 0; l < 2; l++) h[2 * k + l] += J[k] * J[l];
+        }
+    }
+    out->f = (struct imp_estimate){value, 0.1, 0};
+    memcpy(out->g, g, sizeof g);
+    for (int k = 0; k < 4; k++) {
+        out->H[k] = out->H_same[k] = h[k];
+        out->H_prior[k] = out->H_meas[k] = 0;
+        out->cov_g[k] = 0.05 * 0.05 * h[k];
+    }
+    const double noise = 0.3 / x[0];
+    out->g[0] += noise * toy_gauss(seed, 100);
+    out->cov_g[0] += noise * noise;
+    out->H_same[0] += 20 * noise * noise;
+    return IMP_OK;
+}
+static enum imp_status lobe_eval(const double *x, uint64_t seed, struct imp_estimate *f,
+                                 double *g, double *g_se, void *payload)
+{
+    double none[4][4];
+    struct imp__normal eq = {.H = none[0],
+                             .H_same = none[1],
+                             .H_prior = none[2],
+                             .H_meas = none[2],
+                             .cov_g = none[2],
+                             .g = none[3]};
+    (void)g_se;
+    lobe_normal(x, seed, &eq, payload);
+    if (g) memcpy(g, eq.g, 2 * sizeof *g);
+    *f = eq.f;
+    return IMP_OK;
+}
+static void bound_is_no_trap(void)
+{
+    const double lo[2] = {1e-4, 0}, hi[2] = {INFINITY, INFINITY};
+    const double begin[][2] = {{0.4, 5}, {0.7, 1}, {1, 3}, {2, 1}, {2, 15}};
+    const struct imp__opt_options o = options_of(IMP_LM);
+    for (int i = 0; i < 5; i++) {
+        struct imp__search *s = NULL;
+        const struct imp__goal goal = {.ctx = ctx,
+                                       .n = 2,
+                                       .lo = lo,
+                                       .hi = hi,
+                                       .scale = begin[i],
+                                       .seed = 1,
+                                       .eval = lobe_eval,
+                                       .normal = lobe_normal};
+        const int ok = imp__search_create(&goal, IMP_LM, &o, begin[i], &s) == IMP_OK &&
+                       imp__optimize(&goal, &o, s) == IMP_OK;
+        tap_ok(ok && fabs(s->x[0] - 0.2) < 0.002 && fabs(s->x[1] - 10) < 0.1,
+               "LM from %g, %g past a bound where a variable is lost # %g, %g after %d "
+               "iterations: %s",
+               begin[i][0], begin[i][1], s->x[0], s->x[1], s->iteration, s->reason);
+        imp__search_destroy(s);
+    }
+}
+
 int main(void)
 {
     if (imp_context_create(NULL, &ctx) != IMP_OK) return 1;
@@ -152,6 +230,7 @@ int main(void)
         resume(kind);
     }
     valley();
+    bound_is_no_trap();
     /* A variable nothing depends on stays where it was. */
     struct toy t;
     enum imp_status st;
