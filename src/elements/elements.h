@@ -100,7 +100,8 @@ struct imp__el_root { /* an input polygon, one side of it */
     double radiance[3]; /* L0 */
     imp_v3 axis;        /* EL_LOBE, world: L0 max(0, w.axis)^power */
     double power;
-    int light_param, light_count; /* its parameter, -1: none */
+    const struct imp_input *power_input; /* of a light of the scene; NULL: an option's */
+    int light_param, light_count;        /* its parameter, -1: none */
     const char *light_name;
     double light_value[3];
     bool measured;  /* by a source: it has a coefficient even if it is black */

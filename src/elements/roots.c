@@ -3,6 +3,7 @@
  * From the scene's shapes to polygons with a material and a light each. What has no place
  * in finite elements is refused here, by the shape's name. */
 #include "elements.h"
+#include "kind/emitter/beam.h"
 #include <string.h>
 
 static enum imp_status no_memory(imp_elements *e)
@@ -58,7 +59,9 @@ static enum imp_status emitter_take(imp_elements *e, const struct imp_shape *s,
                                     struct imp__el_root *r)
 {
     const struct imp_emitter *em = e->scene->emitters[s->emitter];
-    if (em->n_in < 1 || em->input[0]->texture)
+    bool textured = em->n_in < 1;
+    for (int j = 0; j < em->n_in; j++) textured |= em->input[j]->texture != NULL;
+    if (textured)
         return imp__error(
             e->ctx, IMP_E_UNSUPPORTED,
             "shape '%s': its light (%s) has a texture, which finite elements "
@@ -71,6 +74,15 @@ static enum imp_status emitter_take(imp_elements *e, const struct imp_shape *s,
                           "has too many inputs",
                           s->name, em->ops->name);
     imp__inputs_eval(em->input, em->n_in, &(struct imp_texcoord){.uv = {0.5, 0.5}}, in);
+    if (em->ops == &imp__beam_light) {
+        const struct imp__beam *beam = em->self;
+        light_set(r, em->input[0], em->name);
+        r->light = EL_LOBE;
+        r->axis = beam->aimed ? beam->axis : r->frame.n;
+        r->power_input = em->input[IMP_BEAM_EXPONENT];
+        r->power = in[IMP_BEAM_EXPONENT][0];
+        return IMP_OK;
+    }
     for (int k = 1; k < 16; k++) {
         const double z = k / 16.0, x = sqrt(1 - z * z);
         const struct imp_emission at = {.uv = {0.1 * (k % 7), 0.06 * k},
@@ -207,6 +219,7 @@ static enum imp_status polygon_add(imp_elements *e, const struct imp_shape *s,
             r.light = EL_LOBE;
             r.axis = length > 0 ? axis * (1 / length) : n;
             r.power = beam->exponent;
+            r.power_input = NULL;
         }
         IMP_TRY(root_append(e, &r, &made));
         if (side == 0) *index = made;

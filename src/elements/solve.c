@@ -401,6 +401,7 @@ enum imp_status imp__el_parameters(imp_elements *e)
         for (int c = 0; c < 3; c++)
             r->radiance[c] = r->light_value[c] = imp__param_get(
                 &e->scene->params[r->light_param], r->light_count == 3 ? (size_t)c : 0);
+        if (r->power_input) r->power = r->power_input->value[0];
     }
     for (int i = 0; i < e->n_materials; i++) {
         struct imp__el_material *m = &e->materials[i];

@@ -223,8 +223,10 @@ static bool is_emission(const struct imp_scene *s, size_t param)
     for (int i = 0; i < s->n_emitters; i++)
         for (int j = 0; j < s->emitters[i]->n_in; j++)
             if (s->emitters[i]->input[j]->param == (int)param &&
-                !s->emitters[i]->input[j]->texture)
-                emission = true;
+                !s->emitters[i]->input[j]->texture) {
+                if (s->emitters[i]->ops->inputs[j].role == IMP_EMISSION) emission = true;
+                else other = true;
+            }
     for (int i = 0; i < s->n_bsdfs; i++)
         for (int j = 0; j < s->bsdfs[i]->n_own; j++)
             if (s->bsdfs[i]->input[j]->param == (int)param &&

@@ -481,7 +481,13 @@ static void check_one(const struct subject *q, const char *integrator,
         if (strncmp(info.name, "subject", 7) != 0) continue;
         if (!(info.flags & IMP_PARAM_DIFFERENTIABLE)) continue;
         double *v = calloc(info.count, sizeof *v), *x = calloc(info.count, sizeof *x);
-        const bool linear = q->emitter != NULL;
+        bool linear = q->emitter != NULL;
+        for (int j = 0; inputs && inputs[j].name && linear; j++) {
+            char part[128];
+            snprintf(part, sizeof part, "subject.%s", inputs[j].name);
+            if (strncmp(info.name, part, strlen(part)) == 0)
+                linear = inputs[j].role == IMP_EMISSION;
+        }
         for (size_t e = 0; e < info.count; e++)
             v[e] = 0.5 + imp__u01(imp__key(2, 2, 2), (uint32_t)e);
         fresh(s, p, k, v, linear, what);

@@ -362,8 +362,8 @@ static struct imp_emitter *emitter_build(struct imp_node *n, const struct imp_sh
     return emitter_status == IMP_OK ? e : NULL;
 }
 
-/* What every kind owes: eval is linear in its input, eval_d is that factor, sample and
- * pdf agree, and light behind an area light is none. */
+/* What every kind owes: eval is linear in its first input, eval_d is that factor, sample
+ * and pdf agree, and light behind an area light is none. */
 static void emitters(void)
 {
     const double value[3] = {2, 3, 5};
@@ -378,7 +378,7 @@ static void emitters(void)
             tap_ok(0, "%s is built # %s", ops->name, imp_last_error(ctx));
             continue;
         }
-        double worst = 0, slope = 0;
+        double worst = 0, slope = 0, other = 0;
         int behind = 0, lit = 0, delta_ok = 1;
         for (uint32_t i = 0; i < 4000; i++) {
             const struct imp_key key = imp__key(81, 0, i);
@@ -391,14 +391,26 @@ static void emitters(void)
                                            .dist = l.dist,
                                            .cos_light = l.cos_light,
                                            .d = -l.wi};
-            const imp_spec in[1] = {imp__v3(2, 3, 5)}, twice[1] = {imp__v3(4, 6, 10)};
-            imp_spec le, le2, dle[1];
+            imp_spec in[8] = {imp__v3(2, 3, 5)}, twice[8] = {imp__v3(4, 6, 10)};
+            imp_spec le, le2, dle[8];
+            for (int j = 1; j < e->n_in; j++) in[j] = twice[j] = imp__spec(4);
             ops->eval(e, in, &x, &le);
             ops->eval(e, twice, &x, &le2);
             ops->eval_d(e, in, &x, dle);
             for (int c = 0; c < 3; c++) {
                 slope = fmax(slope, fabs(le2[c] - 2 * le[c]) / (1 + le[c]));
                 slope = fmax(slope, fabs(le[c] - dle[0][c] * in[0][c]) / (1 + le[c]));
+            }
+            for (int j = 1; j < e->n_in; j++) { /* others by central differences */
+                imp_spec up[8], down[8], a, b;
+                memcpy(up, in, sizeof up);
+                memcpy(down, in, sizeof down);
+                up[j] += 1e-5;
+                down[j] -= 1e-5;
+                ops->eval(e, up, &x, &a);
+                ops->eval(e, down, &x, &b);
+                for (int c = 0; c < 3; c++)
+                    other = fmax(other, fabs((a[c] - b[c]) / 2e-5 - dle[j][c]));
             }
             lit += le[0] > 0;
             behind += area && ref[2] < 0 && le[0] != 0;
@@ -416,11 +428,30 @@ static void emitters(void)
                 ops->pdf(e, &ref, &l.wi, area ? &hit : NULL, area ? &at : NULL);
             worst = fmax(worst, fabs(pdf / l.pdf - 1));
         }
-        tap_ok(worst < 1e-3 && slope < 1e-15 && behind == 0 && lit > 1000 && delta_ok,
+        tap_ok(worst < 1e-3 && slope < 1e-15 && other < 1e-8 && behind == 0 &&
+                   lit > 1000 && delta_ok,
                "%s: eval, eval_d, sample, pdf # pdf %.1e slope %.1e behind %d lit %d",
                ops->name, worst, slope, behind, lit);
         world_end();
     }
+
+    /* A beam aimed by 60 degrees: cos^4 about its axis, nothing behind. */
+    world_begin(ctx);
+    struct imp_node *aimed = node_new("emitter", "beam");
+    node_vector(aimed, "axis", imp__v3(sqrt(3), 0, 1));
+    struct imp_emitter *beam = emitter_build(
+        aimed, placed("rectangle", imp__mat4_identity()), (double[3]){2, 2, 2});
+    for (int k = -1; k < 8 && beam; k++) {
+        const imp_spec in[2] = {imp__spec(2), imp__spec(4)};
+        const double a = k * 0.3;
+        const struct imp_emission x = {
+            .dist = 1, .cos_light = cos(a), .d = imp__v3(sin(a), 0, cos(a))};
+        imp_spec le;
+        beam->ops->eval(beam, in, &x, &le);
+        tap_near(le[0], cos(a) > 0 ? 2 * pow(fmax(0, cos(a - IMP_PI / 3)), 4) : 0, 1e-13,
+                 1e-15, "an aimed beam");
+    }
+    world_end();
 
     /* G1: point light I at height h, lateral x: I h / (h^2 + x^2)^(3/2). */
     world_begin(ctx);
@@ -463,6 +494,8 @@ static void emitters(void)
                   {"area", "to_world", "the light is its shape", 1, 1},
                   {"area", NULL, "its shape 'rectangle' (rectangle) has no area", 1, 0},
                   {"stam_m1", NULL, "has no area", 1, 0},
+                  {"beam", NULL, "must be inside a shape", 0, 1},
+                  {"beam", NULL, "has no area", 1, 0},
                   {"point", "both", "position or to_world, not both", 0, 1},
                   {"constant", "to_world", "'to_world'", 0, 1}};
     for (size_t k = 0; k < imp_count(errors); k++) {

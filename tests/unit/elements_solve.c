@@ -651,6 +651,44 @@ static void integrator(imp_context *ctx)
     }
 }
 
+/* Kinds phong and beam of a file are what the options make of d.xml. */
+static void kinds(imp_context *ctx, imp_scene *d)
+{
+    static const struct imp_elements_phong wall = {
+        "*", {0.1, 0.1, 0.1}, {0.6, 0.6, 0.6}, 15};
+    struct imp_elements_beam beams[4] = {{"light_left", {0}, 20},
+                                         {"light_right", {0}, 20},
+                                         {"light_ceiling", {0}, 20},
+                                         {"light_back", {0}, 20}};
+    struct imp_elements_options o = options();
+    imp_scene *s = test_scene(ctx, "elements/glossy.xml", IMP_MONO, "res=24");
+    const struct imp_elements_row *rows;
+    size_t n;
+    o.order = 4;
+    o.eps_last = 1e-2;
+    imp_elements *a = solved(s, &o);
+    o.phong = &wall;
+    o.n_phong = 1;
+    o.beams = beams;
+    o.n_beams = 4;
+    imp_elements *b = solved(d, &o);
+    tap_near(imp__el_measure(a, NULL), imp__el_measure(b, NULL), 1e-10, 0,
+             "kinds phong and beam are --phong and --beam");
+    test_must(ctx, imp_elements_sensitivity(a, &rows, &n));
+    bool exponent = false, flat = false;
+    for (size_t k = 0; k < n; k++) {
+        exponent |= strcmp(rows[k].name, "wall.exponent.value") == 0;
+        flat |= strcmp(rows[k].name, "light_left.emitter.radiance.value") == 0;
+    }
+    tap_ok(exponent && flat, "with derivatives by the exponent and by the lamps");
+    imp_elements_destroy(a);
+    imp_elements_destroy(b);
+    o.n_phong = o.n_beams = 0;
+    derivatives(ctx, s, &o, "wall.exponent");
+    derivatives(ctx, s, &o, "wall.specular_reflectance.value");
+    imp_scene_destroy(s);
+}
+
 int main(void)
 {
     imp_context *ctx = test_context(1);
@@ -668,6 +706,7 @@ int main(void)
     files(ctx, d);
     hostile(ctx);
     integrator(ctx);
+    kinds(ctx, d);
     imp_scene_destroy(b);
     imp_scene_destroy(d);
     imp_context_destroy(ctx);

@@ -9,6 +9,7 @@
     X(imp__dielectric)                                                                   \
     X(imp__diffuse)                                                                      \
     X(imp__null)                                                                         \
+    X(imp__phong)                                                                        \
     X(imp__roughconductor)                                                               \
     X(imp__stam_m2)                                                                      \
     X(imp__stam_m3)                                                                      \

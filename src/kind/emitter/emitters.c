@@ -6,6 +6,7 @@
 #define EMITTERS(X)                                                                      \
     X(imp__area)                                                                         \
     X(imp__stam_m1)                                                                      \
+    X(imp__beam_light)                                                                   \
     X(imp__point_light)                                                                  \
     X(imp__constant)
 

@@ -1,0 +1,101 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * phong: Lambert and the modified Phong lobe (Lafortune and Willems, "Using the Modified
+ * Phong Reflectance Model", 1994), reciprocal, with t = mirror(wi) . wo:
+ *
+ *   f cos_i = kd cos_i/pi + ks (n + 2)/(2 pi) max(0, t)^n cos_i
+ *
+ * Its albedo is at most kd + ks. Half the draws are cosine, half (n + 1)/(2 pi) t^n about
+ * the mirror direction; those that fall behind the horizon are lost. */
+#include "kind/build.h"
+#include "lambert.h"
+
+enum { DIFFUSE, SPECULAR, EXPONENT, N_INPUTS };
+
+static const struct imp_input_desc inputs[] = {{.name = "diffuse_reflectance",
+                                                .role = IMP_REFLECTANCE,
+                                                .fallback = 0.5,
+                                                .hi = 1,
+                                                .unit = "1"},
+                                               {.name = "specular_reflectance",
+                                                .role = IMP_REFLECTANCE,
+                                                .fallback = 0.2,
+                                                .hi = 1,
+                                                .unit = "1"},
+                                               {.name = "exponent",
+                                                .role = IMP_UNBOUNDED,
+                                                .flags = IMP_INPUT_SCALAR,
+                                                .fallback = 30,
+                                                .unit = "1"},
+                                               {0}};
+
+/* Cosine between the mirror image of one direction and the other. */
+static double mirror_dot(const struct imp_dirs *d)
+{
+    return d->wo[2] * d->wi[2] - d->wo[0] * d->wi[0] - d->wo[1] * d->wi[1];
+}
+
+/* The lobe times the cosine, over ks. */
+static double lobe(double n, double t, const struct imp_dirs *d)
+{
+    return t > 0 ? (n + 2) / IMP_2PI * pow(t, n) * d->wi[2] : 0;
+}
+
+static void eval(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
+                 imp_spec *f)
+{
+    (void)b;
+    *f = imp__spec(0);
+    if (imp__front(d))
+        *f = in[DIFFUSE] * imp__lambert(d) +
+             in[SPECULAR] * lobe(in[EXPONENT][0], mirror_dot(d), d);
+}
+
+static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
+{
+    const double n = in[EXPONENT][0], t = mirror_dot(d);
+    (void)b;
+    if (!imp__front(d)) return 0;
+    return 0.5 * imp__lambert(d) + (t > 0 ? 0.5 * (n + 1) / IMP_2PI * pow(t, n) : 0);
+}
+
+static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
+                   struct imp_dirs *d, struct imp_bsdf_sample *s)
+{
+    if (!(d->wo[2] > 0)) return false;
+    if (u[0] < 0.5) {
+        if (!imp__lambert_sample(&u[1], d)) return false;
+    } else {
+        const double t = pow(1 - u[1], 1 / (in[EXPONENT][0] + 1)), phi = IMP_2PI * u[2];
+        const double r = sqrt(fmax(0, 1 - t * t));
+        const struct imp_frame mirror =
+            imp__frame_from_normal(imp__v3(-d->wo[0], -d->wo[1], d->wo[2]));
+        d->wi = imp__to_world(&mirror, imp__v3(r * cos(phi), r * sin(phi), t));
+        d->lobe = IMP_SMOOTH;
+        if (!(d->wi[2] > 0)) return false;
+    }
+    s->eta = 1;
+    s->pdf = pdf(b, in, d);
+    eval(b, in, d, &s->f);
+    return s->pdf > 0;
+}
+
+static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
+                   imp_spec *df)
+{
+    (void)b;
+    for (int j = 0; j < N_INPUTS; j++) df[j] = imp__spec(0);
+    if (!imp__front(d)) return;
+    const double n = in[EXPONENT][0], t = mirror_dot(d), s = lobe(n, t, d);
+    df[DIFFUSE] = imp__spec(imp__lambert(d));
+    df[SPECULAR] = imp__spec(s);
+    if (t > 0) df[EXPONENT] = in[SPECULAR] * (s * (1 / (n + 2) + log(t)));
+}
+
+const struct imp_bsdf_ops imp__phong = {.size = sizeof(struct imp_bsdf_ops),
+                                        .name = "phong",
+                                        .inputs = inputs,
+                                        .sample = sample,
+                                        .eval = eval,
+                                        .pdf = pdf,
+                                        .eval_d = eval_d};
