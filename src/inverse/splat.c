@@ -161,18 +161,17 @@ imp_spec imp__splat_adjoint(const struct imp__splat *s, int b, double px, double
 {
     const struct imp_film_desc *film = s->film;
     const struct imp_filter *f = &film->filter;
-    const double cx = px - film->crop_x, cy = py - film->crop_y;
+    struct imp_taps across, down;
     imp_spec P = {0};
-    for (int j = imp_max(0, (int)ceil(cy - f->radius - 0.5));
-         j <= imp_min(film->crop_h - 1, (int)floor(cy + f->radius - 0.5)); j++) {
-        const double wy = f->ops->eval(f, cy - (j + 0.5));
-        for (int i = imp_max(0, (int)ceil(cx - f->radius - 0.5));
-             i <= imp_min(film->crop_w - 1, (int)floor(cx + f->radius - 0.5)); i++) {
-            const double w = wy * f->ops->eval(f, cx - (i + 0.5));
-            const size_t p = (size_t)j * (size_t)film->crop_w + (size_t)i;
+    imp__film_taps(f, px - film->crop_x, 0, film->crop_w - 1, &across);
+    imp__film_taps(f, py - film->crop_y, 0, film->crop_h - 1, &down);
+    for (int j = 0; j < down.n; j++)
+        for (int i = 0; i < across.n; i++) {
+            const double w = down.w[j] * across.w[i];
+            const size_t p = (size_t)(down.first + j) * (size_t)film->crop_w +
+                             (size_t)(across.first + i);
             if (w == 0 || s->weights[b][p] == 0) continue;
             P += pixel_adjoint(s, b, p, w, L) * (w / s->weights[b][p]);
         }
-    }
     return P;
 }

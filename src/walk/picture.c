@@ -88,19 +88,18 @@ static void splat(const struct render *r, const struct region *g, double *tile, 
 {
     const struct imp_filter *f = &r->film->filter;
     const int n = r->n, stride = TILE + 2 * r->border;
-    const double cx = px - r->film->crop_x, cy = py - r->film->crop_y;
-    const int i0 = (int)ceil(cx - f->radius - 0.5), i1 = (int)floor(cx + f->radius - 0.5);
-    const int j0 = (int)ceil(cy - f->radius - 0.5), j1 = (int)floor(cy + f->radius - 0.5);
-    for (int j = imp_max(j0, g->y0 - r->border); j <= imp_min(j1, g->y1 - 1 + r->border);
-         j++) {
-        const double wy = f->ops->eval(f, cy - (j + 0.5));
-        for (int i = imp_max(i0, g->x0 - r->border);
-             i <= imp_min(i1, g->x1 - 1 + r->border); i++) {
-            const double w = wy * f->ops->eval(f, cx - (i + 0.5));
-            const int at = (j - g->y0 + r->border) * stride + (i - g->x0 + r->border);
+    struct imp_taps across, down;
+    imp__film_taps(f, px - r->film->crop_x, g->x0 - r->border, g->x1 - 1 + r->border,
+                   &across);
+    imp__film_taps(f, py - r->film->crop_y, g->y0 - r->border, g->y1 - 1 + r->border,
+                   &down);
+    for (int j = 0; j < down.n; j++)
+        for (int i = 0; i < across.n; i++) {
+            const double w = down.w[j] * across.w[i];
+            const int at = (down.first + j - g->y0 + r->border) * stride +
+                           (across.first + i - g->x0 + r->border);
             if (w != 0) accumulate(tile + (size_t)at * (size_t)SUMS(n), w, value, n);
         }
-    }
 }
 
 static enum imp_status tile_work(size_t item, int worker, int slot, void *payload)

@@ -5,6 +5,7 @@
 #define IMP_WALK_PICTURE_H
 
 #include "base/film.h"
+#include "kind/filter/filter.h"
 #include "walk.h"
 
 struct imp_picture {
@@ -30,6 +31,22 @@ static inline int imp__film_border(const struct imp_film_desc *f)
 {
     return f->filter.radius > 0.5 ? (int)ceil(f->filter.radius - 0.5) : 0;
 }
+/* What a filter gives, along one axis, of a sample at film coordinate x to the pixels
+ * [first, first + n) that it reaches, no further than [lo, hi]. Filters are separable: n
+ * + n of these make the weights of n n pixels. */
+struct imp_taps {
+    int first, n;
+    double w[2 * (int)IMP_FILTER_RADIUS_MAX + 2];
+};
+static inline void imp__film_taps(const struct imp_filter *f, double x, int lo, int hi,
+                                  struct imp_taps *out)
+{
+    out->first = imp_max((int)ceil(x - f->radius - 0.5), lo);
+    out->n = imp_min((int)floor(x + f->radius - 0.5), hi) - out->first + 1;
+    for (int k = 0; k < out->n; k++)
+        out->w[k] = f->ops->eval(f, x - (out->first + k + 0.5));
+}
+
 /* IMP_E_PATHS if more walks of all `walks` were dropped than the run allows; one is
  * always forgiven. */
 enum imp_status imp__drops_check(imp_context *ctx, const struct imp_run *run,
