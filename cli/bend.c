@@ -12,10 +12,11 @@
 #include <stdlib.h>
 #include <string.h>
 
+static const char *const carry_words[] = {"auto", "always", "never", NULL};
 static const char *const optimizer_words[] = {"lbfgs", "adam", "mma", NULL};
 
 static struct {
-    int optimizer, levels, resume;
+    int optimizer, levels, resume, carry;
     const char *iterations, *checkpoint;
     double learning_rate, tolerance, scale;
 } o;
@@ -37,6 +38,9 @@ static const struct arg_option options[] = {
      &o.scale, 1e-12, 1e12, NULL},
     {ARG_TEXT, 0, "checkpoint", "FILE", "fit: write the state there every few seconds",
      &o.checkpoint, 0, 0, NULL},
+    {ARG_CHOICE, 0, "carry", "WHEN",
+     "fit: carry the optimiser's memory to the next level: auto (lbfgs), always, never",
+     &o.carry, 0, 0, carry_words},
     {ARG_FLAG, 0, "resume", NULL, "fit: go on from the checkpoint", &o.resume, 0, 0,
      NULL},
     {0}};
@@ -325,6 +329,7 @@ static int fit(void)
     fo.scale = o.scale;
     fo.checkpoint = o.checkpoint;
     fo.resume = o.resume;
+    fo.carry = o.carry == 1 ? 1 : o.carry == 2 ? -1 : 0;
     fo.progress = progress_report;
     const double start = cli_now();
     const enum imp_status st = imp_bend_fit(bend, &fo, &r);

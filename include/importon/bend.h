@@ -486,10 +486,13 @@ struct imp_bend_fit_options {
     int resume;
     imp_progress_fn progress;
     void *progress_payload;
+    int carry; /**< what the optimiser learnt at a level, at the next: 1: is carried on
+                    (L-BFGS: pairs, Adam: moments; MMA keeps nothing), -1: is not, 0: of
+                    L-BFGS only */
 };
 #define IMP_BEND_FIT_OPTIONS_INIT                                                        \
     {                                                                                    \
-        sizeof(struct imp_bend_fit_options), IMP_LBFGS, 0, {0}, 0, 0, 0, 0, 0, 0, 0      \
+        sizeof(struct imp_bend_fit_options), IMP_LBFGS, 0, {0}, 0, 0, 0, 0, 0, 0, 0, 0   \
     }
 
 struct imp_bend_fit_result {

@@ -117,6 +117,8 @@ struct imp__grid {
     double most;          /* greatest coefficient, since the last change */
 };
 bool imp__field_is_grid(const imp_field *f);
+/* Numbers of grid f -> of the grid that is twice as fine; linear. */
+enum imp_status imp__grid_prolong(const imp_field *f, const double *coarse, double *fine);
 void imp__grid_changed(imp_field *f);
 void imp__grid_destroy(imp_field *f);
 extern const struct imp__field_ops imp__field_spline, imp__field_trilinear,

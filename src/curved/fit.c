@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Fits: the objective of a problem handed to inverse/'s optimisers, level by level. At
- * each level the grid is refined (the function stays the same) and the optimiser begins
- * anew from there: curvature and moments of the coarse numbers are not those of the fine
- * ones (curved-rays 3.4). Adam's rate is halved explicitly. */
+ * each level the grid is refined (the function stays the same), and what the optimiser
+ * learnt goes along: a step of coarse numbers is, refined by P, one of fine numbers; a
+ * derivative's share of a fine number is 1/8 of the coarse one's. Adam's rate is halved
+ * explicitly. */
 #include "bend.h"
 #include "inverse/checkpoint.h"
 #include "lbfgs.h"
@@ -18,8 +19,12 @@ struct fit {
     struct imp__fingerprint print;
     uint8_t *held;
     double *theta, *bar, *lo, *hi, *scale,
-        *x0;    /* [n_theta], of active numbers where [n] */
-    size_t *at; /* [n] index in theta */
+        *x0;                  /* [n_theta], of active numbers where [n] */
+    size_t *at;               /* [n] index in theta */
+    struct imp__search *last; /* of the level before, and its grid: to be carried on */
+    imp_field *coarse;
+    size_t *coarse_at; /* [last->n] */
+    bool carries;
     int level, levels, done_iterations;
     double fraction_lo, fraction_hi, start_s, last_report_s, last_checkpoint_s;
     double last_value, best_value, rays_done;
@@ -175,6 +180,34 @@ out:
     return st;
 }
 
+static void last_free(struct fit *f)
+{
+    imp__search_destroy(f->last);
+    imp_field_destroy(f->coarse);
+    imp__release(f->b->ctx, f->coarse_at);
+    f->last = NULL;
+    f->coarse = NULL;
+    f->coarse_at = NULL;
+}
+
+/* Active numbers of the grid before -> of the grid now; held ones do not change. */
+static enum imp_status carry_map(const double *in, double *out, void *payload)
+{
+    const struct fit *f = payload;
+    imp_context *ctx = f->b->ctx;
+    enum imp_status st = IMP_OK;
+    double *coarse = imp__alloc(ctx, f->coarse->n_theta + 1, sizeof *coarse);
+    double *fine = imp__alloc(ctx, f->b->field->n_theta + 1, sizeof *fine);
+    if (!coarse || !fine) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a level"));
+    for (size_t k = 0; k < f->last->n; k++) coarse[f->coarse_at[k]] = in[k];
+    IMP_TRY(imp__grid_prolong(f->coarse, coarse, fine));
+    for (size_t k = 0; k < f->goal.n; k++) out[k] = fine[f->at[k]];
+out:
+    imp__release(ctx, coarse);
+    imp__release(ctx, fine);
+    return st;
+}
+
 static enum imp_status level_run(struct fit *f, bool resume, bool *found,
                                  const char **reason, int *iterations)
 {
@@ -186,6 +219,10 @@ static enum imp_status level_run(struct fit *f, bool resume, bool *found,
         IMP_TRY(imp__checkpoint_read(b->ctx, f->o->checkpoint, &f->print, &f->goal, s,
                                      found));
         if (!*found) goto out;
+    } else if (f->last && f->coarse && f->carries) {
+        const struct imp__carry carry = {carry_map, f, 1.0 / 8};
+        if (f->o->optimizer == IMP_LBFGS) IMP_TRY(imp__lbfgs_carry(f->last, &carry, s));
+        else IMP_TRY(imp__search_carry(f->last, &carry, s));
     }
     f->best_value = INFINITY;
     ended = f->o->optimizer == IMP_LBFGS ? imp__lbfgs(&f->goal, &f->opt, s)
@@ -206,6 +243,9 @@ static enum imp_status level_run(struct fit *f, bool resume, bool *found,
     b->n_history = n;
     if (f->o->checkpoint)
         IMP_TRY(imp__checkpoint_write(b->ctx, f->o->checkpoint, &f->print, s));
+    last_free(f);
+    f->last = s;
+    s = NULL;
     st = ended;
 out:
     imp__search_destroy(s);
@@ -213,13 +253,17 @@ out:
 }
 
 /* The field of level `level`, as far as its shape goes. */
-static enum imp_status refine(imp_bend *b)
+static enum imp_status refine(struct fit *f)
 {
     imp_field *fine;
-    const enum imp_status st = imp_field_refine(b->field, &fine);
+    const enum imp_status st = imp_field_refine(f->b->field, &fine);
     if (st != IMP_OK) return st;
-    imp_field_destroy(b->field);
-    b->field = fine;
+    imp_field_destroy(f->coarse);
+    imp__release(f->b->ctx, f->coarse_at);
+    f->coarse = f->b->field;
+    f->coarse_at = f->at; /* level_begin makes another */
+    f->at = NULL;
+    f->b->field = fine;
     return IMP_OK;
 }
 
@@ -229,7 +273,7 @@ static enum imp_status resume(struct fit *f, bool *found, const char **reason,
 {
     enum imp_status st = IMP_OK;
     for (f->level = 0; f->level < f->levels; f->level++) {
-        if (f->level > 0) IMP_TRY(refine(f->b));
+        if (f->level > 0) IMP_TRY(refine(f));
         IMP_TRY(level_begin(f));
         f->fraction_lo = (double)f->level / f->levels;
         f->fraction_hi = (double)(f->level + 1) / f->levels;
@@ -258,6 +302,8 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
     if (f.levels > IMP_BEND_LEVELS_MAX)
         return imp__error(b->ctx, IMP_E_ARG, "%d levels: at most %d", f.levels,
                           IMP_BEND_LEVELS_MAX);
+    /* Adam's moments remember steeper days: begun anew it is the faster more often. */
+    f.carries = o->carry > 0 || (o->carry == 0 && o->optimizer == IMP_LBFGS);
     if (o->optimizer == IMP_LM)
         return imp__error(b->ctx, IMP_E_UNSUPPORTED,
                           "bent rays are fitted by lbfgs, adam, mma");
@@ -278,7 +324,7 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
     for (int level = first; level < f.levels && st == IMP_OK; level++) {
         f.level = level;
         if (level > 0) {
-            IMP_TRY(refine(b));
+            IMP_TRY(refine(&f));
             IMP_TRY(level_begin(&f));
         }
         f.fraction_lo = (double)level / f.levels;
@@ -305,6 +351,7 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
     }
     st = ended;
 out:
+    last_free(&f);
     level_free(&f);
     return st;
 }

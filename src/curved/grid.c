@@ -286,6 +286,16 @@ enum imp_status imp_field_samples_vjp(const imp_field *f, const double *theta_ba
 
 /* ---- Levels -------------------------------------------------------------------- */
 
+enum imp_status imp__grid_prolong(const imp_field *f, const double *coarse, double *fine)
+{
+    const struct imp__grid *g = (const struct imp__grid *)f;
+    const bool spline = g->desc.interp == IMP_FIELD_SPLINE;
+    int nodes[3];
+    for (int k = 0; k < 3; k++) nodes[k] = 2 * g->desc.cells[k] + (spline ? 3 : 1);
+    return along_axes(f->ctx, spline ? line_refine_spline : line_refine_linear, g->nodes,
+                      nodes, coarse, fine);
+}
+
 enum imp_status imp_field_refine(const imp_field *f, imp_field **out)
 {
     enum imp_status st;
@@ -295,9 +305,7 @@ enum imp_status imp_field_refine(const imp_field *f, imp_field **out)
     struct imp_field_grid desc = g->desc;
     for (int k = 0; k < 3; k++) desc.cells[k] *= 2;
     IMP_TRY(imp_field_grid_create(f->ctx, &desc, 1, &fine));
-    IMP_TRY(along_axes(
-        f->ctx, desc.interp == IMP_FIELD_SPLINE ? line_refine_spline : line_refine_linear,
-        g->nodes, ((struct imp__grid *)fine)->nodes, f->theta, fine->theta));
+    IMP_TRY(imp__grid_prolong(f, f->theta, fine->theta));
     if (fine->ops->changed) fine->ops->changed(fine);
     *out = fine;
     fine = NULL;

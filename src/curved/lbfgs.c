@@ -13,8 +13,9 @@
 #define ARMIJO 1e-4
 #define TRIES  25
 
-enum { S, Y, X, G, WORK };   /* arrays: [MEMORY][n], [MEMORY][n], [n], .. */
-enum { PAIRS, VALUE, HAVE }; /* scalars */
+enum { S, Y, X, G, WORK }; /* arrays: [MEMORY][n], [MEMORY][n], [n], .. */
+/* Scalars. HAVE: 1 if VALUE is that of X; -1: pairs are there, carried, no value. */
+enum { PAIRS, VALUE, HAVE };
 
 struct run {
     const struct imp__goal *goal;
@@ -140,13 +141,13 @@ enum imp_status imp__lbfgs(const struct imp__goal *goal,
     IMP_TRY(imp__search_array(s, G, n));
     IMP_TRY(imp__search_array(s, WORK, 3 * n));
     r.d = s->array[WORK], r.trial = r.d + n, r.g_trial = r.trial + n;
-    if (s->scalar[HAVE] == 0) {
+    if (!(s->scalar[HAVE] > 0)) {
         struct imp_estimate e;
         memcpy(s->array[X], s->x, n * sizeof(double));
         IMP_TRY(goal->eval(s->array[X], 0, &e, s->array[G], NULL, goal->payload));
         s->scalar[VALUE] = e.value;
+        if (s->scalar[HAVE] == 0) s->scalar[PAIRS] = 0;
         s->scalar[HAVE] = 1;
-        s->scalar[PAIRS] = 0;
         IMP_TRY(imp__search_log(s, e));
     }
     while (!s->finished && s->iteration < options->max_iterations) {
@@ -182,6 +183,32 @@ enum imp_status imp__lbfgs(const struct imp__goal *goal,
         IMP_TRY(imp__search_iterated(goal, s));
     }
     if (!s->finished) s->reason = "iteration limit reached";
+out:
+    return st;
+}
+
+enum imp_status imp__lbfgs_carry(const struct imp__search *old,
+                                 const struct imp__carry *c, struct imp__search *s)
+{
+    enum imp_status st = IMP_OK;
+    const size_t n = s->n;
+    int m = 0;
+    IMP_TRY(imp__search_array(s, S, MEMORY * n));
+    IMP_TRY(imp__search_array(s, Y, MEMORY * n));
+    for (int i = 0; i < (int)old->scalar[PAIRS]; i++) {
+        const double *so = old->array[S] + (size_t)i * old->n,
+                     *yo = old->array[Y] + (size_t)i * old->n;
+        double *sn = s->array[S] + (size_t)m * n, *yn = s->array[Y] + (size_t)m * n;
+        IMP_TRY(c->map(so, sn, c->payload));
+        IMP_TRY(c->map(yo, yn, c->payload));
+        const double is = dot(n, sn, yn);
+        if (!(is > 1e-10 * sqrt(dot(n, sn, sn) * dot(n, yn, yn)))) continue;
+        const double scale = dot(old->n, so, yo) / is;
+        for (size_t k = 0; k < n; k++) yn[k] *= scale;
+        m++;
+    }
+    s->scalar[PAIRS] = m;
+    s->scalar[HAVE] = -1;
 out:
     return st;
 }

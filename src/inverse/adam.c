@@ -307,4 +307,27 @@ out:
     return st;
 }
 
-const struct imp__opt_kind imp__opt_adam = {init, run};
+/* m and sqrt(v) are gradients: mapped as such, their quotient, the step, is that of the
+ * old variables. Only along the axes: others are found anew. */
+static enum imp_status carry(const struct imp__search *old, const struct imp__carry *c,
+                             struct imp__search *s)
+{
+    enum imp_status st = IMP_OK;
+    double *root = NULL;
+    if (turned(old)) return IMP_OK;
+    root = imp__alloc(s->ctx, old->n + 1, sizeof *root);
+    if (!root) IMP_TRY(imp__error(s->ctx, IMP_E_NOMEM, "no memory for moments"));
+    for (size_t k = 0; k < old->n; k++) root[k] = sqrt(old->array[SECOND][k]);
+    IMP_TRY(c->map(old->array[FIRST], s->array[FIRST], c->payload));
+    IMP_TRY(c->map(root, s->array[SECOND], c->payload));
+    for (size_t k = 0; k < s->n; k++) {
+        s->array[FIRST][k] *= c->share;
+        s->array[SECOND][k] = pow(fmax(s->array[SECOND][k], 0) * c->share, 2);
+    }
+    s->scalar[AGE] = old->scalar[AGE];
+out:
+    imp__release(s->ctx, root);
+    return st;
+}
+
+const struct imp__opt_kind imp__opt_adam = {init, run, carry};

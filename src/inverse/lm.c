@@ -243,4 +243,4 @@ out:
     return st;
 }
 
-const struct imp__opt_kind imp__opt_lm = {init, run};
+const struct imp__opt_kind imp__opt_lm = {init, run, NULL};

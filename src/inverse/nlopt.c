@@ -152,4 +152,4 @@ out:
     return st;
 }
 
-const struct imp__opt_kind imp__opt_nlopt = {init, run};
+const struct imp__opt_kind imp__opt_nlopt = {init, run, NULL};

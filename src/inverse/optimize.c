@@ -83,6 +83,14 @@ enum imp_status imp__search_array(struct imp__search *s, int k, size_t n)
     return IMP_OK;
 }
 
+enum imp_status imp__search_carry(const struct imp__search *old,
+                                  const struct imp__carry *carry, struct imp__search *s)
+{
+    const struct imp__opt_kind *kind = kind_of(s->kind);
+    return kind && kind->carry && old->kind == s->kind ? kind->carry(old, carry, s)
+                                                       : IMP_OK;
+}
+
 enum imp_status imp__search_log(struct imp__search *s, struct imp_estimate f)
 {
     double *h =

@@ -86,6 +86,17 @@ enum imp_status imp__optimize(const struct imp__goal *goal,
                               const struct imp__opt_options *options,
                               struct imp__search *search);
 
+/* Numbers of old variables -> of new ones: how a change of the old is one of the new. */
+struct imp__carry {
+    enum imp_status (*map)(const double *in, double *out, void *payload);
+    void *payload;
+    double share; /* of an old variable's derivative that a new one has */
+};
+/* A search that has not begun takes over what `old` learnt about other variables: Adam's
+ * moments. @return IMP_OK also for methods that keep nothing. */
+enum imp_status imp__search_carry(const struct imp__search *old,
+                                  const struct imp__carry *carry, struct imp__search *s);
+
 /* ---- Between the optimisers' files --------------------------------------------- */
 
 struct imp__opt_kind {
@@ -95,6 +106,9 @@ struct imp__opt_kind {
     enum imp_status (*run)(const struct imp__goal *goal,
                            const struct imp__opt_options *options,
                            struct imp__search *search);
+    enum imp_status (*carry)(const struct imp__search *old,
+                             const struct imp__carry *carry,
+                             struct imp__search *s); /* NULL: nothing to carry */
 };
 extern const struct imp__opt_kind imp__opt_adam, imp__opt_lm, imp__opt_nlopt;
 
