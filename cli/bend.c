@@ -3,6 +3,7 @@
  * importon bend: rays in graded indices. trace, check, fit and view work on one file with
  * field, rays and targets (docs/curved-rays.md). */
 #include "bend.h"
+#include "output.h"
 #include "picture.h"
 #include "plot.h"
 #include "progress.h"
@@ -139,15 +140,15 @@ static int write_exits(const char *path)
         return cli_fail(st, cli.scene_path);
     }
     imp_bend_get_rays(bend, &rays);
-    FILE *f = strcmp(path, "-") ? fopen(path, "w") : stdout;
-    if (!f) rc = cli_error(EXIT_RUN, "%s: %s", path, strerror(errno));
+    struct output to = {0};
+    rc = output_open(&to, path);
+    FILE *f = to.file;
     if (f) fprintf(f, "ray,bundle,x,y,z,vx,vy,vz,path,steps,flags\n");
     for (size_t i = 0; f && i < n; i++)
         fprintf(f, "%zu,%d,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%.17g,%u,%u\n", i,
                 rays.group[i], e[i].x[0], e[i].x[1], e[i].x[2], e[i].v[0], e[i].v[1],
                 e[i].v[2], e[i].path, e[i].steps, e[i].flags);
-    if (f && f != stdout && fclose(f) != 0)
-        rc = cli_error(EXIT_RUN, "%s: %s", path, strerror(errno));
+    rc = output_close(&to, rc);
     free(e);
     return rc;
 }
@@ -284,14 +285,13 @@ static int write_history(const struct imp_bend_fit_result *r)
     char *svg = join_path(cli.out, "loss.svg"), *csv = join_path(cli.out, "loss.csv");
     int rc = plot_curve(svg, "Objective", "evaluation", "objective", r->n_history,
                         r->history, NULL);
-    FILE *f = fopen(csv, "w");
-    if (f) {
-        fprintf(f, "evaluation,objective\n");
+    struct output to = {0};
+    if (!rc && !(rc = output_open(&to, csv))) {
+        fprintf(to.file, "evaluation,objective\n");
         for (size_t i = 0; i < r->n_history; i++)
-            fprintf(f, "%zu,%.9g\n", i, r->history[i]);
-        if (fclose(f) != 0) f = NULL;
+            fprintf(to.file, "%zu,%.9g\n", i, r->history[i]);
+        rc = output_close(&to, rc);
     }
-    if (!f && !rc) rc = cli_error(EXIT_RUN, "%s: %s", csv, strerror(errno));
     free(svg);
     free(csv);
     return rc;

@@ -2,6 +2,7 @@
  *
  * importon elements --fit: lamp powers and reflectances for wanted measurements. */
 #include "elements.h"
+#include "output.h"
 #include "problem.h"
 #include "progress.h"
 
@@ -149,17 +150,17 @@ static void print(const struct elements_sources *s, const struct block *blocks,
 
 static int write_set(const struct block *blocks, size_t n_blocks)
 {
-    FILE *f = fopen(o.recovered, "w");
-    for (size_t b = 0; f && b < n_blocks; b++) {
-        fprintf(f, "%s=", blocks[b].info.name);
+    struct output to;
+    const int rc = output_open(&to, o.recovered);
+    if (rc) return rc;
+    for (size_t b = 0; b < n_blocks; b++) {
+        fprintf(to.file, "%s=", blocks[b].info.name);
         for (size_t i = 0; i < blocks[b].n; i++)
-            fprintf(f, "%s%.17g", i ? "," : "",
+            fprintf(to.file, "%s%.17g", i ? "," : "",
                     found.result->variables[blocks[b].first + i].value);
-        fprintf(f, "\n");
+        fprintf(to.file, "\n");
     }
-    return f && fclose(f) == 0
-               ? 0
-               : cli_error(EXIT_RUN, "%s: %s", o.recovered, strerror(errno));
+    return output_close(&to, 0);
 }
 
 int elements_fit_answer(struct json *j, const struct elements_sources *s)

@@ -4,6 +4,7 @@
  * picture before and after, the target, the loss curve and the parameters with their 95 %
  * intervals. */
 #include "command.h"
+#include "output.h"
 #include "picture.h"
 #include "plot.h"
 #include "problem.h"
@@ -107,7 +108,7 @@ static int write_targets(void)
                        sizeof(float));
             st = imp_film_write(film, path, &w);
         }
-        if (st != IMP_OK) rc = cli_fail(st, path);
+        if (st != IMP_OK) rc = cli_fail(st, NULL);
         imp_film_destroy(film);
         picture_target_free(&t);
         free(path);
@@ -136,16 +137,15 @@ static int write_sheet(void)
 static int write_history(const struct imp_fit_result *r)
 {
     char *csv = join_path(cli.out, "loss.csv"), *svg = join_path(cli.out, "loss.svg");
-    FILE *f = fopen(csv, "w");
-    int rc = 0;
-    if (f) {
-        fprintf(f, "iteration,loss,se\n");
+    struct output to;
+    int rc = output_open(&to, csv);
+    if (!rc) {
+        fprintf(to.file, "iteration,loss,se\n");
         for (size_t i = 0; i < r->n_history; i++)
-            fprintf(f, "%zu,%.9g,%.3g\n", i, r->history[i],
+            fprintf(to.file, "%zu,%.9g,%.3g\n", i, r->history[i],
                     r->history_se ? r->history_se[i] : NAN);
-        if (fclose(f) != 0) f = NULL;
+        rc = output_close(&to, 0);
     }
-    if (!f) rc = cli_error(EXIT_RUN, "%s: %s", csv, strerror(errno));
     if (!rc)
         rc = plot_curve(svg, "Loss", "iteration", loss_word(), r->n_history, r->history,
                         r->history_se);
@@ -212,17 +212,17 @@ static int write_json(const struct imp_fit_result *r, const struct block *blocks
                       size_t n_blocks, char **paths)
 {
     char *path = join_path(cli.out, "parameters.json");
-    struct json j = {fopen(path, "w"), 0};
-    int rc = 0;
-    if (j.file) {
+    struct output to;
+    int rc = output_open(&to, path);
+    if (!rc) {
+        struct json j = {to.file, 0};
         json_object(&j, NULL);
         json_text(&j, "importon", imp_version());
         json_text(&j, "command", "fit");
         put_json(&j, r, blocks, n_blocks, paths);
         cli_json_end(&j);
-        if (fclose(j.file) != 0) j.file = NULL;
+        rc = output_close(&to, 0);
     }
-    if (!j.file) rc = cli_error(EXIT_RUN, "%s: %s", path, strerror(errno));
     free(path);
     return rc;
 }
@@ -280,17 +280,17 @@ static int write_set(const struct imp_fit_result *r, const struct block *blocks,
                      size_t n_blocks)
 {
     char *path = join_path(cli.out, "recovered.txt");
-    FILE *f = fopen(path, "w");
-    int rc = 0;
-    for (size_t k = 0; f && k < n_blocks; k++) {
+    struct output to;
+    int rc = output_open(&to, path);
+    for (size_t k = 0; !rc && k < n_blocks; k++) {
         const struct block *b = &blocks[k];
         if (block_is_large(b)) continue;
-        fprintf(f, "%s=", b->info.name);
+        fprintf(to.file, "%s=", b->info.name);
         for (size_t i = 0; i < b->n; i++)
-            fprintf(f, "%s%.17g", i ? "," : "", r->variables[b->first + i].value);
-        fprintf(f, "\n");
+            fprintf(to.file, "%s%.17g", i ? "," : "", r->variables[b->first + i].value);
+        fprintf(to.file, "\n");
     }
-    if (!f || fclose(f) != 0) rc = cli_error(EXIT_RUN, "%s: %s", path, strerror(errno));
+    rc = output_close(&to, rc);
     free(path);
     return rc;
 }
@@ -354,7 +354,8 @@ static int run_fit(int n, char **operand)
     if (!rc) {
         const struct imp_run run = cli_run();
         const enum imp_status st = imp_fit(problem, &fit, &run, &result);
-        if (cli_failed(st)) rc = cli_fail(st, cli.scene_path);
+        /* a checkpoint that cannot be written names itself */
+        if (cli_failed(st)) rc = cli_fail(st, st == IMP_E_IO ? NULL : cli.scene_path);
     }
     if (!rc && result) rc = answer(problem, result);
     if (!rc && result && cli.out) {

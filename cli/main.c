@@ -3,10 +3,12 @@
  * importon: the command line of libimporton. Data goes to standard output or -o, talk to
  * standard error. */
 #include "command.h"
+#include "output.h"
 #include "progress.h"
 
 #include <errno.h>
 #include <string.h>
+#include <unistd.h>
 
 static const struct command *const commands[] = {
     &command_render, &command_gradient, &command_jacobian, &command_check,
@@ -37,13 +39,30 @@ static const struct command *find(const char *name)
     return NULL;
 }
 
-static const char *stdout_name = "standard output";
+/* Where standard output goes with -o FILE. */
+static struct output redirected;
 
 /* A full disk shows only when the last bytes are flushed. */
 static int finish(int rc)
 {
-    if (fflush(stdout) != 0 || ferror(stdout))
-        return cli_error(EXIT_RUN, "%s: %s", stdout_name, strerror(errno ? errno : EIO));
+    errno = 0;
+    if (fflush(stdout) != 0 || ferror(stdout)) {
+        const char *name = redirected.file ? redirected.path : "standard output";
+        const int code = errno ? errno : EIO;
+        (void)output_close(&redirected, EXIT_RUN);
+        return cli_error(EXIT_RUN, "%s: %s", name, strerror(code));
+    }
+    /* An answer that is no, or was interrupted, is an answer too. */
+    const int lost = rc == EXIT_USAGE || rc == EXIT_RUN;
+    const int closed = output_close(&redirected, lost ? rc : 0);
+    return closed ? closed : rc;
+}
+
+static int redirect(const char *path)
+{
+    const int rc = output_open(&redirected, path);
+    if (rc == 0 && dup2(fileno(redirected.file), STDOUT_FILENO) < 0)
+        return cli_error(EXIT_RUN, "%s: %s", path, strerror(errno));
     return rc;
 }
 
@@ -81,11 +100,8 @@ int main(int argc, char **argv)
             return finish(EXIT_DONE);
         }
     rc = args_parse(&command->args, argc - 1, argv + 1, &first);
-    if (rc == 0 && command->prints && cli.out && strcmp(cli.out, "-")) {
-        stdout_name = cli.out;
-        if (!freopen(cli.out, "w", stdout))
-            rc = cli_error(EXIT_RUN, "%s: %s", cli.out, strerror(errno));
-    }
+    if (rc == 0 && command->prints && cli.out && strcmp(cli.out, "-"))
+        rc = redirect(cli.out);
     if (rc == 0) {
         progress_init((enum progress_mode)cli.progress);
         rc = command->run(argc - 1 - first, argv + 1 + first);

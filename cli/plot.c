@@ -2,6 +2,7 @@
 #include "plot.h"
 
 #include "command.h"
+#include "output.h"
 
 #include <errno.h>
 #include <math.h>
@@ -109,8 +110,10 @@ int plot_curve(const char *path, const char *title, const char *x_label,
 {
     const struct axes a = find_axes(n, y, se);
     int finite = 1;
-    FILE *f = fopen(path, "w");
-    if (!f) return cli_error(EXIT_RUN, "%s: %s", path, strerror(errno));
+    struct output to;
+    const int rc = output_open(&to, path);
+    if (rc) return rc;
+    FILE *f = to.file;
     fprintf(f,
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%d\" height=\"%d\" "
             "viewBox=\"0 0 %d %d\" font-family=\"sans-serif\" font-size=\"13\">\n"
@@ -136,6 +139,5 @@ int plot_curve(const char *path, const char *title, const char *x_label,
             "<text transform=\"translate(20 %d) rotate(-90)\" text-anchor=\"middle\">%s"
             "</text>\n</svg>\n",
             (TOP + HEIGHT - BOTTOM) / 2, y_label);
-    if (fclose(f) != 0) return cli_error(EXIT_RUN, "%s: %s", path, strerror(errno));
-    return 0;
+    return output_close(&to, 0);
 }

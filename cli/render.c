@@ -2,6 +2,7 @@
  *
  * importon render: a picture with its standard errors; or single walks, to look at. */
 #include "command.h"
+#include "output.h"
 #include "picture.h"
 #include "progress.h"
 
@@ -57,16 +58,15 @@ static int write_paths(const struct imp_run *run)
     const double g1 = 0.7548776662466927, g2 = 0.5698402909980532;
     const enum imp_status st = imp_scene_get_sensor(cli.scene, run->sensor, &info);
     if (st != IMP_OK) return cli_fail(st, cli.scene_path);
-    FILE *to = !strcmp(o.paths, "-") ? stdout : fopen(o.paths, "w");
-    int rc = 0;
-    if (!to) return cli_error(EXIT_RUN, "%s: %s", o.paths, strerror(errno));
+    struct output to;
+    int rc = output_open(&to, o.paths);
+    if (rc) return rc;
     for (int i = 0; i < o.count && !rc && !progress_interrupted(); i++) {
         const double u = 0.5 + g1 * i, v = 0.5 + g2 * i;
         rc = describe(run, (int)((u - floor(u)) * info.width),
-                      (int)((v - floor(v)) * info.height), o.sample + i, 1, to);
+                      (int)((v - floor(v)) * info.height), o.sample + i, 1, to.file);
     }
-    if (to != stdout && fclose(to) != 0 && !rc)
-        rc = cli_error(EXIT_RUN, "%s: %s", o.paths, strerror(errno));
+    rc = output_close(&to, rc);
     return rc ? rc : cli_done();
 }
 
