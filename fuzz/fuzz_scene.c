@@ -79,8 +79,8 @@ static void material(struct bytes *b, imp_scene *s, int depth)
 {
     static const char *const types[] = {"diffuse",        "dielectric", "conductor",
                                         "roughconductor", "stam_m2",    "stam_m3",
-                                        "twosided",       "diffuse"};
-    const unsigned t = byte(b) % (depth ? 6 : 8);
+                                        "phong",          "twosided",   "null"};
+    const unsigned t = byte(b) % (depth ? 7 : 9);
     imp_scene_begin(s, "bsdf", types[t], NULL, NULL);
     switch (t) {
     case 0: color(b, s, "reflectance", 0); break;
@@ -100,7 +100,11 @@ static void material(struct bytes *b, imp_scene *s, int depth)
         imp_scene_float(s, "absorb", reflectance(b));
         break;
     case 5: color(b, s, "ambient", 1); break;
-    case 6: material(b, s, 1); break;
+    case 6:
+        color(b, s, "specular_reflectance", 0);
+        imp_scene_float(s, "exponent", 60 * number(b));
+        break;
+    case 7: material(b, s, 1); break;
     default: break;
     }
     imp_scene_end(s);
@@ -124,8 +128,10 @@ static void shape(struct bytes *b, imp_scene *s)
     if (byte(b) & 1) imp_scene_bool(s, "flip_normals", 1);
     if (byte(b) & 3) material(b, s, 0);
     if (byte(b) % 3 == 0) {
-        imp_scene_begin(s, "emitter", "area", NULL, NULL);
+        const unsigned beam = byte(b) & 1;
+        imp_scene_begin(s, "emitter", beam ? "beam" : "area", NULL, NULL);
         color(b, s, "radiance", 1);
+        if (beam) imp_scene_float(s, "exponent", 60 * number(b));
         imp_scene_end(s);
     }
     imp_scene_end(s);

@@ -110,8 +110,8 @@ static void far_off(void)
 {
     static const char *const shapes[] = {
         "<shape type='sphere'><float name='radius' value='2e18'/></shape>",
-        "<shape type='rectangle'><transform name='to_world'><translate y='2e18'/>"
-        "</transform></shape>",
+        ("<shape type='rectangle'><transform name='to_world'><translate y='2e18'/>"
+         "</transform></shape>"),
         "<shape type='cylinder'><point name='p1' value='0, 0, 1e19'/></shape>",
     };
     for (size_t k = 0; k < sizeof shapes / sizeof *shapes; k++) {
