@@ -249,9 +249,10 @@ static int write_field(void)
 {
     const imp_field *f = imp_bend_field(bend);
     const char *kind = imp_field_kind(f);
-    const int grid = !strcmp(kind, "spline") || !strcmp(kind, "trilinear");
+    const int grid = !strcmp(kind, "spline") || !strcmp(kind, "trilinear") ||
+                     !strcmp(kind, "tied grid");
     enum imp_status st = IMP_OK;
-    if (grid || !strcmp(kind, "radial")) {
+    if (grid || !strcmp(kind, "radial") || !strcmp(kind, "rz")) {
         char *path = join_path(cli.out, grid ? "field.vol" : "field.txt");
         st = imp_field_write(f, path);
         free(path);

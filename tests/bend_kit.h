@@ -129,6 +129,41 @@ static inline imp_field *kit_field(int i, const char **name)
         KIT_CHECK(imp_field_sum_create(kit_ctx, 3, parts, &f));
         return f;
     }
+    case 18: {
+        struct imp_field_rz rz = IMP_FIELD_RZ_INIT;
+        rz.cells_r = 6, rz.cells_z = 7, rz.radius = 1.3, rz.lo = -1.2, rz.hi = 1.1;
+        rz.centre[1] = 0.1;
+        memcpy(rz.axis, tilt, sizeof tilt);
+        snprintf(label, sizeof label, "r^2 and z");
+        KIT_CHECK(imp_field_rz_create(kit_ctx, &rz, 1.4, &f));
+        double c[90];
+        for (int k = 0; k < 90; k++) c[k] = 1.4 + 0.1 * kit_pm(7, k);
+        KIT_CHECK(imp_field_set_theta(f, c));
+        return f;
+    }
+    case 19:
+    case 20:
+    case 21: {
+        struct imp_field_grid g = IMP_FIELD_GRID_INIT;
+        struct imp_field_symmetry s = IMP_FIELD_SYMMETRY_INIT;
+        g.interp = i == 20 ? IMP_FIELD_TRILINEAR : IMP_FIELD_SPLINE;
+        g.param = i == 21 ? IMP_FIELD_ETA2 : IMP_FIELD_ETA;
+        for (int k = 0; k < 3; k++)
+            g.cells[k] = 6 + (k == 0), g.lo[k] = -1.1 - 0.2 * (k == 0), g.hi[k] = 1.15;
+        s.axis = 0;
+        s.fold = i == 19 ? 4 : i == 20 ? 2 : IMP_FIELD_AXIAL;
+        s.mirror[i == 20 ? 1 : 0] = i != 21;
+        snprintf(label, sizeof label, "tied grid, fold %d", s.fold);
+        KIT_CHECK(imp_field_grid_create(kit_ctx, &g, 1.3, &f));
+        KIT_CHECK(imp_field_tie_create(kit_ctx, f, &s, &f));
+        const size_t n = imp_field_n_theta(f);
+        double *p = malloc(n * sizeof *p);
+        imp_field_get_theta(f, p);
+        for (size_t k = 0; k < n; k++) p[k] += 0.1 * kit_pm(8, k);
+        KIT_CHECK(imp_field_set_theta(f, p));
+        free(p);
+        return f;
+    }
     }
     return NULL;
 }

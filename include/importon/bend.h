@@ -83,6 +83,46 @@ IMP_API IMP_MUST_CHECK enum imp_status
 imp_field_radial_create(imp_context *context, const struct imp_field_radial *radial,
                         double index, imp_field **out);
 
+struct imp_field_rz {
+    size_t size;
+    double centre[3], axis[3];
+    double radius;        /**< of the last cell across the axis */
+    double lo, hi;        /**< along the axis, from the centre */
+    int cells_r, cells_z; /**< of the cubic spline in r^2 and along the axis */
+};
+#define IMP_FIELD_RZ_INIT                                                                \
+    {                                                                                    \
+        sizeof(struct imp_field_rz), {0}, {0, 0, 1}, 1, -1, 1, 8, 16                     \
+    }
+/** Symmetric about an axis: a tensor cubic spline in r^2 and z. theta:
+ * [cells_z + 3][cells_r + 3]. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_field_rz_create(imp_context *context,
+                                                           const struct imp_field_rz *rz,
+                                                           double index, imp_field **out);
+IMP_API IMP_MUST_CHECK enum imp_status imp_field_get_rz(const imp_field *field,
+                                                        struct imp_field_rz *rz);
+
+#define IMP_FIELD_AXIAL (-1)
+struct imp_field_symmetry {
+    size_t size;
+    int mirror[3]; /**< across the middle planes of x, y, z */
+    int axis;      /**< 0, 1, 2: of turns about the middle */
+    int fold;      /**< turns: 2 halves, 4 quarters, IMP_FIELD_AXIAL: nodes at one
+                        distance from the axis are one number; 0: none */
+};
+#define IMP_FIELD_SYMMETRY_INIT                                                          \
+    {                                                                                    \
+        sizeof(struct imp_field_symmetry), {0}, 2, 0                                     \
+    }
+/** A grid that keeps a symmetry: nodes that are taken into each other have one number.
+ * Takes the grid over, also on failure; its coefficients become their means. Quarter and
+ * all turns need as many cells of one size in both directions. Refining keeps
+ * the function for mirrors, halves and quarters, and nearly so for all turns.
+ * @return IMP_OK; IMP_E_ARG: not a grid, not square; IMP_E_NOMEM. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_field_tie_create(imp_context *context, imp_field *grid,
+                     const struct imp_field_symmetry *symmetry, imp_field **out);
+
 /** eta = sum of the parts. Takes them over, also on failure; theta is theirs, one after
  * the other. */
 IMP_API IMP_MUST_CHECK enum imp_status
@@ -102,7 +142,7 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_field_write(const imp_field *field,
 
 IMP_API void imp_field_destroy(imp_field *field);
 
-/** "spline", "trilinear", "radial", "sum", or the profile's name. */
+/** "spline", "trilinear", "radial", "rz", "tied grid", "sum", or the profile's name. */
 IMP_API const char *imp_field_kind(const imp_field *field);
 IMP_API size_t imp_field_n_theta(const imp_field *field);
 IMP_API void imp_field_get_theta(const imp_field *field, double *theta);
@@ -113,7 +153,7 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_field_set_theta(imp_field *field,
 IMP_API const char *imp_field_param_name(const imp_field *field, size_t i);
 /** The box where the field is defined; infinite for profiles. */
 IMP_API void imp_field_bounds(const imp_field *field, double lo[3], double hi[3]);
-/** The grid, or IMP_E_ARG if it is not one. */
+/** The grid (of a tied one, too), or IMP_E_ARG if it is not one. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_field_get_grid(const imp_field *field,
                                                           struct imp_field_grid *grid);
 

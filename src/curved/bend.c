@@ -18,7 +18,9 @@ enum imp_status imp_bend_create(imp_context *ctx, imp_field *field, imp_bend **o
     b->field = field;
     b->options = (struct imp_bend_options)IMP_BEND_OPTIONS_INIT;
     b->lo = 1, b->hi = INFINITY;
-    b->step_cells = field->ops == &imp__field_trilinear ? 0.5 : 1;
+    const uint32_t *number;
+    const struct imp__grid *g = imp__field_nodes(field, &number);
+    b->step_cells = g && g->desc.interp == IMP_FIELD_TRILINEAR ? 0.5 : 1;
     *out = b;
     return IMP_OK;
 }
@@ -329,16 +331,31 @@ struct hold_job {
     double *theta;
 };
 
+/* Outermost across the axis, and at both ends along it. */
+static void hold_rz(const imp_field *f, size_t offset, const struct hold_job *j)
+{
+    const struct imp__rz *r = (const struct imp__rz *)f;
+    const int layers = j->hold->layers;
+    for (int l = 0; l < r->n_z; l++)
+        for (int k = 0; k < r->n_u; k++, offset++) {
+            if (k < r->n_u - layers && l >= layers && l < r->n_z - layers) continue;
+            j->mask[offset] = 1;
+            if (j->theta && isfinite(j->hold->value)) j->theta[offset] = j->hold->value;
+        }
+}
+
 static void hold_leaf(imp_field *f, size_t offset, void *payload)
 {
     const struct hold_job *j = payload;
     const struct imp__hold *h = j->hold;
-    if (!imp__field_is_grid(f)) return;
-    const struct imp__grid *g = (const struct imp__grid *)f;
+    const uint32_t *number; /* of ties: one node of an orbit holds all */
+    const struct imp__grid *g = imp__field_nodes(f, &number);
+    if (f->ops == &imp__field_rz && h->kind == IMP_HOLD_RIM) hold_rz(f, offset, j);
+    if (!g) return;
     const int first = g->desc.interp == IMP_FIELD_SPLINE ? -1 : 0;
     const double value =
         g->desc.param == IMP_FIELD_ETA2 ? h->value * h->value / 2 : h->value;
-    size_t at = offset;
+    size_t at = 0;
     for (int k = 0; k < g->nodes[2]; k++)
         for (int jj = 0; jj < g->nodes[1]; jj++)
             for (int i = 0; i < g->nodes[0]; i++, at++) {
@@ -355,8 +372,9 @@ static void hold_leaf(imp_field *f, size_t offset, void *payload)
                     held = imp__length(x - h->centre) > h->radius;
                 }
                 if (!held) continue;
-                j->mask[at] = 1;
-                if (j->theta && isfinite(value)) j->theta[at] = value;
+                const size_t own = offset + (number ? number[at] : at);
+                j->mask[own] = 1;
+                if (j->theta && isfinite(value)) j->theta[own] = value;
             }
 }
 
@@ -384,11 +402,12 @@ struct bounds_job {
 static void bounds_leaf(imp_field *f, size_t offset, void *payload)
 {
     const struct bounds_job *j = payload;
-    const bool grid = imp__field_is_grid(f);
+    const uint32_t *number;
+    const struct imp__grid *g = imp__field_nodes(f, &number);
     double lo = j->b->lo, hi = j->b->hi;
-    if (grid && ((const struct imp__grid *)f)->desc.param == IMP_FIELD_ETA2)
-        lo = lo * fabs(lo) / 2, hi = hi * hi / 2;
-    if (!grid && f->ops != &imp__field_radial) lo = -INFINITY, hi = INFINITY;
+    if (g && g->desc.param == IMP_FIELD_ETA2) lo = lo * fabs(lo) / 2, hi = hi * hi / 2;
+    if (!g && f->ops != &imp__field_radial && f->ops != &imp__field_rz)
+        lo = -INFINITY, hi = INFINITY;
     for (size_t i = 0; i < f->n_theta; i++)
         j->lo[offset + i] = lo, j->hi[offset + i] = hi;
 }

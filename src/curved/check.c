@@ -166,8 +166,10 @@ static enum imp_status check_differences(imp_bend *b, double *dot, double *bar)
         dot[i] = most > 0 ? bar[i] / most : 0;
         want += bar[i] * dot[i];
     }
+    const uint32_t *number;
+    const struct imp__grid *g = imp__field_nodes(b->field, &number);
     const bool smooth =
-        b->field->ops != &imp__field_trilinear && b->field->ops != &imp__field_sum;
+        b->field->ops != &imp__field_sum && !(g && g->desc.interp == IMP_FIELD_TRILINEAR);
     for (int k = 2; k <= 8 && want > 0; k++) {
         const double eps = pow(10, -k);
         for (int side = 0; side < 2; side++) {

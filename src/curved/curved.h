@@ -119,10 +119,14 @@ struct imp__grid {
 bool imp__field_is_grid(const imp_field *f);
 /* Numbers of grid f -> of the grid that is twice as fine; linear. */
 enum imp_status imp__grid_prolong(const imp_field *f, const double *coarse, double *fine);
+enum imp_status imp__tie_refine(const imp_field *f, imp_field **out);
+/* The same of a grid or a tie, whose finer field is there. */
+enum imp_status imp__field_prolong(const imp_field *f, const imp_field *finer,
+                                   const double *coarse, double *fine);
 void imp__grid_changed(imp_field *f);
 void imp__grid_destroy(imp_field *f);
 extern const struct imp__field_ops imp__field_spline, imp__field_trilinear,
-    imp__field_radial, imp__field_sum;
+    imp__field_radial, imp__field_rz, imp__field_tie, imp__field_sum;
 
 /* Fields of numbers u = eta^2/2: g = grad u / eta, H = (Hess u - g g^T)/eta. In place. */
 static inline void imp__jet_from_eta2(struct imp__jet *j, int order)
@@ -148,6 +152,33 @@ static inline void imp__eta2_jvp(const struct imp__jet *at, struct imp__jet *j)
     j->eta *= inv;
     j->g = (j->g - at->g * j->eta) * inv;
 }
+/* Cubic B-splines on one axis: numbers first .. first + 3 at local coordinate t of
+ * `cells` cells, values and derivatives times inv_h, inv_h^2. Beyond the ends the
+ * outermost polynomial goes on. */
+struct imp__basis {
+    int first;
+    double b[4], d[4], dd[4];
+};
+static inline struct imp__basis imp__basis_of(double t, int cells, double inv_h)
+{
+    struct imp__basis s;
+    s.first = (int)imp_clamp(t, 0.0, (double)(cells - 1));
+    const double u = t - s.first, m = 1 - u, k = inv_h;
+    s.b[0] = m * m * m / 6;
+    s.b[1] = (3 * u * u * u - 6 * u * u + 4) / 6;
+    s.b[2] = (-3 * u * u * u + 3 * u * u + 3 * u + 1) / 6;
+    s.b[3] = u * u * u / 6;
+    s.d[0] = -m * m / 2 * k;
+    s.d[1] = (3 * u * u - 4 * u) / 2 * k;
+    s.d[2] = (-3 * u * u + 2 * u + 1) / 2 * k;
+    s.d[3] = u * u / 2 * k;
+    s.dd[0] = (1 - u) * k * k;
+    s.dd[1] = (3 * u - 2) * k * k;
+    s.dd[2] = (1 - 3 * u) * k * k;
+    s.dd[3] = u * k * k;
+    return s;
+}
+
 /* Radial spline's data, for its file. */
 struct imp__radial {
     imp_field base;
@@ -155,6 +186,31 @@ struct imp__radial {
     imp_v3 centre, axis;
     double h; /* spacing in u = r^2 */
 };
+
+/* rz.c: [z][r]. */
+struct imp__rz {
+    imp_field base;
+    struct imp_field_rz desc;
+    imp_v3 centre, axis;
+    double inv_u, inv_z; /* cells per r^2 and along the axis */
+    int n_u, n_z;        /* numbers along them */
+};
+/* tie.c: a grid whose coefficients are numbers shared by the nodes of an orbit. */
+struct imp__tie {
+    imp_field base;
+    struct imp_field_symmetry desc;
+    imp_field *grid;
+    uint32_t *number; /* [n_theta of the grid] */
+    double *share;    /* [n_theta] 1 over the nodes of an orbit */
+};
+/* The grid of a grid or a tie, NULL for other kinds; *number as above, NULL of a grid. */
+const struct imp__grid *imp__field_nodes(const imp_field *f, const uint32_t **number);
+
+/* profile_file.c: radial and rz fields as text. */
+struct imp_bytes;
+enum imp_status imp__profile_read(imp_context *ctx, const char *path,
+                                  const struct imp_bytes *b, imp_field **out);
+enum imp_status imp__profile_write(const imp_field *f, const char *path);
 
 /* Profile kinds by index, NULL past the last; names of their numbers. */
 const char *imp__profile_kind(size_t i);

@@ -97,8 +97,9 @@ void imp_field_tangent(const imp_field *f, const double x[3], const double *thet
 
 double imp__field_index_max(const imp_field *f)
 {
-    if (imp__field_is_grid(f)) {
-        const struct imp__grid *g = (const struct imp__grid *)f;
+    const uint32_t *number;
+    const struct imp__grid *g = imp__field_nodes(f, &number);
+    if (g) {
         return g->desc.param == IMP_FIELD_ETA2 ? sqrt(2 * g->most) : g->most;
     }
     double m = 0;

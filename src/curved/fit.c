@@ -200,7 +200,7 @@ static enum imp_status carry_map(const double *in, double *out, void *payload)
     double *fine = imp__alloc(ctx, f->b->field->n_theta + 1, sizeof *fine);
     if (!coarse || !fine) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a level"));
     for (size_t k = 0; k < f->last->n; k++) coarse[f->coarse_at[k]] = in[k];
-    IMP_TRY(imp__grid_prolong(f->coarse, coarse, fine));
+    IMP_TRY(imp__field_prolong(f->coarse, f->b->field, coarse, fine));
     for (size_t k = 0; k < f->goal.n; k++) out[k] = fine[f->at[k]];
 out:
     imp__release(ctx, coarse);
@@ -307,7 +307,8 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
     if (o->optimizer == IMP_LM)
         return imp__error(b->ctx, IMP_E_UNSUPPORTED,
                           "bent rays are fitted by lbfgs, adam, mma");
-    if (f.levels > 1 && !imp__field_is_grid(b->field))
+    const uint32_t *number;
+    if (f.levels > 1 && !imp__field_nodes(b->field, &number))
         return imp__error(b->ctx, IMP_E_ARG, "levels are for grids, not for a %s field",
                           b->field->ops->name);
     b->n_history = 0;

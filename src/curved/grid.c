@@ -86,9 +86,11 @@ out:
 
 enum imp_status imp_field_get_grid(const imp_field *f, struct imp_field_grid *grid)
 {
-    if (!imp__field_is_grid(f))
+    const uint32_t *number;
+    const struct imp__grid *g = imp__field_nodes(f, &number);
+    if (!g)
         return imp__error(f->ctx, IMP_E_ARG, "a %s field is not a grid", f->ops->name);
-    *grid = ((const struct imp__grid *)f)->desc;
+    *grid = g->desc;
     return IMP_OK;
 }
 
@@ -300,6 +302,7 @@ enum imp_status imp_field_refine(const imp_field *f, imp_field **out)
 {
     enum imp_status st;
     imp_field *fine = NULL;
+    if (f->ops == &imp__field_tie) return imp__tie_refine(f, out);
     const struct imp__grid *g = grid_of(f, &st);
     if (st != IMP_OK) return st;
     struct imp_field_grid desc = g->desc;

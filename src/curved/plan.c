@@ -122,7 +122,9 @@ static enum imp_status step_choose(struct imp__plan *p)
         return imp__error(p->ctx, IMP_E_ARG,
                           "a %s field has no cells to choose a step by: give one",
                           f->ops->name);
-    const double part = f->ops == &imp__field_trilinear ? 0.5 : 1;
+    const uint32_t *number;
+    const struct imp__grid *g = imp__field_nodes(f, &number);
+    const double part = g && g->desc.interp == IMP_FIELD_TRILINEAR ? 0.5 : 1;
     p->t = part * f->spacing;
     if (!p->scheme->arc) p->t /= fmax(imp__field_index_max(f), 1e-3);
     return IMP_OK;

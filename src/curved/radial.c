@@ -9,11 +9,6 @@
 
 #define CELLS_MAX 65536
 
-struct basis {
-    int first;
-    double b[4], d[4], dd[4];
-};
-
 static inline imp_v3 offset_of(const struct imp__radial *r, imp_v3 x)
 {
     imp_v3 y = x - r->centre;
@@ -21,25 +16,9 @@ static inline imp_v3 offset_of(const struct imp__radial *r, imp_v3 x)
     return y;
 }
 
-static struct basis basis_of(const struct imp__radial *r, double u2)
+static inline struct imp__basis basis_of(const struct imp__radial *r, double u2)
 {
-    struct basis b;
-    const double t = u2 / r->h;
-    b.first = (int)imp_clamp(t, 0.0, (double)(r->desc.cells - 1));
-    const double u = t - b.first, m = 1 - u, k = 1 / r->h;
-    b.b[0] = m * m * m / 6;
-    b.b[1] = (3 * u * u * u - 6 * u * u + 4) / 6;
-    b.b[2] = (-3 * u * u * u + 3 * u * u + 3 * u + 1) / 6;
-    b.b[3] = u * u * u / 6;
-    b.d[0] = -m * m / 2 * k;
-    b.d[1] = (3 * u * u - 4 * u) / 2 * k;
-    b.d[2] = (-3 * u * u + 2 * u + 1) / 2 * k;
-    b.d[3] = u * u / 2 * k;
-    b.dd[0] = (1 - u) * k * k;
-    b.dd[1] = (3 * u - 2) * k * k;
-    b.dd[2] = (1 - 3 * u) * k * k;
-    b.dd[3] = u * k * k;
-    return b;
+    return imp__basis_of(u2 / r->h, r->desc.cells, 1 / r->h);
 }
 
 static void radial_eval(const imp_field *f, int n, const imp_v3 *x, int order,
@@ -48,7 +27,7 @@ static void radial_eval(const imp_field *f, int n, const imp_v3 *x, int order,
     const struct imp__radial *r = (const struct imp__radial *)f;
     for (int i = 0; i < n; i++) {
         const imp_v3 y = offset_of(r, x[i]);
-        const struct basis b = basis_of(r, imp__dot(y, y));
+        const struct imp__basis b = basis_of(r, imp__dot(y, y));
         double f0 = 0, f1 = 0, f2 = 0;
         for (int k = 0; k < 4; k++) {
             const double c = f->theta[b.first + k];
@@ -71,7 +50,7 @@ static void radial_splat(const imp_field *f, const imp_v3 *x, double a, const im
 {
     const struct imp__radial *r = (const struct imp__radial *)f;
     const imp_v3 y = offset_of(r, *x);
-    const struct basis s = basis_of(r, imp__dot(y, y));
+    const struct imp__basis s = basis_of(r, imp__dot(y, y));
     const double slope = 2 * imp__dot(*b, y);
     double *theta_bar = imp__bar_reach(bar, (size_t)s.first, 4);
     for (int k = 0; k < 4; k++) theta_bar[s.first + k] += a * s.b[k] + slope * s.d[k];
@@ -82,7 +61,7 @@ static void radial_tangent(const imp_field *f, const imp_v3 *x, const double *th
 {
     const struct imp__radial *r = (const struct imp__radial *)f;
     const imp_v3 y = offset_of(r, *x);
-    const struct basis s = basis_of(r, imp__dot(y, y));
+    const struct imp__basis s = basis_of(r, imp__dot(y, y));
     double f0 = 0, f1 = 0;
     for (int k = 0; k < 4; k++)
         f0 += theta_dot[s.first + k] * s.b[k], f1 += theta_dot[s.first + k] * s.d[k];

@@ -12,11 +12,12 @@ struct job {
 static void leaf(imp_field *f, size_t offset, void *payload)
 {
     struct job *j = payload;
-    if (!imp__field_is_grid(f)) return;
-    const struct imp__grid *g = (const struct imp__grid *)f;
+    const uint32_t *number; /* of ties: where the gradient of a node goes */
+    const struct imp__grid *g = imp__field_nodes(f, &number);
+    if (!g) return;
     const double weight = j->s->weight, edge = j->s->edge;
     const int order = j->s->order, *m = g->nodes;
-    const double *c = f->theta;
+    const double *c = g->base.theta;
     double *bar = j->gradient ? j->gradient + offset : NULL;
     const size_t stride[3] = {1, (size_t)m[0], (size_t)m[0] * (size_t)m[1]};
     for (int axis = 0; axis < 3; axis++) {
@@ -33,10 +34,13 @@ static void leaf(imp_field *f, size_t offset, void *payload)
                     j->value += edge > 0 ? weight * root : weight / 2 * d * d;
                     if (!bar) continue;
                     const double r = weight * d / root;
+                    const size_t i0 = number ? number[at] : at,
+                                 i1 = number ? number[at + s] : at + s;
                     if (order == 1) {
-                        bar[at] -= r, bar[at + s] += r;
+                        bar[i0] -= r, bar[i1] += r;
                     } else {
-                        bar[at] += r, bar[at + s] -= 2 * r, bar[at + 2 * s] += r;
+                        const size_t i2 = number ? number[at + 2 * s] : at + 2 * s;
+                        bar[i0] += r, bar[i1] -= 2 * r, bar[i2] += r;
                     }
                 }
     }

@@ -1,14 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Files of index fields: Mitsuba's .vol (3, float32), NumPy .npy of three dimensions,
- * both [z][y][x] samples at the corners of cells, and radial splines as text:
- *
- *     importon-profile 1
- *     radial sphere|cylinder
- *     centre X Y Z
- *     axis X Y Z
- *     radius R
- *     coefficients N  c_1 ... c_N            (cells + 3) */
+ * both [z][y][x] samples at the corners of cells; text is read in profile_file.c. */
 #include "base/file.h"
 #include "base/number.h"
 #include "curved.h"
@@ -158,79 +151,6 @@ static enum imp_status npy_read(imp_context *ctx, const char *path,
     return grid_make(ctx, path, like, size, d + start + length, bytes, out);
 }
 
-/* ---- Profiles as text ---------------------------------------------------------- */
-
-struct text {
-    const char *s, *end;
-};
-
-static void blank(struct text *t)
-{
-    while (t->s < t->end) {
-        if (*t->s == '#') {
-            while (t->s < t->end && *t->s != '\n') t->s++;
-        } else if (*t->s == ' ' || *t->s == '\t' || *t->s == '\r' || *t->s == '\n') {
-            t->s++;
-        } else {
-            break;
-        }
-    }
-}
-static bool word_is(struct text *t, const char *word)
-{
-    blank(t);
-    const size_t n = strlen(word);
-    if ((size_t)(t->end - t->s) < n || memcmp(t->s, word, n) != 0) return false;
-    t->s += n;
-    return true;
-}
-static bool numbers(struct text *t, int n, double *out)
-{
-    for (int i = 0; i < n; i++) {
-        blank(t);
-        if (!imp__number(&t->s, t->end, &out[i]) || !isfinite(out[i])) return false;
-    }
-    return true;
-}
-
-static enum imp_status profile_read(imp_context *ctx, const char *path,
-                                    const struct imp_bytes *b, imp_field **out)
-{
-    enum imp_status st = IMP_OK;
-    struct text t = {(const char *)b->data, (const char *)b->data + b->size};
-    struct imp_field_radial r = IMP_FIELD_RADIAL_INIT;
-    double count = 0, *c = NULL;
-    imp_field *f = NULL;
-    bool ok =
-        word_is(&t, "importon-profile") && word_is(&t, "1") && word_is(&t, "radial");
-    if (ok && word_is(&t, "cylinder")) r.cylinder = 1;
-    else ok = ok && word_is(&t, "sphere");
-    ok = ok && word_is(&t, "centre") && numbers(&t, 3, r.centre) && word_is(&t, "axis") &&
-         numbers(&t, 3, r.axis) && word_is(&t, "radius") && numbers(&t, 1, &r.radius) &&
-         word_is(&t, "coefficients") && numbers(&t, 1, &count);
-    if (!ok || !(count >= 4) || !(count <= 65539))
-        IMP_TRY(
-            imp__error(ctx, IMP_E_SCENE, "%s: not a profile (importon-profile 1)", path));
-    r.cells = (int)count - 3;
-    c = imp__alloc(ctx, (size_t)count, sizeof *c);
-    if (!c) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "%s: no memory", path));
-    if (!numbers(&t, (int)count, c))
-        IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: fewer than %d coefficients", path,
-                           (int)count));
-    st = imp_field_radial_create(ctx, &r, 1, &f);
-    if (st == IMP_OK) st = imp_field_set_theta(f, c);
-    if (st != IMP_OK) {
-        st = imp__error_prefix(ctx, IMP_E_SCENE, "%s: ", path);
-        goto out;
-    }
-    *out = f;
-    f = NULL;
-out:
-    imp__release(ctx, c);
-    imp_field_destroy(f);
-    return st;
-}
-
 enum imp_status imp_field_read(imp_context *ctx, const char *path,
                                const struct imp_field_grid *grid, imp_field **out)
 {
@@ -245,7 +165,7 @@ enum imp_status imp_field_read(imp_context *ctx, const char *path,
         IMP_TRY(npy_read(ctx, path, &like, &b, out));
     else if (b.size >= 3 && memcmp(b.data, "VOL", 3) == 0)
         IMP_TRY(vol_read(ctx, path, &like, &b, out));
-    else IMP_TRY(profile_read(ctx, path, &b, out));
+    else IMP_TRY(imp__profile_read(ctx, path, &b, out));
 out:
     imp__bytes_free(ctx, &b);
     return st;
@@ -314,43 +234,23 @@ static enum imp_status grid_write(const imp_field *f, const char *path, bool npy
     return st;
 }
 
-static enum imp_status profile_write(const imp_field *f, const char *path)
-{
-    const struct imp__radial *r = (const struct imp__radial *)f;
-    const size_t room = 512 + 32 * f->n_theta;
-    char *s = imp__alloc(f->ctx, room, 1);
-    if (!s) return imp__error(f->ctx, IMP_E_NOMEM, "%s: no memory", path);
-    size_t at =
-        (size_t)snprintf(s, room,
-                         "importon-profile 1\nradial %s\ncentre %.17g %.17g %.17g\naxis "
-                         "%.17g %.17g %.17g\n"
-                         "radius %.17g\ncoefficients %zu\n",
-                         r->desc.cylinder ? "cylinder" : "sphere", r->desc.centre[0],
-                         r->desc.centre[1], r->desc.centre[2], r->desc.axis[0],
-                         r->desc.axis[1], r->desc.axis[2], r->desc.radius, f->n_theta);
-    for (size_t i = 0; i < f->n_theta; i++)
-        at += (size_t)snprintf(s + at, room - at, "%.17g\n", f->theta[i]);
-    for (size_t i = 0; i < at; i++)
-        if (s[i] == ',') s[i] = '.'; /* whatever the host's locale */
-    const enum imp_status st = imp__file_write(f->ctx, path, s, at);
-    imp__release(f->ctx, s);
-    return st;
-}
-
 enum imp_status imp_field_write(const imp_field *f, const char *path)
 {
     const size_t n = strlen(path);
     const bool npy = n > 4 && !strcmp(path + n - 4, ".npy");
     const bool vol = n > 4 && !strcmp(path + n - 4, ".vol");
     if (npy || vol) {
-        if (!imp__field_is_grid(f))
+        const uint32_t *number;
+        const struct imp__grid *g = imp__field_nodes(f, &number);
+        if (!g)
             return imp__error(f->ctx, IMP_E_ARG, "%s: a %s field is not a grid", path,
                               f->ops->name);
-        return grid_write(f, path, npy);
+        return grid_write(&g->base, path, npy);
     }
-    if (f->ops == &imp__field_radial) return profile_write(f, path);
+    if (f->ops == &imp__field_radial || f->ops == &imp__field_rz)
+        return imp__profile_write(f, path);
     return imp__error(f->ctx, IMP_E_ARG,
-                      "%s: fields are written as .vol, .npy, radial ones as "
-                      "text",
+                      "%s: grids are written as .vol, .npy, radial and rz "
+                      "fields as text",
                       path);
 }

@@ -101,7 +101,7 @@ static enum imp_status profile_build(struct bend_loader *l, struct imp_node *nod
     if (n == 0)
         IMP_TRY(
             imp__node_error(l->ctx, node, IMP_E_SCENE,
-                            "is of no known type: there are grid, radial, constant, "
+                            "is of no known type: there are grid, radial, rz, constant, "
                             "luneburg, maxwell, rod, rod-vendor, rod-power, sech, plume, "
                             "polynomial, axial, linear"));
     for (size_t i = 0; i < n - 3; i++) {
@@ -140,36 +140,111 @@ out:
     return st;
 }
 
+static enum imp_status rz_build(struct bend_loader *l, struct imp_node *node,
+                                double index, imp_field **out)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_field_rz r = IMP_FIELD_RZ_INIT;
+    const double z[3] = {0, 0, 1}, zero[3] = {0};
+    int64_t cells_r, cells_z;
+    IMP_TRY(imp__props_int(l->ctx, node, "cells_r", 8, 1, 8192, &cells_r));
+    IMP_TRY(imp__props_int(l->ctx, node, "cells_z", 16, 1, 8192, &cells_z));
+    IMP_TRY(bend_number(l, node, "radius", 1, 1e-300, 1e300, &r.radius));
+    IMP_TRY(bend_number(l, node, "lo", -1, -1e300, 1e300, &r.lo));
+    IMP_TRY(bend_number(l, node, "hi", 1, -1e300, 1e300, &r.hi));
+    IMP_TRY(imp__props_vector(l->ctx, node, "centre", zero, r.centre));
+    IMP_TRY(imp__props_vector(l->ctx, node, "axis", z, r.axis));
+    r.cells_r = (int)cells_r, r.cells_z = (int)cells_z;
+    IMP_TRY(placed(l, node, imp_field_rz_create(l->ctx, &r, index, out)));
+out:
+    return st;
+}
+
+/* "mirror-x fourfold-z": words, each an operation and its axis. */
+static enum imp_status symmetry_read(struct bend_loader *l, struct imp_node *node,
+                                     struct imp_field_symmetry *s, bool *any)
+{
+    static const struct {
+        const char *word;
+        int fold;
+    } words[] = {
+        {"mirror-", 0}, {"twofold-", 2}, {"fourfold-", 4}, {"axial-", IMP_FIELD_AXIAL}};
+    const char *text;
+    enum imp_status st = imp__props_string(l->ctx, node, "symmetry", "", &text);
+    *s = (struct imp_field_symmetry)IMP_FIELD_SYMMETRY_INIT;
+    *any = false;
+    while (st == IMP_OK) {
+        text += strspn(text, " ,");
+        const size_t length = strcspn(text, " ,");
+        if (length == 0) break;
+        bool known = false;
+        for (size_t i = 0; i < imp_count(words); i++) {
+            const size_t n = strlen(words[i].word);
+            if (length != n + 1 || memcmp(text, words[i].word, n) != 0 || text[n] < 'x' ||
+                text[n] > 'z')
+                continue;
+            known = i == 0 || s->fold == 0; /* one turn */
+            if (i == 0) s->mirror[text[n] - 'x'] = 1;
+            else s->fold = words[i].fold, s->axis = text[n] - 'x';
+        }
+        if (!known)
+            st = imp__prop_error(l->ctx, node, imp__node_prop(node, "symmetry"),
+                                 IMP_E_SCENE,
+                                 "'%.*s': mirrors are mirror-x, -y, -z; besides one of "
+                                 "twofold-, fourfold- and axial- with an axis",
+                                 (int)imp_min(length, (size_t)40), text);
+        *any = true;
+        text += length;
+    }
+    return st;
+}
+
+static enum imp_status index_build(struct bend_loader *l, struct imp_node *node,
+                                   const struct imp_field_grid *g, imp_field **out)
+{
+    double index;
+    enum imp_status st = bend_number(l, node, "index", 1, 1e-6, 1e6, &index);
+    if (st != IMP_OK) return st;
+    if (g) return placed(l, node, imp_field_grid_create(l->ctx, g, index, out));
+    return strcmp(node->type, "rz") == 0 ? rz_build(l, node, index, out)
+                                         : radial_build(l, node, index, out);
+}
+
 enum imp_status bend_volume(struct bend_loader *l, struct imp_node *node, imp_field **out)
 {
     enum imp_status st = IMP_OK;
     imp_field *f = NULL, *start = NULL;
     const char *file;
-    double index;
     struct imp_field_grid g;
-    if (strcmp(node->type, "grid") != 0 && strcmp(node->type, "radial") != 0) {
+    struct imp_field_symmetry symmetry;
+    const bool grid = strcmp(node->type, "grid") == 0;
+    bool tied = false;
+    if (!grid && strcmp(node->type, "radial") != 0 && strcmp(node->type, "rz") != 0) {
         IMP_TRY(profile_build(l, node, &f));
     } else {
-        const bool grid = node->type[0] == 'g';
         IMP_TRY(imp__props_string(l->ctx, node, "filename", NULL, &file));
         if (grid) IMP_TRY(grid_read(l, node, &g));
+        if (grid) IMP_TRY(symmetry_read(l, node, &symmetry, &tied));
         if (file) {
             const char *path;
             IMP_TRY(placed(l, node, imp__search(l->scene, NULL, file, &path)));
             IMP_TRY(placed(l, node, imp_field_read(l->ctx, path, grid ? &g : NULL, &f)));
-            if (imp__field_is_grid(f) != grid)
+            if (imp__field_is_grid(f) != grid ||
+                (!grid && strcmp(node->type, imp_field_kind(f)) != 0))
                 IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "%s holds a %s field",
                                         file, imp_field_kind(f)));
         } else {
-            IMP_TRY(bend_number(l, node, "index", 1, 1e-6, 1e6, &index));
-            if (grid)
-                IMP_TRY(placed(l, node, imp_field_grid_create(l->ctx, &g, index, &f)));
-            else IMP_TRY(radial_build(l, node, index, &f));
+            IMP_TRY(index_build(l, node, grid ? &g : NULL, &f));
         }
         struct imp_node *from = grid ? volume_child(node, "start") : NULL;
         if (from) {
             IMP_TRY(bend_volume(l, from, &start));
             IMP_TRY(placed(l, node, grid_sample(l, f, start)));
+        }
+        if (tied) {
+            imp_field *given = f;
+            f = NULL; /* taken over, also on failure */
+            IMP_TRY(placed(l, node, imp_field_tie_create(l->ctx, given, &symmetry, &f)));
         }
     }
     IMP_TRY(imp__props_finish(l->ctx, node));

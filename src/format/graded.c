@@ -23,7 +23,7 @@ static void leaf_count(imp_field *f, size_t offset, void *payload)
     const bool grid = imp__field_is_grid(f);
     (void)offset;
     j->n_leaves++;
-    j->medium->n_numbers += grid || f->ops == &imp__field_radial ? 1 : (int)f->n_theta;
+    j->medium->n_numbers += grid || !imp_field_param_name(f, 0) ? 1 : (int)f->n_theta;
     if (grid) j->single |= ((const struct imp__grid *)f)->single != NULL;
     else j->large |= f->n_theta > 4096;
 }
@@ -33,7 +33,7 @@ static void leaf_name(imp_field *f, size_t offset, void *payload)
 {
     struct numbers_job *j = payload;
     struct imp_medium *m = j->medium;
-    const bool grid = imp__field_is_grid(f), one = grid || f->ops == &imp__field_radial;
+    const bool grid = imp__field_is_grid(f), one = grid || !imp_field_param_name(f, 0);
     char stem[32] = "field";
     if (j->n_leaves > 1) snprintf(stem, sizeof stem, "field_%d", j->leaf);
     j->leaf++;
