@@ -44,6 +44,7 @@ for script in "$here/$2"/*.sh; do
     (cd "$scratch/cwd" && OUT=$scratch/cwd exec bash "$script") \
         >"$scratch/stdout" 2>"$scratch/stderr" </dev/null
     code=$?
+    sed -i "s|$ROOT|ROOT|g" "$scratch/stdout" "$scratch/stderr" # the same everywhere
     expected=0 verdict=ok reason=
     [[ -f $script.exit ]] && expected=$(<"$script.exit")
     if ((code != expected)); then

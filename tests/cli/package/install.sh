@@ -21,6 +21,6 @@ find_package(importon 0.1 REQUIRED)
 add_executable(by_cmake $ROOT/examples/render.c)
 target_link_libraries(by_cmake importon::importon)
 END
-cmake -B cmake-build -DCMAKE_PREFIX_PATH="$prefix" >cmake.log 2>&1 &&
+cmake -G Ninja -B cmake-build -DCMAKE_PREFIX_PATH="$prefix" >cmake.log 2>&1 &&
     cmake --build cmake-build >>cmake.log 2>&1 || { cat cmake.log; exit 9; }
 cmake-build/by_cmake "$prefix/share/importon/scenes/furnace.xml" b.exr
