@@ -55,15 +55,24 @@ const struct arg_option options_run[] = {
 
 /* ---- Talking ------------------------------------------------------------------- */
 
+/* Messages quote files and arguments, which may hold what moves a terminal's cursor. */
+static void print(const char *before, const char *format, va_list args)
+{
+    char *text = NULL;
+    progress_clear();
+    if (vasprintf(&text, format, args) < 0) return;
+    for (char *p = text; *p; p++)
+        if (((unsigned char)*p < 32 && *p != '\n' && *p != '\t') || *p == 127) *p = '?';
+    fprintf(stderr, "%s%s\n", before, text);
+    free(text);
+}
+
 int cli_error(int code, const char *format, ...)
 {
     va_list args;
-    progress_clear();
-    fprintf(stderr, "importon: ");
     va_start(args, format);
-    vfprintf(stderr, format, args);
+    print("importon: ", format, args);
     va_end(args);
-    fprintf(stderr, "\n");
     return code;
 }
 
@@ -96,11 +105,9 @@ void cli_say(const char *format, ...)
 {
     va_list args;
     if (cli.quiet) return;
-    progress_clear();
     va_start(args, format);
-    vfprintf(stderr, format, args);
+    print("", format, args);
     va_end(args);
-    fprintf(stderr, "\n");
 }
 
 struct json cli_json(void)

@@ -348,6 +348,7 @@ static int run_fit(int n, char **operand)
     fit.resume = o.resume;
     if (cli.out) {
         rc = make_folder(cli.out);
+        if (!rc && o.sheet) rc = picture_writable(o.sheet);
         if (!rc) rc = write_targets();
         if (!rc) rc = write_pictures("before");
     }

@@ -254,8 +254,8 @@ static int run_gradient(int n, char **operand)
     blocks = problem_blocks(problem, &n_blocks);
     paths = cli_alloc(n_blocks, sizeof *paths);
 
-    rc = compute(problem, &run, &r);
-    if (!rc && cli.out) rc = make_folder(cli.out);
+    if (cli.out) rc = make_folder(cli.out);
+    if (!rc) rc = compute(problem, &run, &r);
     for (size_t k = 0; k < n_blocks && !rc && cli.out; k++)
         if (block_is_large(&blocks[k]))
             rc = block_write(&blocks[k], r.grad, r.se, cli.out, &paths[k]);

@@ -63,6 +63,7 @@ static int write_control(struct json *j, imp_film *film, const char *name,
     double mean, se;
     char file[600];
     snprintf(file, sizeof file, "%s.exr", name);
+    make_file_name(file);
     char *path = join_path(cli.out, file);
     picture_stamp(film, run);
     const int rc = picture_write(film, path, o);
@@ -116,6 +117,12 @@ static int run_jacobian(int n, char **operand)
                                      "each control goes there");
     rc = problem_open(&problem);
     if (rc) return rc;
+    rc = make_folder(cli.out);
+    if (!rc && sheet_path) rc = picture_writable(sheet_path);
+    if (rc) {
+        problem_close(problem);
+        return rc;
+    }
     const struct imp_run run = cli_run();
     progress_deadline(cli.time_s);
     const size_t n_x = imp_problem_n(problem);
@@ -123,7 +130,6 @@ static int run_jacobian(int n, char **operand)
     const enum imp_status st = imp_problem_jacobian(problem, &run, &primal, films);
     if (cli_failed(st)) rc = cli_fail(st, cli.scene_path);
     if (!rc && !primal) rc = cli_done(); /* stopped before anything was there */
-    if (!rc) rc = make_folder(cli.out);
     if (!rc && primal) {
         const struct picture_options plain = {.standard_error = 1};
         struct json j = {stdout, 0};

@@ -9,6 +9,7 @@
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
@@ -35,13 +36,46 @@ int make_folder(const char *path)
         if (*p && *p != '/') continue;
         const char end = *p;
         *p = 0;
+        struct stat info;
         if (mkdir(copy, 0777) != 0 && errno != EEXIST)
             rc = cli_error(EXIT_RUN, "%s: cannot make this folder: %s", copy,
                            strerror(errno));
+        else if (stat(copy, &info) == 0 && !S_ISDIR(info.st_mode))
+            rc = cli_error(EXIT_RUN, "%s: this is not a folder", copy);
         *p = end;
         if (!end) break;
     }
     free(copy);
+    return rc;
+}
+
+void make_file_name(char *name)
+{
+    for (char *p = name; *p; p++)
+        if (*p == '/' || (p == name && *p == '.')) *p = '_';
+}
+
+int picture_writable(const char *path)
+{
+    static const char *const kinds[] = {".exr", ".png", ".pfm", ".hdr", ".npy"};
+    const size_t n = strlen(path), n_kinds = sizeof kinds / sizeof kinds[0];
+    struct stat info;
+    size_t k = 0;
+    if (!strcmp(path, "-")) return 0;
+    while (k < n_kinds && (n < 5 || strcasecmp(path + n - 4, kinds[k]) != 0)) k++;
+    if (k == n_kinds)
+        return cli_error(EXIT_USAGE,
+                         "%s: the name must end in .exr, .png, .pfm, .hdr or .npy", path);
+    if (stat(path, &info) == 0 && S_ISDIR(info.st_mode))
+        return cli_error(EXIT_RUN, "%s: cannot write: %s", path, strerror(EISDIR));
+    char *folder = cli_alloc(n + 2, 1);
+    const char *slash = strrchr(path, '/');
+    snprintf(folder, n + 2, "%.*s", slash ? (int)(slash - path + 1) : 1,
+             slash ? path : ".");
+    int rc = 0;
+    if (access(folder, W_OK | X_OK) != 0)
+        rc = cli_error(EXIT_RUN, "%s: cannot create: %s", path, strerror(errno));
+    free(folder);
     return rc;
 }
 

@@ -30,8 +30,15 @@ int picture_write(const imp_film *film, const char *path,
 int picture_target(const char *spec, const char *mask, struct imp_target *target);
 void picture_target_free(struct imp_target *target);
 
+/* Could picture_write write `path`? Asked before hours of work. 0, or an exit code with
+ * the reason printed. */
+int picture_writable(const char *path);
+
 /* Make the folder `path` and what is missing above it. */
 int make_folder(const char *path);
+/* A parameter's name as a file name: ids may hold '/' and lead out of the folder. In
+ * place. */
+void make_file_name(char *name);
 /* "folder/name" in a new string. */
 char *join_path(const char *folder, const char *name);
 

@@ -74,12 +74,27 @@ static int add_regularisers(imp_problem *problem, enum regulariser kind,
     return 0;
 }
 
+/* What speaks of a loss is not ignored where there is none. */
+static int needs_target(void)
+{
+    const struct problem_options *o = &problem_options;
+    const char *option = o->masks.n      ? "mask"
+                         : o->loss       ? "loss"
+                         : o->epsilon    ? "epsilon"
+                         : o->tikhonov.n ? "tikhonov"
+                         : o->stay.n     ? "stay"
+                         : o->smooth.n   ? "smooth"
+                                         : NULL;
+    if (o->targets.n || !option) return 0;
+    return cli_error(EXIT_USAGE, "--%s is part of a loss, and needs a --target", option);
+}
+
 static int add_targets(imp_problem *problem)
 {
     const struct problem_options *o = &problem_options;
     if (o->masks.n > o->targets.n)
-        return cli_error(EXIT_USAGE, "%zu masks for %zu targets", o->masks.n,
-                         o->targets.n);
+        return cli_error(EXIT_USAGE, "%zu masks, but only %zu %s", o->masks.n,
+                         o->targets.n, o->targets.n == 1 ? "target" : "targets");
     for (size_t i = 0; i < o->targets.n; i++) {
         struct imp_target target = IMP_TARGET_INIT;
         const char *mask = i < o->masks.n ? o->masks.item[i] : NULL;
@@ -98,7 +113,8 @@ int problem_open(imp_problem **out)
 {
     const struct problem_options *o = &problem_options;
     imp_problem *problem = NULL;
-    int rc = 0;
+    int rc = needs_target();
+    if (rc) return rc;
     enum imp_status st = imp_problem_create(cli.scene, &problem);
     for (size_t i = 0; i < o->params.n && st == IMP_OK; i++)
         st = imp_problem_activate(problem, o->params.item[i]);
@@ -173,6 +189,7 @@ int block_write(const struct block *b, const double *x, const double *se,
     imp_film *film = NULL;
     char name[512];
     snprintf(name, sizeof name, "%s.exr", p->name);
+    make_file_name(name);
     *path = join_path(folder, name);
     const enum imp_status st =
         imp_film_create(cli.context, (int)width, (int)height,

@@ -15,7 +15,7 @@ static struct {
     struct picture_options picture;
     int pixel[2], sample, count;
     const char *paths;
-} o = {.pixel = {-1, -1}, .count = 100};
+} o = {.pixel = {-1, -1}};
 
 static const struct arg_option options[] = {
     {ARG_FLAG, 0, "se", NULL, "add the standard error of every channel to the EXR file",
@@ -61,7 +61,8 @@ static int write_paths(const struct imp_run *run)
     struct output to;
     int rc = output_open(&to, o.paths);
     if (rc) return rc;
-    for (int i = 0; i < o.count && !rc && !progress_interrupted(); i++) {
+    const int count = o.count ? o.count : 100;
+    for (int i = 0; i < count && !rc && !progress_interrupted(); i++) {
         const double u = 0.5 + g1 * i, v = 0.5 + g2 * i;
         rc = describe(run, (int)((u - floor(u)) * info.width),
                       (int)((v - floor(v)) * info.height), o.sample + i, 1, to.file);
@@ -140,18 +141,25 @@ static int run_render(int n, char **operand)
     int rc = cli_load(operand[0]);
     if (rc) return rc;
     const struct imp_run run = cli_run();
-    if (o.pixel[0] >= 0 || o.pixel[1] >= 0)
-        return describe(&run, o.pixel[0], o.pixel[1], o.sample, cli.json, stdout);
+    const int one = o.pixel[0] >= 0 || o.pixel[1] >= 0;
+    if (o.sample && !one && !o.paths)
+        return cli_error(EXIT_USAGE, "--sample needs --pixel or --paths");
+    if (o.count && !o.paths) return cli_error(EXIT_USAGE, "--count needs --paths");
+    if (one) return describe(&run, o.pixel[0], o.pixel[1], o.sample, cli.json, stdout);
     if (o.paths) return write_paths(&run);
 
-    const enum imp_status st = imp_render(cli.scene, &run, &film);
-    if (cli_failed(st)) return cli_fail(st, cli.scene_path);
-    if (!film) return cli_done(); /* stopped before the first pass was done */
     char *automatic = cli.out ? NULL : default_output(&run);
     const char *path = cli.out ? cli.out : automatic;
-    picture_stamp(film, &run);
-    rc = picture_write(film, path, &o.picture);
-    if (!rc) report(path, film, &run);
+    rc = picture_writable(path);
+    if (!rc) {
+        const enum imp_status st = imp_render(cli.scene, &run, &film);
+        if (cli_failed(st)) rc = cli_fail(st, cli.scene_path);
+    }
+    if (film && !rc) { /* none: stopped before the first pass was done */
+        picture_stamp(film, &run);
+        rc = picture_write(film, path, &o.picture);
+        if (!rc) report(path, film, &run);
+    }
     imp_film_destroy(film);
     free(automatic);
     return rc ? rc : cli_done();

@@ -51,46 +51,53 @@ static void place(imp_film *from, imp_film *sheet, size_t x0, size_t y0, size_t 
             }
 }
 
+/* Width and height of the tile that every picture fits into, and how much they grow. */
+static int tile_size(const struct sheet *s, size_t *w, size_t *h, size_t *zoom)
+{
+    struct imp_film_info info = {.size = sizeof info};
+    *w = *h = 1;
+    for (size_t i = 0; i < s->n; i++) {
+        imp_film *film;
+        const int rc = picture_read(s->picture[i], &film);
+        if (rc) return rc;
+        imp_film_get_info(film, &info);
+        imp_film_destroy(film);
+        if ((size_t)info.width > *w) *w = (size_t)info.width;
+        if ((size_t)info.height > *h) *h = (size_t)info.height;
+    }
+    const size_t side = *w > *h ? *w : *h;
+    *zoom = (TILE + side - 1) / side;
+    *w = *w * *zoom + GAP;
+    *h = *h * *zoom + GAP;
+    return 0;
+}
+
 int sheet_write(const struct sheet *s, size_t columns, const char *path)
 {
-    struct imp_film_info first = {.size = sizeof first}, info = {.size = sizeof info};
     struct imp_write_options options = IMP_WRITE_OPTIONS_INIT;
     imp_film *sheet = NULL;
-    size_t zoom = 1, w = 0, h = 0;
-    int rc = 0;
+    size_t zoom, w, h;
+    int rc = tile_size(s, &w, &h, &zoom);
+    if (rc) return rc;
+    const size_t rows = (s->n + columns - 1) / columns;
+    const size_t width = columns * w - GAP, height = rows * h - GAP;
+    if (width > LARGEST / height)
+        return cli_error(EXIT_USAGE, "%s: a sheet of %zu x %zu pixels is too large", path,
+                         width, height);
+    if (cli_failed(
+            imp_film_create(cli.context, (int)width, (int)height, "R,G,B", &sheet)))
+        return cli_fail(IMP_E_NOMEM, path);
+    for (size_t k = 0; k < width * height * 3; k++) imp_film_mean(sheet)[k] = 1;
     for (size_t i = 0; i < s->n && !rc; i++) {
         imp_film *film;
         rc = picture_read(s->picture[i], &film);
         if (rc) break;
-        imp_film_get_info(film, &info);
-        if (i == 0) {
-            const size_t rows = (s->n + columns - 1) / columns;
-            const int side = info.width > info.height ? info.width : info.height;
-            first = info;
-            zoom = (size_t)((TILE + side - 1) / side);
-            w = (size_t)info.width * zoom + GAP;
-            h = (size_t)info.height * zoom + GAP;
-            const size_t width = columns * w - GAP, height = rows * h - GAP;
-            if (width > LARGEST / height)
-                rc = cli_error(EXIT_USAGE, "%s: a sheet of %zu x %zu pixels is too large",
-                               path, width, height);
-            else if (cli_failed(imp_film_create(cli.context, (int)width, (int)height,
-                                                "R,G,B", &sheet)))
-                rc = cli_fail(IMP_E_NOMEM, path);
-            else
-                for (size_t k = 0; k < width * height * 3; k++)
-                    imp_film_mean(sheet)[k] = 1;
-        }
-        if (!rc && (info.width != first.width || info.height != first.height))
-            rc = cli_error(EXIT_USAGE,
-                           "%s: pictures of a sheet must have one size, %s is %d x %d",
-                           path, s->picture[i], info.width, info.height);
-        if (!rc) place(film, sheet, i % columns * w, i / columns * h, zoom);
+        place(film, sheet, i % columns * w, i / columns * h, zoom);
         imp_film_destroy(film);
     }
-    if (!rc && sheet) {
+    if (!rc) {
         const enum imp_status st = imp_film_write(sheet, path, &options);
-        if (st != IMP_OK) rc = cli_fail(st, path);
+        if (st != IMP_OK) rc = cli_fail(st, NULL);
     }
     imp_film_destroy(sheet);
     return rc;

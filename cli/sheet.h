@@ -14,8 +14,8 @@ struct sheet {
 /* Add the preview beside the picture `path` (x.exr -> x.png). */
 void sheet_add(struct sheet *s, const char *path);
 
-/* Write the sheet to `path` ("x.png"), `columns` wide. All pictures must have one size.
- * 0, or an exit code with the reason printed. */
+/* Write the sheet to `path` ("x.png"), `columns` wide. Tiles are as large as the largest
+ * picture. 0, or an exit code with the reason printed. */
 int sheet_write(const struct sheet *s, size_t columns, const char *path);
 void sheet_free(struct sheet *s);
 

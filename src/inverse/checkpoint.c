@@ -105,7 +105,7 @@ struct source {
 
 static enum imp_status damaged(const struct source *s, const char *what)
 {
-    return imp__error(s->ctx, IMP_E_IO, "%s: damaged checkpoint (%s)", s->path, what);
+    return imp__error(s->ctx, IMP_E_SCENE, "%s: damaged checkpoint (%s)", s->path, what);
 }
 
 /* "name count" with a count that fits the file. */
@@ -172,7 +172,7 @@ static enum imp_status read_head(struct source *s, const struct imp__fingerprint
     int kind;
     unsigned long long n, h[4];
     if (!fgets(magic, sizeof magic, s->f) || strcmp(magic, MAGIC) != 0)
-        return imp__error(s->ctx, IMP_E_IO, "%s: not a checkpoint of this version",
+        return imp__error(s->ctx, IMP_E_SCENE, "%s: not a checkpoint of this version",
                           s->path);
     if (fscanf(
             s->f,
