@@ -38,6 +38,7 @@ static void print_param_json(struct json *j, const struct imp_param_info *p,
     json_number(j, "max", p->hi);
     json_bool(j, "differentiable", p->flags & IMP_PARAM_DIFFERENTIABLE);
     json_bool(j, "discontinuous", p->flags & IMP_PARAM_DISCONTINUOUS);
+    if (p->why) json_text(j, "why", p->why);
     json_bool(j, "integer", p->flags & IMP_PARAM_INTEGER);
     json_bool(j, "color", p->flags & IMP_PARAM_COLOR);
     json_end_object(j);
@@ -91,9 +92,10 @@ static int print_params(struct json *j)
         } else {
             value_text(&p, values, value, sizeof value);
             snprintf(bounds, sizeof bounds, "[%g, %g]", p.lo, p.hi);
-            printf("%-*s  %-32s %-16s %-14s %s%s\n", width, p.name, value, bounds, p.unit,
-                   p.flags & IMP_PARAM_DIFFERENTIABLE ? "yes" : "no",
-                   p.flags & IMP_PARAM_DISCONTINUOUS ? ", moves edges" : "");
+            printf("%-*s  %-32s %-16s %-14s %s%s%s%s\n", width, p.name, value, bounds,
+                   p.unit, p.flags & IMP_PARAM_DIFFERENTIABLE ? "yes" : "no",
+                   p.flags & IMP_PARAM_DISCONTINUOUS ? ", moves edges" : "",
+                   p.why ? ": " : "", p.why ? p.why : "");
         }
         free(values);
     }

@@ -94,7 +94,7 @@ static inline void stam_sink_add(struct imp_sink *sink, int param, size_t elemen
 static inline void stam_gradient(const struct stam *s, const struct imp_walk *walk,
                                  double adjoint, double g[N_CONTROLS])
 {
-    struct stam_sink to = {{stam_sink_add}, s, g};
+    struct stam_sink to = {{.add = stam_sink_add}, s, g};
     memset(g, 0, N_CONTROLS * sizeof *g);
     imp__walk_sweep(&s->tracer, walk, (imp_spec){adjoint}, &to.sink);
 }

@@ -249,6 +249,7 @@ struct imp_param_info {
     int n_dims;       /**< 0: a scalar */
     double lo, hi;    /**< bounds of every number; may be infinite */
     unsigned flags;   /**< enum imp_param_flags */
+    const char *why;  /**< why it has no gradient, where more can be said; or NULL */
 };
 
 /** Number of parameters, and of numbers in all of them together. */

@@ -68,6 +68,7 @@ struct imp_build; /* what build functions get: src/kind/build.h */
 struct imp_sink {
     void (*add)(struct imp_sink *sink, int param, size_t element, int channels,
                 const imp_spec *bar);
+    bool apart; /* lanes of numbers with one channel are kept, not added up */
 };
 
 /* ---- BSDF ---------------------------------------------------------------------- */

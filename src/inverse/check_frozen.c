@@ -108,9 +108,14 @@ static enum imp_status keep_walks(struct keep *k)
     const struct imp_film_desc *film = &c->tracer.sensor->film;
     const uint64_t pixels = (uint64_t)film->crop_w * (uint64_t)film->crop_h;
     const size_t wanted = (size_t)c->options.paths;
-    struct list list = {
-        {list_add}, c->tracer.active, c->ctx, c->problem->scene->channels, NULL, 0, 0,
-        false};
+    struct list list = {{.add = list_add},
+                        c->tracer.active,
+                        c->ctx,
+                        c->problem->scene->channels,
+                        NULL,
+                        0,
+                        0,
+                        false};
 
     k->walks = imp__alloc(c->ctx, wanted, sizeof *k->walks);
     for (int i = 0; i < 3; i++) k->value[i] = imp__alloc(c->ctx, wanted, sizeof(double));
@@ -379,7 +384,8 @@ static enum imp_status euler(struct keep *k, const uint8_t *chosen,
     const struct imp_scene *s = c->problem->scene;
     struct imp_active active = {0};
     struct imp_tracer tracer = c->tracer;
-    struct list list = {{list_add}, &active, c->ctx, s->channels, NULL, 0, 0, false};
+    struct list list = {
+        {.add = list_add}, &active, c->ctx, s->channels, NULL, 0, 0, false};
     struct imp_check_row row = {.limit = EXACT_LIMIT, .ok = 1};
     double *theta = NULL;
 

@@ -14,6 +14,7 @@
 #include "loss.h"
 #include "splat.h"
 #include "tally.h"
+#include "walk/bend.h"
 #include "walk/measure.h"
 #include "walk/picture.h"
 #include <string.h>
@@ -81,7 +82,7 @@ enum imp_status imp__problem_tracer(const struct imp_problem *p,
         if (st != IMP_OK) return st;
     }
     *out = (struct imp_tracer){p->scene, integrator, sensor, &p->active, run->seed};
-    return IMP_OK;
+    return p->active.medium ? imp__bend_survey(out) : IMP_OK;
 }
 
 /* ---- One pixel's replicate ----------------------------------------------------- */

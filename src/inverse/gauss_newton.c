@@ -90,7 +90,8 @@ static double replicate(const struct job *j, struct worker *w,
         out->dropped += walk.dropped != IMP_DROP_NONE;
         out->failed |= walk.dropped == IMP_DROP_MEMORY;
         memset(w->x, 0, K * (size_t)j->channels * sizeof(double));
-        struct imp_lanes lanes = {{imp__lanes_add}, j->tracer.active, j->channels, w->x};
+        struct imp_lanes lanes = {
+            {imp__lanes_add, true}, j->tracer.active, j->channels, w->x};
         imp__walk_sweep(&j->tracer, &walk, imp__lanes_adjoint(j->channels), &lanes.sink);
         imp__arena_rewind(&w->arena, mark);
         const double L[3] = {walk.L[0], walk.L[1], walk.L[2]};

@@ -44,7 +44,7 @@ static inline bool imp__lanes_sample(const struct imp_tracer *tracer,
     for (size_t k = 0; k < n; k++) value[k] = 0;
     for (int c = 0; c < channels; c++) value[c] = walk.L[c];
     struct imp_lanes lanes = {
-        {imp__lanes_add}, tracer->active, channels, value + channels};
+        {imp__lanes_add, true}, tracer->active, channels, value + channels};
     imp__walk_sweep(tracer, &walk, imp__lanes_adjoint(channels), &lanes.sink);
     *px = walk.px;
     *py = walk.py;

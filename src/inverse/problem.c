@@ -67,6 +67,9 @@ static enum imp_status activate_named(imp_problem *p, const char *name, uint8_t 
         return imp__error(p->ctx, IMP_E_BIAS,
                           "%s counts in whole numbers, so it has no derivative",
                           info->name);
+    if (!(info->flags & IMP_PARAM_DIFFERENTIABLE) && info->why)
+        return imp__error(p->ctx, IMP_E_BIAS, "%s has no unbiased derivative: %s",
+                          info->name, info->why);
     if (!(info->flags & IMP_PARAM_DIFFERENTIABLE))
         return imp__error(
             p->ctx, IMP_E_BIAS,

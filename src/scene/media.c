@@ -82,6 +82,29 @@ static const struct imp_shape *ball_of(const struct imp_scene *scene,
     return imp__dot(round.axis, round.axis) == 0 ? ball : NULL;
 }
 
+/* What is known before a ray is traced to leave the derivative with respect to the field
+ * incomplete; what rays meet is looked at by the walk (walk/bend_survey.c). */
+static const char *fixed_because(const struct imp_scene *scene,
+                                 const struct imp_medium *m)
+{
+    if (scene->has_integrator && scene->integrator.kind == IMP_INTEGRATOR_STAM)
+        return "the integrator stam has no derivative of the field";
+    if (scene->environment >= 0 &&
+        strcmp(scene->emitters[scene->environment]->ops->name, "constant") != 0)
+        return "an environment other than constant lies around it";
+    for (int i = 0; i < scene->n_shapes; i++) {
+        const struct imp_shape *s = scene->shapes[i];
+        if (s->interior != m) continue;
+        const struct imp_bsdf *b = imp__shape_bsdf(scene, s);
+        if (s->smooth)
+            return "its boundary has vertex normals, whose turning is not differentiated";
+        for (int j = 0; j < b->n_in; j++)
+            if (b->input[j]->texture)
+                return "its boundary is textured, and rays move over it";
+    }
+    return NULL;
+}
+
 enum imp_status imp__media_check(struct imp_scene *scene)
 {
     for (int i = 0; i < scene->n_shapes; i++) {
@@ -95,8 +118,16 @@ enum imp_status imp__media_check(struct imp_scene *scene)
             m->hi[k] = fmax(m->hi[k], s->hi[k]);
         }
     }
-    for (int i = 0; i < scene->n_media; i++)
-        if (scene->media[i]->index >= 0)
-            scene->media[i]->ball = ball_of(scene, scene->media[i]);
+    for (int i = 0; i < scene->n_media; i++) {
+        struct imp_medium *m = scene->media[i];
+        if (m->index < 0) continue;
+        m->ball = ball_of(scene, m);
+        const char *why = fixed_because(scene, m);
+        for (int k = 0; k < m->n_numbers; k++) {
+            struct imp_param_info *info = &scene->params[m->numbers[k].param].info;
+            info->why = why ? why : m->numbers[k].why;
+            if (!info->why) info->flags |= IMP_PARAM_DIFFERENTIABLE;
+        }
+    }
     return IMP_OK;
 }

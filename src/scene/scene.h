@@ -84,7 +84,8 @@ struct imp_medium_numbers {
     int n_dims;
     size_t dims[3];
     double *number, lo, hi;
-    int param; /* -1 until the scene is built */
+    const char *why; /* the field itself allows no derivative; or NULL */
+    int param;       /* -1 until the scene is built */
 };
 struct imp_medium {
     const char *name;

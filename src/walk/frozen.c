@@ -8,8 +8,8 @@
 
 #define MAX_INPUTS 32
 
-static imp_spec radiance(const struct imp_scene *scene, int emitter,
-                         const struct imp_emission *x, imp_v3 p)
+imp_spec imp__emitter_radiance(const struct imp_scene *scene, int emitter,
+                               const struct imp_emission *x, imp_v3 p)
 {
     const struct imp_emitter *e = scene->emitters[emitter];
     const struct imp_texcoord at = {{x->uv[0], x->uv[1]}, p};
@@ -23,6 +23,7 @@ imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk
 {
     imp_spec L = {0};
     if (walk->dropped || !walk->valid) return L;
+    if (tracer->active && tracer->active->medium) return imp__bend_frozen(tracer, walk);
     for (const struct imp_vertex *v = walk->last; v; v = v->prev) {
         const struct imp_bsdf *b = v->bsdf;
         imp_spec in[MAX_INPUTS], f, sum = {0};
@@ -33,7 +34,8 @@ imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk
             sum += f * v->inv_ps * L;
         }
         if (v->emitter >= 0)
-            sum += radiance(tracer->scene, v->emitter, &v->e_at, v->at.p) * v->e_weight;
+            sum += imp__emitter_radiance(tracer->scene, v->emitter, &v->e_at, v->at.p) *
+                   v->e_weight;
         if (v->glows) {
             b->ops->emit(b, in, &v->dirs.wo, &f);
             sum += f * v->g_weight;
@@ -41,7 +43,8 @@ imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk
         if (v->light >= 0) {
             const struct imp_dirs dirs = {v->dirs.wo, v->l_wi, IMP_SMOOTH};
             b->ops->eval(b, in, &dirs, &f);
-            sum += f * radiance(tracer->scene, v->light, &v->l_at, v->l_p) * v->l_weight;
+            sum += f * imp__emitter_radiance(tracer->scene, v->light, &v->l_at, v->l_p) *
+                   v->l_weight;
         }
         L = sum;
     }

@@ -3,8 +3,8 @@
  * The walk visited again: radiance comes down (fold), the adjoint goes up and gradient
  * falls off at every vertex (sweep), or both derivative and radiance come down (tangent).
  * The three differ only in the direction the product rule is read. */
+#include "bend.h"
 #include "dims.h"
-#include "walk.h"
 
 #define MAX_INPUTS 32
 
@@ -144,6 +144,7 @@ void imp__walk_sweep(const struct imp_tracer *tracer, const struct imp_walk *wal
         P *= v->w;
         if (imp__is_zero(P)) break;
     }
+    if (active->medium) imp__bend_sweep(tracer, walk, adjoint, sink);
 }
 
 /* ---- Forward ------------------------------------------------------------------- */
@@ -207,5 +208,6 @@ imp_spec imp__walk_tangent(const struct imp_tracer *tracer, const struct imp_wal
             for (int j = 0; j < b->n_in; j++) L_dot += d[j] * in_dot[j] * v->lin;
         }
     }
+    if (active->medium) L_dot += imp__bend_tangent(tracer, walk, x_dot);
     return L_dot;
 }

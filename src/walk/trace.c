@@ -242,7 +242,7 @@ static bool scatter(struct step *s, struct imp_vertex *v, const struct imp_surfa
     s->t_max = INFINITY;
     s->pdf = v->dirs.lobe == IMP_SMOOTH ? sample.pdf : 0;
     if (imp_unlikely(s->bend != NULL)) {
-        imp__bend_leave(s->bend, v, at, s->d);
+        imp__bend_leave(s->tracer, s->bend, v, at, s->d);
         if (s->bend->medium) s->pdf = 0; /* no light sample could have been taken */
     }
     return true;
@@ -323,7 +323,7 @@ static bool step(struct step *s)
     const struct imp_bsdf *bsdf = imp__shape_bsdf(scene, shape);
     struct imp_vertex *v = vertex_add(s, bsdf->n_in);
     if (!v) return false;
-    const struct imp_frame frame = {at.s, at.t, at.n};
+    struct imp_frame frame = {at.s, at.t, at.n};
     v->shape = shape;
     v->bsdf = bsdf;
     v->t = hit.t;
@@ -331,9 +331,11 @@ static bool step(struct step *s)
     v->at = (struct imp_texcoord){{at.uv[0], at.uv[1]}, at.p};
     v->dirs.wo = imp__to_local(&frame, -s->d);
     imp__inputs_eval(v->bsdf->input, v->bsdf->n_in, &v->at, v->in);
-    if (imp_unlikely(s->bend != NULL) &&
-        !imp__bend_arrive(s->tracer, s->arena, s->walk, s->bend, v, &hit, &at, s->d))
-        return false;
+    if (imp_unlikely(s->bend != NULL)) {
+        if (!imp__bend_arrive(s->tracer, s->arena, s->walk, s->bend, v, &hit, &at, s->d))
+            return false;
+        frame = (struct imp_frame){at.s, at.t, at.n}; /* it may have moved a little */
+    }
 
     struct shadow shadow = {.light = -1};
     const bool stam = integrator->kind == IMP_INTEGRATOR_STAM;

@@ -62,7 +62,8 @@ enum imp_drop {
     IMP_DROP_NEGATIVE,
     IMP_DROP_MEMORY,
     IMP_DROP_LONG,
-    IMP_DROP_BENT /* a bent ray came to no end, or to what media cannot hold (bend.h) */
+    IMP_DROP_BENT, /* a bent ray came to no end, or to what media cannot hold (bend.h) */
+    IMP_DROP_MOVED /* what moves with an active field has no derivative where it ends */
 };
 
 /* Vertices of a walk. One of more is dropped: nothing ends it, as in a closed white room
@@ -128,5 +129,9 @@ imp_spec imp__walk_tangent(const struct imp_tracer *tracer, const struct imp_wal
 /* L of the same vertices, densities and decisions at the scene's present parameters: what
  * central differences on frozen walks are made of (gradients.md 13 A). */
 imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk *walk);
+
+/* Radiance of an emitter at x, point p of it, at the scene's present parameters. */
+imp_spec imp__emitter_radiance(const struct imp_scene *scene, int emitter,
+                               const struct imp_emission *x, imp_v3 p);
 
 #endif

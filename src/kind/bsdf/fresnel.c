@@ -14,6 +14,25 @@ double imp__fresnel_dielectric(double c, double eta, double *cos_t, double *eta_
     return 0.5 * (a * a + b * b);
 }
 
+double imp__fresnel_dielectric_d(double c, double e, double *d_c, double *d_e)
+{
+    const double ct2 = 1 - (1 - c * c) / (e * e);
+    *d_c = *d_e = 0;
+    if (!(ct2 > 0)) return 1;
+    const double t = sqrt(ct2), s = c + e * t, p = t + e * c;
+    const double a = (c - e * t) / s, b = (t - e * c) / p;
+    const double dt[2] = {c / (e * e * t), (1 - c * c) / (e * e * e * t)}; /* by c, e */
+    double *const out[2] = {d_c, d_e};
+    for (int k = 0; k < 2; k++) {
+        const double dc = k == 0, de = k == 1;
+        const double et = e * dt[k] + de * t, ec = e * dc + de * c;
+        const double da = ((dc - et) - a * (dc + et)) / s;
+        const double db = ((dt[k] - ec) - b * (dt[k] + ec)) / p;
+        *out[k] = a * da + b * db;
+    }
+    return 0.5 * (a * a + b * b);
+}
+
 /* One lane. With t = eta^2 - k^2 - sin^2, A = sqrt(t^2 + 4 eta^2 k^2), a = sqrt((A +
  * t)/2):
  *

@@ -11,6 +11,9 @@
  * *eta_t: index on the far side over index on the near side. */
 double imp__fresnel_dielectric(double c, double eta, double *cos_t, double *eta_t);
 
+/* F for c > 0 and index e = far/near, with its derivatives: 0 under total reflection. */
+double imp__fresnel_dielectric_d(double c, double e, double *d_c, double *d_e);
+
 /* Conductor in vacuum, c = cosine of incidence, lane by lane. */
 void imp__fresnel_conductor(double c, const imp_spec *eta, const imp_spec *k,
                             imp_spec *f);

@@ -231,6 +231,29 @@ static void tangent(const struct imp_texture *tex, const struct imp_texcoord *at
                      : sum;
 }
 
+/* Bilinear lookups alone: the others jump. Rows of to_uv give d(u', v')/d(u, v). */
+static bool slope(const struct imp_texture *tex, const struct imp_texcoord *at,
+                  bool scalar, imp_spec d_uv[2])
+{
+    const struct bitmap *t = tex->self;
+    struct footprint f;
+    imp_spec texel[4], d[2];
+    if (t->filter != FILTER_BILINEAR) return false;
+    footprint(t, at, &f);
+    for (int k = 0; k < 4; k++) {
+        const float *p = t->data + (size_t)t->channels * f.texel[k];
+        texel[k] = t->channels == 1 ? imp__spec(p[0]) : (imp_spec){p[0], p[1], p[2], 0};
+        if (scalar && t->channels == 3)
+            texel[k] = imp__spec(imp__luminance(p[0], p[1], p[2]));
+    }
+    const double a = f.weight[1] + f.weight[3], b = f.weight[2] + f.weight[3];
+    d[0] = ((texel[1] - texel[0]) * (1 - b) + (texel[3] - texel[2]) * b) * t->width;
+    d[1] = ((texel[2] - texel[0]) * (1 - a) + (texel[3] - texel[1]) * a) * t->height;
+    for (int k = 0; k < 2; k++)
+        d_uv[k] = d[0] * t->to_uv.m[0][k] + d[1] * t->to_uv.m[1][k];
+    return true;
+}
+
 static const struct imp_input_desc inputs[] = {{0}};
 
 const struct imp_texture_ops imp__bitmap = {.size = sizeof(struct imp_texture_ops),
@@ -240,4 +263,5 @@ const struct imp_texture_ops imp__bitmap = {.size = sizeof(struct imp_texture_op
                                             .build = build,
                                             .eval = eval,
                                             .scatter = scatter,
-                                            .tangent = tangent};
+                                            .tangent = tangent,
+                                            .slope = slope};
