@@ -107,15 +107,12 @@ static void paths_draw(imp_bend *b, int u, int v, const double lo[3], const doub
                                         {.05f, .6f, .1f}, {.9f, .5f, 0},
                                         {.5f, .1f, .7f},  {0, .6f, .6f}};
     struct imp_bend_rays r;
-    struct imp_bend_options o = IMP_BEND_OPTIONS_INIT;
     imp_bend_get_rays(b, &r);
-    if (imp_bend_get_options(b, &o) != IMP_OK) return;
-    o.n_taps = 0;
     const size_t stride = r.n > PATHS ? r.n / PATHS : 1;
     for (size_t i = stride / 2; i < r.n; i += stride) {
         double(*q)[4];
         size_t n;
-        if (imp_bend_path(imp_bend_field(b), &o, &r, i, &q, &n, NULL) != IMP_OK) continue;
+        if (imp_bend_ray(b, i, &q, &n) != IMP_OK) continue;
         for (size_t k = 1; k < n; k++)
             line(p, (q[k - 1][u] - lo[u]) / (hi[u] - lo[u]) * SIDE,
                  (hi[v] - q[k - 1][v]) / (hi[v] - lo[v]) * SIDE,

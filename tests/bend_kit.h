@@ -164,6 +164,13 @@ static inline imp_field *kit_field(int i, const char **name)
         free(p);
         return f;
     }
+    case 22: {
+        const char *unused;
+        snprintf(label, sizeof label, "scaled sum");
+        KIT_CHECK(imp_field_scaled_create(kit_ctx, kit_field(17, &unused), 1.2, &f));
+        snprintf(label, sizeof label, "scaled sum");
+        return f;
+    }
     }
     return NULL;
 }

@@ -123,6 +123,12 @@ IMP_API IMP_MUST_CHECK enum imp_status
 imp_field_tie_create(imp_context *context, imp_field *grid,
                      const struct imp_field_symmetry *symmetry, imp_field **out);
 
+/** 1 + k (eta - 1): a field at another wavelength. Takes the field over, also on failure;
+ * theta is the field's. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_field_scaled_create(imp_context *context,
+                                                               imp_field *field, double k,
+                                                               imp_field **out);
+
 /** eta = sum of the parts. Takes them over, also on failure; theta is theirs, one after
  * the other. */
 IMP_API IMP_MUST_CHECK enum imp_status
@@ -142,7 +148,8 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_field_write(const imp_field *field,
 
 IMP_API void imp_field_destroy(imp_field *field);
 
-/** "spline", "trilinear", "radial", "rz", "tied grid", "sum", or the profile's name. */
+/** "spline", "trilinear", "radial", "rz", "tied grid", "scaled", "sum", or the profile's
+ * name. */
 IMP_API const char *imp_field_kind(const imp_field *field);
 IMP_API size_t imp_field_n_theta(const imp_field *field);
 IMP_API void imp_field_get_theta(const imp_field *field, double *theta);
@@ -416,6 +423,29 @@ imp_bend_add_rays(imp_bend *bend, size_t n, const double (*x)[3], const double (
 IMP_API size_t imp_bend_n_rays(const imp_bend *bend);
 IMP_API int imp_bend_n_bundles(const imp_bend *bend);
 
+enum imp_dispersion_model {
+    IMP_CAUCHY = 0, /**< n = c0 + c1/l^2 + c2/l^4 */
+    IMP_SELLMEIER   /**< n^2 = 1 + sum_k c_k l^2/(l^2 - c_{3+k}), k = 0, 1, 2 */
+};
+/** Of a material; wavelengths l in micrometres. */
+struct imp_dispersion {
+    size_t size;
+    enum imp_dispersion_model model;
+    double coefficient[6];
+    double reference; /**< wavelength at which the field is the index */
+};
+#define IMP_DISPERSION_INIT                                                              \
+    {                                                                                    \
+        sizeof(struct imp_dispersion), IMP_CAUCHY, {0}, 0.5875618                        \
+    }
+/** The formula. */
+IMP_API double imp_dispersion_index(const struct imp_dispersion *d, double um);
+/** Rays of a bundle have this wavelength: they see the index 1 + k (eta - 1), with
+ * k = (n(um) - 1)/(n(reference) - 1). @return IMP_E_ARG if k is not positive. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_bend_set_wavelength(imp_bend *bend, int bundle, const struct imp_dispersion *d,
+                        double um);
+
 enum imp_bend_target_type {
     IMP_BEND_FOCUS = 0,  /**< mean |x - point|^2/2 */
     IMP_BEND_SPOT,       /**< mean |x - centroid|^2/2 */
@@ -491,6 +521,9 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_bend_run(imp_bend *bend,
                                                     struct imp_bend_exit *exits,
                                                     struct imp_bend_exit *taps,
                                                     struct imp_bend_stats *stats);
+/** imp_bend_path of one ray of the problem. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_bend_ray(imp_bend *bend, size_t ray, double (**points)[4], size_t *n_points);
 /** Position, direction and path of a ray at a target's plane; weight 0: it does not
  * count. */
 struct imp_bend_arrival {

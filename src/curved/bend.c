@@ -35,9 +35,10 @@ void imp_bend_destroy(imp_bend *b)
     }
     for (size_t i = 0; i < b->n_sdfs; i++) imp_field_destroy(b->sdfs[i]);
     for (size_t i = 0; i < b->n_scenes; i++) imp_scene_destroy(b->scenes[i]);
-    void *const owned[] = {b->surfaces, b->taps,         b->x,       b->d,     b->power,
-                           b->group,    b->bundle_first, b->targets, b->holds, b->smooths,
-                           b->sdfs,     b->scenes,       b->history, b->rows};
+    void *const owned[] = {
+        b->surfaces, b->taps,         b->x,       b->d,     b->power,
+        b->group,    b->bundle_first, b->targets, b->holds, b->smooths,
+        b->sdfs,     b->scenes,       b->history, b->rows,  b->dispersion};
     for (size_t i = 0; i < imp_count(owned); i++) imp__release(ctx, owned[i]);
     imp_field_destroy(b->field);
     imp__release(ctx, b);

@@ -45,6 +45,9 @@ struct imp_bend {
     size_t *bundle_first; /* [n_bundles + 1] */
     size_t cap_bundles;
 
+    double *dispersion; /* [cap_dispersion] factor of eta - 1 by bundle; NULL: all 1 */
+    size_t cap_dispersion;
+
     size_t n_targets, cap_targets;
     struct imp__target_of_rays *targets;
     size_t n_holds, cap_holds;
@@ -70,6 +73,31 @@ static inline struct imp_bend_rays imp__bend_rays(const imp_bend *b)
     return (struct imp_bend_rays){b->n, (const double(*)[3])b->x,
                                   (const double(*)[3])b->d, b->group};
 }
+
+/* dispersion.c: a field at another wavelength; its numbers are those of `of`. */
+struct imp__scaled {
+    imp_field base;
+    imp_field *of;
+    double k;
+};
+void imp__scaled_init(struct imp__scaled *s, imp_field *of, double k);
+double imp__bend_factor(const imp_bend *b, const struct imp_bend_rays *rays, size_t i);
+/* As the calls without a bend, each ray with the field at its bundle's wavelength. */
+enum imp_status
+imp__bundles_trace(const imp_bend *b, imp_field *field, const struct imp_bend_options *o,
+                   const struct imp_bend_rays *rays, struct imp_bend_exit *exits,
+                   struct imp_bend_exit *taps, struct imp_bend_stats *stats);
+enum imp_status imp__bundles_adjoint(const imp_bend *b, const struct imp_bend_options *o,
+                                     const struct imp_bend_rays *rays,
+                                     const struct imp_bend_exit *exits,
+                                     const struct imp_bend_exit *taps,
+                                     const struct imp_bend_cotangent *bars,
+                                     const struct imp_bend_cotangent *tap_bars,
+                                     double *theta, struct imp_bend_stats *stats);
+enum imp_status imp__bundles_tangent(const imp_bend *b, const struct imp_bend_options *o,
+                                     const struct imp_bend_rays *rays,
+                                     const double *theta_dot,
+                                     struct imp_bend_cotangent *dots);
 
 /* Leaves of a field: itself, or the parts of a sum. `offset`: of its theta in the whole.
  */

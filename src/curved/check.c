@@ -48,7 +48,7 @@ enum imp_status imp_bend_step_error(imp_bend *b, size_t pilots, double *error,
     const struct imp_bend_rays r = {n, (const double(*)[3])x, (const double(*)[3])d,
                                     group};
     for (int k = 0; k < 3; k++, o.step /= 2)
-        IMP_TRY(imp_bend_trace(b->field, &o, &r, e + (size_t)k * n, NULL, NULL));
+        IMP_TRY(imp__bundles_trace(b, b->field, &o, &r, e + (size_t)k * n, NULL, NULL));
     for (size_t i = 0; i < n; i++) {
         const struct imp_bend_exit *a = &e[i], *h = &e[n + i], *q = &e[2 * n + i];
         if ((a->flags | h->flags | q->flags) & IMP_BEND_DROPPED) continue;
@@ -106,21 +106,19 @@ static enum imp_status check_dot(imp_bend *b, const double *dot, double *bar)
     struct imp_bend_exit *te = imp__alloc(b->ctx, taps + 1, sizeof *te);
     struct imp_bend_cotangent *c = imp__alloc(b->ctx, 2 * b->n, sizeof *c),
                               *d = c ? c + b->n : NULL;
-    struct imp_bend_gradient g = IMP_BEND_GRADIENT_INIT;
     double left = 0, right = 0, scale = 1e-300;
     if (!e || !te || !c)
         IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "no memory for a check"));
     IMP_TRY(imp_bend_get_options(b, &o));
-    IMP_TRY(imp_bend_trace(b->field, &o, &r, e, te, NULL));
+    IMP_TRY(imp__bundles_trace(b, b->field, &o, &r, e, te, NULL));
     for (size_t i = 0; i < b->n; i++) {
         for (int k = 0; k < 3; k++)
             c[i].x[k] = random_pm(4 + (uint64_t)k, i),
             c[i].v[k] = random_pm(7 + (uint64_t)k, i);
         c[i].path = random_pm(10, i);
     }
-    g.theta = bar;
-    IMP_TRY(imp_bend_adjoint(b->field, &o, &r, e, te, c, NULL, &g, &stats));
-    IMP_TRY(imp_bend_tangent(b->field, &o, &r, dot, NULL, NULL, d, NULL));
+    IMP_TRY(imp__bundles_adjoint(b, &o, &r, e, te, c, NULL, bar, &stats));
+    IMP_TRY(imp__bundles_tangent(b, &o, &r, dot, d));
     for (size_t i = 0; i < b->field->n_theta; i++) left += bar[i] * dot[i];
     for (size_t i = 0; i < b->n; i++) {
         if (e[i].flags & IMP_BEND_DROPPED) continue;

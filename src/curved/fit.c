@@ -111,6 +111,8 @@ static void fingerprint(struct fit *f)
     uint64_t h = imp__hash(0, &b->n, sizeof b->n);
     h = imp__hash(h, b->x, b->n * sizeof *b->x);
     h = imp__hash(h, b->d, b->n * sizeof *b->d);
+    if (b->dispersion)
+        h = imp__hash(h, b->dispersion, b->cap_dispersion * sizeof *b->dispersion);
     f->print.scene = h;
     h = 1;
     for (size_t i = 0; i < b->n_targets; i++) {

@@ -34,7 +34,8 @@ static enum imp_status passes_trace(const imp_bend *b, bool adjoint, struct pass
         (adjoint && n_taps && !p->tap_bars))
         return imp__error(b->ctx, IMP_E_NOMEM, "no memory for the exits of %zu rays",
                           b->n);
-    return imp_bend_trace(b->field, &p->options, &p->rays, p->exits, p->taps, stats);
+    return imp__bundles_trace(b, b->field, &p->options, &p->rays, p->exits, p->taps,
+                              stats);
 }
 
 enum imp_status imp_bend_objective(imp_bend *b, double *value, double *gradient,
@@ -55,14 +56,12 @@ enum imp_status imp_bend_objective(imp_bend *b, double *value, double *gradient,
     }
     if (gradient) {
         const size_t n = b->field->n_theta;
-        struct imp_bend_gradient g = IMP_BEND_GRADIENT_INIT;
         mask = imp__alloc(b->ctx, n + 1, 1);
         bar = imp__alloc(b->ctx, n + 1, sizeof *bar);
         if (!mask || !bar)
             IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "no memory for a gradient"));
-        g.theta = bar;
-        IMP_TRY(imp_bend_adjoint(b->field, &p.options, &p.rays, p.exits, p.taps, p.bars,
-                                 p.tap_bars, &g, &s));
+        IMP_TRY(imp__bundles_adjoint(b, &p.options, &p.rays, p.exits, p.taps, p.bars,
+                                     p.tap_bars, bar, &s));
         total += imp__smooth_value(b, bar);
         imp__bend_hold(b, mask, NULL);
         for (size_t i = 0; i < n; i++) gradient[i] = mask[i] ? 0 : bar[i];

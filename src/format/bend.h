@@ -19,6 +19,8 @@ struct bend_loader {
     imp_bend *bend;
     imp_field *truth; /* what `from_truth` targets are made with */
     struct imp_bend_options options;
+    struct imp_dispersion dispersion;
+    bool dispersive;
     struct imp_bend_surface *surfaces;
     size_t n_surfaces, cap_surfaces;
     struct imp_bend_tap taps[16];

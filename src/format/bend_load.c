@@ -45,7 +45,8 @@ static enum imp_status truth_trace(struct bend_loader *l, struct imp_bend_exit *
     }
     struct imp_bend_exit *e = imp__alloc(l->ctx, imp_max(r.n, (size_t)1), sizeof *e);
     if (!e) return imp__error(l->ctx, IMP_E_NOMEM, "no memory for %zu rays", r.n);
-    const enum imp_status st = imp_bend_trace(l->truth, &o, &r, e, NULL, NULL);
+    const enum imp_status st =
+        imp__bundles_trace(l->bend, l->truth, &o, &r, e, NULL, NULL);
     if (st != IMP_OK) {
         imp__release(l->ctx, e);
         return st;

@@ -279,6 +279,30 @@ enum imp_status bend_sdf(struct bend_loader *l, struct imp_node *parent,
     return IMP_OK;
 }
 
+/* cauchy = "A B C", or sellmeier_b and sellmeier_c, in powers of micrometres. */
+static enum imp_status dispersion_read(struct bend_loader *l, struct imp_node *node)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_dispersion *d = &l->dispersion;
+    const double zero[3] = {0};
+    const bool cauchy = imp__props_has(node, "cauchy"),
+               sellmeier = imp__props_has(node, "sellmeier_b");
+    *d = (struct imp_dispersion)IMP_DISPERSION_INIT;
+    IMP_TRY(bend_number(l, node, "reference", d->reference, 0.01, 1000, &d->reference));
+    if (cauchy && sellmeier)
+        IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE,
+                                "has both 'cauchy' and 'sellmeier_b'"));
+    IMP_TRY(imp__props_vector(l->ctx, node, "cauchy", zero, d->coefficient));
+    if (sellmeier) {
+        d->model = IMP_SELLMEIER;
+        IMP_TRY(imp__props_vector(l->ctx, node, "sellmeier_b", zero, d->coefficient));
+        IMP_TRY(imp__props_vector(l->ctx, node, "sellmeier_c", zero, d->coefficient + 3));
+    }
+    l->dispersive = cauchy || sellmeier;
+out:
+    return st;
+}
+
 enum imp_status bend_medium(struct bend_loader *l, struct imp_node *node)
 {
     static const char *const schemes[] = {"leapfrog", "euler", "verlet",
@@ -336,6 +360,7 @@ enum imp_status bend_medium(struct bend_loader *l, struct imp_node *node)
     o->outside = outside;
     IMP_TRY(bend_number(l, node, "outside_index", 1, 1e-6, 1e6, &o->outside_index));
     IMP_TRY(bend_number(l, node, "grazing", 0, -1, 1, &o->grazing));
+    IMP_TRY(dispersion_read(l, node));
 out:
     for (size_t i = 0; i < n; i++) imp_field_destroy(parts[i]);
     imp_field_destroy(field);

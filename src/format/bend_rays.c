@@ -3,6 +3,7 @@
  * <rays>, <surface> and <target>. Rays come in bundles, each with a frame: its z runs
  * along the beam (or from a point source to the centre), and what stands inside <rays> is
  * written in that frame, once for all bundles of the element. */
+#include "base/number.h"
 #include "bend.h"
 #include "search.h"
 #include <string.h>
@@ -84,7 +85,8 @@ static void bundle_rays(const struct bundle *b, const struct bend_frame *f,
 }
 
 static enum imp_status bundle_add(struct bend_loader *l, struct imp_node *node,
-                                  const struct bundle *b, const struct bend_frame *f)
+                                  const struct bundle *b, const struct bend_frame *f,
+                                  double um)
 {
     enum imp_status st = IMP_OK;
     double(*x)[3] = imp__alloc(l->ctx, (size_t)b->count, sizeof *x);
@@ -94,6 +96,12 @@ static enum imp_status bundle_add(struct bend_loader *l, struct imp_node *node,
     bundle_rays(b, f, x, d);
     IMP_TRY(imp_bend_add_rays(l->bend, (size_t)b->count, (const double(*)[3])x,
                               (const double(*)[3])d, NULL, &bundle));
+    if (um > 0) {
+        st = imp_bend_set_wavelength(l->bend, bundle, &l->dispersion, um);
+        if (st == IMP_E_ARG)
+            st = imp__node_error(l->ctx, node, IMP_E_SCENE, "no index at %g um", um);
+        if (st != IMP_OK) goto out;
+    }
     void *grown = imp__grow(l->ctx, l->frames, &l->cap_frames, (size_t)bundle + 1,
                             sizeof *l->frames);
     if (grown) l->frames = grown;
@@ -115,6 +123,35 @@ out:
     return st;
 }
 
+#define WAVELENGTHS_MAX 64
+
+/* "0.486 0.588 0.656": micrometres; none: 0, the reference. */
+static enum imp_status wavelengths_read(struct bend_loader *l, struct imp_node *node,
+                                        double um[WAVELENGTHS_MAX], int *n)
+{
+    const char *text;
+    const enum imp_status st =
+        imp__props_string(l->ctx, node, "wavelengths", NULL, &text);
+    *n = 0;
+    um[0] = 0;
+    if (st != IMP_OK || !text) return st;
+    if (!l->dispersive)
+        return imp__node_error(l->ctx, node, IMP_E_SCENE,
+                               "has wavelengths, and the medium neither 'cauchy' nor "
+                               "'sellmeier_b'");
+    const char *end = text + strlen(text);
+    for (;;) {
+        text += strspn(text, " ,");
+        if (*text == 0 && *n > 0) return IMP_OK;
+        if (*n == WAVELENGTHS_MAX || !imp__number(&text, end, &um[*n]) ||
+            !(um[*n] >= 0.01 && um[*n] <= 1000))
+            return imp__prop_error(l->ctx, node, imp__node_prop(node, "wavelengths"),
+                                   IMP_E_SCENE, "1 to %d wavelengths of 0.01 to 1000 um",
+                                   WAVELENGTHS_MAX);
+        ++*n;
+    }
+}
+
 enum imp_status bend_rays(struct bend_loader *l, struct imp_node *node)
 {
     static const char *const patterns[] = {"disc", "grid", "fan"};
@@ -123,7 +160,8 @@ enum imp_status bend_rays(struct bend_loader *l, struct imp_node *node)
     const double zero[3] = {0}, z[3] = {0, 0, 1};
     double origin[3], direction[3], degrees;
     int64_t directions, views;
-    int pattern;
+    int pattern, n_um;
+    double um[WAVELENGTHS_MAX];
     b.point = strcmp(node->type, "point") == 0;
     if (!b.point && strcmp(node->type, "beam") != 0)
         IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE,
@@ -151,6 +189,7 @@ enum imp_status bend_rays(struct bend_loader *l, struct imp_node *node)
     }
     if (!(imp__length(imp__v3_load(direction)) > 0))
         IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "has no direction"));
+    IMP_TRY(wavelengths_read(l, node, um, &n_um));
     const int64_t n = directions > 0 ? directions : views > 0 ? views : 1;
     for (int64_t i = 0; i < n; i++) {
         imp_v3 dir = imp__v3_load(direction);
@@ -161,7 +200,8 @@ enum imp_status bend_rays(struct bend_loader *l, struct imp_node *node)
             dir = imp__v3(sin(a), 0, cos(a));
         }
         const struct bend_frame f = frame_of(imp__v3_load(origin), dir);
-        IMP_TRY(bundle_add(l, node, &b, &f));
+        for (int k = 0; k < imp_max(n_um, 1); k++)
+            IMP_TRY(bundle_add(l, node, &b, &f, um[k]));
     }
 out:
     return st;

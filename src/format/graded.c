@@ -97,7 +97,8 @@ out:
 static enum imp_status only_for_rays(struct imp_scene *scene, struct imp_node *node,
                                      const struct bend_loader *l)
 {
-    static const char *const words[] = {"outside", "way", "grazing"};
+    static const char *const words[] = {
+        "outside", "way", "grazing", "cauchy", "reference", "sellmeier_b", "sellmeier_c"};
     for (size_t i = 0; i < imp_count(words); i++)
         if (imp__props_has(node, words[i]))
             return imp__prop_error(scene->ctx, node, imp__node_prop(node, words[i]),
