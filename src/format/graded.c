@@ -14,14 +14,16 @@ struct numbers_job {
     struct imp_medium *medium;
     const double *lo, *hi;
     int n_leaves, leaf;
-    bool failed, single, large;
+    bool failed, single, large, tied;
 };
 
 static void leaf_count(imp_field *f, size_t offset, void *payload)
 {
     struct numbers_job *j = payload;
     const bool grid = imp__field_is_grid(f);
+    const uint32_t *number;
     (void)offset;
+    j->tied |= imp__field_nodes(f, &number) && number;
     j->n_leaves++;
     j->medium->n_numbers += grid || !imp_field_param_name(f, 0) ? 1 : (int)f->n_theta;
     if (grid) j->single |= ((const struct imp__grid *)f)->single != NULL;
@@ -79,6 +81,11 @@ static enum imp_status numbers_make(struct imp_scene *scene, struct imp_node *no
     if (j.single)
         IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
                                 "'single' samples are for files of bent rays only"));
+    if (j.tied)
+        IMP_TRY(
+            imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
+                            "grids with a 'symmetry' are for files of bent rays only; "
+                            "there is 'rz'"));
     if (j.large)
         IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
                                 "a profile of more than 4096 numbers"));
