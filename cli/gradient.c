@@ -81,6 +81,17 @@ static int adjoint_image(const struct imp_run *run, float **seed)
     return 0;
 }
 
+/* The picture that derivatives are of, in the scene's channels: a film may hold alpha,
+ * aovs, luminance or XYZ in their place. */
+static enum imp_status colour_picture(const struct imp_run *run, imp_film **out)
+{
+    imp_problem *none = NULL;
+    enum imp_status st = imp_problem_create(cli.scene, &none);
+    if (st == IMP_OK) st = imp_problem_jacobian(none, run, out, NULL);
+    imp_problem_destroy(none);
+    return st;
+}
+
 /* One estimate of value, gradient and errors with the random numbers of `run`. */
 static enum imp_status estimate(imp_problem *problem, const struct imp_run *run,
                                 const float *seed, struct result *r)
@@ -89,7 +100,7 @@ static enum imp_status estimate(imp_problem *problem, const struct imp_run *run,
     if (!seed)
         return imp_problem_objective(problem, NULL, run, &r->value, r->grad, r->se);
     enum imp_status st = imp_problem_reverse(problem, seed, run, r->grad, r->se);
-    if (st == IMP_OK) st = imp_render(cli.scene, run, &film);
+    if (st == IMP_OK) st = colour_picture(run, &film);
     if (st == IMP_OK) r->value = inner_product(film, seed);
     imp_film_destroy(film);
     return st;

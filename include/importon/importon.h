@@ -472,7 +472,9 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_problem_forward(imp_problem *problem,
                                                            imp_film **out);
 
 /** One picture dI/dx_i for every active number, from one set of walks: films [n], each to
- * be destroyed by the caller. n is limited to 256. primal may be NULL. */
+ * be destroyed by the caller. n is limited to 256. primal, the picture itself in the
+ * scene's channels whatever the film's pixel format, may be NULL; with nothing active and
+ * films NULL it is all that is made. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_jacobian(imp_problem *problem,
                                                             const struct imp_run *run,
                                                             imp_film **primal,

@@ -83,8 +83,8 @@ static enum imp_status film_slice(imp_context *ctx, const imp_film *from, size_t
 enum imp_status imp_problem_jacobian(imp_problem *p, const struct imp_run *run,
                                      imp_film **primal, imp_film **films)
 {
-    if (!p || !films) return IMP_E_ARG;
-    if (p->n == 0 || p->n > JACOBIAN_MAX)
+    if (!p || (!films && (!primal || p->n > 0))) return IMP_E_ARG;
+    if ((p->n == 0 && films) || p->n > JACOBIAN_MAX)
         return imp__error(
             p->ctx, IMP_E_ARG,
             "%zu numbers are active; derivative pictures are made of 1 to %d", p->n,
@@ -95,7 +95,7 @@ enum imp_status imp_problem_jacobian(imp_problem *p, const struct imp_run *run,
     const size_t C = (size_t)p->scene->channels;
     struct jacobian j = {.channels = p->scene->channels};
     imp_film *all = NULL, *first = NULL;
-    imp_film **made = imp__alloc(ctx, p->n, sizeof *made);
+    imp_film **made = imp__alloc(ctx, p->n + 1, sizeof *made);
     char *names = imp__alloc(ctx, (p->n + 1) * C, 12);
     if (!made || !names) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory"));
     for (size_t k = 0, used = 0; k < (p->n + 1) * C; k++)
@@ -110,7 +110,7 @@ enum imp_status imp_problem_jacobian(imp_problem *p, const struct imp_run *run,
     for (size_t k = 0; k < p->n; k++)
         IMP_TRY(film_slice(ctx, all, (k + 1) * C, (int)C, &made[k]));
     IMP_TRY(film_slice(ctx, all, 0, (int)C, &first));
-    memcpy(films, made, p->n * sizeof *made);
+    if (films) memcpy(films, made, p->n * sizeof *made);
     memset(made, 0, p->n * sizeof *made);
     if (primal) {
         *primal = first;

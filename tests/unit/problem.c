@@ -223,6 +223,34 @@ static void regularisers(imp_scene *s)
     tap_ok(worst < 1e-13, "its gradient # %.1e", worst);
 }
 
+/* With nothing active, the picture that derivatives would be of. */
+static void primal_alone(imp_scene *s)
+{
+    struct imp_run run = IMP_RUN_INIT;
+    imp_problem *p = NULL;
+    imp_film *picture = NULL, *primal = NULL, *films[8] = {0};
+    run.spp = 3;
+    int ok = imp_problem_create(s, &p) == IMP_OK;
+    tap_ok(ok && imp_problem_jacobian(p, &run, NULL, NULL) == IMP_E_ARG &&
+               imp_problem_jacobian(p, &run, &primal, films) == IMP_E_ARG && !primal,
+           "a Jacobian of nothing has no films # %s", imp_last_error(ctx));
+    ok = ok && imp_problem_jacobian(p, &run, &primal, NULL) == IMP_OK &&
+         imp_render(s, &run, &picture) == IMP_OK;
+    struct imp_film_info info = {.size = sizeof info};
+    if (ok) imp_film_get_info(picture, &info);
+    const size_t n = (size_t)info.width * (size_t)info.height * (size_t)info.channels;
+    tap_ok(ok &&
+               !memcmp(imp_film_mean(picture), imp_film_mean(primal), n * sizeof(float)),
+           "its primal is the picture, to the bit");
+    imp_film_destroy(primal);
+    primal = NULL;
+    tap_ok(ok && imp_problem_activate(p, "*") == IMP_OK &&
+               imp_problem_jacobian(p, &run, &primal, NULL) == IMP_E_ARG && !primal,
+           "where something is active, films are needed");
+    imp_film_destroy(picture);
+    imp_problem_destroy(p);
+}
+
 int main(void)
 {
     if (imp_context_create(NULL, &ctx) != IMP_OK) return 1;
@@ -231,6 +259,7 @@ int main(void)
     activation(s);
     targets(s);
     regularisers(s);
+    primal_alone(s);
     imp_scene_destroy(s);
     imp_context_destroy(ctx);
     return tap_done();
