@@ -31,6 +31,11 @@ struct imp_leg {
     imp_spec P; /* room for the sweep */
 };
 
+static inline void imp__bend_begin(struct imp_bending *b)
+{
+    b->medium = b->through = NULL;
+    b->chain = b->moved = false;
+}
 /* From the vertex at `from` along *d. ratio: index at the start over that at the end. */
 bool imp__bend_meet(const struct imp_scene *scene, struct imp_bending *b,
                     const imp_v3 *from, imp_v3 *o, imp_v3 *d, struct imp_hit *hit,

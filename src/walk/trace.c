@@ -250,7 +250,7 @@ static bool scatter(struct step *s, struct imp_vertex *v, const struct imp_surfa
 
 /* The ray in flight, in a medium: to what it meets. The step's weight gets the ratio of
  * the squared indices at its ends: radiance/n^2 is what stays along a ray. */
-static bool bend_meet(struct step *s, struct imp_hit *hit)
+static __attribute__((noinline)) bool bend_meet(struct step *s, struct imp_hit *hit)
 {
     struct imp_vertex *last = s->walk->last;
     double ratio;
@@ -408,8 +408,11 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
                      .from = walk->ray.o,
                      .beta = {1, 1, 1, 0},
                      .eta = 1};
-    struct imp_bending bend = {0};
-    if (imp_unlikely(tracer->scene->n_media > 0)) s.bend = &bend;
+    struct imp_bending bend; /* large: not touched without need */
+    if (imp_unlikely(tracer->scene->n_media > 0)) {
+        imp__bend_begin(&bend);
+        s.bend = &bend;
+    }
     while (step(&s)) s.depth++;
 
     const imp_spec L = imp__walk_fold(walk);

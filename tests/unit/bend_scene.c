@@ -2,6 +2,7 @@
  *
  * Graded media in scenes: rays against closed forms, a constant field against an ordinary
  * dielectric, radiance over n^2, and what is refused. */
+#include "imp_fail_alloc.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "walk/bend.h"
@@ -357,6 +358,49 @@ static void threads(void)
     tap_ok(value[0] == value[1] && value[0] == value[2], "same bits at 1, 2, 3 threads");
 }
 
+/* Load, derive, destroy, with every allocation failing once and all after it. */
+static enum imp_status whole(struct fail_alloc *heap, double *gradient)
+{
+    struct imp_context_options o = IMP_CONTEXT_OPTIONS_INIT;
+    struct imp_load_options load = IMP_LOAD_OPTIONS_INIT;
+    const char *defines[] = {"width=6"};
+    imp_context *ctx = NULL;
+    imp_scene *s = NULL;
+    imp_problem *p = NULL;
+    struct imp_run run = IMP_RUN_INIT;
+    float seed[6 * 6 * 3];
+    for (int i = 0; i < 108; i++) seed[i] = 1;
+    o.threads = 1;
+    o.allocator = fail_alloc_hooks(heap);
+    load.defines = defines;
+    load.n_defines = 1;
+    run.spp = 2;
+    enum imp_status st = imp_context_create(&o, &ctx);
+    if (st == IMP_OK) st = imp_scene_load(ctx, IMP_SCENES "/bend/bump.xml", &load, &s);
+    if (st == IMP_OK) st = imp_problem_create(s, &p);
+    if (st == IMP_OK) st = imp_problem_activate(p, "lens*");
+    if (st == IMP_OK) st = imp_problem_reverse(p, seed, &run, gradient, NULL);
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+    imp_context_destroy(ctx);
+    return st;
+}
+
+static void memory(void)
+{
+    long n = 0, wrong = 0, leaks = 0;
+    for (;; n++) {
+        struct fail_alloc heap = {.fail_at = n + 1};
+        double gradient[6] = {0};
+        const enum imp_status st = whole(&heap, gradient);
+        leaks += heap.live != 0;
+        if (st == IMP_OK && heap.calls <= n) break;
+        wrong += st != IMP_E_NOMEM || gradient[0] != 0;
+    }
+    tap_note("%ld allocations, %ld wrong, %ld leaks", n, wrong, leaks);
+    tap_ok(n > 20 && wrong == 0 && leaks == 0, "every allocation may fail");
+}
+
 int main(void)
 {
     imp_context *ctx = test_context(2);
@@ -367,6 +411,7 @@ int main(void)
     embedded(ctx);
     hostile(ctx);
     threads();
+    memory();
     imp_context_destroy(ctx);
     return tap_done();
 }
