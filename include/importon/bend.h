@@ -40,13 +40,16 @@ struct imp_field_grid {
     size_t size;
     enum imp_field_interp interp;
     enum imp_field_param param;
-    int cells[3];        /**< x, y, z */
-    double lo[3], hi[3]; /**< the box the cells fill */
-    int single;          /**< trace with float samples; theta stays double */
+    int cells[3];          /**< x, y, z */
+    double lo[3], hi[3];   /**< the box the cells fill */
+    int single;            /**< trace with float samples; theta stays double */
+    double gladstone_dale; /**< K: samples are densities rho, index 1 + K rho (Gladstone
+                                and Dale); 0: samples are the index */
 };
 #define IMP_FIELD_GRID_INIT                                                              \
     {                                                                                    \
-        sizeof(struct imp_field_grid), IMP_FIELD_SPLINE, IMP_FIELD_ETA, {0}, {0}, {0}, 0 \
+        sizeof(struct imp_field_grid), IMP_FIELD_SPLINE, IMP_FIELD_ETA, {0}, {0}, {0},   \
+            0, 0                                                                         \
     }
 
 /** A grid with the same index everywhere. theta: [z][y][x] coefficients, cells + 3 along
@@ -176,8 +179,8 @@ IMP_API void imp_field_tangent(const imp_field *field, const double x[3],
                                const double *theta_dot, double *eta_dot,
                                double gradient_dot[3]);
 
-/** Samples of the index at the corners of cells, [z][y][x], cells + 1 along an axis. A
- * spline passes through them. */
+/** Samples of the index (or of density, see imp_field_grid) at the corners of cells,
+ * [z][y][x], cells + 1 along an axis. A spline passes through them. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_field_set_samples(imp_field *field,
                                                              const double *samples);
 /** Transpose of imp_field_set_samples, for param eta: samples_bar = (d theta/d samples)^T

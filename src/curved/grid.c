@@ -37,6 +37,9 @@ enum imp_status imp_field_grid_create(imp_context *ctx, const struct imp_field_g
         return imp__error(ctx, IMP_E_ARG, "index grid: no such interpolation");
     if (!(index > 0) || !isfinite(index))
         return imp__error(ctx, IMP_E_ARG, "index grid: index %g is not positive", index);
+    if (!(desc->gladstone_dale >= 0) || !isfinite(desc->gladstone_dale))
+        return imp__error(ctx, IMP_E_ARG, "index grid: Gladstone-Dale constant %g",
+                          desc->gladstone_dale);
     for (int k = 0; k < 3; k++) {
         if (desc->cells[k] < 1 || desc->cells[k] > CELLS_MAX)
             return imp__error(ctx, IMP_E_ARG, "index grid: %d cells along axis %d",
@@ -251,12 +254,13 @@ enum imp_status imp_field_set_samples(imp_field *f, const double *samples)
     if (!values || !theta)
         IMP_TRY(imp__error(f->ctx, IMP_E_NOMEM, "no memory for %zu samples", n));
     for (size_t i = 0; i < n; i++) {
-        if (!isfinite(samples[i]) || !(samples[i] > 0))
+        const double K = g->desc.gladstone_dale,
+                     eta = K > 0 ? 1 + K * samples[i] : samples[i];
+        if (!isfinite(eta) || !(eta > 0))
             IMP_TRY(imp__error(f->ctx, IMP_E_ARG,
                                "sample %zu of the index grid is %g: an index is positive",
                                i, samples[i]));
-        values[i] =
-            g->desc.param == IMP_FIELD_ETA2 ? samples[i] * samples[i] / 2 : samples[i];
+        values[i] = g->desc.param == IMP_FIELD_ETA2 ? eta * eta / 2 : eta;
     }
     if (g->desc.interp == IMP_FIELD_SPLINE)
         IMP_TRY(along_axes(f->ctx, line_from_samples, corners, g->nodes, values, theta));
@@ -280,10 +284,13 @@ enum imp_status imp_field_samples_vjp(const imp_field *f, const double *theta_ba
     const int *cells = g->desc.cells,
               corners[3] = {cells[0] + 1, cells[1] + 1, cells[2] + 1};
     if (g->desc.interp == IMP_FIELD_SPLINE)
-        return along_axes(f->ctx, line_from_samples_vjp, g->nodes, corners, theta_bar,
-                          samples_bar);
-    memcpy(samples_bar, theta_bar, f->n_theta * sizeof *theta_bar);
-    return IMP_OK;
+        st = along_axes(f->ctx, line_from_samples_vjp, g->nodes, corners, theta_bar,
+                        samples_bar);
+    else memcpy(samples_bar, theta_bar, f->n_theta * sizeof *theta_bar);
+    const size_t n = (size_t)corners[0] * corners[1] * corners[2];
+    if (st == IMP_OK && g->desc.gladstone_dale > 0)
+        for (size_t i = 0; i < n; i++) samples_bar[i] *= g->desc.gladstone_dale;
+    return st;
 }
 
 /* ---- Levels -------------------------------------------------------------------- */

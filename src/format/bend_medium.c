@@ -20,6 +20,10 @@ static enum imp_status grid_read(struct bend_loader *l, struct imp_node *node,
     IMP_TRY(imp__props_choice(l->ctx, node, "interpolation", interps, 2, 0, &interp));
     IMP_TRY(imp__props_choice(l->ctx, node, "parameter", params, 2, 0, &param));
     IMP_TRY(imp__props_bool(l->ctx, node, "single", false, &single));
+    IMP_TRY(bend_number(l, node, "gladstone_dale", 0, 0, 1e6, &g->gladstone_dale));
+    if (g->gladstone_dale > 0 && !imp__props_has(node, "filename"))
+        IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE,
+                                "has a 'gladstone_dale' and no file of densities"));
     IMP_TRY(imp__props_vector(l->ctx, node, "lo", minus, g->lo));
     IMP_TRY(imp__props_vector(l->ctx, node, "hi", one, g->hi));
     g->interp = (enum imp_field_interp)interp;
@@ -237,6 +241,9 @@ enum imp_status bend_volume(struct bend_loader *l, struct imp_node *node, imp_fi
             IMP_TRY(index_build(l, node, grid ? &g : NULL, &f));
         }
         struct imp_node *from = grid ? volume_child(node, "start") : NULL;
+        if (from && file)
+            IMP_TRY(imp__node_error(l->ctx, from, IMP_E_SCENE,
+                                    "is a start of a grid that a file gives"));
         if (from) {
             IMP_TRY(bend_volume(l, from, &start));
             IMP_TRY(placed(l, node, grid_sample(l, f, start)));

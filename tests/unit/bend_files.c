@@ -153,6 +153,52 @@ static void problems(void)
            "damaged problems: %d refused with a message, %d read", bad, good);
 }
 
+/* Densities of air, K = 2.26e-4 m^3/kg: index 1 + K rho; from a file, in a problem. */
+static void densities(void)
+{
+    const double K = 2.26e-4;
+    struct imp_field_grid g = IMP_FIELD_GRID_INIT;
+    imp_field *f;
+    double rho[6 * 6 * 6], eta, bar[9 * 9 * 9], back[6 * 6 * 6], left = 0, right = 0;
+    for (int k = 0; k < 3; k++) g.cells[k] = 5, g.lo[k] = -1, g.hi[k] = 1;
+    for (int i = 0; i < 216; i++) rho[i] = 1.2 * kit_u(560, i);
+    g.gladstone_dale = K;
+    KIT_CHECK(imp_field_grid_create(kit_ctx, &g, 1, &f));
+    KIT_CHECK(imp_field_set_samples(f, rho));
+    const double node[3] = {-1 + 2 * 0.4, -1 + 4 * 0.4, -1 + 0.4};
+    imp_field_eval(f, node, &eta, NULL, NULL);
+    tap_near(eta, 1 + K * rho[2 + 6 * (4 + 6 * 1)], 0, 1e-15, "index of a density");
+    /* Transpose: <theta_bar, d theta/d rho rho_dot> with rho_dot = rho: theta - theta(0).
+     */
+    for (size_t i = 0; i < f->n_theta; i++)
+        bar[i] = kit_pm(561, i), left += bar[i] * (f->theta[i] - 1);
+    KIT_CHECK(imp_field_samples_vjp(f, bar, back));
+    for (int i = 0; i < 216; i++) right += back[i] * rho[i];
+    tap_near(left, right, 0, 1e-13, "densities: transpose"); /* theta is near 1 */
+    rho[7] = -1e5;
+    tap_ok(imp_field_set_samples(f, rho) == IMP_E_ARG, "no index # %s",
+           imp_last_error(kit_ctx));
+    imp_field_destroy(f);
+    g.gladstone_dale = NAN;
+    tap_ok(imp_field_grid_create(kit_ctx, &g, 1, &f) == IMP_E_ARG, "K is NaN # %s",
+           imp_last_error(kit_ctx));
+    g.gladstone_dale = 0;
+    KIT_CHECK(imp_field_grid_create(kit_ctx, &g, 1.225, &f)); /* numbers of a file */
+    KIT_CHECK(imp_field_write(f, "rho.npy"));
+    imp_field_destroy(f);
+    static const char xml[] =
+        "<scene version='3.0.0'><medium type='graded'><volume type='grid'>"
+        "<string name='filename' value='rho.npy'/><float name='gladstone_dale' "
+        "value='2.26e-4'/></volume></medium><rays type='beam'><integer name='count' "
+        "value='3'/></rays></scene>";
+    imp_bend *b;
+    KIT_CHECK(imp_bend_load_string(kit_ctx, xml, sizeof xml - 1, "rho.xml", NULL, &b));
+    imp_field_eval(imp_bend_field(b), node, &eta, NULL, NULL);
+    tap_near(eta, 1 + K * 1.225, 0, 1e-14, "a file of densities in a problem");
+    imp_bend_destroy(b);
+    remove("rho.npy");
+}
+
 int main(void)
 {
     char folder[] = "/tmp/bend_files.XXXXXX";
@@ -171,6 +217,7 @@ int main(void)
     f = kit_field(12, &name);
     round_trip("a.txt", f, 1e-15);
     imp_field_destroy(f);
+    densities();
     problems();
     imp_context_destroy(kit_ctx);
     if (chdir("/") == 0) rmdir(folder);
