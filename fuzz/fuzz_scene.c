@@ -110,6 +110,28 @@ static void material(struct bytes *b, imp_scene *s, int depth)
     imp_scene_end(s);
 }
 
+/* A graded index and the boundary that goes with it. */
+static void interior(struct bytes *b, imp_scene *s)
+{
+    static const char *const fields[] = {"luneburg", "maxwell", "rod", "plume"};
+    const unsigned type = byte(b) % 4;
+    imp_scene_begin(s, "bsdf", byte(b) & 1 ? "null" : "dielectric", NULL, NULL);
+    imp_scene_end(s);
+    imp_scene_begin(s, "medium", "graded", NULL, "interior");
+    imp_scene_begin(s, "volume", fields[type], NULL, NULL);
+    if (type < 2) imp_scene_float(s, "radius", 1 + number(b));
+    if (type == 1 || type == 2) imp_scene_float(s, "n0", 1 + number(b));
+    if (type == 2) imp_scene_float(s, "g", number(b));
+    imp_scene_end(s);
+    if (type == 3) { /* a plume adds to a constant */
+        imp_scene_begin(s, "volume", "constant", NULL, NULL);
+        imp_scene_float(s, "n0", 1 + number(b));
+        imp_scene_end(s);
+    }
+    if (byte(b) & 1) imp_scene_float(s, "step", 0.3 * number(b));
+    imp_scene_end(s);
+}
+
 static void shape(struct bytes *b, imp_scene *s)
 {
     static const char *const types[] = {"rectangle", "disk",     "sphere",
@@ -126,8 +148,10 @@ static void shape(struct bytes *b, imp_scene *s)
     }
     place(b, s);
     if (byte(b) & 1) imp_scene_bool(s, "flip_normals", 1);
-    if (byte(b) & 3) material(b, s, 0);
-    if (byte(b) % 3 == 0) {
+    const unsigned filled = byte(b) % 6 == 5;
+    if (filled) interior(b, s);
+    else if (byte(b) & 3) material(b, s, 0);
+    if (!filled && byte(b) % 3 == 0) {
         const unsigned beam = byte(b) & 1;
         imp_scene_begin(s, "emitter", beam ? "beam" : "area", NULL, NULL);
         color(b, s, "radiance", 1);
