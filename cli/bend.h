@@ -3,8 +3,14 @@
 #define IMP_CLI_BEND_H
 
 #include "command.h"
+#include "output.h"
 #include <importon/bend.h>
 
+int bend_fit(imp_bend *bend);
+extern const struct arg_option bend_fit_options[];
+/* Counts of a trace. */
+void bend_print_stats(FILE *to, const struct imp_bend_stats *s);
+void bend_put_stats(struct json *j, const struct imp_bend_stats *s);
 /* Pictures of a problem, DIR/<prefix>slice-x.png, ..., rays, spots, images. */
 int bend_view(imp_bend *bend, const char *folder, const char *prefix);
 

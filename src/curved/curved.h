@@ -390,6 +390,13 @@ double imp__land_on(const struct imp__plan *p, const struct imp__surface *s,
                     const struct imp__state *from, double t, double g0, double g1,
                     struct imp__state *at);
 
+/* The first surface passed by the step from `from` to (x1, v1); NULL: none. `facet` is
+ * room for the one of a mesh. */
+const struct imp__surface *
+imp__land_first(const struct imp__plan *p, const struct imp__domain *d,
+                const struct imp__state *from, const imp_v3 *x1, const imp_v3 *v1,
+                double *tau, struct imp__state *at, struct imp__surface *facet);
+
 /* End of a segment of a ray, before the event's map. */
 struct imp__segment {
     struct imp__state at, from; /* there; at the start of its fractional step */

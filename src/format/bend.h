@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Files of bent rays (docs/curved-rays.md): between bend_load.c, which drives it, the
- * medium with its field (bend_medium.c) and the rays with what they meet (bend_rays.c).
- */
+ * Files of bent rays (docs/curved-rays.md): between bend_load.c, which drives it, and
+ * one file for each element. */
 #ifndef IMP_FORMAT_BEND_H
 #define IMP_FORMAT_BEND_H
 
@@ -54,6 +53,9 @@ enum imp_status bend_surface(struct bend_loader *l, struct imp_node *node,
                              const struct bend_frame *f, int group);
 enum imp_status bend_target(struct bend_loader *l, struct imp_node *node,
                             const struct bend_frame *f, int bundle);
+/* A failure of the library's, with the node's place before its message. */
+enum imp_status bend_placed(struct bend_loader *l, struct imp_node *node,
+                            enum imp_status st);
 /* A float property that must be there, or have a fallback that is not NaN. */
 enum imp_status bend_number(struct bend_loader *l, struct imp_node *node,
                             const char *name, double fallback, double lo, double hi,
