@@ -7,17 +7,22 @@
  *
  * The functional is F = sum_pc s_pc I_pc with a smooth positive pattern s of mean
  * 1/pixels. F is linear in emission: one central difference with a large step. Elsewhere
- * two steps and Richardson's combination (4 D(h/2) - D(h))/3, whose error is O(h^4). */
+ * two steps and Richardson's combination (4 D(h/2) - D(h))/3, whose error is O(h^4); at a
+ * bound, one-sided differences D of third order, (8 D(h/2) - D(h))/7. What this changes
+ * is an estimate of the error that is left: nothing smaller is held against the gradient,
+ * and where it is large (a kink within the step) nothing is decided. */
 #include "check.h"
 #include "walk/picture.h"
 #include <math.h>
 #include <string.h>
 
-#define Z_LIMIT     4
-#define STEP        0.3 /* of the room a number has */
-#define STEP_LINEAR 0.8
-#define BATCHES     16  /* independent differences behind an SE */
-#define RESOLVED    0.2 /* an SE larger than this part of the value decides nothing */
+#define Z_LIMIT        4
+#define STEP           0.3 /* of the room a number has */
+#define STEP_LINEAR    0.8
+#define BATCHES        16   /* independent differences behind an SE */
+#define FLOAT_ROUNDING 1e-7 /* of a picture's mean */
+#define KINK           7 /* D(h) - D(h/2) over what it changes in their combination, at most */
+#define RESOLVED       0.2 /* an SE larger than this part of the value decides nothing */
 
 struct fresh {
     struct imp__check *check;
@@ -134,13 +139,21 @@ static enum imp_status at(struct fresh *f, const struct motion *m, double step,
     return st;
 }
 
-/* Combine values at places with factors: sum factor F(place), batch by batch. */
+struct quotient {
+    struct imp_estimate mean;
+    double truncation; /* how far a formula of lower order is from it */
+    double rounding;   /* of the pictures' floats */
+};
+
+/* Combine values at places with factors: sum factor F(place), batch by batch. `other`:
+ * factors of lower order, or NULL. */
 static enum imp_status combine(struct fresh *f, const struct motion *m, int n,
                                const double *place, const double *factor,
-                               struct imp_estimate *out)
+                               const double *other, struct quotient *out)
 {
     enum imp_status st = IMP_OK;
-    double sum = 0, square = 0;
+    double sum = 0, square = 0, coarse = 0, largest = 0, factors = 0;
+    for (int i = 0; i < n; i++) factors += fabs(factor[i]);
     for (int b = 0; b < BATCHES; b++) {
         const uint64_t seed = seed_of(f);
         double difference = 0;
@@ -148,11 +161,15 @@ static enum imp_status combine(struct fresh *f, const struct motion *m, int n,
             double value;
             IMP_TRY(at(f, m, place[i], seed, &value));
             difference += factor[i] * value;
+            if (other) coarse += other[i] * value / BATCHES;
+            largest = fmax(largest, fabs(value));
         }
         sum += difference;
         square += difference * difference;
     }
-    *out = batches_mean(sum, square);
+    out->mean = batches_mean(sum, square);
+    out->truncation = other ? fabs(coarse - out->mean.value) : 0;
+    out->rounding = FLOAT_ROUNDING * largest * factors;
     st = imp__check_progress(f->check, n);
 out:
     return st;
@@ -170,7 +187,7 @@ static void room(const struct motion *m, double *below, double *above)
 }
 
 static enum imp_status difference(struct fresh *f, const struct motion *m, bool linear,
-                                  double *step, struct imp_estimate *out)
+                                  double *step, struct quotient *out)
 {
     double below, above, scale = 0;
     room(m, &below, &above);
@@ -183,36 +200,47 @@ static enum imp_status difference(struct fresh *f, const struct motion *m, bool 
         const double place[4] = {h, -h, h / 2, -h / 2};
         const double one[2] = {0.5 / h, -0.5 / h};
         const double two[4] = {-1 / (6 * h), 1 / (6 * h), 4 / (3 * h), -4 / (3 * h)};
-        return combine(f, m, linear ? 2 : 4, place, linear ? one : two, out);
+        const double half[4] = {0, 0, 1 / h, -1 / h};
+        return combine(f, m, linear ? 2 : 4, place, linear ? one : two,
+                       linear ? NULL : half, out);
     }
-    /* At a bound: (-3 F(0) + 4 F(h) - F(2h)) / 2h, to the side where there is room. */
+    /* At a bound, to the side where there is room: D(h) = (-11 F(0) + 18 F(h) - 9 F(2h) +
+     * 2 F(3h)) / 6h, and h/2. */
     const double side = above >= below ? 1 : -1;
     const double h = *step =
-        side * 0.5 * part * fmin(fmax(below, above), fmax(scale, 1e-3));
-    const double place[3] = {0, h, 2 * h};
-    const double factor[3] = {-1.5 / h, 2 / h, -0.5 / h};
-    return combine(f, m, 3, place, factor, out);
+        side * 0.15 * part * fmin(fmax(below, above), fmax(scale, 1e-3));
+    const double place[6] = {0, h / 2, h, 3 * h / 2, 2 * h, 3 * h};
+    const double half[6] = {-11 / (3 * h), 6 / h, -3 / h, 2 / (3 * h), 0, 0};
+    const double full[6] = {-11 / (6 * h), 0, 3 / h, 0, -1.5 / h, 1 / (3 * h)};
+    double factor[6];
+    for (int i = 0; i < 6; i++) factor[i] = (8 * half[i] - full[i]) / 7;
+    return combine(f, m, 6, place, factor, half, out);
 }
 
 static enum imp_status compare(struct fresh *f, const struct motion *m, int64_t element,
                                bool linear, struct imp_estimate mine)
 {
-    struct imp_estimate fd;
+    struct quotient q;
     struct imp_check_row row = {.limit = Z_LIMIT};
-    const enum imp_status st = difference(f, m, linear, &row.step, &fd);
+    const enum imp_status st = difference(f, m, linear, &row.step, &q);
     if (st != IMP_OK) return st;
+    const struct imp_estimate fd = q.mean;
     row.value = mine.value;
     row.reference = fd.value;
     row.se = sqrt(mine.se * mine.se + fd.se * fd.se);
     const double off = fabs(mine.value - fd.value);
     /* Without any noise (a furnace) the difference is rounding of the pictures' floats.
      */
-    const double rounding = 1e-6 * fmax(fabs(mine.value), fabs(fd.value));
+    const double rounding =
+        1e-6 * fmax(fabs(mine.value), fabs(fd.value)) + q.rounding + q.truncation;
     row.error = row.se > 0        ? fmax(off - rounding, 0) / row.se
                 : off <= rounding ? 0
                                   : INFINITY;
     const double size = fmax(fabs(mine.value), fabs(fd.value));
-    row.ok = !(row.error <= row.limit) ? 0 : row.se <= RESOLVED * size ? 1 : -1;
+    row.ok = !(row.error <= row.limit)                       ? 0
+             : row.se <= RESOLVED * size || size <= rounding ? 1
+                                                             : -1;
+    if (!row.ok && KINK * q.truncation > RESOLVED * size) row.ok = -1;
     return imp__check_row(f->check, "fresh", m->param->info.name, element, &row);
 }
 

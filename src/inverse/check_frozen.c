@@ -16,15 +16,16 @@
 #include <stdio.h>
 #include <string.h>
 
-#define MEMORY_MAX   ((size_t)512 << 20) /* of kept walks */
-#define TRIES        50                  /* walks traced for one that is kept */
-#define SINGLE_MAX   12 /* numbers of a parameter looked at one by one; more: */
-#define DIRECTIONS   6  /* random directions */
-#define N_STEPS      4
-#define FROZEN_LIMIT 1e-6
-#define EXACT_LIMIT  1e-12
-#define NOTHING      1e-200 /* below it products lose digits to underflow */
-#define TINY         1e-3 /* of the walk's L: logarithmic derivatives below it count as 0 */
+#define MEMORY_MAX    ((size_t)512 << 20) /* of kept walks */
+#define TRIES         50                  /* walks traced for one that is kept */
+#define SINGLE_MAX    12 /* numbers of a parameter looked at one by one; more: */
+#define DIRECTIONS    6  /* random directions */
+#define N_STEPS       4
+#define FROZEN_LIMIT  1e-6
+#define EXACT_LIMIT   1e-12
+#define NOTHING       1e-200 /* below it products lose digits to underflow */
+#define WALK_ROUNDING 5e-14  /* of L, of a walk evaluated twice */
+#define TINY          1e-3 /* of the walk's L: logarithmic derivatives below it count as 0 */
 
 static const double steps[N_STEPS] = {1e-3, 1e-4, 1e-5, 1e-6};
 static const double lane[3] = {1, 0.7, 1.3};
@@ -272,6 +273,39 @@ static double along(const struct kept *w, size_t base, const double *moved, size
     return sum;
 }
 
+/* The walks' verdict. A walk is judged by the step at which its difference quotient
+ * changed least from the step before, and only by what is beyond that change and its
+ * rounding: near a kink (total reflection by a metal with k = 0) no quotient settles.
+ * f, a [N_STEPS][n]: quotients of one direction and what they should be; worst so far in
+ * *row. */
+static void judge(const struct keep *k, const double *f, const double *a,
+                  struct imp_check_row *row)
+{
+    for (size_t i = 0; i < k->n; i++) {
+        const double L = fabs(k->walks[i].L);
+        double settled = INFINITY;
+        size_t best = i;
+        int step = 0;
+        for (int s = 1; s < N_STEPS; s++) {
+            const size_t here = (size_t)s * k->n + i, before = here - k->n;
+            const double change = fabs((f[here] - a[here]) - (f[before] - a[before]));
+            if (!(change < settled)) continue;
+            settled = change;
+            best = here;
+            step = s;
+        }
+        const double allowed = settled + WALK_ROUNDING * L / (2 * steps[step]);
+        const double off = fabs(a[best] - f[best]);
+        const double error = off <= allowed ? 0
+                             : isfinite(settled)
+                                 ? (off - allowed) / fmax(fabs(a[best]), TINY * L)
+                                 : INFINITY;
+        if (!(error > row->error) && row->step > 0) continue;
+        *row = (struct imp_check_row){
+            .step = steps[step], .value = a[best], .reference = f[best], .error = error};
+    }
+}
+
 /* Worst walk over the parameter's directions, for every step: rows. */
 static enum imp_status check_param(struct keep *k, size_t param)
 {
@@ -280,26 +314,32 @@ static enum imp_status check_param(struct keep *k, size_t param)
     const struct imp_param *p = &c->problem->scene->params[param];
     const size_t count = p->info.count, base = (size_t)c->tracer.active->base[param];
     struct direction d = {.param = p};
-    struct imp_check_row row[N_STEPS] = {{0}};
+    struct imp_check_row row[N_STEPS] = {{0}}, verdict = {0};
     double *buffer = imp__alloc(c->ctx, 2 * count, sizeof *buffer);
+    double *q = imp__alloc(c->ctx, imp_max(k->n, (size_t)1),
+                           2 * N_STEPS * sizeof *q); /* see judge */
+    double *want = q ? q + N_STEPS * k->n : NULL;
 
-    if (!buffer) return imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check");
+    if (!buffer || !q) IMP_TRY(imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check"));
     d.old = buffer;
     d.moved = buffer + count;
     for (size_t e = 0; e < count; e++) d.old[e] = imp__param_get(p, e);
     const size_t n_directions = count <= SINGLE_MAX ? count : DIRECTIONS;
-    for (size_t q = 0; q < n_directions; q++) {
-        d.only = count <= SINGLE_MAX ? q : SIZE_MAX;
-        d.seed = q;
+    for (size_t r = 0; r < n_directions; r++) {
+        d.only = count <= SINGLE_MAX ? r : SIZE_MAX;
+        d.seed = r;
         for (int s = 0; s < N_STEPS; s++) {
             IMP_TRY(difference(k, &d, steps[s]));
             const double size =
-                2 * steps[s] * imp__check_scale(p, count <= SINGLE_MAX ? q : 0);
+                2 * steps[s] * imp__check_scale(p, count <= SINGLE_MAX ? r : 0);
             for (size_t i = 0; i < k->n; i++) {
                 const double a = along(&k->walks[i], base, d.moved, count);
                 const double f = k->value[0][i];
                 const double size_L = TINY * 2 * steps[s] * fabs(k->walks[i].L);
                 const double error = a == f ? 0 : fabs(a - f) / fmax(fabs(a), size_L);
+                /* In units of the scale: as large as the logarithmic derivative. */
+                q[(size_t)s * k->n + i] = f / (2 * steps[s]);
+                want[(size_t)s * k->n + i] = a / (2 * steps[s]);
                 if (!(error > row[s].error) && row[s].step > 0) continue;
                 row[s] = (struct imp_check_row){.step = steps[s],
                                                 .value = a / size,
@@ -307,10 +347,17 @@ static enum imp_status check_param(struct keep *k, size_t param)
                                                 .error = error};
             }
         }
+        judge(k, q, want, &verdict);
     }
     int best = 0;
     for (int s = 1; s < N_STEPS; s++)
         if (row[s].error < row[best].error) best = s;
+    if (row[best].error > FROZEN_LIMIT && k->n > 0) {
+        const double scale = imp__check_scale(p, 0);
+        row[best].value = verdict.value / scale;
+        row[best].reference = verdict.reference / scale;
+        row[best].error = verdict.error;
+    }
     for (int s = 0; s < N_STEPS; s++) {
         row[s].step = steps[s];
         row[s].limit = s == best ? FROZEN_LIMIT : 0; /* the others are for information */
@@ -319,6 +366,7 @@ static enum imp_status check_param(struct keep *k, size_t param)
     }
 out:
     imp__release(c->ctx, buffer);
+    imp__release(c->ctx, q);
     return st;
 }
 
