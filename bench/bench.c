@@ -98,7 +98,7 @@ struct rays {
 static void rays_record(imp_context *ctx, imp_scene *scene, struct rays *out)
 {
     const struct imp_sensor *sensor = scene->sensors[0];
-    const struct imp_tracer tracer = {scene, &scene->integrator, sensor, NULL, 1};
+    const struct imp_tracer tracer = {scene, &scene->integrator, sensor, NULL, 1, NULL};
     struct imp_arena arena;
     size_t capacity = 0;
     imp__arena_init(&arena, ctx);

@@ -53,6 +53,15 @@ const struct arg_option options_run[] = {
      &cli.time_s, 1e-3, 1e9, NULL},
     {0}};
 
+const struct arg_option options_guide[] = {
+    {ARG_FLAG, 0, "guide", NULL,
+     "solve by finite elements first, and sample lights by what they send to a place",
+     &cli.guide, 0, 0, NULL},
+    {ARG_NUMBER, 0, "guide-share", "S",
+     "of continuations drawn towards indirect light, below 1 (default 0)",
+     &cli.guide_share, 0, 0.99, NULL},
+    {0}};
+
 /* ---- Talking ------------------------------------------------------------------- */
 
 /* Messages quote files and arguments, which may hold what moves a terminal's cursor. */
@@ -253,6 +262,22 @@ static int dump(void)
     return EXIT_STOP;
 }
 
+/* A coarse solution is enough: lights need their shares to some per cent. */
+static int guide_make(void)
+{
+    struct imp_elements_options o = IMP_ELEMENTS_OPTIONS_INIT;
+    struct imp_elements_guide_options g = IMP_ELEMENTS_GUIDE_OPTIONS_INIT;
+    o.sensor = cli.sensor;
+    o.seed = cli.seed;
+    o.stop = 0.05;
+    o.progress = progress_report;
+    g.share = cli.guide_share;
+    enum imp_status st = imp_elements_create(cli.scene, &o, &cli.elements);
+    if (st == IMP_OK) st = imp_elements_solve(cli.elements);
+    if (!cli_failed(st)) st = imp_elements_guide(cli.elements, &g, &cli.guiding);
+    return cli_failed(st) ? cli_fail(st, cli.scene_path) : 0;
+}
+
 int cli_load(const char *path)
 {
     struct imp_load_options options = IMP_LOAD_OPTIONS_INIT;
@@ -288,11 +313,14 @@ int cli_load(const char *path)
         rc = *set == '@' ? apply_set_file(set + 1) : apply_set(set);
     }
     if (!rc && cli.dump) rc = dump();
+    if (!rc && (cli.guide || cli.guide_share > 0)) rc = guide_make();
     return rc;
 }
 
 void cli_close(void)
 {
+    imp_guide_destroy(cli.guiding);
+    imp_elements_destroy(cli.elements);
     imp_scene_destroy(cli.scene);
     imp_context_destroy(cli.context);
     args_list_free(&cli.defines);
@@ -307,6 +335,7 @@ struct imp_run cli_run(void)
     run.seed = cli.seed;
     run.time_limit_s = cli.time_s;
     run.progress = progress_report;
+    run.guide = cli.guiding;
     return run;
 }
 int cli_spp(const struct imp_run *run)

@@ -8,7 +8,7 @@
 
 #include "args.h"
 #include "json.h"
-#include <importon/importon.h>
+#include <importon/elements.h>
 #include <stdio.h>
 
 /* Exit codes; the manual page is the contract. */
@@ -31,7 +31,8 @@ extern const struct command command_render, command_gradient, command_jacobian,
     command_bend, command_elements;
 
 /* Option tables, to be named in args_spec.group. */
-extern const struct arg_option options_general[], options_scene[], options_run[];
+extern const struct arg_option options_general[], options_scene[], options_run[],
+    options_guide[];
 
 /* The running command. A process runs one, so there is one. */
 struct cli {
@@ -49,10 +50,15 @@ struct cli {
     int sensor, spp;
     uint64_t seed;
     double time_s;
+    /* options_guide */
+    int guide;
+    double guide_share;
     /* what cli_load opened */
     const char *scene_path;
     imp_context *context;
     imp_scene *scene;
+    imp_elements *elements; /* behind the guide, NULL: none */
+    imp_guide *guiding;
 };
 extern struct cli cli;
 

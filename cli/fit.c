@@ -368,12 +368,13 @@ static int run_fit(int n, char **operand)
     return rc ? rc : cli_done();
 }
 
-const struct command command_fit = {{"fit",
-                                     "SCENE --target FILE",
-                                     "recover parameters from target pictures",
-                                     {options, options_targets, options_params,
-                                      options_run, options_scene, options_general},
-                                     1,
-                                     1},
-                                    run_fit,
-                                    0};
+const struct command command_fit = {
+    {"fit",
+     "SCENE --target FILE",
+     "recover parameters from target pictures",
+     {options, options_targets, options_params, options_run, options_guide, options_scene,
+      options_general},
+     1,
+     1},
+    run_fit,
+    0};

@@ -289,7 +289,7 @@ const struct command command_gradient = {
     {"gradient",
      "SCENE",
      "derivatives of a loss (or of the picture's mean), with errors",
-     {options, options_targets, options_params, options_run, options_scene,
+     {options, options_targets, options_params, options_run, options_guide, options_scene,
       options_general},
      1,
      1},

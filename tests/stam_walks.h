@@ -52,7 +52,7 @@ static inline struct stam stam_walks(imp_context *ctx, imp_scene *scene, uint64_
     s.absorb = scene->bsdfs[0]->absorb;
     s.width = sensor->film.crop_w;
     s.height = sensor->film.crop_h;
-    s.tracer = (struct imp_tracer){scene, &scene->integrator, sensor, NULL, seed};
+    s.tracer = (struct imp_tracer){scene, &scene->integrator, sensor, NULL, seed, NULL};
     return s;
 }
 

@@ -229,6 +229,26 @@ imp_elements_fit(imp_elements *elements, imp_problem *problem,
                  const struct imp_elements_fit_options *options,
                  const struct imp_elements_fit_result **result);
 
+struct imp_elements_guide_options {
+    size_t size;
+    int no_lights; /**< light samples as without a guide */
+    double share;  /**< of continuations drawn towards indirect light, 0 to 1 exclusive */
+    int roulette;  /**< walks end by what is expected of them, not by their throughput */
+};
+#define IMP_ELEMENTS_GUIDE_OPTIONS_INIT                                                  \
+    {                                                                                    \
+        sizeof(struct imp_elements_guide_options), 0, 0, 0                               \
+    }
+/** The solution as a guide for walks: set imp_run.guide. Light samples follow what every
+ * light sends to a place; drawing directions by it, or roulette, pays in some scenes only
+ * (docs/elements.md) and is off unless asked for. The elements must outlive it; a guide
+ * of an old solution stays correct, and helps less. Destroy it with imp_guide_destroy.
+ * options may be NULL.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_elements_guide(const imp_elements *elements,
+                   const struct imp_elements_guide_options *options, imp_guide **out);
+
 /** Write elements and links to a file; open it again with the same scene and options. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_elements_save(const imp_elements *elements,
                                                          const char *path);

@@ -325,6 +325,11 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_film_read(imp_context *context,
 
 /* ---- Rendering ----------------------------------------------------------------- */
 
+/** What walks are told about the light, to draw from (imp_elements_guide of elements.h).
+ * It changes the noise, never the mean. */
+typedef struct imp_guide imp_guide;
+IMP_API void imp_guide_destroy(imp_guide *guide);
+
 /** How Monte Carlo is run. The same (seed, spp) give the same bits on any thread count.
  */
 struct imp_run {
@@ -338,10 +343,11 @@ struct imp_run {
     double drop_budget; /**< fraction of walks that may be dropped; 0: 1e-4 */
     imp_progress_fn progress;
     void *progress_payload;
+    const imp_guide *guide; /**< NULL: none; paths (integrator path) alone follow it */
 };
 #define IMP_RUN_INIT                                                                     \
     {                                                                                    \
-        sizeof(struct imp_run), 0, 0, 0, 0, 0, 0, 0                                      \
+        sizeof(struct imp_run), 0, 0, 0, 0, 0, 0, 0, 0                                   \
     }
 
 /** Render the scene's integrator through a sensor.

@@ -198,3 +198,21 @@ uint32_t imp__el_find(const imp_elements *e, uint32_t root, double u, double v,
     for (int k = 0; k < corners && uv; k++) uv[k][0] = p[k][0], uv[k][1] = p[k][1];
     return i;
 }
+
+uint32_t imp__el_find_level(const imp_elements *e, uint32_t root, double u, double v,
+                            int level)
+{
+    uint32_t i = e->roots[root].element;
+    if (e->roots[root].corners == 4) {
+        for (; level > 0 && e->elements[i].child; level--) {
+            const int q = (u >= 0.5) + 2 * (v >= 0.5);
+            u = 2 * u - (u >= 0.5);
+            v = 2 * v - (v >= 0.5);
+            i = e->elements[i].child + (uint32_t)q;
+        }
+        return i;
+    }
+    i = imp__el_find(e, root, u, v, NULL);
+    while (e->elements[i].level > level) i = e->elements[i].parent;
+    return i;
+}

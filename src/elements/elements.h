@@ -236,6 +236,9 @@ enum imp_status imp__el_split(imp_elements *e, uint32_t element);
 /* The leaf at (u, v) of a root, and its corners there (uv [corners][2], may be NULL). */
 uint32_t imp__el_find(const imp_elements *e, uint32_t root, double u, double v,
                       double uv[4][2]);
+/* The element at (u, v) that is a leaf or at the level. */
+uint32_t imp__el_find_level(const imp_elements *e, uint32_t root, double u, double v,
+                            int level);
 /* Quarter q of an element: its polygon. */
 void imp__el_quarter(const struct imp__element *x, int q, imp_v3 v[4]);
 /* The point of polygon v [corners] at (s, t) of the unit square. */
@@ -279,6 +282,8 @@ enum imp_status imp__el_bin(imp_elements *e);     /* a from the hits */
 double imp__el_measure(const imp_elements *e, double *direct);
 /* The same from the emitters: emission x importance. */
 double imp__el_measure_adjoint(const imp_elements *e);
+/* Coordinates of a point of a root, in [0, 1). */
+void imp__el_locate(const struct imp__el_root *r, imp_v3 p, double *u, double *v);
 /* First surface along a ray; false: none, or a black side. */
 bool imp__el_trace(const imp_elements *e, const struct imp_sensor_ray *ray,
                    struct imp__el_hit *hit);

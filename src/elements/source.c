@@ -9,7 +9,7 @@
 
 /* (u, v) of a point of a root: Newton's method on the bilinear map, exact after one step
  * for triangles and parallelograms. */
-static void locate(const struct imp__el_root *r, imp_v3 p, double *u, double *v)
+void imp__el_locate(const struct imp__el_root *r, imp_v3 p, double *u, double *v)
 {
     const imp_v3 a = r->v[0], eu = r->v[1] - a;
     const imp_v3 ev = r->v[r->corners == 3 ? 2 : 3] - a;
@@ -55,7 +55,7 @@ bool imp__el_trace(const imp_elements *e, const struct imp_sensor_ray *ray,
     const struct imp_shape *s = e->scene->shapes[at.shape];
     s->ops->surface(s, &at, &ray->o, &ray->d, &surface);
     hit->root = (uint32_t)root;
-    locate(&e->roots[root], surface.p, &hit->u, &hit->v);
+    imp__el_locate(&e->roots[root], surface.p, &hit->u, &hit->v);
     return true;
 }
 

@@ -81,7 +81,9 @@ enum imp_status imp__problem_tracer(const struct imp_problem *p,
         st = attached_allowed(p->scene);
         if (st != IMP_OK) return st;
     }
-    *out = (struct imp_tracer){p->scene, integrator, sensor, &p->active, run->seed};
+    *out = (struct imp_tracer){p->scene,  integrator,
+                               sensor,    &p->active,
+                               run->seed, imp__guide_of(p->scene, integrator, run)};
     return p->active.medium ? imp__bend_survey(out) : IMP_OK;
 }
 

@@ -201,7 +201,9 @@ enum imp_status imp_walk_describe(const imp_scene *scene, const struct imp_run *
                               : IMP_E_SCENE,
                           "the scene's integrator makes no walks; "
                           "use path, direct or stam");
-    const struct imp_tracer tracer = {scene, integrator, sensor, NULL, run->seed};
+    const struct imp_tracer tracer = {scene,     integrator,
+                                      sensor,    NULL,
+                                      run->seed, imp__guide_of(scene, integrator, run)};
     struct imp_arena arena;
     imp__arena_init(&arena, scene->ctx);
     struct imp_walk walk;

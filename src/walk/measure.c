@@ -130,6 +130,7 @@ enum imp_status imp__measure_create(const struct imp_scene *scene,
     *out = (struct imp_measure){.scene = scene,
                                 .sensor = sensor,
                                 .seed = run->seed,
+                                .guide = run->guide,
                                 .spp = run->spp > 0 ? run->spp : sensor->spp,
                                 .n = names.n,
                                 .names = names.text};
@@ -275,7 +276,14 @@ static bool radiance(const struct imp_measure *m, const struct imp_integrator *i
                      struct imp_arena *arena, int x, int y, int64_t sample, imp_spec *L,
                      double *alpha, struct imp_walk *walk)
 {
-    const struct imp_tracer tracer = {m->scene, integrator, m->sensor, NULL, m->seed};
+    const struct imp_tracer tracer = {
+        m->scene,
+        integrator,
+        m->sensor,
+        NULL,
+        m->seed,
+        m->scene->n_media == 0 && integrator->kind == IMP_INTEGRATOR_PATH ? m->guide
+                                                                          : NULL};
     if (is_radiance(integrator)) {
         const struct imp_arena_mark mark = imp__arena_mark(arena);
         imp__walk_trace(&tracer, arena, x, y, sample, walk);
@@ -287,7 +295,7 @@ static bool radiance(const struct imp_measure *m, const struct imp_integrator *i
     /* depth: the walk's film position and lens, its first hit only */
     static const struct imp_integrator none = {
         .kind = IMP_INTEGRATOR_PATH, .max_depth = 0, .rr_depth = 5};
-    const struct imp_tracer look = {m->scene, &none, m->sensor, NULL, m->seed};
+    const struct imp_tracer look = {m->scene, &none, m->sensor, NULL, m->seed, NULL};
     const struct imp_arena_mark mark = imp__arena_mark(arena);
     imp__walk_trace(&look, arena, x, y, sample, walk);
     *L = imp__spec(walk->first && walk->first->shape ? walk->first->t : 0);

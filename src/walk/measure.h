@@ -13,6 +13,7 @@ struct imp_measure {
     const struct imp_scene *scene;
     const struct imp_sensor *sensor;
     uint64_t seed;
+    const struct imp_guide *guide;
     int spp;
     int n;       /* channels */
     char *names; /* "R,G,B,..." for imp__film_create */

@@ -26,6 +26,12 @@ struct step {
     int zeros[3];  /* per lane: factors that are zero but have a derivative */
     int depth;
     struct imp_bending *bend; /* NULL: no medium in the scene */
+    /* What the guide knows where the walk is, and where the ray in flight left. */
+    bool known, left_known;
+    struct imp_guide_place place, left;
+    double reference; /* radiance that the guide expects of this walk; 0: none */
+    imp_spec before;  /* beta on arrival */
+    imp_v3 arrived;   /* direction of arrival */
 };
 
 static double light_pmf(const struct imp_scene *s, int light)
@@ -104,13 +110,57 @@ static void emission_meet(struct step *s, struct imp_vertex *v, int emitter,
     }
     v->emitter = emitter;
     if (s->pdf > 0 && wants_lights(s->tracer->integrator)) {
-        const double pe =
-            light_pmf(s->scene, emitter) * e->ops->pdf(e, &s->from, &s->d, hit, at);
+        const struct imp_guide *g = s->tracer->guide;
+        const double pmf = imp_unlikely(s->left_known)
+                               ? g->light_pmf(g, &s->left, emitter)
+                               : light_pmf(s->scene, emitter);
+        const double pe = pmf * e->ops->pdf(e, &s->from, &s->d, hit, at);
         v->e_weight *= power_heuristic(s->pdf, pe);
     } else if (s->depth > 0 && s->tracer->integrator->bsdf_samples == 0 && s->pdf > 0) {
         v->e_weight = 0;
     }
     v->e += emitter_radiance(e, x, v->at.p) * v->e_weight;
+}
+
+/* Does the guide draw a part of the continuations here? Its directions are on the front,
+ * and a delta lobe has no density to mix with. */
+static bool mixes(const struct step *s, const struct imp_bsdf *b)
+{
+    return s->known && s->place.share > 0 &&
+           (b->flags & (IMP_BSDF_SMOOTH | IMP_BSDF_DELTA | IMP_BSDF_TRANSMIT |
+                        IMP_BSDF_NULL)) == IMP_BSDF_SMOOTH;
+}
+static double mixture_pdf(const struct step *s, double bsdf, imp_v3 w)
+{
+    const struct imp_guide *g = s->tracer->guide;
+    const double share = s->place.share;
+    return (1 - share) * bsdf + share * g->pdf(g, &s->place, w);
+}
+
+/* As ops->sample, with the density of the mixture. */
+static bool mixture_sample(struct step *s, struct imp_vertex *v,
+                           const struct imp_frame *frame, const double u[3],
+                           struct imp_bsdf_sample *out)
+{
+    const struct imp_bsdf *b = v->bsdf;
+    const struct imp_guide *g = s->tracer->guide;
+    const double share = s->place.share;
+    imp_v3 w;
+    if (u[0] < share) {
+        w = g->draw(g, &s->place, &u[1]);
+        v->dirs.wi = imp__to_local(frame, w);
+    } else {
+        const double rest[3] = {fmin((u[0] - share) / (1 - share), 0x1.fffffffffffffp-1),
+                                u[1], u[2]};
+        if (!b->ops->sample(b, v->in, rest, &v->dirs, out)) return false;
+        w = imp__to_world(frame, v->dirs.wi);
+    }
+    const double bsdf = b->ops->pdf(b, v->in, &v->dirs);
+    if (!(bsdf > 0)) return false; /* structurally zero */
+    b->ops->eval(b, v->in, &v->dirs, &out->f);
+    out->pdf = mixture_pdf(s, bsdf, w);
+    out->eta = 1;
+    return true;
 }
 
 /* The shadow ray of a light sample; light -1: there is nothing to see. */
@@ -131,13 +181,16 @@ static void light_sample(struct step *s, struct imp_vertex *v,
     const int n = scene->n_emitters;
     if (n == 0) return;
     const double choice = imp__u01(key, imp__dim(s->depth, IMP_DIM_LIGHT));
+    const struct imp_guide *g = s->tracer->guide;
     int light = 0, above = n - 1; /* the first whose cumulative weight exceeds choice */
+    if (imp_unlikely(s->known)) light = above = g->light(g, &s->place, choice);
     while (light < above) {
         const int middle = (light + above) / 2;
         if (choice < scene->light_cdf[middle]) above = middle;
         else light = middle + 1;
     }
-    const double pmf = light_pmf(scene, light);
+    const double pmf = imp_unlikely(s->known) ? g->light_pmf(g, &s->place, light)
+                                              : light_pmf(scene, light);
     if (!(pmf > 0)) return;
 
     const struct imp_emitter *e = scene->emitters[light];
@@ -147,8 +200,10 @@ static void light_sample(struct step *s, struct imp_vertex *v,
     if (!e->ops->sample(e, &at->p, u, &ls) || !(ls.pdf > 0)) return;
 
     const struct imp_dirs dirs = {v->dirs.wo, imp__to_local(frame, ls.wi), IMP_SMOOTH};
-    const double pdf_bsdf = v->bsdf->ops->pdf(v->bsdf, v->in, &dirs);
+    double pdf_bsdf = v->bsdf->ops->pdf(v->bsdf, v->in, &dirs);
     if (!(pdf_bsdf > 0)) return; /* structurally zero: nothing to see, no derivative */
+    if (imp_unlikely(s->known) && mixes(s, v->bsdf))
+        pdf_bsdf = mixture_pdf(s, pdf_bsdf, ls.wi);
     const struct imp_emission x = {{ls.uv[0], ls.uv[1]}, ls.dist, ls.cos_light, -ls.wi};
     const imp_spec le = emitter_radiance(e, &x, ls.p);
     imp_spec f;
@@ -198,6 +253,17 @@ static bool throughput_add(struct step *s, const struct imp_bsdf *b, imp_spec fa
     return !imp__is_zero(s->beta);
 }
 
+/* By what is expected to come (adjoint-driven roulette, Vorba and Krivanek 2016): what
+ * the rest of this walk should add, over the walk's own expected radiance. */
+static double guided_survival(const struct step *s, double q)
+{
+    const struct imp_guide *g = s->tracer->guide;
+    if (!s->known) return s->depth + 1 < s->tracer->integrator->rr_depth ? 1 : q;
+    if (s->depth == 0) return 1;
+    const double rest = imp__max3(s->before) * g->expected(g, &s->place, -s->arrived);
+    return imp_clamp(rest / s->reference, 0.2, 1.0);
+}
+
 /* Survival probability. Zero factors that still have a derivative are left out of beta,
  * so roulette sees the walk as if they were not there (gradients.md 9.1, 9.2). */
 static bool roulette(struct step *s, struct imp_vertex *v)
@@ -207,8 +273,9 @@ static bool roulette(struct step *s, struct imp_vertex *v)
         v->survive = 1 - v->bsdf->absorb;
         return true;
     }
-    if (s->depth + 1 < integrator->rr_depth) return true;
-    const double q = fmin(imp__max3(s->beta) * s->eta * s->eta, 0.95);
+    if (s->depth + 1 < integrator->rr_depth && !(s->reference > 0)) return true;
+    double q = fmin(imp__max3(s->beta) * s->eta * s->eta, 0.95);
+    if (imp_unlikely(s->reference > 0)) q = guided_survival(s, q);
     v->survive = q;
     return imp__u01(s->walk->key, imp__dim(s->depth, IMP_DIM_SURVIVE)) < q;
 }
@@ -224,10 +291,13 @@ static bool scatter(struct step *s, struct imp_vertex *v, const struct imp_surfa
                          imp__u01(key, imp__dim(s->depth, IMP_DIM_DIR_V))};
     struct imp_bsdf_sample sample;
     v->dirs.lobe = IMP_SMOOTH;
-    if (!b->ops->sample(b, v->in, u, &v->dirs, &sample) || !(sample.pdf > 0))
-        return false;
+    const bool drawn = imp_unlikely(s->known) && mixes(s, b)
+                           ? mixture_sample(s, v, frame, u, &sample)
+                           : b->ops->sample(b, v->in, u, &v->dirs, &sample);
+    if (!drawn || !(sample.pdf > 0)) return false;
     v->pdf = sample.pdf;
 
+    s->before = s->beta;
     if (!throughput_add(s, b, sample.f * (1 / sample.pdf))) return false;
     s->eta *= sample.eta;
     if (!roulette(s, v)) return false;
@@ -235,6 +305,10 @@ static bool scatter(struct step *s, struct imp_vertex *v, const struct imp_surfa
     v->inv_ps = 1 / (sample.pdf * v->survive);
     v->w = sample.f * v->inv_ps;
 
+    if (imp_unlikely(s->tracer->guide != NULL)) {
+        s->left_known = s->known;
+        s->left = s->place;
+    }
     s->d = imp__to_world(frame, v->dirs.wi);
     s->o = imp__offset(at->p, at->ng, s->d);
     s->from = at->p;
@@ -294,6 +368,16 @@ static bool first_hit(struct step *s, struct imp_hit *hit)
     return false;
 }
 
+static void guide_find(struct step *s, const struct imp_hit *hit,
+                       const struct imp_surface *at)
+{
+    const struct imp_guide *g = s->tracer->guide;
+    s->known = g->find(g, hit, at, s->d, &s->place);
+    s->arrived = s->d;
+    if (s->depth == 0 && s->known && g->expected)
+        s->reference = g->expected(g, &s->place, -s->d);
+}
+
 /* From the ray in flight to the next one; false: the walk ends. */
 static bool step(struct step *s)
 {
@@ -337,6 +421,7 @@ static bool step(struct step *s)
         frame = (struct imp_frame){at.s, at.t, at.n}; /* it may have moved a little */
     }
 
+    if (imp_unlikely(s->tracer->guide != NULL)) guide_find(s, &hit, &at);
     struct shadow shadow = {.light = -1};
     const bool stam = integrator->kind == IMP_INTEGRATOR_STAM;
     const bool ended = stam && counts && absorb(s, v);

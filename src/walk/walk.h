@@ -21,7 +21,7 @@
 #define IMP_WALK_H
 
 #include "math/rng.h"
-#include "scene/scene.h"
+#include "scene/guide.h"
 
 struct imp_vertex {
     struct imp_vertex *prev, *next;
@@ -104,7 +104,17 @@ struct imp_tracer {
         *active; /* NULL: value only. Else walks go on through factors
                     that are zero but have a derivative (gradients.md 9.2) */
     uint64_t seed;
+    const struct imp_guide *guide; /* of PATH; NULL: none */
 };
+
+/* The guide that walks of this integrator follow: its densities are made for paths, in
+ * scenes that finite elements know. */
+static inline const struct imp_guide *imp__guide_of(const struct imp_scene *scene,
+                                                    const struct imp_integrator *i,
+                                                    const struct imp_run *run)
+{
+    return i->kind == IMP_INTEGRATOR_PATH && scene->n_media == 0 ? run->guide : NULL;
+}
 
 /* Record walk (x, y, sample) of the picture (x, y from the crop's corner) in the arena
  * and fold it. Running out of memory drops the walk. */

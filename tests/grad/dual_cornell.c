@@ -84,8 +84,8 @@ int main(void)
     test_must(ctx, imp_scene_find_param(scene, "red.reflectance.value", &red));
     chosen[red] = 1;
     test_must(ctx, imp__active_create(scene, chosen, &active));
-    const struct imp_tracer tracer = {scene, &scene->integrator, scene->sensors[0],
-                                      &active, 11};
+    const struct imp_tracer tracer = {
+        scene, &scene->integrator, scene->sensors[0], &active, 11, NULL};
     struct imp_arena arena;
     imp__arena_init(&arena, ctx);
     double worst_value = 0, worst_slope = 0, total = 0, cross = 0, largest = 0;

@@ -1,0 +1,133 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What a finite-element solution is worth as a guide for walks: variance of the picture
+ * times processor time, with and without, on scene d and others given by name.
+ *
+ *     guide [SCENE.xml ...] > table.json
+ *
+ * The times of solving and of making the guide stand apart: they are paid once. The
+ * standard errors come from the pictures themselves, so variances of heavy-tailed
+ * estimates are known to some per cent only; means are compared to catch what is wrong.
+ */
+#include <importon/elements.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <time.h>
+
+static imp_context *ctx;
+
+static void must(enum imp_status st)
+{
+    if (st == IMP_OK) return;
+    fprintf(stderr, "guide: %s: %s\n", imp_status_text(st), imp_last_error(ctx));
+    exit(3);
+}
+
+static double processor(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+struct result {
+    double mean, se, variance,
+        seconds; /* variance: of one sample, mean over the pixels */
+};
+
+static struct result measured(const imp_scene *s, const imp_guide *guide, int spp)
+{
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_film_info info = {.size = sizeof info};
+    struct result r = {.seconds = INFINITY};
+    imp_film *f;
+    run.spp = spp;
+    run.guide = guide;
+    for (int again = 0; again < 3; again++) {
+        const double start = processor();
+        must(imp_render(s, &run, &f));
+        r.seconds = fmin(r.seconds, processor() - start);
+        if (again < 2) imp_film_destroy(f);
+    }
+    imp_film_get_info(f, &info);
+    const size_t n = (size_t)info.width * (size_t)info.height;
+    const float *mean = imp_film_mean(f), *se = imp_film_se(f);
+    for (size_t k = 0; k < n; k++) {
+        r.mean += mean[k] / (double)n;
+        r.se += (double)se[k] * se[k];
+    }
+    r.variance = r.se * spp / (double)n;
+    r.se = sqrt(r.se) / (double)n;
+    imp_film_destroy(f);
+    return r;
+}
+
+static void scene(const char *path, int spp)
+{
+    static const struct {
+        const char *name;
+        int no_lights, roulette;
+        double share;
+    } ways[] = {{"lights", 0, 0, 0},
+                {"directions", 1, 0, 0.25},
+                {"roulette", 1, 1, 0},
+                {"lights+roulette", 0, 1, 0},
+                {"lights+directions", 0, 0, 0.25}};
+    struct imp_load_options lo = IMP_LOAD_OPTIONS_INIT;
+    struct imp_elements_options eo = IMP_ELEMENTS_OPTIONS_INIT;
+    struct imp_elements_info info = {.size = sizeof info};
+    const char *res[] = {"res=64"};
+    imp_scene *s;
+    imp_elements *e;
+    lo.mode = IMP_MONO;
+    lo.defines = res;
+    lo.n_defines = 1;
+    must(imp_scene_load(ctx, path, &lo, &s));
+    double start = processor();
+    eo.stop = 0.05;
+    must(imp_elements_create(s, &eo, &e));
+    must(imp_elements_solve(e));
+    must(imp_elements_get_info(e, &info));
+    printf("{\"scene\":\"%s\",\"spp\":%d,\"links\":%zu,\"solve_seconds\":%.2f", path, spp,
+           info.links, processor() - start);
+    const struct result base = measured(s, NULL, spp);
+    printf(",\n \"none\":{\"mean\":%.6g,\"se\":%.2g,\"variance\":%.4g,\"seconds\":%.3f}",
+           base.mean, base.se, base.variance, base.seconds);
+    for (size_t k = 0; k < sizeof ways / sizeof *ways; k++) {
+        struct imp_elements_guide_options o = IMP_ELEMENTS_GUIDE_OPTIONS_INIT;
+        imp_guide *g;
+        o.no_lights = ways[k].no_lights;
+        o.roulette = ways[k].roulette;
+        o.share = ways[k].share;
+        start = processor();
+        must(imp_elements_guide(e, &o, &g));
+        const double made = processor() - start;
+        const struct result r = measured(s, g, spp);
+        printf(",\n \"%s\":{\"mean\":%.6g,\"se\":%.2g,\"variance\":%.4g,\"seconds\":%.3f,"
+               "\"guide_seconds\":%.2f,\"z\":%.2f,\"variance_x_time\":%.3f}",
+               ways[k].name, r.mean, r.se, r.variance, r.seconds, made,
+               (r.mean - base.mean) / hypot(r.se, base.se),
+               r.variance * r.seconds / (base.variance * base.seconds));
+        imp_guide_destroy(g);
+    }
+    printf("}");
+    imp_elements_destroy(e);
+    imp_scene_destroy(s);
+}
+
+int main(int argc, char **argv)
+{
+    struct imp_context_options co = IMP_CONTEXT_OPTIONS_INIT;
+    co.threads = 1;
+    must(imp_context_create(&co, &ctx));
+    printf("[");
+    if (argc < 2) scene(IMP_SCENES "/elements/glossy.xml", 256);
+    for (int k = 1; k < argc; k++) {
+        if (k > 1) printf(",\n");
+        scene(argv[k], 256);
+    }
+    printf("]\n");
+    imp_context_destroy(ctx);
+    return 0;
+}
