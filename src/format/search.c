@@ -81,6 +81,10 @@ enum imp_status imp__search(struct imp_scene *scene, const char *first, const ch
             return *out ? IMP_OK : no_memory(ctx);
         }
         if (absolute) return imp__error(ctx, IMP_E_IO, "cannot find '%s'", name);
+        bool again = i > 0 && first && strcmp(folder, first) == 0;
+        for (size_t k = 1; k < i && !again; k++)
+            again = strcmp(folder, scene->search[k - 1]) == 0;
+        if (again) continue;
         const size_t used = strlen(tried);
         snprintf(tried + used, sizeof tried - used, "%s%s", used ? ", " : "", folder);
     }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "tree.h"
+#include "base/nearest.h"
 #include <stdio.h>
 #include <string.h>
 
@@ -135,14 +136,27 @@ out:
     return st;
 }
 
+/* "; did you mean 'x'?" if an id is near, else "". */
+static const char *suggestion(const struct imp_tree *t, const char *id, char *text,
+                              size_t size)
+{
+    struct imp_nearest n = imp__nearest(id);
+    for (size_t i = 0; i < t->ids.capacity; i++)
+        if (t->ids.slots[i].name) imp__nearest_try(&n, t->ids.slots[i].name);
+    snprintf(text, size, n.best ? "; did you mean '%s'?" : "", n.best);
+    return text;
+}
+
 enum imp_status imp__tree_alias(struct imp_tree *t, const char *id, const char *as,
                                 struct imp_loc loc)
 {
     enum imp_status st = IMP_OK;
+    char near[160];
     IMP_TRY(empty_refused(t, "id", as, loc));
     const struct imp_name *source = imp__names_find(&t->ids, NULL, id);
     if (!source)
-        IMP_TRY(imp__loc_error(t->ctx, loc, IMP_E_SCENE, "alias of unknown id '%s'", id));
+        IMP_TRY(imp__loc_error(t->ctx, loc, IMP_E_SCENE, "alias of unknown id '%s'%s", id,
+                               suggestion(t, id, near, sizeof near)));
     struct imp_node *node = source->value;
     const char *copy = imp__arena_strdup(t->arena, as);
     if (!copy) IMP_TRY(no_memory(t->ctx));
@@ -186,9 +200,11 @@ enum imp_status imp__tree_resolve(struct imp_tree *t)
             struct imp_child *c = &t->nodes[i]->children[k];
             if (c->node) continue;
             const struct imp_name *target = imp__names_find(&t->ids, NULL, c->ref);
+            char near[160];
             if (!target)
                 return imp__loc_error(t->ctx, c->loc, IMP_E_SCENE,
-                                      "reference to unknown id '%s'", c->ref);
+                                      "reference to unknown id '%s'%s", c->ref,
+                                      suggestion(t, c->ref, near, sizeof near));
             c->node = target->value;
         }
     if (!t->root) return IMP_OK;

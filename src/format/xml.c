@@ -114,6 +114,16 @@ static enum imp_status text_read(struct xml_file *f, const struct imp_bytes *tex
             const enum XML_Error code = XML_GetErrorCode(parser);
             if (code == XML_ERROR_NO_MEMORY)
                 f->st = imp__error(ctx, IMP_E_NOMEM, "%s: out of memory", f->name);
+            else if (code == XML_ERROR_NO_ELEMENTS && f->depth > 0)
+                f->st = imp__loc_error(ctx, imp__xml_loc(f), IMP_E_SCENE,
+                                       "the file ends inside <%s>", imp__xml_top(f)->tag);
+            else if (code == XML_ERROR_NO_ELEMENTS)
+                f->st = imp__loc_error(ctx, imp__xml_loc(f), IMP_E_SCENE,
+                                       "the file holds no scene");
+            else if (code == XML_ERROR_TAG_MISMATCH && f->depth > 0)
+                f->st =
+                    imp__loc_error(ctx, imp__xml_loc(f), IMP_E_SCENE,
+                                   "mismatched tag: <%s> is open", imp__xml_top(f)->tag);
             else
                 f->st = imp__loc_error(ctx, imp__xml_loc(f), IMP_E_SCENE, "%s",
                                        XML_ErrorString(code));

@@ -2,6 +2,7 @@
  *
  * The grammar: one rule a tag, which attributes it takes and what it does (scene-format
  * 1.1). */
+#include "base/nearest.h"
 #include "search.h"
 #include "value.h"
 #include "xml.h"
@@ -295,9 +296,20 @@ void imp__xml_start(struct xml_file *f, const char *tag, const char **from)
         return;
     }
     bool known = object || strcmp(tag, "transform") == 0;
-    for (size_t i = 0; i < imp_count(rules); i++) known |= strcmp(rules[i].tag, tag) == 0;
+    struct imp_nearest near = imp__nearest(tag);
+    for (size_t i = 0; i < imp_count(rules); i++) {
+        known |= strcmp(rules[i].tag, tag) == 0;
+        imp__nearest_try(&near, rules[i].tag);
+    }
+    static const char *const others[] = {"bsdf",  "emitter", "film",    "integrator",
+                                         "scene", "sensor",  "sampler", "shape",
+                                         "ref",   "texture", "rfilter", "transform"};
+    for (size_t i = 0; i < imp_count(others); i++) imp__nearest_try(&near, others[i]);
     if (known)
         imp__xml_fail(f, IMP_E_SCENE, "<%s> cannot stand inside <%s>", tag, l->tag);
+    else if (near.best)
+        imp__xml_fail(f, IMP_E_SCENE, "unknown tag <%s>; did you mean <%s>?", tag,
+                      near.best);
     else imp__xml_fail(f, IMP_E_SCENE, "unknown tag <%s>", tag);
 }
 

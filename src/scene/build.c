@@ -58,6 +58,9 @@ static enum imp_status top_build(struct imp_scene *scene, struct imp_child *chil
                                     "an area emitter must be inside a shape"));
     } else if (strcmp(tag, "medium") == 0) {
         if (!node->id) node->id = name; /* declared; made where a shape refers to it */
+        if (!node->medium)
+            IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
+                                    "this version has no such medium; it has graded"));
     } else if (strcmp(tag, "integrator") == 0) {
         if (scene->has_integrator)
             IMP_TRY(

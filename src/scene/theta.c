@@ -3,6 +3,7 @@
  * theta: every number that describes the scene, in document order, as places to read and
  * write. A parameter's numbers live where rendering uses them (an input's lanes, a
  * texture's texels); theta is a list of addresses, so setting it needs no rebuild. */
+#include "base/nearest.h"
 #include "scene.h"
 #include <stdio.h>
 #include <string.h>
@@ -63,27 +64,6 @@ enum imp_status imp_scene_get_param(const imp_scene *scene, size_t index,
     return IMP_OK;
 }
 
-/* Levenshtein distance, for suggestions; long names are not worth it. */
-static size_t edit_distance(const char *a, const char *b)
-{
-    enum { LONGEST = 96 };
-    const size_t n = strlen(a), m = strlen(b);
-    if (n > LONGEST || m > LONGEST) return SIZE_MAX;
-    size_t row[LONGEST + 1];
-    for (size_t j = 0; j <= m; j++) row[j] = j;
-    for (size_t i = 1; i <= n; i++) {
-        size_t diagonal = row[0];
-        row[0] = i;
-        for (size_t j = 1; j <= m; j++) {
-            const size_t above = row[j];
-            const size_t swap = diagonal + (a[i - 1] != b[j - 1]);
-            row[j] = imp_min(swap, imp_min(above, row[j - 1]) + 1);
-            diagonal = above;
-        }
-    }
-    return row[m];
-}
-
 /* Names may leave out the final ".value", and may be written below any parent that
  * reaches the object ("ball.bsdf.red.reflectance"): the longest matching tail wins. */
 static bool name_matches(const char *given, const char *name)
@@ -110,7 +90,7 @@ enum imp_status imp_scene_find_param(const imp_scene *scene, const char *name,
     size_t distance[3] = {SIZE_MAX, SIZE_MAX, SIZE_MAX};
     for (size_t i = 0; i < scene->n_params; i++) {
         const char *candidate = scene->params[i].info.name;
-        size_t d = edit_distance(name, candidate);
+        size_t d = imp__edit_distance(name, candidate);
         for (int k = 0; k < 3; k++)
             if (d < distance[k]) {
                 const size_t old = distance[k];

@@ -11,7 +11,9 @@ enum imp_status imp__run_sensor(const struct imp_scene *scene, const struct imp_
     if (!scene->committed)
         return imp__error(scene->ctx, IMP_E_ARG, "the scene has not been committed");
     if (!scene->has_integrator)
-        return imp__error(scene->ctx, IMP_E_SCENE, "the scene has no integrator");
+        return imp__error(scene->ctx, IMP_E_SCENE,
+                          "the scene has no integrator; Mitsuba's default is "
+                          "<integrator type=\"path\"/>");
     if (scene->n_sensors == 0)
         return imp__error(scene->ctx, IMP_E_SCENE, "the scene has no sensor");
     if (run->sensor < 0 || run->sensor >= scene->n_sensors)
