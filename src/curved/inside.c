@@ -236,13 +236,40 @@ static void number_add(const struct imp__graded_active *to, size_t k, double bar
         to->sink->add(to->sink, n->param, k - n->first, 1, &s);
 }
 
+/* What a ray leaves in the cell of a grid that it is in. */
+struct imp__block {
+    const imp_field *grid; /* NULL: nothing yet */
+    size_t offset, corner[3];
+    double bar[64];
+};
+
+static void block_flush(const struct imp__graded_active *to, struct imp__block *b)
+{
+    if (!b->grid) return;
+    const struct imp__grid *g = (const struct imp__grid *)b->grid;
+    const size_t side = g->desc.interp == IMP_FIELD_SPLINE ? 4 : 2;
+    const size_t nx = (size_t)g->nodes[0], ny = (size_t)g->nodes[1];
+    const struct imp_medium_numbers *n = numbers_at(to->medium, b->offset);
+    const size_t from = b->offset - n->first;
+    imp_spec s = {0};
+    for (size_t k = 0, at = 0; k < side; k++)
+        for (size_t j = 0; j < side; j++)
+            for (size_t i = 0; i < side; i++, at++) {
+                const size_t row = b->corner[1] + j + ny * (b->corner[2] + k);
+                s[to->lane] = b->bar[at];
+                to->sink->add(to->sink, n->param, from + b->corner[0] + i + nx * row, 1,
+                              &s);
+            }
+    b->grid = NULL;
+}
+
 /* A grid's splat in its own cell alone: the same kind of grid, one cell large. */
 static void grid_splat(const struct splat_job *j, imp_field *f, size_t offset)
 {
     const struct imp__grid *g = (const struct imp__grid *)f;
-    const int side = g->desc.interp == IMP_FIELD_SPLINE ? 4 : 2;
-    double local[64] = {0};
+    double unused[64] = {0}; /* values, which the weights do not need */
     struct imp__grid cell = *g;
+    struct imp__block own = {0}, *block = j->to->block ? j->to->block : &own;
     double a = j->a;
     imp_v3 b = j->b;
     size_t corner[3];
@@ -256,23 +283,19 @@ static void grid_splat(const struct splat_job *j, imp_field *f, size_t offset)
         const int i = (int)imp_clamp(u[k], 0.0, (double)(g->desc.cells[k] - 1));
         corner[k] = (size_t)i;
         cell.origin[k] += i / g->inv_h[k];
-        cell.nodes[k] = side;
+        cell.nodes[k] = g->desc.interp == IMP_FIELD_SPLINE ? 4 : 2;
         cell.desc.cells[k] = 1;
     }
     cell.desc.param = IMP_FIELD_ETA;
-    cell.base.theta = local;
+    cell.base.theta = unused;
     cell.single = NULL;
-    double bar[64] = {0};
-    f->ops->splat(&cell.base, &j->x, a, &b, &(struct imp__bar){.theta = bar});
-    for (int k = 0, n = 0; k < side; k++)
-        for (int jj = 0; jj < side; jj++)
-            for (int i = 0; i < side; i++, n++)
-                number_add(j->to,
-                           offset + corner[0] + (size_t)i +
-                               (size_t)g->nodes[0] *
-                                   (corner[1] + (size_t)jj +
-                                    (size_t)g->nodes[1] * (corner[2] + (size_t)k)),
-                           bar[n]);
+    if (block->grid != f || memcmp(block->corner, corner, sizeof corner) != 0) {
+        block_flush(j->to, block);
+        *block = (struct imp__block){.grid = f, .offset = offset};
+        memcpy(block->corner, corner, sizeof corner);
+    }
+    f->ops->splat(&cell.base, &j->x, a, &b, &(struct imp__bar){.theta = block->bar});
+    if (block == &own) block_flush(j->to, block);
 }
 
 static void leaf_splat(imp_field *f, size_t offset, void *payload)
@@ -376,7 +399,10 @@ void imp__ride_back(const struct imp__graded_active *to, const struct imp__ride 
                     imp_v3 *lam, imp_v3 *mu)
 {
     const struct imp__plan *p = &to->medium->graded->plan;
-    const struct view view = {{.ops = &view_ops}, to};
+    struct imp__block block = {0};
+    struct imp__graded_active gather = *to;
+    gather.block = &block;
+    const struct view view = {{.ops = &view_ops}, &gather};
     struct imp__bar yes = {0}; /* where splats go is the view's business */
     struct imp__state at = r->from, rate;
     struct imp__surface_at sa;
@@ -400,7 +426,8 @@ void imp__ride_back(const struct imp__graded_active *to, const struct imp__ride 
     /* v0 = eta(x0) d0 */
     const double eta_bar = imp__dot(b.mu[0], r->d);
     const imp_v3 zero = {0};
-    imp__graded_splat(to, &r->x, eta_bar, &zero);
+    imp__graded_splat(&gather, &r->x, eta_bar, &zero);
+    block_flush(to, &block);
     *lam = b.lam[0] + eta_bar * r->j.g;
     *mu = r->j.eta * b.mu[0];
 }

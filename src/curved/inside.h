@@ -58,9 +58,10 @@ bool imp__ride(const struct imp_medium *medium, const struct imp_scene *scene, i
 struct imp__graded_active {
     const struct imp_medium *medium;
     const int64_t *base;
-    struct imp_sink *sink; /* reverse */
-    int lane;              /* of it */
-    const double *x_dot;   /* forward */
+    struct imp_sink *sink;    /* reverse */
+    int lane;                 /* of it */
+    const double *x_dot;      /* forward */
+    struct imp__block *block; /* reverse: splats of one cell are gathered here; or NULL */
 };
 /* a d eta + b . d grad eta at x goes to the sink. */
 void imp__graded_splat(const struct imp__graded_active *to, const imp_v3 *x, double a,

@@ -126,8 +126,8 @@ static void turn_back(const struct imp_vertex *v, const struct imp__surface *l, 
     if (s.medium) {
         const double bar = s.entering ? far_bar : near_bar;
         *lam += bar * s.inner.g;
-        const struct imp__graded_active at = {s.medium, to->base, to->sink, to->lane,
-                                              NULL};
+        struct imp__graded_active at = *to;
+        at.medium = s.medium;
         imp__graded_splat(&at, &x, bar, &zero);
     }
     *mu = d_bar;
@@ -147,8 +147,8 @@ static double turn_tangent(const struct imp_vertex *v, const struct imp__surface
     sides_of(v, x, v->ng, d, &s);
     double near_dot = 0, far_dot = 0;
     if (s.medium) {
-        const struct imp__graded_active at = {s.medium, along->base, NULL, 0,
-                                              along->x_dot};
+        struct imp__graded_active at = *along;
+        at.medium = s.medium;
         *(s.entering ? &far_dot : &near_dot) =
             imp__graded_tangent(&at, &x) + imp__dot(s.inner.g, *x_dot);
     }
@@ -210,8 +210,8 @@ static void chain_sweep(const struct imp_tracer *tracer, const struct imp_walk *
                         int first, int last, struct imp_sink *sink)
 {
     imp_v3 lam = {0}, mu = {0};
-    struct imp__graded_active to = {NULL, tracer->active->base, sink,
-                                    sink->apart ? first : 0, NULL};
+    struct imp__graded_active to = {
+        .base = tracer->active->base, .sink = sink, .lane = sink->apart ? first : 0};
     for (const struct imp_vertex *v = walk->last; v; v = v->prev) {
         const struct imp_leg *leg = v->leg;
         struct imp__surface level;
@@ -280,7 +280,7 @@ void imp__bend_sweep(const struct imp_tracer *tracer, const struct imp_walk *wal
 imp_spec imp__bend_tangent(const struct imp_tracer *tracer, const struct imp_walk *walk,
                            const double *x_dot)
 {
-    struct imp__graded_active along = {NULL, tracer->active->base, NULL, 0, x_dot};
+    struct imp__graded_active along = {.base = tracer->active->base, .x_dot = x_dot};
     imp_spec P = imp__spec(1), before = {0}, L_dot = {0};
     imp_v3 p_dot = {0}, d_dot = {0};
     for (const struct imp_vertex *v = walk->first; v; P *= v->w, v = v->next) {
