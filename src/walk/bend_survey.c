@@ -4,8 +4,9 @@
  * seen through the medium varies smoothly as the rays move. It is not where they pass an
  * edge: of a light that does not fill the view, of one shape before another, of a body
  * with corners. Edges are found as a surface from which moved rays go on to different
- * surfaces; a glass ball's outline is none (reflection and refraction meet there), nor is
- * the border of a light that is dark along it, in the dark. */
+ * surfaces. A glass ball's outline before what has no edges itself is none (reflection
+ * and refraction meet there), nor is the border of a light that is dark along it, in the
+ * dark. */
 #include "bend.h"
 #include <stdio.h>
 #include <string.h>
@@ -17,33 +18,36 @@
 struct piece {
     const struct imp_shape *shape; /* NULL: no shape */
     int normal[3];
+    bool ball, around; /* a glass ball from outside; nothing, or a sphere from inside */
 };
 struct pair {
     struct piece from, to;
-    bool inside;
+    bool inside; /* the way between them begins behind `from` */
 };
 
-static struct piece piece_of(const struct imp_vertex *v)
+static struct piece piece_of(const struct imp_scene *scene, const struct imp_vertex *v)
 {
-    struct piece p = {0};
+    struct piece p = {.around = true};
+    struct imp_round r = {.radius = 0};
     if (!v || !v->shape) return p;
     p.shape = v->shape;
-    if (!v->shape->ops->round)
+    p.around = false;
+    if (!v->shape->ops->round) {
         for (int k = 0; k < 3; k++) p.normal[k] = (int)lrint(v->ng[k] * 1e4);
+        return p;
+    }
+    v->shape->ops->round(v->shape, &r);
+    if (imp__dot(r.axis, r.axis) != 0) return p;
+    const imp_v3 from = v->prev ? v->prev->at.p - r.centre : (imp_v3){0};
+    const bool outside = imp__dot(from, from) > imp__sqr(r.radius) * (1 + 1e-9);
+    const bool clear = imp__shape_bsdf(scene, v->shape)->flags & IMP_BSDF_TRANSMIT;
+    p.ball = clear && outside;
+    p.around = !clear && !outside;
     return p;
 }
 static bool same(struct piece a, struct piece b)
 {
     return a.shape == b.shape && memcmp(a.normal, b.normal, sizeof a.normal) == 0;
-}
-
-static bool is_ball(const struct imp_scene *scene, const struct imp_shape *s)
-{
-    struct imp_round r;
-    if (!s || !s->ops->round || !(imp__shape_bsdf(scene, s)->flags & IMP_BSDF_TRANSMIT))
-        return false;
-    s->ops->round(s, &r);
-    return imp__dot(r.axis, r.axis) == 0;
 }
 
 /* A rectangle that emits nothing along its border. Texels have not more than a few
@@ -71,6 +75,15 @@ static bool dark_border(const struct imp_scene *scene, const struct imp_shape *s
             if (le[c] != 0) return false;
     }
     return true;
+}
+
+/* Do rays that move from one to the other see no jump? */
+static bool smooth_between(const struct imp_scene *scene, struct piece a, struct piece b)
+{
+    if (same(a, b)) return true;
+    if ((a.ball || b.ball) && (a.ball || a.around) && (b.ball || b.around)) return true;
+    if (scene->environment >= 0 || (a.shape && b.shape)) return false;
+    return dark_border(scene, a.shape ? a.shape : b.shape);
 }
 
 static const char *name_of(struct piece p)
@@ -101,21 +114,22 @@ static enum imp_status look(struct survey *s, const struct imp_medium *m,
 {
     const struct imp_scene *scene = s->tracer->scene;
     const struct imp_vertex *shape = next && next->shape ? next : NULL;
-    struct pair p = {piece_of(v), piece_of(shape),
-                     next && next->leg && next->leg->medium};
-    if (shape && is_ball(scene, shape->shape)) return IMP_OK;
+    const struct imp_leg *leg = next ? next->leg : NULL;
+    const imp_v3 d = !leg ? (imp_v3){0} : leg->medium ? leg->ride.d : leg->d;
+    const struct pair p = {piece_of(scene, v), piece_of(scene, shape),
+                           imp__dot(v->ng, d) < 0};
+    bool known = false;
     for (int i = 0; i < s->n; i++) {
         if (!same(s->pair[i].from, p.from) || s->pair[i].inside != p.inside) continue;
-        if (same(s->pair[i].to, p.to)) return IMP_OK;
-        const struct imp_shape *a = s->pair[i].to.shape, *b = p.to.shape;
-        if (scene->environment < 0 && (!a || !b) && dark_border(scene, a ? a : b))
-            continue;
-        return refuse(
-            s->tracer, m,
-            "its rays meet '%s' and, beside it, '%s': an edge that moves with "
-            "the field. Let one fill all that is seen, or be dark at its border",
-            name_of(s->pair[i].to), name_of(p.to));
+        known |= same(s->pair[i].to, p.to);
+        if (!smooth_between(scene, s->pair[i].to, p.to))
+            return refuse(s->tracer, m,
+                          "its rays meet '%s' and, beside it, '%s': an edge that moves "
+                          "with the field. Let one fill all that is seen, or be dark at "
+                          "its border",
+                          name_of(s->pair[i].to), name_of(p.to));
     }
+    if (known) return IMP_OK;
     if (s->n < PAIRS) s->pair[s->n++] = p;
     return IMP_OK;
 }
@@ -136,7 +150,7 @@ static enum imp_status walk_look(struct survey *s, const struct imp_walk *w)
         const bool bent = v->next && v->next->leg && v->next->leg->moved;
         if (w->dropped == IMP_DROP_MOVED && !v->next)
             return refuse(s->tracer, m, "its rays go on to '%s', which %s",
-                          name_of(piece_of(v)),
+                          name_of(piece_of(s->tracer->scene, v)),
                           imp__bend_obstacle(s->tracer->scene, v->shape, &v->at));
         if (!(v->inv_ps > 0) || w->dropped || !(bent || moved)) continue;
         const enum imp_status st = look(s, m, v, v->next);

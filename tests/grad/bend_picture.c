@@ -263,6 +263,21 @@ int main(void)
     refused(LOOK("18", "-1") BALL("null", "<volume type='luneburg'><float name='radius' "
                                           "value='1'/></volume>") SCREEN("3"),
             "jumps at its radius");
+    refused(LOOK("18", "-1")
+                BALL("null",
+                     PLUME) "<shape type='sphere' id='lamp'><float "
+                            "name='radius' value='0.2'/><emitter type='area'/></shape>",
+            "'lamp'");
+    refused(
+        LOOK("18", "-1") BALL(
+            "null",
+            PLUME) "<shape type='sphere' id='behind'><float name='radius' "
+                   "value='3'/><point "
+                   "name='center' value='0,0,-6'/><bsdf type='dielectric'/></shape>"
+                   "<shape type='rectangle' id='lamp'><transform name='to_world'><scale "
+                   "value='0.2'/><translate z='-2'/></transform><emitter "
+                   "type='area'/></shape>",
+        "'lamp'");
     imp_context_destroy(ctx);
     return tap_done();
 }
