@@ -4,7 +4,10 @@
 #ifndef IMP_BASE_NUMBER_H
 #define IMP_BASE_NUMBER_H
 
+#include "compiler.h"
+#include <stdarg.h>
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 /* Read a number that starts at *s and ends before `end`, and move *s behind it; false,
@@ -13,5 +16,9 @@
 bool imp__number(const char **s, const char *end, double *out);
 /* The same for decimal integers; false also if it does not fit. */
 bool imp__integer(const char **s, const char *end, int64_t *out);
+
+/* snprintf for files and answers: with a decimal point, whatever the host calls it. */
+IMP_PRINTF(3, 4) int imp__format(char *text, size_t size, const char *format, ...);
+int imp__vformat(char *text, size_t size, const char *format, va_list args);
 
 #endif

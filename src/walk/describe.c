@@ -2,6 +2,7 @@
  *
  * One walk told vertex by vertex: Stam's single-path view, as text to read or JSON to
  * draw. */
+#include "base/number.h"
 #include "measure.h"
 #include <stdio.h>
 #include <string.h>
@@ -18,7 +19,7 @@ IMP_PRINTF(2, 3) static void put(struct text *t, const char *format, ...)
     char line[512];
     va_list args;
     va_start(args, format);
-    const int n = vsnprintf(line, sizeof line, format, args);
+    const int n = imp__vformat(line, sizeof line, format, args);
     va_end(args);
     if (n < 0 || t->failed) return;
     const size_t length = imp_min((size_t)n, sizeof line - 1);
