@@ -31,7 +31,7 @@ start=(sphere.ambient=.026 sphere.diffuse=.35 sphere.specular=.39 sphere.exponen
     walls.ambient=.021 walls.diffuse=.39 light.emission=6.5)
 fit=(fit "${stam[@]}" -D integrator=path --target "$out/target.exr" --loss relative -q)
 for value in "${start[@]}"; do fit+=(--set "$value"); done
-"$importon" "${fit[@]}" --spp 128 -o "$out/fit" --sheet docs/images/stam_fit.png --json \
+"$importon" "${fit[@]}" --spp 128 --picture-spp 2048 -o "$out/fit" --sheet docs/images/stam_fit.png --json \
     >"$out/adam.json"
 "$importon" "${fit[@]}" --optimizer lm --spp 1024 --json >"$out/lm.json"
 
@@ -39,7 +39,7 @@ say "The errata"
 for variant in microfacet paper; do
     for form in detached paper; do
         "$importon" jacobian "${stam[@]}" -D variant=$variant -D alpha_gradient=$form --spp 1024 \
-            -p sphere.exponent.value -o "$out/e9" --json -q >"$out/e9_${variant}_$form.json" \
+            -p sphere.exponent.value -o "$out/e9" --json >"$out/e9_${variant}_$form.json" \
             2>"$out/e9_${variant}_$form.txt"
     done
 done
