@@ -264,6 +264,7 @@ enum imp_status imp_elements_fit(imp_elements *e, imp_problem *p,
                           "elements have importance");
     struct imp__design d = {.e = e, .p = p, .n = p->n, .goals = e->n_sources};
     struct imp__search *s = NULL;
+    const imp_progress_fn progress = e->opt.progress;
     const char *reason = "no step was made";
     int iterations = 0;
     double *x = NULL, moved = INFINITY;
@@ -296,7 +297,9 @@ enum imp_status imp_elements_fit(imp_elements *e, imp_problem *p,
         (void)!imp_problem_set_x(p, start); /* as if nothing had been tried */
         IMP_TRY(ended);
     }
-    if (ended == IMP_CANCELLED) reason = d.deadline_s > 0 ? "time limit" : "cancelled";
+    if (ended == IMP_CANCELLED) reason = e->reason;
+    /* Whoever asked to stop gets a whole solution: this part ends by itself. */
+    e->opt.progress = NULL;
     e->stop = false;
     e->deadline_s = 0;
     /* The elements measure what they were made for again, at the answer. */
@@ -309,6 +312,7 @@ enum imp_status imp_elements_fit(imp_elements *e, imp_problem *p,
     IMP_TRY(result_make(&d, start, x, before, s, iterations, reason, result));
     st = ended;
 out:
+    e->opt.progress = progress;
     imp__search_destroy(s);
     imp__release(e->ctx, x);
     return st;

@@ -94,7 +94,14 @@ enum imp_status imp__design_eval(const double *x, uint64_t seed, struct imp_esti
     struct imp__design *d = payload;
     enum imp_status st = IMP_OK;
     (void)seed;
-    IMP_TRY(imp__design_at(d, x));
+    st = imp__design_at(d, x);
+    if (st == IMP_E_NUMERIC) { /* reflections that never end: as far away as can be */
+        *f = (struct imp_estimate){HUGE_VAL, 0, 0};
+        if (g) memset(g, 0, d->n * sizeof *g);
+        if (g_se) memset(g_se, 0, d->n * sizeof *g_se);
+        return imp__el_sweep(d->e, 1, true, true); /* not from those numbers */
+    }
+    IMP_TRY(st);
     *f = (struct imp_estimate){imp__design_value(d), 0, 0};
     if (g) {
         memset(g, 0, d->n * sizeof *g);

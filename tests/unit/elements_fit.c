@@ -247,12 +247,48 @@ static void reflectance(imp_context *ctx, enum imp_optimizer optimizer, const ch
     imp_scene_destroy(s);
 }
 
+/* A closed white box that glows: E = pi Le/(1 - rho), so E = 4 pi Le wants rho = 0.75; on
+ * the way lies rho = 1, where reflections never end. */
+static void furnace(imp_context *ctx, enum imp_optimizer optimizer)
+{
+    static const char xml[] =
+        "<scene version='3.0.0'>" EYE
+        "<shape type='cube' id='box'><boolean name='flip_normals' value='true'/>"
+        "<bsdf type='diffuse' id='white'><float name='reflectance' value='0.1'/></bsdf>"
+        "<emitter type='area'><float name='radiance' value='1'/></emitter></shape>"
+        "</scene>";
+    imp_scene *s = test_scene_text(ctx, xml, IMP_MONO);
+    imp_problem *p = test_problem(ctx, s, "white*");
+    struct imp_elements_source source;
+    struct imp_elements_options o = options(1, &source, (const char *[]){"box"});
+    struct imp_elements_fit_options f = IMP_ELEMENTS_FIT_OPTIONS_INIT;
+    const struct imp_elements_fit_result *r;
+    const double target = 4 * IMP_PI;
+    imp_elements *e;
+    o.eps_first = o.eps_last = 0.05;
+    f.optimizer = optimizer;
+    f.targets = &target;
+    test_must(ctx, imp_elements_create(s, &o, &e));
+    test_must(ctx, imp_elements_fit(e, p, &f, &r));
+    tap_near(r->variables[0].value, 0.75, 1e-6, 0, "a furnace's reflectance");
+    tap_near(r->goals[0].before, IMP_PI / 0.9, 1e-8, 0, "what it was");
+    imp_elements_destroy(e);
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+}
+
 /* ---- What is refused, stopped, or out of memory -------------------------------- */
 
 static int stop_now(const struct imp_progress *p, void *payload)
 {
     (void)p, (void)payload;
     return 1;
+}
+static int stop_in_fit(const struct imp_progress *p, void *payload)
+{
+    imp_elements *e = payload;
+    e->last_tick_s = 0; /* report everything */
+    return strcmp(p->stage, "fit") == 0;
 }
 
 static void is_refused(imp_elements *e, imp_problem *p,
@@ -299,6 +335,20 @@ static void refused(imp_context *ctx)
     imp_problem_get_x(p, x);
     tap_ok(st == IMP_CANCELLED && r && r->n == LAMPS && memcmp(x, start, sizeof x) == 0,
            "stopped at once: where it began # %s", r ? r->reason : "");
+    /* Stopped on the way: what it holds is a whole solution all the same. */
+    imp_elements_destroy(e);
+    test_must(ctx, imp_problem_activate(p, "wall*"));
+    test_must(ctx, imp_elements_create(s, &o, &e));
+    e->opt.progress = stop_in_fit;
+    e->opt.progress_payload = e;
+    const enum imp_status later = imp_elements_fit(e, p, &f, &r);
+    struct imp_elements_info info = {.size = sizeof info};
+    test_must(ctx, imp_elements_get_info(e, &info));
+    tap_ok(later == IMP_CANCELLED && e->opt.progress == stop_in_fit &&
+               fabs(info.measure / info.measure_adjoint - 1) < 1e-6 &&
+               fabs(info.measure / r->goals[0].after - 1) < 1e-6,
+           "stopped on the way: settled # %s; %.9g %.9g %.9g", r->reason, info.measure,
+           info.measure_adjoint, r->goals[0].after);
     imp_elements_destroy(e);
     imp_problem_destroy(none);
     imp_problem_destroy(p);
@@ -353,6 +403,8 @@ int main(void)
     bounded(ctx, IMP_SLSQP, (const double[]){2, 1, 3}, "slsqp");
     reflectance(ctx, IMP_LM, "lm");
     reflectance(ctx, IMP_LBFGS, "lbfgs");
+    furnace(ctx, IMP_LM);
+    furnace(ctx, IMP_SLSQP);
     refused(ctx);
     imp_context_destroy(ctx);
     memory();
