@@ -143,7 +143,8 @@ static const char *suggestion(const struct imp_tree *t, const char *id, char *te
     struct imp_nearest n = imp__nearest(id);
     for (size_t i = 0; i < t->ids.capacity; i++)
         if (t->ids.slots[i].name) imp__nearest_try(&n, t->ids.slots[i].name);
-    snprintf(text, size, n.best ? "; did you mean '%s'?" : "", n.best);
+    text[0] = 0;
+    if (n.best) snprintf(text, size, "; did you mean '%s'?", n.best);
     return text;
 }
 
