@@ -171,6 +171,8 @@ struct imp_elements {
 
     size_t n_hits, cap_hits;
     struct imp__el_hit *hits; /* of camera sources */
+    size_t *hit_start;        /* [n_roots + 1] into hit_order: the hits of a root */
+    size_t *hit_order;        /* [n_hits]; made by imp__el_bin */
     size_t n_view, cap_view;
     struct imp__el_hit *view; /* of the picture that decides when to stop */
     double *picture;          /* its pixels at the last step */

@@ -189,10 +189,10 @@ out:
 void imp_elements_destroy(imp_elements *e)
 {
     if (!e) return;
-    void *const all[] = {e->roots,     e->elements,   e->l,     e->g,     e->c,
-                         e->b,         e->from_above, e->a,     e->links, e->in_start,
-                         e->out_start, e->out,        e->value, e->hits,  e->view,
-                         e->picture,   e->log,        e->rows};
+    void *const all[] = {e->roots,     e->elements,   e->l,       e->g,     e->c,
+                         e->b,         e->from_above, e->a,       e->links, e->in_start,
+                         e->out_start, e->out,        e->value,   e->hits,  e->view,
+                         e->hit_start, e->hit_order,  e->picture, e->log,   e->rows};
     for (size_t k = 0; k < imp_count(all); k++) imp__release(e->ctx, all[k]);
     imp__arena_free(&e->arena);
     imp__release(e->ctx, e);

@@ -137,15 +137,35 @@ out:
     return st;
 }
 
-enum imp_status imp__el_bin(imp_elements *e)
+/* Hits by root, in their order: each root is then one worker's, whatever the threads. */
+static enum imp_status hits_sort(imp_elements *e)
 {
-    memset(e->a, 0, e->n_coef * sizeof *e->a);
-    for (size_t k = 0; k < e->n_hits; k++) {
-        const struct imp__el_hit *hit = &e->hits[k];
-        if (hit->root == EL_NONE) continue;
-        const struct imp__el_root *r = &e->roots[hit->root];
-        const int n = el_n(e, r);
-        if (n == 0) continue;
+    e->hit_start = imp__alloc(e->ctx, e->n_roots + 2, sizeof *e->hit_start);
+    e->hit_order = imp__alloc(e->ctx, e->n_hits + 1, sizeof *e->hit_order);
+    if (!e->hit_start || !e->hit_order) {
+        imp__release(e->ctx, e->hit_start);
+        imp__release(e->ctx, e->hit_order);
+        e->hit_start = e->hit_order = NULL;
+        return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for the picture's rays");
+    }
+    size_t *next = e->hit_start + 1; /* counts, then where the next of a root goes */
+    for (size_t k = 0; k < e->n_hits; k++)
+        if (e->hits[k].root != EL_NONE && e->hits[k].root + 1 < e->n_roots)
+            next[e->hits[k].root + 1]++;
+    for (size_t r = 1; r < e->n_roots; r++) next[r] += next[r - 1];
+    for (size_t k = 0; k < e->n_hits; k++)
+        if (e->hits[k].root != EL_NONE) e->hit_order[next[e->hits[k].root]++] = k;
+    return IMP_OK;
+}
+
+static enum imp_status bin_work(size_t item, int worker, int slot, void *payload)
+{
+    imp_elements *e = payload;
+    const struct imp__el_root *r = &e->roots[item];
+    const int n = el_n(e, r);
+    (void)worker, (void)slot;
+    for (size_t i = e->hit_start[item]; i < e->hit_start[item + 1] && n; i++) {
+        const struct imp__el_hit *hit = &e->hits[e->hit_order[i]];
         const struct imp__element *x =
             &e->elements[imp__el_find(e, hit->root, hit->u, hit->v, NULL)];
         double h[EL_N_MAX];
@@ -154,6 +174,17 @@ enum imp_status imp__el_bin(imp_elements *e)
         for (int q = 0; q < n; q++) e->a[x->coef + (size_t)q] += hit->weight * h[q];
     }
     return IMP_OK;
+}
+
+enum imp_status imp__el_bin(imp_elements *e)
+{
+    enum imp_status st = IMP_OK;
+    memset(e->a, 0, e->n_coef * sizeof *e->a);
+    if (!e->hit_order) IMP_TRY(hits_sort(e));
+    const struct imp_loop loop = {.n_items = e->n_roots, .work = bin_work, .payload = e};
+    IMP_TRY(imp__parallel(e->ctx, &loop, NULL));
+out:
+    return st;
 }
 
 /* ---- The measurement, from both sides ------------------------------------------ */
