@@ -273,9 +273,8 @@ static enum imp_status check_param(struct fresh *f, size_t param)
     const size_t count = q->info.count, base = (size_t)p->active.base[param];
     const bool linear = is_emission(p->scene, param);
     double *buffer = imp__alloc(f->check->ctx, 2 * count + p->n, sizeof *buffer);
-    double *old = buffer, *weight = buffer + count, *x_dot = buffer + 2 * count;
-
     if (!buffer) return imp__error(f->check->ctx, IMP_E_NOMEM, "no memory for a check");
+    double *old = buffer, *weight = buffer + count, *x_dot = buffer + 2 * count;
     for (size_t e = 0; e < count; e++) old[e] = imp__param_get(q, e);
     const struct motion m = {q, old, weight};
     for (size_t e = 0; count <= 3 && e < count; e++) {

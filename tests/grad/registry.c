@@ -78,7 +78,11 @@ static double random_in(const struct imp_input_desc *d, uint64_t seed, uint32_t 
         hi = 0.75;
         return lo + u * (hi - lo);
     }
-    const double typical = d->fallback > 0 ? d->fallback : 1;
+    /* Without a fallback: eta of metals. Below 1, with the k = 0 of the lower bound, they
+     * reflect totally from some angle on, and towards it the derivative of Fresnel's
+     * formula grows beyond all bounds: infinite variance, for which there is no z-score.
+     * bsdf_derivatives goes there. */
+    const double typical = d->fallback > 0 ? d->fallback : 1.8;
     return imp_clamp(typical * (0.6 + 0.8 * u), lo, hi);
 }
 
