@@ -4,8 +4,8 @@ sed -n '/^```xml/,/^```/p' "$ROOT/README.md" | grep -v '^```' >ball.xml
 cp ball.xml photo.xml
 importon render photo.xml --spp 4 -q --no-preview -o photo.exr || exit 9
 sed -n 's/^    \(importon [^#]*\).*/\1/p' "$ROOT/README.md" >commands
+ln -s "$ROOT/scenes" scenes || exit 9
 while read -r line; do
-    [[ $line == *scenes/* ]] && continue
     eval "$line" >/dev/null 2>log || { echo "+ $line"; cat log; exit 9; }
 done <commands
 # The C in the README and in libimporton.3 compiles.
