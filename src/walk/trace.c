@@ -171,12 +171,17 @@ static struct imp_key walk_key(const struct imp_tracer *tracer, int x, int y,
     return imp__key(tracer->seed, row << 32 | column, (uint64_t)sample);
 }
 
+static inline void position(const struct imp_tracer *tracer, struct imp_key key, int x,
+                            int y, double *px, double *py)
+{
+    *px = tracer->sensor->film.crop_x + x + imp__u01(key, IMP_DIM_PIXEL_X);
+    *py = tracer->sensor->film.crop_y + y + imp__u01(key, IMP_DIM_PIXEL_Y);
+}
+
 void imp__walk_position(const struct imp_tracer *tracer, int x, int y, int64_t sample,
                         double *px, double *py)
 {
-    const struct imp_key key = walk_key(tracer, x, y, sample);
-    *px = tracer->sensor->film.crop_x + x + imp__u01(key, IMP_DIM_PIXEL_X);
-    *py = tracer->sensor->film.crop_y + y + imp__u01(key, IMP_DIM_PIXEL_Y);
+    position(tracer, walk_key(tracer, x, y, sample), x, y, px, py);
 }
 
 void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, int x,
@@ -185,7 +190,7 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
     const struct imp_sensor *sensor = tracer->sensor;
     const struct imp_key key = walk_key(tracer, x, y, sample);
     *walk = (struct imp_walk){.key = key};
-    imp__walk_position(tracer, x, y, sample, &walk->px, &walk->py);
+    position(tracer, key, x, y, &walk->px, &walk->py);
     const double lens[2] = {imp__u01(key, IMP_DIM_LENS_U), imp__u01(key, IMP_DIM_LENS_V)};
     sensor->ops->ray(sensor, walk->px, walk->py, lens, &walk->ray);
 

@@ -9,10 +9,17 @@
 /* Embree takes larger coordinates for invalid. */
 #define COORDINATE_MAX 1e18
 
-static imp_v3 load3(const float *array, uint32_t index)
+typedef float float4 __attribute__((vector_size(16)));
+
+/* Number `index` of an array of triples that goes on for PADDING floats: one load. */
+#define PADDING 4
+static inline imp_v3 load3(const float *array, uint32_t index)
 {
-    const float *p = array + 3 * (size_t)index;
-    return imp__v3(p[0], p[1], p[2]);
+    float4 p;
+    memcpy(&p, array + 3 * (size_t)index, sizeof p);
+    imp_v3 v = __builtin_convertvector(p, imp_v3);
+    v[3] = 0;
+    return v;
 }
 
 static enum imp_status positions_place(const struct imp_build *b, struct imp_shape *s,
@@ -217,9 +224,10 @@ enum imp_status imp__mesh_build(const struct imp_build *b, void *self,
     IMP_TRY(imp__shape_placement(b, s, &at));
     IMP_TRY(data_check(b, data));
     const size_t n = data->n_vertices;
-    float *positions = imp__arena_array(b->arena, 3 * n + 4, sizeof *positions);
-    float *normals =
-        face_normals ? NULL : imp__arena_take(b->arena, 3 * n, sizeof *normals);
+    float *positions = imp__arena_array(b->arena, 3 * n + PADDING, sizeof *positions);
+    float *normals = face_normals
+                         ? NULL
+                         : imp__arena_array(b->arena, 3 * n + PADDING, sizeof *normals);
     if (!positions || (!normals && !face_normals))
         IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_NOMEM, "out of memory"));
     IMP_TRY(positions_place(b, s, data, &at, positions));
