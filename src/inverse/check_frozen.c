@@ -10,7 +10,7 @@
 #define DIRECTIONS    6  /* random directions */
 #define N_STEPS       4
 #define FROZEN_LIMIT  1e-6
-#define WALK_ROUNDING 5e-14 /* of L, of a walk evaluated twice */
+#define WALK_ROUNDING 5e-14 /* of the larger of two values of a walk */
 #define TINY          1e-3 /* of the walk's L: logarithmic derivatives below it count as 0 */
 
 static const double steps[N_STEPS] = {1e-3, 1e-4, 1e-5, 1e-6};
@@ -60,6 +60,15 @@ static double component(const struct direction *d, size_t e)
     return 2 * imp__u01(imp__key(d->seed, 1, 2), (uint32_t)e) - 1;
 }
 
+/* A float stands at both ends of a difference exactly as far from where it was: the
+ * motion is rounded to what the larger end can hold. */
+static double representable(const struct imp_param *p, double old, double move)
+{
+    if (p->store != IMP_STORE_BULK) return move;
+    const double far = (double)(float)(fabs(old) + fabs(move));
+    return copysign(far - fabs(old), move);
+}
+
 static void place(struct direction *d, double step)
 {
     struct imp_param param = *d->param;
@@ -68,7 +77,9 @@ static void place(struct direction *d, double step)
         imp__param_set(&param, e,
                        d->old[e]); /* the scale is the start's, wherever we are */
         if (move != 0)
-            imp__param_set(&param, e, d->old[e] + move * imp__check_scale(&param, e));
+            imp__param_set(&param, e,
+                           d->old[e] + representable(&param, d->old[e],
+                                                     move * imp__check_scale(&param, e)));
     }
 }
 
@@ -88,8 +99,8 @@ static bool two_sided(const struct direction *d, double step)
     return x - h >= d->param->info.lo && x + h <= d->param->info.hi;
 }
 
-/* Differences of all walks along d: value[0] becomes the difference, d->moved the motion.
- */
+/* Differences of all walks along d: value[0] becomes the difference, value[1] the largest
+ * number it is a difference of, d->moved the motion. */
 static enum imp_status difference(struct imp__kept *k, struct direction *d, double step)
 {
     enum imp_status st = IMP_OK;
@@ -101,7 +112,11 @@ static enum imp_status difference(struct imp__kept *k, struct direction *d, doub
         place(d, -step);
         note(d, -1);
         IMP_TRY(evaluate(k, k->value[1]));
-        for (size_t i = 0; i < k->n; i++) k->value[0][i] -= k->value[1][i];
+        for (size_t i = 0; i < k->n; i++) {
+            const double above = k->value[0][i], below = k->value[1][i];
+            k->value[0][i] = above - below;
+            k->value[1][i] = fmax(fabs(above), fabs(below));
+        }
     } else { /* (-3 f0 + 4 f1 - f2) = 2 h f' + O(h^3) */
         const double x = d->old[d->only], h = step * imp__check_scale(d->param, d->only);
         const double s = x + 2 * h <= d->param->info.hi ? 1 : -1;
@@ -114,9 +129,12 @@ static enum imp_status difference(struct imp__kept *k, struct direction *d, doub
         IMP_TRY(evaluate(k, k->value[2]));
         place(d, 0);
         note(d, -2 * s);
-        for (size_t i = 0; i < k->n; i++)
-            k->value[0][i] =
-                s * (-3 * k->value[0][i] + 4 * k->value[1][i] - k->value[2][i]);
+        for (size_t i = 0; i < k->n; i++) {
+            const double f0 = 3 * k->value[0][i], f1 = 4 * k->value[1][i],
+                         f2 = k->value[2][i];
+            k->value[0][i] = s * (f1 - f0 - f2);
+            k->value[1][i] = fmax(fmax(fabs(f0), fabs(f1)), fabs(f2));
+        }
     }
 out:
     place(d, 0);
@@ -136,10 +154,10 @@ static double along(const struct imp__kept_walk *w, size_t base, const double *m
 /* The walks' verdict. A walk is judged by the step at which its difference quotient
  * changed least from the step before, and only by what is beyond that change and its
  * rounding: near a kink (total reflection by a metal with k = 0) no quotient settles.
- * f, a [N_STEPS][n]: quotients of one direction and what they should be; worst so far in
- * *row. */
+ * f, a, size [N_STEPS][n]: quotients of one direction, what they should be, and the
+ * largest number each is a difference of; worst so far in *row. */
 static void judge(const struct imp__kept *k, const double *f, const double *a,
-                  struct imp_check_row *row)
+                  const double *size, struct imp_check_row *row)
 {
     for (size_t i = 0; i < k->n; i++) {
         const double L = fabs(k->walks[i].L);
@@ -154,7 +172,8 @@ static void judge(const struct imp__kept *k, const double *f, const double *a,
             best = here;
             step = s;
         }
-        const double allowed = settled + WALK_ROUNDING * L / (2 * steps[step]);
+        const double allowed =
+            settled + WALK_ROUNDING * fmax(L, size[best]) / (2 * steps[step]);
         const double off = fabs(a[best] - f[best]);
         const double error = off <= allowed ? 0
                              : isfinite(settled)
@@ -177,8 +196,9 @@ static enum imp_status check_param(struct imp__kept *k, size_t param)
     struct imp_check_row row[N_STEPS] = {{0}}, verdict = {0};
     double *buffer = imp__alloc(c->ctx, 2 * count, sizeof *buffer);
     double *q = imp__alloc(c->ctx, imp_max(k->n, (size_t)1),
-                           2 * N_STEPS * sizeof *q); /* see judge */
+                           3 * N_STEPS * sizeof *q); /* see judge */
     double *want = q ? q + N_STEPS * k->n : NULL;
+    double *largest = q ? want + N_STEPS * k->n : NULL;
 
     if (!buffer || !q) IMP_TRY(imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check"));
     d.old = buffer;
@@ -200,6 +220,7 @@ static enum imp_status check_param(struct imp__kept *k, size_t param)
                 /* In units of the scale: as large as the logarithmic derivative. */
                 q[(size_t)s * k->n + i] = f / (2 * steps[s]);
                 want[(size_t)s * k->n + i] = a / (2 * steps[s]);
+                largest[(size_t)s * k->n + i] = k->value[1][i];
                 if (!(error > row[s].error) && row[s].step > 0) continue;
                 row[s] = (struct imp_check_row){.step = steps[s],
                                                 .value = a / size,
@@ -207,7 +228,7 @@ static enum imp_status check_param(struct imp__kept *k, size_t param)
                                                 .error = error};
             }
         }
-        judge(k, q, want, &verdict);
+        judge(k, q, want, largest, &verdict);
     }
     int best = 0;
     for (int s = 1; s < N_STEPS; s++)
