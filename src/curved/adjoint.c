@@ -26,7 +26,7 @@ static bool wanted(const struct imp__adjoint *job, size_t ray)
 static enum imp_status slot_make(struct imp__adjoint *job, struct imp__adjoint_slot *s)
 {
     imp_context *ctx = job->plan->ctx;
-    if (job->out->theta) {
+    if (job->out->theta && !s->partial) {
         const enum imp_status st = imp__partial_take(&job->partials, &s->partial);
         if (st != IMP_OK) return st;
     }
@@ -72,7 +72,7 @@ static enum imp_status work(size_t item, int worker, int slot_index, void *paylo
             if (lane[n].taps) imp__lane_taps(job, &lane[n], &b, n, bar);
             n++;
         }
-        if (n == 0) return IMP_OK;
+        if (n == 0) break;
         for (int i = 0; i < n;
              i++) { /* lanes at a start: to the segment before, or done */
             while (lane[i].left == 0 && lane[i].segment > 0) {
@@ -105,6 +105,9 @@ static enum imp_status work(size_t item, int worker, int slot_index, void *paylo
             if (lane[i].taps) imp__lane_taps(job, &lane[i], &b, i, bar);
         }
     }
+    if (slot->partial) imp__partial_add(&job->partials, item, slot->partial);
+    slot->partial = NULL;
+    return IMP_OK;
 }
 
 static enum imp_status commit(size_t item, int slot_index, void *payload)
@@ -112,8 +115,6 @@ static enum imp_status commit(size_t item, int slot_index, void *payload)
     struct imp__adjoint *job = payload;
     struct imp__adjoint_slot *s = &job->slots[slot_index];
     (void)item;
-    if (s->partial) imp__partial_add(&job->partials, s->partial);
-    s->partial = NULL;
     if (s->surfaces) {
         for (size_t i = 0; i < job->n_surfaces; i++)
             for (int k = 0; k < 8; k++) job->out->surfaces[i][k] += s->surfaces[i][k];
@@ -126,15 +127,54 @@ static enum imp_status commit(size_t item, int slot_index, void *payload)
     return IMP_OK;
 }
 
-/* Slices: enough for many threads, few while adding up a large gradient would cost more
- * than the rays (at most n_theta numbers a slice, against n_theta^(1/3) steps or so a
- * ray). Their number depends on the problem alone, so that the sums have one order. */
-static size_t slice_rays(size_t n, size_t n_theta)
+/* ---- Slices -------------------------------------------------------------------- */
+
+#define SLICES_MAX 128
+#define SLICES_MIN 8
+#define LOOK_MAX   4096 /* rays looked at to choose */
+
+/* The share of the field in the boxes of starts and ends of `slices` runs of rays: about
+ * what a slice reaches of the coefficients. */
+static double share(const struct imp__adjoint *job, size_t slices)
 {
-    const double worth = 3 * (double)n / pow(imp_max((double)n_theta, 1.0), 2.0 / 3);
-    const size_t most =
-        imp_clamp(((size_t)1 << 24) / imp_max(n_theta, (size_t)1), (size_t)8, (size_t)64);
-    const size_t slices = (size_t)imp_clamp(worth, 8.0, (double)most);
+    const imp_field *f = job->plan->field;
+    const size_t n = job->rays->n, each = (n + slices - 1) / slices,
+                 stride = (n + LOOK_MAX - 1) / LOOK_MAX;
+    double sum = 0;
+    for (size_t first = 0; first < n; first += each) {
+        imp_v3 lo = f->hi, hi = f->lo;
+        for (size_t i = first; i < imp_min(first + each, n); i += stride) {
+            const struct imp_bend_exit *e = &job->exits[i];
+            if (e->flags & IMP_BEND_DROPPED) continue;
+            for (int k = 0; k < 3; k++) {
+                const double a = job->rays->x[i][k], b = e->x[k];
+                lo[k] = fmin(lo[k], fmin(a, b)), hi[k] = fmax(hi[k], fmax(a, b));
+            }
+        }
+        double part = 1;
+        for (int k = 0; k < 3; k++) {
+            const double a = fmax(lo[k], f->lo[k]), b = fmin(hi[k], f->hi[k]);
+            part *= imp_clamp((b - a) / (f->hi[k] - f->lo[k]), 0.0, 1.0);
+        }
+        sum += part;
+    }
+    return sum / (double)slices;
+}
+
+/* Slices: enough for many threads, few while clearing and adding up what they reach of a
+ * large gradient would cost more than a tenth of the rays (n_theta^(1/3) steps or so a
+ * ray; neighbouring rays reach the same, rays without order all). Their number follows
+ * from the problem alone, so that the sums have one order. */
+static size_t slice_rays(const struct imp__adjoint *job)
+{
+    const size_t n = job->rays->n, n_theta = job->plan->field->n_theta;
+    const double worth = 2 * (double)n / pow(imp_max((double)n_theta, 1.0), 2.0 / 3);
+    const bool bounded =
+        imp__is_finite(job->plan->field->lo) && imp__is_finite(job->plan->field->hi);
+    size_t slices = SLICES_MAX;
+    while (slices > SLICES_MIN &&
+           (double)slices * (bounded ? share(job, slices) : 1) > worth)
+        slices = imp_max(slices - slices / 4, (size_t)SLICES_MIN);
     return imp_max((n + slices - 1) / slices, (size_t)4 * IMP_LANES);
 }
 
@@ -158,10 +198,10 @@ imp_bend_adjoint(const imp_field *field, const struct imp_bend_options *options,
                                .bars = bars,
                                .tap_bars = plan.n_taps > 0 ? tap_bars : NULL,
                                .out = &sum,
-                               .n_surfaces = options ? options->n_surfaces : 0,
-                               .slice = slice_rays(rays->n, field->n_theta)};
+                               .n_surfaces = options ? options->n_surfaces : 0};
     double(*surfaces)[8] = NULL;
     imp__partials_init(&job.partials, ctx, field->n_theta);
+    job.slice = slice_rays(&job);
 
     if (plan.scheme->index_form && plan.options.way == IMP_BEND_REVERSE)
         IMP_TRY(imp__error(
@@ -191,16 +231,18 @@ imp_bend_adjoint(const imp_field *field, const struct imp_bend_options *options,
                                   .rate_unit = "rays",
                                   .units = (double)rays->n};
     IMP_TRY(imp__parallel(ctx, &loop, NULL));
-    if (out->theta) imp__partials_sum(&job.partials, out->theta);
+    struct imp_bend_stats counts;
+    IMP_TRY(imp__count(&plan, rays->n, exits, taps, stats ? &counts : NULL));
+    if (out->theta) IMP_TRY(imp__partials_sum(&job.partials, out->theta));
     if (sum.surfaces) memcpy(out->surfaces, surfaces, job.n_surfaces * sizeof *surfaces);
     if (stats) {
-        imp__count(&plan, rays->n, exits, taps, stats);
+        *stats = counts;
         stats->reversal = job.reversal;
         stats->worst_reversal = job.worst;
     }
 out:
     for (int i = 0; job.slots && i < n_slots; i++) {
-        if (job.slots[i].partial) imp__partial_add(&job.partials, job.slots[i].partial);
+        imp__partial_drop(&job.partials, job.slots[i].partial);
         imp__release(ctx, job.slots[i].surfaces);
         for (int k = 0; job.slots[i].track && k < IMP_LANES; k++)
             imp__track_free(&job.slots[i].track[k]);

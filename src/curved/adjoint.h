@@ -13,23 +13,41 @@
 /* The gradient of one slice of rays. Blocks that were not touched hold nothing. */
 struct imp__partial {
     struct imp__partial *next;
+    size_t slice;
+    int parts_left; /* to be added to the sum */
     double *theta;
     uint8_t *touched; /* [n_blocks] */
 };
+/* A part of the coefficients; slices are added to it in order, by one thread at a time.
+ */
+struct imp__partials_part {
+    size_t first, last; /* blocks */
+    size_t slice;       /* the next one to be added */
+    bool busy;
+};
+#define IMP_PARTIALS_PARTS 16
 /* Buffers are made when a slice begins and none is idle: as many as slices are under way
  * at once. */
 struct imp__partials {
     imp_context *ctx;
     size_t n_theta, n_blocks;
     pthread_mutex_t lock;
-    struct imp__partial *idle, *sum;
+    struct imp__partial *idle, *ready; /* ready: to be added */
+    struct imp__partial *sum;
+    int n_parts;
+    struct imp__partials_part part[IMP_PARTIALS_PARTS];
 };
 void imp__partials_init(struct imp__partials *p, imp_context *ctx, size_t n_theta);
 void imp__partials_free(struct imp__partials *p);
 enum imp_status imp__partial_take(struct imp__partials *p, struct imp__partial **out);
-/* To the sum; the buffer is taken back. One call at a time. */
-void imp__partial_add(struct imp__partials *p, struct imp__partial *own);
-void imp__partials_sum(const struct imp__partials *p, double *theta);
+/* The gradient of slice `slice` (0, 1, ... each once) is complete, and no longer the
+ * caller's. Whoever calls adds what can be added: coefficient by coefficient the order is
+ * that of the slices, and different parts are added by different threads. */
+void imp__partial_add(struct imp__partials *p, size_t slice, struct imp__partial *own);
+/* Of a slice that failed; NULL is fine. */
+void imp__partial_drop(struct imp__partials *p, struct imp__partial *own);
+/* All slices are there: theta = the sum. */
+enum imp_status imp__partials_sum(struct imp__partials *p, double *theta);
 
 /* ---- Rays backwards ------------------------------------------------------------ */
 

@@ -425,8 +425,10 @@ enum imp_status imp__trace_some(const struct imp__plan *p,
                                 const struct imp_bend_rays *rays, size_t first,
                                 size_t last, struct imp_bend_exit *exits,
                                 struct imp_bend_exit *taps);
-void imp__count(const struct imp__plan *p, size_t n, const struct imp_bend_exit *exits,
-                const struct imp_bend_exit *taps, struct imp_bend_stats *stats);
+enum imp_status imp__count(const struct imp__plan *p, size_t n,
+                           const struct imp_bend_exit *exits,
+                           const struct imp_bend_exit *taps,
+                           struct imp_bend_stats *stats);
 /* The event's surface of an exit: of a box, its face there. */
 const struct imp__surface *imp__exit_surface(const struct imp__plan *p, int group,
                                              const struct imp_bend_exit *e);

@@ -243,14 +243,21 @@ const struct imp__surface *imp__exit_surface(const struct imp__plan *p, int grou
 
 /* ---- The call ------------------------------------------------------------------ */
 
-void imp__count(const struct imp__plan *p, size_t n, const struct imp_bend_exit *exits,
-                const struct imp_bend_exit *taps, struct imp_bend_stats *out)
+struct count_job {
+    const struct imp__plan *plan;
+    size_t n;
+    const struct imp_bend_exit *exits, *taps;
+    struct imp_bend_stats *slots, *sum;
+};
+
+static enum imp_status count_work(size_t item, int worker, int slot, void *payload)
 {
+    const struct count_job *j = payload;
+    const struct imp__plan *p = j->plan;
     struct imp_bend_stats s = IMP_BEND_STATS_INIT;
-    if (!out) return;
-    s.rays = n;
-    for (size_t i = 0; i < n; i++) {
-        const struct imp_bend_exit *e = &exits[i];
+    (void)worker;
+    for (size_t i = item * CHUNK; i < imp_min((item + 1) * CHUNK, j->n); i++) {
+        const struct imp_bend_exit *e = &j->exits[i];
         s.steps += e->steps + 1u;
         s.truncated += (e->flags & IMP_BEND_TRUNCATED) != 0;
         s.missed += (e->flags & IMP_BEND_MISSED) != 0;
@@ -259,17 +266,57 @@ void imp__count(const struct imp__plan *p, size_t n, const struct imp_bend_exit 
         s.broken += (e->flags & IMP_BEND_BROKEN) != 0;
         s.energy += (e->flags & IMP_BEND_ENERGY) != 0;
         s.reflected += (e->flags & IMP_BEND_REFLECTED) != 0;
-        for (int k = 0; taps && k < p->n_taps; k++)
+        for (int k = 0; j->taps && k < p->n_taps; k++)
             s.taps_missed +=
-                (taps[i * (size_t)p->n_taps + k].flags & IMP_BEND_TAP_MISSED) != 0;
+                (j->taps[i * (size_t)p->n_taps + k].flags & IMP_BEND_TAP_MISSED) != 0;
         if (e->flags & IMP_BEND_DROPPED) continue;
         s.traced++;
-        struct imp__jet j;
+        struct imp__jet jet;
         const imp_v3 x = imp__v3_load(e->x);
-        imp__field_eval1(p->field, &x, 1, &j);
-        s.worst_energy = fmax(s.worst_energy, fabs(e->norm2 / (j.eta * j.eta) - 1));
+        imp__field_eval1(p->field, &x, 1, &jet);
+        s.worst_energy = fmax(s.worst_energy, fabs(e->norm2 / (jet.eta * jet.eta) - 1));
     }
-    *out = s;
+    j->slots[slot] = s;
+    return IMP_OK;
+}
+
+static enum imp_status count_commit(size_t item, int slot, void *payload)
+{
+    const struct count_job *j = payload;
+    const struct imp_bend_stats *s = &j->slots[slot];
+    (void)item;
+    j->sum->steps += s->steps;
+    j->sum->truncated += s->truncated;
+    j->sum->missed += s->missed;
+    j->sum->started_out += s->started_out;
+    j->sum->grazing += s->grazing;
+    j->sum->broken += s->broken;
+    j->sum->energy += s->energy;
+    j->sum->reflected += s->reflected;
+    j->sum->taps_missed += s->taps_missed;
+    j->sum->traced += s->traced;
+    j->sum->worst_energy = fmax(j->sum->worst_energy, s->worst_energy);
+    return IMP_OK;
+}
+
+enum imp_status imp__count(const struct imp__plan *p, size_t n,
+                           const struct imp_bend_exit *exits,
+                           const struct imp_bend_exit *taps, struct imp_bend_stats *out)
+{
+    if (!out) return IMP_OK;
+    struct imp_bend_stats sum = IMP_BEND_STATS_INIT;
+    struct count_job job = {p, n, exits, taps, NULL, &sum};
+    const struct imp_loop loop = {.n_items = (n + CHUNK - 1) / CHUNK,
+                                  .work = count_work,
+                                  .commit = count_commit,
+                                  .payload = &job};
+    job.slots = imp__alloc(p->ctx, (size_t)imp__pool_slots(p->ctx), sizeof *job.slots);
+    if (!job.slots) return imp__error(p->ctx, IMP_E_NOMEM, "no memory to count rays");
+    const enum imp_status st = imp__parallel(p->ctx, &loop, NULL);
+    imp__release(p->ctx, job.slots);
+    sum.rays = n;
+    if (st == IMP_OK) *out = sum;
+    return st;
 }
 
 struct job {
@@ -307,7 +354,7 @@ enum imp_status imp_bend_trace(const imp_field *field,
                                   .rate_unit = "rays",
                                   .units = (double)rays->n};
     IMP_TRY(imp__parallel(plan.ctx, &loop, NULL));
-    imp__count(&plan, rays->n, exits, taps, stats);
+    IMP_TRY(imp__count(&plan, rays->n, exits, taps, stats));
 out:
     imp__plan_destroy(&plan);
     return st;
