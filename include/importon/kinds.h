@@ -50,6 +50,10 @@ struct imp_input_desc { /* the list ends with {0} */
     const char *unit;
 };
 
+/* Inputs of one object, its children's included: more is an error when it is built, so
+ * that whoever visits an object has room for them on the stack. */
+#define IMP_INPUTS_MAX 32
+
 struct imp_texture;
 /* One input of one object: a constant or a texture. */
 struct imp_input {

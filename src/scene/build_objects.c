@@ -61,6 +61,11 @@ enum imp_status imp__build_bsdf(struct imp_scene *scene, struct imp_node *node,
         b->child_in[b->n_child] = b->n_in;
         b->child[b->n_child++] = child;
         b->n_in += child->n_in;
+        if (b->n_in > IMP_INPUTS_MAX)
+            IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
+                                    "has %d inputs with all that is nested in it; at "
+                                    "most %d are possible",
+                                    b->n_in, IMP_INPUTS_MAX));
     }
     if (b->n_child < ops->min_children)
         IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "a nested bsdf is missing"));

@@ -6,19 +6,6 @@
  * wrong densities, which fresh-seed differences see. */
 #include "bend.h"
 
-#define MAX_INPUTS 32
-
-imp_spec imp__emitter_radiance(const struct imp_scene *scene, int emitter,
-                               const struct imp_emission *x, imp_v3 p)
-{
-    const struct imp_emitter *e = scene->emitters[emitter];
-    const struct imp_texcoord at = {{x->uv[0], x->uv[1]}, p};
-    imp_spec in[MAX_INPUTS], le;
-    imp__inputs_eval(e->input, e->n_in, &at, in);
-    e->ops->eval(e, in, x, &le);
-    return le;
-}
-
 imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk *walk)
 {
     imp_spec L = {0};
@@ -26,7 +13,7 @@ imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk
     if (tracer->active && tracer->active->medium) return imp__bend_frozen(tracer, walk);
     for (const struct imp_vertex *v = walk->last; v; v = v->prev) {
         const struct imp_bsdf *b = v->bsdf;
-        imp_spec in[MAX_INPUTS], f, sum = {0};
+        imp_spec in[IMP_INPUTS_MAX], f, sum = {0};
         if (b) imp__inputs_eval(b->input, b->n_in, &v->at, in);
         if (b && v->shape->interior) imp__bend_inputs(v, in);
         if (b && v->inv_ps > 0) {

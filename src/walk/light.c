@@ -15,12 +15,12 @@ static double power_heuristic(double a, double b)
     return a2 > 0 ? a2 / (a2 + b2) : 0;
 }
 
-/* Radiance of emitter e at x; inputs are looked up on the light. */
-static imp_spec emitter_radiance(const struct imp_emitter *e,
-                                 const struct imp_emission *x, imp_v3 p)
+imp_spec imp__emitter_radiance(const struct imp_scene *scene, int emitter,
+                               const struct imp_emission *x, imp_v3 p)
 {
-    imp_spec in[8], le;
+    const struct imp_emitter *e = scene->emitters[emitter];
     const struct imp_texcoord at = {{x->uv[0], x->uv[1]}, p};
+    imp_spec in[IMP_INPUTS_MAX], le;
     imp__inputs_eval(e->input, e->n_in, &at, in);
     e->ops->eval(e, in, x, &le);
     return le;
@@ -49,7 +49,7 @@ void imp__emission_meet(struct imp_step *s, struct imp_vertex *v, int emitter,
     } else if (s->depth > 0 && s->tracer->integrator->bsdf_samples == 0 && s->pdf > 0) {
         v->e_weight = 0;
     }
-    v->e += emitter_radiance(e, x, v->at.p) * v->e_weight;
+    v->e += imp__emitter_radiance(s->scene, emitter, x, v->at.p) * v->e_weight;
 }
 
 void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
@@ -85,7 +85,7 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
     if (imp_unlikely(s->known) && imp__mixes(s, v->bsdf))
         pdf_bsdf = imp__mixture_pdf(s, pdf_bsdf, ls.wi);
     const struct imp_emission x = {{ls.uv[0], ls.uv[1]}, ls.dist, ls.cos_light, -ls.wi};
-    const imp_spec le = emitter_radiance(e, &x, ls.p);
+    const imp_spec le = imp__emitter_radiance(scene, light, &x, ls.p);
     imp_spec f;
     v->bsdf->ops->eval(v->bsdf, v->in, &dirs, &f);
     const struct imp_active *active = s->tracer->active;

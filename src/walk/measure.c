@@ -215,7 +215,7 @@ static imp_spec albedo(const struct imp_measure *m, const struct imp_hit *hit,
     const struct imp_texcoord where = {{at->uv[0], at->uv[1]}, at->p};
     const struct imp_frame frame = {at->s, at->t, at->n};
     const imp_v3 wo = imp__to_local(&frame, -d);
-    imp_spec in[32], rho;
+    imp_spec in[IMP_INPUTS_MAX], rho;
     imp__inputs_eval(b->input, b->n_in, &where, in);
     imp__bsdf_albedo(b, in, &wo, &rho);
     return rho;

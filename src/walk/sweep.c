@@ -6,8 +6,6 @@
 #include "bend.h"
 #include "dims.h"
 
-#define MAX_INPUTS 32
-
 imp_spec imp__walk_fold(struct imp_walk *walk)
 {
     imp_spec L = {0};
@@ -38,7 +36,7 @@ static void glow_d(const struct imp_vertex *v, imp_spec *d)
 static void emitter_d(const struct imp_emitter *e, const struct imp_emission *x,
                       const struct imp_texcoord *at, imp_spec *d)
 {
-    imp_spec in[MAX_INPUTS];
+    imp_spec in[IMP_INPUTS_MAX];
     imp__inputs_eval(e->input, e->n_in, at, in);
     e->ops->eval_d(e, in, x, d);
 }
@@ -98,7 +96,7 @@ static void emitter_scatter(const struct imp_tracer *tracer, int emitter,
                             imp_spec bar, struct imp_sink *sink)
 {
     const struct imp_emitter *e = tracer->scene->emitters[emitter];
-    imp_spec d[MAX_INPUTS];
+    imp_spec d[IMP_INPUTS_MAX];
     emitter_d(e, x, &at, d);
     for (int j = 0; j < e->n_in; j++) d[j] *= bar;
     imp__inputs_scatter(e->input, e->n_in, &at, d, sink);
@@ -120,7 +118,7 @@ void imp__walk_sweep(const struct imp_tracer *tracer, const struct imp_walk *wal
             emitter_scatter(tracer, v->light, &v->l_at, light_texcoord(v),
                             P * v->l_f * v->l_weight, sink);
         if (bsdf_active(active, b)) {
-            imp_spec bar[MAX_INPUTS], d[MAX_INPUTS];
+            imp_spec bar[IMP_INPUTS_MAX], d[IMP_INPUTS_MAX];
             bool any = false;
             for (int j = 0; j < b->n_in; j++) bar[j] = (imp_spec){0};
             if (v->glows) {
@@ -166,7 +164,7 @@ static imp_spec emitter_tangent(const struct imp_tracer *tracer, int emitter,
                                 const struct direction *direction)
 {
     const struct imp_emitter *e = tracer->scene->emitters[emitter];
-    imp_spec d[MAX_INPUTS], in_dot[MAX_INPUTS], sum = {0};
+    imp_spec d[IMP_INPUTS_MAX], in_dot[IMP_INPUTS_MAX], sum = {0};
     emitter_d(e, x, &at, d);
     imp__inputs_tangent(e->input, e->n_in, &at, direction_at, direction, in_dot);
     for (int j = 0; j < e->n_in; j++) sum += d[j] * in_dot[j];
@@ -193,7 +191,7 @@ imp_spec imp__walk_tangent(const struct imp_tracer *tracer, const struct imp_wal
                                      &direction) *
                      v->l_f * v->l_weight;
         if (!bsdf_active(active, b)) continue;
-        imp_spec in_dot[MAX_INPUTS], d[MAX_INPUTS];
+        imp_spec in_dot[IMP_INPUTS_MAX], d[IMP_INPUTS_MAX];
         imp__inputs_tangent(b->input, b->n_in, &v->at, direction_at, &direction, in_dot);
         if (v->glows) {
             glow_d(v, d);

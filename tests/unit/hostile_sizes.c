@@ -406,6 +406,42 @@ static void small_texture(void)
     imp_scene_destroy(s);
 }
 
+/* Inputs of nested materials double with every level: 3 * 2^levels here. */
+static void nested(void)
+{
+    for (int levels = 1; levels <= 40; levels += levels < 5 ? 1 : 35) {
+        char rest[8192] = "<emitter type='constant'/><bsdf type='phong' id='m0'/>";
+        for (int k = 0; k < levels; k++) {
+            const size_t used = strlen(rest);
+            snprintf(
+                rest + used, sizeof rest - used,
+                "<bsdf type='twosided' id='m%d'><ref id='m%d'/><ref id='m%d'/></bsdf>",
+                k + 1, k, k);
+        }
+        const size_t used = strlen(rest);
+        snprintf(rest + used, sizeof rest - used,
+                 "<shape type='sphere'><ref id='m%d'/></shape>", levels);
+        imp_scene *s = NULL;
+        const enum imp_status st = load("", SIZE(4, 4), rest, &s);
+        if (3 * pow(2, levels) > IMP_INPUTS_MAX) {
+            tap_ok(st == IMP_E_SCENE && !s, "%d levels of materials # %s", levels,
+                   imp_last_error(ctx));
+            continue;
+        }
+        imp_problem *p = test_problem(ctx, s, "*");
+        struct imp_run run = IMP_RUN_INIT;
+        static float seed[4 * 4 * 3];
+        double g[64];
+        for (int i = 0; i < 48; i++) seed[i] = 1;
+        test_must(ctx, imp_problem_reverse(p, seed, &run, g, NULL));
+        bool finite = true;
+        for (size_t i = 0; i < imp_problem_n(p); i++) finite &= isfinite(g[i]);
+        tap_ok(finite, "%d levels of materials have a gradient", levels);
+        imp_problem_destroy(p);
+        imp_scene_destroy(s);
+    }
+}
+
 int main(void)
 {
     struct imp_context_options o = IMP_CONTEXT_OPTIONS_INIT;
@@ -420,6 +456,7 @@ int main(void)
     empty();
     many_shapes();
     small_texture();
+    nested();
     imp_context_destroy(ctx);
     tap_ok(live == 0, "all memory is given back");
     return tap_done();
