@@ -83,7 +83,7 @@ enum imp_status imp__problem_tracer(const struct imp_problem *p,
     }
     *out = (struct imp_tracer){p->scene,  integrator,
                                sensor,    &p->active,
-                               run->seed, imp__guide_of(p->scene, integrator, run)};
+                               run->seed, imp__guide_of(p->scene, integrator, run->guide)};
     return p->active.medium ? imp__bend_survey(out) : IMP_OK;
 }
 

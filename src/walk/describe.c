@@ -2,176 +2,152 @@
  *
  * One walk told vertex by vertex: Stam's single-path view, as text to read or JSON to
  * draw. */
-#include "base/number.h"
+#include "base/text.h"
 #include "measure.h"
 #include <stdio.h>
 #include <string.h>
 
-struct text {
-    imp_context *ctx;
-    char *bytes;
-    size_t used, capacity;
-    bool failed;
-};
-
-IMP_PRINTF(2, 3) static void put(struct text *t, const char *format, ...)
+static void put_number(struct imp_text *t, double x)
 {
-    char line[512];
-    va_list args;
-    va_start(args, format);
-    const int n = imp__vformat(line, sizeof line, format, args);
-    va_end(args);
-    if (n < 0 || t->failed) return;
-    const size_t length = imp_min((size_t)n, sizeof line - 1);
-    char *grown = imp__grow(t->ctx, t->bytes, &t->capacity, t->used + length + 1, 1);
-    if (!grown) {
-        t->failed = true;
-        return;
-    }
-    t->bytes = grown;
-    memcpy(t->bytes + t->used, line, length);
-    t->used += length;
-    t->bytes[t->used] = 0;
+    if (isfinite(x)) imp__put(t, "%.9g", x);
+    else imp__put(t, "null");
 }
-
-static void put_number(struct text *t, double x)
+static void put_vector(struct imp_text *t, const char *key, imp_v3 v, int n)
 {
-    if (isfinite(x)) put(t, "%.9g", x);
-    else put(t, "null");
-}
-static void put_vector(struct text *t, const char *key, imp_v3 v, int n)
-{
-    put(t, "\"%s\":[", key);
+    imp__put(t, "\"%s\":[", key);
     for (int c = 0; c < n; c++) {
-        if (c) put(t, ",");
+        if (c) imp__put(t, ",");
         put_number(t, v[c]);
     }
-    put(t, "]");
+    imp__put(t, "]");
 }
-static void put_string(struct text *t, const char *key, const char *s)
+static void put_string(struct imp_text *t, const char *key, const char *s)
 {
-    put(t, "\"%s\":\"", key);
+    imp__put(t, "\"%s\":\"", key);
     for (; *s; s++)
-        put(t,
-            *s == '"' || *s == '\\'  ? "\\%c"
-            : (unsigned char)*s < 32 ? "?"
-                                     : "%c",
-            *s);
-    put(t, "\"");
+        imp__put(t,
+                 *s == '"' || *s == '\\'  ? "\\%c"
+                 : (unsigned char)*s < 32 ? "?"
+                                          : "%c",
+                 *s);
+    imp__put(t, "\"");
 }
 
-static void json(struct text *t, const struct imp_scene *scene, const struct imp_walk *w,
-                 int x, int y, int64_t sample)
+static void json(struct imp_text *t, const struct imp_scene *scene,
+                 const struct imp_walk *w, int x, int y, int64_t sample)
 {
     const int C = scene->channels;
-    put(t, "{\"pixel\":[%d,%d],\"sample\":%lld,", x, y, (long long)sample);
-    put(t, "\"film\":[%.9g,%.9g],", w->px, w->py);
+    imp__put(t, "{\"pixel\":[%d,%d],\"sample\":%lld,", x, y, (long long)sample);
+    imp__put(t, "\"film\":[%.9g,%.9g],", w->px, w->py);
     put_vector(t, "origin", w->ray.o, 3);
-    put(t, ",");
+    imp__put(t, ",");
     put_vector(t, "direction", w->ray.d, 3);
-    put(t, ",");
+    imp__put(t, ",");
     put_vector(t, "radiance", w->L, C);
-    put(t, ",\"absorbed\":%s,\"dropped\":%d,\"vertices\":[",
-        w->absorbed ? "true" : "false", (int)w->dropped);
+    imp__put(t, ",\"absorbed\":%s,\"dropped\":%d,\"vertices\":[",
+             w->absorbed ? "true" : "false", (int)w->dropped);
     imp_spec beta = imp__spec(1);
     for (const struct imp_vertex *v = w->first; v; v = v->next) {
-        put(t, v->prev ? ",{" : "{");
+        imp__put(t, v->prev ? ",{" : "{");
         put_string(t, "shape", v->shape ? v->shape->name : "");
-        put(t, ",");
+        imp__put(t, ",");
         put_string(t, "bsdf", v->bsdf ? v->bsdf->name : "");
-        put(t, ",");
+        imp__put(t, ",");
         if (v->shape) {
             put_vector(t, "position", v->at.p, 3);
-            put(t, ",");
+            imp__put(t, ",");
             put_vector(t, "normal", v->ng, 3);
-            put(t, ",\"uv\":[%.9g,%.9g],\"distance\":%.9g,", v->at.uv[0], v->at.uv[1],
-                v->t);
+            imp__put(t, ",\"uv\":[%.9g,%.9g],\"distance\":%.9g,", v->at.uv[0],
+                     v->at.uv[1], v->t);
         } else {
             put_vector(t, "escapes", v->at.p, 3);
-            put(t, ",");
+            imp__put(t, ",");
         }
         put_vector(t, "throughput", beta, C);
-        put(t, ",");
+        imp__put(t, ",");
         put_vector(t, "emission", v->e, C);
-        put(t, ",");
+        imp__put(t, ",");
         if (v->light >= 0) {
             put_string(t, "light", scene->emitters[v->light]->name);
-            put(t, ",");
+            imp__put(t, ",");
             if (isfinite(v->l_at.dist)) {
                 put_vector(t, "light_position", v->l_p, 3);
-                put(t, ",");
+                imp__put(t, ",");
             }
             put_vector(t, "light_sample", v->l_f * v->l_le * v->l_weight, C);
-            put(t, ",");
+            imp__put(t, ",");
         } else if (v->l_weight > 0) {
-            put(t, "\"light\":null,\"light_blocked\":true,");
+            imp__put(t, "\"light\":null,\"light_blocked\":true,");
         }
         if (v->inv_ps > 0) {
-            put(t, "\"lobe\":%d,\"pdf\":", v->dirs.lobe);
+            imp__put(t, "\"lobe\":%d,\"pdf\":", v->dirs.lobe);
             put_number(t, v->pdf);
-            put(t, ",\"survival\":%.9g,", v->survive);
+            imp__put(t, ",\"survival\":%.9g,", v->survive);
         }
         put_vector(t, "weight", v->w, C);
-        put(t, ",");
+        imp__put(t, ",");
         put_vector(t, "arriving", v->lin, C);
-        put(t, "}");
+        imp__put(t, "}");
         beta *= v->w;
     }
-    put(t, "]}\n");
+    imp__put(t, "]}\n");
 }
 
-static void plain_spec(struct text *t, const char *name, imp_spec s, int C)
+static void plain_spec(struct imp_text *t, const char *name, imp_spec s, int C)
 {
-    put(t, "    %-12s", name);
-    for (int c = 0; c < C; c++) put(t, " %12.6g", s[c]);
-    put(t, "\n");
+    imp__put(t, "    %-12s", name);
+    for (int c = 0; c < C; c++) imp__put(t, " %12.6g", s[c]);
+    imp__put(t, "\n");
 }
 
-static void plain(struct text *t, const struct imp_scene *scene, const struct imp_walk *w,
-                  int x, int y, int64_t sample)
+static void plain(struct imp_text *t, const struct imp_scene *scene,
+                  const struct imp_walk *w, int x, int y, int64_t sample)
 {
     const int C = scene->channels;
-    put(t, "walk: pixel %d,%d sample %lld, film position %.4f %.4f\n", x, y,
-        (long long)sample, w->px, w->py);
-    put(t, "  from (%.6g, %.6g, %.6g) along (%.6g, %.6g, %.6g)\n", w->ray.o[0],
-        w->ray.o[1], w->ray.o[2], w->ray.d[0], w->ray.d[1], w->ray.d[2]);
+    imp__put(t, "walk: pixel %d,%d sample %lld, film position %.4f %.4f\n", x, y,
+             (long long)sample, w->px, w->py);
+    imp__put(t, "  from (%.6g, %.6g, %.6g) along (%.6g, %.6g, %.6g)\n", w->ray.o[0],
+             w->ray.o[1], w->ray.o[2], w->ray.d[0], w->ray.d[1], w->ray.d[2]);
     imp_spec beta = imp__spec(1);
     int k = 0;
     for (const struct imp_vertex *v = w->first; v; v = v->next, k++) {
         if (v->shape)
-            put(t, "  %d: %s (%s) at (%.6g, %.6g, %.6g), distance %.6g, uv %.4f %.4f\n",
-                k, v->shape->name, *v->bsdf->name ? v->bsdf->name : "black", v->at.p[0],
-                v->at.p[1], v->at.p[2], v->t, v->at.uv[0], v->at.uv[1]);
+            imp__put(t,
+                     "  %d: %s (%s) at (%.6g, %.6g, %.6g), distance %.6g, uv %.4f %.4f\n",
+                     k, v->shape->name, *v->bsdf->name ? v->bsdf->name : "black",
+                     v->at.p[0], v->at.p[1], v->at.p[2], v->t, v->at.uv[0], v->at.uv[1]);
         else
-            put(t, "  %d: leaves the scene along (%.6g, %.6g, %.6g)\n", k, v->at.p[0],
-                v->at.p[1], v->at.p[2]);
+            imp__put(t, "  %d: leaves the scene along (%.6g, %.6g, %.6g)\n", k,
+                     v->at.p[0], v->at.p[1], v->at.p[2]);
         plain_spec(t, "throughput", beta, C);
         if (v->emitter >= 0 || v->glows) plain_spec(t, "emission", v->e, C);
         if (v->light >= 0) {
-            put(t, "    light        %s\n", scene->emitters[v->light]->name);
+            imp__put(t, "    light        %s\n", scene->emitters[v->light]->name);
             plain_spec(t, "light sample", v->l_f * v->l_le * v->l_weight, C);
         } else if (v->l_weight > 0) {
-            put(t, "    light        blocked\n");
+            imp__put(t, "    light        blocked\n");
         }
         if (v->inv_ps > 0) {
             if (v->dirs.lobe == IMP_SMOOTH)
-                put(t, "    goes on      pdf %.6g per sr, survival %.6g\n", v->pdf,
-                    v->survive);
+                imp__put(t, "    goes on      pdf %.6g per sr, survival %.6g\n", v->pdf,
+                         v->survive);
             else
-                put(t,
+                imp__put(
+                    t,
                     "    goes on      delta lobe %d, probability %.6g, survival %.6g\n",
                     v->dirs.lobe, v->pdf, v->survive);
             plain_spec(t, "weight", v->w, C);
             plain_spec(t, "arriving", v->lin, C);
-            if (!v->next) put(t, "    leaves the scene\n");
+            if (!v->next) imp__put(t, "    leaves the scene\n");
         } else {
-            put(t, "    ends here%s\n", w->absorbed && !v->next ? ", absorbed" : "");
+            imp__put(t, "    ends here%s\n", w->absorbed && !v->next ? ", absorbed" : "");
         }
         beta *= v->w;
     }
-    if (!w->first) put(t, "  meets nothing\n");
+    if (!w->first) imp__put(t, "  meets nothing\n");
     if (w->dropped)
-        put(t,
+        imp__put(
+            t,
             w->dropped == IMP_DROP_LONG ? "  dropped: nothing ended it\n"
             : w->dropped == IMP_DROP_BENT
                 ? "  dropped: a bent ray came to no end, or to what media cannot hold\n"
@@ -202,22 +178,25 @@ enum imp_status imp_walk_describe(const imp_scene *scene, const struct imp_run *
                               : IMP_E_SCENE,
                           "the scene's integrator makes no walks; "
                           "use path, direct or stam");
-    const struct imp_tracer tracer = {scene,     integrator,
-                                      sensor,    NULL,
-                                      run->seed, imp__guide_of(scene, integrator, run)};
+    const struct imp_tracer tracer = {.scene = scene,
+                                      .integrator = integrator,
+                                      .sensor = sensor,
+                                      .seed = run->seed,
+                                      .guide =
+                                          imp__guide_of(scene, integrator, run->guide)};
     struct imp_arena arena;
     imp__arena_init(&arena, scene->ctx);
     struct imp_walk walk;
     imp__walk_trace(&tracer, &arena, x, y, sample, &walk);
-    struct text t = {.ctx = scene->ctx};
+    struct imp_text t = {.ctx = scene->ctx};
     if (as_json) json(&t, scene, &walk, x, y, sample);
     else plain(&t, scene, &walk, x, y, sample);
     const bool failed = t.failed || walk.dropped == IMP_DROP_MEMORY;
     imp__arena_free(&arena);
     if (failed) {
-        imp__release(scene->ctx, t.bytes);
+        imp__bytes_free(scene->ctx, &t.bytes);
         return imp__error(scene->ctx, IMP_E_NOMEM, "no memory to describe the walk");
     }
-    *out = t.bytes;
+    *out = (char *)t.bytes.data;
     return IMP_OK;
 }

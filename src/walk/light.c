@@ -46,8 +46,6 @@ void imp__emission_meet(struct imp_step *s, struct imp_vertex *v, int emitter,
                                : light_pmf(s->scene, emitter);
         const double pe = pmf * e->ops->pdf(e, &s->from, &s->d, hit, at);
         v->e_weight *= power_heuristic(s->pdf, pe);
-    } else if (s->depth > 0 && s->tracer->integrator->bsdf_samples == 0 && s->pdf > 0) {
-        v->e_weight = 0;
     }
     v->e += imp__emitter_radiance(s->scene, emitter, x, v->at.p) * v->e_weight;
 }

@@ -1,6 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "measure.h"
 #include "base/film.h"
+#include "base/text.h"
+#include "color/rgb.h"
 #include "dims.h"
 #include <stdio.h>
 #include <string.h>
@@ -45,26 +47,15 @@ const struct imp_integrator *imp__radiance_integrator(const struct imp_scene *sc
 /* ---- Channel names ------------------------------------------------------------- */
 
 struct names {
-    imp_context *ctx;
-    char *text;
-    size_t used, capacity;
+    struct imp_text text;
     int n;
-    bool failed;
 };
 
 static void names_add(struct names *s, const char *prefix, const char *slot,
                       const char *channel)
 {
-    char name[256];
-    snprintf(name, sizeof name, "%s%s%s%s", prefix, slot, *slot ? "." : "", channel);
-    const size_t n = strlen(name) + 2;
-    char *grown = imp__grow(s->ctx, s->text, &s->capacity, s->used + n, 1);
-    if (!grown) {
-        s->failed = true;
-        return;
-    }
-    s->text = grown;
-    s->used += (size_t)snprintf(s->text + s->used, n, "%s%s", s->n ? "," : "", name);
+    imp__put(&s->text, "%s%s%s%s%s", s->n ? "," : "", prefix, slot, *slot ? "." : "",
+             channel);
     s->n++;
 }
 
@@ -120,11 +111,11 @@ enum imp_status imp__measure_create(const struct imp_scene *scene,
     const struct imp_sensor *sensor;
     const enum imp_status st = imp__run_sensor(scene, run, &sensor);
     if (st != IMP_OK) return st;
-    struct names names = {.ctx = scene->ctx};
+    struct names names = {.text.ctx = scene->ctx};
     names_make(&names, scene, sensor);
-    if (names.failed || names.n > IMP_MEASURE_MAX) {
-        imp__release(scene->ctx, names.text);
-        return names.failed
+    if (names.text.failed || names.n > IMP_MEASURE_MAX) {
+        imp__bytes_free(scene->ctx, &names.text.bytes);
+        return names.text.failed
                    ? imp__error(scene->ctx, IMP_E_NOMEM, "no memory for channels")
                    : imp__error(scene->ctx, IMP_E_SCENE, "more than %d channels",
                                 IMP_MEASURE_MAX);
@@ -135,7 +126,7 @@ enum imp_status imp__measure_create(const struct imp_scene *scene,
                                 .guide = run->guide,
                                 .spp = run->spp > 0 ? run->spp : sensor->spp,
                                 .n = names.n,
-                                .names = names.text};
+                                .names = (char *)names.text.bytes.data};
     return IMP_OK;
 }
 
@@ -146,16 +137,11 @@ void imp__measure_destroy(struct imp_measure *m)
 
 /* ---- Values -------------------------------------------------------------------- */
 
-static double luminance(imp_spec c)
-{
-    return 0.212671 * c[0] + 0.715160 * c[1] + 0.072169 * c[2];
-}
+static double luminance(imp_spec c) { return imp__luminance(c[0], c[1], c[2]); }
 
 static void to_xyz(imp_spec c, double xyz[3])
 {
-    xyz[0] = 0.412453 * c[0] + 0.357580 * c[1] + 0.180423 * c[2];
-    xyz[1] = luminance(c);
-    xyz[2] = 0.019334 * c[0] + 0.119193 * c[1] + 0.950227 * c[2];
+    imp__rgb_to_xyz((double[3]){c[0], c[1], c[2]}, xyz);
 }
 
 int imp__measure_base(const struct imp_measure *m, imp_spec L, double alpha,
@@ -278,15 +264,13 @@ static bool radiance(const struct imp_measure *m, const struct imp_integrator *i
                      struct imp_arena *arena, int x, int y, int64_t sample, imp_spec *L,
                      double *alpha, struct imp_walk *walk)
 {
-    const struct imp_tracer tracer = {
-        m->scene,
-        integrator,
-        m->sensor,
-        NULL,
-        m->seed,
-        m->scene->n_media == 0 && integrator->kind == IMP_INTEGRATOR_PATH ? m->guide
-                                                                          : NULL};
     if (is_radiance(integrator)) {
+        const struct imp_tracer tracer = {
+            .scene = m->scene,
+            .integrator = integrator,
+            .sensor = m->sensor,
+            .seed = m->seed,
+            .guide = imp__guide_of(m->scene, integrator, m->guide)};
         const struct imp_arena_mark mark = imp__arena_mark(arena);
         imp__walk_trace(&tracer, arena, x, y, sample, walk);
         *L = walk->L;
@@ -297,7 +281,8 @@ static bool radiance(const struct imp_measure *m, const struct imp_integrator *i
     /* depth: the walk's film position and lens, its first hit only */
     static const struct imp_integrator none = {
         .kind = IMP_INTEGRATOR_PATH, .max_depth = 0, .rr_depth = 5};
-    const struct imp_tracer look = {m->scene, &none, m->sensor, NULL, m->seed, NULL};
+    const struct imp_tracer look = {
+        .scene = m->scene, .integrator = &none, .sensor = m->sensor, .seed = m->seed};
     const struct imp_arena_mark mark = imp__arena_mark(arena);
     imp__walk_trace(&look, arena, x, y, sample, walk);
     *L = imp__spec(walk->first && walk->first->shape ? walk->first->t : 0);

@@ -22,8 +22,7 @@ static bool bsdf_active(const struct imp_active *a, const struct imp_bsdf *b)
     return b && b->index >= 0 && a->bsdf[b->index];
 }
 
-/* ---- Lane-wise derivatives of a vertex's three pieces with respect to its inputs ----
- */
+/* ---- Lane by lane, d of a vertex's three pieces / d its inputs ------------------ */
 
 /* E_k through the BSDF's own emission: d[n_in]. */
 static void glow_d(const struct imp_vertex *v, imp_spec *d)
@@ -53,19 +52,18 @@ static struct imp_texcoord emission_texcoord(const struct imp_vertex *v)
 /* Stam's exponent by the attached form, or only its first term as in his App. C
  * (gradients.md 4, E9): replaces the detached derivative of the inputs where the kind
  * offers it. */
-static void attached_d(const struct imp_tracer *tracer, const struct imp_walk *walk,
-                       const struct imp_vertex *v, int depth, imp_spec *d)
+static void attached_d(const struct imp_walk *walk, const struct imp_vertex *v, int depth,
+                       imp_spec *d)
 {
     const struct imp_bsdf *b = v->bsdf;
     if (!b->ops->sample_d) return;
     const double u[3] = {imp__u01(walk->key, imp__dim(depth, IMP_DIM_LOBE)),
                          imp__u01(walk->key, imp__dim(depth, IMP_DIM_DIR_U)),
                          imp__u01(walk->key, imp__dim(depth, IMP_DIM_DIR_V))};
-    (void)tracer;
     for (int j = 0; j < b->n_in; j++) {
         imp_spec dweight;
         imp_v3
-            dwi; /* multiplies the gradient of what arrives, which is 0 where allowed */
+            dwi; /* its factor, the slope of what arrives, is 0 where this is allowed */
         if (b->ops->sample_d(b, v->in, u, &v->dirs, j, &dweight, &dwi))
             d[j] = dweight * (v->inv_ps * v->pdf); /* 1/s */
     }
@@ -78,7 +76,7 @@ static void step_d(const struct imp_tracer *tracer, const struct imp_walk *walk,
     v->bsdf->ops->eval_d(v->bsdf, v->in, &v->dirs, d);
     for (int j = 0; j < v->bsdf->n_in; j++) d[j] *= v->inv_ps;
     if (tracer->integrator->alpha_gradient != IMP_ALPHA_DETACHED)
-        attached_d(tracer, walk, v, depth, d);
+        attached_d(walk, v, depth, d);
 }
 
 /* B_k through the BSDF. */

@@ -6,8 +6,7 @@
  * its value is a product of. With E emission met, B the light sample and w = f/(p s) the
  * step weight (f holds the cosine), the radiance leaving vertex k towards the sensor is
  *
- *     L_k = E_k + B_k + w_k L_{k+1}                                   (fold, far end
- * first)
+ *     L_k = E_k + B_k + w_k L_{k+1}                               (fold, far end first)
  *
  * The sweep carries the adjoint P from the sensor outwards, P_{k+1} = P_k w_k, and at
  * every vertex a piece of gradient falls off (Stam 2020, Eq. 14 on one path; gradients.md
@@ -100,9 +99,9 @@ struct imp_tracer {
     const struct imp_scene *scene;
     const struct imp_integrator *integrator; /* PATH, DIRECT or STAM */
     const struct imp_sensor *sensor;
-    const struct imp_active
-        *active; /* NULL: value only. Else walks go on through factors
-                    that are zero but have a derivative (gradients.md 9.2) */
+    /* NULL: value only. Else walks go on through factors that are zero but have a
+     * derivative (gradients.md 9.2). */
+    const struct imp_active *active;
     uint64_t seed;
     const struct imp_guide *guide; /* of PATH; NULL: none */
 };
@@ -111,9 +110,9 @@ struct imp_tracer {
  * scenes that finite elements know. */
 static inline const struct imp_guide *imp__guide_of(const struct imp_scene *scene,
                                                     const struct imp_integrator *i,
-                                                    const struct imp_run *run)
+                                                    const struct imp_guide *guide)
 {
-    return i->kind == IMP_INTEGRATOR_PATH && scene->n_media == 0 ? run->guide : NULL;
+    return i->kind == IMP_INTEGRATOR_PATH && scene->n_media == 0 ? guide : NULL;
 }
 
 /* Record walk (x, y, sample) of the picture (x, y from the crop's corner) in the arena

@@ -1,0 +1,19 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Text that grows: written piece by piece, asked once at the end whether it all fitted.
+ */
+#ifndef IMP_BASE_TEXT_H
+#define IMP_BASE_TEXT_H
+
+#include "file.h"
+
+struct imp_text { /* {.ctx = ctx} is empty; imp__bytes_free(ctx, &bytes) */
+    imp_context *ctx;
+    struct imp_bytes bytes; /* a zero byte follows, which `size` does not count */
+    bool failed;            /* out of memory: later pieces are dropped */
+};
+
+/* printf to the end, with a decimal point whatever the host calls it. */
+IMP_PRINTF(2, 3) void imp__put(struct imp_text *t, const char *format, ...);
+
+#endif
