@@ -6,8 +6,8 @@
 #ifndef TOY_GOAL_H
 #define TOY_GOAL_H
 
-#include "inverse/optimize.h"
 #include "math/rng.h"
+#include "search/optimize.h"
 #include <math.h>
 #include <string.h>
 

@@ -6,8 +6,8 @@
  * derivative's share of a fine number is 1/8 of the coarse one's. Adam's rate is halved
  * explicitly. */
 #include "bend.h"
-#include "inverse/checkpoint.h"
 #include "lbfgs.h"
+#include "search/checkpoint.h"
 #include <stdio.h>
 #include <string.h>
 

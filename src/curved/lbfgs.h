@@ -2,7 +2,7 @@
 #ifndef IMP_CURVED_LBFGS_H
 #define IMP_CURVED_LBFGS_H
 
-#include "inverse/optimize.h"
+#include "search/optimize.h"
 
 /* As imp__optimize, for objectives without noise; `s` was created for IMP_LBFGS. */
 enum imp_status imp__lbfgs(const struct imp__goal *goal,

@@ -13,8 +13,8 @@
 #define IMP_INVERSE_DESIGN_H
 
 #include "elements/elements.h"
-#include "optimize.h"
 #include "problem.h"
+#include "search/optimize.h"
 
 struct imp__design {
     imp_elements *e;

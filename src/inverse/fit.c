@@ -2,7 +2,7 @@
  *
  * Fit: run an optimiser on a problem, and say how well its answer is known. */
 #include "fit.h"
-#include "covariance.h"
+#include "search/covariance.h"
 #include <math.h>
 #include <string.h>
 

@@ -4,8 +4,8 @@
 #ifndef IMP_INVERSE_FIT_H
 #define IMP_INVERSE_FIT_H
 
-#include "checkpoint.h"
 #include "problem.h"
+#include "search/checkpoint.h"
 
 struct imp__fit {
     struct imp_problem *problem;

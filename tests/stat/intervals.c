@@ -4,7 +4,7 @@
  * with its own noise, fitted with Monte Carlo noise of about the same size. And they must
  * say nothing about what the data do not determine. */
 #include "imp_tap.h"
-#include "inverse/covariance.h"
+#include "search/covariance.h"
 #include "toy_goal.h"
 
 static imp_context *ctx;

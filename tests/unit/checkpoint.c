@@ -2,7 +2,7 @@
  *
  * A search that went through a file has the bits of one that did not; a file of another
  * fit, a damaged or a truncated one is refused and changes nothing. */
-#include "inverse/checkpoint.h"
+#include "search/checkpoint.h"
 #include "imp_tap.h"
 #include "toy_goal.h"
 #include <stdio.h>

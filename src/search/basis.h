@@ -3,8 +3,8 @@
  * Directions in which a method that treats each coordinate for itself should walk: the
  * eigenvectors of the Gauss-Newton matrix in units of the scales, where the objective has
  * no valleys across the axes. */
-#ifndef IMP_INVERSE_BASIS_H
-#define IMP_INVERSE_BASIS_H
+#ifndef IMP_SEARCH_BASIS_H
+#define IMP_SEARCH_BASIS_H
 
 #include "optimize.h"
 

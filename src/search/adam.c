@@ -71,26 +71,27 @@ out:
 
 /* ---- Directions ---------------------------------------------------------------- */
 
+/* out_i = sum_j V[i row + j column] in_j */
+static void rotate(const struct imp__search *s, size_t row, size_t column,
+                   const double *in, double *out)
+{
+    const size_t n = s->n;
+    memcpy(out, in, n * sizeof *out);
+    for (size_t i = 0; turned(s) && i < n; i++) {
+        out[i] = 0;
+        for (size_t j = 0; j < n; j++)
+            out[i] += s->array[V][i * row + j * column] * in[j];
+    }
+}
 /* out = V in: numbers of the variables, along the directions. */
 static void along(const struct imp__search *s, const double *in, double *out)
 {
-    const size_t n = s->n;
-    memcpy(out, in, n * sizeof *out);
-    for (size_t j = 0; turned(s) && j < n; j++) {
-        out[j] = 0;
-        for (size_t k = 0; k < n; k++) out[j] += s->array[V][j * n + k] * in[k];
-    }
+    rotate(s, s->n, 1, in, out);
 }
-
 /* out = V^T in */
 static void back(const struct imp__search *s, const double *in, double *out)
 {
-    const size_t n = s->n;
-    memcpy(out, in, n * sizeof *out);
-    for (size_t k = 0; turned(s) && k < n; k++) {
-        out[k] = 0;
-        for (size_t j = 0; j < n; j++) out[k] += s->array[V][j * n + k] * in[j];
-    }
+    rotate(s, 1, s->n, in, out);
 }
 
 /* Directions from A and ALIGNED. What is known along the old ones is turned with them;

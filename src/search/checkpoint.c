@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "checkpoint.h"
-#include "base/file.h"
+#include "base/text.h"
 #include "math/rng.h"
 #include <errno.h>
 #include <math.h>
@@ -24,33 +24,21 @@ uint64_t imp__hash(uint64_t h, const void *bytes, size_t n)
 /* ---- Writing ------------------------------------------------------------------- */
 
 struct sink {
-    imp_context *ctx;
-    struct imp_bytes text;
+    struct imp_text text;
     uint64_t hash; /* of everything but the fingerprint, against damage */
-    bool failed;   /* out of memory */
 };
-
-IMP_PRINTF(2, 3) static void put(struct sink *s, const char *format, ...)
-{
-    char line[160];
-    va_list args;
-    va_start(args, format);
-    const int n = vsnprintf(line, sizeof line, format, args);
-    va_end(args);
-    s->failed |= n < 0 || !imp__bytes_add(s->ctx, &s->text, line, (size_t)n);
-}
 
 static void put_array(struct sink *s, const char *name, const double *v, size_t n)
 {
     static const char digit[] = "0123456789abcdef";
-    put(s, "%s %zu\n", name, n);
-    for (size_t i = 0; i < n && !s->failed; i++) {
+    imp__put(&s->text, "%s %zu\n", name, n);
+    for (size_t i = 0; i < n && !s->text.failed; i++) {
         char text[17];
         uint64_t bits;
         memcpy(&bits, &v[i], 8);
         for (int k = 0; k < 16; k++) text[k] = digit[(bits >> (60 - 4 * k)) & 15];
         text[16] = '\n';
-        s->failed |= !imp__bytes_add(s->ctx, &s->text, text, sizeof text);
+        s->text.failed |= !imp__bytes_add(s->text.ctx, &s->text.bytes, text, sizeof text);
     }
     s->hash = imp__hash(s->hash, v, n * sizeof *v);
 }
@@ -67,15 +55,17 @@ enum imp_status imp__checkpoint_write(imp_context *ctx, const char *path,
 {
     enum imp_status st = IMP_OK;
     char name[16];
-    struct sink s = {.ctx = ctx,
+    struct sink s = {.text.ctx = ctx,
                      .hash = head_hash((int)search->kind, search->n, search->iteration,
                                        search->finished)};
 
-    put(&s, MAGIC "optimizer %d\nvariables %zu\n", (int)search->kind, search->n);
-    put(&s, "of %016llx %016llx %016llx %016llx\n", (unsigned long long)of->parameters,
-        (unsigned long long)of->scene, (unsigned long long)of->targets,
-        (unsigned long long)of->options);
-    put(&s, "iteration %d\nfinished %d\n", search->iteration, (int)search->finished);
+    imp__put(&s.text, MAGIC "optimizer %d\nvariables %zu\n", (int)search->kind,
+             search->n);
+    imp__put(&s.text, "of %016llx %016llx %016llx %016llx\n",
+             (unsigned long long)of->parameters, (unsigned long long)of->scene,
+             (unsigned long long)of->targets, (unsigned long long)of->options);
+    imp__put(&s.text, "iteration %d\nfinished %d\n", search->iteration,
+             (int)search->finished);
     put_array(&s, "start", search->start, search->n);
     put_array(&s, "x", search->x, search->n);
     put_array(&s, "history", search->history, search->n_history);
@@ -85,11 +75,12 @@ enum imp_status imp__checkpoint_write(imp_context *ctx, const char *path,
         snprintf(name, sizeof name, "array%d", k);
         put_array(&s, name, search->array[k], search->array_n[k]);
     }
-    put(&s, "end %016llx\n", (unsigned long long)s.hash);
-    if (s.failed) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a checkpoint"));
-    IMP_TRY(imp__file_write(ctx, path, s.text.data, s.text.size));
+    imp__put(&s.text, "end %016llx\n", (unsigned long long)s.hash);
+    if (s.text.failed)
+        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a checkpoint"));
+    IMP_TRY(imp__file_write(ctx, path, s.text.bytes.data, s.text.bytes.size));
 out:
-    imp__bytes_free(ctx, &s.text);
+    imp__bytes_free(ctx, &s.text.bytes);
     return st;
 }
 

@@ -2,8 +2,8 @@
  *
  * What a fit knows about its answer: covariance in two parts, intervals, and directions
  * in which the data say nothing (gradients.md 15). */
-#ifndef IMP_INVERSE_COVARIANCE_H
-#define IMP_INVERSE_COVARIANCE_H
+#ifndef IMP_SEARCH_COVARIANCE_H
+#define IMP_SEARCH_COVARIANCE_H
 
 #include "optimize.h"
 

@@ -6,8 +6,8 @@
  * Everything an optimiser knows between two iterations stands in a struct imp__search, in
  * numbers that a checkpoint can hold: continuing from a copy gives the same bits as not
  * having stopped. */
-#ifndef IMP_INVERSE_OPTIMIZE_H
-#define IMP_INVERSE_OPTIMIZE_H
+#ifndef IMP_SEARCH_OPTIMIZE_H
+#define IMP_SEARCH_OPTIMIZE_H
 
 #include "base/context.h"
 

@@ -2,8 +2,8 @@
  *
  * Checkpoints: the state of a search as a text file, numbers as the 64 bits of a double
  * in hexadecimal, so that a continued fit has the bits of one that was never stopped. */
-#ifndef IMP_INVERSE_CHECKPOINT_H
-#define IMP_INVERSE_CHECKPOINT_H
+#ifndef IMP_SEARCH_CHECKPOINT_H
+#define IMP_SEARCH_CHECKPOINT_H
 
 #include "optimize.h"
 

@@ -1,0 +1,40 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Which directions of the variables the data determine: the eigenvectors of the scaled
+ * Gauss-Newton matrix whose eigenvalues stand out of their own noise, and the inverse of
+ * the matrix within them. */
+#ifndef IMP_SEARCH_DIRECTIONS_H
+#define IMP_SEARCH_DIRECTIONS_H
+
+#include "optimize.h"
+
+/* Normal equations at one x, from replicates with random numbers of their own. */
+struct imp__sampled {
+    imp_context *ctx;
+    size_t n;
+    int replicates;          /* >= 2 */
+    struct imp__normal mean; /* over them */
+    double *H_each;          /* [replicates][n][n], data part */
+    double *scale;           /* [n] max(|x|, goal's scale) */
+};
+
+struct imp__directions {      /* of a subset of the variables; all zero is none */
+    size_t m;                 /* variables in it */
+    size_t *index;            /* [m] */
+    double *values, *vectors; /* [m], [m][m] of the scaled H, from data alone */
+    double *se;               /* [m] of the eigenvalues */
+    size_t n_loose;
+    bool *loose; /* [m] eigenvalue not above its noise */
+    double *G;   /* [n][n] generalised inverse, 0 outside */
+};
+
+/* Of the variables that are not fixed ([n]; NULL: none is). Also after a failure `out` is
+ * released by directions_destroy. */
+enum imp_status imp__directions_find(const struct imp__sampled *s, const bool *fixed,
+                                     struct imp__directions *out);
+void imp__directions_destroy(imp_context *ctx, struct imp__directions *d);
+
+/* Does variable k take part in a direction that is not determined? */
+bool imp__is_loose(const struct imp__directions *d, size_t k);
+
+#endif
