@@ -1,21 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Loss and gradient from the same walks. The n walks of a replicate are kept in the arena
- * until their sum S is known; the adjoint of walk i then uses the mean of the others,
- *
- *     P_i = (1/n) l'( (S - L_i)/(n - 1) )                              (leave-one-out)
- *
- * which makes the gradient of a quadratic loss unbiased at any n >= 2, at the price of
- * one render and a sweep (gradients.md 5.2, form B). A smooth loss that is not quadratic
- * uses the jackknife, whose adjoints stand in `adjoints`. A fixed adjoint image needs no
- * mean. Filters wider than a pixel take two passes with the same random numbers
- * (splat.c). */
+ * until their adjoints are known (adjoint.c), then swept: the price of one render and a
+ * sweep. A fixed adjoint image needs no mean, and no walk is kept. Filters wider than a
+ * pixel take two passes with the same random numbers (splat.c). */
 #include "estimate.h"
+#include "adjoint.h"
 #include "loss.h"
 #include "splat.h"
 #include "tally.h"
-#include "walk/bend.h"
-#include "walk/measure.h"
 #include "walk/picture.h"
 #include <string.h>
 
@@ -33,58 +26,6 @@ struct imp__replicates imp__replicates_plan(int spp, int batch_max)
     r.R = (spp - 1) / r.n + 1;
     r.chunks = imp_max(1, r.R / IMP_BATCHES_PER_ITEM);
     return r;
-}
-
-/* The attached form of the exponent here has neither the gradient of what arrives nor
- * boundary terms (gradients.md 4): it is right only where both are zero, a convex object
- * under a constant environment whose weight does not jump at the horizon. */
-static enum imp_status attached_allowed(const struct imp_scene *scene)
-{
-    bool fine = scene->n_shapes == 1 && scene->environment >= 0 && scene->n_emitters == 1;
-    if (fine) {
-        const char *kind = scene->shapes[0]->ops->name;
-        fine = strcmp(kind, "sphere") == 0 || strcmp(kind, "rectangle") == 0 ||
-               strcmp(kind, "disk") == 0 || strcmp(kind, "cube") == 0;
-    }
-    for (int b = 0; fine && b < scene->n_bsdfs; b++)
-        if (scene->bsdfs[b]->flags & IMP_BSDF_JUMP)
-            return imp__error(
-                scene->ctx, IMP_E_BIAS,
-                "alpha_gradient=attached has no boundary term for the jump of "
-                "material '%s' at the horizon; use variant=reciprocal, or "
-                "detached",
-                scene->bsdfs[b]->name);
-    if (fine) return IMP_OK;
-    return imp__error(
-        scene->ctx, IMP_E_BIAS,
-        "alpha_gradient=attached is unbiased only for one convex shape under a "
-        "constant environment; use detached");
-}
-
-enum imp_status imp__problem_tracer(const struct imp_problem *p,
-                                    const struct imp_run *run, struct imp_tracer *out)
-{
-    const struct imp_sensor *sensor;
-    enum imp_status st = imp__run_sensor(p->scene, run, &sensor);
-    if (st != IMP_OK) return st;
-    const struct imp_integrator *integrator = imp__radiance_integrator(p->scene);
-    if (!integrator && p->scene->integrator.kind == IMP_INTEGRATOR_ELEMENTS)
-        return imp__error(p->ctx, IMP_E_UNSUPPORTED,
-                          "integrator elements makes no walks, and has derivatives of "
-                          "its own: imp_elements_sensitivity (importon elements "
-                          "--sensitivity); for walks use path, direct or stam");
-    if (!integrator)
-        return imp__error(p->ctx, IMP_E_SCENE,
-                          "the scene's integrator has no derivative; "
-                          "use path, direct or stam");
-    if (integrator->alpha_gradient == IMP_ALPHA_ATTACHED) {
-        st = attached_allowed(p->scene);
-        if (st != IMP_OK) return st;
-    }
-    *out = (struct imp_tracer){p->scene,  integrator,
-                               sensor,    &p->active,
-                               run->seed, imp__guide_of(p->scene, integrator, run->guide)};
-    return p->active.medium ? imp__bend_survey(out) : IMP_OK;
 }
 
 /* ---- One pixel's replicate ----------------------------------------------------- */
@@ -113,78 +54,6 @@ struct job {
     double objective, variance, *gradient, *gradient_variance;
     uint64_t dropped;
 };
-
-/* What the loss sees of a pixel: its channels, or their luminance if the target has one.
- */
-static double seen(const struct job *j, imp_spec L, int c)
-{
-    if (j->target->desc.channels == j->channels) return L[c];
-    return 0.212671 * L[0] + 0.715160 * L[1] + 0.072169 * L[2];
-}
-static imp_spec unseen(const struct job *j, const double *bar)
-{
-    if (j->target->desc.channels == j->channels)
-        return j->channels == 3 ? (imp_spec){bar[0], bar[1], bar[2], 0}
-                                : (imp_spec){bar[0]};
-    return (imp_spec){0.212671 * bar[0], 0.715160 * bar[0], 0.072169 * bar[0], 0};
-}
-
-/* Adjoints of the n walks of one replicate, and its estimate of the loss. L [n], P [n].
- */
-static double adjoints(const struct job *j, size_t pixel, int n, const imp_spec *L,
-                       imp_spec *P)
-{
-    const struct imp_target *t = &j->target->desc;
-    const double N = n,
-                 scale = t->scale * (j->target->weights ? j->target->weights[pixel] : 1);
-    double value = 0, bar[3];
-    imp_spec channel_bar;
-    for (int i = 0; i < n; i++) P[i] = (imp_spec){0};
-    for (int c = 0; c < t->channels; c++) {
-        const double T = j->target->pixels[pixel * (size_t)t->channels + (size_t)c];
-        double S = 0, S2 = 0;
-        for (int i = 0; i < n; i++) {
-            const double l = seen(j, L[i], c);
-            S += l;
-            S2 += l * l;
-        }
-        memset(bar, 0, sizeof bar);
-        if (imp__loss_quadratic(t->loss)) {
-            const double w = imp__loss_weight(t->loss, scale, t->epsilon, T);
-            value += imp__loss_unbiased(w, T, N, S, S2);
-            for (int i = 0; i < n; i++) {
-                bar[c] = imp__loss_loo(w, T, N, S, seen(j, L[i], c)) / N;
-                channel_bar = unseen(j, bar);
-                P[i] += channel_bar;
-            }
-            continue;
-        }
-        /* Jackknife: N g - (N-1)/N sum_i g_-i with g = l'(mean) mean(x) is linear in the
-         * x_j; the factor of x_j is l'(mean) - (A - a_j)/N, a_i = l'(mean without i), A =
-         * sum a_i. L1 has a kink, where the expansion behind the jackknife fails: plain
-         * a_j / N. */
-        struct imp__loss_at at;
-        double A = 0, values = 0;
-        for (int i = 0; i < n; i++) {
-            imp__loss_eval(t->loss, scale, t->epsilon, (S - seen(j, L[i], c)) / (N - 1),
-                           T, &at);
-            A += at.d1;
-            values += at.value;
-        }
-        imp__loss_eval(t->loss, scale, t->epsilon, S / N, T, &at);
-        const bool kink = t->loss == IMP_LOSS_L1;
-        const double at_mean = at.d1;
-        value += kink ? at.value : N * at.value - (N - 1) / N * values;
-        for (int i = 0; i < n; i++) {
-            imp__loss_eval(t->loss, scale, t->epsilon, (S - seen(j, L[i], c)) / (N - 1),
-                           T, &at);
-            bar[c] = kink ? at.d1 / N : at_mean - (A - at.d1) / N;
-            channel_bar = unseen(j, bar);
-            P[i] += channel_bar;
-        }
-    }
-    return value;
-}
 
 /* Replicate b of a pixel: trace, fold, adjoints, sweep. Returns its loss estimate. */
 static double replicate(struct job *j, struct worker *w, int x, int y, int b,
@@ -222,7 +91,7 @@ static double replicate(struct job *j, struct worker *w, int x, int y, int b,
         imp__arena_rewind(&w->arena, one);
     }
     if (keep) {
-        value = adjoints(j, pixel, n, L, P);
+        value = imp__replicate_adjoints(j->target, j->channels, pixel, n, L, P);
         if (j->want_gradient)
             for (int i = 0; i < n; i++)
                 imp__walk_sweep(&j->tracer, &walks[i], P[i], &w->tally.sink);
@@ -390,7 +259,7 @@ static enum imp_status target_estimate(struct imp_problem *p,
     const int spp = own.spp > 0 ? own.spp : j.tracer.sensor->spp;
     /* A loss that is not quadratic has its bias cut by longer batches. */
     const int batch =
-        imp__loss_quadratic(target->desc.loss) ? IMP_BATCH_MAX : 4 * IMP_BATCH_MAX;
+        imp__loss_quadratic(target->desc.loss) ? IMP_BATCH_MAX : IMP_REPLICATE_MAX;
     if (!j.want_gradient) j.tracer.active = NULL;
     j.plan = imp__replicates_plan(spp, batch);
     if (imp__film_border(&j.tracer.sensor->film) > 0) {

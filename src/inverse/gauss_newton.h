@@ -6,6 +6,7 @@
 #define IMP_INVERSE_GAUSS_NEWTON_H
 
 #include "estimate.h"
+#include "seen.h"
 
 struct imp__normal_sums { /* matrices [K*K], lower triangles */
     double *H, *H_same, *H_meas, *cov_g, *g;
@@ -13,15 +14,6 @@ struct imp__normal_sums { /* matrices [K*K], lower triangles */
     uint64_t dropped;
     bool failed; /* out of memory */
 };
-
-/* Luminance of linear sRGB: what a target of one channel sees of a colour. */
-static inline double imp__seen(int target_channels, int channels, const double *lanes,
-                               int c)
-{
-    static const double weight[3] = {0.212671, 0.715160, 0.072169};
-    if (target_channels == channels) return lanes[c];
-    return weight[0] * lanes[0] + weight[1] * lanes[1] + weight[2] * lanes[2];
-}
 
 /* Adds H, H_same, H_meas, g, cov_g and chi2 of a target seen through a filter wider than
  * a pixel; lo, hi: the part of the caller's progress. */

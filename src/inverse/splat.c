@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "splat.h"
 #include "loss.h"
+#include "seen.h"
 #include "walk/picture.h"
 
 struct imp__replicates imp__splat_plan(int spp)
@@ -50,11 +51,10 @@ static double picture_loss(const struct imp__splat *s, const imp_film *film)
         for (int c = 0; c < t->channels; c++) {
             const size_t k = p * (size_t)s->channels + (size_t)c;
             double I = film->mean[k], variance = imp__sqr(film->se[k]);
-            if (t->channels !=
-                s->channels) { /* luminance; channels of a sample correlate */
+            if (t->channels != s->channels) { /* channels of a sample correlate */
                 const float *m = film->mean + p * 3, *e = film->se + p * 3;
-                I = 0.212671 * m[0] + 0.715160 * m[1] + 0.072169 * m[2];
-                variance = imp__sqr(0.212671 * e[0] + 0.715160 * e[1] + 0.072169 * e[2]);
+                I = imp__luminance(m[0], m[1], m[2]);
+                variance = imp__sqr(imp__luminance(e[0], e[1], e[2]));
             }
             const double T = s->target->pixels[p * (size_t)t->channels + (size_t)c];
             struct imp__loss_at at;
@@ -130,30 +130,24 @@ static imp_spec pixel_adjoint(const struct imp__splat *s, int b, size_t p, doubl
                               imp_spec L)
 {
     const int n = s->channels;
-    imp_spec bar = {0};
+    double bar[3] = {0, 0, 0}, rest[3];
     if (!s->target) {
         for (int c = 0; c < n; c++) bar[c] = s->seed[p * (size_t)n + (size_t)c];
-        return bar;
+        return imp__seen_bar(n, n, bar);
     }
-    static const double lum[3] = {0.212671, 0.715160, 0.072169};
     const struct imp_target *t = &s->target->desc;
     const double scale = t->scale * (s->target->weights ? s->target->weights[p] : 1);
     const double W = s->weights[b][p];
     const float *mean = s->films[b]->mean + p * (size_t)n;
-    imp_spec rest;
     for (int c = 0; c < n; c++) /* alone in its pixel: nothing is known without it */
         rest[c] = W - w > 1e-9 * W ? (mean[c] * W - w * L[c]) / (W - w) : mean[c];
     for (int c = 0; c < t->channels; c++) {
-        const bool same = t->channels == n;
-        const double I =
-            same ? rest[c] : lum[0] * rest[0] + lum[1] * rest[1] + lum[2] * rest[2];
         struct imp__loss_at at;
-        imp__loss_eval(t->loss, scale, t->epsilon, I,
+        imp__loss_eval(t->loss, scale, t->epsilon, imp__seen(t->channels, n, rest, c),
                        s->target->pixels[p * (size_t)t->channels + (size_t)c], &at);
-        if (same) bar[c] = at.d1;
-        else bar = (imp_spec){lum[0], lum[1], lum[2], 0} * at.d1;
+        bar[c] = at.d1;
     }
-    return bar;
+    return imp__seen_bar(t->channels, n, bar);
 }
 
 imp_spec imp__splat_adjoint(const struct imp__splat *s, int b, double px, double py,

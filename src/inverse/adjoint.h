@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * From the radiances of a pixel's walks to their adjoints. */
+#ifndef IMP_INVERSE_ADJOINT_H
+#define IMP_INVERSE_ADJOINT_H
+
+#include "problem.h"
+
+#define IMP_REPLICATE_MAX 256 /* walks of a pixel that are kept at once */
+
+/* Of the 2 <= n <= IMP_REPLICATE_MAX walks of one replicate of a pixel: L [n] their
+ * radiances, P [n] what the gradient of each is multiplied with, so that the sum over
+ * them estimates the gradient of the pixel's loss. Returns the estimate of the loss. */
+double imp__replicate_adjoints(const struct imp__target *target, int channels,
+                               size_t pixel, int n, const imp_spec *L, imp_spec *P);
+
+#endif

@@ -1,0 +1,60 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What a problem's walks are made with; and the reasons to refuse, where a gradient would
+ * not be the whole one. */
+#include "estimate.h"
+#include "walk/bend.h"
+#include "walk/measure.h"
+#include <string.h>
+
+/* The attached form of the exponent here has neither the gradient of what arrives nor
+ * boundary terms (gradients.md 4): it is right only where both are zero, a convex object
+ * under a constant environment whose weight does not jump at the horizon. */
+static enum imp_status attached_allowed(const struct imp_scene *scene)
+{
+    bool fine = scene->n_shapes == 1 && scene->environment >= 0 && scene->n_emitters == 1;
+    if (fine) {
+        const char *kind = scene->shapes[0]->ops->name;
+        fine = strcmp(kind, "sphere") == 0 || strcmp(kind, "rectangle") == 0 ||
+               strcmp(kind, "disk") == 0 || strcmp(kind, "cube") == 0;
+    }
+    for (int b = 0; fine && b < scene->n_bsdfs; b++)
+        if (scene->bsdfs[b]->flags & IMP_BSDF_JUMP)
+            return imp__error(
+                scene->ctx, IMP_E_BIAS,
+                "alpha_gradient=attached has no boundary term for the jump of "
+                "material '%s' at the horizon; use variant=reciprocal, or "
+                "detached",
+                scene->bsdfs[b]->name);
+    if (fine) return IMP_OK;
+    return imp__error(
+        scene->ctx, IMP_E_BIAS,
+        "alpha_gradient=attached is unbiased only for one convex shape under a "
+        "constant environment; use detached");
+}
+
+enum imp_status imp__problem_tracer(const struct imp_problem *p,
+                                    const struct imp_run *run, struct imp_tracer *out)
+{
+    const struct imp_sensor *sensor;
+    enum imp_status st = imp__run_sensor(p->scene, run, &sensor);
+    if (st != IMP_OK) return st;
+    const struct imp_integrator *integrator = imp__radiance_integrator(p->scene);
+    if (!integrator && p->scene->integrator.kind == IMP_INTEGRATOR_ELEMENTS)
+        return imp__error(p->ctx, IMP_E_UNSUPPORTED,
+                          "integrator elements makes no walks, and has derivatives of "
+                          "its own: imp_elements_sensitivity (importon elements "
+                          "--sensitivity); for walks use path, direct or stam");
+    if (!integrator)
+        return imp__error(p->ctx, IMP_E_SCENE,
+                          "the scene's integrator has no derivative; "
+                          "use path, direct or stam");
+    if (integrator->alpha_gradient == IMP_ALPHA_ATTACHED) {
+        st = attached_allowed(p->scene);
+        if (st != IMP_OK) return st;
+    }
+    *out = (struct imp_tracer){
+        p->scene,   integrator, sensor,
+        &p->active, run->seed,  imp__guide_of(p->scene, integrator, run->guide)};
+    return p->active.medium ? imp__bend_survey(out) : IMP_OK;
+}
