@@ -10,15 +10,7 @@
 enum { ETA, K, TINT };
 
 static const struct imp_input_desc inputs[] = {
-    {.name = "eta", .role = IMP_UNBOUNDED, .fallback = 0, .unit = "1"},
-    {.name = "k", .role = IMP_UNBOUNDED, .fallback = 1, .unit = "1"},
-    {.name = "specular_reflectance",
-     .role = IMP_REFLECTANCE,
-     .flags = IMP_INPUT_OPTIONAL,
-     .fallback = 1,
-     .hi = 1,
-     .unit = "1"},
-    {0}};
+    IMP_ETA_INPUT, IMP_K_INPUT, IMP_TINT_INPUT("specular_reflectance"), {0}};
 
 static enum imp_status build(const struct imp_build *build, void *self,
                              struct imp_bsdf *b)

@@ -14,18 +14,8 @@ enum { TINT_R, TINT_T, ETA };
 enum { REFLECT, REFRACT }; /* lobes */
 
 static const struct imp_input_desc inputs[] = {
-    {.name = "specular_reflectance",
-     .role = IMP_REFLECTANCE,
-     .flags = IMP_INPUT_OPTIONAL,
-     .fallback = 1,
-     .hi = 1,
-     .unit = "1"},
-    {.name = "specular_transmittance",
-     .role = IMP_REFLECTANCE,
-     .flags = IMP_INPUT_OPTIONAL,
-     .fallback = 1,
-     .hi = 1,
-     .unit = "1"},
+    IMP_TINT_INPUT("specular_reflectance"),
+    IMP_TINT_INPUT("specular_transmittance"),
     {.name = "eta",
      .role = IMP_UNBOUNDED,
      .flags = IMP_INPUT_SCALAR | IMP_INPUT_FIXED,

@@ -74,10 +74,7 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
         d->lobe = IMP_SMOOTH;
         if (!(d->wi[2] > 0)) return false;
     }
-    s->eta = 1;
-    s->pdf = pdf(b, in, d);
-    eval(b, in, d, &s->f);
-    return s->pdf > 0;
+    return imp__smooth_sample(b, in, d, s);
 }
 
 static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,

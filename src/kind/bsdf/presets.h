@@ -15,6 +15,22 @@ const struct imp__conductor *imp__conductor_find(const char *name);
 /* All of them, in order; NULL after the last. */
 const struct imp__conductor *imp__conductor_at(size_t i);
 
+/* Inputs of the kinds that a Fresnel factor makes: a tint that multiplies it, and the
+ * complex index. */
+#define IMP_TINT_INPUT(key)                                                              \
+    {                                                                                    \
+        .name = key, .role = IMP_REFLECTANCE, .flags = IMP_INPUT_OPTIONAL,               \
+        .fallback = 1, .hi = 1, .unit = "1"                                              \
+    }
+#define IMP_ETA_INPUT                                                                    \
+    {                                                                                    \
+        .name = "eta", .role = IMP_UNBOUNDED, .fallback = 0, .unit = "1"                 \
+    }
+#define IMP_K_INPUT                                                                      \
+    {                                                                                    \
+        .name = "k", .role = IMP_UNBOUNDED, .fallback = 1, .unit = "1"                   \
+    }
+
 /* The `material` property of the two conductor kinds: its numbers become the properties
  * eta and k, as if they had been written. */
 enum imp_status imp__conductor_prepare(const struct imp_build *b);

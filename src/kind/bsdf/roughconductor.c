@@ -8,6 +8,7 @@
  * Light that meets a second facet is lost, as in the format. Drawing a normal and
  * mirroring wo in it gives p(wi) = p(h)/(4 c). */
 #include "fresnel.h"
+#include "lambert.h"
 #include "microfacet.h"
 #include "presets.h"
 
@@ -24,19 +25,13 @@ struct rough {
         .flags = IMP_INPUT_SCALAR | IMP_INPUT_OPTIONAL, .fallback = 0.1,                 \
         .lo = IMP_ALPHA_MIN, .hi = INFINITY, .unit = "1"                                 \
     }
-static const struct imp_input_desc inputs[] = {
-    {.name = "eta", .role = IMP_UNBOUNDED, .fallback = 0, .unit = "1"},
-    {.name = "k", .role = IMP_UNBOUNDED, .fallback = 1, .unit = "1"},
-    {.name = "specular_reflectance",
-     .role = IMP_REFLECTANCE,
-     .flags = IMP_INPUT_OPTIONAL,
-     .fallback = 1,
-     .hi = 1,
-     .unit = "1"},
-    ROUGHNESS("alpha"),
-    ROUGHNESS("alpha_u"),
-    ROUGHNESS("alpha_v"),
-    {0}};
+static const struct imp_input_desc inputs[] = {IMP_ETA_INPUT,
+                                               IMP_K_INPUT,
+                                               IMP_TINT_INPUT("specular_reflectance"),
+                                               ROUGHNESS("alpha"),
+                                               ROUGHNESS("alpha_u"),
+                                               ROUGHNESS("alpha_v"),
+                                               {0}};
 
 /* One of alpha and (alpha_u, alpha_v) is there, so that it can be a parameter, and
  * numbers are not below the smallest roughness. */
@@ -97,13 +92,12 @@ static struct imp__microfacet distribution(const struct imp_bsdf *b, const imp_s
     return (struct imp__microfacet){r->type, r->visible, fmax(au, IMP_ALPHA_MIN),
                                     fmax(av, IMP_ALPHA_MIN)};
 }
-static bool above(const struct imp_dirs *d) { return d->wo[2] > 0 && d->wi[2] > 0; }
 
 static void eval(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
                  imp_spec *f)
 {
     *f = imp__spec(0);
-    if (!above(d)) return;
+    if (!imp__front(d)) return;
     const struct imp__microfacet m = distribution(b, in);
     const imp_v3 h = imp__normalize(d->wo + d->wi);
     const double D = imp__microfacet_d(&m, &h, NULL);
@@ -114,7 +108,7 @@ static void eval(const struct imp_bsdf *b, const imp_spec *in, const struct imp_
 }
 static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
 {
-    if (!above(d)) return 0;
+    if (!imp__front(d)) return 0;
     const struct imp__microfacet m = distribution(b, in);
     const imp_v3 h = imp__normalize(d->wo + d->wi);
     return imp__microfacet_pdf(&m, &d->wo, &h) / (4 * imp__dot(d->wo, h));
@@ -130,10 +124,7 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
     d->wi = imp__normalize(h * (2 * c) - d->wo);
     d->lobe = IMP_SMOOTH;
     if (!(d->wi[2] > 0)) return false; /* the facet sends it into the surface */
-    s->eta = 1;
-    s->pdf = pdf(b, in, d);
-    eval(b, in, d, &s->f);
-    return s->pdf > 0;
+    return imp__smooth_sample(b, in, d, s);
 }
 
 /* ln f = ln tint + ln F + ln D + ln G1(wi) + ln G1(wo), one term an input. */
@@ -142,7 +133,7 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
 {
     const struct rough *r = b->self;
     for (int j = 0; j < N_INPUTS; j++) df[j] = imp__spec(0);
-    if (!above(d)) return;
+    if (!imp__front(d)) return;
     const struct imp__microfacet m = distribution(b, in);
     const imp_v3 h = imp__normalize(d->wo + d->wi);
     double dlog_D[2], dGi[2], dGo[2];

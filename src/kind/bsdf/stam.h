@@ -5,7 +5,9 @@
 #define IMP_KIND_BSDF_STAM_H
 
 #include "kind/build.h"
+#include "math/vec.h"
 
+enum { IMP_AMBIENT }; /* the first input of each */
 #define IMP_STAM_AMBIENT                                                                 \
     {                                                                                    \
         .name = "ambient", .role = IMP_EMISSION, .fallback = 0, .unit = "W m^-2 sr^-1"   \
@@ -23,6 +25,21 @@ static inline enum imp_status imp__stam_absorb_read(const struct imp_build *b,
                                IMP_E_SCENE, "'absorb' = %g is outside [0, 1)", a);
     *absorb = a;
     return IMP_OK;
+}
+
+/* The ambient term is radiance of the front. */
+static inline void imp__stam_emit(const struct imp_bsdf *b, const imp_spec *in,
+                                  const imp_v3 *wo, imp_spec *e)
+{
+    (void)b;
+    *e = (*wo)[2] > 0 ? in[IMP_AMBIENT] : imp__spec(0);
+}
+static inline void imp__stam_emit_d(const struct imp_bsdf *b, const imp_spec *in,
+                                    const imp_v3 *wo, imp_spec *de)
+{
+    (void)in;
+    for (int j = 0; j < b->n_in; j++) de[j] = imp__spec(0);
+    de[IMP_AMBIENT] = imp__spec((*wo)[2] > 0);
 }
 
 #endif

@@ -17,7 +17,7 @@
 #include "lambert.h"
 #include "stam.h"
 
-enum { AMBIENT, DIFFUSE, SPECULAR, EXPONENT, N_INPUTS };
+enum { AMBIENT = IMP_AMBIENT, DIFFUSE, SPECULAR, EXPONENT, N_INPUTS };
 enum variant { RECIPROCAL, MICROFACET, PAPER };
 enum sampling { MIXTURE, COSINE, PHONG };
 
@@ -122,10 +122,7 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
         d->lobe = IMP_SMOOTH;
         if (!(d->wi[2] > 0)) return false;
     }
-    s->eta = 1;
-    s->pdf = pdf(b, in, d);
-    eval(b, in, d, &s->f);
-    return s->pdf > 0;
+    return imp__smooth_sample(b, in, d, s);
 }
 
 /* d ln S/d alpha = 1/(alpha + 2) + ln c_m for all three variants. */
@@ -144,20 +141,6 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     df[DIFFUSE] = imp__spec(imp__lambert(d));
     df[SPECULAR] = imp__spec(h.p * h.V);
     df[EXPONENT] = in[SPECULAR] * (h.p * h.V * score(alpha, &h));
-}
-
-static void emit(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
-                 imp_spec *e)
-{
-    (void)b;
-    *e = (*wo)[2] > 0 ? in[AMBIENT] : imp__spec(0);
-}
-static void emit_d(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
-                   imp_spec *de)
-{
-    (void)b, (void)in;
-    for (int j = 0; j < N_INPUTS; j++) de[j] = imp__spec(0);
-    de[AMBIENT] = imp__spec((*wo)[2] > 0);
 }
 
 /* The exponent moves what the lobe draws (gradients.md 4): at fixed u
@@ -209,6 +192,6 @@ const struct imp_bsdf_ops imp__stam_m2 = {.size = sizeof(struct imp_bsdf_ops),
                                           .eval = eval,
                                           .pdf = pdf,
                                           .eval_d = eval_d,
-                                          .emit = emit,
-                                          .emit_d = emit_d,
+                                          .emit = imp__stam_emit,
+                                          .emit_d = imp__stam_emit_d,
                                           .sample_d = sample_d};

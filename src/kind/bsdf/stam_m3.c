@@ -7,7 +7,7 @@
 #include "lambert.h"
 #include "stam.h"
 
-enum { AMBIENT, DIFFUSE };
+enum { AMBIENT = IMP_AMBIENT, DIFFUSE };
 
 static const struct imp_input_desc inputs[] = {
     IMP_STAM_AMBIENT,
@@ -49,20 +49,6 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     df[AMBIENT] = imp__spec(0);
     df[DIFFUSE] = imp__spec(imp__lambert(d));
 }
-static void emit(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
-                 imp_spec *e)
-{
-    (void)b;
-    *e = (*wo)[2] > 0 ? in[AMBIENT] : imp__spec(0);
-}
-static void emit_d(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
-                   imp_spec *de)
-{
-    (void)b, (void)in;
-    de[AMBIENT] = imp__spec((*wo)[2] > 0);
-    de[DIFFUSE] = imp__spec(0);
-}
-
 const struct imp_bsdf_ops imp__stam_m3 = {.size = sizeof(struct imp_bsdf_ops),
                                           .name = "stam_m3",
                                           .inputs = inputs,
@@ -71,5 +57,5 @@ const struct imp_bsdf_ops imp__stam_m3 = {.size = sizeof(struct imp_bsdf_ops),
                                           .eval = eval,
                                           .pdf = pdf,
                                           .eval_d = eval_d,
-                                          .emit = emit,
-                                          .emit_d = emit_d};
+                                          .emit = imp__stam_emit,
+                                          .emit_d = imp__stam_emit_d};

@@ -3,8 +3,8 @@
  * Light from a surface: the same radiance in all directions on the front, the side of the
  * shading normal, and none behind. `stam_m1` is Stam's pure emitter, the same thing under
  * his name for its strength (Stam 2020, section 3). */
-#include "kind/build.h"
 #include "math/vec.h"
+#include "surface.h"
 
 enum { RADIANCE };
 
@@ -22,13 +22,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_e
     if (placed)
         return imp__prop_error(b->ctx, b->node, placed, IMP_E_SCENE,
                                "to_world has no meaning here: the light is its shape");
-    if (!e->shape)
-        return imp__node_error(b->ctx, b->node, IMP_E_SCENE, "it must be inside a shape");
-    if (!(e->shape->area > 0))
-        return imp__node_error(b->ctx, b->node, IMP_E_SCENE,
-                               "its shape '%s' (%s) has no area",
-                               e->shape->name ? e->shape->name : "", e->shape->ops->name);
-    return IMP_OK;
+    return imp__surface_light_check(b, e);
 }
 
 static void eval(const struct imp_emitter *e, const imp_spec *in,
@@ -43,17 +37,6 @@ static void eval_d(const struct imp_emitter *e, const imp_spec *in,
     (void)e, (void)in;
     dle[RADIANCE] = imp__spec(x->cos_light > 0);
 }
-static bool sample(const struct imp_emitter *e, const imp_v3 *ref, const double u[2],
-                   struct imp_light_sample *out)
-{
-    return e->shape->ops->sample_toward(e->shape, ref, u, out);
-}
-static double pdf(const struct imp_emitter *e, const imp_v3 *ref, const imp_v3 *wi,
-                  const struct imp_hit *hit, const struct imp_surface *at)
-{
-    (void)wi;
-    return e->shape->ops->pdf_toward(e->shape, ref, hit, at);
-}
 
 const struct imp_emitter_ops imp__area = {.size = sizeof(struct imp_emitter_ops),
                                           .name = "area",
@@ -62,8 +45,8 @@ const struct imp_emitter_ops imp__area = {.size = sizeof(struct imp_emitter_ops)
                                           .build = build,
                                           .eval = eval,
                                           .eval_d = eval_d,
-                                          .sample = sample,
-                                          .pdf = pdf};
+                                          .sample = imp__surface_light_sample,
+                                          .pdf = imp__surface_light_pdf};
 const struct imp_emitter_ops imp__stam_m1 = {.size = sizeof(struct imp_emitter_ops),
                                              .name = "stam_m1",
                                              .flags = IMP_EMITTER_AREA,
@@ -71,5 +54,5 @@ const struct imp_emitter_ops imp__stam_m1 = {.size = sizeof(struct imp_emitter_o
                                              .build = build,
                                              .eval = eval,
                                              .eval_d = eval_d,
-                                             .sample = sample,
-                                             .pdf = pdf};
+                                             .sample = imp__surface_light_sample,
+                                             .pdf = imp__surface_light_pdf};

@@ -7,7 +7,7 @@
  * with the surface's normal for an axis unless one is given: the spot lamps of
  * Christensen, Salesin and DeRose (1993). Points are drawn as for `area`. */
 #include "beam.h"
-#include "kind/build.h"
+#include "surface.h"
 
 static const struct imp_input_desc inputs[] = {
     {.name = "radiance", .role = IMP_EMISSION, .fallback = 1, .unit = "W m^-2 sr^-1"},
@@ -23,12 +23,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_e
     enum imp_status st = IMP_OK;
     struct imp__beam *beam = self;
     double axis[3];
-    if (!e->shape)
-        return imp__node_error(b->ctx, b->node, IMP_E_SCENE, "it must be inside a shape");
-    if (!(e->shape->area > 0))
-        return imp__node_error(b->ctx, b->node, IMP_E_SCENE,
-                               "its shape '%s' (%s) has no area",
-                               e->shape->name ? e->shape->name : "", e->shape->ops->name);
+    IMP_TRY(imp__surface_light_check(b, e));
     beam->aimed = imp__props_has(b->node, "axis");
     IMP_TRY(imp__props_vector(b->ctx, b->node, "axis", (double[3]){0, 0, 1}, axis));
     beam->axis = imp__v3(axis[0], axis[1], axis[2]);
@@ -62,17 +57,6 @@ static void eval_d(const struct imp_emitter *e, const imp_spec *in,
     dle[IMP_BEAM_RADIANCE] = imp__spec(c > 0 ? pow(c, n) : 0);
     dle[IMP_BEAM_EXPONENT] = in[IMP_BEAM_RADIANCE] * (c > 0 ? pow(c, n) * log(c) : 0);
 }
-static bool sample(const struct imp_emitter *e, const imp_v3 *ref, const double u[2],
-                   struct imp_light_sample *out)
-{
-    return e->shape->ops->sample_toward(e->shape, ref, u, out);
-}
-static double pdf(const struct imp_emitter *e, const imp_v3 *ref, const imp_v3 *wi,
-                  const struct imp_hit *hit, const struct imp_surface *at)
-{
-    (void)wi;
-    return e->shape->ops->pdf_toward(e->shape, ref, hit, at);
-}
 
 const struct imp_emitter_ops imp__beam_light = {.size = sizeof(struct imp_emitter_ops),
                                                 .name = "beam",
@@ -82,5 +66,5 @@ const struct imp_emitter_ops imp__beam_light = {.size = sizeof(struct imp_emitte
                                                 .build = build,
                                                 .eval = eval,
                                                 .eval_d = eval_d,
-                                                .sample = sample,
-                                                .pdf = pdf};
+                                                .sample = imp__surface_light_sample,
+                                                .pdf = imp__surface_light_pdf};
