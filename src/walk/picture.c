@@ -3,8 +3,14 @@
  * Pictures: samples to pixel means with standard errors. Work is cut into tiles and
  * passes, whose results are added in one order (base/pool.h). A box filter gives a sample
  * to its own pixel; wider filters weight it into all pixels within their radius
- * (scene-format 10), and the pixel is the ratio  sum w v / sum w  with the usual error of
- * a ratio, sum w^2 (v - mean)^2 / (sum w)^2. */
+ * (scene-format 10), and the pixel is the ratio  sum w v / sum w.
+ *
+ * Error of the ratio, with e = w (v - mean):  sum e^2 / (sum w)^2  if the samples were
+ * spread over the filter at random. But every pixel sends the same number of them, and
+ * what pixels differ by is no noise: beside a lamp the plain formula is too large many
+ * times. So e is taken about its mean over the m samples that a pixel of the film sends
+ * here in a pass (strata of Cochran, Sampling Techniques, 5.3 and 6.10):
+ *     sum over strata  m/(m - 1) [sum e^2 - (sum e)^2/m] / (sum w)^2. */
 #include "picture.h"
 #include "base/pool.h"
 #include <string.h>
@@ -12,7 +18,8 @@
 #define TILE     8
 #define PASS_SPP 64
 
-/* Per pixel: sum w, sum w^2, then for each channel sum w v, sum w^2 v, sum w^2 v^2. */
+/* Per pixel: sum w, sum w^2, then for each channel sum w v, sum w^2 v, sum w^2 v^2; the
+ * squares and products about their strata's means where the filter is wide. */
 #define SUMS(channels) (2 + 3 * (channels))
 
 struct tile_result {
@@ -26,8 +33,9 @@ struct render {
     double walks; /* planned */
     const struct imp_picture *picture;
     const struct imp_film_desc *film;
-    int n;                     /* channels */
-    double *values;            /* [threads][n] */
+    int n;           /* channels */
+    double *values;  /* [threads][n] */
+    double *patches; /* [threads][stratum_side^2][SUMS] what one pixel sends in a pass */
     int width, height, border; /* of the picture; reach of the filter in pixels */
     int margin;                /* extra pixels sampled on every side */
     int tiles_x, tiles_y, spp, passes, pass_spp;
@@ -81,24 +89,52 @@ static void accumulate(double *sums, double w, const double *value, int n)
     }
 }
 
-/* Weight a sample into the pixels that the filter reaches; `tile` begins at (x0, y0)
- * minus the border. */
-static void splat(const struct render *r, const struct region *g, double *tile, double px,
-                  double py, const double *value)
+/* Pixels that samples of one pixel reach: `border` on each side, and one more, for a
+ * position may be rounded up to the pixel's end. */
+static int stratum_side(const struct render *r) { return 2 * r->border + 2; }
+
+/* Weight a sample of pixel (x, y) into the pixels that the filter reaches. */
+static void splat(const struct render *r, const struct region *g, double *patch, int x,
+                  int y, double px, double py, const double *value)
 {
     const struct imp_filter *f = &r->film->filter;
-    const int n = r->n, stride = TILE + 2 * r->border;
+    const int n = r->n, b = r->border, side = stratum_side(r);
     struct imp_taps across, down;
-    imp__film_taps(f, px - r->film->crop_x, g->x0 - r->border, g->x1 - 1 + r->border,
-                   &across);
-    imp__film_taps(f, py - r->film->crop_y, g->y0 - r->border, g->y1 - 1 + r->border,
-                   &down);
+    imp__film_taps(f, px - r->film->crop_x, imp_max(x, g->x0) - b,
+                   imp_min(x + 1, g->x1 - 1) + b, &across);
+    imp__film_taps(f, py - r->film->crop_y, imp_max(y, g->y0) - b,
+                   imp_min(y + 1, g->y1 - 1) + b, &down);
     for (int j = 0; j < down.n; j++)
         for (int i = 0; i < across.n; i++) {
             const double w = down.w[j] * across.w[i];
-            const int at = (down.first + j - g->y0 + r->border) * stride +
-                           (across.first + i - g->x0 + r->border);
-            if (w != 0) accumulate(tile + (size_t)at * (size_t)SUMS(n), w, value, n);
+            const int at = (down.first + j - y + b) * side + (across.first + i - x + b);
+            if (w != 0) accumulate(patch + (size_t)at * (size_t)SUMS(n), w, value, n);
+        }
+}
+
+/* Add what pixel (x, y) sent in m samples to the tile, whose corner is (x0, y0) minus the
+ * border, and clear the patch. */
+static void stratum_add(const struct render *r, const struct region *g, double *patch,
+                        int x, int y, int m, double *tile)
+{
+    const int n = r->n, b = r->border, side = stratum_side(r), stride = TILE + 2 * b;
+    const double each = m > 1 ? 1. / m : 0, factor = m > 1 ? m / (m - 1.) : 1;
+    for (int j = 0; j < side; j++)
+        for (int i = 0; i < side; i++) {
+            double *from = patch + (size_t)(j * side + i) * (size_t)SUMS(n);
+            if (from[1] == 0) continue;
+            double *to = tile + (size_t)((y - g->y0 + j) * stride + x - g->x0 + i) *
+                                    (size_t)SUMS(n);
+            const double W = from[0];
+            to[0] += W;
+            to[1] += factor * (from[1] - W * W * each);
+            for (int c = 0; c < n; c++) {
+                const double wv = from[2 + 3 * c];
+                to[2 + 3 * c] += wv;
+                to[3 + 3 * c] += factor * (from[3 + 3 * c] - W * wv * each);
+                to[4 + 3 * c] += factor * (from[4 + 3 * c] - wv * wv * each);
+            }
+            memset(from, 0, (size_t)SUMS(n) * sizeof *from);
         }
 }
 
@@ -108,6 +144,9 @@ static enum imp_status tile_work(size_t item, int worker, int slot, void *payloa
     const struct region g = item_region(r, item);
     const int n = r->n, stride = TILE + 2 * r->border;
     double *value = r->values + (size_t)worker * (size_t)n;
+    double *patch = r->patches + (size_t)worker *
+                                     (size_t)(stratum_side(r) * stratum_side(r)) *
+                                     (size_t)SUMS(n);
     struct tile_result *out = &r->slots[slot];
     memset(out->sums, 0, (size_t)(stride * stride) * (size_t)SUMS(n) * sizeof *out->sums);
     out->dropped = 0;
@@ -124,8 +163,9 @@ static enum imp_status tile_work(size_t item, int worker, int slot, void *payloa
                                                     value, &px, &py);
                 imp__arena_rewind(arena, mark);
                 if (r->border == 0) accumulate(own, 1, value, n);
-                else splat(r, &g, out->sums, px, py, value);
+                else splat(r, &g, patch, x, y, px, py, value);
             }
+            if (r->border > 0) stratum_add(r, &g, patch, x, y, g.s1 - g.s0, out->sums);
             /* A walk dropped for want of memory is not a walk with a bad value. */
             if (r->arenas[worker].failed)
                 return imp__error(r->ctx, IMP_E_NOMEM,
@@ -162,18 +202,22 @@ static enum imp_status tile_commit(size_t item, int slot, void *payload)
 static void film_finish(const struct render *r, imp_film *film)
 {
     const int n = r->n;
+    const bool strata = r->border > 0 && imp_min(r->spp, r->pass_spp) > 1;
     for (size_t p = 0; p < (size_t)r->width * (size_t)r->height; p++) {
         const double *s = r->sums + p * (size_t)SUMS(n), W = s[0];
         if (r->picture->weights) r->picture->weights[p] = W;
+        /* Without strata: n_eff - 1 degrees of freedom, n_eff = W^2/sum w^2. */
         const double n_eff = s[1] > 0 ? W * W / s[1] : 0;
+        const double freedom = strata ? 1 : n_eff > 1 ? n_eff / (n_eff - 1) : INFINITY;
         for (int c = 0; c < n; c++) {
             const double mean = W != 0 ? s[2 + 3 * c] / W : 0;
             const double spread =
                 s[4 + 3 * c] - 2 * mean * s[3 + 3 * c] + mean * mean * s[1];
             film->mean[p * (size_t)n + (size_t)c] = (float)mean;
             film->se[p * (size_t)n + (size_t)c] =
-                n_eff > 1 ? (float)sqrt(fmax(0, spread) / (W * W) * (n_eff / (n_eff - 1)))
-                          : INFINITY;
+                isfinite(freedom) && W != 0
+                    ? (float)(sqrt(fmax(0, spread) * freedom) / fabs(W))
+                    : INFINITY;
         }
     }
     film->dropped = r->dropped;
@@ -184,11 +228,14 @@ static enum imp_status buffers_create(struct render *r, imp_context *ctx)
     const int slots = imp__pool_slots(ctx), n = r->n;
     r->values = imp__alloc(ctx, (size_t)ctx->threads * (size_t)n, sizeof *r->values);
     const size_t stride = (size_t)(TILE + 2 * r->border);
+    const size_t side = (size_t)stratum_side(r);
+    r->patches = imp__alloc(ctx, (size_t)ctx->threads * side * side,
+                            (size_t)SUMS(n) * sizeof *r->patches);
     r->arenas = imp__alloc(ctx, (size_t)ctx->threads, sizeof *r->arenas);
     r->slots = imp__alloc(ctx, (size_t)slots, sizeof *r->slots);
     r->sums = imp__alloc(ctx, (size_t)r->width * (size_t)r->height,
                          (size_t)SUMS(n) * sizeof *r->sums);
-    bool fine = r->arenas && r->slots && r->sums && r->values;
+    bool fine = r->arenas && r->slots && r->sums && r->values && r->patches;
     for (int k = 0; fine && k < ctx->threads; k++) imp__arena_init(&r->arenas[k], ctx);
     for (int k = 0; fine && k < slots; k++) {
         r->slots[k].sums =
@@ -209,6 +256,7 @@ static void buffers_destroy(struct render *r, imp_context *ctx)
     imp__release(ctx, r->slots);
     imp__release(ctx, r->sums);
     imp__release(ctx, r->values);
+    imp__release(ctx, r->patches);
 }
 
 static struct render render_plan(const struct imp_picture *p, const struct imp_run *run)
