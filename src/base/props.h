@@ -52,6 +52,16 @@ struct imp_image_data {
     bool srgb;                   /* an 8- or 16-bit file, values still encoded */
 };
 
+/* The luminous intensity of a luminaire by direction (LM-63, type C). Vertical angles are
+ * from nadir, horizontal ones about it; degrees, ascending. Horizontally there is one
+ * angle (rotational symmetry), or they go from 0 to 90 (symmetric about both planes), 0
+ * to 180 or 90 to 270 (about one), or 0 to 360. */
+struct imp_ies_data {
+    int n_vertical, n_horizontal;
+    const double *vertical, *horizontal;
+    const double *candela; /* [n_horizontal][n_vertical] */
+};
+
 struct imp_node {
     const char *tag, *type, *id; /* id NULL: none */
     const char *name;            /* slot under the parent; NULL: nameless */
@@ -69,6 +79,7 @@ struct imp_node {
     size_t n_children, cap_children;
     const struct imp_mesh_data *mesh; /* attached data, or NULL */
     const struct imp_image_data *image;
+    const struct imp_ies_data *ies;
     struct imp_medium *medium; /* attached: a graded index (format/graded.c), or NULL */
     void *object;              /* what was made from it (scene/build.c) */
     int visiting;              /* cycle detection */

@@ -83,6 +83,13 @@ static enum imp_status emitter_take(imp_elements *e, const struct imp_shape *s,
         r->power = in[IMP_BEAM_EXPONENT][0];
         return IMP_OK;
     }
+    if (em->ops == &imp__ies_area) {
+        light_set(r, em->input[0], em->name);
+        r->light = EL_TABLE;
+        r->table = em->self;
+        r->power = imp__ies_mean(r->table, r->frame.n);
+        return IMP_OK;
+    }
     for (int k = 1; k < 16; k++) {
         const double z = k / 16.0, x = sqrt(1 - z * z);
         const struct imp_emission at = {.uv = {0.1 * (k % 7), 0.06 * k},

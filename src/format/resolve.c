@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Nodes that name files get what the files hold: triangles for obj and ply, pixels for
- * bitmap. */
+ * bitmap, intensities for ies. */
 #include "base/film.h"
 #include "color/rgb.h"
+#include "ies.h"
 #include "image.h"
 #include "load.h"
 #include "mesh.h"
@@ -102,6 +103,24 @@ out:
     return st;
 }
 
+static enum imp_status ies_attach(struct imp_scene *scene, struct imp_node *node)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = scene->ctx;
+    struct imp_bytes text = {0};
+    const char *path;
+    struct imp_ies_data *data = imp__arena_array(&scene->arena, 1, sizeof *data);
+    if (!data) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "scene: out of memory"));
+    IMP_TRY(path_of(scene, node, &path));
+    st = imp__file_read(ctx, path, IMP_IES_BYTES_MAX, &text);
+    if (st == IMP_OK) st = imp__ies_parse(ctx, &scene->arena, path, &text, data);
+    if (st != IMP_OK) IMP_TRY(placed(scene, node, st));
+    node->ies = data;
+out:
+    imp__bytes_free(ctx, &text);
+    return st;
+}
+
 static enum imp_status attach(struct imp_scene *scene, struct imp_node *node)
 {
     enum imp_status st = IMP_OK;
@@ -113,6 +132,8 @@ static enum imp_status attach(struct imp_scene *scene, struct imp_node *node)
     if (obj || ply) IMP_TRY(mesh_attach(scene, node, obj));
     if (strcmp(node->tag, "medium") == 0 && strcmp(node->type, "graded") == 0)
         IMP_TRY(imp__graded_attach(scene, node));
+    if (strcmp(node->tag, "emitter") == 0 && strcmp(node->type, "ies") == 0)
+        IMP_TRY(ies_attach(scene, node));
     if (bitmap && !node->image) IMP_TRY(image_attach(scene, node));
     else if (bitmap && imp__node_prop(node, "filename"))
         IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_SCENE,

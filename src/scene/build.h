@@ -50,6 +50,7 @@ enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node
         (buffer)[0] = 0;                                                                 \
         for (size_t k_ = 0; (table)[k_]; k_++) {                                         \
             const size_t n_ = strlen(buffer);                                            \
+            if (k_ && strcmp((table)[k_]->name, (table)[k_ - 1]->name) == 0) continue;   \
             snprintf((buffer) + n_, sizeof(buffer) - n_, "%s%s", k_ ? ", " : "",         \
                      (table)[k_]->name);                                                 \
         }                                                                                \

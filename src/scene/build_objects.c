@@ -122,6 +122,11 @@ enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *nod
     imp_context *ctx = scene->ctx;
     const struct imp_emitter_ops *ops;
     KIND_FIND(scene, node, imp__emitter_kinds, ops);
+    /* A name may stand for two kinds: a light of its own, and one in a shape. */
+    for (size_t k = 0; shape && imp__emitter_kinds[k]; k++)
+        if (strcmp(imp__emitter_kinds[k]->name, node->type) == 0 &&
+            imp__emitter_kinds[k]->flags & IMP_EMITTER_AREA)
+            ops = imp__emitter_kinds[k];
     const bool area = ops->flags & IMP_EMITTER_AREA;
     if (area && !shape)
         return IMP_OK; /* declared only; used where a shape refers to it */

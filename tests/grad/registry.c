@@ -169,6 +169,10 @@ static void emitter_make(imp_scene *s, const struct subject *q)
     const double at[16] = {1, 0, 0, -0.3, 0, 1, 0, 0.7, 0, 0, 1, 0.4, 0, 0, 0, 1};
     imp_scene_begin(s, "emitter", q->emitter->name, "subject", NULL);
     if (q->emitter->flags & IMP_EMITTER_DELTA) imp_scene_transform(s, "to_world", at);
+    if (strcmp(q->emitter->name, "ies") == 0) {
+        imp_scene_string(s, "filename", IMP_SCENES "/lamps/wallwash.ies");
+        imp_scene_string(s, "units", "radiometric");
+    }
     inputs_make(s, q, q->emitter->name, NULL, q->emitter->inputs, texture, 5);
     imp_scene_end(s);
 }

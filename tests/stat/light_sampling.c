@@ -339,9 +339,14 @@ static struct imp_emitter *emitter_build(struct imp_node *n, const struct imp_sh
                                          const double value[3])
 {
     const struct imp_emitter_ops *ops = NULL;
-    for (int i = 0; imp__emitter_kinds[i]; i++)
-        if (strcmp(imp__emitter_kinds[i]->name, n->type) == 0)
+    static const double vertical[] = {0, 40, 120}, horizontal[] = {0, 90, 180};
+    static const double candela[] = {3, 2, 1, 3, 1, 2, 3, 4, 1};
+    static const struct imp_ies_data table = {3, 3, vertical, horizontal, candela};
+    for (int i = 0; imp__emitter_kinds[i]; i++) /* a name may be a light, and an area */
+        if (strcmp(imp__emitter_kinds[i]->name, n->type) == 0 &&
+            (!ops || !s == !(imp__emitter_kinds[i]->flags & IMP_EMITTER_AREA)))
             ops = imp__emitter_kinds[i];
+    n->ies = &table;
     struct imp_emitter *e = imp__arena_array(&world.arena, 1, sizeof *e);
     int n_in = 0;
     while (ops->inputs[n_in].name) n_in++;

@@ -8,6 +8,8 @@
     X(imp__stam_m1)                                                                      \
     X(imp__beam_light)                                                                   \
     X(imp__point_light)                                                                  \
+    X(imp__ies_light)                                                                    \
+    X(imp__ies_area)                                                                     \
     X(imp__constant)
 
 #define DECLARE(kind) extern const struct imp_emitter_ops kind;

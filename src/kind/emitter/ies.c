@@ -1,0 +1,376 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * ies: a luminaire as it was measured, intensity I by direction from an LM-63 table.
+ *
+ * Photometry is of the far field: it says what a whole luminaire sends along w, not from
+ * where. At the top of a scene the luminaire is a point: irradiance I(w)/r^2 across the
+ * ray. In a shape it is the shape that glows, alike all over:
+ *
+ *     L(w) = scale I(w) / A(w),      A(w) = Int max(0, n . w) dA,
+ *
+ * so that far away Int L max(0, n . w) dA = scale I(w) again. Of a flat shape A is
+ * area x cos: a table of cos^(n+1) is `beam` with exponent n. L grows without bound
+ * towards the shape's own plane if the table does not vanish there, but L cos does not:
+ * points are drawn as for `area`, by projected area, and the cosine cancels. Meeting such
+ * light by chance is bounded by the power heuristic, as the density of light samples has
+ * the same pole.
+ *
+ * Between angles the table is interpolated bilinearly; above and below, it is 0. */
+#include "ies.h"
+#include "kind/build.h"
+#include "kind/shape/shape.h"
+#include "math/transform.h"
+
+#define FACETS_MAX   64
+#define PER_WATT     683.0 /* lm/W at 555 nm, by which the candela is defined */
+#define DEGREE       (IMP_PI / 180)
+#define EDGE_ON      1e-9 /* of the area: nothing is shown */
+#define SAME_NORMALS (1 - 1e-10)
+
+enum { SCALE };
+
+static const struct imp_input_desc inputs[] = {
+    {.name = "scale", .role = IMP_EMISSION, .fallback = 1, .unit = "1"}, {0}};
+
+/* ---- The table ----------------------------------------------------------------- */
+
+/* x[k] <= v, at most n - 2, and the fraction of the way to x[k + 1]. */
+static int place(const double *x, int n, double v, double *fraction)
+{
+    int lo = 0, hi = n - 1;
+    while (hi - lo > 1) {
+        const int middle = (lo + hi) / 2;
+        if (v < x[middle]) hi = middle;
+        else lo = middle;
+    }
+    *fraction = imp_clamp((v - x[lo]) / (x[lo + 1] - x[lo]), 0.0, 1.0);
+    return lo;
+}
+
+/* Into the part of the circle that the table has, by its symmetry. */
+static double folded(const struct imp_ies_data *d, double h)
+{
+    const double last = d->horizontal[d->n_horizontal - 1];
+    if (h < 0) h += 360;
+    if (d->horizontal[0] == 90) return h < 90 ? 180 - h : h > 270 ? 540 - h : h;
+    if (last < 360 && h > 180) h = 360 - h;
+    if (last < 180 && h > 90) h = 180 - h;
+    return h;
+}
+
+double imp__ies_intensity(const struct imp__ies *x, imp_v3 w)
+{
+    const struct imp_ies_data *d = x->data;
+    const double a = imp__dot(w, x->c0), b = imp__dot(w, x->c90);
+    const double v = atan2(sqrt(a * a + b * b), imp__dot(w, x->nadir)) / DEGREE;
+    const int n = d->n_vertical;
+    double f, g;
+    /* Rounding does not take light away at the last angle. */
+    if (v < d->vertical[0] - 1e-9 || v > d->vertical[n - 1] + 1e-9) return 0;
+    const double *cd = d->candela + place(d->vertical, n, v, &f);
+    if (d->n_horizontal > 1) {
+        const double h = folded(d, atan2(b, a) / DEGREE);
+        cd += (size_t)place(d->horizontal, d->n_horizontal, h, &g) * (size_t)n;
+        const double one = cd[0] + f * (cd[1] - cd[0]);
+        return x->factor * (one + g * (cd[n] + f * (cd[n + 1] - cd[n]) - one));
+    }
+    return x->factor * (cd[0] + f * (cd[1] - cd[0]));
+}
+
+/* ---- The surface --------------------------------------------------------------- */
+
+double imp__ies_projected(const struct imp__ies *x, imp_v3 w)
+{
+    double sum = x->same;
+    if (x->across > 0) {
+        const double c = imp__dot(w, x->axis);
+        sum += x->across * sqrt(fmax(0, 1 - c * c));
+    }
+    for (int k = 0; k < x->n_facets; k++)
+        sum += x->facets[k].area * fmax(0, imp__dot(w, x->facets[k].n));
+    return sum;
+}
+
+static double surface_area(const struct imp__ies *x)
+{
+    double sum = x->same + x->across;
+    for (int k = 0; k < x->n_facets; k++) sum += x->facets[k].area;
+    return sum;
+}
+
+double imp__ies_radiance(const struct imp__ies *x, imp_v3 w)
+{
+    const double shown = imp__ies_projected(x, w);
+    return shown > EDGE_ON * surface_area(x) ? imp__ies_intensity(x, w) / shown : 0;
+}
+
+double imp__ies_bound(const struct imp__ies *x, imp_v3 d, double angle)
+{
+    const struct imp_ies_data *t = x->data;
+    const int n = t->n_vertical;
+    const double v = acos(imp_clamp(imp__dot(d, x->nadir), -1.0, 1.0));
+    const double from = (v - angle) / DEGREE, to = (v + angle) / DEGREE;
+    double most = 0, shown = x->same + x->across;
+    if (to < t->vertical[0] || from > t->vertical[n - 1]) return 0;
+    for (int k = 0; k < n; k++) { /* all angles of the table that touch the range */
+        if (k + 1 < n && t->vertical[k + 1] < from) continue;
+        if (k > 0 && t->vertical[k - 1] > to) break;
+        for (int j = 0; j < t->n_horizontal; j++)
+            most = fmax(most, t->candela[(size_t)j * (size_t)n + (size_t)k]);
+    }
+    for (int k = 0; k < x->n_facets; k++) {
+        const double tilt = acos(imp_clamp(imp__dot(d, x->facets[k].n), -1.0, 1.0));
+        shown += x->facets[k].area * fmax(0, cos(fmax(0, tilt - angle)));
+    }
+    return shown > 0 ? x->factor * most / shown : 0;
+}
+
+double imp__ies_mean(const struct imp__ies *x, imp_v3 n)
+{
+    enum { UP = 32, AROUND = 64 };
+    const struct imp_frame f = imp__frame_from_normal(n);
+    double sum = 0;
+    for (int i = 0; i < UP; i++)
+        for (int j = 0; j < AROUND; j++) {
+            const double z = (i + 0.5) / UP, r = sqrt(1 - z * z);
+            const double phi = (j + 0.5) * IMP_2PI / AROUND;
+            sum += imp__ies_radiance(
+                x, imp__to_world(&f, imp__v3(r * cos(phi), r * sin(phi), z)));
+        }
+    return sum / (UP * AROUND);
+}
+
+/* ---- Building ------------------------------------------------------------------ */
+
+/* nadir along n, c0 along s as far as it is across n, c90 so that directions turn about
+ * the lamp as LM-63 has it, seen from above: (c0, c90, up) is a right hand. */
+static void frame_set(struct imp__ies *x, imp_v3 s, imp_v3 n, bool mirrored)
+{
+    x->nadir = imp__normalize(n);
+    const imp_v3 across = s - x->nadir * imp__dot(x->nadir, s);
+    x->c0 = imp__length(across) > 1e-9 * imp__length(s)
+                ? imp__normalize(across)
+                : imp__frame_from_normal(x->nadir).s;
+    x->c90 = imp__cross(x->c0, x->nadir) * (mirrored ? -1.0 : 1.0);
+}
+
+static enum imp_status common_build(const struct imp_build *b, struct imp__ies *x)
+{
+    static const char *const units[] = {"photometric", "radiometric"};
+    enum imp_status st = IMP_OK;
+    struct imp_mat4 m;
+    int unit;
+    if (!b->node->ies)
+        IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_SCENE, "has no table"));
+    x->data = b->node->ies;
+    IMP_TRY(imp__props_choice(b->ctx, b->node, "units", units, 2, 0, &unit));
+    x->factor = unit == 0 ? 1 : 1 / PER_WATT;
+    IMP_TRY(imp__props_transform(b->ctx, b->node, "to_world", m.m));
+    const double det = imp__mat4_det3(&m);
+    if (!imp__mat4_is_finite(&m) || !imp__mat4_is_affine(&m) || !(fabs(det) > 0) ||
+        !isfinite(det))
+        IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "to_world"),
+                                IMP_E_SCENE, "to_world is not affine and invertible"));
+    frame_set(x, imp__mat4_column(&m, 0), imp__mat4_column(&m, 2), det < 0);
+    x->position = imp__point(&m, imp__v3(0, 0, 0));
+out:
+    return st;
+}
+
+static enum imp_status point_build(const struct imp_build *b, void *self,
+                                   struct imp_emitter *e)
+{
+    enum imp_status st = IMP_OK;
+    if (e->n_in > SCALE && e->input[SCALE]->texture)
+        IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+                                "scale cannot be a texture: a point has no surface"));
+    IMP_TRY(common_build(b, self));
+out:
+    return st;
+}
+
+/* A ray through the middle of an analytic shape, which is flat. */
+static bool probe(const struct imp_shape *s, struct imp_surface *at)
+{
+    const imp_v3 centre = (s->lo + s->hi) * 0.5;
+    const double reach = imp__length(s->hi - s->lo);
+    for (int k = 0; k < 3; k++) {
+        imp_v3 d = imp__v3(0, 0, 0);
+        struct imp_hit hit = {.shape = s->index};
+        d[k] = -1;
+        const imp_v3 o = centre - d * reach;
+        if (!s->ops->intersect(s, &o, &d, 0, INFINITY, &hit)) continue;
+        s->ops->surface(s, &hit, &o, &d, at);
+        return true;
+    }
+    return false;
+}
+
+static imp_v3 corner(const struct imp_triangles *t, size_t triangle, int k)
+{
+    const float *p = t->positions + 3 * (size_t)t->indices[3 * triangle + (size_t)k];
+    return imp__v3((double)p[0], (double)p[1], (double)p[2]);
+}
+
+/* The directions that triangles face, and how much area has each. */
+static enum imp_status facets_find(const struct imp_build *b, const struct imp_shape *s,
+                                   struct imp__ies *x, struct imp_surface *first)
+{
+    const struct imp_triangles *t = &s->triangles;
+    struct imp__ies_facet *f = imp__arena_array(b->arena, FACETS_MAX, sizeof *f);
+    if (!f) return imp__error(b->ctx, IMP_E_NOMEM, "scene: out of memory");
+    double sum = 0;
+    for (size_t i = 0; i < t->n_triangles; i++) {
+        const imp_v3 p = corner(t, i, 0), o = p, d = imp__v3(0, 0, 0);
+        const double area =
+            0.5 * imp__length(imp__cross(corner(t, i, 1) - p, corner(t, i, 2) - p));
+        const struct imp_hit hit = {
+            .shape = s->index, .prim = (int)i, .u = 1.0 / 3, .v = 1.0 / 3};
+        struct imp_surface at;
+        if (!(area > 0)) continue;
+        s->ops->surface(s, &hit, &o, &d, &at);
+        if (x->n_facets == 0) *first = at;
+        int k = 0;
+        while (k < x->n_facets && !(imp__dot(f[k].n, at.ng) > SAME_NORMALS)) k++;
+        if (k == FACETS_MAX)
+            return imp__node_error(b->ctx, b->node, IMP_E_UNSUPPORTED,
+                                   "its shape '%s' faces more than %d directions: use a "
+                                   "box, a sphere or a flat one for the luminaire",
+                                   s->name ? s->name : "", FACETS_MAX);
+        if (k == x->n_facets) f[x->n_facets++] = (struct imp__ies_facet){at.ng, 0};
+        f[k].area += area;
+        sum += area;
+    }
+    for (int k = 0; k < x->n_facets; k++) f[k].area *= s->area / sum; /* floats' area */
+    x->facets = f;
+    return IMP_OK;
+}
+
+static enum imp_status area_build(const struct imp_build *b, void *self,
+                                  struct imp_emitter *e)
+{
+    enum imp_status st = IMP_OK;
+    struct imp__ies *x = self;
+    const struct imp_shape *s = e->shape;
+    struct imp_surface at = {.uv = {0}};
+    struct imp_round round;
+    if (!s)
+        return imp__node_error(b->ctx, b->node, IMP_E_SCENE, "it must be inside a shape");
+    if (!(s->area > 0))
+        return imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+                               "its shape '%s' (%s) has no area", s->name ? s->name : "",
+                               s->ops->name);
+    IMP_TRY(common_build(b, x));
+    if (s->geometry == IMP_TRIANGLES) {
+        IMP_TRY(facets_find(b, s, x, &at));
+    } else if (s->ops->round) {
+        s->ops->round(s, &round);
+        const double length = imp__length(round.axis);
+        if (length == 0) x->same = IMP_PI * round.radius * round.radius;
+        else {
+            x->across = s->area / IMP_PI; /* 2 pi r h, of which 2 r h is seen */
+            x->axis = round.axis * (1 / length);
+        }
+    } else {
+        struct imp__ies_facet *f = imp__arena_array(b->arena, 1, sizeof *f);
+        if (!f) IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "scene: out of memory"));
+        if (!probe(s, &at))
+            IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_UNSUPPORTED,
+                                    "its shape '%s' (%s) cannot glow by a table",
+                                    s->name ? s->name : "", s->ops->name));
+        *f = (struct imp__ies_facet){at.ng, s->area};
+        x->n_facets = 1;
+        x->facets = f;
+    }
+    /* A flat lamp shines along its normal unless it is turned. */
+    if (x->n_facets == 1 && !imp__props_has(b->node, "to_world"))
+        frame_set(x, at.s, at.n, false);
+out:
+    return st;
+}
+
+/* ---- As a point ---------------------------------------------------------------- */
+
+static void point_eval_d(const struct imp_emitter *e, const imp_spec *in,
+                         const struct imp_emission *x, imp_spec *dle)
+{
+    (void)in;
+    dle[SCALE] = imp__spec(imp__ies_intensity(e->self, x->d) / (x->dist * x->dist));
+}
+static void point_eval(const struct imp_emitter *e, const imp_spec *in,
+                       const struct imp_emission *x, imp_spec *le)
+{
+    point_eval_d(e, in, x, le);
+    *le *= in[SCALE];
+}
+static bool point_sample(const struct imp_emitter *e, const imp_v3 *ref,
+                         const double u[2], struct imp_light_sample *out)
+{
+    (void)u;
+    const struct imp__ies *p = e->self;
+    const imp_v3 d = p->position - *ref;
+    const double r = imp__length(d);
+    /* 1/r^2 has to be a number. */
+    if (!(r > 1e-150 && r < INFINITY)) return false;
+    *out = (struct imp_light_sample){.wi = d * (1 / r),
+                                     .dist = r,
+                                     .pdf = 1,
+                                     .cos_light = 1,
+                                     .p = p->position,
+                                     .ng = d * (-1 / r)};
+    return true;
+}
+/* No ray meets a point by chance. */
+static double point_pdf(const struct imp_emitter *e, const imp_v3 *ref, const imp_v3 *wi,
+                        const struct imp_hit *hit, const struct imp_surface *at)
+{
+    (void)e, (void)ref, (void)wi, (void)hit, (void)at;
+    return 0;
+}
+
+/* ---- As a surface -------------------------------------------------------------- */
+
+static void area_eval_d(const struct imp_emitter *e, const imp_spec *in,
+                        const struct imp_emission *x, imp_spec *dle)
+{
+    (void)in;
+    dle[SCALE] = imp__spec(x->cos_light > 0 ? imp__ies_radiance(e->self, x->d) : 0);
+}
+static void area_eval(const struct imp_emitter *e, const imp_spec *in,
+                      const struct imp_emission *x, imp_spec *le)
+{
+    area_eval_d(e, in, x, le);
+    *le *= in[SCALE];
+}
+static bool area_sample(const struct imp_emitter *e, const imp_v3 *ref, const double u[2],
+                        struct imp_light_sample *out)
+{
+    return e->shape->ops->sample_toward(e->shape, ref, u, out);
+}
+static double area_pdf(const struct imp_emitter *e, const imp_v3 *ref, const imp_v3 *wi,
+                       const struct imp_hit *hit, const struct imp_surface *at)
+{
+    (void)wi;
+    return e->shape->ops->pdf_toward(e->shape, ref, hit, at);
+}
+
+const struct imp_emitter_ops imp__ies_light = {.size = sizeof(struct imp_emitter_ops),
+                                               .name = "ies",
+                                               .object_size = sizeof(struct imp__ies),
+                                               .flags = IMP_EMITTER_DELTA,
+                                               .inputs = inputs,
+                                               .build = point_build,
+                                               .eval = point_eval,
+                                               .eval_d = point_eval_d,
+                                               .sample = point_sample,
+                                               .pdf = point_pdf};
+const struct imp_emitter_ops imp__ies_area = {.size = sizeof(struct imp_emitter_ops),
+                                              .name = "ies",
+                                              .object_size = sizeof(struct imp__ies),
+                                              .flags = IMP_EMITTER_AREA,
+                                              .inputs = inputs,
+                                              .build = area_build,
+                                              .eval = area_eval,
+                                              .eval_d = area_eval_d,
+                                              .sample = area_sample,
+                                              .pdf = area_pdf};

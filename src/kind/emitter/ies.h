@@ -1,0 +1,43 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Light from a table of intensities; for solvers that keep it analytic. */
+#ifndef IMP_KIND_EMITTER_IES_H
+#define IMP_KIND_EMITTER_IES_H
+
+#include "base/props.h"
+#include "math/vec.h"
+
+struct imp__ies_facet {
+    imp_v3 n;
+    double area;
+};
+struct imp__ies {
+    imp_v3 nadir, c0,
+        c90; /* orthonormal, world: w = nadir cos v + sin v (c0 cos h + ...) */
+    const struct imp_ies_data *data;
+    double factor;   /* from the table to what is emitted: 1 or 1/683 */
+    imp_v3 position; /* of a point */
+    /* Of a surface: what it shows of itself towards w. */
+    double same;   /* of a sphere, everywhere; else 0 */
+    double across; /* of a cylinder, from its side; else 0 */
+    imp_v3 axis;
+    int n_facets;
+    const struct imp__ies_facet *facets;
+};
+
+/* Intensity along w (world, unit, away from the light), at scale 1. */
+double imp__ies_intensity(const struct imp__ies *x, imp_v3 w);
+/* Area that faces w, projected along w. */
+double imp__ies_projected(const struct imp__ies *x, imp_v3 w);
+/* Radiance of the surface along w: intensity over projected area. */
+double imp__ies_radiance(const struct imp__ies *x, imp_v3 w);
+/* For the error of links: the largest intensity within `angle` of d over the largest
+ * projected area there. Where the source is narrow this bounds the radiance, and
+ * elsewhere what radiance times cosine come to. */
+double imp__ies_bound(const struct imp__ies *x, imp_v3 d, double angle);
+/* Mean radiance over the hemisphere about n. */
+double imp__ies_mean(const struct imp__ies *x, imp_v3 n);
+
+extern const struct imp_emitter_ops imp__ies_light, imp__ies_area;
+
+#endif
