@@ -6,6 +6,7 @@
  * checker itself against planted mistakes. */
 #include "imp_kinds.h"
 #include "imp_tap.h"
+#include "kind/bsdf/fresnel.h"
 
 enum { TRIALS = 60 };
 
@@ -247,6 +248,74 @@ static void visit_planted(const struct kind_case *c, void *payload)
     }
 }
 
+/* A child whose inputs are not the first. */
+static void attached_behind(struct kind_factory *f, int *attached)
+{
+    struct kind_case c = {.label = "twosided(diffuse, stam_m2)", .kind = "twosided"};
+    const struct imp_bsdf_ops *ops[3] = {NULL};
+    static const char *const names[] = {"diffuse", "stam_m2", "twosided"};
+    for (int k = 0; imp__bsdf_kinds[k]; k++)
+        for (int i = 0; i < 3; i++)
+            if (strcmp(imp__bsdf_kinds[k]->name, names[i]) == 0)
+                ops[i] = imp__bsdf_kinds[k];
+    const int before = *attached;
+    if (kind_make(f, ops[0], NULL, 0, NULL, 0, &c.child[0]) &&
+        kind_make(f, ops[1], NULL, 0, NULL, 0, &c.child[1]) &&
+        kind_make(f, ops[2], NULL, 0, c.child, 2, &c.bsdf))
+        visit_attached(&c, attached);
+    tap_ok(*attached == before + 1, "%s offers it from behind", c.label);
+}
+
+/* dF/dc and dF/de of a boundary from both sides, off the critical angle. */
+static void fresnel_slopes(void)
+{
+    double worst = 0;
+    for (int i = 0; i < 200; i++) {
+        const struct imp_key key = imp__key(13, (uint64_t)i, 0);
+        const double c = 0.05 + 0.9 * imp__u01(key, 0), e = 0.5 + 1.5 * imp__u01(key, 1);
+        const double h = 1e-6;
+        double dc, de, unused[2];
+        if (1 - (1 - c * c) / (e * e) < 0.05) continue;
+        const double F = imp__fresnel_dielectric_d(c, e, &dc, &de);
+        const double by_c =
+            (imp__fresnel_dielectric_d(c + h, e, &unused[0], &unused[1]) -
+             imp__fresnel_dielectric_d(c - h, e, &unused[0], &unused[1])) /
+            (2 * h);
+        const double by_e =
+            (imp__fresnel_dielectric_d(c, e + h, &unused[0], &unused[1]) -
+             imp__fresnel_dielectric_d(c, e - h, &unused[0], &unused[1])) /
+            (2 * h);
+        worst =
+            fmax(worst, fabs(F - imp__fresnel_dielectric(c, e, &unused[0], &unused[1])));
+        worst = fmax(worst, fabs(dc - by_c) / (1 + fabs(dc)));
+        worst = fmax(worst, fabs(de - by_e) / (1 + fabs(de)));
+    }
+    tap_ok(worst < 1e-8, "Fresnel by cosine and by index # %.1e", worst);
+}
+
+/* A texture may hold less than the smallest roughness: the value is that of the smallest,
+ * and its derivative 0. */
+static void smallest_roughness(struct kind_factory *f)
+{
+    const char *props[] = {"alpha=0.3"};
+    struct imp_bsdf b;
+    imp_spec in[6], at[2], d[6];
+    for (int k = 0; imp__bsdf_kinds[k]; k++)
+        if (strcmp(imp__bsdf_kinds[k]->name, "roughconductor") == 0)
+            kind_make(f, imp__bsdf_kinds[k], props, 1, NULL, 0, &b);
+    const struct imp_dirs dirs = {imp__v3(0.6, 0, 0.8), imp__v3(-0.6, 0, 0.8),
+                                  IMP_SMOOTH};
+    kind_inputs(&b, KIND_FALLBACK, 1, in);
+    for (int k = 0; k < 2; k++) {
+        in[3] = imp__spec(k ? 1e-4 : 1e-6);
+        b.ops->eval(&b, in, &dirs, &at[k]);
+        b.ops->eval_d(&b, in, &dirs, d);
+        tap_ok((d[3][0] != 0) == (k == 1), "roughness %g has a derivative: %s", in[3][0],
+               k ? "yes" : "no");
+    }
+    tap_ok(at[0][0] == at[1][0] && at[0][0] > 0, "and is the smallest # %g", at[0][0]);
+}
+
 int main(void)
 {
     struct kind_factory f;
@@ -256,6 +325,9 @@ int main(void)
     tap_ok(n > 20, "%d materials were visited", n);
     kinds_visit(&f, visit_attached, &attached);
     tap_ok(attached > 0, "sample_d is offered by %d", attached);
+    attached_behind(&f, &attached);
+    fresnel_slopes();
+    smallest_roughness(&f);
     kinds_visit(&f, visit_planted, NULL);
     kinds_close(&f);
     return tap_done();

@@ -458,6 +458,22 @@ static void emitters(void)
     }
     world_end();
 
+    /* Without an axis: about the normal, (cos)^n. */
+    world_begin(ctx);
+    beam = emitter_build(node_new("emitter", "beam"),
+                         placed("rectangle", imp__mat4_identity()), (double[3]){2, 2, 2});
+    for (int k = 0; k < 7 && beam; k++) {
+        const imp_spec in[2] = {imp__spec(2), imp__spec(4)};
+        const double a = k * 0.3;
+        const struct imp_emission x = {
+            .dist = 1, .cos_light = cos(a), .d = imp__v3(sin(a), 0, cos(a))};
+        imp_spec le;
+        beam->ops->eval(beam, in, &x, &le);
+        tap_near(le[0], cos(a) > 0 ? 2 * pow(cos(a), 4) : 0, 1e-13, 1e-15,
+                 "a beam about the normal");
+    }
+    world_end();
+
     /* G1: point light I at height h, lateral x: I h / (h^2 + x^2)^(3/2). */
     world_begin(ctx);
     struct imp_node *n = node_new("emitter", "point");

@@ -58,6 +58,53 @@ static void registry(void)
     tap_ok(whole && distinct, "every kind is whole and has a name of its own");
 }
 
+/* The attached derivative lacks a boundary term where the weight of a lobe's draws jumps
+ * at the horizon: not where V takes it to 0, and not if all draws are cosine. */
+static void stam_flags(void)
+{
+    static const char *const variants[] = {"reciprocal", "microfacet", "paper"};
+    static const char *const samplings[] = {"mixture", "cosine", "phong"};
+    bool right = true;
+    for (int k = 0; k < 9; k++) {
+        char variant[32], sampling[32];
+        const char *props[2] = {variant, sampling};
+        struct imp_bsdf b;
+        snprintf(variant, sizeof variant, "variant=%s", variants[k / 3]);
+        snprintf(sampling, sizeof sampling, "sampling=%s", samplings[k % 3]);
+        right &= kind_make(&f, find("stam_m2"), props, 2, NULL, 0, &b) &&
+                 !!(b.flags & IMP_BSDF_JUMP) == (k / 3 != 0 && k % 3 != 1);
+    }
+    tap_ok(right, "stam_m2 says where its weight jumps");
+
+    const char *rare[] = {"absorb=0.2"}, *often[] = {"absorb=0.6"};
+    struct imp_bsdf child[2], b;
+    const bool ok = kind_make(&f, find("stam_m3"), often, 1, NULL, 0, &child[0]) &&
+                    kind_make(&f, find("stam_m3"), rare, 1, NULL, 0, &child[1]) &&
+                    kind_make(&f, find("twosided"), NULL, 0, child, 2, &b);
+    tap_ok(ok && b.absorb == 0.6, "twosided absorbs as its darker side # %g", b.absorb);
+}
+
+/* What the aov shows: the reflectance; else pi f along the normal, where the mirror lobe
+ * of phong is at its highest, (n + 2)/(2 pi); nothing of delta lobes. */
+static void albedos(void)
+{
+    const imp_v3 up = imp__v3(0, 0, 1), down = imp__v3(0, 0, -1);
+    struct imp_bsdf child[2], b;
+    imp_spec in[4] = {
+        {0.1, 0.2, 0.3, 0}, {0.4, 0.5, 0.6, 0}, imp__spec(8), {0.7, 0.8, 0.9, 0}};
+    imp_spec a;
+    bool ok = kind_make(&f, find("phong"), NULL, 0, NULL, 0, &child[0]) &&
+              kind_make(&f, find("diffuse"), NULL, 0, NULL, 0, &child[1]) &&
+              kind_make(&f, find("twosided"), NULL, 0, child, 2, &b);
+    imp__bsdf_albedo(&b, in, &up, &a);
+    tap_near(a[1], 0.2 + 0.5 * 5, 1e-14, 0, "albedo of phong");
+    imp__bsdf_albedo(&b, in, &down, &a);
+    tap_ok(ok && a[1] == 0.8, "albedo of the back # %g", a[1]);
+    ok = kind_make(&f, find("conductor"), NULL, 0, NULL, 0, &b);
+    imp__bsdf_albedo(&b, in, &up, &a);
+    tap_ok(ok && a[0] == 0, "a mirror has none # %g", a[0]);
+}
+
 int main(void)
 {
     if (!kinds_open(&f)) return 1;
@@ -101,6 +148,8 @@ int main(void)
     tap_ok(n && imp__node_prop(n, "alpha")->number[0] == 1e-4,
            "roughness 0 is the smallest");
 
+    stam_flags();
+    albedos();
     struct imp_bsdf glass, out;
     kind_make(&f, find("dielectric"), NULL, 0, NULL, 0, &glass);
     tap_ok(!kind_make(&f, find("twosided"), NULL, 0, &glass, 1, &out) &&

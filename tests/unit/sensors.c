@@ -7,6 +7,7 @@
 #include "kind/sensor/film.h"
 #include "math/rng.h"
 #include "shape_nodes.h"
+#include "walk/picture.h"
 
 static imp_context *ctx;
 static int warnings;
@@ -374,6 +375,34 @@ static void films(void)
            "uint32 becomes float, aloud");
 }
 
+/* The taps of a sample are the pixels that the filter reaches, each with its value there,
+ * and no others. */
+static void taps(void)
+{
+    const double radius[] = {0.3, 0.5, 1, 1.3, 2, 5.7};
+    const struct imp_filter_ops *tent = NULL;
+    double worst = 0;
+    int n = 0;
+    for (int k = 0; imp__filter_kinds[k]; k++)
+        if (strcmp(imp__filter_kinds[k]->name, "tent") == 0) tent = imp__filter_kinds[k];
+    for (int i = 0; tent && i < 6000; i++) {
+        const struct imp_filter f = {.ops = tent, .radius = radius[i % 6]};
+        const double x = -3 + 26 * imp__u01(imp__key(5, 0, 0), (uint32_t)i);
+        const int lo = i & 8 ? 0 : -2, hi = i & 8 ? 19 : 21;
+        struct imp_taps t;
+        double sum = 0;
+        imp__film_taps(&f, x, lo, hi, &t);
+        for (int p = lo; p <= hi; p++) {
+            const double w = fmax(0, 1 - fabs(x - (p + 0.5)) / f.radius);
+            const bool in = p >= t.first && p < t.first + t.n;
+            worst = fmax(worst, fabs((in ? t.w[p - t.first] : 0) - w));
+            sum += w;
+        }
+        n += sum > 0;
+    }
+    tap_ok(n > 4000 && worst < 1e-13, "taps of a filter # %.1e", worst);
+}
+
 static void filters(void)
 {
     const struct imp_build b = {.ctx = ctx, .arena = &world.arena};
@@ -465,6 +494,7 @@ int main(void)
     rays();
     sensor_errors();
     films();
+    taps();
     filters();
     samplers();
     world_end();

@@ -317,6 +317,24 @@ static void vertex_normals(void)
                a.ng[2]);
         world_end();
     }
+
+    /* Between the vertices they are interpolated, and made unit again. */
+    static const float turned[9] = {0, 0, 1, 1, 0, 1, 0, 2, 1};
+    struct imp_mesh_data bent = one;
+    bent.normals = turned;
+    world_begin(ctx);
+    struct imp_node *node = node_new("shape", "mesh");
+    node->mesh = &bent;
+    struct imp_shape *s = shape_build(node, NULL);
+    if (imp__intersector_create(&world) != IMP_OK) return;
+    const struct imp_surface a = look(s, imp__v3(0.5, 0.2, 5), imp__v3(0, 0, -1));
+    imp_v3 sum = imp__v3(0, 0, 0);
+    const double weight[3] = {0.3, 0.5, 0.2};
+    for (int k = 0; k < 3; k++)
+        sum += imp__normalize(imp__v3(turned[3 * k], turned[3 * k + 1], 1)) * weight[k];
+    tap_ok(imp__length(a.n - imp__normalize(sum)) < 1e-6 && a.ng[2] == 1,
+           "normals between the vertices # %g %g %g", a.n[0], a.n[1], a.n[2]);
+    world_end();
 }
 
 static void expect_error(struct imp_node *n, enum imp_status expected, const char *words)

@@ -12,6 +12,7 @@
 
 static imp_context *ctx;
 static struct imp_arena arena;
+static double bulk_lo; /* lower bound of the texels registered last */
 
 static enum imp_status add_bulk(const struct imp_build *b, const char *key, float *data,
                                 int n_dims, const size_t dims[3], unsigned flags,
@@ -22,6 +23,7 @@ static enum imp_status add_bulk(const struct imp_build *b, const char *key, floa
                (flags & IMP_PARAM_DIFFERENTIABLE) && lo <= 0 && hi == INFINITY,
            "registered as data %zu x %zu x %zu", dims[0], dims[1], dims[2]);
     *param = 0;
+    bulk_lo = lo;
     return IMP_OK;
 }
 
@@ -81,7 +83,7 @@ static void lookups(void)
 {
     struct imp_texture t;
     struct imp_node *n = node_make("bitmap");
-    tap_ok(make(n, ramp(), IMP_RGB, NULL, &t) == IMP_OK, "bitmap");
+    tap_ok(make(n, ramp(), IMP_RGB, NULL, &t) == IMP_OK && bulk_lo == 0, "bitmap");
     bool centres = true;
     for (int y = 0; y < 2; y++)
         for (int x = 0; x < 4; x++)
@@ -161,6 +163,11 @@ static void conversions(void)
     tap_ok(fabs(at(&t, -3.2, 0.1, 0) - 0.7) < 1e-7 &&
                at(&t, 0.9, 7, 2) == at(&t, 0, 0, 0),
            "one texel is a constant in all lanes");
+    const float below = -0.25f;
+    const struct imp_image_data negative = {1, 1, 1, &below, false};
+    tap_ok(make(node_make("bitmap"), &negative, IMP_RGB, NULL, &t) == IMP_OK &&
+               bulk_lo == -INFINITY,
+           "texels below 0 have no lower bound");
     tap_ok(make(node_make("bitmap"), NULL, IMP_RGB, NULL, &t) == IMP_E_SCENE,
            "no picture # %s", imp_last_error(ctx));
     tap_ok(make(node_make("bitmap"), &nan, IMP_RGB, NULL, &t) == IMP_E_SCENE,
@@ -234,6 +241,36 @@ static void linear_check(const struct imp_input *in, const double *data, const c
     tap_ok(worst < 1e-12, "%s: tangent is the derivative of eval # %.1e", what, worst);
 }
 
+/* d value / d(u, v) against central differences, which are exact for what is bilinear;
+ * spots where the two sides differ lie on the border of a texel. */
+static void slope_check(const struct imp_texture *t, bool scalar, const char *what)
+{
+    const double h = 1e-5;
+    double worst = 0;
+    int n = 0;
+    for (int i = 0; i < 200; i++) {
+        const struct imp_key k = imp__key(7, (uint64_t)i, 0);
+        const struct imp_texcoord c = {{4 * imp__u01(k, 0) - 2, 4 * imp__u01(k, 1) - 2},
+                                       {0}};
+        imp_spec d[2], mid;
+        if (!t->ops->slope(t, &c, scalar, d)) break;
+        t->ops->eval(t, &c, scalar, &mid);
+        for (int a = 0; a < 2; a++) {
+            struct imp_texcoord plus = c, minus = c;
+            imp_spec p, m;
+            plus.uv[a] += h;
+            minus.uv[a] -= h;
+            t->ops->eval(t, &plus, scalar, &p);
+            t->ops->eval(t, &minus, scalar, &m);
+            if (fabs(p[0] - 2 * mid[0] + m[0]) > 1e-7) continue;
+            for (int l = 0; l < 3; l++)
+                worst = fmax(worst, fabs((p[l] - m[l]) / (2 * h) - d[a][l]));
+            n++;
+        }
+    }
+    tap_ok(n > 300 && worst < 1e-8, "%s: slope # %.1e of %d", what, worst, n);
+}
+
 static void derivatives(void)
 {
     static const char *const modes[] = {"repeat", "mirror", "clamp"};
@@ -261,6 +298,24 @@ static void derivatives(void)
                  scalar ? " as one number" : "");
         transpose_check(&in, 100, what);
         linear_check(&in, data, what);
+        const struct imp_texcoord middle = {{0.5, 0.5}, {0}};
+        imp_spec d[2];
+        if (!nearest) slope_check(&t, scalar, what);
+        else tap_ok(!t.ops->slope(&t, &middle, scalar, d), "%s: jumps, no slope", what);
+
+        struct imp_texture lit;
+        const struct imp_input *nested[1] = {
+            &(struct imp_input){.texture = &t, .param = -1}};
+        struct imp_node *lamp = node_make("d65");
+        imp__node_add(&arena, lamp, "scale", IMP_PROP_FLOAT, lamp->loc)->number[0] = 2.5;
+        if (make(lamp, NULL, IMP_RGB, nested, &lit) != IMP_OK)
+            tap_ok(0, "%s", imp_last_error(ctx));
+        const struct imp_input light = {.texture = &lit, .param = -1, .scalar = scalar};
+        snprintf(what, sizeof what, "d65 around bitmap %d", m);
+        transpose_check(&light, 20, what);
+        linear_check(&light, data, what);
+        tap_near(at(&lit, 0.3, 0.4, 1), 2.5 * at(&t, 0.3, 0.4, 1), 1e-15, 0,
+                 "d65 scales");
     }
 
     /* Constants: parameter 0 is an rgb, parameter 1 one number. */
