@@ -58,6 +58,40 @@ static inline imp_scene *test_scene_text(imp_context *ctx, const char *xml,
     return scene;
 }
 
+/* By calls: a path integrator, and a camera that looks at the origin from (0, 0, z), with
+ * a box filter. */
+static inline void test_camera(imp_scene *s, double z, double fov, int width, int height)
+{
+    const double camera[16] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, z, 0, 0, 0, 1};
+    imp_scene_begin(s, "integrator", "path", NULL, NULL);
+    imp_scene_end(s);
+    imp_scene_begin(s, "sensor", "perspective", NULL, NULL);
+    imp_scene_transform(s, "to_world", camera);
+    imp_scene_float(s, "fov", fov);
+    imp_scene_begin(s, "film", "hdrfilm", NULL, NULL);
+    imp_scene_integer(s, "width", width);
+    imp_scene_integer(s, "height", height);
+    imp_scene_begin(s, "rfilter", "box", NULL, NULL);
+    imp_scene_end(s);
+    imp_scene_end(s);
+    imp_scene_end(s);
+}
+/* By calls: a square whose reflectance is a picture of three channels, under a white sky.
+ */
+static inline void test_picture_wall(imp_scene *s, int width, int height,
+                                     const float *pixels)
+{
+    imp_scene_begin(s, "emitter", "constant", NULL, NULL);
+    imp_scene_end(s);
+    imp_scene_begin(s, "shape", "rectangle", NULL, NULL);
+    imp_scene_begin(s, "bsdf", "diffuse", NULL, NULL);
+    imp_scene_begin(s, "texture", "bitmap", NULL, "reflectance");
+    imp_scene_image(s, width, height, 3, pixels);
+    imp_scene_end(s);
+    imp_scene_end(s);
+    imp_scene_end(s);
+}
+
 static inline imp_problem *test_problem(imp_context *ctx, imp_scene *scene,
                                         const char *glob)
 {

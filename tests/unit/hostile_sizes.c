@@ -162,9 +162,7 @@ static void samples(void)
     film = NULL;
     run.spp = -5;
     st = imp_render(s, &run, &film);
-    tap_ok((st == IMP_E_ARG && !film) || st == IMP_CANCELLED, "spp -5 # %s",
-           imp_last_error(ctx));
-    imp_film_destroy(film);
+    tap_ok(st == IMP_E_ARG && !film, "spp -5 # %s", imp_last_error(ctx));
     run = (struct imp_run)IMP_RUN_INIT;
     run.spp = 1;
     film = NULL;
@@ -345,14 +343,7 @@ static void many_shapes(void)
     const int n = 100000;
     const double start = imp__now();
     test_must(ctx, imp_scene_create(ctx, NULL, &s));
-    imp_scene_begin(s, "integrator", "path", NULL, NULL);
-    imp_scene_end(s);
-    imp_scene_begin(s, "sensor", "perspective", NULL, NULL);
-    imp_scene_begin(s, "film", "hdrfilm", NULL, NULL);
-    imp_scene_integer(s, "width", 2);
-    imp_scene_integer(s, "height", 2);
-    imp_scene_end(s);
-    imp_scene_end(s);
+    test_camera(s, -1, 40, 2, 2);
     for (int i = 0; i < n; i++) {
         const double at[3] = {i % 100, i / 100 % 100, 5 + i / 10000};
         imp_scene_begin(s, "shape", "sphere", NULL, NULL);
@@ -375,29 +366,11 @@ static void small_texture(void)
 {
     imp_scene *s;
     const float grey[3] = {0.25f, 0.25f, 0.25f};
-    const double camera[16] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 1, 0, 0, 0, 1};
     struct imp_run run = IMP_RUN_INIT;
     imp_film *film;
     test_must(ctx, imp_scene_create(ctx, NULL, &s));
-    imp_scene_begin(s, "integrator", "path", NULL, NULL);
-    imp_scene_end(s);
-    imp_scene_begin(s, "sensor", "perspective", NULL, NULL);
-    imp_scene_transform(s, "to_world", camera);
-    imp_scene_float(s, "fov", 20);
-    imp_scene_begin(s, "film", "hdrfilm", NULL, NULL);
-    imp_scene_integer(s, "width", 3);
-    imp_scene_integer(s, "height", 3);
-    imp_scene_end(s);
-    imp_scene_end(s);
-    imp_scene_begin(s, "emitter", "constant", NULL, NULL);
-    imp_scene_end(s);
-    imp_scene_begin(s, "shape", "rectangle", NULL, NULL);
-    imp_scene_begin(s, "bsdf", "diffuse", NULL, NULL);
-    imp_scene_begin(s, "texture", "bitmap", NULL, "reflectance");
-    imp_scene_image(s, 1, 1, 3, grey);
-    imp_scene_end(s);
-    imp_scene_end(s);
-    imp_scene_end(s);
+    test_camera(s, 1, 20, 3, 3);
+    test_picture_wall(s, 1, 1, grey);
     test_must(ctx, imp_scene_commit(s));
     run.spp = 4096;
     test_must(ctx, imp_render(s, &run, &film));

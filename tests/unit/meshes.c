@@ -257,8 +257,8 @@ static void check_ply(void)
     }
 }
 
-/* ---- Hostile
- * ---------------------------------------------------------------------------- */
+/* ---- Hostile --------------------------------------------------------------------------
+ */
 
 static void check_cut(const char *name, const char *data, size_t size, size_t slack)
 {
@@ -290,11 +290,7 @@ static void check_cut(const char *name, const char *data, size_t size, size_t sl
 static void check_memory(const char *name, const char *data, size_t size)
 {
     struct fail_alloc heap = {0};
-    struct imp_context_options o = IMP_CONTEXT_OPTIONS_INIT;
-    o.threads = 1;
-    o.allocator = fail_alloc_hooks(&heap);
-    imp_context *fragile;
-    if (imp_context_create(&o, &fragile) != IMP_OK) return;
+    imp_context *fragile = fail_alloc_context(&heap);
     int steps = 0, wrong = 0;
     for (enum imp_status st = IMP_E_NOMEM; st != IMP_OK && steps < 1000; steps++) {
         struct loaded l;

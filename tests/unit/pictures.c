@@ -206,8 +206,8 @@ static void check_png(void)
     imp_film_destroy(f);
 }
 
-/* ---- Failing writes
- * ---------------------------------------------------------------------- */
+/* ---- Failing writes -------------------------------------------------------------------
+ */
 
 static void check_atomic(void)
 {

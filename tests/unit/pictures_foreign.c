@@ -240,8 +240,8 @@ static void check_exr_variants(void)
     }
 }
 
-/* ---- Hostile files
- * ---------------------------------------------------------------------- */
+/* ---- Hostile files --------------------------------------------------------------------
+ */
 
 static struct imp_bytes film_bytes(const char *name, const char *names)
 {
@@ -327,17 +327,13 @@ static void check_hostile(void)
            "films that cannot be");
 }
 
-/* ---- Memory
- * ------------------------------------------------------------------------------- */
+/* ---- Memory ---------------------------------------------------------------------------
+ */
 
 static void check_memory(const char *name, struct imp_bytes b)
 {
     struct fail_alloc heap = {0};
-    struct imp_context_options o = IMP_CONTEXT_OPTIONS_INIT;
-    o.threads = 1;
-    o.allocator = fail_alloc_hooks(&heap);
-    imp_context *fragile;
-    if (imp_context_create(&o, &fragile) != IMP_OK) return;
+    imp_context *fragile = fail_alloc_context(&heap);
     int steps = 0, wrong = 0;
     for (enum imp_status st = IMP_E_NOMEM; st != IMP_OK && steps < 10000; steps++) {
         imp_film *g = NULL;

@@ -130,8 +130,8 @@ static void check_same(void)
     imp_scene_destroy(NULL);
 }
 
-/* ---- Building calls that fail
- * ---------------------------------------------------------- */
+/* ---- Building calls that fail ---------------------------------------------------------
+ */
 
 enum fault {
     F_END,
@@ -272,8 +272,8 @@ static void check_faults(void)
            "NULL arguments");
 }
 
-/* ---- Files
- * ------------------------------------------------------------------------------- */
+/* ---- Files ----------------------------------------------------------------------------
+ */
 
 static void check_files(void)
 {
@@ -348,17 +348,13 @@ static void check_files(void)
     imp_scene_destroy(s);
 }
 
-/* ---- Memory
- * ------------------------------------------------------------------------------ */
+/* ---- Memory ---------------------------------------------------------------------------
+ */
 
 static void check_memory(void)
 {
     struct fail_alloc heap = {0};
-    struct imp_context_options o = IMP_CONTEXT_OPTIONS_INIT;
-    o.threads = 1;
-    o.allocator = fail_alloc_hooks(&heap);
-    imp_context *fragile;
-    if (imp_context_create(&o, &fragile) != IMP_OK) return;
+    imp_context *fragile = fail_alloc_context(&heap);
     static const char xml[] =
         "<scene version='3.0.0'><bsdf type='diffuse' id='a'><rgb name='reflectance' "
         "value='.5'/></bsdf>"

@@ -368,11 +368,7 @@ static void check_truncation(void)
 static void check_memory(void)
 {
     struct fail_alloc heap = {0};
-    struct imp_context_options o = IMP_CONTEXT_OPTIONS_INIT;
-    o.threads = 1;
-    o.allocator = fail_alloc_hooks(&heap);
-    imp_context *fragile;
-    if (imp_context_create(&o, &fragile) != IMP_OK) return;
+    imp_context *fragile = fail_alloc_context(&heap);
     int steps = 0, wrong = 0;
     for (enum imp_status st = IMP_E_NOMEM; st != IMP_OK && steps < 10000; steps++) {
         const long live = heap.live;
