@@ -277,6 +277,69 @@ static void seen_directly(void)
     }
 }
 
+/* ---- Pictures ------------------------------------------------------------------ */
+
+/* A pixel's mean and standard error, from its walks one by one: sum w v / sum w, and
+ * sum w^2 (v - mean)^2 / (sum w)^2 times n/(n - 1), n = (sum w)^2 / sum w^2. A box of one
+ * pixel is w = 1 for its own samples. */
+static void pixels(const char *filter, double radius)
+{
+    enum { SPP = 3, SIDE = 8 };
+    struct traced t;
+    struct imp_run run = IMP_RUN_INIT;
+    imp_film *film;
+    char xml[4096];
+    double mean_off = 0, se_off = 0;
+    snprintf(xml, sizeof xml,
+             "<scene version='3.0.0'><integrator type='path'/>"
+             "<sensor type='perspective'><transform name='to_world'><lookat "
+             "origin='0,0,4' target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'>"
+             "<integer name='width' value='8'/><integer name='height' value='8'/>"
+             "<rfilter type='%s'/></film></sensor><shape type='sphere'/>"
+             "<emitter type='constant'/><emitter type='point'><point name='position' "
+             "x='0' y='2' z='3'/></emitter></scene>",
+             filter);
+    t = (struct traced){.scene = test_scene_text(ctx, xml, IMP_RGB)};
+    t.tracer = (struct imp_tracer){.scene = t.scene,
+                                   .integrator = &t.scene->integrator,
+                                   .sensor = t.scene->sensors[0]};
+    imp__arena_init(&t.arena, ctx);
+    run.spp = SPP;
+    t.tracer.seed = run.seed;
+    test_must(ctx, imp_render(t.scene, &run, &film));
+
+    static double v[SIDE * SIDE * SPP], at[SIDE * SIDE * SPP][2];
+    for (int i = 0; i < SIDE * SIDE * SPP; i++) {
+        struct imp_walk w;
+        const struct imp_arena_mark mark = imp__arena_mark(&t.arena);
+        imp__walk_trace(&t.tracer, &t.arena, i / SPP % SIDE, i / SPP / SIDE, i % SPP, &w);
+        v[i] = w.L[1];
+        at[i][0] = w.px, at[i][1] = w.py;
+        imp__arena_rewind(&t.arena, mark);
+    }
+    for (int p = 0; p < SIDE * SIDE; p++) {
+        double W = 0, W2 = 0, sum = 0, spread = 0;
+        for (int pass = 0; pass < 2; pass++)
+            for (int i = 0; i < SIDE * SIDE * SPP; i++) {
+                const double x = at[i][0] - (p % SIDE + 0.5);
+                const double y = at[i][1] - (p / SIDE + 0.5);
+                const double w = radius == 0.5 ? i / SPP == p
+                                               : fmax(0, 1 - fabs(x) / radius) *
+                                                     fmax(0, 1 - fabs(y) / radius);
+                if (pass == 0) W += w, W2 += w * w, sum += w * v[i];
+                else spread += w * w * (v[i] - sum / W) * (v[i] - sum / W);
+            }
+        const double n = W * W / W2, se = sqrt(spread * n / (n - 1)) / W;
+        mean_off = fmax(mean_off, relative(imp_film_mean(film)[3 * p + 1], sum / W));
+        if (se > 1e-3) se_off = fmax(se_off, relative(imp_film_se(film)[3 * p + 1], se));
+    }
+    tap_ok(mean_off < 1e-6 && se_off < 1e-6, "%s: means %.1e and errors %.1e of pixels",
+           filter, mean_off, se_off);
+    imp_film_destroy(film);
+    imp__arena_free(&t.arena);
+    imp_scene_destroy(t.scene);
+}
+
 int main(void)
 {
     ctx = test_context(1);
@@ -286,6 +349,8 @@ int main(void)
     dark_lamp();
     depths();
     seen_directly();
+    pixels("box", 0.5);
+    pixels("tent", 1);
     imp_context_destroy(ctx);
     return tap_done();
 }
