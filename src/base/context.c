@@ -198,9 +198,11 @@ void *imp__grow(imp_context *ctx, void *array, size_t *capacity, size_t n, size_
         if (wanted > SIZE_MAX / 2) return NULL;
         wanted *= 2;
     }
-    void *p = imp__alloc(ctx, wanted, size);
+    char *p = imp__alloc_raw(ctx, wanted, size);
+    const size_t kept = array ? *capacity * size : 0;
     if (!p) return NULL;
-    if (array) memcpy(p, array, *capacity * size);
+    if (kept) memcpy(p, array, kept);
+    memset(p + kept, 0, wanted * size - kept);
     imp__release(ctx, array);
     *capacity = wanted;
     return p;

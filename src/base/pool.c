@@ -22,6 +22,7 @@ struct run {
     bool committing; /* a thread is inside commit or progress */
     double last_report_s, start_s;
     size_t error_item; /* whose message `error` is: the lowest failed item */
+    size_t failed;     /* of a loop without commits: the lowest failed item */
     char error[1024];
 };
 
@@ -80,24 +81,52 @@ static bool report(struct run *r, size_t committed, bool force)
     return stop;
 }
 
+/* An item of a loop that has nothing to collect. The items before it were handed out
+ * before it and are waited for, so the lowest that failed is the same for any number of
+ * threads. Lock held on entry and exit. */
+static void item_done(struct imp_pool *pool, struct run *r, size_t item,
+                      enum imp_status st)
+{
+    if (st != IMP_OK) {
+        if (r->status == IMP_OK || item < r->failed) {
+            r->status = st;
+            r->failed = item;
+        }
+        r->stop = true;
+        return;
+    }
+    const size_t done = ++r->committed;
+    if (r->committing || !(r->loop->progress || r->loop->deadline_s > 0)) return;
+    r->committing = true;
+    pthread_mutex_unlock(&pool->lock);
+    const bool stop = report(r, done, false);
+    pthread_mutex_lock(&pool->lock);
+    r->committing = false;
+    if (stop) r->stop = true;
+}
+
 /* Take items until there are none. Lock held on entry and exit. */
 static void work_on(struct imp_pool *pool, struct run *r, int worker)
 {
     const struct imp_loop *l = r->loop;
+    const bool ordered = l->commit != NULL;
     while (!r->stop && r->next < l->n_items) {
-        if (r->next >=
-            r->committed + (size_t)r->n_slots) { /* ran ahead: wait for commits */
-            pthread_cond_wait(&pool->changed, &pool->lock);
+        if (ordered && r->next >= r->committed + (size_t)r->n_slots) {
+            pthread_cond_wait(&pool->changed, &pool->lock); /* ran ahead of commits */
             continue;
         }
         const size_t i = r->next++;
-        const int slot = (int)(i % (size_t)r->n_slots);
+        const int slot = ordered ? (int)(i % (size_t)r->n_slots) : worker;
         pthread_mutex_unlock(&pool->lock);
         const enum imp_status st = l->work(i, worker, slot, l->payload);
         pthread_mutex_lock(&pool->lock);
         if (st != IMP_OK && (!r->error[0] || i < r->error_item)) {
             r->error_item = i;
             snprintf(r->error, sizeof r->error, "%s", imp_last_error(pool->ctx));
+        }
+        if (!ordered) {
+            item_done(pool, r, i, st);
+            continue;
         }
         r->slot_status[slot] = st;
         r->slot_done[slot] = 1;
@@ -109,7 +138,7 @@ static void work_on(struct imp_pool *pool, struct run *r, int worker)
             const size_t item = r->committed;
             enum imp_status cst = r->slot_status[s];
             pthread_mutex_unlock(&pool->lock);
-            if (cst == IMP_OK && l->commit) cst = l->commit(item, s, l->payload);
+            if (cst == IMP_OK) cst = l->commit(item, s, l->payload);
             const bool stop = cst == IMP_OK && report(r, item + 1, false);
             pthread_mutex_lock(&pool->lock);
             r->slot_done[s] = 0;

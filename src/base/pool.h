@@ -15,7 +15,8 @@ struct imp_loop {
      * `slot` < imp__pool_slots(ctx) names the result buffer to use. */
     enum imp_status (*work)(size_t i, int worker, int slot, void *payload);
     /* Add the result in `slot`; called for items 0, 1, 2, ... never two at a time. NULL:
-     * no results to collect. */
+     * no results to collect; then no worker ever waits for another's item, and `slot` is
+     * the worker. */
     enum imp_status (*commit)(size_t i, int slot, void *payload);
     void *payload;
     /* Progress, or NULL; item weights are equal. */
@@ -34,9 +35,9 @@ struct imp_loop {
 int imp__pool_slots(const imp_context *ctx);
 
 /* Run the loop. Items are committed in order up to the first that failed; `*done` (may be
- * NULL) is how many. @return the first failure in item order, IMP_CANCELLED if progress
- * asked to stop or the deadline passed, or IMP_OK. A loop inside a loop runs on the
- * calling worker alone. */
+ * NULL) is how many, or without commits how many were done. @return the first failure in
+ * item order, IMP_CANCELLED if progress asked to stop or the deadline passed, or IMP_OK.
+ * A loop inside a loop runs on the calling worker alone. */
 enum imp_status imp__parallel(imp_context *ctx, const struct imp_loop *loop,
                               size_t *done);
 
