@@ -18,7 +18,6 @@
 #include <time.h>
 
 enum { MOST = 24 };
-#define SPEED_EPS 4.8828125e-5
 
 struct curve { /* one way of refining one scene */
     int n;
@@ -30,7 +29,6 @@ struct experiment {
     double reference_eps;
     struct curve without, with;
     double links_reference, mean_reference, bytes_link, bytes_element;
-    imp_film **keep; /* the reference, if it is wanted */
 };
 
 static imp_context *ctx;
@@ -161,46 +159,8 @@ static void run(struct experiment *x)
             imp_elements_destroy(e);
         }
     }
-    if (x->keep) *x->keep = reference;
-    else imp_film_destroy(reference);
+    imp_film_destroy(reference);
     imp_scene_destroy(s);
-}
-
-/* Scene d with importance to about 1.1 % RMS, on one thread and on two: the least of
- * three times. Wall clock says little while other programs run; processor time counts
- * their share out, and its growth with threads is the work that threads add. */
-static void speed(imp_film *reference)
-{
-    static const struct experiment d = {.glossy = 1, .beams = 4};
-    const double eps = SPEED_EPS;
-    double wall[2] = {INFINITY, INFINITY}, used[2] = {INFINITY, INFINITY}, error = 0;
-    double links = 0;
-    imp_context *const keep = ctx;
-    for (int threads = 1; threads <= 2; threads++)
-        for (int again = 0; again < 3; again++) {
-            struct imp_context_options co = IMP_CONTEXT_OPTIONS_INIT;
-            struct imp_elements_info info = {.size = sizeof info};
-            const double w = now(), c = processor();
-            co.threads = threads;
-            must(imp_context_create(&co, &ctx));
-            imp_scene *s = scene_of("d.xml");
-            imp_elements *e = solved(&d, s, eps, 0);
-            imp_film *f = picture(e, IMP_ELEMENTS_FLAT);
-            wall[threads - 1] = fmin(wall[threads - 1], now() - w);
-            used[threads - 1] = fmin(used[threads - 1], processor() - c);
-            must(imp_elements_get_info(e, &info));
-            links = (double)info.links;
-            error = rms(f, reference);
-            imp_film_destroy(f);
-            imp_elements_destroy(e);
-            imp_scene_destroy(s);
-            imp_context_destroy(ctx);
-        }
-    ctx = keep;
-    printf("\"speed\":{\"scene\":\"d\",\"links\":%.0f,\"rms\":%.5f,"
-           "\"one_thread\":{\"wall\":%.2f,\"processor\":%.2f},"
-           "\"two_threads\":{\"wall\":%.2f,\"processor\":%.2f},\"speedup\":%.2f},\n",
-           links, error, wall[0], used[0], wall[1], used[1], wall[0] / wall[1]);
 }
 
 /* Links at which the error falls to `level` for good: log-log, from the fine end. */
@@ -333,8 +293,6 @@ int main(int argc, char **argv)
         {.name = "a", .file = "a.xml", .reference_eps = 1e-5},
         {.name = "c", .file = "d.xml", .beams = 4, .reference_eps = 1e-5}};
     const double start = now();
-    imp_film *reference_d = NULL;
-    x[1].keep = &reference_d;
     if (argc > 1) folder = argv[1];
     co.threads = 2;
     must(imp_context_create(&co, &ctx));
@@ -348,8 +306,6 @@ int main(int argc, char **argv)
     figure3(x, 3);
     printf("],\n\"seconds\":%.1f,\"processor_seconds\":%.1f,\n", now() - start,
            processor());
-    speed(reference_d);
-    imp_film_destroy(reference_d);
     printf("\"threads\":2}\n");
     imp_context_destroy(ctx);
     return 0;

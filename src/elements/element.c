@@ -90,6 +90,7 @@ static double exposure_of(const imp_elements *e, const struct imp__element *x,
     return all ? (double)count / all : 1;
 }
 
+/* l and g are kept, the next sweeps and imp__el_bin fill the others anew. */
 static enum imp_status coefficients_grow(imp_elements *e, size_t n)
 {
     const size_t ch = (size_t)e->ch;
@@ -97,77 +98,163 @@ static enum imp_status coefficients_grow(imp_elements *e, size_t n)
         double **array;
         size_t *cap;
         size_t n;
-    } const all[] = {{&e->l, &e->cap_l, ch * n},
-                     {&e->g, &e->cap_g, ch * n},
-                     {&e->c, &e->cap_c, ch * n},
-                     {&e->b, &e->cap_b, ch * n},
-                     {&e->from_above, &e->cap_above, ch * n},
-                     {&e->a, &e->cap_a, n}};
+        bool keep;
+    } const all[] = {{&e->l, &e->cap_l, ch * n, true},
+                     {&e->g, &e->cap_g, ch * n, true},
+                     {&e->c, &e->cap_c, ch * n, false},
+                     {&e->b, &e->cap_b, ch * n, false},
+                     {&e->from_above, &e->cap_above, ch * n, false},
+                     {&e->a, &e->cap_a, n, false}};
     for (size_t k = 0; k < imp_count(all); k++) {
-        double *grown =
-            imp__grow(e->ctx, *all[k].array, all[k].cap, all[k].n, sizeof *grown);
+        const size_t cap = *all[k].cap, more = imp_max(all[k].n, cap + cap / 2);
+        if (all[k].n <= cap) continue;
+        double *grown = imp__alloc_raw(e->ctx, more, sizeof *grown);
         if (!grown) return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for elements");
+        if (cap && all[k].keep) memcpy(grown, *all[k].array, cap * sizeof *grown);
+        imp__release(e->ctx, *all[k].array);
         *all[k].array = grown;
+        *all[k].cap = more;
     }
     return IMP_OK;
 }
 
-enum imp_status imp__el_element_add(imp_elements *e, uint32_t root, uint32_t parent,
-                                    int k, uint32_t *out)
+/* Room for so many elements more, of a root with n basis functions each. */
+static enum imp_status room_make(imp_elements *e, size_t elements, size_t coefficients)
 {
-    const struct imp__el_root *r = &e->roots[root];
-    const int n = el_n(e, r);
-    if (e->n_elements >= EL_NONE - 1)
+    if (e->n_elements + elements >= EL_NONE)
         return imp__error(e->ctx, IMP_E_NOMEM, "more than 2^32 elements");
     struct imp__element *grown = imp__grow(e->ctx, e->elements, &e->cap_elements,
-                                           e->n_elements + 1, sizeof *grown);
+                                           e->n_elements + elements, sizeof *grown);
     if (!grown) return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for elements");
     e->elements = grown;
-    const enum imp_status st = coefficients_grow(e, e->n_coef + (size_t)n + 1);
-    if (st != IMP_OK) return st;
+    return coefficients_grow(e, e->n_coef + coefficients + 1);
+}
 
-    struct imp__element *x = &grown[e->n_elements];
-    *x = (struct imp__element){.root = root,
-                               .parent = parent,
-                               .corners = (uint8_t)r->corners,
-                               .coef = e->n_coef};
-    if (parent == EL_NONE) {
+/* Shape, exposure and first coefficients of an element whose place in the tree is set. */
+static void fill(imp_elements *e, uint32_t index, int k)
+{
+    struct imp__element *x = &e->elements[index];
+    const struct imp__el_root *r = &e->roots[x->root];
+    const size_t bytes = (size_t)(e->ch * el_n(e, r)) * sizeof(double);
+    x->corners = (uint8_t)r->corners;
+    if (x->parent == EL_NONE) {
         memcpy(x->v, r->v, sizeof x->v);
+        memset(el_at(e, e->l, x), 0, bytes);
+        memset(el_at(e, e->g, x), 0, bytes);
     } else {
-        const struct imp__element *p = &grown[parent];
+        const struct imp__element *p = &e->elements[x->parent];
         x->level = p->level + 1;
         imp__el_quarter(p, k, x->v);
-        const size_t bytes = (size_t)(e->ch * n) * sizeof(double);
+        imp__el_hits_share(e, p, k, x);
         memcpy(el_at(e, e->l, x), el_at(e, e->l, p), bytes);
         memcpy(el_at(e, e->g, x), el_at(e, e->g, p), bytes);
     }
-    x->exposed = exposure_of(e, x, (uint32_t)e->n_elements);
+    x->exposed = exposure_of(e, x, index);
     x->area = imp__polygon_area(r->corners, x->v) * x->exposed;
     x->centre = imp__v3(0, 0, 0);
     for (int i = 0; i < r->corners; i++) x->centre += x->v[i] * (1.0 / r->corners);
     for (int i = 0; i < r->corners; i++)
         x->radius = fmax(x->radius, imp__length(x->v[i] - x->centre));
-    e->n_coef += (size_t)n;
-    *out = (uint32_t)e->n_elements++;
+}
+
+static uint32_t place(imp_elements *e, uint32_t root, uint32_t parent)
+{
+    e->elements[e->n_elements] =
+        (struct imp__element){.root = root, .parent = parent, .coef = e->n_coef};
+    e->n_coef += (size_t)el_n(e, &e->roots[root]);
+    return (uint32_t)e->n_elements++;
+}
+
+enum imp_status imp__el_element_root(imp_elements *e, uint32_t root)
+{
+    const enum imp_status st = room_make(e, 1, (size_t)el_n(e, &e->roots[root]));
+    if (st != IMP_OK) return st;
+    e->roots[root].element = place(e, root, EL_NONE);
+    fill(e, e->roots[root].element, 0);
     return IMP_OK;
 }
 
-enum imp_status imp__el_split(imp_elements *e, uint32_t element)
+struct splits {
+    imp_elements *e;
+    const uint32_t *element;
+    size_t n;
+};
+enum { SPLITS_PER_ITEM = 16 };
+
+static enum imp_status split_work(size_t item, int worker, int slot, void *payload)
 {
-    enum imp_status st = IMP_OK;
-    if (e->elements[element].child) return IMP_OK;
-    uint32_t first = 0;
-    for (int k = 0; k < 4; k++) {
-        uint32_t child;
-        IMP_TRY(imp__el_element_add(e, e->elements[element].root, element, k, &child));
-        if (k == 0) first = child;
+    const struct splits *s = payload;
+    (void)worker, (void)slot;
+    const size_t end = imp_min((item + 1) * SPLITS_PER_ITEM, s->n);
+    for (size_t i = item * SPLITS_PER_ITEM; i < end; i++) {
+        struct imp__element *x = &s->e->elements[s->element[i]];
+        double area = 0; /* the children know better how much of it is exposed */
+        for (uint32_t k = 0; k < 4; k++) {
+            fill(s->e, x->child + k, (int)k);
+            area += s->e->elements[x->child + k].area;
+        }
+        x->area = area;
     }
-    struct imp__element *x = &e->elements[element];
-    x->child = first; /* all four or none */
-    x->area = 0;      /* the children know better how much of it is exposed */
-    for (uint32_t k = 0; k < 4; k++) x->area += e->elements[first + k].area;
-out:
+    return IMP_OK;
+}
+
+enum imp_status imp__el_split(imp_elements *e, const uint32_t *element, size_t n)
+{
+    size_t coefficients = 0;
+    for (size_t i = 0; i < n; i++)
+        coefficients += 4 * (size_t)el_n(e, el_root(e, &e->elements[element[i]]));
+    enum imp_status st = room_make(e, 4 * n, coefficients);
+    if (st != IMP_OK) return st;
+    const size_t elements = e->n_elements, coef = e->n_coef;
+    for (size_t i = 0; i < n; i++) {
+        e->elements[element[i]].child = (uint32_t)e->n_elements;
+        for (int k = 0; k < 4; k++) place(e, e->elements[element[i]].root, element[i]);
+    }
+    struct splits s = {e, element, n};
+    const struct imp_loop loop = {.n_items = (n + SPLITS_PER_ITEM - 1) / SPLITS_PER_ITEM,
+                                  .work = split_work,
+                                  .payload = &s};
+    st = imp__parallel(e->ctx, &loop, NULL);
+    if (st == IMP_OK) return st;
+    for (size_t i = 0; i < n; i++) e->elements[element[i]].child = 0; /* as it was */
+    e->n_elements = elements;
+    e->n_coef = coef;
     return st;
+}
+
+/* Which piece of the triangle or square p of the root's coordinates holds (u, v). */
+static int piece_at(int corners, const imp_v3 *p, double u, double v)
+{
+    if (corners == 4) {
+        const imp_v3 mid = (p[0] + p[2]) * 0.5;
+        return (u >= mid[0]) + 2 * (v >= mid[1]);
+    }
+    /* Weights of the three corners; half or more belongs to that corner. Pieces are the
+     * root's (u, v) triangle scaled, some turned by 180 degrees. */
+    const double b1 = (u - p[0][0]) / (p[1][0] - p[0][0]);
+    const double b2 = (v - p[0][1]) / (p[2][1] - p[0][1]);
+    return 1 - b1 - b2 > 0.5 ? 0 : b1 > 0.5 ? 1 : b2 > 0.5 ? 2 : 3;
+}
+
+static void whole(int corners, imp_v3 p[4])
+{
+    const imp_v3 square[4] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
+    memcpy(p, square, sizeof square);
+    if (corners == 3) p[2] = imp__v3(0, 1, 0);
+}
+
+uint32_t imp__el_path(int corners, double u, double v)
+{
+    imp_v3 p[4], sub[4];
+    uint32_t path = 0;
+    whole(corners, p);
+    for (int level = 0; level < EL_LEVEL_MAX; level++) {
+        const int q = piece_at(corners, p, u, v);
+        path = 4 * path + (uint32_t)q;
+        quarter(corners, p, q, sub);
+        memcpy(p, sub, sizeof p);
+    }
+    return path;
 }
 
 /* Coordinates stay dyadic, so the corners of neighbours compare equal to the bit. */
@@ -175,22 +262,11 @@ uint32_t imp__el_find(const imp_elements *e, uint32_t root, double u, double v,
                       double uv[4][2])
 {
     const int corners = e->roots[root].corners;
-    imp_v3 p[4] = {{0, 0}, {1, 0}, {1, 1}, {0, 1}};
-    if (corners == 3) p[2] = imp__v3(0, 1, 0);
+    imp_v3 p[4], sub[4];
     uint32_t i = e->roots[root].element;
+    whole(corners, p);
     while (e->elements[i].child) {
-        imp_v3 sub[4];
-        int q;
-        if (corners == 4) {
-            const imp_v3 mid = (p[0] + p[2]) * 0.5;
-            q = (u >= mid[0]) + 2 * (v >= mid[1]);
-        } else { /* weights of the three corners; half or more belongs to that corner */
-            /* Pieces are the root's (u, v) triangle scaled, some turned by 180 degrees.
-             */
-            const double b1 = (u - p[0][0]) / (p[1][0] - p[0][0]);
-            const double b2 = (v - p[0][1]) / (p[2][1] - p[0][1]);
-            q = 1 - b1 - b2 > 0.5 ? 0 : b1 > 0.5 ? 1 : b2 > 0.5 ? 2 : 3;
-        }
+        const int q = piece_at(corners, p, u, v);
         quarter(corners, p, q, sub);
         memcpy(p, sub, sizeof p);
         i = e->elements[i].child + (uint32_t)q;

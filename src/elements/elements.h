@@ -118,7 +118,8 @@ struct imp__element {
     double area, radius; /* area: of the exposed part */
     double exposed;      /* fraction that no solid covers */
     imp_v3 centre, v[4];
-    size_t coef; /* first coefficient, in units of one channel's number */
+    size_t coef;     /* first coefficient, in units of one channel's number */
+    uint32_t hit[2]; /* the rays of the eye that end in it: [first, end) of the hits */
 };
 
 struct imp__el_link { /* src -> rcv */
@@ -129,7 +130,9 @@ struct imp__el_link { /* src -> rcv */
 
 struct imp__el_hit { /* where a ray of the eye ended */
     uint32_t root;   /* EL_NONE: nowhere, or on a black side */
-    uint32_t source; /* importance source it belongs to */
+    uint32_t source; /* importance source it belongs to, EL_NONE: to the view alone */
+    uint32_t ray;    /* its number in the view, EL_NONE: not there */
+    uint32_t path;   /* imp__el_path of (u, v) */
     double u, v;
     imp_v3 w; /* towards the eye, world */
     double weight;
@@ -171,13 +174,13 @@ struct imp_elements {
     size_t cap_in, cap_out_start, cap_out, cap_value;
     bool sorted;
 
-    size_t n_hits, cap_hits;
-    struct imp__el_hit *hits; /* of camera sources */
-    size_t *hit_start;        /* [n_roots + 1] into hit_order: the hits of a root */
-    size_t *hit_order;        /* [n_hits]; made by imp__el_bin */
-    size_t n_view, cap_view;
-    struct imp__el_hit *view; /* of the picture that decides when to stop */
-    double *picture;          /* its pixels at the last step */
+    /* Rays of camera sources and of the view, the picture that decides when to stop: by
+     * root and path, so that those of an element are together; misses last. */
+    size_t n_hits;
+    struct imp__el_hit *hits;
+    size_t n_view;   /* rays of the view */
+    double *seen;    /* [n_view] what they see */
+    double *picture; /* the view's pixels at the last step */
 
     int64_t rays;
     size_t skipped; /* polygons without area */
@@ -234,10 +237,12 @@ enum imp_status imp__el_material_add(imp_elements *e, const struct imp__el_mater
                                      int *index);
 
 /* element.c */
-enum imp_status imp__el_element_add(imp_elements *e, uint32_t root, uint32_t parent,
-                                    int k, uint32_t *out);
-/* Four children, made if they are not there; they inherit l and g. */
-enum imp_status imp__el_split(imp_elements *e, uint32_t element);
+enum imp_status imp__el_element_root(imp_elements *e, uint32_t root);
+/* Four children for each of these leaves, in this order; they inherit l and g. */
+enum imp_status imp__el_split(imp_elements *e, const uint32_t *element, size_t n);
+/* Which child of which holds (u, v), down to the last level: two bits each, the first on
+ * top. */
+uint32_t imp__el_path(int corners, double u, double v);
 /* The leaf at (u, v) of a root, and its corners there (uv [corners][2], may be NULL). */
 uint32_t imp__el_find(const imp_elements *e, uint32_t root, double u, double v,
                       double uv[4][2]);
@@ -263,8 +268,17 @@ void imp__el_link_make(const imp_elements *e, uint32_t src, uint32_t rcv,
 double imp__el_link_bound(const imp_elements *e, const struct imp__el_link *link);
 size_t imp__el_bytes(const imp_elements *e);
 enum imp_status imp__el_links_first(imp_elements *e);
-/* Sort by receiver, index by source, make room for the values. */
-enum imp_status imp__el_links_sort(imp_elements *e);
+/* Sort the first `all` links by receiver, without those that are gone (NULL: none is),
+ * index by source, make room for the values. */
+enum imp_status imp__el_links_sort(imp_elements *e, const unsigned char *gone,
+                                   size_t all);
+
+/* sum.c: the sum of part(e, first, end, how) over ranges of [0, n), by all threads; the
+ * ranges and the order of adding depend on n alone. */
+double imp__el_sum(const imp_elements *e, size_t n,
+                   double (*part)(const imp_elements *e, size_t first, size_t end,
+                                  const void *how),
+                   const void *how);
 
 /* refine.c: refine all links whose error is over e->eps. */
 enum imp_status imp__el_refine(imp_elements *e, bool importance, bool *full);
@@ -282,7 +296,6 @@ void imp__el_emission(const imp_elements *e, const struct imp__el_link *link,
 
 /* source.c */
 enum imp_status imp__el_sources(imp_elements *e); /* camera hits; before links */
-enum imp_status imp__el_bin(imp_elements *e);     /* a from the hits */
 /* The measurement from radiance; `direct` (may be NULL): emitters that the eye sees. */
 double imp__el_measure(const imp_elements *e, double *direct);
 /* The same from the emitters: emission x importance. */
@@ -294,6 +307,17 @@ bool imp__el_trace(const imp_elements *e, const struct imp_sensor_ray *ray,
                    struct imp__el_hit *hit);
 void imp__el_ray(const struct imp_sensor *s, int x, int y, int k, int side,
                  struct imp_sensor_ray *ray);
+
+/* eye.c */
+/* Order the hits and tell the elements which are theirs; after they were taken. */
+enum imp_status imp__el_hits_sort(imp_elements *e);
+/* The hits of the parent that are its child k's. */
+void imp__el_hits_share(const imp_elements *e, const struct imp__element *parent, int k,
+                        struct imp__element *child);
+enum imp_status imp__el_bin(imp_elements *e); /* a from the hits */
+/* Relative RMS change of the view since the last call; NaN the first time. Without a
+ * sensor it is the relative change of the measurement. */
+enum imp_status imp__el_look(imp_elements *e, double measure, double *change);
 
 /* image.c */
 /* Radiance of a hit towards its w, from the leaf. */

@@ -144,7 +144,7 @@ enum imp_status imp_elements_open(const imp_scene *scene,
                                "%s: element %u is split in a way that makes "
                                "no sense",
                                path, parent));
-        IMP_TRY(imp__el_split(e, parent));
+        IMP_TRY(imp__el_split(e, &parent, 1));
     }
     if (h.coefficients != (size_t)e->ch * e->n_coef)
         IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: is cut short or damaged", path));
@@ -161,7 +161,7 @@ enum imp_status imp_elements_open(const imp_scene *scene,
     memcpy(e->links, at, h.links * sizeof *e->links);
     e->n_links = h.links;
     IMP_TRY(links_check(e, path));
-    IMP_TRY(imp__el_links_sort(e));
+    IMP_TRY(imp__el_links_sort(e, NULL, e->n_links));
     IMP_TRY(imp__el_sources(e));
     IMP_TRY(imp__el_bin(e));
     e->solved = true;

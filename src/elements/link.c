@@ -141,7 +141,7 @@ size_t imp__el_bytes(const imp_elements *e)
            (e->cap_l + e->cap_g + e->cap_c + e->cap_b + e->cap_above + e->cap_a +
             e->cap_value) *
                sizeof(double) +
-           (e->cap_hits + e->cap_view) * sizeof *e->hits + e->arena.total;
+           e->n_hits * sizeof *e->hits + e->n_view * sizeof *e->seen + e->arena.total;
 }
 
 /* ---- The first links: all pairs of polygons that may see each other ------------ */
@@ -232,7 +232,7 @@ enum imp_status imp__el_links_first(imp_elements *e)
     f.count_only = false;
     IMP_TRY(imp__parallel(e->ctx, &loop, NULL));
     e->n_links = f.total;
-    IMP_TRY(imp__el_links_sort(e));
+    IMP_TRY(imp__el_links_sort(e, NULL, e->n_links));
 out:
     for (size_t k = 0; f.slot && k < slots; k++) imp__release(e->ctx, f.slot[k].links);
     imp__release(e->ctx, f.slot);
@@ -249,26 +249,65 @@ out:
         (array) = grown_;                                                                \
     } while (0)
 
-enum imp_status imp__el_links_sort(imp_elements *e)
+struct moved {
+    const struct imp__el_link *from;
+    const unsigned char *gone;
+    const uint32_t *place;
+    struct imp__el_link *to;
+    size_t n;
+};
+enum { MOVES_PER_ITEM = 2048 };
+
+static enum imp_status move_work(size_t item, int worker, int slot, void *payload)
+{
+    const struct moved *m = payload;
+    (void)worker, (void)slot;
+    const size_t end = imp_min((item + 1) * MOVES_PER_ITEM, m->n);
+    for (size_t k = item * MOVES_PER_ITEM; k < end; k++)
+        if (!m->gone || !m->gone[k]) m->to[m->place[k]] = m->from[k];
+    return IMP_OK;
+}
+
+enum imp_status imp__el_links_sort(imp_elements *e, const unsigned char *gone, size_t all)
 {
     enum imp_status st = IMP_OK;
-    const size_t n = e->n_links, m = e->n_elements;
+    const size_t m = e->n_elements;
     struct imp__el_link *sorted = NULL;
+    uint32_t *place = imp__alloc_raw(e->ctx, all + 1, sizeof *place);
+    size_t n = 0;
+    for (size_t k = 0; k < all; k++) n += !gone || !gone[k];
     EL_GROW(e->in_start, e->cap_in, m + 2);
     EL_GROW(e->out_start, e->cap_out_start, m + 2);
     EL_GROW(e->out, e->cap_out, n + 1);
-    EL_GROW(e->value, e->cap_value, 4 * (size_t)e->ch * (n + 1));
-    sorted = imp__alloc(e->ctx, e->cap_links, sizeof *sorted);
-    if (!sorted) IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for links"));
+    if (4 * (size_t)e->ch * (n + 1) > e->cap_value) { /* sweeps fill it anew */
+        imp__release(e->ctx, e->value);
+        e->cap_value = 4 * (size_t)e->ch * (n + n / 2 + 1);
+        e->value = imp__alloc_raw(e->ctx, e->cap_value, sizeof *e->value);
+        if (!e->value) {
+            e->cap_value = 0;
+            IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for links"));
+        }
+    }
+    sorted = imp__alloc_raw(e->ctx, e->cap_links, sizeof *sorted);
+    if (!sorted || !place)
+        IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for links"));
 
     /* Counting sorts, stable: start[k + 1] counts, then becomes the place to write. */
     memset(e->in_start, 0, (m + 2) * sizeof *e->in_start);
-    for (size_t k = 0; k < n; k++) e->in_start[e->links[k].rcv + 2]++;
+    for (size_t k = 0; k < all; k++)
+        if (!gone || !gone[k]) e->in_start[e->links[k].rcv + 2]++;
     for (size_t k = 1; k < m + 2; k++) e->in_start[k] += e->in_start[k - 1];
-    for (size_t k = 0; k < n; k++)
-        sorted[e->in_start[e->links[k].rcv + 1]++] = e->links[k];
+    for (size_t k = 0; k < all; k++)
+        if (!gone || !gone[k]) place[k] = (uint32_t)e->in_start[e->links[k].rcv + 1]++;
+    struct moved move = {e->links, gone, place, sorted, all};
+    const struct imp_loop loop = {.n_items = (all + MOVES_PER_ITEM - 1) / MOVES_PER_ITEM,
+                                  .work = move_work,
+                                  .payload = &move};
+    IMP_TRY(imp__parallel(e->ctx, &loop, NULL));
     imp__release(e->ctx, e->links);
     e->links = sorted;
+    e->n_links = n;
+    sorted = NULL;
     memset(e->out_start, 0, (m + 2) * sizeof *e->out_start);
     for (size_t k = 0; k < n; k++) e->out_start[e->links[k].src + 2]++;
     for (size_t k = 1; k < m + 2; k++) e->out_start[k] += e->out_start[k - 1];
@@ -276,5 +315,7 @@ enum imp_status imp__el_links_sort(imp_elements *e)
         e->out[e->out_start[e->links[k].src + 1]++] = (uint32_t)k;
     e->sorted = true;
 out:
+    imp__release(e->ctx, place);
+    imp__release(e->ctx, sorted);
     return st;
 }

@@ -117,23 +117,23 @@ static double error_of(const imp_elements *e, const struct imp__el_link *k,
 
 /* ---- One wave: look at links [from, n), split, make their children's links ----- */
 
-enum { LINKS_PER_ITEM = 256, KEEP = 0, SPLIT_RECEIVER, SPLIT_SOURCE };
+/* Of a link: it stays, its receiver is to be split, its source is, or it goes. Whether
+ * the element still needs to be split itself is told by FRESH. */
+enum { KEEP = 0, SPLIT_RECEIVER, SPLIT_SOURCE, GONE, FRESH = 4 };
+enum { LINKS_PER_ITEM = 256 };
 
 struct wave {
     imp_elements *e;
     bool importance;
-    size_t from, n;
-    unsigned char *verdict; /* [n - from] */
-    double *part;           /* of the total, one a slot */
-    double total;
-    size_t n_new;
-    struct {
-        uint32_t src, rcv;
-    } * pair;
-    struct imp__el_link *made;
-    bool *keep;
-    int64_t *rays; /* one an item */
+    unsigned char *fate; /* [cap_fate] of every link */
+    size_t cap_fate;
+    size_t from, n; /* links [0, from) are settled */
+    size_t alive;   /* links that stay */
+    size_t *before; /* [items + 1] splits before an item's links */
+    int64_t *rays;  /* [items] */
 };
+
+static size_t items_of(size_t n) { return (n + LINKS_PER_ITEM - 1) / LINKS_PER_ITEM; }
 
 static enum imp_status judge(size_t item, int worker, int slot, void *payload)
 {
@@ -142,166 +142,198 @@ static enum imp_status judge(size_t item, int worker, int slot, void *payload)
     (void)worker, (void)slot;
     const size_t first = v->from + item * LINKS_PER_ITEM;
     const size_t end = imp_min(first + LINKS_PER_ITEM, v->n);
+    size_t splits = 0;
     for (size_t k = first; k < end; k++) {
         const struct imp__el_link *link = &e->links[k];
         const struct imp__element *i = &e->elements[link->rcv],
                                   *j = &e->elements[link->src];
         const bool can_i = refinable(e, i), can_j = refinable(e, j);
-        unsigned char what = KEEP;
-        if ((can_i || can_j) && error_of(e, link, v->importance) > e->eps)
-            what =
-                can_i && (!can_j || i->area >= j->area) ? SPLIT_RECEIVER : SPLIT_SOURCE;
-        v->verdict[k - v->from] = what;
+        if (v->fate[k] == GONE || !(can_i || can_j) ||
+            !(error_of(e, link, v->importance) > e->eps))
+            continue;
+        const bool receiver = can_i && (!can_j || i->area >= j->area);
+        v->fate[k] = receiver ? SPLIT_RECEIVER : SPLIT_SOURCE;
+        if (!(receiver ? i : j)->child) v->fate[k] |= FRESH;
+        splits++;
     }
+    v->before[item + 1] = splits;
     return IMP_OK;
+}
+
+/* Split the elements that links of this wave need split, in the order of the links. */
+static enum imp_status elements_split(struct wave *v)
+{
+    enum imp_status st = IMP_OK;
+    imp_elements *e = v->e;
+    uint32_t *list = NULL;
+    size_t n = 0, cap = 0;
+    for (size_t k = v->from; k < v->n; k++) {
+        if (!(v->fate[k] & FRESH)) continue;
+        v->fate[k] &= (unsigned char)~FRESH;
+        const uint32_t node =
+            v->fate[k] == SPLIT_RECEIVER ? e->links[k].rcv : e->links[k].src;
+        if (e->elements[node].child) continue; /* it is in the list */
+        uint32_t *grown = imp__grow(e->ctx, list, &cap, n + 1, sizeof *grown);
+        if (!grown) {
+            st = imp__error(e->ctx, IMP_E_NOMEM, "out of memory for elements");
+            break;
+        }
+        list = grown;
+        list[n++] = node;
+        e->elements[node].child = EL_NONE;
+    }
+    for (size_t k = 0; k < n; k++) e->elements[list[k]].child = 0;
+    if (st == IMP_OK) st = imp__el_split(e, list, n);
+    imp__release(e->ctx, list);
+    return st;
 }
 
 static enum imp_status make(size_t item, int worker, int slot, void *payload)
 {
     struct wave *v = payload;
+    imp_elements *e = v->e;
     (void)worker, (void)slot;
-    const size_t end = imp_min((item + 1) * LINKS_PER_ITEM, v->n_new);
-    for (size_t k = item * LINKS_PER_ITEM; k < end; k++)
-        imp__el_link_make(v->e, v->pair[k].src, v->pair[k].rcv, &v->made[k], &v->keep[k],
-                          &v->rays[item]);
+    const size_t first = v->from + item * LINKS_PER_ITEM;
+    const size_t end = imp_min(first + LINKS_PER_ITEM, v->n);
+    size_t to = v->n + 4 * v->before[item];
+    v->rays[item] = 0;
+    for (size_t k = first; k < end; k++) {
+        const struct imp__el_link *link = &e->links[k];
+        if (v->fate[k] != SPLIT_RECEIVER && v->fate[k] != SPLIT_SOURCE) continue;
+        const bool receiver = v->fate[k] == SPLIT_RECEIVER;
+        const uint32_t child = e->elements[receiver ? link->rcv : link->src].child;
+        for (uint32_t q = 0; q < 4; q++, to++) {
+            bool keep;
+            imp__el_link_make(e, receiver ? link->src : child + q,
+                              receiver ? child + q : link->rcv, &e->links[to], &keep,
+                              &v->rays[item]);
+            v->fate[to] = keep ? KEEP : GONE;
+        }
+    }
     return IMP_OK;
 }
-
-static size_t items_of(size_t n) { return (n + LINKS_PER_ITEM - 1) / LINKS_PER_ITEM; }
 
 /* Bytes that refinement would hold with so many links and elements more. */
 static double bytes_after(const imp_elements *e, double links, double elements)
 {
     const double each =
-        (double)(2 * sizeof *e->links + 4 * (size_t)e->ch * sizeof(double) + 4);
+        (double)(2 * sizeof *e->links + 4 * (size_t)e->ch * sizeof(double) + 5);
     const double per = e->n_elements ? (double)e->n_coef / (double)e->n_elements : 0;
-    return (double)(e->n_hits + e->n_view) * sizeof *e->hits + links * each +
+    return (double)e->n_hits * sizeof *e->hits + links * each +
            elements * (sizeof *e->elements + 16 + per * 8 * (5.0 * e->ch + 1));
 }
 
-static enum imp_status wave_run(struct wave *v, bool *full)
+/* Room for n links, with their fates. */
+static enum imp_status room_make(struct wave *v, size_t n)
+{
+    imp_elements *e = v->e;
+    if (n > e->cap_links) {
+        const size_t cap = imp_max(n, e->cap_links + e->cap_links / 2);
+        struct imp__el_link *links = imp__alloc_raw(e->ctx, cap, sizeof *links);
+        if (!links) return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for links");
+        if (v->n) memcpy(links, e->links, v->n * sizeof *links);
+        imp__release(e->ctx, e->links);
+        e->links = links;
+        e->cap_links = cap;
+    }
+    unsigned char *fate = imp__grow(e->ctx, v->fate, &v->cap_fate, n, 1);
+    if (!fate) return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for links");
+    v->fate = fate;
+    return IMP_OK;
+}
+
+/* *more: links were split, and their children's links are the next wave. */
+static enum imp_status wave_run(struct wave *v, bool *full, bool *more)
 {
     enum imp_status st = IMP_OK;
     imp_elements *e = v->e;
-    size_t n_split = 0;
-    v->verdict = imp__alloc(e->ctx, v->n - v->from + 1, 1);
-    if (!v->verdict) IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for links"));
-    const struct imp_loop look = {
-        .n_items = items_of(v->n - v->from), .work = judge, .payload = v};
-    IMP_TRY(imp__parallel(e->ctx, &look, NULL));
-    for (size_t k = 0; k < v->n - v->from; k++) n_split += v->verdict[k] != KEEP;
-    v->n_new = 0;
-    if (n_split == 0) goto out;
-    if (e->n_links + 3 * n_split > e->opt.max_links ||
-        bytes_after(e, (double)(e->n_links + 4 * n_split), (double)e->n_elements) >
+    const size_t items = items_of(v->n - v->from);
+    size_t splits = 0;
+    *more = false;
+    v->before = imp__alloc(e->ctx, items + 1, sizeof *v->before);
+    v->rays = imp__alloc(e->ctx, items + 1, sizeof *v->rays);
+    if (!v->before || !v->rays)
+        IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for links"));
+    struct imp_loop loop = {.n_items = items, .work = judge, .payload = v};
+    IMP_TRY(imp__parallel(e->ctx, &loop, NULL));
+    for (size_t k = 0; k < items; k++) v->before[k + 1] += v->before[k];
+    splits = v->before[items];
+    if (splits == 0) goto out;
+    if (v->alive + 3 * splits > e->opt.max_links || v->n + 4 * splits >= UINT32_MAX ||
+        bytes_after(e, (double)(v->n + 4 * splits), (double)e->n_elements) >
             (double)e->opt.max_bytes) {
         *full = true;
         goto out;
     }
-    v->pair = imp__alloc(e->ctx, 4 * n_split, sizeof *v->pair);
-    v->made = imp__alloc(e->ctx, 4 * n_split, sizeof *v->made);
-    v->keep = imp__alloc(e->ctx, 4 * n_split, sizeof *v->keep);
-    v->rays = imp__alloc(e->ctx, items_of(4 * n_split) + 1, sizeof *v->rays);
-    if (!v->pair || !v->made || !v->keep || !v->rays)
-        IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for links"));
+    IMP_TRY(room_make(v, v->n + 4 * splits));
     e->sorted = false; /* the indices are too short for new elements */
-    for (size_t k = v->from; k < v->n; k++) {
-        const unsigned char what = v->verdict[k - v->from];
-        const struct imp__el_link *link = &e->links[k];
-        if (what == KEEP) continue;
-        const uint32_t node = what == SPLIT_RECEIVER ? link->rcv : link->src;
-        IMP_TRY(imp__el_split(e, node));
-        for (uint32_t q = 0; q < 4; q++) {
-            const uint32_t child = e->elements[node].child + q;
-            v->pair[v->n_new].src = what == SPLIT_RECEIVER ? link->src : child;
-            v->pair[v->n_new++].rcv = what == SPLIT_RECEIVER ? child : link->rcv;
-        }
-    }
-    const struct imp_loop build = {
-        .n_items = items_of(v->n_new), .work = make, .payload = v};
-    IMP_TRY(imp__parallel(e->ctx, &build, NULL));
-    struct imp__el_link *grown =
-        imp__grow(e->ctx, e->links, &e->cap_links, e->n_links + v->n_new, sizeof *grown);
-    if (!grown) IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for links"));
-    e->links = grown;
-    /* From here nothing fails: the split links go, their children come. */
-    size_t out = v->from;
+    IMP_TRY(elements_split(v));
+    loop.work = make;
+    IMP_TRY(imp__parallel(e->ctx, &loop, NULL));
+    /* From here nothing fails: the split links go, their children stay. */
     for (size_t k = v->from; k < v->n; k++)
-        if (v->verdict[k - v->from] == KEEP) e->links[out++] = e->links[k];
-    for (size_t k = 0; k < items_of(v->n_new); k++) e->rays += v->rays[k];
-    v->from = out;
-    for (size_t k = 0; k < v->n_new; k++)
-        if (v->keep[k]) e->links[out++] = v->made[k];
-    e->n_links = v->n = out;
+        if (v->fate[k] != KEEP) v->fate[k] = GONE;
+    for (size_t k = 0; k < items; k++) e->rays += v->rays[k];
+    v->from = v->n;
+    v->n += 4 * splits;
+    v->alive -= splits;
+    for (size_t k = v->from; k < v->n; k++) v->alive += v->fate[k] == KEEP;
+    *more = true;
 out:
-    imp__release(e->ctx, v->verdict);
-    imp__release(e->ctx, v->pair);
-    imp__release(e->ctx, v->made);
-    imp__release(e->ctx, v->keep);
+    if (!*more) /* who was to be split stays */
+        for (size_t k = v->from; k < v->n; k++)
+            if (v->fate[k] != GONE) v->fate[k] = KEEP;
+    imp__release(e->ctx, v->before);
     imp__release(e->ctx, v->rays);
-    v->verdict = NULL, v->pair = NULL, v->made = NULL, v->keep = NULL, v->rays = NULL;
+    v->before = NULL, v->rays = NULL;
     return st;
 }
 
 enum imp_status imp__el_refine(imp_elements *e, bool importance, bool *full)
 {
     enum imp_status st = IMP_OK;
-    struct wave v = {.e = e, .importance = importance, .from = 0, .n = e->n_links};
+    struct wave v = {
+        .e = e, .importance = importance, .n = e->n_links, .alive = e->n_links};
+    bool more = false;
     *full = false;
+    st = room_make(&v, e->n_links + 1);
+    if (st != IMP_OK) return st;
     do {
-        st = wave_run(&v, full);
+        st = wave_run(&v, full, &more);
         imp__el_tick(e, "refine", -1, NULL);
-    } while (st == IMP_OK && v.n_new > 0 && !*full && !e->stop);
+    } while (more && !e->stop);
     if (!e->sorted) { /* also after a failure: the links are whole */
-        const enum imp_status sorted = imp__el_links_sort(e);
+        const enum imp_status sorted = imp__el_links_sort(e, v.fate, v.n);
+        if (sorted != IMP_OK) e->solved = false; /* until the old ones are sorted again */
         if (st == IMP_OK) st = sorted;
     }
+    imp__release(e->ctx, v.fate);
     return st;
 }
 
 /* ---- The scale of eps ---------------------------------------------------------- */
 
-static enum imp_status total_work(size_t item, int worker, int slot, void *payload)
+static double total_of(const imp_elements *e, size_t first, size_t end, const void *how)
 {
-    struct wave *v = payload;
-    const imp_elements *e = v->e;
+    const bool importance = *(const bool *)how;
     double sum = 0;
-    (void)worker;
-    const size_t end = imp_min((item + 1) * LINKS_PER_ITEM, e->n_links);
-    for (size_t k = item * LINKS_PER_ITEM; k < end; k++) {
+    for (size_t k = first; k < end; k++) {
         const struct imp__el_link *link = &e->links[k];
         const struct imp__el_root *r = el_root(e, &e->elements[link->rcv]);
         imp_spec l[3], g[3];
-        imp__el_ends(e, link, l, v->importance ? g : NULL);
+        imp__el_ends(e, link, l, importance ? g : NULL);
         for (int c = 0; c < e->ch; c++) {
-            if (!v->importance)
+            if (!importance)
                 g[c] = imp__spec(e->lum[c] *
                                  (e->materials[r->material].albedo[c] * IMP_INV_PI +
                                   (r->measured ? IMP_INV_PI : 0)));
             for (int s = 0; s < 4; s++) sum += link->k[s] * fabs(l[c][s] * g[c][s]);
         }
     }
-    v->part[slot] = sum;
-    return IMP_OK;
-}
-static enum imp_status total_commit(size_t item, int slot, void *payload)
-{
-    struct wave *v = payload;
-    (void)item;
-    v->total += v->part[slot];
-    return IMP_OK;
+    return sum;
 }
 
 double imp__el_total(const imp_elements *e, bool importance)
 {
-    struct wave v = {.e = (imp_elements *)e, .importance = importance};
-    v.part = imp__alloc(e->ctx, (size_t)imp__pool_slots(e->ctx), sizeof *v.part);
-    if (!v.part) return 0;
-    const struct imp_loop loop = {.n_items = items_of(e->n_links),
-                                  .work = total_work,
-                                  .commit = total_commit,
-                                  .payload = &v};
-    const enum imp_status st = imp__parallel(e->ctx, &loop, NULL);
-    imp__release(e->ctx, v.part);
-    return st == IMP_OK ? v.total : 0;
+    return imp__el_sum(e, e->n_links, total_of, &importance);
 }

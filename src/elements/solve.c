@@ -177,8 +177,7 @@ enum imp_status imp_elements_create(const imp_scene *scene,
     IMP_TRY(options_take(e, options));
     IMP_TRY(imp__el_roots(e));
     IMP_TRY(imp__el_materials(e));
-    for (size_t i = 0; i < e->n_roots; i++)
-        IMP_TRY(imp__el_element_add(e, (uint32_t)i, EL_NONE, 0, &e->roots[i].element));
+    for (size_t i = 0; i < e->n_roots; i++) IMP_TRY(imp__el_element_root(e, (uint32_t)i));
     *out = e;
     e = NULL;
 out:
@@ -189,10 +188,10 @@ out:
 void imp_elements_destroy(imp_elements *e)
 {
     if (!e) return;
-    void *const all[] = {e->roots,     e->elements,   e->l,       e->g,     e->c,
-                         e->b,         e->from_above, e->a,       e->links, e->in_start,
-                         e->out_start, e->out,        e->value,   e->hits,  e->view,
-                         e->hit_start, e->hit_order,  e->picture, e->log,   e->rows};
+    void *const all[] = {e->roots, e->elements,   e->l,         e->g,     e->c,
+                         e->b,     e->from_above, e->a,         e->links, e->in_start,
+                         e->out,   e->value,      e->out_start, e->hits,  e->seen,
+                         e->log,   e->picture,    e->rows};
     for (size_t k = 0; k < imp_count(all); k++) imp__release(e->ctx, all[k]);
     imp__arena_free(&e->arena);
     imp__release(e->ctx, e);
@@ -205,61 +204,6 @@ static size_t leaves_of(const imp_elements *e)
     size_t n = 0;
     for (size_t k = 0; k < e->n_elements; k++) n += e->elements[k].child == 0;
     return n;
-}
-
-struct view_job {
-    const imp_elements *e;
-    double *out;
-    size_t per;
-};
-static enum imp_status view_work(size_t item, int worker, int slot, void *payload)
-{
-    const struct view_job *v = payload;
-    const imp_elements *e = v->e;
-    (void)worker, (void)slot;
-    const size_t end = imp_min((item + 1) * 64, e->n_view / v->per);
-    for (size_t p = item * 64; p < end; p++) {
-        double sum = 0;
-        for (size_t k = 0; k < v->per; k++) {
-            double out[3];
-            imp__el_flat(e, &e->view[p * v->per + k], out);
-            for (int c = 0; c < e->ch; c++) sum += e->lum[c] * out[c];
-        }
-        v->out[p] = sum / (double)v->per;
-    }
-    return IMP_OK;
-}
-
-/* Relative RMS change of the picture since the last call; NaN the first time. Without a
- * sensor it is the relative change of the measurement. */
-static enum imp_status change_of(imp_elements *e, double measure, double *change)
-{
-    enum imp_status st = IMP_OK;
-    struct view_job v = {.e = e, .per = (size_t)(e->opt.rays * e->opt.rays)};
-    const size_t n = e->n_view / v.per;
-    *change = NAN;
-    if (n == 0) {
-        if (e->n_log)
-            *change = fabs(measure - e->log[e->n_log - 1].measure) / fabs(measure);
-        return IMP_OK;
-    }
-    v.out = imp__alloc(e->ctx, n, sizeof *v.out);
-    if (!v.out) return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for the picture");
-    const struct imp_loop loop = {
-        .n_items = (n + 63) / 64, .work = view_work, .payload = &v};
-    IMP_TRY(imp__parallel(e->ctx, &loop, NULL));
-    double apart = 0, sum = 0;
-    for (size_t p = 0; p < n; p++) {
-        sum += v.out[p] * v.out[p];
-        if (e->picture) apart += imp__sqr(v.out[p] - e->picture[p]);
-    }
-    if (e->picture) *change = sum > 0 ? sqrt(apart / sum) : 0;
-    imp__release(e->ctx, e->picture);
-    e->picture = v.out;
-    v.out = NULL;
-out:
-    imp__release(e->ctx, v.out);
-    return st;
 }
 
 static enum imp_status log_add(imp_elements *e)
@@ -276,7 +220,7 @@ static enum imp_status log_add(imp_elements *e)
         return imp__error(e->ctx, IMP_E_NUMERIC,
                           "reflections grow without end: the surfaces "
                           "give back more than arrives");
-    IMP_TRY(change_of(e, s.measure, &s.change));
+    IMP_TRY(imp__el_look(e, s.measure, &s.change));
     struct imp_elements_step *grown =
         imp__grow(e->ctx, e->log, &e->cap_log, e->n_log + 1, sizeof *grown);
     if (!grown) IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for the log"));
@@ -338,12 +282,13 @@ enum imp_status imp_elements_solve(imp_elements *e)
     e->deadline_s = e->opt.time_limit_s > 0 ? e->start_s + e->opt.time_limit_s : 0;
     e->stop = false;
     e->reason = "the smallest tolerance was reached";
-    if (!e->n_links) {
-        IMP_TRY(imp__el_links_first(e));
-        IMP_TRY(imp__el_sources(e));
-    }
+    if (!e->n_links) IMP_TRY(imp__el_links_first(e));
+    else if (!e->sorted) IMP_TRY(imp__el_links_sort(e, NULL, e->n_links));
+    if (!e->seen) IMP_TRY(imp__el_sources(e));
+    const bool cold = !e->solved;
+    e->solved = false; /* a failure leaves fields half made */
     IMP_TRY(imp__el_bin(e));
-    IMP_TRY(imp__el_sweep(e, e->opt.sweeps + 2, importance, !e->solved));
+    IMP_TRY(imp__el_sweep(e, e->opt.sweeps + 2, importance, cold));
     e->n_log = 0;
     imp__release(e->ctx, e->picture);
     e->picture = NULL;

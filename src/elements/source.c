@@ -61,10 +61,19 @@ bool imp__el_trace(const imp_elements *e, const struct imp_sensor_ray *ray,
 
 /* ---- Hits of a picture, row by row --------------------------------------------- */
 
+static size_t rays_of(const imp_elements *e, const int region[4])
+{
+    return (size_t)(region[2] - region[0]) * (size_t)(region[3] - region[1]) *
+           (size_t)(e->opt.rays * e->opt.rays);
+}
+
 struct rows {
     const imp_elements *e;
     const struct imp_sensor *sensor;
     int x0, y0, width, side;
+    uint32_t source;
+    bool seen; /* they are the view's */
+    double weight;
     struct imp__el_hit *out;
 };
 static enum imp_status row_work(size_t item, int worker, int slot, void *payload)
@@ -77,112 +86,85 @@ static enum imp_status row_work(size_t item, int worker, int slot, void *payload
         struct imp_sensor_ray ray;
         imp__el_ray(r->sensor, r->x0 + (int)(k / (size_t)per), r->y0 + (int)item,
                     (int)(k % (size_t)per), r->side, &ray);
-        imp__el_trace(r->e, &ray, &r->out[item * n + k]);
+        struct imp__el_hit *hit = &r->out[item * n + k];
+        *hit = (struct imp__el_hit){.source = r->source,
+                                    .ray = r->seen ? (uint32_t)(item * n + k) : EL_NONE,
+                                    .weight = r->weight};
+        if (imp__el_trace(r->e, &ray, hit))
+            hit->path = imp__el_path(r->e->roots[hit->root].corners, hit->u, hit->v);
     }
     return IMP_OK;
 }
 
+/* `weight`: of all these rays together. */
 static enum imp_status hits_take(imp_elements *e, int sensor, const int region[4],
-                                 struct imp__el_hit **array, size_t *cap, size_t *count)
+                                 uint32_t source, bool seen, double weight)
 {
     enum imp_status st = IMP_OK;
+    const int height = region[3] - region[1], width = region[2] - region[0];
+    const size_t n = rays_of(e, region);
     struct rows r = {.e = e,
                      .sensor = e->scene->sensors[sensor],
                      .x0 = region[0],
                      .y0 = region[1],
-                     .width = region[2] - region[0],
-                     .side = e->opt.rays};
-    const int height = region[3] - region[1];
-    const size_t n = (size_t)r.width * (size_t)height * (size_t)(r.side * r.side);
-    if ((double)n * sizeof **array > (double)e->opt.max_bytes)
-        return imp__error(e->ctx, IMP_E_NOMEM,
-                          "%d x %d pixels with %d rays each are over the "
-                          "memory budget",
-                          r.width, height, r.side * r.side);
-    struct imp__el_hit *grown =
-        imp__grow(e->ctx, *array, cap, *count + n + 1, sizeof *grown);
-    if (!grown)
-        return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for the picture's rays");
-    *array = grown;
-    r.out = grown + *count;
+                     .width = width,
+                     .side = e->opt.rays,
+                     .source = source,
+                     .seen = seen,
+                     .weight = weight / (double)n,
+                     .out = e->hits + e->n_hits};
     const struct imp_loop loop = {
         .n_items = (size_t)height, .work = row_work, .payload = &r};
     IMP_TRY(imp__parallel(e->ctx, &loop, NULL));
-    *count += n;
+    e->n_hits += n;
+    if (seen) e->n_view = n;
     e->rays += (int64_t)n;
 out:
     return st;
 }
 
+/* The first source that is the whole view, -1: none; there may be no view. */
+static int view_of(const imp_elements *e, int view[4])
+{
+    memset(view, 0, 4 * sizeof *view);
+    if (e->scene->n_sensors == 0) return -1;
+    const struct imp_film_desc *film = &e->scene->sensors[e->opt.sensor]->film;
+    view[2] = film->crop_w, view[3] = film->crop_h;
+    for (size_t k = 0; k < e->n_sources; k++) {
+        const struct imp_elements_source *s = &e->sources[k];
+        if (s->kind == IMP_ELEMENTS_CAMERA && s->sensor == e->opt.sensor &&
+            memcmp(s->region, view, 4 * sizeof *view) == 0)
+            return (int)k;
+    }
+    return -1;
+}
+
 enum imp_status imp__el_sources(imp_elements *e)
 {
     enum imp_status st = IMP_OK;
+    int view[4];
+    const int seen = view_of(e, view);
+    size_t n = seen < 0 ? rays_of(e, view) : 0;
+    for (size_t k = 0; k < e->n_sources; k++)
+        if (e->sources[k].kind == IMP_ELEMENTS_CAMERA)
+            n += rays_of(e, e->sources[k].region);
+    if ((double)n * sizeof *e->hits > (double)e->opt.max_bytes || n >= EL_NONE)
+        return imp__error(e->ctx, IMP_E_NOMEM,
+                          "%zu rays of the eye (%d a pixel) are over the memory budget",
+                          n, e->opt.rays * e->opt.rays);
+    imp__release(e->ctx, e->hits);
+    e->hits = imp__alloc_raw(e->ctx, n + 1, sizeof *e->hits);
+    e->n_hits = e->n_view = 0;
+    if (!e->hits)
+        return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for the picture's rays");
     for (size_t k = 0; k < e->n_sources; k++) {
         const struct imp_elements_source *src = &e->sources[k];
-        if (src->kind != IMP_ELEMENTS_CAMERA) continue;
-        const size_t first = e->n_hits;
-        IMP_TRY(
-            hits_take(e, src->sensor, src->region, &e->hits, &e->cap_hits, &e->n_hits));
-        for (size_t i = first; i < e->n_hits; i++) {
-            e->hits[i].source = (uint32_t)k;
-            e->hits[i].weight = src->weight / (double)(e->n_hits - first);
-        }
+        if (src->kind == IMP_ELEMENTS_CAMERA)
+            IMP_TRY(hits_take(e, src->sensor, src->region, (uint32_t)k, (int)k == seen,
+                              src->weight));
     }
-    if (e->scene->n_sensors > 0) {
-        const struct imp_film_desc *film = &e->scene->sensors[e->opt.sensor]->film;
-        const int all[4] = {0, 0, film->crop_w, film->crop_h};
-        IMP_TRY(hits_take(e, e->opt.sensor, all, &e->view, &e->cap_view, &e->n_view));
-    }
-out:
-    return st;
-}
-
-/* Hits by root, in their order: each root is then one worker's, whatever the threads. */
-static enum imp_status hits_sort(imp_elements *e)
-{
-    e->hit_start = imp__alloc(e->ctx, e->n_roots + 2, sizeof *e->hit_start);
-    e->hit_order = imp__alloc(e->ctx, e->n_hits + 1, sizeof *e->hit_order);
-    if (!e->hit_start || !e->hit_order) {
-        imp__release(e->ctx, e->hit_start);
-        imp__release(e->ctx, e->hit_order);
-        e->hit_start = e->hit_order = NULL;
-        return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for the picture's rays");
-    }
-    size_t *next = e->hit_start + 1; /* counts, then where the next of a root goes */
-    for (size_t k = 0; k < e->n_hits; k++)
-        if (e->hits[k].root != EL_NONE && e->hits[k].root + 1 < e->n_roots)
-            next[e->hits[k].root + 1]++;
-    for (size_t r = 1; r < e->n_roots; r++) next[r] += next[r - 1];
-    for (size_t k = 0; k < e->n_hits; k++)
-        if (e->hits[k].root != EL_NONE) e->hit_order[next[e->hits[k].root]++] = k;
-    return IMP_OK;
-}
-
-static enum imp_status bin_work(size_t item, int worker, int slot, void *payload)
-{
-    imp_elements *e = payload;
-    const struct imp__el_root *r = &e->roots[item];
-    const int n = el_n(e, r);
-    (void)worker, (void)slot;
-    for (size_t i = e->hit_start[item]; i < e->hit_start[item + 1] && n; i++) {
-        const struct imp__el_hit *hit = &e->hits[e->hit_order[i]];
-        const struct imp__element *x =
-            &e->elements[imp__el_find(e, hit->root, hit->u, hit->v, NULL)];
-        double h[EL_N_MAX];
-        h[0] = e->basis.lead[0];
-        if (n > 1) imp__basis_eval(&e->basis, imp__to_local(&r->frame, hit->w), h);
-        for (int q = 0; q < n; q++) e->a[x->coef + (size_t)q] += hit->weight * h[q];
-    }
-    return IMP_OK;
-}
-
-enum imp_status imp__el_bin(imp_elements *e)
-{
-    enum imp_status st = IMP_OK;
-    memset(e->a, 0, e->n_coef * sizeof *e->a);
-    if (!e->hit_order) IMP_TRY(hits_sort(e));
-    const struct imp_loop loop = {.n_items = e->n_roots, .work = bin_work, .payload = e};
-    IMP_TRY(imp__parallel(e->ctx, &loop, NULL));
+    if (seen < 0) IMP_TRY(hits_take(e, e->opt.sensor, view, EL_NONE, true, 0));
+    IMP_TRY(imp__el_hits_sort(e));
 out:
     return st;
 }
@@ -192,22 +174,25 @@ out:
 static double direct_of(const imp_elements *e)
 {
     double sum = 0;
-    for (size_t k = 0; k < e->n_hits; k++) {
-        const struct imp__el_hit *hit = &e->hits[k];
-        if (hit->root == EL_NONE) continue;
-        const struct imp__el_root *r = &e->roots[hit->root];
-        const double lobe = el_lobe(r, hit->w) * hit->weight;
-        for (int c = 0; c < e->ch && lobe > 0; c++)
-            sum += e->lum[c] * r->radiance[c] * lobe;
+    for (size_t i = 0; i < e->n_roots; i++) {
+        const struct imp__el_root *r = &e->roots[i];
+        if (r->light == EL_DARK) continue;
+        const uint32_t *range = e->elements[r->element].hit;
+        for (uint32_t k = range[0]; k < range[1]; k++) {
+            const double lobe = el_lobe(r, e->hits[k].w) * e->hits[k].weight;
+            for (int c = 0; c < e->ch && lobe != 0; c++)
+                sum += e->lum[c] * r->radiance[c] * lobe;
+        }
     }
     return sum;
 }
 
-double imp__el_measure(const imp_elements *e, double *direct)
+static double leaves_measure(const imp_elements *e, size_t first, size_t end,
+                             const void *how)
 {
-    const double seen = direct_of(e);
     double sum = 0;
-    for (size_t k = 0; k < e->n_elements; k++) {
+    (void)how;
+    for (size_t k = first; k < end; k++) {
         const struct imp__element *x = &e->elements[k];
         if (x->child) continue;
         const struct imp__el_root *r = el_root(e, x);
@@ -219,14 +204,22 @@ double imp__el_measure(const imp_elements *e, double *direct)
             sum += e->lum[c] * (eye + x->area * r->measure * sqrt(IMP_2PI) * in[0]);
         }
     }
-    if (direct) *direct = seen;
-    return sum + seen;
+    return sum;
 }
 
-double imp__el_measure_adjoint(const imp_elements *e)
+double imp__el_measure(const imp_elements *e, double *direct)
 {
-    double sum = direct_of(e);
-    for (size_t j = 0; j < e->n_elements; j++) {
+    const double seen = direct_of(e);
+    if (direct) *direct = seen;
+    return imp__el_sum(e, e->n_elements, leaves_measure, NULL) + seen;
+}
+
+static double lights_measure(const imp_elements *e, size_t first, size_t end,
+                             const void *how)
+{
+    double sum = 0;
+    (void)how;
+    for (size_t j = first; j < end; j++) {
         const struct imp__el_root *r = el_root(e, &e->elements[j]);
         if (r->light == EL_DARK) continue;
         for (size_t at = e->out_start[j]; at < e->out_start[j + 1]; at++) {
@@ -239,4 +232,9 @@ double imp__el_measure_adjoint(const imp_elements *e)
         }
     }
     return sum;
+}
+
+double imp__el_measure_adjoint(const imp_elements *e)
+{
+    return direct_of(e) + imp__el_sum(e, e->n_elements, lights_measure, NULL);
 }

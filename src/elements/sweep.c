@@ -21,7 +21,7 @@ struct pass {
     bool importance, prime; /* prime: only make the values from g */
 };
 
-enum { ELEMENTS_PER_ITEM = 8 };
+enum { ELEMENTS_PER_ITEM = 32 };
 
 static void direction(const struct imp__el_link *k, const struct imp_frame *f,
                       double sign, imp_spec w[3])
