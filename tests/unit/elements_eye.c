@@ -129,6 +129,34 @@ static void negative(imp_context *ctx, imp_scene *s)
            "weight -2 measures -2 times as much # direct %.4g, %.4g", j[0][1], j[1][1]);
 }
 
+/* The lamp of scene a, seen directly, in closed form: a trapezoid in the picture. Lamps
+ * are what a grid of rays aliases on: they are bright, small and upright. */
+static void lamp_seen(imp_context *ctx)
+{
+    const double near = 0.49 * 1.4 / (2.4 - 0.625), far = 0.49 * 1.4 / (2.4 - 0.375);
+    const double wide = 0.25 * 1.4 / (2.4 - 0.625), narrow = 0.25 * 1.4 / (2.4 - 0.375);
+    const double want = 10 * (wide + narrow) / 2 * (near - far);
+    static const struct {
+        const char *res;
+        double limit;
+    } at[] = {{"res=32", 6e-3}, {"res=64", 3e-3}, {"res=128", 1e-3}};
+    for (size_t k = 0; k < imp_count(at); k++) {
+        imp_scene *s = test_scene(ctx, "elements/a.xml", IMP_MONO, at[k].res);
+        struct imp_elements_options o = IMP_ELEMENTS_OPTIONS_INIT;
+        struct imp_elements_info info = {.size = sizeof info};
+        imp_elements *e;
+        char name[64];
+        o.eps_first = o.eps_last = 0.05;
+        test_must(ctx, imp_elements_create(s, &o, &e));
+        test_must(ctx, imp_elements_solve(e));
+        test_must(ctx, imp_elements_get_info(e, &info));
+        snprintf(name, sizeof name, "scene a's lamp, 3 x 3 rays a pixel, %s", at[k].res);
+        tap_near(info.measure_direct, want, at[k].limit, 0, name);
+        imp_elements_destroy(e);
+        imp_scene_destroy(s);
+    }
+}
+
 /* Allocation n fails, n + 1, ...: an error, and the next try on the same object is right
  * to the bit. */
 static void memory(void)
@@ -195,6 +223,7 @@ int main(void)
     eye(ctx, s, &o, "the view is no source");
     negative(ctx, s);
     imp_scene_destroy(s);
+    lamp_seen(ctx);
     imp_context_destroy(ctx);
     memory();
     return tap_done();
