@@ -239,10 +239,15 @@ static int apply_set_file(const char *path)
     return rc;
 }
 
-/* The parameters as --set takes them. Long ones are cut short. */
+/* The parameters as --set takes them. Long ones are cut short; not in JSON. */
 static int dump(void)
 {
     enum { SHOWN = 12 };
+    struct json j = {0};
+    if (cli.json) {
+        j = cli_json();
+        json_array(&j, "params");
+    }
     for (size_t i = 0; i < imp_scene_n_params(cli.scene); i++) {
         struct imp_param_info info = {.size = sizeof info};
         double *values;
@@ -250,7 +255,12 @@ static int dump(void)
         if (st != IMP_OK) return cli_fail(st, cli.scene_path);
         values = cli_alloc(info.count, sizeof *values);
         st = imp_scene_get_values(cli.scene, i, values);
-        if (st == IMP_OK) {
+        if (st == IMP_OK && cli.json) {
+            json_object(&j, NULL);
+            json_text(&j, "name", info.name);
+            json_numbers(&j, "value", info.count, values);
+            json_end_object(&j);
+        } else if (st == IMP_OK) {
             printf("%s=", info.name);
             for (size_t k = 0; k < info.count && k < SHOWN; k++)
                 printf("%s%.9g", k ? "," : "", values[k]);
@@ -258,6 +268,10 @@ static int dump(void)
         }
         free(values);
         if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+    }
+    if (cli.json) {
+        json_end_array(&j);
+        cli_json_end(&j);
     }
     return EXIT_STOP;
 }

@@ -23,7 +23,7 @@ struct result {
     struct imp_estimate value;
     const char *functional; /* "loss", "mean" or "adjoint" */
     double *x, *grad, *se;
-    int rounds; /* of the run, each with spp samples */
+    int rounds, spp; /* of the run, each with spp samples */
 };
 
 /* sum(seed * picture) with its standard error. Pixels through a box filter are
@@ -113,29 +113,53 @@ static void merge(double *mean, double *se, double k, double value, double value
     *se = hypot(k * *se, value_se) / (k + 1);
 }
 
-/* With --time: rounds of the run with other random numbers, as many as fit. The mean of
- * unbiased estimates is one, and rounds that were done survive an interrupt. */
+static void add_round(struct result *sum, const struct result *r, size_t n)
+{
+    const double k = sum->rounds++;
+    merge(&sum->value.value, &sum->value.se, k, r->value.value, r->value.se);
+    for (size_t i = 0; i < n; i++)
+        merge(&sum->grad[i], &sum->se[i], k, r->grad[i], r->se[i]);
+    sum->value.bias_order = r->value.bias_order;
+}
+
+/* With --time: rounds of the run with other random numbers, as many as fit, each taken to
+ * last as long as those before. Where the time is too short for the first, a small one
+ * tells how many samples fit, or is the answer if no more do. The mean of unbiased
+ * estimates is one, and rounds that were done survive an interrupt. */
 static int estimate_for(imp_problem *problem, struct imp_run run, const float *seed,
                         struct result *sum)
 {
+    enum { SMALL = 4 }; /* replicates need two */
     const size_t n = imp_problem_n(problem);
+    const double start = cli_now();
     struct result r = *sum;
     enum imp_status st = IMP_OK;
-    const double start = cli_now();
     r.grad = cli_alloc(n, sizeof *r.grad);
     r.se = cli_alloc(n, sizeof *r.se);
     run.time_limit_s = 0;
     sum->rounds = 0;
-    do {
+    double first = start, now = start;
+    if (sum->spp > SMALL) {
+        run.spp = SMALL;
+        run.seed ^= 0x632be59bd9b4e019u;
         st = estimate(problem, &run, seed, &r);
-        if (st != IMP_OK) break;
-        const double k = sum->rounds++;
-        merge(&sum->value.value, &sum->value.se, k, r.value.value, r.value.se);
-        for (size_t i = 0; i < n; i++)
-            merge(&sum->grad[i], &sum->se[i], k, r.grad[i], r.se[i]);
-        sum->value.bias_order = r.value.bias_order;
+        run.seed ^= 0x632be59bd9b4e019u;
+        now = first = cli_now();
+        const double fit = SMALL * (cli.time_s / fmax(now - start, 1e-6) - 1);
+        if (fit < 2 * SMALL) {
+            sum->spp = SMALL;
+            if (st == IMP_OK) add_round(sum, &r, n);
+            first = start;
+        } else if (fit < sum->spp) sum->spp = (int)fit;
+    }
+    run.spp = sum->spp;
+    while (st == IMP_OK && !progress_interrupted() &&
+           (!sum->rounds || now - start + (now - first) / sum->rounds <= cli.time_s)) {
+        st = estimate(problem, &run, seed, &r);
+        if (st == IMP_OK) add_round(sum, &r, n);
+        now = cli_now();
         run.seed += 0x9e3779b97f4a7c15u; /* far from the seeds people choose */
-    } while (cli_now() - start < cli.time_s && !progress_interrupted());
+    }
     free(r.grad);
     free(r.se);
     if (st == IMP_CANCELLED && sum->rounds) st = IMP_OK;
@@ -157,6 +181,7 @@ static int compute(imp_problem *problem, const struct imp_run *run, struct resul
     const int loss = problem_options.targets.n > 0;
     r->functional = loss ? "loss" : adjoint_path ? "adjoint" : "mean";
     r->rounds = 1;
+    r->spp = cli_spp(run);
     if (!loss) rc = adjoint_image(run, &seed);
     if (!rc && cli.time_s > 0) {
         rc = estimate_for(problem, *run, seed, r);
@@ -176,7 +201,7 @@ static void print_json(const struct imp_run *run, const struct result *r,
     static const char *const bias[] = {"none", "O(1/N)", "O(1/N^2)"};
     struct json j = cli_json();
     json_seed(&j, "seed", run->seed);
-    json_integer(&j, "spp", (int64_t)cli_spp(run) * r->rounds);
+    json_integer(&j, "spp", (int64_t)r->spp * r->rounds);
     json_text(&j, "functional", r->functional);
     if (!strcmp(r->functional, "loss")) json_text(&j, "loss", loss_word());
     json_number(&j, "value", r->value.value);

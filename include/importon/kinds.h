@@ -37,8 +37,10 @@ enum imp_input_flags {
     IMP_INPUT_SCALAR = 1,   /* one number: textures are read as scalars */
     IMP_INPUT_OPTIONAL = 2, /* absent: the fallback, and no parameter */
     IMP_INPUT_REQUIRED = 4,
-    IMP_INPUT_FIXED = 8, /* no gradient: changing it bends or moves things */
-    IMP_INPUT_EDGES = 16 /* differentiable, and may move discontinuities */
+    IMP_INPUT_FIXED = 8,  /* no gradient: changing it bends or moves things */
+    IMP_INPUT_EDGES = 16, /* differentiable, and may move discontinuities */
+    IMP_INPUT_SOFT = 32   /* a number above hi is taken as it is, and then has no bound:
+                             what it is for decides */
 };
 
 struct imp_input_desc { /* the list ends with {0} */

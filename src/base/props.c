@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "props.h"
+#include "nearest.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
+#include <strings.h>
 
 static const char *const type_names[] = {
     [IMP_PROP_BOOL] = "boolean",        [IMP_PROP_INTEGER] = "integer",
@@ -124,6 +126,13 @@ enum imp_status imp__prop_error(imp_context *ctx, const struct imp_node *node,
     return status;
 }
 
+void imp__node_ask(struct imp_node *node, const char *name)
+{
+    for (int i = 0; i < node->n_asked; i++)
+        if (strcmp(node->asked[i], name) == 0) return;
+    if (node->n_asked < (int)imp_count(node->asked)) node->asked[node->n_asked++] = name;
+}
+
 /* The property, marked as used, if it is there and of this type; an integer passes for a
  * float. A child in this slot is a type error too. */
 static enum imp_status find(imp_context *ctx, struct imp_node *node, const char *name,
@@ -131,6 +140,7 @@ static enum imp_status find(imp_context *ctx, struct imp_node *node, const char 
 {
     struct imp_prop *p = imp__node_prop(node, name);
     *out = NULL;
+    imp__node_ask(node, name);
     if (!p) {
         const struct imp_child *c = imp__node_child(node, name);
         if (!c) return IMP_OK;
@@ -223,8 +233,9 @@ enum imp_status imp__props_transform(imp_context *ctx, struct imp_node *node,
     return IMP_OK;
 }
 
-bool imp__props_has(const struct imp_node *node, const char *name)
+bool imp__props_has(struct imp_node *node, const char *name)
 {
+    imp__node_ask(node, name);
     return imp__node_prop(node, name) || imp__node_child(node, name);
 }
 
@@ -241,7 +252,7 @@ enum imp_status imp__props_choice(imp_context *ctx, struct imp_node *node,
     }
     char list[256] = "";
     for (int i = 0; i < n; i++) {
-        if (strcmp(words[i], p->string) == 0) {
+        if (strcasecmp(words[i], p->string) == 0) {
             *out = i;
             return IMP_OK;
         }
@@ -254,7 +265,7 @@ enum imp_status imp__props_choice(imp_context *ctx, struct imp_node *node,
 
 enum imp_status imp__props_finish(imp_context *ctx, const struct imp_node *node)
 {
-    char list[768] = "", where[256];
+    char list[768] = "", where[256], meant[80] = "";
     const struct imp_prop *first = NULL;
     for (size_t i = 0; i < node->n_props; i++) {
         const struct imp_prop *p = &node->props[i];
@@ -262,7 +273,14 @@ enum imp_status imp__props_finish(imp_context *ctx, const struct imp_node *node)
         const size_t n = strlen(list);
         snprintf(list + n, sizeof list - n, "%s'%s' (%s)", n ? ", " : "", p->name,
                  imp__loc_text(p->loc, where, sizeof where));
-        if (!first) first = p;
+        if (first) continue;
+        first = p;
+        struct imp_nearest near = imp__nearest(p->name);
+        for (int k = 0; k < node->n_asked; k++)
+            if (!imp__node_prop(node, node->asked[k]))
+                imp__nearest_try(&near, node->asked[k]);
+        if (near.best)
+            snprintf(meant, sizeof meant, "; did you mean '%.50s'?", near.best);
     }
     for (size_t i = 0; i < node->n_children; i++) {
         const struct imp_child *c = &node->children[i];
@@ -274,5 +292,5 @@ enum imp_status imp__props_finish(imp_context *ctx, const struct imp_node *node)
     }
     if (!*list) return IMP_OK;
     return imp__prop_error(ctx, node, first, IMP_E_SCENE,
-                           "not a property of this plugin: %s", list);
+                           "not a property of this plugin: %s%s", list, meant);
 }

@@ -82,6 +82,8 @@ struct imp_node {
     const struct imp_ies_data *ies;
     struct imp_medium *medium; /* attached: a graded index (format/graded.c), or NULL */
     void *object;              /* what was made from it (scene/build.c) */
+    const char *asked[24];     /* names of properties that were looked for, literals; */
+    int n_asked;               /* what a misspelt one may have meant. Full: no more */
     int visiting;              /* cycle detection */
 };
 
@@ -127,8 +129,11 @@ enum imp_status imp__props_vector(imp_context *ctx, struct imp_node *node,
 /* Identity if absent. */
 enum imp_status imp__props_transform(imp_context *ctx, struct imp_node *node,
                                      const char *name, double out[16]);
-bool imp__props_has(const struct imp_node *node, const char *name);
-/* One of n words, case as spelled; *out its index. The error lists them. */
+bool imp__props_has(struct imp_node *node, const char *name);
+/* Note that the plugin knows a property of this name (imp__props_* do by themselves). The
+ * name must live as long as the node. */
+void imp__node_ask(struct imp_node *node, const char *name);
+/* One of n words, in any case; *out its index. The error lists them. */
 enum imp_status imp__props_choice(imp_context *ctx, struct imp_node *node,
                                   const char *name, const char *const *words, int n,
                                   int fallback, int *out);

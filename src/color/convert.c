@@ -5,12 +5,15 @@
 #include "rgb.h"
 #include <string.h>
 
-/* Three numbers, or one where the mode or the input has room for one only. */
+/* Three numbers, or one where the mode or the input has room for one only: a mode's one
+ * is the luminance; an input's is the mean, as in Mitsuba (where texels are otherwise).
+ */
 static void color_set(const double rgb[3], bool scalar, enum imp_color_mode mode,
                       imp_spec *value, int *count)
 {
     if (scalar || mode == IMP_MONO) {
-        *value = imp__spec(imp__luminance(rgb[0], rgb[1], rgb[2]));
+        *value = imp__spec(mode == IMP_MONO ? imp__luminance(rgb[0], rgb[1], rgb[2])
+                                            : (rgb[0] + rgb[1] + rgb[2]) / 3);
         *count = 1;
     } else {
         *value = (imp_spec){rgb[0], rgb[1], rgb[2], 0};
@@ -207,8 +210,7 @@ out:
     return st;
 }
 
-static enum imp_status require(imp_context *ctx, const struct imp_node *node,
-                               const char *name)
+static enum imp_status require(imp_context *ctx, struct imp_node *node, const char *name)
 {
     if (imp__props_has(node, name)) return IMP_OK;
     return imp__node_error(ctx, node, IMP_E_SCENE, "'%s' is required", name);

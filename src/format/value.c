@@ -13,7 +13,7 @@ bool imp__value_float(const char *text, double *out)
 {
     const char *s = text + strspn(text, BLANKS), *end = s + strlen(s);
     double v;
-    if (!imp__number(&s, end, &v) || s != end || !isfinite(v)) return false;
+    if (!imp__number(&s, end, &v) || s[strspn(s, BLANKS)] || !isfinite(v)) return false;
     *out = v;
     return true;
 }
@@ -22,7 +22,7 @@ bool imp__value_integer(const char *text, int64_t *out)
 {
     const char *s = text + strspn(text, BLANKS), *end = s + strlen(s);
     int64_t v;
-    if (!imp__integer(&s, end, &v) || s != end) return false;
+    if (!imp__integer(&s, end, &v) || s[strspn(s, BLANKS)]) return false;
     *out = v;
     return true;
 }

@@ -5,6 +5,7 @@
 #ifndef IMP_SCENE_BUILD_H
 #define IMP_SCENE_BUILD_H
 
+#include "base/nearest.h"
 #include "color/convert.h"
 #include "scene.h"
 #include <stdio.h>
@@ -63,10 +64,14 @@ enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node
         (out) = (table)[i_];                                                             \
         if (!(out)) {                                                                    \
             char list_[1024];                                                            \
+            struct imp_nearest near_ = imp__nearest((node)->type);                       \
             KIND_LIST(table, list_);                                                     \
-            IMP_TRY(imp__node_error((scene)->ctx, node, IMP_E_UNSUPPORTED,               \
-                                    "this version has no such %s; it has %s",            \
-                                    (node)->tag, list_));                                \
+            for (i_ = 0; (table)[i_]; i_++) imp__nearest_try(&near_, (table)[i_]->name); \
+            IMP_TRY(imp__node_error(                                                     \
+                (scene)->ctx, node, IMP_E_UNSUPPORTED,                                   \
+                "this version has no such %s; it has %s%s%s%s", (node)->tag, list_,      \
+                near_.best ? "; did you mean '" : "", near_.best ? near_.best : "",      \
+                near_.best ? "'?" : ""));                                                \
         }                                                                                \
     } while (0)
 

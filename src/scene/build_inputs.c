@@ -134,6 +134,8 @@ static enum imp_status param_add(struct imp_scene *scene, const char *name,
     const bool unbounded = d->lo == 0 && d->hi == 0;
     p.info.lo = d->lo;
     p.info.hi = unbounded ? INFINITY : d->hi;
+    for (int k = 0; k < count && d->flags & IMP_INPUT_SOFT; k++)
+        if (in->value[k] > d->hi) p.info.hi = INFINITY;
     if (!(d->flags & IMP_INPUT_FIXED)) p.info.flags |= IMP_PARAM_DIFFERENTIABLE;
     if (d->flags & (IMP_INPUT_EDGES | IMP_INPUT_FIXED))
         p.info.flags |= IMP_PARAM_DISCONTINUOUS;
@@ -168,6 +170,7 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
     struct imp_child *child = imp__node_child(node, d->name);
     const char *key = "value";
     int count = 1;
+    imp__node_ask(node, d->name);
     *in = (struct imp_input){.param = -1, .scalar = scalar};
 
     if (prop) {
@@ -203,7 +206,8 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
     }
     in->count = count;
     for (int k = 0; k < count; k++) {
-        const double v = in->value[k], hi = d->lo == 0 && d->hi == 0 ? INFINITY : d->hi;
+        const bool unbounded = (d->lo == 0 && d->hi == 0) || d->flags & IMP_INPUT_SOFT;
+        const double v = in->value[k], hi = unbounded ? INFINITY : d->hi;
         if (!isfinite(v) || v < d->lo || v > hi)
             IMP_TRY(imp__prop_error(ctx, node, prop, IMP_E_SCENE,
                                     "%s = %g is outside [%g, %g]", d->name, v, d->lo,

@@ -3,6 +3,7 @@
  * Integrators: what a picture holds. path, direct and stam are settings of the one walk
  * engine; depth and aov look at the first hit; moment and aov contain others; elements is
  * the other solver, and makes no walks. */
+#include "base/nearest.h"
 #include "scene.h"
 #include <string.h>
 
@@ -125,11 +126,16 @@ enum imp_status imp__integrator_build(struct imp_scene *scene, struct imp_node *
         IMP_INTEGRATOR_ELEMENTS};
     size_t k = 0;
     while (k < imp_count(types) && strcmp(types[k], node->type) != 0) k++;
-    if (k == imp_count(types))
+    if (k == imp_count(types)) {
+        struct imp_nearest near = imp__nearest(node->type);
+        for (size_t i = 0; i < imp_count(types); i++) imp__nearest_try(&near, types[i]);
         return imp__node_error(
             ctx, node, IMP_E_UNSUPPORTED,
             "this version has no such integrator; it has path, direct, "
-            "depth, aov, moment, stam and elements");
+            "depth, aov, moment, stam and elements%s%s%s",
+            near.best ? "; did you mean '" : "", near.best ? near.best : "",
+            near.best ? "'?" : "");
+    }
     *out = (struct imp_integrator){.kind = kinds[k],
                                    .max_depth = -1,
                                    .rr_depth = 5,
@@ -142,8 +148,7 @@ enum imp_status imp__integrator_build(struct imp_scene *scene, struct imp_node *
     IMP_TRY(imp__props_int(ctx, node, "block_size", 0, 0, INT32_MAX, &block));
     IMP_TRY(imp__props_int(ctx, node, "samples_per_pass", 0, 0, INT32_MAX, &passes));
     IMP_TRY(imp__props_float(ctx, node, "timeout", -1, &timeout));
-    if (out->kind != IMP_INTEGRATOR_DEPTH && out->kind != IMP_INTEGRATOR_AOV &&
-        out->kind != IMP_INTEGRATOR_MOMENT && out->kind != IMP_INTEGRATOR_ELEMENTS)
+    if (out->kind != IMP_INTEGRATOR_ELEMENTS) /* depth, aov, moment: without effect */
         IMP_TRY(imp__props_bool(ctx, node, "hide_emitters", false, &out->hide_emitters));
 
     switch (out->kind) {

@@ -75,6 +75,15 @@ static bool first_hit(struct imp_step *s, struct imp_hit *hit)
     return false;
 }
 
+/* May light that is met here make the sample valid (scene-format 11)? What is hidden from
+ * the camera stays hidden behind a null material for path, and not for direct. */
+static bool seen(const struct imp_step *s)
+{
+    const struct imp_integrator *integrator = s->tracer->integrator;
+    return !integrator->hide_emitters ||
+           (integrator->kind == IMP_INTEGRATOR_DIRECT && s->depth > 0);
+}
+
 static void guide_find(struct imp_step *s, const struct imp_hit *hit,
                        const struct imp_surface *at)
 {
@@ -104,7 +113,7 @@ static bool step(struct imp_step *s)
         v->t = INFINITY;
         v->at = (struct imp_texcoord){{0, 0}, s->d};
         imp__emission_meet(s, v, scene->environment, NULL, NULL);
-        s->walk->valid = true;
+        s->walk->valid |= seen(s);
         return false;
     }
 
@@ -142,13 +151,11 @@ static bool step(struct imp_step *s)
         }
         if (shape->emitter >= 0) {
             imp__emission_meet(s, v, shape->emitter, &hit, &at);
-            if (!integrator->hide_emitters || s->depth > 0) s->walk->valid = true;
+            s->walk->valid |= seen(s);
         }
     }
     if (ended || !goes_on) return false;
-    if ((v->bsdf->flags & (IMP_BSDF_SMOOTH | IMP_BSDF_DELTA)) &&
-        !(v->bsdf->flags & IMP_BSDF_NULL))
-        s->walk->valid = true;
+    if (!(v->bsdf->flags & IMP_BSDF_NULL)) s->walk->valid = true;
     if ((v->bsdf->flags & IMP_BSDF_SMOOTH) && imp__wants_lights(integrator) &&
         !(s->bend && s->bend->medium))
         imp__light_sample(s, v, &at, &frame, &shadow);

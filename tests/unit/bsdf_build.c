@@ -121,6 +121,7 @@ int main(void)
     refused("conductor", "material=Ag", "eta=1", "excludes");
     refused("roughconductor", "alpha=0.1", "alpha_u=0.1", "either 'alpha'");
     refused("roughconductor", "alpha_v=0.1", NULL, "either 'alpha'");
+    made("roughconductor", "distribution=GGX", NULL);
     refused("roughconductor", "distribution=phong", NULL, "beckmann");
     refused("roughconductor", "sample_visible=1", NULL, "boolean");
     refused("stam_m2", "variant=stam", NULL, "reciprocal");

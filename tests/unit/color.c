@@ -70,8 +70,11 @@ static void published(void)
           "list as reflectance, mono");
     check(n, IMP_EMISSION, false, IMP_MONO, (struct expected){1, {0.547707}}, 6e-7,
           "list as light, mono");
-    check(n, IMP_REFLECTANCE, true, IMP_RGB, (struct expected){1, {0.530730}}, 6e-7,
-          "list as one number");
+    check(n, IMP_REFLECTANCE, true, IMP_RGB,
+          (struct expected){1, {(0.958689 + 0.446356 + 0.105710) / 3}}, 6e-7,
+          "list as one number: the mean");
+    check(n, IMP_REFLECTANCE, true, IMP_MONO, (struct expected){1, {0.530730}}, 6e-7,
+          "list as one number, mono: the luminance");
     struct imp_node *one = node_make("");
     list_add(one, 2, (double[]){300, 900, 1, 1});
     check(one, IMP_REFLECTANCE, false, IMP_RGB,
@@ -123,8 +126,10 @@ static void table(void)
           "rgb, R");
     check(rgb, IMP_EMISSION, false, IMP_MONO, (struct expected){1, {lum}}, 1e-15,
           "rgb, E, mono");
-    check(rgb, IMP_REFLECTANCE, true, IMP_RGB, (struct expected){1, {lum}}, 1e-15,
-          "rgb as one number");
+    check(rgb, IMP_REFLECTANCE, true, IMP_RGB, (struct expected){1, {0.4}}, 1e-15,
+          "rgb as one number: the mean");
+    check(rgb, IMP_REFLECTANCE, true, IMP_MONO, (struct expected){1, {lum}}, 1e-15,
+          "rgb as one number, mono: the luminance");
     check(u, IMP_REFLECTANCE, false, IMP_RGB, (struct expected){1, {0.5}}, 0,
           "spectrum value, R");
     check(u, IMP_EMISSION, false, IMP_RGB,

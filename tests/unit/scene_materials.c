@@ -77,6 +77,9 @@ int main(void)
     imp_scene_end(scene);
     imp_scene_end(scene);
     imp_scene_end(scene);
+    imp_scene_begin(scene, "texture", "checkerboard", "lamps", NULL);
+    imp_scene_float(scene, "color0", 5);
+    imp_scene_end(scene);
     const enum imp_status st = imp_scene_commit(scene);
     tap_ok(st == IMP_OK, "the scene is made # %s",
            st == IMP_OK ? "" : imp_last_error(ctx));
@@ -97,6 +100,9 @@ int main(void)
     param("sheet.brdf_0.ambient.value", 3, (double[]){0, 0, 0}, 0, INFINITY);
     param("sheet.brdf_1.reflectance.color0.value", 1, (double[]){0.4}, 0, 1);
     param("sheet.brdf_1.reflectance.color1.value", 3, green, 0, 1);
+    param("lamps.color0.value", 1, (double[]){5}, 0,
+          INFINITY); /* light may be brighter */
+    param("lamps.color1.value", 1, (double[]){0.2}, 0, 1);
 
     imp_scene_destroy(scene);
     imp_context_destroy(ctx);

@@ -38,7 +38,7 @@ static void check_values(void)
     struct imp_scene s;
     const enum imp_status st =
         parse(IN("<!-- comment --><?pi x?><shape type='sphere' id='ball'>"
-                 "<integer name='i' value=' -42'/><float name='f' value=' +1.5e-3'/>"
+                 "<integer name='i' value=' -42 '/><float name='f' value=' +1.5e-3 '/>"
                  "<boolean name='b' value='TRUE'/><string name='s' value='a &lt; b'/>"
                  "<point name='p' x='1' y='2' z='3'/><vector name='v' value='4'/>"
                  "<vector name='w' value='1,2 , 3'/><rgb name='c' value='0.25'/>"

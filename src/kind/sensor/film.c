@@ -3,30 +3,10 @@
 #include "base/compiler.h"
 #include "kind/filter/filter.h"
 #include <string.h>
-#include <strings.h>
 
 /* Sides and pixels of the full film: beyond any picture, within int and double. */
 #define SIDE_MAX   1000000
 #define PIXELS_MAX ((int64_t)1 << 31)
-
-/* As imp__props_choice, but any case: scene files spell these as they like. */
-static enum imp_status choice(const struct imp_build *b, const char *name,
-                              const char *const *words, int n, int fallback, int *out)
-{
-    const char *text;
-    const enum imp_status st =
-        imp__props_string(b->ctx, b->node, name, words[fallback], &text);
-    if (st != IMP_OK) return st;
-    for (*out = 0; *out < n; ++*out)
-        if (strcasecmp(words[*out], text) == 0) return IMP_OK;
-    char list[256] = "";
-    for (int i = 0; i < n; i++) {
-        if (i) strcat(list, ", ");
-        strcat(list, words[i]);
-    }
-    return imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, name), IMP_E_SCENE,
-                           "%s = '%s': must be one of %s", name, text, list);
-}
 
 static enum imp_status size_read(const struct imp_build *b, struct imp_film_desc *f)
 {
@@ -76,10 +56,12 @@ static enum imp_status format_read(const struct imp_build *b, struct imp_film_de
     enum imp_status st = IMP_OK;
     int file, pixel, component;
 
-    IMP_TRY(choice(b, "file_format", files, imp_count(files), 0, &file));
-    IMP_TRY(choice(b, "pixel_format", pixels, imp_count(pixels), IMP_PIXEL_RGB, &pixel));
-    IMP_TRY(
-        choice(b, "component_format", components, imp_count(components), 0, &component));
+    IMP_TRY(imp__props_choice(b->ctx, b->node, "file_format", files, imp_count(files), 0,
+                              &file));
+    IMP_TRY(imp__props_choice(b->ctx, b->node, "pixel_format", pixels, imp_count(pixels),
+                              IMP_PIXEL_RGB, &pixel));
+    IMP_TRY(imp__props_choice(b->ctx, b->node, "component_format", components,
+                              imp_count(components), 0, &component));
     f->file_format = file <= 1 ? "openexr" : files[file];
     f->pixel_format = (enum imp_pixel_format)pixel;
     f->half = component == 0;

@@ -10,10 +10,19 @@ struct checkerboard {
     struct imp__to_uv to_uv;
 };
 
-static const struct imp_input_desc inputs[] = {
-    {.name = "color0", .role = IMP_REFLECTANCE, .fallback = 0.4, .hi = 1, .unit = "1"},
-    {.name = "color1", .role = IMP_REFLECTANCE, .fallback = 0.2, .hi = 1, .unit = "1"},
-    {0}};
+static const struct imp_input_desc inputs[] = {{.name = "color0",
+                                                .role = IMP_REFLECTANCE,
+                                                .flags = IMP_INPUT_SOFT,
+                                                .fallback = 0.4,
+                                                .hi = 1,
+                                                .unit = "1"},
+                                               {.name = "color1",
+                                                .role = IMP_REFLECTANCE,
+                                                .flags = IMP_INPUT_SOFT,
+                                                .fallback = 0.2,
+                                                .hi = 1,
+                                                .unit = "1"},
+                                               {0}};
 
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_texture *t)
 {
