@@ -25,7 +25,7 @@ static const struct arg_option options[] = {
 static const char *verdict(const struct imp_check_row *r)
 {
     if (r->limit == 0) return "";
-    return r->ok > 0 ? "ok" : r->ok < 0 ? "noisy" : "FAILED";
+    return r->ok > 0 ? r->kinks > 0 ? "kink" : "ok" : r->ok < 0 ? "noisy" : "FAILED";
 }
 
 static void print_text(const struct imp_check_row *rows, size_t n)
@@ -41,9 +41,11 @@ static void print_text(const struct imp_check_row *rows, size_t n)
         char step[16] = "", se[16] = "";
         if (r->step > 0) snprintf(step, sizeof step, "%.0e", r->step);
         if (r->se > 0) snprintf(se, sizeof se, "%.1e", r->se);
-        printf("%-7s %-*s %-8s %-15.8g %-15.8g %-9s %s%-9.2g %s\n", r->method, width,
+        printf("%-7s %-*s %-8s %-15.8g %-15.8g %-9s %s%-9.2g %s", r->method, width,
                r->param ? r->param : "", step, r->value, r->reference, se,
                r->se > 0 ? "z " : "", r->error, verdict(r));
+        if (r->kinks > 0) printf(" (%d walk%s)", r->kinks, r->kinks > 1 ? "s" : "");
+        printf("\n");
     }
 }
 
@@ -67,6 +69,7 @@ static void print_json(const struct imp_run *run, const struct imp_check_row *ro
         json_number(&j, "limit", r->limit);
         json_bool(&j, "ok", r->ok != 0);
         json_bool(&j, "resolved", r->ok >= 0);
+        json_integer(&j, "kinks", r->kinks);
         json_end_object(&j);
     }
     json_end_array(&j);

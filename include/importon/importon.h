@@ -552,6 +552,7 @@ struct imp_check_row {
     double error;                /**< relative error, or |z| where se > 0 */
     double limit; /**< of error; 0: a row for information (a step that is not the best) */
     int ok;
+    int kinks; /**< frozen walks that stand on a kink, and agree with one of its sides */
 };
 struct imp_check_options {
     size_t size;

@@ -100,8 +100,10 @@ static bool two_sided(const struct direction *d, double step)
 }
 
 /* Differences of all walks along d: value[0] becomes the difference, value[1] the largest
- * number it is a difference of, d->moved the motion. */
-static enum imp_status difference(struct imp__kept *k, struct direction *d, double step)
+ * number it is a difference of, d->moved the motion; bend[]: how much the slope above the
+ * start is larger than that below, by the step (0 where there is one side only). */
+static enum imp_status difference(struct imp__kept *k, struct direction *d, double step,
+                                  const double *start, double *bend)
 {
     enum imp_status st = IMP_OK;
     memset(d->moved, 0, d->param->info.count * sizeof *d->moved);
@@ -114,6 +116,7 @@ static enum imp_status difference(struct imp__kept *k, struct direction *d, doub
         IMP_TRY(evaluate(k, k->value[1]));
         for (size_t i = 0; i < k->n; i++) {
             const double above = k->value[0][i], below = k->value[1][i];
+            bend[i] = (above - start[i]) - (start[i] - below);
             k->value[0][i] = above - below;
             k->value[1][i] = fmax(fabs(above), fabs(below));
         }
@@ -134,6 +137,7 @@ static enum imp_status difference(struct imp__kept *k, struct direction *d, doub
                          f2 = k->value[2][i];
             k->value[0][i] = s * (f1 - f0 - f2);
             k->value[1][i] = fmax(fmax(fabs(f0), fabs(f1)), fabs(f2));
+            bend[i] = 0;
         }
     }
 out:
@@ -151,37 +155,100 @@ static double along(const struct imp__kept_walk *w, size_t base, const double *m
     return sum;
 }
 
-/* The walks' verdict. A walk is judged by the step at which its difference quotient
- * changed least from the step before, and only by what is beyond that change and its
- * rounding: near a kink (total reflection by a metal with k = 0) no quotient settles.
- * f, a, size [N_STEPS][n]: quotients of one direction, what they should be, and the
- * largest number each is a difference of; worst so far in *row. */
-static void judge(const struct imp__kept *k, const double *f, const double *a,
-                  const double *size, struct imp_check_row *row)
+/* Of one direction, [N_STEPS][n]: difference quotients, what they should be, the largest
+ * number each is a difference of, and how much the slope above exceeds the one below. */
+struct quotients {
+    const double *f, *a, *size, *bend;
+};
+
+static double beyond(double off, double rounding, double worth)
+{
+    return off <= rounding ? 0 : isfinite(off) ? (off - rounding) / worth : INFINITY;
+}
+
+/* A walk is judged by the step at which its quotient changed least from the step before,
+ * and only by what is beyond that change and its rounding: near a kink no quotient
+ * settles. Or by the step that agrees best, beyond its rounding: a kink that lies a
+ * little way off is met by the larger steps only. @return the relative error. */
+static double judge_walk(const struct imp__kept *k, const struct quotients *q, size_t i,
+                         int *step)
+{
+    const double L = fabs(k->walks[i].L);
+    double error[N_STEPS], settled = INFINITY;
+    int calm = 0;
+    *step = 0;
+    for (int s = 0; s < N_STEPS; s++) {
+        const size_t here = (size_t)s * k->n + i, before = here - k->n;
+        const double off = q->f[here] - q->a[here];
+        error[s] =
+            beyond(fabs(off), WALK_ROUNDING * fmax(L, q->size[here]) / (2 * steps[s]),
+                   fmax(fabs(q->a[here]), TINY * L));
+        if (s == 0) continue;
+        const double change = fabs(off - (q->f[before] - q->a[before]));
+        if (change < settled) settled = change, calm = s;
+    }
+    if (isfinite(settled)) {
+        const double a = q->a[(size_t)calm * k->n + i];
+        error[calm] = fmax(error[calm] - settled / fmax(fabs(a), TINY * L), 0);
+    }
+    for (int s = 1; s < N_STEPS; s++)
+        if (error[s] < error[*step]) *step = s;
+    return error[*step];
+}
+
+/* The walk may stand on a kink (between two texels, say): then the slopes above and below
+ * the start are two, and central differences have neither. The sweep must have one of
+ * them: at both of the smallest steps, each freed with the one before of what is
+ * proportional to the step. Where the other side differs by more the smaller the step is
+ * lies no kink but a jump. @return the relative error of the better side. */
+static double judge_sides(const struct imp__kept *k, const struct quotients *q, size_t i,
+                          double *slope)
+{
+    const double L = fabs(k->walks[i].L);
+    const size_t last = (N_STEPS - 1) * k->n + i;
+    const double round_last = WALK_ROUNDING * fmax(L, q->size[last]) / steps[N_STEPS - 1];
+    double best = INFINITY;
+    if (!(fabs(q->bend[last]) <= 1.5 * fabs(q->bend[last - k->n]) + 4 * round_last))
+        return INFINITY;
+    for (int side = -1; side <= 1; side += 2) {
+        double worst = 0, at = 0;
+        for (int s = N_STEPS - 2; s < N_STEPS; s++) {
+            const size_t here = (size_t)s * k->n + i, before = here - k->n;
+            const double one = q->f[here] + side * q->bend[here] / 2;
+            const double two = q->f[before] + side * q->bend[before] / 2;
+            at = one + (one - two) * steps[s] / (steps[s - 1] - steps[s]);
+            const double error =
+                beyond(fabs(at - q->a[here]),
+                       1.25 * WALK_ROUNDING * fmax(L, q->size[here]) / steps[s],
+                       fmax(fabs(q->a[here]), TINY * L));
+            /* The larger step leaves a hundred times the error of third order. */
+            worst = fmax(worst, s < N_STEPS - 1 ? error / 10 : error);
+        }
+        if (worst < best) best = worst, *slope = at;
+    }
+    return best;
+}
+
+/* The walks' verdict; worst so far in *row, kinked [n] the walks counted as standing on a
+ * kink. */
+static void judge(const struct imp__kept *k, const struct quotients *q, uint8_t *kinked,
+                  struct imp_check_row *row)
 {
     for (size_t i = 0; i < k->n; i++) {
-        const double L = fabs(k->walks[i].L);
-        double settled = INFINITY;
-        size_t best = i;
-        int step = 0;
-        for (int s = 1; s < N_STEPS; s++) {
-            const size_t here = (size_t)s * k->n + i, before = here - k->n;
-            const double change = fabs((f[here] - a[here]) - (f[before] - a[before]));
-            if (!(change < settled)) continue;
-            settled = change;
-            best = here;
-            step = s;
+        int step;
+        double slope = 0, error = judge_walk(k, q, i, &step);
+        double f = q->f[(size_t)step * k->n + i];
+        const double one_side =
+            error > FROZEN_LIMIT ? judge_sides(k, q, i, &slope) : INFINITY;
+        if (one_side <= FROZEN_LIMIT) {
+            error = one_side, f = slope, step = N_STEPS - 1;
+            if (!kinked[i]) kinked[i] = 1, row->kinks++;
         }
-        const double allowed =
-            settled + WALK_ROUNDING * fmax(L, size[best]) / (2 * steps[step]);
-        const double off = fabs(a[best] - f[best]);
-        const double error = off <= allowed ? 0
-                             : isfinite(settled)
-                                 ? (off - allowed) / fmax(fabs(a[best]), TINY * L)
-                                 : INFINITY;
         if (!(error > row->error) && row->step > 0) continue;
-        *row = (struct imp_check_row){
-            .step = steps[step], .value = a[best], .reference = f[best], .error = error};
+        row->step = steps[step];
+        row->value = q->a[(size_t)step * k->n + i];
+        row->reference = f;
+        row->error = error;
     }
 }
 
@@ -196,20 +263,26 @@ static enum imp_status check_param(struct imp__kept *k, size_t param)
     struct imp_check_row row[N_STEPS] = {{0}}, verdict = {0};
     double *buffer = imp__alloc(c->ctx, 2 * count, sizeof *buffer);
     double *q = imp__alloc(c->ctx, imp_max(k->n, (size_t)1),
-                           3 * N_STEPS * sizeof *q); /* see judge */
+                           (4 * N_STEPS + 1) * sizeof *q); /* struct quotients */
     double *want = q ? q + N_STEPS * k->n : NULL;
     double *largest = q ? want + N_STEPS * k->n : NULL;
+    double *bend = q ? largest + N_STEPS * k->n : NULL;
+    double *start = q ? bend + N_STEPS * k->n : NULL;
 
-    if (!buffer || !q) IMP_TRY(imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check"));
+    uint8_t *kinked = imp__alloc(c->ctx, imp_max(k->n, (size_t)1), 1);
+
+    if (!buffer || !q || !kinked)
+        IMP_TRY(imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check"));
     d.old = buffer;
     d.moved = buffer + count;
     for (size_t e = 0; e < count; e++) d.old[e] = imp__param_get(p, e);
+    IMP_TRY(evaluate(k, start));
     const size_t n_directions = count <= SINGLE_MAX ? count : DIRECTIONS;
     for (size_t r = 0; r < n_directions; r++) {
         d.only = count <= SINGLE_MAX ? r : SIZE_MAX;
         d.seed = r;
         for (int s = 0; s < N_STEPS; s++) {
-            IMP_TRY(difference(k, &d, steps[s]));
+            IMP_TRY(difference(k, &d, steps[s], start, bend + (size_t)s * k->n));
             const double size =
                 2 * steps[s] * imp__check_scale(p, count <= SINGLE_MAX ? r : 0);
             for (size_t i = 0; i < k->n; i++) {
@@ -221,6 +294,7 @@ static enum imp_status check_param(struct imp__kept *k, size_t param)
                 q[(size_t)s * k->n + i] = f / (2 * steps[s]);
                 want[(size_t)s * k->n + i] = a / (2 * steps[s]);
                 largest[(size_t)s * k->n + i] = k->value[1][i];
+                bend[(size_t)s * k->n + i] /= steps[s];
                 if (!(error > row[s].error) && row[s].step > 0) continue;
                 row[s] = (struct imp_check_row){.step = steps[s],
                                                 .value = a / size,
@@ -228,7 +302,7 @@ static enum imp_status check_param(struct imp__kept *k, size_t param)
                                                 .error = error};
             }
         }
-        judge(k, q, want, largest, &verdict);
+        judge(k, &(struct quotients){q, want, largest, bend}, kinked, &verdict);
     }
     int best = 0;
     for (int s = 1; s < N_STEPS; s++)
@@ -238,6 +312,7 @@ static enum imp_status check_param(struct imp__kept *k, size_t param)
         row[best].value = verdict.value / scale;
         row[best].reference = verdict.reference / scale;
         row[best].error = verdict.error;
+        row[best].kinks = verdict.kinks;
     }
     for (int s = 0; s < N_STEPS; s++) {
         row[s].step = steps[s];
@@ -248,6 +323,7 @@ static enum imp_status check_param(struct imp__kept *k, size_t param)
 out:
     imp__release(c->ctx, buffer);
     imp__release(c->ctx, q);
+    imp__release(c->ctx, kinked);
     return st;
 }
 
