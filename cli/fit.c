@@ -189,6 +189,10 @@ static void put_json(struct json *j, const struct imp_fit_result *r,
     json_integer(j, "iterations", r->iterations);
     json_number(j, "value", r->objective.value);
     json_number(j, "se", r->objective.se);
+    json_number(j, "residual", r->residual);
+    json_number(j, "residual_hi", r->residual_hi);
+    json_number(j, "chi2_per_freedom", r->chi2);
+    json_number(j, "chi2_se", r->chi2_se);
     json_number(j, "condition", r->condition);
     json_text(j, "reason", r->reason);
     json_text(j, "warning", r->warning);
@@ -227,6 +231,22 @@ static int write_json(const struct imp_fit_result *r, const struct block *blocks
     return rc;
 }
 
+/* What is left, or that it is below what so many samples tell. */
+static void print_residual(const struct imp_fit_result *r)
+{
+    if (!isfinite(r->residual)) return;
+    if (!(r->residual_hi > 0)) printf("residual within its noise");
+    else if (r->residual_hi > 1.5 * r->residual)
+        printf("residual below %.2g %% of the targets", 100 * r->residual_hi);
+    else printf("residual %.3g %% of the targets", 100 * r->residual);
+    if (isfinite(r->chi2) && (r->chi2_se < 1 || r->chi2 > 5 * r->chi2_se))
+        printf("; chi-square per degree of freedom %.*f +- %.1g", r->chi2 < 100, r->chi2,
+               r->chi2_se);
+    else if (isfinite(r->chi2))
+        printf("; below the targets' own noise only with more --spp");
+    printf("\n");
+}
+
 static void print_table(const struct imp_fit_result *r, const struct block *blocks,
                         size_t n_blocks, char **paths)
 {
@@ -259,6 +279,7 @@ static void print_table(const struct imp_fit_result *r, const struct block *bloc
     }
     printf("\n%s %.6g +- %.2g after %d iterations: %s\n", loss_word(), r->objective.value,
            r->objective.se, r->iterations, r->reason ? r->reason : "");
+    print_residual(r);
 }
 
 /* Recovered textures, as pictures. */

@@ -531,6 +531,12 @@ struct imp_fit_result {
     double condition;                         /**< of the scaled J^T J; 0: not computed */
     const char *reason;                       /**< why it stopped */
     const char *warning; /**< e.g. what is not determined; NULL: none */
+    double residual;    /**< root of sum w (I - T)^2 / sum w T^2 (log: of the mean squared
+                             log ratio), our own noise taken off; NaN with l1 */
+    double residual_hi; /**< the same two standard errors of the loss higher */
+    double chi2, chi2_se; /**< per degree of freedom: the loss over what the targets'
+                               noise alone leaves; 1 where the scene explains the
+                               pictures. NaN where that noise is not known, or l1 */
 };
 
 /** Fit the active parameters to the targets; the scene ends at the best estimate.

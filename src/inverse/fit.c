@@ -10,6 +10,16 @@
 #define EFFORT_SHARE 4 /* they take at least 1/4 of the samples that the search took */
 #define FINAL_SEED   0x40000001
 
+/* A loss that is not differentiable twice anywhere it matters: the expansion behind
+ * Gauss-Newton and its covariances does not exist. */
+static bool has_kink(const struct imp_problem *p)
+{
+    bool kink = false;
+    for (size_t t = 0; t < p->n_targets; t++)
+        kink |= p->targets[t].desc.loss == IMP_LOSS_L1;
+    return kink;
+}
+
 /* Evaluate what the search found with random numbers that it has not seen. */
 static enum imp_status final_objective(struct imp__fit *f, const double *x,
                                        struct imp_estimate *out)
@@ -46,6 +56,10 @@ static enum imp_status intervals(struct imp__fit *f, const struct imp__search *s
         return IMP_OK;
     }
     const struct imp_problem *p = f->problem;
+    if (has_kink(p)) {
+        *why = "the l1 loss has no second derivative";
+        return IMP_OK;
+    }
     const int spp = f->outer.spp > 0 ? f->outer.spp
                                      : p->scene->sensors[p->targets[0].desc.sensor]->spp;
     f->run.spp = replicate_spp(f, s, spp);
@@ -65,6 +79,7 @@ static enum imp_status result_make(struct imp__fit *f, const struct imp__search 
 {
     struct imp_arena *arena = &f->problem->fit_arena;
     const size_t n = f->problem->n;
+    size_t determined = 0;
     struct imp_fit_result *r = imp__arena_array(arena, 1, sizeof *r);
     double *history = imp__arena_array(arena, 2 * s->n_history + 1, sizeof *history);
 
@@ -76,6 +91,7 @@ static enum imp_status result_make(struct imp__fit *f, const struct imp__search 
         v->start = s->start[k];
         v->value = x[k];
         v->at_bound = imp__at_bound(&f->goal, x, k);
+        determined += u->n == 0 || v->determined;
         if (u->n) continue;
         v->se = v->lo95 = v->hi95 = NAN;
         v->determined = 1; /* nothing says the contrary */
@@ -84,6 +100,7 @@ static enum imp_status result_make(struct imp__fit *f, const struct imp__search 
         memcpy(history, s->history, s->n_history * sizeof *history);
         memcpy(history + s->n_history, s->history_se, s->n_history * sizeof *history);
     }
+    const struct imp__fit_residual left = imp__fit_residual(f, x, objective, determined);
     *r = (struct imp_fit_result){
         .size = sizeof *r,
         .iterations = s->iteration,
@@ -97,7 +114,12 @@ static enum imp_status result_make(struct imp__fit *f, const struct imp__search 
         .reason = !f->stopped                                       ? s->reason
                   : f->deadline_s > 0 && imp__now() > f->deadline_s ? "time limit reached"
                                                                     : "cancelled",
-        .warning = imp__fit_warning(f, objective.bias_order, variables, u->loosest, why)};
+        .warning =
+            imp__fit_warning(f, objective.bias_order, variables, u->loosest, why, &left),
+        .residual = left.relative,
+        .residual_hi = left.relative_hi,
+        .chi2 = left.chi2,
+        .chi2_se = left.chi2_se};
     *out = r;
     return IMP_OK;
 }
@@ -116,6 +138,10 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
     const char *why = NULL;
 
     IMP_TRY(imp__fit_begin(p, options, run, &f));
+    if (f.options.optimizer == IMP_LM && has_kink(p))
+        IMP_TRY(imp__error(ctx, IMP_E_ARG,
+                           "Levenberg-Marquardt needs a second derivative of the loss, "
+                           "and l1 has none: use Adam, or another loss"));
     start = imp__alloc(ctx, 2 * p->n, sizeof *start);
     if (!start)
         IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for %zu variables", p->n));

@@ -38,10 +38,21 @@ enum imp_status imp__fit_begin(struct imp_problem *problem,
 void imp__fit_scales(struct imp__fit *fit, const double *start);
 void imp__fit_end(struct imp__fit *fit);
 
+/* fit_residual.c: what is left between scene and targets. NAN: cannot be said. */
+struct imp__fit_residual {
+    double relative;      /* root of sum w (I - T)^2 / sum w T^2, */
+    double relative_hi;   /* and with two standard errors added to the loss */
+    double chi2, chi2_se; /* per degree of freedom */
+};
+struct imp__fit_residual imp__fit_residual(const struct imp__fit *fit, const double *x,
+                                           struct imp_estimate objective,
+                                           size_t determined);
+
 /* fit_report.c: names and warnings. Text in the problem's fit_arena; NULL: out of memory.
  */
 const char *imp__fit_warning(const struct imp__fit *fit, int bias_order,
                              const struct imp_fit_variable *variables,
-                             const double *loosest, const char *no_intervals);
+                             const double *loosest, const char *no_intervals,
+                             const struct imp__fit_residual *residual);
 
 #endif

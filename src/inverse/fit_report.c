@@ -1,10 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "fit.h"
+#include "loss.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
 #define NAMES_MAX 6
+#define MISFIT    2 /* chi^2 per degree of freedom that is worth a word, if it is */
+#define MISFIT_Z  3 /* so many standard errors above 1 */
 
 struct text {
     char buffer[1536];
@@ -36,7 +39,7 @@ static void put_loose(struct text *t, const struct imp__fit *f,
     size_t count = 0, shown = 0;
     for (size_t i = 0; i < n; i++) count += !v[i].determined;
     if (count == 0) return;
-    put(t, "the pictures do not determine ");
+    put(t, "%sthe pictures do not determine ", t->used ? "; " : "");
     for (size_t i = 0; i < n && shown < NAMES_MAX; i++) {
         if (v[i].determined) continue;
         if (shown++) put(t, ", ");
@@ -58,15 +61,31 @@ static void put_loose(struct text *t, const struct imp__fit *f,
     }
 }
 
+static bool quadratic(const struct imp_problem *p)
+{
+    for (size_t t = 0; t < p->n_targets; t++)
+        if (!imp__loss_quadratic(p->targets[t].desc.loss)) return false;
+    return true;
+}
+
 const char *imp__fit_warning(const struct imp__fit *f, int bias_order,
                              const struct imp_fit_variable *variables,
-                             const double *loosest, const char *no_intervals)
+                             const double *loosest, const char *no_intervals,
+                             const struct imp__fit_residual *residual)
 {
     struct text t = {.used = 0};
+    if (residual->chi2 > MISFIT && residual->chi2 - 1 > MISFIT_Z * residual->chi2_se)
+        put(&t,
+            "the scene does not explain the pictures: what is left is %.*f +- %.1g times "
+            "what their noise leaves (chi-square per degree of freedom); this is another "
+            "minimum, or another number is wrong, and intervals do not know of that",
+            residual->chi2 < 100, residual->chi2, residual->chi2_se);
     if (loosest) put_loose(&t, f, variables, loosest);
     if (no_intervals) put(&t, "%sno intervals: %s", t.used ? "; " : "", no_intervals);
     if (bias_order > 0)
-        put(&t, "%sthis loss leaves a bias of order 1/spp%s in value and gradient",
-            t.used ? "; " : "", bias_order == 2 ? "^2" : "");
+        put(&t, "%s%s a bias of order 1/spp%s in value and gradient", t.used ? "; " : "",
+            quadratic(f->problem) ? "a filter wider than a pixel leaves"
+                                  : "this loss leaves",
+            bias_order == 2 ? "^2" : "");
     return t.used ? imp__arena_strdup(&f->problem->fit_arena, t.buffer) : NULL;
 }

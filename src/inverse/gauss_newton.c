@@ -8,7 +8,8 @@
  *
  * averaged over replicates; the same-sample matrix, which a naive product of mean
  * pictures would give, comes along for damping. Losses that are not quadratic enter with
- * w = l''(mean) and r = l'/l''.
+ * Gauss and Newton's w at the mean, and with the gradient of adjoint.c: r = l'/w at the
+ * mean of a few walks would have the bias that the jackknife takes off.
  *
  * Noise of the pictures themselves: sum w^2 sigma^2 J^T J is the gradient's covariance by
  * it. Where sigma is not given, the squared residual stands in for sigma^2, pixel by
@@ -16,6 +17,7 @@
  * 1980); residual and J^T J come from different replicates, so that their own noise is
  * not correlated. */
 #include "gauss_newton.h"
+#include "adjoint.h"
 #include "lanes.h"
 #include "loss.h"
 #include "walk/picture.h"
@@ -42,6 +44,9 @@ struct job {
         double *u, *au; /* [seen][K*K] of a pixel: sums over its replicates of w^2 J^T J,
                            and of that times the replicate's squared residual */
         double a[3];    /* sum over replicates of squared residuals */
+        double *each_x; /* [n][K][channels] of all walks, for losses that are not
+                           quadratic; NULL: there are none */
+        imp_spec L[IMP_BATCH_MAX], P[IMP_BATCH_MAX];
     } * workers;
     struct imp__normal_sums *slots, total;
 };
@@ -77,6 +82,8 @@ static double replicate(const struct job *j, struct worker *w,
     const struct imp_target *t = &j->target->desc;
     const int n = j->plan.n;
     const double N = n;
+    const size_t width = K * (size_t)j->channels;
+    const bool quadratic = imp__loss_quadratic(t->loss);
     double sum[3] = {0}, square[3] = {0}, value = 0;
     memset(w->sum_x, 0, K * S * sizeof(double));
     memset(w->sum_lx, 0, K * S * sizeof(double));
@@ -94,6 +101,10 @@ static double replicate(const struct job *j, struct worker *w,
             {imp__lanes_add, true}, j->tracer.active, j->channels, w->x};
         imp__walk_sweep(&j->tracer, &walk, imp__lanes_adjoint(j->channels), &lanes.sink);
         imp__arena_rewind(&w->arena, mark);
+        if (!quadratic) {
+            memcpy(w->each_x + (size_t)i * width, w->x, width * sizeof(double));
+            w->L[i] = walk.L;
+        }
         const double L[3] = {walk.L[0], walk.L[1], walk.L[2]};
         for (size_t c = 0; c < S; c++) {
             const double l = seen(j, L, (int)c);
@@ -112,19 +123,25 @@ static double replicate(const struct job *j, struct worker *w,
     }
 
     const size_t pixel = (size_t)y * (size_t)j->width + (size_t)x;
+    if (!quadratic) {
+        value = imp__replicate_adjoints(j->target, j->channels, pixel, n, w->L, w->P);
+        for (int i = 0; i < n; i++)
+            for (size_t k = 0; k < width; k++)
+                g[k / (size_t)j->channels] +=
+                    w->P[i][k % (size_t)j->channels] * w->each_x[(size_t)i * width + k];
+    }
     const double scale = t->scale * (j->target->weights ? j->target->weights[pixel] : 1);
     for (size_t c = 0; c < S; c++) {
         const double T = j->target->pixels[pixel * S + c];
-        double weight, T_eff = T;
-        if (imp__loss_quadratic(t->loss)) {
-            weight = imp__loss_weight(t->loss, scale, t->epsilon, T);
+        const double weight =
+            imp__loss_gauss_newton(t->loss, scale, t->epsilon, sum[c] / N, T);
+        double T_eff = T;
+        if (quadratic) {
             value += imp__loss_unbiased(weight, T, N, sum[c], square[c]);
         } else {
             struct imp__loss_at at;
             imp__loss_eval(t->loss, scale, t->epsilon, sum[c] / N, T, &at);
-            weight = at.d2 > 0 ? at.d2 : 0;
             T_eff = weight > 0 ? sum[c] / N - at.d1 / weight : T;
-            value += at.value;
         }
         const bool known = j->target->noise_se != NULL;
         const double sigma = known ? j->target->noise_se[pixel * S + c] : 0;
@@ -138,8 +155,9 @@ static double replicate(const struct job *j, struct worker *w,
         out->chi2 += 2 * share * imp__loss_unbiased(weight, T_eff, N, sum[c], square[c]);
         for (size_t k = 0; k < K; k++) {
             const double xk = w->sum_x[k * S + c];
-            g[k] += weight * ((sum[c] / (N - 1) - T_eff) * xk / N -
-                              w->sum_lx[k * S + c] / (N * (N - 1)));
+            if (quadratic)
+                g[k] += weight * ((sum[c] / (N - 1) - T) * xk / N -
+                                  w->sum_lx[k * S + c] / (N * (N - 1)));
             for (size_t m = 0; m <= k; m++) {
                 const double product = xk * w->sum_x[m * S + c],
                              u = product - xx[k * K + m];
@@ -227,6 +245,9 @@ static enum imp_status tile_commit(size_t item, int slot, void *payload)
 static enum imp_status workers_create(struct job *j, imp_context *ctx)
 {
     const size_t K = j->K, S = 3, R = 2 * IMP_BATCHES_PER_ITEM + 2;
+    bool quadratic = true;
+    for (size_t t = 0; t < j->problem->n_targets; t++)
+        quadratic &= imp__loss_quadratic(j->problem->targets[t].desc.loss);
     for (int k = 0; k < ctx->threads; k++) {
         struct worker *w = &j->workers[k];
         imp__arena_init(&w->arena, ctx);
@@ -238,6 +259,9 @@ static enum imp_status workers_create(struct job *j, imp_context *ctx)
         w->sum_xx = w->g + R * K;
         w->u = w->sum_xx + S * K * K;
         w->au = w->u + S * K * K;
+        if (quadratic) continue;
+        w->each_x = imp__alloc(ctx, IMP_BATCH_MAX, 3 * K * sizeof(double));
+        if (!w->each_x) return imp__error(ctx, IMP_E_NOMEM, "no memory for derivatives");
     }
     return IMP_OK;
 }
@@ -365,6 +389,7 @@ out:
     for (int k = 0; j.workers && k < ctx->threads; k++) {
         if (j.workers[k].arena.ctx) imp__arena_free(&j.workers[k].arena);
         imp__release(ctx, j.workers[k].x);
+        imp__release(ctx, j.workers[k].each_x);
     }
     for (int k = 0; j.slots && k < n_slots; k++) imp__release(ctx, j.slots[k].H);
     imp__release(ctx, j.total.H);

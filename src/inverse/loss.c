@@ -43,6 +43,14 @@ double imp__loss_weight(enum imp_loss loss, double weight, double epsilon, doubl
     return loss == IMP_LOSS_RELATIVE_L2 ? weight / (T * T + epsilon) : weight;
 }
 
+double imp__loss_gauss_newton(enum imp_loss loss, double weight, double epsilon, double I,
+                              double T)
+{
+    if (loss == IMP_LOSS_L1) return 0;
+    if (loss == IMP_LOSS_LOG) return weight / pow(fmax(I, 0) + epsilon, 2);
+    return imp__loss_weight(loss, weight, epsilon, T);
+}
+
 int imp__loss_bias_order(enum imp_loss loss)
 {
     switch (loss) {

@@ -21,6 +21,11 @@ void imp__loss_eval(enum imp_loss loss, double weight, double epsilon, double I,
 bool imp__loss_quadratic(enum imp_loss loss);
 double imp__loss_weight(enum imp_loss loss, double weight, double epsilon, double T);
 
+/* Gauss and Newton's weight of a residual: l'' but for the term with the residual itself,
+ * so never negative. L1 has none: 0. */
+double imp__loss_gauss_newton(enum imp_loss loss, double weight, double epsilon, double I,
+                              double T);
+
 /* imp_estimate.bias_order of leave-one-out (with jackknife where l is smooth). */
 int imp__loss_bias_order(enum imp_loss loss);
 

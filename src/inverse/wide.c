@@ -132,9 +132,27 @@ static double weight_of(const struct wide *w, size_t pixel, int c, double mean, 
         return imp__loss_weight(t->loss, scale, t->epsilon, *T);
     struct imp__loss_at at;
     imp__loss_eval(t->loss, scale, t->epsilon, mean, *T, &at);
-    if (!(at.d2 > 0)) return 0;
-    *T = mean - at.d1 / at.d2;
-    return at.d2;
+    const double weight = imp__loss_gauss_newton(t->loss, scale, t->epsilon, mean, *T);
+    if (weight > 0) *T = mean - at.d1 / weight;
+    return weight;
+}
+
+/* Of a loss that is not quadratic: what the derivative of replicate b is multiplied with,
+ * by the jackknife over replicates (adjoint.c). */
+static void jackknife(const struct wide *w, size_t pixel, int c, double S, double *factor)
+{
+    const struct imp_target *t = w->target;
+    const double scale = t->scale * (w->weights ? w->weights[pixel] : 1), R = w->R;
+    const double T = t->pixels[pixel * (size_t)w->seen + (size_t)c];
+    struct imp__loss_at at;
+    double A = 0;
+    for (int b = 0; b < w->R; b++) {
+        imp__loss_eval(t->loss, scale, t->epsilon, (S - w->L[b]) / (R - 1), T, &at);
+        factor[b] = at.d1;
+        A += at.d1;
+    }
+    imp__loss_eval(t->loss, scale, t->epsilon, S / R, T, &at);
+    for (int b = 0; b < w->R; b++) factor[b] = at.d1 - (A - factor[b]) / R;
 }
 
 /* ---- H, g, and the gradient's own noise ---------------------------------------- */
@@ -154,11 +172,19 @@ static void pixel_add(struct wide *w, size_t pixel, int c, double *leave,
     }
     const double weight = weight_of(w, pixel, c, S / R, &T);
     if (weight == 0) return;
+    const bool quadratic = imp__loss_quadratic(w->target->loss);
+    double factor[MANY];
+    if (!quadratic) jackknife(w, pixel, c, S, factor);
     out->chi2 += 2 * imp__loss_unbiased(weight, T, R, S, S2);
     for (size_t k = 0; k < K; k++) {
         double lx = 0;
         for (int b = 0; b < w->R; b++) lx += w->L[b] * w->X[(size_t)b * K + k];
-        out->g[k] += weight * ((S * w->sum[k] - lx) / (R * (R - 1)) - T * w->sum[k] / R);
+        if (quadratic)
+            out->g[k] +=
+                weight * ((S * w->sum[k] - lx) / (R * (R - 1)) - T * w->sum[k] / R);
+        else
+            for (int b = 0; b < w->R; b++)
+                out->g[k] += factor[b] * w->X[(size_t)b * K + k];
         for (int b = 0; b < w->R; b++) {
             const double l = w->L[b], x = w->X[(size_t)b * K + k], x1 = w->sum[k] - x;
             leave[(size_t)b * K + k] +=
