@@ -5,7 +5,9 @@
  *     bend_experiments luneburg|maxwell|focus|slice|tape|fibre|display|gas|rod ...
  * [--full]
  *
- * Settings are scaled to minutes on two cores; --full takes the published sizes. */
+ * Settings are scaled to minutes on two cores; --full takes the published sizes. How long
+ * an experiment will take is said on standard error before it begins, from a first
+ * evaluation. */
 #include "bend_tape.h"
 #include <importon/bend.h>
 #include <math.h>
@@ -30,6 +32,22 @@ static double now(void)
     return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 static double sqr(double x) { return x * x; }
+
+static void expect(const char *what, double seconds)
+{
+    if (seconds < 90) fprintf(stderr, "%s: about %.0f s\n", what, fmax(seconds, 1));
+    else fprintf(stderr, "%s: about %.0f min\n", what, seconds / 60);
+}
+/* Seconds of one value and gradient, and of what a search adds to them. */
+static double evaluation(imp_bend *b)
+{
+    double *g = calloc(imp_field_n_theta(imp_bend_field(b)), sizeof *g), value, start;
+    must(imp_bend_objective(b, &value, g, NULL, NULL)); /* threads, pages: made once */
+    start = now();
+    must(imp_bend_objective(b, &value, g, NULL, NULL));
+    free(g);
+    return 1.2 * (now() - start);
+}
 
 static imp_field *grid(int cells, double half, double index, enum imp_field_interp interp)
 {
@@ -63,6 +81,9 @@ static void recover(const char *file, double (*truth)(double), const int iterati
         must(imp_bend_load(ctx, file, &lo, &b));
         fo.levels = levels;
         memcpy(fo.iterations, iterations, 3 * sizeof(int));
+        if (levels == 1) /* the step halves with the third level's cells */
+            expect(file, evaluation(b) *
+                             (3 * iterations[0] + 2 * iterations[1] + 2 * iterations[2]));
         const double start = now();
         must(imp_bend_fit(b, &fo, &r));
         const double s = now() - start;
@@ -146,6 +167,8 @@ static void focus(void)
             struct imp_bend_fit_result r;
             fo.iterations[0] = steps[m];
             fo.tolerance = 1e-12;
+            if (k == 0 && m == 0)
+                expect("focus", 4 * evaluation(b) * (steps[0] + steps[1] + steps[2]));
             must(imp_bend_fit(b, &fo, &r));
             printf(" %12.2e", r.value);
             if (m == 1 &&
@@ -242,18 +265,52 @@ static double lens_adjoint(const struct lens *l, double *bar, double *forward_s,
     return value;
 }
 
+/* The gradient by tape, batch after batch of rays: one tape of all rays of the published
+ * sizes has tens of GB. cost: what it would have. */
+#define TAPE_RAYS 250
+static double tape_rays(const struct lens *l, size_t n, int kind, const double *theta,
+                        double *bar, struct tape_cost *cost)
+{
+    const double start = now();
+    cost->bytes = 0;
+    for (size_t i = 0; i < n; i += TAPE_RAYS) {
+        struct tape_cost part;
+        tape_gradient(theta, l->nodes + 2 * kind, kind, 1,
+                      n - i < TAPE_RAYS ? n - i : TAPE_RAYS, l->x + i, l->d + i, l->t,
+                      0.95, bar, &part);
+        cost->bytes += part.bytes;
+    }
+    return now() - start;
+}
+/* Seconds that n rays will take, from the first of them. */
+static double tape_expect(enum imp_field_interp interp, int cells, size_t n)
+{
+    struct lens l = lens_make(interp, cells, n);
+    const size_t m = imp_field_n_theta(l.f), few = n < 40 ? n : 40;
+    double *bar = calloc(m, 8), *theta = calloc(m, 8);
+    struct tape_cost cost;
+    imp_field_get_theta(l.f, theta);
+    const double s = tape_rays(&l, few, interp == IMP_FIELD_SPLINE, theta, bar, &cost);
+    free(bar), free(theta);
+    lens_free(&l);
+    return s * (double)n / (double)few;
+}
+
 static void slice(void)
 {
+    const int cells = full ? 64 : 24;
+    const size_t rays = full ? 20000 : 2000;
+    expect("slice", 1.2 * (tape_expect(IMP_FIELD_TRILINEAR, cells, rays) +
+                           tape_expect(IMP_FIELD_SPLINE, cells, rays)));
     for (int kind = 0; kind < 2; kind++) {
-        const int cells = full ? 64 : 24;
-        struct lens l = lens_make(kind ? IMP_FIELD_SPLINE : IMP_FIELD_TRILINEAR, cells,
-                                  full ? 20000 : 2000);
+        struct lens l =
+            lens_make(kind ? IMP_FIELD_SPLINE : IMP_FIELD_TRILINEAR, cells, rays);
         const size_t n = imp_field_n_theta(l.f), side = (size_t)(l.nodes + 2 * kind);
         double *adj = calloc(n, 8), *tape = calloc(n, 8), *theta = calloc(n, 8), f, b;
         lens_adjoint(&l, adj, &f, &b);
         imp_field_get_theta(l.f, theta);
         struct tape_cost cost;
-        tape_gradient(theta, (int)side, kind, 1, l.n, l.x, l.d, l.t, 0.95, tape, &cost);
+        tape_rays(&l, l.n, kind, theta, tape, &cost);
         double dt = 0, norm = 0;
         for (size_t i = 0; i < n; i++) dt += sqr(adj[i] - tape[i]), norm += sqr(adj[i]);
         printf("%s, %d cells: |adjoint - tape|/|adjoint| = %.1e\n",
@@ -288,6 +345,11 @@ static void tape(void)
     printf("%-10s %6s %8s %14s %14s %10s %10s %10s\n", "field", "nodes", "rays",
            "tape bytes", "exits, grad", "ratio", "tape s", "adjoint s");
     const int sizes[] = {32, 64, 128};
+    double expected = 0;
+    for (int k = 0; k < (full ? 6 : 4); k++)
+        expected += tape_expect(k % 2 ? IMP_FIELD_SPLINE : IMP_FIELD_TRILINEAR,
+                                sizes[k / 2], full ? 20000 : 2000);
+    expect("tape", expected);
     for (int kind = 0; kind < 2; kind++)
         for (int s = 0; s < (full ? 3 : 2); s++) {
             const size_t rays = full ? 20000 : 2000;
@@ -299,12 +361,7 @@ static void tape(void)
             imp_field_get_theta(l.f, theta);
             lens_adjoint(&l, bar, &f, &b);
             memset(bar, 0, n * 8);
-            const double start = now();
-            /* All rays on one tape: what automatic differentiation of the program keeps.
-             */
-            tape_gradient(theta, l.nodes + 2 * kind, kind, 1, rays, l.x, l.d, l.t, 0.95,
-                          bar, &cost);
-            const double ts = now() - start;
+            const double ts = tape_rays(&l, rays, kind, theta, bar, &cost);
             const double ours = (double)rays * (sizeof(struct imp_bend_exit) +
                                                 sizeof(struct imp_bend_cotangent)) +
                                 8.0 * (double)n;
@@ -465,6 +522,8 @@ static void display(void)
         struct imp_bend_fit_options fo = IMP_BEND_FIT_OPTIONS_INIT;
         struct imp_bend_fit_result r;
         fo.iterations[0] = 60, fo.scale = 0.02;
+        if (level == 0) /* steps of half a cell, 0.1 at most */
+            expect("display", 60 * evaluation(b) * (full ? 8.7 : 4.3));
         must(imp_bend_fit(b, &fo, &r));
         double parts[2], v, lo = 1e9, hi = 0, corr = 0;
         must(imp_bend_objective(b, &v, NULL, parts, NULL));
@@ -615,6 +674,8 @@ static void gas(void)
         fo.iterations[0] = 100, fo.tolerance = 1e-12;
         imp_bend *lin = gas_problem(&g, NULL, tiny, tiny / c);
         fo.scale = tiny;
+        if (c < 1e-3) /* four contrasts, two fits each, and one more */
+            expect("gas", 9 * fo.iterations[0] * evaluation(lin));
         must(imp_bend_fit(lin, &fo, &res));
         const size_t n = imp_field_n_theta(imp_bend_field(lin));
         double *theta = calloc(n, 8);

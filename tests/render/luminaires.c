@@ -122,33 +122,31 @@ static void under_a_surface(imp_context *ctx)
 #define WALL(place)                                                                      \
     "<shape type='rectangle'><transform name='to_world'>" place                          \
     "</transform><ref id='wall'/></shape>"
-static const char room[] = "<scene version='3.0.0'><integrator type='path'/>"
-                           "<sensor type='perspective'><float name='fov' "
-                           "value='60'/><transform "
-                           "name='to_world'><lookat origin='0,0.2,0.95' "
-                           "target='0,-0.1,0' up='0,1,0'/>"
-                           "</transform><film type='hdrfilm'><integer name='width' "
-                           "value='24'/><integer "
-                           "name='height' value='24'/><rfilter "
-                           "type='box'/></film></sensor>"
-                           "<bsdf type='diffuse' id='wall'><float name='reflectance' "
-                           "value='0.5'/></bsdf>" WALL(
-                               "<rotate x='1' angle='-90'/><translate y='-1'/>")
-                               WALL("<rotate x='1' angle='90'/><translate y='1'/>")
-                                   WALL("<translate z='-1'/>") WALL(
-                                       "<rotate y='1' angle='180'/><translate z='1'/>")
-                                       WALL("<rotate y='1' angle='90'/><translate "
-                                            "x='-1'/>") WALL(
-                                           "<rotate y='1' angle='-90'/><translate "
-                                           "x='1'/>") "<shape type='rectangle' "
-                                                      "id='pendant'><transform "
-                                                      "name='to_world'><scale x='0.3' "
-                                                      "y='0.1'/><rotate x='1' "
-                                                      "angle='90'/><translate y='0.6' "
-                                                      "z='-0.2'/></transform>"
-                                                      "<emitter type='ies' "
-                                                      "id='bat'>" LAMP_FILE(
-                                                          "batwing") "<string "
+static const char room[] =
+    "<scene version='3.0.0'><integrator type='path'/>"
+    "<sensor type='perspective'><float name='fov' "
+    "value='60'/><transform "
+    "name='to_world'><lookat origin='0,0.2,0.95' "
+    "target='0,-0.1,0' up='0,1,0'/>"
+    "</transform><film type='hdrfilm'><integer name='width' "
+    "value='24'/><integer "
+    "name='height' value='24'/><rfilter "
+    "type='box'/></film></sensor>"
+    "<bsdf type='diffuse' id='wall'><float name='reflectance' "
+    "value='0.5'/></bsdf>" WALL("<rotate x='1' angle='-90'/><translate y='-1'/>")
+        WALL("<rotate x='1' angle='90'/><translate y='1'/>") WALL("<translate z='-1'/>")
+            WALL("<rotate y='1' angle='180'/><translate z='1'/>")
+                WALL("<rotate y='1' angle='90'/><translate "
+                     "x='-1'/>")
+                    WALL("<rotate y='1' angle='-90'/><translate "
+                         "x='1'/>") "<shape type='rectangle' "
+                                    "id='pendant'><transform "
+                                    "name='to_world'><scale x='0.3' "
+                                    "y='0.1'/><rotate x='1' "
+                                    "angle='90'/><translate y='0.6' "
+                                    "z='-0.2'/></transform>"
+                                    "<emitter type='ies' "
+                                    "id='bat'>" LAMP_FILE("batwing") "<string "
                                                                      "name='units' "
                                                                      "value='radiometric'"
                                                                      "/></emitter></"
