@@ -167,6 +167,17 @@ static int unknown_option(const struct args_spec *spec, const char *word,
     return usage_error(spec);
 }
 
+/* Was a list of patterns given, whose first the shell may have made several? */
+static int takes_patterns(const struct args_spec *spec)
+{
+    for (int g = 0; spec->group[g]; g++)
+        for (const struct arg_option *o = spec->group[g]; o->type; o++)
+            if (o->type == ARG_LIST && !strncmp(o->value, "GLOB", 4) &&
+                ((const struct arg_list *)o->target)->n > 0)
+                return 1;
+    return 0;
+}
+
 int args_parse(const struct args_spec *spec, int argc, char **argv, int *first)
 {
     const struct arg_option *all[MAX_OPTIONS];
@@ -215,8 +226,12 @@ int args_parse(const struct args_spec *spec, int argc, char **argv, int *first)
         return usage_error(spec);
     }
     if (spec->max_operands >= 0 && argc - optind > spec->max_operands) {
-        fprintf(stderr, "importon: %s: one argument too many: '%s'\n", spec->command,
-                argv[optind + spec->max_operands]);
+        fprintf(stderr, "importon: %s: one argument too many: '%s'%s\n", spec->command,
+                argv[optind + spec->max_operands],
+                takes_patterns(spec)
+                    ? " (patterns need quotes, or the shell puts file names in their "
+                      "place: -p 'ball.*')"
+                    : "");
         return usage_error(spec);
     }
     return 0;

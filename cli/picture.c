@@ -7,6 +7,7 @@
 #include <errno.h>
 #include <inttypes.h>
 #include <math.h>
+#include <stdio_ext.h>
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
@@ -127,11 +128,14 @@ static int write_to_stdout(const imp_film *film, const struct imp_write_options 
     close(fd);
     const enum imp_status st = imp_film_write(film, name, options);
     FILE *file = st == IMP_OK ? fopen(name, "rb") : NULL;
-    const int good = file && copy_stream(file, stdout);
+    const int good = file && copy_stream(file, stdout), code = errno;
     if (file) fclose(file);
     unlink(name);
     if (st != IMP_OK) return cli_fail(st, NULL);
-    return good ? 0 : cli_error(EXIT_RUN, "standard output: cannot write");
+    if (good) return 0;
+    __fpurge(stdout); /* it has been said: nothing is left to fail at the end */
+    clearerr(stdout);
+    return cli_error(EXIT_RUN, "standard output: %s", strerror(code));
 }
 
 int picture_write(const imp_film *film, const char *path, const struct picture_options *o)

@@ -3,6 +3,7 @@
 
 #include "picture.h"
 
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -89,6 +90,27 @@ static int needs_target(void)
     return cli_error(EXIT_USAGE, "--%s is part of a loss, and needs a --target", option);
 }
 
+/* Files of 8 bits hold nothing brighter than white, and a fit takes them at their word.
+ * JPEG's own noise makes white a little darker. */
+static void warn_clipped(const char *spec, const struct imp_target *t)
+{
+    const bool png = strcasestr(spec, ".png"), jpeg = strcasestr(spec, ".jp");
+    const float white = png ? 0.9999f : 0.98f;
+    size_t clipped = 0;
+    if (!png && !jpeg) return;
+    for (size_t i = 0; i < (size_t)t->width * (size_t)t->height; i++) {
+        bool over = false;
+        for (int c = 0; c < t->channels; c++)
+            over |= t->pixels[i * (size_t)t->channels + (size_t)c] >= white;
+        clipped += over && !(t->weights && t->weights[i] == 0);
+    }
+    if (clipped)
+        cli_say("importon: warning: %s: %zu of %zu pixels are as bright as the file can "
+                "hold, and may have been brighter: leave them out with --mask, or give a "
+                "picture with its full range (.exr, .hdr, .pfm, .npy)",
+                spec, clipped, (size_t)t->width * (size_t)t->height);
+}
+
 static int add_targets(imp_problem *problem)
 {
     const struct problem_options *o = &problem_options;
@@ -100,6 +122,7 @@ static int add_targets(imp_problem *problem)
         const char *mask = i < o->masks.n ? o->masks.item[i] : NULL;
         const int rc = picture_target(o->targets.item[i], mask, &target);
         if (rc) return rc;
+        warn_clipped(o->targets.item[i], &target);
         target.loss = losses[o->loss];
         target.epsilon = o->epsilon;
         const enum imp_status st = imp_problem_add_target(problem, &target);
@@ -121,6 +144,9 @@ int problem_open(imp_problem **out)
     if (st == IMP_OK && o->params.n == 0) st = imp_problem_activate(problem, "*");
     if (st != IMP_OK) rc = cli_fail(st, cli.scene_path);
     if (!rc) rc = add_targets(problem);
+    const struct imp_run run = cli_run();
+    if (!rc && o->targets.n && cli_spp(&run) == 1)
+        cli_say("importon: a loss without bias takes 2 samples per pixel: 2 are taken");
     if (!rc) rc = add_regularisers(problem, TIKHONOV, "tikhonov", &o->tikhonov);
     if (!rc) rc = add_regularisers(problem, STAY, "stay", &o->stay);
     if (!rc) rc = add_regularisers(problem, SMOOTH, "smooth", &o->smooth);

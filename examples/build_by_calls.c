@@ -10,6 +10,8 @@
  *
  * With I = 1, h = 5, rho = 0.6: 0.6 / (25 pi) = 0.0076394. The camera looks at that point
  * through one pixel, narrow enough to see nothing else.
+ *
+ *     cc build_by_calls.c $(pkg-config --cflags --libs importon) -lm
  */
 #include <importon/importon.h>
 #include <math.h>

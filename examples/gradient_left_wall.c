@@ -10,6 +10,8 @@
  * over the vertices k of walk i (gradients of the walk's factors, one at a time). It is
  * the forward derivative J v, with v = 1 for the wall's three numbers: red changes red
  * only, so one picture holds all three derivatives.
+ *
+ *     cc gradient_left_wall.c $(pkg-config --cflags --libs importon)
  */
 #include <importon/importon.h>
 #include <stdio.h>

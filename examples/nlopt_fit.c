@@ -9,6 +9,8 @@
  * and both numbers follow from one picture that shows ball and sky. The seed is the same
  * in every call: with common random numbers J is an ordinary smooth function, which is
  * what L-BFGS expects.
+ *
+ *     cc nlopt_fit.c $(pkg-config --cflags --libs importon nlopt) -lm
  */
 #include <importon/importon.h>
 #include <math.h>

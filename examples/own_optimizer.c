@@ -11,6 +11,8 @@
  *
  * The ball fills the picture of P pixels and a convex body under a sky of 1 has radiance
  * rho, so J'' = 3 P and a = 1 / (6 P) halves the error in every step.
+ *
+ *     cc own_optimizer.c $(pkg-config --cflags --libs importon) -lm
  */
 #include <importon/importon.h>
 #include <math.h>

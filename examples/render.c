@@ -6,6 +6,8 @@
  * from everywhere, estimated by N random walks (Kajiya 1986):
  *
  *     I = 1/N sum_i L_i,    se = sqrt( sum_i (L_i - I)^2 / (N (N - 1)) )
+ *
+ *     cc render.c $(pkg-config --cflags --libs importon)
  */
 #include <importon/importon.h>
 #include <stdio.h>

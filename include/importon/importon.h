@@ -382,8 +382,9 @@ IMP_API void imp_problem_destroy(imp_problem *problem);
 /** Make parameters active: a name or a glob ("*.reflectance.value"; "*" is everything
  * that has a gradient). Active parameters keep the scene's order, whatever the order of
  * calls.
- * @return IMP_OK; IMP_E_ARG if nothing matches; IMP_E_BIAS if a parameter named without
- *         wildcards has no unbiased gradient. */
+ * @return IMP_OK; IMP_E_ARG if nothing matches; IMP_E_BIAS, with the reason, if a
+ *         parameter named without wildcards, or all that match, have no unbiased
+ *         gradient. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_activate(imp_problem *problem,
                                                             const char *glob);
 /** Length of x: how many numbers are active. */

@@ -95,10 +95,11 @@ enum imp_status imp_problem_activate(imp_problem *p, const char *glob)
     if (!imp__has_wildcards(glob)) {
         IMP_TRY(activate_named(p, glob, chosen));
     } else {
-        size_t met = 0, usable = 0;
+        size_t met = 0, usable = 0, last = 0;
         for (size_t k = 0; k < s->n_params; k++) {
             if (!imp__glob(glob, s->params[k].info.name)) continue;
             met++;
+            last = k;
             if (!(s->params[k].info.flags & IMP_PARAM_DIFFERENTIABLE)) continue;
             usable++;
             chosen[k] = 1;
@@ -107,12 +108,9 @@ enum imp_status imp_problem_activate(imp_problem *p, const char *glob)
             IMP_TRY(imp__error(p->ctx, IMP_E_ARG,
                                "no parameter matches '%s' (there are %zu)", glob,
                                s->n_params));
-        if (!usable)
-            IMP_TRY(
-                imp__error(p->ctx, IMP_E_ARG,
-                           "none of the %zu parameters that match '%s' has an unbiased "
-                           "derivative",
-                           met, glob));
+        if (!usable) { /* the reason, of one of them */
+            IMP_TRY(activate_named(p, s->params[last].info.name, chosen));
+        }
     }
     IMP_TRY(imp__active_create(s, chosen, &active));
     imp__active_destroy(p->ctx, &p->active);

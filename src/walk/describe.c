@@ -164,12 +164,15 @@ enum imp_status imp_walk_describe(const imp_scene *scene, const struct imp_run *
     const struct imp_sensor *sensor;
     enum imp_status st = imp__run_sensor(scene, run, &sensor);
     if (st != IMP_OK) return st;
-    if (x < 0 || y < 0 || x >= sensor->film.crop_w || y >= sensor->film.crop_h ||
-        sample < 0)
-        return imp__error(
-            scene->ctx, IMP_E_ARG,
-            "there is no pixel %d,%d in a picture of %d x %d, or sample %lld", x, y,
-            sensor->film.crop_w, sensor->film.crop_h, (long long)sample);
+    const int width = sensor->film.crop_w, height = sensor->film.crop_h;
+    if (x < 0 || y < 0 || x >= width || y >= height)
+        return imp__error(scene->ctx, IMP_E_ARG,
+                          "there is no pixel %d,%d: in this picture they go from 0,0 to "
+                          "%d,%d",
+                          x, y, width - 1, height - 1);
+    if (sample < 0)
+        return imp__error(scene->ctx, IMP_E_ARG,
+                          "there is no sample %lld: the first is 0", (long long)sample);
     const struct imp_integrator *integrator = imp__radiance_integrator(scene);
     if (!integrator)
         return imp__error(scene->ctx,

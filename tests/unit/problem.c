@@ -79,6 +79,11 @@ static void activation(imp_scene *s)
     tap_ok(imp_problem_activate(p, "nothing*") == IMP_E_ARG, "no match # %s",
            imp_last_error(ctx));
     tap_ok(imp_problem_activate(p, "") == IMP_E_ARG, "no name");
+    tap_ok(imp_problem_activate(p, "glass.*") == IMP_E_BIAS &&
+               strstr(imp_last_error(ctx), "glass.eta") &&
+               strstr(imp_last_error(ctx), "paths"),
+           "a pattern that meets only what has none: the reason # %s",
+           imp_last_error(ctx));
     for (size_t k = 0; k < imp_scene_n_params(s); k++) {
         if (imp_scene_get_param(s, k, &info) != IMP_OK) return;
         if (info.flags & IMP_PARAM_DIFFERENTIABLE) continue;
