@@ -180,9 +180,11 @@ static void room(const struct motion *m, double *below, double *above)
 {
     *below = *above = INFINITY;
     for (size_t e = 0; e < m->param->info.count; e++) {
-        if (m->weight[e] == 0) continue;
-        *below = fmin(*below, (m->old[e] - m->param->info.lo) / m->weight[e]);
-        *above = fmin(*above, (m->param->info.hi - m->old[e]) / m->weight[e]);
+        const double w = m->weight[e], down = m->old[e] - m->param->info.lo,
+                     up = m->param->info.hi - m->old[e];
+        if (w == 0) continue;
+        *below = fmin(*below, (w > 0 ? down : up) / fabs(w));
+        *above = fmin(*above, (w > 0 ? up : down) / fabs(w));
     }
 }
 
@@ -233,7 +235,8 @@ static enum imp_status compare(struct fresh *f, const struct motion *m, int64_t 
      */
     const double rounding =
         1e-6 * fmax(fabs(mine.value), fabs(fd.value)) + q.rounding + q.truncation;
-    row.error = row.se > 0        ? fmax(off - rounding, 0) / row.se
+    row.error = !isfinite(off)    ? INFINITY
+                : row.se > 0      ? fmax(off - rounding, 0) / row.se
                 : off <= rounding ? 0
                                   : INFINITY;
     const double size = fmax(fabs(mine.value), fabs(fd.value));
@@ -286,8 +289,12 @@ static enum imp_status check_param(struct fresh *f, size_t param)
     }
     if (count > 3) { /* one direction through all of them */
         struct imp_estimate g;
-        for (size_t e = 0; e < count; e++)
-            weight[e] = x_dot[base + e] = 0.5 + imp__u01(imp__key(9, 9, 9), (uint32_t)e);
+        for (size_t e = 0; e < count; e++) { /* each to the side where it has more room:
+                                                texels may be at both bounds */
+            const double w = 0.5 + imp__u01(imp__key(9, 9, 9), (uint32_t)e);
+            const bool down = old[e] - q->info.lo > q->info.hi - old[e];
+            weight[e] = x_dot[base + e] = down ? -w : w;
+        }
         IMP_TRY(slope(f, x_dot, &g));
         IMP_TRY(compare(f, &m, -1, linear, g));
     }

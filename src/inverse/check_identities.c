@@ -63,6 +63,24 @@ static bool any_chosen(const struct imp_scene *s, const uint8_t *chosen)
     return false;
 }
 
+/* Is a chosen parameter behind another input too (a texture that is light and paint)? */
+static bool used_otherwise(const struct imp_scene *s, const uint8_t *chosen,
+                           uint8_t *others)
+{
+    memset(others, 0, s->n_params);
+    for (int i = 0; i < s->n_emitters; i++)
+        for (int j = 0; j < s->emitters[i]->n_in; j++)
+            if (s->emitters[i]->ops->inputs[j].role != IMP_EMISSION)
+                mark(s, s->emitters[i]->input[j], others);
+    for (int i = 0; i < s->n_bsdfs; i++)
+        for (int j = 0; j < s->bsdfs[i]->n_own; j++)
+            if (s->bsdfs[i]->ops->inputs[j].role != IMP_EMISSION)
+                mark(s, s->bsdfs[i]->input[j], others);
+    for (size_t k = 0; k < s->n_params; k++)
+        if (chosen[k] && others[k]) return true;
+    return false;
+}
+
 /* Sum of theta dL/dtheta over the chosen parameters against n(walk) L, worst walk.
  * Numbers without a parameter (fixed inputs) make the identity fail, so `chosen` must be
  * complete. */
@@ -128,7 +146,9 @@ static enum imp_status check_emission(struct imp__kept *k, uint8_t *chosen)
         for (int j = 0; j < s->bsdfs[i]->n_own; j++)
             if (s->bsdfs[i]->ops->inputs[j].role == IMP_EMISSION)
                 mark(s, s->bsdfs[i]->input[j], chosen);
-    return any_chosen(s, chosen) ? euler(k, chosen, NULL, "all emission") : IMP_OK;
+    if (!any_chosen(s, chosen) || used_otherwise(s, chosen, chosen + s->n_params))
+        return IMP_OK; /* L is not of first degree then */
+    return euler(k, chosen, NULL, "all emission");
 }
 
 /* Stam's integrator collects light at the end only, so L is a product over the vertices.
@@ -157,7 +177,7 @@ enum imp_status imp__check_identities(struct imp__kept *k)
     enum imp_status st = IMP_OK;
     struct imp__check *c = k->check;
     uint8_t *chosen =
-        imp__alloc(c->ctx, imp_max(c->problem->scene->n_params, (size_t)1), 1);
+        imp__alloc(c->ctx, imp_max(2 * c->problem->scene->n_params, (size_t)1), 1);
 
     if (!chosen) return imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check");
     IMP_TRY(check_dot(k));

@@ -7,6 +7,7 @@
 #include "inverse_scenes.h"
 #include "scene/scene.h"
 #include <math.h>
+#include <stdbool.h>
 
 static imp_context *ctx;
 
@@ -103,6 +104,69 @@ static void planted(void)
     imp_scene_destroy(s);
 }
 
+/* A texture whose texels are at both bounds (a picture of black and white), which is also
+ * the light: every row has its number, and none is held against an identity that is not
+ * there. */
+static void black_and_white(void)
+{
+    static const float texels[4] = {0, 1, 1, 0};
+    imp_scene *s;
+    test_must(ctx, imp_scene_create(ctx, NULL, &s));
+    imp_scene_begin(s, "texture", "bitmap", "paint", NULL);
+    imp_scene_string(s, "filter_type", "nearest");
+    imp_scene_image(s, 2, 2, 1, texels);
+    imp_scene_end(s);
+    imp_scene_begin(s, "sensor", "orthographic", NULL, NULL);
+    const double behind[16] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 4, 0, 0, 0, 1};
+    imp_scene_transform(s, "to_world", behind);
+    imp_scene_begin(s, "film", "hdrfilm", NULL, NULL);
+    imp_scene_integer(s, "width", 8);
+    imp_scene_integer(s, "height", 8);
+    imp_scene_begin(s, "rfilter", "box", NULL, NULL);
+    imp_scene_end(s);
+    imp_scene_end(s);
+    imp_scene_end(s);
+    imp_scene_begin(s, "integrator", "path", NULL, NULL);
+    imp_scene_integer(s, "max_depth", 3);
+    imp_scene_end(s);
+    imp_scene_begin(s, "shape", "rectangle", NULL, NULL);
+    imp_scene_begin(s, "bsdf", "diffuse", NULL, NULL);
+    imp_scene_ref(s, "paint", "reflectance");
+    imp_scene_end(s);
+    imp_scene_end(s);
+    imp_scene_begin(s, "shape", "rectangle", NULL, NULL);
+    const double above[16] = {1, 0, 0, 0, 0, 0, -1, 1, 0, 1, 0, 1, 0, 0, 0, 1};
+    imp_scene_transform(s, "to_world", above);
+    imp_scene_begin(s, "emitter", "area", NULL, NULL);
+    imp_scene_ref(s, "paint", "radiance");
+    imp_scene_end(s);
+    imp_scene_end(s);
+    test_must(ctx, imp_scene_commit(s));
+
+    imp_problem *p = test_problem(ctx, s, "paint.*");
+    const struct imp_check_row *rows;
+    struct imp_check_options o = IMP_CHECK_OPTIONS_INIT;
+    struct imp_run run = IMP_RUN_INIT;
+    size_t n = 0;
+    bool fresh = false, identity = false;
+    int failed = 0;
+    o.paths = 100;
+    o.fresh_spp = 256;
+    test_must(ctx, imp_check(p, &o, &run, &rows, &n));
+    for (size_t i = 0; i < n; i++) {
+        failed += !rows[i].ok;
+        if (!strcmp(rows[i].method, "euler")) identity = true;
+        if (strcmp(rows[i].method, "fresh") != 0) continue;
+        fresh = true;
+        tap_ok(isfinite(rows[i].reference) && rows[i].reference != 0 && rows[i].ok == 1,
+               "black and white texels have a difference # %g against %g", rows[i].value,
+               rows[i].reference);
+    }
+    tap_ok(fresh && !identity && !failed, "a texture that is light and paint");
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+}
+
 static int stop(const struct imp_progress *p, void *payload)
 {
     (void)p, (void)payload;
@@ -150,6 +214,7 @@ int main(void)
     imp_problem_destroy(p);
     imp_scene_destroy(s);
     planted();
+    black_and_white();
     imp_context_destroy(ctx);
     return tap_done();
 }

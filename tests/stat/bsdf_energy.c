@@ -263,6 +263,15 @@ static void fresnel_numbers(void)
     imp_spec f;
     imp__fresnel_conductor(0.3, &zero, &one, &f);
     tap_near(f[0], 1, 1e-15, 0, "the default conductor is a perfect mirror");
+    double least = 1;
+    most = 0;
+    for (int i = 1; i <= 100000; i++) { /* where rounding decides the sign */
+        imp__fresnel_conductor(i * 1e-5, &one, &zero, &f);
+        least = fmin(least, f[0]);
+        most = fmax(most, f[0]);
+    }
+    tap_ok(least >= 0 && most < 1e-9, "the conductor that is not there # %g .. %g", least,
+           most);
     tap_ok(imp__conductor_find("Cu_palik") != imp__conductor_find("Cu") &&
                imp__conductor_find("TiO2_palik") == imp__conductor_find("TiO2") &&
                !imp__conductor_find("Ag_palik") && !imp__conductor_find("Na") &&

@@ -306,6 +306,10 @@ static void films(void)
            "every property of the film");
     f = film(n, IMP_MONO);
     tap_ok(f.pixel_format == IMP_PIXEL_LUMINANCE, "mono mode forces luminance");
+    n = node_new("film", "hdrfilm");
+    node_string(n, "pixel_format", "luminance_alpha");
+    f = film(n, IMP_MONO);
+    tap_ok(f.pixel_format == IMP_PIXEL_LUMINANCE_ALPHA, "and keeps its alpha");
     static const char *const others[] = {"rgbe", "pfm"};
     for (int k = 0; k < 2; k++) {
         n = node_new("film", "hdrfilm");

@@ -50,7 +50,7 @@ static double conductor(double c, double eta, double k, double *d_eta, double *d
     const double a = t < 0 ? ek * q : sqrt(0.5 * (A + t));
     const double P = A + c2, Q = 2 * a * c, U = A * c2 + s2 * s2, V = Q * s2;
     const double s_sum = P + Q, p_sum = U + V;
-    const double Rs = s_sum > 0 ? (P - Q) / s_sum : 1;
+    const double Rs = s_sum > 0 ? fmax(P - Q, 0) / s_sum : 1; /* eta = 1, k = 0: P = Q */
     const double ratio = p_sum > 0 ? (U - V) / p_sum : 1;
     if (d_eta) {
         const double dt[2] = {2 * eta, -2 * k};
