@@ -75,6 +75,14 @@ static void published(void)
           "list as one number: the mean");
     check(n, IMP_REFLECTANCE, true, IMP_MONO, (struct expected){1, {0.530730}}, 6e-7,
           "list as one number, mono: the luminance");
+    /* A line at 500 nm lies outside the gamut, on the far side of red. */
+    struct imp_node *line = node_make("");
+    list_add(line, 3, (double[]){495, 500, 505, 0, 1, 0});
+    double raw[3];
+    imp__spectrum_to_rgb(3, (double[]){495, 500, 505}, (double[]){0, 1, 0}, 0, raw);
+    check(line, IMP_EMISSION, false, IMP_RGB, (struct expected){3, {0, raw[1], raw[2]}},
+          1e-15, "a green line is clamped");
+    tap_ok(raw[0] < -1e-3 && raw[1] > 1e-3, "red of the line is negative # %g", raw[0]);
     struct imp_node *one = node_make("");
     list_add(one, 2, (double[]){300, 900, 1, 1});
     check(one, IMP_REFLECTANCE, false, IMP_RGB,

@@ -113,6 +113,12 @@ static void linear_algebra(void)
     tap_near(values[0], 1.082799485e-07, 1e-8, 0, "Hilbert 6: least eigenvalue");
     double singular[4] = {1, 2, 2, 4}, indefinite[4] = {1, 2, 2, 1},
            nan[4] = {NAN, 0, 0, 1};
+    /* Of rank 1, where rounding leaves the second pivot above 0. */
+    double rounded[4] = {0.1 * 0.1, 0.1 * 10.3, 0.1 * 10.3, 10.3 * 10.3};
+    tap_ok(rounded[3] - rounded[1] / sqrt(rounded[0]) * (rounded[1] / sqrt(rounded[0])) >
+                   0 &&
+               !imp__cholesky(2, rounded),
+           "what is left of a pivot is rounding");
     tap_ok(!imp__cholesky(2, singular) && !imp__cholesky(2, indefinite) &&
                !imp__cholesky(2, nan),
            "singular, indefinite and NaN matrices have no factor");
