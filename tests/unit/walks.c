@@ -279,9 +279,10 @@ static void seen_directly(void)
 
 /* ---- Pictures ------------------------------------------------------------------ */
 
-/* A pixel's mean and standard error, from its walks one by one: sum w v / sum w, and
- * sum w^2 (v - mean)^2 / (sum w)^2 times n/(n - 1), n = (sum w)^2 / sum w^2. A box of one
- * pixel is w = 1 for its own samples. */
+/* A pixel's mean and standard error, from its walks one by one: sum w v / sum w, and with
+ * e = w (v - mean), over the pixels that send m samples each (a stratum), the sum of
+ * m/(m - 1) [sum e^2 - (sum e)^2/m] / (sum w)^2. A box of one pixel is w = 1 for its own
+ * samples: the usual error of a mean. */
 static void pixels(const char *filter, double radius)
 {
     enum { SPP = 3, SIDE = 8 };
@@ -318,18 +319,25 @@ static void pixels(const char *filter, double radius)
         imp__arena_rewind(&t.arena, mark);
     }
     for (int p = 0; p < SIDE * SIDE; p++) {
-        double W = 0, W2 = 0, sum = 0, spread = 0;
-        for (int pass = 0; pass < 2; pass++)
-            for (int i = 0; i < SIDE * SIDE * SPP; i++) {
-                const double x = at[i][0] - (p % SIDE + 0.5);
-                const double y = at[i][1] - (p / SIDE + 0.5);
-                const double w = radius == 0.5 ? i / SPP == p
-                                               : fmax(0, 1 - fabs(x) / radius) *
-                                                     fmax(0, 1 - fabs(y) / radius);
-                if (pass == 0) W += w, W2 += w * w, sum += w * v[i];
-                else spread += w * w * (v[i] - sum / W) * (v[i] - sum / W);
+        double W = 0, sum = 0, variance = 0, w[SIDE * SIDE * SPP];
+        for (int i = 0; i < SIDE * SIDE * SPP; i++) {
+            const double x = at[i][0] - (p % SIDE + 0.5), y = at[i][1] - (p / SIDE + 0.5);
+            w[i] = radius == 0.5
+                       ? i / SPP == p
+                       : fmax(0, 1 - fabs(x) / radius) * fmax(0, 1 - fabs(y) / radius);
+            W += w[i];
+            sum += w[i] * v[i];
+        }
+        for (int q = 0; q < SIDE * SIDE; q++) {
+            double e = 0, e2 = 0;
+            for (int i = q * SPP; i < (q + 1) * SPP; i++) {
+                const double one = w[i] * (v[i] - sum / W);
+                e += one;
+                e2 += one * one;
             }
-        const double n = W * W / W2, se = sqrt(spread * n / (n - 1)) / W;
+            variance += (e2 - e * e / SPP) * SPP / (SPP - 1);
+        }
+        const double se = sqrt(variance) / W;
         mean_off = fmax(mean_off, relative(imp_film_mean(film)[3 * p + 1], sum / W));
         if (se > 1e-3) se_off = fmax(se_off, relative(imp_film_se(film)[3 * p + 1], se));
     }
