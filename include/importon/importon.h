@@ -136,8 +136,8 @@ enum imp_color_mode { IMP_RGB = 0, IMP_MONO = 1 };
 struct imp_load_options {
     size_t size;
     enum imp_color_mode mode;
-    const char *const
-        *defines; /**< [n_defines] "name=value", as -D on the command line */
+    /** [n_defines] "name=value", as -D on the command line. */
+    const char *const *defines;
     size_t n_defines;
     const char *const *search; /**< [n_search] folders searched for files */
     size_t n_search;
@@ -155,8 +155,9 @@ IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_load(imp_context *context, const char *path,
                const struct imp_load_options *options, imp_scene **out);
 
-/** The same from memory; `name` stands for the file in messages, files are searched for
- * in the working folder. */
+/** The same from memory: xml [length]; `name` stands for the file in messages, files are
+ * searched for in the working folder.
+ * @return as imp_scene_load. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_load_string(imp_context *context, const char *xml, size_t length,
                       const char *name, const struct imp_load_options *options,
@@ -172,7 +173,9 @@ imp_scene_create(imp_context *context, const struct imp_load_options *options,
                  imp_scene **out);
 IMP_API void imp_scene_destroy(imp_scene *scene);
 
-/** Open an object. `id` and `name` may be NULL; `name` is the slot under the parent. */
+/** Open an object, and close the one opened last. `id` and `name` may be NULL; `name` is
+ * the slot under the parent. The calls in between set properties of the open object, in
+ * the units of the file format (degrees, scene units). */
 IMP_API void imp_scene_begin(imp_scene *scene, const char *tag, const char *type,
                              const char *id, const char *name);
 IMP_API void imp_scene_end(imp_scene *scene);
@@ -200,21 +203,24 @@ IMP_API void imp_scene_mesh(imp_scene *scene, size_t n_vertices, size_t n_triang
  * pixels [height][width][channels], channels 1 or 3. */
 IMP_API void imp_scene_image(imp_scene *scene, int width, int height, int channels,
                              const float *pixels);
-/** Finish a scene built by calls: make all objects, check them, build what rays need. */
+/** Finish a scene built by calls: make all objects, check them, build what rays need.
+ * @return IMP_OK; the first error of the calls before; IMP_E_SCENE; IMP_E_UNSUPPORTED;
+ *         IMP_E_NOMEM; IMP_E_ARG if it has been committed already. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_scene_commit(imp_scene *scene);
 
 struct imp_scene_info {
     size_t size;
     int n_shapes, n_emitters, n_bsdfs, n_textures, n_sensors;
     int64_t n_triangles;
-    double bounds_min[3],
-        bounds_max[3]; /**< scene units; min > max if there is no shape */
+    /** Scene units; min > max if there is no shape. */
+    double bounds_min[3], bounds_max[3];
     enum imp_color_mode mode;
     int channels; /**< of pictures: 3 for rgb, 1 for mono */
     const char *integrator;
     int max_depth;       /**< -1: unlimited */
     size_t memory_bytes; /**< held by the scene, Embree's part included */
 };
+/** Set info->size first; strings belong to the scene. */
 IMP_API void imp_scene_get_info(const imp_scene *scene, struct imp_scene_info *info);
 
 struct imp_sensor_info {
@@ -226,7 +232,8 @@ struct imp_sensor_info {
     double filter_radius;
     const char *file_format; /**< "openexr", "rgbe" or "pfm" */
 };
-/** @return IMP_OK; IMP_E_ARG if there is no such sensor. */
+/** Set info->size first; strings belong to the scene.
+ * @return IMP_OK; IMP_E_ARG if there is no such sensor. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_get_sensor(const imp_scene *scene, int sensor, struct imp_sensor_info *info);
 
@@ -255,18 +262,23 @@ struct imp_param_info {
 /** Number of parameters, and of numbers in all of them together. */
 IMP_API size_t imp_scene_n_params(const imp_scene *scene);
 IMP_API size_t imp_scene_n_theta(const imp_scene *scene);
+/** Strings belong to the scene. @return IMP_OK; IMP_E_ARG if there is no such parameter.
+ */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_get_param(const imp_scene *scene, size_t index, struct imp_param_info *info);
-/** Find by name. @return IMP_OK; IMP_E_ARG with a message that names the nearest ones. */
+/** Find by name; a final ".value" may be left out, and names of parents may stand in
+ * front. @return IMP_OK; IMP_E_ARG with a message that names the nearest ones. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_find_param(const imp_scene *scene, const char *name, size_t *index);
-/** theta [imp_scene_n_theta]. */
+/** theta [imp_scene_n_theta], in the units of imp_param_info; written, and read. */
 IMP_API void imp_scene_get_theta(const imp_scene *scene, double *theta);
 /** @return IMP_OK; IMP_E_ARG if a value is not finite or outside its bounds: nothing is
  * set. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_scene_set_theta(imp_scene *scene,
                                                            const double *theta);
-/** One parameter: values [info.count], or n == 1 to set all of them to one value. */
+/** One parameter: values [info.count], or n == 1 to set all of them to one value.
+ * @return IMP_OK; IMP_E_ARG if there is no such parameter, for another n, or a value
+ *         outside its bounds: nothing is set. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_set_values(imp_scene *scene, size_t index, size_t n, const double *values);
 IMP_API IMP_MUST_CHECK enum imp_status imp_scene_get_values(const imp_scene *scene,
@@ -284,17 +296,19 @@ struct imp_film_info {
     uint64_t dropped; /**< walks dropped because a value was not finite or negative */
 };
 
-/** An empty picture to fill by hand, zeros. `names` is "R,G,B", "Y", "albedo.R,..." . */
+/** An empty picture to fill by hand, zeros. `names` is "R,G,B", "Y", "albedo.R,..." .
+ * @return IMP_OK; IMP_E_ARG for a size below 1, or names that are empty or there twice;
+ *         IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_film_create(imp_context *context, int width,
                                                        int height, const char *names,
                                                        imp_film **out);
 IMP_API void imp_film_destroy(imp_film *film);
 IMP_API void imp_film_get_info(const imp_film *film, struct imp_film_info *info);
-/** Name of a channel as in EXR files. */
+/** Name of a channel as in EXR files; belongs to the film. NULL if there is none. */
 IMP_API const char *imp_film_channel(const imp_film *film, int channel);
-/** [height][width][channels], linear. */
+/** [height][width][channels], linear; belongs to the film, and may be written to. */
 IMP_API float *imp_film_mean(imp_film *film);
-/** One standard error of each mean; NULL if there are none. */
+/** One standard error of each mean, in the same order; NULL if there are none. */
 IMP_API float *imp_film_se(imp_film *film);
 /** Attach a text attribute (provenance); it is written to EXR files. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_film_set_text(imp_film *film, const char *key,
@@ -314,12 +328,16 @@ struct imp_write_options {
     }
 
 /** Write by extension: .exr, .pfm, .hdr, .png (sRGB), .npy. The file appears whole or not
- * at all. */
+ * at all. options may be NULL.
+ * @return IMP_OK; IMP_E_ARG for an extension or channels that do not go together;
+ *         IMP_E_IO; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_film_write(const imp_film *film, const char *path,
                const struct imp_write_options *options);
 /** Read .exr, .pfm, .hdr, .npy, .png or .jpg (8- and 16-bit files are taken to be sRGB
- * and made linear). */
+ * and made linear). The caller destroys the film.
+ * @return IMP_OK; IMP_E_IO; IMP_E_SCENE if it is not such a file, or damaged;
+ *         IMP_E_UNSUPPORTED; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_film_read(imp_context *context,
                                                      const char *path, imp_film **out);
 
@@ -337,9 +355,9 @@ struct imp_run {
     int sensor; /**< index; default 0 */
     int spp;    /**< samples per pixel; 0: what the scene asks for */
     uint64_t seed;
-    double
-        time_limit_s;   /**< pictures: 0: none; else samples are taken until then (every
-                             pixel gets at least one pass), at most spp if that is given */
+    /** Of pictures, 0: none; else samples are taken until then (every pixel gets at least
+     * one pass), at most spp if that is given. */
+    double time_limit_s;
     double drop_budget; /**< fraction of walks that may be dropped; 0: 1e-4 */
     imp_progress_fn progress;
     void *progress_payload;
@@ -356,7 +374,11 @@ struct imp_run {
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_render(const imp_scene *scene, const struct imp_run *run, imp_film **out);
 
-/** One walk, vertex by vertex, as text (json 0) or JSON. Caller frees with imp_free. */
+/** One walk, vertex by vertex, as text (json 0) or JSON: sample number `sample` of pixel
+ * (x, y) of the picture, the same walk that renders and gradients of run->seed use. The
+ * caller frees *text with imp_free.
+ * @return IMP_OK; IMP_E_ARG for a pixel outside the picture; IMP_E_SCENE if the
+ * integrator makes no walks; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_walk_describe(const imp_scene *scene,
                                                          const struct imp_run *run, int x,
                                                          int y, int64_t sample, int json,
@@ -367,14 +389,15 @@ IMP_API void imp_free(imp_context *context, void *memory);
 
 typedef struct imp_problem imp_problem;
 
-/** A number with one standard error. `bias` is 0: none, 1: O(1/N), 2: O(1/N^2). */
+/** A number with one standard error. */
 struct imp_estimate {
     double value, se;
-    int bias_order;
+    int bias_order; /**< 0: no bias; 1: O(1/N), 2: O(1/N^2) in the samples per pixel */
 };
 
 /** Nothing is active until imp_problem_activate. The scene must outlive the problem, and
- * is changed by calls that take x. */
+ * is changed by calls that take x.
+ * @return IMP_OK; IMP_E_ARG if the scene is not committed; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_create(imp_scene *scene,
                                                           imp_problem **out);
 IMP_API void imp_problem_destroy(imp_problem *problem);
@@ -425,12 +448,16 @@ struct imp_target {
     {                                                                                    \
         sizeof(struct imp_target), 0, 0, 0, 0, 0, 0, IMP_LOSS_L2, 0, 0, 0                \
     }
+/** The target's arrays are copied.
+ * @return IMP_OK; IMP_E_ARG if sizes differ from the sensor's, a number is not finite, or
+ *         all weights are 0; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_problem_add_target(imp_problem *problem, const struct imp_target *target);
 
 /** 1/2 weight |x - x0|^2 over the active numbers that match `glob` (Tikhonov, the term
  * 1/2 eps |theta|^2 of Stam's Eq. 10); x0 is 0, or the values at this call if
- * `from_here`. */
+ * `from_here`. @return IMP_OK; IMP_E_ARG if nothing matches or the weight is negative;
+ * IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_add_tikhonov(imp_problem *problem,
                                                                 const char *glob,
                                                                 double weight,
@@ -449,8 +476,12 @@ imp_problem_add_smoothness(imp_problem *problem, const char *glob, double weight
  *
  * @param x         [imp_problem_n]; NULL: the scene's values.
  * @param run       run->sensor is ignored; NULL for defaults.
- * @param[out] gradient    [n]; NULL: value only.
+ * @param[out] objective   may be NULL.
+ * @param[out] gradient    [n], objective per unit of x; NULL: value only.
  * @param[out] gradient_se [n], one standard error; may be NULL.
+ * @return IMP_OK; IMP_E_ARG without a target, or for an x outside its bounds;
+ *         IMP_CANCELLED and IMP_E_PATHS, with nothing written; IMP_E_BIAS where the
+ *         integrator's gradient would have one; IMP_E_NOMEM.
  */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_problem_objective(imp_problem *problem, const double *x, const struct imp_run *run,
@@ -461,18 +492,24 @@ imp_problem_objective(imp_problem *problem, const double *x, const struct imp_ru
  * imp_problem_set_run; equal seeds make common random numbers. Failure gives HUGE_VAL. */
 IMP_API double imp_problem_nlopt(unsigned n, const double *x, double *gradient,
                                  void *problem);
+/** Copied; NULL: the defaults. */
 IMP_API void imp_problem_set_run(imp_problem *problem, const struct imp_run *run);
 
 /**
  * Reverse derivative: gradient = J^T seed, J = d pixel / d x, for a given adjoint image.
  * @param seed_image [height][width][channels] of run->sensor. It must come from other
  * random numbers than `run`: an adjoint made from the same walks is correlated with J.
+ * @param[out] gradient    [n], as imp_problem_objective's.
+ * @param[out] gradient_se [n], one standard error; may be NULL.
+ * @return as imp_problem_objective.
  */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_problem_reverse(imp_problem *problem, const float *seed_image,
                     const struct imp_run *run, double *gradient, double *gradient_se);
 
-/** Forward derivative: the picture J x_dot, with standard errors. x_dot [n]. */
+/** Forward derivative: the picture J x_dot in the scene's channels, with standard errors.
+ * x_dot [n], in units of x. The caller destroys the film. @return as imp_render;
+ * IMP_E_BIAS. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_forward(imp_problem *problem,
                                                            const double *x_dot,
                                                            const struct imp_run *run,
@@ -481,7 +518,7 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_problem_forward(imp_problem *problem,
 /** One picture dI/dx_i for every active number, from one set of walks: films [n], each to
  * be destroyed by the caller. n is limited to 256. primal, the picture itself in the
  * scene's channels whatever the film's pixel format, may be NULL; with nothing active and
- * films NULL it is all that is made. */
+ * films NULL it is all that is made. @return as imp_problem_forward. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_jacobian(imp_problem *problem,
                                                             const struct imp_run *run,
                                                             imp_film **primal,
@@ -541,8 +578,12 @@ struct imp_fit_result {
 };
 
 /** Fit the active parameters to the targets; the scene ends at the best estimate.
- * @return IMP_OK; IMP_CANCELLED (state reached is set, the checkpoint is written); ...
- * The result belongs to the problem and lives until its next fit. */
+ * options and run may be NULL. The result belongs to the problem and lives until its next
+ * fit.
+ * @return IMP_OK; IMP_CANCELLED (the state reached is set, the checkpoint is written);
+ *         IMP_E_ARG if nothing is active, there is no target, an option is out of its
+ *         range or the checkpoint is another fit's; IMP_E_NUMERIC; and what
+ *         imp_problem_objective returns. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_fit(imp_problem *problem,
                                                const struct imp_fit_options *options,
                                                const struct imp_run *run,
@@ -558,7 +599,7 @@ struct imp_check_row {
     double value, reference, se; /**< se of the difference; 0: deterministic */
     double error;                /**< relative error, or |z| where se > 0 */
     double limit; /**< of error; 0: a row for information (a step that is not the best) */
-    int ok;
+    int ok;       /**< 1: they agree; 0: they do not; -1: too noisy to tell */
     int kinks; /**< frozen walks that stand on a kink, and agree with one of its sides */
 };
 struct imp_check_options {
@@ -580,18 +621,19 @@ imp_check(imp_problem *problem, const struct imp_check_options *options,
 
 struct imp_compare_result {
     size_t size;
-    double rmse, relative_rmse, max_abs;
-    double mean_a, mean_b;
-    double
-        p_fail_fraction; /**< pixels whose z-test fails at 1 % over the whole picture */
-    double mean_z;       /**< |z| of the picture's mean, worst channel */
-    double over2;        /**< fraction of pixels with |z| > 2; 0.0455 expected */
-    int has_z, agree;
+    double rmse, relative_rmse,
+        max_abs;           /**< of all channels; relative to the reference */
+    double mean_a, mean_b; /**< of test and reference */
+    /** Fraction of pixels whose z-test fails at 1 % over the whole picture. */
+    double p_fail_fraction;
+    double mean_z; /**< |z| of the picture's mean, worst channel */
+    double over2;  /**< fraction of pixels with |z| > 2; 0.0455 expected */
+    int has_z;     /**< standard errors or a variance are there: z means something */
+    int agree;     /**< by z where it is there, else by relative_rmse */
 };
 struct imp_compare_options {
     size_t size;
-    const imp_film
-        *variance; /**< per-sample variance of `reference`; NULL: use the films' se */
+    const imp_film *variance; /**< per sample, of `reference`; NULL: use the films' se */
     double n_test, n_reference; /**< samples per pixel; 0: unknown / exact */
     double floor; /**< of the variance; 0: 1e-4 * squared mean of the channel */
     int xyz;      /**< compare X, Y, Z: pictures and variance are made to them from
@@ -602,6 +644,11 @@ struct imp_compare_options {
     {                                                                                    \
         sizeof(struct imp_compare_options), 0, 0, 0, 0, 0                                \
     }
+/** Do two pictures of one size show the same, within their noise? Every channel of
+ * `reference` is looked for in `test` by name, else by place. options may be NULL;
+ * neither picture is changed.
+ * @return IMP_OK also where they differ: look at `agree`; IMP_E_ARG if sizes or channels
+ *         do not go together; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_compare(imp_context *context, imp_film *test, imp_film *reference,
             const struct imp_compare_options *options, struct imp_compare_result *result);
