@@ -16,6 +16,12 @@ stam=(-m mono scenes/stam.xml)
 
 say() { echo "$(date +%T) $*" >&2; }
 
+say "Figure 5: one path, and many"
+"$importon" render "${stam[@]}" --pixel 16,16 --sample 39 --json >"$out/path.jsonl"
+"$importon" render "${stam[@]}" --paths "$out/paths.jsonl" --count 40 -q
+docs/draw_paths.py "$out/path.jsonl" docs/images/stam_path.svg --sphere 0,0,0,.5
+docs/draw_paths.py "$out/paths.jsonl" docs/images/stam_paths.svg --sphere 0,0,0,.5
+
 say "Figure 6: adjoint against differences"
 "$importon" check "${stam[@]}" --fresh-spp 1024 --json -q >"$out/check.json" || true
 

@@ -57,20 +57,21 @@ static void near_z(double value, double se, double ref, double relative_se,
     "value='8'/>"                                                                        \
     "<rfilter type='box'/></film></sensor>"
 
-/* Inside a glowing sphere: I_d = e (1 - rho^d)/(1 - rho) (gradients.md 9.1). */
-static void furnace(double rho, int depth, int rr_depth, bool stam)
+/* Inside a glowing sphere: I_d = e (1 - rho^d)/(1 - rho) (gradients.md 9.1). `stam` is
+ * the absorption of Stam's walk, which no mean depends on; 0: the path tracer. */
+static void furnace(double rho, int depth, int rr_depth, double stam)
 {
     char xml[2048], what[200];
     const double e = 0.2;
-    if (stam)
+    if (stam > 0)
         snprintf(
             xml, sizeof xml,
             "<scene version='3.0.0'><integrator type='stam'><integer name='max_depth' "
             "value='%d'/></integrator>" SENSOR "<bsdf type='stam_m3' id='wall'>"
             "<float name='ambient' value='%g'/><float name='diffuse' value='%g'/>"
-            "<float name='absorb' value='.4'/></bsdf><shape type='sphere'>"
+            "<float name='absorb' value='%g'/></bsdf><shape type='sphere'>"
             "<boolean name='flip_normals' value='true'/><ref id='wall'/></shape></scene>",
-            depth, "0,0,.3", e, rho);
+            depth, "0,0,.3", e, rho, stam);
     else
         snprintf(
             xml, sizeof xml,
@@ -85,14 +86,15 @@ static void furnace(double rho, int depth, int rr_depth, bool stam)
     imp_problem *p = test_problem(ctx, scene, "*");
     const struct result r = measure(scene, p, 2000, 5);
     const size_t i_rho =
-        test_variable(p, scene, ctx, stam ? "wall.diffuse" : "wall.reflectance");
+        test_variable(p, scene, ctx, stam > 0 ? "wall.diffuse" : "wall.reflectance");
     const size_t i_e =
-        test_variable(p, scene, ctx, stam ? "wall.ambient" : "glow.radiance");
+        test_variable(p, scene, ctx, stam > 0 ? "wall.ambient" : "glow.radiance");
     const double d = depth, n = depth < 0 ? 0 : pow(rho, d);
     const double I = e * (1 - n) / (1 - rho);
     const double dn = depth < 0 || depth == 0 ? 0 : d * pow(rho, d - 1);
     const double dI = e * (1 - n - dn * (1 - rho)) / ((1 - rho) * (1 - rho));
-    const char *name = stam ? "Stam's walk" : "path";
+    char name[64] = "path";
+    if (stam > 0) snprintf(name, sizeof name, "Stam's walk, absorb %g", stam);
     snprintf(what, sizeof what, "furnace, %s, rho %g, depth %d, rr %d: I", name, rho,
              depth, rr_depth);
     near_z(r.mean, r.se, I, .01, what);
@@ -157,17 +159,19 @@ int main(void)
 {
     ctx = test_context(0);
     for (int depth = 1; depth <= 4; depth *= 2) {
-        furnace(.5, depth, 5, false);
-        furnace(.5, depth, 5, true);
+        furnace(.5, depth, 5, 0);
+        furnace(.5, depth, 5, .4);
     }
-    furnace(.8, -1, 5, false);
-    furnace(.8, -1, 1, false);
-    furnace(.8, 64, 1000, false);
-    furnace(.5, 40, 1, true);
+    furnace(.8, -1, 5, 0);
+    furnace(.8, -1, 1, 0);
+    furnace(.8, 64, 1000, 0);
+    furnace(.5, 40, 1, .4);
+    furnace(.5, 40, 1, .15);
+    furnace(.5, 40, 1, .65);
 
     /* Exactly zero, in the furnace and behind another zero. */
-    furnace(0, 2, 5, false);
-    furnace(0, 6, 1, false);
+    furnace(0, 2, 5, 0);
+    furnace(0, 6, 1, 0);
     one("black wall under the sky",
         SKY "<bsdf type='diffuse' id='wall'><float name='reflectance' "
             "value='0'/></bsdf>" WALL "<ref id='wall'/></shape>",
