@@ -3,23 +3,32 @@
 #include "color/rgb.h"
 #include "math/vec.h"
 
-void imp__luminance_scatter(struct imp_sink *sink, int param, size_t element,
-                            imp_spec bar)
+static void weighted_scatter(struct imp_sink *sink, int param, size_t element,
+                             imp_spec bar, const double weight[3])
 {
-    const double weight[3] = {IMP_LUM_R, IMP_LUM_G, IMP_LUM_B};
     for (size_t c = 0; c < 3; c++) {
         const imp_spec part = bar * weight[c];
         sink->add(sink, param, element + c, 1, &part);
     }
 }
 
+void imp__luminance_scatter(struct imp_sink *sink, int param, size_t element,
+                            imp_spec bar)
+{
+    static const double weight[3] = {IMP_LUM_R, IMP_LUM_G, IMP_LUM_B};
+    weighted_scatter(sink, param, element, bar, weight);
+}
+
+/* A constant colour read as one number is the mean of its three, as in Mitsuba. */
+static const double third[3] = {1.0 / 3, 1.0 / 3, 1.0 / 3};
+static imp_spec mean(double r, double g, double b) { return imp__spec((r + g + b) / 3); }
+
 void imp__input_eval(const struct imp_input *input, bool scalar,
                      const struct imp_texcoord *at, imp_spec *value)
 {
     if (input->texture) input->texture->ops->eval(input->texture, at, scalar, value);
     else if (scalar && input->count == 3)
-        *value =
-            imp__spec(imp__luminance(input->value[0], input->value[1], input->value[2]));
+        *value = mean(input->value[0], input->value[1], input->value[2]);
     else *value = input->value;
 }
 
@@ -31,7 +40,7 @@ void imp__input_scatter(const struct imp_input *input, bool scalar,
         input->texture->ops->scatter(input->texture, at, scalar, bar, sink);
     else if (input->param < 0) return;
     else if (scalar && input->count == 3)
-        imp__luminance_scatter(sink, input->param, 0, *bar);
+        weighted_scatter(sink, input->param, 0, *bar, third);
     else sink->add(sink, input->param, 0, input->count == 3 ? 3 : 1, bar);
 }
 
@@ -48,7 +57,7 @@ void imp__input_tangent(const struct imp_input *input, bool scalar,
     } else {
         const double r = dot(x_dot, input->param, 0), g = dot(x_dot, input->param, 1),
                      b = dot(x_dot, input->param, 2);
-        *value_dot = scalar ? imp__spec(imp__luminance(r, g, b)) : (imp_spec){r, g, b, 0};
+        *value_dot = scalar ? mean(r, g, b) : (imp_spec){r, g, b, 0};
     }
 }
 
