@@ -198,7 +198,7 @@ static int check(void)
                    r->param, r->step, r->value, r->reference, r->error, r->limit,
                    r->limit <= 0 ? ""
                    : r->ok       ? "ok"
-                                 : "FAILS");
+                                 : "FAILED");
         }
     }
     if (cli.json) {

@@ -299,6 +299,7 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
     const char *reason = "nothing was done";
     int iterations = 0, first = 0;
     double start = 0, value = 0;
+    uint64_t traced = 0;
     bool found = false;
 
     if (f.levels > IMP_BEND_LEVELS_MAX)
@@ -322,7 +323,17 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
     if (!found) {
         f.level = 0;
         IMP_TRY(level_begin(&f));
-        IMP_TRY(imp_bend_objective(b, &start, NULL, NULL, NULL));
+        IMP_TRY(imp_bend_objective(b, &start, NULL, NULL, &f.stats));
+        if (f.stats.traced == 0)
+            IMP_TRY(imp__error(
+                b->ctx, IMP_E_NUMERIC,
+                "none of %llu rays comes to its end: %llu start outside "
+                "the field, %llu leave it without an exit, %llu take more "
+                "than max_steps, %llu graze, %llu are broken",
+                (unsigned long long)f.stats.rays, (unsigned long long)f.stats.started_out,
+                (unsigned long long)f.stats.missed, (unsigned long long)f.stats.truncated,
+                (unsigned long long)f.stats.grazing, (unsigned long long)f.stats.broken));
+        traced = f.stats.traced;
     }
     for (int level = first; level < f.levels && st == IMP_OK; level++) {
         f.level = level;
@@ -337,6 +348,13 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
     }
     const enum imp_status ended = st;
     IMP_TRY(imp_bend_objective(b, &value, NULL, NULL, &f.stats));
+    /* What is not counted cannot be bad: a fit may lower a mean by losing rays. */
+    if ((double)f.stats.traced < (double)traced - 0.01 * (double)f.stats.rays)
+        imp__warn(
+            b->ctx,
+            "%llu rays that came to their ends at the start of the fit are lost now: "
+            "the objective does not count them",
+            (unsigned long long)(traced - f.stats.traced));
     f.best_value = value;
     f.done_iterations = f.opt.max_iterations;
     report(&f, true);

@@ -101,7 +101,7 @@ enum imp_status imp__profile_read(imp_context *ctx, const char *path,
     if (word_is(&t, "radial")) st = radial_read(ctx, path, &t, &count, &f);
     else if (word_is(&t, "rz")) st = rz_read(ctx, path, &t, &count, &f);
     else st = imp__error(ctx, IMP_E_SCENE, "%s: a profile is radial or rz", path);
-    if (st == IMP_E_ARG) st = imp__error_prefix(ctx, IMP_E_SCENE, "%s: ", path);
+    if (st == IMP_E_ARG) st = imp__error_prefix(ctx, IMP_E_SCENE, "%s", path);
     if (st != IMP_OK) goto out;
     c = imp__alloc(ctx, f->n_theta, sizeof *c);
     if (!c) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "%s: no memory", path));

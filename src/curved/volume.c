@@ -49,7 +49,7 @@ static enum imp_status grid_make(imp_context *ctx, const char *path,
     st = imp_field_grid_create(ctx, &g, 1, &f);
     if (st == IMP_OK) st = imp_field_set_samples(f, samples);
     if (st != IMP_OK) {
-        st = imp__error_prefix(ctx, st == IMP_E_ARG ? IMP_E_SCENE : st, "%s: ", path);
+        st = imp__error_prefix(ctx, st == IMP_E_ARG ? IMP_E_SCENE : st, "%s", path);
         goto out;
     }
     *out = f;

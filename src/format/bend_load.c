@@ -120,6 +120,30 @@ static enum imp_status target_of_all(struct bend_loader *l, struct imp_node *nod
     return bend_target(l, node, &world, -1);
 }
 
+/* An index below its bound (1 if nothing is said) is often a mistake, of a file's scale
+ * say, and a fit would begin with correcting it. A few coefficients of a spline may be
+ * below what its values never are. */
+static enum imp_status bounds_look(struct bend_loader *l, const struct imp_node *medium)
+{
+    const size_t n = l->bend->field->n_theta;
+    double *theta = imp__alloc(l->ctx, 3 * n + 1, sizeof *theta);
+    size_t beyond = 0;
+    if (!theta) return imp__error(l->ctx, IMP_E_NOMEM, "no memory for bounds");
+    double *lo = theta + n, *hi = lo + n;
+    imp_field_get_theta(l->bend->field, theta);
+    imp__bend_bounds(l->bend, lo, hi);
+    for (size_t i = 0; i < n; i++)
+        beyond += theta[i] < lo[i] - 1e-9 || theta[i] > hi[i] + 1e-9;
+    if (beyond > n / 20)
+        imp__warn(
+            l->ctx,
+            "%s:%d:%d: medium (graded): %zu of %zu numbers of the index are outside "
+            "index_min .. index_max (1 .. infinity if nothing is said)",
+            medium->loc.file, medium->loc.line, medium->loc.column, beyond, n);
+    imp__release(l->ctx, theta);
+    return IMP_OK;
+}
+
 static enum imp_status build(struct bend_loader *l)
 {
     enum imp_status st = IMP_OK;
@@ -159,6 +183,7 @@ static enum imp_status build(struct bend_loader *l)
         IMP_TRY(imp__props_finish(l->ctx, l->nodes[b]));
     IMP_TRY(imp__props_finish(l->ctx, medium));
     IMP_TRY(imp__props_finish(l->ctx, root));
+    IMP_TRY(bounds_look(l, medium));
 out:
     return st;
 }

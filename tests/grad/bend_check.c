@@ -1,0 +1,168 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * imp_bend_check fails where a derivative is wrong, and only there: not where the
+ * objective is at its least, not because samples are floats, not because a ray runs along
+ * the faces of cells. And what a fit says of rays that it cannot see. */
+#include "bend_kit.h"
+#include "curved/bend.h"
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+static char said[400];
+static void hear(enum imp_log_level level, const char *text, void *payload)
+{
+    (void)level, (void)payload;
+    snprintf(said, sizeof said, "%s", text);
+}
+
+#define PROBLEM(start, scheme, volume, more, target)                                     \
+    "<scene version='3.0.0'><medium type='graded'><float name='step' value='0.05'/>"     \
+    "<string name='scheme' value='" scheme "'/>" volume more                             \
+    "<surface type='plane'><float name='offset' value='0.9'/></surface></medium>"        \
+    "<rays type='beam'><integer name='count' value='40'/><float name='radius' "          \
+    "value='0.5'/><float name='start' value='" start "'/></rays>" target "</scene>"
+#define GRID(index, more)                                                                \
+    "<volume type='grid'><integer name='cells' value='6'/><float name='index' "          \
+    "value='" index "'/>" more "</volume>"
+#define WORD(name, value) "<string name='" name "' value='" value "'/>"
+#define FOCUS             "<target type='focus'><point name='point' value='0,0,0.9'/></target>"
+#define SPOT              "<target type='spot'/>"
+#define WAVEFRONT         "<target type='wavefront'/>"
+#define PLUME                                                                            \
+    "<volume type='plume'><float name='n0' value='1.2'/><float name='b' value='0.2'/>"   \
+    "<float name='width' value='0.5'/></volume>"
+#define SINGLE "<boolean name='single' value='true'/>"
+
+static imp_bend *load(const char *xml)
+{
+    imp_bend *b;
+    said[0] = 0;
+    KIT_CHECK(imp_bend_load_string(kit_ctx, xml, strlen(xml), "p", NULL, &b));
+    return b;
+}
+
+static int failures(imp_bend *b, const char *method)
+{
+    const struct imp_check_row *rows;
+    size_t n;
+    int failed = 0;
+    KIT_CHECK(imp_bend_check(b, &rows, &n));
+    for (size_t i = 0; i < n; i++) {
+        if (rows[i].ok || (method && strcmp(rows[i].method, method))) continue;
+        failed++;
+        if (!method)
+            printf("# %s step %g: %.9g against %.9g, error %.2g, limit %.2g\n",
+                   rows[i].method, rows[i].step, rows[i].value, rows[i].reference,
+                   rows[i].error, rows[i].limit);
+    }
+    return failed;
+}
+
+static const struct {
+    const char *name, *xml;
+} problems[] = {
+    {"spline", PROBLEM("-0.6", "leapfrog", GRID("1.3", ""), "", FOCUS)},
+    {"spline, at the least", PROBLEM("-0.6", "verlet", GRID("1.3", ""), "", WAVEFRONT)},
+    {"constant, at the least",
+     PROBLEM("-0.6", "leapfrog",
+             "<volume type='constant'><float name='n0' value='1.5'/></volume>", "",
+             WAVEFRONT)},
+    {"floats", PROBLEM("-0.6", "leapfrog", GRID("1.3", SINGLE), "", SPOT)},
+    {"floats, yoshida4", PROBLEM("-0.6", "yoshida4", GRID("1.3", SINGLE), "", FOCUS)},
+    {"floats of eta^2/2",
+     PROBLEM("-0.6", "arc", GRID("1.3", SINGLE WORD("parameter", "eta2")), "", FOCUS)},
+    {"trilinear, a ray on a face",
+     PROBLEM("-0.6", "euler", GRID("1.3", WORD("interpolation", "trilinear")), "", SPOT)},
+    {"trilinear floats",
+     PROBLEM("-0.6", "leapfrog", GRID("1.3", SINGLE WORD("interpolation", "trilinear")),
+             "", FOCUS)},
+    {"plume", PROBLEM("-0.6", "leapfrog", PLUME, "", FOCUS)},
+    {"sech", PROBLEM("-0.6", "yoshida4",
+                     "<volume type='sech'><float name='n0' value='1.5'/><float name='g' "
+                     "value='0.5'/></volume>",
+                     "", SPOT)}};
+
+/* The same with gradients off by a thousandth. */
+static const struct imp__field_ops *right;
+static void wrong_splat(const imp_field *f, const imp_v3 *x, double a, const imp_v3 *b,
+                        struct imp__bar *bar)
+{
+    const imp_v3 c = *b * 1.001;
+    right->splat(f, x, 1.001 * a, &c, bar);
+}
+
+static void verdicts(void)
+{
+    for (size_t i = 0; i < imp_count(problems); i++) {
+        imp_bend *b = load(problems[i].xml);
+        const int failed = failures(b, NULL);
+        const bool least = strstr(problems[i].name, "least") != NULL;
+        struct imp__field_ops wrong = *b->field->ops;
+        double *theta = malloc(b->field->n_theta * sizeof *theta),
+               *after = malloc(b->field->n_theta * sizeof *after);
+        imp_field_get_theta(b->field, theta);
+        right = b->field->ops;
+        wrong.splat = wrong_splat;
+        wrong.kick_back = NULL;
+        b->field->ops = &wrong;
+        const int caught = failures(b, "difference");
+        b->field->ops = right;
+        imp_field_get_theta(b->field, after);
+        tap_ok(failed == 0 && (least || caught > 0) &&
+                   !memcmp(theta, after, b->field->n_theta * sizeof *theta),
+               "%s # %d rows fail; 0.1 %% off: %d", problems[i].name, failed, caught);
+        free(theta), free(after);
+        imp_bend_destroy(b);
+    }
+}
+
+static void lost(void)
+{
+    struct imp_bend_fit_options o = IMP_BEND_FIT_OPTIONS_INIT;
+    struct imp_bend_fit_result r;
+    o.iterations[0] = 3;
+    imp_bend *b = load(PROBLEM("-1.6", "leapfrog", GRID("1.3", ""), "", FOCUS));
+    const enum imp_status st = imp_bend_fit(b, &o, &r);
+    tap_ok(st == IMP_E_NUMERIC && strstr(imp_last_error(kit_ctx), "40 start outside"),
+           "a fit of no rays is refused # %s", imp_last_error(kit_ctx));
+    imp_bend_destroy(b);
+
+    /* To go sideways is to leave the field without an exit. */
+    b = load(PROBLEM(
+        "-0.6", "leapfrog", GRID("1.3", ""), "",
+        "<target type='direction'><vector name='point' value='1,0,0'/></target>"));
+    o.scale = 1;
+    o.iterations[0] = 20;
+    KIT_CHECK(imp_bend_fit(b, &o, &r));
+    const bool fewer = r.stats.traced < r.stats.rays;
+    tap_ok(fewer == (strstr(said, "are lost now") != NULL) && fewer,
+           "rays that a fit loses are spoken of # %llu of %llu left; %s",
+           (unsigned long long)r.stats.traced, (unsigned long long)r.stats.rays, said);
+    imp_bend_destroy(b);
+}
+
+static void bounds(void)
+{
+    imp_bend *b = load(PROBLEM("-0.6", "leapfrog", GRID("0.5", ""), "", FOCUS));
+    tap_ok(strstr(said, "p:1:") && strstr(said, "729 of 729"), "index below 1 # %s",
+           said);
+    imp_bend_destroy(b);
+    b = load(PROBLEM("-0.6", "leapfrog", GRID("0.5", ""),
+                     "<float name='index_min' value='0.4'/>", FOCUS));
+    tap_ok(!said[0], "and nothing is said where index_min allows it # %s", said);
+    imp_bend_destroy(b);
+}
+
+int main(void)
+{
+    struct imp_context_options o = IMP_CONTEXT_OPTIONS_INIT;
+    o.threads = 2;
+    o.log = hear;
+    if (imp_context_create(&o, &kit_ctx) != IMP_OK) return 1;
+    verdicts();
+    lost();
+    bounds();
+    imp_context_destroy(kit_ctx);
+    return tap_done();
+}
