@@ -179,6 +179,10 @@ static enum imp_status target_check(const imp_bend *b, const struct imp_bend_tar
         return imp__error(b->ctx, IMP_E_ARG,
                           "image target: no picture, %d x %d, or no extent", t->width,
                           t->height);
+    const imp_v3 u = imp__v3_load(t->u), v = imp__v3_load(t->v);
+    if (image && !(fabs(imp__dot(u, v)) <= 1e-6 * imp__length(u) * imp__length(v)))
+        return imp__error(b->ctx, IMP_E_ARG,
+                          "image target: its sides u and v are not orthogonal");
     return IMP_OK;
 }
 

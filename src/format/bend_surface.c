@@ -15,7 +15,7 @@ static enum imp_status mesh_load(struct bend_loader *l, struct imp_node *node,
     imp_scene *scene = NULL;
     IMP_TRY(imp__props_string(l->ctx, node, "filename", NULL, &file));
     if (!file) IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "needs a 'filename'"));
-    IMP_TRY(imp__search(l->scene, NULL, file, &path));
+    IMP_TRY(bend_placed(l, node, imp__search(l->scene, NULL, file, &path)));
     const size_t n = strlen(path);
     IMP_TRY(imp_scene_create(l->ctx, NULL, &scene));
     imp_scene_begin(scene, "shape",
@@ -24,7 +24,7 @@ static enum imp_status mesh_load(struct bend_loader *l, struct imp_node *node,
     imp_scene_string(scene, "filename", path);
     imp_scene_bool(scene, "face_normals", 1);
     imp_scene_end(scene);
-    IMP_TRY(imp_scene_commit(scene));
+    IMP_TRY(bend_placed(l, node, imp_scene_commit(scene)));
     void *grown =
         imp__grow(l->ctx, b->scenes, &b->cap_scenes, b->n_scenes + 1, sizeof *b->scenes);
     if (!grown) IMP_TRY(imp__error(l->ctx, IMP_E_NOMEM, "no memory for a mesh"));

@@ -154,6 +154,24 @@ static void bounds(void)
     imp_bend_destroy(b);
 }
 
+/* A picture whose sides are one line has no pixels. */
+static void picture(void)
+{
+    static const float pixels[16] = {1, 1, 1, 1, 1, 2, 2, 1, 1, 2, 2, 1, 1, 1, 1, 1};
+    imp_bend *b = load(PROBLEM("-0.6", "leapfrog", GRID("1.3", ""), "", FOCUS));
+    struct imp_bend_target t = IMP_BEND_TARGET_INIT;
+    t.type = IMP_BEND_IMAGE;
+    t.width = t.height = 4;
+    t.pixels = pixels;
+    t.origin[0] = t.origin[1] = -1;
+    t.u[0] = t.v[0] = 2;
+    const enum imp_status oblique = imp_bend_add_target(b, &t);
+    t.v[0] = 0, t.v[1] = 2;
+    tap_ok(oblique == IMP_E_ARG && imp_bend_add_target(b, &t) == IMP_OK,
+           "sides of a picture are orthogonal # %s", imp_last_error(kit_ctx));
+    imp_bend_destroy(b);
+}
+
 int main(void)
 {
     struct imp_context_options o = IMP_CONTEXT_OPTIONS_INIT;
@@ -163,6 +181,7 @@ int main(void)
     verdicts();
     lost();
     bounds();
+    picture();
     imp_context_destroy(kit_ctx);
     return tap_done();
 }

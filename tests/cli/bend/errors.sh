@@ -16,6 +16,7 @@ try "<medium type='graded'><volume type='grid'/><float name='stepp' value='1'/><
 try "<medium type='graded'><volume type='grid'/></medium>"
 try "<medium type='graded'><volume type='grid'/></medium><rays type='beam'><target type='points'/></rays>"
 try "<medium type='graded'><volume type='grid'/></medium>$rays<target type='image'/>"
+try "<medium type='graded'><volume type='grid'/><surface type='mesh'><string name='filename' value='no.obj'/></surface></medium>$rays"
 try "<medium type='graded'><volume type='grid'/></medium>$rays<target type='path'><boolean name='from_truth' value='true'/></target>"
 printf 'VOL\003\001\000\000\000\377\377\377\177\002\000\000\000\002\000\000\000\001\000\000\000' >bad.vol
 head -c 100 /dev/zero >>bad.vol
