@@ -17,6 +17,7 @@
  *
  * Between angles the table is interpolated bilinearly; above and below, it is 0. */
 #include "ies.h"
+#include "from_point.h"
 #include "kind/build.h"
 #include "kind/shape/shape.h"
 #include "math/transform.h"
@@ -308,24 +309,7 @@ static bool point_sample(const struct imp_emitter *e, const imp_v3 *ref,
 {
     (void)u;
     const struct imp__ies *p = e->self;
-    const imp_v3 d = p->position - *ref;
-    const double r = imp__length(d);
-    /* 1/r^2 has to be a number. */
-    if (!(r > 1e-150 && r < INFINITY)) return false;
-    *out = (struct imp_light_sample){.wi = d * (1 / r),
-                                     .dist = r,
-                                     .pdf = 1,
-                                     .cos_light = 1,
-                                     .p = p->position,
-                                     .ng = d * (-1 / r)};
-    return true;
-}
-/* No ray meets a point by chance. */
-static double point_pdf(const struct imp_emitter *e, const imp_v3 *ref, const imp_v3 *wi,
-                        const struct imp_hit *hit, const struct imp_surface *at)
-{
-    (void)e, (void)ref, (void)wi, (void)hit, (void)at;
-    return 0;
+    return imp__point_light_sample(p->position, *ref, out);
 }
 
 /* ---- As a surface -------------------------------------------------------------- */
@@ -363,7 +347,7 @@ const struct imp_emitter_ops imp__ies_light = {.size = sizeof(struct imp_emitter
                                                .eval = point_eval,
                                                .eval_d = point_eval_d,
                                                .sample = point_sample,
-                                               .pdf = point_pdf};
+                                               .pdf = imp__point_light_pdf};
 const struct imp_emitter_ops imp__ies_area = {.size = sizeof(struct imp_emitter_ops),
                                               .name = "ies",
                                               .object_size = sizeof(struct imp__ies),

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A point that radiates alike in all directions: irradiance I/r^2 across the ray. */
-#include "kind/build.h"
+#include "from_point.h"
 #include "math/transform.h"
 
 enum { INTENSITY };
@@ -53,24 +53,7 @@ static bool sample(const struct imp_emitter *e, const imp_v3 *ref, const double 
 {
     (void)u;
     const struct point *p = e->self;
-    const imp_v3 d = p->position - *ref;
-    const double r = imp__length(d);
-    /* 1/r^2 has to be a number. */
-    if (!(r > 1e-150 && r < INFINITY)) return false;
-    *out = (struct imp_light_sample){.wi = d * (1 / r),
-                                     .dist = r,
-                                     .pdf = 1,
-                                     .cos_light = 1,
-                                     .p = p->position,
-                                     .ng = d * (-1 / r)};
-    return true;
-}
-/* No ray meets a point by chance. */
-static double pdf(const struct imp_emitter *e, const imp_v3 *ref, const imp_v3 *wi,
-                  const struct imp_hit *hit, const struct imp_surface *at)
-{
-    (void)e, (void)ref, (void)wi, (void)hit, (void)at;
-    return 0;
+    return imp__point_light_sample(p->position, *ref, out);
 }
 
 const struct imp_emitter_ops imp__point_light = {.size = sizeof(struct imp_emitter_ops),
@@ -82,4 +65,4 @@ const struct imp_emitter_ops imp__point_light = {.size = sizeof(struct imp_emitt
                                                  .eval = eval,
                                                  .eval_d = eval_d,
                                                  .sample = sample,
-                                                 .pdf = pdf};
+                                                 .pdf = imp__point_light_pdf};
