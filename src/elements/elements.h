@@ -226,11 +226,28 @@ static inline double el_lobe(const struct imp__el_root *r, imp_v3 w)
     return c > 0 ? pow(c, r->power) : 0;
 }
 
-/* roots.c: give every source the weight w [n_sources]: what the polygons emit as
+/* options.c: check and copy. */
+enum imp_status imp__el_options(imp_elements *e,
+                                const struct imp_elements_options *options);
+/* lights.c: what the shape's light gives the polygon, and what its material itself emits
+ * (Stam's ambient terms). */
+enum imp_status imp__el_emitter_take(imp_elements *e, const struct imp_shape *s,
+                                     struct imp__el_root *r);
+enum imp_status imp__el_ambient_take(imp_elements *e, const struct imp_shape *s,
+                                     const struct imp_bsdf *b, bool flipped,
+                                     struct imp__el_root *r);
+/* measure.c: a polygon for a measuring plane; mark the fronts of a measured shape. */
+enum imp_status imp__el_plane_add(imp_elements *e, const struct imp_elements_source *src);
+enum imp_status imp__el_measure_shape(imp_elements *e,
+                                      const struct imp_elements_source *src);
+/* measure.c: give every source the weight w [n_sources]: what the polygons emit as
  * importance and what the eye's hits weigh. Then imp__el_bin, and sweeps. */
 void imp__el_weigh(imp_elements *e, const double *w);
 /* roots.c: polygons, lights and materials of the scene; errors name the shape. */
 enum imp_status imp__el_roots(imp_elements *e);
+enum imp_status imp__el_root_append(imp_elements *e, const struct imp__el_root *r,
+                                    int *index);
+/* materials.c */
 enum imp_status imp__el_materials(imp_elements *e); /* project; after roots */
 /* The material with these properties, made if new. */
 enum imp_status imp__el_material_add(imp_elements *e, const struct imp__el_material *m,
@@ -296,10 +313,6 @@ void imp__el_emission(const imp_elements *e, const struct imp__el_link *link,
 
 /* source.c */
 enum imp_status imp__el_sources(imp_elements *e); /* camera hits; before links */
-/* The measurement from radiance; `direct` (may be NULL): emitters that the eye sees. */
-double imp__el_measure(const imp_elements *e, double *direct);
-/* The same from the emitters: emission x importance. */
-double imp__el_measure_adjoint(const imp_elements *e);
 /* Coordinates of a point of a root, in [0, 1). */
 void imp__el_locate(const struct imp__el_root *r, imp_v3 p, double *u, double *v);
 /* First surface along a ray; false: none, or a black side. */
@@ -307,6 +320,12 @@ bool imp__el_trace(const imp_elements *e, const struct imp_sensor_ray *ray,
                    struct imp__el_hit *hit);
 void imp__el_ray(const struct imp_sensor *s, int x, int y, int k, int side,
                  struct imp_sensor_ray *ray);
+
+/* measure.c */
+/* The measurement from radiance; `direct` (may be NULL): emitters that the eye sees. */
+double imp__el_measure(const imp_elements *e, double *direct);
+/* The same from the emitters: emission x importance. */
+double imp__el_measure_adjoint(const imp_elements *e);
 
 /* eye.c */
 /* Order the hits and tell the elements which are theirs; after they were taken. */

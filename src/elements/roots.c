@@ -3,144 +3,11 @@
  * From the scene's shapes to polygons with a material and a light each. What has no place
  * in finite elements is refused here, by the shape's name. */
 #include "elements.h"
-#include "kind/emitter/beam.h"
 #include <string.h>
 
 static enum imp_status no_memory(imp_elements *e)
 {
     return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for polygons");
-}
-
-enum imp_status imp__el_material_add(imp_elements *e, const struct imp__el_material *m,
-                                     int *index)
-{
-    for (int i = 0; i < e->n_materials; i++) {
-        const struct imp__el_material *k = &e->materials[i];
-        if (k->bsdf == m->bsdf && k->flipped == m->flipped && k->phong == m->phong &&
-            memcmp(k->kd, m->kd, sizeof m->kd) == 0 &&
-            memcmp(k->ks, m->ks, sizeof m->ks) == 0 && k->exponent == m->exponent) {
-            *index = i;
-            return IMP_OK;
-        }
-    }
-    const size_t n = (size_t)e->n_materials;
-    if ((n & (n - 1)) == 0) { /* full */
-        struct imp__el_material *grown =
-            imp__arena_array(&e->arena, n ? 2 * n : 1, sizeof *grown);
-        if (!grown) return no_memory(e);
-        if (n) memcpy(grown, e->materials, n * sizeof *grown);
-        e->materials = grown;
-    }
-    e->materials[n] = *m;
-    *index = e->n_materials++;
-    return IMP_OK;
-}
-
-/* ---- Lights -------------------------------------------------------------------- */
-
-static double channels_apart(imp_spec a, imp_spec b, int ch)
-{
-    double d = 0;
-    for (int c = 0; c < ch; c++) d = fmax(d, fabs(a[c] - b[c]) / (1e-12 + fabs(a[c])));
-    return d;
-}
-
-static void light_set(struct imp__el_root *r, const struct imp_input *in,
-                      const char *name)
-{
-    r->light = EL_UNIFORM;
-    r->light_param = in->param;
-    r->light_count = in->count;
-    r->light_name = name;
-    for (int c = 0; c < 3; c++) r->light_value[c] = r->radiance[c] = in->value[c];
-}
-
-static enum imp_status emitter_take(imp_elements *e, const struct imp_shape *s,
-                                    struct imp__el_root *r)
-{
-    const struct imp_emitter *em = e->scene->emitters[s->emitter];
-    bool textured = em->n_in < 1;
-    for (int j = 0; j < em->n_in; j++) textured |= em->input[j]->texture != NULL;
-    if (textured)
-        return imp__error(
-            e->ctx, IMP_E_UNSUPPORTED,
-            "shape '%s': its light (%s) has a texture, which finite elements "
-            "cannot project",
-            s->name, em->ops->name);
-    imp_spec in[8];
-    if (em->n_in > 8)
-        return imp__error(e->ctx, IMP_E_UNSUPPORTED,
-                          "shape '%s': its light (%s) "
-                          "has too many inputs",
-                          s->name, em->ops->name);
-    imp__inputs_eval(em->input, em->n_in, &(struct imp_texcoord){.uv = {0.5, 0.5}}, in);
-    if (em->ops == &imp__beam_light) {
-        const struct imp__beam *beam = em->self;
-        light_set(r, em->input[0], em->name);
-        r->light = EL_LOBE;
-        r->axis = beam->aimed ? beam->axis : r->frame.n;
-        r->power_input = em->input[IMP_BEAM_EXPONENT];
-        r->power = in[IMP_BEAM_EXPONENT][0];
-        return IMP_OK;
-    }
-    if (em->ops == &imp__ies_area) {
-        light_set(r, em->input[0], em->name);
-        r->light = EL_TABLE;
-        r->table = em->self;
-        r->power = imp__ies_mean(r->table, r->frame.n);
-        return IMP_OK;
-    }
-    for (int k = 1; k < 16; k++) {
-        const double z = k / 16.0, x = sqrt(1 - z * z);
-        const struct imp_emission at = {.uv = {0.1 * (k % 7), 0.06 * k},
-                                        .dist = 1,
-                                        .cos_light = z,
-                                        .d = r->frame.s * (x * cos(k)) +
-                                             r->frame.t * (x * sin(k)) + r->frame.n * z};
-        imp_spec le;
-        em->ops->eval(em, in, &at, &le);
-        if (channels_apart(in[0], le, e->ch) > 1e-9)
-            return imp__error(
-                e->ctx, IMP_E_UNSUPPORTED,
-                "shape '%s': its light (%s) is not the same in all directions and "
-                "places; finite elements cannot project it",
-                s->name, em->ops->name);
-    }
-    light_set(r, em->input[0], em->name);
-    return IMP_OK;
-}
-
-/* Stam's ambient terms: what the material itself emits. */
-static enum imp_status ambient_take(imp_elements *e, const struct imp_shape *s,
-                                    const struct imp_bsdf *b, bool flipped,
-                                    struct imp__el_root *r)
-{
-    imp_spec in[64], emitted, first = {0}, d[64];
-    int source = -1;
-    imp__inputs_eval(b->input, b->n_in, &(struct imp_texcoord){.uv = {0.5, 0.5}}, in);
-    for (int k = 1; k < 16; k++) {
-        const double z = k / 16.0, x = sqrt(1 - z * z);
-        const imp_v3 wo = imp__v3(x * cos(k), x * sin(k), flipped ? -z : z);
-        b->ops->emit(b, in, &wo, &emitted);
-        if (k == 1) first = emitted;
-        if (channels_apart(first, emitted, e->ch) > 1e-9)
-            return imp__error(
-                e->ctx, IMP_E_UNSUPPORTED,
-                "shape '%s': what its material emits "
-                "depends on the direction; finite elements cannot project it",
-                s->name);
-        b->ops->emit_d(b, in, &wo, d);
-    }
-    for (int j = 0; j < b->n_in; j++)
-        if (d[j][0] == 1 && channels_apart(first, in[j], e->ch) == 0) source = j;
-    if (source < 0) return IMP_OK; /* nothing comes out on this side */
-    if (imp__is_zero(first) && r->light != EL_DARK) return IMP_OK;
-    if (r->light != EL_DARK)
-        return imp__error(e->ctx, IMP_E_UNSUPPORTED,
-                          "shape '%s': light of its own and an ambient term together",
-                          s->name);
-    light_set(r, b->input[source], b->name);
-    return IMP_OK;
 }
 
 /* ---- Materials and overrides --------------------------------------------------- */
@@ -172,8 +39,8 @@ static bool reflects_behind(const struct imp_bsdf *b)
     return false;
 }
 
-static enum imp_status root_append(imp_elements *e, const struct imp__el_root *r,
-                                   int *index)
+enum imp_status imp__el_root_append(imp_elements *e, const struct imp__el_root *r,
+                                    int *index)
 {
     struct imp__el_root *grown =
         imp__grow(e->ctx, e->roots, &e->cap_roots, e->n_roots + 1, sizeof *grown);
@@ -215,9 +82,9 @@ static enum imp_status polygon_add(imp_elements *e, const struct imp_shape *s,
             memcpy(m.ks, p->ks, sizeof m.ks);
         }
         IMP_TRY(imp__el_material_add(e, &m, &r.material));
-        if (s->emitter >= 0 && side == 0) IMP_TRY(emitter_take(e, s, &r));
+        if (s->emitter >= 0 && side == 0) IMP_TRY(imp__el_emitter_take(e, s, &r));
         if (!p && (b->flags & IMP_BSDF_EMIT) && b->n_in <= 64)
-            IMP_TRY(ambient_take(e, s, b, side, &r));
+            IMP_TRY(imp__el_ambient_take(e, s, b, side, &r));
         for (size_t i = 0; i < e->opt.n_beams && side == 0 && r.light != EL_DARK; i++) {
             const struct imp_elements_beam *beam = &e->opt.beams[i];
             if (strcmp(beam->shape, s->name) != 0) continue;
@@ -228,7 +95,7 @@ static enum imp_status polygon_add(imp_elements *e, const struct imp_shape *s,
             r.power = beam->exponent;
             r.power_input = NULL;
         }
-        IMP_TRY(root_append(e, &r, &made));
+        IMP_TRY(imp__el_root_append(e, &r, &made));
         if (side == 0) *index = made;
         else e->roots[*index].back = made, e->roots[made].back = *index;
     }
@@ -321,74 +188,6 @@ out:
     return st;
 }
 
-static enum imp_status plane_add(imp_elements *e, const struct imp_elements_source *src)
-{
-    const imp_v3 o = imp__v3(src->origin[0], src->origin[1], src->origin[2]);
-    const imp_v3 u = imp__v3(src->edge_u[0], src->edge_u[1], src->edge_u[2]);
-    const imp_v3 v = imp__v3(src->edge_v[0], src->edge_v[1], src->edge_v[2]);
-    struct imp__el_root r = {.shape = -1,
-                             .corners = 4,
-                             .light_param = -1,
-                             .back = -1,
-                             .v = {o, o + u, o + u + v, o + v}};
-    const imp_v3 c = imp__cross(u, v);
-    int index;
-    r.area = imp__length(c);
-    if (!(r.area > 0) || !isfinite(r.area))
-        return imp__error(e->ctx, IMP_E_ARG, "a measuring plane has area %g", r.area);
-    r.frame = imp__frame_from_normal(c * (1 / r.area));
-    r.measured = true;
-    const enum imp_status st =
-        imp__el_material_add(e, &(struct imp__el_material){.bsdf = NULL}, &r.material);
-    return st == IMP_OK ? root_append(e, &r, &index) : st;
-}
-
-/* Is the root a front of the shape that this source measures? */
-static bool is_measured(const imp_elements *e, const struct imp__el_root *r,
-                        const struct imp_elements_source *src)
-{
-    if (r->shape < 0 || strcmp(e->scene->shapes[r->shape]->name, src->shape) != 0)
-        return false;
-    return r->back < 0 || &e->roots[r->back] > r; /* a back comes after its front */
-}
-
-static enum imp_status measure_shape(imp_elements *e,
-                                     const struct imp_elements_source *src)
-{
-    bool found = false;
-    for (size_t i = 0; i < e->n_roots; i++)
-        if (is_measured(e, &e->roots[i], src)) found = e->roots[i].measured = true;
-    if (!found)
-        return imp__error(e->ctx, IMP_E_ARG, "there is no shape '%s' to measure",
-                          src->shape);
-    return IMP_OK;
-}
-
-void imp__el_weigh(imp_elements *e, const double *w)
-{
-    size_t plane = 0; /* their roots are the last, in the sources' order */
-    while (plane < e->n_roots && e->roots[plane].shape >= 0) plane++;
-    for (size_t i = 0; i < e->n_roots; i++) e->roots[i].measure = 0;
-    for (size_t k = 0; k < e->n_sources; k++) {
-        const struct imp_elements_source *src = &e->sources[k];
-        if (src->kind == IMP_ELEMENTS_CAMERA) {
-            size_t n = 0;
-            for (size_t i = 0; i < e->n_hits; i++) n += e->hits[i].source == k;
-            for (size_t i = 0; i < e->n_hits; i++)
-                if (e->hits[i].source == k) e->hits[i].weight = w[k] / (double)n;
-        } else if (src->kind == IMP_ELEMENTS_PLANE) {
-            struct imp__el_root *r = &e->roots[plane++];
-            r->measure = w[k] / r->area;
-        } else {
-            double area = 0;
-            for (size_t i = 0; i < e->n_roots; i++)
-                if (is_measured(e, &e->roots[i], src)) area += e->roots[i].area;
-            for (size_t i = 0; i < e->n_roots; i++)
-                if (is_measured(e, &e->roots[i], src)) e->roots[i].measure += w[k] / area;
-        }
-    }
-}
-
 static bool name_is_shape(const imp_elements *e, const char *name)
 {
     for (int i = 0; i < e->scene->n_shapes; i++)
@@ -436,67 +235,13 @@ enum imp_status imp__el_roots(imp_elements *e)
             imp__error(e->ctx, IMP_E_SCENE, "the scene has no surfaces with an area"));
     for (size_t i = 0; i < e->n_sources; i++) {
         const struct imp_elements_source *src = &e->sources[i];
-        if (src->kind == IMP_ELEMENTS_PLANE) IMP_TRY(plane_add(e, src));
-        if (src->kind == IMP_ELEMENTS_SHAPE) IMP_TRY(measure_shape(e, src));
+        if (src->kind == IMP_ELEMENTS_PLANE) IMP_TRY(imp__el_plane_add(e, src));
+        if (src->kind == IMP_ELEMENTS_SHAPE) IMP_TRY(imp__el_measure_shape(e, src));
     }
     double *w = imp__arena_array(&e->arena, e->n_sources, sizeof *w);
     if (!w) IMP_TRY(no_memory(e));
     for (size_t i = 0; i < e->n_sources; i++) w[i] = e->sources[i].weight;
     imp__el_weigh(e, w);
-out:
-    return st;
-}
-
-/* ---- Projection, all together -------------------------------------------------- */
-
-static const char *user_of(const imp_elements *e, int material)
-{
-    for (size_t i = 0; i < e->n_roots; i++)
-        if (e->roots[i].material == material && e->roots[i].shape >= 0)
-            return e->scene->shapes[e->roots[i].shape]->name;
-    return "";
-}
-
-#define RESIDUAL_GOOD 0.17 /* chooses order 8 for a Phong lobe of exponent 15 */
-#define RESIDUAL_BAD  0.6
-
-enum imp_status imp__el_materials(imp_elements *e)
-{
-    enum imp_status st = IMP_OK;
-    double residual = 0;
-    int order = e->opt.order ? e->opt.order : 2;
-    for (;; order += 2) {
-        const struct imp_arena_mark mark = imp__arena_mark(&e->arena);
-        imp__basis_init(&e->basis, order);
-        residual = 0;
-        for (int i = 0; i < e->n_materials; i++) {
-            IMP_TRY(imp__el_project(e->ctx, &e->arena, &e->basis, e->ch, user_of(e, i),
-                                    &e->materials[i]));
-            residual = fmax(residual, e->materials[i].residual);
-        }
-        if (e->opt.order || residual <= RESIDUAL_GOOD || order >= EL_ORDER_MAX) break;
-        imp__arena_rewind(&e->arena, mark);
-    }
-    for (int i = 0; i < e->n_materials; i++) {
-        const struct imp__el_material *m = &e->materials[i];
-        const char *shape = user_of(e, i);
-        if (m->residual > RESIDUAL_BAD)
-            IMP_TRY(imp__error(
-                e->ctx, IMP_E_UNSUPPORTED,
-                "shape '%s': its material is too narrow for directional order %d "
-                "(relative error %.0f %%)",
-                shape, order, 100 * m->residual));
-        if (m->residual > RESIDUAL_GOOD)
-            imp__warn(e->ctx,
-                      "shape '%s': its lobe in directional order %d has a relative error "
-                      "of %.0f %%",
-                      shape, order, 100 * m->residual);
-        if (m->albedo_max > 1 + 1e-4)
-            IMP_TRY(imp__error(
-                e->ctx, IMP_E_UNSUPPORTED,
-                "shape '%s': its material reflects more than arrives (albedo %.4g)",
-                shape, m->albedo_max));
-    }
 out:
     return st;
 }

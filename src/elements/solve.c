@@ -34,127 +34,6 @@ void imp__el_tick(imp_elements *e, const char *stage, double fraction, const cha
     }
 }
 
-/* ---- Options ------------------------------------------------------------------- */
-
-static enum imp_status options_take(imp_elements *e,
-                                    const struct imp_elements_options *options)
-{
-    struct imp_elements_options *o = &e->opt;
-    enum imp_status st = IMP_OK;
-    if (options) memcpy(o, options, imp_min(options->size, sizeof *o));
-    o->size = sizeof *o;
-    if (e->scene->has_integrator &&
-        e->scene->integrator.kind == IMP_INTEGRATOR_ELEMENTS) {
-        const struct imp_integrator_elements *s = &e->scene->integrator.elements;
-        o->no_importance |= s->no_importance;
-        if (o->order == 0) o->order = s->order;
-        if (o->rays == 0) o->rays = s->rays;
-        if (o->stop == 0) o->stop = s->stop;
-        if (o->eps_last == 0) o->eps_last = s->eps;
-        if (o->max_level == 0) o->max_level = s->max_level;
-        if (o->max_links == 0) o->max_links = s->max_links;
-        if (o->max_bytes == 0) o->max_bytes = s->max_bytes;
-    }
-    if (o->rays == 0) o->rays = 3;
-    if (o->stop == 0) o->stop = 0.01;
-    if (o->eps_first == 0) o->eps_first = 0.05;
-    if (o->eps_last == 0) o->eps_last = 5e-6;
-    if (o->sweeps == 0) o->sweeps = 4;
-    if (o->final_sweeps == 0) o->final_sweeps = 12;
-    if (o->max_level == 0) o->max_level = 9;
-    if (o->max_links == 0) o->max_links = 20000000;
-    if (o->max_bytes == 0) o->max_bytes = (size_t)4 << 30;
-    o->max_links = imp_min(o->max_links, (size_t)UINT32_MAX - 1);
-    if (o->order != 0 && (o->order < 2 || o->order > EL_ORDER_MAX))
-        return imp__error(e->ctx, IMP_E_ARG, "directional order %d is outside 2..%d",
-                          o->order, EL_ORDER_MAX);
-    if (o->rays < 1 || o->rays > 64 || o->sweeps < 1 || o->final_sweeps < 0 ||
-        o->max_level < 0 || o->max_level > EL_LEVEL_MAX)
-        return imp__error(e->ctx, IMP_E_ARG,
-                          "an option of the finite elements is outside its "
-                          "range (rays 1..64, sweeps >= 1, level 0..%d)",
-                          EL_LEVEL_MAX);
-    if (!(o->eps_first > 0) || !(o->eps_last > 0) || isnan(o->stop) ||
-        !(o->time_limit_s >= 0))
-        return imp__error(e->ctx, IMP_E_ARG, "tolerances must be positive");
-    if (e->scene->n_sensors > 0 && (o->sensor < 0 || o->sensor >= e->scene->n_sensors))
-        return imp__error(e->ctx, IMP_E_ARG, "there is no sensor %d; the scene has %d",
-                          o->sensor, e->scene->n_sensors);
-
-    /* Copies: the host's arrays may go. */
-    struct imp_elements_phong *phong =
-        imp__arena_array(&e->arena, o->n_phong + 1, sizeof *phong);
-    struct imp_elements_beam *beams =
-        imp__arena_array(&e->arena, o->n_beams + 1, sizeof *beams);
-    e->n_sources = o->n_sources ? o->n_sources : 1;
-    e->sources = imp__arena_array(&e->arena, e->n_sources, sizeof *e->sources);
-    if (!phong || !beams || !e->sources)
-        IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for options"));
-    for (size_t i = 0; i < o->n_phong; i++) {
-        const struct imp_elements_phong *p = &o->phong[i];
-        phong[i] = *p;
-        if (!p->shape || !(phong[i].shape = imp__arena_strdup(&e->arena, p->shape)))
-            IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "a Phong material needs a shape"));
-        for (int c = 0; c < 3; c++)
-            if (!(p->kd[c] >= 0) || !(p->ks[c] >= 0) ||
-                !(p->kd[c] + p->ks[c] <= 1 + 1e-12))
-                IMP_TRY(imp__error(e->ctx, IMP_E_ARG,
-                                   "shape '%s': Phong coefficients must be "
-                                   ">= 0 with kd + ks <= 1",
-                                   p->shape));
-        if (!(p->exponent >= 0) || p->exponent > 1e4)
-            IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "shape '%s': Phong exponent %g",
-                               p->shape, p->exponent));
-    }
-    for (size_t i = 0; i < o->n_beams; i++) {
-        const struct imp_elements_beam *b = &o->beams[i];
-        beams[i] = *b;
-        if (!b->shape || !(beams[i].shape = imp__arena_strdup(&e->arena, b->shape)))
-            IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "a beam needs a shape"));
-        if (!(b->exponent >= 0) || b->exponent > 1e6 || !isfinite(b->axis[0]) ||
-            !isfinite(b->axis[1]) || !isfinite(b->axis[2]))
-            IMP_TRY(imp__error(e->ctx, IMP_E_ARG,
-                               "shape '%s': beam exponent %g or its axis", b->shape,
-                               b->exponent));
-    }
-    o->phong = phong;
-    o->beams = beams;
-    for (size_t i = 0; i < e->n_sources; i++) {
-        struct imp_elements_source *s = &e->sources[i];
-        *s = (struct imp_elements_source){.size = sizeof *s, .sensor = o->sensor};
-        if (o->n_sources)
-            memcpy(s, &o->sources[i], imp_min(o->sources[i].size, sizeof *s));
-        if (s->weight == 0) s->weight = 1;
-        if (!isfinite(s->weight))
-            IMP_TRY(imp__error(e->ctx, IMP_E_ARG,
-                               "the weight of a measurement is not finite"));
-        if (s->kind == IMP_ELEMENTS_SHAPE) {
-            if (!s->shape || !(s->shape = imp__arena_strdup(&e->arena, s->shape)))
-                IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "a measurement has no shape"));
-        } else if (s->kind == IMP_ELEMENTS_CAMERA) {
-            if (s->sensor < 0 || s->sensor >= e->scene->n_sensors)
-                IMP_TRY(imp__error(e->ctx, IMP_E_ARG,
-                                   "there is no sensor %d; the scene has %d", s->sensor,
-                                   e->scene->n_sensors));
-            const struct imp_film_desc *f = &e->scene->sensors[s->sensor]->film;
-            int *r = s->region;
-            if (!r[0] && !r[1] && !r[2] && !r[3]) r[2] = f->crop_w, r[3] = f->crop_h;
-            if (r[0] < 0 || r[1] < 0 || r[2] > f->crop_w || r[3] > f->crop_h ||
-                r[0] >= r[2] || r[1] >= r[3])
-                IMP_TRY(imp__error(e->ctx, IMP_E_ARG,
-                                   "region %d,%d,%d,%d is not inside the "
-                                   "picture of %d x %d",
-                                   r[0], r[1], r[2], r[3], f->crop_w, f->crop_h));
-        } else if (s->kind != IMP_ELEMENTS_PLANE) {
-            IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "unknown kind of measurement %d",
-                               (int)s->kind));
-        }
-    }
-    o->sources = e->sources;
-out:
-    return st;
-}
-
 enum imp_status imp_elements_create(const imp_scene *scene,
                                     const struct imp_elements_options *options,
                                     imp_elements **out)
@@ -174,7 +53,7 @@ enum imp_status imp_elements_create(const imp_scene *scene,
     if (e->ch == 1) e->lum[0] = 1;
     else e->lum[0] = IMP_LUM_R, e->lum[1] = IMP_LUM_G, e->lum[2] = IMP_LUM_B;
     for (int i = 0; i < 3; i++) e->size = fmax(e->size, scene->hi[i] - scene->lo[i]);
-    IMP_TRY(options_take(e, options));
+    IMP_TRY(imp__el_options(e, options));
     IMP_TRY(imp__el_roots(e));
     IMP_TRY(imp__el_materials(e));
     for (size_t i = 0; i < e->n_roots; i++) IMP_TRY(imp__el_element_root(e, (uint32_t)i));
