@@ -115,6 +115,9 @@ static int source_parse(const char *option, const char *text, int n_numbers,
                         double *target)
 {
     const char *what = parts_of(text, &s->weight, target);
+    if (s->weight == 0 || !isfinite(s->weight))
+        return cli_error(EXIT_USAGE, "--%s '%s': a weight is a number, and not 0", option,
+                         text);
     if (isinf(*target) || (n_numbers && numbers(what, v, n_numbers, n_numbers) < 0))
         return cli_error(EXIT_USAGE, "--%s '%s': [WEIGHT:]%s[=TARGET]", option, text,
                          form);

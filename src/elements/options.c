@@ -97,6 +97,11 @@ enum imp_status imp__el_options(imp_elements *e,
         if (!isfinite(s->weight))
             IMP_TRY(imp__error(e->ctx, IMP_E_ARG,
                                "the weight of a measurement is not finite"));
+        for (int k = 0; k < 3 && s->kind == IMP_ELEMENTS_PLANE; k++)
+            if (!isfinite(s->origin[k]) || !isfinite(s->edge_u[k]) ||
+                !isfinite(s->edge_v[k]))
+                IMP_TRY(imp__error(e->ctx, IMP_E_ARG,
+                                   "a measuring plane's numbers are not finite"));
         if (s->kind == IMP_ELEMENTS_SHAPE) {
             if (!s->shape || !(s->shape = imp__arena_strdup(&e->arena, s->shape)))
                 IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "a measurement has no shape"));

@@ -164,10 +164,11 @@ enum imp_status imp_elements_solve(imp_elements *e)
     if (!e->n_links) IMP_TRY(imp__el_links_first(e));
     else if (!e->sorted) IMP_TRY(imp__el_links_sort(e, NULL, e->n_links));
     if (!e->seen) IMP_TRY(imp__el_sources(e));
-    const bool cold = !e->solved;
     e->solved = false; /* a failure leaves fields half made */
     IMP_TRY(imp__el_bin(e));
-    IMP_TRY(imp__el_sweep(e, e->opt.sweeps + 2, importance, cold));
+    /* From zero, also where there is an older solution: of lamps that went out its light
+     * would remain, die away only sweep by sweep, and be refined all the way down. */
+    IMP_TRY(imp__el_sweep(e, e->opt.sweeps + 2, importance, true));
     e->n_log = 0;
     imp__release(e->ctx, e->picture);
     e->picture = NULL;

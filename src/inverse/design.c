@@ -233,7 +233,8 @@ static enum imp_status result_make(const struct imp__design *d, const double *st
                                          .at_bound = imp__at_bound(&d->goal, x, i),
                                          .determined = 1};
     for (size_t k = 0; k < d->goals; k++)
-        g[k] = (struct imp_elements_goal){d->t[k], before[k], d->J[k]};
+        g[k] = (struct imp_elements_goal){d->t[k], isnan(before[k]) ? d->J[k] : before[k],
+                                          d->J[k]}; /* no step yet */
     if (n_history) memcpy(history, s->history, n_history * sizeof *history);
     *r = (struct imp_elements_fit_result){.size = sizeof *r,
                                           .iterations = iterations,

@@ -10,6 +10,8 @@ code=$?
 [[ ! -e out.png ]] || exit 9
 importon elements b.xml --phong 'floor=1' -o out.png && exit 9
 importon elements b.xml --lux 'nothing' -o out.png && exit 9
+importon elements b.xml --lux '0:floor' -o out.png && exit 9
+importon elements b.xml --plane 'nan,0,0,1,0,0,0,1,0' -o out.png && exit 9
 # As an integrator it makes no walks: what needs them says so.
 sed 's/type="path"/type="elements"/' b.xml >e.xml
 importon gradient e.xml && exit 9
