@@ -13,6 +13,42 @@ bool imp__field_is_grid(const imp_field *f)
     return f->ops == &imp__field_spline || f->ops == &imp__field_trilinear;
 }
 
+struct imp__grid imp__grid_cell(const struct imp__grid *g, imp_v3 x, double *local,
+                                size_t corner[3])
+{
+    struct imp__grid cell = *g;
+    const imp_v3 u = (x - g->origin) * g->inv_h;
+    for (int k = 0; k < 3; k++) {
+        const int i = (int)imp_clamp(u[k], 0.0, (double)(g->desc.cells[k] - 1));
+        corner[k] = (size_t)i;
+        cell.origin[k] += i / g->inv_h[k];
+        cell.nodes[k] = g->desc.interp == IMP_FIELD_SPLINE ? 4 : 2;
+        cell.desc.cells[k] = 1;
+    }
+    cell.base.theta = local;
+    cell.single = NULL;
+    return cell;
+}
+
+void imp__grid_tangent(const imp_field *f, const imp_v3 *x, const double *theta_dot,
+                       double *eta_dot, imp_v3 *g_dot)
+{
+    const bool eta2 = ((const struct imp__grid *)f)->desc.param == IMP_FIELD_ETA2;
+    struct imp__grid g = *(const struct imp__grid *)f; /* the same grid, other numbers */
+    struct imp__jet j;
+    g.base.theta = (double *)(uintptr_t)theta_dot;
+    g.single = NULL;
+    g.desc.param = IMP_FIELD_ETA;
+    f->ops->eval(&g.base, 1, x, 1, &j);
+    if (eta2) {
+        struct imp__jet at;
+        imp__field_eval1(f, x, 1, &at);
+        imp__eta2_jvp(&at, &j);
+    }
+    *eta_dot = j.eta;
+    *g_dot = j.g;
+}
+
 void imp__grid_changed(imp_field *f)
 {
     struct imp__grid *g = (struct imp__grid *)f;

@@ -63,7 +63,6 @@ static void grid_splat(const struct splat_job *j, imp_field *f, size_t offset)
 {
     const struct imp__grid *g = (const struct imp__grid *)f;
     double unused[64] = {0}; /* values, which the weights do not need */
-    struct imp__grid cell = *g;
     struct imp__block own = {0}, *block = j->to->block ? j->to->block : &own;
     double a = j->a;
     imp_v3 b = j->b;
@@ -73,17 +72,8 @@ static void grid_splat(const struct splat_job *j, imp_field *f, size_t offset)
         imp__field_eval1(f, &j->x, 1, &at);
         imp__eta2_vjp(&at, &a, &b);
     }
-    const imp_v3 u = (j->x - g->origin) * g->inv_h;
-    for (int k = 0; k < 3; k++) {
-        const int i = (int)imp_clamp(u[k], 0.0, (double)(g->desc.cells[k] - 1));
-        corner[k] = (size_t)i;
-        cell.origin[k] += i / g->inv_h[k];
-        cell.nodes[k] = g->desc.interp == IMP_FIELD_SPLINE ? 4 : 2;
-        cell.desc.cells[k] = 1;
-    }
+    struct imp__grid cell = imp__grid_cell(g, j->x, unused, corner);
     cell.desc.param = IMP_FIELD_ETA;
-    cell.base.theta = unused;
-    cell.single = NULL;
     if (block->grid != f || memcmp(block->corner, corner, sizeof corner) != 0) {
         block_flush(j->to, block);
         *block = (struct imp__block){.grid = f, .offset = offset};

@@ -248,26 +248,10 @@ static void spline_kick_back(const imp_field *f, bool arc, double dt, int n,
     else back_some(g, false, arc, dt, n, b, bar);
 }
 
-static void spline_tangent(const imp_field *f, const imp_v3 *x, const double *theta_dot,
-                           double *eta_dot, imp_v3 *g_dot)
-{
-    struct imp__grid g = *(const struct imp__grid *)f; /* the same grid, other numbers */
-    struct imp__jet j;
-    g.base.theta = (double *)(uintptr_t)theta_dot;
-    eval_first(&g, *x, false, &j);
-    if (g.desc.param == IMP_FIELD_ETA2) {
-        struct imp__jet at;
-        spline_eval(f, 1, x, 1, &at);
-        imp__eta2_jvp(&at, &j);
-    }
-    *eta_dot = j.eta;
-    *g_dot = j.g;
-}
-
 const struct imp__field_ops imp__field_spline = {.name = "spline",
                                                  .eval = spline_eval,
                                                  .splat = spline_splat,
                                                  .kick_back = spline_kick_back,
-                                                 .tangent = spline_tangent,
+                                                 .tangent = imp__grid_tangent,
                                                  .changed = imp__grid_changed,
                                                  .destroy = imp__grid_destroy};

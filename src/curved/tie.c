@@ -41,23 +41,6 @@ static void tie_eval(const imp_field *f, int n, const imp_v3 *x, int order,
     grid->ops->eval(grid, n, x, order, jet);
 }
 
-/* The cell around a point as a grid of its own, one cell large, of numbers `local`. */
-static struct imp__grid cell_of(const struct imp__grid *g, imp_v3 x, double *local,
-                                size_t corner[3])
-{
-    struct imp__grid cell = *g;
-    const imp_v3 u = (x - g->origin) * g->inv_h;
-    for (int k = 0; k < 3; k++) {
-        const int i = (int)imp_clamp(u[k], 0.0, (double)(g->desc.cells[k] - 1));
-        corner[k] = (size_t)i;
-        cell.origin[k] += i / g->inv_h[k];
-        cell.nodes[k] = g->desc.interp == IMP_FIELD_SPLINE ? 4 : 2;
-        cell.desc.cells[k] = 1;
-    }
-    cell.base.theta = local;
-    cell.single = NULL;
-    return cell;
-}
 static inline size_t node_of(const struct imp__grid *g, const size_t corner[3], int side,
                              int k)
 {
@@ -75,7 +58,7 @@ static void tie_splat(const imp_field *f, const imp_v3 *x, double a, const imp_v
     double none[64] = {0}, sum[64] = {0};
     size_t corner[3];
     imp_v3 gb = *b;
-    struct imp__grid cell = cell_of(g, *x, none, corner);
+    struct imp__grid cell = imp__grid_cell(g, *x, none, corner);
     if (g->desc.param == IMP_FIELD_ETA2) {
         struct imp__jet at;
         imp__field_eval1(t->grid, x, 1, &at);
@@ -97,7 +80,7 @@ static void tie_tangent(const imp_field *f, const imp_v3 *x, const double *theta
     const struct imp__grid *g = (const struct imp__grid *)t->grid;
     double local[64] = {0};
     size_t corner[3];
-    struct imp__grid cell = cell_of(g, *x, local, corner);
+    struct imp__grid cell = imp__grid_cell(g, *x, local, corner);
     const int side = cell.nodes[0];
     for (int k = 0; k < side * side * side; k++)
         local[k] = theta_dot[t->number[node_of(g, corner, side, k)]];
