@@ -193,6 +193,7 @@ static void put_json(struct json *j, const struct imp_fit_result *r,
     json_number(j, "residual_hi", r->residual_hi);
     json_number(j, "chi2_per_freedom", r->chi2);
     json_number(j, "chi2_se", r->chi2_se);
+    json_number(j, "shift", r->shift);
     json_number(j, "condition", r->condition);
     json_text(j, "reason", r->reason);
     json_text(j, "warning", r->warning);
@@ -239,11 +240,11 @@ static void print_residual(const struct imp_fit_result *r)
     else if (r->residual_hi > 1.5 * r->residual)
         printf("residual below %.2g %% of the targets", 100 * r->residual_hi);
     else printf("residual %.3g %% of the targets", 100 * r->residual);
-    if (isfinite(r->chi2) && (r->chi2_se < 1 || r->chi2 > 5 * r->chi2_se))
+    if (isfinite(r->chi2) && (r->chi2_se < 1 || r->chi2 > 3 * r->chi2_se))
         printf("; chi-square per degree of freedom %.*f +- %.1g", r->chi2 < 100, r->chi2,
                r->chi2_se);
     else if (isfinite(r->chi2))
-        printf("; below the targets' own noise only with more --spp");
+        printf("; chi-square needs more --spp: our noise is above the targets'");
     printf("\n");
 }
 

@@ -575,6 +575,9 @@ struct imp_fit_result {
     double chi2, chi2_se; /**< per degree of freedom: the loss over what the targets'
                                noise alone leaves; 1 where the scene explains the
                                pictures. NaN where that noise is not known, or l1 */
+    double shift; /**< where a bias is left: how far four times the samples would move
+                       an answer, in standard errors, at most; NaN: no bias, or no
+                       intervals */
 };
 
 /** Fit the active parameters to the targets; the scene ends at the best estimate.

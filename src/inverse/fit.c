@@ -75,6 +75,7 @@ static enum imp_status result_make(struct imp__fit *f, const struct imp__search 
                                    const double *x, struct imp_estimate objective,
                                    const struct imp__uncertainty *u,
                                    struct imp_fit_variable *variables, const char *why,
+                                   const struct imp__fit_shift *shift,
                                    const struct imp_fit_result **out)
 {
     struct imp_arena *arena = &f->problem->fit_arena;
@@ -114,8 +115,9 @@ static enum imp_status result_make(struct imp__fit *f, const struct imp__search 
         .reason = !f->stopped                                       ? s->reason
                   : f->deadline_s > 0 && imp__now() > f->deadline_s ? "time limit reached"
                                                                     : "cancelled",
-        .warning =
-            imp__fit_warning(f, objective.bias_order, variables, u->loosest, why, &left),
+        .warning = imp__fit_warning(f, objective.bias_order, variables, u->loosest, why,
+                                    &left, shift),
+        .shift = shift->of_se >= 0 ? shift->of_se : NAN,
         .residual = left.relative,
         .residual_hi = left.relative_hi,
         .chi2 = left.chi2,
@@ -174,14 +176,20 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
     if (s->n_history > 0)
         objective = (struct imp_estimate){s->history[s->n_history - 1],
                                           s->history_se[s->n_history - 1], 0};
+    const bool biased = imp__fit_is_biased(p);
     f.final_calls = 0;
-    f.final_total = f.options.intervals && p->n <= IMP_DENSE_MAX ? REPLICATES + 3 : 1;
+    f.final_total =
+        f.options.intervals && p->n <= IMP_DENSE_MAX ? REPLICATES + 3 + biased : 1;
     if (ended == IMP_OK && f.options.intervals)
         ended = intervals(&f, s, x, variables, &u, &why);
+    struct imp__fit_shift shift = {.of_se = -1};
+    if (ended == IMP_OK && u.n && biased)
+        ended = imp__fit_shift(&f, x, u.G, imp__search_seed(&f.goal, FINAL_SEED, 1),
+                               variables, &shift);
     if (ended == IMP_OK) ended = final_objective(&f, x, &objective);
     if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
     IMP_TRY(imp_problem_set_x(p, x));
-    IMP_TRY(result_make(&f, s, x, objective, &u, variables, why, result));
+    IMP_TRY(result_make(&f, s, x, objective, &u, variables, why, &shift, result));
     if (f.outer.progress && ended == IMP_OK) {
         const struct imp_progress last = {.size = sizeof last,
                                           .stage = "fit",

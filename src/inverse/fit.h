@@ -48,11 +48,23 @@ struct imp__fit_residual imp__fit_residual(const struct imp__fit *fit, const dou
                                            struct imp_estimate objective,
                                            size_t determined);
 
+/* fit_bias.c: what the bias of few samples does to the answer. */
+struct imp__fit_shift {
+    size_t variable;        /* the one that moves most of its standard errors */
+    double step, se, of_se; /* with four times the samples; of_se < 0: not known */
+};
+bool imp__fit_is_biased(const struct imp_problem *p);
+/* G [n][n]: inverse of H in the directions that are determined. */
+enum imp_status imp__fit_shift(struct imp__fit *fit, const double *x, const double *G,
+                               uint64_t seed, const struct imp_fit_variable *variables,
+                               struct imp__fit_shift *out);
+
 /* fit_report.c: names and warnings. Text in the problem's fit_arena; NULL: out of memory.
  */
 const char *imp__fit_warning(const struct imp__fit *fit, int bias_order,
                              const struct imp_fit_variable *variables,
                              const double *loosest, const char *no_intervals,
-                             const struct imp__fit_residual *residual);
+                             const struct imp__fit_residual *residual,
+                             const struct imp__fit_shift *shift);
 
 #endif

@@ -61,6 +61,22 @@ static void put_loose(struct text *t, const struct imp__fit *f,
     }
 }
 
+static void put_shift(struct text *t, const struct imp__fit *f,
+                      const struct imp__fit_shift *shift)
+{
+    if (shift->of_se < 2) {
+        put(t,
+            "; four times the samples would move no number by more than %.1f of its "
+            "standard errors",
+            fmax(shift->of_se, 0.1));
+        return;
+    }
+    put(t, "; four times the samples would move ");
+    put_name(t, f, shift->variable);
+    put(t, " by %+.2g +- %.1g, %.1f of its standard errors: use more", shift->step,
+        shift->se, shift->of_se);
+}
+
 static bool quadratic(const struct imp_problem *p)
 {
     for (size_t t = 0; t < p->n_targets; t++)
@@ -71,7 +87,8 @@ static bool quadratic(const struct imp_problem *p)
 const char *imp__fit_warning(const struct imp__fit *f, int bias_order,
                              const struct imp_fit_variable *variables,
                              const double *loosest, const char *no_intervals,
-                             const struct imp__fit_residual *residual)
+                             const struct imp__fit_residual *residual,
+                             const struct imp__fit_shift *shift)
 {
     struct text t = {.used = 0};
     if (residual->chi2 > MISFIT && residual->chi2 - 1 > MISFIT_Z * residual->chi2_se)
@@ -87,5 +104,6 @@ const char *imp__fit_warning(const struct imp__fit *f, int bias_order,
             quadratic(f->problem) ? "a filter wider than a pixel leaves"
                                   : "this loss leaves",
             bias_order == 2 ? "^2" : "");
+    if (bias_order > 0 && shift->of_se >= 0) put_shift(&t, f, shift);
     return t.used ? imp__arena_strdup(&f->problem->fit_arena, t.buffer) : NULL;
 }

@@ -23,6 +23,7 @@ void imp__uncertainty_destroy(imp_context *ctx, struct imp__uncertainty *u)
     imp__release(ctx, u->measurement);
     imp__release(ctx, u->monte_carlo);
     imp__release(ctx, u->loosest);
+    imp__release(ctx, u->G);
     *u = (struct imp__uncertainty){0};
 }
 
@@ -236,8 +237,10 @@ static enum imp_status uncertainty_create(imp_context *ctx, size_t n,
     u->loosest = imp__alloc(ctx, n, sizeof *u->loosest);
     u->measurement = imp__alloc(ctx, n * n, sizeof *u->measurement);
     u->monte_carlo = imp__alloc(ctx, n * n, sizeof *u->monte_carlo);
-    return u->x && u->loosest && u->measurement && u->monte_carlo ? IMP_OK
-                                                                  : no_memory(ctx);
+    u->G = imp__alloc(ctx, n * n, sizeof *u->G);
+    return u->x && u->loosest && u->measurement && u->monte_carlo && u->G
+               ? IMP_OK
+               : no_memory(ctx);
 }
 
 enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
@@ -280,6 +283,7 @@ enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
     IMP_TRY(sandwich(ctx, n, every.G, noise, measurement));
     IMP_TRY(sandwich(ctx, n, every.G, s.mean.cov_g, monte_carlo));
 
+    memcpy(u.G, free.G, n * n * sizeof *u.G);
     u.condition = every.values[0] > 0 && !every.loose[0]
                       ? every.values[n - 1] / every.values[0]
                       : INFINITY;

@@ -13,6 +13,7 @@ struct imp__uncertainty {
                             numbers of its own: its error is what the covariances say */
     double *measurement; /* [n][n] covariance: noise of the data */
     double *monte_carlo; /* [n][n] covariance: noise of the estimator */
+    double *G;           /* [n][n] inverse of H in the directions that are determined */
     double condition;    /* of the scaled H; INFINITY if it is singular */
     int n_loose;         /* directions that are not determined */
     double *loosest;     /* [n] unit vector, in units of the scales: the worst of them */
