@@ -202,6 +202,8 @@ static enum imp_status line_read(struct obj *o, const char *s, const char *end)
 {
     if (end - s > LINE_MAX_BYTES)
         return line_error(o, "line is longer than %d bytes", LINE_MAX_BYTES);
+    const char *comment = memchr(s, '#', (size_t)(end - s));
+    if (comment) end = comment;
     s = skip(s, end);
     const char *word = s;
     while (s < end && !blank(*s)) s++;
