@@ -40,7 +40,8 @@ static void check_obj(void)
 {
     static const char text[] =
         "# a quad and a triangle\r\nmtllib x.mtl\no thing\n"
-        "v 0 0 0\nv 1 0 0 1.0\nv\t1 1 0\nv 0 1e0 0\n\nvt 0 0\nvt 1 0.25#x\nvt 1 1 0\nvn 0 "
+        "v 0 0 0\nv 1 0 0 1.0\nv\t1 1 0\nv 0 1e0 0\n\nvt 0 0\nvt 1 0.25#x\nvt 1 1 0\nvn "
+        "0 "
         "0 1\n"
         "usemtl a\ns off\nf 1/1/1 2/2/1 3/3/1 4/1/1 # a quad\n  f 1/1/1 2/3/1 4/1/1  \n";
     struct loaded l;
