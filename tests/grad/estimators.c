@@ -39,7 +39,7 @@ static imp_scene *wall(void)
     return s;
 }
 
-static imp_scene *ball(const char *filter)
+static imp_scene *ball_of(const char *filter, const char *colour)
 {
     char xml[4096];
     snprintf(xml, sizeof xml,
@@ -50,12 +50,13 @@ static imp_scene *ball(const char *filter)
              "up='0,1,0'/></transform><film type='hdrfilm'><integer name='width' "
              "value='3'/><integer name='height' value='2'/><rfilter type='%s'/></film>"
              "</sensor><shape type='sphere'><bsdf type='diffuse' id='ball'><rgb "
-             "name='reflectance' value='.3,.5,.7'/></bsdf></shape>"
+             "name='reflectance' value='%s'/></bsdf></shape>"
              "<emitter type='constant'/><emitter type='point'>"
              "<point name='position' x='2' y='2' z='3'/></emitter></scene>",
-             filter);
+             filter, colour);
     return test_scene_text(ctx, xml, IMP_RGB);
 }
+static imp_scene *ball(const char *filter) { return ball_of(filter, ".3,.5,.7"); }
 
 static void begin(struct setting *s, imp_scene *scene, const char *active, int spp,
                   enum imp_loss loss)
@@ -330,6 +331,46 @@ static void gauss_newton_log(void)
     end(&s);
 }
 
+/* ---- Regularisers, and differences with fresh random numbers -------------------- */
+
+static void regularisers(void)
+{
+    struct setting s;
+    double H[9], off = 0;
+    begin(&s, ball("box"), "ball.*", 2, IMP_LOSS_L2);
+    test_must(ctx, imp_problem_add_tikhonov(s.problem, "ball.*", 2.5, 1));
+    test_must(ctx, imp__regularise_second(s.problem, H));
+    for (int k = 0; k < 9; k++) off = fmax(off, fabs(H[k] - (k % 4 ? 0 : 2.5)));
+    tap_ok(off < 1e-15, "Tikhonov about where x was: H = w 1 # %.1e", off);
+    end(&s);
+}
+
+/* References of the check itself, where they are nearly free of noise: inside the bounds,
+ * and on both of them. */
+static void fresh(const char *colour)
+{
+    struct setting s;
+    const struct imp_check_row *rows;
+    struct imp_check_options o = IMP_CHECK_OPTIONS_INIT;
+    size_t n;
+    double worst = 0, noise = 0;
+    int seen = 0;
+    begin(&s, ball_of("box", colour), "ball.*", 2, IMP_LOSS_L2);
+    o.paths = 10;
+    o.fresh_spp = 2048;
+    test_must(ctx, imp_check(s.problem, &o, &s.run, &rows, &n));
+    for (size_t k = 0; k < n; k++) {
+        if (strcmp(rows[k].method, "fresh") != 0) continue;
+        worst = fmax(worst, relative(rows[k].reference, rows[k].value));
+        noise = fmax(noise, rows[k].se / fabs(rows[k].value));
+        seen++;
+    }
+    tap_ok(seen == 3 && noise < 0.03 && worst < 4 * noise,
+           "reflectance %s: differences with fresh walks # %.1e, noise %.1e", colour,
+           worst, noise);
+    end(&s);
+}
+
 int main(void)
 {
     ctx = test_context(1);
@@ -339,6 +380,10 @@ int main(void)
     wide();
     gauss_newton();
     gauss_newton_log();
+    regularisers();
+    fresh(".3,.5,.7");
+    fresh("0,0,0");
+    fresh("1,1,1");
     imp_context_destroy(ctx);
     return tap_done();
 }
