@@ -60,7 +60,6 @@ struct imp__gauss_newton {
     struct imp_estimate objective; /* data term */
     double chi2;                   /* sum w (mean - T)^2 - w Var(mean), unbiased */
     double n_residuals;
-    double *residual_spread; /* unused by callers; may be NULL */
 };
 enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
                                   const struct imp_run *run,

@@ -222,9 +222,59 @@ static void bound_is_no_trap(void)
     }
 }
 
+/* Where the search begins at a bound that the answer is not on, it leaves it. */
+static void leaves_bounds(enum imp_optimizer kind)
+{
+    struct toy t;
+    enum imp_status st;
+    double ls[TOY_N], inv[TOY_N * TOY_N];
+    toy_make(&t, ctx, 4, 0.1, 0);
+    toy_least_squares(&t, ls, inv);
+    for (int k = 0; k < TOY_N; k++) {
+        t.lo[k] = k % 2 ? -INFINITY : 0.5 * t.truth[k];
+        t.hi[k] = k % 2 ? 2 * t.truth[k] : INFINITY;
+    }
+    struct imp__search *s = solve(&t, kind, &st);
+    tap_ok(st == IMP_OK && distance(&t, s->x, ls) < (kind == IMP_ADAM ? 1e-3 : 1e-5),
+           "%s leaves a bound # distance %.1e after %d iterations", name[kind],
+           distance(&t, s->x, ls), s->iteration);
+    imp__search_destroy(s);
+}
+
+/* The first steps of Adam along the axes, by Kingma and Ba's Algorithm 1 in units of the
+ * scales: moments with their bias taken off. */
+static void adam_by_the_book(void)
+{
+    struct toy t;
+    struct imp__search *s = NULL;
+    double x[TOY_N], m[TOY_N] = {0}, v[TOY_N] = {0}, g[TOY_N];
+    const struct imp__opt_options o = {6, 0.05, 1e-6};
+    toy_make(&t, ctx, 4, 0.1, 0);
+    t.goal.normal = NULL; /* no directions but the axes */
+    for (int k = 0; k < TOY_N; k++) x[k] = 0.5 * t.truth[k];
+    const enum imp_status made = imp__search_create(&t.goal, IMP_ADAM, &o, x, &s);
+    const enum imp_status st = made == IMP_OK ? imp__optimize(&t.goal, &o, s) : made;
+    for (int i = 1; i <= o.max_iterations; i++) {
+        struct imp_estimate f;
+        if (toy_eval(x, 0, &f, g, NULL, &t) != IMP_OK) break;
+        for (int k = 0; k < TOY_N; k++) {
+            const double d = g[k] * t.scale[k];
+            m[k] = 0.9 * m[k] + 0.1 * d;
+            v[k] = 0.99 * v[k] + 0.01 * d * d;
+            x[k] -= 0.05 * t.scale[k] * m[k] / (1 - pow(0.9, i)) /
+                    sqrt(v[k] / (1 - pow(0.99, i)));
+        }
+    }
+    tap_ok(st == IMP_OK && distance(&t, s->x, x) < 1e-6,
+           "six steps of Adam by the book # %.1e", distance(&t, s->x, x));
+    imp__search_destroy(s);
+}
+
 int main(void)
 {
     if (imp_context_create(NULL, &ctx) != IMP_OK) return 1;
+    for (int kind = IMP_ADAM; kind <= IMP_SLSQP; kind++) leaves_bounds(kind);
+    adam_by_the_book();
     for (int kind = IMP_ADAM; kind <= IMP_SLSQP; kind++) {
         answers(kind);
         resume(kind);
