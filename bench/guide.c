@@ -3,7 +3,7 @@
  * What a finite-element solution is worth as a guide for walks: variance of the picture
  * times processor time, with and without, on scene d and others given by name.
  *
- *     guide [SCENE.xml ...] > table.json
+ *     guide [NAME=VALUE ...] [SCENE.xml ...] > table.json
  *
  * The times of solving and of making the guide stand apart: they are paid once. The
  * standard errors come from the pictures themselves, so variances of heavy-tailed
@@ -13,9 +13,12 @@
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <time.h>
 
 static imp_context *ctx;
+static const char *defines[16] = {"res=64"};
+static int n_defines = 1;
 
 static void must(enum imp_status st)
 {
@@ -67,22 +70,24 @@ static void scene(const char *path, int spp)
 {
     static const struct {
         const char *name;
-        int no_lights, roulette;
-        double share;
+        int no_lights;
+        double roulette, share;
     } ways[] = {{"lights", 0, 0, 0},
                 {"directions", 1, 0, 0.25},
-                {"roulette", 1, 1, 0},
-                {"lights+roulette", 0, 1, 0},
-                {"lights+directions", 0, 0, 0.25}};
+                {"lights+directions", 0, 0, 0.25},
+                {"roulette 1", 1, 1, 0},
+                {"lights+roulette 0.5", 0, 0.5, 0},
+                {"lights+roulette 1", 0, 1, 0},
+                {"lights+roulette 4", 0, 4, 0},
+                {"all, roulette 4", 0, 4, 0.25}};
     struct imp_load_options lo = IMP_LOAD_OPTIONS_INIT;
     struct imp_elements_options eo = IMP_ELEMENTS_OPTIONS_INIT;
     struct imp_elements_info info = {.size = sizeof info};
-    const char *res[] = {"res=64"};
     imp_scene *s;
     imp_elements *e;
     lo.mode = IMP_MONO;
-    lo.defines = res;
-    lo.n_defines = 1;
+    lo.defines = defines;
+    lo.n_defines = n_defines;
     must(imp_scene_load(ctx, path, &lo, &s));
     double start = processor();
     eo.stop = 0.05;
@@ -122,9 +127,12 @@ int main(int argc, char **argv)
     co.threads = 1;
     must(imp_context_create(&co, &ctx));
     printf("[");
-    if (argc < 2) scene(IMP_SCENES "/elements/glossy.xml", 256);
-    for (int k = 1; k < argc; k++) {
-        if (k > 1) printf(",\n");
+    int k = 1;
+    for (; k < argc && strchr(argv[k], '=') && n_defines < 16; k++)
+        defines[n_defines++] = argv[k];
+    if (k == argc) scene(IMP_SCENES "/elements/glossy.xml", 256);
+    for (int first = k; k < argc; k++) {
+        if (k > first) printf(",\n");
         scene(argv[k], 256);
     }
     printf("]\n");

@@ -60,6 +60,9 @@ const struct arg_option options_guide[] = {
     {ARG_NUMBER, 0, "guide-share", "S",
      "of continuations drawn towards indirect light, below 1 (default 0)",
      &cli.guide_share, 0, 0.99, NULL},
+    {ARG_NUMBER, 0, "guide-roulette", "S",
+     "end walks by S times what they should still bring (default: by throughput)",
+     &cli.guide_roulette, 0, 1e6, NULL},
     {0}};
 
 /* ---- Talking ------------------------------------------------------------------- */
@@ -286,6 +289,7 @@ static int guide_make(void)
     o.stop = 0.05;
     o.progress = progress_report;
     g.share = cli.guide_share;
+    g.roulette = cli.guide_roulette;
     enum imp_status st = imp_elements_create(cli.scene, &o, &cli.elements);
     if (st == IMP_OK) st = imp_elements_solve(cli.elements);
     if (!cli_failed(st)) st = imp_elements_guide(cli.elements, &g, &cli.guiding);
@@ -327,7 +331,8 @@ int cli_load(const char *path)
         rc = *set == '@' ? apply_set_file(set + 1) : apply_set(set);
     }
     if (!rc && cli.dump) rc = dump();
-    if (!rc && (cli.guide || cli.guide_share > 0)) rc = guide_make();
+    if (!rc && (cli.guide || cli.guide_share > 0 || cli.guide_roulette > 0))
+        rc = guide_make();
     return rc;
 }
 

@@ -52,7 +52,7 @@ struct cli {
     double time_s;
     /* options_guide */
     int guide;
-    double guide_share;
+    double guide_share, guide_roulette;
     /* what cli_load opened */
     const char *scene_path;
     imp_context *context;

@@ -233,7 +233,10 @@ struct imp_elements_guide_options {
     size_t size;
     int no_lights; /**< light samples as without a guide */
     double share;  /**< of continuations drawn towards indirect light, 0 to 1 exclusive */
-    int roulette;  /**< walks end by what is expected of them, not by their throughput */
+    /** Walks end by what is expected of them, not by their throughput: they go on with
+     * probability roulette x (light still to come) / (light expected of the walk), in
+     * [0.2, 1]. 0: off; 0.5 to 1 where most light comes directly, 4 where little does. */
+    double roulette;
 };
 #define IMP_ELEMENTS_GUIDE_OPTIONS_INIT                                                  \
     {                                                                                    \

@@ -64,14 +64,14 @@ static bool throughput_add(struct imp_step *s, const struct imp_bsdf *b, imp_spe
 }
 
 /* By what is expected to come (adjoint-driven roulette, Vorba and Krivanek 2016): what
- * the rest of this walk should add, over the walk's own expected radiance. */
+ * the rest of this walk should add, over the walk's own expected radiance. Direct light
+ * is no part of the rest, a light sample has it already; so the first vertex may be the
+ * last, which is what saves time where most light comes directly. */
 static double guided_survival(const struct imp_step *s, double q)
 {
-    const struct imp_guide *g = s->tracer->guide;
     if (!s->known) return s->depth + 1 < s->tracer->integrator->rr_depth ? 1 : q;
-    if (s->depth == 0) return 1;
-    const double rest = imp__max3(s->before) * g->expected(g, &s->place, -s->arrived);
-    return imp_clamp(rest / s->reference, 0.2, 1.0);
+    const double rest = imp__max3(s->before) * s->beyond;
+    return imp_clamp(s->tracer->guide->roulette * rest / s->reference, 0.2, 1.0);
 }
 
 /* Survival probability. Zero factors that still have a derivative are left out of beta,

@@ -27,6 +27,7 @@ struct imp_step {
     bool known, left_known;
     struct imp_guide_place place, left;
     double reference; /* radiance that the guide expects of this walk; 0: none */
+    double beyond;    /* what it expects of the continuation here, at throughput 1 */
     imp_spec before;  /* beta on arrival */
     imp_v3 arrived;   /* direction of arrival */
 };

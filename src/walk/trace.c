@@ -90,8 +90,10 @@ static void guide_find(struct imp_step *s, const struct imp_hit *hit,
     const struct imp_guide *g = s->tracer->guide;
     s->known = g->find(g, hit, at, s->d, &s->place);
     s->arrived = s->d;
-    if (s->depth == 0 && s->known && g->expected)
-        s->reference = g->expected(g, &s->place, -s->d);
+    if (s->known && g->expected) {
+        const double all = g->expected(g, &s->place, -s->d, &s->beyond);
+        if (s->depth == 0) s->reference = all;
+    }
 }
 
 /* From the ray in flight to the next one; false: the walk ends. */

@@ -10,11 +10,11 @@
 #include "math/warp.h"
 #include "scene/guide.h"
 
-static imp_elements *solved(imp_scene *s)
+static imp_elements *solved_to(imp_scene *s, int order)
 {
     struct imp_elements_options o = IMP_ELEMENTS_OPTIONS_INIT;
     imp_elements *e;
-    o.order = 4;
+    o.order = order;
     o.stop = -1;
     o.eps_last = 3e-3;
     test_must(s->ctx, imp_elements_create(s, &o, &e));
@@ -22,7 +22,9 @@ static imp_elements *solved(imp_scene *s)
     return e;
 }
 
-static imp_guide *guide_of(const imp_elements *e, double share, int roulette)
+static imp_elements *solved(imp_scene *s) { return solved_to(s, 4); }
+
+static imp_guide *guide_of(const imp_elements *e, double share, double roulette)
 {
     struct imp_elements_guide_options o = IMP_ELEMENTS_GUIDE_OPTIONS_INIT;
     imp_guide *g;
@@ -49,7 +51,7 @@ static bool place_on(const imp_scene *s, const imp_guide *g, double x, double z,
  * integral of h over where the density is not 0, for every h; lights likewise. */
 static void densities(imp_context *ctx)
 {
-    imp_scene *s = test_scene(ctx, "elements/glossy.xml", IMP_MONO, "res=16");
+    imp_scene *s = test_scene(ctx, "elements/glossy.xml", IMP_MONO, "res=16 kd=0.7 ks=0");
     imp_elements *e = solved(s);
     imp_guide *g = guide_of(e, 0.5, 1);
     enum { SIDE = 240, DRAWS = 40000 };
@@ -114,9 +116,12 @@ static void pictures(imp_context *ctx, const char *file, double gain)
 {
     static const struct {
         const char *name;
-        double share;
-        int roulette;
-    } ways[] = {{"lights", 0, 0}, {"directions", 0.4, 0}, {"roulette", 0.2, 1}};
+        double share, roulette;
+    } ways[] = {{"lights", 0, 0},
+                {"directions", 0.4, 0},
+                {"directions and roulette", 0.2, 1},
+                {"roulette that is weak", 0, 4},
+                {"roulette that ends most", 0, 0.1}};
     imp_scene *s = test_scene(ctx, file, IMP_MONO, "res=16");
     imp_elements *e = solved(s);
     struct imp_run run = IMP_RUN_INIT;
@@ -169,46 +174,107 @@ static void pictures(imp_context *ctx, const char *file, double gain)
     imp_scene_destroy(s);
 }
 
+/* What a guide expects, at what the camera sees, against pictures: all light reflected
+ * there, and the part that was reflected before, which pictures of two depths tell. */
+static void expectations(imp_context *ctx, const char *file, double slack)
+{
+    enum { SIDE = 16, RAYS = 6 };
+    imp_scene *s = test_scene(ctx, file, IMP_MONO, "res=16");
+    imp_elements *e = solved_to(s, 0);
+    imp_guide *g = guide_of(e, 0, 1);
+    struct imp_run run = IMP_RUN_INIT;
+    imp_film *film;
+    double mean[3], se[3], all = 0, beyond = 0;
+    int wrong = 0;
+    run.spp = 512;
+    for (int k = 0; k < 3; k++) { /* emission, direct light too, everything */
+        s->integrator.max_depth = k < 2 ? k + 1 : -1;
+        test_must(ctx, imp_render(s, &run, &film));
+        mean_of(film, &mean[k], &se[k]);
+        imp_film_destroy(film);
+        run.guide = g;
+        run.seed++;
+    }
+    for (int k = 0; k < SIDE * SIDE * RAYS * RAYS; k++) {
+        const int row = k / (SIDE * RAYS), column = k % (SIDE * RAYS);
+        struct imp_sensor_ray ray;
+        struct imp_hit hit;
+        struct imp_surface at;
+        struct imp_guide_place p;
+        double part;
+        s->sensors[0]->ops->ray(s->sensors[0], (column + 0.5) / RAYS, (row + 0.5) / RAYS,
+                                (double[2]){0.5, 0.5}, &ray);
+        if (!imp__intersect(s, &ray.o, &ray.d, 0, INFINITY, &hit)) continue;
+        s->shapes[hit.shape]->ops->surface(s->shapes[hit.shape], &hit, &ray.o, &ray.d,
+                                           &at);
+        if (!g->find(g, &hit, &at, ray.d, &p)) continue;
+        all += g->expected(g, &p, -ray.d, &part) / (SIDE * SIDE * RAYS * RAYS);
+        wrong += !(part >= 0);
+        beyond += part / (SIDE * SIDE * RAYS * RAYS);
+    }
+    const double see_all = mean[2] - mean[0], see_beyond = mean[2] - mean[1];
+    tap_ok(fabs(all / see_all - 1) < slack,
+           "%s: what leaves # %.5g, pictures %.5g +- %.2g", file, all, see_all,
+           hypot(se[2], se[0]));
+    tap_ok(wrong == 0 && fabs(beyond / see_beyond - 1) < slack,
+           "%s: the part beyond # %.5g, pictures %.5g +- %.2g", file, beyond, see_beyond,
+           hypot(se[2], se[1]));
+    imp_guide_destroy(g);
+    imp_elements_destroy(e);
+    imp_scene_destroy(s);
+}
+
 /* Gradients by all numbers, with a lamp that is off and no diffuse part: what has no
  * value still has its derivative. */
 static void gradients(imp_context *ctx)
 {
-    imp_scene *s = test_scene(ctx, "elements/glossy.xml", IMP_MONO, "res=12");
+    imp_scene *s =
+        test_scene(ctx, "elements/glossy.xml", IMP_MONO, "res=12 kd=0.6 ks=0.05");
     imp_elements *e = solved(s); /* of the scene as it was: a guide may be old */
     imp_problem *p = test_problem(ctx, s, "*");
     const size_t n = imp_problem_n(p);
     static float seed[12 * 12];
-    double g[2][64], se[2][64], off = 0, worst = 0;
+    static const struct {
+        const char *name;
+        double share, roulette;
+    } ways[] = {{"lights", 0, 0},
+                {"directions", 0.4, 0},
+                {"roulette", 0, 1},
+                {"all of it", 0.3, 0.5}};
+    double g[2][64], se[2][64], off = 0;
     size_t index;
     for (size_t k = 0; k < 12 * 12; k++) seed[k] = 1.0f + 0.001f * (float)k;
     test_must(ctx, imp_scene_find_param(s, "light_back.emitter.radiance.value", &index));
     test_must(ctx, imp_scene_set_values(s, index, 1, &off));
     test_must(ctx, imp_scene_find_param(s, "wall.diffuse_reflectance.value", &index));
     test_must(ctx, imp_scene_set_values(s, index, 1, &off));
-    int compared = 0, tight = 0;
-    for (int way = 0; way < 2 && n <= 64; way++) {
-        imp_guide *guide = way ? guide_of(e, 0.3, 1) : NULL;
-        struct imp_run run = IMP_RUN_INIT;
-        run.spp = 2048;
-        run.seed = 3 + (uint64_t)way;
+    struct imp_run run = IMP_RUN_INIT;
+    run.spp = 2048;
+    run.seed = 3;
+    if (n <= 64) test_must(ctx, imp_problem_reverse(p, seed, &run, g[0], se[0]));
+    run.spp = 1024;
+    for (size_t way = 0; way < sizeof ways / sizeof *ways && n <= 64; way++) {
+        imp_guide *guide = guide_of(e, ways[way].share, ways[way].roulette);
+        int compared = 0, tight = 0;
+        double worst = 0;
+        run.seed = 4 + way;
         run.guide = guide;
-        test_must(ctx, imp_problem_reverse(p, seed, &run, g[way], se[way]));
+        test_must(ctx, imp_problem_reverse(p, seed, &run, g[1], se[1]));
         imp_guide_destroy(guide);
+        for (size_t i = 0; i < n; i++) {
+            const double both = hypot(se[0][i], se[1][i]);
+            if (!(both > 0)) continue;
+            compared++;
+            tight += se[1][i] < 0.1 * fabs(g[1][i]);
+            worst = fmax(worst, fabs(g[0][i] - g[1][i]) / both);
+            if (fabs(g[0][i] - g[1][i]) > 4 * both)
+                printf("# %zu: plain %g +- %g, guided %g +- %g\n", i, g[0][i], se[0][i],
+                       g[1][i], se[1][i]);
+        }
+        tap_ok(compared > 8 && tight > compared / 2 && worst < 4.2,
+               "gradients, %s: those without # worst z %.2f of %d, %d known to 10 %%",
+               ways[way].name, worst, compared, tight);
     }
-    for (size_t i = 0; i < n; i++) {
-        const double both = hypot(se[0][i], se[1][i]);
-        if (!(both > 0)) continue;
-        compared++;
-        tight += se[1][i] < 0.1 * fabs(g[1][i]);
-        worst = fmax(worst, fabs(g[0][i] - g[1][i]) / both);
-        if (fabs(g[0][i] - g[1][i]) > 4 * both)
-            printf("# %zu: plain %g +- %g, guided %g +- %g\n", i, g[0][i], se[0][i],
-                   g[1][i], se[1][i]);
-    }
-    tap_ok(compared > 8 && tight > compared / 2 && worst < 4.2,
-           "gradients with a guide are those without # worst z %.2f of %d, %d known to "
-           "10 %%",
-           worst, compared, tight);
     imp_problem_destroy(p);
     imp_elements_destroy(e);
     imp_scene_destroy(s);
@@ -228,6 +294,10 @@ static void refused(imp_context *ctx)
     o.share = 1;
     const enum imp_status share = imp_elements_guide(e, &o, &g);
     tap_ok(share == IMP_E_ARG && !g, "a share of all # %s", imp_last_error(ctx));
+    o.share = 0;
+    o.roulette = -1;
+    const enum imp_status roulette = imp_elements_guide(e, &o, &g);
+    tap_ok(roulette == IMP_E_ARG && !g, "roulette below 0 # %s", imp_last_error(ctx));
     imp_guide_destroy(NULL);
     imp_elements_destroy(e);
     imp_scene_destroy(s);
@@ -239,6 +309,8 @@ int main(void)
     densities(ctx);
     pictures(ctx, "elements/glossy.xml", 0.25);
     pictures(ctx, "elements/b.xml", 0.6);
+    expectations(ctx, "elements/b.xml", 0.08);
+    expectations(ctx, "elements/glossy.xml", 0.25); /* by bins of 15 degrees */
     gradients(ctx);
     refused(ctx);
     imp_context_destroy(ctx);
