@@ -1,0 +1,62 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What a guide made of a solution holds, and how its files share the making. */
+#ifndef IMP_ELEMENTS_GUIDE_H
+#define IMP_ELEMENTS_GUIDE_H
+
+#include "elements.h"
+#include "scene/guide.h"
+
+#define GUIDE_SIDE 16 /* of the histogram */
+#define GUIDE_BINS (GUIDE_SIDE * GUIDE_SIDE)
+
+struct imp__guide_cells { /* elements at the level, and leaves above it */
+    int level;
+    size_t n;
+    uint32_t *of;    /* [n_elements] or EL_NONE */
+    uint32_t *where; /* [n] element */
+};
+struct imp__guide_finder { /* of a root that is a parallelogram: cells by a grid */
+    imp_v3 origin, to_u, to_v;
+    int side;
+    uint32_t *grid; /* [side side], NULL: by the tree */
+};
+struct imp__guide {
+    struct imp_guide base;
+    const imp_elements *e;
+    int n_lights;
+    double light_base;
+    struct imp__guide_cells cells, wide; /* wide: with directions */
+    struct imp__guide_finder *finder;    /* [n_roots] */
+    uint32_t *grids;
+    double *light;       /* [cells][n_lights] cumulative */
+    double *pmf;         /* [n_lights] as the scene has them */
+    float *cdf;          /* [wide][GUIDE_BINS] cumulative */
+    float *share;        /* [wide] of continuations; 0: nothing arrives, or lobes */
+    uint32_t *wide_of;   /* [cells] */
+    float (*leaving)[2]; /* [cells][rose rose] luminance: all, and beyond the first */
+    int rose;
+};
+struct imp__guide_build {
+    struct imp__guide *g;
+    double share;
+    double *scratch; /* [workers][2 GUIDE_BINS] */
+    double *basis;   /* [rose rose][EL_N_MAX] at the middle of bins */
+};
+
+/* The deepest level from `level` up that cuts the trees into few enough cells. */
+enum imp_status imp__guide_cells(const imp_elements *e, int level,
+                                 struct imp__guide_cells *c);
+/* Grids for roots that are parallelograms, as fine as their finest cell. */
+enum imp_status imp__guide_finders(struct imp__guide *g);
+
+/* Work of loops over cells (g->cells), payload: struct imp__guide_build. The choice of
+ * lights, and what leaves. */
+enum imp_status imp__guide_cell_work(size_t item, int worker, int slot, void *payload);
+/* Over g->wide: directions. */
+enum imp_status imp__guide_wide_work(size_t item, int worker, int slot, void *payload);
+
+/* The bin of a direction in the frame of its surface. */
+int imp__guide_bin(imp_v3 w);
+
+#endif

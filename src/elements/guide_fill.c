@@ -1,0 +1,257 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Filling a guide: what links bring to a cell, by emitter and by direction, and what
+ * leaves it. */
+#include "guide.h"
+#include "math/rng.h"
+#include <string.h>
+
+#define SPREAD 16 /* points of a source that stand for it */
+
+/* What is made of the links into a cell; NULL: not wanted. */
+struct arriving {
+    double *bins, *light; /* [GUIDE_BINS], [n_lights] */
+    double *lamps;        /* [ch n] moments of the light of lamps */
+};
+
+/* What a link carries that is not a light's own: luminance by sample. */
+static imp_spec carried(const imp_elements *e, const struct imp__el_link *k,
+                        imp_spec *emitted)
+{
+    const struct imp__el_root *r = el_root(e, &e->elements[k->src]);
+    imp_spec all[3], own[3] = {{0}}, sum = imp__spec(0);
+    imp__el_ends(e, k, all, NULL);
+    imp__el_emission(e, k, r, own);
+    *emitted = imp__spec(0);
+    for (int c = 0; c < e->ch; c++) {
+        sum += e->lum[c] * (all[c] - own[c]);
+        *emitted += e->lum[c] * own[c];
+    }
+    for (int s = 0; s < 4; s++) sum[s] = fmax(sum[s], 0);
+    return sum;
+}
+
+/* The emitter that a root shines for; -1: none, or an ambient term. */
+static int emitter_of(const imp_elements *e, const struct imp__el_root *r)
+{
+    return r->light != EL_DARK && r->shape >= 0 ? e->scene->shapes[r->shape]->emitter
+                                                : -1;
+}
+
+/* Power `weight` that comes from element j to points of x, spread over directions. */
+static void deposit(const imp_elements *e, const struct imp__element *x, uint32_t src,
+                    double weight, uint32_t salt, double *bins)
+{
+    const struct imp__el_root *r = el_root(e, x);
+    const struct imp__element *j = &e->elements[src];
+    double part[SPREAD], total = 0;
+    int bin[SPREAD];
+    if (!(weight > 0)) return;
+    for (uint32_t i = 0; i < SPREAD; i++) {
+        const struct imp_key key = imp__key(e->opt.seed + 3, salt, i);
+        double s[2] = {imp__u01(key, 0), imp__u01(key, 1)};
+        double t[2] = {(i / 4 + imp__u01(key, 2)) / 4, (i % 4 + imp__u01(key, 3)) / 4};
+        if (x->corners == 3 && s[0] + s[1] > 1) s[0] = 1 - s[0], s[1] = 1 - s[1];
+        if (j->corners == 3 && t[0] + t[1] > 1) t[0] = 1 - t[0], t[1] = 1 - t[1];
+        const imp_v3 d = imp__el_point(j->corners, j->v, t[0], t[1]) -
+                         imp__el_point(x->corners, x->v, s[0], s[1]);
+        const double square = imp__dot(d, d);
+        const imp_v3 w = square > 0 ? d * (1 / sqrt(square)) : r->frame.n;
+        const imp_v3 local = imp__to_local(&r->frame, w);
+        const double away = -imp__dot(w, el_root(e, j)->frame.n);
+        part[i] = square > 0 && local[2] > 0 && away > 0 ? local[2] * away / square : 0;
+        bin[i] = part[i] > 0 ? imp__guide_bin(local) : 0;
+        total += part[i];
+    }
+    for (int i = 0; i < SPREAD && total > 0; i++)
+        bins[bin[i]] += weight * part[i] / total;
+}
+
+/* Moments of a lamp's light over a link: what arrives at the samples s of `mask`, times
+ * `part`, per area of the cell x. c [ch n]. */
+static void lamp_moments(const imp_elements *e, const struct imp__element *x,
+                         const struct imp__el_link *k, int mask, double part, double *c)
+{
+    const struct imp__el_root *r = el_root(e, x);
+    const int n = el_n(e, r);
+    imp_spec own[3] = {{0}};
+    double h[EL_N_MAX];
+    if (!(x->area > 0)) return;
+    imp__el_emission(e, k, el_root(e, &e->elements[k->src]), own);
+    for (int s = 0; s < 4; s++) {
+        if (!(mask >> s & 1) || k->k[s] <= 0) continue;
+        const imp_v3 w =
+            imp__v3((double)k->w[0][s], (double)k->w[1][s], (double)k->w[2][s]);
+        h[0] = e->basis.lead[0];
+        if (n > 1) imp__basis_eval(&e->basis, imp__to_local(&r->frame, w), h);
+        for (int ch = 0; ch < e->ch; ch++)
+            for (int q = 0; q < n; q++)
+                c[ch * n + q] += part * k->k[s] * own[ch][s] / x->area * h[q];
+    }
+}
+
+/* Samples s of `mask` of a link, which may belong to an element above the cell: `part` of
+ * what they bring is the cell's. */
+static void arrive(const imp_elements *e, const struct imp__element *x, size_t at,
+                   int mask, double part, struct arriving *to)
+{
+    const struct imp__el_link *k = &e->links[at];
+    imp_spec emitted, l = carried(e, k, &emitted);
+    const int em = emitter_of(e, el_root(e, &e->elements[k->src]));
+    double power = 0, direct = 0;
+    for (int s = 0; s < 4; s++) {
+        if (!(mask >> s & 1)) continue;
+        power += part * k->k[s] * l[s];
+        direct += part * k->k[s] * emitted[s];
+    }
+    if (em < 0) power += direct;
+    else if (to->light) to->light[em] += direct;
+    if (em >= 0 && to->lamps) lamp_moments(e, x, k, mask, part, to->lamps);
+    if (to->bins) deposit(e, x, k->src, power, (uint32_t)at, to->bins);
+}
+
+/* Links into element i and all below it. */
+static void below(const imp_elements *e, const struct imp__element *x, uint32_t i,
+                  struct arriving *to)
+{
+    for (size_t at = e->in_start[i]; at < e->in_start[i + 1]; at++)
+        arrive(e, x, at, 15, 1, to);
+    if (e->elements[i].child)
+        for (uint32_t q = 0; q < 4; q++) below(e, x, e->elements[i].child + q, to);
+}
+
+/* Links into what is above: of each the quarter that the cell lies in. */
+static void above(const imp_elements *e, const struct imp__element *x, uint32_t cell,
+                  struct arriving *to)
+{
+    uint32_t child = cell;
+    for (uint32_t i = x->parent; i != EL_NONE; child = i, i = e->elements[i].parent) {
+        const uint32_t s = child - e->elements[i].child;
+        const double part =
+            imp__polygon_area(x->corners, x->v) /
+            imp__polygon_area(e->elements[child].corners, e->elements[child].v);
+        for (size_t at = e->in_start[i]; at < e->in_start[i + 1]; at++)
+            if (e->links[at].k[s] > 0) arrive(e, x, at, 1 << s, part, to);
+    }
+}
+
+/* A bin's neighbours get a part: the points are few, and a cell is not a point. */
+static void smooth(const double *in, double *out)
+{
+    for (int a = 0; a < GUIDE_SIDE; a++)
+        for (int b = 0; b < GUIDE_SIDE; b++) {
+            double sum = 0, weight = 0;
+            for (int i = imp_max(a - 1, 0); i <= imp_min(a + 1, GUIDE_SIDE - 1); i++)
+                for (int j = imp_max(b - 1, 0); j <= imp_min(b + 1, GUIDE_SIDE - 1);
+                     j++) {
+                    const double w = (i == a ? 2 : 1) * (j == b ? 2 : 1);
+                    sum += w * in[i * GUIDE_SIDE + j];
+                    weight += w;
+                }
+            out[a * GUIDE_SIDE + b] = sum / weight;
+        }
+}
+
+/* l = R c, and without what lamps give: R (c - c of lamps); by direction. */
+static void leaving_set(const struct imp__guide_build *b, const struct imp__element *x,
+                        const double *lamps, float (*out)[2])
+{
+    const struct imp__guide *g = b->g;
+    const imp_elements *e = g->e;
+    const struct imp__el_material *m = el_material(e, x);
+    const int n = el_n(e, el_root(e, x)), bins = g->rose * g->rose;
+    double direct[EL_N_MAX], all[EL_N_MAX] = {0}, rest[EL_N_MAX] = {0};
+    for (int c = 0; c < e->ch; c++) {
+        const double *l = el_at(e, e->l, x) + c * n;
+        imp__el_apply(&e->basis, n, m->r[c], lamps + c * n, direct);
+        for (int q = 0; q < n; q++) {
+            all[q] += e->lum[c] * l[q];
+            rest[q] += e->lum[c] * (l[q] - direct[q]);
+        }
+    }
+    for (int k = 0; k < bins; k++) {
+        const double *h = b->basis + (size_t)k * EL_N_MAX;
+        double sum = 0, part = 0;
+        for (int q = 0; q < n; q++) {
+            sum += all[q] * h[q];
+            part += rest[q] * h[q];
+        }
+        /* Lobes ring below zero: at least a part of the mean over the hemisphere. */
+        out[k][0] = (float)fmax(sum, 0.1 * all[0] * h[0]);
+        out[k][1] =
+            (float)imp_clamp(part, 0.1 * fmax(rest[0] * h[0], 0), (double)out[k][0]);
+    }
+}
+
+enum imp_status imp__guide_cell_work(size_t item, int worker, int slot, void *payload)
+{
+    const struct imp__guide_build *b = payload;
+    struct imp__guide *g = b->g;
+    const imp_elements *e = g->e;
+    const uint32_t index = g->cells.where[item];
+    const struct imp__element *x = &e->elements[index];
+    double *light = g->light + item * (size_t)g->n_lights, sum = 0, run = 0;
+    double lamps[3 * EL_N_MAX] = {0};
+    struct arriving to = {.light = light, .lamps = g->leaving ? lamps : NULL};
+    (void)worker, (void)slot;
+    below(e, x, index, &to);
+    above(e, x, index, &to);
+    if (g->leaving)
+        leaving_set(b, x, lamps, g->leaving + item * (size_t)(g->rose * g->rose));
+    for (int k = 0; k < g->n_lights; k++) sum += light[k];
+    for (int k = 0; k < g->n_lights; k++) {
+        const double p = sum > 0 ? light[k] / sum : g->pmf[k];
+        run += g->light_base * g->pmf[k] + (1 - g->light_base) * p;
+        light[k] = run;
+    }
+    if (g->n_lights > 0) light[g->n_lights - 1] = 1;
+    return IMP_OK;
+}
+
+/* How flat a material's lobes are: of R all is in one number if it is Lambert's. Light
+ * that arrives says nothing of lobes: where they are narrow, the BSDF draws better. */
+static double flatness(const imp_elements *e, const struct imp__el_material *m)
+{
+    double one = 0, all = 0;
+    for (int c = 0; c < e->ch; c++) {
+        const double *r = m->r[c];
+        one += e->lum[c] * imp__sqr(r[0]);
+        for (int k = 0; k <= e->basis.order && m->n > 1; k++) {
+            const int size = e->basis.size[k];
+            for (int j = 0; j < size * size; j++)
+                all += e->lum[c] * (k ? 2 : 1) * imp__sqr(r[j]);
+            r += size * size;
+        }
+    }
+    return m->n == 1 ? 1 : all > 0 ? one / all : 0;
+}
+
+enum imp_status imp__guide_wide_work(size_t item, int worker, int slot, void *payload)
+{
+    const struct imp__guide_build *b = payload;
+    struct imp__guide *g = b->g;
+    const imp_elements *e = g->e;
+    const uint32_t index = g->wide.where[item];
+    const struct imp__element *x = &e->elements[index];
+    double *bins = b->scratch + (size_t)worker * 2 * GUIDE_BINS,
+           *soft = bins + GUIDE_BINS;
+    double sum = 0, run = 0;
+    float *cdf = g->cdf + item * GUIDE_BINS;
+    struct arriving to = {.bins = bins};
+    (void)slot;
+    const double share = b->share * flatness(e, el_material(e, x));
+    if (share < 0.5 * b->share) return IMP_OK; /* not worth its densities */
+    memset(bins, 0, GUIDE_BINS * sizeof *bins);
+    below(e, x, index, &to);
+    above(e, x, index, &to);
+    smooth(bins, soft);
+    for (int k = 0; k < GUIDE_BINS; k++) sum += soft[k];
+    if (!(sum > 0)) return IMP_OK;
+    for (int k = 0; k < GUIDE_BINS; k++) {
+        run += soft[k];
+        cdf[k] = (float)fmin(run / sum, 1);
+    }
+    cdf[GUIDE_BINS - 1] = 1;
+    g->share[item] = (float)share;
+    return IMP_OK;
+}
