@@ -255,6 +255,10 @@ static void gradients(imp_context *ctx)
     run.spp = 1024;
     for (size_t way = 0; way < sizeof ways / sizeof *ways && n <= 64; way++) {
         imp_guide *guide = guide_of(e, ways[way].share, ways[way].roulette);
+        struct imp_guide_place place;
+        if (ways[way].share > 0)
+            tap_ok(place_on(s, guide, 0.2, 0.85, &place) && place.share > 0,
+                   "%s: directions are in use", ways[way].name);
         int compared = 0, tight = 0;
         double worst = 0;
         run.seed = 4 + way;
