@@ -35,7 +35,7 @@ enum imp_status imp__el_emitter_take(imp_elements *e, const struct imp_shape *s,
             "shape '%s': its light (%s) has a texture, which finite elements "
             "cannot project",
             s->name, em->ops->name);
-    imp_spec in[8];
+    imp_spec in[IMP_INPUTS_MAX];
     if (em->n_in > 8)
         return imp__error(e->ctx, IMP_E_UNSUPPORTED,
                           "shape '%s': its light (%s) "

@@ -68,7 +68,7 @@ static bool dark_border(const struct imp_scene *scene, const struct imp_shape *s
         const bool u = i & 2;
         const struct imp_texcoord at = {{u ? along : side, u ? side : along}, {0}};
         const struct imp_emission x = {{at.uv[0], at.uv[1]}, 1, 1, {0, 0, 1, 0}};
-        imp_spec in[8], le;
+        imp_spec in[IMP_INPUTS_MAX], le;
         imp__inputs_eval(e->input, e->n_in, &at, in);
         e->ops->eval(e, in, &x, &le);
         for (int c = 0; c < scene->channels; c++)

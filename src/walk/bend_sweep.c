@@ -14,8 +14,6 @@
 #include "bend.h"
 #include "kind/bsdf/fresnel.h"
 
-#define MAX_INPUTS 32
-
 /* ---- One boundary -------------------------------------------------------------- */
 
 /* Indices on the near and the far side of vertex v for the ray of direction d; `inner`:
@@ -177,7 +175,7 @@ static void radiance_slope(const struct imp_tracer *tracer, const struct imp_ver
 {
     const struct imp_emitter *e = tracer->scene->emitters[v->emitter];
     const struct imp_texcoord at = {{v->e_at.uv[0], v->e_at.uv[1]}, v->at.p};
-    imp_spec in[MAX_INPUTS], d[MAX_INPUTS];
+    imp_spec in[IMP_INPUTS_MAX], d[IMP_INPUTS_MAX];
     slope[0] = slope[1] = (imp_spec){0};
     imp__inputs_eval(e->input, e->n_in, &at, in);
     e->ops->eval_d(e, in, &v->e_at, d);
@@ -363,7 +361,7 @@ imp_spec imp__bend_frozen(const struct imp_tracer *tracer, const struct imp_walk
         struct imp_emission e_at = v->e_at;
         struct imp_dirs dirs = v->dirs;
         imp_v3 ng = v->ng;
-        imp_spec in[MAX_INPUTS], f;
+        imp_spec in[IMP_INPUTS_MAX], f;
         if (v->leg) {
             imp_v3 arriving = v->leg->d;
             if (v->leg->moved) {
