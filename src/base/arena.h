@@ -10,7 +10,9 @@
 #include "context.h"
 
 struct imp_arena {
-    imp_context *ctx;
+    /* A cache line of its own: every vertex writes it, and its neighbour is another
+     * thread's. */
+    _Alignas(IMP_CACHE_LINE) imp_context *ctx;
     struct imp__arena_block *first, *current;
     size_t used;  /* in current */
     size_t total; /* bytes of all blocks */

@@ -9,6 +9,8 @@
 #define IMP_PRINTF(f, a) __attribute__((format(printf, f, a)))
 #define IMP_HIDDEN       __attribute__((visibility("hidden")))
 
+#define IMP_CACHE_LINE 64 /* bytes; what two threads write should not share one */
+
 #define imp_min(a, b)                                                                    \
     ({                                                                                   \
         __typeof__(a) a_ = (a);                                                          \

@@ -30,7 +30,7 @@ static void *default_allocate(size_t bytes, void *payload)
     (void)payload;
     void *p = NULL;
     if (!fits_machine(bytes)) return NULL;
-    return posix_memalign(&p, 64, bytes) == 0 ? p : NULL;
+    return posix_memalign(&p, IMP_CACHE_LINE, bytes) == 0 ? p : NULL;
 }
 static void default_release(void *memory, void *payload)
 {

@@ -8,8 +8,8 @@
  * unbiased at any n >= 2 (gradients.md 5.2, form B). A smooth loss that is not quadratic
  * has what its curvature does to that mean taken off by the jackknife (5.4). */
 #include "adjoint.h"
+#include "color/rgb.h"
 #include "loss.h"
-#include "seen.h"
 
 /* The loss of one number of a pixel. */
 struct loss {
@@ -56,22 +56,19 @@ double imp__replicate_adjoints(const struct imp__target *target, int channels,
 {
     const struct imp_target *t = &target->desc;
     const double scale = t->scale * (target->weights ? target->weights[pixel] : 1);
+    const bool same = t->channels == channels;
     double value = 0, l[IMP_REPLICATE_MAX], a[IMP_REPLICATE_MAX];
     for (int i = 0; i < n; i++) P[i] = (imp_spec){0};
     for (int c = 0; c < t->channels; c++) {
         const struct loss f = {t->loss, scale, t->epsilon,
                                target->pixels[pixel * (size_t)t->channels + (size_t)c]};
-        for (int i = 0; i < n; i++) {
-            const double lanes[3] = {L[i][0], L[i][1], L[i][2]};
-            l[i] = imp__seen(t->channels, channels, lanes, c);
-        }
+        for (int i = 0; i < n; i++)
+            l[i] = same ? L[i][c] : imp__luminance(L[i][0], L[i][1], L[i][2]);
         value += imp__loss_quadratic(t->loss) ? leave_one_out(&f, n, l, a)
                                               : jackknife(&f, n, l, a);
-        for (int i = 0; i < n; i++) {
-            double bar[3] = {0, 0, 0};
-            bar[c] = a[i];
-            P[i] += imp__seen_bar(t->channels, channels, bar);
-        }
+        for (int i = 0; i < n; i++)
+            if (same) P[i][c] = a[i];
+            else P[i] = (imp_spec){IMP_LUM_R, IMP_LUM_G, IMP_LUM_B, 0} * a[i];
     }
     return value;
 }

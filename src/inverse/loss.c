@@ -67,8 +67,3 @@ double imp__loss_unbiased(double weight, double T, double n, double sum, double 
     const double mean = sum / n, var = (sum_sq - n * mean * mean) / (n - 1);
     return 0.5 * weight * ((mean - T) * (mean - T) - var / n);
 }
-
-double imp__loss_loo(double weight, double T, double n, double sum, double l)
-{
-    return weight * ((sum - l) / (n - 1) - T);
-}

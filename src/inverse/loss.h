@@ -35,6 +35,10 @@ int imp__loss_bias_order(enum imp_loss loss);
 double imp__loss_unbiased(double weight, double T, double n, double sum, double sum_sq);
 /* What sample i's derivative x_i is multiplied with, mean over the N samples being the
  * gradient: w [(S - L_i)/(N-1) - T] (LOO). */
-double imp__loss_loo(double weight, double T, double n, double sum, double l);
+static inline double imp__loss_loo(double weight, double T, double n, double sum,
+                                   double l)
+{
+    return weight * ((sum - l) / (n - 1) - T);
+}
 
 #endif

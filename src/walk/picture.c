@@ -34,8 +34,9 @@ struct render {
     const struct imp_picture *picture;
     const struct imp_film_desc *film;
     int n;           /* channels */
-    double *values;  /* [threads][n] */
-    double *patches; /* [threads][stratum_side^2][SUMS] what one pixel sends in a pass */
+    double *values;  /* [threads][n], rows on cache lines of their own */
+    double *patches; /* [threads][stratum_side^2][SUMS] what one pixel sends in a pass;
+                        likewise */
     int width, height, border; /* of the picture; reach of the filter in pixels */
     int margin;                /* extra pixels sampled on every side */
     int tiles_x, tiles_y, spp, passes, pass_spp;
@@ -92,6 +93,16 @@ static void accumulate(double *sums, double w, const double *value, int n)
 /* Pixels that samples of one pixel reach: `border` on each side, and one more, for a
  * position may be rounded up to the pixel's end. */
 static int stratum_side(const struct render *r) { return 2 * r->border + 2; }
+static size_t patch_size(const struct render *r)
+{
+    return (size_t)(stratum_side(r) * stratum_side(r)) * (size_t)SUMS(r->n);
+}
+/* Doubles from one thread's row of n to the next's: no cache line is written by two. */
+static size_t apart(size_t n)
+{
+    const size_t line = IMP_CACHE_LINE / sizeof(double);
+    return (n + line - 1) / line * line;
+}
 
 /* Weight a sample of pixel (x, y) into the pixels that the filter reaches. */
 static void splat(const struct render *r, const struct region *g, double *patch, int x,
@@ -143,13 +154,11 @@ static enum imp_status tile_work(size_t item, int worker, int slot, void *payloa
     struct render *r = payload;
     const struct region g = item_region(r, item);
     const int n = r->n, stride = TILE + 2 * r->border;
-    double *value = r->values + (size_t)worker * (size_t)n;
-    double *patch = r->patches + (size_t)worker *
-                                     (size_t)(stratum_side(r) * stratum_side(r)) *
-                                     (size_t)SUMS(n);
+    double *value = r->values + (size_t)worker * apart((size_t)n);
+    double *patch = r->patches + (size_t)worker * apart(patch_size(r));
     struct tile_result *out = &r->slots[slot];
+    uint64_t dropped = 0;
     memset(out->sums, 0, (size_t)(stride * stride) * (size_t)SUMS(n) * sizeof *out->sums);
-    out->dropped = 0;
     for (int y = g.y0; y < g.y1; y++)
         for (int x = g.x0; x < g.x1; x++) {
             double *own = out->sums + (size_t)((y - g.y0 + r->border) * stride + x -
@@ -159,8 +168,8 @@ static enum imp_status tile_work(size_t item, int worker, int slot, void *payloa
                 double px, py;
                 struct imp_arena *arena = &r->arenas[worker];
                 const struct imp_arena_mark mark = imp__arena_mark(arena);
-                out->dropped += !r->picture->sample(r->picture->payload, arena, x, y, s,
-                                                    value, &px, &py);
+                dropped += !r->picture->sample(r->picture->payload, arena, x, y, s, value,
+                                               &px, &py);
                 imp__arena_rewind(arena, mark);
                 if (r->border == 0) accumulate(own, 1, value, n);
                 else splat(r, &g, patch, x, y, px, py, value);
@@ -172,9 +181,10 @@ static enum imp_status tile_work(size_t item, int worker, int slot, void *payloa
                                   "no memory for the walks of a picture");
             /* Lost already: walks that nothing ends take long. */
             const enum imp_status st =
-                imp__drops_check(r->ctx, r->run, out->dropped, r->walks);
+                imp__drops_check(r->ctx, r->run, dropped, r->walks);
             if (st != IMP_OK) return st;
         }
+    out->dropped = dropped;
     return IMP_OK;
 }
 
@@ -226,11 +236,10 @@ static void film_finish(const struct render *r, imp_film *film)
 static enum imp_status buffers_create(struct render *r, imp_context *ctx)
 {
     const int slots = imp__pool_slots(ctx), n = r->n;
-    r->values = imp__alloc(ctx, (size_t)ctx->threads * (size_t)n, sizeof *r->values);
+    r->values = imp__alloc(ctx, (size_t)ctx->threads, apart((size_t)n) * sizeof(double));
     const size_t stride = (size_t)(TILE + 2 * r->border);
-    const size_t side = (size_t)stratum_side(r);
-    r->patches = imp__alloc(ctx, (size_t)ctx->threads * side * side,
-                            (size_t)SUMS(n) * sizeof *r->patches);
+    r->patches =
+        imp__alloc(ctx, (size_t)ctx->threads, apart(patch_size(r)) * sizeof(double));
     r->arenas = imp__alloc(ctx, (size_t)ctx->threads, sizeof *r->arenas);
     r->slots = imp__alloc(ctx, (size_t)slots, sizeof *r->slots);
     r->sums = imp__alloc(ctx, (size_t)r->width * (size_t)r->height,
