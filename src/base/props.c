@@ -263,6 +263,13 @@ enum imp_status imp__props_choice(imp_context *ctx, struct imp_node *node,
                            name, p->string, list);
 }
 
+/* Defaults that a kind added stand where the node does. */
+static bool is_written(const struct imp_node *node, const char *name)
+{
+    const struct imp_prop *p = imp__node_prop(node, name);
+    return p && (p->loc.line != node->loc.line || p->loc.column != node->loc.column);
+}
+
 enum imp_status imp__props_finish(imp_context *ctx, const struct imp_node *node)
 {
     char list[768] = "", where[256], meant[80] = "";
@@ -271,13 +278,16 @@ enum imp_status imp__props_finish(imp_context *ctx, const struct imp_node *node)
         const struct imp_prop *p = &node->props[i];
         if (p->used) continue;
         const size_t n = strlen(list);
-        snprintf(list + n, sizeof list - n, "%s'%s' (%s)", n ? ", " : "", p->name,
-                 imp__loc_text(p->loc, where, sizeof where));
-        if (first) continue;
-        first = p;
+        if (first) {
+            snprintf(list + n, sizeof list - n, ", '%s' (%s)", p->name,
+                     imp__loc_text(p->loc, where, sizeof where));
+            continue;
+        }
+        first = p; /* whose place the message begins with */
+        snprintf(list, sizeof list, "'%s'", p->name);
         struct imp_nearest near = imp__nearest(p->name);
         for (int k = 0; k < node->n_asked; k++)
-            if (!imp__node_prop(node, node->asked[k]))
+            if (!is_written(node, node->asked[k]))
                 imp__nearest_try(&near, node->asked[k]);
         if (near.best)
             snprintf(meant, sizeof meant, "; did you mean '%.50s'?", near.best);
