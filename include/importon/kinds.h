@@ -39,8 +39,10 @@ enum imp_input_flags {
     IMP_INPUT_REQUIRED = 4,
     IMP_INPUT_FIXED = 8,  /* no gradient: changing it bends or moves things */
     IMP_INPUT_EDGES = 16, /* differentiable, and may move discontinuities */
-    IMP_INPUT_SOFT = 32   /* a number above hi is taken as it is, and then has no bound:
+    IMP_INPUT_SOFT = 32,  /* a number above hi is taken as it is, and then has no bound:
                              what it is for decides */
+    IMP_INPUT_INDEX = 64  /* refractive index behind the surface over the one before it:
+                             where a medium fills the shape, the medium's */
 };
 
 struct imp_input_desc { /* the list ends with {0} */
@@ -111,6 +113,7 @@ struct imp_bsdf {
     int n_child;
     const struct imp_bsdf *child[2];
     int child_in[2]; /* where the child's inputs start in `in` */
+    int index_input; /* its own input with IMP_INPUT_INDEX; -1: none */
     int index;       /* in the scene; -1 for the default material */
     double absorb;   /* Stam's absorption probability; 0: none given */
     const char *name;

@@ -47,16 +47,15 @@ static struct dual radiance(imp_context *ctx, imp_scene *scene, const struct imp
 {
     struct dual L = {0, 0}, throughput = {1, 0};
     for (const struct imp_vertex *v = w->first; v; v = v->next) {
-        if (v->emitter >= 0 && v->dirs.wo[2] > 0)
-            L = add(L, times(throughput, light_rgb[c] * v->e_weight));
+        if (v->d.met.emitter >= 0 && v->d.wo[2] > 0)
+            L = add(L, times(throughput, light_rgb[c] * v->d.met.weight));
         if (!v->bsdf) break;
         const struct dual rho = reflectance(ctx, scene, v, wanted, c);
-        if (v->light >= 0 && v->l_at.cos_light > 0)
-            L = add(L, times(mul(throughput, rho),
-                             fmax(0, v->l_wi[2]) / M_PI * light_rgb[c] * v->l_weight));
-        throughput =
-            times(mul(throughput, rho), fmax(0, v->dirs.wi[2]) / M_PI * v->inv_ps);
-        if (v->inv_ps == 0) break;
+        if (v->d.connection == IMP_CONNECTED && v->d.light.cos_light > 0)
+            L = add(L, times(mul(throughput, rho), fmax(0, v->d.light.wi[2]) / M_PI *
+                                                       light_rgb[c] * v->d.light.weight));
+        throughput = times(mul(throughput, rho), fmax(0, v->d.wi[2]) / M_PI * v->scale);
+        if (!v->d.goes_on) break;
     }
     return L;
 }

@@ -18,7 +18,7 @@ static const struct imp_input_desc inputs[] = {
     IMP_TINT_INPUT("specular_transmittance"),
     {.name = "eta",
      .role = IMP_UNBOUNDED,
-     .flags = IMP_INPUT_SCALAR | IMP_INPUT_FIXED,
+     .flags = IMP_INPUT_SCALAR | IMP_INPUT_FIXED | IMP_INPUT_INDEX,
      .fallback = 1.5046 / 1.000277,
      .lo = 1e-3,
      .hi = 1e3,
