@@ -62,33 +62,24 @@ double imp__direction_pdf(const struct imp_step *s, const struct imp_bsdf *b,
     return n ? mixture_pdf(s, m, n, kernel, w) : kernel;
 }
 
-bool imp__direction_draw(struct imp_step *s, const struct imp_vertex *v,
+bool imp__direction_draw(const struct imp_step *s, const struct imp_vertex *v,
                          const struct imp_frame *frame, const double u[3],
-                         struct imp_dirs *dirs, struct imp_bsdf_sample *out)
+                         struct imp_dirs *dirs)
 {
     const struct imp_bsdf *b = v->bsdf;
     struct member m[MEMBERS_MAX];
     const int n = imp_unlikely(s->guided.here) ? members(s, b, m) : 0;
-    if (imp_likely(n == 0)) return b->ops->sample(b, v->in, u, dirs, out);
+    if (imp_likely(n == 0)) return b->ops->sample(b, v->in, u, dirs);
 
     /* u[0] chooses the member, and what is left of it the kernel's lobe. */
     double before = 0;
     int chosen = 0;
     while (chosen < n && !(u[0] < before + m[chosen].share)) before += m[chosen++].share;
-    imp_v3 w;
     if (chosen < n) {
-        w = m[chosen].draw(s, &u[1]);
-        dirs->wi = imp__to_local(frame, w);
-    } else {
-        const double lobe = (u[0] - before) / (1 - before);
-        const double rest[3] = {fmin(lobe, 0x1.fffffffffffffp-1), u[1], u[2]};
-        if (!b->ops->sample(b, v->in, rest, dirs, out)) return false;
-        w = imp__to_world(frame, dirs->wi);
+        dirs->wi = imp__to_local(frame, m[chosen].draw(s, &u[1]));
+        return true;
     }
-    const double kernel = b->ops->pdf(b, v->in, dirs);
-    if (!(kernel > 0)) return false; /* structurally zero */
-    b->ops->eval(b, v->in, dirs, &out->f);
-    out->pdf = mixture_pdf(s, m, n, kernel, w);
-    out->eta = 1;
-    return true;
+    const double lobe = (u[0] - before) / (1 - before);
+    const double rest[3] = {fmin(lobe, 0x1.fffffffffffffp-1), u[1], u[2]};
+    return b->ops->sample(b, v->in, rest, dirs);
 }

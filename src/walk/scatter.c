@@ -48,33 +48,39 @@ bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_sur
     const double u[3] = {imp__u01(key, imp__dim(s->depth, IMP_DIM_LOBE)),
                          imp__u01(key, imp__dim(s->depth, IMP_DIM_DIR_U)),
                          imp__u01(key, imp__dim(s->depth, IMP_DIM_DIR_V))};
-    struct imp_bsdf_sample sample;
+    const struct imp_bsdf *b = v->bsdf;
     struct imp_dirs dirs = {.wo = imp__decided_v3(v->d.wo), .lobe = IMP_SMOOTH};
 
-    /* Decide the direction ... */
-    if (!imp__direction_draw(s, v, frame, u, &dirs, &sample)) return false;
-    if (!(sample.pdf > 0)) return false;
+    /* The direction, its density and its value. */
+    if (!imp__direction_draw(s, v, frame, u, &dirs)) return false;
     for (int k = 0; k < 3; k++) v->d.wi[k] = (imp_decided)dirs.wi[k];
     v->d.lobe = (int8_t)dirs.lobe;
-    v->d.pdf = (imp_decided)sample.pdf;
+    const imp_v3 w = imp__to_world(frame, dirs.wi);
+    dirs = imp__vertex_dirs(v);
+    const double kernel = b->ops->pdf(b, v->in, &dirs);
+    if (!(kernel > 0)) return false; /* structurally zero */
+    v->d.pdf = (imp_decided)imp__direction_pdf(s, b, kernel, w);
+    if (!(v->d.pdf > 0)) return false;
+    imp_spec f;
+    b->ops->eval(b, v->in, &dirs, &f);
 
-    /* ... and whether the walk goes on. */
+    /* Does the walk go on? */
     if (imp_unlikely(s->guided.guide != NULL)) s->guided.before = s->beta;
-    if (!throughput_add(s, v->bsdf, sample.f * (1 / sample.pdf))) return false;
-    s->eta *= sample.eta;
+    if (!throughput_add(s, b, f * (1 / (double)v->d.pdf))) return false;
+    if (b->ops->index_ratio) s->eta *= b->ops->index_ratio(b, v->in, &dirs);
     if (!roulette(s, v)) return false;
-    s->beta *= imp__spec(1 / v->d.survive);
-    imp__step_weigh(v, sample.f);
+    s->beta *= imp__spec(1 / (double)v->d.survive);
+    imp__step_weigh(v, f);
 
     /* The next ray. */
     imp__guided_leave(&s->guided);
-    s->d = imp__to_world(frame, dirs.wi);
+    s->d = w;
     s->o = imp__offset(at->p, at->ng, s->d);
     s->from = at->p;
     s->t_min = 0;
     s->t_max = INFINITY;
     if (imp_unlikely(s->segment->leave != NULL)) s->segment->leave(s, v, at);
     /* Where no connection could have been made, MIS has nothing to weigh. */
-    s->pdf = dirs.lobe == IMP_SMOOTH && s->segment->connects ? sample.pdf : 0;
+    s->pdf = dirs.lobe == IMP_SMOOTH && s->segment->connects ? v->d.pdf : 0;
     return true;
 }

@@ -91,11 +91,11 @@ void imp__attached_d(const struct imp_walk *walk, const struct imp_vertex *v, in
                      imp_spec *d);
 
 /* ---- direction.c ---- */
-/* Draw the continuation of v from the mixture of densities that know the place: sets
- * *dirs and *sample as imp_bsdf_ops.sample does, with the mixture's density. */
-bool imp__direction_draw(struct imp_step *s, const struct imp_vertex *v,
+/* Draw the continuation of v, as imp_bsdf_ops.sample does, from the mixture of densities
+ * that know the place. */
+bool imp__direction_draw(const struct imp_step *s, const struct imp_vertex *v,
                          const struct imp_frame *frame, const double u[3],
-                         struct imp_dirs *dirs, struct imp_bsdf_sample *sample);
+                         struct imp_dirs *dirs);
 /* Density of a direction, world w, for which the BSDF alone has `kernel`. */
 double imp__direction_pdf(const struct imp_step *s, const struct imp_bsdf *b,
                           double kernel, imp_v3 w);
