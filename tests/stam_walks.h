@@ -52,7 +52,8 @@ static inline struct stam stam_walks(imp_context *ctx, imp_scene *scene, uint64_
     s.absorb = scene->bsdfs[0]->absorb;
     s.width = sensor->film.crop_w;
     s.height = sensor->film.crop_h;
-    s.tracer = (struct imp_tracer){scene, &scene->integrator, sensor, NULL, seed, NULL};
+    s.tracer = (struct imp_tracer){
+        .scene = scene, .integrator = &scene->integrator, .sensor = sensor, .seed = seed};
     return s;
 }
 
@@ -195,7 +196,9 @@ static inline struct dual stam_value(const struct imp_walk *w, enum stam_variant
         const bool sphere = stam_is(v, "sphere");
         if (!v->next) { /* absorbed here, or lost: below the horizon, or too deep */
             const struct dual glow = dual_control(theta, sphere ? AMBIENT2 : AMBIENT3);
-            return w->absorbed ? dual_mul(T, dual_scale(glow, 1 / absorb)) : dual_of(0);
+            (void)absorb; /* 1/absorb, as decided */
+            return w->absorbed ? dual_mul(T, dual_scale(glow, v->d.glow_weight))
+                               : dual_of(0);
         }
         const struct imp_dirs dirs = imp__vertex_dirs(v);
         const struct dual f =

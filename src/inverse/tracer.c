@@ -53,8 +53,11 @@ enum imp_status imp__problem_tracer(const struct imp_problem *p,
         st = attached_allowed(p->scene);
         if (st != IMP_OK) return st;
     }
-    *out = (struct imp_tracer){
-        p->scene,   integrator, sensor,
-        &p->active, run->seed,  imp__guide_of(p->scene, integrator, run->guide)};
+    *out = (struct imp_tracer){.scene = p->scene,
+                               .integrator = integrator,
+                               .sensor = sensor,
+                               .active = &p->active,
+                               .seed = run->seed,
+                               .guide = imp__guide_of(p->scene, integrator, run->guide)};
     return p->active.medium ? imp__graded_survey(out) : IMP_OK;
 }

@@ -53,23 +53,21 @@ static double mixture_pdf(const struct imp_step *s, const struct member *m, int 
     return left * kernel + sum;
 }
 
-double imp__direction_pdf(const struct imp_step *s, const struct imp_bsdf *b,
-                          double kernel, imp_v3 w)
+double imp__mixture_pdf(const struct imp_step *s, const struct imp_bsdf *b, double kernel,
+                        imp_v3 w)
 {
     struct member m[MEMBERS_MAX];
-    if (imp_likely(!s->guided.here)) return kernel;
     const int n = members(s, b, m);
     return n ? mixture_pdf(s, m, n, kernel, w) : kernel;
 }
 
-bool imp__direction_draw(const struct imp_step *s, const struct imp_vertex *v,
-                         const struct imp_frame *frame, const double u[3],
-                         struct imp_dirs *dirs)
+bool imp__mixture_draw(const struct imp_step *s, const struct imp_bsdf *b,
+                       const struct imp_frame *frame, const double u[3],
+                       struct imp_dirs *dirs)
 {
-    const struct imp_bsdf *b = v->bsdf;
     struct member m[MEMBERS_MAX];
-    const int n = imp_unlikely(s->guided.here) ? members(s, b, m) : 0;
-    if (imp_likely(n == 0)) return b->ops->sample(b, v->in, u, dirs);
+    const int n = members(s, b, m);
+    if (n == 0) return b->ops->sample(b, s->in, u, dirs);
 
     /* u[0] chooses the member, and what is left of it the kernel's lobe. */
     double before = 0;
@@ -81,5 +79,5 @@ bool imp__direction_draw(const struct imp_step *s, const struct imp_vertex *v,
     }
     const double lobe = (u[0] - before) / (1 - before);
     const double rest[3] = {fmin(lobe, 0x1.fffffffffffffp-1), u[1], u[2]};
-    return b->ops->sample(b, v->in, rest, dirs);
+    return b->ops->sample(b, s->in, rest, dirs);
 }

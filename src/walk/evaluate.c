@@ -4,46 +4,6 @@
  * vertices, directions, densities, MIS weights and roulette are settled. */
 #include "graded.h"
 
-void imp__evaluate_inputs(const struct imp_vertex *v, const struct imp_texcoord *at,
-                          imp_spec *in)
-{
-    imp__inputs_eval(v->bsdf->input, v->bsdf->n_in, at, in);
-    if (imp_unlikely(v->shape->interior != NULL)) imp__graded_inputs(v, at, in);
-}
-
-imp_spec imp__evaluate_glow(const struct imp_vertex *v, const imp_spec *in,
-                            const imp_v3 *wo)
-{
-    imp_spec glow;
-    v->bsdf->ops->emit(v->bsdf, in, wo, &glow);
-    return glow * v->d.glow_weight;
-}
-
-void imp__step_weigh(struct imp_vertex *v, imp_spec f)
-{
-    v->scale = 1 / ((double)v->d.pdf * v->d.survive);
-    v->w = f * v->scale;
-}
-
-void imp__step_pass(struct imp_vertex *v, double transmittance)
-{
-    v->scale *= transmittance;
-    v->w *= transmittance;
-}
-
-imp_spec imp__emitter_radiance(const struct imp_scene *scene, int emitter,
-                               const struct imp_emission *x, imp_v3 p)
-{
-    const struct imp_emitter *e = scene->emitters[emitter];
-    const struct imp_texcoord at = {{x->uv[0], x->uv[1]}, p};
-    imp_spec in[IMP_INPUTS_MAX], le;
-    imp__inputs_eval(e->input, e->n_in, &at, in);
-    e->ops->eval(e, in, x, &le);
-    return le;
-}
-
-/* ---- Elsewhere -------------------------------------------------------------------- */
-
 static void place_decided(const struct imp_vertex *v, struct imp_place *p)
 {
     *p =
@@ -59,8 +19,11 @@ static imp_spec vertex_value(const struct imp_tracer *tracer, const struct imp_v
     const struct imp_bsdf *b = v->bsdf;
     imp_spec in[IMP_INPUTS_MAX], f, sum = {0};
     *w = (imp_spec){0};
-    if (b) imp__evaluate_inputs(v, &p->at, in);
-    if (d->glows) sum += imp__evaluate_glow(v, in, &p->dirs.wo);
+    if (b) imp__evaluate_inputs(b, v->shape, &p->at, in);
+    if (d->glows) {
+        b->ops->emit(b, in, &p->dirs.wo, &f);
+        sum += f * d->glow_weight;
+    }
     if (d->met.emitter >= 0)
         sum += imp__emitter_radiance(scene, d->met.emitter, &p->met, p->at.p) *
                d->met.weight;

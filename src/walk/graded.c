@@ -3,11 +3,11 @@
  * Segments outside and inside bodies of graded index, while a walk is decided. */
 #include "graded.h"
 
-void imp__graded_inputs(const struct imp_vertex *v, const struct imp_texcoord *at,
-                        imp_spec *in)
+void imp__graded_inputs(const struct imp_bsdf *b, const struct imp_shape *shape,
+                        const struct imp_texcoord *at, imp_spec *in)
 {
-    const struct imp_medium *m = v->shape->interior;
-    const int j = v->bsdf->index_input;
+    const struct imp_medium *m = shape->interior;
+    const int j = b->index_input;
     if (j >= 0) in[j] = imp__spec(imp__graded_index(m->graded, &at->p) / m->outside);
 }
 
@@ -45,6 +45,17 @@ const char *imp__graded_obstacle(const struct imp_scene *scene, const struct imp
     return NULL;
 }
 
+/* Vertices that move are not rounded. */
+static void keep_exact(struct imp_step *s, struct imp_vertex *v,
+                       struct imp_graded_segment *kept, const struct imp_surface *at)
+{
+    s->at = (struct imp_texcoord){{at->uv[0], at->uv[1]}, at->p};
+    s->wo = s->wo_drawn;
+    kept->end = (struct imp_exact){s->at, s->wo};
+    kept->base.exact = &kept->end;
+    imp__evaluate_inputs(v->bsdf, v->shape, &s->at, v->in);
+}
+
 /* Keep the segment to v if a derivative will need it. */
 static bool segment_keep(struct imp_step *s, struct imp_vertex *v,
                          const struct imp_hit *hit, const struct imp_surface *at)
@@ -55,8 +66,7 @@ static bool segment_keep(struct imp_step *s, struct imp_vertex *v,
     if (!active) return true;
     b->chain |= m && active[m->index];
     if (!b->chain) return true;
-    const struct imp_texcoord where = imp__vertex_at(v);
-    if (b->moved && imp__graded_obstacle(s->scene, v->shape, &where)) {
+    if (b->moved && imp__graded_obstacle(s->scene, v->shape, &s->at)) {
         s->walk->dropped = IMP_DROP_MOVED;
         return false;
     }
@@ -65,16 +75,16 @@ static bool segment_keep(struct imp_step *s, struct imp_vertex *v,
         s->walk->dropped = IMP_DROP_MEMORY;
         return false;
     }
-    *kept = (struct imp_graded_segment){.base.ops = &imp__graded_outside,
+    *kept = (struct imp_graded_segment){.base = {&imp__graded_outside, NULL},
                                         .medium = b->through,
                                         .moved = b->moved,
-                                        .x = at->p,
                                         .d = s->d,
                                         .hit = *hit,
                                         .dp_du = at->dp_du,
                                         .dp_dv = at->dp_dv};
     if (b->through) kept->ride = b->ride;
     v->segment = &kept->base;
+    keep_exact(s, v, kept, at);
     s->walk->moving = &imp__graded_outside;
     return true;
 }
@@ -96,18 +106,18 @@ double imp__graded_straight(imp_v3 p, const struct imp__surface *level, imp_v3 x
 
 /* What moves is differentiated where it is: the segment begins at the last vertex itself,
  * not beside it, and ends in double precision. */
-static void meet_exactly(struct imp_vertex *v, struct imp_hit *hit,
-                         struct imp_surface *at, imp_v3 d)
+static void meet_exactly(struct imp_step *s, struct imp_vertex *v, struct imp_hit *hit,
+                         struct imp_surface *at)
 {
     struct imp__surface level;
-    const imp_v3 from = imp__graded_kept(v->prev)->x;
+    const imp_v3 d = s->d, from = imp__graded_kept(v->prev)->end.at.p;
     imp__level(v->shape, at->p, at->ng, &level);
     const double far = imp__graded_straight(at->p, &level, from, d);
     if (!(far > 0) || !isfinite(far)) return;
     imp__hit_at(v->shape, from + far * d, d, far, hit);
     v->shape->ops->surface(v->shape, hit, &from, &d, at);
     const struct imp_frame frame = {at->s, at->t, at->n};
-    imp__vertex_place(v, at, &frame, d, far);
+    imp__vertex_place(s, v, at, &frame, d, far);
 }
 
 /* At a surface: is the walk on the side of it that it should be on? */
@@ -116,7 +126,7 @@ static bool arrive(struct imp_step *s, struct imp_vertex *v, struct imp_hit *hit
 {
     struct imp_graded_state *b = s->graded;
     const struct imp_medium *m = v->shape->interior;
-    if (b->moved && !b->through) meet_exactly(v, hit, at, s->d);
+    if (b->moved && !b->through) meet_exactly(s, v, hit, at);
     if (m) {
         const struct imp_medium *before = imp__dot(at->ng, s->d) < 0 ? NULL : m;
         if (b->medium != before) return drop(s->walk);
@@ -154,11 +164,6 @@ static bool begin(struct imp_step *s)
     return true;
 }
 
-static enum imp_meeting meet_outside(struct imp_step *s, struct imp_hit *hit)
-{
-    return imp__nearest_hit(s, hit) ? IMP_MEETS_SURFACE : IMP_MEETS_NOTHING;
-}
-
 /* Along the bent ray. T is the ratio of the squared indices at its ends: radiance/n^2 is
  * what stays along a ray. */
 static enum imp_meeting meet_inside(struct imp_step *s, struct imp_hit *hit)
@@ -174,9 +179,10 @@ static enum imp_meeting meet_inside(struct imp_step *s, struct imp_hit *hit)
     s->o = r->at.x - r->end * r->length;
     b->through = b->medium;
     const double ratio = r->j.eta / r->k.eta;
-    last->d.passes = (imp_decided)(ratio * ratio);
-    imp__step_pass(last, last->d.passes);
-    s->beta *= (double)last->d.passes;
+    const double passes = imp__decide1(ratio * ratio);
+    if (s->recorded) last->d.passes = (imp_decided)passes;
+    imp__step_pass(last, passes);
+    s->beta *= passes;
     s->eta /= ratio;
     return IMP_MEETS_SURFACE;
 }
@@ -184,7 +190,7 @@ static enum imp_meeting meet_inside(struct imp_step *s, struct imp_hit *hit)
 const struct imp_segment_ops imp__graded_outside = {.name = "outside",
                                                     .connects = true,
                                                     .begin = begin,
-                                                    .meet = meet_outside,
+                                                    .meet = imp__straight_meet,
                                                     .arrive = arrive,
                                                     .leave = leave,
                                                     .place = imp__graded_place,

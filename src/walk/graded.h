@@ -30,7 +30,8 @@ struct imp_graded_segment {
     const struct imp_medium *medium; /* that it came through; NULL: straight */
     struct imp__ride ride;           /* if through a medium */
     bool moved;                      /* its end depends on an active field */
-    imp_v3 x, d;                     /* end, and unit direction of arrival */
+    struct imp_exact end;
+    imp_v3 d; /* unit direction of arrival, world */
     struct imp_hit hit;
     imp_v3 dp_du, dp_dv;
     imp_spec P; /* adjoint at its end, noted by the sweep */
@@ -43,10 +44,6 @@ static inline struct imp_graded_segment *imp__graded_kept(const struct imp_verte
                ? (struct imp_graded_segment *)v->segment
                : NULL;
 }
-
-/* The index of a boundary is the field's at the place. */
-void imp__graded_inputs(const struct imp_vertex *v, const struct imp_texcoord *at,
-                        imp_spec *in);
 
 /* ---- Derivatives with respect to fields (graded_sweep.c) -------------------------- */
 

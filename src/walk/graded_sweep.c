@@ -94,7 +94,7 @@ static void turn_back(const struct imp_vertex *v, const struct imp__surface *l, 
     struct imp__turn t;
     double inv, d_c, d_eta;
     if (passes(v)) return;
-    const imp_v3 x = imp__graded_kept(v)->x, zero = {0};
+    const imp_v3 x = imp__graded_kept(v)->end.at.p, zero = {0};
     sides_of(v, x, v->ng, d, &s);
     const imp_v3 n = normal_of(l, x, &inv), p = s.near * d;
     imp__turn(&n, &p, s.far, reflects(v), &t);
@@ -140,7 +140,7 @@ static double turn_tangent(const struct imp_vertex *v, const struct imp__surface
     struct imp__turn t;
     double inv, d_c, d_eta;
     if (passes(v)) return 0;
-    const imp_v3 x = imp__graded_kept(v)->x;
+    const imp_v3 x = imp__graded_kept(v)->end.at.p;
     sides_of(v, x, v->ng, d, &s);
     double near_dot = 0, far_dot = 0;
     if (s.medium) {
@@ -217,7 +217,7 @@ static void chain_sweep(const struct imp_tracer *tracer, const struct imp_walk *
             if (v->prev && imp__graded_kept(v->prev)) continue; /* the environment */
             break;
         }
-        imp__level(v->shape, leg->x, v->ng, &level);
+        imp__level(v->shape, leg->end.at.p, v->ng, &level);
         if (v->d.goes_on) {
             if (scatters(v)) lam = mu = (imp_v3){0};
             else
@@ -237,8 +237,9 @@ static void chain_sweep(const struct imp_tracer *tracer, const struct imp_walk *
         }
         if (!leg->medium) { /* x = x0 + t d on the surface */
             struct imp__surface_at sa;
-            imp__surface_eval(&level, &leg->x, &leg->d, &sa);
-            const double t = imp__length(leg->x - imp__graded_kept(v->prev)->x);
+            imp__surface_eval(&level, &leg->end.at.p, &leg->d, &sa);
+            const double t =
+                imp__length(leg->end.at.p - imp__graded_kept(v->prev)->end.at.p);
             lam -= sa.gx * (imp__dot(lam, leg->d) / imp__dot(sa.gx, leg->d));
             mu += t * lam;
             continue;
@@ -288,7 +289,7 @@ imp_spec imp__graded_chain_tangent(const struct imp_tracer *tracer,
         const struct imp_graded_segment *leg = imp__graded_kept(v);
         struct imp__surface level;
         if (!leg) continue;
-        imp__level(v->shape, leg->x, v->ng, &level);
+        imp__level(v->shape, leg->end.at.p, v->ng, &level);
         if (!leg->moved) {
             p_dot = d_dot = (imp_v3){0};
         } else if (leg->medium) {
@@ -304,8 +305,9 @@ imp_spec imp__graded_chain_tangent(const struct imp_tracer *tracer,
             L_dot += before * log_dot;
         } else {
             struct imp__surface_at sa;
-            imp__surface_eval(&level, &leg->x, &leg->d, &sa);
-            p_dot += imp__length(leg->x - imp__graded_kept(v->prev)->x) * d_dot;
+            imp__surface_eval(&level, &leg->end.at.p, &leg->d, &sa);
+            p_dot +=
+                imp__length(leg->end.at.p - imp__graded_kept(v->prev)->end.at.p) * d_dot;
             p_dot -= leg->d * (imp__dot(sa.gx, p_dot) / imp__dot(sa.gx, leg->d));
         }
         if (leg->moved && v->d.met.emitter >= 0) {
@@ -341,8 +343,8 @@ static bool meet(const struct imp_tracer *tracer, const struct imp_vertex *v, im
         x = r.at.x, d = r.end, far = r.length;
     } else {
         struct imp__surface level;
-        imp__level(v->shape, leg->x, v->ng, &level);
-        far = imp__graded_straight(leg->x, &level, x, d);
+        imp__level(v->shape, leg->end.at.p, v->ng, &level);
+        far = imp__graded_straight(leg->end.at.p, &level, x, d);
         x += far * d;
         *ratio = 1;
     }
@@ -359,7 +361,7 @@ bool imp__graded_place(const struct imp_tracer *tracer, const struct imp_vertex 
 {
     const struct imp_graded_segment *leg = imp__graded_kept(v);
     if (!leg || !tracer->active || !tracer->active->medium) return true;
-    imp_v3 x = leg->x, ng = v->ng, d = leg->d;
+    imp_v3 x = leg->end.at.p, ng = v->ng, d = leg->d;
     if (leg->moved) {
         /* The direction that the last vertex sends the ray in now. */
         const struct imp_vertex *u = v->prev;

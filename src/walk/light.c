@@ -26,22 +26,27 @@ static double light_pmf_at(const struct imp_step *s, bool known,
 }
 
 void imp__emission_meet(struct imp_step *s, struct imp_vertex *v, int emitter,
-                        const struct imp_hit *hit, const struct imp_surface *at)
+                        double weight, const struct imp_hit *hit,
+                        const struct imp_surface *at)
 {
     const struct imp_emitter *e = s->scene->emitters[emitter];
-    struct imp_met *m = &v->d.met;
-    m->emitter = emitter;
-    m->dist = at ? (imp_decided)hit->t : (imp_decided)INFINITY;
-    m->cos_light = at ? (imp_decided)-imp__dot(at->n, s->d) : 1;
-    for (int k = 0; k < 3; k++) m->d[k] = (imp_decided)-s->d[k];
+    const struct imp_emission x = {{s->at.uv[0], s->at.uv[1]},
+                                   at ? imp__decide1(hit->t) : INFINITY,
+                                   at ? imp__decide1(-imp__dot(at->n, s->d)) : 1,
+                                   imp__decide(-s->d)};
     if (s->pdf > 0 && imp__wants_lights(s->tracer->integrator)) {
         const double pmf = light_pmf_at(s, s->guided.left, &s->guided.from, emitter);
         const double pe = pmf * e->ops->pdf(e, &s->from, &s->d, hit, at);
-        m->weight = (imp_decided)(m->weight * power_heuristic(s->pdf, pe));
+        weight = imp__decide1(weight * power_heuristic(s->pdf, pe));
     }
-    const struct imp_emission x = imp__vertex_met(v);
-    v->e +=
-        imp__emitter_radiance(s->scene, emitter, &x, imp__decided_v3(v->d.p)) * m->weight;
+    v->e += imp__emitter_radiance(s->scene, emitter, &x, s->at.p) * weight;
+    if (!s->recorded) return;
+    struct imp_met *m = &v->d.met;
+    m->emitter = emitter;
+    m->weight = (imp_decided)weight;
+    m->dist = (imp_decided)x.dist;
+    m->cos_light = (imp_decided)x.cos_light;
+    imp__store_v3(m->d, x.d);
 }
 
 /* A light, by sampling weights or as the guide says; its probability. */
@@ -63,21 +68,20 @@ static int light_choose(const struct imp_step *s, double u, double *pmf)
     return light;
 }
 
-static void decide_light(struct imp_vertex *v, int emitter, double weight,
-                         const struct imp_light_sample *ls, imp_v3 wi)
+static void record(struct imp_vertex *v, int emitter, double weight,
+                   const struct imp_emission *x, imp_v3 p, imp_v3 wi)
 {
     struct imp_light *l = &v->d.light;
     l->emitter = emitter;
     l->weight = (imp_decided)weight;
-    l->uv[0] = (imp_decided)ls->uv[0];
-    l->uv[1] = (imp_decided)ls->uv[1];
-    l->dist = (imp_decided)ls->dist;
-    l->cos_light = (imp_decided)ls->cos_light;
-    for (int k = 0; k < 3; k++) {
-        l->d[k] = (imp_decided)-ls->wi[k];
-        l->p[k] = (imp_decided)ls->p[k];
-        l->wi[k] = (imp_decided)wi[k];
-    }
+    l->uv[0] = (imp_decided)x->uv[0];
+    l->uv[1] = (imp_decided)x->uv[1];
+    l->dist = (imp_decided)x->dist;
+    l->cos_light = (imp_decided)x->cos_light;
+    imp__store_v3(l->d, x->d);
+    imp__store_v3(l->p, p);
+    imp__store_v3(l->wi, wi);
+    v->d.connection = IMP_OCCLUDED; /* until it is seen */
 }
 
 void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
@@ -85,6 +89,7 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
                        struct imp_shadow *shadow)
 {
     const struct imp_scene *scene = s->scene;
+    const struct imp_bsdf *b = v->bsdf;
     const struct imp_key key = s->walk->key;
     if (scene->n_emitters == 0) return;
 
@@ -98,33 +103,42 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
                          imp__u01(key, imp__dim(s->depth, IMP_DIM_LIGHT_V))};
     struct imp_light_sample ls;
     if (!e->ops->sample(e, &at->p, u, &ls) || !(ls.pdf > 0)) return;
+    if ((e->ops->flags & IMP_EMITTER_AREA) && !(ls.cos_light > 0)) return; /* its back */
 
     /* Its weight against the continuation that could have met it. */
-    const imp_v3 wi = imp__to_local(frame, ls.wi);
-    const struct imp_dirs there = {imp__decided_v3(v->d.wo), wi, IMP_SMOOTH};
-    const double kernel = v->bsdf->ops->pdf(v->bsdf, v->in, &there);
+    const struct imp_dirs dirs = {s->wo, imp__decide(imp__to_local(frame, ls.wi)),
+                                  IMP_SMOOTH};
+    const double kernel = b->ops->pdf(b, s->in, &dirs);
     if (!(kernel > 0)) return; /* structurally zero: nothing to see, no derivative */
-    const double pdf = imp__direction_pdf(s, v->bsdf, kernel, ls.wi);
+    const double pdf = imp__direction_pdf(s, b, kernel, ls.wi);
     const double p = ls.pdf * pmf;
     const bool alone =
         (e->ops->flags & IMP_EMITTER_DELTA) || s->tracer->integrator->bsdf_samples == 0;
-    decide_light(v, light, (alone ? 1 : power_heuristic(p, pdf)) / p, &ls, wi);
+    const double weight = imp__decide1((alone ? 1 : power_heuristic(p, pdf)) / p);
 
     /* What it brings, if it is seen. */
-    const struct imp_emission x = imp__light_emission(&v->d.light);
-    const struct imp_dirs dirs = imp__light_dirs(v);
-    v->light_e = imp__emitter_radiance(scene, light, &x, imp__decided_v3(v->d.light.p));
-    v->bsdf->ops->eval(v->bsdf, v->in, &dirs, &v->light_f);
+    const struct imp_emission x = {{imp__decide1(ls.uv[0]), imp__decide1(ls.uv[1])},
+                                   imp__decide1(ls.dist),
+                                   imp__decide1(ls.cos_light),
+                                   imp__decide(-ls.wi)};
+    const bool far = !isfinite(ls.dist);
+    const imp_v3 point = imp__decide(far ? (imp_v3){0} : ls.p);
+    const imp_spec le = imp__emitter_radiance(scene, light, &x, point);
+    imp_spec f;
+    b->ops->eval(b, s->in, &dirs, &f);
     const struct imp_active *active = s->tracer->active;
     const bool differentiable =
-        active &&
-        ((v->bsdf->index >= 0 && active->bsdf[v->bsdf->index]) || active->emitter[light]);
-    if (imp__is_zero(v->light_f * v->light_e) && !differentiable) return;
-    v->d.connection = IMP_OCCLUDED; /* until it is seen */
+        active && ((b->index >= 0 && active->bsdf[b->index]) || active->emitter[light]);
+    if (imp__is_zero(f * le) && !differentiable) return;
+    shadow->brings = f * le * weight;
+    if (s->recorded) {
+        record(v, light, weight, &x, point, dirs.wi);
+        v->light_f = f;
+        v->light_e = le;
+    }
 
     /* Aimed from the moved origin at the point itself: a ray parallel to wi would meet a
      * concave light before its end. */
-    const bool far = !isfinite(ls.dist);
     shadow->o = imp__offset(at->p, at->ng, ls.wi);
     shadow->d = far ? ls.wi : ls.p - shadow->o; /* then t = 1 is the light */
     shadow->reach = far ? INFINITY : 1 - 10 * IMP_RAY_EPSILON;

@@ -23,22 +23,22 @@ static bool throughput_add(struct imp_step *s, const struct imp_bsdf *b, imp_spe
     return !imp__is_zero(s->beta);
 }
 
-/* Survival probability in v->d.survive; false: the walk ends. Zero factors that still
+/* Survival probability, as decided; false: the walk ends. Zero factors that still
  * have a derivative are left out of beta, so roulette sees the walk as if they were not
  * there (docs/estimators.md 9.1, 9.2). */
-static bool roulette(struct imp_step *s, struct imp_vertex *v)
+static bool roulette(struct imp_step *s, const struct imp_bsdf *b, double *survive)
 {
     const struct imp_integrator *integrator = s->tracer->integrator;
     const bool guided = imp_unlikely(s->guided.reference > 0);
     if (integrator->kind == IMP_INTEGRATOR_STAM) { /* `absorb` has drawn already */
-        v->d.survive = (imp_decided)(1 - v->bsdf->absorb);
+        *survive = imp__decide1(1 - b->absorb);
         return true;
     }
     if (s->depth + 1 < integrator->rr_depth && !guided) return true;
     double q = fmin(imp__max3(s->beta) * s->eta * s->eta, 0.95);
     if (guided) q = imp__guided_survival(s, q);
-    v->d.survive = (imp_decided)q;
-    return imp__u01(s->walk->key, imp__dim(s->depth, IMP_DIM_SURVIVE)) < v->d.survive;
+    *survive = imp__decide1(q);
+    return imp__u01(s->walk->key, imp__dim(s->depth, IMP_DIM_SURVIVE)) < *survive;
 }
 
 bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_surface *at,
@@ -49,28 +49,35 @@ bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_sur
                          imp__u01(key, imp__dim(s->depth, IMP_DIM_DIR_U)),
                          imp__u01(key, imp__dim(s->depth, IMP_DIM_DIR_V))};
     const struct imp_bsdf *b = v->bsdf;
-    struct imp_dirs dirs = {.wo = imp__decided_v3(v->d.wo), .lobe = IMP_SMOOTH};
+    struct imp_dirs dirs = {.wo = s->wo_drawn, .lobe = IMP_SMOOTH};
 
     /* The direction, its density and its value. */
-    if (!imp__direction_draw(s, v, frame, u, &dirs)) return false;
-    for (int k = 0; k < 3; k++) v->d.wi[k] = (imp_decided)dirs.wi[k];
-    v->d.lobe = (int8_t)dirs.lobe;
+    if (!imp__direction_draw(s, b, frame, u, &dirs)) return false;
     const imp_v3 w = imp__to_world(frame, dirs.wi);
-    dirs = imp__vertex_dirs(v);
-    const double kernel = b->ops->pdf(b, v->in, &dirs);
+    dirs.wo = s->wo;
+    dirs.wi = imp__decide(dirs.wi);
+    const double kernel = b->ops->pdf(b, s->in, &dirs);
     if (!(kernel > 0)) return false; /* structurally zero */
-    v->d.pdf = (imp_decided)imp__direction_pdf(s, b, kernel, w);
-    if (!(v->d.pdf > 0)) return false;
+    const double pdf = imp__decide1(imp__direction_pdf(s, b, kernel, w));
+    if (!(pdf > 0)) return false;
     imp_spec f;
-    b->ops->eval(b, v->in, &dirs, &f);
+    b->ops->eval(b, s->in, &dirs, &f);
 
     /* Does the walk go on? */
+    double survive = 1;
     if (imp_unlikely(s->guided.guide != NULL)) s->guided.before = s->beta;
-    if (!throughput_add(s, b, f * (1 / (double)v->d.pdf))) return false;
-    if (b->ops->index_ratio) s->eta *= b->ops->index_ratio(b, v->in, &dirs);
-    if (!roulette(s, v)) return false;
-    s->beta *= imp__spec(1 / (double)v->d.survive);
-    imp__step_weigh(v, f);
+    if (!throughput_add(s, b, f * (1 / pdf))) return false;
+    if (b->ops->index_ratio) s->eta *= b->ops->index_ratio(b, s->in, &dirs);
+    if (!roulette(s, b, &survive)) return false;
+    s->beta *= imp__spec(1 / survive);
+    imp__step_weigh(v, f, pdf, survive);
+    if (s->recorded) {
+        imp__store_v3(v->d.wi, dirs.wi);
+        v->d.lobe = (int8_t)dirs.lobe;
+        v->d.pdf = (imp_decided)pdf;
+        v->d.survive = (imp_decided)survive;
+        v->d.goes_on = true;
+    }
 
     /* The next ray. */
     imp__guided_leave(&s->guided);
@@ -81,6 +88,6 @@ bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_sur
     s->t_max = INFINITY;
     if (imp_unlikely(s->segment->leave != NULL)) s->segment->leave(s, v, at);
     /* Where no connection could have been made, MIS has nothing to weigh. */
-    s->pdf = dirs.lobe == IMP_SMOOTH && s->segment->connects ? v->d.pdf : 0;
+    s->pdf = dirs.lobe == IMP_SMOOTH && s->segment->connects ? pdf : 0;
     return true;
 }

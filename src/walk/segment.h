@@ -61,11 +61,6 @@ struct imp_segment_ops {
                         const double *x_dot);
 };
 
-/* One segment of a record; kinds put what they keep behind it. */
-struct imp_segment {
-    const struct imp_segment_ops *ops;
-};
-
 extern struct imp_segment imp__straight; /* nothing to keep */
 
 /* The kind that the first segment of a walk has in this scene. */

@@ -4,16 +4,16 @@
  * lobe's exponent may follow the direction that was drawn with it. */
 #include "step.h"
 
-bool imp__absorb(struct imp_step *s, struct imp_vertex *v)
+bool imp__absorb(struct imp_step *s, const struct imp_bsdf *b, double *weight)
 {
-    const double a = v->bsdf->absorb;
+    const double a = b->absorb;
     if (!(a > 0)) return false;
     if (imp__u01(s->walk->key, imp__dim(s->depth, IMP_DIM_SURVIVE)) < a) {
         s->walk->absorbed = true;
-        v->d.met.weight = v->d.glow_weight = (imp_decided)(1 / a);
+        *weight = imp__decide1(1 / a);
         return true;
     }
-    v->d.met.weight = v->d.glow_weight = 0;
+    *weight = 0;
     return false;
 }
 
@@ -31,6 +31,6 @@ void imp__attached_d(const struct imp_walk *walk, const struct imp_vertex *v, in
         imp_v3
             dwi; /* its factor, the slope of what arrives, is 0 where this is allowed */
         if (b->ops->sample_d(b, v->in, u, &dirs, j, &dweight, &dwi))
-            d[j] = dweight * (v->scale * v->d.pdf); /* 1/s */
+            d[j] = dweight * (v->scale * (double)v->d.pdf); /* 1/s */
     }
 }

@@ -24,7 +24,14 @@ struct imp_step {
     const struct imp_scene *scene;
     struct imp_walk *walk;
     struct imp_arena *arena;
+    bool recorded; /* also where only the value counts, if vertices move with a field */
     int depth;
+
+    /* The vertex at work: as decided, in double; its inputs. */
+    struct imp_texcoord at;
+    imp_v3 wo, wo_drawn; /* as decided; before rounding, from which the walk goes on */
+    const imp_spec *in;
+    imp_spec *scratch; /* [IMP_INPUTS_MAX] inputs of a walk that is not recorded */
 
     /* The ray in flight. */
     const struct imp_segment_ops *segment;
@@ -42,37 +49,76 @@ struct imp_step {
     struct imp_guided guided;
 };
 
-/* ---- trace.c ---- */
-/* The nearest hit of the ray in flight. With hide_emitters, a camera ray skips area
- * lights. */
-bool imp__nearest_hit(struct imp_step *s, struct imp_hit *hit);
+/* What a record stores of v, in double again. */
+static inline imp_v3 imp__decide(imp_v3 v)
+{
+    imp_decided4 stored = __builtin_convertvector(v, imp_decided4);
+    IMP_OPAQUE(stored);
+    return __builtin_convertvector(stored, imp_v3);
+}
+static inline double imp__decide1(double x)
+{
+    imp_decided stored = (imp_decided)x;
+    IMP_OPAQUE(stored);
+    return stored;
+}
+static inline void imp__store_v3(imp_decided out[3], imp_v3 v)
+{
+    const imp_decided4 rounded = __builtin_convertvector(v, imp_decided4);
+    for (int k = 0; k < 3; k++) out[k] = rounded[k];
+}
 
+/* ---- trace.c ---- */
 /* Where the surface is, as decided, and its inputs; d: direction of arrival, t: length of
  * the segment that leads there. */
-void imp__vertex_place(struct imp_vertex *v, const struct imp_surface *at,
-                       const struct imp_frame *frame, imp_v3 d, double t);
+void imp__vertex_place(struct imp_step *s, struct imp_vertex *v,
+                       const struct imp_surface *at, const struct imp_frame *frame,
+                       imp_v3 d, double t);
+
+/* ---- segment.c ---- */
+/* The nearest hit of the ray in flight. With hide_emitters, a camera ray skips area
+ * lights. */
+enum imp_meeting imp__straight_meet(struct imp_step *s, struct imp_hit *hit);
 
 /* ---- evaluate.c: the values of a vertex from its decisions ---- */
-void imp__evaluate_inputs(const struct imp_vertex *v, const struct imp_texcoord *at,
-                          imp_spec *in);
-imp_spec imp__evaluate_glow(const struct imp_vertex *v, const imp_spec *in,
-                            const imp_v3 *wo);
+/* The index of a boundary is that of the medium behind it (graded.c). */
+void imp__graded_inputs(const struct imp_bsdf *b, const struct imp_shape *shape,
+                        const struct imp_texcoord *at, imp_spec *in);
+static inline void imp__evaluate_inputs(const struct imp_bsdf *b,
+                                        const struct imp_shape *shape,
+                                        const struct imp_texcoord *at, imp_spec *in)
+{
+    imp__inputs_eval(b->input, b->n_in, at, in);
+    if (imp_unlikely(shape->interior != NULL)) imp__graded_inputs(b, shape, at, in);
+}
 /* f with densities frozen becomes the weight of the step; T of the segment that follows
  * is not known yet. */
-void imp__step_weigh(struct imp_vertex *v, imp_spec f);
+static inline void imp__step_weigh(struct imp_vertex *v, imp_spec f, double pdf,
+                                   double survive)
+{
+    v->scale = 1 / (pdf * survive);
+    v->w = f * v->scale;
+}
 /* ... and now it is. */
-void imp__step_pass(struct imp_vertex *v, double transmittance);
+static inline void imp__step_pass(struct imp_vertex *v, double transmittance)
+{
+    v->scale *= transmittance;
+    v->w *= transmittance;
+}
 
 /* ---- light.c ---- */
-/* The shadow ray of a light sample; `wanted` false: there is nothing to see. */
+/* The shadow ray of a light sample, and what it brings if nothing is in its way; `wanted`
+ * false: there is nothing to see. */
 struct imp_shadow {
     imp_v3 o, d;
     double reach;
+    imp_spec brings;
     bool wanted;
 };
 /* Emission met by the ray at an area light, or the environment (hit, at NULL). */
 void imp__emission_meet(struct imp_step *s, struct imp_vertex *v, int emitter,
-                        const struct imp_hit *hit, const struct imp_surface *at);
+                        double weight, const struct imp_hit *hit,
+                        const struct imp_surface *at);
 /* Light sample at v: choose an emitter and a point on it. Whether it is visible is asked
  * later, after the continuation is drawn: neither waits for the other's arithmetic. */
 void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
@@ -82,8 +128,9 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
 /* ---- stam.c ---- */
 /* Stam's termination: with probability `absorb` the walk ends and collects what glows
  * here, divided by it; else it goes on, divided by the rest (docs/estimators.md 6, E22 to
- * E24). */
-bool imp__absorb(struct imp_step *s, struct imp_vertex *v);
+ * E24). Weight of the emission here: 1/absorb, or 0 where the walk goes on; 1 where
+ * nothing absorbs. */
+bool imp__absorb(struct imp_step *s, const struct imp_bsdf *b, double *weight);
 /* Stam's exponent by the attached form, or only its first term as in his App. C
  * (docs/estimators.md 4, E9): replaces the detached derivative of the inputs where the
  * kind offers it. d [n_in]. */
@@ -91,14 +138,26 @@ void imp__attached_d(const struct imp_walk *walk, const struct imp_vertex *v, in
                      imp_spec *d);
 
 /* ---- direction.c ---- */
-/* Draw the continuation of v, as imp_bsdf_ops.sample does, from the mixture of densities
- * that know the place. */
-bool imp__direction_draw(const struct imp_step *s, const struct imp_vertex *v,
-                         const struct imp_frame *frame, const double u[3],
-                         struct imp_dirs *dirs);
+/* Draw the continuation, as imp_bsdf_ops.sample does, from the mixture of densities that
+ * know the place. */
+bool imp__mixture_draw(const struct imp_step *s, const struct imp_bsdf *b,
+                       const struct imp_frame *frame, const double u[3],
+                       struct imp_dirs *dirs);
 /* Density of a direction, world w, for which the BSDF alone has `kernel`. */
-double imp__direction_pdf(const struct imp_step *s, const struct imp_bsdf *b,
-                          double kernel, imp_v3 w);
+double imp__mixture_pdf(const struct imp_step *s, const struct imp_bsdf *b, double kernel,
+                        imp_v3 w);
+static inline bool imp__direction_draw(const struct imp_step *s, const struct imp_bsdf *b,
+                                       const struct imp_frame *frame, const double u[3],
+                                       struct imp_dirs *dirs)
+{
+    return imp_unlikely(s->guided.here) ? imp__mixture_draw(s, b, frame, u, dirs)
+                                        : b->ops->sample(b, s->in, u, dirs);
+}
+static inline double imp__direction_pdf(const struct imp_step *s,
+                                        const struct imp_bsdf *b, double kernel, imp_v3 w)
+{
+    return imp_unlikely(s->guided.here) ? imp__mixture_pdf(s, b, kernel, w) : kernel;
+}
 
 /* ---- scatter.c ---- */
 /* Decide whether and whither the walk goes on. False: it ends here. */

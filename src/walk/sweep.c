@@ -12,9 +12,7 @@ imp_spec imp__walk_fold(struct imp_walk *walk)
     imp_spec L = {0};
     for (struct imp_vertex *v = walk->last; v; v = v->prev) {
         v->beyond = L;
-        L = v->e + v->w * L;
-        if (v->d.connection == IMP_CONNECTED)
-            L += v->light_f * v->light_e * v->d.light.weight;
+        L = v->e + v->w * L + v->b;
     }
     return L;
 }
@@ -29,7 +27,7 @@ static bool bsdf_active(const struct imp_active *a, const struct imp_bsdf *b)
 /* E_k through the BSDF's own emission: d[n_in]. */
 static void glow_d(const struct imp_vertex *v, imp_spec *d)
 {
-    const imp_v3 wo = imp__decided_v3(v->d.wo);
+    const imp_v3 wo = imp__vertex_wo(v);
     v->bsdf->ops->emit_d(v->bsdf, v->in, &wo, d);
     for (int j = 0; j < v->bsdf->n_in; j++) d[j] *= v->d.glow_weight;
 }

@@ -10,10 +10,11 @@
  * and after a delta lobe. Depth: emission at vertex k counts if k < max_depth, scattering
  * goes on and samples lights if k + 1 < max_depth (scene-format 11). */
 #include "step.h"
+#include <stddef.h>
 
 /* ---- Vertices -------------------------------------------------------------------- */
 
-/* With room behind it for n_in inputs of its BSDF. */
+/* With room behind it for n_in inputs of its BSDF, unless only its value counts. */
 static struct imp_vertex *vertex_add(struct imp_step *s, int n_in)
 {
     struct imp_walk *w = s->walk;
@@ -21,8 +22,9 @@ static struct imp_vertex *vertex_add(struct imp_step *s, int n_in)
         w->dropped = IMP_DROP_LONG;
         return NULL;
     }
-    struct imp_vertex *v =
-        imp__arena_take(s->arena, 1, sizeof *v + (size_t)n_in * sizeof *v->in);
+    struct imp_vertex *v = imp__arena_take(
+        s->arena, 1,
+        s->recorded ? sizeof *v + (size_t)n_in * sizeof *v->in : IMP_VERTEX_VALUES);
     if (imp_unlikely(!v)) {
         w->dropped = IMP_DROP_MEMORY;
         return NULL;
@@ -35,11 +37,12 @@ static struct imp_vertex *vertex_add(struct imp_step *s, int n_in)
     w->n++;
     v->bsdf = NULL;
     v->shape = NULL;
+    v->w = v->e = v->b = v->beyond = (imp_spec){0};
+    v->scale = 0;
+    if (!s->recorded) return v;
+
     v->segment = &imp__straight;
     v->in = (imp_spec *)(v + 1);
-    v->w = v->e = v->beyond = (imp_spec){0};
-    v->scale = 0;
-
     struct imp_decision *d = &v->d;
     d->shape = d->met.emitter = -1;
     d->connection = IMP_NOT_CONNECTED;
@@ -50,37 +53,31 @@ static struct imp_vertex *vertex_add(struct imp_step *s, int n_in)
     return v;
 }
 
-static void decide_v3(imp_decided out[3], imp_v3 v)
+static inline void vertex_place(struct imp_step *s, struct imp_vertex *v,
+                                const struct imp_surface *at,
+                                const struct imp_frame *frame, imp_v3 d, double t)
 {
-    for (int k = 0; k < 3; k++) out[k] = (imp_decided)v[k];
-}
-
-/* Where the surface is, as decided; `t` is the length of the segment that leads there. */
-void imp__vertex_place(struct imp_vertex *v, const struct imp_surface *at,
-                       const struct imp_frame *frame, imp_v3 d, double t)
-{
-    v->ng = at->ng;
+    imp_spec *in = s->recorded ? v->in : s->scratch;
     v->t = t;
-    v->d.uv[0] = (imp_decided)at->uv[0];
-    v->d.uv[1] = (imp_decided)at->uv[1];
-    decide_v3(v->d.p, at->p);
-    decide_v3(v->d.wo, imp__to_local(frame, -d));
-    const struct imp_texcoord where = imp__vertex_at(v);
-    imp__evaluate_inputs(v, &where, v->in);
+    s->at.uv[0] = imp__decide1(at->uv[0]);
+    s->at.uv[1] = imp__decide1(at->uv[1]);
+    s->at.p = imp__decide(at->p);
+    s->wo_drawn = imp__to_local(frame, -d);
+    s->wo = imp__decide(s->wo_drawn);
+    s->in = in;
+    imp__evaluate_inputs(v->bsdf, v->shape, &s->at, in);
+    if (!s->recorded) return;
+    v->ng = at->ng;
+    v->d.uv[0] = (imp_decided)s->at.uv[0];
+    v->d.uv[1] = (imp_decided)s->at.uv[1];
+    imp__store_v3(v->d.p, s->at.p);
+    imp__store_v3(v->d.wo, s->wo);
 }
-
-/* ---- The ray in flight ------------------------------------------------------------ */
-
-bool imp__nearest_hit(struct imp_step *s, struct imp_hit *hit)
+void imp__vertex_place(struct imp_step *s, struct imp_vertex *v,
+                       const struct imp_surface *at, const struct imp_frame *frame,
+                       imp_v3 d, double t)
 {
-    const bool hide = s->tracer->integrator->hide_emitters && s->depth == 0;
-    while (imp__intersect(s->scene, &s->o, &s->d, s->t_min, s->t_max, hit)) {
-        if (!hide || s->scene->shapes[hit->shape]->emitter < 0) return true;
-        const imp_v3 p = s->o + s->d * hit->t;
-        const double scale = fmax(fabs(p[0]), fmax(fabs(p[1]), fabs(p[2])));
-        s->t_min = hit->t + (1 + scale) * IMP_RAY_EPSILON;
-    }
-    return false;
+    vertex_place(s, v, at, frame, d, t);
 }
 
 /* ---- One step --------------------------------------------------------------------- */
@@ -102,10 +99,13 @@ static void sky_meet(struct imp_step *s, bool counts)
     struct imp_vertex *v = vertex_add(s, 0);
     if (!v) return;
     v->t = INFINITY;
-    v->d.scatterer = IMP_AT_SKY;
-    v->d.uv[0] = v->d.uv[1] = 0;
-    decide_v3(v->d.p, s->d);
-    imp__emission_meet(s, v, s->scene->environment, NULL, NULL);
+    s->at = (struct imp_texcoord){{0, 0}, imp__decide(s->d)};
+    if (s->recorded) {
+        v->d.scatterer = IMP_AT_SKY;
+        v->d.uv[0] = v->d.uv[1] = 0;
+        imp__store_v3(v->d.p, s->at.p);
+    }
+    imp__emission_meet(s, v, s->scene->environment, 1, NULL, NULL);
     s->walk->valid |= seen(s);
 }
 
@@ -120,10 +120,12 @@ static struct imp_vertex *surface_meet(struct imp_step *s, struct imp_hit *hit,
     if (!v) return NULL;
     v->shape = shape;
     v->bsdf = bsdf;
-    v->d.shape = hit->shape;
-    v->d.scatterer = bsdf->flags & IMP_BSDF_NULL ? IMP_AT_BOUNDARY : IMP_AT_SURFACE;
+    if (s->recorded) {
+        v->d.shape = hit->shape;
+        v->d.scatterer = bsdf->flags & IMP_BSDF_NULL ? IMP_AT_BOUNDARY : IMP_AT_SURFACE;
+    }
     *frame = (struct imp_frame){at->s, at->t, at->n};
-    imp__vertex_place(v, at, frame, s->d, hit->t);
+    vertex_place(s, v, at, frame, s->d, hit->t);
     if (imp_unlikely(s->segment->arrive != NULL)) {
         if (!s->segment->arrive(s, v, hit, at)) return NULL;
         *frame = (struct imp_frame){at->s, at->t, at->n};
@@ -132,16 +134,20 @@ static struct imp_vertex *surface_meet(struct imp_step *s, struct imp_hit *hit,
 }
 
 /* Light that leaves the vertex by itself: what its BSDF glows with, and its emitter. */
-static void emission_add(struct imp_step *s, struct imp_vertex *v,
+static void emission_add(struct imp_step *s, struct imp_vertex *v, double weight,
                          const struct imp_hit *hit, const struct imp_surface *at)
 {
     if (v->bsdf->flags & IMP_BSDF_EMIT) {
-        const imp_v3 wo = imp__decided_v3(v->d.wo);
-        v->d.glows = true;
-        v->e += imp__evaluate_glow(v, v->in, &wo);
+        imp_spec glow;
+        v->bsdf->ops->emit(v->bsdf, s->in, &s->wo, &glow);
+        v->e += glow * weight;
+        if (s->recorded) {
+            v->d.glows = true;
+            v->d.glow_weight = (imp_decided)weight;
+        }
     }
     if (v->shape->emitter >= 0) {
-        imp__emission_meet(s, v, v->shape->emitter, hit, at);
+        imp__emission_meet(s, v, v->shape->emitter, weight, hit, at);
         s->walk->valid |= seen(s);
     }
 }
@@ -166,17 +172,19 @@ static bool step(struct imp_step *s)
     if (imp_unlikely(s->guided.guide != NULL)) imp__guided_arrive(s, &hit, &at);
 
     /* Stam's walk collects emission only where it is absorbed. */
+    double emits = 1;
     const bool stam = integrator->kind == IMP_INTEGRATOR_STAM;
-    const bool absorbed = stam && counts && imp__absorb(s, v);
+    const bool absorbed = stam && counts && imp__absorb(s, v->bsdf, &emits);
     if (stam) s->walk->valid = true;
 
     /* Emission that is met. */
-    if (counts && v->d.met.weight > 0) emission_add(s, v, &hit, &at);
+    if (counts && emits > 0) emission_add(s, v, emits, &hit, &at);
     if (absorbed || !goes_on) return false;
-    if (v->d.scatterer != IMP_AT_BOUNDARY) s->walk->valid = true;
+    if (!(v->bsdf->flags & IMP_BSDF_NULL)) s->walk->valid = true;
 
     /* The connection to a light. */
-    struct imp_shadow shadow = {.wanted = false};
+    struct imp_shadow shadow;
+    shadow.wanted = false;
     if ((v->bsdf->flags & IMP_BSDF_SMOOTH) && s->segment->connects &&
         imp__wants_lights(integrator))
         imp__light_sample(s, v, &at, &frame, &shadow);
@@ -184,12 +192,15 @@ static bool step(struct imp_step *s)
     /* The continuation. */
     const bool only_lights =
         integrator->kind == IMP_INTEGRATOR_DIRECT && integrator->bsdf_samples == 0;
-    v->d.goes_on = !only_lights && imp__scatter(s, v, &at, &frame);
+    const bool continues = !only_lights && imp__scatter(s, v, &at, &frame);
 
     /* Is the light seen? */
-    if (shadow.wanted && !imp__occluded(s->scene, &shadow.o, &shadow.d, 0, shadow.reach))
-        v->d.connection = IMP_CONNECTED;
-    return v->d.goes_on;
+    if (shadow.wanted &&
+        !imp__occluded(s->scene, &shadow.o, &shadow.d, 0, shadow.reach)) {
+        v->b = shadow.brings;
+        if (s->recorded) v->d.connection = IMP_CONNECTED;
+    }
+    return continues;
 }
 
 /* ---- Walks ------------------------------------------------------------------------ */
@@ -237,10 +248,14 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
     const double lens[2] = {imp__u01(key, IMP_DIM_LENS_U), imp__u01(key, IMP_DIM_LENS_V)};
     sensor->ops->ray(sensor, walk->px, walk->py, lens, &walk->ray);
 
+    imp_spec scratch[IMP_INPUTS_MAX];
     struct imp_step s = {.tracer = tracer,
                          .scene = tracer->scene,
                          .walk = walk,
                          .arena = arena,
+                         .recorded = !tracer->value_only ||
+                                     (tracer->active && tracer->active->medium),
+                         .scratch = scratch,
                          .segment = imp__segment_first(tracer->scene),
                          .o = walk->ray.o,
                          .d = walk->ray.d,

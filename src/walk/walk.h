@@ -28,7 +28,11 @@
 
 /* ---- Decisions ------------------------------------------------------------------- */
 
-typedef double imp_decided;
+/* Decisions are rounded to what a kept record stores before they are first evaluated:
+ * evaluating a kept record gives the walk's value and gradient to the bit. Rays go on
+ * from places and directions in double. */
+typedef float imp_decided;
+typedef imp_decided imp_decided4 __attribute__((vector_size(4 * sizeof(imp_decided))));
 
 enum imp_scatterer {
     IMP_AT_SURFACE,  /* a BSDF */
@@ -71,26 +75,41 @@ struct imp_decision {
 
 /* ---- Record ---------------------------------------------------------------------- */
 
-struct imp_segment;
 struct imp_segment_ops;
+
+/* One segment of a record; kinds put what they keep behind it (segment.h). */
+struct imp_segment {
+    const struct imp_segment_ops *ops;
+    /* Where the vertex at its end moves with a parameter, differences of it are compared
+     * with derivatives: place and direction of arrival are not rounded then. Else NULL.
+     */
+    const struct imp_exact {
+        struct imp_texcoord at;
+        imp_v3 wo;
+    } * exact;
+};
 
 struct imp_vertex {
     struct imp_vertex *prev, *next;
-    struct imp_decision d;
     const struct imp_bsdf *bsdf;   /* of the surface; NULL at the sky */
     const struct imp_shape *shape; /* NULL at the sky */
-    struct imp_segment *segment;   /* from the last vertex to here (segment.h) */
-    imp_v3 ng;                     /* geometric normal, world */
-    double t;                      /* length of the segment */
+    double t;                      /* length of the segment that leads here */
+    double scale;                  /* T/(p s) */
 
-    /* Values. B_k = light_f light_e light.weight. */
-    imp_spec *in;              /* [bsdf->n_in] inputs at this point */
-    imp_spec e;                /* E_k: all emission of this vertex, weighted */
-    imp_spec light_f, light_e; /* BSDF towards the light, and its radiance */
-    double scale;              /* T/(p s) */
-    imp_spec w;                /* f scale: weight of the step to the next vertex */
-    imp_spec beyond;           /* L_{k+1}, set by fold */
+    /* Values. */
+    imp_spec e;      /* E_k: all emission of this vertex, weighted */
+    imp_spec b;      /* B_k = light_f light_e light.weight */
+    imp_spec w;      /* f scale: weight of the step to the next vertex */
+    imp_spec beyond; /* L_{k+1}, set by fold */
+
+    /* Walks for their value alone keep nothing from here on. */
+    imp_v3 ng;                   /* geometric normal, world */
+    imp_spec light_f, light_e;   /* BSDF towards the light, and its radiance */
+    struct imp_segment *segment; /* from the last vertex to here (segment.h) */
+    imp_spec *in;                /* [bsdf->n_in] inputs at this point */
+    struct imp_decision d;
 };
+#define IMP_VERTEX_VALUES offsetof(struct imp_vertex, ng) /* bytes */
 
 enum imp_drop {
     IMP_DROP_NONE,
@@ -144,6 +163,7 @@ struct imp_tracer {
     const struct imp_active *active;
     uint64_t seed;
     const struct imp_guide *guide; /* of PATH; NULL: none */
+    bool value_only;               /* a walk's L is wanted, and no record of it */
 };
 
 /* The guide that walks of this integrator follow: its densities are made for paths, in
@@ -176,8 +196,16 @@ void imp__walk_position(const struct imp_tracer *tracer, int x, int y, int64_t s
 imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk *walk);
 
 /* Radiance of an emitter at x, point p of it, at the scene's present parameters. */
-imp_spec imp__emitter_radiance(const struct imp_scene *scene, int emitter,
-                               const struct imp_emission *x, imp_v3 p);
+static inline imp_spec imp__emitter_radiance(const struct imp_scene *scene, int emitter,
+                                             const struct imp_emission *x, imp_v3 p)
+{
+    const struct imp_emitter *e = scene->emitters[emitter];
+    const struct imp_texcoord at = {{x->uv[0], x->uv[1]}, p};
+    imp_spec in[IMP_INPUTS_MAX], le;
+    imp__inputs_eval(e->input, e->n_in, &at, in);
+    e->ops->eval(e, in, x, &le);
+    return le;
+}
 
 /* ---- Fold, sweep, tangent (sweep.c) ---------------------------------------------- */
 
@@ -196,22 +224,28 @@ imp_spec imp__walk_tangent(const struct imp_tracer *tracer, const struct imp_wal
 
 static inline imp_v3 imp__decided_v3(const imp_decided v[3])
 {
-    return imp__v3(v[0], v[1], v[2]);
+    return __builtin_convertvector(((imp_decided4){v[0], v[1], v[2], 0}), imp_v3);
 }
 static inline struct imp_texcoord imp__vertex_at(const struct imp_vertex *v)
 {
+    if (imp_unlikely(v->segment->exact != NULL)) return v->segment->exact->at;
     return (struct imp_texcoord){{v->d.uv[0], v->d.uv[1]}, imp__decided_v3(v->d.p)};
+}
+static inline imp_v3 imp__vertex_wo(const struct imp_vertex *v)
+{
+    if (imp_unlikely(v->segment->exact != NULL)) return v->segment->exact->wo;
+    return imp__decided_v3(v->d.wo);
 }
 static inline struct imp_dirs imp__vertex_dirs(const struct imp_vertex *v)
 {
-    return (struct imp_dirs){imp__decided_v3(v->d.wo), imp__decided_v3(v->d.wi),
-                             v->d.lobe};
+    return (struct imp_dirs){imp__vertex_wo(v), imp__decided_v3(v->d.wi), v->d.lobe};
 }
 static inline struct imp_emission imp__vertex_met(const struct imp_vertex *v)
 {
     const struct imp_met *m = &v->d.met;
+    const struct imp_texcoord at = imp__vertex_at(v);
     return (struct imp_emission){
-        {v->d.uv[0], v->d.uv[1]}, m->dist, m->cos_light, imp__decided_v3(m->d)};
+        {at.uv[0], at.uv[1]}, m->dist, m->cos_light, imp__decided_v3(m->d)};
 }
 static inline struct imp_emission imp__light_emission(const struct imp_light *l)
 {
@@ -224,7 +258,7 @@ static inline struct imp_texcoord imp__light_at(const struct imp_light *l)
 }
 static inline struct imp_dirs imp__light_dirs(const struct imp_vertex *v)
 {
-    return (struct imp_dirs){imp__decided_v3(v->d.wo), imp__decided_v3(v->d.light.wi),
+    return (struct imp_dirs){imp__vertex_wo(v), imp__decided_v3(v->d.light.wi),
                              IMP_SMOOTH};
 }
 

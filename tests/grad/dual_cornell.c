@@ -83,8 +83,11 @@ int main(void)
     test_must(ctx, imp_scene_find_param(scene, "red.reflectance.value", &red));
     chosen[red] = 1;
     test_must(ctx, imp__active_create(scene, chosen, &active));
-    const struct imp_tracer tracer = {
-        scene, &scene->integrator, scene->sensors[0], &active, 11, NULL};
+    const struct imp_tracer tracer = {.scene = scene,
+                                      .integrator = &scene->integrator,
+                                      .sensor = scene->sensors[0],
+                                      .active = &active,
+                                      .seed = 11};
     struct imp_arena arena;
     imp__arena_init(&arena, ctx);
     double worst_value = 0, worst_slope = 0, total = 0, cross = 0, largest = 0;
