@@ -98,7 +98,8 @@ struct rays {
 static void rays_record(imp_context *ctx, imp_scene *scene, struct rays *out)
 {
     const struct imp_sensor *sensor = scene->sensors[0];
-    const struct imp_tracer tracer = {scene, &scene->integrator, sensor, NULL, 1, NULL};
+    const struct imp_tracer tracer = {
+        .scene = scene, .integrator = &scene->integrator, .sensor = sensor, .seed = 1};
     struct imp_arena arena;
     size_t capacity = 0;
     imp__arena_init(&arena, ctx);
@@ -115,15 +116,19 @@ static void rays_record(imp_context *ctx, imp_scene *scene, struct rays *out)
                 imp_v3 o = walk.ray.o;
                 for (const struct imp_vertex *v = walk.first; v; v = v->next) {
                     if (!v->shape) break;
-                    out->list[out->n++] =
-                        (struct ray){o, imp__normalize(v->at.p - o), INFINITY, false};
-                    if (v->l_weight > 0) {
-                        const imp_v3 d = imp__normalize(v->l_p - v->at.p);
-                        out->list[out->n++] = (struct ray){imp__offset(v->at.p, v->ng, d),
-                                                           d, v->l_at.dist * .9999, true};
+                    out->list[out->n++] = (struct ray){
+                        o, imp__normalize(imp__decided_v3(v->d.p) - o), INFINITY, false};
+                    if (v->d.connection != IMP_NOT_CONNECTED) {
+                        const imp_v3 d = imp__normalize(imp__decided_v3(v->d.light.p) -
+                                                        imp__decided_v3(v->d.p));
+                        out->list[out->n++] =
+                            (struct ray){imp__offset(imp__decided_v3(v->d.p), v->ng, d),
+                                         d, v->d.light.dist * .9999, true};
                     }
                     if (v->next && v->next->shape)
-                        o = imp__offset(v->at.p, v->ng, v->next->at.p - v->at.p);
+                        o = imp__offset(imp__decided_v3(v->d.p), v->ng,
+                                        imp__decided_v3(v->next->d.p) -
+                                            imp__decided_v3(v->d.p));
                     if (out->n + 64 > capacity) break;
                 }
                 imp__arena_rewind(&arena, mark);

@@ -50,6 +50,21 @@ struct kind_factory {
     struct imp_arena arena;
 };
 
+/* A drawn direction with all that the engine asks of it. */
+struct kind_draw {
+    imp_spec f;
+    double pdf, eta;
+};
+static inline bool kind_draw(const struct imp_bsdf *b, const imp_spec *in,
+                             const double u[3], struct imp_dirs *d, struct kind_draw *s)
+{
+    if (!b->ops->sample(b, in, u, d)) return false;
+    s->pdf = b->ops->pdf(b, in, d);
+    b->ops->eval(b, in, d, &s->f);
+    s->eta = b->ops->index_ratio ? b->ops->index_ratio(b, in, d) : 1;
+    return s->pdf > 0;
+}
+
 static bool kind_make(struct kind_factory *f, const struct imp_bsdf_ops *ops,
                       const char *const *props, int n_props, const struct imp_bsdf *child,
                       int n_child, struct imp_bsdf *out)

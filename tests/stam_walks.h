@@ -52,7 +52,8 @@ static inline struct stam stam_walks(imp_context *ctx, imp_scene *scene, uint64_
     s.absorb = scene->bsdfs[0]->absorb;
     s.width = sensor->film.crop_w;
     s.height = sensor->film.crop_h;
-    s.tracer = (struct imp_tracer){scene, &scene->integrator, sensor, NULL, seed, NULL};
+    s.tracer = (struct imp_tracer){
+        .scene = scene, .integrator = &scene->integrator, .sensor = sensor, .seed = seed};
     return s;
 }
 
@@ -191,16 +192,19 @@ static inline struct dual stam_value(const struct imp_walk *w, enum stam_variant
     struct dual T = dual_of(1);
     *n2 = *n3 = 0;
     for (const struct imp_vertex *v = w->first; v; v = v->next) {
-        if (v->emitter >= 0) return dual_mul(T, dual_control(theta, EMISSION));
+        if (v->d.met.emitter >= 0) return dual_mul(T, dual_control(theta, EMISSION));
         const bool sphere = stam_is(v, "sphere");
         if (!v->next) { /* absorbed here, or lost: below the horizon, or too deep */
             const struct dual glow = dual_control(theta, sphere ? AMBIENT2 : AMBIENT3);
-            return w->absorbed ? dual_mul(T, dual_scale(glow, 1 / absorb)) : dual_of(0);
+            (void)absorb; /* 1/absorb, as decided */
+            return w->absorbed ? dual_mul(T, dual_scale(glow, v->d.glow_weight))
+                               : dual_of(0);
         }
+        const struct imp_dirs dirs = imp__vertex_dirs(v);
         const struct dual f =
-            sphere ? stam_m2(&v->dirs, variant, theta)
-                   : dual_scale(dual_control(theta, DIFFUSE3), v->dirs.wi[2] / M_PI);
-        T = dual_mul(T, dual_scale(f, v->inv_ps));
+            sphere ? stam_m2(&dirs, variant, theta)
+                   : dual_scale(dual_control(theta, DIFFUSE3), v->d.wi[2] / M_PI);
+        T = dual_mul(T, dual_scale(f, v->scale));
         ++*(sphere ? n2 : n3);
     }
     return dual_of(0);

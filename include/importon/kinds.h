@@ -39,8 +39,10 @@ enum imp_input_flags {
     IMP_INPUT_REQUIRED = 4,
     IMP_INPUT_FIXED = 8,  /* no gradient: changing it bends or moves things */
     IMP_INPUT_EDGES = 16, /* differentiable, and may move discontinuities */
-    IMP_INPUT_SOFT = 32   /* a number above hi is taken as it is, and then has no bound:
+    IMP_INPUT_SOFT = 32,  /* a number above hi is taken as it is, and then has no bound:
                              what it is for decides */
+    IMP_INPUT_INDEX = 64  /* refractive index behind the surface over the one before it:
+                             where a medium fills the shape, the medium's */
 };
 
 struct imp_input_desc { /* the list ends with {0} */
@@ -86,12 +88,6 @@ struct imp_dirs {
     int lobe; /* IMP_SMOOTH, or the index of a delta lobe (with wi as sample set it) */
 };
 
-struct imp_bsdf_sample {
-    imp_spec f; /* as eval gives it for the sampled direction */
-    double pdf; /* per steradian; of a delta lobe: the probability of choosing it */
-    double eta; /* index ratio crossed, light side over sensor side: 1 for reflection */
-};
-
 enum imp_bsdf_flags {
     IMP_BSDF_SMOOTH = 1, /* has lobes with a density */
     IMP_BSDF_DELTA = 2,  /* has delta lobes */
@@ -111,6 +107,7 @@ struct imp_bsdf {
     int n_child;
     const struct imp_bsdf *child[2];
     int child_in[2]; /* where the child's inputs start in `in` */
+    int index_input; /* its own input with IMP_INPUT_INDEX; -1: none */
     int index;       /* in the scene; -1 for the default material */
     double absorb;   /* Stam's absorption probability; 0: none given */
     const char *name;
@@ -128,11 +125,12 @@ struct imp_bsdf_ops {
     enum imp_status (*build)(const struct imp_build *build, void *self,
                              struct imp_bsdf *bsdf);
 
-    /* Draw d->wi and d->lobe for d->wo. u[0] chooses the lobe, u[1], u[2] the direction.
-     * False: no sample (structurally zero: nothing may arrive from there, whatever the
-     * inputs). The density must not vanish where the value or a derivative does not. */
+    /* Draw d->wi and d->lobe for d->wo; pdf and eval say the rest. u[0] chooses the
+     * lobe, u[1], u[2] the direction. False: no sample (structurally zero: nothing may
+     * arrive from there, whatever the inputs). The density must not vanish where the
+     * value or a derivative does not. */
     bool (*sample)(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
-                   struct imp_dirs *d, struct imp_bsdf_sample *s);
+                   struct imp_dirs *d);
     /* The BSDF times |cos(theta_i)|, in 1/sr, for d->lobe == IMP_SMOOTH; for a delta lobe
      * its coefficient. Radiance passing a refraction carries (n_wo/n_wi)^2. */
     void (*eval)(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
@@ -140,6 +138,9 @@ struct imp_bsdf_ops {
     /* Density of sample, per steradian, all smooth lobes together; for a delta lobe the
      * probability of choosing it. 0 exactly where the value is structurally zero. */
     double (*pdf)(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d);
+    /* Refractive index on the side of wi over that on the side of wo. NULL: 1. */
+    double (*index_ratio)(const struct imp_bsdf *b, const imp_spec *in,
+                          const struct imp_dirs *d);
     /* df[j] = lane-wise derivative of eval with respect to input j, for all n_in; sets
      * all. */
     void (*eval_d)(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,

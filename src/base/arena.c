@@ -5,12 +5,6 @@
 
 #define BLOCK_MIN ((size_t)64 << 10)
 
-struct imp__arena_block {
-    struct imp__arena_block *next;
-    size_t size;
-    _Alignas(64) unsigned char bytes[];
-};
-
 void imp__arena_init(struct imp_arena *a, imp_context *ctx)
 {
     *a = (struct imp_arena){.ctx = ctx};
@@ -30,7 +24,8 @@ static bool block_next(struct imp_arena *a, size_t bytes)
     struct imp__arena_block *next = a->current ? a->current->next : a->first;
     while (next && next->size < bytes) next = next->next; /* kept blocks may be smaller */
     if (!next) {
-        const size_t size = imp_max(bytes, imp_max(BLOCK_MIN, a->total / 2));
+        size_t size = imp_max(bytes, imp_max(BLOCK_MIN, a->total / 2));
+        size = (size + 31) & ~(size_t)31; /* so that `used`, rounded up, stays inside */
         next = imp__alloc(a->ctx, 1, sizeof *next + size);
         if (!next) return false;
         next->size = size;
@@ -44,16 +39,15 @@ static bool block_next(struct imp_arena *a, size_t bytes)
     return true;
 }
 
-void *imp__arena_take(struct imp_arena *a, size_t n, size_t size)
+void *imp__arena_take_more(struct imp_arena *a, size_t n, size_t size)
 {
     size_t bytes;
     if (__builtin_mul_overflow(n, size, &bytes) || bytes > SIZE_MAX / 4) return NULL;
     bytes = (bytes + 31) & ~(size_t)31;
-    if (!a->current || a->used + bytes > a->current->size)
-        if (!block_next(a, bytes)) {
-            a->failed = true;
-            return NULL;
-        }
+    if (!block_next(a, bytes)) {
+        a->failed = true;
+        return NULL;
+    }
     void *p = a->current->bytes + a->used;
     a->used += bytes;
     return p;

@@ -26,8 +26,25 @@ struct imp_arena_mark {
 
 void imp__arena_init(struct imp_arena *a, imp_context *ctx);
 void imp__arena_free(struct imp_arena *a);
+struct imp__arena_block {
+    struct imp__arena_block *next;
+    size_t size;
+    _Alignas(64) unsigned char bytes[];
+};
+void *imp__arena_take_more(struct imp_arena *a, size_t n, size_t size);
+
 /* n*size bytes, aligned to 32, NOT zeroed; NULL if out of memory. */
-void *imp__arena_take(struct imp_arena *a, size_t n, size_t size);
+static inline void *imp__arena_take(struct imp_arena *a, size_t n, size_t size)
+{
+    size_t bytes;
+    if (imp_likely(!__builtin_mul_overflow(n, size, &bytes) && a->current &&
+                   bytes <= a->current->size - a->used)) {
+        void *p = a->current->bytes + a->used;
+        a->used += (bytes + 31) & ~(size_t)31;
+        return p;
+    }
+    return imp__arena_take_more(a, n, size);
+}
 /* The same, zeroed. */
 void *imp__arena_array(struct imp_arena *a, size_t n, size_t size);
 char *imp__arena_strdup(struct imp_arena *a, const char *text);

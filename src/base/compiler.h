@@ -26,4 +26,14 @@
 #define imp_clamp(x, lo, hi) imp_max(imp_min((x), (hi)), (lo))
 #define imp_count(array)     (sizeof(array) / sizeof((array)[0]))
 
+/* The compiler may not look through this value of a floating-point register. GCC 12 takes
+ * (double)(float)x for x where it vectorises several of them. */
+#if defined(__x86_64__)
+#define IMP_OPAQUE(x) __asm__("" : "+x"(x))
+#elif defined(__aarch64__)
+#define IMP_OPAQUE(x) __asm__("" : "+w"(x))
+#else
+#define IMP_OPAQUE(x) __asm__("" : "+m"(x))
+#endif
+
 #endif

@@ -3,7 +3,7 @@
  * What a problem's walks are made with; and the reasons to refuse, where a gradient would
  * not be the whole one. */
 #include "estimate.h"
-#include "walk/bend.h"
+#include "walk/graded.h"
 #include "walk/measure.h"
 #include <string.h>
 
@@ -53,8 +53,11 @@ enum imp_status imp__problem_tracer(const struct imp_problem *p,
         st = attached_allowed(p->scene);
         if (st != IMP_OK) return st;
     }
-    *out = (struct imp_tracer){
-        p->scene,   integrator, sensor,
-        &p->active, run->seed,  imp__guide_of(p->scene, integrator, run->guide)};
-    return p->active.medium ? imp__bend_survey(out) : IMP_OK;
+    *out = (struct imp_tracer){.scene = p->scene,
+                               .integrator = integrator,
+                               .sensor = sensor,
+                               .active = &p->active,
+                               .seed = run->seed,
+                               .guide = imp__guide_of(p->scene, integrator, run->guide)};
+    return p->active.medium ? imp__graded_survey(out) : IMP_OK;
 }

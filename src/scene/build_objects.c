@@ -77,6 +77,10 @@ enum imp_status imp__build_bsdf(struct imp_scene *scene, struct imp_node *node,
             memcpy(b->input + b->child_in[k], b->child[k]->input,
                    (size_t)b->child[k]->n_in * sizeof *b->input);
 
+    b->index_input = -1;
+    for (int j = 0; j < b->n_own; j++)
+        if (ops->inputs[j].flags & IMP_INPUT_INDEX) b->index_input = j;
+
     if (ops->build) IMP_TRY(ops->build(&build, self, b));
     IMP_TRY(imp__props_finish(ctx, node));
     b->index = scene->n_bsdfs;
@@ -101,6 +105,7 @@ enum imp_status imp__build_black(struct imp_scene *scene, struct imp_bsdf **out)
     *b = (struct imp_bsdf){.ops = ops,
                            .n_own = 1,
                            .n_in = 1,
+                           .index_input = -1,
                            .index = -1,
                            .name = "",
                            .self =

@@ -54,39 +54,39 @@ static void json(struct imp_text *t, const struct imp_scene *scene,
         put_string(t, "bsdf", v->bsdf ? v->bsdf->name : "");
         imp__put(t, ",");
         if (v->shape) {
-            put_vector(t, "position", v->at.p, 3);
+            put_vector(t, "position", imp__decided_v3(v->d.p), 3);
             imp__put(t, ",");
             put_vector(t, "normal", v->ng, 3);
-            imp__put(t, ",\"uv\":[%.9g,%.9g],\"distance\":%.9g,", v->at.uv[0],
-                     v->at.uv[1], v->t);
+            imp__put(t, ",\"uv\":[%.9g,%.9g],\"distance\":%.9g,", v->d.uv[0], v->d.uv[1],
+                     v->t);
         } else {
-            put_vector(t, "escapes", v->at.p, 3);
+            put_vector(t, "escapes", imp__decided_v3(v->d.p), 3);
             imp__put(t, ",");
         }
         put_vector(t, "throughput", beta, C);
         imp__put(t, ",");
         put_vector(t, "emission", v->e, C);
         imp__put(t, ",");
-        if (v->light >= 0) {
-            put_string(t, "light", scene->emitters[v->light]->name);
+        if (v->d.connection == IMP_CONNECTED) {
+            put_string(t, "light", scene->emitters[v->d.light.emitter]->name);
             imp__put(t, ",");
-            if (isfinite(v->l_at.dist)) {
-                put_vector(t, "light_position", v->l_p, 3);
+            if (isfinite(v->d.light.dist)) {
+                put_vector(t, "light_position", imp__decided_v3(v->d.light.p), 3);
                 imp__put(t, ",");
             }
-            put_vector(t, "light_sample", v->l_f * v->l_le * v->l_weight, C);
+            put_vector(t, "light_sample", v->light_f * v->light_e * v->d.light.weight, C);
             imp__put(t, ",");
-        } else if (v->l_weight > 0) {
+        } else if (v->d.connection == IMP_OCCLUDED) {
             imp__put(t, "\"light\":null,\"light_blocked\":true,");
         }
-        if (v->inv_ps > 0) {
-            imp__put(t, "\"lobe\":%d,\"pdf\":", v->dirs.lobe);
-            put_number(t, v->pdf);
-            imp__put(t, ",\"survival\":%.9g,", v->survive);
+        if (v->d.goes_on) {
+            imp__put(t, "\"lobe\":%d,\"pdf\":", v->d.lobe);
+            put_number(t, v->d.pdf);
+            imp__put(t, ",\"survival\":%.9g,", v->d.survive);
         }
         put_vector(t, "weight", v->w, C);
         imp__put(t, ",");
-        put_vector(t, "arriving", v->lin, C);
+        put_vector(t, "arriving", v->beyond, C);
         imp__put(t, "}");
         beta *= v->w;
     }
@@ -115,29 +115,30 @@ static void plain(struct imp_text *t, const struct imp_scene *scene,
             imp__put(t,
                      "  %d: %s (%s) at (%.6g, %.6g, %.6g), distance %.6g, uv %.4f %.4f\n",
                      k, v->shape->name, *v->bsdf->name ? v->bsdf->name : "black",
-                     v->at.p[0], v->at.p[1], v->at.p[2], v->t, v->at.uv[0], v->at.uv[1]);
+                     v->d.p[0], v->d.p[1], v->d.p[2], v->t, v->d.uv[0], v->d.uv[1]);
         else
-            imp__put(t, "  %d: leaves the scene along (%.6g, %.6g, %.6g)\n", k,
-                     v->at.p[0], v->at.p[1], v->at.p[2]);
+            imp__put(t, "  %d: leaves the scene along (%.6g, %.6g, %.6g)\n", k, v->d.p[0],
+                     v->d.p[1], v->d.p[2]);
         plain_spec(t, "throughput", beta, C);
-        if (v->emitter >= 0 || v->glows) plain_spec(t, "emission", v->e, C);
-        if (v->light >= 0) {
-            imp__put(t, "    light        %s\n", scene->emitters[v->light]->name);
-            plain_spec(t, "light sample", v->l_f * v->l_le * v->l_weight, C);
-        } else if (v->l_weight > 0) {
+        if (v->d.met.emitter >= 0 || v->d.glows) plain_spec(t, "emission", v->e, C);
+        if (v->d.connection == IMP_CONNECTED) {
+            imp__put(t, "    light        %s\n",
+                     scene->emitters[v->d.light.emitter]->name);
+            plain_spec(t, "light sample", v->light_f * v->light_e * v->d.light.weight, C);
+        } else if (v->d.connection == IMP_OCCLUDED) {
             imp__put(t, "    light        blocked\n");
         }
-        if (v->inv_ps > 0) {
-            if (v->dirs.lobe == IMP_SMOOTH)
-                imp__put(t, "    goes on      pdf %.6g per sr, survival %.6g\n", v->pdf,
-                         v->survive);
+        if (v->d.goes_on) {
+            if (v->d.lobe == IMP_SMOOTH)
+                imp__put(t, "    goes on      pdf %.6g per sr, survival %.6g\n", v->d.pdf,
+                         v->d.survive);
             else
                 imp__put(
                     t,
                     "    goes on      delta lobe %d, probability %.6g, survival %.6g\n",
-                    v->dirs.lobe, v->pdf, v->survive);
+                    v->d.lobe, v->d.pdf, v->d.survive);
             plain_spec(t, "weight", v->w, C);
-            plain_spec(t, "arriving", v->lin, C);
+            plain_spec(t, "arriving", v->beyond, C);
             if (!v->next) imp__put(t, "    leaves the scene\n");
         } else {
             imp__put(t, "    ends here%s\n", w->absorbed && !v->next ? ", absorbed" : "");

@@ -15,39 +15,73 @@ static double power_heuristic(double a, double b)
     return a2 > 0 ? a2 / (a2 + b2) : 0;
 }
 
-imp_spec imp__emitter_radiance(const struct imp_scene *scene, int emitter,
-                               const struct imp_emission *x, imp_v3 p)
+/* Probability with which light samples choose this light: at the vertex itself, or where
+ * the ray in flight left. */
+static double light_pmf_at(const struct imp_step *s, bool known,
+                           const struct imp_guide_place *place, int light)
 {
-    const struct imp_emitter *e = scene->emitters[emitter];
-    const struct imp_texcoord at = {{x->uv[0], x->uv[1]}, p};
-    imp_spec in[IMP_INPUTS_MAX], le;
-    imp__inputs_eval(e->input, e->n_in, &at, in);
-    e->ops->eval(e, in, x, &le);
-    return le;
+    const struct imp_guide *g = s->guided.guide;
+    return imp_unlikely(known) ? g->light_pmf(g, place, light)
+                               : light_pmf(s->scene, light);
 }
 
 void imp__emission_meet(struct imp_step *s, struct imp_vertex *v, int emitter,
-                        const struct imp_hit *hit, const struct imp_surface *at)
+                        double weight, const struct imp_hit *hit,
+                        const struct imp_surface *at)
 {
     const struct imp_emitter *e = s->scene->emitters[emitter];
-    struct imp_emission *x = &v->e_at;
-    *x = (struct imp_emission){{0, 0}, INFINITY, 1, -s->d};
-    if (at) {
-        x->uv[0] = at->uv[0];
-        x->uv[1] = at->uv[1];
-        x->dist = hit->t;
-        x->cos_light = -imp__dot(at->n, s->d);
-    }
-    v->emitter = emitter;
+    const struct imp_emission x = {{s->at.uv[0], s->at.uv[1]},
+                                   at ? imp__decide1(hit->t) : INFINITY,
+                                   at ? imp__decide1(-imp__dot(at->n, s->d)) : 1,
+                                   imp__decide(-s->d)};
     if (s->pdf > 0 && imp__wants_lights(s->tracer->integrator)) {
-        const struct imp_guide *g = s->tracer->guide;
-        const double pmf = imp_unlikely(s->left_known)
-                               ? g->light_pmf(g, &s->left, emitter)
-                               : light_pmf(s->scene, emitter);
+        const double pmf = light_pmf_at(s, s->guided.left, &s->guided.from, emitter);
         const double pe = pmf * e->ops->pdf(e, &s->from, &s->d, hit, at);
-        v->e_weight *= power_heuristic(s->pdf, pe);
+        weight = imp__decide1(weight * power_heuristic(s->pdf, pe));
     }
-    v->e += imp__emitter_radiance(s->scene, emitter, x, v->at.p) * v->e_weight;
+    v->e += imp__emitter_radiance(s->scene, emitter, &x, s->at.p) * weight;
+    if (!s->recorded) return;
+    struct imp_met *m = &v->d.met;
+    m->emitter = emitter;
+    m->weight = (imp_decided)weight;
+    m->dist = (imp_decided)x.dist;
+    m->cos_light = (imp_decided)x.cos_light;
+    imp__store_v3(m->d, x.d);
+}
+
+/* A light, by sampling weights or as the guide says; its probability. */
+static int light_choose(const struct imp_step *s, double u, double *pmf)
+{
+    const struct imp_scene *scene = s->scene;
+    const struct imp_guided *g = &s->guided;
+    int light = 0, above = scene->n_emitters - 1;
+    if (imp_unlikely(g->here)) {
+        light = g->guide->light(g->guide, &g->at, u);
+    } else { /* the first whose cumulative weight exceeds u */
+        while (light < above) {
+            const int middle = (light + above) / 2;
+            if (u < scene->light_cdf[middle]) above = middle;
+            else light = middle + 1;
+        }
+    }
+    *pmf = light_pmf_at(s, g->here, &g->at, light);
+    return light;
+}
+
+static void record(struct imp_vertex *v, int emitter, double weight,
+                   const struct imp_emission *x, imp_v3 p, imp_v3 wi)
+{
+    struct imp_light *l = &v->d.light;
+    l->emitter = emitter;
+    l->weight = (imp_decided)weight;
+    l->uv[0] = (imp_decided)x->uv[0];
+    l->uv[1] = (imp_decided)x->uv[1];
+    l->dist = (imp_decided)x->dist;
+    l->cos_light = (imp_decided)x->cos_light;
+    imp__store_v3(l->d, x->d);
+    imp__store_v3(l->p, p);
+    imp__store_v3(l->wi, wi);
+    v->d.connection = IMP_OCCLUDED; /* until it is seen */
 }
 
 void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
@@ -55,58 +89,58 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
                        struct imp_shadow *shadow)
 {
     const struct imp_scene *scene = s->scene;
+    const struct imp_bsdf *b = v->bsdf;
     const struct imp_key key = s->walk->key;
-    const int n = scene->n_emitters;
-    if (n == 0) return;
-    const double choice = imp__u01(key, imp__dim(s->depth, IMP_DIM_LIGHT));
-    const struct imp_guide *g = s->tracer->guide;
-    int light = 0, above = n - 1; /* the first whose cumulative weight exceeds choice */
-    if (imp_unlikely(s->known)) light = above = g->light(g, &s->place, choice);
-    while (light < above) {
-        const int middle = (light + above) / 2;
-        if (choice < scene->light_cdf[middle]) above = middle;
-        else light = middle + 1;
-    }
-    const double pmf = imp_unlikely(s->known) ? g->light_pmf(g, &s->place, light)
-                                              : light_pmf(scene, light);
-    if (!(pmf > 0)) return;
+    if (scene->n_emitters == 0) return;
 
+    /* A light and a point on it. */
+    double pmf;
+    const int light =
+        light_choose(s, imp__u01(key, imp__dim(s->depth, IMP_DIM_LIGHT)), &pmf);
+    if (!(pmf > 0)) return;
     const struct imp_emitter *e = scene->emitters[light];
     const double u[2] = {imp__u01(key, imp__dim(s->depth, IMP_DIM_LIGHT_U)),
                          imp__u01(key, imp__dim(s->depth, IMP_DIM_LIGHT_V))};
     struct imp_light_sample ls;
     if (!e->ops->sample(e, &at->p, u, &ls) || !(ls.pdf > 0)) return;
+    if ((e->ops->flags & IMP_EMITTER_AREA) && !(ls.cos_light > 0)) return; /* its back */
 
-    const struct imp_dirs dirs = {v->dirs.wo, imp__to_local(frame, ls.wi), IMP_SMOOTH};
-    double pdf_bsdf = v->bsdf->ops->pdf(v->bsdf, v->in, &dirs);
-    if (!(pdf_bsdf > 0)) return; /* structurally zero: nothing to see, no derivative */
-    if (imp_unlikely(s->known) && imp__mixes(s, v->bsdf))
-        pdf_bsdf = imp__mixture_pdf(s, pdf_bsdf, ls.wi);
-    const struct imp_emission x = {{ls.uv[0], ls.uv[1]}, ls.dist, ls.cos_light, -ls.wi};
-    const imp_spec le = imp__emitter_radiance(scene, light, &x, ls.p);
+    /* Its weight against the continuation that could have met it. */
+    const struct imp_dirs dirs = {s->wo, imp__decide(imp__to_local(frame, ls.wi)),
+                                  IMP_SMOOTH};
+    const double kernel = b->ops->pdf(b, s->in, &dirs);
+    if (!(kernel > 0)) return; /* structurally zero: nothing to see, no derivative */
+    const double pdf = imp__direction_pdf(s, b, kernel, ls.wi);
+    const double p = ls.pdf * pmf;
+    const bool alone =
+        (e->ops->flags & IMP_EMITTER_DELTA) || s->tracer->integrator->bsdf_samples == 0;
+    const double weight = imp__decide1((alone ? 1 : power_heuristic(p, pdf)) / p);
+
+    /* What it brings, if it is seen. */
+    const struct imp_emission x = {{imp__decide1(ls.uv[0]), imp__decide1(ls.uv[1])},
+                                   imp__decide1(ls.dist),
+                                   imp__decide1(ls.cos_light),
+                                   imp__decide(-ls.wi)};
+    const bool far = !isfinite(ls.dist);
+    const imp_v3 point = imp__decide(far ? (imp_v3){0} : ls.p);
+    const imp_spec le = imp__emitter_radiance(scene, light, &x, point);
     imp_spec f;
-    v->bsdf->ops->eval(v->bsdf, v->in, &dirs, &f);
+    b->ops->eval(b, s->in, &dirs, &f);
     const struct imp_active *active = s->tracer->active;
     const bool differentiable =
-        active &&
-        ((v->bsdf->index >= 0 && active->bsdf[v->bsdf->index]) || active->emitter[light]);
+        active && ((b->index >= 0 && active->bsdf[b->index]) || active->emitter[light]);
     if (imp__is_zero(f * le) && !differentiable) return;
+    shadow->brings = f * le * weight;
+    if (s->recorded) {
+        record(v, light, weight, &x, point, dirs.wi);
+        v->light_f = f;
+        v->light_e = le;
+    }
 
     /* Aimed from the moved origin at the point itself: a ray parallel to wi would meet a
      * concave light before its end. */
-    const bool far = !isfinite(ls.dist);
     shadow->o = imp__offset(at->p, at->ng, ls.wi);
     shadow->d = far ? ls.wi : ls.p - shadow->o; /* then t = 1 is the light */
     shadow->reach = far ? INFINITY : 1 - 10 * IMP_RAY_EPSILON;
-    shadow->light = light;
-
-    const bool delta = e->ops->flags & IMP_EMITTER_DELTA;
-    const bool bsdf_samples = s->tracer->integrator->bsdf_samples > 0;
-    const double p = ls.pdf * pmf;
-    v->l_at = x;
-    v->l_wi = dirs.wi;
-    v->l_p = ls.p;
-    v->l_f = f;
-    v->l_le = le;
-    v->l_weight = (delta || !bsdf_samples ? 1 : power_heuristic(p, pdf_bsdf)) / p;
+    shadow->wanted = true;
 }

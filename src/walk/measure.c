@@ -270,7 +270,8 @@ static bool radiance(const struct imp_measure *m, const struct imp_integrator *i
             .integrator = integrator,
             .sensor = m->sensor,
             .seed = m->seed,
-            .guide = imp__guide_of(m->scene, integrator, m->guide)};
+            .guide = imp__guide_of(m->scene, integrator, m->guide),
+            .value_only = true};
         const struct imp_arena_mark mark = imp__arena_mark(arena);
         imp__walk_trace(&tracer, arena, x, y, sample, walk);
         *L = walk->L;
@@ -281,8 +282,11 @@ static bool radiance(const struct imp_measure *m, const struct imp_integrator *i
     /* depth: the walk's film position and lens, its first hit only */
     static const struct imp_integrator none = {
         .kind = IMP_INTEGRATOR_PATH, .max_depth = 0, .rr_depth = 5};
-    const struct imp_tracer look = {
-        .scene = m->scene, .integrator = &none, .sensor = m->sensor, .seed = m->seed};
+    const struct imp_tracer look = {.scene = m->scene,
+                                    .integrator = &none,
+                                    .sensor = m->sensor,
+                                    .seed = m->seed,
+                                    .value_only = true};
     const struct imp_arena_mark mark = imp__arena_mark(arena);
     imp__walk_trace(&look, arena, x, y, sample, walk);
     *L = imp__spec(walk->first && walk->first->shape ? walk->first->t : 0);

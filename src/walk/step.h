@@ -1,79 +1,185 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A walk on its way, and the three things that happen at a vertex: emission is met, a
- * light is sampled (light.c), the continuation is drawn (scatter.c). Only trace.c puts
- * them together. */
+ * A walk while it is decided, and what happens at a vertex: emission is met, a light is
+ * sampled (light.c), the continuation is drawn (direction.c, scatter.c). Only trace.c
+ * puts them together. */
 #ifndef IMP_WALK_STEP_H
 #define IMP_WALK_STEP_H
 
-#include "bend.h"
 #include "dims.h"
+#include "segment.h"
+
+/* What a guide knows of the walk (guided.c). */
+struct imp_guided {
+    const struct imp_guide *guide; /* NULL: none */
+    bool here, left; /* known at this vertex; where the ray in flight left */
+    struct imp_guide_place at, from;
+    double reference; /* radiance that it expects of this walk; 0: none */
+    double rest;      /* what it expects of the continuation here, at throughput 1 */
+    imp_spec before;  /* throughput on arrival */
+};
 
 struct imp_step {
     const struct imp_tracer *tracer;
     const struct imp_scene *scene;
     struct imp_walk *walk;
     struct imp_arena *arena;
-    imp_v3 o, d; /* the ray in flight */
+    bool recorded; /* also where only the value counts, if vertices move with a field */
+    int depth;
+
+    /* The vertex at work: as decided, in double; its inputs. */
+    struct imp_texcoord at;
+    imp_v3 wo, wo_drawn; /* as decided; before rounding, from which the walk goes on */
+    const imp_spec *in;
+    imp_spec *scratch; /* [IMP_INPUTS_MAX] inputs of a walk that is not recorded */
+
+    /* The ray in flight. */
+    const struct imp_segment_ops *segment;
+    imp_v3 o, d;
     double t_min, t_max;
-    double pdf;    /* of d per steradian; 0: a delta lobe or the sensor chose it */
-    imp_v3 from;   /* where the ray left, for light densities */
-    imp_spec beta; /* throughput, zero factors left out: for roulette only */
+    double pdf;  /* of d per steradian; 0: a delta lobe or the sensor chose it */
+    imp_v3 from; /* where the ray left, for densities of lights */
+
+    /* For roulette only. */
+    imp_spec beta; /* throughput, zero factors left out */
     double eta;    /* product of index ratios */
     int zeros[3];  /* per lane: factors that are zero but have a derivative */
-    int depth;
-    struct imp_bending *bend; /* NULL: no medium in the scene */
-    /* What the guide knows where the walk is, and where the ray in flight left. */
-    bool known, left_known;
-    struct imp_guide_place place, left;
-    double reference; /* radiance that the guide expects of this walk; 0: none */
-    double beyond;    /* what it expects of the continuation here, at throughput 1 */
-    imp_spec before;  /* beta on arrival */
-    imp_v3 arrived;   /* direction of arrival */
+
+    struct imp_graded_state *graded; /* NULL: no graded medium in the scene */
+    struct imp_guided guided;
 };
 
-/* The shadow ray of a light sample; light -1: there is nothing to see. */
+/* What a record stores of v, in double again. */
+static inline imp_v3 imp__decide(imp_v3 v)
+{
+    imp_decided4 stored = __builtin_convertvector(v, imp_decided4);
+    IMP_OPAQUE(stored);
+    return __builtin_convertvector(stored, imp_v3);
+}
+static inline double imp__decide1(double x)
+{
+    imp_decided stored = (imp_decided)x;
+    IMP_OPAQUE(stored);
+    return stored;
+}
+static inline void imp__store_v3(imp_decided out[3], imp_v3 v)
+{
+    const imp_decided4 rounded = __builtin_convertvector(v, imp_decided4);
+    for (int k = 0; k < 3; k++) out[k] = rounded[k];
+}
+
+/* ---- trace.c ---- */
+/* Where the surface is, as decided, and its inputs; d: direction of arrival, t: length of
+ * the segment that leads there. */
+void imp__vertex_place(struct imp_step *s, struct imp_vertex *v,
+                       const struct imp_surface *at, const struct imp_frame *frame,
+                       imp_v3 d, double t);
+
+/* ---- segment.c ---- */
+/* The nearest hit of the ray in flight. With hide_emitters, a camera ray skips area
+ * lights. */
+enum imp_meeting imp__straight_meet(struct imp_step *s, struct imp_hit *hit);
+
+/* ---- evaluate.c: the values of a vertex from its decisions ---- */
+/* The index of a boundary is that of the medium behind it (graded.c). */
+void imp__graded_inputs(const struct imp_bsdf *b, const struct imp_shape *shape,
+                        const struct imp_texcoord *at, imp_spec *in);
+static inline void imp__evaluate_inputs(const struct imp_bsdf *b,
+                                        const struct imp_shape *shape,
+                                        const struct imp_texcoord *at, imp_spec *in)
+{
+    imp__inputs_eval(b->input, b->n_in, at, in);
+    if (imp_unlikely(shape->interior != NULL)) imp__graded_inputs(b, shape, at, in);
+}
+/* f with densities frozen becomes the weight of the step; T of the segment that follows
+ * is not known yet. */
+static inline void imp__step_weigh(struct imp_vertex *v, imp_spec f, double pdf,
+                                   double survive)
+{
+    v->scale = 1 / (pdf * survive);
+    v->w = f * v->scale;
+}
+/* ... and now it is. */
+static inline void imp__step_pass(struct imp_vertex *v, double transmittance)
+{
+    v->scale *= transmittance;
+    v->w *= transmittance;
+}
+
+/* ---- light.c ---- */
+/* The shadow ray of a light sample, and what it brings if nothing is in its way; `wanted`
+ * false: there is nothing to see. */
 struct imp_shadow {
     imp_v3 o, d;
     double reach;
-    int light;
+    imp_spec brings;
+    bool wanted;
 };
-
 /* Emission met by the ray at an area light, or the environment (hit, at NULL). */
 void imp__emission_meet(struct imp_step *s, struct imp_vertex *v, int emitter,
-                        const struct imp_hit *hit, const struct imp_surface *at);
+                        double weight, const struct imp_hit *hit,
+                        const struct imp_surface *at);
 /* Light sample at v: choose an emitter and a point on it. Whether it is visible is asked
  * later, after the continuation is drawn: neither waits for the other's arithmetic. */
 void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
                        const struct imp_surface *at, const struct imp_frame *frame,
                        struct imp_shadow *shadow);
 
+/* ---- stam.c ---- */
 /* Stam's termination: with probability `absorb` the walk ends and collects what glows
- * here, divided by it; else it goes on, divided by the rest (gradients.md 6, E22-E24). */
-bool imp__absorb(struct imp_step *s, struct imp_vertex *v);
-/* Draw the continuation at v. False: the walk ends here. */
+ * here, divided by it; else it goes on, divided by the rest (docs/estimators.md 6, E22 to
+ * E24). Weight of the emission here: 1/absorb, or 0 where the walk goes on; 1 where
+ * nothing absorbs. */
+bool imp__absorb(struct imp_step *s, const struct imp_bsdf *b, double *weight);
+/* Stam's exponent by the attached form, or only its first term as in his App. C
+ * (docs/estimators.md 4, E9): replaces the detached derivative of the inputs where the
+ * kind offers it. d [n_in]. */
+void imp__attached_d(const struct imp_walk *walk, const struct imp_vertex *v, int depth,
+                     imp_spec *d);
+
+/* ---- direction.c ---- */
+/* Draw the continuation, as imp_bsdf_ops.sample does, from the mixture of densities that
+ * know the place. */
+bool imp__mixture_draw(const struct imp_step *s, const struct imp_bsdf *b,
+                       const struct imp_frame *frame, const double u[3],
+                       struct imp_dirs *dirs);
+/* Density of a direction, world w, for which the BSDF alone has `kernel`. */
+double imp__mixture_pdf(const struct imp_step *s, const struct imp_bsdf *b, double kernel,
+                        imp_v3 w);
+static inline bool imp__direction_draw(const struct imp_step *s, const struct imp_bsdf *b,
+                                       const struct imp_frame *frame, const double u[3],
+                                       struct imp_dirs *dirs)
+{
+    return imp_unlikely(s->guided.here) ? imp__mixture_draw(s, b, frame, u, dirs)
+                                        : b->ops->sample(b, s->in, u, dirs);
+}
+static inline double imp__direction_pdf(const struct imp_step *s,
+                                        const struct imp_bsdf *b, double kernel, imp_v3 w)
+{
+    return imp_unlikely(s->guided.here) ? imp__mixture_pdf(s, b, kernel, w) : kernel;
+}
+
+/* ---- scatter.c ---- */
+/* Decide whether and whither the walk goes on. False: it ends here. */
 bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_surface *at,
                   const struct imp_frame *frame);
+
+/* ---- guided.c ---- */
+void imp__guided_arrive(struct imp_step *s, const struct imp_hit *hit,
+                        const struct imp_surface *at);
+static inline void imp__guided_leave(struct imp_guided *g)
+{
+    if (imp_likely(g->guide == NULL)) return;
+    g->left = g->here;
+    g->from = g->at;
+}
+/* Survival by what is expected to come; `q`: by throughput. */
+double imp__guided_survival(const struct imp_step *s, double q);
 
 static inline bool imp__wants_lights(const struct imp_integrator *i)
 {
     return i->kind == IMP_INTEGRATOR_PATH ||
            (i->kind == IMP_INTEGRATOR_DIRECT && i->emitter_samples > 0);
-}
-
-/* Does the guide draw a part of the continuations here? Its directions are on the front,
- * and a delta lobe has no density to mix with. */
-static inline bool imp__mixes(const struct imp_step *s, const struct imp_bsdf *b)
-{
-    return s->known && s->place.share > 0 &&
-           (b->flags & (IMP_BSDF_SMOOTH | IMP_BSDF_DELTA | IMP_BSDF_TRANSMIT |
-                        IMP_BSDF_NULL)) == IMP_BSDF_SMOOTH;
-}
-static inline double imp__mixture_pdf(const struct imp_step *s, double bsdf, imp_v3 w)
-{
-    const struct imp_guide *g = s->tracer->guide;
-    const double share = s->place.share;
-    return (1 - share) * bsdf + share * g->pdf(g, &s->place, w);
 }
 
 #endif

@@ -1,30 +1,34 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * One walk. The step below is the only place where paths are made: rendering, gradients,
- * replays and frozen checks all start from what it records. Path tracing with light
- * samples, and Stam's walk that collects emission only where it is absorbed, are settings
- * of it.
+ * One walk is decided. The step below is the only place where paths are made: rendering,
+ * gradients, replays and frozen checks all start from what it records. Path tracing with
+ * light samples, and Stam's walk that collects emission only where it is absorbed, are
+ * settings of it.
  *
- * Estimator (gradients.md 8): E_k = w^B Le for emission met by chance, B_k = w^E f Le /
- * p^e for a light sample, power heuristic with exponent 2, w^B = 1 at the first vertex
+ * Estimator (docs/estimators.md 8): E_k = w^B Le for emission met by chance, B_k = w^E f
+ * Le/p^e for a light sample, power heuristic with exponent 2, w^B = 1 at the first vertex
  * and after a delta lobe. Depth: emission at vertex k counts if k < max_depth, scattering
  * goes on and samples lights if k + 1 < max_depth (scene-format 11). */
 #include "step.h"
+#include <stddef.h>
 
-/* With room behind it for n_in inputs of its BSDF. */
+/* ---- Vertices -------------------------------------------------------------------- */
+
+/* With room behind it for n_in inputs of its BSDF, unless only its value counts. */
 static struct imp_vertex *vertex_add(struct imp_step *s, int n_in)
 {
-    if (imp_unlikely(s->walk->n == IMP_WALK_MAX)) {
-        s->walk->dropped = IMP_DROP_LONG;
-        return NULL;
-    }
-    struct imp_vertex *v =
-        imp__arena_take(s->arena, 1, sizeof *v + (size_t)n_in * sizeof *v->in);
-    if (imp_unlikely(!v)) {
-        s->walk->dropped = IMP_DROP_MEMORY;
-        return NULL;
-    }
     struct imp_walk *w = s->walk;
+    if (imp_unlikely(w->n == IMP_WALK_MAX)) {
+        w->dropped = IMP_DROP_LONG;
+        return NULL;
+    }
+    struct imp_vertex *v = imp__arena_take(
+        s->arena, 1,
+        s->recorded ? sizeof *v + (size_t)n_in * sizeof *v->in : IMP_VERTEX_VALUES);
+    if (imp_unlikely(!v)) {
+        w->dropped = IMP_DROP_MEMORY;
+        return NULL;
+    }
     v->prev = w->last;
     v->next = NULL;
     if (w->last) w->last->next = v;
@@ -33,47 +37,50 @@ static struct imp_vertex *vertex_add(struct imp_step *s, int n_in)
     w->n++;
     v->bsdf = NULL;
     v->shape = NULL;
-    v->leg = NULL;
+    v->w = v->e = v->b = v->beyond = (imp_spec){0};
+    v->scale = 0;
+    if (!s->recorded) return v;
+
+    v->segment = &imp__straight;
     v->in = (imp_spec *)(v + 1);
-    v->w = v->e = v->lin = (imp_spec){0};
-    v->inv_ps = v->pdf = v->l_weight = 0;
-    v->survive = 1;
-    v->emitter = v->light = -1;
-    v->glows = false;
-    v->e_weight = v->g_weight = 1;
+    struct imp_decision *d = &v->d;
+    d->shape = d->met.emitter = -1;
+    d->connection = IMP_NOT_CONNECTED;
+    d->glows = d->goes_on = false;
+    d->pdf = 0;
+    d->survive = d->passes = 1;
+    d->met.weight = d->glow_weight = 1;
     return v;
 }
 
-/* The ray in flight, in a medium: to what it meets. The step's weight gets the ratio of
- * the squared indices at its ends: radiance/n^2 is what stays along a ray. */
-static __attribute__((noinline)) bool bend_meet(struct imp_step *s, struct imp_hit *hit)
+static inline void vertex_place(struct imp_step *s, struct imp_vertex *v,
+                                const struct imp_surface *at,
+                                const struct imp_frame *frame, imp_v3 d, double t)
 {
-    struct imp_vertex *last = s->walk->last;
-    double ratio;
-    if (!imp__bend_meet(s->scene, s->bend, &s->from, &s->o, &s->d, hit, &ratio)) {
-        s->walk->dropped = IMP_DROP_BENT;
-        return false;
-    }
-    const double scale = ratio * ratio;
-    last->inv_ps *= scale;
-    last->w *= scale;
-    s->beta *= scale;
-    s->eta /= ratio;
-    return true;
+    imp_spec *in = s->recorded ? v->in : s->scratch;
+    v->t = t;
+    s->at.uv[0] = imp__decide1(at->uv[0]);
+    s->at.uv[1] = imp__decide1(at->uv[1]);
+    s->at.p = imp__decide(at->p);
+    s->wo_drawn = imp__to_local(frame, -d);
+    s->wo = imp__decide(s->wo_drawn);
+    s->in = in;
+    imp__evaluate_inputs(v->bsdf, v->shape, &s->at, in);
+    if (!s->recorded) return;
+    v->ng = at->ng;
+    v->d.uv[0] = (imp_decided)s->at.uv[0];
+    v->d.uv[1] = (imp_decided)s->at.uv[1];
+    imp__store_v3(v->d.p, s->at.p);
+    imp__store_v3(v->d.wo, s->wo);
+}
+void imp__vertex_place(struct imp_step *s, struct imp_vertex *v,
+                       const struct imp_surface *at, const struct imp_frame *frame,
+                       imp_v3 d, double t)
+{
+    vertex_place(s, v, at, frame, d, t);
 }
 
-/* Area lights that a camera ray passes through (hide_emitters). */
-static bool first_hit(struct imp_step *s, struct imp_hit *hit)
-{
-    const bool hide = s->tracer->integrator->hide_emitters && s->depth == 0;
-    while (imp__intersect(s->scene, &s->o, &s->d, s->t_min, s->t_max, hit)) {
-        if (!hide || s->scene->shapes[hit->shape]->emitter < 0) return true;
-        const imp_v3 p = s->o + s->d * hit->t;
-        const double scale = fmax(fabs(p[0]), fmax(fabs(p[1]), fabs(p[2])));
-        s->t_min = hit->t + (1 + scale) * IMP_RAY_EPSILON;
-    }
-    return false;
-}
+/* ---- One step --------------------------------------------------------------------- */
 
 /* May light that is met here make the sample valid (scene-format 11)? What is hidden from
  * the camera stays hidden behind a null material for path, and not for direct. */
@@ -84,90 +91,119 @@ static bool seen(const struct imp_step *s)
            (integrator->kind == IMP_INTEGRATOR_DIRECT && s->depth > 0);
 }
 
-static void guide_find(struct imp_step *s, const struct imp_hit *hit,
-                       const struct imp_surface *at)
+/* The ray leaves the scene and meets the environment. */
+static void sky_meet(struct imp_step *s, bool counts)
 {
-    const struct imp_guide *g = s->tracer->guide;
-    s->known = g->find(g, hit, at, s->d, &s->place);
-    s->arrived = s->d;
-    if (s->known && g->expected) {
-        const double all = g->expected(g, &s->place, -s->d, &s->beyond);
-        if (s->depth == 0) s->reference = all;
+    const bool hidden = s->tracer->integrator->hide_emitters && s->depth == 0;
+    if (s->scene->environment < 0 || hidden || !counts) return;
+    struct imp_vertex *v = vertex_add(s, 0);
+    if (!v) return;
+    v->t = INFINITY;
+    s->at = (struct imp_texcoord){{0, 0}, imp__decide(s->d)};
+    if (s->recorded) {
+        v->d.scatterer = IMP_AT_SKY;
+        v->d.uv[0] = v->d.uv[1] = 0;
+        imp__store_v3(v->d.p, s->at.p);
+    }
+    imp__emission_meet(s, v, s->scene->environment, 1, NULL, NULL);
+    s->walk->valid |= seen(s);
+}
+
+/* The surface that was met, and its material there. NULL: the walk is dropped. */
+static struct imp_vertex *surface_meet(struct imp_step *s, struct imp_hit *hit,
+                                       struct imp_surface *at, struct imp_frame *frame)
+{
+    const struct imp_shape *shape = s->scene->shapes[hit->shape];
+    shape->ops->surface(shape, hit, &s->o, &s->d, at);
+    const struct imp_bsdf *bsdf = imp__shape_bsdf(s->scene, shape);
+    struct imp_vertex *v = vertex_add(s, bsdf->n_in);
+    if (!v) return NULL;
+    v->shape = shape;
+    v->bsdf = bsdf;
+    if (s->recorded) {
+        v->d.shape = hit->shape;
+        v->d.scatterer = bsdf->flags & IMP_BSDF_NULL ? IMP_AT_BOUNDARY : IMP_AT_SURFACE;
+    }
+    *frame = (struct imp_frame){at->s, at->t, at->n};
+    vertex_place(s, v, at, frame, s->d, hit->t);
+    if (imp_unlikely(s->segment->arrive != NULL)) {
+        if (!s->segment->arrive(s, v, hit, at)) return NULL;
+        *frame = (struct imp_frame){at->s, at->t, at->n};
+    }
+    return v;
+}
+
+/* Light that leaves the vertex by itself: what its BSDF glows with, and its emitter. */
+static void emission_add(struct imp_step *s, struct imp_vertex *v, double weight,
+                         const struct imp_hit *hit, const struct imp_surface *at)
+{
+    if (v->bsdf->flags & IMP_BSDF_EMIT) {
+        imp_spec glow;
+        v->bsdf->ops->emit(v->bsdf, s->in, &s->wo, &glow);
+        v->e += glow * weight;
+        if (s->recorded) {
+            v->d.glows = true;
+            v->d.glow_weight = (imp_decided)weight;
+        }
+    }
+    if (v->shape->emitter >= 0) {
+        imp__emission_meet(s, v, v->shape->emitter, weight, hit, at);
+        s->walk->valid |= seen(s);
     }
 }
 
 /* From the ray in flight to the next one; false: the walk ends. */
 static bool step(struct imp_step *s)
 {
-    const struct imp_scene *scene = s->scene;
     const struct imp_integrator *integrator = s->tracer->integrator;
-    const bool counts = integrator->max_depth < 0 || s->depth < integrator->max_depth;
-    const bool goes_on =
-        integrator->max_depth < 0 || s->depth + 1 < integrator->max_depth;
+    const int max_depth = integrator->max_depth;
+    const bool counts = max_depth < 0 || s->depth < max_depth;
+    const bool goes_on = max_depth < 0 || s->depth + 1 < max_depth;
     struct imp_hit hit;
-    if (imp_unlikely(s->bend != NULL) && s->bend->medium) {
-        if (!bend_meet(s, &hit)) return false;
-    } else if (!first_hit(s, &hit)) {
-        const bool hidden = integrator->hide_emitters && s->depth == 0;
-        if (scene->environment < 0 || hidden || !counts) return false;
-        struct imp_vertex *v = vertex_add(s, 0);
-        if (!v) return false;
-        v->t = INFINITY;
-        v->at = (struct imp_texcoord){{0, 0}, s->d};
-        imp__emission_meet(s, v, scene->environment, NULL, NULL);
-        s->walk->valid |= seen(s);
-        return false;
-    }
-
-    const struct imp_shape *shape = scene->shapes[hit.shape];
     struct imp_surface at;
-    shape->ops->surface(shape, &hit, &s->o, &s->d, &at);
-    const struct imp_bsdf *bsdf = imp__shape_bsdf(scene, shape);
-    struct imp_vertex *v = vertex_add(s, bsdf->n_in);
-    if (!v) return false;
-    struct imp_frame frame = {at.s, at.t, at.n};
-    v->shape = shape;
-    v->bsdf = bsdf;
-    v->t = hit.t;
-    v->ng = at.ng;
-    v->at = (struct imp_texcoord){{at.uv[0], at.uv[1]}, at.p};
-    v->dirs.wo = imp__to_local(&frame, -s->d);
-    imp__inputs_eval(v->bsdf->input, v->bsdf->n_in, &v->at, v->in);
-    if (imp_unlikely(s->bend != NULL)) {
-        if (!imp__bend_arrive(s->tracer, s->arena, s->walk, s->bend, v, &hit, &at, s->d))
-            return false;
-        frame = (struct imp_frame){at.s, at.t, at.n}; /* it may have moved a little */
-    }
+    struct imp_frame frame;
 
-    if (imp_unlikely(s->tracer->guide != NULL)) guide_find(s, &hit, &at);
-    struct imp_shadow shadow = {.light = -1};
+    /* Follow the ray to what it meets. */
+    const enum imp_meeting met = s->segment->meet(s, &hit);
+    if (met == IMP_MEETS_NOTHING) sky_meet(s, counts);
+    if (met != IMP_MEETS_SURFACE) return false;
+    struct imp_vertex *v = surface_meet(s, &hit, &at, &frame);
+    if (!v) return false;
+    if (imp_unlikely(s->guided.guide != NULL)) imp__guided_arrive(s, &hit, &at);
+
+    /* Stam's walk collects emission only where it is absorbed. */
+    double emits = 1;
     const bool stam = integrator->kind == IMP_INTEGRATOR_STAM;
-    const bool ended = stam && counts && imp__absorb(s, v);
+    const bool absorbed = stam && counts && imp__absorb(s, v->bsdf, &emits);
     if (stam) s->walk->valid = true;
-    if (counts && v->e_weight > 0) {
-        if (v->bsdf->flags & IMP_BSDF_EMIT) {
-            imp_spec glow;
-            v->bsdf->ops->emit(v->bsdf, v->in, &v->dirs.wo, &glow);
-            v->e += glow * v->g_weight;
-            v->glows = true;
-        }
-        if (shape->emitter >= 0) {
-            imp__emission_meet(s, v, shape->emitter, &hit, &at);
-            s->walk->valid |= seen(s);
-        }
-    }
-    if (ended || !goes_on) return false;
+
+    /* Emission that is met. */
+    if (counts && emits > 0) emission_add(s, v, emits, &hit, &at);
+    if (absorbed || !goes_on) return false;
     if (!(v->bsdf->flags & IMP_BSDF_NULL)) s->walk->valid = true;
-    if ((v->bsdf->flags & IMP_BSDF_SMOOTH) && imp__wants_lights(integrator) &&
-        !(s->bend && s->bend->medium))
+
+    /* The connection to a light. */
+    struct imp_shadow shadow;
+    shadow.wanted = false;
+    if ((v->bsdf->flags & IMP_BSDF_SMOOTH) && s->segment->connects &&
+        imp__wants_lights(integrator))
         imp__light_sample(s, v, &at, &frame, &shadow);
+
+    /* The continuation. */
     const bool only_lights =
         integrator->kind == IMP_INTEGRATOR_DIRECT && integrator->bsdf_samples == 0;
     const bool continues = !only_lights && imp__scatter(s, v, &at, &frame);
-    if (shadow.light >= 0 && !imp__occluded(scene, &shadow.o, &shadow.d, 0, shadow.reach))
-        v->light = shadow.light;
+
+    /* Is the light seen? */
+    if (shadow.wanted &&
+        !imp__occluded(s->scene, &shadow.o, &shadow.d, 0, shadow.reach)) {
+        v->b = shadow.brings;
+        if (s->recorded) v->d.connection = IMP_CONNECTED;
+    }
     return continues;
 }
+
+/* ---- Walks ------------------------------------------------------------------------ */
 
 /* Keys use full-film pixels: a crop renders the same samples as the whole picture. The
  * border of wide filters may lie outside the film, hence the offset. */
@@ -193,6 +229,15 @@ void imp__walk_position(const struct imp_tracer *tracer, int x, int y, int64_t s
     position(tracer, walk_key(tracer, x, y, sample), x, y, px, py);
 }
 
+/* A walk whose value no light can have is dropped. */
+static enum imp_drop drop_cause(imp_spec L)
+{
+    if (imp_unlikely(!imp__is_finite(L)))
+        return isnan(L[0] + L[1] + L[2]) ? IMP_DROP_NAN : IMP_DROP_INFINITE;
+    if (imp_unlikely(L[0] < 0 || L[1] < 0 || L[2] < 0)) return IMP_DROP_NEGATIVE;
+    return IMP_DROP_NONE;
+}
+
 void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, int x,
                      int y, int64_t sample, struct imp_walk *walk)
 {
@@ -203,28 +248,28 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
     const double lens[2] = {imp__u01(key, IMP_DIM_LENS_U), imp__u01(key, IMP_DIM_LENS_V)};
     sensor->ops->ray(sensor, walk->px, walk->py, lens, &walk->ray);
 
+    imp_spec scratch[IMP_INPUTS_MAX];
     struct imp_step s = {.tracer = tracer,
                          .scene = tracer->scene,
                          .walk = walk,
                          .arena = arena,
+                         .recorded = !tracer->value_only ||
+                                     (tracer->active && tracer->active->medium),
+                         .scratch = scratch,
+                         .segment = imp__segment_first(tracer->scene),
                          .o = walk->ray.o,
                          .d = walk->ray.d,
                          .t_min = walk->ray.t_near,
                          .t_max = walk->ray.t_far,
                          .from = walk->ray.o,
                          .beta = {1, 1, 1, 0},
-                         .eta = 1};
-    struct imp_bending bend; /* large: not touched without need */
-    if (imp_unlikely(tracer->scene->n_media > 0)) {
-        imp__bend_begin(&bend);
-        s.bend = &bend;
-    }
-    while (step(&s)) s.depth++;
+                         .eta = 1,
+                         .guided.guide = tracer->guide};
+    if (imp_likely(s.segment->begin == NULL) || s.segment->begin(&s))
+        while (step(&s)) s.depth++;
 
     const imp_spec L = imp__walk_fold(walk);
-    if (imp_unlikely(!imp__is_finite(L)))
-        walk->dropped = isnan(L[0] + L[1] + L[2]) ? IMP_DROP_NAN : IMP_DROP_INFINITE;
-    else if (imp_unlikely(L[0] < 0 || L[1] < 0 || L[2] < 0))
-        walk->dropped = IMP_DROP_NEGATIVE;
+    const enum imp_drop cause = drop_cause(L);
+    if (imp_unlikely(cause != IMP_DROP_NONE)) walk->dropped = cause;
     walk->L = walk->dropped || !walk->valid ? (imp_spec){0} : L;
 }

@@ -1,58 +1,115 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Walk and sweep: the two ideas of the program.
+ * A walk is one random path from the sensor. It is decided once and evaluated as often as
+ * wanted.
  *
- * A walk is one random path from the sensor, recorded vertex by vertex with everything
- * its value is a product of. With E emission met, B the light sample and w = f/(p s) the
- * step weight (f holds the cosine), the radiance leaving vertex k towards the sensor is
+ * Decisions are what rays and random numbers settled: where the walk scattered, in which
+ * directions, with which densities p and survival probabilities s, which light was
+ * sampled and whether it was seen. They are constants to every derivative. Values are
+ * what the scene's parameters make of the decisions: emission E, light sample B, step
+ * weight w = f T/(p s), with the BSDF f (which holds the cosine) and the transmittance T
+ * of the segment that follows. The radiance that leaves vertex k towards the sensor is
  *
- *     L_k = E_k + B_k + w_k L_{k+1}                               (fold, far end first)
+ *     L_k = E_k + B_k + w_k L_{k+1}                        (fold: last vertex to first)
  *
- * The sweep carries the adjoint P from the sensor outwards, P_{k+1} = P_k w_k, and at
- * every vertex a piece of gradient falls off (Stam 2020, Eq. 14 on one path; gradients.md
- * 6):
+ * The sweep carries the adjoint P from the first vertex to the last, P_{k+1} = P_k w_k,
+ * and at every vertex a piece of gradient falls off (Stam 2020, Eq. 14 on one path;
+ * docs/estimators.md 6):
  *
- *     P_k (dE_k + dB_k + dw_k L_{k+1}),   dw = df/(p s): densities are constants
+ *     P_k (dE_k + dB_k + dw_k L_{k+1}),    dw = df T/(p s): densities are constants
  *
- * The tangent is the same product rule run with the fold. All three read the same record;
- * none traces a ray. */
+ * The tangent is the same product rule run with the fold. Evaluate, fold, sweep and
+ * tangent read the same record; none of them draws a number or traces a ray. */
 #ifndef IMP_WALK_H
 #define IMP_WALK_H
 
 #include "math/rng.h"
 #include "scene/guide.h"
 
+/* ---- Decisions ------------------------------------------------------------------- */
+
+/* Decisions are rounded to what a kept record stores before they are first evaluated:
+ * evaluating a kept record gives the walk's value and gradient to the bit. Rays go on
+ * from places and directions in double. */
+typedef float imp_decided;
+typedef imp_decided imp_decided4 __attribute__((vector_size(4 * sizeof(imp_decided))));
+
+enum imp_scatterer {
+    IMP_AT_SURFACE,  /* a BSDF */
+    IMP_AT_BOUNDARY, /* a surface that light passes as if nothing were there */
+    IMP_AT_SKY       /* the environment, met where the walk leaves the scene */
+};
+
+enum imp_connection { IMP_NOT_CONNECTED, IMP_OCCLUDED, IMP_CONNECTED };
+
+/* Emission that the ray met: of an area light at the vertex, or of the environment. */
+struct imp_met {
+    int32_t emitter;    /* -1: none */
+    imp_decided weight; /* MIS weight, or 1/absorb */
+    imp_decided dist, cos_light, d[3];
+};
+
+/* The light sample of a vertex, the walk's connection to a light. */
+struct imp_light {
+    int32_t emitter;
+    imp_decided weight; /* MIS weight over the sample's density */
+    imp_decided uv[2], dist, cos_light, d[3], p[3];
+    imp_decided wi[3]; /* towards it, shading frame of the vertex */
+};
+
+struct imp_decision {
+    int32_t shape;            /* index; -1: none, at the sky */
+    uint8_t scatterer;        /* enum imp_scatterer */
+    int8_t lobe;              /* of the continuation: IMP_SMOOTH or a delta lobe */
+    uint8_t connection;       /* enum imp_connection: what became of the light sample */
+    bool glows, goes_on;      /* the BSDF's own emission counts; the walk continues */
+    imp_decided uv[2], p[3];  /* the place; at the sky p is the direction */
+    imp_decided wo[3], wi[3]; /* of the continuation, shading frame */
+    imp_decided pdf, survive; /* p, s of the continuation */
+    imp_decided passes;       /* T of the segment that follows, where no parameter that
+                                 is differentiated changes it */
+    imp_decided glow_weight;  /* of the BSDF's own emission: 1, or 1/absorb */
+    struct imp_met met;
+    struct imp_light light;
+};
+
+/* ---- Record ---------------------------------------------------------------------- */
+
+struct imp_segment_ops;
+
+/* One segment of a record; kinds put what they keep behind it (segment.h). */
+struct imp_segment {
+    const struct imp_segment_ops *ops;
+    /* Where the vertex at its end moves with a parameter, differences of it are compared
+     * with derivatives: place and direction of arrival are not rounded then. Else NULL.
+     */
+    const struct imp_exact {
+        struct imp_texcoord at;
+        imp_v3 wo;
+    } * exact;
+};
+
 struct imp_vertex {
     struct imp_vertex *prev, *next;
-    const struct imp_bsdf *bsdf; /* NULL: the environment, or nothing */
-    const struct imp_shape *shape;
-    imp_spec *in; /* [bsdf->n_in] inputs at this point */
-    struct imp_texcoord at;
-    struct imp_dirs dirs; /* of the continuation, shading frame */
+    const struct imp_bsdf *bsdf;   /* of the surface; NULL at the sky */
+    const struct imp_shape *shape; /* NULL at the sky */
+    double t;                      /* length of the segment that leads here */
+    double scale;                  /* T/(p s) */
 
-    imp_spec w;    /* f inv_ps: weight of the step to the next vertex */
-    imp_spec lin;  /* L_{k+1}, set by fold */
-    double inv_ps; /* 1/(p s); 0: the walk ends here */
+    /* Values. */
+    imp_spec e;      /* E_k: all emission of this vertex, weighted */
+    imp_spec b;      /* B_k = light_f light_e light.weight */
+    imp_spec w;      /* f scale: weight of the step to the next vertex */
+    imp_spec beyond; /* L_{k+1}, set by fold */
 
-    int emitter;     /* met here, -1: none */
-    double e_weight; /* MIS weight, or 1/absorb */
-    bool glows;      /* the BSDF's own emission counts here */
-    double g_weight; /* 1, or 1/absorb */
-    struct imp_emission e_at;
-    imp_spec e; /* E_k: all emission of this vertex, weighted */
-
-    int light;       /* emitter sampled and visible, -1: none */
-    double l_weight; /* MIS weight / density; > 0, light -1: something is in between */
-    struct imp_emission l_at;
-    imp_v3 l_wi;        /* local */
-    imp_v3 l_p;         /* point on the light */
-    imp_spec l_f, l_le; /* BSDF and radiance; B_k = l_f l_le l_weight */
-
-    struct imp_leg *leg; /* the way here, for derivatives of media (bend.h); or NULL */
-
-    imp_v3 ng;              /* geometric normal, world, for describe */
-    double pdf, survive, t; /* density, survival, distance from the last vertex */
+    /* Walks for their value alone keep nothing from here on. */
+    imp_v3 ng;                   /* geometric normal, world */
+    imp_spec light_f, light_e;   /* BSDF towards the light, and its radiance */
+    struct imp_segment *segment; /* from the last vertex to here (segment.h) */
+    imp_spec *in;                /* [bsdf->n_in] inputs at this point */
+    struct imp_decision d;
 };
+#define IMP_VERTEX_VALUES offsetof(struct imp_vertex, ng) /* bytes */
 
 enum imp_drop {
     IMP_DROP_NONE,
@@ -61,7 +118,7 @@ enum imp_drop {
     IMP_DROP_NEGATIVE,
     IMP_DROP_MEMORY,
     IMP_DROP_LONG,
-    IMP_DROP_BENT, /* a bent ray came to no end, or to what media cannot hold (bend.h) */
+    IMP_DROP_BENT, /* a bent ray came to no end, or to what media cannot hold */
     IMP_DROP_MOVED /* what moves with an active field has no derivative where it ends */
 };
 
@@ -79,6 +136,8 @@ struct imp_walk {
     bool valid;            /* alpha 1 (scene-format 11) */
     bool absorbed;         /* Stam: ended by absorption */
     enum imp_drop dropped; /* then L is 0 and there is nothing to sweep */
+    /* Kind of the segments that move with an active parameter; NULL: none does. */
+    const struct imp_segment_ops *moving;
 };
 
 /* Which numbers a derivative is wanted for, prepared once a job. */
@@ -100,10 +159,11 @@ struct imp_tracer {
     const struct imp_integrator *integrator; /* PATH, DIRECT or STAM */
     const struct imp_sensor *sensor;
     /* NULL: value only. Else walks go on through factors that are zero but have a
-     * derivative (gradients.md 9.2). */
+     * derivative (docs/estimators.md 9.2). */
     const struct imp_active *active;
     uint64_t seed;
     const struct imp_guide *guide; /* of PATH; NULL: none */
+    bool value_only;               /* a walk's L is wanted, and no record of it */
 };
 
 /* The guide that walks of this integrator follow: its densities are made for paths, in
@@ -115,8 +175,11 @@ static inline const struct imp_guide *imp__guide_of(const struct imp_scene *scen
     return i->kind == IMP_INTEGRATOR_PATH && scene->n_media == 0 ? guide : NULL;
 }
 
-/* Record walk (x, y, sample) of the picture (x, y from the crop's corner) in the arena
- * and fold it. Running out of memory drops the walk. */
+/* ---- Decide (trace.c) ------------------------------------------------------------ */
+
+/* Record walk (x, y, sample) of the picture (x, y from the crop's corner) in the arena,
+ * with its values at the scene's present parameters, and fold it. Running out of memory
+ * drops the walk. */
 void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, int x,
                      int y, int64_t sample, struct imp_walk *walk);
 
@@ -124,7 +187,29 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
 void imp__walk_position(const struct imp_tracer *tracer, int x, int y, int64_t sample,
                         double *px, double *py);
 
-/* L = E + B + w L, from the far end; sets lin of every vertex. */
+/* ---- Evaluate (evaluate.c) ------------------------------------------------------- */
+
+/* L of the same decisions at the scene's present parameters: what central differences on
+ * frozen walks are made of (docs/estimators.md 13 A). It does not see wrong densities;
+ * fresh-seed differences do. NaN if the walk moves with a field and meets other shapes
+ * now. */
+imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk *walk);
+
+/* Radiance of an emitter at x, point p of it, at the scene's present parameters. */
+static inline imp_spec imp__emitter_radiance(const struct imp_scene *scene, int emitter,
+                                             const struct imp_emission *x, imp_v3 p)
+{
+    const struct imp_emitter *e = scene->emitters[emitter];
+    const struct imp_texcoord at = {{x->uv[0], x->uv[1]}, p};
+    imp_spec in[IMP_INPUTS_MAX], le;
+    imp__inputs_eval(e->input, e->n_in, &at, in);
+    e->ops->eval(e, in, x, &le);
+    return le;
+}
+
+/* ---- Fold, sweep, tangent (sweep.c) ---------------------------------------------- */
+
+/* L = E + B + w L, from the last vertex to the first; sets `beyond` of every vertex. */
 imp_spec imp__walk_fold(struct imp_walk *walk);
 
 /* Reverse mode: adds (dL/dtheta)^T adjoint to the sink, lane by lane. */
@@ -135,12 +220,46 @@ void imp__walk_sweep(const struct imp_tracer *tracer, const struct imp_walk *wal
 imp_spec imp__walk_tangent(const struct imp_tracer *tracer, const struct imp_walk *walk,
                            const double *x_dot);
 
-/* L of the same vertices, densities and decisions at the scene's present parameters: what
- * central differences on frozen walks are made of (gradients.md 13 A). */
-imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk *walk);
+/* ---- Decisions as the readers of a record want them ------------------------------- */
 
-/* Radiance of an emitter at x, point p of it, at the scene's present parameters. */
-imp_spec imp__emitter_radiance(const struct imp_scene *scene, int emitter,
-                               const struct imp_emission *x, imp_v3 p);
+static inline imp_v3 imp__decided_v3(const imp_decided v[3])
+{
+    return __builtin_convertvector(((imp_decided4){v[0], v[1], v[2], 0}), imp_v3);
+}
+static inline struct imp_texcoord imp__vertex_at(const struct imp_vertex *v)
+{
+    if (imp_unlikely(v->segment->exact != NULL)) return v->segment->exact->at;
+    return (struct imp_texcoord){{v->d.uv[0], v->d.uv[1]}, imp__decided_v3(v->d.p)};
+}
+static inline imp_v3 imp__vertex_wo(const struct imp_vertex *v)
+{
+    if (imp_unlikely(v->segment->exact != NULL)) return v->segment->exact->wo;
+    return imp__decided_v3(v->d.wo);
+}
+static inline struct imp_dirs imp__vertex_dirs(const struct imp_vertex *v)
+{
+    return (struct imp_dirs){imp__vertex_wo(v), imp__decided_v3(v->d.wi), v->d.lobe};
+}
+static inline struct imp_emission imp__vertex_met(const struct imp_vertex *v)
+{
+    const struct imp_met *m = &v->d.met;
+    const struct imp_texcoord at = imp__vertex_at(v);
+    return (struct imp_emission){
+        {at.uv[0], at.uv[1]}, m->dist, m->cos_light, imp__decided_v3(m->d)};
+}
+static inline struct imp_emission imp__light_emission(const struct imp_light *l)
+{
+    return (struct imp_emission){
+        {l->uv[0], l->uv[1]}, l->dist, l->cos_light, imp__decided_v3(l->d)};
+}
+static inline struct imp_texcoord imp__light_at(const struct imp_light *l)
+{
+    return (struct imp_texcoord){{l->uv[0], l->uv[1]}, imp__decided_v3(l->p)};
+}
+static inline struct imp_dirs imp__light_dirs(const struct imp_vertex *v)
+{
+    return (struct imp_dirs){imp__vertex_wo(v), imp__decided_v3(v->d.light.wi),
+                             IMP_SMOOTH};
+}
 
 #endif

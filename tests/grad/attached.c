@@ -63,9 +63,9 @@ static struct estimates estimate(const struct setting *s, uint32_t n, uint64_t s
         const struct imp_key key = imp__key(seed, 0, i);
         const double u[3] = {imp__u01(key, 0), imp__u01(key, 1), imp__u01(key, 2)};
         struct imp_dirs d = {wo, {0}, IMP_SMOOTH};
-        struct imp_bsdf_sample q;
+        struct kind_draw q;
         double detached = 0, attached = 0, stam = 0;
-        if (s->b->ops->sample(s->b, s->in, u, &d, &q)) {
+        if (kind_draw(s->b, s->in, u, &d, &q)) {
             imp_spec df[4], dw;
             imp_v3 dwi;
             s->b->ops->eval_d(s->b, s->in, &d, df);

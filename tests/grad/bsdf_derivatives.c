@@ -108,12 +108,12 @@ static struct tally check_case(const struct imp_bsdf *b, enum kind_set set)
     for (int i = 0; i < TRIALS; i++) {
         kind_inputs(b, set, 1000 + (uint64_t)i, in);
         struct imp_dirs d = {kind_direction(i, 5), {0}, IMP_SMOOTH};
-        struct imp_bsdf_sample s;
+        struct kind_draw s;
         const struct imp_key key = imp__key(9, (uint64_t)i, 0);
         const double u[3] = {imp__u01(key, 0), imp__u01(key, 1), imp__u01(key, 2)};
         /* Directions that are drawn (every delta lobe is met), and any. */
         if (i % 3 == 0) d.wi = kind_direction(i / 3 + (i % 2), 6);
-        else if (!b->ops->sample(b, in, u, &d, &s)) continue;
+        else if (!kind_draw(b, in, u, &d, &s)) continue;
         b->ops->eval_d(b, in, &d, df);
         t.value = fmax(t.value, point_error(b, in, &d, eval_value, df, &t));
         t.points++;
@@ -154,10 +154,10 @@ static bool weight_at(const struct imp_bsdf *b, imp_spec *in, int j, double x,
                       const double u[3], imp_v3 wo, imp_spec *w, imp_v3 *wi)
 {
     struct imp_dirs d = {wo, {0}, IMP_SMOOTH};
-    struct imp_bsdf_sample s;
+    struct kind_draw s;
     const imp_spec old = in[j];
     in[j] = imp__spec(x);
-    const bool ok = b->ops->sample(b, in, u, &d, &s);
+    const bool ok = kind_draw(b, in, u, &d, &s);
     in[j] = old;
     *w = s.f / s.pdf;
     *wi = d.wi;
@@ -177,8 +177,8 @@ static void visit_attached(const struct kind_case *c, void *payload)
         const struct imp_key key = imp__key(11, (uint64_t)i, 0);
         const double u[3] = {imp__u01(key, 0), imp__u01(key, 1), imp__u01(key, 2)};
         struct imp_dirs d = {kind_direction(i, 12), {0}, IMP_SMOOTH};
-        struct imp_bsdf_sample s;
-        if (!b->ops->sample(b, in, u, &d, &s)) continue;
+        struct kind_draw s;
+        if (!kind_draw(b, in, u, &d, &s)) continue;
         for (int j = 0; j < b->n_in; j++) {
             imp_spec dw, wp, wm;
             imp_v3 dwi, ip, im;

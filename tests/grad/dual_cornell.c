@@ -47,16 +47,15 @@ static struct dual radiance(imp_context *ctx, imp_scene *scene, const struct imp
 {
     struct dual L = {0, 0}, throughput = {1, 0};
     for (const struct imp_vertex *v = w->first; v; v = v->next) {
-        if (v->emitter >= 0 && v->dirs.wo[2] > 0)
-            L = add(L, times(throughput, light_rgb[c] * v->e_weight));
+        if (v->d.met.emitter >= 0 && v->d.wo[2] > 0)
+            L = add(L, times(throughput, light_rgb[c] * v->d.met.weight));
         if (!v->bsdf) break;
         const struct dual rho = reflectance(ctx, scene, v, wanted, c);
-        if (v->light >= 0 && v->l_at.cos_light > 0)
-            L = add(L, times(mul(throughput, rho),
-                             fmax(0, v->l_wi[2]) / M_PI * light_rgb[c] * v->l_weight));
-        throughput =
-            times(mul(throughput, rho), fmax(0, v->dirs.wi[2]) / M_PI * v->inv_ps);
-        if (v->inv_ps == 0) break;
+        if (v->d.connection == IMP_CONNECTED && v->d.light.cos_light > 0)
+            L = add(L, times(mul(throughput, rho), fmax(0, v->d.light.wi[2]) / M_PI *
+                                                       light_rgb[c] * v->d.light.weight));
+        throughput = times(mul(throughput, rho), fmax(0, v->d.wi[2]) / M_PI * v->scale);
+        if (!v->d.goes_on) break;
     }
     return L;
 }
@@ -84,8 +83,11 @@ int main(void)
     test_must(ctx, imp_scene_find_param(scene, "red.reflectance.value", &red));
     chosen[red] = 1;
     test_must(ctx, imp__active_create(scene, chosen, &active));
-    const struct imp_tracer tracer = {
-        scene, &scene->integrator, scene->sensors[0], &active, 11, NULL};
+    const struct imp_tracer tracer = {.scene = scene,
+                                      .integrator = &scene->integrator,
+                                      .sensor = scene->sensors[0],
+                                      .active = &active,
+                                      .seed = 11};
     struct imp_arena arena;
     imp__arena_init(&arena, ctx);
     double worst_value = 0, worst_slope = 0, total = 0, cross = 0, largest = 0;

@@ -32,22 +32,24 @@ static double planted(const struct stam *s, const struct imp_walk *w,
         at[n++] = v;
     const struct imp_vertex *last = at[n - 1];
     const int glow = stam_is(last, "sphere") ? AMBIENT2 : AMBIENT3;
-    const bool ends = w->absorbed || (mistake == E24_CUT_GLOWS && last->emitter < 0);
-    if (last->emitter >= 0) L = s->theta[EMISSION];
+    const bool ends =
+        w->absorbed || (mistake == E24_CUT_GLOWS && last->d.met.emitter < 0);
+    if (last->d.met.emitter >= 0) L = s->theta[EMISSION];
     else if (ends) L = s->theta[glow] / s->absorb;
 
     for (int k = n - 2; k >= 0; k--) {
         const struct imp_vertex *v = at[k];
         const bool sphere = stam_is(v, "sphere");
-        double p = v->pdf;
+        const struct imp_dirs dirs = imp__vertex_dirs(v);
+        double p = v->d.pdf;
         if (mistake == DRAWN_DENSITY && sphere) {
             const bool cosine = imp__u01(w->key, imp__dim(k, IMP_DIM_LOBE)) < .5;
-            p = .5 * stam_m2_pdf(&v->dirs, cosine ? STAM_COSINE : STAM_PHONG,
-                                 s->theta[EXPONENT]);
+            p = .5 *
+                stam_m2_pdf(&dirs, cosine ? STAM_COSINE : STAM_PHONG, s->theta[EXPONENT]);
         }
         f[k] = dual_scale(
-            sphere ? stam_m2(&v->dirs, STAM_MICROFACET, s->theta)
-                   : dual_scale(dual_control(s->theta, DIFFUSE3), v->dirs.wi[2] / M_PI),
+            sphere ? stam_m2(&dirs, STAM_MICROFACET, s->theta)
+                   : dual_scale(dual_control(s->theta, DIFFUSE3), v->d.wi[2] / M_PI),
             1 / p);
         lin[k] = L;
         L *= f[k].v / (1 - s->absorb);
@@ -64,7 +66,7 @@ static double planted(const struct stam *s, const struct imp_walk *w,
                  ? f[k].v
                  : f[k].v / (1 - s->absorb);
     }
-    if (last->emitter >= 0) g[EMISSION] += P;
+    if (last->d.met.emitter >= 0) g[EMISSION] += P;
     else if (ends)
         g[glow] += P / s->absorb * (mistake == E23_EMISSION_TWICE ? s->theta[glow] : 1);
     return L;

@@ -14,14 +14,14 @@ static float ratio_float(const struct imp_walk *w, const double *theta, double a
     const double *at[2] = {theta, start};
     for (int k = 0; k < 2; k++)
         for (const struct imp_vertex *v = w->first; v; v = v->next) {
+            const struct imp_dirs dirs = imp__vertex_dirs(v);
             if (!v->next) {
                 L[k] *= (float)at[k][AMBIENT3] / (float)absorb;
             } else if (stam_is(v, "sphere")) {
-                L[k] *=
-                    (float)stam_m2(&v->dirs, STAM_MICROFACET, at[k]).v * (float)v->inv_ps;
+                L[k] *= (float)stam_m2(&dirs, STAM_MICROFACET, at[k]).v * (float)v->scale;
             } else {
-                L[k] *= (float)at[k][DIFFUSE3] * (float)(v->dirs.wi[2] / M_PI) *
-                        (float)v->inv_ps;
+                L[k] *=
+                    (float)at[k][DIFFUSE3] * (float)(v->d.wi[2] / M_PI) * (float)v->scale;
             }
         }
     return (L[0] * L[0]) / (L[1] * L[1]);

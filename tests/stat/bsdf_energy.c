@@ -48,7 +48,7 @@ static void albedo_visit(const struct kind_case *c, void *payload)
         kind_inputs(b, KIND_RANDOM, 70 + (uint64_t)i, in);
         struct imp_dirs d = {kind_direction(i, 31), {0}, IMP_SMOOTH};
         const imp_v3 wo = d.wo;
-        struct imp_bsdf_sample s;
+        struct kind_draw s;
         /* One reflectance at a time is 1 and the others are 0: the lobes one by one. */
         for (int j = 0; j < b->n_in; j++) {
             const struct imp_input_desc *q = kind_input(b, j);
@@ -67,7 +67,7 @@ static void albedo_visit(const struct kind_case *c, void *payload)
                 const double u[3] = {imp__u01(key, 0), imp__u01(key, 1),
                                      imp__u01(key, 2)};
                 d.wo = wo;
-                const bool ok = b->ops->sample(b, in, u, &d, &s);
+                const bool ok = kind_draw(b, in, u, &d, &s);
                 if (b->flags &
                     IMP_BSDF_DELTA) /* the delta lobes alone; power, not radiance */
                     tap_add(&mc, ok && d.lobe >= 0 ? s.f[0] / s.pdf * s.eta * s.eta : 0);
@@ -325,12 +325,12 @@ static void dielectric_visit(const struct kind_case *c, void *payload)
     if (strcmp(c->kind, "dielectric") != 0) return;
     for (int i = 0; i < 200; i++) {
         struct imp_dirs d = {kind_direction(i, 51), {0}, 0}, e;
-        struct imp_bsdf_sample s;
+        struct kind_draw s;
         imp_spec back;
         const double u[3] = {1 - 1e-15, 0.5, 0.5};
         const imp_spec in[3] = {imp__spec(0.7), imp__spec(0.4),
                                 imp__spec(0.5 + 0.01 * i)};
-        if (!b->ops->sample(b, in, u, &d, &s)) continue;
+        if (!kind_draw(b, in, u, &d, &s)) continue;
         const struct imp_dirs r = {d.wo, {0}, 0};
         if (d.lobe == 0) continue; /* total reflection */
         n++;

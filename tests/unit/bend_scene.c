@@ -5,7 +5,7 @@
 #include "imp_fail_alloc.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "walk/bend.h"
+#include "walk/graded.h"
 #include <math.h>
 #include <stdarg.h>
 
@@ -30,7 +30,8 @@ static imp_scene *scene_of(imp_context *ctx, const char *format, ...)
 
 static struct imp_tracer tracer_of(const imp_scene *s)
 {
-    return (struct imp_tracer){s, &s->integrator, s->sensors[0], NULL, 1, NULL};
+    return (struct imp_tracer){
+        .scene = s, .integrator = &s->integrator, .sensor = s->sensors[0], .seed = 1};
 }
 
 /* A ball of Luneburg's profile: parallel rays meet at the opposite point. */
@@ -58,7 +59,7 @@ static void luneburg(imp_context *ctx)
                 worst[fine] = INFINITY;
                 continue;
             }
-            const imp_v3 off = w.first->next->at.p - imp__v3(0, 0, -1);
+            const imp_v3 off = imp__decided_v3(w.first->next->d.p) - imp__v3(0, 0, -1);
             worst[fine] = fmax(worst[fine], imp__length(off));
             worst[fine] = fmax(worst[fine], fabs(w.L[0] - 1));
         }
@@ -97,17 +98,17 @@ static void rod(imp_context *ctx)
     for (int k = 0; k < 24 * 24; k++) {
         struct imp_walk w;
         imp__walk_trace(&t, &arena, k % 24, k / 24, 0, &w);
-        if (w.n < 3 || w.first->shape != s->shapes[0] || w.first->dirs.lobe != 1 ||
+        if (w.n < 3 || w.first->shape != s->shapes[0] || w.first->d.lobe != 1 ||
             w.first->next->shape != s->shapes[1])
             continue;
         n++;
         /* Snell with the index at the point; then the harmonic motion. */
-        const imp_v3 a = w.first->at.p, d = w.ray.d;
+        const imp_v3 a = imp__decided_v3(w.first->d.p), d = w.ray.d;
         const double r2 = a[0] * a[0] + a[1] * a[1];
         const double eta2 = n0 * n0 * (1 - g * g * r2);
         const double vz = -sqrt(eta2 - d[0] * d[0] - d[1] * d[1]);
         const double sigma = length / -vz, k2 = n0 * g;
-        const imp_v3 b = w.first->next->at.p;
+        const imp_v3 b = imp__decided_v3(w.first->next->d.p);
         for (int i = 0; i < 2; i++)
             worst = fmax(
                 worst, fabs(a[i] * cos(k2 * sigma) + d[i] / k2 * sin(k2 * sigma) - b[i]));
@@ -220,7 +221,7 @@ static void radiance(imp_context *ctx)
         imp__walk_trace(&t, &arena, k % 24, k / 24 % 24, k / 576, &w);
         if (!(w.L[0] > 0)) continue;
         n++;
-        const imp_v3 p = w.last->at.p;
+        const imp_v3 p = imp__decided_v3(w.last->d.p);
         worst = fmax(worst, fabs(w.L[0] - 1 / (2 - imp__dot(p, p))));
         imp__arena_rewind(&arena, start);
     }

@@ -36,15 +36,12 @@ static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp
     return lit(d) ? 1 : 0;
 }
 static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
-                   struct imp_dirs *d, struct imp_bsdf_sample *s)
+                   struct imp_dirs *d)
 {
-    (void)u;
+    (void)b, (void)in, (void)u;
     if (!(d->wo[2] > 0)) return false;
     d->wi = imp__v3(-d->wo[0], -d->wo[1], d->wo[2]);
     d->lobe = 0;
-    s->pdf = 1;
-    s->eta = 1;
-    eval(b, in, d, &s->f);
     return true;
 }
 static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,

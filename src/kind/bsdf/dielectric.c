@@ -18,7 +18,7 @@ static const struct imp_input_desc inputs[] = {
     IMP_TINT_INPUT("specular_transmittance"),
     {.name = "eta",
      .role = IMP_UNBOUNDED,
-     .flags = IMP_INPUT_SCALAR | IMP_INPUT_FIXED,
+     .flags = IMP_INPUT_SCALAR | IMP_INPUT_FIXED | IMP_INPUT_INDEX,
      .fallback = 1.5046 / 1.000277,
      .lo = 1e-3,
      .hi = 1e3,
@@ -66,7 +66,7 @@ static double coefficient(const imp_spec *in, const struct imp_dirs *d, double *
 }
 
 static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
-                   struct imp_dirs *d, struct imp_bsdf_sample *s)
+                   struct imp_dirs *d)
 {
     double cos_t, eta_t;
     (void)b;
@@ -75,17 +75,11 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
     if (u[0] < F) {
         d->lobe = REFLECT;
         d->wi = imp__v3(-d->wo[0], -d->wo[1], d->wo[2]);
-        s->eta = 1;
-        s->f = in[TINT_R] * F;
-        s->pdf = F;
     } else {
         d->lobe = REFRACT;
         d->wi = imp__v3(-d->wo[0] / eta_t, -d->wo[1] / eta_t, -copysign(cos_t, d->wo[2]));
-        s->eta = eta_t;
-        s->f = in[TINT_T] * ((1 - F) / (eta_t * eta_t));
-        s->pdf = 1 - F;
     }
-    return s->pdf > 0;
+    return true;
 }
 static void eval(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
                  imp_spec *f)
@@ -101,6 +95,13 @@ static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp
     (void)b;
     coefficient(in, d, &chance);
     return chance;
+}
+static double index_ratio(const struct imp_bsdf *b, const imp_spec *in,
+                          const struct imp_dirs *d)
+{
+    (void)b;
+    if (d->lobe != REFRACT) return 1;
+    return d->wo[2] > 0 ? in[ETA][0] : 1 / in[ETA][0];
 }
 static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
                    imp_spec *df)
@@ -121,4 +122,5 @@ const struct imp_bsdf_ops imp__dielectric = {.size = sizeof(struct imp_bsdf_ops)
                                              .sample = sample,
                                              .eval = eval,
                                              .pdf = pdf,
+                                             .index_ratio = index_ratio,
                                              .eval_d = eval_d};

@@ -25,15 +25,4 @@ static inline bool imp__lambert_sample(const double u[2], struct imp_dirs *d)
     return d->wi[2] > 0;
 }
 
-/* What sample returns for the smooth direction it has drawn: value and density are those
- * of all lobes together. */
-static inline bool imp__smooth_sample(const struct imp_bsdf *b, const imp_spec *in,
-                                      const struct imp_dirs *d, struct imp_bsdf_sample *s)
-{
-    s->eta = 1;
-    s->pdf = b->ops->pdf(b, in, d);
-    b->ops->eval(b, in, d, &s->f);
-    return s->pdf > 0;
-}
-
 #endif

@@ -18,14 +18,11 @@ static enum imp_status build(const struct imp_build *build, void *self,
 }
 
 static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
-                   struct imp_dirs *d, struct imp_bsdf_sample *s)
+                   struct imp_dirs *d)
 {
     (void)b, (void)in, (void)u;
     d->lobe = PASS;
     d->wi = -d->wo;
-    s->eta = 1;
-    s->f = imp__spec(1);
-    s->pdf = 1;
     return true;
 }
 static void eval(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,

@@ -114,7 +114,7 @@ static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp
     return imp__microfacet_pdf(&m, &d->wo, &h) / (4 * imp__dot(d->wo, h));
 }
 static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
-                   struct imp_dirs *d, struct imp_bsdf_sample *s)
+                   struct imp_dirs *d)
 {
     if (!(d->wo[2] > 0)) return false;
     const struct imp__microfacet m = distribution(b, in);
@@ -124,7 +124,7 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
     d->wi = imp__normalize(h * (2 * c) - d->wo);
     d->lobe = IMP_SMOOTH;
     if (!(d->wi[2] > 0)) return false; /* the facet sends it into the surface */
-    return imp__smooth_sample(b, in, d, s);
+    return true;
 }
 
 /* ln f = ln tint + ln F + ln D + ln G1(wi) + ln G1(wo), one term an input. */

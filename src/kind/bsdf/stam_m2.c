@@ -106,7 +106,7 @@ static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp
 }
 
 static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
-                   struct imp_dirs *d, struct imp_bsdf_sample *s)
+                   struct imp_dirs *d)
 {
     const struct m2 *m2 = b->self;
     if (!(d->wo[2] > 0)) return false;
@@ -122,7 +122,7 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
         d->lobe = IMP_SMOOTH;
         if (!(d->wi[2] > 0)) return false;
     }
-    return imp__smooth_sample(b, in, d, s);
+    return true;
 }
 
 /* d ln S/d alpha = 1/(alpha + 2) + ln c_m for all three variants. */

@@ -22,14 +22,10 @@ static enum imp_status build(const struct imp_build *build, void *self,
     return imp__stam_absorb_read(build, &b->absorb);
 }
 static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
-                   struct imp_dirs *d, struct imp_bsdf_sample *s)
+                   struct imp_dirs *d)
 {
-    (void)b;
-    if (!imp__lambert_sample(&u[1], d)) return false;
-    s->pdf = imp__lambert(d);
-    s->f = in[DIFFUSE] * s->pdf;
-    s->eta = 1;
-    return true;
+    (void)b, (void)in;
+    return imp__lambert_sample(&u[1], d);
 }
 static void eval(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
                  imp_spec *f)

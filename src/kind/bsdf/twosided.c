@@ -40,13 +40,13 @@ static const struct imp_bsdf *side(const struct imp_bsdf *b, const imp_v3 *wo, b
 }
 
 static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
-                   struct imp_dirs *d, struct imp_bsdf_sample *s)
+                   struct imp_dirs *d)
 {
     bool back;
     int first;
     const struct imp_bsdf *c = side(b, &d->wo, &back, &first);
     struct imp_dirs e = {flip(d->wo, back), d->wi, d->lobe};
-    if (!c->ops->sample(c, in + first, u, &e, s)) return false;
+    if (!c->ops->sample(c, in + first, u, &e)) return false;
     d->wi = flip(e.wi, back);
     d->lobe = e.lobe;
     return true;

@@ -7,7 +7,7 @@
  * surfaces. A glass ball's outline before what has no edges itself is none (reflection
  * and refraction meet there), nor is the border of a light that is dark along it, in the
  * dark. */
-#include "bend.h"
+#include "graded.h"
 #include <stdio.h>
 #include <string.h>
 
@@ -38,7 +38,7 @@ static struct piece piece_of(const struct imp_scene *scene, const struct imp_ver
     }
     v->shape->ops->round(v->shape, &r);
     if (imp__dot(r.axis, r.axis) != 0) return p;
-    const imp_v3 from = v->prev ? v->prev->at.p - r.centre : (imp_v3){0};
+    const imp_v3 from = v->prev ? imp__decided_v3(v->prev->d.p) - r.centre : (imp_v3){0};
     const bool outside = imp__dot(from, from) > imp__sqr(r.radius) * (1 + 1e-9);
     const bool clear = imp__shape_bsdf(scene, v->shape)->flags & IMP_BSDF_TRANSMIT;
     p.ball = clear && outside;
@@ -114,7 +114,7 @@ static enum imp_status look(struct survey *s, const struct imp_medium *m,
 {
     const struct imp_scene *scene = s->tracer->scene;
     const struct imp_vertex *shape = next && next->shape ? next : NULL;
-    const struct imp_leg *leg = next ? next->leg : NULL;
+    const struct imp_graded_segment *leg = next ? imp__graded_kept(next) : NULL;
     const imp_v3 d = !leg ? (imp_v3){0} : leg->medium ? leg->ride.d : leg->d;
     const struct pair p = {piece_of(scene, v), piece_of(scene, shape),
                            imp__dot(v->ng, d) < 0};
@@ -146,20 +146,23 @@ static enum imp_status walk_look(struct survey *s, const struct imp_walk *w)
     const struct imp_medium *m = an_active(s->tracer);
     bool moved = false;
     for (const struct imp_vertex *v = w->first; v; v = v->next) {
-        moved |= v->leg && v->leg->moved;
-        const bool bent = v->next && v->next->leg && v->next->leg->moved;
+        const struct imp_graded_segment *to = imp__graded_kept(v);
+        const struct imp_graded_segment *on = v->next ? imp__graded_kept(v->next) : NULL;
+        moved |= to && to->moved;
+        const bool bent = on && on->moved;
+        const struct imp_texcoord at = imp__vertex_at(v);
         if (w->dropped == IMP_DROP_MOVED && !v->next)
             return refuse(s->tracer, m, "its rays go on to '%s', which %s",
                           name_of(piece_of(s->tracer->scene, v)),
-                          imp__bend_obstacle(s->tracer->scene, v->shape, &v->at));
-        if (!(v->inv_ps > 0) || w->dropped || !(bent || moved)) continue;
+                          imp__graded_obstacle(s->tracer->scene, v->shape, &at));
+        if (!v->d.goes_on || w->dropped || !(bent || moved)) continue;
         const enum imp_status st = look(s, m, v, v->next);
         if (st != IMP_OK) return st;
     }
     return IMP_OK;
 }
 
-enum imp_status imp__bend_survey(const struct imp_tracer *tracer)
+enum imp_status imp__graded_survey(const struct imp_tracer *tracer)
 {
     const struct imp_film_desc *film = &tracer->sensor->film;
     const int64_t pixels = (int64_t)film->crop_w * film->crop_h;

@@ -9,9 +9,9 @@
  * and its value a product of Fresnel's factors, ratios of n^2 and the radiance E at the
  * end, all differentiable in x, d and the field. The choice of a lobe has probability F
  * or 1 - F, taken as fixed: the factor's derivative divided by it is the unbiased part of
- * that choice (gradients.md 3). What the chain may not end on is in imp__bend_obstacle;
- * edges are looked for by the survey. */
-#include "bend.h"
+ * that choice (docs/estimators.md 3). What the chain may not end on is in
+ * imp__graded_obstacle; edges are looked for by the survey. */
+#include "graded.h"
 #include "kind/bsdf/fresnel.h"
 
 /* ---- One boundary -------------------------------------------------------------- */
@@ -34,9 +34,8 @@ static void sides_of(const struct imp_vertex *v, imp_v3 x, imp_v3 ng, imp_v3 d,
         imp__field_eval1(imp__graded_field(s->medium->graded), &x, 1, &s->inner);
         in = s->inner.eta;
         out = s->medium->outside;
-    } else if (!(v->bsdf->flags & IMP_BSDF_NULL)) {
-        for (int j = 0; j < v->bsdf->n_own; j++) /* of a dielectric */
-            if (v->bsdf->ops->inputs[j].flags & IMP_INPUT_SCALAR) in = v->in[j][0];
+    } else if (v->bsdf->index_input >= 0) {
+        in = v->in[v->bsdf->index_input][0];
     }
     s->near = s->entering ? out : in;
     s->far = s->entering ? in : out;
@@ -46,8 +45,8 @@ static bool passes(const struct imp_vertex *v) /* as if nothing were there */
 {
     return v->bsdf->flags & IMP_BSDF_NULL;
 }
-static bool reflects(const struct imp_vertex *v) { return v->dirs.lobe == 0; }
-static bool scatters(const struct imp_vertex *v) { return v->dirs.lobe == IMP_SMOOTH; }
+static bool reflects(const struct imp_vertex *v) { return v->d.lobe == 0; }
+static bool scatters(const struct imp_vertex *v) { return v->d.lobe == IMP_SMOOTH; }
 
 static imp_v3 normal_of(const struct imp__surface *l, imp_v3 x, double *inv_length)
 {
@@ -95,7 +94,7 @@ static void turn_back(const struct imp_vertex *v, const struct imp__surface *l, 
     struct imp__turn t;
     double inv, d_c, d_eta;
     if (passes(v)) return;
-    const imp_v3 x = v->at.p, zero = {0};
+    const imp_v3 x = imp__graded_kept(v)->end.at.p, zero = {0};
     sides_of(v, x, v->ng, d, &s);
     const imp_v3 n = normal_of(l, x, &inv), p = s.near * d;
     imp__turn(&n, &p, s.far, reflects(v), &t);
@@ -141,7 +140,7 @@ static double turn_tangent(const struct imp_vertex *v, const struct imp__surface
     struct imp__turn t;
     double inv, d_c, d_eta;
     if (passes(v)) return 0;
-    const imp_v3 x = v->at.p;
+    const imp_v3 x = imp__graded_kept(v)->end.at.p;
     sides_of(v, x, v->ng, d, &s);
     double near_dot = 0, far_dot = 0;
     if (s.medium) {
@@ -173,20 +172,21 @@ static double turn_tangent(const struct imp_vertex *v, const struct imp__surface
 static void radiance_slope(const struct imp_tracer *tracer, const struct imp_vertex *v,
                            imp_spec slope[2], imp_v3 grad[2])
 {
-    const struct imp_emitter *e = tracer->scene->emitters[v->emitter];
-    const struct imp_texcoord at = {{v->e_at.uv[0], v->e_at.uv[1]}, v->at.p};
+    const struct imp_emitter *e = tracer->scene->emitters[v->d.met.emitter];
+    const struct imp_texcoord at = imp__vertex_at(v);
+    const struct imp_emission met = imp__vertex_met(v);
     imp_spec in[IMP_INPUTS_MAX], d[IMP_INPUTS_MAX];
     slope[0] = slope[1] = (imp_spec){0};
     imp__inputs_eval(e->input, e->n_in, &at, in);
-    e->ops->eval_d(e, in, &v->e_at, d);
+    e->ops->eval_d(e, in, &met, d);
     for (int j = 0; j < e->n_in; j++) {
         const struct imp_texture *t = e->input[j]->texture;
         imp_spec d_uv[2];
         if (!t || !t->ops->slope || !t->ops->slope(t, &at, e->input[j]->scalar, d_uv))
             continue;
-        for (int k = 0; k < 2; k++) slope[k] += d[j] * d_uv[k] * v->e_weight;
+        for (int k = 0; k < 2; k++) slope[k] += d[j] * d_uv[k] * v->d.met.weight;
     }
-    const imp_v3 a = v->leg->dp_du, b = v->leg->dp_dv;
+    const imp_v3 a = imp__graded_kept(v)->dp_du, b = imp__graded_kept(v)->dp_dv;
     const double aa = imp__dot(a, a), ab = imp__dot(a, b), bb = imp__dot(b, b);
     const double det = aa * bb - ab * ab;
     grad[0] = grad[1] = (imp_v3){0};
@@ -211,24 +211,24 @@ static void chain_sweep(const struct imp_tracer *tracer, const struct imp_walk *
     struct imp__graded_active to = {
         .base = tracer->active->base, .sink = sink, .lane = sink->apart ? first : 0};
     for (const struct imp_vertex *v = walk->last; v; v = v->prev) {
-        const struct imp_leg *leg = v->leg;
+        const struct imp_graded_segment *leg = imp__graded_kept(v);
         struct imp__surface level;
         if (!leg) {
-            if (v->prev && v->prev->leg) continue; /* the environment */
+            if (v->prev && imp__graded_kept(v->prev)) continue; /* the environment */
             break;
         }
-        imp__level(v->shape, v->at.p, v->ng, &level);
-        if (v->inv_ps > 0) {
+        imp__level(v->shape, leg->end.at.p, v->ng, &level);
+        if (v->d.goes_on) {
             if (scatters(v)) lam = mu = (imp_v3){0};
             else
-                turn_back(v, &level, leg->d, over(leg->P * v->w * v->lin, first, last),
+                turn_back(v, &level, leg->d, over(leg->P * v->w * v->beyond, first, last),
                           &to, &lam, &mu);
         }
         if (!leg->moved) {
             lam = mu = (imp_v3){0};
             continue;
         }
-        if (v->emitter >= 0) {
+        if (v->d.met.emitter >= 0) {
             imp_spec slope[2];
             imp_v3 grad[2];
             radiance_slope(tracer, v, slope, grad);
@@ -237,8 +237,9 @@ static void chain_sweep(const struct imp_tracer *tracer, const struct imp_walk *
         }
         if (!leg->medium) { /* x = x0 + t d on the surface */
             struct imp__surface_at sa;
-            imp__surface_eval(&level, &v->at.p, &leg->d, &sa);
-            const double t = imp__length(v->at.p - v->prev->at.p);
+            imp__surface_eval(&level, &leg->end.at.p, &leg->d, &sa);
+            const double t =
+                imp__length(leg->end.at.p - imp__graded_kept(v->prev)->end.at.p);
             lam -= sa.gx * (imp__dot(lam, leg->d) / imp__dot(sa.gx, leg->d));
             mu += t * lam;
             continue;
@@ -246,7 +247,7 @@ static void chain_sweep(const struct imp_tracer *tracer, const struct imp_walk *
         /* n^2 at the start over that at the end */
         const struct imp_vertex *u = v->prev;
         const imp_v3 zero = {0};
-        const double A = over(u->leg->P * u->w * u->lin, first, last);
+        const double A = over(imp__graded_kept(u)->P * u->w * u->beyond, first, last);
         const struct imp__ride *r = &leg->ride;
         to.medium = leg->medium;
         lam -= r->k.g * (2 * A / r->k.eta);
@@ -257,14 +258,16 @@ static void chain_sweep(const struct imp_tracer *tracer, const struct imp_walk *
     }
 }
 
-void imp__bend_sweep(const struct imp_tracer *tracer, const struct imp_walk *walk,
-                     imp_spec adjoint, struct imp_sink *sink)
+void imp__graded_sweep(const struct imp_tracer *tracer, const struct imp_walk *walk,
+                       imp_spec adjoint, struct imp_sink *sink)
 {
+    if (!tracer->active->medium) return;
     const int lanes = tracer->scene->channels;
     imp_spec P = adjoint;
     bool any = false;
     for (const struct imp_vertex *v = walk->first; v; v = v->next) {
-        if (v->leg) v->leg->P = P, any = true;
+        struct imp_graded_segment *leg = imp__graded_kept(v);
+        if (leg) leg->P = P, any = true;
         P *= v->w;
     }
     if (!any) return;
@@ -275,17 +278,18 @@ void imp__bend_sweep(const struct imp_tracer *tracer, const struct imp_walk *wal
 
 /* ---- Tangent ------------------------------------------------------------------- */
 
-imp_spec imp__bend_tangent(const struct imp_tracer *tracer, const struct imp_walk *walk,
-                           const double *x_dot)
+imp_spec imp__graded_chain_tangent(const struct imp_tracer *tracer,
+                                   const struct imp_walk *walk, const double *x_dot)
 {
     struct imp__graded_active along = {.base = tracer->active->base, .x_dot = x_dot};
     imp_spec P = imp__spec(1), before = {0}, L_dot = {0};
     imp_v3 p_dot = {0}, d_dot = {0};
+    if (!tracer->active->medium) return L_dot;
     for (const struct imp_vertex *v = walk->first; v; P *= v->w, v = v->next) {
-        const struct imp_leg *leg = v->leg;
+        const struct imp_graded_segment *leg = imp__graded_kept(v);
         struct imp__surface level;
         if (!leg) continue;
-        imp__level(v->shape, v->at.p, v->ng, &level);
+        imp__level(v->shape, leg->end.at.p, v->ng, &level);
         if (!leg->moved) {
             p_dot = d_dot = (imp_v3){0};
         } else if (leg->medium) {
@@ -301,44 +305,46 @@ imp_spec imp__bend_tangent(const struct imp_tracer *tracer, const struct imp_wal
             L_dot += before * log_dot;
         } else {
             struct imp__surface_at sa;
-            imp__surface_eval(&level, &v->at.p, &leg->d, &sa);
-            p_dot += imp__length(v->at.p - v->prev->at.p) * d_dot;
+            imp__surface_eval(&level, &leg->end.at.p, &leg->d, &sa);
+            p_dot +=
+                imp__length(leg->end.at.p - imp__graded_kept(v->prev)->end.at.p) * d_dot;
             p_dot -= leg->d * (imp__dot(sa.gx, p_dot) / imp__dot(sa.gx, leg->d));
         }
-        if (leg->moved && v->emitter >= 0) {
+        if (leg->moved && v->d.met.emitter >= 0) {
             imp_spec slope[2];
             imp_v3 grad[2];
             radiance_slope(tracer, v, slope, grad);
             for (int k = 0; k < 2; k++) L_dot += P * slope[k] * imp__dot(grad[k], p_dot);
         }
-        if (!(v->inv_ps > 0)) break;
-        before = P * v->w * v->lin;
+        if (!v->d.goes_on) break;
+        before = P * v->w * v->beyond;
         if (!scatters(v))
             L_dot += before * turn_tangent(v, &level, leg->d, &along, &p_dot, &d_dot);
     }
     return L_dot;
 }
 
-/* ---- Frozen -------------------------------------------------------------------- */
+/* ---- Elsewhere: where the vertices are when the field has changed ---------------- */
 
 /* Where the ray from x along d meets the shape of v now. */
 static bool meet(const struct imp_tracer *tracer, const struct imp_vertex *v, imp_v3 x,
                  imp_v3 d, double *ratio, imp_v3 *arriving, struct imp_surface *at)
 {
+    const struct imp_graded_segment *leg = imp__graded_kept(v);
     const struct imp_scene *scene = tracer->scene;
-    struct imp_hit hit = v->leg->hit;
+    struct imp_hit hit = leg->hit;
     double far;
-    if (v->leg->medium) {
+    if (leg->medium) {
         struct imp__ride r;
-        if (!imp__ride(v->leg->medium, scene, x, v->prev->ng, d, &r, &hit) ||
+        if (!imp__ride(leg->medium, scene, x, v->prev->ng, d, &r, &hit) ||
             hit.shape != v->shape->index)
             return false;
-        *ratio = (r.j.eta / r.k.eta) / (v->leg->ride.j.eta / v->leg->ride.k.eta);
+        *ratio = (r.j.eta / r.k.eta) / (leg->ride.j.eta / leg->ride.k.eta);
         x = r.at.x, d = r.end, far = r.length;
     } else {
         struct imp__surface level;
-        imp__level(v->shape, v->at.p, v->ng, &level);
-        far = imp__bend_straight(v, &level, x, d);
+        imp__level(v->shape, leg->end.at.p, v->ng, &level);
+        far = imp__graded_straight(leg->end.at.p, &level, x, d);
         x += far * d;
         *ratio = 1;
     }
@@ -350,64 +356,30 @@ static bool meet(const struct imp_tracer *tracer, const struct imp_vertex *v, im
     return true;
 }
 
-imp_spec imp__bend_frozen(const struct imp_tracer *tracer, const struct imp_walk *walk)
+bool imp__graded_place(const struct imp_tracer *tracer, const struct imp_vertex *v,
+                       struct imp_moving *m, struct imp_place *p)
 {
-    const imp_spec nan = imp__spec(NAN);
-    imp_spec P = imp__spec(1), L = {0};
-    imp_v3 x = {0}, d = {0};
-    for (const struct imp_vertex *v = walk->first; v; v = v->next) {
-        const struct imp_bsdf *b = v->bsdf;
-        struct imp_texcoord at = v->at;
-        struct imp_emission e_at = v->e_at;
-        struct imp_dirs dirs = v->dirs;
-        imp_v3 ng = v->ng;
-        imp_spec in[IMP_INPUTS_MAX], f;
-        if (v->leg) {
-            imp_v3 arriving = v->leg->d;
-            if (v->leg->moved) {
-                struct imp_surface s;
-                double ratio;
-                if (!meet(tracer, v, x, d, &ratio, &arriving, &s)) return nan;
-                P *= ratio * ratio;
-                at = (struct imp_texcoord){{s.uv[0], s.uv[1]}, s.p};
-                ng = s.ng;
-                dirs.wo[2] = -imp__dot(s.n, arriving);
-                e_at.uv[0] = at.uv[0], e_at.uv[1] = at.uv[1];
-            }
-            x = at.p, d = arriving;
+    const struct imp_graded_segment *leg = imp__graded_kept(v);
+    if (!leg || !tracer->active || !tracer->active->medium) return true;
+    imp_v3 x = leg->end.at.p, ng = v->ng, d = leg->d;
+    if (leg->moved) {
+        /* The direction that the last vertex sends the ray in now. */
+        const struct imp_vertex *u = v->prev;
+        struct imp__surface level;
+        struct imp_surface at;
+        imp_v3 out = m->d;
+        if (!scatters(u)) {
+            imp__level(u->shape, m->x, m->ng, &level);
+            out = turned(u, &level, m->x, m->ng, m->d);
         }
-        if (b) imp__inputs_eval(b->input, b->n_in, &at, in);
-        if (b && v->shape->interior) {
-            const struct imp_medium *m = v->shape->interior;
-            imp__bend_inputs(v, in);
-            if (v->leg)
-                for (int j = 0; j < b->n_own; j++)
-                    if (b->ops->inputs[j].flags & IMP_INPUT_SCALAR)
-                        in[j] =
-                            imp__spec(imp__graded_index(m->graded, &at.p) / m->outside);
-        }
-        if (v->emitter >= 0)
-            L += P * imp__emitter_radiance(tracer->scene, v->emitter, &e_at, at.p) *
-                 v->e_weight;
-        if (v->glows) {
-            b->ops->emit(b, in, &dirs.wo, &f);
-            L += P * f * v->g_weight;
-        }
-        if (v->light >= 0) {
-            const struct imp_dirs to = {dirs.wo, v->l_wi, IMP_SMOOTH};
-            b->ops->eval(b, in, &to, &f);
-            L += P * f *
-                 imp__emitter_radiance(tracer->scene, v->light, &v->l_at, v->l_p) *
-                 v->l_weight;
-        }
-        if (!b || !(v->inv_ps > 0)) break;
-        if (v->leg && !scatters(v)) {
-            struct imp__surface level;
-            imp__level(v->shape, x, ng, &level);
-            d = turned(v, &level, x, ng, d);
-        }
-        b->ops->eval(b, in, &dirs, &f);
-        P *= f * v->inv_ps;
+        if (!meet(tracer, v, m->x, out, &p->ratio, &d, &at)) return false;
+        x = at.p;
+        ng = at.ng;
+        p->dirs.wo[2] = -imp__dot(at.n, d);
+        p->at = (struct imp_texcoord){{at.uv[0], at.uv[1]}, x};
+        p->met.uv[0] = at.uv[0];
+        p->met.uv[1] = at.uv[1];
     }
-    return L;
+    *m = (struct imp_moving){x, ng, d};
+    return true;
 }
