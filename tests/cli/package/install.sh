@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # A program builds against the installed tree with pkg-config and with CMake, and runs.
-nm -D "$BUILD/libimporton.so" | grep -qE '__(asan|tsan|ubsan)' && exit 0 # needs flags of its own
+nm -D "$BUILD/lib/libimporton.so" | grep -qE '__(asan|tsan|ubsan)' && exit 0 # needs flags of its own
 DESTDIR=$OUT/root meson install -C "$BUILD" --no-rebuild --quiet >/dev/null || exit 9
 pc=$(find "$OUT/root" -name importon.pc)
 prefix=$OUT/root$(sed -n 's/^prefix=//p' "$pc")
