@@ -2,8 +2,8 @@
  *
  * The experiments of docs/curved-rays.md, each a table on standard output:
  *
- *     bend_experiments luneburg|maxwell|focus|slice|tape|fibre|display|gas|rod ...
- * [--full]
+ *     bend_experiments [--full] EXPERIMENT...
+ *     EXPERIMENT  luneburg|maxwell|focus|slice|tape|fibre|display|gas|rod
  *
  * Settings are scaled to minutes on two cores; --full takes the published sizes. How long
  * an experiment will take is said on standard error before it begins, from a first

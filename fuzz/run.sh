@@ -3,7 +3,7 @@
 #
 # Fuzz every target, or those that are named, with libFuzzer under ASan and UBSan.
 #
-#     fuzz/run.sh [-s SECONDS] [xml mesh image scene bend ies]  60 seconds each by default
+#     fuzz/run.sh [-s SECONDS] [NAME...]    of fuzz/fuzz_NAME.c; 60 seconds each by default
 #
 # New inputs stay in build-fuzz/corpus/NAME; what fails is written to build-fuzz/crash-*.
 set -euo pipefail
@@ -17,10 +17,10 @@ while getopts s: option; do
 done
 shift $((OPTIND - 1))
 [[ -f build-fuzz/build.ninja ]] ||
-    CC=clang meson setup build-fuzz -Db_sanitize=address,undefined -Db_lundef=false \
+    CC=clang meson setup build-fuzz -Dcpu=native -Db_sanitize=address,undefined -Db_lundef=false \
         -Dbuildtype=debugoptimized
 targets=("$@")
-((${#targets[@]})) || targets=(xml mesh image scene bend ies)
+((${#targets[@]})) || mapfile -t targets < <(printf '%s\n' fuzz/fuzz_*.c | sed 's/.*fuzz_//; s/\.c$//')
 ninja -C build-fuzz "${targets[@]/#/fuzz/fuzz_}"
 export UBSAN_OPTIONS=halt_on_error=1:print_stacktrace=1
 export LSAN_OPTIONS=suppressions=$PWD/tools/lsan.supp

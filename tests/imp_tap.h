@@ -1,7 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Tests are plain C programs that print TAP. A check prints value, uncertainty and
- * verdict: ok 1 - albedo is rho # mean 0.50004 se 0.00065 ref 0.5 z 0.06
+ * verdict:
+ *
+ *     ok 1 - albedo is rho # mean 0.50004 se 0.00065 ref 0.5 z 0.06
  */
 #ifndef IMP_TAP_H
 #define IMP_TAP_H

@@ -1,10 +1,16 @@
 #!/usr/bin/env bash
 # SPDX-License-Identifier: Apache-2.0
 #
-# Includes run down: a file includes its own room and rooms below it, so no two rooms need
-# each other. The commands see the public headers alone, and one file knows Embree.
+#     tools/check_layers.sh [LIBRARY.a]
+#
+# Rooms stand above each other: a file includes files of its own room and of rooms below, so
+# no two rooms need each other. With the static library, calls are looked at too: what an
+# object file refers to is defined in its own room or below. Commands see the public headers
+# alone, and one file knows Embree.
+set -uo pipefail
+library=${1:+$(realpath "$1")}
 cd "$(dirname "$0")/.." || exit 1
-rooms=(base math color kind scene search curved elements walk inverse format render)
+rooms=(base math color kind scene search curved elements walk film inverse format render)
 bad=0
 
 complain() {
@@ -34,5 +40,25 @@ done < <(grep -rE '^#include "([a-z_]+/|\.\./)' cli --include='*.[ch]')
 while IFS=: read -r file include; do
     [[ $file == src/scene/intersect.c ]] || complain "$file: $include"
 done < <(grep -rE '^#include <embree' src cli include --include='*.[ch]')
+
+# Meson names an object after its path: src_ROOM_FILE.c.o, '/' written as '_'.
+if [[ $library ]]; then
+    calls=$(nm -A -g "$library" | awk -v order="${rooms[*]}" '
+        BEGIN { n = split(order, name, " "); for (i = 1; i <= n; i++) floor[name[i]] = i }
+        { object = $1; sub(/^.*src_/, "", object); sub(/\.c\.o:.*/, "", object)
+          split(object, part, "_"); symbol = $NF }
+        !(part[1] in floor) { print object ": in no room"; next }
+        $(NF - 1) == "U" { used[object, symbol] = 1; next }
+        { home[symbol] = part[1]; defined++ }
+        END {
+            for (pair in used) {
+                split(pair, p, SUBSEP); split(p[1], part, "_")
+                if (p[2] in home && floor[home[p[2]]] > floor[part[1]])
+                    print p[1] ".c: refers to " p[2] " of " home[p[2]] ", which runs up"
+            }
+            if (defined < 500) print "too few symbols: is this the static library?"
+        }' | sort)
+    [[ -z $calls ]] || complain "$calls"
+fi
 
 exit "$bad"

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * importon: adjoint and differentiable light transport, for C and everything that calls
- * C.
+ * importon: adjoint and differentiable light transport.
  *
  * A host creates a context, loads or builds a scene, renders it, asks for derivatives of
  * what its sensors see, or fits it to pictures. In the order of a first program:
@@ -147,10 +146,10 @@ struct imp_load_options {
         sizeof(struct imp_load_options), IMP_RGB, 0, 0, 0, 0                             \
     }
 
-/** Load a scene file (Mitsuba 3 XML). The scene is committed and ready. options may be
+/** Load a scene file (Mitsuba 3 XML). The scene is committed and ready. `options` may be
  * NULL.
- * @return IMP_OK; IMP_E_IO; IMP_E_SCENE (message begins file:line:column);
- * IMP_E_UNSUPPORTED for a plugin this version does not have; IMP_E_NOMEM. */
+ * @return IMP_OK; IMP_E_IO; IMP_E_SCENE (message begins file:line:column); IMP_E_NOMEM;
+ *         IMP_E_UNSUPPORTED for a plugin this version does not have. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_load(imp_context *context, const char *path,
                const struct imp_load_options *options, imp_scene **out);
@@ -498,7 +497,8 @@ IMP_API void imp_problem_set_run(imp_problem *problem, const struct imp_run *run
 /**
  * Reverse derivative: gradient = J^T seed, J = d pixel / d x, for a given adjoint image.
  * @param seed_image [height][width][channels] of run->sensor. It must come from other
- * random numbers than `run`: an adjoint made from the same walks is correlated with J.
+ *        random numbers than `run`: an adjoint made from the same walks is correlated
+ *        with J.
  * @param[out] gradient    [n], as imp_problem_objective's.
  * @param[out] gradient_se [n], one standard error; may be NULL.
  * @return as imp_problem_objective.

@@ -7,7 +7,6 @@
 #define imp_likely(x)    __builtin_expect(!!(x), 1)
 #define imp_unlikely(x)  __builtin_expect(!!(x), 0)
 #define IMP_PRINTF(f, a) __attribute__((format(printf, f, a)))
-#define IMP_HIDDEN       __attribute__((visibility("hidden")))
 
 #define IMP_CACHE_LINE 64 /* bytes; what two threads write should not share one */
 

@@ -17,8 +17,8 @@ bool imp__number(const char **s, const char *end, double *out);
 /* The same for decimal integers; false also if it does not fit. */
 bool imp__integer(const char **s, const char *end, int64_t *out);
 
-/* snprintf for files and answers: with a decimal point, whatever the host calls it. */
-IMP_PRINTF(3, 4) int imp__format(char *text, size_t size, const char *format, ...);
+/* vsnprintf for files and answers: with a decimal point, whatever the host's locale. */
+IMP_PRINTF(3, 0)
 int imp__vformat(char *text, size_t size, const char *format, va_list args);
 
 #endif

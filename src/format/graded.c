@@ -121,6 +121,8 @@ static enum imp_status only_for_rays(struct imp_scene *scene, struct imp_node *n
     return IMP_OK;
 }
 
+static void graded_destroy(void *graded) { imp__graded_destroy(graded); }
+
 enum imp_status imp__graded_attach(struct imp_scene *scene, struct imp_node *node)
 {
     enum imp_status st = IMP_OK;
@@ -141,12 +143,9 @@ enum imp_status imp__graded_attach(struct imp_scene *scene, struct imp_node *nod
     imp_bend *given = l.bend;
     l.bend = NULL;
     IMP_TRY(imp__graded_create(given, &m->graded));
-    st = imp__build_list_add(scene, (void ***)&scene->media, &scene->n_media, m);
-    if (st != IMP_OK) {
-        imp__graded_destroy(m->graded);
-        goto out;
-    }
-    node->medium = m; /* the scene's from here */
+    IMP_TRY(imp__scene_own(scene, m->graded, graded_destroy));
+    IMP_TRY(imp__build_list_add(scene, (void ***)&scene->media, &scene->n_media, m));
+    node->medium = m;
     IMP_TRY(numbers_make(scene, node, m));
 out:
     imp_bend_destroy(l.bend);

@@ -9,9 +9,6 @@
 /* The caller's options, complete whatever `size` says. @return IMP_E_ARG if malformed. */
 enum imp_status imp__load_options(imp_context *ctx, const struct imp_load_options *from,
                                   struct imp_load_options *to);
-/* An empty scene, `folder` (may be NULL) at the end of its search list. */
-enum imp_status imp__scene_new(imp_context *ctx, const struct imp_load_options *options,
-                               const char *folder, struct imp_scene **out);
 /* graded.c: attach the field of a <medium type="graded">; when the scene is built, make
  * ready to trace. */
 enum imp_status imp__graded_attach(struct imp_scene *scene, struct imp_node *node);

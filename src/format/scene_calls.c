@@ -5,6 +5,7 @@
 #include "base/film.h"
 #include "load.h"
 #include "mesh.h"
+#include "search.h"
 #include "tree.h"
 #include "value.h"
 #include <math.h>
@@ -42,6 +43,8 @@ static enum imp_status push(struct imp_scene *scene, struct imp_node *node)
     return IMP_OK;
 }
 
+static void tree_destroy(void *tree) { imp__tree_free(tree); }
+
 enum imp_status imp_scene_create(imp_context *ctx, const struct imp_load_options *options,
                                  imp_scene **out)
 {
@@ -53,10 +56,12 @@ enum imp_status imp_scene_create(imp_context *ctx, const struct imp_load_options
     IMP_TRY(imp__load_options(ctx, options, &o));
     if (o.n_defines)
         IMP_TRY(imp__error(ctx, IMP_E_ARG, "definitions are of use in scene files only"));
-    IMP_TRY(imp__scene_new(ctx, &o, NULL, &scene));
-    scene->tree = imp__alloc(ctx, 1, sizeof *scene->tree);
+    IMP_TRY(imp__scene_new(ctx, o.mode, &scene));
+    IMP_TRY(imp__search_init(scene, o.search, o.n_search, NULL));
+    scene->tree = imp__arena_array(&scene->arena, 1, sizeof *scene->tree);
     if (!scene->tree) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "scene: out of memory"));
     imp__tree_init(scene->tree, scene);
+    IMP_TRY(imp__scene_own(scene, scene->tree, tree_destroy));
     IMP_TRY(imp__tree_open(scene->tree, NULL, "scene", NULL, NULL, NULL, nowhere, &root));
     IMP_TRY(push(scene, root));
     scene->root = root;
@@ -290,8 +295,7 @@ enum imp_status imp_scene_commit(imp_scene *scene)
         IMP_TRY(imp__node_error(ctx, top(scene), IMP_E_ARG, "begin without end"));
     IMP_TRY(imp__tree_resolve(scene->tree));
     IMP_TRY(imp__scene_finish(scene));
-    imp__tree_free(scene->tree);
-    imp__release(ctx, scene->tree);
+    imp__tree_free(scene->tree); /* early: empty when the scene ends */
     scene->tree = NULL;
 out:
     keep(scene, st);

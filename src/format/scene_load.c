@@ -1,5 +1,4 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "curved/inside.h"
 #include "load.h"
 #include "search.h"
 #include "tree.h"
@@ -18,58 +17,12 @@ enum imp_status imp__load_options(imp_context *ctx, const struct imp_load_option
     return IMP_OK;
 }
 
-enum imp_status imp__scene_new(imp_context *ctx, const struct imp_load_options *options,
-                               const char *folder, struct imp_scene **out)
-{
-    struct imp_scene *scene = imp__alloc(ctx, 1, sizeof *scene);
-    if (!scene) return imp__error(ctx, IMP_E_NOMEM, "scene: out of memory");
-    scene->ctx = ctx;
-    scene->mode = options->mode;
-    scene->channels = options->mode == IMP_MONO ? 1 : 3;
-    scene->environment = -1;
-    imp__arena_init(&scene->arena, ctx);
-    imp__arena_init(&scene->files, ctx);
-    const enum imp_status st =
-        imp__search_init(scene, options->search, options->n_search, folder);
-    if (st == IMP_OK) *out = scene;
-    else imp_scene_destroy(scene);
-    return st;
-}
-
-void imp_scene_destroy(imp_scene *scene)
-{
-    if (!scene) return;
-    imp_context *ctx = scene->ctx;
-    imp__intersector_destroy(scene);
-    for (int i = 0; i < scene->n_media; i++) imp__graded_destroy(scene->media[i]->graded);
-    if (scene->tree) imp__tree_free(scene->tree);
-    imp__release(ctx, scene->tree);
-    for (size_t i = 0; i < scene->n_search; i++) imp__release(ctx, scene->search[i]);
-    imp__release(ctx, scene->search);
-    imp__release(ctx, scene->stack);
-    imp__release(ctx, scene->build_error);
-    imp__release(ctx, scene->params);
-    imp__arena_free(&scene->files);
-    imp__arena_free(&scene->arena);
-    imp__release(ctx, scene);
-}
-
-/* The data of files are gone: nobody may look at them any more. */
-static void files_forget(struct imp_node *node)
-{
-    node->mesh = NULL;
-    node->image = NULL;
-    for (size_t i = 0; i < node->n_children; i++)
-        if (!node->children[i].ref) files_forget(node->children[i].node);
-}
-
 enum imp_status imp__scene_finish(struct imp_scene *scene)
 {
     enum imp_status st = imp__files_attach(scene);
     if (st == IMP_OK) st = imp__scene_build(scene);
     if (st == IMP_OK) st = imp__graded_finish(scene);
-    files_forget(scene->root);
-    imp__arena_free(&scene->files);
+    imp__scene_release_files(scene);
     return st;
 }
 
@@ -80,7 +33,8 @@ static enum imp_status load(imp_context *ctx, const struct imp_bytes *text,
 {
     enum imp_status st = IMP_OK;
     struct imp_scene *scene = NULL;
-    IMP_TRY(imp__scene_new(ctx, o, folder, &scene));
+    IMP_TRY(imp__scene_new(ctx, o->mode, &scene));
+    IMP_TRY(imp__search_init(scene, o->search, o->n_search, folder));
     IMP_TRY(imp__xml_read(scene, text, name, o));
     IMP_TRY(imp__scene_finish(scene));
     *out = scene;

@@ -3,9 +3,10 @@
  * J^T W J and J^T W r without bias (gradients.md 15). With x_ik = dL_i/dx_k of walk i and
  * a replicate of n walks in one pixel and channel,
  *
- *     (J^T J)_kl ~ w [ (sum_i x_ik)(sum_i x_il) - sum_i x_ik x_il ] / (n (n-1))      (i
- * != j) (J^T r)_k  ~ w { [S/(n-1) - T] mean(x_k) - sum_i L_i x_ik / (n (n-1)) } (LOO')
+ *     (J^T J)_kl ~ w [ (sum_i x_ik)(sum_i x_il) - sum_i x_ik x_il ] / (n (n-1))
+ *     (J^T r)_k  ~ w { [S/(n-1) - T] mean(x_k) - sum_i L_i x_ik / (n (n-1)) }
  *
+ * (products of two different walks, i != j; the mean of the others, leave-one-out),
  * averaged over replicates; the same-sample matrix, which a naive product of mean
  * pictures would give, comes along for damping. Losses that are not quadratic enter with
  * Gauss and Newton's w at the mean, and with the gradient of adjoint.c: r = l'/w at the

@@ -51,10 +51,12 @@ enum imp_status imp__regularise_second(const struct imp_problem *p, double *H);
  *   H [K*K]      U-statistic estimate of J^T W J (unbiased, may be indefinite)
  *   H_same [K*K] the same-sample matrix (biased upwards, positive semi-definite)
  *   H_meas [K*K] sum of w^2 sigma^2 J J^T for the measurement covariance, sigma^2 from
- * the residuals where the target does not give it; NULL to skip g [K] leave-one-out
- * gradient of the data term, g_se [K] its standard errors cov_g [K*K]  covariance of g;
- * NULL to skip Regularisers are not included. Non-quadratic targets: their Gauss-Newton
- * weights at the present pictures, and *bias_order > 0. */
+ *                the residuals where the target does not give it; NULL to skip
+ *   g [K]        leave-one-out gradient of the data term
+ *   g_se [K]     standard errors of g
+ *   cov_g [K*K]  covariance of g; NULL to skip
+ * Regularisers are not included. Non-quadratic targets: their Gauss-Newton weights at the
+ * present pictures, and *bias_order > 0. */
 struct imp__gauss_newton {
     double *H, *H_same, *H_meas, *g, *g_se, *cov_g;
     struct imp_estimate objective; /* data term */

@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * 4x4 matrices, row-major, column vectors: p' = M p (scene-format 1.4). Points divide by
- * w only in imp__project_point; the matrices of shapes and sensors are affine. */
+ * 4x4 matrices, row-major, column vectors: p' = M p (scene-format 1.4). The matrices of
+ * shapes and sensors are affine. */
 #ifndef IMP_MATH_TRANSFORM_H
 #define IMP_MATH_TRANSFORM_H
 
 #include "vec.h"
-#include <string.h>
 
 struct imp_mat4 {
     double m[16];
@@ -15,12 +14,6 @@ struct imp_mat4 {
 static inline struct imp_mat4 imp__mat4_identity(void)
 {
     return (struct imp_mat4){{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}};
-}
-static inline struct imp_mat4 imp__mat4_from(const double m[16])
-{
-    struct imp_mat4 a;
-    memcpy(a.m, m, sizeof a.m);
-    return a;
 }
 static inline struct imp_mat4 imp__mat4_multiply(const struct imp_mat4 *a,
                                                  const struct imp_mat4 *b)
@@ -57,12 +50,6 @@ static inline imp_v3 imp__normal(const struct imp_mat4 *inverse, imp_v3 n)
     return imp__v3(m[0] * n[0] + m[4] * n[1] + m[8] * n[2],
                    m[1] * n[0] + m[5] * n[1] + m[9] * n[2],
                    m[2] * n[0] + m[6] * n[1] + m[10] * n[2]);
-}
-static inline imp_v3 imp__project_point(const struct imp_mat4 *a, imp_v3 p)
-{
-    const double *m = a->m;
-    const double w = m[12] * p[0] + m[13] * p[1] + m[14] * p[2] + m[15];
-    return imp__point(a, p) * (1 / w);
 }
 
 static inline bool imp__mat4_is_affine(const struct imp_mat4 *a)

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * From the unit square to directions and points: each warp with its density and inverse.
+ * From the unit square to directions and points: each warp with its density, and its
+ * inverse where a guide needs it.
  */
 #ifndef IMP_MATH_WARP_H
 #define IMP_MATH_WARP_H
@@ -70,25 +71,6 @@ static inline imp_v3 imp__uniform_sphere(const double u[2])
     double s, c;
     imp__sincos_turn(u[1], &s, &c);
     return imp__v3(r * c, r * s, z);
-}
-static inline void imp__uniform_sphere_inverse(imp_v3 w, double u[2])
-{
-    const double phi = atan2(w[1], w[0]) / IMP_2PI;
-    u[0] = (1 - w[2]) / 2;
-    u[1] = phi < 0 ? phi + 1 : phi;
-}
-
-/* Uniform in the cone cos >= cos_max about +z. Density 1/(2 pi (1 - cos_max)). */
-static inline imp_v3 imp__uniform_cone(const double u[2], double cos_max)
-{
-    const double z = 1 - u[0] * (1 - cos_max), r = sqrt(imp_max(0, 1 - z * z));
-    double s, c;
-    imp__sincos_turn(u[1], &s, &c);
-    return imp__v3(r * c, r * s, z);
-}
-static inline double imp__uniform_cone_pdf(double cos_max)
-{
-    return 1 / (IMP_2PI * (1 - cos_max));
 }
 
 /* Uniform triangle: barycentric weights of the second and third vertex. Density 1/area.

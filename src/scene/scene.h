@@ -89,7 +89,7 @@ struct imp_medium_numbers {
 };
 struct imp_medium {
     const char *name;
-    struct imp_graded *graded;    /* curved/inside.h; destroyed with the scene */
+    struct imp_graded *graded;    /* curved/inside.h; owned by the scene */
     double outside;               /* index around it */
     imp_v3 lo, hi;                /* of all shapes it fills */
     const struct imp_shape *ball; /* the sphere it fills, if nothing else is near it */
@@ -97,6 +97,13 @@ struct imp_medium {
     int index;                    /* in the scene; -1: in no shape */
     int n_numbers;
     struct imp_medium_numbers *numbers;
+};
+
+/* An object of a room above, which this one does not know: destroyed with the scene. */
+struct imp_owned {
+    struct imp_owned *next; /* made earlier */
+    void *object;
+    void (*destroy)(void *object);
 };
 
 struct imp_scene {
@@ -115,6 +122,7 @@ struct imp_scene {
     size_t n_search;
     struct imp_tree *tree;  /* of the building calls, until commit (format/tree.h) */
     struct imp_arena files; /* what files held and objects copy; freed by commit */
+    struct imp_owned *owned;
 
     int n_shapes, n_bsdfs, n_emitters, n_sensors, n_textures;
     struct imp_shape **shapes;
@@ -137,6 +145,16 @@ struct imp_scene {
     void *intersector;
     imp_v3 lo, hi; /* bounds of all shapes */
 };
+
+/* ---- scene.c ------------------------------------------------------------------- */
+/* An empty scene without folders to search; imp_scene_destroy ends it. */
+enum imp_status imp__scene_new(imp_context *ctx, enum imp_color_mode mode,
+                               struct imp_scene **out);
+/* The last object owned is the first destroyed; on failure it is destroyed at once. */
+enum imp_status imp__scene_own(struct imp_scene *scene, void *object,
+                               void (*destroy)(void *object));
+/* Objects have copied what they need of meshes and pictures. */
+void imp__scene_release_files(struct imp_scene *scene);
 
 /* ---- build.c ------------------------------------------------------------------- */
 /* Resolve references, make every object in document order, commit the intersector. Files

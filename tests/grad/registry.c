@@ -5,10 +5,11 @@
  * derivatives, in colour and in mono. For each of its parameters
  *
  *   frozen   sweep against central differences of kept walks, 1e-6; forward against
- * reverse per walk, 1e-12; Euler identities, 1e-12 (imp_check) dot      forward picture
- * against reverse gradient of the same seed fresh    forward picture against differences
- * of renders with other seeds: z-scores, at random values, with one number at its lower
- * bound (0) and at its upper bound
+ *            reverse per walk, 1e-12; Euler identities, 1e-12 (imp_check)
+ *   dot      forward picture against reverse gradient of the same seed
+ *   fresh    forward picture against differences of renders with other seeds: z-scores,
+ *            at random values, with one number at its lower bound (0) and at its upper
+ *            bound
  *
  * A new kind is tested by existing: its inputs are drawn from what it declares.
  *

@@ -33,8 +33,9 @@ double imp__fresnel_dielectric_d(double c, double e, double *d_c, double *d_e)
     return 0.5 * (a * a + b * b);
 }
 
-/* One lane. With t = eta^2 - k^2 - sin^2, A = sqrt(t^2 + 4 eta^2 k^2), a = sqrt((A +
- * t)/2):
+/* One lane. With
+ *
+ *   t = eta^2 - k^2 - sin^2,  A = sqrt(t^2 + 4 eta^2 k^2),  a = sqrt((A + t)/2),
  *
  *   Rs = (P - Q)/(P + Q),  P = A + c^2,  Q = 2 a c
  *   Rp = Rs (U - V)/(U + V),  U = A c^2 + sin^4,  V = Q sin^2,   F = (Rs + Rp)/2

@@ -5,6 +5,7 @@
  * shading normals agree (scene-format 4.3, as Mitsuba 3.10). */
 #include "math/warp.h"
 #include "shape.h"
+#include <string.h>
 
 /* Embree takes larger coordinates for invalid. */
 #define COORDINATE_MAX 1e18

@@ -4,6 +4,7 @@
  * at the vertex (Thuermer and Wuethrich 1998). Files split a vertex where its uv differ,
  * so the sum runs over all vertices at one position, not over one index. */
 #include "shape.h"
+#include <string.h>
 
 /* Equal positions are equal bits; +0 and -0 are one place. */
 static uint64_t position_hash(const float p[3])

@@ -3,6 +3,7 @@
  * The square [-1,1]^2 at z = 0 under an affine map: a parallelogram. Embree sees two
  * triangles; the surface is computed from the parallelogram itself, in double. */
 #include "shape.h"
+#include <string.h>
 
 struct rectangle {
     imp_v3 corner, eu, ev; /* p = corner + u eu + v ev, so eu and ev are dp_du, dp_dv */

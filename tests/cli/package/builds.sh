@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: Apache-2.0
+# The library for every x86-64 and the one for x86-64-v3 give the same bits, and the loader
+# takes the second where the processor can run it.
+every=$BUILD/lib/libimporton.so.0 v3=$BUILD/lib/glibc-hwcaps/x86-64-v3/libimporton.so.0
+[[ -e $v3 ]] || exit 0 # one build only (-Dcpu=)
+nm -D "$every" | grep -qE '__(asan|tsan|ubsan)' && exit 0 # not to be preloaded
+objdump -d --no-show-raw-insn "$every" | grep -m1 %ymm && echo "the library for every processor uses AVX"
+objdump -d --no-show-raw-insn "$v3" | grep -m1 -E 'vfn?m(add|sub)' && echo "the v3 library uses FMA"
+grep -m1 '^flags' /proc/cpuinfo | grep -w avx2 | grep -w bmi2 | grep -qw fma || exit 0
+ldd "$(command -v importon)" | grep -q glibc-hwcaps/x86-64-v3 || echo "the loader takes the slow one"
+
+# answers COMMAND...: the numbers, without the time they took.
+answers() {
+    importon "$@" --json -q | sed 's/"seconds":[^,}]*//g'
+}
+# all NAME LIBRARY: pictures as floats without a header, gradients, a fit, bent rays, elements.
+all() (
+    export LD_PRELOAD=$2
+    mkdir "$1" && cd "$1" || exit 9
+    for scene in cornell textured lamps stam bend/seen elements/glossy; do
+        size=(-D width=16)
+        grep -q '"\$res"' "$ROOT/scenes/$scene.xml" && size=(-D res=16)
+        importon render "$ROOT/scenes/$scene.xml" "${size[@]}" --spp 8 -q --no-preview \
+            -o "$(basename $scene).pfm" || exit 9
+        answers gradient "$ROOT/scenes/$scene.xml" "${size[@]}" --spp 4 >>gradients
+    done
+    importon render "$ROOT/scenes/cornell.xml" -D res=12 --spp 32 -q --no-preview -o target.pfm
+    answers fit "$ROOT/scenes/cornell.xml" -D res=12 --spp 4 -T target.pfm -n 3 -p 'red.*' >fit
+    answers bend trace "$ROOT/scenes/bend/luneburg.xml" >bend
+    answers elements "$ROOT/scenes/elements/b.xml" -D res=16 --stop 10 --no-image >elements
+    [[ -s gradients && -s fit && -s bend && -s elements ]] || exit 9
+)
+all every "$every" || exit 9
+all v3 "$v3" || exit 9
+diff -rq every v3
