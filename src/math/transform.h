@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * 4x4 matrices, row-major, column vectors: p' = M p (scene-format 1.4). Points divide by
- * w only in imp__project_point; the matrices of shapes and sensors are affine. */
+ * 4x4 matrices, row-major, column vectors: p' = M p (docs/scene-format.md 1.4). Points
+ * divide by w only in imp__project_point; the matrices of shapes and sensors are
+ * affine. */
 #ifndef IMP_MATH_TRANSFORM_H
 #define IMP_MATH_TRANSFORM_H
 

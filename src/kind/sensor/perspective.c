@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A pinhole: the ray through film position (px, py) runs along
- * (t (1 - 2X), (t/a)(1 - 2Y), 1), X = px/W + offset_x, Y = py/H + offset_y (scene-format
- * 9). */
+ * (t (1 - 2X), (t/a)(1 - 2Y), 1), X = px/W + offset_x, Y = py/H + offset_y
+ * (docs/scene-format.md 9). */
 #include "projection.h"
 
 struct perspective {
