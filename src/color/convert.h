@@ -10,9 +10,9 @@
 #include <importon/kinds.h>
 
 /* *value in all lanes; *count 1: one number, the same in all lanes, or 3: r, g, b.
- * `scalar` inputs get one number: the luminance of what is coloured. @return IMP_OK, or
- * IMP_E_SCENE with the place: not a colour, not finite, a reflectance outside [0,1],
- * negative light. */
+ * `scalar` inputs get one number of a colour: the mean of the three in rgb mode, the
+ * luminance in mono mode. @return IMP_OK, or IMP_E_SCENE with the place: not a colour,
+ * not finite, a reflectance outside [0,1], negative light. */
 enum imp_status imp__color_convert(imp_context *ctx, const struct imp_node *node,
                                    const struct imp_prop *prop, enum imp_role role,
                                    bool scalar, enum imp_color_mode mode, imp_spec *value,
