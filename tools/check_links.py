@@ -30,7 +30,7 @@ BREAK = r"(?:[ ]|[ ]*\n[ \t]*(?:\*|#|//|\.\\\")?[ \t]*)"  # a blank, or the end 
 DOCUMENT = re.compile(r"(?<![\w/.$-])((?:[\w.-]+/)*[\w-]+\.md)\b")
 SECTIONS = re.compile(rf"{BREAK}({SECTION}(?:(?:,|[ ]-|[ ]and){BREAK}{SECTION}(?=[).,;:\s]))*)(?![\w%.]*\d)")
 FILE = re.compile(r"(?<![\w/.$@{}-])((?:src|include|tests|tools|cli|bench|examples|fuzz|docs|man|"
-                  r"scenes|packaging)/[\w./-]*\.(?:c|h|py|sh|xml|md|png|svg|txt))\b")
+                  r"scenes|packaging)/[\w./-]*\.(?:c|h|py|sh|xml|png|svg|txt))\b")
 LINK = re.compile(r"!?\[[^\]\n]*(?:\n[^\]\n]*)?\]\(([^)\s]+)\)")
 HEADING = re.compile(r"^#{1,6}\s+(.*?)\s*#*$", re.M)
 
