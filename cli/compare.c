@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * importon compare: do two pictures have the same expectation? (scene-format, statistical
- * comparison; docs.) */
+ * importon compare: do two pictures have the same expectation?
+ * (docs/scene-format.md 14.) */
 #include "command.h"
 #include "picture.h"
 #include <string.h>

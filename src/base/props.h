@@ -3,7 +3,7 @@
  * Property bags: a scene before its objects exist. The XML reader and the building calls
  * make a tree of imp_node; the kinds read their properties from it. Reading marks a
  * property as used; what nobody asked for is an error that names the place it was written
- * (scene-format 1.3). This file knows names and values, and nothing of light. */
+ * (docs/scene-format.md 1.3). This file knows names and values, and nothing of light. */
 #ifndef IMP_BASE_PROPS_H
 #define IMP_BASE_PROPS_H
 

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The standard observer and daylight, 360-830 nm in steps of 5 nm (scene-format A.1). */
+ * The standard observer and daylight, 360-830 nm in steps of 5 nm
+ * (docs/scene-format.md A.1). */
 #ifndef IMP_COLOR_CIE_H
 #define IMP_COLOR_CIE_H
 

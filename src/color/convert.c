@@ -73,7 +73,7 @@ static enum imp_status check_rgb(imp_context *ctx, const struct imp_node *node,
 }
 
 /* Samples, checked and turned into a colour: surfaces are seen under D65, lights as they
- * are; what lies outside the gamut is clamped (scene-format 2.1). */
+ * are; what lies outside the gamut is clamped (docs/scene-format.md 2.1). */
 static enum imp_status spectrum_set(imp_context *ctx, const struct imp_node *node,
                                     const struct imp_prop *prop, enum imp_role role,
                                     size_t n, const double *nm, const double *v,

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * From a colour as written to the numbers of a parameter. What a colour turns into
- * depends on how it was written and on what it is for (scene-format 2.1); how many
- * numbers the parameter has depends on both too (12.2). */
+ * depends on how it was written and on what it is for (docs/scene-format.md 2.1); how
+ * many numbers the parameter has depends on both too (12.2). */
 #ifndef IMP_COLOR_CONVERT_H
 #define IMP_COLOR_CONVERT_H
 
@@ -10,9 +10,9 @@
 #include <importon/kinds.h>
 
 /* *value in all lanes; *count 1: one number, the same in all lanes, or 3: r, g, b.
- * `scalar` inputs get one number: the luminance of what is coloured. @return IMP_OK, or
- * IMP_E_SCENE with the place: not a colour, not finite, a reflectance outside [0,1],
- * negative light. */
+ * `scalar` inputs get one number of a colour: the mean of the three in rgb mode, the
+ * luminance in mono mode. @return IMP_OK, or IMP_E_SCENE with the place: not a colour,
+ * not finite, a reflectance outside [0,1], negative light. */
 enum imp_status imp__color_convert(imp_context *ctx, const struct imp_node *node,
                                    const struct imp_prop *prop, enum imp_role role,
                                    bool scalar, enum imp_color_mode mode, imp_spec *value,
@@ -24,8 +24,8 @@ void imp__color_default(double fallback, enum imp_role role, enum imp_color_mode
 
 /* Is this node a colour that is written as an object (uniform, srgb, d65, ...)? */
 bool imp__color_is_object(const struct imp_node *node);
-/* The same for such a node (scene-format 2.4). Reads and checks all its properties; *key
- * is the name of its parameter under the object. */
+/* The same for such a node (docs/scene-format.md 2.4). Reads and checks all its
+ * properties; *key is the name of its parameter under the object. */
 enum imp_status imp__color_object(imp_context *ctx, struct imp_node *node,
                                   enum imp_role role, bool scalar,
                                   enum imp_color_mode mode, imp_spec *value, int *count,

@@ -28,9 +28,9 @@ static inline double imp__srgb_encode(double c)
     return c <= 0.0031308 ? 12.92 * c : 1.055 * pow(c, 1 / 2.4) - 0.055;
 }
 
-/* Colour of a sampled spectrum (scene-format 2.3), not clamped. Wavelengths increase; the
- * spectrum is linear between them and 0 outside. `daylight`: of a surface of this
- * reflectance under D65; else of a light of this power. */
+/* Colour of a sampled spectrum (docs/scene-format.md 2.3), not clamped. Wavelengths
+ * increase; the spectrum is linear between them and 0 outside. `daylight`: of a surface
+ * of this reflectance under D65; else of a light of this power. */
 void imp__spectrum_to_rgb(size_t n, const double *nm, const double *value, int daylight,
                           double rgb[3]);
 

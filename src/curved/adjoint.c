@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The exact adjoint of traced rays (curved-rays 2.2 - 2.4). From the exit state alone the
- * ray runs backwards, its cotangents lam = dC/dx, mu = dC/dv with it, and each kick
- * leaves a piece of gradient in the field. Memory: what the tracer kept of each ray, one
- * gradient per slice of rays, and nothing that grows with the number of steps. */
+ * The exact adjoint of traced rays (docs/bent-rays.md 2.2 - 2.4). From the exit state
+ * alone the ray runs backwards, its cotangents lam = dC/dx, mu = dC/dv with it, and each
+ * kick leaves a piece of gradient in the field. Memory: what the tracer kept of each ray,
+ * one gradient per slice of rays, and nothing that grows with the number of steps. */
 #include "adjoint.h"
 #include <string.h>
 

@@ -61,7 +61,7 @@ enum imp_status imp_bend_step_error(imp_bend *b, size_t pilots, double *error,
     const double d0 = used > 0 ? sqrt(sum[0] / used) : NAN,
                  d1 = used > 0 ? sqrt(sum[1] / used) : NAN;
     const double p = d1 > 1e-14 && d0 > d1 ? log2(d0 / d1) : 0;
-    /* |x_t - x_{t/2}| = error(t) (1 - 2^-p) (curved-rays 2.5) */
+    /* |x_t - x_{t/2}| = error(t) (1 - 2^-p) (docs/bent-rays.md 2.5) */
     if (error) *error = p > 0 ? d0 / (1 - exp2(-p)) : d0;
     if (order) *order = p;
 out:
@@ -230,10 +230,10 @@ static enum imp_status check_differences(imp_bend *b, double *dot, double *bar)
             IMP_TRY(imp_bend_objective(b, &f[side], NULL, NULL, NULL));
         }
         /* Curvature of the objective at large steps, rounding at small ones: the middle
-         * must agree; of trilinear fields, the smallest (curved-rays 3.3). What the next
-         * larger step says of the error that is left is allowed (a hundredth; two, to be
-         * safe); and where the objective is at its least, gradients that a motion of
-         * 1e-12 makes, or of a float's last bit. */
+         * must agree; of trilinear fields, the smallest (docs/bent-rays.md 3.3). What the
+         * next larger step says of the error that is left is allowed (a hundredth; two,
+         * to be safe); and where the objective is at its least, gradients that a motion
+         * of 1e-12 makes, or of a float's last bit. */
         const double fd = (f[0] - f[1]) / (2 * eps);
         if (k <= 4) bend = fmax(bend, fabs(f[0] + f[1] - 2 * value) / (eps * eps));
         const double left = !smooth            ? bend * eps

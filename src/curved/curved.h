@@ -4,7 +4,7 @@
  * step scheme is a list of drifts and kicks; a surface is where a ray ends or turns.
  * Everything that moves a ray, forwards, backwards or along a tangent, reads the same
  * list, so the derivative is that of the program that traces. Equation numbers: Teh et
- * al. 2022, supplement, with the corrections of docs/curved-rays.md. */
+ * al. 2022, supplement, with the corrections of docs/bent-rays.md 1.3. */
 #ifndef IMP_CURVED_CURVED_H
 #define IMP_CURVED_CURVED_H
 
@@ -112,7 +112,7 @@ bool imp__facet(const struct imp__surface *s, const imp_v3 *a, const imp_v3 *b,
                 bool inwards, double nearest, struct imp__surface *facet);
 bool imp__surface_covers(const struct imp__surface *s, const imp_v3 *x);
 
-/* Momentum v through a surface at unit normal n into index e2 (curved-rays 3.5). */
+/* Momentum v through a surface at unit normal n into index e2 (docs/bent-rays.md 3.5). */
 struct imp__turn {
     imp_v3 v;
     bool reflected;

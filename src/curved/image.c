@@ -2,8 +2,9 @@
  *
  * Irradiance of rays on a picture, and its adjoint. The kernel is a cubic B-spline one
  * pixel wide on each axis: a partition of unity, so energy is exact, and twice
- * differentiable (curved-rays 4). Pictures are normalised by constants, the power of the
- * rays and the target's mean: 1 is the mean of all power spread over the picture. */
+ * differentiable (docs/bent-rays.md 4). Pictures are normalised by constants, the power
+ * of the rays and the target's mean: 1 is the mean of all power spread over the
+ * picture. */
 #include "bend.h"
 #include <string.h>
 

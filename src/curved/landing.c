@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The last, fractional step of a ray, exactly onto a surface (curved-rays 2.3). */
+ * The last, fractional step of a ray, exactly onto a surface (docs/bent-rays.md 2.3). */
 #include "curved.h"
 
 /* Solve G(Phi_tau(from)) = 0 on (0, t]: Newton with dG/dtau, kept inside a bracket. */

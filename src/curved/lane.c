@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * One ray backwards, but for its whole steps: its end, taps, turns and start
- * (curved-rays 2.3). */
+ * (docs/bent-rays.md 2.3). */
 #include "adjoint.h"
 
 /* ---- Events -------------------------------------------------------------------- */
@@ -222,7 +222,7 @@ void imp__lane_end(const struct imp__adjoint *job, struct imp__adjoint_slot *slo
         if (off > p->reversal || !isfinite(off)) slot->reversal++;
         slot->worst = fmax(slot->worst, off);
     }
-    if (job->out->energy) { /* K of curved-rays 1.2 at the start */
+    if (job->out->energy) { /* K of docs/bent-rays.md 1.2 at the start */
         const double speed = imp__length(s->at.v);
         job->out->energy[l->ray] =
             p->scheme->arc

@@ -7,7 +7,7 @@
  *     g = 2 f' y,   H = 2 f' P + 4 f'' y y^T        (along: g = f' a, H = f'' a a^T)
  *
  * which has no singularity at r = 0, and d/dc = -grad. A profile gives f, f', f'' and the
- * derivatives of f and f' with respect to its own parameters (curved-rays 3.2). */
+ * derivatives of f and f' with respect to its own parameters (docs/bent-rays.md 3.2). */
 #include "curved.h"
 #include <string.h>
 

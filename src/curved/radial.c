@@ -3,7 +3,8 @@
  * Radial spline: eta = f(u), a cubic B-spline in u = r^2 on [0, radius^2], with r from a
  * centre or an axis. In r^2 nothing is singular at r = 0:
  *     g = 2 f' y,  H = 2 f' P + 4 f'' y y^T,
- *     theta_bar_k += a B_k(u) + 2 (b.y) B_k'(u)                     (curved-rays 3.2) */
+ *     theta_bar_k += a B_k(u) + 2 (b.y) B_k'(u)
+ * (docs/bent-rays.md 3.2). */
 #include "curved.h"
 #include <string.h>
 

@@ -4,7 +4,8 @@
  * tensor cubic B-spline in u = r^2 and in z. With y across the axis a, as in radial.c
  *     g = 2 f_u y + f_z a
  *     H = 2 f_u P + 4 f_uu y y^T + 2 f_uz (y a^T + a y^T) + f_zz a a^T
- *     theta_bar_kl += A B_k B_l + 2 (b.y) B_k' B_l + (b.a) B_k B_l'  (curved-rays 3.2) */
+ *     theta_bar_kl += A B_k B_l + 2 (b.y) B_k' B_l + (b.a) B_k B_l'
+ * (docs/bent-rays.md 3.2). */
 #include "curved.h"
 
 #define CELLS_MAX 8192

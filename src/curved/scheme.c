@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * One step of a ray, forwards, backwards, along a tangent and with its rate in the step
- * length. A scheme is a list of drifts and kicks (curved-rays 2.1, 2.2):
+ * length. A scheme is a list of drifts and kicks (docs/bent-rays.md 2.1, 2.2):
  *
  *     canonical    drift x += c t v        kick v += d t eta g,   path += d t eta^2
  *     arc length   drift x += c t v/|v|    kick v += d t g,       path += d t eta
@@ -163,7 +163,7 @@ void imp__step_tangent(const struct imp__scheme *s, const imp_field *f, double t
     }
 }
 
-/* kick_adj and drift_adj of curved-rays 2.2, stages from the last to the first. */
+/* kick_adj and drift_adj of docs/bent-rays.md 2.2, stages from the last to the first. */
 void imp__step_adjoint(const struct imp__scheme *s, const imp_field *f, double t, int n,
                        struct imp__back *b, const struct imp__state *const *before,
                        struct imp__bar *bar)
@@ -249,7 +249,7 @@ static void index_step_tangent(const imp_field *f, double t, const double *theta
 }
 
 /* Exact with the states before the step; without them (25), (26) with eta and g taken at
- * the nearest point that is known explicitly: biased, O(s) (curved-rays 1.3). */
+ * the nearest point that is known explicitly: biased, O(s) (docs/bent-rays.md 1.3). */
 static void index_step_adjoint(const imp_field *f, double t, int n, struct imp__back *b,
                                const struct imp__state *const *before,
                                struct imp__bar *bar)

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Smoothness of grids (curved-rays 3.6): differences D of first or second order along
- * each axis, weight/2 sum D^2, or weight sum sqrt(D^2 + edge^2), which keeps edges. */
+ * Smoothness of grids (docs/bent-rays.md 3.6): differences D of first or second order
+ * along each axis, weight/2 sum D^2, or weight sum sqrt(D^2 + edge^2), which keeps
+ * edges. */
 #include "bend.h"
 
 struct job {

@@ -2,7 +2,7 @@
  *
  * Tensor cubic B-spline: eta = sum theta_abc w_a(u) w_b(v) w_c(w). Twice differentiable,
  * so the adjoint of a traced ray is also the macroscopic derivative
- * (curved-rays 3.1, 3.3). The x axis is contiguous: rows of four coefficients are
+ * (docs/bent-rays.md 3.1, 3.3). The x axis is contiguous: rows of four coefficients are
  * vectors, reduced over y, then z, and only at the end multiplied with the weights of x.
  */
 #include "curved.h"

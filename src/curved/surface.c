@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Surfaces where rays end or turn: G(x, v), negative inside, with its derivatives, and
- * the momentum's map there (curved-rays 2.6, 3.5). */
+ * the momentum's map there (docs/bent-rays.md 2.6, 3.5). */
 #include "curved.h"
 #include "scene/scene.h"
 

@@ -1,10 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * What rays should do: each kind of target as value and cotangents of where rays arrive
- * (curved-rays 4). Shares of power w_i p_i take the place of 1/N. */
+ * (docs/bent-rays.md 4). Shares of power w_i p_i take the place of 1/N. */
 #include "bend.h"
 
-/* Slant on a plane below 0.05 does not count, above 0.15 it does (curved-rays 2.6 b). */
+/* Slant on a plane below 0.05 does not count, above 0.15 it does (b in
+ * docs/bent-rays.md 2.6). */
 static double slant_weight(double c, double *slope)
 {
     const double t = imp_clamp((c - 0.05) / 0.1, 0.0, 1.0);

@@ -3,7 +3,7 @@
  * Symmetry: a grid whose coefficients are tied, theta = T p, one number p for all nodes
  * that mirrors and turns take into each other (an orbit). A cubic B-spline with
  * symmetric coefficients is symmetric, and so are its derivatives; the transpose adds up
- * over orbits, p_bar = T^T theta_bar (curved-rays 3.6). */
+ * over orbits, p_bar = T^T theta_bar (docs/bent-rays.md 3.6). */
 #include "curved.h"
 #include <string.h>
 

@@ -2,7 +2,7 @@
  *
  * Trilinear grid. The index is continuous, its gradient jumps at cell faces, and inside
  * cells the diagonal of the Hessian is zero: the derivative of the traced program is
- * exact, and not the macroscopic one (curved-rays 3.3). */
+ * exact, and not the macroscopic one (docs/bent-rays.md 3.3). */
 #include "curved.h"
 
 struct corners {

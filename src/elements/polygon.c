@@ -2,7 +2,7 @@
  *
  * Lambert's formula: the integral of cos cos'/r^2 over a polygon is half the sum over its
  * edges of the angle they subtend times the cosine between the receiver's normal and the
- * normal of the triangle (x, v_k, v_k+1) (finite elements, docs/elements.md). */
+ * normal of the triangle (x, v_k, v_k+1) (docs/elements-theory.md 3.1). */
 #include "elements.h"
 
 double imp__polygon_area(int n, const imp_v3 *v)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Picture files (scene-format 13.5). All are read into films, whatever their channels;
- * the format is told from the first bytes, not from the name. */
+ * Picture files (docs/scene-format.md 13.5). All are read into films, whatever their
+ * channels; the format is told from the first bytes, not from the name. */
 #ifndef IMP_FORMAT_IMAGE_H
 #define IMP_FORMAT_IMAGE_H
 

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Triangle meshes in files (scene-format 13.1, 13.2). What a shape keeps (uvs, indices)
- * goes to the arena `keep`, what it copies (positions, normals) to `temporary`. Every
- * number is finite and every index in range in what is returned; messages begin with the
- * file's name and name line, vertex or face. */
+ * Triangle meshes in files (docs/scene-format.md 13.1, 13.2). What a shape keeps (uvs,
+ * indices) goes to the arena `keep`, what it copies (positions, normals) to `temporary`.
+ * Every number is finite and every index in range in what is returned; messages begin
+ * with the file's name and name line, vertex or face. */
 #ifndef IMP_FORMAT_MESH_H
 #define IMP_FORMAT_MESH_H
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Parameters of a scene file: -D name=value, <default>, and $name in attribute values
- * (scene-format 1.3). */
+ * (docs/scene-format.md 1.3). */
 #ifndef IMP_FORMAT_PARAMS_H
 #define IMP_FORMAT_PARAMS_H
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Where files are looked for (scene-format 1.5). scene->search holds, in the order they
- * are tried: <path> entries, latest first; the working folder; the caller's folders; the
- * folder of the scene file. */
+ * Where files are looked for (docs/scene-format.md 1.5). scene->search holds, in the
+ * order they are tried: <path> entries, latest first; the working folder; the caller's
+ * folders; the folder of the scene file. */
 #ifndef IMP_FORMAT_SEARCH_H
 #define IMP_FORMAT_SEARCH_H
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Values of attributes: numbers, lists, booleans (scene-format 1.1, 1.3). */
+ * Values of attributes: numbers, lists, booleans (docs/scene-format.md 1.1, 1.3). */
 #ifndef IMP_FORMAT_VALUE_H
 #define IMP_FORMAT_VALUE_H
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Reading scene files (scene-format 1). xml.c drives expat over a file and its includes,
- * xml_tags.c is the grammar. */
+ * Reading scene files (docs/scene-format.md 1). xml.c drives expat over a file and its
+ * includes, xml_tags.c is the grammar. */
 #ifndef IMP_FORMAT_XML_H
 #define IMP_FORMAT_XML_H
 
@@ -101,7 +101,7 @@ struct imp_prop *imp__xml_prop(struct xml_file *f, const struct xml_attributes *
 bool imp__xml_xyz(struct xml_file *f, const char *tag, const struct xml_attributes *a,
                   double missing, double out[3]);
 
-/* ---- upgrade.c: files before version 2.0.0 (scene-format 1.6) ------------------ */
+/* ---- upgrade.c: files before version 2.0.0 (docs/scene-format.md 1.6) ---------- */
 /* camelCase -> snake_case, and reflectances renamed; `type` is the plugin that has the
  * property. In scratch; NULL: out of memory. */
 const char *imp__upgrade_name(struct imp_arena *scratch, const char *type,

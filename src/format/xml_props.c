@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Tags that are plain properties of an object (scene-format 1.1). */
+ * Tags that are plain properties of an object (docs/scene-format.md 1.1). */
 #include "search.h"
 #include "value.h"
 #include "xml.h"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The grammar: one rule a tag, which attributes it takes and what it does (scene-format
- * 1.1). */
+ * The grammar: one rule a tag, which attributes it takes and what it does
+ * (docs/scene-format.md 1.1). */
 #include "base/nearest.h"
 #include "search.h"
 #include "value.h"

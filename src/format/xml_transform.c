@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Operations inside <transform>: each multiplies from the left (scene-format 1.4). */
+ * Operations inside <transform>: each multiplies from the left
+ * (docs/scene-format.md 1.4). */
 #include "value.h"
 #include "xml.h"
 #include <string.h>

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Gradient checks: what imp_check's files share. Frozen checks see wrong derivative code
- * and are blind to wrong densities; fresh seeds see those too, with noise (gradients.md
- * 13). */
+ * and are blind to wrong densities; fresh seeds see those too, with noise
+ * (docs/estimators.md 13). */
 #ifndef IMP_INVERSE_CHECK_H
 #define IMP_INVERSE_CHECK_H
 

@@ -3,7 +3,8 @@
  * Gradients against differences of pictures that share no random number with them: what a
  * frozen walk cannot see (wrong densities, missing terms) shows here as z. The pictures
  * of one difference share theirs, in batches whose spread is the standard error: walks
- * that do not feel the parameter then cancel (common random numbers, gradients.md 13 B).
+ * that do not feel the parameter then cancel (common random numbers,
+ * docs/estimators.md 13 B).
  *
  * The functional is F = sum_pc s_pc I_pc with a smooth positive pattern s of mean
  * 1/pixels. F is linear in emission: one central difference with a large step. Elsewhere

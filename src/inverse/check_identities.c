@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Identities that hold on every walk, to rounding (gradients.md 12):
+ * Identities that hold on every walk, to rounding (docs/estimators.md 12):
  *
  *   dot     <J v, w> = <v, J^T w>: tangent against sweep
  *   euler   sum theta dL/dtheta = L over all emission; on Stam's walks

@@ -2,8 +2,9 @@
  *
  * Do two pictures have the same expectation? A z-test of every pixel and channel, with
  * Sidak's level so that the picture as a whole fails by chance once in a hundred, and one
- * of every channel's mean, which sees a bias far below a pixel's noise (scene-format 14).
- * Pixels must be independent: compare pictures made with box filters. */
+ * of every channel's mean, which sees a bias far below a pixel's noise
+ * (docs/scene-format.md 14). Pixels must be independent: compare pictures made with box
+ * filters. */
 #include "base/film.h"
 #include "color/rgb.h"
 #include "math/stat.h"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * J^T W J and J^T W r without bias (gradients.md 15). With x_ik = dL_i/dx_k of walk i and
- * a replicate of n walks in one pixel and channel,
+ * J^T W J and J^T W r without bias (docs/estimators.md 15). With x_ik = dL_i/dx_k of walk
+ * i and a replicate of n walks in one pixel and channel,
  *
  *     (J^T J)_kl ~ w [ (sum_i x_ik)(sum_i x_il) - sum_i x_ik x_il ] / (n (n-1))
  *     (J^T r)_k  ~ w { [S/(n-1) - T] mean(x_k) - sum_i L_i x_ik / (n (n-1)) }

@@ -2,8 +2,8 @@
  *
  * Losses of one number of a picture: l(I) for the mean I, against the target T. The
  * derivatives up to the third are what leave-one-out needs: l' is the adjoint, and what
- * remains of the bias when l is not quadratic is 1/2 l''' Var(L)/(N-1) dI (gradients.md
- * 5.4). */
+ * remains of the bias when l is not quadratic is 1/2 l''' Var(L)/(N-1) dI
+ * (docs/estimators.md 5.4). */
 #ifndef IMP_INVERSE_LOSS_H
 #define IMP_INVERSE_LOSS_H
 

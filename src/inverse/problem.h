@@ -47,7 +47,7 @@ double imp__regularise(const struct imp_problem *p, const double *x, double *gra
 enum imp_status imp__regularise_second(const struct imp_problem *p, double *H);
 
 /* Gauss-Newton pieces for all quadratic targets, from one set of walks, K = p->n <= 256
- * (gradients.md 15):
+ * (docs/estimators.md 15):
  *   H [K*K]      U-statistic estimate of J^T W J (unbiased, may be indefinite)
  *   H_same [K*K] the same-sample matrix (biased upwards, positive semi-definite)
  *   H_meas [K*K] sum of w^2 sigma^2 J J^T for the measurement covariance, sigma^2 from

@@ -7,7 +7,7 @@
  *     P_i = sum_p  w_ip / W_p  l'_p( (S_p - w_ip L_i) / (W_p - w_ip) )
  *
  * over the pixels p it reaches: its own part left out, the normaliser W fixed (it depends
- * on positions only; gradients.md 5.4). */
+ * on positions only; docs/estimators.md 5.4). */
 #ifndef IMP_INVERSE_SPLAT_H
 #define IMP_INVERSE_SPLAT_H
 

@@ -4,9 +4,9 @@
  *
  * The samples of a pixel come in R independent replicates of n, each with its own
  * leave-one-out adjoint; a pixel's gradient is their mean, its variance comes from their
- * spread, and pixels are independent, so variances add (gradients.md 14). Few numbers are
- * kept in arrays; many (textures) in a hash table of what a tile of pixels touched, so
- * memory and time follow the touched texels and not the texture. */
+ * spread, and pixels are independent, so variances add (docs/estimators.md 14). Few
+ * numbers are kept in arrays; many (textures) in a hash table of what a tile of pixels
+ * touched, so memory and time follow the touched texels and not the texture. */
 #ifndef IMP_INVERSE_TALLY_H
 #define IMP_INVERSE_TALLY_H
 

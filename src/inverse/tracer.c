@@ -8,8 +8,8 @@
 #include <string.h>
 
 /* The attached form of the exponent here has neither the gradient of what arrives nor
- * boundary terms (gradients.md 4): it is right only where both are zero, a convex object
- * under a constant environment whose weight does not jump at the horizon. */
+ * boundary terms (docs/estimators.md 4): it is right only where both are zero, a convex
+ * object under a constant environment whose weight does not jump at the horizon. */
 static enum imp_status attached_allowed(const struct imp_scene *scene)
 {
     bool fine = scene->n_shapes == 1 && scene->environment >= 0 && scene->n_emitters == 1;

@@ -2,7 +2,7 @@
  *
  * J^T W J through filters wider than a pixel, where a walk has a part in several pixels
  * and pixels share walks. R independent replicates, each a picture L and a derivative
- * picture X_k for every number, take the place of walks (gradients.md 15):
+ * picture X_k for every number, take the place of walks (docs/estimators.md 15):
  *
  *     (J^T J)_kl ~ w [ (sum_b X_k)(sum_b X_l) - sum_b X_k X_l ] / (R (R-1))
  *     (J^T r)_k  ~ w [ (sum_b L)(sum_b X_k) - sum_b L X_k ] / (R (R-1)) - w T mean(X_k)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * 4x4 matrices, row-major, column vectors: p' = M p (scene-format 1.4). The matrices of
+ * 4x4 matrices, row-major, column vectors: p' = M p (docs/scene-format.md 1.4). The matrices of
  * shapes and sensors are affine. */
 #ifndef IMP_MATH_TRANSFORM_H
 #define IMP_MATH_TRANSFORM_H

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * From nodes to objects, in document order. Parameters get their names on the way
- * (scene-format 12.2): by an object's own id, else below its parent's name. */
+ * (docs/scene-format.md 12.2): by an object's own id, else below its parent's name. */
 #include "build.h"
 
 /* Top-level objects without id: <tag><n>, counted per tag. */

@@ -205,7 +205,7 @@ bool imp__occluded(const struct imp_scene *scene, const imp_v3 *o, const imp_v3 
 /* Origin of a ray leaving p on a surface with geometric normal ng towards d, moved to the
  * side of d by (1 + max|p_k|) eps. Hits are recomputed in double, so what has to be
  * cleared is Embree's own rounding, a few units of 2^-24; Mitsuba takes 1500 of them
- * (scene-format 3.1), which shows at grazing angles inside a glowing sphere
+ * (docs/scene-format.md 3.1), which shows at grazing angles inside a glowing sphere
  * (tests/grad/closed_forms.c). */
 #define IMP_RAY_EPSILON (96 * 0x1p-24)
 static inline imp_v3 imp__offset(imp_v3 p, imp_v3 ng, imp_v3 d)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Levenberg-Marquardt with an unbiased Gauss-Newton matrix: the U-statistic H need not be
- * positive definite, the same-sample matrix is, and damps it (gradients.md 15):
+ * positive definite, the same-sample matrix is, and damps it (docs/estimators.md 15):
  *
  *     (H + mu diag H_same) delta = -g
  *

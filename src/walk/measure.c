@@ -247,8 +247,8 @@ static int aov_value(const struct imp_measure *m, const struct imp_integrator *t
     return n;
 }
 
-/* Alpha (scene-format 11): an environment in sight makes every path valid; direct asks
- * for a surface at the first hit. */
+/* Alpha (docs/scene-format.md 11): an environment in sight makes every path valid; direct
+ * asks for a surface at the first hit. */
 static double walk_alpha(const struct imp_measure *m,
                          const struct imp_integrator *integrator,
                          const struct imp_walk *walk)

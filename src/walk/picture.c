@@ -3,7 +3,7 @@
  * Pictures: samples to pixel means with standard errors. Work is cut into tiles and
  * passes, whose results are added in one order (base/pool.h). A box filter gives a sample
  * to its own pixel; wider filters weight it into all pixels within their radius
- * (scene-format 10), and the pixel is the ratio  sum w v / sum w.
+ * (docs/scene-format.md 10), and the pixel is the ratio  sum w v / sum w.
  *
  * Error of the ratio, with e = w (v - mean):  sum e^2 / (sum w)^2  if the samples were
  * spread over the filter at random. But every pixel sends the same number of them, and

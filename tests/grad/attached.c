@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The table of gradients.md 4 (its reproducible version): the derivative of
+ * The table of docs/estimators.md 4: the derivative of
  *   I(alpha) = int f cos(theta_i) L(wi) dwi,  wo = (1/2, 0, sqrt(3)/2),
  *   L(w) = max(0, w_z) exp(2 w.a),  a = (-.6, 0, .8),  specular 1, diffuse 0
  * with respect to Stam's exponent. Exact numbers by quadrature of eval and eval_d; then

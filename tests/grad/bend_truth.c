@@ -2,8 +2,8 @@
  *
  * The adjoint of bent rays against three independent truths: dual numbers through a
  * tracer written for this test, central differences over seven decades of step (cubic and
- * trilinear: curved-rays 3.3), and a plain adjoint written here in which errors can be
- * planted, each of which must be caught. */
+ * trilinear: docs/bent-rays.md 3.3), and a plain adjoint written here in which errors can
+ * be planted, each of which must be caught. */
 #include "bend_kit.h"
 
 /* ---- Dual numbers, a spline by Cox-de Boor, leapfrog, exit --------------------- */
@@ -219,9 +219,9 @@ static void against_duals(struct problem *p)
     free(bar), free(dot), free(theta);
 }
 
-/* K = lam.v + mu.F is zero along the ray of the continuous problem (curved-rays 1.2): at
- * the start it is what the discretisation leaves, O(t^2) with leapfrog and O(t) with
- * Euler. */
+/* K = lam.v + mu.F is zero along the ray of the continuous problem
+ * (docs/bent-rays.md 1.2): at the start it is what the discretisation leaves, O(t^2) with
+ * leapfrog and O(t) with Euler. */
 static void energy_of_adjoint(struct problem *p)
 {
     static const struct {
@@ -356,7 +356,7 @@ static void planted(struct problem *p)
     free(bar), free(plain);
 }
 
-/* ---- Seven decades of step: curved-rays 3.3 ------------------------------------ */
+/* ---- Seven decades of step: docs/bent-rays.md 3.3 ------------------------------ */
 
 #define RAYS 1500
 

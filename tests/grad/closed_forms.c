@@ -57,8 +57,8 @@ static void near_z(double value, double se, double ref, double relative_se,
     "value='8'/>"                                                                        \
     "<rfilter type='box'/></film></sensor>"
 
-/* Inside a glowing sphere: I_d = e (1 - rho^d)/(1 - rho) (gradients.md 9.1). `stam` is
- * the absorption of Stam's walk, which no mean depends on; 0: the path tracer. */
+/* Inside a glowing sphere: I_d = e (1 - rho^d)/(1 - rho) (docs/estimators.md 9.1). `stam`
+ * is the absorption of Stam's walk, which no mean depends on; 0: the path tracer. */
 static void furnace(double rho, int depth, int rr_depth, double stam)
 {
     char xml[2048], what[200];
@@ -135,7 +135,7 @@ static void one(const char *what, const char *objects, const char *param, int sp
 
 /* Point light of intensity 1 at (0,0,5) over a floor of 0.6 at z = 0, seen from (0,0,4)
  * with 60 degrees: radiance 0.6/pi h/(h^2 + x^2 + y^2)^(3/2), averaged over the pixels by
- * midpoints. Straight below it is 0.0076394 (scene-format 16). */
+ * midpoints. Straight below it is 0.0076394 (docs/scene-format.md 16). */
 static void point_light(void)
 {
     double mean = 0;

@@ -2,8 +2,8 @@
  *
  * Loss, gradient, their standard errors and the Gauss-Newton matrices of a small picture,
  * from its walks one by one: radiances and derivatives of every walk are taken from the
- * walk itself, and the estimators' formulas (gradients.md 5.2, 14, 15) are summed here in
- * full. A wrong error bar or a lost weight leaves every mean right. */
+ * walk itself, and the estimators' formulas (docs/estimators.md 5.2, 14, 15) are summed
+ * here in full. A wrong error bar or a lost weight leaves every mean right. */
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "inverse/estimate.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Integrating sphere (adjoint-photons.md F2b): radius r, Lambertian wall of reflectance
+ * Integrating sphere (docs/estimators.md 16.1): radius r, Lambertian wall of reflectance
  * rho, an emitting cap of area A_e and radiance e, which also reflects. Whatever its
  * place, each point sends every other the same share, so the irradiance is
  *
@@ -127,8 +127,9 @@ int main(int argc, char **argv)
     const double direct = M_PI * E_CAP * share(0, LIT);
     ctx = test_context(0);
     for (size_t k = 0; k < sizeof row / sizeof *row; k++) {
-        /* Roulette with survival 0.95 has infinite variance at 0.98 (gradients.md 9.1):
-         * there n = 400 bounces count, and rho^n = 3e-4 is missing, exactly. */
+        /* Roulette with survival 0.95 has infinite variance at 0.98
+         * (docs/estimators.md 9.1): there n = 400 bounces count, and rho^n = 3e-4 is
+         * missing, exactly. */
         const double rho = row[k].rho, left = 1 - rho, n = row[k].depth - 1;
         const double cut = n > 0 ? pow(rho, n) : 0, whole = (1 - cut) / left;
         const double slope = (whole - (n > 0 ? n * cut / rho : 0)) / left;

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * T6 of gradients.md: all seven controls of Stam's box back from one 32 x 32 picture,
- * from a start 30 % off. Light samples instead of Stam's own walk (expectations are the
- * same, the noise of a pixel is far smaller), and weights that follow the picture's
- * noise. With IMP_SLOW set, enough samples for 2 %; else what the standard errors
- * promise. */
+ * T6 of docs/estimators.md 2.3: all seven controls of Stam's box back from one 32 x 32
+ * picture, from a start 30 % off. Light samples instead of Stam's own walk (expectations
+ * are the same, the noise of a pixel is far smaller), and weights that follow the
+ * picture's noise. With IMP_SLOW set, enough samples for 2 %; else what the standard
+ * errors promise. */
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include <math.h>

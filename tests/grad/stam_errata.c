@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Negative controls (gradients.md 13 G): mistakes of the paper's pseudo-code, and two
- * that others make, planted in this test's own fold and sweep of recorded walks. Each is
- * shown to give the wrong number it must give, where that is known, and to be caught by
- * the check that is there for it; without the mistake the same fold and sweep pass.
+ * Negative controls (docs/estimators.md 13 G): mistakes of the paper's pseudo-code, and
+ * two that others make, planted in this test's own fold and sweep of recorded walks. Each
+ * is shown to give the wrong number it must give, where that is known, and to be caught
+ * by the check that is there for it; without the mistake the same fold and sweep pass.
  * docs/stam.md quotes what this prints. */
 #include "stam_walks.h"
 

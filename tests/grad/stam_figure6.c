@@ -3,7 +3,8 @@
  * Stam's Figure 6 as he drew it: one walk with two M2 and two M3 scatterings that ends on
  * a wall, J = 1/2 L^2 (target 0), derivatives of J/J0 by the adjoint, and differences for
  * four steps, in double and in float. Test and table: docs/stam.md quotes what it prints.
- * Its identities (gradients.md 2.4): th6 d6 = 2, th7 d7 = 4, th3 d3 + th4 d4 = 4. */
+ * Its identities (docs/estimators.md 2.4): th6 d6 = 2, th7 d7 = 4,
+ * th3 d3 + th4 d4 = 4. */
 #include "stam_walks.h"
 
 /* J/J0 in float, the paper's arithmetic: the same products, each rounded. */

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Errata of Stam's formulas (gradients.md 3): what is printed beside what is right, each
- * by quadrature or a small simulation of its own, and what the library does. docs/stam.md
- * quotes what this prints. */
+ * Errata of Stam's formulas (docs/estimators.md 3): what is printed beside what is right,
+ * each by quadrature or a small simulation of its own, and what the library does.
+ * docs/stam.md quotes what this prints. */
 #include "imp_kinds.h"
 #include "imp_sphere.h"
 #include "imp_tap.h"

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Stam's Figure 6, walk by walk (gradients.md 2.3, T1 and T2): on 1000 recorded walks the
- * adjoint of all seven controls against central differences and against dual numbers of
- * this test's own evaluation, and the identities that need no difference at all. */
+ * Stam's Figure 6, walk by walk (docs/estimators.md 2.3, T1 and T2): on 1000 recorded
+ * walks the adjoint of all seven controls against central differences and against dual
+ * numbers of this test's own evaluation, and the identities that need no difference at
+ * all. */
 #include "stam_walks.h"
 
 struct worst {

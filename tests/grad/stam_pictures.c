@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Stam's Figures 7 and 8 (gradients.md 2.3, T4): the picture and seven derivative
+ * Stam's Figures 7 and 8 (docs/estimators.md 2.3, T4): the picture and seven derivative
  * pictures, with cosine draws and with half of the draws from the Phong-Blinn lobe. The
  * sampler changes the noise and nothing else: chi-square over blocks of pixels, and the
  * ratios of noise. */

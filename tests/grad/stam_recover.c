@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Stam's optimiser loop (gradients.md 2.3, T6): all seven controls back from one 32 x 32
- * picture, from values that are wrong by 30 %. Without an argument a quick run, judged by
- * its own error bars; with "long" enough walks for 2 %.
+ * Stam's optimiser loop (docs/estimators.md 2.3, T6): all seven controls back from one 32
+ * x 32 picture, from values that are wrong by 30 %. Without an argument a quick run,
+ * judged by its own error bars; with "long" enough walks for 2 %.
  *
  * Walks that sample the light (integrator=path) and the loss relative to the target,
  * whose weights are nearly those of the noise: the paper's walk and equal weights would

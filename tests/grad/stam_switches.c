@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The switches that show the errata (gradients.md 2.3, T7): which of them is refused
- * where, what is warned about, and that the attached exponent, where it is allowed, is
- * the derivative (it lacks the gradient of what arrives and all boundary terms:
- * gradients.md 4). */
+ * The switches that show the errata (docs/estimators.md 2.3, T7): which of them is
+ * refused where, what is warned about, and that the attached exponent, where it is
+ * allowed, is the derivative (it lacks the gradient of what arrives and all boundary
+ * terms: docs/estimators.md 4). */
 #include "imp_scene.h"
 #include "imp_tap.h"
 

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Stam's box against published means: the picture's mean and its seven derivatives (two
- * independent implementations, 7e9 paths: gradients.md 2.2), and the whole-picture loss
- * with its gradient at few samples per pixel, where estimators without leave-one-out are
- * wrong by factors (2.3 T5, 5). Deterministic walks with fixed seeds; z-tests. */
+ * independent implementations, 7e9 paths: docs/estimators.md 2.2), and the whole-picture
+ * loss with its gradient at few samples per pixel, where estimators without leave-one-out
+ * are wrong by factors (2.3 T5, 5). Deterministic walks with fixed seeds; z-tests. */
 #include "imp_scene.h"
 #include "imp_tap.h"
 

@@ -31,7 +31,7 @@ static void agrees(imp_context *ctx, const char *folder, const char *scene_file,
              suffix);
     test_must(ctx, imp_film_read(ctx, path, &variance));
     imp_film_get_info(reference, &info);
-    run.spp = (int)(2e6 / (info.width * info.height)); /* scene-format 14 */
+    run.spp = (int)(2e6 / (info.width * info.height)); /* docs/scene-format.md 14 */
     run.seed = 11;
     test_must(ctx, imp_render(scene, &run, &film));
     options.variance = variance;

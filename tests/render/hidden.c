@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What hide_emitters hides, and alpha (scene-format 11): a ray straight down on a stack
- * of squares under an orthographic camera. A null square is no surface that was seen:
- * behind it path hides lights as before it, and what has alpha 0 has no radiance; direct
- * has the alpha of the first hit. Expected numbers are those that the rules give by hand
- * (and Mitsuba 3.9.1 gave the same). */
+ * What hide_emitters hides, and alpha (docs/scene-format.md 11): a ray straight down on a
+ * stack of squares under an orthographic camera. A null square is no surface that was
+ * seen: behind it path hides lights as before it, and what has alpha 0 has no radiance;
+ * direct has the alpha of the first hit. Expected numbers are those that the rules give
+ * by hand (and Mitsuba 3.9.1 gave the same). */
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include <stdbool.h>

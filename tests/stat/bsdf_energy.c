@@ -153,7 +153,7 @@ static double m2_albedo(int variant, double alpha, double degrees, bool from_lig
 
 static void stam_numbers(void)
 {
-    /* gradients.md 2.1, and E10, E21, E28 of section 3. */
+    /* docs/estimators.md 2.1, and E10, E21, E28 of section 3. */
     tap_near(m2_albedo(0, 10, 0, false), 0.717, 0, 6e-4, "M2r: albedo at 0 degrees");
     tap_near(m2_albedo(0, 10, 60, false), 0.623, 0, 6e-4, "M2r: albedo at 60 degrees");
     tap_near(m2_albedo(0, 10, 89, false), 0.504, 0, 6e-4, "M2r: albedo at 89 degrees");

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Rays against closed forms: parabolas, Luneburg, the fish-eye's circles, rods, Snell,
- * plumes; orders of convergence; what is conserved. References: docs/curved-rays.md. */
+ * plumes; orders of convergence; what is conserved. References: docs/bent-rays.md 6. */
 #include "bend_kit.h"
 
 static struct imp_bend_exit trace_one(const imp_field *f, struct imp_bend_options *o,
@@ -175,7 +175,7 @@ static void rods(void)
     tap_near(e.x[0], 0, 0, 2e-8, "rod: the ray is back on the axis there");
 
     /* Quarter pitch, flat faces in air: object at l1 = 10, a height goes to -0.189394 of
-     * it at l2 = 0.358701 behind (ray matrix; curved-rays 6). */
+     * it at l2 = 0.358701 behind (ray matrix; docs/bent-rays.md 6). */
     const double L = 4.759989;
     struct imp_bend_surface faces[2] = {plane_z(0), plane_z(L)};
     faces[0].normal[2] = -1;
@@ -294,7 +294,7 @@ static void invariants(void)
     imp_field_destroy(f);
 }
 
-/* Grids whose nodes carry the analytic Luneburg index (curved-rays 6). */
+/* Grids whose nodes carry the analytic Luneburg index (docs/bent-rays.md 6). */
 static double luneburg_grid(enum imp_field_interp interp, enum imp_bend_scheme scheme,
                             int nodes, double ds, double *drift)
 {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Colours: the published numbers of scene-format 16, the table of conversions (2.1) line
- * by line, colour objects (2.4), and what is refused. */
+ * Colours: the published numbers of docs/scene-format.md 16, the table of conversions
+ * (2.1) line by line, colour objects (2.4), and what is refused. */
 #include "base/arena.h"
 #include "color/cie.h"
 #include "color/convert.h"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * OBJ and PLY: what is read (scene-format 13.1, 13.2), the message of every error, files
- * cut off and damaged anywhere, and memory that ends. */
+ * OBJ and PLY: what is read (docs/scene-format.md 13.1, 13.2), the message of every
+ * error, files cut off and damaged anywhere, and memory that ends. */
 #include "format/mesh.h"
 #include "imp_fail_alloc.h"
 #include "imp_tap.h"

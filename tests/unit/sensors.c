@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Sensors against the formulas of scene-format 9 (written out again here), fields of
- * view, films, samplers, filters, and every error rule. */
+ * Sensors against the formulas of docs/scene-format.md 9 (written out again here), fields
+ * of view, films, samplers, filters, and every error rule. */
 #include "imp_tap.h"
 #include "kind/filter/filter.h"
 #include "kind/sensor/film.h"

@@ -197,7 +197,7 @@ static int uv_is(const struct imp_surface *at, double u, double v)
     return fabs(at->uv[0] - u) < 2e-6 && fabs(at->uv[1] - v) < 2e-6;
 }
 
-/* uv by scene-format 4.2, at points whose uv can be said without computing. */
+/* uv by docs/scene-format.md 4.2, at points whose uv can be said without computing. */
 static void uvs(void)
 {
     static const char *const kinds[] = {"rectangle", "disk", "sphere", "cylinder",

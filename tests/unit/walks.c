@@ -259,7 +259,7 @@ static void depths(void)
     }
 }
 
-/* Depth 0 sees nothing, depth 1 what glows (scene-format 11). */
+/* Depth 0 sees nothing, depth 1 what glows (docs/scene-format.md 11). */
 static void seen_directly(void)
 {
     for (int depth = 0; depth < 2; depth++) {

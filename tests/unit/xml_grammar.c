@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Scene files: what the grammar makes of them (scene-format 1), and the exact text and
- * place of every error. */
+ * Scene files: what the grammar makes of them (docs/scene-format.md 1), and the exact
+ * text and place of every error. */
 #include "imp_fail_alloc.h"
 #include "imp_tap.h"
 #include "scene_parse.h"

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * conductor: a smooth mirror of complex index eta + i k. One delta lobe, tint times
- * Fresnel; its derivatives are those of the coefficient (gradients.md 9.3). Front only.
- */
+ * Fresnel; its derivatives are those of the coefficient (docs/estimators.md 9.3). Front
+ * only. */
 #include "fresnel.h"
 #include "kind/build.h"
 #include "presets.h"

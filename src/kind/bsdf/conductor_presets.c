@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Complex refractive indices of metals and other absorbers under rgb (scene-format A.3):
- * measured spectra integrated against the observer, without an illuminant. */
+ * Complex refractive indices of metals and other absorbers under rgb
+ * (docs/scene-format.md A.3): measured spectra integrated against the observer, without
+ * an illuminant. */
 #include "presets.h"
 #include <string.h>
 

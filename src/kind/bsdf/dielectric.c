@@ -5,7 +5,7 @@
  * is compressed where the index is higher. Lobes are drawn with probabilities F and 1 -
  * F, whatever the tints are, so that a tint of 0 keeps its derivative. The index bends
  * paths and has no gradient: it can be set, and asking for its derivative is refused
- * (gradients.md 9.3). */
+ * (docs/estimators.md 9.3). */
 #include "fresnel.h"
 #include "kind/build.h"
 #include "presets.h"

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Fresnel reflectance of unpolarised light at a smooth interface (scene-format 5.1). */
+ * Fresnel reflectance of unpolarised light at a smooth interface
+ * (docs/scene-format.md 5.1). */
 #ifndef IMP_KIND_BSDF_FRESNEL_H
 #define IMP_KIND_BSDF_FRESNEL_H
 

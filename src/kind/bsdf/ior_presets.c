@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <strings.h>
 
-/* Refractive indices by name (scene-format A.2). */
+/* Refractive indices by name (docs/scene-format.md A.2). */
 static const struct {
     const char *name;
     double n;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * stam_m2: Lambert and a Phong-Blinn lobe with an ambient term (Stam 2020, App. B and C,
- * with the errata of gradients.md 3). With m the half-vector, c_m = cos(theta_m) and
+ * with the errata of docs/estimators.md 3). With m the half-vector, c_m = cos(theta_m) and
  * mo = m.wo
  *
  *   f cos(theta_i) = diffuse cos(theta_i)/pi + specular S,
@@ -143,7 +143,7 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     df[EXPONENT] = in[SPECULAR] * (h.p * h.V * score(alpha, &h));
 }
 
-/* The exponent moves what the lobe draws (gradients.md 4): at fixed u
+/* The exponent moves what the lobe draws (docs/estimators.md 4): at fixed u
  *   d c_m = -c_m ln c_m/(alpha + 2),   d m = e_theta d theta_m,
  *   d wi = 2 ((dm.wo) m + mo dm)
  * and everything in f/p is carried along. The cosine draw does not move, its weight

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * stam_m3: Lambert with an ambient term that acts as emission (Stam 2020, App. C;
- * controls theta_6, theta_7 of gradients.md 2.1). `absorb` is the chance that a walk of
- * integrator `stam` ends here: it is sampling, no expectation depends on it. */
+ * controls theta_6, theta_7 of docs/estimators.md 2.1). `absorb` is the chance that a
+ * walk of integrator `stam` ends here: it is sampling, no expectation depends on it. */
 #include "kind/build.h"
 #include "lambert.h"
 #include "stam.h"

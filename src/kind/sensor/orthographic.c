@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Parallel rays along +z from (1 - 2 px/W, (1 - 2 py/H)/a, near): the picture spans [-1,
- * 1] across, and to_world may scale that (scene-format 9). */
+ * 1] across, and to_world may scale that (docs/scene-format.md 9). */
 #include "projection.h"
 
 struct orthographic {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A pinhole: the ray through film position (px, py) runs along (scene-format 9)
+ * A pinhole: the ray through film position (px, py) runs along (docs/scene-format.md 9)
  *
  *   (t (1 - 2X), (t/a)(1 - 2Y), 1),   X = px/W + offset_x,  Y = py/H + offset_y */
 #include "projection.h"

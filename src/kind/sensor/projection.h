@@ -19,7 +19,7 @@ enum imp_status imp__projection_build(const struct imp_build *b, bool rigid,
                                       struct imp_projection *out);
 
 /* tan of half the horizontal field of view, from fov and fov_axis, or focal_length;
- * aspect is width/height of the full film (scene-format 9). */
+ * aspect is width/height of the full film (docs/scene-format.md 9). */
 enum imp_status imp__fov_build(const struct imp_build *b, double aspect,
                                double *tan_half_x);
 

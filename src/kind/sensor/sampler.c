@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Samplers. All of them mean independent samples here, of which there are as many as the
- * kind rounds up to, so that a file costs the same everywhere (scene-format 10). */
+ * kind rounds up to, so that a file costs the same everywhere
+ * (docs/scene-format.md 10). */
 #include "base/compiler.h"
 #include "film.h"
 #include <string.h>

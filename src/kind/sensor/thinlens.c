@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A thin lens: rays of one film position start anywhere on the aperture and meet where
- * the pinhole's ray reaches z = focus_distance (scene-format 9). */
+ * the pinhole's ray reaches z = focus_distance (docs/scene-format.md 9). */
 #include "math/warp.h"
 #include "projection.h"
 

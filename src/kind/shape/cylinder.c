@@ -26,7 +26,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
     if (!(length > 0) || !isfinite(length))
         IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "p1"),
                                 IMP_E_SCENE, "p0 and p1 are %g apart", length));
-    /* to_world T(p0) frame(p1 - p0) S(r, r, length), scene-format 4.2. */
+    /* to_world T(p0) frame(p1 - p0) S(r, r, length), docs/scene-format.md 4.2. */
     const struct imp_frame f = imp__frame_from_normal(e * (1 / length));
     const struct imp_mat4 local = {{f.s[0], f.t[0], f.n[0], a[0], f.s[1], f.t[1], f.n[1],
                                     a[1], f.s[2], f.t[2], f.n[2], a[2], 0, 0, 0, 1}};

@@ -2,7 +2,7 @@
  *
  * Triangle meshes, from files (`obj`, `ply`) or from calls (`mesh`), in world space after
  * build. A mirroring to_world or flip_normals reverses the winding, so that geometric and
- * shading normals agree (scene-format 4.3, as Mitsuba 3.10). */
+ * shading normals agree (docs/scene-format.md 4.3, as Mitsuba 3.10). */
 #include "math/warp.h"
 #include "shape.h"
 #include <string.h>

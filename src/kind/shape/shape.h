@@ -31,8 +31,8 @@ static inline imp_v3 imp__mat4_column(const struct imp_mat4 *a, int j)
 void imp__placement_frame(const struct imp_build *b, const struct imp_mat4 *to_world,
                           int equal, struct imp_frame *frame, double length[3]);
 
-/* s and t from n and dp_du (scene-format 3.2); the basis of n alone where dp_du vanishes.
- */
+/* s and t from n and dp_du (docs/scene-format.md 3.2); the basis of n alone where dp_du
+ * vanishes. */
 static inline void imp__surface_frame(struct imp_surface *x)
 {
     const imp_v3 s = x->dp_du - x->n * imp__dot(x->n, x->dp_du);

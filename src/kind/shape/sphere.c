@@ -31,7 +31,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
                                 IMP_E_SCENE, "its radius is %g, its area %g", p->radius,
                                 s->area));
     /* A mirroring placement turns the normal inwards, flip_normals turns it back
-     * (scene-format 4.2). A negative radius mirrors all three axes. */
+     * (docs/scene-format.md 4.2). A negative radius mirrors all three axes. */
     if (radius < 0) p->axes = (struct imp_frame){-p->axes.s, -p->axes.t, -p->axes.n};
     p->side = ((at.mirrored != (radius < 0)) != s->flip_normals) ? -1 : 1;
     const imp_v3 r = imp__v3(p->radius, p->radius, p->radius);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * checkerboard: two colours by the parity of the half-unit cells. Read as one number the
- * two are swapped, as in Mitsuba (scene-format 6.1, 15: followed so that pictures agree).
- */
+ * two are swapped, as in Mitsuba (docs/scene-format.md 6.1, 15: followed so that pictures
+ * agree). */
 #include "input.h"
 #include "uv.h"
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * d65 around a texture: daylight of the texture's colour. In rgb and mono modes it scales
- * (scene-format 2.4); d65 around a colour is a constant (color/convert.c). */
+ * (docs/scene-format.md 2.4); d65 around a colour is a constant (color/convert.c). */
 #include "input.h"
 #include "math/vec.h"
 

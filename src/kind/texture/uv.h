@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The `to_uv` property: a plane affine map before the lookup (scene-format 6.1). */
+ * The `to_uv` property: a plane affine map before the lookup
+ * (docs/scene-format.md 6.1). */
 #ifndef IMP_KIND_TEXTURE_UV_H
 #define IMP_KIND_TEXTURE_UV_H
 

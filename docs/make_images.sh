@@ -1,0 +1,40 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+#
+# The README's pictures, rendered again. Two to four minutes. (docs/make_stam.sh makes
+# those of docs/stam.md.)
+#
+#     docs/make_images.sh [BUILD FOLDER, default build]
+set -euo pipefail
+cd "$(dirname "$0")/.."
+build=$(cd "${1:-build}" && pwd)
+importon=$build/cli/importon
+[[ -x $importon ]] || { echo "$importon: not built" >&2; exit 2; }
+out=$(mktemp -d)
+trap 'rm -rf "$out"' EXIT
+images=docs/images
+most=100000 # bytes of a committed picture
+
+say() { echo "$(date +%T) $*" >&2; }
+
+say "pictures: a textured floor; a rod, a fish-eye and a Luneburg lens"
+"$importon" render scenes/textured.xml -D width=256 -D height=192 --spp 256 -q -o "$images/textured.png"
+"$importon" render scenes/bend/lenses.xml -D width=300 -D height=150 --spp 256 -q -o "$images/lenses.png"
+
+say "gradient: the Cornell box, and its derivatives by three reflectances"
+"$importon" jacobian scenes/cornell.xml -D res=128 --spp 256 -p 'red.*' -p 'green.*' -p 'white.*' -q \
+    -o "$out/J" --sheet "$images/cornell_jacobian.png" >"$out/jacobian.txt"
+
+say "fit: wrong walls and a wrong lamp, the target, what was recovered (as ./quickstart)"
+size=(-D res=96)
+"$importon" render scenes/cornell.xml "${size[@]}" --spp 512 --seed 1 --se -q -o "$out/target.exr"
+"$importon" fit scenes/cornell.xml "${size[@]}" --set red.reflectance.value=0.35 \
+    --set green.reflectance.value=0.35 --set white.reflectance.value=0.5 --set light.radiance.value=6 \
+    -p 'red.*' -p 'green.*' -p 'white.*' -p 'light.*' --target "$out/target.exr" --optimizer lm --spp 64 \
+    --seed 2 -q -o "$out/fit" --picture-spp 512 --sheet "$images/cornell_fit.png" >"$out/fit.txt"
+
+for picture in textured lenses cornell_jacobian cornell_fit; do
+    bytes=$(stat -c %s "$images/$picture.png")
+    say "$images/$picture.png: $bytes bytes"
+    ((bytes < most)) || { echo "$images/$picture.png is larger than $most bytes" >&2; exit 1; }
+done
