@@ -83,7 +83,7 @@ void bend_put_stats(struct json *j, const struct imp_bend_stats *s)
     json_end_object(j);
 }
 
-static const char *target_word(enum imp_bend_target_type t)
+const char *bend_target_word(enum imp_bend_target_type t)
 {
     static const char *const words[IMP_BEND_N_TARGETS] = {
         "focus", "spot",      "points", "direction", "directions", "deflection",
@@ -216,8 +216,23 @@ static int fit(void) { return bend_fit(bend); }
 static int view(void)
 {
     const char *folder = cli.out ? cli.out : "out";
+    struct imp_bend_stats s = IMP_BEND_STATS_INIT;
+    struct json j = {0};
+    double value;
+    const enum imp_status st = imp_bend_objective(bend, &value, NULL, NULL, &s);
+    if (st != IMP_OK) return cli_fail(st, cli.scene_path); /* also if no ray is traced */
     int rc = make_folder(folder);
-    if (!rc) rc = bend_view(bend, folder, "");
+    if (!rc && cli.json) {
+        j = cli_json();
+        json_text(&j, "folder", folder);
+        bend_put_stats(&j, &s);
+    }
+    if (!rc) rc = bend_view(bend, folder, "", cli.json ? &j : NULL);
+    if (j.file) cli_json_end(&j);
+    if (!rc && s.traced < s.rays)
+        cli_say("%llu of %llu rays are lost and not drawn as spots: 'bend trace' counts "
+                "the reasons",
+                (unsigned long long)(s.rays - s.traced), (unsigned long long)s.rays);
     if (!rc) cli_say("pictures in %s", folder);
     return rc;
 }

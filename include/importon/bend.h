@@ -449,6 +449,10 @@ IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_set_wavelength(imp_bend *bend, int bundle, const struct imp_dispersion *d,
                         double um);
 
+/** The wavelength in micrometres of a bundle, 0 if it was given none: its rays see the
+ * index as it is. */
+IMP_API double imp_bend_wavelength(const imp_bend *bend, int bundle);
+
 enum imp_bend_target_type {
     IMP_BEND_FOCUS = 0,  /**< mean |x - point|^2/2 */
     IMP_BEND_SPOT,       /**< mean |x - centroid|^2/2 */

@@ -38,7 +38,8 @@ void imp_bend_destroy(imp_bend *b)
     void *const owned[] = {
         b->surfaces, b->taps,         b->x,       b->d,     b->power,
         b->group,    b->bundle_first, b->targets, b->holds, b->smooths,
-        b->sdfs,     b->scenes,       b->history, b->rows,  b->dispersion};
+        b->sdfs,     b->scenes,       b->history, b->rows,  b->dispersion,
+        b->um};
     for (size_t i = 0; i < imp_count(owned); i++) imp__release(ctx, owned[i]);
     imp_field_destroy(b->field);
     imp__release(ctx, b);

@@ -47,6 +47,8 @@ struct imp_bend {
 
     double *dispersion; /* [cap_dispersion] factor of eta - 1 by bundle; NULL: all 1 */
     size_t cap_dispersion;
+    double *um; /* [cap_um] wavelength by bundle in micrometres; 0: none was given */
+    size_t cap_um;
 
     size_t n_targets, cap_targets;
     struct imp__target_of_rays *targets;

@@ -123,11 +123,22 @@ enum imp_status imp_bend_set_wavelength(imp_bend *b, int bundle,
     const size_t old = b->cap_dispersion, n_bundles = (size_t)b->n_bundles;
     double *grown =
         imp__grow(b->ctx, b->dispersion, &b->cap_dispersion, n_bundles, sizeof *grown);
-    if (!grown) return imp__error(b->ctx, IMP_E_NOMEM, "no memory for wavelengths");
-    b->dispersion = grown;
-    for (size_t i = old; i < b->cap_dispersion; i++) grown[i] = 1;
+    if (grown) {
+        b->dispersion = grown;
+        for (size_t i = old; i < b->cap_dispersion; i++) grown[i] = 1;
+    }
+    double *um_grown = imp__grow(b->ctx, b->um, &b->cap_um, n_bundles, sizeof *b->um);
+    if (um_grown) b->um = um_grown;
+    if (!grown || !um_grown)
+        return imp__error(b->ctx, IMP_E_NOMEM, "no memory for wavelengths");
     grown[bundle] = k;
+    b->um[bundle] = um;
     return IMP_OK;
+}
+
+double imp_bend_wavelength(const imp_bend *b, int bundle)
+{
+    return bundle >= 0 && (size_t)bundle < b->cap_um ? b->um[bundle] : 0;
 }
 
 double imp__bend_factor(const imp_bend *b, const struct imp_bend_rays *rays, size_t i)
