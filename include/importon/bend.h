@@ -518,7 +518,9 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_bend_hold_number(imp_bend *bend, size
 
 /** Objective and its gradient with respect to all numbers of the field (held ones: 0).
  * The rays are fixed, so both are exact: no standard error belongs to them. gradient
- * [n_theta], stats may be NULL. targets [n targets]: their parts; may be NULL. */
+ * [n_theta], stats may be NULL. targets [n targets]: their parts; may be NULL.
+ * @return IMP_OK, also if a part of the rays is lost (look at stats); IMP_E_NUMERIC if no
+ * ray comes to its end (stats is set); IMP_E_ARG; IMP_E_NOMEM; IMP_CANCELLED. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_objective(imp_bend *bend, double *value,
                                                           double *gradient,
                                                           double *targets,
@@ -591,18 +593,20 @@ imp_bend_fit(imp_bend *bend, const struct imp_bend_fit_options *options,
              struct imp_bend_fit_result *result);
 
 /**
- * Check a problem as it stands: splat against tangent ("transpose"), reverse against
- * forward
- * ("dot"), the gradient against central differences of steps 1e-2 to 1e-8 ("difference"),
- * reversal, energy, and the error of the step by halving it ("step": value is the rms
- * change of exits, reference the change at half the step, error the error left). Rows
- * belong to the bend until its next check. @return IMP_OK also when rows fail: look at
- * `ok`.
+ * Check a problem as it stands: how many rays come to their end ("rays": value of
+ * reference, error the part that is lost), splat against tangent ("transpose"), reverse
+ * against forward ("dot"), the gradient against central differences of steps 1e-2 to 1e-8
+ * ("difference"), reversal, energy, and the error of the step by halving it ("step": value
+ * is the order seen, error the rms error of exits). Rows belong to the bend until its next
+ * check.
+ * @return IMP_OK also when rows fail: look at `ok`; IMP_E_NUMERIC if no ray comes to its
+ * end: nothing was checked.
  */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_check(imp_bend *bend, const struct imp_check_row **rows, size_t *n_rows);
-/** Error of exits by the step, from up to `pilots` rays traced with t, t/2, t/4: rms over
- * rays, and the order seen (0: not to be seen). Outputs may be NULL. */
+/** Error of exits by the step, from about `pilots` rays traced with t, t/2, t/4: rms over
+ * rays, and the order seen (0: not to be seen). Outputs may be NULL.
+ * @return IMP_E_NUMERIC if no ray comes to its end with all three steps. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_step_error(imp_bend *bend, size_t pilots,
                                                            double *error, double *order);
 

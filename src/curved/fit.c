@@ -25,7 +25,7 @@ struct fit {
     imp_field *coarse;
     size_t *coarse_at; /* [last->n] */
     bool carries;
-    int level, levels, done_iterations;
+    int level, levels, done_iterations, n_evaluated;
     double fraction_lo, fraction_hi, start_s, last_report_s, last_checkpoint_s;
     double last_value, best_value, rays_done;
     struct imp_bend_stats stats;
@@ -80,7 +80,12 @@ static enum imp_status goal_eval(const double *x, uint64_t seed, struct imp_esti
     double value = 0;
     if (st != IMP_OK) return st;
     st = imp_bend_objective(f->b, &value, g ? f->bar : NULL, NULL, &f->stats);
+    if (st == IMP_E_NUMERIC && f->o->optimizer == IMP_LBFGS && f->n_evaluated > 0) {
+        value = INFINITY; /* every ray is lost: the line search takes a shorter step */
+        st = IMP_OK;
+    }
     if (st != IMP_OK) return st;
+    f->n_evaluated++;
     f->rays_done += (double)f->b->n;
     f->last_value = value;
     if (value < f->best_value) f->best_value = value;
@@ -324,15 +329,6 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
         f.level = 0;
         IMP_TRY(level_begin(&f));
         IMP_TRY(imp_bend_objective(b, &start, NULL, NULL, &f.stats));
-        if (f.stats.traced == 0)
-            IMP_TRY(imp__error(
-                b->ctx, IMP_E_NUMERIC,
-                "none of %llu rays comes to its end: %llu start outside "
-                "the field, %llu leave it without an exit, %llu take more "
-                "than max_steps, %llu graze, %llu are broken",
-                (unsigned long long)f.stats.rays, (unsigned long long)f.stats.started_out,
-                (unsigned long long)f.stats.missed, (unsigned long long)f.stats.truncated,
-                (unsigned long long)f.stats.grazing, (unsigned long long)f.stats.broken));
         traced = f.stats.traced;
     }
     for (int level = first; level < f.levels && st == IMP_OK; level++) {

@@ -142,6 +142,44 @@ static void lost(void)
     imp_bend_destroy(b);
 }
 
+/* A value or a check over no rays is an error, whose counts say why; over a part of them
+ * it stands for that part, and how large it is can be read. */
+static void none(void)
+{
+    imp_bend *b = load(PROBLEM("2", "leapfrog", GRID("1.3", ""), "", FOCUS));
+    struct imp_bend_stats s = IMP_BEND_STATS_INIT;
+    const struct imp_check_row *rows;
+    double value, error, order;
+    size_t n;
+    enum imp_status st = imp_bend_objective(b, &value, NULL, NULL, &s);
+    tap_ok(st == IMP_E_NUMERIC && strstr(imp_last_error(kit_ctx), "none of 40 rays") &&
+               s.started_out == 40 && s.traced == 0,
+           "an objective of no rays is refused # %s", imp_last_error(kit_ctx));
+    st = imp_bend_check(b, &rows, &n);
+    tap_ok(st == IMP_E_NUMERIC && strstr(imp_last_error(kit_ctx), "none of 40 rays"),
+           "a check of no rays is refused # %s", imp_last_error(kit_ctx));
+    st = imp_bend_step_error(b, 200, &error, &order);
+    tap_ok(st == IMP_E_NUMERIC, "no error of the step without rays # %s",
+           imp_last_error(kit_ctx));
+    imp_bend_destroy(b);
+
+    b = load(PROBLEM("-0.6", "leapfrog", GRID("1.3", ""),
+                     "<surface type='disc'><float name='radius' value='0.3'/>"
+                     "<string name='event' value='stop'/></surface>",
+                     FOCUS));
+    KIT_CHECK(imp_bend_objective(b, &value, NULL, NULL, &s));
+    KIT_CHECK(imp_bend_check(b, &rows, &n));
+    size_t at = 0;
+    while (at < n && strcmp(rows[at].method, "rays")) at++;
+    tap_ok(at < n && s.traced > 0 && s.traced < s.rays &&
+               rows[at].value == (double)s.traced && rows[at].reference == 40 &&
+               fabs(rows[at].error - (double)(s.rays - s.traced) / 40) < 1e-12,
+           "a check says how many rays it stands for # %d of 40", (int)s.traced);
+    KIT_CHECK(imp_bend_step_error(b, 1, &error, &order)); /* the first ray is lost */
+    tap_ok(isfinite(error), "pilot rays that are lost are replaced # %.1e", error);
+    imp_bend_destroy(b);
+}
+
 static void bounds(void)
 {
     imp_bend *b = load(PROBLEM("-0.6", "leapfrog", GRID("0.5", ""), "", FOCUS));
@@ -180,6 +218,7 @@ int main(void)
     if (imp_context_create(&o, &kit_ctx) != IMP_OK) return 1;
     verdicts();
     lost();
+    none();
     bounds();
     picture();
     imp_context_destroy(kit_ctx);
