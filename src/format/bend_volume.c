@@ -230,6 +230,12 @@ enum imp_status bend_volume(struct bend_loader *l, struct imp_node *node, imp_fi
         if (grid) IMP_TRY(symmetry_read(l, node, &symmetry, &tied));
         if (file) {
             const char *path;
+            if (imp__props_has(node, "index") || imp__props_has(node, "cells"))
+                IMP_TRY(
+                    imp__node_error(l->ctx, node, IMP_E_SCENE,
+                                    "has a 'filename', which gives the index and its "
+                                    "cells, and '%s' as well",
+                                    imp__props_has(node, "index") ? "index" : "cells"));
             IMP_TRY(bend_placed(l, node, imp__search(l->scene, NULL, file, &path)));
             IMP_TRY(
                 bend_placed(l, node, imp_field_read(l->ctx, path, grid ? &g : NULL, &f)));
