@@ -364,7 +364,8 @@ struct imp_bend_cotangent {
 struct imp_bend_gradient {
     size_t size;
     double *theta;           /**< [n_theta] */
-    double (*x)[3], (*d)[3]; /**< [n] origins, directions (tangent to the unit sphere) */
+    double (*x)[3], (*d)[3]; /**< [n] origins; directions as given: a ray depends on d/|d|
+                                  alone, so this is across d and falls as 1/|d| */
     double (*surfaces)[8];   /**< [n_surfaces]: 0-2 normal (plane) or centre, 3 offset or
                                   radius, 4 index outside; not for box, SDF and mesh */
     double *energy;          /**< [n] K = lam.v + mu.F at the start: 0 up to truncation */
@@ -596,9 +597,9 @@ imp_bend_fit(imp_bend *bend, const struct imp_bend_fit_options *options,
  * Check a problem as it stands: how many rays come to their end ("rays": value of
  * reference, error the part that is lost), splat against tangent ("transpose"), reverse
  * against forward ("dot"), the gradient against central differences of steps 1e-2 to 1e-8
- * ("difference"), reversal, energy, and the error of the step by halving it ("step": value
- * is the order seen, error the rms error of exits). Rows belong to the bend until its next
- * check.
+ * ("difference"), reversal, energy, and the error of the step by halving it ("step":
+ * value is the order seen, error the rms error of exits). Rows belong to the bend until
+ * its next check.
  * @return IMP_OK also when rows fail: look at `ok`; IMP_E_NUMERIC if no ray comes to its
  * end: nothing was checked.
  */
