@@ -36,10 +36,9 @@ void imp_bend_destroy(imp_bend *b)
     for (size_t i = 0; i < b->n_sdfs; i++) imp_field_destroy(b->sdfs[i]);
     for (size_t i = 0; i < b->n_scenes; i++) imp_scene_destroy(b->scenes[i]);
     void *const owned[] = {
-        b->surfaces, b->taps,         b->x,       b->d,     b->power,
-        b->group,    b->bundle_first, b->targets, b->holds, b->smooths,
-        b->sdfs,     b->scenes,       b->history, b->rows,  b->dispersion,
-        b->um};
+        b->surfaces,     b->taps,    b->x,          b->d,       b->power, b->group,
+        b->bundle_first, b->targets, b->holds,      b->smooths, b->sdfs,  b->scenes,
+        b->history,      b->rows,    b->dispersion, b->um};
     for (size_t i = 0; i < imp_count(owned); i++) imp__release(ctx, owned[i]);
     imp_field_destroy(b->field);
     imp__release(ctx, b);
@@ -229,6 +228,7 @@ enum imp_status imp_bend_add_target(imp_bend *b, const struct imp_bend_target *d
     for (size_t i = t.first; i < t.last; i++) t.power += b->power[i];
     if (!(t.power > 0))
         IMP_TRY(imp__error(ctx, IMP_E_ARG, "target of rays without power"));
+    t.n_data = n;
     if (n > 0) {
         t.data = imp__alloc(ctx, n, sizeof *t.data);
         if (!t.data) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a target"));

@@ -9,7 +9,8 @@
 
 struct imp__target_of_rays {
     struct imp_bend_target desc; /* data, pixels point to copies */
-    double *data;
+    double *data;                /* [n_data] */
+    size_t n_data;
     float *pixels;      /* divided by their mean */
     size_t first, last; /* rays */
     double power;       /* of these rays together */

@@ -32,6 +32,9 @@ static void hear(enum imp_log_level level, const char *text, void *payload)
 #define PLUME                                                                            \
     "<volume type='plume'><float name='n0' value='1.2'/><float name='b' value='0.2'/>"   \
     "<float name='width' value='0.5'/></volume>"
+#define LENS                                                                             \
+    "<volume type='plume' name='start'><float name='n0' value='1.2'/>"                   \
+    "<float name='b' value='0.2'/><float name='width' value='0.5'/></volume>"
 #define SINGLE "<boolean name='single' value='true'/>"
 
 static imp_bend *load(const char *xml)
@@ -180,6 +183,47 @@ static void none(void)
     imp_bend_destroy(b);
 }
 
+/* A fit that goes on from a checkpoint has the start of one that was never stopped, also
+ * where the search began by moving numbers into their bounds; other problems are refused.
+ */
+static void resumed(void)
+{
+    static const char *const xml[3] = {
+        PROBLEM("-0.6", "leapfrog", GRID("1.3", LENS),
+                "<float name='index_min' value='1.3'/>", FOCUS),
+        PROBLEM("-0.6", "leapfrog", GRID("1.3", LENS),
+                "<float name='index_min' value='1.31'/>", FOCUS),
+        PROBLEM("-0.6", "leapfrog", GRID("1.3", LENS),
+                "<float name='index_min' value='1.3'/>",
+                "<target type='focus'><point name='point' value='0,0,0.9'/>"
+                "<float name='plane' value='0.95'/></target>")};
+    struct imp_bend_fit_options o = IMP_BEND_FIT_OPTIONS_INIT;
+    struct imp_bend_fit_result r[2];
+    enum imp_status st[3];
+    bool moved = false;
+    o.checkpoint = "bend_check.checkpoint";
+    remove(o.checkpoint);
+    for (int k = 0; k < 2; k++) {
+        imp_bend *b = load(xml[0]);
+        o.iterations[0] = k == 0 ? 3 : 6;
+        o.resume = k;
+        KIT_CHECK(imp_bend_fit(b, &o, &r[k]));
+        moved |= k == 0 && r[0].history[0] != r[0].start;
+        imp_bend_destroy(b);
+    }
+    tap_ok(moved && r[1].start == r[0].start && r[1].n_history > r[0].n_history,
+           "a resumed fit has the same start # %.9g %.9g", r[0].start, r[1].start);
+    for (int k = 1; k < 3; k++) {
+        imp_bend *b = load(xml[k]);
+        st[k] = imp_bend_fit(b, &o, &r[1]);
+        imp_bend_destroy(b);
+    }
+    tap_ok(st[1] == IMP_E_ARG && st[2] == IMP_E_ARG,
+           "a checkpoint of other bounds or targets is refused # %s",
+           imp_last_error(kit_ctx));
+    remove(o.checkpoint);
+}
+
 static void bounds(void)
 {
     imp_bend *b = load(PROBLEM("-0.6", "leapfrog", GRID("0.5", ""), "", FOCUS));
@@ -219,6 +263,7 @@ int main(void)
     verdicts();
     lost();
     none();
+    resumed();
     bounds();
     picture();
     imp_context_destroy(kit_ctx);
