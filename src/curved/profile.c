@@ -34,13 +34,16 @@ static void constant_at(const double *p, double u, struct shape_at *s)
     s->f = p[0];
     s->fp[0] = 1;
 }
-/* sqrt(2 - r^2/R^2) inside R, 1 outside */
+/* sqrt(2 - r^2/R^2) inside R, 1 outside. The gradient jumps at R. Rays that start or end
+ * there are inside to rounding, and a scheme that begins or ends with a kick evaluates it
+ * there: on the rim it is the inside's, or such a scheme would be of first order. */
+#define RIM 1e-12
 static void luneburg_at(const double *p, double u, struct shape_at *s)
 {
     const double R = p[0], q = u / (R * R);
     s->f = 1;
-    if (q >= 1) return;
-    const double f = sqrt(2 - q);
+    if (q > 1 + RIM) return;
+    const double f = q < 1 ? sqrt(2 - q) : 1;
     s->f = f;
     s->f1 = -0.5 / (f * R * R);
     s->f2 = s->f1 * 0.5 / (f * f * R * R);
