@@ -594,12 +594,12 @@ imp_bend_fit(imp_bend *bend, const struct imp_bend_fit_options *options,
              struct imp_bend_fit_result *result);
 
 /**
- * Check a problem as it stands: how many rays come to their end ("rays": value of
- * reference, error the part that is lost), splat against tangent ("transpose"), reverse
- * against forward ("dot"), the gradient against central differences of steps 1e-2 to 1e-8
- * ("difference"), reversal, energy, and the error of the step by halving it ("step":
- * value is the order seen, error the rms error of exits). Rows belong to the bend until
- * its next check.
+ * Check a problem as it stands: splat against tangent ("transpose"), reverse against
+ * forward ("dot"), the gradient against central differences of steps 1e-2 to 1e-8
+ * ("difference"), reversal, energy, the error of the step by halving it ("step": value is
+ * the order seen, error the rms error of exits), and how many rays come to their end
+ * ("rays": value of reference, error the part that is lost). Rows belong to the bend
+ * until its next check.
  * @return IMP_OK also when rows fail: look at `ok`; IMP_E_NUMERIC if no ray comes to its
  * end: nothing was checked.
  */

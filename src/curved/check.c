@@ -101,11 +101,12 @@ static enum imp_status check_transpose(imp_bend *b, const double *dot, double *b
                                              .limit = 1e-12});
 }
 
-static enum imp_status check_dot(imp_bend *b, const double *dot, double *bar)
+static enum imp_status check_dot(imp_bend *b, const double *dot, double *bar,
+                                 struct imp_bend_stats *traced)
 {
     enum imp_status st = IMP_OK;
     struct imp_bend_options o;
-    struct imp_bend_stats stats = IMP_BEND_STATS_INIT, traced = IMP_BEND_STATS_INIT;
+    struct imp_bend_stats stats = IMP_BEND_STATS_INIT;
     const struct imp_bend_rays r = imp__bend_rays(b);
     const size_t taps = b->n * b->options.n_taps;
     struct imp_bend_exit *e = imp__alloc(b->ctx, b->n, sizeof *e);
@@ -116,14 +117,8 @@ static enum imp_status check_dot(imp_bend *b, const double *dot, double *bar)
     if (!e || !te || !c)
         IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "no memory for a check"));
     IMP_TRY(imp_bend_get_options(b, &o));
-    IMP_TRY(imp__bundles_trace(b, b->field, &o, &r, e, te, &traced));
-    IMP_TRY(imp__bend_traced(b, &traced));
-    IMP_TRY(row_add(b, (struct imp_check_row){.method = "rays",
-                                              .param = "come to their end",
-                                              .value = (double)traced.traced,
-                                              .reference = (double)b->n,
-                                              .error = 1 - (double)traced.traced /
-                                                               (double)b->n}));
+    IMP_TRY(imp__bundles_trace(b, b->field, &o, &r, e, te, traced));
+    IMP_TRY(imp__bend_traced(b, traced));
     for (size_t i = 0; i < b->n; i++) {
         for (int k = 0; k < 3; k++)
             c[i].x[k] = random_pm(4 + (uint64_t)k, i),
@@ -285,19 +280,26 @@ enum imp_status imp_bend_check(imp_bend *b, const struct imp_check_row **rows,
     enum imp_status st = IMP_OK;
     const size_t n = b->field->n_theta;
     double *dot = imp__alloc(b->ctx, 2 * n + 1, sizeof *dot), *bar = dot ? dot + n : NULL;
+    struct imp_bend_stats traced = IMP_BEND_STATS_INIT;
     double error, order;
     if (!dot) return imp__error(b->ctx, IMP_E_NOMEM, "no memory for a check");
     if (b->n == 0) IMP_TRY(imp__error(b->ctx, IMP_E_ARG, "a problem without rays"));
     b->n_rows = 0;
     for (size_t i = 0; i < n; i++) dot[i] = random_pm(11, i);
     IMP_TRY(check_transpose(b, dot, bar));
-    IMP_TRY(check_dot(b, dot, bar));
+    IMP_TRY(check_dot(b, dot, bar, &traced));
     if (b->n_targets > 0) IMP_TRY(check_differences(b, dot, bar));
     IMP_TRY(imp_bend_step_error(b, 200, &error, &order));
     IMP_TRY(row_add(b, (struct imp_check_row){.method = "step",
                                               .param = "rms of exits",
                                               .value = order,
                                               .error = error}));
+    const double all = (double)b->n;
+    IMP_TRY(row_add(b, (struct imp_check_row){.method = "rays",
+                                              .param = "come to their end",
+                                              .value = (double)traced.traced,
+                                              .reference = all,
+                                              .error = 1 - (double)traced.traced / all}));
     *rows = b->rows;
     *n_rows = b->n_rows;
 out:
