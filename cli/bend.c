@@ -33,7 +33,10 @@ static int load(const char *path)
     lo.n_defines = cli.defines.n;
     if (cli.search) lo.search = &cli.search, lo.n_search = 1;
     const enum imp_status st = imp_bend_load(cli.context, path, &lo, &bend);
-    if (st == IMP_OK) return 0;
+    if (st == IMP_OK) {
+        imp_bend_set_progress(bend, progress_report, NULL);
+        return 0;
+    }
     rc = cli_fail(st, NULL);
     return st == IMP_E_IO ? EXIT_USAGE : rc;
 }

@@ -136,6 +136,7 @@ int bend_fit(imp_bend *bend)
     if (cli_failed(st)) return cli_fail(st, cli.scene_path);
     const double seconds = cli_now() - start;
     progress_clear();
+    progress_resume(); /* what is there is drawn and written, also after Ctrl-C */
     if (cli.json) {
         struct json j = cli_json();
         json_number(&j, "start", r.start);

@@ -416,6 +416,11 @@ IMP_API imp_field *imp_bend_field(imp_bend *bend);
  * grid: min(step_max, step_cells * cell), see imp_bend_set_step. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_set_options(imp_bend *bend, const struct imp_bend_options *o);
+/** Called while the rays of imp_bend_objective, _run, _check, _step_error, _arrivals and
+ * _image are traced: nonzero stops them with IMP_CANCELLED. NULL: none. The same as
+ * `progress` of the options. A fit calls its own instead. */
+IMP_API void imp_bend_set_progress(imp_bend *bend, imp_progress_fn progress,
+                                   void *payload);
 /** The step when options.step is 0: cells * spacing, at most `most` (0: no limit). */
 IMP_API void imp_bend_set_step(imp_bend *bend, double cells, double most);
 

@@ -79,6 +79,12 @@ enum imp_status imp_bend_set_options(imp_bend *b, const struct imp_bend_options 
     return IMP_OK;
 }
 
+void imp_bend_set_progress(imp_bend *b, imp_progress_fn progress, void *payload)
+{
+    b->options.progress = progress;
+    b->options.progress_payload = payload;
+}
+
 void imp_bend_set_step(imp_bend *b, double cells, double most)
 {
     b->step_cells = cells;

@@ -340,6 +340,7 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
     double start = 0, value = 0;
     bool found = false;
 
+    const imp_progress_fn progress = b->options.progress;
     if (f.levels > IMP_BEND_LEVELS_MAX)
         return imp__error(b->ctx, IMP_E_ARG, "%d levels: at most %d", f.levels,
                           IMP_BEND_LEVELS_MAX);
@@ -353,6 +354,7 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
         return imp__error(b->ctx, IMP_E_ARG, "levels are for grids, not for a %s field",
                           b->field->ops->name);
     b->n_history = 0;
+    b->options.progress = NULL; /* a search is stopped between its iterations only */
     IMP_TRY(level_begin(&f));
     /* Before the search moves what lies outside its bounds: a resumed fit has the same.
      */
@@ -400,6 +402,7 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
     }
     st = ended;
 out:
+    b->options.progress = progress;
     last_free(&f);
     level_free(&f);
     return st;

@@ -9,7 +9,7 @@
 #include <string.h>
 
 #define GOLDEN_ANGLE 2.39996322972865332
-#define RAYS_MAX     100000000
+#define RAYS_MAX     20000000 /* of a file: 160 bytes each, before they are traced */
 
 /* Axes so that x and y are those of the world for z = (0, 0, 1). */
 static struct bend_frame frame_of(imp_v3 origin, imp_v3 direction)
@@ -191,6 +191,11 @@ enum imp_status bend_rays(struct bend_loader *l, struct imp_node *node)
         IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "has no direction"));
     IMP_TRY(wavelengths_read(l, node, um, &n_um));
     const int64_t n = directions > 0 ? directions : views > 0 ? views : 1;
+    const int64_t all = n * imp_max(n_um, 1) * b.count + (int64_t)l->bend->n;
+    if (all > RAYS_MAX)
+        IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE,
+                                "makes %lld rays in all: at most %d are read from a file",
+                                (long long)all, RAYS_MAX));
     for (int64_t i = 0; i < n; i++) {
         imp_v3 dir = imp__v3_load(direction);
         if (directions > 0) {
