@@ -113,18 +113,20 @@ bool imp__facet(const struct imp__surface *s, const imp_v3 *a, const imp_v3 *b,
 bool imp__surface_covers(const struct imp__surface *s, const imp_v3 *x);
 
 /* Momentum v through a surface at unit normal n into index e2 (curved-rays 3.5). */
-struct imp__turn {
+struct imp__bend_turn {
     imp_v3 v;
     bool reflected;
     double a, q, c, sign;
 };
-void imp__turn(const imp_v3 *n, const imp_v3 *v, double e2, bool mirror,
-               struct imp__turn *out);
+void imp__bend_turn(const imp_v3 *n, const imp_v3 *v, double e2, bool mirror,
+                    struct imp__bend_turn *out);
 /* Cotangents of v', -> of v, n, e2. */
-void imp__turn_vjp(const struct imp__turn *t, const imp_v3 *n, const imp_v3 *v, double e2,
-                   const imp_v3 *bar, imp_v3 *v_bar, imp_v3 *n_bar, double *e2_bar);
-void imp__turn_jvp(const struct imp__turn *t, const imp_v3 *n, const imp_v3 *v, double e2,
-                   const imp_v3 *v_dot, const imp_v3 *n_dot, double e2_dot, imp_v3 *dot);
+void imp__bend_turn_vjp(const struct imp__bend_turn *t, const imp_v3 *n, const imp_v3 *v,
+                        double e2, const imp_v3 *bar, imp_v3 *v_bar, imp_v3 *n_bar,
+                        double *e2_bar);
+void imp__bend_turn_jvp(const struct imp__bend_turn *t, const imp_v3 *n, const imp_v3 *v,
+                        double e2, const imp_v3 *v_dot, const imp_v3 *n_dot,
+                        double e2_dot, imp_v3 *dot);
 
 /* ---- Plans: options made ready ------------------------------------------------- */
 

@@ -156,13 +156,13 @@ static inline void imp__eta2_jvp(const struct imp__jet *at, struct imp__jet *j)
 /* Cubic B-splines on one axis: numbers first .. first + 3 at local coordinate t of
  * `cells` cells, values and derivatives times inv_h, inv_h^2. Beyond the ends the
  * outermost polynomial goes on. */
-struct imp__basis {
+struct imp__bend_basis {
     int first;
     double b[4], d[4], dd[4];
 };
-static inline struct imp__basis imp__basis_of(double t, int cells, double inv_h)
+static inline struct imp__bend_basis imp__bend_basis_of(double t, int cells, double inv_h)
 {
-    struct imp__basis s;
+    struct imp__bend_basis s;
     s.first = (int)imp_clamp(t, 0.0, (double)(cells - 1));
     const double u = t - s.first, m = 1 - u, k = inv_h;
     s.b[0] = m * m * m / 6;

@@ -45,11 +45,11 @@ static void turn_back(struct imp__adjoint_slot *slot, const struct imp__surface 
 {
     const double length = imp__length(gx);
     const imp_v3 n = gx * (1 / length);
-    struct imp__turn turn;
+    struct imp__bend_turn turn;
     imp_v3 v_bar, n_bar, m, curved;
     double e2_bar;
-    imp__turn(&n, &v_in, e2, mirror, &turn);
-    imp__turn_vjp(&turn, &n, &v_in, e2, mu, &v_bar, &n_bar, &e2_bar);
+    imp__bend_turn(&n, &v_in, e2, mirror, &turn);
+    imp__bend_turn_vjp(&turn, &n, &v_in, e2, mu, &v_bar, &n_bar, &e2_bar);
     m = (n_bar - n * imp__dot(n, n_bar)) * (1 / length);
     imp__surface_hess(s, &x, &m, &curved);
     *lam += curved;

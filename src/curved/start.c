@@ -136,11 +136,11 @@ void imp__start_ray(const struct imp__plan *p, const struct imp_bend_rays *rays,
         imp__field_eval1(p->field, &s->at.x, 1, &s->jet);
         if (s->entry->event == IMP_BEND_REFRACT) {
             struct imp__surface_at at;
-            struct imp__turn turn;
+            struct imp__bend_turn turn;
             imp__surface_eval(imp__start_entry(s), &s->at.x, &s->at.v, &at);
             const imp_v3 n = imp__normalize(at.gx);
             if (fabs(imp__dot(n, s->d0)) < p->grazing) s->flags = IMP_BEND_GRAZING;
-            imp__turn(&n, &s->at.v, s->jet.eta, false, &turn);
+            imp__bend_turn(&n, &s->at.v, s->jet.eta, false, &turn);
             if (turn.reflected) s->flags = IMP_BEND_MISSED;
             s->at.v = turn.v;
         }

@@ -72,8 +72,8 @@ static bool event(const struct imp__plan *p, struct lane *l, const struct imp__s
         fabs(imp__dot(n, at->v)) < p->grazing * speed)
         l->flags |= IMP_BEND_GRAZING;
     if (s->event == IMP_BEND_REFRACT || s->event == IMP_BEND_MIRROR) {
-        struct imp__turn turn;
-        imp__turn(&n, &at->v, s->index, s->event == IMP_BEND_MIRROR, &turn);
+        struct imp__bend_turn turn;
+        imp__bend_turn(&n, &at->v, s->index, s->event == IMP_BEND_MIRROR, &turn);
         at->v = turn.v;
         if (turn.reflected && !(l->flags & IMP_BEND_DROPPED)) {
             l->flags |= IMP_BEND_REFLECTED;

@@ -253,8 +253,8 @@ static void snell(void)
         const double th = 1.55 * i / 100, e1 = i % 2 ? 1.5 : 1.0, e2 = i % 2 ? 1.0 : 1.5;
         const double c = i % 3 ? cos(th) : -cos(th);
         const imp_v3 v = imp__to_world(&fr, imp__v3(e1 * sin(th), 0, e1 * c));
-        struct imp__turn t;
-        imp__turn(&n, &v, e2, false, &t);
+        struct imp__bend_turn t;
+        imp__bend_turn(&n, &v, e2, false, &t);
         const imp_v3 local = imp__to_local(&fr, t.v);
         reflected += t.reflected;
         if (t.reflected != (e1 * sin(th) > e2)) worst = 1;
