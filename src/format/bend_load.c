@@ -8,12 +8,12 @@
 #include "xml.h"
 #include <string.h>
 
-static const struct bend_frame world = {
+static const struct imp__bendfile_frame world = {
     {0, 0, 0, 0}, {1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
 
-enum imp_status bend_number(struct bend_loader *l, struct imp_node *node,
-                            const char *name, double fallback, double lo, double hi,
-                            double *out)
+enum imp_status imp__bendfile_number(struct imp__bendfile *l, struct imp_node *node,
+                                     const char *name, double fallback, double lo,
+                                     double hi, double *out)
 {
     if (isnan(fallback) && !imp__props_has(node, name))
         return imp__node_error(l->ctx, node, IMP_E_SCENE, "needs the float '%s'", name);
@@ -28,7 +28,7 @@ enum imp_status bend_number(struct bend_loader *l, struct imp_node *node,
 
 /* What `from_truth` targets want: the exits of the same rays through the other field,
  * traced well. */
-static enum imp_status truth_trace(struct bend_loader *l, struct imp_bend_exit **out)
+static enum imp_status truth_trace(struct imp__bendfile *l, struct imp_bend_exit **out)
 {
     struct imp_bend_rays r;
     struct imp_bend_options o = l->options;
@@ -55,7 +55,7 @@ static enum imp_status truth_trace(struct bend_loader *l, struct imp_bend_exit *
     return IMP_OK;
 }
 
-static enum imp_status truth_apply(struct bend_loader *l)
+static enum imp_status truth_apply(struct imp__bendfile *l)
 {
     enum imp_status st = IMP_OK;
     struct imp_bend_exit *e = NULL;
@@ -97,9 +97,9 @@ out:
     return st;
 }
 
-static enum imp_status each(struct bend_loader *l, struct imp_node *node, const char *tag,
-                            enum imp_status (*fn)(struct bend_loader *,
-                                                  struct imp_node *))
+static enum imp_status
+each(struct imp__bendfile *l, struct imp_node *node, const char *tag,
+     enum imp_status (*fn)(struct imp__bendfile *, struct imp_node *))
 {
     for (size_t i = 0; i < node->n_children; i++) {
         struct imp_child *c = &node->children[i];
@@ -111,19 +111,19 @@ static enum imp_status each(struct bend_loader *l, struct imp_node *node, const 
     return IMP_OK;
 }
 
-static enum imp_status surface_of_all(struct bend_loader *l, struct imp_node *node)
+static enum imp_status surface_of_all(struct imp__bendfile *l, struct imp_node *node)
 {
-    return bend_surface(l, node, &world, -1);
+    return imp__bendfile_surface(l, node, &world, -1);
 }
-static enum imp_status target_of_all(struct bend_loader *l, struct imp_node *node)
+static enum imp_status target_of_all(struct imp__bendfile *l, struct imp_node *node)
 {
-    return bend_target(l, node, &world, -1);
+    return imp__bendfile_target(l, node, &world, -1);
 }
 
 /* An index below its bound (1 if nothing is said) is often a mistake, of a file's scale
  * say, and a fit would begin with correcting it. A few coefficients of a spline may be
  * below what its values never are. */
-static enum imp_status bounds_look(struct bend_loader *l, const struct imp_node *medium)
+static enum imp_status bounds_look(struct imp__bendfile *l, const struct imp_node *medium)
 {
     const size_t n = l->bend->field->n_theta;
     double *theta = imp__alloc(l->ctx, 3 * n + 1, sizeof *theta);
@@ -144,7 +144,7 @@ static enum imp_status bounds_look(struct bend_loader *l, const struct imp_node 
     return IMP_OK;
 }
 
-static enum imp_status build(struct bend_loader *l)
+static enum imp_status build(struct imp__bendfile *l)
 {
     enum imp_status st = IMP_OK;
     struct imp_node *root = l->scene->root, *medium = NULL;
@@ -159,23 +159,24 @@ static enum imp_status build(struct bend_loader *l)
     if (!medium)
         IMP_TRY(imp__node_error(l->ctx, root, IMP_E_SCENE,
                                 "has no <medium type=\"graded\">"));
-    IMP_TRY(bend_medium(l, medium));
+    IMP_TRY(imp__bendfile_medium(l, medium));
     IMP_TRY(each(l, root, "surface", surface_of_all));
     IMP_TRY(each(l, medium, "surface", surface_of_all));
-    IMP_TRY(each(l, root, "rays", bend_rays));
+    IMP_TRY(each(l, root, "rays", imp__bendfile_rays));
     if (imp_bend_n_rays(l->bend) == 0)
         IMP_TRY(imp__node_error(l->ctx, root, IMP_E_SCENE, "has no <rays>"));
     l->options.surfaces = l->surfaces, l->options.n_surfaces = l->n_surfaces;
     l->options.taps = l->taps, l->options.n_taps = l->n_taps;
     IMP_TRY(imp_bend_set_options(l->bend, &l->options));
-    IMP_TRY(bend_rules(l, medium));
+    IMP_TRY(imp__bendfile_rules(l, medium));
     IMP_TRY(each(l, root, "target", target_of_all));
     for (int b = 0; b < imp_bend_n_bundles(l->bend); b++) {
         struct imp_node *rays = l->nodes[b];
         for (size_t i = 0; i < rays->n_children; i++)
             if (strcmp(rays->children[i].node->tag, "target") == 0) {
                 rays->children[i].used = true;
-                IMP_TRY(bend_target(l, rays->children[i].node, &l->frames[b], b));
+                IMP_TRY(
+                    imp__bendfile_target(l, rays->children[i].node, &l->frames[b], b));
             }
     }
     IMP_TRY(truth_apply(l));
@@ -193,7 +194,7 @@ static enum imp_status load(imp_context *ctx, const struct imp_bytes *text,
                             const struct imp_load_options *o, imp_bend **out)
 {
     enum imp_status st = IMP_OK;
-    struct bend_loader l = {.ctx = ctx};
+    struct imp__bendfile l = {.ctx = ctx};
     IMP_TRY(imp__scene_new(ctx, o, folder, &l.scene));
     IMP_TRY(imp__xml_read(l.scene, text, name, o));
     IMP_TRY(build(&l));
