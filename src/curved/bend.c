@@ -192,7 +192,7 @@ static enum imp_status target_check(const imp_bend *b, const struct imp_bend_tar
     return IMP_OK;
 }
 
-static size_t data_size(enum imp_bend_target_type type)
+size_t imp__target_numbers(enum imp_bend_target_type type)
 {
     switch (type) {
     case IMP_BEND_POINTS:
@@ -218,7 +218,7 @@ enum imp_status imp_bend_add_target(imp_bend *b, const struct imp_bend_target *d
     struct imp__target_of_rays t = {.desc = *desc};
     t.first = desc->bundle < 0 ? 0 : b->bundle_first[desc->bundle];
     t.last = desc->bundle < 0 ? b->n : b->bundle_first[desc->bundle + 1];
-    const size_t n = (t.last - t.first) * data_size(desc->type);
+    const size_t n = (t.last - t.first) * imp__target_numbers(desc->type);
     const size_t n_pixels = desc->pixels ? (size_t)desc->width * (size_t)desc->height : 0;
     if (t.desc.weight == 0) t.desc.weight = 1;
     imp_v3 normal = imp__v3_load(desc->normal);

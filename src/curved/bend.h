@@ -134,6 +134,8 @@ imp__target_exit(const struct imp_bend_target *t, const struct imp_bend_exit *ex
     return t->tap < 0 ? &exits[i] : &taps[i * n_taps + (size_t)t->tap];
 }
 
+/* Numbers a ray of a target's data; 0: the type has none. */
+size_t imp__target_numbers(enum imp_bend_target_type type);
 /* Value of one target; adds cotangents to bars [n], tap_bars (NULL: value only). */
 enum imp_status imp__target_value(const imp_bend *b, const struct imp__target_of_rays *t,
                                   const struct imp_bend_exit *exits,

@@ -213,8 +213,7 @@ enum imp_status imp__profile_read(imp_context *ctx, const char *path,
                                   const struct imp_bytes *b, imp_field **out);
 enum imp_status imp__profile_write(const imp_field *f, const char *path);
 
-/* Profile kinds by index, NULL past the last; names of their numbers. */
-const char *imp__profile_kind(size_t i);
+/* Name of parameter i of a profile kind, NULL past the last. */
 const char *imp__profile_param(const char *kind, size_t i);
 
 #endif

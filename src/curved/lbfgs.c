@@ -97,10 +97,14 @@ static enum imp_status line(struct run *r, bool *found)
     const struct imp__goal *goal = r->goal;
     const size_t n = r->n;
     const double *x = s->array[X], *g = s->array[G];
-    double step = 1, f0 = s->scalar[VALUE], longest = 0;
-    for (size_t k = 0; k < n; k++) longest = fmax(longest, fabs(r->d[k]));
-    if (s->scalar[PAIRS] == 0) step = 0.1 * goal->scale[0] / fmax(longest, 1e-300);
-    else if (step * longest > 5 * goal->scale[0]) step = 5 * goal->scale[0] / longest;
+    double step = 1, f0 = s->scalar[VALUE], longest = 0, scale = goal->scale[0];
+    for (size_t k = 0; k < n; k++) { /* the longest component in units of its scale */
+        const double a = fabs(r->d[k]) * scale, b = longest * goal->scale[k];
+        if (a > b || (a == b && fabs(r->d[k]) > longest))
+            longest = fabs(r->d[k]), scale = goal->scale[k];
+    }
+    if (s->scalar[PAIRS] == 0) step = 0.1 * scale / fmax(longest, 1e-300);
+    else if (step * longest > 5 * scale) step = 5 * scale / longest;
     *found = false;
     for (int i = 0; i < TRIES; i++) {
         struct imp_estimate e;
@@ -124,7 +128,7 @@ static enum imp_status line(struct run *r, bool *found)
         const double curve = e.value - f0 - slope;
         double q = isfinite(curve) && curve > 0 ? -slope / (2 * curve) : 0.5;
         step *= imp_clamp(q, 0.1, 0.5);
-        if (step * longest < 1e-14 * goal->scale[0]) break;
+        if (step * longest < 1e-14 * scale) break;
     }
     return IMP_OK;
 }

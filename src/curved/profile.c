@@ -290,11 +290,6 @@ static int kind_find(const char *name)
     return -1;
 }
 
-const char *imp__profile_kind(size_t i)
-{
-    return i < imp_count(kinds) ? kinds[i].name : NULL;
-}
-
 const char *imp__profile_param(const char *kind, size_t i)
 {
     const int k = kind_find(kind);

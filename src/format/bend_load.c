@@ -75,20 +75,14 @@ static enum imp_status truth_apply(struct imp__bendfile *l)
             const size_t own = k - t->first;
             if (!imp__arrive(&t->desc, &e[k], &a)) continue;
             const imp_v3 d0 = imp__normalize(imp__v3_load(b->d[k]));
-            imp_v3 value = {0};
-            switch (t->desc.type) {
-            case IMP_BEND_POINTS: value = a.x; break;
-            case IMP_BEND_DIRECTIONS: value = a.d; break;
-            case IMP_BEND_DEFLECTION: value = a.v - d0 * imp__dot(d0, a.v); break;
-            case IMP_BEND_PATH: t->data[own] = a.path; continue;
-            case IMP_BEND_FOCUS:
-            case IMP_BEND_SPOT:
-            case IMP_BEND_DIRECTION:
-            case IMP_BEND_WAVEFRONT:
-            case IMP_BEND_IMAGE:
-            case IMP_BEND_FARFIELD:
-            case IMP_BEND_SHAPE: break;
+            if (imp__target_numbers(t->desc.type) == 1) {
+                t->data[own] = a.path;
+                continue;
             }
+            const imp_v3 value = t->desc.type == IMP_BEND_POINTS ? a.x
+                                 : t->desc.type == IMP_BEND_DIRECTIONS
+                                     ? a.d
+                                     : a.v - d0 * imp__dot(d0, a.v); /* deflection */
             imp__v3_store(value, t->data + 3 * own);
         }
     }
@@ -213,21 +207,10 @@ out:
 enum imp_status imp_bend_load(imp_context *ctx, const char *path,
                               const struct imp_load_options *options, imp_bend **out)
 {
-    enum imp_status st = IMP_OK;
-    struct imp_load_options o;
-    struct imp_bytes text = {0};
-    char *folder = NULL;
-    if (!path || !*path) return imp__error(ctx, IMP_E_ARG, "no file is named");
-    IMP_TRY(imp__load_options(ctx, options, &o));
-    IMP_TRY(imp__file_read(ctx, path, XML_FILE_BYTES_MAX, &text));
-    folder = imp__strdup(ctx, strchr(path, '/') ? path : ".");
-    if (!folder) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "%s: out of memory", path));
-    char *slash = strrchr(folder, '/');
-    if (slash) slash[slash == folder] = 0;
-    IMP_TRY(load(ctx, &text, path, folder, &o, out));
-out:
-    imp__release(ctx, folder);
-    imp__bytes_free(ctx, &text);
+    struct imp__load_file f;
+    enum imp_status st = imp__load_open(ctx, path, options, &f);
+    if (st == IMP_OK) st = load(ctx, &f.text, path, f.folder, &f.options, out);
+    imp__load_close(ctx, &f);
     return st;
 }
 
