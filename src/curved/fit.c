@@ -1,10 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
- *
- * Fits: the objective of a problem handed to inverse/'s optimisers, level by level. At
- * each level the grid is refined (the function stays the same), and what the optimiser
- * learnt goes along: a step of coarse numbers is, refined by P, one of fine numbers; a
- * derivative's share of a fine number is 1/8 of the coarse one's. Adam's rate is halved
- * explicitly. */
+ * Fits: a problem's objective is minimised level by level by the optimisers of
+ * src/search. Each level refines the grid without changing the function, and carries the
+ * optimiser's memory: steps are prolonged by P, gradients as well and scaled by 1/8 (a
+ * coarse coefficient's share goes to eight fine ones). Adam's rate is halved. */
 #include "bend.h"
 #include "lbfgs.h"
 #include "search/checkpoint.h"
@@ -19,9 +17,10 @@ struct fit {
     struct imp__fingerprint print;
     uint8_t *held;
     double *theta, *bar, *lo, *hi, *scale,
-        *x0;                  /* [n_theta], of active numbers where [n] */
-    size_t *at;               /* [n] index in theta */
-    struct imp__search *last; /* of the level before, and its grid: to be carried on */
+        *x0;    /* [n_theta], of active numbers where [n] */
+    size_t *at; /* [n] index in theta */
+    struct imp__search
+        *last; /* search and grid of the level before, whose memory is carried on */
     imp_field *coarse;
     size_t *coarse_at; /* [last->n] */
     bool carries;
@@ -231,7 +230,7 @@ static void last_free(struct fit *f)
     f->coarse_at = NULL;
 }
 
-/* Active numbers of the grid before -> of the grid now; held ones do not change. */
+/* Prolong active numbers of the coarse grid to those of the fine one; held ones are 0. */
 static enum imp_status carry_map(const double *in, double *out, void *payload)
 {
     const struct fit *f = payload;
@@ -293,7 +292,7 @@ out:
     return st;
 }
 
-/* The field of level `level`, as far as its shape goes. */
+/* Refine the field to the next level. */
 static enum imp_status refine(struct fit *f)
 {
     imp_field *fine;
@@ -344,7 +343,7 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
     if (f.levels > IMP_BEND_LEVELS_MAX)
         return imp__error(b->ctx, IMP_E_ARG, "%d levels: at most %d", f.levels,
                           IMP_BEND_LEVELS_MAX);
-    /* Adam's moments remember steeper days: begun anew it is the faster more often. */
+    /* Adam's moments are those of steeper gradients: begun anew it is usually faster. */
     f.carries = o->carry > 0 || (o->carry == 0 && o->optimizer == IMP_LBFGS);
     if (o->optimizer == IMP_LM)
         return imp__error(b->ctx, IMP_E_UNSUPPORTED,
@@ -379,7 +378,7 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
     }
     const enum imp_status ended = st;
     IMP_TRY(imp_bend_objective(b, &value, NULL, NULL, &f.stats));
-    /* What is not counted cannot be bad: a fit may lower a mean by losing rays. */
+    /* Lost rays are not in the objective, so a fit may lower it by losing rays. */
     if ((double)f.stats.traced < (double)traced - 0.01 * (double)f.stats.rays)
         imp__warn(
             b->ctx,

@@ -2,9 +2,9 @@
  *
  * L-BFGS with bounds for exact objectives (fixed rays): two-loop recursion over the
  * variables that are free, steps projected onto the bounds, backtracking by quadratic
- * interpolation (Bertsekas 1982 for the active set). NLopt's L-BFGS loses its way on
- * these problems: as curvature is negative in many directions its line search stays at a
- * few points and returns. State lives in inverse/'s search, so checkpoints are shared. */
+ * interpolation (Bertsekas 1982 for the active set). NLopt's L-BFGS fails on these
+ * problems: curvature is negative in many directions, and its line search returns to the
+ * same few points. The state is a search of src/search, so checkpoints are shared. */
 #include "lbfgs.h"
 #include <math.h>
 #include <string.h>
@@ -31,7 +31,7 @@ static double dot(size_t n, const double *a, const double *b)
     return sum;
 }
 
-/* At a bound, and down leads outside? In units of the scale. */
+/* Is variable k at a bound, with the descent direction pointing outside? */
 static bool pinned(const struct imp__goal *goal, const double *x, const double *g,
                    size_t k)
 {
@@ -90,7 +90,7 @@ static void remember(struct run *r, const double *x1, const double *g1)
     s->scalar[PAIRS] = m;
 }
 
-/* Go down d; false: no step lowers the objective. */
+/* Backtracking line search along d. *found false: no step lowers the objective. */
 static enum imp_status line(struct run *r, bool *found)
 {
     struct imp__search *s = r->s;
@@ -108,7 +108,7 @@ static enum imp_status line(struct run *r, bool *found)
     *found = false;
     for (int i = 0; i < TRIES; i++) {
         struct imp_estimate e;
-        double slope = 0; /* of what is really walked, after projection */
+        double slope = 0; /* along the step after projection onto the bounds */
         for (size_t k = 0; k < n; k++) {
             r->trial[k] = imp__into_bounds(goal, k, x[k] + step * r->d[k]);
             slope += g[k] * (r->trial[k] - x[k]);
@@ -158,7 +158,7 @@ enum imp_status imp__lbfgs(const struct imp__goal *goal,
         bool found;
         direction(&r);
         double down = dot(n, r.d, s->array[G]), moved = 0;
-        if (!(down < 0)) { /* the memory misleads: begin again */
+        if (!(down < 0)) { /* not a descent direction: drop the pairs */
             s->scalar[PAIRS] = 0;
             direction(&r);
             down = dot(n, r.d, s->array[G]);
