@@ -207,11 +207,12 @@ enum imp_bend_scheme {
 };
 #define IMP_BEND_N_SCHEMES 6
 
-/** How the adjoint gets the path back. */
+/** How the adjoint recomputes the ray's states. */
 enum imp_bend_way {
-    IMP_BEND_REVERSE = 0, /**< runs the ray backwards: nothing is stored */
+    IMP_BEND_REVERSE = 0, /**< reverses the steps from the exit: nothing is stored */
     IMP_BEND_STORED,      /**< trace again into a buffer of one ray: 48 B a step */
-    IMP_BEND_PSEUDO       /**< of IMP_BEND_ARC_INDEX: biased; for comparisons only */
+    IMP_BEND_PSEUDO       /**< approximate reversal of IMP_BEND_ARC_INDEX: biased; for
+                             comparisons */
 };
 
 enum imp_bend_surface_type {
@@ -226,7 +227,7 @@ enum imp_bend_surface_type {
     IMP_BEND_MESH       /**< the shapes of `scene`, from inside; facets are planes */
 };
 
-/** What happens to a ray at a surface. */
+/** Effect of a surface on a ray. */
 enum imp_bend_event {
     IMP_BEND_END = 0, /**< the ray ends; momentum as it is (index-matched) */
     IMP_BEND_REFRACT, /**< the ray ends refracted into `index`; total reflection goes on
@@ -289,7 +290,7 @@ struct imp_bend_options {
             0, 0, 0, 0, 0, 0, 0, 0, 0                                                    \
     }
 
-enum imp_bend_flags { /* of an exit; a ray with one of DROPPED has no derivative */
+enum imp_bend_flags { /* flags of an exit; rays with one of DROPPED have no derivative */
                       IMP_BEND_TRUNCATED = 1, /**< more than max_steps */
                       IMP_BEND_MISSED =
                           2, /**< left the field, or met IMP_BEND_STOP, or no surface */
@@ -307,7 +308,9 @@ enum imp_bend_flags { /* of an exit; a ray with one of DROPPED has no derivative
                           128 /**< of a tap's record: plane not crossed */
 };
 
-/** End of a ray, or its crossing of a tap. All that is kept of a ray between passes. */
+/** End of a ray, or its crossing of a tap: all that is stored between tracing and
+ * adjoint.
+ */
 struct imp_bend_exit {
     double x[3], v[3]; /**< position; momentum (after refraction) */
     double path;       /**< optical path length, int eta ds */
@@ -360,7 +363,7 @@ struct imp_bend_cotangent {
     double x[3], v[3], path;
 };
 
-/** What the adjoint gives. Arrays may be NULL; all are overwritten. */
+/** Gradients of an adjoint. Arrays may be NULL: not wanted; all are overwritten. */
 struct imp_bend_gradient {
     size_t size;
     double *theta;           /**< [n_theta] */
@@ -400,7 +403,7 @@ imp_bend_path(const imp_field *field, const struct imp_bend_options *options,
               const struct imp_bend_rays *rays, size_t ray, double (**points)[4],
               size_t *n_points, struct imp_bend_exit *exit);
 
-/* ---- Problems: rays, targets, and a field that is to meet them ----------------- */
+/* ---- Problems: a field, rays, targets ------------------------------------------ */
 
 typedef struct imp_bend imp_bend;
 
@@ -511,9 +514,9 @@ imp_bend_add_smoothness(imp_bend *bend, double weight, int order, double edge);
 /** Bounds of every number of the field; default for grids of the index: 1 .. infinity. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_set_bounds(imp_bend *bend, double lo,
                                                            double hi);
-/** Hold what a fit may not change, here and on finer levels: grid coefficients in the
- * `layers` outermost layers, those whose node is outside a sphere, or one number; each
- * set to `value` (NaN: left as it is). */
+/** Hold numbers, which a fit then does not change at any level: grid coefficients in the
+ * `layers` outermost layers, those whose node is outside a sphere, or one number; each is
+ * set to `value` (NaN: unchanged). */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_hold_rim(imp_bend *bend, int layers,
                                                          double value);
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_hold_outside(imp_bend *bend,
@@ -539,8 +542,8 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_bend_run(imp_bend *bend,
 /** imp_bend_path of one ray of the problem. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_ray(imp_bend *bend, size_t ray, double (**points)[4], size_t *n_points);
-/** Position, direction and path of a ray at a target's plane; weight 0: it does not
- * count. */
+/** Position, direction and path of a ray at a target's plane, and its share of the
+ * target's power. */
 struct imp_bend_arrival {
     double x[3], d[3], path, weight;
     uint32_t ray;

@@ -224,7 +224,7 @@ enum imp_status imp_bend_add_target(imp_bend *b, const struct imp_bend_target *d
     imp_v3 normal = imp__v3_load(desc->normal);
     const double length = imp__length(normal);
     if (desc->at_plane) {
-        double along = 0; /* the normal looks the way the rays go */
+        double along = 0; /* the normal is turned along the rays' directions */
         for (size_t i = t.first; i < t.last; i++)
             along += imp__dot(normal, imp__normalize(imp__v3_load(b->d[i])));
         const double k = along < 0 ? -1 / length : 1 / length;

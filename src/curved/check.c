@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
- *
- * A problem of bent rays checks itself: the identities that its gradient must satisfy,
- * and how far its steps are from the rays of the field. */
+ * Checks of a problem of bent rays: identities that its gradient must satisfy, and the
+ * error of its step. */
 #include "bend.h"
 #include "math/rng.h"
 #include <string.h>
@@ -182,8 +181,8 @@ static void trilinear_leaf(imp_field *f, size_t offset, void *payload)
     t->spacing = f->spacing;
 }
 
-/* Of a trilinear field rays that run along a face of cells (the middle one of a beam,
- * say) have a kink: they are moved aside, by a thousandth of a cell. */
+/* In a trilinear field the objective has a kink where a ray runs along cell faces (the
+ * middle ray of a beam may): all rays are shifted by a thousandth of a cell. */
 static void aside(const imp_bend *b, double by, double (*x)[3])
 {
     for (size_t i = 0; i < b->n; i++) {
@@ -194,7 +193,7 @@ static void aside(const imp_bend *b, double by, double (*x)[3])
     }
 }
 
-/* Along the gradient scaled to 1: the direction a fit goes. */
+/* Central differences along the gradient, scaled to a greatest component of 1. */
 static enum imp_status check_differences(imp_bend *b, double *dot, double *bar)
 {
     enum imp_status st = IMP_OK;
@@ -220,7 +219,8 @@ static enum imp_status check_differences(imp_bend *b, double *dot, double *bar)
     }
     const bool smooth = b->field->ops != &imp__field_sum && !tri.any;
     const bool some_floats = memchr(floats.mask, 1, n) != NULL;
-    for (size_t i = 0; i < b->n; i++) { /* objectives are squares of lengths, mostly */
+    for (size_t i = 0; i < b->n;
+         i++) { /* scale of rounding: most objectives are squared lengths */
         const imp_v3 at = imp__v3_load(x[i]);
         size2 = fmax(size2, imp__dot(at, at));
     }
@@ -231,7 +231,7 @@ static enum imp_status check_differences(imp_bend *b, double *dot, double *bar)
             const double sign = side ? -1 : 1;
             for (size_t i = 0; i < n; i++) {
                 moved[i] = theta[i] + sign * eps * dot[i];
-                if (floats.mask[i]) moved[i] = (float)moved[i]; /* what rays will see */
+                if (floats.mask[i]) moved[i] = (float)moved[i]; /* as it is traced */
                 want += sign * bar[i] * (moved[i] / (2 * eps));
             }
             IMP_TRY(imp_field_set_theta(b->field, moved));
@@ -239,11 +239,11 @@ static enum imp_status check_differences(imp_bend *b, double *dot, double *bar)
             if (st == IMP_E_NUMERIC) f[side] = NAN, st = IMP_OK; /* this row fails */
             if (st != IMP_OK) goto out;
         }
-        /* Curvature of the objective at large steps, rounding at small ones: the middle
-         * must agree; of trilinear fields, the smallest (curved-rays 3.3). What the next
-         * larger step says of the error that is left is allowed (a hundredth; two, to be
-         * safe); and where the objective is at its least, gradients that a motion of
-         * 1e-12 makes, or of a float's last bit. */
+        /* Curvature of the objective limits large steps and rounding small ones, so those
+         * between are judged; for trilinear fields the smallest (curved-rays 3.3). The
+         * error left is 1/100 of the change from the next larger step; 1/50 is allowed.
+         * At a minimum the gradient may be what a change of theta by 1e-12, or by a
+         * float's last bit, makes of the curvature. */
         const double fd = (f[0] - f[1]) / (2 * eps);
         if (k <= 4) bend = fmax(bend, fabs(f[0] + f[1] - 2 * value) / (eps * eps));
         const double left = !smooth            ? bend * eps
@@ -264,7 +264,7 @@ static enum imp_status check_differences(imp_bend *b, double *dot, double *bar)
     }
 out:
     if (x) memcpy(b->x, x, b->n * sizeof *x);
-    if (theta) { /* as it was, also after a failure */
+    if (theta) { /* restored also after a failure */
         const enum imp_status back = imp_field_set_theta(b->field, theta);
         if (st == IMP_OK) st = back;
     }

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Objective and gradient of a problem of bent rays: trace, targets, adjoint,
- * regularisers. Between the passes only the exits are kept. */
+ * regularisers. Only the exits are stored between tracing and
+ * adjoint. */
 #include "bend.h"
 #include <string.h>
 

@@ -238,7 +238,7 @@ static void profile_splat(const imp_field *f, const imp_v3 *x, double a, const i
     p->kind->at(f->theta, u, &s);
     double *theta_bar = imp__bar_reach(bar, 0, f->n_theta);
     const bool along = p->kind->about == ALONG_AXIS;
-    /* g = 2 f' y or f' a: what f' is multiplied with in b.g */
+    /* g = 2 f' y or f' a, so b.g = slope f' */
     const double slope = along ? imp__dot(*b, p->axis) : 2 * imp__dot(*b, y);
     for (int k = 0; k < p->kind->n_own; k++)
         theta_bar[k] += a * s.fp[k] + slope * s.f1p[k];
@@ -325,7 +325,8 @@ enum imp_status imp_field_profile_create(imp_context *ctx, const char *kind,
     for (int i = 0; i < kinds[k].n_own; i++) {
         const char *name = kinds[k].names[i];
         const bool part =
-            kinds[k].at == plume_at || kinds[k].at == polynomial_at; /* of sums */
+            kinds[k].at == plume_at ||
+            kinds[k].at == polynomial_at; /* may be 0 or negative as a part of a sum */
         if ((!strcmp(name, "radius") || !strcmp(name, "width") ||
              (!strcmp(name, "n0") && !part)) &&
             !(params[i] > 0))

@@ -7,7 +7,7 @@
  */
 #include "grid_back.h"
 
-struct cell {      /* where a point falls */
+struct cell {      /* the cell that contains a point */
     size_t corner; /* index of the first coefficient */
     imp_v3 u;      /* local coordinates, in [0, 1) inside the domain */
 };
@@ -18,7 +18,8 @@ static inline struct cell cell_of(const struct imp__grid *g, imp_v3 x)
     struct cell c;
     int i[3];
     for (int k = 0; k < 3; k++) {
-        /* Outside, the cell is clamped, not u: the polynomial goes on. */
+        /* Outside the grid the cell is clamped but not u: the outermost polynomial is
+         * extrapolated. */
         const int top = g->desc.cells[k] - 1;
         const double f = imp_clamp(u[k], 0.0, (double)top);
         i[k] = (int)f;

@@ -19,7 +19,7 @@ void imp__surface_eval(const struct imp__surface *s, const imp_v3 *x, const imp_
     switch (s->kind) {
     case IMP__PLANE:
     case IMP__DISC:
-    case IMP__MESH: /* the plane of the triangle that was met */
+    case IMP__MESH: /* the plane of the triangle that was hit */
         at->g = imp__dot(s->n, *x) - s->offset;
         at->gx = s->n;
         break;
@@ -148,7 +148,7 @@ bool imp__facet(const struct imp__surface *s, const imp_v3 *a, const imp_v3 *b,
             facet->offset = imp__dot(at.ng, at.p);
             return true;
         }
-        from = hit.t * (1 + 1e-6) + nearest; /* the other side of a thin wall */
+        from = hit.t * (1 + 1e-6) + nearest; /* of the other side: go on */
     }
     return false;
 }

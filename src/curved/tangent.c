@@ -33,7 +33,7 @@ static imp_v3 normal_dot(const struct imp__surface *s, imp_v3 x, imp_v3 gx, imp_
     return (h - n * imp__dot(n, h)) * (1 / length);
 }
 
-/* The length of the fractional step follows: d tau = -dG / (dG/d tau). */
+/* Tangent of a fractional step, whose length changes by d tau = -dG / (dG/d tau). */
 static void land_dot(const struct imp__plan *p, const struct imp__surface *s,
                      const struct imp__state *from, const struct imp__state *from_dot,
                      double tau, const double *theta_dot, struct imp__state *at,

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
- *
- * Files of bent rays (docs/curved-rays.md): between bend_load.c, which drives it, and
- * one file for each element. */
+ * Loader of problems of bent rays (docs/curved-rays.md): bend_load.c reads the file, and
+ * one file reads each element. */
 #ifndef IMP_FORMAT_BEND_H
 #define IMP_FORMAT_BEND_H
 
@@ -16,7 +15,7 @@ struct imp__bendfile {
     imp_context *ctx;
     struct imp_scene *scene; /* of the tree and the search list; never built */
     imp_bend *bend;
-    imp_field *truth; /* what `from_truth` targets are made with */
+    imp_field *truth; /* the field that `from_truth` data are traced through */
     struct imp_bend_options options;
     struct imp_dispersion dispersion;
     bool dispersive;
@@ -54,10 +53,10 @@ enum imp_status imp__bendfile_surface(struct imp__bendfile *l, struct imp_node *
                                       const struct imp__bendfile_frame *f, int group);
 enum imp_status imp__bendfile_target(struct imp__bendfile *l, struct imp_node *node,
                                      const struct imp__bendfile_frame *f, int bundle);
-/* A failure of the library's, with the node's place before its message. */
+/* Put the node's file, line and column before the message of a failed call. */
 enum imp_status imp__bendfile_placed(struct imp__bendfile *l, struct imp_node *node,
                                      enum imp_status st);
-/* A float property that must be there, or have a fallback that is not NaN. */
+/* A float property in lo .. hi; required if fallback is NaN. */
 enum imp_status imp__bendfile_number(struct imp__bendfile *l, struct imp_node *node,
                                      const char *name, double fallback, double lo,
                                      double hi, double *out);

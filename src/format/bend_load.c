@@ -26,8 +26,8 @@ enum imp_status imp__bendfile_number(struct imp__bendfile *l, struct imp_node *n
     return IMP_OK;
 }
 
-/* What `from_truth` targets want: the exits of the same rays through the other field,
- * traced well. */
+/* Data of `from_truth` targets: exits of the same rays through the field `truth`, traced
+ * with yoshida4 and a quarter of the step. */
 static enum imp_status truth_trace(struct imp__bendfile *l, struct imp_bend_exit **out)
 {
     struct imp_bend_rays r;
@@ -114,9 +114,9 @@ static enum imp_status target_of_all(struct imp__bendfile *l, struct imp_node *n
     return imp__bendfile_target(l, node, &world, -1);
 }
 
-/* An index below its bound (1 if nothing is said) is often a mistake, of a file's scale
- * say, and a fit would begin with correcting it. A few coefficients of a spline may be
- * below what its values never are. */
+/* An index below its bound (default 1) is often a mistake, for instance in a file's
+ * scale, and a fit would begin by moving it. A few coefficients of a spline may be below
+ * the bound while its values are not. */
 static enum imp_status bounds_look(struct imp__bendfile *l, const struct imp_node *medium)
 {
     const size_t n = l->bend->field->n_theta;

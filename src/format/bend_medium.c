@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
- *
- * <medium type="graded">: the index field from <volume>s, how rays step, what a fit may
- * do. */
+ * <medium type="graded">: the index field from <volume>s, the options of tracing, bounds
+ * and held numbers of a fit. */
 #include "bend.h"
 #include "search.h"
 #include <string.h>

@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
- *
- * <rays>. They come in bundles, each with a frame: its z runs along the beam (or from a
- * point source to the centre), and what stands inside <rays> is written in that frame,
- * once for all bundles of the element. */
+ * <rays>: bundles, each with a frame whose z axis runs along the beam (or from a point
+ * source to the centre). Children of <rays> are given in that frame and apply to every
+ * bundle of the element. */
 #include "base/number.h"
 #include "bend.h"
 #include "search.h"

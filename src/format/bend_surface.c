@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
- *
- * <surface>: where bent rays end, turn, or are looked at on the way. */
+ * <surface>: where bent rays end, are refracted or reflected, or cross a tap. */
 #include "bend.h"
 #include "search.h"
 #include <string.h>
 
-/* A scene of one mesh, which the bend keeps. */
+/* A scene of one mesh, owned by the bend. */
 static enum imp_status mesh_load(struct imp__bendfile *l, struct imp_node *node,
                                  const imp_scene **out)
 {

@@ -1,6 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0
- *
- * <target>: what bent rays should do. */
+ * <target>: what is minimised. */
 #include "bend.h"
 #include "search.h"
 #include <string.h>

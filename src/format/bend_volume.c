@@ -51,7 +51,7 @@ enum imp_status imp__bendfile_placed(struct imp__bendfile *l, struct imp_node *n
                                      enum imp_status st)
 {
     if (st == IMP_OK || st == IMP_E_NOMEM) return st;
-    char message[900]; /* the message that is there, with the place before it */
+    char message[900]; /* the message of the failed call */
     strncpy(message, imp_last_error(l->ctx), sizeof message - 1);
     message[sizeof message - 1] = 0;
     return imp__node_error(l->ctx, node, st == IMP_E_IO ? st : IMP_E_SCENE, "%s",
