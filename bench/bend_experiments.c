@@ -2,12 +2,13 @@
  *
  * The experiments of docs/curved-rays.md, each a table on standard output:
  *
- *     bend_experiments [--full] EXPERIMENT...
- *     EXPERIMENT  luneburg|maxwell|focus|slice|tape|fibre|display|gas|rod
+ *     bend_experiments luneburg|maxwell|focus|slice|tape|fibre|display|gas|rod ...
+ *                      [--full] [--figures DIR]
  *
  * Settings are scaled to minutes on two cores; --full takes the published sizes. How long
  * an experiment will take is said on standard error before it begins, from a first
- * evaluation. */
+ * evaluation. With --figures, luneburg and maxwell draw the index found over the true one
+ * as DIR/NAME.svg; without it no file is written. */
 #include "bend_tape.h"
 #include <importon/bend.h>
 #include <math.h>
@@ -18,6 +19,7 @@
 
 static imp_context *ctx;
 static int full;
+static const char *figures; /* folder; NULL: none */
 
 static void must(enum imp_status st)
 {
@@ -64,8 +66,76 @@ static imp_field *grid(int cells, double half, double index, enum imp_field_inte
 static double luneburg(double r2) { return sqrt(2 - fmin(r2, 1)); }
 static double maxwell(double r2) { return 2 / (1 + r2); }
 
-static void recover(const char *file, double (*truth)(double), const int iterations[3])
+enum { RADII = 51, LEVELS = 3 };
+
+/* Mean of the index over a sphere of each radius 0 .. 1. */
+static void shells(const imp_field *f, double eta[RADII])
 {
+    enum { DIRECTIONS = 200 };
+    for (int k = 0; k < RADII; k++) {
+        const double r = (double)k / (RADII - 1);
+        eta[k] = 0;
+        for (int i = 0; i < DIRECTIONS; i++) {
+            const double z = 1 - (2 * i + 1.0) / DIRECTIONS, s = sqrt(1 - z * z);
+            const double a = 2.399963229728653 * i;
+            const double x[3] = {r * s * cos(a), r * s * sin(a), r * z};
+            double e;
+            imp_field_eval(f, x, &e, NULL, NULL);
+            eta[k] += e / DIRECTIONS;
+        }
+    }
+}
+
+/* The index against the radius: the truth as a wide grey line, each level over it. */
+static void figure(const char *name, double (*truth)(double), double eta[LEVELS][RADII])
+{
+    static const char *const colours[LEVELS] = {"#d08020", "#2070c0", "#c02020"};
+    double lo = INFINITY, hi = -INFINITY;
+    char path[1024];
+    if (!figures) return;
+    snprintf(path, sizeof path, "%s/%s.svg", figures, name);
+    FILE *f = fopen(path, "w");
+    if (!f) {
+        perror(path);
+        exit(3);
+    }
+    for (int k = 0; k < RADII; k++) {
+        const double r = (double)k / (RADII - 1), t = truth(r * r);
+        lo = fmin(lo, t), hi = fmax(hi, t);
+        for (int l = 0; l < LEVELS; l++)
+            lo = fmin(lo, eta[l][k]), hi = fmax(hi, eta[l][k]);
+    }
+    fprintf(f, "<svg xmlns='http://www.w3.org/2000/svg' width='640' height='440' "
+               "font-family='sans-serif' font-size='13'>\n<rect width='640' height='440' "
+               "fill='white'/>\n<rect x='60' y='20' width='560' height='370' fill='none' "
+               "stroke='black'/>\n<text x='340' y='428' text-anchor='middle'>r</text>\n"
+               "<text x='8' y='14'>index</text>\n");
+    for (int k = 0; k <= 5; k++)
+        fprintf(f,
+                "<text x='%d' y='408' text-anchor='middle'>%.1f</text>\n<text x='54' "
+                "y='%d' text-anchor='end'>%.3f</text>\n",
+                60 + 112 * k, 0.2 * k, 394 - 74 * k, lo + (hi - lo) * k / 5);
+    for (int l = -1; l < LEVELS; l++) {
+        fprintf(f, "<polyline fill='none' stroke='%s' stroke-width='%d' points='",
+                l < 0 ? "#bbbbbb" : colours[l], l < 0 ? 6 : 2);
+        for (int k = 0; k < RADII; k++) {
+            const double r = (double)k / (RADII - 1),
+                         e = l < 0 ? truth(r * r) : eta[l][k];
+            fprintf(f, "%.1f,%.1f ", 60 + 560 * r, 390 - 370 * (e - lo) / (hi - lo));
+        }
+        fprintf(f, "'/>\n<text x='500' y='%d' fill='%s'>", 62 + 18 * l,
+                l < 0 ? "#888888" : colours[l]);
+        if (l < 0) fprintf(f, "true</text>\n");
+        else fprintf(f, "%d cells</text>\n", 6 << l);
+    }
+    fprintf(f, "</svg>\n");
+    if (fclose(f)) perror(path), exit(3);
+}
+
+static void recover(const char *name, const char *file, double (*truth)(double),
+                    const int iterations[3])
+{
+    double eta[LEVELS][RADII];
     imp_bend *b;
     struct imp_bend_fit_options fo = IMP_BEND_FIT_OPTIONS_INIT;
     struct imp_bend_fit_result r;
@@ -110,8 +180,10 @@ static void recover(const char *file, double (*truth)(double), const int iterati
                centre, sqrt(spot), s);
         fflush(stdout);
         free(parts);
+        shells(f, eta[levels - 1]);
         imp_bend_destroy(b);
     }
+    figure(name, truth, eta);
 }
 
 /* ---- Focusing, canonical and arc length (supplement Fig. 2) -------------------- */
@@ -748,15 +820,22 @@ int main(int argc, char **argv)
     struct imp_context_options o = IMP_CONTEXT_OPTIONS_INIT;
     if (imp_context_create(&o, &ctx) != IMP_OK) return 3;
     int did = 0;
-    for (int i = 1; i < argc; i++) full |= !strcmp(argv[i], "--full");
+    for (int i = 1; i < argc; i++) {
+        full |= !strcmp(argv[i], "--full");
+        if (!strcmp(argv[i], "--figures") && i + 1 < argc) figures = argv[i + 1];
+    }
     for (int i = 1; i < argc; i++) {
         const char *a = argv[i];
         if (!strcmp(a, "--full")) continue;
+        if (!strcmp(a, "--figures")) {
+            i++;
+            continue;
+        }
         did++;
         if (!strcmp(a, "luneburg"))
-            recover(IMP_SCENES "/bend/luneburg.xml", luneburg, it);
+            recover(a, IMP_SCENES "/bend/luneburg.xml", luneburg, it);
         else if (!strcmp(a, "maxwell"))
-            recover(IMP_SCENES "/bend/maxwell.xml", maxwell, it);
+            recover(a, IMP_SCENES "/bend/maxwell.xml", maxwell, it);
         else if (!strcmp(a, "focus")) focus();
         else if (!strcmp(a, "slice")) slice();
         else if (!strcmp(a, "tape")) tape();
@@ -771,6 +850,6 @@ int main(int argc, char **argv)
     fprintf(
         stderr,
         "usage: bend_experiments luneburg|maxwell|focus|slice|tape|fibre|display|gas|rod "
-        "... [--full]\n");
+        "... [--full] [--figures DIR]\n");
     return 2;
 }

@@ -33,7 +33,10 @@ static int load(const char *path)
     lo.n_defines = cli.defines.n;
     if (cli.search) lo.search = &cli.search, lo.n_search = 1;
     const enum imp_status st = imp_bend_load(cli.context, path, &lo, &bend);
-    if (st == IMP_OK) return 0;
+    if (st == IMP_OK) {
+        imp_bend_set_progress(bend, progress_report, NULL);
+        return 0;
+    }
     rc = cli_fail(st, NULL);
     return st == IMP_E_IO ? EXIT_USAGE : rc;
 }
@@ -83,7 +86,7 @@ void bend_put_stats(struct json *j, const struct imp_bend_stats *s)
     json_end_object(j);
 }
 
-static const char *target_word(enum imp_bend_target_type t)
+const char *bend_target_word(enum imp_bend_target_type t)
 {
     static const char *const words[IMP_BEND_N_TARGETS] = {
         "focus", "spot",      "points", "direction", "directions", "deflection",
@@ -129,6 +132,10 @@ static int trace(void)
     enum imp_status st = imp_bend_objective(bend, &value, NULL, parts, &s);
     const double seconds = cli_now() - start;
     if (st == IMP_OK) st = imp_bend_step_error(bend, 200, &error, &order);
+    if (st == IMP_E_NUMERIC && s.traced > 0) { /* lost with the shorter steps alone */
+        error = order = NAN;
+        st = IMP_OK;
+    }
     if (st == IMP_OK) st = imp_bend_get_options(bend, &bo);
     if (st != IMP_OK) {
         free(parts);
@@ -146,15 +153,19 @@ static int trace(void)
         cli_json_end(&j);
     } else if (!cli.out || strcmp(cli.out, "-")) {
         bend_print_stats(stdout, &s);
-        printf("step      %.4g: exits are off by %.2g rms (order %.1f seen by halving)\n",
-               bo.step, error, order);
+        printf("step      %.4g: ", bo.step);
+        if (isfinite(error))
+            printf("exits are off by %.2g rms (order %.1f seen by halving)\n", error,
+                   order);
+        else printf("error unknown, no ray comes to its end with half the step\n");
         printf("speed     %.3g rays/s, %.3g ray-steps/s\n", (double)s.rays / seconds,
                (double)s.steps / seconds);
         printf("objective %.9g\n", value);
         for (size_t i = 0; i < n && i < 20; i++) {
             struct imp_bend_target t;
             if (imp_bend_get_target(bend, i, &t) == IMP_OK)
-                printf("  target %-3zu %-10s %.9g\n", i, target_word(t.type), parts[i]);
+                printf("  target %-3zu %-10s %.9g\n", i, bend_target_word(t.type),
+                       parts[i]);
         }
         if (n > 20) printf("  ... and %zu more\n", n - 20);
     }
@@ -171,6 +182,11 @@ static int check(void)
     int ok = 1;
     const enum imp_status st = imp_bend_check(bend, &rows, &n);
     if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+    for (size_t i = 0; i < n; i++)
+        if (!strcmp(rows[i].method, "rays") && rows[i].value < rows[i].reference)
+            cli_say("%.0f of %.0f rays are lost and not checked: 'bend trace' counts the "
+                    "reasons",
+                    rows[i].reference - rows[i].value, rows[i].reference);
     struct json j = {0};
     if (cli.json) {
         j = cli_json();
@@ -216,8 +232,23 @@ static int fit(void) { return bend_fit(bend); }
 static int view(void)
 {
     const char *folder = cli.out ? cli.out : "out";
+    struct imp_bend_stats s = IMP_BEND_STATS_INIT;
+    struct json j = {0};
+    double value;
+    const enum imp_status st = imp_bend_objective(bend, &value, NULL, NULL, &s);
+    if (st != IMP_OK) return cli_fail(st, cli.scene_path); /* also if no ray is traced */
     int rc = make_folder(folder);
-    if (!rc) rc = bend_view(bend, folder, "");
+    if (!rc && cli.json) {
+        j = cli_json();
+        json_text(&j, "folder", folder);
+        bend_put_stats(&j, &s);
+    }
+    if (!rc) rc = bend_view(bend, folder, "", cli.json ? &j : NULL);
+    if (j.file) cli_json_end(&j);
+    if (!rc && s.traced < s.rays)
+        cli_say("%llu of %llu rays are lost and not drawn as spots: 'bend trace' counts "
+                "the reasons",
+                (unsigned long long)(s.rays - s.traced), (unsigned long long)s.rays);
     if (!rc) cli_say("pictures in %s", folder);
     return rc;
 }

@@ -11,7 +11,9 @@ extern const struct arg_option bend_fit_options[];
 /* Counts of a trace. */
 void bend_print_stats(FILE *to, const struct imp_bend_stats *s);
 void bend_put_stats(struct json *j, const struct imp_bend_stats *s);
-/* Pictures of a problem, DIR/<prefix>slice-x.png, ..., rays, spots, images. */
-int bend_view(imp_bend *bend, const char *folder, const char *prefix);
+const char *bend_target_word(enum imp_bend_target_type type);
+/* Pictures of a problem, DIR/<prefix>slice-x.png, ..., rays, spots, images. `json` gets
+ * what they show; NULL: no answer. */
+int bend_view(imp_bend *bend, const char *folder, const char *prefix, struct json *json);
 
 #endif

@@ -120,7 +120,7 @@ int bend_fit(imp_bend *bend)
     struct imp_bend_fit_result r = {0};
     int rc = iterations_read(fo.iterations);
     if (!rc && cli.out) rc = make_folder(cli.out);
-    if (!rc && cli.out) rc = bend_view(bend, cli.out, "before-");
+    if (!rc && cli.out) rc = bend_view(bend, cli.out, "before-", NULL);
     if (rc) return rc;
     fo.optimizer = kinds[o.optimizer];
     fo.levels = o.levels;
@@ -136,6 +136,7 @@ int bend_fit(imp_bend *bend)
     if (cli_failed(st)) return cli_fail(st, cli.scene_path);
     const double seconds = cli_now() - start;
     progress_clear();
+    progress_resume(); /* what is there is drawn and written, also after Ctrl-C */
     if (cli.json) {
         struct json j = cli_json();
         json_number(&j, "start", r.start);
@@ -159,6 +160,6 @@ int bend_fit(imp_bend *bend)
     }
     if (cli.out) rc = write_field(bend);
     if (cli.out && !rc) rc = write_history(&r);
-    if (cli.out && !rc) rc = bend_view(bend, cli.out, "");
+    if (cli.out && !rc) rc = bend_view(bend, cli.out, "", NULL);
     return rc ? rc : cli_done();
 }

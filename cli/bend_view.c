@@ -1,56 +1,91 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Pictures of bent rays: slices of the index through the middle, the rays' ways projected
- * on them, spot diagrams, and what image targets see. */
+ * Pictures of bent rays: slices of the index through the middle, ray paths projected onto
+ * them, spot diagrams, and irradiance beside its target. */
 #include "bend.h"
-#include "picture.h"
+#include "bend_chart.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { SIDE = 512, PATHS = 60 };
+enum { SIDE = 512, PATHS = 60, TARGETS = 8 };
 
-static int picture_save(imp_film *film, const char *folder, const char *prefix,
-                        const char *name)
+/* ---- Colours ------------------------------------------------------------------- */
+
+/* The index: dark is the least of the slice, light the greatest. The exponent is about
+ * that of sRGB, so that equal steps look equal. */
+static void index_colour(double t, chart_colour c)
 {
-    char file[128];
-    struct imp_write_options w = IMP_WRITE_OPTIONS_INIT;
-    snprintf(file, sizeof file, "%s%s.png", prefix, name);
-    char *path = join_path(folder, file);
-    const enum imp_status st = imp_film_write(film, path, &w);
-    const int rc = st == IMP_OK ? 0 : cli_fail(st, path);
-    free(path);
-    return rc;
+    const float s = (float)pow(0.15 + 0.8 * t, 2.2);
+    c[0] = 0.85f * s, c[1] = 0.95f * s, c[2] = s;
+}
+static void grey(double t, chart_colour c) { c[0] = c[1] = c[2] = (float)t; }
+
+/* Rays have the colour of their wavelength, from blue (the shortest of the problem) over
+ * green to red (the longest); rays of one wavelength that of their bundle. */
+static void wavelength_colour(double t, chart_colour c)
+{
+    static const chart_colour stop[4] = {
+        {.10f, .05f, .85f}, {0, .45f, .45f}, {.25f, .45f, 0}, {.85f, .05f, .02f}};
+    const int k = (int)fmin(3 * t, 2);
+    const float u = (float)(3 * t - k);
+    for (int i = 0; i < 3; i++) c[i] = stop[k][i] + u * (stop[k + 1][i] - stop[k][i]);
 }
 
-static void put(float *p, int x, int y, const float c[3], float a)
+struct palette {
+    int n; /* different wavelengths */
+    double um[64];
+};
+
+static int by_size(const void *a, const void *b)
 {
-    if (x < 0 || y < 0 || x >= SIDE || y >= SIDE) return;
-    float *q = p + 3 * ((size_t)y * SIDE + (size_t)x);
-    for (int k = 0; k < 3; k++) q[k] += a * (c[k] - q[k]);
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
 }
 
-/* A line, a pixel wide with soft edges. */
-static void line(float *p, double x0, double y0, double x1, double y1, const float c[3])
+static void palette_of(const imp_bend *b, struct palette *p)
 {
-    const double length = hypot(x1 - x0, y1 - y0);
-    if (!(length < 1e5)) return;
-    const int n = (int)(2 * length) + 1;
-    for (int i = 0; i < n; i++) {
-        const double x = x0 + (x1 - x0) * i / n - 0.5, y = y0 + (y1 - y0) * i / n - 0.5;
-        const int ix = (int)floor(x), iy = (int)floor(y);
-        const float u = (float)(x - ix), v = (float)(y - iy);
-        put(p, ix, iy, c, 0.5f * (1 - u) * (1 - v));
-        put(p, ix + 1, iy, c, 0.5f * u * (1 - v));
-        put(p, ix, iy + 1, c, 0.5f * (1 - u) * v);
-        put(p, ix + 1, iy + 1, c, 0.5f * u * v);
+    p->n = 0;
+    for (int k = 0; k < imp_bend_n_bundles(b); k++) {
+        const double um = imp_bend_wavelength(b, k);
+        int at = 0;
+        while (at < p->n && p->um[at] != um) at++;
+        if (at == p->n && p->n < 64) p->um[p->n++] = um;
+    }
+    qsort(p->um, (size_t)p->n, sizeof *p->um, by_size);
+}
+
+static void ray_colour(const imp_bend *b, const struct palette *p, int bundle,
+                       chart_colour c)
+{
+    static const chart_colour bundles[6] = {{.9f, .1f, .05f}, {.05f, .4f, .9f},
+                                            {.05f, .6f, .1f}, {.9f, .5f, 0},
+                                            {.5f, .1f, .7f},  {0, .6f, .6f}};
+    int at = 0;
+    if (p->n < 2) {
+        memcpy(c, bundles[bundle % 6], sizeof(chart_colour));
+        return;
+    }
+    while (at < p->n - 1 && p->um[at] < imp_bend_wavelength(b, bundle)) at++;
+    wavelength_colour((double)at / (p->n - 1), c);
+}
+
+static void legend(struct chart *c, const struct palette *p)
+{
+    for (int k = 0; p->n > 1 && k < p->n; k++) {
+        char name[32];
+        chart_colour colour;
+        if (p->um[k] > 0) snprintf(name, sizeof name, "%.4g um", p->um[k]);
+        else snprintf(name, sizeof name, "not given");
+        wavelength_colour((double)k / (p->n - 1), colour);
+        chart_legend(c, k, name, colour);
     }
 }
 
-/* ---- What is seen: the box of the picture -------------------------------------- */
+/* ---- Slices and paths ---------------------------------------------------------- */
 
-/* The field's box, or that of the rays and their ends; a square per pair of axes. */
+/* The field's box, or that of the rays and their ends. */
 static void box_of(imp_bend *b, double lo[3], double hi[3])
 {
     struct imp_bend_rays r;
@@ -74,9 +109,9 @@ static void box_of(imp_bend *b, double lo[3], double hi[3])
     free(e);
 }
 
-/* Grey from the least index to the greatest, on the plane through the middle. */
-static void slice(const imp_field *f, int u, int v, const double lo[3],
-                  const double hi[3], float *p, double range[2])
+/* The index on the plane through the middle, across axis `held`. */
+static void slice(const imp_field *f, struct chart *c, int u, int v, const double lo[3],
+                  const double hi[3], double range[2])
 {
     double *eta = cli_alloc((size_t)SIDE * SIDE, sizeof *eta);
     range[0] = INFINITY, range[1] = -INFINITY;
@@ -91,55 +126,96 @@ static void slice(const imp_field *f, int u, int v, const double lo[3],
                 range[0] = fmin(range[0], *e), range[1] = fmax(range[1], *e);
         }
     const double span = range[1] - range[0];
-    for (size_t i = 0; i < (size_t)SIDE * SIDE; i++) {
-        const double t = span > 0 ? (eta[i] - range[0]) / span : 0.5;
-        const float s =
-            (float)pow(0.15 + 0.8 * (isfinite(t) ? t : 0), 2.2); /* sRGB later */
-        p[3 * i] = 0.85f * s, p[3 * i + 1] = 0.95f * s, p[3 * i + 2] = s;
-    }
+    for (int j = 0; j < SIDE; j++)
+        for (int i = 0; i < SIDE; i++) {
+            const double e = eta[(size_t)j * SIDE + (size_t)i];
+            chart_colour colour;
+            index_colour(span > 0 && isfinite(e) ? (e - range[0]) / span : 0.5, colour);
+            chart_pixel(c, i, j, colour);
+        }
     free(eta);
 }
 
-static void paths_draw(imp_bend *b, int u, int v, const double lo[3], const double hi[3],
-                       float *p)
+static void paths_draw(imp_bend *b, const struct palette *palette, struct chart *c, int u,
+                       int v)
 {
-    static const float colours[6][3] = {{.9f, .1f, .05f}, {.05f, .4f, .9f},
-                                        {.05f, .6f, .1f}, {.9f, .5f, 0},
-                                        {.5f, .1f, .7f},  {0, .6f, .6f}};
     struct imp_bend_rays r;
     imp_bend_get_rays(b, &r);
     const size_t stride = r.n > PATHS ? r.n / PATHS : 1;
     for (size_t i = stride / 2; i < r.n; i += stride) {
         double(*q)[4];
         size_t n;
+        chart_colour colour;
         if (imp_bend_ray(b, i, &q, &n) != IMP_OK) continue;
+        ray_colour(b, palette, r.group[i], colour);
         for (size_t k = 1; k < n; k++)
-            line(p, (q[k - 1][u] - lo[u]) / (hi[u] - lo[u]) * SIDE,
-                 (hi[v] - q[k - 1][v]) / (hi[v] - lo[v]) * SIDE,
-                 (q[k][u] - lo[u]) / (hi[u] - lo[u]) * SIDE,
-                 (hi[v] - q[k][v]) / (hi[v] - lo[v]) * SIDE, colours[r.group[i] % 6]);
+            chart_line(c, q[k - 1][u], q[k - 1][v], q[k][u], q[k][v], colour);
         imp_free(cli.context, q);
     }
 }
 
-/* Arrivals of one target about their centroid, on the two axes across the plane. */
-static int spots(imp_bend *b, size_t target, const char *folder, const char *prefix)
+static int slices(imp_bend *b, const struct palette *palette, const char *folder,
+                  const char *prefix, struct json *j)
 {
-    struct imp_bend_target t;
-    imp_film *film;
-    size_t n = 0;
-    struct imp_bend_arrival *a = cli_alloc(imp_bend_n_rays(b), sizeof *a);
-    enum imp_status st = imp_bend_get_target(b, target, &t);
-    if (st == IMP_OK) st = imp_bend_arrivals(b, target, a, &n);
-    if (st == IMP_OK) st = imp_film_create(cli.context, SIDE, SIDE, "R,G,B", &film);
-    if (st != IMP_OK) {
-        free(a);
-        return cli_fail(st, cli.scene_path);
+    static const char *const names[3] = {"x", "y", "z"};
+    double lo[3], hi[3];
+    int rc = 0;
+    box_of(b, lo, hi);
+    if (j) json_array(j, "slices");
+    for (int held = 0; held < 3 && !rc; held++) {
+        const int u = held == 0 ? 1 : 0, v = held == 2 ? 1 : 2;
+        const double x[2] = {lo[u], hi[u]}, y[2] = {lo[v], hi[v]};
+        const double at = (lo[held] + hi[held]) / 2;
+        double range[2] = {NAN, NAN};
+        char name[32];
+        for (int paths = 0; paths < (held < 2 ? 2 : 1) && !rc; paths++) {
+            struct chart c;
+            if ((rc = chart_open(&c, SIDE, SIDE, x, y))) break;
+            slice(imp_bend_field(b), &c, u, v, lo, hi, range);
+            if (paths) paths_draw(b, palette, &c, u, v);
+            chart_axes(&c, names[u], names[v]);
+            if (paths && palette->n > 1) legend(&c, palette);
+            else chart_bar(&c, "index", range[0], range[1], index_colour);
+            snprintf(name, sizeof name, "%s-%s", paths ? "rays" : "slice", names[held]);
+            rc = chart_save(&c, folder, prefix, name);
+        }
+        cli_say("slice %s = %.4g: index %.6g to %.6g", names[held], at, range[0],
+                range[1]);
+        if (!j) continue;
+        json_object(j, NULL);
+        json_text(j, "axis", names[held]);
+        json_number(j, "at", at);
+        json_number(j, "index_min", range[0]);
+        json_number(j, "index_max", range[1]);
+        json_end_object(j);
     }
-    float *p = imp_film_mean(film);
+    if (j) json_end_array(j);
+    return rc;
+}
+
+/* ---- Targets ------------------------------------------------------------------- */
+
+struct seen { /* of one target */
+    size_t rays;
+    double rms, wide;
+};
+
+/* Arrivals of one target about their centroid, on the two axes across the plane. */
+static int spots(imp_bend *b, const struct palette *palette, size_t target,
+                 const struct imp_bend_target *t, const char *folder, const char *prefix,
+                 struct seen *seen)
+{
+    static const char *const names[3] = {"x", "y", "z"};
+    static const chart_colour ink = {0.02f, 0.05f, 0.2f}, light = {.6f, .6f, .6f};
+    size_t n = 0;
+    struct chart c;
+    struct imp_bend_rays rays;
+    struct imp_bend_arrival *a = cli_alloc(imp_bend_n_rays(b), sizeof *a);
+    const enum imp_status st = imp_bend_arrivals(b, target, a, &n);
+    imp_bend_get_rays(b, &rays);
     int across = 0; /* the axis nearest to the normal is not shown */
     for (int k = 1; k < 3; k++)
-        if (fabs(t.normal[k]) > fabs(t.normal[across])) across = k;
+        if (fabs(t->normal[k]) > fabs(t->normal[across])) across = k;
     const int u = across == 0 ? 1 : 0, v = across == 2 ? 1 : 2;
     double mid[3] = {0}, rms = 0, w = 0;
     for (size_t i = 0; i < n; i++) {
@@ -150,79 +226,119 @@ static int spots(imp_bend *b, size_t target, const char *folder, const char *pre
     for (size_t i = 0; i < n; i++)
         rms += a[i].weight * (pow(a[i].x[u] - mid[u], 2) + pow(a[i].x[v] - mid[v], 2));
     rms = sqrt(rms / (w > 0 ? w : 1));
-    for (size_t i = 0; i < 3 * (size_t)SIDE * SIDE; i++) p[i] = 1;
-    static const float ink[3] = {0.02f, 0.05f, 0.2f}, grey[3] = {.6f, .6f, .6f};
-    line(p, SIDE / 2, 0, SIDE / 2, SIDE, grey);
-    line(p, 0, SIDE / 2, SIDE, SIDE / 2, grey);
-    for (size_t i = 0; i < n; i++) {
-        const double x = SIDE / 2 + (a[i].x[u] - mid[u]) / (3 * rms + 1e-300) * SIDE / 2;
-        const double y = SIDE / 2 - (a[i].x[v] - mid[v]) / (3 * rms + 1e-300) * SIDE / 2;
-        if (!(fabs(x) < 1e4 && fabs(y) < 1e4)) continue;
-        line(p, x - 1, y, x + 1, y, ink);
-        line(p, x, y - 1, x, y + 1, ink);
+    const double half = rms > 0 && isfinite(rms) ? 3 * rms : 1;
+    const double side[2] = {-half, half};
+    *seen = (struct seen){n, rms, 2 * half};
+    int rc = st == IMP_OK ? chart_open(&c, SIDE, SIDE, side, side)
+                          : cli_fail(st, cli.scene_path);
+    if (rc) {
+        free(a);
+        return rc;
     }
-    char name[64];
+    chart_line(&c, 0, -half, 0, half, light);
+    chart_line(&c, -half, 0, half, 0, light);
+    for (size_t i = 0; i < n; i++) {
+        chart_colour colour;
+        memcpy(colour, ink, sizeof ink);
+        if (palette->n > 1) ray_colour(b, palette, rays.group[a[i].ray], colour);
+        chart_cross(&c, a[i].x[u] - mid[u], a[i].x[v] - mid[v], colour);
+    }
+    char name[64], x_name[48], y_name[48];
+    snprintf(x_name, sizeof x_name, "%s %c %.6g", names[u], mid[u] < 0 ? '+' : '-',
+             fabs(mid[u]));
+    snprintf(y_name, sizeof y_name, "%s %c %.6g", names[v], mid[v] < 0 ? '+' : '-',
+             fabs(mid[v]));
+    chart_axes(&c, x_name, y_name);
+    legend(&c, palette);
     snprintf(name, sizeof name, "spot-%zu", target);
-    const int rc = picture_save(film, folder, prefix, name);
-    cli_say("target %zu: %zu rays, rms spot %.4g; the picture is %.4g wide", target, n,
-            rms, 6 * rms);
-    imp_film_destroy(film);
+    rc = chart_save(&c, folder, prefix, name);
+    if (n > 0)
+        cli_say("target %zu: %zu rays, rms spot %.4g; the picture is %.4g wide", target,
+                n, rms, 2 * half);
+    else cli_say("target %zu: no ray arrives, the picture is empty", target);
     free(a);
     return rc;
+}
+
+/* One irradiance, in units of its mean over the target's picture. */
+static int irradiance(const struct imp_bend_target *t, const float *pixels, double most,
+                      const char *folder, const char *prefix, const char *name)
+{
+    struct chart c;
+    const int longest = t->width > t->height ? t->width : t->height;
+    const int zoom = longest < SIDE ? SIDE / longest : 1;
+    const double x[2] = {0,
+                         sqrt(t->u[0] * t->u[0] + t->u[1] * t->u[1] + t->u[2] * t->u[2])};
+    const double y[2] = {/* v runs down, from the corner at the top */
+                         sqrt(t->v[0] * t->v[0] + t->v[1] * t->v[1] + t->v[2] * t->v[2]),
+                         0};
+    const int rc = chart_open(&c, t->width * zoom, t->height * zoom, x, y);
+    if (rc) return rc;
+    for (int j = 0; j < c.rows; j++)
+        for (int i = 0; i < c.columns; i++) {
+            const double e =
+                pixels[(size_t)(j / zoom) * (size_t)t->width + (size_t)(i / zoom)] / most;
+            chart_colour colour;
+            grey(fmin(fmax(e, 0), 1), colour);
+            chart_pixel(&c, i, j, colour);
+        }
+    chart_axes(&c, "u", "v");
+    chart_bar(&c, "e / mean", 0, most, grey);
+    return chart_save(&c, folder, prefix, name);
 }
 
 static int image(imp_bend *b, size_t target, const struct imp_bend_target *t,
                  const char *folder, const char *prefix)
 {
-    imp_film *film;
-    enum imp_status st = imp_film_create(cli.context, t->width, t->height, "Y", &film);
-    if (st != IMP_OK) return cli_fail(st, NULL);
-    float *p = imp_film_mean(film), most = 1e-20f;
-    char name[64];
-    st = imp_bend_image(b, target, p);
     const size_t n = (size_t)t->width * (size_t)t->height;
+    float *p = cli_alloc(n, sizeof *p), most = 1e-20f;
+    char name[64];
+    const enum imp_status st = imp_bend_image(b, target, p);
     for (size_t i = 0; i < n; i++) most = t->pixels[i] > most ? t->pixels[i] : most;
-    for (size_t i = 0; i < n; i++) p[i] = p[i] / most;
     snprintf(name, sizeof name, "image-%zu", target);
-    int rc = st == IMP_OK ? picture_save(film, folder, prefix, name) : cli_fail(st, NULL);
-    for (size_t i = 0; i < n; i++) p[i] = t->pixels[i] / most;
+    int rc = st == IMP_OK ? irradiance(t, p, most, folder, prefix, name)
+                          : cli_fail(st, cli.scene_path);
     snprintf(name, sizeof name, "target-%zu", target);
-    if (!rc && !*prefix) rc = picture_save(film, folder, prefix, name);
-    imp_film_destroy(film);
+    if (!rc && !*prefix) rc = irradiance(t, t->pixels, most, folder, prefix, name);
+    free(p);
     return rc;
 }
 
-int bend_view(imp_bend *b, const char *folder, const char *prefix)
+static int targets(imp_bend *b, const struct palette *palette, const char *folder,
+                   const char *prefix, struct json *j)
 {
-    static const int axes[3][2] = {{1, 2}, {0, 2}, {0, 1}}; /* x, y, z held */
-    double lo[3], hi[3], range[2];
     int rc = 0;
-    box_of(b, lo, hi);
-    for (int k = 0; k < 3 && !rc; k++) {
-        imp_film *film;
-        char name[32];
-        const enum imp_status st =
-            imp_film_create(cli.context, SIDE, SIDE, "R,G,B", &film);
-        if (st != IMP_OK) return cli_fail(st, NULL);
-        slice(imp_bend_field(b), axes[k][0], axes[k][1], lo, hi, imp_film_mean(film),
-              range);
-        snprintf(name, sizeof name, "slice-%c", "xyz"[k]);
-        rc = picture_save(film, folder, prefix, name);
-        cli_say("slice %c = %.4g: index %.6g to %.6g", "xyz"[k], (lo[k] + hi[k]) / 2,
-                range[0], range[1]);
-        if (!rc && k < 2) {
-            paths_draw(b, axes[k][0], axes[k][1], lo, hi, imp_film_mean(film));
-            snprintf(name, sizeof name, "rays-%c", "xyz"[k]);
-            rc = picture_save(film, folder, prefix, name);
-        }
-        imp_film_destroy(film);
-    }
-    for (size_t i = 0; i < imp_bend_n_targets(b) && i < 8 && !rc; i++) {
+    const size_t n = imp_bend_n_targets(b);
+    if (j) json_array(j, "targets");
+    for (size_t i = 0; i < n && i < TARGETS && !rc; i++) {
         struct imp_bend_target t;
+        struct seen seen = {0, NAN, NAN};
         if (imp_bend_get_target(b, i, &t) != IMP_OK) continue;
-        rc = t.type == IMP_BEND_IMAGE || t.type == IMP_BEND_FARFIELD
-                 ? image(b, i, &t, folder, prefix)
-                 : spots(b, i, folder, prefix);
+        const int picture = t.type == IMP_BEND_IMAGE || t.type == IMP_BEND_FARFIELD;
+        rc = picture ? image(b, i, &t, folder, prefix)
+                     : spots(b, palette, i, &t, folder, prefix, &seen);
+        if (!j) continue;
+        json_object(j, NULL);
+        json_integer(j, "target", (int64_t)i);
+        json_text(j, "type", bend_target_word(t.type));
+        if (!picture) {
+            json_integer(j, "rays", (int64_t)seen.rays);
+            json_number(j, "rms_spot", seen.rms);
+            json_number(j, "picture_width", seen.wide);
+        }
+        json_end_object(j);
     }
+    if (j) json_end_array(j);
+    if (n > TARGETS && !rc)
+        cli_say("%zu targets: the first %d are drawn", n, (int)TARGETS);
+    return rc;
+}
+
+int bend_view(imp_bend *b, const char *folder, const char *prefix, struct json *j)
+{
+    struct palette palette;
+    palette_of(b, &palette);
+    int rc = slices(b, &palette, folder, prefix, j);
+    if (!rc) rc = targets(b, &palette, folder, prefix, j);
     return rc;
 }

@@ -207,11 +207,12 @@ enum imp_bend_scheme {
 };
 #define IMP_BEND_N_SCHEMES 6
 
-/** How the adjoint gets the path back. */
+/** How the adjoint recomputes the ray's states. */
 enum imp_bend_way {
-    IMP_BEND_REVERSE = 0, /**< runs the ray backwards: nothing is stored */
+    IMP_BEND_REVERSE = 0, /**< reverses the steps from the exit: nothing is stored */
     IMP_BEND_STORED,      /**< trace again into a buffer of one ray: 48 B a step */
-    IMP_BEND_PSEUDO       /**< of IMP_BEND_ARC_INDEX: biased; for comparisons only */
+    IMP_BEND_PSEUDO       /**< approximate reversal of IMP_BEND_ARC_INDEX: biased; for
+                             comparisons */
 };
 
 enum imp_bend_surface_type {
@@ -226,7 +227,7 @@ enum imp_bend_surface_type {
     IMP_BEND_MESH       /**< the shapes of `scene`, from inside; facets are planes */
 };
 
-/** What happens to a ray at a surface. */
+/** Effect of a surface on a ray. */
 enum imp_bend_event {
     IMP_BEND_END = 0, /**< the ray ends; momentum as it is (index-matched) */
     IMP_BEND_REFRACT, /**< the ray ends refracted into `index`; total reflection goes on
@@ -289,7 +290,7 @@ struct imp_bend_options {
             0, 0, 0, 0, 0, 0, 0, 0, 0                                                    \
     }
 
-enum imp_bend_flags { /* of an exit; a ray with one of DROPPED has no derivative */
+enum imp_bend_flags { /* flags of an exit; rays with one of DROPPED have no derivative */
                       IMP_BEND_TRUNCATED = 1, /**< more than max_steps */
                       IMP_BEND_MISSED =
                           2, /**< left the field, or met IMP_BEND_STOP, or no surface */
@@ -307,7 +308,9 @@ enum imp_bend_flags { /* of an exit; a ray with one of DROPPED has no derivative
                           128 /**< of a tap's record: plane not crossed */
 };
 
-/** End of a ray, or its crossing of a tap. All that is kept of a ray between passes. */
+/** End of a ray, or its crossing of a tap: all that is stored between tracing and
+ * adjoint.
+ */
 struct imp_bend_exit {
     double x[3], v[3]; /**< position; momentum (after refraction) */
     double path;       /**< optical path length, int eta ds */
@@ -360,11 +363,12 @@ struct imp_bend_cotangent {
     double x[3], v[3], path;
 };
 
-/** What the adjoint gives. Arrays may be NULL; all are overwritten. */
+/** Gradients of an adjoint. Arrays may be NULL: not wanted; all are overwritten. */
 struct imp_bend_gradient {
     size_t size;
     double *theta;           /**< [n_theta] */
-    double (*x)[3], (*d)[3]; /**< [n] origins, directions (tangent to the unit sphere) */
+    double (*x)[3], (*d)[3]; /**< [n] origins; directions as given: a ray depends on d/|d|
+                                  alone, so this is across d and falls as 1/|d| */
     double (*surfaces)[8];   /**< [n_surfaces]: 0-2 normal (plane) or centre, 3 offset or
                                   radius, 4 index outside; not for box, SDF and mesh */
     double *energy;          /**< [n] K = lam.v + mu.F at the start: 0 up to truncation */
@@ -399,7 +403,7 @@ imp_bend_path(const imp_field *field, const struct imp_bend_options *options,
               const struct imp_bend_rays *rays, size_t ray, double (**points)[4],
               size_t *n_points, struct imp_bend_exit *exit);
 
-/* ---- Problems: rays, targets, and a field that is to meet them ----------------- */
+/* ---- Problems: a field, rays, targets ------------------------------------------ */
 
 typedef struct imp_bend imp_bend;
 
@@ -415,6 +419,11 @@ IMP_API imp_field *imp_bend_field(imp_bend *bend);
  * grid: min(step_max, step_cells * cell), see imp_bend_set_step. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_set_options(imp_bend *bend, const struct imp_bend_options *o);
+/** Called while the rays of imp_bend_objective, _run, _check, _step_error, _arrivals and
+ * _image are traced: nonzero stops them with IMP_CANCELLED. NULL: none. The same as
+ * `progress` of the options. A fit calls its own instead. */
+IMP_API void imp_bend_set_progress(imp_bend *bend, imp_progress_fn progress,
+                                   void *payload);
 /** The step when options.step is 0: cells * spacing, at most `most` (0: no limit). */
 IMP_API void imp_bend_set_step(imp_bend *bend, double cells, double most);
 
@@ -448,6 +457,10 @@ IMP_API double imp_dispersion_index(const struct imp_dispersion *d, double um);
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_set_wavelength(imp_bend *bend, int bundle, const struct imp_dispersion *d,
                         double um);
+
+/** The wavelength in micrometres of a bundle, 0 if it was given none: its rays see the
+ * index as it is. */
+IMP_API double imp_bend_wavelength(const imp_bend *bend, int bundle);
 
 enum imp_bend_target_type {
     IMP_BEND_FOCUS = 0,  /**< mean |x - point|^2/2 */
@@ -501,9 +514,9 @@ imp_bend_add_smoothness(imp_bend *bend, double weight, int order, double edge);
 /** Bounds of every number of the field; default for grids of the index: 1 .. infinity. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_set_bounds(imp_bend *bend, double lo,
                                                            double hi);
-/** Hold what a fit may not change, here and on finer levels: grid coefficients in the
- * `layers` outermost layers, those whose node is outside a sphere, or one number; each
- * set to `value` (NaN: left as it is). */
+/** Hold numbers, which a fit then does not change at any level: grid coefficients in the
+ * `layers` outermost layers, those whose node is outside a sphere, or one number; each is
+ * set to `value` (NaN: unchanged). */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_hold_rim(imp_bend *bend, int layers,
                                                          double value);
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_hold_outside(imp_bend *bend,
@@ -514,7 +527,9 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_bend_hold_number(imp_bend *bend, size
 
 /** Objective and its gradient with respect to all numbers of the field (held ones: 0).
  * The rays are fixed, so both are exact: no standard error belongs to them. gradient
- * [n_theta], stats may be NULL. targets [n targets]: their parts; may be NULL. */
+ * [n_theta], stats may be NULL. targets [n targets]: their parts; may be NULL.
+ * @return IMP_OK, also if a part of the rays is lost (look at stats); IMP_E_NUMERIC if no
+ * ray comes to its end (stats is set); IMP_E_ARG; IMP_E_NOMEM; IMP_CANCELLED. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_objective(imp_bend *bend, double *value,
                                                           double *gradient,
                                                           double *targets,
@@ -527,8 +542,8 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_bend_run(imp_bend *bend,
 /** imp_bend_path of one ray of the problem. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_ray(imp_bend *bend, size_t ray, double (**points)[4], size_t *n_points);
-/** Position, direction and path of a ray at a target's plane; weight 0: it does not
- * count. */
+/** Position, direction and path of a ray at a target's plane, and its share of the
+ * target's power. */
 struct imp_bend_arrival {
     double x[3], d[3], path, weight;
     uint32_t ray;
@@ -588,17 +603,19 @@ imp_bend_fit(imp_bend *bend, const struct imp_bend_fit_options *options,
 
 /**
  * Check a problem as it stands: splat against tangent ("transpose"), reverse against
- * forward
- * ("dot"), the gradient against central differences of steps 1e-2 to 1e-8 ("difference"),
- * reversal, energy, and the error of the step by halving it ("step": value is the rms
- * change of exits, reference the change at half the step, error the error left). Rows
- * belong to the bend until its next check. @return IMP_OK also when rows fail: look at
- * `ok`.
+ * forward ("dot"), the gradient against central differences of steps 1e-2 to 1e-8
+ * ("difference"), reversal, energy, the error of the step by halving it ("step": value is
+ * the order seen, error the rms error of exits), and how many rays come to their end
+ * ("rays": value of reference, error the part that is lost). Rows belong to the bend
+ * until its next check.
+ * @return IMP_OK also when rows fail: look at `ok`; IMP_E_NUMERIC if no ray comes to its
+ * end: nothing was checked.
  */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_check(imp_bend *bend, const struct imp_check_row **rows, size_t *n_rows);
-/** Error of exits by the step, from up to `pilots` rays traced with t, t/2, t/4: rms over
- * rays, and the order seen (0: not to be seen). Outputs may be NULL. */
+/** Error of exits by the step, from about `pilots` rays traced with t, t/2, t/4: rms over
+ * rays, and the order seen (0: not to be seen). Outputs may be NULL.
+ * @return IMP_E_NUMERIC if no ray comes to its end with all three steps. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_step_error(imp_bend *bend, size_t pilots,
                                                            double *error, double *order);
 

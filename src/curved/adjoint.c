@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The exact adjoint of traced rays (docs/bent-rays.md 2.2 - 2.4). From the exit state
- * alone the ray runs backwards, its cotangents lam = dC/dx, mu = dC/dv with it, and each
- * kick leaves a piece of gradient in the field. Memory: what the tracer kept of each ray,
- * one gradient per slice of rays, and nothing that grows with the number of steps. */
+ * The exact adjoint of traced rays (docs/bent-rays.md 2.2 - 2.4). The ray is reversed from
+ * its exit state, together with its cotangents lam = dC/dx, mu = dC/dv, and each kick
+ * adds to the gradient of the field. Memory: the exits, one gradient for each slice of
+ * rays at work, and nothing that grows with the number of steps. */
 #include "adjoint.h"
 #include <string.h>
 
@@ -74,7 +74,7 @@ static enum imp_status work(size_t item, int worker, int slot_index, void *paylo
         }
         if (n == 0) break;
         for (int i = 0; i < n;
-             i++) { /* lanes at a start: to the segment before, or done */
+             i++) { /* lanes at the start of a segment: on to the one before, or done */
             while (lane[i].left == 0 && lane[i].segment > 0) {
                 imp__lane_turn(job, slot, &lane[i], &b, i, bar);
                 if (lane[i].taps) imp__lane_taps(job, &lane[i], &b, i, bar);
@@ -86,14 +86,14 @@ static enum imp_status work(size_t item, int worker, int slot_index, void *paylo
             b.x[i] = b.x[n], b.v[i] = b.v[n], b.lam[i] = b.lam[n], b.mu[i] = b.mu[n];
             b.path_bar[i] = b.path_bar[n];
             lane[i] = lane[n];
-            free_track[i] = free_track[n]; /* each lane's own stays with it */
+            free_track[i] = free_track[n]; /* a lane keeps its track when it is moved */
             free_track[n] = track;
             i--;
         }
         if (n == 0) continue;
         const struct imp__state *before[IMP_LANES];
         for (int i = 0; stored && i < n;
-             i++) { /* the known states, not the reversed ones */
+             i++) { /* stored states replace the reversed ones */
             const struct imp__state *s =
                 lane[i].track->state + lane[i].base + lane[i].left;
             b.x[i] = s->x, b.v[i] = s->v;
@@ -131,10 +131,10 @@ static enum imp_status commit(size_t item, int slot_index, void *payload)
 
 #define SLICES_MAX 128
 #define SLICES_MIN 8
-#define LOOK_MAX   4096 /* rays looked at to choose */
+#define LOOK_MAX   4096 /* rays sampled to choose the number of slices */
 
-/* The share of the field in the boxes of starts and ends of `slices` runs of rays: about
- * what a slice reaches of the coefficients. */
+/* Mean fraction of the field that the bounding box of a slice's starts and ends covers:
+ * about the fraction of the coefficients that a slice reaches. */
 static double share(const struct imp__adjoint *job, size_t slices)
 {
     const imp_field *f = job->plan->field;
@@ -161,10 +161,10 @@ static double share(const struct imp__adjoint *job, size_t slices)
     return sum / (double)slices;
 }
 
-/* Slices: enough for many threads, few while clearing and adding up what they reach of a
- * large gradient would cost more than a tenth of the rays (n_theta^(1/3) steps or so a
- * ray; neighbouring rays reach the same, rays without order all). Their number follows
- * from the problem alone, so that the sums have one order. */
+/* Rays in a slice. Many slices keep many threads busy; but each clears and adds up the
+ * coefficients that it reaches, which should cost at most a tenth of tracing its rays
+ * (about n_theta^(1/3) steps each). The number depends on the problem alone, so that sums
+ * have one order. */
 static size_t slice_rays(const struct imp__adjoint *job)
 {
     const size_t n = job->rays->n, n_theta = job->plan->field->n_theta;

@@ -10,7 +10,7 @@
 
 /* ---- Gradients by slices ------------------------------------------------------- */
 
-/* The gradient of one slice of rays. Blocks that were not touched hold nothing. */
+/* The gradient of one slice of rays. Blocks that were not touched are not initialised. */
 struct imp__partial {
     struct imp__partial *next;
     size_t slice;
@@ -26,8 +26,8 @@ struct imp__partials_part {
     bool busy;
 };
 #define IMP_PARTIALS_PARTS 16
-/* Buffers are made when a slice begins and none is idle: as many as slices are under way
- * at once. */
+/* A slice takes an idle buffer or makes one, so there are as many as slices at work at
+ * once. */
 struct imp__partials {
     imp_context *ctx;
     size_t n_theta, n_blocks;
@@ -40,13 +40,13 @@ struct imp__partials {
 void imp__partials_init(struct imp__partials *p, imp_context *ctx, size_t n_theta);
 void imp__partials_free(struct imp__partials *p);
 enum imp_status imp__partial_take(struct imp__partials *p, struct imp__partial **out);
-/* The gradient of slice `slice` (0, 1, ... each once) is complete, and no longer the
- * caller's. Whoever calls adds what can be added: coefficient by coefficient the order is
- * that of the slices, and different parts are added by different threads. */
+/* Hands in the gradient of slice `slice` (0, 1, ... each once). The calling thread adds
+ * the parts that are ready: every coefficient gets the slices in their order, and
+ * different threads add different parts. */
 void imp__partial_add(struct imp__partials *p, size_t slice, struct imp__partial *own);
-/* Of a slice that failed; NULL is fine. */
+/* Releases the gradient of a slice that failed; NULL is fine. */
 void imp__partial_drop(struct imp__partials *p, struct imp__partial *own);
-/* All slices are there: theta = the sum. */
+/* After all slices: theta = the sum. */
 enum imp_status imp__partials_sum(struct imp__partials *p, double *theta);
 
 /* ---- Rays backwards ------------------------------------------------------------ */
@@ -81,20 +81,21 @@ struct imp__lane {
     bool taps;
 };
 
-/* Lane i of b: from the cotangents of a ray's end to the start of its fractional step. */
+/* Put a ray into lane i of b: from the cotangents of its exit to the start of the
+ * fractional step there. */
 enum imp_status imp__lane_begin(const struct imp__adjoint *job,
                                 struct imp__adjoint_slot *slot, size_t ray,
                                 struct imp__track *track, struct imp__lane *l,
                                 struct imp__back *b, int i, struct imp__bar *bar);
-/* Taps inside the step that begins here: their cotangents come in through their own
- * fractional step. */
+/* Add the cotangents of taps crossed within the step that begins at the lane's state,
+ * each through the adjoint of its own fractional step. */
 void imp__lane_taps(const struct imp__adjoint *job, struct imp__lane *l,
                     struct imp__back *b, int i, struct imp__bar *bar);
-/* Back through a turn in the middle of the ray, into the segment before it. */
+/* Adjoint of a reflection between two segments; the lane goes on with the earlier one. */
 void imp__lane_turn(const struct imp__adjoint *job, struct imp__adjoint_slot *slot,
                     struct imp__lane *l, struct imp__back *b, int i,
                     struct imp__bar *bar);
-/* From the start of the steps back to the ray as it was given. */
+/* From the start of the first step to the ray's origin and direction as given. */
 void imp__lane_end(const struct imp__adjoint *job, struct imp__adjoint_slot *slot,
                    struct imp__lane *l, struct imp__back *b, int i, struct imp__bar *bar);
 

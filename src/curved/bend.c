@@ -36,9 +36,9 @@ void imp_bend_destroy(imp_bend *b)
     for (size_t i = 0; i < b->n_sdfs; i++) imp_field_destroy(b->sdfs[i]);
     for (size_t i = 0; i < b->n_scenes; i++) imp_scene_destroy(b->scenes[i]);
     void *const owned[] = {
-        b->surfaces, b->taps,         b->x,       b->d,     b->power,
-        b->group,    b->bundle_first, b->targets, b->holds, b->smooths,
-        b->sdfs,     b->scenes,       b->history, b->rows,  b->dispersion};
+        b->surfaces,     b->taps,    b->x,          b->d,       b->power, b->group,
+        b->bundle_first, b->targets, b->holds,      b->smooths, b->sdfs,  b->scenes,
+        b->history,      b->rows,    b->dispersion, b->um};
     for (size_t i = 0; i < imp_count(owned); i++) imp__release(ctx, owned[i]);
     imp_field_destroy(b->field);
     imp__release(ctx, b);
@@ -77,6 +77,12 @@ enum imp_status imp_bend_set_options(imp_bend *b, const struct imp_bend_options 
     b->options = *o;
     b->options.surfaces = s, b->options.taps = t;
     return IMP_OK;
+}
+
+void imp_bend_set_progress(imp_bend *b, imp_progress_fn progress, void *payload)
+{
+    b->options.progress = progress;
+    b->options.progress_payload = payload;
 }
 
 void imp_bend_set_step(imp_bend *b, double cells, double most)
@@ -186,7 +192,7 @@ static enum imp_status target_check(const imp_bend *b, const struct imp_bend_tar
     return IMP_OK;
 }
 
-static size_t data_size(enum imp_bend_target_type type)
+size_t imp__target_numbers(enum imp_bend_target_type type)
 {
     switch (type) {
     case IMP_BEND_POINTS:
@@ -212,13 +218,13 @@ enum imp_status imp_bend_add_target(imp_bend *b, const struct imp_bend_target *d
     struct imp__target_of_rays t = {.desc = *desc};
     t.first = desc->bundle < 0 ? 0 : b->bundle_first[desc->bundle];
     t.last = desc->bundle < 0 ? b->n : b->bundle_first[desc->bundle + 1];
-    const size_t n = (t.last - t.first) * data_size(desc->type);
+    const size_t n = (t.last - t.first) * imp__target_numbers(desc->type);
     const size_t n_pixels = desc->pixels ? (size_t)desc->width * (size_t)desc->height : 0;
     if (t.desc.weight == 0) t.desc.weight = 1;
     imp_v3 normal = imp__v3_load(desc->normal);
     const double length = imp__length(normal);
     if (desc->at_plane) {
-        double along = 0; /* the normal looks the way the rays go */
+        double along = 0; /* the normal is turned along the rays' directions */
         for (size_t i = t.first; i < t.last; i++)
             along += imp__dot(normal, imp__normalize(imp__v3_load(b->d[i])));
         const double k = along < 0 ? -1 / length : 1 / length;
@@ -228,6 +234,7 @@ enum imp_status imp_bend_add_target(imp_bend *b, const struct imp_bend_target *d
     for (size_t i = t.first; i < t.last; i++) t.power += b->power[i];
     if (!(t.power > 0))
         IMP_TRY(imp__error(ctx, IMP_E_ARG, "target of rays without power"));
+    t.n_data = n;
     if (n > 0) {
         t.data = imp__alloc(ctx, n, sizeof *t.data);
         if (!t.data) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a target"));

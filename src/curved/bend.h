@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A problem of bent rays: what is held between bend.c (making it), target.c and image.c
- * (what the rays should do), objective.c (value and gradient) and fit.c. */
+ * A problem of bent rays: field, rays, targets and the rules of a fit. bend.c makes it,
+ * target.c and image.c evaluate targets, objective.c adds them up and differentiates,
+ * fit.c minimises. */
 #ifndef IMP_CURVED_BEND_H
 #define IMP_CURVED_BEND_H
 
@@ -9,13 +10,14 @@
 
 struct imp__target_of_rays {
     struct imp_bend_target desc; /* data, pixels point to copies */
-    double *data;
+    double *data;                /* [n_data] */
+    size_t n_data;
     float *pixels;      /* divided by their mean */
     size_t first, last; /* rays */
     double power;       /* of these rays together */
 };
 
-struct imp__hold { /* rules, applied again on finer levels */
+struct imp__hold { /* numbers that a fit may not change: a rule, applied at each level */
     enum { IMP_HOLD_RIM, IMP_HOLD_OUTSIDE, IMP_HOLD_NUMBER } kind;
     int layers;
     imp_v3 centre;
@@ -47,6 +49,8 @@ struct imp_bend {
 
     double *dispersion; /* [cap_dispersion] factor of eta - 1 by bundle; NULL: all 1 */
     size_t cap_dispersion;
+    double *um; /* [cap_um] wavelength by bundle in micrometres; 0: none was given */
+    size_t cap_um;
 
     size_t n_targets, cap_targets;
     struct imp__target_of_rays *targets;
@@ -66,7 +70,10 @@ struct imp_bend {
     size_t n_history, cap_history;
 };
 
-/* The options with the step that rays take now. */
+/* IMP_E_NUMERIC, with the counts in the message, if no ray came to its end: a value or a
+ * check over no rays would look like a perfect one. */
+enum imp_status imp__bend_traced(const imp_bend *b, const struct imp_bend_stats *s);
+/* The options, with the step chosen from the grid where none is given. */
 void imp__bend_options(const imp_bend *b, struct imp_bend_options *o);
 static inline struct imp_bend_rays imp__bend_rays(const imp_bend *b)
 {
@@ -82,7 +89,8 @@ struct imp__scaled {
 };
 void imp__scaled_init(struct imp__scaled *s, imp_field *of, double k);
 double imp__bend_factor(const imp_bend *b, const struct imp_bend_rays *rays, size_t i);
-/* As the calls without a bend, each ray with the field at its bundle's wavelength. */
+/* imp_bend_trace, _adjoint and _tangent, each ray in the field at its bundle's
+ * wavelength. */
 enum imp_status
 imp__bundles_trace(const imp_bend *b, imp_field *field, const struct imp_bend_options *o,
                    const struct imp_bend_rays *rays, struct imp_bend_exit *exits,
@@ -99,8 +107,8 @@ enum imp_status imp__bundles_tangent(const imp_bend *b, const struct imp_bend_op
                                      const double *theta_dot,
                                      struct imp_bend_cotangent *dots);
 
-/* Leaves of a field: itself, or the parts of a sum. `offset`: of its theta in the whole.
- */
+/* Calls `each` for the parts of a sum, or for a field that is none. `offset` is that of
+ * the part's theta in the whole. */
 void imp__field_leaves(imp_field *f, size_t offset,
                        void (*each)(imp_field *leaf, size_t offset, void *payload),
                        void *payload);
@@ -110,14 +118,16 @@ void imp__bend_hold(const imp_bend *b, uint8_t *mask, double *theta);
 /* Bounds of all numbers. */
 void imp__bend_bounds(const imp_bend *b, double *lo, double *hi);
 
-/* Where a ray arrives, and back. */
+/* A ray at its target: at its exit or tap, or continued straight to the target's plane.
+ */
 struct imp__arrival {
     imp_v3 x, d, v;
     double path, weight, s, slope;
 };
 bool imp__arrive(const struct imp_bend_target *t, const struct imp_bend_exit *e,
                  struct imp__arrival *a);
-/* Adds to the exit's cotangent; d_bar of the direction, v_bar of the momentum itself. */
+/* Adds to the cotangent of the exit, from those of the arrival: of position, direction
+ * (d_bar), momentum (v_bar), path and weight. */
 void imp__arrive_vjp(const struct imp_bend_target *t, const struct imp__arrival *a,
                      imp_v3 x_bar, imp_v3 d_bar, imp_v3 v_bar, double path_bar,
                      double weight_bar, struct imp_bend_cotangent *bar);
@@ -128,6 +138,8 @@ imp__target_exit(const struct imp_bend_target *t, const struct imp_bend_exit *ex
     return t->tap < 0 ? &exits[i] : &taps[i * n_taps + (size_t)t->tap];
 }
 
+/* Numbers a ray of a target's data; 0: the type has none. */
+size_t imp__target_numbers(enum imp_bend_target_type type);
 /* Value of one target; adds cotangents to bars [n], tap_bars (NULL: value only). */
 enum imp_status imp__target_value(const imp_bend *b, const struct imp__target_of_rays *t,
                                   const struct imp_bend_exit *exits,
@@ -140,7 +152,7 @@ enum imp_status imp__image_value(const imp_bend *b, const struct imp__target_of_
                                  const struct imp_bend_exit *taps, double *value,
                                  struct imp_bend_cotangent *bars,
                                  struct imp_bend_cotangent *tap_bars, float *pixels);
-/* Smoothness of all grids; gradient [n_theta] is added to, may be NULL. */
+/* Smoothness of all grids; adds to gradient [n_theta], which may be NULL. */
 double imp__smooth_value(const imp_bend *b, double *gradient);
 
 #endif

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
- *
- * A problem of bent rays checks itself: the identities that its gradient must satisfy,
- * and how far its steps are from the rays of the field. */
+ * Checks of a problem of bent rays: identities that its gradient must satisfy, and the
+ * error of its step. */
 #include "bend.h"
 #include "math/rng.h"
 #include <string.h>
@@ -58,8 +57,14 @@ enum imp_status imp_bend_step_error(imp_bend *b, size_t pilots, double *error,
             sum[1] += imp__sqr(h->x[k] - q->x[k]);
         }
     }
-    const double d0 = used > 0 ? sqrt(sum[0] / used) : NAN,
-                 d1 = used > 0 ? sqrt(sum[1] / used) : NAN;
+    if (!(used > 0)) {
+        if (stride > 1) st = imp_bend_step_error(b, b->n, error, order); /* all rays */
+        else
+            st = imp__error(b->ctx, IMP_E_NUMERIC,
+                            "error of the step: none of %zu rays comes to its end", n);
+        goto out;
+    }
+    const double d0 = sqrt(sum[0] / used), d1 = sqrt(sum[1] / used);
     const double p = d1 > 1e-14 && d0 > d1 ? log2(d0 / d1) : 0;
     /* |x_t - x_{t/2}| = error(t) (1 - 2^-p) (docs/bent-rays.md 2.5) */
     if (error) *error = p > 0 ? d0 / (1 - exp2(-p)) : d0;
@@ -95,7 +100,8 @@ static enum imp_status check_transpose(imp_bend *b, const double *dot, double *b
                                              .limit = 1e-12});
 }
 
-static enum imp_status check_dot(imp_bend *b, const double *dot, double *bar)
+static enum imp_status check_dot(imp_bend *b, const double *dot, double *bar,
+                                 struct imp_bend_stats *traced)
 {
     enum imp_status st = IMP_OK;
     struct imp_bend_options o;
@@ -110,7 +116,8 @@ static enum imp_status check_dot(imp_bend *b, const double *dot, double *bar)
     if (!e || !te || !c)
         IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "no memory for a check"));
     IMP_TRY(imp_bend_get_options(b, &o));
-    IMP_TRY(imp__bundles_trace(b, b->field, &o, &r, e, te, NULL));
+    IMP_TRY(imp__bundles_trace(b, b->field, &o, &r, e, te, traced));
+    IMP_TRY(imp__bend_traced(b, traced));
     for (size_t i = 0; i < b->n; i++) {
         for (int k = 0; k < 3; k++)
             c[i].x[k] = random_pm(4 + (uint64_t)k, i),
@@ -174,8 +181,8 @@ static void trilinear_leaf(imp_field *f, size_t offset, void *payload)
     t->spacing = f->spacing;
 }
 
-/* Of a trilinear field rays that run along a face of cells (the middle one of a beam,
- * say) have a kink: they are moved aside, by a thousandth of a cell. */
+/* In a trilinear field the objective has a kink where a ray runs along cell faces (the
+ * middle ray of a beam may): all rays are shifted by a thousandth of a cell. */
 static void aside(const imp_bend *b, double by, double (*x)[3])
 {
     for (size_t i = 0; i < b->n; i++) {
@@ -186,7 +193,7 @@ static void aside(const imp_bend *b, double by, double (*x)[3])
     }
 }
 
-/* Along the gradient scaled to 1: the direction a fit goes. */
+/* Central differences along the gradient, scaled to a greatest component of 1. */
 static enum imp_status check_differences(imp_bend *b, double *dot, double *bar)
 {
     enum imp_status st = IMP_OK;
@@ -212,7 +219,8 @@ static enum imp_status check_differences(imp_bend *b, double *dot, double *bar)
     }
     const bool smooth = b->field->ops != &imp__field_sum && !tri.any;
     const bool some_floats = memchr(floats.mask, 1, n) != NULL;
-    for (size_t i = 0; i < b->n; i++) { /* objectives are squares of lengths, mostly */
+    for (size_t i = 0; i < b->n;
+         i++) { /* scale of rounding: most objectives are squared lengths */
         const imp_v3 at = imp__v3_load(x[i]);
         size2 = fmax(size2, imp__dot(at, at));
     }
@@ -223,17 +231,19 @@ static enum imp_status check_differences(imp_bend *b, double *dot, double *bar)
             const double sign = side ? -1 : 1;
             for (size_t i = 0; i < n; i++) {
                 moved[i] = theta[i] + sign * eps * dot[i];
-                if (floats.mask[i]) moved[i] = (float)moved[i]; /* what rays will see */
+                if (floats.mask[i]) moved[i] = (float)moved[i]; /* as it is traced */
                 want += sign * bar[i] * (moved[i] / (2 * eps));
             }
             IMP_TRY(imp_field_set_theta(b->field, moved));
-            IMP_TRY(imp_bend_objective(b, &f[side], NULL, NULL, NULL));
+            st = imp_bend_objective(b, &f[side], NULL, NULL, NULL);
+            if (st == IMP_E_NUMERIC) f[side] = NAN, st = IMP_OK; /* this row fails */
+            if (st != IMP_OK) goto out;
         }
-        /* Curvature of the objective at large steps, rounding at small ones: the middle
-         * must agree; of trilinear fields, the smallest (docs/bent-rays.md 3.3). What the
-         * next larger step says of the error that is left is allowed (a hundredth; two,
-         * to be safe); and where the objective is at its least, gradients that a motion
-         * of 1e-12 makes, or of a float's last bit. */
+        /* Curvature of the objective limits large steps and rounding small ones, so those
+         * between are judged; for trilinear fields the smallest (docs/bent-rays.md 3.3). The
+         * error left is 1/100 of the change from the next larger step; 1/50 is allowed.
+         * At a minimum the gradient may be what a change of theta by 1e-12, or by a
+         * float's last bit, makes of the curvature. */
         const double fd = (f[0] - f[1]) / (2 * eps);
         if (k <= 4) bend = fmax(bend, fabs(f[0] + f[1] - 2 * value) / (eps * eps));
         const double left = !smooth            ? bend * eps
@@ -254,7 +264,7 @@ static enum imp_status check_differences(imp_bend *b, double *dot, double *bar)
     }
 out:
     if (x) memcpy(b->x, x, b->n * sizeof *x);
-    if (theta) { /* as it was, also after a failure */
+    if (theta) { /* restored also after a failure */
         const enum imp_status back = imp_field_set_theta(b->field, theta);
         if (st == IMP_OK) st = back;
     }
@@ -270,19 +280,26 @@ enum imp_status imp_bend_check(imp_bend *b, const struct imp_check_row **rows,
     enum imp_status st = IMP_OK;
     const size_t n = b->field->n_theta;
     double *dot = imp__alloc(b->ctx, 2 * n + 1, sizeof *dot), *bar = dot ? dot + n : NULL;
+    struct imp_bend_stats traced = IMP_BEND_STATS_INIT;
     double error, order;
     if (!dot) return imp__error(b->ctx, IMP_E_NOMEM, "no memory for a check");
     if (b->n == 0) IMP_TRY(imp__error(b->ctx, IMP_E_ARG, "a problem without rays"));
     b->n_rows = 0;
     for (size_t i = 0; i < n; i++) dot[i] = random_pm(11, i);
     IMP_TRY(check_transpose(b, dot, bar));
-    IMP_TRY(check_dot(b, dot, bar));
+    IMP_TRY(check_dot(b, dot, bar, &traced));
     if (b->n_targets > 0) IMP_TRY(check_differences(b, dot, bar));
     IMP_TRY(imp_bend_step_error(b, 200, &error, &order));
     IMP_TRY(row_add(b, (struct imp_check_row){.method = "step",
                                               .param = "rms of exits",
                                               .value = order,
                                               .error = error}));
+    const double all = (double)b->n;
+    IMP_TRY(row_add(b, (struct imp_check_row){.method = "rays",
+                                              .param = "come to their end",
+                                              .value = (double)traced.traced,
+                                              .reference = all,
+                                              .error = 1 - (double)traced.traced / all}));
     *rows = b->rows;
     *n_rows = b->n_rows;
 out:

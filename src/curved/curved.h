@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The room of bent rays. A field kind is a table of functions (eval, splat, tangent); a
- * step scheme is a list of drifts and kicks; a surface is where a ray ends or turns.
- * Everything that moves a ray, forwards, backwards or along a tangent, reads the same
- * list, so the derivative is that of the program that traces. Equation numbers: Teh et
- * al. 2022, supplement, with the corrections of docs/bent-rays.md 1.3. */
+ * Ray tracing in a graded refractive index. A field kind is a table of functions (eval,
+ * splat, tangent); an integration scheme is a list of drifts and kicks; a ray ends, is
+ * refracted or is reflected at a surface. The forward step, its adjoint and its tangent
+ * read the same list, so the derivative is that of the program that traces. Equation
+ * numbers: Teh et al. 2022, supplement, with the corrections of docs/curved-rays.md. */
 #ifndef IMP_CURVED_CURVED_H
 #define IMP_CURVED_CURVED_H
 
@@ -46,8 +46,9 @@ void imp__step_rate(const struct imp__scheme *s, const imp_field *f, double t,
 void imp__step_tangent(const struct imp__scheme *s, const imp_field *f, double t,
                        const double *theta_dot, struct imp__state *state,
                        struct imp__state *dot);
-/* Adjoint. In: state after the step and cotangents there; out: before it. `before`: the
- * known states before the step, or NULL to reverse (index form: pseudo-reverse). */
+/* Adjoint of a step: takes state and cotangents after the step to those before it.
+ * `before` holds stored states before the step; NULL: they are recomputed by reversing
+ * the step (index form: by its biased pseudo-reverse). */
 struct imp__back {
     imp_v3 x[IMP_LANES], v[IMP_LANES], lam[IMP_LANES], mu[IMP_LANES];
     double path_bar[IMP_LANES];
@@ -55,7 +56,8 @@ struct imp__back {
 void imp__step_adjoint(const struct imp__scheme *s, const imp_field *f, double t, int n,
                        struct imp__back *b, const struct imp__state *const *before,
                        struct imp__bar *bar);
-/* Adjoint of the kick of ray i, with the field there: what to splat is returned. A path
+/* Adjoint of the kick of ray i, given the field's jet at its position. Returns the
+ * cotangents of the index (*value) and of its gradient (*slope), to be splatted. A path
  * cotangent adds S_bar 2 t eta to the value's and S_bar t 2F to lam. */
 static inline __attribute__((always_inline)) void
 imp__kick_back(bool arc, double dt, const struct imp__jet *j, struct imp__back *b, int i,
@@ -85,8 +87,8 @@ enum imp__surface_kind {
     IMP__APPROACH,
     IMP__MESH
 };
-/* Where a box has become six planes. G < 0 inside; a crossing is G going from <= 0 to >
- * 0. */
+/* A surface as the tracer uses it: a box has been split into six planes. G < 0 inside; a
+ * ray crosses where G goes from <= 0 to > 0. */
 struct imp__surface {
     enum imp__surface_kind kind;
     enum imp_bend_event event;
@@ -94,7 +96,7 @@ struct imp__surface {
     imp_v3 n, c; /* normal or axis; centre */
     double offset, radius, index;
     const imp_field *sdf;
-    const imp_scene *scene; /* MESH: what is hit gives n and offset of the facet */
+    const imp_scene *scene; /* MESH: n and offset are those of the facet that was hit */
 };
 /* G, its gradients in x and v, and Hess_x G times a vector. */
 struct imp__surface_at {
@@ -105,31 +107,35 @@ void imp__surface_eval(const struct imp__surface *s, const imp_v3 *x, const imp_
                        struct imp__surface_at *at);
 void imp__surface_hess(const struct imp__surface *s, const imp_v3 *x, const imp_v3 *m,
                        imp_v3 *out);
-/* Is a crossing at x one (a disc has a rim)? */
-/* The first facet of a MESH surface that the way from a to b crosses outwards (inwards:
- * from outside), as a plane. */
+/* The first facet of a MESH surface that the segment from a to b crosses outwards (with
+ * `inwards`: inwards), as a plane. False: it crosses none. */
 bool imp__facet(const struct imp__surface *s, const imp_v3 *a, const imp_v3 *b,
                 bool inwards, double nearest, struct imp__surface *facet);
+/* Does x, on the surface's plane, lie within a disc's radius? True for other kinds. */
 bool imp__surface_covers(const struct imp__surface *s, const imp_v3 *x);
 
-/* Momentum v through a surface at unit normal n into index e2 (docs/bent-rays.md 3.5). */
-struct imp__turn {
+/* Refraction of momentum v at unit normal n into index e2, or reflection: `mirror`, or
+ * total reflection (docs/bent-rays.md 3.5). */
+struct imp__bend_turn {
     imp_v3 v;
     bool reflected;
     double a, q, c, sign;
 };
-void imp__turn(const imp_v3 *n, const imp_v3 *v, double e2, bool mirror,
-               struct imp__turn *out);
-/* Cotangents of v', -> of v, n, e2. */
-void imp__turn_vjp(const struct imp__turn *t, const imp_v3 *n, const imp_v3 *v, double e2,
-                   const imp_v3 *bar, imp_v3 *v_bar, imp_v3 *n_bar, double *e2_bar);
-void imp__turn_jvp(const struct imp__turn *t, const imp_v3 *n, const imp_v3 *v, double e2,
-                   const imp_v3 *v_dot, const imp_v3 *n_dot, double e2_dot, imp_v3 *dot);
+void imp__bend_turn(const imp_v3 *n, const imp_v3 *v, double e2, bool mirror,
+                    struct imp__bend_turn *out);
+/* From the cotangent of the new momentum to those of v, n and e2. */
+void imp__bend_turn_vjp(const struct imp__bend_turn *t, const imp_v3 *n, const imp_v3 *v,
+                        double e2, const imp_v3 *bar, imp_v3 *v_bar, imp_v3 *n_bar,
+                        double *e2_bar);
+void imp__bend_turn_jvp(const struct imp__bend_turn *t, const imp_v3 *n, const imp_v3 *v,
+                        double e2, const imp_v3 *v_dot, const imp_v3 *n_dot,
+                        double e2_dot, imp_v3 *dot);
 
 /* ---- Plans: options made ready ------------------------------------------------- */
 
-struct imp__domain {  /* what one group of rays meets */
-    imp_v3 lo, hi;    /* inside this box no box face is met and the field is defined */
+struct imp__domain { /* the surfaces of one group of rays */
+    imp_v3 lo,
+        hi; /* inside this box no face of a box is crossed and the field is defined */
     int n, n_general; /* the last n_general are not faces of boxes */
     struct imp__surface *surface;
 };
@@ -139,11 +145,12 @@ struct imp__plan {
     const struct imp__scheme *scheme;
     struct imp_bend_options options;
     double t, grazing, outside_index, reversal;
-    double size;   /* a length of the whole: the field's or the rays' box */
+    double size;   /* longest side of the field's box, or of the rays' origins */
     imp_v3 lo, hi; /* a ray outside this has left the field: its box and a margin */
     uint32_t max_steps;
     int n_groups;
-    struct imp__domain *domain; /* [n_groups + 1]; the last: groups without their own */
+    struct imp__domain *
+        domain; /* [n_groups + 1]; the last serves groups without surfaces of their own */
     struct imp__surface *surfaces;
     struct imp__surface taps[IMP_BEND_TAPS_MAX];
     int tap_group[IMP_BEND_TAPS_MAX];
@@ -163,18 +170,19 @@ static inline const struct imp__domain *imp__plan_domain(const struct imp__plan 
     return &p->domain[group < p->n_groups ? group : p->n_groups];
 }
 
-/* Start of ray i: position, momentum; for rays from outside also where they come from. */
+/* Start of ray i: position and momentum; with options.outside also its entry point. */
 struct imp__start {
     imp_v3 x0, d0;                    /* as given, d0 unit */
     double length;                    /* |d| as given */
     struct imp__state at;             /* where the steps begin */
     const struct imp__surface *entry; /* NULL: begins at x0 */
-    double tau;                       /* of the straight way to the entry, in sigma */
-    struct imp__jet jet;              /* value and gradient of the field at `at` */
+    double tau;          /* length in sigma of the straight line to the entry */
+    struct imp__jet jet; /* value and gradient of the field at `at` */
     unsigned flags;
     struct imp__surface facet; /* the entry itself if that is a mesh */
 };
-/* Where it entered; starts are copied, so not a pointer into one. */
+/* The surface entered. A function, since a start that is copied may not point into
+ * itself. */
 static inline const struct imp__surface *imp__start_entry(const struct imp__start *s)
 {
     return s->entry && s->entry->kind == IMP__MESH ? &s->facet : s->entry;
@@ -182,30 +190,31 @@ static inline const struct imp__surface *imp__start_entry(const struct imp__star
 void imp__start_ray(const struct imp__plan *p, const struct imp_bend_rays *rays, size_t i,
                     struct imp__start *out);
 
-/* Length of the step from `from` to the crossing of one surface; the state there. */
+/* Length of the fractional step from `from` onto one surface, and the state there. */
 double imp__land_on(const struct imp__plan *p, const struct imp__surface *s,
                     const struct imp__state *from, double t, double g0, double g1,
                     struct imp__state *at);
 
-/* The first surface passed by the step from `from` to (x1, v1); NULL: none. `facet` is
- * room for the one of a mesh. */
+/* The first surface that the step from `from` to (x1, v1) crosses; NULL: none. *facet
+ * stores the facet if that is a mesh. */
 const struct imp__surface *
 imp__land_first(const struct imp__plan *p, const struct imp__domain *d,
                 const struct imp__state *from, const imp_v3 *x1, const imp_v3 *v1,
                 double *tau, struct imp__state *at, struct imp__surface *facet);
 
-/* End of a segment of a ray, before the event's map. */
+/* A segment of a ray ends at a surface; this is its end before refraction or reflection.
+ */
 struct imp__segment {
-    struct imp__state at, from; /* there; at the start of its fractional step */
+    struct imp__state at, from; /* at the surface; at the start of the fractional step */
     const struct imp__surface *surface;
     double tau;
     uint32_t steps;
-    struct imp__surface facet; /* surface points here if that is a mesh */
+    struct imp__surface facet; /* `surface` points here for meshes */
 };
-/* One ray with everything noted. Same bits as the many-ray tracer. */
+/* One ray with its segments recorded. Same bits as the tracer of many rays. */
 struct imp__track {
     imp_context *ctx;
-    bool states;              /* keep the states at the start of each step, too */
+    bool states;              /* record the state at the start of each step, too */
     struct imp__state *state; /* [n]; those of segment k begin at sum (steps + 1) */
     size_t n, capacity;
     int n_segments;
@@ -226,7 +235,7 @@ enum imp_status imp__count(const struct imp__plan *p, size_t n,
                            const struct imp_bend_exit *exits,
                            const struct imp_bend_exit *taps,
                            struct imp_bend_stats *stats);
-/* The event's surface of an exit: of a box, its face there. */
+/* The surface of an exit; for boxes the face. */
 const struct imp__surface *imp__exit_surface(const struct imp__plan *p, int group,
                                              const struct imp_bend_exit *e);
 

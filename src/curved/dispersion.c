@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
- *
- * Several wavelengths in one problem. What is graded is one material, more or less of it:
- * at wavelength lambda the index is
+ * Several wavelengths in one problem. The field is one material of varying density; at
+ * wavelength lambda the index is
  *     eta_lambda(x) = 1 + k (eta(x) - 1),  k = (n(lambda) - 1)/(n(reference) - 1)
  * with n of the material's formula. Gases follow this exactly (n - 1 is proportional to
  * density, Gladstone and Dale 1863), polymers and glasses of one family nearly. It is
@@ -65,7 +64,7 @@ static void scaled_moved(imp_field *f)
 static void scaled_destroy(imp_field *f)
 {
     imp_field *of = ((struct imp__scaled *)f)->of;
-    of->borrowed = true; /* its numbers are released as those of the whole */
+    of->borrowed = true; /* its theta is released with the scaled field */
     imp_field_destroy(of);
 }
 static const char *scaled_param_name(const imp_field *f, size_t i)
@@ -123,11 +122,22 @@ enum imp_status imp_bend_set_wavelength(imp_bend *b, int bundle,
     const size_t old = b->cap_dispersion, n_bundles = (size_t)b->n_bundles;
     double *grown =
         imp__grow(b->ctx, b->dispersion, &b->cap_dispersion, n_bundles, sizeof *grown);
-    if (!grown) return imp__error(b->ctx, IMP_E_NOMEM, "no memory for wavelengths");
-    b->dispersion = grown;
-    for (size_t i = old; i < b->cap_dispersion; i++) grown[i] = 1;
+    if (grown) {
+        b->dispersion = grown;
+        for (size_t i = old; i < b->cap_dispersion; i++) grown[i] = 1;
+    }
+    double *um_grown = imp__grow(b->ctx, b->um, &b->cap_um, n_bundles, sizeof *b->um);
+    if (um_grown) b->um = um_grown;
+    if (!grown || !um_grown)
+        return imp__error(b->ctx, IMP_E_NOMEM, "no memory for wavelengths");
     grown[bundle] = k;
+    b->um[bundle] = um;
     return IMP_OK;
+}
+
+double imp_bend_wavelength(const imp_bend *b, int bundle)
+{
+    return bundle >= 0 && (size_t)bundle < b->cap_um ? b->um[bundle] : 0;
 }
 
 double imp__bend_factor(const imp_bend *b, const struct imp_bend_rays *rays, size_t i)
@@ -136,7 +146,7 @@ double imp__bend_factor(const imp_bend *b, const struct imp_bend_rays *rays, siz
     return group < b->cap_dispersion ? b->dispersion[group] : 1;
 }
 
-/* Rays in a row that see one field: first .. the result - 1. */
+/* End of the run of rays from `first` on that have one factor. */
 static size_t run_end(const imp_bend *b, const struct imp_bend_rays *rays, size_t first)
 {
     if (!b->dispersion) return rays->n;

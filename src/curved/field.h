@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Fields of refractive index: a kind is a table of functions (eval, splat, tangent), and
- * what the kinds hold that other files know of. */
+ * Fields of refractive index: a kind is a table of functions (eval, splat, tangent). The
+ * structs of those kinds that other files need to see are at the end. */
 #ifndef IMP_CURVED_FIELD_H
 #define IMP_CURVED_FIELD_H
 
@@ -20,17 +20,18 @@ struct imp__jet {
     imp_v3 g, h[3];
 };
 
-/* Where a gradient is added up. A large gradient is mostly not reached by a slice of
- * rays, so its blocks are cleared when they are first touched, and only those are added
- * to the sum (gradient.c). */
+/* Accumulator of a gradient. A slice of rays reaches few blocks of a large gradient, so
+ * blocks are cleared when first touched, and only those are added to the sum
+ * (gradient.c). */
 #define IMP_BLOCK_SHIFT 12
 struct imp__bar {
-    double *theta;    /* of the whole field ... */
-    size_t first;     /* ... where the numbers of this part begin */
-    uint8_t *touched; /* by blocks; NULL: theta is all zero or more, nothing is noted */
+    double *theta;    /* gradient of the whole field */
+    size_t first;     /* offset of the part that splats (in a sum of fields) */
+    uint8_t *touched; /* dirty flags by block; NULL: theta was cleared by the caller */
 };
 void imp__bar_touch(struct imp__bar *bar, size_t first_block, size_t last_block);
-/* The numbers of this part; of them i .. i + n - 1 will be added to. */
+/* The gradient of this part, with the blocks of numbers i .. i + n - 1 cleared and
+ * marked. */
 static inline double *imp__bar_reach(struct imp__bar *bar, size_t i, size_t n)
 {
     if (bar->touched) {
@@ -42,8 +43,9 @@ static inline double *imp__bar_reach(struct imp__bar *bar, size_t i, size_t n)
     return bar->theta + bar->first;
 }
 
-/* Order in which n lanes add to a gradient: neighbours in a beam reach overlapping rows,
- * and a load that overlaps a store still under way waits for it. */
+/* Order in which n lanes add to a gradient. Neighbours in a beam reach overlapping rows,
+ * and a load that overlaps a store still in the store buffer stalls; so they alternate.
+ */
 static inline int imp__lane_order(int n, int k)
 {
     return n == IMP_LANES ? (k >> 1) + IMP_LANES / 2 * (k & 1) : k;
@@ -65,10 +67,11 @@ struct imp__field_ops {
                       struct imp__bar *bar);
     void (*tangent)(const imp_field *f, const imp_v3 *x, const double *theta_dot,
                     double *eta_dot, imp_v3 *g_dot);
-    /* theta has new values; NULL: nothing to do. */
+    /* Called after theta changed; may be NULL. */
     void (*changed)(imp_field *f);
-    void (*destroy)(imp_field *f); /* what the kind holds besides theta; may be NULL */
-    /* theta is about to live elsewhere (inside a sum); NULL: nothing to do. */
+    void (*destroy)(
+        imp_field *f); /* releases what the kind owns besides theta; may be NULL */
+    /* Called after f->theta points elsewhere (into a sum's numbers); may be NULL. */
     void (*moved)(imp_field *f);
     const char *(*param_name)(const imp_field *f,
                               size_t i); /* NULL: numbers without names */
@@ -81,7 +84,7 @@ struct imp_field {
     double *theta;
     bool borrowed;  /* theta belongs to a sum */
     imp_v3 lo, hi;  /* where it is defined; infinite for profiles */
-    double spacing; /* of samples, the smallest; 0: none */
+    double spacing; /* smallest spacing of samples; 0: no samples */
 };
 
 /* Set ops, n_theta, bounds (infinite) and allocate theta. `size` of the kind's struct,
@@ -115,10 +118,10 @@ bool imp__field_is_grid(const imp_field *f);
 /* Numbers of grid f -> of the grid that is twice as fine; linear. */
 enum imp_status imp__grid_prolong(const imp_field *f, const double *coarse, double *fine);
 enum imp_status imp__tie_refine(const imp_field *f, imp_field **out);
-/* The same of a grid or a tie, whose finer field is there. */
+/* The same for a grid or a tied grid; `finer` is its refined field. */
 enum imp_status imp__field_prolong(const imp_field *f, const imp_field *finer,
                                    const double *coarse, double *fine);
-/* The cell around a point as a grid of its own, one cell large, of numbers `local`. */
+/* The cell that contains x, as a grid of one cell with the coefficients `local`. */
 struct imp__grid imp__grid_cell(const struct imp__grid *g, imp_v3 x, double *local,
                                 size_t corner[3]);
 /* For both kinds of grids: `tangent` of the table. */
@@ -156,13 +159,13 @@ static inline void imp__eta2_jvp(const struct imp__jet *at, struct imp__jet *j)
 /* Cubic B-splines on one axis: numbers first .. first + 3 at local coordinate t of
  * `cells` cells, values and derivatives times inv_h, inv_h^2. Beyond the ends the
  * outermost polynomial goes on. */
-struct imp__basis {
+struct imp__bend_basis {
     int first;
     double b[4], d[4], dd[4];
 };
-static inline struct imp__basis imp__basis_of(double t, int cells, double inv_h)
+static inline struct imp__bend_basis imp__bend_basis_of(double t, int cells, double inv_h)
 {
-    struct imp__basis s;
+    struct imp__bend_basis s;
     s.first = (int)imp_clamp(t, 0.0, (double)(cells - 1));
     const double u = t - s.first, m = 1 - u, k = inv_h;
     s.b[0] = m * m * m / 6;
@@ -213,8 +216,7 @@ enum imp_status imp__profile_read(imp_context *ctx, const char *path,
                                   const struct imp_bytes *b, imp_field **out);
 enum imp_status imp__profile_write(const imp_field *f, const char *path);
 
-/* Profile kinds by index, NULL past the last; names of their numbers. */
-const char *imp__profile_kind(size_t i);
+/* Name of parameter i of a profile kind, NULL past the last. */
 const char *imp__profile_param(const char *kind, size_t i);
 
 #endif

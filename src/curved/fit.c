@@ -1,10 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
- *
- * Fits: the objective of a problem handed to inverse/'s optimisers, level by level. At
- * each level the grid is refined (the function stays the same), and what the optimiser
- * learnt goes along: a step of coarse numbers is, refined by P, one of fine numbers; a
- * derivative's share of a fine number is 1/8 of the coarse one's. Adam's rate is halved
- * explicitly. */
+ * Fits: a problem's objective is minimised level by level by the optimisers of
+ * src/search. Each level refines the grid without changing the function, and carries the
+ * optimiser's memory: steps are prolonged by P, gradients as well and scaled by 1/8 (a
+ * coarse coefficient's share goes to eight fine ones). Adam's rate is halved. */
 #include "bend.h"
 #include "lbfgs.h"
 #include "search/checkpoint.h"
@@ -19,13 +17,14 @@ struct fit {
     struct imp__fingerprint print;
     uint8_t *held;
     double *theta, *bar, *lo, *hi, *scale,
-        *x0;                  /* [n_theta], of active numbers where [n] */
-    size_t *at;               /* [n] index in theta */
-    struct imp__search *last; /* of the level before, and its grid: to be carried on */
+        *x0;    /* [n_theta], of active numbers where [n] */
+    size_t *at; /* [n] index in theta */
+    struct imp__search
+        *last; /* search and grid of the level before, whose memory is carried on */
     imp_field *coarse;
     size_t *coarse_at; /* [last->n] */
     bool carries;
-    int level, levels, done_iterations;
+    int level, levels, done_iterations, n_evaluated;
     double fraction_lo, fraction_hi, start_s, last_report_s, last_checkpoint_s;
     double last_value, best_value, rays_done;
     struct imp_bend_stats stats;
@@ -80,7 +79,12 @@ static enum imp_status goal_eval(const double *x, uint64_t seed, struct imp_esti
     double value = 0;
     if (st != IMP_OK) return st;
     st = imp_bend_objective(f->b, &value, g ? f->bar : NULL, NULL, &f->stats);
+    if (st == IMP_E_NUMERIC && f->o->optimizer == IMP_LBFGS && f->n_evaluated > 0) {
+        value = INFINITY; /* every ray is lost: the line search takes a shorter step */
+        st = IMP_OK;
+    }
     if (st != IMP_OK) return st;
+    f->n_evaluated++;
     f->rays_done += (double)f->b->n;
     f->last_value = value;
     if (value < f->best_value) f->best_value = value;
@@ -104,29 +108,63 @@ static enum imp_status goal_iterated(const struct imp__search *s, void *payload)
     return report(f, false) ? IMP_CANCELLED : IMP_OK;
 }
 
-/* What a checkpoint belongs to. */
+#define HASH(h, x) ((h) = imp__hash((h), &(x), sizeof(x)))
+
+static uint64_t target_hash(uint64_t h, const struct imp__target_of_rays *t)
+{
+    const struct imp_bend_target *d = &t->desc;
+    const size_t n_pixels = t->pixels ? (size_t)d->width * (size_t)d->height : 0;
+    HASH(h, d->type), HASH(h, d->bundle), HASH(h, d->tap), HASH(h, d->weight);
+    HASH(h, d->at_plane), HASH(h, d->point), HASH(h, d->normal), HASH(h, d->offset);
+    HASH(h, d->outside), HASH(h, d->width), HASH(h, d->height);
+    HASH(h, d->origin), HASH(h, d->u), HASH(h, d->v);
+    h = imp__hash(h, t->data, t->n_data * sizeof *t->data);
+    return imp__hash(h, t->pixels, n_pixels * sizeof *t->pixels);
+}
+
+static uint64_t surface_hash(uint64_t h, const struct imp_bend_surface *s)
+{
+    HASH(h, s->type), HASH(h, s->event), HASH(h, s->group), HASH(h, s->normal);
+    HASH(h, s->offset), HASH(h, s->centre), HASH(h, s->radius), HASH(h, s->lo);
+    HASH(h, s->hi), HASH(h, s->index);
+    return h;
+}
+
+/* What a checkpoint belongs to: rays, how they are traced, targets, the rules and the
+ * size of the field; not the field's numbers, which the search has changed. */
 static void fingerprint(struct fit *f)
 {
     const imp_bend *b = f->b;
+    const struct imp_bend_options *o = &b->options;
     uint64_t h = imp__hash(0, &b->n, sizeof b->n);
     h = imp__hash(h, b->x, b->n * sizeof *b->x);
     h = imp__hash(h, b->d, b->n * sizeof *b->d);
+    h = imp__hash(h, b->power, b->n * sizeof *b->power);
+    h = imp__hash(h, b->group, b->n * sizeof *b->group);
     if (b->dispersion)
         h = imp__hash(h, b->dispersion, b->cap_dispersion * sizeof *b->dispersion);
+    HASH(h, o->scheme), HASH(h, o->way), HASH(h, o->step), HASH(h, o->max_steps);
+    HASH(h, o->outside), HASH(h, o->outside_index), HASH(h, o->grazing);
+    HASH(h, b->step_cells), HASH(h, b->step_max);
+    for (size_t i = 0; i < o->n_surfaces; i++) h = surface_hash(h, &o->surfaces[i]);
+    for (size_t i = 0; i < o->n_taps; i++) {
+        HASH(h, o->taps[i].normal), HASH(h, o->taps[i].offset);
+        HASH(h, o->taps[i].group);
+    }
     f->print.scene = h;
     h = 1;
-    for (size_t i = 0; i < b->n_targets; i++) {
-        const struct imp_bend_target *t = &b->targets[i].desc;
-        h = imp__hash(h, &t->type, sizeof t->type);
-        h = imp__hash(h, &t->weight, sizeof t->weight);
-        h = imp__hash(h, t->point, sizeof t->point);
-        h = imp__hash(h, t->normal, sizeof t->normal);
-        h = imp__hash(h, &t->offset, sizeof t->offset);
+    for (size_t i = 0; i < b->n_targets; i++) h = target_hash(h, &b->targets[i]);
+    for (size_t i = 0; i < b->n_smooths; i++) {
+        HASH(h, b->smooths[i].weight), HASH(h, b->smooths[i].edge);
+        HASH(h, b->smooths[i].order);
     }
     f->print.targets = h;
-    f->print.parameters = imp__hash(2, &b->field->n_theta, sizeof b->field->n_theta);
+    h = imp__hash(2, &b->field->n_theta, sizeof b->field->n_theta);
+    HASH(h, b->lo), HASH(h, b->hi), HASH(h, b->field->lo), HASH(h, b->field->hi);
+    h = imp__hash(h, f->held, b->field->n_theta);
+    f->print.parameters = h;
     h = imp__hash(3, &f->o->optimizer, sizeof f->o->optimizer);
-    f->print.options = imp__hash(h, &f->level, sizeof f->level);
+    f->print.options = HASH(h, f->level);
 }
 
 static enum imp_status level_begin(struct fit *f)
@@ -192,7 +230,7 @@ static void last_free(struct fit *f)
     f->coarse_at = NULL;
 }
 
-/* Active numbers of the grid before -> of the grid now; held ones do not change. */
+/* Prolong active numbers of the coarse grid to those of the fine one; held ones are 0. */
 static enum imp_status carry_map(const double *in, double *out, void *payload)
 {
     const struct fit *f = payload;
@@ -254,7 +292,7 @@ out:
     return st;
 }
 
-/* The field of level `level`, as far as its shape goes. */
+/* Refine the field to the next level. */
 static enum imp_status refine(struct fit *f)
 {
     imp_field *fine;
@@ -299,13 +337,13 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
     const char *reason = "nothing was done";
     int iterations = 0, first = 0;
     double start = 0, value = 0;
-    uint64_t traced = 0;
     bool found = false;
 
+    const imp_progress_fn progress = b->options.progress;
     if (f.levels > IMP_BEND_LEVELS_MAX)
         return imp__error(b->ctx, IMP_E_ARG, "%d levels: at most %d", f.levels,
                           IMP_BEND_LEVELS_MAX);
-    /* Adam's moments remember steeper days: begun anew it is the faster more often. */
+    /* Adam's moments are those of steeper gradients: begun anew it is usually faster. */
     f.carries = o->carry > 0 || (o->carry == 0 && o->optimizer == IMP_LBFGS);
     if (o->optimizer == IMP_LM)
         return imp__error(b->ctx, IMP_E_UNSUPPORTED,
@@ -315,25 +353,17 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
         return imp__error(b->ctx, IMP_E_ARG, "levels are for grids, not for a %s field",
                           b->field->ops->name);
     b->n_history = 0;
+    b->options.progress = NULL; /* a search is stopped between its iterations only */
+    IMP_TRY(level_begin(&f));
+    /* Before the search moves what lies outside its bounds: a resumed fit has the same.
+     */
+    IMP_TRY(imp_bend_objective(b, &start, NULL, NULL, &f.stats));
+    const uint64_t traced = f.stats.traced;
     if (o->checkpoint && o->resume) {
         st = resume(&f, &found, &reason, &iterations);
         if (st != IMP_OK && st != IMP_CANCELLED) goto out;
         if (found) first = f.level + 1;
-    }
-    if (!found) {
-        f.level = 0;
-        IMP_TRY(level_begin(&f));
-        IMP_TRY(imp_bend_objective(b, &start, NULL, NULL, &f.stats));
-        if (f.stats.traced == 0)
-            IMP_TRY(imp__error(
-                b->ctx, IMP_E_NUMERIC,
-                "none of %llu rays comes to its end: %llu start outside "
-                "the field, %llu leave it without an exit, %llu take more "
-                "than max_steps, %llu graze, %llu are broken",
-                (unsigned long long)f.stats.rays, (unsigned long long)f.stats.started_out,
-                (unsigned long long)f.stats.missed, (unsigned long long)f.stats.truncated,
-                (unsigned long long)f.stats.grazing, (unsigned long long)f.stats.broken));
-        traced = f.stats.traced;
+        else f.level = 0;
     }
     for (int level = first; level < f.levels && st == IMP_OK; level++) {
         f.level = level;
@@ -348,7 +378,7 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
     }
     const enum imp_status ended = st;
     IMP_TRY(imp_bend_objective(b, &value, NULL, NULL, &f.stats));
-    /* What is not counted cannot be bad: a fit may lower a mean by losing rays. */
+    /* Lost rays are not in the objective, so a fit may lower it by losing rays. */
     if ((double)f.stats.traced < (double)traced - 0.01 * (double)f.stats.rays)
         imp__warn(
             b->ctx,
@@ -359,19 +389,19 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
     f.done_iterations = f.opt.max_iterations;
     report(&f, true);
     if (result) {
-        *result = (struct imp_bend_fit_result){
-            .size = sizeof *result,
-            .iterations = iterations,
-            .levels = f.level + 1,
-            .start = found && first > 0 && b->n_history ? b->history[0] : start,
-            .value = value,
-            .n_history = b->n_history,
-            .history = b->history,
-            .reason = reason,
-            .stats = f.stats};
+        *result = (struct imp_bend_fit_result){.size = sizeof *result,
+                                               .iterations = iterations,
+                                               .levels = f.level + 1,
+                                               .start = start,
+                                               .value = value,
+                                               .n_history = b->n_history,
+                                               .history = b->history,
+                                               .reason = reason,
+                                               .stats = f.stats};
     }
     st = ended;
 out:
+    b->options.progress = progress;
     last_free(&f);
     level_free(&f);
     return st;

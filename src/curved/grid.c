@@ -34,7 +34,7 @@ void imp__grid_tangent(const imp_field *f, const imp_v3 *x, const double *theta_
                        double *eta_dot, imp_v3 *g_dot)
 {
     const bool eta2 = ((const struct imp__grid *)f)->desc.param == IMP_FIELD_ETA2;
-    struct imp__grid g = *(const struct imp__grid *)f; /* the same grid, other numbers */
+    struct imp__grid g = *(const struct imp__grid *)f; /* with coefficients theta_dot */
     struct imp__jet j;
     g.base.theta = (double *)(uintptr_t)theta_dot;
     g.single = NULL;

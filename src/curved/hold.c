@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
- *
- * What a fit may not change, and between which bounds the rest: rules, applied again on
- * finer levels. */
+ * Numbers that a fit may not change, and the bounds of the others. Both are rules,
+ * applied again at each level. */
 #include "bend.h"
 
 static enum imp_status hold_add(imp_bend *b, const struct imp__hold *h)
@@ -57,7 +56,7 @@ struct hold_job {
     double *theta;
 };
 
-/* Outermost across the axis, and at both ends along it. */
+/* The outermost layers across the axis, and at both of its ends. */
 static void hold_rz(const imp_field *f, size_t offset, const struct hold_job *j)
 {
     const struct imp__rz *r = (const struct imp__rz *)f;
@@ -74,7 +73,7 @@ static void hold_leaf(imp_field *f, size_t offset, void *payload)
 {
     const struct hold_job *j = payload;
     const struct imp__hold *h = j->hold;
-    const uint32_t *number; /* of ties: one node of an orbit holds all */
+    const uint32_t *number; /* in a tied grid one held node holds its orbit */
     const struct imp__grid *g = imp__field_nodes(f, &number);
     if (f->ops == &imp__field_rz && h->kind == IMP_HOLD_RIM) hold_rz(f, offset, j);
     if (!g) return;

@@ -28,7 +28,7 @@ struct spot {
     int x, y;
 };
 
-/* false: beside the picture. */
+/* Footprint of a ray on the picture. False: it lies beside the picture. */
 static bool spot_of(const struct imp_bend_target *t, imp_v3 at, struct spot *s)
 {
     const imp_v3 u = imp__v3_load(t->u), v = imp__v3_load(t->v);

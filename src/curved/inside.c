@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
- *
- * A bent ray inside a body, step by step: each step's chord is looked at by the scene's
- * intersector, and the step that meets a shape is cut to end on it exactly. The same
- * steps, landings and transposes as in trace.c and adjoint.c; one ray, no turns. */
+ * A bent ray inside a body: the chord of each step is intersected with the scene, and the
+ * step that hits a shape is shortened to end on it. Same steps and transposes as in
+ * trace.c and adjoint.c, for one ray without reflections. */
 #include "inside.h"
 
 #define STEPS_DEFAULT 100 /* across a body whose field has no cells */
@@ -96,8 +95,9 @@ static inline imp_v3 vertex(const struct imp_triangles *t, uint32_t i)
     return imp__v3(p[0], p[1], p[2]);
 }
 
-/* Triangles: the weights of x, in double. Analytic shapes answer themselves; the ray is
- * cut to the last bit of its way, so that they do not find their other side. */
+/* Triangles: barycentric coordinates of x in double. Analytic shapes are intersected
+ * again, with a ray limited to the neighbourhood of x, so that it misses their far side.
+ */
 void imp__hit_at(const struct imp_shape *s, imp_v3 x, imp_v3 d, double far,
                  struct imp_hit *hit)
 {
@@ -124,7 +124,8 @@ void imp__hit_at(const struct imp_shape *s, imp_v3 x, imp_v3 d, double far,
 
 /* ---- Forwards ------------------------------------------------------------------ */
 
-/* Cut the step from `from` to end on the surface: Newton from the chord's crossing. */
+/* Shorten the step from `from` to end on the surface, by Newton's method started at the
+ * crossing of the chord. False: it did not converge. */
 static bool land(const struct imp__plan *p, const struct imp__surface *s,
                  const struct imp__state *from, double first, double *tau,
                  struct imp__state *at)
@@ -178,7 +179,8 @@ bool imp__ride(const struct imp_medium *m, const struct imp_scene *scene, imp_v3
     if (m->ball) m->ball->ops->round(m->ball, &ball);
     const double inside2 = imp__sqr(ball.radius) * (1 - 1e-9);
     const struct imp__plan *p = &g->plan;
-    /* Chords overlap by what the intersector's rounding may lose. */
+    /* Chords overlap by the intersector's rounding, so that none misses a surface
+     * between. */
     const double overlap = IMP_RAY_EPSILON * (p->size + imp__length(x));
     struct imp__state s = {x, d, 0};
     *r = (struct imp__ride){.x = x, .d = d};

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * One bent ray at a time, for walks through a scene: from a point on or in a body of
- * graded index to the first shape it meets, and the derivatives of that. The walk turns
- * it there; nothing of light is known here. */
+ * Bent segments of a walk through a scene: a ray from a point on or in a body of graded
+ * index to the first shape it hits, and the derivatives of that. Refraction and radiance
+ * at its ends are the walk's. */
 #ifndef IMP_CURVED_INSIDE_H
 #define IMP_CURVED_INSIDE_H
 
@@ -18,7 +18,7 @@ struct imp_graded {
 /* Takes the bend over, also on failure. */
 enum imp_status imp__graded_create(imp_bend *bend, struct imp_graded **out);
 void imp__graded_destroy(struct imp_graded *g);
-/* The shapes lie in lo..hi: choose the step. What is wrong is said without a place. */
+/* Choose the step for shapes that lie in lo..hi. Error messages have no file and line. */
 enum imp_status imp__graded_ready(struct imp_graded *g, imp_v3 lo, imp_v3 hi);
 static inline const imp_field *imp__graded_field(const struct imp_graded *g)
 {
@@ -34,22 +34,21 @@ static inline double imp__graded_index(const struct imp_graded *g, const imp_v3 
 /* The surface of a shape near a point p of it, as a level set. */
 void imp__level(const struct imp_shape *s, imp_v3 p, imp_v3 ng,
                 struct imp__surface *level);
-/* The hit that `surface` needs to recompute x, which lies on the shape: of a ray of unit
- * direction d that has come the distance `far` to x. */
+/* The hit of a ray with unit direction d that reaches x, on the shape, after the distance
+ * `far`: what the shape's `surface` needs to recompute x. */
 void imp__hit_at(const struct imp_shape *s, imp_v3 x, imp_v3 d, double far,
                  struct imp_hit *hit);
 
 struct imp__ride {
     imp_v3 x, d, end;           /* start, unit directions there and at the end */
     struct imp__jet j, k;       /* index and its gradient there */
-    struct imp__state from, at; /* start of the last, fractional step; the end */
+    struct imp__state from, at; /* start and end of the last, fractional step */
     double tau, length;         /* of that step; from start to end, along the ray */
     uint32_t steps;             /* whole steps before it */
-    struct imp__surface level;  /* what it met */
+    struct imp__surface level;  /* the surface hit */
 };
-/* A ray from x, where ng is the normal of the surface it leaves (0: none), along d.
- * False: it left the body without meeting anything, or came to numbers that are no index.
- */
+/* Trace a ray from x along d; ng is the normal of the surface it leaves (0: none). False:
+ * it left the body without a hit, or the index is not a positive number there. */
 bool imp__ride(const struct imp_medium *medium, const struct imp_scene *scene, imp_v3 x,
                imp_v3 ng, imp_v3 d, struct imp__ride *ride, struct imp_hit *hit);
 
@@ -70,7 +69,7 @@ double imp__graded_tangent(const struct imp__graded_active *along, const imp_v3 
 /* Cotangents of position and unit direction at the end -> at the start. */
 void imp__ride_back(const struct imp__graded_active *to, const struct imp__ride *ride,
                     imp_v3 *lam, imp_v3 *mu);
-/* Their motion at the start -> at the end. */
+/* Tangents of position and unit direction at the start -> at the end. */
 void imp__ride_tangent(const struct imp__graded_active *along,
                        const struct imp__ride *ride, imp_v3 *x_dot, imp_v3 *d_dot);
 

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
- *
- * Derivatives of a ride (inside.c): the exact adjoint and tangent of its steps, with the
- * medium's numbers as parameters of the scene. */
+ * Adjoint and tangent of a bent segment (inside.c), exact for its steps, with respect to
+ * the medium's parameters in the scene. */
 #include "inside.h"
 #include <string.h>
 
@@ -31,7 +30,7 @@ static void number_add(const struct imp__graded_active *to, size_t k, double bar
         to->sink->add(to->sink, n->param, k - n->first, 1, &s);
 }
 
-/* What a ray leaves in the cell of a grid that it is in. */
+/* Gradient of the grid cell that a ray is in, gathered over its steps there. */
 struct imp__block {
     const imp_field *grid; /* NULL: nothing yet */
     size_t offset, corner[3];
@@ -58,11 +57,12 @@ static void block_flush(const struct imp__graded_active *to, struct imp__block *
     b->grid = NULL;
 }
 
-/* A grid's splat in its own cell alone: the same kind of grid, one cell large. */
+/* Splat into the coefficients of one cell: through a grid of the same kind, one cell
+ * large. */
 static void grid_splat(const struct splat_job *j, imp_field *f, size_t offset)
 {
     const struct imp__grid *g = (const struct imp__grid *)f;
-    double unused[64] = {0}; /* values, which the weights do not need */
+    double unused[64] = {0}; /* coefficients, which weights do not depend on */
     struct imp__block own = {0}, *block = j->to->block ? j->to->block : &own;
     double a = j->a;
     imp_v3 b = j->b;
@@ -147,8 +147,8 @@ double imp__graded_tangent(const struct imp__graded_active *along, const imp_v3 
     return j.eta_dot;
 }
 
-/* The field as the steps of scheme.c see it when derivatives go to, or come from, a
- * scene's parameters: splats reach the sink, and memory follows no grid. */
+/* A field for the steps of scheme.c whose splats go to the sink and whose tangents come
+ * from the scene's parameters, so that no array of the grid's size is needed. */
 struct view {
     imp_field base;
     const struct imp__graded_active *active;
@@ -188,7 +188,7 @@ void imp__ride_back(const struct imp__graded_active *to, const struct imp__ride 
     struct imp__graded_active gather = *to;
     gather.block = &block;
     const struct view view = {{.ops = &view_ops}, &gather};
-    struct imp__bar yes = {0}; /* where splats go is the view's business */
+    struct imp__bar yes = {0}; /* not NULL, so that steps splat; the view ignores it */
     struct imp__state at = r->from, rate;
     struct imp__surface_at sa;
     struct imp__back b;
@@ -222,7 +222,7 @@ void imp__ride_tangent(const struct imp__graded_active *along, const struct imp_
 {
     const struct imp__plan *p = &along->medium->graded->plan;
     const struct view view = {{.ops = &view_ops}, along};
-    const double yes = 0; /* theta_dot: asks the view */
+    const double yes = 0; /* not NULL, so that steps call the view's tangent */
     struct imp__state s = {r->x, r->j.eta * r->d, 0}, dot = {*x_dot, {0}, 0}, rate;
     struct imp__surface_at sa;
     const double eta_dot = imp__graded_tangent(along, &r->x) + imp__dot(r->j.g, *x_dot);

@@ -11,7 +11,7 @@ double imp__land_on(const struct imp__plan *p, const struct imp__surface *s,
     double lo = 0, hi = t, tau = t * g0 / (g0 - g1);
     struct imp__state rate;
     struct imp__surface_at sa;
-    if (!(g0 < 0)) { /* begins on the surface: look for the inside first */
+    if (!(g0 < 0)) { /* begins on the surface: halve the step until it ends inside */
         for (tau = t / 2; tau > 1e-9 * t; tau /= 2) {
             *at = *from;
             imp__step(p->scheme, p->field, tau, 1, &at->x, &at->v, &at->path);
@@ -66,7 +66,8 @@ imp__land_first(const struct imp__plan *p, const struct imp__domain *d,
         if (!(a1.g > 0)) continue;
         imp__surface_eval(s, &from->x, &from->v, &a0);
         const bool once = s->kind == IMP__DISC || s->kind == IMP__APPROACH;
-        if (a0.g > 0 && (once || a1.g <= a0.g)) continue; /* was outside, or comes in */
+        if (a0.g > 0 && (once || a1.g <= a0.g))
+            continue; /* began outside, or moves inwards */
         const double t = imp__land_on(p, s, from, p->t, a0.g, a1.g, &there);
         if (!imp__surface_covers(s, &there.x)) continue;
         if (!hit || t < *tau) hit = s, *tau = t, *at = there;

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0
- *
- * One ray backwards, but for its whole steps: its end, taps, turns and start
+ * The adjoint of a ray apart from its whole steps: exit, taps, reflections and start
  * (docs/bent-rays.md 2.3). */
 #include "adjoint.h"
 
 /* ---- Events -------------------------------------------------------------------- */
 
-/* Gradient of a surface's own numbers: through where the ray meets it (rho), and through
- * its normal (n_bar). [0-2] normal or centre, [3] offset or radius, [4] index outside. */
+/* Gradient of a surface's parameters: through the point where the ray crosses it (rho)
+ * and through its normal (n_bar). [0-2] normal or centre, [3] offset or radius, [4] index
+ * outside. */
 static void surface_bar(struct imp__adjoint_slot *slot, const struct imp__surface *s,
                         imp_v3 x, double rho, imp_v3 n_bar, imp_v3 x_curved,
                         double e2_bar)
@@ -38,18 +38,18 @@ static void surface_bar(struct imp__adjoint_slot *slot, const struct imp__surfac
     for (int k = 0; k < 3; k++) bar[k] += c[k];
 }
 
-/* Pull the cotangents of the momentum after the map back to before it. */
+/* Adjoint of refraction or reflection: cotangents after it -> before it. */
 static void turn_back(struct imp__adjoint_slot *slot, const struct imp__surface *s,
                       imp_v3 x, imp_v3 v_in, imp_v3 gx, bool mirror, double e2,
                       imp_v3 *lam, imp_v3 *mu, double *field_bar)
 {
     const double length = imp__length(gx);
     const imp_v3 n = gx * (1 / length);
-    struct imp__turn turn;
+    struct imp__bend_turn turn;
     imp_v3 v_bar, n_bar, m, curved;
     double e2_bar;
-    imp__turn(&n, &v_in, e2, mirror, &turn);
-    imp__turn_vjp(&turn, &n, &v_in, e2, mu, &v_bar, &n_bar, &e2_bar);
+    imp__bend_turn(&n, &v_in, e2, mirror, &turn);
+    imp__bend_turn_vjp(&turn, &n, &v_in, e2, mu, &v_bar, &n_bar, &e2_bar);
     m = (n_bar - n * imp__dot(n, n_bar)) * (1 / length);
     imp__surface_hess(s, &x, &m, &curved);
     *lam += curved;
@@ -58,8 +58,8 @@ static void turn_back(struct imp__adjoint_slot *slot, const struct imp__surface 
     surface_bar(slot, s, x, 0, n_bar, curved, e2_bar);
 }
 
-/* Undo a segment's fractional step: (lam, mu, path_bar) at its end -> at the start of
- * that step. `from` is where the step began, `v_in` the momentum at the end. */
+/* Adjoint of a fractional step: (lam, mu, path_bar) at its end -> at its start. `from` is
+ * the state at the start, `v_in` the momentum at the end. */
 static void land_back(const struct imp__plan *p, struct imp__adjoint_slot *slot,
                       const struct imp__surface *s, const struct imp__state *from,
                       double tau, imp_v3 x, imp_v3 v_in, imp_v3 *lam, imp_v3 *mu,
@@ -91,7 +91,7 @@ static void land_back(const struct imp__plan *p, struct imp__adjoint_slot *slot,
 /* State at the start of the fractional step, by reversal. */
 static void reverse_landing(const struct imp__plan *p, double tau, struct imp__state *a)
 {
-    if (p->scheme->index_form) { /* pseudo-reverse: the same guess as its adjoint makes */
+    if (p->scheme->index_form) { /* pseudo-reverse, as in its adjoint */
         struct imp__jet j;
         imp__field_eval1(p->field, &a->x, 1, &j);
         a->x -= a->v * (tau / j.eta);
@@ -110,7 +110,7 @@ static void reverse_landing(const struct imp__plan *p, double tau, struct imp__s
     imp__step(p->scheme, p->field, -tau, 1, &a->x, &a->v, &path);
 }
 
-/* Put segment `k` of a lane's track under way: from the cotangents at its end. */
+/* Begin the lane's current segment: from the cotangents at its end. */
 static void segment_begin(const struct imp__plan *p, struct imp__adjoint_slot *slot,
                           struct imp__lane *l, struct imp__back *b, int i,
                           struct imp__bar *theta_bar)
@@ -145,7 +145,7 @@ enum imp_status imp__lane_begin(const struct imp__adjoint *job,
     b->mu[i] = imp__v3_load(bar->v);
     b->path_bar[i] = bar->path;
     s = imp__exit_surface(p, group, e);
-    /* What is not in the record (turns, the facet of a mesh) is traced again. */
+    /* Reflections and facets of meshes are not in the exit: the ray is traced again. */
     if (stored || e->segments > 1 || s->kind == IMP__MESH) {
         track->states = stored;
         const enum imp_status st = imp__track_ray(p, job->rays, ray, track);
@@ -162,7 +162,7 @@ enum imp_status imp__lane_begin(const struct imp__adjoint *job,
     if (s->event == IMP_BEND_REFRACT) {
         struct imp__surface_at sa;
         imp__surface_eval(s, &x, &v_in, &sa);
-        if (!l->track) { /* |v|^2 inside was kept: the normal part follows */
+        if (!l->track) { /* the exit has |v|^2 inside: the normal part follows */
             const imp_v3 n = imp__normalize(sa.gx);
             const imp_v3 along = v_in - n * imp__dot(n, v_in);
             const double q2 = e->norm2 - imp__dot(along, along);

@@ -2,9 +2,9 @@
  *
  * L-BFGS with bounds for exact objectives (fixed rays): two-loop recursion over the
  * variables that are free, steps projected onto the bounds, backtracking by quadratic
- * interpolation (Bertsekas 1982 for the active set). NLopt's L-BFGS loses its way on
- * these problems: as curvature is negative in many directions its line search stays at a
- * few points and returns. State lives in inverse/'s search, so checkpoints are shared. */
+ * interpolation (Bertsekas 1982 for the active set). NLopt's L-BFGS fails on these
+ * problems: curvature is negative in many directions, and its line search returns to the
+ * same few points. The state is a search of src/search, so checkpoints are shared. */
 #include "lbfgs.h"
 #include <math.h>
 #include <string.h>
@@ -31,7 +31,7 @@ static double dot(size_t n, const double *a, const double *b)
     return sum;
 }
 
-/* At a bound, and down leads outside? In units of the scale. */
+/* Is variable k at a bound, with the descent direction pointing outside? */
 static bool pinned(const struct imp__goal *goal, const double *x, const double *g,
                    size_t k)
 {
@@ -90,21 +90,25 @@ static void remember(struct run *r, const double *x1, const double *g1)
     s->scalar[PAIRS] = m;
 }
 
-/* Go down d; false: no step lowers the objective. */
+/* Backtracking line search along d. *found false: no step lowers the objective. */
 static enum imp_status line(struct run *r, bool *found)
 {
     struct imp__search *s = r->s;
     const struct imp__goal *goal = r->goal;
     const size_t n = r->n;
     const double *x = s->array[X], *g = s->array[G];
-    double step = 1, f0 = s->scalar[VALUE], longest = 0;
-    for (size_t k = 0; k < n; k++) longest = fmax(longest, fabs(r->d[k]));
-    if (s->scalar[PAIRS] == 0) step = 0.1 * goal->scale[0] / fmax(longest, 1e-300);
-    else if (step * longest > 5 * goal->scale[0]) step = 5 * goal->scale[0] / longest;
+    double step = 1, f0 = s->scalar[VALUE], longest = 0, scale = goal->scale[0];
+    for (size_t k = 0; k < n; k++) { /* the longest component in units of its scale */
+        const double a = fabs(r->d[k]) * scale, b = longest * goal->scale[k];
+        if (a > b || (a == b && fabs(r->d[k]) > longest))
+            longest = fabs(r->d[k]), scale = goal->scale[k];
+    }
+    if (s->scalar[PAIRS] == 0) step = 0.1 * scale / fmax(longest, 1e-300);
+    else if (step * longest > 5 * scale) step = 5 * scale / longest;
     *found = false;
     for (int i = 0; i < TRIES; i++) {
         struct imp_estimate e;
-        double slope = 0; /* of what is really walked, after projection */
+        double slope = 0; /* along the step after projection onto the bounds */
         for (size_t k = 0; k < n; k++) {
             r->trial[k] = imp__into_bounds(goal, k, x[k] + step * r->d[k]);
             slope += g[k] * (r->trial[k] - x[k]);
@@ -124,7 +128,7 @@ static enum imp_status line(struct run *r, bool *found)
         const double curve = e.value - f0 - slope;
         double q = isfinite(curve) && curve > 0 ? -slope / (2 * curve) : 0.5;
         step *= imp_clamp(q, 0.1, 0.5);
-        if (step * longest < 1e-14 * goal->scale[0]) break;
+        if (step * longest < 1e-14 * scale) break;
     }
     return IMP_OK;
 }
@@ -154,7 +158,7 @@ enum imp_status imp__lbfgs(const struct imp__goal *goal,
         bool found;
         direction(&r);
         double down = dot(n, r.d, s->array[G]), moved = 0;
-        if (!(down < 0)) { /* the memory misleads: begin again */
+        if (!(down < 0)) { /* not a descent direction: drop the pairs */
             s->scalar[PAIRS] = 0;
             direction(&r);
             down = dot(n, r.d, s->array[G]);

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Objective and gradient of a problem of bent rays: trace, targets, adjoint,
- * regularisers. Between the passes only the exits are kept. */
+ * regularisers. Only the exits are stored between tracing and
+ * adjoint. */
 #include "bend.h"
 #include <string.h>
 
@@ -38,6 +39,18 @@ static enum imp_status passes_trace(const imp_bend *b, bool adjoint, struct pass
                               stats);
 }
 
+enum imp_status imp__bend_traced(const imp_bend *b, const struct imp_bend_stats *s)
+{
+    if (s->traced > 0) return IMP_OK;
+    return imp__error(b->ctx, IMP_E_NUMERIC,
+                      "none of %llu rays comes to its end: %llu start outside "
+                      "the field, %llu leave it without an exit, %llu take more "
+                      "than max_steps, %llu graze, %llu are broken",
+                      (unsigned long long)s->rays, (unsigned long long)s->started_out,
+                      (unsigned long long)s->missed, (unsigned long long)s->truncated,
+                      (unsigned long long)s->grazing, (unsigned long long)s->broken);
+}
+
 enum imp_status imp_bend_objective(imp_bend *b, double *value, double *gradient,
                                    double *targets, struct imp_bend_stats *stats)
 {
@@ -47,6 +60,8 @@ enum imp_status imp_bend_objective(imp_bend *b, double *value, double *gradient,
     struct imp_bend_stats s = IMP_BEND_STATS_INIT;
     enum imp_status st = passes_trace(b, gradient != NULL, &p, &s);
     if (st != IMP_OK) goto out;
+    if (stats) *stats = s; /* the counts say why, also when nothing was traced */
+    IMP_TRY(imp__bend_traced(b, &s));
     parts = imp__alloc(b->ctx, b->n_targets + 1, sizeof *parts);
     if (!parts) IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "no memory for the targets"));
     for (size_t i = 0; i < b->n_targets; i++) {

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
- *
- * Options checked and made ready: step length, surfaces by group, boxes cut into faces.
- */
+ * Checks options and prepares tracing: chooses the step, sorts surfaces by group, splits
+ * boxes into faces. */
 #include "curved.h"
 #include "scene/scene.h"
 #include <string.h>
@@ -88,7 +87,7 @@ static enum imp_status surface_make(imp_context *ctx, const struct imp_bend_surf
     return IMP_OK;
 }
 
-/* Surfaces of group g (-1: those for all only), faces of boxes first. */
+/* Surfaces of group g and those of all groups, faces of boxes first. */
 static void domain_make(const struct imp_bend_options *o, const struct imp__surface *all,
                         const int *first, int g, const struct imp__plan *p,
                         struct imp__domain *d, struct imp__surface *room)
@@ -144,7 +143,7 @@ static void bounds_choose(struct imp__plan *p, const struct imp_bend_rays *rays)
         if (isfinite(w)) p->size = fmax(p->size, w);
     }
     if (!(p->size > 0)) p->size = 1;
-    /* One step beyond the field is allowed: the exit lies behind. */
+    /* A ray may be one step outside the field: its exit lies within that step. */
     const double margin = p->t * (p->scheme->arc ? 1 : fmax(imp__field_index_max(f), 1));
     for (int k = 0; k < 3; k++)
         p->lo[k] = f->lo[k] - margin, p->hi[k] = f->hi[k] + margin;
@@ -238,7 +237,7 @@ enum imp_status imp__plan_create(const imp_field *field,
         p.taps[i] = s;
         p.tap_group[i] = o->taps[i].group;
     }
-    o->surfaces = NULL; /* the caller's; copied */
+    o->surfaces = NULL; /* belong to the caller; copies are in p */
     o->taps = NULL;
     *out = p;
 out:

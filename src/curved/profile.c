@@ -34,13 +34,16 @@ static void constant_at(const double *p, double u, struct shape_at *s)
     s->f = p[0];
     s->fp[0] = 1;
 }
-/* sqrt(2 - r^2/R^2) inside R, 1 outside */
+/* sqrt(2 - r^2/R^2) inside R, 1 outside. The gradient jumps at R. Rays that start or end
+ * there are inside to rounding, and a scheme that begins or ends with a kick evaluates it
+ * there: on the rim it is the inside's, or such a scheme would be of first order. */
+#define RIM 1e-12
 static void luneburg_at(const double *p, double u, struct shape_at *s)
 {
     const double R = p[0], q = u / (R * R);
     s->f = 1;
-    if (q >= 1) return;
-    const double f = sqrt(2 - q);
+    if (q > 1 + RIM) return;
+    const double f = q < 1 ? sqrt(2 - q) : 1;
     s->f = f;
     s->f1 = -0.5 / (f * R * R);
     s->f2 = s->f1 * 0.5 / (f * f * R * R);
@@ -235,7 +238,7 @@ static void profile_splat(const imp_field *f, const imp_v3 *x, double a, const i
     p->kind->at(f->theta, u, &s);
     double *theta_bar = imp__bar_reach(bar, 0, f->n_theta);
     const bool along = p->kind->about == ALONG_AXIS;
-    /* g = 2 f' y or f' a: what f' is multiplied with in b.g */
+    /* g = 2 f' y or f' a, so b.g = slope f' */
     const double slope = along ? imp__dot(*b, p->axis) : 2 * imp__dot(*b, y);
     for (int k = 0; k < p->kind->n_own; k++)
         theta_bar[k] += a * s.fp[k] + slope * s.f1p[k];
@@ -287,11 +290,6 @@ static int kind_find(const char *name)
     return -1;
 }
 
-const char *imp__profile_kind(size_t i)
-{
-    return i < imp_count(kinds) ? kinds[i].name : NULL;
-}
-
 const char *imp__profile_param(const char *kind, size_t i)
 {
     const int k = kind_find(kind);
@@ -327,7 +325,8 @@ enum imp_status imp_field_profile_create(imp_context *ctx, const char *kind,
     for (int i = 0; i < kinds[k].n_own; i++) {
         const char *name = kinds[k].names[i];
         const bool part =
-            kinds[k].at == plume_at || kinds[k].at == polynomial_at; /* of sums */
+            kinds[k].at == plume_at ||
+            kinds[k].at == polynomial_at; /* may be 0 or negative as a part of a sum */
         if ((!strcmp(name, "radius") || !strcmp(name, "width") ||
              (!strcmp(name, "n0") && !part)) &&
             !(params[i] > 0))

@@ -50,7 +50,7 @@ static bool numbers(struct text *t, int n, double *out)
     return true;
 }
 
-/* What follows the head: sizes, then coefficients. */
+/* The file after its first word: sizes, then coefficients. */
 static enum imp_status radial_read(imp_context *ctx, const char *path, struct text *t,
                                    double *count, imp_field **out)
 {

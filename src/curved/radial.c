@@ -17,9 +17,9 @@ static inline imp_v3 offset_of(const struct imp__radial *r, imp_v3 x)
     return y;
 }
 
-static inline struct imp__basis basis_of(const struct imp__radial *r, double u2)
+static inline struct imp__bend_basis basis_of(const struct imp__radial *r, double u2)
 {
-    return imp__basis_of(u2 / r->h, r->desc.cells, 1 / r->h);
+    return imp__bend_basis_of(u2 / r->h, r->desc.cells, 1 / r->h);
 }
 
 static void radial_eval(const imp_field *f, int n, const imp_v3 *x, int order,
@@ -28,7 +28,7 @@ static void radial_eval(const imp_field *f, int n, const imp_v3 *x, int order,
     const struct imp__radial *r = (const struct imp__radial *)f;
     for (int i = 0; i < n; i++) {
         const imp_v3 y = offset_of(r, x[i]);
-        const struct imp__basis b = basis_of(r, imp__dot(y, y));
+        const struct imp__bend_basis b = basis_of(r, imp__dot(y, y));
         double f0 = 0, f1 = 0, f2 = 0;
         for (int k = 0; k < 4; k++) {
             const double c = f->theta[b.first + k];
@@ -51,7 +51,7 @@ static void radial_splat(const imp_field *f, const imp_v3 *x, double a, const im
 {
     const struct imp__radial *r = (const struct imp__radial *)f;
     const imp_v3 y = offset_of(r, *x);
-    const struct imp__basis s = basis_of(r, imp__dot(y, y));
+    const struct imp__bend_basis s = basis_of(r, imp__dot(y, y));
     const double slope = 2 * imp__dot(*b, y);
     double *theta_bar = imp__bar_reach(bar, (size_t)s.first, 4);
     for (int k = 0; k < 4; k++) theta_bar[s.first + k] += a * s.b[k] + slope * s.d[k];
@@ -62,7 +62,7 @@ static void radial_tangent(const imp_field *f, const imp_v3 *x, const double *th
 {
     const struct imp__radial *r = (const struct imp__radial *)f;
     const imp_v3 y = offset_of(r, *x);
-    const struct imp__basis s = basis_of(r, imp__dot(y, y));
+    const struct imp__bend_basis s = basis_of(r, imp__dot(y, y));
     double f0 = 0, f1 = 0;
     for (int k = 0; k < 4; k++)
         f0 += theta_dot[s.first + k] * s.b[k], f1 += theta_dot[s.first + k] * s.d[k];

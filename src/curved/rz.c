@@ -12,7 +12,7 @@
 
 struct place {
     imp_v3 y; /* across the axis */
-    struct imp__basis u, z;
+    struct imp__bend_basis u, z;
     size_t first;
 };
 
@@ -22,8 +22,8 @@ static inline struct place place_of(const struct imp__rz *r, imp_v3 x)
     const imp_v3 d = x - r->centre;
     const double z = imp__dot(d, r->axis);
     p.y = d - r->axis * z;
-    p.u = imp__basis_of(imp__dot(p.y, p.y) * r->inv_u, r->desc.cells_r, r->inv_u);
-    p.z = imp__basis_of((z - r->desc.lo) * r->inv_z, r->desc.cells_z, r->inv_z);
+    p.u = imp__bend_basis_of(imp__dot(p.y, p.y) * r->inv_u, r->desc.cells_r, r->inv_u);
+    p.z = imp__bend_basis_of((z - r->desc.lo) * r->inv_z, r->desc.cells_z, r->inv_z);
     p.first = (size_t)p.u.first + (size_t)r->n_u * (size_t)p.z.first;
     return p;
 }

@@ -5,9 +5,9 @@
  * (docs/bent-rays.md 3.1, 3.3). The x axis is contiguous: rows of four coefficients are
  * vectors, reduced over y, then z, and only at the end multiplied with the weights of x.
  */
-#include "curved.h"
+#include "grid_back.h"
 
-struct cell {      /* where a point falls */
+struct cell {      /* the cell that contains a point */
     size_t corner; /* index of the first coefficient */
     imp_v3 u;      /* local coordinates, in [0, 1) inside the domain */
 };
@@ -18,7 +18,8 @@ static inline struct cell cell_of(const struct imp__grid *g, imp_v3 x)
     struct cell c;
     int i[3];
     for (int k = 0; k < 3; k++) {
-        /* Outside, the cell is clamped, not u: the polynomial goes on. */
+        /* Outside the grid the cell is clamped but not u: the outermost polynomial is
+         * extrapolated. */
         const int top = g->desc.cells[k] - 1;
         const double f = imp_clamp(u[k], 0.0, (double)top);
         i[k] = (int)f;
@@ -219,33 +220,30 @@ static void spline_splat(const imp_field *f, const imp_v3 *x, double a, const im
     splat_basis(g, &s, a, gb, bar);
 }
 
-/* Weights and addresses are those of value, gradient, Hessian and transpose at once. */
+struct place {
+    struct cell cell;
+    struct basis basis;
+};
 static inline __attribute__((always_inline)) void
-back_some(const struct imp__grid *g, bool single, bool arc, double dt, int n,
-          struct imp__back *b, struct imp__bar *bar)
+back_jet(const struct imp__grid *g, imp_v3 x, bool single, void *at, struct imp__jet *j)
 {
-    const bool eta2 = g->desc.param == IMP_FIELD_ETA2;
-    for (int o = 0; o < n; o++) {
-        const int i = imp__lane_order(n, o);
-        const struct cell c = cell_of(g, b->x[i]);
-        const struct basis s = basis_of(&c, g->inv_h);
-        struct imp__jet j;
-        double value;
-        imp_v3 slope;
-        second(g, &c, &s, single, &j);
-        if (eta2) imp__jet_from_eta2(&j, 2);
-        imp__kick_back(arc, dt, &j, b, i, &value, &slope);
-        if (!bar) continue;
-        if (eta2) imp__eta2_vjp(&j, &value, &slope);
-        splat_basis(g, &s, value, slope, bar);
-    }
+    struct place *p = at;
+    p->cell = cell_of(g, x);
+    p->basis = basis_of(&p->cell, g->inv_h);
+    second(g, &p->cell, &p->basis, single, j);
+}
+static inline __attribute__((always_inline)) void back_splat(const struct imp__grid *g,
+                                                             const void *at, double a,
+                                                             imp_v3 b,
+                                                             struct imp__bar *bar)
+{
+    splat_basis(g, &((const struct place *)at)->basis, a, b, bar);
 }
 static void spline_kick_back(const imp_field *f, bool arc, double dt, int n,
                              struct imp__back *b, struct imp__bar *bar)
 {
-    const struct imp__grid *g = (const struct imp__grid *)f;
-    if (g->single) back_some(g, true, arc, dt, n, b, bar);
-    else back_some(g, false, arc, dt, n, b, bar);
+    struct place at;
+    imp__grid_kick_back(f, arc, dt, n, b, bar, back_jet, back_splat, &at);
 }
 
 const struct imp__field_ops imp__field_spline = {.name = "spline",

@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
- *
- * Where rays begin: inside the field with v = eta d, or outside, straight to the surface
- * where they enter. */
+ * Starts of rays: inside the field with v = eta d, or outside, along a straight line to
+ * the surface where they enter. */
 #include "curved.h"
 
-/* Straight line x + s d against a surface: *s_in where it enters, *s_out where it leaves.
- * false: it never gets inside. */
+/* Intersect the line x + s d with a surface: it enters at *s_in and leaves at *s_out.
+ * False: it never gets inside. */
 static bool straight(const struct imp__surface *s, imp_v3 x, imp_v3 d, double *s_in,
                      double *s_out)
 {
@@ -85,8 +84,8 @@ static bool starts_inside(const struct imp__plan *p, const struct imp__domain *d
     return true;
 }
 
-/* Inside: v = eta d. From outside: straight to the surface that is entered last, then
- * refracted there, or as it is if the surface is matched. */
+/* From inside: v = eta d. From outside: along the line to the surface that is entered
+ * last, and refracted there (with event `end`, index-matched: unchanged). */
 void imp__start_ray(const struct imp__plan *p, const struct imp_bend_rays *rays, size_t i,
                     struct imp__start *s)
 {
@@ -136,11 +135,11 @@ void imp__start_ray(const struct imp__plan *p, const struct imp_bend_rays *rays,
         imp__field_eval1(p->field, &s->at.x, 1, &s->jet);
         if (s->entry->event == IMP_BEND_REFRACT) {
             struct imp__surface_at at;
-            struct imp__turn turn;
+            struct imp__bend_turn turn;
             imp__surface_eval(imp__start_entry(s), &s->at.x, &s->at.v, &at);
             const imp_v3 n = imp__normalize(at.gx);
             if (fabs(imp__dot(n, s->d0)) < p->grazing) s->flags = IMP_BEND_GRAZING;
-            imp__turn(&n, &s->at.v, s->jet.eta, false, &turn);
+            imp__bend_turn(&n, &s->at.v, s->jet.eta, false, &turn);
             if (turn.reflected) s->flags = IMP_BEND_MISSED;
             s->at.v = turn.v;
         }

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
- *
- * A sum of fields. Its numbers are those of the parts, one after the other; the parts
- * keep none of their own. */
+ * A sum of fields. Its theta is that of the parts, one after the other; each part's theta
+ * points into it. */
 #include "bend.h"
 #include <string.h>
 

@@ -19,7 +19,7 @@ void imp__surface_eval(const struct imp__surface *s, const imp_v3 *x, const imp_
     switch (s->kind) {
     case IMP__PLANE:
     case IMP__DISC:
-    case IMP__MESH: /* the plane of the triangle that was met */
+    case IMP__MESH: /* the plane of the triangle that was hit */
         at->g = imp__dot(s->n, *x) - s->offset;
         at->gx = s->n;
         break;
@@ -80,8 +80,8 @@ bool imp__surface_covers(const struct imp__surface *s, const imp_v3 *x)
 
 /* a = n.v; q^2 = e2^2 - |v|^2 + a^2; v' = v + (sign(a) q - a) n, or reflected if q^2 < 0.
  */
-void imp__turn(const imp_v3 *n, const imp_v3 *v, double e2, bool mirror,
-               struct imp__turn *t)
+void imp__bend_turn(const imp_v3 *n, const imp_v3 *v, double e2, bool mirror,
+                    struct imp__bend_turn *t)
 {
     t->a = imp__dot(*n, *v);
     const double q2 = e2 * e2 - imp__dot(*v, *v) + t->a * t->a;
@@ -97,8 +97,9 @@ void imp__turn(const imp_v3 *n, const imp_v3 *v, double e2, bool mirror,
     t->v = *v + t->c * *n;
 }
 
-void imp__turn_vjp(const struct imp__turn *t, const imp_v3 *n, const imp_v3 *v, double e2,
-                   const imp_v3 *bar, imp_v3 *v_bar, imp_v3 *n_bar, double *e2_bar)
+void imp__bend_turn_vjp(const struct imp__bend_turn *t, const imp_v3 *n, const imp_v3 *v,
+                        double e2, const imp_v3 *bar, imp_v3 *v_bar, imp_v3 *n_bar,
+                        double *e2_bar)
 {
     const imp_v3 m = *bar;
     const double cb = imp__dot(m, *n);
@@ -114,8 +115,9 @@ void imp__turn_vjp(const struct imp__turn *t, const imp_v3 *n, const imp_v3 *v, 
     *e2_bar = cb * t->sign * e2 / t->q;
 }
 
-void imp__turn_jvp(const struct imp__turn *t, const imp_v3 *n, const imp_v3 *v, double e2,
-                   const imp_v3 *v_dot, const imp_v3 *n_dot, double e2_dot, imp_v3 *dot)
+void imp__bend_turn_jvp(const struct imp__bend_turn *t, const imp_v3 *n, const imp_v3 *v,
+                        double e2, const imp_v3 *v_dot, const imp_v3 *n_dot,
+                        double e2_dot, imp_v3 *dot)
 {
     const double a_dot = imp__dot(*n, *v_dot) + imp__dot(*n_dot, *v);
     double c_dot = -2 * a_dot;
@@ -146,7 +148,7 @@ bool imp__facet(const struct imp__surface *s, const imp_v3 *a, const imp_v3 *b,
             facet->offset = imp__dot(at.ng, at.p);
             return true;
         }
-        from = hit.t * (1 + 1e-6) + nearest; /* the other side of a thin wall */
+        from = hit.t * (1 + 1e-6) + nearest; /* of the other side: go on */
     }
     return false;
 }

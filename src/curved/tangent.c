@@ -33,7 +33,7 @@ static imp_v3 normal_dot(const struct imp__surface *s, imp_v3 x, imp_v3 gx, imp_
     return (h - n * imp__dot(n, h)) * (1 / length);
 }
 
-/* The length of the fractional step follows: d tau = -dG / (dG/d tau). */
+/* Tangent of a fractional step, whose length changes by d tau = -dG / (dG/d tau). */
 static void land_dot(const struct imp__plan *p, const struct imp__surface *s,
                      const struct imp__state *from, const struct imp__state *from_dot,
                      double tau, const double *theta_dot, struct imp__state *at,
@@ -74,7 +74,7 @@ static void start_dot(const struct job *job, size_t i, const struct imp__start *
         dot->x += tau_dot * v0;
         dot->path = p->outside_index * p->outside_index * tau_dot;
         if (entry->event != IMP_BEND_REFRACT) return;
-        struct imp__turn turn;
+        struct imp__bend_turn turn;
         const imp_v3 n = imp__normalize(sa.gx);
         const imp_v3 n_dot = normal_dot(entry, s->at.x, sa.gx, dot->x);
         double eta_dot = 0;
@@ -82,8 +82,8 @@ static void start_dot(const struct job *job, size_t i, const struct imp__start *
         if (job->theta_dot)
             p->field->ops->tangent(p->field, &s->at.x, job->theta_dot, &eta_dot, &g_dot);
         eta_dot += imp__dot(s->jet.g, dot->x);
-        imp__turn(&n, &v0, s->jet.eta, false, &turn);
-        imp__turn_jvp(&turn, &n, &v0, s->jet.eta, &vd, &n_dot, eta_dot, &dot->v);
+        imp__bend_turn(&n, &v0, s->jet.eta, false, &turn);
+        imp__bend_turn_jvp(&turn, &n, &v0, s->jet.eta, &vd, &n_dot, eta_dot, &dot->v);
         return;
     }
     double eta_dot = 0;
@@ -135,12 +135,13 @@ static enum imp_status ray_tangent(const struct job *job, size_t i,
         imp__surface_eval(g->surface, &s.x, &s.v, &sa);
         if (g->surface->event == IMP_BEND_REFRACT ||
             g->surface->event == IMP_BEND_MIRROR) {
-            struct imp__turn turn;
+            struct imp__bend_turn turn;
             const imp_v3 n = imp__normalize(sa.gx), vd = dot.v;
             const imp_v3 n_dot = normal_dot(g->surface, s.x, sa.gx, dot.x);
-            imp__turn(&n, &s.v, g->surface->index, g->surface->event == IMP_BEND_MIRROR,
-                      &turn);
-            imp__turn_jvp(&turn, &n, &s.v, g->surface->index, &vd, &n_dot, 0, &dot.v);
+            imp__bend_turn(&n, &s.v, g->surface->index,
+                           g->surface->event == IMP_BEND_MIRROR, &turn);
+            imp__bend_turn_jvp(&turn, &n, &s.v, g->surface->index, &vd, &n_dot, 0,
+                               &dot.v);
             s.v = turn.v;
         }
     }

@@ -1,11 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
- *
- * What rays should do: each kind of target as value and cotangents of where rays arrive
- * (docs/bent-rays.md 4). Shares of power w_i p_i take the place of 1/N. */
+ * Targets: value, and cotangents of the rays' arrivals (docs/bent-rays.md 4). Means are
+ * weighted by the shares of power w_i p_i. */
 #include "bend.h"
 
-/* Slant on a plane below 0.05 does not count, above 0.15 it does (b in
- * docs/bent-rays.md 2.6). */
+/* Weight of an arrival by the cosine c on the plane: 0 below 0.05, 1 above 0.15, smooth
+ * between (docs/bent-rays.md 2.6 b). */
 static double slant_weight(double c, double *slope)
 {
     const double t = imp_clamp((c - 0.05) / 0.1, 0.0, 1.0);
@@ -27,7 +26,8 @@ bool imp__arrive(const struct imp_bend_target *t, const struct imp_bend_exit *e,
     if (!t->at_plane) return true;
     const imp_v3 n = imp__v3_load(t->normal);
     const double nv = imp__dot(n, a->v);
-    a->weight = slant_weight(nv / speed, &a->slope); /* backwards does not count */
+    a->weight = slant_weight(nv / speed,
+                             &a->slope); /* 0 for rays that move away from the plane */
     if (a->weight == 0) return false;
     a->s = (t->offset - imp__dot(n, a->x)) / nv;
     a->x += a->s * a->v;

@@ -113,7 +113,7 @@ static void quarter(int n, int *i, int *j)
     *j = was;
 }
 
-/* The least node that a discrete symmetry takes node p to. */
+/* The first node of the orbit of node p under mirrors and turns. */
 static size_t least(const struct imp__grid *g, const struct imp_field_symmetry *s,
                     const int p[3])
 {
@@ -138,8 +138,8 @@ static size_t least(const struct imp__grid *g, const struct imp_field_symmetry *
     return best;
 }
 
-/* Nodes at one distance from the axis share a number: all symmetries at once that a node
- * can see. r^2 in units of a quarter of the spacing squared is an integer. */
+/* Continuous symmetry: nodes at one distance from the axis share a number. r^2 in units
+ * of a quarter of the squared spacing is an integer. */
 static enum imp_status rings(const struct imp__grid *g,
                              const struct imp_field_symmetry *s, uint32_t *number,
                              size_t *count)

@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
- *
- * Rays forwards. IMP_LANES rays take whole steps side by side; a ray that has passed a
- * surface lands on it (landing.c), and ends or turns there. */
+ * Forward tracing. IMP_LANES rays take whole steps side by side. A step that crosses a
+ * surface is shortened to end on it (landing.c); there the ray ends or is reflected. */
 #include "curved.h"
 #include <string.h>
 
@@ -11,7 +10,7 @@ struct lane {
     size_t ray;
     const struct imp__domain *domain;
     uint32_t steps, total;   /* whole steps of this segment, of the ray */
-    unsigned flags, pending; /* pending: taps not met yet, as bits */
+    unsigned flags, pending; /* pending: bit mask of taps not crossed yet */
     int segments;
 };
 
@@ -30,7 +29,7 @@ static void exit_write(const struct imp__state *a, double tau, const struct lane
     e->segments = (uint8_t)imp_min(l->segments, 255);
 }
 
-/* Taps crossed on the way from `from` to `to`, `t` long. */
+/* Record the taps crossed by the step from `from` to `to`, of length t. */
 static void taps_look(const struct imp__plan *p, struct lane *l,
                       const struct imp__state *from, const struct imp__state *to,
                       double t, struct imp_bend_exit *taps)
@@ -47,12 +46,13 @@ static void taps_look(const struct imp__plan *p, struct lane *l,
         const double tau = imp__land_on(p, &s, from, t, a0.g, a1.g, &at);
         l->pending &= ~(1u << k);
         struct lane here = *l;
-        here.total = l->steps; /* of this segment: the adjoint meets it there */
+        here.total = l->steps; /* steps of this segment, which the adjoint counts down */
         exit_write(&at, tau, &here, 0, k, &taps[k]);
     }
 }
 
-/* What happens at a surface: true if the ray ends, with its exit; false: `at` goes on. */
+/* Apply a surface's event. True: the ray ends, and its exit is written. False: it was
+ * reflected and goes on from `at`. */
 static bool event(const struct imp__plan *p, struct lane *l, const struct imp__surface *s,
                   struct imp__state *at, double tau, struct imp_bend_exit *e)
 {
@@ -72,8 +72,8 @@ static bool event(const struct imp__plan *p, struct lane *l, const struct imp__s
         fabs(imp__dot(n, at->v)) < p->grazing * speed)
         l->flags |= IMP_BEND_GRAZING;
     if (s->event == IMP_BEND_REFRACT || s->event == IMP_BEND_MIRROR) {
-        struct imp__turn turn;
-        imp__turn(&n, &at->v, s->index, s->event == IMP_BEND_MIRROR, &turn);
+        struct imp__bend_turn turn;
+        imp__bend_turn(&n, &at->v, s->index, s->event == IMP_BEND_MIRROR, &turn);
         at->v = turn.v;
         if (turn.reflected && !(l->flags & IMP_BEND_DROPPED)) {
             l->flags |= IMP_BEND_REFLECTED;

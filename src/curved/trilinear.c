@@ -3,7 +3,7 @@
  * Trilinear grid. The index is continuous, its gradient jumps at cell faces, and inside
  * cells the diagonal of the Hessian is zero: the derivative of the traced program is
  * exact, and not the macroscopic one (docs/bent-rays.md 3.3). */
-#include "curved.h"
+#include "grid_back.h"
 
 struct corners {
     double c[8];
@@ -106,30 +106,24 @@ static void trilinear_splat(const imp_field *f, const imp_v3 *x, double a,
 }
 
 static inline __attribute__((always_inline)) void
-back_some(const struct imp__grid *g, bool single, bool arc, double dt, int n,
-          struct imp__back *b, struct imp__bar *bar)
+back_jet(const struct imp__grid *g, imp_v3 x, bool single, void *at, struct imp__jet *j)
 {
-    const bool eta2 = g->desc.param == IMP_FIELD_ETA2;
-    for (int o = 0; o < n; o++) {
-        const int i = imp__lane_order(n, o);
-        const struct corners r = corners_of(g, b->x[i], single);
-        struct imp__jet j;
-        double value;
-        imp_v3 slope;
-        jet_of(g, &r, 2, &j);
-        if (eta2) imp__jet_from_eta2(&j, 2);
-        imp__kick_back(arc, dt, &j, b, i, &value, &slope);
-        if (!bar) continue;
-        if (eta2) imp__eta2_vjp(&j, &value, &slope);
-        splat_corners(g, &r, value, slope, bar);
-    }
+    struct corners *r = at;
+    *r = corners_of(g, x, single);
+    jet_of(g, r, 2, j);
+}
+static inline __attribute__((always_inline)) void back_splat(const struct imp__grid *g,
+                                                             const void *at, double a,
+                                                             imp_v3 b,
+                                                             struct imp__bar *bar)
+{
+    splat_corners(g, at, a, b, bar);
 }
 static void trilinear_kick_back(const imp_field *f, bool arc, double dt, int n,
                                 struct imp__back *b, struct imp__bar *bar)
 {
-    const struct imp__grid *g = (const struct imp__grid *)f;
-    if (g->single) back_some(g, true, arc, dt, n, b, bar);
-    else back_some(g, false, arc, dt, n, b, bar);
+    struct corners at;
+    imp__grid_kick_back(f, arc, dt, n, b, bar, back_jet, back_splat, &at);
 }
 
 const struct imp__field_ops imp__field_trilinear = {.name = "trilinear",

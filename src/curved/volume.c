@@ -16,6 +16,13 @@ static uint32_t u32_at(const unsigned char *d)
     return (uint32_t)d[0] | (uint32_t)d[1] << 8 | (uint32_t)d[2] << 16 |
            (uint32_t)d[3] << 24;
 }
+static int32_t i32_at(const unsigned char *d)
+{
+    const uint32_t bits = u32_at(d);
+    int32_t i;
+    memcpy(&i, &bits, sizeof i);
+    return i;
+}
 static double f32_at(const unsigned char *d)
 {
     const uint32_t bits = u32_at(d);
@@ -31,11 +38,11 @@ static double f64_at(const unsigned char *d)
     return f;
 }
 
-/* A grid through samples [z][y][x] of `bytes` each. */
+/* A grid through samples of `bytes` each; [z][y][x], or in Fortran order [x][y][z]. */
 static enum imp_status grid_make(imp_context *ctx, const char *path,
                                  const struct imp_field_grid *like,
                                  const uint64_t size[3], const unsigned char *d,
-                                 int bytes, imp_field **out)
+                                 int bytes, bool fortran, imp_field **out)
 {
     enum imp_status st = IMP_OK;
     struct imp_field_grid g = *like;
@@ -44,8 +51,13 @@ static enum imp_status grid_make(imp_context *ctx, const char *path,
     double *samples = imp__alloc(ctx, n, sizeof *samples);
     if (!samples) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "%s: no memory", path));
     for (int k = 0; k < 3; k++) g.cells[k] = (int)size[k] - 1;
-    for (size_t i = 0; i < n; i++, d += bytes)
-        samples[i] = bytes == 8 ? f64_at(d) : f32_at(d);
+    const size_t nx = size[0], ny = size[1], nz = size[2];
+    for (size_t i = 0; i < n; i++, d += bytes) {
+        /* Fortran: z runs fastest in the file */
+        const size_t at =
+            fortran ? i / (nz * ny) + nx * (i / nz % ny + ny * (i % nz)) : i;
+        samples[at] = bytes == 8 ? f64_at(d) : f32_at(d);
+    }
     st = imp_field_grid_create(ctx, &g, 1, &f);
     if (st == IMP_OK) st = imp_field_set_samples(f, samples);
     if (st != IMP_OK) {
@@ -62,16 +74,24 @@ out:
 
 /* Sizes from a file, before they become memory. */
 static enum imp_status size_check(imp_context *ctx, const char *path,
-                                  const uint64_t size[3], size_t bytes, size_t left)
+                                  const int64_t given[3], size_t bytes, size_t left,
+                                  uint64_t size[3])
 {
-    for (int k = 0; k < 3; k++)
-        if (size[k] < 2 || size[k] > 8193)
+    for (int k = 0; k < 3; k++) {
+        if (given[k] < 2 || given[k] > 8193)
             return imp__error(ctx, IMP_E_SCENE,
-                              "%s: %llu samples along an axis: 2 to 8193 are "
-                              "read",
-                              path, (unsigned long long)size[k]);
-    if (size[0] * size[1] * size[2] > left / bytes)
-        return imp__error(ctx, IMP_E_SCENE, "%s: cut off", path);
+                              "%s: %lld samples along %c: 2 to 8193 are read", path,
+                              (long long)given[k], "xyz"[k]);
+        size[k] = (uint64_t)given[k];
+    }
+    const uint64_t n = size[0] * size[1] * size[2];
+    if (n > left / bytes)
+        return imp__error(ctx, IMP_E_SCENE,
+                          "%s: cut off: %llu x %llu x %llu samples are %llu bytes, and "
+                          "%zu are there",
+                          path, (unsigned long long)size[0], (unsigned long long)size[1],
+                          (unsigned long long)size[2], (unsigned long long)(n * bytes),
+                          left);
     return IMP_OK;
 }
 
@@ -84,17 +104,18 @@ static enum imp_status vol_read(imp_context *ctx, const char *path,
     if (b->size < 48 || d[3] != 3 || u32_at(d + 4) != 1)
         return imp__error(ctx, IMP_E_SCENE, "%s: not a grid volume of version 3, float32",
                           path);
-    const uint64_t size[3] = {u32_at(d + 8), u32_at(d + 12), u32_at(d + 16)};
-    if (u32_at(d + 20) != 1)
-        return imp__error(ctx, IMP_E_SCENE, "%s: %u channels: an index has one", path,
-                          u32_at(d + 20));
-    const enum imp_status st = size_check(ctx, path, size, 4, b->size - 48);
+    const int64_t given[3] = {i32_at(d + 8), i32_at(d + 12), i32_at(d + 16)};
+    uint64_t size[3];
+    if (i32_at(d + 20) != 1)
+        return imp__error(ctx, IMP_E_SCENE, "%s: %d channels: an index has one", path,
+                          i32_at(d + 20));
+    const enum imp_status st = size_check(ctx, path, given, 4, b->size - 48, size);
     if (st != IMP_OK) return st;
     for (int k = 0; k < 3; k++) {
         g.lo[k] = f32_at(d + 24 + 4 * k);
         g.hi[k] = f32_at(d + 36 + 4 * k);
     }
-    return grid_make(ctx, path, &g, size, d + 48, 4, out);
+    return grid_make(ctx, path, &g, size, d + 48, 4, false, out);
 }
 
 /* What follows 'key': in the header's dictionary; NULL: not there. */
@@ -114,41 +135,53 @@ static enum imp_status npy_read(imp_context *ctx, const char *path,
 {
     const unsigned char *d = b->data;
     char header[HEADER_MAX + 1];
-    if (b->size < 12) return imp__error(ctx, IMP_E_SCENE, "%s: cut off", path);
+    if (b->size < 12)
+        return imp__error(ctx, IMP_E_SCENE, "%s: cut off in the NPY header", path);
     const size_t start = d[6] == 1 ? 10 : 12;
     const size_t length = d[6] == 1 ? (size_t)(d[8] | d[9] << 8) : u32_at(d + 8);
-    if (d[6] < 1 || d[6] > 3 || length > HEADER_MAX || length > b->size - start)
-        return imp__error(ctx, IMP_E_SCENE, "%s: malformed NPY header", path);
+    if (d[6] < 1 || d[6] > 3)
+        return imp__error(ctx, IMP_E_SCENE, "%s: NPY version %d: 1 to 3 are read", path,
+                          d[6]);
+    if (length > HEADER_MAX || length > b->size - start)
+        return imp__error(ctx, IMP_E_SCENE, "%s: cut off in the NPY header", path);
     memcpy(header, d + start, length);
     header[length] = 0;
     const char *type = npy_entry(header, "'descr'"),
                *order = npy_entry(header, "'fortran_order'"),
                *shape = npy_entry(header, "'shape'");
-    const int bytes = !type                        ? 0
-                      : !strncmp(type, "'<f4'", 5) ? 4
-                      : !strncmp(type, "'<f8'", 5) ? 8
-                                                   : 0;
-    uint64_t zyx[4] = {0};
-    int dims = 0;
-    if (shape && *shape == '(') {
-        const char *s = shape + 1;
-        for (; dims < 4; dims++) {
-            int64_t v;
-            s += strspn(s, " ,");
-            if (*s == ')' || !imp__integer(&s, s + strlen(s), &v) || v < 0) break;
-            zyx[dims] = (uint64_t)v;
-        }
-    }
-    if (!bytes || !order || strncmp(order, "False", 5) != 0 || dims != 3)
+    if (!type || !order || !shape || *shape != '(')
         return imp__error(ctx, IMP_E_SCENE,
-                          "%s: must be an array (Z, Y, X) of <f4 or <f8, in C "
-                          "order",
+                          "%s: malformed NPY header: no 'descr', 'fortran_order' or "
+                          "'shape'",
                           path);
-    const uint64_t size[3] = {zyx[2], zyx[1], zyx[0]};
+    const bool fortran = !strncmp(order, "True", 4);
+    const int bytes = !strncmp(type, "'<f4'", 5) ? 4 : !strncmp(type, "'<f8'", 5) ? 8 : 0;
+    if (!bytes)
+        return imp__error(ctx, IMP_E_SCENE,
+                          "%s: samples of type %.*s: '<f4' and '<f8' are read", path,
+                          (int)imp_min(strcspn(type, ",}"), (size_t)40), type);
+    int64_t zyx[4] = {0};
+    int dims = 0;
+    for (const char *s = shape + 1; dims < 4; dims++) {
+        s += strspn(s, " ,");
+        if (*s == ')' || !imp__integer(&s, s + strlen(s), &zyx[dims])) break;
+    }
+    if (dims != 3)
+        return imp__error(ctx, IMP_E_SCENE,
+                          "%s: an array of shape %.*s: must be (Z, Y, X)", path,
+                          (int)imp_min(strcspn(shape, ")") + 1, (size_t)80), shape);
+    const int64_t given[3] = {zyx[2], zyx[1], zyx[0]};
+    uint64_t size[3];
     const enum imp_status st =
-        size_check(ctx, path, size, (size_t)bytes, b->size - start - length);
+        size_check(ctx, path, given, (size_t)bytes, b->size - start - length, size);
     if (st != IMP_OK) return st;
-    return grid_make(ctx, path, like, size, d + start + length, bytes, out);
+    return grid_make(ctx, path, like, size, d + start + length, bytes, fortran, out);
+}
+
+static bool has_suffix(const char *path, const char *suffix)
+{
+    const size_t n = strlen(path), m = strlen(suffix);
+    return n > m && !strcmp(path + n - m, suffix);
 }
 
 enum imp_status imp_field_read(imp_context *ctx, const char *path,
@@ -165,6 +198,13 @@ enum imp_status imp_field_read(imp_context *ctx, const char *path,
         IMP_TRY(npy_read(ctx, path, &like, &b, out));
     else if (b.size >= 3 && memcmp(b.data, "VOL", 3) == 0)
         IMP_TRY(vol_read(ctx, path, &like, &b, out));
+    else if (has_suffix(path, ".npy"))
+        IMP_TRY(imp__error(ctx, IMP_E_SCENE,
+                           "%s: not an NPY file: it does not begin with \\x93NUMPY",
+                           path));
+    else if (has_suffix(path, ".vol"))
+        IMP_TRY(imp__error(ctx, IMP_E_SCENE,
+                           "%s: not a grid volume: it does not begin with VOL", path));
     else IMP_TRY(imp__profile_read(ctx, path, &b, out));
 out:
     imp__bytes_free(ctx, &b);
@@ -236,10 +276,8 @@ static enum imp_status grid_write(const imp_field *f, const char *path, bool npy
 
 enum imp_status imp_field_write(const imp_field *f, const char *path)
 {
-    const size_t n = strlen(path);
-    const bool npy = n > 4 && !strcmp(path + n - 4, ".npy");
-    const bool vol = n > 4 && !strcmp(path + n - 4, ".vol");
-    if (npy || vol) {
+    const bool npy = has_suffix(path, ".npy");
+    if (npy || has_suffix(path, ".vol")) {
         const uint32_t *number;
         const struct imp__grid *g = imp__field_nodes(f, &number);
         if (!g)

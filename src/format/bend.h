@@ -1,22 +1,21 @@
 /* SPDX-License-Identifier: Apache-2.0
- *
- * Files of bent rays (docs/curved-rays.md): between bend_load.c, which drives it, and
- * one file for each element. */
+ * Loader of problems of bent rays (docs/curved-rays.md): bend_load.c reads the file, and
+ * one file reads each element. */
 #ifndef IMP_FORMAT_BEND_H
 #define IMP_FORMAT_BEND_H
 
 #include "curved/bend.h"
 #include "scene/scene.h"
 
-struct bend_frame {
+struct imp__bendfile_frame {
     imp_v3 o, s, t, n;
 }; /* of a bundle: z along its rays */
 
-struct bend_loader {
+struct imp__bendfile {
     imp_context *ctx;
     struct imp_scene *scene; /* of the tree and the search list; never built */
     imp_bend *bend;
-    imp_field *truth; /* what `from_truth` targets are made with */
+    imp_field *truth; /* the field that `from_truth` data are traced through */
     struct imp_bend_options options;
     struct imp_dispersion dispersion;
     bool dispersive;
@@ -24,41 +23,42 @@ struct bend_loader {
     size_t n_surfaces, cap_surfaces;
     struct imp_bend_tap taps[16];
     size_t n_taps;
-    struct bend_frame *frames; /* [bundles] */
-    struct imp_node **nodes;   /* [bundles] the <rays> it comes from */
+    struct imp__bendfile_frame *frames; /* [bundles] */
+    struct imp_node **nodes;            /* [bundles] the <rays> it comes from */
     size_t cap_frames, cap_nodes;
 };
 
-static inline imp_v3 bend_place(const struct bend_frame *f, imp_v3 p)
+static inline imp_v3 imp__bendfile_point(const struct imp__bendfile_frame *f, imp_v3 p)
 {
     return f->o + f->s * p[0] + f->t * p[1] + f->n * p[2];
 }
-static inline imp_v3 bend_turn(const struct bend_frame *f, imp_v3 d)
+static inline imp_v3 imp__bendfile_direction(const struct imp__bendfile_frame *f,
+                                             imp_v3 d)
 {
     return f->s * d[0] + f->t * d[1] + f->n * d[2];
 }
 
 /* A <volume>: grid, radial, a file or a profile. */
-enum imp_status bend_volume(struct bend_loader *l, struct imp_node *node,
-                            imp_field **out);
+enum imp_status imp__bendfile_volume(struct imp__bendfile *l, struct imp_node *node,
+                                     imp_field **out);
 /* A distance field that the bend keeps. */
-enum imp_status bend_sdf(struct bend_loader *l, struct imp_node *parent,
-                         const imp_field **out);
-enum imp_status bend_medium(struct bend_loader *l, struct imp_node *node);
+enum imp_status imp__bendfile_sdf(struct imp__bendfile *l, struct imp_node *parent,
+                                  const imp_field **out);
+enum imp_status imp__bendfile_medium(struct imp__bendfile *l, struct imp_node *node);
 /* Bounds, holds and smoothness: when the bend is there. */
-enum imp_status bend_rules(struct bend_loader *l, struct imp_node *node);
-enum imp_status bend_rays(struct bend_loader *l, struct imp_node *node);
+enum imp_status imp__bendfile_rules(struct imp__bendfile *l, struct imp_node *node);
+enum imp_status imp__bendfile_rays(struct imp__bendfile *l, struct imp_node *node);
 /* A <surface>: for `group` in its frame. */
-enum imp_status bend_surface(struct bend_loader *l, struct imp_node *node,
-                             const struct bend_frame *f, int group);
-enum imp_status bend_target(struct bend_loader *l, struct imp_node *node,
-                            const struct bend_frame *f, int bundle);
-/* A failure of the library's, with the node's place before its message. */
-enum imp_status bend_placed(struct bend_loader *l, struct imp_node *node,
-                            enum imp_status st);
-/* A float property that must be there, or have a fallback that is not NaN. */
-enum imp_status bend_number(struct bend_loader *l, struct imp_node *node,
-                            const char *name, double fallback, double lo, double hi,
-                            double *out);
+enum imp_status imp__bendfile_surface(struct imp__bendfile *l, struct imp_node *node,
+                                      const struct imp__bendfile_frame *f, int group);
+enum imp_status imp__bendfile_target(struct imp__bendfile *l, struct imp_node *node,
+                                     const struct imp__bendfile_frame *f, int bundle);
+/* Put the node's file, line and column before the message of a failed call. */
+enum imp_status imp__bendfile_placed(struct imp__bendfile *l, struct imp_node *node,
+                                     enum imp_status st);
+/* A float property in lo .. hi; required if fallback is NaN. */
+enum imp_status imp__bendfile_number(struct imp__bendfile *l, struct imp_node *node,
+                                     const char *name, double fallback, double lo,
+                                     double hi, double *out);
 
 #endif

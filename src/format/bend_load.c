@@ -8,12 +8,12 @@
 #include "xml.h"
 #include <string.h>
 
-static const struct bend_frame world = {
+static const struct imp__bendfile_frame world = {
     {0, 0, 0, 0}, {1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
 
-enum imp_status bend_number(struct bend_loader *l, struct imp_node *node,
-                            const char *name, double fallback, double lo, double hi,
-                            double *out)
+enum imp_status imp__bendfile_number(struct imp__bendfile *l, struct imp_node *node,
+                                     const char *name, double fallback, double lo,
+                                     double hi, double *out)
 {
     if (isnan(fallback) && !imp__props_has(node, name))
         return imp__node_error(l->ctx, node, IMP_E_SCENE, "needs the float '%s'", name);
@@ -26,9 +26,9 @@ enum imp_status bend_number(struct bend_loader *l, struct imp_node *node,
     return IMP_OK;
 }
 
-/* What `from_truth` targets want: the exits of the same rays through the other field,
- * traced well. */
-static enum imp_status truth_trace(struct bend_loader *l, struct imp_bend_exit **out)
+/* Data of `from_truth` targets: exits of the same rays through the field `truth`, traced
+ * with yoshida4 and a quarter of the step. */
+static enum imp_status truth_trace(struct imp__bendfile *l, struct imp_bend_exit **out)
 {
     struct imp_bend_rays r;
     struct imp_bend_options o = l->options;
@@ -55,7 +55,7 @@ static enum imp_status truth_trace(struct bend_loader *l, struct imp_bend_exit *
     return IMP_OK;
 }
 
-static enum imp_status truth_apply(struct bend_loader *l)
+static enum imp_status truth_apply(struct imp__bendfile *l)
 {
     enum imp_status st = IMP_OK;
     struct imp_bend_exit *e = NULL;
@@ -75,20 +75,14 @@ static enum imp_status truth_apply(struct bend_loader *l)
             const size_t own = k - t->first;
             if (!imp__arrive(&t->desc, &e[k], &a)) continue;
             const imp_v3 d0 = imp__normalize(imp__v3_load(b->d[k]));
-            imp_v3 value = {0};
-            switch (t->desc.type) {
-            case IMP_BEND_POINTS: value = a.x; break;
-            case IMP_BEND_DIRECTIONS: value = a.d; break;
-            case IMP_BEND_DEFLECTION: value = a.v - d0 * imp__dot(d0, a.v); break;
-            case IMP_BEND_PATH: t->data[own] = a.path; continue;
-            case IMP_BEND_FOCUS:
-            case IMP_BEND_SPOT:
-            case IMP_BEND_DIRECTION:
-            case IMP_BEND_WAVEFRONT:
-            case IMP_BEND_IMAGE:
-            case IMP_BEND_FARFIELD:
-            case IMP_BEND_SHAPE: break;
+            if (imp__target_numbers(t->desc.type) == 1) {
+                t->data[own] = a.path;
+                continue;
             }
+            const imp_v3 value = t->desc.type == IMP_BEND_POINTS ? a.x
+                                 : t->desc.type == IMP_BEND_DIRECTIONS
+                                     ? a.d
+                                     : a.v - d0 * imp__dot(d0, a.v); /* deflection */
             imp__v3_store(value, t->data + 3 * own);
         }
     }
@@ -97,9 +91,9 @@ out:
     return st;
 }
 
-static enum imp_status each(struct bend_loader *l, struct imp_node *node, const char *tag,
-                            enum imp_status (*fn)(struct bend_loader *,
-                                                  struct imp_node *))
+static enum imp_status
+each(struct imp__bendfile *l, struct imp_node *node, const char *tag,
+     enum imp_status (*fn)(struct imp__bendfile *, struct imp_node *))
 {
     for (size_t i = 0; i < node->n_children; i++) {
         struct imp_child *c = &node->children[i];
@@ -111,19 +105,19 @@ static enum imp_status each(struct bend_loader *l, struct imp_node *node, const 
     return IMP_OK;
 }
 
-static enum imp_status surface_of_all(struct bend_loader *l, struct imp_node *node)
+static enum imp_status surface_of_all(struct imp__bendfile *l, struct imp_node *node)
 {
-    return bend_surface(l, node, &world, -1);
+    return imp__bendfile_surface(l, node, &world, -1);
 }
-static enum imp_status target_of_all(struct bend_loader *l, struct imp_node *node)
+static enum imp_status target_of_all(struct imp__bendfile *l, struct imp_node *node)
 {
-    return bend_target(l, node, &world, -1);
+    return imp__bendfile_target(l, node, &world, -1);
 }
 
-/* An index below its bound (1 if nothing is said) is often a mistake, of a file's scale
- * say, and a fit would begin with correcting it. A few coefficients of a spline may be
- * below what its values never are. */
-static enum imp_status bounds_look(struct bend_loader *l, const struct imp_node *medium)
+/* An index below its bound (default 1) is often a mistake, for instance in a file's
+ * scale, and a fit would begin by moving it. A few coefficients of a spline may be below
+ * the bound while its values are not. */
+static enum imp_status bounds_look(struct imp__bendfile *l, const struct imp_node *medium)
 {
     const size_t n = l->bend->field->n_theta;
     double *theta = imp__alloc(l->ctx, 3 * n + 1, sizeof *theta);
@@ -144,7 +138,7 @@ static enum imp_status bounds_look(struct bend_loader *l, const struct imp_node 
     return IMP_OK;
 }
 
-static enum imp_status build(struct bend_loader *l)
+static enum imp_status build(struct imp__bendfile *l)
 {
     enum imp_status st = IMP_OK;
     struct imp_node *root = l->scene->root, *medium = NULL;
@@ -159,23 +153,24 @@ static enum imp_status build(struct bend_loader *l)
     if (!medium)
         IMP_TRY(imp__node_error(l->ctx, root, IMP_E_SCENE,
                                 "has no <medium type=\"graded\">"));
-    IMP_TRY(bend_medium(l, medium));
+    IMP_TRY(imp__bendfile_medium(l, medium));
     IMP_TRY(each(l, root, "surface", surface_of_all));
     IMP_TRY(each(l, medium, "surface", surface_of_all));
-    IMP_TRY(each(l, root, "rays", bend_rays));
+    IMP_TRY(each(l, root, "rays", imp__bendfile_rays));
     if (imp_bend_n_rays(l->bend) == 0)
         IMP_TRY(imp__node_error(l->ctx, root, IMP_E_SCENE, "has no <rays>"));
     l->options.surfaces = l->surfaces, l->options.n_surfaces = l->n_surfaces;
     l->options.taps = l->taps, l->options.n_taps = l->n_taps;
     IMP_TRY(imp_bend_set_options(l->bend, &l->options));
-    IMP_TRY(bend_rules(l, medium));
+    IMP_TRY(imp__bendfile_rules(l, medium));
     IMP_TRY(each(l, root, "target", target_of_all));
     for (int b = 0; b < imp_bend_n_bundles(l->bend); b++) {
         struct imp_node *rays = l->nodes[b];
         for (size_t i = 0; i < rays->n_children; i++)
             if (strcmp(rays->children[i].node->tag, "target") == 0) {
                 rays->children[i].used = true;
-                IMP_TRY(bend_target(l, rays->children[i].node, &l->frames[b], b));
+                IMP_TRY(
+                    imp__bendfile_target(l, rays->children[i].node, &l->frames[b], b));
             }
     }
     IMP_TRY(truth_apply(l));
@@ -193,7 +188,7 @@ static enum imp_status load(imp_context *ctx, const struct imp_bytes *text,
                             const struct imp_load_options *o, imp_bend **out)
 {
     enum imp_status st = IMP_OK;
-    struct bend_loader l = {.ctx = ctx};
+    struct imp__bendfile l = {.ctx = ctx};
     IMP_TRY(imp__scene_new(ctx, o->mode, &l.scene));
     IMP_TRY(imp__search_init(l.scene, o->search, o->n_search, folder));
     IMP_TRY(imp__xml_read(l.scene, text, name, o));
@@ -213,21 +208,10 @@ out:
 enum imp_status imp_bend_load(imp_context *ctx, const char *path,
                               const struct imp_load_options *options, imp_bend **out)
 {
-    enum imp_status st = IMP_OK;
-    struct imp_load_options o;
-    struct imp_bytes text = {0};
-    char *folder = NULL;
-    if (!path || !*path) return imp__error(ctx, IMP_E_ARG, "no file is named");
-    IMP_TRY(imp__load_options(ctx, options, &o));
-    IMP_TRY(imp__file_read(ctx, path, XML_FILE_BYTES_MAX, &text));
-    folder = imp__strdup(ctx, strchr(path, '/') ? path : ".");
-    if (!folder) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "%s: out of memory", path));
-    char *slash = strrchr(folder, '/');
-    if (slash) slash[slash == folder] = 0;
-    IMP_TRY(load(ctx, &text, path, folder, &o, out));
-out:
-    imp__release(ctx, folder);
-    imp__bytes_free(ctx, &text);
+    struct imp__load_file f;
+    enum imp_status st = imp__load_open(ctx, path, options, &f);
+    if (st == IMP_OK) st = load(ctx, &f.text, path, f.folder, &f.options, out);
+    imp__load_close(ctx, &f);
     return st;
 }
 

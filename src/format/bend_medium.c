@@ -1,13 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0
- *
- * <medium type="graded">: the index field from <volume>s, how rays step, what a fit may
- * do. */
+ * <medium type="graded">: the index field from <volume>s, the options of tracing, bounds
+ * and held numbers of a fit. */
 #include "bend.h"
 #include "search.h"
 #include <string.h>
 
 /* cauchy = "A B C", or sellmeier_b and sellmeier_c, in powers of micrometres. */
-static enum imp_status dispersion_read(struct bend_loader *l, struct imp_node *node)
+static enum imp_status dispersion_read(struct imp__bendfile *l, struct imp_node *node)
 {
     enum imp_status st = IMP_OK;
     struct imp_dispersion *d = &l->dispersion;
@@ -15,7 +14,8 @@ static enum imp_status dispersion_read(struct bend_loader *l, struct imp_node *n
     const bool cauchy = imp__props_has(node, "cauchy"),
                sellmeier = imp__props_has(node, "sellmeier_b");
     *d = (struct imp_dispersion)IMP_DISPERSION_INIT;
-    IMP_TRY(bend_number(l, node, "reference", d->reference, 0.01, 1000, &d->reference));
+    IMP_TRY(imp__bendfile_number(l, node, "reference", d->reference, 0.01, 1000,
+                                 &d->reference));
     if (cauchy && sellmeier)
         IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE,
                                 "has both 'cauchy' and 'sellmeier_b'"));
@@ -30,7 +30,7 @@ out:
     return st;
 }
 
-enum imp_status bend_medium(struct bend_loader *l, struct imp_node *node)
+enum imp_status imp__bendfile_medium(struct imp__bendfile *l, struct imp_node *node)
 {
     static const char *const schemes[] = {"leapfrog", "euler", "verlet",
                                           "yoshida4", "arc",   "arc-index"};
@@ -52,13 +52,13 @@ enum imp_status bend_medium(struct bend_loader *l, struct imp_node *node)
         if (strcmp(c->node->tag, "volume") != 0) continue;
         c->used = true;
         if (c->name && strcmp(c->name, "truth") == 0) {
-            IMP_TRY(bend_volume(l, c->node, &l->truth));
+            IMP_TRY(imp__bendfile_volume(l, c->node, &l->truth));
             continue;
         }
         if (n == imp_count(parts))
             IMP_TRY(
                 imp__node_error(l->ctx, node, IMP_E_SCENE, "has more than 64 volumes"));
-        IMP_TRY(bend_volume(l, c->node, &parts[n]));
+        IMP_TRY(imp__bendfile_volume(l, c->node, &parts[n]));
         n++;
     }
     if (n == 0) IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "has no <volume>"));
@@ -77,16 +77,18 @@ enum imp_status bend_medium(struct bend_loader *l, struct imp_node *node)
     IMP_TRY(imp__props_choice(l->ctx, node, "way", ways, 3, 0, &way));
     o->scheme = (enum imp_bend_scheme)scheme;
     o->way = (enum imp_bend_way)way;
-    IMP_TRY(bend_number(l, node, "step", 0, 0, 1e300, &o->step));
-    IMP_TRY(bend_number(l, node, "step_cells", l->bend->step_cells, 1e-6, 1e3, &cells));
-    IMP_TRY(bend_number(l, node, "step_max", 0, 0, 1e300, &most));
+    IMP_TRY(imp__bendfile_number(l, node, "step", 0, 0, 1e300, &o->step));
+    IMP_TRY(imp__bendfile_number(l, node, "step_cells", l->bend->step_cells, 1e-6, 1e3,
+                                 &cells));
+    IMP_TRY(imp__bendfile_number(l, node, "step_max", 0, 0, 1e300, &most));
     imp_bend_set_step(l->bend, cells, most);
     IMP_TRY(imp__props_int(l->ctx, node, "max_steps", 0, 0, 4000000000, &max_steps));
     o->max_steps = (uint32_t)max_steps;
     IMP_TRY(imp__props_bool(l->ctx, node, "outside", false, &outside));
     o->outside = outside;
-    IMP_TRY(bend_number(l, node, "outside_index", 1, 1e-6, 1e6, &o->outside_index));
-    IMP_TRY(bend_number(l, node, "grazing", 0, -1, 1, &o->grazing));
+    IMP_TRY(
+        imp__bendfile_number(l, node, "outside_index", 1, 1e-6, 1e6, &o->outside_index));
+    IMP_TRY(imp__bendfile_number(l, node, "grazing", 0, -1, 1, &o->grazing));
     IMP_TRY(dispersion_read(l, node));
 out:
     for (size_t i = 0; i < n; i++) imp_field_destroy(parts[i]);
@@ -94,29 +96,30 @@ out:
     return st;
 }
 
-enum imp_status bend_rules(struct bend_loader *l, struct imp_node *node)
+enum imp_status imp__bendfile_rules(struct imp__bendfile *l, struct imp_node *node)
 {
     enum imp_status st = IMP_OK;
     double value, weight, edge, lo, hi, radius;
     const double zero[3] = {0};
     double centre[3];
     int64_t layers, order;
-    IMP_TRY(bend_number(l, node, "index_min", 1, -1e300, 1e300, &lo));
-    IMP_TRY(bend_number(l, node, "index_max", 1e300, -1e300, 1e300, &hi));
+    IMP_TRY(imp__bendfile_number(l, node, "index_min", 1, -1e300, 1e300, &lo));
+    IMP_TRY(imp__bendfile_number(l, node, "index_max", 1e300, -1e300, 1e300, &hi));
     if (imp__props_has(node, "index_min") || imp__props_has(node, "index_max"))
-        IMP_TRY(bend_placed(l, node, imp_bend_set_bounds(l->bend, lo, hi)));
-    IMP_TRY(bend_number(l, node, "hold_value", 0, 0, 1e6, &value));
+        IMP_TRY(imp__bendfile_placed(l, node, imp_bend_set_bounds(l->bend, lo, hi)));
+    IMP_TRY(imp__bendfile_number(l, node, "hold_value", 0, 0, 1e6, &value));
     if (!imp__props_has(node, "hold_value")) value = NAN; /* held where they are */
     IMP_TRY(imp__props_int(l->ctx, node, "hold_rim", 0, 0, 1000, &layers));
-    IMP_TRY(bend_number(l, node, "hold_outside", 0, 0, 1e300, &radius));
+    IMP_TRY(imp__bendfile_number(l, node, "hold_outside", 0, 0, 1e300, &radius));
     IMP_TRY(imp__props_vector(l->ctx, node, "hold_centre", zero, centre));
     if (layers > 0)
-        IMP_TRY(bend_placed(l, node, imp_bend_hold_rim(l->bend, (int)layers, value)));
+        IMP_TRY(imp__bendfile_placed(l, node,
+                                     imp_bend_hold_rim(l->bend, (int)layers, value)));
     if (radius > 0)
-        IMP_TRY(
-            bend_placed(l, node, imp_bend_hold_outside(l->bend, centre, radius, value)));
-    IMP_TRY(bend_number(l, node, "smoothness", 0, 0, 1e300, &weight));
-    IMP_TRY(bend_number(l, node, "smoothness_edge", 0, 0, 1e300, &edge));
+        IMP_TRY(imp__bendfile_placed(
+            l, node, imp_bend_hold_outside(l->bend, centre, radius, value)));
+    IMP_TRY(imp__bendfile_number(l, node, "smoothness", 0, 0, 1e300, &weight));
+    IMP_TRY(imp__bendfile_number(l, node, "smoothness_edge", 0, 0, 1e300, &edge));
     IMP_TRY(imp__props_int(l->ctx, node, "smoothness_order", 2, 1, 2, &order));
     if (weight > 0) IMP_TRY(imp_bend_add_smoothness(l->bend, weight, (int)order, edge));
     /* Names of profile numbers that a fit leaves alone: "n0 x y z". */

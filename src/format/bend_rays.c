@@ -1,20 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0
- *
- * <rays>. They come in bundles, each with a frame: its z runs along the beam (or from a
- * point source to the centre), and what stands inside <rays> is written in that frame,
- * once for all bundles of the element. */
+ * <rays>: bundles, each with a frame whose z axis runs along the beam (or from a point
+ * source to the centre). Children of <rays> are given in that frame and apply to every
+ * bundle of the element. */
 #include "base/number.h"
 #include "bend.h"
 #include "search.h"
 #include <string.h>
 
 #define GOLDEN_ANGLE 2.39996322972865332
-#define RAYS_MAX     100000000
+#define RAYS_MAX     20000000 /* of a file: 160 bytes each, before they are traced */
 
 /* Axes so that x and y are those of the world for z = (0, 0, 1). */
-static struct bend_frame frame_of(imp_v3 origin, imp_v3 direction)
+static struct imp__bendfile_frame frame_of(imp_v3 origin, imp_v3 direction)
 {
-    struct bend_frame f = {.o = origin, .n = imp__normalize(direction)};
+    struct imp__bendfile_frame f = {.o = origin, .n = imp__normalize(direction)};
     const imp_v3 up =
         fabs(f.n[1]) < 0.999 ? imp__v3(0, 1, 0) : imp__v3(0, 0, -copysign(1, f.n[1]));
     f.s = imp__normalize(imp__cross(up, f.n));
@@ -57,7 +56,7 @@ struct bundle {
     double radius, start, on_sphere, angle;
 };
 
-static void bundle_rays(const struct bundle *b, const struct bend_frame *f,
+static void bundle_rays(const struct bundle *b, const struct imp__bendfile_frame *f,
                         double (*x)[3], double (*d)[3])
 {
     for (int64_t i = 0; i < b->count; i++) {
@@ -79,14 +78,14 @@ static void bundle_rays(const struct bundle *b, const struct bend_frame *f,
             p[2] = b->on_sphere > 0 ? -sqrt(fmax(0, b->on_sphere * b->on_sphere - r2))
                                     : b->start;
         }
-        imp__v3_store(bend_place(f, p), x[i]);
-        imp__v3_store(bend_turn(f, v), d[i]);
+        imp__v3_store(imp__bendfile_point(f, p), x[i]);
+        imp__v3_store(imp__bendfile_direction(f, v), d[i]);
     }
 }
 
-static enum imp_status bundle_add(struct bend_loader *l, struct imp_node *node,
-                                  const struct bundle *b, const struct bend_frame *f,
-                                  double um)
+static enum imp_status bundle_add(struct imp__bendfile *l, struct imp_node *node,
+                                  const struct bundle *b,
+                                  const struct imp__bendfile_frame *f, double um)
 {
     enum imp_status st = IMP_OK;
     double(*x)[3] = imp__alloc(l->ctx, (size_t)b->count, sizeof *x);
@@ -115,7 +114,7 @@ static enum imp_status bundle_add(struct bend_loader *l, struct imp_node *node,
         struct imp_child *c = &node->children[i];
         if (strcmp(c->node->tag, "surface") != 0) continue;
         c->used = true;
-        IMP_TRY(bend_surface(l, c->node, f, bundle));
+        IMP_TRY(imp__bendfile_surface(l, c->node, f, bundle));
     }
 out:
     imp__release(l->ctx, x);
@@ -126,7 +125,7 @@ out:
 #define WAVELENGTHS_MAX 64
 
 /* "0.486 0.588 0.656": micrometres; none: 0, the reference. */
-static enum imp_status wavelengths_read(struct bend_loader *l, struct imp_node *node,
+static enum imp_status wavelengths_read(struct imp__bendfile *l, struct imp_node *node,
                                         double um[WAVELENGTHS_MAX], int *n)
 {
     const char *text;
@@ -152,7 +151,7 @@ static enum imp_status wavelengths_read(struct bend_loader *l, struct imp_node *
     }
 }
 
-enum imp_status bend_rays(struct bend_loader *l, struct imp_node *node)
+enum imp_status imp__bendfile_rays(struct imp__bendfile *l, struct imp_node *node)
 {
     static const char *const patterns[] = {"disc", "grid", "fan"};
     enum imp_status st = IMP_OK;
@@ -173,14 +172,15 @@ enum imp_status bend_rays(struct bend_loader *l, struct imp_node *node)
     IMP_TRY(imp__props_vector(l->ctx, node, "direction", z, direction));
     IMP_TRY(imp__props_int(l->ctx, node, "directions", 0, 0, 60000, &directions));
     IMP_TRY(imp__props_int(l->ctx, node, "views", 0, 0, 60000, &views));
-    IMP_TRY(bend_number(l, node, "start", b.point ? 0 : -1, -1e300, 1e300, &b.start));
+    IMP_TRY(imp__bendfile_number(l, node, "start", b.point ? 0 : -1, -1e300, 1e300,
+                                 &b.start));
     b.pattern = (enum pattern)pattern;
     if (b.point) {
-        IMP_TRY(bend_number(l, node, "angle", 10, 0, 180, &degrees));
+        IMP_TRY(imp__bendfile_number(l, node, "angle", 10, 0, 180, &degrees));
         b.angle = degrees * IMP_PI / 180;
     } else {
-        IMP_TRY(bend_number(l, node, "radius", 1, 0, 1e300, &b.radius));
-        IMP_TRY(bend_number(l, node, "on_sphere", 0, 0, 1e300, &b.on_sphere));
+        IMP_TRY(imp__bendfile_number(l, node, "radius", 1, 0, 1e300, &b.radius));
+        IMP_TRY(imp__bendfile_number(l, node, "on_sphere", 0, 0, 1e300, &b.on_sphere));
         if (b.on_sphere > 0 && b.on_sphere < b.radius)
             IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE,
                                     "starts on a sphere of radius %g "
@@ -191,6 +191,11 @@ enum imp_status bend_rays(struct bend_loader *l, struct imp_node *node)
         IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "has no direction"));
     IMP_TRY(wavelengths_read(l, node, um, &n_um));
     const int64_t n = directions > 0 ? directions : views > 0 ? views : 1;
+    const int64_t all = n * imp_max(n_um, 1) * b.count + (int64_t)l->bend->n;
+    if (all > RAYS_MAX)
+        IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE,
+                                "makes %lld rays in all: at most %d are read from a file",
+                                (long long)all, RAYS_MAX));
     for (int64_t i = 0; i < n; i++) {
         imp_v3 dir = imp__v3_load(direction);
         if (directions > 0) {
@@ -199,7 +204,7 @@ enum imp_status bend_rays(struct bend_loader *l, struct imp_node *node)
             const double a = IMP_PI * (double)i / (double)n;
             dir = imp__v3(sin(a), 0, cos(a));
         }
-        const struct bend_frame f = frame_of(imp__v3_load(origin), dir);
+        const struct imp__bendfile_frame f = frame_of(imp__v3_load(origin), dir);
         for (int k = 0; k < imp_max(n_um, 1); k++)
             IMP_TRY(bundle_add(l, node, &b, &f, um[k]));
     }

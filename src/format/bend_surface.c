@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
- *
- * <surface>: where bent rays end, turn, or are looked at on the way. */
+ * <surface>: where bent rays end, are refracted or reflected, or cross a tap. */
 #include "bend.h"
 #include "search.h"
 #include <string.h>
 
-/* A scene of one mesh, which the bend keeps. */
-static enum imp_status mesh_load(struct bend_loader *l, struct imp_node *node,
+/* A scene of one mesh, owned by the bend. */
+static enum imp_status mesh_load(struct imp__bendfile *l, struct imp_node *node,
                                  const imp_scene **out)
 {
     enum imp_status st = IMP_OK;
@@ -15,7 +14,7 @@ static enum imp_status mesh_load(struct bend_loader *l, struct imp_node *node,
     imp_scene *scene = NULL;
     IMP_TRY(imp__props_string(l->ctx, node, "filename", NULL, &file));
     if (!file) IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "needs a 'filename'"));
-    IMP_TRY(bend_placed(l, node, imp__search(l->scene, NULL, file, &path)));
+    IMP_TRY(imp__bendfile_placed(l, node, imp__search(l->scene, NULL, file, &path)));
     const size_t n = strlen(path);
     IMP_TRY(imp_scene_create(l->ctx, NULL, &scene));
     imp_scene_begin(scene, "shape",
@@ -24,7 +23,7 @@ static enum imp_status mesh_load(struct bend_loader *l, struct imp_node *node,
     imp_scene_string(scene, "filename", path);
     imp_scene_bool(scene, "face_normals", 1);
     imp_scene_end(scene);
-    IMP_TRY(bend_placed(l, node, imp_scene_commit(scene)));
+    IMP_TRY(imp__bendfile_placed(l, node, imp_scene_commit(scene)));
     void *grown =
         imp__grow(l->ctx, b->scenes, &b->cap_scenes, b->n_scenes + 1, sizeof *b->scenes);
     if (!grown) IMP_TRY(imp__error(l->ctx, IMP_E_NOMEM, "no memory for a mesh"));
@@ -37,8 +36,8 @@ out:
     return st;
 }
 
-enum imp_status bend_surface(struct bend_loader *l, struct imp_node *node,
-                             const struct bend_frame *f, int group)
+enum imp_status imp__bendfile_surface(struct imp__bendfile *l, struct imp_node *node,
+                                      const struct imp__bendfile_frame *f, int group)
 {
     static const char *const types[] = {"plane", "sphere",   "cylinder",         "disc",
                                         "box",   "distance", "closest-approach", "mesh"};
@@ -60,13 +59,13 @@ enum imp_status bend_surface(struct bend_loader *l, struct imp_node *node,
     s.type = (enum imp_bend_surface_type)type;
     s.event = event == 4 ? IMP_BEND_END : (enum imp_bend_event)event;
     s.group = group;
-    IMP_TRY(bend_number(l, node, "index", 1, 1e-6, 1e6, &s.index));
+    IMP_TRY(imp__bendfile_number(l, node, "index", 1, 1e-6, 1e6, &s.index));
     switch (s.type) {
     case IMP_BEND_PLANE:
     case IMP_BEND_DISC:
     case IMP_BEND_CYLINDER:
         IMP_TRY(imp__props_vector(l->ctx, node, "normal", z, normal));
-        imp__v3_store(bend_turn(f, imp__v3_load(normal)), s.normal);
+        imp__v3_store(imp__bendfile_direction(f, imp__v3_load(normal)), s.normal);
         break;
     case IMP_BEND_SPHERE:
     case IMP_BEND_BOX:
@@ -77,7 +76,7 @@ enum imp_status bend_surface(struct bend_loader *l, struct imp_node *node,
     switch (s.type) {
     case IMP_BEND_PLANE: {
         const double length = imp__length(imp__v3_load(s.normal));
-        IMP_TRY(bend_number(l, node, "offset", 0, -1e300, 1e300, &s.offset));
+        IMP_TRY(imp__bendfile_number(l, node, "offset", 0, -1e300, 1e300, &s.offset));
         s.offset += imp__dot(imp__v3_load(s.normal), f->o);
         if (!(length > 0))
             IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "has no normal"));
@@ -88,9 +87,9 @@ enum imp_status bend_surface(struct bend_loader *l, struct imp_node *node,
     case IMP_BEND_DISC:
     case IMP_BEND_APPROACH:
         IMP_TRY(imp__props_vector(l->ctx, node, "centre", zero, centre));
-        imp__v3_store(bend_place(f, imp__v3_load(centre)), s.centre);
+        imp__v3_store(imp__bendfile_point(f, imp__v3_load(centre)), s.centre);
         if (s.type != IMP_BEND_APPROACH)
-            IMP_TRY(bend_number(l, node, "radius", 1, 1e-300, 1e300, &s.radius));
+            IMP_TRY(imp__bendfile_number(l, node, "radius", 1, 1e-300, 1e300, &s.radius));
         break;
     case IMP_BEND_BOX:
         if (group >= 0)
@@ -100,7 +99,7 @@ enum imp_status bend_surface(struct bend_loader *l, struct imp_node *node,
         IMP_TRY(imp__props_vector(l->ctx, node, "lo", minus, s.lo));
         IMP_TRY(imp__props_vector(l->ctx, node, "hi", one, s.hi));
         break;
-    case IMP_BEND_SDF: IMP_TRY(bend_sdf(l, node, &s.sdf)); break;
+    case IMP_BEND_SDF: IMP_TRY(imp__bendfile_sdf(l, node, &s.sdf)); break;
     case IMP_BEND_MESH: IMP_TRY(mesh_load(l, node, &s.scene)); break;
     }
     IMP_TRY(imp__props_finish(l->ctx, node));

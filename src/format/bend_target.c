@@ -1,12 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
- *
- * <target>: what bent rays should do. */
+ * <target>: what is minimised. */
 #include "bend.h"
 #include "search.h"
 #include <string.h>
 
 /* Picture or numbers of a target from its file. */
-static enum imp_status target_file(struct bend_loader *l, struct imp_node *node,
+static enum imp_status target_file(struct imp__bendfile *l, struct imp_node *node,
                                    const char *file, bool image,
                                    struct imp_bend_target *t, imp_film **film,
                                    double **data, float **pixels)
@@ -46,8 +45,8 @@ out:
     return st;
 }
 
-enum imp_status bend_target(struct bend_loader *l, struct imp_node *node,
-                            const struct bend_frame *f, int bundle)
+enum imp_status imp__bendfile_target(struct imp__bendfile *l, struct imp_node *node,
+                                     const struct imp__bendfile_frame *f, int bundle)
 {
     static const char *const types[IMP_BEND_N_TARGETS] = {
         "focus", "spot",      "points", "direction", "directions", "deflection",
@@ -75,20 +74,20 @@ enum imp_status bend_target(struct bend_loader *l, struct imp_node *node,
     t.type = (enum imp_bend_target_type)type;
     t.bundle = bundle;
     const bool image = t.type == IMP_BEND_IMAGE || t.type == IMP_BEND_FARFIELD;
-    IMP_TRY(bend_number(l, node, "weight", 1, 0, 1e300, &t.weight));
+    IMP_TRY(imp__bendfile_number(l, node, "weight", 1, 0, 1e300, &t.weight));
     IMP_TRY(imp__props_int(l->ctx, node, "tap", -1, -1, 15, &tap));
     t.tap = (int)tap;
     t.at_plane = imp__props_has(node, "plane");
-    IMP_TRY(bend_number(l, node, "plane", 0, -1e300, 1e300, &t.offset));
+    IMP_TRY(imp__bendfile_number(l, node, "plane", 0, -1e300, 1e300, &t.offset));
     IMP_TRY(imp__props_vector(l->ctx, node, "normal", z, normal));
-    IMP_TRY(
-        bend_number(l, node, "index", l->options.outside_index, 1e-6, 1e6, &t.outside));
+    IMP_TRY(imp__bendfile_number(l, node, "index", l->options.outside_index, 1e-6, 1e6,
+                                 &t.outside));
     IMP_TRY(imp__props_vector(l->ctx, node, "point", zero, point));
-    imp__v3_store(bend_turn(f, imp__v3_load(normal)), t.normal);
+    imp__v3_store(imp__bendfile_direction(f, imp__v3_load(normal)), t.normal);
     t.offset += imp__dot(imp__v3_load(t.normal), f->o);
     const bool directions = t.type == IMP_BEND_DIRECTION;
-    imp__v3_store(directions ? bend_turn(f, imp__v3_load(point))
-                             : bend_place(f, imp__v3_load(point)),
+    imp__v3_store(directions ? imp__bendfile_direction(f, imp__v3_load(point))
+                             : imp__bendfile_point(f, imp__v3_load(point)),
                   t.point);
     IMP_TRY(imp__props_bool(l->ctx, node, "from_truth", false, &from_truth));
     IMP_TRY(imp__props_string(l->ctx, node, "filename", NULL, &file));
@@ -99,22 +98,28 @@ enum imp_status bend_target(struct bend_loader *l, struct imp_node *node,
         imp_v3 o = imp__v3_load(origin);
         if (t.type == IMP_BEND_IMAGE && t.at_plane && o[2] == 0) {
             double p;
-            IMP_TRY(bend_number(l, node, "plane", 0, -1e300, 1e300, &p));
+            IMP_TRY(imp__bendfile_number(l, node, "plane", 0, -1e300, 1e300, &p));
             o[2] = p;
         }
-        imp__v3_store(t.type == IMP_BEND_FARFIELD ? bend_turn(f, o) : bend_place(f, o),
+        imp__v3_store(t.type == IMP_BEND_FARFIELD ? imp__bendfile_direction(f, o)
+                                                  : imp__bendfile_point(f, o),
                       t.origin);
-        imp__v3_store(bend_turn(f, imp__v3_load(u)), t.u);
-        imp__v3_store(bend_turn(f, imp__v3_load(v)), t.v);
+        imp__v3_store(imp__bendfile_direction(f, imp__v3_load(u)), t.u);
+        imp__v3_store(imp__bendfile_direction(f, imp__v3_load(v)), t.v);
         if (!file)
             IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "needs a 'filename'"));
     }
     if (file) IMP_TRY(target_file(l, node, file, image, &t, &film, &data, &pixels));
-    if (t.type == IMP_BEND_SHAPE) IMP_TRY(bend_sdf(l, node, &t.sdf));
+    if (t.type == IMP_BEND_SHAPE) IMP_TRY(imp__bendfile_sdf(l, node, &t.sdf));
     IMP_TRY(imp__props_finish(l->ctx, node));
     const size_t n =
         bundle < 0 ? l->bend->n
                    : l->bend->bundle_first[bundle + 1] - l->bend->bundle_first[bundle];
+    if (from_truth && imp__target_numbers(t.type) == 0)
+        IMP_TRY(imp__prop_error(l->ctx, node, imp__node_prop(node, "from_truth"),
+                                IMP_E_SCENE,
+                                "'from_truth' is for points, directions, "
+                                "deflection and path"));
     if (from_truth && !t.data) { /* filled when all is there */
         data = imp__alloc(l->ctx, 3 * n, sizeof *data);
         if (!data) IMP_TRY(imp__error(l->ctx, IMP_E_NOMEM, "no memory for a target"));

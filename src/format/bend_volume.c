@@ -5,7 +5,7 @@
 #include "search.h"
 #include <string.h>
 
-static enum imp_status grid_read(struct bend_loader *l, struct imp_node *node,
+static enum imp_status grid_read(struct imp__bendfile *l, struct imp_node *node,
                                  struct imp_field_grid *g)
 {
     static const char *const interps[] = {"spline", "trilinear"}, *const params[] = {
@@ -19,7 +19,8 @@ static enum imp_status grid_read(struct bend_loader *l, struct imp_node *node,
     IMP_TRY(imp__props_choice(l->ctx, node, "interpolation", interps, 2, 0, &interp));
     IMP_TRY(imp__props_choice(l->ctx, node, "parameter", params, 2, 0, &param));
     IMP_TRY(imp__props_bool(l->ctx, node, "single", false, &single));
-    IMP_TRY(bend_number(l, node, "gladstone_dale", 0, 0, 1e6, &g->gladstone_dale));
+    IMP_TRY(
+        imp__bendfile_number(l, node, "gladstone_dale", 0, 0, 1e6, &g->gladstone_dale));
     if (g->gladstone_dale > 0 && !imp__props_has(node, "filename"))
         IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE,
                                 "has a 'gladstone_dale' and no file of densities"));
@@ -46,11 +47,11 @@ out:
     return st;
 }
 
-enum imp_status bend_placed(struct bend_loader *l, struct imp_node *node,
-                            enum imp_status st)
+enum imp_status imp__bendfile_placed(struct imp__bendfile *l, struct imp_node *node,
+                                     enum imp_status st)
 {
     if (st == IMP_OK || st == IMP_E_NOMEM) return st;
-    char message[900]; /* the message that is there, with the place before it */
+    char message[900]; /* the message of the failed call */
     strncpy(message, imp_last_error(l->ctx), sizeof message - 1);
     message[sizeof message - 1] = 0;
     return imp__node_error(l->ctx, node, st == IMP_E_IO ? st : IMP_E_SCENE, "%s",
@@ -58,7 +59,7 @@ enum imp_status bend_placed(struct bend_loader *l, struct imp_node *node,
 }
 
 /* Coefficients of a grid from another field: its values, through a spline's samples. */
-static enum imp_status grid_sample(struct bend_loader *l, imp_field *grid,
+static enum imp_status grid_sample(struct imp__bendfile *l, imp_field *grid,
                                    const imp_field *from)
 {
     struct imp_field_grid g;
@@ -94,7 +95,7 @@ static struct imp_node *volume_child(struct imp_node *node, const char *name)
     return NULL;
 }
 
-static enum imp_status profile_build(struct bend_loader *l, struct imp_node *node,
+static enum imp_status profile_build(struct imp__bendfile *l, struct imp_node *node,
                                      imp_field **out)
 {
     enum imp_status st = IMP_OK;
@@ -111,19 +112,19 @@ static enum imp_status profile_build(struct bend_loader *l, struct imp_node *nod
         const char *name = imp__profile_param(node->type, i);
         const bool optional =
             i > 0 && (name[0] == 'n' || name[0] == 'h'); /* coefficients */
-        IMP_TRY(
-            bend_number(l, node, name, optional ? 0 : NAN, -1e300, 1e300, &params[i]));
+        IMP_TRY(imp__bendfile_number(l, node, name, optional ? 0 : NAN, -1e300, 1e300,
+                                     &params[i]));
     }
     IMP_TRY(imp__props_vector(l->ctx, node, "centre", zero, centre));
     IMP_TRY(imp__props_vector(l->ctx, node, "axis", z, axis));
     for (int k = 0; k < 3; k++) params[n - 3 + (size_t)k] = centre[k];
-    IMP_TRY(bend_placed(l, node,
-                        imp_field_profile_create(l->ctx, node->type, params, axis, out)));
+    IMP_TRY(imp__bendfile_placed(
+        l, node, imp_field_profile_create(l->ctx, node->type, params, axis, out)));
 out:
     return st;
 }
 
-static enum imp_status radial_build(struct bend_loader *l, struct imp_node *node,
+static enum imp_status radial_build(struct imp__bendfile *l, struct imp_node *node,
                                     double index, imp_field **out)
 {
     enum imp_status st = IMP_OK;
@@ -133,17 +134,18 @@ static enum imp_status radial_build(struct bend_loader *l, struct imp_node *node
     bool cylinder;
     IMP_TRY(imp__props_bool(l->ctx, node, "cylinder", false, &cylinder));
     IMP_TRY(imp__props_int(l->ctx, node, "cells", 16, 1, 65536, &cells));
-    IMP_TRY(bend_number(l, node, "radius", 1, 1e-300, 1e300, &r.radius));
+    IMP_TRY(imp__bendfile_number(l, node, "radius", 1, 1e-300, 1e300, &r.radius));
     IMP_TRY(imp__props_vector(l->ctx, node, "centre", zero, r.centre));
     IMP_TRY(imp__props_vector(l->ctx, node, "axis", z, r.axis));
     r.cylinder = cylinder;
     r.cells = (int)cells;
-    IMP_TRY(bend_placed(l, node, imp_field_radial_create(l->ctx, &r, index, out)));
+    IMP_TRY(
+        imp__bendfile_placed(l, node, imp_field_radial_create(l->ctx, &r, index, out)));
 out:
     return st;
 }
 
-static enum imp_status rz_build(struct bend_loader *l, struct imp_node *node,
+static enum imp_status rz_build(struct imp__bendfile *l, struct imp_node *node,
                                 double index, imp_field **out)
 {
     enum imp_status st = IMP_OK;
@@ -152,19 +154,19 @@ static enum imp_status rz_build(struct bend_loader *l, struct imp_node *node,
     int64_t cells_r, cells_z;
     IMP_TRY(imp__props_int(l->ctx, node, "cells_r", 8, 1, 8192, &cells_r));
     IMP_TRY(imp__props_int(l->ctx, node, "cells_z", 16, 1, 8192, &cells_z));
-    IMP_TRY(bend_number(l, node, "radius", 1, 1e-300, 1e300, &r.radius));
-    IMP_TRY(bend_number(l, node, "lo", -1, -1e300, 1e300, &r.lo));
-    IMP_TRY(bend_number(l, node, "hi", 1, -1e300, 1e300, &r.hi));
+    IMP_TRY(imp__bendfile_number(l, node, "radius", 1, 1e-300, 1e300, &r.radius));
+    IMP_TRY(imp__bendfile_number(l, node, "lo", -1, -1e300, 1e300, &r.lo));
+    IMP_TRY(imp__bendfile_number(l, node, "hi", 1, -1e300, 1e300, &r.hi));
     IMP_TRY(imp__props_vector(l->ctx, node, "centre", zero, r.centre));
     IMP_TRY(imp__props_vector(l->ctx, node, "axis", z, r.axis));
     r.cells_r = (int)cells_r, r.cells_z = (int)cells_z;
-    IMP_TRY(bend_placed(l, node, imp_field_rz_create(l->ctx, &r, index, out)));
+    IMP_TRY(imp__bendfile_placed(l, node, imp_field_rz_create(l->ctx, &r, index, out)));
 out:
     return st;
 }
 
 /* "mirror-x fourfold-z": words, each an operation and its axis. */
-static enum imp_status symmetry_read(struct bend_loader *l, struct imp_node *node,
+static enum imp_status symmetry_read(struct imp__bendfile *l, struct imp_node *node,
                                      struct imp_field_symmetry *s, bool *any)
 {
     static const struct {
@@ -202,18 +204,21 @@ static enum imp_status symmetry_read(struct bend_loader *l, struct imp_node *nod
     return st;
 }
 
-static enum imp_status index_build(struct bend_loader *l, struct imp_node *node,
+static enum imp_status index_build(struct imp__bendfile *l, struct imp_node *node,
                                    const struct imp_field_grid *g, imp_field **out)
 {
     double index;
-    enum imp_status st = bend_number(l, node, "index", 1, 1e-6, 1e6, &index);
+    enum imp_status st = imp__bendfile_number(l, node, "index", 1, 1e-6, 1e6, &index);
     if (st != IMP_OK) return st;
-    if (g) return bend_placed(l, node, imp_field_grid_create(l->ctx, g, index, out));
+    if (g)
+        return imp__bendfile_placed(l, node,
+                                    imp_field_grid_create(l->ctx, g, index, out));
     return strcmp(node->type, "rz") == 0 ? rz_build(l, node, index, out)
                                          : radial_build(l, node, index, out);
 }
 
-enum imp_status bend_volume(struct bend_loader *l, struct imp_node *node, imp_field **out)
+enum imp_status imp__bendfile_volume(struct imp__bendfile *l, struct imp_node *node,
+                                     imp_field **out)
 {
     enum imp_status st = IMP_OK;
     imp_field *f = NULL, *start = NULL;
@@ -230,9 +235,16 @@ enum imp_status bend_volume(struct bend_loader *l, struct imp_node *node, imp_fi
         if (grid) IMP_TRY(symmetry_read(l, node, &symmetry, &tied));
         if (file) {
             const char *path;
-            IMP_TRY(bend_placed(l, node, imp__search(l->scene, NULL, file, &path)));
+            if (imp__props_has(node, "index") || imp__props_has(node, "cells"))
+                IMP_TRY(
+                    imp__node_error(l->ctx, node, IMP_E_SCENE,
+                                    "has a 'filename', which gives the index and its "
+                                    "cells, and '%s' as well",
+                                    imp__props_has(node, "index") ? "index" : "cells"));
             IMP_TRY(
-                bend_placed(l, node, imp_field_read(l->ctx, path, grid ? &g : NULL, &f)));
+                imp__bendfile_placed(l, node, imp__search(l->scene, NULL, file, &path)));
+            IMP_TRY(imp__bendfile_placed(
+                l, node, imp_field_read(l->ctx, path, grid ? &g : NULL, &f)));
             if (imp__field_is_grid(f) != grid ||
                 (!grid && strcmp(node->type, imp_field_kind(f)) != 0))
                 IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE, "%s holds a %s field",
@@ -245,14 +257,14 @@ enum imp_status bend_volume(struct bend_loader *l, struct imp_node *node, imp_fi
             IMP_TRY(imp__node_error(l->ctx, from, IMP_E_SCENE,
                                     "is a start of a grid that a file gives"));
         if (from) {
-            IMP_TRY(bend_volume(l, from, &start));
-            IMP_TRY(bend_placed(l, node, grid_sample(l, f, start)));
+            IMP_TRY(imp__bendfile_volume(l, from, &start));
+            IMP_TRY(imp__bendfile_placed(l, node, grid_sample(l, f, start)));
         }
         if (tied) {
             imp_field *given = f;
             f = NULL; /* taken over, also on failure */
-            IMP_TRY(
-                bend_placed(l, node, imp_field_tie_create(l->ctx, given, &symmetry, &f)));
+            IMP_TRY(imp__bendfile_placed(
+                l, node, imp_field_tie_create(l->ctx, given, &symmetry, &f)));
         }
     }
     IMP_TRY(imp__props_finish(l->ctx, node));
@@ -264,8 +276,8 @@ out:
     return st;
 }
 
-enum imp_status bend_sdf(struct bend_loader *l, struct imp_node *parent,
-                         const imp_field **out)
+enum imp_status imp__bendfile_sdf(struct imp__bendfile *l, struct imp_node *parent,
+                                  const imp_field **out)
 {
     imp_bend *b = l->bend;
     imp_field *f;
@@ -273,7 +285,7 @@ enum imp_status bend_sdf(struct bend_loader *l, struct imp_node *parent,
     if (!node)
         return imp__node_error(l->ctx, parent, IMP_E_SCENE,
                                "needs a <volume> of distances");
-    const enum imp_status st = bend_volume(l, node, &f);
+    const enum imp_status st = imp__bendfile_volume(l, node, &f);
     if (st != IMP_OK) return st;
     void *grown =
         imp__grow(l->ctx, b->sdfs, &b->cap_sdfs, b->n_sdfs + 1, sizeof *b->sdfs);

@@ -102,7 +102,7 @@ out:
 
 /* What has a meaning for bundles of rays, and none, or another, in a scene. */
 static enum imp_status only_for_rays(struct imp_scene *scene, struct imp_node *node,
-                                     const struct bend_loader *l)
+                                     const struct imp__bendfile *l)
 {
     static const char *const words[] = {
         "outside", "way", "grazing", "cauchy", "reference", "sellmeier_b", "sellmeier_c"};
@@ -126,14 +126,14 @@ static void graded_destroy(void *graded) { imp__graded_destroy(graded); }
 enum imp_status imp__graded_attach(struct imp_scene *scene, struct imp_node *node)
 {
     enum imp_status st = IMP_OK;
-    struct bend_loader l = {.ctx = scene->ctx, .scene = scene};
+    struct imp__bendfile l = {.ctx = scene->ctx, .scene = scene};
     struct imp_medium *m = imp__arena_array(&scene->arena, 1, sizeof *m);
     double lo, hi;
     if (!m) IMP_TRY(imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a medium"));
-    IMP_TRY(bend_medium(&l, node));
+    IMP_TRY(imp__bendfile_medium(&l, node));
     IMP_TRY(only_for_rays(scene, node, &l));
-    IMP_TRY(bend_number(&l, node, "index_min", 1, 1e-3, 1e3, &lo));
-    IMP_TRY(bend_number(&l, node, "index_max", 1e300, 1e-3, 1e300, &hi));
+    IMP_TRY(imp__bendfile_number(&l, node, "index_min", 1, 1e-3, 1e3, &lo));
+    IMP_TRY(imp__bendfile_number(&l, node, "index_max", 1e300, 1e-3, 1e300, &hi));
     if (imp__props_has(node, "index_min") || imp__props_has(node, "index_max"))
         IMP_TRY(imp_bend_set_bounds(l.bend, lo, hi));
     IMP_TRY(imp_bend_set_options(l.bend, &l.options));

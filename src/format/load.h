@@ -4,11 +4,23 @@
 #ifndef IMP_FORMAT_LOAD_H
 #define IMP_FORMAT_LOAD_H
 
+#include "base/file.h"
 #include "scene/scene.h"
 
 /* The caller's options, complete whatever `size` says. @return IMP_E_ARG if malformed. */
 enum imp_status imp__load_options(imp_context *ctx, const struct imp_load_options *from,
                                   struct imp_load_options *to);
+/* What loading a file begins with: complete options, its text, the folder it lies in. */
+struct imp__load_file {
+    struct imp_load_options options;
+    struct imp_bytes text;
+    char *folder;
+};
+/* @return IMP_E_ARG without a path. To be closed also after a failure. */
+enum imp_status imp__load_open(imp_context *ctx, const char *path,
+                               const struct imp_load_options *options,
+                               struct imp__load_file *out);
+void imp__load_close(imp_context *ctx, struct imp__load_file *file);
 /* graded.c: attach the field of a <medium type="graded">; when the scene is built, make
  * ready to trace. */
 enum imp_status imp__graded_attach(struct imp_scene *scene, struct imp_node *node);

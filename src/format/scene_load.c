@@ -17,6 +17,29 @@ enum imp_status imp__load_options(imp_context *ctx, const struct imp_load_option
     return IMP_OK;
 }
 
+enum imp_status imp__load_open(imp_context *ctx, const char *path,
+                               const struct imp_load_options *options,
+                               struct imp__load_file *f)
+{
+    enum imp_status st = IMP_OK;
+    *f = (struct imp__load_file){.folder = NULL};
+    if (!path || !*path) return imp__error(ctx, IMP_E_ARG, "no scene file is named");
+    IMP_TRY(imp__load_options(ctx, options, &f->options));
+    IMP_TRY(imp__file_read(ctx, path, XML_FILE_BYTES_MAX, &f->text));
+    f->folder = imp__strdup(ctx, strchr(path, '/') ? path : ".");
+    if (!f->folder) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "%s: out of memory", path));
+    char *slash = strrchr(f->folder, '/');
+    if (slash) slash[slash == f->folder] = 0;
+out:
+    return st;
+}
+
+void imp__load_close(imp_context *ctx, struct imp__load_file *f)
+{
+    imp__release(ctx, f->folder);
+    imp__bytes_free(ctx, &f->text);
+}
+
 enum imp_status imp__scene_finish(struct imp_scene *scene)
 {
     enum imp_status st = imp__files_attach(scene);
@@ -48,21 +71,10 @@ enum imp_status imp_scene_load(imp_context *ctx, const char *path,
                                const struct imp_load_options *options, imp_scene **out)
 {
     if (!ctx || !out) return IMP_E_ARG;
-    if (!path || !*path) return imp__error(ctx, IMP_E_ARG, "no scene file is named");
-    enum imp_status st = IMP_OK;
-    struct imp_load_options o;
-    struct imp_bytes text = {0};
-    char *folder = NULL;
-    IMP_TRY(imp__load_options(ctx, options, &o));
-    IMP_TRY(imp__file_read(ctx, path, XML_FILE_BYTES_MAX, &text));
-    folder = imp__strdup(ctx, strchr(path, '/') ? path : ".");
-    if (!folder) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "%s: out of memory", path));
-    char *slash = strrchr(folder, '/');
-    if (slash) slash[slash == folder] = 0;
-    IMP_TRY(load(ctx, &text, path, folder, &o, out));
-out:
-    imp__release(ctx, folder);
-    imp__bytes_free(ctx, &text);
+    struct imp__load_file f;
+    enum imp_status st = imp__load_open(ctx, path, options, &f);
+    if (st == IMP_OK) st = load(ctx, &f.text, path, f.folder, &f.options, out);
+    imp__load_close(ctx, &f);
     return st;
 }
 

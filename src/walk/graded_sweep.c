@@ -63,12 +63,12 @@ static imp_v3 turned(const struct imp_vertex *v, const struct imp__surface *l, i
                      imp_v3 ng, imp_v3 d)
 {
     struct sides s;
-    struct imp__turn t;
+    struct imp__bend_turn t;
     double inv;
     if (passes(v)) return d;
     sides_of(v, x, ng, d, &s);
     const imp_v3 n = normal_of(l, x, &inv), p = s.near * d;
-    imp__turn(&n, &p, s.far, reflects(v), &t);
+    imp__bend_turn(&n, &p, s.far, reflects(v), &t);
     return t.v * (1 / (t.reflected ? s.near : s.far));
 }
 
@@ -91,19 +91,19 @@ static void turn_back(const struct imp_vertex *v, const struct imp__surface *l, 
                       imp_v3 *mu)
 {
     struct sides s;
-    struct imp__turn t;
+    struct imp__bend_turn t;
     double inv, d_c, d_eta;
     if (passes(v)) return;
     const imp_v3 x = imp__graded_kept(v)->end.at.p, zero = {0};
     sides_of(v, x, v->ng, d, &s);
     const imp_v3 n = normal_of(l, x, &inv), p = s.near * d;
-    imp__turn(&n, &p, s.far, reflects(v), &t);
+    imp__bend_turn(&n, &p, s.far, reflects(v), &t);
     const double after = t.reflected ? s.near : s.far;
     const imp_v3 out = t.v * (1 / after), v_bar = *mu * (1 / after);
     imp_v3 p_bar, n_bar;
     double near_bar = 0, far_bar = 0, e2_bar;
     *(t.reflected ? &near_bar : &far_bar) -= imp__dot(v_bar, out);
-    imp__turn_vjp(&t, &n, &p, s.far, &v_bar, &p_bar, &n_bar, &e2_bar);
+    imp__bend_turn_vjp(&t, &n, &p, s.far, &v_bar, &p_bar, &n_bar, &e2_bar);
     far_bar += e2_bar;
     near_bar += imp__dot(p_bar, d);
     imp_v3 d_bar = s.near * p_bar;
@@ -137,7 +137,7 @@ static double turn_tangent(const struct imp_vertex *v, const struct imp__surface
                            const imp_v3 *x_dot, imp_v3 *d_dot)
 {
     struct sides s;
-    struct imp__turn t;
+    struct imp__bend_turn t;
     double inv, d_c, d_eta;
     if (passes(v)) return 0;
     const imp_v3 x = imp__graded_kept(v)->end.at.p;
@@ -154,8 +154,8 @@ static double turn_tangent(const struct imp_vertex *v, const struct imp__surface
     imp__surface_hess(l, &x, x_dot, &curved);
     const imp_v3 n_dot = (curved - n * imp__dot(n, curved)) * inv;
     p_dot = near_dot * d + s.near * *d_dot;
-    imp__turn(&n, &p, s.far, reflects(v), &t);
-    imp__turn_jvp(&t, &n, &p, s.far, &p_dot, &n_dot, far_dot, &v_dot);
+    imp__bend_turn(&n, &p, s.far, reflects(v), &t);
+    imp__bend_turn_jvp(&t, &n, &p, s.far, &p_dot, &n_dot, far_dot, &v_dot);
     const double c = imp__dot(n, d), eta = s.far / s.near;
     const double c_dot = imp__dot(n_dot, d) + imp__dot(n, *d_dot);
     const double eta_dot = (far_dot - eta * near_dot) / s.near;

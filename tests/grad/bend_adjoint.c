@@ -296,6 +296,44 @@ static void difference_test(imp_field *f, const struct setup *s,
     kit_rays_free(&rays);
 }
 
+/* The derivative with respect to a direction is the one to the vector as given: rays
+ * depend on d/|d|, so with d three times as long it is a third, and none along d. */
+static void length_test(const imp_field *f)
+{
+    struct imp_bend_options o = IMP_BEND_OPTIONS_INIT;
+    struct imp_bend_surface s = IMP_BEND_SURFACE_INIT;
+    struct imp_bend_gradient g = IMP_BEND_GRADIENT_INIT;
+    struct imp_bend_rays rays = kit_beam(N, -0.9, 0.5, 0.3);
+    double(*d)[3] = (double(*)[3])(uintptr_t)rays.d;
+    static double at[2][N][3];
+    double third = 0, along = 0, size = 0;
+    int used = 0;
+    s.offset = 0.8;
+    o.surfaces = &s, o.n_surfaces = 1, o.step = 0.05;
+    for (int k = 0; k < 2; k++) {
+        KIT_CHECK(imp_bend_trace(f, &o, &rays, exits, NULL, NULL));
+        for (int i = 0; i < N; i++) objective(&exits[i], (size_t)i, &bars[i]);
+        g.d = at[k];
+        KIT_CHECK(imp_bend_adjoint(f, &o, &rays, exits, NULL, bars, NULL, &g, NULL));
+        for (int i = 0; i < N; i++)
+            for (int c = 0; c < 3; c++) d[i][c] *= k == 0 ? 3 : 1;
+    }
+    for (int i = 0; i < N; i++) {
+        double dot = 0;
+        used += !(exits[i].flags & IMP_BEND_DROPPED);
+        for (int c = 0; c < 3; c++) {
+            third = fmax(third, fabs(at[0][i][c] - 3 * at[1][i][c]));
+            size = fmax(size, fabs(at[0][i][c]));
+            dot += at[1][i][c] * d[i][c];
+        }
+        along = fmax(along, fabs(dot));
+    }
+    tap_ok(third < 1e-13 * size && along < 1e-13 * size && size > 0.1 && used > N / 2,
+           "direction: derivative to the vector as given # 1/|d| %.1e, along %.1e", third,
+           along);
+    kit_rays_free(&rays);
+}
+
 /* Numbers of the surfaces themselves. */
 static void surface_test(const imp_field *f, struct setup s)
 {
@@ -383,6 +421,7 @@ int main(void)
     for (int i = 0; i < n_setups; i++)
         for (int scheme = 0; scheme < IMP_BEND_N_SCHEMES; scheme++)
             difference_test(f, &setups[i], scheme);
+    length_test(f);
     surface_test(f, setups[1]);
     surface_test(f, setups[2]);
     surface_test(f, setups[7]);

@@ -32,6 +32,9 @@ static void hear(enum imp_log_level level, const char *text, void *payload)
 #define PLUME                                                                            \
     "<volume type='plume'><float name='n0' value='1.2'/><float name='b' value='0.2'/>"   \
     "<float name='width' value='0.5'/></volume>"
+#define LENS                                                                             \
+    "<volume type='plume' name='start'><float name='n0' value='1.2'/>"                   \
+    "<float name='b' value='0.2'/><float name='width' value='0.5'/></volume>"
 #define SINGLE "<boolean name='single' value='true'/>"
 
 static imp_bend *load(const char *xml)
@@ -142,6 +145,85 @@ static void lost(void)
     imp_bend_destroy(b);
 }
 
+/* A value or a check over no rays is an error, whose counts say why; over a part of them
+ * it stands for that part, and how large it is can be read. */
+static void none(void)
+{
+    imp_bend *b = load(PROBLEM("2", "leapfrog", GRID("1.3", ""), "", FOCUS));
+    struct imp_bend_stats s = IMP_BEND_STATS_INIT;
+    const struct imp_check_row *rows;
+    double value, error, order;
+    size_t n;
+    enum imp_status st = imp_bend_objective(b, &value, NULL, NULL, &s);
+    tap_ok(st == IMP_E_NUMERIC && strstr(imp_last_error(kit_ctx), "none of 40 rays") &&
+               s.started_out == 40 && s.traced == 0,
+           "an objective of no rays is refused # %s", imp_last_error(kit_ctx));
+    st = imp_bend_check(b, &rows, &n);
+    tap_ok(st == IMP_E_NUMERIC && strstr(imp_last_error(kit_ctx), "none of 40 rays"),
+           "a check of no rays is refused # %s", imp_last_error(kit_ctx));
+    st = imp_bend_step_error(b, 200, &error, &order);
+    tap_ok(st == IMP_E_NUMERIC, "no error of the step without rays # %s",
+           imp_last_error(kit_ctx));
+    imp_bend_destroy(b);
+
+    b = load(PROBLEM("-0.6", "leapfrog", GRID("1.3", ""),
+                     "<surface type='disc'><float name='radius' value='0.3'/>"
+                     "<string name='event' value='stop'/></surface>",
+                     FOCUS));
+    KIT_CHECK(imp_bend_objective(b, &value, NULL, NULL, &s));
+    KIT_CHECK(imp_bend_check(b, &rows, &n));
+    size_t at = 0;
+    while (at < n && strcmp(rows[at].method, "rays")) at++;
+    tap_ok(at < n && s.traced > 0 && s.traced < s.rays &&
+               rows[at].value == (double)s.traced && rows[at].reference == 40 &&
+               fabs(rows[at].error - (double)(s.rays - s.traced) / 40) < 1e-12,
+           "a check says how many rays it stands for # %d of 40", (int)s.traced);
+    KIT_CHECK(imp_bend_step_error(b, 1, &error, &order)); /* the first ray is lost */
+    tap_ok(isfinite(error), "pilot rays that are lost are replaced # %.1e", error);
+    imp_bend_destroy(b);
+}
+
+/* A fit that goes on from a checkpoint has the start of one that was never stopped, also
+ * where the search began by moving numbers into their bounds; other problems are refused.
+ */
+static void resumed(void)
+{
+    static const char *const xml[3] = {
+        PROBLEM("-0.6", "leapfrog", GRID("1.3", LENS),
+                "<float name='index_min' value='1.3'/>", FOCUS),
+        PROBLEM("-0.6", "leapfrog", GRID("1.3", LENS),
+                "<float name='index_min' value='1.31'/>", FOCUS),
+        PROBLEM("-0.6", "leapfrog", GRID("1.3", LENS),
+                "<float name='index_min' value='1.3'/>",
+                "<target type='focus'><point name='point' value='0,0,0.9'/>"
+                "<float name='plane' value='0.95'/></target>")};
+    struct imp_bend_fit_options o = IMP_BEND_FIT_OPTIONS_INIT;
+    struct imp_bend_fit_result r[2];
+    enum imp_status st[3];
+    bool moved = false;
+    o.checkpoint = "bend_check.checkpoint";
+    remove(o.checkpoint);
+    for (int k = 0; k < 2; k++) {
+        imp_bend *b = load(xml[0]);
+        o.iterations[0] = k == 0 ? 3 : 6;
+        o.resume = k;
+        KIT_CHECK(imp_bend_fit(b, &o, &r[k]));
+        moved |= k == 0 && r[0].history[0] != r[0].start;
+        imp_bend_destroy(b);
+    }
+    tap_ok(moved && r[1].start == r[0].start && r[1].n_history > r[0].n_history,
+           "a resumed fit has the same start # %.9g %.9g", r[0].start, r[1].start);
+    for (int k = 1; k < 3; k++) {
+        imp_bend *b = load(xml[k]);
+        st[k] = imp_bend_fit(b, &o, &r[1]);
+        imp_bend_destroy(b);
+    }
+    tap_ok(st[1] == IMP_E_ARG && st[2] == IMP_E_ARG,
+           "a checkpoint of other bounds or targets is refused # %s",
+           imp_last_error(kit_ctx));
+    remove(o.checkpoint);
+}
+
 static void bounds(void)
 {
     imp_bend *b = load(PROBLEM("-0.6", "leapfrog", GRID("0.5", ""), "", FOCUS));
@@ -180,6 +262,8 @@ int main(void)
     if (imp_context_create(&o, &kit_ctx) != IMP_OK) return 1;
     verdicts();
     lost();
+    none();
+    resumed();
     bounds();
     picture();
     imp_context_destroy(kit_ctx);

@@ -4,6 +4,9 @@
  * transpose of the tangent (and of the value, for kinds that are linear), sums, samples,
  * levels. */
 #include "bend_kit.h"
+/* No name of bent rays clashes with one of these. */
+#include "elements/elements.h"
+#include "kind/shape/shape.h"
 
 static void check_kind(int kind)
 {

@@ -75,6 +75,88 @@ static void round_trip(const char *path, imp_field *f, double limit)
     unlink(path);
 }
 
+static void npy_write(const char *path, const char *head, const double *v, size_t n)
+{
+    unsigned char *d = calloc(128 + 8 * n, 1);
+    memcpy(d, "\x93NUMPY\x01\x00\x76\x00", 10);
+    memset(d + 10, ' ', 118);
+    memcpy(d + 10, head, strlen(head));
+    memcpy(d + 128, v, 8 * n);
+    spill(path, d, 128 + 8 * n);
+    free(d);
+}
+
+/* NumPy writes a.T in Fortran order: the same array, the first axis fastest. */
+static void fortran_order(void)
+{
+    enum { NX = 5, NY = 3, NZ = 4, N = NX * NY * NZ };
+    double c[N], f[N];
+    imp_field *fields[2];
+    for (size_t z = 0; z < NZ; z++)
+        for (size_t y = 0; y < NY; y++)
+            for (size_t x = 0; x < NX; x++)
+                f[z + NZ * (y + NY * x)] = c[x + NX * (y + NY * z)] =
+                    1.3 + 0.1 * kit_u(570, x + NX * (y + NY * z));
+    npy_write("c.npy", "{'descr': '<f8', 'fortran_order': False, 'shape': (4, 3, 5), }",
+              c, N);
+    npy_write("f.npy", "{'descr': '<f8', 'fortran_order': True, 'shape': (4, 3, 5), }", f,
+              N);
+    KIT_CHECK(imp_field_read(kit_ctx, "c.npy", NULL, &fields[0]));
+    KIT_CHECK(imp_field_read(kit_ctx, "f.npy", NULL, &fields[1]));
+    const size_t n = imp_field_n_theta(fields[0]);
+    tap_ok(n == imp_field_n_theta(fields[1]) && n == (NX + 2) * (NY + 2) * (NZ + 2) &&
+               !memcmp(fields[0]->theta, fields[1]->theta, n * sizeof(double)),
+           "an .npy in Fortran order is the same field");
+    imp_field_destroy(fields[0]);
+    imp_field_destroy(fields[1]);
+    remove("c.npy");
+    remove("f.npy");
+}
+
+/* What is wrong with a file is said by name and number. */
+static void messages(void)
+{
+    static const struct {
+        const char *path, *head, *want;
+    } npy[] = {
+        {"a.npy", "{'descr': '>f8', 'fortran_order': False, 'shape': (2, 2, 2), }",
+         "samples of type '>f8'"},
+        {"a.npy", "{'descr': '<i4', 'fortran_order': False, 'shape': (2, 2, 2), }",
+         "samples of type '<i4'"},
+        {"a.npy", "{'descr': '<f8', 'fortran_order': False, 'shape': (2, 4), }",
+         "an array of shape (2, 4): must be (Z, Y, X)"},
+        {"a.npy", "{'descr': '<f8', 'fortran_order': False, 'shape': (2, 2, 2, 1), }",
+         "an array of shape (2, 2, 2, 1)"},
+        {"a.npy", "{'descr': '<f8', 'fortran_order': False, 'shape': (2, -2, 2), }",
+         "-2 samples along y"},
+        {"a.npy", "{'descr': '<f8', 'fortran_order': False, 'shape': (20, 2, 2), }",
+         "cut off: 2 x 2 x 20 samples are 640 bytes, and 64 are there"},
+        {"a.npy", "{'descr': '<f8', 'shape': (2, 2, 2), }", "malformed NPY header"},
+    };
+    double v[8] = {1, 1, 1, 1, 1, 1, 1, 1};
+    imp_field *f = NULL;
+    for (size_t i = 0; i < imp_count(npy); i++) {
+        npy_write(npy[i].path, npy[i].head, v, 8);
+        const enum imp_status st = imp_field_read(kit_ctx, npy[i].path, NULL, &f);
+        tap_ok(st == IMP_E_SCENE && strstr(imp_last_error(kit_ctx), npy[i].want) &&
+                   strstr(imp_last_error(kit_ctx), npy[i].path),
+               "%s # %s", npy[i].want, imp_last_error(kit_ctx));
+    }
+    spill("a.npy", (const unsigned char *)"PK\x03\x04 an .npz, say", 20);
+    tap_ok(imp_field_read(kit_ctx, "a.npy", NULL, &f) == IMP_E_SCENE &&
+               strstr(imp_last_error(kit_ctx), "not an NPY file"),
+           "no .npy # %s", imp_last_error(kit_ctx));
+    remove("a.npy");
+    unsigned char vol[48 + 32] = "VOL\x03\x01";
+    const int32_t sizes[4] = {2, -3, 2, 1};
+    memcpy(vol + 8, sizes, sizeof sizes);
+    spill("a.vol", vol, sizeof vol);
+    tap_ok(imp_field_read(kit_ctx, "a.vol", NULL, &f) == IMP_E_SCENE &&
+               strstr(imp_last_error(kit_ctx), ": -3 samples along y: 2 to 8193"),
+           "a negative size # %s", imp_last_error(kit_ctx));
+    remove("a.vol");
+}
+
 static const char problem[] =
     "<scene version='3.0.0'>\n"
     "<medium type='graded'>\n"
@@ -218,6 +300,8 @@ int main(void)
     round_trip("a.txt", f, 1e-15);
     imp_field_destroy(f);
     densities();
+    fortran_order();
+    messages();
     problems();
     imp_context_destroy(kit_ctx);
     if (chdir("/") == 0) rmdir(folder);

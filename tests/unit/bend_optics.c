@@ -96,6 +96,37 @@ static void luneburg(void)
     imp_field_destroy(f);
 }
 
+/* From the rim, where the gradient jumps: x = b cos(sigma) of the ray at height b, which
+ * is at z = 0 for tan(sigma) = sqrt(1 - b^2). Schemes that begin with a kick keep their
+ * order. */
+static double rim_error(const imp_field *f, enum imp_bend_scheme scheme, double t)
+{
+    struct imp_bend_surface s = plane_z(0);
+    struct imp_bend_options o = IMP_BEND_OPTIONS_INIT;
+    double sum = 0;
+    o.surfaces = &s, o.n_surfaces = 1, o.scheme = scheme, o.step = t, o.grazing = -1;
+    for (int i = 0; i < 20; i++) {
+        const double b = 0.03 + 0.045 * i, x[3] = {b, 0, -sqrt(1 - b * b)},
+                     d[3] = {0, 0, 1};
+        const struct imp_bend_exit e = trace_one(f, &o, x, d);
+        sum += imp__sqr(e.x[0] - b * cos(atan(sqrt(1 - b * b))));
+    }
+    return sqrt(sum / 20);
+}
+static void rim(void)
+{
+    const double p[4] = {1, 0, 0, 0};
+    imp_field *f = kit_profile("luneburg", p, NULL);
+    for (int k = 0; k < IMP_BEND_N_SCHEMES; k++) {
+        const double t = 0.05, a = rim_error(f, k, t), h = rim_error(f, k, t / 2);
+        const double order = log2(a / h);
+        tap_ok(fabs(order - imp__schemes[k].order) < 0.1,
+               "%s from the rim of a Luneburg lens: order %d # %.2f, error %.1e",
+               imp__schemes[k].name, imp__schemes[k].order, order, h);
+    }
+    imp_field_destroy(f);
+}
+
 /* From the pole the ray is a circle; at z = 0 it is known. */
 static double fisheye_error(const imp_field *f, enum imp_bend_scheme scheme, double t)
 {
@@ -222,8 +253,8 @@ static void snell(void)
         const double th = 1.55 * i / 100, e1 = i % 2 ? 1.5 : 1.0, e2 = i % 2 ? 1.0 : 1.5;
         const double c = i % 3 ? cos(th) : -cos(th);
         const imp_v3 v = imp__to_world(&fr, imp__v3(e1 * sin(th), 0, e1 * c));
-        struct imp__turn t;
-        imp__turn(&n, &v, e2, false, &t);
+        struct imp__bend_turn t;
+        imp__bend_turn(&n, &v, e2, false, &t);
         const imp_v3 local = imp__to_local(&fr, t.v);
         reflected += t.reflected;
         if (t.reflected != (e1 * sin(th) > e2)) worst = 1;
@@ -364,6 +395,7 @@ int main(void)
     straight();
     parabola();
     luneburg();
+    rim();
     fisheye();
     rods();
     snell();

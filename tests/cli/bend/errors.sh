@@ -21,5 +21,8 @@ try "<medium type='graded'><volume type='grid'/></medium>$rays<target type='path
 printf 'VOL\003\001\000\000\000\377\377\377\177\002\000\000\000\002\000\000\000\001\000\000\000' >bad.vol
 head -c 100 /dev/zero >>bad.vol
 try "<medium type='graded'><volume type='grid'><string name='filename' value='bad.vol'/></volume></medium>$rays"
+try "<medium type='graded'><volume type='grid'><string name='filename' value='bad.vol'/><float name='index' value='1.3'/></volume></medium>$rays"
+try "<medium type='graded'><volume type='grid'/></medium><rays type='beam'><integer name='count' value='9000000'/><integer name='views' value='60000'/></rays>"
+try "<medium type='graded'><volume type='grid'/></medium>$rays<target type='focus'><boolean name='from_truth' value='true'/></target>"
 importon bend draw f.xml
 echo "exit $?" >&2
