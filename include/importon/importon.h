@@ -288,12 +288,45 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_scene_get_values(const imp_scene *sce
 
 typedef struct imp_film imp_film;
 
+/** Why a walk was dropped. Its value counts as 0. */
+#define IMP_DROP_LIST(X)                                                                 \
+    X(IMP_DROP_NONE, 0, "not dropped")                                                   \
+    X(IMP_DROP_NAN, 1, "the value is not a number")                                      \
+    X(IMP_DROP_INFINITE, 2, "the value is infinite, or more than a float holds")         \
+    X(IMP_DROP_NEGATIVE, 3, "the value is negative")                                     \
+    X(IMP_DROP_MEMORY, 4, "no memory for the vertices")                                  \
+    X(IMP_DROP_LONG, 5, "nothing ended the walk in 16384 vertices")                      \
+    X(IMP_DROP_BENT, 6, "a bent ray came to no end, or to what media cannot hold")       \
+    X(IMP_DROP_MOVED, 7, "what moves with an active field has no derivative there")
+#define IMP_DROP_ENUM(name, value, text) name = value,
+enum imp_drop { IMP_DROP_LIST(IMP_DROP_ENUM) };
+
+/** The sentence that belongs to a cause, never NULL. */
+IMP_API const char *imp_drop_text(enum imp_drop cause);
+
+#define IMP_DROP_CAUSES 16 /**< enum imp_drop, and room for more */
+#define IMP_DROP_KEYS   8
+
+/** A dropped walk. imp_walk_describe with the same sensor, seed, pixel and sample is that
+ * walk, vertex by vertex (IMP_DROP_MOVED: the walk, but not what was dropped of it). */
+struct imp_drop_key {
+    uint64_t seed;
+    int64_t sample;
+    int32_t x, y;   /**< pixel of the picture; outside of it within the filter's radius */
+    int32_t sensor; /**< index */
+    int32_t cause;  /**< enum imp_drop */
+};
+
 struct imp_film_info {
     size_t size;
     int width, height, channels;
     int64_t spp;      /**< samples per pixel in it */
     int has_se;       /**< standard errors are there */
-    uint64_t dropped; /**< walks dropped because a value was not finite or negative */
+    uint64_t dropped; /**< walks dropped, of all causes */
+    /** The same by enum imp_drop. All 0 for a picture that was read from a file. */
+    uint64_t dropped_by_cause[IMP_DROP_CAUSES];
+    int n_drop_keys;                              /**< at most IMP_DROP_KEYS */
+    struct imp_drop_key drop_keys[IMP_DROP_KEYS]; /**< the first by sample, row, column */
 };
 
 /** An empty picture to fill by hand, zeros. `names` is "R,G,B", "Y", "albedo.R,..." .

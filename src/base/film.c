@@ -101,8 +101,16 @@ void imp_film_destroy(imp_film *f)
 void imp_film_get_info(const imp_film *f, struct imp_film_info *info)
 {
     if (!f || !info) return;
-    const struct imp_film_info all = {sizeof all, f->width,      f->height, f->channels,
-                                      f->spp,     f->se != NULL, f->dropped};
+    struct imp_film_info all = {.size = sizeof all,
+                                .width = f->width,
+                                .height = f->height,
+                                .channels = f->channels,
+                                .spp = f->spp,
+                                .has_se = f->se != NULL,
+                                .dropped = f->dropped,
+                                .n_drop_keys = f->drops.n_keys};
+    memcpy(all.dropped_by_cause, f->drops.by_cause, sizeof all.dropped_by_cause);
+    memcpy(all.drop_keys, f->drops.keys, sizeof all.drop_keys);
     const size_t size = info->size && info->size < sizeof all ? info->size : sizeof all;
     memcpy(info, &all, size);
     info->size = size;
