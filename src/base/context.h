@@ -28,7 +28,16 @@ struct imp_context {
     struct imp_pool *pool;          /* made on first use */
     void *device;                   /* Embree's device, owned by scene/intersect.c */
     void (*device_release)(void *);
+    _Atomic long process; /* whose threads and locks these are; see imp__context_own */
 };
+
+/* After a fork, threads are gone and locks may be held by them: the child's first call
+ * leaves pool and device to the parent and begins with none. Called before either is
+ * used. True: the context was made, or has been used, by this process. */
+bool imp__context_own(imp_context *ctx);
+
+/* Can a thread be made now? */
+bool imp__thread_possible(void);
 
 /* Needs a local `enum imp_status st` and a label `out`. */
 #define IMP_TRY(call)                                                                    \
@@ -37,7 +46,7 @@ struct imp_context {
     } while (0)
 
 /* Record the message for this thread; returns `status`. Never fails: out of memory leaves
- * a fixed text. */
+ * a fixed text. ctx NULL: where no context is known; imp_last_error(NULL) has it. */
 enum imp_status imp__error(imp_context *ctx, enum imp_status status, const char *format,
                            ...) IMP_PRINTF(3, 4);
 /* Put "prefix: " before the message that is there. */

@@ -48,7 +48,12 @@ static void device_release(void *memory)
     struct device *dev = memory;
     if (dev->rtc) {
         rtcSetDeviceErrorFunction(dev->rtc, NULL, NULL);
-        rtcReleaseDevice(dev->rtc);
+        rtcSetDeviceMemoryMonitorFunction(dev->rtc, NULL, NULL);
+        /* TBB makes a thread when a device is released, and ends the process if it
+         * cannot. Then the device is left: a leak, which is said. */
+        if (imp__thread_possible()) rtcReleaseDevice(dev->rtc);
+        else
+            imp__warn(dev->ctx, "no thread can be made: Embree's device is not released");
     }
     pthread_mutex_destroy(&dev->lock);
     imp__release(dev->ctx, dev);
@@ -68,6 +73,7 @@ static enum imp_status device_get(imp_context *ctx, struct device **out)
     enum imp_status st = IMP_OK;
     struct device *dev = NULL;
 
+    imp__context_own(ctx);
     pthread_mutex_lock(&ctx->lock);
     *out = ctx->device;
     pthread_mutex_unlock(&ctx->lock);

@@ -25,7 +25,8 @@ static bool same(const struct imp_drops *a, const struct imp_drops *b)
 
 int main(void)
 {
-    struct imp_drops forward = {0}, backward = {0}, merged = {0}, part[PARTS] = {{{0}}};
+    struct imp_drops forward = {0}, backward = {0}, merged = {0}, part[PARTS];
+    memset(part, 0, sizeof part);
     for (int i = 0; i < WALKS; i++) {
         const struct imp_drop_key k = key_of(i), l = key_of(WALKS - 1 - i);
         imp__drops_add(&forward, &k);
