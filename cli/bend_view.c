@@ -125,7 +125,7 @@ static void paths_draw(imp_bend *b, int u, int v, const double lo[3], const doub
 /* Arrivals of one target about their centroid, on the two axes across the plane. */
 static int spots(imp_bend *b, size_t target, const char *folder, const char *prefix)
 {
-    struct imp_bend_target t;
+    struct imp_bend_target t = {.size = sizeof t};
     imp_film *film;
     size_t n = 0;
     struct imp_bend_arrival *a = cli_alloc(imp_bend_n_rays(b), sizeof *a);
@@ -218,7 +218,7 @@ int bend_view(imp_bend *b, const char *folder, const char *prefix)
         imp_film_destroy(film);
     }
     for (size_t i = 0; i < imp_bend_n_targets(b) && i < 8 && !rc; i++) {
-        struct imp_bend_target t;
+        struct imp_bend_target t = {.size = sizeof t};
         if (imp_bend_get_target(b, i, &t) != IMP_OK) continue;
         rc = t.type == IMP_BEND_IMAGE || t.type == IMP_BEND_FARFIELD
                  ? image(b, i, &t, folder, prefix)

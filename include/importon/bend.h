@@ -415,8 +415,9 @@ IMP_API imp_field *imp_bend_field(imp_bend *bend);
  * grid: min(step_max, step_cells * cell), see imp_bend_set_step. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_set_options(imp_bend *bend, const struct imp_bend_options *o);
-/** The step when options.step is 0: cells * spacing, at most `most` (0: no limit). */
-IMP_API void imp_bend_set_step(imp_bend *bend, double cells, double most);
+/** The step when options.step is 0: cells * spacing, at most `most` (0: no limit).
+ * @return IMP_OK; IMP_E_ARG if one is not a number >= 0. */
+IMP_API enum imp_status imp_bend_set_step(imp_bend *bend, double cells, double most);
 
 /** A bundle: rays that share surfaces, taps and targets by its number (their group).
  * x, d [n]; power [n] or NULL (1/n each). *bundle may be NULL. */

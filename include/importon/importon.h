@@ -220,8 +220,9 @@ struct imp_scene_info {
     int max_depth;       /**< -1: unlimited */
     size_t memory_bytes; /**< held by the scene, Embree's part included */
 };
-/** Set info->size first; strings belong to the scene. */
-IMP_API void imp_scene_get_info(const imp_scene *scene, struct imp_scene_info *info);
+/** Set info->size first; strings belong to the scene. @return IMP_OK; IMP_E_ARG. */
+IMP_API enum imp_status imp_scene_get_info(const imp_scene *scene,
+                                           struct imp_scene_info *info);
 
 struct imp_sensor_info {
     size_t size;
@@ -262,8 +263,8 @@ struct imp_param_info {
 /** Number of parameters, and of numbers in all of them together. */
 IMP_API size_t imp_scene_n_params(const imp_scene *scene);
 IMP_API size_t imp_scene_n_theta(const imp_scene *scene);
-/** Strings belong to the scene. @return IMP_OK; IMP_E_ARG if there is no such parameter.
- */
+/** Set info->size first; strings belong to the scene. @return IMP_OK; IMP_E_ARG if there
+ * is no such parameter. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_get_param(const imp_scene *scene, size_t index, struct imp_param_info *info);
 /** Find by name; a final ".value" may be left out, and names of parents may stand in
@@ -336,7 +337,9 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_film_create(imp_context *context, int
                                                        int height, const char *names,
                                                        imp_film **out);
 IMP_API void imp_film_destroy(imp_film *film);
-IMP_API void imp_film_get_info(const imp_film *film, struct imp_film_info *info);
+/** Set info->size first. @return IMP_OK; IMP_E_ARG. */
+IMP_API enum imp_status imp_film_get_info(const imp_film *film,
+                                          struct imp_film_info *info);
 /** Name of a channel as in EXR files; belongs to the film. NULL if there is none. */
 IMP_API const char *imp_film_channel(const imp_film *film, int channel);
 /** [height][width][channels], linear; belongs to the film, and may be written to. */
@@ -525,8 +528,9 @@ imp_problem_objective(imp_problem *problem, const double *x, const struct imp_ru
  * imp_problem_set_run; equal seeds make common random numbers. Failure gives HUGE_VAL. */
 IMP_API double imp_problem_nlopt(unsigned n, const double *x, double *gradient,
                                  void *problem);
-/** Copied; NULL: the defaults. */
-IMP_API void imp_problem_set_run(imp_problem *problem, const struct imp_run *run);
+/** Copied; NULL: the defaults. @return IMP_OK; IMP_E_ARG: the run before stays. */
+IMP_API enum imp_status imp_problem_set_run(imp_problem *problem,
+                                            const struct imp_run *run);
 
 /**
  * Reverse derivative: gradient = J^T seed, J = d pixel / d x, for a given adjoint image.

@@ -33,16 +33,21 @@ void imp_field_destroy(imp_field *f)
     imp__release(f->ctx, f);
 }
 
-const char *imp_field_kind(const imp_field *f) { return f->ops->name; }
-size_t imp_field_n_theta(const imp_field *f) { return f->n_theta; }
+const char *imp_field_kind(const imp_field *f) { return f ? f->ops->name : ""; }
+size_t imp_field_n_theta(const imp_field *f) { return f ? f->n_theta : 0; }
 
 void imp_field_get_theta(const imp_field *f, double *theta)
 {
+    IMP_REQUIRE_OR(NULL, f, "field", );
+    IMP_REQUIRE_OR(f->ctx, theta, "theta", );
     memcpy(theta, f->theta, f->n_theta * sizeof *theta);
 }
 
 enum imp_status imp_field_set_theta(imp_field *f, const double *theta)
 {
+    IMP_REQUIRE(NULL, f, "field");
+    IMP_REQUIRE(f->ctx, theta, "theta");
+    IMP_FLOAT_MODE;
     for (size_t i = 0; i < f->n_theta; i++)
         if (!isfinite(theta[i]))
             return imp__error(f->ctx, IMP_E_ARG,
@@ -55,11 +60,14 @@ enum imp_status imp_field_set_theta(imp_field *f, const double *theta)
 
 const char *imp_field_param_name(const imp_field *f, size_t i)
 {
-    return f->ops->param_name && i < f->n_theta ? f->ops->param_name(f, i) : NULL;
+    return f && f->ops->param_name && i < f->n_theta ? f->ops->param_name(f, i) : NULL;
 }
 
 void imp_field_bounds(const imp_field *f, double lo[3], double hi[3])
 {
+    IMP_REQUIRE_OR(NULL, f, "field", );
+    IMP_REQUIRE_OR(f->ctx, lo, "lo", );
+    IMP_REQUIRE_OR(f->ctx, hi, "hi", );
     imp__v3_store(f->lo, lo);
     imp__v3_store(f->hi, hi);
 }
@@ -67,6 +75,10 @@ void imp_field_bounds(const imp_field *f, double lo[3], double hi[3])
 void imp_field_eval(const imp_field *f, const double x[3], double *eta, double *gradient,
                     double *hessian)
 {
+    IMP_REQUIRE_OR(NULL, f, "field", );
+    IMP_REQUIRE_OR(f->ctx, x, "x", );
+    IMP_REQUIRE_OR(f->ctx, eta, "eta", );
+    IMP_FLOAT_MODE;
     const imp_v3 at = imp__v3_load(x);
     struct imp__jet j;
     imp__field_eval1(f, &at, hessian ? 2 : 1, &j);
@@ -81,6 +93,11 @@ void imp_field_eval(const imp_field *f, const double x[3], double *eta, double *
 void imp_field_splat(const imp_field *f, const double x[3], double a, const double b[3],
                      double *theta_bar)
 {
+    IMP_REQUIRE_OR(NULL, f, "field", );
+    IMP_REQUIRE_OR(f->ctx, x, "x", );
+    IMP_REQUIRE_OR(f->ctx, b, "b", );
+    IMP_REQUIRE_OR(f->ctx, theta_bar, "theta_bar", );
+    IMP_FLOAT_MODE;
     const imp_v3 at = imp__v3_load(x), gb = imp__v3_load(b);
     struct imp__bar bar = {.theta = theta_bar};
     f->ops->splat(f, &at, a, &gb, &bar);
@@ -89,6 +106,12 @@ void imp_field_splat(const imp_field *f, const double x[3], double a, const doub
 void imp_field_tangent(const imp_field *f, const double x[3], const double *theta_dot,
                        double *eta_dot, double gradient_dot[3])
 {
+    IMP_REQUIRE_OR(NULL, f, "field", );
+    IMP_REQUIRE_OR(f->ctx, x, "x", );
+    IMP_REQUIRE_OR(f->ctx, theta_dot, "theta_dot", );
+    IMP_REQUIRE_OR(f->ctx, eta_dot, "eta_dot", );
+    IMP_REQUIRE_OR(f->ctx, gradient_dot, "gradient_dot", );
+    IMP_FLOAT_MODE;
     const imp_v3 at = imp__v3_load(x);
     imp_v3 g;
     f->ops->tangent(f, &at, theta_dot, eta_dot, &g);

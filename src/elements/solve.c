@@ -39,7 +39,10 @@ enum imp_status imp_elements_create(const imp_scene *scene,
                                     imp_elements **out)
 {
     enum imp_status st = IMP_OK;
-    if (!scene || !out) return IMP_E_ARG;
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_REQUIRE(scene->ctx, out, "out");
+    IMP_FLOAT_MODE;
+    IMP_READS(scene);
     if (!scene->committed)
         return imp__error(scene->ctx, IMP_E_ARG, "the scene is not committed");
     imp_elements *e = imp__alloc(scene->ctx, 1, sizeof *e);
@@ -153,7 +156,9 @@ out:
 enum imp_status imp_elements_solve(imp_elements *e)
 {
     enum imp_status st = IMP_OK;
-    if (!e) return IMP_E_ARG;
+    IMP_REQUIRE(NULL, e, "elements");
+    IMP_FLOAT_MODE;
+    IMP_READS(e->scene);
     const bool importance = !e->opt.no_importance;
     bool full = false;
     int still = 0;
@@ -248,9 +253,11 @@ enum imp_status imp__el_parameters(imp_elements *e)
 enum imp_status imp_elements_update(imp_elements *e)
 {
     enum imp_status st = IMP_OK;
-    if (!e) return IMP_E_ARG;
+    IMP_REQUIRE(NULL, e, "elements");
     if (!e->solved)
         return imp__error(e->ctx, IMP_E_ARG, "the elements are not solved yet");
+    IMP_FLOAT_MODE;
+    IMP_READS(e->scene);
     IMP_TRY(imp__el_parameters(e));
     IMP_TRY(imp__el_bin(e));
     IMP_TRY(imp__el_settle(e, 4, e->has_importance, 1e-10));
@@ -261,8 +268,11 @@ out:
 enum imp_status imp_elements_get_info(const imp_elements *e,
                                       struct imp_elements_info *info)
 {
-    if (!e || !info) return IMP_E_ARG;
-    struct imp_elements_info i = {.size = imp_min(info->size, sizeof i),
+    IMP_REQUIRE(NULL, e, "elements");
+    IMP_REQUIRE(e->ctx, info, "info");
+    IMP_SIZED(e->ctx, info, "info");
+    IMP_FLOAT_MODE;
+    struct imp_elements_info i = {.size = sizeof i,
                                   .order = e->basis.order,
                                   .functions = e->basis.n,
                                   .polygons = e->n_roots,
@@ -287,6 +297,6 @@ enum imp_status imp_elements_get_info(const imp_elements *e,
         i.measure = imp__el_measure(e, &i.measure_direct);
         i.measure_adjoint = e->has_importance ? imp__el_measure_adjoint(e) : NAN;
     }
-    memcpy(info, &i, i.size);
+    IMP_GIVE(e->ctx, info, i, "info");
     return IMP_OK;
 }

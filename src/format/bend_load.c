@@ -2,6 +2,7 @@
  *
  * Files of bent rays: the scene format's grammar, with <medium type="graded">, <rays>,
  * <surface> and <target> (docs/curved-rays.md). */
+#include "base/arguments.h"
 #include "bend.h"
 #include "load.h"
 #include "search.h"
@@ -38,7 +39,7 @@ static enum imp_status truth_trace(struct bend_loader *l, struct imp_bend_exit *
     o.scheme = IMP_BEND_YOSHIDA4;
     o.way = IMP_BEND_REVERSE;
     if (!(o.step > 0)) {
-        struct imp_bend_options own;
+        struct imp_bend_options own = {.size = sizeof own};
         const enum imp_status st = imp_bend_get_options(l->bend, &own);
         if (st != IMP_OK) return st;
         o.step = own.step / 4;
@@ -216,7 +217,11 @@ enum imp_status imp_bend_load(imp_context *ctx, const char *path,
     struct imp_load_options o;
     struct imp_bytes text = {0};
     char *folder = NULL;
-    if (!path || !*path) return imp__error(ctx, IMP_E_ARG, "no file is named");
+    IMP_REQUIRE(NULL, ctx, "context");
+    IMP_REQUIRE(ctx, path, "path");
+    IMP_REQUIRE(ctx, out, "out");
+    if (!*path) return imp__error(ctx, IMP_E_ARG, "no file is named");
+    IMP_FLOAT_MODE;
     IMP_TRY(imp__load_options(ctx, options, &o));
     IMP_TRY(imp__file_read(ctx, path, XML_FILE_BYTES_MAX, &text));
     folder = imp__strdup(ctx, strchr(path, '/') ? path : ".");
@@ -236,6 +241,10 @@ enum imp_status imp_bend_load_string(imp_context *ctx, const char *xml, size_t l
                                      imp_bend **out)
 {
     struct imp_load_options o;
+    IMP_REQUIRE(NULL, ctx, "context");
+    IMP_REQUIRE(ctx, xml, "xml");
+    IMP_REQUIRE(ctx, out, "out");
+    IMP_FLOAT_MODE;
     const enum imp_status st = imp__load_options(ctx, options, &o);
     if (st != IMP_OK) return st;
     const struct imp_bytes text = {(unsigned char *)(uintptr_t)xml, length, length};

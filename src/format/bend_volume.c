@@ -61,7 +61,7 @@ enum imp_status bend_placed(struct bend_loader *l, struct imp_node *node,
 static enum imp_status grid_sample(struct bend_loader *l, imp_field *grid,
                                    const imp_field *from)
 {
-    struct imp_field_grid g;
+    struct imp_field_grid g = {.size = sizeof g};
     enum imp_status st = imp_field_get_grid(grid, &g);
     const size_t m[3] = {(size_t)g.cells[0] + 1, (size_t)g.cells[1] + 1,
                          (size_t)g.cells[2] + 1};
@@ -218,7 +218,7 @@ enum imp_status bend_volume(struct bend_loader *l, struct imp_node *node, imp_fi
     enum imp_status st = IMP_OK;
     imp_field *f = NULL, *start = NULL;
     const char *file;
-    struct imp_field_grid g;
+    struct imp_field_grid g = {.size = sizeof g};
     struct imp_field_symmetry symmetry;
     const bool grid = strcmp(node->type, "grid") == 0;
     bool tied = false;

@@ -164,8 +164,8 @@ static const struct {
     [F_ID] = {"scene: id 'a' is used twice (first at scene)", IMP_E_SCENE},
     [F_REF] = {"scene: reference to unknown id 'nobody'", IMP_E_SCENE},
     [F_CYCLE] = {"scene: reference to 'a' makes a cycle", IMP_E_SCENE},
-    [F_NAN] = {"scene: shape 'radius' is not finite", IMP_E_ARG},
-    [F_NULL] = {"scene: a property has no name", IMP_E_ARG},
+    [F_NAN] = {"scene: value of shape 'radius' is nan", IMP_E_ARG},
+    [F_NULL] = {"scene: a property's name is NULL", IMP_E_ARG},
     [F_SPECTRUM] =
         {"scene: spectrum 'radiance': a spectrum needs at least two wavelengths",
          IMP_E_SCENE},
