@@ -10,6 +10,7 @@
  * and after a delta lobe. Depth: emission at vertex k counts if k < max_depth, scattering
  * goes on and samples lights if k + 1 < max_depth (scene-format 11). */
 #include "step.h"
+#include <float.h>
 
 /* With room behind it for n_in inputs of its BSDF. */
 static struct imp_vertex *vertex_add(struct imp_step *s, int n_in)
@@ -222,7 +223,9 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
     while (step(&s)) s.depth++;
 
     const imp_spec L = imp__walk_fold(walk);
-    if (imp_unlikely(!imp__is_finite(L)))
+    /* A picture holds floats. */
+    if (imp_unlikely(
+            !(fabs(L[0]) <= FLT_MAX && fabs(L[1]) <= FLT_MAX && fabs(L[2]) <= FLT_MAX)))
         walk->dropped = isnan(L[0] + L[1] + L[2]) ? IMP_DROP_NAN : IMP_DROP_INFINITE;
     else if (imp_unlikely(L[0] < 0 || L[1] < 0 || L[2] < 0))
         walk->dropped = IMP_DROP_NEGATIVE;

@@ -23,6 +23,28 @@ static bool same(const struct imp_drops *a, const struct imp_drops *b)
     return memcmp(a, b, sizeof *a) == 0;
 }
 
+/* Status of a picture of a sky with this radiance. */
+static enum imp_status sky(imp_context *ctx, const char *radiance, float *pixel)
+{
+    char xml[1024];
+    struct imp_run run = IMP_RUN_INIT;
+    imp_film *film = NULL;
+    snprintf(xml, sizeof xml,
+             "<scene version='3.0.0'><integrator type='path'/><sensor "
+             "type='perspective'><film type='hdrfilm'><integer name='width' value='4'/>"
+             "<integer name='height' value='4'/><rfilter type='box'/></film></sensor>"
+             "<emitter type='constant'><rgb name='radiance' value='%s'/></emitter>"
+             "</scene>",
+             radiance);
+    imp_scene *s = test_scene_text(ctx, xml, IMP_RGB);
+    run.spp = 2;
+    const enum imp_status st = imp_render(s, &run, &film);
+    if (st == IMP_OK) *pixel = imp_film_mean(film)[0];
+    imp_film_destroy(film);
+    imp_scene_destroy(s);
+    return st;
+}
+
 int main(void)
 {
     struct imp_drops forward = {0}, backward = {0}, merged = {0}, part[PARTS];
@@ -65,6 +87,12 @@ int main(void)
     tap_ok(st == IMP_E_PATHS && strstr(said, "30: the value is not a number") &&
                strstr(said, "--pixel 0,0 --sample 0 --seed 3"),
            "too many for the budget # %s", said);
+    float pixel = 0;
+    tap_ok(sky(ctx, "1e38", &pixel) == IMP_OK && pixel == 1e38f, "radiance 1e38 # %g",
+           (double)pixel);
+    tap_ok(sky(ctx, "1e39", &pixel) == IMP_E_PATHS &&
+               sky(ctx, "1e200", &pixel) == IMP_E_PATHS,
+           "radiance that a float cannot hold is a bad walk # %s", imp_last_error(ctx));
     imp_context_destroy(ctx);
     return tap_done();
 }
