@@ -74,6 +74,7 @@ enum imp_status imp_context_create(const struct imp_context_options *options,
     if (!ctx) return imp__error(NULL, IMP_E_NOMEM, "%s: out of memory", __func__);
     memset(ctx, 0, sizeof *ctx);
     ctx->allocator = a;
+    atomic_init(&ctx->held, 1);
     atomic_init(&ctx->process, (long)getpid());
     ctx->log = o.log;
     ctx->log_payload = o.log_payload;
@@ -91,10 +92,16 @@ enum imp_status imp_context_create(const struct imp_context_options *options,
 
 void imp_context_destroy(imp_context *ctx)
 {
-    if (!ctx) return;
+    if (ctx) imp__context_drop(ctx);
+}
+
+void imp__context_hold(imp_context *ctx) { atomic_fetch_add(&ctx->held, 1); }
+
+void imp__context_drop(imp_context *ctx)
+{
+    if (atomic_fetch_sub(&ctx->held, 1) > 1) return;
     IMP_FLOAT_MODE;
     imp__context_own(ctx);
-    if (ctx->device) ctx->device_release(ctx->device);
     imp__pool_destroy(ctx, ctx->pool);
     for (struct imp__error_text *e = ctx->errors, *next; e; e = next) {
         next = e->next;
@@ -107,30 +114,19 @@ void imp_context_destroy(imp_context *ctx)
 
 /* A child has one thread at first; where its threads call at once, one of them sets up
  * and the others wait for it. */
-bool imp__context_own(imp_context *ctx)
+void imp__context_own(imp_context *ctx)
 {
     const long here = (long)getpid();
     long was = atomic_load(&ctx->process);
-    if (was == here) return true;
+    if (was == here) return;
     while (was == BEING_SET_UP ||
            !atomic_compare_exchange_weak(&ctx->process, &was, BEING_SET_UP)) {
         was = atomic_load(&ctx->process);
-        if (was == here) return false;
+        if (was == here) return;
     }
     pthread_mutex_init(&ctx->lock, NULL);
     ctx->pool = NULL; /* lost: what holds the parent's threads is not touched */
-    ctx->device = NULL;
     atomic_store(&ctx->process, here);
-    return false;
-}
-
-static void *nothing(void *payload) { return payload; }
-
-bool imp__thread_possible(void)
-{
-    pthread_t thread;
-    return pthread_create(&thread, NULL, nothing, NULL) == 0 &&
-           pthread_join(thread, NULL) == 0;
 }
 
 int imp_context_threads(const imp_context *ctx) { return ctx ? ctx->threads : 0; }

@@ -26,18 +26,19 @@ struct imp_context {
     pthread_mutex_t lock;           /* guards errors and pool creation */
     struct imp__error_text *errors; /* list of all threads' texts, freed at the end */
     struct imp_pool *pool;          /* made on first use */
-    void *device;                   /* Embree's device, owned by scene/intersect.c */
-    void (*device_release)(void *);
+    _Atomic int held;               /* by the host, and by every object made from it */
     _Atomic long process; /* whose threads and locks these are; see imp__context_own */
 };
 
 /* After a fork, threads are gone and locks may be held by them: the child's first call
- * leaves pool and device to the parent and begins with none. Called before either is
- * used. True: the context was made, or has been used, by this process. */
-bool imp__context_own(imp_context *ctx);
+ * leaves the pool to the parent and begins with none. Called before pool and lock are
+ * used. */
+void imp__context_own(imp_context *ctx);
 
-/* Can a thread be made now? */
-bool imp__thread_possible(void);
+/* An object that keeps `ctx` holds it from its making to its end: a host may destroy the
+ * context before its objects. */
+void imp__context_hold(imp_context *ctx);
+void imp__context_drop(imp_context *ctx);
 
 /* Needs a local `enum imp_status st` and a label `out`. */
 #define IMP_TRY(call)                                                                    \

@@ -43,6 +43,7 @@ enum imp_status imp__film_create(imp_context *ctx, int width, int height,
     imp_film *f = imp__alloc(ctx, 1, sizeof *f);
     if (!f) return imp__error(ctx, IMP_E_NOMEM, "film: out of memory");
     f->ctx = ctx;
+    imp__context_hold(ctx);
     if (width < 1 || height < 1 || width > IMP_FILM_SIDE_MAX ||
         height > IMP_FILM_SIDE_MAX)
         IMP_TRY(imp__error(ctx, IMP_E_ARG, "film: size %d x %d is not between 1 and %d",
@@ -98,6 +99,7 @@ void imp_film_destroy(imp_film *f)
     imp__release(ctx, f->mean);
     imp__release(ctx, f->se);
     imp__release(ctx, f);
+    imp__context_drop(ctx);
 }
 
 enum imp_status imp_film_get_info(const imp_film *f, struct imp_film_info *info)

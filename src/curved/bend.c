@@ -22,6 +22,7 @@ enum imp_status imp_bend_create(imp_context *ctx, imp_field *field, imp_bend **o
         return imp__error(ctx, IMP_E_NOMEM, "no memory for a problem of bent rays");
     }
     b->ctx = ctx;
+    imp__context_hold(ctx);
     b->field = field;
     b->options = (struct imp_bend_options)IMP_BEND_OPTIONS_INIT;
     b->lo = 1, b->hi = INFINITY;
@@ -49,6 +50,7 @@ void imp_bend_destroy(imp_bend *b)
     for (size_t i = 0; i < imp_count(owned); i++) imp__release(ctx, owned[i]);
     imp_field_destroy(b->field);
     imp__release(ctx, b);
+    imp__context_drop(ctx);
 }
 
 imp_field *imp_bend_field(imp_bend *b) { return b ? b->field : NULL; }

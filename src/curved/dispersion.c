@@ -111,6 +111,7 @@ enum imp_status imp_field_scaled_create(imp_context *ctx, imp_field *of, double 
                    : imp__error(ctx, IMP_E_ARG, "a field scaled by k = %g", k);
     }
     imp__scaled_init(s, of, k);
+    imp__context_hold(ctx);
     s->base.borrowed = of->borrowed;
     *out = &s->base;
     return IMP_OK;

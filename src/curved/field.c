@@ -21,6 +21,7 @@ enum imp_status imp__field_new(imp_context *ctx, const struct imp__field_ops *op
         return imp__error(ctx, IMP_E_NOMEM, "no memory for %zu numbers of an index field",
                           n_theta);
     }
+    imp__context_hold(ctx);
     *out = f;
     return IMP_OK;
 }
@@ -29,8 +30,10 @@ void imp_field_destroy(imp_field *f)
 {
     if (!f) return;
     if (f->ops->destroy) f->ops->destroy(f);
-    if (!f->borrowed) imp__release(f->ctx, f->theta);
-    imp__release(f->ctx, f);
+    imp_context *ctx = f->ctx;
+    if (!f->borrowed) imp__release(ctx, f->theta);
+    imp__release(ctx, f);
+    imp__context_drop(ctx);
 }
 
 const char *imp_field_kind(const imp_field *f) { return f ? f->ops->name : ""; }
@@ -50,9 +53,8 @@ enum imp_status imp_field_set_theta(imp_field *f, const double *theta)
     IMP_FLOAT_MODE;
     for (size_t i = 0; i < f->n_theta; i++)
         if (!isfinite(theta[i]))
-            return imp__error(f->ctx, IMP_E_ARG,
-                              "number %zu of the %s field is not finite", i,
-                              f->ops->name);
+            return imp__error(f->ctx, IMP_E_ARG, "theta[%zu] of the %s field is %g", i,
+                              f->ops->name, theta[i]);
     memcpy(f->theta, theta, f->n_theta * sizeof *theta);
     if (f->ops->changed) f->ops->changed(f);
     return IMP_OK;

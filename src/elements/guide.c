@@ -162,6 +162,7 @@ static void destroy(struct imp_guide *base)
     imp__release(ctx, g->wide_of);
     imp__release(ctx, g->leaving);
     imp__release(ctx, g);
+    imp__context_drop(ctx);
 }
 
 /* ---- Making it ----------------------------------------------------------------- */
@@ -236,6 +237,7 @@ enum imp_status imp_elements_guide(const imp_elements *e,
     struct imp__guide *g = imp__alloc(e->ctx, 1, sizeof *g);
     if (!g) return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for a guide");
     b.g = g;
+    imp__context_hold(e->ctx);
     g->base = (struct imp_guide){.ctx = e->ctx,
                                  .find = find,
                                  .light = light_choose,

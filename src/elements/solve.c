@@ -49,6 +49,7 @@ enum imp_status imp_elements_create(const imp_scene *scene,
     if (!e)
         return imp__error(scene->ctx, IMP_E_NOMEM, "out of memory for finite elements");
     e->ctx = scene->ctx;
+    imp__context_hold(e->ctx);
     e->scene = scene;
     e->ch = scene->channels;
     e->reason = "not solved";
@@ -70,13 +71,15 @@ out:
 void imp_elements_destroy(imp_elements *e)
 {
     if (!e) return;
+    imp_context *ctx = e->ctx;
     void *const all[] = {e->roots, e->elements,   e->l,         e->g,     e->c,
                          e->b,     e->from_above, e->a,         e->links, e->in_start,
                          e->out,   e->value,      e->out_start, e->hits,  e->seen,
                          e->log,   e->picture,    e->rows};
     for (size_t k = 0; k < imp_count(all); k++) imp__release(e->ctx, all[k]);
     imp__arena_free(&e->arena);
-    imp__release(e->ctx, e);
+    imp__release(ctx, e);
+    imp__context_drop(ctx);
 }
 
 /* ---- Solving ------------------------------------------------------------------- */

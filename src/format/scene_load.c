@@ -25,6 +25,7 @@ enum imp_status imp__scene_new(imp_context *ctx, const struct imp_load_options *
     struct imp_scene *scene = imp__alloc(ctx, 1, sizeof *scene);
     if (!scene) return imp__error(ctx, IMP_E_NOMEM, "scene: out of memory");
     scene->ctx = ctx;
+    imp__context_hold(ctx);
     scene->mode = options->mode;
     scene->channels = options->mode == IMP_MONO ? 1 : 3;
     scene->environment = -1;
@@ -55,6 +56,7 @@ void imp_scene_destroy(imp_scene *scene)
     imp__arena_free(&scene->files);
     imp__arena_free(&scene->arena);
     imp__release(ctx, scene);
+    imp__context_drop(ctx);
 }
 
 /* The data of files are gone: nobody may look at them any more. */

@@ -20,6 +20,7 @@ enum imp_status imp_problem_create(imp_scene *scene, imp_problem **out)
     p = imp__alloc(ctx, 1, sizeof *p);
     if (!p) return imp__error(ctx, IMP_E_NOMEM, "no memory for a problem");
     p->ctx = ctx;
+    imp__context_hold(ctx);
     p->scene = scene;
     p->run = (struct imp_run)IMP_RUN_INIT;
     imp__arena_init(&p->fit_arena, ctx);
@@ -44,6 +45,7 @@ static void target_free(imp_context *ctx, struct imp__target *t)
 void imp_problem_destroy(imp_problem *p)
 {
     if (!p) return;
+    imp_context *ctx = p->ctx;
     for (size_t i = 0; i < p->n_targets; i++) target_free(p->ctx, &p->targets[i]);
     imp__release(p->ctx, p->targets);
     for (size_t i = 0; i < p->n_regularisers; i++) {
@@ -54,8 +56,9 @@ void imp_problem_destroy(imp_problem *p)
     imp__active_destroy(p->ctx, &p->active);
     imp__arena_free(&p->fit_arena);
     imp__arena_free(&p->check_arena);
-    imp__release(p->ctx, p->chosen);
-    imp__release(p->ctx, p);
+    imp__release(ctx, p->chosen);
+    imp__release(ctx, p);
+    imp__context_drop(ctx);
 }
 
 /* ---- Active parameters --------------------------------------------------------- */
