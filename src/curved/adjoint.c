@@ -178,6 +178,21 @@ static size_t slice_rays(const struct imp__adjoint *job)
     return imp_max((n + slices - 1) / slices, (size_t)4 * IMP_LANES);
 }
 
+/* As traced: what is not dropped is finite. */
+static enum imp_status exits_check(imp_context *ctx, const struct imp_bend_exit *exits,
+                                   size_t n)
+{
+    for (size_t i = 0; i < n; i++) {
+        const struct imp_bend_exit *e = &exits[i];
+        double sum = fabs(e->path) + fabs(e->tau) + fabs(e->norm2);
+        for (int k = 0; k < 3; k++) sum += fabs(e->x[k]) + fabs(e->v[k]);
+        if (!(e->flags & IMP_BEND_DROPPED) && !isfinite(sum))
+            return imp__error(ctx, IMP_E_ARG,
+                              "imp_bend_adjoint: exits[%zu] is not finite", i);
+    }
+    return IMP_OK;
+}
+
 static enum imp_status bars_check(imp_context *ctx, const char *name,
                                   const struct imp_bend_cotangent *bars, size_t n)
 {
@@ -206,10 +221,13 @@ imp_bend_adjoint(const imp_field *field, const struct imp_bend_options *options,
     if (stats) IMP_SIZED(field->ctx, stats, "stats");
     struct imp_bend_gradient arrays = IMP_BEND_GRADIENT_INIT, *const out = &arrays;
     IMP_OPTIONS(field->ctx, arrays, gradient, "out");
+    struct imp_bend_options own;
+    IMP_CHECKED(imp__bend_options_take(field->ctx, __func__, "options", options, &own));
+    IMP_CHECKED(exits_check(field->ctx, exits, rays->n));
     IMP_CHECKED(bars_check(field->ctx, "bars", bars, rays->n));
     IMP_FLOAT_MODE;
     struct imp__plan plan;
-    enum imp_status st = imp__plan_create(field, options, rays, &plan);
+    enum imp_status st = imp__plan_create(field, &own, rays, &plan);
     if (st != IMP_OK) return st;
     imp_context *ctx = plan.ctx;
     const int n_slots = imp__pool_slots(ctx);
@@ -221,7 +239,7 @@ imp_bend_adjoint(const imp_field *field, const struct imp_bend_options *options,
                                .bars = bars,
                                .tap_bars = plan.n_taps > 0 ? tap_bars : NULL,
                                .out = &sum,
-                               .n_surfaces = options ? options->n_surfaces : 0};
+                               .n_surfaces = own.n_surfaces};
     double(*surfaces)[8] = NULL;
     imp__partials_init(&job.partials, ctx, field->n_theta);
     job.slice = slice_rays(&job);

@@ -209,6 +209,13 @@ static enum imp_status target_check(const imp_bend *b, const struct imp_bend_tar
                           b->options.n_taps);
     if (!(t->weight >= 0) || !isfinite(t->weight))
         return imp__error(b->ctx, IMP_E_ARG, "target of weight %g", t->weight);
+    IMP_FINITE_ALL(b->ctx, t->normal, 3, "t->normal");
+    IMP_FINITE(b->ctx, t->offset, "t->offset");
+    IMP_FINITE(b->ctx, t->outside, "t->outside");
+    IMP_FINITE_ALL(b->ctx, t->point, 3, "t->point");
+    IMP_FINITE_ALL(b->ctx, t->origin, 3, "t->origin");
+    IMP_FINITE_ALL(b->ctx, t->u, 3, "t->u");
+    IMP_FINITE_ALL(b->ctx, t->v, 3, "t->v");
     const imp_v3 n = imp__v3_load(t->normal);
     if (t->at_plane && (!(imp__length(n) > 0) || !imp__is_finite(n) ||
                         !isfinite(t->offset) || !(t->outside > 0)))
@@ -330,7 +337,7 @@ enum imp_status imp_bend_add_smoothness(imp_bend *b, double weight, int order,
 enum imp_status imp_bend_set_bounds(imp_bend *b, double lo, double hi)
 {
     IMP_REQUIRE(NULL, b, "bend");
-    if (!(lo < hi)) return imp__error(b->ctx, IMP_E_ARG, "bounds %g to %g", lo, hi);
+    if (!(lo < hi)) return imp__error(b->ctx, IMP_E_ARG, "bounds lo %g to hi %g", lo, hi);
     b->lo = lo, b->hi = hi;
     b->bounds_set = true;
     return IMP_OK;

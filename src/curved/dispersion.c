@@ -127,6 +127,9 @@ enum imp_status imp_bend_set_wavelength(imp_bend *b, int bundle,
     IMP_REQUIRE(NULL, b, "bend");
     IMP_REQUIRE(b->ctx, dispersion, "d");
     IMP_OPTIONS(b->ctx, own, dispersion, "d");
+    IMP_FINITE_ALL(b->ctx, own.coefficient, 6, "d->coefficient");
+    IMP_FINITE(b->ctx, own.reference, "d->reference");
+    IMP_FINITE(b->ctx, um, "um");
     IMP_FLOAT_MODE;
     if (bundle < 0 || bundle >= b->n_bundles)
         return imp__error(b->ctx, IMP_E_ARG, "bundle %d: there are %d", bundle,

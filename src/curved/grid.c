@@ -305,9 +305,10 @@ enum imp_status imp_field_set_samples(imp_field *f, const double *samples)
         const double K = g->desc.gladstone_dale,
                      eta = K > 0 ? 1 + K * samples[i] : samples[i];
         if (!isfinite(eta) || !(eta > 0))
-            IMP_TRY(imp__error(f->ctx, IMP_E_ARG,
-                               "sample %zu of the index grid is %g: an index is positive",
-                               i, samples[i]));
+            IMP_TRY(
+                imp__error(f->ctx, IMP_E_ARG,
+                           "samples[%zu] of the index grid is %g: an index is positive",
+                           i, samples[i]));
         values[i] = g->desc.param == IMP_FIELD_ETA2 ? eta * eta / 2 : eta;
     }
     if (g->desc.interp == IMP_FIELD_SPLINE)
@@ -330,6 +331,7 @@ enum imp_status imp_field_samples_vjp(const imp_field *f, const double *theta_ba
     IMP_FLOAT_MODE;
     const struct imp__grid *g = grid_of(f, &st);
     if (st != IMP_OK) return st;
+    IMP_FINITE_ALL(f->ctx, theta_bar, f->n_theta, "theta_bar");
     if (g->desc.param != IMP_FIELD_ETA)
         return imp__error(f->ctx, IMP_E_UNSUPPORTED,
                           "samples of eta^2 have no transpose here");
@@ -392,6 +394,8 @@ enum imp_status imp_field_refine_vjp(const imp_field *f, const double *fine_bar,
     const bool spline = g->desc.interp == IMP_FIELD_SPLINE;
     int fine[3];
     for (int k = 0; k < 3; k++) fine[k] = 2 * g->desc.cells[k] + (spline ? 3 : 1);
+    IMP_FINITE_ALL(f->ctx, fine_bar, (size_t)fine[0] * (size_t)fine[1] * (size_t)fine[2],
+                   "fine_bar");
     return along_axes(f->ctx, spline ? line_refine_spline_vjp : line_refine_linear_vjp,
                       fine, g->nodes, fine_bar, coarse_bar);
 }

@@ -93,6 +93,7 @@ enum imp_status imp_field_radial_create(imp_context *ctx,
         return imp__error(ctx, IMP_E_ARG, "radial field: radius %g", desc->radius);
     if (!imp__is_finite(imp__v3_load(desc->centre)))
         return imp__error(ctx, IMP_E_ARG, "radial field: the centre is not finite");
+    IMP_FINITE_ALL(ctx, desc->axis, 3, "axis");
     if (desc->cylinder && !(length > 0 && isfinite(length)))
         return imp__error(ctx, IMP_E_ARG, "radial field: the axis has no direction");
     if (!(index > 0) || !isfinite(index))

@@ -161,6 +161,9 @@ enum imp_status imp_field_read(imp_context *ctx, const char *path,
     IMP_REQUIRE(ctx, path, "path");
     IMP_REQUIRE(ctx, out, "out");
     IMP_OPTIONS(ctx, like, grid, "grid");
+    IMP_FINITE_ALL(ctx, like.lo, 3, "grid->lo");
+    IMP_FINITE_ALL(ctx, like.hi, 3, "grid->hi");
+    IMP_FINITE(ctx, like.gladstone_dale, "grid->gladstone_dale");
     IMP_FLOAT_MODE;
     if (!grid || !(like.hi[0] > like.lo[0]))
         for (int k = 0; k < 3; k++) like.lo[k] = -1, like.hi[k] = 1;

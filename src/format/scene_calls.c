@@ -225,6 +225,16 @@ static bool open_is(const struct imp_scene *scene, const char *tag, const char *
     return strcmp(top(scene)->tag, tag) == 0 && strcmp(top(scene)->type, type) == 0;
 }
 
+static enum imp_status floats_check(imp_context *ctx, const struct imp_node *node,
+                                    const char *name, const float *values, size_t n)
+{
+    for (size_t i = 0; i < n; i++)
+        if (!isfinite(values[i]))
+            return imp__node_error(ctx, node, IMP_E_ARG, "%s[%zu] is %g", name, i,
+                                   (double)values[i]);
+    return IMP_OK;
+}
+
 static enum imp_status mesh(struct imp_scene *scene, size_t n_vertices,
                             size_t n_triangles, const float *positions,
                             const float *normals, const float *uvs,
@@ -242,6 +252,9 @@ static enum imp_status mesh(struct imp_scene *scene, size_t n_vertices,
         n_triangles > IMP_MESH_MAX)
         return imp__node_error(ctx, node, IMP_E_ARG,
                                "needs between 1 and 2^31 vertices and triangles");
+    IMP_CHECKED(floats_check(ctx, node, "positions", positions, 3 * n_vertices));
+    if (normals) IMP_CHECKED(floats_check(ctx, node, "normals", normals, 3 * n_vertices));
+    if (uvs) IMP_CHECKED(floats_check(ctx, node, "uvs", uvs, 2 * n_vertices));
     const struct imp_mesh_source source = {
         .ctx = ctx, .keep = &scene->arena, .temporary = &scene->files, .name = "mesh"};
     struct imp_mesh_data *data = imp__arena_array(&scene->files, 1, sizeof *data);
@@ -284,6 +297,7 @@ static enum imp_status image(struct imp_scene *scene, int width, int height, int
                                "a picture of %d x %d with %d channels", width, height,
                                channels);
     const size_t n = (size_t)width * (size_t)height * (size_t)channels;
+    IMP_CHECKED(floats_check(ctx, node, "pixels", pixels, n));
     struct imp_image_data *data = imp__arena_array(&scene->files, 1, sizeof *data);
     float *copy = data ? imp__arena_take(&scene->files, n, sizeof *copy) : NULL;
     if (!copy) return imp__error(ctx, IMP_E_NOMEM, "scene: no memory for a picture");

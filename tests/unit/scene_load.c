@@ -177,7 +177,7 @@ static const struct {
          IMP_E_ARG},
     [F_MESH_INDEX] = {"scene: shape (mesh): triangle 0 names vertex 3; there are 3",
                       IMP_E_SCENE},
-    [F_MESH_NAN] = {"scene: shape (mesh): vertex 1 is not finite", IMP_E_SCENE},
+    [F_MESH_NAN] = {"scene: shape (mesh): positions[3] is nan", IMP_E_ARG},
     [F_IMAGE] = {"scene: texture (bitmap): a picture of 2 x 0 with 3 channels",
                  IMP_E_ARG},
     [F_UNUSED] = {"scene: shape (sphere): not a property of this plugin: 'colour'",
