@@ -8,20 +8,21 @@
 #include <dlfcn.h>
 #include <errno.h>
 #include <fenv.h>
+#include <importon/bend.h>
 #include <pthread.h>
 #include <stdatomic.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
-#include <importon/bend.h>
 #include <unistd.h>
 
 /* This program's pthread_create is what the library calls, and what TBB calls. */
 static atomic_bool no_threads;
 
-int pthread_create(pthread_t *restrict thread, const pthread_attr_t *restrict attributes,
-                   void *(*start)(void *), void *restrict payload)
+__attribute__((visibility("default"))) int
+pthread_create(pthread_t *restrict thread, const pthread_attr_t *restrict attributes,
+               void *(*start)(void *), void *restrict payload)
 {
     typedef int create(pthread_t *, const pthread_attr_t *, void *(*)(void *), void *);
     static create *real;
