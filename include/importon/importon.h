@@ -14,13 +14,16 @@
  *     imp_fit                 parameters back from pictures
  *
  * Conventions, for the whole header. Functions that can fail return enum imp_status; the
- * message belongs to the context and the calling thread (imp_last_error). On failure,
- * outputs keep their contents. `destroy(NULL)` does nothing. Strings and arrays handed in
- * are copied unless a comment says otherwise; pointers handed out belong to the object
- * and live until it is destroyed or changed. Structs start with `size`: use their
- * initialisers. Zero in an options struct means the default. Images are [height][width]
- * [channels], row 0 at the top. A scene may be read by several threads at once, but not
- * while its parameters are being set.
+ * message belongs to the context and the calling thread (imp_last_error) and names the
+ * argument. On failure, outputs keep their contents. `destroy(NULL)` does nothing; any
+ * other pointer that is NULL, and a number that is not finite, is IMP_E_ARG where nothing
+ * else is said. Strings and arrays handed in are copied unless a comment says otherwise;
+ * pointers handed out belong to the object and live until it is destroyed or changed.
+ * Structs that may grow start with `size`: use their initialisers, or set it before a
+ * getter writes; fields that an older caller does not have keep their defaults. Zero in
+ * an options struct means the default. Images are [height][width][channels], row 0 at the
+ * top. A scene may be used by several threads at once; calls that set its parameters wait
+ * for those that read them.
  */
 #ifndef IMPORTON_H
 #define IMPORTON_H
@@ -95,14 +98,17 @@ struct imp_context_options {
 
 /**
  * @param options  NULL for the defaults.
- * @param[out] out the context; destroy it after everything made from it.
+ * @param[out] out the context. It lives until it and everything made from it is
+ * destroyed.
  * @return IMP_OK; IMP_E_ARG for a negative thread count; IMP_E_NOMEM.
  */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_context_create(const struct imp_context_options *options, imp_context **out);
 IMP_API void imp_context_destroy(imp_context *context);
 
-/** Message of the last failure in this context on this thread; "" if none. Never NULL. */
+/** Message of the last failure in this context on this thread; "" if none. Never NULL.
+ * context NULL: of the last call of this thread whose context was not known, because the
+ * object was NULL, or there is none yet. */
 IMP_API const char *imp_last_error(const imp_context *context);
 
 /** Number of threads in use. */
@@ -394,7 +400,7 @@ struct imp_run {
     /** Of pictures, 0: none; else samples are taken until then (every pixel gets at least
      * one pass), at most spp if that is given. */
     double time_limit_s;
-    double drop_budget; /**< fraction of walks that may be dropped; 0: 1e-4 */
+    double drop_budget; /**< fraction of walks that may be dropped, 0 to 1; 0: 1e-4 */
     imp_progress_fn progress;
     void *progress_payload;
     const imp_guide *guide; /**< NULL: none; paths (integrator path) alone follow it */
@@ -534,8 +540,9 @@ IMP_API enum imp_status imp_problem_set_run(imp_problem *problem,
 
 /**
  * Reverse derivative: gradient = J^T seed, J = d pixel / d x, for a given adjoint image.
- * @param seed_image [height][width][channels] of run->sensor. It must come from other
- * random numbers than `run`: an adjoint made from the same walks is correlated with J.
+ * @param seed_image [height][width][channels] of run->sensor, finite. It must come from
+ * other random numbers than `run`: an adjoint made from the same walks is correlated with
+ * J.
  * @param[out] gradient    [n], as imp_problem_objective's.
  * @param[out] gradient_se [n], one standard error; may be NULL.
  * @return as imp_problem_objective.
