@@ -114,6 +114,7 @@ static void work_make(struct work *w, int threads, enum imp_field_interp interp,
     free(s);
     w->exit = (struct imp_bend_surface)IMP_BEND_SURFACE_INIT;
     w->exit.offset = 1;
+    w->stats = (struct imp_bend_stats)IMP_BEND_STATS_INIT;
     w->o = (struct imp_bend_options)IMP_BEND_OPTIONS_INIT;
     w->o.surfaces = &w->exit, w->o.n_surfaces = 1;
     w->o.step = step_cells * 2.0 / M;

@@ -138,7 +138,7 @@ static void recover(const char *name, const char *file, double (*truth)(double),
     double eta[LEVELS][RADII];
     imp_bend *b;
     struct imp_bend_fit_options fo = IMP_BEND_FIT_OPTIONS_INIT;
-    struct imp_bend_fit_result r;
+    struct imp_bend_fit_result r = {.size = sizeof r};
     char define[2][32];
     const char *const defines[2] = {define[0], define[1]};
     struct imp_load_options lo = IMP_LOAD_OPTIONS_INIT;
@@ -236,7 +236,7 @@ static void focus(void)
         for (int m = 0; m < 3; m++) {
             imp_bend *b = focus_problem(16, rows[k].s, rows[k].w);
             struct imp_bend_fit_options fo = IMP_BEND_FIT_OPTIONS_INIT;
-            struct imp_bend_fit_result r;
+            struct imp_bend_fit_result r = {.size = sizeof r};
             fo.iterations[0] = steps[m];
             fo.tolerance = 1e-12;
             if (k == 0 && m == 0)
@@ -482,7 +482,7 @@ static void fibre_run(const char *name, double curve, int cells)
     must(imp_bend_add_target(b, &t));
     must(imp_bend_hold_number(b, 1, NAN));
     struct imp_bend_fit_options fo = IMP_BEND_FIT_OPTIONS_INIT;
-    struct imp_bend_fit_result r;
+    struct imp_bend_fit_result r = {.size = sizeof r};
     fo.iterations[0] = 2000, fo.tolerance = 1e-13, fo.scale = 0.01;
     double spots[4], v;
     must(imp_bend_objective(b, &v, NULL, spots, NULL));
@@ -581,7 +581,7 @@ static void display(void)
             imp_field_destroy(f);
             f = fine;
         }
-        struct imp_field_grid g;
+        struct imp_field_grid g = {.size = sizeof g};
         const double start = now();
         must(imp_field_get_grid(f, &g));
         imp_field *copy = grid(g.cells[0], 1.1, 1, IMP_FIELD_SPLINE);
@@ -592,7 +592,7 @@ static void display(void)
         const float *const pictures[2] = {img[0], img[1]};
         imp_bend *b = display_problem(copy, level ? 3 : 2, beam, side, pictures);
         struct imp_bend_fit_options fo = IMP_BEND_FIT_OPTIONS_INIT;
-        struct imp_bend_fit_result r;
+        struct imp_bend_fit_result r = {.size = sizeof r};
         fo.iterations[0] = 60, fo.scale = 0.02;
         if (level == 0) /* steps of half a cell, 0.1 at most */
             expect("display", 60 * evaluation(b) * (full ? 8.7 : 4.3));
@@ -600,7 +600,7 @@ static void display(void)
         double parts[2], v, lo = 1e9, hi = 0, corr = 0;
         must(imp_bend_objective(b, &v, NULL, parts, NULL));
         for (size_t t = 0; t < 2; t++) {
-            struct imp_bend_target desc;
+            struct imp_bend_target desc = {.size = sizeof desc};
             double a = 0, c = 0, aa = 0, cc = 0, ac = 0;
             const int np = side * side;
             must(imp_bend_get_target(b, t, &desc));
@@ -742,7 +742,7 @@ static void gas(void)
          */
         const double tiny = 1e-6;
         struct imp_bend_fit_options fo = IMP_BEND_FIT_OPTIONS_INIT;
-        struct imp_bend_fit_result res;
+        struct imp_bend_fit_result res = {.size = sizeof res};
         fo.iterations[0] = 100, fo.tolerance = 1e-12;
         imp_bend *lin = gas_problem(&g, NULL, tiny, tiny / c);
         fo.scale = tiny;

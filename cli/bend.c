@@ -162,7 +162,7 @@ static int trace(void)
                (double)s.steps / seconds);
         printf("objective %.9g\n", value);
         for (size_t i = 0; i < n && i < 20; i++) {
-            struct imp_bend_target t;
+            struct imp_bend_target t = {.size = sizeof t};
             if (imp_bend_get_target(bend, i, &t) == IMP_OK)
                 printf("  target %-3zu %-10s %.9g\n", i, bend_target_word(t.type),
                        parts[i]);

@@ -117,7 +117,7 @@ int bend_fit(imp_bend *bend)
 {
     static const enum imp_optimizer kinds[] = {IMP_LBFGS, IMP_ADAM, IMP_MMA};
     struct imp_bend_fit_options fo = IMP_BEND_FIT_OPTIONS_INIT;
-    struct imp_bend_fit_result r = {0};
+    struct imp_bend_fit_result r = {.size = sizeof r};
     int rc = iterations_read(fo.iterations);
     if (!rc && cli.out) rc = make_folder(cli.out);
     if (!rc && cli.out) rc = bend_view(bend, cli.out, "before-", NULL);

@@ -311,7 +311,7 @@ static int targets(imp_bend *b, const struct palette *palette, const char *folde
     const size_t n = imp_bend_n_targets(b);
     if (j) json_array(j, "targets");
     for (size_t i = 0; i < n && i < TARGETS && !rc; i++) {
-        struct imp_bend_target t;
+        struct imp_bend_target t = {.size = sizeof t};
         struct seen seen = {0, NAN, NAN};
         if (imp_bend_get_target(b, i, &t) != IMP_OK) continue;
         const int picture = t.type == IMP_BEND_IMAGE || t.type == IMP_BEND_FARFIELD;

@@ -163,12 +163,13 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_field_set_theta(imp_field *field,
 IMP_API const char *imp_field_param_name(const imp_field *field, size_t i);
 /** The box where the field is defined; infinite for profiles. */
 IMP_API void imp_field_bounds(const imp_field *field, double lo[3], double hi[3]);
-/** The grid (of a tied one, too), or IMP_E_ARG if it is not one. */
+/** The grid (of a tied one, too), or IMP_E_ARG if it is not one. Set grid->size first. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_field_get_grid(const imp_field *field,
                                                           struct imp_field_grid *grid);
 
 /** Index, gradient [3], Hessian [6] = xx yy zz xy xz yz. gradient and hessian may be
- * NULL. */
+ * NULL. As functions of a point, this and the next two take any number and give what
+ * comes of it. */
 IMP_API void imp_field_eval(const imp_field *field, const double x[3], double *eta,
                             double *gradient, double *hessian);
 /** The transpose: theta_bar += a d eta/d theta + b . d grad eta/d theta. */
@@ -424,8 +425,9 @@ imp_bend_set_options(imp_bend *bend, const struct imp_bend_options *o);
  * `progress` of the options. A fit calls its own instead. */
 IMP_API void imp_bend_set_progress(imp_bend *bend, imp_progress_fn progress,
                                    void *payload);
-/** The step when options.step is 0: cells * spacing, at most `most` (0: no limit). */
-IMP_API void imp_bend_set_step(imp_bend *bend, double cells, double most);
+/** The step when options.step is 0: cells * spacing, at most `most` (0: no limit).
+ * @return IMP_OK; IMP_E_ARG if one is not a number >= 0. */
+IMP_API enum imp_status imp_bend_set_step(imp_bend *bend, double cells, double most);
 
 /** A bundle: rays that share surfaces, taps and targets by its number (their group).
  * x, d [n]; power [n] or NULL (1/n each). *bundle may be NULL. */

@@ -13,13 +13,16 @@
  *     imp_fit                 parameters back from pictures
  *
  * Conventions, for the whole header. Functions that can fail return enum imp_status; the
- * message belongs to the context and the calling thread (imp_last_error). On failure,
- * outputs keep their contents. `destroy(NULL)` does nothing. Strings and arrays handed in
- * are copied unless a comment says otherwise; pointers handed out belong to the object
- * and live until it is destroyed or changed. Structs start with `size`: use their
- * initialisers. Zero in an options struct means the default. Images are [height][width]
- * [channels], row 0 at the top. A scene may be read by several threads at once, but not
- * while its parameters are being set.
+ * message belongs to the context and the calling thread (imp_last_error) and names the
+ * argument. On failure, outputs keep their contents. `destroy(NULL)` does nothing; any
+ * other pointer that is NULL, and a number that is not finite, is IMP_E_ARG where nothing
+ * else is said. Strings and arrays handed in are copied unless a comment says otherwise;
+ * pointers handed out belong to the object and live until it is destroyed or changed.
+ * Structs that may grow start with `size`: use their initialisers, or set it before a
+ * getter writes; fields that an older caller does not have keep their defaults. Zero in
+ * an options struct means the default. Images are [height][width][channels], row 0 at the
+ * top. A scene may be used by several threads at once; calls that set its parameters wait
+ * for those that read them.
  */
 #ifndef IMPORTON_H
 #define IMPORTON_H
@@ -94,14 +97,17 @@ struct imp_context_options {
 
 /**
  * @param options  NULL for the defaults.
- * @param[out] out the context; destroy it after everything made from it.
+ * @param[out] out the context. It lives until it and everything made from it is
+ * destroyed.
  * @return IMP_OK; IMP_E_ARG for a negative thread count; IMP_E_NOMEM.
  */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_context_create(const struct imp_context_options *options, imp_context **out);
 IMP_API void imp_context_destroy(imp_context *context);
 
-/** Message of the last failure in this context on this thread; "" if none. Never NULL. */
+/** Message of the last failure in this context on this thread; "" if none. Never NULL.
+ * context NULL: of the last call of this thread whose context was not known, because the
+ * object was NULL, or there is none yet. */
 IMP_API const char *imp_last_error(const imp_context *context);
 
 /** Number of threads in use. */
@@ -219,8 +225,9 @@ struct imp_scene_info {
     int max_depth;       /**< -1: unlimited */
     size_t memory_bytes; /**< held by the scene, Embree's part included */
 };
-/** Set info->size first; strings belong to the scene. */
-IMP_API void imp_scene_get_info(const imp_scene *scene, struct imp_scene_info *info);
+/** Set info->size first; strings belong to the scene. @return IMP_OK; IMP_E_ARG. */
+IMP_API enum imp_status imp_scene_get_info(const imp_scene *scene,
+                                           struct imp_scene_info *info);
 
 struct imp_sensor_info {
     size_t size;
@@ -261,8 +268,8 @@ struct imp_param_info {
 /** Number of parameters, and of numbers in all of them together. */
 IMP_API size_t imp_scene_n_params(const imp_scene *scene);
 IMP_API size_t imp_scene_n_theta(const imp_scene *scene);
-/** Strings belong to the scene. @return IMP_OK; IMP_E_ARG if there is no such parameter.
- */
+/** Set info->size first; strings belong to the scene. @return IMP_OK; IMP_E_ARG if there
+ * is no such parameter. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_get_param(const imp_scene *scene, size_t index, struct imp_param_info *info);
 /** Find by name; a final ".value" may be left out, and names of parents may stand in
@@ -287,12 +294,45 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_scene_get_values(const imp_scene *sce
 
 typedef struct imp_film imp_film;
 
+/** Why a walk was dropped. Its value counts as 0. */
+#define IMP_DROP_LIST(X)                                                                 \
+    X(IMP_DROP_NONE, 0, "not dropped")                                                   \
+    X(IMP_DROP_NAN, 1, "the value is not a number")                                      \
+    X(IMP_DROP_INFINITE, 2, "the value is infinite, or more than a float holds")         \
+    X(IMP_DROP_NEGATIVE, 3, "the value is negative")                                     \
+    X(IMP_DROP_MEMORY, 4, "no memory for the vertices")                                  \
+    X(IMP_DROP_LONG, 5, "nothing ended the walk in 16384 vertices")                      \
+    X(IMP_DROP_BENT, 6, "a bent ray came to no end, or to what media cannot hold")       \
+    X(IMP_DROP_MOVED, 7, "what moves with an active field has no derivative there")
+#define IMP_DROP_ENUM(name, value, text) name = value,
+enum imp_drop { IMP_DROP_LIST(IMP_DROP_ENUM) };
+
+/** The sentence that belongs to a cause, never NULL. */
+IMP_API const char *imp_drop_text(enum imp_drop cause);
+
+#define IMP_DROP_CAUSES 16 /**< enum imp_drop, and room for more */
+#define IMP_DROP_KEYS   8
+
+/** A dropped walk. imp_walk_describe with the same sensor, seed, pixel and sample is that
+ * walk, vertex by vertex (IMP_DROP_MOVED: the walk, but not what was dropped of it). */
+struct imp_drop_key {
+    uint64_t seed;
+    int64_t sample;
+    int32_t x, y;   /**< pixel of the picture; outside of it within the filter's radius */
+    int32_t sensor; /**< index */
+    int32_t cause;  /**< enum imp_drop */
+};
+
 struct imp_film_info {
     size_t size;
     int width, height, channels;
     int64_t spp;      /**< samples per pixel in it */
     int has_se;       /**< standard errors are there */
-    uint64_t dropped; /**< walks dropped because a value was not finite or negative */
+    uint64_t dropped; /**< walks dropped, of all causes */
+    /** The same by enum imp_drop. All 0 for a picture that was read from a file. */
+    uint64_t dropped_by_cause[IMP_DROP_CAUSES];
+    int n_drop_keys;                              /**< at most IMP_DROP_KEYS */
+    struct imp_drop_key drop_keys[IMP_DROP_KEYS]; /**< the first by sample, row, column */
 };
 
 /** An empty picture to fill by hand, zeros. `names` is "R,G,B", "Y", "albedo.R,..." .
@@ -302,7 +342,9 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_film_create(imp_context *context, int
                                                        int height, const char *names,
                                                        imp_film **out);
 IMP_API void imp_film_destroy(imp_film *film);
-IMP_API void imp_film_get_info(const imp_film *film, struct imp_film_info *info);
+/** Set info->size first. @return IMP_OK; IMP_E_ARG. */
+IMP_API enum imp_status imp_film_get_info(const imp_film *film,
+                                          struct imp_film_info *info);
 /** Name of a channel as in EXR files; belongs to the film. NULL if there is none. */
 IMP_API const char *imp_film_channel(const imp_film *film, int channel);
 /** [height][width][channels], linear; belongs to the film, and may be written to. */
@@ -357,7 +399,7 @@ struct imp_run {
     /** Of pictures, 0: none; else samples are taken until then (every pixel gets at least
      * one pass), at most spp if that is given. */
     double time_limit_s;
-    double drop_budget; /**< fraction of walks that may be dropped; 0: 1e-4 */
+    double drop_budget; /**< fraction of walks that may be dropped, 0 to 1; 0: 1e-4 */
     imp_progress_fn progress;
     void *progress_payload;
     const imp_guide *guide; /**< NULL: none; paths (integrator path) alone follow it */
@@ -491,14 +533,15 @@ imp_problem_objective(imp_problem *problem, const double *x, const struct imp_ru
  * imp_problem_set_run; equal seeds make common random numbers. Failure gives HUGE_VAL. */
 IMP_API double imp_problem_nlopt(unsigned n, const double *x, double *gradient,
                                  void *problem);
-/** Copied; NULL: the defaults. */
-IMP_API void imp_problem_set_run(imp_problem *problem, const struct imp_run *run);
+/** Copied; NULL: the defaults. @return IMP_OK; IMP_E_ARG: the run before stays. */
+IMP_API enum imp_status imp_problem_set_run(imp_problem *problem,
+                                            const struct imp_run *run);
 
 /**
  * Reverse derivative: gradient = J^T seed, J = d pixel / d x, for a given adjoint image.
- * @param seed_image [height][width][channels] of run->sensor. It must come from other
- *        random numbers than `run`: an adjoint made from the same walks is correlated
- *        with J.
+ * @param seed_image [height][width][channels] of run->sensor, finite. It must come from
+ *        other random numbers than `run`: an adjoint made from the same walks is
+ *        correlated with J.
  * @param[out] gradient    [n], as imp_problem_objective's.
  * @param[out] gradient_se [n], one standard error; may be NULL.
  * @return as imp_problem_objective.

@@ -1,9 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Context, errors and memory. Error texts are kept per thread through a pthread key of
- * the context, so the library has no global state. */
-#include "context.h"
+ * the context. A call whose context is not known (an object is NULL) leaves a short text
+ * that belongs to the thread. */
+#include "arguments.h"
 #include "pool.h"
+#include <stdatomic.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -11,6 +13,8 @@
 #include <unistd.h>
 
 #define ERROR_LENGTH 2048
+#define THREADS_MAX  4096
+#define BEING_SET_UP (-1L) /* no process has this number */
 
 struct imp__error_text {
     struct imp__error_text *next;
@@ -54,24 +58,32 @@ const char *imp_version(void) { return IMP_VERSION_STRING; }
 enum imp_status imp_context_create(const struct imp_context_options *options,
                                    imp_context **out)
 {
-    const struct imp_context_options none = IMP_CONTEXT_OPTIONS_INIT;
-    const struct imp_context_options *o = options ? options : &none;
-    if (!out || o->threads < 0 || o->threads > 4096) return IMP_E_ARG;
-    if (!o->allocator.allocate != !o->allocator.release) return IMP_E_ARG;
+    struct imp_context_options o = IMP_CONTEXT_OPTIONS_INIT;
+    IMP_REQUIRE(NULL, out, "out");
+    IMP_OPTIONS(NULL, o, options, "options");
+    if (o.threads < 0 || o.threads > THREADS_MAX)
+        return imp__error(NULL, IMP_E_ARG, "%s: threads %d is outside [0, %d]", __func__,
+                          o.threads, THREADS_MAX);
+    if (!o.allocator.allocate != !o.allocator.release)
+        return imp__error(NULL, IMP_E_ARG,
+                          "%s: allocator has only one of allocate and release", __func__);
 
-    struct imp_allocator a = o->allocator;
+    struct imp_allocator a = o.allocator;
     if (!a.allocate) a = (struct imp_allocator){default_allocate, default_release, NULL};
     imp_context *ctx = a.allocate(sizeof *ctx, a.payload);
-    if (!ctx) return IMP_E_NOMEM;
+    if (!ctx) return imp__error(NULL, IMP_E_NOMEM, "%s: out of memory", __func__);
     memset(ctx, 0, sizeof *ctx);
     ctx->allocator = a;
-    ctx->log = o->log;
-    ctx->log_payload = o->log_payload;
-    ctx->threads = o->threads ? o->threads : (int)sysconf(_SC_NPROCESSORS_ONLN);
+    atomic_init(&ctx->held, 1);
+    atomic_init(&ctx->process, (long)getpid());
+    ctx->log = o.log;
+    ctx->log_payload = o.log_payload;
+    ctx->threads = o.threads ? o.threads : (int)sysconf(_SC_NPROCESSORS_ONLN);
     if (ctx->threads < 1) ctx->threads = 1;
     if (pthread_key_create(&ctx->error_key, NULL) != 0) {
         a.release(ctx, a.payload);
-        return IMP_E_NOMEM;
+        return imp__error(NULL, IMP_E_NOMEM, "%s: no key for the errors of threads",
+                          __func__);
     }
     pthread_mutex_init(&ctx->lock, NULL);
     *out = ctx;
@@ -80,8 +92,16 @@ enum imp_status imp_context_create(const struct imp_context_options *options,
 
 void imp_context_destroy(imp_context *ctx)
 {
-    if (!ctx) return;
-    if (ctx->device) ctx->device_release(ctx->device);
+    if (ctx) imp__context_drop(ctx);
+}
+
+void imp__context_hold(imp_context *ctx) { atomic_fetch_add(&ctx->held, 1); }
+
+void imp__context_drop(imp_context *ctx)
+{
+    if (atomic_fetch_sub(&ctx->held, 1) > 1) return;
+    IMP_FLOAT_MODE;
+    imp__context_own(ctx);
     imp__pool_destroy(ctx, ctx->pool);
     for (struct imp__error_text *e = ctx->errors, *next; e; e = next) {
         next = e->next;
@@ -92,11 +112,31 @@ void imp_context_destroy(imp_context *ctx)
     ctx->allocator.release(ctx, ctx->allocator.payload);
 }
 
+/* A child has one thread at first; where its threads call at once, one of them sets up
+ * and the others wait for it. */
+void imp__context_own(imp_context *ctx)
+{
+    const long here = (long)getpid();
+    long was = atomic_load(&ctx->process);
+    if (was == here) return;
+    while (was == BEING_SET_UP ||
+           !atomic_compare_exchange_weak(&ctx->process, &was, BEING_SET_UP)) {
+        was = atomic_load(&ctx->process);
+        if (was == here) return;
+    }
+    pthread_mutex_init(&ctx->lock, NULL);
+    ctx->pool = NULL; /* lost: what holds the parent's threads is not touched */
+    atomic_store(&ctx->process, here);
+}
+
 int imp_context_threads(const imp_context *ctx) { return ctx ? ctx->threads : 0; }
+
+/* Of calls whose context is not known. */
+static _Thread_local char without_context[256];
 
 const char *imp_last_error(const imp_context *ctx)
 {
-    if (!ctx) return "";
+    if (!ctx) return without_context;
     const struct imp__error_text *e = pthread_getspecific(ctx->error_key);
     return e ? e->text : "";
 }
@@ -117,6 +157,7 @@ static struct imp__error_text *error_text(imp_context *ctx)
         imp__release(ctx, e);
         return NULL;
     }
+    imp__context_own(ctx);
     pthread_mutex_lock(&ctx->lock);
     e->next = ctx->errors;
     ctx->errors = e;
@@ -127,9 +168,15 @@ static struct imp__error_text *error_text(imp_context *ctx)
 enum imp_status imp__error(imp_context *ctx, enum imp_status status, const char *format,
                            ...)
 {
+    va_list args;
+    if (!ctx) {
+        va_start(args, format);
+        vsnprintf(without_context, sizeof without_context, format, args);
+        va_end(args);
+        return status;
+    }
     struct imp__error_text *e = error_text(ctx);
     if (!e) return status;
-    va_list args;
     va_start(args, format);
     char text[ERROR_LENGTH]; /* the arguments may point into the old message */
     vsnprintf(text, sizeof text, format, args);
@@ -188,7 +235,11 @@ void imp__release(imp_context *ctx, void *memory)
     if (memory) ctx->allocator.release(memory, ctx->allocator.payload);
 }
 
-void imp_free(imp_context *ctx, void *memory) { imp__release(ctx, memory); }
+void imp_free(imp_context *ctx, void *memory)
+{
+    IMP_REQUIRE_OR(NULL, ctx, "context", );
+    imp__release(ctx, memory);
+}
 
 void *imp__grow(imp_context *ctx, void *array, size_t *capacity, size_t n, size_t size)
 {

@@ -26,9 +26,19 @@ struct imp_context {
     pthread_mutex_t lock;           /* guards errors and pool creation */
     struct imp__error_text *errors; /* list of all threads' texts, freed at the end */
     struct imp_pool *pool;          /* made on first use */
-    void *device;                   /* Embree's device, owned by scene/intersect.c */
-    void (*device_release)(void *);
+    _Atomic int held;               /* by the host, and by every object made from it */
+    _Atomic long process; /* whose threads and locks these are; see imp__context_own */
 };
+
+/* After a fork, threads are gone and locks may be held by them: the child's first call
+ * leaves the pool to the parent and begins with none. Called before pool and lock are
+ * used. */
+void imp__context_own(imp_context *ctx);
+
+/* An object that keeps `ctx` holds it from its making to its end: a host may destroy the
+ * context before its objects. */
+void imp__context_hold(imp_context *ctx);
+void imp__context_drop(imp_context *ctx);
 
 /* Needs a local `enum imp_status st` and a label `out`. */
 #define IMP_TRY(call)                                                                    \
@@ -37,7 +47,7 @@ struct imp_context {
     } while (0)
 
 /* Record the message for this thread; returns `status`. Never fails: out of memory leaves
- * a fixed text. */
+ * a fixed text. ctx NULL: where no context is known; imp_last_error(NULL) has it. */
 enum imp_status imp__error(imp_context *ctx, enum imp_status status, const char *format,
                            ...) IMP_PRINTF(3, 4);
 /* Put "prefix: " before the message that is there. */

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "film.h"
+#include "arguments.h"
 #include <string.h>
 
 /* "R,G,B" -> names; blanks around names do not count, empty and repeated names are
@@ -42,6 +43,7 @@ enum imp_status imp__film_create(imp_context *ctx, int width, int height,
     imp_film *f = imp__alloc(ctx, 1, sizeof *f);
     if (!f) return imp__error(ctx, IMP_E_NOMEM, "film: out of memory");
     f->ctx = ctx;
+    imp__context_hold(ctx);
     if (width < 1 || height < 1 || width > IMP_FILM_SIDE_MAX ||
         height > IMP_FILM_SIDE_MAX)
         IMP_TRY(imp__error(ctx, IMP_E_ARG, "film: size %d x %d is not between 1 and %d",
@@ -77,8 +79,9 @@ int imp__film_find(const imp_film *f, const char *name)
 enum imp_status imp_film_create(imp_context *ctx, int width, int height,
                                 const char *names, imp_film **out)
 {
-    if (!ctx || !out) return IMP_E_ARG;
-    if (!names) return imp__error(ctx, IMP_E_ARG, "film: no channel names");
+    IMP_REQUIRE(NULL, ctx, "context");
+    IMP_REQUIRE(ctx, names, "names");
+    IMP_REQUIRE(ctx, out, "out");
     return imp__film_create(ctx, width, height, names, false, out);
 }
 
@@ -96,16 +99,25 @@ void imp_film_destroy(imp_film *f)
     imp__release(ctx, f->mean);
     imp__release(ctx, f->se);
     imp__release(ctx, f);
+    imp__context_drop(ctx);
 }
 
-void imp_film_get_info(const imp_film *f, struct imp_film_info *info)
+enum imp_status imp_film_get_info(const imp_film *f, struct imp_film_info *info)
 {
-    if (!f || !info) return;
-    const struct imp_film_info all = {sizeof all, f->width,      f->height, f->channels,
-                                      f->spp,     f->se != NULL, f->dropped};
-    const size_t size = info->size && info->size < sizeof all ? info->size : sizeof all;
-    memcpy(info, &all, size);
-    info->size = size;
+    IMP_REQUIRE(NULL, f, "film");
+    IMP_REQUIRE(f->ctx, info, "info");
+    struct imp_film_info all = {.size = sizeof all,
+                                .width = f->width,
+                                .height = f->height,
+                                .channels = f->channels,
+                                .spp = f->spp,
+                                .has_se = f->se != NULL,
+                                .dropped = f->dropped,
+                                .n_drop_keys = f->drops.n_keys};
+    memcpy(all.dropped_by_cause, f->drops.by_cause, sizeof all.dropped_by_cause);
+    memcpy(all.drop_keys, f->drops.keys, sizeof all.drop_keys);
+    IMP_GIVE(f->ctx, info, all, "info");
+    return IMP_OK;
 }
 
 const char *imp_film_channel(const imp_film *f, int channel)
@@ -118,11 +130,12 @@ float *imp_film_se(imp_film *f) { return f ? f->se : NULL; }
 
 enum imp_status imp_film_set_text(imp_film *f, const char *key, const char *value)
 {
-    if (!f) return IMP_E_ARG;
+    IMP_REQUIRE(NULL, f, "film");
     imp_context *ctx = f->ctx;
-    if (!key || !*key || !value || strlen(key) > 200)
-        return imp__error(ctx, IMP_E_ARG,
-                          "film: a text needs a key (1 to 200 bytes) and a value");
+    IMP_REQUIRE(ctx, key, "key");
+    IMP_REQUIRE(ctx, value, "value");
+    if (!*key || strlen(key) > 200)
+        return imp__error(ctx, IMP_E_ARG, "film: a text needs a key of 1 to 200 bytes");
     char *copy = imp__strdup(ctx, value);
     if (!copy) return imp__error(ctx, IMP_E_NOMEM, "film: out of memory");
     for (size_t i = 0; i < f->n_texts; i++)

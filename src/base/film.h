@@ -5,7 +5,7 @@
 #ifndef IMP_BASE_FILM_H
 #define IMP_BASE_FILM_H
 
-#include "context.h"
+#include "drops.h"
 
 #define IMP_FILM_SIDE_MAX     (1 << 20) /* pixels along one side */
 #define IMP_FILM_CHANNELS_MAX 1024
@@ -18,7 +18,8 @@ struct imp_film {
     float *mean;
     float *se; /* one standard error of each mean; NULL: there are none */
     int64_t spp;
-    uint64_t dropped; /* walks not counted: value not finite */
+    uint64_t dropped;       /* walks that count as 0, in a picture read from a file too */
+    struct imp_drops drops; /* the same by cause, of a picture made here */
     size_t n_texts, cap_texts;
     struct imp_film_text {
         char *key, *value;

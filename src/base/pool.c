@@ -4,6 +4,7 @@
  * a loop started by a second host thread waits for the first one, a loop started by a
  * worker runs inline. */
 #include "pool.h"
+#include "float_mode.h"
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
@@ -163,6 +164,7 @@ static void *worker_main(void *arg)
     struct worker *w = arg;
     struct imp_pool *pool = w->pool;
     uint64_t seen = 0;
+    fesetenv(FE_DFL_ENV); /* not that of the thread that made this one */
     pthread_setspecific(pool->inside, pool);
     pthread_mutex_lock(&pool->lock);
     while (!pool->quit) {
@@ -221,8 +223,19 @@ static struct imp_pool *pool_create(imp_context *ctx)
     return pool;
 }
 
+bool imp__pool_inside(imp_context *ctx)
+{
+    imp__context_own(ctx);
+    pthread_mutex_lock(&ctx->lock);
+    const struct imp_pool *pool = ctx->pool;
+    pthread_mutex_unlock(&ctx->lock);
+    return pool && pthread_getspecific(pool->inside) != NULL;
+}
+
 enum imp_status imp__parallel(imp_context *ctx, const struct imp_loop *loop, size_t *done)
 {
+    IMP_FLOAT_MODE;
+    imp__context_own(ctx);
     pthread_mutex_lock(&ctx->lock);
     if (!ctx->pool) ctx->pool = pool_create(ctx);
     struct imp_pool *pool = ctx->pool;

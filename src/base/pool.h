@@ -41,6 +41,9 @@ int imp__pool_slots(const imp_context *ctx);
 enum imp_status imp__parallel(imp_context *ctx, const struct imp_loop *loop,
                               size_t *done);
 
+/* Is the calling thread at work on a loop of this context? */
+bool imp__pool_inside(imp_context *ctx);
+
 void imp__pool_destroy(imp_context *ctx, struct imp_pool *pool);
 
 /* Seconds on a monotonic clock. */

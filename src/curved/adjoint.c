@@ -178,15 +178,56 @@ static size_t slice_rays(const struct imp__adjoint *job)
     return imp_max((n + slices - 1) / slices, (size_t)4 * IMP_LANES);
 }
 
+/* As traced: what is not dropped is finite. */
+static enum imp_status exits_check(imp_context *ctx, const struct imp_bend_exit *exits,
+                                   size_t n)
+{
+    for (size_t i = 0; i < n; i++) {
+        const struct imp_bend_exit *e = &exits[i];
+        double sum = fabs(e->path) + fabs(e->tau) + fabs(e->norm2);
+        for (int k = 0; k < 3; k++) sum += fabs(e->x[k]) + fabs(e->v[k]);
+        if (!(e->flags & IMP_BEND_DROPPED) && !isfinite(sum))
+            return imp__error(ctx, IMP_E_ARG,
+                              "imp_bend_adjoint: exits[%zu] is not finite", i);
+    }
+    return IMP_OK;
+}
+
+static enum imp_status bars_check(imp_context *ctx, const char *name,
+                                  const struct imp_bend_cotangent *bars, size_t n)
+{
+    for (size_t i = 0; i < n; i++) {
+        double sum = bars[i].path;
+        for (int k = 0; k < 3; k++) sum += fabs(bars[i].x[k]) + fabs(bars[i].v[k]);
+        if (!isfinite(sum))
+            return imp__error(ctx, IMP_E_ARG, "imp_bend_adjoint: %s[%zu] is not finite",
+                              name, i);
+    }
+    return IMP_OK;
+}
+
 enum imp_status
 imp_bend_adjoint(const imp_field *field, const struct imp_bend_options *options,
                  const struct imp_bend_rays *rays, const struct imp_bend_exit *exits,
                  const struct imp_bend_exit *taps, const struct imp_bend_cotangent *bars,
-                 const struct imp_bend_cotangent *tap_bars, struct imp_bend_gradient *out,
-                 struct imp_bend_stats *stats)
+                 const struct imp_bend_cotangent *tap_bars,
+                 struct imp_bend_gradient *gradient, struct imp_bend_stats *stats)
 {
+    IMP_REQUIRE(NULL, field, "field");
+    IMP_REQUIRE(field->ctx, rays, "rays");
+    IMP_REQUIRE(field->ctx, exits, "exits");
+    IMP_REQUIRE(field->ctx, bars, "bars");
+    IMP_REQUIRE(field->ctx, gradient, "out");
+    if (stats) IMP_SIZED(field->ctx, stats, "stats");
+    struct imp_bend_gradient arrays = IMP_BEND_GRADIENT_INIT, *const out = &arrays;
+    IMP_OPTIONS(field->ctx, arrays, gradient, "out");
+    struct imp_bend_options own;
+    IMP_CHECKED(imp__bend_options_take(field->ctx, __func__, "options", options, &own));
+    IMP_CHECKED(exits_check(field->ctx, exits, rays->n));
+    IMP_CHECKED(bars_check(field->ctx, "bars", bars, rays->n));
+    IMP_FLOAT_MODE;
     struct imp__plan plan;
-    enum imp_status st = imp__plan_create(field, options, rays, &plan);
+    enum imp_status st = imp__plan_create(field, &own, rays, &plan);
     if (st != IMP_OK) return st;
     imp_context *ctx = plan.ctx;
     const int n_slots = imp__pool_slots(ctx);
@@ -198,7 +239,7 @@ imp_bend_adjoint(const imp_field *field, const struct imp_bend_options *options,
                                .bars = bars,
                                .tap_bars = plan.n_taps > 0 ? tap_bars : NULL,
                                .out = &sum,
-                               .n_surfaces = options ? options->n_surfaces : 0};
+                               .n_surfaces = own.n_surfaces};
     double(*surfaces)[8] = NULL;
     imp__partials_init(&job.partials, ctx, field->n_theta);
     job.slice = slice_rays(&job);
@@ -210,6 +251,8 @@ imp_bend_adjoint(const imp_field *field, const struct imp_bend_options *options,
             "stored trajectories, or ask for the pseudo-reverse by name"));
     if (plan.options.way == IMP_BEND_PSEUDO && !plan.scheme->index_form)
         IMP_TRY(imp__error(ctx, IMP_E_ARG, "pseudo-reverse belongs to scheme arc-index"));
+    if (job.tap_bars)
+        IMP_TRY(bars_check(ctx, "tap_bars", tap_bars, rays->n * (size_t)plan.n_taps));
     if (job.tap_bars && !taps)
         IMP_TRY(imp__error(ctx, IMP_E_ARG, "cotangents of taps without the taps"));
     job.slots = imp__alloc(ctx, (size_t)n_slots, sizeof *job.slots);
@@ -236,9 +279,9 @@ imp_bend_adjoint(const imp_field *field, const struct imp_bend_options *options,
     if (out->theta) IMP_TRY(imp__partials_sum(&job.partials, out->theta));
     if (sum.surfaces) memcpy(out->surfaces, surfaces, job.n_surfaces * sizeof *surfaces);
     if (stats) {
-        *stats = counts;
-        stats->reversal = job.reversal;
-        stats->worst_reversal = job.worst;
+        counts.reversal = job.reversal;
+        counts.worst_reversal = job.worst;
+        IMP_TRY(imp__info_give(ctx, __func__, "stats", stats, &counts, sizeof counts));
     }
 out:
     for (int i = 0; job.slots && i < n_slots; i++) {

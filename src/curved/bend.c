@@ -9,12 +9,20 @@
 
 enum imp_status imp_bend_create(imp_context *ctx, imp_field *field, imp_bend **out)
 {
+    if (!ctx || !field || !out) {
+        imp_field_destroy(field);
+        return imp__argument_missing(ctx, __func__,
+                                     !ctx     ? "context"
+                                     : !field ? "field"
+                                              : "out");
+    }
     imp_bend *b = imp__alloc(ctx, 1, sizeof *b);
     if (!b) {
         imp_field_destroy(field);
         return imp__error(ctx, IMP_E_NOMEM, "no memory for a problem of bent rays");
     }
     b->ctx = ctx;
+    imp__context_hold(ctx);
     b->field = field;
     b->options = (struct imp_bend_options)IMP_BEND_OPTIONS_INIT;
     b->lo = 1, b->hi = INFINITY;
@@ -42,41 +50,58 @@ void imp_bend_destroy(imp_bend *b)
     for (size_t i = 0; i < imp_count(owned); i++) imp__release(ctx, owned[i]);
     imp_field_destroy(b->field);
     imp__release(ctx, b);
+    imp__context_drop(ctx);
 }
 
-imp_field *imp_bend_field(imp_bend *b) { return b->field; }
-size_t imp_bend_n_rays(const imp_bend *b) { return b->n; }
-int imp_bend_n_bundles(const imp_bend *b) { return b->n_bundles; }
-size_t imp_bend_n_targets(const imp_bend *b) { return b->n_targets; }
+imp_field *imp_bend_field(imp_bend *b) { return b ? b->field : NULL; }
+size_t imp_bend_n_rays(const imp_bend *b) { return b ? b->n : 0; }
+int imp_bend_n_bundles(const imp_bend *b) { return b ? b->n_bundles : 0; }
+size_t imp_bend_n_targets(const imp_bend *b) { return b ? b->n_targets : 0; }
 void imp_bend_get_rays(const imp_bend *b, struct imp_bend_rays *r)
 {
+    IMP_REQUIRE_OR(NULL, b, "bend", );
+    IMP_REQUIRE_OR(b->ctx, r, "rays", );
     *r = imp__bend_rays(b);
 }
 
 enum imp_status imp_bend_get_target(const imp_bend *b, size_t i,
                                     struct imp_bend_target *t)
 {
+    IMP_REQUIRE(NULL, b, "bend");
+    IMP_REQUIRE(b->ctx, t, "target");
     if (i >= b->n_targets) return imp__error(b->ctx, IMP_E_ARG, "no target %zu", i);
-    *t = b->targets[i].desc;
+    IMP_GIVE(b->ctx, t, b->targets[i].desc, "target");
     return IMP_OK;
 }
 
-enum imp_status imp_bend_set_options(imp_bend *b, const struct imp_bend_options *o)
+enum imp_status imp_bend_set_options(imp_bend *b, const struct imp_bend_options *options)
 {
+    struct imp_bend_options own = IMP_BEND_OPTIONS_INIT, *const o = &own;
+    enum imp_status st = IMP_OK;
+    IMP_REQUIRE(NULL, b, "bend");
     imp_context *ctx = b->ctx;
+    IMP_REQUIRE(ctx, options, "o");
+    IMP_CHECKED(imp__bend_options_take(ctx, __func__, "o", options, o));
     struct imp_bend_surface *s = imp__alloc(ctx, o->n_surfaces + 1, sizeof *s);
     struct imp_bend_tap *t = imp__alloc(ctx, o->n_taps + 1, sizeof *t);
     if (!s || !t) {
         imp__release(ctx, s), imp__release(ctx, t);
         return imp__error(ctx, IMP_E_NOMEM, "no memory for surfaces");
     }
-    if (o->n_surfaces) memcpy(s, o->surfaces, o->n_surfaces * sizeof *s);
+    for (size_t i = 0; i < o->n_surfaces; i++) {
+        s[i] = (struct imp_bend_surface)IMP_BEND_SURFACE_INIT;
+        IMP_TRY(imp__element_take(ctx, __func__, "surfaces", o->surfaces, i, &s[i],
+                                  sizeof *s));
+    }
     if (o->n_taps) memcpy(t, o->taps, o->n_taps * sizeof *t);
     imp__release(ctx, b->surfaces), imp__release(ctx, b->taps);
     b->surfaces = s, b->taps = t;
     b->options = *o;
     b->options.surfaces = s, b->options.taps = t;
     return IMP_OK;
+out:
+    imp__release(ctx, s), imp__release(ctx, t);
+    return st;
 }
 
 void imp_bend_set_progress(imp_bend *b, imp_progress_fn progress, void *payload)
@@ -85,10 +110,16 @@ void imp_bend_set_progress(imp_bend *b, imp_progress_fn progress, void *payload)
     b->options.progress_payload = payload;
 }
 
-void imp_bend_set_step(imp_bend *b, double cells, double most)
+enum imp_status imp_bend_set_step(imp_bend *b, double cells, double most)
 {
+    IMP_REQUIRE(NULL, b, "bend");
+    if (!(cells >= 0) || !(most >= 0) || !isfinite(cells) || !isfinite(most))
+        return imp__error(b->ctx, IMP_E_ARG,
+                          "%s: cells %g and most %g must be numbers >= 0", __func__,
+                          cells, most);
     b->step_cells = cells;
     b->step_max = most;
+    return IMP_OK;
 }
 
 void imp__bend_options(const imp_bend *b, struct imp_bend_options *o)
@@ -102,6 +133,16 @@ void imp__bend_options(const imp_bend *b, struct imp_bend_options *o)
 }
 
 enum imp_status imp_bend_get_options(const imp_bend *b, struct imp_bend_options *o)
+{
+    struct imp_bend_options all;
+    IMP_REQUIRE(NULL, b, "bend");
+    IMP_REQUIRE(b->ctx, o, "o");
+    IMP_CHECKED(imp__bend_options_ready(b, &all));
+    IMP_GIVE(b->ctx, o, all, "o");
+    return IMP_OK;
+}
+
+enum imp_status imp__bend_options_ready(const imp_bend *b, struct imp_bend_options *o)
 {
     imp__bend_options(b, o);
     return o->step > 0 ? IMP_OK
@@ -122,8 +163,11 @@ static bool room(imp_context *ctx, void *array, size_t *capacity, size_t n, size
 enum imp_status imp_bend_add_rays(imp_bend *b, size_t n, const double (*x)[3],
                                   const double (*d)[3], const double *power, int *bundle)
 {
+    IMP_REQUIRE(NULL, b, "bend");
+    IMP_REQUIRE(b->ctx, x, "x");
+    IMP_REQUIRE(b->ctx, d, "d");
     const size_t total = b->n + n;
-    if (n == 0 || total > RAYS_MAX)
+    if (n == 0 || n > RAYS_MAX || total > RAYS_MAX)
         return imp__error(b->ctx, IMP_E_ARG, "a bundle of %zu rays", n);
     if (b->n_bundles >= 60000)
         return imp__error(b->ctx, IMP_E_ARG, "more than 60000 bundles of rays");
@@ -131,7 +175,8 @@ enum imp_status imp_bend_add_rays(imp_bend *b, size_t n, const double (*x)[3],
         for (int k = 0; k < 3; k++)
             if (!isfinite(x[i][k]) || !isfinite(d[i][k]))
                 return imp__error(b->ctx, IMP_E_ARG,
-                                  "ray %zu of the bundle is not finite", i);
+                                  "ray %zu of the bundle is not finite: %s[%zu][%d]", i,
+                                  isfinite(x[i][k]) ? "d" : "x", i, k);
     for (size_t i = 0; power && i < n; i++)
         if (!(power[i] >= 0) || !isfinite(power[i]))
             return imp__error(b->ctx, IMP_E_ARG, "ray %zu of the bundle has power %g", i,
@@ -170,6 +215,13 @@ static enum imp_status target_check(const imp_bend *b, const struct imp_bend_tar
                           b->options.n_taps);
     if (!(t->weight >= 0) || !isfinite(t->weight))
         return imp__error(b->ctx, IMP_E_ARG, "target of weight %g", t->weight);
+    IMP_FINITE_ALL(b->ctx, t->normal, 3, "t->normal");
+    IMP_FINITE(b->ctx, t->offset, "t->offset");
+    IMP_FINITE(b->ctx, t->outside, "t->outside");
+    IMP_FINITE_ALL(b->ctx, t->point, 3, "t->point");
+    IMP_FINITE_ALL(b->ctx, t->origin, 3, "t->origin");
+    IMP_FINITE_ALL(b->ctx, t->u, 3, "t->u");
+    IMP_FINITE_ALL(b->ctx, t->v, 3, "t->v");
     const imp_v3 n = imp__v3_load(t->normal);
     if (t->at_plane && (!(imp__length(n) > 0) || !imp__is_finite(n) ||
                         !isfinite(t->offset) || !(t->outside > 0)))
@@ -210,12 +262,16 @@ size_t imp__target_numbers(enum imp_bend_target_type type)
     return 0;
 }
 
-enum imp_status imp_bend_add_target(imp_bend *b, const struct imp_bend_target *desc)
+enum imp_status imp_bend_add_target(imp_bend *b, const struct imp_bend_target *target)
 {
-    enum imp_status st = target_check(b, desc);
+    enum imp_status st = IMP_OK;
+    IMP_REQUIRE(NULL, b, "bend");
     imp_context *ctx = b->ctx;
-    if (st != IMP_OK) return st;
-    struct imp__target_of_rays t = {.desc = *desc};
+    IMP_REQUIRE(ctx, target, "t");
+    struct imp__target_of_rays t = {.desc = IMP_BEND_TARGET_INIT};
+    const struct imp_bend_target *desc = &t.desc;
+    IMP_OPTIONS(ctx, t.desc, target, "t");
+    IMP_CHECKED(target_check(b, desc));
     t.first = desc->bundle < 0 ? 0 : b->bundle_first[desc->bundle];
     t.last = desc->bundle < 0 ? b->n : b->bundle_first[desc->bundle + 1];
     const size_t n = (t.last - t.first) * imp__target_numbers(desc->type);
@@ -274,7 +330,9 @@ out:
 enum imp_status imp_bend_add_smoothness(imp_bend *b, double weight, int order,
                                         double edge)
 {
-    if (!(weight >= 0) || !isfinite(weight) || order < 1 || order > 2 || !(edge >= 0))
+    IMP_REQUIRE(NULL, b, "bend");
+    if (!(weight >= 0) || !isfinite(weight) || order < 1 || order > 2 || !(edge >= 0) ||
+        !isfinite(edge))
         return imp__error(b->ctx, IMP_E_ARG, "smoothness of weight %g, order %d, edge %g",
                           weight, order, edge);
     if (!room(b->ctx, &b->smooths, &b->cap_smooths, b->n_smooths + 1, sizeof *b->smooths))
@@ -285,7 +343,8 @@ enum imp_status imp_bend_add_smoothness(imp_bend *b, double weight, int order,
 
 enum imp_status imp_bend_set_bounds(imp_bend *b, double lo, double hi)
 {
-    if (!(lo < hi)) return imp__error(b->ctx, IMP_E_ARG, "bounds %g to %g", lo, hi);
+    IMP_REQUIRE(NULL, b, "bend");
+    if (!(lo < hi)) return imp__error(b->ctx, IMP_E_ARG, "bounds lo %g to hi %g", lo, hi);
     b->lo = lo, b->hi = hi;
     b->bounds_set = true;
     return IMP_OK;

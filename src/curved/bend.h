@@ -75,6 +75,8 @@ struct imp_bend {
 enum imp_status imp__bend_traced(const imp_bend *b, const struct imp_bend_stats *s);
 /* The options, with the step chosen from the grid where none is given. */
 void imp__bend_options(const imp_bend *b, struct imp_bend_options *o);
+/* The same; IMP_E_ARG if no step can be chosen. */
+enum imp_status imp__bend_options_ready(const imp_bend *b, struct imp_bend_options *o);
 static inline struct imp_bend_rays imp__bend_rays(const imp_bend *b)
 {
     return (struct imp_bend_rays){b->n, (const double(*)[3])b->x,

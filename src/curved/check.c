@@ -28,6 +28,8 @@ enum imp_status imp_bend_step_error(imp_bend *b, size_t pilots, double *error,
 {
     enum imp_status st = IMP_OK;
     struct imp_bend_options o;
+    IMP_REQUIRE(NULL, b, "bend");
+    IMP_FLOAT_MODE;
     const size_t stride = imp_max(b->n / imp_max(pilots, (size_t)1), (size_t)1);
     const size_t n = b->n ? (b->n + stride - 1) / stride : 0;
     double(*x)[3] = imp__alloc(b->ctx, n + 1, sizeof *x),
@@ -37,7 +39,7 @@ enum imp_status imp_bend_step_error(imp_bend *b, size_t pilots, double *error,
     double sum[2] = {0}, used = 0;
     if (!x || !d || !group || !e)
         IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "no memory for pilot rays"));
-    IMP_TRY(imp_bend_get_options(b, &o));
+    IMP_TRY(imp__bend_options_ready(b, &o));
     o.n_taps = 0;
     for (size_t i = 0; i < n; i++) {
         memcpy(x[i], b->x[i * stride], sizeof *x);
@@ -115,7 +117,7 @@ static enum imp_status check_dot(imp_bend *b, const double *dot, double *bar,
     double left = 0, right = 0, scale = 1e-300;
     if (!e || !te || !c)
         IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "no memory for a check"));
-    IMP_TRY(imp_bend_get_options(b, &o));
+    IMP_TRY(imp__bend_options_ready(b, &o));
     IMP_TRY(imp__bundles_trace(b, b->field, &o, &r, e, te, traced));
     IMP_TRY(imp__bend_traced(b, traced));
     for (size_t i = 0; i < b->n; i++) {
@@ -278,6 +280,10 @@ enum imp_status imp_bend_check(imp_bend *b, const struct imp_check_row **rows,
                                size_t *n_rows)
 {
     enum imp_status st = IMP_OK;
+    IMP_REQUIRE(NULL, b, "bend");
+    IMP_REQUIRE(b->ctx, rows, "rows");
+    IMP_REQUIRE(b->ctx, n_rows, "n_rows");
+    IMP_FLOAT_MODE;
     const size_t n = b->field->n_theta;
     double *dot = imp__alloc(b->ctx, 2 * n + 1, sizeof *dot), *bar = dot ? dot + n : NULL;
     struct imp_bend_stats traced = IMP_BEND_STATS_INIT;

@@ -156,6 +156,11 @@ struct imp__plan {
     int tap_group[IMP_BEND_TAPS_MAX];
     int n_taps;
 };
+/* A caller's options, checked: sizes, numbers, and that arrays are there. */
+enum imp_status imp__bend_options_take(imp_context *ctx, const char *function,
+                                       const char *name,
+                                       const struct imp_bend_options *in,
+                                       struct imp_bend_options *own);
 enum imp_status imp__plan_create(const imp_field *field,
                                  const struct imp_bend_options *options,
                                  const struct imp_bend_rays *rays, struct imp__plan *out);

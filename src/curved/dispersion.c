@@ -8,8 +8,11 @@
  * times those of the field. */
 #include "bend.h"
 
-double imp_dispersion_index(const struct imp_dispersion *d, double um)
+double imp_dispersion_index(const struct imp_dispersion *dispersion, double um)
 {
+    struct imp_dispersion own = IMP_DISPERSION_INIT, *const d = &own;
+    if (!dispersion || imp__options_take(NULL, __func__, "d", dispersion, d, sizeof own))
+        return NAN;
     const double l2 = um * um, *c = d->coefficient;
     double n2 = 1;
     if (d->model == IMP_CAUCHY) return c[0] + c[1] / l2 + c[2] / (l2 * l2);
@@ -92,14 +95,22 @@ enum imp_status imp_field_scaled_create(imp_context *ctx, imp_field *of, double 
                                         imp_field **out)
 {
     struct imp__scaled *s = NULL;
+    if (!ctx || !of || !out) {
+        imp_field_destroy(of);
+        return imp__argument_missing(ctx, __func__,
+                                     !ctx  ? "context"
+                                     : !of ? "field"
+                                           : "out");
+    }
     if (k > 0 && isfinite(k)) s = imp__alloc(ctx, 1, sizeof *s);
     if (!s) {
         imp_field_destroy(of);
         return k > 0 && isfinite(k)
                    ? imp__error(ctx, IMP_E_NOMEM, "no memory for an index field")
-                   : imp__error(ctx, IMP_E_ARG, "a field scaled by %g", k);
+                   : imp__error(ctx, IMP_E_ARG, "a field scaled by k = %g", k);
     }
     imp__scaled_init(s, of, k);
+    imp__context_hold(ctx);
     s->base.borrowed = of->borrowed;
     *out = &s->base;
     return IMP_OK;
@@ -108,8 +119,17 @@ enum imp_status imp_field_scaled_create(imp_context *ctx, imp_field *of, double 
 /* ---- Bundles with wavelengths -------------------------------------------------- */
 
 enum imp_status imp_bend_set_wavelength(imp_bend *b, int bundle,
-                                        const struct imp_dispersion *d, double um)
+                                        const struct imp_dispersion *dispersion,
+                                        double um)
 {
+    struct imp_dispersion own = IMP_DISPERSION_INIT, *const d = &own;
+    IMP_REQUIRE(NULL, b, "bend");
+    IMP_REQUIRE(b->ctx, dispersion, "d");
+    IMP_OPTIONS(b->ctx, own, dispersion, "d");
+    IMP_FINITE_ALL(b->ctx, own.coefficient, 6, "d->coefficient");
+    IMP_FINITE(b->ctx, own.reference, "d->reference");
+    IMP_FINITE(b->ctx, um, "um");
+    IMP_FLOAT_MODE;
     if (bundle < 0 || bundle >= b->n_bundles)
         return imp__error(b->ctx, IMP_E_ARG, "bundle %d: there are %d", bundle,
                           b->n_bundles);
@@ -254,9 +274,12 @@ enum imp_status imp_bend_ray(imp_bend *b, size_t ray, double (**points)[4], size
 {
     struct imp_bend_options o;
     struct imp__scaled at;
+    IMP_REQUIRE(NULL, b, "bend");
+    IMP_REQUIRE(b->ctx, points, "points");
+    IMP_REQUIRE(b->ctx, n, "n_points");
     const struct imp_bend_rays rays = imp__bend_rays(b);
     if (ray >= b->n) return imp__error(b->ctx, IMP_E_ARG, "no ray %zu", ray);
-    const enum imp_status st = imp_bend_get_options(b, &o);
+    const enum imp_status st = imp__bend_options_ready(b, &o);
     if (st != IMP_OK) return st;
     o.n_taps = 0;
     imp__scaled_init(&at, b->field, imp__bend_factor(b, &rays, ray));

@@ -21,6 +21,7 @@ enum imp_status imp__field_new(imp_context *ctx, const struct imp__field_ops *op
         return imp__error(ctx, IMP_E_NOMEM, "no memory for %zu numbers of an index field",
                           n_theta);
     }
+    imp__context_hold(ctx);
     *out = f;
     return IMP_OK;
 }
@@ -29,25 +30,31 @@ void imp_field_destroy(imp_field *f)
 {
     if (!f) return;
     if (f->ops->destroy) f->ops->destroy(f);
-    if (!f->borrowed) imp__release(f->ctx, f->theta);
-    imp__release(f->ctx, f);
+    imp_context *ctx = f->ctx;
+    if (!f->borrowed) imp__release(ctx, f->theta);
+    imp__release(ctx, f);
+    imp__context_drop(ctx);
 }
 
-const char *imp_field_kind(const imp_field *f) { return f->ops->name; }
-size_t imp_field_n_theta(const imp_field *f) { return f->n_theta; }
+const char *imp_field_kind(const imp_field *f) { return f ? f->ops->name : ""; }
+size_t imp_field_n_theta(const imp_field *f) { return f ? f->n_theta : 0; }
 
 void imp_field_get_theta(const imp_field *f, double *theta)
 {
+    IMP_REQUIRE_OR(NULL, f, "field", );
+    IMP_REQUIRE_OR(f->ctx, theta, "theta", );
     memcpy(theta, f->theta, f->n_theta * sizeof *theta);
 }
 
 enum imp_status imp_field_set_theta(imp_field *f, const double *theta)
 {
+    IMP_REQUIRE(NULL, f, "field");
+    IMP_REQUIRE(f->ctx, theta, "theta");
+    IMP_FLOAT_MODE;
     for (size_t i = 0; i < f->n_theta; i++)
         if (!isfinite(theta[i]))
-            return imp__error(f->ctx, IMP_E_ARG,
-                              "number %zu of the %s field is not finite", i,
-                              f->ops->name);
+            return imp__error(f->ctx, IMP_E_ARG, "theta[%zu] of the %s field is %g", i,
+                              f->ops->name, theta[i]);
     memcpy(f->theta, theta, f->n_theta * sizeof *theta);
     if (f->ops->changed) f->ops->changed(f);
     return IMP_OK;
@@ -55,11 +62,14 @@ enum imp_status imp_field_set_theta(imp_field *f, const double *theta)
 
 const char *imp_field_param_name(const imp_field *f, size_t i)
 {
-    return f->ops->param_name && i < f->n_theta ? f->ops->param_name(f, i) : NULL;
+    return f && f->ops->param_name && i < f->n_theta ? f->ops->param_name(f, i) : NULL;
 }
 
 void imp_field_bounds(const imp_field *f, double lo[3], double hi[3])
 {
+    IMP_REQUIRE_OR(NULL, f, "field", );
+    IMP_REQUIRE_OR(f->ctx, lo, "lo", );
+    IMP_REQUIRE_OR(f->ctx, hi, "hi", );
     imp__v3_store(f->lo, lo);
     imp__v3_store(f->hi, hi);
 }
@@ -67,6 +77,10 @@ void imp_field_bounds(const imp_field *f, double lo[3], double hi[3])
 void imp_field_eval(const imp_field *f, const double x[3], double *eta, double *gradient,
                     double *hessian)
 {
+    IMP_REQUIRE_OR(NULL, f, "field", );
+    IMP_REQUIRE_OR(f->ctx, x, "x", );
+    IMP_REQUIRE_OR(f->ctx, eta, "eta", );
+    IMP_FLOAT_MODE;
     const imp_v3 at = imp__v3_load(x);
     struct imp__jet j;
     imp__field_eval1(f, &at, hessian ? 2 : 1, &j);
@@ -81,6 +95,11 @@ void imp_field_eval(const imp_field *f, const double x[3], double *eta, double *
 void imp_field_splat(const imp_field *f, const double x[3], double a, const double b[3],
                      double *theta_bar)
 {
+    IMP_REQUIRE_OR(NULL, f, "field", );
+    IMP_REQUIRE_OR(f->ctx, x, "x", );
+    IMP_REQUIRE_OR(f->ctx, b, "b", );
+    IMP_REQUIRE_OR(f->ctx, theta_bar, "theta_bar", );
+    IMP_FLOAT_MODE;
     const imp_v3 at = imp__v3_load(x), gb = imp__v3_load(b);
     struct imp__bar bar = {.theta = theta_bar};
     f->ops->splat(f, &at, a, &gb, &bar);
@@ -89,6 +108,12 @@ void imp_field_splat(const imp_field *f, const double x[3], double a, const doub
 void imp_field_tangent(const imp_field *f, const double x[3], const double *theta_dot,
                        double *eta_dot, double gradient_dot[3])
 {
+    IMP_REQUIRE_OR(NULL, f, "field", );
+    IMP_REQUIRE_OR(f->ctx, x, "x", );
+    IMP_REQUIRE_OR(f->ctx, theta_dot, "theta_dot", );
+    IMP_REQUIRE_OR(f->ctx, eta_dot, "eta_dot", );
+    IMP_REQUIRE_OR(f->ctx, gradient_dot, "gradient_dot", );
+    IMP_FLOAT_MODE;
     const imp_v3 at = imp__v3_load(x);
     imp_v3 g;
     f->ops->tangent(f, &at, theta_dot, eta_dot, &g);

@@ -5,6 +5,7 @@
 #ifndef IMP_CURVED_FIELD_H
 #define IMP_CURVED_FIELD_H
 
+#include "base/arguments.h"
 #include "base/pool.h"
 #include "math/vec.h"
 #include <importon/bend.h>

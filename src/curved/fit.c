@@ -329,10 +329,22 @@ out:
 enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *options,
                              struct imp_bend_fit_result *result)
 {
-    static const struct imp_bend_fit_options defaults = IMP_BEND_FIT_OPTIONS_INIT;
-    const struct imp_bend_fit_options *o = options ? options : &defaults;
-    struct fit f = {
-        .b = b, .o = o, .levels = imp_max(o->levels, 1), .start_s = imp__now()};
+    struct imp_bend_fit_options own = IMP_BEND_FIT_OPTIONS_INIT, *const o = &own;
+    IMP_REQUIRE(NULL, b, "bend");
+    IMP_OPTIONS(b->ctx, own, options, "options");
+    if (result) IMP_SIZED(b->ctx, result, "result");
+    IMP_FLOAT_MODE;
+    if (!(o->learning_rate >= 0) || !(o->tolerance >= 0) || !(o->scale >= 0) ||
+        !isfinite(o->learning_rate + o->tolerance + o->scale))
+        return imp__error(
+            b->ctx, IMP_E_ARG,
+            "learning_rate %g, tolerance %g and scale %g must be numbers >= 0",
+            o->learning_rate, o->tolerance, o->scale);
+    struct fit f = {.b = b,
+                    .o = o,
+                    .levels = imp_max(o->levels, 1),
+                    .start_s = imp__now(),
+                    .stats = IMP_BEND_STATS_INIT};
     enum imp_status st = IMP_OK;
     const char *reason = "nothing was done";
     int iterations = 0, first = 0;
@@ -389,15 +401,17 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
     f.done_iterations = f.opt.max_iterations;
     report(&f, true);
     if (result) {
-        *result = (struct imp_bend_fit_result){.size = sizeof *result,
-                                               .iterations = iterations,
-                                               .levels = f.level + 1,
-                                               .start = start,
-                                               .value = value,
-                                               .n_history = b->n_history,
-                                               .history = b->history,
-                                               .reason = reason,
-                                               .stats = f.stats};
+        const struct imp_bend_fit_result all = {
+            .size = sizeof all,
+            .iterations = iterations,
+            .levels = f.level + 1,
+            .start = start,
+            .value = value,
+            .n_history = b->n_history,
+            .history = b->history,
+            .reason = reason,
+            .stats = f.stats};
+        IMP_TRY(imp__info_give(b->ctx, __func__, "result", result, &all, sizeof all));
     }
     st = ended;
 out:

@@ -63,13 +63,20 @@ void imp__grid_destroy(imp_field *f)
     imp__release(f->ctx, ((struct imp__grid *)f)->single);
 }
 
-enum imp_status imp_field_grid_create(imp_context *ctx, const struct imp_field_grid *desc,
+enum imp_status imp_field_grid_create(imp_context *ctx, const struct imp_field_grid *grid,
                                       double index, imp_field **out)
 {
+    struct imp_field_grid own = IMP_FIELD_GRID_INIT, *const desc = &own;
+    IMP_REQUIRE(NULL, ctx, "context");
+    IMP_REQUIRE(ctx, grid, "grid");
+    IMP_REQUIRE(ctx, out, "out");
+    IMP_OPTIONS(ctx, own, grid, "grid");
+    IMP_FLOAT_MODE;
     const bool spline = desc->interp == IMP_FIELD_SPLINE;
     int nodes[3];
     size_t n = 1;
-    if (desc->interp > IMP_FIELD_TRILINEAR || desc->param > IMP_FIELD_ETA2)
+    if ((unsigned)desc->interp > IMP_FIELD_TRILINEAR ||
+        (unsigned)desc->param > IMP_FIELD_ETA2)
         return imp__error(ctx, IMP_E_ARG, "index grid: no such interpolation");
     if (!(index > 0) || !isfinite(index))
         return imp__error(ctx, IMP_E_ARG, "index grid: index %g is not positive", index);
@@ -126,10 +133,12 @@ out:
 enum imp_status imp_field_get_grid(const imp_field *f, struct imp_field_grid *grid)
 {
     const uint32_t *number;
+    IMP_REQUIRE(NULL, f, "field");
+    IMP_REQUIRE(f->ctx, grid, "grid");
     const struct imp__grid *g = imp__field_nodes(f, &number);
     if (!g)
         return imp__error(f->ctx, IMP_E_ARG, "a %s field is not a grid", f->ops->name);
-    *grid = g->desc;
+    IMP_GIVE(f->ctx, grid, g->desc, "grid");
     return IMP_OK;
 }
 
@@ -279,6 +288,9 @@ enum imp_status imp_field_set_samples(imp_field *f, const double *samples)
 {
     enum imp_status st;
     double *values = NULL, *theta = NULL;
+    IMP_REQUIRE(NULL, f, "field");
+    IMP_REQUIRE(f->ctx, samples, "samples");
+    IMP_FLOAT_MODE;
     const struct imp__grid *g = grid_of(f, &st);
     if (st != IMP_OK) return st;
     const int *cells = g->desc.cells,
@@ -293,9 +305,10 @@ enum imp_status imp_field_set_samples(imp_field *f, const double *samples)
         const double K = g->desc.gladstone_dale,
                      eta = K > 0 ? 1 + K * samples[i] : samples[i];
         if (!isfinite(eta) || !(eta > 0))
-            IMP_TRY(imp__error(f->ctx, IMP_E_ARG,
-                               "sample %zu of the index grid is %g: an index is positive",
-                               i, samples[i]));
+            IMP_TRY(
+                imp__error(f->ctx, IMP_E_ARG,
+                           "samples[%zu] of the index grid is %g: an index is positive",
+                           i, samples[i]));
         values[i] = g->desc.param == IMP_FIELD_ETA2 ? eta * eta / 2 : eta;
     }
     if (g->desc.interp == IMP_FIELD_SPLINE)
@@ -312,8 +325,13 @@ enum imp_status imp_field_samples_vjp(const imp_field *f, const double *theta_ba
                                       double *samples_bar)
 {
     enum imp_status st;
+    IMP_REQUIRE(NULL, f, "field");
+    IMP_REQUIRE(f->ctx, theta_bar, "theta_bar");
+    IMP_REQUIRE(f->ctx, samples_bar, "samples_bar");
+    IMP_FLOAT_MODE;
     const struct imp__grid *g = grid_of(f, &st);
     if (st != IMP_OK) return st;
+    IMP_FINITE_ALL(f->ctx, theta_bar, f->n_theta, "theta_bar");
     if (g->desc.param != IMP_FIELD_ETA)
         return imp__error(f->ctx, IMP_E_UNSUPPORTED,
                           "samples of eta^2 have no transpose here");
@@ -345,6 +363,9 @@ enum imp_status imp_field_refine(const imp_field *f, imp_field **out)
 {
     enum imp_status st;
     imp_field *fine = NULL;
+    IMP_REQUIRE(NULL, f, "field");
+    IMP_REQUIRE(f->ctx, out, "out");
+    IMP_FLOAT_MODE;
     if (f->ops == &imp__field_tie) return imp__tie_refine(f, out);
     const struct imp__grid *g = grid_of(f, &st);
     if (st != IMP_OK) return st;
@@ -364,11 +385,17 @@ enum imp_status imp_field_refine_vjp(const imp_field *f, const double *fine_bar,
                                      double *coarse_bar)
 {
     enum imp_status st;
+    IMP_REQUIRE(NULL, f, "field");
+    IMP_REQUIRE(f->ctx, fine_bar, "fine_bar");
+    IMP_REQUIRE(f->ctx, coarse_bar, "coarse_bar");
+    IMP_FLOAT_MODE;
     const struct imp__grid *g = grid_of(f, &st);
     if (st != IMP_OK) return st;
     const bool spline = g->desc.interp == IMP_FIELD_SPLINE;
     int fine[3];
     for (int k = 0; k < 3; k++) fine[k] = 2 * g->desc.cells[k] + (spline ? 3 : 1);
+    IMP_FINITE_ALL(f->ctx, fine_bar, (size_t)fine[0] * (size_t)fine[1] * (size_t)fine[2],
+                   "fine_bar");
     return along_axes(f->ctx, spline ? line_refine_spline_vjp : line_refine_linear_vjp,
                       fine, g->nodes, fine_bar, coarse_bar);
 }

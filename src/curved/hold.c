@@ -26,6 +26,7 @@ out:
 
 enum imp_status imp_bend_hold_rim(imp_bend *b, int layers, double value)
 {
+    IMP_REQUIRE(NULL, b, "bend");
     if (layers < 1 || layers > 1000)
         return imp__error(b->ctx, IMP_E_ARG, "a rim of %d layers", layers);
     return hold_add(
@@ -34,6 +35,10 @@ enum imp_status imp_bend_hold_rim(imp_bend *b, int layers, double value)
 enum imp_status imp_bend_hold_outside(imp_bend *b, const double centre[3], double radius,
                                       double value)
 {
+    IMP_REQUIRE(NULL, b, "bend");
+    IMP_REQUIRE(b->ctx, centre, "centre");
+    IMP_FINITE_ALL(b->ctx, centre, 3, "centre");
+    IMP_FINITE(b->ctx, radius, "radius");
     if (!(radius > 0))
         return imp__error(b->ctx, IMP_E_ARG, "a sphere of radius %g", radius);
     return hold_add(b, &(struct imp__hold){.kind = IMP_HOLD_OUTSIDE,
@@ -43,6 +48,7 @@ enum imp_status imp_bend_hold_outside(imp_bend *b, const double centre[3], doubl
 }
 enum imp_status imp_bend_hold_number(imp_bend *b, size_t i, double value)
 {
+    IMP_REQUIRE(NULL, b, "bend");
     if (i >= b->field->n_theta)
         return imp__error(b->ctx, IMP_E_ARG, "number %zu of a field that has %zu", i,
                           b->field->n_theta);

@@ -25,7 +25,7 @@ static enum imp_status passes_trace(const imp_bend *b, bool adjoint, struct pass
     *p = (struct passes){.rays = imp__bend_rays(b)};
     const size_t n = imp_max(b->n, (size_t)1), n_taps = n * b->options.n_taps;
     if (b->n == 0) return imp__error(b->ctx, IMP_E_ARG, "a problem without rays");
-    const enum imp_status st = imp_bend_get_options(b, &p->options);
+    const enum imp_status st = imp__bend_options_ready(b, &p->options);
     if (st != IMP_OK) return st;
     p->exits = imp__alloc(b->ctx, n, sizeof *p->exits);
     if (n_taps) p->taps = imp__alloc(b->ctx, n_taps, sizeof *p->taps);
@@ -58,6 +58,10 @@ enum imp_status imp_bend_objective(imp_bend *b, double *value, double *gradient,
     uint8_t *mask = NULL;
     double *bar = NULL, total = 0, *parts = NULL;
     struct imp_bend_stats s = IMP_BEND_STATS_INIT;
+    IMP_REQUIRE(NULL, b, "bend");
+    IMP_REQUIRE(b->ctx, value, "value");
+    if (stats) IMP_SIZED(b->ctx, stats, "stats");
+    IMP_FLOAT_MODE;
     enum imp_status st = passes_trace(b, gradient != NULL, &p, &s);
     if (st != IMP_OK) goto out;
     if (stats) *stats = s; /* the counts say why, also when nothing was traced */
@@ -84,7 +88,7 @@ enum imp_status imp_bend_objective(imp_bend *b, double *value, double *gradient,
         total += imp__smooth_value(b, NULL);
     }
     if (targets) memcpy(targets, parts, b->n_targets * sizeof *parts);
-    if (stats) *stats = s;
+    if (stats) IMP_TRY(imp__info_give(b->ctx, __func__, "stats", stats, &s, sizeof s));
     *value = total;
 out:
     imp__release(b->ctx, parts);
@@ -98,10 +102,17 @@ enum imp_status imp_bend_run(imp_bend *b, struct imp_bend_exit *exits,
                              struct imp_bend_exit *taps, struct imp_bend_stats *stats)
 {
     struct passes p;
-    const enum imp_status st = passes_trace(b, false, &p, stats);
+    struct imp_bend_stats all = IMP_BEND_STATS_INIT;
+    IMP_REQUIRE(NULL, b, "bend");
+    IMP_REQUIRE(b->ctx, exits, "exits");
+    if (stats) IMP_SIZED(b->ctx, stats, "stats");
+    IMP_FLOAT_MODE;
+    enum imp_status st = passes_trace(b, false, &p, stats ? &all : NULL);
     if (st == IMP_OK) {
         memcpy(exits, p.exits, b->n * sizeof *exits);
         if (taps && p.taps) memcpy(taps, p.taps, b->n * b->options.n_taps * sizeof *taps);
+        if (stats)
+            st = imp__info_give(b->ctx, __func__, "stats", stats, &all, sizeof all);
     }
     passes_free(b, &p);
     return st;
@@ -111,6 +122,10 @@ enum imp_status imp_bend_arrivals(imp_bend *b, size_t target,
                                   struct imp_bend_arrival *arrivals, size_t *n)
 {
     struct passes p;
+    IMP_REQUIRE(NULL, b, "bend");
+    IMP_REQUIRE(b->ctx, arrivals, "arrivals");
+    IMP_REQUIRE(b->ctx, n, "n");
+    IMP_FLOAT_MODE;
     if (target >= b->n_targets)
         return imp__error(b->ctx, IMP_E_ARG, "no target %zu", target);
     const struct imp__target_of_rays *t = &b->targets[target];
@@ -141,6 +156,9 @@ enum imp_status imp_bend_image(imp_bend *b, size_t target, float *pixels)
 {
     struct passes p;
     double value;
+    IMP_REQUIRE(NULL, b, "bend");
+    IMP_REQUIRE(b->ctx, pixels, "pixels");
+    IMP_FLOAT_MODE;
     if (target >= b->n_targets || !b->targets[target].pixels)
         return imp__error(b->ctx, IMP_E_ARG, "target %zu is no image", target);
     enum imp_status st = passes_trace(b, false, &p, NULL);

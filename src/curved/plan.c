@@ -149,31 +149,57 @@ static void bounds_choose(struct imp__plan *p, const struct imp_bend_rays *rays)
         p->lo[k] = f->lo[k] - margin, p->hi[k] = f->hi[k] + margin;
 }
 
+enum imp_status imp__bend_options_take(imp_context *ctx, const char *function,
+                                       const char *name,
+                                       const struct imp_bend_options *in,
+                                       struct imp_bend_options *own)
+{
+    struct imp_bend_options o = IMP_BEND_OPTIONS_INIT;
+    IMP_CHECKED(imp__options_take(ctx, function, name, in, &o, sizeof o));
+    const struct {
+        const char *name;
+        double value;
+    } numbers[] = {{"step", o.step},
+                   {"outside_index", o.outside_index},
+                   {"grazing", o.grazing},
+                   {"reversal", o.reversal}};
+    for (size_t i = 0; i < imp_count(numbers); i++)
+        if (!isfinite(numbers[i].value))
+            return imp__error(ctx, IMP_E_ARG, "%s: %s->%s is %g", function, name,
+                              numbers[i].name, numbers[i].value);
+    if (o.n_taps > IMP_BEND_TAPS_MAX)
+        return imp__error(ctx, IMP_E_ARG, "%zu taps: at most %d", o.n_taps,
+                          IMP_BEND_TAPS_MAX);
+    if (o.n_surfaces > SURFACES_MAX)
+        return imp__error(ctx, IMP_E_ARG, "%zu surfaces: at most %d", o.n_surfaces,
+                          SURFACES_MAX);
+    if ((o.n_surfaces && !o.surfaces) || (o.n_taps && !o.taps))
+        return imp__error(ctx, IMP_E_ARG, "%s: %s->%s is NULL", function, name,
+                          o.n_surfaces && !o.surfaces ? "surfaces" : "taps");
+    *own = o;
+    return IMP_OK;
+}
+
 enum imp_status imp__plan_create(const imp_field *field,
                                  const struct imp_bend_options *options,
                                  const struct imp_bend_rays *rays, struct imp__plan *out)
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = field->ctx;
-    static const struct imp_bend_options defaults = IMP_BEND_OPTIONS_INIT;
-    struct imp__plan p = {.ctx = ctx, .field = field};
+    struct imp__plan p = {.ctx = ctx, .field = field, .options = IMP_BEND_OPTIONS_INIT};
+    struct imp_bend_surface *surfaces = NULL;
     struct imp_bend_surface box = IMP_BEND_SURFACE_INIT;
     struct imp__surface *all = NULL;
     int *first = NULL;
 
-    p.options = options ? *options : defaults;
     struct imp_bend_options *o = &p.options;
+    IMP_CHECKED(imp__bend_options_take(ctx, "bend", "options", options, o));
     if ((int)o->scheme < 0 || o->scheme >= IMP_BEND_N_SCHEMES || (int)o->way < 0 ||
         o->way > IMP_BEND_PSEUDO)
         IMP_TRY(imp__error(ctx, IMP_E_ARG, "no such scheme or way back"));
     p.scheme = &imp__schemes[o->scheme];
     if (rays->n > 0 && (!rays->x || !rays->d))
         IMP_TRY(imp__error(ctx, IMP_E_ARG, "rays without origins or directions"));
-    if (o->n_taps > IMP_BEND_TAPS_MAX)
-        IMP_TRY(imp__error(ctx, IMP_E_ARG, "%zu taps: at most %d", o->n_taps,
-                           IMP_BEND_TAPS_MAX));
-    if (o->n_surfaces > SURFACES_MAX)
-        IMP_TRY(imp__error(ctx, IMP_E_ARG, "%zu surfaces", o->n_surfaces));
     p.max_steps = o->max_steps ? o->max_steps : MAX_STEPS_DEFAULT;
     p.grazing = o->grazing == 0 ? 0.05 : fmax(o->grazing, 0);
     p.outside_index = o->outside_index == 0 ? 1 : o->outside_index;
@@ -199,6 +225,14 @@ enum imp_status imp__plan_create(const imp_field *field,
         o->surfaces = &box;
         o->n_surfaces = 1;
     }
+    surfaces = imp__alloc(ctx, o->n_surfaces, sizeof *surfaces);
+    if (!surfaces) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for surfaces"));
+    for (size_t i = 0; i < o->n_surfaces; i++) {
+        surfaces[i] = (struct imp_bend_surface)IMP_BEND_SURFACE_INIT;
+        IMP_TRY(imp__element_take(ctx, "bend", "surfaces", o->surfaces, i, &surfaces[i],
+                                  sizeof *surfaces));
+    }
+    o->surfaces = surfaces;
     all = imp__alloc(ctx, 6 * o->n_surfaces, sizeof *all);
     first = imp__alloc(ctx, o->n_surfaces + 1, sizeof *first);
     if (!all || !first) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for surfaces"));
@@ -241,6 +275,7 @@ enum imp_status imp__plan_create(const imp_field *field,
     o->taps = NULL;
     *out = p;
 out:
+    imp__release(ctx, surfaces);
     imp__release(ctx, all);
     imp__release(ctx, first);
     if (st != IMP_OK) imp__plan_destroy(&p);

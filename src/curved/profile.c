@@ -300,7 +300,7 @@ const char *imp__profile_param(const char *kind, size_t i)
 
 size_t imp_field_profile_count(const char *kind)
 {
-    const int k = kind_find(kind);
+    const int k = kind ? kind_find(kind) : -1;
     return k < 0 ? 0 : (size_t)kinds[k].n_own + 3;
 }
 
@@ -308,6 +308,11 @@ enum imp_status imp_field_profile_create(imp_context *ctx, const char *kind,
                                          const double *params, const double *axis,
                                          imp_field **out)
 {
+    IMP_REQUIRE(NULL, ctx, "context");
+    IMP_REQUIRE(ctx, kind, "kind");
+    IMP_REQUIRE(ctx, params, "params");
+    IMP_REQUIRE(ctx, out, "out");
+    IMP_FLOAT_MODE;
     const int k = kind_find(kind);
     imp_v3 a = imp__v3(0, 0, 1);
     imp_field *f = NULL;
@@ -320,8 +325,8 @@ enum imp_status imp_field_profile_create(imp_context *ctx, const char *kind,
     const size_t n = (size_t)kinds[k].n_own + 3;
     for (size_t i = 0; i < n; i++)
         if (!isfinite(params[i]))
-            return imp__error(ctx, IMP_E_ARG, "%s profile: parameter '%s' is not finite",
-                              kind, imp__profile_param(kind, i));
+            return imp__error(ctx, IMP_E_ARG, "%s profile: params[%zu], '%s', is %g",
+                              kind, i, imp__profile_param(kind, i), params[i]);
     for (int i = 0; i < kinds[k].n_own; i++) {
         const char *name = kinds[k].names[i];
         const bool part =

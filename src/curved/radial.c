@@ -76,9 +76,15 @@ const struct imp__field_ops imp__field_radial = {.name = "radial",
                                                  .tangent = radial_tangent};
 
 enum imp_status imp_field_radial_create(imp_context *ctx,
-                                        const struct imp_field_radial *desc, double index,
-                                        imp_field **out)
+                                        const struct imp_field_radial *radial,
+                                        double index, imp_field **out)
 {
+    struct imp_field_radial own = IMP_FIELD_RADIAL_INIT, *const desc = &own;
+    IMP_REQUIRE(NULL, ctx, "context");
+    IMP_REQUIRE(ctx, radial, "radial");
+    IMP_REQUIRE(ctx, out, "out");
+    IMP_OPTIONS(ctx, own, radial, "radial");
+    IMP_FLOAT_MODE;
     const imp_v3 axis = imp__v3_load(desc->axis);
     const double length = imp__length(axis);
     imp_field *f = NULL;
@@ -86,6 +92,9 @@ enum imp_status imp_field_radial_create(imp_context *ctx,
         return imp__error(ctx, IMP_E_ARG, "radial field: %d cells", desc->cells);
     if (!(desc->radius > 0) || !isfinite(desc->radius))
         return imp__error(ctx, IMP_E_ARG, "radial field: radius %g", desc->radius);
+    if (!imp__is_finite(imp__v3_load(desc->centre)))
+        return imp__error(ctx, IMP_E_ARG, "radial field: the centre is not finite");
+    IMP_FINITE_ALL(ctx, desc->axis, 3, "axis");
     if (desc->cylinder && !(length > 0 && isfinite(length)))
         return imp__error(ctx, IMP_E_ARG, "radial field: the axis has no direction");
     if (!(index > 0) || !isfinite(index))

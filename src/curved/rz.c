@@ -99,9 +99,15 @@ static void rz_tangent(const imp_field *f, const imp_v3 *x, const double *theta_
 const struct imp__field_ops imp__field_rz = {
     .name = "rz", .eval = rz_eval, .splat = rz_splat, .tangent = rz_tangent};
 
-enum imp_status imp_field_rz_create(imp_context *ctx, const struct imp_field_rz *desc,
+enum imp_status imp_field_rz_create(imp_context *ctx, const struct imp_field_rz *rz,
                                     double index, imp_field **out)
 {
+    struct imp_field_rz own = IMP_FIELD_RZ_INIT, *const desc = &own;
+    IMP_REQUIRE(NULL, ctx, "context");
+    IMP_REQUIRE(ctx, rz, "rz");
+    IMP_REQUIRE(ctx, out, "out");
+    IMP_OPTIONS(ctx, own, rz, "rz");
+    IMP_FLOAT_MODE;
     const imp_v3 axis = imp__v3_load(desc->axis);
     const double length = imp__length(axis);
     imp_field *f = NULL;
@@ -138,9 +144,11 @@ enum imp_status imp_field_rz_create(imp_context *ctx, const struct imp_field_rz 
 
 enum imp_status imp_field_get_rz(const imp_field *f, struct imp_field_rz *out)
 {
+    IMP_REQUIRE(NULL, f, "field");
+    IMP_REQUIRE(f->ctx, out, "rz");
     if (f->ops != &imp__field_rz)
         return imp__error(f->ctx, IMP_E_ARG, "a %s field is not in r^2 and z",
                           f->ops->name);
-    *out = ((const struct imp__rz *)f)->desc;
+    IMP_GIVE(f->ctx, out, ((const struct imp__rz *)f)->desc, "rz");
     return IMP_OK;
 }

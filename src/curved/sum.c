@@ -98,6 +98,12 @@ enum imp_status imp_field_sum_create(imp_context *ctx, size_t n, imp_field **par
     enum imp_status st = IMP_OK;
     imp_field *f = NULL;
     size_t n_theta = 0;
+    IMP_REQUIRE(ctx, parts, "parts");
+    if (!ctx || !out)
+        IMP_TRY(imp__argument_missing(ctx, __func__, ctx ? "out" : "context"));
+    for (size_t p = 0; p < n; p++)
+        if (!parts[p])
+            IMP_TRY(imp__error(ctx, IMP_E_ARG, "%s: parts[%zu] is NULL", __func__, p));
     if (n < 1 || n > PARTS_MAX)
         IMP_TRY(imp__error(ctx, IMP_E_ARG, "a sum of %zu index fields", n));
     for (size_t p = 0; p < n; p++) n_theta += parts[p]->n_theta;

@@ -167,6 +167,13 @@ imp_bend_tangent(const imp_field *field, const struct imp_bend_options *options,
                  const double (*x_dot)[3], const double (*d_dot)[3],
                  struct imp_bend_cotangent *dots, struct imp_bend_cotangent *tap_dots)
 {
+    IMP_REQUIRE(NULL, field, "field");
+    IMP_REQUIRE(field->ctx, rays, "rays");
+    IMP_REQUIRE(field->ctx, dots, "dots");
+    if (theta_dot) IMP_FINITE_ALL(field->ctx, theta_dot, field->n_theta, "theta_dot");
+    if (x_dot) IMP_FINITE_ALL(field->ctx, x_dot[0], 3 * rays->n, "x_dot");
+    if (d_dot) IMP_FINITE_ALL(field->ctx, d_dot[0], 3 * rays->n, "d_dot");
+    IMP_FLOAT_MODE;
     struct imp__plan plan;
     enum imp_status st = imp__plan_create(field, options, rays, &plan);
     if (st != IMP_OK) return st;
@@ -192,6 +199,11 @@ enum imp_status imp_bend_path(const imp_field *field,
                               double (**points)[4], size_t *n_points,
                               struct imp_bend_exit *exit)
 {
+    IMP_REQUIRE(NULL, field, "field");
+    IMP_REQUIRE(field->ctx, rays, "rays");
+    IMP_REQUIRE(field->ctx, points, "points");
+    IMP_REQUIRE(field->ctx, n_points, "n_points");
+    IMP_FLOAT_MODE;
     struct imp__plan plan;
     struct imp__track track = {.states = true};
     double(*list)[4] = NULL;

@@ -196,12 +196,22 @@ static void means(const struct imp__tie *t, const double *grid, double *theta)
 }
 
 enum imp_status imp_field_tie_create(imp_context *ctx, imp_field *grid,
-                                     const struct imp_field_symmetry *s, imp_field **out)
+                                     const struct imp_field_symmetry *symmetry,
+                                     imp_field **out)
 {
     enum imp_status st = IMP_OK;
+    struct imp_field_symmetry own = IMP_FIELD_SYMMETRY_INIT, *const s = &own;
     imp_field *f = NULL;
     uint32_t *number = NULL;
     size_t n = 0;
+    IMP_FLOAT_MODE;
+    IMP_REQUIRE(ctx, grid, "grid");
+    if (!ctx || !symmetry || !out)
+        IMP_TRY(imp__argument_missing(ctx, __func__,
+                                      !ctx        ? "context"
+                                      : !symmetry ? "symmetry"
+                                                  : "out"));
+    IMP_TRY(imp__options_take(ctx, __func__, "symmetry", symmetry, s, sizeof own));
     const struct imp__grid *g = (const struct imp__grid *)grid;
     if (!imp__field_is_grid(grid))
         IMP_TRY(imp__error(ctx, IMP_E_ARG, "symmetry of a %s field: of grids only",

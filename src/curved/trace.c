@@ -339,6 +339,12 @@ enum imp_status imp_bend_trace(const imp_field *field,
                                struct imp_bend_exit *exits, struct imp_bend_exit *taps,
                                struct imp_bend_stats *stats)
 {
+    IMP_REQUIRE(NULL, field, "field");
+    IMP_REQUIRE(field->ctx, rays, "rays");
+    IMP_REQUIRE(field->ctx, exits, "exits");
+    if (stats) IMP_SIZED(field->ctx, stats, "stats");
+    IMP_FLOAT_MODE;
+    struct imp_bend_stats all = IMP_BEND_STATS_INIT;
     struct imp__plan plan;
     enum imp_status st = imp__plan_create(field, options, rays, &plan);
     if (st != IMP_OK) return st;
@@ -354,7 +360,9 @@ enum imp_status imp_bend_trace(const imp_field *field,
                                   .rate_unit = "rays",
                                   .units = (double)rays->n};
     IMP_TRY(imp__parallel(plan.ctx, &loop, NULL));
-    IMP_TRY(imp__count(&plan, rays->n, exits, taps, stats));
+    IMP_TRY(imp__count(&plan, rays->n, exits, taps, stats ? &all : NULL));
+    if (stats)
+        IMP_TRY(imp__info_give(plan.ctx, __func__, "stats", stats, &all, sizeof all));
 out:
     imp__plan_destroy(&plan);
     return st;

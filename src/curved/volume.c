@@ -190,7 +190,14 @@ enum imp_status imp_field_read(imp_context *ctx, const char *path,
     struct imp_field_grid like = IMP_FIELD_GRID_INIT;
     struct imp_bytes b = {0};
     enum imp_status st = IMP_OK;
-    if (grid) like = *grid;
+    IMP_REQUIRE(NULL, ctx, "context");
+    IMP_REQUIRE(ctx, path, "path");
+    IMP_REQUIRE(ctx, out, "out");
+    IMP_OPTIONS(ctx, like, grid, "grid");
+    IMP_FINITE_ALL(ctx, like.lo, 3, "grid->lo");
+    IMP_FINITE_ALL(ctx, like.hi, 3, "grid->hi");
+    IMP_FINITE(ctx, like.gladstone_dale, "grid->gladstone_dale");
+    IMP_FLOAT_MODE;
     if (!grid || !(like.hi[0] > like.lo[0]))
         for (int k = 0; k < 3; k++) like.lo[k] = -1, like.hi[k] = 1;
     IMP_TRY(imp__file_read(ctx, path, FILE_BYTES_MAX, &b));
@@ -276,6 +283,9 @@ static enum imp_status grid_write(const imp_field *f, const char *path, bool npy
 
 enum imp_status imp_field_write(const imp_field *f, const char *path)
 {
+    IMP_REQUIRE(NULL, f, "field");
+    IMP_REQUIRE(f->ctx, path, "path");
+    IMP_FLOAT_MODE;
     const bool npy = has_suffix(path, ".npy");
     if (npy || has_suffix(path, ".vol")) {
         const uint32_t *number;

@@ -15,6 +15,7 @@
 #ifndef IMP_ELEMENTS_H
 #define IMP_ELEMENTS_H
 
+#include "base/arguments.h"
 #include "base/pool.h"
 #include "kind/emitter/ies.h"
 #include "scene/scene.h"

@@ -181,7 +181,9 @@ static void json(const imp_elements *e, struct writer *w)
 enum imp_status imp_elements_export(const imp_elements *e, const char *path)
 {
     enum imp_status st = IMP_OK;
-    if (!e || !path) return IMP_E_ARG;
+    IMP_REQUIRE(NULL, e, "elements");
+    IMP_REQUIRE(e->ctx, path, "path");
+    IMP_FLOAT_MODE;
     struct writer w = {.ctx = e->ctx, .ok = true};
     const char *dot = strrchr(path, '.');
     if (!e->solved)

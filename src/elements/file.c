@@ -56,7 +56,8 @@ enum imp_status imp_elements_save(const imp_elements *e, const char *path)
 {
     enum imp_status st = IMP_OK;
     struct imp_bytes out = {0};
-    if (!e || !path) return IMP_E_ARG;
+    IMP_REQUIRE(NULL, e, "elements");
+    IMP_REQUIRE(e->ctx, path, "path");
     if (!e->solved)
         return imp__error(e->ctx, IMP_E_ARG, "the elements are not solved yet");
     struct header h = {.order_mark = 0x01020304,
@@ -111,7 +112,11 @@ enum imp_status imp_elements_open(const imp_scene *scene,
     struct imp_bytes in = {0};
     struct header h;
     imp_elements *e = NULL;
-    if (!scene || !path || !out) return IMP_E_ARG;
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_REQUIRE(scene->ctx, path, "path");
+    IMP_REQUIRE(scene->ctx, out, "out");
+    IMP_FLOAT_MODE;
+    IMP_READS(scene);
     imp_context *ctx = scene->ctx;
     IMP_TRY(imp_elements_create(scene, options, &e));
     IMP_TRY(imp__file_read(ctx, path, FILE_LIMIT, &in));

@@ -162,6 +162,7 @@ static void destroy(struct imp_guide *base)
     imp__release(ctx, g->wide_of);
     imp__release(ctx, g->leaving);
     imp__release(ctx, g);
+    imp__context_drop(ctx);
 }
 
 /* ---- Making it ----------------------------------------------------------------- */
@@ -220,18 +221,23 @@ enum imp_status imp_elements_guide(const imp_elements *e,
 {
     enum imp_status st = IMP_OK;
     struct imp_elements_guide_options o = IMP_ELEMENTS_GUIDE_OPTIONS_INIT;
-    if (!e || !out) return IMP_E_ARG;
-    if (options) memcpy(&o, options, imp_min(options->size, sizeof o));
+    IMP_REQUIRE(NULL, e, "elements");
+    IMP_REQUIRE(e->ctx, out, "out");
+    IMP_OPTIONS(e->ctx, o, options, "options");
+    IMP_FLOAT_MODE;
+    IMP_READS(e->scene);
     if (!(o.share >= 0 && o.share < 1))
-        return imp__error(e->ctx, IMP_E_ARG, "a share of %g is outside [0, 1)", o.share);
+        return imp__error(e->ctx, IMP_E_ARG, "share %g is outside [0, 1)", o.share);
     if (!(o.roulette >= 0) || isinf(o.roulette))
-        return imp__error(e->ctx, IMP_E_ARG, "roulette of strength %g", o.roulette);
+        return imp__error(e->ctx, IMP_E_ARG, "roulette %g is not a number >= 0",
+                          o.roulette);
     if (!e->solved)
         return imp__error(e->ctx, IMP_E_ARG, "the elements are not solved yet");
     struct imp__guide_build b = {.share = o.share};
     struct imp__guide *g = imp__alloc(e->ctx, 1, sizeof *g);
     if (!g) return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for a guide");
     b.g = g;
+    imp__context_hold(e->ctx);
     g->base = (struct imp_guide){.ctx = e->ctx,
                                  .find = find,
                                  .light = light_choose,

@@ -231,7 +231,10 @@ enum imp_status imp_elements_image(const imp_elements *e, int sensor,
                                    enum imp_elements_image kind, int rays, imp_film **out)
 {
     enum imp_status st = IMP_OK;
-    if (!e || !out) return IMP_E_ARG;
+    IMP_REQUIRE(NULL, e, "elements");
+    IMP_REQUIRE(e->ctx, out, "out");
+    IMP_FLOAT_MODE;
+    IMP_READS(e->scene);
     if (sensor < 0 || sensor >= e->scene->n_sensors)
         return imp__error(e->ctx, IMP_E_ARG, "there is no sensor %d; the scene has %d",
                           sensor, e->scene->n_sensors);

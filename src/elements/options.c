@@ -10,7 +10,7 @@ enum imp_status imp__el_options(imp_elements *e,
 {
     struct imp_elements_options *o = &e->opt;
     enum imp_status st = IMP_OK;
-    if (options) memcpy(o, options, imp_min(options->size, sizeof *o));
+    IMP_CHECKED(imp__options_take(e->ctx, "elements", "options", options, o, sizeof *o));
     o->size = sizeof *o;
     if (e->scene->has_integrator &&
         e->scene->integrator.kind == IMP_INTEGRATOR_ELEMENTS) {
@@ -43,9 +43,21 @@ enum imp_status imp__el_options(imp_elements *e,
                           "an option of the finite elements is outside its "
                           "range (rays 1..64, sweeps >= 1, level 0..%d)",
                           EL_LEVEL_MAX);
-    if (!(o->eps_first > 0) || !(o->eps_last > 0) || isnan(o->stop) ||
-        !(o->time_limit_s >= 0))
-        return imp__error(e->ctx, IMP_E_ARG, "tolerances must be positive");
+    if (!(o->eps_first > 0) || !(o->eps_last > 0) || !isfinite(o->eps_first) ||
+        !isfinite(o->eps_last) || !isfinite(o->stop))
+        return imp__error(
+            e->ctx, IMP_E_ARG,
+            "eps_first %g and eps_last %g must be positive, stop %g a number",
+            o->eps_first, o->eps_last, o->stop);
+    if (!(o->time_limit_s >= 0) || !isfinite(o->time_limit_s))
+        return imp__error(e->ctx, IMP_E_ARG, "time_limit_s %g is not a number >= 0",
+                          o->time_limit_s);
+    if ((o->n_sources && !o->sources) || (o->n_phong && !o->phong) ||
+        (o->n_beams && !o->beams))
+        return imp__error(e->ctx, IMP_E_ARG, "%s is NULL",
+                          o->n_sources && !o->sources ? "sources"
+                          : o->n_phong && !o->phong   ? "phong"
+                                                      : "beams");
     if (e->scene->n_sensors > 0 && (o->sensor < 0 || o->sensor >= e->scene->n_sensors))
         return imp__error(e->ctx, IMP_E_ARG, "there is no sensor %d; the scene has %d",
                           o->sensor, e->scene->n_sensors);
@@ -92,11 +104,12 @@ enum imp_status imp__el_options(imp_elements *e,
         struct imp_elements_source *s = &e->sources[i];
         *s = (struct imp_elements_source){.size = sizeof *s, .sensor = o->sensor};
         if (o->n_sources)
-            memcpy(s, &o->sources[i], imp_min(o->sources[i].size, sizeof *s));
+            IMP_TRY(imp__element_take(e->ctx, "elements", "sources", o->sources, i, s,
+                                      sizeof *s));
         if (s->weight == 0) s->weight = 1;
         if (!isfinite(s->weight))
             IMP_TRY(imp__error(e->ctx, IMP_E_ARG,
-                               "the weight of a measurement is not finite"));
+                               "weight %g of sources[%zu] is not finite", s->weight, i));
         for (int k = 0; k < 3 && s->kind == IMP_ELEMENTS_PLANE; k++)
             if (!isfinite(s->origin[k]) || !isfinite(s->edge_u[k]) ||
                 !isfinite(s->edge_v[k]))

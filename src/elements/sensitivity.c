@@ -147,9 +147,13 @@ enum imp_status imp_elements_sensitivity(imp_elements *e,
                                          size_t *n_rows)
 {
     enum imp_status st = IMP_OK;
-    if (!e || !rows || !n_rows) return IMP_E_ARG;
+    IMP_REQUIRE(NULL, e, "elements");
+    IMP_REQUIRE(e->ctx, rows, "rows");
+    IMP_REQUIRE(e->ctx, n_rows, "n_rows");
     if (!e->solved)
         return imp__error(e->ctx, IMP_E_ARG, "the elements are not solved yet");
+    IMP_FLOAT_MODE;
+    IMP_READS(e->scene);
     e->n_rows = 0;
     IMP_TRY(imp__el_settle(e, 8, true, 1e-13));
     e->has_importance = true;

@@ -39,13 +39,17 @@ enum imp_status imp_elements_create(const imp_scene *scene,
                                     imp_elements **out)
 {
     enum imp_status st = IMP_OK;
-    if (!scene || !out) return IMP_E_ARG;
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_REQUIRE(scene->ctx, out, "out");
+    IMP_FLOAT_MODE;
+    IMP_READS(scene);
     if (!scene->committed)
         return imp__error(scene->ctx, IMP_E_ARG, "the scene is not committed");
     imp_elements *e = imp__alloc(scene->ctx, 1, sizeof *e);
     if (!e)
         return imp__error(scene->ctx, IMP_E_NOMEM, "out of memory for finite elements");
     e->ctx = scene->ctx;
+    imp__context_hold(e->ctx);
     e->scene = scene;
     e->ch = scene->channels;
     e->reason = "not solved";
@@ -67,13 +71,15 @@ out:
 void imp_elements_destroy(imp_elements *e)
 {
     if (!e) return;
+    imp_context *ctx = e->ctx;
     void *const all[] = {e->roots, e->elements,   e->l,         e->g,     e->c,
                          e->b,     e->from_above, e->a,         e->links, e->in_start,
                          e->out,   e->value,      e->out_start, e->hits,  e->seen,
                          e->log,   e->picture,    e->rows};
     for (size_t k = 0; k < imp_count(all); k++) imp__release(e->ctx, all[k]);
     imp__arena_free(&e->arena);
-    imp__release(e->ctx, e);
+    imp__release(ctx, e);
+    imp__context_drop(ctx);
 }
 
 /* ---- Solving ------------------------------------------------------------------- */
@@ -153,7 +159,9 @@ out:
 enum imp_status imp_elements_solve(imp_elements *e)
 {
     enum imp_status st = IMP_OK;
-    if (!e) return IMP_E_ARG;
+    IMP_REQUIRE(NULL, e, "elements");
+    IMP_FLOAT_MODE;
+    IMP_READS(e->scene);
     const bool importance = !e->opt.no_importance;
     bool full = false;
     int still = 0;
@@ -248,9 +256,11 @@ enum imp_status imp__el_parameters(imp_elements *e)
 enum imp_status imp_elements_update(imp_elements *e)
 {
     enum imp_status st = IMP_OK;
-    if (!e) return IMP_E_ARG;
+    IMP_REQUIRE(NULL, e, "elements");
     if (!e->solved)
         return imp__error(e->ctx, IMP_E_ARG, "the elements are not solved yet");
+    IMP_FLOAT_MODE;
+    IMP_READS(e->scene);
     IMP_TRY(imp__el_parameters(e));
     IMP_TRY(imp__el_bin(e));
     IMP_TRY(imp__el_settle(e, 4, e->has_importance, 1e-10));
@@ -261,8 +271,11 @@ out:
 enum imp_status imp_elements_get_info(const imp_elements *e,
                                       struct imp_elements_info *info)
 {
-    if (!e || !info) return IMP_E_ARG;
-    struct imp_elements_info i = {.size = imp_min(info->size, sizeof i),
+    IMP_REQUIRE(NULL, e, "elements");
+    IMP_REQUIRE(e->ctx, info, "info");
+    IMP_SIZED(e->ctx, info, "info");
+    IMP_FLOAT_MODE;
+    struct imp_elements_info i = {.size = sizeof i,
                                   .order = e->basis.order,
                                   .functions = e->basis.n,
                                   .polygons = e->n_roots,
@@ -287,6 +300,6 @@ enum imp_status imp_elements_get_info(const imp_elements *e,
         i.measure = imp__el_measure(e, &i.measure_direct);
         i.measure_adjoint = e->has_importance ? imp__el_measure_adjoint(e) : NAN;
     }
-    memcpy(info, &i, i.size);
+    IMP_GIVE(e->ctx, info, i, "info");
     return IMP_OK;
 }

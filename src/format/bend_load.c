@@ -2,6 +2,7 @@
  *
  * Files of bent rays: the scene format's grammar, with <medium type="graded">, <rays>,
  * <surface> and <target> (docs/curved-rays.md). */
+#include "base/arguments.h"
 #include "bend.h"
 #include "load.h"
 #include "search.h"
@@ -38,7 +39,7 @@ static enum imp_status truth_trace(struct imp__bendfile *l, struct imp_bend_exit
     o.scheme = IMP_BEND_YOSHIDA4;
     o.way = IMP_BEND_REVERSE;
     if (!(o.step > 0)) {
-        struct imp_bend_options own;
+        struct imp_bend_options own = {.size = sizeof own};
         const enum imp_status st = imp_bend_get_options(l->bend, &own);
         if (st != IMP_OK) return st;
         o.step = own.step / 4;
@@ -208,6 +209,10 @@ out:
 enum imp_status imp_bend_load(imp_context *ctx, const char *path,
                               const struct imp_load_options *options, imp_bend **out)
 {
+    IMP_REQUIRE(NULL, ctx, "context");
+    IMP_REQUIRE(ctx, path, "path");
+    IMP_REQUIRE(ctx, out, "out");
+    IMP_FLOAT_MODE;
     struct imp__load_file f;
     enum imp_status st = imp__load_open(ctx, path, options, &f);
     if (st == IMP_OK) st = load(ctx, &f.text, path, f.folder, &f.options, out);
@@ -221,6 +226,10 @@ enum imp_status imp_bend_load_string(imp_context *ctx, const char *xml, size_t l
                                      imp_bend **out)
 {
     struct imp_load_options o;
+    IMP_REQUIRE(NULL, ctx, "context");
+    IMP_REQUIRE(ctx, xml, "xml");
+    IMP_REQUIRE(ctx, out, "out");
+    IMP_FLOAT_MODE;
     const enum imp_status st = imp__load_options(ctx, options, &o);
     if (st != IMP_OK) return st;
     const struct imp_bytes text = {(unsigned char *)(uintptr_t)xml, length, length};

@@ -62,7 +62,7 @@ enum imp_status imp__bendfile_placed(struct imp__bendfile *l, struct imp_node *n
 static enum imp_status grid_sample(struct imp__bendfile *l, imp_field *grid,
                                    const imp_field *from)
 {
-    struct imp_field_grid g;
+    struct imp_field_grid g = {.size = sizeof g};
     enum imp_status st = imp_field_get_grid(grid, &g);
     const size_t m[3] = {(size_t)g.cells[0] + 1, (size_t)g.cells[1] + 1,
                          (size_t)g.cells[2] + 1};
@@ -223,7 +223,7 @@ enum imp_status imp__bendfile_volume(struct imp__bendfile *l, struct imp_node *n
     enum imp_status st = IMP_OK;
     imp_field *f = NULL, *start = NULL;
     const char *file;
-    struct imp_field_grid g;
+    struct imp_field_grid g = {.size = sizeof g};
     struct imp_field_symmetry symmetry;
     const bool grid = strcmp(node->type, "grid") == 0;
     bool tied = false;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Films in files: reading, and writing by extension. */
+#include "base/arguments.h"
 #include "color/rgb.h"
 #include "image.h"
 #include <math.h>
@@ -104,15 +105,17 @@ static bool ends_with(const char *path, const char *extension)
 enum imp_status imp_film_write(const imp_film *f, const char *path,
                                const struct imp_write_options *options)
 {
-    if (!f) return IMP_E_ARG;
+    IMP_REQUIRE(NULL, f, "film");
     imp_context *ctx = f->ctx;
-    if (!path || !*path) return imp__error(ctx, IMP_E_ARG, "film: no file name");
     struct imp_write_options o = IMP_WRITE_OPTIONS_INIT;
-    if (options)
-        memcpy(&o, options, imp_min(options->size ? options->size : sizeof o, sizeof o));
+    IMP_REQUIRE(ctx, path, "path");
+    if (!*path) return imp__error(ctx, IMP_E_ARG, "film: no file name");
+    IMP_OPTIONS(ctx, o, options, "options");
     if (!isfinite(o.exposure) || !isfinite(o.range) || o.range < 0)
         return imp__error(ctx, IMP_E_ARG,
-                          "film: exposure and range must be finite, range >= 0");
+                          "film: exposure %g and range %g must be finite, range >= 0",
+                          o.exposure, o.range);
+    IMP_FLOAT_MODE;
 
     struct imp_bytes bytes = {0};
     enum imp_status st;
@@ -133,8 +136,11 @@ enum imp_status imp_film_write(const imp_film *f, const char *path,
 
 enum imp_status imp_film_read(imp_context *ctx, const char *path, imp_film **out)
 {
-    if (!ctx || !out) return IMP_E_ARG;
-    if (!path || !*path) return imp__error(ctx, IMP_E_ARG, "film: no file name");
+    IMP_REQUIRE(NULL, ctx, "context");
+    IMP_REQUIRE(ctx, path, "path");
+    IMP_REQUIRE(ctx, out, "out");
+    if (!*path) return imp__error(ctx, IMP_E_ARG, "film: no file name");
+    IMP_FLOAT_MODE;
     imp_film *f;
     bool srgb;
     enum imp_status st = imp__image_read(ctx, path, &f, &srgb);

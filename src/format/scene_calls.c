@@ -2,6 +2,7 @@
  *
  * Scenes built by calls: the same tree that the XML reader makes. The first failure is
  * kept; later calls do nothing, and commit returns it. */
+#include "base/arguments.h"
 #include "base/film.h"
 #include "load.h"
 #include "mesh.h"
@@ -16,6 +17,7 @@ static const struct imp_loc nowhere = {NULL, 0, 0};
 
 static bool ready(struct imp_scene *scene)
 {
+    if (!scene) imp__error(NULL, IMP_E_ARG, "imp_scene_begin ...: scene is NULL");
     if (!scene || scene->build_status != IMP_OK) return false;
     if (!scene->tree) imp__error(scene->ctx, IMP_E_ARG, "scene: it is committed already");
     return scene->tree != NULL;
@@ -48,7 +50,9 @@ static void tree_destroy(void *tree) { imp__tree_free(tree); }
 enum imp_status imp_scene_create(imp_context *ctx, const struct imp_load_options *options,
                                  imp_scene **out)
 {
-    if (!ctx || !out) return IMP_E_ARG;
+    IMP_REQUIRE(NULL, ctx, "context");
+    IMP_REQUIRE(ctx, out, "out");
+    IMP_FLOAT_MODE;
     enum imp_status st = IMP_OK;
     struct imp_scene *scene = NULL;
     struct imp_load_options o;
@@ -77,9 +81,12 @@ static enum imp_status begin(struct imp_scene *scene, const char *tag, const cha
 {
     imp_context *ctx = scene->ctx;
     struct imp_node *node;
-    if (!tag || !type || !imp__is_object_tag(tag) || strcmp(tag, "scene") == 0)
-        return imp__error(ctx, IMP_E_ARG, "scene: '%s' of type '%s' is no object",
-                          tag ? tag : "", type ? type : "");
+    if (!tag || !type)
+        return imp__error(ctx, IMP_E_ARG, "imp_scene_begin: %s is NULL",
+                          tag ? "type" : "tag");
+    if (!imp__is_object_tag(tag) || strcmp(tag, "scene") == 0)
+        return imp__error(ctx, IMP_E_ARG, "scene: '%s' of type '%s' is no object", tag,
+                          type);
     if (scene->n_stack >= IMP_DEPTH_MAX)
         return imp__error(ctx, IMP_E_SCENE, "scene: objects are nested deeper than %d",
                           IMP_DEPTH_MAX);
@@ -111,7 +118,8 @@ static struct imp_prop *prop(struct imp_scene *scene, const char *name,
     struct imp_prop *p = NULL;
     if (!ready(scene)) return NULL;
     if (!name)
-        keep(scene, imp__error(scene->ctx, IMP_E_ARG, "scene: a property has no name"));
+        keep(scene,
+             imp__error(scene->ctx, IMP_E_ARG, "scene: a property's name is NULL"));
     else keep(scene, imp__tree_prop(scene->tree, top(scene), name, type, nowhere, &p));
     return scene->build_status == IMP_OK ? p : NULL;
 }
@@ -121,10 +129,13 @@ static void numbers(struct imp_scene *scene, const char *name, enum imp_prop_typ
 {
     struct imp_prop *p = prop(scene, name, type);
     if (!p) return;
-    for (int i = 0; i < n; i++) {
-        if (!value || !isfinite(value[i])) {
-            keep(scene, imp__error(scene->ctx, IMP_E_ARG, "scene: %s '%s' is not finite",
-                                   top(scene)->tag, name));
+    if (!value)
+        keep(scene, imp__error(scene->ctx, IMP_E_ARG, "scene: value of %s '%s' is NULL",
+                               top(scene)->tag, name));
+    for (int i = 0; value && i < n; i++) {
+        if (!isfinite(value[i])) {
+            keep(scene, imp__error(scene->ctx, IMP_E_ARG, "scene: value of %s '%s' is %g",
+                                   top(scene)->tag, name, value[i]));
             return;
         }
         p->number[i] = value[i];
@@ -167,7 +178,12 @@ void imp_scene_string(imp_scene *scene, const char *name, const char *value)
 {
     struct imp_prop *p = prop(scene, name, IMP_PROP_STRING);
     if (!p) return;
-    p->string = imp__arena_strdup(&scene->arena, value ? value : "");
+    if (!value) {
+        keep(scene,
+             imp__error(scene->ctx, IMP_E_ARG, "scene: value of '%s' is NULL", name));
+        return;
+    }
+    p->string = imp__arena_strdup(&scene->arena, value);
     if (!p->string)
         keep(scene, imp__error(scene->ctx, IMP_E_NOMEM, "scene: out of memory"));
 }
@@ -176,8 +192,12 @@ static enum imp_status spectrum(struct imp_scene *scene, struct imp_prop *p, siz
                                 const double *nm, const double *values)
 {
     imp_context *ctx = scene->ctx;
-    if (n > SIZE_MAX / 64 || (n && (!nm || !values)))
-        return imp__error(ctx, IMP_E_ARG, "scene: spectrum '%s' has no samples", p->name);
+    if (!nm || !values)
+        return imp__error(ctx, IMP_E_ARG, "scene: %s of spectrum '%s' is NULL",
+                          nm ? "values" : "wavelengths_nm", p->name);
+    if (n > SIZE_MAX / 64)
+        return imp__error(ctx, IMP_E_ARG, "scene: spectrum '%s' has %zu samples", p->name,
+                          n);
     double *list = imp__arena_array(&scene->arena, n, 2 * sizeof *list);
     if (!list) return imp__error(ctx, IMP_E_NOMEM, "scene: out of memory");
     if (n) memcpy(list, nm, n * sizeof *list);
@@ -198,8 +218,9 @@ void imp_scene_spectrum(imp_scene *scene, const char *name, size_t n,
 
 void imp_scene_ref(imp_scene *scene, const char *id, const char *name)
 {
-    if (ready(scene))
-        keep(scene, imp__tree_ref(scene->tree, top(scene), id ? id : "", name, nowhere));
+    if (!ready(scene)) return;
+    if (!id) keep(scene, imp__error(scene->ctx, IMP_E_ARG, "imp_scene_ref: id is NULL"));
+    else keep(scene, imp__tree_ref(scene->tree, top(scene), id, name, nowhere));
 }
 
 /* ---- Bulk data ----------------------------------------------------------------- */
@@ -207,6 +228,16 @@ void imp_scene_ref(imp_scene *scene, const char *id, const char *name)
 static bool open_is(const struct imp_scene *scene, const char *tag, const char *type)
 {
     return strcmp(top(scene)->tag, tag) == 0 && strcmp(top(scene)->type, type) == 0;
+}
+
+static enum imp_status floats_check(imp_context *ctx, const struct imp_node *node,
+                                    const char *name, const float *values, size_t n)
+{
+    for (size_t i = 0; i < n; i++)
+        if (!isfinite(values[i]))
+            return imp__node_error(ctx, node, IMP_E_ARG, "%s[%zu] is %g", name, i,
+                                   (double)values[i]);
+    return IMP_OK;
 }
 
 static enum imp_status mesh(struct imp_scene *scene, size_t n_vertices,
@@ -219,10 +250,16 @@ static enum imp_status mesh(struct imp_scene *scene, size_t n_vertices,
     if (!open_is(scene, "shape", "mesh") || node->mesh)
         return imp__node_error(ctx, node, IMP_E_ARG,
                                "triangles are for a shape of type 'mesh', once");
-    if (!positions || !indices || n_vertices < 1 || n_triangles < 1 ||
-        n_vertices > IMP_MESH_MAX || n_triangles > IMP_MESH_MAX)
+    if (!positions || !indices)
+        return imp__node_error(ctx, node, IMP_E_ARG, "%s is NULL",
+                               positions ? "indices" : "positions");
+    if (n_vertices < 1 || n_triangles < 1 || n_vertices > IMP_MESH_MAX ||
+        n_triangles > IMP_MESH_MAX)
         return imp__node_error(ctx, node, IMP_E_ARG,
                                "needs between 1 and 2^31 vertices and triangles");
+    IMP_CHECKED(floats_check(ctx, node, "positions", positions, 3 * n_vertices));
+    if (normals) IMP_CHECKED(floats_check(ctx, node, "normals", normals, 3 * n_vertices));
+    if (uvs) IMP_CHECKED(floats_check(ctx, node, "uvs", uvs, 2 * n_vertices));
     const struct imp_mesh_source source = {
         .ctx = ctx, .keep = &scene->arena, .temporary = &scene->files, .name = "mesh"};
     struct imp_mesh_data *data = imp__arena_array(&scene->files, 1, sizeof *data);
@@ -258,12 +295,14 @@ static enum imp_status image(struct imp_scene *scene, int width, int height, int
     if (!open_is(scene, "texture", "bitmap") || node->image)
         return imp__node_error(ctx, node, IMP_E_ARG,
                                "pixels are for a texture of type 'bitmap', once");
-    if (!pixels || width < 1 || height < 1 || width > IMP_FILM_SIDE_MAX ||
+    if (!pixels) return imp__node_error(ctx, node, IMP_E_ARG, "pixels is NULL");
+    if (width < 1 || height < 1 || width > IMP_FILM_SIDE_MAX ||
         height > IMP_FILM_SIDE_MAX || (channels != 1 && channels != 3))
         return imp__node_error(ctx, node, IMP_E_ARG,
                                "a picture of %d x %d with %d channels", width, height,
                                channels);
     const size_t n = (size_t)width * (size_t)height * (size_t)channels;
+    IMP_CHECKED(floats_check(ctx, node, "pixels", pixels, n));
     struct imp_image_data *data = imp__arena_array(&scene->files, 1, sizeof *data);
     float *copy = data ? imp__arena_take(&scene->files, n, sizeof *copy) : NULL;
     if (!copy) return imp__error(ctx, IMP_E_NOMEM, "scene: no memory for a picture");
@@ -283,7 +322,8 @@ void imp_scene_image(imp_scene *scene, int width, int height, int channels,
 
 enum imp_status imp_scene_commit(imp_scene *scene)
 {
-    if (!scene) return IMP_E_ARG;
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_FLOAT_MODE;
     imp_context *ctx = scene->ctx;
     if (scene->build_status != IMP_OK)
         return imp__error(ctx, scene->build_status, "%s",

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include "base/arguments.h"
 #include "load.h"
 #include "search.h"
 #include "tree.h"
@@ -9,7 +10,7 @@ enum imp_status imp__load_options(imp_context *ctx, const struct imp_load_option
                                   struct imp_load_options *to)
 {
     *to = (struct imp_load_options)IMP_LOAD_OPTIONS_INIT;
-    if (from) memcpy(to, from, imp_min(from->size ? from->size : sizeof *to, sizeof *to));
+    IMP_CHECKED(imp__options_take(ctx, "load", "options", from, to, sizeof *to));
     if (to->mode != IMP_RGB && to->mode != IMP_MONO)
         return imp__error(ctx, IMP_E_ARG, "colour mode %d is not known", (int)to->mode);
     if ((to->n_defines && !to->defines) || (to->n_search && !to->search))
@@ -70,7 +71,10 @@ out:
 enum imp_status imp_scene_load(imp_context *ctx, const char *path,
                                const struct imp_load_options *options, imp_scene **out)
 {
-    if (!ctx || !out) return IMP_E_ARG;
+    IMP_REQUIRE(NULL, ctx, "context");
+    IMP_REQUIRE(ctx, path, "path");
+    IMP_REQUIRE(ctx, out, "out");
+    IMP_FLOAT_MODE;
     struct imp__load_file f;
     enum imp_status st = imp__load_open(ctx, path, options, &f);
     if (st == IMP_OK) st = load(ctx, &f.text, path, f.folder, &f.options, out);
@@ -83,8 +87,10 @@ enum imp_status imp_scene_load_string(imp_context *ctx, const char *xml, size_t 
                                       const struct imp_load_options *options,
                                       imp_scene **out)
 {
-    if (!ctx || !out) return IMP_E_ARG;
-    if (!xml && length) return imp__error(ctx, IMP_E_ARG, "the scene's text is NULL");
+    IMP_REQUIRE(NULL, ctx, "context");
+    IMP_REQUIRE(ctx, xml, "xml");
+    IMP_REQUIRE(ctx, out, "out");
+    IMP_FLOAT_MODE;
     struct imp_load_options o;
     const enum imp_status st = imp__load_options(ctx, options, &o);
     if (st != IMP_OK) return st;

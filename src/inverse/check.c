@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "check.h"
+#include "walk/run.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -64,19 +65,24 @@ enum imp_status imp_check(imp_problem *p, const struct imp_check_options *option
                           const struct imp_run *run, const struct imp_check_row **rows,
                           size_t *n_rows)
 {
-    if (!p || !rows || !n_rows) return IMP_E_ARG;
     enum imp_status st = IMP_OK, ended = IMP_OK;
+    IMP_REQUIRE(NULL, p, "problem");
+    IMP_REQUIRE(p->ctx, rows, "rows");
+    IMP_REQUIRE(p->ctx, n_rows, "n_rows");
+    IMP_FLOAT_MODE;
+    IMP_SETS(p->scene, st);
+    if (st != IMP_OK) return st;
     struct imp__check c = {.problem = p,
                            .ctx = p->ctx,
                            .options = IMP_CHECK_OPTIONS_INIT,
                            .outer = IMP_RUN_INIT,
                            .start_s = imp__now()};
 
+    IMP_OPTIONS(p->ctx, c.options, options, "options");
+    IMP_RUN(p->ctx, c.outer, run);
     if (p->n == 0)
         IMP_TRY(
             imp__error(p->ctx, IMP_E_ARG, "nothing to check: no parameter is active"));
-    if (options) memcpy(&c.options, options, imp_min(options->size, sizeof c.options));
-    if (run) memcpy(&c.outer, run, imp_min(run->size, sizeof c.outer));
     if (c.options.paths < 0 || c.options.fresh_spp < 0)
         IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "paths and fresh_spp must be >= 0"));
     if (c.options.paths == 0) c.options.paths = 1000;

@@ -5,6 +5,7 @@
  * of every channel's mean, which sees a bias far below a pixel's noise
  * (docs/scene-format.md 14). Pixels must be independent: compare pictures made with box
  * filters. */
+#include "base/arguments.h"
 #include "base/film.h"
 #include "color/rgb.h"
 #include "math/stat.h"
@@ -122,8 +123,11 @@ static void channel(const struct pair *p, int c, double level, struct sums *s)
 static enum imp_status options_check(imp_context *ctx,
                                      const struct imp_compare_options *o)
 {
-    if (!(o->n_test >= 0) || !(o->n_reference >= 0) || !(o->floor >= 0))
-        return imp__error(ctx, IMP_E_ARG, "sample counts and floor must be >= 0");
+    if (!(o->n_test >= 0) || !(o->n_reference >= 0) || !(o->floor >= 0) ||
+        !isfinite(o->n_test + o->n_reference + o->floor))
+        return imp__error(ctx, IMP_E_ARG,
+                          "n_test %g, n_reference %g and floor %g must be >= 0",
+                          o->n_test, o->n_reference, o->floor);
     if (o->variance && !(o->n_test > 0))
         return imp__error(ctx, IMP_E_ARG,
                           "a variance picture needs the test's samples per pixel");
@@ -159,16 +163,19 @@ enum imp_status imp_compare(imp_context *ctx, imp_film *test, imp_film *referenc
                             const struct imp_compare_options *options,
                             struct imp_compare_result *result)
 {
-    if (!ctx || !test || !reference || !result)
-        return ctx ? imp__error(ctx, IMP_E_ARG, "two pictures and a result are needed")
-                   : IMP_E_ARG;
     enum imp_status st = IMP_OK;
     struct imp_compare_options own = IMP_COMPARE_OPTIONS_INIT;
+    IMP_REQUIRE(NULL, ctx, "context");
+    IMP_REQUIRE(ctx, test, "test");
+    IMP_REQUIRE(ctx, reference, "reference");
+    IMP_REQUIRE(ctx, result, "result");
+    IMP_OPTIONS(ctx, own, options, "options");
+    IMP_SIZED(ctx, result, "result");
+    IMP_FLOAT_MODE;
     struct pair p = {.test = test, .reference = reference, .options = &own};
     struct sums s = {0};
     imp_film *xyz[3] = {NULL, NULL, NULL};
 
-    if (options) memcpy(&own, options, imp_min(options->size, sizeof own));
     if (own.variance && own.n_test == 0) own.n_test = (double)test->spp;
     IMP_TRY(options_check(ctx, &own));
     if (own.xyz) {
@@ -192,7 +199,7 @@ enum imp_status imp_compare(imp_context *ctx, imp_film *test, imp_film *referenc
     const double level = imp__sidak(LEVEL, (double)p.pixels);
     for (int c = 0; c < reference->channels; c++) channel(&p, c, level, &s);
     const double n = fmax(s.n, 1), n_z = fmax(s.n_z, 1);
-    const struct imp_compare_result r = {
+    struct imp_compare_result r = {
         .size = sizeof r,
         .rmse = sqrt(s.square / n),
         .relative_rmse = s.square > 0 ? sqrt(s.square / s.reference_square) : 0,
@@ -204,11 +211,11 @@ enum imp_status imp_compare(imp_context *ctx, imp_film *test, imp_film *referenc
         .over2 = s.over2 / n_z,
         .has_z = own.variance || test->se || reference->se,
         .agree = !s.broken && s.n > 0};
-    *result = r;
     if (r.has_z)
-        result->agree &= r.p_fail_fraction <= PIXELS_MAX_FAIL && r.mean_z < MEAN_Z_MAX &&
-                         (!own.variance || r.over2 <= OVER2_MAX);
-    else result->agree &= r.relative_rmse <= WITHOUT_Z;
+        r.agree &= r.p_fail_fraction <= PIXELS_MAX_FAIL && r.mean_z < MEAN_Z_MAX &&
+                   (!own.variance || r.over2 <= OVER2_MAX);
+    else r.agree &= r.relative_rmse <= WITHOUT_Z;
+    IMP_TRY(imp__info_give(ctx, __func__, "result", result, &r, sizeof r));
 out:
     imp__release(ctx, p.of_test);
     for (int k = 0; k < 3; k++) imp_film_destroy(xyz[k]);

@@ -2,6 +2,7 @@
  *
  * Lighting design: what is active, bounds, rounds of refining and searching. */
 #include "design.h"
+#include "base/arguments.h"
 #include "match.h"
 #include <float.h>
 #include <math.h>
@@ -55,6 +56,8 @@ static enum imp_status bounds_take(struct imp__design *d)
             d->hi[(size_t)base + i] = info->hi;
         }
     }
+    if (d->o.n_bounds > 0 && !d->o.bounds)
+        return imp__error(d->goal.ctx, IMP_E_ARG, "imp_elements_fit: bounds is NULL");
     for (size_t b = 0; b < d->o.n_bounds; b++) {
         const struct imp_elements_bounds *want = &d->o.bounds[b];
         bool met = false;
@@ -119,13 +122,11 @@ static void scales(struct imp__design *d, const double *x)
 
 /* ---- The search ---------------------------------------------------------------- */
 
-static enum imp_status begin(struct imp__design *d,
-                             const struct imp_elements_fit_options *o)
+static enum imp_status begin(struct imp__design *d)
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = d->goal.ctx;
     const size_t n = d->n, m = d->goals, params = d->p->scene->n_params;
-    memcpy(&d->o, o, imp_min(o->size, sizeof d->o));
     if (d->o.max_iterations == 0) d->o.max_iterations = 100;
     if (d->o.tolerance == 0) d->o.tolerance = 1e-8;
     if (d->o.rounds == 0) d->o.rounds = 3;
@@ -133,8 +134,10 @@ static enum imp_status begin(struct imp__design *d,
         d->o.optimizer = n <= IMP_DENSE_MAX ? IMP_LM : IMP_LBFGS;
     if (n == 0)
         return imp__error(ctx, IMP_E_ARG, "nothing to fit: no parameter is active");
-    if (!d->o.targets) return imp__error(ctx, IMP_E_ARG, "nothing to fit to: no target");
-    if (d->o.max_iterations < 0 || d->o.rounds < 0 || !(d->o.tolerance > 0))
+    if (!d->o.targets)
+        return imp__error(ctx, IMP_E_ARG, "nothing to fit to: targets is NULL");
+    if (d->o.max_iterations < 0 || d->o.rounds < 0 || !(d->o.tolerance > 0) ||
+        isinf(d->o.tolerance))
         return imp__error(ctx, IMP_E_ARG, "max_iterations %d, rounds %d, tolerance %g",
                           d->o.max_iterations, d->o.rounds, d->o.tolerance);
     double *all = imp__arena_array(&d->p->fit_arena, 3 * n + 5 * m, sizeof *all);
@@ -258,12 +261,20 @@ enum imp_status imp_elements_fit(imp_elements *e, imp_problem *p,
                                  const struct imp_elements_fit_result **result)
 {
     enum imp_status st = IMP_OK, ended = IMP_OK;
-    if (!e || !p || !options || !result) return IMP_E_ARG;
+    struct imp_elements_fit_options o = IMP_ELEMENTS_FIT_OPTIONS_INIT;
+    IMP_REQUIRE(NULL, e, "elements");
+    IMP_REQUIRE(e->ctx, p, "problem");
+    IMP_REQUIRE(e->ctx, options, "options");
+    IMP_REQUIRE(e->ctx, result, "result");
+    IMP_OPTIONS(e->ctx, o, options, "options");
+    IMP_FLOAT_MODE;
+    IMP_SETS(p->scene, st);
+    if (st != IMP_OK) return st;
     if (p->scene != e->scene || e->opt.no_importance)
         return imp__error(e->ctx, IMP_E_ARG,
                           "the problem and the elements must be of one scene, and the "
                           "elements have importance");
-    struct imp__design d = {.e = e, .p = p, .n = p->n, .goals = e->n_sources};
+    struct imp__design d = {.e = e, .p = p, .n = p->n, .goals = e->n_sources, .o = o};
     struct imp__search *s = NULL;
     const imp_progress_fn progress = e->opt.progress;
     const char *reason = "no step was made";
@@ -277,7 +288,7 @@ enum imp_status imp_elements_fit(imp_elements *e, imp_problem *p,
                            .iterated = iterated,
                            .payload = &d};
     imp__arena_free(&p->fit_arena);
-    IMP_TRY(begin(&d, options));
+    IMP_TRY(begin(&d));
     d.goal.lo = d.lo, d.goal.hi = d.hi, d.goal.scale = d.scale;
     const double time_limit = e->opt.time_limit_s;
     if (time_limit > 0) d.deadline_s = imp__now() + time_limit;

@@ -10,13 +10,8 @@
 #include "splat.h"
 #include "tally.h"
 #include "walk/picture.h"
+#include "walk/run.h"
 #include <string.h>
-
-struct imp_run imp__run_or_default(const struct imp_run *run)
-{
-    const struct imp_run none = IMP_RUN_INIT;
-    return run ? *run : none;
-}
 
 struct imp__replicates imp__replicates_plan(int spp, int batch_max)
 {
@@ -279,12 +274,17 @@ enum imp_status imp_problem_objective(imp_problem *p, const double *x,
                                       struct imp_estimate *objective, double *gradient,
                                       double *gradient_se)
 {
-    if (!p) return IMP_E_ARG;
-    if (p->n_targets == 0)
-        return imp__error(p->ctx, IMP_E_ARG, "the problem has no target");
     enum imp_status st = IMP_OK;
+    struct imp_run own;
+    IMP_REQUIRE(NULL, p, "problem");
     imp_context *ctx = p->ctx;
-    const struct imp_run own = imp__run_or_default(run);
+    IMP_RUN(ctx, own, run);
+    if (p->n_targets == 0) return imp__error(ctx, IMP_E_ARG, "the problem has no target");
+    IMP_FLOAT_MODE;
+    const struct imp__access_held access
+        __attribute__((cleanup(imp__access_leave), unused)) =
+            x ? imp__access_set(p->scene, &st) : imp__access_read(p->scene);
+    if (st != IMP_OK) return st;
     double *buffer = imp__alloc(ctx, 3 * p->n, sizeof *buffer);
     struct imp_estimate estimate = {0};
     if (!buffer) return imp__error(ctx, IMP_E_NOMEM, "no memory for gradients");
@@ -319,14 +319,33 @@ out:
     return st;
 }
 
+static enum imp_status adjoint_check(const struct imp_problem *p,
+                                     const struct imp_film_desc *film,
+                                     const float *adjoint)
+{
+    const size_t channels = (size_t)p->scene->channels, width = (size_t)film->crop_w;
+    for (size_t i = 0; i < width * (size_t)film->crop_h * channels; i++)
+        if (!isfinite(adjoint[i]))
+            return imp__error(p->ctx, IMP_E_ARG,
+                              "seed_image: channel %zu of pixel (%zu, %zu) is %g",
+                              i % channels, i / channels % width, i / channels / width,
+                              (double)adjoint[i]);
+    return IMP_OK;
+}
+
 enum imp_status imp_problem_reverse(imp_problem *p, const float *seed_image,
                                     const struct imp_run *run, double *gradient,
                                     double *gradient_se)
 {
-    if (!p || !seed_image || !gradient) return IMP_E_ARG;
     enum imp_status st = IMP_OK;
+    struct imp_run own;
+    IMP_REQUIRE(NULL, p, "problem");
     imp_context *ctx = p->ctx;
-    const struct imp_run own = imp__run_or_default(run);
+    IMP_REQUIRE(ctx, seed_image, "seed_image");
+    IMP_REQUIRE(ctx, gradient, "gradient");
+    IMP_RUN(ctx, own, run);
+    IMP_FLOAT_MODE;
+    IMP_READS(p->scene);
     struct imp__splat splat = {0};
     double *g = imp__alloc(ctx, 2 * p->n, sizeof *g);
     struct job j = {.problem = p,
@@ -336,6 +355,7 @@ enum imp_status imp_problem_reverse(imp_problem *p, const float *seed_image,
                     .gradient_variance = g ? g + p->n : NULL};
     if (!g) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for gradients"));
     IMP_TRY(imp__problem_tracer(p, &own, &j.tracer));
+    IMP_TRY(adjoint_check(p, &j.tracer.sensor->film, seed_image));
     const int spp = own.spp > 0 ? own.spp : j.tracer.sensor->spp;
     j.plan = imp__replicates_plan(spp, IMP_BATCH_MAX);
     if (imp__film_border(&j.tracer.sensor->film) > 0) {

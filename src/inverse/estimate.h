@@ -51,6 +51,5 @@ static inline size_t imp__tile_count(int width, int height, int margin)
 enum imp_status imp__problem_tracer(const struct imp_problem *p,
                                     const struct imp_run *run, struct imp_tracer *out);
 /* The run to use: the given one or the defaults. */
-struct imp_run imp__run_or_default(const struct imp_run *run);
 
 #endif

@@ -2,6 +2,7 @@
  *
  * Fit: run an optimiser on a problem, and say how well its answer is known. */
 #include "fit.h"
+#include "base/arguments.h"
 #include "search/covariance.h"
 #include <math.h>
 #include <string.h>
@@ -129,9 +130,13 @@ static enum imp_status result_make(struct imp__fit *f, const struct imp__search 
 enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
                         const struct imp_run *run, const struct imp_fit_result **result)
 {
-    if (!p) return IMP_E_ARG;
     enum imp_status st = IMP_OK, ended = IMP_OK;
+    IMP_REQUIRE(NULL, p, "problem");
     imp_context *ctx = p->ctx;
+    IMP_REQUIRE(ctx, result, "result");
+    IMP_FLOAT_MODE;
+    IMP_SETS(p->scene, st);
+    if (st != IMP_OK) return st;
     struct imp__fit f = {0};
     struct imp__search *s = NULL;
     struct imp__uncertainty u = {0};

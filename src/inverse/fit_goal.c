@@ -2,6 +2,7 @@
  *
  * A problem as an optimiser sees it. */
 #include "fit.h"
+#include "walk/run.h"
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -192,14 +193,19 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
     struct imp__fit f = {
         .problem = p, .options = IMP_FIT_OPTIONS_INIT, .outer = IMP_RUN_INIT};
 
-    if (options) memcpy(&f.options, options, imp_min(options->size, sizeof f.options));
-    if (run) memcpy(&f.outer, run, imp_min(run->size, sizeof f.outer));
+    IMP_CHECKED(imp__options_take(ctx, "imp_fit", "options", options, &f.options,
+                                  sizeof f.options));
+    IMP_CHECKED(imp__run_take(ctx, "imp_fit", run, &f.outer));
+    if ((unsigned)f.options.optimizer > IMP_SLSQP)
+        return imp__error(ctx, IMP_E_ARG, "optimizer %d does not exist",
+                          (int)f.options.optimizer);
     if (n == 0)
         return imp__error(ctx, IMP_E_ARG, "nothing to fit: no parameter is active");
     if (p->n_targets == 0)
         return imp__error(ctx, IMP_E_ARG, "nothing to fit to: no target");
     if (f.options.max_iterations < 0 || !(f.options.learning_rate >= 0) ||
-        !(f.options.tolerance >= 0) || f.options.learning_rate > 1)
+        !(f.options.tolerance >= 0) || isinf(f.options.tolerance) ||
+        f.options.learning_rate > 1)
         return imp__error(
             ctx, IMP_E_ARG,
             "max_iterations %d, learning_rate %g (0 to 1), tolerance %g: out of "

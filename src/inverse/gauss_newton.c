@@ -341,7 +341,8 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = p->ctx;
-    const struct imp_run own = imp__run_or_default(run);
+    struct imp_run own = IMP_RUN_INIT;
+    if (run) own = *run;
     struct job j = {.problem = p, .K = p->n, .channels = p->scene->channels};
     const int n_slots = imp__pool_slots(ctx);
     double residuals = 0;

@@ -5,6 +5,7 @@
 #include "estimate.h"
 #include "lanes.h"
 #include "walk/picture.h"
+#include "walk/run.h"
 #include <stdio.h>
 #include <string.h>
 
@@ -32,8 +33,14 @@ static bool sample_tangent(const void *payload, struct imp_arena *arena, int x, 
 enum imp_status imp_problem_forward(imp_problem *p, const double *x_dot,
                                     const struct imp_run *run, imp_film **out)
 {
-    if (!p || !x_dot || !out) return IMP_E_ARG;
-    const struct imp_run own = imp__run_or_default(run);
+    struct imp_run own;
+    IMP_REQUIRE(NULL, p, "problem");
+    IMP_REQUIRE(p->ctx, x_dot, "x_dot");
+    IMP_REQUIRE(p->ctx, out, "out");
+    IMP_RUN(p->ctx, own, run);
+    IMP_FINITE_ALL(p->ctx, x_dot, p->n, "x_dot");
+    IMP_FLOAT_MODE;
+    IMP_READS(p->scene);
     struct forward f = {.x_dot = x_dot, .channels = p->scene->channels};
     const enum imp_status st = imp__problem_tracer(p, &own, &f.tracer);
     if (st != IMP_OK) return st;
@@ -83,7 +90,11 @@ static enum imp_status film_slice(imp_context *ctx, const imp_film *from, size_t
 enum imp_status imp_problem_jacobian(imp_problem *p, const struct imp_run *run,
                                      imp_film **primal, imp_film **films)
 {
-    if (!p || (!films && (!primal || p->n > 0))) return IMP_E_ARG;
+    struct imp_run own;
+    IMP_REQUIRE(NULL, p, "problem");
+    if (p->n > 0) IMP_REQUIRE(p->ctx, films, "films");
+    if (!films) IMP_REQUIRE(p->ctx, primal, "primal");
+    IMP_RUN(p->ctx, own, run);
     if ((p->n == 0 && films) || p->n > JACOBIAN_MAX)
         return imp__error(
             p->ctx, IMP_E_ARG,
@@ -91,7 +102,8 @@ enum imp_status imp_problem_jacobian(imp_problem *p, const struct imp_run *run,
             JACOBIAN_MAX);
     enum imp_status st = IMP_OK;
     imp_context *ctx = p->ctx;
-    const struct imp_run own = imp__run_or_default(run);
+    IMP_FLOAT_MODE;
+    IMP_READS(p->scene);
     const size_t C = (size_t)p->scene->channels;
     struct jacobian j = {.channels = p->scene->channels};
     imp_film *all = NULL, *first = NULL;

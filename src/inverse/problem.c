@@ -3,20 +3,24 @@
  * Problems: which numbers are free, and what they have to match. */
 #include "problem.h"
 #include "match.h"
+#include "walk/run.h"
 #include <math.h>
 #include <string.h>
 
 enum imp_status imp_problem_create(imp_scene *scene, imp_problem **out)
 {
     enum imp_status st = IMP_OK;
+    IMP_REQUIRE(NULL, scene, "scene");
     imp_context *ctx = scene->ctx;
     imp_problem *p = NULL;
+    IMP_REQUIRE(ctx, out, "out");
 
     if (!scene->committed)
         return imp__error(ctx, IMP_E_ARG, "a problem needs a committed scene");
     p = imp__alloc(ctx, 1, sizeof *p);
     if (!p) return imp__error(ctx, IMP_E_NOMEM, "no memory for a problem");
     p->ctx = ctx;
+    imp__context_hold(ctx);
     p->scene = scene;
     p->run = (struct imp_run)IMP_RUN_INIT;
     imp__arena_init(&p->fit_arena, ctx);
@@ -41,6 +45,7 @@ static void target_free(imp_context *ctx, struct imp__target *t)
 void imp_problem_destroy(imp_problem *p)
 {
     if (!p) return;
+    imp_context *ctx = p->ctx;
     for (size_t i = 0; i < p->n_targets; i++) target_free(p->ctx, &p->targets[i]);
     imp__release(p->ctx, p->targets);
     for (size_t i = 0; i < p->n_regularisers; i++) {
@@ -51,8 +56,9 @@ void imp_problem_destroy(imp_problem *p)
     imp__active_destroy(p->ctx, &p->active);
     imp__arena_free(&p->fit_arena);
     imp__arena_free(&p->check_arena);
-    imp__release(p->ctx, p->chosen);
-    imp__release(p->ctx, p);
+    imp__release(ctx, p->chosen);
+    imp__release(ctx, p);
+    imp__context_drop(ctx);
 }
 
 /* ---- Active parameters --------------------------------------------------------- */
@@ -84,11 +90,13 @@ static enum imp_status activate_named(imp_problem *p, const char *name, uint8_t 
 enum imp_status imp_problem_activate(imp_problem *p, const char *glob)
 {
     enum imp_status st = IMP_OK;
+    IMP_REQUIRE(NULL, p, "problem");
+    IMP_REQUIRE(p->ctx, glob, "glob");
     const struct imp_scene *s = p->scene;
     struct imp_active active = {0};
     uint8_t *chosen = imp__alloc(p->ctx, imp_max(s->n_params, (size_t)1), 1);
 
-    if (!glob || !*glob) IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "no parameter is named"));
+    if (!*glob) IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "no parameter is named"));
     if (!chosen)
         IMP_TRY(imp__error(p->ctx, IMP_E_NOMEM, "no memory for active parameters"));
     memcpy(chosen, p->chosen, s->n_params);
@@ -122,11 +130,12 @@ out:
     return st;
 }
 
-size_t imp_problem_n(const imp_problem *p) { return p->n; }
+size_t imp_problem_n(const imp_problem *p) { return p ? p->n : 0; }
 
 enum imp_status imp_problem_variable(const imp_problem *p, size_t i, size_t *param,
                                      size_t *element, double *lo, double *hi)
 {
+    IMP_REQUIRE(NULL, p, "problem");
     for (size_t k = 0; k < p->scene->n_params; k++) {
         const struct imp_param_info *info = &p->scene->params[k].info;
         const int64_t base = p->active.base[k];
@@ -143,6 +152,9 @@ enum imp_status imp_problem_variable(const imp_problem *p, size_t i, size_t *par
 
 void imp_problem_get_x(const imp_problem *p, double *x)
 {
+    IMP_REQUIRE_OR(NULL, p, "problem", );
+    IMP_REQUIRE_OR(p->ctx, x, "x", );
+    IMP_READS(p->scene);
     for (size_t k = 0; k < p->scene->n_params; k++) {
         const int64_t base = p->active.base[k];
         if (base < 0) continue;
@@ -155,6 +167,10 @@ void imp_problem_get_x(const imp_problem *p, double *x)
 enum imp_status imp_problem_set_x(imp_problem *p, const double *x)
 {
     enum imp_status st = IMP_OK;
+    IMP_REQUIRE(NULL, p, "problem");
+    IMP_REQUIRE(p->ctx, x, "x");
+    IMP_SETS(p->scene, st);
+    if (st != IMP_OK) return st;
     /* All or nothing: look at everything before the first is set. */
     for (size_t k = 0; k < p->scene->n_params; k++) {
         const struct imp_param_info *info = &p->scene->params[k].info;
@@ -229,9 +245,9 @@ enum imp_status imp_problem_add_target(imp_problem *p, const struct imp_target *
     struct imp__target t = {.desc = IMP_TARGET_INIT};
     struct imp_sensor_info sensor = {.size = sizeof sensor};
 
-    if (!target || !target->size)
-        return imp__error(p->ctx, IMP_E_ARG, "target is NULL or without its size");
-    memcpy(&t.desc, target, imp_min(target->size, sizeof t.desc));
+    IMP_REQUIRE(NULL, p, "problem");
+    IMP_REQUIRE(p->ctx, target, "target");
+    IMP_OPTIONS(p->ctx, t.desc, target, "target");
     const struct imp_target *d = &t.desc;
     IMP_TRY(imp_scene_get_sensor(p->scene, d->sensor, &sensor));
     if (d->width != sensor.width || d->height != sensor.height)
@@ -277,16 +293,21 @@ out:
 
 /* ---- NLopt's callback shape ---------------------------------------------------- */
 
-void imp_problem_set_run(imp_problem *p, const struct imp_run *run)
+enum imp_status imp_problem_set_run(imp_problem *p, const struct imp_run *run)
 {
-    p->run = (struct imp_run)IMP_RUN_INIT;
-    if (run) memcpy(&p->run, run, imp_min(run->size, sizeof p->run));
+    struct imp_run own;
+    IMP_REQUIRE(NULL, p, "problem");
+    IMP_RUN(p->ctx, own, run);
+    p->run = own;
+    return IMP_OK;
 }
 
 double imp_problem_nlopt(unsigned n, const double *x, double *gradient, void *problem)
 {
     imp_problem *p = problem;
     struct imp_estimate e;
+    IMP_REQUIRE_OR(NULL, p, "problem", HUGE_VAL);
+    IMP_REQUIRE_OR(p->ctx, x || n == 0, "x", HUGE_VAL);
     if (n != p->n) {
         imp__error(p->ctx, IMP_E_ARG, "n is %u, but %zu numbers are active", n, p->n);
         return HUGE_VAL;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Regularisers: exact functions of x, added to the estimated data term. */
+#include "base/arguments.h"
 #include "match.h"
 #include "problem.h"
 #include <math.h>
@@ -10,11 +11,13 @@ static enum imp_status add(imp_problem *p, const char *glob, double weight, int 
                            bool from_here)
 {
     enum imp_status st = IMP_OK;
+    IMP_REQUIRE(NULL, p, "problem");
+    IMP_REQUIRE(p->ctx, glob, "glob");
     const struct imp_scene *s = p->scene;
     struct imp__regulariser r = {.kind = kind, .weight = weight};
     size_t met = 0, usable = 0;
 
-    if (!glob || !*glob) return imp__error(p->ctx, IMP_E_ARG, "no parameter is named");
+    if (!*glob) return imp__error(p->ctx, IMP_E_ARG, "no parameter is named");
     if (!(weight >= 0) || !isfinite(weight))
         return imp__error(p->ctx, IMP_E_ARG, "weight %g must be finite and >= 0", weight);
     r.on = imp__alloc(p->ctx, imp_max(s->n_params, (size_t)1), 1);

@@ -1,17 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * What a scene holds, for people and host programs. */
+#include "base/arguments.h"
 #include "scene.h"
 
-void imp_scene_get_info(const imp_scene *scene, struct imp_scene_info *info)
+enum imp_status imp_scene_get_info(const imp_scene *scene, struct imp_scene_info *out)
 {
     static const char *const integrators[] = {
         [IMP_INTEGRATOR_PATH] = "path",        [IMP_INTEGRATOR_DIRECT] = "direct",
         [IMP_INTEGRATOR_DEPTH] = "depth",      [IMP_INTEGRATOR_AOV] = "aov",
         [IMP_INTEGRATOR_MOMENT] = "moment",    [IMP_INTEGRATOR_STAM] = "stam",
         [IMP_INTEGRATOR_ELEMENTS] = "elements"};
-    if (!scene || !info) return;
-    *info = (struct imp_scene_info){.size = sizeof *info};
+    struct imp_scene_info all = {.size = sizeof all}, *info = &all;
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_REQUIRE(scene->ctx, out, "info");
     info->n_shapes = scene->n_shapes;
     info->n_emitters = scene->n_emitters;
     info->n_bsdfs = scene->n_bsdfs;
@@ -30,25 +32,29 @@ void imp_scene_get_info(const imp_scene *scene, struct imp_scene_info *info)
     }
     info->memory_bytes = scene->arena.total + imp__intersector_bytes(scene) +
                          scene->cap_params * sizeof *scene->params;
+    IMP_GIVE(scene->ctx, out, all, "info");
+    return IMP_OK;
 }
 
 enum imp_status imp_scene_get_sensor(const imp_scene *scene, int sensor,
                                      struct imp_sensor_info *info)
 {
-    if (!scene || !info) return IMP_E_ARG;
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_REQUIRE(scene->ctx, info, "info");
     if (sensor < 0 || sensor >= scene->n_sensors)
         return imp__error(scene->ctx, IMP_E_ARG,
                           "there is no sensor %d; the scene has %d", sensor,
                           scene->n_sensors);
     const struct imp_sensor *s = scene->sensors[sensor];
-    *info = (struct imp_sensor_info){.size = sizeof *info,
-                                     .name = s->name,
-                                     .type = s->ops->name,
-                                     .width = s->film.crop_w,
-                                     .height = s->film.crop_h,
-                                     .spp = s->spp,
-                                     .filter = s->film.filter.ops->name,
-                                     .filter_radius = s->film.filter.radius,
-                                     .file_format = s->film.file_format};
+    const struct imp_sensor_info all = {.size = sizeof all,
+                                        .name = s->name,
+                                        .type = s->ops->name,
+                                        .width = s->film.crop_w,
+                                        .height = s->film.crop_h,
+                                        .spp = s->spp,
+                                        .filter = s->film.filter.ops->name,
+                                        .filter_radius = s->film.filter.radius,
+                                        .file_format = s->film.file_format};
+    IMP_GIVE(scene->ctx, info, all, "info");
     return IMP_OK;
 }

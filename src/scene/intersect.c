@@ -4,22 +4,24 @@
  * work, in float; analytic shapes answer through their ops, in double, and their hits
  * never pass through a float (struct query carries ray and hit past it).
  *
- * One device a context, made on first use. It runs in the thread that commits: the scene
- * is built the same way each time, and no thread of Embree's outlives a call. */
+ * One device a process, made on first use and kept until the process ends: Embree's
+ * thread library makes a thread when a device is released, or when a second one is made,
+ * and ends the process if it cannot. Scenes are built in the thread that commits, the
+ * same way each time; no thread of Embree's is used. */
 #include "scene.h"
 #include <embree3/rtcore.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <string.h>
+#include <time.h>
+#include <unistd.h>
 
-struct device {
-    imp_context *ctx;
-    RTCDevice rtc;
-    _Atomic int64_t bytes; /* held by Embree */
-    pthread_mutex_t lock;  /* one commit at a time: bytes and message belong to it */
+/* What a commit is told: callbacks come in the thread that commits. */
+static _Thread_local struct commit {
+    int64_t bytes;
     enum RTCError error;
     char message[256];
-};
+} told;
 
 struct intersector {
     RTCScene rtc;
@@ -29,29 +31,17 @@ struct intersector {
 
 static void error_keep(void *user, enum RTCError error, const char *text)
 {
-    struct device *dev = user;
-    if (dev->error != RTC_ERROR_NONE) return;
-    dev->error = error;
-    snprintf(dev->message, sizeof dev->message, "%s", text ? text : "");
+    (void)user;
+    if (told.error != RTC_ERROR_NONE) return;
+    told.error = error;
+    snprintf(told.message, sizeof told.message, "%s", text ? text : "");
 }
 
 static bool bytes_count(void *user, ssize_t bytes, bool post)
 {
-    struct device *dev = user;
-    (void)post;
-    atomic_fetch_add_explicit(&dev->bytes, bytes, memory_order_relaxed);
+    (void)user, (void)post;
+    told.bytes += bytes;
     return true;
-}
-
-static void device_release(void *memory)
-{
-    struct device *dev = memory;
-    if (dev->rtc) {
-        rtcSetDeviceErrorFunction(dev->rtc, NULL, NULL);
-        rtcReleaseDevice(dev->rtc);
-    }
-    pthread_mutex_destroy(&dev->lock);
-    imp__release(dev->ctx, dev);
 }
 
 static enum imp_status device_error(imp_context *ctx, enum RTCError error,
@@ -62,35 +52,33 @@ static enum imp_status device_error(imp_context *ctx, enum RTCError error,
                       "Embree: error %d%s%s", (int)error, *text ? ": " : "", text);
 }
 
-/* The context's device; two threads may ask for the first time at once. */
-static enum imp_status device_get(imp_context *ctx, struct device **out)
+static _Atomic(RTCDevice) device;
+static _Atomic long maker; /* process that is making it; 0: none */
+
+/* Two threads may ask for the first time at once, and the process may be forked while one
+ * makes the device: then the child makes its own. */
+static enum imp_status device_get(imp_context *ctx, RTCDevice *out)
 {
-    enum imp_status st = IMP_OK;
-    struct device *dev = NULL;
-
-    pthread_mutex_lock(&ctx->lock);
-    *out = ctx->device;
-    pthread_mutex_unlock(&ctx->lock);
-    if (*out) return IMP_OK;
-    dev = imp__alloc(ctx, 1, sizeof *dev);
-    if (!dev) return imp__error(ctx, IMP_E_NOMEM, "out of memory for Embree's device");
-    dev->ctx = ctx;
-    pthread_mutex_init(&dev->lock, NULL);
-    dev->rtc = rtcNewDevice("threads=1,ignore_config_files=1");
-    if (!dev->rtc) IMP_TRY(device_error(ctx, rtcGetDeviceError(NULL), "no device"));
-    rtcSetDeviceErrorFunction(dev->rtc, error_keep, dev);
-    rtcSetDeviceMemoryMonitorFunction(dev->rtc, bytes_count, dev);
-
-    pthread_mutex_lock(&ctx->lock);
-    if (!ctx->device) {
-        ctx->device_release = device_release;
-        ctx->device = dev;
-        dev = NULL;
+    const long here = (long)getpid();
+    for (;;) {
+        long by = 0;
+        if ((*out = atomic_load(&device))) return IMP_OK;
+        if (atomic_compare_exchange_strong(&maker, &by, here)) break;
+        if (by != here && atomic_compare_exchange_strong(&maker, &by, here)) break;
+        nanosleep(&(struct timespec){0, 100000}, NULL);
     }
-    *out = ctx->device;
-    pthread_mutex_unlock(&ctx->lock);
-out:
-    if (dev) device_release(dev);
+    enum imp_status st = IMP_OK;
+    if (!(*out = atomic_load(&device))) {
+        *out = rtcNewDevice("threads=1,ignore_config_files=1");
+        if (*out) {
+            rtcSetDeviceErrorFunction(*out, error_keep, NULL);
+            rtcSetDeviceMemoryMonitorFunction(*out, bytes_count, NULL);
+        } else {
+            st = device_error(ctx, rtcGetDeviceError(NULL), "no device");
+        }
+        atomic_store(&device, *out);
+    }
+    atomic_store(&maker, 0);
     return st;
 }
 
@@ -172,39 +160,32 @@ static RTCGeometry geometry_create(RTCDevice rtc, struct imp_shape *s)
 enum imp_status imp__intersector_create(struct imp_scene *scene)
 {
     enum imp_status st = IMP_OK;
-    struct device *dev;
-    char message[sizeof dev->message] = "";
+    RTCDevice rtc;
 
-    IMP_TRY(device_get(scene->ctx, &dev));
+    IMP_TRY(device_get(scene->ctx, &rtc));
     struct intersector *x = imp__alloc(scene->ctx, 1, sizeof *x);
     if (!x)
         IMP_TRY(imp__error(scene->ctx, IMP_E_NOMEM, "out of memory for the intersector"));
 
-    pthread_mutex_lock(&dev->lock);
-    const int64_t before = atomic_load(&dev->bytes);
-    dev->error = RTC_ERROR_NONE;
-    dev->message[0] = 0;
-    x->rtc = rtcNewScene(dev->rtc);
+    told = (struct commit){.error = RTC_ERROR_NONE};
+    x->rtc = rtcNewScene(rtc);
     /* Robust: rays through shared edges do not fall between two triangles. */
     if (x->rtc) rtcSetSceneFlags(x->rtc, RTC_SCENE_FLAG_ROBUST);
-    for (int i = 0; x->rtc && i < scene->n_shapes && dev->error == RTC_ERROR_NONE; i++) {
-        RTCGeometry g = geometry_create(dev->rtc, scene->shapes[i]);
+    for (int i = 0; x->rtc && i < scene->n_shapes && told.error == RTC_ERROR_NONE; i++) {
+        RTCGeometry g = geometry_create(rtc, scene->shapes[i]);
         if (!g) break;
         rtcAttachGeometryByID(x->rtc, g, (unsigned)i);
         rtcReleaseGeometry(g); /* the scene holds it now */
         x->analytic |= scene->shapes[i]->geometry == IMP_ANALYTIC;
     }
-    if (x->rtc && dev->error == RTC_ERROR_NONE) rtcCommitScene(x->rtc);
+    if (x->rtc && told.error == RTC_ERROR_NONE) rtcCommitScene(x->rtc);
     const enum RTCError error =
-        !x->rtc && dev->error == RTC_ERROR_NONE ? RTC_ERROR_UNKNOWN : dev->error;
-    memcpy(message, dev->message, sizeof message);
-    x->bytes = atomic_load(&dev->bytes) - before;
-    if (error != RTC_ERROR_NONE && x->rtc) rtcReleaseScene(x->rtc);
-    pthread_mutex_unlock(&dev->lock);
-
+        !x->rtc && told.error == RTC_ERROR_NONE ? RTC_ERROR_UNKNOWN : told.error;
+    x->bytes = told.bytes;
     if (error != RTC_ERROR_NONE) {
+        if (x->rtc) rtcReleaseScene(x->rtc);
         imp__release(scene->ctx, x);
-        IMP_TRY(device_error(scene->ctx, error, message));
+        IMP_TRY(device_error(scene->ctx, error, told.message));
     }
     scene->intersector = x;
 out:

@@ -9,6 +9,7 @@ enum imp_status imp__scene_new(imp_context *ctx, enum imp_color_mode mode,
     struct imp_scene *scene = imp__alloc(ctx, 1, sizeof *scene);
     if (!scene) return imp__error(ctx, IMP_E_NOMEM, "scene: out of memory");
     scene->ctx = ctx;
+    imp__context_hold(ctx);
     scene->mode = mode;
     scene->channels = mode == IMP_MONO ? 1 : 3;
     scene->environment = -1;
@@ -50,6 +51,8 @@ void imp_scene_destroy(imp_scene *scene)
 {
     if (!scene) return;
     imp_context *ctx = scene->ctx;
+    imp__context_own(ctx);
+    imp__access_destroy(&scene->access);
     imp__intersector_destroy(scene);
     for (const struct imp_owned *o = scene->owned; o; o = o->next) o->destroy(o->object);
     for (size_t i = 0; i < scene->n_search; i++) imp__release(ctx, scene->search[i]);
@@ -60,4 +63,5 @@ void imp_scene_destroy(imp_scene *scene)
     imp__arena_free(&scene->files);
     imp__arena_free(&scene->arena);
     imp__release(ctx, scene);
+    imp__context_drop(ctx);
 }

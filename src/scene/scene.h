@@ -6,6 +6,7 @@
 #ifndef IMP_SCENE_H
 #define IMP_SCENE_H
 
+#include "access.h"
 #include "kind/build.h"
 #include "math/vec.h"
 
@@ -144,6 +145,7 @@ struct imp_scene {
 
     void *intersector;
     imp_v3 lo, hi; /* bounds of all shapes */
+    struct imp__access access;
 };
 
 /* ---- scene.c ------------------------------------------------------------------- */

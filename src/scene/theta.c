@@ -3,6 +3,7 @@
  * theta: every number that describes the scene, in document order, as places to read and
  * write. A parameter's numbers live where rendering uses them (an input's lanes, a
  * texture's texels); theta is a list of addresses, so setting it needs no rebuild. */
+#include "base/arguments.h"
 #include "base/nearest.h"
 #include "scene.h"
 #include <stdio.h>
@@ -57,10 +58,11 @@ size_t imp_scene_n_theta(const imp_scene *scene) { return scene ? scene->n_theta
 enum imp_status imp_scene_get_param(const imp_scene *scene, size_t index,
                                     struct imp_param_info *info)
 {
-    if (!scene || !info) return IMP_E_ARG;
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_REQUIRE(scene->ctx, info, "info");
     if (index >= scene->n_params)
         return imp__error(scene->ctx, IMP_E_ARG, "there is no parameter %zu", index);
-    *info = scene->params[index].info;
+    IMP_GIVE(scene->ctx, info, scene->params[index].info, "info");
     return IMP_OK;
 }
 
@@ -78,7 +80,9 @@ static bool name_matches(const char *given, const char *name)
 enum imp_status imp_scene_find_param(const imp_scene *scene, const char *name,
                                      size_t *index)
 {
-    if (!scene || !name || !index) return IMP_E_ARG;
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_REQUIRE(scene->ctx, name, "name");
+    IMP_REQUIRE(scene->ctx, index, "index");
     for (const char *tail = name; tail;
          tail = strchr(tail, '.') ? strchr(tail, '.') + 1 : NULL)
         for (size_t i = 0; i < scene->n_params; i++)
@@ -111,6 +115,9 @@ enum imp_status imp_scene_find_param(const imp_scene *scene, const char *name,
 
 void imp_scene_get_theta(const imp_scene *scene, double *theta)
 {
+    IMP_REQUIRE_OR(NULL, scene, "scene", );
+    IMP_REQUIRE_OR(scene->ctx, theta, "theta", );
+    IMP_READS(scene);
     for (size_t i = 0; i < scene->n_params; i++) {
         const struct imp_param *p = &scene->params[i];
         for (size_t k = 0; k < p->info.count; k++)
@@ -130,14 +137,15 @@ enum imp_status imp__param_check(const struct imp_scene *scene, const struct imp
 
 enum imp_status imp_scene_set_theta(imp_scene *scene, const double *theta)
 {
-    if (!scene || !theta) return IMP_E_ARG;
+    enum imp_status st = IMP_OK;
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_REQUIRE(scene->ctx, theta, "theta");
+    IMP_SETS(scene, st);
+    if (st != IMP_OK) return st;
     for (size_t i = 0; i < scene->n_params; i++) {
         const struct imp_param *p = &scene->params[i];
-        for (size_t k = 0; k < p->info.count; k++) {
-            const enum imp_status st =
-                imp__param_check(scene, p, k, theta[p->info.offset + k]);
-            if (st != IMP_OK) return st;
-        }
+        for (size_t k = 0; k < p->info.count; k++)
+            IMP_CHECKED(imp__param_check(scene, p, k, theta[p->info.offset + k]));
     }
     for (size_t i = 0; i < scene->n_params; i++) {
         struct imp_param *p = &scene->params[i];
@@ -150,17 +158,18 @@ enum imp_status imp_scene_set_theta(imp_scene *scene, const double *theta)
 enum imp_status imp_scene_set_values(imp_scene *scene, size_t index, size_t n,
                                      const double *values)
 {
-    if (!scene || !values) return IMP_E_ARG;
+    enum imp_status st = IMP_OK;
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_REQUIRE(scene->ctx, values, "values");
     if (index >= scene->n_params)
         return imp__error(scene->ctx, IMP_E_ARG, "there is no parameter %zu", index);
     struct imp_param *p = &scene->params[index];
     if (n != p->info.count && n != 1)
         return imp__error(scene->ctx, IMP_E_ARG, "%s has %zu numbers, not %zu",
                           p->info.name, p->info.count, n);
-    for (size_t k = 0; k < n; k++) {
-        const enum imp_status st = imp__param_check(scene, p, k, values[k]);
-        if (st != IMP_OK) return st;
-    }
+    IMP_SETS(scene, st);
+    if (st != IMP_OK) return st;
+    for (size_t k = 0; k < n; k++) IMP_CHECKED(imp__param_check(scene, p, k, values[k]));
     for (size_t k = 0; k < p->info.count; k++)
         imp__param_set(p, k, values[n == 1 ? 0 : k]);
     return IMP_OK;
@@ -168,7 +177,11 @@ enum imp_status imp_scene_set_values(imp_scene *scene, size_t index, size_t n,
 
 enum imp_status imp_scene_get_values(const imp_scene *scene, size_t index, double *values)
 {
-    if (!scene || !values || index >= scene->n_params) return IMP_E_ARG;
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_REQUIRE(scene->ctx, values, "values");
+    if (index >= scene->n_params)
+        return imp__error(scene->ctx, IMP_E_ARG, "there is no parameter %zu", index);
+    IMP_READS(scene);
     const struct imp_param *p = &scene->params[index];
     for (size_t k = 0; k < p->info.count; k++) values[k] = imp__param_get(p, k);
     return IMP_OK;

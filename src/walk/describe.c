@@ -4,6 +4,7 @@
  * draw. */
 #include "base/text.h"
 #include "measure.h"
+#include "run.h"
 #include <stdio.h>
 #include <string.h>
 
@@ -146,24 +147,21 @@ static void plain(struct imp_text *t, const struct imp_scene *scene,
         beta *= v->w;
     }
     if (!w->first) imp__put(t, "  meets nothing\n");
-    if (w->dropped)
-        imp__put(
-            t,
-            w->dropped == IMP_DROP_LONG ? "  dropped: nothing ended it\n"
-            : w->dropped == IMP_DROP_BENT
-                ? "  dropped: a bent ray came to no end, or to what media cannot hold\n"
-                : "  dropped: its value is not finite, or negative\n");
+    if (w->dropped) imp__put(t, "  dropped: %s\n", imp_drop_text(w->dropped));
     plain_spec(t, "radiance", w->L, C);
 }
 
 enum imp_status imp_walk_describe(const imp_scene *scene, const struct imp_run *run,
                                   int x, int y, int64_t sample, int as_json, char **out)
 {
-    const struct imp_run none = IMP_RUN_INIT;
-    if (!scene || !out) return IMP_E_ARG;
-    if (!run) run = &none;
+    struct imp_run own;
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_REQUIRE(scene->ctx, out, "text");
+    IMP_RUN(scene->ctx, own, run);
+    IMP_FLOAT_MODE;
+    IMP_READS(scene);
     const struct imp_sensor *sensor;
-    enum imp_status st = imp__run_sensor(scene, run, &sensor);
+    enum imp_status st = imp__run_sensor(scene, &own, &sensor);
     if (st != IMP_OK) return st;
     const int width = sensor->film.crop_w, height = sensor->film.crop_h;
     if (x < 0 || y < 0 || x >= width || y >= height)
@@ -185,9 +183,9 @@ enum imp_status imp_walk_describe(const imp_scene *scene, const struct imp_run *
     const struct imp_tracer tracer = {.scene = scene,
                                       .integrator = integrator,
                                       .sensor = sensor,
-                                      .seed = run->seed,
+                                      .seed = own.seed,
                                       .guide =
-                                          imp__guide_of(scene, integrator, run->guide)};
+                                          imp__guide_of(scene, integrator, own.guide)};
     struct imp_arena arena;
     imp__arena_init(&arena, scene->ctx);
     struct imp_walk walk;

@@ -10,6 +10,7 @@
  * and after a delta lobe. Depth: emission at vertex k counts if k < max_depth, scattering
  * goes on and samples lights if k + 1 < max_depth (scene-format 11). */
 #include "step.h"
+#include <float.h>
 #include <stddef.h>
 
 /* ---- Vertices -------------------------------------------------------------------- */
@@ -229,10 +230,11 @@ void imp__walk_position(const struct imp_tracer *tracer, int x, int y, int64_t s
     position(tracer, walk_key(tracer, x, y, sample), x, y, px, py);
 }
 
-/* A walk whose value no light can have is dropped. */
+/* A walk whose value no light can have, or no picture can hold, is dropped. */
 static enum imp_drop drop_cause(imp_spec L)
 {
-    if (imp_unlikely(!imp__is_finite(L)))
+    if (imp_unlikely(
+            !(fabs(L[0]) <= FLT_MAX && fabs(L[1]) <= FLT_MAX && fabs(L[2]) <= FLT_MAX)))
         return isnan(L[0] + L[1] + L[2]) ? IMP_DROP_NAN : IMP_DROP_INFINITE;
     if (imp_unlikely(L[0] < 0 || L[1] < 0 || L[2] < 0)) return IMP_DROP_NEGATIVE;
     return IMP_DROP_NONE;

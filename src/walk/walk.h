@@ -111,17 +111,6 @@ struct imp_vertex {
 };
 #define IMP_VERTEX_VALUES offsetof(struct imp_vertex, ng) /* bytes */
 
-enum imp_drop {
-    IMP_DROP_NONE,
-    IMP_DROP_NAN,
-    IMP_DROP_INFINITE,
-    IMP_DROP_NEGATIVE,
-    IMP_DROP_MEMORY,
-    IMP_DROP_LONG,
-    IMP_DROP_BENT, /* a bent ray came to no end, or to what media cannot hold */
-    IMP_DROP_MOVED /* what moves with an active field has no derivative where it ends */
-};
-
 /* Vertices of a walk. One of more is dropped: nothing ends it, as in a closed white room
  * without roulette. With roulette at 0.95 the chance to get here is 1e-365. */
 #define IMP_WALK_MAX (1 << 14)

@@ -123,8 +123,8 @@ static double pair(const struct imp_bend_cotangent *a, const struct imp_bend_cot
 static void dot_test(const imp_field *f, const struct setup *s,
                      enum imp_bend_scheme scheme, bool stored)
 {
-    struct imp_bend_options o;
-    struct imp_bend_stats stats;
+    struct imp_bend_options o = {.size = sizeof o};
+    struct imp_bend_stats stats = {.size = sizeof stats};
     options_of(s, scheme, &o);
     if (stored) o.way = IMP_BEND_STORED;
     struct imp_bend_rays rays = kit_beam(N, s->z0, s->radius, s->strong ? 0.9 : 0.1);
@@ -228,7 +228,7 @@ static void move(imp_field *f, const double *theta, const double *dot, int what,
 static void difference_test(imp_field *f, const struct setup *s,
                             enum imp_bend_scheme scheme)
 {
-    struct imp_bend_options o;
+    struct imp_bend_options o = {.size = sizeof o};
     options_of(s, scheme, &o);
     struct imp_bend_rays rays = kit_beam(N, s->z0, s->radius, s->strong ? 0.9 : 0.1);
     const size_t n = imp_field_n_theta(f);
@@ -337,7 +337,7 @@ static void length_test(const imp_field *f)
 /* Numbers of the surfaces themselves. */
 static void surface_test(const imp_field *f, struct setup s)
 {
-    struct imp_bend_options o;
+    struct imp_bend_options o = {.size = sizeof o};
     struct imp_bend_rays rays = kit_beam(N, s.z0, s.radius, 0.1);
     double sb[4][8] = {{0}};
     uint8_t use[N];
@@ -393,7 +393,7 @@ int main(void)
 {
     kit_begin(2);
     sdf = kit_grid(IMP_FIELD_SPLINE, IMP_FIELD_ETA, 12, 1.2, 0);
-    struct imp_field_grid d;
+    struct imp_field_grid d = {.size = sizeof d};
     KIT_CHECK(imp_field_get_grid(sdf, &d));
     double *t = calloc(imp_field_n_theta(sdf), sizeof *t);
     size_t at = 0;

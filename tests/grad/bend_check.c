@@ -123,7 +123,7 @@ static void verdicts(void)
 static void lost(void)
 {
     struct imp_bend_fit_options o = IMP_BEND_FIT_OPTIONS_INIT;
-    struct imp_bend_fit_result r;
+    struct imp_bend_fit_result r = {.size = sizeof r};
     o.iterations[0] = 3;
     imp_bend *b = load(PROBLEM("-1.6", "leapfrog", GRID("1.3", ""), "", FOCUS));
     const enum imp_status st = imp_bend_fit(b, &o, &r);

@@ -128,7 +128,7 @@ int main(void)
     }
     tap_near(sum, value, 0, 1e-13 * value, "the mean of the colours one by one");
     struct imp_bend_fit_options fo = IMP_BEND_FIT_OPTIONS_INIT;
-    struct imp_bend_fit_result r;
+    struct imp_bend_fit_result r = {.size = sizeof r};
     fo.iterations[0] = 30;
     KIT_CHECK(imp_bend_fit(b, &fo, &r));
     tap_ok(r.value < 0.1 * r.start, "a fit of three colours # %.2e -> %.2e", r.start,

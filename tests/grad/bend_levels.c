@@ -11,7 +11,7 @@
 static double fit(enum imp_optimizer kind, int carry, int first, int second)
 {
     struct imp_bend_fit_options o = IMP_BEND_FIT_OPTIONS_INIT;
-    struct imp_bend_fit_result r;
+    struct imp_bend_fit_result r = {.size = sizeof r};
     imp_bend *b;
     KIT_CHECK(imp_bend_load(kit_ctx, IMP_SCENES "/bend/focus.xml", NULL, &b));
     o.optimizer = kind;

@@ -210,7 +210,7 @@ static void files(void)
         "</rays></scene>";
     imp_bend *b;
     struct imp_bend_fit_options o = IMP_BEND_FIT_OPTIONS_INIT;
-    struct imp_bend_fit_result r;
+    struct imp_bend_fit_result r = {.size = sizeof r};
     KIT_CHECK(imp_bend_load_string(kit_ctx, xml, sizeof xml - 1, "tied.xml", NULL, &b));
     o.levels = 2, o.iterations[0] = 15;
     KIT_CHECK(imp_bend_fit(b, &o, &r));
@@ -236,7 +236,7 @@ static void files(void)
     imp_field *rz = kit_field(18, &name);
     KIT_CHECK(imp_field_write(rz, path));
     KIT_CHECK(imp_field_read(kit_ctx, path, NULL, &read));
-    struct imp_field_rz d[2];
+    struct imp_field_rz d[2] = {{.size = sizeof *d}, {.size = sizeof *d}};
     KIT_CHECK(imp_field_get_rz(rz, &d[0]));
     KIT_CHECK(imp_field_get_rz(read, &d[1]));
     tap_ok(read->n_theta == rz->n_theta && d[0].cells_z == d[1].cells_z &&

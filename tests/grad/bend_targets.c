@@ -134,7 +134,7 @@ static void fits(void)
         KIT_CHECK(imp_bend_add_target(b, &t));
         KIT_CHECK(imp_bend_hold_number(b, 0, NAN));
         struct imp_bend_fit_options fo = IMP_BEND_FIT_OPTIONS_INIT;
-        struct imp_bend_fit_result res;
+        struct imp_bend_fit_result res = {.size = sizeof res};
         fo.iterations[0] = 200;
         fo.tolerance = 1e-9;
         KIT_CHECK(imp_bend_fit(b, &fo, &res));
@@ -162,7 +162,7 @@ static void fits(void)
         KIT_CHECK(imp_bend_add_target(b, &t));
         KIT_CHECK(imp_bend_add_smoothness(b, 1e-7, 2, 0));
         struct imp_bend_fit_options fo = IMP_BEND_FIT_OPTIONS_INIT;
-        struct imp_bend_fit_result res;
+        struct imp_bend_fit_result res = {.size = sizeof res};
         fo.levels = 2;
         fo.iterations[0] = 20;
         fo.checkpoint = "bend_targets.checkpoint";

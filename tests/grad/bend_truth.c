@@ -171,7 +171,7 @@ static void bars_make(struct problem *p)
 static void problem_make(struct problem *p)
 {
     p->f = kit_grid(IMP_FIELD_SPLINE, IMP_FIELD_ETA, 16, 1, 0);
-    struct imp_field_grid g;
+    struct imp_field_grid g = {.size = sizeof g};
     KIT_CHECK(imp_field_get_grid(p->f, &g));
     const size_t n = imp_field_n_theta(p->f);
     double *t = calloc(n, sizeof *t);
@@ -201,7 +201,7 @@ static void against_duals(struct problem *p)
         imp_bend_adjoint(p->f, &p->o, &p->rays, p->exits, NULL, p->bars, NULL, &g, NULL));
     double got = 0, want = 0, c = 0, c_prod = 0;
     for (size_t i = 0; i < n; i++) got += bar[i] * dot[i];
-    struct dfield f = {.theta = theta, .dot = dot};
+    struct dfield f = {.g = {.size = sizeof f.g}, .theta = theta, .dot = dot};
     KIT_CHECK(imp_field_get_grid(p->f, &f.g));
     for (int k = 0; k < 3; k++) f.m[k] = f.g.cells[k] + 3;
     const double l = sqrt(1 + 0.3 * 0.3 + 0.15 * 0.15);
@@ -261,7 +261,7 @@ static void plain_adjoint(struct problem *p, enum plant plant, double *bar)
     const double t = 0.033;
     const double l = sqrt(1 + 0.3 * 0.3 + 0.15 * 0.15);
     const double n[3] = {0.3 / l, -0.15 / l, 1 / l};
-    struct imp_field_grid gd;
+    struct imp_field_grid gd = {.size = sizeof gd};
     KIT_CHECK(imp_field_get_grid(p->f, &gd));
     for (int i = 0; i < N; i++) {
         const struct imp_bend_exit *e = &p->exits[i];

@@ -263,7 +263,7 @@ static double pattern(int x, int y, int c)
  */
 static struct imp_estimate functional(imp_film *film)
 {
-    struct imp_film_info info;
+    struct imp_film_info info = {.size = sizeof info};
     struct imp_estimate e = {0};
     double variance = 0;
     imp_film_get_info(film, &info);
@@ -307,7 +307,7 @@ static double moved(imp_scene *s, size_t param, size_t count, const double *old,
 static void fresh(imp_scene *s, imp_problem *p, size_t param, const double *v,
                   bool linear, const char *what)
 {
-    struct imp_param_info info;
+    struct imp_param_info info = {.size = sizeof info};
     struct imp_run run = IMP_RUN_INIT;
     const int spp = is_long ? 64 : 4;
     static uint64_t seed = 1000;
@@ -456,7 +456,7 @@ static void frozen(imp_problem *p, const char *what, bool at_bound)
 static bool active_has(imp_problem *p, imp_scene *s, const char *part)
 {
     for (size_t i = 0; i < imp_problem_n(p); i++) {
-        struct imp_param_info info;
+        struct imp_param_info info = {.size = sizeof info};
         size_t param;
         test_must(ctx, imp_problem_variable(p, i, &param, NULL, NULL, NULL));
         test_must(ctx, imp_scene_get_param(s, param, &info));
@@ -497,7 +497,7 @@ static void check_one(const struct subject *q, const char *integrator,
     }
     frozen(all, what, false);
     for (size_t k = 0; k < imp_scene_n_params(s); k++) {
-        struct imp_param_info info;
+        struct imp_param_info info = {.size = sizeof info};
         test_must(ctx, imp_scene_get_param(s, k, &info));
         if (strncmp(info.name, "subject", 7) != 0) continue;
         if (!(info.flags & IMP_PARAM_DIFFERENTIABLE)) continue;

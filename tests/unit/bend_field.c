@@ -96,7 +96,7 @@ static void check_linear(enum imp_field_interp interp)
 static void check_samples(enum imp_field_interp interp)
 {
     imp_field *f = kit_grid(interp, IMP_FIELD_ETA, 6, 1, 0), *fine = NULL;
-    struct imp_field_grid d;
+    struct imp_field_grid d = {.size = sizeof d};
     KIT_CHECK(imp_field_get_grid(f, &d));
     const int m[3] = {d.cells[0] + 1, d.cells[1] + 1, d.cells[2] + 1};
     const size_t n_s = (size_t)m[0] * m[1] * m[2], n = imp_field_n_theta(f);

@@ -13,7 +13,7 @@ static struct imp_bend_exit e[N];
 static struct imp_bend_stats trace(const imp_field *f, const struct imp_bend_options *o)
 {
     struct imp_bend_rays r = kit_beam(N, -0.8, 0.7, 0.2);
-    struct imp_bend_stats s;
+    struct imp_bend_stats s = {.size = sizeof s};
     KIT_CHECK(imp_bend_trace(f, o, &r, e, NULL, &s));
     kit_rays_free(&r);
     return s;

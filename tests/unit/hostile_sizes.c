@@ -234,7 +234,7 @@ static void endless(void)
            "walks without end # %s", imp_last_error(ctx));
     char *text = NULL;
     test_must(ctx, imp_walk_describe(s, &run, 3, 3, 0, 0, &text));
-    tap_ok(strstr(text, "nothing ended it") != NULL, "the walk says so");
+    tap_ok(strstr(text, "nothing ended the walk") != NULL, "the walk says so");
     imp_free(ctx, text);
     imp_problem *p = test_problem(ctx, s, "*");
     static float seed[16 * 16 * 3];

@@ -1,0 +1,20 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "run.h"
+#include <math.h>
+
+enum imp_status imp__run_take(imp_context *ctx, const char *function,
+                              const struct imp_run *run, struct imp_run *own)
+{
+    struct imp_run r = IMP_RUN_INIT;
+    IMP_CHECKED(imp__options_take(ctx, function, "run", run, &r, sizeof r));
+    if (r.spp < 0)
+        return imp__error(ctx, IMP_E_ARG, "%s: run->spp %d is negative", function, r.spp);
+    if (!(r.time_limit_s >= 0) || !isfinite(r.time_limit_s))
+        return imp__error(ctx, IMP_E_ARG, "%s: run->time_limit_s %g is not a number >= 0",
+                          function, r.time_limit_s);
+    if (!(r.drop_budget >= 0 && r.drop_budget <= 1))
+        return imp__error(ctx, IMP_E_ARG, "%s: run->drop_budget %g is outside [0, 1]",
+                          function, r.drop_budget);
+    *own = r;
+    return IMP_OK;
+}
