@@ -163,4 +163,5 @@ const struct command command_bench = {
      1,
      1},
     run_bench,
-    1};
+    1,
+    " numbers with a gradient"};

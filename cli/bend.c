@@ -107,7 +107,7 @@ static int write_exits(const char *path)
     }
     imp_bend_get_rays(bend, &rays);
     struct output to = {0};
-    rc = output_open(&to, path);
+    rc = output_open(&to, path, OUTPUT_TABLE);
     FILE *f = to.file;
     if (f) fprintf(f, "ray,bundle,x,y,z,vx,vy,vz,path,steps,flags\n");
     for (size_t i = 0; f && i < n; i++)
@@ -124,7 +124,10 @@ static int trace(void)
     struct imp_bend_stats s = IMP_BEND_STATS_INIT;
     struct imp_bend_options bo = IMP_BEND_OPTIONS_INIT;
     const size_t n = imp_bend_n_targets(bend);
-    double value, error, order, *parts = cli_alloc(n, sizeof *parts);
+    double value, error, order, *parts;
+    const int rc = cli.out ? overwrite_check(cli.out, OUTPUT_TABLE) : 0;
+    if (rc) return rc;
+    parts = cli_alloc(n, sizeof *parts);
     const double start = cli_now();
     enum imp_status st = imp_bend_objective(bend, &value, NULL, parts, &s);
     const double seconds = cli_now() - start;
@@ -169,6 +172,8 @@ static int check(void)
     const struct imp_check_row *rows;
     size_t n;
     int ok = 1;
+    const int rc = cli_redirect();
+    if (rc) return rc;
     const enum imp_status st = imp_bend_check(bend, &rows, &n);
     if (st != IMP_OK) return cli_fail(st, cli.scene_path);
     struct json j = {0};
@@ -216,8 +221,15 @@ static int fit(void) { return bend_fit(bend); }
 static int view(void)
 {
     const char *folder = cli.out ? cli.out : "out";
+    struct json json, *j = NULL;
     int rc = make_folder(folder);
-    if (!rc) rc = bend_view(bend, folder, "");
+    if (!rc) rc = bend_view_writable(folder, "");
+    if (!rc && cli.json) {
+        json = cli_json();
+        j = &json;
+    }
+    if (!rc) rc = bend_view(bend, folder, "", j);
+    if (j) cli_json_end(j);
     if (!rc) cli_say("pictures in %s", folder);
     return rc;
 }
@@ -244,11 +256,13 @@ static int run(int n, char **operand)
                      operand[0], near ? ", did you mean " : "", near ? near : "");
 }
 
-const struct command command_bend = {{"bend",
-                                      "trace|check|fit|view FILE",
-                                      "rays in a graded index: trace, check, fit, view",
-                                      {options_general, options_file, bend_fit_options},
-                                      2,
-                                      2},
-                                     run,
-                                     0};
+const struct command command_bend = {
+    {"bend",
+     "trace|check|fit|view FILE",
+     "rays in a graded index: trace, check, fit, view",
+     {options_general_either, options_file, bend_fit_options},
+     2,
+     2},
+    run,
+    0,
+    "check "};

@@ -11,7 +11,10 @@ extern const struct arg_option bend_fit_options[];
 /* Counts of a trace. */
 void bend_print_stats(FILE *to, const struct imp_bend_stats *s);
 void bend_put_stats(struct json *j, const struct imp_bend_stats *s);
-/* Pictures of a problem, DIR/<prefix>slice-x.png, ..., rays, spots, images. */
-int bend_view(imp_bend *bend, const char *folder, const char *prefix);
+/* Pictures of a problem, DIR/<prefix>slice-x.png, ..., rays, spots, images; listed in j
+ * unless it is NULL. */
+int bend_view(imp_bend *bend, const char *folder, const char *prefix, struct json *j);
+/* May they all be written? */
+int bend_view_writable(const char *folder, const char *prefix);
 
 #endif

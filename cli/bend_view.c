@@ -9,19 +9,58 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { SIDE = 512, PATHS = 60 };
+enum { SIDE = 512, PATHS = 60, TARGETS = 8 };
 
+/* The pictures written, for --json; NULL: not asked for. */
+static struct json *list;
+
+static char *picture_path(const char *folder, const char *prefix, const char *name)
+{
+    char file[128];
+    snprintf(file, sizeof file, "%s%s.png", prefix, name);
+    return join_path(folder, file);
+}
+
+int bend_view_writable(const char *folder, const char *prefix)
+{
+    static const char *const fixed[] = {"slice-x", "slice-y", "slice-z", "rays-x",
+                                        "rays-y"};
+    static const char *const numbered[] = {"spot-%d", "image-%d", "target-%d"};
+    const int n_fixed = sizeof fixed / sizeof *fixed;
+    int rc = 0;
+    for (int k = 0; k < n_fixed + 3 * TARGETS && !rc; k++) {
+        char name[32];
+        if (k < n_fixed) snprintf(name, sizeof name, "%s", fixed[k]);
+        else snprintf(name, sizeof name, numbered[(k - n_fixed) % 3], (k - n_fixed) / 3);
+        char *path = picture_path(folder, prefix, name);
+        rc = overwrite_check(path, OUTPUT_PNG);
+        free(path);
+    }
+    return rc;
+}
+
+/* In --json an object is left open, for what is known of the picture. */
 static int picture_save(imp_film *film, const char *folder, const char *prefix,
                         const char *name)
 {
-    char file[128];
     struct imp_write_options w = IMP_WRITE_OPTIONS_INIT;
-    snprintf(file, sizeof file, "%s%s.png", prefix, name);
-    char *path = join_path(folder, file);
+    char *path = picture_path(folder, prefix, name);
     const enum imp_status st = imp_film_write(film, path, &w);
     const int rc = st == IMP_OK ? 0 : cli_fail(st, path);
+    if (list && !rc) {
+        json_object(list, NULL);
+        json_text(list, "file", path);
+    }
     free(path);
     return rc;
+}
+static void list_number(const char *key, double value)
+{
+    if (list) json_number(list, key, value);
+}
+static void list_end(int rc)
+{
+    if (list && !rc) json_end_object(list);
 }
 
 static void put(float *p, int x, int y, const float c[3], float a)
@@ -164,6 +203,13 @@ static int spots(imp_bend *b, size_t target, const char *folder, const char *pre
     char name[64];
     snprintf(name, sizeof name, "spot-%zu", target);
     const int rc = picture_save(film, folder, prefix, name);
+    if (list && !rc) {
+        json_integer(list, "target", (int64_t)target);
+        json_integer(list, "rays", (int64_t)n);
+    }
+    if (!rc) list_number("rms", rms);
+    if (!rc) list_number("width", 6 * rms);
+    list_end(rc);
     cli_say("target %zu: %zu rays, rms spot %.4g; the picture is %.4g wide", target, n,
             rms, 6 * rms);
     imp_film_destroy(film);
@@ -185,18 +231,24 @@ static int image(imp_bend *b, size_t target, const struct imp_bend_target *t,
     for (size_t i = 0; i < n; i++) p[i] = p[i] / most;
     snprintf(name, sizeof name, "image-%zu", target);
     int rc = st == IMP_OK ? picture_save(film, folder, prefix, name) : cli_fail(st, NULL);
+    list_end(rc);
     for (size_t i = 0; i < n; i++) p[i] = t->pixels[i] / most;
     snprintf(name, sizeof name, "target-%zu", target);
-    if (!rc && !*prefix) rc = picture_save(film, folder, prefix, name);
+    if (!rc && !*prefix) {
+        rc = picture_save(film, folder, prefix, name);
+        list_end(rc);
+    }
     imp_film_destroy(film);
     return rc;
 }
 
-int bend_view(imp_bend *b, const char *folder, const char *prefix)
+int bend_view(imp_bend *b, const char *folder, const char *prefix, struct json *j)
 {
     static const int axes[3][2] = {{1, 2}, {0, 2}, {0, 1}}; /* x, y, z held */
     double lo[3], hi[3], range[2];
     int rc = 0;
+    list = j;
+    if (list) json_array(list, "pictures");
     box_of(b, lo, hi);
     for (int k = 0; k < 3 && !rc; k++) {
         imp_film *film;
@@ -208,21 +260,29 @@ int bend_view(imp_bend *b, const char *folder, const char *prefix)
               range);
         snprintf(name, sizeof name, "slice-%c", "xyz"[k]);
         rc = picture_save(film, folder, prefix, name);
+        if (!rc) {
+            list_number("at", (lo[k] + hi[k]) / 2);
+            list_number("index_min", range[0]);
+            list_number("index_max", range[1]);
+        }
+        list_end(rc);
         cli_say("slice %c = %.4g: index %.6g to %.6g", "xyz"[k], (lo[k] + hi[k]) / 2,
                 range[0], range[1]);
         if (!rc && k < 2) {
             paths_draw(b, axes[k][0], axes[k][1], lo, hi, imp_film_mean(film));
             snprintf(name, sizeof name, "rays-%c", "xyz"[k]);
             rc = picture_save(film, folder, prefix, name);
+            list_end(rc);
         }
         imp_film_destroy(film);
     }
-    for (size_t i = 0; i < imp_bend_n_targets(b) && i < 8 && !rc; i++) {
+    for (size_t i = 0; i < imp_bend_n_targets(b) && i < TARGETS && !rc; i++) {
         struct imp_bend_target t;
         if (imp_bend_get_target(b, i, &t) != IMP_OK) continue;
         rc = t.type == IMP_BEND_IMAGE || t.type == IMP_BEND_FARFIELD
                  ? image(b, i, &t, folder, prefix)
                  : spots(b, i, folder, prefix);
     }
+    if (list) json_end_array(list);
     return rc;
 }

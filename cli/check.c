@@ -120,4 +120,5 @@ const struct command command_check = {
      1,
      1},
     run_check,
-    1};
+    1,
+    "method "};

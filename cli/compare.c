@@ -108,4 +108,5 @@ const struct command command_compare = {{"compare",
                                          2,
                                          2},
                                         run_compare,
-                                        1};
+                                        1,
+                                        "mean  "};

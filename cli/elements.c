@@ -4,6 +4,7 @@
  * with --sensitivity what every light and reflectance does to the measurement, and with
  * --fit lights and reflectances for wanted measurements. */
 #include "elements.h"
+#include "overwrite.h"
 #include "picture.h"
 #include "problem.h"
 #include "progress.h"
@@ -240,6 +241,19 @@ static int print_sensitivity(imp_elements *e, struct json *j)
     return 0;
 }
 
+/* May everything be written? */
+static int writable(void)
+{
+    int rc = 0;
+    if (!o.no_picture) rc = picture_writable(cli.out ? cli.out : "elements.exr", 1);
+    if (!rc && o.save) rc = overwrite_check(o.save, OUTPUT_SOLUTION);
+    for (size_t k = 0; k < o.exports.n && !rc; k++) {
+        const char *path = o.exports.item[k];
+        rc = overwrite_check(path, ends_with(path, ".json") ? OUTPUT_JSON : OUTPUT_PLY);
+    }
+    return rc ? rc : elements_fit_writable();
+}
+
 static int run_elements(int n, char **operand)
 {
     struct imp_elements_options options_e = IMP_ELEMENTS_OPTIONS_INIT;
@@ -249,6 +263,7 @@ static int run_elements(int n, char **operand)
     (void)n;
     int rc = cli_load(operand[0]), complete = 1;
     if (!rc) rc = options_make(&options_e);
+    if (!rc) rc = writable();
     if (rc) return rc;
     const struct imp_run run = cli_run();
     if (o.open) {
@@ -297,4 +312,5 @@ const struct command command_elements = {
      1,
      1},
     run_elements,
-    0};
+    0,
+    NULL};

@@ -57,16 +57,42 @@ static char *picture_path(const char *name, size_t i)
     return join_path(cli.out, file);
 }
 
+/* May everything be written? A checkpoint is begun over, or gone on from, when that is
+ * said. */
+static int writable(const struct block *blocks, size_t n_blocks)
+{
+    static const struct {
+        const char *name;
+        enum output_kind kind;
+    } files[] = {{"loss.csv", OUTPUT_TABLE},
+                 {"loss.svg", OUTPUT_CURVE},
+                 {"parameters.json", OUTPUT_JSON},
+                 {"recovered.txt", OUTPUT_SETTINGS}};
+    static const char *const pictures[] = {"before", "recovered", "target"};
+    int rc = checkpoint_writable(o.checkpoint, o.resume);
+    if (rc || !cli.out) return rc;
+    rc = make_folder(cli.out);
+    for (size_t k = 0; k < sizeof files / sizeof *files && !rc; k++)
+        rc = overwrite_check_in(cli.out, files[k].name, files[k].kind);
+    for (size_t i = 0; i < problem_options.targets.n; i++)
+        for (size_t k = 0; k < 3 && !rc; k++) {
+            char *path = picture_path(pictures[k], i);
+            if (k == 2) memcpy(strrchr(path, '.'), ".png", 4);
+            rc = picture_writable(path, 1);
+            free(path);
+        }
+    for (size_t k = 0; k < n_blocks && !rc; k++)
+        if (block_is_large(&blocks[k])) rc = block_writable(&blocks[k], cli.out);
+    if (!rc && o.sheet) rc = picture_writable(o.sheet, 0);
+    return rc;
+}
+
 static int write_one(const char *name, size_t i)
 {
-    struct imp_target target = IMP_TARGET_INIT;
     struct imp_run run = cli_run();
     const struct picture_options po = {.standard_error = 1};
     imp_film *film = NULL;
-    int rc = picture_target(problem_options.targets.item[i], NULL, &target);
-    if (rc) return rc;
-    run.sensor = target.sensor;
-    picture_target_free(&target);
+    run.sensor = target_sensor(i);
     run.time_limit_s = 0;
     if (o.picture_spp) run.spp = o.picture_spp;
     const enum imp_status st = imp_render(cli.scene, &run, &film);
@@ -74,7 +100,7 @@ static int write_one(const char *name, size_t i)
     if (!film) return cli_done();
     char *path = picture_path(name, i);
     picture_stamp(film, &run);
-    rc = picture_write(film, path, &po);
+    const int rc = picture_write(film, path, &po);
     free(path);
     imp_film_destroy(film);
     return rc;
@@ -138,7 +164,7 @@ static int write_history(const struct imp_fit_result *r)
 {
     char *csv = join_path(cli.out, "loss.csv"), *svg = join_path(cli.out, "loss.svg");
     struct output to;
-    int rc = output_open(&to, csv);
+    int rc = output_open(&to, csv, OUTPUT_TABLE);
     if (!rc) {
         fprintf(to.file, "iteration,loss,se\n");
         for (size_t i = 0; i < r->n_history; i++)
@@ -185,7 +211,7 @@ static void put_json(struct json *j, const struct imp_fit_result *r,
     json_text(j, "loss", loss_word());
     json_seed(j, "seed", cli.seed);
     const struct imp_run run = cli_run();
-    json_integer(j, "spp", cli_spp(&run));
+    json_integer(j, "spp", problem_spp(&run));
     json_integer(j, "iterations", r->iterations);
     json_number(j, "value", r->objective.value);
     json_number(j, "se", r->objective.se);
@@ -218,7 +244,7 @@ static int write_json(const struct imp_fit_result *r, const struct block *blocks
 {
     char *path = join_path(cli.out, "parameters.json");
     struct output to;
-    int rc = output_open(&to, path);
+    int rc = output_open(&to, path, OUTPUT_JSON);
     if (!rc) {
         struct json j = {to.file, 0};
         json_object(&j, NULL);
@@ -303,7 +329,7 @@ static int write_set(const struct imp_fit_result *r, const struct block *blocks,
 {
     char *path = join_path(cli.out, "recovered.txt");
     struct output to;
-    int rc = output_open(&to, path);
+    int rc = output_open(&to, path, OUTPUT_SETTINGS);
     for (size_t k = 0; !rc && k < n_blocks; k++) {
         const struct block *b = &blocks[k];
         if (block_is_large(b)) continue;
@@ -317,10 +343,9 @@ static int write_set(const struct imp_fit_result *r, const struct block *blocks,
     return rc;
 }
 
-static int answer(imp_problem *problem, const struct imp_fit_result *r)
+static int answer(imp_problem *problem, const struct imp_fit_result *r,
+                  const struct block *blocks, size_t n_blocks)
 {
-    size_t n_blocks;
-    struct block *blocks = problem_blocks(problem, &n_blocks);
     char **paths = cli_alloc(n_blocks, sizeof *paths);
     int rc = 0;
     if (cli.out) {
@@ -339,7 +364,6 @@ static int answer(imp_problem *problem, const struct imp_fit_result *r)
     if (r->warning) cli_say("importon: warning: %s", r->warning);
     for (size_t k = 0; k < n_blocks; k++) free(paths[k]);
     free(paths);
-    free(blocks);
     return rc;
 }
 
@@ -350,6 +374,8 @@ static int run_fit(int n, char **operand)
     struct imp_fit_options fit = IMP_FIT_OPTIONS_INIT;
     const struct imp_fit_result *result = NULL;
     imp_problem *problem = NULL;
+    struct block *blocks;
+    size_t n_blocks;
     (void)n;
     int rc = cli_load(operand[0]);
     if (!rc && !problem_options.targets.n)
@@ -368,25 +394,25 @@ static int run_fit(int n, char **operand)
     fit.intervals = !o.no_intervals;
     fit.checkpoint = o.checkpoint;
     fit.resume = o.resume;
-    if (cli.out) {
-        rc = make_folder(cli.out);
-        if (!rc && o.sheet) rc = picture_writable(o.sheet);
-        if (!rc) rc = write_targets();
-        if (!rc) rc = write_pictures("before");
-    }
+    blocks = problem_blocks(problem, &n_blocks);
+    rc = writable(blocks, n_blocks);
+    if (!rc && cli.out) rc = write_targets();
+    if (!rc && cli.out) rc = write_pictures("before");
     if (!rc) {
         const struct imp_run run = cli_run();
         const enum imp_status st = imp_fit(problem, &fit, &run, &result);
         /* a checkpoint that cannot be written names itself */
         if (cli_failed(st)) rc = cli_fail(st, st == IMP_E_IO ? NULL : cli.scene_path);
     }
-    if (!rc && result) rc = answer(problem, result);
+    if (!rc && result) rc = answer(problem, result, blocks, n_blocks);
     if (!rc && result && cli.out) {
         progress_resume(); /* after Ctrl-C the state reached is still written */
         rc = write_pictures("recovered");
         if (!rc && o.sheet) rc = write_sheet();
     }
+    free(blocks);
     problem_close(problem);
+    if (!rc) checkpoint_hint(o.checkpoint);
     return rc ? rc : cli_done();
 }
 
@@ -395,8 +421,9 @@ const struct command command_fit = {
      "SCENE --target FILE",
      "recover parameters from target pictures",
      {options, options_targets, options_params, options_run, options_guide, options_scene,
-      options_general},
+      options_general_folder},
      1,
      1},
     run_fit,
-    0};
+    0,
+    NULL};

@@ -13,10 +13,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char *adjoint_path;
+static const char *adjoint_path, *textures;
 static const struct arg_option options[] = {
     {ARG_TEXT, 0, "adjoint", "FILE",
      "derivative of sum(FILE * picture), in place of a loss", &adjoint_path, 0, 0, NULL},
+    {ARG_TEXT, 0, "textures", "DIR", "gradients of textures go there, as pictures",
+     &textures, 0, 0, NULL},
     {0}};
 
 struct result {
@@ -290,11 +292,13 @@ static int run_gradient(int n, char **operand)
     blocks = problem_blocks(problem, &n_blocks);
     paths = cli_alloc(n_blocks, sizeof *paths);
 
-    if (cli.out) rc = make_folder(cli.out);
+    if (textures) rc = make_folder(textures);
+    for (size_t k = 0; k < n_blocks && !rc && textures; k++)
+        if (block_is_large(&blocks[k])) rc = block_writable(&blocks[k], textures);
     if (!rc) rc = compute(problem, &run, &r);
-    for (size_t k = 0; k < n_blocks && !rc && cli.out; k++)
+    for (size_t k = 0; k < n_blocks && !rc && textures; k++)
         if (block_is_large(&blocks[k]))
-            rc = block_write(&blocks[k], r.grad, r.se, cli.out, &paths[k]);
+            rc = block_write(&blocks[k], r.grad, r.se, textures, &paths[k]);
     if (!rc) {
         if (cli.json) print_json(&run, &r, blocks, n_blocks, paths);
         else print_text(&r, blocks, n_blocks, paths);
@@ -319,4 +323,5 @@ const struct command command_gradient = {
      1,
      1},
     run_gradient,
-    0};
+    1,
+    " +- "};

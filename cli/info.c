@@ -158,4 +158,5 @@ const struct command command_info = {{"info",
                                       1,
                                       1},
                                      run_info,
-                                     1};
+                                     1,
+                                     " triangles)"};

@@ -59,7 +59,7 @@ static int write_paths(const struct imp_run *run)
     const enum imp_status st = imp_scene_get_sensor(cli.scene, run->sensor, &info);
     if (st != IMP_OK) return cli_fail(st, cli.scene_path);
     struct output to;
-    int rc = output_open(&to, o.paths);
+    int rc = output_open(&to, o.paths, OUTPUT_WALKS);
     if (rc) return rc;
     const int count = o.count ? o.count : 100;
     for (int i = 0; i < count && !rc && !progress_interrupted(); i++) {
@@ -145,12 +145,16 @@ static int run_render(int n, char **operand)
     if (o.sample && !one && !o.paths)
         return cli_error(EXIT_USAGE, "--sample needs --pixel or --paths");
     if (o.count && !o.paths) return cli_error(EXIT_USAGE, "--count needs --paths");
-    if (one) return describe(&run, o.pixel[0], o.pixel[1], o.sample, cli.json, stdout);
+    if (one) {
+        rc = cli_redirect();
+        return rc ? rc
+                  : describe(&run, o.pixel[0], o.pixel[1], o.sample, cli.json, stdout);
+    }
     if (o.paths) return write_paths(&run);
 
     char *automatic = cli.out ? NULL : default_output(&run);
     const char *path = cli.out ? cli.out : automatic;
-    rc = picture_writable(path);
+    rc = picture_writable(path, !o.picture.no_preview);
     if (!rc) {
         const enum imp_status st = imp_render(cli.scene, &run, &film);
         if (cli_failed(st)) rc = cli_fail(st, cli.scene_path);
@@ -173,4 +177,5 @@ const struct command command_render = {
      1,
      1},
     run_render,
-    0};
+    0,
+    "walk: pixel"};

@@ -22,15 +22,16 @@ static void report(struct imp__fit *f, double fraction)
     f->last_report_s = now;
     const double elapsed = now - f->start_s;
     const int done = f->search ? f->search->iteration - f->first_iteration : 0;
+    const bool closing = f->final_total > 0; /* the search is over */
     const struct imp_progress p = {
         .size = sizeof p,
-        .stage = "fit",
+        .stage = closing ? "intervals" : "fit",
         .fraction = f->fraction,
         .elapsed_s = elapsed,
         .eta_s = f->fraction > 1e-3 ? elapsed * (1 - f->fraction) / f->fraction : -1,
-        .rate = elapsed > 0 ? done / elapsed : 0,
+        .rate = elapsed > 0 && !closing ? done / elapsed : 0,
         .rate_unit = "iterations",
-        .note = f->note[0] ? f->note : NULL};
+        .note = f->note[0] && !closing ? f->note : NULL};
     if (f->outer.progress(&p, f->outer.progress_payload) != 0) f->stopped = true;
 }
 
