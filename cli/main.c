@@ -86,9 +86,11 @@ int main(int argc, char **argv)
     }
     if (!strcmp(name, "--help") || !strcmp(name, "-h") || !strcmp(name, "help")) {
         if (argc > 2 && !(command = find(argv[2]))) return EXIT_USAGE;
-        if (argc > 2) args_help(&command->args, stdout);
+        rc = EXIT_DONE;
+        if (argc > 3) rc = args_help_option(&command->args, argv[3], stdout);
+        else if (argc > 2) args_help(&command->args, stdout);
         else print_usage(stdout);
-        return finish(EXIT_DONE);
+        return finish(rc);
     }
     if (!(command = find(name))) return EXIT_USAGE;
 
