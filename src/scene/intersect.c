@@ -57,9 +57,11 @@ static void device_release(void *memory)
 static enum imp_status device_error(imp_context *ctx, enum RTCError error,
                                     const char *text)
 {
-    return imp__error(ctx,
-                      error == RTC_ERROR_OUT_OF_MEMORY ? IMP_E_NOMEM : IMP_E_UNSUPPORTED,
-                      "Embree: error %d%s%s", (int)error, *text ? ": " : "", text);
+    const char *colon = *text ? ": " : "";
+    if (error == RTC_ERROR_OUT_OF_MEMORY)
+        return imp__error(ctx, IMP_E_NOMEM, "out of memory for Embree%s%s", colon, text);
+    return imp__error(ctx, IMP_E_UNSUPPORTED, "Embree: error %d%s%s", (int)error, colon,
+                      text);
 }
 
 /* The context's device; two threads may ask for the first time at once. */
@@ -77,7 +79,7 @@ static enum imp_status device_get(imp_context *ctx, struct device **out)
     dev->ctx = ctx;
     pthread_mutex_init(&dev->lock, NULL);
     dev->rtc = rtcNewDevice("threads=1,ignore_config_files=1");
-    if (!dev->rtc) IMP_TRY(device_error(ctx, rtcGetDeviceError(NULL), "no device"));
+    if (!dev->rtc) IMP_TRY(device_error(ctx, rtcGetDeviceError(NULL), ""));
     rtcSetDeviceErrorFunction(dev->rtc, error_keep, dev);
     rtcSetDeviceMemoryMonitorFunction(dev->rtc, bytes_count, dev);
 
