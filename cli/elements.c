@@ -214,7 +214,7 @@ static int print_sensitivity(imp_elements *e, struct json *j)
     const enum imp_status st = imp_elements_sensitivity(e, &rows, &n);
     if (st != IMP_OK) return cli_fail(st, cli.scene_path);
     if (j) json_array(j, "sensitivity");
-    else printf("%-44s %13s %13s %9s\n", "number", "value", "derivative", "share");
+    else printf("%-44s %13s %13s %10s\n", "number", "value", "derivative", "elasticity");
     for (size_t k = 0; k < n; k++) {
         const struct imp_elements_row *r = &rows[k];
         const char *name = row_name(r, text, sizeof text);
@@ -228,7 +228,7 @@ static int print_sensitivity(imp_elements *e, struct json *j)
             json_number(j, "share", r->share);
             json_end_object(j);
         } else {
-            printf("%-44s %13.6g %13.6g %8.3f%%\n", name, r->value, r->derivative,
+            printf("%-44s %13.6g %13.6g %9.3f%%\n", name, r->value, r->derivative,
                    100 * r->share);
         }
     }
@@ -236,7 +236,7 @@ static int print_sensitivity(imp_elements *e, struct json *j)
         json_end_array(j);
         json_number(j, "euler", sum);
     } else {
-        printf("the lights' shares add up to %.6f%%\n", 100 * sum);
+        printf("the lights' elasticities add up to %.6f%%\n", 100 * sum);
     }
     return 0;
 }

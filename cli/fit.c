@@ -281,8 +281,8 @@ static void print_table(const struct imp_fit_result *r, const struct block *bloc
     for (size_t k = 0; k < n_blocks; k++)
         if ((int)strlen(blocks[k].info.name) + 3 > width)
             width = (int)strlen(blocks[k].info.name) + 3;
-    printf("%-*s  %-11s %-11s %s\n", width, "parameter", "start", "value",
-           "95 % interval");
+    printf("%-*s  %-11s %-11s %-22s %s\n", width, "parameter", "start", "value",
+           "95 % interval", "unit");
     for (size_t k = 0; k < n_blocks; k++) {
         const struct block *b = &blocks[k];
         char name[512];
@@ -295,10 +295,12 @@ static void print_table(const struct imp_fit_result *r, const struct block *bloc
             const struct imp_fit_variable *v = &r->variables[b->first + i];
             printf("%-*s  %-11.6g %-11.6g ", width,
                    cli_number_name(&b->info, i, name, sizeof name), v->start, v->value);
+            char interval[64] = "-";
             if (isfinite(v->lo95) && isfinite(v->hi95))
-                printf("[%.6g, %.6g]", v->lo95, v->hi95);
-            else if (!o.no_intervals && !v->determined) printf("not determined");
-            else printf("-");
+                snprintf(interval, sizeof interval, "[%.6g, %.6g]", v->lo95, v->hi95);
+            else if (!o.no_intervals && !v->determined)
+                snprintf(interval, sizeof interval, "not determined");
+            printf("%-22s %s", interval, b->info.unit);
             printf("%s\n", v->at_bound < 0   ? "  at its lower bound"
                            : v->at_bound > 0 ? "  at its upper bound"
                                              : "");

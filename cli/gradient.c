@@ -3,7 +3,7 @@
  * importon gradient: the derivative of a number with respect to the scene's parameters,
  * with standard errors. The number is a loss against target pictures; or the inner
  * product of the picture with a given adjoint image; or, with neither, the mean of the
- * picture. */
+ * picture over its pixels and channels. */
 #include "command.h"
 #include "picture.h"
 #include "problem.h"
@@ -183,7 +183,7 @@ static int compute(imp_problem *problem, const struct imp_run *run, struct resul
     const int loss = problem_options.targets.n > 0;
     r->functional = loss ? "loss" : adjoint_path ? "adjoint" : "mean";
     r->rounds = 1;
-    r->spp = cli_spp(run);
+    r->spp = problem_spp(run);
     if (!loss) rc = adjoint_image(run, &seed);
     if (!rc && cli.time_s > 0) {
         rc = estimate_for(problem, *run, seed, r);
@@ -241,8 +241,10 @@ static void print_text(const struct result *r, const struct block *blocks,
     for (size_t k = 0; k < n_blocks; k++)
         if ((int)strlen(blocks[k].info.name) + 3 > width)
             width = (int)strlen(blocks[k].info.name) + 3;
-    printf("%-*s  %-14.8g +- %.2g%s\n\n", width, r->functional, r->value.value,
+    printf("%-*s  %-14.8g +- %.2g%s%s\n\n", width, r->functional, r->value.value,
            r->value.se,
+           !strcmp(r->functional, "mean") ? "  (of the picture: all pixels and channels)"
+                                          : "",
            r->value.bias_order == 1   ? "  (biased, O(1/N))"
            : r->value.bias_order == 2 ? "  (biased, O(1/N^2))"
                                       : "");
@@ -302,6 +304,12 @@ static int run_gradient(int n, char **operand)
     if (!rc) {
         if (cli.json) print_json(&run, &r, blocks, n_blocks, paths);
         else print_text(&r, blocks, n_blocks, paths);
+        for (size_t k = 0; k < n_blocks && !textures; k++)
+            if (block_is_large(&blocks[k])) {
+                cli_say("importon: --textures DIR writes the gradients of textures as "
+                        "pictures");
+                break;
+            }
         rc = cli_done();
     }
     for (size_t k = 0; k < n_blocks; k++) free(paths[k]);

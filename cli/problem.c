@@ -21,8 +21,9 @@ const struct arg_option options_params[] = {
 
 const struct arg_option options_targets[] = {
     {ARG_LIST, 'T', "target", "FILE[@N]",
-     "picture to match, through sensor N; repeatable", &problem_options.targets, 0, 0,
-     NULL},
+     "picture to match, through sensor N; several without @N: one for each sensor, in "
+     "order",
+     &problem_options.targets, 0, 0, NULL},
     {ARG_LIST, 0, "mask", "FILE", "weights of the pixels, one for each --target in order",
      &problem_options.masks, 0, 0, NULL},
     {ARG_CHOICE, 0, "loss", "LOSS", "l2 (default), relative, l1 or log",

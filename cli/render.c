@@ -101,10 +101,12 @@ static void report(const char *path, imp_film *film, const struct imp_run *run)
             : info.spp
                 ? ", interrupted"
                 : ", interrupted in the first pass: a part of the picture is there");
-    if (info.dropped)
-        cli_say("importon: warning: %llu walks dropped: a value was not finite or "
-                "negative, or a bent ray was lost",
-                (unsigned long long)info.dropped);
+    if (info.dropped) /* more than the budget fails the run */
+        cli_say("%llu of %.4g walks were left out (a value not finite or negative, or a "
+                "bent ray lost): so few change no pixel that can be seen; up to 1 in "
+                "10000 is within the budget",
+                (unsigned long long)info.dropped,
+                (double)info.width * info.height * (double)info.spp);
     if (!cli.json || !strcmp(path, "-")) return;
     struct json j = cli_json();
     json_text(&j, "file", path);
