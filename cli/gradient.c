@@ -183,7 +183,7 @@ static int compute(imp_problem *problem, const struct imp_run *run, struct resul
     const int loss = problem_options.targets.n > 0;
     r->functional = loss ? "loss" : adjoint_path ? "adjoint" : "mean";
     r->rounds = 1;
-    r->spp = problem_spp(run);
+    r->spp = cli_spp(run);
     if (!loss) rc = adjoint_image(run, &seed);
     if (!rc && cli.time_s > 0) {
         rc = estimate_for(problem, *run, seed, r);
@@ -286,7 +286,8 @@ static int run_gradient(int n, char **operand)
     if (!rc) rc = problem_open(&problem);
     if (rc) return rc;
     const size_t n_x = imp_problem_n(problem);
-    const struct imp_run run = cli_run();
+    struct imp_run run = cli_run();
+    if (cli_spp(&run) == 1) run.spp = 2; /* replicates need two, which are reported */
     r.x = cli_alloc(n_x, sizeof *r.x);
     r.grad = cli_alloc(n_x, sizeof *r.grad);
     r.se = cli_alloc(n_x, sizeof *r.se);

@@ -102,9 +102,8 @@ static void report(const char *path, imp_film *film, const struct imp_run *run)
                 ? ", interrupted"
                 : ", interrupted in the first pass: a part of the picture is there");
     if (info.dropped) /* more than the budget fails the run */
-        cli_say("%llu of %.4g walks were left out (a value not finite or negative, or a "
-                "bent ray lost): so few change no pixel that can be seen; up to 1 in "
-                "10000 is within the budget",
+        cli_say("%llu of %.3g walks were left out (a value not finite or negative, or a "
+                "bent ray lost): within the budget of 1 in 10000",
                 (unsigned long long)info.dropped,
                 (double)info.width * info.height * (double)info.spp);
     if (!cli.json || !strcmp(path, "-")) return;
