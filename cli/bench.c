@@ -159,7 +159,7 @@ const struct command command_bench = {
     {"bench",
      "SCENE",
      "time loading, rendering and gradients of a scene",
-     {options, options_run, options_scene, options_general},
+     {options, options_run, options_scene, options_file, options_general},
      1,
      1},
     run_bench,

@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const struct arg_option options_file[] = {
+static const struct arg_option options_bend[] = {
     {ARG_LIST, 'D', "define", "NAME=VALUE", "set a $parameter of the file", &cli.defines,
      0, 0, NULL},
     {ARG_TEXT, 'a', "search", "DIR", "one more folder to look for files in", &cli.search,
@@ -260,7 +260,7 @@ const struct command command_bend = {
     {"bend",
      "trace|check|fit|view FILE",
      "rays in a graded index: trace, check, fit, view",
-     {options_general_either, options_file, bend_fit_options},
+     {options_file_or_folder, options_general, options_bend, bend_fit_options},
      2,
      2},
     run,

@@ -115,7 +115,7 @@ const struct command command_check = {
     {"check",
      "SCENE",
      "check the gradients against differences and identities",
-     {options, options_params, options_run, options_guide, options_scene,
+     {options, options_params, options_run, options_guide, options_scene, options_file,
       options_general},
      1,
      1},

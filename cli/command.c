@@ -2,6 +2,7 @@
 #include "command.h"
 
 #include "progress.h"
+#include "settings.h"
 
 #include <errno.h>
 #include <math.h>
@@ -15,49 +16,33 @@ struct cli cli;
 static const char *const mode_words[] = {"rgb", "mono", NULL};
 static const char *const progress_words[] = {"auto", "always", "never", NULL};
 
-#define GENERAL(place, says)                                                             \
-    {ARG_TEXT, 'o', "output", place, says, &cli.out, 0, 0, NULL},                        \
-        {ARG_FLAG,                                                                       \
-         0,                                                                              \
-         "overwrite",                                                                    \
-         NULL,                                                                           \
-         "replace files of another kind, and older checkpoints",                         \
-         &cli.overwrite,                                                                 \
-         0,                                                                              \
-         0,                                                                              \
-         NULL},                                                                          \
-        {ARG_INT,      't', "threads", "N", "threads; 0: all cores (default)",           \
-         &cli.threads, 0,   4096,      NULL},                                            \
-        {ARG_FLAG, 0, "json", NULL, "answer in JSON", &cli.json, 0, 0, NULL},            \
-        {ARG_CHOICE,                                                                     \
-         0,                                                                              \
-         "progress",                                                                     \
-         "WHEN",                                                                         \
-         "auto (on a terminal), always or never",                                        \
-         &cli.progress,                                                                  \
-         0,                                                                              \
-         0,                                                                              \
-         progress_words},                                                                \
-        {ARG_FLAG,                                                                       \
-         'q',                                                                            \
-         "quiet",                                                                        \
-         NULL,                                                                           \
-         "nothing but errors on standard error: no progress bar either",                 \
-         &cli.quiet,                                                                     \
-         0,                                                                              \
-         0,                                                                              \
-         NULL},                                                                          \
-        {ARG_FLAG, 'h', "help", NULL, "this text", &cli.help, 0, 0, NULL},               \
-    {                                                                                    \
-        0                                                                                \
-    }
+const struct arg_option options_file[] = {{ARG_TEXT, 'o', "output", "FILE",
+                                           "where the data goes; '-' is standard output",
+                                           &cli.out, 0, 0, NULL},
+                                          {0}};
+const struct arg_option options_folder[] = {{ARG_TEXT, 'o', "output", "DIR",
+                                             "where the data goes: a folder of files",
+                                             &cli.out, 0, 0, NULL},
+                                            {0}};
+const struct arg_option options_file_or_folder[] = {
+    {ARG_TEXT, 'o', "output", "PATH",
+     "where the data goes: trace, check: a file; fit, view: a folder", &cli.out, 0, 0,
+     NULL},
+    {0}};
 
 const struct arg_option options_general[] = {
-    GENERAL("FILE", "where the data goes; '-' is standard output")};
-const struct arg_option options_general_folder[] = {
-    GENERAL("DIR", "where the data goes: a folder of files")};
-const struct arg_option options_general_either[] = {
-    GENERAL("PATH", "where the data goes: a file, or a folder of files")};
+    {ARG_FLAG, 0, "overwrite", NULL,
+     "replace files of another kind, and older checkpoints", &cli.overwrite, 0, 0, NULL},
+    {ARG_INT, 't', "threads", "N", "threads; 0: all cores (default)", &cli.threads, 0,
+     4096, NULL},
+    {ARG_FLAG, 0, "json", NULL, "answer in JSON", &cli.json, 0, 0, NULL},
+    {ARG_CHOICE, 0, "progress", "WHEN", "auto (on a terminal), always or never",
+     &cli.progress, 0, 0, progress_words},
+    {ARG_FLAG, 'q', "quiet", NULL,
+     "nothing but errors on standard error: no progress bar either", &cli.quiet, 0, 0,
+     NULL},
+    {ARG_FLAG, 'h', "help", NULL, "this text", &cli.help, 0, 0, NULL},
+    {0}};
 
 const struct arg_option options_scene[] = {
     {ARG_LIST, 'D', "define", "NAME=VALUE", "set a $parameter of the scene file",
@@ -200,36 +185,6 @@ int cli_open(void)
     return st == IMP_OK ? 0 : cli_fail(st, NULL);
 }
 
-/* All of a file, with a zero byte behind the end; NULL with errno set: it cannot be read,
- * or (EFBIG) is not shorter than `limit`. */
-static char *read_all(FILE *file, size_t limit, size_t *length)
-{
-    size_t capacity = 1 << 16, n = 0;
-    char *text = cli_alloc(capacity + 1, 1);
-    errno = 0;
-    for (size_t got; (got = fread(text + n, 1, capacity - n, file)) > 0;) {
-        n += got;
-        if (n >= limit) break;
-        if (n < capacity) continue;
-        char *grown = realloc(text, (capacity *= 2) + 1);
-        if (!grown) {
-            free(text);
-            errno = ENOMEM;
-            return NULL;
-        }
-        text = grown;
-    }
-    if (n < limit && !ferror(file)) {
-        text[n] = 0;
-        *length = n;
-        return text;
-    }
-    if (n >= limit) errno = EFBIG;
-    else if (!errno) errno = EIO;
-    free(text);
-    return NULL;
-}
-
 /* Cut "a;b;c" into a list; the text lives as long as the process. */
 static void split_search(const char *paths, struct arg_list *list)
 {
@@ -237,81 +192,6 @@ static void split_search(const char *paths, struct arg_list *list)
     if (!copy) exit(cli_error(EXIT_RUN, "out of memory"));
     for (char *p = strtok_r(copy, ";", &save); p; p = strtok_r(NULL, ";", &save))
         args_list_add(list, p);
-}
-
-static int set_error(const char *where, const char *text, const char *why)
-{
-    if (where) return cli_error(EXIT_USAGE, "%s: '%.60s': %s", where, text, why);
-    return cli_error(EXIT_USAGE, "--set %s: %s", text, why);
-}
-
-/* One --set: "name=v" or "name=v,v,..". Messages begin with `where` it stands; NULL: on
- * the command line. */
-static int apply_set(const char *where, const char *text)
-{
-    const char *equal = strchr(text, '=');
-    char *name, *end, why[96];
-    double *values = NULL;
-    size_t index, n = 0;
-    int rc = 0;
-    enum imp_status st;
-
-    if (!equal || equal == text) return set_error(where, text, "expected ID=VALUE");
-    name = cli_alloc((size_t)(equal - text) + 1, 1);
-    memcpy(name, text, (size_t)(equal - text));
-    values = cli_alloc(strlen(equal), sizeof *values); /* more than there can be */
-    for (const char *p = equal + 1;; p = end + 1) {
-        values[n++] = strtod(p, &end);
-        if (end == p || (*end && *end != ',')) {
-            snprintf(why, sizeof why, "'%.60s' is not a number", p);
-            rc = set_error(where, text, why);
-            goto out;
-        }
-        if (!*end) break;
-    }
-    st = imp_scene_find_param(cli.scene, name, &index);
-    if (st == IMP_OK) st = imp_scene_set_values(cli.scene, index, n, values);
-    if (st != IMP_OK) rc = cli_fail(st, where ? where : cli.scene_path);
-out:
-    free(name);
-    free(values);
-    return rc;
-}
-
-#define SET_FILE_MAX ((size_t)256 << 20) /* ten million numbers of 17 digits */
-
-/* "@FILE": one ID=VALUE a line; empty lines and lines that begin with # are skipped. */
-static int apply_set_file(const char *path)
-{
-    FILE *f = fopen(path, "r");
-    size_t length = 0, number = 0;
-    int rc = 0;
-    if (!f) return cli_error(EXIT_USAGE, "--set @%s: %s", path, strerror(errno));
-    char *text = read_all(f, SET_FILE_MAX, &length);
-    const int code = errno;
-    fclose(f);
-    if (!text && code == EFBIG)
-        return cli_error(EXIT_USAGE, "--set @%s: not shorter than %zu MiB", path,
-                         SET_FILE_MAX >> 20);
-    if (!text)
-        return cli_error(code == ENOMEM ? EXIT_RUN : EXIT_USAGE, "--set @%s: %s", path,
-                         strerror(code));
-    for (char *line = text, *next; !rc && line < text + length; line = next) {
-        char *end = memchr(line, '\n', (size_t)(text + length - line)), *where;
-        if (!end) end = text + length;
-        next = end + 1;
-        if (end > line && end[-1] == '\r') end--;
-        *end = 0;
-        if (asprintf(&where, "%s:%zu", path, ++number) < 0)
-            exit(cli_error(EXIT_RUN, "out of memory"));
-        if (strlen(line) != (size_t)(end - line))
-            rc = cli_error(EXIT_USAGE, "%s: a zero byte: this is no list of settings",
-                           where);
-        else if (*line && *line != '#') rc = apply_set(where, line);
-        free(where);
-    }
-    free(text);
-    return rc;
 }
 
 /* The parameters as --set takes them. Long ones are cut short; not in JSON. */
@@ -399,10 +279,7 @@ int cli_load(const char *path)
         rc = cli_fail(st, NULL);
         return st == IMP_E_IO ? EXIT_USAGE : rc;
     }
-    for (size_t i = 0; i < cli.sets.n && !rc; i++) {
-        const char *set = cli.sets.item[i];
-        rc = *set == '@' ? apply_set_file(set + 1) : apply_set(NULL, set);
-    }
+    for (size_t i = 0; i < cli.sets.n && !rc; i++) rc = settings_apply(cli.sets.item[i]);
     if (!rc && cli.dump) rc = dump();
     if (!rc && (cli.guide || cli.guide_share > 0 || cli.guide_roulette > 0))
         rc = guide_make();

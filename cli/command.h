@@ -31,10 +31,10 @@ extern const struct command command_render, command_gradient, command_jacobian,
     command_check, command_fit, command_compare, command_info, command_bench,
     command_bend, command_elements;
 
-/* Option tables, to be named in args_spec.group. The general ones differ in what -o is:
- * a file, or a folder for commands that write several files. */
-extern const struct arg_option options_general[], options_general_folder[],
-    options_general_either[], options_scene[], options_run[], options_guide[];
+/* Option tables, to be named in args_spec.group. -o is a file, or a folder for commands
+ * that write several files. */
+extern const struct arg_option options_file[], options_folder[], options_file_or_folder[],
+    options_general[], options_scene[], options_run[], options_guide[];
 
 /* The running command. A process runs one, so there is one. */
 struct cli {

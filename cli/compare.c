@@ -104,7 +104,7 @@ out:
 const struct command command_compare = {{"compare",
                                          "TEST REFERENCE",
                                          "do two pictures have the same expectation?",
-                                         {options, options_general},
+                                         {options, options_file, options_general},
                                          2,
                                          2},
                                         run_compare,

@@ -308,7 +308,7 @@ const struct command command_elements = {
      "SCENE",
      "solve a scene without noise, by finite elements",
      {options, options_elements_fit, options_params, options_run, options_scene,
-      options_general},
+      options_file, options_general},
      1,
      1},
     run_elements,

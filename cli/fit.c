@@ -4,12 +4,12 @@
  * picture before and after, the target, the loss curve and the parameters with their 95 %
  * intervals. */
 #include "command.h"
+#include "fit_pictures.h"
 #include "output.h"
 #include "picture.h"
 #include "plot.h"
 #include "problem.h"
 #include "progress.h"
-#include "sheet.h"
 
 #include <errno.h>
 #include <math.h>
@@ -45,118 +45,6 @@ static const struct arg_option options[] = {
     {ARG_TEXT, 0, "sheet", "FILE.png",
      "one PNG of before, target and recovered (with -o)", &o.sheet, 0, 0, NULL},
     {0}};
-
-/* ---- Pictures ------------------------------------------------------------------ */
-
-/* "name.exr", or "name-1.exr" for the second of several targets. */
-static char *picture_path(const char *name, size_t i)
-{
-    char file[64];
-    if (problem_options.targets.n == 1) snprintf(file, sizeof file, "%s.exr", name);
-    else snprintf(file, sizeof file, "%s-%zu.exr", name, i);
-    return join_path(cli.out, file);
-}
-
-/* May everything be written? A checkpoint is begun over, or gone on from, when that is
- * said. */
-static int writable(const struct block *blocks, size_t n_blocks)
-{
-    static const struct {
-        const char *name;
-        enum output_kind kind;
-    } files[] = {{"loss.csv", OUTPUT_TABLE},
-                 {"loss.svg", OUTPUT_CURVE},
-                 {"parameters.json", OUTPUT_JSON},
-                 {"recovered.txt", OUTPUT_SETTINGS}};
-    static const char *const pictures[] = {"before", "recovered", "target"};
-    int rc = checkpoint_writable(o.checkpoint, o.resume);
-    if (rc || !cli.out) return rc;
-    rc = make_folder(cli.out);
-    for (size_t k = 0; k < sizeof files / sizeof *files && !rc; k++)
-        rc = overwrite_check_in(cli.out, files[k].name, files[k].kind);
-    for (size_t i = 0; i < problem_options.targets.n; i++)
-        for (size_t k = 0; k < 3 && !rc; k++) {
-            char *path = picture_path(pictures[k], i);
-            if (k == 2) memcpy(strrchr(path, '.'), ".png", 4);
-            rc = picture_writable(path, 1);
-            free(path);
-        }
-    for (size_t k = 0; k < n_blocks && !rc; k++)
-        if (block_is_large(&blocks[k])) rc = block_writable(&blocks[k], cli.out);
-    if (!rc && o.sheet) rc = picture_writable(o.sheet, 0);
-    return rc;
-}
-
-static int write_one(const char *name, size_t i)
-{
-    struct imp_run run = cli_run();
-    const struct picture_options po = {.standard_error = 1};
-    imp_film *film = NULL;
-    run.sensor = target_sensor(i);
-    run.time_limit_s = 0;
-    if (o.picture_spp) run.spp = o.picture_spp;
-    const enum imp_status st = imp_render(cli.scene, &run, &film);
-    if (cli_failed(st)) return cli_fail(st, cli.scene_path);
-    if (!film) return cli_done();
-    char *path = picture_path(name, i);
-    picture_stamp(film, &run);
-    const int rc = picture_write(film, path, &po);
-    free(path);
-    imp_film_destroy(film);
-    return rc;
-}
-
-/* The scene as it is now, through the sensor of every target. */
-static int write_pictures(const char *name)
-{
-    int rc = 0;
-    for (size_t i = 0; i < problem_options.targets.n && !rc; i++) rc = write_one(name, i);
-    return rc;
-}
-
-/* A copy of each target, so that the folder tells the whole story. */
-static int write_targets(void)
-{
-    int rc = 0;
-    for (size_t i = 0; i < problem_options.targets.n && !rc; i++) {
-        struct imp_target t = IMP_TARGET_INIT;
-        struct imp_write_options w = IMP_WRITE_OPTIONS_INIT;
-        imp_film *film = NULL;
-        rc = picture_target(problem_options.targets.item[i], NULL, &t);
-        if (rc) return rc;
-        enum imp_status st = imp_film_create(cli.context, t.width, t.height,
-                                             t.channels == 3 ? "R,G,B" : "Y", &film);
-        char *path = picture_path("target", i);
-        memcpy(strrchr(path, '.'), ".png", 4);
-        if (st == IMP_OK) {
-            memcpy(imp_film_mean(film), t.pixels,
-                   (size_t)t.width * (size_t)t.height * (size_t)t.channels *
-                       sizeof(float));
-            st = imp_film_write(film, path, &w);
-        }
-        if (st != IMP_OK) rc = cli_fail(st, NULL);
-        imp_film_destroy(film);
-        picture_target_free(&t);
-        free(path);
-    }
-    return rc;
-}
-
-/* A row for each target. */
-static int write_sheet(void)
-{
-    static const char *const name[] = {"before", "target", "recovered"};
-    struct sheet sheet = {NULL, 0};
-    for (size_t i = 0; i < problem_options.targets.n; i++)
-        for (int k = 0; k < 3; k++) {
-            char *path = picture_path(name[k], i);
-            sheet_add(&sheet, path);
-            free(path);
-        }
-    const int rc = sheet_write(&sheet, 3, o.sheet);
-    sheet_free(&sheet);
-    return rc;
-}
 
 /* ---- Numbers ------------------------------------------------------------------- */
 
@@ -369,6 +257,29 @@ static int answer(imp_problem *problem, const struct imp_fit_result *r,
     return rc;
 }
 
+/* May everything be written? A checkpoint is begun over, or gone on from, when that is
+ * said. */
+static int writable(const struct block *blocks, size_t n_blocks)
+{
+    static const struct {
+        const char *name;
+        enum output_kind kind;
+    } files[] = {{"loss.csv", OUTPUT_TABLE},
+                 {"loss.svg", OUTPUT_CURVE},
+                 {"parameters.json", OUTPUT_JSON},
+                 {"recovered.txt", OUTPUT_SETTINGS}};
+    int rc = checkpoint_writable(o.checkpoint, o.resume);
+    if (rc || !cli.out) return rc;
+    rc = make_folder(cli.out);
+    for (size_t k = 0; k < sizeof files / sizeof *files && !rc; k++)
+        rc = overwrite_check_in(cli.out, files[k].name, files[k].kind);
+    if (!rc) rc = fit_pictures_writable();
+    for (size_t k = 0; k < n_blocks && !rc; k++)
+        if (block_is_large(&blocks[k])) rc = block_writable(&blocks[k], cli.out);
+    if (!rc && o.sheet) rc = picture_writable(o.sheet, 0);
+    return rc;
+}
+
 static int run_fit(int n, char **operand)
 {
     static const enum imp_optimizer optimizers[] = {IMP_ADAM, IMP_LM, IMP_LBFGS, IMP_MMA,
@@ -398,8 +309,8 @@ static int run_fit(int n, char **operand)
     fit.resume = o.resume;
     blocks = problem_blocks(problem, &n_blocks);
     rc = writable(blocks, n_blocks);
-    if (!rc && cli.out) rc = write_targets();
-    if (!rc && cli.out) rc = write_pictures("before");
+    if (!rc && cli.out) rc = fit_targets_write();
+    if (!rc && cli.out) rc = fit_pictures_write("before", o.picture_spp);
     if (!rc) {
         const struct imp_run run = cli_run();
         const enum imp_status st = imp_fit(problem, &fit, &run, &result);
@@ -409,8 +320,8 @@ static int run_fit(int n, char **operand)
     if (!rc && result) rc = answer(problem, result, blocks, n_blocks);
     if (!rc && result && cli.out) {
         progress_resume(); /* after Ctrl-C the state reached is still written */
-        rc = write_pictures("recovered");
-        if (!rc && o.sheet) rc = write_sheet();
+        rc = fit_pictures_write("recovered", o.picture_spp);
+        if (!rc && o.sheet) rc = fit_sheet_write(o.sheet);
     }
     free(blocks);
     problem_close(problem);
@@ -423,7 +334,7 @@ const struct command command_fit = {
      "SCENE --target FILE",
      "recover parameters from target pictures",
      {options, options_targets, options_params, options_run, options_guide, options_scene,
-      options_general_folder},
+      options_folder, options_general},
      1,
      1},
     run_fit,

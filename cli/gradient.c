@@ -328,7 +328,7 @@ const struct command command_gradient = {
      "SCENE",
      "derivatives of a loss (or of the picture's mean), with errors",
      {options, options_targets, options_params, options_run, options_guide, options_scene,
-      options_general},
+      options_file, options_general},
      1,
      1},
     run_gradient,

@@ -174,7 +174,7 @@ const struct command command_render = {
     {"render",
      "SCENE",
      "render a scene; or print its random walks",
-     {options, options_run, options_guide, options_scene, options_general},
+     {options, options_run, options_guide, options_scene, options_file, options_general},
      1,
      1},
     run_render,
