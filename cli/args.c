@@ -237,20 +237,55 @@ int args_parse(const struct args_spec *spec, int argc, char **argv, int *first)
     return 0;
 }
 
+/* Words from column `column` on, in lines that end before WIDTH. */
+static void put_wrapped(FILE *to, const char *text, int column)
+{
+    enum { WIDTH = 80 };
+    int at = column;
+    while (*text) {
+        const int n = (int)strcspn(text, " ");
+        if (at > column && at + 1 + n >= WIDTH) {
+            fprintf(to, "\n%*s", column, "");
+            at = column;
+        }
+        at += fprintf(to, "%s%.*s", at > column ? " " : "", n, text);
+        text += n;
+        text += strspn(text, " ");
+    }
+    fputc('\n', to);
+}
+
 void args_help(const struct args_spec *spec, FILE *to)
 {
-    fprintf(to, "usage: importon %s [options] %s\n\n%s\n\n", spec->command,
-            spec->operands, spec->summary);
+    enum { COLUMN = 31 };
+    fprintf(to, "usage: importon %s [options] %s\n\n", spec->command, spec->operands);
+    put_wrapped(to, spec->summary, 0);
+    fputc('\n', to);
     for (int g = 0; spec->group[g]; g++) {
         for (const struct arg_option *o = spec->group[g]; o->type; o++) {
             char left[64];
             snprintf(left, sizeof left, "  %c%c%s --%s%s%s", o->letter ? '-' : ' ',
                      o->letter ? o->letter : ' ', o->letter ? "," : " ", o->name,
                      o->value ? " " : "", o->value ? o->value : "");
-            fprintf(to, "%-30s ", left);
-            if (strlen(left) > 30) fprintf(to, "\n%-30s ", "");
-            fprintf(to, "%s\n", o->help);
+            fprintf(to, "%-*s", COLUMN, left);
+            if (strlen(left) >= COLUMN) fprintf(to, "\n%*s", COLUMN, "");
+            put_wrapped(to, o->help, COLUMN);
         }
         fprintf(to, "\n");
     }
+}
+
+int args_help_option(const struct args_spec *spec, const char *name, FILE *to)
+{
+    name += strspn(name, "-");
+    for (int g = 0; spec->group[g]; g++)
+        for (const struct arg_option *o = spec->group[g]; o->type; o++) {
+            if (strcmp(name, o->name) && !(name[0] == o->letter && !name[1])) continue;
+            if (o->type == ARG_CHOICE)
+                for (int i = 0; o->words[i]; i++) fprintf(to, "%s\n", o->words[i]);
+            else if (o->value) fprintf(to, "%s\n", o->value);
+            return 0;
+        }
+    fprintf(stderr, "importon: %s: unknown option '%s'\n", spec->command, name);
+    return usage_error(spec);
 }

@@ -36,7 +36,7 @@ struct arg_option { /* tables end with {0} */
     const char *const *words; /* of ARG_CHOICE, NULL-terminated */
 };
 
-#define ARGS_MAX_GROUPS 7
+#define ARGS_MAX_GROUPS 8
 struct args_spec {
     const char *command, *operands, *summary;
     const struct arg_option *group[ARGS_MAX_GROUPS + 1]; /* NULL-terminated */
@@ -47,6 +47,9 @@ struct args_spec {
  * first. Returns 0, or prints what is wrong on stderr and returns 2. */
 int args_parse(const struct args_spec *spec, int argc, char **argv, int *first);
 void args_help(const struct args_spec *spec, FILE *to);
+/* What one option takes ("--name", "-n"): a word a line, or what help calls its value; a
+ * flag: nothing. 0, or 2 with the reason printed. */
+int args_help_option(const struct args_spec *spec, const char *name, FILE *to);
 void args_list_add(struct arg_list *list, const char *item);
 void args_list_free(struct arg_list *list);
 

@@ -159,8 +159,9 @@ const struct command command_bench = {
     {"bench",
      "SCENE",
      "time loading, rendering and gradients of a scene",
-     {options, options_run, options_scene, options_general},
+     {options, options_run, options_scene, options_file, options_general},
      1,
      1},
     run_bench,
-    1};
+    1,
+    " numbers with a gradient"};

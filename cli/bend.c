@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const struct arg_option options_file[] = {
+static const struct arg_option options_bend[] = {
     {ARG_LIST, 'D', "define", "NAME=VALUE", "set a $parameter of the file", &cli.defines,
      0, 0, NULL},
     {ARG_TEXT, 'a', "search", "DIR", "one more folder to look for files in", &cli.search,
@@ -110,7 +110,7 @@ static int write_exits(const char *path)
     }
     imp_bend_get_rays(bend, &rays);
     struct output to = {0};
-    rc = output_open(&to, path);
+    rc = output_open(&to, path, OUTPUT_TABLE);
     FILE *f = to.file;
     if (f) fprintf(f, "ray,bundle,x,y,z,vx,vy,vz,path,steps,flags\n");
     for (size_t i = 0; f && i < n; i++)
@@ -127,7 +127,10 @@ static int trace(void)
     struct imp_bend_stats s = IMP_BEND_STATS_INIT;
     struct imp_bend_options bo = IMP_BEND_OPTIONS_INIT;
     const size_t n = imp_bend_n_targets(bend);
-    double value, error, order, *parts = cli_alloc(n, sizeof *parts);
+    double value, error, order, *parts;
+    const int rc = cli.out ? overwrite_check(cli.out, OUTPUT_TABLE) : 0;
+    if (rc) return rc;
+    parts = cli_alloc(n, sizeof *parts);
     const double start = cli_now();
     enum imp_status st = imp_bend_objective(bend, &value, NULL, parts, &s);
     const double seconds = cli_now() - start;
@@ -180,6 +183,8 @@ static int check(void)
     const struct imp_check_row *rows;
     size_t n;
     int ok = 1;
+    const int rc = cli_redirect();
+    if (rc) return rc;
     const enum imp_status st = imp_bend_check(bend, &rows, &n);
     if (st != IMP_OK) return cli_fail(st, cli.scene_path);
     for (size_t i = 0; i < n; i++)
@@ -238,6 +243,7 @@ static int view(void)
     const enum imp_status st = imp_bend_objective(bend, &value, NULL, NULL, &s);
     if (st != IMP_OK) return cli_fail(st, cli.scene_path); /* also if no ray is traced */
     int rc = make_folder(folder);
+    if (!rc) rc = bend_view_writable(folder, "");
     if (!rc && cli.json) {
         j = cli_json();
         json_text(&j, "folder", folder);
@@ -275,11 +281,13 @@ static int run(int n, char **operand)
                      operand[0], near ? ", did you mean " : "", near ? near : "");
 }
 
-const struct command command_bend = {{"bend",
-                                      "trace|check|fit|view FILE",
-                                      "rays in a graded index: trace, check, fit, view",
-                                      {options_general, options_file, bend_fit_options},
-                                      2,
-                                      2},
-                                     run,
-                                     0};
+const struct command command_bend = {
+    {"bend",
+     "trace|check|fit|view FILE",
+     "rays in a graded index: trace, check, fit, view",
+     {options_file_or_folder, options_general, options_bend, bend_fit_options},
+     2,
+     2},
+    run,
+    0,
+    "check "};

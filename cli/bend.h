@@ -15,5 +15,7 @@ const char *bend_target_word(enum imp_bend_target_type type);
 /* Pictures of a problem, DIR/<prefix>slice-x.png, ..., rays, spots, images. `json` gets
  * what they show; NULL: no answer. */
 int bend_view(imp_bend *bend, const char *folder, const char *prefix, struct json *json);
+/* May they all be written? */
+int bend_view_writable(const char *folder, const char *prefix);
 
 #endif

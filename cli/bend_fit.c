@@ -86,7 +86,7 @@ static int write_history(const struct imp_bend_fit_result *r)
     int rc = plot_curve(svg, "Objective", "evaluation", "objective", r->n_history,
                         r->history, NULL);
     struct output to = {0};
-    if (!rc && !(rc = output_open(&to, csv))) {
+    if (!rc && !(rc = output_open(&to, csv, OUTPUT_TABLE))) {
         fprintf(to.file, "evaluation,objective\n");
         for (size_t i = 0; i < r->n_history; i++)
             fprintf(to.file, "%zu,%.9g\n", i, r->history[i]);
@@ -113,13 +113,35 @@ static int iterations_read(int out[IMP_BEND_LEVELS_MAX])
     return 0;
 }
 
+/* May everything be written? */
+static int writable(void)
+{
+    static const struct {
+        const char *name;
+        enum output_kind kind;
+    } files[] = {{"field.vol", OUTPUT_VOL},
+                 {"field.txt", OUTPUT_PROFILE},
+                 {"field.npy", OUTPUT_NPY},
+                 {"loss.csv", OUTPUT_TABLE},
+                 {"loss.svg", OUTPUT_CURVE}};
+    int rc = 0;
+    for (size_t k = 0; k < sizeof files / sizeof *files && !rc; k++)
+        rc = overwrite_check_in(cli.out, files[k].name, files[k].kind);
+    if (!rc) rc = bend_view_writable(cli.out, "before-");
+    return rc ? rc : bend_view_writable(cli.out, "");
+}
+
 int bend_fit(imp_bend *bend)
 {
     static const enum imp_optimizer kinds[] = {IMP_LBFGS, IMP_ADAM, IMP_MMA};
     struct imp_bend_fit_options fo = IMP_BEND_FIT_OPTIONS_INIT;
     struct imp_bend_fit_result r = {.size = sizeof r};
     int rc = iterations_read(fo.iterations);
+    if (!rc && o.resume && !o.checkpoint)
+        rc = cli_error(EXIT_USAGE, "bend fit: --resume needs --checkpoint FILE");
+    if (!rc) rc = checkpoint_writable(o.checkpoint, o.resume);
     if (!rc && cli.out) rc = make_folder(cli.out);
+    if (!rc && cli.out) rc = writable();
     if (!rc && cli.out) rc = bend_view(bend, cli.out, "before-", NULL);
     if (rc) return rc;
     fo.optimizer = kinds[o.optimizer];
@@ -161,5 +183,6 @@ int bend_fit(imp_bend *bend)
     if (cli.out) rc = write_field(bend);
     if (cli.out && !rc) rc = write_history(&r);
     if (cli.out && !rc) rc = bend_view(bend, cli.out, "", NULL);
+    if (!rc) checkpoint_hint(o.checkpoint);
     return rc ? rc : cli_done();
 }

@@ -4,12 +4,31 @@
  * them, spot diagrams, and irradiance beside its target. */
 #include "bend.h"
 #include "bend_chart.h"
+#include "overwrite.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum { SIDE = 512, PATHS = 60, TARGETS = 8 };
+
+int bend_view_writable(const char *folder, const char *prefix)
+{
+    static const char *const fixed[] = {"slice-x", "slice-y", "slice-z", "rays-x",
+                                        "rays-y"};
+    static const char *const numbered[] = {"spot-%d", "image-%d", "target-%d"};
+    const int n_fixed = sizeof fixed / sizeof *fixed;
+    int rc = 0;
+    for (int k = 0; k < n_fixed + 3 * TARGETS && !rc; k++) {
+        char name[32];
+        if (k < n_fixed) snprintf(name, sizeof name, "%s", fixed[k]);
+        else snprintf(name, sizeof name, numbered[(k - n_fixed) % 3], (k - n_fixed) / 3);
+        char file[128];
+        snprintf(file, sizeof file, "%s%s.png", prefix, name);
+        rc = overwrite_check_in(folder, file, OUTPUT_PNG);
+    }
+    return rc;
+}
 
 /* ---- Colours ------------------------------------------------------------------- */
 

@@ -115,9 +115,10 @@ const struct command command_check = {
     {"check",
      "SCENE",
      "check the gradients against differences and identities",
-     {options, options_params, options_run, options_guide, options_scene,
+     {options, options_params, options_run, options_guide, options_scene, options_file,
       options_general},
      1,
      1},
     run_check,
-    1};
+    1,
+    "method "};

@@ -2,6 +2,7 @@
 #include "command.h"
 
 #include "progress.h"
+#include "settings.h"
 
 #include <errno.h>
 #include <math.h>
@@ -15,17 +16,31 @@ struct cli cli;
 static const char *const mode_words[] = {"rgb", "mono", NULL};
 static const char *const progress_words[] = {"auto", "always", "never", NULL};
 
+const struct arg_option options_file[] = {{ARG_TEXT, 'o', "output", "FILE",
+                                           "where the data goes; '-' is standard output",
+                                           &cli.out, 0, 0, NULL},
+                                          {0}};
+const struct arg_option options_folder[] = {{ARG_TEXT, 'o', "output", "DIR",
+                                             "where the data goes: a folder of files",
+                                             &cli.out, 0, 0, NULL},
+                                            {0}};
+const struct arg_option options_file_or_folder[] = {
+    {ARG_TEXT, 'o', "output", "PATH",
+     "where the data goes: trace, check: a file; fit, view: a folder", &cli.out, 0, 0,
+     NULL},
+    {0}};
+
 const struct arg_option options_general[] = {
-    {ARG_TEXT, 'o', "output", "FILE", "where the data goes; '-' is standard output",
-     &cli.out, 0, 0, NULL},
+    {ARG_FLAG, 0, "overwrite", NULL,
+     "replace files of another kind, and older checkpoints", &cli.overwrite, 0, 0, NULL},
     {ARG_INT, 't', "threads", "N", "threads; 0: all cores (default)", &cli.threads, 0,
      4096, NULL},
-    {ARG_FLAG, 0, "json", NULL, "answer in JSON on standard output", &cli.json, 0, 0,
-     NULL},
+    {ARG_FLAG, 0, "json", NULL, "answer in JSON", &cli.json, 0, 0, NULL},
     {ARG_CHOICE, 0, "progress", "WHEN", "auto (on a terminal), always or never",
      &cli.progress, 0, 0, progress_words},
-    {ARG_FLAG, 'q', "quiet", NULL, "say nothing but errors on standard error", &cli.quiet,
-     0, 0, NULL},
+    {ARG_FLAG, 'q', "quiet", NULL,
+     "nothing but errors on standard error: no progress bar either", &cli.quiet, 0, 0,
+     NULL},
     {ARG_FLAG, 'h', "help", NULL, "this text", &cli.help, 0, 0, NULL},
     {0}};
 
@@ -111,7 +126,10 @@ int cli_fail(enum imp_status status, const char *what)
     if (what) return cli_error(exit_code(status), "%s: %s", what, message);
     return cli_error(exit_code(status), "%s", message);
 }
-int cli_done(void) { return progress_interrupted() ? EXIT_INTERRUPTED : EXIT_DONE; }
+int cli_done(void)
+{
+    return progress_interrupted() ? EXIT_SIGNAL + progress_interrupted() : EXIT_DONE;
+}
 
 void cli_say(const char *format, ...)
 {
@@ -167,22 +185,6 @@ int cli_open(void)
     return st == IMP_OK ? 0 : cli_fail(st, NULL);
 }
 
-/* All of stdin. */
-static char *read_stdin(size_t *length)
-{
-    size_t capacity = 1 << 16, n = 0;
-    char *text = cli_alloc(capacity, 1);
-    for (size_t got; (got = fread(text + n, 1, capacity - n, stdin)) > 0;) {
-        n += got;
-        if (n < capacity) continue;
-        char *grown = realloc(text, capacity *= 2);
-        if (!grown) exit(cli_error(EXIT_RUN, "out of memory"));
-        text = grown;
-    }
-    *length = n;
-    return text;
-}
-
 /* Cut "a;b;c" into a list; the text lives as long as the process. */
 static void split_search(const char *paths, struct arg_list *list)
 {
@@ -190,56 +192,6 @@ static void split_search(const char *paths, struct arg_list *list)
     if (!copy) exit(cli_error(EXIT_RUN, "out of memory"));
     for (char *p = strtok_r(copy, ";", &save); p; p = strtok_r(NULL, ";", &save))
         args_list_add(list, p);
-}
-
-/* One --set: "name=v" or "name=v,v,..". */
-static int apply_set(const char *text)
-{
-    const char *equal = strchr(text, '=');
-    char *name, *end;
-    double *values = NULL;
-    size_t index, n = 0;
-    int rc = 0;
-    enum imp_status st;
-
-    if (!equal || equal == text)
-        return cli_error(EXIT_USAGE, "--set %s: expected ID=VALUE", text);
-    name = cli_alloc((size_t)(equal - text) + 1, 1);
-    memcpy(name, text, (size_t)(equal - text));
-    values = cli_alloc(strlen(equal), sizeof *values); /* more than there can be */
-    for (const char *p = equal + 1;; p = end + 1) {
-        values[n++] = strtod(p, &end);
-        if (end == p || (*end && *end != ',')) {
-            rc = cli_error(EXIT_USAGE, "--set %s: '%s' is not a number", text, p);
-            goto out;
-        }
-        if (!*end) break;
-    }
-    st = imp_scene_find_param(cli.scene, name, &index);
-    if (st == IMP_OK) st = imp_scene_set_values(cli.scene, index, n, values);
-    if (st != IMP_OK) rc = cli_fail(st, cli.scene_path);
-out:
-    free(name);
-    free(values);
-    return rc;
-}
-
-/* "@FILE": one ID=VALUE a line; empty lines and lines that begin with # are skipped. */
-static int apply_set_file(const char *path)
-{
-    FILE *f = fopen(path, "r");
-    char *line = NULL;
-    size_t size = 0;
-    int rc = 0;
-    if (!f) return cli_error(EXIT_USAGE, "--set @%s: %s", path, strerror(errno));
-    while (!rc && getline(&line, &size, f) >= 0) {
-        line[strcspn(line, "\r\n")] = 0;
-        if (*line && *line != '#') rc = apply_set(line);
-    }
-    if (!rc && ferror(f)) rc = cli_error(EXIT_USAGE, "--set @%s: cannot read", path);
-    free(line);
-    fclose(f);
-    return rc;
 }
 
 /* The parameters as --set takes them. Long ones are cut short; not in JSON. */
@@ -313,7 +265,8 @@ int cli_load(const char *path)
     options.n_search = search.n;
     if (!strcmp(path, "-")) {
         size_t length;
-        char *xml = read_stdin(&length);
+        char *xml = read_all(stdin, SIZE_MAX, &length);
+        if (!xml) return cli_error(EXIT_RUN, "standard input: %s", strerror(errno));
         cli.scene_path = "<stdin>";
         st = imp_scene_load_string(cli.context, xml, length, cli.scene_path, &options,
                                    &cli.scene);
@@ -326,10 +279,7 @@ int cli_load(const char *path)
         rc = cli_fail(st, NULL);
         return st == IMP_E_IO ? EXIT_USAGE : rc;
     }
-    for (size_t i = 0; i < cli.sets.n && !rc; i++) {
-        const char *set = cli.sets.item[i];
-        rc = *set == '@' ? apply_set_file(set + 1) : apply_set(set);
-    }
+    for (size_t i = 0; i < cli.sets.n && !rc; i++) rc = settings_apply(cli.sets.item[i]);
     if (!rc && cli.dump) rc = dump();
     if (!rc && (cli.guide || cli.guide_share > 0 || cli.guide_roulette > 0))
         rc = guide_make();

@@ -14,34 +14,37 @@
 /* Exit codes; the manual page is the contract. */
 enum {
     EXIT_DONE = 0,
-    EXIT_NO = 1,    /* check, compare: the answer is no */
-    EXIT_USAGE = 2, /* usage or scene error */
-    EXIT_RUN = 3,   /* the run failed */
-    EXIT_INTERRUPTED = 130,
-    EXIT_STOP = -1 /* inside: end now, all is done */
+    EXIT_NO = 1,       /* check, compare: the answer is no */
+    EXIT_USAGE = 2,    /* usage or scene error */
+    EXIT_RUN = 3,      /* the run failed */
+    EXIT_SIGNAL = 128, /* and the number of the signal that interrupted the run */
+    EXIT_STOP = -1     /* inside: end now, all is done */
 };
 
 struct command {
     struct args_spec args;
     int (*run)(int n, char **operand);
-    int prints; /* all its data is text, so -o stands for standard output */
+    int prints;         /* all its data is text, so -o stands for standard output */
+    const char *answer; /* in the first line of that text; NULL: none is known */
 };
 extern const struct command command_render, command_gradient, command_jacobian,
     command_check, command_fit, command_compare, command_info, command_bench,
     command_bend, command_elements;
 
-/* Option tables, to be named in args_spec.group. */
-extern const struct arg_option options_general[], options_scene[], options_run[],
-    options_guide[];
+/* Option tables, to be named in args_spec.group. -o is a file, or a folder for commands
+ * that write several files. */
+extern const struct arg_option options_file[], options_folder[], options_file_or_folder[],
+    options_general[], options_scene[], options_run[], options_guide[];
 
 /* The running command. A process runs one, so there is one. */
 struct cli {
-    const char *name; /* of the command */
+    const char *name;   /* of the command */
+    const char *answer; /* its struct command's */
     int argc;
     char **argv; /* as typed, for provenance */
     /* options_general */
     const char *out;
-    int threads, json, progress, help, quiet;
+    int threads, json, progress, help, quiet, overwrite;
     /* options_scene */
     struct arg_list defines, sets;
     const char *search;
@@ -68,6 +71,8 @@ int cli_open(void);
  * --dump, or an exit code. */
 int cli_load(const char *path);
 void cli_close(void);
+/* From here on, what is printed goes to -o, if there is one. 0, or an exit code. */
+int cli_redirect(void);
 
 /* The run the options ask for. */
 struct imp_run cli_run(void);

@@ -104,8 +104,9 @@ out:
 const struct command command_compare = {{"compare",
                                          "TEST REFERENCE",
                                          "do two pictures have the same expectation?",
-                                         {options, options_general},
+                                         {options, options_file, options_general},
                                          2,
                                          2},
                                         run_compare,
-                                        1};
+                                        1,
+                                        "mean  "};

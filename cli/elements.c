@@ -4,6 +4,7 @@
  * with --sensitivity what every light and reflectance does to the measurement, and with
  * --fit lights and reflectances for wanted measurements. */
 #include "elements.h"
+#include "overwrite.h"
 #include "picture.h"
 #include "problem.h"
 #include "progress.h"
@@ -213,7 +214,7 @@ static int print_sensitivity(imp_elements *e, struct json *j)
     const enum imp_status st = imp_elements_sensitivity(e, &rows, &n);
     if (st != IMP_OK) return cli_fail(st, cli.scene_path);
     if (j) json_array(j, "sensitivity");
-    else printf("%-44s %13s %13s %9s\n", "number", "value", "derivative", "share");
+    else printf("%-44s %13s %13s %10s\n", "number", "value", "derivative", "elasticity");
     for (size_t k = 0; k < n; k++) {
         const struct imp_elements_row *r = &rows[k];
         const char *name = row_name(r, text, sizeof text);
@@ -227,7 +228,7 @@ static int print_sensitivity(imp_elements *e, struct json *j)
             json_number(j, "share", r->share);
             json_end_object(j);
         } else {
-            printf("%-44s %13.6g %13.6g %8.3f%%\n", name, r->value, r->derivative,
+            printf("%-44s %13.6g %13.6g %9.3f%%\n", name, r->value, r->derivative,
                    100 * r->share);
         }
     }
@@ -235,9 +236,22 @@ static int print_sensitivity(imp_elements *e, struct json *j)
         json_end_array(j);
         json_number(j, "euler", sum);
     } else {
-        printf("the lights' shares add up to %.6f%%\n", 100 * sum);
+        printf("the lights' elasticities add up to %.6f%%\n", 100 * sum);
     }
     return 0;
+}
+
+/* May everything be written? */
+static int writable(void)
+{
+    int rc = 0;
+    if (!o.no_picture) rc = picture_writable(cli.out ? cli.out : "elements.exr", 1);
+    if (!rc && o.save) rc = overwrite_check(o.save, OUTPUT_SOLUTION);
+    for (size_t k = 0; k < o.exports.n && !rc; k++) {
+        const char *path = o.exports.item[k];
+        rc = overwrite_check(path, ends_with(path, ".json") ? OUTPUT_JSON : OUTPUT_PLY);
+    }
+    return rc ? rc : elements_fit_writable();
 }
 
 static int run_elements(int n, char **operand)
@@ -249,6 +263,7 @@ static int run_elements(int n, char **operand)
     (void)n;
     int rc = cli_load(operand[0]), complete = 1;
     if (!rc) rc = options_make(&options_e);
+    if (!rc) rc = writable();
     if (rc) return rc;
     const struct imp_run run = cli_run();
     if (o.open) {
@@ -293,8 +308,9 @@ const struct command command_elements = {
      "SCENE",
      "solve a scene without noise, by finite elements",
      {options, options_elements_fit, options_params, options_run, options_scene,
-      options_general},
+      options_file, options_general},
      1,
      1},
     run_elements,
-    0};
+    0,
+    NULL};

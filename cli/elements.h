@@ -22,6 +22,8 @@ const char *elements_source_name(const struct elements_sources *s, size_t i);
 /* elements_fit.c: importon elements --fit. */
 extern const struct arg_option options_elements_fit[];
 int elements_fit_wanted(void);
+/* May its files be written? */
+int elements_fit_writable(void);
 /* Refuses targets without --fit, and --fit without targets or parameters. */
 int elements_fit_check(const double *targets, size_t n);
 /* Search, and keep the answer; *complete 0: it was stopped. */

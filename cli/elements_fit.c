@@ -51,6 +51,10 @@ static struct {
 } found;
 
 int elements_fit_wanted(void) { return o.fit; }
+int elements_fit_writable(void)
+{
+    return o.recovered ? overwrite_check(o.recovered, OUTPUT_SETTINGS) : 0;
+}
 
 int elements_fit_check(const double *targets, size_t n)
 {
@@ -151,7 +155,7 @@ static void print(const struct elements_sources *s, const struct block *blocks,
 static int write_set(const struct block *blocks, size_t n_blocks)
 {
     struct output to;
-    const int rc = output_open(&to, o.recovered);
+    const int rc = output_open(&to, o.recovered, OUTPUT_SETTINGS);
     if (rc) return rc;
     for (size_t b = 0; b < n_blocks; b++) {
         fprintf(to.file, "%s=", blocks[b].info.name);

@@ -4,12 +4,12 @@
  * picture before and after, the target, the loss curve and the parameters with their 95 %
  * intervals. */
 #include "command.h"
+#include "fit_pictures.h"
 #include "output.h"
 #include "picture.h"
 #include "plot.h"
 #include "problem.h"
 #include "progress.h"
-#include "sheet.h"
 
 #include <errno.h>
 #include <math.h>
@@ -46,99 +46,13 @@ static const struct arg_option options[] = {
      "one PNG of before, target and recovered (with -o)", &o.sheet, 0, 0, NULL},
     {0}};
 
-/* ---- Pictures ------------------------------------------------------------------ */
-
-/* "name.exr", or "name-1.exr" for the second of several targets. */
-static char *picture_path(const char *name, size_t i)
-{
-    char file[64];
-    if (problem_options.targets.n == 1) snprintf(file, sizeof file, "%s.exr", name);
-    else snprintf(file, sizeof file, "%s-%zu.exr", name, i);
-    return join_path(cli.out, file);
-}
-
-static int write_one(const char *name, size_t i)
-{
-    struct imp_target target = IMP_TARGET_INIT;
-    struct imp_run run = cli_run();
-    const struct picture_options po = {.standard_error = 1};
-    imp_film *film = NULL;
-    int rc = picture_target(problem_options.targets.item[i], NULL, &target);
-    if (rc) return rc;
-    run.sensor = target.sensor;
-    picture_target_free(&target);
-    run.time_limit_s = 0;
-    if (o.picture_spp) run.spp = o.picture_spp;
-    const enum imp_status st = imp_render(cli.scene, &run, &film);
-    if (cli_failed(st)) return cli_fail(st, cli.scene_path);
-    if (!film) return cli_done();
-    char *path = picture_path(name, i);
-    picture_stamp(film, &run);
-    rc = picture_write(film, path, &po);
-    free(path);
-    imp_film_destroy(film);
-    return rc;
-}
-
-/* The scene as it is now, through the sensor of every target. */
-static int write_pictures(const char *name)
-{
-    int rc = 0;
-    for (size_t i = 0; i < problem_options.targets.n && !rc; i++) rc = write_one(name, i);
-    return rc;
-}
-
-/* A copy of each target, so that the folder tells the whole story. */
-static int write_targets(void)
-{
-    int rc = 0;
-    for (size_t i = 0; i < problem_options.targets.n && !rc; i++) {
-        struct imp_target t = IMP_TARGET_INIT;
-        struct imp_write_options w = IMP_WRITE_OPTIONS_INIT;
-        imp_film *film = NULL;
-        rc = picture_target(problem_options.targets.item[i], NULL, &t);
-        if (rc) return rc;
-        enum imp_status st = imp_film_create(cli.context, t.width, t.height,
-                                             t.channels == 3 ? "R,G,B" : "Y", &film);
-        char *path = picture_path("target", i);
-        memcpy(strrchr(path, '.'), ".png", 4);
-        if (st == IMP_OK) {
-            memcpy(imp_film_mean(film), t.pixels,
-                   (size_t)t.width * (size_t)t.height * (size_t)t.channels *
-                       sizeof(float));
-            st = imp_film_write(film, path, &w);
-        }
-        if (st != IMP_OK) rc = cli_fail(st, NULL);
-        imp_film_destroy(film);
-        picture_target_free(&t);
-        free(path);
-    }
-    return rc;
-}
-
-/* A row for each target. */
-static int write_sheet(void)
-{
-    static const char *const name[] = {"before", "target", "recovered"};
-    struct sheet sheet = {NULL, 0};
-    for (size_t i = 0; i < problem_options.targets.n; i++)
-        for (int k = 0; k < 3; k++) {
-            char *path = picture_path(name[k], i);
-            sheet_add(&sheet, path);
-            free(path);
-        }
-    const int rc = sheet_write(&sheet, 3, o.sheet);
-    sheet_free(&sheet);
-    return rc;
-}
-
 /* ---- Numbers ------------------------------------------------------------------- */
 
 static int write_history(const struct imp_fit_result *r)
 {
     char *csv = join_path(cli.out, "loss.csv"), *svg = join_path(cli.out, "loss.svg");
     struct output to;
-    int rc = output_open(&to, csv);
+    int rc = output_open(&to, csv, OUTPUT_TABLE);
     if (!rc) {
         fprintf(to.file, "iteration,loss,se\n");
         for (size_t i = 0; i < r->n_history; i++)
@@ -185,7 +99,7 @@ static void put_json(struct json *j, const struct imp_fit_result *r,
     json_text(j, "loss", loss_word());
     json_seed(j, "seed", cli.seed);
     const struct imp_run run = cli_run();
-    json_integer(j, "spp", cli_spp(&run));
+    json_integer(j, "spp", problem_spp(&run));
     json_integer(j, "iterations", r->iterations);
     json_number(j, "value", r->objective.value);
     json_number(j, "se", r->objective.se);
@@ -218,7 +132,7 @@ static int write_json(const struct imp_fit_result *r, const struct block *blocks
 {
     char *path = join_path(cli.out, "parameters.json");
     struct output to;
-    int rc = output_open(&to, path);
+    int rc = output_open(&to, path, OUTPUT_JSON);
     if (!rc) {
         struct json j = {to.file, 0};
         json_object(&j, NULL);
@@ -255,8 +169,8 @@ static void print_table(const struct imp_fit_result *r, const struct block *bloc
     for (size_t k = 0; k < n_blocks; k++)
         if ((int)strlen(blocks[k].info.name) + 3 > width)
             width = (int)strlen(blocks[k].info.name) + 3;
-    printf("%-*s  %-11s %-11s %s\n", width, "parameter", "start", "value",
-           "95 % interval");
+    printf("%-*s  %-11s %-11s %-22s %s\n", width, "parameter", "start", "value",
+           "95 % interval", "unit");
     for (size_t k = 0; k < n_blocks; k++) {
         const struct block *b = &blocks[k];
         char name[512];
@@ -269,10 +183,12 @@ static void print_table(const struct imp_fit_result *r, const struct block *bloc
             const struct imp_fit_variable *v = &r->variables[b->first + i];
             printf("%-*s  %-11.6g %-11.6g ", width,
                    cli_number_name(&b->info, i, name, sizeof name), v->start, v->value);
+            char interval[64] = "-";
             if (isfinite(v->lo95) && isfinite(v->hi95))
-                printf("[%.6g, %.6g]", v->lo95, v->hi95);
-            else if (!o.no_intervals && !v->determined) printf("not determined");
-            else printf("-");
+                snprintf(interval, sizeof interval, "[%.6g, %.6g]", v->lo95, v->hi95);
+            else if (!o.no_intervals && !v->determined)
+                snprintf(interval, sizeof interval, "not determined");
+            printf("%-22s %s", interval, b->info.unit);
             printf("%s\n", v->at_bound < 0   ? "  at its lower bound"
                            : v->at_bound > 0 ? "  at its upper bound"
                                              : "");
@@ -303,7 +219,7 @@ static int write_set(const struct imp_fit_result *r, const struct block *blocks,
 {
     char *path = join_path(cli.out, "recovered.txt");
     struct output to;
-    int rc = output_open(&to, path);
+    int rc = output_open(&to, path, OUTPUT_SETTINGS);
     for (size_t k = 0; !rc && k < n_blocks; k++) {
         const struct block *b = &blocks[k];
         if (block_is_large(b)) continue;
@@ -317,10 +233,9 @@ static int write_set(const struct imp_fit_result *r, const struct block *blocks,
     return rc;
 }
 
-static int answer(imp_problem *problem, const struct imp_fit_result *r)
+static int answer(imp_problem *problem, const struct imp_fit_result *r,
+                  const struct block *blocks, size_t n_blocks)
 {
-    size_t n_blocks;
-    struct block *blocks = problem_blocks(problem, &n_blocks);
     char **paths = cli_alloc(n_blocks, sizeof *paths);
     int rc = 0;
     if (cli.out) {
@@ -339,7 +254,29 @@ static int answer(imp_problem *problem, const struct imp_fit_result *r)
     if (r->warning) cli_say("importon: warning: %s", r->warning);
     for (size_t k = 0; k < n_blocks; k++) free(paths[k]);
     free(paths);
-    free(blocks);
+    return rc;
+}
+
+/* May everything be written? A checkpoint is begun over, or gone on from, when that is
+ * said. */
+static int writable(const struct block *blocks, size_t n_blocks)
+{
+    static const struct {
+        const char *name;
+        enum output_kind kind;
+    } files[] = {{"loss.csv", OUTPUT_TABLE},
+                 {"loss.svg", OUTPUT_CURVE},
+                 {"parameters.json", OUTPUT_JSON},
+                 {"recovered.txt", OUTPUT_SETTINGS}};
+    int rc = checkpoint_writable(o.checkpoint, o.resume);
+    if (rc || !cli.out) return rc;
+    rc = make_folder(cli.out);
+    for (size_t k = 0; k < sizeof files / sizeof *files && !rc; k++)
+        rc = overwrite_check_in(cli.out, files[k].name, files[k].kind);
+    if (!rc) rc = fit_pictures_writable();
+    for (size_t k = 0; k < n_blocks && !rc; k++)
+        if (block_is_large(&blocks[k])) rc = block_writable(&blocks[k], cli.out);
+    if (!rc && o.sheet) rc = picture_writable(o.sheet, 0);
     return rc;
 }
 
@@ -350,6 +287,8 @@ static int run_fit(int n, char **operand)
     struct imp_fit_options fit = IMP_FIT_OPTIONS_INIT;
     const struct imp_fit_result *result = NULL;
     imp_problem *problem = NULL;
+    struct block *blocks;
+    size_t n_blocks;
     (void)n;
     int rc = cli_load(operand[0]);
     if (!rc && !problem_options.targets.n)
@@ -368,25 +307,25 @@ static int run_fit(int n, char **operand)
     fit.intervals = !o.no_intervals;
     fit.checkpoint = o.checkpoint;
     fit.resume = o.resume;
-    if (cli.out) {
-        rc = make_folder(cli.out);
-        if (!rc && o.sheet) rc = picture_writable(o.sheet);
-        if (!rc) rc = write_targets();
-        if (!rc) rc = write_pictures("before");
-    }
+    blocks = problem_blocks(problem, &n_blocks);
+    rc = writable(blocks, n_blocks);
+    if (!rc && cli.out) rc = fit_targets_write();
+    if (!rc && cli.out) rc = fit_pictures_write("before", o.picture_spp);
     if (!rc) {
         const struct imp_run run = cli_run();
         const enum imp_status st = imp_fit(problem, &fit, &run, &result);
         /* a checkpoint that cannot be written names itself */
         if (cli_failed(st)) rc = cli_fail(st, st == IMP_E_IO ? NULL : cli.scene_path);
     }
-    if (!rc && result) rc = answer(problem, result);
+    if (!rc && result) rc = answer(problem, result, blocks, n_blocks);
     if (!rc && result && cli.out) {
         progress_resume(); /* after Ctrl-C the state reached is still written */
-        rc = write_pictures("recovered");
-        if (!rc && o.sheet) rc = write_sheet();
+        rc = fit_pictures_write("recovered", o.picture_spp);
+        if (!rc && o.sheet) rc = fit_sheet_write(o.sheet);
     }
+    free(blocks);
     problem_close(problem);
+    if (!rc) checkpoint_hint(o.checkpoint);
     return rc ? rc : cli_done();
 }
 
@@ -395,8 +334,9 @@ const struct command command_fit = {
      "SCENE --target FILE",
      "recover parameters from target pictures",
      {options, options_targets, options_params, options_run, options_guide, options_scene,
-      options_general},
+      options_folder, options_general},
      1,
      1},
     run_fit,
-    0};
+    0,
+    NULL};

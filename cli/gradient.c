@@ -3,7 +3,7 @@
  * importon gradient: the derivative of a number with respect to the scene's parameters,
  * with standard errors. The number is a loss against target pictures; or the inner
  * product of the picture with a given adjoint image; or, with neither, the mean of the
- * picture. */
+ * picture over its pixels and channels. */
 #include "command.h"
 #include "picture.h"
 #include "problem.h"
@@ -13,10 +13,12 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char *adjoint_path;
+static const char *adjoint_path, *textures;
 static const struct arg_option options[] = {
     {ARG_TEXT, 0, "adjoint", "FILE",
      "derivative of sum(FILE * picture), in place of a loss", &adjoint_path, 0, 0, NULL},
+    {ARG_TEXT, 0, "textures", "DIR", "gradients of textures go there, as pictures",
+     &textures, 0, 0, NULL},
     {0}};
 
 struct result {
@@ -239,8 +241,10 @@ static void print_text(const struct result *r, const struct block *blocks,
     for (size_t k = 0; k < n_blocks; k++)
         if ((int)strlen(blocks[k].info.name) + 3 > width)
             width = (int)strlen(blocks[k].info.name) + 3;
-    printf("%-*s  %-14.8g +- %.2g%s\n\n", width, r->functional, r->value.value,
+    printf("%-*s  %-14.8g +- %.2g%s%s\n\n", width, r->functional, r->value.value,
            r->value.se,
+           !strcmp(r->functional, "mean") ? "  (of the picture: all pixels and channels)"
+                                          : "",
            r->value.bias_order == 1   ? "  (biased, O(1/N))"
            : r->value.bias_order == 2 ? "  (biased, O(1/N^2))"
                                       : "");
@@ -282,7 +286,8 @@ static int run_gradient(int n, char **operand)
     if (!rc) rc = problem_open(&problem);
     if (rc) return rc;
     const size_t n_x = imp_problem_n(problem);
-    const struct imp_run run = cli_run();
+    struct imp_run run = cli_run();
+    if (cli_spp(&run) == 1) run.spp = 2; /* replicates need two, which are reported */
     r.x = cli_alloc(n_x, sizeof *r.x);
     r.grad = cli_alloc(n_x, sizeof *r.grad);
     r.se = cli_alloc(n_x, sizeof *r.se);
@@ -290,14 +295,22 @@ static int run_gradient(int n, char **operand)
     blocks = problem_blocks(problem, &n_blocks);
     paths = cli_alloc(n_blocks, sizeof *paths);
 
-    if (cli.out) rc = make_folder(cli.out);
+    if (textures) rc = make_folder(textures);
+    for (size_t k = 0; k < n_blocks && !rc && textures; k++)
+        if (block_is_large(&blocks[k])) rc = block_writable(&blocks[k], textures);
     if (!rc) rc = compute(problem, &run, &r);
-    for (size_t k = 0; k < n_blocks && !rc && cli.out; k++)
+    for (size_t k = 0; k < n_blocks && !rc && textures; k++)
         if (block_is_large(&blocks[k]))
-            rc = block_write(&blocks[k], r.grad, r.se, cli.out, &paths[k]);
+            rc = block_write(&blocks[k], r.grad, r.se, textures, &paths[k]);
     if (!rc) {
         if (cli.json) print_json(&run, &r, blocks, n_blocks, paths);
         else print_text(&r, blocks, n_blocks, paths);
+        for (size_t k = 0; k < n_blocks && !textures; k++)
+            if (block_is_large(&blocks[k])) {
+                cli_say("importon: --textures DIR writes the gradients of textures as "
+                        "pictures");
+                break;
+            }
         rc = cli_done();
     }
     for (size_t k = 0; k < n_blocks; k++) free(paths[k]);
@@ -315,8 +328,9 @@ const struct command command_gradient = {
      "SCENE",
      "derivatives of a loss (or of the picture's mean), with errors",
      {options, options_targets, options_params, options_run, options_guide, options_scene,
-      options_general},
+      options_file, options_general},
      1,
      1},
     run_gradient,
-    0};
+    1,
+    " +- "};

@@ -154,8 +154,9 @@ static int run_info(int n, char **operand)
 const struct command command_info = {{"info",
                                       "SCENE",
                                       "list a scene's objects and parameters",
-                                      {options_scene, options_general},
+                                      {options_scene, options_file, options_general},
                                       1,
                                       1},
                                      run_info,
-                                     1};
+                                     1,
+                                     " triangles)"};

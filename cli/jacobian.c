@@ -4,6 +4,7 @@
  * colour is one control: lane c of a picture depends on lane c of a colour only, so the
  * three derivatives share one picture without loss (CONVENTIONS.md). */
 #include "command.h"
+#include "output.h"
 #include "picture.h"
 #include "problem.h"
 #include "progress.h"
@@ -57,49 +58,120 @@ static void film_sums(imp_film *film, double *mean, double *mean_se)
     *mean_se = se ? sqrt(squares) / (double)(n * c) : NAN;
 }
 
-static int write_control(struct json *j, imp_film *film, const char *name,
-                         const struct imp_run *run, const struct picture_options *o)
+/* A block is one control, or as many as it has numbers. */
+static size_t n_controls(const struct block *b)
 {
-    double mean, se;
+    return !separate && b->n == 3 && (b->info.flags & IMP_PARAM_COLOR) ? 1 : b->n;
+}
+static char *control_name(const struct block *b, size_t i, char *name, size_t size)
+{
+    if (n_controls(b) == 1) snprintf(name, size, "%s", b->info.name);
+    else snprintf(name, size, "%s.%zu", b->info.name, i);
+    return name;
+}
+static char *control_path(const char *name)
+{
     char file[600];
     snprintf(file, sizeof file, "%s.exr", name);
     make_file_name(file);
-    char *path = join_path(cli.out, file);
+    return join_path(cli.out, file);
+}
+
+/* May everything be written? */
+static int writable(const struct block *blocks, size_t n_blocks)
+{
+    char name[512];
+    int rc = overwrite_check_in(cli.out, "controls.csv", OUTPUT_TABLE);
+    char *picture = join_path(cli.out, "picture.exr");
+    if (!rc) rc = picture_writable(picture, 1);
+    free(picture);
+    for (size_t k = 0; k < n_blocks; k++)
+        for (size_t i = 0; i < n_controls(&blocks[k]) && !rc; i++) {
+            char *path = control_path(control_name(&blocks[k], i, name, sizeof name));
+            rc = picture_writable(path, 1);
+            free(path);
+        }
+    if (!rc && sheet_path) rc = picture_writable(sheet_path, 0);
+    return rc;
+}
+
+/* A picture of one derivative, its line in the answer and in the table beside it. */
+static int write_control(struct json *j, FILE *table, imp_film *film, const char *name,
+                         const struct imp_run *run)
+{
+    const double red = picture_range(film);
+    const struct picture_options o = {.standard_error = 1, .diverging = 1, .range = red};
+    double mean, se;
+    char *path = control_path(name);
     picture_stamp(film, run);
-    const int rc = picture_write(film, path, o);
+    const int rc = picture_write(film, path, &o);
     film_sums(film, &mean, &se);
     sheet_add(&sheet, path);
+    if (!rc) fprintf(table, "%s,%.9g,%.3g,%.9g\n", strrchr(path, '/') + 1, mean, se, red);
     if (!rc && cli.json) {
         json_object(j, NULL);
         json_text(j, "name", name);
         json_text(j, "file", path);
         json_number(j, "mean", mean);
         json_number(j, "se", se);
+        json_number(j, "red", red);
         json_end_object(j);
     } else if (!rc) {
-        printf("%-40s mean %-12.6g +- %.2g\n", path, mean, se);
+        char blue[32];
+        snprintf(blue, sizeof blue, "-%.3g", red);
+        printf("%-40s mean %-12.6g +- %-9.2g %s is blue, %.3g red\n", path, mean, se,
+               blue, red);
     }
     free(path);
     return rc;
 }
 
-static int write_block(struct json *j, const struct block *b, imp_film **films,
-                       const struct imp_run *run)
+static int write_block(struct json *j, FILE *table, const struct block *b,
+                       imp_film **films, const struct imp_run *run)
 {
-    const struct picture_options o = {.standard_error = 1, .diverging = 1};
-    const int one = !separate && b->n == 3 && (b->info.flags & IMP_PARAM_COLOR);
+    const size_t n = n_controls(b);
+    char name[512];
     int rc = 0;
-    if (one) {
-        add_film(films[b->first], films[b->first + 1]);
-        add_film(films[b->first], films[b->first + 2]);
-        return write_control(j, films[b->first], b->info.name, run, &o);
+    for (size_t i = 1; i < b->n && n == 1; i++)
+        add_film(films[b->first], films[b->first + i]);
+    for (size_t i = 0; i < n && !rc; i++)
+        rc = write_control(j, table, films[b->first + i],
+                           control_name(b, i, name, sizeof name), run);
+    return rc;
+}
+
+/* Everything, once the walks are done. */
+static int answer(const struct imp_run *run, imp_film *primal, imp_film **films,
+                  const struct block *blocks, size_t n_blocks)
+{
+    const struct picture_options plain = {.standard_error = 1};
+    struct json j = {stdout, 0};
+    struct output table;
+    char *csv = join_path(cli.out, "controls.csv");
+    char *path = join_path(cli.out, "picture.exr");
+    int rc = output_open(&table, csv, OUTPUT_TABLE);
+    if (!rc) {
+        fprintf(table.file, "file,mean,se,red\n");
+        if (cli.json) {
+            j = cli_json();
+            json_seed(&j, "seed", run->seed);
+            json_integer(&j, "spp", cli_spp(run));
+            json_array(&j, "controls");
+        }
+        picture_stamp(primal, run);
+        rc = picture_write(primal, path, &plain);
+        sheet_add(&sheet, path);
+        for (size_t k = 0; k < n_blocks && !rc; k++)
+            rc = write_block(&j, table.file, &blocks[k], films, run);
+        if (cli.json) {
+            json_end_array(&j);
+            cli_json_end(&j);
+        }
+        rc = output_close(&table, rc);
     }
-    for (size_t i = 0; i < b->n && !rc; i++) {
-        char name[512];
-        if (b->n == 1) snprintf(name, sizeof name, "%s", b->info.name);
-        else snprintf(name, sizeof name, "%s.%zu", b->info.name, i);
-        rc = write_control(j, films[b->first + i], name, run, &o);
-    }
+    if (!rc && sheet_path) rc = sheet_write(&sheet, 4, sheet_path);
+    free(path);
+    free(csv);
     return rc;
 }
 
@@ -118,8 +190,10 @@ static int run_jacobian(int n, char **operand)
     rc = problem_open(&problem);
     if (rc) return rc;
     rc = make_folder(cli.out);
-    if (!rc && sheet_path) rc = picture_writable(sheet_path);
+    blocks = problem_blocks(problem, &n_blocks);
+    if (!rc) rc = writable(blocks, n_blocks);
     if (rc) {
+        free(blocks);
         problem_close(problem);
         return rc;
     }
@@ -129,31 +203,9 @@ static int run_jacobian(int n, char **operand)
     films = cli_alloc(n_x, sizeof *films);
     const enum imp_status st = imp_problem_jacobian(problem, &run, &primal, films);
     if (cli_failed(st)) rc = cli_fail(st, cli.scene_path);
-    if (!rc && !primal) rc = cli_done(); /* stopped before anything was there */
-    if (!rc && primal) {
-        const struct picture_options plain = {.standard_error = 1};
-        struct json j = {stdout, 0};
-        if (cli.json) {
-            j = cli_json();
-            json_seed(&j, "seed", run.seed);
-            json_integer(&j, "spp", cli_spp(&run));
-            json_array(&j, "controls");
-        }
-        char *path = join_path(cli.out, "picture.exr");
-        picture_stamp(primal, &run);
-        rc = picture_write(primal, path, &plain);
-        sheet_add(&sheet, path);
-        free(path);
-        blocks = problem_blocks(problem, &n_blocks);
-        for (size_t k = 0; k < n_blocks && !rc; k++)
-            rc = write_block(&j, &blocks[k], films, &run);
-        if (cli.json) {
-            json_end_array(&j);
-            cli_json_end(&j);
-        }
-        if (!rc && sheet_path) rc = sheet_write(&sheet, 4, sheet_path);
-        if (!rc) rc = cli_done();
-    }
+    /* none: stopped before anything was there */
+    if (!rc && primal) rc = answer(&run, primal, films, blocks, n_blocks);
+    if (!rc) rc = cli_done();
     sheet_free(&sheet);
     imp_film_destroy(primal);
     for (size_t i = 0; i < n_x; i++) imp_film_destroy(films[i]);
@@ -167,9 +219,10 @@ const struct command command_jacobian = {
     {"jacobian",
      "SCENE",
      "one derivative picture per parameter, from one set of walks",
-     {options, options_params, options_run, options_guide, options_scene,
+     {options, options_params, options_run, options_guide, options_scene, options_folder,
       options_general},
      1,
      1},
     run_jacobian,
-    0};
+    0,
+    NULL};

@@ -7,6 +7,7 @@
 #include "progress.h"
 
 #include <errno.h>
+#include <signal.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -50,6 +51,8 @@ static int finish(int rc)
         const char *name = redirected.file ? redirected.path : "standard output";
         const int code = errno ? errno : EIO;
         (void)output_close(&redirected, EXIT_RUN);
+        /* the terminal is gone, and was to be told; files are written */
+        if (!redirected.path && progress_interrupted() == SIGHUP) return rc;
         return cli_error(EXIT_RUN, "%s: %s", name, strerror(code));
     }
     /* An answer that is no, or was interrupted, is an answer too. */
@@ -58,11 +61,12 @@ static int finish(int rc)
     return closed ? closed : rc;
 }
 
-static int redirect(const char *path)
+int cli_redirect(void)
 {
-    const int rc = output_open(&redirected, path);
+    if (!cli.out || !strcmp(cli.out, "-")) return 0;
+    const int rc = output_open(&redirected, cli.out, OUTPUT_ANSWER);
     if (rc == 0 && dup2(fileno(redirected.file), STDOUT_FILENO) < 0)
-        return cli_error(EXIT_RUN, "%s: %s", path, strerror(errno));
+        return cli_error(EXIT_RUN, "%s: %s", cli.out, strerror(errno));
     return rc;
 }
 
@@ -82,13 +86,16 @@ int main(int argc, char **argv)
     }
     if (!strcmp(name, "--help") || !strcmp(name, "-h") || !strcmp(name, "help")) {
         if (argc > 2 && !(command = find(argv[2]))) return EXIT_USAGE;
-        if (argc > 2) args_help(&command->args, stdout);
+        rc = EXIT_DONE;
+        if (argc > 3) rc = args_help_option(&command->args, argv[3], stdout);
+        else if (argc > 2) args_help(&command->args, stdout);
         else print_usage(stdout);
-        return finish(EXIT_DONE);
+        return finish(rc);
     }
     if (!(command = find(name))) return EXIT_USAGE;
 
     cli.name = command->args.command;
+    cli.answer = command->answer;
     cli.argc = argc - 1;
     cli.argv = cli_alloc((size_t)argc, sizeof *cli.argv);
     memcpy(cli.argv, argv + 1,
@@ -100,10 +107,10 @@ int main(int argc, char **argv)
             return finish(EXIT_DONE);
         }
     rc = args_parse(&command->args, argc - 1, argv + 1, &first);
-    if (rc == 0 && command->prints && cli.out && strcmp(cli.out, "-"))
-        rc = redirect(cli.out);
+    for (int i = 1 + first; rc == 0 && i < argc; i++) overwrite_protect(argv[i]);
+    if (rc == 0 && command->prints) rc = cli_redirect();
     if (rc == 0) {
-        progress_init((enum progress_mode)cli.progress);
+        progress_init(cli.quiet ? PROGRESS_NEVER : (enum progress_mode)cli.progress);
         rc = command->run(argc - 1 - first, argv + 1 + first);
         progress_clear();
     }

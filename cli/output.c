@@ -23,10 +23,12 @@ static mode_t new_mode(void)
     return 0666 & ~mask;
 }
 
-int output_open(struct output *o, const char *path)
+int output_open(struct output *o, const char *path, enum output_kind kind)
 {
     struct stat info;
     *o = (struct output){.path = path};
+    const int rc = overwrite_check(path, kind);
+    if (rc) return rc;
     if (!strcmp(path, "-")) {
         o->file = stdout;
         return 0;

@@ -5,6 +5,7 @@
 #ifndef IMP_CLI_OUTPUT_H
 #define IMP_CLI_OUTPUT_H
 
+#include "overwrite.h"
 #include <stdio.h>
 
 struct output {
@@ -15,8 +16,9 @@ struct output {
 };
 
 /* "-" is standard output, and what is not a regular file (/dev/stdout) is written to as
- * it is. 0, or an exit code with the reason printed. */
-int output_open(struct output *o, const char *path);
+ * it is. A file that is there must be one of this kind (overwrite.h). 0, or an exit code
+ * with the reason printed. */
+int output_open(struct output *o, const char *path, enum output_kind kind);
 /* Flush, and rename if `rc` is 0; else what was there before stays. Returns rc, or
  * EXIT_RUN with the reason printed. */
 int output_close(struct output *o, int rc);

@@ -2,6 +2,7 @@
 #include "picture.h"
 
 #include "command.h"
+#include "overwrite.h"
 
 #include <ctype.h>
 #include <errno.h>
@@ -56,27 +57,40 @@ void make_file_name(char *name)
         if (*p == '/' || (p == name && *p == '.')) *p = '_';
 }
 
-int picture_writable(const char *path)
+/* The PNG beside a picture, in a new string; NULL: there is none. */
+static char *preview_path(const char *path)
 {
-    static const char *const kinds[] = {".exr", ".png", ".pfm", ".hdr", ".npy"};
+    const char *dot = strrchr(path, '.'), *slash = strrchr(path, '/');
+    if (!dot || (slash && dot < slash) || !strcmp(dot, ".png")) return NULL;
+    const size_t stem = (size_t)(dot - path);
+    char *preview = cli_alloc(stem + 5, 1);
+    memcpy(preview, path, stem);
+    memcpy(preview + stem, ".png", 5);
+    return preview;
+}
+
+int picture_writable(const char *path, int preview)
+{
+    static const struct {
+        const char *extension;
+        enum output_kind kind;
+    } kinds[] = {{".exr", OUTPUT_EXR},
+                 {".png", OUTPUT_PNG},
+                 {".pfm", OUTPUT_PFM},
+                 {".hdr", OUTPUT_HDR},
+                 {".npy", OUTPUT_NPY}};
     const size_t n = strlen(path), n_kinds = sizeof kinds / sizeof kinds[0];
-    struct stat info;
     size_t k = 0;
     if (!strcmp(path, "-")) return 0;
-    while (k < n_kinds && (n < 5 || strcasecmp(path + n - 4, kinds[k]) != 0)) k++;
+    while (k < n_kinds && (n < 5 || strcasecmp(path + n - 4, kinds[k].extension) != 0))
+        k++;
     if (k == n_kinds)
         return cli_error(EXIT_USAGE,
                          "%s: the name must end in .exr, .png, .pfm, .hdr or .npy", path);
-    if (stat(path, &info) == 0 && S_ISDIR(info.st_mode))
-        return cli_error(EXIT_RUN, "%s: cannot write: %s", path, strerror(EISDIR));
-    char *folder = cli_alloc(n + 2, 1);
-    const char *slash = strrchr(path, '/');
-    snprintf(folder, n + 2, "%.*s", slash ? (int)(slash - path + 1) : 1,
-             slash ? path : ".");
-    int rc = 0;
-    if (access(folder, W_OK | X_OK) != 0)
-        rc = cli_error(EXIT_RUN, "%s: cannot create: %s", path, strerror(errno));
-    free(folder);
+    int rc = overwrite_check(path, kinds[k].kind);
+    char *beside = preview ? preview_path(path) : NULL;
+    if (!rc && beside) rc = overwrite_check(beside, OUTPUT_PNG);
+    free(beside);
     return rc;
 }
 
@@ -113,6 +127,7 @@ int picture_read(const char *path, imp_film **out)
             return cli_error(EXIT_RUN, "cannot copy standard input");
         }
     }
+    if (!from_stdin) overwrite_protect(path);
     const enum imp_status st = imp_film_read(cli.context, from_stdin ? name : path, out);
     if (from_stdin) unlink(name);
     if (st == IMP_OK) return 0;
@@ -141,25 +156,43 @@ static int write_to_stdout(const imp_film *film, const struct imp_write_options 
 int picture_write(const imp_film *film, const char *path, const struct picture_options *o)
 {
     struct imp_write_options options = IMP_WRITE_OPTIONS_INIT;
-    const char *dot = strrchr(path, '.');
-    const char *slash = strrchr(path, '/');
     options.half = o->half;
     options.standard_error = o->standard_error;
     options.exposure = o->exposure;
     options.diverging = o->diverging;
+    options.range = o->range;
     if (!strcmp(path, "-")) return write_to_stdout(film, &options);
 
     enum imp_status st = imp_film_write(film, path, &options);
-    if (st == IMP_OK && !o->no_preview && dot && (!slash || dot > slash) &&
-        strcmp(dot, ".png")) {
-        const size_t stem = (size_t)(dot - path);
-        char *preview = cli_alloc(stem + 5, 1);
-        memcpy(preview, path, stem);
-        memcpy(preview + stem, ".png", 5);
-        st = imp_film_write(film, preview, &options);
-        free(preview);
-    }
+    char *preview = o->no_preview ? NULL : preview_path(path);
+    if (st == IMP_OK && preview) st = imp_film_write(film, preview, &options);
+    free(preview);
     return st == IMP_OK ? 0 : cli_fail(st, NULL);
+}
+
+/* By bisection on the count, as imp_film_write does it: the same bits. */
+double picture_range(imp_film *film)
+{
+    struct imp_film_info info = {.size = sizeof info};
+    imp_film_get_info(film, &info);
+    const size_t n = (size_t)info.width * (size_t)info.height;
+    const float *mean = imp_film_mean(film);
+    double *size = cli_alloc(n, sizeof *size), lo = 0, hi = 0;
+    for (size_t i = 0; i < n; i++) {
+        double sum = 0;
+        for (int c = 0; c < info.channels; c++) sum += (double)*mean++;
+        size[i] = fabs(sum / info.channels);
+        if (isfinite(size[i])) hi = fmax(hi, size[i]);
+    }
+    for (int step = 0; step < 40 && hi > 0; step++) {
+        const double middle = (lo + hi) / 2;
+        size_t above = 0;
+        for (size_t i = 0; i < n; i++) above += size[i] > middle;
+        if (above > n / 200) lo = middle;
+        else hi = middle;
+    }
+    free(size);
+    return hi > 0 ? hi : 1;
 }
 
 /* ---- Provenance ---------------------------------------------------------------- */
@@ -259,17 +292,18 @@ static float *extract(const float *from, size_t n_pixels, int stride, const int 
     return out;
 }
 
-/* Cut "FILE@3" into file and sensor; a name with '@' and no digits after it is a name. */
-static char *split_sensor(const char *spec, int *sensor)
+/* The "@3" of "FILE@3"; a name with '@' and no digits after it is a name. */
+static const char *sensor_part(const char *spec)
 {
-    char *path = strdup(spec);
-    if (!path) exit(cli_error(EXIT_RUN, "out of memory"));
-    char *at = strrchr(path, '@');
-    if (at && at[1] && strspn(at + 1, "0123456789") == strlen(at + 1) && strlen(at) < 8) {
-        *sensor = atoi(at + 1);
-        *at = 0;
-    }
-    return path;
+    const char *at = strrchr(spec, '@');
+    return at && at[1] && strspn(at + 1, "0123456789") == strlen(at + 1) && strlen(at) < 8
+               ? at
+               : NULL;
+}
+int picture_sensor(const char *spec)
+{
+    const char *at = sensor_part(spec);
+    return at ? atoi(at + 1) : -1;
 }
 
 int picture_target(const char *spec, const char *mask, struct imp_target *target)
@@ -278,15 +312,17 @@ int picture_target(const char *spec, const char *mask, struct imp_target *target
                          mask_info = {.size = sizeof mask_info};
     struct imp_scene_info scene = {.size = sizeof scene};
     imp_film *film = NULL, *weights = NULL;
-    int index[3], sensor = cli.sensor;
-    char *path = split_sensor(spec, &sensor);
+    int index[3];
+    const char *at = sensor_part(spec);
+    char *path = at ? strndup(spec, (size_t)(at - spec)) : strdup(spec);
+    if (!path) return cli_error(EXIT_RUN, "out of memory");
     int rc = picture_read(path, &film);
     if (rc) goto out;
     imp_scene_get_info(cli.scene, &scene);
     imp_film_get_info(film, &info);
     const int channels = colour_channels(film, info.channels, index);
     const size_t n = (size_t)info.width * (size_t)info.height;
-    target->sensor = sensor;
+    target->sensor = at ? picture_sensor(spec) : cli.sensor;
     target->width = info.width;
     target->height = info.height;
     target->channels = channels < scene.channels ? channels : scene.channels;

@@ -19,20 +19,28 @@ struct picture_options {
     int diverging; /* preview of a signed picture */
     int no_preview;
     double exposure;
+    double range; /* of a signed preview: what is full red; 0: picture_range */
 };
 /* Write `path` ("-": EXR to stdout) and, unless it is a PNG itself, a PNG beside it. */
 int picture_write(const imp_film *film, const char *path,
                   const struct picture_options *o);
 
-/* A target for a loss: "FILE[@SENSOR]", with an optional mask file (NULL: none). Pixels
- * are brought to the scene's channels: its R, G, B, or its Y, or in mono mode their
- * luminance. target->pixels, weights and noise_se are to be freed. */
+/* N of "FILE@N"; -1: none is named. */
+int picture_sensor(const char *spec);
+
+/* The value of full red in a signed picture's preview: 99.5 % of the pixels are below. */
+double picture_range(imp_film *film);
+
+/* A target for a loss: "FILE[@N]", with an optional mask file (NULL: none). Without @N
+ * the caller sets target->sensor. Pixels are brought to the scene's channels: its R, G,
+ * B, or its Y, or in mono mode their luminance. target->pixels, weights and noise_se are
+ * to be freed. */
 int picture_target(const char *spec, const char *mask, struct imp_target *target);
 void picture_target_free(struct imp_target *target);
 
-/* Could picture_write write `path`? Asked before hours of work. 0, or an exit code with
- * the reason printed. */
-int picture_writable(const char *path);
+/* May picture_write write `path` and, if asked, the preview beside it? Asked before hours
+ * of work. 0, or an exit code with the reason printed. */
+int picture_writable(const char *path, int preview);
 
 /* Make the folder `path` and what is missing above it. */
 int make_folder(const char *path);

@@ -111,7 +111,7 @@ int plot_curve(const char *path, const char *title, const char *x_label,
     const struct axes a = find_axes(n, y, se);
     int finite = 1;
     struct output to;
-    const int rc = output_open(&to, path);
+    const int rc = output_open(&to, path, OUTPUT_CURVE);
     if (rc) return rc;
     FILE *f = to.file;
     fprintf(f,

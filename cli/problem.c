@@ -21,8 +21,9 @@ const struct arg_option options_params[] = {
 
 const struct arg_option options_targets[] = {
     {ARG_LIST, 'T', "target", "FILE[@N]",
-     "picture to match, through sensor N; repeatable", &problem_options.targets, 0, 0,
-     NULL},
+     "picture to match, through sensor N; several without @N: one for each sensor, in "
+     "order",
+     &problem_options.targets, 0, 0, NULL},
     {ARG_LIST, 0, "mask", "FILE", "weights of the pixels, one for each --target in order",
      &problem_options.masks, 0, 0, NULL},
     {ARG_CHOICE, 0, "loss", "LOSS", "l2 (default), relative, l1 or log",
@@ -111,9 +112,52 @@ static void warn_clipped(const char *spec, const struct imp_target *t)
                 spec, clipped, (size_t)t->width * (size_t)t->height);
 }
 
+int target_sensor(size_t i)
+{
+    const struct problem_options *o = &problem_options;
+    const int named = picture_sensor(o->targets.item[i]);
+    return named >= 0 ? named : o->targets.n > 1 ? (int)i : cli.sensor;
+}
+
+/* Several targets either all name their sensors, or are one for each sensor, in order:
+ * what else could be meant is not guessed. */
+static int match_sensors(void)
+{
+    const struct arg_list *t = &problem_options.targets;
+    struct imp_scene_info scene = {.size = sizeof scene};
+    size_t named = 0;
+    imp_scene_get_info(cli.scene, &scene);
+    for (size_t i = 0; i < t->n; i++) named += picture_sensor(t->item[i]) >= 0;
+    if (t->n < 2 || named == t->n) return 0;
+    if (named)
+        return cli_error(EXIT_USAGE,
+                         "%zu of %zu targets name a sensor: name one for each, like "
+                         "--target %s@0",
+                         named, t->n, t->item[picture_sensor(t->item[0]) >= 0 ? 1 : 0]);
+    if (t->n == (size_t)scene.n_sensors && !cli.sensor) return 0;
+    if (t->n == (size_t)scene.n_sensors)
+        return cli_error(EXIT_USAGE,
+                         "--sensor %d and %zu targets: name the sensor of each target, "
+                         "like --target %s@%d",
+                         cli.sensor, t->n, t->item[0], cli.sensor);
+    return cli_error(EXIT_USAGE,
+                     "%zu targets, but the scene has %d %s: name the sensor of each "
+                     "target, like --target %s@0 --target %s@%d",
+                     t->n, scene.n_sensors, scene.n_sensors == 1 ? "sensor" : "sensors",
+                     t->item[0], t->item[1], scene.n_sensors > 1);
+}
+
+int problem_spp(const struct imp_run *run)
+{
+    const int spp = cli_spp(run);
+    return problem_options.targets.n && spp == 1 ? 2 : spp;
+}
+
 static int add_targets(imp_problem *problem)
 {
     const struct problem_options *o = &problem_options;
+    const int unclear = match_sensors();
+    if (unclear) return unclear;
     if (o->masks.n > o->targets.n)
         return cli_error(EXIT_USAGE, "%zu masks, but only %zu %s", o->masks.n,
                          o->targets.n, o->targets.n == 1 ? "target" : "targets");
@@ -123,6 +167,7 @@ static int add_targets(imp_problem *problem)
         const int rc = picture_target(o->targets.item[i], mask, &target);
         if (rc) return rc;
         warn_clipped(o->targets.item[i], &target);
+        target.sensor = target_sensor(i);
         target.loss = losses[o->loss];
         target.epsilon = o->epsilon;
         const enum imp_status st = imp_problem_add_target(problem, &target);
@@ -196,6 +241,21 @@ void block_json(struct json *j, const struct block *b)
     json_text(j, "unit", b->info.unit);
 }
 
+static char *block_path(const struct block *b, const char *folder)
+{
+    char name[512];
+    snprintf(name, sizeof name, "%s.exr", b->info.name);
+    make_file_name(name);
+    return join_path(folder, name);
+}
+int block_writable(const struct block *b, const char *folder)
+{
+    char *path = block_path(b, folder);
+    const int rc = picture_writable(path, 1);
+    free(path);
+    return rc;
+}
+
 int block_write(const struct block *b, const double *x, const double *se,
                 const char *folder, char **path)
 {
@@ -213,10 +273,7 @@ int block_write(const struct block *b, const double *x, const double *se,
                                                     {"R,G,B", "R,G,B,se.R,se.G,se.B"}};
     const struct imp_run run = cli_run();
     imp_film *film = NULL;
-    char name[512];
-    snprintf(name, sizeof name, "%s.exr", p->name);
-    make_file_name(name);
-    *path = join_path(folder, name);
+    *path = block_path(b, folder);
     const enum imp_status st =
         imp_film_create(cli.context, (int)width, (int)height,
                         channel_names[channels == 3][se != NULL], &film);

@@ -30,6 +30,8 @@ struct block *problem_blocks(const imp_problem *problem, size_t *n_blocks);
 int block_is_large(const struct block *b);
 /* {"name":..,"unit":..} and what the caller adds before json_end_object. */
 void block_json(struct json *j, const struct block *b);
+/* May block_write write there? */
+int block_writable(const struct block *b, const char *folder);
 /* A texture's numbers as a picture in `folder`, named by the parameter: `x` in plain
  * colours, or, with `se` of the same length, signed. [h][w] or [h][w][1 or 3]; what has
  * another shape is a row. *path is to be freed. 0, or an exit code with the reason
@@ -37,5 +39,9 @@ void block_json(struct json *j, const struct block *b);
 int block_write(const struct block *b, const double *x, const double *se,
                 const char *folder, char **path);
 const char *loss_word(void);
+/* The sensor that sees target i. */
+int target_sensor(size_t i);
+/* Samples per pixel that a loss, or without --target a picture, takes in this run. */
+int problem_spp(const struct imp_run *run);
 
 #endif

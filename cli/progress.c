@@ -8,15 +8,15 @@
 #include <time.h>
 #include <unistd.h>
 
-static volatile sig_atomic_t stop_asked; /* the library shall stop */
-static volatile sig_atomic_t interrupted;
+static volatile sig_atomic_t stop_asked;  /* the library shall stop */
+static volatile sig_atomic_t interrupted; /* by this signal */
 static int show, drawn;
 static double deadline; /* on the monotonic clock; 0: none */
 
 static void on_interrupt(int signal_number)
 {
-    (void)signal_number;
-    stop_asked = interrupted = 1;
+    stop_asked = 1;
+    interrupted = signal_number;
 }
 
 void progress_init(enum progress_mode mode)
@@ -27,6 +27,9 @@ void progress_init(enum progress_mode mode)
                                      .sa_flags = SA_RESETHAND};
     sigaction(SIGINT, &action, NULL);
     sigaction(SIGTERM, &action, NULL);
+    struct sigaction before; /* nohup ignores it */
+    if (sigaction(SIGHUP, NULL, &before) == 0 && before.sa_handler != SIG_IGN)
+        sigaction(SIGHUP, &action, NULL);
     signal(SIGXFSZ, SIG_IGN); /* over a size limit writes fail, as on a full disk */
     show = mode == PROGRESS_ALWAYS || (mode == PROGRESS_AUTO && isatty(STDERR_FILENO));
 }
@@ -92,7 +95,7 @@ int progress_report(const struct imp_progress *p, void *payload)
     format_time(p->eta_s, eta, sizeof eta);
     format_time(p->elapsed_s, elapsed, sizeof elapsed);
     format_rate(p->rate, p->rate_unit, rate, sizeof rate);
-    fprintf(stderr, "\r\033[K%-8s [%s] %3.0f%% %s ETA %s%s%s%s%s",
+    fprintf(stderr, "\r\033[K%-9s [%s] %3.0f%% %s ETA %s%s%s%s%s",
             p->stage ? p->stage : "", bar, 100 * fraction, elapsed, eta,
             rate[0] ? "  " : "", rate, p->note ? "  " : "", p->note ? p->note : "");
     fflush(stderr);

@@ -59,7 +59,7 @@ static int write_paths(const struct imp_run *run)
     const enum imp_status st = imp_scene_get_sensor(cli.scene, run->sensor, &info);
     if (st != IMP_OK) return cli_fail(st, cli.scene_path);
     struct output to;
-    int rc = output_open(&to, o.paths);
+    int rc = output_open(&to, o.paths, OUTPUT_WALKS);
     if (rc) return rc;
     const int count = o.count ? o.count : 100;
     for (int i = 0; i < count && !rc && !progress_interrupted(); i++) {
@@ -101,10 +101,11 @@ static void report(const char *path, imp_film *film, const struct imp_run *run)
             : info.spp
                 ? ", interrupted"
                 : ", interrupted in the first pass: a part of the picture is there");
-    if (info.dropped)
-        cli_say("importon: warning: %llu walks dropped: a value was not finite or "
-                "negative, or a bent ray was lost",
-                (unsigned long long)info.dropped);
+    if (info.dropped) /* more than the budget fails the run */
+        cli_say("%llu of %.3g walks were left out (a value not finite or negative, or a "
+                "bent ray lost): within the budget of 1 in 10000",
+                (unsigned long long)info.dropped,
+                (double)info.width * info.height * (double)info.spp);
     if (!cli.json || !strcmp(path, "-")) return;
     struct json j = cli_json();
     json_text(&j, "file", path);
@@ -145,12 +146,16 @@ static int run_render(int n, char **operand)
     if (o.sample && !one && !o.paths)
         return cli_error(EXIT_USAGE, "--sample needs --pixel or --paths");
     if (o.count && !o.paths) return cli_error(EXIT_USAGE, "--count needs --paths");
-    if (one) return describe(&run, o.pixel[0], o.pixel[1], o.sample, cli.json, stdout);
+    if (one) {
+        rc = cli_redirect();
+        return rc ? rc
+                  : describe(&run, o.pixel[0], o.pixel[1], o.sample, cli.json, stdout);
+    }
     if (o.paths) return write_paths(&run);
 
     char *automatic = cli.out ? NULL : default_output(&run);
     const char *path = cli.out ? cli.out : automatic;
-    rc = picture_writable(path);
+    rc = picture_writable(path, !o.picture.no_preview);
     if (!rc) {
         const enum imp_status st = imp_render(cli.scene, &run, &film);
         if (cli_failed(st)) rc = cli_fail(st, cli.scene_path);
@@ -169,8 +174,9 @@ const struct command command_render = {
     {"render",
      "SCENE",
      "render a scene; or print its random walks",
-     {options, options_run, options_guide, options_scene, options_general},
+     {options, options_run, options_guide, options_scene, options_file, options_general},
      1,
      1},
     run_render,
-    0};
+    0,
+    "walk: pixel"};

@@ -28,7 +28,7 @@ say "Figure 6: adjoint against differences"
 say "Figures 7 and 8: gradient pictures"
 for sampling in cosine mixture; do
     "$importon" jacobian "${stam[@]}" -D sampling=$sampling --spp 512 -o "$out/$sampling" \
-        --sheet "docs/images/stam_$sampling.png" --json -q >"$out/$sampling.json"
+        --sheet "docs/images/stam_$sampling.png" --overwrite --json -q >"$out/$sampling.json"
 done
 
 say "Section 5: the optimiser's loop"
@@ -37,7 +37,7 @@ start=(sphere.ambient=.026 sphere.diffuse=.35 sphere.specular=.39 sphere.exponen
     walls.ambient=.021 walls.diffuse=.39 light.emission=6.5)
 fit=(fit "${stam[@]}" -D integrator=path --target "$out/target.exr" --loss relative -q)
 for value in "${start[@]}"; do fit+=(--set "$value"); done
-"$importon" "${fit[@]}" --spp 128 --picture-spp 2048 -o "$out/fit" --sheet docs/images/stam_fit.png --json \
+"$importon" "${fit[@]}" --spp 128 --picture-spp 2048 -o "$out/fit" --sheet docs/images/stam_fit.png --overwrite --json \
     >"$out/adam.json"
 "$importon" "${fit[@]}" --optimizer lm --spp 1024 --json >"$out/lm.json"
 

@@ -172,8 +172,7 @@ enum imp_status imp__lbfgs(const struct imp__goal *goal,
             IMP_TRY(line(&r, &found));
         }
         if (!found) {
-            s->finished = true;
-            s->reason = "no step lowers the objective further";
+            imp__search_finish(s, IMP_FINISH_LOWEST);
             break;
         }
         for (size_t k = 0; k < n; k++)
@@ -181,8 +180,7 @@ enum imp_status imp__lbfgs(const struct imp__goal *goal,
         memcpy(s->x, s->array[X], n * sizeof(double));
         IMP_TRY(imp__search_log(s, (struct imp_estimate){s->scalar[VALUE], 0, 0}));
         if (moved < options->tolerance) {
-            s->finished = true;
-            s->reason = "steps stay below the tolerance";
+            imp__search_finish(s, IMP_FINISH_STEPS);
         }
         IMP_TRY(imp__search_iterated(goal, s));
     }

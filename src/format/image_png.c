@@ -149,6 +149,13 @@ static bool encode(struct png_job *j, int width, int height, int channels,
                  PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
                  PNG_FILTER_TYPE_DEFAULT);
     png_set_sRGB(j->png, j->info, PNG_sRGB_INTENT_RELATIVE);
+    char key[] = "Software", value[] = "importon " IMP_VERSION_STRING;
+    png_set_text(j->png, j->info,
+                 &(png_text){.compression = PNG_TEXT_COMPRESSION_NONE,
+                             .key = key,
+                             .text = value,
+                             .text_length = strlen(value)},
+                 1);
     png_write_info(j->png, j->info);
     for (int y = 0; y < height; y++)
         png_write_row(j->png, pixels + (size_t)y * (size_t)width * (size_t)channels);

@@ -40,9 +40,10 @@ void imp__fit_end(struct imp__fit *fit);
 
 /* fit_residual.c: what is left between scene and targets. NAN: cannot be said. */
 struct imp__fit_residual {
-    double relative;      /* root of sum w (I - T)^2 / sum w T^2, */
-    double relative_hi;   /* and with two standard errors added to the loss */
-    double chi2, chi2_se; /* per degree of freedom */
+    double relative;       /* root of sum w (I - T)^2 / sum w T^2, */
+    double relative_hi;    /* and with two standard errors added to the loss */
+    double chi2, chi2_se;  /* per degree of freedom */
+    double count, freedom; /* residuals; and those less the determined numbers */
 };
 struct imp__fit_residual imp__fit_residual(const struct imp__fit *fit, const double *x,
                                            struct imp_estimate objective,

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A problem as an optimiser sees it. */
+#include "curved/inside.h"
 #include "fit.h"
 #include "walk/run.h"
 #include <float.h>
@@ -23,15 +24,16 @@ static void report(struct imp__fit *f, double fraction)
     f->last_report_s = now;
     const double elapsed = now - f->start_s;
     const int done = f->search ? f->search->iteration - f->first_iteration : 0;
+    const bool closing = f->final_total > 0; /* the search is over */
     const struct imp_progress p = {
         .size = sizeof p,
-        .stage = "fit",
+        .stage = closing ? "intervals" : "fit",
         .fraction = f->fraction,
         .elapsed_s = elapsed,
         .eta_s = f->fraction > 1e-3 ? elapsed * (1 - f->fraction) / f->fraction : -1,
-        .rate = elapsed > 0 ? done / elapsed : 0,
+        .rate = elapsed > 0 && !closing ? done / elapsed : 0,
         .rate_unit = "iterations",
-        .note = f->note[0] ? f->note : NULL};
+        .note = f->note[0] && !closing ? f->note : NULL};
     if (f->outer.progress(&p, f->outer.progress_payload) != 0) f->stopped = true;
 }
 
@@ -114,11 +116,28 @@ static enum imp_status normal(const double *x, uint64_t seed, struct imp__normal
 
 /* ---- What the fit belongs to --------------------------------------------------- */
 
+/* What of a medium is no parameter (where its field lies, a profile's axis) shows in its
+ * index at some points; with an active number that differs from start to start. */
+static uint64_t medium_hash(uint64_t h, const struct imp_medium *m, const int64_t *base)
+{
+    enum { SIDE = 3 };
+    for (int k = 0; k < m->n_numbers; k++)
+        if (m->numbers[k].param >= 0 && base[m->numbers[k].param] >= 0) return h;
+    if (!m->graded || m->index < 0) return h;
+    for (int k = 0; k < SIDE * SIDE * SIDE; k++) {
+        const int at[3] = {k % SIDE, k / SIDE % SIDE, k / (SIDE * SIDE)};
+        imp_v3 x = m->lo;
+        for (int c = 0; c < 3; c++) x[c] += (m->hi[c] - m->lo[c]) * (at[c] + 0.6) / SIDE;
+        const double index = imp__graded_index(m->graded, &x);
+        h = imp__hash(h, &index, sizeof index);
+    }
+    return h;
+}
+
 static void fingerprint(struct imp__fit *f)
 {
     const struct imp_problem *p = f->problem;
     struct imp__fingerprint *h = &f->fingerprint;
-    double value[3];
 
     for (size_t k = 0; k < p->scene->n_params; k++) {
         const struct imp_param *q = &p->scene->params[k];
@@ -129,11 +148,14 @@ static void fingerprint(struct imp__fit *f)
         } else if (q->store == IMP_STORE_BULK) {
             h->scene = imp__hash(h->scene, q->bulk, n * sizeof *q->bulk);
         } else {
-            for (size_t e = 0; e < imp_min(n, (size_t)3); e++)
-                value[e] = imp__param_get(q, e);
-            h->scene = imp__hash(h->scene, value, imp_min(n, (size_t)3) * sizeof *value);
+            for (size_t e = 0; e < n; e++) {
+                const double value = imp__param_get(q, e);
+                h->scene = imp__hash(h->scene, &value, sizeof value);
+            }
         }
     }
+    for (int m = 0; m < p->scene->n_media; m++)
+        h->scene = medium_hash(h->scene, p->scene->media[m], p->active.base);
     for (size_t i = 0; i < p->n_targets; i++) {
         const struct imp__target *t = &p->targets[i];
         const size_t n = (size_t)t->desc.width * (size_t)t->desc.height;

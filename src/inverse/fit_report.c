@@ -6,8 +6,10 @@
 #include <string.h>
 
 #define NAMES_MAX 6
-#define MISFIT    2 /* chi^2 per degree of freedom that is worth a word, if it is */
-#define MISFIT_Z  3 /* so many standard errors above 1 */
+#define MISFIT    2   /* chi^2 per degree of freedom that is worth a word, if it is */
+#define MISFIT_Z  3   /* so many standard errors above 1 */
+#define LEFT_OVER 0.2 /* of the targets, as a relative residual, that is worth a word */
+#define FEW       10  /* degrees of freedom that tell little of the targets' noise */
 
 struct text {
     char buffer[1536];
@@ -84,6 +86,14 @@ static bool quadratic(const struct imp_problem *p)
     return true;
 }
 
+/* More than the uncertainty of the loss, where the targets' noise does not explain it. */
+static bool much_left(const struct imp__fit_residual *r)
+{
+    const double square = r->relative * r->relative;
+    const double two_se = r->relative_hi * r->relative_hi - square;
+    return !isfinite(r->chi2) && square - two_se > LEFT_OVER * LEFT_OVER;
+}
+
 const char *imp__fit_warning(const struct imp__fit *f, int bias_order,
                              const struct imp_fit_variable *variables,
                              const double *loosest, const char *no_intervals,
@@ -97,6 +107,19 @@ const char *imp__fit_warning(const struct imp__fit *f, int bias_order,
             "what their noise leaves (chi-square per degree of freedom); this is another "
             "minimum, or another number is wrong, and intervals do not know of that",
             residual->chi2 < 100, residual->chi2, residual->chi2_se);
+    else if (much_left(residual))
+        put(&t,
+            "%.0f %% of the targets are left over: a target belongs to another sensor, "
+            "this is another minimum, or the scene cannot make the pictures",
+            100 * residual->relative);
+    if (loosest && !f->noise_known && residual->freedom < FEW)
+        put(&t,
+            "%sthe targets' noise is not known, and %.0f residuals less %zu numbers tell "
+            "%s of it: intervals %s. Give targets with their standard errors "
+            "(render --se)",
+            t.used ? "; " : "", residual->count, f->problem->n,
+            residual->freedom > 0 ? "little" : "nothing",
+            residual->freedom > 0 ? "are uncertain" : "are without it");
     if (loosest) put_loose(&t, f, variables, loosest);
     if (no_intervals) put(&t, "%sno intervals: %s", t.used ? "; " : "", no_intervals);
     if (bias_order > 0)

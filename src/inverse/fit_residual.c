@@ -53,7 +53,7 @@ struct imp__fit_residual imp__fit_residual(const struct imp__fit *f, const doubl
                                            size_t determined)
 {
     const struct imp_problem *p = f->problem;
-    struct imp__fit_residual r = {NAN, NAN, NAN, NAN};
+    struct imp__fit_residual r = {NAN, NAN, NAN, NAN, NAN, NAN};
     struct sums s = {0};
     for (size_t t = 0; t < p->n_targets; t++) {
         if (p->targets[t].desc.loss == IMP_LOSS_L1) return r; /* own noise is in it */
@@ -61,6 +61,8 @@ struct imp__fit_residual imp__fit_residual(const struct imp__fit *f, const doubl
     }
     const double data = objective.value - imp__regularise(p, x, NULL);
     const double freedom = s.count - (double)determined;
+    r.count = s.count;
+    r.freedom = freedom;
     if (s.signal > 0) {
         r.relative = sqrt(fmax(0, 2 * data) / s.signal);
         r.relative_hi = sqrt(fmax(0, 2 * (data + 2 * objective.se)) / s.signal);

@@ -54,6 +54,7 @@ void imp_problem_destroy(imp_problem *p)
     }
     imp__release(p->ctx, p->regularisers);
     imp__active_destroy(p->ctx, &p->active);
+    imp__release(p->ctx, p->blocks);
     imp__arena_free(&p->fit_arena);
     imp__arena_free(&p->check_arena);
     imp__release(ctx, p->chosen);
@@ -95,9 +96,11 @@ enum imp_status imp_problem_activate(imp_problem *p, const char *glob)
     const struct imp_scene *s = p->scene;
     struct imp_active active = {0};
     uint8_t *chosen = imp__alloc(p->ctx, imp_max(s->n_params, (size_t)1), 1);
+    size_t *blocks = imp__alloc(p->ctx, imp_max(s->n_params, (size_t)1), sizeof *blocks);
+    size_t n_blocks = 0;
 
     if (!*glob) IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "no parameter is named"));
-    if (!chosen)
+    if (!chosen || !blocks)
         IMP_TRY(imp__error(p->ctx, IMP_E_NOMEM, "no memory for active parameters"));
     memcpy(chosen, p->chosen, s->n_params);
     if (!imp__has_wildcards(glob)) {
@@ -125,7 +128,14 @@ enum imp_status imp_problem_activate(imp_problem *p, const char *glob)
     p->active = active;
     p->n = active.n;
     memcpy(p->chosen, chosen, s->n_params);
+    for (size_t k = 0; k < s->n_params; k++)
+        if (chosen[k]) blocks[n_blocks++] = k;
+    imp__release(p->ctx, p->blocks);
+    p->blocks = blocks;
+    p->n_blocks = n_blocks;
+    blocks = NULL;
 out:
+    imp__release(p->ctx, blocks);
     imp__release(p->ctx, chosen);
     return st;
 }
@@ -136,18 +146,24 @@ enum imp_status imp_problem_variable(const imp_problem *p, size_t i, size_t *par
                                      size_t *element, double *lo, double *hi)
 {
     IMP_REQUIRE(NULL, p, "problem");
-    for (size_t k = 0; k < p->scene->n_params; k++) {
-        const struct imp_param_info *info = &p->scene->params[k].info;
-        const int64_t base = p->active.base[k];
-        if (base < 0 || i < (size_t)base || i - (size_t)base >= info->count) continue;
-        if (param) *param = k;
-        if (element) *element = i - (size_t)base;
-        if (lo) *lo = info->lo;
-        if (hi) *hi = info->hi;
-        return IMP_OK;
+    if (i >= p->n)
+        return imp__error(p->ctx, IMP_E_ARG,
+                          "there is no active number %zu (there are %zu)", i, p->n);
+    /* The last block that begins at i or before. Blocks of no numbers share their place
+     * with the next, and come before it. */
+    size_t at = 0, end = p->n_blocks;
+    while (end - at > 1) {
+        const size_t middle = at + (end - at) / 2;
+        if ((size_t)p->active.base[p->blocks[middle]] <= i) at = middle;
+        else end = middle;
     }
-    return imp__error(p->ctx, IMP_E_ARG, "there is no active number %zu (there are %zu)",
-                      i, p->n);
+    const size_t k = p->blocks[at];
+    const struct imp_param_info *info = &p->scene->params[k].info;
+    if (param) *param = k;
+    if (element) *element = i - (size_t)p->active.base[k];
+    if (lo) *lo = info->lo;
+    if (hi) *hi = info->hi;
+    return IMP_OK;
 }
 
 void imp_problem_get_x(const imp_problem *p, double *x)

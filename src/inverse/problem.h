@@ -28,6 +28,7 @@ struct imp_problem {
     uint8_t *chosen;          /* [n_params] */
     struct imp_active active; /* follows chosen */
     size_t n;                 /* active numbers */
+    size_t n_blocks, *blocks; /* active parameters, in the order of their numbers */
     size_t n_targets, cap_targets;
     struct imp__target *targets;
     size_t n_regularisers, cap_regularisers;

@@ -47,9 +47,11 @@ static bool bytes_count(void *user, ssize_t bytes, bool post)
 static enum imp_status device_error(imp_context *ctx, enum RTCError error,
                                     const char *text)
 {
-    return imp__error(ctx,
-                      error == RTC_ERROR_OUT_OF_MEMORY ? IMP_E_NOMEM : IMP_E_UNSUPPORTED,
-                      "Embree: error %d%s%s", (int)error, *text ? ": " : "", text);
+    const char *colon = *text ? ": " : "";
+    if (error == RTC_ERROR_OUT_OF_MEMORY)
+        return imp__error(ctx, IMP_E_NOMEM, "out of memory for Embree%s%s", colon, text);
+    return imp__error(ctx, IMP_E_UNSUPPORTED, "Embree: error %d%s%s", (int)error, colon,
+                      text);
 }
 
 static _Atomic(RTCDevice) device;
@@ -74,7 +76,7 @@ static enum imp_status device_get(imp_context *ctx, RTCDevice *out)
             rtcSetDeviceErrorFunction(*out, error_keep, NULL);
             rtcSetDeviceMemoryMonitorFunction(*out, bytes_count, NULL);
         } else {
-            st = device_error(ctx, rtcGetDeviceError(NULL), "no device");
+            st = device_error(ctx, rtcGetDeviceError(NULL), "");
         }
         atomic_store(&device, *out);
     }

@@ -255,8 +255,7 @@ static enum imp_status window_end(const struct imp__goal *goal,
     const bool fell = fall > FELL * se, wandered = net <= STALLED * way;
 
     if (s->scalar[LARGEST] < options->tolerance) {
-        s->finished = true;
-        s->reason = "steps stay below the tolerance";
+        imp__search_finish(s, IMP_FINISH_STEPS);
     }
     cool(goal, s, wandered, fell, work);
     if (fall > FAR * se) s->scalar[AVERAGED] = 0;

@@ -169,7 +169,8 @@ static enum imp_status read_head(struct source *s, const struct imp__fingerprint
             s->f,
             "optimizer %d variables %llu of %llx %llx %llx %llx iteration %d finished %d",
             &kind, &n, &h[0], &h[1], &h[2], &h[3], iteration, finished) != 8 ||
-        fgetc(s->f) != '\n' || *iteration < 0 || *iteration > 1000000000)
+        fgetc(s->f) != '\n' || *iteration < 0 || *iteration > 1000000000 ||
+        *finished < 0 || *finished >= IMP_FINISH_KINDS)
         return damaged(s, "head");
     const struct imp__fingerprint is = {h[0], h[1], h[2], h[3]};
     const enum imp_status st = same_problem(s, &is, of);
@@ -205,7 +206,8 @@ static enum imp_status read_body(struct source *s, const struct imp__goal *goal,
     }
     const uint64_t hash = s->hash;
     unsigned long long end;
-    if (fscanf(s->f, "end %llx", &end) != 1 || end != hash)
+    if (fscanf(s->f, "end %16llx", &end) != 1 || end != hash || fgetc(s->f) != '\n' ||
+        fgetc(s->f) != EOF)
         IMP_TRY(damaged(s, "checksum"));
 out:
     return st;
@@ -245,7 +247,7 @@ enum imp_status imp__checkpoint_read(imp_context *ctx, const char *path,
     IMP_TRY(read_head(&s, of, search, &fresh->iteration, &finished));
     s.hash = head_hash((int)fresh->kind, fresh->n, fresh->iteration, finished);
     IMP_TRY(read_body(&s, goal, fresh));
-    fresh->finished = finished != 0;
+    imp__search_finish(fresh, (enum imp__finish)finished);
     swap(search, fresh);
 out:
     imp__search_destroy(fresh);

@@ -187,8 +187,7 @@ static enum imp_status iterate(const struct imp__goal *goal,
     free_set(goal, s->x, w);
     if (w->n_free == 0) {
         IMP_TRY(imp__search_log(s, w->eq.f));
-        s->finished = true;
-        s->reason = "no variable has an effect inside its bounds";
+        imp__search_finish(s, IMP_FINISH_BOUNDED);
         goto out;
     }
     double mu_quiet = MU_MIN;
@@ -198,8 +197,7 @@ static enum imp_status iterate(const struct imp__goal *goal,
         struct imp_estimate f1;
         const double promised = propose(goal, s->x, w);
         if (promised > 0 && largest_step(goal, w->delta) < options->tolerance && !quiet) {
-            s->finished = true;
-            s->reason = "steps stay below the tolerance";
+            imp__search_finish(s, IMP_FINISH_STEPS);
             break;
         }
         IMP_TRY(goal->eval(w->trial, seed, &f1, NULL, NULL, goal->payload));
@@ -218,11 +216,9 @@ static enum imp_status iterate(const struct imp__goal *goal,
     } else if (s->scalar[WITHIN] == 2) {
         for (size_t k = 0; k < n; k++)
             s->x[k] = imp__into_bounds(goal, k, 0.5 * (s->x[k] + s->array[FIRST][k]));
-        s->finished = true;
-        s->reason = "the gradient is within its noise";
+        imp__search_finish(s, IMP_FINISH_NOISE);
     } else if (!moved && !quiet) {
-        s->finished = true;
-        s->reason = "no step lowers the objective further";
+        imp__search_finish(s, IMP_FINISH_LOWEST);
     }
 out:
     return st;

@@ -142,10 +142,10 @@ static enum imp_status run(const struct imp__goal *goal,
     if (r == NLOPT_INVALID_ARGS)
         IMP_TRY(imp__error(goal->ctx, IMP_E_NUMERIC, "NLopt refuses the problem"));
     if (r == NLOPT_MAXEVAL_REACHED) goto out;
-    s->finished = true;
-    s->reason = r == NLOPT_XTOL_REACHED || r == NLOPT_SUCCESS || r == NLOPT_FTOL_REACHED
-                    ? "steps stay below the tolerance"
-                    : "no step lowers the objective further";
+    imp__search_finish(s, r == NLOPT_XTOL_REACHED || r == NLOPT_SUCCESS ||
+                                  r == NLOPT_FTOL_REACHED
+                              ? IMP_FINISH_STEPS
+                              : IMP_FINISH_LOWEST);
 out:
     if (c.opt) nlopt_destroy(c.opt);
     imp__release(goal->ctx, work);

@@ -60,13 +60,24 @@ enum imp_status imp__optimize(const struct imp__goal *goal,
                               const struct imp__opt_options *options,
                               struct imp__search *s)
 {
-    if (s->finished) {
-        s->reason = "it had converged";
-        return IMP_OK;
-    }
+    if (s->finished) return IMP_OK;
     const enum imp_status st = kind_of(s->kind)->run(goal, options, s);
-    if (st == IMP_OK && !s->finished) s->reason = "iteration limit reached";
+    /* The average that Adam answers with is as good as its iterations are many. */
+    if (st == IMP_OK && !s->finished)
+        s->reason =
+            s->kind == IMP_ADAM ? "all iterations are done" : "iteration limit reached";
     return st;
+}
+
+void imp__search_finish(struct imp__search *s, enum imp__finish why)
+{
+    static const char *const reasons[IMP_FINISH_KINDS] = {
+        [IMP_FINISH_STEPS] = "steps stay below the tolerance",
+        [IMP_FINISH_NOISE] = "the gradient is within its noise",
+        [IMP_FINISH_LOWEST] = "no step lowers the objective further",
+        [IMP_FINISH_BOUNDED] = "no variable has an effect inside its bounds"};
+    s->finished = why;
+    s->reason = reasons[why];
 }
 
 enum imp_status imp__search_array(struct imp__search *s, int k, size_t n)

@@ -57,15 +57,25 @@ struct imp__opt_options {
 /* Of the scalars, one is for all to read: how many iterates x is the average of. */
 enum { IMP_SEARCH_ARRAYS = 11, IMP_SEARCH_SCALARS = 12, IMP_SEARCH_AVERAGED = 11 };
 
+/* Why a search has finished; a checkpoint holds the number. */
+enum imp__finish {
+    IMP_FINISH_NOT,
+    IMP_FINISH_STEPS,   /* steps stay below the tolerance */
+    IMP_FINISH_NOISE,   /* the gradient is within its noise */
+    IMP_FINISH_LOWEST,  /* no step lowers the objective further */
+    IMP_FINISH_BOUNDED, /* no variable has an effect inside its bounds */
+    IMP_FINISH_KINDS
+};
+
 struct imp__search {
     imp_context *ctx;
     enum imp_optimizer kind;
     size_t n;
-    int iteration;      /* completed */
-    bool finished;      /* converged: more iterations would change nothing */
-    const char *reason; /* why it stopped, a constant string */
-    double *start;      /* [n] where it began */
-    double *x;          /* [n] the best estimate so far, inside the bounds */
+    int iteration;             /* completed */
+    enum imp__finish finished; /* converged: more iterations would change nothing */
+    const char *reason;        /* why it stopped, a constant string */
+    double *start;             /* [n] where it began */
+    double *x;                 /* [n] the best estimate so far, inside the bounds */
     size_t n_history, cap_history, cap_history_se;
     double *history, *history_se;
     /* Private to the optimiser. */
@@ -85,6 +95,9 @@ void imp__search_destroy(struct imp__search *search);
 enum imp_status imp__optimize(const struct imp__goal *goal,
                               const struct imp__opt_options *options,
                               struct imp__search *search);
+
+/* Sets the reason too. */
+void imp__search_finish(struct imp__search *search, enum imp__finish why);
 
 /* Numbers of old variables -> of new ones: how a change of the old is one of the new. */
 struct imp__carry {

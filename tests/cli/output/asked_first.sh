@@ -13,5 +13,9 @@ run jacobian "$furnace" -o target.exr
 run jacobian "$furnace" -o out --sheet p.gif
 run jacobian "$furnace" -o out --sheet nowhere/p.png
 run gradient "$furnace" -o target.exr
+run gradient "$furnace" --textures target.exr
+run gradient "$furnace" -T target.exr --spp 1000000000 -o folder.exr
+run fit "$furnace" -T target.exr --checkpoint nowhere/state
+run fit "$furnace" -T target.exr --checkpoint folder.exr
 run fit "$furnace" -T target.exr -o out --sheet p.gif
 ls

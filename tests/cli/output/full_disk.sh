@@ -16,7 +16,7 @@ full() {
     for file in "${files[@]}"; do echo before >"$file"; done
     find . -type f | sort >../list_before
     # through a pipe: the limit would hit our own files too
-    (ulimit -f 0; "$@" 2>&1 >/dev/null; echo "exit $?") | sed "s|^|$2: |"
+    (ulimit -f 0; "$@" --overwrite 2>&1 >/dev/null; echo "exit $?") | sed "s|^|$2: |"
     find . -type f | sort | cmp - ../list_before
     for file in "${files[@]}"; do [[ $(<"$file") == before ]] || echo "$2: $file is lost"; done
     cd "$OUT" || exit 9

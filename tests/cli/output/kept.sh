@@ -2,7 +2,7 @@
 # A run that fails leaves the file of an earlier one; one that succeeds replaces it, through a
 # link, with the permissions it had.
 furnace=$ROOT/scenes/furnace.xml
-echo before >answer
+echo '{"importon":"before"}' >answer
 chmod 640 answer
 ln -s answer link
 importon info nothere.xml -o answer 2>/dev/null

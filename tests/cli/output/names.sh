@@ -17,6 +17,6 @@ cat >scene.xml <<'X'
 </scene>
 X
 mkdir up
-importon gradient scene.xml --spp 1 -q -o out >/dev/null
+importon gradient scene.xml --spp 1 -q --textures out >/dev/null
 importon jacobian scene.xml --spp 1 -q -o out -p 'a/*' >/dev/null
 ls out up

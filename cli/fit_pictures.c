@@ -1,0 +1,101 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "fit_pictures.h"
+
+#include "picture.h"
+#include "problem.h"
+#include "sheet.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* "name.exr", or "name-1.exr" for the second of several targets. */
+static char *picture_path(const char *name, size_t i)
+{
+    char file[64];
+    if (problem_options.targets.n == 1) snprintf(file, sizeof file, "%s.exr", name);
+    else snprintf(file, sizeof file, "%s-%zu.exr", name, i);
+    return join_path(cli.out, file);
+}
+
+static int write_one(const char *name, size_t i, int spp)
+{
+    struct imp_run run = cli_run();
+    const struct picture_options po = {.standard_error = 1};
+    imp_film *film = NULL;
+    run.sensor = target_sensor(i);
+    run.time_limit_s = 0;
+    if (spp) run.spp = spp;
+    const enum imp_status st = imp_render(cli.scene, &run, &film);
+    if (cli_failed(st)) return cli_fail(st, cli.scene_path);
+    if (!film) return cli_done();
+    char *path = picture_path(name, i);
+    picture_stamp(film, &run);
+    const int rc = picture_write(film, path, &po);
+    free(path);
+    imp_film_destroy(film);
+    return rc;
+}
+
+int fit_pictures_write(const char *name, int spp)
+{
+    int rc = 0;
+    for (size_t i = 0; i < problem_options.targets.n && !rc; i++)
+        rc = write_one(name, i, spp);
+    return rc;
+}
+
+int fit_targets_write(void)
+{
+    int rc = 0;
+    for (size_t i = 0; i < problem_options.targets.n && !rc; i++) {
+        struct imp_target t = IMP_TARGET_INIT;
+        struct imp_write_options w = IMP_WRITE_OPTIONS_INIT;
+        imp_film *film = NULL;
+        rc = picture_target(problem_options.targets.item[i], NULL, &t);
+        if (rc) return rc;
+        enum imp_status st = imp_film_create(cli.context, t.width, t.height,
+                                             t.channels == 3 ? "R,G,B" : "Y", &film);
+        char *path = picture_path("target", i);
+        memcpy(strrchr(path, '.'), ".png", 4);
+        if (st == IMP_OK) {
+            memcpy(imp_film_mean(film), t.pixels,
+                   (size_t)t.width * (size_t)t.height * (size_t)t.channels *
+                       sizeof(float));
+            st = imp_film_write(film, path, &w);
+        }
+        if (st != IMP_OK) rc = cli_fail(st, NULL);
+        imp_film_destroy(film);
+        picture_target_free(&t);
+        free(path);
+    }
+    return rc;
+}
+
+int fit_sheet_write(const char *to)
+{
+    static const char *const name[] = {"before", "target", "recovered"};
+    struct sheet sheet = {NULL, 0};
+    for (size_t i = 0; i < problem_options.targets.n; i++)
+        for (int k = 0; k < 3; k++) {
+            char *path = picture_path(name[k], i);
+            sheet_add(&sheet, path);
+            free(path);
+        }
+    const int rc = sheet_write(&sheet, 3, to);
+    sheet_free(&sheet);
+    return rc;
+}
+
+int fit_pictures_writable(void)
+{
+    static const char *const pictures[] = {"before", "recovered", "target"};
+    int rc = 0;
+    for (size_t i = 0; i < problem_options.targets.n; i++)
+        for (size_t k = 0; k < 3 && !rc; k++) {
+            char *path = picture_path(pictures[k], i);
+            if (k == 2) memcpy(strrchr(path, '.'), ".png", 4);
+            rc = picture_writable(path, 1);
+            free(path);
+        }
+    return rc;
+}

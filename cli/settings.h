@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * --set: numbers of the scene given on the command line, or in a file. */
+#ifndef IMP_CLI_SETTINGS_H
+#define IMP_CLI_SETTINGS_H
+
+#include <stddef.h>
+#include <stdio.h>
+
+/* "ID=V[,V..]", or "@FILE" with one of these a line. 0, or an exit code with the reason
+ * printed. */
+int settings_apply(const char *text);
+
+/* All of a file, with a zero byte behind the end; NULL with errno set: it cannot be read,
+ * or (EFBIG) is not shorter than `limit`. */
+char *read_all(FILE *file, size_t limit, size_t *length);
+
+#endif
