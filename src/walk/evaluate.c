@@ -25,8 +25,9 @@ static imp_spec vertex_value(const struct imp_tracer *tracer, const struct imp_v
         sum += f * d->glow_weight;
     }
     if (d->met.emitter >= 0)
-        sum += imp__emitter_radiance(scene, d->met.emitter, &p->met, p->at.p) *
-               d->met.weight;
+        sum +=
+            imp__emitter_radiance(scene, d->met.emitter, &p->met, p->at.p, v->carried) *
+            d->met.weight;
     if (d->connection == IMP_CONNECTED) {
         const struct imp_emission x = imp__light_emission(&d->light);
         struct imp_dirs dirs = imp__light_dirs(v);
@@ -34,7 +35,7 @@ static imp_spec vertex_value(const struct imp_tracer *tracer, const struct imp_v
         b->ops->eval(b, in, &dirs, &f);
         sum += f *
                imp__emitter_radiance(scene, d->light.emitter, &x,
-                                     imp__decided_v3(d->light.p)) *
+                                     imp__decided_v3(d->light.p), v->carried) *
                d->light.weight;
     }
     if (d->goes_on) {

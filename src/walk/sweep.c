@@ -90,7 +90,7 @@ void imp__walk_sweep(const struct imp_tracer *tracer, const struct imp_walk *wal
                             P * met->weight, sink);
         if (connected && active->emitter[light->emitter])
             emitter_scatter(tracer, light->emitter, imp__light_emission(light),
-                            imp__light_at(light), P * v->light_f * light->weight, sink);
+                            imp__light_at(v), P * v->light_f * light->weight, sink);
         if (bsdf_active(active, b)) {
             imp_spec bar[IMP_INPUTS_MAX], d[IMP_INPUTS_MAX];
             bool any = false;
@@ -106,7 +106,7 @@ void imp__walk_sweep(const struct imp_tracer *tracer, const struct imp_walk *wal
                 any = true;
             }
             const imp_spec arriving = P * v->beyond;
-            if (v->d.goes_on && !imp__is_zero(arriving)) {
+            if (v->d.goes_on && !imp__is_zero_used(arriving, v->carried)) {
                 step_d(tracer, walk, v, depth, d);
                 for (int j = 0; j < b->n_in; j++) bar[j] += d[j] * arriving;
                 any = true;
@@ -117,7 +117,7 @@ void imp__walk_sweep(const struct imp_tracer *tracer, const struct imp_walk *wal
             }
         }
         P *= v->w;
-        if (imp__is_zero(P)) break;
+        if (imp__is_zero_used(P, v->carried)) break;
     }
     if (walk->moving) walk->moving->sweep(tracer, walk, adjoint, sink);
 }
@@ -169,7 +169,7 @@ imp_spec imp__walk_tangent(const struct imp_tracer *tracer, const struct imp_wal
                      met->weight;
         if (connected && active->emitter[light->emitter])
             L_dot += emitter_tangent(tracer, light->emitter, imp__light_emission(light),
-                                     imp__light_at(light), &direction) *
+                                     imp__light_at(v), &direction) *
                      v->light_f * light->weight;
         if (!bsdf_active(active, b)) continue;
         imp_spec in_dot[IMP_INPUTS_MAX], d[IMP_INPUTS_MAX];

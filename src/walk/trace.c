@@ -44,6 +44,7 @@ static struct imp_vertex *vertex_add(struct imp_step *s, int n_in)
 
     v->segment = &imp__straight;
     v->in = (imp_spec *)(v + 1);
+    v->carried = s->at.carried;
     struct imp_decision *d = &v->d;
     d->shape = d->met.emitter = -1;
     d->connection = IMP_NOT_CONNECTED;
@@ -100,7 +101,7 @@ static void sky_meet(struct imp_step *s, bool counts)
     struct imp_vertex *v = vertex_add(s, 0);
     if (!v) return;
     v->t = INFINITY;
-    s->at = (struct imp_texcoord){{0, 0}, imp__decide(s->d)};
+    s->at = (struct imp_texcoord){{0, 0}, imp__decide(s->d), s->at.carried};
     if (s->recorded) {
         v->d.scatterer = IMP_AT_SKY;
         v->d.uv[0] = v->d.uv[1] = 0;
@@ -231,12 +232,14 @@ void imp__walk_position(const struct imp_tracer *tracer, int x, int y, int64_t s
 }
 
 /* A walk whose value no light can have, or no picture can hold, is dropped. */
-static enum imp_drop drop_cause(imp_spec L)
+static enum imp_drop drop_cause(imp_spec L, bool four)
 {
-    if (imp_unlikely(
-            !(fabs(L[0]) <= FLT_MAX && fabs(L[1]) <= FLT_MAX && fabs(L[2]) <= FLT_MAX)))
-        return isnan(L[0] + L[1] + L[2]) ? IMP_DROP_NAN : IMP_DROP_INFINITE;
-    if (imp_unlikely(L[0] < 0 || L[1] < 0 || L[2] < 0)) return IMP_DROP_NEGATIVE;
+    if (!four) L[3] = 0;
+    if (imp_unlikely(!(fabs(L[0]) <= FLT_MAX && fabs(L[1]) <= FLT_MAX &&
+                       fabs(L[2]) <= FLT_MAX && fabs(L[3]) <= FLT_MAX)))
+        return isnan(L[0] + L[1] + L[2] + L[3]) ? IMP_DROP_NAN : IMP_DROP_INFINITE;
+    if (imp_unlikely(L[0] < 0 || L[1] < 0 || L[2] < 0 || L[3] < 0))
+        return IMP_DROP_NEGATIVE;
     return IMP_DROP_NONE;
 }
 
@@ -258,20 +261,21 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
                          .recorded = !tracer->value_only ||
                                      (tracer->active && tracer->active->medium),
                          .scratch = scratch,
+                         .at.carried = tracer->carried,
                          .segment = imp__segment_first(tracer->scene),
                          .o = walk->ray.o,
                          .d = walk->ray.d,
                          .t_min = walk->ray.t_near,
                          .t_max = walk->ray.t_far,
                          .from = walk->ray.o,
-                         .beta = {1, 1, 1, 0},
+                         .beta = {1, 1, 1, 1},
                          .eta = 1,
                          .guided.guide = tracer->guide};
     if (imp_likely(s.segment->begin == NULL) || s.segment->begin(&s))
         while (step(&s)) s.depth++;
 
     const imp_spec L = imp__walk_fold(walk);
-    const enum imp_drop cause = drop_cause(L);
+    const enum imp_drop cause = drop_cause(L, tracer->carried);
     if (imp_unlikely(cause != IMP_DROP_NONE)) walk->dropped = cause;
     walk->L = walk->dropped || !walk->valid ? (imp_spec){0} : L;
 }

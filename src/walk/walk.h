@@ -103,10 +103,11 @@ struct imp_vertex {
     imp_spec beyond; /* L_{k+1}, set by fold */
 
     /* Walks for their value alone keep nothing from here on. */
-    imp_v3 ng;                   /* geometric normal, world */
-    imp_spec light_f, light_e;   /* BSDF towards the light, and its radiance */
-    struct imp_segment *segment; /* from the last vertex to here (segment.h) */
-    imp_spec *in;                /* [bsdf->n_in] inputs at this point */
+    imp_v3 ng;                         /* geometric normal, world */
+    imp_spec light_f, light_e;         /* BSDF towards the light, and its radiance */
+    struct imp_segment *segment;       /* from the last vertex to here (segment.h) */
+    imp_spec *in;                      /* [bsdf->n_in] inputs at this point */
+    const struct imp_carried *carried; /* of the walk; outlives it */
     struct imp_decision d;
 };
 #define IMP_VERTEX_VALUES offsetof(struct imp_vertex, ng) /* bytes */
@@ -151,8 +152,10 @@ struct imp_tracer {
      * derivative (docs/estimators.md 9.2). */
     const struct imp_active *active;
     uint64_t seed;
-    const struct imp_guide *guide; /* of PATH; NULL: none */
-    bool value_only;               /* a walk's L is wanted, and no record of it */
+    const struct imp_guide *guide;     /* of PATH; NULL: none */
+    bool value_only;                   /* a walk's L is wanted, and no record of it */
+    const struct imp_carried *carried; /* wavelengths of the walks; NULL: the colours of
+                                          the scene */
 };
 
 /* The guide that walks of this integrator follow: its densities are made for paths, in
@@ -186,10 +189,11 @@ imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk
 
 /* Radiance of an emitter at x, point p of it, at the scene's present parameters. */
 static inline imp_spec imp__emitter_radiance(const struct imp_scene *scene, int emitter,
-                                             const struct imp_emission *x, imp_v3 p)
+                                             const struct imp_emission *x, imp_v3 p,
+                                             const struct imp_carried *carried)
 {
     const struct imp_emitter *e = scene->emitters[emitter];
-    const struct imp_texcoord at = {{x->uv[0], x->uv[1]}, p};
+    const struct imp_texcoord at = {{x->uv[0], x->uv[1]}, p, carried};
     imp_spec in[IMP_INPUTS_MAX], le;
     imp__inputs_eval(e->input, e->n_in, &at, in);
     e->ops->eval(e, in, x, &le);
@@ -218,7 +222,8 @@ static inline imp_v3 imp__decided_v3(const imp_decided v[3])
 static inline struct imp_texcoord imp__vertex_at(const struct imp_vertex *v)
 {
     if (imp_unlikely(v->segment->exact != NULL)) return v->segment->exact->at;
-    return (struct imp_texcoord){{v->d.uv[0], v->d.uv[1]}, imp__decided_v3(v->d.p)};
+    return (struct imp_texcoord){
+        {v->d.uv[0], v->d.uv[1]}, imp__decided_v3(v->d.p), v->carried};
 }
 static inline imp_v3 imp__vertex_wo(const struct imp_vertex *v)
 {
@@ -241,9 +246,10 @@ static inline struct imp_emission imp__light_emission(const struct imp_light *l)
     return (struct imp_emission){
         {l->uv[0], l->uv[1]}, l->dist, l->cos_light, imp__decided_v3(l->d)};
 }
-static inline struct imp_texcoord imp__light_at(const struct imp_light *l)
+static inline struct imp_texcoord imp__light_at(const struct imp_vertex *v)
 {
-    return (struct imp_texcoord){{l->uv[0], l->uv[1]}, imp__decided_v3(l->p)};
+    const struct imp_light *l = &v->d.light;
+    return (struct imp_texcoord){{l->uv[0], l->uv[1]}, imp__decided_v3(l->p), v->carried};
 }
 static inline struct imp_dirs imp__light_dirs(const struct imp_vertex *v)
 {
