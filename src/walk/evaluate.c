@@ -48,6 +48,7 @@ static imp_spec vertex_value(const struct imp_tracer *tracer, const struct imp_v
 imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk *walk)
 {
     imp_spec P = imp__spec(1), L = {0};
+    const imp_spec *entry = walk->entry;
     struct imp_moving moving = {{0}, {0}, {0}};
     if (walk->dropped || !walk->valid) return L;
     for (const struct imp_vertex *v = walk->first; v; v = v->next) {
@@ -58,7 +59,10 @@ imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk
         if (segment->place && !segment->place(tracer, v, &moving, &p))
             return imp__spec(NAN);
         P *= p.ratio * p.ratio;
-        L += P * vertex_value(tracer, v, &p, &w);
+        const imp_spec own = vertex_value(tracer, v, &p, &w);
+        L += P * (entry ? own * *entry++ : own);
+        for (const struct imp_side *s = v->side; s; s = s->next)
+            L += P * imp__walk_frozen(tracer, &s->walk);
         P *= w;
     }
     return L;

@@ -38,6 +38,7 @@ static struct imp_vertex *vertex_add(struct imp_step *s, int n_in)
     w->n++;
     v->bsdf = NULL;
     v->shape = NULL;
+    v->side = NULL;
     v->w = v->e = v->b = v->beyond = (imp_spec){0};
     v->scale = 0;
     if (!s->recorded) return v;
@@ -154,6 +155,68 @@ static void emission_add(struct imp_step *s, struct imp_vertex *v, double weight
     }
 }
 
+static bool step(struct imp_step *s);
+
+/* The continuation of v counts by a share of 1/n. */
+static void share(const struct imp_step *s, struct imp_vertex *v, int n)
+{
+    const double part = imp__decide1(1. / n);
+    imp__step_pass(v, part);
+    if (s->recorded) v->d.passes = (imp_decided)part;
+}
+
+/* Further continuations of v hang on it as side walks. `before`: the walk before its own
+ * continuation was drawn. */
+static void split(const struct imp_step *before, struct imp_vertex *v,
+                  const struct imp_surface *at, const struct imp_frame *frame)
+{
+    struct imp_walk *walk = before->walk;
+    const int n = before->tracer->split;
+    for (int i = 1; i < n && !walk->dropped; i++) {
+        struct imp_step s = *before;
+        struct imp_side *side = imp__arena_take(s.arena, 1, sizeof *side);
+        if (!side) {
+            walk->dropped = IMP_DROP_MEMORY;
+            return;
+        }
+        side->next = v->side;
+        v->side = side;
+        side->walk = (struct imp_walk){.px = walk->px,
+                                       .py = walk->py,
+                                       .key = imp__key_branch(walk->key, s.depth, i),
+                                       .ray = walk->ray,
+                                       .depth = s.depth};
+        s.walk = &side->walk;
+        struct imp_vertex *u = vertex_add(&s, v->bsdf->n_in);
+        if (!u) {
+            walk->dropped = side->walk.dropped;
+            return;
+        }
+        u->shape = v->shape;
+        u->bsdf = v->bsdf;
+        u->t = v->t;
+        if (s.recorded) {
+            u->ng = v->ng;
+            u->d.shape = v->d.shape;
+            u->d.scatterer = v->d.scatterer;
+            u->d.uv[0] = v->d.uv[0];
+            u->d.uv[1] = v->d.uv[1];
+            imp__store_v3(u->d.p, s.at.p);
+            imp__store_v3(u->d.wo, s.wo);
+        }
+        imp_spec *in = s.recorded ? u->in : s.scratch;
+        imp__evaluate_inputs(u->bsdf, u->shape, &s.at, in);
+        s.in = in;
+        if (imp__scatter(&s, u, at, frame)) {
+            share(&s, u, n);
+            for (s.depth++; step(&s);) s.depth++;
+        }
+        walk->valid |= side->walk.valid;
+        side->walk.valid = true;
+        walk->dropped = side->walk.dropped;
+    }
+}
+
 /* From the ray in flight to the next one; false: the walk ends. */
 static bool step(struct imp_step *s)
 {
@@ -194,7 +257,16 @@ static bool step(struct imp_step *s)
     /* The continuation. */
     const bool only_lights =
         integrator->kind == IMP_INTEGRATOR_DIRECT && integrator->bsdf_samples == 0;
-    const bool continues = !only_lights && imp__scatter(s, v, &at, &frame);
+    bool continues;
+    if (imp_unlikely(s->tracer->split > 1) && s->depth == 0 && !only_lights &&
+        s->scene->n_media == 0) {
+        const struct imp_step before = *s;
+        continues = imp__scatter(s, v, &at, &frame);
+        if (continues) share(s, v, s->tracer->split);
+        split(&before, v, &at, &frame);
+    } else {
+        continues = !only_lights && imp__scatter(s, v, &at, &frame);
+    }
 
     /* Is the light seen? */
     if (shadow.wanted &&
@@ -202,7 +274,7 @@ static bool step(struct imp_step *s)
         v->b = shadow.brings;
         if (s->recorded) v->d.connection = IMP_CONNECTED;
     }
-    return continues;
+    return continues && !s->walk->dropped;
 }
 
 /* ---- Walks ------------------------------------------------------------------------ */

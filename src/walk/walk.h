@@ -97,10 +97,11 @@ struct imp_vertex {
     double scale;                  /* T/(p s) */
 
     /* Values. */
-    imp_spec e;      /* E_k: all emission of this vertex, weighted */
-    imp_spec b;      /* B_k = light_f light_e light.weight */
-    imp_spec w;      /* f scale: weight of the step to the next vertex */
-    imp_spec beyond; /* L_{k+1}, set by fold */
+    imp_spec e;            /* E_k: all emission of this vertex, weighted */
+    imp_spec b;            /* B_k = light_f light_e light.weight */
+    imp_spec w;            /* f scale: weight of the step to the next vertex */
+    imp_spec beyond;       /* L_{k+1}, set by fold */
+    struct imp_side *side; /* walks that hang on this vertex; NULL: none */
 
     /* Walks for their value alone keep nothing from here on. */
     imp_v3 ng;                         /* geometric normal, world */
@@ -119,6 +120,7 @@ struct imp_vertex {
 struct imp_walk {
     struct imp_vertex *first, *last;
     int n;         /* vertices */
+    int depth;     /* of the first vertex: 0, unless it hangs on another walk */
     double px, py; /* film position, pixels of the full film */
     struct imp_key key;
     struct imp_sensor_ray ray;
@@ -126,8 +128,20 @@ struct imp_walk {
     bool valid;            /* alpha 1 (scene-format 11) */
     bool absorbed;         /* Stam: ended by absorption */
     enum imp_drop dropped; /* then L is 0 and there is nothing to sweep */
+    /* [n] adjoint with which the light of vertex k itself enters: what a sensor that it
+     * reaches makes of it. NULL: 1, as of a walk from the sensor, whose adjoint enters at
+     * its start. */
+    const imp_spec *entry;
     /* Kind of the segments that move with an active parameter; NULL: none does. */
     const struct imp_segment_ops *moving;
+};
+
+/* A walk that hangs on a vertex of another: its radiance adds to that vertex's. It begins
+ * with a copy of the vertex, which has a continuation of its own and no light. A walk and
+ * what hangs on it are one sample. */
+struct imp_side {
+    struct imp_side *next;
+    struct imp_walk walk;
 };
 
 /* Which numbers a derivative is wanted for, prepared once a job. */
@@ -156,6 +170,8 @@ struct imp_tracer {
     bool value_only;                   /* a walk's L is wanted, and no record of it */
     const struct imp_carried *carried; /* wavelengths of the walks; NULL: the colours of
                                           the scene */
+    int split; /* continuations of the first vertex, each with its share; 0: one. Scenes
+                  with graded media have one */
 };
 
 /* The guide that walks of this integrator follow: its densities are made for paths, in
