@@ -9,8 +9,8 @@
  * Inputs. A kind declares named inputs (colours, numbers, textures). Before any call the
  * engine looks them up at the point in question, so kinds are pure functions of `in`, an
  * array with one imp_spec per declared input, and never see textures or theta. Lanes 0..2
- * are r, g, b (lane 0 alone in mono mode; lane 3 is unspecified); a scalar input has its
- * value in all lanes, read it from lane 0.
+ * are r, g, b (lane 0 alone in mono mode; lane 3 is unspecified), or all four are
+ * wavelengths; a scalar input has its value in all lanes, read it from lane 0.
  *
  * Lane rule. Lane c of every value depends on lane c of each input only. The Jacobian of
  * eval is therefore diagonal in the lanes, and one function (`eval_d`: lane-wise
@@ -41,8 +41,12 @@ enum imp_input_flags {
     IMP_INPUT_EDGES = 16, /* differentiable, and may move discontinuities */
     IMP_INPUT_SOFT = 32,  /* a number above hi is taken as it is, and then has no bound:
                              what it is for decides */
-    IMP_INPUT_INDEX = 64  /* refractive index behind the surface over the one before it:
+    IMP_INPUT_INDEX = 64, /* refractive index behind the surface over the one before it:
                              where a medium fills the shape, the medium's */
+    IMP_INPUT_LUMINANCE = 128 /* no property: the luminance, in all lanes, of the input
+                                 declared before it under the same name. A kind whose
+                                 lanes couple (a tint divided by its luminance) reads
+                                 it, and the engine has its derivative */
 };
 
 struct imp_input_desc { /* the list ends with {0} */
@@ -58,6 +62,21 @@ struct imp_input_desc { /* the list ends with {0} */
  * that whoever visits an object has room for them on the stack. */
 #define IMP_INPUTS_MAX 32
 
+/* What the lanes of a walk are where they are not the scene's colours: up to four
+ * wavelengths. Unused lanes repeat the first. */
+struct imp_carried {
+    int n;
+    double nm[4];
+};
+
+/* A spectrum as written: values at increasing wavelengths, linear between them, 0
+ * outside. */
+struct imp_spectrum {
+    size_t n;
+    const double *nm;
+    double *value;
+};
+
 struct imp_texture;
 /* One input of one object: a constant or a texture. */
 struct imp_input {
@@ -66,6 +85,10 @@ struct imp_input {
     int param;                         /* index of its parameter, -1: none */
     bool scalar; /* declared IMP_INPUT_SCALAR: textures give one number */
     int count;   /* numbers of a constant: 3, or 1 (in all lanes) */
+    const struct imp_spectrum *spectrum; /* what a walk of wavelengths looks up; NULL:
+                                            none was written */
+    int luminance;   /* > 0: the luminance of the input that stands so many before it */
+    imp_spec weight; /* of that input's lanes */
 };
 
 struct imp_build; /* what build functions get: src/kind/build.h */
@@ -172,7 +195,8 @@ struct imp_bsdf_ops {
 
 struct imp_texcoord {
     double uv[2];
-    imp_v3 p; /* world position */
+    imp_v3 p;                          /* world position */
+    const struct imp_carried *carried; /* what is looked up; NULL: the scene's colours */
 };
 
 struct imp_texture {

@@ -78,7 +78,8 @@ static enum imp_status spectrum_set(imp_context *ctx, const struct imp_node *nod
                                     const struct imp_prop *prop, enum imp_role role,
                                     size_t n, const double *nm, const double *v,
                                     bool scalar, enum imp_color_mode mode,
-                                    imp_spec *value, int *count)
+                                    imp_spec *value, int *count, struct imp_arena *arena,
+                                    const struct imp_spectrum **kept)
 {
     if (n < 2)
         return imp__prop_error(ctx, node, prop, IMP_E_SCENE,
@@ -98,13 +99,15 @@ static enum imp_status spectrum_set(imp_context *ctx, const struct imp_node *nod
         rgb[c] =
             role == IMP_REFLECTANCE ? imp_clamp(rgb[c], 0.0, 1.0) : imp_max(rgb[c], 0.0);
     color_set(rgb, scalar, mode, value, count);
-    return IMP_OK;
+    *kept = imp__spectrum_keep(arena, n, nm, v);
+    return *kept ? IMP_OK : imp__error(ctx, IMP_E_NOMEM, "out of memory");
 }
 
 enum imp_status imp__color_convert(imp_context *ctx, const struct imp_node *node,
                                    const struct imp_prop *prop, enum imp_role role,
                                    bool scalar, enum imp_color_mode mode, imp_spec *value,
-                                   int *count)
+                                   int *count, struct imp_arena *arena,
+                                   const struct imp_spectrum **kept)
 {
     enum imp_status st = IMP_OK;
     switch (prop->type) {
@@ -128,7 +131,8 @@ enum imp_status imp__color_convert(imp_context *ctx, const struct imp_node *node
         break;
     case IMP_PROP_SPECTRUM:
         IMP_TRY(spectrum_set(ctx, node, prop, role, prop->n, prop->list,
-                             prop->list + prop->n, scalar, mode, value, count));
+                             prop->list + prop->n, scalar, mode, value, count, arena,
+                             kept));
         break;
     case IMP_PROP_BOOL:
     case IMP_PROP_STRING:
@@ -219,7 +223,8 @@ static enum imp_status require(imp_context *ctx, struct imp_node *node, const ch
 static enum imp_status spectrum_object(imp_context *ctx, struct imp_node *node,
                                        bool regular, enum imp_role role, bool scalar,
                                        enum imp_color_mode mode, imp_spec *value,
-                                       int *count)
+                                       int *count, struct imp_arena *arena,
+                                       const struct imp_spectrum **kept)
 {
     enum imp_status st = IMP_OK;
     double *nm = NULL, *v = NULL;
@@ -241,7 +246,8 @@ static enum imp_status spectrum_object(imp_context *ctx, struct imp_node *node,
             IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
                                     "%zu wavelengths, but %zu values", n_nm, n));
     }
-    IMP_TRY(spectrum_set(ctx, node, NULL, role, n, nm, v, scalar, mode, value, count));
+    IMP_TRY(spectrum_set(ctx, node, NULL, role, n, nm, v, scalar, mode, value, count,
+                         arena, kept));
 out:
     imp__release(ctx, nm);
     imp__release(ctx, v);
@@ -279,10 +285,12 @@ out:
 /* The property's colour, or white. */
 static enum imp_status d65_object(imp_context *ctx, struct imp_node *node,
                                   enum imp_role role, bool scalar,
-                                  enum imp_color_mode mode, imp_spec *value, int *count)
+                                  enum imp_color_mode mode, imp_spec *value, int *count,
+                                  struct imp_arena *arena)
 {
     static const double white[3] = {1, 1, 1};
     enum imp_status st = IMP_OK;
+    const struct imp_spectrum *inner = NULL; /* daylight times it is another one */
     double scale;
     imp_spec v;
     int n;
@@ -306,7 +314,8 @@ static enum imp_status d65_object(imp_context *ctx, struct imp_node *node,
         if (!child->node || !imp__color_is_object(child->node))
             IMP_TRY(imp__node_error(ctx, node, IMP_E_UNSUPPORTED,
                                     "d65 around a texture cannot be nested"));
-        IMP_TRY(imp__color_object(ctx, child->node, role, scalar, mode, &v, &n, &key));
+        IMP_TRY(imp__color_object(ctx, child->node, role, scalar, mode, &v, &n, &key,
+                                  arena, &inner));
     } else {
         color_set(white, scalar, mode, &v, &n);
     }
@@ -319,7 +328,8 @@ out:
 enum imp_status imp__color_object(imp_context *ctx, struct imp_node *node,
                                   enum imp_role role, bool scalar,
                                   enum imp_color_mode mode, imp_spec *value, int *count,
-                                  const char **key)
+                                  const char **key, struct imp_arena *arena,
+                                  const struct imp_spectrum **kept)
 {
     enum imp_status st = IMP_OK;
     imp_spec v = imp__spec(0);
@@ -349,11 +359,11 @@ enum imp_status imp__color_object(imp_context *ctx, struct imp_node *node,
         break;
     }
     case RAWCONSTANT: IMP_TRY(raw_object(ctx, node, scalar, mode, &v, &n)); break;
-    case D65: IMP_TRY(d65_object(ctx, node, role, scalar, mode, &v, &n)); break;
+    case D65: IMP_TRY(d65_object(ctx, node, role, scalar, mode, &v, &n, arena)); break;
     case REGULAR:
     case IRREGULAR:
         IMP_TRY(spectrum_object(ctx, node, object_kind(node) == REGULAR, role, scalar,
-                                mode, &v, &n));
+                                mode, &v, &n, arena, kept));
         break;
     case BLACKBODY:
         IMP_TRY(imp__node_error(

@@ -29,6 +29,13 @@ static inline struct imp_key imp__key(uint64_t seed, uint64_t pixel, uint64_t sa
     return (struct imp_key){h};
 }
 
+/* The key of branch i (from 1) that leaves a walk at a vertex. */
+static inline struct imp_key imp__key_branch(struct imp_key key, int vertex, int i)
+{
+    const uint64_t where = (uint64_t)vertex << 32 | (uint32_t)i;
+    return (struct imp_key){imp__mix64(key.state ^ (where + 0xa0761d6478bd642fu))};
+}
+
 /* Uniform on [0, 1), 53 bits. */
 static inline double imp__u01(struct imp_key key, uint32_t dim)
 {

@@ -40,6 +40,15 @@ static inline bool imp__is_zero(imp_spec s)
 {
     return s[0] == 0 && s[1] == 0 && s[2] == 0;
 }
+/* Of the lanes that a walk uses: four of wavelengths, three of colours. */
+static inline double imp__max_used(imp_spec s, bool four)
+{
+    return four ? imp_max(imp__max3(s), s[3]) : imp__max3(s);
+}
+static inline bool imp__is_zero_used(imp_spec s, bool four)
+{
+    return imp__is_zero(s) && (!four || s[3] == 0);
+}
 static inline bool imp__is_finite(imp_spec s)
 {
     return isfinite(s[0]) && isfinite(s[1]) && isfinite(s[2]);

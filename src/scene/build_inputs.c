@@ -3,6 +3,7 @@
  * Inputs of objects: constants, which become parameters, and textures. Names and tools
  * that all builders share stand first. */
 #include "build.h"
+#include "color/rgb.h"
 
 enum imp_status imp__build_no_memory(struct imp_scene *scene)
 {
@@ -172,15 +173,20 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
     int count = 1;
     imp__node_ask(node, d->name);
     *in = (struct imp_input){.param = -1, .scalar = scalar};
+    if (d->flags & IMP_INPUT_LUMINANCE) {
+        in->count = 1;
+        return IMP_OK;
+    }
 
     if (prop) {
         prop->used = true;
         IMP_TRY(imp__color_convert(ctx, node, prop, d->role, scalar, scene->mode,
-                                   &in->value, &count));
+                                   &in->value, &count, &scene->arena, &in->spectrum));
     } else if (child && imp__color_is_object(child->node)) {
         child->used = true;
         IMP_TRY(imp__color_object(ctx, child->node, d->role, scalar, scene->mode,
-                                  &in->value, &count, &key));
+                                  &in->value, &count, &key, &scene->arena,
+                                  &in->spectrum));
     } else if (child) {
         struct imp_texture *t;
         child->used = true;
@@ -223,11 +229,17 @@ enum imp_status imp__build_inputs(struct imp_scene *scene, struct imp_node *node
                                   const struct imp_input **out, int *n)
 {
     enum imp_status st = IMP_OK;
+    static const imp_spec luminance = {IMP_LUM_R, IMP_LUM_G, IMP_LUM_B, 0};
     int count = 0;
     for (const struct imp_input_desc *d = desc; d && d->name; d++) {
         struct imp_input *in = imp__arena_array(&scene->arena, 1, sizeof *in);
         if (!in) IMP_TRY(imp__build_no_memory(scene));
         IMP_TRY(input_build(scene, node, name, d, in));
+        if (d->flags & IMP_INPUT_LUMINANCE) {
+            in->weight = scene->mode == IMP_MONO ? (imp_spec){1} : luminance;
+            for (in->luminance = 1; in->luminance < count; in->luminance++)
+                if (strcmp(desc[count - in->luminance].name, d->name) == 0) break;
+        }
         out[count++] = in;
     }
     *n = count;

@@ -23,4 +23,18 @@ static inline unsigned imp__dim(int vertex, int use)
     return IMP_DIM_VERTEX + (unsigned)vertex * IMP_DIMS_PER_VERTEX + (unsigned)use;
 }
 
+/* Uses that came later have blocks in the upper half of the dimensions, so that none of
+ * the numbers above moves: one for the start of a walk, one for each vertex. */
+enum { IMP_DIM_TIME, IMP_DIM_WAVELENGTH };
+enum {
+    IMP_DIM_TECHNIQUE, /* which way of continuing or connecting */
+    IMP_DIM_MEDIUM,    /* first of what tracking through a medium needs */
+    IMP_DIMS_LATE_PER_VERTEX = 16
+};
+static inline unsigned imp__dim_start(int use) { return 1u << 31 | (unsigned)use; }
+static inline unsigned imp__dim_late(int vertex, int use)
+{
+    return 1u << 31 | ((unsigned)(vertex + 1) * IMP_DIMS_LATE_PER_VERTEX + (unsigned)use);
+}
+
 #endif

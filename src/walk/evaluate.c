@@ -25,8 +25,9 @@ static imp_spec vertex_value(const struct imp_tracer *tracer, const struct imp_v
         sum += f * d->glow_weight;
     }
     if (d->met.emitter >= 0)
-        sum += imp__emitter_radiance(scene, d->met.emitter, &p->met, p->at.p) *
-               d->met.weight;
+        sum +=
+            imp__emitter_radiance(scene, d->met.emitter, &p->met, p->at.p, v->carried) *
+            d->met.weight;
     if (d->connection == IMP_CONNECTED) {
         const struct imp_emission x = imp__light_emission(&d->light);
         struct imp_dirs dirs = imp__light_dirs(v);
@@ -34,7 +35,7 @@ static imp_spec vertex_value(const struct imp_tracer *tracer, const struct imp_v
         b->ops->eval(b, in, &dirs, &f);
         sum += f *
                imp__emitter_radiance(scene, d->light.emitter, &x,
-                                     imp__decided_v3(d->light.p)) *
+                                     imp__decided_v3(d->light.p), v->carried) *
                d->light.weight;
     }
     if (d->goes_on) {
@@ -47,6 +48,7 @@ static imp_spec vertex_value(const struct imp_tracer *tracer, const struct imp_v
 imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk *walk)
 {
     imp_spec P = imp__spec(1), L = {0};
+    const imp_spec *entry = walk->entry;
     struct imp_moving moving = {{0}, {0}, {0}};
     if (walk->dropped || !walk->valid) return L;
     for (const struct imp_vertex *v = walk->first; v; v = v->next) {
@@ -57,7 +59,10 @@ imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk
         if (segment->place && !segment->place(tracer, v, &moving, &p))
             return imp__spec(NAN);
         P *= p.ratio * p.ratio;
-        L += P * vertex_value(tracer, v, &p, &w);
+        const imp_spec own = vertex_value(tracer, v, &p, &w);
+        L += P * (entry ? own * *entry++ : own);
+        for (const struct imp_side *s = v->side; s; s = s->next)
+            L += P * imp__walk_frozen(tracer, &s->walk);
         P *= w;
     }
     return L;

@@ -49,7 +49,9 @@ const char *imp__graded_obstacle(const struct imp_scene *scene, const struct imp
 static void keep_exact(struct imp_step *s, struct imp_vertex *v,
                        struct imp_graded_segment *kept, const struct imp_surface *at)
 {
-    s->at = (struct imp_texcoord){{at->uv[0], at->uv[1]}, at->p};
+    s->at.uv[0] = at->uv[0];
+    s->at.uv[1] = at->uv[1];
+    s->at.p = at->p;
     s->wo = s->wo_drawn;
     kept->end = (struct imp_exact){s->at, s->wo};
     kept->base.exact = &kept->end;

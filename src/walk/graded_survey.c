@@ -66,7 +66,7 @@ static bool dark_border(const struct imp_scene *scene, const struct imp_shape *s
     for (size_t i = 0; i < 4 * n; i++) {
         const double along = ((double)(i / 4) + 0.5) / (double)n, side = (double)(i & 1);
         const bool u = i & 2;
-        const struct imp_texcoord at = {{u ? along : side, u ? side : along}, {0}};
+        const struct imp_texcoord at = {.uv = {u ? along : side, u ? side : along}};
         const struct imp_emission x = {{at.uv[0], at.uv[1]}, 1, 1, {0, 0, 1, 0}};
         imp_spec in[IMP_INPUTS_MAX], le;
         imp__inputs_eval(e->input, e->n_in, &at, in);

@@ -39,7 +39,7 @@ void imp__emission_meet(struct imp_step *s, struct imp_vertex *v, int emitter,
         const double pe = pmf * e->ops->pdf(e, &s->from, &s->d, hit, at);
         weight = imp__decide1(weight * power_heuristic(s->pdf, pe));
     }
-    v->e += imp__emitter_radiance(s->scene, emitter, &x, s->at.p) * weight;
+    v->e += imp__emitter_radiance(s->scene, emitter, &x, s->at.p, s->at.carried) * weight;
     if (!s->recorded) return;
     struct imp_met *m = &v->d.met;
     m->emitter = emitter;
@@ -123,13 +123,13 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
                                    imp__decide(-ls.wi)};
     const bool far = !isfinite(ls.dist);
     const imp_v3 point = imp__decide(far ? (imp_v3){0} : ls.p);
-    const imp_spec le = imp__emitter_radiance(scene, light, &x, point);
+    const imp_spec le = imp__emitter_radiance(scene, light, &x, point, s->at.carried);
     imp_spec f;
     b->ops->eval(b, s->in, &dirs, &f);
     const struct imp_active *active = s->tracer->active;
     const bool differentiable =
         active && ((b->index >= 0 && active->bsdf[b->index]) || active->emitter[light]);
-    if (imp__is_zero(f * le) && !differentiable) return;
+    if (imp__is_zero_used(f * le, s->at.carried) && !differentiable) return;
     shadow->brings = f * le * weight;
     if (s->recorded) {
         record(v, light, weight, &x, point, dirs.wi);

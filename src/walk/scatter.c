@@ -9,18 +9,20 @@
 static bool throughput_add(struct imp_step *s, const struct imp_bsdf *b, imp_spec factor)
 {
     const struct imp_active *active = s->tracer->active;
-    if (imp_likely(factor[0] != 0 && factor[1] != 0 && factor[2] != 0)) {
+    const bool four = s->at.carried != NULL;
+    if (imp_likely(factor[0] != 0 && factor[1] != 0 && factor[2] != 0 &&
+                   (!four || factor[3] != 0))) {
         s->beta *= factor;
-        return !imp__is_zero(s->beta);
+        return !imp__is_zero_used(s->beta, four);
     }
     const bool differentiable = active && b->index >= 0 && active->bsdf[b->index];
-    const double stand_in = fmax(imp__max3(factor), 0.5);
-    for (int c = 0; c < 3; c++) {
+    const double stand_in = fmax(imp__max_used(factor, four), 0.5);
+    for (int c = 0; c < 3 + four; c++) {
         if (factor[c] != 0) continue;
         if (differentiable && s->zeros[c]++ == 0) factor[c] = stand_in;
     }
     s->beta *= factor;
-    return !imp__is_zero(s->beta);
+    return !imp__is_zero_used(s->beta, four);
 }
 
 /* Survival probability, as decided; false: the walk ends. Zero factors that still
@@ -35,7 +37,7 @@ static bool roulette(struct imp_step *s, const struct imp_bsdf *b, double *survi
         return true;
     }
     if (s->depth + 1 < integrator->rr_depth && !guided) return true;
-    double q = fmin(imp__max3(s->beta) * s->eta * s->eta, 0.95);
+    double q = fmin(imp__max_used(s->beta, s->at.carried) * s->eta * s->eta, 0.95);
     if (guided) q = imp__guided_survival(s, q);
     *survive = imp__decide1(q);
     return imp__u01(s->walk->key, imp__dim(s->depth, IMP_DIM_SURVIVE)) < *survive;

@@ -43,7 +43,7 @@ struct imp_step {
     /* For roulette only. */
     imp_spec beta; /* throughput, zero factors left out */
     double eta;    /* product of index ratios */
-    int zeros[3];  /* per lane: factors that are zero but have a derivative */
+    int zeros[4];  /* per lane: factors that are zero but have a derivative */
 
     struct imp_graded_state *graded; /* NULL: no graded medium in the scene */
     struct imp_guided guided;

@@ -10,9 +10,13 @@
 imp_spec imp__walk_fold(struct imp_walk *walk)
 {
     imp_spec L = {0};
+    const imp_spec *entry = walk->entry ? walk->entry + walk->n : NULL;
     for (struct imp_vertex *v = walk->last; v; v = v->prev) {
         v->beyond = L;
-        L = v->e + v->w * L + v->b;
+        L = imp_likely(!entry) ? v->e + v->w * L + v->b
+                               : *--entry * (v->e + v->b) + v->w * L;
+        for (struct imp_side *s = v->side; s; s = s->next)
+            L += s->walk.L = imp__walk_fold(&s->walk);
     }
     return L;
 }
@@ -79,34 +83,39 @@ void imp__walk_sweep(const struct imp_tracer *tracer, const struct imp_walk *wal
     const struct imp_active *active = tracer->active;
     if (walk->dropped || !walk->valid) return;
     imp_spec P = adjoint;
-    int depth = 0;
+    int depth = walk->depth;
     for (const struct imp_vertex *v = walk->first; v; v = v->next, depth++) {
         const struct imp_bsdf *b = v->bsdf;
+        /* The adjoint of the vertex's own light. */
+        const imp_spec own =
+            imp_likely(!walk->entry) ? P : P * walk->entry[depth - walk->depth];
+        for (const struct imp_side *s = v->side; s; s = s->next)
+            imp__walk_sweep(tracer, &s->walk, P, sink);
         const struct imp_met *met = &v->d.met;
         const struct imp_light *light = &v->d.light;
         const bool connected = v->d.connection == IMP_CONNECTED;
         if (met->emitter >= 0 && active->emitter[met->emitter])
             emitter_scatter(tracer, met->emitter, imp__vertex_met(v), imp__vertex_at(v),
-                            P * met->weight, sink);
+                            own * met->weight, sink);
         if (connected && active->emitter[light->emitter])
             emitter_scatter(tracer, light->emitter, imp__light_emission(light),
-                            imp__light_at(light), P * v->light_f * light->weight, sink);
+                            imp__light_at(v), own * v->light_f * light->weight, sink);
         if (bsdf_active(active, b)) {
             imp_spec bar[IMP_INPUTS_MAX], d[IMP_INPUTS_MAX];
             bool any = false;
             for (int j = 0; j < b->n_in; j++) bar[j] = (imp_spec){0};
             if (v->d.glows) {
                 glow_d(v, d);
-                for (int j = 0; j < b->n_in; j++) bar[j] += d[j] * P;
+                for (int j = 0; j < b->n_in; j++) bar[j] += d[j] * own;
                 any = true;
             }
             if (connected) {
                 light_d(v, d);
-                for (int j = 0; j < b->n_in; j++) bar[j] += d[j] * P;
+                for (int j = 0; j < b->n_in; j++) bar[j] += d[j] * own;
                 any = true;
             }
             const imp_spec arriving = P * v->beyond;
-            if (v->d.goes_on && !imp__is_zero(arriving)) {
+            if (v->d.goes_on && !imp__is_zero_used(arriving, v->carried)) {
                 step_d(tracer, walk, v, depth, d);
                 for (int j = 0; j < b->n_in; j++) bar[j] += d[j] * arriving;
                 any = true;
@@ -117,7 +126,7 @@ void imp__walk_sweep(const struct imp_tracer *tracer, const struct imp_walk *wal
             }
         }
         P *= v->w;
-        if (imp__is_zero(P)) break;
+        if (imp__is_zero_used(P, v->carried)) break;
     }
     if (walk->moving) walk->moving->sweep(tracer, walk, adjoint, sink);
 }
@@ -154,11 +163,15 @@ imp_spec imp__walk_tangent(const struct imp_tracer *tracer, const struct imp_wal
     const struct imp_active *active = tracer->active;
     const struct direction direction = {active, x_dot};
     imp_spec L_dot = {0};
-    int depth = walk->n - 1;
+    int depth = walk->depth + walk->n - 1;
     if (walk->dropped || !walk->valid) return L_dot;
     for (const struct imp_vertex *v = walk->last; v; v = v->prev, depth--) {
         const struct imp_bsdf *b = v->bsdf;
         L_dot *= v->w;
+        for (const struct imp_side *s = v->side; s; s = s->next)
+            L_dot += imp__walk_tangent(tracer, &s->walk, x_dot);
+        const imp_spec own =
+            imp_likely(!walk->entry) ? imp__spec(1) : walk->entry[depth - walk->depth];
         const struct imp_met *met = &v->d.met;
         const struct imp_light *light = &v->d.light;
         const bool connected = v->d.connection == IMP_CONNECTED;
@@ -166,21 +179,21 @@ imp_spec imp__walk_tangent(const struct imp_tracer *tracer, const struct imp_wal
         if (met->emitter >= 0 && active->emitter[met->emitter])
             L_dot += emitter_tangent(tracer, met->emitter, imp__vertex_met(v), at,
                                      &direction) *
-                     met->weight;
+                     met->weight * own;
         if (connected && active->emitter[light->emitter])
             L_dot += emitter_tangent(tracer, light->emitter, imp__light_emission(light),
-                                     imp__light_at(light), &direction) *
-                     v->light_f * light->weight;
+                                     imp__light_at(v), &direction) *
+                     v->light_f * light->weight * own;
         if (!bsdf_active(active, b)) continue;
         imp_spec in_dot[IMP_INPUTS_MAX], d[IMP_INPUTS_MAX];
         imp__inputs_tangent(b->input, b->n_in, &at, direction_at, &direction, in_dot);
         if (v->d.glows) {
             glow_d(v, d);
-            for (int j = 0; j < b->n_in; j++) L_dot += d[j] * in_dot[j];
+            for (int j = 0; j < b->n_in; j++) L_dot += d[j] * in_dot[j] * own;
         }
         if (connected) {
             light_d(v, d);
-            for (int j = 0; j < b->n_in; j++) L_dot += d[j] * in_dot[j];
+            for (int j = 0; j < b->n_in; j++) L_dot += d[j] * in_dot[j] * own;
         }
         if (v->d.goes_on) {
             step_d(tracer, walk, v, depth, d);

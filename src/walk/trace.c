@@ -38,12 +38,14 @@ static struct imp_vertex *vertex_add(struct imp_step *s, int n_in)
     w->n++;
     v->bsdf = NULL;
     v->shape = NULL;
+    v->side = NULL;
     v->w = v->e = v->b = v->beyond = (imp_spec){0};
     v->scale = 0;
     if (!s->recorded) return v;
 
     v->segment = &imp__straight;
     v->in = (imp_spec *)(v + 1);
+    v->carried = s->at.carried;
     struct imp_decision *d = &v->d;
     d->shape = d->met.emitter = -1;
     d->connection = IMP_NOT_CONNECTED;
@@ -100,7 +102,7 @@ static void sky_meet(struct imp_step *s, bool counts)
     struct imp_vertex *v = vertex_add(s, 0);
     if (!v) return;
     v->t = INFINITY;
-    s->at = (struct imp_texcoord){{0, 0}, imp__decide(s->d)};
+    s->at = (struct imp_texcoord){{0, 0}, imp__decide(s->d), s->at.carried};
     if (s->recorded) {
         v->d.scatterer = IMP_AT_SKY;
         v->d.uv[0] = v->d.uv[1] = 0;
@@ -153,6 +155,68 @@ static void emission_add(struct imp_step *s, struct imp_vertex *v, double weight
     }
 }
 
+static bool step(struct imp_step *s);
+
+/* The continuation of v counts by a share of 1/n. */
+static void share(const struct imp_step *s, struct imp_vertex *v, int n)
+{
+    const double part = imp__decide1(1. / n);
+    imp__step_pass(v, part);
+    if (s->recorded) v->d.passes = (imp_decided)part;
+}
+
+/* Further continuations of v hang on it as side walks. `before`: the walk before its own
+ * continuation was drawn. */
+static void split(const struct imp_step *before, struct imp_vertex *v,
+                  const struct imp_surface *at, const struct imp_frame *frame)
+{
+    struct imp_walk *walk = before->walk;
+    const int n = before->tracer->split;
+    for (int i = 1; i < n && !walk->dropped; i++) {
+        struct imp_step s = *before;
+        struct imp_side *side = imp__arena_take(s.arena, 1, sizeof *side);
+        if (!side) {
+            walk->dropped = IMP_DROP_MEMORY;
+            return;
+        }
+        side->next = v->side;
+        v->side = side;
+        side->walk = (struct imp_walk){.px = walk->px,
+                                       .py = walk->py,
+                                       .key = imp__key_branch(walk->key, s.depth, i),
+                                       .ray = walk->ray,
+                                       .depth = s.depth};
+        s.walk = &side->walk;
+        struct imp_vertex *u = vertex_add(&s, v->bsdf->n_in);
+        if (!u) {
+            walk->dropped = side->walk.dropped;
+            return;
+        }
+        u->shape = v->shape;
+        u->bsdf = v->bsdf;
+        u->t = v->t;
+        if (s.recorded) {
+            u->ng = v->ng;
+            u->d.shape = v->d.shape;
+            u->d.scatterer = v->d.scatterer;
+            u->d.uv[0] = v->d.uv[0];
+            u->d.uv[1] = v->d.uv[1];
+            imp__store_v3(u->d.p, s.at.p);
+            imp__store_v3(u->d.wo, s.wo);
+        }
+        imp_spec *in = s.recorded ? u->in : s.scratch;
+        imp__evaluate_inputs(u->bsdf, u->shape, &s.at, in);
+        s.in = in;
+        if (imp__scatter(&s, u, at, frame)) {
+            share(&s, u, n);
+            for (s.depth++; step(&s);) s.depth++;
+        }
+        walk->valid |= side->walk.valid;
+        side->walk.valid = true;
+        walk->dropped = side->walk.dropped;
+    }
+}
+
 /* From the ray in flight to the next one; false: the walk ends. */
 static bool step(struct imp_step *s)
 {
@@ -193,7 +257,16 @@ static bool step(struct imp_step *s)
     /* The continuation. */
     const bool only_lights =
         integrator->kind == IMP_INTEGRATOR_DIRECT && integrator->bsdf_samples == 0;
-    const bool continues = !only_lights && imp__scatter(s, v, &at, &frame);
+    bool continues;
+    if (imp_unlikely(s->tracer->split > 1) && s->depth == 0 && !only_lights &&
+        s->scene->n_media == 0) {
+        const struct imp_step before = *s;
+        continues = imp__scatter(s, v, &at, &frame);
+        if (continues) share(s, v, s->tracer->split);
+        split(&before, v, &at, &frame);
+    } else {
+        continues = !only_lights && imp__scatter(s, v, &at, &frame);
+    }
 
     /* Is the light seen? */
     if (shadow.wanted &&
@@ -201,7 +274,7 @@ static bool step(struct imp_step *s)
         v->b = shadow.brings;
         if (s->recorded) v->d.connection = IMP_CONNECTED;
     }
-    return continues;
+    return continues && !s->walk->dropped;
 }
 
 /* ---- Walks ------------------------------------------------------------------------ */
@@ -231,12 +304,14 @@ void imp__walk_position(const struct imp_tracer *tracer, int x, int y, int64_t s
 }
 
 /* A walk whose value no light can have, or no picture can hold, is dropped. */
-static enum imp_drop drop_cause(imp_spec L)
+static enum imp_drop drop_cause(imp_spec L, bool four)
 {
-    if (imp_unlikely(
-            !(fabs(L[0]) <= FLT_MAX && fabs(L[1]) <= FLT_MAX && fabs(L[2]) <= FLT_MAX)))
-        return isnan(L[0] + L[1] + L[2]) ? IMP_DROP_NAN : IMP_DROP_INFINITE;
-    if (imp_unlikely(L[0] < 0 || L[1] < 0 || L[2] < 0)) return IMP_DROP_NEGATIVE;
+    if (!four) L[3] = 0;
+    if (imp_unlikely(!(fabs(L[0]) <= FLT_MAX && fabs(L[1]) <= FLT_MAX &&
+                       fabs(L[2]) <= FLT_MAX && fabs(L[3]) <= FLT_MAX)))
+        return isnan(L[0] + L[1] + L[2] + L[3]) ? IMP_DROP_NAN : IMP_DROP_INFINITE;
+    if (imp_unlikely(L[0] < 0 || L[1] < 0 || L[2] < 0 || L[3] < 0))
+        return IMP_DROP_NEGATIVE;
     return IMP_DROP_NONE;
 }
 
@@ -258,20 +333,21 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
                          .recorded = !tracer->value_only ||
                                      (tracer->active && tracer->active->medium),
                          .scratch = scratch,
+                         .at.carried = tracer->carried,
                          .segment = imp__segment_first(tracer->scene),
                          .o = walk->ray.o,
                          .d = walk->ray.d,
                          .t_min = walk->ray.t_near,
                          .t_max = walk->ray.t_far,
                          .from = walk->ray.o,
-                         .beta = {1, 1, 1, 0},
+                         .beta = {1, 1, 1, 1},
                          .eta = 1,
                          .guided.guide = tracer->guide};
     if (imp_likely(s.segment->begin == NULL) || s.segment->begin(&s))
         while (step(&s)) s.depth++;
 
     const imp_spec L = imp__walk_fold(walk);
-    const enum imp_drop cause = drop_cause(L);
+    const enum imp_drop cause = drop_cause(L, tracer->carried);
     if (imp_unlikely(cause != IMP_DROP_NONE)) walk->dropped = cause;
     walk->L = walk->dropped || !walk->valid ? (imp_spec){0} : L;
 }

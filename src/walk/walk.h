@@ -97,16 +97,18 @@ struct imp_vertex {
     double scale;                  /* T/(p s) */
 
     /* Values. */
-    imp_spec e;      /* E_k: all emission of this vertex, weighted */
-    imp_spec b;      /* B_k = light_f light_e light.weight */
-    imp_spec w;      /* f scale: weight of the step to the next vertex */
-    imp_spec beyond; /* L_{k+1}, set by fold */
+    imp_spec e;            /* E_k: all emission of this vertex, weighted */
+    imp_spec b;            /* B_k = light_f light_e light.weight */
+    imp_spec w;            /* f scale: weight of the step to the next vertex */
+    imp_spec beyond;       /* L_{k+1}, set by fold */
+    struct imp_side *side; /* walks that hang on this vertex; NULL: none */
 
     /* Walks for their value alone keep nothing from here on. */
-    imp_v3 ng;                   /* geometric normal, world */
-    imp_spec light_f, light_e;   /* BSDF towards the light, and its radiance */
-    struct imp_segment *segment; /* from the last vertex to here (segment.h) */
-    imp_spec *in;                /* [bsdf->n_in] inputs at this point */
+    imp_v3 ng;                         /* geometric normal, world */
+    imp_spec light_f, light_e;         /* BSDF towards the light, and its radiance */
+    struct imp_segment *segment;       /* from the last vertex to here (segment.h) */
+    imp_spec *in;                      /* [bsdf->n_in] inputs at this point */
+    const struct imp_carried *carried; /* of the walk; outlives it */
     struct imp_decision d;
 };
 #define IMP_VERTEX_VALUES offsetof(struct imp_vertex, ng) /* bytes */
@@ -118,6 +120,7 @@ struct imp_vertex {
 struct imp_walk {
     struct imp_vertex *first, *last;
     int n;         /* vertices */
+    int depth;     /* of the first vertex: 0, unless it hangs on another walk */
     double px, py; /* film position, pixels of the full film */
     struct imp_key key;
     struct imp_sensor_ray ray;
@@ -125,8 +128,20 @@ struct imp_walk {
     bool valid;            /* alpha 1 (scene-format 11) */
     bool absorbed;         /* Stam: ended by absorption */
     enum imp_drop dropped; /* then L is 0 and there is nothing to sweep */
+    /* [n] adjoint with which the light of vertex k itself enters: what a sensor that it
+     * reaches makes of it. NULL: 1, as of a walk from the sensor, whose adjoint enters at
+     * its start. */
+    const imp_spec *entry;
     /* Kind of the segments that move with an active parameter; NULL: none does. */
     const struct imp_segment_ops *moving;
+};
+
+/* A walk that hangs on a vertex of another: its radiance adds to that vertex's. It begins
+ * with a copy of the vertex, which has a continuation of its own and no light. A walk and
+ * what hangs on it are one sample. */
+struct imp_side {
+    struct imp_side *next;
+    struct imp_walk walk;
 };
 
 /* Which numbers a derivative is wanted for, prepared once a job. */
@@ -151,8 +166,12 @@ struct imp_tracer {
      * derivative (docs/estimators.md 9.2). */
     const struct imp_active *active;
     uint64_t seed;
-    const struct imp_guide *guide; /* of PATH; NULL: none */
-    bool value_only;               /* a walk's L is wanted, and no record of it */
+    const struct imp_guide *guide;     /* of PATH; NULL: none */
+    bool value_only;                   /* a walk's L is wanted, and no record of it */
+    const struct imp_carried *carried; /* wavelengths of the walks; NULL: the colours of
+                                          the scene */
+    int split; /* continuations of the first vertex, each with its share; 0: one. Scenes
+                  with graded media have one */
 };
 
 /* The guide that walks of this integrator follow: its densities are made for paths, in
@@ -186,10 +205,11 @@ imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk
 
 /* Radiance of an emitter at x, point p of it, at the scene's present parameters. */
 static inline imp_spec imp__emitter_radiance(const struct imp_scene *scene, int emitter,
-                                             const struct imp_emission *x, imp_v3 p)
+                                             const struct imp_emission *x, imp_v3 p,
+                                             const struct imp_carried *carried)
 {
     const struct imp_emitter *e = scene->emitters[emitter];
-    const struct imp_texcoord at = {{x->uv[0], x->uv[1]}, p};
+    const struct imp_texcoord at = {{x->uv[0], x->uv[1]}, p, carried};
     imp_spec in[IMP_INPUTS_MAX], le;
     imp__inputs_eval(e->input, e->n_in, &at, in);
     e->ops->eval(e, in, x, &le);
@@ -218,7 +238,8 @@ static inline imp_v3 imp__decided_v3(const imp_decided v[3])
 static inline struct imp_texcoord imp__vertex_at(const struct imp_vertex *v)
 {
     if (imp_unlikely(v->segment->exact != NULL)) return v->segment->exact->at;
-    return (struct imp_texcoord){{v->d.uv[0], v->d.uv[1]}, imp__decided_v3(v->d.p)};
+    return (struct imp_texcoord){
+        {v->d.uv[0], v->d.uv[1]}, imp__decided_v3(v->d.p), v->carried};
 }
 static inline imp_v3 imp__vertex_wo(const struct imp_vertex *v)
 {
@@ -241,9 +262,10 @@ static inline struct imp_emission imp__light_emission(const struct imp_light *l)
     return (struct imp_emission){
         {l->uv[0], l->uv[1]}, l->dist, l->cos_light, imp__decided_v3(l->d)};
 }
-static inline struct imp_texcoord imp__light_at(const struct imp_light *l)
+static inline struct imp_texcoord imp__light_at(const struct imp_vertex *v)
 {
-    return (struct imp_texcoord){{l->uv[0], l->uv[1]}, imp__decided_v3(l->p)};
+    const struct imp_light *l = &v->d.light;
+    return (struct imp_texcoord){{l->uv[0], l->uv[1]}, imp__decided_v3(l->p), v->carried};
 }
 static inline struct imp_dirs imp__light_dirs(const struct imp_vertex *v)
 {

@@ -41,8 +41,10 @@ static void check(const struct imp_node *node, enum imp_role role, bool scalar,
 {
     imp_spec v = {-7, -7, -7, -7};
     int count = -7;
-    const enum imp_status st = imp__color_convert(ctx, node, imp__node_prop(node, "c"),
-                                                  role, scalar, mode, &v, &count);
+    const struct imp_spectrum *kept = NULL;
+    const enum imp_status st =
+        imp__color_convert(ctx, node, imp__node_prop(node, "c"), role, scalar, mode, &v,
+                           &count, &arena, &kept);
     if (e.count == 0) {
         const char *message = imp_last_error(ctx);
         tap_ok(st == IMP_E_SCENE && count == -7 && v[0] == -7 &&
@@ -164,10 +166,11 @@ static void table(void)
     check(t, IMP_REFLECTANCE, false, IMP_RGB, (struct expected){0, {0}}, 0, "a vector");
     struct imp_node *bad = node_make("");
     list_add(bad, 2, (double[]){500, 400, 1, 1});
+    const struct imp_spectrum *kept = NULL;
     imp_spec v;
     int count;
     tap_ok(imp__color_convert(ctx, bad, imp__node_prop(bad, "c"), IMP_REFLECTANCE, false,
-                              IMP_RGB, &v, &count) == IMP_E_SCENE,
+                              IMP_RGB, &v, &count, &arena, &kept) == IMP_E_SCENE,
            "wavelengths that do not increase # %s", imp_last_error(ctx));
 
     imp__color_default(0.5, IMP_REFLECTANCE, IMP_RGB, &v, &count);
@@ -180,8 +183,9 @@ static enum imp_status object(struct imp_node *n, enum imp_role role, imp_spec *
                               int *count)
 {
     const char *key = "";
+    const struct imp_spectrum *kept = NULL;
     const enum imp_status st =
-        imp__color_object(ctx, n, role, false, IMP_RGB, v, count, &key);
+        imp__color_object(ctx, n, role, false, IMP_RGB, v, count, &key, &arena, &kept);
     return st == IMP_OK && strcmp(key, "value") != 0 ? IMP_E_ARG : st;
 }
 

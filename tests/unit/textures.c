@@ -61,7 +61,7 @@ static enum imp_status make(struct imp_node *n, const struct imp_image_data *ima
 }
 static double at(const struct imp_texture *t, double u, double v, int lane)
 {
-    const struct imp_texcoord c = {{u, v}, {0}};
+    const struct imp_texcoord c = {.uv = {u, v}};
     imp_spec s;
     t->ops->eval(t, &c, false, &s);
     return s[lane];
@@ -207,8 +207,8 @@ static void transpose_check(const struct imp_input *in, int spots, const char *w
     for (int i = 0; i < N + 8; i++) x[i] = imp__u01(key, (uint32_t)i) - 0.5;
     for (int i = 0; i < spots; i++) {
         const struct imp_key k = imp__key(5, (uint64_t)i, 0);
-        const struct imp_texcoord c = {{4 * imp__u01(k, 0) - 2, 4 * imp__u01(k, 1) - 2},
-                                       {0}};
+        const struct imp_texcoord c = {
+            .uv = {4 * imp__u01(k, 0) - 2, 4 * imp__u01(k, 1) - 2}};
         const imp_spec bar = {imp__u01(k, 2), imp__u01(k, 3) - 0.5, -imp__u01(k, 4), NAN};
         struct gather g = {.sink = {gather_add}};
         const struct imp_input *const list[1] = {in};
@@ -230,8 +230,8 @@ static void linear_check(const struct imp_input *in, const double *data, const c
     double worst = 0;
     for (int i = 0; i < 200; i++) {
         const struct imp_key k = imp__key(6, (uint64_t)i, 0);
-        const struct imp_texcoord c = {{4 * imp__u01(k, 0) - 2, 4 * imp__u01(k, 1) - 2},
-                                       {0}};
+        const struct imp_texcoord c = {
+            .uv = {4 * imp__u01(k, 0) - 2, 4 * imp__u01(k, 1) - 2}};
         const struct imp_input *const list[1] = {in};
         imp_spec dot, value;
         imp__inputs_tangent(list, 1, &c, read_dot, data, &dot);
@@ -250,8 +250,8 @@ static void slope_check(const struct imp_texture *t, bool scalar, const char *wh
     int n = 0;
     for (int i = 0; i < 200; i++) {
         const struct imp_key k = imp__key(7, (uint64_t)i, 0);
-        const struct imp_texcoord c = {{4 * imp__u01(k, 0) - 2, 4 * imp__u01(k, 1) - 2},
-                                       {0}};
+        const struct imp_texcoord c = {
+            .uv = {4 * imp__u01(k, 0) - 2, 4 * imp__u01(k, 1) - 2}};
         imp_spec d[2], mid;
         if (!t->ops->slope(t, &c, scalar, d)) break;
         t->ops->eval(t, &c, scalar, &mid);
@@ -298,7 +298,7 @@ static void derivatives(void)
                  scalar ? " as one number" : "");
         transpose_check(&in, 100, what);
         linear_check(&in, data, what);
-        const struct imp_texcoord middle = {{0.5, 0.5}, {0}};
+        const struct imp_texcoord middle = {.uv = {0.5, 0.5}};
         imp_spec d[2];
         if (!nearest) slope_check(&t, scalar, what);
         else tap_ok(!t.ops->slope(&t, &middle, scalar, d), "%s: jumps, no slope", what);
@@ -357,7 +357,7 @@ static void checkerboard(void)
            "other parity: color1");
     tap_ok(at(&t, 0.5, 0.5, 1) == 0.2 && at(&t, 3.2, -1.7, 1) == 0.2,
            "borders and turns");
-    const struct imp_texcoord c = {{0.2, 0.3}, {0}}, d = {{0.7, 0.3}, {0}};
+    const struct imp_texcoord c = {.uv = {0.2, 0.3}}, d = {.uv = {0.7, 0.3}};
     imp_spec s;
     t.ops->eval(&t, &c, true, &s);
     tap_ok(s[0] == 0.8, "as one number the two are swapped");

@@ -1,6 +1,12 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What an input is at a point, and the two derivatives of that. Between the lanes of a
+ * walk and the numbers of a parameter stands a map: with colours lane c is number c, or
+ * all lanes are one number; with wavelengths a lane is a weighted sum of neighbouring
+ * samples of a spectrum. */
 #include "input.h"
 #include "color/rgb.h"
+#include "color/spectrum.h"
 #include "math/vec.h"
 
 static void weighted_scatter(struct imp_sink *sink, int param, size_t element,
@@ -23,10 +29,63 @@ void imp__luminance_scatter(struct imp_sink *sink, int param, size_t element,
 static const double third[3] = {1.0 / 3, 1.0 / 3, 1.0 / 3};
 static imp_spec mean(double r, double g, double b) { return imp__spec((r + g + b) / 3); }
 
+/* ---- Wavelengths ----------------------------------------------------------------- */
+
+/* Is it looked up by wavelength? One number is the same at all of them. */
+static bool by_wavelength(const struct imp_input *input, bool scalar,
+                          const struct imp_texcoord *at)
+{
+    return imp_unlikely(at->carried != NULL) && !scalar && input->spectrum;
+}
+
+static void spectrum_eval(const struct imp_input *input, const struct imp_carried *c,
+                          imp_spec *value)
+{
+    for (int k = 0; k < 4; k++) {
+        const double *v = input->spectrum->value;
+        size_t first;
+        double w[2];
+        const bool inside =
+            imp__spectrum_at(input->spectrum, c->nm[k < c->n ? k : 0], &first, w);
+        (*value)[k] = inside ? w[0] * v[first] + w[1] * v[first + 1] : 0;
+    }
+}
+
+static void spectrum_scatter(const struct imp_input *input, const struct imp_carried *c,
+                             const imp_spec *bar, struct imp_sink *sink)
+{
+    for (int k = 0; k < c->n; k++) {
+        size_t first;
+        double w[2];
+        if (!imp__spectrum_at(input->spectrum, c->nm[k], &first, w)) continue;
+        for (size_t i = 0; i < 2; i++) {
+            imp_spec part = {0};
+            part[k] = w[i] * (*bar)[k];
+            sink->add(sink, input->param, first + i, 1, &part);
+        }
+    }
+}
+
+static void spectrum_tangent(const struct imp_input *input, const struct imp_carried *c,
+                             imp_dot_fn *dot, const void *x_dot, imp_spec *value_dot)
+{
+    *value_dot = imp__spec(0);
+    for (int k = 0; k < 4; k++) {
+        size_t first;
+        double w[2];
+        if (imp__spectrum_at(input->spectrum, c->nm[k < c->n ? k : 0], &first, w))
+            (*value_dot)[k] = w[0] * dot(x_dot, input->param, first) +
+                              w[1] * dot(x_dot, input->param, first + 1);
+    }
+}
+
+/* ---- One input ------------------------------------------------------------------- */
+
 void imp__input_eval(const struct imp_input *input, bool scalar,
                      const struct imp_texcoord *at, imp_spec *value)
 {
     if (input->texture) input->texture->ops->eval(input->texture, at, scalar, value);
+    else if (by_wavelength(input, scalar, at)) spectrum_eval(input, at->carried, value);
     else if (scalar && input->count == 3)
         *value = mean(input->value[0], input->value[1], input->value[2]);
     else *value = input->value;
@@ -39,6 +98,8 @@ void imp__input_scatter(const struct imp_input *input, bool scalar,
     if (input->texture)
         input->texture->ops->scatter(input->texture, at, scalar, bar, sink);
     else if (input->param < 0) return;
+    else if (by_wavelength(input, scalar, at))
+        spectrum_scatter(input, at->carried, bar, sink);
     else if (scalar && input->count == 3)
         weighted_scatter(sink, input->param, 0, *bar, third);
     else sink->add(sink, input->param, 0, input->count == 3 ? 3 : 1, bar);
@@ -52,6 +113,8 @@ void imp__input_tangent(const struct imp_input *input, bool scalar,
         input->texture->ops->tangent(input->texture, at, scalar, dot, x_dot, value_dot);
     } else if (input->param < 0) {
         *value_dot = imp__spec(0);
+    } else if (by_wavelength(input, scalar, at)) {
+        spectrum_tangent(input, at->carried, dot, x_dot, value_dot);
     } else if (input->count != 3) {
         *value_dot = imp__spec(dot(x_dot, input->param, 0));
     } else {
@@ -61,12 +124,61 @@ void imp__input_tangent(const struct imp_input *input, bool scalar,
     }
 }
 
+/* ---- Luminances of other inputs -------------------------------------------------- */
+
+/* Lanes without a weight do not count, whatever is in them. */
+static double weighted(imp_spec weight, imp_spec value)
+{
+    double sum = 0;
+    for (int c = 0; c < 4; c++)
+        if (weight[c] != 0) sum += weight[c] * value[c];
+    return sum;
+}
+
+/* Takes what a colour's numbers get through a luminance: all of it belongs to the lane of
+ * the picture that asked, whichever number it goes to. */
+struct one_lane {
+    struct imp_sink sink; /* first */
+    struct imp_sink *to;
+    int lane;
+};
+static void one_lane_add(struct imp_sink *sink, int param, size_t element, int channels,
+                         const imp_spec *bar)
+{
+    const struct one_lane *o = (const struct one_lane *)sink;
+    for (int c = 0; c < channels; c++) {
+        imp_spec part = {0};
+        part[o->lane] = channels == 3 ? (*bar)[c] : imp__sum3(*bar);
+        o->to->add(o->to, param, element + (size_t)c, 1, &part);
+    }
+}
+
+/* value = weight . colour in every lane, so colour_bar = weight (sum of value_bar). */
+static void luminance_scatter(const struct imp_input *colour, imp_spec weight,
+                              const struct imp_texcoord *at, const imp_spec *bar,
+                              struct imp_sink *sink)
+{
+    for (int lane = 0; lane < 3; lane++) {
+        struct one_lane one = {{one_lane_add, sink->apart}, sink, lane};
+        if (weight[lane] == 0) continue; /* a lane that is not used */
+        const imp_spec part = weight * (*bar)[lane];
+        if (part[0] != 0 || part[1] != 0 || part[2] != 0)
+            imp__input_scatter(colour, colour->scalar, at, &part, &one.sink);
+    }
+}
+
+/* ---- All inputs of an object ----------------------------------------------------- */
+
 void imp__inputs_eval(const struct imp_input *const *input, int n,
                       const struct imp_texcoord *at, imp_spec *in)
 {
     for (int j = 0; j < n; j++) {
-        if (imp_likely(!input[j]->texture && !input[j]->scalar)) in[j] = input[j]->value;
-        else imp__input_eval(input[j], input[j]->scalar, at, &in[j]);
+        const struct imp_input *i = input[j];
+        if (imp_likely(!i->texture && !i->scalar && !i->luminance && !at->carried))
+            in[j] = i->value;
+        else if (i->luminance)
+            in[j] = imp__spec(weighted(i->weight, in[j - i->luminance]));
+        else imp__input_eval(i, i->scalar, at, &in[j]);
     }
 }
 
@@ -74,14 +186,22 @@ void imp__inputs_scatter(const struct imp_input *const *input, int n,
                          const struct imp_texcoord *at, const imp_spec *in_bar,
                          struct imp_sink *sink)
 {
-    for (int j = 0; j < n; j++)
-        imp__input_scatter(input[j], input[j]->scalar, at, &in_bar[j], sink);
+    for (int j = 0; j < n; j++) {
+        const struct imp_input *i = input[j];
+        if (imp_unlikely(i->luminance))
+            luminance_scatter(input[j - i->luminance], i->weight, at, &in_bar[j], sink);
+        else imp__input_scatter(i, i->scalar, at, &in_bar[j], sink);
+    }
 }
 
 void imp__inputs_tangent(const struct imp_input *const *input, int n,
                          const struct imp_texcoord *at, imp_dot_fn *dot,
                          const void *x_dot, imp_spec *in_dot)
 {
-    for (int j = 0; j < n; j++)
-        imp__input_tangent(input[j], input[j]->scalar, at, dot, x_dot, &in_dot[j]);
+    for (int j = 0; j < n; j++) {
+        const struct imp_input *i = input[j];
+        if (imp_unlikely(i->luminance))
+            in_dot[j] = imp__spec(weighted(i->weight, in_dot[j - i->luminance]));
+        else imp__input_tangent(i, i->scalar, at, dot, x_dot, &in_dot[j]);
+    }
 }
