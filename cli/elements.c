@@ -95,6 +95,7 @@ static int options_make(struct imp_elements_options *e)
     e->max_level = o.level;
     e->max_links = (size_t)o.max_links;
     e->max_bytes = (size_t)(o.max_mb * 1e6);
+    e->picture = !o.no_picture;
     e->time_limit_s = cli.time_s;
     e->seed = cli.seed;
     e->progress = progress_report;

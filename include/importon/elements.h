@@ -69,9 +69,11 @@ struct imp_elements_options {
     size_t size;
     int order;         /**< of the directional basis, 2..12; 0: by the materials */
     int no_importance; /**< refine by radiance alone (the baseline of 1993) */
-    int sensor;        /**< whose picture decides when to stop */
+    int sensor;        /**< of the picture that decides when to stop */
     int rays;          /**< per side of a pixel's grid; 0: 3 */
-    double stop;       /**< relative RMS change of the picture; 0: 0.01; < 0: never */
+    double stop; /**< relative change of what is asked for: of the measurements if there
+                    are sources, RMS of the picture if there are none or `picture` is
+                    set; 0: 0.01; < 0: never stop for that */
     double eps_first,
         eps_last; /**< link tolerance relative to what passes; 0: 0.05, 5e-6 */
     int sweeps, final_sweeps; /**< 0: 4, 12 */
@@ -88,11 +90,12 @@ struct imp_elements_options {
     const struct imp_elements_beam *beams;
     imp_progress_fn progress;
     void *progress_payload;
+    int picture; /**< beside its sources the sensor's picture decides when to stop */
 };
 #define IMP_ELEMENTS_OPTIONS_INIT                                                        \
     {                                                                                    \
         sizeof(struct imp_elements_options), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,   \
-            0, 0, 0, 0, 0, 0, 0, 0                                                       \
+            0, 0, 0, 0, 0, 0, 0, 0, 0                                                    \
     }
 
 /**
@@ -120,7 +123,7 @@ struct imp_elements_step { /**< one line of the schedule's log */
     size_t links, elements, leaves;
     int64_t rays;
     double measure;
-    double change; /**< relative RMS change of the picture; NaN at first */
+    double change; /**< of what is asked for, as `stop` has it; NaN at first */
     double elapsed_s;
 };
 struct imp_elements_info {

@@ -132,7 +132,7 @@ struct imp__el_link { /* src -> rcv */
 struct imp__el_hit { /* where a ray of the eye ended */
     uint32_t root;   /* EL_NONE: nowhere, or on a black side */
     uint32_t source; /* importance source it belongs to, EL_NONE: to the view alone */
-    uint32_t ray;    /* its number in the view, EL_NONE: not there */
+    uint32_t ray;    /* its number in the order of tracing: index of `seen` */
     uint32_t path;   /* imp__el_path of (u, v) */
     double u, v;
     imp_v3 w; /* towards the eye, world */
@@ -156,7 +156,10 @@ struct imp_elements {
     int **prim_root; /* [n_shapes][n_prims]: front root, -1: none */
     size_t n_sources;
     struct imp_elements_source *sources;
-    double size; /* of the scene, for tolerances */
+    double *weight;    /* [n_sources] present weights in the measurement */
+    double *each;      /* [n_sources] measurements at the last step, without weights */
+    size_t *first_ray; /* [n_sources] of camera sources: index into `seen` */
+    double size;       /* of the scene, for tolerances */
 
     size_t n_elements, cap_elements;
     struct imp__element *elements;
@@ -175,13 +178,13 @@ struct imp_elements {
     size_t cap_in, cap_out_start, cap_out, cap_value;
     bool sorted;
 
-    /* Rays of camera sources and of the view, the picture that decides when to stop: by
-     * root and path, so that those of an element are together; misses last. */
+    /* Rays of camera sources and of the view, the picture that was asked for: by root and
+     * path, so that those of an element are together; misses last. */
     size_t n_hits;
     struct imp__el_hit *hits;
-    size_t n_view;   /* rays of the view */
-    double *seen;    /* [n_view] what they see */
-    double *picture; /* the view's pixels at the last step */
+    double *seen;              /* [n_hits] radiance along each ray, in order of tracing */
+    size_t first_view, n_view; /* rays of the view; none: no picture was asked for */
+    double *picture;           /* the view's pixels at the last step */
 
     int64_t rays;
     size_t skipped; /* polygons without area */
@@ -327,6 +330,8 @@ void imp__el_ray(const struct imp_sensor *s, int x, int y, int k, int side,
 double imp__el_measure(const imp_elements *e, double *direct);
 /* The same from the emitters: emission x importance. */
 double imp__el_measure_adjoint(const imp_elements *e);
+/* What every source measures by itself, from radiance, without weights: J [n_sources]. */
+enum imp_status imp__el_measure_each(imp_elements *e, double *J);
 
 /* eye.c */
 /* Order the hits and tell the elements which are theirs; after they were taken. */
@@ -335,9 +340,12 @@ enum imp_status imp__el_hits_sort(imp_elements *e);
 void imp__el_hits_share(const imp_elements *e, const struct imp__element *parent, int k,
                         struct imp__element *child);
 enum imp_status imp__el_bin(imp_elements *e); /* a from the hits */
-/* Relative RMS change of the view since the last call; NaN the first time. Without a
- * sensor it is the relative change of the measurement. */
-enum imp_status imp__el_look(imp_elements *e, double measure, double *change);
+/* Fill `seen` from the present solution. */
+enum imp_status imp__el_see(imp_elements *e);
+/* Relative change since the last call of what was asked for: the larger of the view's RMS
+ * and, where sources were given, sum w |dJ| / sum w |J| over their measurements J. NaN
+ * the first time. */
+enum imp_status imp__el_look(imp_elements *e, double *change);
 
 /* image.c */
 /* Radiance of a hit towards its w, from the leaf. */

@@ -55,6 +55,7 @@ void imp__el_weigh(imp_elements *e, const double *w)
     for (size_t i = 0; i < e->n_roots; i++) e->roots[i].measure = 0;
     for (size_t k = 0; k < e->n_sources; k++) {
         const struct imp_elements_source *src = &e->sources[k];
+        e->weight[k] = w[k];
         if (src->kind == IMP_ELEMENTS_CAMERA) {
             size_t n = 0;
             for (size_t i = 0; i < e->n_hits; i++) n += e->hits[i].source == k;
@@ -116,6 +117,53 @@ double imp__el_measure(const imp_elements *e, double *direct)
     const double seen = direct_of(e);
     if (direct) *direct = seen;
     return imp__el_sum(e, e->n_elements, leaves_measure, NULL) + seen;
+}
+
+/* Sum over a measured root's leaves of area x irradiance. */
+static double flux_of(const imp_elements *e, const struct imp__element *x, int n)
+{
+    double sum = 0;
+    if (x->child) {
+        for (uint32_t k = 0; k < 4; k++) sum += flux_of(e, &e->elements[x->child + k], n);
+        return sum;
+    }
+    for (int c = 0; c < e->ch; c++) sum += e->lum[c] * el_at(e, e->c, x)[c * n];
+    return x->area * sqrt(IMP_2PI) * sum;
+}
+
+static double mean_seen(const imp_elements *e, size_t source)
+{
+    const int *r = e->sources[source].region;
+    const size_t n = (size_t)(r[2] - r[0]) * (size_t)(r[3] - r[1]) *
+                     (size_t)(e->opt.rays * e->opt.rays);
+    double sum = 0;
+    for (size_t k = 0; k < n; k++) sum += e->seen[e->first_ray[source] + k];
+    return sum / (double)n;
+}
+
+enum imp_status imp__el_measure_each(imp_elements *e, double *J)
+{
+    size_t plane = 0; /* as in imp__el_weigh */
+    const enum imp_status st = imp__el_see(e);
+    while (plane < e->n_roots && e->roots[plane].shape >= 0) plane++;
+    for (size_t k = 0; k < e->n_sources && st == IMP_OK; k++) {
+        const struct imp_elements_source *src = &e->sources[k];
+        double flux = 0, area = 0;
+        if (src->kind == IMP_ELEMENTS_CAMERA) {
+            J[k] = mean_seen(e, k);
+            continue;
+        }
+        const bool is_plane = src->kind == IMP_ELEMENTS_PLANE;
+        for (size_t i = is_plane ? plane++ : 0; i < (is_plane ? plane : e->n_roots);
+             i++) {
+            const struct imp__el_root *r = &e->roots[i];
+            if (!is_plane && !is_measured(e, r, src)) continue;
+            flux += flux_of(e, &e->elements[r->element], el_n(e, r));
+            area += r->area;
+        }
+        J[k] = flux / area;
+    }
+    return st;
 }
 
 static double lights_measure(const imp_elements *e, size_t first, size_t end,

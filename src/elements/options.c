@@ -69,7 +69,10 @@ enum imp_status imp__el_options(imp_elements *e,
         imp__arena_array(&e->arena, o->n_beams + 1, sizeof *beams);
     e->n_sources = o->n_sources ? o->n_sources : 1;
     e->sources = imp__arena_array(&e->arena, e->n_sources, sizeof *e->sources);
-    if (!phong || !beams || !e->sources)
+    e->weight = imp__arena_array(&e->arena, e->n_sources, sizeof *e->weight);
+    e->each = imp__arena_array(&e->arena, e->n_sources, sizeof *e->each);
+    e->first_ray = imp__arena_array(&e->arena, e->n_sources, sizeof *e->first_ray);
+    if (!phong || !beams || !e->sources || !e->weight || !e->each || !e->first_ray)
         IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for options"));
     for (size_t i = 0; i < o->n_phong; i++) {
         const struct imp_elements_phong *p = &o->phong[i];

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The schedule: links between whole polygons first, then refinement under a falling
- * tolerance with a few warm-started sweeps each, until the picture hardly changes (the
- * paper's rule), the tolerance has reached its end, or a budget is spent. */
+ * tolerance with a few warm-started sweeps each, until what was asked for hardly changes
+ * (measurements; the picture, as the paper has it, where one is wanted), the tolerance
+ * has reached its end, or a budget is spent. */
 #include "color/rgb.h"
 #include "elements.h"
 #include <stdio.h>
@@ -105,7 +106,7 @@ static enum imp_status log_add(imp_elements *e)
         return imp__error(e->ctx, IMP_E_NUMERIC,
                           "reflections grow without end: the surfaces "
                           "give back more than arrives");
-    IMP_TRY(imp__el_look(e, s.measure, &s.change));
+    IMP_TRY(imp__el_look(e, &s.change));
     struct imp_elements_step *grown =
         imp__grow(e->ctx, e->log, &e->cap_log, e->n_log + 1, sizeof *grown);
     if (!grown) IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for the log"));
@@ -178,8 +179,6 @@ enum imp_status imp_elements_solve(imp_elements *e)
      * would remain, die away only sweep by sweep, and be refined all the way down. */
     IMP_TRY(imp__el_sweep(e, e->opt.sweeps + 2, importance, true));
     e->n_log = 0;
-    imp__release(e->ctx, e->picture);
-    e->picture = NULL;
     IMP_TRY(log_add(e));
     const double first = e->opt.eps_first, last = e->opt.eps_last;
     for (double rel = first; rel >= last && !e->stop; rel /= 2) {
@@ -207,7 +206,8 @@ enum imp_status imp_elements_solve(imp_elements *e)
         if (s->links > before + before / 8)
             still = s->change < e->opt.stop ? still + 1 : 0;
         if (still == 2) {
-            e->reason = "the picture stands still";
+            e->reason = e->opt.n_sources ? "what was asked for stands still"
+                                         : "the picture stands still";
             break;
         }
     }
