@@ -20,7 +20,7 @@ static struct {
     const char *save, *open;
     int kind, order, no_importance, rays, level, max_links, sensitivity, no_picture;
     double stop, eps, max_mb;
-} o = {.kind = IMP_ELEMENTS_GOURAUD};
+} o = {.kind = IMP_ELEMENTS_GOURAUD, .stop = -1}; /* -1: not given */
 
 static const char *const kind_words[] = {"flat", "gouraud", "gather", "importance", NULL};
 
@@ -29,7 +29,8 @@ static const struct arg_option options[] = {
      &o.kind, 0, 0, kind_words},
     {ARG_FLAG, 0, "no-image", NULL, "no picture", &o.no_picture, 0, 0, NULL},
     {ARG_NUMBER, 0, "stop", "PERCENT",
-     "stop when the picture changes by less (default 1)", &o.stop, 1e-9, 100, NULL},
+     "stop when what is asked for changes by less (default 1; 0: never)", &o.stop, 0, 100,
+     NULL},
     {ARG_NUMBER, 0, "eps", "E", "smallest link tolerance, relative (default 5e-6)",
      &o.eps, 1e-12, 1, NULL},
     {ARG_INT, 0, "order", "L",
@@ -90,7 +91,7 @@ static int options_make(struct imp_elements_options *e)
     e->no_importance = o.no_importance;
     e->sensor = cli.sensor;
     e->rays = o.rays;
-    e->stop = o.stop / 100;
+    e->stop = o.stop < 0 ? 0 : o.stop == 0 ? -1 : o.stop / 100;
     e->eps_last = o.eps;
     e->max_level = o.level;
     e->max_links = (size_t)o.max_links;

@@ -224,8 +224,10 @@ struct imp_elements_fit_result {
  * source. The problem needs no targets of its own. Progress and time limit are those of
  * the elements' options. The scene and the elements end at the answer; the result belongs
  * to the problem and lives until its next fit.
- * @return IMP_OK; IMP_CANCELLED (the state reached is set); IMP_E_ARG; IMP_E_UNSUPPORTED
- * for an active number of which finite elements have no derivative.
+ * More numbers than targets, without a regulariser on them, is a warning: many answers
+ * meet the targets.
+ * @return IMP_OK; IMP_CANCELLED (the state reached is set); IMP_E_ARG, also for a negative
+ * target; IMP_E_UNSUPPORTED for an active number of which finite elements have no derivative.
  */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_elements_fit(imp_elements *elements, imp_problem *problem,
