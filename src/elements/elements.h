@@ -249,6 +249,9 @@ enum imp_status imp__el_measure_shape(imp_elements *e,
 void imp__el_weigh(imp_elements *e, const double *w);
 /* roots.c: polygons, lights and materials of the scene; errors name the shape. */
 enum imp_status imp__el_roots(imp_elements *e);
+/* Prefix what refuses an object of the scene with where the object was written. */
+enum imp_status imp__el_refused_at(const imp_elements *e, enum imp_status st,
+                                   const void *object);
 enum imp_status imp__el_root_append(imp_elements *e, const struct imp__el_root *r,
                                     int *index);
 /* materials.c */
