@@ -155,17 +155,43 @@ static int write_picture(const imp_elements *e, const struct imp_run *run)
     return rc;
 }
 
+/* What was measured, each by its name, and their sum from both sides. */
+static void print_measures(const struct imp_elements_info *i)
+{
+    double only = named.n_sources == 1 ? named.sources[0].weight : 0;
+    for (size_t k = 0; k < named.n_sources; k++)
+        cli_say("%s %s: %.9g",
+                named.sources[k].kind == IMP_ELEMENTS_CAMERA ? "mean of the region"
+                                                             : "mean illuminance of",
+                elements_source_name(&o.sources, k), i->measures[k]);
+    if (named.n_sources == 0) cli_say("mean of the picture: %.9g", i->measure);
+    else if (only != 1) cli_say("weighted sum: %.9g", i->measure);
+    if (isfinite(i->luminance)) cli_say("mean luminance: %.9g", i->luminance);
+    if (isfinite(i->measure_adjoint))
+        cli_say("the same from the lights, emission x importance: %.9g",
+                i->measure_adjoint);
+}
+
 static void print_info(struct json *j, const struct imp_elements_info *i, int complete)
 {
     if (!j) {
         cli_say("%zu polygons, %zu elements (%zu leaves), %zu links, %lld rays; order %d",
                 i->polygons, i->elements, i->leaves, i->links, (long long)i->rays,
                 i->order);
-        cli_say("measure %.9g (from the lights %.9g); %s", i->measure, i->measure_adjoint,
-                i->reason);
+        print_measures(i);
+        cli_say("%s", i->reason);
         return;
     }
     json_number(j, "measure", i->measure);
+    json_number(j, "luminance", i->luminance);
+    json_array(j, "measurements");
+    for (size_t k = 0; k < named.n_sources; k++) {
+        json_object(j, NULL);
+        json_text(j, "name", elements_source_name(&o.sources, k));
+        json_number(j, "value", i->measures[k]);
+        json_end_object(j);
+    }
+    json_end_array(j);
     json_number(j, "measure_direct", i->measure_direct);
     json_number(j, "measure_adjoint", i->measure_adjoint);
     json_bool(j, "complete", complete);
@@ -212,8 +238,9 @@ static int print_sensitivity(imp_elements *e, struct json *j)
     const struct imp_elements_row *rows;
     size_t n;
     double sum = 0;
+    int loose = 0;
     char text[256];
-    const enum imp_status st = imp_elements_sensitivity(e, &rows, &n);
+    const enum imp_status st = imp_elements_share_errors(e, &rows, &n);
     if (st != IMP_OK) return cli_fail(st, cli.scene_path);
     if (j) json_array(j, "sensitivity");
     else printf("%-44s %13s %13s %10s\n", "number", "value", "derivative", "elasticity");
@@ -228,10 +255,15 @@ static int print_sensitivity(imp_elements *e, struct json *j)
             json_number(j, "value", r->value);
             json_number(j, "derivative", r->derivative);
             json_number(j, "share", r->share);
+            json_number(j, "share_error", r->share_error);
             json_end_object(j);
         } else {
-            printf("%-44s %13.6g %13.6g %9.3f%%\n", name, r->value, r->derivative,
+            printf("%-44s %13.6g %13.6g %9.3f%%", name, r->value, r->derivative,
                    100 * r->share);
+            if (r->share_error > 0.05 * fabs(r->share))
+                printf(" +- %.2g%%", 100 * r->share_error);
+            printf("\n");
+            loose |= r->share_error > 0.05 * fabs(r->share);
         }
     }
     if (j) {
@@ -239,6 +271,9 @@ static int print_sensitivity(imp_elements *e, struct json *j)
         json_number(j, "euler", sum);
     } else {
         printf("the lights' elasticities add up to %.6f%%\n", 100 * sum);
+        if (loose)
+            printf("+-: the change from a neighbouring directional order; --order L sets "
+                   "it\n");
     }
     return 0;
 }

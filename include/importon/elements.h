@@ -29,10 +29,10 @@ extern "C" {
 typedef struct imp_elements imp_elements;
 
 enum imp_elements_source_kind {
-    IMP_ELEMENTS_CAMERA =
-        0,              /**< mean luminance of a sensor's picture, or of a part of it */
-    IMP_ELEMENTS_PLANE, /**< mean irradiance of a virtual parallelogram: not occluding */
-    IMP_ELEMENTS_SHAPE  /**< mean irradiance of a shape's front */
+    IMP_ELEMENTS_CAMERA = 0, /**< mean of the channels of a sensor's picture or a part */
+    IMP_ELEMENTS_PLANE, /**< mean illuminance (luminance of the irradiance) of a virtual
+                           parallelogram, which does not occlude */
+    IMP_ELEMENTS_SHAPE  /**< mean illuminance of a shape's front */
 };
 
 /** A measurement, and so a source of importance. Several are added with their weights. */
@@ -141,6 +141,9 @@ struct imp_elements_info {
     const char *reason;     /**< why it stopped */
     size_t n_steps;
     const struct imp_elements_step *steps;
+    double luminance;  /**< part of `measure` from cameras, as luminance; NaN: none */
+    size_t n_measures; /**< sources, 1 if none was given */
+    const double *measures; /**< [n_measures] of each by itself, without its weight */
 };
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_elements_get_info(const imp_elements *elements, struct imp_elements_info *info);
@@ -165,13 +168,25 @@ struct imp_elements_row {
     size_t element;   /**< number inside it */
     int emission;     /**< it scales a light, linearly */
     double value, derivative;
-    double share; /**< value x derivative / measure; those of emission sum to 1 */
+    double share;       /**< value x derivative / measure; those of emission sum to 1 */
+    double share_error; /**< of imp_elements_share_errors, else NaN */
 };
 /** Derivatives of the measurement to every light and material number, links fixed,
  * largest |value x derivative| first. Rows belong to the object until the next call. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_elements_sensitivity(imp_elements *elements, const struct imp_elements_row **rows,
                          size_t *n_rows);
+
+/**
+ * imp_elements_sensitivity, with the error of each share that the directional order l
+ * makes: |share in order l - share in order l - 2|, on the same links. Where l is below
+ * 4, or the order below too small for a lobe, order l + 2 takes its place; NaN where that
+ * is above 12. 0 where nothing is glossy. Takes the memory of the elements again, and the
+ * time of solving without refinement.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_elements_share_errors(imp_elements *elements, const struct imp_elements_row **rows,
+                          size_t *n_rows);
 
 /* ---- Design: numbers of the scene for wanted measurements ----------------------- */
 
@@ -226,8 +241,9 @@ struct imp_elements_fit_result {
  * to the problem and lives until its next fit.
  * More numbers than targets, without a regulariser on them, is a warning: many answers
  * meet the targets.
- * @return IMP_OK; IMP_CANCELLED (the state reached is set); IMP_E_ARG, also for a negative
- * target; IMP_E_UNSUPPORTED for an active number of which finite elements have no derivative.
+ * @return IMP_OK; IMP_CANCELLED (the state reached is set); IMP_E_ARG, also for a
+ * negative target; IMP_E_UNSUPPORTED for an active number of which finite elements have
+ * no derivative.
  */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_elements_fit(imp_elements *elements, imp_problem *problem,

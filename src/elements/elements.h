@@ -144,8 +144,10 @@ struct imp_elements {
     const struct imp_scene *scene;
     struct imp_elements_options opt;
     struct imp_arena arena;
+    bool quiet;    /* no warnings */
     int ch;        /* channels */
-    double lum[3]; /* weights of the channels in a measurement */
+    double lum[3]; /* weights of the channels in an illuminance: luminance */
+    double eye[3]; /* in what a camera measures: the mean of the channels */
     struct imp__basis basis;
     double eps; /* now */
 
@@ -230,6 +232,10 @@ static inline double el_lobe(const struct imp__el_root *r, imp_v3 w)
     return c > 0 ? pow(c, r->power) : 0;
 }
 
+/* solve.c: imp_elements_create; `quiet`: without warnings, which were given before. */
+enum imp_status imp__el_create(const imp_scene *scene,
+                               const struct imp_elements_options *options, bool quiet,
+                               imp_elements **out);
 /* options.c: check and copy. */
 enum imp_status imp__el_options(imp_elements *e,
                                 const struct imp_elements_options *options);
@@ -331,6 +337,8 @@ void imp__el_ray(const struct imp_sensor *s, int x, int y, int k, int side,
 /* measure.c */
 /* The measurement from radiance; `direct` (may be NULL): emitters that the eye sees. */
 double imp__el_measure(const imp_elements *e, double *direct);
+/* The part of the camera sources, as luminance; NaN: there is none. */
+double imp__el_luminance(const imp_elements *e);
 /* The same from the emitters: emission x importance. */
 double imp__el_measure_adjoint(const imp_elements *e);
 /* What every source measures by itself, from radiance, without weights: J [n_sources]. */

@@ -144,8 +144,7 @@ static void bin_leaf(imp_elements *e, const struct imp__element *x)
     }
 }
 
-/* Radiance along the rays that end in a leaf, in the measurement's weights of the
- * channels. */
+/* Mean over the channels of the radiance along the rays that end in a leaf. */
 static void see_leaf(imp_elements *e, const struct imp__element *x)
 {
     const struct imp__el_root *r = el_root(e, x);
@@ -158,14 +157,14 @@ static void see_leaf(imp_elements *e, const struct imp__element *x)
         for (int c = 0; c < e->ch; c++) {
             imp_spec value = imp__spec(0);
             for (int q = 0; q < n; q++) value += l[c * n + q] * h[q];
-            sum += e->lum[c] * value;
+            sum += e->eye[c] * value;
         }
         for (uint32_t s = 0; s < 4 && k + s < x->hit[1]; s++) {
             const struct imp__el_hit *hit = &e->hits[k + s];
             const double lobe = el_lobe(r, hit->w);
             double out = sum[s];
             for (int c = 0; c < e->ch && lobe > 0; c++)
-                out += e->lum[c] * r->radiance[c] * lobe;
+                out += e->eye[c] * r->radiance[c] * lobe;
             e->seen[hit->ray] = out;
         }
     }
@@ -247,14 +246,13 @@ enum imp_status imp__el_look(imp_elements *e, double *change)
     *change = first ? NAN : 0;
     IMP_TRY(imp__el_measure_each(e, now));
     if (e->n_view) IMP_TRY(view_change(e, first, change));
-    if (e->opt.n_sources == 0) goto out;
     for (size_t k = 0; k < e->n_sources; k++) {
         const double w = fabs(e->weight[k]);
         sum += w * fabs(now[k]);
         apart += w * fabs(now[k] - e->each[k]);
         e->each[k] = now[k];
     }
-    if (!first) *change = fmax(*change, sum > 0 ? apart / sum : 0);
+    if (!first && e->opt.n_sources) *change = fmax(*change, sum > 0 ? apart / sum : 0);
 out:
     imp__release(e->ctx, now);
     return st;

@@ -190,6 +190,7 @@ enum imp_status imp_elements_open(const imp_scene *scene,
     /* Other measurements than those it was solved for need their importance. */
     if (h.sources != sources_of(e) && e->has_importance)
         IMP_TRY(imp__el_settle(e, 8, true, 1e-7));
+    IMP_TRY(imp__el_measure_each(e, e->each));
     *out = e;
     e = NULL;
 out:

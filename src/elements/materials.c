@@ -73,7 +73,7 @@ enum imp_status imp__el_materials(imp_elements *e)
                     "(relative error %.0f %%)",
                     shape, order, 100 * m->residual),
                 m->bsdf));
-        if (m->residual > RESIDUAL_GOOD)
+        if (m->residual > RESIDUAL_GOOD && !e->quiet)
             imp__warn(e->ctx,
                       "shape '%s': its lobe in directional order %d has a relative error "
                       "of %.0f %%",

@@ -202,7 +202,7 @@ static enum imp_status shape_take(imp_elements *e, const struct imp_shape *s,
         IMP_TRY(polygon_add(e, s, joined ? 4 : 3, joined ? quad : a, na, &prim_root[t]));
         if (joined) prim_root[t + 1] = prim_root[t], t++;
     }
-    if (smooth)
+    if (smooth && !e->quiet)
         imp__warn(e->ctx,
                   "shape '%s': finite elements see its faces flat, without the "
                   "interpolated normals",

@@ -35,9 +35,9 @@ void imp__el_tick(imp_elements *e, const char *stage, double fraction, const cha
     }
 }
 
-enum imp_status imp_elements_create(const imp_scene *scene,
-                                    const struct imp_elements_options *options,
-                                    imp_elements **out)
+enum imp_status imp__el_create(const imp_scene *scene,
+                               const struct imp_elements_options *options, bool quiet,
+                               imp_elements **out)
 {
     enum imp_status st = IMP_OK;
     IMP_REQUIRE(NULL, scene, "scene");
@@ -54,9 +54,11 @@ enum imp_status imp_elements_create(const imp_scene *scene,
     e->scene = scene;
     e->ch = scene->channels;
     e->reason = "not solved";
+    e->quiet = quiet;
     imp__arena_init(&e->arena, e->ctx);
     if (e->ch == 1) e->lum[0] = 1;
     else e->lum[0] = IMP_LUM_R, e->lum[1] = IMP_LUM_G, e->lum[2] = IMP_LUM_B;
+    for (int c = 0; c < e->ch; c++) e->eye[c] = 1.0 / e->ch;
     for (int i = 0; i < 3; i++) e->size = fmax(e->size, scene->hi[i] - scene->lo[i]);
     IMP_TRY(imp__el_options(e, options));
     IMP_TRY(imp__el_roots(e));
@@ -67,6 +69,13 @@ enum imp_status imp_elements_create(const imp_scene *scene,
 out:
     imp_elements_destroy(e);
     return st;
+}
+
+enum imp_status imp_elements_create(const imp_scene *scene,
+                                    const struct imp_elements_options *options,
+                                    imp_elements **out)
+{
+    return imp__el_create(scene, options, false, out);
 }
 
 void imp_elements_destroy(imp_elements *e)
@@ -264,6 +273,7 @@ enum imp_status imp_elements_update(imp_elements *e)
     IMP_TRY(imp__el_parameters(e));
     IMP_TRY(imp__el_bin(e));
     IMP_TRY(imp__el_settle(e, 4, e->has_importance, 1e-10));
+    IMP_TRY(imp__el_measure_each(e, e->each));
 out:
     return st;
 }
@@ -299,6 +309,9 @@ enum imp_status imp_elements_get_info(const imp_elements *e,
     if (e->solved) {
         i.measure = imp__el_measure(e, &i.measure_direct);
         i.measure_adjoint = e->has_importance ? imp__el_measure_adjoint(e) : NAN;
+        i.luminance = imp__el_luminance(e);
+        i.n_measures = e->n_sources;
+        i.measures = e->each;
     }
     IMP_GIVE(e->ctx, info, i, "info");
     return IMP_OK;

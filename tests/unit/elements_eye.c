@@ -83,7 +83,7 @@ static void eye(imp_context *ctx, imp_scene *s, const struct imp_elements_option
         const struct imp__el_hit *hit = &e->hits[i];
         double out[3], sum = 0, h[EL_N_MAX];
         imp__el_flat(e, hit, out);
-        for (int c = 0; c < e->ch; c++) sum += e->lum[c] * out[c];
+        for (int c = 0; c < e->ch; c++) sum += e->eye[c] * out[c];
         most = fmax(most, sum);
         worst = fmax(worst, fabs(e->seen[hit->ray] - sum));
         if (hit->root == EL_NONE) continue;
