@@ -50,8 +50,9 @@ static const struct arg_option options[] = {
     {ARG_LIST, 0, "region", "[W:]X0,Y0,X1,Y1[=T]", "measure a part of the picture",
      &o.sources.regions, 0, 0, NULL},
     {ARG_LIST, 0, "plane", "[W:]CORNER,U,V[=T]",
-     "measure the irradiance of a virtual patch", &o.sources.planes, 0, 0, NULL},
-    {ARG_LIST, 0, "lux", "[W:]SHAPE[=T]", "measure the irradiance of a shape",
+     "measure the illuminance of a virtual patch that faces U x V", &o.sources.planes, 0,
+     0, NULL},
+    {ARG_LIST, 0, "lux", "[W:]SHAPE[=T]", "measure the illuminance of a shape",
      &o.sources.shapes, 0, 0, NULL},
     {ARG_FLAG, 0, "sensitivity", NULL,
      "print derivatives of the measurement, largest first", &o.sensitivity, 0, 0, NULL},
@@ -159,11 +160,22 @@ static int write_picture(const imp_elements *e, const struct imp_run *run)
 static void print_measures(const struct imp_elements_info *i)
 {
     double only = named.n_sources == 1 ? named.sources[0].weight : 0;
-    for (size_t k = 0; k < named.n_sources; k++)
-        cli_say("%s %s: %.9g",
-                named.sources[k].kind == IMP_ELEMENTS_CAMERA ? "mean of the region"
-                                                             : "mean illuminance of",
-                elements_source_name(&o.sources, k), i->measures[k]);
+    for (size_t k = 0; k < named.n_sources; k++) {
+        const struct imp_elements_source *s = &named.sources[k];
+        const char *name = elements_source_name(&o.sources, k);
+        const double *u = s->edge_u, *v = s->edge_v;
+        const double n[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
+                             u[0] * v[1] - u[1] * v[0]};
+        const double area = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+        if (s->kind == IMP_ELEMENTS_CAMERA)
+            cli_say("mean of the region %s: %.9g", name, i->measures[k]);
+        else if (s->kind == IMP_ELEMENTS_SHAPE)
+            cli_say("mean illuminance of %s: %.9g", name, i->measures[k]);
+        else /* + 0.0: no negative zero */
+            cli_say("mean illuminance of the plane %s, which faces %.3g,%.3g,%.3g: %.9g",
+                    name, n[0] / area + 0.0, n[1] / area + 0.0, n[2] / area + 0.0,
+                    i->measures[k]);
+    }
     if (named.n_sources == 0) cli_say("mean of the picture: %.9g", i->measure);
     else if (only != 1) cli_say("weighted sum: %.9g", i->measure);
     if (isfinite(i->luminance)) cli_say("mean luminance: %.9g", i->luminance);
