@@ -22,8 +22,21 @@
 
 #include <importon/importon.h>
 
+/* An options struct with its size set and every other member zero. */
 #ifdef __cplusplus
+template <class T> inline T imp_elements_sized()
+{
+    T t = T();
+    t.size = sizeof(T);
+    return t;
+}
+#define IMP_ELEMENTS_SIZED(type) imp_elements_sized<type>()
 extern "C" {
+#else
+#define IMP_ELEMENTS_SIZED(type)                                                         \
+    {                                                                                    \
+        .size = sizeof(type)                                                             \
+    }
 #endif
 
 typedef struct imp_elements imp_elements;
@@ -46,11 +59,7 @@ struct imp_elements_source {
         edge_v[3];     /**< plane; its front is along edge_u x edge_v */
     const char *shape; /**< shape: its name */
 };
-#define IMP_ELEMENTS_SOURCE_INIT                                                         \
-    {                                                                                    \
-        sizeof(struct imp_elements_source), IMP_ELEMENTS_CAMERA, 0, 0, {0}, {0}, {0},    \
-            {0}, 0                                                                       \
-    }
+#define IMP_ELEMENTS_SOURCE_INIT IMP_ELEMENTS_SIZED(struct imp_elements_source)
 
 /** Reciprocal modified Phong in place of a shape's material, seen from its front:
  * kd/pi + ks (n+2)/(2 pi) max(0, mirror(wi).wo)^n. */
@@ -82,8 +91,8 @@ struct imp_elements_options {
     size_t max_bytes;         /**< 0: 4 GiB */
     double time_limit_s;      /**< 0: none; reached: ends as if cancelled */
     uint64_t seed;
-    size_t n_sources; /**< 0: the sensor's whole picture */
-    const struct imp_elements_source *sources;
+    size_t n_sources;                          /**< 0: the sensor's whole picture */
+    const struct imp_elements_source *sources; /**< each as long as its own `size` */
     size_t n_phong;
     const struct imp_elements_phong *phong;
     size_t n_beams;
@@ -92,11 +101,7 @@ struct imp_elements_options {
     void *progress_payload;
     int picture; /**< beside its sources the sensor's picture decides when to stop */
 };
-#define IMP_ELEMENTS_OPTIONS_INIT                                                        \
-    {                                                                                    \
-        sizeof(struct imp_elements_options), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,   \
-            0, 0, 0, 0, 0, 0, 0, 0, 0                                                    \
-    }
+#define IMP_ELEMENTS_OPTIONS_INIT IMP_ELEMENTS_SIZED(struct imp_elements_options)
 
 /**
  * Take the scene's polygons and project its materials. The scene must outlive the result
@@ -206,10 +211,7 @@ struct imp_elements_fit_options {
     size_t n_bounds;
     const struct imp_elements_bounds *bounds;
 };
-#define IMP_ELEMENTS_FIT_OPTIONS_INIT                                                    \
-    {                                                                                    \
-        sizeof(struct imp_elements_fit_options), IMP_ADAM, 0, 0, 0, 0, 0, 0              \
-    }
+#define IMP_ELEMENTS_FIT_OPTIONS_INIT IMP_ELEMENTS_SIZED(struct imp_elements_fit_options)
 struct imp_elements_goal {
     double target, before, after; /**< a source's measurement, without its weight */
 };
@@ -227,12 +229,13 @@ struct imp_elements_fit_result {
     const char *reason;
 };
 
+/* clang-format off */
 /**
  * Find the problem's active numbers (lights, reflectances) for which every source of the
  * elements measures its target, inside bounds: the least value of
  *
- *     1/2 sum over sources of weight ((J - target) / scale)^2 + the problem's
- * regularisers
+ *     1/2 sum over sources of weight ((J - target) / scale)^2
+ *         + the problem's regularisers
  *
  * where scale is |target|, or 1 if that is 0, by adjoint sensitivities. With lights alone
  * it is a linear least-squares problem with bounds, solved from one adjoint solution a
@@ -245,6 +248,7 @@ struct imp_elements_fit_result {
  * negative target; IMP_E_UNSUPPORTED for an active number of which finite elements have
  * no derivative.
  */
+/* clang-format on */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_elements_fit(imp_elements *elements, imp_problem *problem,
                  const struct imp_elements_fit_options *options,
@@ -254,15 +258,14 @@ struct imp_elements_guide_options {
     size_t size;
     int no_lights; /**< light samples as without a guide */
     double share;  /**< of continuations drawn towards indirect light, 0 to 1 exclusive */
-    /** Walks end by what is expected of them, not by their throughput: they go on with
-     * probability roulette x (light still to come) / (light expected of the walk), in
-     * [0.2, 1]. 0: off; 0.5 to 1 where most light comes directly, 4 where little does. */
+    /** Russian roulette by expected contribution instead of throughput: a walk continues
+     * with probability roulette x (radiance expected after this vertex) / (radiance
+     * expected of the whole walk), clamped to [0.2, 1]. 0: off; 0.5 to 1 where most light
+     * is direct, 4 where little is. */
     double roulette;
 };
 #define IMP_ELEMENTS_GUIDE_OPTIONS_INIT                                                  \
-    {                                                                                    \
-        sizeof(struct imp_elements_guide_options), 0, 0, 0                               \
-    }
+    IMP_ELEMENTS_SIZED(struct imp_elements_guide_options)
 /** The solution as a guide for walks: set imp_run.guide. Light samples follow what every
  * light sends to a place; drawing directions by it, or roulette, pays in some scenes only
  * (docs/elements.md) and is off unless asked for. The elements must outlive it; a guide

@@ -1,3 +1,4 @@
+/* clang-format off */
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Finite elements with directional radiance and importance (Christensen, Salesin, DeRose
@@ -6,12 +7,16 @@
  * moments of what arrives are gathered over the links; reflection is one matrix per
  * element.
  *
- * With A_i areas, R the material in the basis, and link samples of weight K_s, direction
- * w_s: c_i  = sum K_s/A_i (l_j . H_j(-w_s) + Le_j(-w_s)) H_i(w_s)      moments of
- * radiance b_j  = sum K_s/A_j (g_i . H_i(w_s)) H_j(-w_s)                   moments of
- * importance l_i  = R c_i,   g_i = R (b_i + a_i/A_i) + s_i where a is importance that
- * arrives from the eye and s what a measuring patch emits. R is symmetric and both sums
- * are over the same links, so a.l = Le . (S^T g) to rounding. */
+ * With A_i areas, R the material in the basis, and link samples of weight K_s and
+ * direction w_s:
+ *
+ *     c_i = sum K_s/A_i (l_j . H_j(-w_s) + Le_j(-w_s)) H_i(w_s)     moments of radiance
+ *     b_j = sum K_s/A_j (g_i . H_i(w_s)) H_j(-w_s)                  moments of importance
+ *     l_i = R c_i,   g_i = R (b_i + a_i/A_i) + s_i
+ *
+ * where a is importance that arrives from the eye and s what a measuring patch emits. R is
+ * symmetric and both sums are over the same links, so a.l = Le . (S^T g) to rounding. */
+/* clang-format on */
 #ifndef IMP_ELEMENTS_H
 #define IMP_ELEMENTS_H
 
