@@ -37,7 +37,9 @@ static const struct arg_option options[] = {
      "of the directional basis, 2..12; default: by the materials", &o.order, 2, 12, NULL},
     {ARG_INT, 0, "level", "N", "of subdivision at most (default 9)", &o.level, 1, 10,
      NULL},
-    {ARG_INT, 0, "rays", "N", "per side of a pixel (default 3)", &o.rays, 1, 64, NULL},
+    {ARG_INT, 0, "rays", "N",
+     "per side of a pixel (default 3 to 24, more in small pictures)", &o.rays, 1, 64,
+     NULL},
     {ARG_INT, 0, "max-links", "N", "budget of links", &o.max_links, 1, 2e9, NULL},
     {ARG_NUMBER, 0, "max-memory", "MB", "budget of memory (default 4295)", &o.max_mb, 1,
      1e9, NULL},
@@ -191,7 +193,10 @@ static void print_info(struct json *j, const struct imp_elements_info *i, int co
                 i->polygons, i->elements, i->leaves, i->links, (long long)i->rays,
                 i->order);
         print_measures(i);
-        cli_say("%s", i->reason);
+        const double change = i->n_steps > 1 ? i->steps[i->n_steps - 2].change : NAN;
+        if (isfinite(change))
+            cli_say("%s (last change %.2g %%)", i->reason, 100 * change);
+        else cli_say("%s", i->reason);
         return;
     }
     json_number(j, "measure", i->measure);

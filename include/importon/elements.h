@@ -79,7 +79,7 @@ struct imp_elements_options {
     int order;         /**< of the directional basis, 2..12; 0: by the materials */
     int no_importance; /**< refine by radiance alone (the baseline of 1993) */
     int sensor;        /**< of the picture that decides when to stop */
-    int rays;          /**< per side of a pixel's grid; 0: 3 */
+    int rays;    /**< per side of a pixel's grid; 0: 3 to 24, more in small pictures */
     double stop; /**< relative change of what is asked for: of the measurements if there
                     are sources, RMS of the picture if there are none or `picture` is
                     set; 0: 0.01; < 0: never stop for that */
