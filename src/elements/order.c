@@ -50,6 +50,10 @@ enum imp_status imp_elements_share_errors(imp_elements *e,
     imp_elements *twin = NULL;
     size_t n_other = 0;
     bool glossy = false;
+    IMP_REQUIRE(NULL, e, "elements");
+    IMP_REQUIRE(e->ctx, rows, "rows");
+    IMP_REQUIRE(e->ctx, n_rows, "n_rows");
+    IMP_FLOAT_MODE;
     IMP_TRY(imp_elements_sensitivity(e, rows, n_rows));
     for (int k = 0; k < e->n_materials; k++) glossy |= e->materials[k].n > 1;
     if (glossy) {

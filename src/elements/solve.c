@@ -40,8 +40,6 @@ enum imp_status imp__el_create(const imp_scene *scene,
                                imp_elements **out)
 {
     enum imp_status st = IMP_OK;
-    IMP_REQUIRE(NULL, scene, "scene");
-    IMP_REQUIRE(scene->ctx, out, "out");
     IMP_FLOAT_MODE;
     IMP_READS(scene);
     if (!scene->committed)
@@ -75,6 +73,8 @@ enum imp_status imp_elements_create(const imp_scene *scene,
                                     const struct imp_elements_options *options,
                                     imp_elements **out)
 {
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_REQUIRE(scene->ctx, out, "out");
     return imp__el_create(scene, options, false, out);
 }
 

@@ -76,14 +76,14 @@ static void planes(imp_context *ctx)
     imp_scene_destroy(s);
 }
 
-/* Measurements of a host with a newer header, longer by a member; and of size 0. */
+/* Measurements of a host with a newer header, longer by members that it does not use, or
+ * does use; and of size 0. */
 static void sizes(imp_context *ctx)
 {
     struct longer {
         struct imp_elements_source now;
         double later[3];
-    } two[2] = {{.now = IMP_ELEMENTS_SOURCE_INIT, .later = {NAN, NAN, NAN}},
-                {.now = IMP_ELEMENTS_SOURCE_INIT, .later = {NAN, NAN, NAN}}};
+    } two[2] = {{.now = IMP_ELEMENTS_SOURCE_INIT}, {.now = IMP_ELEMENTS_SOURCE_INIT}};
     imp_scene *s = test_scene(ctx, "elements/b.xml", IMP_MONO, "res=8");
     struct imp_elements_options o = IMP_ELEMENTS_OPTIONS_INIT;
     struct imp_elements_info info = {.size = sizeof info};
@@ -106,8 +106,11 @@ static void sizes(imp_context *ctx)
            "longer structs # %g, %g; alone %g, %g", info.measures[0], info.measures[1],
            want[0], want[1]);
     imp_elements_destroy(e);
-    two[1].now.size = 0;
+    two[1].later[2] = 1;
     e = NULL;
+    tap_ok(imp_elements_create(s, &o, &e) == IMP_E_ARG && !e, "a later member # %s",
+           imp_last_error(ctx));
+    two[1].now.size = 0;
     tap_ok(imp_elements_create(s, &o, &e) == IMP_E_ARG && !e, "size 0 is refused # %s",
            imp_last_error(ctx));
     imp_scene_destroy(s);
