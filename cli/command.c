@@ -123,7 +123,10 @@ int cli_fail(enum imp_status status, const char *what)
 {
     const char *message = cli.context ? imp_last_error(cli.context) : "";
     if (!message[0]) message = imp_status_text(status);
-    if (what) return cli_error(exit_code(status), "%s: %s", what, message);
+    const size_t n =
+        what ? strlen(what) : 0; /* "FILE:LINE:COLUMN: ..." names it already */
+    if (what && !(strncmp(message, what, n) == 0 && message[n] == ':'))
+        return cli_error(exit_code(status), "%s: %s", what, message);
     return cli_error(exit_code(status), "%s", message);
 }
 int cli_done(void)

@@ -20,7 +20,7 @@ static struct {
     const char *save, *open;
     int kind, order, no_importance, rays, level, max_links, sensitivity, no_picture;
     double stop, eps, max_mb;
-} o = {.kind = IMP_ELEMENTS_GOURAUD};
+} o = {.kind = IMP_ELEMENTS_GOURAUD, .stop = -1}; /* -1: not given */
 
 static const char *const kind_words[] = {"flat", "gouraud", "gather", "importance", NULL};
 
@@ -29,14 +29,17 @@ static const struct arg_option options[] = {
      &o.kind, 0, 0, kind_words},
     {ARG_FLAG, 0, "no-image", NULL, "no picture", &o.no_picture, 0, 0, NULL},
     {ARG_NUMBER, 0, "stop", "PERCENT",
-     "stop when the picture changes by less (default 1)", &o.stop, 1e-9, 100, NULL},
+     "stop when what is asked for changes by less (default 1; 0: never)", &o.stop, 0, 100,
+     NULL},
     {ARG_NUMBER, 0, "eps", "E", "smallest link tolerance, relative (default 5e-6)",
      &o.eps, 1e-12, 1, NULL},
     {ARG_INT, 0, "order", "L",
      "of the directional basis, 2..12; default: by the materials", &o.order, 2, 12, NULL},
     {ARG_INT, 0, "level", "N", "of subdivision at most (default 9)", &o.level, 1, 10,
      NULL},
-    {ARG_INT, 0, "rays", "N", "per side of a pixel (default 3)", &o.rays, 1, 64, NULL},
+    {ARG_INT, 0, "rays", "N",
+     "per side of a pixel (default 3 to 24, more in small pictures)", &o.rays, 1, 64,
+     NULL},
     {ARG_INT, 0, "max-links", "N", "budget of links", &o.max_links, 1, 2e9, NULL},
     {ARG_NUMBER, 0, "max-memory", "MB", "budget of memory (default 4295)", &o.max_mb, 1,
      1e9, NULL},
@@ -49,8 +52,9 @@ static const struct arg_option options[] = {
     {ARG_LIST, 0, "region", "[W:]X0,Y0,X1,Y1[=T]", "measure a part of the picture",
      &o.sources.regions, 0, 0, NULL},
     {ARG_LIST, 0, "plane", "[W:]CORNER,U,V[=T]",
-     "measure the irradiance of a virtual patch", &o.sources.planes, 0, 0, NULL},
-    {ARG_LIST, 0, "lux", "[W:]SHAPE[=T]", "measure the irradiance of a shape",
+     "measure the illuminance of a virtual patch that faces U x V", &o.sources.planes, 0,
+     0, NULL},
+    {ARG_LIST, 0, "lux", "[W:]SHAPE[=T]", "measure the illuminance of a shape",
      &o.sources.shapes, 0, 0, NULL},
     {ARG_FLAG, 0, "sensitivity", NULL,
      "print derivatives of the measurement, largest first", &o.sensitivity, 0, 0, NULL},
@@ -90,11 +94,12 @@ static int options_make(struct imp_elements_options *e)
     e->no_importance = o.no_importance;
     e->sensor = cli.sensor;
     e->rays = o.rays;
-    e->stop = o.stop / 100;
+    e->stop = o.stop < 0 ? 0 : o.stop == 0 ? -1 : o.stop / 100;
     e->eps_last = o.eps;
     e->max_level = o.level;
     e->max_links = (size_t)o.max_links;
     e->max_bytes = (size_t)(o.max_mb * 1e6);
+    e->picture = !o.no_picture;
     e->time_limit_s = cli.time_s;
     e->seed = cli.seed;
     e->progress = progress_report;
@@ -153,17 +158,57 @@ static int write_picture(const imp_elements *e, const struct imp_run *run)
     return rc;
 }
 
+/* What was measured, each by its name, and their sum from both sides. */
+static void print_measures(const struct imp_elements_info *i)
+{
+    double only = named.n_sources == 1 ? named.sources[0].weight : 0;
+    for (size_t k = 0; k < named.n_sources; k++) {
+        const struct imp_elements_source *s = &named.sources[k];
+        const char *name = elements_source_name(&o.sources, k);
+        const double *u = s->edge_u, *v = s->edge_v;
+        const double n[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
+                             u[0] * v[1] - u[1] * v[0]};
+        const double area = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
+        if (s->kind == IMP_ELEMENTS_CAMERA)
+            cli_say("mean of the region %s: %.9g", name, i->measures[k]);
+        else if (s->kind == IMP_ELEMENTS_SHAPE)
+            cli_say("mean illuminance of %s: %.9g", name, i->measures[k]);
+        else /* + 0.0: no negative zero */
+            cli_say("mean illuminance of the plane %s, which faces %.3g,%.3g,%.3g: %.9g",
+                    name, n[0] / area + 0.0, n[1] / area + 0.0, n[2] / area + 0.0,
+                    i->measures[k]);
+    }
+    if (named.n_sources == 0) cli_say("mean of the picture: %.9g", i->measure);
+    else if (only != 1) cli_say("weighted sum: %.9g", i->measure);
+    if (isfinite(i->luminance)) cli_say("mean luminance: %.9g", i->luminance);
+    if (isfinite(i->measure_adjoint))
+        cli_say("the same from the lights, emission x importance: %.9g",
+                i->measure_adjoint);
+}
+
 static void print_info(struct json *j, const struct imp_elements_info *i, int complete)
 {
     if (!j) {
         cli_say("%zu polygons, %zu elements (%zu leaves), %zu links, %lld rays; order %d",
                 i->polygons, i->elements, i->leaves, i->links, (long long)i->rays,
                 i->order);
-        cli_say("measure %.9g (from the lights %.9g); %s", i->measure, i->measure_adjoint,
-                i->reason);
+        print_measures(i);
+        const double change = i->n_steps > 1 ? i->steps[i->n_steps - 2].change : NAN;
+        if (isfinite(change))
+            cli_say("%s (last change %.2g %%)", i->reason, 100 * change);
+        else cli_say("%s", i->reason);
         return;
     }
     json_number(j, "measure", i->measure);
+    json_number(j, "luminance", i->luminance);
+    json_array(j, "measurements");
+    for (size_t k = 0; k < named.n_sources; k++) {
+        json_object(j, NULL);
+        json_text(j, "name", elements_source_name(&o.sources, k));
+        json_number(j, "value", i->measures[k]);
+        json_end_object(j);
+    }
+    json_end_array(j);
     json_number(j, "measure_direct", i->measure_direct);
     json_number(j, "measure_adjoint", i->measure_adjoint);
     json_bool(j, "complete", complete);
@@ -210,8 +255,9 @@ static int print_sensitivity(imp_elements *e, struct json *j)
     const struct imp_elements_row *rows;
     size_t n;
     double sum = 0;
+    int loose = 0;
     char text[256];
-    const enum imp_status st = imp_elements_sensitivity(e, &rows, &n);
+    const enum imp_status st = imp_elements_share_errors(e, &rows, &n);
     if (st != IMP_OK) return cli_fail(st, cli.scene_path);
     if (j) json_array(j, "sensitivity");
     else printf("%-44s %13s %13s %10s\n", "number", "value", "derivative", "elasticity");
@@ -226,10 +272,15 @@ static int print_sensitivity(imp_elements *e, struct json *j)
             json_number(j, "value", r->value);
             json_number(j, "derivative", r->derivative);
             json_number(j, "share", r->share);
+            json_number(j, "share_error", r->share_error);
             json_end_object(j);
         } else {
-            printf("%-44s %13.6g %13.6g %9.3f%%\n", name, r->value, r->derivative,
+            printf("%-44s %13.6g %13.6g %9.3f%%", name, r->value, r->derivative,
                    100 * r->share);
+            if (r->share_error > 0.05 * fabs(r->share))
+                printf(" +- %.2g%%", 100 * r->share_error);
+            printf("\n");
+            loose |= r->share_error > 0.05 * fabs(r->share);
         }
     }
     if (j) {
@@ -237,6 +288,9 @@ static int print_sensitivity(imp_elements *e, struct json *j)
         json_number(j, "euler", sum);
     } else {
         printf("the lights' elasticities add up to %.6f%%\n", 100 * sum);
+        if (loose)
+            printf("+-: the change from a neighbouring directional order; --order L sets "
+                   "it\n");
     }
     return 0;
 }

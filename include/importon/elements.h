@@ -22,17 +22,30 @@
 
 #include <importon/importon.h>
 
+/* An options struct with its size set and every other member zero. */
 #ifdef __cplusplus
+template <class T> inline T imp_elements_sized()
+{
+    T t = T();
+    t.size = sizeof(T);
+    return t;
+}
+#define IMP_ELEMENTS_SIZED(type) imp_elements_sized<type>()
 extern "C" {
+#else
+#define IMP_ELEMENTS_SIZED(type)                                                         \
+    {                                                                                    \
+        .size = sizeof(type)                                                             \
+    }
 #endif
 
 typedef struct imp_elements imp_elements;
 
 enum imp_elements_source_kind {
-    IMP_ELEMENTS_CAMERA =
-        0,              /**< mean luminance of a sensor's picture, or of a part of it */
-    IMP_ELEMENTS_PLANE, /**< mean irradiance of a virtual parallelogram: not occluding */
-    IMP_ELEMENTS_SHAPE  /**< mean irradiance of a shape's front */
+    IMP_ELEMENTS_CAMERA = 0, /**< mean of the channels of a sensor's picture or a part */
+    IMP_ELEMENTS_PLANE, /**< mean illuminance (luminance of the irradiance) of a virtual
+                           parallelogram, which does not occlude */
+    IMP_ELEMENTS_SHAPE  /**< mean illuminance of a shape's front */
 };
 
 /** A measurement, and so a source of importance. Several are added with their weights. */
@@ -46,11 +59,7 @@ struct imp_elements_source {
         edge_v[3];     /**< plane; its front is along edge_u x edge_v */
     const char *shape; /**< shape: its name */
 };
-#define IMP_ELEMENTS_SOURCE_INIT                                                         \
-    {                                                                                    \
-        sizeof(struct imp_elements_source), IMP_ELEMENTS_CAMERA, 0, 0, {0}, {0}, {0},    \
-            {0}, 0                                                                       \
-    }
+#define IMP_ELEMENTS_SOURCE_INIT IMP_ELEMENTS_SIZED(struct imp_elements_source)
 
 /** Reciprocal modified Phong in place of a shape's material, seen from its front:
  * kd/pi + ks (n+2)/(2 pi) max(0, mirror(wi).wo)^n. */
@@ -69,9 +78,11 @@ struct imp_elements_options {
     size_t size;
     int order;         /**< of the directional basis, 2..12; 0: by the materials */
     int no_importance; /**< refine by radiance alone (the baseline of 1993) */
-    int sensor;        /**< whose picture decides when to stop */
-    int rays;          /**< per side of a pixel's grid; 0: 3 */
-    double stop;       /**< relative RMS change of the picture; 0: 0.01; < 0: never */
+    int sensor;        /**< of the picture that decides when to stop */
+    int rays;    /**< per side of a pixel's grid; 0: 3 to 24, more in small pictures */
+    double stop; /**< relative change of what is asked for: of the measurements if there
+                    are sources, RMS of the picture if there are none or `picture` is
+                    set; 0: 0.01; < 0: never stop for that */
     double eps_first,
         eps_last; /**< link tolerance relative to what passes; 0: 0.05, 5e-6 */
     int sweeps, final_sweeps; /**< 0: 4, 12 */
@@ -80,20 +91,17 @@ struct imp_elements_options {
     size_t max_bytes;         /**< 0: 4 GiB */
     double time_limit_s;      /**< 0: none; reached: ends as if cancelled */
     uint64_t seed;
-    size_t n_sources; /**< 0: the sensor's whole picture */
-    const struct imp_elements_source *sources;
+    size_t n_sources;                          /**< 0: the sensor's whole picture */
+    const struct imp_elements_source *sources; /**< each as long as its own `size` */
     size_t n_phong;
     const struct imp_elements_phong *phong;
     size_t n_beams;
     const struct imp_elements_beam *beams;
     imp_progress_fn progress;
     void *progress_payload;
+    int picture; /**< beside its sources the sensor's picture decides when to stop */
 };
-#define IMP_ELEMENTS_OPTIONS_INIT                                                        \
-    {                                                                                    \
-        sizeof(struct imp_elements_options), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,   \
-            0, 0, 0, 0, 0, 0, 0, 0                                                       \
-    }
+#define IMP_ELEMENTS_OPTIONS_INIT IMP_ELEMENTS_SIZED(struct imp_elements_options)
 
 /**
  * Take the scene's polygons and project its materials. The scene must outlive the result
@@ -120,7 +128,7 @@ struct imp_elements_step { /**< one line of the schedule's log */
     size_t links, elements, leaves;
     int64_t rays;
     double measure;
-    double change; /**< relative RMS change of the picture; NaN at first */
+    double change; /**< of what is asked for, as `stop` has it; NaN at first */
     double elapsed_s;
 };
 struct imp_elements_info {
@@ -138,6 +146,9 @@ struct imp_elements_info {
     const char *reason;     /**< why it stopped */
     size_t n_steps;
     const struct imp_elements_step *steps;
+    double luminance;  /**< part of `measure` from cameras, as luminance; NaN: none */
+    size_t n_measures; /**< sources, 1 if none was given */
+    const double *measures; /**< [n_measures] of each by itself, without its weight */
 };
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_elements_get_info(const imp_elements *elements, struct imp_elements_info *info);
@@ -162,13 +173,25 @@ struct imp_elements_row {
     size_t element;   /**< number inside it */
     int emission;     /**< it scales a light, linearly */
     double value, derivative;
-    double share; /**< value x derivative / measure; those of emission sum to 1 */
+    double share;       /**< value x derivative / measure; those of emission sum to 1 */
+    double share_error; /**< of imp_elements_share_errors, else NaN */
 };
 /** Derivatives of the measurement to every light and material number, links fixed,
  * largest |value x derivative| first. Rows belong to the object until the next call. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_elements_sensitivity(imp_elements *elements, const struct imp_elements_row **rows,
                          size_t *n_rows);
+
+/**
+ * imp_elements_sensitivity, with the error of each share that the directional order l
+ * makes: |share in order l - share in order l - 2|, on the same links. Where l is below
+ * 4, or the order below too small for a lobe, order l + 2 takes its place; NaN where that
+ * is above 12. 0 where nothing is glossy. Takes the memory of the elements again, and the
+ * time of solving without refinement.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_elements_share_errors(imp_elements *elements, const struct imp_elements_row **rows,
+                          size_t *n_rows);
 
 /* ---- Design: numbers of the scene for wanted measurements ----------------------- */
 
@@ -188,10 +211,7 @@ struct imp_elements_fit_options {
     size_t n_bounds;
     const struct imp_elements_bounds *bounds;
 };
-#define IMP_ELEMENTS_FIT_OPTIONS_INIT                                                    \
-    {                                                                                    \
-        sizeof(struct imp_elements_fit_options), IMP_ADAM, 0, 0, 0, 0, 0, 0              \
-    }
+#define IMP_ELEMENTS_FIT_OPTIONS_INIT IMP_ELEMENTS_SIZED(struct imp_elements_fit_options)
 struct imp_elements_goal {
     double target, before, after; /**< a source's measurement, without its weight */
 };
@@ -209,21 +229,26 @@ struct imp_elements_fit_result {
     const char *reason;
 };
 
+/* clang-format off */
 /**
  * Find the problem's active numbers (lights, reflectances) for which every source of the
  * elements measures its target, inside bounds: the least value of
  *
- *     1/2 sum over sources of weight ((J - target) / scale)^2 + the problem's
- * regularisers
+ *     1/2 sum over sources of weight ((J - target) / scale)^2
+ *         + the problem's regularisers
  *
  * where scale is |target|, or 1 if that is 0, by adjoint sensitivities. With lights alone
  * it is a linear least-squares problem with bounds, solved from one adjoint solution a
  * source. The problem needs no targets of its own. Progress and time limit are those of
  * the elements' options. The scene and the elements end at the answer; the result belongs
  * to the problem and lives until its next fit.
- * @return IMP_OK; IMP_CANCELLED (the state reached is set); IMP_E_ARG; IMP_E_UNSUPPORTED
- * for an active number of which finite elements have no derivative.
+ * More numbers than targets, without a regulariser on them, is a warning: many answers
+ * meet the targets.
+ * @return IMP_OK; IMP_CANCELLED (the state reached is set); IMP_E_ARG, also for a
+ * negative target; IMP_E_UNSUPPORTED for an active number of which finite elements have
+ * no derivative.
  */
+/* clang-format on */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_elements_fit(imp_elements *elements, imp_problem *problem,
                  const struct imp_elements_fit_options *options,
@@ -233,15 +258,14 @@ struct imp_elements_guide_options {
     size_t size;
     int no_lights; /**< light samples as without a guide */
     double share;  /**< of continuations drawn towards indirect light, 0 to 1 exclusive */
-    /** Walks end by what is expected of them, not by their throughput: they go on with
-     * probability roulette x (light still to come) / (light expected of the walk), in
-     * [0.2, 1]. 0: off; 0.5 to 1 where most light comes directly, 4 where little does. */
+    /** Russian roulette by expected contribution instead of throughput: a walk continues
+     * with probability roulette x (radiance expected after this vertex) / (radiance
+     * expected of the whole walk), clamped to [0.2, 1]. 0: off; 0.5 to 1 where most light
+     * is direct, 4 where little is. */
     double roulette;
 };
 #define IMP_ELEMENTS_GUIDE_OPTIONS_INIT                                                  \
-    {                                                                                    \
-        sizeof(struct imp_elements_guide_options), 0, 0, 0                               \
-    }
+    IMP_ELEMENTS_SIZED(struct imp_elements_guide_options)
 /** The solution as a guide for walks: set imp_run.guide. Light samples follow what every
  * light sends to a place; drawing directions by it, or roulette, pays in some scenes only
  * (docs/elements.md) and is off unless asked for. The elements must outlive it; a guide
@@ -252,7 +276,9 @@ IMP_API IMP_MUST_CHECK enum imp_status
 imp_elements_guide(const imp_elements *elements,
                    const struct imp_elements_guide_options *options, imp_guide **out);
 
-/** Write elements and links to a file; open it again with the same scene and options. */
+/** Write elements and links to a file; open it again with the same scene and options.
+ * @return of opening also IMP_E_SCENE if the file is damaged (it has a checksum) or of
+ * another scene, IMP_E_UNSUPPORTED if another version of importon wrote it. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_elements_save(const imp_elements *elements,
                                                          const char *path);
 IMP_API IMP_MUST_CHECK enum imp_status

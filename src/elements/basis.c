@@ -5,10 +5,16 @@
  * which is continuous at the horizon. */
 #include "elements.h"
 
-/* z P_l = alpha_{l+1} P_{l+1} + alpha_l P_{l-1} for normalised associated Legendre
- * functions of one m; applying it twice steps over the odd ones: z^2 P_l = alpha_{l+1}
- * alpha_{l+2} P_{l+2} + (alpha_{l+1}^2 + alpha_l^2) P_l
- *         + alpha_l alpha_{l-1} P_{l-2}. */
+/* clang-format off */
+/* Recurrence of the normalised associated Legendre functions of one m,
+ *
+ *     z P_l = alpha_{l+1} P_{l+1} + alpha_l P_{l-1},
+ *
+ * applied twice, so that it steps over the odd ones:
+ *
+ *     z^2 P_l = alpha_{l+1} alpha_{l+2} P_{l+2} + (alpha_{l+1}^2 + alpha_l^2) P_l
+ *             + alpha_l alpha_{l-1} P_{l-2}. */
+/* clang-format on */
 static double alpha(int l, int m)
 {
     return l > m ? sqrt((double)(l * l - m * m) / (double)(4 * l * l - 1)) : 0;

@@ -1,3 +1,4 @@
+/* clang-format off */
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Finite elements with directional radiance and importance (Christensen, Salesin, DeRose
@@ -6,12 +7,16 @@
  * moments of what arrives are gathered over the links; reflection is one matrix per
  * element.
  *
- * With A_i areas, R the material in the basis, and link samples of weight K_s, direction
- * w_s: c_i  = sum K_s/A_i (l_j . H_j(-w_s) + Le_j(-w_s)) H_i(w_s)      moments of
- * radiance b_j  = sum K_s/A_j (g_i . H_i(w_s)) H_j(-w_s)                   moments of
- * importance l_i  = R c_i,   g_i = R (b_i + a_i/A_i) + s_i where a is importance that
- * arrives from the eye and s what a measuring patch emits. R is symmetric and both sums
- * are over the same links, so a.l = Le . (S^T g) to rounding. */
+ * With A_i areas, R the material in the basis, and link samples of weight K_s and
+ * direction w_s:
+ *
+ *     c_i = sum K_s/A_i (l_j . H_j(-w_s) + Le_j(-w_s)) H_i(w_s)     moments of radiance
+ *     b_j = sum K_s/A_j (g_i . H_i(w_s)) H_j(-w_s)                  moments of importance
+ *     l_i = R c_i,   g_i = R (b_i + a_i/A_i) + s_i
+ *
+ * where a is importance that arrives from the eye and s what a measuring patch emits. R is
+ * symmetric and both sums are over the same links, so a.l = Le . (S^T g) to rounding. */
+/* clang-format on */
 #ifndef IMP_ELEMENTS_H
 #define IMP_ELEMENTS_H
 
@@ -132,7 +137,7 @@ struct imp__el_link { /* src -> rcv */
 struct imp__el_hit { /* where a ray of the eye ended */
     uint32_t root;   /* EL_NONE: nowhere, or on a black side */
     uint32_t source; /* importance source it belongs to, EL_NONE: to the view alone */
-    uint32_t ray;    /* its number in the view, EL_NONE: not there */
+    uint32_t ray;    /* its number in the order of tracing: index of `seen` */
     uint32_t path;   /* imp__el_path of (u, v) */
     double u, v;
     imp_v3 w; /* towards the eye, world */
@@ -144,8 +149,10 @@ struct imp_elements {
     const struct imp_scene *scene;
     struct imp_elements_options opt;
     struct imp_arena arena;
+    bool quiet;    /* no warnings */
     int ch;        /* channels */
-    double lum[3]; /* weights of the channels in a measurement */
+    double lum[3]; /* weights of the channels in an illuminance: luminance */
+    double eye[3]; /* in what a camera measures: the mean of the channels */
     struct imp__basis basis;
     double eps; /* now */
 
@@ -156,7 +163,10 @@ struct imp_elements {
     int **prim_root; /* [n_shapes][n_prims]: front root, -1: none */
     size_t n_sources;
     struct imp_elements_source *sources;
-    double size; /* of the scene, for tolerances */
+    double *weight;    /* [n_sources] present weights in the measurement */
+    double *each;      /* [n_sources] measurements at the last step, without weights */
+    size_t *first_ray; /* [n_sources] of camera sources: index into `seen` */
+    double size;       /* of the scene, for tolerances */
 
     size_t n_elements, cap_elements;
     struct imp__element *elements;
@@ -175,13 +185,13 @@ struct imp_elements {
     size_t cap_in, cap_out_start, cap_out, cap_value;
     bool sorted;
 
-    /* Rays of camera sources and of the view, the picture that decides when to stop: by
-     * root and path, so that those of an element are together; misses last. */
+    /* Rays of camera sources and of the view, the picture that was asked for: by root and
+     * path, so that those of an element are together; misses last. */
     size_t n_hits;
     struct imp__el_hit *hits;
-    size_t n_view;   /* rays of the view */
-    double *seen;    /* [n_view] what they see */
-    double *picture; /* the view's pixels at the last step */
+    double *seen;              /* [n_hits] radiance along each ray, in order of tracing */
+    size_t first_view, n_view; /* rays of the view; none: no picture was asked for */
+    double *picture;           /* the view's pixels at the last step */
 
     int64_t rays;
     size_t skipped; /* polygons without area */
@@ -227,6 +237,10 @@ static inline double el_lobe(const struct imp__el_root *r, imp_v3 w)
     return c > 0 ? pow(c, r->power) : 0;
 }
 
+/* solve.c: imp_elements_create; `quiet`: without warnings, which were given before. */
+enum imp_status imp__el_create(const imp_scene *scene,
+                               const struct imp_elements_options *options, bool quiet,
+                               imp_elements **out);
 /* options.c: check and copy. */
 enum imp_status imp__el_options(imp_elements *e,
                                 const struct imp_elements_options *options);
@@ -246,6 +260,9 @@ enum imp_status imp__el_measure_shape(imp_elements *e,
 void imp__el_weigh(imp_elements *e, const double *w);
 /* roots.c: polygons, lights and materials of the scene; errors name the shape. */
 enum imp_status imp__el_roots(imp_elements *e);
+/* Prefix what refuses an object of the scene with where the object was written. */
+enum imp_status imp__el_refused_at(const imp_elements *e, enum imp_status st,
+                                   const void *object);
 enum imp_status imp__el_root_append(imp_elements *e, const struct imp__el_root *r,
                                     int *index);
 /* materials.c */
@@ -325,8 +342,12 @@ void imp__el_ray(const struct imp_sensor *s, int x, int y, int k, int side,
 /* measure.c */
 /* The measurement from radiance; `direct` (may be NULL): emitters that the eye sees. */
 double imp__el_measure(const imp_elements *e, double *direct);
+/* The part of the camera sources, as luminance; NaN: there is none. */
+double imp__el_luminance(const imp_elements *e);
 /* The same from the emitters: emission x importance. */
 double imp__el_measure_adjoint(const imp_elements *e);
+/* What every source measures by itself, from radiance, without weights: J [n_sources]. */
+enum imp_status imp__el_measure_each(imp_elements *e, double *J);
 
 /* eye.c */
 /* Order the hits and tell the elements which are theirs; after they were taken. */
@@ -335,9 +356,12 @@ enum imp_status imp__el_hits_sort(imp_elements *e);
 void imp__el_hits_share(const imp_elements *e, const struct imp__element *parent, int k,
                         struct imp__element *child);
 enum imp_status imp__el_bin(imp_elements *e); /* a from the hits */
-/* Relative RMS change of the view since the last call; NaN the first time. Without a
- * sensor it is the relative change of the measurement. */
-enum imp_status imp__el_look(imp_elements *e, double measure, double *change);
+/* Fill `seen` from the present solution. */
+enum imp_status imp__el_see(imp_elements *e);
+/* Relative change since the last call of what was asked for: the larger of the view's RMS
+ * and, where sources were given, sum w |dJ| / sum w |J| over their measurements J. NaN
+ * the first time. */
+enum imp_status imp__el_look(imp_elements *e, double *change);
 
 /* image.c */
 /* Radiance of a hit towards its w, from the leaf. */

@@ -2,8 +2,8 @@
  *
  * The rays of the eye inside the hierarchy. They are ordered once, by root and by the
  * path down its tree, so that at every refinement the rays of an element are a range of
- * one array: importance from the eye and the view's colours are sums over ranges, leaf by
- * leaf, and nobody searches for the leaf of a ray. */
+ * one array: importance from the eye and the radiance that rays see are loops over
+ * ranges, leaf by leaf, without a search for the leaf of a ray. */
 #include "elements.h"
 #include <string.h>
 
@@ -69,7 +69,8 @@ enum imp_status imp__el_hits_sort(imp_elements *e)
     size_t *start =
         imp__alloc_raw(e->ctx, imp_max(roots + 1, (size_t)1 << DIGIT) + 1, sizeof *start);
     struct imp__el_hit *sorted = imp__alloc_raw(e->ctx, n + 1, sizeof *sorted);
-    e->seen = imp__alloc(e->ctx, e->n_view + 1, sizeof *e->seen);
+    imp__release(e->ctx, e->seen);
+    e->seen = imp__alloc(e->ctx, n + 1, sizeof *e->seen);
     if (!order || !start || !sorted || !e->seen)
         IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for the picture's rays"));
     uint32_t *const key = order + 2 * n;
@@ -143,7 +144,7 @@ static void bin_leaf(imp_elements *e, const struct imp__element *x)
     }
 }
 
-/* What the view's rays see in a leaf, in the measurement's weights of the channels. */
+/* Mean over the channels of the radiance along the rays that end in a leaf. */
 static void see_leaf(imp_elements *e, const struct imp__element *x)
 {
     const struct imp__el_root *r = el_root(e, x);
@@ -156,15 +157,14 @@ static void see_leaf(imp_elements *e, const struct imp__element *x)
         for (int c = 0; c < e->ch; c++) {
             imp_spec value = imp__spec(0);
             for (int q = 0; q < n; q++) value += l[c * n + q] * h[q];
-            sum += e->lum[c] * value;
+            sum += e->eye[c] * value;
         }
         for (uint32_t s = 0; s < 4 && k + s < x->hit[1]; s++) {
             const struct imp__el_hit *hit = &e->hits[k + s];
-            if (hit->ray == EL_NONE) continue;
             const double lobe = el_lobe(r, hit->w);
             double out = sum[s];
             for (int c = 0; c < e->ch && lobe > 0; c++)
-                out += e->lum[c] * r->radiance[c] * lobe;
+                out += e->eye[c] * r->radiance[c] * lobe;
             e->seen[hit->ray] = out;
         }
     }
@@ -207,33 +207,53 @@ enum imp_status imp__el_bin(imp_elements *e)
     return imp__parallel(e->ctx, &loop, NULL);
 }
 
-enum imp_status imp__el_look(imp_elements *e, double measure, double *change)
+enum imp_status imp__el_see(imp_elements *e)
 {
-    enum imp_status st = IMP_OK;
-    const size_t per = (size_t)(e->opt.rays * e->opt.rays), n = e->n_view / per;
-    *change = NAN;
-    if (n == 0) {
-        if (e->n_log)
-            *change = fabs(measure - e->log[e->n_log - 1].measure) / fabs(measure);
-        return IMP_OK;
-    }
-    const bool first = !e->picture;
-    if (first) e->picture = imp__alloc(e->ctx, n, sizeof *e->picture);
-    if (!e->picture)
-        return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for the picture");
     struct imp_loop loop = by_element(e);
     loop.work = see_work;
-    IMP_TRY(imp__parallel(e->ctx, &loop, NULL));
+    return imp__parallel(e->ctx, &loop, NULL);
+}
+
+/* ---- What was asked for -------------------------------------------------------- */
+
+/* Relative RMS change of the view's pixels, which are kept for the next time. */
+static enum imp_status view_change(imp_elements *e, bool first, double *change)
+{
+    const size_t per = (size_t)(e->opt.rays * e->opt.rays), n = e->n_view / per;
+    const double *seen = e->seen + e->first_view;
     double apart = 0, sum = 0;
+    if (!e->picture) e->picture = imp__alloc(e->ctx, n + 1, sizeof *e->picture);
+    if (!e->picture)
+        return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for the picture");
     for (size_t p = 0; p < n; p++) {
         double mean = 0;
-        for (size_t k = 0; k < per; k++) mean += e->seen[p * per + k];
+        for (size_t k = 0; k < per; k++) mean += seen[p * per + k];
         mean /= (double)per;
         sum += mean * mean;
         apart += imp__sqr(mean - e->picture[p]);
         e->picture[p] = mean;
     }
-    if (!first) *change = sum > 0 ? sqrt(apart / sum) : 0;
+    if (!first) *change = fmax(*change, sum > 0 ? sqrt(apart / sum) : 0);
+    return IMP_OK;
+}
+
+enum imp_status imp__el_look(imp_elements *e, double *change)
+{
+    enum imp_status st = IMP_OK;
+    const bool first = e->n_log == 0;
+    double *now = imp__alloc(e->ctx, e->n_sources, sizeof *now), apart = 0, sum = 0;
+    if (!now) IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for measurements"));
+    *change = first ? NAN : 0;
+    IMP_TRY(imp__el_measure_each(e, now));
+    if (e->n_view) IMP_TRY(view_change(e, first, change));
+    for (size_t k = 0; k < e->n_sources; k++) {
+        const double w = fabs(e->weight[k]);
+        sum += w * fabs(now[k]);
+        apart += w * fabs(now[k] - e->each[k]);
+        e->each[k] = now[k];
+    }
+    if (!first && e->opt.n_sources) *change = fmax(*change, sum > 0 ? apart / sum : 0);
 out:
+    imp__release(e->ctx, now);
     return st;
 }

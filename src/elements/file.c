@@ -1,28 +1,23 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A solution in a file: which elements were split, their coefficients, the links.
- * Geometry and materials come from the scene again and must be the same; nothing in the
- * file is believed before it is checked. */
+ * Geometry and materials come from the scene again and must be the same. A checksum finds
+ * damage; what it cannot find, a file made to deceive, is checked number by number. */
 #include "base/file.h"
 #include "elements.h"
-#include "math/rng.h"
+#include "search/checkpoint.h"
 #include <string.h>
 
-static const char magic[8] = "IMPELEM1";
+/* The last character is the version of the format. */
+static const char magic[8] = "IMPELEM2";
 #define FILE_LIMIT ((size_t)64 << 30)
 
 struct header {
     char magic[8];
     uint32_t order_mark, order, channels, link_bytes; /* order_mark: byte order */
     uint64_t polygons, splits, links, coefficients, geometry, sources;
+    uint64_t checksum; /* of the header with 0 here and of all that follows */
 };
-
-static uint64_t hash_of(uint64_t h, const void *data, size_t n)
-{
-    const unsigned char *p = data;
-    for (size_t k = 0; k < n; k++) h = imp__mix64(h ^ p[k]) + 0x9e3779b97f4a7c15u;
-    return h;
-}
 
 static uint64_t geometry_of(const imp_elements *e)
 {
@@ -30,7 +25,7 @@ static uint64_t geometry_of(const imp_elements *e)
     for (size_t k = 0; k < e->n_roots; k++) {
         const struct imp__el_root *r = &e->roots[k];
         const int n[3] = {r->corners, el_n(e, r), r->shape};
-        h = hash_of(hash_of(h, n, sizeof n), r->v, sizeof r->v);
+        h = imp__hash(imp__hash(h, n, sizeof n), r->v, sizeof r->v);
     }
     return h;
 }
@@ -40,16 +35,24 @@ static uint64_t sources_of(const imp_elements *e)
     uint64_t h = 2;
     for (size_t k = 0; k < e->n_sources; k++) {
         const struct imp_elements_source *s = &e->sources[k];
-        h = hash_of(h, &s->kind, sizeof s->kind);
-        h = hash_of(h, &s->weight, sizeof s->weight);
-        h = hash_of(h, &s->sensor, sizeof s->sensor);
-        h = hash_of(h, s->region, sizeof s->region);
-        h = hash_of(h, s->origin, sizeof s->origin);
-        h = hash_of(h, s->edge_u, sizeof s->edge_u);
-        h = hash_of(h, s->edge_v, sizeof s->edge_v);
-        if (s->shape) h = hash_of(h, s->shape, strlen(s->shape));
+        h = imp__hash(h, &s->kind, sizeof s->kind);
+        h = imp__hash(h, &s->weight, sizeof s->weight);
+        h = imp__hash(h, &s->sensor, sizeof s->sensor);
+        h = imp__hash(h, s->region, sizeof s->region);
+        h = imp__hash(h, s->origin, sizeof s->origin);
+        h = imp__hash(h, s->edge_u, sizeof s->edge_u);
+        h = imp__hash(h, s->edge_v, sizeof s->edge_v);
+        if (s->shape) h = imp__hash(h, s->shape, strlen(s->shape));
     }
     return h;
+}
+
+static uint64_t checksum_of(const unsigned char *data, size_t size)
+{
+    struct header h;
+    memcpy(&h, data, sizeof h);
+    h.checksum = 0;
+    return imp__hash(imp__hash(0, &h, sizeof h), data + sizeof h, size - sizeof h);
 }
 
 enum imp_status imp_elements_save(const imp_elements *e, const char *path)
@@ -82,6 +85,8 @@ enum imp_status imp_elements_save(const imp_elements *e, const char *path)
     ok = ok && imp__bytes_add(e->ctx, &out, e->links, e->n_links * sizeof *e->links);
     if (!ok)
         IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for the elements' file"));
+    h.checksum = checksum_of(out.data, out.size);
+    memcpy(out.data, &h, sizeof h);
     IMP_TRY(imp__file_write(e->ctx, path, out.data, out.size));
 out:
     imp__bytes_free(e->ctx, &out);
@@ -120,12 +125,22 @@ enum imp_status imp_elements_open(const imp_scene *scene,
     imp_context *ctx = scene->ctx;
     IMP_TRY(imp_elements_create(scene, options, &e));
     IMP_TRY(imp__file_read(ctx, path, FILE_LIMIT, &in));
-    if (in.size < sizeof h || memcmp(in.data, magic, sizeof magic) != 0)
+    if (in.size < sizeof magic || memcmp(in.data, magic, sizeof magic - 1) != 0)
         IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: not a file of finite elements", path));
+    if (in.data[sizeof magic - 1] != (unsigned char)magic[sizeof magic - 1])
+        IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,
+                           "%s: written by another version of importon: solve the scene "
+                           "again",
+                           path));
+    if (in.size < sizeof h)
+        IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: is cut short or damaged", path));
     memcpy(&h, in.data, sizeof h);
     if (h.order_mark != 0x01020304 || h.link_bytes != sizeof *e->links)
         IMP_TRY(
             imp__error(ctx, IMP_E_UNSUPPORTED, "%s: from another kind of machine", path));
+    if (h.checksum != checksum_of(in.data, in.size))
+        IMP_TRY(imp__error(ctx, IMP_E_SCENE,
+                           "%s: is cut short or damaged: its checksum is wrong", path));
     if (h.order != (uint32_t)e->basis.order || h.channels != (uint32_t)e->ch ||
         h.polygons != e->n_roots || h.geometry != geometry_of(e))
         IMP_TRY(imp__error(ctx, IMP_E_SCENE,
@@ -175,6 +190,7 @@ enum imp_status imp_elements_open(const imp_scene *scene,
     /* Other measurements than those it was solved for need their importance. */
     if (h.sources != sources_of(e) && e->has_importance)
         IMP_TRY(imp__el_settle(e, 8, true, 1e-7));
+    IMP_TRY(imp__el_measure_each(e, e->each));
     *out = e;
     e = NULL;
 out:

@@ -1,28 +1,31 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A solution as a guide for walks. The quadtrees are cut at cells; each cell has
+ * Path guiding by a finite-element solution. The cells of the guide are the elements of
+ * one level of the quadtrees, and the leaves above it. Each cell stores
  *
- *   lights      what every emitter sends there over the links, seen part only
- *   directions  indirect radiance times cosine by direction: a histogram over the unit
- *               square that the concentric map takes to the cosine-weighted hemisphere
- *   leaving     its exitant radiance by direction, and the part of it that is not light
- *               from emitters, reflected for the first time: for roulette
+ *   lights      the irradiance that each emitter sends it over visible links: a discrete
+ *               distribution for choosing a light
+ *   directions  incident indirect radiance times cosine: a histogram over the unit square
+ *               that the concentric map takes to the cosine-weighted hemisphere
+ *   leaving     exitant radiance by direction, and the part of it that was reflected at
+ *               least twice: for Russian roulette
  *
- * Cells with directions are wider, so that their histograms stay in the cache.
- * A cell's light over its links and those of all above it: of a link above, the quarter
- * that holds the cell. Every part is mixed with what a walk would do without it, so the
- * densities of walks are bounded from below. */
+ * Histograms of directions are kept for a coarser level, so that they fit into the cache.
+ * A cell receives over its own links and over those of its ancestors; of an ancestor's
+ * link it receives the sample whose quarter contains the cell. Every distribution is
+ * mixed with the one that is used without a guide, which bounds the density from below.
+ */
 #include "guide.h"
 #include "math/rng.h"
 #include "math/warp.h"
 #include <string.h>
 
 #define LEVEL      5
-#define DIR_LEVEL  3   /* of cells with directions: they have to stay in the cache */
-#define ROSE       8   /* bins of leaving radiance across the disk of (x, y) */
-#define LIGHT_BASE 0.1 /* of the lights' choice is as without a guide */
+#define DIR_LEVEL  3 /* of cells with directions, so that all histograms fit the cache */
+#define ROSE       8 /* bins of leaving radiance across the disk of (x, y) */
+#define LIGHT_BASE 0.1 /* weight of the unguided distribution of lights */
 
-/* ---- What walks ask ------------------------------------------------------------ */
+/* ---- Functions that walks call ------------------------------------------------- */
 
 static size_t cell_of(const struct imp__guide *g, const struct imp_guide_place *p)
 {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What a guide made of a solution holds, and how its files share the making. */
+ * The data of a guide that was made from a solution, and the functions that fill it. */
 #ifndef IMP_ELEMENTS_GUIDE_H
 #define IMP_ELEMENTS_GUIDE_H
 
@@ -10,13 +10,15 @@
 #define GUIDE_SIDE 16 /* of the histogram */
 #define GUIDE_BINS (GUIDE_SIDE * GUIDE_SIDE)
 
-struct imp__guide_cells { /* elements at the level, and leaves above it */
+/* A cut through the quadtrees: elements at the level, and leaves above it. */
+struct imp__guide_cells {
     int level;
     size_t n;
     uint32_t *of;    /* [n_elements] or EL_NONE */
     uint32_t *where; /* [n] element */
 };
-struct imp__guide_finder { /* of a root that is a parallelogram: cells by a grid */
+/* Lookup of a point's cell on a root that is a parallelogram, by a regular grid. */
+struct imp__guide_finder {
     imp_v3 origin, to_u, to_v;
     int side;
     uint32_t *grid; /* [side side], NULL: by the tree */
@@ -32,9 +34,10 @@ struct imp__guide {
     double *light;       /* [cells][n_lights] cumulative */
     double *pmf;         /* [n_lights] as the scene has them */
     float *cdf;          /* [wide][GUIDE_BINS] cumulative */
-    float *share;        /* [wide] of continuations; 0: nothing arrives, or lobes */
+    float *share;        /* [wide] of continuations drawn from the histogram; 0 where
+                            nothing arrives or the material has lobes */
     uint32_t *wide_of;   /* [cells] */
-    float (*leaving)[2]; /* [cells][rose rose] luminance: all, and beyond the first */
+    float (*leaving)[2]; /* [cells][rose rose] luminance: all; reflected twice or more */
     int rose;
 };
 struct imp__guide_build {

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The cells of a guide: where the quadtrees are cut, and how a point finds its cell. */
+ * The cells of a guide: which elements they are, and the lookup of a point's cell. */
 #include "guide.h"
 
 #define CELLS_MAX ((size_t)1 << 14)

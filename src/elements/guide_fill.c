@@ -1,20 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Filling a guide: what links bring to a cell, by emitter and by direction, and what
- * leaves it. */
+ * Contents of a guide: radiance that arrives at a cell over links, by emitter and by
+ * direction, and radiance that leaves it. */
 #include "guide.h"
 #include "math/rng.h"
 #include <string.h>
 
 #define SPREAD 16 /* points of a source that stand for it */
 
-/* What is made of the links into a cell; NULL: not wanted. */
+/* Sums over the links into a cell; NULL: not wanted. */
 struct arriving {
     double *bins, *light; /* [GUIDE_BINS], [n_lights] */
     double *lamps;        /* [ch n] moments of the light of lamps */
 };
 
-/* What a link carries that is not a light's own: luminance by sample. */
+/* Reflected radiance that a link carries, as luminance by sample; *emitted: the rest. */
 static imp_spec carried(const imp_elements *e, const struct imp__el_link *k,
                         imp_spec *emitted)
 {

@@ -36,11 +36,6 @@ enum imp_status imp__el_emitter_take(imp_elements *e, const struct imp_shape *s,
             "cannot project",
             s->name, em->ops->name);
     imp_spec in[IMP_INPUTS_MAX];
-    if (em->n_in > 8)
-        return imp__error(e->ctx, IMP_E_UNSUPPORTED,
-                          "shape '%s': its light (%s) "
-                          "has too many inputs",
-                          s->name, em->ops->name);
     imp__inputs_eval(em->input, em->n_in, &(struct imp_texcoord){.uv = {0.5, 0.5}}, in);
     if (em->ops == &imp__beam_light) {
         const struct imp__beam *beam = em->self;
@@ -82,7 +77,7 @@ enum imp_status imp__el_ambient_take(imp_elements *e, const struct imp_shape *s,
                                      const struct imp_bsdf *b, bool flipped,
                                      struct imp__el_root *r)
 {
-    imp_spec in[64], emitted, first = {0}, d[64];
+    imp_spec in[IMP_INPUTS_MAX], emitted, first = {0}, d[IMP_INPUTS_MAX];
     int source = -1;
     imp__inputs_eval(b->input, b->n_in, &(struct imp_texcoord){.uv = {0.5, 0.5}}, in);
     for (int k = 1; k < 16; k++) {

@@ -141,7 +141,7 @@ size_t imp__el_bytes(const imp_elements *e)
            (e->cap_l + e->cap_g + e->cap_c + e->cap_b + e->cap_above + e->cap_a +
             e->cap_value) *
                sizeof(double) +
-           e->n_hits * sizeof *e->hits + e->n_view * sizeof *e->seen + e->arena.total;
+           e->n_hits * (sizeof *e->hits + sizeof *e->seen) + e->arena.total;
 }
 
 /* ---- The first links: all pairs of polygons that may see each other ------------ */

@@ -52,8 +52,7 @@ static void eval(const struct imp__el_material *m, imp_v3 wo, imp_v3 wi, imp_spe
     }
 }
 
-#define INPUTS_MAX 64
-static void inputs_at(const struct imp__el_material *m, imp_spec in[INPUTS_MAX])
+static void inputs_at(const struct imp__el_material *m, imp_spec in[IMP_INPUTS_MAX])
 {
     const struct imp_texcoord at = {.uv = {0.5, 0.5}};
     if (m->bsdf) imp__inputs_eval(m->bsdf->input, m->bsdf->n_in, &at, in);
@@ -61,7 +60,7 @@ static void inputs_at(const struct imp__el_material *m, imp_spec in[INPUTS_MAX])
 
 void imp__el_brdf(const struct imp__el_material *m, imp_v3 wo, imp_v3 wi, double f[3])
 {
-    imp_spec in[INPUTS_MAX];
+    imp_spec in[IMP_INPUTS_MAX];
     inputs_at(m, in);
     f[0] = f[1] = f[2] = 0;
     if (wo[2] > 0 && wi[2] > 0) eval(m, wo, wi, in, NULL, f, NULL);
@@ -98,9 +97,6 @@ static enum imp_status check(imp_context *ctx, const char *shape,
     const struct imp_bsdf *b = m->bsdf;
     if (!b || m->phong) return IMP_OK;
     const char *name = b->name && *b->name ? b->name : b->ops->name;
-    if (b->n_in > INPUTS_MAX)
-        return imp__error(ctx, IMP_E_UNSUPPORTED,
-                          "shape '%s': material '%s' has too many inputs", shape, name);
     if (b->flags & (IMP_BSDF_DELTA | IMP_BSDF_TRANSMIT))
         return imp__error(
             ctx, IMP_E_UNSUPPORTED,
@@ -222,8 +218,8 @@ enum imp_status imp__el_project(imp_context *ctx, struct imp_arena *a,
     struct table *t = NULL;
     imp_spec *in = NULL;
     double z[NZ], w[NZ], h[NZ][EL_N_MAX], cosine[NPHI][NM];
-    IMP_TRY(check(ctx, shape, m, (imp_spec[INPUTS_MAX]){{0}}));
-    in = imp__alloc(ctx, 2 * INPUTS_MAX, sizeof *in);
+    IMP_TRY(check(ctx, shape, m, (imp_spec[IMP_INPUTS_MAX]){{0}}));
+    in = imp__alloc(ctx, 2 * IMP_INPUTS_MAX, sizeof *in);
     if (!in) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "out of memory for materials"));
     inputs_at(m, in);
     IMP_TRY(derivatives_make(ctx, a, shape, m, in));
@@ -243,7 +239,7 @@ enum imp_status imp__el_project(imp_context *ctx, struct imp_arena *a,
             for (int p = 0; p < NPHI; p++) {
                 double f[3];
                 eval(m, at_angles(z[o], 0), at_angles(z[i], IMP_2PI * p / NPHI), in,
-                     in + INPUTS_MAX, f, df);
+                     in + IMP_INPUTS_MAX, f, df);
                 for (int c = 0; c < ch; c++) {
                     norm[c][o] += w[i] * f[c] * f[c] * IMP_2PI / NPHI;
                     for (int q = 0; q < NM; q++) {

@@ -51,8 +51,11 @@ enum imp_status imp__el_materials(imp_elements *e)
         imp__basis_init(&e->basis, order);
         residual = 0;
         for (int i = 0; i < e->n_materials; i++) {
-            IMP_TRY(imp__el_project(e->ctx, &e->arena, &e->basis, e->ch, user_of(e, i),
-                                    &e->materials[i]));
+            IMP_TRY(
+                imp__el_refused_at(e,
+                                   imp__el_project(e->ctx, &e->arena, &e->basis, e->ch,
+                                                   user_of(e, i), &e->materials[i]),
+                                   e->materials[i].bsdf));
             residual = fmax(residual, e->materials[i].residual);
         }
         if (e->opt.order || residual <= RESIDUAL_GOOD || order >= EL_ORDER_MAX) break;
@@ -62,21 +65,27 @@ enum imp_status imp__el_materials(imp_elements *e)
         const struct imp__el_material *m = &e->materials[i];
         const char *shape = user_of(e, i);
         if (m->residual > RESIDUAL_BAD)
-            IMP_TRY(imp__error(
-                e->ctx, IMP_E_UNSUPPORTED,
-                "shape '%s': its material is too narrow for directional order %d "
-                "(relative error %.0f %%)",
-                shape, order, 100 * m->residual));
-        if (m->residual > RESIDUAL_GOOD)
+            IMP_TRY(imp__el_refused_at(
+                e,
+                imp__error(
+                    e->ctx, IMP_E_UNSUPPORTED,
+                    "shape '%s': its material is too narrow for directional order %d "
+                    "(relative error %.0f %%)",
+                    shape, order, 100 * m->residual),
+                m->bsdf));
+        if (m->residual > RESIDUAL_GOOD && !e->quiet)
             imp__warn(e->ctx,
                       "shape '%s': its lobe in directional order %d has a relative error "
                       "of %.0f %%",
                       shape, order, 100 * m->residual);
         if (m->albedo_max > 1 + 1e-4)
-            IMP_TRY(imp__error(
-                e->ctx, IMP_E_UNSUPPORTED,
-                "shape '%s': its material reflects more than arrives (albedo %.4g)",
-                shape, m->albedo_max));
+            IMP_TRY(imp__el_refused_at(
+                e,
+                imp__error(
+                    e->ctx, IMP_E_UNSUPPORTED,
+                    "shape '%s': its material reflects more than arrives (albedo %.4g)",
+                    shape, m->albedo_max),
+                m->bsdf));
     }
 out:
     return st;

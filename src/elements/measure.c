@@ -55,6 +55,7 @@ void imp__el_weigh(imp_elements *e, const double *w)
     for (size_t i = 0; i < e->n_roots; i++) e->roots[i].measure = 0;
     for (size_t k = 0; k < e->n_sources; k++) {
         const struct imp_elements_source *src = &e->sources[k];
+        e->weight[k] = w[k];
         if (src->kind == IMP_ELEMENTS_CAMERA) {
             size_t n = 0;
             for (size_t i = 0; i < e->n_hits; i++) n += e->hits[i].source == k;
@@ -75,7 +76,12 @@ void imp__el_weigh(imp_elements *e, const double *w)
 
 /* ---- The measurement, from both sides ------------------------------------------ */
 
-static double direct_of(const imp_elements *e)
+/* Weights of the channels: of what the eye sees, of what falls on a patch. */
+struct weights {
+    const double *eye, *patch;
+};
+
+static double direct_of(const imp_elements *e, const double *eye)
 {
     double sum = 0;
     for (size_t i = 0; i < e->n_roots; i++) {
@@ -85,7 +91,7 @@ static double direct_of(const imp_elements *e)
         for (uint32_t k = range[0]; k < range[1]; k++) {
             const double lobe = el_lobe(r, e->hits[k].w) * e->hits[k].weight;
             for (int c = 0; c < e->ch && lobe != 0; c++)
-                sum += e->lum[c] * r->radiance[c] * lobe;
+                sum += eye[c] * r->radiance[c] * lobe;
         }
     }
     return sum;
@@ -94,8 +100,8 @@ static double direct_of(const imp_elements *e)
 static double leaves_measure(const imp_elements *e, size_t first, size_t end,
                              const void *how)
 {
+    const struct weights *w = how;
     double sum = 0;
-    (void)how;
     for (size_t k = first; k < end; k++) {
         const struct imp__element *x = &e->elements[k];
         if (x->child) continue;
@@ -105,7 +111,8 @@ static double leaves_measure(const imp_elements *e, size_t first, size_t end,
             const double *l = el_at(e, e->l, x) + c * n, *in = el_at(e, e->c, x) + c * n;
             double eye = 0;
             for (int q = 0; q < n; q++) eye += e->a[x->coef + (size_t)q] * l[q];
-            sum += e->lum[c] * (eye + x->area * r->measure * sqrt(IMP_2PI) * in[0]);
+            sum += w->eye[c] * eye +
+                   w->patch[c] * (x->area * r->measure * sqrt(IMP_2PI) * in[0]);
         }
     }
     return sum;
@@ -113,9 +120,67 @@ static double leaves_measure(const imp_elements *e, size_t first, size_t end,
 
 double imp__el_measure(const imp_elements *e, double *direct)
 {
-    const double seen = direct_of(e);
+    const double seen = direct_of(e, e->eye);
+    const struct weights w = {e->eye, e->lum};
     if (direct) *direct = seen;
-    return imp__el_sum(e, e->n_elements, leaves_measure, NULL) + seen;
+    return imp__el_sum(e, e->n_elements, leaves_measure, &w) + seen;
+}
+
+double imp__el_luminance(const imp_elements *e)
+{
+    const struct weights w = {e->lum, (const double[3]){0}};
+    bool camera = false;
+    for (size_t k = 0; k < e->n_sources; k++)
+        camera |= e->sources[k].kind == IMP_ELEMENTS_CAMERA;
+    if (!camera) return NAN;
+    return imp__el_sum(e, e->n_elements, leaves_measure, &w) + direct_of(e, e->lum);
+}
+
+/* Sum over a measured root's leaves of area x irradiance. */
+static double flux_of(const imp_elements *e, const struct imp__element *x, int n)
+{
+    double sum = 0;
+    if (x->child) {
+        for (uint32_t k = 0; k < 4; k++) sum += flux_of(e, &e->elements[x->child + k], n);
+        return sum;
+    }
+    for (int c = 0; c < e->ch; c++) sum += e->lum[c] * el_at(e, e->c, x)[c * n];
+    return x->area * sqrt(IMP_2PI) * sum;
+}
+
+static double mean_seen(const imp_elements *e, size_t source)
+{
+    const int *r = e->sources[source].region;
+    const size_t n = (size_t)(r[2] - r[0]) * (size_t)(r[3] - r[1]) *
+                     (size_t)(e->opt.rays * e->opt.rays);
+    double sum = 0;
+    for (size_t k = 0; k < n; k++) sum += e->seen[e->first_ray[source] + k];
+    return sum / (double)n;
+}
+
+enum imp_status imp__el_measure_each(imp_elements *e, double *J)
+{
+    size_t plane = 0; /* as in imp__el_weigh */
+    const enum imp_status st = imp__el_see(e);
+    while (plane < e->n_roots && e->roots[plane].shape >= 0) plane++;
+    for (size_t k = 0; k < e->n_sources && st == IMP_OK; k++) {
+        const struct imp_elements_source *src = &e->sources[k];
+        double flux = 0, area = 0;
+        if (src->kind == IMP_ELEMENTS_CAMERA) {
+            J[k] = mean_seen(e, k);
+            continue;
+        }
+        const bool is_plane = src->kind == IMP_ELEMENTS_PLANE;
+        for (size_t i = is_plane ? plane++ : 0; i < (is_plane ? plane : e->n_roots);
+             i++) {
+            const struct imp__el_root *r = &e->roots[i];
+            if (!is_plane && !is_measured(e, r, src)) continue;
+            flux += flux_of(e, &e->elements[r->element], el_n(e, r));
+            area += r->area;
+        }
+        J[k] = flux / area;
+    }
+    return st;
 }
 
 static double lights_measure(const imp_elements *e, size_t first, size_t end,
@@ -140,5 +205,5 @@ static double lights_measure(const imp_elements *e, size_t first, size_t end,
 
 double imp__el_measure_adjoint(const imp_elements *e)
 {
-    return direct_of(e) + imp__el_sum(e, e->n_elements, lights_measure, NULL);
+    return direct_of(e, e->eye) + imp__el_sum(e, e->n_elements, lights_measure, NULL);
 }

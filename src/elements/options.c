@@ -5,6 +5,17 @@
 #include "elements.h"
 #include <string.h>
 
+/* At least 384 rays across the picture, 3 to 24 a side of a pixel: the edges of lamps in
+ * view are then as well resolved in small pictures as in large ones (0.1 % of their
+ * light; with 3 a pixel 8 % at 16 pixels across). */
+static int rays_by_default(const struct imp_scene *scene, int sensor)
+{
+    if (sensor < 0 || sensor >= scene->n_sensors) return 3;
+    const struct imp_film_desc *f = &scene->sensors[sensor]->film;
+    const int across = imp_max(imp_min(f->crop_w, f->crop_h), 1);
+    return imp_clamp((384 + across - 1) / across, 3, 24);
+}
+
 enum imp_status imp__el_options(imp_elements *e,
                                 const struct imp_elements_options *options)
 {
@@ -24,7 +35,7 @@ enum imp_status imp__el_options(imp_elements *e,
         if (o->max_links == 0) o->max_links = s->max_links;
         if (o->max_bytes == 0) o->max_bytes = s->max_bytes;
     }
-    if (o->rays == 0) o->rays = 3;
+    if (o->rays == 0) o->rays = rays_by_default(e->scene, o->sensor);
     if (o->stop == 0) o->stop = 0.01;
     if (o->eps_first == 0) o->eps_first = 0.05;
     if (o->eps_last == 0) o->eps_last = 5e-6;
@@ -69,7 +80,10 @@ enum imp_status imp__el_options(imp_elements *e,
         imp__arena_array(&e->arena, o->n_beams + 1, sizeof *beams);
     e->n_sources = o->n_sources ? o->n_sources : 1;
     e->sources = imp__arena_array(&e->arena, e->n_sources, sizeof *e->sources);
-    if (!phong || !beams || !e->sources)
+    e->weight = imp__arena_array(&e->arena, e->n_sources, sizeof *e->weight);
+    e->each = imp__arena_array(&e->arena, e->n_sources, sizeof *e->each);
+    e->first_ray = imp__arena_array(&e->arena, e->n_sources, sizeof *e->first_ray);
+    if (!phong || !beams || !e->sources || !e->weight || !e->each || !e->first_ray)
         IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for options"));
     for (size_t i = 0; i < o->n_phong; i++) {
         const struct imp_elements_phong *p = &o->phong[i];

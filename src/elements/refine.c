@@ -115,6 +115,28 @@ static double error_of(const imp_elements *e, const struct imp__el_link *k,
            fmax(q_max - q_min, 4 * k_max * l_max * g_max / e->ch);
 }
 
+/* The part of the source's radiance that finer sources would resolve. The kernel is
+ * integrated over the source exactly, so a uniform lamp that the receiver sees whole
+ * gives the same irradiance from its parts: only the light that it reflects may differ
+ * from part to part. A glossy receiver tells directions apart, a beam has a lobe, and
+ * behind an edge more samples mean more rays: there all of it counts. */
+static double resolved_by_source(const imp_elements *e, const struct imp__el_link *k)
+{
+    const struct imp__element *j = &e->elements[k->src];
+    const struct imp__el_root *r = el_root(e, j);
+    double emitted = 0, reflected = 0;
+    if (r->light != EL_UNIFORM || el_n(e, r) > 1 ||
+        el_n(e, el_root(e, &e->elements[k->rcv])) > 1)
+        return 1;
+    for (int s = 0; s < 4; s++)
+        if (k->k[s] == 0) return 1;
+    for (int c = 0; c < e->ch; c++) {
+        emitted += fabs(r->radiance[c]);
+        if (el_n(e, r)) reflected += fabs(el_at(e, e->l, j)[c]) * e->basis.lead[0];
+    }
+    return emitted > 0 ? reflected / (emitted + reflected) : 1;
+}
+
 /* ---- One wave: look at links [from, n), split, make their children's links ----- */
 
 /* Of a link: it stays, its receiver is to be split, its source is, or it goes. Whether
@@ -151,7 +173,8 @@ static enum imp_status judge(size_t item, int worker, int slot, void *payload)
         if (v->fate[k] == GONE || !(can_i || can_j) ||
             !(error_of(e, link, v->importance) > e->eps))
             continue;
-        const bool receiver = can_i && (!can_j || i->area >= j->area);
+        const bool receiver =
+            can_i && (!can_j || i->area >= j->area * resolved_by_source(e, link));
         v->fate[k] = receiver ? SPLIT_RECEIVER : SPLIT_SOURCE;
         if (!(receiver ? i : j)->child) v->fate[k] |= FRESH;
         splits++;
@@ -219,7 +242,7 @@ static double bytes_after(const imp_elements *e, double links, double elements)
     const double each =
         (double)(2 * sizeof *e->links + 4 * (size_t)e->ch * sizeof(double) + 5);
     const double per = e->n_elements ? (double)e->n_coef / (double)e->n_elements : 0;
-    return (double)e->n_hits * sizeof *e->hits + links * each +
+    return (double)e->n_hits * (sizeof *e->hits + sizeof *e->seen) + links * each +
            elements * (sizeof *e->elements + 16 + per * 8 * (5.0 * e->ch + 1));
 }
 

@@ -10,6 +10,29 @@ static enum imp_status no_memory(imp_elements *e)
     return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for polygons");
 }
 
+/* The node that an object of the scene was made from, NULL: none. Trees may share nodes,
+ * but have no circles: commit refuses them. */
+static const struct imp_node *node_of(const struct imp_node *node, const void *object)
+{
+    if (!node || node->object == object) return node;
+    for (size_t i = 0; i < node->n_children; i++) {
+        const struct imp_node *found = node_of(node->children[i].node, object);
+        if (found) return found;
+    }
+    return NULL;
+}
+
+enum imp_status imp__el_refused_at(const imp_elements *e, enum imp_status st,
+                                   const void *object)
+{
+    char where[512];
+    if (st != IMP_E_UNSUPPORTED || !object) return st;
+    const struct imp_node *node = node_of(e->scene->root, object);
+    if (!node || !node->loc.file) return st;
+    return imp__error_prefix(e->ctx, st, "%s",
+                             imp__loc_text(node->loc, where, sizeof where));
+}
+
 /* ---- Materials and overrides --------------------------------------------------- */
 
 static const struct imp_elements_phong *phong_of(const imp_elements *e,
@@ -25,8 +48,8 @@ static const struct imp_elements_phong *phong_of(const imp_elements *e,
 
 static bool reflects_behind(const struct imp_bsdf *b)
 {
-    imp_spec in[64], f;
-    if (b->n_in > 64 || !(b->flags & IMP_BSDF_SMOOTH)) return false;
+    imp_spec in[IMP_INPUTS_MAX], f;
+    if (!(b->flags & IMP_BSDF_SMOOTH)) return false;
     for (int j = 0; j < b->n_in; j++) /* textures are refused later, by name */
         in[j] = b->input[j]->texture ? imp__spec(0.5) : b->input[j]->value;
     for (int k = 1; k < 8; k++) {
@@ -83,7 +106,7 @@ static enum imp_status polygon_add(imp_elements *e, const struct imp_shape *s,
         }
         IMP_TRY(imp__el_material_add(e, &m, &r.material));
         if (s->emitter >= 0 && side == 0) IMP_TRY(imp__el_emitter_take(e, s, &r));
-        if (!p && (b->flags & IMP_BSDF_EMIT) && b->n_in <= 64)
+        if (!p && (b->flags & IMP_BSDF_EMIT))
             IMP_TRY(imp__el_ambient_take(e, s, b, side, &r));
         for (size_t i = 0; i < e->opt.n_beams && side == 0 && r.light != EL_DARK; i++) {
             const struct imp_elements_beam *beam = &e->opt.beams[i];
@@ -179,7 +202,7 @@ static enum imp_status shape_take(imp_elements *e, const struct imp_shape *s,
         IMP_TRY(polygon_add(e, s, joined ? 4 : 3, joined ? quad : a, na, &prim_root[t]));
         if (joined) prim_root[t + 1] = prim_root[t], t++;
     }
-    if (smooth)
+    if (smooth && !e->quiet)
         imp__warn(e->ctx,
                   "shape '%s': finite elements see its faces flat, without the "
                   "interpolated normals",
@@ -201,10 +224,13 @@ enum imp_status imp__el_roots(imp_elements *e)
     const struct imp_scene *scene = e->scene;
     for (int i = 0; i < scene->n_emitters; i++)
         if (!(scene->emitters[i]->ops->flags & IMP_EMITTER_AREA))
-            IMP_TRY(imp__error(
-                e->ctx, IMP_E_UNSUPPORTED,
-                "emitter '%s' (%s): finite elements take lights that are surfaces",
-                scene->emitters[i]->name, scene->emitters[i]->ops->name));
+            IMP_TRY(imp__el_refused_at(
+                e,
+                imp__error(
+                    e->ctx, IMP_E_UNSUPPORTED,
+                    "emitter '%s' (%s): finite elements take lights that are surfaces",
+                    scene->emitters[i]->name, scene->emitters[i]->ops->name),
+                scene->emitters[i]));
     for (size_t i = 0; i < e->opt.n_phong; i++)
         if (strcmp(e->opt.phong[i].shape, "*") != 0 &&
             !name_is_shape(e, e->opt.phong[i].shape))
@@ -220,15 +246,17 @@ enum imp_status imp__el_roots(imp_elements *e)
     for (int i = 0; i < scene->n_shapes; i++) {
         const struct imp_shape *s = scene->shapes[i];
         if (s->geometry != IMP_TRIANGLES)
-            IMP_TRY(
+            IMP_TRY(imp__el_refused_at(
+                e,
                 imp__error(e->ctx, IMP_E_UNSUPPORTED,
                            "shape '%s' (%s): finite elements take rectangles, cubes and "
                            "meshes",
-                           s->name, s->ops->name));
+                           s->name, s->ops->name),
+                s));
         e->prim_root[i] =
             imp__arena_array(&e->arena, s->triangles.n_triangles + 1, sizeof(int));
         if (!e->prim_root[i]) IMP_TRY(no_memory(e));
-        IMP_TRY(shape_take(e, s, e->prim_root[i]));
+        IMP_TRY(imp__el_refused_at(e, shape_take(e, s, e->prim_root[i]), s));
     }
     if (e->n_roots == 0)
         IMP_TRY(

@@ -65,7 +65,7 @@ static enum imp_status lights_take(imp_elements *e)
         const struct imp__el_root *r = &e->roots[hit->root];
         const double lobe = el_lobe(r, hit->w) * hit->weight;
         if (r->light == EL_DARK || lobe == 0) continue;
-        const double d[3] = {e->lum[0] * lobe, e->lum[1] * lobe, e->lum[2] * lobe};
+        const double d[3] = {e->eye[0] * lobe, e->eye[1] * lobe, e->eye[2] * lobe};
         IMP_TRY(rows_add(e, r->light_name, r->light_param, r->light_count, true,
                          r->light_value, d));
     }
@@ -114,7 +114,7 @@ static enum imp_status materials_take(imp_elements *e)
                 imp__el_apply(&e->basis, m->n, m->d[j].r[c], in, y);
                 for (int q = 0; q < m->n; q++)
                     sum +=
-                        (x->area * b[q] + e->lum[c] * e->a[x->coef + (size_t)q]) * y[q];
+                        (x->area * b[q] + e->eye[c] * e->a[x->coef + (size_t)q]) * y[q];
                 sums[at + (size_t)j].d[c] += sum;
             }
     }
@@ -163,6 +163,7 @@ enum imp_status imp_elements_sensitivity(imp_elements *e,
     for (size_t k = 0; k < e->n_rows; k++) {
         struct imp_elements_row *r = &e->rows[k];
         r->share = measure != 0 ? r->value * r->derivative / measure : 0;
+        r->share_error = NAN;
     }
     if (e->n_rows) qsort(e->rows, e->n_rows, sizeof *e->rows, by_size);
     *rows = e->rows;

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The schedule: links between whole polygons first, then refinement under a falling
- * tolerance with a few warm-started sweeps each, until the picture hardly changes (the
- * paper's rule), the tolerance has reached its end, or a budget is spent. */
+ * tolerance with a few warm-started sweeps each, until what was asked for hardly changes
+ * (measurements; the picture, as the paper has it, where one is wanted), the tolerance
+ * has reached its end, or a budget is spent. */
 #include "color/rgb.h"
 #include "elements.h"
 #include <stdio.h>
@@ -34,13 +35,11 @@ void imp__el_tick(imp_elements *e, const char *stage, double fraction, const cha
     }
 }
 
-enum imp_status imp_elements_create(const imp_scene *scene,
-                                    const struct imp_elements_options *options,
-                                    imp_elements **out)
+enum imp_status imp__el_create(const imp_scene *scene,
+                               const struct imp_elements_options *options, bool quiet,
+                               imp_elements **out)
 {
     enum imp_status st = IMP_OK;
-    IMP_REQUIRE(NULL, scene, "scene");
-    IMP_REQUIRE(scene->ctx, out, "out");
     IMP_FLOAT_MODE;
     IMP_READS(scene);
     if (!scene->committed)
@@ -53,9 +52,11 @@ enum imp_status imp_elements_create(const imp_scene *scene,
     e->scene = scene;
     e->ch = scene->channels;
     e->reason = "not solved";
+    e->quiet = quiet;
     imp__arena_init(&e->arena, e->ctx);
     if (e->ch == 1) e->lum[0] = 1;
     else e->lum[0] = IMP_LUM_R, e->lum[1] = IMP_LUM_G, e->lum[2] = IMP_LUM_B;
+    for (int c = 0; c < e->ch; c++) e->eye[c] = 1.0 / e->ch;
     for (int i = 0; i < 3; i++) e->size = fmax(e->size, scene->hi[i] - scene->lo[i]);
     IMP_TRY(imp__el_options(e, options));
     IMP_TRY(imp__el_roots(e));
@@ -66,6 +67,15 @@ enum imp_status imp_elements_create(const imp_scene *scene,
 out:
     imp_elements_destroy(e);
     return st;
+}
+
+enum imp_status imp_elements_create(const imp_scene *scene,
+                                    const struct imp_elements_options *options,
+                                    imp_elements **out)
+{
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_REQUIRE(scene->ctx, out, "out");
+    return imp__el_create(scene, options, false, out);
 }
 
 void imp_elements_destroy(imp_elements *e)
@@ -105,7 +115,7 @@ static enum imp_status log_add(imp_elements *e)
         return imp__error(e->ctx, IMP_E_NUMERIC,
                           "reflections grow without end: the surfaces "
                           "give back more than arrives");
-    IMP_TRY(imp__el_look(e, s.measure, &s.change));
+    IMP_TRY(imp__el_look(e, &s.change));
     struct imp_elements_step *grown =
         imp__grow(e->ctx, e->log, &e->cap_log, e->n_log + 1, sizeof *grown);
     if (!grown) IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for the log"));
@@ -178,8 +188,6 @@ enum imp_status imp_elements_solve(imp_elements *e)
      * would remain, die away only sweep by sweep, and be refined all the way down. */
     IMP_TRY(imp__el_sweep(e, e->opt.sweeps + 2, importance, true));
     e->n_log = 0;
-    imp__release(e->ctx, e->picture);
-    e->picture = NULL;
     IMP_TRY(log_add(e));
     const double first = e->opt.eps_first, last = e->opt.eps_last;
     for (double rel = first; rel >= last && !e->stop; rel /= 2) {
@@ -207,7 +215,8 @@ enum imp_status imp_elements_solve(imp_elements *e)
         if (s->links > before + before / 8)
             still = s->change < e->opt.stop ? still + 1 : 0;
         if (still == 2) {
-            e->reason = "the picture stands still";
+            e->reason = e->opt.n_sources ? "what was asked for stands still"
+                                         : "the picture stands still";
             break;
         }
     }
@@ -264,6 +273,7 @@ enum imp_status imp_elements_update(imp_elements *e)
     IMP_TRY(imp__el_parameters(e));
     IMP_TRY(imp__el_bin(e));
     IMP_TRY(imp__el_settle(e, 4, e->has_importance, 1e-10));
+    IMP_TRY(imp__el_measure_each(e, e->each));
 out:
     return st;
 }
@@ -299,6 +309,9 @@ enum imp_status imp_elements_get_info(const imp_elements *e,
     if (e->solved) {
         i.measure = imp__el_measure(e, &i.measure_direct);
         i.measure_adjoint = e->has_importance ? imp__el_measure_adjoint(e) : NAN;
+        i.luminance = imp__el_luminance(e);
+        i.n_measures = e->n_sources;
+        i.measures = e->each;
     }
     IMP_GIVE(e->ctx, info, i, "info");
     return IMP_OK;

@@ -82,7 +82,7 @@ struct rows {
     const struct imp_sensor *sensor;
     int x0, y0, width, side;
     uint32_t source;
-    bool seen; /* they are the view's */
+    size_t first_ray;
     double weight;
     struct imp__el_hit *out;
 };
@@ -98,7 +98,7 @@ static enum imp_status row_work(size_t item, int worker, int slot, void *payload
                     (int)(k % (size_t)per), r->side, &ray);
         struct imp__el_hit *hit = &r->out[item * n + k];
         *hit = (struct imp__el_hit){.source = r->source,
-                                    .ray = r->seen ? (uint32_t)(item * n + k) : EL_NONE,
+                                    .ray = (uint32_t)(r->first_ray + item * n + k),
                                     .weight = r->weight};
         if (imp__el_trace(r->e, &ray, hit))
             hit->path = imp__el_path(r->e->roots[hit->root].corners, hit->u, hit->v);
@@ -108,7 +108,7 @@ static enum imp_status row_work(size_t item, int worker, int slot, void *payload
 
 /* `weight`: of all these rays together. */
 static enum imp_status hits_take(imp_elements *e, int sensor, const int region[4],
-                                 uint32_t source, bool seen, double weight)
+                                 uint32_t source, double weight)
 {
     enum imp_status st = IMP_OK;
     const int height = region[3] - region[1], width = region[2] - region[0];
@@ -120,24 +120,24 @@ static enum imp_status hits_take(imp_elements *e, int sensor, const int region[4
                      .width = width,
                      .side = e->opt.rays,
                      .source = source,
-                     .seen = seen,
+                     .first_ray = e->n_hits,
                      .weight = weight / (double)n,
                      .out = e->hits + e->n_hits};
     const struct imp_loop loop = {
         .n_items = (size_t)height, .work = row_work, .payload = &r};
     IMP_TRY(imp__parallel(e->ctx, &loop, NULL));
     e->n_hits += n;
-    if (seen) e->n_view = n;
     e->rays += (int64_t)n;
 out:
     return st;
 }
 
-/* The first source that is the whole view, -1: none; there may be no view. */
+/* The view and the first source that is all of it, -1: none. There is no view without a
+ * sensor, or where only measurements were asked for. */
 static int view_of(const imp_elements *e, int view[4])
 {
     memset(view, 0, 4 * sizeof *view);
-    if (e->scene->n_sensors == 0) return -1;
+    if (e->scene->n_sensors == 0 || (e->opt.n_sources && !e->opt.picture)) return -1;
     const struct imp_film_desc *film = &e->scene->sensors[e->opt.sensor]->film;
     view[2] = film->crop_w, view[3] = film->crop_h;
     for (size_t k = 0; k < e->n_sources; k++) {
@@ -154,26 +154,33 @@ enum imp_status imp__el_sources(imp_elements *e)
     enum imp_status st = IMP_OK;
     int view[4];
     const int seen = view_of(e, view);
-    size_t n = seen < 0 ? rays_of(e, view) : 0;
+    const size_t n_view = rays_of(e, view);
+    size_t n = seen < 0 ? n_view : 0;
     for (size_t k = 0; k < e->n_sources; k++)
         if (e->sources[k].kind == IMP_ELEMENTS_CAMERA)
             n += rays_of(e, e->sources[k].region);
-    if ((double)n * sizeof *e->hits > (double)e->opt.max_bytes || n >= EL_NONE)
+    if ((double)n * (sizeof *e->hits + sizeof *e->seen) > (double)e->opt.max_bytes ||
+        n >= EL_NONE)
         return imp__error(e->ctx, IMP_E_NOMEM,
                           "%zu rays of the eye (%d a pixel) are over the memory budget",
                           n, e->opt.rays * e->opt.rays);
     imp__release(e->ctx, e->hits);
     e->hits = imp__alloc_raw(e->ctx, n + 1, sizeof *e->hits);
-    e->n_hits = e->n_view = 0;
+    e->n_hits = 0;
+    e->n_view = n_view;
     if (!e->hits)
         return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for the picture's rays");
     for (size_t k = 0; k < e->n_sources; k++) {
         const struct imp_elements_source *src = &e->sources[k];
+        e->first_ray[k] = e->n_hits;
+        if ((int)k == seen) e->first_view = e->n_hits;
         if (src->kind == IMP_ELEMENTS_CAMERA)
-            IMP_TRY(hits_take(e, src->sensor, src->region, (uint32_t)k, (int)k == seen,
-                              src->weight));
+            IMP_TRY(hits_take(e, src->sensor, src->region, (uint32_t)k, src->weight));
     }
-    if (seen < 0) IMP_TRY(hits_take(e, e->opt.sensor, view, EL_NONE, true, 0));
+    if (seen < 0 && n_view) {
+        e->first_view = e->n_hits;
+        IMP_TRY(hits_take(e, e->opt.sensor, view, EL_NONE, 0));
+    }
     IMP_TRY(imp__el_hits_sort(e));
 out:
     return st;

@@ -230,7 +230,7 @@ static void reflect(imp_elements *e, uint32_t index, bool importance)
         double arrives[EL_N_MAX];
         const double *from = in + c * n;
         if (importance) {
-            const double scale = x->area > 0 ? e->lum[c] / x->area : 0;
+            const double scale = x->area > 0 ? e->eye[c] / x->area : 0;
             for (int q = 0; q < n; q++)
                 arrives[q] = from[q] + e->a[x->coef + (size_t)q] * scale;
             from = arrives;

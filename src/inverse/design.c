@@ -120,6 +120,22 @@ static void scales(struct imp__design *d, const double *x)
     }
 }
 
+/* Numbers that may move and on which no regulariser puts a price. */
+static size_t unpriced(const struct imp__design *d)
+{
+    const struct imp_problem *p = d->p;
+    size_t count = 0;
+    for (size_t k = 0; k < p->scene->n_params; k++) {
+        const int64_t base = p->active.base[k];
+        bool priced = base < 0;
+        for (size_t r = 0; r < p->n_regularisers; r++)
+            priced |= p->regularisers[r].weight > 0 && p->regularisers[r].on[k];
+        for (size_t i = 0; !priced && i < p->scene->params[k].info.count; i++)
+            count += d->lo[(size_t)base + i] < d->hi[(size_t)base + i];
+    }
+    return count;
+}
+
 /* ---- The search ---------------------------------------------------------------- */
 
 static enum imp_status begin(struct imp__design *d)
@@ -158,9 +174,20 @@ static enum imp_status begin(struct imp__design *d)
         if (!isfinite(d->t[k]) || !(d->w[k] > 0) || !isfinite(d->w[k]))
             return imp__error(ctx, IMP_E_ARG, "target %g with weight %g", d->t[k],
                               d->e->sources[k].weight);
+        if (d->t[k] < 0)
+            return imp__error(ctx, IMP_E_ARG,
+                              "target %g: neither an illuminance nor a radiance is "
+                              "negative",
+                              d->t[k]);
     }
     IMP_TRY(sort_out(d));
     IMP_TRY(bounds_take(d));
+    const size_t free_numbers = unpriced(d);
+    if (free_numbers > m)
+        imp__warn(ctx,
+                  "underdetermined: %zu targets for %zu numbers, so many answers meet "
+                  "them; a Tikhonov weight on the numbers picks the smallest",
+                  m, free_numbers);
     if (d->H_prior) IMP_TRY(imp__regularise_second(d->p, d->H_prior));
 out:
     return st;

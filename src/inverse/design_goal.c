@@ -20,14 +20,7 @@ enum imp_status imp__design_weigh(struct imp__design *d, const double *w)
 
 enum imp_status imp__design_measure(struct imp__design *d, double *J)
 {
-    for (size_t k = 0; k < d->goals; k++) {
-        memset(d->unit, 0, d->goals * sizeof *d->unit);
-        d->unit[k] = 1;
-        const enum imp_status st = imp__design_weigh(d, d->unit);
-        if (st != IMP_OK) return st;
-        J[k] = imp__el_measure(d->e, NULL);
-    }
-    return IMP_OK;
+    return imp__el_measure_each(d->e, J);
 }
 
 /* d (sum of w_k J_k) / dx, added to g [n]. */

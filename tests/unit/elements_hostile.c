@@ -76,6 +76,46 @@ static void planes(imp_context *ctx)
     imp_scene_destroy(s);
 }
 
+/* Measurements of a host with a newer header, longer by members that it does not use, or
+ * does use; and of size 0. */
+static void sizes(imp_context *ctx)
+{
+    struct longer {
+        struct imp_elements_source now;
+        double later[3];
+    } two[2] = {{.now = IMP_ELEMENTS_SOURCE_INIT}, {.now = IMP_ELEMENTS_SOURCE_INIT}};
+    imp_scene *s = test_scene(ctx, "elements/b.xml", IMP_MONO, "res=8");
+    struct imp_elements_options o = IMP_ELEMENTS_OPTIONS_INIT;
+    struct imp_elements_info info = {.size = sizeof info};
+    double want[2];
+    for (int k = 0; k < 2; k++) {
+        two[k].now.kind = IMP_ELEMENTS_SHAPE;
+        two[k].now.shape = k ? "floor" : "ceiling";
+        o.sources = &two[k].now, o.n_sources = 1, o.eps_last = 5e-3, o.stop = -1;
+        imp_elements *e = solved(s, &o);
+        test_must(ctx, imp_elements_get_info(e, &info));
+        want[k] = info.measures[0];
+        imp_elements_destroy(e);
+    }
+    for (int k = 0; k < 2; k++) two[k].now.size = sizeof two[k];
+    o.sources = &two[0].now, o.n_sources = 2;
+    imp_elements *e = solved(s, &o);
+    test_must(ctx, imp_elements_get_info(e, &info));
+    tap_ok(fabs(info.measures[0] / want[0] - 1) < 0.02 &&
+               fabs(info.measures[1] / want[1] - 1) < 0.02,
+           "longer structs # %g, %g; alone %g, %g", info.measures[0], info.measures[1],
+           want[0], want[1]);
+    imp_elements_destroy(e);
+    two[1].later[2] = 1;
+    e = NULL;
+    tap_ok(imp_elements_create(s, &o, &e) == IMP_E_ARG && !e, "a later member # %s",
+           imp_last_error(ctx));
+    two[1].now.size = 0;
+    tap_ok(imp_elements_create(s, &o, &e) == IMP_E_ARG && !e, "size 0 is refused # %s",
+           imp_last_error(ctx));
+    imp_scene_destroy(s);
+}
+
 /* A closed box as a mesh, with triangles without area among the sound ones: a furnace. */
 static void no_area(imp_context *ctx)
 {
@@ -123,6 +163,7 @@ int main(void)
     imp_context *ctx = test_context(2);
     lamps_out(ctx);
     planes(ctx);
+    sizes(ctx);
     no_area(ctx);
     imp_context_destroy(ctx);
     return tap_done();

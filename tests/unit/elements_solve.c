@@ -401,28 +401,36 @@ static void files(imp_context *ctx, imp_scene *s)
     other.n_phong = 0;
     const enum imp_status st = imp_elements_open(s, &other, path, &b);
     tap_ok(st == IMP_E_SCENE, "another material is refused # %s", imp_last_error(ctx));
-    /* Damage: every cut and a flip in each of some bytes gives an error or a valid
-     * object. */
+    /* Damage: cuts, one bit flipped at places all over the file, 3,000 bytes zeroed, and
+     * the version before this one. */
     FILE *file = fopen(path, "rb");
-    static unsigned char data[8 << 20];
+    static unsigned char data[8 << 20], bad[8 << 20];
     const size_t size = file ? fread(data, 1, sizeof data, file) : 0;
     if (file) fclose(file);
-    int refused = 0, opened = 0;
-    for (int k = 0; k < 60 && size; k++) {
-        const size_t cut = k < 20 ? size * (size_t)k / 20 : size;
-        const size_t at = k < 20   ? 0
-                          : k < 45 ? (size_t)(k - 20) * 4
-                                   : size - (size_t)(k - 40) * 1000;
-        data[at] ^= 0xc5;
+    int refused = 0, named = 0;
+    enum { CUTS = 20, FLIPS = 60, ZEROED = 8, ALL = CUTS + FLIPS + ZEROED + 1 };
+    for (int k = 0; k < ALL && size > 4000; k++) {
+        const size_t cut = k < CUTS ? size * (size_t)k / CUTS : size;
+        memcpy(bad, data, size);
+        if (k == ALL - 1) bad[7] = '1';
+        else if (k >= CUTS + FLIPS)
+            memset(bad + (size - 3000) * (size_t)(k - CUTS - FLIPS + 1) / (ZEROED + 1), 0,
+                   3000);
+        else if (k >= CUTS)
+            bad[k < CUTS + 20 ? (size_t)(k - CUTS) * 4
+                              : size * (size_t)(k - CUTS - 20) / (FLIPS - 20)] ^=
+                (unsigned char)(1 << k % 8);
         file = fopen(path, "wb");
-        if (file) fwrite(data, 1, cut, file), fclose(file);
-        data[at] ^= 0xc5;
-        if (imp_elements_open(s, &o, path, &b) == IMP_OK)
-            opened++, imp_elements_destroy(b);
-        else refused++;
+        if (file) fwrite(bad, 1, cut, file), fclose(file);
+        b = NULL;
+        const enum imp_status damage = imp_elements_open(s, &o, path, &b);
+        refused += damage != IMP_OK && b == NULL;
+        named += strstr(imp_last_error(ctx), path) != NULL;
+        imp_elements_destroy(b);
     }
-    tap_ok(size > 0 && refused >= 35, "damaged files: %d refused, %d still sound",
-           refused, opened);
+    tap_ok(size > 4000 && refused == ALL && named == ALL,
+           "damaged files are refused by name # %d, %d of %d: %s", refused, named, ALL,
+           imp_last_error(ctx));
     close(fd);
     unlink(path);
     imp_elements_destroy(a);

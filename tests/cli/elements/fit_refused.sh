@@ -8,4 +8,5 @@ importon elements "$scene" "${common[@]}" --fit -p 'light*' --lux floor && exit 
 importon elements "$scene" "${common[@]}" --lux floor=1 && exit 9
 importon elements "$scene" "${common[@]}" --fit -p 'light*' --lux floor=x && exit 9
 importon elements "$scene" "${common[@]}" --fit -p 'light*' --lux floor=1 --bounds 'light*=3' && exit 9
+importon elements "$scene" "${common[@]}" --fit -p 'light*' --lux floor=-100 && exit 9
 importon elements "$scene" "${common[@]}" --fit -p 'light*' --lux floor=1 --bounds 'light*=3,2'

@@ -8,6 +8,18 @@ END
 importon elements glass.xml -o out.png
 code=$?
 [[ ! -e out.png ]] || exit 9
+cat >sky.xml <<END
+<scene version="3.0.0"><sensor type="perspective"/>
+<shape type="rectangle"/>
+  <emitter type="constant"/></scene>
+END
+importon elements sky.xml -o out.png && exit 9
+cat >mirror.xml <<END
+<scene version="3.0.0"><sensor type="perspective"/>
+<shape type="rectangle"><emitter type="area"/>
+<bsdf type="conductor"/></shape></scene>
+END
+importon elements mirror.xml -o out.png && exit 9
 importon elements b.xml --phong 'floor=1' -o out.png && exit 9
 importon elements b.xml --lux 'nothing' -o out.png && exit 9
 importon elements b.xml --lux '0:floor' -o out.png && exit 9
