@@ -684,7 +684,7 @@ struct imp_check_row {
     const char *param;
     double step;                 /**< of a difference; 0: none */
     double value, reference, se; /**< se of the difference; 0: deterministic */
-    double error;                /**< relative error, or |z| where se > 0 */
+    double error; /**< relative error; where se > 0: |z|, z = (value - reference) / se */
     double limit; /**< of error; 0: a row for information (a step that is not the best) */
     int ok;       /**< 1: they agree; 0: they do not; -1: too noisy to tell */
     int kinks; /**< frozen walks that stand on a kink, and agree with one of its sides */

@@ -34,6 +34,7 @@ static bool report(struct imp__check *c, double fraction)
 {
     if (!c->outer.progress) return false;
     const double elapsed = imp__now() - c->start_s;
+    fraction = c->shown = fmax(c->shown, fraction); /* rows may turn out to need more */
     const struct imp_progress p = {
         .size = sizeof p,
         .stage = "check",

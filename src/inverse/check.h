@@ -17,6 +17,7 @@ struct imp__check {
     struct imp_check_row *rows; /* [n_rows], names in the problem's check_arena */
     size_t n_rows, cap_rows;
     double start_s, done, total; /* pieces of work */
+    double shown;                /* fraction reported last */
     bool stopped;
 };
 
