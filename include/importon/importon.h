@@ -680,7 +680,7 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_fit(imp_problem *problem,
 
 /** One line of a gradient check: a method, a parameter, two numbers that must agree. */
 struct imp_check_row {
-    const char *method; /**< "frozen", "fresh", "dot", "euler", "density" */
+    const char *method; /**< "frozen", "fresh", "dot", "euler", "density", "loss" */
     const char *param;
     double step;                 /**< of a difference; 0: none */
     double value, reference, se; /**< se of the difference; 0: deterministic */

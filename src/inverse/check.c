@@ -97,6 +97,7 @@ enum imp_status imp_check(imp_problem *p, const struct imp_check_options *option
 
     ended = imp__check_frozen(&c);
     if (ended == IMP_OK) ended = imp__check_fresh(&c);
+    if (ended == IMP_OK) ended = imp__check_losses(&c);
     if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
     struct imp_check_row *kept =
         imp__arena_array(&p->check_arena, c.n_rows + 1, sizeof *kept);

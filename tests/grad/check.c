@@ -12,7 +12,7 @@
 static imp_context *ctx;
 
 struct counts {
-    int rows, failed, frozen, dot, euler, fresh, noisy, density, wrong_density;
+    int rows, failed, frozen, dot, euler, fresh, noisy, density, wrong_density, loss;
     bool plain; /* z is (value - reference)/se */
     double worst_exact, worst_frozen, worst_z;
 };
@@ -48,6 +48,8 @@ static struct counts check(imp_problem *p, int paths, int spp, uint64_t seed)
         } else if (!strcmp(r->method, "density")) {
             n.density++;
             n.wrong_density += !r->ok;
+        } else if (!strcmp(r->method, "loss")) {
+            n.loss++;
         } else {
             if (!strcmp(r->method, "dot")) n.dot++;
             else n.euler++;
@@ -68,7 +70,7 @@ static void passes(imp_scene *s, const char *what, int paths, int spp, int froze
     const struct counts n = check(p, paths, spp, 5);
     imp_problem_get_x(p, after);
     tap_ok(n.failed == 0 && n.frozen == frozen && n.dot == 1 && n.euler == euler &&
-               n.fresh == fresh && n.plain,
+               n.fresh == fresh && n.plain && n.loss == 8,
            "%s # frozen %d (worst %.1e), dot, euler %d (worst %.1e), "
            "fresh %d (worst z %.2f), failed %d, noisy %d",
            what, n.frozen, n.worst_frozen, n.euler, n.worst_exact, n.fresh, n.worst_z,
