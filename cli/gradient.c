@@ -28,29 +28,6 @@ struct result {
     int rounds, spp; /* of the run, each with spp samples */
 };
 
-/* sum(seed * picture) with its standard error. Pixels through a box filter are
- * independent, so squares of their errors add; the channels of a pixel share walks, so
- * theirs are added as they are: exact for grey, an upper bound for colours. */
-static struct imp_estimate inner_product(imp_film *film, const float *seed)
-{
-    struct imp_film_info info = {.size = sizeof info};
-    struct imp_estimate sum = {0, 0, 0};
-    imp_film_get_info(film, &info);
-    const size_t n = (size_t)info.width * (size_t)info.height;
-    const float *mean = imp_film_mean(film), *se = imp_film_se(film);
-    for (size_t i = 0; i < n; i++) {
-        double error = 0;
-        for (int c = 0; c < info.channels; c++) {
-            const size_t k = i * (size_t)info.channels + (size_t)c;
-            sum.value += (double)seed[k] * mean[k];
-            if (se) error += fabs((double)seed[k] * se[k]);
-        }
-        sum.se += error * error;
-    }
-    sum.se = se ? sqrt(sum.se) : NAN;
-    return sum;
-}
-
 /* The adjoint image: from the file, or 1 / (number of pixels and channels) everywhere. */
 static int adjoint_image(const struct imp_run *run, float **seed)
 {
@@ -83,29 +60,13 @@ static int adjoint_image(const struct imp_run *run, float **seed)
     return 0;
 }
 
-/* The picture that derivatives are of, in the scene's channels: a film may hold alpha,
- * aovs, luminance or XYZ in their place. */
-static enum imp_status colour_picture(const struct imp_run *run, imp_film **out)
-{
-    imp_problem *none = NULL;
-    enum imp_status st = imp_problem_create(cli.scene, &none);
-    if (st == IMP_OK) st = imp_problem_jacobian(none, run, out, NULL);
-    imp_problem_destroy(none);
-    return st;
-}
-
 /* One estimate of value, gradient and errors with the random numbers of `run`. */
 static enum imp_status estimate(imp_problem *problem, const struct imp_run *run,
                                 const float *seed, struct result *r)
 {
-    imp_film *film = NULL;
     if (!seed)
         return imp_problem_objective(problem, NULL, run, &r->value, r->grad, r->se);
-    enum imp_status st = imp_problem_reverse(problem, seed, run, r->grad, r->se);
-    if (st == IMP_OK) st = colour_picture(run, &film);
-    if (st == IMP_OK) r->value = inner_product(film, seed);
-    imp_film_destroy(film);
-    return st;
+    return imp_problem_functional(problem, seed, run, &r->value, r->grad, r->se);
 }
 
 /* Mean of two independent estimates of k and 1 rounds. */

@@ -38,26 +38,6 @@ static void add_film(imp_film *sum, imp_film *film)
     }
 }
 
-/* Mean over pixels and channels. */
-static void film_sums(imp_film *film, double *mean, double *mean_se)
-{
-    struct imp_film_info info = {.size = sizeof info};
-    double sum = 0, squares = 0;
-    imp_film_get_info(film, &info);
-    const size_t n = (size_t)info.width * (size_t)info.height, c = (size_t)info.channels;
-    const float *m = imp_film_mean(film), *se = imp_film_se(film);
-    for (size_t i = 0; i < n; i++) {
-        double error = 0; /* the channels of a pixel share walks */
-        for (size_t k = i * c; k < (i + 1) * c; k++) {
-            sum += m[k];
-            if (se) error += se[k];
-        }
-        squares += error * error;
-    }
-    *mean = sum / (double)(n * c);
-    *mean_se = se ? sqrt(squares) / (double)(n * c) : NAN;
-}
-
 /* A block is one control, or as many as it has numbers. */
 static size_t n_controls(const struct block *b)
 {
@@ -96,38 +76,53 @@ static int writable(const struct block *blocks, size_t n_blocks)
 }
 
 /* A picture of one derivative, its line in the answer and in the table beside it. */
-static int write_control(struct json *j, FILE *table, imp_film *film, const char *name,
+static int write_control(struct json *j, FILE *table, imp_film *film,
+                         struct imp_estimate mean, const char *name,
                          const struct imp_run *run)
 {
     const double red = picture_range(film);
     const struct picture_options o = {.standard_error = 1, .diverging = 1, .range = red};
-    double mean, se;
     char *path = control_path(name);
     picture_stamp(film, run);
     const int rc = picture_write(film, path, &o);
-    film_sums(film, &mean, &se);
     sheet_add(&sheet, path);
-    if (!rc) fprintf(table, "%s,%.9g,%.3g,%.9g\n", strrchr(path, '/') + 1, mean, se, red);
+    if (!rc)
+        fprintf(table, "%s,%.9g,%.3g,%.9g\n", strrchr(path, '/') + 1, mean.value, mean.se,
+                red);
     if (!rc && cli.json) {
         json_object(j, NULL);
         json_text(j, "name", name);
         json_text(j, "file", path);
-        json_number(j, "mean", mean);
-        json_number(j, "se", se);
+        json_number(j, "mean", mean.value);
+        json_number(j, "se", mean.se);
         json_number(j, "red", red);
         json_end_object(j);
     } else if (!rc) {
         char blue[32];
         snprintf(blue, sizeof blue, "-%.3g", red);
-        printf("%-40s mean %-12.6g +- %-9.2g %s is blue, %.3g red\n", path, mean, se,
-               blue, red);
+        printf("%-40s mean %-12.6g +- %-9.2g %s is blue, %.3g red\n", path, mean.value,
+               mean.se, blue, red);
     }
     free(path);
     return rc;
 }
 
+/* The picture that each number belongs to, [n_x]; returns how many there are. */
+static int group_numbers(const struct block *blocks, size_t n_blocks, int *group)
+{
+    int n = 0;
+    for (size_t k = 0; k < n_blocks; k++)
+        for (size_t i = 0; i < blocks[k].n; i++) {
+            n += i == 0 || n_controls(&blocks[k]) > 1;
+            group[blocks[k].first + i] = n - 1;
+        }
+    return n;
+}
+
+/* means: those of the block's pictures. */
 static int write_block(struct json *j, FILE *table, const struct block *b,
-                       imp_film **films, const struct imp_run *run)
+                       imp_film **films, const struct imp_estimate *means,
+                       const struct imp_run *run)
 {
     const size_t n = n_controls(b);
     char name[512];
@@ -135,13 +130,14 @@ static int write_block(struct json *j, FILE *table, const struct block *b,
     for (size_t i = 1; i < b->n && n == 1; i++)
         add_film(films[b->first], films[b->first + i]);
     for (size_t i = 0; i < n && !rc; i++)
-        rc = write_control(j, table, films[b->first + i],
+        rc = write_control(j, table, films[b->first + i], means[i],
                            control_name(b, i, name, sizeof name), run);
     return rc;
 }
 
 /* Everything, once the walks are done. */
 static int answer(const struct imp_run *run, imp_film *primal, imp_film **films,
+                  struct imp_estimate mean, const struct imp_estimate *means,
                   const struct block *blocks, size_t n_blocks)
 {
     const struct picture_options plain = {.standard_error = 1};
@@ -161,10 +157,19 @@ static int answer(const struct imp_run *run, imp_film *primal, imp_film **films,
         picture_stamp(primal, run);
         rc = picture_write(primal, path, &plain);
         sheet_add(&sheet, path);
-        for (size_t k = 0; k < n_blocks && !rc; k++)
-            rc = write_block(&j, table.file, &blocks[k], films, run);
+        if (!rc && !cli.json)
+            printf("%-40s mean %-12.6g +- %.2g\n", path, mean.value, mean.se);
+        for (size_t k = 0; k < n_blocks && !rc; k++) {
+            rc = write_block(&j, table.file, &blocks[k], films, means, run);
+            means += n_controls(&blocks[k]);
+        }
         if (cli.json) {
             json_end_array(&j);
+            json_object(&j, "picture");
+            json_text(&j, "file", path);
+            json_number(&j, "mean", mean.value);
+            json_number(&j, "se", mean.se);
+            json_end_object(&j);
             cli_json_end(&j);
         }
         rc = output_close(&table, rc);
@@ -179,6 +184,8 @@ static int run_jacobian(int n, char **operand)
 {
     imp_problem *problem = NULL;
     imp_film *primal = NULL, **films = NULL;
+    struct imp_estimate mean = {0}, *means = NULL;
+    int *group = NULL;
     struct block *blocks = NULL;
     size_t n_blocks = 0;
     (void)n;
@@ -201,15 +208,25 @@ static int run_jacobian(int n, char **operand)
     progress_deadline(cli.time_s);
     const size_t n_x = imp_problem_n(problem);
     films = cli_alloc(n_x, sizeof *films);
-    const enum imp_status st = imp_problem_jacobian(problem, &run, &primal, films);
+    means = cli_alloc(n_x, sizeof *means);
+    group = cli_alloc(n_x, sizeof *group);
+    const int n_groups = group_numbers(blocks, n_blocks, group);
+    enum imp_status st = imp_problem_jacobian(problem, &run, &primal, films);
+    if (primal && !cli_failed(st)) {
+        progress_resume(); /* a time limit was that of the pictures */
+        st = imp_problem_jacobian_sums(problem, NULL, &run, primal, films, group,
+                                       n_groups, &mean, means);
+    }
     if (cli_failed(st)) rc = cli_fail(st, cli.scene_path);
     /* none: stopped before anything was there */
-    if (!rc && primal) rc = answer(&run, primal, films, blocks, n_blocks);
+    if (!rc && primal) rc = answer(&run, primal, films, mean, means, blocks, n_blocks);
     if (!rc) rc = cli_done();
     sheet_free(&sheet);
     imp_film_destroy(primal);
     for (size_t i = 0; i < n_x; i++) imp_film_destroy(films[i]);
     free(films);
+    free(means);
+    free(group);
     free(blocks);
     problem_close(problem);
     return rc;

@@ -550,6 +550,24 @@ IMP_API IMP_MUST_CHECK enum imp_status
 imp_problem_reverse(imp_problem *problem, const float *seed_image,
                     const struct imp_run *run, double *gradient, double *gradient_se);
 
+/**
+ * A number made of the picture: F = sum(adjoint * picture), and its gradient J^T adjoint.
+ * The standard error of F is taken sample by sample: a filter wider than a pixel makes
+ * neighbouring pixels share samples, so their errors may not be added as if independent.
+ * @param adjoint [height][width][channels] of run->sensor, channels of the scene; NULL:
+ * 1/(pixels channels), so that F is the mean of the picture. Not to be made from the same
+ * random numbers.
+ * @param run   NULL for defaults.
+ * @param[out] value       may be NULL.
+ * @param[out] gradient    [n], as imp_problem_objective's; NULL: value only.
+ * @param[out] gradient_se [n], one standard error; may be NULL.
+ * @return as imp_problem_objective; IMP_E_ARG if both value and gradient are NULL.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_problem_functional(imp_problem *problem, const float *adjoint,
+                       const struct imp_run *run, struct imp_estimate *value,
+                       double *gradient, double *gradient_se);
+
 /** Forward derivative: the picture J x_dot in the scene's channels, with standard errors.
  * x_dot [n], in units of x. The caller destroys the film. @return as imp_render;
  * IMP_E_BIAS. */
@@ -566,6 +584,29 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_problem_jacobian(imp_problem *problem
                                                             const struct imp_run *run,
                                                             imp_film **primal,
                                                             imp_film **films);
+
+/**
+ * F = sum(adjoint * picture) of the pictures that imp_problem_jacobian made, with
+ * standard errors taken sample by sample (see imp_problem_functional): of the picture
+ * itself, and of groups of derivative pictures, such as the three numbers of a colour. At
+ * most a quarter of the pictures' walks (but 16 per pixel) are made again.
+ * @param adjoint  as imp_problem_functional's.
+ * @param run      that of imp_problem_jacobian; with a time limit, it is not one here.
+ * @param primal   the picture; borrowed.
+ * @param films    [n] the derivative pictures, as they came; borrowed.
+ * @param group    [n] which sum a number's picture belongs to, 0 <= group < n_groups;
+ * NULL: each number is a sum of its own, and n_groups is ignored.
+ * @param[out] value of the picture; may be NULL.
+ * @param[out] sums  [n_groups], or [n].
+ * @return IMP_OK; IMP_CANCELLED, with NaN for errors, which are NaN too if primal was
+ * interrupted before every pixel had its samples; IMP_E_ARG if the films are not this
+ * problem's, and IMP_E_PATHS, with nothing written; IMP_E_NOMEM.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_problem_jacobian_sums(imp_problem *problem, const float *adjoint,
+                          const struct imp_run *run, const imp_film *primal,
+                          imp_film *const *films, const int *group, int n_groups,
+                          struct imp_estimate *value, struct imp_estimate *sums);
 
 /* ---- Fitting ------------------------------------------------------------------- */
 
@@ -639,11 +680,11 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_fit(imp_problem *problem,
 
 /** One line of a gradient check: a method, a parameter, two numbers that must agree. */
 struct imp_check_row {
-    const char *method; /**< "frozen", "fresh", "dot", "euler" */
+    const char *method; /**< "frozen", "fresh", "dot", "euler", "density", "loss" */
     const char *param;
     double step;                 /**< of a difference; 0: none */
     double value, reference, se; /**< se of the difference; 0: deterministic */
-    double error;                /**< relative error, or |z| where se > 0 */
+    double error; /**< relative error; where se > 0: |z|, z = (value - reference) / se */
     double limit; /**< of error; 0: a row for information (a step that is not the best) */
     int ok;       /**< 1: they agree; 0: they do not; -1: too noisy to tell */
     int kinks; /**< frozen walks that stand on a kink, and agree with one of its sides */

@@ -34,6 +34,7 @@ static bool report(struct imp__check *c, double fraction)
 {
     if (!c->outer.progress) return false;
     const double elapsed = imp__now() - c->start_s;
+    fraction = c->shown = fmax(c->shown, fraction); /* rows may turn out to need more */
     const struct imp_progress p = {
         .size = sizeof p,
         .stage = "check",
@@ -96,6 +97,7 @@ enum imp_status imp_check(imp_problem *p, const struct imp_check_options *option
 
     ended = imp__check_frozen(&c);
     if (ended == IMP_OK) ended = imp__check_fresh(&c);
+    if (ended == IMP_OK) ended = imp__check_losses(&c);
     if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
     struct imp_check_row *kept =
         imp__arena_array(&p->check_arena, c.n_rows + 1, sizeof *kept);

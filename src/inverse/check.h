@@ -17,6 +17,7 @@ struct imp__check {
     struct imp_check_row *rows; /* [n_rows], names in the problem's check_arena */
     size_t n_rows, cap_rows;
     double start_s, done, total; /* pieces of work */
+    double shown;                /* fraction reported last */
     bool stopped;
 };
 
@@ -32,5 +33,6 @@ double imp__check_scale(const struct imp_param *p, size_t e);
 
 enum imp_status imp__check_frozen(struct imp__check *c); /* frozen, dot, euler */
 enum imp_status imp__check_fresh(struct imp__check *c);
+enum imp_status imp__check_losses(struct imp__check *c);
 
 #endif

@@ -1,17 +1,24 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Walks that are kept, at other parameters: the sweep against central differences of the
- * same product of the same vertices. */
+ * Kept walks evaluated at other parameters, with their vertices as they were: central
+ * differences of their radiance against the gradient of the sweep. */
 #include "check_walks.h"
 #include <math.h>
 #include <string.h>
 
-#define SINGLE_MAX    12 /* numbers of a parameter looked at one by one; more: */
-#define DIRECTIONS    6  /* random directions */
-#define N_STEPS       4
-#define FROZEN_LIMIT  1e-6
-#define WALK_ROUNDING 5e-14 /* of the larger of two values of a walk */
-#define TINY          1e-3 /* of the walk's L: logarithmic derivatives below it count as 0 */
+#define SINGLE_MAX 12 /* numbers of a parameter that are each a direction; of more: */
+#define DIRECTIONS 6  /* random ones */
+#define N_STEPS    4
+/* Central differences leave an error of step^2 times the third derivative, and rounding
+ * of 1e-16/step: 1e-8 to 1e-10 at the better steps. A wrong term is far above. */
+#define FROZEN_LIMIT 1e-6
+/* Of the larger of two values of a walk: products of up to some hundred factors, each
+ * with a rounding of 1e-16. */
+#define WALK_ROUNDING 5e-14
+/* Derivatives are compared with themselves, or with this part of the walk's L per
+ * relative change of the parameter where they are smaller: they are then differences of
+ * larger terms, whose rounding they keep. */
+#define TINY 1e-3
 
 static const double steps[N_STEPS] = {1e-3, 1e-4, 1e-5, 1e-6};
 
@@ -155,10 +162,12 @@ static double along(const struct imp__kept_walk *w, size_t base, const double *m
     return sum;
 }
 
-/* Of one direction, [N_STEPS][n]: difference quotients, what they should be, the largest
- * number each is a difference of, and how much the slope above exceeds the one below. */
+/* Differences of all walks along one direction, [N_STEPS][n] each. */
 struct quotients {
-    const double *f, *a, *size, *bend;
+    const double *f;    /* difference quotients */
+    const double *a;    /* the same from the sweeps' gradients */
+    const double *size; /* largest number that f is a difference of */
+    const double *bend; /* slope above the parameter's value less the slope below */
 };
 
 static double beyond(double off, double rounding, double worth)
@@ -166,10 +175,10 @@ static double beyond(double off, double rounding, double worth)
     return off <= rounding ? 0 : isfinite(off) ? (off - rounding) / worth : INFINITY;
 }
 
-/* A walk is judged by the step at which its quotient changed least from the step before,
- * and only by what is beyond that change and its rounding: near a kink no quotient
- * settles. Or by the step that agrees best, beyond its rounding: a kink that lies a
- * little way off is met by the larger steps only. @return the relative error. */
+/* Relative error of a walk, the smaller of two. One: at the step where the quotient
+ * changed least from the step before, what is beyond that change and the rounding; near a
+ * kink no quotient settles. Two: at the step that agrees best, what is beyond the
+ * rounding; a kink a little way off lies within the larger steps only. */
 static double judge_walk(const struct imp__kept *k, const struct quotients *q, size_t i,
                          int *step)
 {
@@ -196,11 +205,14 @@ static double judge_walk(const struct imp__kept *k, const struct quotients *q, s
     return error[*step];
 }
 
-/* The walk may stand on a kink (between two texels, say): then the slopes above and below
- * the start are two, and central differences have neither. The sweep must have one of
- * them: at both of the smallest steps, each freed with the one before of what is
- * proportional to the step. Where the other side differs by more the smaller the step is
- * lies no kink but a jump. @return the relative error of the better side. */
+/* A walk may stand on a kink, for example on the border of two texels. The slopes below
+ * and above the parameter's value then differ, a central difference is their mean, and
+ * the sweep must agree with one of them. The one-sided slope is taken at the two smallest
+ * steps, and extrapolated to step 0 from each and the step before, which removes the
+ * error proportional to the step. The difference of the two slopes stays as the step
+ * shrinks at a kink; it grows with 1/step at a jump, where no side is right (1.5 is
+ * between 1 and 10).
+ * @return the relative error of the side that agrees better; INFINITY at a jump. */
 static double judge_sides(const struct imp__kept *k, const struct quotients *q, size_t i,
                           double *slope)
 {
@@ -217,11 +229,12 @@ static double judge_sides(const struct imp__kept *k, const struct quotients *q, 
             const double one = q->f[here] + side * q->bend[here] / 2;
             const double two = q->f[before] + side * q->bend[before] / 2;
             at = one + (one - two) * steps[s] / (steps[s - 1] - steps[s]);
+            /* Rounding of the extrapolated slope: 10/9 of one, 1/90 of the other. */
             const double error =
                 beyond(fabs(at - q->a[here]),
                        1.25 * WALK_ROUNDING * fmax(L, q->size[here]) / steps[s],
                        fmax(fabs(q->a[here]), TINY * L));
-            /* The larger step leaves a hundred times the error of third order. */
+            /* What is left is of third order, 100 times larger at the larger step. */
             worst = fmax(worst, s < N_STEPS - 1 ? error / 10 : error);
         }
         if (worst < best) best = worst, *slope = at;
@@ -229,8 +242,8 @@ static double judge_sides(const struct imp__kept *k, const struct quotients *q, 
     return best;
 }
 
-/* The walks' verdict; worst so far in *row, kinked [n] the walks counted as standing on a
- * kink. */
+/* Puts the worst walk so far into *row. kinked [n]: walks that were counted as standing
+ * on a kink. */
 static void judge(const struct imp__kept *k, const struct quotients *q, uint8_t *kinked,
                   struct imp_check_row *row)
 {
@@ -347,6 +360,7 @@ enum imp_status imp__check_frozen(struct imp__check *c)
             IMP_TRY(imp__check_progress(c, 0));
         }
     IMP_TRY(imp__check_identities(&k));
+    IMP_TRY(imp__check_density(&k));
 out:
     imp__kept_destroy(&k);
     return st;

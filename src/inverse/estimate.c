@@ -319,15 +319,15 @@ out:
     return st;
 }
 
-static enum imp_status adjoint_check(const struct imp_problem *p,
-                                     const struct imp_film_desc *film,
-                                     const float *adjoint)
+enum imp_status imp__adjoint_check(const struct imp_problem *p,
+                                   const struct imp_film_desc *film, const float *adjoint,
+                                   const char *name)
 {
     const size_t channels = (size_t)p->scene->channels, width = (size_t)film->crop_w;
     for (size_t i = 0; i < width * (size_t)film->crop_h * channels; i++)
         if (!isfinite(adjoint[i]))
             return imp__error(p->ctx, IMP_E_ARG,
-                              "seed_image: channel %zu of pixel (%zu, %zu) is %g",
+                              "%s: channel %zu of pixel (%zu, %zu) is %g", name,
                               i % channels, i / channels % width, i / channels / width,
                               (double)adjoint[i]);
     return IMP_OK;
@@ -355,7 +355,7 @@ enum imp_status imp_problem_reverse(imp_problem *p, const float *seed_image,
                     .gradient_variance = g ? g + p->n : NULL};
     if (!g) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for gradients"));
     IMP_TRY(imp__problem_tracer(p, &own, &j.tracer));
-    IMP_TRY(adjoint_check(p, &j.tracer.sensor->film, seed_image));
+    IMP_TRY(imp__adjoint_check(p, &j.tracer.sensor->film, seed_image, "seed_image"));
     const int spp = own.spp > 0 ? own.spp : j.tracer.sensor->spp;
     j.plan = imp__replicates_plan(spp, IMP_BATCH_MAX);
     if (imp__film_border(&j.tracer.sensor->film) > 0) {

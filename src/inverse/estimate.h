@@ -51,5 +51,9 @@ static inline size_t imp__tile_count(int width, int height, int margin)
 enum imp_status imp__problem_tracer(const struct imp_problem *p,
                                     const struct imp_run *run, struct imp_tracer *out);
 /* The run to use: the given one or the defaults. */
+/* Are all numbers of an adjoint image finite? `name` is the argument's. */
+enum imp_status imp__adjoint_check(const struct imp_problem *problem,
+                                   const struct imp_film_desc *film, const float *adjoint,
+                                   const char *name);
 
 #endif

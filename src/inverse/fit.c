@@ -21,11 +21,21 @@ static bool has_kink(const struct imp_problem *p)
     return kink;
 }
 
-/* Evaluate what the search found with random numbers that it has not seen. */
+/* Evaluate what the search found with random numbers that it has not seen. They depend on
+ * the answer's bits too: two fits with one seed that end at different answers would
+ * otherwise share the noise of their losses, and their chi-squares could not be compared.
+ */
 static enum imp_status final_objective(struct imp__fit *f, const double *x,
                                        struct imp_estimate *out)
 {
-    return f->goal.eval(x, imp__search_seed(&f->goal, FINAL_SEED, 0), out, NULL, NULL, f);
+    uint64_t seed = imp__search_seed(&f->goal, FINAL_SEED, 0);
+    for (size_t k = 0; k < f->goal.n; k++) {
+        const double value = x[k] + 0.0; /* -0 and 0 are one answer */
+        uint64_t bits;
+        memcpy(&bits, &value, sizeof bits);
+        seed = imp__mix64(seed ^ bits);
+    }
+    return f->goal.eval(x, seed, out, NULL, NULL, f);
 }
 
 /* Samples per pixel of each replicate. A search that averaged many evaluations with few

@@ -369,7 +369,7 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
         residuals +=
             (double)(p->targets[t].desc.channels) * pixels_in_use(&p->targets[t]);
         const int bias = imp__loss_bias_order(p->targets[t].desc.loss);
-        if (bias) bias_order = 1;
+        if (bias && (!bias_order || bias < bias_order)) bias_order = bias;
         wide |= imp__film_border(&j.tracer.sensor->film) > 0;
     }
     /* With wide filters, the same estimate as that of trial steps from the same walks. */

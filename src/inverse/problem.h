@@ -47,19 +47,18 @@ double imp__regularise(const struct imp_problem *p, const double *x, double *gra
 /* Their second derivative, H [n][n]. */
 enum imp_status imp__regularise_second(const struct imp_problem *p, double *H);
 
-/* Gauss-Newton pieces for all quadratic targets, from one set of walks, K = p->n <= 256
- * (docs/estimators.md 15):
- *   H [K*K]      U-statistic estimate of J^T W J (unbiased, may be indefinite)
- *   H_same [K*K] the same-sample matrix (biased upwards, positive semi-definite)
- *   H_meas [K*K] sum of w^2 sigma^2 J J^T for the measurement covariance, sigma^2 from
- *                the residuals where the target does not give it; NULL to skip
- *   g [K]        leave-one-out gradient of the data term
- *   g_se [K]     standard errors of g
- *   cov_g [K*K]  covariance of g; NULL to skip
- * Regularisers are not included. Non-quadratic targets: their Gauss-Newton weights at the
- * present pictures, and *bias_order > 0. */
+/* Gauss-Newton pieces for all targets, from one set of walks, K = p->n <= 256
+ * (docs/estimators.md 15). Regularisers are not included. Targets that are not quadratic have
+ * their Gauss-Newton weights at the present pictures; what bias that leaves in value and
+ * gradient is objective.bias_order. */
 struct imp__gauss_newton {
-    double *H, *H_same, *H_meas, *g, *g_se, *cov_g;
+    double *H;      /* [K*K] U-statistic of J^T W J: unbiased, may be indefinite */
+    double *H_same; /* [K*K] same-sample matrix: biased upwards, positive semi-definite */
+    double *H_meas; /* [K*K] sum of w^2 sigma^2 J J^T for the measurement's covariance, or
+                       NULL; sigma^2 from the residuals where a target gives none */
+    double *g, *g_se; /* [K] leave-one-out gradient of the data term, standard errors; or
+                         NULL */
+    double *cov_g;    /* [K*K] covariance of g; or NULL */
     struct imp_estimate objective; /* data term */
     double chi2;                   /* sum w (mean - T)^2 - w Var(mean), unbiased */
     double n_residuals;

@@ -12,13 +12,14 @@
 static imp_context *ctx;
 
 struct counts {
-    int rows, failed, frozen, dot, euler, fresh;
+    int rows, failed, frozen, dot, euler, fresh, noisy, density, wrong_density, loss;
+    bool plain; /* z is (value - reference)/se */
     double worst_exact, worst_frozen, worst_z;
 };
 
 static struct counts check(imp_problem *p, int paths, int spp, uint64_t seed)
 {
-    struct counts n = {0};
+    struct counts n = {.plain = true};
     const struct imp_check_row *rows;
     struct imp_check_options o = IMP_CHECK_OPTIONS_INIT;
     struct imp_run run = IMP_RUN_INIT;
@@ -40,7 +41,15 @@ static struct counts check(imp_problem *p, int paths, int spp, uint64_t seed)
             if (r->limit > 0) n.worst_frozen = fmax(n.worst_frozen, r->error);
         } else if (!strcmp(r->method, "fresh")) {
             n.fresh++;
+            n.noisy += r->ok < 0;
             n.worst_z = fmax(n.worst_z, r->error);
+            n.plain &= r->se == 0 || fabs(r->value - r->reference) == r->error * r->se ||
+                       fabs(fabs(r->value - r->reference) / r->se / r->error - 1) < 1e-12;
+        } else if (!strcmp(r->method, "density")) {
+            n.density++;
+            n.wrong_density += !r->ok;
+        } else if (!strcmp(r->method, "loss")) {
+            n.loss++;
         } else {
             if (!strcmp(r->method, "dot")) n.dot++;
             else n.euler++;
@@ -61,11 +70,11 @@ static void passes(imp_scene *s, const char *what, int paths, int spp, int froze
     const struct counts n = check(p, paths, spp, 5);
     imp_problem_get_x(p, after);
     tap_ok(n.failed == 0 && n.frozen == frozen && n.dot == 1 && n.euler == euler &&
-               n.fresh == fresh,
+               n.fresh == fresh && n.plain && n.loss == 8,
            "%s # frozen %d (worst %.1e), dot, euler %d (worst %.1e), "
-           "fresh %d (worst z %.2f), failed %d",
+           "fresh %d (worst z %.2f), failed %d, noisy %d",
            what, n.frozen, n.worst_frozen, n.euler, n.worst_exact, n.fresh, n.worst_z,
-           n.failed);
+           n.failed, n.noisy);
     tap_ok(!memcmp(before, after, imp_problem_n(p) * sizeof *before),
            "and leaves the scene alone");
     imp_problem_destroy(p);
@@ -100,6 +109,58 @@ static void planted(void)
     b->ops = ops;
     tap_ok(n.failed >= 1 && fabs(n.worst_frozen - 1e-3) < 1e-4,
            "a derivative 0.1 %% off is caught # worst frozen error %.2e", n.worst_frozen);
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+}
+
+/* The kind of a material with a density that is not the one it draws with. */
+static const struct imp_bsdf_ops *right_ops;
+static double wrong_by;
+static double wrong_pdf(const struct imp_bsdf *b, const imp_spec *in,
+                        const struct imp_dirs *d)
+{
+    return wrong_by * right_ops->pdf(b, in, d);
+}
+
+/* Pictures and gradients are wrong alike then, and no difference is far off. */
+static void wrong_densities(void)
+{
+    static const char *const kinds[] = {"roughconductor", "diffuse"};
+    imp_scene *s = test_scene(ctx, "textured.xml", IMP_RGB, "width=24 height=16");
+    imp_problem *p = test_problem(ctx, s, "metal*");
+    for (size_t k = 0; k < imp_count(kinds); k++)
+        for (int sign = -1; sign <= 1; sign += 2) {
+            struct imp_bsdf_ops wrong;
+            for (int i = 0; i < s->n_bsdfs; i++)
+                if (!strcmp(s->bsdfs[i]->ops->name, kinds[k]))
+                    right_ops = s->bsdfs[i]->ops;
+            wrong = *right_ops;
+            wrong.pdf = wrong_pdf;
+            wrong_by = 1 + 0.15 * sign;
+            for (int i = 0; i < s->n_bsdfs; i++)
+                if (s->bsdfs[i]->ops == right_ops) s->bsdfs[i]->ops = &wrong;
+            /* Default settings, but for the pictures of fresh differences. */
+            const struct counts n = check(p, 0, 1, 5);
+            for (int i = 0; i < s->n_bsdfs; i++)
+                if (s->bsdfs[i]->ops == &wrong) s->bsdfs[i]->ops = right_ops;
+            tap_ok(n.density == 3 && n.wrong_density >= 1,
+                   "%s: a density times %g is caught # %d of %d", kinds[k], wrong_by,
+                   n.wrong_density, n.density);
+        }
+    const struct counts n = check(p, 0, 1, 5);
+    tap_ok(n.density == 3 && !n.wrong_density, "and the right one is not");
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+}
+
+/* At 2 samples per pixel most rows of this scene cannot be told from noise; 32 do. */
+static void more_samples(void)
+{
+    imp_scene *s = test_scene(ctx, "cornell.xml", IMP_RGB, "res=16");
+    imp_problem *p = test_problem(ctx, s, "*");
+    const struct counts n = check(p, 20, 2, 5);
+    tap_ok(n.fresh == 15 && n.failed == 0 && n.noisy <= 3,
+           "rows that are noisy get more samples # %d of %d stay so", n.noisy, n.fresh);
     imp_problem_destroy(p);
     imp_scene_destroy(s);
 }
@@ -214,6 +275,8 @@ int main(void)
     imp_problem_destroy(p);
     imp_scene_destroy(s);
     planted();
+    more_samples();
+    wrong_densities();
     black_and_white();
     imp_context_destroy(ctx);
     return tap_done();

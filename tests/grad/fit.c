@@ -198,15 +198,17 @@ static void mask(void)
     if (st == IMP_OK) st = imp_problem_set_x(p, x);
     o.optimizer = IMP_LM;
     if (st == IMP_OK) st = imp_fit(p, &o, &run, &r);
-    double worst = 0, worst_z = 0;
+    double worst_se = 0, worst_z = 0;
     for (int k = 0; st == IMP_OK && k < 6; k++) {
-        worst = fmax(worst, fabs(r->variables[k].value / truth[k] - 1));
+        worst_se = fmax(worst_se, r->variables[k].se / truth[k]);
         worst_z =
             fmax(worst_z, fabs(r->variables[k].value - truth[k]) / r->variables[k].se);
     }
-    tap_ok(st == IMP_OK && worst < 0.2 && worst_z < 4.5,
-           "half of the picture masked, NaN there # %.2f %%, %.1f se", 100 * worst,
-           worst_z);
+    /* Within 4.5 standard errors (7e-6 by chance), at most 0.23 of a value here (the
+     * channel that is reflected least). */
+    tap_ok(st == IMP_OK && worst_se < 0.25 && worst_z < 4.5,
+           "half of the picture masked, NaN there # off by %.1f se, which are %.2f %%",
+           worst_z, 100 * worst_se);
     imp_problem_destroy(p);
     imp_film_destroy(film);
     imp_scene_destroy(s);

@@ -104,12 +104,12 @@ static void loss(imp_context *ctx, int spp, int repeats)
         char what[160];
         snprintf(what, sizeof what, "loss at %d spp: %s", spp, k ? names[k - 1] : "J");
         agrees(stat[k].mean, tap_se(&stat[k]), ref[k], spp < 16 ? .12 : .06, what);
-        /* The reported variance against the spread of the repeats, whose own relative
-         * error is sqrt(2/repeats) and more, for tails are heavy. Paired pixels give a
-         * bound, here a tight one: neighbours differ little beside the noise. */
+        /* The reported variance against the spread of the repeats, whose logarithm has a
+         * standard error of sqrt(2/(repeats - 1)) for normal numbers, which sums over a
+         * thousand pixels nearly are: 4 of them. Paired pixels give a bound, here a tight
+         * one: neighbours differ little beside the noise. */
         const double ratio = reported[k] / repeats / (stat[k].m2 / (stat[k].n - 1));
-        const double low = repeats < 100 ? .6 : .75, high = repeats < 100 ? 1.7 : 1.3;
-        tap_ok(ratio > low && ratio < high,
+        tap_ok(fabs(log(ratio)) < 4 * sqrt(2 / (stat[k].n - 1)),
                "loss at %d spp: reported variance of %s # reported/observed %.3f", spp,
                k ? names[k - 1] : "J", ratio);
     }

@@ -157,10 +157,14 @@ NULLABLE = {"options", "run", "stats", "id", "objective", "gradient_se", "primal
             "imp_scene_begin.name", "imp_scene_ref.name", "imp_scene_load_string.name",
             "imp_bend_load_string.name", "imp_problem_variable.lo", "imp_problem_variable.hi",
             "imp_problem_objective.x", "imp_problem_objective.gradient",
+            "imp_problem_functional.adjoint", "imp_problem_functional.value",
+            "imp_problem_functional.gradient", "imp_problem_jacobian_sums.adjoint",
+            "imp_problem_jacobian_sums.group", "imp_problem_jacobian_sums.value",
             "imp_problem_nlopt.gradient", "imp_field_eval.gradient", "imp_bend_objective.gradient",
             "imp_field_read.grid", "imp_bend_tangent.theta_dot", "imp_bend_tangent.x_dot",
             "imp_bend_tangent.d_dot", "imp_bend_fit.result", "imp_last_error.context"}
-NOT_NULLABLE = {"imp_bend_set_options.o", "imp_elements_fit.options"}
+NOT_NULLABLE = {"imp_bend_set_options.o", "imp_elements_fit.options",
+                "imp_problem_jacobian_sums.primal"}
 INPUT = {"imp_bend_adjoint.out"}  # structs of pointers to write to, not written themselves
 # Numbers that may be anything: a NaN is a documented value, infinity is a bound, or the
 # number is not used with the good arguments. What comes out must be finite all the same.
@@ -216,6 +220,8 @@ class Fixture:
                 lib.imp_scene_begin(s, tag, kind, None, None)
                 return s
             return scene
+        if kind == "imp_film" and function == "imp_problem_jacobian_sums":
+            return self.jacobian()[0]
         if kind == "imp_film": return self.make("imp_film_create", context, 4, 4, b"R,G,B")
         if kind == "imp_problem":
             p = self.make("imp_problem_create", scene)
@@ -251,6 +257,15 @@ class Fixture:
         if kind == "imp_guide": return None
         raise KeyError(kind)
 
+    def jacobian(self):
+        """A picture of the problem above and its derivatives: [4] films."""
+        if not hasattr(self, "pictures"):
+            self.pictures = self.array(C.c_void_p, 4)
+            status = lib.imp_problem_jacobian(self.object("imp_problem", ""), C.byref(self.struct("imp_run")),
+                                              self.pictures, C.byref(self.pictures, C.sizeof(C.c_void_p)))
+            if status != OK: raise RuntimeError(self.said())
+        return self.pictures
+
     def struct(self, name, function=""):
         s = initial(structs[name])
         doubles = lambda n, v=0.: C.addressof(self.array(C.c_double, n, [v] * n))
@@ -284,7 +299,7 @@ class Fixture:
             scalars = {"width": 4, "height": 4, "channels": 3, "length": len(self.good(xml, function)[0]) if "load_string" in function else 0, "weight": 1., "order": 1,
                        "index": 1.5 if a.ctype is C.c_double else 0, "cells": 1., "um": .5, "k": 1.,
                        "radius": 2., "hi": 3., "lo": 1., "value": 1.5 if a.ctype is C.c_double else 1,
-                       "n_vertices": 3, "n_triangles": 1, "layers": 1, "a": 1., "pilots": 2,
+                       "n_vertices": 3, "n_triangles": 1, "layers": 1, "a": 1., "pilots": 2, "n_groups": 1,
                        "n": {"imp_scene_set_values": 1, "imp_scene_spectrum": 2, "imp_problem_nlopt": 3}.get(function, 1)}
             zeros = {"status", "cause", "sensor", "channel", "x", "y", "sample", "json", "i", "from_here",
                      "kind", "rays", "ray", "bundle", "target", "edge", "most"}
@@ -336,6 +351,9 @@ class Fixture:
             fields = self.array(C.c_void_p, 1, [self.object("imp_field", function)])
             return C.addressof(fields), None
         if a.name == "memory": return None, None
+        if key == "imp_problem_jacobian_sums.films":
+            return C.addressof(self.jacobian()) + C.sizeof(C.c_void_p), None
+        if a.name == "group": return C.addressof(self.array(C.c_int, 3)), None
         doubles = {"theta": [1.5] * 4096, "samples": [1.5] * 4096, "values": [.5] * 4096, "wavelengths_nm": [400., 700.],
                    "params": [1.] * 16, "axis": [0., 0., 1.], "x": [.5] * 64, "value": [1., 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],
                    "centre": [0.] * 3, "d": [0., 0., 1.] * 8, "power": [1.] * 8}

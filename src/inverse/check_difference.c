@@ -1,0 +1,194 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The pictures of one difference share their random numbers, in batches whose spread is
+ * the standard error: walks that do not depend on the parameter cancel (common random
+ * numbers, docs/estimators.md 13 B).
+ *
+ * F is linear in emission: one central difference with a large step. Elsewhere two steps
+ * and Richardson's combination (4 D(h/2) - D(h))/3, whose error is O(h^4); at a bound,
+ * one-sided differences D of third order, (8 D(h/2) - D(h))/7. */
+#include "check_difference.h"
+#include "walk/picture.h"
+#include <math.h>
+
+/* Steps as parts of the room that a number has: large, for noise falls with 1/step. F is
+ * exactly linear in emission. Elsewhere the error of Richardson's combination is 0.3^4 =
+ * 0.8 % of the term of fifth order. */
+#define STEP           0.3
+#define STEP_LINEAR    0.8
+#define FLOAT_ROUNDING 1e-7 /* of a picture's mean: 2^-24, and some for its sums */
+
+/* What pictures are made of: radiance, or its derivative along x_dot. */
+struct sampled {
+    struct imp_tracer tracer;
+    const double *x_dot; /* NULL: radiance */
+    bool *no_memory;
+};
+
+static bool sample(const void *payload, struct imp_arena *arena, int x, int y,
+                   int64_t index, double *value, double *px, double *py)
+{
+    const struct sampled *s = payload;
+    struct imp_walk walk;
+    imp__walk_trace(&s->tracer, arena, x, y, index, &walk);
+    const imp_spec v = s->x_dot ? imp__walk_tangent(&s->tracer, &walk, s->x_dot) : walk.L;
+    for (int c = 0; c < s->tracer.scene->channels; c++) value[c] = v[c];
+    *px = walk.px;
+    *py = walk.py;
+    if (walk.dropped == IMP_DROP_MEMORY)
+        __atomic_store_n(s->no_memory, true, __ATOMIC_RELAXED);
+    return walk.dropped == IMP_DROP_NONE;
+}
+
+uint64_t imp__fresh_seed(struct imp__fresh *f)
+{
+    return imp__mix64(f->check->outer.seed ^
+                      (0xf7e5u + ++f->next_seed * 0x9e3779b97f4a7c15u));
+}
+
+int imp__fresh_batch(const struct imp__fresh *f)
+{
+    const struct imp__check *c = f->check;
+    const double spp = c->run.spp > 0 ? c->run.spp : c->tracer.sensor->spp;
+    return (int)fmin(ceil(spp * f->more / IMP_CHECK_BATCHES), 1 << 24);
+}
+
+/* F, or its derivative along x_dot, with the random numbers of `seed`. */
+static enum imp_status functional(struct imp__fresh *f, const double *x_dot,
+                                  uint64_t seed, double *value)
+{
+    const struct imp_sensor *sensor = f->check->tracer.sensor;
+    struct imp_run run = f->check->run;
+    bool no_memory = false;
+    struct sampled t = {f->check->tracer, x_dot, &no_memory};
+    struct imp_picture picture = {
+        sensor, "check", f->channels == 3 ? "R,G,B" : "Y", f->channels, sample, &t, NULL};
+    imp_film *film = NULL;
+    if (!x_dot) t.tracer.active = NULL;
+    run.spp = imp__fresh_batch(f);
+    run.seed = t.tracer.seed = seed;
+    enum imp_status st = imp__picture_make(f->check->ctx, &picture, &run, &film);
+    if (no_memory && st == IMP_E_PATHS)
+        st = imp__error(f->check->ctx, IMP_E_NOMEM, "no memory to record a walk");
+    if (st == IMP_OK) {
+        *value = 0;
+        for (size_t i = 0; i < imp__film_values(film); i++)
+            *value += f->pattern[i] * film->mean[i];
+    }
+    imp_film_destroy(film);
+    return st;
+}
+
+/* Mean of batches and its standard error, from sums over them. */
+static struct imp_estimate batches_mean(double sum, double square)
+{
+    const double mean = sum / IMP_CHECK_BATCHES;
+    const double variance =
+        fmax(square / IMP_CHECK_BATCHES - mean * mean, 0) / (IMP_CHECK_BATCHES - 1);
+    return (struct imp_estimate){mean, sqrt(variance), 0};
+}
+
+enum imp_status imp__fresh_slope(struct imp__fresh *f, const double *x_dot,
+                                 struct imp_estimate *out)
+{
+    enum imp_status st = IMP_OK;
+    double sum = 0, square = 0;
+    for (int b = 0; b < IMP_CHECK_BATCHES; b++) {
+        double value;
+        IMP_TRY(functional(f, x_dot, imp__fresh_seed(f), &value));
+        sum += value;
+        square += value * value;
+    }
+    *out = batches_mean(sum, square);
+    st = imp__check_progress(f->check, f->more);
+out:
+    return st;
+}
+
+/* ---- Differences --------------------------------------------------------------- */
+
+static enum imp_status at(struct imp__fresh *f, const struct imp__motion *m, double step,
+                          uint64_t seed, double *value)
+{
+    struct imp_param p = *m->param;
+    for (size_t e = 0; e < p.info.count; e++)
+        if (m->weight[e] != 0) imp__param_set(&p, e, m->old[e] + step * m->weight[e]);
+    const enum imp_status st = functional(f, NULL, seed, value);
+    for (size_t e = 0; e < p.info.count; e++) imp__param_set(&p, e, m->old[e]);
+    return st;
+}
+
+/* Combine values at places with factors: sum factor F(place), batch by batch. `other`:
+ * factors of lower order, or NULL. */
+static enum imp_status combine(struct imp__fresh *f, const struct imp__motion *m, int n,
+                               const double *place, const double *factor,
+                               const double *other, struct imp__quotient *out)
+{
+    enum imp_status st = IMP_OK;
+    double sum = 0, square = 0, coarse = 0, largest = 0, factors = 0;
+    for (int i = 0; i < n; i++) factors += fabs(factor[i]);
+    for (int b = 0; b < IMP_CHECK_BATCHES; b++) {
+        const uint64_t seed = imp__fresh_seed(f);
+        double difference = 0;
+        for (int i = 0; i < n; i++) {
+            double value;
+            IMP_TRY(at(f, m, place[i], seed, &value));
+            difference += factor[i] * value;
+            if (other) coarse += other[i] * value / IMP_CHECK_BATCHES;
+            largest = fmax(largest, fabs(value));
+        }
+        sum += difference;
+        square += difference * difference;
+    }
+    out->mean = batches_mean(sum, square);
+    out->coarse = other ? coarse : out->mean.value;
+    out->rounding = FLOAT_ROUNDING * largest * factors;
+    st = imp__check_progress(f->check, (double)n * f->more);
+out:
+    return st;
+}
+
+/* Room of all moving numbers below and above, in units of their weights. */
+static void room(const struct imp__motion *m, double *below, double *above)
+{
+    *below = *above = INFINITY;
+    for (size_t e = 0; e < m->param->info.count; e++) {
+        const double w = m->weight[e], down = m->old[e] - m->param->info.lo,
+                     up = m->param->info.hi - m->old[e];
+        if (w == 0) continue;
+        *below = fmin(*below, (w > 0 ? down : up) / fabs(w));
+        *above = fmin(*above, (w > 0 ? up : down) / fabs(w));
+    }
+}
+
+enum imp_status imp__fresh_difference(struct imp__fresh *f, const struct imp__motion *m,
+                                      bool linear, double *step,
+                                      struct imp__quotient *out)
+{
+    double below, above, scale = 0;
+    room(m, &below, &above);
+    for (size_t e = 0; e < m->param->info.count; e++)
+        if (m->weight[e] != 0) scale = fmax(scale, imp__check_scale(m->param, e));
+    const double least = 1e-3 * scale, part = linear ? STEP_LINEAR : STEP;
+    const double both = fmin(fmin(below, above), scale);
+    if (both > least) {
+        const double h = *step = part * both;
+        const double place[4] = {h, -h, h / 2, -h / 2};
+        const double one[2] = {0.5 / h, -0.5 / h};
+        const double two[4] = {-1 / (6 * h), 1 / (6 * h), 4 / (3 * h), -4 / (3 * h)};
+        const double half[4] = {0, 0, 1 / h, -1 / h};
+        return combine(f, m, linear ? 2 : 4, place, linear ? one : two,
+                       linear ? NULL : half, out);
+    }
+    /* At a bound, to the side where there is room: D(h) = (-11 F(0) + 18 F(h) - 9 F(2h) +
+     * 2 F(3h)) / 6h, and h/2. */
+    const double side = above >= below ? 1 : -1;
+    const double h = *step =
+        side * 0.15 * part * fmin(fmax(below, above), fmax(scale, 1e-3));
+    const double place[6] = {0, h / 2, h, 3 * h / 2, 2 * h, 3 * h};
+    const double half[6] = {-11 / (3 * h), 6 / h, -3 / h, 2 / (3 * h), 0, 0};
+    const double full[6] = {-11 / (6 * h), 0, 3 / h, 0, -1.5 / h, 1 / (3 * h)};
+    double factor[6];
+    for (int i = 0; i < 6; i++) factor[i] = (8 * half[i] - full[i]) / 7;
+    return combine(f, m, 6, place, factor, half, out);
+}
