@@ -29,7 +29,7 @@
 typedef double imp_spec __attribute__((vector_size(32)));
 typedef double imp_v3 __attribute__((vector_size(32)));
 
-/* How a colour property is converted (scene-format 2.1): reflectance-like in [0,1],
+/* How a colour property is converted (docs/scene-format.md 2.1): reflectance-like in [0,1],
  * unbounded, or emission. */
 enum imp_role { IMP_REFLECTANCE, IMP_UNBOUNDED, IMP_EMISSION };
 
@@ -177,7 +177,7 @@ struct imp_bsdf_ops {
 
     /* Attached derivative of sampling with respect to scalar input `j`, for the direction
      * that `sample` made from u: dweight is d(f/pdf)/d in[j], dwi the motion of wi (both
-     * at fixed u). Returns false where not offered; NULL: nowhere (gradients.md 4). */
+     * at fixed u). Returns false where not offered; NULL: nowhere (docs/estimators.md 4). */
     bool (*sample_d)(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
                      const struct imp_dirs *d, int j, imp_spec *dweight, imp_v3 *dwi);
 

@@ -106,6 +106,7 @@ out:
 
 void imp_bend_set_progress(imp_bend *b, imp_progress_fn progress, void *payload)
 {
+    IMP_REQUIRE_OR(NULL, b, "bend", );
     b->options.progress = progress;
     b->options.progress_payload = payload;
 }

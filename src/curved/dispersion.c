@@ -6,6 +6,7 @@
  * density, Gladstone and Dale 1863), polymers and glasses of one family nearly. It is
  * linear in the numbers of the field, so value, gradient, Hessian and transposes are k
  * times those of the field. */
+#include "base/arguments.h"
 #include "bend.h"
 
 double imp_dispersion_index(const struct imp_dispersion *dispersion, double um)
@@ -157,6 +158,7 @@ enum imp_status imp_bend_set_wavelength(imp_bend *b, int bundle,
 
 double imp_bend_wavelength(const imp_bend *b, int bundle)
 {
+    IMP_REQUIRE_OR(NULL, b, "bend", 0);
     return bundle >= 0 && (size_t)bundle < b->cap_um ? b->um[bundle] : 0;
 }
 

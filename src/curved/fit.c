@@ -401,16 +401,15 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
     f.done_iterations = f.opt.max_iterations;
     report(&f, true);
     if (result) {
-        const struct imp_bend_fit_result all = {
-            .size = sizeof all,
-            .iterations = iterations,
-            .levels = f.level + 1,
-            .start = start,
-            .value = value,
-            .n_history = b->n_history,
-            .history = b->history,
-            .reason = reason,
-            .stats = f.stats};
+        const struct imp_bend_fit_result all = {.size = sizeof all,
+                                                .iterations = iterations,
+                                                .levels = f.level + 1,
+                                                .start = start,
+                                                .value = value,
+                                                .n_history = b->n_history,
+                                                .history = b->history,
+                                                .reason = reason,
+                                                .stats = f.stats};
         IMP_TRY(imp__info_give(b->ctx, __func__, "result", result, &all, sizeof all));
     }
     st = ended;

@@ -8,7 +8,7 @@
  * Estimator (docs/estimators.md 8): E_k = w^B Le for emission met by chance, B_k = w^E f
  * Le/p^e for a light sample, power heuristic with exponent 2, w^B = 1 at the first vertex
  * and after a delta lobe. Depth: emission at vertex k counts if k < max_depth, scattering
- * goes on and samples lights if k + 1 < max_depth (scene-format 11). */
+ * goes on and samples lights if k + 1 < max_depth (docs/scene-format.md 11). */
 #include "step.h"
 #include <float.h>
 #include <stddef.h>
@@ -85,7 +85,7 @@ void imp__vertex_place(struct imp_step *s, struct imp_vertex *v,
 
 /* ---- One step --------------------------------------------------------------------- */
 
-/* May light that is met here make the sample valid (scene-format 11)? What is hidden from
+/* May light that is met here make the sample valid (docs/scene-format.md 11)? What is hidden from
  * the camera stays hidden behind a null material for path, and not for direct. */
 static bool seen(const struct imp_step *s)
 {

@@ -125,7 +125,7 @@ struct imp_walk {
     struct imp_key key;
     struct imp_sensor_ray ray;
     imp_spec L;            /* radiance at the sensor */
-    bool valid;            /* alpha 1 (scene-format 11) */
+    bool valid;            /* alpha 1 (docs/scene-format.md 11) */
     bool absorbed;         /* Stam: ended by absorption */
     enum imp_drop dropped; /* then L is 0 and there is nothing to sweep */
     /* [n] adjoint with which the light of vertex k itself enters: what a sensor that it

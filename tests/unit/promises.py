@@ -302,7 +302,7 @@ class Fixture:
                        "n_vertices": 3, "n_triangles": 1, "layers": 1, "a": 1., "pilots": 2, "n_groups": 1,
                        "n": {"imp_scene_set_values": 1, "imp_scene_spectrum": 2, "imp_problem_nlopt": 3}.get(function, 1)}
             zeros = {"status", "cause", "sensor", "channel", "x", "y", "sample", "json", "i", "from_here",
-                     "kind", "rays", "ray", "bundle", "target", "edge", "most"}
+                     "kind", "progress", "rays", "ray", "bundle", "target", "edge", "most"}
             if key == "imp_bend_image.target": return 4, None  # the fixture adds it
             if a.name in scalars: return scalars[a.name], None
             if a.name in zeros: return 0, None
