@@ -19,7 +19,6 @@ ROOTS = ("src", "include", "tests", "cli", "bench", "examples", "fuzz", "docs", 
          "scenes", "packaging", "python")
 SUFFIXES = {".c", ".h", ".py", ".sh", ".md", ".xml", ".build", ".1", ".3", ".5", ".exact",
             ".txt", ".in"}
-# Comments that still cite by old names; they go with the rewrite of these files.
 # History speaks of files as they were.
 HISTORY = {"CHANGELOG.md"}
 

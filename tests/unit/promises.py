@@ -89,6 +89,9 @@ def initial(struct):
     if name not in defines:
         if struct._fields_[0][0] == "size": s.size = C.sizeof(s)
         return s
+    if "_SIZED(struct " in defines[name]:  # its size, and zeros
+        s.size = C.sizeof(s)
+        return s
     values = split(re.search(r"\{(.*)\}", defines[name], re.S)[1])
     if len(values) != len(struct._fields_):
         raise ValueError("%s has %d values for %d fields" % (name, len(values), len(struct._fields_)))
@@ -162,7 +165,8 @@ NULLABLE = {"options", "run", "stats", "id", "objective", "gradient_se", "primal
             "imp_problem_jacobian_sums.group", "imp_problem_jacobian_sums.value",
             "imp_problem_nlopt.gradient", "imp_field_eval.gradient", "imp_bend_objective.gradient",
             "imp_field_read.grid", "imp_bend_tangent.theta_dot", "imp_bend_tangent.x_dot",
-            "imp_bend_tangent.d_dot", "imp_bend_fit.result", "imp_last_error.context"}
+            "imp_bend_tangent.d_dot", "imp_bend_fit.result", "imp_last_error.context",
+            "imp_bend_set_progress.payload", "imp_bend_set_progress.progress"}
 NOT_NULLABLE = {"imp_bend_set_options.o", "imp_elements_fit.options",
                 "imp_problem_jacobian_sums.primal"}
 INPUT = {"imp_bend_adjoint.out"}  # structs of pointers to write to, not written themselves
