@@ -14,7 +14,8 @@
 #include <math.h>
 
 enum { D = 5, WALKS = 200 };
-#define STORED 0x1p-22 /* a product of D floats, each half a unit of 2^-24 off */
+/* A step is made of two floats, each half a unit of 2^-24 off. */
+#define STORED (2 * D * 0x1p-24)
 
 static imp_context *ctx;
 static const double rho[3] = {0.5, 0.3, 0.8}, glow[3] = {1, 2, 0.25};
