@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Options that commands share, and the start of every command: context, scene,
+ * settings. */
 #include "command.h"
 
 #include "progress.h"

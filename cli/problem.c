@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Options of a problem (targets, losses, regularisers, active parameters) and the
+ * problem made from them. */
 #include "problem.h"
 
 #include "picture.h"

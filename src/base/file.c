@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Reading and writing of whole files. A file is written beside its final name and
+ * renamed, so that no reader meets half of it. */
 #include "file.h"
 #include <errno.h>
 #include <fcntl.h>
