@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Parser of the command line: options from tables, help texts, suggestions for what is
+ * misspelt. */
 #include "args.h"
 
 #include <errno.h>

@@ -158,7 +158,7 @@ static int run_bench(int n, char **operand)
 const struct command command_bench = {
     {"bench",
      "SCENE",
-     "time loading, rendering and gradients of a scene",
+     "measure the time for loading, rendering and gradients",
      {options, options_run, options_scene, options_file, options_general},
      1,
      1},

@@ -15,7 +15,7 @@
 static const struct arg_option options_bend[] = {
     {ARG_LIST, 'D', "define", "NAME=VALUE", "set a $parameter of the file", &cli.defines,
      0, 0, NULL},
-    {ARG_TEXT, 'a', "search", "DIR", "one more folder to look for files in", &cli.search,
+    {ARG_TEXT, 'a', "search", "DIR", "one more folder to search for files", &cli.search,
      0, 0, NULL},
     {0}};
 

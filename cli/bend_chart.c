@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A line chart as an 8-bit picture, with a bitmap font of its own. */
 #include "bend_chart.h"
 #include "command.h"
 #include "picture.h"

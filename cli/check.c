@@ -15,7 +15,7 @@ static struct {
 } o;
 
 static const struct arg_option options[] = {
-    {ARG_INT, 0, "paths", "N", "frozen walks looked at (default 1000)", &o.paths, 1, 1e9,
+    {ARG_INT, 0, "paths", "N", "number of frozen walks (default 1000)", &o.paths, 1, 1e9,
      NULL},
     {ARG_INT, 0, "fresh-spp", "N", "samples per pixel of fresh-seed differences",
      &o.fresh_spp, 1, 1e9, NULL},

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Options that commands share, and the start of every command: context, scene,
+ * settings. */
 #include "command.h"
 
 #include "progress.h"
@@ -17,16 +20,14 @@ static const char *const mode_words[] = {"rgb", "mono", NULL};
 static const char *const progress_words[] = {"auto", "always", "never", NULL};
 
 const struct arg_option options_file[] = {{ARG_TEXT, 'o', "output", "FILE",
-                                           "where the data goes; '-' is standard output",
+                                           "output file; '-' is standard output",
                                            &cli.out, 0, 0, NULL},
                                           {0}};
-const struct arg_option options_folder[] = {{ARG_TEXT, 'o', "output", "DIR",
-                                             "where the data goes: a folder of files",
-                                             &cli.out, 0, 0, NULL},
-                                            {0}};
+const struct arg_option options_folder[] = {
+    {ARG_TEXT, 'o', "output", "DIR", "output folder", &cli.out, 0, 0, NULL}, {0}};
 const struct arg_option options_file_or_folder[] = {
     {ARG_TEXT, 'o', "output", "PATH",
-     "where the data goes: trace, check: a file; fit, view: a folder", &cli.out, 0, 0,
+     "output: a file for trace and check, a folder for fit and view", &cli.out, 0, 0,
      NULL},
     {0}};
 
@@ -35,13 +36,12 @@ const struct arg_option options_general[] = {
      "replace files of another kind, and older checkpoints", &cli.overwrite, 0, 0, NULL},
     {ARG_INT, 't', "threads", "N", "threads; 0: all cores (default)", &cli.threads, 0,
      4096, NULL},
-    {ARG_FLAG, 0, "json", NULL, "answer in JSON", &cli.json, 0, 0, NULL},
+    {ARG_FLAG, 0, "json", NULL, "print JSON", &cli.json, 0, 0, NULL},
     {ARG_CHOICE, 0, "progress", "WHEN", "auto (on a terminal), always or never",
      &cli.progress, 0, 0, progress_words},
     {ARG_FLAG, 'q', "quiet", NULL,
-     "nothing but errors on standard error: no progress bar either", &cli.quiet, 0, 0,
-     NULL},
-    {ARG_FLAG, 'h', "help", NULL, "this text", &cli.help, 0, 0, NULL},
+     "print only errors on standard error, and no progress bar", &cli.quiet, 0, 0, NULL},
+    {ARG_FLAG, 'h', "help", NULL, "print this text", &cli.help, 0, 0, NULL},
     {0}};
 
 const struct arg_option options_scene[] = {
@@ -50,7 +50,7 @@ const struct arg_option options_scene[] = {
     {ARG_LIST, 0, "set", "ID=V[,V..]",
      "set a scene parameter ('importon info' lists them); @FILE: many", &cli.sets, 0, 0,
      NULL},
-    {ARG_TEXT, 'a', "search", "DIR[;DIR..]", "more folders to look for files in",
+    {ARG_TEXT, 'a', "search", "DIR[;DIR..]", "more folders to search for files",
      &cli.search, 0, 0, NULL},
     {ARG_CHOICE, 'm', "mode", "MODE", "colour: rgb (default) or mono", &cli.mode, 0, 0,
      mode_words},
@@ -59,24 +59,25 @@ const struct arg_option options_scene[] = {
     {0}};
 
 const struct arg_option options_run[] = {
-    {ARG_INT, 's', "sensor", "N", "which sensor, from 0", &cli.sensor, 0, 1e6, NULL},
-    {ARG_INT, 0, "spp", "N", "samples per pixel; default: what the scene asks for",
-     &cli.spp, 1, 1e9, NULL},
-    {ARG_SEED, 0, "seed", "N", "of the random numbers (default 0)", &cli.seed, 0, 0,
+    {ARG_INT, 's', "sensor", "N", "number of the sensor, from 0", &cli.sensor, 0, 1e6,
      NULL},
-    {ARG_NUMBER, 0, "time", "SECONDS", "stop after this time with what there is",
+    {ARG_INT, 0, "spp", "N", "samples per pixel (default: those of the scene)", &cli.spp,
+     1, 1e9, NULL},
+    {ARG_SEED, 0, "seed", "N", "seed of the random numbers (default 0)", &cli.seed, 0, 0,
+     NULL},
+    {ARG_NUMBER, 0, "time", "SECONDS", "stop after this time and keep the results so far",
      &cli.time_s, 1e-3, 1e9, NULL},
     {0}};
 
 const struct arg_option options_guide[] = {
     {ARG_FLAG, 0, "guide", NULL,
-     "solve by finite elements first, and sample lights by what they send to a place",
+     "solve by finite elements first, and choose lights by what they send to a point",
      &cli.guide, 0, 0, NULL},
     {ARG_NUMBER, 0, "guide-share", "S",
-     "of continuations drawn towards indirect light, below 1 (default 0)",
+     "fraction of directions drawn towards indirect light, below 1 (default 0)",
      &cli.guide_share, 0, 0.99, NULL},
     {ARG_NUMBER, 0, "guide-roulette", "S",
-     "end walks by S times what they should still bring (default: by throughput)",
+     "survival by S times the expected remaining light (default: by throughput)",
      &cli.guide_roulette, 0, 1e6, NULL},
     {0}};
 

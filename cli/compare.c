@@ -19,11 +19,12 @@ static const struct arg_option options[] = {
      1, 1e15, NULL},
     {ARG_NUMBER, 0, "spp-ref", "N", "samples per pixel of the reference (default: exact)",
      &o.n_reference, 1, 1e15, NULL},
-    {ARG_NUMBER, 0, "floor", "V", "least variance (default 1e-4 of the squared mean)",
-     &o.floor, 1e-300, 1e300, NULL},
+    {ARG_NUMBER, 0, "floor", "V",
+     "smallest variance used (default 1e-4 of the squared mean)", &o.floor, 1e-300, 1e300,
+     NULL},
     {ARG_FLAG, 0, "plain-variance", NULL,
-     "R, G, B of the variance are of R, G, B; else of X, Y, Z, kept as a colour",
-     &o.plain, 0, 0, NULL},
+     "channels of the variance are R, G, B (default: X, Y, Z converted to RGB)", &o.plain,
+     0, 0, NULL},
     {0}};
 
 static int has_channel(const imp_film *film, const char *name)
@@ -101,12 +102,13 @@ out:
     return rc;
 }
 
-const struct command command_compare = {{"compare",
-                                         "TEST REFERENCE",
-                                         "do two pictures have the same expectation?",
-                                         {options, options_file, options_general},
-                                         2,
-                                         2},
-                                        run_compare,
-                                        1,
-                                        "mean  "};
+const struct command command_compare = {
+    {"compare",
+     "TEST REFERENCE",
+     "test whether two pictures have the same expectation",
+     {options, options_file, options_general},
+     2,
+     2},
+    run_compare,
+    1,
+    "mean  "};

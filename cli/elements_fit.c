@@ -25,9 +25,9 @@ static struct {
 
 const struct arg_option options_elements_fit[] = {
     {ARG_FLAG, 0, "fit", NULL,
-     "find the parameters of -p for which --lux, --plane, --region give their targets T",
-     &o.fit, 0, 0, NULL},
-    {ARG_LIST, 0, "bounds", "GLOB=LO,HI", "keep these parameters inside", &o.bounds, 0, 0,
+     "fit the parameters of -p to the targets T of --lux, --plane and --region", &o.fit,
+     0, 0, NULL},
+    {ARG_LIST, 0, "bounds", "GLOB=LO,HI", "bounds of these parameters", &o.bounds, 0, 0,
      NULL},
     {ARG_LIST, 0, "tikhonov", "GLOB=W", "add W/2 |x|^2 over these parameters",
      &problem_options.tikhonov, 0, 0, NULL},
@@ -35,11 +35,11 @@ const struct arg_option options_elements_fit[] = {
      &problem_options.stay, 0, 0, NULL},
     {ARG_CHOICE, 0, "optimizer", "NAME", "lm, lbfgs, mma or slsqp", &o.optimizer, 0, 0,
      optimizer_words},
-    {ARG_INT, 'n', "iterations", "N", "at most, after every refinement (default 100)",
+    {ARG_INT, 'n', "iterations", "N", "maximum after every refinement (default 100)",
      &o.iterations, 1, 1e9, NULL},
     {ARG_NUMBER, 0, "tolerance", "T",
      "stop when relative steps stay below (default 1e-8)", &o.tolerance, 1e-15, 1, NULL},
-    {ARG_TEXT, 0, "recovered", "FILE", "write what was found, for --set @FILE",
+    {ARG_TEXT, 0, "recovered", "FILE", "write the recovered parameters, for --set @FILE",
      &o.recovered, 0, 0, NULL},
     {0}};
 

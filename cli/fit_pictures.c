@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Pictures that a fit writes: the start, the result, the targets, and a contact sheet
+ * of them. */
 #include "fit_pictures.h"
 
 #include "picture.h"

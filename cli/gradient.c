@@ -17,7 +17,7 @@ static const char *adjoint_path, *textures;
 static const struct arg_option options[] = {
     {ARG_TEXT, 0, "adjoint", "FILE",
      "derivative of sum(FILE * picture), in place of a loss", &adjoint_path, 0, 0, NULL},
-    {ARG_TEXT, 0, "textures", "DIR", "gradients of textures go there, as pictures",
+    {ARG_TEXT, 0, "textures", "DIR", "write gradients of textures there, as pictures",
      &textures, 0, 0, NULL},
     {0}};
 

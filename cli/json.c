@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * JSON output. Text from scene files may not be UTF-8; what is malformed is replaced. */
 #include "json.h"
 
 #include <inttypes.h>

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Writing of output files: through a temporary file that is renamed, or to standard
+ * output. */
 #include "output.h"
 
 #include "command.h"

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Tells from its first bytes whether an existing file may be replaced by an output. */
 #include "overwrite.h"
 
 #include "command.h"

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Film files as commands read and write them: output paths, previews, the command line
+ * in their header, targets with masks. */
 #include "picture.h"
 
 #include "command.h"

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The curve of a fit's loss, as SVG. */
 #include "plot.h"
 
 #include "command.h"

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Options of a problem (targets, losses, regularisers, active parameters) and the
+ * problem made from them. */
 #include "problem.h"
 
 #include "picture.h"
@@ -28,8 +31,9 @@ const struct arg_option options_targets[] = {
      &problem_options.masks, 0, 0, NULL},
     {ARG_CHOICE, 0, "loss", "LOSS", "l2 (default), relative, l1 or log",
      &problem_options.loss, 0, 0, loss_words},
-    {ARG_NUMBER, 0, "epsilon", "E", "of the relative and log losses (default 0.01)",
-     &problem_options.epsilon, 1e-12, 1e12, NULL},
+    {ARG_NUMBER, 0, "epsilon", "E",
+     "constant of the relative and log losses (default 0.01)", &problem_options.epsilon,
+     1e-12, 1e12, NULL},
     {ARG_LIST, 0, "tikhonov", "GLOB=W", "add W/2 |x|^2 over these parameters",
      &problem_options.tikhonov, 0, 0, NULL},
     {ARG_LIST, 0, "stay", "GLOB=W", "add W/2 |x - start|^2 over these parameters",

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Progress bar, time limit, and signals that stop a run. */
 #include "progress.h"
 
 #include <math.h>

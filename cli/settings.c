@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * --set: values of parameters from the command line and from files. */
 #include "settings.h"
 
 #include "command.h"

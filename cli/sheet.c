@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A contact sheet: pictures side by side on one scale, small ones enlarged. */
 #include "sheet.h"
 
 #include "command.h"

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Blocks of the bump allocator. Each new block is at least half of everything before
+ * it, so the number of allocations grows with the logarithm of the bytes. */
 #include "arena.h"
 #include <stdint.h>
 #include <string.h>

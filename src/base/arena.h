@@ -16,7 +16,7 @@ struct imp_arena {
     struct imp__arena_block *first, *current;
     size_t used;  /* in current */
     size_t total; /* bytes of all blocks */
-    bool failed;  /* something was asked for that there was no memory for */
+    bool failed;  /* an allocation has failed */
 };
 
 struct imp_arena_mark {

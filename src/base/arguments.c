@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Checks that the argument macros expand to: sized structs from older and newer
+ * callers, and numbers that must be finite. */
 #include "arguments.h"
 #include <math.h>
 #include <string.h>

@@ -131,7 +131,7 @@ void imp__context_own(imp_context *ctx)
 
 int imp_context_threads(const imp_context *ctx) { return ctx ? ctx->threads : 0; }
 
-/* Of calls whose context is not known. */
+/* Last error of this thread's calls that had no context. */
 static _Thread_local char without_context[256];
 
 const char *imp_last_error(const imp_context *ctx)

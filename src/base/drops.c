@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Counts of dropped walks by cause, and the smallest keys among them in a fixed order. */
 #include "drops.h"
 #include <stdio.h>
 #include <string.h>

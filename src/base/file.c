@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Reading and writing of whole files. A file is written beside its final name and
+ * renamed, so that no reader meets half of it. */
 #include "file.h"
 #include <errno.h>
 #include <fcntl.h>
@@ -11,7 +14,7 @@
 #include <time.h>
 #include <unistd.h>
 
-/* Of what has no size of its own: pipes, and devices that never end. */
+/* Most bytes read from a pipe or device, which has no size and may never end. */
 #define ENDLESS_MAX ((size_t)1 << 30)
 
 static enum imp_status io_error(imp_context *ctx, const char *path, const char *what,

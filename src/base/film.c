@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Creation and public access of films. */
 #include "film.h"
 #include "arguments.h"
 #include <string.h>

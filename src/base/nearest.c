@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Spelling suggestions by edit distance. */
 #include "nearest.h"
 #include "compiler.h"
 #include <stdint.h>

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Decimal numbers from text and to text. The C library's own functions follow the
+ * locale of the host, which may write a comma for the decimal point. */
 #include "number.h"
 #include <locale.h>
 #include <math.h>

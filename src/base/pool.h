@@ -3,7 +3,7 @@
  * Parallel loops whose results do not depend on the number of threads. Work is cut into
  * items whose number is fixed by the problem; any worker computes any item; the results
  * are committed one at a time and in item order. Sums taken in `commit` therefore have
- * one order, whoever computed what. */
+ * the same order on any number of threads. */
 #ifndef IMP_BASE_POOL_H
 #define IMP_BASE_POOL_H
 

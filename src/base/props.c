@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Nodes and properties of a scene's tree: creation, typed reading with defaults and
+ * ranges, and errors that name the place where a value was written. */
 #include "props.h"
 #include "nearest.h"
 #include <math.h>

@@ -2,8 +2,8 @@
  *
  * Property bags: a scene before its objects exist. The XML reader and the building calls
  * make a tree of imp_node; the kinds read their properties from it. Reading marks a
- * property as used; what nobody asked for is an error that names the place it was written
- * (docs/scene-format.md 1.3). This file knows names and values, and nothing of light. */
+ * property as used; an unused property is an error that names its line and column
+ * (docs/scene-format.md 1.3). */
 #ifndef IMP_BASE_PROPS_H
 #define IMP_BASE_PROPS_H
 
@@ -130,14 +130,14 @@ enum imp_status imp__props_vector(imp_context *ctx, struct imp_node *node,
 enum imp_status imp__props_transform(imp_context *ctx, struct imp_node *node,
                                      const char *name, double out[16]);
 bool imp__props_has(struct imp_node *node, const char *name);
-/* Note that the plugin knows a property of this name (imp__props_* do by themselves). The
- * name must live as long as the node. */
+/* Mark `name` as a property of the plugin, as the imp__props_* readers do. The name must
+ * live as long as the node. */
 void imp__node_ask(struct imp_node *node, const char *name);
 /* One of n words, in any case; *out its index. The error lists them. */
 enum imp_status imp__props_choice(imp_context *ctx, struct imp_node *node,
                                   const char *name, const char *const *words, int n,
                                   int fallback, int *out);
-/* IMP_E_SCENE listing every property and child that nobody asked for. */
+/* IMP_E_SCENE with a list of all unused properties and children. */
 enum imp_status imp__props_finish(imp_context *ctx, const struct imp_node *node);
 
 #endif

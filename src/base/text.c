@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Formatted text appended to a growing buffer. */
 #include "text.h"
 #include "number.h"
 

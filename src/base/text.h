@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Text that grows: written piece by piece, asked once at the end whether it all fitted.
- */
+ * Growing text buffer: append without checks, and test `failed` once at the end. */
 #ifndef IMP_BASE_TEXT_H
 #define IMP_BASE_TEXT_H
 

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Tables of the CIE 1931 observer and of D65 (docs/scene-format.md A.1). */
 #include "cie.h"
 
 /* CIE 1931 2-degree standard observer. */

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Conversion of colours, numbers and spectra to the one or three numbers of a
+ * parameter (docs/scene-format.md 2.1). */
 #include "convert.h"
 #include "base/number.h"
 #include "math/vec.h"

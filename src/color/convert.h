@@ -22,7 +22,7 @@ enum imp_status imp__color_convert(imp_context *ctx, const struct imp_node *node
                                    int *count, struct imp_arena *arena,
                                    const struct imp_spectrum **kept);
 
-/* What an absent property stands for. */
+/* Value of an absent property. */
 void imp__color_default(double fallback, enum imp_role role, enum imp_color_mode mode,
                         imp_spec *value, int *count);
 

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Matrices between XYZ and linear sRGB, and the integral of a spectrum. */
 #include "rgb.h"
 #include "cie.h"
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Contexts of OpenEXRCore that read and write memory, use our allocator and keep the
+ * library's message. */
 #include "exr.h"
 #include "hooks.h"
 #include <stdio.h>

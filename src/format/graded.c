@@ -100,7 +100,7 @@ out:
     return st;
 }
 
-/* What has a meaning for bundles of rays, and none, or another, in a scene. */
+/* Refuse what is valid in files of `importon bend` only. */
 static enum imp_status only_for_rays(struct imp_scene *scene, struct imp_node *node,
                                      const struct imp__bendfile *l)
 {

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * malloc, realloc and free for other libraries, on the allocator of the context. A
+ * header before each block holds its context and size, which free is not given. */
 #include "hooks.h"
 #include <stdint.h>
 #include <string.h>

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Reads a picture of any known format: tells the format from the first bytes, and
+ * picks the colour channels of the film that comes out. */
 #include "image.h"
 #include <string.h>
 #include <strings.h>

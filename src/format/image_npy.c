@@ -9,7 +9,7 @@
 
 #define HEADER_MAX 65536
 
-/* What follows 'key': in the dictionary; NULL: not there. */
+/* Text after 'key': in the dictionary; NULL: no such key. */
 static const char *entry(const char *header, const char *key)
 {
     char quoted[32];

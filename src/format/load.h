@@ -10,7 +10,7 @@
 /* The caller's options, complete whatever `size` says. @return IMP_E_ARG if malformed. */
 enum imp_status imp__load_options(imp_context *ctx, const struct imp_load_options *from,
                                   struct imp_load_options *to);
-/* What loading a file begins with: complete options, its text, the folder it lies in. */
+/* A file to load: complete options, its text, and its folder. */
 struct imp__load_file {
     struct imp_load_options options;
     struct imp_bytes text;

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Arrays for the vertices and triangles of a mesh file. */
 #include "mesh.h"
 
 enum imp_status imp__mesh_arrays(const struct imp_mesh_source *source, size_t n_vertices,

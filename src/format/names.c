@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Open-addressing hash table of names. */
 #include "names.h"
 #include <stdint.h>
 #include <string.h>

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Definition and expansion of $name in scene files, with limits on what nested
+ * defaults may expand to. */
 #include "params.h"
 #include <string.h>
 

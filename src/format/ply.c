@@ -26,7 +26,7 @@ enum ply_type {
 };
 static const int type_bytes[] = {1, 1, 2, 2, 4, 4, 4, 8};
 
-/* What a vertex property is for; SKIP: nothing. */
+/* Meaning of a vertex property; SKIP: ignored. */
 enum ply_use {
     USE_X,
     USE_Y,

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * imp_scene_load and imp_scene_load_string: options, the scene file, its tree, and the
+ * scene that is built from the tree. */
 #include "base/arguments.h"
 #include "load.h"
 #include "search.h"

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The list of folders that files are searched in, and the search. */
 #include "search.h"
 #include <limits.h>
 #include <stdio.h>

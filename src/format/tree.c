@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Builds the tree of nodes: objects, properties, references and aliases; resolves the
+ * references and refuses cycles when all nodes are there. */
 #include "tree.h"
 #include "base/nearest.h"
 #include <stdio.h>

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Scenes of old versions: camelCase names become snake_case, and the four numbers of a
+ * texture's placement become the transform to_uv (docs/scene-format.md 1.3). */
 #include "xml.h"
 #include <string.h>
 

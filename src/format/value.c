@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Parsers of numbers, booleans, lists, triples and spectra. */
 #include "value.h"
 #include "base/file.h"
 #include "base/number.h"

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Feeds scene files and their includes to expat in pieces, and places errors at line
+ * and column. */
 #include "xml.h"
 #include "hooks.h"
 #include "search.h"

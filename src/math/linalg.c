@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Cholesky factorisation, and eigenvectors of a symmetric matrix by Jacobi's
+ * rotations. */
 #include "linalg.h"
 #include <math.h>
 

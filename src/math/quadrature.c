@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Nodes and weights of Gauss-Legendre quadrature, for any number of points. */
 #include "quadrature.h"
 #include <math.h>
 

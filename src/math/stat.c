@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Normal and gamma distributions, and the Sidak correction for many tests. */
 #include "stat.h"
 #include <math.h>
 

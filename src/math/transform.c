@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * 4x4 matrices: determinant, inverse, and the elementary transforms of a scene file. */
 #include "transform.h"
 
 double imp__mat4_det3(const struct imp_mat4 *a)

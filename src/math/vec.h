@@ -40,7 +40,7 @@ static inline bool imp__is_zero(imp_spec s)
 {
     return s[0] == 0 && s[1] == 0 && s[2] == 0;
 }
-/* Of the lanes that a walk uses: four of wavelengths, three of colours. */
+/* Largest of the lanes in use: four for wavelengths, three for colours. */
 static inline double imp__max_used(imp_spec s, bool four)
 {
     return four ? imp_max(imp__max3(s), s[3]) : imp__max3(s);

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Many readers or one setter of a scene's parameters, per process: a forked child
+ * begins with no calls in flight. */
 #include "access.h"
 #include "base/pool.h"
 #include "scene.h"

@@ -20,7 +20,7 @@ const char *imp__build_object_name(struct imp_scene *scene, const struct imp_nod
 /* Append to one of the scene's lists; they live in the arena and double. */
 enum imp_status imp__build_list_add(struct imp_scene *scene, void ***list, int *n,
                                     void *object);
-/* What a kind's build function gets. */
+/* The argument of a kind's build function. */
 struct imp_build imp__build_make(struct imp_scene *scene, struct imp_node *node);
 
 /* Read the declared inputs of a node into out [as many as desc has]; *n how many. */
@@ -45,7 +45,7 @@ enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
 enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node,
                                   const char *name);
 
-/* What a concept supports, for "there is no such plugin". */
+/* Names of all kinds of a concept, for the message "there is no such plugin". */
 #define KIND_LIST(table, buffer)                                                         \
     do {                                                                                 \
         (buffer)[0] = 0;                                                                 \

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Materials, lights, shapes and sensors, each made once, at its first place in document
- * order, whoever refers to it. */
+ * Builds BSDFs, emitters, shapes and sensors. Each is built once, where it first appears
+ * in document order, however many references it has. */
 #include "build.h"
 #include "kind/sensor/film.h"
 

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What walks may be told about the light in a scene, by whoever knows something of it
- * (src/elements): which lights matter at a place, where indirect light comes from, how
- * much leaves. Only sampling follows it: densities are constants to values and to
- * derivatives (detached), so a bad guide costs variance, never bias. */
+ * Guides: approximate knowledge of the light in a scene (from src/elements) for sampling:
+ * probabilities of lights at a point, densities of indirect light, expected radiance. Only
+ * sampling uses them, and densities are constants to derivatives (detached), so a bad
+ * guide costs variance, never bias. */
 #ifndef IMP_SCENE_GUIDE_H
 #define IMP_SCENE_GUIDE_H
 
@@ -12,12 +12,12 @@
 struct imp_guide_place { /* a point that the guide knows */
     const struct imp_frame *frame;
     const void *cell;
-    double share; /* of continuations that the guide draws, < 1; 0: none */
+    double share; /* fraction of continuations that the guide draws, < 1; 0: none */
 };
 
 struct imp_guide {
     imp_context *ctx;
-    /* The surface at a hit of a ray along d; false: nothing is known there. */
+    /* Look up the surface point at a hit of a ray along d; false: unknown to the guide. */
     bool (*find)(const struct imp_guide *g, const struct imp_hit *hit,
                  const struct imp_surface *at, imp_v3 d, struct imp_guide_place *place);
     /* Choose a light by u in [0, 1); its probability, > 0 for all that scene->light_cdf
@@ -35,8 +35,7 @@ struct imp_guide {
      * before. NULL: roulette goes by throughput. */
     double (*expected)(const struct imp_guide *g, const struct imp_guide_place *p,
                        imp_v3 w, double *beyond);
-    double roulette; /* survival is this times what is expected of the rest over what is
-                        expected of the walk */
+    double roulette; /* survival = this * expected rest of the walk / expected walk */
     void (*destroy)(struct imp_guide *g);
 };
 

@@ -16,7 +16,7 @@
 #include <time.h>
 #include <unistd.h>
 
-/* What a commit is told: callbacks come in the thread that commits. */
+/* Memory and errors of one commit: Embree calls back in the committing thread. */
 static _Thread_local struct commit {
     int64_t bytes;
     enum RTCError error;
@@ -86,7 +86,7 @@ static enum imp_status device_get(imp_context *ctx, RTCDevice *out)
 
 /* ---- analytic shapes ----------------------------------------------------------- */
 
-/* What Embree hands on to the callbacks: the ray and the best analytic hit, in double. */
+/* Passed through Embree to the callbacks: ray and nearest analytic hit, in double. */
 struct query {
     struct RTCIntersectContext context; /* first: callbacks get its address */
     const imp_v3 *o, *d;

@@ -82,8 +82,8 @@ static const struct imp_shape *ball_of(const struct imp_scene *scene,
     return imp__dot(round.axis, round.axis) == 0 ? ball : NULL;
 }
 
-/* What is known before a ray is traced to leave the derivative with respect to the field
- * incomplete; what rays meet is looked at by the walk (walk/bend_survey.c). */
+/* Reason why the derivative with respect to the field would be incomplete, as far as the
+ * scene alone decides it; NULL: none. src/walk/graded_survey.c checks what rays meet. */
 static const char *fixed_because(const struct imp_scene *scene,
                                  const struct imp_medium *m)
 {

@@ -51,7 +51,7 @@ struct imp_aov {
 
 enum imp_stam_alpha { IMP_ALPHA_DETACHED, IMP_ALPHA_ATTACHED, IMP_ALPHA_PAPER };
 
-/* What a scene file says to the finite elements; 0 is their default (elements.h). */
+/* Options of the finite elements in a scene file; 0: default (elements.h). */
 struct imp_integrator_elements {
     int image; /* enum imp_elements_image: flat, gouraud or gather */
     int order, rays, max_level;

@@ -4,18 +4,18 @@
  * fresh random numbers every iteration, steps in units of each variable's scale,
  * projection on the bounds.
  *
- * Adam divides every coordinate by the size of its own gradient, so it creeps where
- * coordinates trade against each other (a lamp and a reflectance). With few variables it
- * therefore walks along the eigenvectors of the Gauss-Newton matrix (basis.h), where they
- * do not; the size of its steps stays its own. A variable that meets a bound becomes a
- * direction of its own: a projected step that is not along the axes need not end in a
- * minimum (Bertsekas, SIAM J. Control Optim. 20, 1982).
+ * Adam divides each coordinate by the size of its gradient, so it is slow where the
+ * objective depends on products of coordinates (a lamp and a reflectance). With few
+ * variables its coordinates are therefore the eigenvectors of the Gauss-Newton matrix
+ * (basis.h). A variable at a bound becomes a direction by itself: a projected step that is
+ * not along the axes need not end in a minimum (Bertsekas, SIAM J. Control Optim. 20,
+ * 1982).
  *
- * A direction in which a window of iterations made no net motion only met noise, or
- * oscillated: it goes on from the window's average with a smaller rate. Once the search
- * as a whole wanders, the answer is the average of the iterates, the later the heavier,
- * whose noise falls with their number (Polyak and Juditsky 1992; Shamir and Zhang 2013).
- */
+ * A direction without net motion over a window of iterations has met only noise, or
+ * oscillates: it continues from the average of the window with a smaller rate. Once all
+ * directions do so, the answer is a weighted average of the iterates, later ones with
+ * larger weight; its noise falls with their number (Polyak and Juditsky 1992; Shamir and
+ * Zhang 2013). */
 #include "basis.h"
 #include <math.h>
 #include <string.h>
@@ -23,14 +23,15 @@
 #define BETA1   0.9
 #define BETA2   0.99
 #define WINDOW  20
-#define STALLED 0.5 /* net motion / way, below which a window only wandered */
-#define STEADY  0.8 /* and above which it went somewhere: the rate may grow again */
+#define STALLED 0.5 /* net motion over path length: below, a window made no progress */
+#define STEADY  0.8 /* above, it made progress and the rate may grow again */
 #define COOLING 1.5 /* rate ~ (1 + windows wandered)^-COOLING */
 #define FELL    2 /* standard errors, by which a loss is lower than the window's before */
 #define FAR     4 /* by which it is so much lower that older iterates do not count */
 
-/* Arrays: [n] each, but V and A [n][n], empty where the axes are the directions. FIRST,
- * SECOND, NET, WAY and PACE are along the rows of V. AVERAGE: of the iterates. */
+/* Arrays of length n, except V (eigenvectors) and A (matrix): n x n, and empty if the
+ * coordinates are the variables. FIRST, SECOND, NET, WAY (path length) and PACE (rate) are
+ * in the coordinates of the rows of V. AVERAGE is that of the iterates. */
 enum { FIRST, SECOND, HERE, SUM, AVERAGE, ALIGNED, NET, WAY, PACE, V, A };
 enum {
     COUNT,

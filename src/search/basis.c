@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The Gauss-Newton matrix at the start of a search, and its eigenvectors as
+ * coordinates. */
 #include "basis.h"
 #include "math/linalg.h"
 #include <math.h>

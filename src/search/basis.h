@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Directions in which a method that treats each coordinate for itself should walk: the
- * eigenvectors of the Gauss-Newton matrix in units of the scales, where the objective has
- * no valleys across the axes. */
+ * Coordinates for methods that treat each coordinate separately: the eigenvectors of the
+ * Gauss-Newton matrix in units of the scales. In them the objective has no valleys that
+ * run diagonally to the axes. */
 #ifndef IMP_SEARCH_BASIS_H
 #define IMP_SEARCH_BASIS_H
 

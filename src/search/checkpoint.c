@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Text of a search's state: writing, and strict reading. */
 #include "checkpoint.h"
 #include "base/text.h"
 #include "math/rng.h"

@@ -7,7 +7,8 @@
 
 #include "optimize.h"
 
-/* What a search belongs to, part by part, so that a refusal can say what differs. */
+/* Hashes of the problem that a search belongs to; the first that differs is named when a
+ * checkpoint is refused. */
 struct imp__fingerprint {
     uint64_t parameters, scene, targets, options;
 };

@@ -221,7 +221,7 @@ out:
     return st;
 }
 
-/* Of variable k, from the two covariances [n][n]. */
+/* Standard error of variable k from the two covariances [n][n]. */
 static double standard_error(size_t n, size_t k, const double *measurement,
                              const double *monte_carlo)
 {

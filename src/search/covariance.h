@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What a fit knows about its answer: covariance in two parts, intervals, and directions
- * in which the data say nothing (docs/estimators.md 15). */
+ * Uncertainty of a fit: covariance in two parts, intervals, and directions that the data
+ * do not determine (docs/estimators.md 15). */
 #ifndef IMP_SEARCH_COVARIANCE_H
 #define IMP_SEARCH_COVARIANCE_H
 

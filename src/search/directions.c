@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Eigenvectors of the scaled Gauss-Newton matrix, the noise of its eigenvalues, and
+ * the variables that the data leave undetermined. */
 #include "directions.h"
 #include "math/linalg.h"
 #include <math.h>

@@ -28,8 +28,8 @@ struct imp__directions {      /* of a subset of the variables; all zero is none 
     double *G;   /* [n][n] generalised inverse, 0 outside */
 };
 
-/* Of the variables that are not fixed ([n]; NULL: none is). Also after a failure `out` is
- * released by directions_destroy. */
+/* Directions of the variables that are not fixed (fixed: [n], or NULL for none). Release
+ * `out` with imp__directions_destroy, also after a failure. */
 enum imp_status imp__directions_find(const struct imp__sampled *s, const bool *fixed,
                                      struct imp__directions *out);
 void imp__directions_destroy(imp_context *ctx, struct imp__directions *d);

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * State that all optimisers share: arrays, log, seeds, and the choice of the method. */
 #include "optimize.h"
 #include "math/rng.h"
 #include <math.h>

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Optimisers of noisy objectives, for whoever has one: they know a goal (values,
- * gradients and their standard errors), bounds and scales, and nothing of light.
+ * Optimisers of noisy objectives. Input is a goal: values, gradients and their standard
+ * errors, bounds and scales. Nothing here depends on light transport.
  *
- * Everything an optimiser knows between two iterations stands in a struct imp__search, in
- * numbers that a checkpoint can hold: continuing from a copy gives the same bits as not
- * having stopped. */
+ * The whole state between two iterations is in struct imp__search, in numbers that a
+ * checkpoint can hold: a search continued from a copy has the same bits as one that was
+ * never stopped. */
 #ifndef IMP_SEARCH_OPTIMIZE_H
 #define IMP_SEARCH_OPTIMIZE_H
 
@@ -42,19 +42,19 @@ struct imp__goal {
     /* For Levenberg-Marquardt and covariances: sets all of `out`. NULL: not offered. */
     enum imp_status (*normal)(const double *x, uint64_t seed, struct imp__normal *out,
                               void *payload);
-    /* Called when an iteration is complete and the search could be continued from a copy:
-     * report, write a checkpoint. IMP_CANCELLED to stop. NULL: nothing. */
+    /* Called after each complete iteration, when `search` may be copied: report progress,
+     * write a checkpoint. Returns IMP_CANCELLED to stop. May be NULL. */
     enum imp_status (*iterated)(const struct imp__search *search, void *payload);
     void *payload;
 };
 
 struct imp__opt_options {
     int max_iterations;   /* > 0 */
-    double learning_rate; /* Adam: of the scale */
-    double tolerance;     /* of the scale */
+    double learning_rate; /* Adam: fraction of the scale */
+    double tolerance;     /* fraction of the scale */
 };
 
-/* Of the scalars, one is for all to read: how many iterates x is the average of. */
+/* scalar[IMP_SEARCH_AVERAGED], public: number of iterates whose average x is. */
 enum { IMP_SEARCH_ARRAYS = 11, IMP_SEARCH_SCALARS = 12, IMP_SEARCH_AVERAGED = 11 };
 
 /* Why a search has finished; a checkpoint holds the number. */

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Fresnel reflectance of dielectrics and conductors, and its derivatives with respect
+ * to angle and index. */
 #include "fresnel.h"
 
 double imp__fresnel_dielectric(double c, double eta, double *cos_t, double *eta_t)

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Materials with a known index of refraction, by name, and how a BSDF reads its index. */
 #include "presets.h"
 #include <math.h>
 #include <stdio.h>

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * GGX and Beckmann: D and G1 with their derivatives, density and sampling of visible
+ * normals. */
 #include "microfacet.h"
 
 double imp__microfacet_d(const struct imp__microfacet *f, const imp_v3 *m,

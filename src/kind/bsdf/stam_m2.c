@@ -60,7 +60,7 @@ out:
     return st;
 }
 
-/* What the formulas are made of, for two directions on the front. */
+/* Quantities shared by the formulas, for two directions on the front. */
 struct half {
     imp_v3 m;
     double c_m, sin_m, mo;

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Sampling and density shared by point lights. */
 #include "from_point.h"
 #include "math/vec.h"
 #include <math.h>

@@ -15,11 +15,11 @@ struct imp__ies {
     imp_v3 nadir, c0,
         c90; /* orthonormal, world: w = nadir cos v + sin v (c0 cos h + ...) */
     const struct imp_ies_data *data;
-    double factor;   /* from the table to what is emitted: 1 or 1/683 */
+    double factor;   /* emitted intensity over the table's: 1 or 1/683 */
     imp_v3 position; /* of a point */
-    /* Of a surface: what it shows of itself towards w. */
-    double same;   /* of a sphere, everywhere; else 0 */
-    double across; /* of a cylinder, from its side; else 0 */
+    /* Projected area of a surface light in direction w, in parts. */
+    double same;   /* sphere: the same for all w; else 0 */
+    double across; /* cylinder: seen from its side; else 0 */
     imp_v3 axis;
     int n_facets;
     const struct imp__ies_facet *facets;

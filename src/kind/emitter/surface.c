@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Checks, sampling and density shared by area lights. */
 #include "surface.h"
 
 enum imp_status imp__surface_light_check(const struct imp_build *b,

@@ -13,8 +13,8 @@
 enum imp_status imp__filter_size(const struct imp_build *b, const char *name,
                                  double fallback, double limit, double *out);
 
-/* The filter that a node describes; NULL: the default gaussian. The build's node is not
- * looked at. Everything in the node has been asked for, or it is an error. */
+/* The filter that a node describes; NULL: the default gaussian. b->node is not
+ * used. Unused properties of the node are errors. */
 enum imp_status imp__filter_build(const struct imp_build *b, struct imp_node *node,
                                   struct imp_filter *out);
 

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Reads film and sampler of a sensor: size, crop, filter, samples per pixel. */
 #include "film.h"
 #include "base/compiler.h"
 #include "kind/filter/filter.h"

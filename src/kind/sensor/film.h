@@ -8,12 +8,11 @@
 #include "kind/build.h"
 
 /* The film that b->node describes, with its filter (docs/scene-format.md 10); node NULL:
- * the default film. Everything in the node and in its rfilter has been asked for, or it
- * is an error. */
+ * the default film. Unused properties of the node and its rfilter are errors. */
 enum imp_status imp__film_desc_build(const struct imp_build *b,
                                      struct imp_film_desc *out);
 
-/* Samples per pixel that b->node, a sampler, asks for, rounded up as its kind does
+/* Samples per pixel of the sampler b->node, rounded up as its kind does
  * (docs/scene-format.md 10); node NULL: 4. */
 enum imp_status imp__sampler_build(const struct imp_build *b, int *spp);
 

@@ -1,4 +1,7 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Reads the properties that perspective, thin-lens and orthographic cameras have in
+ * common. */
 #include "projection.h"
 #include "base/compiler.h"
 #include <string.h>

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Reads to_world and flip_normals of analytic shapes. */
 #include "shape.h"
 
 enum imp_status imp__shape_placement(const struct imp_build *b, struct imp_shape *s,

@@ -76,7 +76,7 @@ static enum imp_status build(const struct imp_build *b, void *self,
         imp__props_choice(b->ctx, b->node, "wrap_mode", wraps, 3, WRAP_REPEAT, &wrap));
     IMP_TRY(imp__props_choice(b->ctx, b->node, "filter_type", filters, 2, FILTER_BILINEAR,
                               &filter));
-    /* How Mitsuba stores texels and looks them up: of no consequence here. */
+    /* Mitsuba's options of texel storage and lookup: accepted, without effect here. */
     IMP_TRY(imp__props_choice(b->ctx, b->node, "format", formats, 5, 0, &format));
     IMP_TRY(imp__props_bool(b->ctx, b->node, "accel", true, &accel));
     IMP_TRY(imp__to_uv_read(b, &t->to_uv));
