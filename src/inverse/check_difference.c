@@ -8,7 +8,7 @@
  * and Richardson's combination (4 D(h/2) - D(h))/3, whose error is O(h^4); at a bound,
  * one-sided differences D of third order, (8 D(h/2) - D(h))/7. */
 #include "check_difference.h"
-#include "walk/picture.h"
+#include "film/film_picture.h"
 #include <math.h>
 
 /* Steps as parts of the room that a number has: large, for noise falls with 1/step. F is

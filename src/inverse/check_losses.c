@@ -20,8 +20,8 @@
  * Pixels are looked at through a box filter, whatever the sensor's: through wider ones a
  * pixel is a ratio of sums over its neighbours' samples too. */
 #include "check.h"
+#include "film/film_picture.h"
 #include "loss.h"
-#include "walk/picture.h"
 #include <math.h>
 #include <string.h>
 

@@ -6,10 +6,10 @@
  * pixel take two passes with the same random numbers (splat.c). */
 #include "estimate.h"
 #include "adjoint.h"
+#include "film/film_picture.h"
 #include "loss.h"
 #include "splat.h"
 #include "tally.h"
-#include "walk/picture.h"
 #include "walk/run.h"
 #include <string.h>
 

@@ -17,8 +17,8 @@
  * the same walks again and looks at e as a picture through a box filter. Through a box
  * filter I_p and W_p are constants of their stratum, and F needs one pass. */
 #include "estimate.h"
+#include "film/film_picture.h"
 #include "lanes.h"
-#include "walk/picture.h"
 #include "walk/run.h"
 #include <math.h>
 #include <stdio.h>

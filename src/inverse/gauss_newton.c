@@ -19,9 +19,9 @@
  * not correlated. */
 #include "gauss_newton.h"
 #include "adjoint.h"
+#include "film/film_picture.h"
 #include "lanes.h"
 #include "loss.h"
-#include "walk/picture.h"
 #include <string.h>
 
 #define GAUSS_NEWTON_MAX 256

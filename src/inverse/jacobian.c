@@ -3,8 +3,8 @@
  * Derivative pictures: in one direction (tangent along each walk), or one for every
  * active number from the same walks (sweep with adjoint 1, channels kept apart). */
 #include "estimate.h"
+#include "film/film_picture.h"
 #include "lanes.h"
-#include "walk/picture.h"
 #include "walk/run.h"
 #include <stdio.h>
 #include <string.h>

@@ -32,7 +32,7 @@ static inline imp_spec imp__lanes_adjoint(int lanes)
 }
 
 /* A walk's radiance and its derivatives, value [1 + active][channels], as a sample of a
- * picture (walk/picture.h). */
+ * picture (film/film_picture.h). */
 static inline bool imp__lanes_sample(const struct imp_tracer *tracer,
                                      struct imp_arena *arena, int x, int y,
                                      int64_t sample, int channels, double *value,

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "splat.h"
+#include "film/film_picture.h"
 #include "loss.h"
 #include "seen.h"
-#include "walk/picture.h"
 
 struct imp__replicates imp__splat_plan(int spp)
 {

@@ -17,10 +17,10 @@
  * Noise of the target is taken as correlated from pixel to pixel as the filter makes it,
  * since targets come through the same filter: H_meas = sum_pq w_p w_q rho(p - q)
  * sigma_p^2 J_p J_q, with the squared residual for sigma^2 where that is not given. */
+#include "film/film_picture.h"
 #include "gauss_newton.h"
 #include "lanes.h"
 #include "loss.h"
-#include "walk/picture.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

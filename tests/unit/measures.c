@@ -3,9 +3,9 @@
  * What one sample contributes to each channel: first-hit quantities of a tilted
  * parallelogram against its own plane geometry, moments, pixel formats, alpha. */
 #include "color/rgb.h"
+#include "film/film_measure.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "walk/measure.h"
 
 static imp_context *ctx;
 

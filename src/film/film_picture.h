@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Pictures of anything that can be sampled: radiance, derivatives, first hits. */
-#ifndef IMP_WALK_PICTURE_H
-#define IMP_WALK_PICTURE_H
+#ifndef IMP_FILM_PICTURE_H
+#define IMP_FILM_PICTURE_H
 
 #include "base/film.h"
 #include "kind/filter/filter.h"
-#include "walk.h"
+#include "walk/walk.h"
 
 struct imp_picture {
     const struct imp_sensor *sensor;

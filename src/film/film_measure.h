@@ -2,10 +2,10 @@
  *
  * What one sample contributes to each channel of a picture: the integrator's radiance in
  * the film's pixel format, first-hit quantities, moments. */
-#ifndef IMP_WALK_MEASURE_H
-#define IMP_WALK_MEASURE_H
+#ifndef IMP_FILM_MEASURE_H
+#define IMP_FILM_MEASURE_H
 
-#include "walk.h"
+#include "walk/walk.h"
 
 #define IMP_MEASURE_MAX 128 /* channels */
 

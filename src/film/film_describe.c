@@ -3,8 +3,8 @@
  * One walk told vertex by vertex: Stam's single-path view, as text to read or JSON to
  * draw. */
 #include "base/text.h"
-#include "measure.h"
-#include "run.h"
+#include "film_measure.h"
+#include "walk/run.h"
 #include <stdio.h>
 #include <string.h>
 

@@ -11,7 +11,7 @@
  * times. So e is taken about its mean over the m samples that a pixel of the film sends
  * here in a pass (strata of Cochran, Sampling Techniques, 5.3 and 6.10):
  *     sum over strata  m/(m - 1) [sum e^2 - (sum e)^2/m] / (sum w)^2. */
-#include "picture.h"
+#include "film_picture.h"
 #include "base/pool.h"
 #include <string.h>
 

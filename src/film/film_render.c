@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * imp_render: the scene's integrator decides which solver makes the picture. */
-#include "render.h"
-#include "walk/measure.h"
-#include "walk/picture.h"
+#include "film_render.h"
+#include "film_measure.h"
+#include "film_picture.h"
 #include "walk/run.h"
 
 static bool sample(const void *payload, struct imp_arena *arena, int x, int y,

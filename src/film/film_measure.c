@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "measure.h"
+#include "film_measure.h"
 #include "base/film.h"
 #include "base/text.h"
 #include "color/rgb.h"
-#include "dims.h"
+#include "walk/dims.h"
 #include <stdio.h>
 #include <string.h>
 
