@@ -265,14 +265,17 @@ enum imp_status imp__parallel(imp_context *ctx, const struct imp_loop *loop, siz
     enum imp_status st = IMP_E_NOMEM;
     struct run r = {.loop = loop, .n_slots = n_slots, .start_s = imp__now()};
     r.slot_done = imp__alloc(ctx, (size_t)n_slots, sizeof *r.slot_done);
-    r.slot_status = imp__alloc(ctx, (size_t)n_slots, sizeof *r.slot_status);
-    r.at = imp__alloc(ctx, (size_t)ctx->threads, sizeof *r.at);
+    r.at = imp__alloc(ctx, 1,
+                      (size_t)ctx->threads * sizeof *r.at +
+                          (size_t)n_slots * sizeof *r.slot_status);
     r.threads = ctx->threads;
     for (int k = 0; r.at && k < ctx->threads; k++) r.at[k] = SIZE_MAX;
-    if (!r.slot_done || !r.slot_status || !r.at) {
+    if (!r.slot_done || !r.at) {
         imp__error(ctx, IMP_E_NOMEM, "no memory for a parallel loop");
         goto out;
     }
+
+    r.slot_status = (enum imp_status *)(r.at + ctx->threads);
 
     if (nested) { /* the pool is busy with the loop we are in */
         st = IMP_OK;
@@ -304,7 +307,6 @@ enum imp_status imp__parallel(imp_context *ctx, const struct imp_loop *loop, siz
     if (done) *done = r.committed;
 out:
     imp__release(ctx, r.slot_done);
-    imp__release(ctx, r.slot_status);
     imp__release(ctx, r.at);
     return st;
 }

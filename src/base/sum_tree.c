@@ -17,9 +17,11 @@ void imp__sum_tree_destroy(struct imp_sum_tree *t)
 {
     if (!t->ctx) return;
     for (size_t k = 0; k < t->n_nodes; k++) imp__release(t->ctx, t->nodes[k].sum);
-    for (size_t k = 0; k < t->n_spare; k++) imp__release(t->ctx, t->spare[k]);
+    for (void *room = t->spare, *next; room; room = next) {
+        memcpy(&next, room, sizeof next);
+        imp__release(t->ctx, room);
+    }
     imp__release(t->ctx, t->nodes);
-    imp__release(t->ctx, t->spare);
     pthread_mutex_destroy(&t->lock);
     *t = (struct imp_sum_tree){0};
 }
@@ -28,24 +30,21 @@ void *imp__sum_tree_room(struct imp_sum_tree *t)
 {
     void *room = NULL;
     pthread_mutex_lock(&t->lock);
-    if (t->n_spare > 0) room = t->spare[--t->n_spare];
+    if (t->spare) {
+        room = t->spare;
+        memcpy(&t->spare, room, sizeof t->spare);
+    }
     t->most = imp_max(t->most, ++t->in_use);
     pthread_mutex_unlock(&t->lock);
-    return room ? room : imp__alloc_raw(t->ctx, 1, t->desc.size);
+    return room ? room : imp__alloc_raw(t->ctx, 1, imp_max(t->desc.size, sizeof room));
 }
 
 /* Lock held. */
 static void spare_add(struct imp_sum_tree *t, void *room)
 {
-    void *grown =
-        imp__grow(t->ctx, t->spare, &t->cap_spare, t->n_spare + 1, sizeof *t->spare);
+    memcpy(room, &t->spare, sizeof t->spare);
+    t->spare = room;
     t->in_use--;
-    if (!grown) {
-        imp__release(t->ctx, room);
-        return;
-    }
-    t->spare = grown;
-    t->spare[t->n_spare++] = room;
 }
 
 void imp__sum_tree_drop(struct imp_sum_tree *t, void *room)

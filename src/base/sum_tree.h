@@ -39,8 +39,7 @@ struct imp_sum_tree {
     /* Known, and their siblings are not. */
     struct imp_sum_node *nodes;
     size_t n_nodes, cap_nodes;
-    void **spare; /* results not in use */
-    size_t n_spare, cap_spare;
+    void *spare; /* results not in use: each begins with a pointer to the next */
     size_t most; /* results that were in use at once */
     size_t in_use;
 };

@@ -5,51 +5,48 @@
 #define IMP_FILM_PICTURE_H
 
 #include "base/film.h"
-#include "kind/filter/filter.h"
+#include "film_filter.h"
 #include "walk/walk.h"
+
+/* A sample of a pixel: which one, and what comes of it. */
+struct imp_sample {
+    int x, y;                /* pixel, from the crop's corner */
+    int64_t index;           /* number of the sample in its pixel */
+    struct imp_arena *arena; /* rewound afterwards */
+    /* Set by whoever takes the sample: */
+    double *value; /* [n]; 0 if dropped */
+    double px, py; /* film position */
+    enum imp_drop dropped;
+};
 
 struct imp_picture {
     const struct imp_sensor *sensor;
     const char *stage; /* for progress */
-    const char *names; /* channels, "R,G,B" */
-    int n;             /* how many */
-    /* Sample number `sample` of pixel (x, y): value [n] and its film position. The arena
-     * is rewound afterwards. False: dropped, value is 0. Called by many threads at once.
-     */
-    bool (*sample)(const void *payload, struct imp_arena *arena, int x, int y,
-                   int64_t sample, double *value, double *px, double *py);
+    const char *names; /* channels of each film, "R,G,B" */
+    int n;             /* values of a sample: channels of all films */
+    /* Called by many threads at once. */
+    void (*sample)(const void *payload, struct imp_sample *s);
     const void *payload;
+    int64_t first;   /* number of a pixel's first sample */
+    int n_films;     /* the values are cut into so many films of equal size; 0: one */
     double *weights; /* [height][width] sums of filter weights; NULL: not wanted */
 };
 
-/* @return IMP_OK; IMP_CANCELLED with a valid picture; IMP_E_PATHS; IMP_E_NOMEM. */
+/* out [n_films]. A value that is not finite or beyond float is a dropped walk
+ * (IMP_DROP_INFINITE, IMP_DROP_NAN).
+ * @return IMP_OK; IMP_CANCELLED with a valid picture; IMP_E_PATHS; IMP_E_NOMEM, before
+ * the first sample; IMP_E_NUMERIC if a pixel is not finite. */
 enum imp_status imp__picture_make(imp_context *ctx, const struct imp_picture *picture,
                                   const struct imp_run *run, imp_film **out);
 
-/* How many pixels beyond its own a sample may reach. */
-static inline int imp__film_border(const struct imp_film_desc *f)
+/* The walk of a sample, which gets its film position, and the cause if it was dropped. */
+static inline void imp__sample_walk(struct imp_sample *s, const struct imp_tracer *tracer,
+                                    struct imp_walk *walk)
 {
-    return f->filter.radius > 0.5 ? (int)ceil(f->filter.radius - 0.5) : 0;
+    imp__walk_trace(tracer, s->arena, s->x, s->y, s->index, walk);
+    s->px = walk->px;
+    s->py = walk->py;
+    s->dropped = walk->dropped;
 }
-/* What a filter gives, along one axis, of a sample at film coordinate x to the pixels
- * [first, first + n) that it reaches, no further than [lo, hi]. Filters are separable: n
- * + n of these make the weights of n n pixels. */
-struct imp_taps {
-    int first, n;
-    double w[2 * (int)IMP_FILTER_RADIUS_MAX + 2];
-};
-static inline void imp__film_taps(const struct imp_filter *f, double x, int lo, int hi,
-                                  struct imp_taps *out)
-{
-    out->first = imp_max((int)ceil(x - f->radius - 0.5), lo);
-    out->n = imp_min((int)floor(x + f->radius - 0.5), hi) - out->first + 1;
-    for (int k = 0; k < out->n; k++)
-        out->w[k] = f->ops->eval(f, x - (out->first + k + 0.5));
-}
-
-/* IMP_E_PATHS if more walks of all `walks` were dropped than the run allows; one is
- * always forgiven. */
-enum imp_status imp__drops_check(imp_context *ctx, const struct imp_run *run,
-                                 uint64_t dropped, double walks);
 
 #endif

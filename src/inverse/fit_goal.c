@@ -2,6 +2,7 @@
  *
  * A problem as an optimiser sees it. */
 #include "curved/inside.h"
+#include "estimate.h"
 #include "fit.h"
 #include "walk/run.h"
 #include <float.h>
@@ -79,7 +80,7 @@ static enum imp_status eval(const double *x, uint64_t seed, struct imp_estimate 
     struct imp__fit *fit = payload;
     fit->run.seed = seed;
     fit->final_calls++;
-    return imp_problem_objective(fit->problem, x, &fit->run, f, g, g_se);
+    return imp__problem_objective(fit->problem, x, &fit->run, true, f, g, g_se);
 }
 
 static enum imp_status normal(const double *x, uint64_t seed, struct imp__normal *out,
