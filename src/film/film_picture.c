@@ -17,6 +17,10 @@
 #define MANY_TILES 1024
 #define SIDE_MAX   32
 
+/* Pixels of a picture whose means take seconds: who stops it in its first pass does not
+ * want to wait for a part of it. */
+#define LARGE_PICTURE 16e6
+
 struct render {
     const struct imp_run *run;
     const struct imp_picture *picture;
@@ -313,6 +317,11 @@ enum imp_status imp__picture_make(imp_context *ctx, const struct imp_picture *pi
     IMP_TRY(buffers_create(&r, ctx));
     ended = render_run(&r, &spp);
     if (ended != IMP_CANCELLED) IMP_TRY(ended);
+    if (ended == IMP_CANCELLED && spp == 0 &&
+        (double)r.sums.width * r.sums.height > LARGE_PICTURE) {
+        memset(out, 0, (size_t)n_films * sizeof *out);
+        IMP_TRY(ended);
+    }
     IMP_TRY(imp__film_sums_finish(&r.sums, r.border > 0 && imp_min(r.spp, r.pass_spp) > 1,
                                   picture->weights, films));
     for (int k = 0; k < n_films; k++) {

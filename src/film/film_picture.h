@@ -34,7 +34,8 @@ struct imp_picture {
 
 /* out [n_films]. A value that is not finite or beyond float is a dropped walk
  * (IMP_DROP_INFINITE, IMP_DROP_NAN).
- * @return IMP_OK; IMP_CANCELLED with a valid picture; IMP_E_PATHS; IMP_E_NOMEM, before
+ * @return IMP_OK; IMP_CANCELLED with a valid picture, or NULL from the first pass of a
+ * large one; IMP_E_PATHS; IMP_E_NOMEM, before
  * the first sample; IMP_E_NUMERIC if a pixel is not finite. */
 enum imp_status imp__picture_make(imp_context *ctx, const struct imp_picture *picture,
                                   const struct imp_run *run, imp_film **out);
