@@ -16,18 +16,19 @@
  * as a whole wanders, the answer is the average of the iterates, the later the heavier,
  * whose noise falls with their number (Polyak and Juditsky 1992; Shamir and Zhang 2013).
  */
+#include "adam_many.h"
 #include "basis.h"
 #include <math.h>
 #include <string.h>
 
-#define BETA1   0.9
-#define BETA2   0.99
-#define WINDOW  20
-#define STALLED 0.5 /* net motion / way, below which a window only wandered */
+#define BETA1   IMP_ADAM_BETA1
+#define BETA2   IMP_ADAM_BETA2
+#define WINDOW  IMP_ADAM_WINDOW
+#define STALLED IMP_ADAM_STALLED /* net motion / way, below which a window wandered */
 #define STEADY  0.8 /* and above which it went somewhere: the rate may grow again */
-#define COOLING 1.5 /* rate ~ (1 + windows wandered)^-COOLING */
-#define FELL    2 /* standard errors, by which a loss is lower than the window's before */
-#define FAR     4 /* by which it is so much lower that older iterates do not count */
+#define COOLING IMP_ADAM_COOLING /* rate ~ (1 + windows wandered)^-COOLING */
+#define FELL    IMP_ADAM_FELL /* standard errors, by which a loss is lower than before */
+#define FAR     IMP_ADAM_FAR  /* by which it is so low that older iterates do not count */
 
 /* Arrays: [n] each, but V and A [n][n], empty where the axes are the directions. FIRST,
  * SECOND, NET, WAY and PACE are along the rows of V. AVERAGE: of the iterates. */
@@ -61,6 +62,7 @@ static enum imp_status init(const struct imp__goal *goal,
 {
     enum imp_status st = IMP_OK;
     (void)options;
+    if (imp__adam_is_many(goal)) return imp__adam_many_init(s);
     for (int k = 0; k <= PACE; k++) IMP_TRY(imp__search_array(s, k, goal->n));
     for (size_t k = 0; k < goal->n; k++) s->array[HERE][k] = s->x[k];
     s->scalar[OLD_LOSS] = INFINITY;
@@ -285,6 +287,7 @@ static void answer(const struct imp__goal *goal, struct imp__search *s)
 static enum imp_status run(const struct imp__goal *goal,
                            const struct imp__opt_options *options, struct imp__search *s)
 {
+    if (imp__adam_is_many(goal)) return imp__adam_many_run(goal, options, s);
     enum imp_status st = IMP_OK;
     double *g = imp__alloc(goal->ctx, 2 * goal->n + 1, sizeof *g);
     if (!g) IMP_TRY(imp__error(goal->ctx, IMP_E_NOMEM, "no memory for a gradient"));
