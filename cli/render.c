@@ -92,6 +92,25 @@ static char *default_output(const struct imp_run *run)
     return path;
 }
 
+/* How many walks of each cause, and the first of them to look at. More than the budget
+ * fails the run. */
+static void report_drops(const struct imp_film_info *info)
+{
+    if (!info->dropped) return;
+    cli_say("%llu of %.3g walks were left out, within the budget of 1 in 10000:",
+            (unsigned long long)info->dropped,
+            (double)info->width * info->height * (double)info->spp);
+    for (int c = 0; c < IMP_DROP_CAUSES; c++)
+        if (info->dropped_by_cause[c])
+            cli_say("  %llu: %s", (unsigned long long)info->dropped_by_cause[c],
+                    imp_drop_text((enum imp_drop)c));
+    if (info->n_drop_keys)
+        cli_say("  the first: render --pixel %d,%d --sample %lld --seed %llu",
+                info->drop_keys[0].x, info->drop_keys[0].y,
+                (long long)info->drop_keys[0].sample,
+                (unsigned long long)info->drop_keys[0].seed);
+}
+
 static void report(const char *path, imp_film *film, const struct imp_run *run)
 {
     struct imp_film_info info = {.size = sizeof info};
@@ -102,11 +121,7 @@ static void report(const char *path, imp_film *film, const struct imp_run *run)
             : info.spp
                 ? ", interrupted"
                 : ", interrupted in the first pass: a part of the picture is there");
-    if (info.dropped) /* more than the budget fails the run */
-        cli_say("%llu of %.3g walks were left out (a value not finite or negative, or a "
-                "bent ray lost): within the budget of 1 in 10000",
-                (unsigned long long)info.dropped,
-                (double)info.width * info.height * (double)info.spp);
+    report_drops(&info);
     if (!cli.json || !strcmp(path, "-")) return;
     struct json j = cli_json();
     json_text(&j, "file", path);
@@ -161,7 +176,8 @@ static int run_render(int n, char **operand)
         const enum imp_status st = imp_render(cli.scene, &run, &film);
         if (cli_failed(st)) rc = cli_fail(st, cli.scene_path);
     }
-    if (film && !rc) { /* none: stopped before the first pass was done */
+    if (!film && !rc) cli_say("interrupted in the first pass: no picture is written");
+    if (film && !rc) {
         picture_stamp(film, &run);
         rc = picture_write(film, path, &o.picture);
         if (!rc) report(path, film, &run);

@@ -29,9 +29,9 @@ today() {
 twice() { LC_ALL=C sort | uniq -d; }
 
 today "files of one name" \
-    adjoint.c adjoint.h basis.c bend.c bend.h build.h check.c compare.c elements.c elements.h \
+    adjoint.c adjoint.h basis.c bend.c bend.h build.h check.c compare.c elements.h \
     file.c film.c film.h fit.c gradient.c guide.c guide.h ies.c ies.h image.c info.c \
-    jacobian.c measure.c mesh.c picture.c picture.h problem.c problem.h render.c sum.c \
+    jacobian.c mesh.c problem.c problem.h sum.c \
     surface.c sweep.c trace.c \
     < <(find src cli -name '*.[ch]' -printf '%f\n' | twice)
 

@@ -410,8 +410,10 @@ struct imp_run {
     }
 
 /** Render the scene's integrator through a sensor.
- * @return IMP_OK; IMP_CANCELLED (*out is valid, with the passes done); IMP_E_ARG;
- *         IMP_E_PATHS; IMP_E_NOMEM. */
+ * @return IMP_OK; IMP_CANCELLED (*out is valid, with the passes done; or NULL, if less
+ * than one pass of a picture of more than 16 million pixels was); IMP_E_ARG; IMP_E_PATHS;
+ *         IMP_E_NOMEM, with the size, before the first sample; IMP_E_NUMERIC if a pixel
+ * is not finite. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_render(const imp_scene *scene, const struct imp_run *run, imp_film **out);
 

@@ -42,6 +42,33 @@ static void default_release(void *memory, void *payload)
     free(memory);
 }
 
+/* What can be had without driving others out of memory; 0: not known. */
+static double memory_left(void)
+{
+    double kib = 0;
+    char line[128];
+    FILE *f = fopen("/proc/meminfo", "r");
+    while (f && fgets(line, sizeof line, f)) {
+        unsigned long long n;
+        if (sscanf(line, "MemAvailable: %llu", &n) == 1 ||
+            sscanf(line, "SwapFree: %llu", &n) == 1)
+            kib += (double)n;
+    }
+    if (f) fclose(f);
+    return 1024 * kib;
+}
+
+enum imp_status imp__memory_check(imp_context *ctx, double bytes, const char *what)
+{
+    const double certain = (double)((size_t)1 << 28); /* not worth a look */
+    if (bytes < certain || ctx->allocator.allocate != default_allocate) return IMP_OK;
+    const double left = memory_left();
+    if (left <= 0 || bytes < left) return IMP_OK;
+    return imp__error(ctx, IMP_E_NOMEM,
+                      "%s takes %.3g GB of memory; %.3g GB are available", what,
+                      bytes * 1e-9, left * 1e-9);
+}
+
 const char *imp_status_text(enum imp_status status)
 {
 #define STATUS_CASE(name, value, text)                                                   \

@@ -59,6 +59,9 @@ void imp__warn(imp_context *ctx, const char *format, ...) IMP_PRINTF(2, 3);
 void *imp__alloc(imp_context *ctx, size_t n, size_t size);
 void *imp__alloc_raw(imp_context *ctx, size_t n, size_t size); /* not zeroed */
 void imp__release(imp_context *ctx, void *memory);
+/* IMP_E_NOMEM, with both sizes, if so many bytes are more than the machine has left. Not
+ * of a host's own allocator: it knows its limits. `what` begins the message. */
+enum imp_status imp__memory_check(imp_context *ctx, double bytes, const char *what);
 /* Grow an array of `old_n` elements to at least `n` (doubling); keeps the contents, new
  * ones are zero. On failure returns NULL and the old array stays. */
 void *imp__grow(imp_context *ctx, void *array, size_t *capacity, size_t n, size_t size);

@@ -38,8 +38,8 @@ static enum imp_status names_split(imp_film *f, const char *list)
     }
 }
 
-enum imp_status imp__film_create(imp_context *ctx, int width, int height,
-                                 const char *names, bool with_se, imp_film **out)
+enum imp_status imp__film_describe(imp_context *ctx, int width, int height,
+                                   const char *names, imp_film **out)
 {
     enum imp_status st = IMP_OK;
     imp_film *f = imp__alloc(ctx, 1, sizeof *f);
@@ -53,17 +53,37 @@ enum imp_status imp__film_create(imp_context *ctx, int width, int height,
     IMP_TRY(names_split(f, names));
     f->width = width;
     f->height = height;
-    const size_t n = imp__film_values(f);
-    if (n > IMP_FILM_VALUES_MAX)
+    if (imp__film_values(f) > IMP_FILM_VALUES_MAX)
         IMP_TRY(imp__error(ctx, IMP_E_NOMEM,
                            "film: %d x %d with %d channels is too large", width, height,
                            f->channels));
-    f->mean = imp__alloc(ctx, n, sizeof *f->mean);
-    f->se = with_se ? imp__alloc(ctx, n, sizeof *f->se) : NULL;
-    if (!f->mean || (with_se && !f->se))
-        IMP_TRY(imp__error(ctx, IMP_E_NOMEM,
-                           "film: no memory for %d x %d with %d channels", width, height,
-                           f->channels));
+    *out = f;
+    return IMP_OK;
+out:
+    imp_film_destroy(f);
+    return st;
+}
+
+enum imp_status imp__film_room(imp_film *f, float **array)
+{
+    *array = imp__alloc_raw(f->ctx, imp__film_values(f), sizeof **array);
+    if (*array) return IMP_OK;
+    return imp__error(f->ctx, IMP_E_NOMEM, "film: no memory for %d x %d with %d channels",
+                      f->width, f->height, f->channels);
+}
+
+enum imp_status imp__film_create(imp_context *ctx, int width, int height,
+                                 const char *names, bool with_se, imp_film **out)
+{
+    enum imp_status st = IMP_OK;
+    imp_film *f = NULL;
+    IMP_TRY(imp__film_describe(ctx, width, height, names, &f));
+    IMP_TRY(imp__film_room(f, &f->mean));
+    memset(f->mean, 0, imp__film_values(f) * sizeof *f->mean);
+    if (with_se) {
+        IMP_TRY(imp__film_room(f, &f->se));
+        memset(f->se, 0, imp__film_values(f) * sizeof *f->se);
+    }
     *out = f;
     return IMP_OK;
 out:

@@ -29,6 +29,10 @@ struct imp_film {
 /* Zeros. `names` is a comma-separated list, one name a channel ("R,G,B"). */
 enum imp_status imp__film_create(imp_context *ctx, int width, int height,
                                  const char *names, bool with_se, imp_film **out);
+/* The same without mean and se, and the room for one of them, not cleared. */
+enum imp_status imp__film_describe(imp_context *ctx, int width, int height,
+                                   const char *names, imp_film **out);
+enum imp_status imp__film_room(imp_film *film, float **array);
 static inline size_t imp__film_values(const imp_film *f)
 {
     return (size_t)f->width * (size_t)f->height * (size_t)f->channels;

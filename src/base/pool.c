@@ -24,6 +24,8 @@ struct run {
     double last_report_s, start_s;
     size_t error_item; /* whose message `error` is: the lowest failed item */
     size_t failed;     /* of a loop without commits: the lowest failed item */
+    size_t *at;        /* [threads] item that a worker is at, SIZE_MAX: none */
+    int threads;
     char error[1024];
 };
 
@@ -106,6 +108,15 @@ static void item_done(struct imp_pool *pool, struct run *r, size_t item,
     if (stop) r->stop = true;
 }
 
+/* Is the next item within the window behind the oldest that somebody is at? */
+static bool may_begin(const struct run *r)
+{
+    if (r->loop->window == 0) return true;
+    size_t oldest = r->next;
+    for (int k = 0; k < r->threads; k++) oldest = imp_min(oldest, r->at[k]);
+    return r->next - oldest < r->loop->window;
+}
+
 /* Take items until there are none. Lock held on entry and exit. */
 static void work_on(struct imp_pool *pool, struct run *r, int worker)
 {
@@ -116,7 +127,12 @@ static void work_on(struct imp_pool *pool, struct run *r, int worker)
             pthread_cond_wait(&pool->changed, &pool->lock); /* ran ahead of commits */
             continue;
         }
+        if (!ordered && !may_begin(r)) {
+            pthread_cond_wait(&pool->changed, &pool->lock);
+            continue;
+        }
         const size_t i = r->next++;
+        r->at[worker] = i;
         const int slot = ordered ? (int)(i % (size_t)r->n_slots) : worker;
         pthread_mutex_unlock(&pool->lock);
         const enum imp_status st = l->work(i, worker, slot, l->payload);
@@ -125,8 +141,10 @@ static void work_on(struct imp_pool *pool, struct run *r, int worker)
             r->error_item = i;
             snprintf(r->error, sizeof r->error, "%s", imp_last_error(pool->ctx));
         }
+        r->at[worker] = SIZE_MAX;
         if (!ordered) {
             item_done(pool, r, i, st);
+            if (l->window > 0 || r->stop) pthread_cond_broadcast(&pool->changed);
             continue;
         }
         r->slot_status[slot] = st;
@@ -247,11 +265,17 @@ enum imp_status imp__parallel(imp_context *ctx, const struct imp_loop *loop, siz
     enum imp_status st = IMP_E_NOMEM;
     struct run r = {.loop = loop, .n_slots = n_slots, .start_s = imp__now()};
     r.slot_done = imp__alloc(ctx, (size_t)n_slots, sizeof *r.slot_done);
-    r.slot_status = imp__alloc(ctx, (size_t)n_slots, sizeof *r.slot_status);
-    if (!r.slot_done || !r.slot_status) {
+    r.at = imp__alloc(ctx, 1,
+                      (size_t)ctx->threads * sizeof *r.at +
+                          (size_t)n_slots * sizeof *r.slot_status);
+    r.threads = ctx->threads;
+    for (int k = 0; r.at && k < ctx->threads; k++) r.at[k] = SIZE_MAX;
+    if (!r.slot_done || !r.at) {
         imp__error(ctx, IMP_E_NOMEM, "no memory for a parallel loop");
         goto out;
     }
+
+    r.slot_status = (enum imp_status *)(r.at + ctx->threads);
 
     if (nested) { /* the pool is busy with the loop we are in */
         st = IMP_OK;
@@ -283,6 +307,46 @@ enum imp_status imp__parallel(imp_context *ctx, const struct imp_loop *loop, siz
     if (done) *done = r.committed;
 out:
     imp__release(ctx, r.slot_done);
-    imp__release(ctx, r.slot_status);
+    imp__release(ctx, r.at);
     return st;
+}
+
+/* ---- Sums ---------------------------------------------------------------------- */
+
+/* Nodes that wait for a slow item: no more than this many a thread. */
+#define WINDOW_PER_THREAD 8
+
+struct summing {
+    struct imp_sum_tree *tree;
+    size_t first;
+    enum imp_status (*work)(size_t i, int worker, void *result, void *payload);
+    void *payload;
+};
+
+static enum imp_status sum_work(size_t i, int worker, int slot, void *payload)
+{
+    struct summing *s = payload;
+    (void)slot;
+    void *result = imp__sum_tree_room(s->tree);
+    if (!result)
+        return imp__error(s->tree->ctx, IMP_E_NOMEM, "no memory for a part of a sum");
+    const enum imp_status st = s->work(s->first + i, worker, result, s->payload);
+    if (st == IMP_OK) return imp__sum_tree_put(s->tree, s->first + i, result);
+    imp__sum_tree_drop(s->tree, result);
+    return st;
+}
+
+enum imp_status imp__parallel_sum(imp_context *ctx, const struct imp_loop *loop,
+                                  struct imp_sum_tree *tree, size_t first,
+                                  enum imp_status (*work)(size_t i, int worker,
+                                                          void *result, void *payload),
+                                  size_t *done)
+{
+    struct summing s = {tree, first, work, loop->payload};
+    struct imp_loop own = *loop;
+    own.work = sum_work;
+    own.commit = NULL;
+    own.payload = &s;
+    own.window = (size_t)ctx->threads * WINDOW_PER_THREAD;
+    return imp__parallel(ctx, &own, done);
 }

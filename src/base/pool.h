@@ -2,12 +2,13 @@
  *
  * Parallel loops whose results do not depend on the number of threads. Work is cut into
  * items whose number is fixed by the problem; any worker computes any item; the results
- * are committed one at a time and in item order. Sums taken in `commit` therefore have
- * the same order on any number of threads. */
+ * are committed one at a time and in item order, or added up in a fixed binary tree. Sums
+ * therefore have one order, whoever computed what. */
 #ifndef IMP_BASE_POOL_H
 #define IMP_BASE_POOL_H
 
 #include "context.h"
+#include "sum_tree.h"
 
 struct imp_loop {
     size_t n_items;
@@ -28,6 +29,9 @@ struct imp_loop {
         fraction_hi;   /* part of the caller's work this loop is; hi 0: all */
     double start_s;    /* imp__now() when the caller's work began; 0: now */
     double deadline_s; /* imp__now() after which no item starts; 0: none */
+    /* Without commits: items this far after the oldest in work are not begun; 0: all are.
+     */
+    size_t window;
 };
 
 /* Result buffers a loop may need at once: a worker that runs ahead of the commits waits.
@@ -43,6 +47,15 @@ enum imp_status imp__parallel(imp_context *ctx, const struct imp_loop *loop,
 
 /* Is the calling thread at work on a loop of this context? */
 bool imp__pool_inside(imp_context *ctx);
+/* Add up results over items [first, first + loop->n_items) of the tree (sum_tree.h):
+ * `work` computes item `i`, counted in the tree, into `result`, which is not cleared.
+ * loop->work and commit are not looked at. On failure or IMP_CANCELLED the tree holds
+ * some of the items. */
+enum imp_status imp__parallel_sum(imp_context *ctx, const struct imp_loop *loop,
+                                  struct imp_sum_tree *tree, size_t first,
+                                  enum imp_status (*work)(size_t i, int worker,
+                                                          void *result, void *payload),
+                                  size_t *done);
 
 void imp__pool_destroy(imp_context *ctx, struct imp_pool *pool);
 

@@ -3,6 +3,8 @@
  * Formatted text appended to a growing buffer. */
 #include "text.h"
 #include "number.h"
+#include <stdio.h>
+#include <string.h>
 
 void imp__put(struct imp_text *t, const char *format, ...)
 {
@@ -23,4 +25,16 @@ void imp__put(struct imp_text *t, const char *format, ...)
     if (text != line) imp__release(t->ctx, text);
     va_end(again);
     va_end(args);
+}
+
+bool imp__json_string(imp_context *ctx, struct imp_bytes *out, const char *text)
+{
+    bool fine = imp__bytes_add(ctx, out, "\"", 1);
+    for (const char *s = text; fine && *s; s++) {
+        char c[8] = {*s};
+        if (*s == '"' || *s == '\\') c[0] = '\\', c[1] = *s;
+        else if ((unsigned char)*s < 0x20) snprintf(c, sizeof c, "\\u%04x", *s);
+        fine = imp__bytes_add(ctx, out, c, strlen(c));
+    }
+    return fine && imp__bytes_add(ctx, out, "\"", 1);
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The leaves, for other programs: a binary PLY mesh with colours, or JSON. */
-#include "base/file.h"
+#include "base/text.h"
 #include "color/rgb.h"
 #include "elements.h"
 #include <stdio.h>
@@ -54,16 +54,7 @@ static void put_number(struct writer *w, double x)
 }
 static void put_string(struct writer *w, const char *s)
 {
-    put_text(w, "\"");
-    for (; *s; s++) {
-        char c[8];
-        const unsigned char u = (unsigned char)*s;
-        if (u == '"' || u == '\\') snprintf(c, sizeof c, "\\%c", u);
-        else if (u < 0x20) snprintf(c, sizeof c, "\\u%04x", u);
-        else snprintf(c, sizeof c, "%c", u);
-        put_text(w, c);
-    }
-    put_text(w, "\"");
+    w->ok = w->ok && imp__json_string(w->ctx, &w->out, s);
 }
 
 /* Mean exitant radiance over the hemisphere and importance, per solid angle. */

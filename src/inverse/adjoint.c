@@ -8,8 +8,8 @@
  * unbiased at any n >= 2 (docs/estimators.md 5.2). A smooth loss that is not
  * quadratic has what its curvature does to that mean taken off by the jackknife (5.4). */
 #include "adjoint.h"
-#include "color/rgb.h"
 #include "loss.h"
+#include "seen.h"
 
 /* The loss of one number of a pixel. */
 struct loss {
@@ -63,12 +63,13 @@ double imp__replicate_adjoints(const struct imp__target *target, int channels,
         const struct loss f = {t->loss, scale, t->epsilon,
                                target->pixels[pixel * (size_t)t->channels + (size_t)c]};
         for (int i = 0; i < n; i++)
-            l[i] = same ? L[i][c] : imp__luminance(L[i][0], L[i][1], L[i][2]);
+            l[i] = imp__seen(t->channels, channels,
+                             (double[3]){L[i][0], L[i][1], L[i][2]}, c);
         value += imp__loss_quadratic(t->loss) ? leave_one_out(&f, n, l, a)
                                               : jackknife(&f, n, l, a);
         for (int i = 0; i < n; i++)
             if (same) P[i][c] = a[i];
-            else P[i] = (imp_spec){IMP_LUM_R, IMP_LUM_G, IMP_LUM_B, 0} * a[i];
+            else P[i] = imp__seen_bar(t->channels, channels, &a[i]);
     }
     return value;
 }

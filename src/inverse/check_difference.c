@@ -8,7 +8,7 @@
  * and Richardson's combination (4 D(h/2) - D(h))/3, whose error is O(h^4); at a bound,
  * one-sided differences D of third order, (8 D(h/2) - D(h))/7. */
 #include "check_difference.h"
-#include "walk/picture.h"
+#include "film/film_picture.h"
 #include <math.h>
 
 /* Steps as parts of the room that a number has: large, for noise falls with 1/step. F is
@@ -22,22 +22,15 @@
 struct sampled {
     struct imp_tracer tracer;
     const double *x_dot; /* NULL: radiance */
-    bool *no_memory;
 };
 
-static bool sample(const void *payload, struct imp_arena *arena, int x, int y,
-                   int64_t index, double *value, double *px, double *py)
+static void sample(const void *payload, struct imp_sample *out)
 {
     const struct sampled *s = payload;
     struct imp_walk walk;
-    imp__walk_trace(&s->tracer, arena, x, y, index, &walk);
+    imp__sample_walk(out, &s->tracer, &walk);
     const imp_spec v = s->x_dot ? imp__walk_tangent(&s->tracer, &walk, s->x_dot) : walk.L;
-    for (int c = 0; c < s->tracer.scene->channels; c++) value[c] = v[c];
-    *px = walk.px;
-    *py = walk.py;
-    if (walk.dropped == IMP_DROP_MEMORY)
-        __atomic_store_n(s->no_memory, true, __ATOMIC_RELAXED);
-    return walk.dropped == IMP_DROP_NONE;
+    for (int c = 0; c < s->tracer.scene->channels; c++) out->value[c] = v[c];
 }
 
 uint64_t imp__fresh_seed(struct imp__fresh *f)
@@ -59,17 +52,18 @@ static enum imp_status functional(struct imp__fresh *f, const double *x_dot,
 {
     const struct imp_sensor *sensor = f->check->tracer.sensor;
     struct imp_run run = f->check->run;
-    bool no_memory = false;
-    struct sampled t = {f->check->tracer, x_dot, &no_memory};
-    struct imp_picture picture = {
-        sensor, "check", f->channels == 3 ? "R,G,B" : "Y", f->channels, sample, &t, NULL};
+    struct sampled t = {f->check->tracer, x_dot};
+    const struct imp_picture picture = {.sensor = sensor,
+                                        .stage = "check",
+                                        .names = f->channels == 3 ? "R,G,B" : "Y",
+                                        .n = f->channels,
+                                        .sample = sample,
+                                        .payload = &t};
     imp_film *film = NULL;
     if (!x_dot) t.tracer.active = NULL;
     run.spp = imp__fresh_batch(f);
     run.seed = t.tracer.seed = seed;
-    enum imp_status st = imp__picture_make(f->check->ctx, &picture, &run, &film);
-    if (no_memory && st == IMP_E_PATHS)
-        st = imp__error(f->check->ctx, IMP_E_NOMEM, "no memory to record a walk");
+    const enum imp_status st = imp__picture_make(f->check->ctx, &picture, &run, &film);
     if (st == IMP_OK) {
         *value = 0;
         for (size_t i = 0; i < imp__film_values(film); i++)

@@ -20,8 +20,8 @@
  * Pixels are looked at through a box filter, whatever the sensor's: through wider ones a
  * pixel is a ratio of sums over its neighbours' samples too. */
 #include "check.h"
+#include "film/film_picture.h"
 #include "loss.h"
-#include "walk/picture.h"
 #include <math.h>
 #include <string.h>
 
@@ -55,23 +55,18 @@ struct pass {
     struct imp_tracer tracer;
     const double *x_dot;
     size_t channels;
-    int64_t index;
 };
 
-static bool sample(const void *payload, struct imp_arena *arena, int x, int y, int64_t i,
-                   double *value, double *px, double *py)
+static void sample(const void *payload, struct imp_sample *s)
 {
     const struct pass *p = payload;
     struct imp_walk walk;
-    imp__walk_trace(&p->tracer, arena, x, y, p->index + i, &walk);
+    imp__sample_walk(s, &p->tracer, &walk);
     const imp_spec tangent = imp__walk_tangent(&p->tracer, &walk, p->x_dot);
     for (size_t c = 0; c < p->channels; c++) {
-        value[c] = walk.L[c];
-        value[p->channels + c] = tangent[c];
+        s->value[c] = walk.L[c];
+        s->value[p->channels + c] = tangent[c];
     }
-    *px = walk.px;
-    *py = walk.py;
-    return walk.dropped == IMP_DROP_NONE;
 }
 
 static enum imp_status samples_make(struct losses *l)
@@ -79,14 +74,15 @@ static enum imp_status samples_make(struct losses *l)
     enum imp_status st = IMP_OK;
     struct imp__check *c = l->check;
     for (int i = 0; i < N; i++) {
-        struct pass pass = {c->tracer, l->x_dot, l->channels, i};
-        const struct imp_picture picture = {c->tracer.sensor,
-                                            "check",
-                                            l->channels == 3 ? "0,1,2,3,4,5" : "0,1",
-                                            (int)(2 * l->channels),
-                                            sample,
-                                            &pass,
-                                            NULL};
+        struct pass pass = {c->tracer, l->x_dot, l->channels};
+        const struct imp_picture picture = {.sensor = c->tracer.sensor,
+                                            .stage = "check",
+                                            .names =
+                                                l->channels == 3 ? "0,1,2,3,4,5" : "0,1",
+                                            .n = (int)(2 * l->channels),
+                                            .sample = sample,
+                                            .payload = &pass,
+                                            .first = i};
         struct imp_run run = c->run;
         run.spp = 1;
         pass.tracer.seed = l->seed;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "check_walks.h"
-#include "walk/picture.h"
+#include "film/film_picture.h"
 #include <math.h>
 #include <string.h>
 

@@ -21,32 +21,12 @@ static inline int imp__replicates_begin(struct imp__replicates r, int k)
     return (int)((int64_t)r.R * k / r.chunks);
 }
 
-/* A tile of TILE x TILE pixels of the picture, in rows. */
-#define IMP_ESTIMATE_TILE 8
-struct imp__tile {
-    int x0, y0, x1, y1, chunk;
-};
-static inline struct imp__tile imp__tile_of(size_t item, int width, int height,
-                                            int margin, int chunks)
-{
-    const int side = IMP_ESTIMATE_TILE;
-    const int across = (width + 2 * margin + side - 1) / side;
-    const int k = (int)(item / (size_t)chunks);
-    struct imp__tile t;
-    t.chunk = (int)(item % (size_t)chunks);
-    t.x0 = k % across * side - margin;
-    t.y0 = k / across * side - margin;
-    t.x1 = imp_min(t.x0 + side, width + margin);
-    t.y1 = imp_min(t.y0 + side, height + margin);
-    return t;
-}
-static inline size_t imp__tile_count(int width, int height, int margin)
-{
-    const int side = IMP_ESTIMATE_TILE;
-    return (size_t)((width + 2 * margin + side - 1) / side) *
-           (size_t)((height + 2 * margin + side - 1) / side);
-}
-
+/* imp_problem_objective; `in_place`: sums of many numbers are made in gradient and
+ * gradient_se, which a failure then leaves undefined. */
+enum imp_status imp__problem_objective(struct imp_problem *p, const double *x,
+                                       const struct imp_run *run, bool in_place,
+                                       struct imp_estimate *objective, double *gradient,
+                                       double *gradient_se);
 /* The tracer of a sensor for this problem, with every reason to refuse checked. */
 enum imp_status imp__problem_tracer(const struct imp_problem *p,
                                     const struct imp_run *run, struct imp_tracer *out);

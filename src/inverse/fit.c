@@ -100,7 +100,7 @@ static enum imp_status result_make(struct imp__fit *f, const struct imp__search 
                           "no memory for the result of a fit");
     for (size_t k = 0; k < n; k++) {
         struct imp_fit_variable *v = &variables[k];
-        v->start = s->start[k];
+        v->start = imp__search_start(s, k);
         v->value = x[k];
         v->at_bound = imp__at_bound(&f->goal, x, k);
         determined += u->n == 0 || v->determined;
@@ -137,6 +137,65 @@ static enum imp_status result_make(struct imp__fit *f, const struct imp__search 
     return IMP_OK;
 }
 
+/* Is parameter k active, and kept in doubles? */
+static bool is_double(const struct imp_problem *p, size_t k)
+{
+    return p->active.base[k] >= 0 && p->scene->params[k].store != IMP_STORE_BULK;
+}
+static size_t many_doubles(const struct imp_problem *p)
+{
+    size_t n = 0;
+    for (size_t k = 0; k < p->scene->n_params; k++)
+        n += is_double(p, k) ? p->scene->params[k].info.count : 0;
+    return n;
+}
+
+/* The numbers before the fit, to go back to. Of many: those that are not floats, which
+ * the search keeps. */
+static enum imp_status start_keep(const struct imp_problem *p, bool many, double **out)
+{
+    size_t used = 0;
+    double *start = imp__alloc_raw(p->ctx, many ? many_doubles(p) : p->n, sizeof *start);
+    if (!start)
+        return imp__error(p->ctx, IMP_E_NOMEM, "no memory for %zu variables", p->n);
+    *out = start;
+    if (!many) {
+        imp_problem_get_x(p, start);
+        return IMP_OK;
+    }
+    for (size_t k = 0; k < p->scene->n_params; k++) {
+        const struct imp_param *q = &p->scene->params[k];
+        for (size_t e = 0; is_double(p, k) && e < q->info.count; e++)
+            start[used++] = imp__param_get(q, e);
+    }
+    return IMP_OK;
+}
+
+/* The search's starts are floats; the others as they were. */
+static void start_tell(const struct imp_problem *p, const double *start,
+                       struct imp_fit_variable *variables)
+{
+    size_t used = 0;
+    for (size_t k = 0; k < p->scene->n_params; k++)
+        for (size_t e = 0; is_double(p, k) && e < p->scene->params[k].info.count; e++)
+            variables[(size_t)p->active.base[k] + e].start = start[used++];
+}
+
+static void start_restore(struct imp_problem *p, bool many, const double *start,
+                          struct imp__search *s)
+{
+    size_t used = 0;
+    if (!many) {
+        (void)!imp_problem_set_x(p, start);
+        return;
+    }
+    for (size_t k = 0; k < p->n; k++) s->x[k] = imp__search_start(s, k);
+    for (size_t k = 0; k < p->scene->n_params; k++)
+        for (size_t e = 0; is_double(p, k) && e < p->scene->params[k].info.count; e++)
+            s->x[(size_t)p->active.base[k] + e] = start[used++];
+    (void)!imp_problem_set_x(p, s->x);
+}
+
 enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
                         const struct imp_run *run, const struct imp_fit_result **result)
 {
@@ -151,7 +210,7 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
     struct imp__search *s = NULL;
     struct imp__uncertainty u = {0};
     struct imp_fit_variable *variables = NULL;
-    double *start = NULL, *x;
+    double *start = NULL, *x = NULL;
     const char *why = NULL;
 
     IMP_TRY(imp__fit_begin(p, options, run, &f));
@@ -159,19 +218,20 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
         IMP_TRY(imp__error(ctx, IMP_E_ARG,
                            "Levenberg-Marquardt needs a second derivative of the loss, "
                            "and l1 has none: use Adam, or another loss"));
-    start = imp__alloc(ctx, 2 * p->n, sizeof *start);
-    if (!start)
-        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for %zu variables", p->n));
-    x = start + p->n;
-    imp_problem_get_x(p, start);
+    IMP_TRY(start_keep(p, f.spans != NULL, &start));
     const struct imp__opt_options o = {f.options.max_iterations, f.options.learning_rate,
                                        f.options.tolerance};
-    IMP_TRY(imp__search_create(&f.goal, f.options.optimizer, &o, start, &s));
+    x = imp__alloc_raw(ctx, p->n, sizeof *x);
+    if (!x) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for %zu variables", p->n));
+    imp_problem_get_x(p, x);
+    IMP_TRY(imp__search_create(&f.goal, f.options.optimizer, &o, x, &s));
+    imp__release(ctx, x);
+    x = NULL;
     bool found = false;
     if (f.options.resume)
         IMP_TRY(imp__checkpoint_read(ctx, f.options.checkpoint, &f.fingerprint, &f.goal,
                                      s, &found));
-    imp__fit_scales(&f, s->start);
+    imp__fit_scales(&f, s);
     f.search = s;
     f.first_iteration = s->iteration;
 
@@ -182,11 +242,12 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
     if (f.options.checkpoint)
         IMP_TRY(imp__checkpoint_write(ctx, f.options.checkpoint, &f.fingerprint, s));
 
+    imp__search_settle(s);
+    x = s->x;
     imp__arena_free(&p->fit_arena);
     variables = imp__arena_array(&p->fit_arena, p->n, sizeof *variables);
     if (!variables)
         IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for the result of a fit"));
-    memcpy(x, s->x, p->n * sizeof *x);
     struct imp_estimate objective = {NAN, NAN, 0};
     if (s->n_history > 0)
         objective = (struct imp_estimate){s->history[s->n_history - 1],
@@ -205,6 +266,7 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
     if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
     IMP_TRY(imp_problem_set_x(p, x));
     IMP_TRY(result_make(&f, s, x, objective, &u, variables, why, &shift, result));
+    if (f.spans) start_tell(p, start, variables);
     if (f.outer.progress && ended == IMP_OK) {
         const struct imp_progress last = {.size = sizeof last,
                                           .stage = "fit",
@@ -216,11 +278,11 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
     }
     st = ended;
 out:
-    if (st != IMP_OK && st != IMP_CANCELLED && start &&
-        s) /* as if nothing had been tried */
-        (void)!imp_problem_set_x(p, start);
+    if (st != IMP_OK && st != IMP_CANCELLED && start && s) /* as if nothing was tried */
+        start_restore(p, f.spans != NULL, start, s);
     imp__uncertainty_destroy(ctx, &u);
     imp__search_destroy(s);
+    if (!s) imp__release(ctx, x);
     imp__release(ctx, start);
     imp__fit_end(&f);
     return st;

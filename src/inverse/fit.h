@@ -14,10 +14,12 @@ struct imp__fit {
     struct imp_run outer;           /* the caller's */
     struct imp__goal goal;
     struct imp__fingerprint fingerprint;
-    double *lo, *hi, *scale; /* [n] */
-    double *g_se;            /* [n], for Gauss-Newton */
-    double *H_prior;         /* [n][n] second derivative of the regularisers */
-    bool noise_known;        /* every target has noise_se */
+    double *lo, *hi, *scale; /* [n]; NULL with spans */
+    double *g_se;            /* [n], for Gauss-Newton; likewise */
+    struct imp__span *spans; /* Adam of many variables: by parameter; or NULL */
+    size_t n_spans;
+    double *H_prior;  /* [n][n] second derivative of the regularisers */
+    bool noise_known; /* every target has noise_se */
 
     const struct imp__search *search; /* being run, for reports */
     double start_s, deadline_s;       /* deadline 0: none */
@@ -35,7 +37,7 @@ enum imp_status imp__fit_begin(struct imp_problem *problem,
                                const struct imp_fit_options *options,
                                const struct imp_run *run, struct imp__fit *fit);
 /* Scales of the variables, from where the search starts. */
-void imp__fit_scales(struct imp__fit *fit, const double *start);
+void imp__fit_scales(struct imp__fit *fit, const struct imp__search *search);
 void imp__fit_end(struct imp__fit *fit);
 
 /* fit_residual.c: what is left between scene and targets. NAN: cannot be said. */

@@ -4,9 +4,9 @@
  * pixels that are ratios of sums (wide filters), leave a bias b(N) that falls at least
  * like 1/N. At the answer x of N samples the gradient by 4 N samples is g, and x - G g,
  * G the inverse of H, is where these would end: 3/4 of the bias away, or more. */
+#include "film/film_picture.h"
 #include "fit.h"
 #include "loss.h"
-#include "walk/picture.h"
 #include <math.h>
 
 #define MORE 4

@@ -2,6 +2,7 @@
  *
  * A problem as an optimiser sees it. */
 #include "curved/inside.h"
+#include "estimate.h"
 #include "fit.h"
 #include "walk/run.h"
 #include <float.h>
@@ -79,7 +80,7 @@ static enum imp_status eval(const double *x, uint64_t seed, struct imp_estimate 
     struct imp__fit *fit = payload;
     fit->run.seed = seed;
     fit->final_calls++;
-    return imp_problem_objective(fit->problem, x, &fit->run, f, g, g_se);
+    return imp__problem_objective(fit->problem, x, &fit->run, true, f, g, g_se);
 }
 
 static enum imp_status normal(const double *x, uint64_t seed, struct imp__normal *out,
@@ -184,25 +185,63 @@ static void fingerprint(struct imp__fit *f)
 
 /* A large change of a variable: its whole range, or its size at the start. Zeros take the
  * size of their neighbours in the same parameter, or 1 in the parameter's unit. */
-void imp__fit_scales(struct imp__fit *f, const double *start)
+void imp__fit_scales(struct imp__fit *f, const struct imp__search *search)
 {
     const struct imp_problem *p = f->problem;
+    size_t span = 0;
     for (size_t k = 0; k < p->scene->n_params; k++) {
         const struct imp_param_info *info = &p->scene->params[k].info;
         const int64_t base = p->active.base[k];
         double square = 0;
         if (base < 0) continue;
         for (size_t e = 0; e < info->count; e++)
-            square += start[base + (int64_t)e] * start[base + (int64_t)e];
+            square += imp__sqr(imp__search_start(search, (size_t)base + e));
         const double typical = square > 0 ? sqrt(square / (double)info->count) : 1;
+        const bool bounded =
+            isfinite(info->lo) && isfinite(info->hi) && info->hi - info->lo < DBL_MAX;
+        const double range = info->hi - info->lo;
+        if (f->spans) {
+            const double scale = bounded ? range : typical;
+            f->spans[span].by_start = !bounded;
+            f->spans[span++].scale = scale > 0 ? scale : 1;
+            continue;
+        }
         for (size_t e = 0; e < info->count; e++) {
-            double *scale = &f->scale[(size_t)base + e];
-            if (isfinite(info->lo) && isfinite(info->hi) && info->hi - info->lo < DBL_MAX)
-                *scale = info->hi - info->lo;
-            else *scale = fmax(fabs(start[(size_t)base + e]), typical);
-            if (!(*scale > 0)) *scale = 1;
+            const double start = fabs(imp__search_start(search, (size_t)base + e));
+            const double scale = bounded ? range : fmax(start, typical);
+            f->scale[(size_t)base + e] = scale > 0 ? scale : 1;
         }
     }
+}
+
+/* Bounds, by variable or by parameter. */
+static enum imp_status bounds_make(struct imp__fit *f)
+{
+    const struct imp_problem *p = f->problem;
+    const size_t n = p->n;
+    const bool many = f->options.optimizer == IMP_ADAM && n > IMP_SEARCH_FEW;
+    if (many) f->spans = imp__alloc(p->ctx, p->scene->n_params, sizeof *f->spans);
+    else f->lo = imp__alloc(p->ctx, 4 * n, sizeof *f->lo);
+    if (!f->spans && !f->lo)
+        return imp__error(p->ctx, IMP_E_NOMEM, "no memory for %zu variables", n);
+    if (!many) {
+        f->hi = f->lo + n;
+        f->scale = f->lo + 2 * n;
+        f->g_se = f->lo + 3 * n;
+    }
+    for (size_t k = 0; k < p->scene->n_params; k++) {
+        const struct imp_param_info *info = &p->scene->params[k].info;
+        const int64_t base = p->active.base[k];
+        if (base < 0) continue;
+        if (many)
+            f->spans[f->n_spans++] = (struct imp__span){(size_t)base + info->count,
+                                                        info->lo, info->hi, 1, false};
+        for (size_t e = 0; !many && e < info->count; e++) {
+            f->lo[(size_t)base + e] = info->lo;
+            f->hi[(size_t)base + e] = info->hi;
+        }
+    }
+    return IMP_OK;
 }
 
 enum imp_status imp__fit_begin(struct imp_problem *p,
@@ -240,18 +279,7 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
     if (f.options.learning_rate == 0) f.options.learning_rate = 0.05;
     if (f.options.tolerance == 0) f.options.tolerance = 1e-4;
 
-    f.lo = imp__alloc(ctx, 4 * n, sizeof *f.lo);
-    if (!f.lo) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for %zu variables", n));
-    f.hi = f.lo + n;
-    f.scale = f.lo + 2 * n;
-    f.g_se = f.lo + 3 * n;
-    for (size_t k = 0; k < p->scene->n_params; k++) {
-        const struct imp_param_info *info = &p->scene->params[k].info;
-        for (size_t e = 0; p->active.base[k] >= 0 && e < info->count; e++) {
-            f.lo[(size_t)p->active.base[k] + e] = info->lo;
-            f.hi[(size_t)p->active.base[k] + e] = info->hi;
-        }
-    }
+    IMP_TRY(bounds_make(&f));
     if (n <= IMP_DENSE_MAX) {
         f.H_prior = imp__alloc(ctx, n * n, sizeof *f.H_prior);
         if (!f.H_prior)
@@ -277,6 +305,8 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
                                    .lo = out->lo,
                                    .hi = out->hi,
                                    .scale = out->scale,
+                                   .spans = out->spans,
+                                   .n_spans = out->n_spans,
                                    .seed = out->outer.seed,
                                    .eval = eval,
                                    .normal = n <= IMP_DENSE_MAX ? normal : NULL,
@@ -292,5 +322,6 @@ void imp__fit_end(struct imp__fit *f)
 {
     if (!f->problem) return;
     imp__release(f->problem->ctx, f->lo);
+    imp__release(f->problem->ctx, f->spans);
     imp__release(f->problem->ctx, f->H_prior);
 }

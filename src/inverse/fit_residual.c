@@ -10,9 +10,9 @@
  * for Gaussian noise follows from sum 1/2 w^2 sigma^4, taken for fully correlated colour
  * channels, and for what filters wider than a pixel correlate (up to CORRELATED pixels).
  * The log loss has w = 1/(T + e)^2, to first order in the noise. */
+#include "film/film_picture.h"
 #include "fit.h"
 #include "loss.h"
-#include "walk/picture.h"
 #include <math.h>
 
 #define CORRELATED 4.

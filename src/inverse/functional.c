@@ -17,8 +17,8 @@
  * the same walks again and looks at e as a picture through a box filter. Through a box
  * filter I_p and W_p are constants of their stratum, and F needs one pass. */
 #include "estimate.h"
+#include "film/film_picture.h"
 #include "lanes.h"
-#include "walk/picture.h"
 #include "walk/run.h"
 #include <math.h>
 #include <stdio.h>
@@ -48,37 +48,43 @@ static int error_spp(int spp)
     return imp_max(2, imp_min(spp, imp_max(ERROR_SPP, spp / ERROR_SHARE)));
 }
 
+static void radiance(const struct functional *f, struct imp_sample *s)
+{
+    struct imp_walk walk;
+    imp__sample_walk(s, &f->tracer, &walk);
+    for (int c = 0; c < f->channels; c++) s->value[c] = walk.L[c];
+}
+
 /* ---- The second pass ----------------------------------------------------------- */
 
 /* e_i of the picture, and of the sums of derivative pictures: value [1 + n_groups]. */
-static bool sample_influence(const void *payload, struct imp_arena *arena, int x, int y,
-                             int64_t sample, double *value, double *px, double *py)
+static void sample_influence(const void *payload, struct imp_sample *s)
 {
     const struct functional *f = payload;
     const struct imp_film_desc *film = f->film;
     const size_t C = (size_t)f->channels, K = f->films ? f->tracer.active->n : 0;
-    double *lane = imp__arena_take(arena, (K + 1) * C, sizeof *lane);
+    double *value = s->value,
+           *lane = imp__arena_take(s->arena, (K + 1) * C, sizeof *lane);
     struct imp_taps across, down;
     for (int g = 0; g <= f->n_groups; g++) value[g] = 0;
-    if (!lane) return false;
-    bool fine = true;
-    if (f->films) {
-        fine = imp__lanes_sample(&f->tracer, arena, x - f->margin, y - f->margin, sample,
-                                 f->channels, lane, px, py);
-    } else {
-        struct imp_walk walk;
-        imp__walk_trace(&f->tracer, arena, x - f->margin, y - f->margin, sample, &walk);
-        for (size_t c = 0; c < C; c++) lane[c] = walk.L[c];
-        *px = walk.px;
-        *py = walk.py;
-        fine = walk.dropped == IMP_DROP_NONE;
-    }
+    s->dropped = IMP_DROP_MEMORY;
+    if (!lane) return;
+    struct imp_sample own = *s; /* of the film without its margin */
+    own.x -= f->margin;
+    own.y -= f->margin;
+    own.value = lane;
+    if (f->films) imp__lanes_sample(&f->tracer, &own);
+    else radiance(f, &own);
+    s->px = own.px;
+    s->py = own.py;
+    /* Of a dropped walk, which the picture has counted, the influence is that of a 0. */
+    s->dropped = own.dropped == IMP_DROP_MEMORY ? IMP_DROP_MEMORY : IMP_DROP_NONE;
     if (imp__film_border(film) > 0) {
-        imp__film_taps(&film->filter, *px - film->crop_x, 0, film->crop_w - 1, &across);
-        imp__film_taps(&film->filter, *py - film->crop_y, 0, film->crop_h - 1, &down);
+        imp__film_taps(&film->filter, s->px - film->crop_x, 0, film->crop_w - 1, &across);
+        imp__film_taps(&film->filter, s->py - film->crop_y, 0, film->crop_h - 1, &down);
     } else {
-        across = (struct imp_taps){.first = x, .n = 1, .w = {1}};
-        down = (struct imp_taps){.first = y, .n = 1, .w = {1}};
+        across = (struct imp_taps){.first = s->x, .n = 1, .w = {1}};
+        down = (struct imp_taps){.first = s->y, .n = 1, .w = {1}};
     }
     for (int j = 0; j < down.n; j++)
         for (int i = 0; i < across.n; i++) {
@@ -96,7 +102,6 @@ static bool sample_influence(const void *payload, struct imp_arena *arena, int x
                         a * (lane[(k + 1) * C + c] - f->films[k]->mean[at]);
             }
         }
-    return fine;
 }
 
 /* Standard errors of the picture's number and of the groups', se [1 + n_groups]. */
@@ -118,8 +123,12 @@ static enum imp_status influence(imp_context *ctx, const struct functional *f,
     strata.film.sample_border = false;
     own.spp = error_spp(f->spp);
     own.time_limit_s = 0;
-    const struct imp_picture picture = {&strata,          "errors", names, (int)n,
-                                        sample_influence, f,        NULL};
+    const struct imp_picture picture = {.sensor = &strata,
+                                        .stage = "errors",
+                                        .names = names,
+                                        .n = (int)n,
+                                        .sample = sample_influence,
+                                        .payload = f};
     IMP_TRY(imp__picture_make(ctx, &picture, &own, &film));
     for (size_t k = 0; k < n; k++) {
         double sum = 0;
@@ -137,32 +146,22 @@ out:
 /* ---- The picture --------------------------------------------------------------- */
 
 /* The radiance; through a box filter also what the sample adds to F. */
-static bool sample_value(const void *payload, struct imp_arena *arena, int x, int y,
-                         int64_t sample, double *value, double *px, double *py)
+static void sample_value(const void *payload, struct imp_sample *s)
 {
     const struct functional *f = payload;
     const size_t C = (size_t)f->channels;
-    struct imp_walk walk;
-    imp__walk_trace(&f->tracer, arena, x, y, sample, &walk);
-    for (size_t c = 0; c < C; c++) value[c] = walk.L[c];
-    if (!f->W) {
-        const size_t p = (size_t)y * (size_t)f->film->crop_w + (size_t)x;
-        value[C] = 0;
-        for (size_t c = 0; c < C; c++) value[C] += f->adjoint[p * C + c] * walk.L[c];
-    }
-    *px = walk.px;
-    *py = walk.py;
-    return walk.dropped == IMP_DROP_NONE;
+    radiance(f, s);
+    if (f->W) return;
+    const size_t p = (size_t)s->y * (size_t)f->film->crop_w + (size_t)s->x;
+    s->value[C] = 0;
+    for (size_t c = 0; c < C; c++) s->value[C] += f->adjoint[p * C + c] * s->value[c];
 }
 
-static bool sample_position(const void *payload, struct imp_arena *arena, int x, int y,
-                            int64_t sample, double *value, double *px, double *py)
+static void sample_position(const void *payload, struct imp_sample *s)
 {
     const struct functional *f = payload;
-    imp__walk_position(&f->tracer, x, y, sample, px, py);
-    (void)arena;
-    value[0] = 0;
-    return true;
+    imp__walk_position(&f->tracer, s->x, s->y, s->index, &s->px, &s->py);
+    s->value[0] = 0;
 }
 
 /* What all functions here begin with. *weights: room for W with a wide filter. *ones: the
@@ -217,8 +216,13 @@ static enum imp_status picture_value(imp_context *ctx, struct functional *f,
     struct imp_estimate value = {0, 0, 0};
     imp_film *film = NULL;
     f->tracer.active = NULL; /* nothing is differentiated here */
-    const struct imp_picture picture = {f->tracer.sensor, "picture", names[n - 1], n,
-                                        sample_value,     f,         weights};
+    const struct imp_picture picture = {.sensor = f->tracer.sensor,
+                                        .stage = "picture",
+                                        .names = names[n - 1],
+                                        .n = n,
+                                        .sample = sample_value,
+                                        .payload = f,
+                                        .weights = weights};
     IMP_TRY(imp__picture_make(ctx, &picture, run, &film));
     value.value = inner_product(f, film);
     f->spp = (int)film->spp;
@@ -284,8 +288,13 @@ static enum imp_status weights_make(imp_context *ctx, const struct functional *f
     imp_film *film = NULL;
     own.spp = f->spp;
     own.time_limit_s = 0;
-    const struct imp_picture picture = {f->tracer.sensor, "errors", "W",    1,
-                                        sample_position,  f,        weights};
+    const struct imp_picture picture = {.sensor = f->tracer.sensor,
+                                        .stage = "errors",
+                                        .names = "W",
+                                        .n = 1,
+                                        .sample = sample_position,
+                                        .payload = f,
+                                        .weights = weights};
     const enum imp_status st = imp__picture_make(ctx, &picture, &own, &film);
     imp_film_destroy(film);
     return st;

@@ -19,24 +19,24 @@
  * not correlated. */
 #include "gauss_newton.h"
 #include "adjoint.h"
+#include "film/film_filter.h"
+#include "film/film_tiles.h"
+
 #include "lanes.h"
 #include "loss.h"
-#include "walk/picture.h"
 #include <string.h>
 
 #define GAUSS_NEWTON_MAX 256
 
 struct job {
     const struct imp_problem *problem;
-    const struct imp_run *run;
-    double walks; /* planned, through one target's sensor */
     const struct imp__target *target;
     struct imp_tracer tracer;
     struct imp__replicates plan;
-    int width, height, channels;
+    int width, channels;
     size_t K;
+    struct imp_tiles tiles;
     struct worker {
-        struct imp_arena arena;
         double *x;      /* [K][channels] of one walk */
         double *sum_x;  /* [K][seen] of a replicate */
         double *sum_lx; /* [K][seen] */
@@ -49,21 +49,19 @@ struct job {
                            quadratic; NULL: there are none */
         imp_spec L[IMP_BATCH_MAX], P[IMP_BATCH_MAX];
     } * workers;
-    struct imp__normal_sums *slots, total;
+    double *total; /* [sums_count] */
 };
 
-static size_t sums_bytes(size_t K) { return (4 * K * K + K) * sizeof(double); }
+static size_t sums_count(size_t K) { return 4 * K * K + K + IMP_NORMAL_SCALARS; }
 
-static enum imp_status sums_create(imp_context *ctx, size_t K, struct imp__normal_sums *s)
+static struct imp__normal_sums sums_at(double *p, size_t K)
 {
-    double *p = imp__alloc(ctx, 1, sums_bytes(K));
-    if (!p) return imp__error(ctx, IMP_E_NOMEM, "no memory for %zu x %zu matrices", K, K);
-    *s = (struct imp__normal_sums){.H = p,
-                                   .H_same = p + K * K,
-                                   .H_meas = p + 2 * K * K,
-                                   .cov_g = p + 3 * K * K,
-                                   .g = p + 4 * K * K};
-    return IMP_OK;
+    return (struct imp__normal_sums){.H = p,
+                                     .H_same = p + K * K,
+                                     .H_meas = p + 2 * K * K,
+                                     .cov_g = p + 3 * K * K,
+                                     .g = p + 4 * K * K,
+                                     .scalars = p + 4 * K * K + K};
 }
 
 /* A walk's L and x as the target sees them: its channels, or their luminance. */
@@ -75,10 +73,11 @@ static double seen(const struct job *j, const double *lanes, int c)
 
 /* One replicate of a pixel: adds to the tile's matrices with factor `share`, writes its
  * gradient, returns its loss. */
-static double replicate(const struct job *j, struct worker *w,
+static double replicate(const struct job *j, struct imp_tile_worker *tile,
                         struct imp__normal_sums *out, int x, int y, int b, double share,
                         double *g)
 {
+    struct worker *w = &j->workers[tile->index];
     const size_t K = j->K, S = (size_t)seen_channels(j);
     const struct imp_target *t = &j->target->desc;
     const int n = j->plan.n;
@@ -92,16 +91,16 @@ static double replicate(const struct job *j, struct worker *w,
     memset(g, 0, K * sizeof *g);
 
     for (int i = 0; i < n; i++) {
-        const struct imp_arena_mark mark = imp__arena_mark(&w->arena);
+        const struct imp_arena_mark mark = imp__arena_mark(&tile->arena);
+        const int64_t sample = (int64_t)b * n + i;
         struct imp_walk walk;
-        imp__walk_trace(&j->tracer, &w->arena, x, y, (int64_t)b * n + i, &walk);
-        out->dropped += walk.dropped != IMP_DROP_NONE;
-        out->failed |= walk.dropped == IMP_DROP_MEMORY;
+        imp__walk_trace(&j->tracer, &tile->arena, x, y, sample, &walk);
+        imp__tile_drop(tile, walk.dropped, x, y, sample);
         memset(w->x, 0, K * (size_t)j->channels * sizeof(double));
         struct imp_lanes lanes = {
             {imp__lanes_add, true}, j->tracer.active, j->channels, w->x};
         imp__walk_sweep(&j->tracer, &walk, imp__lanes_adjoint(j->channels), &lanes.sink);
-        imp__arena_rewind(&w->arena, mark);
+        imp__arena_rewind(&tile->arena, mark);
         if (!quadratic) {
             memcpy(w->each_x + (size_t)i * width, w->x, width * sizeof(double));
             w->L[i] = walk.L;
@@ -153,7 +152,8 @@ static double replicate(const struct job *j, struct worker *w,
         const double a = weight * share / (N * (N - 1)), same = weight * share / (N * N);
         const double meas = weight * weight * sigma * sigma * share / (N * (N - 1));
         const double *xx = w->sum_xx + c * K * K;
-        out->chi2 += 2 * share * imp__loss_unbiased(weight, T_eff, N, sum[c], square[c]);
+        out->scalars[IMP_NORMAL_CHI2] +=
+            2 * share * imp__loss_unbiased(weight, T_eff, N, sum[c], square[c]);
         for (size_t k = 0; k < K; k++) {
             const double xk = w->sum_x[k * S + c];
             if (quadratic)
@@ -174,44 +174,37 @@ static double replicate(const struct job *j, struct worker *w,
     return value;
 }
 
-static enum imp_status tile_work(size_t item, int worker, int slot, void *payload)
+static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worker *tile,
+                                 void *result, void *payload)
 {
     struct job *j = payload;
-    struct worker *w = &j->workers[worker];
-    struct imp__normal_sums *out = &j->slots[slot];
+    struct worker *w = &j->workers[tile->index];
     const size_t K = j->K;
-    const struct imp__tile t = imp__tile_of(item, j->width, j->height, 0, j->plan.chunks);
-    const int b0 = imp__replicates_begin(j->plan, t.chunk);
-    const int b1 = imp__replicates_begin(j->plan, t.chunk + 1);
+    struct imp__normal_sums sums = sums_at(result, K), *out = &sums;
+    const int b0 = imp__replicates_begin(j->plan, (int)t->part);
+    const int b1 = imp__replicates_begin(j->plan, (int)t->part + 1);
     const double R = b1 - b0, all = j->plan.R;
-    memset(out->H, 0, sums_bytes(K));
-    out->objective = out->variance = out->chi2 = 0;
-    out->dropped = 0;
-    out->failed = false;
-    for (int y = t.y0; y < t.y1; y++)
-        for (int x = t.x0; x < t.x1; x++) {
+    memset(result, 0, sums_count(K) * sizeof(double));
+    for (int y = t->y0; y < t->y1; y++)
+        for (int x = t->x0; x < t->x1; x++) {
             double sum = 0, square = 0;
             memset(w->u, 0, 2 * (size_t)seen_channels(j) * K * K * sizeof(double));
             memset(w->a, 0, sizeof w->a);
             for (int b = b0; b < b1; b++) {
-                const double v =
-                    replicate(j, w, out, x, y, b, 1 / all, w->g + (size_t)(b - b0) * K);
+                const double v = replicate(j, tile, out, x, y, b, 1 / all,
+                                           w->g + (size_t)(b - b0) * K);
                 sum += v;
                 square += v * v;
             }
-            if (out->failed)
-                return imp__error(j->problem->ctx, IMP_E_NOMEM,
-                                  "no memory to record a walk");
-            const enum imp_status st =
-                imp__drops_check(j->problem->ctx, j->run, out->dropped, j->walks);
+            const enum imp_status st = imp__tile_check(tile);
             if (st != IMP_OK) return st;
             const double spread = R / ((R - 1) * all * all);
             if (!j->target->noise_se)
                 for (size_t i = 0; i < (size_t)seen_channels(j) * K * K; i++)
                     out->H_meas[i % (K * K)] +=
                         (w->a[i / (K * K)] * w->u[i] - w->au[i]) / ((R - 1) * all);
-            out->objective += sum / all;
-            out->variance += (square - sum * sum / R) * spread;
+            out->scalars[IMP_NORMAL_OBJECTIVE] += sum / all;
+            out->scalars[IMP_NORMAL_VARIANCE] += (square - sum * sum / R) * spread;
             for (size_t k = 0; k < K; k++) {
                 double mean_k = 0;
                 for (int b = 0; b < (int)R; b++) mean_k += w->g[(size_t)b * K + k] / R;
@@ -229,17 +222,19 @@ static enum imp_status tile_work(size_t item, int worker, int slot, void *payloa
     return IMP_OK;
 }
 
-static enum imp_status tile_commit(size_t item, int slot, void *payload)
+static void tile_add(void *into, const void *from, void *payload)
+{
+    const struct job *j = payload;
+    double *a = into;
+    const double *b = from;
+    for (size_t k = 0; k < sums_count(j->K); k++) a[k] += b[k];
+}
+
+static enum imp_status tile_take(size_t group, const void *sum, void *payload)
 {
     struct job *j = payload;
-    const struct imp__normal_sums *in = &j->slots[slot];
-    (void)item;
-    for (size_t k = 0; k < sums_bytes(j->K) / sizeof(double); k++)
-        j->total.H[k] += in->H[k];
-    j->total.objective += in->objective;
-    j->total.variance += in->variance;
-    j->total.chi2 += in->chi2;
-    j->total.dropped += in->dropped;
+    (void)group;
+    tile_add(j->total, sum, j);
     return IMP_OK;
 }
 
@@ -251,7 +246,6 @@ static enum imp_status workers_create(struct job *j, imp_context *ctx)
         quadratic &= imp__loss_quadratic(j->problem->targets[t].desc.loss);
     for (int k = 0; k < ctx->threads; k++) {
         struct worker *w = &j->workers[k];
-        imp__arena_init(&w->arena, ctx);
         w->x = imp__alloc(ctx, K * (3 + 2 * S + R) + 3 * S * K * K, sizeof(double));
         if (!w->x) return imp__error(ctx, IMP_E_NOMEM, "no memory for derivatives");
         w->sum_x = w->x + 3 * K;
@@ -278,32 +272,34 @@ static enum imp_status target_add(struct job *j, const struct imp__target *targe
     enum imp_status st = imp__problem_tracer(p, &own, &j->tracer);
     if (st != IMP_OK) return st;
     const struct imp_film_desc *film = &j->tracer.sensor->film;
-    if (imp__film_border(film) > 0)
-        return imp__gauss_newton_wide(p, &j->tracer, target, &own, lo, hi, &j->total);
+    if (imp__film_border(film) > 0) {
+        struct imp__normal_sums total = sums_at(j->total, j->K);
+        return imp__gauss_newton_wide(p, &j->tracer, target, &own, lo, hi, &total);
+    }
     j->width = film->crop_w;
-    j->height = film->crop_h;
     j->plan = imp__replicates_plan(
         imp_max(own.spp > 0 ? own.spp : j->tracer.sensor->spp, 4), IMP_BATCH_MAX);
-    const double walks = (double)j->width * j->height * j->plan.n * j->plan.R;
-    j->run = run;
-    j->walks = walks;
-    const struct imp_loop loop = {.n_items = imp__tile_count(j->width, j->height, 0) *
-                                             (size_t)j->plan.chunks,
+    const double walks = (double)film->crop_w * film->crop_h * j->plan.n * j->plan.R;
+    j->tiles = (struct imp_tiles){.ctx = p->ctx,
+                                  .run = &own,
+                                  .walks = walks,
+                                  .width = film->crop_w,
+                                  .height = film->crop_h,
                                   .work = tile_work,
-                                  .commit = tile_commit,
-                                  .payload = j,
-                                  .progress = run->progress,
-                                  .progress_payload = run->progress_payload,
-                                  .stage = "gauss-newton",
-                                  .rate_unit = "walks",
-                                  .units = walks,
-                                  .fraction_lo = lo,
-                                  .fraction_hi = hi,
-                                  .start_s = start};
-    const uint64_t before = j->total.dropped;
-    st = imp__parallel(p->ctx, &loop, NULL);
-    if (st == IMP_OK)
-        st = imp__drops_check(p->ctx, run, j->total.dropped - before, walks);
+                                  .size = sums_count(j->K) * sizeof(double),
+                                  .add = tile_add,
+                                  .take = tile_take,
+                                  .payload = j};
+    const struct imp_tiles_pass pass = {.stage = "gauss-newton",
+                                        .rate_unit = "walks",
+                                        .units = walks,
+                                        .fraction_lo = lo,
+                                        .fraction_hi = hi,
+                                        .start_s = start,
+                                        .parts = (size_t)j->plan.chunks};
+    st = imp__tiles_create(&j->tiles);
+    if (st == IMP_OK) st = imp__tiles_run(&j->tiles, &pass);
+    imp__tiles_destroy(&j->tiles);
     return st;
 }
 
@@ -344,7 +340,6 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
     struct imp_run own = IMP_RUN_INIT;
     if (run) own = *run;
     struct job j = {.problem = p, .K = p->n, .channels = p->scene->channels};
-    const int n_slots = imp__pool_slots(ctx);
     double residuals = 0;
     int bias_order = 0;
     bool wide = false;
@@ -354,18 +349,16 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
                            GAUSS_NEWTON_MAX));
     if (x) IMP_TRY(imp_problem_set_x(p, x));
     j.workers = imp__alloc(ctx, (size_t)ctx->threads, sizeof *j.workers);
-    j.slots = imp__alloc(ctx, (size_t)n_slots, sizeof *j.slots);
-    if (!j.workers || !j.slots) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory"));
+    j.total = imp__alloc(ctx, sums_count(j.K), sizeof *j.total);
+    if (!j.workers || !j.total)
+        IMP_TRY(
+            imp__error(ctx, IMP_E_NOMEM, "no memory for %zu x %zu matrices", j.K, j.K));
     IMP_TRY(workers_create(&j, ctx));
-    for (int k = 0; k < n_slots; k++) IMP_TRY(sums_create(ctx, j.K, &j.slots[k]));
-    IMP_TRY(sums_create(ctx, j.K, &j.total));
 
-    const double start = p->progress_start_s > 0 ? p->progress_start_s : imp__now();
-    const double lo = p->progress_lo, hi = p->progress_hi > 0 ? p->progress_hi : 1;
+    const double start = imp__now(), targets = (double)p->n_targets;
     for (size_t t = 0; t < p->n_targets; t++) {
-        IMP_TRY(target_add(
-            &j, &p->targets[t], &own, lo + (hi - lo) * (double)t / (double)p->n_targets,
-            lo + (hi - lo) * (double)(t + 1) / (double)p->n_targets, start));
+        IMP_TRY(target_add(&j, &p->targets[t], &own, (double)t / targets,
+                           (double)(t + 1) / targets, start));
         residuals +=
             (double)(p->targets[t].desc.channels) * pixels_in_use(&p->targets[t]);
         const int bias = imp__loss_bias_order(p->targets[t].desc.loss);
@@ -373,29 +366,28 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
         wide |= imp__film_border(&j.tracer.sensor->film) > 0;
     }
     /* With wide filters, the same estimate as that of trial steps from the same walks. */
-    struct imp_estimate objective = {j.total.objective, sqrt(fmax(0, j.total.variance)),
+    const struct imp__normal_sums total = sums_at(j.total, j.K);
+    struct imp_estimate objective = {total.scalars[IMP_NORMAL_OBJECTIVE],
+                                     sqrt(fmax(0, total.scalars[IMP_NORMAL_VARIANCE])),
                                      bias_order};
     if (wide) IMP_TRY(data_term(p, &own, &objective));
-    matrix_copy(out->H, j.total.H, j.K);
-    matrix_copy(out->H_same, j.total.H_same, j.K);
-    matrix_copy(out->H_meas, j.total.H_meas, j.K);
-    matrix_copy(out->cov_g, j.total.cov_g, j.K);
+    matrix_copy(out->H, total.H, j.K);
+    matrix_copy(out->H_same, total.H_same, j.K);
+    matrix_copy(out->H_meas, total.H_meas, j.K);
+    matrix_copy(out->cov_g, total.cov_g, j.K);
     for (size_t k = 0; k < j.K; k++) {
-        if (out->g) out->g[k] = j.total.g[k];
-        if (out->g_se) out->g_se[k] = sqrt(fmax(0, j.total.cov_g[k * j.K + k]));
+        if (out->g) out->g[k] = total.g[k];
+        if (out->g_se) out->g_se[k] = sqrt(fmax(0, total.cov_g[k * j.K + k]));
     }
     out->objective = objective;
-    out->chi2 = j.total.chi2;
+    out->chi2 = total.scalars[IMP_NORMAL_CHI2];
     out->n_residuals = residuals;
 out:
     for (int k = 0; j.workers && k < ctx->threads; k++) {
-        if (j.workers[k].arena.ctx) imp__arena_free(&j.workers[k].arena);
         imp__release(ctx, j.workers[k].x);
         imp__release(ctx, j.workers[k].each_x);
     }
-    for (int k = 0; j.slots && k < n_slots; k++) imp__release(ctx, j.slots[k].H);
-    imp__release(ctx, j.total.H);
     imp__release(ctx, j.workers);
-    imp__release(ctx, j.slots);
+    imp__release(ctx, j.total);
     return st;
 }

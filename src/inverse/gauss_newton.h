@@ -10,10 +10,10 @@
 
 struct imp__normal_sums { /* matrices [K*K], lower triangles */
     double *H, *H_same, *H_meas, *cov_g, *g;
-    double objective, variance, chi2;
-    uint64_t dropped;
-    bool failed; /* out of memory */
+    double *scalars; /* [IMP_NORMAL_SCALARS] */
 };
+/* Of a target: loss, its variance, chi^2. */
+enum { IMP_NORMAL_OBJECTIVE, IMP_NORMAL_VARIANCE, IMP_NORMAL_CHI2, IMP_NORMAL_SCALARS };
 
 /* Adds H, H_same, H_meas, g, cov_g and chi2 of a target seen through a filter wider than
  * a pixel; lo, hi: the part of the caller's progress. */

@@ -36,9 +36,6 @@ struct imp_problem {
     struct imp_run run;           /* of imp_problem_nlopt */
     struct imp_arena fit_arena;   /* of the last fit's result */
     struct imp_arena check_arena; /* of the last check's rows */
-    double progress_lo,
-        progress_hi; /* part of the caller's work an estimate is; 0, 0: all */
-    double progress_start_s;
 };
 
 /* Regularisers' value; adds their gradient (may be NULL). x [n]. */

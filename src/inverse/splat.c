@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "splat.h"
+#include "film/film_picture.h"
 #include "loss.h"
 #include "seen.h"
-#include "walk/picture.h"
 
 struct imp__replicates imp__splat_plan(int spp)
 {
@@ -11,33 +11,19 @@ struct imp__replicates imp__splat_plan(int spp)
     return r;
 }
 
-struct pass {
-    const struct imp_tracer *tracer;
-    int64_t first; /* sample number the replicate begins at */
-    int channels;
-};
-
-static bool sample_radiance(const void *payload, struct imp_arena *arena, int x, int y,
-                            int64_t sample, double *value, double *px, double *py)
+static void sample_radiance(const void *payload, struct imp_sample *s)
 {
-    const struct pass *p = payload;
+    const struct imp_tracer *tracer = payload;
     struct imp_walk walk;
-    imp__walk_trace(p->tracer, arena, x, y, p->first + sample, &walk);
-    for (int c = 0; c < p->channels; c++) value[c] = walk.L[c];
-    *px = walk.px;
-    *py = walk.py;
-    return walk.dropped == IMP_DROP_NONE;
+    imp__sample_walk(s, tracer, &walk);
+    for (int c = 0; c < tracer->scene->channels; c++) s->value[c] = walk.L[c];
 }
 
 /* Positions only: an integrator that stops at the sensor. */
-static bool sample_position(const void *payload, struct imp_arena *arena, int x, int y,
-                            int64_t sample, double *value, double *px, double *py)
+static void sample_position(const void *payload, struct imp_sample *s)
 {
-    const struct pass *p = payload;
-    imp__walk_position(p->tracer, x, y, p->first + sample, px, py);
-    (void)arena;
-    value[0] = 0;
-    return true;
+    imp__walk_position(payload, s->x, s->y, s->index, &s->px, &s->py);
+    s->value[0] = 0;
 }
 
 /* The loss of one replicate's picture; the variance of a quadratic one is taken off. */
@@ -49,13 +35,14 @@ static double picture_loss(const struct imp__splat *s, const imp_film *film)
     for (size_t p = 0; p < pixels; p++) {
         const double scale = t->scale * (s->target->weights ? s->target->weights[p] : 1);
         for (int c = 0; c < t->channels; c++) {
-            const size_t k = p * (size_t)s->channels + (size_t)c;
-            double I = film->mean[k], variance = imp__sqr(film->se[k]);
-            if (t->channels != s->channels) { /* channels of a sample correlate */
-                const float *m = film->mean + p * 3, *e = film->se + p * 3;
-                I = imp__luminance(m[0], m[1], m[2]);
-                variance = imp__sqr(imp__luminance(e[0], e[1], e[2]));
+            double mean[3], se[3];
+            for (int k = 0; k < s->channels; k++) {
+                mean[k] = film->mean[p * (size_t)s->channels + (size_t)k];
+                se[k] = film->se[p * (size_t)s->channels + (size_t)k];
             }
+            const double I = imp__seen(t->channels, s->channels, mean, c);
+            /* Channels of a sample correlate: the luminance of their errors. */
+            const double variance = imp__sqr(imp__seen(t->channels, s->channels, se, c));
             const double T = s->target->pixels[p * (size_t)t->channels + (size_t)c];
             struct imp__loss_at at;
             imp__loss_eval(t->loss, scale, t->epsilon, I, T, &at);
@@ -88,17 +75,19 @@ enum imp_status imp__splat_create(const struct imp_problem *p,
     for (int b = 0; b < plan.R; b++) {
         s.weights[b] = imp__alloc(ctx, pixels, sizeof **s.weights);
         if (!s.weights[b]) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory"));
-        const struct pass pass = {tracer, (int64_t)b * plan.n, target ? s.channels : 1};
         struct imp_run own = *run;
         own.spp = plan.n;
         own.time_limit_s = 0;
-        const struct imp_picture picture = {tracer->sensor,
-                                            "picture",
-                                            pass.channels == 3 ? "R,G,B" : "Y",
-                                            pass.channels,
-                                            target ? sample_radiance : sample_position,
-                                            &pass,
-                                            s.weights[b]};
+        const int n = target ? s.channels : 1;
+        const struct imp_picture picture = {.sensor = tracer->sensor,
+                                            .stage = "picture",
+                                            .names = n == 3 ? "R,G,B" : "Y",
+                                            .n = n,
+                                            .sample = target ? sample_radiance
+                                                             : sample_position,
+                                            .payload = tracer,
+                                            .first = (int64_t)b * plan.n,
+                                            .weights = s.weights[b]};
         IMP_TRY(imp__picture_make(ctx, &picture, &own, &s.films[b]));
         if (!target) continue;
         const double value = picture_loss(&s, s.films[b]);

@@ -164,55 +164,14 @@ void imp__tally_pixel(struct imp_tally *t, double replicates, double by_mean,
     t->n_touched = 0;
 }
 
-enum imp_status imp__tally_export(const struct imp_tally *t, struct imp_tally_result *out)
+void imp__tally_flush(const struct imp_tally *t, struct imp_fixed_sum *mean,
+                      struct imp_fixed_sum *variance)
 {
-    if (t->failed) return imp__error(t->ctx, IMP_E_NOMEM, "no memory for gradients");
-    if (t->dense) {
-        if (!out->dense)
-            out->dense = imp__alloc(t->ctx, 2 * t->active->n, sizeof *out->dense);
-        if (!out->dense)
-            return imp__error(t->ctx, IMP_E_NOMEM, "no memory for gradients");
-        memcpy(out->dense, t->mean, 2 * t->active->n * sizeof *out->dense);
-        return IMP_OK;
-    }
-    void *grown = imp__grow(t->ctx, out->pieces, &out->capacity, t->n_entries + 1,
-                            sizeof *out->pieces);
-    if (!grown) return imp__error(t->ctx, IMP_E_NOMEM, "no memory for gradients");
-    out->pieces = grown;
-    out->n = t->n_entries;
     for (size_t k = 0; k < t->n_entries; k++) {
         const struct imp__tally_entry *e = &t->entries[k];
-        struct imp__tally_piece *p = &out->pieces[k];
-        p->key = e->key;
-        p->channels = e->channels;
-        memcpy(p->mean, e->mean, sizeof p->mean);
-        memcpy(p->variance, e->variance, sizeof p->variance);
-    }
-    return IMP_OK;
-}
-
-void imp__tally_add(const struct imp_tally_result *r, size_t n_active, double *gradient,
-                    double *variance)
-{
-    if (r->dense) {
-        for (size_t k = 0; k < n_active; k++) {
-            gradient[k] += r->dense[k];
-            variance[k] += r->dense[n_active + k];
-        }
-        return;
-    }
-    for (size_t k = 0; k < r->n; k++) {
-        const struct imp__tally_piece *p = &r->pieces[k];
-        for (uint32_t c = 0; c < p->channels; c++) {
-            gradient[p->key + c] += p->mean[c];
-            variance[p->key + c] += p->variance[c];
+        for (uint32_t c = 0; c < e->channels; c++) {
+            imp__fixed_add(mean, e->key + c, e->mean[c]);
+            if (variance) imp__fixed_add(variance, e->key + c, e->variance[c]);
         }
     }
-}
-
-void imp__tally_result_destroy(imp_context *ctx, struct imp_tally_result *r)
-{
-    imp__release(ctx, r->pieces);
-    imp__release(ctx, r->dense);
-    *r = (struct imp_tally_result){0};
 }

@@ -10,6 +10,7 @@
 #ifndef IMP_INVERSE_TALLY_H
 #define IMP_INVERSE_TALLY_H
 
+#include "base/fixed_sum.h"
 #include "walk/walk.h"
 
 #define IMP_TALLY_DENSE 1024 /* numbers, above which the hash table is used */
@@ -49,20 +50,14 @@ void imp__tally_batch(struct imp_tally *t);
 void imp__tally_pixel(struct imp_tally *t, double replicates, double by_mean,
                       double by_variance);
 
-/* ---- Totals of a whole estimate, in x's order ---------------------------------- */
-struct imp_tally_result { /* a tile's means and variances, handed from worker to commit */
-    size_t n, capacity;
-    struct imp__tally_piece {
-        uint32_t key, channels;
-        double mean[3], variance[3];
-    } * pieces;
-    double *dense; /* [2 n_active] */
-};
-enum imp_status imp__tally_export(const struct imp_tally *t,
-                                  struct imp_tally_result *out);
-/* gradient, variance [n_active] += */
-void imp__tally_add(const struct imp_tally_result *r, size_t n_active, double *gradient,
-                    double *variance);
-void imp__tally_result_destroy(imp_context *ctx, struct imp_tally_result *r);
+/* Few numbers: mean and variance of the tile, [2][n] in x's order. */
+static inline const double *imp__tally_dense(const struct imp_tally *t)
+{
+    return t->mean;
+}
+/* Many numbers: add mean and variance of the tile to sums in x's order; variance may be
+ * NULL. */
+void imp__tally_flush(const struct imp_tally *t, struct imp_fixed_sum *mean,
+                      struct imp_fixed_sum *variance);
 
 #endif

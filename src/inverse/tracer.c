@@ -3,8 +3,8 @@
  * What a problem's walks are made with; and the reasons to refuse, where a gradient would
  * not be the whole one. */
 #include "estimate.h"
+#include "film/film_measure.h"
 #include "walk/graded.h"
-#include "walk/measure.h"
 #include <string.h>
 
 /* The attached form of the exponent here has neither the gradient of what arrives nor

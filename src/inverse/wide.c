@@ -17,10 +17,10 @@
  * Noise of the target is taken as correlated from pixel to pixel as the filter makes it,
  * since targets come through the same filter: H_meas = sum_pq w_p w_q rho(p - q)
  * sigma_p^2 J_p J_q, with the squared residual for sigma^2 where that is not given. */
+#include "film/film_picture.h"
 #include "gauss_newton.h"
 #include "lanes.h"
 #include "loss.h"
-#include "walk/picture.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -52,18 +52,14 @@ struct wide {
 
 struct pass {
     const struct imp_tracer *tracer;
-    int64_t first;
-    int channels;
     const struct imp_run *run;
     double lo, hi;
 };
 
-static bool sample(const void *payload, struct imp_arena *arena, int x, int y, int64_t i,
-                   double *value, double *px, double *py)
+static void sample(const void *payload, struct imp_sample *s)
 {
     const struct pass *p = payload;
-    return imp__lanes_sample(p->tracer, arena, x, y, p->first + i, p->channels, value, px,
-                             py);
+    imp__lanes_sample(p->tracer, s);
 }
 
 static int progress(const struct imp_progress *p, void *payload)
@@ -89,15 +85,19 @@ static enum imp_status replicates(struct wide *w, const struct imp_tracer *trace
         struct imp_run own = *run;
         own.spp = (spp - 1) / w->R + 1;
         own.time_limit_s = 0;
-        const struct pass pass = {
-            tracer, (int64_t)b * own.spp,      w->channels,
-            run,    lo + (hi - lo) * b / w->R, lo + (hi - lo) * (b + 1) / w->R};
+        const struct pass pass = {tracer, run, lo + (hi - lo) * b / w->R,
+                                  lo + (hi - lo) * (b + 1) / w->R};
         if (run->progress) {
             own.progress = progress;
             own.progress_payload = (void *)&pass;
         }
-        const struct imp_picture picture = {tracer->sensor, "gauss-newton", names, n,
-                                            sample,         &pass,          NULL};
+        const struct imp_picture picture = {.sensor = tracer->sensor,
+                                            .stage = "gauss-newton",
+                                            .names = names,
+                                            .n = n,
+                                            .sample = sample,
+                                            .payload = &pass,
+                                            .first = (int64_t)b * own.spp};
         IMP_TRY(imp__picture_make(w->ctx, &picture, &own, &w->films[b]));
     }
 out:
@@ -175,7 +175,7 @@ static void pixel_add(struct wide *w, size_t pixel, int c, double *leave,
     const bool quadratic = imp__loss_quadratic(w->target->loss);
     double factor[MANY];
     if (!quadratic) jackknife(w, pixel, c, S, factor);
-    out->chi2 += 2 * imp__loss_unbiased(weight, T, R, S, S2);
+    out->scalars[IMP_NORMAL_CHI2] += 2 * imp__loss_unbiased(weight, T, R, S, S2);
     for (size_t k = 0; k < K; k++) {
         double lx = 0;
         for (int b = 0; b < w->R; b++) lx += w->L[b] * w->X[(size_t)b * K + k];

@@ -16,18 +16,19 @@
  * directions do so, the answer is a weighted average of the iterates, later ones with
  * larger weight; its noise falls with their number (Polyak and Juditsky 1992; Shamir and
  * Zhang 2013). */
+#include "adam_many.h"
 #include "basis.h"
 #include <math.h>
 #include <string.h>
 
-#define BETA1   0.9
-#define BETA2   0.99
-#define WINDOW  20
-#define STALLED 0.5 /* net motion over path length: below, a window made no progress */
-#define STEADY  0.8 /* above, it made progress and the rate may grow again */
-#define COOLING 1.5 /* rate ~ (1 + windows wandered)^-COOLING */
-#define FELL    2 /* standard errors, by which a loss is lower than the window's before */
-#define FAR     4 /* by which it is so much lower that older iterates do not count */
+#define BETA1   IMP_ADAM_BETA1
+#define BETA2   IMP_ADAM_BETA2
+#define WINDOW  IMP_ADAM_WINDOW
+#define STALLED IMP_ADAM_STALLED /* net motion over path length: below, no progress */
+#define STEADY  0.8              /* above, it made progress and the rate may grow again */
+#define COOLING IMP_ADAM_COOLING /* rate ~ (1 + windows wandered)^-COOLING */
+#define FELL    IMP_ADAM_FELL /* standard errors, by which a loss is lower than before */
+#define FAR     IMP_ADAM_FAR  /* by which it is so low that older iterates do not count */
 
 /* Arrays of length n, except V (eigenvectors) and A (matrix): n x n, and empty if the
  * coordinates are the variables. FIRST, SECOND, NET, WAY (path length) and PACE (rate) are
@@ -62,6 +63,7 @@ static enum imp_status init(const struct imp__goal *goal,
 {
     enum imp_status st = IMP_OK;
     (void)options;
+    if (imp__adam_is_many(goal)) return imp__adam_many_init(s);
     for (int k = 0; k <= PACE; k++) IMP_TRY(imp__search_array(s, k, goal->n));
     for (size_t k = 0; k < goal->n; k++) s->array[HERE][k] = s->x[k];
     s->scalar[OLD_LOSS] = INFINITY;
@@ -286,6 +288,7 @@ static void answer(const struct imp__goal *goal, struct imp__search *s)
 static enum imp_status run(const struct imp__goal *goal,
                            const struct imp__opt_options *options, struct imp__search *s)
 {
+    if (imp__adam_is_many(goal)) return imp__adam_many_run(goal, options, s);
     enum imp_status st = IMP_OK;
     double *g = imp__alloc(goal->ctx, 2 * goal->n + 1, sizeof *g);
     if (!g) IMP_TRY(imp__error(goal->ctx, IMP_E_NOMEM, "no memory for a gradient"));

@@ -68,7 +68,7 @@ enum imp_status imp__checkpoint_write(imp_context *ctx, const char *path,
              (unsigned long long)of->targets, (unsigned long long)of->options);
     imp__put(&s.text, "iteration %d\nfinished %d\n", search->iteration,
              (int)search->finished);
-    put_array(&s, "start", search->start, search->n);
+    put_array(&s, "start", search->start, search->start ? search->n : 0);
     put_array(&s, "x", search->x, search->n);
     put_array(&s, "history", search->history, search->n_history);
     put_array(&s, "history_se", search->history_se, search->n_history);
@@ -187,11 +187,11 @@ static enum imp_status read_body(struct source *s, const struct imp__goal *goal,
     size_t n = 0;
     char name[16];
 
-    IMP_TRY(get_array(s, "start", t->start, t->n));
+    IMP_TRY(get_array(s, "start", t->start, t->start ? t->n : 0));
     IMP_TRY(get_array(s, "x", t->x, t->n));
     for (size_t k = 0; k < t->n; k++)
-        if (!(t->x[k] >= goal->lo[k]) || !(t->x[k] <= goal->hi[k]) ||
-            !isfinite(t->start[k]))
+        if (imp__into_bounds(goal, k, t->x[k]) != t->x[k] ||
+            (t->start && !isfinite(t->start[k])))
             IMP_TRY(damaged(s, "values outside their bounds"));
     IMP_TRY(get_head(s, "history", &n));
     for (size_t k = 0; k < n; k++) IMP_TRY(imp__search_log(t, (struct imp_estimate){0}));

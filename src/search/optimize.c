@@ -2,6 +2,7 @@
  *
  * State that all optimisers share: arrays, log, seeds, and the choice of the method. */
 #include "optimize.h"
+#include "adam_many.h"
 #include "math/rng.h"
 #include <math.h>
 #include <string.h>
@@ -34,11 +35,12 @@ enum imp_status imp__search_create(const struct imp__goal *goal, enum imp_optimi
     s->kind = kind;
     s->n = goal->n;
     s->x = imp__alloc(ctx, imp_max(goal->n, (size_t)1), sizeof *s->x);
-    s->start = imp__alloc(ctx, imp_max(goal->n, (size_t)1), sizeof *s->start);
-    if (!s->x || !s->start)
+    const bool many = goal->spans != NULL;
+    if (!many) s->start = imp__alloc(ctx, imp_max(goal->n, (size_t)1), sizeof *s->start);
+    if (!s->x || (!many && !s->start))
         IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for %zu variables", goal->n));
-    for (size_t k = 0; k < goal->n; k++)
-        s->start[k] = s->x[k] = imp__into_bounds(goal, k, x0[k]);
+    for (size_t k = 0; k < goal->n; k++) s->x[k] = imp__into_bounds(goal, k, x0[k]);
+    if (!many) memcpy(s->start, s->x, goal->n * sizeof *s->x);
     IMP_TRY(kind_of(kind)->init(goal, options, s));
     *out = s;
     return IMP_OK;
@@ -80,6 +82,30 @@ void imp__search_finish(struct imp__search *s, enum imp__finish why)
         [IMP_FINISH_BOUNDED] = "no variable has an effect inside its bounds"};
     s->finished = why;
     s->reason = reasons[why];
+}
+
+double imp__search_start(const struct imp__search *s, size_t k)
+{
+    return s->start ? s->start[k] : imp__adam_many_start(s, k);
+}
+double imp__search_answer(const struct imp__search *s, size_t k)
+{
+    return s->start ? s->x[k] : imp__adam_many_answer(s, k);
+}
+
+void imp__search_settle(struct imp__search *s)
+{
+    if (!s->start) imp__adam_many_settle(s);
+}
+
+enum imp_status imp__search_exact(struct imp__search *s, int k, size_t n)
+{
+    s->array[k] = imp__alloc(s->ctx, n, sizeof *s->array[k]);
+    if (!s->array[k])
+        return imp__error(s->ctx, IMP_E_NOMEM,
+                          "no memory for %zu numbers of an optimiser's state", n);
+    s->array_n[k] = s->array_cap[k] = n;
+    return IMP_OK;
 }
 
 enum imp_status imp__search_array(struct imp__search *s, int k, size_t n)

@@ -11,7 +11,8 @@
 
 #include "base/context.h"
 
-#define IMP_DENSE_MAX 256 /* most variables of methods that hold [n][n] matrices */
+#define IMP_DENSE_MAX  256  /* most variables of methods that hold [n][n] matrices */
+#define IMP_SEARCH_FEW 1024 /* variables, above which Adam's memory counts */
 
 /* Normal equations at one x, from one set of random numbers. */
 struct imp__normal {
@@ -29,11 +30,23 @@ struct imp__normal {
 
 struct imp__search;
 
+/* Variables [end of the span before, end) with one range and scale. */
+struct imp__span {
+    size_t end;
+    double lo, hi, scale;
+    bool by_start; /* a start that is larger than `scale` is the variable's scale */
+};
+
 struct imp__goal {
     imp_context *ctx;
     size_t n;
     const double *lo, *hi; /* [n] bounds, may be infinite */
     const double *scale;   /* [n] > 0: a large change of each variable */
+    /* Adam of many variables, which lo, hi and scale have no memory for (NULL): the same
+     * in spans; a search then keeps its iterate in x, and imp__search_answer is its
+     * answer. NULL: lo, hi and scale are there. */
+    const struct imp__span *spans;
+    size_t n_spans;
     uint64_t seed;
     /* Value and gradient at x (inside the bounds) from the random numbers of `seed`;
      * equal seeds are common random numbers. g and g_se may be NULL. */
@@ -74,7 +87,7 @@ struct imp__search {
     int iteration;             /* completed */
     enum imp__finish finished; /* converged: more iterations would change nothing */
     const char *reason;        /* why it stopped, a constant string */
-    double *start;             /* [n] where it began */
+    double *start;             /* [n] where it began; NULL: see imp__search_start */
     double *x;                 /* [n] the best estimate so far, inside the bounds */
     size_t n_history, cap_history, cap_history_se;
     double *history, *history_se;
@@ -98,6 +111,11 @@ enum imp_status imp__optimize(const struct imp__goal *goal,
 
 /* Sets the reason too. */
 void imp__search_finish(struct imp__search *search, enum imp__finish why);
+/* Variable k at the start of the search, and in its answer so far. */
+double imp__search_start(const struct imp__search *search, size_t k);
+double imp__search_answer(const struct imp__search *search, size_t k);
+/* x: the answer; of many variables, the memory of what led there is given back. */
+void imp__search_settle(struct imp__search *search);
 
 /* Numbers of old variables -> of new ones: how a change of the old is one of the new. */
 struct imp__carry {
@@ -125,7 +143,9 @@ struct imp__opt_kind {
 };
 extern const struct imp__opt_kind imp__opt_adam, imp__opt_lm, imp__opt_nlopt;
 
-/* Room for n numbers in array k; new ones are zero. */
+/* Room for n numbers in array k; new ones are zero. _exact: an array that will not grow,
+ * with no room to spare. */
+enum imp_status imp__search_exact(struct imp__search *s, int k, size_t n);
 enum imp_status imp__search_array(struct imp__search *s, int k, size_t n);
 enum imp_status imp__search_log(struct imp__search *s, struct imp_estimate f);
 /* iteration++, and tell the goal. */
@@ -136,14 +156,29 @@ uint64_t imp__search_seed(const struct imp__goal *goal, int i, int k);
 enum imp_status imp__normal_create(imp_context *ctx, size_t n, struct imp__normal *out);
 void imp__normal_destroy(imp_context *ctx, struct imp__normal *normal);
 
+static inline struct imp__span imp__goal_span(const struct imp__goal *goal, size_t k)
+{
+    if (goal->lo)
+        return (struct imp__span){k + 1, goal->lo[k], goal->hi[k], goal->scale[k], false};
+    size_t lo = 0, hi = goal->n_spans - 1;
+    while (lo < hi) {
+        const size_t middle = (lo + hi) / 2;
+        if (k < goal->spans[middle].end) hi = middle;
+        else lo = middle + 1;
+    }
+    return goal->spans[lo];
+}
+
 /* -1 or 1 if x[k] is at its lower or upper bound, else 0. */
 static inline int imp__at_bound(const struct imp__goal *goal, const double *x, size_t k)
 {
-    return x[k] <= goal->lo[k] ? -1 : x[k] >= goal->hi[k] ? 1 : 0;
+    const struct imp__span a = imp__goal_span(goal, k);
+    return x[k] <= a.lo ? -1 : x[k] >= a.hi ? 1 : 0;
 }
 static inline double imp__into_bounds(const struct imp__goal *goal, size_t k, double v)
 {
-    return imp_clamp(v, goal->lo[k], goal->hi[k]);
+    const struct imp__span a = imp__goal_span(goal, k);
+    return imp_clamp(v, a.lo, a.hi);
 }
 
 #endif

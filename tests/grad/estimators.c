@@ -89,9 +89,15 @@ static void begin(struct setting *s, imp_scene *scene, const char *active, int s
     for (int p = 0; p < PIXELS; p++)
         for (int i = 0; i < spp; i++) {
             const struct imp_arena_mark mark = imp__arena_mark(&arena);
-            imp__lanes_sample(&tracer, &arena, p % WIDTH, p / WIDTH, i, C,
-                              s->walk + (size_t)(p * SPP_MAX + i) * size, &s->at[p][i][0],
-                              &s->at[p][i][1]);
+            struct imp_sample sample = {.x = p % WIDTH,
+                                        .y = p / WIDTH,
+                                        .index = i,
+                                        .arena = &arena,
+                                        .value =
+                                            s->walk + (size_t)(p * SPP_MAX + i) * size};
+            imp__lanes_sample(&tracer, &sample);
+            s->at[p][i][0] = sample.px;
+            s->at[p][i][1] = sample.py;
             imp__arena_rewind(&arena, mark);
         }
     imp__arena_free(&arena);

@@ -76,7 +76,7 @@ int main(void)
         long n = 0;
         enum imp_status st = run_job(job, &heap, 0, &changed);
         tap_ok(st == IMP_OK && heap.live == 0, "%s: works when memory lasts", names[job]);
-        for (n = 1; n < 5000; n += 1 + n / 60) {
+        for (n = 1; n < 20000; n += 1 + n / 60) {
             heap = (struct fail_alloc){0};
             st = run_job(job, &heap, n, &changed);
             leaks += heap.live != 0;

@@ -3,9 +3,9 @@
  * What one sample contributes to each channel: first-hit quantities of a tilted
  * parallelogram against its own plane geometry, moments, pixel formats, alpha. */
 #include "color/rgb.h"
+#include "film/film_measure.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
-#include "walk/measure.h"
 
 static imp_context *ctx;
 
@@ -87,8 +87,14 @@ static void first_hits(void)
            "channels # %d: %s", m.n, m.names);
     imp__arena_init(&arena, ctx);
     for (int i = 0; i < W * H * SPP; i++) {
-        double v[CHANNELS], px, py;
-        imp__measure_sample(&m, &arena, i / SPP % W, i / SPP / W, i % SPP, v, &px, &py);
+        double v[CHANNELS];
+        struct imp_sample sample = {.x = i / SPP % W,
+                                    .y = i / SPP / W,
+                                    .index = i % SPP,
+                                    .arena = &arena,
+                                    .value = v};
+        imp__measure_sample(&m, &sample);
+        const double px = sample.px, py = sample.py;
         const double h = 1 / sqrt(SPP);
         const struct meeting at = meet(px, py), dx = meet(px + h, py),
                              dy = meet(px, py + h);
@@ -130,12 +136,14 @@ static void two_samples(const char *integrator, const char *format, const char *
     struct imp_run run = IMP_RUN_INIT;
     struct imp_measure m;
     struct imp_arena arena;
-    double px, py;
     run.spp = 1;
     test_must(ctx, imp__measure_create(s, &run, &m));
     imp__arena_init(&arena, ctx);
-    imp__measure_sample(&m, &arena, W / 2, H / 2, 0, middle, &px, &py);
-    imp__measure_sample(&m, &arena, 0, 0, 0, corner, &px, &py);
+    struct imp_sample in_middle = {
+        .x = W / 2, .y = H / 2, .arena = &arena, .value = middle};
+    struct imp_sample in_corner = {.arena = &arena, .value = corner};
+    imp__measure_sample(&m, &in_middle);
+    imp__measure_sample(&m, &in_corner);
     *n = m.n;
     imp__arena_free(&arena);
     imp__measure_destroy(&m);

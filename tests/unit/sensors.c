@@ -2,12 +2,12 @@
  *
  * Sensors against the formulas of docs/scene-format.md 9 (written out again here), fields
  * of view, films, samplers, filters, and every error rule. */
+#include "film/film_picture.h"
 #include "imp_tap.h"
 #include "kind/filter/filter.h"
 #include "kind/sensor/film.h"
 #include "math/rng.h"
 #include "shape_nodes.h"
-#include "walk/picture.h"
 
 static imp_context *ctx;
 static int warnings;

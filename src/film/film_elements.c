@@ -5,7 +5,7 @@
  * The film's filter is not applied: a pixel is the mean of its square. */
 #include "base/film.h"
 #include "base/pool.h"
-#include "render.h"
+#include "film_render.h"
 #include <importon/elements.h>
 
 struct convert {

@@ -3,8 +3,8 @@
  * One walk told vertex by vertex: Stam's single-path view, as text to read or JSON to
  * draw. */
 #include "base/text.h"
-#include "measure.h"
-#include "run.h"
+#include "film_measure.h"
+#include "walk/run.h"
 #include <stdio.h>
 #include <string.h>
 
@@ -24,14 +24,8 @@ static void put_vector(struct imp_text *t, const char *key, imp_v3 v, int n)
 }
 static void put_string(struct imp_text *t, const char *key, const char *s)
 {
-    imp__put(t, "\"%s\":\"", key);
-    for (; *s; s++)
-        imp__put(t,
-                 *s == '"' || *s == '\\'  ? "\\%c"
-                 : (unsigned char)*s < 32 ? "?"
-                                          : "%c",
-                 *s);
-    imp__put(t, "\"");
+    imp__put(t, "\"%s\":", key);
+    t->failed = t->failed || !imp__json_string(t->ctx, &t->bytes, s);
 }
 
 static void json(struct imp_text *t, const struct imp_scene *scene,

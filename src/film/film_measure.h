@@ -2,10 +2,10 @@
  *
  * What one sample contributes to each channel of a picture: the integrator's radiance in
  * the film's pixel format, first-hit quantities, moments. */
-#ifndef IMP_WALK_MEASURE_H
-#define IMP_WALK_MEASURE_H
+#ifndef IMP_FILM_MEASURE_H
+#define IMP_FILM_MEASURE_H
 
-#include "walk.h"
+#include "film_picture.h"
 
 #define IMP_MEASURE_MAX 128 /* channels */
 
@@ -23,9 +23,8 @@ struct imp_measure {
 enum imp_status imp__measure_create(const struct imp_scene *scene,
                                     const struct imp_run *run, struct imp_measure *out);
 void imp__measure_destroy(struct imp_measure *m);
-/* value [n]; *px, *py the film position. False: the walk was dropped, value is 0. */
-bool imp__measure_sample(const struct imp_measure *m, struct imp_arena *arena, int x,
-                         int y, int64_t sample, double *value, double *px, double *py);
+/* Takes the sample (payload: the measure). */
+void imp__measure_sample(const void *measure, struct imp_sample *sample);
 
 /* Radiance and alpha in the film's pixel format; how many values. */
 int imp__measure_base(const struct imp_measure *m, imp_spec L, double alpha,

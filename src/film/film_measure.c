@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "measure.h"
+#include "film_measure.h"
 #include "base/film.h"
 #include "base/text.h"
 #include "color/rgb.h"
-#include "dims.h"
+#include "walk/dims.h"
 #include <stdio.h>
 #include <string.h>
 
@@ -259,57 +259,50 @@ static double walk_alpha(const struct imp_measure *m,
     return walk->valid || (sky && integrator->max_depth != 0);
 }
 
-/* Radiance and alpha of one integrator, on the same random numbers as the others. */
-static bool radiance(const struct imp_measure *m, const struct imp_integrator *integrator,
-                     struct imp_arena *arena, int x, int y, int64_t sample, imp_spec *L,
-                     double *alpha, struct imp_walk *walk)
+/* Radiance and alpha of one integrator, on the same random numbers as the others; marks
+ * the sample if the walk was dropped. */
+static void radiance(const struct imp_measure *m, const struct imp_integrator *integrator,
+                     struct imp_sample *s, imp_spec *L, double *alpha,
+                     struct imp_walk *walk)
 {
-    if (is_radiance(integrator)) {
-        const struct imp_tracer tracer = {
-            .scene = m->scene,
-            .integrator = integrator,
-            .sensor = m->sensor,
-            .seed = m->seed,
-            .guide = imp__guide_of(m->scene, integrator, m->guide),
-            .value_only = true};
-        const struct imp_arena_mark mark = imp__arena_mark(arena);
-        imp__walk_trace(&tracer, arena, x, y, sample, walk);
-        *L = walk->L;
-        *alpha = walk_alpha(m, integrator, walk);
-        imp__arena_rewind(arena, mark);
-        return walk->dropped == IMP_DROP_NONE;
-    }
     /* depth: the walk's film position and lens, its first hit only */
     static const struct imp_integrator none = {
         .kind = IMP_INTEGRATOR_PATH, .max_depth = 0, .rr_depth = 5};
-    const struct imp_tracer look = {.scene = m->scene,
-                                    .integrator = &none,
-                                    .sensor = m->sensor,
-                                    .seed = m->seed,
-                                    .value_only = true};
-    const struct imp_arena_mark mark = imp__arena_mark(arena);
-    imp__walk_trace(&look, arena, x, y, sample, walk);
-    *L = imp__spec(walk->first && walk->first->shape ? walk->first->t : 0);
-    *alpha = walk->first && walk->first->shape;
-    imp__arena_rewind(arena, mark);
-    return walk->dropped == IMP_DROP_NONE;
+    const bool depth = !is_radiance(integrator);
+    const struct imp_tracer tracer = {
+        .scene = m->scene,
+        .integrator = depth ? &none : integrator,
+        .sensor = m->sensor,
+        .seed = m->seed,
+        .guide = depth ? NULL : imp__guide_of(m->scene, integrator, m->guide),
+        .value_only = true};
+    const enum imp_drop before = s->dropped;
+    const struct imp_arena_mark mark = imp__arena_mark(s->arena);
+    imp__sample_walk(s, &tracer, walk);
+    if (before != IMP_DROP_NONE) s->dropped = before;
+    *L = walk->L;
+    if (depth) {
+        *L = imp__spec(walk->first && walk->first->shape ? walk->first->t : 0);
+        *alpha = walk->first && walk->first->shape;
+    } else {
+        *alpha = walk_alpha(m, integrator, walk);
+    }
+    imp__arena_rewind(s->arena, mark);
 }
 
-bool imp__measure_sample(const struct imp_measure *m, struct imp_arena *arena, int x,
-                         int y, int64_t sample, double *value, double *px, double *py)
+void imp__measure_sample(const void *measure, struct imp_sample *s)
 {
+    const struct imp_measure *m = measure;
     const struct imp_integrator *top = &m->scene->integrator;
+    double *value = s->value;
     struct imp_walk walk;
     imp_spec L = {0};
     double alpha = 0;
-    bool fine = true;
     int n;
     if (top->kind != IMP_INTEGRATOR_AOV && top->kind != IMP_INTEGRATOR_MOMENT) {
-        fine = radiance(m, top, arena, x, y, sample, &L, &alpha, &walk);
+        radiance(m, top, s, &L, &alpha, &walk);
         imp__measure_base(m, L, alpha, value);
-        *px = walk.px;
-        *py = walk.py;
-        return fine;
+        return;
     }
 
     imp_spec first = {0};
@@ -318,11 +311,11 @@ bool imp__measure_sample(const struct imp_measure *m, struct imp_arena *arena, i
     const int after_base = n;
     if (top->kind == IMP_INTEGRATOR_AOV) {
         static const struct imp_integrator look = {.kind = IMP_INTEGRATOR_DEPTH};
-        fine &= radiance(m, &look, arena, x, y, sample, &L, &alpha, &walk);
+        radiance(m, &look, s, &L, &alpha, &walk);
         n += aov_value(m, top, walk.key, walk.px, walk.py, value + n);
     }
     for (int k = 0; k < top->n_nested; k++) {
-        fine &= radiance(m, &top->nested[k], arena, x, y, sample, &L, &alpha, &walk);
+        radiance(m, &top->nested[k], s, &L, &alpha, &walk);
         if (k == 0) first = L, first_alpha = alpha;
         if (top->kind == IMP_INTEGRATOR_AOV) {
             for (int c = 0; c < 3; c++) value[n++] = L[c];
@@ -338,8 +331,4 @@ bool imp__measure_sample(const struct imp_measure *m, struct imp_arena *arena, i
         for (int c = 0; c < count; c++) value[n + c] = imp__sqr(value[after_base + c]);
     }
     imp__measure_base(m, first, first_alpha, value);
-    *px = walk.px;
-    *py = walk.py;
-    if (!fine) memset(value, 0, (size_t)m->n * sizeof *value);
-    return fine;
 }

@@ -1,16 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * imp_render: the scene's integrator decides which solver makes the picture. */
-#include "render.h"
-#include "walk/measure.h"
-#include "walk/picture.h"
+#include "film_render.h"
+#include "film_measure.h"
+#include "film_picture.h"
 #include "walk/run.h"
-
-static bool sample(const void *payload, struct imp_arena *arena, int x, int y,
-                   int64_t index, double *value, double *px, double *py)
-{
-    return imp__measure_sample(payload, arena, x, y, index, value, px, py);
-}
 
 enum imp_status imp_render(const imp_scene *scene, const struct imp_run *run,
                            imp_film **out)
@@ -27,8 +21,12 @@ enum imp_status imp_render(const imp_scene *scene, const struct imp_run *run,
     if (scene->integrator.kind == IMP_INTEGRATOR_ELEMENTS) {
         st = imp__render_elements(&measure, &own, out);
     } else {
-        const struct imp_picture picture = {
-            measure.sensor, "render", measure.names, measure.n, sample, &measure, NULL};
+        const struct imp_picture picture = {.sensor = measure.sensor,
+                                            .stage = "render",
+                                            .names = measure.names,
+                                            .n = measure.n,
+                                            .sample = imp__measure_sample,
+                                            .payload = &measure};
         st = imp__picture_make(scene->ctx, &picture, &own, out);
     }
     imp__measure_destroy(&measure);

@@ -2,10 +2,10 @@
  *
  * Between the solvers: this room stands on walk and elements, which do not know each
  * other. */
-#ifndef IMP_RENDER_H
-#define IMP_RENDER_H
+#ifndef IMP_FILM_RENDER_H
+#define IMP_FILM_RENDER_H
 
-#include "walk/measure.h"
+#include "film_measure.h"
 
 /* Solve the scene by finite elements and look at it through the measure's sensor, in the
  * pixel format of its film. IMP_CANCELLED with the picture of a coarser solution. */

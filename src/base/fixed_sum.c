@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "fixed_sum.h"
+#include <string.h>
+
+void imp__fixed_begin(struct imp_fixed_sum *f, double largest, int spare_bits,
+                      double n_terms)
+{
+    int size, terms;
+    frexp(largest, &size); /* |largest| < 2^size */
+    frexp(n_terms, &terms);
+    /* 2^size 2^spare = 2^(62 - terms) units; a unit and its inverse are normal numbers.
+     */
+    const int unit = imp_clamp(size + spare_bits + terms - 62, -1000, 1000);
+    f->unit = ldexp(1, unit);
+    f->per_unit = ldexp(1, -unit);
+    f->limit = ldexp(1, imp_min(unit + 62 - terms, 1023));
+    f->too_large = f->bits = 0;
+    if (f->sum) memset(f->sum, 0, f->n * sizeof *f->sum);
+    if (f->fine) memset(f->fine, 0, f->n * sizeof *f->fine);
+}
+
+void imp__fixed_end(struct imp_fixed_sum *f)
+{
+    double *out = (double *)f->sum;
+    for (size_t k = 0; k < f->n; k++) {
+        const imp_fixed units = f->sum[k];
+        const double below = f->fine ? (double)f->fine[k] / IMP_FIXED_FINE : 0;
+        out[k] = ((double)units + below) * f->unit;
+    }
+}

@@ -1,0 +1,343 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Pictures from samples. Passes over all tiles come in sweeps of 1, 1, 2, 4, ... passes:
+ * the first 2^k passes are a node of the tree over passes, so what is there and the next
+ * sweep are its two children, and one set of sums is enough for a picture that can be had
+ * at any time. */
+#include "film_picture.h"
+#include "film_sums.h"
+#include <float.h>
+#include <stdio.h>
+#include <string.h>
+
+#define PASS_SPP       64
+#define PASS_SPP_TIMED 4
+
+/* Wide filters: tiles of a large picture are larger, so that their borders take less. */
+#define MANY_TILES 1024
+#define SIDE_MAX   32
+
+/* Pixels of a picture whose means take seconds: who stops it in its first pass does not
+ * want to wait for a part of it. */
+#define LARGE_PICTURE 16e6
+
+struct render {
+    const struct imp_run *run;
+    const struct imp_picture *picture;
+    const struct imp_film_desc *film;
+    struct imp_tiles tiles;
+    struct imp_film_sums sums;
+    int n, side, border;
+    int spp, passes, pass_spp;
+    /* Rows of the threads on cache lines of their own. */
+    double *values;  /* [threads][n] */
+    double *patches; /* [threads][stratum_side^2][IMP_WIDE_SUMS] what one pixel sends in a
+                        pass through a wide filter */
+    int sweep_spp;   /* samples of a pixel in the sweep at work */
+};
+
+/* ---- One tile and pass ----------------------------------------------------------- */
+
+/* Pixels that samples of one pixel reach: `border` on each side, and one more, for a
+ * position may be rounded up to the pixel's end. */
+static int stratum_side(const struct render *r) { return 2 * r->border + 2; }
+static size_t patch_size(const struct render *r)
+{
+    return (size_t)(stratum_side(r) * stratum_side(r)) * (size_t)IMP_WIDE_SUMS(r->n);
+}
+/* Doubles from one thread's row of n to the next's: no cache line is written by two. */
+static size_t apart(size_t n)
+{
+    const size_t line = IMP_CACHE_LINE / sizeof(double);
+    return (n + line - 1) / line * line;
+}
+
+static void accumulate(double *sums, double w, const double *value, int n)
+{
+    sums[0] += w;
+    sums[1] += w * w;
+    for (int c = 0; c < n; c++) {
+        const double wv = w * value[c];
+        sums[2 + 3 * c] += wv;
+        sums[3 + 3 * c] += w * wv;
+        sums[4 + 3 * c] += wv * wv;
+    }
+}
+
+/* Weight a sample into the pixels that the filter reaches. */
+static void splat(const struct render *r, const struct imp_tile *t, double *patch,
+                  const struct imp_sample *s)
+{
+    const struct imp_filter *f = &r->film->filter;
+    const int n = r->n, b = r->border, side = stratum_side(r);
+    struct imp_taps across, down;
+    imp__film_taps(f, s->px - r->film->crop_x, imp_max(s->x, t->x0) - b,
+                   imp_min(s->x + 1, t->x1 - 1) + b, &across);
+    imp__film_taps(f, s->py - r->film->crop_y, imp_max(s->y, t->y0) - b,
+                   imp_min(s->y + 1, t->y1 - 1) + b, &down);
+    for (int j = 0; j < down.n; j++)
+        for (int i = 0; i < across.n; i++) {
+            const double w = down.w[j] * across.w[i];
+            const int u = across.first + i - s->x + b, v = down.first + j - s->y + b;
+            if (w != 0)
+                accumulate(patch + (size_t)(v * side + u) * (size_t)IMP_WIDE_SUMS(n), w,
+                           s->value, n);
+        }
+}
+
+/* Add what pixel (x, y) sent in m samples to the tile, whose corner is (x0, y0) minus the
+ * border, and clear the patch. */
+static void stratum_add(const struct render *r, const struct imp_tile *t, double *patch,
+                        int x, int y, int m, double *tile)
+{
+    const int n = r->n, side = stratum_side(r), stride = r->side + 2 * r->border;
+    const size_t sums = (size_t)IMP_WIDE_SUMS(n);
+    const double each = m > 1 ? 1. / m : 0, factor = m > 1 ? m / (m - 1.) : 1;
+    for (int j = 0; j < side; j++)
+        for (int i = 0; i < side; i++) {
+            double *from = patch + (size_t)(j * side + i) * sums;
+            if (from[1] == 0) continue;
+            double *to = tile + (size_t)((y - t->y0 + j) * stride + x - t->x0 + i) * sums;
+            const double W = from[0];
+            to[0] += W;
+            to[1] += factor * (from[1] - W * W * each);
+            for (int c = 0; c < n; c++) {
+                const double wv = from[2 + 3 * c];
+                to[2 + 3 * c] += wv;
+                to[3 + 3 * c] += factor * (from[3 + 3 * c] - W * wv * each);
+                to[4 + 3 * c] += factor * (from[4 + 3 * c] - wv * wv * each);
+            }
+            memset(from, 0, sums * sizeof *from);
+        }
+}
+
+/* A picture holds floats. */
+static enum imp_drop beyond_float(const double *value, int n)
+{
+    bool fine = true, number = true;
+    for (int c = 0; c < n; c++) {
+        fine &= fabs(value[c]) <= FLT_MAX;
+        number &= !isnan(value[c]);
+    }
+    return imp_likely(fine) ? IMP_DROP_NONE : number ? IMP_DROP_INFINITE : IMP_DROP_NAN;
+}
+
+static void sample_take(const struct render *r, struct imp_tile_worker *w,
+                        struct imp_sample *s)
+{
+    const struct imp_arena_mark mark = imp__arena_mark(s->arena);
+    s->dropped = IMP_DROP_NONE;
+    r->picture->sample(r->picture->payload, s);
+    imp__arena_rewind(s->arena, mark);
+    if (s->dropped == IMP_DROP_NONE) s->dropped = beyond_float(s->value, r->n);
+    if (imp_likely(s->dropped == IMP_DROP_NONE)) return;
+    memset(s->value, 0, (size_t)r->n * sizeof *s->value);
+    imp__tile_drop(w, s->dropped, s->x, s->y, s->index);
+}
+
+static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worker *w,
+                                 void *result, void *payload)
+{
+    struct render *r = payload;
+    const int s0 = (int)t->part * r->pass_spp;
+    const int s1 = r->spp - s0 > r->pass_spp ? s0 + r->pass_spp : r->spp;
+    const int n = r->n;
+    double *tile = result;
+    double *patch = r->patches + (size_t)w->index * apart(patch_size(r));
+    struct imp_sample s = {.arena = &w->arena,
+                           .value = r->values + (size_t)w->index * apart((size_t)n)};
+    memset(tile, 0, imp__film_sums_tile(&r->sums) * sizeof *tile);
+    for (s.y = t->y0; s.y < t->y1; s.y++)
+        for (s.x = t->x0; s.x < t->x1; s.x++) {
+            double *own =
+                tile + (size_t)((s.y - t->y0) * r->side + s.x - t->x0) * 2 * (size_t)n;
+            for (int k = s0; k < s1; k++) {
+                s.index = r->picture->first + k;
+                sample_take(r, w, &s);
+                if (r->border > 0) {
+                    splat(r, t, patch, &s);
+                    continue;
+                }
+                for (int c = 0; c < n; c++) {
+                    own[2 * c] += s.value[c];
+                    own[2 * c + 1] += s.value[c] * s.value[c];
+                }
+            }
+            if (r->border > 0) stratum_add(r, t, patch, s.x, s.y, s1 - s0, tile);
+            const enum imp_status st = imp__tile_check(w);
+            if (st != IMP_OK) return st;
+        }
+    return IMP_OK;
+}
+
+static void tile_add(void *into, const void *from, void *payload)
+{
+    const struct render *r = payload;
+    const size_t n = imp__film_sums_tile(&r->sums);
+    double *a = into;
+    const double *b = from;
+    for (size_t k = 0; k < n; k++) a[k] += b[k];
+}
+
+static enum imp_status tile_take(size_t tile, const void *sum, void *payload)
+{
+    struct render *r = payload;
+    imp__film_sums_add(&r->sums, tile, sum, r->sweep_spp);
+    return IMP_OK;
+}
+
+/* ---- All ------------------------------------------------------------------------- */
+
+static enum imp_status render_plan(struct render *r, imp_context *ctx)
+{
+    const struct imp_picture *p = r->picture;
+    const struct imp_run *run = r->run;
+    r->film = &p->sensor->film;
+    r->n = p->n;
+    r->border = imp__film_border(r->film);
+    const int width = r->film->crop_w, height = r->film->crop_h;
+    r->side = IMP_TILE_SIDE;
+    while (r->border > 0 && r->side < SIDE_MAX &&
+           (double)width * height >= MANY_TILES * 4. * r->side * r->side)
+        r->side *= 2;
+    /* With a time limit and no count: until the time is up. */
+    r->spp = run->spp > 0 ? run->spp : run->time_limit_s > 0 ? 1 << 24 : p->sensor->spp;
+    r->pass_spp = run->time_limit_s > 0 ? PASS_SPP_TIMED : PASS_SPP;
+    r->passes = (r->spp - 1) / r->pass_spp + 1;
+    r->tiles = (struct imp_tiles){.ctx = ctx,
+                                  .run = run,
+                                  .width = width,
+                                  .height = height,
+                                  .margin = r->film->sample_border ? r->border : 0,
+                                  .side = r->side,
+                                  .work = tile_work,
+                                  .add = tile_add,
+                                  .take = tile_take,
+                                  .payload = r};
+    const enum imp_status st = imp__tiles_create(&r->tiles);
+    r->sums = (struct imp_film_sums){.ctx = ctx,
+                                     .width = width,
+                                     .height = height,
+                                     .n = p->n,
+                                     .n_films = imp_max(p->n_films, 1),
+                                     .border = r->border,
+                                     .margin = r->tiles.margin,
+                                     .side = r->side,
+                                     .across = r->tiles.across,
+                                     .down = r->tiles.down};
+    r->tiles.size = imp__film_sums_tile(&r->sums) * sizeof(double);
+    return st;
+}
+
+static enum imp_status buffers_create(struct render *r, imp_context *ctx)
+{
+    char what[80];
+    snprintf(what, sizeof what, "a picture of %d x %d with %d channels", r->sums.width,
+             r->sums.height, r->n);
+    enum imp_status st = imp__memory_check(ctx, imp__film_sums_bytes(&r->sums), what);
+    if (st != IMP_OK) return st;
+    r->values =
+        imp__alloc(ctx, (size_t)ctx->threads, apart((size_t)r->n) * sizeof(double));
+    r->patches =
+        imp__alloc(ctx, (size_t)ctx->threads, apart(patch_size(r)) * sizeof(double));
+    if (!r->values || !r->patches)
+        return imp__error(ctx, IMP_E_NOMEM, "no memory for samples of %d channels", r->n);
+    return imp__film_sums_create(&r->sums);
+}
+
+/* Passes of the next sweep, a power of two that divides `done`. With a time limit, when
+ * sums cannot be repeated anyway, they are shorter, so that tiles end with nearly equal
+ * numbers of samples. */
+static int sweep_passes(const struct render *r, int done)
+{
+    int n = 1;
+    const int most = r->run->time_limit_s > 0 ? done / 4 : done;
+    while (2 * n <= most && done % (2 * n) == 0) n *= 2;
+    return imp_min(n, r->passes - done);
+}
+
+/* Passes over all tiles; how many samples every pixel got. */
+static enum imp_status render_run(struct render *r, int64_t *spp)
+{
+    enum imp_status st = IMP_OK;
+    const bool timed = r->run->time_limit_s > 0;
+    const double start = imp__now();
+    const double pixels = (double)r->sums.width * r->sums.height;
+    const double sampled =
+        pixels +
+        2. * r->sums.margin * (r->sums.width + r->sums.height + 2. * r->sums.margin);
+    for (int done = 0; done < r->passes && st == IMP_OK;) {
+        const int n = sweep_passes(r, done);
+        const int64_t before = (int64_t)done * r->pass_spp;
+        const int64_t after = imp_min(before + (int64_t)n * r->pass_spp, (int64_t)r->spp);
+        r->sweep_spp = (int)(after - before);
+        r->tiles.walks = sampled * (double)(timed ? after : (int64_t)r->spp);
+        const struct imp_tiles_pass pass = {
+            .stage = r->picture->stage,
+            .rate_unit = "samples",
+            .units = pixels * r->sweep_spp,
+            .fraction_lo = (double)before / r->spp,
+            .fraction_hi = (double)after / r->spp,
+            .start_s = start,
+            /* The first pass reaches every pixel whatever the time limit. */
+            .deadline_s = timed && done > 0 ? start + r->run->time_limit_s : 0,
+            .first_part = (size_t)done,
+            .parts = (size_t)n,
+            .per_tile = true};
+        st = imp__tiles_run(&r->tiles, &pass);
+        if (st == IMP_CANCELLED && pass.deadline_s > 0 && imp__now() >= pass.deadline_s) {
+            st = IMP_OK;
+            break;
+        }
+        done += n;
+        if (st == IMP_OK) *spp = after;
+    }
+    if (st == IMP_OK || st == IMP_CANCELLED) {
+        const double walks = pixels * (double)imp_max(*spp, (int64_t)r->pass_spp);
+        const enum imp_status dropped =
+            imp__drops_budget(r->tiles.ctx, &r->tiles.drops, r->run->drop_budget, walks);
+        if (dropped != IMP_OK) st = dropped;
+    }
+    return st;
+}
+
+enum imp_status imp__picture_make(imp_context *ctx, const struct imp_picture *picture,
+                                  const struct imp_run *run, imp_film **out)
+{
+    enum imp_status st = IMP_OK, ended;
+    struct render r = {.picture = picture, .run = run};
+    const int n_films = imp_max(picture->n_films, 1);
+    int64_t spp = 0;
+    imp_film **films = imp__alloc(ctx, (size_t)n_films, sizeof *films);
+    if (!films) return imp__error(ctx, IMP_E_NOMEM, "no memory for films");
+    IMP_TRY(render_plan(&r, ctx));
+    for (int k = 0; k < n_films; k++)
+        IMP_TRY(imp__film_describe(ctx, r.sums.width, r.sums.height, picture->names,
+                                   &films[k]));
+    IMP_TRY(buffers_create(&r, ctx));
+    ended = render_run(&r, &spp);
+    if (ended != IMP_CANCELLED) IMP_TRY(ended);
+    if (ended == IMP_CANCELLED && spp == 0 &&
+        (double)r.sums.width * r.sums.height > LARGE_PICTURE) {
+        memset(out, 0, (size_t)n_films * sizeof *out);
+        IMP_TRY(ended);
+    }
+    IMP_TRY(imp__film_sums_finish(&r.sums, r.border > 0 && imp_min(r.spp, r.pass_spp) > 1,
+                                  picture->weights, films));
+    for (int k = 0; k < n_films; k++) {
+        films[k]->spp = spp;
+        films[k]->drops = r.tiles.drops;
+        films[k]->dropped = imp__drops_total(&r.tiles.drops);
+    }
+    memcpy(out, films, (size_t)n_films * sizeof *films);
+    memset(films, 0, (size_t)n_films * sizeof *films);
+    st = ended;
+out:
+    for (int k = 0; k < n_films; k++) imp_film_destroy(films[k]);
+    imp__release(ctx, films);
+    if (r.sums.ctx) imp__film_sums_destroy(&r.sums);
+    if (r.tiles.ctx) imp__tiles_destroy(&r.tiles);
+    imp__release(ctx, r.values);
+    imp__release(ctx, r.patches);
+    return st;
+}

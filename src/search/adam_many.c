@@ -1,0 +1,212 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "adam_many.h"
+#include <math.h>
+#include <string.h>
+
+/* Of a variable, in units of its scale: MEAN_G and ROOT_V the moments of the gradient, v
+ * as its root, since squares leave the range of floats; NET the motion in this window,
+ * SUM_NET the sum of NET over its steps. Not in these units: AVERAGE of the iterates, and
+ * START. */
+enum { MEAN_G, ROOT_V, NET, SUM_NET, AVERAGE, START, ARRAYS };
+enum {
+    COUNT,
+    LARGEST,
+    LOSS,
+    LOSS_VAR,
+    OLD_LOSS,
+    OLD_VAR,
+    AGE,                           /* steps in the moments */
+    PACE,                          /* windows that wandered */
+    WAY,                           /* sum over variables and steps of |step| */
+    UNIT,                          /* of the moments, a power of two; 0: not known yet */
+    AVERAGED = IMP_SEARCH_AVERAGED /* 0: the search has not wandered yet */
+};
+
+typedef float __attribute__((may_alias)) packed; /* in the place of doubles */
+
+static packed *floats(const struct imp__search *s, int k)
+{
+    return (packed *)s->array[k];
+}
+
+static double scale_of(const struct imp__search *s, const struct imp__span *a, size_t k)
+{
+    return a->by_start ? fmax(a->scale, fabsf(floats(s, START)[k])) : a->scale;
+}
+
+double imp__adam_many_start(const struct imp__search *s, size_t k)
+{
+    return floats(s, START)[k];
+}
+double imp__adam_many_answer(const struct imp__search *s, size_t k)
+{
+    return s->scalar[AVERAGED] > 0 ? floats(s, AVERAGE)[k] : s->x[k];
+}
+
+void imp__adam_many_settle(struct imp__search *s)
+{
+    for (size_t k = 0; k < s->n; k++) s->x[k] = imp__adam_many_answer(s, k);
+    s->scalar[AVERAGED] = 0;
+    for (int k = 0; k < START; k++) {
+        imp__release(s->ctx, s->array[k]);
+        s->array[k] = NULL;
+        s->array_n[k] = s->array_cap[k] = 0;
+    }
+}
+
+static void window_begin(struct imp__search *s)
+{
+    memset(floats(s, NET), 0, s->n * sizeof(float));
+    memset(floats(s, SUM_NET), 0, s->n * sizeof(float));
+    s->scalar[COUNT] = s->scalar[LARGEST] = s->scalar[WAY] = 0;
+    s->scalar[LOSS] = s->scalar[LOSS_VAR] = 0;
+}
+
+enum imp_status imp__adam_many_init(struct imp__search *s)
+{
+    enum imp_status st = IMP_OK;
+    for (int k = 0; k < ARRAYS; k++) IMP_TRY(imp__search_exact(s, k, (s->n + 1) / 2));
+    for (size_t k = 0; k < s->n; k++) floats(s, START)[k] = (float)s->x[k];
+    s->scalar[OLD_LOSS] = INFINITY;
+    window_begin(s);
+out:
+    return st;
+}
+
+/* A power of two near the largest derivative. */
+static double unit_of(const struct imp__goal *goal, const struct imp__search *s,
+                      const double *g)
+{
+    double largest = 0;
+    int exponent;
+    for (size_t i = 0, k = 0; i < goal->n_spans; i++)
+        for (; k < goal->spans[i].end; k++)
+            largest = fmax(largest, fabs(g[k]) * scale_of(s, &goal->spans[i], k));
+    if (!(largest > 0) || !isfinite(largest)) return 0;
+    frexp(largest, &exponent);
+    return ldexp(1, imp_clamp(exponent, -1000, 1000));
+}
+
+/* Moments from the gradient; returns the mean of v. */
+static double moments(const struct imp__goal *goal, struct imp__search *s,
+                      const double *g)
+{
+    packed *m = floats(s, MEAN_G), *r = floats(s, ROOT_V);
+    double mean_v = 0;
+    for (size_t i = 0, k = 0; i < goal->n_spans; i++) {
+        const struct imp__span *a = &goal->spans[i];
+        for (; k < a->end; k++) {
+            const double d = g[k] * (scale_of(s, a, k) / s->scalar[UNIT]);
+            const double v =
+                IMP_ADAM_BETA2 * ((double)r[k] * r[k]) + (1 - IMP_ADAM_BETA2) * d * d;
+            m[k] = (float)(IMP_ADAM_BETA1 * m[k] + (1 - IMP_ADAM_BETA1) * d);
+            r[k] = (float)sqrt(v);
+            mean_v += v / (double)s->n;
+        }
+    }
+    return mean_v;
+}
+
+static void step(const struct imp__goal *goal, double learning_rate,
+                 struct imp__search *s, const double *g)
+{
+    packed *m = floats(s, MEAN_G), *r = floats(s, ROOT_V);
+    packed *net = floats(s, NET), *sum = floats(s, SUM_NET);
+    if (s->scalar[UNIT] == 0) s->scalar[UNIT] = unit_of(goal, s, g);
+    s->scalar[COUNT]++;
+    if (s->scalar[UNIT] == 0) return; /* nothing has a derivative yet */
+    const double age = ++s->scalar[AGE], mean_v = moments(goal, s, g);
+    const double c1 = 1 - pow(IMP_ADAM_BETA1, age), c2 = 1 - pow(IMP_ADAM_BETA2, age);
+    const double rate = learning_rate * pow(1 + s->scalar[PACE], -IMP_ADAM_COOLING);
+    /* Keeps what was never seen at rest, whatever the objective's unit. */
+    const double tiny = 1e-8 * sqrt(mean_v / c2) + 1e-300;
+    for (size_t i = 0, k = 0; i < goal->n_spans; i++) {
+        const struct imp__span *a = &goal->spans[i];
+        for (; k < a->end; k++) {
+            const double wanted = rate * (m[k] / c1) / (r[k] / sqrt(c2) + tiny);
+            const double old = s->x[k], scale = scale_of(s, a, k);
+            s->x[k] = imp_clamp(old - scale * wanted, a->lo, a->hi);
+            const double moved = (s->x[k] - old) / scale;
+            s->scalar[LARGEST] = fmax(s->scalar[LARGEST], fabs(moved));
+            s->scalar[WAY] += fabs(moved);
+            net[k] = (float)(net[k] + moved);
+            sum[k] += net[k];
+            /* At a bound: free to leave. */
+            if ((s->x[k] <= a->lo && m[k] > 0) || (s->x[k] >= a->hi && m[k] < 0))
+                m[k] = 0;
+        }
+    }
+}
+
+/* Slower, from the window's mean: many variables have no average in many dimensions to go
+ * by, so the rate is halved. */
+static void cool(const struct imp__goal *goal, struct imp__search *s)
+{
+    s->scalar[PACE] = pow(2, 1 / IMP_ADAM_COOLING) * (1 + s->scalar[PACE]) - 1;
+    for (size_t i = 0, k = 0; i < goal->n_spans; i++) {
+        const struct imp__span *a = &goal->spans[i];
+        for (; k < a->end; k++) {
+            const double back =
+                floats(s, SUM_NET)[k] / (IMP_ADAM_WINDOW + 1.) - floats(s, NET)[k];
+            s->x[k] = imp_clamp(s->x[k] + scale_of(s, a, k) * back, a->lo, a->hi);
+        }
+    }
+}
+
+static void window_end(const struct imp__goal *goal,
+                       const struct imp__opt_options *options, struct imp__search *s)
+{
+    double net = 0;
+    for (size_t k = 0; k < s->n; k++) net += fabsf(floats(s, NET)[k]);
+    const double loss = s->scalar[LOSS] / IMP_ADAM_WINDOW;
+    const double var = s->scalar[LOSS_VAR] / (IMP_ADAM_WINDOW * IMP_ADAM_WINDOW);
+    const double fall = s->scalar[OLD_LOSS] - loss, se = sqrt(var + s->scalar[OLD_VAR]);
+    const bool fell = fall > IMP_ADAM_FELL * se;
+    const bool wandered = net <= IMP_ADAM_STALLED * s->scalar[WAY];
+
+    if (s->scalar[LARGEST] < options->tolerance) imp__search_finish(s, IMP_FINISH_STEPS);
+    if (wandered && !fell) cool(goal, s);
+    if (fall > IMP_ADAM_FAR * se) s->scalar[AVERAGED] = 0;
+    if (wandered && !fell && s->scalar[AVERAGED] == 0) {
+        for (size_t k = 0; k < s->n; k++) floats(s, AVERAGE)[k] = (float)s->x[k];
+        s->scalar[AVERAGED] = 1;
+    }
+    s->scalar[OLD_LOSS] = loss;
+    s->scalar[OLD_VAR] = var;
+    window_begin(s);
+}
+
+/* Once the search wanders, the average of the iterates with weights 1, 2, 3, ... */
+static void average(struct imp__search *s)
+{
+    packed *mean = floats(s, AVERAGE);
+    const double n = s->scalar[AVERAGED];
+    if (n == 0) return;
+    s->scalar[AVERAGED]++;
+    for (size_t k = 0; k < s->n; k++)
+        mean[k] = (float)(mean[k] + (s->x[k] - mean[k]) * 2 / (n + 1));
+}
+
+enum imp_status imp__adam_many_run(const struct imp__goal *goal,
+                                   const struct imp__opt_options *options,
+                                   struct imp__search *s)
+{
+    enum imp_status st = IMP_OK;
+    double *g = imp__alloc_raw(goal->ctx, goal->n, sizeof *g);
+    if (!g) IMP_TRY(imp__error(goal->ctx, IMP_E_NOMEM, "no memory for a gradient"));
+    while (!s->finished && s->iteration < options->max_iterations) {
+        struct imp_estimate f;
+        IMP_TRY(goal->eval(s->x, imp__search_seed(goal, s->iteration, 0), &f, g, NULL,
+                           goal->payload));
+        IMP_TRY(imp__search_log(s, f));
+        s->scalar[LOSS] += f.value;
+        s->scalar[LOSS_VAR] += f.se * f.se;
+        step(goal, options->learning_rate, s, g);
+        if (s->scalar[COUNT] == IMP_ADAM_WINDOW) window_end(goal, options, s);
+        average(s);
+        IMP_TRY(imp__search_iterated(goal, s));
+    }
+out:
+    imp__release(goal->ctx, g);
+    return st;
+}

@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Adam for more variables than have directions of their own (textures): the search of
+ * adam.c along the axes, with one pace for all, in 40 bytes a variable, gradient
+ * included. The iterate is x, in double as the goal wants it; what is behind it are
+ * floats, two in the place of a double of the search's arrays. */
+#ifndef IMP_SEARCH_ADAM_MANY_H
+#define IMP_SEARCH_ADAM_MANY_H
+
+#include "optimize.h"
+
+/* What both searches are tuned with; adam.c says what it is. */
+#define IMP_ADAM_BETA1   0.9
+#define IMP_ADAM_BETA2   0.99
+#define IMP_ADAM_WINDOW  20
+#define IMP_ADAM_STALLED 0.5
+#define IMP_ADAM_COOLING 1.5
+#define IMP_ADAM_FELL    2
+#define IMP_ADAM_FAR     4
+
+static inline bool imp__adam_is_many(const struct imp__goal *goal)
+{
+    return goal->spans != NULL;
+}
+enum imp_status imp__adam_many_init(struct imp__search *s);
+enum imp_status imp__adam_many_run(const struct imp__goal *goal,
+                                   const struct imp__opt_options *options,
+                                   struct imp__search *s);
+/* x: the answer. The search cannot go on: only its start is kept. */
+void imp__adam_many_settle(struct imp__search *s);
+/* Where the search began, and its answer so far. */
+double imp__adam_many_start(const struct imp__search *s, size_t k);
+double imp__adam_many_answer(const struct imp__search *s, size_t k);
+
+#endif

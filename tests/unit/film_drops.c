@@ -1,0 +1,108 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Walks whose value a picture cannot hold: counted by cause with their keys, which are
+ * the same for any number of threads and which imp_walk_describe can show. */
+#include "imp_scene.h"
+#include "imp_tap.h"
+
+static const char *const sky =
+    "<scene version='3.0.0'><integrator type='path'/>"
+    "<sensor type='perspective'><film type='hdrfilm'><integer name='width' value='12'/>"
+    "<integer name='height' value='10'/><rfilter type='box'/></film></sensor>"
+    "<shape type='sphere'><point name='center' x='0' y='0' z='4'/>"
+    "<bsdf type='diffuse'/></shape>"
+    "<emitter type='constant'><float name='radiance' value='%s'/></emitter></scene>";
+
+static imp_scene *scene(imp_context *ctx, const char *radiance)
+{
+    char xml[1024];
+    snprintf(xml, sizeof xml, sky, radiance);
+    return test_scene_text(ctx, xml, IMP_RGB);
+}
+
+static void refused(const char *radiance)
+{
+    imp_context *ctx = test_context(2);
+    imp_scene *s = scene(ctx, radiance);
+    imp_film *film = NULL;
+    imp_problem *p;
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_target target = IMP_TARGET_INIT;
+    static float pixels[12 * 10 * 3];
+    struct imp_estimate f;
+    double g[16];
+    run.spp = 8;
+    run.seed = 3;
+    enum imp_status st = imp_render(s, &run, &film);
+    const char *message = imp_last_error(ctx);
+    tap_ok(st == IMP_E_PATHS && !film && strstr(message, "more than a float holds") &&
+               strstr(message, "--pixel ") && strstr(message, "--sample "),
+           "radiance %s: no picture # %s", radiance, message);
+    test_must(ctx, imp_problem_create(s, &p));
+    test_must(ctx, imp_problem_activate(p, "*"));
+    target.width = 12, target.height = 10, target.channels = 3, target.pixels = pixels;
+    test_must(ctx, imp_problem_add_target(p, &target));
+    st = imp_problem_objective(p, NULL, &run, &f, g, NULL);
+    tap_ok(st == IMP_E_PATHS, "nor a gradient # %s", imp_last_error(ctx));
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+    imp_context_destroy(ctx);
+}
+
+/* All may be dropped: what is known of them. */
+static struct imp_film_info counted(int threads)
+{
+    imp_context *ctx = test_context(threads);
+    imp_scene *s = scene(ctx, "1e200");
+    imp_film *film = NULL;
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_film_info info = {.size = sizeof info};
+    run.spp = 8;
+    run.drop_budget = 1;
+    test_must(ctx, imp_render(s, &run, &film));
+    imp_film_get_info(film, &info);
+    float largest = 0;
+    for (int k = 0; k < 12 * 10 * 3; k++)
+        largest = fmaxf(largest, imp_film_mean(film)[k]);
+    tap_ok(info.dropped > 0 && largest == 0,
+           "%d threads: dropped walks count as 0 # %llu", threads,
+           (unsigned long long)info.dropped);
+    char *text = NULL;
+    const struct imp_drop_key *key = &info.drop_keys[0];
+    run.seed = key->seed;
+    test_must(ctx, imp_walk_describe(s, &run, key->x, key->y, key->sample, 0, &text));
+    tap_ok(strstr(text, "dropped: the value is infinite, or more than a float holds") !=
+               NULL,
+           "its first key is that walk");
+    imp_free(ctx, text);
+    imp_film_destroy(film);
+    imp_scene_destroy(s);
+    imp_context_destroy(ctx);
+    return info;
+}
+
+int main(void)
+{
+    refused("1e200");
+    refused("1e308");
+    refused("4e38");
+    const struct imp_film_info one = counted(1);
+    tap_ok(one.dropped_by_cause[IMP_DROP_INFINITE] == one.dropped &&
+               one.n_drop_keys == IMP_DROP_KEYS,
+           "the cause is known, and the first keys are");
+    for (int threads = 2; threads <= 5; threads += 3) {
+        const struct imp_film_info more = counted(threads);
+        tap_ok(memcmp(&one, &more, sizeof one) == 0, "%d threads: the same", threads);
+    }
+    imp_context *ctx = test_context(1);
+    imp_scene *s = scene(ctx, "1e38");
+    imp_film *film = NULL;
+    struct imp_run run = IMP_RUN_INIT;
+    run.spp = 8;
+    test_must(ctx, imp_render(s, &run, &film));
+    tap_near(imp_film_mean(film)[0], 1e38, 1e-6 * 1e38, 0, "1e38 is a float");
+    imp_film_destroy(film);
+    imp_scene_destroy(s);
+    imp_context_destroy(ctx);
+    return tap_done();
+}

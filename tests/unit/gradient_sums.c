@@ -1,0 +1,135 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Sums of many numbers in fixed point: the same for any order and any number of threads,
+ * within their unit of sums in doubles, and done again where the first unit was too small
+ * for a term. */
+#include "base/fixed_sum.h"
+#include "imp_scene.h"
+#include "imp_tap.h"
+#include "math/rng.h"
+
+enum { SIDE = 64, TEXELS = 32, N = TEXELS * TEXELS * 3, TERMS = 20000, NUMBERS = 7 };
+
+static double term(size_t i)
+{
+    const struct imp_key key = imp__key(3, i, 0);
+    return (imp__u01(key, 0) - 0.5) * exp2(-30 * imp__u01(key, 1));
+}
+
+static void integers(void)
+{
+    double a[NUMBERS], b[NUMBERS];
+    imp_fixed fine[2][NUMBERS];
+    long double exact[NUMBERS] = {0};
+    struct imp_fixed_sum fa = {.n = NUMBERS, .sum = (imp_fixed *)a, .fine = fine[0]};
+    struct imp_fixed_sum fb = {.n = NUMBERS, .sum = (imp_fixed *)b, .fine = fine[1]};
+    imp__fixed_begin(&fa, 0.5, 4, TERMS);
+    imp__fixed_begin(&fb, 0.5, 4, TERMS);
+    for (size_t i = 0; i < TERMS; i++) {
+        exact[i % NUMBERS] += term(i);
+        imp__fixed_add(&fa, i % NUMBERS, term(i));
+        imp__fixed_add(&fb, (TERMS - 1 - i) % NUMBERS, term(TERMS - 1 - i));
+    }
+    imp__fixed_end(&fa);
+    imp__fixed_end(&fb);
+    double worst = 0;
+    for (int k = 0; k < NUMBERS; k++) worst = fmax(worst, fabs(a[k] - (double)exact[k]));
+    tap_ok(memcmp(a, b, sizeof a) == 0, "backwards: the same bits");
+    tap_ok(worst < 1e-15, "exact but for the last double # %.2g", worst);
+
+    imp__fixed_begin(&fa, 1, 4, 8);
+    imp__fixed_add(&fa, 0, 3);
+    imp__fixed_add(&fa, 0, 1e9);
+    imp__fixed_add(&fa, 1, NAN);
+    imp__fixed_add(&fa, 1, -INFINITY);
+    tap_ok(fa.too_large == 3 && isnan(imp__fixed_largest(&fa)),
+           "too large, infinite or no number: counted # %llu",
+           (unsigned long long)fa.too_large);
+    imp__fixed_end(&fa);
+    tap_ok(a[0] == 3 && a[1] == 0, "and left out");
+}
+
+static imp_scene *wall(imp_context *ctx)
+{
+    static float pixels[N];
+    imp_scene *s;
+    for (int k = 0; k < N; k++) pixels[k] = 0.3f + 0.4f * (float)(k % 5) / 5;
+    test_must(ctx, imp_scene_create(ctx, NULL, &s));
+    imp_scene_begin(s, "integrator", "direct", NULL, NULL);
+    imp_scene_end(s);
+    imp_scene_begin(s, "sensor", "perspective", NULL, NULL);
+    imp_scene_float(s, "fov", 30);
+    const double camera[16] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 3, 0, 0, 0, 1};
+    imp_scene_transform(s, "to_world", camera);
+    imp_scene_begin(s, "film", "hdrfilm", NULL, NULL);
+    imp_scene_integer(s, "width", SIDE);
+    imp_scene_integer(s, "height", SIDE);
+    imp_scene_begin(s, "rfilter", "box", NULL, NULL);
+    imp_scene_end(s);
+    imp_scene_end(s);
+    imp_scene_end(s);
+    imp_scene_begin(s, "shape", "rectangle", NULL, NULL);
+    imp_scene_begin(s, "bsdf", "diffuse", "paint", NULL);
+    imp_scene_begin(s, "texture", "bitmap", "texels", "reflectance");
+    imp_scene_image(s, TEXELS, TEXELS, 3, pixels);
+    imp_scene_end(s);
+    imp_scene_end(s);
+    imp_scene_end(s);
+    imp_scene_begin(s, "emitter", "constant", "sky", NULL);
+    imp_scene_rgb(s, "radiance", (double[3]){1, 2, 3});
+    imp_scene_end(s);
+    test_must(ctx, imp_scene_commit(s));
+    return s;
+}
+
+/* Gradient and errors with weight `all` on the pixels and `one` on pixel (1, 1). */
+static void gradient(int threads, float all, float one, double *g, double *se)
+{
+    static float target[SIDE * SIDE * 3], weights[SIDE * SIDE];
+    imp_context *ctx = test_context(threads);
+    imp_scene *s = wall(ctx);
+    imp_problem *p;
+    struct imp_target t = IMP_TARGET_INIT;
+    struct imp_run run = IMP_RUN_INIT;
+    for (int k = 0; k < SIDE * SIDE; k++) weights[k] = k == SIDE + 1 ? one : all;
+    t.width = t.height = SIDE, t.channels = 3, t.pixels = target, t.weights = weights;
+    run.spp = 4;
+    test_must(ctx, imp_problem_create(s, &p));
+    test_must(ctx, imp_problem_activate(p, "*data*"));
+    test_must(ctx, imp_problem_add_target(p, &t));
+    test_must(ctx, imp_problem_objective(p, NULL, &run, NULL, g, se));
+    if (imp_problem_n(p) != N) exit(99);
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+    imp_context_destroy(ctx);
+}
+
+int main(void)
+{
+    static double g[3][N], se[3][N];
+    integers();
+
+    gradient(1, 1, 1, g[0], se[0]);
+    gradient(2, 1, 1, g[1], se[1]);
+    gradient(5, 1, 1, g[2], se[2]);
+    tap_ok(!memcmp(g[0], g[1], sizeof g[0]) && !memcmp(g[0], g[2], sizeof g[0]) &&
+               !memcmp(se[0], se[1], sizeof se[0]) && !memcmp(se[0], se[2], sizeof se[0]),
+           "gradient of %d texels: the same bits at 1, 2, 5 threads", N);
+    /* The gradient is linear in the weights. A pixel that a look at some tiles does not
+     * see has 2^30 times the weight of others. */
+    const float large = 0x1p30f;
+    double worst = 0, worst_se = 0, largest = 0;
+    gradient(2, 0, 1, g[1], se[1]);
+    gradient(2, 1, large, g[2], se[2]);
+    for (int k = 0; k < N; k++) largest = fmax(largest, fabs(g[2][k]));
+    for (int k = 0; k < N; k++) {
+        const double want = g[0][k] + (large - 1.) * g[1][k];
+        const double want_se = large * se[1][k];
+        worst = fmax(worst, fabs(g[2][k] - want) / largest);
+        if (want_se > 0) worst_se = fmax(worst_se, fabs(se[2][k] / want_se - 1));
+    }
+    tap_ok(largest > 0 && worst < 1e-9 && worst_se < 1e-6,
+           "a term 2^30 times larger than expected # off by %.2g of the largest, %.2g",
+           worst, worst_se);
+    return tap_done();
+}
