@@ -81,14 +81,15 @@ struct imp_texture;
 /* One input of one object: a constant or a texture. */
 struct imp_input {
     const struct imp_texture *texture; /* NULL: constant */
-    imp_spec value;                    /* the constant, in all used lanes */
     int param;                         /* index of its parameter, -1: none */
-    bool scalar; /* declared IMP_INPUT_SCALAR: textures give one number */
-    int count;   /* numbers of a constant: 3, or 1 (in all lanes) */
+    int count;                         /* numbers of a constant: 3, or 1 (in all lanes) */
+    bool scalar;     /* declared IMP_INPUT_SCALAR: textures give one number */
+    bool plain;      /* a constant that is no scalar and no luminance: `value` as it is */
+    int luminance;   /* > 0: the luminance of the input that stands so many before it */
+    imp_spec value;  /* the constant, in all used lanes */
+    imp_spec weight; /* of a luminance: of that input's lanes */
     const struct imp_spectrum *spectrum; /* what a walk of wavelengths looks up; NULL:
                                             none was written */
-    int luminance;   /* > 0: the luminance of the input that stands so many before it */
-    imp_spec weight; /* of that input's lanes */
 };
 
 struct imp_build; /* what build functions get: src/kind/build.h */

@@ -240,6 +240,7 @@ enum imp_status imp__build_inputs(struct imp_scene *scene, struct imp_node *node
             for (in->luminance = 1; in->luminance < count; in->luminance++)
                 if (strcmp(desc[count - in->luminance].name, d->name) == 0) break;
         }
+        in->plain = !in->texture && !in->scalar && !in->luminance;
         out[count++] = in;
     }
     *n = count;

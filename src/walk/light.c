@@ -68,17 +68,19 @@ static int light_choose(const struct imp_step *s, double u, double *pmf)
     return light;
 }
 
-static void record(struct imp_vertex *v, int emitter, double weight,
-                   const struct imp_emission *x, imp_v3 p, imp_v3 wi)
+/* there: uv, distance, cosine at the light. */
+static inline void record(struct imp_vertex *v, int emitter, double weight, imp_v3 there,
+                          imp_v3 d, imp_v3 p, imp_v3 wi)
 {
     struct imp_light *l = &v->d.light;
     l->emitter = emitter;
     l->weight = (imp_decided)weight;
-    l->uv[0] = (imp_decided)x->uv[0];
-    l->uv[1] = (imp_decided)x->uv[1];
-    l->dist = (imp_decided)x->dist;
-    l->cos_light = (imp_decided)x->cos_light;
-    imp__store_v3(l->d, x->d);
+    const imp_decided4 stored = __builtin_convertvector(there, imp_decided4);
+    l->uv[0] = stored[0];
+    l->uv[1] = stored[1];
+    l->dist = stored[2];
+    l->cos_light = stored[3];
+    imp__store_v3(l->d, d);
     imp__store_v3(l->p, p);
     imp__store_v3(l->wi, wi);
     v->d.connection = IMP_OCCLUDED; /* until it is seen */
@@ -117,10 +119,9 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
     const double weight = imp__decide1((alone ? 1 : power_heuristic(p, pdf)) / p);
 
     /* What it brings, if it is seen. */
-    const struct imp_emission x = {{imp__decide1(ls.uv[0]), imp__decide1(ls.uv[1])},
-                                   imp__decide1(ls.dist),
-                                   imp__decide1(ls.cos_light),
-                                   imp__decide(-ls.wi)};
+    const imp_v3 there = imp__decide((imp_v3){ls.uv[0], ls.uv[1], ls.dist, ls.cos_light});
+    const struct imp_emission x = {
+        {there[0], there[1]}, there[2], there[3], imp__decide(-ls.wi)};
     const bool far = !isfinite(ls.dist);
     const imp_v3 point = imp__decide(far ? (imp_v3){0} : ls.p);
     const imp_spec le = imp__emitter_radiance(scene, light, &x, point, s->at.carried);
@@ -132,7 +133,7 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
     if (imp__is_zero_used(f * le, s->at.carried) && !differentiable) return;
     shadow->brings = f * le * weight;
     if (s->recorded) {
-        record(v, light, weight, &x, point, dirs.wi);
+        record(v, light, weight, there, x.d, point, dirs.wi);
         v->light_f = f;
         v->light_e = le;
     }

@@ -155,7 +155,7 @@ static void emission_add(struct imp_step *s, struct imp_vertex *v, double weight
     }
 }
 
-static bool step(struct imp_step *s);
+static void walk_on(struct imp_step *s);
 
 /* The continuation of v counts by a share of 1/n. */
 static void share(const struct imp_step *s, struct imp_vertex *v, int n)
@@ -167,8 +167,10 @@ static void share(const struct imp_step *s, struct imp_vertex *v, int n)
 
 /* Further continuations of v hang on it as side walks. `before`: the walk before its own
  * continuation was drawn. */
-static void split(const struct imp_step *before, struct imp_vertex *v,
-                  const struct imp_surface *at, const struct imp_frame *frame)
+static __attribute__((noinline)) void split(const struct imp_step *before,
+                                            struct imp_vertex *v,
+                                            const struct imp_surface *at,
+                                            const struct imp_frame *frame)
 {
     struct imp_walk *walk = before->walk;
     const int n = before->tracer->split;
@@ -209,7 +211,8 @@ static void split(const struct imp_step *before, struct imp_vertex *v,
         s.in = in;
         if (imp__scatter(&s, u, at, frame)) {
             share(&s, u, n);
-            for (s.depth++; step(&s);) s.depth++;
+            s.depth++;
+            walk_on(&s);
         }
         walk->valid |= side->walk.valid;
         side->walk.valid = true;
@@ -217,8 +220,21 @@ static void split(const struct imp_step *before, struct imp_vertex *v,
     }
 }
 
+/* The continuation of v, and its branches where the walk is split. */
+static __attribute__((noinline)) bool scatter_split(struct imp_step *s,
+                                                    struct imp_vertex *v,
+                                                    const struct imp_surface *at,
+                                                    const struct imp_frame *frame)
+{
+    const struct imp_step before = *s;
+    const bool continues = imp__scatter(s, v, at, frame);
+    if (continues) share(s, v, s->tracer->split);
+    split(&before, v, at, frame);
+    return continues;
+}
+
 /* From the ray in flight to the next one; false: the walk ends. */
-static bool step(struct imp_step *s)
+static inline __attribute__((always_inline)) bool step(struct imp_step *s)
 {
     const struct imp_integrator *integrator = s->tracer->integrator;
     const int max_depth = integrator->max_depth;
@@ -257,16 +273,10 @@ static bool step(struct imp_step *s)
     /* The continuation. */
     const bool only_lights =
         integrator->kind == IMP_INTEGRATOR_DIRECT && integrator->bsdf_samples == 0;
-    bool continues;
-    if (imp_unlikely(s->tracer->split > 1) && s->depth == 0 && !only_lights &&
-        s->scene->n_media == 0) {
-        const struct imp_step before = *s;
-        continues = imp__scatter(s, v, &at, &frame);
-        if (continues) share(s, v, s->tracer->split);
-        split(&before, v, &at, &frame);
-    } else {
-        continues = !only_lights && imp__scatter(s, v, &at, &frame);
-    }
+    const bool splits =
+        imp_unlikely(s->tracer->split > 1) && s->depth == 0 && s->scene->n_media == 0;
+    const bool continues = !only_lights && (splits ? scatter_split(s, v, &at, &frame)
+                                                   : imp__scatter(s, v, &at, &frame));
 
     /* Is the light seen? */
     if (shadow.wanted &&
@@ -275,6 +285,11 @@ static bool step(struct imp_step *s)
         if (s->recorded) v->d.connection = IMP_CONNECTED;
     }
     return continues && !s->walk->dropped;
+}
+
+static void walk_on(struct imp_step *s)
+{
+    while (step(s)) s->depth++;
 }
 
 /* ---- Walks ------------------------------------------------------------------------ */
@@ -343,8 +358,7 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
                          .beta = {1, 1, 1, 1},
                          .eta = 1,
                          .guided.guide = tracer->guide};
-    if (imp_likely(s.segment->begin == NULL) || s.segment->begin(&s))
-        while (step(&s)) s.depth++;
+    if (imp_likely(s.segment->begin == NULL) || s.segment->begin(&s)) walk_on(&s);
 
     const imp_spec L = imp__walk_fold(walk);
     const enum imp_drop cause = drop_cause(L, tracer->carried);

@@ -172,10 +172,10 @@ static void luminance_scatter(const struct imp_input *colour, imp_spec weight,
 void imp__inputs_eval(const struct imp_input *const *input, int n,
                       const struct imp_texcoord *at, imp_spec *in)
 {
+    const bool colours = imp_likely(!at->carried);
     for (int j = 0; j < n; j++) {
         const struct imp_input *i = input[j];
-        if (imp_likely(!i->texture && !i->scalar && !i->luminance && !at->carried))
-            in[j] = i->value;
+        if (imp_likely(i->plain && colours)) in[j] = i->value;
         else if (i->luminance)
             in[j] = imp__spec(weighted(i->weight, in[j - i->luminance]));
         else imp__input_eval(i, i->scalar, at, &in[j]);
@@ -186,11 +186,17 @@ void imp__inputs_scatter(const struct imp_input *const *input, int n,
                          const struct imp_texcoord *at, const imp_spec *in_bar,
                          struct imp_sink *sink)
 {
+    const bool colours = imp_likely(!at->carried);
     for (int j = 0; j < n; j++) {
         const struct imp_input *i = input[j];
-        if (imp_unlikely(i->luminance))
+        if (imp_likely(i->plain && colours)) {
+            if (i->param >= 0)
+                sink->add(sink, i->param, 0, i->count == 3 ? 3 : 1, &in_bar[j]);
+        } else if (i->luminance) {
             luminance_scatter(input[j - i->luminance], i->weight, at, &in_bar[j], sink);
-        else imp__input_scatter(i, i->scalar, at, &in_bar[j], sink);
+        } else {
+            imp__input_scatter(i, i->scalar, at, &in_bar[j], sink);
+        }
     }
 }
 
