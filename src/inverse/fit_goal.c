@@ -4,6 +4,7 @@
 #include "curved/inside.h"
 #include "estimate.h"
 #include "fit.h"
+#include "math/hash.h"
 #include "walk/run.h"
 #include <float.h>
 #include <math.h>
