@@ -9,7 +9,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define MAGIC "importon checkpoint 1\n"
+#define MAGIC "importon checkpoint 2\n"
 
 /* ---- Writing ------------------------------------------------------------------- */
 
@@ -136,7 +136,8 @@ static enum imp_status same_problem(const struct source *s,
 {
     const char *what = is->parameters != of->parameters ? "other parameters are active"
                        : is->targets != of->targets ? "its targets or regularisers differ"
-                       : is->scene != of->scene ? "the scene's other parameters differ"
+                       : is->scene != of->scene
+                           ? "the scene, or a parameter that is held, differs"
                        : is->options != of->options
                            ? "seed, samples per pixel or optimiser's options differ"
                            : NULL;
