@@ -78,9 +78,8 @@ static void begin(void)
     }
     file = memfd_create("walks", 0);
     snprintf(path, sizeof path, "/proc/self/fd/%d", file);
-    snprintf((char *)good, sizeof good, "fuzz_record.%ld.tmp", (long)getpid());
     char name[64];
-    snprintf(name, sizeof name, "%s", (char *)good);
+    snprintf(name, sizeof name, "fuzz_record.%ld.tmp", (long)getpid());
     must(imp__record_write(&record, name));
     FILE *f = fopen(name, "rb");
     if (!f || file < 0) abort();
