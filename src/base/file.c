@@ -107,6 +107,14 @@ static int write_all(int fd, const unsigned char *p, size_t size)
     return 0;
 }
 
+static int write_parts(int fd, const struct imp_part *parts, size_t n)
+{
+    int code = 0;
+    for (size_t k = 0; k < n && !code; k++)
+        code = write_all(fd, parts[k].data, parts[k].size);
+    return code;
+}
+
 /* A name beside `path` that is free: created, never opened over something. */
 static int temporary_open(const char *path, mode_t mode, char *name, size_t size)
 {
@@ -132,8 +140,8 @@ static void folder_sync(const char *path, char *scratch, size_t size)
     close(fd);
 }
 
-enum imp_status imp__file_write(imp_context *ctx, const char *path, const void *data,
-                                size_t size)
+enum imp_status imp__file_write_parts(imp_context *ctx, const char *path,
+                                      const struct imp_part *parts, size_t n)
 {
     struct stat info;
     const bool exists = stat(path, &info) == 0;
@@ -142,7 +150,7 @@ enum imp_status imp__file_write(imp_context *ctx, const char *path, const void *
     if (exists && !S_ISREG(info.st_mode)) {
         const int fd = open(path, O_WRONLY | O_CLOEXEC);
         if (fd < 0) return io_error(ctx, path, "cannot open", errno);
-        const int code = write_all(fd, data, size);
+        const int code = write_parts(fd, parts, n);
         if (close(fd) != 0 || code) return io_error(ctx, path, "cannot write", code);
         return IMP_OK;
     }
@@ -157,7 +165,7 @@ enum imp_status imp__file_write(imp_context *ctx, const char *path, const void *
     fd = temporary_open(target, 0666, name, room);
     if (fd < 0) IMP_TRY(io_error(ctx, path, "cannot create", errno));
     if (exists) (void)fchmod(fd, info.st_mode & 07777);
-    code = write_all(fd, data, size);
+    code = write_parts(fd, parts, n);
     if (!code && fsync(fd) != 0 && errno != EINVAL && errno != EROFS) code = errno;
     if (close(fd) != 0 && !code) code = errno;
     if (!code && rename(name, target) != 0) code = errno;
@@ -169,4 +177,10 @@ enum imp_status imp__file_write(imp_context *ctx, const char *path, const void *
 out:
     imp__release(ctx, name);
     return st;
+}
+
+enum imp_status imp__file_write(imp_context *ctx, const char *path, const void *data,
+                                size_t size)
+{
+    return imp__file_write_parts(ctx, path, &(struct imp_part){data, size}, 1);
 }

@@ -20,6 +20,13 @@ enum imp_status imp__file_read(imp_context *ctx, const char *path, size_t limit,
  */
 enum imp_status imp__file_write(imp_context *ctx, const char *path, const void *data,
                                 size_t size);
+/* The same, of parts in turn. */
+struct imp_part {
+    const void *data;
+    size_t size;
+};
+enum imp_status imp__file_write_parts(imp_context *ctx, const char *path,
+                                      const struct imp_part *parts, size_t n);
 
 /* Put n bytes at `offset`, growing as needed; false if out of memory. */
 bool imp__bytes_put(imp_context *ctx, struct imp_bytes *b, size_t offset,

@@ -37,6 +37,7 @@ struct imp_prop {
     const double *list; /* SPECTRUM: 2 n numbers */
     size_t n;
     bool used;
+    bool theta; /* its numbers have become a parameter */
 };
 
 /* Mesh and pixel data attached to a node in place of a file. */
@@ -74,7 +75,7 @@ struct imp_node {
         struct imp_node *node; /* NULL until a reference is resolved */
         const char *ref;       /* id referred to; NULL: a direct child */
         struct imp_loc loc;
-        bool used;
+        bool used, theta;
     } * children;
     size_t n_children, cap_children;
     const struct imp_mesh_data *mesh; /* attached data, or NULL */

@@ -5,6 +5,7 @@
  * coarse coefficient's share goes to eight fine ones). Adam's rate is halved. */
 #include "bend.h"
 #include "lbfgs.h"
+#include "math/hash.h"
 #include "search/checkpoint.h"
 #include <stdio.h>
 #include <string.h>

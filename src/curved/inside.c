@@ -3,6 +3,7 @@
  * step that hits a shape is shortened to end on it. Same steps and transposes as in
  * trace.c and adjoint.c, for one ray without reflections. */
 #include "inside.h"
+#include "math/hash.h"
 
 #define STEPS_DEFAULT 100 /* across a body whose field has no cells */
 
@@ -26,6 +27,20 @@ void imp__graded_destroy(struct imp_graded *g)
     if (g->ready) imp__plan_destroy(&g->plan);
     imp_bend_destroy(g->bend);
     imp__release(ctx, g);
+}
+
+uint64_t imp__graded_hash(uint64_t h, const struct imp_medium *m)
+{
+    enum { SIDE = 3 };
+    if (!m->graded || m->index < 0) return h;
+    for (int k = 0; k < SIDE * SIDE * SIDE; k++) {
+        const int at[3] = {k % SIDE, k / SIDE % SIDE, k / (SIDE * SIDE)};
+        imp_v3 x = m->lo;
+        for (int c = 0; c < 3; c++) x[c] += (m->hi[c] - m->lo[c]) * (at[c] + 0.6) / SIDE;
+        const double index = imp__graded_index(m->graded, &x);
+        h = imp__hash(h, &index, sizeof index);
+    }
+    return h;
 }
 
 enum imp_status imp__graded_ready(struct imp_graded *g, imp_v3 lo, imp_v3 hi)

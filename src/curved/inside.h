@@ -30,6 +30,9 @@ static inline double imp__graded_index(const struct imp_graded *g, const imp_v3 
     imp__field_eval1(g->bend->field, x, 1, &j);
     return j.eta;
 }
+/* What of a medium is no parameter (where its field lies, a profile's axis) shows in its
+ * index at some points. */
+uint64_t imp__graded_hash(uint64_t h, const struct imp_medium *m);
 
 /* The surface of a shape near a point p of it, as a level set. */
 void imp__level(const struct imp_shape *s, imp_v3 p, imp_v3 ng,

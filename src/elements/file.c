@@ -5,7 +5,7 @@
  * damage; what it cannot find, a file made to deceive, is checked number by number. */
 #include "base/file.h"
 #include "elements.h"
-#include "search/checkpoint.h"
+#include "math/hash.h"
 #include <string.h>
 
 /* The last character is the version of the format. */

@@ -4,6 +4,8 @@
 #include "curved/inside.h"
 #include "estimate.h"
 #include "fit.h"
+#include "math/hash.h"
+#include "scene/fingerprint.h"
 #include "walk/run.h"
 #include <float.h>
 #include <math.h>
@@ -117,22 +119,12 @@ static enum imp_status normal(const double *x, uint64_t seed, struct imp__normal
 
 /* ---- What the fit belongs to --------------------------------------------------- */
 
-/* What of a medium is no parameter (where its field lies, a profile's axis) shows in its
- * index at some points; with an active number that differs from start to start. */
-static uint64_t medium_hash(uint64_t h, const struct imp_medium *m, const int64_t *base)
+/* With an active number, the index of a medium differs from start to start. */
+static bool medium_active(const struct imp_medium *m, const int64_t *base)
 {
-    enum { SIDE = 3 };
     for (int k = 0; k < m->n_numbers; k++)
-        if (m->numbers[k].param >= 0 && base[m->numbers[k].param] >= 0) return h;
-    if (!m->graded || m->index < 0) return h;
-    for (int k = 0; k < SIDE * SIDE * SIDE; k++) {
-        const int at[3] = {k % SIDE, k / SIDE % SIDE, k / (SIDE * SIDE)};
-        imp_v3 x = m->lo;
-        for (int c = 0; c < 3; c++) x[c] += (m->hi[c] - m->lo[c]) * (at[c] + 0.6) / SIDE;
-        const double index = imp__graded_index(m->graded, &x);
-        h = imp__hash(h, &index, sizeof index);
-    }
-    return h;
+        if (m->numbers[k].param >= 0 && base[m->numbers[k].param] >= 0) return true;
+    return false;
 }
 
 static void fingerprint(struct imp__fit *f)
@@ -140,6 +132,14 @@ static void fingerprint(struct imp__fit *f)
     const struct imp_problem *p = f->problem;
     struct imp__fingerprint *h = &f->fingerprint;
 
+    h->scene = imp__fingerprint_objects(p->scene);
+    const uint64_t integrator = imp__fingerprint_integrator(&p->scene->integrator);
+    h->scene = imp__hash(h->scene, &integrator, sizeof integrator);
+    for (size_t i = 0; i < p->n_targets; i++) {
+        const uint64_t sensor =
+            imp__fingerprint_sensor(p->scene->sensors[p->targets[i].desc.sensor]);
+        h->scene = imp__hash(h->scene, &sensor, sizeof sensor);
+    }
     for (size_t k = 0; k < p->scene->n_params; k++) {
         const struct imp_param *q = &p->scene->params[k];
         const size_t n = q->info.count;
@@ -156,7 +156,8 @@ static void fingerprint(struct imp__fit *f)
         }
     }
     for (int m = 0; m < p->scene->n_media; m++)
-        h->scene = medium_hash(h->scene, p->scene->media[m], p->active.base);
+        if (!medium_active(p->scene->media[m], p->active.base))
+            h->scene = imp__graded_hash(h->scene, p->scene->media[m]);
     for (size_t i = 0; i < p->n_targets; i++) {
         const struct imp__target *t = &p->targets[i];
         const size_t n = (size_t)t->desc.width * (size_t)t->desc.height;
@@ -178,8 +179,10 @@ static void fingerprint(struct imp__fit *f)
             h->targets =
                 imp__hash(h->targets, r->origin, p->scene->n_theta * sizeof *r->origin);
     }
+    const struct imp_sensor *sensor = p->scene->sensors[p->targets[0].desc.sensor];
     const double number[4] = {f->options.optimizer, f->options.learning_rate,
-                              f->options.tolerance, f->run.spp};
+                              f->options.tolerance,
+                              f->run.spp > 0 ? f->run.spp : sensor->spp};
     h->options = imp__hash(f->outer.seed, number, sizeof number);
 }
 
@@ -295,7 +298,7 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
     f.search_share = f.options.intervals && n <= IMP_DENSE_MAX ? 0.7 : 0.98;
     f.run = f.outer;
     f.run.time_limit_s = 0;
-    fingerprint(&f);
+    if (f.options.checkpoint) fingerprint(&f);
     *out = f;
     /* Pointers to the fit itself: it does not move any more. */
     out->run.progress = inner_progress;

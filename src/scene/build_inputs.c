@@ -220,6 +220,8 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
                                     hi));
     }
     IMP_TRY(param_add(scene, name, key, d, in, count));
+    if (prop) prop->theta = true;
+    else if (child) child->theta = true;
 out:
     return st;
 }

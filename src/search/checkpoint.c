@@ -3,25 +3,13 @@
  * Text of a search's state: writing, and strict reading. */
 #include "checkpoint.h"
 #include "base/text.h"
-#include "math/rng.h"
+#include "math/hash.h"
 #include <errno.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
 
-#define MAGIC "importon checkpoint 1\n"
-
-uint64_t imp__hash(uint64_t h, const void *bytes, size_t n)
-{
-    const unsigned char *b = bytes;
-    for (; n >= 8; n -= 8, b += 8) {
-        uint64_t word;
-        memcpy(&word, b, 8);
-        h = imp__mix64(h ^ word) + 0x9e3779b97f4a7c15u;
-    }
-    for (; n > 0; n--, b++) h = imp__mix64(h ^ *b) + 0x9e3779b97f4a7c15u;
-    return h;
-}
+#define MAGIC "importon checkpoint 2\n"
 
 /* ---- Writing ------------------------------------------------------------------- */
 
@@ -148,7 +136,8 @@ static enum imp_status same_problem(const struct source *s,
 {
     const char *what = is->parameters != of->parameters ? "other parameters are active"
                        : is->targets != of->targets ? "its targets or regularisers differ"
-                       : is->scene != of->scene ? "the scene's other parameters differ"
+                       : is->scene != of->scene
+                           ? "the scene, or a parameter that is held, differs"
                        : is->options != of->options
                            ? "seed, samples per pixel or optimiser's options differ"
                            : NULL;

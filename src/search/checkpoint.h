@@ -25,7 +25,4 @@ enum imp_status imp__checkpoint_read(imp_context *ctx, const char *path,
                                      const struct imp__goal *goal,
                                      struct imp__search *search, bool *found);
 
-/* Running hash of bytes, for fingerprints. */
-uint64_t imp__hash(uint64_t h, const void *bytes, size_t n);
-
 #endif

@@ -10,60 +10,85 @@ static void place_decided(const struct imp_vertex *v, struct imp_place *p)
         (struct imp_place){imp__vertex_at(v), imp__vertex_dirs(v), imp__vertex_met(v), 1};
 }
 
-/* E + B of the vertex at place p, and the weight of its step. */
-static imp_spec vertex_value(const struct imp_tracer *tracer, const struct imp_vertex *v,
-                             const struct imp_place *p, imp_spec *w)
+/* What a vertex's decisions are worth. */
+struct values {
+    imp_spec e, b;             /* E_k, B_k */
+    imp_spec light_f, light_e; /* factors of B_k */
+    imp_spec f;                /* of the continuation: w_k without T/(p s) */
+};
+
+/* Of the vertex at place p; in: its inputs there. */
+static void vertex_values(const struct imp_tracer *tracer, const struct imp_vertex *v,
+                          const struct imp_place *p, imp_spec *in, struct values *x)
 {
     const struct imp_scene *scene = tracer->scene;
     const struct imp_decision *d = &v->d;
     const struct imp_bsdf *b = v->bsdf;
-    imp_spec in[IMP_INPUTS_MAX], f, sum = {0};
-    *w = (imp_spec){0};
+    *x = (struct values){.e = {0}};
     if (b) imp__evaluate_inputs(b, v->shape, &p->at, in);
     if (d->glows) {
-        b->ops->emit(b, in, &p->dirs.wo, &f);
-        sum += f * d->glow_weight;
+        imp_spec glow;
+        b->ops->emit(b, in, &p->dirs.wo, &glow);
+        x->e += glow * d->glow_weight;
     }
     if (d->met.emitter >= 0)
-        sum +=
+        x->e +=
             imp__emitter_radiance(scene, d->met.emitter, &p->met, p->at.p, v->carried) *
             d->met.weight;
     if (d->connection == IMP_CONNECTED) {
-        const struct imp_emission x = imp__light_emission(&d->light);
+        const struct imp_emission to = imp__light_emission(&d->light);
         struct imp_dirs dirs = imp__light_dirs(v);
         dirs.wo = p->dirs.wo;
-        b->ops->eval(b, in, &dirs, &f);
-        sum += f *
-               imp__emitter_radiance(scene, d->light.emitter, &x,
-                                     imp__decided_v3(d->light.p), v->carried) *
-               d->light.weight;
+        b->ops->eval(b, in, &dirs, &x->light_f);
+        x->light_e = imp__emitter_radiance(scene, d->light.emitter, &to,
+                                           imp__decided_v3(d->light.p), v->carried);
+        x->b = x->light_f * x->light_e * d->light.weight;
     }
-    if (d->goes_on) {
-        b->ops->eval(b, in, &p->dirs, &f);
-        *w = f * v->scale;
+    if (d->goes_on) b->ops->eval(b, in, &p->dirs, &x->f);
+}
+
+void imp__walk_evaluate(const struct imp_tracer *tracer, struct imp_walk *walk)
+{
+    for (struct imp_vertex *v = walk->first; v; v = v->next) {
+        const struct imp_decision *d = &v->d;
+        struct imp_place p;
+        struct values x;
+        place_decided(v, &p);
+        vertex_values(tracer, v, &p, v->in, &x);
+        v->e = x.e;
+        v->b = x.b;
+        v->light_f = x.light_f;
+        v->light_e = x.light_e;
+        v->w = (imp_spec){0};
+        v->scale = 0;
+        for (struct imp_side *s = v->side; s; s = s->next)
+            imp__walk_evaluate(tracer, &s->walk);
+        if (!d->goes_on) continue;
+        imp__step_weigh(v, x.f, d->pdf, d->survive);
+        imp__step_pass(v, d->passes);
     }
-    return sum;
 }
 
 imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk *walk)
 {
-    imp_spec P = imp__spec(1), L = {0};
+    imp_spec P = imp__spec(1), L = {0}, in[IMP_INPUTS_MAX];
     const imp_spec *entry = walk->entry;
     struct imp_moving moving = {{0}, {0}, {0}};
     if (walk->dropped || !walk->valid) return L;
     for (const struct imp_vertex *v = walk->first; v; v = v->next) {
         const struct imp_segment_ops *segment = v->segment->ops;
         struct imp_place p;
-        imp_spec w;
+        struct values x;
         place_decided(v, &p);
         if (segment->place && !segment->place(tracer, v, &moving, &p))
             return imp__spec(NAN);
+        vertex_values(tracer, v, &p, in, &x);
         P *= p.ratio * p.ratio;
-        const imp_spec own = vertex_value(tracer, v, &p, &w);
+        const imp_spec own = x.e + x.b;
         L += P * (entry ? own * *entry++ : own);
         for (const struct imp_side *s = v->side; s; s = s->next)
             L += P * imp__walk_frozen(tracer, &s->walk);
-        P *= w;
+        P *= x.f * v->scale;
     }
     return L;
 }

@@ -330,6 +330,14 @@ static enum imp_drop drop_cause(imp_spec L, bool four)
     return IMP_DROP_NONE;
 }
 
+void imp__walk_close(const struct imp_tracer *tracer, struct imp_walk *walk)
+{
+    const imp_spec L = imp__walk_fold(walk);
+    const enum imp_drop cause = drop_cause(L, tracer->carried);
+    if (imp_unlikely(cause != IMP_DROP_NONE)) walk->dropped = cause;
+    walk->L = walk->dropped || !walk->valid ? (imp_spec){0} : L;
+}
+
 void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, int x,
                      int y, int64_t sample, struct imp_walk *walk)
 {
@@ -360,8 +368,5 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
                          .guided.guide = tracer->guide};
     if (imp_likely(s.segment->begin == NULL) || s.segment->begin(&s)) walk_on(&s);
 
-    const imp_spec L = imp__walk_fold(walk);
-    const enum imp_drop cause = drop_cause(L, tracer->carried);
-    if (imp_unlikely(cause != IMP_DROP_NONE)) walk->dropped = cause;
-    walk->L = walk->dropped || !walk->valid ? (imp_spec){0} : L;
+    imp__walk_close(tracer, walk);
 }

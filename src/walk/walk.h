@@ -62,7 +62,8 @@ struct imp_decision {
     uint8_t scatterer;        /* enum imp_scatterer */
     int8_t lobe;              /* of the continuation: IMP_SMOOTH or a delta lobe */
     uint8_t connection;       /* enum imp_connection: what became of the light sample */
-    bool glows, goes_on;      /* the BSDF's own emission counts; the walk continues */
+    bool glows : 1;           /* the BSDF's own emission counts */
+    bool goes_on : 1;         /* the walk continues */
     imp_decided uv[2], p[3];  /* the place; at the sky p is the direction */
     imp_decided wo[3], wi[3]; /* of the continuation, shading frame */
     imp_decided pdf, survive; /* p, s of the continuation */
@@ -202,6 +203,12 @@ void imp__walk_position(const struct imp_tracer *tracer, int x, int y, int64_t s
  * fresh-seed differences do. NaN if the walk moves with a field and meets other shapes
  * now. */
 imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk *walk);
+/* Inputs and values of all vertices at the scene's present parameters, to the bit those
+ * that tracing gave at the parameters it was done with. No vertex moves. */
+void imp__walk_evaluate(const struct imp_tracer *tracer, struct imp_walk *walk);
+/* Fold, and L as it counts: a walk that is not valid brings 0, and one whose value no
+ * light can have, or no picture can hold, is dropped (trace.c). */
+void imp__walk_close(const struct imp_tracer *tracer, struct imp_walk *walk);
 
 /* Radiance of an emitter at x, point p of it, at the scene's present parameters. */
 static inline imp_spec imp__emitter_radiance(const struct imp_scene *scene, int emitter,

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-# A fit resumed after it had converged writes the same files, its reason too; a fit with another lens, or
-# another number of one, is another fit.
+# A fit resumed after it had converged writes the same files, its reason too; a fit with another lens,
+# another number of one, or another camera, is another fit.
 scene=$ROOT/scenes/furnace.xml
 importon render "$scene" --spp 64 -q -o t.exr || exit 9
 for optimizer in lm lbfgs; do
@@ -34,5 +34,12 @@ fit=(importon fit "${seen[@]}" -T seen.exr -p 'map.*' --spp 2 -n 2 --no-interval
 "${fit[@]}" --set @other.txt --resume
 echo "exit $?"
 sed -i 's/<volume type="grid">/& <point name="lo" value="-1.25, -1, -1"\/>/' bend/seen.xml
+"${fit[@]}" --set @same.txt --resume >/dev/null
+echo "exit $?"
+cp "$ROOT/scenes/bend/seen.xml" bend/
+sed -i 's/<float name="fov" value="18"/<float name="fov" value="19"/' bend/seen.xml
+"${fit[@]}" --set @same.txt --resume >/dev/null
+echo "exit $?"
+cp "$ROOT/scenes/bend/seen.xml" bend/
 "${fit[@]}" --set @same.txt --resume >/dev/null
 echo "exit $?"

@@ -1,0 +1,169 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What a kept walk costs: evaluated, folded and swept, over traced and swept, one thread,
+ * processor time; the median of pairs measured in turn.
+ *
+ *     kept [--repeats N] [--spp N] */
+#include "walk/record.h"
+#include <importon/importon.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+static int repeats = 5, spp = 16;
+static imp_context *ctx;
+
+static void must(enum imp_status st)
+{
+    if (st == IMP_OK) return;
+    fprintf(stderr, "kept: %s\n", imp_last_error(ctx));
+    exit(3);
+}
+
+static double cpu(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+static int by_value(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+static double median(double *x, int n)
+{
+    qsort(x, (size_t)n, sizeof *x, by_value);
+    return x[n / 2];
+}
+
+struct gradient {
+    struct imp_sink sink; /* first */
+    const struct imp_active *active;
+    double *g;
+};
+static void add(struct imp_sink *sink, int param, size_t element, int channels,
+                const imp_spec *bar)
+{
+    struct gradient *to = (struct gradient *)sink;
+    const int64_t base = to->active->base[param];
+    if (base < 0) return;
+    double *g = to->g + (size_t)base + element;
+    if (channels == 3)
+        for (int c = 0; c < 3; c++) g[c] += (*bar)[c];
+    else g[0] += (*bar)[0] + (*bar)[1] + (*bar)[2];
+}
+
+struct job {
+    struct imp_tracer tracer;
+    struct imp_arena arena;
+    struct imp_record record;
+    struct gradient to;
+    double sum; /* of radiance: what was asked for is used */
+};
+
+static void sweep(struct job *j, const struct imp_walk *w)
+{
+    j->sum += w->L[0] + w->L[1] + w->L[2];
+    imp__walk_sweep(&j->tracer, w, (imp_spec){1, 1, 1, 0}, &j->to.sink);
+}
+
+/* All walks of the picture; kept too, if `keep`. */
+static void trace_all(struct job *j, bool keep, bool swept)
+{
+    const struct imp_film_desc *film = &j->tracer.sensor->film;
+    for (int y = 0; y < film->crop_h; y++)
+        for (int x = 0; x < film->crop_w; x++)
+            for (int s = 0; s < spp; s++) {
+                const struct imp_arena_mark mark = imp__arena_mark(&j->arena);
+                struct imp_walk w;
+                imp__walk_trace(&j->tracer, &j->arena, x, y, s, &w);
+                if (keep) must(imp__record_keep(&j->record, &w, s));
+                if (swept) sweep(j, &w);
+                imp__arena_rewind(&j->arena, mark);
+            }
+}
+static void evaluate_all(struct job *j, bool swept)
+{
+    for (size_t i = 0; i < j->record.n_walks; i++) {
+        const struct imp_arena_mark mark = imp__arena_mark(&j->arena);
+        struct imp_walk w;
+        imp__record_walk(&j->record, i, &j->tracer, &j->arena, &w);
+        if (swept) sweep(j, &w);
+        imp__arena_rewind(&j->arena, mark);
+    }
+}
+
+static void measure(const char *file, const char *define)
+{
+    struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
+    char path[1024];
+    imp_scene *scene;
+    struct imp_active active;
+    o.defines = &define;
+    o.n_defines = define != NULL;
+    snprintf(path, sizeof path, "%s/%s", IMP_SCENES, file);
+    must(imp_scene_load(ctx, path, &o, &scene));
+    uint8_t *chosen = calloc(scene->n_params + 1, 1);
+    if (!chosen) exit(3);
+    for (size_t k = 0; k < scene->n_params; k++)
+        chosen[k] = (scene->params[k].info.flags & IMP_PARAM_DIFFERENTIABLE) != 0;
+    must(imp__active_create(scene, chosen, &active));
+    struct job j = {.tracer = {.scene = scene,
+                               .integrator = &scene->integrator,
+                               .sensor = scene->sensors[0],
+                               .active = &active,
+                               .seed = 1},
+                    .to = {{.add = add}, &active, calloc(active.n + 1, sizeof(double))}};
+    if (!j.to.g) exit(3);
+    imp__arena_init(&j.arena, ctx);
+    must(imp__record_create(&j.tracer, (size_t)2 << 30, &j.record));
+    trace_all(&j, true, false);
+
+    double both[64], value[64], ns[64];
+    for (int k = 0; k < repeats; k++) {
+        const double t0 = cpu();
+        trace_all(&j, false, true);
+        const double t1 = cpu();
+        evaluate_all(&j, true);
+        const double t2 = cpu();
+        evaluate_all(&j, false);
+        const double t3 = cpu();
+        both[k] = (t2 - t1) / (t1 - t0);
+        value[k] = (t3 - t2) / (t1 - t0);
+        ns[k] = (t1 - t0) / (double)j.record.n_walks * 1e9;
+    }
+    printf("%-14s %-16s %5.2f vertices %5.0f bytes a walk; traced and swept %5.0f ns; "
+           "kept: value %.3f, and swept %.3f of that\n",
+           file, define ? define : "",
+           (double)j.record.n_vertices / (double)j.record.n_walks,
+           (double)imp__record_bytes(&j.record) / (double)j.record.n_walks,
+           median(ns, repeats), median(value, repeats), median(both, repeats));
+    fflush(stdout);
+    imp__record_destroy(&j.record);
+    imp__arena_free(&j.arena);
+    imp__active_destroy(ctx, &active);
+    free(j.to.g);
+    free(chosen);
+    imp_scene_destroy(scene);
+}
+
+int main(int argc, char **argv)
+{
+    struct imp_context_options o = IMP_CONTEXT_OPTIONS_INIT;
+    for (int k = 1; k + 1 < argc; k += 2) {
+        if (strcmp(argv[k], "--repeats") == 0) repeats = atoi(argv[k + 1]);
+        else if (strcmp(argv[k], "--spp") == 0) spp = atoi(argv[k + 1]);
+    }
+    if (repeats < 1 || repeats > 64 || spp < 1) return 2;
+    o.threads = 1;
+    if (imp_context_create(&o, &ctx) != IMP_OK) return 3;
+    measure("cornell.xml", "res=64");
+    measure("stam.xml", "integrator=path");
+    measure("stam.xml", "integrator=stam");
+    measure("textured.xml", NULL);
+    measure("lamps.xml", NULL);
+    imp_context_destroy(ctx);
+    return 0;
+}

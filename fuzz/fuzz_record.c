@@ -1,0 +1,143 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Files of kept walks. A good file is made here, and the bytes say where it is changed:
+ * every three are a place (two bytes) and what is xored there. With an odd first byte the
+ * checksum is made to fit again, so that decisions no tracer makes are looked at one by
+ * one. What is read is evaluated and swept. */
+#include "math/hash.h"
+#include "walk/record.h"
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size);
+
+static const char scene_text[] =
+    "<scene version='3.0.0'><integrator type='path'><integer name='rr_depth' value='2'/>"
+    "</integrator><sensor type='perspective'><transform name='to_world'><lookat "
+    "origin='0,0,4' target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'><integer "
+    "name='width' value='8'/><integer name='height' value='8'/></film></sensor>"
+    "<emitter type='constant'/>"
+    "<shape type='rectangle'><transform name='to_world'><scale value='2'/></transform>"
+    "<bsdf type='diffuse'><texture name='reflectance' "
+    "type='checkerboard'/></bsdf></shape>"
+    "<shape type='sphere'><float name='radius' value='.6'/><point name='center' x='.5' "
+    "y='0' z='1'/><bsdf type='dielectric'/></shape>"
+    "<shape type='sphere'><float name='radius' value='.4'/><point name='center' x='-.8' "
+    "y='0' z='.6'/><bsdf type='twosided'><bsdf type='roughconductor'/></bsdf></shape>"
+    "<shape type='sphere'><float name='radius' value='.2'/><point name='center' x='-.8' "
+    "y='.8' z='1'/><emitter type='area'/></shape>"
+    "<emitter type='point'><point name='position' x='0' y='3' z='3'/></emitter></scene>";
+
+enum { WALKS = 40, HEAD = 72, SUM = 8 };
+
+static imp_context *ctx;
+static struct imp_active active;
+static struct imp_tracer tracer;
+static struct imp_arena arena;
+static uint8_t good[1 << 16];
+static size_t n_good;
+static char path[64]; /* of a file in memory */
+static int file;
+
+static void must(enum imp_status st)
+{
+    if (st == IMP_OK) return;
+    fprintf(stderr, "%s\n", imp_last_error(ctx));
+    abort();
+}
+
+static void begin(void)
+{
+    struct imp_context_options o = IMP_CONTEXT_OPTIONS_INIT;
+    imp_scene *scene;
+    struct imp_record record;
+    o.threads = 1;
+    must(imp_context_create(&o, &ctx));
+    must(imp_scene_load_string(ctx, scene_text, sizeof scene_text - 1, "fuzz.xml", NULL,
+                               &scene));
+    static uint8_t chosen[256];
+    if (scene->n_params > sizeof chosen) abort();
+    for (size_t k = 0; k < scene->n_params; k++)
+        chosen[k] = (scene->params[k].info.flags & IMP_PARAM_DIFFERENTIABLE) != 0;
+    must(imp__active_create(scene, chosen, &active));
+    tracer = (struct imp_tracer){.scene = scene,
+                                 .integrator = &scene->integrator,
+                                 .sensor = scene->sensors[0],
+                                 .active = &active};
+    imp__arena_init(&arena, ctx);
+    must(imp__record_create(&tracer, sizeof good, &record));
+    for (int i = 0; i < WALKS; i++) {
+        const struct imp_arena_mark mark = imp__arena_mark(&arena);
+        struct imp_walk walk;
+        imp__walk_trace(&tracer, &arena, i % 8, i / 8, i, &walk);
+        must(imp__record_keep(&record, &walk, i));
+        imp__arena_rewind(&arena, mark);
+    }
+    file = memfd_create("walks", 0);
+    snprintf(path, sizeof path, "/proc/self/fd/%d", file);
+    char name[64];
+    snprintf(name, sizeof name, "fuzz_record.%ld.tmp", (long)getpid());
+    must(imp__record_write(&record, name));
+    FILE *f = fopen(name, "rb");
+    if (!f || file < 0) abort();
+    n_good = fread(good, 1, sizeof good, f);
+    fclose(f);
+    remove(name);
+    if (n_good != HEAD + imp__record_bytes(&record) + SUM) abort();
+    imp__record_destroy(&record);
+}
+
+static void nothing(struct imp_sink *sink, int param, size_t element, int channels,
+                    const imp_spec *bar)
+{
+    (void)sink, (void)bar;
+    const struct imp_param_info *info = &tracer.scene->params[param].info;
+    if (element + (size_t)channels > info->count) abort();
+}
+
+static uint64_t hash_of(const uint8_t *b, size_t n) /* the parts of a file in turn */
+{
+    uint64_t n_walks, sum = imp__hash(0, b, HEAD);
+    memcpy(&n_walks, b + 56, sizeof n_walks);
+    const size_t walks = n_walks < n / sizeof(struct imp_record_walk)
+                             ? (size_t)n_walks * sizeof(struct imp_record_walk)
+                             : 0;
+    if (HEAD + walks + SUM > n) return 0;
+    sum = imp__hash(sum, b + HEAD, walks);
+    return imp__hash(sum, b + HEAD + walks, n - HEAD - walks - SUM);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
+{
+    static uint8_t b[sizeof good];
+    struct imp_record record;
+    if (!ctx) begin();
+    memcpy(b, good, n_good);
+    for (size_t k = 1; k + 3 <= size; k += 3)
+        b[(data[k] | (size_t)data[k + 1] << 8) % (n_good - SUM)] ^= data[k + 2];
+    if (size > 0 && data[0] & 1) {
+        const uint64_t sum = hash_of(b, n_good);
+        memcpy(b + n_good - SUM, &sum, SUM);
+    }
+    const size_t n = size > 0 && data[0] & 2 ? n_good / 2 : n_good; /* cut short */
+    if (ftruncate(file, 0) != 0 || pwrite(file, b, n, 0) != (ssize_t)n) abort();
+    if (imp__record_read(&tracer, path, sizeof good, &record) != IMP_OK) {
+        if (!imp_last_error(ctx)[0]) abort();
+        return 0;
+    }
+    for (size_t i = 0; i < record.n_walks; i++) {
+        const struct imp_arena_mark mark = imp__arena_mark(&arena);
+        struct imp_sink sink = {.add = nothing};
+        struct imp_walk walk;
+        imp__record_walk(&record, i, &tracer, &arena, &walk);
+        imp__walk_sweep(&tracer, &walk, (imp_spec){1, 1, 1, 0}, &sink);
+        for (int c = 0; c < 3; c++)
+            if (!(walk.L[c] >= 0) || walk.L[c] > 3.5e38) abort();
+        imp__arena_rewind(&arena, mark);
+    }
+    imp__record_destroy(&record);
+    return 0;
+}

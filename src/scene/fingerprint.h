@@ -1,0 +1,20 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What a file belongs to that was made with a scene: hashes of the scene, part by part,
+ * so that a refusal can say what differs. None depends on theta but the last. */
+#ifndef IMP_SCENE_FINGERPRINT_H
+#define IMP_SCENE_FINGERPRINT_H
+
+#include "scene.h"
+
+/* Objects: kinds, names, properties that are no parameters, geometry, what lights do with
+ * direction, names and sizes of parameters. */
+uint64_t imp__fingerprint_objects(const struct imp_scene *scene);
+/* Film, filter, and the rays of the camera. */
+uint64_t imp__fingerprint_sensor(const struct imp_sensor *sensor);
+uint64_t imp__fingerprint_integrator(const struct imp_integrator *integrator);
+/* Values of parameters that move or bend rays: those without a derivative, and those of
+ * media. */
+uint64_t imp__fingerprint_rays(const struct imp_scene *scene);
+
+#endif

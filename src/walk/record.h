@@ -1,0 +1,95 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Walks that are kept: their decisions, without values, outlive the arena they were
+ * traced in, and can be written to a file. Evaluated at other parameters of the same
+ * scene they give L and its derivative with densities, directions and visibility as they
+ * were drawn; at the parameters they were drawn at, what tracing gave, to the bit
+ * (docs/estimators.md 17). */
+#ifndef IMP_WALK_RECORD_H
+#define IMP_WALK_RECORD_H
+
+#include "walk.h"
+
+/* ---- What is kept ---------------------------------------------------------------- */
+
+struct imp_record_walk {
+    double px, py; /* film position */
+    struct imp_key key;
+    int64_t sample;
+    uint64_t first; /* vertex, of all in the record */
+    uint16_t n;     /* vertices: of a walk that is dropped or not valid, none */
+    uint8_t valid, absorbed, dropped;
+    uint8_t reserved[3]; /* 0 */
+};
+
+/* What the walks were made with: evaluated with anything else they mean nothing. */
+struct imp_record_of {
+    uint64_t objects, sensor, integrator, rays; /* scene/fingerprint.h */
+};
+
+#define IMP_RECORD_PAGE 1024 /* walks, or vertices */
+
+/* Not for sharing between threads while walks are added. */
+struct imp_record {
+    imp_context *ctx;
+    struct imp_record_of of;
+    size_t budget; /* bytes that walks and vertices may take */
+    size_t n_walks, n_vertices;
+    struct imp_record_walk **walks; /* pages, which never move */
+    struct imp_decision **vertices;
+    size_t n_walk_pages, cap_walk_pages, n_vertex_pages, cap_vertex_pages;
+};
+
+/* An empty record for walks of this tracer, whose scene outlives it. `budget`: bytes of
+ * walks and vertices; memory exceeds it by a page of each at most. IMP_E_UNSUPPORTED if
+ * derivatives follow directions (alpha_gradient), since kept directions stand still, and
+ * if walks split. */
+enum imp_status imp__record_create(const struct imp_tracer *tracer, size_t budget,
+                                   struct imp_record *out);
+void imp__record_destroy(struct imp_record *record);
+size_t imp__record_bytes(const struct imp_record *record);
+
+/* Append a walk that was traced with a record (not value_only); `sample` is its number.
+ * IMP_E_UNSUPPORTED if its vertices move with a field; IMP_E_NOMEM beyond the budget, the
+ * message says how much is needed. Then nothing is appended. */
+enum imp_status imp__record_keep(struct imp_record *record, const struct imp_walk *walk,
+                                 int64_t sample);
+
+/* ---- Evaluated ------------------------------------------------------------------- */
+
+/* Before walks are evaluated: IMP_E_ARG if the scene, sensor or integrator is another, or
+ * a parameter has changed that moves or bends rays. Other parameters are free. */
+enum imp_status imp__record_check(const struct imp_record *record,
+                                  const struct imp_tracer *tracer);
+
+static inline const struct imp_record_walk *imp__record_at(const struct imp_record *r,
+                                                           size_t i)
+{
+    return &r->walks[i / IMP_RECORD_PAGE][i % IMP_RECORD_PAGE];
+}
+
+/* Walk i in the arena, with its values at the scene's present parameters, folded, to be
+ * swept like any other; it has no camera ray, normals and lengths. Running out of memory
+ * drops it. */
+void imp__record_walk(const struct imp_record *record, size_t i,
+                      const struct imp_tracer *tracer, struct imp_arena *arena,
+                      struct imp_walk *walk);
+
+/* ---- Files (record_file.c) ------------------------------------------------------- */
+
+/* Whole or not at all. */
+enum imp_status imp__record_write(const struct imp_record *record, const char *path);
+/* IMP_E_ARG: of another scene, sensor or integrator, or parameters that move rays have
+ * other values; IMP_E_SCENE: damaged, or of another version, byte order or build;
+ * IMP_E_NOMEM: more than the budget. */
+enum imp_status imp__record_read(const struct imp_tracer *tracer, const char *path,
+                                 size_t budget, struct imp_record *out);
+
+/* Room for so many walks and vertices more. */
+enum imp_status imp__record_reserve(struct imp_record *record, size_t walks,
+                                    size_t vertices);
+enum imp_status imp__record_same(imp_context *ctx, const char *what,
+                                 const struct imp_record_of *is,
+                                 const struct imp_record_of *of);
+
+#endif

@@ -1,0 +1,254 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Files of kept walks: a head, the walks, their vertices, and a checksum of all, as they
+ * are in memory. What is read is checked vertex by vertex against the scene, so that
+ * evaluating it is safe whatever the bytes are. */
+#include "base/file.h"
+#include "math/hash.h"
+#include "record.h"
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+
+#define MAGIC      "impwalks"
+#define BYTE_ORDER 0x01020304u
+#define VERSION    1
+
+struct head {
+    char magic[8];
+    uint32_t byte_order, version;
+    uint32_t walk_bytes, vertex_bytes;
+    struct imp_record_of of;
+    uint64_t n_walks, n_vertices;
+};
+_Static_assert(sizeof(struct head) == 72, "no padding: it is written");
+
+/* ---- Writing --------------------------------------------------------------------- */
+
+/* The parts of a file in turn; n elements in pages. */
+static struct imp_part *pages_put(struct imp_part *part, void *const *pages, size_t n,
+                                  size_t size)
+{
+    for (size_t at = 0; at < n; at += IMP_RECORD_PAGE)
+        *part++ = (struct imp_part){pages[at / IMP_RECORD_PAGE],
+                                    imp_min(n - at, (size_t)IMP_RECORD_PAGE) * size};
+    return part;
+}
+
+enum imp_status imp__record_write(const struct imp_record *r, const char *path)
+{
+    const struct head head = {.magic = MAGIC,
+                              .byte_order = BYTE_ORDER,
+                              .version = VERSION,
+                              .walk_bytes = sizeof **r->walks,
+                              .vertex_bytes = sizeof **r->vertices,
+                              .of = r->of,
+                              .n_walks = r->n_walks,
+                              .n_vertices = r->n_vertices};
+    uint64_t sum = 0;
+    struct imp_part *parts =
+        imp__alloc(r->ctx, r->n_walk_pages + r->n_vertex_pages + 2, sizeof *parts);
+    if (!parts) return imp__error(r->ctx, IMP_E_NOMEM, "%s: out of memory", path);
+    struct imp_part *end = parts;
+    *end++ = (struct imp_part){&head, sizeof head};
+    end = pages_put(end, (void *const *)r->walks, r->n_walks, sizeof **r->walks);
+    end = pages_put(end, (void *const *)r->vertices, r->n_vertices, sizeof **r->vertices);
+    for (const struct imp_part *p = parts; p < end; p++)
+        sum = imp__hash(sum, p->data, p->size);
+    *end++ = (struct imp_part){&sum, sizeof sum};
+    const enum imp_status st =
+        imp__file_write_parts(r->ctx, path, parts, (size_t)(end - parts));
+    imp__release(r->ctx, parts);
+    return st;
+}
+
+/* ---- Are these decisions that the scene allows? ---------------------------------- */
+
+static bool all_finite(const imp_decided *x, int n)
+{
+    for (int k = 0; k < n; k++)
+        if (!isfinite(x[k])) return false;
+    return true;
+}
+/* Components of a unit vector, as it was rounded. */
+static bool unit(const imp_decided *x)
+{
+    const double l2 = (double)x[0] * x[0] + (double)x[1] * x[1] + (double)x[2] * x[2];
+    return fabs(l2 - 1) < 1e-3;
+}
+static bool weight(imp_decided x) { return isfinite(x) && x >= 0; }
+
+static bool met_fits(const struct imp_scene *scene, const struct imp_decision *d)
+{
+    const struct imp_met *m = &d->met;
+    const int here = d->shape < 0 ? scene->environment : scene->shapes[d->shape]->emitter;
+    if (m->emitter < 0) return m->emitter == -1;
+    return m->emitter == here && weight(m->weight) && m->dist >= 0 &&
+           isfinite(m->cos_light) && unit(m->d);
+}
+
+static bool light_fits(const struct imp_scene *scene, const struct imp_bsdf *b,
+                       const struct imp_decision *d)
+{
+    const struct imp_light *l = &d->light;
+    if (d->connection == IMP_NOT_CONNECTED) return true;
+    return d->connection <= IMP_CONNECTED && (b->flags & IMP_BSDF_SMOOTH) &&
+           l->emitter >= 0 && l->emitter < scene->n_emitters && weight(l->weight) &&
+           all_finite(l->uv, 2) && all_finite(l->p, 3) && l->dist >= 0 &&
+           isfinite(l->cos_light) && unit(l->d) && unit(l->wi);
+}
+
+static bool continuation_fits(const struct imp_bsdf *b, const struct imp_decision *d)
+{
+    if (!d->goes_on) return true;
+    const unsigned needs = d->lobe == IMP_SMOOTH ? IMP_BSDF_SMOOTH : IMP_BSDF_DELTA;
+    return d->lobe >= IMP_SMOOTH && (b->flags & (needs | IMP_BSDF_NULL)) && unit(d->wi) &&
+           isfinite(d->pdf) && d->pdf > 0 && isfinite(d->survive) && d->survive > 0;
+}
+
+static bool vertex_fits(const struct imp_scene *scene, const struct imp_decision *d,
+                        bool last)
+{
+    if (!all_finite(d->uv, 2) || !all_finite(d->p, 3) || !isfinite(d->passes) ||
+        !weight(d->glow_weight) || (!d->goes_on && !last))
+        return false;
+    if (d->shape == -1)
+        return d->scatterer == IMP_AT_SKY && last && !d->goes_on && !d->glows &&
+               d->connection == IMP_NOT_CONNECTED && d->met.emitter >= 0 &&
+               met_fits(scene, d);
+    if (d->shape < 0 || d->shape >= scene->n_shapes) return false;
+    const struct imp_bsdf *b = imp__shape_bsdf(scene, scene->shapes[d->shape]);
+    const bool null = b->flags & IMP_BSDF_NULL;
+    return d->scatterer == (null ? IMP_AT_BOUNDARY : IMP_AT_SURFACE) && unit(d->wo) &&
+           (!d->glows || (b->flags & IMP_BSDF_EMIT)) && met_fits(scene, d) &&
+           light_fits(scene, b, d) && continuation_fits(b, d);
+}
+
+static bool walk_fits(const struct imp_scene *scene, const struct imp_record *r,
+                      const struct imp_record_walk *w, uint64_t first)
+{
+    const bool counts = w->valid == 1 && w->dropped == IMP_DROP_NONE;
+    if (w->first != first || w->n > IMP_WALK_MAX || w->n > r->n_vertices - first ||
+        w->valid > 1 || w->absorbed > 1 || w->dropped >= IMP_DROP_CAUSES ||
+        (w->n > 0 && !counts) || !isfinite(w->px) || !isfinite(w->py))
+        return false;
+    for (uint64_t k = first; k < first + w->n; k++)
+        if (!vertex_fits(scene, &r->vertices[k / IMP_RECORD_PAGE][k % IMP_RECORD_PAGE],
+                         k + 1 == first + w->n))
+            return false;
+    return true;
+}
+
+/* ---- Reading --------------------------------------------------------------------- */
+
+struct source {
+    imp_context *ctx;
+    const char *path;
+    FILE *f;
+    uint64_t sum;
+};
+
+static enum imp_status damaged(const struct source *s, const char *what)
+{
+    return imp__error(s->ctx, IMP_E_SCENE, "%s: damaged file of kept walks (%s)", s->path,
+                      what);
+}
+
+static enum imp_status take(struct source *s, void *data, size_t size)
+{
+    if (fread(data, 1, size, s->f) != size)
+        return ferror(s->f)
+                   ? imp__error(s->ctx, IMP_E_IO, "%s: %s", s->path, strerror(errno))
+                   : damaged(s, "it ends early");
+    s->sum = imp__hash(s->sum, data, size);
+    return IMP_OK;
+}
+
+static enum imp_status head_take(struct source *s, struct head *h)
+{
+    *h = (struct head){.magic = ""};
+    if (fread(h, 1, sizeof *h, s->f) != sizeof *h &&
+        memcmp(h->magic, MAGIC, sizeof h->magic) == 0)
+        return damaged(s, "it ends early");
+    if (memcmp(h->magic, MAGIC, sizeof h->magic) != 0)
+        return imp__error(s->ctx, IMP_E_SCENE, "%s: not a file of kept walks", s->path);
+    if (h->byte_order != BYTE_ORDER)
+        return imp__error(s->ctx, IMP_E_SCENE,
+                          "%s: kept walks of a machine with another byte order", s->path);
+    if (h->version != VERSION)
+        return imp__error(s->ctx, IMP_E_SCENE,
+                          "%s: kept walks of version %u; this program reads %d", s->path,
+                          h->version, VERSION);
+    if (h->walk_bytes != sizeof(struct imp_record_walk) ||
+        h->vertex_bytes != sizeof(struct imp_decision))
+        return imp__error(s->ctx, IMP_E_SCENE,
+                          "%s: kept walks of another build: %u bytes a vertex, here %zu",
+                          s->path, h->vertex_bytes, sizeof(struct imp_decision));
+    s->sum = imp__hash(0, h, sizeof *h);
+    return IMP_OK;
+}
+
+/* Page by page: a size that the file does not have takes no memory. */
+static enum imp_status body_take(struct source *s, struct imp_record *r,
+                                 const struct head *h)
+{
+    enum imp_status st = IMP_OK;
+    const size_t page = IMP_RECORD_PAGE;
+    while (r->n_walks < h->n_walks) {
+        const size_t n = (size_t)imp_min(h->n_walks - r->n_walks, (uint64_t)page);
+        IMP_TRY(imp__record_reserve(r, n, 0));
+        IMP_TRY(take(s, r->walks[r->n_walks / page], n * sizeof **r->walks));
+        r->n_walks += n;
+    }
+    while (r->n_vertices < h->n_vertices) {
+        const size_t n = (size_t)imp_min(h->n_vertices - r->n_vertices, (uint64_t)page);
+        IMP_TRY(imp__record_reserve(r, 0, n));
+        IMP_TRY(take(s, r->vertices[r->n_vertices / page], n * sizeof **r->vertices));
+        r->n_vertices += n;
+    }
+    const uint64_t sum = s->sum;
+    uint64_t end;
+    IMP_TRY(take(s, &end, sizeof end));
+    if (end != sum) IMP_TRY(damaged(s, "checksum"));
+    if (fgetc(s->f) != EOF) IMP_TRY(damaged(s, "it goes on behind its end"));
+out:
+    return st;
+}
+
+enum imp_status imp__record_read(const struct imp_tracer *tracer, const char *path,
+                                 size_t budget, struct imp_record *out)
+{
+    enum imp_status st = IMP_OK;
+    const struct imp_scene *scene = tracer->scene;
+    struct source s = {.ctx = scene->ctx, .path = path, .f = fopen(path, "rbe")};
+    struct imp_record r = {.ctx = NULL};
+    struct head head;
+    uint64_t needed, vertices, first = 0;
+
+    if (!s.f) return imp__error(s.ctx, IMP_E_IO, "%s: %s", path, strerror(errno));
+    IMP_TRY(imp__record_create(tracer, budget, &r));
+    IMP_TRY(head_take(&s, &head));
+    IMP_TRY(imp__record_same(s.ctx, path, &head.of, &r.of));
+    if (__builtin_mul_overflow(head.n_walks, sizeof **r.walks, &needed) ||
+        __builtin_mul_overflow(head.n_vertices, sizeof **r.vertices, &vertices) ||
+        __builtin_add_overflow(needed, vertices, &needed))
+        IMP_TRY(damaged(&s, "absurd size"));
+    if (needed > budget)
+        IMP_TRY(imp__error(s.ctx, IMP_E_NOMEM,
+                           "%s: its walks need %llu bytes; the budget is %zu", path,
+                           (unsigned long long)needed, budget));
+    IMP_TRY(body_take(&s, &r, &head));
+    for (size_t i = 0; i < r.n_walks; i++) {
+        const struct imp_record_walk *w = imp__record_at(&r, i);
+        if (!walk_fits(scene, &r, w, first))
+            IMP_TRY(damaged(&s, "a walk that this scene cannot have"));
+        first += w->n;
+    }
+    if (first != r.n_vertices) IMP_TRY(damaged(&s, "vertices of no walk"));
+    *out = r;
+    r = (struct imp_record){.ctx = NULL};
+out:
+    imp__record_destroy(&r);
+    fclose(s.f);
+    return st;
+}

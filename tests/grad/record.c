@@ -1,0 +1,516 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Walks that are kept, on every scene of this repository: kept, written, read and
+ * evaluated they have the value and the pieces of gradient of the traced walk, to the
+ * bit. At other parameters they have the value of the frozen walk, whose differences are
+ * the sweep's. Files of another scene, version or byte order, and damaged ones, are
+ * refused. */
+#include "walk/record.h"
+#include "imp_scene.h"
+#include "imp_tap.h"
+#include <math.h>
+#include <stdbool.h>
+
+#define PLENTY ((size_t)256 << 20)
+
+static imp_context *ctx;
+static const char *const path = "kept_walks.tmp";
+
+/* ---- Walks of a scene ------------------------------------------------------------ */
+
+struct traced {
+    imp_scene *scene;
+    uint8_t *chosen;
+    struct imp_active active;
+    struct imp_integrator integrator;
+    struct imp_tracer tracer;
+    struct imp_arena arena;
+    int width, height;
+};
+
+/* All parameters with a derivative are active, but those of media if `held`. */
+static void begin(struct traced *t, const char *file, const char *defines, bool held)
+{
+    imp_scene *scene = test_scene(ctx, file, IMP_RGB, defines);
+    *t = (struct traced){.scene = scene};
+    t->chosen = calloc(scene->n_params + 1, 1);
+    for (size_t k = 0; k < scene->n_params; k++)
+        t->chosen[k] = (scene->params[k].info.flags & IMP_PARAM_DIFFERENTIABLE) != 0;
+    for (int m = 0; held && m < scene->n_media; m++)
+        for (int k = 0; k < scene->media[m]->n_numbers; k++)
+            t->chosen[scene->media[m]->numbers[k].param] = 0;
+    test_must(ctx, imp__active_create(scene, t->chosen, &t->active));
+    t->integrator = scene->integrator;
+    if (t->integrator.kind == IMP_INTEGRATOR_ELEMENTS)
+        t->integrator.kind = IMP_INTEGRATOR_PATH;
+    if (t->integrator.rr_depth > 2) t->integrator.rr_depth = 2; /* let roulette decide */
+    const struct imp_sensor *sensor = scene->sensors[0];
+    t->width = sensor->film.crop_w;
+    t->height = sensor->film.crop_h;
+    t->tracer = (struct imp_tracer){.scene = scene,
+                                    .integrator = &t->integrator,
+                                    .sensor = sensor,
+                                    .active = &t->active,
+                                    .seed = 11};
+    imp__arena_init(&t->arena, ctx);
+}
+static void end(struct traced *t)
+{
+    imp__arena_free(&t->arena);
+    imp__active_destroy(ctx, &t->active);
+    free(t->chosen);
+    imp_scene_destroy(t->scene);
+}
+static void trace(struct traced *t, int i, struct imp_walk *w)
+{
+    imp__walk_trace(&t->tracer, &t->arena, i * 7 % t->width, i * 13 % t->height, i, w);
+}
+
+/* ---- Pieces of gradient, in the order they fall off ------------------------------ */
+
+#define PIECES 4096
+struct pieces {
+    struct imp_sink sink; /* first */
+    size_t n;
+    struct piece {
+        int param, channels;
+        size_t element;
+        imp_spec bar;
+    } at[PIECES];
+};
+static void piece_add(struct imp_sink *sink, int param, size_t element, int channels,
+                      const imp_spec *bar)
+{
+    struct pieces *p = (struct pieces *)sink;
+    if (p->n == PIECES) return;
+    p->at[p->n++] = (struct piece){param, channels, element, *bar};
+}
+static void sweep(const struct traced *t, const struct imp_walk *w, struct pieces *p)
+{
+    p->sink.add = piece_add;
+    p->n = 0;
+    imp__walk_sweep(&t->tracer, w, (imp_spec){1, 0.7, 1.3, 0}, &p->sink);
+}
+static bool same_bits(imp_spec a, imp_spec b) { return memcmp(&a, &b, 24) == 0; }
+static bool same_pieces(const struct pieces *a, const struct pieces *b)
+{
+    if (a->n != b->n) return false;
+    for (size_t k = 0; k < a->n; k++)
+        if (a->at[k].param != b->at[k].param || a->at[k].channels != b->at[k].channels ||
+            a->at[k].element != b->at[k].element ||
+            !same_bits(a->at[k].bar, b->at[k].bar))
+            return false;
+    return true;
+}
+
+static double dot(const struct pieces *p, const struct imp_active *a, const double *x_dot)
+{
+    double sum = 0;
+    for (size_t k = 0; k < p->n; k++) {
+        const int64_t base = a->base[p->at[k].param];
+        if (base < 0) continue;
+        const size_t e = (size_t)base + p->at[k].element;
+        for (int c = 0; c < 3; c++)
+            sum += p->at[k].bar[c] * x_dot[p->at[k].channels == 3 ? e + (size_t)c : e];
+    }
+    return sum;
+}
+
+/* ---- theta moves ----------------------------------------------------------------- */
+
+static double unit_noise(size_t k)
+{
+    return (double)(imp__mix64(k + 77) >> 11) * 0x1p-53;
+}
+
+/* Every active number by up to `step` of itself, inwards at a bound; x_dot [n]. */
+static void direction(const struct traced *t, double *x_dot)
+{
+    for (size_t k = 0; k < t->scene->n_params; k++) {
+        const struct imp_param *p = &t->scene->params[k];
+        for (size_t e = 0; t->active.base[k] >= 0 && e < p->info.count; e++) {
+            const double v = imp__param_get(p, e);
+            x_dot[(size_t)t->active.base[k] + e] = -v * unit_noise(97 * k + e);
+        }
+    }
+}
+static void move(const struct traced *t, const double *theta, const double *x_dot,
+                 double step)
+{
+    for (size_t k = 0; k < t->scene->n_params; k++) {
+        struct imp_param *p = &t->scene->params[k];
+        for (size_t e = 0; t->active.base[k] >= 0 && e < p->info.count; e++) {
+            const size_t i = (size_t)t->active.base[k] + e;
+            imp__param_set(p, e, theta[i] + step * x_dot[i]);
+        }
+    }
+}
+static void theta_get(const struct traced *t, double *theta)
+{
+    for (size_t k = 0; k < t->scene->n_params; k++)
+        for (size_t e = 0; t->active.base[k] >= 0 && e < t->scene->params[k].info.count;
+             e++)
+            theta[(size_t)t->active.base[k] + e] =
+                imp__param_get(&t->scene->params[k], e);
+}
+
+static double weighed(imp_spec L) { return L[0] + 0.7 * L[1] + 1.3 * L[2]; }
+
+/* ---- Every scene ----------------------------------------------------------------- */
+
+static const struct scene_case {
+    const char *file, *defines;
+    bool lanes_only; /* texels are floats: differences of them are too coarse */
+} cases[] = {
+    {"cornell.xml", "res=32", false},
+    {"cornell.xml", "res=32 max_depth=-1", false},
+    {"textured.xml", NULL, true},
+    {"lamps.xml", NULL, false},
+    {"furnace.xml", NULL, false},
+    {"stam.xml", "integrator=stam", false},
+    {"stam.xml", "integrator=path", false},
+    {"elements/a.xml", NULL, false},
+    {"elements/b.xml", NULL, false},
+    {"elements/d.xml", NULL, false},
+    {"elements/d_lamps.xml", NULL, false},
+    {"elements/glossy.xml", NULL, false},
+    {"bend/seen.xml", "cells=1 width=8", true},
+};
+
+static void scene_test(const struct scene_case *c)
+{
+    enum { N = 3000 };
+    struct traced t;
+    struct imp_record kept, read;
+    static struct pieces one, two;
+    char name[96];
+    snprintf(name, sizeof name, "%s %s", c->file, c->defines ? c->defines : "");
+    begin(&t, c->file, c->defines, true);
+
+    test_must(ctx, imp__record_create(&t.tracer, PLENTY, &kept));
+    const struct imp_arena_mark mark = imp__arena_mark(&t.arena);
+    for (int i = 0; i < N; i++) {
+        struct imp_walk w;
+        trace(&t, i, &w);
+        test_must(ctx, imp__record_keep(&kept, &w, i));
+        imp__arena_rewind(&t.arena, mark);
+    }
+    test_must(ctx, imp__record_write(&kept, path));
+    test_must(ctx, imp__record_read(&t.tracer, path, PLENTY, &read));
+    tap_ok(read.n_walks == N && read.n_vertices == kept.n_vertices &&
+               sizeof **read.vertices <= 160 &&
+               imp__record_bytes(&read) <= 160 * read.n_vertices + 48 * N,
+           "%s: %zu walks of %zu vertices, %zu bytes a vertex, %.0f a walk", name,
+           read.n_walks, read.n_vertices, sizeof **read.vertices,
+           (double)imp__record_bytes(&read) / N);
+
+    /* At the parameters they were drawn at. */
+    int values = 0, gradients = 0, lit = 0, counted = 0;
+    size_t n_pieces = 0;
+    for (int i = 0; i < N; i++) {
+        struct imp_walk w, k;
+        trace(&t, i, &w);
+        imp__record_walk(&read, (size_t)i, &t.tracer, &t.arena, &k);
+        sweep(&t, &w, &one);
+        sweep(&t, &k, &two);
+        values += same_bits(w.L, k.L) && w.px == k.px && w.py == k.py &&
+                  w.valid == k.valid && w.dropped == k.dropped &&
+                  imp__record_at(&read, (size_t)i)->sample == i;
+        gradients += same_pieces(&one, &two);
+        lit += weighed(w.L) > 0;
+        counted += k.n > 0;
+        n_pieces += one.n;
+        imp__arena_rewind(&t.arena, mark);
+    }
+    tap_ok(values == N && lit > N / 20,
+           "%s: values to the bit, through a file # %d of %d, %d lit", name, values, N,
+           lit);
+    tap_ok(gradients == N && n_pieces > N / 20,
+           "%s: pieces of gradient to the bit, in order # %d of %d, %zu pieces", name,
+           gradients, N, n_pieces);
+
+    /* At others: against the walks traced at the first ones, frozen. */
+    const size_t n = t.active.n;
+    double *theta = malloc(n * sizeof *theta), *x_dot = malloc(n * sizeof *x_dot);
+    struct imp_walk *frozen = aligned_alloc(64, (N * sizeof *frozen + 63) / 64 * 64);
+    double worst = 0, difference = 0, moved = 0, size = 0;
+    for (int i = 0; i < N; i++) trace(&t, i, &frozen[i]);
+    theta_get(&t, theta);
+    direction(&t, x_dot);
+    const struct imp_arena_mark after = imp__arena_mark(&t.arena);
+    move(&t, theta, x_dot, 0.25);
+    for (int i = 0; i < N; i++) {
+        struct imp_walk k;
+        imp__record_walk(&read, (size_t)i, &t.tracer, &t.arena, &k);
+        const double a = weighed(imp__walk_frozen(&t.tracer, &frozen[i]));
+        worst = fmax(worst, fabs(weighed(k.L) - a) / fmax(fabs(a), 1e-300));
+        moved = fmax(moved, fabs(weighed(k.L) - weighed(frozen[i].L)));
+        imp__arena_rewind(&t.arena, after);
+    }
+    tap_ok(worst < 1e-13 && moved > 0,
+           "%s: at other parameters as the frozen walk # %.1e, moved %.2g", name, worst,
+           moved);
+    /* Central differences there, all walks together: what they err by is the step's
+     * square, and rounding over the step. Texels are stored as floats. */
+    const double h = c->lanes_only ? 2e-3 : 1e-4;
+    double plus = 0, minus = 0, slope = 0;
+    for (int side = -1; side <= 1; side++) {
+        move(&t, theta, x_dot, 0.25 + side * h);
+        for (int i = 0; i < N; i++) {
+            struct imp_walk k;
+            imp__record_walk(&read, (size_t)i, &t.tracer, &t.arena, &k);
+            if (side < 0) minus += weighed(k.L);
+            else if (side > 0) plus += weighed(k.L);
+            else {
+                sweep(&t, &k, &two);
+                const double d = dot(&two, &t.active, x_dot);
+                slope += d;
+                size += fabs(d);
+            }
+            imp__arena_rewind(&t.arena, after);
+        }
+    }
+    difference = (plus - minus) / (2 * h);
+    tap_ok(fabs(difference - slope) < (c->lanes_only ? 2e-4 : 2e-6) * size && size > 0,
+           "%s: differences there are the sweep's # %.9g, %.9g", name, difference, slope);
+    move(&t, theta, x_dot, 0);
+
+    /* Control: a density that differs in its last bit is seen, unless next to nothing
+     * arrives along its step. */
+    int seen = 0, tried = 0;
+    for (int i = 0; i < N && tried < 100; i++) {
+        struct imp_walk w, k;
+        const struct imp_record_walk *head = imp__record_at(&kept, (size_t)i);
+        struct imp_decision *d =
+            &kept.vertices[head->first / IMP_RECORD_PAGE][head->first % IMP_RECORD_PAGE];
+        trace(&t, i, &w);
+        if (w.n > 0 && w.first->d.goes_on && weighed(w.first->beyond * w.first->w) > 0) {
+            d->pdf = nextafterf(d->pdf, INFINITY);
+            imp__record_walk(&kept, (size_t)i, &t.tracer, &t.arena, &k);
+            seen += !same_bits(w.L, k.L);
+            tried++;
+        }
+        imp__arena_rewind(&t.arena, after);
+    }
+    tap_ok(10 * seen >= 9 * tried && tried > 0,
+           "%s: control: one bit of a density # %d of %d", name, seen, tried);
+
+    free(frozen);
+    free(theta);
+    free(x_dot);
+    imp__record_destroy(&kept);
+    imp__record_destroy(&read);
+    end(&t);
+}
+
+/* ---- Refused --------------------------------------------------------------------- */
+
+static struct imp_record some(struct traced *t, int n, size_t budget, enum imp_status *st)
+{
+    struct imp_record r;
+    *st = IMP_OK;
+    test_must(ctx, imp__record_create(&t->tracer, budget, &r));
+    for (int i = 0; i < n && *st == IMP_OK; i++) {
+        const struct imp_arena_mark mark = imp__arena_mark(&t->arena);
+        struct imp_walk w;
+        trace(t, i, &w);
+        *st = imp__record_keep(&r, &w, i);
+        imp__arena_rewind(&t->arena, mark);
+    }
+    return r;
+}
+
+static void refused_by(const char *other, const char *defines, int change,
+                       const char *word)
+{
+    struct traced t;
+    struct imp_record r;
+    begin(&t, other, defines, true);
+    if (change == 1) t.integrator.max_depth = 3;
+    if (change == 2) t.integrator.rr_depth = 4;
+    const enum imp_status st = imp__record_read(&t.tracer, path, PLENTY, &r);
+    tap_ok(st == IMP_E_ARG && strstr(imp_last_error(ctx), word),
+           "walks of another scene are refused # %s",
+           st == IMP_OK ? "read" : imp_last_error(ctx));
+    if (st == IMP_OK) imp__record_destroy(&r);
+    end(&t);
+}
+
+static void other_scenes(void)
+{
+    struct traced t;
+    struct imp_record r;
+    enum imp_status st;
+    begin(&t, "cornell.xml", "res=32", true);
+    struct imp_record kept = some(&t, 50, PLENTY, &st);
+    test_must(ctx, imp__record_write(&kept, path));
+
+    /* Control: the same scene, loaded again, with another theta. */
+    struct traced again;
+    begin(&again, "cornell.xml", "res=32", true);
+    imp__param_set(&again.scene->params[0], 0,
+                   0.5 * imp__param_get(&again.scene->params[0], 0));
+    st = imp__record_read(&again.tracer, path, PLENTY, &r);
+    tap_ok(st == IMP_OK, "the same scene at other parameters reads them # %s",
+           st == IMP_OK ? "" : imp_last_error(ctx));
+    if (st == IMP_OK) imp__record_destroy(&r);
+    end(&again);
+
+    refused_by("cornell.xml", "res=33", 0, "sensor");
+    refused_by("cornell.xml", "res=32", 1, "integrator");
+    refused_by("cornell.xml", "res=32", 2, "integrator");
+    refused_by("furnace.xml", NULL, 0, "objects");
+    test_must(ctx, imp__record_check(&kept, &t.tracer));
+    t.integrator.max_depth = 2;
+    tap_ok(imp__record_check(&kept, &t.tracer) == IMP_E_ARG, "before evaluating too # %s",
+           imp_last_error(ctx));
+    imp__record_destroy(&kept);
+    end(&t);
+
+    /* Numbers that bend rays. */
+    begin(&t, "bend/seen.xml", "cells=1 width=8", true);
+    kept = some(&t, 50, PLENTY, &st);
+    struct imp_param *index = &t.scene->params[t.scene->media[0]->numbers[0].param];
+    imp__param_set(index, 0, imp__param_get(index, 0) + 1e-6);
+    tap_ok(imp__record_check(&kept, &t.tracer) == IMP_E_ARG,
+           "with another index of a medium # %s", imp_last_error(ctx));
+    imp__record_destroy(&kept);
+    end(&t);
+}
+
+static void not_kept(void)
+{
+    struct traced t;
+    enum imp_status st;
+    begin(&t, "bend/seen.xml", "cells=1 width=8", false);
+    struct imp_record r = some(&t, 500, PLENTY, &st);
+    tap_ok(st == IMP_E_UNSUPPORTED, "walks that move with a field are refused # %s",
+           imp_last_error(ctx));
+    imp__record_destroy(&r);
+    end(&t);
+
+    begin(&t, "stam.xml", "integrator=stam", true);
+    t.integrator.alpha_gradient = IMP_ALPHA_ATTACHED;
+    tap_ok(imp__record_create(&t.tracer, PLENTY, &r) == IMP_E_UNSUPPORTED,
+           "and attached derivatives # %s", imp_last_error(ctx));
+    t.integrator.alpha_gradient = IMP_ALPHA_DETACHED;
+    t.tracer.split = 2;
+    tap_ok(imp__record_create(&t.tracer, PLENTY, &r) == IMP_E_UNSUPPORTED,
+           "and walks that split # %s", imp_last_error(ctx));
+    end(&t);
+
+    /* The budget, to the byte. */
+    begin(&t, "cornell.xml", "res=32", true);
+    r = some(&t, 500, PLENTY, &st);
+    const size_t bytes = imp__record_bytes(&r);
+    char needed[32];
+    snprintf(needed, sizeof needed, "%zu bytes", bytes);
+    test_must(ctx, imp__record_write(&r, path));
+    imp__record_destroy(&r);
+    r = some(&t, 500, bytes, &st);
+    tap_ok(st == IMP_OK && r.n_walks == 500, "500 walks in a budget of %zu bytes", bytes);
+    imp__record_destroy(&r);
+    r = some(&t, 500, bytes - 1, &st);
+    tap_ok(st == IMP_E_NOMEM && r.n_walks == 499 && strstr(imp_last_error(ctx), needed),
+           "and not in one less # %s", imp_last_error(ctx));
+    imp__record_destroy(&r);
+    tap_ok(imp__record_read(&t.tracer, path, bytes - 1, &r) == IMP_E_NOMEM &&
+               strstr(imp_last_error(ctx), needed),
+           "nor from a file # %s", imp_last_error(ctx));
+    end(&t);
+}
+
+/* ---- Files ----------------------------------------------------------------------- */
+
+static unsigned char *bytes_read(size_t *n)
+{
+    FILE *f = fopen(path, "rb");
+    static unsigned char all[1 << 20];
+    *n = f ? fread(all, 1, sizeof all, f) : 0;
+    if (f) fclose(f);
+    return all;
+}
+static void bytes_write(const unsigned char *b, size_t n)
+{
+    FILE *f = fopen(path, "wb");
+    if (!f || fwrite(b, 1, n, f) != n || fclose(f) != 0) {
+        printf("Bail out! cannot write %s\n", path);
+        exit(99);
+    }
+}
+static enum imp_status file_read(struct traced *t)
+{
+    struct imp_record r;
+    const enum imp_status st = imp__record_read(&t->tracer, path, PLENTY, &r);
+    if (st == IMP_OK) imp__record_destroy(&r);
+    return st;
+}
+
+static void files(void)
+{
+    struct traced t;
+    enum imp_status st;
+    size_t n;
+    begin(&t, "cornell.xml", "res=32", true);
+    struct imp_record kept = some(&t, 20, PLENTY, &st);
+    test_must(ctx, imp__record_write(&kept, path));
+    unsigned char *b = bytes_read(&n);
+    tap_ok(n == 72 + imp__record_bytes(&kept) + 8 && file_read(&t) == IMP_OK,
+           "a head of 72 bytes, the walks, a checksum # %zu", n);
+
+    static const struct {
+        size_t at;
+        const char *word;
+    } parts[] = {{0, "not a file"}, {8, "byte order"}, {12, "version"}, {20, "build"}};
+    for (size_t k = 0; k < sizeof parts / sizeof *parts; k++) {
+        unsigned char old[4];
+        memcpy(old, b + parts[k].at, 4);
+        for (int j = 0; j < 4; j++) b[parts[k].at + (size_t)j] = old[3 - j];
+        bytes_write(b, n);
+        st = file_read(&t);
+        tap_ok(st == IMP_E_SCENE && strstr(imp_last_error(ctx), parts[k].word),
+               "refused # %s", imp_last_error(ctx));
+        memcpy(b + parts[k].at, old, 4);
+    }
+    int read = 0;
+    for (size_t k = 0; k < n; k += 1 + k / 40) { /* every byte of the head */
+        b[k] ^= (unsigned char)(1u << k % 8);
+        bytes_write(b, n);
+        read += file_read(&t) == IMP_OK;
+        b[k] ^= (unsigned char)(1u << k % 8);
+    }
+    tap_ok(read == 0, "one bit flipped: refused # %d read", read);
+    for (size_t k = 0; k < n; k += 1 + k / 20) {
+        bytes_write(b, k);
+        read += file_read(&t) == IMP_OK;
+    }
+    tap_ok(read == 0, "cut short: refused # %s", imp_last_error(ctx));
+    b[n] = 0;
+    bytes_write(b, n + 1);
+    tap_ok(file_read(&t) == IMP_E_SCENE, "a byte too much: refused # %s",
+           imp_last_error(ctx));
+    bytes_write(b, n);
+    tap_ok(file_read(&t) == IMP_OK, "control: unchanged it is read");
+    remove(path);
+    tap_ok(file_read(&t) == IMP_E_IO, "no file # %s", imp_last_error(ctx));
+    tap_ok(imp__record_write(&kept, "no/such/folder/file") == IMP_E_IO, "unwritable # %s",
+           imp_last_error(ctx));
+    imp__record_destroy(&kept);
+    kept = some(&t, 0, PLENTY, &st);
+    test_must(ctx, imp__record_write(&kept, path));
+    tap_ok(file_read(&t) == IMP_OK, "no walks are a file too");
+    imp__record_destroy(&kept);
+    end(&t);
+}
+
+int main(void)
+{
+    ctx = test_context(1);
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) scene_test(&cases[k]);
+    other_scenes();
+    not_kept();
+    files();
+    remove(path);
+    imp_context_destroy(ctx);
+    return tap_done();
+}
