@@ -51,13 +51,8 @@ static void leaf_name(imp_field *f, size_t offset, void *payload)
                                          .number = f->theta + k,
                                          .lo = j->lo[offset + k],
                                          .hi = j->hi[offset + k],
+                                         .why = f->ops->jumps,
                                          .param = -1};
-        if (f->ops == &imp__field_trilinear)
-            n->why = "the gradient of a trilinear field jumps at cell faces; splines do "
-                     "not";
-        else if (strcmp(f->ops->name, "luneburg") == 0)
-            n->why = "the gradient of this profile jumps at its radius; radial splines "
-                     "do not";
         n->dims[0] = f->n_theta;
         if (grid)
             for (int d = 0; d < 3; d++)
