@@ -26,8 +26,25 @@
 #include <importon/importon.h>
 #include <stdbool.h>
 
+#if defined(__GNUC__)
+#define IMP_FORMAT(text, first) __attribute__((__format__(__printf__, text, first)))
+#else
+#define IMP_FORMAT(text, first)
+#endif
+
 typedef double imp_spec __attribute__((vector_size(32)));
 typedef double imp_v3 __attribute__((vector_size(32)));
+
+/* Vectors go by pointer: by value, their place depends on the processor that code is
+ * compiled for. Inside a function they are numbers: *f = in[0] * (cos_i / pi). */
+static inline void imp_spec_fill(imp_spec *s, double c)
+{
+    for (int k = 0; k < 4; k++) (*s)[k] = c;
+}
+static inline double imp_v3_dot(const imp_v3 *a, const imp_v3 *b)
+{
+    return ((*a)[0] * (*b)[0] + (*a)[1] * (*b)[1]) + (*a)[2] * (*b)[2];
+}
 
 /* How a colour property is converted (docs/scene-format.md 2.1): reflectance-like in [0,1],
  * unbounded, or emission. */
@@ -92,7 +109,7 @@ struct imp_input {
                                             none was written */
 };
 
-struct imp_build; /* what build functions get: src/kind/build.h */
+struct imp_build; /* what build functions get; read by imp_build_*, below */
 
 /* Receives pieces of gradient. `param` is a parameter's index, `element` the number
  * inside it; with channels == 3 lane c belongs to element + c, with channels == 1 all
@@ -116,10 +133,13 @@ enum imp_bsdf_flags {
     IMP_BSDF_SMOOTH = 1, /* has lobes with a density */
     IMP_BSDF_DELTA = 2,  /* has delta lobes */
     IMP_BSDF_TRANSMIT = 4,
-    IMP_BSDF_EMIT = 8,  /* has emit: Stam's ambient terms */
-    IMP_BSDF_JUMP = 16, /* f/pdf of sample jumps at the horizon: sample_d, which has no
+    IMP_BSDF_EMIT = 8,   /* has emit: Stam's ambient terms */
+    IMP_BSDF_JUMP = 16,  /* f/pdf of sample jumps at the horizon: sample_d, which has no
                            boundary term, is not the whole derivative */
-    IMP_BSDF_NULL = 32  /* light passes as if nothing were there */
+    IMP_BSDF_NULL = 32,  /* light passes as if nothing were there */
+    IMP_BSDF_LINEAR = 64 /* eval is of first degree in its own inputs of role
+                            IMP_REFLECTANCE together, and emit is free of them: an
+                            identity of integrator stam that `check` tests */
 };
 
 struct imp_bsdf {
@@ -190,6 +210,14 @@ struct imp_bsdf_ops {
      * from either side. NULL: pi f for light along the normal. */
     void (*albedo)(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
                    imp_spec *albedo);
+
+    /* A child without an id is named <child_name>_<k> below this object. NULL:
+     * nested_bsdf where there is at most one, else bsdf_<k>. */
+    const char *child_name;
+    /* Numbers of its inputs, or of their textures, are others now: make what build
+     * derived from them anew. Called once after all numbers are set, while nobody renders.
+     * It cannot fail: what it needs, build has allocated. May be NULL. */
+    void (*changed)(const struct imp_bsdf *b);
 };
 
 /* ---- Texture ------------------------------------------------------------------- */
@@ -209,10 +237,16 @@ struct imp_texture {
     const char *name;
 };
 
+enum imp_texture_flags {
+    IMP_TEXTURE_SPECTRUM = 1 /* written as <spectrum> too, around the texture that is its
+                                input nested_texture */
+};
+
 struct imp_texture_ops {
     size_t size;
     const char *name;
     size_t object_size;
+    unsigned flags;
     const struct imp_input_desc *inputs;
     enum imp_status (*build)(const struct imp_build *build, void *self,
                              struct imp_texture *t);
@@ -232,6 +266,8 @@ struct imp_texture_ops {
      * jumps somewhere, and this derivative is not the whole of it. */
     bool (*slope)(const struct imp_texture *t, const struct imp_texcoord *at, bool scalar,
                   imp_spec d_uv[2]);
+    /* As imp_bsdf_ops.changed; of its own texels too. */
+    void (*changed)(const struct imp_texture *t);
 };
 
 /* ---- Shape --------------------------------------------------------------------- */
@@ -291,10 +327,18 @@ struct imp_round {
     double radius;
 };
 
+enum imp_shape_flags {
+    IMP_SHAPE_CONVEX = 1, /* whatever its to_world: no line meets it more than twice, and
+                             nothing of it is seen from its outside but by the front */
+    IMP_SHAPE_SQUARE = 2  /* uv covers [0,1]^2 once, and its border is where u or v is
+                             0 or 1 */
+};
+
 struct imp_shape_ops {
     size_t size;
     const char *name;
     size_t object_size;
+    unsigned flags;
     enum imp_status (*build)(const struct imp_build *build, void *self,
                              struct imp_shape *s);
     /* Nearest hit with tmin < t < tmax, in double; IMP_ANALYTIC only. Sets t, u, v, prim.
@@ -319,7 +363,9 @@ struct imp_shape_ops {
 enum imp_emitter_flags {
     IMP_EMITTER_DELTA = 1,
     IMP_EMITTER_AREA = 2,
-    IMP_EMITTER_ENVIRONMENT = 4
+    IMP_EMITTER_ENVIRONMENT = 4,
+    IMP_EMITTER_UNIFORM = 8 /* eval is its first input, whatever the direction (of a
+                               surface: on its front) */
 };
 
 struct imp_emission { /* where and whither light leaves */
@@ -338,6 +384,17 @@ struct imp_emitter {
     int index;
     double weight; /* sampling_weight */
     const char *name;
+};
+
+/* Of a light that is its first input times a function of the direction alone: what solvers
+ * other than walks need. Directions are unit vectors of the world, away from the light. */
+struct imp_emitter_profile {
+    double (*value)(const struct imp_emitter *e, const imp_v3 *w);
+    /* No less than value within `angle` (radians) of w, or than what value times the
+     * cosine at the light comes to where value has a pole. */
+    double (*bound)(const struct imp_emitter *e, const imp_v3 *w, double angle);
+    /* Mean of value over the hemisphere about n. */
+    double (*mean)(const struct imp_emitter *e, const imp_v3 *n);
 };
 
 struct imp_emitter_ops {
@@ -359,6 +416,13 @@ struct imp_emitter_ops {
      * (environment; hit and at are NULL). */
     double (*pdf)(const struct imp_emitter *e, const imp_v3 *ref, const imp_v3 *wi,
                   const struct imp_hit *hit, const struct imp_surface *at);
+
+    /* Of a light that is its first input times max(0, w . axis)^n: sets the axis, of a
+     * surface with this normal, and returns which input n is. NULL: another light. */
+    int (*lobe)(const struct imp_emitter *e, const imp_v3 *normal, imp_v3 *axis);
+    const struct imp_emitter_profile *profile; /* NULL: another light */
+    /* As imp_bsdf_ops.changed. */
+    void (*changed)(const struct imp_emitter *e);
 };
 
 /* ---- Sensor and filter --------------------------------------------------------- */
@@ -418,5 +482,88 @@ struct imp_sensor_ops {
     void (*ray)(const struct imp_sensor *s, double px, double py, const double lens[2],
                 struct imp_sensor_ray *out);
 };
+
+/* ---- Registering ---------------------------------------------------------------- */
+
+/** Add a kind to those that scenes of this context can name. Before its first scene. The
+ * table is copied; its strings, inputs and functions must live as long as the context.
+ * A table of an older header (a smaller `size`) is taken if it has all functions that
+ * are required.
+ * @return IMP_OK, IMP_E_ARG (another `size`, a required function or the name missing, the
+ * name taken by a built-in kind or one registered before, a scene made before; the message
+ * says which) or IMP_E_NOMEM. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_register_bsdf(imp_context *context,
+                                                         const struct imp_bsdf_ops *ops);
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_register_texture(imp_context *context, const struct imp_texture_ops *ops);
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_register_shape(imp_context *context, const struct imp_shape_ops *ops);
+/** A name may have two tables: one with IMP_EMITTER_AREA, for lights in shapes, and one
+ * without. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_register_emitter(imp_context *context, const struct imp_emitter_ops *ops);
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_register_sensor(imp_context *context, const struct imp_sensor_ops *ops);
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_register_filter(imp_context *context, const struct imp_filter_ops *ops);
+
+/* ---- Reading properties: what build functions call ------------------------------ */
+
+/* A property is what the scene says of an object that is not an input. Each function
+ * marks it as read, and leaves *out at `fallback` where it is absent; what nobody has read
+ * when `build` returns is an error for the user. IMP_E_SCENE with file, line and column if
+ * it has another type or a number is not finite. Names are literals: they must live as
+ * long as the scene. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_build_bool(const struct imp_build *build, const char *name, bool fallback, bool *out);
+/** IMP_E_SCENE outside [lo, hi]. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_build_int(const struct imp_build *build,
+                                                     const char *name, int64_t fallback,
+                                                     int64_t lo, int64_t hi,
+                                                     int64_t *out);
+/** Integers are taken too. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_build_float(const struct imp_build *build,
+                                                       const char *name, double fallback,
+                                                       double *out);
+/** The string lives as long as the scene. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_build_string(const struct imp_build *build,
+                                                        const char *name,
+                                                        const char *fallback,
+                                                        const char **out);
+IMP_API IMP_MUST_CHECK enum imp_status imp_build_vector(const struct imp_build *build,
+                                                        const char *name,
+                                                        const double fallback[3],
+                                                        double out[3]);
+/** Row-major; the identity where it is absent. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_build_transform(const struct imp_build *build, const char *name, double out[16]);
+/** One of n words, in any case; *out is its index. The error lists them. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_build_choice(const struct imp_build *build,
+                                                        const char *name,
+                                                        const char *const *words, int n,
+                                                        int fallback, int *out);
+/** Is the property, or a child in this slot, written? Marks nothing as read. */
+IMP_API bool imp_build_has(const struct imp_build *build, const char *name);
+/** Record an error at the place of property `name` (NULL: at the object's), with the
+ * object's name in front.
+ * @return status */
+IMP_API enum imp_status imp_build_error(const struct imp_build *build, const char *name,
+                                        enum imp_status status, const char *format, ...)
+    IMP_FORMAT(4, 5);
+/** Zeroed memory, aligned to 32 bytes, that lives as long as the scene; NULL: none. */
+IMP_API void *imp_build_alloc(const struct imp_build *build, size_t n, size_t size);
+/** In mono mode lane 0 is all there is. */
+IMP_API enum imp_color_mode imp_build_color_mode(const struct imp_build *build);
+/** In `prepare`: write an input as if the scene had, one number or (n = 3) a colour. The
+ * input must be absent. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_build_set(const struct imp_build *build,
+                                                     const char *name, size_t n,
+                                                     const double *values);
+/** Of a texture: make `data` [dims[0]]..[dims[n_dims - 1]] a parameter <name>.<key>. The
+ * numbers are read and set in place; `flags` are IMP_PARAM_*. *param is what an
+ * imp_sink gets. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_build_texels(const struct imp_build *build, const char *key, float *data, int n_dims,
+                 const size_t *dims, unsigned flags, double lo, double hi, int *param);
 
 #endif

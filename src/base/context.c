@@ -134,6 +134,10 @@ void imp__context_drop(imp_context *ctx)
         next = e->next;
         imp__release(ctx, e);
     }
+    for (struct imp_registered *k = ctx->kinds, *next; k; k = next) {
+        next = k->next;
+        imp__release(ctx, k);
+    }
     pthread_key_delete(ctx->error_key);
     pthread_mutex_destroy(&ctx->lock);
     ctx->allocator.release(ctx, ctx->allocator.payload);

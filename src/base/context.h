@@ -17,16 +17,25 @@
 
 struct imp_pool;
 
+/* A kind that the host registered: a table of kinds.h (kind/registry.c). */
+struct imp_registered {
+    struct imp_registered *next; /* registered later */
+    int concept;
+    _Alignas(64) unsigned char ops[];
+};
+
 struct imp_context {
     struct imp_allocator allocator;
     void (*log)(enum imp_log_level, const char *, void *);
     void *log_payload;
     int threads;
     pthread_key_t error_key;        /* struct error_text * of each thread */
-    pthread_mutex_t lock;           /* guards errors and pool creation */
+    pthread_mutex_t lock;           /* guards errors, kinds and pool creation */
     struct imp__error_text *errors; /* list of all threads' texts, freed at the end */
     struct imp_pool *pool;          /* made on first use */
-    _Atomic int held;               /* by the host, and by every object made from it */
+    struct imp_registered *kinds;
+    bool has_scenes;      /* one was made: kinds are not registered any more */
+    _Atomic int held;     /* by the host, and by every object made from it */
     _Atomic long process; /* whose threads and locks these are; see imp__context_own */
 };
 

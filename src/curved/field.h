@@ -76,6 +76,7 @@ struct imp__field_ops {
     void (*moved)(imp_field *f);
     const char *(*param_name)(const imp_field *f,
                               size_t i); /* NULL: numbers without names */
+    const char *jumps; /* why paths have no derivative by its numbers; NULL: they have */
 };
 
 struct imp_field {

@@ -271,16 +271,22 @@ static const char *profile_param_name(const imp_field *f, size_t i)
     return i < (size_t)k->n_own ? k->names[i] : centre_names[i - (size_t)k->n_own];
 }
 
-/* The kinds share one table but for the name. */
-#define PROFILE(text)                                                                    \
+/* The kinds share one table but for the name, and what jumps. */
+#define PROFILE_THAT(text, why)                                                          \
     {                                                                                    \
         .name = text, .eval = profile_eval, .splat = profile_splat,                      \
-        .tangent = profile_tangent, .param_name = profile_param_name                     \
+        .tangent = profile_tangent, .param_name = profile_param_name, .jumps = why       \
     }
+#define PROFILE(text) PROFILE_THAT(text, NULL)
+#define AT_RADIUS                                                                        \
+    "the gradient of this profile jumps at its radius; radial splines do not"
 static const struct imp__field_ops profile_ops[] = {
-    PROFILE("constant"),   PROFILE("luneburg"),  PROFILE("maxwell"), PROFILE("rod"),
-    PROFILE("rod-vendor"), PROFILE("rod-power"), PROFILE("sech"),    PROFILE("plume"),
-    PROFILE("polynomial"), PROFILE("axial"),     PROFILE("linear")};
+    PROFILE("constant"),   PROFILE_THAT("luneburg", AT_RADIUS),
+    PROFILE("maxwell"),    PROFILE("rod"),
+    PROFILE("rod-vendor"), PROFILE("rod-power"),
+    PROFILE("sech"),       PROFILE("plume"),
+    PROFILE("polynomial"), PROFILE("axial"),
+    PROFILE("linear")};
 _Static_assert(imp_count(profile_ops) == imp_count(kinds), "one table a kind");
 
 static int kind_find(const char *name)

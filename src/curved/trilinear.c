@@ -126,10 +126,12 @@ static void trilinear_kick_back(const imp_field *f, bool arc, double dt, int n,
     imp__grid_kick_back(f, arc, dt, n, b, bar, back_jet, back_splat, &at);
 }
 
-const struct imp__field_ops imp__field_trilinear = {.name = "trilinear",
-                                                    .eval = trilinear_eval,
-                                                    .splat = trilinear_splat,
-                                                    .kick_back = trilinear_kick_back,
-                                                    .tangent = imp__grid_tangent,
-                                                    .changed = imp__grid_changed,
-                                                    .destroy = imp__grid_destroy};
+const struct imp__field_ops imp__field_trilinear = {
+    .name = "trilinear",
+    .eval = trilinear_eval,
+    .splat = trilinear_splat,
+    .kick_back = trilinear_kick_back,
+    .tangent = imp__grid_tangent,
+    .changed = imp__grid_changed,
+    .destroy = imp__grid_destroy,
+    .jumps = "the gradient of a trilinear field jumps at cell faces; splines do not"};

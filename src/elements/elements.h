@@ -22,7 +22,6 @@
 
 #include "base/arguments.h"
 #include "base/pool.h"
-#include "kind/emitter/ies.h"
 #include "scene/scene.h"
 #include <importon/elements.h>
 
@@ -94,7 +93,7 @@ void imp__el_apply(const struct imp__basis *b, int n, const double *r, const dou
 
 /* ---- Geometry ------------------------------------------------------------------ */
 
-enum imp__el_light { EL_DARK, EL_UNIFORM, EL_LOBE, EL_TABLE };
+enum imp__el_light { EL_DARK, EL_UNIFORM, EL_LOBE, EL_PROFILE };
 
 struct imp__el_root { /* an input polygon, one side of it */
     int shape;        /* -1: a virtual patch */
@@ -106,8 +105,8 @@ struct imp__el_root { /* an input polygon, one side of it */
     enum imp__el_light light;
     double radiance[3]; /* L0 */
     imp_v3 axis;        /* EL_LOBE, world: L0 max(0, w.axis)^power */
-    double power;       /* its exponent; of EL_TABLE: mean radiance of the hemisphere */
-    const struct imp__ies *table;        /* EL_TABLE: L0 is the scale */
+    double power;       /* its exponent; of EL_PROFILE: mean radiance of the hemisphere */
+    const struct imp_emitter *profiled;  /* EL_PROFILE: L0 is the scale */
     const struct imp_input *power_input; /* of a light of the scene; NULL: an option's */
     int light_param, light_count;        /* its parameter, -1: none */
     const char *light_name;
@@ -232,7 +231,7 @@ static inline double el_lobe(const struct imp__el_root *r, imp_v3 w)
 {
     if (r->light == EL_DARK) return 0;
     if (r->light == EL_UNIFORM) return 1;
-    if (r->light == EL_TABLE) return imp__ies_radiance(r->table, w);
+    if (r->light == EL_PROFILE) return r->profiled->ops->profile->value(r->profiled, &w);
     const double c = imp__dot(w, r->axis);
     return c > 0 ? pow(c, r->power) : 0;
 }

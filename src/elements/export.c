@@ -64,7 +64,7 @@ static void means_of(const imp_elements *e, const struct imp__element *x,
     const struct imp__el_root *r = el_root(e, x);
     const int n = el_n(e, r);
     double lobe = r->light == EL_DARK ? 0 : r->light == EL_UNIFORM ? 1 : 0;
-    if (r->light == EL_TABLE) lobe = r->power;
+    if (r->light == EL_PROFILE) lobe = r->power;
     if (r->light == EL_LOBE) lobe = 1 / (r->power + 1); /* mean about the normal */
     *importance = 0;
     for (int c = 0; c < 3; c++) {

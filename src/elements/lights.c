@@ -4,7 +4,6 @@
  * depends on place or direction in ways that finite elements cannot hold is refused, by
  * the shape's name. */
 #include "elements.h"
-#include "kind/emitter/beam.h"
 
 static double channels_apart(imp_spec a, imp_spec b, int ch)
 {
@@ -37,20 +36,19 @@ enum imp_status imp__el_emitter_take(imp_elements *e, const struct imp_shape *s,
             s->name, em->ops->name);
     imp_spec in[IMP_INPUTS_MAX];
     imp__inputs_eval(em->input, em->n_in, &(struct imp_texcoord){.uv = {0.5, 0.5}}, in);
-    if (em->ops == &imp__beam_light) {
-        const struct imp__beam *beam = em->self;
+    if (em->ops->lobe) {
         light_set(r, em->input[0], em->name);
         r->light = EL_LOBE;
-        r->axis = beam->aimed ? beam->axis : r->frame.n;
-        r->power_input = em->input[IMP_BEAM_EXPONENT];
-        r->power = in[IMP_BEAM_EXPONENT][0];
+        const int exponent = em->ops->lobe(em, &r->frame.n, &r->axis);
+        r->power_input = em->input[exponent];
+        r->power = in[exponent][0];
         return IMP_OK;
     }
-    if (em->ops == &imp__ies_area) {
+    if (em->ops->profile) {
         light_set(r, em->input[0], em->name);
-        r->light = EL_TABLE;
-        r->table = em->self;
-        r->power = imp__ies_mean(r->table, r->frame.n);
+        r->light = EL_PROFILE;
+        r->profiled = em;
+        r->power = em->ops->profile->mean(em, &r->frame.n);
         return IMP_OK;
     }
     for (int k = 1; k < 16; k++) {

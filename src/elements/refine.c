@@ -49,10 +49,12 @@ static double beam_bound(const imp_elements *e, const struct imp__el_root *r,
     if (r->light == EL_DARK || r->light == EL_UNIFORM) return r->light ? peak : 0;
     const imp_v3 d = i->centre - j->centre;
     const double dist = imp__length(d), reach = i->radius + j->radius;
-    if (r->light == EL_TABLE)
-        return dist <= reach
-                   ? peak * imp__ies_bound(r->table, r->frame.n, IMP_PI)
-                   : peak * imp__ies_bound(r->table, d * (1 / dist), asin(reach / dist));
+    if (r->light == EL_PROFILE) {
+        const bool inside = dist <= reach;
+        const imp_v3 to = inside ? r->frame.n : d * (1 / dist);
+        return peak * r->profiled->ops->profile->bound(
+                          r->profiled, &to, inside ? IMP_PI : asin(reach / dist));
+    }
     if (dist <= reach) return peak;
     const double angle =
         acos(imp_clamp(imp__dot(d, r->axis) / dist, -1.0, 1.0)) - asin(reach / dist);

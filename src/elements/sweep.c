@@ -100,7 +100,7 @@ void imp__el_emission(const imp_elements *e, const struct imp__el_link *k,
 {
     if (r->light == EL_DARK) return;
     imp_spec lobe = imp__spec(1);
-    if (r->light == EL_LOBE || r->light == EL_TABLE)
+    if (r->light == EL_LOBE || r->light == EL_PROFILE)
         for (int s = 0; s < 4; s++)
             lobe[s] = el_lobe(r, imp__v3(-(double)k->w[0][s], -(double)k->w[1][s],
                                          -(double)k->w[2][s]));

@@ -51,13 +51,8 @@ static void leaf_name(imp_field *f, size_t offset, void *payload)
                                          .number = f->theta + k,
                                          .lo = j->lo[offset + k],
                                          .hi = j->hi[offset + k],
+                                         .why = f->ops->jumps,
                                          .param = -1};
-        if (f->ops == &imp__field_trilinear)
-            n->why = "the gradient of a trilinear field jumps at cell faces; splines do "
-                     "not";
-        else if (strcmp(f->ops->name, "luneburg") == 0)
-            n->why = "the gradient of this profile jumps at its radius; radial splines "
-                     "do not";
         n->dims[0] = f->n_theta;
         if (grid)
             for (int d = 0; d < 3; d++)
@@ -153,6 +148,12 @@ out:
     return st;
 }
 
+static void field_changed(void *payload)
+{
+    imp_field *f = payload;
+    f->ops->changed(f);
+}
+
 enum imp_status imp__graded_finish(struct imp_scene *scene)
 {
     enum imp_status st = IMP_OK;
@@ -165,6 +166,9 @@ enum imp_status imp__graded_finish(struct imp_scene *scene)
             snprintf(message, sizeof message, "%s", imp_last_error(scene->ctx));
             st = imp__node_error(scene->ctx, m->node, IMP_E_SCENE, "%s", message);
         }
+        imp_field *f = m->graded->bend->field;
+        for (int k = 0; st == IMP_OK && f->ops->changed && k < m->n_numbers; k++)
+            st = imp__theta_watch(scene, m->numbers[k].param, field_changed, f);
         if (st != IMP_OK) break;
     }
     return st;

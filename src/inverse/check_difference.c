@@ -107,8 +107,10 @@ static enum imp_status at(struct imp__fresh *f, const struct imp__motion *m, dou
     struct imp_param p = *m->param;
     for (size_t e = 0; e < p.info.count; e++)
         if (m->weight[e] != 0) imp__param_set(&p, e, m->old[e] + step * m->weight[e]);
+    imp__theta_announce(f->check->problem->scene);
     const enum imp_status st = functional(f, NULL, seed, value);
     for (size_t e = 0; e < p.info.count; e++) imp__param_set(&p, e, m->old[e]);
+    imp__theta_announce(f->check->problem->scene);
     return st;
 }
 

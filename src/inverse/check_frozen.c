@@ -45,6 +45,7 @@ static enum imp_status frozen_work(size_t item, int worker, int slot, void *payl
 /* All walks at the scene's present parameters. */
 static enum imp_status evaluate(const struct imp__kept *k, double *value)
 {
+    imp__theta_announce(k->check->problem->scene);
     struct frozen_job job = {k, value};
     const struct imp_loop loop = {.n_items = (k->n + PER_ITEM - 1) / PER_ITEM,
                                   .work = frozen_work,
@@ -149,6 +150,7 @@ static enum imp_status difference(struct imp__kept *k, struct direction *d, doub
     }
 out:
     place(d, 0);
+    imp__theta_announce(k->check->problem->scene);
     return st;
 }
 

@@ -160,7 +160,7 @@ static enum imp_status check_reflectance(struct imp__kept *k, uint8_t *chosen)
     if (k->check->tracer.integrator->kind != IMP_INTEGRATOR_STAM) return IMP_OK;
     for (int i = 0; i < s->n_bsdfs; i++) {
         const struct imp_bsdf *b = s->bsdfs[i];
-        if (strncmp(b->ops->name, "stam_m", 6) != 0) continue;
+        if (!(b->flags & IMP_BSDF_LINEAR)) continue;
         memset(chosen, 0, s->n_params);
         for (int j = 0; j < b->n_own; j++)
             if (b->ops->inputs[j].role == IMP_REFLECTANCE) mark(s, b->input[j], chosen);

@@ -200,12 +200,12 @@ enum imp_status imp_problem_set_x(imp_problem *p, const double *x)
     }
     for (size_t k = 0; k < p->scene->n_params; k++) {
         const int64_t base = p->active.base[k];
-        if (base >= 0)
-            IMP_TRY(imp_scene_set_values(p->scene, k, p->scene->params[k].info.count,
-                                         x + (size_t)base));
+        struct imp_param *param = &p->scene->params[k];
+        for (size_t e = 0; base >= 0 && e < param->info.count; e++)
+            imp__param_set(param, e, x[(size_t)base + e]);
     }
-out:
-    return st;
+    imp__theta_announce(p->scene);
+    return IMP_OK;
 }
 
 /* ---- Targets ------------------------------------------------------------------- */

@@ -12,12 +12,8 @@
  * object under a constant environment whose weight does not jump at the horizon. */
 static enum imp_status attached_allowed(const struct imp_scene *scene)
 {
-    bool fine = scene->n_shapes == 1 && scene->environment >= 0 && scene->n_emitters == 1;
-    if (fine) {
-        const char *kind = scene->shapes[0]->ops->name;
-        fine = strcmp(kind, "sphere") == 0 || strcmp(kind, "rectangle") == 0 ||
-               strcmp(kind, "disk") == 0 || strcmp(kind, "cube") == 0;
-    }
+    bool fine = scene->n_shapes == 1 && scene->environment >= 0 &&
+                scene->n_emitters == 1 && scene->shapes[0]->ops->flags & IMP_SHAPE_CONVEX;
     for (int b = 0; fine && b < scene->n_bsdfs; b++)
         if (scene->bsdfs[b]->flags & IMP_BSDF_JUMP)
             return imp__error(

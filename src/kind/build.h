@@ -2,7 +2,7 @@
  *
  * What a kind's build function gets, and the concepts' tables. Inputs (imp_input_desc)
  * are read by the engine before build is called; build reads the remaining properties
- * with imp__props_* of base/props.h. Unread properties are an error afterwards. */
+ * with imp_build_* (kinds.h, properties.c). Unread properties are an error afterwards. */
 #ifndef IMP_KIND_BUILD_H
 #define IMP_KIND_BUILD_H
 
@@ -29,6 +29,9 @@ extern const struct imp_shape_ops *const imp__shape_kinds[];
 extern const struct imp_emitter_ops *const imp__emitter_kinds[];
 extern const struct imp_sensor_ops *const imp__sensor_kinds[];
 extern const struct imp_filter_ops *const imp__filter_kinds[];
+
+/* Reflects nothing, and has no inputs. No scene can name it. */
+extern const struct imp_bsdf_ops imp__black;
 
 /* The material's albedo, or its stand-in (imp_bsdf_ops.albedo). */
 void imp__bsdf_albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,

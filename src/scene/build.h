@@ -5,8 +5,8 @@
 #ifndef IMP_SCENE_BUILD_H
 #define IMP_SCENE_BUILD_H
 
-#include "base/nearest.h"
 #include "color/convert.h"
+#include "kind/registry.h"
 #include "scene.h"
 #include <stdio.h>
 #include <string.h>
@@ -27,6 +27,10 @@ struct imp_build imp__build_make(struct imp_scene *scene, struct imp_node *node)
 enum imp_status imp__build_inputs(struct imp_scene *scene, struct imp_node *node,
                                   const char *name, const struct imp_input_desc *desc,
                                   const struct imp_input **out, int *n);
+/* Call `changed` when a number behind these inputs is set: a constant's, or a texel. */
+enum imp_status imp__build_watch(struct imp_scene *scene,
+                                 const struct imp_input *const *input, int n,
+                                 void (*changed)(void *payload), void *payload);
 enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *node,
                                    const char *parent, const char *slot,
                                    struct imp_texture **out);
@@ -34,7 +38,7 @@ enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *nod
 enum imp_status imp__build_bsdf(struct imp_scene *scene, struct imp_node *node,
                                 const char *parent, const char *slot,
                                 struct imp_bsdf **out);
-/* A material of reflectance 0 that has no parameter: emitters' default. */
+/* A material that reflects nothing: emitters' default. */
 enum imp_status imp__build_black(struct imp_scene *scene, struct imp_bsdf **out);
 /* An area light without a shape is only declared, and nothing is made. */
 enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *node,
@@ -44,35 +48,5 @@ enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
                                  const char *name);
 enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node,
                                   const char *name);
-
-/* Names of all kinds of a concept, for the message "there is no such plugin". */
-#define KIND_LIST(table, buffer)                                                         \
-    do {                                                                                 \
-        (buffer)[0] = 0;                                                                 \
-        for (size_t k_ = 0; (table)[k_]; k_++) {                                         \
-            const size_t n_ = strlen(buffer);                                            \
-            if (k_ && strcmp((table)[k_]->name, (table)[k_ - 1]->name) == 0) continue;   \
-            snprintf((buffer) + n_, sizeof(buffer) - n_, "%s%s", k_ ? ", " : "",         \
-                     (table)[k_]->name);                                                 \
-        }                                                                                \
-    } while (0)
-/* The kind of this node's type, or an error that says what there is. */
-#define KIND_FIND(scene, node, table, out)                                               \
-    do {                                                                                 \
-        size_t i_ = 0;                                                                   \
-        while ((table)[i_] && strcmp((table)[i_]->name, (node)->type) != 0) i_++;        \
-        (out) = (table)[i_];                                                             \
-        if (!(out)) {                                                                    \
-            char list_[1024];                                                            \
-            struct imp_nearest near_ = imp__nearest((node)->type);                       \
-            KIND_LIST(table, list_);                                                     \
-            for (i_ = 0; (table)[i_]; i_++) imp__nearest_try(&near_, (table)[i_]->name); \
-            IMP_TRY(imp__node_error(                                                     \
-                (scene)->ctx, node, IMP_E_UNSUPPORTED,                                   \
-                "this version has no such %s; it has %s%s%s%s", (node)->tag, list_,      \
-                near_.best ? "; did you mean '" : "", near_.best ? near_.best : "",      \
-                near_.best ? "'?" : ""));                                                \
-        }                                                                                \
-    } while (0)
 
 #endif

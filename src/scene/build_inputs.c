@@ -75,6 +75,27 @@ static enum imp_status add_bulk(const struct imp_build *b, const char *key, floa
     return imp__theta_add(scene, &p, param);
 }
 
+enum imp_status imp__build_watch(struct imp_scene *scene,
+                                 const struct imp_input *const *input, int n,
+                                 void (*changed)(void *payload), void *payload)
+{
+    enum imp_status st = IMP_OK;
+    for (int j = 0; j < n; j++) {
+        const struct imp_texture *t = input[j]->texture;
+        const int param = t ? t->param : input[j]->param;
+        if (param >= 0) IMP_TRY(imp__theta_watch(scene, param, changed, payload));
+        if (t) IMP_TRY(imp__build_watch(scene, t->input, t->n_in, changed, payload));
+    }
+out:
+    return st;
+}
+
+static void texture_changed(void *payload)
+{
+    const struct imp_texture *t = payload;
+    t->ops->changed(t);
+}
+
 enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *node,
                                    const char *parent, const char *slot,
                                    struct imp_texture **out)
@@ -89,8 +110,9 @@ enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *nod
         return imp__node_error(scene->ctx, node, IMP_E_SCENE,
                                "the object contains itself");
     node->visiting = 1;
-    const struct imp_texture_ops *ops;
-    KIND_FIND(scene, node, imp__texture_kinds, ops);
+    const void *found;
+    IMP_TRY(imp__kind_find(scene->ctx, IMP_CONCEPT_TEXTURE, node, &found));
+    const struct imp_texture_ops *ops = found;
 
     t = imp__arena_array(&scene->arena, 1, sizeof *t);
     void *self = imp__arena_array(&scene->arena, 1, ops->object_size);
@@ -111,6 +133,10 @@ enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *nod
     const struct imp_build b = imp__build_make(scene, node);
     if (ops->build) IMP_TRY(ops->build(&b, self, t));
     IMP_TRY(imp__props_finish(scene->ctx, node));
+    if (ops->changed) {
+        IMP_TRY(imp__build_watch(scene, t->input, t->n_in, texture_changed, t));
+        if (t->param >= 0) IMP_TRY(imp__theta_watch(scene, t->param, texture_changed, t));
+    }
     IMP_TRY(
         imp__build_list_add(scene, (void ***)&scene->textures, &scene->n_textures, t));
     *out = t;
@@ -160,6 +186,15 @@ static void texels_bound(struct imp_scene *scene, int param,
     p->info.hi = imp_min(p->info.hi, hi);
 }
 
+/* May it be written as <spectrum>, around a texture? */
+static bool is_spectrum(const imp_context *ctx, const struct imp_node *node)
+{
+    const struct imp_texture_ops *t;
+    for (size_t k = 0; (t = imp__kind_at(ctx, IMP_CONCEPT_TEXTURE, k)); k++)
+        if (strcmp(t->name, node->type) == 0) return t->flags & IMP_TEXTURE_SPECTRUM;
+    return false;
+}
+
 static enum imp_status input_build(struct imp_scene *scene, struct imp_node *node,
                                    const char *name, const struct imp_input_desc *d,
                                    struct imp_input *in)
@@ -190,10 +225,10 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
     } else if (child) {
         struct imp_texture *t;
         child->used = true;
-        const bool daylight = strcmp(child->node->type, "d65") == 0;
-        if (daylight && child->node->n_children)
+        const bool spectrum = is_spectrum(ctx, child->node);
+        if (spectrum && child->node->n_children)
             child->node->children[0].name = "nested_texture";
-        if (strcmp(child->node->tag, "texture") != 0 && !daylight)
+        if (strcmp(child->node->tag, "texture") != 0 && !spectrum)
             IMP_TRY(imp__node_error(ctx, child->node, IMP_E_SCENE,
                                     "'%s' must be a number, a colour or a texture",
                                     d->name));

@@ -7,6 +7,12 @@
 
 /* ---- BSDFs --------------------------------------------------------------------- */
 
+static void bsdf_changed(void *payload)
+{
+    const struct imp_bsdf *b = payload;
+    b->ops->changed(b);
+}
+
 enum imp_status imp__build_bsdf(struct imp_scene *scene, struct imp_node *node,
                                 const char *parent, const char *slot,
                                 struct imp_bsdf **out)
@@ -20,8 +26,9 @@ enum imp_status imp__build_bsdf(struct imp_scene *scene, struct imp_node *node,
     if (node->visiting)
         return imp__node_error(ctx, node, IMP_E_SCENE, "the object contains itself");
     node->visiting = 1;
-    const struct imp_bsdf_ops *ops;
-    KIND_FIND(scene, node, imp__bsdf_kinds, ops);
+    const void *found;
+    IMP_TRY(imp__kind_find(scene->ctx, IMP_CONCEPT_BSDF, node, &found));
+    const struct imp_bsdf_ops *ops = found;
 
     struct imp_bsdf *b = imp__arena_array(&scene->arena, 1, sizeof *b);
     void *self = imp__arena_array(&scene->arena, 1, ops->object_size);
@@ -51,11 +58,11 @@ enum imp_status imp__build_bsdf(struct imp_scene *scene, struct imp_node *node,
                                     "'%s' takes at most %d bsdfs", ops->name,
                                     ops->max_children));
         char child_slot[32];
-        snprintf(child_slot, sizeof child_slot,
-                 strcmp(ops->name, "twosided") == 0 ? "brdf_%d"
-                 : ops->max_children == 1           ? "nested_bsdf"
-                                                    : "bsdf_%d",
-                 b->n_child);
+        if (ops->max_children == 1 && !ops->child_name)
+            snprintf(child_slot, sizeof child_slot, "nested_bsdf");
+        else
+            snprintf(child_slot, sizeof child_slot, "%s_%d",
+                     ops->child_name ? ops->child_name : "bsdf", b->n_child);
         struct imp_bsdf *child;
         IMP_TRY(imp__build_bsdf(scene, c->node, b->name, child_slot, &child));
         b->child_in[b->n_child] = b->n_in;
@@ -83,6 +90,8 @@ enum imp_status imp__build_bsdf(struct imp_scene *scene, struct imp_node *node,
 
     if (ops->build) IMP_TRY(ops->build(&build, self, b));
     IMP_TRY(imp__props_finish(ctx, node));
+    if (ops->changed)
+        IMP_TRY(imp__build_watch(scene, b->input, b->n_in, bsdf_changed, b));
     b->index = scene->n_bsdfs;
     IMP_TRY(imp__build_list_add(scene, (void ***)&scene->bsdfs, &scene->n_bsdfs, b));
     node->object = b;
@@ -92,32 +101,23 @@ out:
     return st;
 }
 
-/* A diffuse of this reflectance that has no parameter: emitters' default material. */
 enum imp_status imp__build_black(struct imp_scene *scene, struct imp_bsdf **out)
 {
-    const struct imp_bsdf_ops *ops = NULL;
-    for (size_t k = 0; imp__bsdf_kinds[k]; k++)
-        if (strcmp(imp__bsdf_kinds[k]->name, "diffuse") == 0) ops = imp__bsdf_kinds[k];
     struct imp_bsdf *b = imp__arena_array(&scene->arena, 1, sizeof *b);
-    struct imp_input *in = imp__arena_array(&scene->arena, 1, sizeof *in);
-    if (!b || !in || !ops) return imp__build_no_memory(scene);
-    *in = (struct imp_input){.param = -1, .count = 1};
-    *b = (struct imp_bsdf){.ops = ops,
-                           .n_own = 1,
-                           .n_in = 1,
-                           .index_input = -1,
-                           .index = -1,
-                           .name = "",
-                           .self =
-                               imp__arena_array(&scene->arena, 1, ops->object_size + 1),
-                           .input = imp__arena_array(&scene->arena, 1, sizeof *b->input)};
-    if (!b->self || !b->input) return imp__build_no_memory(scene);
-    b->input[0] = in;
+    if (!b) return imp__build_no_memory(scene);
+    *b =
+        (struct imp_bsdf){.ops = &imp__black, .index_input = -1, .index = -1, .name = ""};
     *out = b; /* flags 0: nothing is reflected, so no light samples and no continuation */
     return IMP_OK;
 }
 
 /* ---- Emitters, shapes, sensors ------------------------------------------------- */
+
+static void emitter_changed(void *payload)
+{
+    const struct imp_emitter *e = payload;
+    e->ops->changed(e);
+}
 
 enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *node,
                                    const char *parent, const char *slot,
@@ -125,13 +125,17 @@ enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *nod
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = scene->ctx;
-    const struct imp_emitter_ops *ops;
-    KIND_FIND(scene, node, imp__emitter_kinds, ops);
+    const void *found;
+    IMP_TRY(imp__kind_find(scene->ctx, IMP_CONCEPT_EMITTER, node, &found));
+    const struct imp_emitter_ops *ops = found;
     /* A name may stand for two kinds: a light of its own, and one in a shape. */
-    for (size_t k = 0; shape && imp__emitter_kinds[k]; k++)
-        if (strcmp(imp__emitter_kinds[k]->name, node->type) == 0 &&
-            imp__emitter_kinds[k]->flags & IMP_EMITTER_AREA)
-            ops = imp__emitter_kinds[k];
+    for (size_t k = 0; shape && found; k++) {
+        const struct imp_emitter_ops *other = found =
+            imp__kind_at(ctx, IMP_CONCEPT_EMITTER, k);
+        if (other && strcmp(other->name, node->type) == 0 &&
+            other->flags & IMP_EMITTER_AREA)
+            ops = other;
+    }
     const bool area = ops->flags & IMP_EMITTER_AREA;
     if (area && !shape)
         return IMP_OK; /* declared only; used where a shape refers to it */
@@ -164,6 +168,8 @@ enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *nod
     const struct imp_build b = imp__build_make(scene, node);
     if (ops->build) IMP_TRY(ops->build(&b, self, e));
     IMP_TRY(imp__props_finish(ctx, node));
+    if (ops->changed)
+        IMP_TRY(imp__build_watch(scene, e->input, e->n_in, emitter_changed, e));
     if (ops->flags & IMP_EMITTER_ENVIRONMENT) {
         if (scene->environment >= 0)
             IMP_TRY(
@@ -182,8 +188,9 @@ enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = scene->ctx;
-    const struct imp_shape_ops *ops;
-    KIND_FIND(scene, node, imp__shape_kinds, ops);
+    const void *found;
+    IMP_TRY(imp__kind_find(scene->ctx, IMP_CONCEPT_SHAPE, node, &found));
+    const struct imp_shape_ops *ops = found;
     struct imp_shape *s = imp__arena_array(&scene->arena, 1, sizeof *s);
     void *self = imp__arena_array(&scene->arena, 1, ops->object_size);
     if (!s || !self) IMP_TRY(imp__build_no_memory(scene));
@@ -287,8 +294,9 @@ enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = scene->ctx;
-    const struct imp_sensor_ops *ops;
-    KIND_FIND(scene, node, imp__sensor_kinds, ops);
+    const void *found;
+    IMP_TRY(imp__kind_find(scene->ctx, IMP_CONCEPT_SENSOR, node, &found));
+    const struct imp_sensor_ops *ops = found;
     struct imp_sensor *s = imp__arena_array(&scene->arena, 1, sizeof *s);
     void *self = imp__arena_array(&scene->arena, 1, ops->object_size);
     if (!s || !self) IMP_TRY(imp__build_no_memory(scene));

@@ -46,7 +46,7 @@ static enum imp_status boundary_check(const struct imp_scene *scene,
                                       const struct imp_shape *s)
 {
     const struct imp_bsdf *b = imp__shape_bsdf(scene, s);
-    const bool dielectric = strcmp(b->ops->name, "dielectric") == 0;
+    const bool dielectric = b->index_input >= 0 && !(b->flags & IMP_BSDF_SMOOTH);
     if (!dielectric && !(b->flags & IMP_BSDF_NULL))
         return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
                           "shape '%s': a graded medium ends at a bsdf of type dielectric "
@@ -90,7 +90,7 @@ static const char *fixed_because(const struct imp_scene *scene,
     if (scene->has_integrator && scene->integrator.kind == IMP_INTEGRATOR_STAM)
         return "the integrator stam has no derivative of the field";
     if (scene->environment >= 0 &&
-        strcmp(scene->emitters[scene->environment]->ops->name, "constant") != 0)
+        !(scene->emitters[scene->environment]->ops->flags & IMP_EMITTER_UNIFORM))
         return "an environment other than constant lies around it";
     for (int i = 0; i < scene->n_shapes; i++) {
         const struct imp_shape *s = scene->shapes[i];

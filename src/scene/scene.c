@@ -10,6 +10,10 @@ enum imp_status imp__scene_new(imp_context *ctx, enum imp_color_mode mode,
     if (!scene) return imp__error(ctx, IMP_E_NOMEM, "scene: out of memory");
     scene->ctx = ctx;
     imp__context_hold(ctx);
+    imp__context_own(ctx);
+    pthread_mutex_lock(&ctx->lock);
+    ctx->has_scenes = true;
+    pthread_mutex_unlock(&ctx->lock);
     scene->mode = mode;
     scene->channels = mode == IMP_MONO ? 1 : 3;
     scene->environment = -1;

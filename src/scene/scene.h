@@ -12,8 +12,21 @@
 
 enum imp_param_store { IMP_STORE_LANES, IMP_STORE_BULK, IMP_STORE_DOUBLES };
 
+/* Someone who derived something from numbers of theta. */
+struct imp_listener {
+    struct imp_listener *next; /* began to listen later */
+    void (*changed)(void *payload);
+    void *payload;
+    bool due; /* a number that it watches has been set since the last call */
+};
+struct imp_watch { /* one of the listeners of a parameter */
+    struct imp_watch *next;
+    struct imp_listener *listener;
+};
+
 struct imp_param {
     struct imp_param_info info;
+    struct imp_watch *watches;
     enum imp_param_store store;
     imp_spec *lanes; /* LANES: info.count numbers in lanes 0.., a scalar in all of them */
     float *bulk;     /* BULK: [info.count] in place */
@@ -142,6 +155,7 @@ struct imp_scene {
     size_t n_params, cap_params;
     struct imp_param *params;
     size_t n_theta;
+    struct imp_listener *listeners;
 
     void *intersector;
     imp_v3 lo, hi; /* bounds of all shapes */
@@ -180,9 +194,16 @@ enum imp_status imp__theta_add(struct imp_scene *scene, const struct imp_param *
                                int *index);
 /* Give every parameter its offset, in order of addition. */
 void imp__theta_finish(struct imp_scene *scene);
-/* Number k of a parameter. Setting does not look at the bounds. */
+/* Number k of a parameter. Setting does not look at the bounds; who sets numbers calls
+ * imp__theta_announce after the last of them, before anything is rendered. */
 double imp__param_get(const struct imp_param *p, size_t k);
 void imp__param_set(struct imp_param *p, size_t k, double value);
+/* Call `changed` after numbers of this parameter have been set to others: once for all
+ * parameters that are watched with this payload, those who began first come first. It
+ * cannot fail, so what it needs is there before. */
+enum imp_status imp__theta_watch(struct imp_scene *scene, int param,
+                                 void (*changed)(void *payload), void *payload);
+void imp__theta_announce(const struct imp_scene *scene);
 /* IMP_E_ARG with a message if the value is not finite or outside the bounds. */
 enum imp_status imp__param_check(const struct imp_scene *scene, const struct imp_param *p,
                                  size_t k, double value);

@@ -44,12 +44,47 @@ double imp__param_get(const struct imp_param *p, size_t k)
     return (*p->lanes)[k];
 }
 
-void imp__param_set(struct imp_param *p, size_t k, double value)
+static void param_put(const struct imp_param *p, size_t k, double value)
 {
     if (p->store == IMP_STORE_BULK) p->bulk[k] = (float)value;
     else if (p->store == IMP_STORE_DOUBLES) p->doubles[k] = value;
     else if (p->info.count == 1) *p->lanes = imp__spec(value);
     else (*p->lanes)[k] = value;
+}
+
+void imp__param_set(struct imp_param *p, size_t k, double value)
+{
+    const double before = p->watches ? imp__param_get(p, k) : 0;
+    param_put(p, k, value);
+    if (imp_likely(!p->watches) || imp__param_get(p, k) == before) return;
+    for (const struct imp_watch *w = p->watches; w; w = w->next) w->listener->due = true;
+}
+
+enum imp_status imp__theta_watch(struct imp_scene *scene, int param,
+                                 void (*changed)(void *payload), void *payload)
+{
+    struct imp_param *p = &scene->params[param];
+    struct imp_listener **l = &scene->listeners;
+    while (*l && ((*l)->changed != changed || (*l)->payload != payload)) l = &(*l)->next;
+    for (const struct imp_watch *w = p->watches; *l && w; w = w->next)
+        if (w->listener == *l) return IMP_OK;
+    struct imp_watch *w = imp__arena_array(&scene->arena, 1, sizeof *w);
+    if (!*l) *l = imp__arena_array(&scene->arena, 1, sizeof **l);
+    if (!w || !*l) return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for parameters");
+    (*l)->changed = changed;
+    (*l)->payload = payload;
+    *w = (struct imp_watch){p->watches, *l};
+    p->watches = w;
+    return IMP_OK;
+}
+
+void imp__theta_announce(const struct imp_scene *scene)
+{
+    for (struct imp_listener *l = scene->listeners; l; l = l->next) {
+        if (!l->due) continue;
+        l->due = false;
+        l->changed(l->payload);
+    }
 }
 
 size_t imp_scene_n_params(const imp_scene *scene) { return scene ? scene->n_params : 0; }
@@ -152,6 +187,7 @@ enum imp_status imp_scene_set_theta(imp_scene *scene, const double *theta)
         for (size_t k = 0; k < p->info.count; k++)
             imp__param_set(p, k, theta[p->info.offset + k]);
     }
+    imp__theta_announce(scene);
     return IMP_OK;
 }
 
@@ -172,6 +208,7 @@ enum imp_status imp_scene_set_values(imp_scene *scene, size_t index, size_t n,
     for (size_t k = 0; k < n; k++) IMP_CHECKED(imp__param_check(scene, p, k, values[k]));
     for (size_t k = 0; k < p->info.count; k++)
         imp__param_set(p, k, values[n == 1 ? 0 : k]);
+    imp__theta_announce(scene);
     return IMP_OK;
 }
 

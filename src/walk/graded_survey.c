@@ -54,7 +54,7 @@ static bool same(struct piece a, struct piece b)
  * samples each: the border of a finer picture is not seen between them. */
 static bool dark_border(const struct imp_scene *scene, const struct imp_shape *s)
 {
-    if (strcmp(s->ops->name, "rectangle") != 0 || s->emitter < 0) return false;
+    if (!(s->ops->flags & IMP_SHAPE_SQUARE) || s->emitter < 0) return false;
     const struct imp_emitter *e = scene->emitters[s->emitter];
     size_t n = 1024;
     for (int j = 0; j < e->n_in; j++) {

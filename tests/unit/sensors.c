@@ -357,7 +357,7 @@ static void films(void)
     film_refused(node_new("film", "specfilm"), IMP_E_UNSUPPORTED, "there is: hdrfilm");
     n = node_new("film", "hdrfilm");
     imp__node_add_child(&world.arena, n, node_new("rfilter", "lanczos"), NULL, n->loc);
-    film_refused(n, IMP_E_UNSUPPORTED, "there are: box, tent, gaussian");
+    film_refused(n, IMP_E_UNSUPPORTED, "it has box, tent, gaussian");
     n = node_new("film", "hdrfilm");
     imp__node_add_child(&world.arena, n, node_new("rfilter", "box"), NULL, n->loc);
     imp__node_add_child(&world.arena, n, node_new("rfilter", "tent"), NULL, n->loc);

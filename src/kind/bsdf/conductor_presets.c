@@ -95,15 +95,15 @@ enum imp_status imp__conductor_prepare(const struct imp_build *b)
     if (!p) return IMP_OK;
     const struct imp_loc loc = p->loc; /* adding properties may move p */
 
-    IMP_TRY(imp__props_string(b->ctx, b->node, "material", "none", &name));
-    if (imp__props_has(b->node, "eta") || imp__props_has(b->node, "k"))
-        IMP_TRY(imp__prop_error(b->ctx, b->node, p, IMP_E_SCENE,
+    IMP_TRY(imp_build_string(b, "material", "none", &name));
+    if (imp_build_has(b, "eta") || imp_build_has(b, "k"))
+        IMP_TRY(imp_build_error(b, "material", IMP_E_SCENE,
                                 "'material' excludes 'eta' and 'k'"));
     if (strcmp(name, "none") == 0) return IMP_OK; /* the defaults: a perfect mirror */
     const struct imp__conductor *c = imp__conductor_find(name);
     if (!c)
         IMP_TRY(
-            imp__prop_error(b->ctx, b->node, p, IMP_E_SCENE,
+            imp_build_error(b, "material", IMP_E_SCENE,
                             "unknown material '%s'; the manual lists them (Ag, Al, Au, "
                             "Cu, ...)",
                             name));

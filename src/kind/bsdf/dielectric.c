@@ -30,16 +30,12 @@ static enum imp_status prepare(const struct imp_build *b)
 {
     enum imp_status st = IMP_OK;
     double inside, outside;
-    if (imp__props_has(b->node, "eta"))
-        IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "eta"),
-                                IMP_E_SCENE,
+    if (imp_build_has(b, "eta"))
+        IMP_TRY(imp_build_error(b, "eta", IMP_E_SCENE,
                                 "give 'int_ior' and 'ext_ior' instead of 'eta'"));
     IMP_TRY(imp__ior_read(b, "int_ior", "bk7", &inside));
     IMP_TRY(imp__ior_read(b, "ext_ior", "air", &outside));
-    struct imp_prop *p =
-        imp__node_add(b->arena, b->node, "eta", IMP_PROP_FLOAT, b->node->loc);
-    if (!p) IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "out of memory"));
-    p->number[0] = inside / outside;
+    IMP_TRY(imp_build_set(b, "eta", 1, &(double){inside / outside}));
 out:
     return st;
 }

@@ -29,14 +29,14 @@ enum imp_status imp__ior_read(const struct imp_build *b, const char *name,
     double n = NAN;
 
     if (p && p->type != IMP_PROP_STRING) {
-        IMP_TRY(imp__props_float(b->ctx, b->node, name, NAN, &n));
+        IMP_TRY(imp_build_float(b, name, 1, &n));
         if (!(n > 0) || !isfinite(n))
-            IMP_TRY(imp__prop_error(b->ctx, b->node, p, IMP_E_SCENE,
+            IMP_TRY(imp_build_error(b, name, IMP_E_SCENE,
                                     "'%s' = %g: a refractive index is positive", name,
                                     n));
     } else {
         const char *material;
-        IMP_TRY(imp__props_string(b->ctx, b->node, name, fallback, &material));
+        IMP_TRY(imp_build_string(b, name, fallback, &material));
         for (size_t i = 0; i < imp_count(indices); i++)
             if (strcasecmp(indices[i].name, material) == 0) n = indices[i].n;
         if (isnan(n)) {
@@ -45,7 +45,7 @@ enum imp_status imp__ior_read(const struct imp_build *b, const char *name,
             for (size_t i = 0; i < imp_count(indices) && len < sizeof list; i++)
                 len += (size_t)snprintf(list + len, sizeof list - len, "%s%s",
                                         i ? ", " : "", indices[i].name);
-            IMP_TRY(imp__prop_error(b->ctx, b->node, p, IMP_E_SCENE,
+            IMP_TRY(imp_build_error(b, name, IMP_E_SCENE,
                                     "'%s': unknown material '%s'; known are %s", name,
                                     material, list));
         }

@@ -42,17 +42,12 @@ static enum imp_status prepare(const struct imp_build *b)
     struct imp_node *node = b->node;
 
     IMP_TRY(imp__conductor_prepare(b));
-    const bool iso = imp__props_has(node, "alpha"), u = imp__props_has(node, "alpha_u"),
-               v = imp__props_has(node, "alpha_v");
+    const bool iso = imp_build_has(b, "alpha"), u = imp_build_has(b, "alpha_u"),
+               v = imp_build_has(b, "alpha_v");
     if (u != v || (iso && u))
-        IMP_TRY(imp__node_error(b->ctx, node, IMP_E_SCENE,
+        IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE,
                                 "give either 'alpha', or both 'alpha_u' and 'alpha_v'"));
-    if (!iso && !u) {
-        struct imp_prop *p =
-            imp__node_add(b->arena, node, "alpha", IMP_PROP_FLOAT, node->loc);
-        if (!p) IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "out of memory"));
-        p->number[0] = 0.1;
-    }
+    if (!iso && !u) IMP_TRY(imp_build_set(b, "alpha", 1, &(double){0.1}));
     for (int i = 0; i < 3; i++) {
         struct imp_prop *p = imp__node_prop(node, names[i]);
         if (!p) continue;
@@ -73,11 +68,10 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_b
     enum imp_status st = IMP_OK;
     struct rough *r = self;
     int type;
-    IMP_TRY(imp__props_choice(b->ctx, b->node, "distribution", types, 2, IMP_BECKMANN,
-                              &type));
-    IMP_TRY(imp__props_bool(b->ctx, b->node, "sample_visible", true, &r->visible));
+    IMP_TRY(imp_build_choice(b, "distribution", types, 2, IMP_BECKMANN, &type));
+    IMP_TRY(imp_build_bool(b, "sample_visible", true, &r->visible));
     r->type = (enum imp__distribution)type;
-    r->anisotropic = imp__props_has(b->node, "alpha_u");
+    r->anisotropic = imp_build_has(b, "alpha_u");
     bsdf->flags = IMP_BSDF_SMOOTH;
 out:
     return st;

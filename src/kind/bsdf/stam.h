@@ -18,11 +18,11 @@ static inline enum imp_status imp__stam_absorb_read(const struct imp_build *b,
                                                     double *absorb)
 {
     double a;
-    const enum imp_status st = imp__props_float(b->ctx, b->node, "absorb", 0, &a);
+    const enum imp_status st = imp_build_float(b, "absorb", 0, &a);
     if (st != IMP_OK) return st;
     if (!(a >= 0 && a < 1))
-        return imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "absorb"),
-                               IMP_E_SCENE, "'absorb' = %g is outside [0, 1)", a);
+        return imp_build_error(b, "absorb", IMP_E_SCENE,
+                               "'absorb' = %g is outside [0, 1)", a);
     *absorb = a;
     return IMP_OK;
 }

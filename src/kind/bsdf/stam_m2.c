@@ -45,14 +45,12 @@ static enum imp_status build(const struct imp_build *build, void *self,
     enum imp_status st = IMP_OK;
     struct m2 *m = self;
     int v, s;
-    IMP_TRY(imp__props_choice(build->ctx, build->node, "variant", variants, 3, RECIPROCAL,
-                              &v));
-    IMP_TRY(imp__props_choice(build->ctx, build->node, "sampling", samplings, 3, MIXTURE,
-                              &s));
+    IMP_TRY(imp_build_choice(build, "variant", variants, 3, RECIPROCAL, &v));
+    IMP_TRY(imp_build_choice(build, "sampling", samplings, 3, MIXTURE, &s));
     IMP_TRY(imp__stam_absorb_read(build, &b->absorb));
     m->variant = (enum variant)v;
     m->sampling = (enum sampling)s;
-    b->flags = IMP_BSDF_SMOOTH | IMP_BSDF_EMIT;
+    b->flags = IMP_BSDF_SMOOTH | IMP_BSDF_EMIT | IMP_BSDF_LINEAR;
     /* Only V = min(1, cos_i/cos_o) takes the lobe's weight to 0 at the horizon, behind
      * which its draws are lost; a cosine draw does not move. */
     if (m->variant != RECIPROCAL && m->sampling != COSINE) b->flags |= IMP_BSDF_JUMP;

@@ -18,7 +18,7 @@ static enum imp_status build(const struct imp_build *build, void *self,
                              struct imp_bsdf *b)
 {
     (void)self;
-    b->flags = IMP_BSDF_SMOOTH | IMP_BSDF_EMIT;
+    b->flags = IMP_BSDF_SMOOTH | IMP_BSDF_EMIT | IMP_BSDF_LINEAR;
     return imp__stam_absorb_read(build, &b->absorb);
 }
 static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],

@@ -11,8 +11,7 @@ static enum imp_status build(const struct imp_build *build, void *self,
     enum imp_status st = IMP_OK;
     bool allow;
     (void)self;
-    IMP_TRY(
-        imp__props_bool(build->ctx, build->node, "allow_transmission", false, &allow));
+    IMP_TRY(imp_build_bool(build, "allow_transmission", false, &allow));
     b->flags = 0;
     b->absorb = 0;
     for (int k = 0; k < b->n_child; k++) {
@@ -20,7 +19,7 @@ static enum imp_status build(const struct imp_build *build, void *self,
         b->absorb = imp_max(b->absorb, b->child[k]->absorb);
     }
     if ((b->flags & IMP_BSDF_TRANSMIT) && !allow)
-        IMP_TRY(imp__node_error(build->ctx, build->node, IMP_E_SCENE,
+        IMP_TRY(imp_build_error(build, NULL, IMP_E_SCENE,
                                 "the nested material transmits light; set "
                                 "'allow_transmission' if that is meant"));
 out:
@@ -127,6 +126,7 @@ const struct imp_bsdf_ops imp__twosided = {.size = sizeof(struct imp_bsdf_ops),
                                            .inputs = inputs,
                                            .min_children = 1,
                                            .max_children = 2,
+                                           .child_name = "brdf",
                                            .build = build,
                                            .sample = sample,
                                            .eval = eval,

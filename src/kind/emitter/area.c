@@ -18,9 +18,8 @@ static const struct imp_input_desc stam_inputs[] = {
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_emitter *e)
 {
     (void)self;
-    const struct imp_prop *placed = imp__node_prop(b->node, "to_world");
-    if (placed)
-        return imp__prop_error(b->ctx, b->node, placed, IMP_E_SCENE,
+    if (imp__node_prop(b->node, "to_world"))
+        return imp_build_error(b, "to_world", IMP_E_SCENE,
                                "to_world has no meaning here: the light is its shape");
     return imp__surface_light_check(b, e);
 }
@@ -40,7 +39,7 @@ static void eval_d(const struct imp_emitter *e, const imp_spec *in,
 
 const struct imp_emitter_ops imp__area = {.size = sizeof(struct imp_emitter_ops),
                                           .name = "area",
-                                          .flags = IMP_EMITTER_AREA,
+                                          .flags = IMP_EMITTER_AREA | IMP_EMITTER_UNIFORM,
                                           .inputs = area_inputs,
                                           .build = build,
                                           .eval = eval,
@@ -49,7 +48,8 @@ const struct imp_emitter_ops imp__area = {.size = sizeof(struct imp_emitter_ops)
                                           .pdf = imp__surface_light_pdf};
 const struct imp_emitter_ops imp__stam_m1 = {.size = sizeof(struct imp_emitter_ops),
                                              .name = "stam_m1",
-                                             .flags = IMP_EMITTER_AREA,
+                                             .flags =
+                                                 IMP_EMITTER_AREA | IMP_EMITTER_UNIFORM,
                                              .inputs = stam_inputs,
                                              .build = build,
                                              .eval = eval,

@@ -14,7 +14,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_e
 {
     (void)self;
     if (e->n_in > RADIANCE && e->input[RADIANCE]->texture)
-        return imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+        return imp_build_error(b, NULL, IMP_E_SCENE,
                                "radiance cannot be a texture: it is the same everywhere");
     return IMP_OK;
 }
@@ -50,7 +50,8 @@ static double pdf(const struct imp_emitter *e, const imp_v3 *ref, const imp_v3 *
 
 const struct imp_emitter_ops imp__constant = {.size = sizeof(struct imp_emitter_ops),
                                               .name = "constant",
-                                              .flags = IMP_EMITTER_ENVIRONMENT,
+                                              .flags = IMP_EMITTER_ENVIRONMENT |
+                                                       IMP_EMITTER_UNIFORM,
                                               .inputs = inputs,
                                               .build = build,
                                               .eval = eval,

@@ -161,17 +161,16 @@ static enum imp_status common_build(const struct imp_build *b, struct imp__ies *
     enum imp_status st = IMP_OK;
     struct imp_mat4 m;
     int unit;
-    if (!b->node->ies)
-        IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_SCENE, "has no table"));
+    if (!b->node->ies) IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE, "has no table"));
     x->data = b->node->ies;
-    IMP_TRY(imp__props_choice(b->ctx, b->node, "units", units, 2, 0, &unit));
+    IMP_TRY(imp_build_choice(b, "units", units, 2, 0, &unit));
     x->factor = unit == 0 ? 1 : 1 / PER_WATT;
-    IMP_TRY(imp__props_transform(b->ctx, b->node, "to_world", m.m));
+    IMP_TRY(imp_build_transform(b, "to_world", m.m));
     const double det = imp__mat4_det3(&m);
     if (!imp__mat4_is_finite(&m) || !imp__mat4_is_affine(&m) || !(fabs(det) > 0) ||
         !isfinite(det))
-        IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "to_world"),
-                                IMP_E_SCENE, "to_world is not affine and invertible"));
+        IMP_TRY(imp_build_error(b, "to_world", IMP_E_SCENE,
+                                "to_world is not affine and invertible"));
     frame_set(x, imp__mat4_column(&m, 0), imp__mat4_column(&m, 2), det < 0);
     x->position = imp__point(&m, imp__v3(0, 0, 0));
 out:
@@ -183,7 +182,7 @@ static enum imp_status point_build(const struct imp_build *b, void *self,
 {
     enum imp_status st = IMP_OK;
     if (e->n_in > SCALE && e->input[SCALE]->texture)
-        IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+        IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE,
                                 "scale cannot be a texture: a point has no surface"));
     IMP_TRY(common_build(b, self));
 out:
@@ -218,7 +217,7 @@ static enum imp_status facets_find(const struct imp_build *b, const struct imp_s
                                    struct imp__ies *x, struct imp_surface *first)
 {
     const struct imp_triangles *t = &s->triangles;
-    struct imp__ies_facet *f = imp__arena_array(b->arena, FACETS_MAX, sizeof *f);
+    struct imp__ies_facet *f = imp_build_alloc(b, FACETS_MAX, sizeof *f);
     if (!f) return imp__error(b->ctx, IMP_E_NOMEM, "scene: out of memory");
     double sum = 0;
     for (size_t i = 0; i < t->n_triangles; i++) {
@@ -234,7 +233,7 @@ static enum imp_status facets_find(const struct imp_build *b, const struct imp_s
         int k = 0;
         while (k < x->n_facets && !(imp__dot(f[k].n, at.ng) > SAME_NORMALS)) k++;
         if (k == FACETS_MAX)
-            return imp__node_error(b->ctx, b->node, IMP_E_UNSUPPORTED,
+            return imp_build_error(b, NULL, IMP_E_UNSUPPORTED,
                                    "its shape '%s' faces more than %d directions: use a "
                                    "box, a sphere or a flat one for the luminaire",
                                    s->name ? s->name : "", FACETS_MAX);
@@ -255,12 +254,10 @@ static enum imp_status area_build(const struct imp_build *b, void *self,
     const struct imp_shape *s = e->shape;
     struct imp_surface at = {.uv = {0}};
     struct imp_round round;
-    if (!s)
-        return imp__node_error(b->ctx, b->node, IMP_E_SCENE, "it must be inside a shape");
+    if (!s) return imp_build_error(b, NULL, IMP_E_SCENE, "it must be inside a shape");
     if (!(s->area > 0))
-        return imp__node_error(b->ctx, b->node, IMP_E_SCENE,
-                               "its shape '%s' (%s) has no area", s->name ? s->name : "",
-                               s->ops->name);
+        return imp_build_error(b, NULL, IMP_E_SCENE, "its shape '%s' (%s) has no area",
+                               s->name ? s->name : "", s->ops->name);
     IMP_TRY(common_build(b, x));
     if (s->geometry == IMP_TRIANGLES) {
         IMP_TRY(facets_find(b, s, x, &at));
@@ -273,10 +270,10 @@ static enum imp_status area_build(const struct imp_build *b, void *self,
             x->axis = round.axis * (1 / length);
         }
     } else {
-        struct imp__ies_facet *f = imp__arena_array(b->arena, 1, sizeof *f);
+        struct imp__ies_facet *f = imp_build_alloc(b, 1, sizeof *f);
         if (!f) IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "scene: out of memory"));
         if (!probe(s, &at))
-            IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_UNSUPPORTED,
+            IMP_TRY(imp_build_error(b, NULL, IMP_E_UNSUPPORTED,
                                     "its shape '%s' (%s) cannot glow by a table",
                                     s->name ? s->name : "", s->ops->name));
         *f = (struct imp__ies_facet){at.ng, s->area};
@@ -284,7 +281,7 @@ static enum imp_status area_build(const struct imp_build *b, void *self,
         x->facets = f;
     }
     /* A flat lamp shines along its normal unless it is turned. */
-    if (x->n_facets == 1 && !imp__props_has(b->node, "to_world"))
+    if (x->n_facets == 1 && !imp_build_has(b, "to_world"))
         frame_set(x, at.s, at.n, false);
 out:
     return st;
@@ -338,6 +335,21 @@ static double area_pdf(const struct imp_emitter *e, const imp_v3 *ref, const imp
     return e->shape->ops->pdf_toward(e->shape, ref, hit, at);
 }
 
+static double profile_value(const struct imp_emitter *e, const imp_v3 *w)
+{
+    return imp__ies_radiance(e->self, *w);
+}
+static double profile_bound(const struct imp_emitter *e, const imp_v3 *w, double angle)
+{
+    return imp__ies_bound(e->self, *w, angle);
+}
+static double profile_mean(const struct imp_emitter *e, const imp_v3 *n)
+{
+    return imp__ies_mean(e->self, *n);
+}
+static const struct imp_emitter_profile area_profile = {profile_value, profile_bound,
+                                                        profile_mean};
+
 const struct imp_emitter_ops imp__ies_light = {.size = sizeof(struct imp_emitter_ops),
                                                .name = "ies",
                                                .object_size = sizeof(struct imp__ies),
@@ -357,4 +369,5 @@ const struct imp_emitter_ops imp__ies_area = {.size = sizeof(struct imp_emitter_
                                               .eval = area_eval,
                                               .eval_d = area_eval_d,
                                               .sample = area_sample,
-                                              .pdf = area_pdf};
+                                              .pdf = area_pdf,
+                                              .profile = &area_profile};

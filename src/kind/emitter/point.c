@@ -20,17 +20,17 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_e
     struct imp_mat4 to_world;
     double at[3];
 
-    if (imp__props_has(b->node, "position") && imp__props_has(b->node, "to_world"))
-        IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "to_world"),
-                                IMP_E_SCENE, "give position or to_world, not both"));
+    if (imp_build_has(b, "position") && imp_build_has(b, "to_world"))
+        IMP_TRY(imp_build_error(b, "to_world", IMP_E_SCENE,
+                                "give position or to_world, not both"));
     if (e->n_in > INTENSITY && e->input[INTENSITY]->texture)
-        IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+        IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE,
                                 "intensity cannot be a texture: a point has no surface"));
-    IMP_TRY(imp__props_vector(b->ctx, b->node, "position", (double[3]){0, 0, 0}, at));
-    IMP_TRY(imp__props_transform(b->ctx, b->node, "to_world", to_world.m));
+    IMP_TRY(imp_build_vector(b, "position", (double[3]){0, 0, 0}, at));
+    IMP_TRY(imp_build_transform(b, "to_world", to_world.m));
     if (!imp__mat4_is_finite(&to_world) || !imp__mat4_is_affine(&to_world))
-        IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "to_world"),
-                                IMP_E_SCENE, "to_world is not finite and affine"));
+        IMP_TRY(imp_build_error(b, "to_world", IMP_E_SCENE,
+                                "to_world is not finite and affine"));
     p->position = imp__point(&to_world, imp__v3(at[0], at[1], at[2]));
 out:
     return st;

@@ -7,10 +7,9 @@ enum imp_status imp__surface_light_check(const struct imp_build *b,
                                          const struct imp_emitter *e)
 {
     if (!e->shape)
-        return imp__node_error(b->ctx, b->node, IMP_E_SCENE, "it must be inside a shape");
+        return imp_build_error(b, NULL, IMP_E_SCENE, "it must be inside a shape");
     if (!(e->shape->area > 0))
-        return imp__node_error(b->ctx, b->node, IMP_E_SCENE,
-                               "its shape '%s' (%s) has no area",
+        return imp_build_error(b, NULL, IMP_E_SCENE, "its shape '%s' (%s) has no area",
                                e->shape->name ? e->shape->name : "", e->shape->ops->name);
     return IMP_OK;
 }

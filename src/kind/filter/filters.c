@@ -2,8 +2,7 @@
  *
  * The reconstruction filters: one line a kind; and making one from its node. */
 #include "filter.h"
-#include <stdio.h>
-#include <string.h>
+#include "kind/registry.h"
 
 #define FILTERS(X)                                                                       \
     X(imp__box)                                                                          \
@@ -19,13 +18,12 @@ enum imp_status imp__filter_size(const struct imp_build *b, const char *name,
                                  double fallback, double limit, double *out)
 {
     double v;
-    const enum imp_status st = imp__props_float(b->ctx, b->node, name, fallback, &v);
+    const enum imp_status st = imp_build_float(b, name, fallback, &v);
     if (st != IMP_OK) return st;
     /* Below this a sample could miss every pixel centre by rounding. */
     if (!(v >= 1e-3 && v <= limit))
-        return imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, name),
-                               IMP_E_SCENE, "%s = %g is outside [0.001, %g]", name, v,
-                               limit);
+        return imp_build_error(b, name, IMP_E_SCENE, "%s = %g is outside [0.001, %g]",
+                               name, v, limit);
     *out = v;
     return IMP_OK;
 }
@@ -36,7 +34,7 @@ enum imp_status imp__filter_build(const struct imp_build *b, struct imp_node *no
     enum imp_status st = IMP_OK;
     struct imp_filter f = {0};
     struct imp_build own = *b;
-    char list[128] = "";
+    const void *found;
 
     if (!node) {
         node = imp__node_create(b->arena, "rfilter", "gaussian", NULL, NULL,
@@ -44,18 +42,9 @@ enum imp_status imp__filter_build(const struct imp_build *b, struct imp_node *no
         if (!node) IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "out of memory for a filter"));
     }
     own.node = node;
-    for (int i = 0; imp__filter_kinds[i] && !f.ops; i++)
-        if (strcmp(imp__filter_kinds[i]->name, node->type) == 0)
-            f.ops = imp__filter_kinds[i];
-    for (int i = 0; imp__filter_kinds[i] && !f.ops; i++) {
-        const size_t n = strlen(list);
-        snprintf(list + n, sizeof list - n, "%s%s", i ? ", " : "",
-                 imp__filter_kinds[i]->name);
-    }
-    if (!f.ops)
-        IMP_TRY(imp__node_error(b->ctx, node, IMP_E_UNSUPPORTED,
-                                "no such filter in this version; there are: %s", list));
-    f.self = imp__arena_array(b->arena, 1, f.ops->object_size ? f.ops->object_size : 1);
+    IMP_TRY(imp__kind_find(b->ctx, IMP_CONCEPT_FILTER, node, &found));
+    f.ops = found;
+    f.self = imp_build_alloc(b, 1, f.ops->object_size ? f.ops->object_size : 1);
     if (!f.self) IMP_TRY(imp__node_error(b->ctx, node, IMP_E_NOMEM, "out of memory"));
     IMP_TRY(f.ops->build(&own, f.self, &f));
     IMP_TRY(imp__props_finish(b->ctx, node));

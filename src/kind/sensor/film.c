@@ -22,17 +22,15 @@ static enum imp_status size_read(const struct imp_build *b, struct imp_film_desc
 
     for (int i = 0; i < 6; i++) {
         if (i >= 4) v[i] = v[i - 4]; /* the crop window is the whole film */
-        IMP_TRY(imp__props_int(b->ctx, b->node, fields[i].name, v[i], fields[i].lo,
-                               SIDE_MAX, &v[i]));
+        IMP_TRY(imp_build_int(b, fields[i].name, v[i], fields[i].lo, SIDE_MAX, &v[i]));
     }
     if (v[0] * v[1] > PIXELS_MAX)
-        IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_SCENE,
-                                "%lld x %lld pixels are too many", (long long)v[0],
-                                (long long)v[1]));
+        IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE, "%lld x %lld pixels are too many",
+                                (long long)v[0], (long long)v[1]));
     for (int i = 0; i < 2; i++)
         if (v[2 + i] + v[4 + i] > v[i])
-            IMP_TRY(imp__node_error(
-                b->ctx, b->node, IMP_E_SCENE,
+            IMP_TRY(imp_build_error(
+                b, NULL, IMP_E_SCENE,
                 "the crop window ends at %s %lld of a film of %lld pixels",
                 i ? "row" : "column", (long long)(v[2 + i] + v[4 + i]), (long long)v[i]));
     f->width = (int)v[0];
@@ -58,12 +56,11 @@ static enum imp_status format_read(const struct imp_build *b, struct imp_film_de
     enum imp_status st = IMP_OK;
     int file, pixel, component;
 
-    IMP_TRY(imp__props_choice(b->ctx, b->node, "file_format", files, imp_count(files), 0,
-                              &file));
-    IMP_TRY(imp__props_choice(b->ctx, b->node, "pixel_format", pixels, imp_count(pixels),
-                              IMP_PIXEL_RGB, &pixel));
-    IMP_TRY(imp__props_choice(b->ctx, b->node, "component_format", components,
-                              imp_count(components), 0, &component));
+    IMP_TRY(imp_build_choice(b, "file_format", files, imp_count(files), 0, &file));
+    IMP_TRY(imp_build_choice(b, "pixel_format", pixels, imp_count(pixels), IMP_PIXEL_RGB,
+                             &pixel));
+    IMP_TRY(imp_build_choice(b, "component_format", components, imp_count(components), 0,
+                             &component));
     f->file_format = file <= 1 ? "openexr" : files[file];
     f->pixel_format = (enum imp_pixel_format)pixel;
     f->half = component == 0;
@@ -108,13 +105,13 @@ enum imp_status imp__film_desc_build(const struct imp_build *b, struct imp_film_
             IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "out of memory for a film"));
     }
     if (strcmp(own.node->type, "hdrfilm") != 0)
-        IMP_TRY(imp__node_error(b->ctx, own.node, IMP_E_UNSUPPORTED,
+        IMP_TRY(imp_build_error(&own, NULL, IMP_E_UNSUPPORTED,
                                 "no such film in this version; there is: hdrfilm"));
     IMP_TRY(size_read(&own, &f));
     IMP_TRY(format_read(&own, &f));
-    IMP_TRY(imp__props_bool(b->ctx, own.node, "sample_border", false, &f.sample_border));
-    IMP_TRY(imp__props_bool(b->ctx, own.node, "banner", true, &ignored));
-    IMP_TRY(imp__props_bool(b->ctx, own.node, "compensate", false, &ignored));
+    IMP_TRY(imp_build_bool(&own, "sample_border", false, &f.sample_border));
+    IMP_TRY(imp_build_bool(&own, "banner", true, &ignored));
+    IMP_TRY(imp_build_bool(&own, "compensate", false, &ignored));
     IMP_TRY(filter_read(&own, &f));
     IMP_TRY(imp__props_finish(b->ctx, own.node));
     *out = f;

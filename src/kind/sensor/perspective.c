@@ -19,8 +19,8 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
 
     IMP_TRY(imp__projection_build(b, true, &p->projection));
     IMP_TRY(imp__fov_build(b, a, &t));
-    IMP_TRY(imp__props_float(b->ctx, b->node, "principal_point_offset_x", 0, &offset_x));
-    IMP_TRY(imp__props_float(b->ctx, b->node, "principal_point_offset_y", 0, &offset_y));
+    IMP_TRY(imp_build_float(b, "principal_point_offset_x", 0, &offset_x));
+    IMP_TRY(imp_build_float(b, "principal_point_offset_y", 0, &offset_y));
     p->x0 = t * (1 - 2 * offset_x);
     p->dx = -2 * t / w;
     p->y0 = t / a * (1 - 2 * offset_y);

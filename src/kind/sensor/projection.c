@@ -12,22 +12,20 @@ static enum imp_status placement_read(const struct imp_build *b, bool rigid,
 {
     enum imp_status st = IMP_OK;
     struct imp_mat4 m, inverse;
-    const struct imp_prop *prop = imp__node_prop(b->node, "to_world");
 
-    IMP_TRY(imp__props_transform(b->ctx, b->node, "to_world", m.m));
+    IMP_TRY(imp_build_transform(b, "to_world", m.m));
     if (!imp__mat4_is_finite(&m) || !imp__mat4_is_affine(&m))
-        IMP_TRY(imp__prop_error(b->ctx, b->node, prop, IMP_E_SCENE,
+        IMP_TRY(imp_build_error(b, "to_world", IMP_E_SCENE,
                                 "to_world is not finite and affine"));
     if (!imp__mat4_inverse(&m, &inverse))
-        IMP_TRY(
-            imp__prop_error(b->ctx, b->node, prop, IMP_E_SCENE, "to_world is singular"));
+        IMP_TRY(imp_build_error(b, "to_world", IMP_E_SCENE, "to_world is singular"));
     /* Rigid up to mirroring: M M^T = 1. */
     for (int i = 0; rigid && i < 3; i++)
         for (int j = 0; j <= i; j++) {
             const double *r = m.m + 4 * i, *s = m.m + 4 * j;
             const double dot = r[0] * s[0] + r[1] * s[1] + r[2] * s[2];
             if (!(fabs(dot - (i == j)) <= 1e-3))
-                IMP_TRY(imp__prop_error(b->ctx, b->node, prop, IMP_E_SCENE,
+                IMP_TRY(imp_build_error(b, "to_world", IMP_E_SCENE,
                                         "to_world scales or shears; this sensor allows "
                                         "rotation and translation only"));
         }
@@ -44,29 +42,26 @@ enum imp_status imp__projection_build(const struct imp_build *b, bool rigid,
     double open, close;
 
     IMP_TRY(placement_read(b, rigid, &p.to_world));
-    IMP_TRY(imp__props_float(b->ctx, b->node, "near_clip", 1e-2, &p.near_clip));
-    IMP_TRY(imp__props_float(b->ctx, b->node, "far_clip", 1e4, &p.far_clip));
+    IMP_TRY(imp_build_float(b, "near_clip", 1e-2, &p.near_clip));
+    IMP_TRY(imp_build_float(b, "far_clip", 1e4, &p.far_clip));
     if (!(p.near_clip > 0))
-        IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "near_clip"),
-                                IMP_E_SCENE, "near_clip = %g must be greater than 0",
-                                p.near_clip));
+        IMP_TRY(imp_build_error(b, "near_clip", IMP_E_SCENE,
+                                "near_clip = %g must be greater than 0", p.near_clip));
     if (!(p.far_clip > p.near_clip))
-        IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "far_clip"),
-                                IMP_E_SCENE,
+        IMP_TRY(imp_build_error(b, "far_clip", IMP_E_SCENE,
                                 "far_clip = %g must be greater than near_clip = %g",
                                 p.far_clip, p.near_clip));
-    IMP_TRY(imp__props_float(b->ctx, b->node, "focus_distance", p.far_clip,
-                             &p.focus_distance));
+    IMP_TRY(imp_build_float(b, "focus_distance", p.far_clip, &p.focus_distance));
     if (!(p.focus_distance > 0))
-        IMP_TRY(imp__prop_error(
-            b->ctx, b->node, imp__node_prop(b->node, "focus_distance"), IMP_E_SCENE,
-            "focus_distance = %g must be greater than 0", p.focus_distance));
-    IMP_TRY(imp__props_float(b->ctx, b->node, "shutter_open", 0, &open));
-    IMP_TRY(imp__props_float(b->ctx, b->node, "shutter_close", 0, &close));
+        IMP_TRY(imp_build_error(b, "focus_distance", IMP_E_SCENE,
+                                "focus_distance = %g must be greater than 0",
+                                p.focus_distance));
+    IMP_TRY(imp_build_float(b, "shutter_open", 0, &open));
+    IMP_TRY(imp_build_float(b, "shutter_close", 0, &close));
     if (close < open)
-        IMP_TRY(imp__prop_error(
-            b->ctx, b->node, imp__node_prop(b->node, "shutter_close"), IMP_E_SCENE,
-            "shutter_close = %g comes before shutter_open = %g", close, open));
+        IMP_TRY(imp_build_error(b, "shutter_close", IMP_E_SCENE,
+                                "shutter_close = %g comes before shutter_open = %g",
+                                close, open));
     *out = p;
 out:
     return st;
@@ -100,35 +95,33 @@ enum imp_status imp__fov_build(const struct imp_build *b, double a, double *tan_
     enum imp_status st = IMP_OK;
     enum { X, Y, DIAGONAL, SMALLER, LARGER };
     static const char *const axes[] = {"x", "y", "diagonal", "smaller", "larger"};
-    const bool by_fov = imp__props_has(b->node, "fov");
+    const bool by_fov = imp_build_has(b, "fov");
     const char *text;
     double fov = 0, tan_half;
     int axis = DIAGONAL;
 
-    if (by_fov && imp__props_has(b->node, "focal_length"))
-        IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "focal_length"),
-                                IMP_E_SCENE, "give fov or focal_length, not both"));
+    if (by_fov && imp_build_has(b, "focal_length"))
+        IMP_TRY(imp_build_error(b, "focal_length", IMP_E_SCENE,
+                                "give fov or focal_length, not both"));
     if (by_fov) {
-        IMP_TRY(imp__props_float(b->ctx, b->node, "fov", 0, &fov));
-        IMP_TRY(imp__props_string(b->ctx, b->node, "fov_axis", "x", &text));
+        IMP_TRY(imp_build_float(b, "fov", 0, &fov));
+        IMP_TRY(imp_build_string(b, "fov_axis", "x", &text));
         for (axis = 0; axis <= LARGER && strcasecmp(axes[axis], text) != 0;) axis++;
         if (axis > LARGER)
-            IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "fov_axis"),
-                                    IMP_E_SCENE,
+            IMP_TRY(imp_build_error(b, "fov_axis", IMP_E_SCENE,
                                     "fov_axis = '%s': must be one of x, y, "
                                     "diagonal, smaller, larger",
                                     text));
         if (!(fov > 0 && fov < 180))
-            IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "fov"),
-                                    IMP_E_SCENE, "fov = %g is outside (0, 180)", fov));
+            IMP_TRY(imp_build_error(b, "fov", IMP_E_SCENE, "fov = %g is outside (0, 180)",
+                                    fov));
         tan_half = tan(fov * (IMP_PI / 360));
     } else { /* the diagonal of a 36 x 24 mm picture; fov_axis then is an unused property
               */
         double f = 0;
-        IMP_TRY(imp__props_string(b->ctx, b->node, "focal_length", "50mm", &text));
+        IMP_TRY(imp_build_string(b, "focal_length", "50mm", &text));
         if (!millimetres_parse(text, &f))
-            IMP_TRY(imp__prop_error(b->ctx, b->node,
-                                    imp__node_prop(b->node, "focal_length"), IMP_E_SCENE,
+            IMP_TRY(imp_build_error(b, "focal_length", IMP_E_SCENE,
                                     "focal_length = '%s': must be like '50mm'", text));
         tan_half = sqrt(36.0 * 36 + 24.0 * 24) / (2 * f);
     }
@@ -138,9 +131,7 @@ enum imp_status imp__fov_build(const struct imp_build *b, double a, double *tan_
     if (axis == DIAGONAL) tan_half /= sqrt(1 + 1 / (a * a));
     /* atan keeps it below 180 degrees; what is left is rounding to 0 or 180. */
     if (!(tan_half > 1e-12 && tan_half < 1e12))
-        IMP_TRY(imp__prop_error(b->ctx, b->node,
-                                imp__node_prop(b->node, by_fov ? "fov" : "focal_length"),
-                                IMP_E_SCENE,
+        IMP_TRY(imp_build_error(b, by_fov ? "fov" : "focal_length", IMP_E_SCENE,
                                 "the horizontal field of view, %g degrees, is "
                                 "outside (0, 180)",
                                 atan(tan_half) * (360 / IMP_PI)));

@@ -71,15 +71,13 @@ enum imp_status imp__sampler_build(const struct imp_build *b, int *spp)
         kind++;
     if (kind == imp_count(kinds))
         IMP_TRY(
-            imp__node_error(b->ctx, b->node, IMP_E_UNSUPPORTED,
+            imp_build_error(b, NULL, IMP_E_UNSUPPORTED,
                             "no such sampler in this version; there are: independent, "
                             "stratified, multijitter, orthogonal, ldsampler"));
-    IMP_TRY(imp__props_int(b->ctx, b->node, "sample_count", 4, 1, SPP_MAX, &count));
-    IMP_TRY(imp__props_int(b->ctx, b->node, "seed", 0, 0, INT64_MAX, &ignored));
-    if (kinds[kind].jitter)
-        IMP_TRY(imp__props_bool(b->ctx, b->node, "jitter", true, &jitter));
-    if (kinds[kind].strength)
-        IMP_TRY(imp__props_int(b->ctx, b->node, "strength", 2, 1, 100, &ignored));
+    IMP_TRY(imp_build_int(b, "sample_count", 4, 1, SPP_MAX, &count));
+    IMP_TRY(imp_build_int(b, "seed", 0, 0, INT64_MAX, &ignored));
+    if (kinds[kind].jitter) IMP_TRY(imp_build_bool(b, "jitter", true, &jitter));
+    if (kinds[kind].strength) IMP_TRY(imp_build_int(b, "strength", 2, 1, 100, &ignored));
     if (!jitter)
         imp__warn(b->ctx, "sampler '%s': jitter=false is ignored, samples stay random",
                   b->node->type);

@@ -20,13 +20,11 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
 
     IMP_TRY(imp__projection_build(b, true, &p->projection));
     IMP_TRY(imp__fov_build(b, a, &t));
-    if (!imp__props_has(b->node, "aperture_radius"))
-        IMP_TRY(
-            imp__node_error(b->ctx, b->node, IMP_E_SCENE, "aperture_radius is missing"));
-    IMP_TRY(imp__props_float(b->ctx, b->node, "aperture_radius", 0, &p->aperture_radius));
+    if (!imp_build_has(b, "aperture_radius"))
+        IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE, "aperture_radius is missing"));
+    IMP_TRY(imp_build_float(b, "aperture_radius", 0, &p->aperture_radius));
     if (p->aperture_radius < 0)
-        IMP_TRY(imp__prop_error(b->ctx, b->node,
-                                imp__node_prop(b->node, "aperture_radius"), IMP_E_SCENE,
+        IMP_TRY(imp_build_error(b, "aperture_radius", IMP_E_SCENE,
                                 "aperture_radius = %g is negative", p->aperture_radius));
     p->x0 = t;
     p->dx = -2 * t / w;

@@ -32,6 +32,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
 
 const struct imp_shape_ops imp__cube = {.size = sizeof(struct imp_shape_ops),
                                         .name = "cube",
+                                        .flags = IMP_SHAPE_CONVEX,
                                         .object_size = sizeof(struct imp__mesh),
                                         .build = build,
                                         .surface = imp__mesh_surface,

@@ -18,14 +18,13 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
     double p0[3], p1[3], radius, scale[3];
 
     IMP_TRY(imp__shape_placement(b, s, &at));
-    IMP_TRY(imp__props_vector(b->ctx, b->node, "p0", (double[3]){0, 0, 0}, p0));
-    IMP_TRY(imp__props_vector(b->ctx, b->node, "p1", (double[3]){0, 0, 1}, p1));
-    IMP_TRY(imp__props_float(b->ctx, b->node, "radius", 1, &radius));
+    IMP_TRY(imp_build_vector(b, "p0", (double[3]){0, 0, 0}, p0));
+    IMP_TRY(imp_build_vector(b, "p1", (double[3]){0, 0, 1}, p1));
+    IMP_TRY(imp_build_float(b, "radius", 1, &radius));
     const imp_v3 a = imp__v3(p0[0], p0[1], p0[2]), e = imp__v3(p1[0], p1[1], p1[2]) - a;
     const double length = imp__length(e);
     if (!(length > 0) || !isfinite(length))
-        IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "p1"),
-                                IMP_E_SCENE, "p0 and p1 are %g apart", length));
+        IMP_TRY(imp_build_error(b, "p1", IMP_E_SCENE, "p0 and p1 are %g apart", length));
     /* to_world T(p0) frame(p1 - p0) S(r, r, length), docs/scene-format.md 4.2. */
     const struct imp_frame f = imp__frame_from_normal(e * (1 / length));
     const struct imp_mat4 local = {{f.s[0], f.t[0], f.n[0], a[0], f.s[1], f.t[1], f.n[1],
@@ -37,9 +36,8 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
     c->length = length * scale[2];
     s->area = IMP_2PI * c->radius * c->length;
     if (!(s->area > 0) || !isfinite(s->area) || !imp__is_finite(c->base))
-        IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "radius"),
-                                IMP_E_SCENE, "its radius is %g, its area %g", c->radius,
-                                s->area));
+        IMP_TRY(imp_build_error(b, "radius", IMP_E_SCENE, "its radius is %g, its area %g",
+                                c->radius, s->area));
     c->side = (at.mirrored != s->flip_normals) ? -1 : 1;
     /* A circle about n reaches r sqrt(1 - n_i^2) along axis i. */
     const imp_v3 top = c->base + c->axes.n * c->length;

@@ -22,7 +22,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
                  c = imp__mat4_column(&at.to_world, 1);
     s->area = IMP_PI * imp__length(imp__cross(a, c));
     if (!(s->area > 0) || !isfinite(s->area))
-        return imp__node_error(b->ctx, b->node, IMP_E_SCENE, "its area is %g", s->area);
+        return imp_build_error(b, NULL, IMP_E_SCENE, "its area is %g", s->area);
     k->inv_area = 1 / s->area;
     k->n = imp__normalize(imp__cross(a, c)) *
            ((at.mirrored != s->flip_normals) ? -1.0 : 1.0);
@@ -96,6 +96,7 @@ static double pdf_toward(const struct imp_shape *s, const imp_v3 *ref,
 
 const struct imp_shape_ops imp__disk = {.size = sizeof(struct imp_shape_ops),
                                         .name = "disk",
+                                        .flags = IMP_SHAPE_CONVEX,
                                         .object_size = sizeof(struct disk),
                                         .build = build,
                                         .intersect = intersect,

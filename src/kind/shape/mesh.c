@@ -34,7 +34,7 @@ static enum imp_status positions_place(const struct imp_build *b, struct imp_sha
         const imp_v3 p = imp__point(&at->to_world, imp__v3(q[0], q[1], q[2]));
         for (int i = 0; i < 3; i++) {
             if (!(fabs(p[i]) < COORDINATE_MAX))
-                return imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+                return imp_build_error(b, NULL, IMP_E_SCENE,
                                        "vertex %zu is not finite, or further out than %g",
                                        k, COORDINATE_MAX);
             const float x = (float)p[i];
@@ -56,7 +56,7 @@ static enum imp_status normals_place(const struct imp_build *b, const struct imp
         imp_v3 n = imp__normal(&at->to_local, imp__v3(q[0], q[1], q[2]));
         const double length = imp__length(n);
         if (!isfinite(length))
-            return imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+            return imp_build_error(b, NULL, IMP_E_SCENE,
                                    "the normal of vertex %zu is not finite", k);
         if (length > 0) n = n * ((s->flip_normals ? -1 : 1) / length);
         for (int i = 0; i < 3; i++) out[3 * k + i] = (float)n[i];
@@ -68,18 +68,18 @@ static enum imp_status data_check(const struct imp_build *b,
                                   const struct imp_mesh_data *data)
 {
     if (data->n_triangles == 0 || data->n_vertices == 0)
-        return imp__node_error(b->ctx, b->node, IMP_E_SCENE, "it has no triangles");
+        return imp_build_error(b, NULL, IMP_E_SCENE, "it has no triangles");
     if (data->n_triangles > INT32_MAX || data->n_vertices > INT32_MAX)
-        return imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+        return imp_build_error(b, NULL, IMP_E_SCENE,
                                "it has more than 2^31 triangles or vertices");
     for (size_t k = 0; k < 3 * data->n_triangles; k++)
         if (data->indices[k] >= data->n_vertices)
-            return imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+            return imp_build_error(b, NULL, IMP_E_SCENE,
                                    "triangle %zu names vertex %u; there are %zu", k / 3,
                                    data->indices[k], data->n_vertices);
     for (size_t k = 0; data->uvs && k < 2 * data->n_vertices; k++)
         if (!isfinite(data->uvs[k]))
-            return imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+            return imp_build_error(b, NULL, IMP_E_SCENE,
                                    "the uv of vertex %zu is not finite", k / 2);
     return IMP_OK;
 }
@@ -91,7 +91,7 @@ static enum imp_status areas_sum(const struct imp_build *b, struct imp__mesh *m,
     double *normals = imp__arena_take(b->arena, 3 * n, sizeof *normals);
     m->face_normals = normals;
     if (!m->cumulative || !normals)
-        return imp__node_error(b->ctx, b->node, IMP_E_NOMEM, "out of memory");
+        return imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory");
     double sum = 0;
     m->cumulative[0] = 0;
     for (size_t k = 0; k < n; k++) {
@@ -107,7 +107,7 @@ static enum imp_status areas_sum(const struct imp_build *b, struct imp__mesh *m,
         m->cumulative[k + 1] = sum;
     }
     if (!isfinite(sum))
-        return imp__node_error(b->ctx, b->node, IMP_E_SCENE, "its area is not finite");
+        return imp_build_error(b, NULL, IMP_E_SCENE, "its area is not finite");
     s->area = sum;
     m->inv_area = sum > 0 ? 1 / sum : 0;
     return IMP_OK;
@@ -201,7 +201,7 @@ static enum imp_status tangents_make(const struct imp_build *b, struct imp__mesh
                                      size_t n)
 {
     double *tangents = imp__arena_take(b->arena, 3 * n, sizeof *tangents);
-    if (!tangents) return imp__node_error(b->ctx, b->node, IMP_E_NOMEM, "out of memory");
+    if (!tangents) return imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory");
     for (size_t k = 0; k < n; k++) {
         const struct imp_hit hit = {.prim = (int)k};
         struct imp_surface at;
@@ -225,12 +225,11 @@ enum imp_status imp__mesh_build(const struct imp_build *b, void *self,
     IMP_TRY(imp__shape_placement(b, s, &at));
     IMP_TRY(data_check(b, data));
     const size_t n = data->n_vertices;
-    float *positions = imp__arena_array(b->arena, 3 * n + PADDING, sizeof *positions);
-    float *normals = face_normals
-                         ? NULL
-                         : imp__arena_array(b->arena, 3 * n + PADDING, sizeof *normals);
+    float *positions = imp_build_alloc(b, 3 * n + PADDING, sizeof *positions);
+    float *normals =
+        face_normals ? NULL : imp_build_alloc(b, 3 * n + PADDING, sizeof *normals);
     if (!positions || (!normals && !face_normals))
-        IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_NOMEM, "out of memory"));
+        IMP_TRY(imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory"));
     IMP_TRY(positions_place(b, s, data, &at, positions));
     m->positions = positions;
     m->uvs = data->uvs;
@@ -239,8 +238,7 @@ enum imp_status imp__mesh_build(const struct imp_build *b, void *self,
     if (m->reversed) {
         uint32_t *indices =
             imp__arena_take(b->arena, 3 * data->n_triangles, sizeof *indices);
-        if (!indices)
-            IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_NOMEM, "out of memory"));
+        if (!indices) IMP_TRY(imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory"));
         for (size_t k = 0; k < data->n_triangles; k++) {
             indices[3 * k] = data->indices[3 * k];
             indices[3 * k + 1] = data->indices[3 * k + 2];
@@ -301,12 +299,10 @@ static enum imp_status mesh_build(const struct imp_build *b, void *self,
                                   struct imp_shape *s)
 {
     bool face_normals;
-    const enum imp_status st =
-        imp__props_bool(b->ctx, b->node, "face_normals", false, &face_normals);
+    const enum imp_status st = imp_build_bool(b, "face_normals", false, &face_normals);
     if (st != IMP_OK) return st;
     if (!b->node->mesh)
-        return imp__node_error(b->ctx, b->node, IMP_E_SCENE,
-                               "no triangles were given to it");
+        return imp_build_error(b, NULL, IMP_E_SCENE, "no triangles were given to it");
     return imp__mesh_build(b, self, s, b->node->mesh, face_normals);
 }
 
@@ -316,9 +312,8 @@ static enum imp_status file_build(const struct imp_build *b, void *self,
 {
     const char *filename;
     bool flip;
-    enum imp_status st = imp__props_string(b->ctx, b->node, "filename", NULL, &filename);
-    if (st == IMP_OK)
-        st = imp__props_bool(b->ctx, b->node, "flip_tex_coords", false, &flip);
+    enum imp_status st = imp_build_string(b, "filename", NULL, &filename);
+    if (st == IMP_OK) st = imp_build_bool(b, "flip_tex_coords", false, &flip);
     if (st != IMP_OK) return st;
     return mesh_build(b, self, s);
 }

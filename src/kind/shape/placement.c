@@ -10,18 +10,16 @@ enum imp_status imp__shape_placement(const struct imp_build *b, struct imp_shape
     struct imp_placement p;
     double weight;
 
-    IMP_TRY(imp__props_transform(b->ctx, b->node, "to_world", p.to_world.m));
-    IMP_TRY(imp__props_bool(b->ctx, b->node, "flip_normals", false, &s->flip_normals));
-    IMP_TRY(imp__props_float(b->ctx, b->node, "silhouette_sampling_weight", 1, &weight));
-    const struct imp_prop *prop = imp__node_prop(b->node, "to_world");
+    IMP_TRY(imp_build_transform(b, "to_world", p.to_world.m));
+    IMP_TRY(imp_build_bool(b, "flip_normals", false, &s->flip_normals));
+    IMP_TRY(imp_build_float(b, "silhouette_sampling_weight", 1, &weight));
     if (!imp__mat4_is_finite(&p.to_world))
-        IMP_TRY(imp__prop_error(b->ctx, b->node, prop, IMP_E_SCENE,
-                                "to_world is not finite"));
+        IMP_TRY(imp_build_error(b, "to_world", IMP_E_SCENE, "to_world is not finite"));
     if (!imp__mat4_is_affine(&p.to_world))
-        IMP_TRY(imp__prop_error(b->ctx, b->node, prop, IMP_E_SCENE,
+        IMP_TRY(imp_build_error(b, "to_world", IMP_E_SCENE,
                                 "to_world is not affine: its last row must be 0 0 0 1"));
     if (!imp__mat4_inverse(&p.to_world, &p.to_local))
-        IMP_TRY(imp__prop_error(b->ctx, b->node, prop, IMP_E_SCENE,
+        IMP_TRY(imp_build_error(b, "to_world", IMP_E_SCENE,
                                 "to_world is singular: it flattens the shape"));
     p.mirrored = imp__mat4_det3(&p.to_world) < 0;
     *out = p;

@@ -25,7 +25,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
     r->ev = imp__vector(&at.to_world, imp__v3(0, 2, 0));
     s->area = imp__length(imp__cross(r->eu, r->ev));
     if (!(s->area > 0) || !isfinite(s->area))
-        return imp__node_error(b->ctx, b->node, IMP_E_SCENE, "its area is %g", s->area);
+        return imp_build_error(b, NULL, IMP_E_SCENE, "its area is %g", s->area);
     r->inv_area = 1 / s->area;
     /* The image of local +z as normals go, so that mirroring in the plane keeps its side.
      */
@@ -92,6 +92,7 @@ static double pdf_toward(const struct imp_shape *s, const imp_v3 *ref,
 
 const struct imp_shape_ops imp__rectangle = {.size = sizeof(struct imp_shape_ops),
                                              .name = "rectangle",
+                                             .flags = IMP_SHAPE_CONVEX | IMP_SHAPE_SQUARE,
                                              .object_size = sizeof(struct rectangle),
                                              .build = build,
                                              .surface = surface,

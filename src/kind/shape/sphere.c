@@ -20,16 +20,15 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
     double center[3], radius, scale[3];
 
     IMP_TRY(imp__shape_placement(b, s, &at));
-    IMP_TRY(imp__props_vector(b->ctx, b->node, "center", (double[3]){0, 0, 0}, center));
-    IMP_TRY(imp__props_float(b->ctx, b->node, "radius", 1, &radius));
+    IMP_TRY(imp_build_vector(b, "center", (double[3]){0, 0, 0}, center));
+    IMP_TRY(imp_build_float(b, "radius", 1, &radius));
     imp__placement_frame(b, &at.to_world, 3, &p->axes, scale);
     p->center = imp__point(&at.to_world, imp__v3(center[0], center[1], center[2]));
     p->radius = fabs(radius) * scale[0];
     s->area = 4 * IMP_PI * p->radius * p->radius;
     if (!(s->area > 0) || !isfinite(s->area) || !imp__is_finite(p->center))
-        IMP_TRY(imp__prop_error(b->ctx, b->node, imp__node_prop(b->node, "radius"),
-                                IMP_E_SCENE, "its radius is %g, its area %g", p->radius,
-                                s->area));
+        IMP_TRY(imp_build_error(b, "radius", IMP_E_SCENE, "its radius is %g, its area %g",
+                                p->radius, s->area));
     /* A mirroring placement turns the normal inwards, flip_normals turns it back
      * (docs/scene-format.md 4.2). A negative radius mirrors all three axes. */
     if (radius < 0) p->axes = (struct imp_frame){-p->axes.s, -p->axes.t, -p->axes.n};
@@ -156,6 +155,7 @@ static void round_of(const struct imp_shape *s, struct imp_round *out)
 
 const struct imp_shape_ops imp__sphere = {.size = sizeof(struct imp_shape_ops),
                                           .name = "sphere",
+                                          .flags = IMP_SHAPE_CONVEX,
                                           .object_size = sizeof(struct sphere),
                                           .build = build,
                                           .intersect = intersect,

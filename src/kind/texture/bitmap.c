@@ -41,7 +41,7 @@ static enum imp_status data_convert(const struct imp_build *b,
         for (int c = 0; c < im->channels; c++) {
             p[c] = im->pixels[i * (size_t)im->channels + (size_t)c];
             if (!isfinite(p[c]))
-                return imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+                return imp_build_error(b, NULL, IMP_E_SCENE,
                                        "pixel (%zu, %zu) of the picture is not finite",
                                        i % (size_t)im->width, i / (size_t)im->width);
             if (im->srgb && !raw) {
@@ -70,22 +70,20 @@ static enum imp_status build(const struct imp_build *b, void *self,
     bool raw, accel;
     int wrap, filter, format;
 
-    IMP_TRY(imp__props_string(b->ctx, b->node, "filename", NULL, &filename));
-    IMP_TRY(imp__props_bool(b->ctx, b->node, "raw", false, &raw));
-    IMP_TRY(
-        imp__props_choice(b->ctx, b->node, "wrap_mode", wraps, 3, WRAP_REPEAT, &wrap));
-    IMP_TRY(imp__props_choice(b->ctx, b->node, "filter_type", filters, 2, FILTER_BILINEAR,
-                              &filter));
+    IMP_TRY(imp_build_string(b, "filename", NULL, &filename));
+    IMP_TRY(imp_build_bool(b, "raw", false, &raw));
+    IMP_TRY(imp_build_choice(b, "wrap_mode", wraps, 3, WRAP_REPEAT, &wrap));
+    IMP_TRY(imp_build_choice(b, "filter_type", filters, 2, FILTER_BILINEAR, &filter));
     /* Mitsuba's options of texel storage and lookup: accepted, without effect here. */
-    IMP_TRY(imp__props_choice(b->ctx, b->node, "format", formats, 5, 0, &format));
-    IMP_TRY(imp__props_bool(b->ctx, b->node, "accel", true, &accel));
+    IMP_TRY(imp_build_choice(b, "format", formats, 5, 0, &format));
+    IMP_TRY(imp_build_bool(b, "accel", true, &accel));
     IMP_TRY(imp__to_uv_read(b, &t->to_uv));
     if (!im)
-        IMP_TRY(imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+        IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE,
                                 "needs a picture: 'filename' is required"));
     if (im->width < 1 || im->height < 1 || (im->channels != 1 && im->channels != 3))
         IMP_TRY(
-            imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+            imp_build_error(b, NULL, IMP_E_SCENE,
                             "picture of %d x %d with %d channels; 1 or 3 are possible",
                             im->width, im->height, im->channels));
     t->width = im->width;
@@ -99,9 +97,9 @@ static enum imp_status build(const struct imp_build *b, void *self,
     const size_t dims[3] = {(size_t)t->height, (size_t)t->width, (size_t)t->channels};
     float lo = 0;
     for (size_t i = 0; i < dims[0] * dims[1] * dims[2]; i++) lo = imp_min(lo, t->data[i]);
-    IMP_TRY(b->add_bulk(b, "data", t->data, 3, dims,
-                        IMP_PARAM_DIFFERENTIABLE | IMP_PARAM_COLOR,
-                        lo < 0 ? -INFINITY : 0.0, INFINITY, &tex->param));
+    IMP_TRY(imp_build_texels(b, "data", t->data, 3, dims,
+                             IMP_PARAM_DIFFERENTIABLE | IMP_PARAM_COLOR,
+                             lo < 0 ? -INFINITY : 0.0, INFINITY, &tex->param));
 out:
     return st;
 }

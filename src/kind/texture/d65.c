@@ -20,10 +20,10 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_t
 {
     struct d65 *d = self;
     t->param = -1;
-    const enum imp_status st = imp__props_float(b->ctx, b->node, "scale", 1, &d->scale);
+    const enum imp_status st = imp_build_float(b, "scale", 1, &d->scale);
     if (st != IMP_OK) return st;
     if (!isfinite(d->scale) || d->scale < 0)
-        return imp__node_error(b->ctx, b->node, IMP_E_SCENE,
+        return imp_build_error(b, NULL, IMP_E_SCENE,
                                "'scale' must be finite and not negative");
     return IMP_OK;
 }
@@ -52,6 +52,7 @@ static void tangent(const struct imp_texture *t, const struct imp_texcoord *at,
 const struct imp_texture_ops imp__d65 = {.size = sizeof(struct imp_texture_ops),
                                          .name = "d65",
                                          .object_size = sizeof(struct d65),
+                                         .flags = IMP_TEXTURE_SPECTRUM,
                                          .inputs = inputs,
                                          .build = build,
                                          .eval = eval,

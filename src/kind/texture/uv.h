@@ -17,12 +17,12 @@ static inline enum imp_status imp__to_uv_read(const struct imp_build *b,
                                               struct imp__to_uv *t)
 {
     double m[16];
-    const enum imp_status st = imp__props_transform(b->ctx, b->node, "to_uv", m);
+    const enum imp_status st = imp_build_transform(b, "to_uv", m);
     if (st != IMP_OK) return st;
     const struct imp__to_uv r = {{{m[0], m[1], m[3]}, {m[4], m[5], m[7]}}};
     for (int k = 0; k < 6; k++)
         if (!isfinite(r.m[k / 3][k % 3]))
-            return imp__node_error(b->ctx, b->node, IMP_E_SCENE, "'to_uv' is not finite");
+            return imp_build_error(b, NULL, IMP_E_SCENE, "'to_uv' is not finite");
     *t = r;
     return IMP_OK;
 }

@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * All kinds of a concept: the built-in ones, then those that a host registered in a
+ * context (imp_register_bsdf and its like, kinds.h). */
+#ifndef IMP_KIND_REGISTRY_H
+#define IMP_KIND_REGISTRY_H
+
+#include "build.h"
+
+enum imp_concept {
+    IMP_CONCEPT_BSDF,
+    IMP_CONCEPT_TEXTURE,
+    IMP_CONCEPT_SHAPE,
+    IMP_CONCEPT_EMITTER,
+    IMP_CONCEPT_SENSOR,
+    IMP_CONCEPT_FILTER
+};
+
+/* Table i of a concept (struct imp_bsdf_ops, ...); NULL after the last. */
+const void *imp__kind_at(const imp_context *ctx, enum imp_concept concept, size_t i);
+/* The first kind of the node's type, or IMP_E_UNSUPPORTED with a list of what there is.
+ */
+enum imp_status imp__kind_find(imp_context *ctx, enum imp_concept concept,
+                               const struct imp_node *node, const void **ops);
+
+#endif

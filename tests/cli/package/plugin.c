@@ -1,0 +1,317 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Kinds of a host: the material of the example, an environment and a texture, against
+ * closed forms; and what is not registered. Compiled against an installed tree. */
+#define main example_main
+#include "own_material.c"
+#undef main
+#include <stddef.h>
+#include <stdlib.h>
+
+static int n_tests, n_failed;
+static void ok(int good, const char *text)
+{
+    n_tests++;
+    n_failed += !good;
+    printf("%sok %d - %s\n", good ? "" : "not ", n_tests, text);
+}
+
+/* ---- An environment: radiance gain max(0, w_z), w towards the light ------------- */
+
+struct zenith {
+    double gain, drawn; /* `drawn` follows the first number of radiance */
+    int n_changed;
+};
+static const struct zenith *seen; /* of the scene made last */
+
+static const struct imp_input_desc zenith_inputs[] = {
+    {.name = "radiance", .role = IMP_EMISSION, .fallback = 1, .unit = "W m^-2 sr^-1"},
+    {0}};
+
+static enum imp_status zenith_build(const struct imp_build *b, void *self,
+                                    struct imp_emitter *e)
+{
+    static const char *const words[] = {"up", "down"};
+    struct zenith *z = self;
+    double axis[3], m[16];
+    int64_t n;
+    int word;
+    bool on;
+    const char *text;
+    enum imp_status st = imp_build_float(b, "gain", 1, &z->gain);
+    if (st == IMP_OK) st = imp_build_choice(b, "side", words, 2, 0, &word);
+    if (st == IMP_OK) st = imp_build_vector(b, "axis", (double[3]){0, 0, 1}, axis);
+    if (st == IMP_OK) st = imp_build_transform(b, "to_world", m);
+    if (st == IMP_OK) st = imp_build_int(b, "count", 3, 0, 9, &n);
+    if (st == IMP_OK) st = imp_build_bool(b, "on", true, &on);
+    if (st == IMP_OK) st = imp_build_string(b, "text", "none", &text);
+    if (st != IMP_OK) return st;
+    if (word != 0 || axis[2] != 1 || m[0] != 1 || n != 3 || !on ||
+        strcmp(text, "none") != 0 || imp_build_color_mode(b) != IMP_RGB)
+        return imp_build_error(b, NULL, IMP_E_SCENE, "defaults are wrong");
+    if (z->gain < 0)
+        return imp_build_error(b, "gain", IMP_E_SCENE, "gain = %g is negative", z->gain);
+    double *own = imp_build_alloc(b, 1, sizeof *own);
+    if (!own || *own != 0) return imp_build_error(b, NULL, IMP_E_NOMEM, "no memory");
+    z->drawn = e->input[0]->value[0];
+    seen = z;
+    return IMP_OK;
+}
+static void zenith_changed(const struct imp_emitter *e)
+{
+    struct zenith *z = e->self;
+    z->drawn = e->input[0]->value[0];
+    z->n_changed++;
+}
+static void zenith_eval_d(const struct imp_emitter *e, const imp_spec *in,
+                          const struct imp_emission *x, imp_spec *dle)
+{
+    (void)in;
+    const struct zenith *z = e->self;
+    imp_spec_fill(dle, x->d[2] < 0 ? z->gain * -x->d[2] : 0);
+}
+static void zenith_eval(const struct imp_emitter *e, const imp_spec *in,
+                        const struct imp_emission *x, imp_spec *le)
+{
+    zenith_eval_d(e, in, x, le);
+    *le *= in[0];
+}
+static bool zenith_sample(const struct imp_emitter *e, const imp_v3 *ref,
+                          const double u[2], struct imp_light_sample *out)
+{
+    (void)e, (void)ref;
+    const double r = sqrt(u[0]), phi = 2 * pi * u[1], z = sqrt(1 - u[0]);
+    *out = (struct imp_light_sample){.wi = (imp_v3){r * cos(phi), r * sin(phi), z},
+                                     .dist = INFINITY,
+                                     .pdf = z / pi,
+                                     .cos_light = 1};
+    return z > 0;
+}
+static double zenith_pdf(const struct imp_emitter *e, const imp_v3 *ref, const imp_v3 *wi,
+                         const struct imp_hit *hit, const struct imp_surface *at)
+{
+    (void)e, (void)ref, (void)hit, (void)at;
+    const imp_v3 up = {0, 0, 1};
+    return fmax(0, imp_v3_dot(wi, &up)) / pi;
+}
+static const struct imp_emitter_ops zenith = {.size = sizeof(struct imp_emitter_ops),
+                                              .name = "zenith",
+                                              .object_size = sizeof(struct zenith),
+                                              .flags = IMP_EMITTER_ENVIRONMENT,
+                                              .inputs = zenith_inputs,
+                                              .build = zenith_build,
+                                              .eval = zenith_eval,
+                                              .eval_d = zenith_eval_d,
+                                              .sample = zenith_sample,
+                                              .pdf = zenith_pdf,
+                                              .changed = zenith_changed};
+
+/* ---- A texture: one number a times u ------------------------------------------- */
+
+struct ramp {
+    float a;
+};
+static enum imp_status ramp_build(const struct imp_build *b, void *self,
+                                  struct imp_texture *t)
+{
+    struct ramp *r = self;
+    const size_t one = 1;
+    double a;
+    enum imp_status st = imp_build_float(b, "a", 1, &a);
+    r->a = (float)a;
+    if (st == IMP_OK)
+        st = imp_build_texels(b, "slope", &r->a, 1, &one, IMP_PARAM_DIFFERENTIABLE, 0, 1,
+                              &t->param);
+    return st;
+}
+static void ramp_eval(const struct imp_texture *t, const struct imp_texcoord *at,
+                      bool scalar, imp_spec *value)
+{
+    (void)scalar;
+    const struct ramp *r = t->self;
+    imp_spec_fill(value, (double)r->a * at->uv[0]);
+}
+static void ramp_scatter(const struct imp_texture *t, const struct imp_texcoord *at,
+                         bool scalar, const imp_spec *bar, struct imp_sink *sink)
+{
+    (void)scalar;
+    const imp_spec d = *bar * at->uv[0];
+    sink->add(sink, t->param, 0, 1, &d);
+}
+static void ramp_tangent(const struct imp_texture *t, const struct imp_texcoord *at,
+                         bool scalar,
+                         double (*dot)(const void *x_dot, int param, size_t element),
+                         const void *x_dot, imp_spec *value_dot)
+{
+    (void)scalar;
+    imp_spec_fill(value_dot, dot(x_dot, t->param, 0) * at->uv[0]);
+}
+static const struct imp_texture_ops ramp = {.size = sizeof(struct imp_texture_ops),
+                                            .name = "ramp",
+                                            .object_size = sizeof(struct ramp),
+                                            .build = ramp_build,
+                                            .eval = ramp_eval,
+                                            .scatter = ramp_scatter,
+                                            .tangent = ramp_tangent};
+
+/* ---- Scenes -------------------------------------------------------------------- */
+
+enum { W = 8, N = W * W };
+
+static const char scene_text[] =
+    "<scene version='3.0.0'><integrator type='direct'/>"
+    "<sensor type='orthographic'><transform name='to_world'>"
+    "<scale value='0.1'/><lookat origin='3.4641016151377544,0,2' target='0,0,0' "
+    "up='0,0,1'/></transform>"
+    "<film type='hdrfilm'><integer name='width' value='8'/>"
+    "<integer name='height' value='8'/><rfilter type='box'/></film>"
+    "<sampler type='independent'><integer name='sample_count' value='1024'/></sampler>"
+    "</sensor>"
+    "<shape type='rectangle'><bsdf type='minnaert' id='dust'>%s"
+    "<float name='darkening' value='2'/></bsdf></shape>"
+    "<emitter type='zenith' id='sky'><float name='radiance' value='1'/>%s"
+    "</emitter></scene>";
+
+static enum imp_status load(imp_context *ctx, const char *reflectance, const char *light,
+                            imp_scene **out)
+{
+    char text[2048];
+    *out = NULL;
+    snprintf(text, sizeof text, scene_text, reflectance, light);
+    return imp_scene_load_string(ctx, text, strlen(text), "plate.xml", NULL, out);
+}
+
+/* Mean of red and its derivatives by the first number of each parameter, within 4
+ * standard errors. */
+static void compare(imp_scene *scene, const char *what, double value, size_t n_active,
+                    size_t n, const char *const *name, const double *derivative)
+{
+    char text[200];
+    imp_film *film = NULL;
+    imp_problem *p = NULL;
+    struct imp_run run = IMP_RUN_INIT;
+    float seed[3 * N];
+    double g[8] = {0}, se[8] = {0}, mean = 0, var = 0;
+    enum imp_status st = imp_render(scene, &run, &film);
+    for (int i = 0; st == IMP_OK && i < N; i++) {
+        mean += (double)imp_film_mean(film)[3 * i] / N;
+        var += pow((double)imp_film_se(film)[3 * i] / N, 2);
+    }
+    snprintf(text, sizeof text, "%s: mean %.5f (se %.1e), closed form %.5f", what, mean,
+             sqrt(var), value);
+    ok(st == IMP_OK && var < 1e-5 && fabs(mean - value) < 4 * sqrt(var) + 1e-6, text);
+
+    for (int i = 0; i < 3 * N; i++) seed[i] = i % 3 == 0 ? 1.0f / N : 0;
+    if (st == IMP_OK) st = imp_problem_create(scene, &p);
+    for (size_t k = 0; k < n && st == IMP_OK; k++) st = imp_problem_activate(p, name[k]);
+    snprintf(text, sizeof text, "%s: %zu numbers are active", what, imp_problem_n(p));
+    ok(st == IMP_OK && imp_problem_n(p) == n_active, text);
+    if (st == IMP_OK) st = imp_problem_reverse(p, seed, &run, g, se);
+    for (size_t k = 0; k < n; k++) {
+        snprintf(text, sizeof text, "%s: derivative by %s %.5f (se %.1e), %.5f", what,
+                 name[k], g[k], se[k], derivative[k]);
+        ok(st == IMP_OK && se[k] < 1e-2 && fabs(g[k] - derivative[k]) < 4 * se[k] + 1e-6,
+           text);
+    }
+    imp_problem_destroy(p);
+    imp_film_destroy(film);
+}
+
+static void refused(imp_context *ctx, enum imp_status st, const char *message)
+{
+    char text[400];
+    snprintf(text, sizeof text, "refused: '%s': %s", message, imp_last_error(ctx));
+    ok(st == IMP_E_ARG && strstr(imp_last_error(ctx), message), text);
+}
+
+int main(void)
+{
+    imp_context *ctx, *other;
+    imp_scene *scene;
+    if (imp_context_create(NULL, &ctx) != IMP_OK ||
+        imp_context_create(NULL, &other) != IMP_OK)
+        return 99;
+
+    struct imp_bsdf_ops b = minnaert;
+    b.size = sizeof b + 8;
+    refused(ctx, imp_register_bsdf(ctx, &b), "another kinds.h");
+    b.size = offsetof(struct imp_bsdf_ops, eval_d);
+    refused(ctx, imp_register_bsdf(ctx, &b), "has no eval_d");
+    b.size = 3;
+    refused(ctx, imp_register_bsdf(ctx, &b), "size 3 of ops");
+    b = minnaert, b.pdf = NULL;
+    refused(ctx, imp_register_bsdf(ctx, &b), "has no pdf");
+    b = minnaert, b.name = "diffuse";
+    refused(ctx, imp_register_bsdf(ctx, &b), "built-in");
+    b = minnaert, b.name = "two words";
+    refused(ctx, imp_register_bsdf(ctx, &b), "a name is");
+    b = minnaert, b.emit = (void (*)(const struct imp_bsdf *, const imp_spec *,
+                                     const imp_v3 *, imp_spec *))abort;
+    refused(ctx, imp_register_bsdf(ctx, &b), "only one of emit and emit_d");
+    b = minnaert, b.min_children = 3;
+    refused(ctx, imp_register_bsdf(ctx, &b), "children");
+    struct imp_emitter_ops e = zenith;
+    e.pdf = NULL;
+    refused(ctx, imp_register_emitter(ctx, &e), "has no pdf");
+
+    b = minnaert;
+    b.size = offsetof(struct imp_bsdf_ops, emit); /* an older header's */
+    ok(imp_register_bsdf(ctx, &b) == IMP_OK, "a shorter table with all that is required");
+    refused(ctx, imp_register_bsdf(ctx, &minnaert), "registered already");
+    ok(imp_register_emitter(ctx, &zenith) == IMP_OK, "an emitter");
+    ok(imp_register_texture(ctx, &ramp) == IMP_OK, "a texture");
+    struct imp_texture_ops t = ramp;
+    t.name = "minnaert";
+    ok(imp_register_texture(ctx, &t) == IMP_OK, "another concept, the same name");
+
+    const double rho = 0.8, k = 2, base = (k + 1) / (k + 2) * pow(0.5, k - 1);
+    const char *const names[] = {"dust.reflectance.value", "dust.darkening.value",
+                                 "sky.radiance.value"};
+    /* L = rho (k + 1)/(k + 2) cos_o^(k - 1) gain, gain = 2, cos_o = 1/2 */
+    enum imp_status st = load(ctx, "<float name='reflectance' value='0.8'/>",
+                              "<float name='gain' value='2'/>", &scene);
+    ok(st == IMP_OK, imp_last_error(ctx));
+    if (st == IMP_OK)
+        compare(scene, "own material and light", 2 * rho * base, 5, 3, names,
+                (double[]){2 * base,
+                           2 * rho * base * (1 / (k + 1) - 1 / (k + 2) + log(0.5)),
+                           2 * rho * base});
+
+    size_t at;
+    if (st == IMP_OK) st = imp_scene_find_param(scene, names[2], &at);
+    if (st == IMP_OK) st = imp_scene_set_values(scene, at, 1, (double[]){3});
+    ok(st == IMP_OK && seen->n_changed == 1 && seen->drawn == 3, "changed is called");
+    if (st == IMP_OK) st = imp_scene_set_values(scene, at, 1, (double[]){3});
+    ok(st == IMP_OK && seen->n_changed == 1, "and not where nothing changed");
+    refused(ctx, imp_register_sensor(ctx, NULL), "ops is NULL");
+    ok(imp_register_bsdf(NULL, &minnaert) == IMP_E_ARG, "no context");
+    b = minnaert, b.name = "late";
+    refused(ctx, imp_register_bsdf(ctx, &b), "after a scene");
+    imp_scene_destroy(scene);
+
+    /* u is 1/2 in the middle of the picture, and the picture is symmetric about it */
+    st = load(ctx,
+              "<texture name='reflectance' type='ramp'><float name='a' value='0.5'/>"
+              "</texture>",
+              "", &scene);
+    ok(st == IMP_OK, imp_last_error(ctx));
+    const char *const slope[] = {"dust.reflectance.slope"};
+    if (st == IMP_OK)
+        compare(scene, "own texture", 0.25 * base, 1, 1, slope, (double[]){0.5 * base});
+    imp_scene_destroy(scene);
+
+    st = load(ctx, "", "<float name='gain' value='-1'/>", &scene);
+    ok(st == IMP_E_SCENE && strstr(imp_last_error(ctx), "plate.xml:1:") &&
+           strstr(imp_last_error(ctx), "'sky' (zenith): gain = -1 is negative"),
+       imp_last_error(ctx));
+    st = load(ctx, "", "<float name='gainn' value='1'/>", &scene);
+    ok(st == IMP_E_SCENE && strstr(imp_last_error(ctx), "did you mean 'gain'"),
+       imp_last_error(ctx));
+    st = load(other, "", "", &scene);
+    ok(st == IMP_E_UNSUPPORTED && strstr(imp_last_error(other), "no such bsdf; it has"),
+       "another context does not have them");
+    imp_context_destroy(other);
+    imp_context_destroy(ctx);
+    printf("1..%d\n", n_tests);
+    return n_failed != 0;
+}

@@ -1,0 +1,114 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Whoever derived something from numbers of theta is told, once, after they are set; and
+ * not where nothing changed. */
+#include "curved/inside.h"
+#include "imp_scene.h"
+#include "imp_tap.h"
+#include <stdlib.h>
+
+static const char plates[] =
+    "<scene version='3.0.0'><integrator type='direct'/><sensor "
+    "type='perspective'><transform name='to_world'>"
+    "<lookat origin='0,0,5' target='0,0,0' up='0,1,0'/></transform></sensor>"
+    "<bsdf type='diffuse' id='a'><float name='reflectance' value='0.5'/></bsdf>"
+    "<bsdf type='diffuse' id='b'><float name='reflectance' value='0.5'/></bsdf>"
+    "<shape type='sphere'><ref id='a'/></shape><shape type='sphere'><ref id='b'/></shape>"
+    "<emitter type='constant'/></scene>";
+
+/* The sum of two numbers, as whoever derived it keeps it. */
+struct derived {
+    const imp_scene *scene;
+    int param[2], n_calls;
+    double sum;
+    const struct derived *of; /* derived from this; or NULL */
+};
+static void derive(void *payload)
+{
+    struct derived *d = payload;
+    d->n_calls++;
+    d->sum = d->of ? 2 * d->of->sum : 0;
+    for (int k = 0; k < 2 && !d->of; k++)
+        d->sum += imp__param_get(&d->scene->params[d->param[k]], 0);
+}
+
+static void listeners(imp_context *ctx)
+{
+    imp_scene *s = test_scene_text(ctx, plates, IMP_MONO);
+    size_t a, b;
+    test_must(ctx, imp_scene_find_param(s, "a.reflectance", &a));
+    test_must(ctx, imp_scene_find_param(s, "b.reflectance", &b));
+    struct derived sum = {.scene = s, .param = {(int)a, (int)b}};
+    struct derived twice = {.scene = s, .of = &sum};
+    test_must(ctx, imp__theta_watch(s, (int)a, derive, &sum));
+    test_must(ctx, imp__theta_watch(s, (int)b, derive, &sum));
+    test_must(ctx, imp__theta_watch(s, (int)b, derive, &sum)); /* again: no effect */
+    test_must(ctx, imp__theta_watch(s, (int)a, derive, &twice));
+
+    test_must(ctx, imp_scene_set_values(s, a, 1, (double[]){0.25}));
+    tap_ok(sum.n_calls == 1 && sum.sum == 0.75 && twice.n_calls == 1 && twice.sum == 1.5,
+           "one parameter: both are called, in order");
+    test_must(ctx, imp_scene_set_values(s, b, 1, (double[]){0.125}));
+    tap_ok(sum.n_calls == 2 && sum.sum == 0.375 && twice.n_calls == 1,
+           "the other: only who watches it");
+
+    double *theta = calloc(imp_scene_n_theta(s), sizeof *theta);
+    imp_scene_get_theta(s, theta);
+    test_must(ctx, imp_scene_set_theta(s, theta));
+    tap_ok(sum.n_calls == 2, "the same numbers: nobody is called");
+    theta[s->params[a].info.offset] = theta[s->params[b].info.offset] = 0.5;
+    test_must(ctx, imp_scene_set_theta(s, theta));
+    tap_ok(sum.n_calls == 3 && sum.sum == 1 && twice.sum == 2, "both at once: one call");
+    theta[s->params[b].info.offset] = 2;
+    tap_ok(imp_scene_set_theta(s, theta) == IMP_E_ARG && sum.n_calls == 3,
+           "refused numbers: nobody is called");
+
+    imp_problem *p;
+    test_must(ctx, imp_problem_create(s, &p));
+    test_must(ctx, imp_problem_activate(p, "*.reflectance.value"));
+    test_must(ctx, imp_problem_set_x(p, (double[]){0.75, 0.125}));
+    tap_ok(sum.n_calls == 4 && sum.sum == 0.875, "the numbers of a problem: one call");
+    const struct imp_check_row *rows;
+    size_t n;
+    struct imp_check_options o = IMP_CHECK_OPTIONS_INIT;
+    struct imp_run run = IMP_RUN_INIT;
+    run.spp = 1;
+    o.paths = 8, o.fresh_spp = 4;
+    test_must(ctx, imp_check(p, &o, &run, &rows, &n));
+    tap_ok(sum.n_calls > 4 && sum.sum == 0.875 && twice.sum == 1.75,
+           "check: called, and at the end as it was");
+    imp_problem_destroy(p);
+    free(theta);
+    imp_scene_destroy(s);
+}
+
+/* A grid keeps its greatest coefficient, and steps of later plans are chosen by it. */
+static void fields(imp_context *ctx)
+{
+    imp_scene *s = test_scene_text(
+        ctx,
+        "<scene version='3.0.0'><sensor type='perspective'/><shape type='sphere'>"
+        "<bsdf type='null'/><medium type='graded' id='glass' name='interior'>"
+        "<volume type='grid'><vector name='lo' value='-2,-2,-2'/>"
+        "<vector name='hi' value='2,2,2'/><integer name='cells' value='4'/>"
+        "<float name='index' value='1.25'/></volume></medium></shape>"
+        "<emitter type='constant'/></scene>",
+        IMP_RGB);
+    size_t at;
+    test_must(ctx, imp_scene_find_param(s, "glass.field.coefficients", &at));
+    const imp_field *f = imp__graded_field(s->media[0]->graded);
+    const double before = imp__field_index_max(f);
+    test_must(ctx, imp_scene_set_values(s, at, 1, (double[]){1.5}));
+    tap_ok(before == 1.25 && imp__field_index_max(f) == 1.5,
+           "greatest index of a grid: %g, then %g", before, imp__field_index_max(f));
+    imp_scene_destroy(s);
+}
+
+int main(void)
+{
+    imp_context *ctx = test_context(1);
+    listeners(ctx);
+    fields(ctx);
+    imp_context_destroy(ctx);
+    return tap_done();
+}
