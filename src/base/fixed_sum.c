@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Fixed-point sums: the choice of the unit, and the way back to doubles. */
 #include "fixed_sum.h"
 #include <string.h>
 

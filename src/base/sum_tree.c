@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Sums in a fixed binary tree: nodes that wait for their siblings. */
 #include "sum_tree.h"
 #include <string.h>
 

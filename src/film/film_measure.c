@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Channels of a sample: names, and values of radiance, first hits and moments. */
 #include "film_measure.h"
 #include "base/film.h"
 #include "base/text.h"

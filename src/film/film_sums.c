@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Sums of pictures, added tile by tile, and the means and errors that follow. */
 #include "film_sums.h"
 #include <string.h>
 

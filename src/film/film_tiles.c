@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The tile engine: items, workers, dropped walks, and the tree of sums. */
 #include "film_tiles.h"
 #include <string.h>
 

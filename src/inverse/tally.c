@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The sink of sweeps: batches, pixels and tiles, in arrays or in a hash table. */
 #include "tally.h"
 #include <string.h>
 

@@ -1,4 +1,6 @@
-/* SPDX-License-Identifier: Apache-2.0 */
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Adam for many variables: moments, steps, windows and the average, in floats. */
 #include "adam_many.h"
 #include <math.h>
 #include <string.h>
