@@ -4,8 +4,8 @@
  * of them. */
 #include "fit_pictures.h"
 
-#include "picture.h"
-#include "problem.h"
+#include "cmd_picture.h"
+#include "cmd_problem.h"
 #include "sheet.h"
 
 #include <stdlib.h>

@@ -3,8 +3,8 @@
  * Tells from its first bytes whether an existing file may be replaced by an output. */
 #include "overwrite.h"
 
+#include "cmd_picture.h"
 #include "command.h"
-#include "picture.h"
 #include "progress.h"
 
 #include <errno.h>

@@ -3,8 +3,8 @@
  * A contact sheet: pictures side by side on one scale, small ones enlarged. */
 #include "sheet.h"
 
+#include "cmd_picture.h"
 #include "command.h"
-#include "picture.h"
 
 #include <math.h>
 #include <stdlib.h>

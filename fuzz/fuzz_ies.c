@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Photometric files. What is read ascends, is finite and in range. */
-#include "format/ies.h"
+#include "format/ies_file.h"
 #include <math.h>
 #include <stdlib.h>
 

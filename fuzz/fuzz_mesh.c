@@ -2,7 +2,7 @@
  *
  * Meshes: the first byte chooses OBJ or PLY and whether v is flipped. What is read has
  * indices in range and finite numbers. */
-#include "format/mesh.h"
+#include "format/mesh_file.h"
 #include <math.h>
 #include <stdlib.h>
 

@@ -4,7 +4,7 @@
 #ifndef BEND_KIT_H
 #define BEND_KIT_H
 
-#include "curved/curved.h"
+#include "bend/bend_rays.h"
 #include "imp_tap.h"
 #include "math/rng.h"
 #include <stdlib.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A picture: means and their standard errors, [height][width][channels], row 0 at the
- * top. Renders make it, format/film.c reads and writes it. */
+ * top. Renders make it, format/film_file.c reads and writes it. */
 #ifndef IMP_BASE_FILM_H
 #define IMP_BASE_FILM_H
 

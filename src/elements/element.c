@@ -135,19 +135,19 @@ static void fill(imp_elements *e, uint32_t index, int k)
 {
     struct imp__element *x = &e->elements[index];
     const struct imp__el_root *r = &e->roots[x->root];
-    const size_t bytes = (size_t)(e->ch * el_n(e, r)) * sizeof(double);
+    const size_t bytes = (size_t)(e->ch * imp__el_n(e, r)) * sizeof(double);
     x->corners = (uint8_t)r->corners;
     if (x->parent == EL_NONE) {
         memcpy(x->v, r->v, sizeof x->v);
-        memset(el_at(e, e->l, x), 0, bytes);
-        memset(el_at(e, e->g, x), 0, bytes);
+        memset(imp__el_at(e, e->l, x), 0, bytes);
+        memset(imp__el_at(e, e->g, x), 0, bytes);
     } else {
         const struct imp__element *p = &e->elements[x->parent];
         x->level = p->level + 1;
         imp__el_quarter(p, k, x->v);
         imp__el_hits_share(e, p, k, x);
-        memcpy(el_at(e, e->l, x), el_at(e, e->l, p), bytes);
-        memcpy(el_at(e, e->g, x), el_at(e, e->g, p), bytes);
+        memcpy(imp__el_at(e, e->l, x), imp__el_at(e, e->l, p), bytes);
+        memcpy(imp__el_at(e, e->g, x), imp__el_at(e, e->g, p), bytes);
     }
     x->exposed = exposure_of(e, x, index);
     x->area = imp__polygon_area(r->corners, x->v) * x->exposed;
@@ -161,13 +161,13 @@ static uint32_t place(imp_elements *e, uint32_t root, uint32_t parent)
 {
     e->elements[e->n_elements] =
         (struct imp__element){.root = root, .parent = parent, .coef = e->n_coef};
-    e->n_coef += (size_t)el_n(e, &e->roots[root]);
+    e->n_coef += (size_t)imp__el_n(e, &e->roots[root]);
     return (uint32_t)e->n_elements++;
 }
 
 enum imp_status imp__el_element_root(imp_elements *e, uint32_t root)
 {
-    const enum imp_status st = room_make(e, 1, (size_t)el_n(e, &e->roots[root]));
+    const enum imp_status st = room_make(e, 1, (size_t)imp__el_n(e, &e->roots[root]));
     if (st != IMP_OK) return st;
     e->roots[root].element = place(e, root, EL_NONE);
     fill(e, e->roots[root].element, 0);
@@ -202,7 +202,8 @@ enum imp_status imp__el_split(imp_elements *e, const uint32_t *element, size_t n
 {
     size_t coefficients = 0;
     for (size_t i = 0; i < n; i++)
-        coefficients += 4 * (size_t)el_n(e, el_root(e, &e->elements[element[i]]));
+        coefficients +=
+            4 * (size_t)imp__el_n(e, imp__el_root_of(e, &e->elements[element[i]]));
     enum imp_status st = room_make(e, 4 * n, coefficients);
     if (st != IMP_OK) return st;
     const size_t elements = e->n_elements, coef = e->n_coef;

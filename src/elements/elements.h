@@ -31,11 +31,11 @@
 #define EL_LEVEL_MAX 10
 #define EL_NONE      UINT32_MAX
 
-/* ---- basis.c: even-parity real spherical harmonics on the hemisphere ----------- */
+/* ---- elements_basis.c: even-parity real spherical harmonics on the hemisphere ----------- */
 
 /* H_lm = sqrt(2) Y_lm, l + m even: orthonormal on z > 0. Stored by m: all l of m = 0,
  * then of m = 1 with cosine, m = 1 with sine, m = 2 ... */
-struct imp__basis {
+struct imp__el_basis {
     int order, n;
     int size[EL_ORDER_MAX + 1];    /* number of l for each m */
     int start[EL_ORDER_MAX + 1];   /* index of the first function of m (cosine) */
@@ -44,11 +44,11 @@ struct imp__basis {
     double mid[EL_ORDER_MAX + 1][EL_ORDER_MAX / 2 + 1];
     double low[EL_ORDER_MAX + 1][EL_ORDER_MAX / 2 + 1];
 };
-void imp__basis_init(struct imp__basis *b, int order);
+void imp__basis_init(struct imp__el_basis *b, int order);
 /* Four directions at once, one a lane; h [n]. */
-void imp__basis_eval4(const struct imp__basis *b, imp_spec x, imp_spec y, imp_spec z,
+void imp__basis_eval4(const struct imp__el_basis *b, imp_spec x, imp_spec y, imp_spec z,
                       imp_spec *h);
-void imp__basis_eval(const struct imp__basis *b, imp_v3 w, double *h);
+void imp__basis_eval(const struct imp__el_basis *b, imp_v3 w, double *h);
 
 /* ---- polygon.c ----------------------------------------------------------------- */
 
@@ -85,10 +85,10 @@ void imp__el_brdf(const struct imp__el_material *m, imp_v3 wo, imp_v3 wi, double
 /* Fill r, albedo, residual and d for basis b. @return IMP_E_UNSUPPORTED with `shape` in
  * the message. m->n is set to 0, 1 or b->n. */
 enum imp_status imp__el_project(imp_context *ctx, struct imp_arena *a,
-                                const struct imp__basis *b, int ch, const char *shape,
+                                const struct imp__el_basis *b, int ch, const char *shape,
                                 struct imp__el_material *m);
 /* y = R x over one channel's coefficients; r is one [EL_BLOCK_MAX]. */
-void imp__el_apply(const struct imp__basis *b, int n, const double *r, const double *x,
+void imp__el_apply(const struct imp__el_basis *b, int n, const double *r, const double *x,
                    double *y);
 
 /* ---- Geometry ------------------------------------------------------------------ */
@@ -152,7 +152,7 @@ struct imp_elements {
     int ch;        /* channels */
     double lum[3]; /* weights of the channels in an illuminance: luminance */
     double eye[3]; /* in what a camera measures: the mean of the channels */
-    struct imp__basis basis;
+    struct imp__el_basis basis;
     double eps; /* now */
 
     int n_materials;
@@ -171,8 +171,8 @@ struct imp_elements {
     struct imp__element *elements;
     size_t n_coef, cap_coef; /* numbers of one channel */
     double *l, *g, *c, *b;   /* [ch n_coef], an element's channels together */
-    double *from_above;      /* part of c that the parent's links give (sweep.c) */
-    double *a;               /* [n_coef] */
+    double *from_above; /* part of c that the parent's links give (elements_sweep.c) */
+    double *a;          /* [n_coef] */
     size_t cap_l, cap_g, cap_c, cap_b, cap_above, cap_a;
 
     size_t n_links, cap_links;
@@ -180,7 +180,7 @@ struct imp_elements {
     size_t *in_start;           /* [n_elements + 1] into links */
     size_t *out_start;          /* [n_elements + 1] into out */
     uint32_t *out;              /* link indices by source */
-    double *value;              /* [4 ch n_links], see sweep.c */
+    double *value;              /* [4 ch n_links], see elements_sweep.c */
     size_t cap_in, cap_out_start, cap_out, cap_value;
     bool sorted;
 
@@ -205,29 +205,29 @@ struct imp_elements {
     size_t n_rows, cap_rows;
 };
 
-static inline double *el_at(const imp_elements *e, double *array,
-                            const struct imp__element *x)
+static inline double *imp__el_at(const imp_elements *e, double *array,
+                                 const struct imp__element *x)
 {
     return array + (size_t)e->ch * x->coef;
 }
-static inline const struct imp__el_root *el_root(const imp_elements *e,
-                                                 const struct imp__element *x)
+static inline const struct imp__el_root *imp__el_root_of(const imp_elements *e,
+                                                         const struct imp__element *x)
 {
     return &e->roots[x->root];
 }
-static inline const struct imp__el_material *el_material(const imp_elements *e,
-                                                         const struct imp__element *x)
+static inline const struct imp__el_material *
+imp__el_material_of(const imp_elements *e, const struct imp__element *x)
 {
     return &e->materials[e->roots[x->root].material];
 }
 /* Number of basis functions of an element. A measuring patch needs its constant one. */
-static inline int el_n(const imp_elements *e, const struct imp__el_root *r)
+static inline int imp__el_n(const imp_elements *e, const struct imp__el_root *r)
 {
     const int n = e->materials[r->material].n;
     return n == 0 && r->measured ? 1 : n;
 }
 /* Emitted radiance along w (world, away from the surface), relative to L0. */
-static inline double el_lobe(const struct imp__el_root *r, imp_v3 w)
+static inline double imp__el_lobe(const struct imp__el_root *r, imp_v3 w)
 {
     if (r->light == EL_DARK) return 0;
     if (r->light == EL_UNIFORM) return 1;
@@ -250,11 +250,11 @@ enum imp_status imp__el_emitter_take(imp_elements *e, const struct imp_shape *s,
 enum imp_status imp__el_ambient_take(imp_elements *e, const struct imp_shape *s,
                                      const struct imp_bsdf *b, bool flipped,
                                      struct imp__el_root *r);
-/* measure.c: a polygon for a measuring plane; mark the fronts of a measured shape. */
+/* elements_measure.c: a polygon for a measuring plane; mark the fronts of a measured shape. */
 enum imp_status imp__el_plane_add(imp_elements *e, const struct imp_elements_source *src);
 enum imp_status imp__el_measure_shape(imp_elements *e,
                                       const struct imp_elements_source *src);
-/* measure.c: give every source the weight w [n_sources]: what the polygons emit as
+/* elements_measure.c: give every source the weight w [n_sources]: what the polygons emit as
  * importance and what the eye's hits weigh. Then imp__el_bin, and sweeps. */
 void imp__el_weigh(imp_elements *e, const double *w);
 /* roots.c: polygons, lights and materials of the scene; errors name the shape. */
@@ -307,7 +307,7 @@ enum imp_status imp__el_links_first(imp_elements *e);
 enum imp_status imp__el_links_sort(imp_elements *e, const unsigned char *gone,
                                    size_t all);
 
-/* sum.c: the sum of part(e, first, end, how) over ranges of [0, n), by all threads; the
+/* elements_sum.c: the sum of part(e, first, end, how) over ranges of [0, n), by all threads; the
  * ranges and the order of adding depend on n alone. */
 double imp__el_sum(const imp_elements *e, size_t n,
                    double (*part)(const imp_elements *e, size_t first, size_t end,
@@ -319,7 +319,7 @@ enum imp_status imp__el_refine(imp_elements *e, bool importance, bool *full);
 /* The scale of eps: what passes over all links together. */
 double imp__el_total(const imp_elements *e, bool importance);
 
-/* sweep.c: n Jacobi sweeps of both fields. `cold`: from zero. */
+/* elements_sweep.c: n Jacobi sweeps of both fields. `cold`: from zero. */
 enum imp_status imp__el_sweep(imp_elements *e, int n, bool importance, bool cold);
 /* What the four samples of a link carry, [channels]: radiance from the source, importance
  * from the receiver; either may be NULL. */
@@ -338,7 +338,7 @@ bool imp__el_trace(const imp_elements *e, const struct imp_sensor_ray *ray,
 void imp__el_ray(const struct imp_sensor *s, int x, int y, int k, int side,
                  struct imp_sensor_ray *ray);
 
-/* measure.c */
+/* elements_measure.c */
 /* The measurement from radiance; `direct` (may be NULL): emitters that the eye sees. */
 double imp__el_measure(const imp_elements *e, double *direct);
 /* The part of the camera sources, as luminance; NaN: there is none. */
@@ -362,7 +362,7 @@ enum imp_status imp__el_see(imp_elements *e);
  * the first time. */
 enum imp_status imp__el_look(imp_elements *e, double *change);
 
-/* image.c */
+/* elements_image.c */
 /* Radiance of a hit towards its w, from the leaf. */
 void imp__el_flat(const imp_elements *e, const struct imp__el_hit *hit, double out[3]);
 /* solve.c: sweeps until the solution moves by less than `tolerance`, `n` at a time. */

@@ -61,8 +61,8 @@ static void put_string(struct writer *w, const char *s)
 static void means_of(const imp_elements *e, const struct imp__element *x,
                      double radiance[3], double *importance)
 {
-    const struct imp__el_root *r = el_root(e, x);
-    const int n = el_n(e, r);
+    const struct imp__el_root *r = imp__el_root_of(e, x);
+    const int n = imp__el_n(e, r);
     double lobe = r->light == EL_DARK ? 0 : r->light == EL_UNIFORM ? 1 : 0;
     if (r->light == EL_PROFILE) lobe = r->power;
     if (r->light == EL_LOBE) lobe = 1 / (r->power + 1); /* mean about the normal */
@@ -70,8 +70,8 @@ static void means_of(const imp_elements *e, const struct imp__element *x,
     for (int c = 0; c < 3; c++) {
         const int k = e->ch == 1 ? 0 : c;
         radiance[c] = r->radiance[k] * lobe;
-        if (n) radiance[c] += el_at(e, e->l, x)[k * n] / sqrt(IMP_2PI);
-        if (n && c < e->ch) *importance += el_at(e, e->g, x)[c * n] / sqrt(IMP_2PI);
+        if (n) radiance[c] += imp__el_at(e, e->l, x)[k * n] / sqrt(IMP_2PI);
+        if (n && c < e->ch) *importance += imp__el_at(e, e->g, x)[c * n] / sqrt(IMP_2PI);
     }
 }
 
@@ -83,7 +83,7 @@ static int ascending(const void *a, const void *b)
 
 static bool is_leaf(const imp_elements *e, size_t k)
 {
-    return !e->elements[k].child && el_root(e, &e->elements[k])->shape >= 0;
+    return !e->elements[k].child && imp__el_root_of(e, &e->elements[k])->shape >= 0;
 }
 
 static enum imp_status ply(const imp_elements *e, struct writer *w)
@@ -145,7 +145,7 @@ static void json(const imp_elements *e, struct writer *w)
         means_of(e, x, l, &g);
         put_text(w, first ? "\n{\"shape\":" : ",\n{\"shape\":");
         first = false;
-        put_string(w, e->scene->shapes[el_root(e, x)->shape]->name);
+        put_string(w, e->scene->shapes[imp__el_root_of(e, x)->shape]->name);
         snprintf(text, sizeof text, ",\"polygon\":%u,\"level\":%d,\"area\":", x->root,
                  x->level);
         put_text(w, text);

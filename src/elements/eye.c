@@ -113,7 +113,7 @@ out:
 static void basis_at(const imp_elements *e, const struct imp__element *x, uint32_t first,
                      int n, imp_spec *h)
 {
-    const struct imp_frame *f = &el_root(e, x)->frame;
+    const struct imp_frame *f = &imp__el_root_of(e, x)->frame;
     imp_spec w[3];
     h[0] = imp__spec(e->basis.lead[0]);
     if (n <= 1) return;
@@ -127,7 +127,7 @@ static void basis_at(const imp_elements *e, const struct imp__element *x, uint32
 
 static void bin_leaf(imp_elements *e, const struct imp__element *x)
 {
-    const int n = el_n(e, el_root(e, x));
+    const int n = imp__el_n(e, imp__el_root_of(e, x));
     imp_spec sum[EL_N_MAX], h[EL_N_MAX];
     if (n == 0 || x->hit[0] == x->hit[1]) return;
     memset(sum, 0, (size_t)n * sizeof *sum);
@@ -147,9 +147,9 @@ static void bin_leaf(imp_elements *e, const struct imp__element *x)
 /* Mean over the channels of the radiance along the rays that end in a leaf. */
 static void see_leaf(imp_elements *e, const struct imp__element *x)
 {
-    const struct imp__el_root *r = el_root(e, x);
-    const int n = el_n(e, r);
-    const double *l = el_at(e, e->l, x);
+    const struct imp__el_root *r = imp__el_root_of(e, x);
+    const int n = imp__el_n(e, r);
+    const double *l = imp__el_at(e, e->l, x);
     imp_spec h[EL_N_MAX];
     for (uint32_t k = x->hit[0]; k < x->hit[1]; k += 4) {
         imp_spec sum = imp__spec(0);
@@ -161,7 +161,7 @@ static void see_leaf(imp_elements *e, const struct imp__element *x)
         }
         for (uint32_t s = 0; s < 4 && k + s < x->hit[1]; s++) {
             const struct imp__el_hit *hit = &e->hits[k + s];
-            const double lobe = el_lobe(r, hit->w);
+            const double lobe = imp__el_lobe(r, hit->w);
             double out = sum[s];
             for (int c = 0; c < e->ch && lobe > 0; c++)
                 out += e->eye[c] * r->radiance[c] * lobe;
@@ -177,7 +177,7 @@ static enum imp_status bin_work(size_t item, int worker, int slot, void *payload
     const size_t end = imp_min((item + 1) * ELEMENTS_PER_ITEM, e->n_elements);
     for (size_t k = item * ELEMENTS_PER_ITEM; k < end; k++) {
         const struct imp__element *x = &e->elements[k];
-        const size_t n = (size_t)el_n(e, el_root(e, x));
+        const size_t n = (size_t)imp__el_n(e, imp__el_root_of(e, x));
         memset(e->a + x->coef, 0, n * sizeof *e->a);
         if (!x->child) bin_leaf(e, x);
     }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The cells of a guide: which elements they are, and the lookup of a point's cell. */
-#include "guide.h"
+#include "elements_guide.h"
 
 #define CELLS_MAX ((size_t)1 << 14)
 #define GRID_MAX  ((size_t)1 << 22)
@@ -9,7 +9,7 @@
 static bool is_cell(const imp_elements *e, const struct imp__element *x, int level)
 {
     return (x->level == level || (x->level < level && !x->child)) &&
-           el_root(e, x)->shape >= 0 && el_material(e, x)->n > 0;
+           imp__el_root_of(e, x)->shape >= 0 && imp__el_material_of(e, x)->n > 0;
 }
 
 enum imp_status imp__guide_cells(const imp_elements *e, int level,
@@ -43,7 +43,7 @@ enum imp_status imp__guide_finders(struct imp__guide *g)
     if (!g->finder) return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for a guide");
     for (size_t k = 0; k < g->cells.n; k++) {
         const struct imp__element *x = &e->elements[g->cells.where[k]];
-        const struct imp__el_root *r = el_root(e, x);
+        const struct imp__el_root *r = imp__el_root_of(e, x);
         struct imp__guide_finder *f = &g->finder[x->root];
         const imp_v3 u = r->v[1] - r->v[0], v = r->v[3] - r->v[0], n = imp__cross(u, v);
         const double size = imp__length(u) + imp__length(v), nn = imp__dot(n, n);

@@ -2,7 +2,7 @@
  *
  * Contents of a guide: radiance that arrives at a cell over links, by emitter and by
  * direction, and radiance that leaves it. */
-#include "guide.h"
+#include "elements_guide.h"
 #include "math/rng.h"
 #include <string.h>
 
@@ -18,7 +18,7 @@ struct arriving {
 static imp_spec carried(const imp_elements *e, const struct imp__el_link *k,
                         imp_spec *emitted)
 {
-    const struct imp__el_root *r = el_root(e, &e->elements[k->src]);
+    const struct imp__el_root *r = imp__el_root_of(e, &e->elements[k->src]);
     imp_spec all[3], own[3] = {{0}}, sum = imp__spec(0);
     imp__el_ends(e, k, all, NULL);
     imp__el_emission(e, k, r, own);
@@ -42,7 +42,7 @@ static int emitter_of(const imp_elements *e, const struct imp__el_root *r)
 static void deposit(const imp_elements *e, const struct imp__element *x, uint32_t src,
                     double weight, uint32_t salt, double *bins)
 {
-    const struct imp__el_root *r = el_root(e, x);
+    const struct imp__el_root *r = imp__el_root_of(e, x);
     const struct imp__element *j = &e->elements[src];
     double part[SPREAD], total = 0;
     int bin[SPREAD];
@@ -58,7 +58,7 @@ static void deposit(const imp_elements *e, const struct imp__element *x, uint32_
         const double square = imp__dot(d, d);
         const imp_v3 w = square > 0 ? d * (1 / sqrt(square)) : r->frame.n;
         const imp_v3 local = imp__to_local(&r->frame, w);
-        const double away = -imp__dot(w, el_root(e, j)->frame.n);
+        const double away = -imp__dot(w, imp__el_root_of(e, j)->frame.n);
         part[i] = square > 0 && local[2] > 0 && away > 0 ? local[2] * away / square : 0;
         bin[i] = part[i] > 0 ? imp__guide_bin(local) : 0;
         total += part[i];
@@ -72,12 +72,12 @@ static void deposit(const imp_elements *e, const struct imp__element *x, uint32_
 static void lamp_moments(const imp_elements *e, const struct imp__element *x,
                          const struct imp__el_link *k, int mask, double part, double *c)
 {
-    const struct imp__el_root *r = el_root(e, x);
-    const int n = el_n(e, r);
+    const struct imp__el_root *r = imp__el_root_of(e, x);
+    const int n = imp__el_n(e, r);
     imp_spec own[3] = {{0}};
     double h[EL_N_MAX];
     if (!(x->area > 0)) return;
-    imp__el_emission(e, k, el_root(e, &e->elements[k->src]), own);
+    imp__el_emission(e, k, imp__el_root_of(e, &e->elements[k->src]), own);
     for (int s = 0; s < 4; s++) {
         if (!(mask >> s & 1) || k->k[s] <= 0) continue;
         const imp_v3 w =
@@ -97,7 +97,7 @@ static void arrive(const imp_elements *e, const struct imp__element *x, size_t a
 {
     const struct imp__el_link *k = &e->links[at];
     imp_spec emitted, l = carried(e, k, &emitted);
-    const int em = emitter_of(e, el_root(e, &e->elements[k->src]));
+    const int em = emitter_of(e, imp__el_root_of(e, &e->elements[k->src]));
     double power = 0, direct = 0;
     for (int s = 0; s < 4; s++) {
         if (!(mask >> s & 1)) continue;
@@ -158,11 +158,11 @@ static void leaving_set(const struct imp__guide_build *b, const struct imp__elem
 {
     const struct imp__guide *g = b->g;
     const imp_elements *e = g->e;
-    const struct imp__el_material *m = el_material(e, x);
-    const int n = el_n(e, el_root(e, x)), bins = g->rose * g->rose;
+    const struct imp__el_material *m = imp__el_material_of(e, x);
+    const int n = imp__el_n(e, imp__el_root_of(e, x)), bins = g->rose * g->rose;
     double direct[EL_N_MAX], all[EL_N_MAX] = {0}, rest[EL_N_MAX] = {0};
     for (int c = 0; c < e->ch; c++) {
-        const double *l = el_at(e, e->l, x) + c * n;
+        const double *l = imp__el_at(e, e->l, x) + c * n;
         imp__el_apply(&e->basis, n, m->r[c], lamps + c * n, direct);
         for (int q = 0; q < n; q++) {
             all[q] += e->lum[c] * l[q];
@@ -239,7 +239,7 @@ enum imp_status imp__guide_wide_work(size_t item, int worker, int slot, void *pa
     float *cdf = g->cdf + item * GUIDE_BINS;
     struct arriving to = {.bins = bins};
     (void)slot;
-    const double share = b->share * flatness(e, el_material(e, x));
+    const double share = b->share * flatness(e, imp__el_material_of(e, x));
     if (share < 0.5 * b->share) return IMP_OK; /* not worth its densities */
     memset(bins, 0, GUIDE_BINS * sizeof *bins);
     below(e, x, index, &to);

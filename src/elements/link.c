@@ -13,7 +13,7 @@
 static int in_front(const imp_elements *e, const struct imp__element *at,
                     const struct imp__element *x)
 {
-    const imp_v3 n = el_root(e, at)->frame.n;
+    const imp_v3 n = imp__el_root_of(e, at)->frame.n;
     const double least = 1e-9 * (at->radius + imp__length(x->centre - at->centre));
     int count = 0;
     for (int k = 0; k < x->corners; k++) count += imp__dot(x->v[k] - at->v[0], n) > least;
@@ -59,7 +59,7 @@ static imp_v3 source_point(const imp_elements *e, const struct imp__element *rcv
                            imp_v3 x, const struct imp__element *src, int q,
                            struct imp_key key, int s)
 {
-    const imp_v3 n = el_root(e, rcv)->frame.n;
+    const imp_v3 n = imp__el_root_of(e, rcv)->frame.n;
     imp_v3 v[4];
     imp__el_quarter(src, q, v);
     imp_v3 y = random_point(src->corners, v, key, 16 * (uint32_t)s + 8);
@@ -80,7 +80,7 @@ void imp__el_link_make(const imp_elements *e, uint32_t src, uint32_t rcv,
                        struct imp__el_link *out, bool *keep, int64_t *rays)
 {
     const struct imp__element *i = &e->elements[rcv], *j = &e->elements[src];
-    const struct imp__el_root *ri = el_root(e, i), *rj = el_root(e, j);
+    const struct imp__el_root *ri = imp__el_root_of(e, i), *rj = imp__el_root_of(e, j);
     const struct imp_key key = imp__key(e->opt.seed, rcv, src);
     int order[4] = {0, 1, 2, 3};
     *keep = false;
@@ -118,7 +118,8 @@ void imp__el_link_make(const imp_elements *e, uint32_t src, uint32_t rcv,
 double imp__el_link_bound(const imp_elements *e, const struct imp__el_link *link)
 {
     const struct imp__element *i = &e->elements[link->rcv], *j = &e->elements[link->src];
-    const imp_v3 n = el_root(e, i)->frame.n, facing = el_root(e, j)->frame.n;
+    const imp_v3 n = imp__el_root_of(e, i)->frame.n,
+                 facing = imp__el_root_of(e, j)->frame.n;
     double most = 0;
     for (int k = 0; k < 4 + i->corners; k++) {
         imp_v3 v[4], x;
@@ -170,7 +171,7 @@ static enum imp_status first_work(size_t item, int worker, int slot, void *paylo
     (void)worker;
     f->slot[slot].n = 0;
     f->slot[slot].rays = 0;
-    if (el_n(e, r) == 0) return IMP_OK;
+    if (imp__el_n(e, r) == 0) return IMP_OK;
     for (size_t j = 0; j < e->n_roots; j++) {
         const uint32_t src = e->roots[j].element;
         bool keep =

@@ -125,7 +125,7 @@ struct table {
     double f[NZ][NZ][NM];
 }; /* Fourier coefficients in phi, [zo][zi][m] */
 
-static void blocks(const struct imp__basis *b, const struct table *t, const double *w,
+static void blocks(const struct imp__el_basis *b, const struct table *t, const double *w,
                    double (*h)[EL_N_MAX], double *r)
 {
     for (int m = 0; m <= b->order; m++) {
@@ -148,7 +148,7 @@ static void blocks(const struct imp__basis *b, const struct table *t, const doub
 
 /* Relative L2 error of lobes with zo > cos 80 degrees, and the largest directional
  * albedo. */
-static void quality(const struct imp__basis *b, const struct table *t, const double *z,
+static void quality(const struct imp__el_basis *b, const struct table *t, const double *z,
                     const double *w, double (*h)[EL_N_MAX], const double *norm,
                     struct imp__el_material *m)
 {
@@ -201,7 +201,7 @@ static enum imp_status derivatives_make(imp_context *ctx, struct imp_arena *a,
 }
 
 /* Basis functions that a matrix needs: 0, 1 or all. */
-static int size_of(const struct imp__basis *b, const double *r)
+static int size_of(const struct imp__el_basis *b, const double *r)
 {
     int n = 0;
     for (int q = 0; q <= b->order; q++) n += b->size[q] * b->size[q];
@@ -211,7 +211,7 @@ static int size_of(const struct imp__basis *b, const double *r)
 }
 
 enum imp_status imp__el_project(imp_context *ctx, struct imp_arena *a,
-                                const struct imp__basis *b, int ch, const char *shape,
+                                const struct imp__el_basis *b, int ch, const char *shape,
                                 struct imp__el_material *m)
 {
     enum imp_status st = IMP_OK;
@@ -271,7 +271,7 @@ out:
     return st;
 }
 
-void imp__el_apply(const struct imp__basis *b, int n, const double *r, const double *x,
+void imp__el_apply(const struct imp__el_basis *b, int n, const double *r, const double *x,
                    double *y)
 {
     if (n == 1) { /* Lambert, and measuring patches: the first block's first number */

@@ -18,8 +18,8 @@ static bool refinable(const imp_elements *e, const struct imp__element *x)
 static double corner_bound(const imp_elements *e, const struct imp__element *x,
                            const double *field, const struct imp__element *to)
 {
-    const struct imp__el_root *r = el_root(e, x);
-    const int n = el_n(e, r);
+    const struct imp__el_root *r = imp__el_root_of(e, x);
+    const int n = imp__el_n(e, r);
     imp_spec w[3] = {{0}}, h[EL_N_MAX];
     double most = 0;
     for (int k = 0; k < 4; k++) {
@@ -77,7 +77,7 @@ static double error_of(const imp_elements *e, const struct imp__el_link *k,
                        bool importance)
 {
     const struct imp__element *i = &e->elements[k->rcv], *j = &e->elements[k->src];
-    const struct imp__el_root *ri = el_root(e, i), *rj = el_root(e, j);
+    const struct imp__el_root *ri = imp__el_root_of(e, i), *rj = imp__el_root_of(e, j);
     imp_spec l[3], g[3];
     imp__el_ends(e, k, l, importance ? g : NULL);
     if (!importance)
@@ -97,12 +97,12 @@ static double error_of(const imp_elements *e, const struct imp__el_link *k,
         g_max = fmax(g_max, sum_of(e->ch, g, s));
     }
     if (k_max == 0) k_max = imp__el_link_bound(e, k);
-    const int ni = el_n(e, ri), nj = el_n(e, rj);
+    const int ni = imp__el_n(e, ri), nj = imp__el_n(e, rj);
     const double dist = imp__length(i->centre - j->centre);
     const bool wide = i->radius + j->radius > 0.1 * dist;
     /* Channels: the bound of a product of sums is over-cautious by up to their number. */
     double bound = beam_bound(e, rj, j, i);
-    if (wide && nj > 1) bound += corner_bound(e, j, el_at(e, e->l, j), i);
+    if (wide && nj > 1) bound += corner_bound(e, j, imp__el_at(e, e->l, j), i);
     else if (nj > 0) {
         double sh = 0;
         for (int s = 0; s < 4; s++) sh = fmax(sh, sum_of(e->ch, l, s));
@@ -110,7 +110,7 @@ static double error_of(const imp_elements *e, const struct imp__el_link *k,
     }
     l_max = fmax(l_max, bound);
     if (importance && wide && ni > 1)
-        g_max = fmax(g_max, corner_bound(e, i, el_at(e, e->g, i), j));
+        g_max = fmax(g_max, corner_bound(e, i, imp__el_at(e, e->g, i), j));
     int hidden = 0;
     for (int s = 0; s < 4; s++) hidden += k->k[s] == 0;
     return (hidden % 4 ? HALF_HIDDEN : 1) *
@@ -125,16 +125,17 @@ static double error_of(const imp_elements *e, const struct imp__el_link *k,
 static double resolved_by_source(const imp_elements *e, const struct imp__el_link *k)
 {
     const struct imp__element *j = &e->elements[k->src];
-    const struct imp__el_root *r = el_root(e, j);
+    const struct imp__el_root *r = imp__el_root_of(e, j);
     double emitted = 0, reflected = 0;
-    if (r->light != EL_UNIFORM || el_n(e, r) > 1 ||
-        el_n(e, el_root(e, &e->elements[k->rcv])) > 1)
+    if (r->light != EL_UNIFORM || imp__el_n(e, r) > 1 ||
+        imp__el_n(e, imp__el_root_of(e, &e->elements[k->rcv])) > 1)
         return 1;
     for (int s = 0; s < 4; s++)
         if (k->k[s] == 0) return 1;
     for (int c = 0; c < e->ch; c++) {
         emitted += fabs(r->radiance[c]);
-        if (el_n(e, r)) reflected += fabs(el_at(e, e->l, j)[c]) * e->basis.lead[0];
+        if (imp__el_n(e, r))
+            reflected += fabs(imp__el_at(e, e->l, j)[c]) * e->basis.lead[0];
     }
     return emitted > 0 ? reflected / (emitted + reflected) : 1;
 }
@@ -344,7 +345,7 @@ static double total_of(const imp_elements *e, size_t first, size_t end, const vo
     double sum = 0;
     for (size_t k = first; k < end; k++) {
         const struct imp__el_link *link = &e->links[k];
-        const struct imp__el_root *r = el_root(e, &e->elements[link->rcv]);
+        const struct imp__el_root *r = imp__el_root_of(e, &e->elements[link->rcv]);
         imp_spec l[3], g[3];
         imp__el_ends(e, link, l, importance ? g : NULL);
         for (int c = 0; c < e->ch; c++) {

@@ -63,14 +63,14 @@ static enum imp_status lights_take(imp_elements *e)
         const struct imp__el_hit *hit = &e->hits[k];
         if (hit->root == EL_NONE) continue;
         const struct imp__el_root *r = &e->roots[hit->root];
-        const double lobe = el_lobe(r, hit->w) * hit->weight;
+        const double lobe = imp__el_lobe(r, hit->w) * hit->weight;
         if (r->light == EL_DARK || lobe == 0) continue;
         const double d[3] = {e->eye[0] * lobe, e->eye[1] * lobe, e->eye[2] * lobe};
         IMP_TRY(rows_add(e, r->light_name, r->light_param, r->light_count, true,
                          r->light_value, d));
     }
     for (size_t j = 0; j < e->n_elements; j++) {
-        struct imp__el_root r = *el_root(e, &e->elements[j]);
+        struct imp__el_root r = *imp__el_root_of(e, &e->elements[j]);
         double d[3] = {0};
         if (r.light == EL_DARK) continue;
         for (int c = 0; c < 3; c++) r.radiance[c] = 1;
@@ -101,15 +101,15 @@ static enum imp_status materials_take(imp_elements *e)
     if (!sums) return imp__error(e->ctx, IMP_E_NOMEM, "out of memory for sensitivities");
     for (size_t i = 0; i < e->n_elements; i++) {
         const struct imp__element *x = &e->elements[i];
-        const struct imp__el_material *m = el_material(e, x);
+        const struct imp__el_material *m = imp__el_material_of(e, x);
         if (x->child || m->n == 0 || m->n_d == 0) continue;
         size_t at = 0;
         for (const struct imp__el_material *o = e->materials; o < m; o++)
             at += (size_t)o->n_d;
         for (int j = 0; j < m->n_d; j++)
             for (int c = 0; c < e->ch; c++) {
-                const double *in = el_at(e, e->c, x) + c * m->n,
-                             *b = el_at(e, e->b, x) + c * m->n;
+                const double *in = imp__el_at(e, e->c, x) + c * m->n,
+                             *b = imp__el_at(e, e->b, x) + c * m->n;
                 double y[EL_N_MAX], sum = 0;
                 imp__el_apply(&e->basis, m->n, m->d[j].r[c], in, y);
                 for (int q = 0; q < m->n; q++)

@@ -132,9 +132,9 @@ static double weight_of(const imp_elements *e, bool importance)
     double sum = 0;
     for (size_t k = 0; k < e->n_roots; k++) {
         const struct imp__element *x = &e->elements[e->roots[k].element];
-        const int n = el_n(e, &e->roots[k]);
+        const int n = imp__el_n(e, &e->roots[k]);
         for (int c = 0; c < e->ch && n; c++)
-            sum += x->area * fabs(el_at(e, importance ? e->g : e->l, x)[c * n]);
+            sum += x->area * fabs(imp__el_at(e, importance ? e->g : e->l, x)[c * n]);
     }
     return sum;
 }

@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * <medium type="graded"> of a scene: the field and its steps, read as in files of bent
- * rays (bend_medium.c), attached to its node until the scene is built. */
-#include "bend.h"
-#include "curved/inside.h"
+ * rays (bend_load_medium.c), attached to its node until the scene is built. */
+#include "bend/inside.h"
+#include "format/bend/bend_load.h"
 #include "load.h"
-#include "scene/build.h"
+#include "scene/scene_build.h"
 #include <stdio.h>
 #include <string.h>
 

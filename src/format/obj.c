@@ -3,7 +3,7 @@
  * Wavefront OBJ: v, vt, vn and f with positive indices; polygons are fanned from their
  * first corner; all other lines are ignored. A vertex is a distinct (v, vt, vn). */
 #include "base/number.h"
-#include "mesh.h"
+#include "mesh_file.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

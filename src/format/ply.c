@@ -4,7 +4,7 @@
  * and uv are read, of faces vertex_index or vertex_indices; other properties are skipped.
  */
 #include "base/number.h"
-#include "mesh.h"
+#include "mesh_file.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

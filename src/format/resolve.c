@@ -4,10 +4,10 @@
  * bitmap, intensities for ies. */
 #include "base/film.h"
 #include "color/rgb.h"
-#include "ies.h"
+#include "ies_file.h"
 #include "image.h"
 #include "load.h"
-#include "mesh.h"
+#include "mesh_file.h"
 #include "search.h"
 #include <string.h>
 

@@ -5,7 +5,7 @@
 #include "base/arguments.h"
 #include "base/film.h"
 #include "load.h"
-#include "mesh.h"
+#include "mesh_file.h"
 #include "search.h"
 #include "tree.h"
 #include "value.h"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A problem as an optimiser sees it. */
-#include "curved/inside.h"
+#include "bend/inside.h"
 #include "estimate.h"
 #include "fit.h"
 #include "math/hash.h"

@@ -2,8 +2,8 @@
  *
  * Inputs of objects: constants, which become parameters, and textures. Names and tools
  * that all builders share stand first. */
-#include "build.h"
 #include "color/rgb.h"
+#include "scene_build.h"
 
 enum imp_status imp__build_no_memory(struct imp_scene *scene)
 {

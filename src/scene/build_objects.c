@@ -2,8 +2,8 @@
  *
  * Builds BSDFs, emitters, shapes and sensors. Each is built once, where it first appears
  * in document order, however many references it has. */
-#include "build.h"
-#include "kind/sensor/film.h"
+#include "kind/sensor/sensor_film.h"
+#include "scene_build.h"
 
 /* ---- BSDFs --------------------------------------------------------------------- */
 

@@ -2,7 +2,7 @@
  *
  * Graded media: which shapes they fill, their numbers as parameters, and what of them can
  * be differentiated. */
-#include "build.h"
+#include "scene_build.h"
 
 enum imp_status imp__build_medium(struct imp_scene *scene, struct imp_node *node,
                                   const char *parent, const struct imp_medium **out)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The scene: what is there, and the numbers that describe it. Objects are made once from
- * a tree of nodes (build.c), theta is a list of places where their numbers live
+ * a tree of nodes (scene_build.c), theta is a list of places where their numbers live
  * (theta.c), and rays are answered by intersect.c, the one file that includes Embree. */
 #ifndef IMP_SCENE_H
 #define IMP_SCENE_H
@@ -103,7 +103,7 @@ struct imp_medium_numbers {
 };
 struct imp_medium {
     const char *name;
-    struct imp_graded *graded;    /* curved/inside.h; owned by the scene */
+    struct imp_graded *graded;    /* bend/inside.h; owned by the scene */
     double outside;               /* index around it */
     imp_v3 lo, hi;                /* of all shapes it fills */
     const struct imp_shape *ball; /* the sphere it fills, if nothing else is near it */
@@ -172,7 +172,7 @@ enum imp_status imp__scene_own(struct imp_scene *scene, void *object,
 /* Objects have copied what they need of meshes and pictures. */
 void imp__scene_release_files(struct imp_scene *scene);
 
-/* ---- build.c ------------------------------------------------------------------- */
+/* ---- scene_build.c ------------------------------------------------------------------- */
 /* Resolve references, make every object in document order, commit the intersector. Files
  * must have been attached to the nodes (format/resolve.c). */
 enum imp_status imp__scene_build(struct imp_scene *scene);

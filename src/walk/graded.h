@@ -8,7 +8,7 @@
 #ifndef IMP_WALK_GRADED_H
 #define IMP_WALK_GRADED_H
 
-#include "curved/inside.h"
+#include "bend/inside.h"
 #include "step.h"
 
 extern const struct imp_segment_ops imp__graded_outside, imp__graded_inside;

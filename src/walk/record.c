@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "record.h"
-#include "curved/inside.h"
+#include "bend/inside.h"
 #include "math/hash.h"
 #include "scene/fingerprint.h"
 #include "segment.h"

@@ -3,8 +3,8 @@
  * imp_bend_check fails where a derivative is wrong, and only there: not where the
  * objective is at its least, not because samples are floats, not because a ray runs along
  * the faces of cells. And what a fit says of rays that it cannot see. */
+#include "bend/bend_problem.h"
 #include "bend_kit.h"
-#include "curved/bend.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>

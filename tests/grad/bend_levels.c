@@ -3,8 +3,8 @@
  * What an optimiser learnt goes along when the grid is refined: prolonged changes keep
  * the curvature seen, Adam's step is the refined step, and a fit by L-BFGS gets further
  * in the same number of iterations than one that begins anew. */
+#include "bend/lbfgs.h"
 #include "bend_kit.h"
-#include "curved/lbfgs.h"
 #include <math.h>
 
 /* Two levels of the lens of scenes/bend/focus.xml, `second` iterations on the second. */

@@ -3,8 +3,8 @@
  * Every target, at exits, beyond a plane and at taps, with holds and smoothness: gradient
  * of the objective against central differences. Energy of pictures. Fits that find what
  * made their data. */
+#include "bend/bend_problem.h"
 #include "bend_kit.h"
-#include "curved/bend.h"
 
 #define N 200
 

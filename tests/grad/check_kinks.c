@@ -4,7 +4,7 @@
  * texels as different as can be, and the slope of what a walk sees jumps from texel to
  * texel. A walk that stands on a border is no wrong derivative, and a wrong derivative
  * is one on borders too. */
-#include "curved/inside.h"
+#include "bend/inside.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "inverse_scenes.h"

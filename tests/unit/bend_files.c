@@ -2,8 +2,8 @@
  *
  * Files of index fields: written and read back, cut off at every length, and hostile
  * headers; files of problems: what they make, random damage. */
+#include "bend/bend_problem.h"
 #include "bend_kit.h"
-#include "curved/bend.h"
 #include <unistd.h>
 
 static unsigned char *slurp(const char *path, size_t *n)

@@ -3,7 +3,7 @@
  * Adding up slices of a gradient: whichever thread adds which slice to which part, and
  * in whatever order slices come, the sum has the bits of a sum in order. */
 #include "../bend_kit.h"
-#include "curved/adjoint.h"
+#include "bend/bend_adjoint.h"
 #include <pthread.h>
 #include <string.h>
 

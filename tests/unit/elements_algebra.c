@@ -91,7 +91,7 @@ static void form_factors(void)
 
 static void gram(int order)
 {
-    struct imp__basis b;
+    struct imp__el_basis b;
     double z[24], w[24], h[EL_N_MAX], worst = 0;
     static double g[EL_N_MAX][EL_N_MAX];
     memset(g, 0, sizeof g);
@@ -116,7 +116,7 @@ static void gram(int order)
 static void materials(imp_context *ctx)
 {
     struct imp_arena a;
-    struct imp__basis b;
+    struct imp__el_basis b;
     static struct imp__el_material lambert, phong;
     imp__arena_init(&a, ctx);
     imp__basis_init(&b, 8);

@@ -90,9 +90,9 @@ static void eye(imp_context *ctx, imp_scene *s, const struct imp_elements_option
         const struct imp__el_root *r = &e->roots[hit->root];
         const uint32_t leaf = imp__el_find(e, hit->root, hit->u, hit->v, NULL);
         h[0] = e->basis.lead[0];
-        if (el_n(e, r) > 1)
+        if (imp__el_n(e, r) > 1)
             imp__basis_eval(&e->basis, imp__to_local(&r->frame, hit->w), h);
-        for (int q = 0; q < el_n(e, r); q++)
+        for (int q = 0; q < imp__el_n(e, r); q++)
             a[e->elements[leaf].coef + (size_t)q] += hit->weight * h[q];
     }
     for (size_t q = 0; q < e->n_coef && a; q++)

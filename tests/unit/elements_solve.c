@@ -60,8 +60,9 @@ static void furnace(imp_context *ctx)
         test_must(ctx, imp__el_settle(e, 8, true, 1e-14));
         double worst = 0;
         for (size_t k = 0; k < e->n_elements; k++)
-            worst = fmax(worst,
-                         fabs(el_at(e, e->l, &e->elements[k])[0] / sqrt(IMP_2PI) - 1.5));
+            worst =
+                fmax(worst,
+                     fabs(imp__el_at(e, e->l, &e->elements[k])[0] / sqrt(IMP_2PI) - 1.5));
         tap_ok(worst < 2e-12 && e->n_elements == (level == 0   ? 6
                                                   : level == 1 ? 30
                                                                : 126),
@@ -100,9 +101,9 @@ static void furnace(imp_context *ctx)
                 const double r = sqrt(1 - z[i] * z[i]), phi = IMP_2PI * p / 48;
                 imp__basis_eval(&e->basis, imp__v3(r * cos(phi), r * sin(phi), z[i]), h);
                 for (int q = 0; q < e->basis.n; q++)
-                    out += w[i] * z[i] * IMP_2PI / 48 * h[q] * el_at(e, e->l, x)[q];
+                    out += w[i] * z[i] * IMP_2PI / 48 * h[q] * imp__el_at(e, e->l, x)[q];
             }
-        const double part = out / (el_at(e, e->c, x)[0] * sqrt(IMP_2PI));
+        const double part = out / (imp__el_at(e, e->c, x)[0] * sqrt(IMP_2PI));
         most = fmax(most, part);
         least = fmin(least, part);
     }
@@ -300,7 +301,7 @@ static void chain(imp_context *ctx)
         const imp_v3 wi = imp__v3(-sqrt(0.5), 0, sqrt(0.5));
         const struct imp__element *x = NULL;
         for (size_t k = 0; k < e->n_elements; k++)
-            if (el_root(e, &e->elements[k])->shape == 1 &&
+            if (imp__el_root_of(e, &e->elements[k])->shape == 1 &&
                 e->elements[k].parent == EL_NONE)
                 x = &e->elements[k];
         double apart = 0, sum = 0;
@@ -310,8 +311,10 @@ static void chain(imp_context *ctx)
                              phi = IMP_2PI * b / 80;
                 const imp_v3 w = imp__v3(r * cos(phi), r * sin(phi), z);
                 double h[EL_N_MAX], l = 0;
-                imp__basis_eval(&e->basis, imp__to_local(&el_root(e, x)->frame, w), h);
-                for (int q = 0; q < e->basis.n; q++) l += el_at(e, e->l, x)[q] * h[q];
+                imp__basis_eval(&e->basis,
+                                imp__to_local(&imp__el_root_of(e, x)->frame, w), h);
+                for (int q = 0; q < e->basis.n; q++)
+                    l += imp__el_at(e, e->l, x)[q] * h[q];
                 const double t = z * wi[2] - w[0] * wi[0] - w[1] * wi[1];
                 const double want =
                     g12 * (kd / IMP_PI + ks * (n + 2) / IMP_2PI * pow(fmax(0, t), n));

@@ -3,7 +3,7 @@
  * LM-63 files: what is read of each edition, the message of every error, files cut off
  * and damaged anywhere, memory that ends; and the light that is made of them: symmetry,
  * interpolation, flux in closed form, shapes. */
-#include "format/ies.h"
+#include "format/ies_file.h"
 #include "imp_fail_alloc.h"
 #include "imp_scene.h"
 #include "imp_tap.h"

@@ -2,7 +2,7 @@
  *
  * OBJ and PLY: what is read (docs/scene-format.md 13.1, 13.2), the message of every
  * error, files cut off and damaged anywhere, and memory that ends. */
-#include "format/mesh.h"
+#include "format/mesh_file.h"
 #include "imp_fail_alloc.h"
 #include "imp_tap.h"
 #include <stdlib.h>

@@ -5,7 +5,7 @@
 #include "film/film_picture.h"
 #include "imp_tap.h"
 #include "kind/filter/filter.h"
-#include "kind/sensor/film.h"
+#include "kind/sensor/sensor_film.h"
 #include "math/rng.h"
 #include "shape_nodes.h"
 

@@ -2,7 +2,7 @@
  *
  * Whoever derived something from numbers of theta is told, once, after they are set; and
  * not where nothing changed. */
-#include "curved/inside.h"
+#include "bend/inside.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include <stdlib.h>

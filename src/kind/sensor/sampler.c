@@ -4,7 +4,7 @@
  * kind rounds up to, so that a file costs the same everywhere
  * (docs/scene-format.md 10). */
 #include "base/compiler.h"
-#include "film.h"
+#include "sensor_film.h"
 #include <string.h>
 
 #define SPP_MAX ((int64_t)1 << 30)

@@ -86,7 +86,7 @@ static void surface_at(const struct cylinder *k, double x, double y, double v,
     const imp_v3 outward = k->axes.s * x + k->axes.t * y;
     out->p = k->base + k->axes.n * (v * k->length) + outward * k->radius;
     out->ng = out->n = outward * k->side;
-    out->uv[0] = imp__turn(x, y);
+    out->uv[0] = imp__uv_turn(x, y);
     out->uv[1] = v;
     out->dp_du = (k->axes.t * x - k->axes.s * y) * (IMP_2PI * k->radius);
     out->dp_dv = k->axes.n * k->length;

@@ -60,7 +60,7 @@ static void surface_at(const struct disk *k, double x, double y, struct imp_surf
     out->p = imp__point(&k->to_world, imp__v3(x, y, 0));
     out->ng = out->n = k->n;
     out->uv[0] = r;
-    out->uv[1] = imp__turn(x, y);
+    out->uv[1] = imp__uv_turn(x, y);
     out->dp_du =
         imp__vector(&k->to_world, r > 0 ? imp__v3(x / r, y / r, 0) : imp__v3(1, 0, 0));
     out->dp_dv = imp__vector(&k->to_world, imp__v3(-y, x, 0)) * IMP_2PI;
@@ -81,7 +81,7 @@ static bool sample_toward(const struct imp_shape *s, const imp_v3 *ref, const do
     double xy[2];
     imp__concentric_disk(u, xy);
     out->uv[0] = sqrt(xy[0] * xy[0] + xy[1] * xy[1]);
-    out->uv[1] = imp__turn(xy[0], xy[1]);
+    out->uv[1] = imp__uv_turn(xy[0], xy[1]);
     return imp__light_from_area(*ref, imp__point(&k->to_world, imp__v3(xy[0], xy[1], 0)),
                                 k->n, k->n, k->inv_area, out);
 }

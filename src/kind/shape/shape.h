@@ -76,7 +76,7 @@ static inline bool imp__light_from_area(imp_v3 ref, imp_v3 p, imp_v3 ng, imp_v3 
 }
 
 /* Angle about the axis over 2 pi, in [0, 1). */
-static inline double imp__turn(double x, double y)
+static inline double imp__uv_turn(double x, double y)
 {
     const double phi = atan2(y, x) * (1 / IMP_2PI), turn = phi < 0 ? phi + 1 : phi;
     return turn < 1 ? turn : 0;

@@ -71,7 +71,7 @@ static void surface_at(const struct sphere *p, imp_v3 outward, struct imp_surfac
     const double rho = sqrt(q[0] * q[0] + q[1] * q[1]);
     out->p = p->center + outward * p->radius;
     out->ng = out->n = outward * p->side;
-    out->uv[0] = imp__turn(q[0], q[1]);
+    out->uv[0] = imp__uv_turn(q[0], q[1]);
     out->uv[1] = atan2(rho, q[2]) * IMP_INV_PI;
     out->dp_du = imp__to_world(&p->axes, imp__v3(-q[1], q[0], 0)) * (IMP_2PI * p->radius);
     const double c = rho > 0 ? q[0] / rho : 1, si = rho > 0 ? q[1] / rho : 0;

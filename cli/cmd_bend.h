@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef IMP_CLI_CMD_BEND_H
+#define IMP_CLI_CMD_BEND_H
+
+#include "command.h"
+#include "output.h"
+#include <importon/bend.h>
+
+int bend_fit(imp_bend *bend);
+extern const struct arg_option bend_fit_options[];
+/* Counts of a trace. */
+void bend_print_stats(FILE *to, const struct imp_bend_stats *s);
+void bend_put_stats(struct json *j, const struct imp_bend_stats *s);
+const char *bend_target_word(enum imp_bend_target_type type);
+/* Pictures of a problem, DIR/<prefix>slice-x.png, ..., rays, spots, images. `json` gets
+ * what they show; NULL: no answer. */
+int bend_view(imp_bend *bend, const char *folder, const char *prefix, struct json *json);
+/* May they all be written? */
+int bend_view_writable(const char *folder, const char *prefix);
+
+#endif

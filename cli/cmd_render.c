@@ -1,0 +1,199 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * importon render: a picture with its standard errors; or single walks, to look at. */
+#include "cmd_picture.h"
+#include "command.h"
+#include "output.h"
+#include "progress.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static struct {
+    struct picture_options picture;
+    int pixel[2], sample, count;
+    const char *paths;
+} o = {.pixel = {-1, -1}};
+
+static const struct arg_option options[] = {
+    {ARG_FLAG, 0, "se", NULL, "add the standard error of every channel to the EXR file",
+     &o.picture.standard_error, 0, 0, NULL},
+    {ARG_FLAG, 0, "half", NULL, "16-bit floats in the EXR file", &o.picture.half, 0, 0,
+     NULL},
+    {ARG_NUMBER, 0, "exposure", "STOPS", "exposure of the PNG preview",
+     &o.picture.exposure, -100, 100, NULL},
+    {ARG_FLAG, 0, "no-preview", NULL, "write no PNG beside the picture",
+     &o.picture.no_preview, 0, 0, NULL},
+    {ARG_PAIR, 0, "pixel", "X,Y", "print one walk of this pixel, vertex by vertex",
+     o.pixel, 0, 0, NULL},
+    {ARG_INT, 0, "sample", "K", "number of the walk in the pixel (default 0)", &o.sample,
+     0, 1e9, NULL},
+    {ARG_TEXT, 0, "paths", "FILE",
+     "write walks from all over the picture, one JSON object per line", &o.paths, 0, 0,
+     NULL},
+    {ARG_INT, 0, "count", "N", "number of walks for --paths (default 100)", &o.count, 1,
+     1e7, NULL},
+    {0}};
+
+static int describe(const struct imp_run *run, int x, int y, int64_t sample, int json,
+                    FILE *to)
+{
+    char *text = NULL;
+    const enum imp_status st =
+        imp_walk_describe(cli.scene, run, x, y, sample, json, &text);
+    if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+    const size_t n = strlen(text);
+    fwrite(text, 1, n, to);
+    if (n == 0 || text[n - 1] != '\n') fputc('\n', to);
+    imp_free(cli.context, text);
+    return 0;
+}
+
+/* Walks spread evenly over the picture by the golden ratio and its square in two
+ * dimensions (the R2 sequence, M. Roberts 2018). */
+static int write_paths(const struct imp_run *run)
+{
+    struct imp_sensor_info info = {.size = sizeof info};
+    const double g1 = 0.7548776662466927, g2 = 0.5698402909980532;
+    const enum imp_status st = imp_scene_get_sensor(cli.scene, run->sensor, &info);
+    if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+    struct output to;
+    int rc = output_open(&to, o.paths, OUTPUT_WALKS);
+    if (rc) return rc;
+    const int count = o.count ? o.count : 100;
+    for (int i = 0; i < count && !rc && !progress_interrupted(); i++) {
+        const double u = 0.5 + g1 * i, v = 0.5 + g2 * i;
+        rc = describe(run, (int)((u - floor(u)) * info.width),
+                      (int)((v - floor(v)) * info.height), o.sample + i, 1, to.file);
+    }
+    rc = output_close(&to, rc);
+    return rc ? rc : cli_done();
+}
+
+/* The scene's file name with the extension its film asks for, in the working folder. */
+static char *default_output(const struct imp_run *run)
+{
+    struct imp_sensor_info info = {.size = sizeof info};
+    const char *extension = "exr";
+    if (imp_scene_get_sensor(cli.scene, run->sensor, &info) == IMP_OK &&
+        info.file_format) {
+        if (!strcmp(info.file_format, "pfm")) extension = "pfm";
+        if (!strcmp(info.file_format, "rgbe")) extension = "hdr";
+    }
+    const char *base = strrchr(cli.scene_path, '/');
+    base = base ? base + 1 : cli.scene_path;
+    if (base[0] == '<') base = "render"; /* stdin */
+    const char *dot = strrchr(base, '.');
+    const int stem = dot && dot > base ? (int)(dot - base) : (int)strlen(base);
+    char *path = cli_alloc((size_t)stem + 5, 1);
+    snprintf(path, (size_t)stem + 5, "%.*s.%s", stem, base, extension);
+    return path;
+}
+
+/* How many walks of each cause, and the first of them to look at. More than the budget
+ * fails the run. */
+static void report_drops(const struct imp_film_info *info)
+{
+    if (!info->dropped) return;
+    cli_say("%llu of %.3g walks were left out, within the budget of 1 in 10000:",
+            (unsigned long long)info->dropped,
+            (double)info->width * info->height * (double)info->spp);
+    for (int c = 0; c < IMP_DROP_CAUSES; c++)
+        if (info->dropped_by_cause[c])
+            cli_say("  %llu: %s", (unsigned long long)info->dropped_by_cause[c],
+                    imp_drop_text((enum imp_drop)c));
+    if (info->n_drop_keys)
+        cli_say("  the first: render --pixel %d,%d --sample %lld --seed %llu",
+                info->drop_keys[0].x, info->drop_keys[0].y,
+                (long long)info->drop_keys[0].sample,
+                (unsigned long long)info->drop_keys[0].seed);
+}
+
+static void report(const char *path, imp_film *film, const struct imp_run *run)
+{
+    struct imp_film_info info = {.size = sizeof info};
+    imp_film_get_info(film, &info);
+    cli_say("%s: %d x %d, %lld samples per pixel%s", path, info.width, info.height,
+            (long long)info.spp,
+            !progress_interrupted() ? ""
+            : info.spp
+                ? ", interrupted"
+                : ", interrupted in the first pass: a part of the picture is there");
+    report_drops(&info);
+    if (!cli.json || !strcmp(path, "-")) return;
+    struct json j = cli_json();
+    json_text(&j, "file", path);
+    json_integer(&j, "width", info.width);
+    json_integer(&j, "height", info.height);
+    json_seed(&j, "seed", run->seed);
+    json_integer(&j, "spp", info.spp);
+    json_seed(&j, "dropped", info.dropped);
+    json_bool(&j, "complete", !progress_interrupted());
+    json_array(&j, "channels");
+    const size_t n = (size_t)info.width * (size_t)info.height;
+    const float *mean = imp_film_mean(film), *se = imp_film_se(film);
+    for (int c = 0; c < info.channels; c++) {
+        double sum = 0, squares = 0;
+        for (size_t i = 0; i < n; i++) {
+            const size_t k = i * (size_t)info.channels + (size_t)c;
+            sum += mean[k];
+            if (se) squares += (double)se[k] * se[k];
+        }
+        json_object(&j, NULL);
+        json_text(&j, "name", imp_film_channel(film, c));
+        json_number(&j, "mean", sum / (double)n);
+        json_number(&j, "se", se ? sqrt(squares) / (double)n : NAN);
+        json_end_object(&j);
+    }
+    json_end_array(&j);
+    cli_json_end(&j);
+}
+
+static int run_render(int n, char **operand)
+{
+    imp_film *film = NULL;
+    (void)n;
+    int rc = cli_load(operand[0]);
+    if (rc) return rc;
+    const struct imp_run run = cli_run();
+    const int one = o.pixel[0] >= 0 || o.pixel[1] >= 0;
+    if (o.sample && !one && !o.paths)
+        return cli_error(EXIT_USAGE, "--sample needs --pixel or --paths");
+    if (o.count && !o.paths) return cli_error(EXIT_USAGE, "--count needs --paths");
+    if (one) {
+        rc = cli_redirect();
+        return rc ? rc
+                  : describe(&run, o.pixel[0], o.pixel[1], o.sample, cli.json, stdout);
+    }
+    if (o.paths) return write_paths(&run);
+
+    char *automatic = cli.out ? NULL : default_output(&run);
+    const char *path = cli.out ? cli.out : automatic;
+    rc = picture_writable(path, !o.picture.no_preview);
+    if (!rc) {
+        const enum imp_status st = imp_render(cli.scene, &run, &film);
+        if (cli_failed(st)) rc = cli_fail(st, cli.scene_path);
+    }
+    if (!film && !rc) cli_say("interrupted in the first pass: no picture is written");
+    if (film && !rc) {
+        picture_stamp(film, &run);
+        rc = picture_write(film, path, &o.picture);
+        if (!rc) report(path, film, &run);
+    }
+    imp_film_destroy(film);
+    free(automatic);
+    return rc ? rc : cli_done();
+}
+
+const struct command command_render = {
+    {"render",
+     "SCENE",
+     "render a scene, or print its random walks",
+     {options, options_run, options_guide, options_scene, options_file, options_general},
+     1,
+     1},
+    run_render,
+    0,
+    "walk: pixel"};

@@ -1,0 +1,422 @@
+/* SPDX-License-Identifier: Apache-2.0
+ * Fits: a problem's objective is minimised level by level by the optimisers of
+ * src/search. Each level refines the grid without changing the function, and carries the
+ * optimiser's memory: steps are prolonged by P, gradients as well and scaled by 1/8 (a
+ * coarse coefficient's share goes to eight fine ones). Adam's rate is halved. */
+#include "bend_problem.h"
+#include "lbfgs.h"
+#include "math/hash.h"
+#include "search/checkpoint.h"
+#include <stdio.h>
+#include <string.h>
+
+struct fit {
+    imp_bend *b;
+    const struct imp_bend_fit_options *o;
+    struct imp__goal goal;
+    struct imp__opt_options opt;
+    struct imp__fingerprint print;
+    uint8_t *held;
+    double *theta, *bar, *lo, *hi, *scale,
+        *x0;    /* [n_theta], of active numbers where [n] */
+    size_t *at; /* [n] index in theta */
+    struct imp__search
+        *last; /* search and grid of the level before, whose memory is carried on */
+    imp_field *coarse;
+    size_t *coarse_at; /* [last->n] */
+    bool carries;
+    int level, levels, done_iterations, n_evaluated;
+    double fraction_lo, fraction_hi, start_s, last_report_s, last_checkpoint_s;
+    double last_value, best_value, rays_done;
+    struct imp_bend_stats stats;
+    char note[80];
+};
+
+static void level_free(struct fit *f)
+{
+    imp_context *ctx = f->b->ctx;
+    void *const owned[] = {f->held, f->theta, f->bar, f->lo,
+                           f->hi,   f->scale, f->x0,  f->at};
+    for (size_t i = 0; i < imp_count(owned); i++) imp__release(ctx, owned[i]);
+    f->held = NULL;
+    f->theta = f->bar = f->lo = f->hi = f->scale = f->x0 = NULL;
+    f->at = NULL;
+}
+
+static enum imp_status theta_set(struct fit *f, const double *x)
+{
+    for (size_t k = 0; k < f->goal.n; k++) f->theta[f->at[k]] = x[k];
+    return imp_field_set_theta(f->b->field, f->theta);
+}
+
+static bool report(struct fit *f, bool force)
+{
+    const double now = imp__now();
+    if (!f->o->progress || (!force && now - f->last_report_s < 0.1)) return false;
+    f->last_report_s = now;
+    const double elapsed = now - f->start_s;
+    snprintf(f->note, sizeof f->note, "level %d of %d, objective %.4g", f->level + 1,
+             f->levels, f->best_value);
+    const double part = imp_min(1.0, (double)f->done_iterations / f->opt.max_iterations);
+    const double fraction = f->fraction_lo + (f->fraction_hi - f->fraction_lo) * part;
+    const struct imp_progress p = {
+        .size = sizeof p,
+        .stage = "fit",
+        .fraction = fraction,
+        .elapsed_s = elapsed,
+        .eta_s = fraction > 1e-3 ? elapsed * (1 - fraction) / fraction : -1,
+        .rate = elapsed > 0 ? f->rays_done / elapsed : 0,
+        .rate_unit = "rays",
+        .note = f->note};
+    return f->o->progress(&p, f->o->progress_payload) != 0;
+}
+
+static enum imp_status goal_eval(const double *x, uint64_t seed, struct imp_estimate *e,
+                                 double *g, double *g_se, void *payload)
+{
+    struct fit *f = payload;
+    (void)seed; /* the rays are fixed */
+    enum imp_status st = theta_set(f, x);
+    double value = 0;
+    if (st != IMP_OK) return st;
+    st = imp_bend_objective(f->b, &value, g ? f->bar : NULL, NULL, &f->stats);
+    if (st == IMP_E_NUMERIC && f->o->optimizer == IMP_LBFGS && f->n_evaluated > 0) {
+        value = INFINITY; /* every ray is lost: the line search takes a shorter step */
+        st = IMP_OK;
+    }
+    if (st != IMP_OK) return st;
+    f->n_evaluated++;
+    f->rays_done += (double)f->b->n;
+    f->last_value = value;
+    if (value < f->best_value) f->best_value = value;
+    *e = (struct imp_estimate){value, 0, 0};
+    for (size_t k = 0; g && k < f->goal.n; k++) g[k] = f->bar[f->at[k]];
+    for (size_t k = 0; g_se && k < f->goal.n; k++) g_se[k] = 0;
+    return IMP_OK;
+}
+
+static enum imp_status goal_iterated(const struct imp__search *s, void *payload)
+{
+    struct fit *f = payload;
+    f->done_iterations = s->iteration;
+    const double now = imp__now();
+    if (f->o->checkpoint && now - f->last_checkpoint_s > 5) {
+        f->last_checkpoint_s = now;
+        const enum imp_status st =
+            imp__checkpoint_write(f->b->ctx, f->o->checkpoint, &f->print, s);
+        if (st != IMP_OK) return st;
+    }
+    return report(f, false) ? IMP_CANCELLED : IMP_OK;
+}
+
+#define HASH(h, x) ((h) = imp__hash((h), &(x), sizeof(x)))
+
+static uint64_t target_hash(uint64_t h, const struct imp__target_of_rays *t)
+{
+    const struct imp_bend_target *d = &t->desc;
+    const size_t n_pixels = t->pixels ? (size_t)d->width * (size_t)d->height : 0;
+    HASH(h, d->type), HASH(h, d->bundle), HASH(h, d->tap), HASH(h, d->weight);
+    HASH(h, d->at_plane), HASH(h, d->point), HASH(h, d->normal), HASH(h, d->offset);
+    HASH(h, d->outside), HASH(h, d->width), HASH(h, d->height);
+    HASH(h, d->origin), HASH(h, d->u), HASH(h, d->v);
+    h = imp__hash(h, t->data, t->n_data * sizeof *t->data);
+    return imp__hash(h, t->pixels, n_pixels * sizeof *t->pixels);
+}
+
+static uint64_t surface_hash(uint64_t h, const struct imp_bend_surface *s)
+{
+    HASH(h, s->type), HASH(h, s->event), HASH(h, s->group), HASH(h, s->normal);
+    HASH(h, s->offset), HASH(h, s->centre), HASH(h, s->radius), HASH(h, s->lo);
+    HASH(h, s->hi), HASH(h, s->index);
+    return h;
+}
+
+/* What a checkpoint belongs to: rays, how they are traced, targets, the rules and the
+ * size of the field; not the field's numbers, which the search has changed. */
+static void fingerprint(struct fit *f)
+{
+    const imp_bend *b = f->b;
+    const struct imp_bend_options *o = &b->options;
+    uint64_t h = imp__hash(0, &b->n, sizeof b->n);
+    h = imp__hash(h, b->x, b->n * sizeof *b->x);
+    h = imp__hash(h, b->d, b->n * sizeof *b->d);
+    h = imp__hash(h, b->power, b->n * sizeof *b->power);
+    h = imp__hash(h, b->group, b->n * sizeof *b->group);
+    if (b->dispersion)
+        h = imp__hash(h, b->dispersion, b->cap_dispersion * sizeof *b->dispersion);
+    HASH(h, o->scheme), HASH(h, o->way), HASH(h, o->step), HASH(h, o->max_steps);
+    HASH(h, o->outside), HASH(h, o->outside_index), HASH(h, o->grazing);
+    HASH(h, b->step_cells), HASH(h, b->step_max);
+    for (size_t i = 0; i < o->n_surfaces; i++) h = surface_hash(h, &o->surfaces[i]);
+    for (size_t i = 0; i < o->n_taps; i++) {
+        HASH(h, o->taps[i].normal), HASH(h, o->taps[i].offset);
+        HASH(h, o->taps[i].group);
+    }
+    f->print.scene = h;
+    h = 1;
+    for (size_t i = 0; i < b->n_targets; i++) h = target_hash(h, &b->targets[i]);
+    for (size_t i = 0; i < b->n_smooths; i++) {
+        HASH(h, b->smooths[i].weight), HASH(h, b->smooths[i].edge);
+        HASH(h, b->smooths[i].order);
+    }
+    f->print.targets = h;
+    h = imp__hash(2, &b->field->n_theta, sizeof b->field->n_theta);
+    HASH(h, b->lo), HASH(h, b->hi), HASH(h, b->field->lo), HASH(h, b->field->hi);
+    h = imp__hash(h, f->held, b->field->n_theta);
+    f->print.parameters = h;
+    h = imp__hash(3, &f->o->optimizer, sizeof f->o->optimizer);
+    f->print.options = HASH(h, f->level);
+}
+
+static enum imp_status level_begin(struct fit *f)
+{
+    enum imp_status st = IMP_OK;
+    imp_bend *b = f->b;
+    imp_context *ctx = b->ctx;
+    const size_t n = b->field->n_theta;
+    level_free(f);
+    f->held = imp__alloc(ctx, n + 1, 1);
+    f->theta = imp__alloc(ctx, n + 1, sizeof(double));
+    f->bar = imp__alloc(ctx, n + 1, sizeof(double));
+    f->lo = imp__alloc(ctx, n + 1, sizeof(double));
+    f->hi = imp__alloc(ctx, n + 1, sizeof(double));
+    f->scale = imp__alloc(ctx, n + 1, sizeof(double));
+    f->x0 = imp__alloc(ctx, n + 1, sizeof(double));
+    f->at = imp__alloc(ctx, n + 1, sizeof *f->at);
+    if (!f->held || !f->theta || !f->bar || !f->lo || !f->hi || !f->scale || !f->x0 ||
+        !f->at)
+        return imp__error(ctx, IMP_E_NOMEM, "no memory for a fit of %zu numbers", n);
+    imp_field_get_theta(b->field, f->theta);
+    imp__bend_hold(b, f->held, f->theta);
+    IMP_TRY(imp_field_set_theta(b->field, f->theta));
+    imp__bend_bounds(b, f->lo, f->hi);
+    size_t k = 0;
+    for (size_t i = 0; i < n; i++) {
+        if (f->held[i]) continue;
+        f->lo[k] = f->lo[i], f->hi[k] = f->hi[i]; /* k <= i */
+        f->scale[k] = f->o->scale > 0 ? f->o->scale : 0.1;
+        f->x0[k] = f->theta[i];
+        f->at[k++] = i;
+    }
+    if (k == 0)
+        IMP_TRY(imp__error(ctx, IMP_E_ARG, "nothing to fit: every number is held"));
+    f->goal = (struct imp__goal){.ctx = ctx,
+                                 .n = k,
+                                 .lo = f->lo,
+                                 .hi = f->hi,
+                                 .scale = f->scale,
+                                 .eval = goal_eval,
+                                 .iterated = goal_iterated,
+                                 .payload = f};
+    int iterations = 50;
+    double rate = f->o->learning_rate > 0 ? f->o->learning_rate : 0.05;
+    for (int l = 0; l <= f->level; l++)
+        if (f->o->iterations[l] > 0) iterations = f->o->iterations[l];
+    for (int l = 0; l < f->level; l++) rate /= 2;
+    f->opt = (struct imp__opt_options){iterations, rate,
+                                       f->o->tolerance > 0 ? f->o->tolerance : 1e-6};
+    f->done_iterations = 0;
+    fingerprint(f);
+out:
+    return st;
+}
+
+static void last_free(struct fit *f)
+{
+    imp__search_destroy(f->last);
+    imp_field_destroy(f->coarse);
+    imp__release(f->b->ctx, f->coarse_at);
+    f->last = NULL;
+    f->coarse = NULL;
+    f->coarse_at = NULL;
+}
+
+/* Prolong active numbers of the coarse grid to those of the fine one; held ones are 0. */
+static enum imp_status carry_map(const double *in, double *out, void *payload)
+{
+    const struct fit *f = payload;
+    imp_context *ctx = f->b->ctx;
+    enum imp_status st = IMP_OK;
+    double *coarse = imp__alloc(ctx, f->coarse->n_theta + 1, sizeof *coarse);
+    double *fine = imp__alloc(ctx, f->b->field->n_theta + 1, sizeof *fine);
+    if (!coarse || !fine) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a level"));
+    for (size_t k = 0; k < f->last->n; k++) coarse[f->coarse_at[k]] = in[k];
+    IMP_TRY(imp__field_prolong(f->coarse, f->b->field, coarse, fine));
+    for (size_t k = 0; k < f->goal.n; k++) out[k] = fine[f->at[k]];
+out:
+    imp__release(ctx, coarse);
+    imp__release(ctx, fine);
+    return st;
+}
+
+static enum imp_status level_run(struct fit *f, bool resume, bool *found,
+                                 const char **reason, int *iterations)
+{
+    enum imp_status st = IMP_OK, ended;
+    imp_bend *b = f->b;
+    struct imp__search *s = NULL;
+    IMP_TRY(imp__search_create(&f->goal, f->o->optimizer, &f->opt, f->x0, &s));
+    if (resume) {
+        IMP_TRY(imp__checkpoint_read(b->ctx, f->o->checkpoint, &f->print, &f->goal, s,
+                                     found));
+        if (!*found) goto out;
+    } else if (f->last && f->coarse && f->carries) {
+        const struct imp__carry carry = {carry_map, f, 1.0 / 8};
+        if (f->o->optimizer == IMP_LBFGS) IMP_TRY(imp__lbfgs_carry(f->last, &carry, s));
+        else IMP_TRY(imp__search_carry(f->last, &carry, s));
+    }
+    f->best_value = INFINITY;
+    ended = f->o->optimizer == IMP_LBFGS ? imp__lbfgs(&f->goal, &f->opt, s)
+                                         : imp__optimize(&f->goal, &f->opt, s);
+    if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
+    IMP_TRY(theta_set(f, s->x));
+    *reason = s->reason                ? s->reason
+              : ended == IMP_CANCELLED ? "stopped"
+                                       : "all iterations done";
+    *iterations += s->iteration;
+    const size_t n = b->n_history + s->n_history;
+    void *grown =
+        imp__grow(b->ctx, b->history, &b->cap_history, n + 1, sizeof *b->history);
+    if (!grown) IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "no memory for the history"));
+    b->history = grown;
+    if (s->n_history)
+        memcpy(b->history + b->n_history, s->history, s->n_history * sizeof *b->history);
+    b->n_history = n;
+    if (f->o->checkpoint)
+        IMP_TRY(imp__checkpoint_write(b->ctx, f->o->checkpoint, &f->print, s));
+    last_free(f);
+    f->last = s;
+    s = NULL;
+    st = ended;
+out:
+    imp__search_destroy(s);
+    return st;
+}
+
+/* Refine the field to the next level. */
+static enum imp_status refine(struct fit *f)
+{
+    imp_field *fine;
+    const enum imp_status st = imp_field_refine(f->b->field, &fine);
+    if (st != IMP_OK) return st;
+    imp_field_destroy(f->coarse);
+    imp__release(f->b->ctx, f->coarse_at);
+    f->coarse = f->b->field;
+    f->coarse_at = f->at; /* level_begin makes another */
+    f->at = NULL;
+    f->b->field = fine;
+    return IMP_OK;
+}
+
+/* Find the level the checkpoint belongs to, refining until it fits. */
+static enum imp_status resume(struct fit *f, bool *found, const char **reason,
+                              int *iterations)
+{
+    enum imp_status st = IMP_OK;
+    for (f->level = 0; f->level < f->levels; f->level++) {
+        if (f->level > 0) IMP_TRY(refine(f));
+        IMP_TRY(level_begin(f));
+        f->fraction_lo = (double)f->level / f->levels;
+        f->fraction_hi = (double)(f->level + 1) / f->levels;
+        st = level_run(f, true, found, reason, iterations);
+        if (st != IMP_E_ARG) return st;
+    }
+    st = imp__error(f->b->ctx, IMP_E_ARG, "%s: belongs to another problem",
+                    f->o->checkpoint);
+out:
+    return st;
+}
+
+enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *options,
+                             struct imp_bend_fit_result *result)
+{
+    struct imp_bend_fit_options own = IMP_BEND_FIT_OPTIONS_INIT, *const o = &own;
+    IMP_REQUIRE(NULL, b, "bend");
+    IMP_OPTIONS(b->ctx, own, options, "options");
+    if (result) IMP_SIZED(b->ctx, result, "result");
+    IMP_FLOAT_MODE;
+    if (!(o->learning_rate >= 0) || !(o->tolerance >= 0) || !(o->scale >= 0) ||
+        !isfinite(o->learning_rate + o->tolerance + o->scale))
+        return imp__error(
+            b->ctx, IMP_E_ARG,
+            "learning_rate %g, tolerance %g and scale %g must be numbers >= 0",
+            o->learning_rate, o->tolerance, o->scale);
+    struct fit f = {.b = b,
+                    .o = o,
+                    .levels = imp_max(o->levels, 1),
+                    .start_s = imp__now(),
+                    .stats = IMP_BEND_STATS_INIT};
+    enum imp_status st = IMP_OK;
+    const char *reason = "nothing was done";
+    int iterations = 0, first = 0;
+    double start = 0, value = 0;
+    bool found = false;
+
+    const imp_progress_fn progress = b->options.progress;
+    if (f.levels > IMP_BEND_LEVELS_MAX)
+        return imp__error(b->ctx, IMP_E_ARG, "%d levels: at most %d", f.levels,
+                          IMP_BEND_LEVELS_MAX);
+    /* Adam's moments are those of steeper gradients: begun anew it is usually faster. */
+    f.carries = o->carry > 0 || (o->carry == 0 && o->optimizer == IMP_LBFGS);
+    if (o->optimizer == IMP_LM)
+        return imp__error(b->ctx, IMP_E_UNSUPPORTED,
+                          "bent rays are fitted by lbfgs, adam, mma");
+    const uint32_t *number;
+    if (f.levels > 1 && !imp__field_nodes(b->field, &number))
+        return imp__error(b->ctx, IMP_E_ARG, "levels are for grids, not for a %s field",
+                          b->field->ops->name);
+    b->n_history = 0;
+    b->options.progress = NULL; /* a search is stopped between its iterations only */
+    IMP_TRY(level_begin(&f));
+    /* Before the search moves what lies outside its bounds: a resumed fit has the same.
+     */
+    IMP_TRY(imp_bend_objective(b, &start, NULL, NULL, &f.stats));
+    const uint64_t traced = f.stats.traced;
+    if (o->checkpoint && o->resume) {
+        st = resume(&f, &found, &reason, &iterations);
+        if (st != IMP_OK && st != IMP_CANCELLED) goto out;
+        if (found) first = f.level + 1;
+        else f.level = 0;
+    }
+    for (int level = first; level < f.levels && st == IMP_OK; level++) {
+        f.level = level;
+        if (level > 0) {
+            IMP_TRY(refine(&f));
+            IMP_TRY(level_begin(&f));
+        }
+        f.fraction_lo = (double)level / f.levels;
+        f.fraction_hi = (double)(level + 1) / f.levels;
+        st = level_run(&f, false, &found, &reason, &iterations);
+        if (st != IMP_OK && st != IMP_CANCELLED) goto out;
+    }
+    const enum imp_status ended = st;
+    IMP_TRY(imp_bend_objective(b, &value, NULL, NULL, &f.stats));
+    /* Lost rays are not in the objective, so a fit may lower it by losing rays. */
+    if ((double)f.stats.traced < (double)traced - 0.01 * (double)f.stats.rays)
+        imp__warn(
+            b->ctx,
+            "%llu rays that came to their ends at the start of the fit are lost now: "
+            "the objective does not count them",
+            (unsigned long long)(traced - f.stats.traced));
+    f.best_value = value;
+    f.done_iterations = f.opt.max_iterations;
+    report(&f, true);
+    if (result) {
+        const struct imp_bend_fit_result all = {.size = sizeof all,
+                                                .iterations = iterations,
+                                                .levels = f.level + 1,
+                                                .start = start,
+                                                .value = value,
+                                                .n_history = b->n_history,
+                                                .history = b->history,
+                                                .reason = reason,
+                                                .stats = f.stats};
+        IMP_TRY(imp__info_give(b->ctx, __func__, "result", result, &all, sizeof all));
+    }
+    st = ended;
+out:
+    b->options.progress = progress;
+    last_free(&f);
+    level_free(&f);
+    return st;
+}

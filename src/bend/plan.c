@@ -1,0 +1,291 @@
+/* SPDX-License-Identifier: Apache-2.0
+ * Checks options and prepares tracing: chooses the step, sorts surfaces by group, splits
+ * boxes into faces. */
+#include "bend_rays.h"
+#include "scene/scene.h"
+#include <string.h>
+
+#define MAX_STEPS_DEFAULT 100000
+#define GROUPS_MAX        65535
+#define SURFACES_MAX      60000
+
+static enum imp_status surface_make(imp_context *ctx, const struct imp_bend_surface *in,
+                                    int id, struct imp__surface out[6], int *n)
+{
+    static const enum imp__surface_kind kinds[] = {
+        [IMP_BEND_PLANE] = IMP__PLANE,       [IMP_BEND_SPHERE] = IMP__SPHERE,
+        [IMP_BEND_CYLINDER] = IMP__CYLINDER, [IMP_BEND_DISC] = IMP__DISC,
+        [IMP_BEND_BOX] = IMP__PLANE,         [IMP_BEND_SDF] = IMP__SDF,
+        [IMP_BEND_APPROACH] = IMP__APPROACH, [IMP_BEND_MESH] = IMP__MESH};
+    if ((int)in->type < 0 || in->type > IMP_BEND_MESH || (int)in->event < 0 ||
+        in->event > IMP_BEND_STOP)
+        return imp__error(ctx, IMP_E_ARG, "surface %d: no such type or event", id);
+    struct imp__surface s = {.kind = kinds[in->type],
+                             .event = in->event,
+                             .id = id,
+                             .n = imp__v3_load(in->normal),
+                             .c = imp__v3_load(in->centre),
+                             .offset = in->offset,
+                             .radius = in->radius,
+                             .index = in->index,
+                             .sdf = in->sdf,
+                             .scene = in->scene};
+    const double length = imp__length(s.n);
+    *n = 1;
+    if (in->event == IMP_BEND_REFRACT && !(in->index > 0 && isfinite(in->index)))
+        return imp__error(ctx, IMP_E_ARG, "surface %d: index %g outside is not positive",
+                          id, in->index);
+    if (!imp__is_finite(s.c) || !isfinite(s.offset))
+        return imp__error(ctx, IMP_E_ARG, "surface %d: not finite", id);
+    switch (in->type) {
+    case IMP_BEND_PLANE:
+    case IMP_BEND_DISC:
+    case IMP_BEND_CYLINDER:
+        if (!(length > 0) || !isfinite(length))
+            return imp__error(ctx, IMP_E_ARG, "surface %d: the normal has no direction",
+                              id);
+        s.n *= 1 / length;
+        s.offset /= length;
+        if (in->type == IMP_BEND_DISC) s.offset = imp__dot(s.n, s.c);
+        if (in->type == IMP_BEND_PLANE) break;
+        /* fall through */
+    case IMP_BEND_SPHERE:
+        if (!(in->radius > 0) || !isfinite(in->radius))
+            return imp__error(ctx, IMP_E_ARG, "surface %d: radius %g", id, in->radius);
+        break;
+    case IMP_BEND_BOX:
+        *n = 6;
+        for (int k = 0; k < 3; k++) {
+            if (!(in->hi[k] > in->lo[k]))
+                return imp__error(ctx, IMP_E_ARG,
+                                  "surface %d: empty box, %g to %g along axis %d", id,
+                                  in->lo[k], in->hi[k], k);
+            for (int side = 0; side < 2; side++) {
+                struct imp__surface *face = &out[2 * k + side];
+                *face = s;
+                face->n = (imp_v3){0};
+                face->n[k] = side ? 1 : -1;
+                face->offset = side ? in->hi[k] : -in->lo[k];
+            }
+        }
+        return IMP_OK;
+    case IMP_BEND_SDF:
+        if (!in->sdf)
+            return imp__error(ctx, IMP_E_ARG, "surface %d: no distance field", id);
+        break;
+    case IMP_BEND_APPROACH:
+        if (in->event != IMP_BEND_END)
+            return imp__error(ctx, IMP_E_ARG,
+                              "surface %d: rays end at a closest approach", id);
+        break;
+    case IMP_BEND_MESH:
+        if (!in->scene || in->scene->n_shapes == 0)
+            return imp__error(ctx, IMP_E_ARG, "surface %d: no scene with shapes", id);
+        break;
+    }
+    out[0] = s;
+    return IMP_OK;
+}
+
+/* Surfaces of group g and those of all groups, faces of boxes first. */
+static void domain_make(const struct imp_bend_options *o, const struct imp__surface *all,
+                        const int *first, int g, const struct imp__plan *p,
+                        struct imp__domain *d, struct imp__surface *room)
+{
+    d->surface = room;
+    d->n = d->n_general = 0;
+    d->lo = p->lo;
+    d->hi = p->hi;
+    for (int boxes = 1; boxes >= 0; boxes--)
+        for (size_t i = 0; i < o->n_surfaces; i++) {
+            const struct imp_bend_surface *s = &o->surfaces[i];
+            if ((s->group >= 0 && s->group != g) || (s->type == IMP_BEND_BOX) != boxes)
+                continue;
+            for (int k = first[i]; k < first[i + 1]; k++) d->surface[d->n++] = all[k];
+            if (!boxes) d->n_general++;
+            for (int k = 0; boxes && k < 3; k++) {
+                d->lo[k] = fmax(d->lo[k], s->lo[k]);
+                d->hi[k] = fmin(d->hi[k], s->hi[k]);
+            }
+        }
+}
+
+static enum imp_status step_choose(struct imp__plan *p)
+{
+    const imp_field *f = p->field;
+    p->t = p->options.step;
+    if (p->t < 0 || !isfinite(p->t))
+        return imp__error(p->ctx, IMP_E_ARG, "step %g must be positive", p->t);
+    if (p->t > 0) return IMP_OK;
+    if (!(f->spacing > 0))
+        return imp__error(p->ctx, IMP_E_ARG,
+                          "a %s field has no cells to choose a step by: give one",
+                          f->ops->name);
+    const uint32_t *number;
+    const struct imp__grid *g = imp__field_nodes(f, &number);
+    const double part = g && g->desc.interp == IMP_FIELD_TRILINEAR ? 0.5 : 1;
+    p->t = part * f->spacing;
+    if (!p->scheme->arc) p->t /= fmax(imp__field_index_max(f), 1e-3);
+    return IMP_OK;
+}
+
+static void bounds_choose(struct imp__plan *p, const struct imp_bend_rays *rays)
+{
+    const imp_field *f = p->field;
+    imp_v3 lo = imp__v3(INFINITY, INFINITY, INFINITY), hi = -lo;
+    for (size_t i = 0; i < rays->n && i < 4096; i++)
+        for (int k = 0; k < 3; k++)
+            lo[k] = fmin(lo[k], rays->x[i][k]), hi[k] = fmax(hi[k], rays->x[i][k]);
+    p->size = 0;
+    for (int k = 0; k < 3; k++) {
+        const bool finite = isfinite(f->lo[k]) && isfinite(f->hi[k]);
+        const double w = finite ? f->hi[k] - f->lo[k] : hi[k] - lo[k];
+        if (isfinite(w)) p->size = fmax(p->size, w);
+    }
+    if (!(p->size > 0)) p->size = 1;
+    /* A ray may be one step outside the field: its exit lies within that step. */
+    const double margin = p->t * (p->scheme->arc ? 1 : fmax(imp__field_index_max(f), 1));
+    for (int k = 0; k < 3; k++)
+        p->lo[k] = f->lo[k] - margin, p->hi[k] = f->hi[k] + margin;
+}
+
+enum imp_status imp__bend_options_take(imp_context *ctx, const char *function,
+                                       const char *name,
+                                       const struct imp_bend_options *in,
+                                       struct imp_bend_options *own)
+{
+    struct imp_bend_options o = IMP_BEND_OPTIONS_INIT;
+    IMP_CHECKED(imp__options_take(ctx, function, name, in, &o, sizeof o));
+    const struct {
+        const char *name;
+        double value;
+    } numbers[] = {{"step", o.step},
+                   {"outside_index", o.outside_index},
+                   {"grazing", o.grazing},
+                   {"reversal", o.reversal}};
+    for (size_t i = 0; i < imp_count(numbers); i++)
+        if (!isfinite(numbers[i].value))
+            return imp__error(ctx, IMP_E_ARG, "%s: %s->%s is %g", function, name,
+                              numbers[i].name, numbers[i].value);
+    if (o.n_taps > IMP_BEND_TAPS_MAX)
+        return imp__error(ctx, IMP_E_ARG, "%zu taps: at most %d", o.n_taps,
+                          IMP_BEND_TAPS_MAX);
+    if (o.n_surfaces > SURFACES_MAX)
+        return imp__error(ctx, IMP_E_ARG, "%zu surfaces: at most %d", o.n_surfaces,
+                          SURFACES_MAX);
+    if ((o.n_surfaces && !o.surfaces) || (o.n_taps && !o.taps))
+        return imp__error(ctx, IMP_E_ARG, "%s: %s->%s is NULL", function, name,
+                          o.n_surfaces && !o.surfaces ? "surfaces" : "taps");
+    *own = o;
+    return IMP_OK;
+}
+
+enum imp_status imp__plan_create(const imp_field *field,
+                                 const struct imp_bend_options *options,
+                                 const struct imp_bend_rays *rays, struct imp__plan *out)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = field->ctx;
+    struct imp__plan p = {.ctx = ctx, .field = field, .options = IMP_BEND_OPTIONS_INIT};
+    struct imp_bend_surface *surfaces = NULL;
+    struct imp_bend_surface box = IMP_BEND_SURFACE_INIT;
+    struct imp__surface *all = NULL;
+    int *first = NULL;
+
+    struct imp_bend_options *o = &p.options;
+    IMP_CHECKED(imp__bend_options_take(ctx, "bend", "options", options, o));
+    if ((int)o->scheme < 0 || o->scheme >= IMP_BEND_N_SCHEMES || (int)o->way < 0 ||
+        o->way > IMP_BEND_PSEUDO)
+        IMP_TRY(imp__error(ctx, IMP_E_ARG, "no such scheme or way back"));
+    p.scheme = &imp__schemes[o->scheme];
+    if (rays->n > 0 && (!rays->x || !rays->d))
+        IMP_TRY(imp__error(ctx, IMP_E_ARG, "rays without origins or directions"));
+    p.max_steps = o->max_steps ? o->max_steps : MAX_STEPS_DEFAULT;
+    p.grazing = o->grazing == 0 ? 0.05 : fmax(o->grazing, 0);
+    p.outside_index = o->outside_index == 0 ? 1 : o->outside_index;
+    p.reversal = o->reversal > 0 ? o->reversal : 1e-10;
+    if (!(p.outside_index > 0) || !isfinite(p.outside_index) || !isfinite(p.grazing))
+        IMP_TRY(imp__error(ctx, IMP_E_ARG, "index outside %g", p.outside_index));
+    IMP_TRY(step_choose(&p));
+    bounds_choose(&p, rays);
+    if (field->spacing > 0 && p.t > p.size)
+        IMP_TRY(imp__error(ctx, IMP_E_ARG, "step %g is longer than the field, %g", p.t,
+                           p.size));
+
+    if (o->n_surfaces == 0) {
+        box.type = IMP_BEND_BOX;
+        for (int k = 0; k < 3; k++) {
+            box.lo[k] = field->lo[k], box.hi[k] = field->hi[k];
+            if (!isfinite(box.lo[k]) || !isfinite(box.hi[k]))
+                IMP_TRY(
+                    imp__error(ctx, IMP_E_ARG,
+                               "a %s field has no end: give a surface where rays exit",
+                               field->ops->name));
+        }
+        o->surfaces = &box;
+        o->n_surfaces = 1;
+    }
+    surfaces = imp__alloc(ctx, o->n_surfaces, sizeof *surfaces);
+    if (!surfaces) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for surfaces"));
+    for (size_t i = 0; i < o->n_surfaces; i++) {
+        surfaces[i] = (struct imp_bend_surface)IMP_BEND_SURFACE_INIT;
+        IMP_TRY(imp__element_take(ctx, "bend", "surfaces", o->surfaces, i, &surfaces[i],
+                                  sizeof *surfaces));
+    }
+    o->surfaces = surfaces;
+    all = imp__alloc(ctx, 6 * o->n_surfaces, sizeof *all);
+    first = imp__alloc(ctx, o->n_surfaces + 1, sizeof *first);
+    if (!all || !first) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for surfaces"));
+    size_t shared = 0, own = 0;
+    for (size_t i = 0; i < o->n_surfaces; i++) {
+        int n = 0;
+        IMP_TRY(surface_make(ctx, &o->surfaces[i], (int)i, all + first[i], &n));
+        first[i + 1] = first[i] + n;
+        if (o->surfaces[i].group > GROUPS_MAX)
+            IMP_TRY(imp__error(ctx, IMP_E_ARG, "surface %zu: group %d", i,
+                               o->surfaces[i].group));
+        p.n_groups = imp_max(p.n_groups, o->surfaces[i].group + 1);
+        *(o->surfaces[i].group < 0 ? &shared : &own) += (size_t)n;
+    }
+    const size_t n_domains = (size_t)p.n_groups + 1;
+    p.domain = imp__alloc(ctx, n_domains, sizeof *p.domain);
+    p.surfaces = imp__alloc(ctx, own + n_domains * shared + 1, sizeof *p.surfaces);
+    if (!p.domain || !p.surfaces)
+        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for surfaces"));
+    struct imp__surface *room = p.surfaces;
+    for (int g = 0; g <= p.n_groups; g++) {
+        domain_make(o, all, first, g < p.n_groups ? g : -2, &p, &p.domain[g], room);
+        room += p.domain[g].n;
+    }
+    p.n_taps = (int)o->n_taps;
+    for (int i = 0; i < p.n_taps; i++) {
+        struct imp__surface s = {.kind = IMP__PLANE,
+                                 .id = i,
+                                 .n = imp__v3_load(o->taps[i].normal),
+                                 .offset = o->taps[i].offset};
+        const double length = imp__length(s.n);
+        if (!(length > 0) || !isfinite(length) || !isfinite(s.offset))
+            IMP_TRY(imp__error(ctx, IMP_E_ARG, "tap %d: the normal has no direction", i));
+        s.n *= 1 / length;
+        s.offset /= length;
+        p.taps[i] = s;
+        p.tap_group[i] = o->taps[i].group;
+    }
+    o->surfaces = NULL; /* belong to the caller; copies are in p */
+    o->taps = NULL;
+    *out = p;
+out:
+    imp__release(ctx, surfaces);
+    imp__release(ctx, all);
+    imp__release(ctx, first);
+    if (st != IMP_OK) imp__plan_destroy(&p);
+    return st;
+}
+
+void imp__plan_destroy(struct imp__plan *p)
+{
+    imp__release(p->ctx, p->domain);
+    imp__release(p->ctx, p->surfaces);
+    p->domain = NULL;
+    p->surfaces = NULL;
+}

@@ -1,0 +1,122 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * From nodes to objects, in document order. Parameters get their names on the way
+ * (docs/scene-format.md 12.2): by an object's own id, else below its parent's name. */
+#include "scene_build.h"
+
+/* Top-level objects without id: <tag><n>, counted per tag. */
+struct tag_counts {
+    int n_tags;
+    struct {
+        const char *tag;
+        size_t n;
+    } tags[16]; /* there are not as many */
+};
+
+static const char *top_name(struct imp_scene *scene, const struct imp_node *node,
+                            struct tag_counts *counts)
+{
+    if (node->id) return node->id;
+    int k = 0;
+    while (k < counts->n_tags && strcmp(counts->tags[k].tag, node->tag) != 0) k++;
+    if (k == counts->n_tags && k < (int)imp_count(counts->tags))
+        counts->tags[counts->n_tags++].tag = node->tag;
+    char text[64];
+    snprintf(text, sizeof text, "%.40s%zu", node->tag,
+             k < counts->n_tags ? counts->tags[k].n++ : 0);
+    return imp__arena_strdup(&scene->arena, text);
+}
+
+static enum imp_status top_build(struct imp_scene *scene, struct imp_child *child,
+                                 struct tag_counts *counts)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_node *node = child->node;
+    const char *tag = node->tag, *name = top_name(scene, node, counts);
+    if (!name) return imp__build_no_memory(scene);
+    child->used = true;
+    if (strcmp(tag, "shape") == 0) {
+        if (!node->object) IMP_TRY(imp__build_shape(scene, node, name));
+    } else if (strcmp(tag, "sensor") == 0) {
+        if (!node->object) IMP_TRY(imp__build_sensor(scene, node, name));
+    } else if (strcmp(tag, "bsdf") == 0) {
+        struct imp_bsdf *b;
+        node->id = name;
+        IMP_TRY(imp__build_bsdf(scene, node, "", "", &b));
+    } else if (strcmp(tag, "texture") == 0 || strcmp(tag, "spectrum") == 0) {
+        struct imp_texture *t;
+        if (strcmp(tag, "texture") == 0 && !imp__color_is_object(node)) {
+            node->id = name;
+            IMP_TRY(imp__build_texture(scene, node, "", "", &t));
+        }
+    } else if (strcmp(tag, "emitter") == 0) {
+        const bool had_id = node->id;
+        node->id = name;
+        if (!node->object) IMP_TRY(imp__build_emitter(scene, node, "", "", NULL));
+        if (!had_id && !node->object)
+            IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_SCENE,
+                                    "an area emitter must be inside a shape"));
+    } else if (strcmp(tag, "medium") == 0) {
+        if (!node->id) node->id = name; /* declared; made where a shape refers to it */
+        if (!node->medium)
+            IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
+                                    "this version has no such medium; it has graded"));
+    } else if (strcmp(tag, "integrator") == 0) {
+        if (scene->has_integrator)
+            IMP_TRY(
+                imp__node_error(scene->ctx, node, IMP_E_SCENE, "a second integrator"));
+        IMP_TRY(imp__integrator_build(scene, node, &scene->integrator));
+        scene->has_integrator = true;
+    } else if (strcmp(tag, "film") != 0 && strcmp(tag, "sampler") != 0 &&
+               strcmp(tag, "rfilter") != 0) { /* those are declared for sensors */
+        IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
+                                "this version has no <%s>", tag));
+    }
+out:
+    return st;
+}
+
+/* Emitters are chosen by sampling_weight; all zero is as good as none. */
+static enum imp_status lights_build(struct imp_scene *scene)
+{
+    double total = 0;
+    for (int i = 0; i < scene->n_emitters; i++) total += scene->emitters[i]->weight;
+    scene->light_cdf = imp__arena_array(&scene->arena, (size_t)scene->n_emitters + 1,
+                                        sizeof *scene->light_cdf);
+    if (!scene->light_cdf) return imp__build_no_memory(scene);
+    double sum = 0;
+    for (int i = 0; i < scene->n_emitters; i++) {
+        sum += scene->emitters[i]->weight;
+        scene->light_cdf[i] = total > 0 ? sum / total : 0;
+    }
+    if (scene->n_emitters && total > 0) scene->light_cdf[scene->n_emitters - 1] = 1;
+    return IMP_OK;
+}
+
+enum imp_status imp__scene_build(struct imp_scene *scene)
+{
+    enum imp_status st = IMP_OK;
+    struct tag_counts counts = {0};
+    scene->channels = scene->mode == IMP_MONO ? 1 : 3;
+    scene->environment = -1;
+    scene->lo = imp__v3(INFINITY, INFINITY, INFINITY);
+    scene->hi = -scene->lo;
+    IMP_TRY(imp__build_black(scene, &scene->black_bsdf));
+    scene->default_bsdf = scene->black_bsdf;
+    for (size_t i = 0; i < scene->root->n_children; i++)
+        IMP_TRY(top_build(scene, &scene->root->children[i], &counts));
+    IMP_TRY(imp__props_finish(scene->ctx, scene->root));
+    if (!scene->has_integrator)
+        scene->integrator = (struct imp_integrator){.kind = IMP_INTEGRATOR_PATH,
+                                                    .max_depth = -1,
+                                                    .rr_depth = 5,
+                                                    .emitter_samples = 1,
+                                                    .bsdf_samples = 1};
+    IMP_TRY(lights_build(scene));
+    IMP_TRY(imp__media_check(scene));
+    imp__theta_finish(scene);
+    IMP_TRY(imp__intersector_create(scene));
+    scene->committed = true;
+out:
+    return st;
+}

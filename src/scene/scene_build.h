@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Shared by the files that make objects from nodes: scene_build.c (the scene), build_objects.c
+ * (materials, lights, shapes, sensors), build_inputs.c (their inputs, and textures). */
+#ifndef IMP_SCENE_BUILD_H
+#define IMP_SCENE_BUILD_H
+
+#include "color/convert.h"
+#include "kind/registry.h"
+#include "scene.h"
+#include <stdio.h>
+#include <string.h>
+
+enum imp_status imp__build_no_memory(struct imp_scene *scene);
+/* "parent.key"; NULL: no memory. */
+char *imp__build_name(struct imp_scene *scene, const char *parent, const char *key);
+/* The name of an object: its id, else the slot below the parent. */
+const char *imp__build_object_name(struct imp_scene *scene, const struct imp_node *node,
+                                   const char *parent, const char *slot);
+/* Append to one of the scene's lists; they live in the arena and double. */
+enum imp_status imp__build_list_add(struct imp_scene *scene, void ***list, int *n,
+                                    void *object);
+/* The argument of a kind's build function. */
+struct imp_build imp__build_make(struct imp_scene *scene, struct imp_node *node);
+
+/* Read the declared inputs of a node into out [as many as desc has]; *n how many. */
+enum imp_status imp__build_inputs(struct imp_scene *scene, struct imp_node *node,
+                                  const char *name, const struct imp_input_desc *desc,
+                                  const struct imp_input **out, int *n);
+/* Call `changed` when a number behind these inputs is set: a constant's, or a texel. */
+enum imp_status imp__build_watch(struct imp_scene *scene,
+                                 const struct imp_input *const *input, int n,
+                                 void (*changed)(void *payload), void *payload);
+enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *node,
+                                   const char *parent, const char *slot,
+                                   struct imp_texture **out);
+
+enum imp_status imp__build_bsdf(struct imp_scene *scene, struct imp_node *node,
+                                const char *parent, const char *slot,
+                                struct imp_bsdf **out);
+/* A material that reflects nothing: emitters' default. */
+enum imp_status imp__build_black(struct imp_scene *scene, struct imp_bsdf **out);
+/* An area light without a shape is only declared, and nothing is made. */
+enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *node,
+                                   const char *parent, const char *slot,
+                                   struct imp_shape *shape);
+enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
+                                 const char *name);
+enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node,
+                                  const char *name);
+
+#endif
