@@ -8,6 +8,10 @@ enum imp_status imp__surface_light_check(const struct imp_build *b,
 {
     if (!e->shape)
         return imp_build_error(b, NULL, IMP_E_SCENE, "it must be inside a shape");
+    if (!e->shape->ops->sample_toward || !e->shape->ops->pdf_toward)
+        return imp_build_error(b, NULL, IMP_E_SCENE,
+                               "points of its shape (%s) cannot be drawn",
+                               e->shape->ops->name);
     if (!(e->shape->area > 0))
         return imp_build_error(b, NULL, IMP_E_SCENE, "its shape '%s' (%s) has no area",
                                e->shape->name ? e->shape->name : "", e->shape->ops->name);
