@@ -198,7 +198,7 @@ static void resumed(void)
                 "<target type='focus'><point name='point' value='0,0,0.9'/>"
                 "<float name='plane' value='0.95'/></target>")};
     struct imp_bend_fit_options o = IMP_BEND_FIT_OPTIONS_INIT;
-    struct imp_bend_fit_result r[2];
+    struct imp_bend_fit_result r[2] = {{.size = sizeof *r}, {.size = sizeof *r}};
     enum imp_status st[3];
     bool moved = false;
     o.checkpoint = "bend_check.checkpoint";
