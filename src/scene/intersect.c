@@ -54,23 +54,28 @@ static enum imp_status device_error(imp_context *ctx, enum RTCError error,
                       text);
 }
 
-static _Atomic(RTCDevice) device;
-static _Atomic long maker; /* process that is making it; 0: none */
+static RTCDevice device;
+static _Atomic long builder; /* process of the thread that is with Embree; 0: none */
 
-/* Two threads may ask for the first time at once, and the process may be forked while one
- * makes the device: then the child makes its own. */
-static enum imp_status device_get(imp_context *ctx, RTCDevice *out)
+/* One thread at a time makes the device, a scene, or releases one. Not a mutex: the process
+ * may be forked while a thread is here, and then the child takes its place. */
+static void build_enter(void)
 {
     const long here = (long)getpid();
     for (;;) {
         long by = 0;
-        if ((*out = atomic_load(&device))) return IMP_OK;
-        if (atomic_compare_exchange_strong(&maker, &by, here)) break;
-        if (by != here && atomic_compare_exchange_strong(&maker, &by, here)) break;
+        if (atomic_compare_exchange_strong(&builder, &by, here)) return;
+        if (by != here && atomic_compare_exchange_strong(&builder, &by, here)) return;
         nanosleep(&(struct timespec){0, 100000}, NULL);
     }
+}
+static void build_leave(void) { atomic_store(&builder, 0); }
+
+/* Inside build_enter. */
+static enum imp_status device_get(imp_context *ctx, RTCDevice *out)
+{
     enum imp_status st = IMP_OK;
-    if (!(*out = atomic_load(&device))) {
+    if (!(*out = device)) {
         *out = rtcNewDevice("threads=1,ignore_config_files=1");
         if (*out) {
             rtcSetDeviceErrorFunction(*out, error_keep, NULL);
@@ -78,9 +83,8 @@ static enum imp_status device_get(imp_context *ctx, RTCDevice *out)
         } else {
             st = device_error(ctx, rtcGetDeviceError(NULL), "");
         }
-        atomic_store(&device, *out);
+        device = *out;
     }
-    atomic_store(&maker, 0);
     return st;
 }
 
@@ -164,6 +168,7 @@ enum imp_status imp__intersector_create(struct imp_scene *scene)
     enum imp_status st = IMP_OK;
     RTCDevice rtc;
 
+    build_enter();
     IMP_TRY(device_get(scene->ctx, &rtc));
     struct intersector *x = imp__alloc(scene->ctx, 1, sizeof *x);
     if (!x)
@@ -191,6 +196,7 @@ enum imp_status imp__intersector_create(struct imp_scene *scene)
     }
     scene->intersector = x;
 out:
+    build_leave();
     return st;
 }
 
@@ -198,7 +204,9 @@ void imp__intersector_destroy(struct imp_scene *scene)
 {
     struct intersector *x = scene->intersector;
     if (!x) return;
+    build_enter();
     rtcReleaseScene(x->rtc);
+    build_leave();
     imp__release(scene->ctx, x);
     scene->intersector = NULL;
 }
