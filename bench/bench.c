@@ -98,8 +98,10 @@ struct rays {
 static void rays_record(imp_context *ctx, imp_scene *scene, struct rays *out)
 {
     const struct imp_sensor *sensor = scene->sensors[0];
-    const struct imp_tracer tracer = {
-        .scene = scene, .integrator = &scene->integrator, .sensor = sensor, .seed = 1};
+    const struct imp_tracer tracer = {.scene = scene,
+                                      .integrator = imp__walk_integrator(scene),
+                                      .sensor = sensor,
+                                      .seed = 1};
     struct imp_arena arena;
     size_t capacity = 0;
     imp__arena_init(&arena, ctx);

@@ -111,7 +111,7 @@ static void measure(const char *file, const char *define)
         chosen[k] = (scene->params[k].info.flags & IMP_PARAM_DIFFERENTIABLE) != 0;
     must(imp__active_create(scene, chosen, &active));
     struct job j = {.tracer = {.scene = scene,
-                               .integrator = &scene->integrator,
+                               .integrator = imp__walk_integrator(scene),
                                .sensor = scene->sensors[0],
                                .active = &active,
                                .seed = 1},

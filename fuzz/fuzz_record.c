@@ -64,7 +64,7 @@ static void begin(void)
         chosen[k] = (scene->params[k].info.flags & IMP_PARAM_DIFFERENTIABLE) != 0;
     must(imp__active_create(scene, chosen, &active));
     tracer = (struct imp_tracer){.scene = scene,
-                                 .integrator = &scene->integrator,
+                                 .integrator = imp__walk_integrator(scene),
                                  .sensor = scene->sensors[0],
                                  .active = &active};
     imp__arena_init(&arena, ctx);

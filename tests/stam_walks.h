@@ -52,8 +52,10 @@ static inline struct stam stam_walks(imp_context *ctx, imp_scene *scene, uint64_
     s.absorb = scene->bsdfs[0]->absorb;
     s.width = sensor->film.crop_w;
     s.height = sensor->film.crop_h;
-    s.tracer = (struct imp_tracer){
-        .scene = scene, .integrator = &scene->integrator, .sensor = sensor, .seed = seed};
+    s.tracer = (struct imp_tracer){.scene = scene,
+                                   .integrator = imp__walk_integrator(scene),
+                                   .sensor = sensor,
+                                   .seed = seed};
     return s;
 }
 

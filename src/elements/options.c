@@ -3,6 +3,7 @@
  * Options: defaults, what the scene's integrator asks for, bounds, and copies of what the
  * host may free. */
 #include "elements.h"
+#include "elements_integrator.h"
 #include <string.h>
 
 /* At least 384 rays across the picture, 3 to 24 a side of a pixel: the edges of lamps in
@@ -23,9 +24,9 @@ enum imp_status imp__el_options(imp_elements *e,
     enum imp_status st = IMP_OK;
     IMP_CHECKED(imp__options_take(e->ctx, "elements", "options", options, o, sizeof *o));
     o->size = sizeof *o;
-    if (e->scene->has_integrator &&
-        e->scene->integrator.kind == IMP_INTEGRATOR_ELEMENTS) {
-        const struct imp_integrator_elements *s = &e->scene->integrator.elements;
+    const struct imp_elements_integrator *s =
+        imp__elements_integrator(e->scene->integrator);
+    if (s) {
         o->no_importance |= s->no_importance;
         if (o->order == 0) o->order = s->order;
         if (o->rays == 0) o->rays = s->rays;

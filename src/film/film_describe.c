@@ -166,10 +166,10 @@ enum imp_status imp_walk_describe(const imp_scene *scene, const struct imp_run *
     if (sample < 0)
         return imp__error(scene->ctx, IMP_E_ARG,
                           "there is no sample %lld: the first is 0", (long long)sample);
-    const struct imp_integrator *integrator = imp__radiance_integrator(scene);
+    const struct imp_walk_integrator *integrator = imp__walk_integrator(scene);
     if (!integrator)
         return imp__error(scene->ctx,
-                          scene->integrator.kind == IMP_INTEGRATOR_ELEMENTS
+                          scene->integrator->ops->flags & IMP_INTEGRATOR_SOLVES
                               ? IMP_E_UNSUPPORTED
                               : IMP_E_SCENE,
                           "the scene's integrator makes no walks; "

@@ -5,8 +5,8 @@
  * The film's filter is not applied: a pixel is the mean of its square. */
 #include "base/film.h"
 #include "base/pool.h"
+#include "elements/elements_integrator.h"
 #include "film_render.h"
-#include <importon/elements.h>
 
 struct convert {
     const struct imp_measure *measure;
@@ -71,7 +71,7 @@ enum imp_status imp__render_elements(const struct imp_measure *m,
     ended = imp_elements_solve(e);
     if (ended != IMP_CANCELLED) IMP_TRY(ended);
     const enum imp_elements_image kind =
-        (enum imp_elements_image)scene->integrator.elements.image;
+        imp__elements_integrator(scene->integrator)->image;
     IMP_TRY(imp_elements_image(e, run->sensor, kind, side, &seen));
     IMP_TRY(
         imp__film_create(scene->ctx, seen->width, seen->height, m->names, false, &film));

@@ -5,6 +5,7 @@
 #include "base/film.h"
 #include "base/text.h"
 #include "color/rgb.h"
+#include "film_integrator.h"
 #include "walk/dims.h"
 #include <stdio.h>
 #include <string.h>
@@ -14,7 +15,7 @@ enum imp_status imp__run_sensor(const struct imp_scene *scene, const struct imp_
 {
     if (!scene->committed)
         return imp__error(scene->ctx, IMP_E_ARG, "the scene has not been committed");
-    if (!scene->has_integrator)
+    if (!scene->integrator)
         return imp__error(scene->ctx, IMP_E_SCENE,
                           "the scene has no integrator; Mitsuba's default is "
                           "<integrator type=\"path\"/>");
@@ -29,21 +30,6 @@ enum imp_status imp__run_sensor(const struct imp_scene *scene, const struct imp_
                           run->spp);
     *out = scene->sensors[run->sensor];
     return IMP_OK;
-}
-
-static bool is_radiance(const struct imp_integrator *i)
-{
-    return i->kind == IMP_INTEGRATOR_PATH || i->kind == IMP_INTEGRATOR_DIRECT ||
-           i->kind == IMP_INTEGRATOR_STAM;
-}
-
-const struct imp_integrator *imp__radiance_integrator(const struct imp_scene *scene)
-{
-    const struct imp_integrator *i = &scene->integrator;
-    if (is_radiance(i)) return i;
-    for (int k = 0; k < i->n_nested; k++)
-        if (is_radiance(&i->nested[k])) return &i->nested[k];
-    return NULL;
 }
 
 /* ---- Channel names ------------------------------------------------------------- */
@@ -61,18 +47,10 @@ static void names_add(struct names *s, const char *prefix, const char *slot,
     s->n++;
 }
 
-static const char *const aov_suffixes[][3] = {
-    [IMP_AOV_ALBEDO] = {"R", "G", "B"},     [IMP_AOV_DEPTH] = {"T"},
-    [IMP_AOV_POSITION] = {"X", "Y", "Z"},   [IMP_AOV_UV] = {"U", "V"},
-    [IMP_AOV_GEO_NORMAL] = {"X", "Y", "Z"}, [IMP_AOV_SH_NORMAL] = {"X", "Y", "Z"},
-    [IMP_AOV_DP_DU] = {"X", "Y", "Z"},      [IMP_AOV_DP_DV] = {"X", "Y", "Z"},
-    [IMP_AOV_DUV_DX] = {"U", "V"},          [IMP_AOV_DUV_DY] = {"U", "V"},
-    [IMP_AOV_PRIM_INDEX] = {"I"},           [IMP_AOV_SHAPE_INDEX] = {"I"}};
-
 static int aov_channels(enum imp_aov_type type)
 {
     int n = 0;
-    while (n < 3 && aov_suffixes[type][n]) n++;
+    while (n < 3 && imp__aov_channels[type][n]) n++;
     return n;
 }
 
@@ -90,21 +68,21 @@ static void names_make(struct names *s, const struct imp_scene *scene,
                                           {"X", "Y", "Z"}, {"X", "Y", "Z", "A"}};
     static const char *const rgba[] = {"R", "G", "B", "A"}, *const xyz[] = {"X", "Y",
                                                                             "Z"};
-    const struct imp_integrator *top = &scene->integrator;
+    const struct imp_integrator *top = scene->integrator;
+    const struct imp_channels *more = imp__channels_of(top);
     const enum imp_pixel_format format = sensor->film.pixel_format;
     for (int c = 0; c < base_channels(format); c++) names_add(s, "", "", base[format][c]);
-    if (top->kind == IMP_INTEGRATOR_AOV) {
-        for (int a = 0; a < top->n_aovs; a++)
-            for (int c = 0; c < aov_channels(top->aovs[a].type); c++)
-                names_add(s, "", top->aovs[a].name, aov_suffixes[top->aovs[a].type][c]);
-        for (int k = 0; k < top->n_nested; k++)
-            for (int c = 0; c < 4; c++) names_add(s, "", top->nested[k].name, rgba[c]);
-    }
-    if (top->kind == IMP_INTEGRATOR_MOMENT)
-        for (int moment = 1; moment <= 2; moment++)
-            for (int k = 0; k < top->n_nested; k++)
-                for (int c = 0; c < 3; c++)
-                    names_add(s, moment == 2 ? "m2_" : "", top->nested[k].name, xyz[c]);
+    if (!more) return;
+    for (int a = 0; a < more->n_aovs; a++)
+        for (int c = 0; c < aov_channels(more->aovs[a].type); c++)
+            names_add(s, "", more->aovs[a].name,
+                      imp__aov_channels[more->aovs[a].type][c]);
+    for (int k = 0; !more->moments && k < top->n_inner; k++)
+        for (int c = 0; c < 4; c++) names_add(s, "", top->inner[k].name, rgba[c]);
+    for (int moment = 1; more->moments && moment <= 2; moment++)
+        for (int k = 0; k < top->n_inner; k++)
+            for (int c = 0; c < 3; c++)
+                names_add(s, moment == 2 ? "m2_" : "", top->inner[k].name, xyz[c]);
 }
 
 enum imp_status imp__measure_create(const struct imp_scene *scene,
@@ -209,7 +187,7 @@ static imp_spec albedo(const struct imp_measure *m, const struct imp_hit *hit,
     return rho;
 }
 
-static int aov_value(const struct imp_measure *m, const struct imp_integrator *top,
+static int aov_value(const struct imp_measure *m, const struct imp_channels *top,
                      struct imp_key key, double px, double py, double *value)
 {
     const double lens[2] = {imp__u01(key, IMP_DIM_LENS_U), imp__u01(key, IMP_DIM_LENS_V)};
@@ -252,42 +230,38 @@ static int aov_value(const struct imp_measure *m, const struct imp_integrator *t
 /* Alpha (docs/scene-format.md 11): an environment in sight makes every path valid; direct
  * asks for a surface at the first hit. */
 static double walk_alpha(const struct imp_measure *m,
-                         const struct imp_integrator *integrator,
+                         const struct imp_walk_integrator *integrator,
                          const struct imp_walk *walk)
 {
-    if (integrator->kind == IMP_INTEGRATOR_DIRECT)
-        return walk->first && walk->first->shape;
+    if (integrator->first_hit) return walk->first && walk->first->shape;
     const bool sky = m->scene->environment >= 0 && !integrator->hide_emitters;
     return walk->valid || (sky && integrator->max_depth != 0);
 }
 
 /* Radiance and alpha of one integrator, on the same random numbers as the others; marks
- * the sample if the walk was dropped. */
-static void radiance(const struct imp_measure *m, const struct imp_integrator *integrator,
-                     struct imp_sample *s, imp_spec *L, double *alpha,
-                     struct imp_walk *walk)
+ * the sample if the walk was dropped. NULL: the distance of the first hit. */
+static void radiance(const struct imp_measure *m,
+                     const struct imp_walk_integrator *integrator, struct imp_sample *s,
+                     imp_spec *L, double *alpha, struct imp_walk *walk)
 {
-    /* depth: the walk's film position and lens, its first hit only */
-    static const struct imp_integrator none = {
-        .kind = IMP_INTEGRATOR_PATH, .max_depth = 0, .rr_depth = 5};
-    const bool depth = !is_radiance(integrator);
+    static const struct imp_walk_integrator first_hit = {.max_depth = 0};
     const struct imp_tracer tracer = {
         .scene = m->scene,
-        .integrator = depth ? &none : integrator,
+        .integrator = integrator ? integrator : &first_hit,
         .sensor = m->sensor,
         .seed = m->seed,
-        .guide = depth ? NULL : imp__guide_of(m->scene, integrator, m->guide),
+        .guide = integrator ? imp__guide_of(m->scene, integrator, m->guide) : NULL,
         .value_only = true};
     const enum imp_drop before = s->dropped;
     const struct imp_arena_mark mark = imp__arena_mark(s->arena);
     imp__sample_walk(s, &tracer, walk);
     if (before != IMP_DROP_NONE) s->dropped = before;
     *L = walk->L;
-    if (depth) {
+    if (integrator) {
+        *alpha = walk_alpha(m, integrator, walk);
+    } else {
         *L = imp__spec(walk->first && walk->first->shape ? walk->first->t : 0);
         *alpha = walk->first && walk->first->shape;
-    } else {
-        *alpha = walk_alpha(m, integrator, walk);
     }
     imp__arena_rewind(s->arena, mark);
 }
@@ -295,14 +269,15 @@ static void radiance(const struct imp_measure *m, const struct imp_integrator *i
 void imp__measure_sample(const void *measure, struct imp_sample *s)
 {
     const struct imp_measure *m = measure;
-    const struct imp_integrator *top = &m->scene->integrator;
+    const struct imp_integrator *top = m->scene->integrator;
+    const struct imp_channels *more = imp__channels_of(top);
     double *value = s->value;
     struct imp_walk walk;
     imp_spec L = {0};
     double alpha = 0;
     int n;
-    if (top->kind != IMP_INTEGRATOR_AOV && top->kind != IMP_INTEGRATOR_MOMENT) {
-        radiance(m, top, s, &L, &alpha, &walk);
+    if (!more) {
+        radiance(m, imp__walk_integrator_of(top), s, &L, &alpha, &walk);
         imp__measure_base(m, L, alpha, value);
         return;
     }
@@ -311,15 +286,14 @@ void imp__measure_sample(const void *measure, struct imp_sample *s)
     double first_alpha = 0;
     n = base_channels(m->sensor->film.pixel_format);
     const int after_base = n;
-    if (top->kind == IMP_INTEGRATOR_AOV) {
-        static const struct imp_integrator look = {.kind = IMP_INTEGRATOR_DEPTH};
-        radiance(m, &look, s, &L, &alpha, &walk);
-        n += aov_value(m, top, walk.key, walk.px, walk.py, value + n);
+    if (!more->moments) {
+        radiance(m, NULL, s, &L, &alpha, &walk);
+        n += aov_value(m, more, walk.key, walk.px, walk.py, value + n);
     }
-    for (int k = 0; k < top->n_nested; k++) {
-        radiance(m, &top->nested[k], s, &L, &alpha, &walk);
+    for (int k = 0; k < top->n_inner; k++) {
+        radiance(m, imp__walk_integrator_of(&top->inner[k]), s, &L, &alpha, &walk);
         if (k == 0) first = L, first_alpha = alpha;
-        if (top->kind == IMP_INTEGRATOR_AOV) {
+        if (!more->moments) {
             for (int c = 0; c < 3; c++) value[n++] = L[c];
             value[n++] = alpha;
         } else {
@@ -328,7 +302,7 @@ void imp__measure_sample(const void *measure, struct imp_sample *s)
             n += 3;
         }
     }
-    if (top->kind == IMP_INTEGRATOR_MOMENT) {
+    if (more->moments) {
         const int count = n - after_base;
         for (int c = 0; c < count; c++) value[n + c] = imp__sqr(value[after_base + c]);
     }

@@ -33,8 +33,5 @@ int imp__measure_base(const struct imp_measure *m, imp_spec L, double alpha,
 /* The sensor of a run, or an error that says how many there are. */
 enum imp_status imp__run_sensor(const struct imp_scene *scene, const struct imp_run *run,
                                 const struct imp_sensor **out);
-/* The radiance integrator of a scene: itself, or the first nested in moment or aov; NULL
- * if there is none (depth alone). */
-const struct imp_integrator *imp__radiance_integrator(const struct imp_scene *scene);
 
 #endif

@@ -18,7 +18,7 @@ enum imp_status imp_render(const imp_scene *scene, const struct imp_run *run,
     struct imp_measure measure;
     enum imp_status st = imp__measure_create(scene, &own, &measure);
     if (st != IMP_OK) return st;
-    if (scene->integrator.kind == IMP_INTEGRATOR_ELEMENTS) {
+    if (scene->integrator->ops->flags & IMP_INTEGRATOR_SOLVES) {
         st = imp__render_elements(&measure, &own, out);
     } else {
         const struct imp_picture picture = {.sensor = measure.sensor,

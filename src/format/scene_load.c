@@ -3,6 +3,7 @@
  * imp_scene_load and imp_scene_load_string: options, the scene file, its tree, and the
  * scene that is built from the tree. */
 #include "base/arguments.h"
+#include "film/film_integrator.h"
 #include "load.h"
 #include "search.h"
 #include "tree.h"
@@ -47,7 +48,7 @@ void imp__load_close(imp_context *ctx, struct imp__load_file *f)
 enum imp_status imp__scene_finish(struct imp_scene *scene)
 {
     enum imp_status st = imp__files_attach(scene);
-    if (st == IMP_OK) st = imp__scene_build(scene);
+    if (st == IMP_OK) st = imp__scene_build(scene, imp__integrator_kinds);
     if (st == IMP_OK) st = imp__graded_finish(scene);
     imp__scene_release_files(scene);
     return st;

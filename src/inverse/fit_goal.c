@@ -133,7 +133,7 @@ static void fingerprint(struct imp__fit *f)
     struct imp__fingerprint *h = &f->fingerprint;
 
     h->scene = imp__fingerprint_objects(p->scene);
-    const uint64_t integrator = imp__fingerprint_integrator(&p->scene->integrator);
+    const uint64_t integrator = imp__walk_integrator_hash(imp__walk_integrator(p->scene));
     h->scene = imp__hash(h->scene, &integrator, sizeof integrator);
     for (size_t i = 0; i < p->n_targets; i++) {
         const uint64_t sensor =

@@ -35,8 +35,8 @@ enum imp_status imp__problem_tracer(const struct imp_problem *p,
     const struct imp_sensor *sensor;
     enum imp_status st = imp__run_sensor(p->scene, run, &sensor);
     if (st != IMP_OK) return st;
-    const struct imp_integrator *integrator = imp__radiance_integrator(p->scene);
-    if (!integrator && p->scene->integrator.kind == IMP_INTEGRATOR_ELEMENTS)
+    const struct imp_walk_integrator *integrator = imp__walk_integrator(p->scene);
+    if (p->scene->integrator->ops->flags & IMP_INTEGRATOR_SOLVES)
         return imp__error(p->ctx, IMP_E_UNSUPPORTED,
                           "integrator elements makes no walks, and has derivatives of "
                           "its own: imp_elements_sensitivity (importon elements "

@@ -58,17 +58,18 @@ const void *imp__kind_at(const imp_context *ctx, enum imp_concept concept, size_
     return NULL;
 }
 
-enum imp_status imp__kind_find(imp_context *ctx, enum imp_concept concept,
-                               const struct imp_node *node, const void **ops)
+enum imp_status imp__kind_choose(imp_context *ctx, const struct imp_node *node,
+                                 const void *(*at)(const void *payload, size_t i),
+                                 const void *payload, const void **ops)
 {
-    const void *at;
+    const void *kind;
     const char *before = "";
     char list[1024] = "";
     struct imp_nearest near = imp__nearest(node->type);
-    for (size_t i = 0; (at = imp__kind_at(ctx, concept, i)); i++) {
-        const char *name = head_of(at).name;
+    for (size_t i = 0; (kind = at(payload, i)); i++) {
+        const char *name = head_of(kind).name;
         if (strcmp(name, node->type) == 0) {
-            *ops = at;
+            *ops = kind;
             return IMP_OK;
         }
         imp__nearest_try(&near, name);
@@ -81,6 +82,23 @@ enum imp_status imp__kind_find(imp_context *ctx, enum imp_concept concept,
                            "this version has no such %s; it has %s%s%s%s", node->tag,
                            list, near.best ? "; did you mean '" : "",
                            near.best ? near.best : "", near.best ? "'?" : "");
+}
+
+struct concept {
+    const imp_context *ctx;
+    enum imp_concept concept;
+};
+static const void *concept_at(const void *payload, size_t i)
+{
+    const struct concept *c = payload;
+    return imp__kind_at(c->ctx, c->concept, i);
+}
+
+enum imp_status imp__kind_find(imp_context *ctx, enum imp_concept concept,
+                               const struct imp_node *node, const void **ops)
+{
+    const struct concept c = {ctx, concept};
+    return imp__kind_choose(ctx, node, concept_at, &c, ops);
 }
 
 /* ---- Registering --------------------------------------------------------------- */

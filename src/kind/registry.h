@@ -18,8 +18,12 @@ enum imp_concept {
 
 /* Table i of a concept (struct imp_bsdf_ops, ...); NULL after the last. */
 const void *imp__kind_at(const imp_context *ctx, enum imp_concept concept, size_t i);
-/* The first kind of the node's type, or IMP_E_UNSUPPORTED with a list of what there is.
- */
+/* The first kind of the node's type among those that `at` gives (NULL after the last; all
+ * tables begin with size, name and object_size), or IMP_E_UNSUPPORTED with their list. */
+enum imp_status imp__kind_choose(imp_context *ctx, const struct imp_node *node,
+                                 const void *(*at)(const void *payload, size_t i),
+                                 const void *payload, const void **ops);
+/* Among all of a concept. */
 enum imp_status imp__kind_find(imp_context *ctx, enum imp_concept concept,
                                const struct imp_node *node, const void **ops);
 

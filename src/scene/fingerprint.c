@@ -145,19 +145,6 @@ uint64_t imp__fingerprint_sensor(const struct imp_sensor *sensor)
     return h;
 }
 
-uint64_t imp__fingerprint_integrator(const struct imp_integrator *i)
-{
-    const int number[] = {(int)i->kind,          i->max_depth,       i->rr_depth,
-                          i->hide_emitters,      i->emitter_samples, i->bsdf_samples,
-                          (int)i->alpha_gradient};
-    uint64_t h = HASH(0, number);
-    for (int k = 0; k < i->n_nested; k++) {
-        const uint64_t nested = imp__fingerprint_integrator(&i->nested[k]);
-        h = HASH(h, nested);
-    }
-    return h;
-}
-
 static uint64_t values_hash(uint64_t h, const struct imp_param *p)
 {
     for (size_t e = 0; e < p->info.count; e++) {

@@ -12,7 +12,6 @@
 uint64_t imp__fingerprint_objects(const struct imp_scene *scene);
 /* Film, filter, and the rays of the camera. */
 uint64_t imp__fingerprint_sensor(const struct imp_sensor *sensor);
-uint64_t imp__fingerprint_integrator(const struct imp_integrator *integrator);
 /* Values of parameters that move or bend rays: those without a derivative, and those of
  * media. */
 uint64_t imp__fingerprint_rays(const struct imp_scene *scene);

@@ -6,11 +6,6 @@
 
 enum imp_status imp_scene_get_info(const imp_scene *scene, struct imp_scene_info *out)
 {
-    static const char *const integrators[] = {
-        [IMP_INTEGRATOR_PATH] = "path",        [IMP_INTEGRATOR_DIRECT] = "direct",
-        [IMP_INTEGRATOR_DEPTH] = "depth",      [IMP_INTEGRATOR_AOV] = "aov",
-        [IMP_INTEGRATOR_MOMENT] = "moment",    [IMP_INTEGRATOR_STAM] = "stam",
-        [IMP_INTEGRATOR_ELEMENTS] = "elements"};
     struct imp_scene_info all = {.size = sizeof all}, *info = &all;
     IMP_REQUIRE(NULL, scene, "scene");
     IMP_REQUIRE(scene->ctx, out, "info");
@@ -21,8 +16,8 @@ enum imp_status imp_scene_get_info(const imp_scene *scene, struct imp_scene_info
     info->n_sensors = scene->n_sensors;
     info->mode = scene->mode;
     info->channels = scene->mode == IMP_MONO ? 1 : 3;
-    info->integrator = scene->has_integrator ? integrators[scene->integrator.kind] : "";
-    info->max_depth = scene->integrator.max_depth;
+    info->integrator = scene->integrator ? scene->integrator->ops->name : "";
+    info->max_depth = scene->integrator ? scene->integrator->max_depth : -1;
     for (int s = 0; s < scene->n_shapes; s++)
         if (scene->shapes[s]->geometry == IMP_TRIANGLES)
             info->n_triangles += (int64_t)scene->shapes[s]->triangles.n_triangles;

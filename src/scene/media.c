@@ -87,8 +87,8 @@ static const struct imp_shape *ball_of(const struct imp_scene *scene,
 static const char *fixed_because(const struct imp_scene *scene,
                                  const struct imp_medium *m)
 {
-    if (scene->has_integrator && scene->integrator.kind == IMP_INTEGRATOR_STAM)
-        return "the integrator stam has no derivative of the field";
+    if (scene->integrator && scene->integrator->ops->flags & IMP_INTEGRATOR_NO_FIELDS)
+        return "the scene's integrator has no derivative of the field";
     if (scene->environment >= 0 &&
         !(scene->emitters[scene->environment]->ops->flags & IMP_EMITTER_UNIFORM))
         return "an environment other than constant lies around it";

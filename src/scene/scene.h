@@ -7,7 +7,7 @@
 #define IMP_SCENE_H
 
 #include "access.h"
-#include "kind/build.h"
+#include "integrator.h"
 #include "math/vec.h"
 
 enum imp_param_store { IMP_STORE_LANES, IMP_STORE_BULK, IMP_STORE_DOUBLES };
@@ -31,62 +31,6 @@ struct imp_param {
     imp_spec *lanes; /* LANES: info.count numbers in lanes 0.., a scalar in all of them */
     float *bulk;     /* BULK: [info.count] in place */
     double *doubles; /* DOUBLES: [info.count] in place */
-};
-
-enum imp_integrator_kind {
-    IMP_INTEGRATOR_PATH,
-    IMP_INTEGRATOR_DIRECT,
-    IMP_INTEGRATOR_DEPTH,
-    IMP_INTEGRATOR_AOV,
-    IMP_INTEGRATOR_MOMENT,
-    IMP_INTEGRATOR_STAM, /* emission only where the walk is absorbed, no light samples */
-    IMP_INTEGRATOR_ELEMENTS /* no walks: finite elements (src/elements) */
-};
-
-enum imp_aov_type {
-    IMP_AOV_ALBEDO,
-    IMP_AOV_DEPTH,
-    IMP_AOV_POSITION,
-    IMP_AOV_UV,
-    IMP_AOV_GEO_NORMAL,
-    IMP_AOV_SH_NORMAL,
-    IMP_AOV_DP_DU,
-    IMP_AOV_DP_DV,
-    IMP_AOV_DUV_DX,
-    IMP_AOV_DUV_DY,
-    IMP_AOV_PRIM_INDEX,
-    IMP_AOV_SHAPE_INDEX
-};
-struct imp_aov {
-    const char *name;
-    enum imp_aov_type type;
-};
-
-enum imp_stam_alpha { IMP_ALPHA_DETACHED, IMP_ALPHA_ATTACHED, IMP_ALPHA_PAPER };
-
-/* Options of the finite elements in a scene file; 0: default (elements.h). */
-struct imp_integrator_elements {
-    int image; /* enum imp_elements_image: flat, gouraud or gather */
-    int order, rays, max_level;
-    bool no_importance;
-    double stop; /* < 0: never */
-    double eps;
-    size_t max_links, max_bytes;
-};
-
-struct imp_integrator {
-    enum imp_integrator_kind kind;
-    const char *name; /* slot name, for channels of nested ones */
-    int max_depth;    /* -1: unlimited */
-    int rr_depth;
-    bool hide_emitters;
-    int emitter_samples, bsdf_samples;  /* direct */
-    enum imp_stam_alpha alpha_gradient; /* stam */
-    int n_aovs;
-    struct imp_aov *aovs;
-    int n_nested; /* aov, moment */
-    struct imp_integrator *nested;
-    struct imp_integrator_elements elements;
 };
 
 /* A graded index inside shapes. What it is, and how rays step through it, is known to
@@ -147,9 +91,8 @@ struct imp_scene {
     int n_media;
     struct imp_medium **media; /* attached to nodes; those in use have an index */
     struct imp_bsdf *default_bsdf, *black_bsdf;
-    struct imp_integrator integrator;
-    bool has_integrator;
-    int environment;   /* emitter index, -1: none */
+    const struct imp_integrator *integrator; /* NULL: none was written */
+    int environment;                         /* emitter index, -1: none */
     double *light_cdf; /* [n_emitters] by sampling_weight, last is 1 */
 
     size_t n_params, cap_params;
@@ -174,11 +117,13 @@ void imp__scene_release_files(struct imp_scene *scene);
 
 /* ---- scene_build.c ------------------------------------------------------------------- */
 /* Resolve references, make every object in document order, commit the intersector. Files
- * must have been attached to the nodes (format/resolve.c). */
-enum imp_status imp__scene_build(struct imp_scene *scene);
+ * must have been attached to the nodes (format/resolve.c). `integrators` ends with NULL. */
+enum imp_status imp__scene_build(struct imp_scene *scene,
+                                 const struct imp_integrator_ops *const *integrators);
 
 /* ---- integrator.c -------------------------------------------------------------- */
 enum imp_status imp__integrator_build(struct imp_scene *scene, struct imp_node *node,
+                                      const struct imp_integrator_ops *const *kinds,
                                       struct imp_integrator *out);
 
 /* ---- media.c ------------------------------------------------------------------- */

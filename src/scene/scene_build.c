@@ -28,6 +28,7 @@ static const char *top_name(struct imp_scene *scene, const struct imp_node *node
 }
 
 static enum imp_status top_build(struct imp_scene *scene, struct imp_child *child,
+                                 const struct imp_integrator_ops *const *integrators,
                                  struct tag_counts *counts)
 {
     enum imp_status st = IMP_OK;
@@ -62,11 +63,13 @@ static enum imp_status top_build(struct imp_scene *scene, struct imp_child *chil
             IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
                                     "this version has no such medium; it has graded"));
     } else if (strcmp(tag, "integrator") == 0) {
-        if (scene->has_integrator)
+        if (scene->integrator)
             IMP_TRY(
                 imp__node_error(scene->ctx, node, IMP_E_SCENE, "a second integrator"));
-        IMP_TRY(imp__integrator_build(scene, node, &scene->integrator));
-        scene->has_integrator = true;
+        struct imp_integrator *i = imp__arena_array(&scene->arena, 1, sizeof *i);
+        if (!i) IMP_TRY(imp__build_no_memory(scene));
+        IMP_TRY(imp__integrator_build(scene, node, integrators, i));
+        scene->integrator = i;
     } else if (strcmp(tag, "film") != 0 && strcmp(tag, "sampler") != 0 &&
                strcmp(tag, "rfilter") != 0) { /* those are declared for sensors */
         IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
@@ -93,7 +96,8 @@ static enum imp_status lights_build(struct imp_scene *scene)
     return IMP_OK;
 }
 
-enum imp_status imp__scene_build(struct imp_scene *scene)
+enum imp_status imp__scene_build(struct imp_scene *scene,
+                                 const struct imp_integrator_ops *const *integrators)
 {
     enum imp_status st = IMP_OK;
     struct tag_counts counts = {0};
@@ -104,14 +108,8 @@ enum imp_status imp__scene_build(struct imp_scene *scene)
     IMP_TRY(imp__build_black(scene, &scene->black_bsdf));
     scene->default_bsdf = scene->black_bsdf;
     for (size_t i = 0; i < scene->root->n_children; i++)
-        IMP_TRY(top_build(scene, &scene->root->children[i], &counts));
+        IMP_TRY(top_build(scene, &scene->root->children[i], integrators, &counts));
     IMP_TRY(imp__props_finish(scene->ctx, scene->root));
-    if (!scene->has_integrator)
-        scene->integrator = (struct imp_integrator){.kind = IMP_INTEGRATOR_PATH,
-                                                    .max_depth = -1,
-                                                    .rr_depth = 5,
-                                                    .emitter_samples = 1,
-                                                    .bsdf_samples = 1};
     IMP_TRY(lights_build(scene));
     IMP_TRY(imp__media_check(scene));
     imp__theta_finish(scene);

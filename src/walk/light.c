@@ -34,7 +34,7 @@ void imp__emission_meet(struct imp_step *s, struct imp_vertex *v, int emitter,
                                    at ? imp__decide1(hit->t) : INFINITY,
                                    at ? imp__decide1(-imp__dot(at->n, s->d)) : 1,
                                    imp__decide(-s->d)};
-    if (s->pdf > 0 && imp__wants_lights(s->tracer->integrator)) {
+    if (s->pdf > 0 && s->tracer->integrator->lights) {
         const double pmf = light_pmf_at(s, s->guided.left, &s->guided.from, emitter);
         const double pe = pmf * e->ops->pdf(e, &s->from, &s->d, hit, at);
         weight = imp__decide1(weight * power_heuristic(s->pdf, pe));
@@ -115,7 +115,7 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
     const double pdf = imp__direction_pdf(s, b, kernel, ls.wi);
     const double p = ls.pdf * pmf;
     const bool alone =
-        (e->ops->flags & IMP_EMITTER_DELTA) || s->tracer->integrator->bsdf_samples == 0;
+        (e->ops->flags & IMP_EMITTER_DELTA) || !s->tracer->integrator->directions;
     const double weight = imp__decide1((alone ? 1 : power_heuristic(p, pdf)) / p);
 
     /* What it brings, if it is seen. */

@@ -16,7 +16,7 @@ static struct imp_record_of made_with(const struct imp_tracer *t)
 {
     struct imp_record_of of = {
         imp__fingerprint_objects(t->scene), imp__fingerprint_sensor(t->sensor),
-        imp__fingerprint_integrator(t->integrator), imp__fingerprint_rays(t->scene)};
+        imp__walk_integrator_hash(t->integrator), imp__fingerprint_rays(t->scene)};
     for (int m = 0; m < t->scene->n_media; m++)
         of.rays = imp__graded_hash(of.rays, t->scene->media[m]);
     if (t->carried) {

@@ -24,7 +24,7 @@ struct imp_record_walk {
 
 /* What the walks were made with: evaluated with anything else they mean nothing. */
 struct imp_record_of {
-    uint64_t objects, sensor, integrator, rays; /* scene/fingerprint.h */
+    uint64_t objects, sensor, integrator, rays; /* hashes: scene/fingerprint.h */
 };
 
 #define IMP_RECORD_PAGE 1024 /* walks, or vertices */

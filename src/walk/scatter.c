@@ -30,9 +30,9 @@ static bool throughput_add(struct imp_step *s, const struct imp_bsdf *b, imp_spe
  * there (docs/estimators.md 9.1, 9.2). */
 static bool roulette(struct imp_step *s, const struct imp_bsdf *b, double *survive)
 {
-    const struct imp_integrator *integrator = s->tracer->integrator;
+    const struct imp_walk_integrator *integrator = s->tracer->integrator;
     const bool guided = imp_unlikely(s->guided.reference > 0);
-    if (integrator->kind == IMP_INTEGRATOR_STAM) { /* `absorb` has drawn already */
+    if (integrator->absorbs) { /* `absorb` has drawn already */
         *survive = imp__decide1(1 - b->absorb);
         return true;
     }

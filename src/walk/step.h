@@ -176,10 +176,4 @@ static inline void imp__guided_leave(struct imp_guided *g)
 /* Survival by what is expected to come; `q`: by throughput. */
 double imp__guided_survival(const struct imp_step *s, double q);
 
-static inline bool imp__wants_lights(const struct imp_integrator *i)
-{
-    return i->kind == IMP_INTEGRATOR_PATH ||
-           (i->kind == IMP_INTEGRATOR_DIRECT && i->emitter_samples > 0);
-}
-
 #endif

@@ -89,9 +89,8 @@ void imp__vertex_place(struct imp_step *s, struct imp_vertex *v,
  * the camera stays hidden behind a null material for path, and not for direct. */
 static bool seen(const struct imp_step *s)
 {
-    const struct imp_integrator *integrator = s->tracer->integrator;
-    return !integrator->hide_emitters ||
-           (integrator->kind == IMP_INTEGRATOR_DIRECT && s->depth > 0);
+    const struct imp_walk_integrator *integrator = s->tracer->integrator;
+    return !integrator->hide_emitters || (integrator->first_hit && s->depth > 0);
 }
 
 /* The ray leaves the scene and meets the environment. */
@@ -236,7 +235,7 @@ static __attribute__((noinline)) bool scatter_split(struct imp_step *s,
 /* From the ray in flight to the next one; false: the walk ends. */
 static inline __attribute__((always_inline)) bool step(struct imp_step *s)
 {
-    const struct imp_integrator *integrator = s->tracer->integrator;
+    const struct imp_walk_integrator *integrator = s->tracer->integrator;
     const int max_depth = integrator->max_depth;
     const bool counts = max_depth < 0 || s->depth < max_depth;
     const bool goes_on = max_depth < 0 || s->depth + 1 < max_depth;
@@ -254,9 +253,9 @@ static inline __attribute__((always_inline)) bool step(struct imp_step *s)
 
     /* Stam's walk collects emission only where it is absorbed. */
     double emits = 1;
-    const bool stam = integrator->kind == IMP_INTEGRATOR_STAM;
-    const bool absorbed = stam && counts && imp__absorb(s, v->bsdf, &emits);
-    if (stam) s->walk->valid = true;
+    const bool absorbed =
+        integrator->absorbs && counts && imp__absorb(s, v->bsdf, &emits);
+    if (integrator->absorbs) s->walk->valid = true;
 
     /* Emission that is met. */
     if (counts && emits > 0) emission_add(s, v, emits, &hit, &at);
@@ -266,17 +265,15 @@ static inline __attribute__((always_inline)) bool step(struct imp_step *s)
     /* The connection to a light. */
     struct imp_shadow shadow;
     shadow.wanted = false;
-    if ((v->bsdf->flags & IMP_BSDF_SMOOTH) && s->segment->connects &&
-        imp__wants_lights(integrator))
+    if ((v->bsdf->flags & IMP_BSDF_SMOOTH) && s->segment->connects && integrator->lights)
         imp__light_sample(s, v, &at, &frame, &shadow);
 
     /* The continuation. */
-    const bool only_lights =
-        integrator->kind == IMP_INTEGRATOR_DIRECT && integrator->bsdf_samples == 0;
     const bool splits =
         imp_unlikely(s->tracer->split > 1) && s->depth == 0 && s->scene->n_media == 0;
-    const bool continues = !only_lights && (splits ? scatter_split(s, v, &at, &frame)
-                                                   : imp__scatter(s, v, &at, &frame));
+    const bool continues =
+        integrator->directions &&
+        (splits ? scatter_split(s, v, &at, &frame) : imp__scatter(s, v, &at, &frame));
 
     /* Is the light seen? */
     if (shadow.wanted &&

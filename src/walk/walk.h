@@ -25,6 +25,7 @@
 
 #include "math/rng.h"
 #include "scene/guide.h"
+#include "walk_integrator.h"
 
 /* ---- Decisions ------------------------------------------------------------------- */
 
@@ -161,13 +162,13 @@ void imp__active_destroy(imp_context *ctx, struct imp_active *active);
 /* What walks are made with; read-only, shared by all workers. */
 struct imp_tracer {
     const struct imp_scene *scene;
-    const struct imp_integrator *integrator; /* PATH, DIRECT or STAM */
+    const struct imp_walk_integrator *integrator;
     const struct imp_sensor *sensor;
     /* NULL: value only. Else walks go on through factors that are zero but have a
      * derivative (docs/estimators.md 9.2). */
     const struct imp_active *active;
     uint64_t seed;
-    const struct imp_guide *guide;     /* of PATH; NULL: none */
+    const struct imp_guide *guide;     /* imp__guide_of; NULL: none */
     bool value_only;                   /* a walk's L is wanted, and no record of it */
     const struct imp_carried *carried; /* wavelengths of the walks; NULL: the colours of
                                           the scene */
@@ -178,10 +179,10 @@ struct imp_tracer {
 /* The guide that walks of this integrator follow: its densities are made for paths, in
  * scenes that finite elements know. */
 static inline const struct imp_guide *imp__guide_of(const struct imp_scene *scene,
-                                                    const struct imp_integrator *i,
+                                                    const struct imp_walk_integrator *i,
                                                     const struct imp_guide *guide)
 {
-    return i->kind == IMP_INTEGRATOR_PATH && scene->n_media == 0 ? guide : NULL;
+    return i->guided && scene->n_media == 0 ? guide : NULL;
 }
 
 /* ---- Decide (trace.c) ------------------------------------------------------------ */

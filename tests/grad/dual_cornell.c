@@ -84,7 +84,7 @@ int main(void)
     chosen[red] = 1;
     test_must(ctx, imp__active_create(scene, chosen, &active));
     const struct imp_tracer tracer = {.scene = scene,
-                                      .integrator = &scene->integrator,
+                                      .integrator = imp__walk_integrator(scene),
                                       .sensor = scene->sensors[0],
                                       .active = &active,
                                       .seed = 11};

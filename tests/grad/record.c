@@ -22,7 +22,7 @@ struct traced {
     imp_scene *scene;
     uint8_t *chosen;
     struct imp_active active;
-    struct imp_integrator integrator;
+    struct imp_walk_integrator integrator;
     struct imp_tracer tracer;
     struct imp_arena arena;
     int width, height;
@@ -40,9 +40,14 @@ static void begin(struct traced *t, const char *file, const char *defines, bool 
         for (int k = 0; k < scene->media[m]->n_numbers; k++)
             t->chosen[scene->media[m]->numbers[k].param] = 0;
     test_must(ctx, imp__active_create(scene, t->chosen, &t->active));
-    t->integrator = scene->integrator;
-    if (t->integrator.kind == IMP_INTEGRATOR_ELEMENTS)
-        t->integrator.kind = IMP_INTEGRATOR_PATH;
+    const struct imp_walk_integrator *own = imp__walk_integrator(scene);
+    t->integrator = own ? *own
+                        : (struct imp_walk_integrator){/* path, for finite elements */
+                                                       .max_depth = -1,
+                                                       .rr_depth = 5,
+                                                       .lights = true,
+                                                       .directions = true,
+                                                       .guided = true};
     if (t->integrator.rr_depth > 2) t->integrator.rr_depth = 2; /* let roulette decide */
     const struct imp_sensor *sensor = scene->sensors[0];
     t->width = sensor->film.crop_w;

@@ -9,6 +9,7 @@
 #include "math/rng.h"
 #include "math/warp.h"
 #include "scene/guide.h"
+#include "walk/walk_integrator.h"
 
 static imp_elements *solved_to(imp_scene *s, int order)
 {
@@ -188,7 +189,8 @@ static void expectations(imp_context *ctx, const char *file, double slack)
     int wrong = 0;
     run.spp = 512;
     for (int k = 0; k < 3; k++) { /* emission, direct light too, everything */
-        s->integrator.max_depth = k < 2 ? k + 1 : -1;
+        ((struct imp_walk_integrator *)s->integrator->self)->max_depth =
+            k < 2 ? k + 1 : -1;
         test_must(ctx, imp_render(s, &run, &film));
         mean_of(film, &mean[k], &se[k]);
         imp_film_destroy(film);

@@ -30,8 +30,10 @@ static imp_scene *scene_of(imp_context *ctx, const char *format, ...)
 
 static struct imp_tracer tracer_of(const imp_scene *s)
 {
-    return (struct imp_tracer){
-        .scene = s, .integrator = &s->integrator, .sensor = s->sensors[0], .seed = 1};
+    return (struct imp_tracer){.scene = s,
+                               .integrator = imp__walk_integrator(s),
+                               .sensor = s->sensors[0],
+                               .seed = 1};
 }
 
 /* A ball of Luneburg's profile: parallel rays meet at the opposite point. */

@@ -5,6 +5,7 @@
 #include "scene/fingerprint.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
+#include "walk/walk_integrator.h"
 
 static imp_context *ctx;
 
@@ -16,7 +17,7 @@ static struct prints prints_of(const imp_scene *s)
 {
     return (struct prints){
         imp__fingerprint_objects(s), imp__fingerprint_sensor(s->sensors[0]),
-        imp__fingerprint_integrator(&s->integrator), imp__fingerprint_rays(s)};
+        imp__walk_integrator_hash(imp__walk_integrator(s)), imp__fingerprint_rays(s)};
 }
 /* "osir" with a '-' for what is the same. */
 static const char *differ(struct prints a, struct prints b)

@@ -44,7 +44,7 @@ static void choose(struct room *r)
         r->chosen[k] = (r->scene->params[k].info.flags & IMP_PARAM_DIFFERENTIABLE) != 0;
     test_must(ctx, imp__active_create(r->scene, r->chosen, &r->active));
     r->tracer = (struct imp_tracer){.scene = r->scene,
-                                    .integrator = &r->scene->integrator,
+                                    .integrator = imp__walk_integrator(r->scene),
                                     .sensor = r->scene->sensors[0],
                                     .active = &r->active,
                                     .seed = 5};

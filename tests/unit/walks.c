@@ -35,7 +35,7 @@ static void begin(struct traced *t, const char *integrator, const char *rest)
         t->chosen[k] = (t->scene->params[k].info.flags & IMP_PARAM_DIFFERENTIABLE) != 0;
     test_must(ctx, imp__active_create(t->scene, t->chosen, &t->active));
     t->tracer = (struct imp_tracer){.scene = t->scene,
-                                    .integrator = &t->scene->integrator,
+                                    .integrator = imp__walk_integrator(t->scene),
                                     .sensor = t->scene->sensors[0],
                                     .active = &t->active,
                                     .seed = 3};
@@ -306,7 +306,7 @@ static void pixels(const char *filter, double radius)
              filter);
     t = (struct traced){.scene = test_scene_text(ctx, xml, IMP_RGB)};
     t.tracer = (struct imp_tracer){.scene = t.scene,
-                                   .integrator = &t.scene->integrator,
+                                   .integrator = imp__walk_integrator(t.scene),
                                    .sensor = t.scene->sensors[0]};
     imp__arena_init(&t.arena, ctx);
     run.spp = SPP;

@@ -1,0 +1,39 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Integrators: what a picture holds. A kind is a table; those of this program are listed
+ * by the room that makes pictures (film/film_integrator.c), since most belong to rooms
+ * above this one: walk, elements, film. The scene makes them and knows no settings. */
+#ifndef IMP_SCENE_INTEGRATOR_H
+#define IMP_SCENE_INTEGRATOR_H
+
+#include "kind/build.h"
+
+enum imp_integrator_flags {
+    IMP_INTEGRATOR_WALKS = 1,     /* radiance along walks; self is a struct
+                                 imp_walk_integrator (walk/walk_integrator.h) */
+    IMP_INTEGRATOR_SOLVES = 2,    /* finite elements; self is a struct
+                                  imp_elements_integrator */
+    IMP_INTEGRATOR_CONTAINS = 4,  /* others, which must be INNER */
+    IMP_INTEGRATOR_INNER = 8,     /* may be contained */
+    IMP_INTEGRATOR_NO_FIELDS = 16 /* has no derivative of a graded index */
+};
+
+struct imp_integrator {
+    const struct imp_integrator_ops *ops;
+    void *self;       /* ops->object_size bytes, filled by build */
+    const char *name; /* of one that is contained: its slot, for names of channels */
+    int max_depth;    /* what imp_scene_get_info says of it; -1: unlimited, or none */
+    int n_inner;
+    struct imp_integrator *inner; /* [n_inner], in document order */
+};
+
+struct imp_integrator_ops {
+    size_t size; /* size, name, object_size: as all tables of kinds (kinds.h) */
+    const char *name;
+    size_t object_size;
+    unsigned flags;
+    /* Read the properties, fill self and max_depth. What it contains is there. */
+    enum imp_status (*build)(const struct imp_build *build, struct imp_integrator *i);
+};
+
+#endif

@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Integrators of radiance along walks: path, direct and stam are settings of one engine.
+ * Another one is a table here and a line in film/film_integrator.c. */
+#ifndef IMP_WALK_INTEGRATOR_H
+#define IMP_WALK_INTEGRATOR_H
+
+#include "scene/scene.h"
+
+enum imp_stam_alpha { IMP_ALPHA_DETACHED, IMP_ALPHA_ATTACHED, IMP_ALPHA_PAPER };
+
+/* What walks are made by. */
+struct imp_walk_integrator {
+    int max_depth; /* segments; -1: unlimited */
+    int rr_depth;  /* Russian roulette from this vertex on, the first is 1 */
+    bool hide_emitters;
+    bool lights;     /* vertices are connected to lights */
+    bool directions; /* walks go on behind the first vertex; false: lights alone */
+    bool guided;     /* a guide's densities are made for these walks */
+    bool absorbs;    /* emission counts where the walk is absorbed only (stam.c), which
+                        takes the place of Russian roulette */
+    bool first_hit;  /* alpha is 1 where the first ray meets a surface, and hide_emitters
+                        hides lights from that ray alone (docs/scene-format.md 11) */
+    enum imp_stam_alpha alpha_gradient;
+};
+
+extern const struct imp_integrator_ops imp__integrator_path, imp__integrator_direct,
+    imp__integrator_stam;
+
+/* NULL: not one of walks. */
+static inline const struct imp_walk_integrator *
+imp__walk_integrator_of(const struct imp_integrator *i)
+{
+    return i && i->ops->flags & IMP_INTEGRATOR_WALKS ? i->self : NULL;
+}
+/* The radiance integrator of a scene: itself, or the first in moment or aov; NULL: none
+ * (depth alone). */
+const struct imp_walk_integrator *imp__walk_integrator(const struct imp_scene *scene);
+/* Hash of the settings, for files made with walks (scene/fingerprint.h); NULL has one. */
+uint64_t imp__walk_integrator_hash(const struct imp_walk_integrator *integrator);
+
+#endif
