@@ -318,7 +318,7 @@ struct imp_shape {
     imp_v3 lo, hi;                  /* bounds; build sets them */
     const char *name;
     bool smooth; /* shading normals turn over flat facets; build sets it */
-    const struct imp_medium *interior; /* behind ng; NULL: none */
+    const struct imp_body *body; /* of graded index, behind ng; NULL: none */
 };
 
 /* A surface of constant curvature. */

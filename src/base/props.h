@@ -81,8 +81,7 @@ struct imp_node {
     const struct imp_mesh_data *mesh; /* attached data, or NULL */
     const struct imp_image_data *image;
     const struct imp_ies_data *ies;
-    struct imp_medium
-        *medium;           /* attached: a graded index (format/graded_file.c), or NULL */
+    struct imp_body *body; /* attached: a graded index (format/graded_file.c), or NULL */
     void *object;          /* what was made from it (scene/scene_build.c) */
     const char *asked[24]; /* names of properties that were looked for, literals; */
     int n_asked;           /* what a misspelt one may have meant. Full: no more */

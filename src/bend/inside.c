@@ -29,7 +29,7 @@ void imp__graded_destroy(struct imp_graded *g)
     imp__release(ctx, g);
 }
 
-uint64_t imp__graded_hash(uint64_t h, const struct imp_medium *m)
+uint64_t imp__graded_hash(uint64_t h, const struct imp_body *m)
 {
     enum { SIDE = 3 };
     if (!m->graded || m->index < 0) return h;
@@ -186,7 +186,7 @@ static bool end_ride(const struct imp_graded *g, const struct imp_scene *scene,
     return true;
 }
 
-bool imp__ride(const struct imp_medium *m, const struct imp_scene *scene, imp_v3 x,
+bool imp__ride(const struct imp_body *m, const struct imp_scene *scene, imp_v3 x,
                imp_v3 ng, imp_v3 d, struct imp__ride *r, struct imp_hit *hit)
 {
     const struct imp_graded *g = m->graded;

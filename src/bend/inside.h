@@ -32,7 +32,7 @@ static inline double imp__graded_index(const struct imp_graded *g, const imp_v3 
 }
 /* What of a medium is no parameter (where its field lies, a profile's axis) shows in its
  * index at some points. */
-uint64_t imp__graded_hash(uint64_t h, const struct imp_medium *m);
+uint64_t imp__graded_hash(uint64_t h, const struct imp_body *m);
 
 /* The surface of a shape near a point p of it, as a level set. */
 void imp__level(const struct imp_shape *s, imp_v3 p, imp_v3 ng,
@@ -52,13 +52,13 @@ struct imp__ride {
 };
 /* Trace a ray from x along d; ng is the normal of the surface it leaves (0: none). False:
  * it left the body without a hit, or the index is not a positive number there. */
-bool imp__ride(const struct imp_medium *medium, const struct imp_scene *scene, imp_v3 x,
+bool imp__ride(const struct imp_body *medium, const struct imp_scene *scene, imp_v3 x,
                imp_v3 ng, imp_v3 d, struct imp__ride *ride, struct imp_hit *hit);
 
 /* Derivatives with respect to the numbers of a medium that are active. base [n_params]:
  * place of a parameter's first number in x, or -1. */
 struct imp__graded_active {
-    const struct imp_medium *medium;
+    const struct imp_body *medium;
     const int64_t *base;
     struct imp_sink *sink;    /* reverse */
     int lane;                 /* of it */

@@ -14,7 +14,7 @@ struct splat_job {
     double a;
 };
 
-static const struct imp_medium_numbers *numbers_at(const struct imp_medium *m, size_t k)
+static const struct imp_body_numbers *numbers_at(const struct imp_body *m, size_t k)
 {
     for (int i = 0; i < m->n_numbers; i++)
         if (k - m->numbers[i].first < m->numbers[i].count) return &m->numbers[i];
@@ -23,7 +23,7 @@ static const struct imp_medium_numbers *numbers_at(const struct imp_medium *m, s
 
 static void number_add(const struct imp__graded_active *to, size_t k, double bar)
 {
-    const struct imp_medium_numbers *n = numbers_at(to->medium, k);
+    const struct imp_body_numbers *n = numbers_at(to->medium, k);
     imp_spec s = {0};
     s[to->lane] = bar;
     if (n && to->base[n->param] >= 0)
@@ -43,7 +43,7 @@ static void block_flush(const struct imp__graded_active *to, struct imp__block *
     const struct imp__grid *g = (const struct imp__grid *)b->grid;
     const size_t side = g->desc.interp == IMP_FIELD_SPLINE ? 4 : 2;
     const size_t nx = (size_t)g->nodes[0], ny = (size_t)g->nodes[1];
-    const struct imp_medium_numbers *n = numbers_at(to->medium, b->offset);
+    const struct imp_body_numbers *n = numbers_at(to->medium, b->offset);
     const size_t from = b->offset - n->first;
     imp_spec s = {0};
     for (size_t k = 0, at = 0; k < side; k++)
@@ -86,7 +86,7 @@ static void grid_splat(const struct splat_job *j, imp_field *f, size_t offset)
 static void leaf_splat(imp_field *f, size_t offset, void *payload)
 {
     const struct splat_job *j = payload;
-    const struct imp_medium_numbers *n = numbers_at(j->to->medium, offset);
+    const struct imp_body_numbers *n = numbers_at(j->to->medium, offset);
     if (imp__field_is_grid(f)) {
         if (n && j->to->base[n->param] >= 0) grid_splat(j, f, offset);
         return;
@@ -117,7 +117,7 @@ static void leaf_tangent(imp_field *f, size_t offset, void *payload)
 {
     struct tangent_job *j = payload;
     const struct imp__graded_active *a = j->along;
-    const struct imp_medium_numbers *n = numbers_at(a->medium, offset);
+    const struct imp_body_numbers *n = numbers_at(a->medium, offset);
     double dot[64] = {0}, eta_dot;
     const double *theta_dot = dot;
     imp_v3 g_dot;

@@ -11,7 +11,7 @@
 
 struct numbers_job {
     struct imp_scene *scene;
-    struct imp_medium *medium;
+    struct imp_body *medium;
     const double *lo, *hi;
     int n_leaves, leaf;
     bool failed, single, large, tied;
@@ -34,7 +34,7 @@ static void leaf_count(imp_field *f, size_t offset, void *payload)
 static void leaf_name(imp_field *f, size_t offset, void *payload)
 {
     struct numbers_job *j = payload;
-    struct imp_medium *m = j->medium;
+    struct imp_body *m = j->medium;
     const bool grid = imp__field_is_grid(f), one = grid || !imp_field_param_name(f, 0);
     char stem[32] = "field";
     if (j->n_leaves > 1) snprintf(stem, sizeof stem, "field_%d", j->leaf);
@@ -42,17 +42,17 @@ static void leaf_name(imp_field *f, size_t offset, void *payload)
     for (size_t k = 0; k < (one ? 1 : f->n_theta); k++) {
         char key[96];
         const char *name = one ? "coefficients" : imp_field_param_name(f, k);
-        struct imp_medium_numbers *n = &m->numbers[m->n_numbers++];
+        struct imp_body_numbers *n = &m->numbers[m->n_numbers++];
         snprintf(key, sizeof key, "%s.%s", stem, name ? name : "value");
-        *n = (struct imp_medium_numbers){.key = imp__arena_strdup(&j->scene->arena, key),
-                                         .first = offset + k,
-                                         .count = one ? f->n_theta : 1,
-                                         .n_dims = grid ? 3 : one,
-                                         .number = f->theta + k,
-                                         .lo = j->lo[offset + k],
-                                         .hi = j->hi[offset + k],
-                                         .why = f->ops->jumps,
-                                         .param = -1};
+        *n = (struct imp_body_numbers){.key = imp__arena_strdup(&j->scene->arena, key),
+                                       .first = offset + k,
+                                       .count = one ? f->n_theta : 1,
+                                       .n_dims = grid ? 3 : one,
+                                       .number = f->theta + k,
+                                       .lo = j->lo[offset + k],
+                                       .hi = j->hi[offset + k],
+                                       .why = f->ops->jumps,
+                                       .param = -1};
         n->dims[0] = f->n_theta;
         if (grid)
             for (int d = 0; d < 3; d++)
@@ -62,7 +62,7 @@ static void leaf_name(imp_field *f, size_t offset, void *payload)
 }
 
 static enum imp_status numbers_make(struct imp_scene *scene, struct imp_node *node,
-                                    struct imp_medium *m)
+                                    struct imp_body *m)
 {
     enum imp_status st = IMP_OK;
     imp_bend *b = m->graded->bend;
@@ -122,7 +122,7 @@ enum imp_status imp__graded_attach(struct imp_scene *scene, struct imp_node *nod
 {
     enum imp_status st = IMP_OK;
     struct imp__bendfile l = {.ctx = scene->ctx, .scene = scene};
-    struct imp_medium *m = imp__arena_array(&scene->arena, 1, sizeof *m);
+    struct imp_body *m = imp__arena_array(&scene->arena, 1, sizeof *m);
     double lo, hi;
     if (!m) IMP_TRY(imp__error(scene->ctx, IMP_E_NOMEM, "no memory for a medium"));
     IMP_TRY(imp__bendfile_medium(&l, node));
@@ -139,8 +139,8 @@ enum imp_status imp__graded_attach(struct imp_scene *scene, struct imp_node *nod
     l.bend = NULL;
     IMP_TRY(imp__graded_create(given, &m->graded));
     IMP_TRY(imp__scene_own(scene, m->graded, graded_destroy));
-    IMP_TRY(imp__build_list_add(scene, (void ***)&scene->media, &scene->n_media, m));
-    node->medium = m;
+    IMP_TRY(imp__build_list_add(scene, (void ***)&scene->bodies, &scene->n_bodies, m));
+    node->body = m;
     IMP_TRY(numbers_make(scene, node, m));
 out:
     imp_bend_destroy(l.bend);
@@ -157,8 +157,8 @@ static void field_changed(void *payload)
 enum imp_status imp__graded_finish(struct imp_scene *scene)
 {
     enum imp_status st = IMP_OK;
-    for (int i = 0; i < scene->n_media; i++) {
-        struct imp_medium *m = scene->media[i];
+    for (int i = 0; i < scene->n_bodies; i++) {
+        struct imp_body *m = scene->bodies[i];
         if (m->index < 0) continue; /* declared, and used by no shape */
         st = imp__graded_ready(m->graded, m->lo, m->hi);
         if (st == IMP_E_ARG || st == IMP_E_SCENE) {

@@ -120,7 +120,7 @@ static enum imp_status normal(const double *x, uint64_t seed, struct imp__normal
 /* ---- What the fit belongs to --------------------------------------------------- */
 
 /* With an active number, the index of a medium differs from start to start. */
-static bool medium_active(const struct imp_medium *m, const int64_t *base)
+static bool medium_active(const struct imp_body *m, const int64_t *base)
 {
     for (int k = 0; k < m->n_numbers; k++)
         if (m->numbers[k].param >= 0 && base[m->numbers[k].param] >= 0) return true;
@@ -155,9 +155,9 @@ static void fingerprint(struct imp__fit *f)
             }
         }
     }
-    for (int m = 0; m < p->scene->n_media; m++)
-        if (!medium_active(p->scene->media[m], p->active.base))
-            h->scene = imp__graded_hash(h->scene, p->scene->media[m]);
+    for (int m = 0; m < p->scene->n_bodies; m++)
+        if (!medium_active(p->scene->bodies[m], p->active.base))
+            h->scene = imp__graded_hash(h->scene, p->scene->bodies[m]);
     for (size_t i = 0; i < p->n_targets; i++) {
         const struct imp__target *t = &p->targets[i];
         const size_t n = (size_t)t->desc.width * (size_t)t->desc.height;

@@ -55,5 +55,5 @@ enum imp_status imp__problem_tracer(const struct imp_problem *p,
                                .active = &p->active,
                                .seed = run->seed,
                                .guide = imp__guide_of(p->scene, integrator, run->guide)};
-    return p->active.medium ? imp__graded_survey(out) : IMP_OK;
+    return p->active.body ? imp__graded_survey(out) : IMP_OK;
 }

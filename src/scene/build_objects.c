@@ -254,7 +254,7 @@ enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
                                     "the index inside is its medium's, the one outside "
                                     "the medium's outside_index: the bsdf has no "
                                     "int_ior and no ext_ior"));
-        IMP_TRY(imp__build_medium(scene, medium, name, &s->interior));
+        IMP_TRY(imp__build_body(scene, medium, name, &s->body));
     }
     if (emitter) {
         if (!(s->area > 0))

@@ -160,9 +160,9 @@ uint64_t imp__fingerprint_rays(const struct imp_scene *scene)
     for (size_t k = 0; k < scene->n_params; k++)
         if (!(scene->params[k].info.flags & IMP_PARAM_DIFFERENTIABLE))
             h = values_hash(h, &scene->params[k]);
-    for (int m = 0; m < scene->n_media; m++)
-        for (int k = 0; k < scene->media[m]->n_numbers; k++) {
-            const int param = scene->media[m]->numbers[k].param;
+    for (int m = 0; m < scene->n_bodies; m++)
+        for (int k = 0; k < scene->bodies[m]->n_numbers; k++) {
+            const int param = scene->bodies[m]->numbers[k].param;
             if (param >= 0) h = values_hash(h, &scene->params[param]);
         }
     return h;

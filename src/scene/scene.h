@@ -36,7 +36,7 @@ struct imp_param {
 /* A graded index inside shapes. What it is, and how rays step through it, is known to
  * `curved` alone; its numbers are parameters like all others. */
 struct imp_graded;
-struct imp_medium_numbers {
+struct imp_body_numbers {
     const char *key;     /* below the medium's name: "field.coefficients" */
     size_t first, count; /* place in the field's theta */
     int n_dims;
@@ -45,7 +45,7 @@ struct imp_medium_numbers {
     const char *why; /* the field itself allows no derivative; or NULL */
     int param;       /* -1 until the scene is built */
 };
-struct imp_medium {
+struct imp_body {
     const char *name;
     struct imp_graded *graded;    /* bend/inside.h; owned by the scene */
     double outside;               /* index around it */
@@ -54,7 +54,7 @@ struct imp_medium {
     struct imp_node *node;        /* where it was declared */
     int index;                    /* in the scene; -1: in no shape */
     int n_numbers;
-    struct imp_medium_numbers *numbers;
+    struct imp_body_numbers *numbers;
 };
 
 /* An object of a room above, which this one does not know: destroyed with the scene. */
@@ -88,8 +88,8 @@ struct imp_scene {
     struct imp_emitter **emitters;
     struct imp_sensor **sensors;
     struct imp_texture **textures;
-    int n_media;
-    struct imp_medium **media; /* attached to nodes; those in use have an index */
+    int n_bodies;
+    struct imp_body **bodies; /* attached to nodes; those in use have an index */
     struct imp_bsdf *default_bsdf, *black_bsdf;
     const struct imp_integrator *integrator; /* NULL: none was written */
     int environment;                         /* emitter index, -1: none */
@@ -128,11 +128,11 @@ enum imp_status imp__integrator_build(struct imp_scene *scene, struct imp_node *
 
 /* ---- media.c ------------------------------------------------------------------- */
 /* The medium of a shape: its numbers become parameters where it is met first. */
-enum imp_status imp__build_medium(struct imp_scene *scene, struct imp_node *node,
-                                  const char *parent, const struct imp_medium **out);
+enum imp_status imp__build_body(struct imp_scene *scene, struct imp_node *node,
+                                const char *parent, const struct imp_body **out);
 /* When all objects are there: may these media be where they are, and which of their
  * numbers have a derivative? */
-enum imp_status imp__media_check(struct imp_scene *scene);
+enum imp_status imp__bodies_check(struct imp_scene *scene);
 
 /* ---- theta.c ------------------------------------------------------------------- */
 enum imp_status imp__theta_add(struct imp_scene *scene, const struct imp_param *param,

@@ -59,7 +59,7 @@ static enum imp_status top_build(struct imp_scene *scene, struct imp_child *chil
                                     "an area emitter must be inside a shape"));
     } else if (strcmp(tag, "medium") == 0) {
         if (!node->id) node->id = name; /* declared; made where a shape refers to it */
-        if (!node->medium)
+        if (!node->body)
             IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
                                     "this version has no such medium; it has graded"));
     } else if (strcmp(tag, "integrator") == 0) {
@@ -111,7 +111,7 @@ enum imp_status imp__scene_build(struct imp_scene *scene,
         IMP_TRY(top_build(scene, &scene->root->children[i], integrators, &counts));
     IMP_TRY(imp__props_finish(scene->ctx, scene->root));
     IMP_TRY(lights_build(scene));
-    IMP_TRY(imp__media_check(scene));
+    IMP_TRY(imp__bodies_check(scene));
     imp__theta_finish(scene);
     IMP_TRY(imp__intersector_create(scene));
     scene->committed = true;

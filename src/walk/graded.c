@@ -6,7 +6,7 @@
 void imp__graded_inputs(const struct imp_bsdf *b, const struct imp_shape *shape,
                         const struct imp_texcoord *at, imp_spec *in)
 {
-    const struct imp_medium *m = shape->interior;
+    const struct imp_body *m = shape->body;
     const int j = b->index_input;
     if (j >= 0) in[j] = imp__spec(imp__graded_index(m->graded, &at->p) / m->outside);
 }
@@ -63,8 +63,8 @@ static bool segment_keep(struct imp_step *s, struct imp_vertex *v,
                          const struct imp_hit *hit, const struct imp_surface *at)
 {
     struct imp_graded_state *b = s->graded;
-    const uint8_t *active = s->tracer->active ? s->tracer->active->medium : NULL;
-    const struct imp_medium *m = v->shape->interior;
+    const uint8_t *active = s->tracer->active ? s->tracer->active->body : NULL;
+    const struct imp_body *m = v->shape->body;
     if (!active) return true;
     b->chain |= m && active[m->index];
     if (!b->chain) return true;
@@ -127,10 +127,10 @@ static bool arrive(struct imp_step *s, struct imp_vertex *v, struct imp_hit *hit
                    struct imp_surface *at)
 {
     struct imp_graded_state *b = s->graded;
-    const struct imp_medium *m = v->shape->interior;
+    const struct imp_body *m = v->shape->body;
     if (b->moved && !b->through) meet_exactly(s, v, hit, at);
     if (m) {
-        const struct imp_medium *before = imp__dot(at->ng, s->d) < 0 ? NULL : m;
+        const struct imp_body *before = imp__dot(at->ng, s->d) < 0 ? NULL : m;
         if (b->medium != before) return drop(s->walk);
     } else if (b->medium && (v->bsdf->flags & IMP_BSDF_TRANSMIT)) {
         return drop(s->walk);
@@ -145,9 +145,8 @@ static void leave(struct imp_step *s, const struct imp_vertex *v,
                   const struct imp_surface *at)
 {
     struct imp_graded_state *b = s->graded;
-    const uint8_t *active = s->tracer->active ? s->tracer->active->medium : NULL;
-    if (v->shape->interior)
-        b->medium = imp__dot(at->ng, s->d) < 0 ? v->shape->interior : NULL;
+    const uint8_t *active = s->tracer->active ? s->tracer->active->body : NULL;
+    if (v->shape->body) b->medium = imp__dot(at->ng, s->d) < 0 ? v->shape->body : NULL;
     b->ng = at->ng;
     b->moved |= b->medium && active && active[b->medium->index];
     s->segment = b->medium ? &imp__graded_inside : &imp__graded_outside;

@@ -15,9 +15,9 @@ extern const struct imp_segment_ops imp__graded_outside, imp__graded_inside;
 
 /* Of a walk while it is decided. */
 struct imp_graded_state {
-    const struct imp_medium *medium;  /* that the ray in flight is in; NULL: none */
-    imp_v3 ng;                        /* of the surface it left */
-    const struct imp_medium *through; /* that the last ray came through */
+    const struct imp_body *medium;  /* that the ray in flight is in; NULL: none */
+    imp_v3 ng;                      /* of the surface it left */
+    const struct imp_body *through; /* that the last ray came through */
     struct imp__ride ride;
     bool chain; /* a boundary of an active medium has been met */
     bool moved; /* the ray in flight depends on an active field */
@@ -27,9 +27,9 @@ struct imp_graded_state {
  * its end to double precision, since derivatives follow it. */
 struct imp_graded_segment {
     struct imp_segment base;
-    const struct imp_medium *medium; /* that it came through; NULL: straight */
-    struct imp__ride ride;           /* if through a medium */
-    bool moved;                      /* its end depends on an active field */
+    const struct imp_body *medium; /* that it came through; NULL: straight */
+    struct imp__ride ride;         /* if through a medium */
+    bool moved;                    /* its end depends on an active field */
     struct imp_exact end;
     imp_v3 d; /* unit direction of arrival, world */
     struct imp_hit hit;

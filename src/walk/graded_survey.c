@@ -91,7 +91,7 @@ static const char *name_of(struct piece p)
     return !p.shape ? "nothing" : p.shape->name ? p.shape->name : p.shape->ops->name;
 }
 
-static enum imp_status refuse(const struct imp_tracer *t, const struct imp_medium *m,
+static enum imp_status refuse(const struct imp_tracer *t, const struct imp_body *m,
                               const char *format, const char *a, const char *b)
 {
     char text[400];
@@ -109,7 +109,7 @@ struct survey {
 };
 
 /* The ray that left v has moved and met `next` (NULL: nothing). */
-static enum imp_status look(struct survey *s, const struct imp_medium *m,
+static enum imp_status look(struct survey *s, const struct imp_body *m,
                             const struct imp_vertex *v, const struct imp_vertex *next)
 {
     const struct imp_scene *scene = s->tracer->scene;
@@ -134,16 +134,16 @@ static enum imp_status look(struct survey *s, const struct imp_medium *m,
     return IMP_OK;
 }
 
-static const struct imp_medium *an_active(const struct imp_tracer *t)
+static const struct imp_body *an_active(const struct imp_tracer *t)
 {
-    for (int i = 0; i < t->scene->n_media; i++)
-        if (t->active->medium[i]) return t->scene->media[i];
+    for (int i = 0; i < t->scene->n_bodies; i++)
+        if (t->active->body[i]) return t->scene->bodies[i];
     return NULL;
 }
 
 static enum imp_status walk_look(struct survey *s, const struct imp_walk *w)
 {
-    const struct imp_medium *m = an_active(s->tracer);
+    const struct imp_body *m = an_active(s->tracer);
     bool moved = false;
     for (const struct imp_vertex *v = w->first; v; v = v->next) {
         const struct imp_graded_segment *to = imp__graded_kept(v);

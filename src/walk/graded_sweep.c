@@ -21,7 +21,7 @@
 struct sides {
     double near, far;
     bool entering;
-    const struct imp_medium *medium; /* inside */
+    const struct imp_body *medium; /* inside */
     struct imp__jet inner;
 };
 
@@ -29,7 +29,7 @@ static void sides_of(const struct imp_vertex *v, imp_v3 x, imp_v3 ng, imp_v3 d,
                      struct sides *s)
 {
     double in = 1, out = 1;
-    *s = (struct sides){.entering = imp__dot(ng, d) < 0, .medium = v->shape->interior};
+    *s = (struct sides){.entering = imp__dot(ng, d) < 0, .medium = v->shape->body};
     if (s->medium) {
         imp__field_eval1(imp__graded_field(s->medium->graded), &x, 1, &s->inner);
         in = s->inner.eta;
@@ -261,7 +261,7 @@ static void chain_sweep(const struct imp_tracer *tracer, const struct imp_walk *
 void imp__graded_sweep(const struct imp_tracer *tracer, const struct imp_walk *walk,
                        imp_spec adjoint, struct imp_sink *sink)
 {
-    if (!tracer->active->medium) return;
+    if (!tracer->active->body) return;
     const int lanes = tracer->scene->channels;
     imp_spec P = adjoint;
     bool any = false;
@@ -284,7 +284,7 @@ imp_spec imp__graded_chain_tangent(const struct imp_tracer *tracer,
     struct imp__graded_active along = {.base = tracer->active->base, .x_dot = x_dot};
     imp_spec P = imp__spec(1), before = {0}, L_dot = {0};
     imp_v3 p_dot = {0}, d_dot = {0};
-    if (!tracer->active->medium) return L_dot;
+    if (!tracer->active->body) return L_dot;
     for (const struct imp_vertex *v = walk->first; v; P *= v->w, v = v->next) {
         const struct imp_graded_segment *leg = imp__graded_kept(v);
         struct imp__surface level;
@@ -360,7 +360,7 @@ bool imp__graded_place(const struct imp_tracer *tracer, const struct imp_vertex 
                        struct imp_moving *m, struct imp_place *p)
 {
     const struct imp_graded_segment *leg = imp__graded_kept(v);
-    if (!leg || !tracer->active || !tracer->active->medium) return true;
+    if (!leg || !tracer->active || !tracer->active->body) return true;
     imp_v3 x = leg->end.at.p, ng = v->ng, d = leg->d;
     if (leg->moved) {
         /* The direction that the last vertex sends the ray in now. */

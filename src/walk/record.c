@@ -17,8 +17,8 @@ static struct imp_record_of made_with(const struct imp_tracer *t)
     struct imp_record_of of = {
         imp__fingerprint_objects(t->scene), imp__fingerprint_sensor(t->sensor),
         imp__walk_integrator_hash(t->integrator), imp__fingerprint_rays(t->scene)};
-    for (int m = 0; m < t->scene->n_media; m++)
-        of.rays = imp__graded_hash(of.rays, t->scene->media[m]);
+    for (int m = 0; m < t->scene->n_bodies; m++)
+        of.rays = imp__graded_hash(of.rays, t->scene->bodies[m]);
     if (t->carried) {
         of.integrator = imp__hash(of.integrator, &t->carried->n, sizeof t->carried->n);
         of.integrator = imp__hash(of.integrator, t->carried->nm, sizeof t->carried->nm);

@@ -35,5 +35,5 @@ struct imp_segment imp__straight = {&straight, NULL};
 
 const struct imp_segment_ops *imp__segment_first(const struct imp_scene *scene)
 {
-    return imp_unlikely(scene->n_media > 0) ? &imp__graded_outside : &straight;
+    return imp_unlikely(scene->n_bodies > 0) ? &imp__graded_outside : &straight;
 }

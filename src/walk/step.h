@@ -89,7 +89,7 @@ static inline void imp__evaluate_inputs(const struct imp_bsdf *b,
                                         const struct imp_texcoord *at, imp_spec *in)
 {
     imp__inputs_eval(b->input, b->n_in, at, in);
-    if (imp_unlikely(shape->interior != NULL)) imp__graded_inputs(b, shape, at, in);
+    if (imp_unlikely(shape->body != NULL)) imp__graded_inputs(b, shape, at, in);
 }
 /* f with densities frozen becomes the weight of the step; T of the segment that follows
  * is not known yet. */

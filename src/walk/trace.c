@@ -270,7 +270,7 @@ static inline __attribute__((always_inline)) bool step(struct imp_step *s)
 
     /* The continuation. */
     const bool splits =
-        imp_unlikely(s->tracer->split > 1) && s->depth == 0 && s->scene->n_media == 0;
+        imp_unlikely(s->tracer->split > 1) && s->depth == 0 && s->scene->n_bodies == 0;
     const bool continues =
         integrator->directions &&
         (splits ? scatter_split(s, v, &at, &frame) : imp__scatter(s, v, &at, &frame));
@@ -351,7 +351,7 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
                          .walk = walk,
                          .arena = arena,
                          .recorded = !tracer->value_only ||
-                                     (tracer->active && tracer->active->medium),
+                                     (tracer->active && tracer->active->body),
                          .scratch = scratch,
                          .at.carried = tracer->carried,
                          .segment = imp__segment_first(tracer->scene),

@@ -152,7 +152,7 @@ struct imp_active {
     int64_t *base;    /* [n_params] index in x of a parameter's first number, or -1 */
     uint8_t *bsdf;    /* [n_bsdfs] does it depend on an active number */
     uint8_t *emitter; /* [n_emitters] */
-    uint8_t *medium;  /* [n_media]; NULL: none of them */
+    uint8_t *body;    /* [n_bodies]; NULL: none of them */
 };
 /* `chosen` [n_params]. */
 enum imp_status imp__active_create(const struct imp_scene *scene, const uint8_t *chosen,
@@ -182,7 +182,7 @@ static inline const struct imp_guide *imp__guide_of(const struct imp_scene *scen
                                                     const struct imp_walk_integrator *i,
                                                     const struct imp_guide *guide)
 {
-    return i->guided && scene->n_media == 0 ? guide : NULL;
+    return i->guided && scene->n_bodies == 0 ? guide : NULL;
 }
 
 /* ---- Decide (trace.c) ------------------------------------------------------------ */

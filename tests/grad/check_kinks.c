@@ -100,7 +100,7 @@ int main(void)
     tap_ok(sum.failed == 0, "and that is no failure # %d rows, worst error %.1e",
            sum.failed, sum.worst);
 
-    imp_field *field = (imp_field *)(uintptr_t)imp__graded_field(s->media[0]->graded);
+    imp_field *field = (imp_field *)(uintptr_t)imp__graded_field(s->bodies[0]->graded);
     struct imp__field_ops wrong = *field->ops;
     right = field->ops;
     wrong.splat = wrong_splat;

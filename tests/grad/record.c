@@ -36,9 +36,9 @@ static void begin(struct traced *t, const char *file, const char *defines, bool 
     t->chosen = calloc(scene->n_params + 1, 1);
     for (size_t k = 0; k < scene->n_params; k++)
         t->chosen[k] = (scene->params[k].info.flags & IMP_PARAM_DIFFERENTIABLE) != 0;
-    for (int m = 0; held && m < scene->n_media; m++)
-        for (int k = 0; k < scene->media[m]->n_numbers; k++)
-            t->chosen[scene->media[m]->numbers[k].param] = 0;
+    for (int m = 0; held && m < scene->n_bodies; m++)
+        for (int k = 0; k < scene->bodies[m]->n_numbers; k++)
+            t->chosen[scene->bodies[m]->numbers[k].param] = 0;
     test_must(ctx, imp__active_create(scene, t->chosen, &t->active));
     const struct imp_walk_integrator *own = imp__walk_integrator(scene);
     t->integrator = own ? *own
@@ -375,7 +375,7 @@ static void other_scenes(void)
     /* Numbers that bend rays. */
     begin(&t, "bend/seen.xml", "cells=1 width=8", true);
     kept = some(&t, 50, PLENTY, &st);
-    struct imp_param *index = &t.scene->params[t.scene->media[0]->numbers[0].param];
+    struct imp_param *index = &t.scene->params[t.scene->bodies[0]->numbers[0].param];
     imp__param_set(index, 0, imp__param_get(index, 0) + 1e-6);
     tap_ok(imp__record_check(&kept, &t.tracer) == IMP_E_ARG,
            "with another index of a medium # %s", imp_last_error(ctx));

@@ -96,7 +96,7 @@ static void fields(imp_context *ctx)
         IMP_RGB);
     size_t at;
     test_must(ctx, imp_scene_find_param(s, "glass.field.coefficients", &at));
-    const imp_field *f = imp__graded_field(s->media[0]->graded);
+    const imp_field *f = imp__graded_field(s->bodies[0]->graded);
     const double before = imp__field_index_max(f);
     test_must(ctx, imp_scene_set_values(s, at, 1, (double[]){1.5}));
     tap_ok(before == 1.25 && imp__field_index_max(f) == 1.5,

@@ -4,11 +4,11 @@
  * be differentiated. */
 #include "scene_build.h"
 
-enum imp_status imp__build_medium(struct imp_scene *scene, struct imp_node *node,
-                                  const char *parent, const struct imp_medium **out)
+enum imp_status imp__build_body(struct imp_scene *scene, struct imp_node *node,
+                                const char *parent, const struct imp_body **out)
 {
     enum imp_status st = IMP_OK;
-    struct imp_medium *m = node->medium;
+    struct imp_body *m = node->body;
     if (!m)
         return imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
                                "this version has no such medium; it has graded");
@@ -19,7 +19,7 @@ enum imp_status imp__build_medium(struct imp_scene *scene, struct imp_node *node
     m->name = imp__build_object_name(scene, node, parent, "interior");
     if (!m->name) return imp__build_no_memory(scene);
     for (int i = 0; i < m->n_numbers; i++) {
-        struct imp_medium_numbers *n = &m->numbers[i];
+        struct imp_body_numbers *n = &m->numbers[i];
         struct imp_param p = {.store = IMP_STORE_DOUBLES, .doubles = n->number};
         p.info.name = imp__build_name(scene, m->name, n->key);
         if (!p.info.name) return imp__build_no_memory(scene);
@@ -34,8 +34,8 @@ enum imp_status imp__build_medium(struct imp_scene *scene, struct imp_node *node
     IMP_TRY(imp__props_finish(scene->ctx, node));
     m->lo = imp__v3(INFINITY, INFINITY, INFINITY);
     m->hi = -m->lo;
-    for (int i = 0; i < scene->n_media; i++)
-        if (scene->media[i] == m) m->index = i;
+    for (int i = 0; i < scene->n_bodies; i++)
+        if (scene->bodies[i] == m) m->index = i;
     *out = m;
 out:
     return st;
@@ -62,14 +62,14 @@ static enum imp_status boundary_check(const struct imp_scene *scene,
 /* The only shape of a medium, if it is a sphere and no other shape's box meets its own: a
  * ray inside meets nothing before it is outside. */
 static const struct imp_shape *ball_of(const struct imp_scene *scene,
-                                       const struct imp_medium *m)
+                                       const struct imp_body *m)
 {
     const struct imp_shape *ball = NULL;
     struct imp_round round;
     for (int i = 0; i < scene->n_shapes; i++) {
         const struct imp_shape *s = scene->shapes[i];
         bool apart = false;
-        if (s->interior == m) {
+        if (s->body == m) {
             if (ball) return NULL;
             ball = s;
             continue;
@@ -84,8 +84,7 @@ static const struct imp_shape *ball_of(const struct imp_scene *scene,
 
 /* Reason why the derivative with respect to the field would be incomplete, as far as the
  * scene alone decides it; NULL: none. src/walk/graded_survey.c checks what rays meet. */
-static const char *fixed_because(const struct imp_scene *scene,
-                                 const struct imp_medium *m)
+static const char *fixed_because(const struct imp_scene *scene, const struct imp_body *m)
 {
     if (scene->integrator && scene->integrator->ops->flags & IMP_INTEGRATOR_NO_FIELDS)
         return "the scene's integrator has no derivative of the field";
@@ -94,7 +93,7 @@ static const char *fixed_because(const struct imp_scene *scene,
         return "an environment other than constant lies around it";
     for (int i = 0; i < scene->n_shapes; i++) {
         const struct imp_shape *s = scene->shapes[i];
-        if (s->interior != m) continue;
+        if (s->body != m) continue;
         const struct imp_bsdf *b = imp__shape_bsdf(scene, s);
         if (s->smooth)
             return "its boundary has vertex normals, whose turning is not differentiated";
@@ -105,21 +104,21 @@ static const char *fixed_because(const struct imp_scene *scene,
     return NULL;
 }
 
-enum imp_status imp__media_check(struct imp_scene *scene)
+enum imp_status imp__bodies_check(struct imp_scene *scene)
 {
     for (int i = 0; i < scene->n_shapes; i++) {
         struct imp_shape *s = scene->shapes[i];
-        if (!s->interior) continue;
+        if (!s->body) continue;
         const enum imp_status st = boundary_check(scene, s);
         if (st != IMP_OK) return st;
-        struct imp_medium *m = scene->media[s->interior->index];
+        struct imp_body *m = scene->bodies[s->body->index];
         for (int k = 0; k < 3; k++) {
             m->lo[k] = fmin(m->lo[k], s->lo[k]);
             m->hi[k] = fmax(m->hi[k], s->hi[k]);
         }
     }
-    for (int i = 0; i < scene->n_media; i++) {
-        struct imp_medium *m = scene->media[i];
+    for (int i = 0; i < scene->n_bodies; i++) {
+        struct imp_body *m = scene->bodies[i];
         if (m->index < 0) continue;
         m->ball = ball_of(scene, m);
         const char *why = fixed_because(scene, m);
