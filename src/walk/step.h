@@ -7,6 +7,7 @@
 #define IMP_WALK_STEP_H
 
 #include "dims.h"
+#include "lane_mis.h"
 #include "segment.h"
 
 /* What a guide knows of the walk (guided.c). */
@@ -44,6 +45,8 @@ struct imp_step {
     imp_spec beta; /* throughput, zero factors left out */
     double eta;    /* product of index ratios */
     int zeros[4];  /* per lane: factors that are zero but have a derivative */
+
+    struct imp_lane_mis lanes;
 
     struct imp_graded_state *graded; /* NULL: no graded medium in the scene */
     struct imp_guided guided;

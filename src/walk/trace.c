@@ -362,6 +362,7 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
                          .from = walk->ray.o,
                          .beta = {1, 1, 1, 1},
                          .eta = 1,
+                         .lanes = IMP_LANE_MIS_INIT,
                          .guided.guide = tracer->guide};
     if (imp_likely(s.segment->begin == NULL) || s.segment->begin(&s)) walk_on(&s);
 

@@ -1,0 +1,31 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "step.h"
+
+int imp__lane_mis_count(const struct imp_step *s)
+{
+    return s->at.carried ? s->at.carried->n : s->scene->channels;
+}
+
+int imp__lane_mis_drew(struct imp_step *s)
+{
+    struct imp_lane_mis *l = &s->lanes;
+    if (l->drew < 0) {
+        const int n = imp__lane_mis_count(s);
+        const double u = imp__u01(s->walk->key, imp__dim_start(IMP_DIM_LANE));
+        l->drew = imp_min((int)(u * n), n - 1);
+    }
+    return l->drew;
+}
+
+double imp__lane_mis_decide(struct imp_step *s, imp_spec p)
+{
+    struct imp_lane_mis *l = &s->lanes;
+    const int n = imp__lane_mis_count(s), drew = imp__lane_mis_drew(s);
+    double sum = 0;
+    l->ratio *= p * (1 / p[drew]);
+    l->ratio[drew] = 1;
+    for (int j = 0; j < n; j++) sum += l->ratio[j];
+    const double before = l->weight;
+    l->weight = n / sum;
+    return imp__decide1(l->weight / (before * p[drew]));
+}
