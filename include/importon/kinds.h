@@ -242,6 +242,9 @@ enum imp_texture_flags {
                                 input nested_texture */
 };
 
+/* Number `element` of a parameter in a direction of theta. */
+typedef double imp_dot_fn(const void *x_dot, int param, size_t element);
+
 struct imp_texture_ops {
     size_t size;
     const char *name;
@@ -259,9 +262,7 @@ struct imp_texture_ops {
     /* The derivative applied: direction x_dot is read through `dot` (element of param).
      */
     void (*tangent)(const struct imp_texture *t, const struct imp_texcoord *at,
-                    bool scalar,
-                    double (*dot)(const void *x_dot, int param, size_t element),
-                    const void *x_dot, imp_spec *value_dot);
+                    bool scalar, imp_dot_fn *dot, const void *x_dot, imp_spec *value_dot);
     /* d value/du, d value/dv, for what moves over the texture. False, or NULL: the value
      * jumps somewhere, and this derivative is not the whole of it. */
     bool (*slope)(const struct imp_texture *t, const struct imp_texcoord *at, bool scalar,
@@ -269,6 +270,26 @@ struct imp_texture_ops {
     /* As imp_bsdf_ops.changed; of its own texels too. */
     void (*changed)(const struct imp_texture *t);
 };
+
+/* A texture with inputs looks them up itself, at any point it likes: its eval, scatter and
+ * tangent call these with t->input[k] and what they were given. The input may be a
+ * constant, a spectrum or another texture. Threads may share all but the sink. */
+
+/** The value of an input at a point.
+ * @param scalar  read it as one number, in all lanes of *value.
+ * @param[out] value  in the lanes of the walk (at->carried). */
+IMP_API void imp_input_eval(const struct imp_input *input, const struct imp_texcoord *at,
+                            bool scalar, imp_spec *value);
+/** Transpose of its derivative: what `bar` = d objective / d value gives to the numbers of
+ * its parameters, added to the sink. Nothing where the input has none. */
+IMP_API void imp_input_scatter(const struct imp_input *input,
+                               const struct imp_texcoord *at, bool scalar,
+                               const imp_spec *bar, struct imp_sink *sink);
+/** The derivative of its value in direction x_dot, which is read through `dot`.
+ * @param x_dot  handed to `dot`; whatever that takes. */
+IMP_API void imp_input_tangent(const struct imp_input *input,
+                               const struct imp_texcoord *at, bool scalar,
+                               imp_dot_fn *dot, const void *x_dot, imp_spec *value_dot);
 
 /* ---- Shape --------------------------------------------------------------------- */
 

@@ -46,8 +46,7 @@ void imp__inputs_scatter(const struct imp_input *const *input, int n,
                          struct imp_sink *sink);
 /* Derivative in a direction: in_dot [n]. */
 void imp__inputs_tangent(const struct imp_input *const *input, int n,
-                         const struct imp_texcoord *at,
-                         double (*dot)(const void *x_dot, int param, size_t element),
+                         const struct imp_texcoord *at, imp_dot_fn *dot,
                          const void *x_dot, imp_spec *in_dot);
 
 #endif

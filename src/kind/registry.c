@@ -142,10 +142,16 @@ static enum imp_status inputs_check(imp_context *ctx, const char *function,
             return imp__error(ctx, IMP_E_ARG,
                               "%s: ops: input '%s': fallback %g, bounds [%g, %g]",
                               function, d->name, d->fallback, d->lo, d->hi);
-        for (size_t k = 0; k < n; k++)
-            if (strcmp(inputs[k].name, d->name) == 0)
-                return imp__error(ctx, IMP_E_ARG, "%s: ops: two inputs '%s'", function,
-                                  d->name);
+        bool before = false; /* under the same name */
+        for (size_t k = 0; k < n; k++) before |= strcmp(inputs[k].name, d->name) == 0;
+        const bool luminance = d->flags & IMP_INPUT_LUMINANCE;
+        if (before && !luminance)
+            return imp__error(ctx, IMP_E_ARG, "%s: ops: two inputs '%s'", function,
+                              d->name);
+        if (!before && luminance)
+            return imp__error(ctx, IMP_E_ARG,
+                              "%s: ops: no input '%s' before its luminance", function,
+                              d->name);
     }
     if (n > IMP_INPUTS_MAX)
         return imp__error(ctx, IMP_E_ARG, "%s: ops: %zu inputs; at most %d", function, n,
@@ -248,6 +254,11 @@ enum imp_status imp_register_texture(imp_context *context,
     NEEDS(own, scatter);
     NEEDS(own, tangent);
     IMP_CHECKED(inputs_check(context, __func__, own.inputs));
+    for (const struct imp_input_desc *d = own.inputs; d && d->name; d++)
+        if (d->flags & IMP_INPUT_LUMINANCE) /* they are looked up one by one */
+            return imp__error(context, IMP_E_ARG,
+                              "%s: ops: input '%s': IMP_INPUT_LUMINANCE in a texture",
+                              __func__, d->name);
     return append(context, __func__, IMP_CONCEPT_TEXTURE, &own, sizeof own, NULL);
 }
 

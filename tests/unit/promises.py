@@ -47,7 +47,7 @@ for m in re.finditer(r"enum \w+ \{([^}]*)\}", code):
 SCALARS = {"size_t": C.c_size_t, "int": C.c_int, "unsigned": C.c_uint, "double": C.c_double,
            "float": C.c_float, "int64_t": C.c_int64, "uint64_t": C.c_uint64, "int32_t": C.c_int32,
            "uint32_t": C.c_uint32, "uint16_t": C.c_uint16, "uint8_t": C.c_uint8,
-           "imp_progress_fn": C.c_void_p,
+           "imp_progress_fn": C.c_void_p, "imp_dot_fn": C.c_void_p,
            "bool": C.c_bool, "imp_v3": C.c_double * 4, "imp_spec": C.c_double * 4}
 structs = {}
 
@@ -171,7 +171,8 @@ NULLABLE = {"options", "run", "stats", "id", "objective", "gradient_se", "primal
             "imp_problem_nlopt.gradient", "imp_field_eval.gradient", "imp_bend_objective.gradient",
             "imp_build_error.name", "imp_build_string.fallback", "imp_field_read.grid", "imp_bend_tangent.theta_dot", "imp_bend_tangent.x_dot",
             "imp_bend_tangent.d_dot", "imp_bend_fit.result", "imp_last_error.context",
-            "imp_bend_set_progress.payload", "imp_bend_set_progress.progress"}
+            "imp_bend_set_progress.payload", "imp_bend_set_progress.progress",
+            "imp_input_tangent.x_dot"}
 NOT_NULLABLE = {"imp_bend_set_options.o", "imp_elements_fit.options",
                 "imp_problem_jacobian_sums.primal"}
 INPUT = {"imp_bend_adjoint.out"}  # structs of pointers to write to, not written themselves
@@ -184,7 +185,10 @@ ANY_NUMBER = {"imp_bend_set_bounds.lo": "infinite: none", "imp_bend_set_bounds.h
               "imp_field_splat.a": "adds a multiple", "imp_field_splat.b": "adds a multiple",
               "imp_field_tangent.x": "a function of x", "imp_field_tangent.theta_dot": "linear in it",
               "imp_bend_hold_rim.value": "NaN: as it is", "imp_bend_hold_outside.value": "NaN: as it is",
-              "imp_bend_hold_number.value": "NaN: as it is"}
+              "imp_bend_hold_number.value": "NaN: as it is",
+              **{"imp_input_%s.%s" % (f, a): "a function of it" for f, a in
+                 (("eval", "input"), ("eval", "at"), ("scatter", "input"), ("scatter", "at"), ("scatter", "bar"),
+                  ("tangent", "input"), ("tangent", "at"))}}
 
 # Arguments whose numbers have names of their own in messages.
 ALSO = {"imp_scene_spectrum.wavelengths_nm": ["sample 0"], "imp_scene_spectrum.values": ["sample 0"],
@@ -343,7 +347,7 @@ class Fixture:
                        "radius": 2., "hi": 3., "lo": 1., "value": 1.5 if a.ctype is C.c_double else 1,
                        "n_vertices": 3, "n_triangles": 1, "layers": 1, "a": 1., "pilots": 2, "n_groups": 1,
                        "n": {"imp_scene_set_values": 1, "imp_scene_spectrum": 2, "imp_problem_nlopt": 3}.get(function, 1)}
-            zeros = {"status", "cause", "sensor", "channel", "x", "y", "sample", "json", "i", "from_here",
+            zeros = {"scalar", "status", "cause", "sensor", "channel", "x", "y", "sample", "json", "i", "from_here",
                      "kind", "progress", "rays", "ray", "bundle", "target", "edge", "most"}
             if key == "imp_bend_image.target": return 4, None  # the fixture adds it
             if a.name in scalars: return scalars[a.name], None
@@ -379,6 +383,17 @@ class Fixture:
             s = self.struct(a.struct.__name__, function)
             self.keep.append(s)
             return C.addressof(s), s
+        if name in ("imp_spec", "imp_v3"):
+            v = self.array(C.c_double, 4)
+            return C.addressof(v), None if a.const else v
+        if name in ("struct imp_input", "struct imp_sink") or name == "imp_dot_fn":
+            nothing = C.CFUNCTYPE(C.c_double)(lambda: 0.)
+            s = a.struct() if a.struct is not None else None
+            self.keep += [nothing, s]
+            if s is None: return C.cast(nothing, C.c_void_p), None
+            if name == "struct imp_sink": s.add = C.cast(nothing, C.c_void_p)
+            else: s.count = 1  # one number, of parameter 0
+            return C.addressof(s), None
         if a.struct is not None:  # arrays: exits, cotangents, arrivals
             s = self.array(a.struct, 4096)
             if key == "imp_bend_adjoint.exits":

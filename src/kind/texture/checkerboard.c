@@ -44,17 +44,17 @@ static const struct imp_input *choose(const struct imp_texture *t,
 static void eval(const struct imp_texture *t, const struct imp_texcoord *at, bool scalar,
                  imp_spec *value)
 {
-    imp__input_eval(choose(t, at, scalar), scalar, at, value);
+    imp_input_eval(choose(t, at, scalar), at, scalar, value);
 }
 static void scatter(const struct imp_texture *t, const struct imp_texcoord *at,
                     bool scalar, const imp_spec *bar, struct imp_sink *sink)
 {
-    imp__input_scatter(choose(t, at, scalar), scalar, at, bar, sink);
+    imp_input_scatter(choose(t, at, scalar), at, scalar, bar, sink);
 }
 static void tangent(const struct imp_texture *t, const struct imp_texcoord *at,
                     bool scalar, imp_dot_fn *dot, const void *x_dot, imp_spec *value_dot)
 {
-    imp__input_tangent(choose(t, at, scalar), scalar, at, dot, x_dot, value_dot);
+    imp_input_tangent(choose(t, at, scalar), at, scalar, dot, x_dot, value_dot);
 }
 
 const struct imp_texture_ops imp__checkerboard = {.size = sizeof(struct imp_texture_ops),

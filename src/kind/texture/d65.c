@@ -31,7 +31,7 @@ static void eval(const struct imp_texture *t, const struct imp_texcoord *at, boo
                  imp_spec *value)
 {
     const struct d65 *d = t->self;
-    imp__input_eval(t->input[0], scalar, at, value);
+    imp_input_eval(t->input[0], at, scalar, value);
     *value *= d->scale;
 }
 static void scatter(const struct imp_texture *t, const struct imp_texcoord *at,
@@ -39,13 +39,13 @@ static void scatter(const struct imp_texture *t, const struct imp_texcoord *at,
 {
     const struct d65 *d = t->self;
     const imp_spec scaled = *bar * d->scale;
-    imp__input_scatter(t->input[0], scalar, at, &scaled, sink);
+    imp_input_scatter(t->input[0], at, scalar, &scaled, sink);
 }
 static void tangent(const struct imp_texture *t, const struct imp_texcoord *at,
                     bool scalar, imp_dot_fn *dot, const void *x_dot, imp_spec *value_dot)
 {
     const struct d65 *d = t->self;
-    imp__input_tangent(t->input[0], scalar, at, dot, x_dot, value_dot);
+    imp_input_tangent(t->input[0], at, scalar, dot, x_dot, value_dot);
     *value_dot *= d->scale;
 }
 

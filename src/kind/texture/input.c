@@ -5,6 +5,7 @@
  * all lanes are one number; with wavelengths a lane is a weighted sum of neighbouring
  * samples of a spectrum. */
 #include "input.h"
+#include "base/arguments.h"
 #include "color/rgb.h"
 #include "color/spectrum.h"
 #include "math/vec.h"
@@ -81,8 +82,8 @@ static void spectrum_tangent(const struct imp_input *input, const struct imp_car
 
 /* ---- One input ------------------------------------------------------------------- */
 
-void imp__input_eval(const struct imp_input *input, bool scalar,
-                     const struct imp_texcoord *at, imp_spec *value)
+static void input_eval(const struct imp_input *input, const struct imp_texcoord *at,
+                       bool scalar, imp_spec *value)
 {
     if (input->texture) input->texture->ops->eval(input->texture, at, scalar, value);
     else if (by_wavelength(input, scalar, at)) spectrum_eval(input, at->carried, value);
@@ -91,9 +92,8 @@ void imp__input_eval(const struct imp_input *input, bool scalar,
     else *value = input->value;
 }
 
-void imp__input_scatter(const struct imp_input *input, bool scalar,
-                        const struct imp_texcoord *at, const imp_spec *bar,
-                        struct imp_sink *sink)
+static void input_scatter(const struct imp_input *input, const struct imp_texcoord *at,
+                          bool scalar, const imp_spec *bar, struct imp_sink *sink)
 {
     if (input->texture)
         input->texture->ops->scatter(input->texture, at, scalar, bar, sink);
@@ -105,9 +105,9 @@ void imp__input_scatter(const struct imp_input *input, bool scalar,
     else sink->add(sink, input->param, 0, input->count == 3 ? 3 : 1, bar);
 }
 
-void imp__input_tangent(const struct imp_input *input, bool scalar,
-                        const struct imp_texcoord *at, imp_dot_fn *dot, const void *x_dot,
-                        imp_spec *value_dot)
+static void input_tangent(const struct imp_input *input, const struct imp_texcoord *at,
+                          bool scalar, imp_dot_fn *dot, const void *x_dot,
+                          imp_spec *value_dot)
 {
     if (input->texture) {
         input->texture->ops->tangent(input->texture, at, scalar, dot, x_dot, value_dot);
@@ -122,6 +122,37 @@ void imp__input_tangent(const struct imp_input *input, bool scalar,
                      b = dot(x_dot, input->param, 2);
         *value_dot = scalar ? mean(r, g, b) : (imp_spec){r, g, b, 0};
     }
+}
+
+/* For textures with inputs. */
+void imp_input_eval(const struct imp_input *input, const struct imp_texcoord *at,
+                    bool scalar, imp_spec *value)
+{
+    IMP_REQUIRE_OR(NULL, input, "input", );
+    IMP_REQUIRE_OR(NULL, at, "at", );
+    IMP_REQUIRE_OR(NULL, value, "value", );
+    input_eval(input, at, scalar, value);
+}
+
+void imp_input_scatter(const struct imp_input *input, const struct imp_texcoord *at,
+                       bool scalar, const imp_spec *bar, struct imp_sink *sink)
+{
+    IMP_REQUIRE_OR(NULL, input, "input", );
+    IMP_REQUIRE_OR(NULL, at, "at", );
+    IMP_REQUIRE_OR(NULL, bar, "bar", );
+    IMP_REQUIRE_OR(NULL, sink, "sink", );
+    input_scatter(input, at, scalar, bar, sink);
+}
+
+void imp_input_tangent(const struct imp_input *input, const struct imp_texcoord *at,
+                       bool scalar, imp_dot_fn *dot, const void *x_dot,
+                       imp_spec *value_dot)
+{
+    IMP_REQUIRE_OR(NULL, input, "input", );
+    IMP_REQUIRE_OR(NULL, at, "at", );
+    IMP_REQUIRE_OR(NULL, dot, "dot", );
+    IMP_REQUIRE_OR(NULL, value_dot, "value_dot", );
+    input_tangent(input, at, scalar, dot, x_dot, value_dot);
 }
 
 /* ---- Luminances of other inputs -------------------------------------------------- */
@@ -163,7 +194,7 @@ static void luminance_scatter(const struct imp_input *colour, imp_spec weight,
         if (weight[lane] == 0) continue; /* a lane that is not used */
         const imp_spec part = weight * (*bar)[lane];
         if (part[0] != 0 || part[1] != 0 || part[2] != 0)
-            imp__input_scatter(colour, colour->scalar, at, &part, &one.sink);
+            input_scatter(colour, at, colour->scalar, &part, &one.sink);
     }
 }
 
@@ -178,7 +209,7 @@ void imp__inputs_eval(const struct imp_input *const *input, int n,
         if (imp_likely(i->plain && colours)) in[j] = i->value;
         else if (i->luminance)
             in[j] = imp__spec(weighted(i->weight, in[j - i->luminance]));
-        else imp__input_eval(i, i->scalar, at, &in[j]);
+        else input_eval(i, at, i->scalar, &in[j]);
     }
 }
 
@@ -195,7 +226,7 @@ void imp__inputs_scatter(const struct imp_input *const *input, int n,
         } else if (i->luminance) {
             luminance_scatter(input[j - i->luminance], i->weight, at, &in_bar[j], sink);
         } else {
-            imp__input_scatter(i, i->scalar, at, &in_bar[j], sink);
+            input_scatter(i, at, i->scalar, &in_bar[j], sink);
         }
     }
 }
@@ -208,6 +239,6 @@ void imp__inputs_tangent(const struct imp_input *const *input, int n,
         const struct imp_input *i = input[j];
         if (imp_unlikely(i->luminance))
             in_dot[j] = imp__spec(weighted(i->weight, in_dot[j - i->luminance]));
-        else imp__input_tangent(i, i->scalar, at, dot, x_dot, &in_dot[j]);
+        else input_tangent(i, at, i->scalar, dot, x_dot, &in_dot[j]);
     }
 }

@@ -139,9 +139,8 @@ static void ramp_scatter(const struct imp_texture *t, const struct imp_texcoord 
     sink->add(sink, t->param, 0, 1, &d);
 }
 static void ramp_tangent(const struct imp_texture *t, const struct imp_texcoord *at,
-                         bool scalar,
-                         double (*dot)(const void *x_dot, int param, size_t element),
-                         const void *x_dot, imp_spec *value_dot)
+                         bool scalar, imp_dot_fn *dot, const void *x_dot,
+                         imp_spec *value_dot)
 {
     (void)scalar;
     imp_spec_fill(value_dot, dot(x_dot, t->param, 0) * at->uv[0]);
@@ -153,6 +152,52 @@ static const struct imp_texture_ops ramp = {.size = sizeof(struct imp_texture_op
                                             .eval = ramp_eval,
                                             .scatter = ramp_scatter,
                                             .tangent = ramp_tangent};
+
+/* ---- A texture of textures: a/4 + 3 b/4 ------------------------------------------ */
+
+static const struct imp_input_desc blend_inputs[] = {
+    {.name = "a", .role = IMP_REFLECTANCE, .fallback = 0.5, .hi = 1, .unit = "1"},
+    {.name = "b", .role = IMP_REFLECTANCE, .fallback = 0.5, .hi = 1, .unit = "1"},
+    {0}};
+static enum imp_status blend_build(const struct imp_build *b, void *self,
+                                   struct imp_texture *t)
+{
+    (void)b, (void)self;
+    t->param = -1;
+    return IMP_OK;
+}
+static void blend_eval(const struct imp_texture *t, const struct imp_texcoord *at,
+                       bool scalar, imp_spec *value)
+{
+    imp_spec a, b;
+    imp_input_eval(t->input[0], at, scalar, &a);
+    imp_input_eval(t->input[1], at, scalar, &b);
+    *value = a * 0.25 + b * 0.75;
+}
+static void blend_scatter(const struct imp_texture *t, const struct imp_texcoord *at,
+                          bool scalar, const imp_spec *bar, struct imp_sink *sink)
+{
+    const imp_spec a = *bar * 0.25, b = *bar * 0.75;
+    imp_input_scatter(t->input[0], at, scalar, &a, sink);
+    imp_input_scatter(t->input[1], at, scalar, &b, sink);
+}
+static void blend_tangent(const struct imp_texture *t, const struct imp_texcoord *at,
+                          bool scalar, imp_dot_fn *dot, const void *x_dot,
+                          imp_spec *value_dot)
+{
+    imp_spec a, b;
+    imp_input_tangent(t->input[0], at, scalar, dot, x_dot, &a);
+    imp_input_tangent(t->input[1], at, scalar, dot, x_dot, &b);
+    *value_dot = a * 0.25 + b * 0.75;
+}
+static const struct imp_texture_ops blend = {.size = sizeof(struct imp_texture_ops),
+                                             .name = "blend",
+                                             .object_size = 1,
+                                             .inputs = blend_inputs,
+                                             .build = blend_build,
+                                             .eval = blend_eval,
+                                             .scatter = blend_scatter,
+                                             .tangent = blend_tangent};
 
 /* ---- Scenes -------------------------------------------------------------------- */
 
@@ -213,6 +258,17 @@ static void compare(imp_scene *scene, const char *what, double value, size_t n_a
         ok(st == IMP_OK && se[k] < 1e-2 && fabs(g[k] - derivative[k]) < 4 * se[k] + 1e-6,
            text);
     }
+
+    /* Forward along all active numbers: the reverse gradients added up. */
+    double x_dot[8], forward = 0, reverse = 0;
+    imp_film *tangent = NULL;
+    for (size_t k = 0; k < n_active; k++) x_dot[k] = 1, reverse += g[k];
+    if (st == IMP_OK) st = imp_problem_forward(p, x_dot, &run, &tangent);
+    for (int i = 0; st == IMP_OK && i < N; i++)
+        forward += (double)imp_film_mean(tangent)[3 * i] / N;
+    snprintf(text, sizeof text, "%s: forward %.9f, reverse %.9f", what, forward, reverse);
+    ok(st == IMP_OK && fabs(forward - reverse) <= 1e-6 * fabs(reverse), text);
+    imp_film_destroy(tangent);
     imp_problem_destroy(p);
     imp_film_destroy(film);
 }
@@ -260,7 +316,16 @@ int main(void)
     refused(ctx, imp_register_bsdf(ctx, &minnaert), "registered already");
     ok(imp_register_emitter(ctx, &zenith) == IMP_OK, "an emitter");
     ok(imp_register_texture(ctx, &ramp) == IMP_OK, "a texture");
+    ok(imp_register_texture(ctx, &blend) == IMP_OK, "a texture with inputs");
     struct imp_texture_ops t = ramp;
+    struct imp_input_desc two[] = {blend_inputs[0], blend_inputs[0], {0}};
+    t.inputs = two;
+    refused(ctx, imp_register_texture(ctx, &t), "two inputs 'a'");
+    two[1].flags = IMP_INPUT_LUMINANCE;
+    refused(ctx, imp_register_texture(ctx, &t), "IMP_INPUT_LUMINANCE in a texture");
+    two[1].name = "b";
+    refused(ctx, imp_register_texture(ctx, &t), "no input 'b' before its luminance");
+    t = ramp;
     t.name = "minnaert";
     ok(imp_register_texture(ctx, &t) == IMP_OK, "another concept, the same name");
 
@@ -298,6 +363,20 @@ int main(void)
     const char *const slope[] = {"dust.reflectance.slope"};
     if (st == IMP_OK)
         compare(scene, "own texture", 0.25 * base, 1, 1, slope, (double[]){0.5 * base});
+    imp_scene_destroy(scene);
+
+    /* a is s u, of mean s/2: s/8 + 3 b/4 */
+    st = load(ctx,
+              "<texture name='reflectance' type='blend'>"
+              "<texture name='a' type='ramp'><float name='a' value='0.8'/></texture>"
+              "<rgb name='b' value='0.6,0.2,0.4'/></texture>",
+              "", &scene);
+    ok(st == IMP_OK, imp_last_error(ctx));
+    const char *const blended[] = {"dust.reflectance.a.slope",
+                                   "dust.reflectance.b.value"};
+    if (st == IMP_OK)
+        compare(scene, "own texture of textures", (0.1 + 0.45) * base, 4, 2, blended,
+                (double[]){base / 8, 0.75 * base});
     imp_scene_destroy(scene);
 
     st = load(ctx, "", "<float name='gain' value='-1'/>", &scene);
