@@ -7,23 +7,12 @@
  *   jacobian_channel   a channel more of a pixel of derivative pictures
  *   adam_number        a texel's channel more of a fit by Adam, scene and result included
  */
-#include <importon/importon.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
+#include "../tests/imp_scene.h"
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 enum { JACOBIAN_CHANNELS = 3 * 4 }; /* the picture, and its derivative by an rgb */
-
-static void must(imp_context *ctx, enum imp_status st)
-{
-    if (st == IMP_OK) return;
-    fprintf(stderr, "memory: %s: %s\n", imp_status_text(st),
-            ctx ? imp_last_error(ctx) : "");
-    exit(3);
-}
 
 /* A textured wall under an even sky. */
 static imp_scene *wall(imp_context *ctx, int side, int texels)
@@ -33,62 +22,39 @@ static imp_scene *wall(imp_context *ctx, int side, int texels)
     imp_scene *s;
     if (!pixels) exit(3);
     for (size_t k = 0; k < n; k++) pixels[k] = .5f;
-    must(ctx, imp_scene_create(ctx, NULL, &s));
-    imp_scene_begin(s, "integrator", "direct", NULL, NULL);
-    imp_scene_end(s);
-    imp_scene_begin(s, "sensor", "perspective", NULL, NULL);
-    const double camera[16] = {-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 3, 0, 0, 0, 1};
-    imp_scene_transform(s, "to_world", camera);
-    imp_scene_begin(s, "film", "hdrfilm", NULL, NULL);
-    imp_scene_integer(s, "width", side);
-    imp_scene_integer(s, "height", side);
-    imp_scene_begin(s, "rfilter", "box", NULL, NULL);
-    imp_scene_end(s);
-    imp_scene_end(s);
-    imp_scene_end(s);
-    imp_scene_begin(s, "shape", "rectangle", NULL, NULL);
-    imp_scene_begin(s, "bsdf", "diffuse", "paint", NULL);
-    imp_scene_begin(s, "texture", "bitmap", "texels", "reflectance");
-    imp_scene_image(s, texels, texels, 3, pixels);
-    imp_scene_end(s);
-    imp_scene_end(s);
-    imp_scene_end(s);
-    imp_scene_begin(s, "emitter", "constant", "sky", NULL);
-    imp_scene_rgb(s, "radiance", (double[3]){1, 2, 3});
-    imp_scene_end(s);
-    must(ctx, imp_scene_commit(s));
+    test_must(ctx, imp_scene_create(ctx, NULL, &s));
+    test_camera(s, 3, 30, side, side);
+    test_picture_wall(s, texels, texels, pixels);
+    test_must(ctx, imp_scene_commit(s));
     free(pixels);
     return s;
 }
 
 static void work(const char *what, int size)
 {
-    struct imp_context_options o = IMP_CONTEXT_OPTIONS_INIT;
     struct imp_run run = IMP_RUN_INIT;
     const int fit = !strcmp(what, "adam");
-    imp_context *ctx = NULL;
+    imp_context *ctx = test_context(2);
     imp_problem *p;
     imp_film *film = NULL, *films[3];
-    o.threads = 2;
-    must(NULL, imp_context_create(&o, &ctx));
     imp_scene *s = wall(ctx, fit ? 64 : size, fit ? size : 2);
-    must(ctx, imp_problem_create(s, &p));
+    test_must(ctx, imp_problem_create(s, &p));
     run.spp = 4;
     if (!strcmp(what, "picture")) {
-        must(ctx, imp_render(s, &run, &film));
+        test_must(ctx, imp_render(s, &run, &film));
     } else if (!strcmp(what, "jacobian")) {
-        must(ctx, imp_problem_activate(p, "sky.radiance.value"));
-        must(ctx, imp_problem_jacobian(p, &run, &film, films));
+        test_must(ctx, imp_problem_activate(p, "*radiance*"));
+        test_must(ctx, imp_problem_jacobian(p, &run, &film, films));
     } else {
         static float target[64 * 64 * 3];
         struct imp_target t = IMP_TARGET_INIT;
         struct imp_fit_options f = IMP_FIT_OPTIONS_INIT;
         const struct imp_fit_result *result;
         t.width = t.height = 64, t.channels = 3, t.pixels = target;
-        must(ctx, imp_problem_activate(p, "*data*"));
-        must(ctx, imp_problem_add_target(p, &t));
+        test_must(ctx, imp_problem_activate(p, "*data*"));
+        test_must(ctx, imp_problem_add_target(p, &t));
         f.max_iterations = 3;
-        must(ctx, imp_fit(p, &f, &run, &result));
+        test_must(ctx, imp_fit(p, &f, &run, &result));
     }
 }
 
