@@ -69,9 +69,18 @@ static int write_history(const struct imp_fit_result *r)
     return rc;
 }
 
-static void put_variable(struct json *j, const struct imp_fit_variable *v,
+/* Number i of the fit that has just ended. */
+static struct imp_fit_variable variable_at(const imp_problem *problem, size_t i)
+{
+    struct imp_fit_variable v = {0};
+    (void)!imp_problem_fit_variable(problem, i, &v); /* it is there */
+    return v;
+}
+
+static void put_variable(struct json *j, const imp_problem *problem, size_t i,
                          const char *unit, const char *name)
 {
+    const struct imp_fit_variable all = variable_at(problem, i), *v = &all;
     json_object(j, NULL);
     json_text(j, "name", name);
     json_text(j, "unit", unit);
@@ -93,8 +102,9 @@ static void put_texture(struct json *j, const struct block *b, const char *path)
     json_text(j, "file", path);
     json_end_object(j);
 }
-static void put_json(struct json *j, const struct imp_fit_result *r,
-                     const struct block *blocks, size_t n_blocks, char **paths)
+static void put_json(struct json *j, const imp_problem *problem,
+                     const struct imp_fit_result *r, const struct block *blocks,
+                     size_t n_blocks, char **paths)
 {
     json_text(j, "optimizer", optimizer_words[o.optimizer]);
     json_text(j, "loss", loss_word());
@@ -122,14 +132,14 @@ static void put_json(struct json *j, const struct imp_fit_result *r,
             continue;
         }
         for (size_t i = 0; i < b->n; i++)
-            put_variable(j, &r->variables[b->first + i], b->info.unit,
+            put_variable(j, problem, b->first + i, b->info.unit,
                          cli_number_name(&b->info, i, name, sizeof name));
     }
     json_end_array(j);
 }
 
-static int write_json(const struct imp_fit_result *r, const struct block *blocks,
-                      size_t n_blocks, char **paths)
+static int write_json(const imp_problem *problem, const struct imp_fit_result *r,
+                      const struct block *blocks, size_t n_blocks, char **paths)
 {
     char *path = join_path(cli.out, "parameters.json");
     struct output to;
@@ -139,7 +149,7 @@ static int write_json(const struct imp_fit_result *r, const struct block *blocks
         json_object(&j, NULL);
         json_text(&j, "importon", imp_version());
         json_text(&j, "command", "fit");
-        put_json(&j, r, blocks, n_blocks, paths);
+        put_json(&j, problem, r, blocks, n_blocks, paths);
         cli_json_end(&j);
         rc = output_close(&to, 0);
     }
@@ -163,8 +173,8 @@ static void print_residual(const struct imp_fit_result *r)
     printf("\n");
 }
 
-static void print_table(const struct imp_fit_result *r, const struct block *blocks,
-                        size_t n_blocks, char **paths)
+static void print_table(const imp_problem *problem, const struct imp_fit_result *r,
+                        const struct block *blocks, size_t n_blocks, char **paths)
 {
     int width = 9;
     for (size_t k = 0; k < n_blocks; k++)
@@ -181,7 +191,8 @@ static void print_table(const struct imp_fit_result *r, const struct block *bloc
             continue;
         }
         for (size_t i = 0; i < b->n; i++) {
-            const struct imp_fit_variable *v = &r->variables[b->first + i];
+            const struct imp_fit_variable all = variable_at(problem, b->first + i),
+                                          *v = &all;
             printf("%-*s  %-11.6g %-11.6g ", width,
                    cli_number_name(&b->info, i, name, sizeof name), v->start, v->value);
             char interval[64] = "-";
@@ -215,7 +226,7 @@ static int write_textures(const imp_problem *problem, const struct block *blocks
 }
 
 /* What was recovered as --set @FILE takes it, for the next fit, or a render. */
-static int write_set(const struct imp_fit_result *r, const struct block *blocks,
+static int write_set(const imp_problem *problem, const struct block *blocks,
                      size_t n_blocks)
 {
     char *path = join_path(cli.out, "recovered.txt");
@@ -226,7 +237,8 @@ static int write_set(const struct imp_fit_result *r, const struct block *blocks,
         if (block_is_large(b)) continue;
         fprintf(to.file, "%s=", b->info.name);
         for (size_t i = 0; i < b->n; i++)
-            fprintf(to.file, "%s%.17g", i ? "," : "", r->variables[b->first + i].value);
+            fprintf(to.file, "%s%.17g", i ? "," : "",
+                    variable_at(problem, b->first + i).value);
         fprintf(to.file, "\n");
     }
     rc = output_close(&to, rc);
@@ -242,15 +254,15 @@ static int answer(imp_problem *problem, const struct imp_fit_result *r,
     if (cli.out) {
         rc = write_textures(problem, blocks, n_blocks, paths);
         if (!rc) rc = write_history(r);
-        if (!rc) rc = write_json(r, blocks, n_blocks, paths);
-        if (!rc) rc = write_set(r, blocks, n_blocks);
+        if (!rc) rc = write_json(problem, r, blocks, n_blocks, paths);
+        if (!rc) rc = write_set(problem, blocks, n_blocks);
     }
     if (cli.json) {
         struct json j = cli_json();
-        put_json(&j, r, blocks, n_blocks, paths);
+        put_json(&j, problem, r, blocks, n_blocks, paths);
         cli_json_end(&j);
     } else {
-        print_table(r, blocks, n_blocks, paths);
+        print_table(problem, r, blocks, n_blocks, paths);
     }
     if (r->warning) cli_say("importon: warning: %s", r->warning);
     for (size_t k = 0; k < n_blocks; k++) free(paths[k]);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * An allocator that counts, and fails from the n-th allocation on:
+ * An allocator that counts blocks and bytes, and fails from the n-th allocation on:
  *
  *     struct fail_alloc heap = {0};
  *     imp_context *fragile = fail_alloc_context(&heap);
@@ -13,12 +13,15 @@
 #include <importon/importon.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 
 struct fail_alloc {
-    long fail_at; /* 1: the first */
-    long calls;   /* so far */
-    long live;    /* blocks not released */
+    long fail_at;       /* 1: the first */
+    long calls;         /* so far */
+    long live;          /* blocks not released */
+    size_t bytes, peak; /* in them; the most so far, by one thread */
 };
+enum { FAIL_ALLOC_HEAD = 64 }; /* in front of a block: its size */
 
 static inline void *fail_alloc_allocate(size_t bytes, void *payload)
 {
@@ -26,15 +29,24 @@ static inline void *fail_alloc_allocate(size_t bytes, void *payload)
     const long n = __atomic_add_fetch(&heap->calls, 1, __ATOMIC_RELAXED);
     void *p = NULL;
     if (heap->fail_at && n >= heap->fail_at) return NULL;
-    if (posix_memalign(&p, 64, bytes) != 0) return NULL;
+    if (bytes > SIZE_MAX - FAIL_ALLOC_HEAD ||
+        posix_memalign(&p, 64, bytes + FAIL_ALLOC_HEAD) != 0)
+        return NULL;
     __atomic_add_fetch(&heap->live, 1, __ATOMIC_RELAXED);
-    return p;
+    const size_t now = __atomic_add_fetch(&heap->bytes, bytes, __ATOMIC_RELAXED);
+    if (now > heap->peak) heap->peak = now;
+    memcpy(p, &bytes, sizeof bytes);
+    return (char *)p + FAIL_ALLOC_HEAD;
 }
 static inline void fail_alloc_release(void *memory, void *payload)
 {
     struct fail_alloc *heap = payload;
+    char *block = (char *)memory - FAIL_ALLOC_HEAD;
+    size_t bytes;
+    memcpy(&bytes, block, sizeof bytes);
     __atomic_sub_fetch(&heap->live, 1, __ATOMIC_RELAXED);
-    free(memory);
+    __atomic_sub_fetch(&heap->bytes, bytes, __ATOMIC_RELAXED);
+    free(block);
 }
 static inline struct imp_allocator fail_alloc_hooks(struct fail_alloc *heap)
 {

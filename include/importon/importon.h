@@ -651,7 +651,9 @@ struct imp_fit_result {
     const double *history; /**< [n_history] objective of every iteration */
     const double *history_se;
     size_t n;
-    const struct imp_fit_variable *variables; /**< [n] */
+    const struct imp_fit_variable *variables; /**< [n]; NULL if n > 1024, where rows of
+                                                   this size would take more memory than
+                                                   the fit: imp_problem_fit_variable */
     double condition;                         /**< of the scaled J^T J; 0: not computed */
     const char *reason;                       /**< why it stopped */
     const char *warning; /**< e.g. what is not determined; NULL: none */
@@ -677,6 +679,12 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_fit(imp_problem *problem,
                                                const struct imp_fit_options *options,
                                                const struct imp_run *run,
                                                const struct imp_fit_result **result);
+
+/** Number i < n of the problem's last fit, whatever n.
+ * @return IMP_E_ARG also if there was no fit. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_problem_fit_variable(const imp_problem *problem, size_t i,
+                         struct imp_fit_variable *variable);
 
 /* ---- Checking ------------------------------------------------------------------ */
 

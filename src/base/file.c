@@ -107,12 +107,34 @@ static int write_all(int fd, const unsigned char *p, size_t size)
     return 0;
 }
 
-static int write_parts(int fd, const struct imp_part *parts, size_t n)
+static void flush(struct imp_file_writer *w)
 {
-    int code = 0;
-    for (size_t k = 0; k < n && !code; k++)
-        code = write_all(fd, parts[k].data, parts[k].size);
-    return code;
+    if (!w->error) w->error = write_all(w->fd, w->buffer, w->used);
+    w->used = 0;
+}
+
+void imp__file_put(struct imp_file_writer *w, const void *data, size_t n)
+{
+    if (n > sizeof w->buffer - w->used) flush(w);
+    if (n > sizeof w->buffer) {
+        if (!w->error) w->error = write_all(w->fd, data, n);
+    } else if (n) {
+        memcpy(w->buffer + w->used, data, n);
+        w->used += n;
+    }
+}
+
+/* Returns errno, or 0. */
+static int fill_all(int fd, void (*fill)(struct imp_file_writer *w, const void *payload),
+                    const void *payload)
+{
+    struct imp_file_writer w;
+    w.fd = fd;
+    w.error = 0;
+    w.used = 0;
+    fill(&w, payload);
+    flush(&w);
+    return w.error;
 }
 
 /* A name beside `path` that is free: created, never opened over something. */
@@ -140,8 +162,10 @@ static void folder_sync(const char *path, char *scratch, size_t size)
     close(fd);
 }
 
-enum imp_status imp__file_write_parts(imp_context *ctx, const char *path,
-                                      const struct imp_part *parts, size_t n)
+enum imp_status imp__file_write_by(imp_context *ctx, const char *path,
+                                   void (*fill)(struct imp_file_writer *w,
+                                                const void *payload),
+                                   const void *payload)
 {
     struct stat info;
     const bool exists = stat(path, &info) == 0;
@@ -150,7 +174,7 @@ enum imp_status imp__file_write_parts(imp_context *ctx, const char *path,
     if (exists && !S_ISREG(info.st_mode)) {
         const int fd = open(path, O_WRONLY | O_CLOEXEC);
         if (fd < 0) return io_error(ctx, path, "cannot open", errno);
-        const int code = write_parts(fd, parts, n);
+        const int code = fill_all(fd, fill, payload);
         if (close(fd) != 0 || code) return io_error(ctx, path, "cannot write", code);
         return IMP_OK;
     }
@@ -165,7 +189,7 @@ enum imp_status imp__file_write_parts(imp_context *ctx, const char *path,
     fd = temporary_open(target, 0666, name, room);
     if (fd < 0) IMP_TRY(io_error(ctx, path, "cannot create", errno));
     if (exists) (void)fchmod(fd, info.st_mode & 07777);
-    code = write_parts(fd, parts, n);
+    code = fill_all(fd, fill, payload);
     if (!code && fsync(fd) != 0 && errno != EINVAL && errno != EROFS) code = errno;
     if (close(fd) != 0 && !code) code = errno;
     if (!code && rename(name, target) != 0) code = errno;
@@ -177,6 +201,23 @@ enum imp_status imp__file_write_parts(imp_context *ctx, const char *path,
 out:
     imp__release(ctx, name);
     return st;
+}
+
+struct parts {
+    const struct imp_part *part;
+    size_t n;
+};
+static void parts_fill(struct imp_file_writer *w, const void *payload)
+{
+    const struct parts *p = payload;
+    for (size_t k = 0; k < p->n; k++) imp__file_put(w, p->part[k].data, p->part[k].size);
+}
+
+enum imp_status imp__file_write_parts(imp_context *ctx, const char *path,
+                                      const struct imp_part *parts, size_t n)
+{
+    const struct parts p = {parts, n};
+    return imp__file_write_by(ctx, path, parts_fill, &p);
 }
 
 enum imp_status imp__file_write(imp_context *ctx, const char *path, const void *data,

@@ -20,6 +20,17 @@ enum imp_status imp__file_read(imp_context *ctx, const char *path, size_t limit,
  */
 enum imp_status imp__file_write(imp_context *ctx, const char *path, const void *data,
                                 size_t size);
+/* The same, of what `fill` puts into it, in order: no more than the buffer is held. */
+struct imp_file_writer {
+    int fd, error; /* errno of the first failure: later bytes are dropped */
+    size_t used;
+    unsigned char buffer[1 << 14];
+};
+void imp__file_put(struct imp_file_writer *w, const void *data, size_t n);
+enum imp_status imp__file_write_by(imp_context *ctx, const char *path,
+                                   void (*fill)(struct imp_file_writer *w,
+                                                const void *payload),
+                                   const void *payload);
 /* The same, of parts in turn. */
 struct imp_part {
     const void *data;

@@ -82,120 +82,6 @@ static enum imp_status intervals(struct imp__fit *f, const struct imp__search *s
     return IMP_OK;
 }
 
-static enum imp_status result_make(struct imp__fit *f, const struct imp__search *s,
-                                   const double *x, struct imp_estimate objective,
-                                   const struct imp__uncertainty *u,
-                                   struct imp_fit_variable *variables, const char *why,
-                                   const struct imp__fit_shift *shift,
-                                   const struct imp_fit_result **out)
-{
-    struct imp_arena *arena = &f->problem->fit_arena;
-    const size_t n = f->problem->n;
-    size_t determined = 0;
-    struct imp_fit_result *r = imp__arena_array(arena, 1, sizeof *r);
-    double *history = imp__arena_array(arena, 2 * s->n_history + 1, sizeof *history);
-
-    if (!r || !history)
-        return imp__error(f->problem->ctx, IMP_E_NOMEM,
-                          "no memory for the result of a fit");
-    for (size_t k = 0; k < n; k++) {
-        struct imp_fit_variable *v = &variables[k];
-        v->start = imp__search_start(s, k);
-        v->value = x[k];
-        v->at_bound = imp__at_bound(&f->goal, x, k);
-        determined += u->n == 0 || v->determined;
-        if (u->n) continue;
-        v->se = v->lo95 = v->hi95 = NAN;
-        v->determined = 1; /* nothing says the contrary */
-    }
-    if (s->n_history > 0) {
-        memcpy(history, s->history, s->n_history * sizeof *history);
-        memcpy(history + s->n_history, s->history_se, s->n_history * sizeof *history);
-    }
-    const struct imp__fit_residual left = imp__fit_residual(f, x, objective, determined);
-    *r = (struct imp_fit_result){
-        .size = sizeof *r,
-        .iterations = s->iteration,
-        .objective = objective,
-        .n_history = s->n_history,
-        .history = history,
-        .history_se = history + s->n_history,
-        .n = n,
-        .variables = variables,
-        .condition = u->condition,
-        .reason = !f->stopped                                       ? s->reason
-                  : f->deadline_s > 0 && imp__now() > f->deadline_s ? "time limit reached"
-                                                                    : "cancelled",
-        .warning = imp__fit_warning(f, objective.bias_order, variables, u->loosest, why,
-                                    &left, shift),
-        .shift = shift->of_se >= 0 ? shift->of_se : NAN,
-        .residual = left.relative,
-        .residual_hi = left.relative_hi,
-        .chi2 = left.chi2,
-        .chi2_se = left.chi2_se};
-    *out = r;
-    return IMP_OK;
-}
-
-/* Is parameter k active, and kept in doubles? */
-static bool is_double(const struct imp_problem *p, size_t k)
-{
-    return p->active.base[k] >= 0 && p->scene->params[k].store != IMP_STORE_BULK;
-}
-static size_t many_doubles(const struct imp_problem *p)
-{
-    size_t n = 0;
-    for (size_t k = 0; k < p->scene->n_params; k++)
-        n += is_double(p, k) ? p->scene->params[k].info.count : 0;
-    return n;
-}
-
-/* The numbers before the fit, to go back to. Of many: those that are not floats, which
- * the search keeps. */
-static enum imp_status start_keep(const struct imp_problem *p, bool many, double **out)
-{
-    size_t used = 0;
-    double *start = imp__alloc_raw(p->ctx, many ? many_doubles(p) : p->n, sizeof *start);
-    if (!start)
-        return imp__error(p->ctx, IMP_E_NOMEM, "no memory for %zu variables", p->n);
-    *out = start;
-    if (!many) {
-        imp_problem_get_x(p, start);
-        return IMP_OK;
-    }
-    for (size_t k = 0; k < p->scene->n_params; k++) {
-        const struct imp_param *q = &p->scene->params[k];
-        for (size_t e = 0; is_double(p, k) && e < q->info.count; e++)
-            start[used++] = imp__param_get(q, e);
-    }
-    return IMP_OK;
-}
-
-/* The search's starts are floats; the others as they were. */
-static void start_tell(const struct imp_problem *p, const double *start,
-                       struct imp_fit_variable *variables)
-{
-    size_t used = 0;
-    for (size_t k = 0; k < p->scene->n_params; k++)
-        for (size_t e = 0; is_double(p, k) && e < p->scene->params[k].info.count; e++)
-            variables[(size_t)p->active.base[k] + e].start = start[used++];
-}
-
-static void start_restore(struct imp_problem *p, bool many, const double *start,
-                          struct imp__search *s)
-{
-    size_t used = 0;
-    if (!many) {
-        (void)!imp_problem_set_x(p, start);
-        return;
-    }
-    for (size_t k = 0; k < p->n; k++) s->x[k] = imp__search_start(s, k);
-    for (size_t k = 0; k < p->scene->n_params; k++)
-        for (size_t e = 0; is_double(p, k) && e < p->scene->params[k].info.count; e++)
-            s->x[(size_t)p->active.base[k] + e] = start[used++];
-    (void)!imp_problem_set_x(p, s->x);
-}
-
 enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
                         const struct imp_run *run, const struct imp_fit_result **result)
 {
@@ -209,8 +95,9 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
     struct imp__fit f = {0};
     struct imp__search *s = NULL;
     struct imp__uncertainty u = {0};
-    struct imp_fit_variable *variables = NULL;
+    struct imp_fit_variable *rows = NULL;
     double *start = NULL, *x = NULL;
+    bool kept = false; /* the search, by the problem */
     const char *why = NULL;
 
     IMP_TRY(imp__fit_begin(p, options, run, &f));
@@ -218,7 +105,8 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
         IMP_TRY(imp__error(ctx, IMP_E_ARG,
                            "Levenberg-Marquardt needs a second derivative of the loss, "
                            "and l1 has none: use Adam, or another loss"));
-    IMP_TRY(start_keep(p, f.spans != NULL, &start));
+    IMP_TRY(imp__fit_start_keep(p, f.spans != NULL, &start));
+    imp__fit_answer_free(p);
     const struct imp__opt_options o = {f.options.max_iterations, f.options.learning_rate,
                                        f.options.tolerance};
     x = imp__alloc_raw(ctx, p->n, sizeof *x);
@@ -243,11 +131,11 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
         IMP_TRY(imp__checkpoint_write(ctx, f.options.checkpoint, &f.fingerprint, s));
 
     imp__search_settle(s);
-    x = s->x;
-    imp__arena_free(&p->fit_arena);
-    variables = imp__arena_array(&p->fit_arena, p->n, sizeof *variables);
-    if (!variables)
-        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for the result of a fit"));
+    if (p->n <= IMP_SEARCH_FEW) {
+        rows = imp__arena_array(&p->fit_arena, p->n, sizeof *rows);
+        if (!rows)
+            IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for the result of a fit"));
+    }
     struct imp_estimate objective = {NAN, NAN, 0};
     if (s->n_history > 0)
         objective = (struct imp_estimate){s->history[s->n_history - 1],
@@ -257,16 +145,16 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
     f.final_total =
         f.options.intervals && p->n <= IMP_DENSE_MAX ? REPLICATES + 3 + biased : 1;
     if (ended == IMP_OK && f.options.intervals)
-        ended = intervals(&f, s, x, variables, &u, &why);
+        ended = intervals(&f, s, s->x, rows, &u, &why);
     struct imp__fit_shift shift = {.of_se = -1};
     if (ended == IMP_OK && u.n && biased)
-        ended = imp__fit_shift(&f, x, u.G, imp__search_seed(&f.goal, FINAL_SEED, 1),
-                               variables, &shift);
-    if (ended == IMP_OK) ended = final_objective(&f, x, &objective);
+        ended = imp__fit_shift(&f, s->x, u.G, imp__search_seed(&f.goal, FINAL_SEED, 1),
+                               rows, &shift);
+    if (ended == IMP_OK) ended = final_objective(&f, s->x, &objective);
     if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
-    IMP_TRY(imp_problem_set_x(p, x));
-    IMP_TRY(result_make(&f, s, x, objective, &u, variables, why, &shift, result));
-    if (f.spans) start_tell(p, start, variables);
+    IMP_TRY(imp_problem_set_x(p, s->x));
+    IMP_TRY(imp__fit_answer(&f, s, objective, &u, rows, start, why, &shift, result));
+    kept = !rows;
     if (f.outer.progress && ended == IMP_OK) {
         const struct imp_progress last = {.size = sizeof last,
                                           .stage = "fit",
@@ -279,10 +167,10 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
     st = ended;
 out:
     if (st != IMP_OK && st != IMP_CANCELLED && start && s) /* as if nothing was tried */
-        start_restore(p, f.spans != NULL, start, s);
+        imp__fit_start_restore(p, f.spans != NULL, start, s);
     imp__uncertainty_destroy(ctx, &u);
-    imp__search_destroy(s);
-    if (!s) imp__release(ctx, x);
+    if (!kept) imp__search_destroy(s);
+    imp__release(ctx, x);
     imp__release(ctx, start);
     imp__fit_end(&f);
     return st;

@@ -40,6 +40,24 @@ enum imp_status imp__fit_begin(struct imp_problem *problem,
 void imp__fit_scales(struct imp__fit *fit, const struct imp__search *search);
 void imp__fit_end(struct imp__fit *fit);
 
+struct imp__uncertainty;
+
+/* fit_result.c: the numbers before the fit, to go back to. Of `many`: those that are not
+ * floats, which the search keeps. */
+enum imp_status imp__fit_start_keep(const struct imp_problem *p, bool many, double **out);
+void imp__fit_start_restore(struct imp_problem *p, bool many, const double *start,
+                            struct imp__search *s);
+/* fit_result.c: what stays with the problem. rows [n] in fit_arena have what the
+ * covariance knows; NULL: more than IMP_SEARCH_FEW numbers, and the problem owns the
+ * search from then on. */
+struct imp__fit_shift;
+enum imp_status imp__fit_answer(struct imp__fit *fit, struct imp__search *s,
+                                struct imp_estimate objective,
+                                const struct imp__uncertainty *u,
+                                struct imp_fit_variable *rows, const double *start,
+                                const char *why, const struct imp__fit_shift *shift,
+                                const struct imp_fit_result **out);
+
 /* fit_residual.c: what is left between scene and targets. NAN: cannot be said. */
 struct imp__fit_residual {
     double relative;       /* root of sum w (I - T)^2 / sum w T^2, */

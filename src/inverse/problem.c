@@ -55,7 +55,7 @@ void imp_problem_destroy(imp_problem *p)
     imp__release(p->ctx, p->regularisers);
     imp__active_destroy(p->ctx, &p->active);
     imp__release(p->ctx, p->blocks);
-    imp__arena_free(&p->fit_arena);
+    imp__fit_answer_free(p);
     imp__arena_free(&p->check_arena);
     imp__release(ctx, p->chosen);
     imp__release(ctx, p);

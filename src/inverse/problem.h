@@ -22,6 +22,23 @@ struct imp__regulariser {
     double *origin; /* [n_theta] x0, or NULL for 0 */
 };
 
+struct imp__search;
+
+/* What imp_problem_fit_variable reads: of the last fit (fit_result.c). */
+struct imp__fit_block { /* numbers of one parameter */
+    size_t first;
+    double lo, hi;
+    const double *start; /* of numbers kept in doubles; NULL: the search's */
+};
+struct imp__fit_answer {
+    size_t n;                            /* 0: there is none */
+    const struct imp_fit_variable *rows; /* [n] in fit_arena; NULL: too many for that */
+    struct imp__search *search;          /* settled; owned */
+    size_t n_blocks;
+    struct imp__fit_block *blocks; /* in fit_arena */
+};
+void imp__fit_answer_free(struct imp_problem *p);
+
 struct imp_problem {
     imp_context *ctx;
     struct imp_scene *scene;
@@ -33,8 +50,9 @@ struct imp_problem {
     struct imp__target *targets;
     size_t n_regularisers, cap_regularisers;
     struct imp__regulariser *regularisers;
-    struct imp_run run;           /* of imp_problem_nlopt */
-    struct imp_arena fit_arena;   /* of the last fit's result */
+    struct imp_run run;         /* of imp_problem_nlopt */
+    struct imp_arena fit_arena; /* of the last fit's result */
+    struct imp__fit_answer fit_answer;
     struct imp_arena check_arena; /* of the last check's rows */
 };
 

@@ -2,10 +2,11 @@
  *
  * Text of a search's state: writing, and strict reading. */
 #include "checkpoint.h"
-#include "base/text.h"
+#include "base/file.h"
 #include "math/hash.h"
 #include <errno.h>
 #include <math.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -13,22 +14,34 @@
 
 /* ---- Writing ------------------------------------------------------------------- */
 
+/* A number a line, straight to the file: text of millions of numbers would take more
+ * memory than the search. */
 struct sink {
-    struct imp_text text;
+    struct imp_file_writer *to;
     uint64_t hash; /* of everything but the fingerprint, against damage */
 };
+
+IMP_PRINTF(2, 3) static void put(struct sink *s, const char *format, ...)
+{
+    char line[128]; /* longer than any of them */
+    va_list args;
+    va_start(args, format);
+    const int n = vsnprintf(line, sizeof line, format, args);
+    va_end(args);
+    imp__file_put(s->to, line, (size_t)n);
+}
 
 static void put_array(struct sink *s, const char *name, const double *v, size_t n)
 {
     static const char digit[] = "0123456789abcdef";
-    imp__put(&s->text, "%s %zu\n", name, n);
-    for (size_t i = 0; i < n && !s->text.failed; i++) {
+    put(s, "%s %zu\n", name, n);
+    for (size_t i = 0; i < n; i++) {
         char text[17];
         uint64_t bits;
         memcpy(&bits, &v[i], 8);
         for (int k = 0; k < 16; k++) text[k] = digit[(bits >> (60 - 4 * k)) & 15];
         text[16] = '\n';
-        s->text.failed |= !imp__bytes_add(s->text.ctx, &s->text.bytes, text, sizeof text);
+        imp__file_put(s->to, text, sizeof text);
     }
     s->hash = imp__hash(s->hash, v, n * sizeof *v);
 }
@@ -39,23 +52,24 @@ static uint64_t head_hash(int kind, size_t n, int iteration, int finished)
     return imp__hash(0, head, sizeof head);
 }
 
-enum imp_status imp__checkpoint_write(imp_context *ctx, const char *path,
-                                      const struct imp__fingerprint *of,
-                                      const struct imp__search *search)
-{
-    enum imp_status st = IMP_OK;
-    char name[16];
-    struct sink s = {.text.ctx = ctx,
-                     .hash = head_hash((int)search->kind, search->n, search->iteration,
-                                       search->finished)};
+struct contents {
+    const struct imp__fingerprint *of;
+    const struct imp__search *search;
+};
 
-    imp__put(&s.text, MAGIC "optimizer %d\nvariables %zu\n", (int)search->kind,
-             search->n);
-    imp__put(&s.text, "of %016llx %016llx %016llx %016llx\n",
-             (unsigned long long)of->parameters, (unsigned long long)of->scene,
-             (unsigned long long)of->targets, (unsigned long long)of->options);
-    imp__put(&s.text, "iteration %d\nfinished %d\n", search->iteration,
-             (int)search->finished);
+static void contents_put(struct imp_file_writer *w, const void *payload)
+{
+    const struct contents *c = payload;
+    const struct imp__search *search = c->search;
+    char name[16];
+    struct sink s = {w, head_hash((int)search->kind, search->n, search->iteration,
+                                  (int)search->finished)};
+
+    put(&s, MAGIC "optimizer %d\nvariables %zu\n", (int)search->kind, search->n);
+    put(&s, "of %016llx %016llx %016llx %016llx\n", (unsigned long long)c->of->parameters,
+        (unsigned long long)c->of->scene, (unsigned long long)c->of->targets,
+        (unsigned long long)c->of->options);
+    put(&s, "iteration %d\nfinished %d\n", search->iteration, (int)search->finished);
     put_array(&s, "start", search->start, search->start ? search->n : 0);
     put_array(&s, "x", search->x, search->n);
     put_array(&s, "history", search->history, search->n_history);
@@ -65,23 +79,28 @@ enum imp_status imp__checkpoint_write(imp_context *ctx, const char *path,
         snprintf(name, sizeof name, "array%d", k);
         put_array(&s, name, search->array[k], search->array_n[k]);
     }
-    imp__put(&s.text, "end %016llx\n", (unsigned long long)s.hash);
-    if (s.text.failed)
-        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a checkpoint"));
-    IMP_TRY(imp__file_write(ctx, path, s.text.bytes.data, s.text.bytes.size));
-out:
-    imp__bytes_free(ctx, &s.text.bytes);
-    return st;
+    put(&s, "end %016llx\n", (unsigned long long)s.hash);
+}
+
+enum imp_status imp__checkpoint_write(imp_context *ctx, const char *path,
+                                      const struct imp__fingerprint *of,
+                                      const struct imp__search *search)
+{
+    return imp__file_write_by(ctx, path, contents_put, &(struct contents){of, search});
 }
 
 /* ---- Reading ------------------------------------------------------------------- */
 
+/* The file is read twice: looked at, then taken. A second search to fill would take as
+ * much memory as the first. */
 struct source {
     FILE *f;
     imp_context *ctx;
     const char *path;
     size_t max; /* numbers the file has room for */
     uint64_t hash;
+    const struct imp__goal *goal;
+    bool take;
 };
 
 static enum imp_status damaged(const struct source *s, const char *what)
@@ -101,33 +120,58 @@ static enum imp_status get_head(struct source *s, const char *name, size_t *n)
     return IMP_OK;
 }
 
-static enum imp_status get_numbers(struct source *s, const char *name, double *v,
-                                   size_t n)
+static enum imp_status get_number(struct source *s, const char *name, double *v)
 {
-    for (size_t i = 0; i < n; i++) {
-        char text[17];
-        uint64_t bits = 0;
-        if (fread(text, 1, 17, s->f) != 17 || text[16] != '\n') return damaged(s, name);
-        for (int k = 0; k < 16; k++) {
-            const char c = text[k];
-            const int d = c >= '0' && c <= '9'   ? c - '0'
-                          : c >= 'a' && c <= 'f' ? c - 'a' + 10
-                                                 : -1;
-            if (d < 0) return damaged(s, name);
-            bits = bits << 4 | (uint64_t)d;
-        }
-        memcpy(&v[i], &bits, 8);
+    char text[17];
+    uint64_t bits = 0;
+    if (fread(text, 1, 17, s->f) != 17 || text[16] != '\n') return damaged(s, name);
+    for (int k = 0; k < 16; k++) {
+        const char c = text[k];
+        const int d = c >= '0' && c <= '9'   ? c - '0'
+                      : c >= 'a' && c <= 'f' ? c - 'a' + 10
+                                             : -1;
+        if (d < 0) return damaged(s, name);
+        bits = bits << 4 | (uint64_t)d;
     }
-    s->hash = imp__hash(s->hash, v, n * sizeof *v);
+    memcpy(v, &bits, 8);
+    s->hash = imp__hash(s->hash, v, sizeof *v);
     return IMP_OK;
 }
 
-static enum imp_status get_array(struct source *s, const char *name, double *v, size_t n)
+/* v [n], written when the file is taken. `fits`, if any, must be true of every number. */
+static enum imp_status
+get_numbers(struct source *s, const char *name, double *v, size_t n,
+            bool (*fits)(const struct imp__goal *goal, size_t k, double value))
+{
+    for (size_t i = 0; i < n; i++) {
+        double value = 0;
+        const enum imp_status st = get_number(s, name, &value);
+        if (st != IMP_OK) return st;
+        if (fits && !fits(s->goal, i, value))
+            return damaged(s, "values outside their bounds");
+        if (s->take) v[i] = value;
+    }
+    return IMP_OK;
+}
+
+static enum imp_status get_array(struct source *s, const char *name, double *v, size_t n,
+                                 bool (*fits)(const struct imp__goal *goal, size_t k,
+                                              double value))
 {
     size_t count = 0;
     const enum imp_status st = get_head(s, name, &count);
     if (st != IMP_OK) return st;
-    return count == n ? get_numbers(s, name, v, n) : damaged(s, name);
+    return count == n ? get_numbers(s, name, v, n, fits) : damaged(s, name);
+}
+
+static bool is_number(const struct imp__goal *goal, size_t k, double value)
+{
+    (void)goal, (void)k;
+    return isfinite(value);
+}
+static bool is_inside(const struct imp__goal *goal, size_t k, double value)
+{
+    return imp__into_bounds(goal, k, value) == value;
 }
 
 static enum imp_status same_problem(const struct source *s,
@@ -169,31 +213,27 @@ static enum imp_status read_head(struct source *s, const struct imp__fingerprint
     return n == search->n && kind == (int)search->kind ? IMP_OK : damaged(s, "head");
 }
 
-static enum imp_status read_body(struct source *s, const struct imp__goal *goal,
-                                 struct imp__search *t)
+static enum imp_status read_body(struct source *s, struct imp__search *t)
 {
     enum imp_status st = IMP_OK;
     size_t n = 0;
     char name[16];
 
-    IMP_TRY(get_array(s, "start", t->start, t->start ? t->n : 0));
-    IMP_TRY(get_array(s, "x", t->x, t->n));
-    for (size_t k = 0; k < t->n; k++)
-        if (imp__into_bounds(goal, k, t->x[k]) != t->x[k] ||
-            (t->start && !isfinite(t->start[k])))
-            IMP_TRY(damaged(s, "values outside their bounds"));
+    IMP_TRY(get_array(s, "start", t->start, t->start ? t->n : 0, is_number));
+    IMP_TRY(get_array(s, "x", t->x, t->n, is_inside));
     IMP_TRY(get_head(s, "history", &n));
-    for (size_t k = 0; k < n; k++) IMP_TRY(imp__search_log(t, (struct imp_estimate){0}));
-    IMP_TRY(get_numbers(s, "history", t->history, n));
-    IMP_TRY(get_array(s, "history_se", t->history_se, n));
-    IMP_TRY(get_array(s, "scalars", t->scalar, IMP_SEARCH_SCALARS));
+    for (size_t k = 0; s->take && k < n; k++)
+        IMP_TRY(imp__search_log(t, (struct imp_estimate){0}));
+    IMP_TRY(get_numbers(s, "history", t->history, n, NULL));
+    IMP_TRY(get_array(s, "history_se", t->history_se, n, NULL));
+    IMP_TRY(get_array(s, "scalars", t->scalar, IMP_SEARCH_SCALARS, NULL));
     for (int k = 0; k < IMP_SEARCH_ARRAYS; k++) {
         snprintf(name, sizeof name, "array%d", k);
         IMP_TRY(get_head(s, name, &n));
         /* Arrays that exist from the start have their size; the others grow. */
         if (t->array_n[k] != 0 && t->array_n[k] != n) IMP_TRY(damaged(s, name));
-        if (n > 0) IMP_TRY(imp__search_array(t, k, n));
-        IMP_TRY(get_numbers(s, name, t->array[k], n));
+        if (n > 0 && s->take) IMP_TRY(imp__search_array(t, k, n));
+        IMP_TRY(get_numbers(s, name, t->array[k], n, NULL));
     }
     const uint64_t hash = s->hash;
     unsigned long long end;
@@ -204,24 +244,14 @@ out:
     return st;
 }
 
-/* Put what `from` holds into `to`; both stay valid. */
-static void swap(struct imp__search *to, struct imp__search *from)
-{
-    const struct imp__search t = *to;
-    *to = *from;
-    *from = t;
-}
-
 enum imp_status imp__checkpoint_read(imp_context *ctx, const char *path,
                                      const struct imp__fingerprint *of,
                                      const struct imp__goal *goal,
                                      struct imp__search *search, bool *found)
 {
     enum imp_status st = IMP_OK;
-    struct source s = {.ctx = ctx, .path = path, .f = fopen(path, "rb")};
-    struct imp__search *fresh = NULL;
-    const struct imp__opt_options none = {.max_iterations = 1};
-    int finished = 0;
+    struct source s = {.ctx = ctx, .path = path, .f = fopen(path, "rb"), .goal = goal};
+    int iteration = 0, finished = 0;
 
     *found = s.f != NULL;
     if (!s.f)
@@ -231,17 +261,18 @@ enum imp_status imp__checkpoint_read(imp_context *ctx, const char *path,
     if (fseek(s.f, 0, SEEK_END) != 0)
         IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: cannot be read", path));
     const long size = ftell(s.f);
-    if (size < 0 || fseek(s.f, 0, SEEK_SET) != 0)
-        IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: cannot be read", path));
-    s.max = (size_t)size / 17;
-    IMP_TRY(imp__search_create(goal, search->kind, &none, search->x, &fresh));
-    IMP_TRY(read_head(&s, of, search, &fresh->iteration, &finished));
-    s.hash = head_hash((int)fresh->kind, fresh->n, fresh->iteration, finished);
-    IMP_TRY(read_body(&s, goal, fresh));
-    imp__search_finish(fresh, (enum imp__finish)finished);
-    swap(search, fresh);
+    s.max = size > 0 ? (size_t)size / 17 : 0;
+    for (int pass = 0; pass < 2; pass++) {
+        if (size < 0 || fseek(s.f, 0, SEEK_SET) != 0)
+            IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: cannot be read", path));
+        s.take = pass == 1;
+        IMP_TRY(read_head(&s, of, search, &iteration, &finished));
+        s.hash = head_hash((int)search->kind, search->n, iteration, finished);
+        IMP_TRY(read_body(&s, search));
+    }
+    search->iteration = iteration;
+    imp__search_finish(search, (enum imp__finish)finished);
 out:
-    imp__search_destroy(fresh);
     fclose(s.f);
     return st;
 }

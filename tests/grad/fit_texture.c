@@ -87,13 +87,24 @@ int main(void)
     o.intervals = 1;
     test_must(ctx, imp_fit(p, &o, &run, &r));
     imp_problem_get_x(p, x);
+    struct imp_fit_variable variable = {0};
     double outside = 0;
-    for (int i = 0; i < N; i++) outside += x[i] < 0 || x[i] > 1;
+    int other = 0;
+    for (size_t i = 0; i < N; i++) {
+        outside += x[i] < 0 || x[i] > 1;
+        test_must(ctx, imp_problem_fit_variable(p, i, &variable));
+        other += variable.value != x[i] || variable.start != 0.5 ||
+                 variable.at_bound != (x[i] <= 0 ? -1 : x[i] >= 1) ||
+                 !variable.determined || !isnan(variable.se) || !isnan(variable.hi95);
+    }
+    tap_ok(other == 0 && !r->variables &&
+               imp_problem_fit_variable(p, N, &variable) == IMP_E_ARG,
+           "each of them is asked for by its number # %d differ", other);
     tap_ok(rmse(x, truth) < 0.02 && outside == 0,
            "a texture of %d numbers # rms error %.4f, from %.4f: %s", N, rmse(x, truth),
            0.25, r->reason);
-    tap_ok(r->warning && strstr(r->warning, "256") && r->variables[0].determined,
-           "no intervals for so many # %s", r->warning);
+    tap_ok(r->warning && strstr(r->warning, "256"), "no intervals for so many # %s",
+           r->warning);
     tap_ok(r->history[0] > 50 * fabs(r->objective.value),
            "loss # from %.3g to %.3g +- %.1g", r->history[0], r->objective.value,
            r->objective.se);

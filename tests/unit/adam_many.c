@@ -3,6 +3,7 @@
  * Adam of many variables: 40 bytes each, gradient included; the steps and the answer of
  * the search that keeps doubles; and the bits of an uninterrupted search after a
  * checkpoint. */
+#include "imp_fail_alloc.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "math/rng.h"
@@ -147,41 +148,19 @@ static void resumed(void)
     imp_context_destroy(ctx);
 }
 
-static size_t live, peak;
-static void *allocate(size_t bytes, void *payload)
-{
-    void *p = NULL;
-    (void)payload;
-    if (posix_memalign(&p, 64, bytes + 64) != 0) return NULL;
-    memcpy(p, &bytes, sizeof bytes);
-    live += bytes;
-    if (live > peak) peak = live;
-    return (char *)p + 64;
-}
-static void release(void *memory, void *payload)
-{
-    size_t bytes;
-    (void)payload;
-    memcpy(&bytes, (char *)memory - 64, sizeof bytes);
-    live -= bytes;
-    free((char *)memory - 64);
-}
-
 static void memory(void)
 {
     enum { LARGE = 500000 };
-    struct imp_context_options o = IMP_CONTEXT_OPTIONS_INIT;
     static struct bowl b;
-    imp_context *ctx;
+    struct fail_alloc heap = {0};
+    imp_context *ctx = fail_alloc_context(&heap);
     double *x0 = malloc(LARGE * sizeof *x0);
-    o.threads = 1;
-    o.allocator = (struct imp_allocator){allocate, release, NULL};
-    if (!x0 || imp_context_create(&o, &ctx) != IMP_OK) exit(99);
-    const size_t before = live;
+    if (!x0) exit(99);
+    const size_t before = heap.bytes;
     bowl_make(&b, ctx, LARGE, true, 1);
     struct imp__search *s = begin(&b, x0, 45);
     run(&b, s, 45);
-    const double bytes = (double)(peak - before) / LARGE;
+    const double bytes = (double)(heap.peak - before) / LARGE;
     tap_ok(bytes <= 40.1, "%.2f bytes a variable, gradient included", bytes);
     imp__search_destroy(s);
     imp_context_destroy(ctx);

@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Allocation 1, 2, 3, ... fails, in fits and checks: an error every time, nothing leaks,
- * and the scene's numbers are what they were. */
+ * and the scene's numbers are what they were. And the bytes that Adam takes for a texture:
+ * no more than 40 a number, checkpoints, resuming and the result included. */
 #include "imp_fail_alloc.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "inverse_scenes.h"
 #include <math.h>
+#include <unistd.h>
 
 enum job { FIT_ADAM, FIT_LM, FIT_LBFGS, CHECK, N_JOBS };
 static const char *const names[] = {"fit, Adam", "fit, LM and intervals", "fit, L-BFGS",
@@ -68,6 +70,75 @@ static enum imp_status run_job(enum job job, struct fail_alloc *heap, long fail_
     return st;
 }
 
+/* ---- A texture by Adam ----------------------------------------------------------- */
+
+struct taken {
+    double first, second, left; /* bytes: two fits, the second resumed; with the result */
+};
+
+static struct taken texture_fit(int texels, const char *checkpoint)
+{
+    enum { SIDE = 16 };
+    const size_t n = 3 * (size_t)texels * (size_t)texels;
+    static float target[SIDE * SIDE * 3];
+    float *pixels = calloc(n, sizeof *pixels);
+    struct fail_alloc heap = {0};
+    imp_context *ctx = fail_alloc_context(&heap);
+    imp_scene *s;
+    imp_problem *p;
+    struct imp_target t = IMP_TARGET_INIT;
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
+    const struct imp_fit_result *r;
+    struct taken taken;
+    if (!pixels) exit(99);
+    for (size_t k = 0; k < n; k++) pixels[k] = 0.5f;
+    test_must(ctx, imp_scene_create(ctx, NULL, &s));
+    test_camera(s, 3, 30, SIDE, SIDE);
+    test_picture_wall(s, texels, texels, pixels);
+    test_must(ctx, imp_scene_commit(s));
+    free(pixels);
+    test_must(ctx, imp_problem_create(s, &p));
+    test_must(ctx, imp_problem_activate(p, "*data*"));
+    t.width = t.height = SIDE, t.channels = 3, t.pixels = target;
+    test_must(ctx, imp_problem_add_target(p, &t));
+
+    const size_t before = heap.bytes;
+    run.spp = 4;
+    o.checkpoint = checkpoint;
+    o.resume = 1;
+    o.max_iterations = 2;
+    heap.peak = heap.bytes;
+    test_must(ctx, imp_fit(p, &o, &run, &r));
+    taken.first = (double)(heap.peak - before);
+    o.max_iterations = 25; /* more than a window */
+    heap.peak = heap.bytes;
+    test_must(ctx, imp_fit(p, &o, &run, &r));
+    taken.second = (double)(heap.peak - before);
+    taken.left = (double)(heap.bytes - before);
+    if (r->iterations != 25 || r->n_history != 25) exit(99);
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+    imp_context_destroy(ctx);
+    remove(checkpoint);
+    return taken;
+}
+
+static void texture_memory(void)
+{
+    enum { SMALL = 64, LARGE = 320 };
+    char path[64];
+    snprintf(path, sizeof path, "/tmp/imp_fit_memory_%ld.ck", (long)getpid());
+    const struct taken a = texture_fit(SMALL, path), b = texture_fit(LARGE, path);
+    const double n = 3. * (LARGE * LARGE - SMALL * SMALL);
+    const double first = (b.first - a.first) / n, second = (b.second - a.second) / n;
+    /* Iterate 8, moments, window, average and start 24 and gradient 8; then x and start. */
+    tap_ok(first <= 40.1, "a fit of %d numbers # %.2f bytes each", 3 * LARGE * LARGE,
+           first);
+    tap_ok(second <= 40.1, "and another, resumed from a checkpoint # %.2f", second);
+    tap_ok((b.left - a.left) / n <= 12.1, "its result # %.2f", (b.left - a.left) / n);
+}
+
 int main(void)
 {
     for (int job = 0; job < N_JOBS; job++) {
@@ -90,5 +161,6 @@ int main(void)
                "changed",
                names[job], n, bad_status, leaks, touched);
     }
+    texture_memory();
     return tap_done();
 }

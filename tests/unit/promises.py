@@ -157,6 +157,7 @@ PARAM = "floor.bsdf.reflectance.value"
 NOT_OK = {
     "imp_scene_commit": "the scene is committed",
     "imp_problem_add_smoothness": "the scene has no texture",
+    "imp_problem_fit_variable": "there was no fit",
 }
 # Pointers that may be NULL, by name, or by function and name.
 NULLABLE = {"options", "run", "stats", "id", "objective", "gradient_se", "primal", "normals", "uvs",

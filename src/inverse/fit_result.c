@@ -1,0 +1,198 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What a fit leaves with its problem, and where it began. Rows of 48 bytes are more than a
+ * fit of millions of numbers takes: theirs are made when they are asked for, from the
+ * search, which is kept. */
+#include "base/arguments.h"
+#include "fit.h"
+#include "search/covariance.h"
+#include <math.h>
+#include <string.h>
+
+/* ---- Where it began ------------------------------------------------------------ */
+
+/* Is parameter k active, and kept in doubles? */
+static bool is_double(const struct imp_problem *p, size_t k)
+{
+    return p->active.base[k] >= 0 && p->scene->params[k].store != IMP_STORE_BULK;
+}
+static size_t many_doubles(const struct imp_problem *p)
+{
+    size_t n = 0;
+    for (size_t k = 0; k < p->scene->n_params; k++)
+        n += is_double(p, k) ? p->scene->params[k].info.count : 0;
+    return n;
+}
+
+enum imp_status imp__fit_start_keep(const struct imp_problem *p, bool many, double **out)
+{
+    size_t used = 0;
+    double *start = imp__alloc_raw(p->ctx, many ? many_doubles(p) : p->n, sizeof *start);
+    if (!start)
+        return imp__error(p->ctx, IMP_E_NOMEM, "no memory for %zu variables", p->n);
+    *out = start;
+    if (!many) {
+        imp_problem_get_x(p, start);
+        return IMP_OK;
+    }
+    for (size_t k = 0; k < p->scene->n_params; k++) {
+        const struct imp_param *q = &p->scene->params[k];
+        for (size_t e = 0; is_double(p, k) && e < q->info.count; e++)
+            start[used++] = imp__param_get(q, e);
+    }
+    return IMP_OK;
+}
+
+void imp__fit_start_restore(struct imp_problem *p, bool many, const double *start,
+                            struct imp__search *s)
+{
+    size_t used = 0;
+    if (!many) {
+        (void)!imp_problem_set_x(p, start);
+        return;
+    }
+    for (size_t k = 0; k < p->n; k++) s->x[k] = imp__search_start(s, k);
+    for (size_t k = 0; k < p->scene->n_params; k++)
+        for (size_t e = 0; is_double(p, k) && e < p->scene->params[k].info.count; e++)
+            s->x[(size_t)p->active.base[k] + e] = start[used++];
+    (void)!imp_problem_set_x(p, s->x);
+}
+
+/* ---- Its answer ---------------------------------------------------------------- */
+
+/* One entry an active parameter. Numbers kept in doubles start where `start` says; those
+ * of textures where the search does, which has them as floats. */
+static enum imp_status blocks_make(struct imp__fit *f, const double *start)
+{
+    struct imp_problem *p = f->problem;
+    struct imp__fit_answer *a = &p->fit_answer;
+    const bool many = f->spans != NULL;
+    a->blocks = imp__arena_array(&p->fit_arena, p->n_blocks, sizeof *a->blocks);
+    double *kept =
+        many ? imp__arena_array(&p->fit_arena, many_doubles(p) + 1, sizeof *kept) : NULL;
+    if (!a->blocks || (many && !kept))
+        return imp__error(p->ctx, IMP_E_NOMEM, "no memory for the result of a fit");
+    for (size_t b = 0; b < p->n_blocks; b++) {
+        const size_t k = p->blocks[b];
+        const struct imp_param_info *info = &p->scene->params[k].info;
+        const bool doubles = many && is_double(p, k);
+        a->blocks[b] = (struct imp__fit_block){.first = (size_t)p->active.base[k],
+                                               .lo = info->lo,
+                                               .hi = info->hi,
+                                               .start = doubles ? kept : NULL};
+        for (size_t e = 0; doubles && e < info->count; e++) *kept++ = *start++;
+    }
+    a->n_blocks = p->n_blocks;
+    return IMP_OK;
+}
+
+/* Without what the covariance says of it. */
+static struct imp_fit_variable variable_of(const struct imp__fit_answer *a, size_t i)
+{
+    size_t at = 0, end = a->n_blocks;
+    while (end - at > 1) { /* the last block that begins at i or before */
+        const size_t middle = at + (end - at) / 2;
+        if (a->blocks[middle].first <= i) at = middle;
+        else end = middle;
+    }
+    const struct imp__fit_block *b = &a->blocks[at];
+    const double value = a->search->x[i];
+    return (struct imp_fit_variable){.start = b->start ? b->start[i - b->first]
+                                                       : imp__search_start(a->search, i),
+                                     .value = value,
+                                     .se = NAN,
+                                     .lo95 = NAN,
+                                     .hi95 = NAN,
+                                     .at_bound = value <= b->lo   ? -1
+                                                 : value >= b->hi ? 1
+                                                                  : 0,
+                                     .determined = 1}; /* nothing says the contrary */
+}
+
+enum imp_status imp_problem_fit_variable(const imp_problem *p, size_t i,
+                                         struct imp_fit_variable *variable)
+{
+    IMP_REQUIRE(NULL, p, "problem");
+    IMP_REQUIRE(p->ctx, variable, "variable");
+    const struct imp__fit_answer *a = &p->fit_answer;
+    if (i >= a->n)
+        return imp__error(p->ctx, IMP_E_ARG,
+                          a->n ? "there is no number i = %zu in the last fit (it has %zu)"
+                               : "number i = %zu: there is no fit yet",
+                          i, a->n);
+    *variable = a->rows ? a->rows[i] : variable_of(a, i);
+    return IMP_OK;
+}
+
+void imp__fit_answer_free(struct imp_problem *p)
+{
+    imp__search_destroy(p->fit_answer.search);
+    p->fit_answer = (struct imp__fit_answer){0};
+    imp__arena_free(&p->fit_arena);
+}
+
+enum imp_status imp__fit_answer(struct imp__fit *f, struct imp__search *s,
+                                struct imp_estimate objective,
+                                const struct imp__uncertainty *u,
+                                struct imp_fit_variable *rows, const double *start,
+                                const char *why, const struct imp__fit_shift *shift,
+                                const struct imp_fit_result **out)
+{
+    struct imp_arena *arena = &f->problem->fit_arena;
+    struct imp__fit_answer *answer = &f->problem->fit_answer;
+    const size_t n = f->problem->n;
+    size_t determined = n;
+    struct imp_fit_result *r = imp__arena_array(arena, 1, sizeof *r);
+    double *history = imp__arena_array(arena, 2 * s->n_history + 1, sizeof *history);
+
+    if (!r || !history)
+        return imp__error(f->problem->ctx, IMP_E_NOMEM,
+                          "no memory for the result of a fit");
+    *answer = (struct imp__fit_answer){.search = s};
+    const enum imp_status st = blocks_make(f, start);
+    if (st != IMP_OK) {
+        answer->search = NULL; /* the caller's */
+        return st;
+    }
+    for (size_t k = 0; rows && k < n; k++) {
+        const struct imp_fit_variable known = rows[k];
+        rows[k] = variable_of(answer, k);
+        if (!u->n) continue;
+        rows[k].se = known.se;
+        rows[k].lo95 = known.lo95;
+        rows[k].hi95 = known.hi95;
+        rows[k].determined = known.determined;
+        determined -= !known.determined;
+    }
+    if (s->n_history > 0) {
+        memcpy(history, s->history, s->n_history * sizeof *history);
+        memcpy(history + s->n_history, s->history_se, s->n_history * sizeof *history);
+    }
+    const struct imp__fit_residual left =
+        imp__fit_residual(f, s->x, objective, determined);
+    *r = (struct imp_fit_result){
+        .size = sizeof *r,
+        .iterations = s->iteration,
+        .objective = objective,
+        .n_history = s->n_history,
+        .history = history,
+        .history_se = history + s->n_history,
+        .n = n,
+        .variables = rows,
+        .condition = u->condition,
+        .reason = !f->stopped                                       ? s->reason
+                  : f->deadline_s > 0 && imp__now() > f->deadline_s ? "time limit reached"
+                                                                    : "cancelled",
+        .warning = imp__fit_warning(f, objective.bias_order, rows, u->loosest, why, &left,
+                                    shift),
+        .shift = shift->of_se >= 0 ? shift->of_se : NAN,
+        .residual = left.relative,
+        .residual_hi = left.relative_hi,
+        .chi2 = left.chi2,
+        .chi2_se = left.chi2_se};
+    answer->n = n;
+    answer->rows = rows;
+    if (rows) answer->search = NULL; /* all is said */
+    *out = r;
+    return IMP_OK;
+}
