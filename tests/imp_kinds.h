@@ -29,6 +29,12 @@ static const struct {
     {"roughconductor",
      {"distribution=beckmann", "alpha_u=0.1", "alpha_v=0.4", "sample_visible=false"}},
     {"roughconductor", {"distribution=ggx", "alpha=0.3", "sample_visible=false"}},
+    {"plastic", {"nonlinear=true", "int_ior=1.9"}},
+    {"plastic", {"int_ior=1.1", "ext_ior=1.6"}},
+    {"roughdielectric", {"distribution=beckmann", "alpha=0.3"}},
+    {"roughdielectric", {"distribution=ggx", "alpha=0.4", "int_ior=1.1", "ext_ior=1.6"}},
+    {"roughdielectric", {"distribution=ggx", "alpha_u=0.4", "alpha_v=0.1"}},
+    {"roughdielectric", {"distribution=beckmann", "alpha=0.2", "sample_visible=false"}},
     {"stam_m2", {"variant=reciprocal", "sampling=cosine", "absorb=0.3"}},
     {"stam_m2", {"variant=microfacet", "sampling=phong"}},
     {"stam_m2", {"variant=microfacet", "sampling=mixture"}},
@@ -115,6 +121,11 @@ static inline const struct imp_input_desc *kind_input(const struct imp_bsdf *b, 
         if (j >= b->child_in[k]) return kind_input(b->child[k], j - b->child_in[k]);
     return NULL;
 }
+/* One number, in all lanes. */
+static inline bool kind_is_scalar(const struct imp_input_desc *d)
+{
+    return d->flags & (IMP_INPUT_SCALAR | IMP_INPUT_LUMINANCE);
+}
 static inline void kind_bounds(const struct imp_input_desc *d, double *lo, double *hi)
 {
     *lo = d->lo;
@@ -138,7 +149,7 @@ static inline void kind_inputs(const struct imp_bsdf *b, enum kind_set set, uint
         in[j] = imp__spec(0);
         for (int c = 0; c < 3; c++) {
             const double u =
-                imp__u01(key, (uint32_t)(4 * j + (d->flags & IMP_INPUT_SCALAR ? 0 : c)));
+                imp__u01(key, (uint32_t)(4 * j + (kind_is_scalar(d) ? 0 : c)));
             double v = d->fallback;
             if (set == KIND_LOWEST) v = lo;
             else if (set == KIND_FALLBACK) v = d->fallback;
@@ -148,7 +159,7 @@ static inline void kind_inputs(const struct imp_bsdf *b, enum kind_set set, uint
             else v = lo + 3 * u;
             in[j][c] = imp_clamp(v, lo, hi);
         }
-        in[j][3] = d->flags & IMP_INPUT_SCALAR ? in[j][0] : NAN; /* nobody may read it */
+        in[j][3] = kind_is_scalar(d) ? in[j][0] : NAN; /* nobody may read it */
     }
 }
 

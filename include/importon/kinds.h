@@ -60,10 +60,11 @@ enum imp_input_flags {
                              what it is for decides */
     IMP_INPUT_INDEX = 64, /* refractive index behind the surface over the one before it:
                              where a medium fills the shape, the medium's */
-    IMP_INPUT_LUMINANCE = 128 /* no property: the luminance, in all lanes, of the input
+    IMP_INPUT_LUMINANCE = 128, /* no property: the luminance, in all lanes, of the input
                                  declared before it under the same name. A kind whose
                                  lanes couple (a tint divided by its luminance) reads
                                  it, and the engine has its derivative */
+    IMP_INPUT_NUMBER = 256     /* of an IMP_INPUT_SCALAR: a texture is refused */
 };
 
 struct imp_input_desc { /* the list ends with {0} */
@@ -155,6 +156,8 @@ struct imp_bsdf {
     int index;       /* in the scene; -1 for the default material */
     double absorb;   /* Stam's absorption probability; 0: none given */
     const char *name;
+    int n_lobes; /* delta lobes have the indices below it; build sets it. 0 of a kind with
+                    IMP_BSDF_DELTA: not said, at most 8 */
 };
 
 struct imp_bsdf_ops {

@@ -232,6 +232,9 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
             IMP_TRY(imp__node_error(ctx, child->node, IMP_E_SCENE,
                                     "'%s' must be a number, a colour or a texture",
                                     d->name));
+        if (d->flags & IMP_INPUT_NUMBER)
+            IMP_TRY(imp__node_error(ctx, child->node, IMP_E_SCENE,
+                                    "'%s' must be a number, not a texture", d->name));
         IMP_TRY(imp__build_texture(scene, child->node, name, d->name, &t));
         in->texture = t;
         texels_bound(scene, t->param, d);

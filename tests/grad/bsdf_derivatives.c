@@ -34,7 +34,7 @@ static double difference(const struct imp_bsdf *b, imp_spec *in, const struct im
         {-2, 1.0 / 12}, {-1, -8.0 / 12}, {1, 8.0 / 12}, {2, -1.0 / 12}};
     static const double forward[4][2] = {{1, 4}, {2, -3}, {3, 4.0 / 3}, {4, -0.25}};
     const struct imp_input_desc *desc = kind_input(b, j);
-    const bool scalar = desc->flags & IMP_INPUT_SCALAR;
+    const bool scalar = kind_is_scalar(desc);
     const imp_spec x = in[j];
     double lo, hi;
     kind_bounds(desc, &lo, &hi);

@@ -36,6 +36,9 @@ static const struct {
     {"roughconductor", "alpha", "alpha_u", "given by alpha_u and alpha_v"},
     {"roughconductor", "eta", "material", "given by the preset"},
     {"roughconductor", "k", "material", "given by the preset"},
+    {"roughdielectric", "alpha_u", NULL, "given by alpha"},
+    {"roughdielectric", "alpha_v", NULL, "given by alpha"},
+    {"roughdielectric", "alpha", "alpha_u", "given by alpha_u and alpha_v"},
     {"conductor", "eta", "material", "given by the preset"},
     {"conductor", "k", "material", "given by the preset"},
 };
@@ -118,8 +121,13 @@ static void inputs_make(imp_scene *s, const struct subject *q, const char *kind,
         double v[3];
         if (d->flags & IMP_INPUT_FIXED || config_has(props, d->name)) continue;
         if (is_left_out(kind, props, d->name)) continue;
+        if (d->flags & IMP_INPUT_LUMINANCE) continue;
         for (uint32_t k = 0; k < 3; k++) v[k] = random_in(d, seed, 3 * (uint32_t)j + k);
-        if (textures && q->texture)
+        if (strcmp(d->name, "eta") == 0 && d->flags & IMP_INPUT_NUMBER) {
+            if (config_has(props, "int_ior")) continue; /* that is how it is written */
+            imp_scene_float(s, "int_ior", fmax(v[0], 1.1));
+            imp_scene_float(s, "ext_ior", 1);
+        } else if (textures && q->texture && !(d->flags & IMP_INPUT_NUMBER))
             texture_make(s, q, d->name, d, seed + (uint64_t)j, true);
         else if (d->flags & IMP_INPUT_SCALAR) imp_scene_float(s, d->name, v[0]);
         else imp_scene_rgb(s, d->name, v);

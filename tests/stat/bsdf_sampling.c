@@ -15,7 +15,7 @@ enum {
     PILOT = 1500,
     PILOT_LIMIT = 25,
     MIN_EXPECTED = 10, /* cells below are pooled: chi-square is an approximation */
-    LOBES = 4
+    LOBES = 16
 };
 static double level; /* of one chi-square, so that all together fail 1 % (Sidak) */
 

@@ -10,9 +10,12 @@
     X(imp__diffuse)                                                                      \
     X(imp__null)                                                                         \
     X(imp__phong)                                                                        \
+    X(imp__plastic)                                                                      \
     X(imp__roughconductor)                                                               \
+    X(imp__roughdielectric)                                                              \
     X(imp__stam_m2)                                                                      \
     X(imp__stam_m3)                                                                      \
+    X(imp__thindielectric)                                                               \
     X(imp__twosided)
 
 #define DECLARE(kind) extern const struct imp_bsdf_ops kind;

@@ -17,6 +17,7 @@ static enum imp_status build(const struct imp_build *build, void *self,
 {
     (void)build, (void)self;
     b->flags = IMP_BSDF_DELTA;
+    b->n_lobes = 1;
     return IMP_OK;
 }
 static bool lit(const struct imp_dirs *d) { return d->lobe == 0 && d->wo[2] > 0; }

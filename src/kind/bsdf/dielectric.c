@@ -25,19 +25,9 @@ static const struct imp_input_desc inputs[] = {
      .unit = "1"}, /* inside/outside */
     {0}};
 
-/* The two indices become their ratio. */
 static enum imp_status prepare(const struct imp_build *b)
 {
-    enum imp_status st = IMP_OK;
-    double inside, outside;
-    if (imp_build_has(b, "eta"))
-        IMP_TRY(imp_build_error(b, "eta", IMP_E_SCENE,
-                                "give 'int_ior' and 'ext_ior' instead of 'eta'"));
-    IMP_TRY(imp__ior_read(b, "int_ior", "bk7", &inside));
-    IMP_TRY(imp__ior_read(b, "ext_ior", "air", &outside));
-    IMP_TRY(imp_build_set(b, "eta", 1, &(double){inside / outside}));
-out:
-    return st;
+    return imp__ior_prepare(b, "bk7", true);
 }
 
 static enum imp_status build(const struct imp_build *build, void *self,
@@ -45,6 +35,7 @@ static enum imp_status build(const struct imp_build *build, void *self,
 {
     (void)build, (void)self;
     b->flags = IMP_BSDF_DELTA | IMP_BSDF_TRANSMIT;
+    b->n_lobes = 2;
     return IMP_OK;
 }
 

@@ -36,6 +36,23 @@ double imp__fresnel_dielectric_d(double c, double e, double *d_c, double *d_e)
     return 0.5 * (a * a + b * b);
 }
 
+double imp__fresnel_diffuse(double e, double *d_e)
+{
+    const double x = 1 / e;
+    if (e < 1) {
+        *d_e = -2 * 1.4399 * e + 0.7099 - 0.0636 * x * x;
+        return (-1.4399 * e + 0.7099) * e + 0.6681 + 0.0636 * x;
+    }
+    static const double c[6] = {0.919317, -3.4793, 6.75335, -7.80989, 4.98554, -1.36881};
+    double sum = 0, d = 0; /* Horner's scheme, and its derivative */
+    for (int k = 5; k >= 0; k--) {
+        d = d * x + sum;
+        sum = sum * x + c[k];
+    }
+    *d_e = -d * x * x;
+    return sum;
+}
+
 /* One lane. With
  *
  *   t = eta^2 - k^2 - sin^2,  A = sqrt(t^2 + 4 eta^2 k^2),  a = sqrt((A + t)/2),

@@ -15,6 +15,11 @@ double imp__fresnel_dielectric(double c, double eta, double *cos_t, double *eta_
 /* F for c > 0 and index e = far/near, with its derivatives: 0 under total reflection. */
 double imp__fresnel_dielectric_d(double c, double e, double *d_c, double *d_e);
 
+/* Mean reflectance of a smooth boundary for light that is diffuse on the near side, e =
+ * far/near, by fits: Egan and Hilgeman 1973 below e = 1, d'Eon and Irving 2011 above. With
+ * its derivative. */
+double imp__fresnel_diffuse(double e, double *d_e);
+
 /* Conductor in vacuum, c = cosine of incidence, lane by lane. */
 void imp__fresnel_conductor(double c, const imp_spec *eta, const imp_spec *k,
                             imp_spec *f);

@@ -54,3 +54,23 @@ enum imp_status imp__ior_read(const struct imp_build *b, const char *name,
 out:
     return st;
 }
+
+enum imp_status imp__ior_prepare(const struct imp_build *b, const char *inside,
+                                 bool may_be_equal)
+{
+    enum imp_status st = IMP_OK;
+    double n_inside, n_outside;
+    if (imp_build_has(b, "eta"))
+        IMP_TRY(imp_build_error(b, "eta", IMP_E_SCENE,
+                                "give 'int_ior' and 'ext_ior' instead of 'eta'"));
+    IMP_TRY(imp__ior_read(b, "int_ior", inside, &n_inside));
+    IMP_TRY(imp__ior_read(b, "ext_ior", "air", &n_outside));
+    if (n_inside == n_outside && !may_be_equal)
+        IMP_TRY(imp_build_error(b, "int_ior", IMP_E_SCENE,
+                                "int_ior and ext_ior are equal (%g): there is no "
+                                "boundary to be rough",
+                                n_inside));
+    IMP_TRY(imp_build_set(b, "eta", 1, &(double){n_inside / n_outside}));
+out:
+    return st;
+}

@@ -30,6 +30,16 @@ double imp__microfacet_d(const struct imp__microfacet *f, const imp_v3 *m,
     return 1 / (IMP_PI * au * av * s * s);
 }
 
+double imp__microfacet_d_turned(const struct imp__microfacet *f, const imp_v3 *m,
+                                const imp_v3 *dm)
+{
+    const double au2 = f->au * f->au, av2 = f->av * f->av, z = (*m)[2], dz = (*dm)[2];
+    const double q = (*m)[0] * (*m)[0] / au2 + (*m)[1] * (*m)[1] / av2;
+    const double dq = 2 * ((*m)[0] * (*dm)[0] / au2 + (*m)[1] * (*dm)[1] / av2);
+    if (f->type == IMP_GGX) return -2 * (dq + 2 * z * dz) / (q + z * z);
+    return (2 * q * dz / z - dq) / (z * z) - 4 * dz / z;
+}
+
 double imp__microfacet_g1(const struct imp__microfacet *f, const imp_v3 *v, double d[2])
 {
     const double z2 = (*v)[2] * (*v)[2], au = f->au, av = f->av;

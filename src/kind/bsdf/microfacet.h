@@ -25,6 +25,9 @@ struct imp__microfacet {
 /* D, in 1/sr; 0 for m below the surface. d_log (may be NULL): d ln D / d(au, av). */
 double imp__microfacet_d(const struct imp__microfacet *f, const imp_v3 *m,
                          double d_log[2]);
+/* Derivative of ln D(m) where m turns by dm. */
+double imp__microfacet_d_turned(const struct imp__microfacet *f, const imp_v3 *m,
+                                const imp_v3 *dm);
 /* G1(v) on the side of m (v.m > 0 is the caller's business); d (may be NULL): dG1/d(au,
  * av). */
 double imp__microfacet_g1(const struct imp__microfacet *f, const imp_v3 *v, double d[2]);

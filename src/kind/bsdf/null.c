@@ -14,6 +14,7 @@ static enum imp_status build(const struct imp_build *build, void *self,
 {
     (void)build, (void)self;
     b->flags = IMP_BSDF_DELTA | IMP_BSDF_TRANSMIT | IMP_BSDF_NULL;
+    b->n_lobes = 1;
     return IMP_OK;
 }
 

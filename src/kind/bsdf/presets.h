@@ -35,6 +35,19 @@ const struct imp__conductor *imp__conductor_at(size_t i);
  * eta and k, as if they had been written. */
 enum imp_status imp__conductor_prepare(const struct imp_build *b);
 
+/* Refractive index inside over outside, of kinds that it bends nothing in: with a
+ * gradient. imp__ior_prepare makes it of the properties int_ior and ext_ior. */
+#define IMP_IOR_INPUT(ratio, least, most)                                                \
+    {                                                                                    \
+        .name = "eta", .role = IMP_UNBOUNDED,                                            \
+        .flags = IMP_INPUT_SCALAR | IMP_INPUT_NUMBER, .fallback = ratio, .lo = least,    \
+        .hi = most, .unit = "1"                                                          \
+    }
+/* `inside`: the material that int_ior means where it is not written; ext_ior means air. An
+ * error if both sides are equal and may not be. */
+enum imp_status imp__ior_prepare(const struct imp_build *b, const char *inside,
+                                 bool may_be_equal);
+
 /* A refractive index, written as a number or a name (any case). */
 enum imp_status imp__ior_read(const struct imp_build *b, const char *name,
                               const char *fallback, double *ior);

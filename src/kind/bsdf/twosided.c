@@ -16,6 +16,7 @@ static enum imp_status build(const struct imp_build *build, void *self,
     b->absorb = 0;
     for (int k = 0; k < b->n_child; k++) {
         b->flags |= b->child[k]->flags;
+        b->n_lobes = imp_max(b->n_lobes, b->child[k]->n_lobes);
         b->absorb = imp_max(b->absorb, b->child[k]->absorb);
     }
     if ((b->flags & IMP_BSDF_TRANSMIT) && !allow)

@@ -1,0 +1,147 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * plastic: a diffuse base under a smooth clear coat of index eta. The coat reflects like a
+ * mirror, the base what comes through it, and what comes back from inside is reflected
+ * again with the mean reflectance r = F_dr(1/eta):
+ *
+ *   delta lobe  tint F(cos_o)
+ *   smooth      rho/(1 - k r) (1 - F(cos_i)) (1 - F(cos_o))/eta^2 cos_i/pi,   front only
+ *
+ * k = rho if `nonlinear`, so that the base's colour deepens with every reflection, else 1.
+ * The index bends no path that is followed, and has a gradient. */
+#include "fresnel.h"
+#include "lambert.h"
+#include "presets.h"
+
+enum { DIFFUSE, TINT, ETA };
+enum { MIRROR }; /* the delta lobe */
+
+struct plastic {
+    bool nonlinear;
+};
+
+static const struct imp_input_desc inputs[] = {
+    {.name = "diffuse_reflectance",
+     .role = IMP_REFLECTANCE,
+     .fallback = 0.5,
+     .hi = 1,
+     .unit = "1"},
+    IMP_TINT_INPUT("specular_reflectance"),
+    /* The fits of F_dr hold in these bounds. */
+    IMP_IOR_INPUT(1.49 / 1.000277, 0.2, 3.5),
+    {0}};
+
+static enum imp_status prepare(const struct imp_build *b)
+{
+    return imp__ior_prepare(b, "polypropylene", true);
+}
+
+static enum imp_status build(const struct imp_build *build, void *self,
+                             struct imp_bsdf *b)
+{
+    struct plastic *p = self;
+    b->flags = IMP_BSDF_SMOOTH | IMP_BSDF_DELTA;
+    b->n_lobes = 1;
+    return imp_build_bool(build, "nonlinear", false, &p->nonlinear);
+}
+
+static double fresnel(const imp_spec *in, double c)
+{
+    double cos_t, eta_t;
+    return imp__fresnel_dielectric(c, in[ETA][0], &cos_t, &eta_t);
+}
+
+/* Probability of the mirror lobe: its share of what is reflected, roughly. Colours below
+ * the floor keep a part, since their derivatives do not vanish with them. */
+static double mirror_chance(const imp_spec *in, double F)
+{
+    const double s = F * imp_max(imp__max3(in[TINT]), 0.1),
+                 d = (1 - F) * imp_max(imp__max3(in[DIFFUSE]), 0.1);
+    return s + d > 0 ? s / (s + d) : 1;
+}
+
+static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
+                   struct imp_dirs *d)
+{
+    (void)b;
+    if (!(d->wo[2] > 0)) return false;
+    if (!(u[0] < mirror_chance(in, fresnel(in, d->wo[2]))))
+        return imp__lambert_sample(&u[1], d);
+    d->lobe = MIRROR;
+    d->wi = imp__v3(-d->wo[0], -d->wo[1], d->wo[2]);
+    return true;
+}
+static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
+{
+    (void)b;
+    if (!(d->wo[2] > 0)) return 0;
+    const double q = mirror_chance(in, fresnel(in, d->wo[2]));
+    if (d->lobe == IMP_SMOOTH) return (1 - q) * imp__lambert(d);
+    return d->lobe == MIRROR ? q : 0;
+}
+
+/* rho/(1 - k r) and its derivatives. */
+static imp_spec base(const struct plastic *p, const imp_spec *in, double r,
+                     imp_spec *d_rho, imp_spec *d_r)
+{
+    const imp_spec rho = in[DIFFUSE];
+    const imp_spec q = 1 / (1 - (p->nonlinear ? rho : imp__spec(1)) * r);
+    *d_rho = p->nonlinear ? q * q : q;
+    *d_r = (p->nonlinear ? rho : imp__spec(1)) * rho * q * q;
+    return rho * q;
+}
+
+static void eval(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
+                 imp_spec *f)
+{
+    imp_spec d_rho, d_r;
+    double d_e;
+    *f = imp__spec(0);
+    if (!(d->wo[2] > 0)) return;
+    const double eta = in[ETA][0], Fo = fresnel(in, d->wo[2]);
+    if (d->lobe == IMP_SMOOTH && d->wi[2] > 0)
+        *f = base(b->self, in, imp__fresnel_diffuse(1 / eta, &d_e), &d_rho, &d_r) *
+             ((1 - Fo) * (1 - fresnel(in, d->wi[2])) / (eta * eta) * imp__lambert(d));
+    else if (d->lobe == MIRROR) *f = in[TINT] * Fo;
+}
+static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
+                   imp_spec *df)
+{
+    double d_c, dFo, dFi, dr_de;
+    imp_spec d_rho, d_r;
+    df[DIFFUSE] = df[TINT] = df[ETA] = imp__spec(0);
+    if (!(d->wo[2] > 0)) return;
+    const double eta = in[ETA][0];
+    const double Fo = imp__fresnel_dielectric_d(d->wo[2], eta, &d_c, &dFo);
+    if (d->lobe == MIRROR) {
+        df[TINT] = imp__spec(Fo);
+        df[ETA] = in[TINT] * dFo;
+    }
+    if (d->lobe != IMP_SMOOTH || !(d->wi[2] > 0)) return;
+    const double Fi = imp__fresnel_dielectric_d(d->wi[2], eta, &d_c, &dFi);
+    const double inv2 = 1 / (eta * eta), lambert = imp__lambert(d) * inv2;
+    const double T = (1 - Fo) * (1 - Fi), r = imp__fresnel_diffuse(1 / eta, &dr_de);
+    const imp_spec rho = base(b->self, in, r, &d_rho, &d_r);
+    df[DIFFUSE] = d_rho * (T * lambert);
+    df[ETA] = rho * (lambert * (-dFo * (1 - Fi) - dFi * (1 - Fo) - 2 * T / eta)) -
+              d_r * (dr_de * inv2 * T * lambert);
+}
+
+static void albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
+                   imp_spec *rho)
+{
+    (void)b, (void)wo;
+    *rho = in[DIFFUSE];
+}
+
+const struct imp_bsdf_ops imp__plastic = {.size = sizeof(struct imp_bsdf_ops),
+                                          .name = "plastic",
+                                          .object_size = sizeof(struct plastic),
+                                          .inputs = inputs,
+                                          .prepare = prepare,
+                                          .build = build,
+                                          .sample = sample,
+                                          .eval = eval,
+                                          .pdf = pdf,
+                                          .eval_d = eval_d,
+                                          .albedo = albedo};

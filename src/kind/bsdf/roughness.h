@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Roughness of the microfacet kinds, as scenes write it: `alpha`, or `alpha_u` and
+ * `alpha_v`; `distribution`; `sample_visible`. */
+#ifndef IMP_KIND_BSDF_ROUGHNESS_H
+#define IMP_KIND_BSDF_ROUGHNESS_H
+
+#include "microfacet.h"
+
+#define IMP_ROUGHNESS_INPUT(key, more)                                                   \
+    {                                                                                    \
+        .name = key, .role = IMP_REFLECTANCE, .flags = IMP_INPUT_SCALAR | (more),        \
+        .fallback = 0.1, .lo = IMP_ALPHA_MIN, .hi = INFINITY, .unit = "1"                \
+    }
+/* The three inputs, in this order. */
+#define IMP_ROUGHNESS_INPUTS                                                             \
+    IMP_ROUGHNESS_INPUT("alpha", IMP_INPUT_OPTIONAL),                                    \
+        IMP_ROUGHNESS_INPUT("alpha_u", IMP_INPUT_OPTIONAL),                              \
+        IMP_ROUGHNESS_INPUT("alpha_v", IMP_INPUT_OPTIONAL)
+
+/* What stands in a kind's object; filled by imp__roughness_build. */
+struct imp__roughness {
+    enum imp__distribution type;
+    bool visible, anisotropic;
+};
+
+/* One of alpha and (alpha_u, alpha_v) is there, so that it can be a parameter, and
+ * numbers are not below the smallest roughness. */
+enum imp_status imp__roughness_prepare(const struct imp_build *b);
+enum imp_status imp__roughness_build(const struct imp_build *b, struct imp__roughness *r);
+
+/* `in`: the three inputs. Textures may hold less than the smallest roughness: then it is
+ * that, and constant. */
+static inline struct imp__microfacet imp__roughness_at(const struct imp__roughness *r,
+                                                       const imp_spec *in)
+{
+    const double au = in[r->anisotropic ? 1 : 0][0], av = in[r->anisotropic ? 2 : 0][0];
+    return (struct imp__microfacet){r->type, r->visible, fmax(au, IMP_ALPHA_MIN),
+                                    fmax(av, IMP_ALPHA_MIN)};
+}
+/* Adds df by (au, av), lane by lane, to the derivatives `df` by the three inputs. */
+static inline void imp__roughness_d(const struct imp__roughness *r, const imp_spec *in,
+                                    const imp_spec d[2], imp_spec *df)
+{
+    for (int j = 0; j < 2; j++) {
+        const int input = r->anisotropic ? 1 + j : 0;
+        if (!(in[input][0] < IMP_ALPHA_MIN)) df[input] += d[j];
+    }
+}
+
+#endif
