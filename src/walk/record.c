@@ -130,6 +130,13 @@ enum imp_status imp__record_keep(struct imp_record *r, const struct imp_walk *wa
         return imp__error(r->ctx, IMP_E_UNSUPPORTED,
                           "a walk through a medium whose numbers are active cannot be "
                           "kept: its vertices move with them");
+    if (walk->entry)
+        return imp__error(r->ctx, IMP_E_UNSUPPORTED,
+                          "a walk whose light enters at its vertices cannot be kept");
+    for (const struct imp_vertex *v = walk->first; v; v = v->next)
+        if (v->side)
+            return imp__error(r->ctx, IMP_E_UNSUPPORTED,
+                              "a walk with others that hang on it cannot be kept");
     const bool counts = walk->valid && walk->dropped == IMP_DROP_NONE;
     const int n = counts ? walk->n : 0;
     const enum imp_status st = imp__record_reserve(r, 1, (size_t)n);

@@ -50,8 +50,10 @@ void imp__record_destroy(struct imp_record *record);
 size_t imp__record_bytes(const struct imp_record *record);
 
 /* Append a walk that was traced with a record (not value_only); `sample` is its number.
- * IMP_E_UNSUPPORTED if its vertices move with a field; IMP_E_NOMEM beyond the budget, the
- * message says how much is needed. Then nothing is appended. */
+ * IMP_E_UNSUPPORTED if its vertices move with a field, if walks hang on it, or if light
+ * enters at its vertices (imp_walk.entry): a record has one list of vertices a walk, with
+ * decisions only. IMP_E_NOMEM beyond the budget, the message says how much is needed. Then
+ * nothing is appended. A guide decides as anything else does, and is not needed again. */
 enum imp_status imp__record_keep(struct imp_record *record, const struct imp_walk *walk,
                                  int64_t sample);
 

@@ -8,6 +8,8 @@
 #include "walk/record.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
+#include "scene/guide.h"
+#include <importon/elements.h>
 #include <math.h>
 #include <stdbool.h>
 
@@ -182,50 +184,49 @@ static const struct scene_case {
     {"bend/seen.xml", "cells=1 width=8", true},
 };
 
-static void scene_test(const struct scene_case *c)
-{
-    enum { N = 3000 };
-    struct traced t;
-    struct imp_record kept, read;
-    static struct pieces one, two;
-    char name[96];
-    snprintf(name, sizeof name, "%s %s", c->file, c->defines ? c->defines : "");
-    begin(&t, c->file, c->defines, true);
+enum { N = 3000 };
 
-    test_must(ctx, imp__record_create(&t.tracer, PLENTY, &kept));
-    const struct imp_arena_mark mark = imp__arena_mark(&t.arena);
+/* Keeps N walks, through a file: the walks that tracing gives, to the bit, at the
+ * parameters they were drawn at. A guide is not there when they are read. */
+static void kept_same(struct traced *t, const char *name, struct imp_record *read)
+{
+    struct imp_record kept;
+    static struct pieces one, two;
+    struct imp_tracer alone = t->tracer;
+    alone.guide = NULL;
+    test_must(ctx, imp__record_create(&t->tracer, PLENTY, &kept));
+    const struct imp_arena_mark mark = imp__arena_mark(&t->arena);
     for (int i = 0; i < N; i++) {
         struct imp_walk w;
-        trace(&t, i, &w);
+        trace(t, i, &w);
         test_must(ctx, imp__record_keep(&kept, &w, i));
-        imp__arena_rewind(&t.arena, mark);
+        imp__arena_rewind(&t->arena, mark);
     }
     test_must(ctx, imp__record_write(&kept, path));
-    test_must(ctx, imp__record_read(&t.tracer, path, PLENTY, &read));
-    tap_ok(read.n_walks == N && read.n_vertices == kept.n_vertices &&
-               sizeof **read.vertices <= 160 &&
-               imp__record_bytes(&read) <= 160 * read.n_vertices + 48 * N,
+    test_must(ctx, imp__record_read(&alone, path, PLENTY, read));
+    tap_ok(read->n_walks == N && read->n_vertices == kept.n_vertices &&
+               sizeof **read->vertices <= 160 &&
+               imp__record_bytes(read) <= 160 * read->n_vertices + 48 * N,
            "%s: %zu walks of %zu vertices, %zu bytes a vertex, %.0f a walk", name,
-           read.n_walks, read.n_vertices, sizeof **read.vertices,
-           (double)imp__record_bytes(&read) / N);
+           read->n_walks, read->n_vertices, sizeof **read->vertices,
+           (double)imp__record_bytes(read) / N);
+    imp__record_destroy(&kept);
 
-    /* At the parameters they were drawn at. */
-    int values = 0, gradients = 0, lit = 0, counted = 0;
+    int values = 0, gradients = 0, lit = 0;
     size_t n_pieces = 0;
     for (int i = 0; i < N; i++) {
         struct imp_walk w, k;
-        trace(&t, i, &w);
-        imp__record_walk(&read, (size_t)i, &t.tracer, &t.arena, &k);
-        sweep(&t, &w, &one);
-        sweep(&t, &k, &two);
+        trace(t, i, &w);
+        imp__record_walk(read, (size_t)i, &alone, &t->arena, &k);
+        sweep(t, &w, &one);
+        sweep(t, &k, &two);
         values += same_bits(w.L, k.L) && w.px == k.px && w.py == k.py &&
                   w.valid == k.valid && w.dropped == k.dropped &&
-                  imp__record_at(&read, (size_t)i)->sample == i;
+                  imp__record_at(read, (size_t)i)->sample == i;
         gradients += same_pieces(&one, &two);
         lit += weighed(w.L) > 0;
-        counted += k.n > 0;
         n_pieces += one.n;
-        imp__arena_rewind(&t.arena, mark);
+        imp__arena_rewind(&t->arena, mark);
     }
     tap_ok(values == N && lit > N / 20,
            "%s: values to the bit, through a file # %d of %d, %d lit", name, values, N,
@@ -233,6 +234,17 @@ static void scene_test(const struct scene_case *c)
     tap_ok(gradients == N && n_pieces > N / 20,
            "%s: pieces of gradient to the bit, in order # %d of %d, %zu pieces", name,
            gradients, N, n_pieces);
+}
+
+static void scene_test(const struct scene_case *c)
+{
+    struct traced t;
+    struct imp_record read;
+    static struct pieces two;
+    char name[96];
+    snprintf(name, sizeof name, "%s %s", c->file, c->defines ? c->defines : "");
+    begin(&t, c->file, c->defines, true);
+    kept_same(&t, name, &read);
 
     /* At others: against the walks traced at the first ones, frozen. */
     const size_t n = t.active.n;
@@ -285,13 +297,13 @@ static void scene_test(const struct scene_case *c)
     int seen = 0, tried = 0;
     for (int i = 0; i < N && tried < 100; i++) {
         struct imp_walk w, k;
-        const struct imp_record_walk *head = imp__record_at(&kept, (size_t)i);
+        const struct imp_record_walk *head = imp__record_at(&read, (size_t)i);
         struct imp_decision *d =
-            &kept.vertices[head->first / IMP_RECORD_PAGE][head->first % IMP_RECORD_PAGE];
+            &read.vertices[head->first / IMP_RECORD_PAGE][head->first % IMP_RECORD_PAGE];
         trace(&t, i, &w);
         if (w.n > 0 && w.first->d.goes_on && weighed(w.first->beyond * w.first->w) > 0) {
             d->pdf = nextafterf(d->pdf, INFINITY);
-            imp__record_walk(&kept, (size_t)i, &t.tracer, &t.arena, &k);
+            imp__record_walk(&read, (size_t)i, &t.tracer, &t.arena, &k);
             seen += !same_bits(w.L, k.L);
             tried++;
         }
@@ -303,7 +315,60 @@ static void scene_test(const struct scene_case *c)
     free(frozen);
     free(theta);
     free(x_dot);
-    imp__record_destroy(&kept);
+    imp__record_destroy(&read);
+    end(&t);
+}
+
+/* ---- A guide, wavelengths ---------------------------------------------------------- */
+
+static void guided(void)
+{
+    struct imp_elements_options o = IMP_ELEMENTS_OPTIONS_INIT;
+    struct imp_elements_guide_options go = IMP_ELEMENTS_GUIDE_OPTIONS_INIT;
+    struct imp_record read;
+    struct traced t;
+    imp_elements *e;
+    imp_guide *guide;
+    begin(&t, "elements/b.xml", NULL, true);
+    o.stop = -1;
+    o.eps_last = 3e-3;
+    test_must(ctx, imp_elements_create(t.scene, &o, &e));
+    test_must(ctx, imp_elements_solve(e));
+    test_must(ctx, imp_elements_guide(e, &go, &guide));
+    const struct imp_guide *follows = imp__guide_of(t.scene, &t.integrator, guide);
+    int differ = 0;
+    for (int i = 0; i < 100; i++) {
+        struct imp_walk with, without;
+        trace(&t, i, &without);
+        t.tracer.guide = follows;
+        trace(&t, i, &with);
+        t.tracer.guide = NULL;
+        differ += !same_bits(with.L, without.L);
+    }
+    tap_ok(differ > 20, "a guide makes other walks # %d of 100", differ);
+    t.tracer.guide = follows;
+    kept_same(&t, "guided", &read);
+    imp__record_destroy(&read);
+    imp_guide_destroy(guide);
+    imp_elements_destroy(e);
+    end(&t);
+}
+
+static void wavelengths(void)
+{
+    static const struct imp_carried four = {4, {437, 555, 600, 690}},
+                                    other = {4, {437, 555, 600, 691}};
+    struct imp_record read;
+    struct traced t;
+    begin(&t, "cornell.xml", "res=32", true);
+    t.tracer.carried = &four;
+    kept_same(&t, "four wavelengths", &read);
+    t.tracer.carried = &other;
+    const enum imp_status st = imp__record_check(&read, &t.tracer);
+    tap_ok(st == IMP_E_ARG, "walks of other wavelengths are refused # %s",
+           imp_last_error(ctx));
+    t.tracer.carried = NULL;
+    tap_ok(imp__record_check(&read, &t.tracer) == IMP_E_ARG, "and walks of colours");
     imp__record_destroy(&read);
     end(&t);
 }
@@ -402,6 +467,24 @@ static void not_kept(void)
     t.tracer.split = 2;
     tap_ok(imp__record_create(&t.tracer, PLENTY, &r) == IMP_E_UNSUPPORTED,
            "and walks that split # %s", imp_last_error(ctx));
+    end(&t);
+
+    begin(&t, "cornell.xml", "res=32", true);
+    const imp_spec one = {1, 1, 1, 1};
+    struct imp_side side = {.next = NULL};
+    struct imp_walk w;
+    for (int i = 0; trace(&t, i, &w), !w.first; i++) {}
+    test_must(ctx, imp__record_create(&t.tracer, PLENTY, &r));
+    w.entry = &one;
+    tap_ok(imp__record_keep(&r, &w, 0) == IMP_E_UNSUPPORTED && r.n_walks == 0,
+           "and walks whose light enters at their vertices # %s", imp_last_error(ctx));
+    w.entry = NULL;
+    w.last->side = &side;
+    tap_ok(imp__record_keep(&r, &w, 0) == IMP_E_UNSUPPORTED && r.n_walks == 0,
+           "and walks with others on them # %s", imp_last_error(ctx));
+    w.last->side = NULL;
+    tap_ok(imp__record_keep(&r, &w, 0) == IMP_OK && r.n_walks == 1, "and none else");
+    imp__record_destroy(&r);
     end(&t);
 
     /* The budget, to the byte. */
@@ -512,6 +595,8 @@ int main(void)
 {
     ctx = test_context(1);
     for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) scene_test(&cases[k]);
+    guided();
+    wavelengths();
     other_scenes();
     not_kept();
     files();
