@@ -204,7 +204,8 @@ IMP_API void imp_scene_ref(imp_scene *scene, const char *id, const char *name);
 IMP_API void imp_scene_mesh(imp_scene *scene, size_t n_vertices, size_t n_triangles,
                             const float *positions, const float *normals,
                             const float *uvs, const uint32_t *indices);
-/** Linear pixels for the open texture of type "bitmap", in place of `filename`.
+/** Linear pixels for the open texture of type "bitmap" or emitter of type "envmap", in
+ * place of `filename`.
  * pixels [height][width][channels], channels 1 or 3. */
 IMP_API void imp_scene_image(imp_scene *scene, int width, int height, int channels,
                              const float *pixels);

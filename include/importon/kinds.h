@@ -388,8 +388,10 @@ enum imp_emitter_flags {
     IMP_EMITTER_DELTA = 1,
     IMP_EMITTER_AREA = 2,
     IMP_EMITTER_ENVIRONMENT = 4,
-    IMP_EMITTER_UNIFORM = 8 /* eval is its first input, whatever the direction (of a
-                               surface: on its front) */
+    IMP_EMITTER_UNIFORM = 8, /* eval is its first input, whatever the direction (of a
+                                surface: on its front) */
+    IMP_EMITTER_GAPS = 16    /* the density of sample is 0 where eval is, also where a
+                                derivative is not */
 };
 
 struct imp_emission { /* where and whither light leaves */
@@ -447,6 +449,14 @@ struct imp_emitter_ops {
     const struct imp_emitter_profile *profile; /* NULL: another light */
     /* As imp_bsdf_ops.changed. */
     void (*changed)(const struct imp_emitter *e);
+    /* Where the inputs are looked up for light that leaves along x->d. NULL: at x->uv. It
+     * may read constants of its own, e->input[j]->value, that move it; for these */
+    void (*place)(const struct imp_emitter *e, const struct imp_emission *x,
+                  double uv[2]);
+    /* sets d uv/d(input j), by which the engine adds the slopes of textures to eval_d. Both
+     * or neither where a constant moves the lookup. */
+    void (*place_d)(const struct imp_emitter *e, const struct imp_emission *x, int j,
+                    double duv[2]);
 };
 
 /* ---- Sensor and filter --------------------------------------------------------- */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Nodes that name files get what the files hold: triangles for obj and ply, pixels for
- * bitmap, intensities for ies. */
+ * bitmap and envmap, intensities for ies. */
 #include "base/film.h"
 #include "color/rgb.h"
 #include "ies_file.h"
@@ -121,6 +121,34 @@ out:
     return st;
 }
 
+/* The picture of an environment is a bitmap in its slot data, whether it was written as
+ * `filename`, given by pixels, or nested under any name. */
+static enum imp_status sky_expand(struct imp_scene *scene, struct imp_node *node)
+{
+    struct imp_prop *file = imp__node_prop(node, "filename");
+    struct imp_child *picture = NULL;
+    for (size_t i = 0; i < node->n_children && !picture; i++)
+        if (node->children[i].node && strcmp(node->children[i].node->tag, "texture") == 0)
+            picture = &node->children[i];
+    if ((file != NULL) + (picture != NULL) + (node->image != NULL) > 1)
+        return imp__node_error(scene->ctx, node, IMP_E_SCENE,
+                               "has two pictures: one of 'filename', a bitmap or pixels "
+                               "can be");
+    if (picture) picture->name = "data";
+    if (picture || (!file && !node->image)) return IMP_OK;
+    struct imp_node *t = imp__node_create(&scene->arena, "texture", "bitmap", NULL, NULL,
+                                          file ? file->loc : node->loc);
+    if (!t || !imp__node_add_child(&scene->arena, node, t, "data", t->loc))
+        return imp__error(scene->ctx, IMP_E_NOMEM, "scene: out of memory");
+    t->image = node->image;
+    if (!file) return IMP_OK;
+    struct imp_prop *p =
+        imp__node_add(&scene->arena, t, "filename", file->type, file->loc);
+    if (!p) return imp__error(scene->ctx, IMP_E_NOMEM, "scene: out of memory");
+    *p = *file;
+    return IMP_OK;
+}
+
 static enum imp_status attach(struct imp_scene *scene, struct imp_node *node)
 {
     enum imp_status st = IMP_OK;
@@ -134,6 +162,8 @@ static enum imp_status attach(struct imp_scene *scene, struct imp_node *node)
         IMP_TRY(imp__graded_attach(scene, node));
     if (strcmp(node->tag, "emitter") == 0 && strcmp(node->type, "ies") == 0)
         IMP_TRY(ies_attach(scene, node));
+    if (strcmp(node->tag, "emitter") == 0 && strcmp(node->type, "envmap") == 0)
+        IMP_TRY(sky_expand(scene, node));
     if (bitmap && !node->image) IMP_TRY(image_attach(scene, node));
     else if (bitmap && imp__node_prop(node, "filename"))
         IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_SCENE,

@@ -292,9 +292,11 @@ static enum imp_status image(struct imp_scene *scene, int width, int height, int
 {
     imp_context *ctx = scene->ctx;
     struct imp_node *node = top(scene);
-    if (!open_is(scene, "texture", "bitmap") || node->image)
+    if ((!open_is(scene, "texture", "bitmap") && !open_is(scene, "emitter", "envmap")) ||
+        node->image)
         return imp__node_error(ctx, node, IMP_E_ARG,
-                               "pixels are for a texture of type 'bitmap', once");
+                               "pixels are for a texture of type 'bitmap' or an emitter "
+                               "of type 'envmap', once");
     if (!pixels) return imp__node_error(ctx, node, IMP_E_ARG, "pixels is NULL");
     if (width < 1 || height < 1 || width > IMP_FILM_SIDE_MAX ||
         height > IMP_FILM_SIDE_MAX || (channels != 1 && channels != 3))

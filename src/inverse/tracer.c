@@ -13,7 +13,9 @@
 static enum imp_status attached_allowed(const struct imp_scene *scene)
 {
     bool fine = scene->n_shapes == 1 && scene->environment >= 0 &&
-                scene->n_emitters == 1 && scene->shapes[0]->ops->flags & IMP_SHAPE_CONVEX;
+                scene->n_emitters == 1 &&
+                scene->emitters[0]->ops->flags & IMP_EMITTER_UNIFORM &&
+                scene->shapes[0]->ops->flags & IMP_SHAPE_CONVEX;
     for (int b = 0; fine && b < scene->n_bsdfs; b++)
         if (scene->bsdfs[b]->flags & IMP_BSDF_JUMP)
             return imp__error(
@@ -27,6 +29,22 @@ static enum imp_status attached_allowed(const struct imp_scene *scene)
         scene->ctx, IMP_E_BIAS,
         "alpha_gradient=attached is unbiased only for one convex shape under a "
         "constant environment; use detached");
+}
+
+/* Light samples alone see no derivative of a light where it is dark. */
+static enum imp_status gaps_allowed(const struct imp_problem *p,
+                                    const struct imp_walk_integrator *integrator)
+{
+    if (integrator->directions) return IMP_OK;
+    for (int i = 0; i < p->scene->n_emitters; i++) {
+        const struct imp_emitter *e = p->scene->emitters[i];
+        if (e->ops->flags & IMP_EMITTER_GAPS && p->active.emitter[i])
+            return imp__error(p->ctx, IMP_E_BIAS,
+                              "light '%s' (%s) is sampled only where it shines, so "
+                              "direct without bsdf_samples has not the whole derivative",
+                              e->name, e->ops->name);
+    }
+    return IMP_OK;
 }
 
 enum imp_status imp__problem_tracer(const struct imp_problem *p,
@@ -49,6 +67,8 @@ enum imp_status imp__problem_tracer(const struct imp_problem *p,
         st = attached_allowed(p->scene);
         if (st != IMP_OK) return st;
     }
+    st = gaps_allowed(p, integrator);
+    if (st != IMP_OK) return st;
     *out = (struct imp_tracer){.scene = p->scene,
                                .integrator = integrator,
                                .sensor = sensor,

@@ -57,6 +57,15 @@ struct imp_build imp__build_make(struct imp_scene *scene, struct imp_node *node)
 
 /* ---- Inputs and textures ------------------------------------------------------- */
 
+/* The data of a picture in a slot that is called data are that slot: sky.data. */
+static const char *bulk_name(struct imp_scene *scene, const char *texture,
+                             const char *key)
+{
+    const char *slot = strrchr(texture, '.');
+    return slot && strcmp(slot + 1, key) == 0 ? texture
+                                              : imp__build_name(scene, texture, key);
+}
+
 static enum imp_status add_bulk(const struct imp_build *b, const char *key, float *data,
                                 int n_dims, const size_t dims[3], unsigned flags,
                                 double lo, double hi, int *param)
@@ -64,7 +73,7 @@ static enum imp_status add_bulk(const struct imp_build *b, const char *key, floa
     struct imp_scene *scene = b->scene;
     const struct imp_texture *t = b->node->object; /* set before build is called */
     struct imp_param p = {.store = IMP_STORE_BULK, .bulk = data};
-    p.info.name = imp__build_name(scene, t->name, key);
+    p.info.name = bulk_name(scene, t->name, key);
     if (!p.info.name) return imp__build_no_memory(scene);
     p.info.unit = "1";
     p.info.n_dims = n_dims;

@@ -36,13 +36,35 @@ static void glow_d(const struct imp_vertex *v, imp_spec *d)
     for (int j = 0; j < v->bsdf->n_in; j++) d[j] *= v->d.glow_weight;
 }
 
+/* d[j] of a constant that moves the lookup of the textures: the sum over these of
+ * d[k] (slope . d uv/d input j). */
+static void lookup_d(const struct imp_emitter *e, const struct imp_active *active,
+                     const struct imp_emission *x, const struct imp_texcoord *at,
+                     imp_spec *d)
+{
+    for (int j = 0; j < e->n_in; j++) {
+        const int param = e->input[j]->param;
+        double duv[2];
+        if (e->input[j]->texture || param < 0 || active->base[param] < 0) continue;
+        e->ops->place_d(e, x, j, duv);
+        for (int k = 0; k < e->n_in && (duv[0] != 0 || duv[1] != 0); k++) {
+            const struct imp_texture *t = e->input[k]->texture;
+            imp_spec slope[2];
+            if (t && t->ops->slope && t->ops->slope(t, at, e->input[k]->scalar, slope))
+                d[j] += d[k] * (slope[0] * duv[0] + slope[1] * duv[1]);
+        }
+    }
+}
+
 /* E_k or B_k through an emitter: d[emitter->n_in], without the factor in front. */
-static void emitter_d(const struct imp_emitter *e, const struct imp_emission *x,
-                      const struct imp_texcoord *at, imp_spec *d)
+static void emitter_d(const struct imp_emitter *e, const struct imp_active *active,
+                      const struct imp_emission *x, const struct imp_texcoord *at,
+                      imp_spec *d)
 {
     imp_spec in[IMP_INPUTS_MAX];
     imp__inputs_eval(e->input, e->n_in, at, in);
     e->ops->eval_d(e, in, x, d);
+    if (imp_unlikely(e->ops->place_d != NULL)) lookup_d(e, active, x, at, d);
 }
 
 /* w_k through the BSDF, densities frozen: d[n_in]. */
@@ -72,7 +94,8 @@ static void emitter_scatter(const struct imp_tracer *tracer, int emitter,
 {
     const struct imp_emitter *e = tracer->scene->emitters[emitter];
     imp_spec d[IMP_INPUTS_MAX];
-    emitter_d(e, &x, &at, d);
+    imp__emitter_place(e, &x, &at);
+    emitter_d(e, tracer->active, &x, &at, d);
     for (int j = 0; j < e->n_in; j++) d[j] *= bar;
     imp__inputs_scatter(e->input, e->n_in, &at, d, sink);
 }
@@ -151,7 +174,8 @@ static imp_spec emitter_tangent(const struct imp_tracer *tracer, int emitter,
 {
     const struct imp_emitter *e = tracer->scene->emitters[emitter];
     imp_spec d[IMP_INPUTS_MAX], in_dot[IMP_INPUTS_MAX], sum = {0};
-    emitter_d(e, &x, &at, d);
+    imp__emitter_place(e, &x, &at);
+    emitter_d(e, tracer->active, &x, &at, d);
     imp__inputs_tangent(e->input, e->n_in, &at, direction_at, direction, in_dot);
     for (int j = 0; j < e->n_in; j++) sum += d[j] * in_dot[j];
     return sum;

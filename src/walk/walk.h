@@ -211,14 +211,22 @@ void imp__walk_evaluate(const struct imp_tracer *tracer, struct imp_walk *walk);
  * light can have, or no picture can hold, is dropped (trace.c). */
 void imp__walk_close(const struct imp_tracer *tracer, struct imp_walk *walk);
 
+/* Where the emitter's inputs are looked up. */
+static inline void imp__emitter_place(const struct imp_emitter *e,
+                                      const struct imp_emission *x,
+                                      struct imp_texcoord *at)
+{
+    if (imp_unlikely(e->ops->place != NULL)) e->ops->place(e, x, at->uv);
+}
 /* Radiance of an emitter at x, point p of it, at the scene's present parameters. */
 static inline imp_spec imp__emitter_radiance(const struct imp_scene *scene, int emitter,
                                              const struct imp_emission *x, imp_v3 p,
                                              const struct imp_carried *carried)
 {
     const struct imp_emitter *e = scene->emitters[emitter];
-    const struct imp_texcoord at = {{x->uv[0], x->uv[1]}, p, carried};
+    struct imp_texcoord at = {{x->uv[0], x->uv[1]}, p, carried};
     imp_spec in[IMP_INPUTS_MAX], le;
+    imp__emitter_place(e, x, &at);
     imp__inputs_eval(e->input, e->n_in, &at, in);
     e->ops->eval(e, in, x, &le);
     return le;

@@ -182,6 +182,15 @@ static void emitter_make(imp_scene *s, const struct subject *q)
         imp_scene_string(s, "filename", IMP_SCENES "/lamps/wallwash.ies");
         imp_scene_string(s, "units", "radiometric");
     }
+    if (q->emitter->place) { /* a picture of the sky, some of it dark */
+        float pixels[5 * 4 * 3];
+        for (uint32_t k = 0; k < 60; k++)
+            pixels[k] = k % 7 ? (float)random_in(q->emitter->inputs, 5, 100 + k) : 0;
+        imp_scene_image(s, 5, 4, 3, pixels);
+        inputs_make(s, q, q->emitter->name, NULL, q->emitter->inputs + 1, false, 5);
+        imp_scene_end(s);
+        return;
+    }
     inputs_make(s, q, q->emitter->name, NULL, q->emitter->inputs, texture, 5);
     imp_scene_end(s);
 }
@@ -241,7 +250,7 @@ static imp_scene *scene_make(const struct subject *q, const char *integrator,
         imp_scene_end(s);
     } else {
         emitter_make(s, q);
-        if (!open) {
+        if (!open || q->emitter->place) { /* so that scale 0 is not darkness */
             const double at[3] = {0.2, 0.6, 0.3};
             imp_scene_begin(s, "emitter", "point", NULL, NULL);
             imp_scene_vector(s, "position", at);

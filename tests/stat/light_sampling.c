@@ -375,6 +375,7 @@ static void emitters(void)
     for (int k = 0; imp__emitter_kinds[k]; k++) {
         const struct imp_emitter_ops *ops = imp__emitter_kinds[k];
         const int area = ops->flags & IMP_EMITTER_AREA;
+        if (ops->place) continue; /* a picture: environment.c */
         world_begin(ctx);
         struct imp_shape *s = placed("rectangle", imp__mat4_identity());
         struct imp_emitter *e =

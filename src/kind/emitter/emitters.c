@@ -10,7 +10,8 @@
     X(imp__point_light)                                                                  \
     X(imp__ies_light)                                                                    \
     X(imp__ies_area)                                                                     \
-    X(imp__constant)
+    X(imp__constant)                                                                     \
+    X(imp__envmap)
 
 #define DECLARE(kind) extern const struct imp_emitter_ops kind;
 EMITTERS(DECLARE)

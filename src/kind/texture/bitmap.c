@@ -3,6 +3,7 @@
  * bitmap: a picture. Texel (i, j) has its centre at ((i + .5)/W, (j + .5)/H), row 0 at v
  * = 0. The value is linear in the texels, so its derivative is the set of filter weights
  * itself: eval, scatter and tangent all go through `footprint`. */
+#include "bitmap.h"
 #include "color/rgb.h"
 #include "input.h"
 #include "math/vec.h"
@@ -12,6 +13,8 @@
 
 enum wrap { WRAP_REPEAT, WRAP_MIRROR, WRAP_CLAMP };
 enum filter { FILTER_BILINEAR, FILTER_NEAREST };
+
+extern const struct imp_texture_ops imp__bitmap;
 
 struct bitmap {
     int width, height, channels; /* 1 or 3 */
@@ -249,6 +252,16 @@ static bool slope(const struct imp_texture *tex, const struct imp_texcoord *at,
     d[1] = ((texel[2] - texel[0]) * (1 - a) + (texel[3] - texel[1]) * a) * t->height;
     for (int k = 0; k < 2; k++)
         d_uv[k] = d[0] * t->to_uv.m[0][k] + d[1] * t->to_uv.m[1][k];
+    return true;
+}
+
+bool imp__bitmap_texels(const struct imp_texture *tex, struct imp__texels *out)
+{
+    const struct bitmap *t = tex->self;
+    if (tex->ops != &imp__bitmap) return false;
+    *out = (struct imp__texels){t->width, t->height, t->channels, t->data,
+                                t->identity && t->wrap == WRAP_REPEAT &&
+                                    t->filter == FILTER_BILINEAR};
     return true;
 }
 

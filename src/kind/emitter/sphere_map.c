@@ -1,0 +1,108 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "sphere_map.h"
+
+void imp__sphere_map_place(const struct imp__sphere_map *m, imp_v3 d, double *u,
+                           double *row)
+{
+    const double turns = atan2(d[0], -d[2]) * (IMP_INV_PI / 2);
+    const double last = m->height - 1;
+    *u = turns < 0 ? turns + 1 : turns;
+    if (m->projection == IMP_LATLONG)
+        *row = atan2(sqrt(d[0] * d[0] + d[2] * d[2]), d[1]) * IMP_INV_PI * last;
+    else *row = (1 - d[1]) * 0.5 * m->height - 0.5;
+    *row = imp_clamp(*row, 0.0, last);
+}
+
+imp_v3 imp__sphere_direction(double u, double cos_theta, double sin_theta)
+{
+    const double phi = IMP_2PI * u;
+    return imp__v3(sin(phi) * sin_theta, cos_theta, -cos(phi) * sin_theta);
+}
+
+double imp__sphere_map_cosine(const struct imp__sphere_map *m, double row)
+{
+    if (m->projection == IMP_LATLONG) return cos(IMP_PI * row / (m->height - 1));
+    return 1 - 2 * (row + 0.5) / m->height;
+}
+
+/* 1 - sin(x)/x without cancellation. */
+static double sinc_missing(double x)
+{
+    const double x2 = x * x;
+    if (x > 0.3) return 1 - sin(x) / x;
+    return x2 / 6 * (1 - x2 / 20 * (1 - x2 / 42 * (1 - x2 / 72 * (1 - x2 / 110))));
+}
+
+/* Int_0^delta (1 - t/delta) sin(theta + t) dt, half the hat of a row at theta. */
+static double half_hat(double theta, double delta)
+{
+    const double s = sin(delta / 2);
+    return cos(theta) * sinc_missing(delta) + sin(theta) * 2 * s * s / delta;
+}
+
+static double row_step(const struct imp__sphere_map *m)
+{
+    return IMP_PI / (m->height - 1);
+}
+
+double imp__sphere_map_weight(const struct imp__sphere_map *m, int i)
+{
+    const double column = IMP_2PI / m->width;
+    if (m->projection == IMP_EQUAL_AREA) return column * 2 / m->height;
+    const double delta = row_step(m), theta = i * delta;
+    double sum = 0;
+    if (i < m->height - 1) sum += half_hat(theta, delta);
+    if (i > 0) sum += half_hat(IMP_PI - theta, delta);
+    return column * sum;
+}
+
+/* t in [0, delta] with density (1 - t/delta) sin(theta + t): Newton's method on the
+ * integral, kept inside an interval that holds the root. */
+static double half_hat_draw(double theta, double delta, double r)
+{
+    const double sine = sin(theta), cosine = cos(theta);
+    const double goal = r * half_hat(theta, delta);
+    double lo = 0, hi = delta, t = delta * (1 - sqrt(1 - r)); /* were the sine constant */
+    for (int k = 0; k < 30 && hi - lo > 1e-13 * delta; k++) {
+        const double s = sin(theta + t), c = cos(theta + t), left = 1 - t / delta;
+        const double excess = cosine - left * c - (s - sine) / delta - goal;
+        if (excess > 0) hi = t;
+        else lo = t;
+        const double next = t - excess / (left * s);
+        const double before = t;
+        t = next > lo && next < hi ? next : 0.5 * (lo + hi);
+        if (fabs(t - before) < 1e-12 * delta) break;
+    }
+    return t;
+}
+
+static void latlong_draw(const struct imp__sphere_map *m, int i, double r,
+                         double *cos_theta, double *sin_theta)
+{
+    const double delta = row_step(m), theta = i * delta;
+    const double below = i < m->height - 1 ? half_hat(theta, delta) : 0;
+    const double above = i > 0 ? half_hat(IMP_PI - theta, delta) : 0;
+    const double at = r * (above + below);
+    double t;
+    if (at < above || below == 0)
+        t = theta - half_hat_draw(IMP_PI - theta, delta, fmax(0, 1 - at / above));
+    else t = theta + half_hat_draw(theta, delta, fmin(1, (at - above) / below));
+    *cos_theta = cos(t);
+    *sin_theta = sin(t);
+}
+
+void imp__sphere_map_draw(const struct imp__sphere_map *m, int i, double r,
+                          double *cos_theta, double *sin_theta)
+{
+    if (m->projection == IMP_LATLONG) {
+        latlong_draw(m, i, r, cos_theta, sin_theta);
+        return;
+    }
+    double x = imp__hat_draw(r);
+    /* Beyond the first and the last row the map is constant: half a row of it. */
+    if (i == 0 && r < 0.5) x = r - 0.5;
+    if (i == m->height - 1 && r >= 0.5) x = r - 0.5;
+    const double z = imp_clamp(1 - 2 * (i + 0.5 + x) / m->height, -1.0, 1.0);
+    *cos_theta = z;
+    *sin_theta = sqrt((1 - z) * (1 + z));
+}

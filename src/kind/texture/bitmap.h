@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The texels of a bitmap, for kinds that draw directions or points by them. */
+#ifndef IMP_KIND_TEXTURE_BITMAP_H
+#define IMP_KIND_TEXTURE_BITMAP_H
+
+#include "kind/build.h"
+
+struct imp__texels {
+    int width, height, channels; /* 1 or 3 */
+    const float *data;           /* [height][width][channels], lives as the texture */
+    bool plain;                  /* bilinear and repeated, and to_uv does nothing */
+};
+/* False: t is another texture. */
+bool imp__bitmap_texels(const struct imp_texture *t, struct imp__texels *out);
+
+#endif
