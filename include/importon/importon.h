@@ -53,6 +53,7 @@ extern "C" {
 #define IMP_STATUS_LIST(X)                                                               \
     X(IMP_OK, 0, "success")                                                              \
     X(IMP_CANCELLED, 1, "cancelled by the caller; results so far are valid")             \
+    X(IMP_PART, 2, "a part is kept; there is no whole result")                           \
     X(IMP_E_ARG, 10, "argument outside its documented range")                            \
     X(IMP_E_SCENE, 20, "scene or input file is not valid")                               \
     X(IMP_E_UNSUPPORTED, 25, "valid, but not available in this version")                 \
@@ -112,6 +113,83 @@ IMP_API const char *imp_last_error(const imp_context *context);
 
 /** Number of threads in use. */
 IMP_API int imp_context_threads(const imp_context *context);
+
+/* ---- Many processes ------------------------------------------------------------ */
+
+/** Processes that work together, the ranks of a team. Each makes the same calls in the
+ * same order with the same arguments, on scenes and targets that are the same. Each
+ * computes a share of the walks, and all get the whole result, with the bits that one
+ * process alone gives; what is not walks is computed by each. A failure, a cancel or a
+ * time limit of one ends the call on all. Calls come from one thread a rank at a time. */
+struct imp_team {
+    size_t size;
+    int rank, ranks; /**< this one, of how many */
+    /** Give the messages of all ranks to all: calls `receive` with those of ranks 0, 1,
+     * ..., its own too. The message may be of 0 bytes, and what is received belongs to
+     * the team. @return IMP_OK, or the status that ends the call. */
+    enum imp_status (*gather)(const void *message, size_t bytes,
+                              void (*receive)(void *receiver, int rank,
+                                              const void *message, size_t bytes),
+                              void *receiver, void *payload);
+    /** The next of 0, 1, 2, ...: each number goes to one rank, by whatever thread; the
+     * numbers begin anew in every round, and all ranks gather between two rounds. NULL:
+     * ranks get equal shares, and none takes over what another has left. */
+    int64_t (*next)(uint64_t round, void *payload);
+    void *payload;
+};
+#define IMP_TEAM_INIT                                                                    \
+    {                                                                                    \
+        sizeof(struct imp_team), 0, 1, 0, 0, 0                                           \
+    }
+
+/** Work on this context's calls from now on as one rank of a team; NULL: alone again.
+ * Waits for the other ranks.
+ * @return IMP_OK; IMP_E_ARG if a rank runs another version, or another processor whose
+ *         results have other bits (the message names both); what `gather` returned. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_context_set_team(imp_context *context,
+                                                            const struct imp_team *team);
+
+/** Parts of a run, made one by one on any machine and at any time, and merged later to
+ * the bits of one run. They are the messages that the ranks of a team would have sent,
+ * kept in files; a part is made by making all calls of the run with this part set. */
+typedef struct imp_parts imp_parts;
+
+/** Part `index`, from 1, of `count`; nothing is computed yet. `command`: how the run was
+ * asked for, kept as it is. Parts go together only with equal commands.
+ * @return IMP_OK; IMP_E_ARG; IMP_E_NOMEM. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_parts_create(imp_context *context, int index,
+                                                        int count, const char *command,
+                                                        imp_parts **out);
+/** Read files of parts, paths [n], each of one part or of several. They may be of
+ * different cuts, such as 1/2, 3/4 and 4/4.
+ * @return IMP_OK; IMP_E_IO; IMP_E_SCENE for what is damaged or of another version;
+ *         IMP_E_ARG for parts that overlap, or do not belong together; IMP_E_NOMEM. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_parts_read(imp_context *context, const char *const *paths, size_t n, imp_parts **out);
+/** Write all of them to one file, which appears whole or not at all.
+ * @return IMP_OK; IMP_E_IO; IMP_E_NOMEM. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_parts_write(const imp_parts *parts,
+                                                       const char *path);
+IMP_API void imp_parts_destroy(imp_parts *parts);
+
+struct imp_parts_info {
+    size_t size;
+    int n;               /**< parts that are there */
+    int missing;         /**< holes between them; 0: they are a whole */
+    const char *holes;   /**< which, for people: "2/4, 4/4"; belongs to the parts */
+    const char *command; /**< as given to imp_parts_create; belongs to the parts */
+};
+/** Set info->size first. @return IMP_OK; IMP_E_ARG. */
+IMP_API enum imp_status imp_parts_get_info(imp_parts *parts, struct imp_parts_info *info);
+/** The calls that follow compute this part (they return IMP_PART and leave their outputs
+ * alone: write it when the last was made), or merge the parts that were read: the same
+ * calls give the whole, and compute no walk. NULL: calls are whole again. `parts` must
+ * live until then. Losses through filters wider than a pixel take pictures first; each
+ * part makes these whole.
+ * @return IMP_OK; IMP_E_ARG if some are missing (the message says which), or they were
+ *         made by another version or on another kind of processor. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_context_set_parts(imp_context *context,
+                                                             imp_parts *parts);
 
 /* ---- Progress and cancel ------------------------------------------------------- */
 

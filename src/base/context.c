@@ -130,6 +130,7 @@ void imp__context_drop(imp_context *ctx)
     IMP_FLOAT_MODE;
     imp__context_own(ctx);
     imp__pool_destroy(ctx, ctx->pool);
+    imp__release(ctx, ctx->team);
     for (struct imp__error_text *e = ctx->errors, *next; e; e = next) {
         next = e->next;
         imp__release(ctx, e);

@@ -16,6 +16,7 @@
 #include <stdbool.h>
 
 struct imp_pool;
+struct imp__team;
 
 /* A kind that the host registered: a table of kinds.h (kind/registry.c). */
 struct imp_registered {
@@ -33,6 +34,7 @@ struct imp_context {
     pthread_mutex_t lock;           /* guards errors, kinds and pool creation */
     struct imp__error_text *errors; /* list of all threads' texts, freed at the end */
     struct imp_pool *pool;          /* made on first use */
+    struct imp__team *team;         /* NULL: alone */
     struct imp_registered *kinds;
     bool has_scenes;      /* one was made: kinds are not registered any more */
     _Atomic int held;     /* by the host, and by every object made from it */

@@ -204,7 +204,7 @@ out:
 }
 
 struct parts {
-    const struct imp_part *part;
+    const struct imp_chunk *part;
     size_t n;
 };
 static void parts_fill(struct imp_file_writer *w, const void *payload)
@@ -214,7 +214,7 @@ static void parts_fill(struct imp_file_writer *w, const void *payload)
 }
 
 enum imp_status imp__file_write_parts(imp_context *ctx, const char *path,
-                                      const struct imp_part *parts, size_t n)
+                                      const struct imp_chunk *parts, size_t n)
 {
     const struct parts p = {parts, n};
     return imp__file_write_by(ctx, path, parts_fill, &p);
@@ -223,5 +223,5 @@ enum imp_status imp__file_write_parts(imp_context *ctx, const char *path,
 enum imp_status imp__file_write(imp_context *ctx, const char *path, const void *data,
                                 size_t size)
 {
-    return imp__file_write_parts(ctx, path, &(struct imp_part){data, size}, 1);
+    return imp__file_write_parts(ctx, path, &(struct imp_chunk){data, size}, 1);
 }

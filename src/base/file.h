@@ -32,12 +32,12 @@ enum imp_status imp__file_write_by(imp_context *ctx, const char *path,
                                                 const void *payload),
                                    const void *payload);
 /* The same, of parts in turn. */
-struct imp_part {
+struct imp_chunk {
     const void *data;
     size_t size;
 };
 enum imp_status imp__file_write_parts(imp_context *ctx, const char *path,
-                                      const struct imp_part *parts, size_t n);
+                                      const struct imp_chunk *parts, size_t n);
 
 /* Put n bytes at `offset`, growing as needed; false if out of memory. */
 bool imp__bytes_put(imp_context *ctx, struct imp_bytes *b, size_t offset,

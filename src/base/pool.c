@@ -316,6 +316,11 @@ out:
 /* Nodes that wait for a slow item: no more than this many a thread. */
 #define WINDOW_PER_THREAD 8
 
+size_t imp__sum_window(const imp_context *ctx)
+{
+    return (size_t)ctx->threads * WINDOW_PER_THREAD;
+}
+
 struct summing {
     struct imp_sum_tree *tree;
     size_t first;
@@ -347,6 +352,6 @@ enum imp_status imp__parallel_sum(imp_context *ctx, const struct imp_loop *loop,
     own.work = sum_work;
     own.commit = NULL;
     own.payload = &s;
-    own.window = (size_t)ctx->threads * WINDOW_PER_THREAD;
+    own.window = imp__sum_window(ctx);
     return imp__parallel(ctx, &own, done);
 }

@@ -57,6 +57,9 @@ enum imp_status imp__parallel_sum(imp_context *ctx, const struct imp_loop *loop,
                                                           void *result, void *payload),
                                   size_t *done);
 
+/* Items of a sum that may be in work beyond the oldest. */
+size_t imp__sum_window(const imp_context *ctx);
+
 void imp__pool_destroy(imp_context *ctx, struct imp_pool *pool);
 
 /* Seconds on a monotonic clock. */

@@ -285,7 +285,7 @@ static enum imp_status render_run(struct render *r, int64_t *spp)
             .parts = (size_t)n,
             .per_tile = true};
         st = imp__tiles_run(&r->tiles, &pass);
-        if (st == IMP_CANCELLED && pass.deadline_s > 0 && imp__now() >= pass.deadline_s) {
+        if (st == IMP_CANCELLED && r->tiles.late) {
             st = IMP_OK;
             break;
         }
@@ -317,6 +317,7 @@ enum imp_status imp__picture_make(imp_context *ctx, const struct imp_picture *pi
     IMP_TRY(buffers_create(&r, ctx));
     ended = render_run(&r, &spp);
     if (ended != IMP_CANCELLED) IMP_TRY(ended);
+    if (imp__team_part(ctx) && imp__team_shares(ctx)) IMP_TRY(IMP_PART);
     if (ended == IMP_CANCELLED && spp == 0 &&
         (double)r.sums.width * r.sums.height > LARGE_PICTURE) {
         memset(out, 0, (size_t)n_films * sizeof *out);

@@ -4,6 +4,7 @@
 #include "film_render.h"
 #include "film_measure.h"
 #include "film_picture.h"
+#include "parts.h"
 #include "walk/run.h"
 
 enum imp_status imp_render(const imp_scene *scene, const struct imp_run *run,
@@ -16,9 +17,19 @@ enum imp_status imp_render(const imp_scene *scene, const struct imp_run *run,
     IMP_FLOAT_MODE;
     IMP_READS(scene);
     struct imp_measure measure;
-    enum imp_status st = imp__measure_create(scene, &own, &measure);
+    struct imp_same same[IMP_SAME_MAX];
+    enum imp_status st = IMP_OK;
+    if (imp__team_shares(scene->ctx))
+        st = imp__team_same(scene->ctx, same, imp__same_run(scene, &own, "render", same));
+    const bool solves = scene->integrator->ops->flags & IMP_INTEGRATOR_SOLVES;
+    if (st == IMP_OK && solves && scene->ctx->team &&
+        scene->ctx->team->role != IMP_TEAM_RANK)
+        st = imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                        "a picture by finite elements cannot be made in parts");
     if (st != IMP_OK) return st;
-    if (scene->integrator->ops->flags & IMP_INTEGRATOR_SOLVES) {
+    st = imp__measure_create(scene, &own, &measure);
+    if (st != IMP_OK) return st;
+    if (solves) {
         st = imp__render_elements(&measure, &own, out);
     } else {
         const struct imp_picture picture = {.sensor = measure.sensor,

@@ -114,7 +114,9 @@ static enum imp_status take(size_t group, void *sum, void *payload)
 enum imp_status imp__tiles_run(struct imp_tiles *t, const struct imp_tiles_pass *pass)
 {
     struct running r = {t, pass};
-    struct imp_sum_tree tree;
+    const struct imp_drops before = t->drops;
+    struct imp_shared shared = {.drops = &t->drops};
+    imp_context *ctx = t->ctx;
     const size_t all = imp__tiles_count(t) * pass->parts;
     const size_t items = imp_max(all / imp_max(pass->every, (size_t)1), (size_t)1);
     const struct imp_sum_desc desc = {.n_items = items,
@@ -134,9 +136,15 @@ enum imp_status imp__tiles_run(struct imp_tiles *t, const struct imp_tiles_pass 
                                   .fraction_hi = pass->fraction_hi,
                                   .start_s = pass->start_s,
                                   .deadline_s = pass->deadline_s};
-    enum imp_status st = imp__sum_tree_create(t->ctx, &desc, &tree);
-    if (st != IMP_OK) return st;
-    st = imp__parallel_sum(t->ctx, &loop, &tree, 0, item_work, NULL);
-    imp__sum_tree_destroy(&tree);
+    /* A look is what every rank takes by itself. */
+    const int alone = ctx->team && pass->every > 1;
+    if (alone) ctx->team->alone++;
+    if (imp__team_shares(ctx)) t->drops = (struct imp_drops){0};
+    enum imp_status st = imp__shared_sum(ctx, &loop, &desc, item_work, &shared);
+    if (imp__team_shares(ctx)) imp__drops_merge(&t->drops, &before);
+    if (alone) ctx->team->alone--;
+    t->late = shared.late;
+    if (st == IMP_OK)
+        st = imp__drops_budget(ctx, &t->drops, t->run->drop_budget, t->walks);
     return st;
 }

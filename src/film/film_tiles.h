@@ -9,7 +9,7 @@
 
 #include "base/arena.h"
 #include "base/drops.h"
-#include "base/pool.h"
+#include "base/team.h"
 
 #define IMP_TILE_SIDE 8 /* pixels, where nothing asks for larger tiles */
 
@@ -51,6 +51,7 @@ struct imp_tiles {
     pthread_mutex_t lock;            /* guards drops */
     bool has_lock;
     struct imp_drops drops; /* of the items done */
+    bool late;              /* the last pass was stopped by its deadline */
 };
 
 struct imp_tiles_pass {

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "check.h"
+#include "base/team.h"
 #include "walk/run.h"
 #include <math.h>
 #include <stdio.h>
@@ -52,7 +53,10 @@ enum imp_status imp__check_progress(struct imp__check *c, double work)
     c->done += work;
     if (c->outer.time_limit_s > 0 && imp__now() - c->start_s > c->outer.time_limit_s)
         c->stopped = true;
-    return report(c, c->done / fmax(c->total, 1)) || c->stopped ? IMP_CANCELLED : IMP_OK;
+    report(c, c->done / fmax(c->total, 1));
+    const enum imp_status st = imp__team_any(c->ctx, c->stopped, &c->stopped);
+    if (st != IMP_OK) return st;
+    return c->stopped ? IMP_CANCELLED : IMP_OK;
 }
 
 /* One evaluation is one piece. */
@@ -70,6 +74,7 @@ enum imp_status imp_check(imp_problem *p, const struct imp_check_options *option
     IMP_REQUIRE(NULL, p, "problem");
     IMP_REQUIRE(p->ctx, rows, "rows");
     IMP_REQUIRE(p->ctx, n_rows, "n_rows");
+    IMP_CHECKED(imp__problem_no_parts(p, "check"));
     IMP_FLOAT_MODE;
     IMP_SETS(p->scene, st);
     if (st != IMP_OK) return st;

@@ -204,17 +204,19 @@ static double terms_most(const struct job *j)
            (double)j->problem->n_targets;
 }
 
-/* The unit of sums in fixed point, from the largest term of some tiles; of more tiles
- * where there is none. */
-static enum imp_status unit_find(struct job *j, const struct imp_tiles_pass *run)
+/* The largest terms of some tiles, of mean and spread; of more tiles where there is none.
+ * Every rank of a team looks by itself. */
+static enum imp_status terms_look(struct job *j, const struct imp_tiles_pass *run,
+                                  double largest[2])
 {
-    struct totals *to = j->totals;
     const size_t all = imp__tiles_count(&j->tiles) * run->parts;
+    struct imp__team *team = j->problem->ctx->team;
     struct imp_fixed_sum mean = {0}, spread = {0};
     struct imp_tiles_pass pass = *run;
     enum imp_status st = IMP_OK;
     pass.fraction_hi = run->fraction_lo + 0.01 * (run->fraction_hi - run->fraction_lo);
     j->look = true;
+    if (team) team->alone++;
     j->mean = &mean;
     j->spread = &spread;
     for (size_t n = imp_clamp(all / LOOKS, (size_t)1, (size_t)LOOKS_MOST);
@@ -224,12 +226,33 @@ static enum imp_status unit_find(struct job *j, const struct imp_tiles_pass *run
         if (pass.every == 1) break;
     }
     j->look = false;
+    if (team) team->alone--;
     j->tiles.drops = (struct imp_drops){0};
-    if (mean.bits == 0 || st != IMP_OK) return st;
-    const double terms = fmax(terms_most(j), (double)all);
-    imp__fixed_begin(&to->mean, imp__fixed_largest(&mean), SPARE_BITS, terms);
-    imp__fixed_begin(&to->spread, imp__fixed_largest(&spread), 2 * SPARE_BITS, terms);
+    largest[0] = imp__fixed_largest(&mean);
+    largest[1] = imp__fixed_largest(&spread);
+    return st;
+}
+
+/* The unit of sums in fixed point. A merge of parts takes theirs. */
+static enum imp_status unit_find(struct job *j, const struct imp_tiles_pass *run)
+{
+    struct totals *to = j->totals;
+    imp_context *ctx = j->problem->ctx;
+    const double all = (double)imp__tiles_count(&j->tiles) * (double)run->parts;
+    const double terms = fmax(terms_most(j), all);
+    double largest[2] = {0, 0};
+    bool known = false;
+    enum imp_status st = IMP_OK;
+    if (imp__team_merges(ctx))
+        IMP_TRY(imp__team_keep(ctx, largest, sizeof largest, &known));
+    if (!known) IMP_TRY(terms_look(j, run, largest));
+    if (imp__team_part(ctx))
+        IMP_TRY(imp__team_keep(ctx, largest, sizeof largest, &known));
+    if (largest[0] == 0) return IMP_OK;
+    imp__fixed_begin(&to->mean, largest[0], SPARE_BITS, terms);
+    imp__fixed_begin(&to->spread, largest[1], 2 * SPARE_BITS, terms);
     to->unit_known = true;
+out:
     return st;
 }
 
@@ -330,6 +353,23 @@ static void totals_free(struct imp_problem *p, struct totals *t)
     imp__release(p->ctx, t->spread.fine);
 }
 
+/* Sums in fixed point are complete when the other ranks' are added. */
+static enum imp_status totals_share(struct imp_problem *p, struct totals *t)
+{
+    enum imp_status st = IMP_OK;
+    if (t->many) {
+        IMP_TRY(imp__shared_fixed(p->ctx, &t->mean));
+        IMP_TRY(imp__shared_fixed(p->ctx, &t->spread));
+    }
+    if (imp__team_part(p->ctx)) return IMP_PART;
+    if (imp__team_merges(p->ctx) && (t->mean.too_large || t->spread.too_large))
+        return imp__error(p->ctx, IMP_E_NUMERIC,
+                          "a term of the gradient is 4096 times larger than those that "
+                          "its parts looked at first: this gradient cannot be merged");
+out:
+    return st;
+}
+
 /* Were terms left out? Then with the unit that the largest asks for, once again. */
 static enum imp_status totals_again(struct imp_problem *p, struct totals *t, bool *again)
 {
@@ -368,13 +408,28 @@ static void totals_end(struct imp_problem *p, struct totals *t, double *gradient
 static enum imp_status splat_prepare(struct job *j, const struct imp_run *run,
                                      struct imp__splat *splat)
 {
-    const enum imp_status st = imp__splat_create(j->problem, &j->tracer, j->target,
-                                                 j->seed, j->plan, run, splat);
-    if (st == IMP_OK) {
-        j->splat = splat;
-        j->totals->objective += splat->objective;
-        j->totals->variance += splat->objective_variance;
+    imp_context *ctx = j->problem->ctx;
+    /* What comes next needs these pictures: each part makes them whole. */
+    const bool apart = ctx->team && ctx->team->role != IMP_TEAM_RANK;
+    double value[2] = {0, 0};
+    bool known = false;
+    enum imp_status st = IMP_OK;
+    if (imp__team_merges(ctx)) IMP_TRY(imp__team_keep(ctx, value, sizeof value, &known));
+    if (!known) {
+        if (apart) ctx->team->alone++;
+        st = imp__splat_create(j->problem, &j->tracer, j->target, j->seed, j->plan, run,
+                               splat);
+        if (apart) ctx->team->alone--;
+        IMP_TRY(st);
+        value[0] = splat->objective;
+        value[1] = splat->objective_variance;
+        if (imp__team_part(ctx))
+            IMP_TRY(imp__team_keep(ctx, value, sizeof value, &known));
     }
+    j->splat = splat;
+    j->totals->objective += value[0];
+    j->totals->variance += value[1];
+out:
     return st;
 }
 
@@ -447,10 +502,15 @@ enum imp_status imp__problem_objective(struct imp_problem *p, const double *x,
     double *at = NULL, prior = 0;
     bool again = false;
     if (x) IMP_TRY(imp_problem_set_x(p, x));
+    IMP_TRY(imp__problem_same(p, run, "loss"));
     IMP_TRY(totals_begin(p, in_place, gradient, gradient_se, &totals));
     IMP_TRY(targets_estimate(p, run, want_gradient, &totals));
+    IMP_TRY(totals_share(p, &totals));
     IMP_TRY(totals_again(p, &totals, &again));
-    if (again) IMP_TRY(targets_estimate(p, run, want_gradient, &totals));
+    if (again) {
+        IMP_TRY(targets_estimate(p, run, want_gradient, &totals));
+        IMP_TRY(totals_share(p, &totals));
+    }
     if (p->n_regularisers > 0) {
         at = imp__alloc(ctx, p->n, sizeof *at);
         if (!at) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for regularisers"));
@@ -512,6 +572,7 @@ enum imp_status imp_problem_reverse(imp_problem *p, const float *seed_image,
     bool again = false;
     struct job j = {
         .problem = p, .totals = &totals, .seed = seed_image, .want_gradient = true};
+    IMP_TRY(imp__problem_same(p, &own, "reverse"));
     IMP_TRY(totals_begin(p, false, gradient, gradient_se, &totals));
     IMP_TRY(imp__problem_tracer(p, &own, &j.tracer));
     IMP_TRY(imp__adjoint_check(p, &j.tracer.sensor->film, seed_image, "seed_image"));
@@ -522,8 +583,12 @@ enum imp_status imp_problem_reverse(imp_problem *p, const float *seed_image,
         IMP_TRY(splat_prepare(&j, &own, &splat));
     }
     IMP_TRY(job_run(&j, &own, "gradient", 0, 1, imp__now()));
+    IMP_TRY(totals_share(p, &totals));
     IMP_TRY(totals_again(p, &totals, &again));
-    if (again) IMP_TRY(job_run(&j, &own, "gradient", 0, 1, imp__now()));
+    if (again) {
+        IMP_TRY(job_run(&j, &own, "gradient", 0, 1, imp__now()));
+        IMP_TRY(totals_share(p, &totals));
+    }
     totals_end(p, &totals, gradient, gradient_se);
 out:
     imp__splat_destroy(p->ctx, &splat);

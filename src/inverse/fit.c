@@ -89,6 +89,7 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
     IMP_REQUIRE(NULL, p, "problem");
     imp_context *ctx = p->ctx;
     IMP_REQUIRE(ctx, result, "result");
+    IMP_CHECKED(imp__problem_no_parts(p, "a fit"));
     IMP_FLOAT_MODE;
     IMP_SETS(p->scene, st);
     if (st != IMP_OK) return st;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A problem as an optimiser sees it. */
+#include "base/team.h"
 #include "bend/inside.h"
 #include "estimate.h"
 #include "fit.h"
@@ -71,6 +72,8 @@ static enum imp_status iterated(const struct imp__search *s, void *payload)
         f->checkpoint_cost_s = f->last_checkpoint_s - now;
     }
     report(f, f->search_share * s->iteration / f->options.max_iterations);
+    const enum imp_status st = imp__team_any(f->problem->ctx, f->stopped, &f->stopped);
+    if (st != IMP_OK) return st;
     return f->stopped ? IMP_CANCELLED : IMP_OK;
 }
 
@@ -82,7 +85,10 @@ static enum imp_status eval(const double *x, uint64_t seed, struct imp_estimate 
     struct imp__fit *fit = payload;
     fit->run.seed = seed;
     fit->final_calls++;
-    return imp__problem_objective(fit->problem, x, &fit->run, true, f, g, g_se);
+    const enum imp_status st =
+        imp__problem_objective(fit->problem, x, &fit->run, true, f, g, g_se);
+    if (st == IMP_CANCELLED) fit->stopped = true; /* by this rank or another */
+    return st;
 }
 
 static enum imp_status normal(const double *x, uint64_t seed, struct imp__normal *out,
@@ -99,6 +105,7 @@ static enum imp_status normal(const double *x, uint64_t seed, struct imp__normal
     fit->run.seed = seed;
     fit->final_calls++;
     const enum imp_status st = imp__gauss_newton(fit->problem, x, &fit->run, &gn);
+    if (st == IMP_CANCELLED) fit->stopped = true;
     if (st != IMP_OK) return st;
     out->f = gn.objective;
     out->f.value += imp__regularise(fit->problem, x, out->g);
@@ -158,27 +165,7 @@ static void fingerprint(struct imp__fit *f)
     for (int m = 0; m < p->scene->n_bodies; m++)
         if (!medium_active(p->scene->bodies[m], p->active.base))
             h->scene = imp__graded_hash(h->scene, p->scene->bodies[m]);
-    for (size_t i = 0; i < p->n_targets; i++) {
-        const struct imp__target *t = &p->targets[i];
-        const size_t n = (size_t)t->desc.width * (size_t)t->desc.height;
-        const size_t c = n * (size_t)t->desc.channels * sizeof(float);
-        const double number[8] = {t->desc.sensor,   t->desc.width,     t->desc.height,
-                                  t->desc.channels, t->desc.loss,      t->desc.epsilon,
-                                  t->desc.scale,    t->weights != NULL};
-        h->targets = imp__hash(h->targets, number, sizeof number);
-        h->targets = imp__hash(h->targets, t->pixels, c);
-        if (t->weights) h->targets = imp__hash(h->targets, t->weights, n * sizeof(float));
-        if (t->noise_se) h->targets = imp__hash(h->targets, t->noise_se, c);
-    }
-    for (size_t i = 0; i < p->n_regularisers; i++) {
-        const struct imp__regulariser *r = &p->regularisers[i];
-        const double number[2] = {r->kind, r->weight};
-        h->targets = imp__hash(h->targets, number, sizeof number);
-        h->targets = imp__hash(h->targets, r->on, p->scene->n_params);
-        if (r->origin)
-            h->targets =
-                imp__hash(h->targets, r->origin, p->scene->n_theta * sizeof *r->origin);
-    }
+    h->targets = imp__problem_targets_hash(p);
     const struct imp_sensor *sensor = p->scene->sensors[p->targets[0].desc.sensor];
     const double number[4] = {f->options.optimizer, f->options.learning_rate,
                               f->options.tolerance,

@@ -16,6 +16,7 @@
  * I_p and W_p are known only when the picture is there. A second pass then walks some of
  * the same walks again and looks at e as a picture through a box filter. Through a box
  * filter I_p and W_p are constants of their stratum, and F needs one pass. */
+#include "base/team.h"
 #include "estimate.h"
 #include "film/film_picture.h"
 #include "lanes.h"
@@ -223,11 +224,27 @@ static enum imp_status picture_value(imp_context *ctx, struct functional *f,
                                         .sample = sample_value,
                                         .payload = f,
                                         .weights = weights};
-    IMP_TRY(imp__picture_make(ctx, &picture, run, &film));
-    value.value = inner_product(f, film);
-    f->spp = (int)film->spp;
+    /* Errors through a wide filter need the picture: each part makes it whole. */
+    const int spp = run->spp > 0 ? run->spp : f->tracer.sensor->spp;
+    const bool one_pass = box && spp > 1,
+               apart = ctx->team && !one_pass && ctx->team->role != IMP_TEAM_RANK;
+    double kept[2] = {0, 0}; /* the value, and samples per pixel */
+    bool known = false;
+    if (apart && imp__team_merges(ctx))
+        IMP_TRY(imp__team_keep(ctx, kept, sizeof kept, &known));
+    if (!known) {
+        if (apart) ctx->team->alone++;
+        st = imp__picture_make(ctx, &picture, run, &film);
+        if (apart) ctx->team->alone--;
+        IMP_TRY(st);
+        kept[0] = inner_product(f, film);
+        kept[1] = (double)film->spp;
+        if (apart) IMP_TRY(imp__team_keep(ctx, kept, sizeof kept, &known));
+    }
+    value.value = kept[0];
+    f->spp = (int)kept[1];
     f->picture = film;
-    if (box && f->spp > 1) {
+    if (one_pass && f->spp > 1) {
         for (size_t p = 0; p < (size_t)film->width * (size_t)film->height; p++)
             value.se += imp__sqr((double)film->se[p * (size_t)n + (size_t)n - 1]);
         value.se = sqrt(value.se) / f->norm;
@@ -262,13 +279,16 @@ enum imp_status imp_problem_functional(imp_problem *p, const float *adjoint,
     if (gradient) {
         g = imp__alloc(ctx, 2 * p->n, sizeof *g);
         if (!g) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for gradients"));
-        IMP_TRY(imp_problem_reverse(p, f.adjoint, &own, g, g + p->n));
+        st = imp_problem_reverse(p, f.adjoint, &own, g, g + p->n);
+        if (st != IMP_PART) IMP_TRY(st);
         for (size_t k = 0; k < 2 * p->n; k++) g[k] /= f.norm;
     }
     if (value) {
+        IMP_TRY(imp__problem_same(p, &own, "functional"));
         IMP_TRY(picture_value(ctx, &f, weights, &own, &estimate));
-        *value = estimate;
     }
+    if (imp__team_part(ctx)) IMP_TRY(IMP_PART);
+    if (value) *value = estimate;
     if (gradient) memcpy(gradient, g, p->n * sizeof *g);
     if (gradient && gradient_se) memcpy(gradient_se, g + p->n, p->n * sizeof *g);
 out:
@@ -345,9 +365,13 @@ enum imp_status imp_problem_jacobian_sums(imp_problem *p, const float *adjoint,
     f.films = films;
     f.spp = (int)primal->spp;
     for (size_t k = 0; k <= n; k++) se[k] = NAN;
+    if (ctx->team && ctx->team->role != IMP_TEAM_RANK) ctx->team->alone++;
     if (f.spp > 0) { /* else interrupted before every pixel had its samples */
         if (weights) ended = weights_make(ctx, &f, &own, weights);
         if (ended == IMP_OK) ended = influence(ctx, &f, &own, se);
+    }
+    if (ctx->team && ctx->team->role != IMP_TEAM_RANK) ctx->team->alone--;
+    if (f.spp > 0) {
         if (ended != IMP_CANCELLED) IMP_TRY(ended);
     }
     if (value) *value = (struct imp_estimate){inner_product(&f, primal), se[0], 0};

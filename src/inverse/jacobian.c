@@ -37,7 +37,8 @@ enum imp_status imp_problem_forward(imp_problem *p, const double *x_dot,
     IMP_FLOAT_MODE;
     IMP_READS(p->scene);
     struct forward f = {.x_dot = x_dot, .channels = p->scene->channels};
-    const enum imp_status st = imp__problem_tracer(p, &own, &f.tracer);
+    enum imp_status st = imp__problem_same(p, &own, "forward");
+    if (st == IMP_OK) st = imp__problem_tracer(p, &own, &f.tracer);
     if (st != IMP_OK) return st;
     const struct imp_picture picture = {.sensor = f.tracer.sensor,
                                         .stage = "derivative",
@@ -75,6 +76,7 @@ enum imp_status imp_problem_jacobian(imp_problem *p, const struct imp_run *run,
     struct imp_tracer tracer;
     imp_film **made = imp__alloc(ctx, (size_t)n, sizeof *made);
     if (!made) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory"));
+    IMP_TRY(imp__problem_same(p, &own, "jacobian"));
     IMP_TRY(imp__problem_tracer(p, &own, &tracer));
     const struct imp_picture picture = {.sensor = tracer.sensor,
                                         .stage = "jacobian",

@@ -51,10 +51,19 @@ struct imp_problem {
     size_t n_regularisers, cap_regularisers;
     struct imp__regulariser *regularisers;
     struct imp_run run;         /* of imp_problem_nlopt */
+    bool same_known;            /* the ranks of a team have the same problem */
     struct imp_arena fit_arena; /* of the last fit's result */
     struct imp__fit_answer fit_answer;
     struct imp_arena check_arena; /* of the last check's rows */
 };
+
+/* Of pixels, weights, losses and regularisers. */
+uint64_t imp__problem_targets_hash(const struct imp_problem *p);
+/* IMP_E_ARG if parts, or other ranks, are of another problem, scene or call. */
+enum imp_status imp__problem_same(struct imp_problem *p, const struct imp_run *run,
+                                  const char *call);
+/* IMP_E_UNSUPPORTED where this context's calls are parts, or a merge of such. */
+enum imp_status imp__problem_no_parts(const struct imp_problem *p, const char *call);
 
 /* Regularisers' value; adds their gradient (may be NULL). x [n]. */
 double imp__regularise(const struct imp_problem *p, const double *x, double *gradient);

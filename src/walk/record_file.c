@@ -26,12 +26,12 @@ _Static_assert(sizeof(struct head) == 72, "no padding: it is written");
 /* ---- Writing --------------------------------------------------------------------- */
 
 /* The parts of a file in turn; n elements in pages. */
-static struct imp_part *pages_put(struct imp_part *part, void *const *pages, size_t n,
-                                  size_t size)
+static struct imp_chunk *pages_put(struct imp_chunk *part, void *const *pages, size_t n,
+                                   size_t size)
 {
     for (size_t at = 0; at < n; at += IMP_RECORD_PAGE)
-        *part++ = (struct imp_part){pages[at / IMP_RECORD_PAGE],
-                                    imp_min(n - at, (size_t)IMP_RECORD_PAGE) * size};
+        *part++ = (struct imp_chunk){pages[at / IMP_RECORD_PAGE],
+                                     imp_min(n - at, (size_t)IMP_RECORD_PAGE) * size};
     return part;
 }
 
@@ -46,16 +46,16 @@ enum imp_status imp__record_write(const struct imp_record *r, const char *path)
                               .n_walks = r->n_walks,
                               .n_vertices = r->n_vertices};
     uint64_t sum = 0;
-    struct imp_part *parts =
+    struct imp_chunk *parts =
         imp__alloc(r->ctx, r->n_walk_pages + r->n_vertex_pages + 2, sizeof *parts);
     if (!parts) return imp__error(r->ctx, IMP_E_NOMEM, "%s: out of memory", path);
-    struct imp_part *end = parts;
-    *end++ = (struct imp_part){&head, sizeof head};
+    struct imp_chunk *end = parts;
+    *end++ = (struct imp_chunk){&head, sizeof head};
     end = pages_put(end, (void *const *)r->walks, r->n_walks, sizeof **r->walks);
     end = pages_put(end, (void *const *)r->vertices, r->n_vertices, sizeof **r->vertices);
-    for (const struct imp_part *p = parts; p < end; p++)
+    for (const struct imp_chunk *p = parts; p < end; p++)
         sum = imp__hash(sum, p->data, p->size);
-    *end++ = (struct imp_part){&sum, sizeof sum};
+    *end++ = (struct imp_chunk){&sum, sizeof sum};
     const enum imp_status st =
         imp__file_write_parts(r->ctx, path, parts, (size_t)(end - parts));
     imp__release(r->ctx, parts);

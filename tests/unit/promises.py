@@ -163,6 +163,7 @@ NOT_OK = {
 NULLABLE = {"options", "run", "stats", "id", "objective", "gradient_se", "primal", "normals", "uvs",
             "axis", "hessian", "taps", "tap_bars", "tap_dots", "power", "bundle", "exit", "targets",
             "error", "order", "param", "element", "memory",
+            "imp_context_set_team.team", "imp_context_set_parts.parts",
             "imp_scene_begin.name", "imp_scene_ref.name", "imp_scene_load_string.name",
             "imp_bend_load_string.name", "imp_problem_variable.lo", "imp_problem_variable.hi",
             "imp_problem_objective.x", "imp_problem_objective.gradient",
@@ -273,6 +274,7 @@ class Fixture:
                 if lib.imp_bend_add_target(b, C.byref(t)) != OK: raise RuntimeError(self.said())
             return b
         if kind == "imp_guide": return None
+        if kind == "imp_parts": return self.make("imp_parts_create", context, 1, 2, b"command")
         raise KeyError(kind)
 
     def jacobian(self):
@@ -324,6 +326,7 @@ class Fixture:
             s.width = s.height = 4
             s.channels = 3
             s.pixels = C.addressof(self.array(C.c_float, 48, [0.25] * 48))
+        if name == "imp_team": s.gather = C.cast(self.keep.append(C.CFUNCTYPE(C.c_int)(lambda: 0)) or self.keep[-1], C.c_void_p)
         if name == "imp_fit_options": s.max_iterations = 2
         if name == "imp_check_options": s.paths, s.fresh_spp = 8, 4
         if name == "imp_run": s.spp = 2
@@ -351,6 +354,7 @@ class Fixture:
             zeros = {"scalar", "status", "cause", "sensor", "channel", "x", "y", "sample", "json", "i", "from_here",
                      "kind", "progress", "rays", "ray", "bundle", "target", "edge", "most"}
             if key == "imp_bend_image.target": return 4, None  # the fixture adds it
+            if function == "imp_parts_create": return {"index": 1, "count": 2}[a.name], None
             if a.name in scalars: return scalars[a.name], None
             if a.name in zeros: return 0, None
             raise KeyError("no value known for " + a.text)
@@ -358,7 +362,8 @@ class Fixture:
             paths = {"imp_scene_load": os.path.join(top, "scenes", "furnace.xml"),
                      "imp_bend_load": os.path.join(top, "scenes", "bend", "maxwell.xml"),
                      "imp_film_write": self.folder + "/x.exr", "imp_elements_save": self.folder + "/x.el",
-                     "imp_elements_export": self.folder + "/x.ply", "imp_field_write": self.folder + "/x.npy"}
+                     "imp_elements_export": self.folder + "/x.ply", "imp_field_write": self.folder + "/x.npy",
+                     "imp_parts_write": self.folder + "/x.part"}
             if key == "imp_film_read.path":
                 f, path = self.object("imp_film", ""), self.folder + "/read.exr"
                 lib.imp_film_write(f, path.encode(), None)
@@ -377,6 +382,7 @@ class Fixture:
                 return (bend if "bend" in function else SCENE), None
             if a.name == "name":
                 return {"imp_scene_find_param": PARAM.encode()}.get(function, b"name"), None
+            if a.name == "command": return b"command", None
             words = {"fallback": b"text", "format": b"text", "names": b"R,G,B", "key": b"key", "value": b"value", "tag": b"shape", "type": b"sphere", "id": b"id",
                      "glob": PARAM.encode(), "kind": b"luneburg"}
             return words[a.name], None
@@ -410,6 +416,10 @@ class Fixture:
             fields = self.array(C.c_void_p, 1, [self.object("imp_field", function)])
             return C.addressof(fields), None
         if a.name == "memory": return None, None
+        if key == "imp_parts_read.paths":
+            path = (self.folder + "/read.part").encode()
+            if lib.imp_parts_write(self.object("imp_parts", ""), path) != OK: raise RuntimeError(self.said())
+            return C.addressof(self.array(C.c_char_p, 1, [path])), None
         if key == "imp_problem_jacobian_sums.films":
             return C.addressof(self.jacobian()) + C.sizeof(C.c_void_p), None
         if a.name == "group": return C.addressof(self.array(C.c_int, 3)), None

@@ -1,0 +1,252 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A team of processes: who belongs to it, and what its ranks tell each other besides
+ * sums. */
+#include "team.h"
+#include "arguments.h"
+#include "file.h"
+#include <stdio.h>
+#include <string.h>
+
+/* ---- Joining ----------------------------------------------------------------------- */
+
+enum imp_status imp__team_join(imp_context *ctx, const struct imp_team *host,
+                               enum imp_team_role role)
+{
+    if (host->ranks == 0) {
+        imp__release(ctx, ctx->team);
+        ctx->team = NULL;
+        return IMP_OK;
+    }
+    struct imp__team *team = imp__alloc(ctx, 1, sizeof *team);
+    if (!team) return imp__error(ctx, IMP_E_NOMEM, "no memory for a team");
+    team->host = *host;
+    team->role = role;
+    imp__release(ctx, ctx->team);
+    ctx->team = team;
+    return IMP_OK;
+}
+
+/* Embree and libm choose their code by these. */
+void imp__machine_text(char text[256])
+{
+    snprintf(text, 256, "importon %s", IMP_VERSION_STRING);
+#if defined(__x86_64__)
+    __builtin_cpu_init();
+#define IMP_HAS(name)                                                                    \
+    if (__builtin_cpu_supports(name)) strncat(text, " " name, 255 - strlen(text))
+    IMP_HAS("sse4.2");
+    IMP_HAS("avx");
+    IMP_HAS("fma");
+    IMP_HAS("avx2");
+    IMP_HAS("avx512f");
+    IMP_HAS("avx512dq");
+    IMP_HAS("avx512vl");
+#undef IMP_HAS
+#endif
+}
+
+/* What results depend on besides the calls: equal on all ranks, or bits would differ. */
+struct hello {
+    int32_t ranks, rank;
+    char machine[256];
+};
+
+struct greeting {
+    imp_context *ctx;
+    struct hello own, first;
+    bool differs;
+    int other;
+    struct hello seen;
+};
+
+static void greet(void *receiver, int rank, const void *message, size_t bytes)
+{
+    struct greeting *g = receiver;
+    struct hello h = {0};
+    if (g->differs) return;
+    if (bytes == sizeof h) memcpy(&h, message, sizeof h);
+    h.machine[sizeof h.machine - 1] = 0;
+    if (bytes == sizeof h && h.ranks == g->own.ranks && h.rank == rank &&
+        !strcmp(h.machine, g->own.machine))
+        return;
+    g->differs = true;
+    g->other = rank;
+    g->seen = h;
+}
+
+enum imp_status imp_context_set_team(imp_context *ctx, const struct imp_team *team)
+{
+    struct imp_team own = IMP_TEAM_INIT;
+    IMP_REQUIRE(NULL, ctx, "context");
+    IMP_OPTIONS(ctx, own, team, "team");
+    if (team && (own.ranks < 1 || own.rank < 0 || own.rank >= own.ranks))
+        return imp__error(ctx, IMP_E_ARG, "%s: rank %d of %d ranks is none", __func__,
+                          own.rank, own.ranks);
+    if (team && !own.gather)
+        return imp__error(ctx, IMP_E_ARG, "%s: team has no gather", __func__);
+    if (!team || own.ranks == 1) own.ranks = 0;
+    enum imp_status st = imp__team_join(ctx, &own, IMP_TEAM_RANK);
+    if (st != IMP_OK || own.ranks == 0) return st;
+
+    struct greeting g = {.ctx = ctx, .own = {.ranks = own.ranks, .rank = own.rank}};
+    imp__machine_text(g.own.machine);
+    st = own.gather(&g.own, sizeof g.own, greet, &g, own.payload);
+    if (st != IMP_OK)
+        st = imp__error(ctx, st, "%s: the ranks of the team do not reach each other",
+                        __func__);
+    else if (g.differs)
+        st = imp__error(ctx, IMP_E_ARG,
+                        "%s: rank %d runs \"%s\", rank %d \"%s\": their results would "
+                        "not have the same bits",
+                        __func__, own.rank, g.own.machine, g.other,
+                        g.seen.machine[0] ? g.seen.machine : "another version");
+    if (st != IMP_OK) {
+        own.ranks = 0;
+        (void)imp__team_join(ctx, &own, IMP_TEAM_RANK);
+    }
+    return st;
+}
+
+/* ---- Agreeing ---------------------------------------------------------------------- */
+
+static void any_receive(void *receiver, int rank, const void *message, size_t bytes)
+{
+    (void)rank;
+    if (bytes == 1) *(bool *)receiver |= *(const unsigned char *)message != 0;
+}
+
+enum imp_status imp__team_any(imp_context *ctx, bool here, bool *any)
+{
+    struct imp__team *team = ctx->team;
+    const unsigned char own = here;
+    *any = here;
+    if (!imp__team_shares(ctx) || team->role != IMP_TEAM_RANK) return IMP_OK;
+    return team->host.gather(&own, 1, any_receive, any, team->host.payload);
+}
+
+struct kept {
+    void *bytes;
+    size_t n;
+    bool known, strange;
+};
+
+static void kept_receive(void *receiver, int rank, const void *message, size_t bytes)
+{
+    struct kept *k = receiver;
+    (void)rank;
+    k->strange |= bytes != k->n || (k->known && memcmp(k->bytes, message, k->n) != 0);
+    if (!k->strange && !k->known) memcpy(k->bytes, message, k->n);
+    k->known = true;
+}
+
+enum imp_status imp__team_keep(imp_context *ctx, void *bytes, size_t n, bool *known)
+{
+    struct imp__team *team = ctx->team;
+    struct kept k = {bytes, n, false, false};
+    *known = false;
+    if (!imp__team_shares(ctx) || team->role == IMP_TEAM_RANK) return IMP_OK;
+    if (team->role == IMP_TEAM_PART)
+        return team->host.gather(bytes, n, NULL, NULL, team->host.payload);
+    const enum imp_status st =
+        team->host.gather(NULL, 0, kept_receive, &k, team->host.payload);
+    if (st == IMP_OK && k.strange)
+        return imp__error(ctx, IMP_E_ARG, "the parts are of different runs");
+    *known = st == IMP_OK && k.known;
+    return st;
+}
+
+/* ---- Sums in fixed point ------------------------------------------------------------ */
+
+#define BLOCK 512 /* numbers; those without a term are not sent */
+
+struct fixed_head {
+    uint64_t n, too_large, bits, blocks;
+    double unit;
+};
+
+struct fixed_receiving {
+    struct imp_fixed_sum *f;
+    int own;
+    bool strange;
+};
+
+static bool touched(const imp_fixed *x, size_t n)
+{
+    for (size_t k = 0; k < n; k++)
+        if (x[k]) return true;
+    return false;
+}
+
+static void fixed_receive(void *receiver, int rank, const void *message, size_t bytes)
+{
+    struct fixed_receiving *r = receiver;
+    struct imp_fixed_sum *f = r->f;
+    struct fixed_head head;
+    const unsigned char *at = message;
+    if (rank == r->own || r->strange) return;
+    r->strange = bytes < sizeof head;
+    if (r->strange) return;
+    memcpy(&head, at, sizeof head);
+    at += sizeof head;
+    r->strange = head.n != f->n || (f->sum && head.unit != f->unit);
+    const size_t rows = f->fine ? 2 : 1;
+    size_t left = bytes - sizeof head;
+    f->too_large += head.too_large;
+    f->bits = imp_max(f->bits, head.bits);
+    for (uint64_t b = 0; b < head.blocks && !r->strange; b++) {
+        uint64_t block;
+        r->strange = left < sizeof block;
+        if (r->strange) break;
+        memcpy(&block, at, sizeof block);
+        const size_t first = (size_t)block * BLOCK;
+        r->strange = !f->sum || block > f->n / BLOCK || first >= f->n;
+        if (r->strange) break;
+        const size_t n = imp_min(f->n - first, (size_t)BLOCK);
+        r->strange = left < sizeof block + rows * n * sizeof(imp_fixed);
+        if (r->strange) break;
+        at += sizeof block;
+        for (size_t row = 0; row < rows; row++) {
+            imp_fixed *to = (row ? f->fine : f->sum) + first;
+            for (size_t k = 0; k < n; k++) {
+                int64_t term;
+                memcpy(&term, at + k * sizeof term, sizeof term);
+                to[k] += term;
+            }
+            at += n * sizeof(imp_fixed);
+        }
+        left -= sizeof block + rows * n * sizeof(imp_fixed);
+    }
+}
+
+enum imp_status imp__shared_fixed(imp_context *ctx, struct imp_fixed_sum *f)
+{
+    struct imp__team *team = ctx->team;
+    struct imp_bytes out = {0};
+    enum imp_status st = IMP_OK;
+    if (!imp__team_shares(ctx)) return IMP_OK;
+    struct fixed_head head = {
+        .n = f->n, .too_large = f->too_large, .bits = f->bits, .unit = f->unit};
+    bool fits = imp__bytes_add(ctx, &out, &head, sizeof head);
+    for (uint64_t b = 0; f->sum && b * BLOCK < f->n && fits; b++) {
+        const size_t first = (size_t)b * BLOCK, n = imp_min(f->n - first, (size_t)BLOCK);
+        if (!touched(f->sum + first, n) && !(f->fine && touched(f->fine + first, n)))
+            continue;
+        head.blocks++;
+        fits =
+            imp__bytes_add(ctx, &out, &b, sizeof b) &&
+            imp__bytes_add(ctx, &out, f->sum + first, n * sizeof *f->sum) &&
+            (!f->fine || imp__bytes_add(ctx, &out, f->fine + first, n * sizeof *f->fine));
+    }
+    if (fits) memcpy(out.data, &head, sizeof head);
+    struct fixed_receiving r = {.f = f, .own = team->host.rank};
+    if (!fits)
+        st = imp__error(ctx, IMP_E_NOMEM, "no memory for a message of %zu bytes",
+                        out.size);
+    if (st == IMP_OK)
+        st = team->host.gather(out.data, out.size, fixed_receive, &r, team->host.payload);
+    if (st == IMP_OK && r.strange)
+        st = imp__error(ctx, IMP_E_ARG, "sums of other ranks are not of this run");
+    imp__bytes_free(ctx, &out);
+    return st;
+}

@@ -1,0 +1,86 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Sums that several processes share. Every rank of a team makes the same calls; a sum
+ * over items (sum_tree.h) is the only thing that is divided. Each rank computes some of
+ * the items, then all get the nodes of all, and complete the same tree: the result has
+ * the bits of one process, on every rank, and what follows from it is computed by each.
+ *
+ *     rank 0:  items 0 .. 4   ->  nodes (2, 0), (0, 4)  \   everybody's nodes
+ *     rank 1:  items 5 .. 7   ->  nodes (0, 5), (1, 3)  /   make node (3, 0) on each rank
+ *
+ * Parts of a run that are written to files (film/parts.h) are a team whose ranks never
+ * meet: a part computes its share and keeps its messages; a merge computes nothing and
+ * reads the messages of all. */
+#ifndef IMP_BASE_TEAM_H
+#define IMP_BASE_TEAM_H
+
+#include "drops.h"
+#include "fixed_sum.h"
+#include "pool.h"
+
+enum imp_team_role {
+    IMP_TEAM_RANK,
+    IMP_TEAM_PART, /* what the others compute is not known: results are not whole */
+    IMP_TEAM_MERGE /* computes no item */
+};
+
+struct imp__team {
+    struct imp_team host;
+    enum imp_team_role role;
+    uint64_t round;
+    int alone; /* > 0: inside of what every rank computes whole */
+};
+
+/* Is work of this context divided now? */
+static inline bool imp__team_shares(const imp_context *ctx)
+{
+    return ctx->team && ctx->team->alone == 0;
+}
+/* Are the results of this call those of a part? Then outputs are left alone, and the call
+ * returns IMP_PART. */
+static inline bool imp__team_part(const imp_context *ctx)
+{
+    return ctx->team && ctx->team->role == IMP_TEAM_PART;
+}
+
+/* Are walks read from parts, in the place of being made? */
+static inline bool imp__team_merges(const imp_context *ctx)
+{
+    return ctx->team && ctx->team->role == IMP_TEAM_MERGE;
+}
+
+/* What imp__shared_sum finds out besides the sum. */
+struct imp_shared {
+    struct imp_drops *drops; /* in: those of this rank's items; out: of all */
+    bool late;               /* stopped by the deadline of some rank */
+};
+
+/* Sum over all items of desc; without a team, imp__parallel_sum. The status is that of the
+ * first rank that failed, on every rank. */
+enum imp_status imp__shared_sum(imp_context *ctx, const struct imp_loop *loop,
+                                const struct imp_sum_desc *desc,
+                                enum imp_status (*work)(size_t i, int worker,
+                                                        void *result, void *payload),
+                                struct imp_shared *shared);
+
+/* Add up what the ranks have in f, so that all have the sums; blocks without a term are
+ * not sent. f->sum may be NULL. */
+enum imp_status imp__shared_fixed(imp_context *ctx, struct imp_fixed_sum *f);
+
+/* Is it so on any rank? What a clock or a user says differs between ranks; what follows
+ * may not. `here` where it cannot be asked (parts). */
+enum imp_status imp__team_any(imp_context *ctx, bool here, bool *any);
+
+/* Bytes that every rank has computed alike: parts keep them, and *known of a merge says
+ * that they have been read instead. */
+enum imp_status imp__team_keep(imp_context *ctx, void *bytes, size_t n, bool *known);
+
+/* The version, and the instruction sets by which Embree and libm choose their code: equal
+ * where bits are to be. */
+void imp__machine_text(char text[256]);
+
+/* Join a team of this role; host.ranks == 0: leave. */
+enum imp_status imp__team_join(imp_context *ctx, const struct imp_team *host,
+                               enum imp_team_role role);
+
+#endif

@@ -1,0 +1,247 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A sum over items by all ranks of a team. */
+#include "file.h"
+#include "team.h"
+#include <stdio.h>
+#include <string.h>
+
+/* ---- Who computes what --------------------------------------------------------------- */
+
+/* Chunks of a rank, where whoever is idle takes the next. */
+#define CHUNKS 16
+
+/* The items of this rank, in the order of its calls. */
+struct share {
+    struct imp__team *team;
+    pthread_mutex_t lock;
+    size_t n_items, chunk;
+    size_t next, end; /* of the present chunk */
+    bool more;        /* there may be other chunks */
+};
+
+static void share_begin(struct share *s, struct imp__team *team, size_t n_items)
+{
+    const size_t ranks = (size_t)team->host.ranks, rank = (size_t)team->host.rank;
+    *s = (struct share){.team = team, .n_items = n_items, .chunk = 1};
+    if (team->role == IMP_TEAM_MERGE) return;
+    if (team->host.next) {
+        while (s->chunk * 2 * ranks * CHUNKS <= n_items) s->chunk *= 2;
+        s->more = true;
+        return;
+    }
+    /* Parts of any two cuts with a common border meet there: floor(n i/k). */
+    s->next = (size_t)((unsigned __int128)n_items * rank / ranks);
+    s->end = (size_t)((unsigned __int128)n_items * (rank + 1) / ranks);
+}
+
+static bool share_take(struct share *s, size_t *item)
+{
+    pthread_mutex_lock(&s->lock);
+    while (s->next == s->end && s->more) {
+        const int64_t c = s->team->host.next(s->team->round, s->team->host.payload);
+        s->more = c >= 0 && (uint64_t)c <= s->n_items / s->chunk;
+        if (!s->more) break;
+        s->next = imp_min((size_t)c * s->chunk, s->n_items);
+        s->end = imp_min(s->next + s->chunk, s->n_items);
+        s->more = s->next < s->n_items;
+    }
+    const bool got = s->next < s->end;
+    if (got) *item = s->next++;
+    pthread_mutex_unlock(&s->lock);
+    return got;
+}
+
+/* ---- What a rank tells the others ------------------------------------------------------ */
+
+struct head {
+    uint32_t status, late;
+    uint64_t items, group, size, nodes;
+    struct imp_drops drops;
+    char error[512];
+};
+struct place {
+    uint64_t group, index;
+    int64_t level;
+};
+
+struct sharing {
+    imp_context *ctx;
+    const struct imp_sum_desc *desc; /* the caller's */
+    struct imp_sum_tree tree;
+    struct share share;
+    enum imp_status (*work)(size_t i, int worker, void *result, void *payload);
+    void *payload;
+    struct imp_bytes message;
+    uint64_t nodes; /* in the message */
+    bool own;       /* this rank's items are being computed */
+    bool no_memory;
+    struct head all; /* what all ranks say together */
+    int failed;      /* the first rank that did */
+    bool strange;
+};
+
+static void message_node(struct sharing *s, const struct imp_sum_node *node)
+{
+    const struct place at = {node->group, node->index, node->level};
+    s->no_memory |= !imp__bytes_add(s->ctx, &s->message, &at, sizeof at) ||
+                    !imp__bytes_add(s->ctx, &s->message, node->sum, s->desc->size);
+    s->nodes++;
+}
+
+static void sum_add(void *into, const void *from, void *payload)
+{
+    const struct sharing *s = payload;
+    s->desc->add(into, from, s->desc->payload);
+}
+
+/* A group that this rank completed alone is told to the others; by any thread. */
+static enum imp_status sum_take(size_t group, void *sum, void *payload)
+{
+    struct sharing *s = payload;
+    if (s->own) {
+        const size_t items =
+            imp_min(s->tree.desc.group, s->desc->n_items - group * s->tree.desc.group);
+        struct imp_sum_node node = {.group = group, .sum = sum};
+        while ((size_t)1 << node.level < items) node.level++;
+        pthread_mutex_lock(&s->share.lock);
+        message_node(s, &node);
+        pthread_mutex_unlock(&s->share.lock);
+    }
+    return s->desc->take(group, sum, s->desc->payload);
+}
+
+static enum imp_status item_work(size_t i, int worker, int slot, void *payload)
+{
+    struct sharing *s = payload;
+    size_t item;
+    (void)i, (void)slot;
+    if (!share_take(&s->share, &item)) return IMP_OK;
+    void *result = imp__sum_tree_room(&s->tree);
+    if (!result) return imp__error(s->ctx, IMP_E_NOMEM, "no memory for a part of a sum");
+    const enum imp_status st = s->work(item, worker, result, s->payload);
+    if (st == IMP_OK) return imp__sum_tree_put(&s->tree, item, result);
+    imp__sum_tree_drop(&s->tree, result);
+    return st;
+}
+
+static void receive(void *receiver, int rank, const void *message, size_t bytes)
+{
+    struct sharing *s = receiver;
+    const unsigned char *at = message;
+    struct head head;
+    if (s->strange) return;
+    s->strange = bytes < sizeof head;
+    if (s->strange) return;
+    memcpy(&head, at, sizeof head);
+    s->strange = head.items != s->desc->n_items || head.group != s->tree.desc.group ||
+                 head.size != s->desc->size ||
+                 (bytes - sizeof head) / (sizeof(struct place) + head.size) < head.nodes;
+    if (s->strange) return;
+    head.error[sizeof head.error - 1] = 0;
+    s->all.late |= head.late;
+    imp__drops_merge(&s->all.drops, &head.drops);
+    /* A failure counts before a wish to stop, and that before a time that is up. */
+    const uint32_t was = s->all.status, is = head.status;
+    if (is != IMP_OK &&
+        (was == IMP_OK || (was == IMP_CANCELLED && is != IMP_CANCELLED))) {
+        s->all.status = is;
+        s->failed = rank;
+        memcpy(s->all.error, head.error, sizeof head.error);
+    }
+    at += sizeof head;
+    if (rank == s->share.team->host.rank) return;
+    for (uint64_t k = 0; k < head.nodes && !s->strange; k++) {
+        struct place p;
+        memcpy(&p, at, sizeof p);
+        at += sizeof p;
+        const struct imp_sum_node node = {.group = (size_t)p.group,
+                                          .index = (size_t)p.index,
+                                          .level = (int)p.level,
+                                          .sum = (void *)(uintptr_t)at};
+        s->strange = imp__sum_tree_put_node(&s->tree, &node) != IMP_OK;
+        at += s->desc->size;
+    }
+}
+
+/* Tell what this rank computed, and complete the tree with what the others did. */
+static enum imp_status exchange(struct sharing *s, enum imp_status st,
+                                struct imp_shared *shared)
+{
+    struct imp__team *team = s->share.team;
+    struct head head;
+    memset(&head, 0, sizeof head); /* with what is between the fields: it is written */
+    for (size_t k = 0; k < s->tree.n_nodes; k++) message_node(s, &s->tree.nodes[k]);
+    if (s->no_memory) st = imp__error(s->ctx, IMP_E_NOMEM, "no memory for a message");
+    head.status = st;
+    head.late = shared->late;
+    head.items = s->desc->n_items;
+    head.group = s->tree.desc.group;
+    head.size = s->desc->size;
+    head.nodes = s->no_memory ? 0 : s->nodes;
+    head.drops = *shared->drops;
+    if (st != IMP_OK)
+        snprintf(head.error, sizeof head.error, "%s", imp_last_error(s->ctx));
+    if (!s->no_memory) memcpy(s->message.data, &head, sizeof head);
+    s->own = false;
+    st = team->host.gather(s->no_memory ? (const void *)&head : s->message.data,
+                           s->no_memory ? sizeof head : s->message.size, receive, s,
+                           team->host.payload);
+    team->round++;
+    if (st != IMP_OK) return imp__error_prefix(s->ctx, st, "the team");
+    if (s->strange)
+        return imp__error(s->ctx, IMP_E_ARG,
+                          "what the ranks of a team, or parts, have computed is not of "
+                          "one and the same run");
+    *shared->drops = s->all.drops;
+    shared->late = s->all.late != 0;
+    st = (enum imp_status)s->all.status;
+    if (st != IMP_OK && st != IMP_CANCELLED)
+        return imp__error(s->ctx, st, "rank %d: %s", s->failed, s->all.error);
+    return st;
+}
+
+enum imp_status imp__shared_sum(imp_context *ctx, const struct imp_loop *loop,
+                                const struct imp_sum_desc *desc,
+                                enum imp_status (*work)(size_t i, int worker,
+                                                        void *result, void *payload),
+                                struct imp_shared *shared)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_sum_desc own = *desc;
+    struct sharing s = {.ctx = ctx, .desc = desc, .work = work, .payload = loop->payload};
+    const struct head none = {0};
+    const bool shares = imp__team_shares(ctx);
+    shared->late = false;
+    if (shares) {
+        own.add = sum_add;
+        own.take = sum_take;
+        own.payload = &s;
+    }
+    IMP_TRY(imp__sum_tree_create(ctx, &own, &s.tree));
+    if (!shares) {
+        st = imp__parallel_sum(ctx, loop, &s.tree, 0, work, NULL);
+    } else {
+        struct imp_loop each = *loop;
+        share_begin(&s.share, ctx->team, desc->n_items);
+        s.own = true;
+        const bool locks = pthread_mutex_init(&s.share.lock, NULL) == 0;
+        /* A rank that cannot begin tells the others. */
+        s.no_memory = !locks || !imp__bytes_add(ctx, &s.message, &none, sizeof none);
+        each.work = item_work;
+        each.commit = NULL;
+        each.payload = &s;
+        each.window = imp__sum_window(ctx);
+        if (!s.no_memory) st = imp__parallel(ctx, &each, NULL);
+    }
+    shared->late =
+        st == IMP_CANCELLED && loop->deadline_s > 0 && imp__now() >= loop->deadline_s;
+    if (shares) {
+        st = exchange(&s, st, shared);
+        pthread_mutex_destroy(&s.share.lock);
+    }
+out:
+    imp__bytes_free(ctx, &s.message);
+    imp__sum_tree_destroy(&s.tree);
+    return st;
+}

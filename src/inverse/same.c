@@ -1,0 +1,63 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Is a problem the one that parts, or the other ranks of a team, have? */
+#include "film/parts.h"
+#include "math/hash.h"
+#include "problem.h"
+#include "scene/fingerprint.h"
+
+uint64_t imp__problem_targets_hash(const struct imp_problem *p)
+{
+    uint64_t hash = 0;
+    for (size_t i = 0; i < p->n_targets; i++) {
+        const struct imp__target *t = &p->targets[i];
+        const size_t n = (size_t)t->desc.width * (size_t)t->desc.height;
+        const size_t c = n * (size_t)t->desc.channels * sizeof(float);
+        const double number[8] = {t->desc.sensor,   t->desc.width,     t->desc.height,
+                                  t->desc.channels, t->desc.loss,      t->desc.epsilon,
+                                  t->desc.scale,    t->weights != NULL};
+        hash = imp__hash(hash, number, sizeof number);
+        hash = imp__hash(hash, t->pixels, c);
+        if (t->weights) hash = imp__hash(hash, t->weights, n * sizeof(float));
+        if (t->noise_se) hash = imp__hash(hash, t->noise_se, c);
+    }
+    for (size_t i = 0; i < p->n_regularisers; i++) {
+        const struct imp__regulariser *r = &p->regularisers[i];
+        const double number[2] = {r->kind, r->weight};
+        hash = imp__hash(hash, number, sizeof number);
+        hash = imp__hash(hash, r->on, p->scene->n_params);
+        if (r->origin)
+            hash = imp__hash(hash, r->origin, p->scene->n_theta * sizeof *r->origin);
+    }
+    return hash;
+}
+
+enum imp_status imp__problem_same(struct imp_problem *p, const struct imp_run *run,
+                                  const char *call)
+{
+    struct imp_same same[IMP_SAME_MAX];
+    const struct imp__team *team = p->ctx->team;
+    if (!imp__team_shares(p->ctx)) return IMP_OK;
+    if (team->role == IMP_TEAM_RANK && p->same_known) return IMP_OK;
+    int n = imp__same_run(p->scene, run, call, same);
+    uint64_t what = imp__hash(0, p->chosen, p->scene->n_params);
+    for (size_t i = 0; i < p->n_targets; i++) {
+        const uint64_t sensor =
+            imp__fingerprint_sensor(p->scene->sensors[p->targets[i].desc.sensor]);
+        what = imp__hash(what, &sensor, sizeof sensor);
+    }
+    same[n++] = (struct imp_same){"choice of parameters or sensors", what};
+    same[n++] = (struct imp_same){"target", imp__problem_targets_hash(p)};
+    const enum imp_status st = imp__team_same(p->ctx, same, n);
+    p->same_known = st == IMP_OK;
+    return st;
+}
+
+enum imp_status imp__problem_no_parts(const struct imp_problem *p, const char *call)
+{
+    if (!p->ctx->team || p->ctx->team->role == IMP_TEAM_RANK) return IMP_OK;
+    return imp__error(p->ctx, IMP_E_UNSUPPORTED,
+                      "%s cannot be made in parts: what is computed next depends on what "
+                      "was before; a team of processes can",
+                      call);
+}

@@ -1,0 +1,66 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A team whose ranks are threads of one process: what a message-passing library does, by
+ * a barrier. */
+#ifndef TEAM_KIT_H
+#define TEAM_KIT_H
+
+#include <importon/importon.h>
+#include <pthread.h>
+#include <stdatomic.h>
+
+enum { TEAM_MAX = 7 };
+
+struct team_hub {
+    int ranks;
+    int shares; /* no counter: equal shares */
+    pthread_barrier_t barrier;
+    const void *message[TEAM_MAX];
+    size_t bytes[TEAM_MAX];
+    size_t sent; /* by rank 0, all in all */
+    _Atomic int64_t counter[2];
+};
+
+struct team_rank {
+    struct team_hub *hub;
+    int rank;
+};
+
+static enum imp_status team_gather(const void *message, size_t bytes,
+                                   void (*receive)(void *, int, const void *, size_t),
+                                   void *receiver, void *payload)
+{
+    const struct team_rank *r = payload;
+    struct team_hub *hub = r->hub;
+    hub->message[r->rank] = message;
+    hub->bytes[r->rank] = bytes;
+    if (r->rank == 0) hub->sent += bytes;
+    pthread_barrier_wait(&hub->barrier);
+    for (int k = 0; k < hub->ranks; k++)
+        receive(receiver, k, hub->message[k], hub->bytes[k]);
+    pthread_barrier_wait(&hub->barrier);
+    return IMP_OK;
+}
+
+/* Rounds take turns with two counters: nobody is in the last round any more when one of
+ * the ranks begins the next. */
+static int64_t team_next(uint64_t round, void *payload)
+{
+    struct team_hub *hub = ((const struct team_rank *)payload)->hub;
+    atomic_store(&hub->counter[(round + 1) % 2], 0);
+    return atomic_fetch_add(&hub->counter[round % 2], 1);
+}
+
+/* Join with a context. */
+static enum imp_status team_join(imp_context *context, struct team_rank *rank)
+{
+    struct imp_team team = IMP_TEAM_INIT;
+    team.rank = rank->rank;
+    team.ranks = rank->hub->ranks;
+    team.gather = team_gather;
+    team.next = rank->hub->shares ? NULL : team_next;
+    team.payload = rank;
+    return imp_context_set_team(context, &team);
+}
+
+#endif
