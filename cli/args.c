@@ -181,7 +181,18 @@ static int takes_patterns(const struct args_spec *spec)
     return 0;
 }
 
-int args_parse(const struct args_spec *spec, int argc, char **argv, int *first)
+static void typed_add(struct arg_list *typed, const struct arg_option *o,
+                      const char *value)
+{
+    const size_t n = strlen(o->name) + (value ? strlen(value) : 0) + 4;
+    char *text = malloc(n);
+    if (!text) return;
+    snprintf(text, n, "--%s%s%s", o->name, value ? "=" : "", value ? value : "");
+    args_list_add(typed, text);
+}
+
+int args_parse(const struct args_spec *spec, int argc, char **argv, int *first,
+               struct arg_list *typed)
 {
     const struct arg_option *all[MAX_OPTIONS];
     struct option options[MAX_OPTIONS + 1] = {{0}};
@@ -222,6 +233,7 @@ int args_parse(const struct args_spec *spec, int argc, char **argv, int *first)
             explain_value(spec, o, optarg);
             return usage_error(spec);
         }
+        typed_add(typed, o, o->type == ARG_FLAG ? NULL : optarg);
     }
     *first = optind;
     if (argc - optind < spec->min_operands) {

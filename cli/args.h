@@ -44,8 +44,11 @@ struct args_spec {
 };
 
 /* Parse argv[1..]; operands are moved to the end of argv, *first is the index of the
- * first. Returns 0, or prints what is wrong on stderr and returns 2. */
-int args_parse(const struct args_spec *spec, int argc, char **argv, int *first);
+ * first. Every option that was given is added to `typed` as "--name" or "--name=value",
+ * and its text lives as long as the process. Returns 0, or prints what is wrong on stderr
+ * and returns 2. */
+int args_parse(const struct args_spec *spec, int argc, char **argv, int *first,
+               struct arg_list *typed);
 void args_help(const struct args_spec *spec, FILE *to);
 /* What one option takes ("--name", "-n"): a word a line, or what help calls its value; a
  * flag: nothing. 0, or 2 with the reason printed. */

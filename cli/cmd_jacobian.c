@@ -191,14 +191,14 @@ static int run_jacobian(int n, char **operand)
     (void)n;
     int rc = cli_load(operand[0]);
     if (rc) return rc;
-    if (!cli.out)
+    if (!cli.out && !cli.part)
         return cli_error(EXIT_USAGE, "jacobian: -o DIR is needed: a picture for "
                                      "each control goes there");
     rc = problem_open(&problem);
     if (rc) return rc;
-    rc = make_folder(cli.out);
+    if (!cli.part) rc = make_folder(cli.out);
     blocks = problem_blocks(problem, &n_blocks);
-    if (!rc) rc = writable(blocks, n_blocks);
+    if (!rc && !cli.part) rc = writable(blocks, n_blocks);
     if (rc) {
         free(blocks);
         problem_close(problem);

@@ -4,6 +4,7 @@
  * settings. */
 #include "command.h"
 
+#include "part.h"
 #include "progress.h"
 #include "settings.h"
 
@@ -67,6 +68,9 @@ const struct arg_option options_run[] = {
      NULL},
     {ARG_NUMBER, 0, "time", "SECONDS", "stop after this time and keep the results so far",
      &cli.time_s, 1e-3, 1e9, NULL},
+    {ARG_TEXT, 0, "part", "I/N",
+     "compute part I of N (from 1), to the file of -o; 'importon merge' makes the whole",
+     &cli.part, 0, 0, NULL},
     {0}};
 
 const struct arg_option options_guide[] = {
@@ -109,6 +113,7 @@ static int exit_code(enum imp_status status)
     switch (status) {
     case IMP_OK: return EXIT_DONE;
     case IMP_CANCELLED: return cli_done();
+    case IMP_PART: return EXIT_STOP;
     case IMP_E_ARG:
     case IMP_E_SCENE:
     case IMP_E_UNSUPPORTED:
@@ -122,6 +127,7 @@ static int exit_code(enum imp_status status)
 }
 int cli_fail(enum imp_status status, const char *what)
 {
+    if (status == IMP_PART) return part_end();
     const char *message = cli.context ? imp_last_error(cli.context) : "";
     if (!message[0]) message = imp_status_text(status);
     const size_t n =
@@ -183,10 +189,12 @@ static void on_log(enum imp_log_level level, const char *message, void *payload)
 int cli_open(void)
 {
     struct imp_context_options options = IMP_CONTEXT_OPTIONS_INIT;
+    if (cli.context) return 0;
     options.threads = cli.threads;
     options.log = on_log;
     const enum imp_status st = imp_context_create(&options, &cli.context);
-    return st == IMP_OK ? 0 : cli_fail(st, NULL);
+    if (st != IMP_OK) return cli_fail(st, NULL);
+    return part_open();
 }
 
 /* Cut "a;b;c" into a list; the text lives as long as the process. */
@@ -295,6 +303,7 @@ void cli_close(void)
     imp_guide_destroy(cli.guiding);
     imp_elements_destroy(cli.elements);
     imp_scene_destroy(cli.scene);
+    imp_parts_destroy(cli.parts);
     imp_context_destroy(cli.context);
     args_list_free(&cli.defines);
     args_list_free(&cli.sets);

@@ -29,7 +29,7 @@ struct command {
 };
 extern const struct command command_render, command_gradient, command_jacobian,
     command_check, command_fit, command_compare, command_info, command_bench,
-    command_bend, command_elements;
+    command_bend, command_elements, command_merge;
 
 /* Option tables, to be named in args_spec.group. -o is a file, or a folder for commands
  * that write several files. */
@@ -41,7 +41,10 @@ struct cli {
     const char *name;   /* of the command */
     const char *answer; /* its struct command's */
     int argc;
-    char **argv; /* as typed, for provenance */
+    char **argv;           /* as typed, for provenance */
+    struct arg_list typed; /* the options of it, spelled out */
+    int n_operands;
+    char **operand;
     /* options_general */
     const char *out;
     int threads, json, progress, help, quiet, overwrite;
@@ -53,6 +56,8 @@ struct cli {
     int sensor, spp;
     uint64_t seed;
     double time_s;
+    const char *part, *part_out; /* "I/N", and where it goes */
+    imp_parts *parts;            /* the part in the making, or those that are merged */
     /* options_guide */
     int guide;
     double guide_share, guide_roulette;
@@ -65,7 +70,10 @@ struct cli {
 };
 extern struct cli cli;
 
-/* Make the context. 0, or an exit code with the reason printed. */
+/* Run a command as if typed: argv[0] is its name. Returns an exit code. */
+int cli_run_command(int argc, char **argv);
+
+/* Make the context, unless there is one. 0, or an exit code with the reason printed. */
 int cli_open(void);
 /* Make the context, load the scene ("-": from stdin), apply --set. 0, EXIT_STOP after
  * --dump, or an exit code. */

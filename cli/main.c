@@ -4,6 +4,7 @@
  * standard error. */
 #include "command.h"
 #include "output.h"
+#include "part.h"
 #include "progress.h"
 
 #include <errno.h>
@@ -14,7 +15,7 @@
 static const struct command *const commands[] = {
     &command_render, &command_gradient, &command_jacobian, &command_check,
     &command_fit,    &command_compare,  &command_info,     &command_bend,
-    &command_bench,  &command_elements};
+    &command_bench,  &command_elements, &command_merge};
 #define N_COMMANDS (sizeof commands / sizeof *commands)
 
 static void print_usage(FILE *to)
@@ -70,11 +71,42 @@ int cli_redirect(void)
     return rc;
 }
 
+int cli_run_command(int argc, char **argv)
+{
+    const struct command *command = find(argv[0]);
+    int first, rc;
+    if (!command) return EXIT_USAGE;
+    cli.name = command->args.command;
+    cli.answer = command->answer;
+    cli.argc = argc;
+    cli.argv = cli_alloc((size_t)argc + 1, sizeof *cli.argv);
+    memcpy(cli.argv, argv, (size_t)argc * sizeof *argv); /* getopt reorders argv */
+    /* --help needs no operands. */
+    for (int i = 1; i < argc && strcmp(argv[i], "--"); i++)
+        if (!strcmp(argv[i], "--help") || !strcmp(argv[i], "-h")) {
+            args_help(&command->args, stdout);
+            return EXIT_DONE;
+        }
+    args_list_free(&cli.typed);
+    rc = args_parse(&command->args, argc, argv, &first, &cli.typed);
+    cli.n_operands = argc - first;
+    cli.operand = argv + first;
+    for (int i = first; rc == 0 && i < argc; i++) overwrite_protect(argv[i]);
+    if (rc == 0) rc = part_begin();
+    if (rc == 0 && command->prints) rc = cli_redirect();
+    if (rc == 0) {
+        progress_init(cli.quiet ? PROGRESS_NEVER : (enum progress_mode)cli.progress);
+        rc = command->run(argc - first, argv + first);
+        progress_clear();
+    }
+    return rc;
+}
+
 int main(int argc, char **argv)
 {
     const char *name = argc > 1 ? argv[1] : "";
     const struct command *command;
-    int first, rc;
+    int rc;
 
     if (!*name) {
         print_usage(stderr);
@@ -92,28 +124,7 @@ int main(int argc, char **argv)
         else print_usage(stdout);
         return finish(rc);
     }
-    if (!(command = find(name))) return EXIT_USAGE;
-
-    cli.name = command->args.command;
-    cli.answer = command->answer;
-    cli.argc = argc - 1;
-    cli.argv = cli_alloc((size_t)argc, sizeof *cli.argv);
-    memcpy(cli.argv, argv + 1,
-           (size_t)(argc - 1) * sizeof *argv); /* getopt reorders argv */
-    /* --help needs no operands. */
-    for (int i = 2; i < argc && strcmp(argv[i], "--"); i++)
-        if (!strcmp(argv[i], "--help") || !strcmp(argv[i], "-h")) {
-            args_help(&command->args, stdout);
-            return finish(EXIT_DONE);
-        }
-    rc = args_parse(&command->args, argc - 1, argv + 1, &first);
-    for (int i = 1 + first; rc == 0 && i < argc; i++) overwrite_protect(argv[i]);
-    if (rc == 0 && command->prints) rc = cli_redirect();
-    if (rc == 0) {
-        progress_init(cli.quiet ? PROGRESS_NEVER : (enum progress_mode)cli.progress);
-        rc = command->run(argc - 1 - first, argv + 1 + first);
-        progress_clear();
-    }
+    rc = cli_run_command(argc - 1, argv + 1);
     cli_close();
     return finish(rc == EXIT_STOP ? EXIT_DONE : rc);
 }

@@ -24,6 +24,7 @@ static const struct {
     [OUTPUT_ANSWER] = {"an answer of this command", {"{\"importon\":"}, NULL},
     [OUTPUT_CHECKPOINT] = {"a checkpoint", {"importon checkpoint "}, NULL},
     [OUTPUT_SOLUTION] = {"a saved solution", {"IMPELEM"}, NULL},
+    [OUTPUT_PART] = {"a part of a run", {"impparts"}, NULL},
     [OUTPUT_SETTINGS] = {"a list of settings (ID=VALUE)", {NULL}, NULL},
     [OUTPUT_TABLE] = {"a table of importon's",
                       {"iteration,loss,se\n", "evaluation,objective\n", "ray,bundle,x,y,",

@@ -11,6 +11,7 @@ enum output_kind {
     OUTPUT_ANSWER, /* what the running command prints, as text or JSON */
     OUTPUT_CHECKPOINT,
     OUTPUT_SOLUTION,
+    OUTPUT_PART,
     OUTPUT_SETTINGS, /* name=value,.. for --set @FILE */
     OUTPUT_TABLE,
     OUTPUT_CURVE,

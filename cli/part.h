@@ -1,0 +1,20 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * --part I/N: a command that computes its part of a run, to be merged later. */
+#ifndef IMP_CLI_PART_H
+#define IMP_CLI_PART_H
+
+#include "command.h"
+
+/* Read --part, and take -o for the part's file. 0, or an exit code. */
+int part_begin(void);
+/* Set the part of the context that was just made. 0, or an exit code. */
+int part_open(void);
+/* The part is computed: write it. EXIT_STOP, or an exit code. */
+int part_end(void);
+
+/* The words that a command consists of, from the text that parts carry: argv, ends with
+ * NULL, [*argc]. NULL if the text is none. The caller frees argv and argv[0]. */
+char **part_command_words(const char *text, int *argc);
+
+#endif
