@@ -35,6 +35,9 @@ static const struct {
     {"roughdielectric", {"distribution=ggx", "alpha=0.4", "int_ior=1.1", "ext_ior=1.6"}},
     {"roughdielectric", {"distribution=ggx", "alpha_u=0.4", "alpha_v=0.1"}},
     {"roughdielectric", {"distribution=beckmann", "alpha=0.2", "sample_visible=false"}},
+    {"roughplastic", {"distribution=ggx", "nonlinear=true"}},
+    {"roughplastic",
+     {"distribution=ggx", "sample_visible=false", "int_ior=1.1", "ext_ior=1.6"}},
     {"stam_m2", {"variant=reciprocal", "sampling=cosine", "absorb=0.3"}},
     {"stam_m2", {"variant=microfacet", "sampling=phong"}},
     {"stam_m2", {"variant=microfacet", "sampling=mixture"}},
@@ -95,6 +98,8 @@ static bool kind_make(struct kind_factory *f, const struct imp_bsdf_ops *ops,
         p->string = eq + 1;
     }
     void *self = imp__arena_array(&f->arena, 1, ops->object_size + 1);
+    const struct imp_input **input =
+        imp__arena_array(&f->arena, IMP_INPUTS_MAX + 1, sizeof *input);
     *out = (struct imp_bsdf){.ops = ops,
                              .self = self,
                              .flags = IMP_BSDF_SMOOTH,
@@ -102,9 +107,17 @@ static bool kind_make(struct kind_factory *f, const struct imp_bsdf_ops *ops,
                              .name = ops->name};
     while (ops->inputs[out->n_own].name) out->n_own++;
     out->n_in = out->n_own;
+    out->input = input;
+    for (int j = 0; j < out->n_own; j++) {
+        struct imp_input *own = imp__arena_array(&f->arena, 1, sizeof *own);
+        own->value = imp__spec(ops->inputs[j].fallback);
+        own->param = -1;
+        input[j] = own;
+    }
     for (int k = 0; k < n_child; k++) {
         out->child[k] = &child[k];
         out->child_in[k] = out->n_in;
+        for (int j = 0; j < child[k].n_in; j++) input[out->n_in + j] = child[k].input[j];
         out->n_in += child[k].n_in;
     }
     out->n_child = n_child;
@@ -132,6 +145,13 @@ static inline void kind_bounds(const struct imp_input_desc *d, double *lo, doubl
     *hi = d->lo == 0 && d->hi == 0 ? INFINITY : d->hi;
 }
 
+/* What the engine calls after inputs have got other values. */
+static inline void kind_changed(const struct imp_bsdf *b)
+{
+    for (int k = 0; k < b->n_child; k++) kind_changed(b->child[k]);
+    if (b->ops->changed) b->ops->changed(b);
+}
+
 enum kind_set {
     KIND_FALLBACK, /* what the kind declares */
     KIND_RANDOM,   /* near it, another value in every lane */
@@ -142,14 +162,17 @@ static inline void kind_inputs(const struct imp_bsdf *b, enum kind_set set, uint
                                imp_spec *in)
 {
     const struct imp_key key = imp__key(seed, (uint64_t)set, 0);
+    /* Numbers that tables are made for stay for a while: making them takes long. */
+    const struct imp_key slow = imp__key(seed / 50, (uint64_t)set, 0);
     for (int j = 0; j < b->n_in; j++) {
         const struct imp_input_desc *d = kind_input(b, j);
+        const struct imp_key key_j = d->flags & IMP_INPUT_NUMBER ? slow : key;
         double lo, hi;
         kind_bounds(d, &lo, &hi);
         in[j] = imp__spec(0);
         for (int c = 0; c < 3; c++) {
             const double u =
-                imp__u01(key, (uint32_t)(4 * j + (kind_is_scalar(d) ? 0 : c)));
+                imp__u01(key_j, (uint32_t)(4 * j + (kind_is_scalar(d) ? 0 : c)));
             double v = d->fallback;
             if (set == KIND_LOWEST) v = lo;
             else if (set == KIND_FALLBACK) v = d->fallback;
@@ -160,7 +183,9 @@ static inline void kind_inputs(const struct imp_bsdf *b, enum kind_set set, uint
             in[j][c] = imp_clamp(v, lo, hi);
         }
         in[j][3] = kind_is_scalar(d) ? in[j][0] : NAN; /* nobody may read it */
+        ((struct imp_input *)b->input[j])->value = in[j];
     }
+    kind_changed(b);
 }
 
 static inline bool kind_has_config(const struct kind_case *c, const char *prop)

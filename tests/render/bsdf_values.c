@@ -9,6 +9,8 @@
 #include <math.h>
 
 #define TOLERANCE 3e-4
+/* The tables of its rough coats: means over 32 x 32 facets, 1e-3 off under grazing angles. */
+#define TOLERANCE_COAT 2e-3
 
 struct row {
     double uv[2];
@@ -60,8 +62,9 @@ static void row_check(const struct imp_bsdf *b, const struct imp_shape *shape,
 
 static void report(const struct tally *t)
 {
+    const double limit = strncmp(t->name, "coat", 4) ? TOLERANCE : TOLERANCE_COAT;
     if (t->name[0])
-        tap_ok(t->worst < TOLERANCE && t->lit > 8,
+        tap_ok(t->worst < limit && t->lit > 8,
                "%s # largest error %.1e, %d values, %d lit, %d of delta lobes", t->name,
                t->worst, t->smooth, t->lit, t->delta);
 }

@@ -13,6 +13,7 @@
     X(imp__plastic)                                                                      \
     X(imp__roughconductor)                                                               \
     X(imp__roughdielectric)                                                              \
+    X(imp__roughplastic)                                                                 \
     X(imp__stam_m2)                                                                      \
     X(imp__stam_m3)                                                                      \
     X(imp__thindielectric)                                                               \

@@ -1,0 +1,197 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * roughplastic: a diffuse base under a coat of small facets. With h the half-vector, T
+ * what the coat lets through and R its mean reflectance from inside (coat.h)
+ *
+ *   f cos(theta_i) = tint F(wo.h) D(h) G1(wi) G1(wo)/(4 cos_o)
+ *                  + rho/(1 - k R) T(cos_i) T(cos_o)/eta^2 cos_i/pi,       front only
+ *
+ * with k = rho if `nonlinear`, else 1. Roughness and index are numbers, since T and R are
+ * tables that are made for them, and made anew when they change. */
+#include "coat.h"
+#include "fresnel.h"
+#include "lambert.h"
+#include "presets.h"
+#include "roughness.h"
+
+enum { DIFFUSE, TINT, ETA, ALPHA, N_INPUTS };
+
+struct roughplastic {
+    enum imp__distribution type;
+    bool visible, nonlinear;
+    struct imp__coat coat;
+};
+
+static const struct imp_input_desc inputs[] = {
+    {.name = "diffuse_reflectance",
+     .role = IMP_REFLECTANCE,
+     .fallback = 0.5,
+     .hi = 1,
+     .unit = "1"},
+    IMP_TINT_INPUT("specular_reflectance"),
+    IMP_IOR_INPUT(1.49 / 1.000277, 0.1, 10),
+    IMP_ROUGHNESS_INPUT("alpha", IMP_INPUT_NUMBER),
+    {0}};
+
+static enum imp_status prepare(const struct imp_build *b)
+{
+    const enum imp_status st = imp__ior_prepare(b, "polypropylene", false);
+    return st == IMP_OK ? imp__roughness_prepare(b) : st;
+}
+
+static void changed(const struct imp_bsdf *b)
+{
+    struct roughplastic *p = b->self;
+    imp__coat_make(&p->coat, p->type, imp_max(b->input[ALPHA]->value[0], IMP_ALPHA_MIN),
+                   b->input[ETA]->value[0]);
+}
+
+static enum imp_status build(const struct imp_build *b, void *self, struct imp_bsdf *bsdf)
+{
+    enum imp_status st = IMP_OK;
+    struct roughplastic *p = self;
+    struct imp__roughness r;
+    IMP_TRY(imp__roughness_build(b, &r));
+    IMP_TRY(imp_build_bool(b, "nonlinear", false, &p->nonlinear));
+    if (r.anisotropic)
+        IMP_TRY(imp_build_error(b, "alpha_u", IMP_E_SCENE,
+                                "has one roughness, 'alpha', for all directions"));
+    p->type = r.type;
+    p->visible = r.visible;
+    bsdf->flags = IMP_BSDF_SMOOTH;
+    changed(bsdf);
+out:
+    return st;
+}
+
+/* All that the functions below need at their inputs. */
+struct at {
+    const struct roughplastic *p;
+    struct imp__microfacet facets;
+    double alpha, eta;
+};
+static struct at at_inputs(const struct imp_bsdf *b, const imp_spec *in)
+{
+    const struct roughplastic *p = b->self;
+    const double alpha = fmax(in[ALPHA][0], IMP_ALPHA_MIN);
+    return (struct at){p, {p->type, p->visible, alpha, alpha}, alpha, in[ETA][0]};
+}
+static double number(const struct at *a, imp__dual x)
+{
+    return imp__coat_at(&a->p->coat, x, a->alpha, a->eta);
+}
+
+/* Probability of the lobe of facets. Colours below the floor keep a part, since their
+ * derivatives do not vanish with them. */
+static double facet_chance(const struct at *a, const imp_spec *in, double mu)
+{
+    const double T = imp_clamp(number(a, imp__coat_T(&a->p->coat, mu)), 0, 1);
+    const double s = (1 - T) * imp_max(imp__max3(in[TINT]), 0.1),
+                 d = T * imp_max(imp__max3(in[DIFFUSE]), 0.1);
+    return imp_clamp(s / (s + d), 0.02, 0.98);
+}
+
+static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
+                   struct imp_dirs *d)
+{
+    if (!(d->wo[2] > 0)) return false;
+    const struct at a = at_inputs(b, in);
+    if (!(u[0] < facet_chance(&a, in, d->wo[2]))) return imp__lambert_sample(&u[1], d);
+    const imp_v3 h = imp__microfacet_sample(&a.facets, &d->wo, &u[1]);
+    const double c = imp__dot(d->wo, h);
+    if (!(c > 0)) return false;
+    d->wi = imp__normalize(h * (2 * c) - d->wo);
+    d->lobe = IMP_SMOOTH;
+    return d->wi[2] > 0;
+}
+static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
+{
+    if (!imp__front(d)) return 0;
+    const struct at a = at_inputs(b, in);
+    const imp_v3 h = imp__normalize(d->wo + d->wi);
+    const double q = facet_chance(&a, in, d->wo[2]);
+    return q * imp__microfacet_pdf(&a.facets, &d->wo, &h) / (4 * imp__dot(d->wo, h)) +
+           (1 - q) * imp__lambert(d);
+}
+
+/* rho/(1 - k R) and its derivatives. */
+static imp_spec base(const struct at *a, const imp_spec *in, imp_spec *d_rho,
+                     imp_spec *d_R)
+{
+    const imp_spec rho = in[DIFFUSE], k = a->p->nonlinear ? rho : imp__spec(1);
+    const imp_spec q = 1 / (1 - k * number(a, a->p->coat.R_int));
+    *d_rho = a->p->nonlinear ? q * q : q;
+    *d_R = k * rho * q * q;
+    return rho * q;
+}
+
+static void eval(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
+                 imp_spec *f)
+{
+    imp_spec d_rho, d_R;
+    double cos_t, eta_t;
+    *f = imp__spec(0);
+    if (!imp__front(d)) return;
+    const struct at a = at_inputs(b, in);
+    const imp_v3 h = imp__normalize(d->wo + d->wi);
+    const double F =
+        imp__fresnel_dielectric(imp_min(imp__dot(d->wo, h), 1), a.eta, &cos_t, &eta_t);
+    const double lobe = F * imp__microfacet_d(&a.facets, &h, NULL) *
+                        imp__microfacet_g1(&a.facets, &d->wi, NULL) *
+                        imp__microfacet_g1(&a.facets, &d->wo, NULL) / (4 * d->wo[2]);
+    const double T = number(&a, imp__coat_T(&a.p->coat, d->wi[2])) *
+                     number(&a, imp__coat_T(&a.p->coat, d->wo[2]));
+    *f = in[TINT] * lobe +
+         base(&a, in, &d_rho, &d_R) * (T / (a.eta * a.eta) * imp__lambert(d));
+}
+
+static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
+                   imp_spec *df)
+{
+    imp_spec d_rho, d_R;
+    double dlog_D[2], dGi[2], dGo[2], F_c, F_e;
+    for (int j = 0; j < N_INPUTS; j++) df[j] = imp__spec(0);
+    if (!imp__front(d)) return;
+    const struct at a = at_inputs(b, in);
+    const imp_v3 h = imp__normalize(d->wo + d->wi);
+    const double F =
+        imp__fresnel_dielectric_d(imp_min(imp__dot(d->wo, h), 1), a.eta, &F_c, &F_e);
+    const double c = imp__microfacet_d(&a.facets, &h, dlog_D) / (4 * d->wo[2]);
+    const double Gi = imp__microfacet_g1(&a.facets, &d->wi, dGi),
+                 Go = imp__microfacet_g1(&a.facets, &d->wo, dGo);
+    df[TINT] = imp__spec(F * c * Gi * Go);
+    df[ETA] = in[TINT] * (F_e * c * Gi * Go);
+    df[ALPHA] = in[TINT] * (F * c *
+                            ((dlog_D[0] + dlog_D[1]) * Gi * Go + (dGi[0] + dGi[1]) * Go +
+                             Gi * (dGo[0] + dGo[1])));
+
+    const imp__dual Ti = imp__coat_T(&a.p->coat, d->wi[2]),
+                    To = imp__coat_T(&a.p->coat, d->wo[2]), R = a.p->coat.R_int;
+    const double ti = number(&a, Ti), to = number(&a, To), T = ti * to;
+    const double lambert = imp__lambert(d) / (a.eta * a.eta);
+    const imp_spec rho = base(&a, in, &d_rho, &d_R);
+    df[DIFFUSE] = d_rho * (T * lambert);
+    df[ALPHA] += rho * ((Ti[1] * to + ti * To[1]) * lambert) + d_R * (R[1] * T * lambert);
+    df[ETA] += rho * ((Ti[2] * to + ti * To[2] - 2 * T / a.eta) * lambert) +
+               d_R * (R[2] * T * lambert);
+}
+
+static void albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
+                   imp_spec *rho)
+{
+    (void)b, (void)wo;
+    *rho = in[DIFFUSE];
+}
+
+const struct imp_bsdf_ops imp__roughplastic = {.size = sizeof(struct imp_bsdf_ops),
+                                               .name = "roughplastic",
+                                               .object_size = sizeof(struct roughplastic),
+                                               .inputs = inputs,
+                                               .prepare = prepare,
+                                               .build = build,
+                                               .sample = sample,
+                                               .eval = eval,
+                                               .pdf = pdf,
+                                               .eval_d = eval_d,
+                                               .albedo = albedo,
+                                               .changed = changed};
