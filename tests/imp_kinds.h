@@ -230,8 +230,8 @@ static inline int kinds_visit(struct kind_factory *f,
             const struct imp_bsdf_ops *front = imp__bsdf_kinds[i];
             const char *allow[] = {"allow_transmission=true", NULL};
             if (front->max_children) continue;
-            const int n = imp_min(ops->max_children, 1 + i % 2); /* one and two in turn */
-            if (n < ops->min_children) continue;
+            const int n = imp_max(ops->min_children, /* one and two in turn */
+                                  imp_min(ops->max_children, 1 + i % 2));
             const struct imp_bsdf_ops *back = imp__bsdf_kinds[0];
             for (int b = 0; imp__bsdf_kinds[b]; b++)
                 if (strcmp(imp__bsdf_kinds[b]->name, "diffuse") == 0)
@@ -239,7 +239,8 @@ static inline int kinds_visit(struct kind_factory *f,
             if (!kind_make(f, front, NULL, 0, NULL, 0, &c.child[0]) ||
                 !kind_make(f, back, NULL, 0, NULL, 0, &c.child[1]))
                 return -1;
-            const bool transmits = c.child[0].flags & IMP_BSDF_TRANSMIT;
+            const bool transmits = strcmp(ops->name, "twosided") == 0 &&
+                                   c.child[0].flags & IMP_BSDF_TRANSMIT;
             snprintf(c.label, sizeof c.label, "%s(%s%s%s)", ops->name, front->name,
                      n > 1 ? ", " : "", n > 1 ? back->name : "");
             if (!kind_make(f, ops, allow, transmits, c.child, n, &c.bsdf)) return -1;

@@ -148,14 +148,22 @@ static void props_make(imp_scene *s, const char *const *props)
     }
 }
 
+static const struct imp_bsdf_ops *kind(const char *name)
+{
+    int k = 0;
+    while (strcmp(imp__bsdf_kinds[k]->name, name) != 0) k++;
+    return imp__bsdf_kinds[k];
+}
+
 static void bsdf_make(imp_scene *s, const struct subject *q,
                       const struct imp_bsdf_ops *ops, const char *id, uint64_t seed)
 {
     imp_scene_begin(s, "bsdf", ops->name, id, NULL);
     if (ops->max_children) {
-        imp_scene_bool(s, "allow_transmission", 1);
+        if (strcmp(ops->name, "twosided") == 0)
+            imp_scene_bool(s, "allow_transmission", 1);
         bsdf_make(s, q, q->back, NULL, seed + 1);
-        if (ops->max_children > 1) bsdf_make(s, q, imp__bsdf_kinds[0], NULL, seed + 2);
+        if (ops->max_children > 1) bsdf_make(s, q, kind("conductor"), NULL, seed + 2);
     } else {
         props_make(s, q->props);
     }
@@ -587,6 +595,10 @@ int main(int argc, char **argv)
                 if (!imp__bsdf_kinds[i]->max_children &&
                     imp__bsdf_kinds[i]->inputs[0].name)
                     check(&(struct subject){.bsdf = ops, .back = imp__bsdf_kinds[i]});
+            for (int i = 0; imp__texture_kinds[i] && ops->inputs[0].name; i++)
+                check(&(struct subject){.bsdf = ops,
+                                        .back = kind("diffuse"),
+                                        .texture = imp__texture_kinds[i]});
             continue;
         }
         check(&(struct subject){.bsdf = ops});

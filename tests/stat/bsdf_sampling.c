@@ -69,9 +69,12 @@ static struct result check(const struct point *p, int samples, uint64_t seed)
     bool lobe_seen[LOBES] = {0};
 
     sphere_tree_init(&tree);
-    for (uint32_t i = 0; i < PILOT; i++)
-        if (draw(p, imp__key(seed, 1, 0), i, &d, &s) && d.lobe == IMP_SMOOTH)
+    /* Enough of those with a density, however rare they are. */
+    for (uint32_t i = 0, n = 0; n < PILOT && i < (n ? 100 : 1) * PILOT; i++)
+        if (draw(p, imp__key(seed, 1, 0), i, &d, &s) && d.lobe == IMP_SMOOTH) {
             sphere_tree_pilot(&tree, d.wi, PILOT_LIMIT);
+            n++;
+        }
     sphere_tree_reset(&tree);
     for (int i = 0; i < samples; i++) {
         if (!draw(p, imp__key(seed, 2, (uint64_t)i / 1000), (uint32_t)(i % 1000), &d,

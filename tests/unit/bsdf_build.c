@@ -156,6 +156,17 @@ int main(void)
     tap_ok(!kind_make(&f, find("twosided"), NULL, 0, &glass, 1, &out) &&
                strstr(imp_last_error(f.ctx), "allow_transmission"),
            "twosided glass # %s", imp_last_error(f.ctx));
+    /* Each blend doubles the lobes of glass: 2, 4, ... 128, 256. */
+    struct imp_bsdf nest[8][2];
+    int deep = 0;
+    nest[0][0] = nest[0][1] = glass;
+    for (; deep < 7; deep++) {
+        if (!kind_make(&f, find("blendbsdf"), NULL, 0, nest[deep], 2, &nest[deep + 1][0]))
+            break;
+        nest[deep + 1][1] = nest[deep + 1][0];
+    }
+    tap_ok(deep == 6 && strstr(imp_last_error(f.ctx), "too deeply"),
+           "lobes have an end # %s", imp_last_error(f.ctx));
     kinds_close(&f);
     return tap_done();
 }

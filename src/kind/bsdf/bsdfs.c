@@ -5,9 +5,11 @@
 #include "math/vec.h"
 
 #define BSDFS(X)                                                                         \
+    X(imp__blendbsdf)                                                                    \
     X(imp__conductor)                                                                    \
     X(imp__dielectric)                                                                   \
     X(imp__diffuse)                                                                      \
+    X(imp__mask)                                                                         \
     X(imp__null)                                                                         \
     X(imp__phong)                                                                        \
     X(imp__plastic)                                                                      \

@@ -3,7 +3,7 @@
  * twosided: seen from behind, the second child (or the only one) is turned over: the
  * mirror z -> -z is applied to both directions. */
 #include "kind/build.h"
-#include "math/vec.h"
+#include "mixing.h"
 
 static enum imp_status build(const struct imp_build *build, void *self,
                              struct imp_bsdf *b)
@@ -16,7 +16,7 @@ static enum imp_status build(const struct imp_build *build, void *self,
     b->absorb = 0;
     for (int k = 0; k < b->n_child; k++) {
         b->flags |= b->child[k]->flags;
-        b->n_lobes = imp_max(b->n_lobes, b->child[k]->n_lobes);
+        b->n_lobes = imp_max(b->n_lobes, imp__lobes_of(b->child[k]));
         b->absorb = imp_max(b->absorb, b->child[k]->absorb);
     }
     if ((b->flags & IMP_BSDF_TRANSMIT) && !allow)

@@ -1,0 +1,43 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Materials that are mixtures of others. A weight w counts the second of two, 1 - w the
+ * first; texels beyond [0, 1] are cut. The probability with which the second is drawn
+ * stays away from 0 and 1, since there the derivative with respect to w, second minus
+ * first, has a part that the value has not.
+ *
+ * Delta lobes of nested materials are numbered anew, so that none share an index. */
+#ifndef IMP_KIND_BSDF_MIXING_H
+#define IMP_KIND_BSDF_MIXING_H
+
+#include "kind/build.h"
+#include "math/vec.h"
+
+#define IMP_MIXING_LEAST 0.02
+#define IMP_LOBES_MAX    128 /* records keep them in a signed byte */
+
+static inline double imp__mixing_weight(double w) { return imp_clamp(w, 0, 1); }
+static inline double imp__mixing_chance(double w)
+{
+    return imp_clamp(w, IMP_MIXING_LEAST, 1 - IMP_MIXING_LEAST);
+}
+/* What is left of u, uniform again, once it is known to lie in [lo, hi). */
+static inline double imp__mixing_rest(double u, double lo, double hi)
+{
+    return imp_clamp((u - lo) / (hi - lo), 0, 0x1.fffffffffffffp-1);
+}
+
+/* Delta lobes of a material. */
+static inline int imp__lobes_of(const struct imp_bsdf *b)
+{
+    return !(b->flags & IMP_BSDF_DELTA) ? 0 : b->n_lobes ? b->n_lobes : 8;
+}
+static inline enum imp_status imp__lobes_check(const struct imp_build *build,
+                                               const struct imp_bsdf *b)
+{
+    if (b->n_lobes <= IMP_LOBES_MAX) return IMP_OK;
+    return imp_build_error(build, NULL, IMP_E_SCENE,
+                           "materials are nested too deeply: %d ideal lobes; at most %d",
+                           b->n_lobes, IMP_LOBES_MAX);
+}
+
+#endif
