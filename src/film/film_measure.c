@@ -16,11 +16,12 @@ enum imp_status imp__run_sensor(const struct imp_scene *scene, const struct imp_
     if (!scene->committed)
         return imp__error(scene->ctx, IMP_E_ARG, "the scene has not been committed");
     if (!scene->integrator)
-        return imp__error(scene->ctx, IMP_E_SCENE,
-                          "the scene has no integrator; Mitsuba's default is "
-                          "<integrator type=\"path\"/>");
+        return imp__node_error(scene->ctx, scene->root, IMP_E_SCENE,
+                               "there is no integrator in it; Mitsuba's default is "
+                               "<integrator type=\"path\"/>");
     if (scene->n_sensors == 0)
-        return imp__error(scene->ctx, IMP_E_SCENE, "the scene has no sensor");
+        return imp__node_error(scene->ctx, scene->root, IMP_E_SCENE,
+                               "there is no sensor in it");
     if (run->sensor < 0 || run->sensor >= scene->n_sensors)
         return imp__error(scene->ctx, IMP_E_ARG,
                           "there is no sensor %d; the scene has %d", run->sensor,

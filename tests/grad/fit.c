@@ -3,6 +3,7 @@
  * Parameters back from pictures: with every optimiser, from one sensor and from two, with
  * masks, at bounds, with what is not determined, stopped and resumed, on one thread and
  * on three. */
+#include "imp_scene.h"
 #include "imp_tap.h"
 #include "inverse_scenes.h"
 #include <math.h>
@@ -386,6 +387,51 @@ static void arguments(void)
     imp_scene_destroy(s);
 }
 
+/* ---- What is said on the way --------------------------------------------------- */
+
+struct said {
+    int searches, intervals, stale, back;
+    double last;
+};
+static int listen(const struct imp_progress *p, void *payload)
+{
+    struct said *s = payload;
+    const int closing = !strcmp(p->stage, "intervals");
+    s->searches += !closing;
+    s->intervals += closing;
+    s->stale += closing && (p->note || p->rate != 0);
+    s->back += p->fraction < s->last;
+    s->last = p->fraction;
+    return 0;
+}
+
+/* While intervals are made, the loss and the pace of the search are not shown any more. */
+static void progress(void)
+{
+    static float pixels[12 * 10 * 3];
+    imp_scene *s = test_scene_text(ctx, ball_xml, IMP_RGB);
+    imp_problem *p = problem_of(s, &(const char *){"ball.*"}, 1);
+    struct said said = {0};
+    struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
+    const struct imp_fit_result *r;
+    struct imp_run run = run_of(4096, 3);
+    struct imp_target t = IMP_TARGET_INIT;
+    for (int i = 0; i < 360; i++) pixels[i] = 0.8f;
+    t.width = 12, t.height = 10, t.channels = 3, t.pixels = pixels;
+    test_must(ctx, imp_problem_add_target(p, &t));
+    o.optimizer = IMP_LM;
+    o.intervals = 1;
+    run.progress = listen;
+    run.progress_payload = &said;
+    test_must(ctx, imp_fit(p, &o, &run, &r));
+    tap_ok(said.searches > 0 && said.intervals > 0 && said.stale == 0 && said.back == 0 &&
+               said.last == 1,
+           "progress of the intervals # %d reports, %d stale; %d of the search",
+           said.intervals, said.stale, said.searches);
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+}
+
 int main(void)
 {
     if (imp_context_create(NULL, &ctx) != IMP_OK) return 1;
@@ -397,6 +443,7 @@ int main(void)
     resume(IMP_LM);
     resume(IMP_LBFGS);
     threads();
+    progress();
     arguments();
     imp_context_destroy(ctx);
     return tap_done();

@@ -4,6 +4,8 @@
  * the same for any number of threads and which imp_walk_describe can show. */
 #include "imp_scene.h"
 #include "imp_tap.h"
+#include <importon/kinds.h>
+#include <math.h>
 
 static const char *const sky =
     "<scene version='3.0.0'><integrator type='path'/>"
@@ -81,8 +83,52 @@ static struct imp_film_info counted(int threads)
     return info;
 }
 
+/* Catmull-Rom's spline, of a host: the built-in filters have no negative lobes. */
+static enum imp_status lobes_build(const struct imp_build *b, void *self,
+                                   struct imp_filter *f)
+{
+    (void)b, (void)self;
+    f->radius = 2;
+    return IMP_OK;
+}
+static double lobes_eval(const struct imp_filter *f, double x)
+{
+    (void)f;
+    x = fabs(x);
+    return x < 1 ? 1 + x * x * (1.5 * x - 2.5) : 2 + x * (-4 + x * (2.5 - 0.5 * x));
+}
+static const struct imp_filter_ops lobes = {sizeof lobes, "lobes", 1, lobes_build,
+                                            lobes_eval};
+
+/* Values that a float holds, and a pixel between them that it does not: weights of both
+ * signs can add up to next to nothing. */
+static void not_finite(void)
+{
+    static const char edge[] =
+        "<scene version='3.0.0'><integrator type='direct'/><sensor type='perspective'>"
+        "<film type='hdrfilm'><integer name='width' value='48'/>"
+        "<integer name='height' value='48'/><rfilter type='lobes'/></film></sensor>"
+        "<shape type='sphere'><point name='center' x='0' y='0' z='4'/>"
+        "<emitter type='area'><float name='radiance' value='3e38'/></emitter></shape>"
+        "</scene>";
+    imp_context *ctx = test_context(2);
+    test_must(ctx, imp_register_filter(ctx, &lobes));
+    imp_scene *s = test_scene_text(ctx, edge, IMP_RGB);
+    struct imp_run run = IMP_RUN_INIT;
+    imp_film *film = NULL;
+    run.spp = 1;
+    const enum imp_status st = imp_render(s, &run, &film);
+    tap_ok(st == IMP_E_NUMERIC && !film &&
+               strstr(imp_last_error(ctx), "of the picture is not finite in channel R"),
+           "a pixel beyond float is an error # %s", imp_last_error(ctx));
+    imp_film_destroy(film);
+    imp_scene_destroy(s);
+    imp_context_destroy(ctx);
+}
+
 int main(void)
 {
+    not_finite();
     refused("1e200");
     refused("1e308");
     refused("4e38");

@@ -10,9 +10,10 @@
 #include <math.h>
 #include <unistd.h>
 
-enum job { FIT_ADAM, FIT_LM, FIT_LBFGS, CHECK, N_JOBS };
-static const char *const names[] = {"fit, Adam", "fit, LM and intervals", "fit, L-BFGS",
-                                    "check"};
+enum job { FIT_ADAM, FIT_LM, FIT_LBFGS, CHECK, FUNCTIONAL, JACOBIAN_SUMS, N_JOBS };
+static const char *const names[] = {"fit, Adam",   "fit, LM and intervals",
+                                    "fit, L-BFGS", "check",
+                                    "functional",  "sums of derivative pictures"};
 
 /* From a new context to the result; *reached: how far it got. */
 static enum imp_status run_job(enum job job, struct fail_alloc *heap, long fail_at,
@@ -51,6 +52,19 @@ static enum imp_status run_job(enum job job, struct fail_alloc *heap, long fail_
         struct imp_check_options o = IMP_CHECK_OPTIONS_INIT;
         o.paths = 10;
         st = imp_check(p, &o, &run, &rows, &n);
+    } else if (ready && job == FUNCTIONAL) {
+        struct imp_estimate value;
+        double g[6], g_se[6];
+        st = imp_problem_functional(p, pixels, &run, &value, g, g_se);
+    } else if (ready && job == JACOBIAN_SUMS) {
+        struct imp_estimate value, sums[6];
+        imp_film *primal = NULL, *films[6] = {NULL};
+        st = imp_problem_jacobian(p, &run, &primal, films);
+        if (st == IMP_OK)
+            st = imp_problem_jacobian_sums(p, pixels, &run, primal, films, NULL, 0,
+                                           &value, sums);
+        for (int k = 0; k < 6; k++) imp_film_destroy(films[k]);
+        imp_film_destroy(primal);
     } else if (ready) {
         const struct imp_fit_result *r;
         struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
@@ -60,7 +74,7 @@ static enum imp_status run_job(enum job job, struct fail_alloc *heap, long fail_
         st = imp_fit(p, &o, &run, &r);
     }
     *changed = 0;
-    if (ready && (st != IMP_OK || job == CHECK)) {
+    if (ready && (st != IMP_OK || job >= CHECK)) {
         imp_problem_get_x(p, after);
         *changed = memcmp(before, after, 3 * sizeof *before) != 0;
     }

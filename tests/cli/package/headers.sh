@@ -1,8 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-# Each public header compiles alone, as C11 and as C++, under strict warnings.
+# Each public header compiles alone, as C11 and as C++, under strict warnings, and with it every
+# initialiser: IMP_RUN_INIT is one of struct imp_run.
+n=0
 for header in importon kinds elements bend; do
     echo "#include <importon/$header.h>" >alone.c
-    echo "#include <importon/$header.h>" >alone.cc
+    for init in $(sed -nE 's/^#define (IMP_\w+_INIT)( .*|)$/\1/p' "$ROOT/include/importon/$header.h"); do
+        name=${init%_INIT}
+        echo "size_t use_${name,,}(void); size_t use_${name,,}(void) { struct ${name,,} v = $init; return v.size; }"
+        n=$((n + 1))
+    done >>alone.c
+    cp alone.c alone.cc
     for cc in gcc clang; do
         command -v $cc >/dev/null || continue
         $cc -std=c11 -Wall -Wextra -Wpedantic -Werror -I"$ROOT/include" -c alone.c -o alone.o
@@ -12,3 +19,4 @@ for header in importon kinds elements bend; do
         $cxx -std=c++11 -Wall -Wextra -Wpedantic -Werror -I"$ROOT/include" -c alone.cc -o alone.o
     done
 done
+((n >= 20)) || echo "only $n initialisers were found"
