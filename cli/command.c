@@ -55,6 +55,10 @@ const struct arg_option options_scene[] = {
      &cli.search, 0, 0, NULL},
     {ARG_CHOICE, 'm', "mode", "MODE", "colour: rgb (default) or mono", &cli.mode, 0, 0,
      mode_words},
+    {ARG_TEXT, 0, "weights", "NAME=W[,..]",
+     "densities of directions, in place of those of the scene file: kernel, emitters, "
+     "environment, proxies, guide, uniform",
+     &cli.weights, 0, 0, NULL},
     {ARG_FLAG, 0, "dump", NULL, "print the parameters and their values, and stop",
      &cli.dump, 0, 0, NULL},
     {0}};
@@ -272,6 +276,7 @@ int cli_load(const char *path)
     options.mode = cli.mode == 1 ? IMP_MONO : IMP_RGB;
     options.defines = cli.defines.item;
     options.n_defines = cli.defines.n;
+    options.weights = cli.weights;
     if (cli.search) split_search(cli.search, &search);
     options.search = search.item;
     options.n_search = search.n;

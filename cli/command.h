@@ -50,7 +50,7 @@ struct cli {
     int threads, json, progress, help, quiet, overwrite;
     /* options_scene */
     struct arg_list defines, sets;
-    const char *search;
+    const char *search, *weights;
     int mode, dump;
     /* options_run */
     int sensor, spp;

@@ -224,10 +224,13 @@ struct imp_load_options {
     size_t n_defines;
     const char *const *search; /**< [n_search] folders searched for files */
     size_t n_search;
+    /** Of scene files: the property `weights` of the integrator (of the first one in aov
+     * and moment), in place of what the file says; NULL: that. */
+    const char *weights;
 };
 #define IMP_LOAD_OPTIONS_INIT                                                            \
     {                                                                                    \
-        sizeof(struct imp_load_options), IMP_RGB, 0, 0, 0, 0                             \
+        sizeof(struct imp_load_options), IMP_RGB, 0, 0, 0, 0, 0                          \
     }
 
 /** Load a scene file (Mitsuba 3 XML). The scene is committed and ready. `options` may be

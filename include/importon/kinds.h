@@ -221,6 +221,14 @@ struct imp_bsdf_ops {
      * derived from them anew. Called once after all numbers are set, while nobody renders.
      * It cannot fail: what it needs, build has allocated. May be NULL. */
     void (*changed)(const struct imp_bsdf *b);
+
+    /* Directional albedo, the part of what arrives along wo that is not absorbed: the
+     * integral of eval over wi, delta lobes with their coefficients, without the squared
+     * index ratio of radiance. Survival of the walks of integrator photons goes by it; a
+     * bad one costs variance, never bias. False, or NULL: not known, and the weight of the
+     * direction drawn takes its place. */
+    bool (*directional_albedo)(const struct imp_bsdf *b, const imp_spec *in,
+                               const imp_v3 *wo, imp_spec *albedo);
 };
 
 /* ---- Texture ------------------------------------------------------------------- */
@@ -354,8 +362,10 @@ struct imp_round {
 enum imp_shape_flags {
     IMP_SHAPE_CONVEX = 1, /* whatever its to_world: no line meets it more than twice, and
                              nothing of it is seen from its outside but by the front */
-    IMP_SHAPE_SQUARE = 2  /* uv covers [0,1]^2 once, and its border is where u or v is
+    IMP_SHAPE_SQUARE = 2, /* uv covers [0,1]^2 once, and its border is where u or v is
                              0 or 1 */
+    IMP_SHAPE_NEAREST = 4 /* of the points on a line, sample_toward draws the nearest
+                             only; else all of them */
 };
 
 struct imp_shape_ops {

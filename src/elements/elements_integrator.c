@@ -41,5 +41,8 @@ out:
 }
 
 const struct imp_integrator_ops imp__integrator_elements = {
-    sizeof(struct imp_integrator_ops), "elements", sizeof(struct imp_elements_integrator),
-    IMP_INTEGRATOR_SOLVES, elements_build};
+    .size = sizeof(struct imp_integrator_ops),
+    .name = "elements",
+    .object_size = sizeof(struct imp_elements_integrator),
+    .flags = IMP_INTEGRATOR_SOLVES,
+    .build = elements_build};

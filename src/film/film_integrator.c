@@ -90,14 +90,29 @@ static enum imp_status moment_build(const struct imp_build *build,
     return depth_build(build, i);
 }
 
-static const struct imp_integrator_ops depth = {sizeof depth, "depth", 0,
-                                                IMP_INTEGRATOR_INNER, depth_build};
-static const struct imp_integrator_ops aov = {
-    sizeof aov, "aov", sizeof(struct imp_channels), IMP_INTEGRATOR_CONTAINS, aov_build};
-static const struct imp_integrator_ops moment = {sizeof moment, "moment",
-                                                 sizeof(struct imp_channels),
-                                                 IMP_INTEGRATOR_CONTAINS, moment_build};
+static const struct imp_integrator_ops depth = {.size = sizeof depth,
+                                                .name = "depth",
+                                                .flags = IMP_INTEGRATOR_INNER,
+                                                .build = depth_build};
+static const struct imp_integrator_ops aov = {.size = sizeof aov,
+                                              .name = "aov",
+                                              .object_size = sizeof(struct imp_channels),
+                                              .flags = IMP_INTEGRATOR_CONTAINS,
+                                              .build = aov_build};
+static const struct imp_integrator_ops moment = {.size = sizeof moment,
+                                                 .name = "moment",
+                                                 .object_size =
+                                                     sizeof(struct imp_channels),
+                                                 .flags = IMP_INTEGRATOR_CONTAINS,
+                                                 .build = moment_build};
 
 const struct imp_integrator_ops *const imp__integrator_kinds[] = {
-    &imp__integrator_path, &imp__integrator_direct,   &depth, &aov, &moment,
-    &imp__integrator_stam, &imp__integrator_elements, NULL};
+    &imp__integrator_path,
+    &imp__integrator_direct,
+    &depth,
+    &aov,
+    &moment,
+    &imp__integrator_stam,
+    &imp__integrator_photons,
+    &imp__integrator_elements,
+    NULL};

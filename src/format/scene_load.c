@@ -54,6 +54,32 @@ enum imp_status imp__scene_finish(struct imp_scene *scene)
     return st;
 }
 
+/* The integrator's property `weights`, whatever the file says. */
+static enum imp_status weights_set(struct imp_scene *scene, const char *text)
+{
+    static const struct imp_loc nowhere = {NULL, 0, 0};
+    struct imp_node *node = scene->root;
+    for (size_t i = 0; node && i < node->n_children; i++) {
+        struct imp_node *child = node->children[i].node;
+        if (!child || strcmp(child->tag, "integrator") != 0) continue;
+        node = child;
+        if (strcmp(node->type, "aov") != 0 && strcmp(node->type, "moment") != 0) break;
+        i = SIZE_MAX; /* its children, from the first */
+    }
+    if (!node || node == scene->root)
+        return imp__error(scene->ctx, IMP_E_SCENE,
+                          "weights: the scene has no integrator");
+    struct imp_prop *p = imp__node_prop(node, "weights");
+    if (!p) p = imp__node_add(&scene->arena, node, "weights", IMP_PROP_STRING, nowhere);
+    char *copy = imp__arena_strdup(&scene->arena, text);
+    if (!p || !copy)
+        return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for the scene");
+    p->type = IMP_PROP_STRING;
+    p->loc = nowhere;
+    p->string = copy;
+    return IMP_OK;
+}
+
 /* `name` of the scene file; its folder is the last that is searched. */
 static enum imp_status load(imp_context *ctx, const struct imp_bytes *text,
                             const char *name, const char *folder,
@@ -64,6 +90,7 @@ static enum imp_status load(imp_context *ctx, const struct imp_bytes *text,
     IMP_TRY(imp__scene_new(ctx, o->mode, &scene));
     IMP_TRY(imp__search_init(scene, o->search, o->n_search, folder));
     IMP_TRY(imp__xml_read(scene, text, name, o));
+    if (o->weights) IMP_TRY(weights_set(scene, o->weights));
     IMP_TRY(imp__scene_finish(scene));
     *out = scene;
     return IMP_OK;

@@ -88,12 +88,16 @@ enum imp_status imp__build_bsdf(struct imp_scene *scene, struct imp_node *node,
     for (int j = 0; j < b->n_own; j++)
         if (ops->inputs[j].flags & IMP_INPUT_INDEX) b->index_input = j;
 
+    struct imp_mixing *mixing;
     if (ops->build) IMP_TRY(ops->build(&build, self, b));
+    IMP_TRY(imp__mixing_read(&build, &mixing));
     IMP_TRY(imp__props_finish(ctx, node));
     if (ops->changed)
         IMP_TRY(imp__build_watch(scene, b->input, b->n_in, bsdf_changed, b));
     b->index = scene->n_bsdfs;
     IMP_TRY(imp__build_list_add(scene, (void ***)&scene->bsdfs, &scene->n_bsdfs, b));
+    IMP_TRY(imp__build_list_add(scene, (void ***)&scene->bsdf_mixing,
+                                &scene->n_bsdf_mixing, mixing));
     node->object = b;
     *out = b;
 out:
@@ -167,6 +171,7 @@ enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *nod
         IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "sampling_weight is negative"));
     const struct imp_build b = imp__build_make(scene, node);
     if (ops->build) IMP_TRY(ops->build(&b, self, e));
+    IMP_TRY(imp__proxies_take(scene, node, e->name));
     IMP_TRY(imp__props_finish(ctx, node));
     if (ops->changed)
         IMP_TRY(imp__build_watch(scene, e->input, e->n_in, emitter_changed, e));
@@ -183,27 +188,41 @@ out:
     return st;
 }
 
+enum imp_status imp__build_shape_bare(struct imp_scene *scene, struct imp_node *node,
+                                      const char *name, struct imp_shape **out)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = scene->ctx;
+    const void *found;
+    IMP_TRY(imp__kind_find(ctx, IMP_CONCEPT_SHAPE, node, &found));
+    const struct imp_shape_ops *ops = found;
+    struct imp_shape *s = imp__arena_array(&scene->arena, 1, sizeof *s);
+    void *self = imp__arena_array(&scene->arena, 1, ops->object_size);
+    if (!s || !self) IMP_TRY(imp__build_no_memory(scene));
+    *s = (struct imp_shape){
+        .ops = ops, .self = self, .index = -1, .bsdf = -1, .emitter = -1, .name = name};
+    /* Has a say in gradients of geometry only; there are none yet. */
+    double silhouette;
+    IMP_TRY(imp__props_float(ctx, node, "silhouette_sampling_weight", 1, &silhouette));
+    const struct imp_build b = imp__build_make(scene, node);
+    IMP_TRY(ops->build(&b, self, s));
+    IMP_TRY(imp__props_finish(ctx, node));
+    for (int k = 0; k < 3; k++)
+        if (!(s->lo[k] > -IMP_REACH_MAX && s->hi[k] < IMP_REACH_MAX))
+            IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "reaches further out than %g",
+                                    IMP_REACH_MAX));
+    *out = s;
+out:
+    return st;
+}
+
 enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
                                  const char *name)
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = scene->ctx;
-    const void *found;
-    IMP_TRY(imp__kind_find(scene->ctx, IMP_CONCEPT_SHAPE, node, &found));
-    const struct imp_shape_ops *ops = found;
-    struct imp_shape *s = imp__arena_array(&scene->arena, 1, sizeof *s);
-    void *self = imp__arena_array(&scene->arena, 1, ops->object_size);
-    if (!s || !self) IMP_TRY(imp__build_no_memory(scene));
-    *s = (struct imp_shape){.ops = ops,
-                            .self = self,
-                            .index = scene->n_shapes,
-                            .bsdf = -1,
-                            .emitter = -1,
-                            .name = name};
-    node->object = s;
-    /* Has a say in gradients of geometry only; there are none yet. */
-    double silhouette;
-    IMP_TRY(imp__props_float(ctx, node, "silhouette_sampling_weight", 1, &silhouette));
+    struct imp_shape *s;
+    IMP_TRY(imp__proxies_take(scene, node, name));
 
     struct imp_node *bsdf = NULL, *emitter = NULL, *medium = NULL;
     for (size_t i = 0; i < node->n_children; i++) {
@@ -229,13 +248,9 @@ enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
         }
         c->used = true;
     }
-    const struct imp_build b = imp__build_make(scene, node);
-    IMP_TRY(ops->build(&b, self, s));
-    IMP_TRY(imp__props_finish(ctx, node));
-    for (int k = 0; k < 3; k++)
-        if (!(s->lo[k] > -IMP_REACH_MAX && s->hi[k] < IMP_REACH_MAX))
-            IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "reaches further out than %g",
-                                    IMP_REACH_MAX));
+    IMP_TRY(imp__build_shape_bare(scene, node, name, &s));
+    s->index = scene->n_shapes;
+    node->object = s;
 
     if (!bsdf && !emitter) { /* as if <bsdf type="diffuse"/> had been written */
         bsdf = imp__node_create(&scene->arena, "bsdf", "diffuse", NULL, NULL, node->loc);

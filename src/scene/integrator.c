@@ -66,3 +66,14 @@ enum imp_status imp__integrator_build(struct imp_scene *scene, struct imp_node *
 out:
     return st;
 }
+
+enum imp_status imp__integrator_ready(struct imp_scene *scene,
+                                      const struct imp_integrator *i)
+{
+    enum imp_status st = IMP_OK;
+    for (int k = 0; k < i->n_inner; k++)
+        IMP_TRY(imp__integrator_ready(scene, &i->inner[k]));
+    if (i->ops->ready) IMP_TRY(i->ops->ready(scene, i));
+out:
+    return st;
+}

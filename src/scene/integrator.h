@@ -8,6 +8,8 @@
 
 #include "kind/build.h"
 
+struct imp_scene;
+
 enum imp_integrator_flags {
     IMP_INTEGRATOR_WALKS = 1,     /* radiance along walks; self is a struct
                                  imp_walk_integrator (walk/walk_integrator.h) */
@@ -34,6 +36,8 @@ struct imp_integrator_ops {
     unsigned flags;
     /* Read the properties, fill self and max_depth. What it contains is there. */
     enum imp_status (*build)(const struct imp_build *build, struct imp_integrator *i);
+    /* All objects of the scene are there: settle what depends on them. NULL: nothing. */
+    enum imp_status (*ready)(struct imp_scene *scene, const struct imp_integrator *i);
 };
 
 #endif

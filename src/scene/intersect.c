@@ -138,9 +138,67 @@ static void analytic_occluded(const struct RTCOccludedFunctionNArguments *args)
         ((struct RTCRay *)args->ray)->tfar = -INFINITY;
 }
 
+/* ---- all hits ------------------------------------------------------------------ */
+
+/* Those of a ray with aims, nearest first, as many as there is room for. */
+struct gather {
+    struct RTCIntersectContext context; /* first */
+    const imp_v3 *o, *d;
+    double tmin;
+    const struct imp_hit *last; /* those up to this one are known; NULL: none are */
+    struct imp_hit *hit;        /* [max] */
+    int n, max;
+};
+
+static bool later(const struct imp_hit *a, const struct imp_hit *b)
+{
+    if (a->t != b->t) return a->t > b->t;
+    return a->shape != b->shape ? a->shape > b->shape : a->prim > b->prim;
+}
+
+static void gather_add(struct gather *g, const struct imp_hit *hit)
+{
+    if (g->last && !later(hit, g->last)) return;
+    if (g->n == g->max && !later(&g->hit[g->n - 1], hit)) return;
+    int k = g->n < g->max ? g->n++ : g->n - 1;
+    for (; k > 0 && later(&g->hit[k - 1], hit); k--) g->hit[k] = g->hit[k - 1];
+    g->hit[k] = *hit;
+}
+
+static void gather_analytic(const struct RTCIntersectFunctionNArguments *args)
+{
+    const struct imp_shape *s = args->geometryUserPtr;
+    struct gather *g = (struct gather *)args->context;
+    struct imp_hit hit = {.t = g->tmin};
+    if (!args->valid[0]) return;
+    while (s->ops->intersect(s, g->o, g->d, hit.t, INFINITY, &hit)) {
+        hit.shape = (int)args->geomID;
+        gather_add(g, &hit);
+        if (s->ops->flags & IMP_SHAPE_NEAREST) break;
+    }
+}
+
+/* Of triangles: the hit is kept, and refused, so that the ray goes on. */
+static void gather_triangle(const struct RTCFilterFunctionNArguments *args)
+{
+    struct gather *g = (struct gather *)args->context;
+    if (!args->valid[0]) return;
+    /* N is 1 for rtcIntersect1 */
+    const struct RTCHit *h = (const struct RTCHit *)args->hit;
+    const struct RTCRay *r = (const struct RTCRay *)args->ray;
+    const struct imp_hit hit = {.shape = (int)h->geomID,
+                                .prim = (int)h->primID,
+                                .t = (double)r->tfar,
+                                .u = (double)h->u,
+                                .v = (double)h->v};
+    gather_add(g, &hit);
+    args->valid[0] = 0;
+}
+
 /* ---- building ------------------------------------------------------------------ */
 
-static RTCGeometry geometry_create(RTCDevice rtc, struct imp_shape *s)
+/* all: its geometries are asked for all hits of a ray, not for the nearest. */
+static RTCGeometry geometry_create(RTCDevice rtc, const struct imp_shape *s, bool all)
 {
     const bool analytic = s->geometry == IMP_ANALYTIC;
     RTCGeometry g = rtcNewGeometry(rtc, analytic ? RTC_GEOMETRY_TYPE_USER
@@ -148,9 +206,9 @@ static RTCGeometry geometry_create(RTCDevice rtc, struct imp_shape *s)
     if (!g) return NULL;
     if (analytic) {
         rtcSetGeometryUserPrimitiveCount(g, 1);
-        rtcSetGeometryUserData(g, s);
+        rtcSetGeometryUserData(g, (void *)(uintptr_t)s);
         rtcSetGeometryBoundsFunction(g, analytic_bounds, NULL);
-        rtcSetGeometryIntersectFunction(g, analytic_intersect);
+        rtcSetGeometryIntersectFunction(g, all ? gather_analytic : analytic_intersect);
         rtcSetGeometryOccludedFunction(g, analytic_occluded);
     } else {
         const struct imp_triangles *t = &s->triangles;
@@ -163,7 +221,9 @@ static RTCGeometry geometry_create(RTCDevice rtc, struct imp_shape *s)
     return g;
 }
 
-enum imp_status imp__intersector_create(struct imp_scene *scene)
+/* Of n shapes, the scene's (aims NULL) or the aims'. */
+static enum imp_status intersector_make(struct imp_scene *scene,
+                                        const struct imp_aims *aims, int n, void **out)
 {
     enum imp_status st = IMP_OK;
     RTCDevice rtc;
@@ -177,13 +237,16 @@ enum imp_status imp__intersector_create(struct imp_scene *scene)
     told = (struct commit){.error = RTC_ERROR_NONE};
     x->rtc = rtcNewScene(rtc);
     /* Robust: rays through shared edges do not fall between two triangles. */
-    if (x->rtc) rtcSetSceneFlags(x->rtc, RTC_SCENE_FLAG_ROBUST);
-    for (int i = 0; x->rtc && i < scene->n_shapes && told.error == RTC_ERROR_NONE; i++) {
-        RTCGeometry g = geometry_create(rtc, scene->shapes[i]);
+    if (x->rtc)
+        rtcSetSceneFlags(x->rtc, RTC_SCENE_FLAG_ROBUST |
+                                     (aims ? RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION : 0));
+    for (int i = 0; x->rtc && i < n && told.error == RTC_ERROR_NONE; i++) {
+        const struct imp_shape *s = aims ? aims->list[i].shape : scene->shapes[i];
+        RTCGeometry g = geometry_create(rtc, s, aims != NULL);
         if (!g) break;
         rtcAttachGeometryByID(x->rtc, g, (unsigned)i);
         rtcReleaseGeometry(g); /* the scene holds it now */
-        x->analytic |= scene->shapes[i]->geometry == IMP_ANALYTIC;
+        x->analytic |= s->geometry == IMP_ANALYTIC;
     }
     if (x->rtc && told.error == RTC_ERROR_NONE) rtcCommitScene(x->rtc);
     const enum RTCError error =
@@ -194,27 +257,45 @@ enum imp_status imp__intersector_create(struct imp_scene *scene)
         imp__release(scene->ctx, x);
         IMP_TRY(device_error(scene->ctx, error, told.message));
     }
-    scene->intersector = x;
+    *out = x;
 out:
     build_leave();
     return st;
 }
 
-void imp__intersector_destroy(struct imp_scene *scene)
+enum imp_status imp__intersector_create(struct imp_scene *scene)
 {
-    struct intersector *x = scene->intersector;
+    return intersector_make(scene, NULL, scene->n_shapes, &scene->intersector);
+}
+enum imp_status imp__aims_commit(struct imp_scene *scene)
+{
+    struct imp_aims *t = &scene->aims;
+    return intersector_make(scene, t, t->n, &t->intersector);
+}
+
+static void intersector_release(struct imp_scene *scene, void **intersector)
+{
+    struct intersector *x = *intersector;
     if (!x) return;
     build_enter();
     rtcReleaseScene(x->rtc);
     build_leave();
     imp__release(scene->ctx, x);
-    scene->intersector = NULL;
+    *intersector = NULL;
+}
+void imp__intersector_destroy(struct imp_scene *scene)
+{
+    intersector_release(scene, &scene->intersector);
+    intersector_release(scene, &scene->aims.intersector);
 }
 
+static size_t bytes_of(const struct intersector *x)
+{
+    return x && x->bytes > 0 ? (size_t)x->bytes : 0;
+}
 size_t imp__intersector_bytes(const struct imp_scene *scene)
 {
-    const struct intersector *x = scene->intersector;
-    return x && x->bytes > 0 ? (size_t)x->bytes : 0;
+    return bytes_of(scene->intersector) + bytes_of(scene->aims.intersector);
 }
 
 /* ---- queries ------------------------------------------------------------------- */
@@ -295,4 +376,26 @@ bool imp__occluded(const struct imp_scene *scene, const imp_v3 *o, const imp_v3 
     ray_fill(&r, o, d, tmin, tmax);
     rtcOccluded1(x->rtc, &q.context, &r);
     return r.tfar < 0;
+}
+
+int imp__aims_hit(const struct imp_aims *t, const imp_v3 *o, const imp_v3 *d, double tmin,
+                  const struct imp_hit *last, int max, struct imp_hit *hit)
+{
+    const struct intersector *x = t->intersector;
+    const struct imp_hit from = last ? *last : (struct imp_hit){.shape = -1};
+    struct gather g = {.o = o,
+                       .d = d,
+                       .tmin = tmin,
+                       .last = last ? &from : NULL,
+                       .hit = hit,
+                       .max = max};
+    struct RTCRayHit r;
+    if (imp_unlikely(!x || !ray_valid(o, d, tmin, INFINITY))) return 0;
+    rtcInitIntersectContext(&g.context);
+    g.context.filter = gather_triangle;
+    ray_fill(&r.ray, o, d, tmin, INFINITY);
+    r.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    r.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    rtcIntersect1(x->rtc, &g.context, &r);
+    return g.n;
 }

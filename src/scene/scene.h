@@ -7,6 +7,7 @@
 #define IMP_SCENE_H
 
 #include "access.h"
+#include "aims.h"
 #include "integrator.h"
 #include "math/vec.h"
 
@@ -94,6 +95,12 @@ struct imp_scene {
     const struct imp_integrator *integrator; /* NULL: none was written */
     int environment;                         /* emitter index, -1: none */
     double *light_cdf; /* [n_emitters] by sampling_weight, last is 1 */
+    int n_bsdf_mixing;
+    struct imp_mixing **bsdf_mixing; /* [n_bsdfs] NULL: the integrator's */
+    bool materials_mix;              /* some material has weights */
+    int n_proxies;
+    struct imp_proxy **proxies;
+    struct imp_aims aims;
 
     size_t n_params, cap_params;
     struct imp_param *params;
@@ -125,6 +132,10 @@ enum imp_status imp__scene_build(struct imp_scene *scene,
 enum imp_status imp__integrator_build(struct imp_scene *scene, struct imp_node *node,
                                       const struct imp_integrator_ops *const *kinds,
                                       struct imp_integrator *out);
+
+/* When all objects are there: of an integrator and those in it. */
+enum imp_status imp__integrator_ready(struct imp_scene *scene,
+                                      const struct imp_integrator *i);
 
 /* ---- media.c ------------------------------------------------------------------- */
 /* The medium of a shape: its numbers become parameters where it is met first. */

@@ -107,13 +107,19 @@ enum imp_status imp__scene_build(struct imp_scene *scene,
     scene->hi = -scene->lo;
     IMP_TRY(imp__build_black(scene, &scene->black_bsdf));
     scene->default_bsdf = scene->black_bsdf;
+    IMP_TRY(imp__proxies_take(scene, scene->root, ""));
     for (size_t i = 0; i < scene->root->n_children; i++)
-        IMP_TRY(top_build(scene, &scene->root->children[i], integrators, &counts));
+        if (!imp__is_proxy(&scene->root->children[i]))
+            IMP_TRY(top_build(scene, &scene->root->children[i], integrators, &counts));
     IMP_TRY(imp__props_finish(scene->ctx, scene->root));
     IMP_TRY(lights_build(scene));
+    IMP_TRY(imp__aims_build(scene));
+    IMP_TRY(imp__mixing_materials(scene));
+    if (scene->integrator) IMP_TRY(imp__integrator_ready(scene, scene->integrator));
     IMP_TRY(imp__bodies_check(scene));
     imp__theta_finish(scene);
     IMP_TRY(imp__intersector_create(scene));
+    if (scene->aims.aimed) IMP_TRY(imp__aims_aim(scene));
     scene->committed = true;
 out:
     return st;

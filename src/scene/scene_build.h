@@ -44,6 +44,9 @@ enum imp_status imp__build_black(struct imp_scene *scene, struct imp_bsdf **out)
 enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *node,
                                    const char *parent, const char *slot,
                                    struct imp_shape *shape);
+/* A shape of which nobody knows yet: neither its material nor its index are set. */
+enum imp_status imp__build_shape_bare(struct imp_scene *scene, struct imp_node *node,
+                                      const char *name, struct imp_shape **out);
 enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
                                  const char *name);
 enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node,

@@ -112,7 +112,8 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
                                   IMP_SMOOTH};
     const double kernel = b->ops->pdf(b, s->in, &dirs);
     if (!(kernel > 0)) return; /* structurally zero: nothing to see, no derivative */
-    const double pdf = imp__direction_pdf(s, b, kernel, ls.wi);
+    double pdf;
+    imp__direction_pdf(s, kernel, ls.wi, -1, IMP_SMOOTH, &pdf);
     const double p = ls.pdf * pmf;
     const bool alone =
         (e->ops->flags & IMP_EMITTER_DELTA) || !s->tracer->integrator->directions;

@@ -106,6 +106,7 @@ static struct imp_decision decided(const struct imp_decision *d)
     k.connection = d->connection;
     k.glows = d->glows;
     k.goes_on = d->goes_on;
+    k.drawn = d->goes_on ? d->drawn : 0;
     memcpy(k.uv, d->uv, sizeof k.uv);
     memcpy(k.p, d->p, sizeof k.p);
     if (d->scatterer != IMP_AT_SKY) memcpy(k.wo, d->wo, sizeof k.wo);

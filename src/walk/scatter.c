@@ -25,10 +25,29 @@ static bool throughput_add(struct imp_step *s, const struct imp_bsdf *b, imp_spe
     return !imp__is_zero_used(s->beta, four);
 }
 
+/* Of adjoint photons: min(1, H h) in the brightest lane, H the directional albedo, or the
+ * weight of the step where the kind does not know it (Morley et al. 2006, section 3). A lane
+ * that is zero but has a derivative counts as one half. */
+static double photon_survival(const struct imp_step *s, const struct imp_bsdf *b,
+                              imp_spec factor)
+{
+    const struct imp_active *active = s->tracer->active;
+    const bool four = s->at.carried != NULL;
+    imp_spec H;
+    if (!b->ops->directional_albedo || !b->ops->directional_albedo(b, s->in, &s->wo, &H))
+        H = factor;
+    double brightest = imp__max_used(H, four);
+    if (active && b->index >= 0 && active->bsdf[b->index])
+        for (int c = 0; c < 3 + four; c++)
+            if (H[c] == 0) brightest = fmax(brightest, 0.5);
+    return fmin(1, brightest * s->tracer->integrator->h);
+}
+
 /* Survival probability, as decided; false: the walk ends. Zero factors that still
  * have a derivative are left out of beta, so roulette sees the walk as if they were not
- * there (docs/estimators.md 9.1, 9.2). */
-static bool roulette(struct imp_step *s, const struct imp_bsdf *b, double *survive)
+ * there (docs/estimators.md 9.1, 9.2). factor: weight of the step, without survival. */
+static bool roulette(struct imp_step *s, const struct imp_bsdf *b, imp_spec factor,
+                     double *survive)
 {
     const struct imp_walk_integrator *integrator = s->tracer->integrator;
     const bool guided = imp_unlikely(s->guided.reference > 0);
@@ -36,9 +55,14 @@ static bool roulette(struct imp_step *s, const struct imp_bsdf *b, double *survi
         *survive = imp__decide1(1 - b->absorb);
         return true;
     }
-    if (s->depth + 1 < integrator->rr_depth && !guided) return true;
-    double q = fmin(imp__max_used(s->beta, s->at.carried) * s->eta * s->eta, 0.95);
-    if (guided) q = imp__guided_survival(s, q);
+    double q;
+    if (imp_unlikely(integrator->photons)) {
+        q = photon_survival(s, b, factor);
+    } else {
+        if (s->depth + 1 < integrator->rr_depth && !guided) return true;
+        q = fmin(imp__max_used(s->beta, s->at.carried) * s->eta * s->eta, 0.95);
+        if (guided) q = imp__guided_survival(s, q);
+    }
     *survive = imp__decide1(q);
     return imp__u01(s->walk->key, imp__dim(s->depth, IMP_DIM_SURVIVE)) < *survive;
 }
@@ -54,13 +78,16 @@ bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_sur
     struct imp_dirs dirs = {.wo = s->wo_drawn, .lobe = IMP_SMOOTH};
 
     /* The direction, its density and its value. */
-    if (!imp__direction_draw(s, b, frame, u, &dirs)) return false;
+    int drawn;
+    if (!imp__direction_draw(s, b, frame, u, &dirs, &drawn)) return false;
     const imp_v3 w = imp__to_world(frame, dirs.wi);
     dirs.wo = s->wo;
     dirs.wi = imp__decide(dirs.wi);
     const double kernel = b->ops->pdf(b, s->in, &dirs);
     if (!(kernel > 0)) return false; /* structurally zero */
-    const double pdf = imp__decide1(imp__direction_pdf(s, b, kernel, w));
+    double competing;
+    const double pdf =
+        imp__decide1(imp__direction_pdf(s, kernel, w, drawn, dirs.lobe, &competing));
     if (!(pdf > 0)) return false;
     imp_spec f;
     b->ops->eval(b, s->in, &dirs, &f);
@@ -70,12 +97,13 @@ bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_sur
     if (imp_unlikely(s->guided.guide != NULL)) s->guided.before = s->beta;
     if (!throughput_add(s, b, f * (1 / pdf))) return false;
     if (b->ops->index_ratio) s->eta *= b->ops->index_ratio(b, s->in, &dirs);
-    if (!roulette(s, b, &survive)) return false;
+    if (!roulette(s, b, f * (1 / pdf), &survive)) return false;
     s->beta *= imp__spec(1 / survive);
     imp__step_weigh(v, f, pdf, survive);
     if (s->recorded) {
         imp__store_v3(v->d.wi, dirs.wi);
         v->d.lobe = (int8_t)dirs.lobe;
+        v->d.drawn = (uint8_t)(drawn & 7);
         v->d.pdf = (imp_decided)pdf;
         v->d.survive = (imp_decided)survive;
         v->d.goes_on = true;
@@ -90,6 +118,7 @@ bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_sur
     s->t_max = INFINITY;
     if (imp_unlikely(s->segment->leave != NULL)) s->segment->leave(s, v, at);
     /* Where no connection could have been made, MIS has nothing to weigh. */
-    s->pdf = dirs.lobe == IMP_SMOOTH && s->segment->connects ? pdf : 0;
+    if (imp_likely(!s->mixed.splits)) competing = pdf;
+    s->pdf = dirs.lobe == IMP_SMOOTH && s->segment->connects ? competing : 0;
     return true;
 }

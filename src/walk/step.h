@@ -20,6 +20,21 @@ struct imp_guided {
     imp_spec before;  /* throughput on arrival */
 };
 
+/* The mixture that directions are drawn from (direction.c). */
+struct imp_mixed {
+    const struct imp_mixing *all; /* of the walk; NULL: its kernels draw */
+    bool same;                    /* for all materials, whatever weights they have */
+    /* At the vertex at work: */
+    bool here;   /* more than the kernel draws */
+    bool splits; /* one continuation from each member, with MIS */
+    bool sphere; /* the uniform member draws both sides */
+    int only; /* the member that draws, of a vertex that splits; -1: one by its share */
+    int members;
+    double share[IMP_DENSITIES];
+    double strength[2]; /* sums of lights' and proxies' strengths, seen from p */
+    imp_v3 p;
+};
+
 struct imp_step {
     const struct imp_tracer *tracer;
     const struct imp_scene *scene;
@@ -50,6 +65,7 @@ struct imp_step {
 
     struct imp_graded_state *graded; /* NULL: no graded medium in the scene */
     struct imp_guided guided;
+    struct imp_mixed mixed;
 };
 
 /* What a record stores of v, in double again. */
@@ -141,25 +157,33 @@ void imp__attached_d(const struct imp_walk *walk, const struct imp_vertex *v, in
                      imp_spec *d);
 
 /* ---- direction.c ---- */
-/* Draw the continuation, as imp_bsdf_ops.sample does, from the mixture of densities that
- * know the place. */
+/* The densities that take part at a vertex at p, of material b; with s->mixed.all set, or
+ * where a guide knows the place. */
+void imp__mixture_prepare(struct imp_step *s, const struct imp_bsdf *b, imp_v3 p);
+/* Draw the continuation, as imp_bsdf_ops.sample does, and which member drew it (enum
+ * imp_density). */
 bool imp__mixture_draw(const struct imp_step *s, const struct imp_bsdf *b,
                        const struct imp_frame *frame, const double u[3],
-                       struct imp_dirs *dirs);
-/* Density of a direction, world w, for which the BSDF alone has `kernel`. */
-double imp__mixture_pdf(const struct imp_step *s, const struct imp_bsdf *b, double kernel,
-                        imp_v3 w);
+                       struct imp_dirs *dirs, int *drawn);
+/* By what the value of direction w, world, is divided if `drawn` drew it (-1: none did);
+ * the BSDF alone has `kernel` for it. *competing: the density that a light sample competes
+ * with. */
+double imp__mixture_pdf(const struct imp_step *s, double kernel, imp_v3 w, int drawn,
+                        int lobe, double *competing);
 static inline bool imp__direction_draw(const struct imp_step *s, const struct imp_bsdf *b,
                                        const struct imp_frame *frame, const double u[3],
-                                       struct imp_dirs *dirs)
+                                       struct imp_dirs *dirs, int *drawn)
 {
-    return imp_unlikely(s->guided.here) ? imp__mixture_draw(s, b, frame, u, dirs)
-                                        : b->ops->sample(b, s->in, u, dirs);
+    *drawn = IMP_DENSITY_KERNEL;
+    return imp_unlikely(s->mixed.here) ? imp__mixture_draw(s, b, frame, u, dirs, drawn)
+                                       : b->ops->sample(b, s->in, u, dirs);
 }
-static inline double imp__direction_pdf(const struct imp_step *s,
-                                        const struct imp_bsdf *b, double kernel, imp_v3 w)
+static inline double imp__direction_pdf(const struct imp_step *s, double kernel, imp_v3 w,
+                                        int drawn, int lobe, double *competing)
 {
-    return imp_unlikely(s->guided.here) ? imp__mixture_pdf(s, b, kernel, w) : kernel;
+    return imp_unlikely(s->mixed.here)
+               ? imp__mixture_pdf(s, kernel, w, drawn, lobe, competing)
+               : (*competing = kernel);
 }
 
 /* ---- scatter.c ---- */

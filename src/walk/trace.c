@@ -50,6 +50,7 @@ static struct imp_vertex *vertex_add(struct imp_step *s, int n_in)
     d->shape = d->met.emitter = -1;
     d->connection = IMP_NOT_CONNECTED;
     d->glows = d->goes_on = false;
+    d->drawn = IMP_DENSITY_KERNEL;
     d->pdf = 0;
     d->survive = d->passes = 1;
     d->met.weight = d->glow_weight = 1;
@@ -164,6 +165,27 @@ static void share(const struct imp_step *s, struct imp_vertex *v, int n)
     if (s->recorded) v->d.passes = (imp_decided)part;
 }
 
+/* Continuations of a vertex that splits: one from each member of the mixture, with weights
+ * of MIS in the densities; or as many as the tracer wants, each with its share. */
+static int branches(const struct imp_step *s)
+{
+    return s->mixed.splits ? s->mixed.members : s->tracer->split;
+}
+static bool branch_scatter(struct imp_step *s, struct imp_vertex *v, int i,
+                           const struct imp_surface *at, const struct imp_frame *frame)
+{
+    if (s->mixed.splits) { /* the i-th member that has a share */
+        int k = 0;
+        for (;; k++)
+            if (s->mixed.share[k] > 0 && i-- == 0) break;
+        s->mixed.only = k;
+        return imp__scatter(s, v, at, frame);
+    }
+    if (!imp__scatter(s, v, at, frame)) return false;
+    share(s, v, s->tracer->split);
+    return true;
+}
+
 /* Further continuations of v hang on it as side walks. `before`: the walk before its own
  * continuation was drawn. */
 static __attribute__((noinline)) void split(const struct imp_step *before,
@@ -172,7 +194,7 @@ static __attribute__((noinline)) void split(const struct imp_step *before,
                                             const struct imp_frame *frame)
 {
     struct imp_walk *walk = before->walk;
-    const int n = before->tracer->split;
+    const int n = branches(before);
     for (int i = 1; i < n && !walk->dropped; i++) {
         struct imp_step s = *before;
         struct imp_side *side = imp__arena_take(s.arena, 1, sizeof *side);
@@ -208,8 +230,7 @@ static __attribute__((noinline)) void split(const struct imp_step *before,
         imp_spec *in = s.recorded ? u->in : s.scratch;
         imp__evaluate_inputs(u->bsdf, u->shape, &s.at, in);
         s.in = in;
-        if (imp__scatter(&s, u, at, frame)) {
-            share(&s, u, n);
+        if (branch_scatter(&s, u, i, at, frame)) {
             s.depth++;
             walk_on(&s);
         }
@@ -226,10 +247,17 @@ static __attribute__((noinline)) bool scatter_split(struct imp_step *s,
                                                     const struct imp_frame *frame)
 {
     const struct imp_step before = *s;
-    const bool continues = imp__scatter(s, v, at, frame);
-    if (continues) share(s, v, s->tracer->split);
+    const bool continues = branch_scatter(s, v, 0, at, frame);
     split(&before, v, at, frame);
     return continues;
+}
+
+/* The densities at the vertex that was met, and whether it splits. */
+static __attribute__((noinline)) void
+mixture_meet(struct imp_step *s, const struct imp_bsdf *b, const struct imp_surface *at)
+{
+    imp__mixture_prepare(s, b, at->p);
+    s->mixed.splits = s->mixed.here && s->depth < s->tracer->integrator->split;
 }
 
 /* From the ray in flight to the next one; false: the walk ends. */
@@ -250,6 +278,9 @@ static inline __attribute__((always_inline)) bool step(struct imp_step *s)
     struct imp_vertex *v = surface_meet(s, &hit, &at, &frame);
     if (!v) return false;
     if (imp_unlikely(s->guided.guide != NULL)) imp__guided_arrive(s, &hit, &at);
+    if (imp_unlikely(s->mixed.all != NULL || s->guided.here))
+        mixture_meet(s, v->bsdf, &at);
+    else s->mixed.here = s->mixed.splits = false;
 
     /* Stam's walk collects emission only where it is absorbed. */
     double emits = 1;
@@ -270,7 +301,8 @@ static inline __attribute__((always_inline)) bool step(struct imp_step *s)
 
     /* The continuation. */
     const bool splits =
-        imp_unlikely(s->tracer->split > 1) && s->depth == 0 && s->scene->n_bodies == 0;
+        imp_unlikely(s->mixed.splits) ||
+        (imp_unlikely(s->tracer->split > 1) && s->depth == 0 && s->scene->n_bodies == 0);
     const bool continues =
         integrator->directions &&
         (splits ? scatter_split(s, v, &at, &frame) : imp__scatter(s, v, &at, &frame));
@@ -364,6 +396,10 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
                          .eta = 1,
                          .lanes = IMP_LANE_MIS_INIT,
                          .guided.guide = tracer->guide};
+    s.mixed.same = tracer->mixing != NULL;
+    s.mixed.all = tracer->mixing              ? tracer->mixing
+                  : tracer->integrator->mixes ? tracer->integrator->mixing
+                                              : NULL;
     if (imp_likely(s.segment->begin == NULL) || s.segment->begin(&s)) walk_on(&s);
 
     imp__walk_close(tracer, walk);

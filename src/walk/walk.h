@@ -65,6 +65,7 @@ struct imp_decision {
     uint8_t connection;       /* enum imp_connection: what became of the light sample */
     bool glows : 1;           /* the BSDF's own emission counts */
     bool goes_on : 1;         /* the walk continues */
+    uint8_t drawn : 3;        /* enum imp_density that drew the continuation */
     imp_decided uv[2], p[3];  /* the place; at the sky p is the direction */
     imp_decided wo[3], wi[3]; /* of the continuation, shading frame */
     imp_decided pdf, survive; /* p, s of the continuation */
@@ -172,6 +173,8 @@ struct imp_tracer {
     bool value_only;                   /* a walk's L is wanted, and no record of it */
     const struct imp_carried *carried; /* wavelengths of the walks; NULL: the colours of
                                           the scene */
+    const struct imp_mixing *mixing;   /* densities in place of the integrator's and the
+                                        materials'; NULL: those */
     int split; /* continuations of the first vertex, each with its share; 0: one. Scenes
                   with graded media have one */
 };

@@ -17,7 +17,11 @@ uint64_t imp__walk_integrator_hash(const struct imp_walk_integrator *i)
     const int number[] = {i->max_depth, i->rr_depth,   i->hide_emitters,
                           i->lights,    i->directions, i->guided,
                           i->absorbs,   i->first_hit,  (int)i->alpha_gradient};
-    return imp__hash(0, number, sizeof number);
+    uint64_t h = imp__hash(0, number, sizeof number);
+    if (!i->mixes && !i->photons) return h;
+    const double other[] = {i->photons ? i->h : 0, i->split};
+    h = imp__hash(h, other, sizeof other);
+    return imp__hash(h, i->mixing->weight, sizeof i->mixing->weight);
 }
 
 /* ---- Kinds ----------------------------------------------------------------------- */
@@ -37,6 +41,54 @@ out:
     return st;
 }
 
+/* Weights of the densities of directions, and how many vertices draw from each of them:
+ * walks then become trees of up to IMP_DENSITIES^split branches. */
+#define SPLIT_MAX 6
+static enum imp_status mixture_read(const struct imp_build *build,
+                                    struct imp_walk_integrator *w)
+{
+    enum imp_status st = IMP_OK;
+    int64_t split;
+    IMP_TRY(imp__mixing_read(build, &w->mixing));
+    IMP_TRY(imp__props_int(build->ctx, build->node, "split", 0, 0, SPLIT_MAX, &split));
+    w->split = (int)split;
+out:
+    return st;
+}
+
+/* If nobody wrote weights: path draws from kernels, and towards proxies, which are there to
+ * be aimed at; photons, which no connection helps, towards lights as well. */
+static enum imp_status mixture_ready(struct imp_scene *scene,
+                                     const struct imp_integrator *i)
+{
+    struct imp_walk_integrator *w = i->self;
+    if (!w->mixing) {
+        w->mixing = imp__arena_array(&scene->arena, 1, sizeof *w->mixing);
+        if (!w->mixing)
+            return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for the scene");
+        double *weight = w->mixing->weight;
+        const bool varied =
+            scene->environment >= 0 &&
+            !(scene->emitters[scene->environment]->ops->flags & IMP_EMITTER_UNIFORM);
+        weight[IMP_DENSITY_KERNEL] = 1;
+        weight[IMP_DENSITY_GUIDE] = -1;
+        weight[IMP_DENSITY_PROXIES] = imp__mixing_possible(scene, IMP_DENSITY_PROXIES);
+        if (w->photons) {
+            weight[IMP_DENSITY_EMITTERS] =
+                imp__mixing_possible(scene, IMP_DENSITY_EMITTERS);
+            weight[IMP_DENSITY_ENVIRONMENT] = varied;
+        }
+    }
+    const enum imp_status st = imp__mixing_settle(scene, w->mixing);
+    w->mixes = scene->materials_mix || imp__mixing_mixes(w->mixing);
+    if (st == IMP_OK && w->split > 0 && scene->n_bodies > 0)
+        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                          "integrator %s: walks through media do not split; set 'split' "
+                          "to 0",
+                          i->ops->name);
+    return st;
+}
+
 static enum imp_status path_build(const struct imp_build *build, struct imp_integrator *i)
 {
     struct imp_walk_integrator *w = i->self;
@@ -45,6 +97,7 @@ static enum imp_status path_build(const struct imp_build *build, struct imp_inte
     *w = (struct imp_walk_integrator){.lights = true, .directions = true, .guided = true};
     IMP_TRY(imp__props_int(build->ctx, build->node, "rr_depth", 5, 1, INT32_MAX, &rr));
     IMP_TRY(depth_read(build, -1, i, w));
+    IMP_TRY(mixture_read(build, w));
     w->rr_depth = (int)rr;
 out:
     return st;
@@ -99,12 +152,61 @@ out:
     return st;
 }
 
+/* Adjoint photons (Morley et al. 2006): light is met or not, and no vertex is connected to
+ * it. */
+static enum imp_status photons_build(const struct imp_build *build,
+                                     struct imp_integrator *i)
+{
+    struct imp_walk_integrator *w = i->self;
+    enum imp_status st = IMP_OK;
+    *w = (struct imp_walk_integrator){
+        .rr_depth = 5, .directions = true, .guided = true, .photons = true};
+    IMP_TRY(depth_read(build, -1, i, w));
+    IMP_TRY(imp__props_float(build->ctx, build->node, "h", 1, &w->h));
+    if (!(w->h > 0))
+        IMP_TRY(imp__node_error(build->ctx, build->node, IMP_E_SCENE,
+                                "h = %g is not positive", w->h));
+    IMP_TRY(mixture_read(build, w));
+out:
+    return st;
+}
+
+static enum imp_status photons_ready(struct imp_scene *scene,
+                                     const struct imp_integrator *i)
+{
+    for (int e = 0; e < scene->n_emitters; e++)
+        if (scene->emitters[e]->ops->flags & IMP_EMITTER_DELTA)
+            return imp__error(
+                scene->ctx, IMP_E_UNSUPPORTED,
+                "integrator photons: light '%s' (%s) has no surface, and no "
+                "photon can meet it; use path, or a light with a shape",
+                scene->emitters[e]->name, scene->emitters[e]->ops->name);
+    return mixture_ready(scene, i);
+}
+
 const struct imp_integrator_ops imp__integrator_path = {
-    sizeof(struct imp_integrator_ops), "path", sizeof(struct imp_walk_integrator),
-    IMP_INTEGRATOR_WALKS | IMP_INTEGRATOR_INNER, path_build};
+    .size = sizeof(struct imp_integrator_ops),
+    .name = "path",
+    .object_size = sizeof(struct imp_walk_integrator),
+    .flags = IMP_INTEGRATOR_WALKS | IMP_INTEGRATOR_INNER,
+    .build = path_build,
+    .ready = mixture_ready};
 const struct imp_integrator_ops imp__integrator_direct = {
-    sizeof(struct imp_integrator_ops), "direct", sizeof(struct imp_walk_integrator),
-    IMP_INTEGRATOR_WALKS | IMP_INTEGRATOR_INNER, direct_build};
+    .size = sizeof(struct imp_integrator_ops),
+    .name = "direct",
+    .object_size = sizeof(struct imp_walk_integrator),
+    .flags = IMP_INTEGRATOR_WALKS | IMP_INTEGRATOR_INNER,
+    .build = direct_build};
 const struct imp_integrator_ops imp__integrator_stam = {
-    sizeof(struct imp_integrator_ops), "stam", sizeof(struct imp_walk_integrator),
-    IMP_INTEGRATOR_WALKS | IMP_INTEGRATOR_INNER | IMP_INTEGRATOR_NO_FIELDS, stam_build};
+    .size = sizeof(struct imp_integrator_ops),
+    .name = "stam",
+    .object_size = sizeof(struct imp_walk_integrator),
+    .flags = IMP_INTEGRATOR_WALKS | IMP_INTEGRATOR_INNER | IMP_INTEGRATOR_NO_FIELDS,
+    .build = stam_build};
+const struct imp_integrator_ops imp__integrator_photons = {
+    .size = sizeof(struct imp_integrator_ops),
+    .name = "photons",
+    .object_size = sizeof(struct imp_walk_integrator),
+    .flags = IMP_INTEGRATOR_WALKS | IMP_INTEGRATOR_INNER,
+    .build = photons_build,
+    .ready = photons_ready};

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Integrators of radiance along walks: path, direct and stam are settings of one engine.
+ * Integrators of radiance along walks: path, direct, stam and photons are settings of one
+ * engine.
  * Another one is a table here and a line in film/film_integrator.c. */
 #ifndef IMP_WALK_INTEGRATOR_H
 #define IMP_WALK_INTEGRATOR_H
@@ -22,10 +23,18 @@ struct imp_walk_integrator {
     bool first_hit;  /* alpha is 1 where the first ray meets a surface, and hide_emitters
                         hides lights from that ray alone (docs/scene-format.md 11) */
     enum imp_stam_alpha alpha_gradient;
+    bool photons; /* survival min(1, H h) at every vertex, with H the directional albedo
+                     or, of a kind that does not know it, the weight of the direction
+                     drawn: in place of Russian roulette */
+    double h;
+    /* Densities of directions (direction.c). */
+    struct imp_mixing *mixing; /* weights */
+    bool mixes;                /* some vertex may draw from more than its kernel */
+    int split;                 /* so many vertices of a walk draw from each density */
 };
 
 extern const struct imp_integrator_ops imp__integrator_path, imp__integrator_direct,
-    imp__integrator_stam;
+    imp__integrator_stam, imp__integrator_photons;
 
 /* NULL: not one of walks. */
 static inline const struct imp_walk_integrator *

@@ -56,6 +56,14 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     df[K] *= in[TINT];
 }
 
+static bool directional_albedo(const struct imp_bsdf *b, const imp_spec *in,
+                               const imp_v3 *wo, imp_spec *rho)
+{
+    const struct imp_dirs d = {.wo = *wo, .lobe = 0};
+    eval(b, in, &d, rho);
+    return true;
+}
+
 const struct imp_bsdf_ops imp__conductor = {.size = sizeof(struct imp_bsdf_ops),
                                             .name = "conductor",
                                             .inputs = inputs,
@@ -64,4 +72,5 @@ const struct imp_bsdf_ops imp__conductor = {.size = sizeof(struct imp_bsdf_ops),
                                             .sample = sample,
                                             .eval = eval,
                                             .pdf = pdf,
-                                            .eval_d = eval_d};
+                                            .eval_d = eval_d,
+                                            .directional_albedo = directional_albedo};

@@ -101,6 +101,18 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     df[TINT_T] = imp__spec(d->lobe == REFRACT ? c : 0);
 }
 
+static bool directional_albedo(const struct imp_bsdf *b, const imp_spec *in,
+                               const imp_v3 *wo, imp_spec *rho)
+{
+    double cos_t, eta_t;
+    (void)b;
+    *rho = imp__spec(0);
+    if ((*wo)[2] == 0) return true;
+    const double F = imp__fresnel_dielectric((*wo)[2], in[ETA][0], &cos_t, &eta_t);
+    *rho = in[TINT_R] * F + in[TINT_T] * (1 - F);
+    return true;
+}
+
 const struct imp_bsdf_ops imp__dielectric = {.size = sizeof(struct imp_bsdf_ops),
                                              .name = "dielectric",
                                              .inputs = inputs,
@@ -110,4 +122,5 @@ const struct imp_bsdf_ops imp__dielectric = {.size = sizeof(struct imp_bsdf_ops)
                                              .eval = eval,
                                              .pdf = pdf,
                                              .index_ratio = index_ratio,
-                                             .eval_d = eval_d};
+                                             .eval_d = eval_d,
+                                             .directional_albedo = directional_albedo};

@@ -44,6 +44,14 @@ static void albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *w
     *rho = in[RHO];
 }
 
+static bool directional_albedo(const struct imp_bsdf *b, const imp_spec *in,
+                               const imp_v3 *wo, imp_spec *rho)
+{
+    (void)b;
+    *rho = (*wo)[2] > 0 ? in[RHO] : imp__spec(0);
+    return true;
+}
+
 const struct imp_bsdf_ops imp__diffuse = {.size = sizeof(struct imp_bsdf_ops),
                                           .name = "diffuse",
                                           .inputs = inputs,
@@ -51,4 +59,5 @@ const struct imp_bsdf_ops imp__diffuse = {.size = sizeof(struct imp_bsdf_ops),
                                           .eval = eval,
                                           .pdf = pdf,
                                           .eval_d = eval_d,
-                                          .albedo = albedo};
+                                          .albedo = albedo,
+                                          .directional_albedo = directional_albedo};

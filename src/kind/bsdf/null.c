@@ -43,6 +43,14 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     (void)b, (void)in, (void)d, (void)df; /* it has no inputs */
 }
 
+static bool directional_albedo(const struct imp_bsdf *b, const imp_spec *in,
+                               const imp_v3 *wo, imp_spec *rho)
+{
+    (void)b, (void)in, (void)wo;
+    *rho = imp__spec(1);
+    return true;
+}
+
 const struct imp_bsdf_ops imp__null = {.size = sizeof(struct imp_bsdf_ops),
                                        .name = "null",
                                        .inputs = inputs,
@@ -50,4 +58,5 @@ const struct imp_bsdf_ops imp__null = {.size = sizeof(struct imp_bsdf_ops),
                                        .sample = sample,
                                        .eval = eval,
                                        .pdf = pdf,
-                                       .eval_d = eval_d};
+                                       .eval_d = eval_d,
+                                       .directional_albedo = directional_albedo};

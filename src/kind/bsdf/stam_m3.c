@@ -45,6 +45,13 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     df[AMBIENT] = imp__spec(0);
     df[DIFFUSE] = imp__spec(imp__lambert(d));
 }
+static bool directional_albedo(const struct imp_bsdf *b, const imp_spec *in,
+                               const imp_v3 *wo, imp_spec *rho)
+{
+    (void)b;
+    *rho = (*wo)[2] > 0 ? in[DIFFUSE] : imp__spec(0);
+    return true;
+}
 const struct imp_bsdf_ops imp__stam_m3 = {.size = sizeof(struct imp_bsdf_ops),
                                           .name = "stam_m3",
                                           .inputs = inputs,
@@ -54,4 +61,5 @@ const struct imp_bsdf_ops imp__stam_m3 = {.size = sizeof(struct imp_bsdf_ops),
                                           .pdf = pdf,
                                           .eval_d = eval_d,
                                           .emit = imp__stam_emit,
-                                          .emit_d = imp__stam_emit_d};
+                                          .emit_d = imp__stam_emit_d,
+                                          .directional_albedo = directional_albedo};

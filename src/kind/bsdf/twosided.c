@@ -120,6 +120,17 @@ static void albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *w
     imp__bsdf_albedo(c, in + first, &w, rho);
 }
 
+static bool directional_albedo(const struct imp_bsdf *b, const imp_spec *in,
+                               const imp_v3 *wo, imp_spec *rho)
+{
+    bool back;
+    int first;
+    const struct imp_bsdf *c = side(b, wo, &back, &first);
+    const imp_v3 w = flip(*wo, back);
+    return c->ops->directional_albedo &&
+           c->ops->directional_albedo(c, in + first, &w, rho);
+}
+
 static const struct imp_input_desc inputs[] = {{0}};
 
 const struct imp_bsdf_ops imp__twosided = {.size = sizeof(struct imp_bsdf_ops),
@@ -136,4 +147,5 @@ const struct imp_bsdf_ops imp__twosided = {.size = sizeof(struct imp_bsdf_ops),
                                            .emit = emit,
                                            .emit_d = emit_d,
                                            .sample_d = sample_d,
-                                           .albedo = albedo};
+                                           .albedo = albedo,
+                                           .directional_albedo = directional_albedo};

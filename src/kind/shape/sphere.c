@@ -155,7 +155,7 @@ static void round_of(const struct imp_shape *s, struct imp_round *out)
 
 const struct imp_shape_ops imp__sphere = {.size = sizeof(struct imp_shape_ops),
                                           .name = "sphere",
-                                          .flags = IMP_SHAPE_CONVEX,
+                                          .flags = IMP_SHAPE_CONVEX | IMP_SHAPE_NEAREST,
                                           .object_size = sizeof(struct sphere),
                                           .build = build,
                                           .intersect = intersect,
