@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Context, errors and memory. Error texts are kept per thread through a pthread key of
- * the context. A call whose context is not known (an object is NULL) leaves a short text
+ * the context, until the thread or the context ends. A call whose context is not known (an object is NULL) leaves a short text
  * that belongs to the thread. */
 #include "arguments.h"
 #include "pool.h"
@@ -17,6 +17,7 @@
 #define BEING_SET_UP (-1L) /* no process has this number */
 
 struct imp__error_text {
+    imp_context *ctx;
     struct imp__error_text *next;
     char text[ERROR_LENGTH];
 };
@@ -82,6 +83,24 @@ const char *imp_status_text(enum imp_status status)
 
 const char *imp_version(void) { return IMP_VERSION_STRING; }
 
+/* Said where there is no memory for a text of its own. */
+static const struct imp__error_text no_memory = {NULL, NULL, "out of memory"};
+
+/* A thread ends before the context: hosts may make a thread for every call. */
+static void error_forget(void *text)
+{
+    struct imp__error_text *e = text;
+    if (e == &no_memory) return;
+    imp_context *ctx = e->ctx;
+    imp__context_own(ctx);
+    pthread_mutex_lock(&ctx->lock);
+    struct imp__error_text **at = &ctx->errors;
+    while (*at && *at != e) at = &(*at)->next;
+    if (*at) *at = e->next;
+    pthread_mutex_unlock(&ctx->lock);
+    imp__release(ctx, e);
+}
+
 enum imp_status imp_context_create(const struct imp_context_options *options,
                                    imp_context **out)
 {
@@ -107,7 +126,7 @@ enum imp_status imp_context_create(const struct imp_context_options *options,
     ctx->log_payload = o.log_payload;
     ctx->threads = o.threads ? o.threads : (int)sysconf(_SC_NPROCESSORS_ONLN);
     if (ctx->threads < 1) ctx->threads = 1;
-    if (pthread_key_create(&ctx->error_key, NULL) != 0) {
+    if (pthread_key_create(&ctx->error_key, error_forget) != 0) {
         a.release(ctx, a.payload);
         return imp__error(NULL, IMP_E_NOMEM, "%s: no key for the errors of threads",
                           __func__);
@@ -173,14 +192,12 @@ const char *imp_last_error(const imp_context *ctx)
     return e ? e->text : "";
 }
 
-/* Said where there is no memory for a text of its own. */
-static const struct imp__error_text no_memory = {NULL, "out of memory"};
-
 static struct imp__error_text *error_text(imp_context *ctx)
 {
     struct imp__error_text *e = pthread_getspecific(ctx->error_key);
     if (e && e != &no_memory) return e;
     e = imp__alloc(ctx, 1, sizeof *e);
+    if (e) e->ctx = ctx;
     if (!e) {
         pthread_setspecific(ctx->error_key, &no_memory);
         return NULL;

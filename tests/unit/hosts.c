@@ -303,6 +303,58 @@ static void shared(void)
     imp_context_destroy(ctx);
 }
 
+/* ---- Threads that end -------------------------------------------------------------- */
+
+static atomic_int blocks;
+static void *counted_allocate(size_t bytes, void *payload)
+{
+    (void)payload;
+    void *p = NULL;
+    if (posix_memalign(&p, 64, bytes) != 0) return NULL;
+    atomic_fetch_add(&blocks, 1);
+    return p;
+}
+static void counted_release(void *memory, void *payload)
+{
+    (void)payload;
+    atomic_fetch_sub(&blocks, 1);
+    free(memory);
+}
+static void *fails(void *payload)
+{
+    imp_film *film;
+    imp_context *ctx = payload;
+    const bool said = imp_film_read(ctx, "/none/x.exr", &film) != IMP_OK &&
+                      strstr(imp_last_error(ctx), "/none/x.exr");
+    return said ? payload : NULL;
+}
+
+/* A host may make a thread for every call: the message of one that has ended is released.
+ */
+static void short_lived(void)
+{
+    imp_context *ctx = NULL;
+    struct imp_context_options o = IMP_CONTEXT_OPTIONS_INIT;
+    bool fine = true;
+    int before = 0;
+    o.threads = 1;
+    o.allocator = (struct imp_allocator){counted_allocate, counted_release, NULL};
+    if (imp_context_create(&o, &ctx) != IMP_OK) return;
+    fails(ctx);
+    for (int i = 0; i < 50 && fine; i++) {
+        pthread_t thread;
+        void *said = NULL;
+        if (i == 1) before = atomic_load(&blocks);
+        fine = pthread_create(&thread, NULL, fails, ctx) == 0 &&
+               pthread_join(thread, &said) == 0 && said == ctx;
+    }
+    tap_ok(fine && atomic_load(&blocks) == before,
+           "messages of threads that have ended # %d blocks, %d before",
+           atomic_load(&blocks), before);
+    imp_context_destroy(ctx);
+    tap_ok(atomic_load(&blocks) == 0, "and nothing is left of the context");
+}
+
 struct inner {
     imp_scene *scene;
     enum imp_status set;
@@ -443,6 +495,7 @@ int main(void)
     forks(right);
     order();
     shared();
+    short_lived();
     callbacks();
     theta();
     return tap_done();
