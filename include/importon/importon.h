@@ -260,7 +260,7 @@ imp_scene_create(imp_context *context, const struct imp_load_options *options,
 IMP_API void imp_scene_destroy(imp_scene *scene);
 
 /** Open an object, and close the one opened last. `id` and `name` may be NULL; `name` is
- * the slot under the parent. The calls in between set properties of the open object, in
+ * the slot under the parent. tag NULL: what objects of this type are ("diffuse": "bsdf"). The calls in between set properties of the open object, in
  * the units of the file format (degrees, scene units). */
 IMP_API void imp_scene_begin(imp_scene *scene, const char *tag, const char *type,
                              const char *id, const char *name);
@@ -271,7 +271,8 @@ IMP_API void imp_scene_float(imp_scene *scene, const char *name, double value);
 IMP_API void imp_scene_string(imp_scene *scene, const char *name, const char *value);
 IMP_API void imp_scene_vector(imp_scene *scene, const char *name, const double value[3]);
 IMP_API void imp_scene_rgb(imp_scene *scene, const char *name, const double value[3]);
-/** A spectrum by samples: n >= 2 strictly increasing wavelengths in nm. */
+/** A spectrum by samples: n >= 2 strictly increasing wavelengths in nm; or, with n == 1
+ * and wavelengths_nm NULL, the same value at all of them. */
 IMP_API void imp_scene_spectrum(imp_scene *scene, const char *name, size_t n,
                                 const double *wavelengths_nm, const double *values);
 /** Local-to-world matrix, row-major. */
@@ -748,6 +749,9 @@ struct imp_fit_result {
     double shift; /**< where a bias is left: how far four times the samples would move
                        an answer, in standard errors, at most; NaN: no bias, or no
                        intervals */
+    /** [n][n] of the variables, measurement and Monte Carlo together, in the directions
+     * that the pictures determine and no bound holds. NULL: no intervals. */
+    const double *covariance;
 };
 
 /** Fit the active parameters to the targets; the scene ends at the best estimate.

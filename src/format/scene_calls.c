@@ -85,9 +85,8 @@ static enum imp_status begin(struct imp_scene *scene, const char *tag, const cha
 {
     imp_context *ctx = scene->ctx;
     struct imp_node *node;
-    if (!tag || !type)
-        return imp__error(ctx, IMP_E_ARG, "imp_scene_begin: %s is NULL",
-                          tag ? "type" : "tag");
+    if (!type) return imp__error(ctx, IMP_E_ARG, "imp_scene_begin: type is NULL");
+    if (!tag) IMP_CHECKED(imp__tag_of_type(ctx, type, &tag));
     if (!imp__is_object_tag(tag) || strcmp(tag, "scene") == 0)
         return imp__error(ctx, IMP_E_ARG, "scene: '%s' of type '%s' is no object", tag,
                           type);
@@ -216,6 +215,10 @@ static enum imp_status spectrum(struct imp_scene *scene, struct imp_prop *p, siz
 void imp_scene_spectrum(imp_scene *scene, const char *name, size_t n,
                         const double *wavelengths_nm, const double *values)
 {
+    if (n == 1 && !wavelengths_nm) {
+        numbers(scene, name, IMP_PROP_UNIFORM, values, 1);
+        return;
+    }
     struct imp_prop *p = prop(scene, name, IMP_PROP_SPECTRUM);
     if (p) keep(scene, spectrum(scene, p, n, wavelengths_nm, values));
 }

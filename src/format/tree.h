@@ -29,6 +29,9 @@ enum imp_status imp__loc_error(imp_context *ctx, struct imp_loc loc,
     IMP_PRINTF(4, 5);
 
 bool imp__is_object_tag(const char *tag);
+/* type_tags.c: what an object of this type is ("diffuse": "bsdf"), for dictionaries, which
+ * name types alone. @return IMP_E_UNSUPPORTED, with the nearest type, if there is none. */
+enum imp_status imp__tag_of_type(imp_context *ctx, const char *type, const char **tag);
 /* A new object under `parent`; parent NULL: the root of the scene. */
 enum imp_status imp__tree_open(struct imp_tree *t, struct imp_node *parent,
                                const char *tag, const char *type, const char *id,

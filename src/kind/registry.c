@@ -58,6 +58,24 @@ const void *imp__kind_at(const imp_context *ctx, enum imp_concept concept, size_
     return NULL;
 }
 
+const char *imp__kind_tag(const imp_context *ctx, const char *type,
+                          struct imp_nearest *near)
+{
+    static const char *const tags[] = {
+        [IMP_CONCEPT_BSDF] = "bsdf",     [IMP_CONCEPT_TEXTURE] = "texture",
+        [IMP_CONCEPT_SHAPE] = "shape",   [IMP_CONCEPT_EMITTER] = "emitter",
+        [IMP_CONCEPT_SENSOR] = "sensor", [IMP_CONCEPT_FILTER] = "rfilter"};
+    for (size_t c = 0; c < imp_count(tags); c++) {
+        const void *at;
+        for (size_t i = 0; (at = imp__kind_at(ctx, (enum imp_concept)c, i)); i++) {
+            const char *name = head_of(at).name;
+            if (strcmp(name, type) == 0) return tags[c];
+            if (near) imp__nearest_try(near, name);
+        }
+    }
+    return NULL;
+}
+
 enum imp_status imp__kind_choose(imp_context *ctx, const struct imp_node *node,
                                  const void *(*at)(const void *payload, size_t i),
                                  const void *payload, const void **ops)

@@ -5,6 +5,7 @@
 #ifndef IMP_KIND_REGISTRY_H
 #define IMP_KIND_REGISTRY_H
 
+#include "base/nearest.h"
 #include "build.h"
 
 enum imp_concept {
@@ -18,6 +19,10 @@ enum imp_concept {
 
 /* Table i of a concept (struct imp_bsdf_ops, ...); NULL after the last. */
 const void *imp__kind_at(const imp_context *ctx, enum imp_concept concept, size_t i);
+/* The tag of the first concept that has a kind of this type ("bsdf", ..., "rfilter");
+ * NULL: none has. `near` (may be NULL) is shown every type. */
+const char *imp__kind_tag(const imp_context *ctx, const char *type,
+                          struct imp_nearest *near);
 /* The first kind of the node's type among those that `at` gives (NULL after the last; all
  * tables begin with size, name and object_size), or IMP_E_UNSUPPORTED with their list. */
 enum imp_status imp__kind_choose(imp_context *ctx, const struct imp_node *node,

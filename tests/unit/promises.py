@@ -164,7 +164,7 @@ NULLABLE = {"options", "run", "stats", "id", "objective", "gradient_se", "primal
             "axis", "hessian", "taps", "tap_bars", "tap_dots", "power", "bundle", "exit", "targets",
             "error", "order", "param", "element", "memory",
             "imp_context_set_team.team", "imp_context_set_parts.parts",
-            "imp_scene_begin.name", "imp_scene_ref.name", "imp_scene_load_string.name",
+            "imp_scene_begin.name", "imp_scene_begin.tag", "imp_scene_ref.name", "imp_scene_load_string.name",
             "imp_bend_load_string.name", "imp_problem_variable.lo", "imp_problem_variable.hi",
             "imp_problem_objective.x", "imp_problem_objective.gradient",
             "imp_problem_functional.adjoint", "imp_problem_functional.value",

@@ -75,6 +75,25 @@ static void build(imp_scene *s)
     imp_scene_end(s);
 }
 
+/* The same by types alone, and a spectrum that is one value. */
+static void build_by_types(imp_scene *s, bool by_types, const char *xml, imp_scene **file)
+{
+    const double value = 0.25;
+    imp_scene_begin(s, by_types ? NULL : "sensor", "perspective", NULL, NULL);
+    imp_scene_begin(s, by_types ? NULL : "film", "hdrfilm", NULL, NULL);
+    imp_scene_begin(s, by_types ? NULL : "rfilter", "box", NULL, NULL);
+    imp_scene_end(s);
+    imp_scene_end(s);
+    imp_scene_end(s);
+    imp_scene_begin(s, by_types ? NULL : "integrator", "path", NULL, NULL);
+    imp_scene_end(s);
+    imp_scene_begin(s, by_types ? NULL : "emitter", "constant", "sky", NULL);
+    imp_scene_spectrum(s, "radiance", 1, NULL, &value);
+    imp_scene_end(s);
+    if (imp_scene_load_string(ctx, xml, strlen(xml), NULL, NULL, file) != IMP_OK)
+        printf("# %s\n", imp_last_error(ctx));
+}
+
 static bool same_theta(const imp_scene *a, const imp_scene *b)
 {
     if (imp_scene_n_params(a) != imp_scene_n_params(b) || imp_scene_n_params(a) == 0)
@@ -128,6 +147,39 @@ static void check_same(void)
     imp_scene_destroy(a);
     imp_scene_destroy(b);
     imp_scene_destroy(NULL);
+}
+
+static void check_types(void)
+{
+    static const char xml[] =
+        "<scene version='3.0.0'><sensor type='perspective'><film type='hdrfilm'>"
+        "<rfilter type='box'/></film></sensor><integrator type='path'/>"
+        "<emitter type='constant' id='sky'><spectrum name='radiance' value='0.25'/>"
+        "</emitter></scene>";
+    for (int by_types = 0; by_types < 2; by_types++) {
+        imp_scene *s = NULL, *file = NULL;
+        if (imp_scene_create(ctx, NULL, &s) != IMP_OK) return;
+        build_by_types(s, by_types, xml, &file);
+        const enum imp_status st = imp_scene_commit(s);
+        tap_ok(st == IMP_OK && file && same_theta(s, file), "%s, one value # %s",
+               by_types ? "types without tags" : "tags and types",
+               st ? imp_last_error(ctx) : "");
+        imp_scene_destroy(s);
+        imp_scene_destroy(file);
+    }
+    static const char *const unknown[][2] = {{"spere", "did you mean 'sphere'?"},
+                                             {"hdrfilmm", "did you mean 'hdrfilm'?"},
+                                             {"prbb", "did you mean 'prb'?"},
+                                             {"zzzzzzzz", "no plugin 'zzzzzzzz'"}};
+    for (size_t i = 0; i < sizeof unknown / sizeof *unknown; i++) {
+        imp_scene *s = NULL;
+        if (imp_scene_create(ctx, NULL, &s) != IMP_OK) return;
+        imp_scene_begin(s, NULL, unknown[i][0], NULL, NULL);
+        tap_ok(imp_scene_commit(s) == IMP_E_UNSUPPORTED &&
+                   strstr(imp_last_error(ctx), unknown[i][1]),
+               "no such type # %s", imp_last_error(ctx));
+        imp_scene_destroy(s);
+    }
 }
 
 /* ---- Building calls that fail ---------------------------------------------------------
@@ -403,6 +455,7 @@ int main(void)
     o.threads = 1;
     if (imp_context_create(&o, &ctx) != IMP_OK || !mkdtemp(folder)) return 1;
     check_same();
+    check_types();
     check_faults();
     check_files();
     check_memory();
