@@ -131,6 +131,20 @@ void imp__fit_answer_free(struct imp_problem *p)
     imp__arena_free(&p->fit_arena);
 }
 
+/* Of both sources of error together, in the result's memory. */
+static enum imp_status
+covariance_give(struct imp__fit *f, const struct imp__uncertainty *u, const double **out)
+{
+    const size_t nn = u->n * u->n;
+    if (!nn) return IMP_OK;
+    double *sum = imp__arena_array(&f->problem->fit_arena, nn, sizeof *sum);
+    if (!sum)
+        return imp__error(f->problem->ctx, IMP_E_NOMEM, "no memory for a covariance");
+    for (size_t i = 0; i < nn; i++) sum[i] = u->measurement[i] + u->monte_carlo[i];
+    *out = sum;
+    return IMP_OK;
+}
+
 enum imp_status imp__fit_answer(struct imp__fit *f, struct imp__search *s,
                                 struct imp_estimate objective,
                                 const struct imp__uncertainty *u,
@@ -148,6 +162,8 @@ enum imp_status imp__fit_answer(struct imp__fit *f, struct imp__search *s,
     if (!r || !history)
         return imp__error(f->problem->ctx, IMP_E_NOMEM,
                           "no memory for the result of a fit");
+    const double *covariance = NULL;
+    IMP_CHECKED(covariance_give(f, u, &covariance));
     *answer = (struct imp__fit_answer){.search = s};
     const enum imp_status st = blocks_make(f, start);
     if (st != IMP_OK) {
@@ -189,7 +205,8 @@ enum imp_status imp__fit_answer(struct imp__fit *f, struct imp__search *s,
         .residual = left.relative,
         .residual_hi = left.relative_hi,
         .chi2 = left.chi2,
-        .chi2_se = left.chi2_se};
+        .chi2_se = left.chi2_se,
+        .covariance = covariance};
     answer->n = n;
     answer->rows = rows;
     if (rows) answer->search = NULL; /* all is said */

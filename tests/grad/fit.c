@@ -132,6 +132,24 @@ static void ball(void)
     imp_scene_destroy(s);
 }
 
+/* The covariance holds the standard errors of what no bound holds, and correlations. */
+static void covariance_check(const struct imp_fit_result *r, const char *what)
+{
+    int good = r->covariance != NULL;
+    size_t free = 0;
+    for (size_t k = 0; good && k < r->n; k++)
+        for (size_t l = 0; l < r->n; l++) {
+            const double c = r->covariance[k * r->n + l];
+            const struct imp_fit_variable *a = &r->variables[k], *b = &r->variables[l];
+            if (a->at_bound || b->at_bound || !a->determined || !b->determined) continue;
+            good &= fabs(c - r->covariance[l * r->n + k]) <= 1e-9 * a->se * b->se;
+            good &= fabs(c) <= a->se * b->se * (1 + 1e-9);
+            if (k == l) good &= fabs(sqrt(c) - a->se) <= 1e-12 * a->se;
+            free += k == l;
+        }
+    tap_ok(good && free > 0, "%s: covariance of %zu numbers", what, free);
+}
+
 /* Both lamps of the box from one picture, colour by colour; the wall whose colour is seen
  * by the other sensor alone, from two. */
 static void box(enum imp_optimizer kind)
@@ -167,6 +185,7 @@ static void box(enum imp_optimizer kind)
         "%d iterations: %s",
         optimizer[kind], 100 * worst, worst_z, r ? r->condition : 0,
         r ? r->iterations : 0, st == IMP_OK ? r->reason : imp_last_error(ctx));
+    if (st == IMP_OK) covariance_check(r, optimizer[kind]);
     imp_problem_destroy(p);
     for (int k = 0; k < 2; k++) imp_film_destroy(film[k]);
     imp_scene_destroy(s);
