@@ -3,6 +3,7 @@
  * Definition and expansion of $name in scene files, with limits on what nested
  * defaults may expand to. */
 #include "params.h"
+#include "base/nearest.h"
 #include <string.h>
 
 /* A parameter made of two others doubles with every <default>: bound what may come of it.
@@ -144,9 +145,15 @@ enum imp_status imp__params_expand(struct imp_params *p, struct imp_arena *scrat
     return st;
 }
 
-const char *imp__params_unused(const struct imp_params *p)
+const char *imp__params_unused(const struct imp_params *p, const char **meant)
 {
-    for (size_t i = 0; i < p->n; i++)
-        if (p->at[i].given && !p->at[i].used) return p->at[i].name;
+    for (size_t i = 0; i < p->n; i++) {
+        if (!p->at[i].given || p->at[i].used) continue;
+        struct imp_nearest near = imp__nearest(p->at[i].name);
+        for (size_t k = 0; k < p->n; k++)
+            if (!p->at[k].given) imp__nearest_try(&near, p->at[k].name);
+        *meant = near.best;
+        return p->at[i].name;
+    }
     return NULL;
 }

@@ -32,7 +32,8 @@ enum imp_status imp__params_default(struct imp_params *p, const char *name,
  * `scratch`. The message has no location. */
 enum imp_status imp__params_expand(struct imp_params *p, struct imp_arena *scratch,
                                    const char *text, const char **out);
-/* A parameter of the caller that nothing used, or NULL. */
-const char *imp__params_unused(const struct imp_params *p);
+/* A parameter of the caller that nothing used, or NULL; `meant` is the nearest name that
+ * the file gives a default, or NULL. */
+const char *imp__params_unused(const struct imp_params *p, const char **meant);
 
 #endif

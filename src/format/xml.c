@@ -220,11 +220,12 @@ enum imp_status imp__xml_read(struct imp_scene *scene, const struct imp_bytes *t
     IMP_TRY(imp__params_init(&r.params, scene->ctx, options ? options->defines : NULL,
                              options ? options->n_defines : 0));
     IMP_TRY(file_read(&r, NULL, text, name, NULL, NULL));
-    const char *unused = imp__params_unused(&r.params);
+    const char *meant, *unused = imp__params_unused(&r.params, &meant);
     if (unused)
         IMP_TRY(imp__loc_error(r.ctx, r.tree.root->loc, IMP_E_SCENE,
-                               "parameter '%s' was given, but nothing uses $%s", unused,
-                               unused));
+                               "parameter '%s' was given, but nothing uses $%s%s%s%s",
+                               unused, unused, meant ? "; did you mean '" : "",
+                               meant ? meant : "", meant ? "'?" : ""));
     IMP_TRY(imp__tree_resolve(&r.tree));
     scene->root = r.tree.root;
 out:
