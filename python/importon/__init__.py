@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Adjoint and differentiable light transport.
+
+A scene is loaded (`load_file`, `load_string`, `load_dict`), its parameters are seen and set
+(`traverse`), pictures and derivatives are made from it (`render`, `render_forward`,
+`render_backward`, `jacobian`, `loss`), and its parameters are fitted to pictures (`fit`).
+Every number has its standard error. Names are Mitsuba 3's where both have the thing.
+
+`importon.torch` and `importon.jax` put pictures and losses into those frameworks,
+`importon.bend` traces rays in graded indices, `importon.elements` solves by finite elements.
+
+Examples
+--------
+>>> import importon as im
+>>> scene = im.load_dict(im.cornell_box(res=8))
+>>> picture = im.render(scene, spp=4)
+>>> picture.shape
+(8, 8, 3)
+"""
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from ._c import VERSION as __version__
+from ._dictionary import cornell_box, load_dict
+from ._fit import Fit, FitVariable, fit
+from ._library import (ArgumentError, BiasError, Cancelled, Error, FileError, ImportonWarning, NumericError,
+                       OutOfMemoryError, ParameterError, PathsError, Progress, SceneError, UnsupportedError,
+                       library_path, set_threads, threads)
+from ._params import Gradient, ParameterInfo, SceneParameters, Values, traverse
+from ._picture import Picture, read, write
+from ._progress import set_progress
+from ._render import (Check, CheckRow, Comparison, Jacobian, Loss, check, compare, jacobian, loss, render,
+                      render_backward, render_forward)
+from ._scene import Scene, Sensor, load_file, load_string, set_variant, variant
+from ._transform import ScalarTransform4f, Transform4f
+
+if TYPE_CHECKING:
+    from . import ad
+
+__all__ = [
+    "ArgumentError", "BiasError", "Cancelled", "Check", "CheckRow", "Color3f", "Comparison", "Error",
+    "FileError", "Fit", "FitVariable", "Gradient", "ImportonWarning", "Jacobian", "Loss", "NumericError",
+    "OutOfMemoryError", "ParameterError", "ParameterInfo", "PathsError", "Picture", "Progress",
+    "ScalarTransform4f", "Scene", "SceneError", "SceneParameters", "Sensor", "Transform4f", "UnsupportedError",
+    "Values", "__version__", "ad", "check", "compare", "cornell_box", "fit", "jacobian",
+    "library_path", "load_dict", "load_file", "load_string", "loss", "read", "render",
+    "render_backward", "render_forward", "set_progress", "set_threads", "set_variant", "threads",
+    "traverse", "variant", "write",
+]
+
+for _name in __all__:  # errors and objects are known by the name that users import
+    _object = globals().get(_name)
+    if getattr(_object, "__module__", "").startswith("importon."):
+        _object.__module__ = "importon"
+del _name, _object
+
+
+def Color3f(*values: Any) -> Any:
+    """Three numbers, as Mitsuba's type of this name: an array [3].
+
+    Examples
+    --------
+    >>> importon.Color3f(0.01, 0.2, 0.9)
+    array([0.01, 0.2 , 0.9 ])
+    """
+    import numpy as np
+    v = np.asarray(values[0] if len(values) == 1 else values, dtype=np.float64)
+    return np.array(np.broadcast_to(v, (3,)))
+
+
+# Names that Mitsuba has, and what does the same here.
+_ELSEWHERE = {
+    "Bitmap": "importon.read and importon.write read and write pictures",
+    "load_integrator": "the scene's own integrator is used",
+    "util": "importon.write writes pictures",
+    "xml": "load_dict takes a dictionary, load_string a text",
+    "TensorXf": "arrays are NumPy's", "Float": "numbers are Python's",
+    "Properties": "load_dict takes a dictionary",
+    "integrator": "render, render_forward and render_backward take a scene",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name == "ad":
+        return importlib.import_module("." + name, __name__)
+    hint = ": " + _ELSEWHERE[name] if name in _ELSEWHERE else ""
+    raise AttributeError("module 'importon' has no attribute '%s'%s" % (name, hint))
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

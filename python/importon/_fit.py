@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Fits: parameters back from pictures."""
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping
+from typing import Any, NamedTuple, Optional
+
+import numpy as np
+
+from . import _c
+from ._array import copy_doubles
+from ._library import choice, failure, integer, lib, make, run, text
+from ._params import Values
+from ._render import Problem, _run
+from ._scene import Scene
+
+
+class FitVariable(NamedTuple):
+    """A fitted parameter; every field has the parameter's shape.
+
+    `se` is one standard error, of measurement and Monte Carlo together; `interval` is the
+    95 % interval, NaN where the picture does not determine the number; `at_bound` is -1
+    at the lower bound, 1 at the upper."""
+
+    value: Any
+    se: Any
+    interval: tuple[Any, Any]
+    start: Any
+    at_bound: Any
+    determined: Any
+
+
+class Fit(Values):
+    """A fit's answer: name -> `FitVariable`.
+
+    Attributes
+    ----------
+    iterations : int
+    loss, loss_se : float
+        At the answer.
+    history, history_se : ndarray
+        Loss of each iteration.
+    covariance : ndarray or None
+        [n][n] of all numbers (`names` lists them), measurement and Monte Carlo together,
+        in the directions that the pictures determine and no bound holds.
+    condition : float
+        Of the scaled J^T J; 0: not computed.
+    chi2, chi2_se : float
+        Per degree of freedom; NaN where the targets' noise is not known.
+    residual, residual_hi : float
+        Of the targets, our own noise taken off; and two standard errors higher.
+    shift : float
+        How far four times the samples would move an answer, in standard errors, where the
+        loss leaves a bias; else NaN.
+    reason, warning : str
+    """
+
+    def __init__(self, scene: Scene, values: dict[str, Any], result: Any, names: list[str]) -> None:
+        super().__init__(scene, values)
+        decode = lambda b: (b or b"").decode(errors="replace")
+        self.iterations: int = result.iterations
+        self.loss: float = result.objective.value
+        self.loss_se: float = result.objective.se
+        self.bias_order: int = result.objective.bias_order
+        self.history = copy_doubles(result.history, (result.n_history,))
+        self.history_se = copy_doubles(result.history_se, (result.n_history,))
+        self.covariance = copy_doubles(result.covariance, (result.n, result.n))
+        self.names = names
+        self.condition: float = result.condition
+        self.chi2: float = result.chi2
+        self.chi2_se: float = result.chi2_se
+        self.residual: float = result.residual
+        self.residual_hi: float = result.residual_hi
+        self.shift: float = result.shift
+        self.reason: str = decode(result.reason)
+        self.warning: str = decode(result.warning)
+
+    def __repr__(self) -> str:
+        lines = ["%d iterations, loss %.4g +- %.2g: %s" % (self.iterations, self.loss, self.loss_se, self.reason)]
+        for name, v in self.items():
+            flat = [np.atleast_1d(x).ravel() for x in (v.value, v.se, *v.interval)]
+            if flat[0].size > 12:
+                lines.append("%-32s %d numbers in %.4g .. %.4g" % (name, flat[0].size, flat[0].min(), flat[0].max()))
+                continue
+            for k, (x, se, lo, hi) in enumerate(zip(*flat)):
+                label = "%s[%d]" % (name, k) if flat[0].size > 1 else name
+                lines.append("%-32s %10.6g +- %-9.2g [%.6g, %.6g]" % (label, x, se, lo, hi))
+        if self.warning:
+            lines.append("warning: " + self.warning)
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        from ._html import fit
+        return fit(self)
+
+
+def variables(result: Any, blocks: Any, start: Any, value: Any) -> dict[str, FitVariable]:
+    """imp_fit_variables [n] by parameter. Of more than 1024 there are no rows, and no
+    errors either."""
+    if result.variables:
+        rows = (_c.imp_fit_variable * result.n).from_address(result.variables)
+        column = {f: np.array([getattr(r, f) for r in rows]) for f, _ in _c.imp_fit_variable._fields_}
+    else:
+        lo, hi = (np.concatenate([np.full(i.count, b) for i, b in pairs]) for pairs in (
+            [(i, i.lo) for i, _ in blocks], [(i, i.hi) for i, _ in blocks]))
+        unknown = np.full(len(value), np.nan)
+        column = {"start": start, "value": value, "se": unknown, "lo95": unknown, "hi95": unknown,
+                  "at_bound": (value >= hi).astype(int) - (value <= lo), "determined": np.ones(len(value))}
+    made = {}
+    for info, at in blocks:
+        part = {f: c[at].reshape(info.shape)[()] for f, c in column.items()}
+        made[info.name] = FitVariable(part["value"], part["se"], (part["lo95"], part["hi95"]), part["start"],
+                                      part["at_bound"], part["determined"] != 0)
+    return made
+
+
+def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam", max_iterations: int = 0,
+        learning_rate: float = 0, tolerance: float = 0, intervals: bool = True, checkpoint: Any = None,
+        resume: bool = False, spp: int = 0, seed: int = 0, sensor: Any = 0, loss: str = "l2", epsilon: float = 0,
+        weights: Any = None, noise_se: Any = None, tikhonov: Optional[Mapping[str, float]] = None,
+        stay: Optional[Mapping[str, float]] = None, smooth: Optional[Mapping[str, float]] = None,
+        time_limit: float = 0, drop_budget: float = 0, guide: Any = None, progress: Any = None) -> Fit:
+    """Fit parameters to target pictures; the scene ends at the best estimate.
+
+    Parameters
+    ----------
+    scene : Scene
+    target : array, Picture, path; list, or dictionary by sensor
+        As `loss`'s. The standard errors of a `Picture` are its noise.
+    params : SceneParameters, names or patterns
+        The active parameters; None: all that have a gradient.
+    optimizer : str
+        "adam", "lm" (at most 256 numbers), "lbfgs", "mma" or "slsqp".
+    max_iterations : int
+        0: 200 (adam), 30 (others).
+    learning_rate : float
+        Of adam, as a part of each variable's scale; 0: 0.05.
+    tolerance : float
+        Stop when relative steps stay below; 0: 1e-4.
+    intervals : bool
+        Estimate covariance and 95 % intervals at the end.
+    checkpoint : path, optional
+        Rewritten every few seconds; `resume` continues from it.
+    spp, seed, sensor, loss, epsilon, weights, tikhonov, stay, smooth, drop_budget, guide
+        As `loss`'s; `spp` is that of each iteration.
+    noise_se : array, optional
+        [height][width][channels]: one standard error of the target's noise; default: that
+        of the target, else estimated from what is left over.
+    time_limit : float
+        In seconds; 0: none.
+    progress : bool or callable, optional
+        See `set_progress`.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    Cancelled
+        By the callback; `result` is the state reached, which the scene has.
+    ArgumentError
+        Nothing is active, an option is out of its range, or the checkpoint is another fit's.
+
+    Examples
+    --------
+    >>> scene = importon.load_dict(importon.cornell_box(res=16))
+    >>> target = importon.render(scene, spp=256, seed=1)
+    >>> params = importon.traverse(scene)
+    >>> params.keep("red.*")
+    >>> truth = params["red.reflectance"]
+    >>> params["red.reflectance"] = 0.5
+    >>> fit = importon.fit(scene, target, params, optimizer="lm", spp=64)
+    >>> bool(np.all(abs(fit["red.reflectance"].value - truth) < 5 * fit["red.reflectance"].se))
+    True
+    """
+    with Problem(scene, params) as p:
+        options = _run(p.scene, seed=seed, spp=spp, time_limit=time_limit, drop_budget=drop_budget, guide=guide)
+        p.add_targets(target, sensor=sensor, weights=weights, loss=loss, epsilon=epsilon, noise_se=noise_se)
+        p.add_regularisers(tikhonov, stay, smooth)
+        path = text(checkpoint, "checkpoint") if checkpoint is not None else None
+        wanted = make(_c.imp_fit_options, optimizer=choice("imp_optimizer", optimizer, "optimizer"),
+                      max_iterations=integer(max_iterations, "max_iterations"), learning_rate=float(learning_rate),
+                      tolerance=float(tolerance), intervals=bool(intervals), checkpoint=path, resume=bool(resume))
+        out, start = ctypes.c_void_p(), p.x()
+        status, message = run(p.context, options, progress, lib.imp_fit, p.pointer, ctypes.byref(wanted),
+                              ctypes.byref(options), ctypes.byref(out))
+        answer = None
+        if out.value and status in (_c.IMP_OK, _c.IMP_CANCELLED):
+            result = _c.imp_fit_result.from_address(out.value)
+            names = [info.name + ("[%d]" % k if info.count > 1 else "") for info, _ in p.blocks
+                     for k in range(info.count)] if p.n <= 1024 else []
+            answer = Fit(p.scene, variables(result, p.blocks, start, p.x()), result, names)
+        if status == _c.IMP_CANCELLED and answer and answer.reason == "time limit reached":
+            return answer
+        if status:
+            raise failure(status, message, answer)
+        assert answer is not None
+        return answer

@@ -1,0 +1,238 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures: NumPy arrays with their standard errors beside them."""
+from __future__ import annotations
+
+import ctypes
+import os
+from collections.abc import Sequence
+from typing import Any, Optional
+
+import numpy as np
+
+from . import _c
+from ._array import numbers, view
+from ._library import ArgumentError, Context, Handle, context, lib, make, text, warn_said, word
+
+
+class Picture(np.ndarray):  # type: ignore[type-arg]
+    """A picture: float32 [height][width][channels], linear, row 0 at the top.
+
+    It is an array over the library's memory, which lives as long as the array does, whatever
+    happens to the scene. What is computed from it is a plain array; a part of it keeps its
+    part of `se`.
+
+    Attributes
+    ----------
+    se : ndarray or None
+        One standard error of each number, in the same shape; None: not known.
+    channels : tuple of str
+        Names of the channels, as in EXR files.
+    spp : int
+        Samples per pixel.
+    dropped : dict
+        How many walks were dropped (their value counts as 0), by cause.
+    signed : bool
+        A derivative: shown in blue and red.
+
+    Examples
+    --------
+    >>> scene = importon.load_dict(importon.cornell_box(res=8, spp=4))
+    >>> picture = importon.render(scene)
+    >>> picture.shape, picture.se.shape, picture.channels
+    ((8, 8, 3), (8, 8, 3), ('R', 'G', 'B'))
+    >>> picture[..., 0].se.shape
+    (8, 8)
+    """
+
+    se: Any
+    channels: tuple[str, ...]
+    spp: int
+    dropped: dict[str, int]
+    signed: bool
+    _film: Optional[Handle]
+
+    def __array_finalize__(self, source: Any) -> None:
+        self.se = None
+        self.channels = ()
+        self.spp = getattr(source, "spp", 0)
+        self.dropped = getattr(source, "dropped", {})
+        self.signed = getattr(source, "signed", False)
+        self._film = None
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, out: Any = None, **kw: Any) -> Any:
+        plain = [np.asarray(x) if isinstance(x, Picture) else x for x in inputs]
+        if out is not None:
+            kw["out"] = tuple(np.asarray(x) if isinstance(x, Picture) else x for x in out)
+        made = getattr(ufunc, method)(*plain, **kw)
+        return made if out is None else out[0] if len(out) == 1 else out
+
+    def __array_function__(self, func: Any, types: Any, args: Any, kwargs: Any) -> Any:
+        def plain(x: Any) -> Any:
+            if isinstance(x, Picture):
+                return x.view(np.ndarray)
+            if type(x) in (list, tuple):
+                return type(x)(plain(y) for y in x)
+            return x
+
+        return func(*plain(args), **{k: plain(v) for k, v in kwargs.items()})
+
+    def __getitem__(self, key: Any) -> Any:
+        part = super().__getitem__(key)
+        if isinstance(part, Picture) and self.se is not None:
+            part.se = self.se[key]
+            if part.ndim == 3 and part.shape[2] == len(self.channels):
+                part.channels = self.channels
+        return part
+
+    def __reduce__(self) -> Any:
+        state = (self.se, self.channels, self.spp, self.dropped, self.signed)
+        return _rebuild, (np.array(self.view(np.ndarray)), state)
+
+    def write(self, path: Any, **options: Any) -> None:
+        """`importon.write` of this picture."""
+        write(path, self, **options)
+
+    def _repr_png_(self) -> Optional[bytes]:
+        if self.ndim not in (2, 3) or not self.size:
+            return None
+        return png(self)
+
+    def _repr_html_(self) -> Optional[str]:
+        from ._html import picture
+        return picture(self)
+
+
+def _rebuild(array: Any, state: Any) -> Picture:
+    made = array.view(Picture)
+    made.se, made.channels, made.spp, made.dropped, made.signed = state
+    return made
+
+
+def from_film(pointer: Optional[int], signed: bool = False) -> Picture:
+    """The picture of a film, which it now owns."""
+    film = Handle(pointer or 0, lib.imp_film_destroy)
+    info = make(_c.imp_film_info)
+    lib.imp_film_get_info(film.pointer, ctypes.byref(info))
+    shape = (info.height, info.width, info.channels)
+    made: Picture = view(film, lib.imp_film_mean(film.pointer), shape).view(Picture)
+    se = lib.imp_film_se(film.pointer)
+    made.se = view(film, se, shape) if se else None
+    made.channels = tuple(lib.imp_film_channel(film.pointer, c).decode() for c in range(info.channels))
+    made.spp = info.spp
+    counted = {word("imp_drop", c): int(n) for c, n in enumerate(info.dropped_by_cause) if n}
+    made.dropped = counted or ({"unknown": int(info.dropped)} if info.dropped else {})
+    made.signed = signed
+    made._film = film
+    return made
+
+
+def _default_channels(n: int) -> tuple[str, ...]:
+    known = {1: ("Y",), 2: ("Y", "A"), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
+    return known.get(n) or tuple("c%d" % i for i in range(n))
+
+
+def to_film(picture: Any, ctx: Optional[Context] = None, name: str = "picture",
+            channels: Optional[Sequence[str]] = None) -> Handle:
+    """A film with these numbers: the picture's own, or a copy."""
+    if isinstance(picture, Picture) and picture._film is not None and channels is None:
+        return picture._film
+    pixels = numbers(picture, name, np.float32)
+    if pixels.ndim == 2:
+        pixels = pixels[..., None]
+    if pixels.ndim != 3 or not pixels.size:
+        raise ArgumentError("%s has shape %s: a picture is (height, width) or (height, width, channels)"
+                            % (name, pixels.shape))
+    names = tuple(channels or getattr(picture, "channels", ()) or _default_channels(pixels.shape[2]))
+    if len(names) != pixels.shape[2]:
+        raise ArgumentError("%s has %d channels, and %d names" % (name, pixels.shape[2], len(names)))
+    ctx = ctx or context()
+    out = ctypes.c_void_p()
+    ctx.check(lib.imp_film_create(ctx.pointer, pixels.shape[1], pixels.shape[0],
+                                  text(",".join(names), "channels"), ctypes.byref(out)))
+    film = Handle(out.value or 0, lib.imp_film_destroy)
+    view(film, lib.imp_film_mean(film.pointer), pixels.shape)[...] = pixels
+    return film
+
+
+def read(path: Any) -> Picture:
+    """Read a picture.
+
+    Parameters
+    ----------
+    path : str or PathLike
+        .exr, .pfm, .hdr, .npy, .png or .jpg; files of 8 and 16 bits are taken to be sRGB
+        and made linear.
+
+    Returns
+    -------
+    Picture
+        float32 [height][width][channels], with `se` where the file has standard errors.
+
+    Raises
+    ------
+    FileError
+        It cannot be read.
+    SceneError
+        It is no such file, or damaged.
+
+    Examples
+    --------
+    >>> importon.write("grey.exr", np.full((2, 3, 3), 0.5))
+    >>> importon.read("grey.exr").shape
+    (2, 3, 3)
+    """
+    ctx = context()
+    out = ctypes.c_void_p()
+    ctx.check(lib.imp_film_read(ctx.pointer, text(path, "path"), ctypes.byref(out)))
+    warn_said()
+    return from_film(out.value)
+
+
+def write(path: Any, picture: Any, *, half: bool = False, standard_error: bool = True,
+          exposure: float = 0, diverging: Optional[bool] = None, range: float = 0) -> None:
+    """Write a picture by extension: .exr, .pfm, .hdr, .png (sRGB), .npy.
+
+    The file appears whole or not at all, in the place of an older one.
+
+    Parameters
+    ----------
+    path : str or PathLike
+    picture : Picture or array
+        (height, width) or (height, width, channels).
+    half : bool
+        16-bit floats (EXR).
+    standard_error : bool
+        With channels se.R, se.G ... (EXR), if the picture has standard errors.
+    exposure : float
+        In stops (PNG).
+    diverging : bool or None
+        Of a signed picture: blue, white, red (PNG). None: of derivatives.
+    range : float
+        The value drawn in full red; 0: the 99.5 percentile.
+
+    Raises
+    ------
+    ArgumentError
+        Another extension, or channels that do not go together.
+    FileError
+        The file cannot be written.
+
+    Examples
+    --------
+    >>> importon.write("grey.png", np.full((2, 3, 3), 0.5))
+    """
+    film = to_film(picture)
+    signed = getattr(picture, "signed", False) if diverging is None else diverging
+    options = make(_c.imp_write_options, half=bool(half), exposure=float(exposure), diverging=bool(signed),
+                   range=float(range), standard_error=bool(standard_error and getattr(picture, "se", None) is not None))
+    context().check(lib.imp_film_write(film.pointer, text(path, "path"), ctypes.byref(options)))
+
+
+def png(picture: Any) -> bytes:
+    """The picture as a PNG file in memory."""
+    import tempfile  # late: it takes as long to load as the rest of the package
+    with tempfile.TemporaryDirectory(prefix="importon") as folder:
+        path = os.path.join(folder, "picture.png")
+        write(path, picture, standard_error=False)
+        with open(path, "rb") as file:
+            return file.read()

@@ -1,0 +1,278 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scenes: loaded from files, strings and dictionaries."""
+from __future__ import annotations
+
+import ctypes
+import threading
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Optional
+
+from . import _c
+from ._library import (ArgumentError, Handle, choice, context, lib, make, not_inside, register_lock,
+                       text, warn_said, word)
+
+_mode = "rgb"
+
+
+def set_variant(*names: str) -> None:
+    """What scenes loaded from now on compute with, by Mitsuba's names.
+
+    Parameters
+    ----------
+    *names : str
+        The first that there is, as in Mitsuba: its word for colours counts ("llvm_ad_rgb":
+        "rgb", "scalar_mono": "mono").
+
+    Examples
+    --------
+    >>> importon.set_variant("llvm_ad_mono")
+    >>> importon.variant()
+    'mono'
+    >>> importon.set_variant("scalar_rgb")
+    """
+    global _mode
+    for name in names:
+        for part in name.split("_"):
+            if part in _c.WORDS["imp_color_mode"]:
+                _mode = part
+                return
+    raise ArgumentError("there is no variant %s; one names a colour mode: %s" % (
+        " or ".join(map(repr, names)), ", ".join(_c.WORDS["imp_color_mode"])))
+
+
+def variant() -> str:
+    """The colour mode of scenes loaded now.
+
+    Examples
+    --------
+    >>> importon.variant()
+    'rgb'
+    """
+    return _mode
+
+
+class Sensor(NamedTuple):
+    """A sensor of a scene: what `struct imp_sensor_info` has."""
+
+    name: str
+    type: str
+    width: int
+    height: int
+    spp: int
+    filter: str
+    filter_radius: float
+    file_format: str
+
+
+class Scene:
+    """A scene, ready to render. Made by `load_file`, `load_string` and `load_dict`.
+
+    Calls from several threads are made one after the other. `close`, or the end of a `with`
+    block, frees its memory; pictures made from it stay.
+
+    Attributes
+    ----------
+    mode : str
+        "rgb", "mono", ...
+    channels : int
+        Of pictures.
+    integrator : str
+    max_depth : int
+        -1: unlimited.
+    n_shapes, n_emitters, n_bsdfs, n_textures, n_triangles, memory_bytes : int
+    bounds : tuple
+        Lowest and highest corner, in scene units.
+    sensors : tuple of Sensor
+
+    Examples
+    --------
+    >>> with importon.load_dict(importon.cornell_box(res=8)) as scene:
+    ...     scene.n_emitters, scene.sensors[0].width
+    (1, 8)
+    """
+
+    def __init__(self, handle: Handle, ctx: Any, name: str) -> None:
+        self._handle, self._context, self.name = handle, ctx, name
+        self.lock = threading.RLock()
+        register_lock(self)
+        info = make(_c.imp_scene_info)
+        lib.imp_scene_get_info(handle.pointer, ctypes.byref(info))
+        self.mode = word("imp_color_mode", info.mode)
+        self.channels: int = info.channels
+        self.integrator: str = (info.integrator or b"").decode()
+        self.max_depth: int = info.max_depth
+        self.n_shapes: int = info.n_shapes
+        self.n_emitters: int = info.n_emitters
+        self.n_bsdfs: int = info.n_bsdfs
+        self.n_textures: int = info.n_textures
+        self.n_triangles: int = info.n_triangles
+        self.memory_bytes: int = info.memory_bytes
+        self.bounds = (tuple(info.bounds_min), tuple(info.bounds_max))
+        self.sensors = tuple(self._sensor(i) for i in range(info.n_sensors))
+        self._table: Any = None
+
+    def _sensor(self, index: int) -> Sensor:
+        s = make(_c.imp_sensor_info)
+        self._context.check(lib.imp_scene_get_sensor(self._handle.pointer, index, ctypes.byref(s)))
+        decode = lambda b: (b or b"").decode(errors="replace")
+        return Sensor(decode(s.name), decode(s.type), s.width, s.height, s.spp, decode(s.filter),
+                      s.filter_radius, decode(s.file_format))
+
+    def sensor_index(self, sensor: Any) -> int:
+        """The number of a sensor, given by number or name."""
+        if isinstance(sensor, str):
+            for i, s in enumerate(self.sensors):
+                if s.name == sensor:
+                    return i
+            raise ArgumentError("there is no sensor '%s'; there are: %s" % (
+                sensor, ", ".join(s.name for s in self.sensors)))
+        try:
+            i: int = sensor.__index__()
+        except AttributeError:
+            raise TypeError("sensor is %r: a number or a name is wanted" % (sensor,)) from None
+        if not 0 <= i < len(self.sensors):
+            raise ArgumentError("there is no sensor %d (there are %d)" % (i, len(self.sensors)))
+        return i
+
+    @property
+    def pointer(self) -> int:
+        if self._handle.closed:
+            raise ArgumentError("the scene is closed")
+        return self._handle.pointer
+
+    def close(self) -> None:
+        """Free the scene. Using it afterwards is an ArgumentError."""
+        not_inside()
+        with self.lock:
+            self._handle.close()
+
+    def __enter__(self) -> Scene:
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self.close()
+
+    def __reduce__(self) -> Any:
+        raise TypeError("a scene cannot be copied to another process: load it there")
+
+    def __repr__(self) -> str:
+        if self._handle.closed:
+            return "<importon.Scene '%s', closed>" % self.name
+        return "<importon.Scene '%s': %s, %d shapes, %d emitters, %d sensors>" % (
+            self.name, self.mode, self.n_shapes, self.n_emitters, len(self.sensors))
+
+    def _repr_html_(self) -> str:
+        from ._html import scene
+        return scene(self)
+
+
+def _load_options(mode: Optional[str], search: Sequence[Any], defines: dict[str, Any]) -> tuple[Any, Any]:
+    """imp_load_options, and what it points to."""
+    if isinstance(search, (str, bytes)) or hasattr(search, "__fspath__"):
+        search = [search]
+    pairs = [text("%s=%s" % (k, _define(k, v)), k) for k, v in defines.items()]
+    folders = [text(f, "search") for f in search]
+    names = (ctypes.c_char_p * (len(pairs) + 1))(*pairs)
+    paths = (ctypes.c_char_p * (len(folders) + 1))(*folders)
+    options = make(_c.imp_load_options, mode=choice("imp_color_mode", mode or _mode, "mode"),
+                   defines=ctypes.addressof(names), n_defines=len(pairs),
+                   search=ctypes.addressof(paths), n_search=len(folders))
+    return options, (names, paths)
+
+
+def _define(name: str, value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, (int, float, str)) or hasattr(value, "__fspath__"):
+        return str(value)
+    try:
+        return ", ".join(repr(float(v)) for v in value)
+    except (TypeError, ValueError):
+        raise TypeError("%s is a %s, which no $%s can be" % (name, type(value).__name__, name)) from None
+
+
+def _load(function: Any, arguments: tuple[Any, ...], name: str, mode: Optional[str], search: Sequence[Any],
+          defines: dict[str, Any]) -> Scene:
+    not_inside()
+    ctx = context()
+    options, kept = _load_options(mode, search, defines)
+    out = ctypes.c_void_p()
+    status = function(ctx.pointer, *arguments, ctypes.byref(options), ctypes.byref(out))
+    del kept
+    if status and "was given, but nothing uses $" in ctx.message():
+        raise TypeError(ctx.message().replace("parameter", "keyword", 1))
+    ctx.check(status)
+    warn_said(4)
+    return Scene(Handle(out.value or 0, lib.imp_scene_destroy), ctx, name)
+
+
+def load_file(path: Any, *, mode: Optional[str] = None, search: Sequence[Any] = (), parallel: bool = True,
+              optimize: bool = True, **defaults: Any) -> Scene:
+    """Load a scene file (Mitsuba 3 XML).
+
+    Parameters
+    ----------
+    path : str or PathLike
+    mode : str, optional
+        What rays carry: "rgb", "mono", ... Default: that of `set_variant`.
+    search : sequence of path, optional
+        Folders in which files that the scene names are searched for, too.
+    parallel, optimize : bool
+        Taken as Mitsuba's are; without effect.
+    **defaults
+        Values of the file's `<default>`s: ``res=128`` is ``$res``.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    FileError
+        The file cannot be read.
+    SceneError
+        It is not valid: `file`, `line` and `column` tell the place.
+    UnsupportedError
+        It has a plugin that this version does not have.
+    TypeError
+        A keyword that the file does not use.
+
+    Examples
+    --------
+    >>> scene = importon.load_file("cornell.xml", res=16, spp=4)
+    >>> scene.sensors[0].width
+    16
+    """
+    return _load(lib.imp_scene_load, (text(path, "path"),), str(path), mode, search, defaults)
+
+
+def load_string(xml: str, *, name: str = "string", mode: Optional[str] = None, search: Sequence[Any] = (),
+                parallel: bool = True, optimize: bool = True, **defaults: Any) -> Scene:
+    """Load a scene from text, as `load_file` does from a file.
+
+    Parameters
+    ----------
+    xml : str
+    name : str
+        Stands for the file in messages.
+    mode, search, parallel, optimize, **defaults
+        As `load_file`'s. Files are searched for in the working folder.
+
+    Returns
+    -------
+    Scene
+
+    Raises
+    ------
+    SceneError, UnsupportedError, TypeError
+        As `load_file`.
+
+    Examples
+    --------
+    >>> importon.load_string("<scene version='3.0.0'><shape type='spher'/></scene>")
+    Traceback (most recent call last):
+    ...
+    importon.UnsupportedError: string:1:24: ...
+    """
+    data = xml.encode() if isinstance(xml, str) else bytes(xml)
+    return _load(lib.imp_scene_load_string, (data, len(data), text(name, "name")), name, mode, search, defaults)

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Fits: answers, intervals, covariances, checkpoints, what is said of bad ones."""
+import os
+
+import importon as im
+import numpy as np
+from tap import SCENES, raises, run, z
+
+RED = "red.reflectance.value"
+
+
+def box(res=16, **kw):
+    return im.load_dict(im.cornell_box(res=res, **kw))
+
+
+def setting(noise_spp=256, res=16):
+    s = box(res)
+    target = im.render(s, spp=noise_spp, seed=1)
+    p = im.traverse(s)
+    truth = p[RED]
+    p.keep("red.*")
+    p[RED] = .4, .3, .2
+    return s, target, p, truth
+
+
+def test_answer():
+    """The truth comes back within its errors; covariance and intervals belong together"""
+    s, target, p, truth = setting()
+    f = im.fit(s, target, p, optimizer="lm", spp=64, seed=3)
+    v = f["red.reflectance"]
+    worst = z(v.value, truth, v.se, most_se=.1)
+    assert np.allclose(p[RED], v.value) and np.allclose(v.start, [.4, .3, .2])
+    assert f.covariance.shape == (3, 3) and np.allclose(f.covariance, f.covariance.T)
+    free = (v.at_bound == 0) & (v.interval[0] > 0)
+    assert free.any() and np.allclose(np.sqrt(np.diag(f.covariance))[free], v.se[free])
+    lo, hi = v.interval
+    assert np.allclose((hi - lo)[free], 2 * 1.959964 * v.se[free], rtol=1e-5)
+    assert f.names == [RED + "[%d]" % k for k in range(3)] and len(f.history) == f.iterations or f.iterations
+    z(f.chi2, 1, f.chi2_se, most_se=10, what="chi-square")
+    assert f.reason and RED in repr(f) and "<table>" in f._repr_html_() and "<svg" in f._repr_html_()
+    return "z %.2f" % worst
+
+
+def test_is_the_command():
+    """The same bits as `importon fit`"""
+    import json
+    import subprocess
+    path = os.path.join(SCENES, "cornell.xml")
+    s = im.load_file(path, res=16)
+    im.render(s, spp=64, seed=1).write("target.exr")
+    im.traverse(s)[RED] = .5
+    f = im.fit(s, "target.exr", RED, optimizer="lm", spp=16, seed=2)
+    said = subprocess.run(
+        [os.path.join(os.environ["IMP_BUILD"], "cli", "importon"), "fit", path, "-D", "res=16", "--set", RED + "=0.5,0.5,0.5",
+         "-p", RED, "--target", "target.exr", "--optimizer", "lm", "--spp", "16", "--seed", "2", "--json"],
+        capture_output=True, text=True, check=True).stdout
+    for value in [*f[RED].value, *f[RED].se]:
+        assert any(abs(float(x) - value) <= 1e-8 * abs(value) for x in
+                   json.dumps(json.loads(said)).replace(",", " ").replace("]", " ").replace("}", " ").replace("[", " ").split()
+                   if x[0].isdigit()), (value, said)
+
+
+def test_optimizers():
+    """Each optimiser finds it"""
+    for name in ("adam", "lm", "lbfgs", "mma", "slsqp"):
+        s, target, p, truth = setting(res=8)
+        f = im.fit(s, target, p, optimizer=name, spp=32, seed=5, max_iterations=60)
+        z(f[RED].value, truth, f[RED].se, what=name)
+
+
+def test_cancel_and_resume():
+    """A cancelled fit has its state; a checkpoint continues to the same bits"""
+    s, target, p, truth = setting()
+    whole = im.fit(s, target, p, spp=16, max_iterations=12, tolerance=1e-12)
+    s, target, p, truth = setting()
+    seen = []
+    e = raises(im.Cancelled, lambda: im.fit(s, target, p, spp=16, max_iterations=10**6, tolerance=1e-14,
+                                            progress=lambda q: seen.append(q) or len(seen) > 2))
+    assert e.result["red.reflectance"].value.shape == (3,) and seen[0].stage == "fit" and "loss" in seen[-1].note
+    assert np.allclose(p[RED], e.result[RED].value)
+    s, target, p, truth = setting()
+    im.fit(s, target, p, spp=16, max_iterations=6, tolerance=1e-12, checkpoint="c", intervals=False)
+    s, target, p, truth = setting()
+    again = im.fit(s, target, p, spp=16, max_iterations=12, tolerance=1e-12, checkpoint="c", resume=True)
+    assert np.array_equal(again[RED].value, whole[RED].value)
+
+
+def test_intervals_off():
+    """Without intervals there are no errors and no covariance"""
+    s, target, p, truth = setting()
+    f = im.fit(s, target, p, optimizer="lm", spp=8, intervals=False)
+    assert f.covariance is None and np.isnan(f[RED].se).all()
+
+
+def test_bad_fits():
+    """Bad arguments are named; the scene is as it was"""
+    s, target, p, truth = setting()
+    for words, kw in ((("optimizer", "adam"), dict(optimizer="sgd")), (("max_iterations",), dict(max_iterations=-1)),
+                      (("learning_rate",), dict(learning_rate=float("nan"))), (("loss",), dict(loss="l0")),
+                      (("l1",), dict(optimizer="lm", loss="l1")), (("no/where/c",), dict(checkpoint="no/where/c")),
+                      (("noise_se",), dict(noise_se=np.full((16, 16, 3), -1.)))):
+        raises(im.Error, lambda: im.fit(s, target, p, spp=4, **kw), *words)
+    assert np.allclose(p[RED], [.4, .3, .2])
+    raises(TypeError, lambda: im.fit(s, target, p, lr=.1))
+
+
+def test_texture():
+    """A texture of thousands of numbers: no errors, and it comes closer"""
+    s = im.load_file(os.path.join(SCENES, "textured.xml"))
+    p = im.traverse(s)
+    name = max(p, key=lambda n: p.info(n).count)
+    target, truth = im.render(s, spp=64, seed=1), p[name]
+    p[name] = .5
+    before = float(im.loss(s, target, name, spp=16, seed=9))
+    f = im.fit(s, target, name, spp=4, max_iterations=10, learning_rate=.1)
+    v = f[name]
+    assert v.value.shape == truth.shape and np.all(v.start == .5) and np.isnan(v.se).all() and f.covariance is None
+    assert np.array_equal(v.value, p[name]) and np.array_equal(v.at_bound == 1, v.value >= 1)
+    assert float(im.loss(s, target, name, spp=16, seed=9)) < .7 * before and "numbers in" in repr(f) + f._repr_html_()
+
+
+def test_views():
+    """Several sensors: a list in order, a dictionary by sensor"""
+    d = im.cornell_box(res=12)
+    d["other"] = {**d["sensor"], "to_world": im.ScalarTransform4f().look_at([.5, .2, 3.8], [0, 0, 0], [0, 1, 0])}
+    s = im.load_dict(d)
+    targets = [im.render(s, sensor=k, spp=256, seed=k + 1) for k in (0, 1)]
+    p = im.traverse(s)
+    truth = p[RED]
+    a = float(im.loss(s, targets, RED, spp=16))
+    assert a == float(im.loss(s, {0: targets[0], "other": targets[1]}, RED, spp=16))
+    p[RED] = .4
+    f = im.fit(s, targets, RED, optimizer="lm", spp=64)
+    z(f[RED].value, truth, f[RED].se)
+    raises(im.ArgumentError, lambda: im.loss(s, targets[:1], RED), "1 target")
+
+
+run(globals())

@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scenes from files, strings and dictionaries; what is said of bad ones."""
+import os
+import warnings
+
+import importon as im
+import numpy as np
+from tap import SCENES, raises, run
+
+T = im.ScalarTransform4f
+XML = """<scene version="3.0.0">
+ <default name="res" value="8"/>
+ <integrator type="path"><integer name="max_depth" value="4"/></integrator>
+ <sensor type="perspective"><float name="fov" value="40"/>
+  <transform name="to_world"><lookat origin="1, -4, 2" target="0, 0.5, 0" up="0, 0, 1"/></transform>
+  <film type="hdrfilm"><integer name="width" value="$res"/><integer name="height" value="$res"/><rfilter type="box"/></film>
+  <sampler type="independent"><integer name="sample_count" value="4"/></sampler></sensor>
+ <bsdf type="diffuse" id="paint"><rgb name="reflectance" value="0.5, 0.4, 0.3"/></bsdf>
+ <shape type="rectangle" id="floor">
+  <transform name="to_world"><scale value="2"/><rotate x="1" y="2" z="-0.5" angle="25"/><translate x="0.1" z="-1"/></transform>
+  <ref id="paint"/></shape>
+ <shape type="sphere" id="ball"><point name="center" x="0.5" y="0" z="0"/><float name="radius" value="0.4"/>
+  <bsdf type="conductor" id="metal"><spectrum name="eta" value="400:1.2, 700:0.5"/><spectrum name="k" value="3.5"/></bsdf></shape>
+ <emitter type="point" id="lamp"><point name="position" x="0" y="-1" z="3"/><rgb name="intensity" value="9, 8, 7"/></emitter>
+ <emitter type="constant" id="sky"><spectrum name="radiance" value="0.25"/></emitter>
+</scene>"""
+
+
+def dictionary():
+    return {
+        "type": "scene",
+        "integrator": {"type": "path", "max_depth": 4},
+        "sensor": {"type": "perspective", "fov": 40.0, "to_world": T().look_at([1, -4, 2], [0, .5, 0], [0, 0, 1]),
+                   "film": {"type": "hdrfilm", "width": 8, "height": 8, "rfilter": {"type": "box"}},
+                   "sampler": {"type": "independent", "sample_count": 4}},
+        "paint": {"type": "diffuse", "reflectance": {"type": "rgb", "value": [.5, .4, .3]}},
+        "floor": {"type": "rectangle", "bsdf": {"type": "ref", "id": "paint"},
+                  "to_world": T().translate([.1, 0, -1]).rotate([1, 2, -.5], 25).scale(2)},
+        "ball": {"type": "sphere", "center": [.5, 0, 0], "radius": .4, "bsdf": {
+            "type": "conductor", "id": "metal", "eta": {"type": "spectrum", "value": [(400, 1.2), (700, .5)]},
+            "k": {"type": "spectrum", "value": 3.5}}},
+        "lamp": {"type": "point", "position": [0, -1, 3], "intensity": {"type": "rgb", "value": [9, 8, 7]}},
+        "sky": {"type": "constant", "radiance": {"type": "spectrum", "value": .25}}}
+
+
+def test_dictionary_is_the_file():
+    """A dictionary and the same scene as XML: the same parameters and picture"""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", im.ImportonWarning)  # the axis is normalised
+        a, b = im.load_string(XML), im.load_dict(dictionary())
+    pa, pb = im.traverse(a), im.traverse(b)
+    assert list(pa) == list(pb), (list(pa), list(pb))
+    for name in pa:
+        assert np.array_equal(pa[name], pb[name]), name
+    ia, ib = im.render(a, spp=16), im.render(b, spp=16)
+    assert np.allclose(ia, ib, rtol=1e-5, atol=1e-6), abs(ia - ib).max()
+
+
+def test_defaults():
+    """Keywords fill $defaults, of any type; an unknown one is a TypeError"""
+    assert im.load_file(os.path.join(SCENES, "cornell.xml"), res=16, spp=2).sensors[0][2:5] == (16, 16, 2)
+    assert im.load_string(XML, res="12").sensors[0].width == 12
+    raises(TypeError, lambda: im.load_file(os.path.join(SCENES, "cornell.xml"), rez=16), "rez", "'res'")
+    raises(TypeError, lambda: im.load_string(XML, res=object()), "res")
+    raises(TypeError, lambda: im.render(im.load_string(XML), ssp=4), "ssp")
+
+
+def test_modes():
+    """Colour modes by keyword and by Mitsuba's variants"""
+    assert im.load_string(XML, mode="mono").channels == 1
+    try:
+        im.set_variant("cuda_ad_mono")
+        assert im.load_string(XML).mode == "mono" and im.load_dict(dictionary()).mode == "mono"
+    finally:
+        im.set_variant("scalar_rgb")
+    raises(im.ArgumentError, lambda: im.load_string(XML, mode="rbg"), "rbg", "rgb, mono")
+    raises(im.ArgumentError, lambda: im.set_variant("llvm_ad_polarized"), "llvm_ad_polarized")
+
+
+def test_errors_have_places():
+    """Errors have file, line and column, and a class by status"""
+    with open("bad.xml", "w") as f:
+        f.write("<scene version='3.0.0'>\n  <shape type='sphere'><float name='radious' value='1'/></shape>\n</scene>")
+    e = raises(im.Error, lambda: im.load_file("bad.xml"), "radious")
+    assert e.file.endswith("bad.xml") and e.line == 2 and e.column > 0, (e.file, e.line, e)
+    e = raises(im.UnsupportedError, lambda: im.load_string(XML.replace("diffuse", "difuse"), name="room"), "diffuse")
+    assert e.file == "room" and isinstance(e, NotImplementedError)
+    raises(im.FileError, lambda: im.load_file("none.xml"), "none.xml")
+    raises(OSError, lambda: im.load_file("none.xml"))
+    raises(im.SceneError, lambda: im.load_string("<scene"))
+
+
+def test_dictionary_errors():
+    """Bad dictionaries: the object and the property are named"""
+    def change(path, value):
+        d = dictionary()
+        at = d
+        for key in path[:-1]:
+            at = at[key]
+        at[path[-1]] = value
+        return lambda: im.load_dict(d)
+    raises(im.Error, change(("ball", "radious"), 1.0), "radious", "ball")
+    raises(im.UnsupportedError, change(("ball", "type"), "spere"), "spere", "sphere")
+    raises(im.ArgumentError, change(("ball",), {"radius": 1}), "ball", "type")
+    raises(im.ArgumentError, change(("paint", "reflectance"), {"type": "rgb", "value": [1, 2]}), "reflectance")
+    raises(im.Error, change(("lamp", "position"), [0, float("nan"), 0]), "position")
+    raises(im.Error, change(("floor", "bsdf"), {"type": "ref", "id": "pant"}), "pant")
+    raises(im.ArgumentError, change(("paint", "reflectance"), {"type": "rgb", "value": [1, 1, 1], "x": 1}), "x")
+    raises(im.ArgumentError, change(("sky", "radiance"), {"type": "spectrum", "value": "no.spd"}), "no.spd")
+    raises(im.ArgumentError, change(("ball", "center"), "a b".split()), "center")
+    raises(im.ArgumentError, change(("ball", "center"), 1j), "center")
+    raises(im.ArgumentError, change(("type",), "shape"), "scene")
+    raises(TypeError, lambda: im.load_dict([]))
+    raises(TypeError, lambda: im.load_dict({"type": "scene", 3: {}}))
+    raises(im.Error, change(("ball", "radius"), "x\0y"))
+
+
+def test_meshes_and_bitmaps():
+    """Meshes and pixels from arrays; their errors"""
+    d = dictionary()
+    pixels = np.random.default_rng(1).random((4, 6, 3)).astype(np.float32)
+    positions = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], float)
+    d["sheet"] = {"type": "mesh", "vertex_positions": positions.T.copy().T, "faces": [[0, 1, 2], [0, 2, 3]],
+                  "vertex_texcoords": positions[:, :2],
+                  "bsdf": {"type": "diffuse", "id": "cloth", "reflectance": {"type": "bitmap", "bitmap": pixels, "raw": True}}}
+    s = im.load_dict(d)
+    p = im.traverse(s)
+    name = [n for n in p if n.startswith("cloth")][0]
+    assert p[name].shape == (4, 6, 3) and np.allclose(p[name], pixels, atol=1e-7)
+    assert im.render(s, spp=2).mean() > 0
+    d["sheet"]["faces"] = [[0, 1, 4]]
+    raises(im.ArgumentError, lambda: im.load_dict(d), "faces")
+    d["sheet"]["faces"] = [[0, 1, -1]]
+    raises(im.ArgumentError, lambda: im.load_dict(d), "faces")
+    d["sheet"]["faces"], d["sheet"]["vertex_texcoords"] = [[0, 1, 2]], [[0, 0]]
+    raises(im.ArgumentError, lambda: im.load_dict(d), "uvs")
+    del d["sheet"]["vertex_texcoords"]
+    d["sheet"]["vertex_positions"] = positions * np.nan
+    raises(im.Error, lambda: im.load_dict(d))
+
+
+def test_transforms():
+    """Transforms as Mitsuba composes them, from the class and from an instance"""
+    a = T().translate([1, 2, 3]).rotate(axis=[0, 1, 0], angle=90).scale([1, 2, 3])
+    b = T.translate([1, 2, 3]) @ T.rotate([0, 1, 0], 90) @ T.scale([1, 2, 3])
+    assert a == b and np.allclose(a @ [1, 0, 0], [1, 2, 2]) and hash(a) == hash(b)
+    assert np.allclose((a @ a.inverse()).matrix, np.eye(4))
+    camera = T.look_at(origin=[0, 0, 4], target=[0, 0, 0], up=[0, 1, 0])
+    assert np.allclose(camera @ [0, 0, 1], [0, 0, 3]) and np.allclose(camera.matrix[:3, 0], [-1, 0, 0])
+    for bad in (lambda: T.rotate([0, 0, 0], 3), lambda: T.translate([1, 2]), lambda: T(np.eye(3)),
+                lambda: T.look_at([0, 0, 0], [0, 0, 0]), lambda: T.look_at([0, 0, 0], [0, 1, 0], [0, 1, 0])):
+        raises(im.ArgumentError, bad)
+
+
+def test_cornell_box():
+    """Mitsuba's dictionary of the Cornell box"""
+    s = im.load_dict(im.cornell_box(res=16, spp=8))
+    assert s.n_emitters == 1 and s.sensors[0].spp == 8 and s.max_depth == 8
+    assert len(im.traverse(s)) == 4
+    assert "rectangle" not in repr(s) and "dictionary" in repr(s)
+
+
+def test_warnings():
+    """What the library warns of are Python warnings"""
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        im.load_string(XML)
+    assert any(issubclass(w.category, im.ImportonWarning) and "axis" in str(w.message) for w in said)
+
+
+run(globals())
