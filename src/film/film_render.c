@@ -21,7 +21,8 @@ enum imp_status imp_render(const imp_scene *scene, const struct imp_run *run,
     enum imp_status st = IMP_OK;
     if (imp__team_shares(scene->ctx))
         st = imp__team_same(scene->ctx, same, imp__same_run(scene, &own, "render", same));
-    const bool solves = scene->integrator->ops->flags & IMP_INTEGRATOR_SOLVES;
+    const bool solves =
+        scene->integrator && scene->integrator->ops->flags & IMP_INTEGRATOR_SOLVES;
     if (st == IMP_OK && solves && scene->ctx->team &&
         scene->ctx->team->role != IMP_TEAM_RANK)
         st = imp__error(scene->ctx, IMP_E_UNSUPPORTED,
