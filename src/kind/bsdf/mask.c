@@ -9,7 +9,7 @@
  * and -1 in the other. So the hole is drawn with a probability that stays away from 0 and
  * 1, where one of the two would never be seen. */
 #include "kind/build.h"
-#include "mixing.h"
+#include "blending.h"
 
 enum { OPACITY };
 enum { HOLE }; /* lobe 0; those of the nested material follow */

@@ -6,8 +6,8 @@
  * first, has a part that the value has not.
  *
  * Delta lobes of nested materials are numbered anew, so that none share an index. */
-#ifndef IMP_KIND_BSDF_MIXING_H
-#define IMP_KIND_BSDF_MIXING_H
+#ifndef IMP_KIND_BSDF_BLENDING_H
+#define IMP_KIND_BSDF_BLENDING_H
 
 #include "kind/build.h"
 #include "math/vec.h"
