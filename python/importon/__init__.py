@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 from ._c import VERSION as __version__
 from ._dictionary import cornell_box, load_dict
 from ._fit import Fit, FitVariable, fit
-from ._library import (ArgumentError, BiasError, Cancelled, Error, FileError, ImportonWarning, NumericError,
+from ._library import (ArgumentError, BiasError, Cancelled, Error, FileError, ImportonWarning, NumericError, Part,
                        OutOfMemoryError, ParameterError, PathsError, Progress, SceneError, UnsupportedError,
                        library_path, set_threads, threads)
 from ._params import Gradient, ParameterInfo, SceneParameters, Values, traverse
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 __all__ = [
     "ArgumentError", "BiasError", "Cancelled", "Check", "CheckRow", "Color3f", "Comparison", "Error",
     "FileError", "Fit", "FitVariable", "Gradient", "ImportonWarning", "Jacobian", "Loss", "NumericError",
-    "OutOfMemoryError", "ParameterError", "ParameterInfo", "PathsError", "Picture", "Progress",
+    "OutOfMemoryError", "Part", "ParameterError", "ParameterInfo", "PathsError", "Picture", "Progress",
     "ScalarTransform4f", "Scene", "SceneError", "SceneParameters", "Sensor", "Transform4f", "UnsupportedError",
     "Values", "__version__", "ad", "check", "compare", "cornell_box", "fit", "jacobian",
     "library_path", "load_dict", "load_file", "load_string", "loss", "read", "render",

@@ -56,6 +56,10 @@ class Cancelled(Error):
     `result` has what was reached, where that is valid."""
 
 
+class Part(Error):
+    """A part is kept; there is no whole result."""
+
+
 class ArgumentError(Error, ValueError):
     """An argument is outside its documented range."""
 
@@ -107,6 +111,7 @@ class ImportonWarning(UserWarning):
 
 ERRORS: dict[int, type[Error]] = {
     _c.IMP_CANCELLED: Cancelled,
+    _c.IMP_PART: Part,
     _c.IMP_E_ARG: ArgumentError,
     _c.IMP_E_SCENE: SceneError,
     _c.IMP_E_UNSUPPORTED: UnsupportedError,
