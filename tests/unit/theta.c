@@ -10,7 +10,9 @@
 static const char plates[] =
     "<scene version='3.0.0'><integrator type='direct'/><sensor "
     "type='perspective'><transform name='to_world'>"
-    "<lookat origin='0,0,5' target='0,0,0' up='0,1,0'/></transform></sensor>"
+    "<lookat origin='0,0,5' target='0,0,0' up='0,1,0'/></transform>"
+    "<film type='hdrfilm'><integer name='width' value='16'/>"
+    "<integer name='height' value='16'/></film></sensor>"
     "<bsdf type='diffuse' id='a'><float name='reflectance' value='0.5'/></bsdf>"
     "<bsdf type='diffuse' id='b'><float name='reflectance' value='0.5'/></bsdf>"
     "<shape type='sphere'><ref id='a'/></shape><shape type='sphere'><ref id='b'/></shape>"
