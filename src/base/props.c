@@ -72,6 +72,14 @@ struct imp_child *imp__node_add_child(struct imp_arena *a, struct imp_node *pare
     return c;
 }
 
+void imp__node_remove(struct imp_node *node, const char *name)
+{
+    struct imp_prop *p = imp__node_prop(node, name);
+    if (!p) return;
+    memmove(p, p + 1, (size_t)(node->props + node->n_props - (p + 1)) * sizeof *p);
+    node->n_props--;
+}
+
 struct imp_prop *imp__node_prop(const struct imp_node *node, const char *name)
 {
     for (size_t i = 0; i < node->n_props; i++)

@@ -101,6 +101,8 @@ struct imp_child *imp__node_add_child(struct imp_arena *a, struct imp_node *pare
 /* Look up without marking; NULL: not there. */
 struct imp_prop *imp__node_prop(const struct imp_node *node, const char *name);
 struct imp_child *imp__node_child(const struct imp_node *node, const char *name);
+/* As if it had not been written. */
+void imp__node_remove(struct imp_node *node, const char *name);
 
 /* "file:line:column", or "scene" for scenes built by calls; then " (type 'id')". */
 const char *imp__loc_text(struct imp_loc loc, char *buffer, size_t size);

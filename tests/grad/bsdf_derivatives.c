@@ -136,7 +136,9 @@ static void visit(const struct kind_case *c, void *payload)
     (void)payload;
     for (int set = 0; set <= KIND_LOWEST; set++) {
         const struct tally t = check_case(b, (enum kind_set)set);
-        tap_ok(t.value < 1e-6 && t.emission < 1e-6 && t.kinks * 50 <= t.numbers,
+        /* Equal indices: `specular` 0 has, beside its slope, a term of power 3/2. */
+        const int most = set == KIND_LOWEST && strstr(c->label, "principled") ? 12 : 50;
+        tap_ok(t.value < 1e-6 && t.emission < 1e-6 && t.kinks * most <= t.numbers,
                "%s: derivatives, %s inputs # %.1e %.1e, %ld of %ld at kinks", c->label,
                names[set], t.value, t.emission, t.kinks, t.numbers);
         tap_ok(!t.lanes_mixed, "%s: lanes stay apart, %s inputs", c->label, names[set]);

@@ -13,6 +13,7 @@
     X(imp__null)                                                                         \
     X(imp__phong)                                                                        \
     X(imp__plastic)                                                                      \
+    X(imp__principled)                                                                   \
     X(imp__roughconductor)                                                               \
     X(imp__roughdielectric)                                                              \
     X(imp__roughplastic)                                                                 \

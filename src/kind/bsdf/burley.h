@@ -1,0 +1,109 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Parts of the principled materials (Burley 2012, 2015; docs/scene-format.md 5.4), each
+ * with its derivatives. Cosines are those at the shading normal (o, i) and at the
+ * half-vector (d = wo.h = wi.h). */
+#ifndef IMP_KIND_BSDF_BURLEY_H
+#define IMP_KIND_BSDF_BURLEY_H
+
+#include "kind/build.h"
+#include "microfacet.h"
+
+/* Schlick's weight (1 - c)^5, and its slope. */
+static inline double imp__schlick(double c, double *d_c)
+{
+    const double x = imp_clamp(1 - c, 0, 1), x2 = x * x;
+    *d_c = c > 0 ? -5 * x2 * x2 : 0;
+    return x2 * x2 * x;
+}
+
+/* Diffuse lobe over base_color cos_i/pi: Burley's with its retro-reflection, and the
+ * flat one that imitates scattering below the surface. */
+struct imp__burley {
+    double value, d_roughness, d_flatness;
+};
+static inline struct imp__burley imp__burley(double cos_o, double cos_i, double cos_d,
+                                             double roughness, double flatness)
+{
+    double slope;
+    const double Fo = imp__schlick(cos_o, &slope), Fi = imp__schlick(cos_i, &slope);
+    const double R = 2 * roughness * cos_d * cos_d, dR = 2 * cos_d * cos_d;
+    const double full =
+        (1 - 0.5 * Fo) * (1 - 0.5 * Fi) + R * (Fo + Fi + Fo * Fi * (R - 1));
+    const double d_full = Fo + Fi + Fo * Fi * (2 * R - 1);
+    const double q_o = 1 + Fo * (0.5 * R - 1), q_i = 1 + Fi * (0.5 * R - 1);
+    const double slab = 1 / (cos_o + cos_i) - 0.5;
+    const double flat = 1.25 * (q_o * q_i * slab + 0.5);
+    const double d_flat = 1.25 * slab * 0.5 * (Fo * q_i + Fi * q_o);
+    return (struct imp__burley){full + (flat - full) * flatness,
+                                dR * (d_full + (d_flat - d_full) * flatness),
+                                flat - full};
+}
+
+/* Roughness along s and t of the GGX lobe, by `roughness` and `anisotropic`. */
+struct imp__burley_facets {
+    struct imp__microfacet f;
+    double d_roughness[2], d_anisotropic[2];
+};
+static inline struct imp__burley_facets imp__burley_facets(double roughness,
+                                                           double anisotropic)
+{
+    const double a = sqrt(1 - 0.9 * anisotropic), r2 = roughness * roughness;
+    const double au = r2 / a, av = r2 * a, least = 1e-3;
+    struct imp__burley_facets m = {
+        {IMP_GGX, true, imp_max(au, least), imp_max(av, least)}, {0, 0}, {0, 0}};
+    if (au > least) {
+        m.d_roughness[0] = 2 * roughness / a;
+        m.d_anisotropic[0] = 0.45 * r2 / (a * a * a);
+    }
+    if (av > least) {
+        m.d_roughness[1] = 2 * roughness * a;
+        m.d_anisotropic[1] = -0.45 * r2 / a;
+    }
+    return m;
+}
+
+/* D G1(wo) G1(wi), and its derivatives by roughness and anisotropic. */
+struct imp__burley_lobe {
+    double DG, d_roughness, d_anisotropic;
+};
+static inline struct imp__burley_lobe imp__burley_lobe(const struct imp__burley_facets *m,
+                                                       const imp_v3 *h, const imp_v3 *wo,
+                                                       const imp_v3 *wi)
+{
+    double dlog_D[2], dGo[2], dGi[2];
+    const double D = imp__microfacet_d(&m->f, h, dlog_D);
+    const double Go = imp__microfacet_g1(&m->f, wo, dGo),
+                 Gi = imp__microfacet_g1(&m->f, wi, dGi);
+    struct imp__burley_lobe x = {D * Go * Gi, 0, 0};
+    for (int k = 0; k < 2; k++) {
+        const double d = D * (dlog_D[k] * Go * Gi + dGo[k] * Gi + Go * dGi[k]);
+        x.d_roughness += d * m->d_roughness[k];
+        x.d_anisotropic += d * m->d_anisotropic[k];
+    }
+    return x;
+}
+
+/* The colour of tinted lobes, base/lum, 1 where lum is 0; and its derivatives lane by
+ * lane. */
+static inline imp_spec imp__burley_tint(const imp_spec *base, double lum,
+                                        imp_spec *d_base, imp_spec *d_lum)
+{
+    *d_base = *d_lum = imp__spec(0);
+    if (!(lum > 0)) return imp__spec(1);
+    *d_base = imp__spec(1 / lum);
+    *d_lum = *base * (-1 / (lum * lum));
+    return *base * (1 / lum);
+}
+
+#define IMP_BURLEY_COLOR(key)                                                            \
+    {                                                                                    \
+        .name = key, .role = IMP_REFLECTANCE, .fallback = 0.5, .hi = 1, .unit = "1"      \
+    }
+#define IMP_BURLEY_NUMBER(key, more, value)                                              \
+    {                                                                                    \
+        .name = key, .role = IMP_REFLECTANCE, .flags = IMP_INPUT_SCALAR | (more),        \
+        .fallback = value, .hi = 1, .unit = "1"                                          \
+    }
+
+#endif
