@@ -102,7 +102,7 @@ struct imp_input {
     int param;                         /* index of its parameter, -1: none */
     int count;                         /* numbers of a constant: 3, or 1 (in all lanes) */
     bool scalar;     /* declared IMP_INPUT_SCALAR: textures give one number */
-    bool plain;      /* a constant that is no scalar and no luminance: `value` as it is */
+    bool plain;      /* a constant: `value` as it is, unless lanes are wavelengths */
     int luminance;   /* > 0: the luminance of the input that stands so many before it */
     imp_spec value;  /* the constant, in all used lanes */
     imp_spec weight; /* of a luminance: of that input's lanes */

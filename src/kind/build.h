@@ -6,6 +6,7 @@
 #ifndef IMP_KIND_BUILD_H
 #define IMP_KIND_BUILD_H
 
+#include "base/compiler.h"
 #include "base/props.h"
 #include <importon/kinds.h>
 
@@ -38,8 +39,14 @@ void imp__bsdf_albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3
                       imp_spec *albedo);
 
 /* Inputs at a point (src/kind/texture/input.c). in [n]. */
-void imp__inputs_eval(const struct imp_input *const *input, int n,
-                      const struct imp_texcoord *at, imp_spec *in);
+void imp__inputs_look_up(const struct imp_input *const *input, int n,
+                         const struct imp_texcoord *at, imp_spec *in);
+static inline void imp__inputs_eval(const struct imp_input *const *input, int n,
+                                    const struct imp_texcoord *at, imp_spec *in)
+{
+    if (imp_likely(n == 1 && input[0]->plain && !at->carried)) in[0] = input[0]->value;
+    else if (n > 0) imp__inputs_look_up(input, n, at, in);
+}
 /* Transpose: in_bar [n] goes to the parameters behind the inputs. */
 void imp__inputs_scatter(const struct imp_input *const *input, int n,
                          const struct imp_texcoord *at, const imp_spec *in_bar,

@@ -21,6 +21,22 @@ static inline imp_v3 imp__v3(double x, double y, double z)
 }
 static inline imp_spec imp__spec(double c) { return (imp_spec){c, c, c, c}; }
 
+/* Four floats and four doubles. */
+typedef float imp_float4 __attribute__((vector_size(16)));
+static inline imp_float4 imp__narrow(imp_v3 v)
+{
+    return __builtin_convertvector(v, imp_float4);
+}
+static inline imp_v3 imp__widen(imp_float4 v)
+{
+#if defined(__AVX__) &&                                                                  \
+    !defined(__clang__) /* GCC 12 would convert the halves one by one */
+    return (imp_v3)__builtin_ia32_cvtps2pd256(v);
+#else
+    return __builtin_convertvector(v, imp_v3);
+#endif
+}
+
 static inline double imp__dot(imp_v3 a, imp_v3 b)
 {
     const imp_v3 p = a * b;
@@ -52,6 +68,12 @@ static inline bool imp__is_zero_used(imp_spec s, bool four)
 static inline bool imp__is_finite(imp_spec s)
 {
     return isfinite(s[0]) && isfinite(s[1]) && isfinite(s[2]);
+}
+/* Are all four lanes in [0, most]? */
+static inline bool imp__is_within(imp_spec s, double most)
+{
+    const __typeof__(s >= s) in = (s >= imp__spec(0)) & (s <= imp__spec(most));
+    return (in[0] & in[1]) & (in[2] & in[3]);
 }
 static inline double imp__sqr(double x) { return x * x; }
 

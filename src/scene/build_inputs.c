@@ -289,7 +289,7 @@ enum imp_status imp__build_inputs(struct imp_scene *scene, struct imp_node *node
             for (in->luminance = 1; in->luminance < count; in->luminance++)
                 if (strcmp(desc[count - in->luminance].name, d->name) == 0) break;
         }
-        in->plain = !in->texture && !in->scalar && !in->luminance;
+        in->plain = !in->texture && !in->luminance && !(in->scalar && in->count == 3);
         out[count++] = in;
     }
     *n = count;

@@ -309,15 +309,12 @@ static inline bool ray_valid(const imp_v3 *o, const imp_v3 *d, double tmin, doub
     return size < IMP_REACH_MAX && tmin >= 0 && tmin < tmax;
 }
 
-typedef float float4 __attribute__((vector_size(16)));
-
 /* Embree reads (org, tnear) and (dir, time) as 16 bytes each. Written as single floats
  * they could not be forwarded from the store buffer, which costs 10 ns a ray. */
 static inline void ray_fill(struct RTCRay *r, const imp_v3 *o, const imp_v3 *d,
                             double tmin, double tmax)
 {
-    float4 org = __builtin_convertvector(*o, float4);
-    float4 dir = __builtin_convertvector(*d, float4);
+    imp_float4 org = imp__narrow(*o), dir = imp__narrow(*d);
     org[3] = (float)tmin;
     dir[3] = 0;
     memcpy(&r->org_x, &org, sizeof org);

@@ -75,7 +75,7 @@ static inline void record(struct imp_vertex *v, int emitter, double weight, imp_
     struct imp_light *l = &v->d.light;
     l->emitter = emitter;
     l->weight = (imp_decided)weight;
-    const imp_decided4 stored = __builtin_convertvector(there, imp_decided4);
+    const imp_float4 stored = imp__narrow(there);
     l->uv[0] = stored[0];
     l->uv[1] = stored[1];
     l->dist = stored[2];

@@ -71,9 +71,9 @@ struct imp_step {
 /* What a record stores of v, in double again. */
 static inline imp_v3 imp__decide(imp_v3 v)
 {
-    imp_decided4 stored = __builtin_convertvector(v, imp_decided4);
+    imp_float4 stored = imp__narrow(v);
     IMP_OPAQUE(stored);
-    return __builtin_convertvector(stored, imp_v3);
+    return imp__widen(stored);
 }
 static inline double imp__decide1(double x)
 {
@@ -83,7 +83,7 @@ static inline double imp__decide1(double x)
 }
 static inline void imp__store_v3(imp_decided out[3], imp_v3 v)
 {
-    const imp_decided4 rounded = __builtin_convertvector(v, imp_decided4);
+    const imp_float4 rounded = imp__narrow(v);
     for (int k = 0; k < 3; k++) out[k] = rounded[k];
 }
 

@@ -347,23 +347,25 @@ void imp__walk_position(const struct imp_tracer *tracer, int x, int y, int64_t s
     position(tracer, walk_key(tracer, x, y, sample), x, y, px, py);
 }
 
-/* A walk whose value no light can have, or no picture can hold, is dropped. */
-static enum imp_drop drop_cause(imp_spec L, bool four)
+/* Why a walk of this radiance is dropped: no light can have it, or no picture can hold
+ * it. */
+static __attribute__((noinline)) enum imp_drop drop_cause(imp_spec L)
 {
-    if (!four) L[3] = 0;
-    if (imp_unlikely(!(fabs(L[0]) <= FLT_MAX && fabs(L[1]) <= FLT_MAX &&
-                       fabs(L[2]) <= FLT_MAX && fabs(L[3]) <= FLT_MAX)))
-        return isnan(L[0] + L[1] + L[2] + L[3]) ? IMP_DROP_NAN : IMP_DROP_INFINITE;
-    if (imp_unlikely(L[0] < 0 || L[1] < 0 || L[2] < 0 || L[3] < 0))
-        return IMP_DROP_NEGATIVE;
-    return IMP_DROP_NONE;
+    double sum = 0, largest = 0;
+    for (int c = 0; c < 4; c++) {
+        sum += L[c];
+        largest = fmax(largest, fabs(L[c]));
+    }
+    if (isnan(sum)) return IMP_DROP_NAN;
+    return largest <= FLT_MAX ? IMP_DROP_NEGATIVE : IMP_DROP_INFINITE;
 }
 
 void imp__walk_close(const struct imp_tracer *tracer, struct imp_walk *walk)
 {
     const imp_spec L = imp__walk_fold(walk);
-    const enum imp_drop cause = drop_cause(L, tracer->carried);
-    if (imp_unlikely(cause != IMP_DROP_NONE)) walk->dropped = cause;
+    imp_spec used = L;
+    if (!tracer->carried) used[3] = 0;
+    if (imp_unlikely(!imp__is_within(used, FLT_MAX))) walk->dropped = drop_cause(used);
     walk->L = walk->dropped || !walk->valid ? (imp_spec){0} : L;
 }
 

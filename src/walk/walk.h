@@ -33,7 +33,6 @@
  * evaluating a kept record gives the walk's value and gradient to the bit. Rays go on
  * from places and directions in double. */
 typedef float imp_decided;
-typedef imp_decided imp_decided4 __attribute__((vector_size(4 * sizeof(imp_decided))));
 
 enum imp_scatterer {
     IMP_AT_SURFACE,  /* a BSDF */
@@ -252,7 +251,7 @@ imp_spec imp__walk_tangent(const struct imp_tracer *tracer, const struct imp_wal
 
 static inline imp_v3 imp__decided_v3(const imp_decided v[3])
 {
-    return __builtin_convertvector(((imp_decided4){v[0], v[1], v[2], 0}), imp_v3);
+    return imp__widen((imp_float4){v[0], v[1], v[2], 0});
 }
 static inline struct imp_texcoord imp__vertex_at(const struct imp_vertex *v)
 {

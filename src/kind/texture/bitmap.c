@@ -171,8 +171,6 @@ static inline void footprint(const struct bitmap *t, const struct imp_texcoord *
     f->weight[3] = a * b;
 }
 
-typedef float texel4 __attribute__((vector_size(16)));
-
 static void eval(const struct imp_texture *tex, const struct imp_texcoord *at,
                  bool scalar, imp_spec *value)
 {
@@ -187,9 +185,9 @@ static void eval(const struct imp_texture *tex, const struct imp_texcoord *at,
     }
     imp_spec sum = imp__spec(0);
     for (int k = 0; k < f.n; k++) {
-        texel4 p;
+        imp_float4 p;
         memcpy(&p, t->data + 3 * f.texel[k], sizeof p);
-        sum += __builtin_convertvector(p, imp_spec) * f.weight[k];
+        sum += imp__widen(p) * f.weight[k];
     }
     *value = scalar ? imp__spec(imp__luminance(sum[0], sum[1], sum[2])) : sum;
 }

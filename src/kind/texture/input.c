@@ -200,8 +200,8 @@ static void luminance_scatter(const struct imp_input *colour, imp_spec weight,
 
 /* ---- All inputs of an object ----------------------------------------------------- */
 
-void imp__inputs_eval(const struct imp_input *const *input, int n,
-                      const struct imp_texcoord *at, imp_spec *in)
+void imp__inputs_look_up(const struct imp_input *const *input, int n,
+                         const struct imp_texcoord *at, imp_spec *in)
 {
     const bool colours = imp_likely(!at->carried);
     for (int j = 0; j < n; j++) {
