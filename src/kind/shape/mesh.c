@@ -10,15 +10,13 @@
 /* Embree takes larger coordinates for invalid. */
 #define COORDINATE_MAX 1e18
 
-typedef float float4 __attribute__((vector_size(16)));
-
 /* Number `index` of an array of triples that goes on for PADDING floats: one load. */
 #define PADDING 4
 static inline imp_v3 load3(const float *array, uint32_t index)
 {
-    float4 p;
+    imp_float4 p;
     memcpy(&p, array + 3 * (size_t)index, sizeof p);
-    imp_v3 v = __builtin_convertvector(p, imp_v3);
+    imp_v3 v = imp__widen(p);
     v[3] = 0;
     return v;
 }
@@ -124,25 +122,28 @@ static bool is_flat(const struct imp__mesh *m, const float *normals, size_t n)
     return true;
 }
 
-/* Edges of a triangle from its first vertex. */
-struct edges {
-    imp_v3 e1, e2;
+/* First vertex of a triangle and its edges from there. */
+struct corner {
+    imp_v3 p0, e1, e2;
 };
+static inline struct corner corner(const struct imp__mesh *m, size_t prim)
+{
+    const uint32_t *i = m->indices + 3 * prim;
+    const imp_v3 p0 = load3(m->positions, i[0]);
+    return (struct corner){p0, load3(m->positions, i[1]) - p0,
+                           load3(m->positions, i[2]) - p0};
+}
 
 /* Position, normals and uv: all that a light sample needs. */
-static inline struct edges point(const struct imp__mesh *m, const struct imp_hit *hit,
-                                 struct imp_surface *out)
+static inline void point(const struct imp__mesh *m, const struct imp_hit *hit,
+                         const struct corner *c, imp_v3 ng, struct imp_surface *out)
 {
-    const uint32_t *i = m->indices + 3 * (size_t)hit->prim;
-    const double *ng = m->face_normals + 3 * (size_t)hit->prim;
     const double b1 = hit->u, b2 = hit->v, b0 = 1 - b1 - b2;
-    const imp_v3 p0 = load3(m->positions, i[0]);
-    const struct edges e = {load3(m->positions, i[1]) - p0,
-                            load3(m->positions, i[2]) - p0};
-    out->p = p0 + e.e1 * b1 + e.e2 * b2;
-    out->ng = imp__v3(ng[0], ng[1], ng[2]);
-    out->n = out->ng;
+    out->p = c->p0 + c->e1 * b1 + c->e2 * b2;
+    out->ng = ng;
+    out->n = ng;
     if (m->normals) {
+        const uint32_t *i = m->indices + 3 * (size_t)hit->prim;
         const imp_v3 n = load3(m->normals, i[0]) * b0 + load3(m->normals, i[1]) * b1 +
                          load3(m->normals, i[2]) * b2;
         const double l = imp__length(n);
@@ -152,18 +153,18 @@ static inline struct edges point(const struct imp__mesh *m, const struct imp_hit
     out->uv[0] = m->reversed ? b2 : b1;
     out->uv[1] = m->reversed ? b1 : b2;
     if (m->uvs) {
+        const uint32_t *i = m->indices + 3 * (size_t)hit->prim;
         const float *t0 = m->uvs + 2 * (size_t)i[0], *t1 = m->uvs + 2 * (size_t)i[1],
                     *t2 = m->uvs + 2 * (size_t)i[2];
         for (int k = 0; k < 2; k++)
             out->uv[k] =
                 t0[k] + b1 * ((double)t1[k] - t0[k]) + b2 * ((double)t2[k] - t0[k]);
     }
-    return e;
 }
 
 /* dp_du and dp_dv, from uv where they say something. */
 static inline void slopes(const struct imp__mesh *m, const uint32_t *i,
-                          const struct edges *e, struct imp_surface *out)
+                          const struct corner *e, struct imp_surface *out)
 {
     out->dp_du = m->reversed ? e->e2 : e->e1;
     out->dp_dv = m->reversed ? e->e1 : e->e2;
@@ -180,17 +181,45 @@ static inline void slopes(const struct imp__mesh *m, const uint32_t *i,
     }
 }
 
+static inline imp_v3 face_normal(const struct imp__mesh *m, size_t prim)
+{
+    const double *ng = m->face_normals + 3 * prim;
+    return imp__v3(ng[0], ng[1], ng[2]);
+}
+
+/* Without facets. */
+static void surface_from_arrays(const struct imp__mesh *m, const struct imp_hit *hit,
+                                struct imp_surface *out)
+{
+    const size_t prim = (size_t)hit->prim;
+    const struct corner c = corner(m, prim);
+    point(m, hit, &c, face_normal(m, prim), out);
+    slopes(m, m->indices + 3 * prim, &c, out);
+    if (m->face_tangents) {
+        const double *tangent = m->face_tangents + 3 * prim;
+        out->s = imp__v3(tangent[0], tangent[1], tangent[2]);
+        out->t = imp__cross(out->n, out->s);
+    } else {
+        imp__surface_frame(out);
+    }
+}
+
 void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit,
                        const imp_v3 *o, const imp_v3 *d, struct imp_surface *out)
 {
     (void)o, (void)d;
     const struct imp__mesh *m = s->self;
-    const struct edges e = point(m, hit, out);
-    slopes(m, m->indices + 3 * (size_t)hit->prim, &e, out);
+    if (imp_unlikely(!m->facets)) {
+        surface_from_arrays(m, hit, out);
+        return;
+    }
+    const struct imp__facet *f = &m->facets[hit->prim];
+    point(m, hit, &(struct corner){f->p0, f->e1, f->e2}, f->ng, out);
+    out->dp_du = f->dp_du;
+    out->dp_dv = f->dp_dv;
     if (m->face_tangents) {
-        const double *tangent = m->face_tangents + 3 * (size_t)hit->prim;
-        out->s = imp__v3(tangent[0], tangent[1], tangent[2]);
-        out->t = imp__cross(out->n, out->s);
+        out->s = f->s;
+        out->t = f->t;
     } else {
         imp__surface_frame(out);
     }
@@ -204,13 +233,30 @@ static enum imp_status tangents_make(const struct imp_build *b, struct imp__mesh
     if (!tangents) return imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory");
     for (size_t k = 0; k < n; k++) {
         const struct imp_hit hit = {.prim = (int)k};
+        const struct corner c = corner(m, k);
         struct imp_surface at;
-        const struct edges e = point(m, &hit, &at);
-        slopes(m, m->indices + 3 * k, &e, &at);
+        point(m, &hit, &c, face_normal(m, k), &at);
+        slopes(m, m->indices + 3 * k, &c, &at);
         imp__surface_frame(&at);
         for (int j = 0; j < 3; j++) tangents[3 * k + (size_t)j] = at.s[j];
     }
     m->face_tangents = tangents;
+    return IMP_OK;
+}
+
+static enum imp_status facets_make(const struct imp_build *b, struct imp__mesh *m, size_t n)
+{
+    struct imp__facet *facets = imp__arena_take(b->arena, n, sizeof *facets);
+    if (!facets) return imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory");
+    for (size_t k = 0; k < n; k++) {
+        const struct imp_hit hit = {.prim = (int)k};
+        const struct corner c = corner(m, k);
+        struct imp_surface at;
+        surface_from_arrays(m, &hit, &at);
+        facets[k] = (struct imp__facet){c.p0,     c.e1,     c.e2, at.ng,
+                                        at.dp_du, at.dp_dv, at.s, at.t};
+    }
+    m->facets = facets;
     return IMP_OK;
 }
 
@@ -253,6 +299,8 @@ enum imp_status imp__mesh_build(const struct imp_build *b, void *self,
     IMP_TRY(areas_sum(b, m, s, data->n_triangles));
     m->normals = normals && !is_flat(m, normals, data->n_triangles) ? normals : NULL;
     if (!m->normals) IMP_TRY(tangents_make(b, m, data->n_triangles));
+    if (data->n_triangles <= IMP_FACETS_MAX)
+        IMP_TRY(facets_make(b, m, data->n_triangles));
     s->geometry = IMP_TRIANGLES;
     s->smooth = m->normals != NULL;
     s->triangles = (struct imp_triangles){n, data->n_triangles, m->positions, m->indices};
@@ -280,8 +328,10 @@ bool imp__mesh_sample(const struct imp_shape *s, const imp_v3 *ref, const double
     double b[2];
     imp__uniform_triangle((double[2]){within, u[1]}, b);
     const struct imp_hit hit = {.prim = (int)lo, .u = b[0], .v = b[1]};
+    const struct imp__facet *f = m->facets ? &m->facets[lo] : NULL;
+    const struct corner c = f ? (struct corner){f->p0, f->e1, f->e2} : corner(m, lo);
     struct imp_surface at;
-    point(m, &hit, &at);
+    point(m, &hit, &c, f ? f->ng : face_normal(m, lo), &at);
     out->uv[0] = at.uv[0];
     out->uv[1] = at.uv[1];
     return imp__light_from_area(*ref, at.p, at.ng, at.n, m->inv_area, out);

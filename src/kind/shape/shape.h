@@ -91,6 +91,13 @@ enum imp_status imp__mesh_build(const struct imp_build *b, void *self,
 enum imp_status imp__mesh_normals(imp_context *ctx, size_t n_vertices, size_t n_triangles,
                                   const float *positions, const uint32_t *indices,
                                   float *out);
+/* A triangle as light samples and hits want it, in double: made once for meshes of few. */
+struct imp__facet {
+    imp_v3 p0, e1, e2, ng; /* first vertex, edges from it, face normal */
+    imp_v3 dp_du, dp_dv;
+    imp_v3 s, t; /* shading frame, where the normals are the faces' */
+};
+#define IMP_FACETS_MAX 1024 /* triangles of a mesh that has them: 256 kB */
 struct imp__mesh {
     const float *positions, *normals, *uvs; /* world; normals, uvs may be NULL */
     const uint32_t *indices;
@@ -101,6 +108,7 @@ struct imp__mesh {
     const double *face_normals;  /* [3 n_triangles], 0 0 1 of those without area */
     const double *face_tangents; /* [3 n_triangles] s of the shading frame of flat meshes,
                                     where it does not vary over a triangle; else NULL */
+    const struct imp__facet *facets; /* [n_triangles]; NULL: too many */
 };
 void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit,
                        const imp_v3 *o, const imp_v3 *d, struct imp_surface *out);
