@@ -18,32 +18,33 @@ static void add_dense(struct imp_sink *sink, int param, size_t element, int chan
     else batch[0] += t->lanes == 3 ? imp__sum3(*bar) : (*bar)[0];
 }
 
+/* Where key is, or would be (Fibonacci hashing; Knuth, vol. 3, 6.4). */
+static inline struct imp__tally_slot *slot_of(const struct imp_tally *t, uint32_t key)
+{
+    const size_t mask = t->table_size - 1;
+    size_t k = (key * UINT64_C(0x9e3779b97f4a7c15)) >> 32 & mask;
+    while (t->table[k].entry && t->table[k].key != key) k = (k + 1) & mask;
+    return &t->table[k];
+}
+
 static bool table_grow(struct imp_tally *t)
 {
     const size_t size = t->table_size ? 2 * t->table_size : TABLE_MIN;
-    uint32_t *table = imp__alloc(t->ctx, size, sizeof *table);
+    struct imp__tally_slot *table = imp__alloc(t->ctx, size, sizeof *table);
     if (!table) return false;
-    for (size_t k = 0; k < t->n_entries; k++) {
-        size_t slot = imp__mix64(t->entries[k].key) & (size - 1);
-        while (table[slot]) slot = (slot + 1) & (size - 1);
-        table[slot] = (uint32_t)k + 1;
-    }
     imp__release(t->ctx, t->table);
     t->table = table;
     t->table_size = size;
+    for (size_t k = 0; k < t->n_entries; k++)
+        *slot_of(t, t->entries[k].key) =
+            (struct imp__tally_slot){t->entries[k].key, (uint32_t)k + 1};
     return true;
 }
 
-static struct imp__tally_entry *entry_find(struct imp_tally *t, uint32_t key,
-                                           int channels)
+static __attribute__((noinline)) struct imp__tally_entry *
+entry_add(struct imp_tally *t, uint32_t key, int channels)
 {
     if (2 * t->n_entries >= t->table_size && !table_grow(t)) return NULL;
-    size_t slot = imp__mix64(key) & (t->table_size - 1);
-    while (t->table[slot]) {
-        struct imp__tally_entry *e = &t->entries[t->table[slot] - 1];
-        if (e->key == key) return e;
-        slot = (slot + 1) & (t->table_size - 1);
-    }
     void *grown = imp__grow(t->ctx, t->entries, &t->cap_entries, t->n_entries + 1,
                             sizeof *t->entries);
     if (!grown) return NULL;
@@ -52,8 +53,18 @@ static struct imp__tally_entry *entry_find(struct imp_tally *t, uint32_t key,
     memset(e, 0, sizeof *e);
     e->key = key;
     e->channels = (uint32_t)channels;
-    t->table[slot] = (uint32_t)t->n_entries;
+    *slot_of(t, key) = (struct imp__tally_slot){key, (uint32_t)t->n_entries};
     return e;
+}
+
+static inline struct imp__tally_entry *entry_find(struct imp_tally *t, uint32_t key,
+                                                  int channels)
+{
+    if (imp_likely(t->table_size > 0)) {
+        const struct imp__tally_slot *s = slot_of(t, key);
+        if (imp_likely(s->entry)) return &t->entries[s->entry - 1];
+    }
+    return entry_add(t, key, channels);
 }
 
 static void add_hashed(struct imp_sink *sink, int param, size_t element, int channels,

@@ -15,11 +15,13 @@
 
 #define IMP_TALLY_DENSE 1024 /* numbers, above which the hash table is used */
 
-struct imp__tally_entry {        /* three neighbouring numbers, or one (then lane 0) */
-    imp_spec batch, sum, square; /* of the pixel at work */
-    double mean[3], variance[3]; /* of the tile so far */
+struct imp__tally_entry { /* three neighbouring numbers, or one (then lane 0) */
+    /* Of the pixel at work. What an addition needs is on one cache line. */
+    imp_spec batch;
     uint32_t key, channels;
-    bool touched; /* by the pixel at work */
+    bool touched;
+    _Alignas(IMP_CACHE_LINE) imp_spec sum, square;
+    double mean[3], variance[3]; /* of the tile so far */
 };
 
 struct imp_tally {
@@ -31,7 +33,9 @@ struct imp_tally {
     /* dense: [n] each */
     double *batch, *sum, *square, *mean, *variance;
     /* hash: open addressing; `entries` in order of arrival, `touched` of the pixel */
-    uint32_t *table; /* [table_size] entry + 1, 0: free */
+    struct imp__tally_slot {
+        uint32_t key, entry; /* entry + 1, 0: free */
+    } * table;               /* [table_size], a power of two */
     size_t table_size, n_entries, cap_entries;
     struct imp__tally_entry *entries;
     uint32_t *touched;
