@@ -229,6 +229,11 @@ struct imp_bsdf_ops {
      * direction drawn takes its place. */
     bool (*directional_albedo)(const struct imp_bsdf *b, const imp_spec *in,
                                const imp_v3 *wo, imp_spec *albedo);
+
+    /* pdf and eval of one direction, where they have work in common: the same numbers,
+     * to the bit; *f is anything where the density is 0. NULL: they are called in turn. */
+    double (*pdf_eval)(const struct imp_bsdf *b, const imp_spec *in,
+                       const struct imp_dirs *d, imp_spec *f);
 };
 
 /* ---- Texture ------------------------------------------------------------------- */

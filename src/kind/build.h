@@ -38,6 +38,16 @@ extern const struct imp_bsdf_ops imp__black;
 void imp__bsdf_albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
                       imp_spec *albedo);
 
+/* Density and value of a direction; *f is anything where the density is not positive. */
+static inline double imp__bsdf_pdf_eval(const struct imp_bsdf *b, const imp_spec *in,
+                                        const struct imp_dirs *d, imp_spec *f)
+{
+    if (imp_likely(b->ops->pdf_eval != NULL)) return b->ops->pdf_eval(b, in, d, f);
+    const double p = b->ops->pdf(b, in, d);
+    if (p > 0) b->ops->eval(b, in, d, f);
+    return p;
+}
+
 /* Inputs at a point (src/kind/texture/input.c). in [n]. */
 void imp__inputs_look_up(const struct imp_input *const *input, int n,
                          const struct imp_texcoord *at, imp_spec *in);

@@ -110,7 +110,8 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
     /* Its weight against the continuation that could have met it. */
     const struct imp_dirs dirs = {s->wo, imp__decide(imp__to_local(frame, ls.wi)),
                                   IMP_SMOOTH};
-    const double kernel = b->ops->pdf(b, s->in, &dirs);
+    imp_spec f;
+    const double kernel = imp__bsdf_pdf_eval(b, s->in, &dirs, &f);
     if (!(kernel > 0)) return; /* structurally zero: nothing to see, no derivative */
     double pdf;
     imp__direction_pdf(s, kernel, ls.wi, -1, IMP_SMOOTH, &pdf);
@@ -126,8 +127,6 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
     const bool far = !isfinite(ls.dist);
     const imp_v3 point = imp__decide(far ? (imp_v3){0} : ls.p);
     const imp_spec le = imp__emitter_radiance(scene, light, &x, point, s->at.carried);
-    imp_spec f;
-    b->ops->eval(b, s->in, &dirs, &f);
     const struct imp_active *active = s->tracer->active;
     const bool differentiable =
         active && ((b->index >= 0 && active->bsdf[b->index]) || active->emitter[light]);

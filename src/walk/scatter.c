@@ -83,14 +83,13 @@ bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_sur
     const imp_v3 w = imp__to_world(frame, dirs.wi);
     dirs.wo = s->wo;
     dirs.wi = imp__decide(dirs.wi);
-    const double kernel = b->ops->pdf(b, s->in, &dirs);
+    imp_spec f;
+    const double kernel = imp__bsdf_pdf_eval(b, s->in, &dirs, &f);
     if (!(kernel > 0)) return false; /* structurally zero */
     double competing;
     const double pdf =
         imp__decide1(imp__direction_pdf(s, kernel, w, drawn, dirs.lobe, &competing));
     if (!(pdf > 0)) return false;
-    imp_spec f;
-    b->ops->eval(b, s->in, &dirs, &f);
 
     /* Does the walk go on? */
     double survive = 1;

@@ -136,6 +136,7 @@ static void wrong_densities(void)
                     right_ops = s->bsdfs[i]->ops;
             wrong = *right_ops;
             wrong.pdf = wrong_pdf;
+            wrong.pdf_eval = NULL;
             wrong_by = 1 + 0.15 * sign;
             for (int i = 0; i < s->n_bsdfs; i++)
                 if (s->bsdfs[i]->ops == right_ops) s->bsdfs[i]->ops = &wrong;

@@ -48,6 +48,24 @@ static bool draw(const struct point *p, struct imp_key key, uint32_t i,
     return kind_draw(p->b, p->in, u, d, s);
 }
 
+/* pdf_eval gives the bits of pdf and eval, on either side. */
+static bool at_once(const struct point *p, const struct imp_dirs *d)
+{
+    const struct imp_bsdf_ops *ops = p->b->ops;
+    if (!ops->pdf_eval) return true;
+    for (int side = 0; side < 4; side++) {
+        struct imp_dirs e = *d;
+        imp_spec f, both;
+        if (side & 1) e.wo[2] = -e.wo[2];
+        if (side & 2) e.wi[2] = -e.wi[2];
+        const double density = ops->pdf(p->b, p->in, &e);
+        if (ops->pdf_eval(p->b, p->in, &e, &both) != density) return false;
+        ops->eval(p->b, p->in, &e, &f);
+        if (density > 0 && memcmp(&f, &both, 3 * sizeof(double)) != 0) return false;
+    }
+    return true;
+}
+
 static void draw_check(const struct point *p, const struct imp_dirs *d,
                        const struct kind_draw *s, struct result *r)
 {
@@ -57,6 +75,7 @@ static void draw_check(const struct point *p, const struct imp_dirs *d,
     if (d->lobe == IMP_SMOOTH) r->sane &= (p->b->flags & IMP_BSDF_SMOOTH) != 0;
     else r->sane &= (p->b->flags & IMP_BSDF_DELTA) != 0;
     r->sane &= d->wi[2] * d->wo[2] > 0 || (p->b->flags & IMP_BSDF_TRANSMIT);
+    r->sane &= at_once(p, d);
 }
 
 static struct result check(const struct point *p, int samples, uint64_t seed)

@@ -31,6 +31,14 @@ static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp
     (void)b, (void)in;
     return imp__lambert(d);
 }
+static double pdf_eval(const struct imp_bsdf *b, const imp_spec *in,
+                       const struct imp_dirs *d, imp_spec *f)
+{
+    (void)b;
+    const double p = imp__lambert(d);
+    *f = in[RHO] * p;
+    return p;
+}
 static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
                    imp_spec *df)
 {
@@ -60,4 +68,5 @@ const struct imp_bsdf_ops imp__diffuse = {.size = sizeof(struct imp_bsdf_ops),
                                           .pdf = pdf,
                                           .eval_d = eval_d,
                                           .albedo = albedo,
-                                          .directional_albedo = directional_albedo};
+                                          .directional_albedo = directional_albedo,
+                                          .pdf_eval = pdf_eval};

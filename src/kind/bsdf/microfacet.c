@@ -86,6 +86,15 @@ double imp__microfacet_pdf(const struct imp__microfacet *f, const imp_v3 *v,
     return f->visible ? D * g1_exact(f, v) * vm / (*v)[2] : D * (*m)[2];
 }
 
+double imp__microfacet_pdf_of(const struct imp__microfacet *f, const imp_v3 *v,
+                              const imp_v3 *m, double D, double G1)
+{
+    const double vm = imp__dot(*v, *m);
+    if (!(vm > 0) || !((*v)[2] > 0)) return 0;
+    if (!f->visible) return D * (*m)[2];
+    return D * (f->type == IMP_GGX ? G1 : g1_exact(f, v)) * vm / (*v)[2];
+}
+
 /* Inverse error function to 2e-3 (Winitzki 2008): where Halley's steps begin. */
 static double erf_inverse_start(double y)
 {

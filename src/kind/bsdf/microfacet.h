@@ -36,5 +36,8 @@ imp_v3 imp__microfacet_sample(const struct imp__microfacet *f, const imp_v3 *v,
                               const double u[2]);
 double imp__microfacet_pdf(const struct imp__microfacet *f, const imp_v3 *v,
                            const imp_v3 *m);
+/* The same where D of m, and G1 of v, are known. */
+double imp__microfacet_pdf_of(const struct imp__microfacet *f, const imp_v3 *v,
+                              const imp_v3 *m, double D, double G1);
 
 #endif

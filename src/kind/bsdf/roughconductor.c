@@ -52,6 +52,19 @@ static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp
     const imp_v3 h = imp__normalize(d->wo + d->wi);
     return imp__microfacet_pdf(&m, &d->wo, &h) / (4 * imp__dot(d->wo, h));
 }
+static double pdf_eval(const struct imp_bsdf *b, const imp_spec *in,
+                       const struct imp_dirs *d, imp_spec *f)
+{
+    if (!imp__front(d)) return 0;
+    const struct imp__microfacet m = imp__roughness_at(b->self, &in[ALPHA]);
+    const imp_v3 h = imp__normalize(d->wo + d->wi);
+    const double D = imp__microfacet_d(&m, &h, NULL),
+                 Go = imp__microfacet_g1(&m, &d->wo, NULL),
+                 G = imp__microfacet_g1(&m, &d->wi, NULL) * Go;
+    imp__fresnel_conductor(fmin(1, imp__dot(d->wo, h)), &in[ETA], &in[K], f);
+    *f *= in[TINT] * (D * G / (4 * d->wo[2]));
+    return imp__microfacet_pdf_of(&m, &d->wo, &h, D, Go) / (4 * imp__dot(d->wo, h));
+}
 static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
                    struct imp_dirs *d)
 {
@@ -103,4 +116,5 @@ const struct imp_bsdf_ops imp__roughconductor = {.size = sizeof(struct imp_bsdf_
                                                  .sample = sample,
                                                  .eval = eval,
                                                  .pdf = pdf,
-                                                 .eval_d = eval_d};
+                                                 .eval_d = eval_d,
+                                                 .pdf_eval = pdf_eval};

@@ -68,6 +68,15 @@ static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp
     const struct imp_dirs e = {flip(d->wo, back), flip(d->wi, back), d->lobe};
     return c->ops->pdf(c, in + first, &e);
 }
+static double pdf_eval(const struct imp_bsdf *b, const imp_spec *in,
+                       const struct imp_dirs *d, imp_spec *f)
+{
+    bool back;
+    int first;
+    const struct imp_bsdf *c = side(b, &d->wo, &back, &first);
+    const struct imp_dirs e = {flip(d->wo, back), flip(d->wi, back), d->lobe};
+    return imp__bsdf_pdf_eval(c, in + first, &e, f);
+}
 static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
                    imp_spec *df)
 {
@@ -148,4 +157,5 @@ const struct imp_bsdf_ops imp__twosided = {.size = sizeof(struct imp_bsdf_ops),
                                            .emit_d = emit_d,
                                            .sample_d = sample_d,
                                            .albedo = albedo,
-                                           .directional_albedo = directional_albedo};
+                                           .directional_albedo = directional_albedo,
+                                           .pdf_eval = pdf_eval};
