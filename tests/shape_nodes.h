@@ -10,10 +10,11 @@
 #include <stdlib.h>
 
 static struct imp_scene world;
+static struct imp_bsdf world_bsdf = {.flags = IMP_BSDF_SMOOTH};
 
 static inline void world_begin(imp_context *ctx)
 {
-    world = (struct imp_scene){.ctx = ctx};
+    world = (struct imp_scene){.ctx = ctx, .default_bsdf = &world_bsdf};
     imp__arena_init(&world.arena, ctx);
 }
 static inline void world_end(void)

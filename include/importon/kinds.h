@@ -340,6 +340,8 @@ struct imp_triangles { /* world space */
     size_t n_vertices, n_triangles;
     const float *positions;  /* [3 n_vertices], room for 16 bytes after the end */
     const uint32_t *indices; /* [3 n_triangles] */
+    double volume;           /* enclosed: negative where the normals point inwards; of
+                                open meshes that of the cones to the centre of its box */
 };
 
 struct imp_shape {

@@ -221,6 +221,22 @@ static RTCGeometry geometry_create(RTCDevice rtc, const struct imp_shape *s, boo
     return g;
 }
 
+/* Does light travel on the inner side of the mesh: in a room, a body of glass, a medium?
+ * Of 10^8 rays in rooms of 20,480 triangles, some 70 slip between two triangles without
+ * Embree's robust flag and none with it (tests/stat/leaks.c); in rooms of 12, some 5. A
+ * ray that slips into an opaque body is lost to the picture as if it were black there.
+ * Rays without the flag take three quarters of the instructions. */
+#define FEW 64
+static bool is_boundary(const struct imp_scene *scene, const struct imp_shape *s)
+{
+    const struct imp_bsdf *b = imp__shape_bsdf(scene, s);
+    if (s->geometry != IMP_TRIANGLES || s->triangles.n_triangles <= FEW) return false;
+    if (s->body || (b->flags & (IMP_BSDF_TRANSMIT | IMP_BSDF_NULL))) return true;
+    if (b->n_child > 0) return true; /* two-sided */
+    const imp_v3 size = s->hi - s->lo;
+    return s->triangles.volume < -0.05 * (size[0] * size[1] * size[2]);
+}
+
 /* Of n shapes, the scene's (aims NULL) or the aims'. */
 static enum imp_status intersector_make(struct imp_scene *scene,
                                         const struct imp_aims *aims, int n, void **out)
@@ -236,9 +252,10 @@ static enum imp_status intersector_make(struct imp_scene *scene,
 
     told = (struct commit){.error = RTC_ERROR_NONE};
     x->rtc = rtcNewScene(rtc);
-    /* Robust: rays through shared edges do not fall between two triangles. */
+    bool robust = aims != NULL;
+    for (int i = 0; !aims && i < n; i++) robust |= is_boundary(scene, scene->shapes[i]);
     if (x->rtc)
-        rtcSetSceneFlags(x->rtc, RTC_SCENE_FLAG_ROBUST |
+        rtcSetSceneFlags(x->rtc, (robust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE) |
                                      (aims ? RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION : 0));
     for (int i = 0; x->rtc && i < n && told.error == RTC_ERROR_NONE; i++) {
         const struct imp_shape *s = aims ? aims->list[i].shape : scene->shapes[i];

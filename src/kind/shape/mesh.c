@@ -90,7 +90,8 @@ static enum imp_status areas_sum(const struct imp_build *b, struct imp__mesh *m,
     m->face_normals = normals;
     if (!m->cumulative || !normals)
         return imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory");
-    double sum = 0;
+    const imp_v3 centre = (s->lo + s->hi) * 0.5;
+    double sum = 0, volume = 0;
     m->cumulative[0] = 0;
     for (size_t k = 0; k < n; k++) {
         const uint32_t *i = m->indices + 3 * k;
@@ -101,12 +102,14 @@ static enum imp_status areas_sum(const struct imp_build *b, struct imp__mesh *m,
         const imp_v3 ng = length > 0 ? c * (1 / length) : imp__v3(0, 0, 1);
         for (int j = 0; j < 3; j++) normals[3 * k + (size_t)j] = ng[j];
         sum += length / 2;
+        volume += imp__dot(p - centre, c) / 6;
         if (sum > before) m->last = k;
         m->cumulative[k + 1] = sum;
     }
     if (!isfinite(sum))
         return imp_build_error(b, NULL, IMP_E_SCENE, "its area is not finite");
     s->area = sum;
+    s->triangles.volume = volume;
     m->inv_area = sum > 0 ? 1 / sum : 0;
     return IMP_OK;
 }
@@ -244,7 +247,8 @@ static enum imp_status tangents_make(const struct imp_build *b, struct imp__mesh
     return IMP_OK;
 }
 
-static enum imp_status facets_make(const struct imp_build *b, struct imp__mesh *m, size_t n)
+static enum imp_status facets_make(const struct imp_build *b, struct imp__mesh *m,
+                                   size_t n)
 {
     struct imp__facet *facets = imp__arena_take(b->arena, n, sizeof *facets);
     if (!facets) return imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory");
@@ -253,8 +257,8 @@ static enum imp_status facets_make(const struct imp_build *b, struct imp__mesh *
         const struct corner c = corner(m, k);
         struct imp_surface at;
         surface_from_arrays(m, &hit, &at);
-        facets[k] = (struct imp__facet){c.p0,     c.e1,     c.e2, at.ng,
-                                        at.dp_du, at.dp_dv, at.s, at.t};
+        facets[k] =
+            (struct imp__facet){c.p0, c.e1, c.e2, at.ng, at.dp_du, at.dp_dv, at.s, at.t};
     }
     m->facets = facets;
     return IMP_OK;
@@ -303,7 +307,10 @@ enum imp_status imp__mesh_build(const struct imp_build *b, void *self,
         IMP_TRY(facets_make(b, m, data->n_triangles));
     s->geometry = IMP_TRIANGLES;
     s->smooth = m->normals != NULL;
-    s->triangles = (struct imp_triangles){n, data->n_triangles, m->positions, m->indices};
+    s->triangles.n_vertices = n;
+    s->triangles.n_triangles = data->n_triangles;
+    s->triangles.positions = m->positions;
+    s->triangles.indices = m->indices;
 out:
     return st;
 }

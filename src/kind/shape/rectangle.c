@@ -51,7 +51,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
     }
     s->lo[3] = s->hi[3] = 0;
     s->geometry = IMP_TRIANGLES;
-    s->triangles = (struct imp_triangles){4, 2, r->positions, r->indices};
+    s->triangles = (struct imp_triangles){4, 2, r->positions, r->indices, 0};
     return IMP_OK;
 }
 
