@@ -1,0 +1,129 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Two builds of the program beside each other, say of today and of a month ago: processor
+ * seconds (user and system) and peak memory of pictures, losses with gradients and checks,
+ * one thread each. A round runs every job once with either build, in turn; the minimum of
+ * all rounds counts. Prints a table for docs/speed.md.
+ *
+ *     versions [--rounds N] [--job TEXT] OLD NEW        (paths of two cli/importon) */
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+enum { WORDS_MAX = 32 };
+
+struct job {
+    const char *name;
+    const char *words[WORDS_MAX]; /* of the command line, after the program */
+    double seconds[2], mib[2];    /* minima of the old and the new build */
+};
+
+#define CORNELL  IMP_SCENES "/cornell.xml", "-D", "res=128"
+#define TEXTURED IMP_SCENES "/textured.xml", "-D", "width=160", "-D", "height=120"
+#define PICTURE  "--no-preview", "-o", "picture.exr"
+
+static struct job jobs[] = {
+    {.name = "picture, Cornell box",
+     .words = {"render", CORNELL, "--spp", "64", PICTURE}},
+    {.name = "picture, textured", .words = {"render", TEXTURED, "--spp", "64", PICTURE}},
+    {.name = "loss + gradient, Cornell box",
+     .words = {"gradient", CORNELL, "--spp", "64", "-T", "cornell.exr"}},
+    {.name = "loss + gradient, textured",
+     .words = {"gradient", TEXTURED, "--spp", "64", "-T", "textured.exr"}},
+    {.name = "check, Cornell box",
+     .words = {"check", IMP_SCENES "/cornell.xml", "-D", "res=48", "--paths", "200",
+               "--fresh-spp", "16"}},
+    {.name = "check, textured, reflectances",
+     .words = {"check", IMP_SCENES "/textured.xml", "-D", "width=96", "-D", "height=72",
+               "--paths", "200", "--fresh-spp", "16", "-p", "*reflectance*"}}};
+enum { JOBS = sizeof jobs / sizeof jobs[0] };
+
+static const char *const targets[][WORDS_MAX] = {
+    {"render", CORNELL, "--spp", "32", "--seed", "7", "--no-preview", "-o",
+     "cornell.exr"},
+    {"render", TEXTURED, "--spp", "32", "--seed", "7", "--no-preview", "-o",
+     "textured.exr"}};
+
+/* Run it once; its processor seconds and peak memory. This program is small: what a child
+ * has before it becomes `program` does not count. */
+static void run(const char *program, const char *const *words, double *seconds,
+                double *mib)
+{
+    char *argv[WORDS_MAX + 5] = {(char *)program};
+    struct rusage usage;
+    int n = 1, status;
+    for (; *words; words++) argv[n++] = (char *)*words;
+    argv[n++] = "-t", argv[n++] = "1", argv[n++] = "-q";
+    unlink("picture.exr");
+    const pid_t pid = fork();
+    if (pid == 0) {
+        if (!freopen("/dev/null", "w", stdout)) _exit(127);
+        execv(program, argv);
+        _exit(127);
+    }
+    wait4(pid, &status, 0, &usage);
+    /* 1: a check that a difference stays too noisy for. */
+    if (!WIFEXITED(status) || WEXITSTATUS(status) > 1) {
+        fprintf(stderr, "versions: %s %s failed\n", program, argv[1]);
+        exit(3);
+    }
+    const double s = (double)(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
+                     1e-6 * (double)(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
+    const double m = (double)usage.ru_maxrss / 1024;
+    if (s < *seconds) *seconds = s;
+    if (m < *mib) *mib = m;
+}
+
+int main(int argc, char **argv)
+{
+    const char *program[2] = {NULL, NULL}, *wanted = "";
+    char *path[2], work[] = "/tmp/versions-XXXXXX";
+    int rounds = 9, n = 0;
+    for (int k = 1; k < argc; k++) {
+        if (!strcmp(argv[k], "--rounds") && k + 1 < argc) rounds = atoi(argv[++k]);
+        else if (!strcmp(argv[k], "--job") && k + 1 < argc) wanted = argv[++k];
+        else if (n < 2 && argv[k][0] != '-') program[n++] = argv[k];
+        else n = 3;
+    }
+    if (n != 2 || rounds < 1) {
+        fprintf(stderr, "usage: versions [--rounds N] [--job TEXT] OLD NEW\n");
+        return 2;
+    }
+    for (int b = 0; b < 2; b++)
+        if (!(path[b] = realpath(program[b], NULL))) {
+            fprintf(stderr, "versions: %s: no such program\n", program[b]);
+            return 2;
+        }
+    if (!mkdtemp(work) || chdir(work) != 0) {
+        fprintf(stderr, "versions: no folder to work in\n");
+        return 3;
+    }
+    for (size_t t = 0; t < sizeof targets / sizeof targets[0]; t++) {
+        double seconds = 1e30, mib = 1e30;
+        run(path[0], targets[t], &seconds, &mib);
+    }
+    for (int k = 0; k < JOBS; k++)
+        for (int b = 0; b < 2; b++) jobs[k].seconds[b] = jobs[k].mib[b] = 1e30;
+    for (int r = 0; r < rounds; r++)
+        for (int k = 0; k < JOBS; k++)
+            for (int b = 0; strstr(jobs[k].name, wanted) && b < 2; b++)
+                run(path[b], jobs[k].words, &jobs[k].seconds[b], &jobs[k].mib[b]);
+
+    printf("| %d rounds | old s | new s | new / old | old MiB | new MiB | new / old |\n"
+           "|---|---|---|---|---|---|---|\n",
+           rounds);
+    for (int k = 0; k < JOBS; k++) {
+        const struct job *j = &jobs[k];
+        if (!strstr(j->name, wanted)) continue;
+        printf("| %s | %.3f | %.3f | %.3f | %.1f | %.1f | %.2f |\n", j->name,
+               j->seconds[0], j->seconds[1], j->seconds[1] / j->seconds[0], j->mib[0],
+               j->mib[1], j->mib[1] / j->mib[0]);
+    }
+    unlink("picture.exr"), unlink("cornell.exr"), unlink("textured.exr");
+    if (chdir("/") == 0) rmdir(work);
+    free(path[0]), free(path[1]);
+    return 0;
+}
