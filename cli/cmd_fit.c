@@ -111,6 +111,7 @@ static void put_json(struct json *j, const imp_problem *problem,
     json_seed(j, "seed", cli.seed);
     const struct imp_run run = cli_run();
     json_integer(j, "spp", problem_spp(&run));
+    json_integer(j, "spp_taken", r->spp);
     json_integer(j, "iterations", r->iterations);
     json_number(j, "value", r->objective.value);
     json_number(j, "se", r->objective.se);

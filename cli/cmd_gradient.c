@@ -25,7 +25,8 @@ struct result {
     struct imp_estimate value;
     const char *functional; /* "loss", "mean" or "adjoint" */
     double *x, *grad, *se;
-    int rounds, spp; /* of the run, each with spp samples */
+    int rounds, spp; /* of the run, each with spp samples asked for */
+    int spp_taken;   /* by a round's gradient: of the target with most of them */
 };
 
 /* The adjoint image: from the file, or 1 / (number of pixels and channels) everywhere. */
@@ -145,6 +146,12 @@ static int compute(imp_problem *problem, const struct imp_run *run, struct resul
     r->functional = loss ? "loss" : adjoint_path ? "adjoint" : "mean";
     r->rounds = 1;
     r->spp = cli_spp(run);
+    for (int t = loss ? 0 : -1; t < (int)problem_options.targets.n; t++) {
+        int taken = 0;
+        const enum imp_status st = imp_problem_spp(problem, t, run, &taken);
+        if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+        if (taken > r->spp_taken) r->spp_taken = taken;
+    }
     if (!loss) rc = adjoint_image(run, &seed);
     if (!rc && cli.time_s > 0) {
         rc = estimate_for(problem, *run, seed, r);
@@ -165,6 +172,7 @@ static void print_json(const struct imp_run *run, const struct result *r,
     struct json j = cli_json();
     json_seed(&j, "seed", run->seed);
     json_integer(&j, "spp", (int64_t)r->spp * r->rounds);
+    json_integer(&j, "spp_taken", (int64_t)r->spp_taken * r->rounds);
     json_text(&j, "functional", r->functional);
     if (!strcmp(r->functional, "loss")) json_text(&j, "loss", loss_word());
     json_number(&j, "value", r->value.value);

@@ -27,7 +27,7 @@ answer() {
     shift
     "$importon" "$@" --json -q 2>/dev/null | python3 -c '
 import json, sys
-volatile = {"seconds"}  # what a clock says
+volatile = {"seconds", "spp_taken"}  # what a clock says; what of "spp" was rounded
 def walk(path, x):
     if isinstance(x, dict):
         for k in x: walk(path + "." + k, x[k])

@@ -593,12 +593,22 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_problem_add_tikhonov(imp_problem *pro
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_problem_add_smoothness(imp_problem *problem, const char *glob, double weight);
 
+/** Samples per pixel that imp_problem_objective takes for a target (imp_problem_reverse
+ * for target -1), where this run asks for run->spp: they are cut into replicates of equal
+ * size, so it may be a few more.
+ * @return IMP_OK; IMP_E_ARG if there is no such target or sensor. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_problem_spp(const imp_problem *problem,
+                                                       int target,
+                                                       const struct imp_run *run,
+                                                       int *spp);
+
 /**
  * Objective and gradient in one call, from the same walks.
  *
  * Quadratic losses through box filters take one pass with leave-one-out adjoints, so that
  * value and gradient have no bias (docs: estimators); others take two passes, and
- * objective->bias_order says what is left. spp is rounded up to at least 2.
+ * objective->bias_order says what is left. spp is rounded up to at least 2,
+ * and so that replicates have one size (imp_problem_spp).
  *
  * @param x         [imp_problem_n]; NULL: the scene's values.
  * @param run       run->sensor is ignored; NULL for defaults.
@@ -752,6 +762,8 @@ struct imp_fit_result {
     /** [n][n] of the variables, measurement and Monte Carlo together, in the directions
      * that the pictures determine and no bound holds. NULL: no intervals. */
     const double *covariance;
+    int spp; /**< samples per pixel that each evaluation of the search took, of the
+                  target with most of them */
 };
 
 /** Fit the active parameters to the targets; the scene ends at the best estimate.

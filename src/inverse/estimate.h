@@ -8,6 +8,7 @@
 
 #define IMP_BATCH_MAX        64 /* walks of a pixel kept at once (quadratic losses) */
 #define IMP_BATCHES_PER_ITEM 8
+#define IMP_WIDE_REPLICATES  8 /* most of a Gauss-Newton matrix through wide filters */
 
 /* R replicates of n samples; spp = R n >= the spp asked for. R = 1 only where spp < 4:
  * then neighbouring pixels are paired, which makes the variance an upper bound. */
@@ -15,6 +16,12 @@ struct imp__replicates {
     int n, R, chunks; /* chunks: work items per tile, each with at least 2 replicates */
 };
 struct imp__replicates imp__replicates_plan(int spp, int batch_max);
+/* Those of imp_problem_objective for a target, of imp_problem_reverse for none; spp 0:
+ * the sensor's. */
+struct imp__replicates imp__replicates_of(const struct imp_sensor *sensor,
+                                          const struct imp__target *target, int spp);
+/* Those of Gauss-Newton matrices. */
+struct imp__replicates imp__replicates_normal(const struct imp_sensor *sensor, int spp);
 /* Replicates b0 <= b < b1 of chunk k. */
 static inline int imp__replicates_begin(struct imp__replicates r, int k)
 {
@@ -30,7 +37,6 @@ enum imp_status imp__problem_objective(struct imp_problem *p, const double *x,
 /* The tracer of a sensor for this problem, with every reason to refuse checked. */
 enum imp_status imp__problem_tracer(const struct imp_problem *p,
                                     const struct imp_run *run, struct imp_tracer *out);
-/* The run to use: the given one or the defaults. */
 /* Are all numbers of an adjoint image finite? `name` is the argument's. */
 enum imp_status imp__adjoint_check(const struct imp_problem *problem,
                                    const struct imp_film_desc *film, const float *adjoint,

@@ -4,6 +4,7 @@
  * fit of millions of numbers takes: theirs are made when they are asked for, from the
  * search, which is kept. */
 #include "base/arguments.h"
+#include "estimate.h"
 #include "fit.h"
 #include "search/covariance.h"
 #include <math.h>
@@ -145,6 +146,21 @@ covariance_give(struct imp__fit *f, const struct imp__uncertainty *u, const doub
     return IMP_OK;
 }
 
+static int spp_taken(const struct imp__fit *f)
+{
+    const struct imp_problem *p = f->problem;
+    int most = 0;
+    for (size_t t = 0; t < p->n_targets; t++) {
+        const struct imp_sensor *sensor = p->scene->sensors[p->targets[t].desc.sensor];
+        const struct imp__replicates r =
+            f->options.optimizer == IMP_LM
+                ? imp__replicates_normal(sensor, f->outer.spp)
+                : imp__replicates_of(sensor, &p->targets[t], f->outer.spp);
+        most = imp_max(most, r.n * r.R);
+    }
+    return most;
+}
+
 enum imp_status imp__fit_answer(struct imp__fit *f, struct imp__search *s,
                                 struct imp_estimate objective,
                                 const struct imp__uncertainty *u,
@@ -202,6 +218,7 @@ enum imp_status imp__fit_answer(struct imp__fit *f, struct imp__search *s,
         .warning = imp__fit_warning(f, objective.bias_order, rows, u->loosest, why, &left,
                                     shift),
         .shift = shift->of_se >= 0 ? shift->of_se : NAN,
+        .spp = spp_taken(f),
         .residual = left.relative,
         .residual_hi = left.relative_hi,
         .chi2 = left.chi2,

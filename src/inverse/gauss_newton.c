@@ -277,8 +277,7 @@ static enum imp_status target_add(struct job *j, const struct imp__target *targe
         return imp__gauss_newton_wide(p, &j->tracer, target, &own, lo, hi, &total);
     }
     j->width = film->crop_w;
-    j->plan = imp__replicates_plan(
-        imp_max(own.spp > 0 ? own.spp : j->tracer.sensor->spp, 4), IMP_BATCH_MAX);
+    j->plan = imp__replicates_normal(j->tracer.sensor, own.spp);
     const double walks = (double)film->crop_w * film->crop_h * j->plan.n * j->plan.R;
     j->tiles = (struct imp_tiles){.ctx = p->ctx,
                                   .run = &own,

@@ -65,7 +65,8 @@ enum imp_status imp__problem_same(struct imp_problem *p, const struct imp_run *r
 /* IMP_E_UNSUPPORTED where this context's calls are parts, or a merge of such. */
 enum imp_status imp__problem_no_parts(const struct imp_problem *p, const char *call);
 
-/* Regularisers' value; adds their gradient (may be NULL). x [n]. */
+/* Regularisers' value; adds their gradient (may be NULL). x [n]; NULL: what the scene has
+ * now. */
 double imp__regularise(const struct imp_problem *p, const double *x, double *gradient);
 
 /* Their second derivative, H [n][n]. */

@@ -66,12 +66,23 @@ enum imp_status imp_problem_add_smoothness(imp_problem *p, const char *glob,
     return add(p, glob, weight, IMP_SMOOTHNESS, false);
 }
 
+/* Numbers of a parameter: x, or where that is NULL those that the scene has now. */
+struct numbers {
+    const double *x;
+    const struct imp_param *param;
+};
+static double at(const struct numbers *v, size_t e)
+{
+    return v->x ? v->x[e] : imp__param_get(v->param, e);
+}
+
 /* 1/2 w sum (x - x0)^2 */
-static double tikhonov(double w, size_t n, const double *x, const double *x0, double *g)
+static double tikhonov(double w, size_t n, const struct numbers *v, const double *x0,
+                       double *g)
 {
     double sum = 0;
     for (size_t e = 0; e < n; e++) {
-        const double d = x[e] - (x0 ? x0[e] : 0);
+        const double d = at(v, e) - (x0 ? x0[e] : 0);
         sum += d * d;
         if (g) g[e] += w * d;
     }
@@ -79,8 +90,8 @@ static double tikhonov(double w, size_t n, const double *x, const double *x0, do
 }
 
 /* 1/2 w sum over neighbours of (x_q - x_p)^2, along both axes of [h][w][c] */
-static double smoothness(double weight, size_t h, size_t w, size_t c, const double *x,
-                         double *g)
+static double smoothness(double weight, size_t h, size_t w, size_t c,
+                         const struct numbers *v, double *g)
 {
     double sum = 0;
     for (size_t i = 0; i < h; i++)
@@ -91,7 +102,7 @@ static double smoothness(double weight, size_t h, size_t w, size_t c, const doub
                 const bool inside[2] = {j + 1 < w, i + 1 < h};
                 for (int a = 0; a < 2; a++) {
                     if (!inside[a]) continue;
-                    const double d = x[next[a]] - x[here];
+                    const double d = at(v, next[a]) - at(v, here);
                     sum += d * d;
                     if (!g) continue;
                     g[next[a]] += weight * d;
@@ -110,16 +121,16 @@ double imp__regularise(const struct imp_problem *p, const double *x, double *gra
             const int64_t base = p->active.base[k];
             if (base < 0 || !r->on[k]) continue;
             const struct imp_param_info *info = &p->scene->params[k].info;
-            const double *at = x + base;
+            const struct numbers v = {x ? x + base : NULL, &p->scene->params[k]};
             double *g = gradient ? gradient + base : NULL;
             if (r->kind == IMP_TIKHONOV)
-                value += tikhonov(r->weight, info->count, at,
+                value += tikhonov(r->weight, info->count, &v,
                                   r->origin ? r->origin + info->offset : NULL, g);
             else
                 value += smoothness(r->weight, info->dims[0], info->dims[1],
                                     info->count /
                                         imp_max(info->dims[0] * info->dims[1], (size_t)1),
-                                    at, g);
+                                    &v, g);
         }
     }
     return value;

@@ -4,13 +4,6 @@
 #include "loss.h"
 #include "seen.h"
 
-struct imp__replicates imp__splat_plan(int spp)
-{
-    struct imp__replicates r = {.R = spp >= 16 ? 4 : 2, .chunks = 1};
-    r.n = imp_max(2, (spp - 1) / r.R + 1);
-    return r;
-}
-
 static void sample_radiance(const void *payload, struct imp_sample *s)
 {
     const struct imp_tracer *tracer = payload;

@@ -24,7 +24,6 @@ struct imp__splat {
 };
 
 /* Two to four replicates of half the samples or fewer. */
-struct imp__replicates imp__splat_plan(int spp);
 enum imp_status imp__splat_create(const struct imp_problem *p,
                                   const struct imp_tracer *tracer,
                                   const struct imp__target *target, const float *seed,

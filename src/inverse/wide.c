@@ -25,11 +25,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define MANY    8  /* replicates, and */
-#define FEW     4  /* with less than */
-#define MANY_AT 32 /* samples per pixel */
-#define BLOCK   8  /* pixels */
-#define TAPS    16 /* reach of rho in pixels, at most */
+#define MANY  IMP_WIDE_REPLICATES
+#define BLOCK 8  /* pixels */
+#define TAPS  16 /* reach of rho in pixels, at most */
 
 struct wide {
     imp_context *ctx;
@@ -75,15 +73,15 @@ static enum imp_status replicates(struct wide *w, const struct imp_tracer *trace
 {
     enum imp_status st = IMP_OK;
     const int n = (int)(w->K + 1) * w->channels;
-    const int spp = imp_max(run->spp > 0 ? run->spp : tracer->sensor->spp, FEW);
-    w->R = spp < MANY_AT ? FEW : MANY;
+    const struct imp__replicates plan = imp__replicates_normal(tracer->sensor, run->spp);
+    w->R = plan.R;
     char *names = imp__alloc(w->ctx, (size_t)n, 12);
     if (!names) IMP_TRY(imp__error(w->ctx, IMP_E_NOMEM, "no memory"));
     for (int k = 0, used = 0; k < n; k++)
         used += snprintf(names + used, 12, "%s%d", k ? "," : "", k);
     for (int b = 0; b < w->R; b++) {
         struct imp_run own = *run;
-        own.spp = (spp - 1) / w->R + 1;
+        own.spp = plan.n;
         own.time_limit_s = 0;
         const struct pass pass = {tracer, run, lo + (hi - lo) * b / w->R,
                                   lo + (hi - lo) * (b + 1) / w->R};

@@ -116,6 +116,7 @@ static struct taken texture_fit(int texels, const char *checkpoint)
     test_must(ctx, imp_problem_activate(p, "*data*"));
     t.width = t.height = SIDE, t.channels = 3, t.pixels = target;
     test_must(ctx, imp_problem_add_target(p, &t));
+    test_must(ctx, imp_problem_add_smoothness(p, "*data*", 0.01));
 
     const size_t before = heap.bytes;
     run.spp = 4;

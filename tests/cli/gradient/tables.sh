@@ -6,6 +6,14 @@ importon gradient "$scene" -D res=8 -T target.exr --spp 1 -q --json >loss.json |
 importon gradient "$scene" -D res=8 -T target.exr --spp 2 -q --json >two.json || exit 9
 cmp loss.json two.json # 2 samples were taken, and are reported
 importon gradient "$scene" -D res=8 --spp 1 -q --json | grep -o '"spp":[0-9]*'
+importon gradient "$scene" -D res=8 --spp 5 -q --json | grep -o '"spp[_a-z]*":[0-9]*' | xargs
+importon gradient "$scene" -D res=8 --spp 5 -T target.exr -q --json | grep -o '"spp[_a-z]*":[0-9]*' | xargs
+for spp in 1 17; do # replicates have one size, and Gauss-Newton wants four samples
+    for optimizer in adam lm; do
+        importon fit "$scene" -D res=8 -T target.exr --spp $spp -n 1 --optimizer $optimizer -q -p 'sky*' --json |
+            grep -o '"spp[_a-z]*":[0-9]*' | xargs
+    done
+done
 importon gradient "$scene" -D res=8 --spp 4 -q | head -n 1 | grep -o '(.*'
 importon jacobian "$scene" -D res=8 --spp 16 -q -o J --json >jacobian.json || exit 9
 importon jacobian "$scene" -D res=8 --spp 16 -q -o J | grep -c 'is blue, .* red$'

@@ -1,0 +1,270 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "gradient_job.h"
+#include "adjoint.h"
+#include "base/team.h"
+#include "film/film_filter.h"
+#include <string.h>
+
+/* ---- One pixel's replicate ----------------------------------------------------- */
+
+/* An item's result, and the sum of several. */
+struct part {
+    double objective, variance;
+    double dense[]; /* [2][n] gradient and its variance, of few numbers */
+};
+
+/* Replicate b of a pixel: trace, fold, adjoints, sweep. Returns its loss estimate. */
+static double replicate(struct imp__gradient_job *j, struct imp_tile_worker *w, int x,
+                        int y, int b)
+{
+    const int n = j->plan.n;
+    struct imp_tally *tally = &j->tallies[w->index];
+    const struct imp_arena_mark mark = imp__arena_mark(&w->arena);
+    struct imp_walk *walks = imp__arena_take(&w->arena, (size_t)n, sizeof *walks);
+    imp_spec *L = imp__arena_take(&w->arena, (size_t)n, sizeof *L);
+    imp_spec *P = imp__arena_take(&w->arena, (size_t)n, sizeof *P);
+    double value = 0;
+    if (!walks || !L || !P) {
+        w->no_memory = true;
+        goto out;
+    }
+    const bool keep = j->target && !j->splat; /* the others' mean is needed first */
+    const size_t pixel = (size_t)y * (size_t)j->width + (size_t)x;
+    for (int i = 0; i < n; i++) {
+        const struct imp_arena_mark one = imp__arena_mark(&w->arena);
+        const int64_t sample = (int64_t)b * n + i;
+        imp__walk_trace(&j->tracer, &w->arena, x, y, sample, &walks[i]);
+        imp__tile_drop(w, walks[i].dropped, x, y, sample);
+        L[i] = walks[i].L;
+        if (keep) continue;
+        if (j->splat)
+            P[0] = imp__splat_adjoint(j->splat, b, walks[i].px, walks[i].py, L[i]);
+        else
+            for (int c = 0; c < 4; c++)
+                P[0][c] =
+                    c < j->channels
+                        ? j->seed[pixel * (size_t)j->channels + (size_t)c] / (double)n
+                        : 0;
+        imp__walk_sweep(&j->tracer, &walks[i], P[0], &tally->sink);
+        imp__arena_rewind(&w->arena, one);
+    }
+    if (keep) {
+        value = imp__replicate_adjoints(j->target, j->channels, pixel, n, L, P);
+        if (j->want_gradient)
+            for (int i = 0; i < n; i++)
+                imp__walk_sweep(&j->tracer, &walks[i], P[i], &tally->sink);
+    }
+    imp__tally_batch(tally);
+out:
+    imp__arena_rewind(&w->arena, mark);
+    return value;
+}
+
+/* ---- Tiles --------------------------------------------------------------------- */
+
+static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worker *w,
+                                 void *result, void *payload)
+{
+    struct imp__gradient_job *j = payload;
+    struct part *out = result;
+    struct imp_tally *tally = &j->tallies[w->index];
+    const int b0 = imp__replicates_begin(j->plan, (int)t->part);
+    const int b1 = imp__replicates_begin(j->plan, (int)t->part + 1);
+    const double R = b1 - b0, all = j->plan.R;
+    const bool paired = j->plan.R == 1; /* pixels two by two stand in for replicates */
+    double first = 0;
+    int in_pair = 0;
+
+    out->objective = out->variance = 0;
+    imp__tally_clear(tally);
+    for (int y = t->y0; y < t->y1; y++)
+        for (int x = t->x0; x < t->x1; x++) {
+            double sum = 0, square = 0;
+            for (int b = b0; b < b1; b++) {
+                const double v = replicate(j, w, x, y, b);
+                sum += v;
+                square += v * v;
+            }
+            w->no_memory |= tally->failed;
+            const enum imp_status st = imp__tile_check(w);
+            if (st != IMP_OK) return st;
+            if (!paired) {
+                /* mean over all R replicates; variance R/(R-1) spread / all^2 */
+                imp__tally_pixel(tally, R, 1 / all, R / ((R - 1) * all * all));
+                out->objective += sum / all;
+                out->variance += (square - sum * sum / R) * R / ((R - 1) * all * all);
+                continue;
+            }
+            out->objective += sum;
+            if (in_pair++ == 0) {
+                first = sum;
+                continue;
+            }
+            imp__tally_pixel(tally, 2, 1, 2);
+            out->variance += imp__sqr(first - sum);
+            in_pair = 0;
+        }
+    if (in_pair) {
+        imp__tally_pixel(tally, 2, 1, 2);
+        out->variance += imp__sqr(first);
+    }
+    if (tally->dense)
+        memcpy(out->dense, imp__tally_dense(tally),
+               2 * tally->active->n * sizeof *out->dense);
+    else imp__tally_flush(tally, j->mean, j->spread);
+    return IMP_OK;
+}
+
+static size_t dense_numbers(const struct imp__gradient_job *j)
+{
+    return j->want_gradient && !j->totals->many ? 2 * j->problem->n : 0;
+}
+
+static void tile_add(void *into, const void *from, void *payload)
+{
+    const size_t n = dense_numbers(payload);
+    struct part *a = into;
+    const struct part *b = from;
+    a->objective += b->objective;
+    a->variance += b->variance;
+    for (size_t k = 0; k < n; k++) a->dense[k] += b->dense[k];
+}
+
+static enum imp_status tile_take(size_t group, const void *sum, void *payload)
+{
+    const struct imp__gradient_job *j = payload;
+    const size_t n = dense_numbers(j) / 2;
+    const struct part *in = sum;
+    struct imp__totals *to = j->totals;
+    (void)group;
+    if (j->look) return IMP_OK;
+    to->objective += in->objective;
+    to->variance += in->variance;
+    for (size_t k = 0; k < n; k++) {
+        to->gradient[k] += in->dense[k];
+        to->gradient_variance[k] += in->dense[n + k];
+    }
+    return IMP_OK;
+}
+
+/* ---- Sums of many numbers ------------------------------------------------------- */
+
+#define LOOKS      64 /* 1 in so many items tells how large terms are, and */
+#define LOOKS_MOST 16 /* no more than so many: */
+#define SPARE_BITS 12 /* none found is 2^12 times larger, or all is done again */
+
+static double terms_most(const struct imp__gradient_job *j)
+{
+    return (double)imp__tiles_count(&j->tiles) * j->plan.chunks *
+           (double)j->problem->n_targets;
+}
+
+/* The largest terms of some tiles, of mean and spread; of more tiles where there is none.
+ * Every rank of a team looks by itself. */
+static enum imp_status terms_look(struct imp__gradient_job *j,
+                                  const struct imp_tiles_pass *run, double largest[2])
+{
+    const size_t all = imp__tiles_count(&j->tiles) * run->parts;
+    struct imp__team *team = j->problem->ctx->team;
+    struct imp_fixed_sum mean = {0}, spread = {0};
+    struct imp_tiles_pass pass = *run;
+    enum imp_status st = IMP_OK;
+    pass.fraction_hi = run->fraction_lo + 0.01 * (run->fraction_hi - run->fraction_lo);
+    j->look = true;
+    if (team) team->alone++;
+    j->mean = &mean;
+    j->spread = &spread;
+    for (size_t n = imp_clamp(all / LOOKS, (size_t)1, (size_t)LOOKS_MOST);
+         mean.bits == 0 && st == IMP_OK; n *= 4) {
+        pass.every = imp_max(all / n, (size_t)1);
+        st = imp__tiles_run(&j->tiles, &pass);
+        if (pass.every == 1) break;
+    }
+    j->look = false;
+    if (team) team->alone--;
+    j->tiles.drops = (struct imp_drops){0};
+    largest[0] = imp__fixed_largest(&mean);
+    largest[1] = imp__fixed_largest(&spread);
+    return st;
+}
+
+/* The unit of sums in fixed point. A merge of parts takes theirs. */
+static enum imp_status unit_find(struct imp__gradient_job *j,
+                                 const struct imp_tiles_pass *run)
+{
+    struct imp__totals *to = j->totals;
+    imp_context *ctx = j->problem->ctx;
+    const double all = (double)imp__tiles_count(&j->tiles) * (double)run->parts;
+    const double terms = fmax(terms_most(j), all);
+    double largest[2] = {0, 0};
+    bool known = false;
+    enum imp_status st = IMP_OK;
+    if (imp__team_merges(ctx))
+        IMP_TRY(imp__team_keep(ctx, largest, sizeof largest, &known));
+    if (!known) IMP_TRY(terms_look(j, run, largest));
+    if (imp__team_part(ctx))
+        IMP_TRY(imp__team_keep(ctx, largest, sizeof largest, &known));
+    if (largest[0] == 0) return IMP_OK;
+    imp__fixed_begin(&to->mean, largest[0], SPARE_BITS, terms);
+    imp__fixed_begin(&to->spread, largest[1], 2 * SPARE_BITS, terms);
+    to->unit_known = true;
+out:
+    return st;
+}
+
+/* ---- A whole estimate ------------------------------------------------------------ */
+
+static void job_destroy(struct imp__gradient_job *j)
+{
+    imp_context *ctx = j->problem->ctx;
+    for (int k = 0; j->tallies && k < ctx->threads; k++)
+        imp__tally_destroy(&j->tallies[k]);
+    imp__release(ctx, j->tallies);
+    j->tallies = NULL;
+    if (j->tiles.ctx) imp__tiles_destroy(&j->tiles);
+}
+
+enum imp_status imp__gradient_job_run(struct imp__gradient_job *j,
+                                      const struct imp_run *run, const char *stage,
+                                      double lo, double hi, double start_s)
+{
+    imp_context *ctx = j->problem->ctx;
+    enum imp_status st = IMP_OK;
+    const struct imp_film_desc *film = &j->tracer.sensor->film;
+    j->width = film->crop_w;
+    j->channels = j->problem->scene->channels;
+    const double walks = (double)film->crop_w * film->crop_h * j->plan.n * j->plan.R;
+    j->tiles = (struct imp_tiles){
+        .ctx = ctx,
+        .run = run,
+        .walks = walks,
+        .width = film->crop_w,
+        .height = film->crop_h,
+        .margin = j->splat && film->sample_border ? imp__film_border(film) : 0,
+        .work = tile_work,
+        .size = sizeof(struct part) + dense_numbers(j) * sizeof(double),
+        .add = tile_add,
+        .take = tile_take,
+        .payload = j};
+    IMP_TRY(imp__tiles_create(&j->tiles));
+    j->tallies = imp__alloc(ctx, (size_t)ctx->threads, sizeof *j->tallies);
+    if (!j->tallies) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory"));
+    for (int k = 0; k < ctx->threads; k++)
+        IMP_TRY(imp__tally_create(ctx, j->want_gradient ? j->tracer.active : &j->nothing,
+                                  j->channels, &j->tallies[k]));
+    const struct imp_tiles_pass pass = {.stage = stage,
+                                        .rate_unit = "walks",
+                                        .units = walks,
+                                        .fraction_lo = lo,
+                                        .fraction_hi = hi,
+                                        .start_s = start_s,
+                                        .parts = (size_t)j->plan.chunks};
+    if (j->want_gradient && j->totals->many && !j->totals->unit_known)
+        IMP_TRY(unit_find(j, &pass));
+    j->mean = &j->totals->mean;
+    j->spread = j->totals->spread.sum ? &j->totals->spread : NULL;
+    IMP_TRY(imp__tiles_run(&j->tiles, &pass));
+out:
+    job_destroy(j);
+    return st;
+}
