@@ -7,15 +7,18 @@
 #include "progress.h"
 
 #include <errno.h>
+#include <limits.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
+
+#define NO_PIXEL INT_MIN /* of a border, x and y may be negative */
 
 static struct {
     struct picture_options picture;
     int pixel[2], sample, count;
     const char *paths;
-} o = {.pixel = {-1, -1}};
+} o = {.pixel = {NO_PIXEL, NO_PIXEL}};
 
 static const struct arg_option options[] = {
     {ARG_FLAG, 0, "se", NULL, "add the standard error of every channel to the EXR file",
@@ -158,7 +161,7 @@ static int run_render(int n, char **operand)
     int rc = cli_load(operand[0]);
     if (rc) return rc;
     const struct imp_run run = cli_run();
-    const int one = o.pixel[0] >= 0 || o.pixel[1] >= 0;
+    const int one = o.pixel[0] != NO_PIXEL;
     if (o.sample && !one && !o.paths)
         return cli_error(EXIT_USAGE, "--sample needs --pixel or --paths");
     if (o.count && !o.paths) return cli_error(EXIT_USAGE, "--count needs --paths");

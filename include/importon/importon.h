@@ -501,9 +501,10 @@ IMP_API IMP_MUST_CHECK enum imp_status
 imp_render(const imp_scene *scene, const struct imp_run *run, imp_film **out);
 
 /** One walk, vertex by vertex, as text (json 0) or JSON: sample number `sample` of pixel
- * (x, y) of the picture, the same walk that renders and gradients of run->seed use. The
- * caller frees *text with imp_free.
- * @return IMP_OK; IMP_E_ARG for a pixel outside the picture; IMP_E_SCENE if the
+ * (x, y) of the picture, the same walk that renders and gradients of run->seed use. Pixels
+ * of the border that a film with sample_border samples for its filter have numbers below 0
+ * and from the width, or height, on. The caller frees *text with imp_free.
+ * @return IMP_OK; IMP_E_ARG for a pixel outside these; IMP_E_SCENE if the
  * integrator makes no walks; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_walk_describe(const imp_scene *scene,
                                                          const struct imp_run *run, int x,

@@ -3,6 +3,7 @@
  * One walk told vertex by vertex: Stam's single-path view, as text to read or JSON to
  * draw. */
 #include "base/text.h"
+#include "film_filter.h"
 #include "film_measure.h"
 #include "walk/run.h"
 #include <stdio.h>
@@ -157,12 +158,15 @@ enum imp_status imp_walk_describe(const imp_scene *scene, const struct imp_run *
     const struct imp_sensor *sensor;
     enum imp_status st = imp__run_sensor(scene, &own, &sensor);
     if (st != IMP_OK) return st;
+    /* Samples of the border, which wide filters bring in, are walks like others. */
+    const int margin = sensor->film.sample_border ? imp__film_border(&sensor->film) : 0;
     const int width = sensor->film.crop_w, height = sensor->film.crop_h;
-    if (x < 0 || y < 0 || x >= width || y >= height)
-        return imp__error(scene->ctx, IMP_E_ARG,
-                          "there is no pixel %d,%d: in this picture they go from 0,0 to "
-                          "%d,%d",
-                          x, y, width - 1, height - 1);
+    if (x < -margin || y < -margin || x >= width + margin || y >= height + margin)
+        return imp__error(
+            scene->ctx, IMP_E_ARG,
+            "there is no pixel %d,%d: in this picture they go from %d,%d to "
+            "%d,%d",
+            x, y, -margin, -margin, width + margin - 1, height + margin - 1);
     if (sample < 0)
         return imp__error(scene->ctx, IMP_E_ARG,
                           "there is no sample %lld: the first is 0", (long long)sample);

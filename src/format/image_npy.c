@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * NumPy arrays (H, W, C) or (H, W): <f4 and <f8 are read, <f4 is written. The header is a
+ * NumPy arrays (H, W, C) or (H, W): <f4 and <f8 in either order are read, <f4 is written. The header is a
  * Python dictionary, of which three entries are looked for. */
 #include "base/number.h"
 #include "image.h"
@@ -75,12 +75,12 @@ enum imp_status imp__npy_parse(imp_context *ctx, const char *name,
                       : strncmp(type, "'<f4'", 5) == 0 ? 4
                       : strncmp(type, "'<f8'", 5) == 0 ? 8
                                                        : 0;
-    const bool plain = order && strncmp(order, "False", 5) == 0;
+    const bool fortran = order && strncmp(order, "True", 4) == 0;
+    const bool known = fortran || (order && strncmp(order, "False", 5) == 0);
     imp__release(ctx, header);
-    if (!bytes || !plain || dims < 2)
-        return imp__error(
-            ctx, IMP_E_SCENE,
-            "%s: must be an array (H, W) or (H, W, C) of <f4 or <f8, in C order", name);
+    if (!bytes || !known || dims < 2)
+        return imp__error(ctx, IMP_E_SCENE,
+                          "%s: must be an array (H, W) or (H, W, C) of <f4 or <f8", name);
     const uint64_t c = size[2], left = file->size - start - length;
     if (c < 1 || c > 4)
         return imp__error(ctx, IMP_E_SCENE, "%s: %llu channels; 1 to 4 are read", name,
@@ -94,8 +94,13 @@ enum imp_status imp__npy_parse(imp_context *ctx, const char *name,
         imp__image_film(ctx, name, size[1], size[0], names[c - 1], file->size, 1, &film);
     if (st != IMP_OK) return st;
     d += start + length;
-    for (size_t i = 0; i < imp__film_values(film); i++, d += bytes)
-        film->mean[i] = (float)number_at(d, bytes);
+    /* In Fortran's order the row varies first: element (y, x, k) is y + H (x + W k). */
+    const size_t H = (size_t)size[0], W = (size_t)size[1], C = (size_t)c;
+    for (size_t i = 0; i < imp__film_values(film); i++) {
+        const size_t y = i / (W * C), x = i / C % W, k = i % C;
+        const size_t at = fortran ? y + H * (x + W * k) : i;
+        film->mean[i] = (float)number_at(d + at * (size_t)bytes, bytes);
+    }
     *out = film;
     return IMP_OK;
 }

@@ -126,9 +126,53 @@ static void not_finite(void)
     imp_context_destroy(ctx);
 }
 
+/* Walks of the border, which lie outside the picture, are described as their keys say. */
+static void border(void)
+{
+    static const char wide[] =
+        "<scene version='3.0.0'><integrator type='path'/><sensor type='perspective'>"
+        "<film type='hdrfilm'><integer name='width' value='12'/>"
+        "<integer name='height' value='10'/><boolean name='sample_border' value='%s'/>"
+        "<rfilter type='gaussian'/></film></sensor>"
+        "<emitter type='constant'><float name='radiance' value='1e200'/></emitter>"
+        "</scene>";
+    imp_context *ctx = test_context(2);
+    for (int sampled = 0; sampled < 2; sampled++) {
+        char xml[1024], *text = NULL;
+        snprintf(xml, sizeof xml, wide, sampled ? "true" : "false");
+        imp_scene *s = test_scene_text(ctx, xml, IMP_RGB);
+        imp_film *film = NULL;
+        struct imp_run run = IMP_RUN_INIT;
+        struct imp_film_info info = {.size = sizeof info};
+        run.spp = 2;
+        run.drop_budget = 1;
+        test_must(ctx, imp_render(s, &run, &film));
+        imp_film_get_info(film, &info);
+        int outside = 0, told = 0;
+        for (int k = 0; k < info.n_drop_keys; k++) {
+            const struct imp_drop_key *key = &info.drop_keys[k];
+            run.seed = key->seed;
+            outside += key->x < 0 || key->y < 0;
+            const enum imp_status st =
+                imp_walk_describe(s, &run, key->x, key->y, key->sample, 0, &text);
+            told += st == IMP_OK && strstr(text, "dropped: ");
+            if (st == IMP_OK) imp_free(ctx, text);
+        }
+        tap_ok(told == IMP_DROP_KEYS && (outside > 0) == sampled,
+               "sample_border %d: each key is described # %d of %d, %d in the border",
+               sampled, told, IMP_DROP_KEYS, outside);
+        tap_ok(imp_walk_describe(s, &run, sampled ? -3 : -1, 0, 0, 0, &text) == IMP_E_ARG,
+               "and nothing further out # %s", imp_last_error(ctx));
+        imp_film_destroy(film);
+        imp_scene_destroy(s);
+    }
+    imp_context_destroy(ctx);
+}
+
 int main(void)
 {
     not_finite();
+    border();
     refused("1e200");
     refused("1e308");
     refused("4e38");

@@ -121,6 +121,30 @@ static void check_raw(void)
     tap_ok(st == IMP_OK && g->width == 2 && g->mean[0] == 1 && g->mean[1] == 2,
            "NPY of doubles # %s", st ? imp_last_error(ctx) : "");
     imp_film_destroy(g);
+
+    /* numpy.asfortranarray of a (2, 3, 3) array whose element (y, x, c) is 100 y + 10 x + c.
+     */
+    enum { H = 2, W = 3, C = 3 };
+    char file[128 + 4 * H * W * C];
+    memset(file, ' ', 128);
+    memcpy(file, "\x93NUMPY\x01\x00\x76\x00", 10);
+    const int n = snprintf(file + 10, 118,
+                           "{'descr': '<f4', 'fortran_order': True, "
+                           "'shape': (2, 3, 3), }");
+    file[10 + n] = ' ';
+    file[127] = '\n';
+    for (int c = 0, at = 128; c < C; c++)
+        for (int x = 0; x < W; x++)
+            for (int y = 0; y < H; y++, at += 4)
+                memcpy(file + at, &(float){(float)(100 * y + 10 * x + c)}, 4);
+    b = (struct imp_bytes){(unsigned char *)file, sizeof file, 0};
+    g = NULL;
+    const enum imp_status fortran = imp__image_parse(ctx, "f.npy", &b, &g, &srgb);
+    int wrong = fortran != IMP_OK || g->width != W || g->height != H || g->channels != C;
+    for (int i = 0; !wrong && i < H * W * C; i++)
+        wrong += g->mean[i] != (float)(100 * (i / (W * C)) + 10 * (i / C % W) + i % C);
+    tap_ok(!wrong, "NPY in Fortran's order # %s", fortran ? imp_last_error(ctx) : "");
+    imp_film_destroy(g);
 }
 
 static void check_hdr(void)
