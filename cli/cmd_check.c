@@ -11,7 +11,7 @@
 #include <string.h>
 
 static struct {
-    int paths, fresh_spp;
+    int paths, fresh_spp, sampling;
 } o;
 
 static const struct arg_option options[] = {
@@ -19,6 +19,9 @@ static const struct arg_option options[] = {
      NULL},
     {ARG_INT, 0, "fresh-spp", "N", "samples per pixel of fresh-seed differences",
      &o.fresh_spp, 1, 1e9, NULL},
+    {ARG_FLAG, 0, "verify-sampling", NULL,
+     "compare the picture with one of uniform directions, in place of gradients",
+     &o.sampling, 0, 0, NULL},
     {0}};
 
 /* Steps that are not the best have none. */
@@ -92,6 +95,7 @@ static int run_check(int n, char **operand)
     progress_deadline(cli.time_s);
     check.paths = o.paths;
     check.fresh_spp = o.fresh_spp;
+    check.sampling = o.sampling;
     const enum imp_status st = imp_check(problem, &check, &run, &rows, &n_rows);
     if (cli_failed(st)) {
         rc = cli_fail(st, cli.scene_path);

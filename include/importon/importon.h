@@ -789,7 +789,8 @@ imp_problem_fit_variable(const imp_problem *problem, size_t i,
 
 /** One line of a gradient check: a method, a parameter, two numbers that must agree. */
 struct imp_check_row {
-    const char *method; /**< "frozen", "fresh", "dot", "euler", "density", "loss" */
+    const char *method; /**< "frozen", "fresh", "dot", "euler", "density", "loss";
+                             "uniform", "energy", "aim" (imp_check_options.sampling) */
     const char *param;
     double step;                 /**< of a difference; 0: none */
     double value, reference, se; /**< se of the difference; 0: deterministic */
@@ -802,10 +803,17 @@ struct imp_check_options {
     size_t size;
     int paths;     /**< frozen walks looked at; 0: 1000 */
     int fresh_spp; /**< samples per pixel of fresh-seed differences; 0: the run's */
+    /** 1: check sampling in place of gradients. The picture, and one with directions drawn
+     * uniformly and lights met by chance, are compared in 8 x 8 blocks: rows "uniform",
+     * the worst block of each channel, and chi-square of all. Rows "energy": the part of
+     * the light that arrives through directions that a density drew at the first choice
+     * of a walk (value), and the part of these directions (reference). Rows "aim": the
+     * part of the directions towards a proxy in which anything lies. */
+    int sampling;
 };
 #define IMP_CHECK_OPTIONS_INIT                                                           \
     {                                                                                    \
-        sizeof(struct imp_check_options), 0, 0                                           \
+        sizeof(struct imp_check_options), 0, 0, 0                                        \
     }
 /** Check the gradients of all active parameters (docs: gradient checks). Rows belong to
  * the problem until its next check. @return IMP_OK also when rows fail: look at `ok`. */

@@ -86,7 +86,7 @@ enum imp_status imp_check(imp_problem *p, const struct imp_check_options *option
 
     IMP_OPTIONS(p->ctx, c.options, options, "options");
     IMP_RUN(p->ctx, c.outer, run);
-    if (p->n == 0)
+    if (p->n == 0 && !c.options.sampling)
         IMP_TRY(
             imp__error(p->ctx, IMP_E_ARG, "nothing to check: no parameter is active"));
     if (c.options.paths < 0 || c.options.fresh_spp < 0)
@@ -100,9 +100,13 @@ enum imp_status imp_check(imp_problem *p, const struct imp_check_options *option
     IMP_TRY(imp__problem_tracer(p, &c.outer, &c.tracer));
     imp__arena_free(&p->check_arena);
 
-    ended = imp__check_frozen(&c);
-    if (ended == IMP_OK) ended = imp__check_fresh(&c);
-    if (ended == IMP_OK) ended = imp__check_losses(&c);
+    if (c.options.sampling) {
+        ended = imp__check_sampling(&c);
+    } else {
+        ended = imp__check_frozen(&c);
+        if (ended == IMP_OK) ended = imp__check_fresh(&c);
+        if (ended == IMP_OK) ended = imp__check_losses(&c);
+    }
     if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
     struct imp_check_row *kept =
         imp__arena_array(&p->check_arena, c.n_rows + 1, sizeof *kept);

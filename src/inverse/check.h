@@ -34,5 +34,6 @@ double imp__check_scale(const struct imp_param *p, size_t e);
 enum imp_status imp__check_frozen(struct imp__check *c); /* frozen, dot, euler */
 enum imp_status imp__check_fresh(struct imp__check *c);
 enum imp_status imp__check_losses(struct imp__check *c);
+enum imp_status imp__check_sampling(struct imp__check *c); /* uniform, energy, aim */
 
 #endif

@@ -34,7 +34,8 @@ void imp__emission_meet(struct imp_step *s, struct imp_vertex *v, int emitter,
                                    at ? imp__decide1(hit->t) : INFINITY,
                                    at ? imp__decide1(-imp__dot(at->n, s->d)) : 1,
                                    imp__decide(-s->d)};
-    if (s->pdf > 0 && s->tracer->integrator->lights) {
+    if (s->pdf > 0 && s->tracer->integrator->lights &&
+        !s->tracer->integrator->only_points) {
         const double pmf = light_pmf_at(s, s->guided.left, &s->guided.from, emitter);
         const double pe = pmf * e->ops->pdf(e, &s->from, &s->d, hit, at);
         weight = imp__decide1(weight * power_heuristic(s->pdf, pe));
@@ -101,6 +102,9 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
         light_choose(s, imp__u01(key, imp__dim(s->depth, IMP_DIM_LIGHT)), &pmf);
     if (!(pmf > 0)) return;
     const struct imp_emitter *e = scene->emitters[light];
+    if (imp_unlikely(s->tracer->integrator->only_points) &&
+        !(e->ops->flags & IMP_EMITTER_DELTA))
+        return;
     const double u[2] = {imp__u01(key, imp__dim(s->depth, IMP_DIM_LIGHT_U)),
                          imp__u01(key, imp__dim(s->depth, IMP_DIM_LIGHT_V))};
     struct imp_light_sample ls;

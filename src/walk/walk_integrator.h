@@ -15,12 +15,13 @@ struct imp_walk_integrator {
     int max_depth; /* segments; -1: unlimited */
     int rr_depth;  /* Russian roulette from this vertex on, the first is 1 */
     bool hide_emitters;
-    bool lights;     /* vertices are connected to lights */
-    bool directions; /* walks go on behind the first vertex; false: lights alone */
-    bool guided;     /* a guide's densities are made for these walks */
-    bool absorbs;    /* emission counts where the walk is absorbed only (stam.c), which
+    bool lights;      /* vertices are connected to lights */
+    bool only_points; /* of lights, those that no direction meets: the others are met */
+    bool directions;  /* walks go on behind the first vertex; false: lights alone */
+    bool guided;      /* a guide's densities are made for these walks */
+    bool absorbs;     /* emission counts where the walk is absorbed only (stam.c), which
                         takes the place of Russian roulette */
-    bool first_hit;  /* alpha is 1 where the first ray meets a surface, and hide_emitters
+    bool first_hit;   /* alpha is 1 where the first ray meets a surface, and hide_emitters
                         hides lights from that ray alone (docs/scene-format.md 11) */
     enum imp_stam_alpha alpha_gradient;
     bool photons; /* survival min(1, H h) at every vertex, with H the directional albedo

@@ -1,0 +1,350 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Is light found where it is looked for? The picture again with directions drawn uniformly
+ * by every material, and lights met, not sampled (those that nothing meets apart): an
+ * oracle with no density of a kind in it but 1/2pi and 1/4pi. Both pictures are compared
+ * block by block, and their z together by chi-square. And what each density of the
+ * mixture is good for: its part of the directions of first choices, and of the energy
+ * that arrives through them. */
+#include "check.h"
+#include "film/film_picture.h"
+#include "math/stat.h"
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+#define BLOCKS   8     /* along a side, at most */
+#define P_LIMIT  0.01  /* of chi-square */
+#define Z_LIMIT  5     /* of one block */
+#define NOISY    0.05  /* relative error of the oracle that decides nothing */
+#define SECOND   0x5a3 /* distinguishes the seeds of the two pictures */
+#define VERTICES 2000  /* from which rays are sent towards lights and proxies */
+
+/* Values of a sample: radiance, then parts of the first channels' sum. */
+enum { MET = IMP_DENSITIES, CONNECTED, PARTS, SQUARE = PARTS + IMP_DENSITIES, LOOKED };
+struct looked {
+    struct imp_tracer tracer;
+    int channels;
+    bool parts;
+};
+
+static double sum_used(const struct looked *j, imp_spec L)
+{
+    return j->channels == 1 ? L[0] : imp__sum3(L);
+}
+
+/* Light that arrives by the first direction that was drawn from a mixture, by the density
+ * that drew it, and what was found before it: emission that is met, light samples. Counts
+ * the draws behind. */
+static void parts_add(const struct looked *j, const struct imp_walk *walk, imp_spec P,
+                      double *part)
+{
+    for (const struct imp_vertex *v = walk->first; v; v = v->next) {
+        part[MET] += sum_used(j, P * v->e);
+        part[CONNECTED] += sum_used(j, P * v->b);
+        const bool choice = v->d.goes_on && v->d.lobe == IMP_SMOOTH;
+        for (const struct imp_side *s = v->side; s; s = s->next)
+            parts_add(j, &s->walk, P, part);
+        if (choice) {
+            part[v->d.drawn] += sum_used(j, P * v->w * v->beyond);
+            part[PARTS + v->d.drawn] += 1;
+            return;
+        }
+        P *= v->w;
+    }
+}
+
+/* Second moment that the oracle's walks have, by those of the picture: a term c of a walk
+ * that drew its directions with densities p has E_u[c_u^2] = E_p[c_p^2 prod p/u], with u
+ * the uniform density. Terms are taken one by one, and a light sample as if its weight
+ * were 1/p. It finds what the oracle itself meets too rarely to know of. */
+static double square_of(const struct looked *j, const struct imp_walk *walk)
+{
+    imp_spec P = imp__spec(1);
+    double ratio = 1, square = 0;
+    for (const struct imp_vertex *v = walk->first; v; v = v->next) {
+        const bool sphere = v->bsdf && v->bsdf->flags & IMP_BSDF_TRANSMIT;
+        const double domain = IMP_2PI * (sphere ? 2 : 1);
+        square += imp__sqr(sum_used(j, P * v->e)) * ratio;
+        if (v->d.connection == IMP_CONNECTED && v->d.light.weight > 0)
+            square += imp__sqr(sum_used(j, P * v->b)) * ratio * domain /
+                      (double)v->d.light.weight;
+        for (const struct imp_side *s = v->side; s; s = s->next)
+            square += imp__sqr(sum_used(j, P)) * ratio * square_of(j, &s->walk);
+        if (!v->d.goes_on) break;
+        P *= v->w;
+        if (v->d.lobe == IMP_SMOOTH) ratio *= fmax((double)v->d.pdf * domain, 1e-3);
+    }
+    return square;
+}
+
+static void sample(const void *payload, struct imp_sample *out)
+{
+    const struct looked *j = payload;
+    struct imp_walk walk;
+    double *part = out->value + j->channels;
+    imp__sample_walk(out, &j->tracer, &walk);
+    for (int c = 0; c < j->channels; c++) out->value[c] = walk.L[c];
+    if (!j->parts) return;
+    for (int k = 0; k < LOOKED; k++) part[k] = 0;
+    if (walk.dropped || !walk.valid) return;
+    parts_add(j, &walk, imp__spec(1), part);
+    part[SQUARE] = fmin(square_of(j, &walk), 1e30);
+}
+
+static enum imp_status picture_make(struct imp__check *c, const struct looked *j,
+                                    imp_film **out)
+{
+    char names[256] = "R,G,B";
+    if (j->channels == 1) snprintf(names, sizeof names, "Y");
+    for (int k = 0; j->parts && k < LOOKED; k++) {
+        const size_t n = strlen(names);
+        snprintf(names + n, sizeof names - n, ",p%d", k);
+    }
+    struct imp_run run = c->run;
+    const struct imp_picture picture = {.sensor = j->tracer.sensor,
+                                        .stage = "check",
+                                        .names = names,
+                                        .n = j->channels + (j->parts ? LOOKED : 0),
+                                        .sample = sample,
+                                        .payload = j};
+    run.seed = j->tracer.seed;
+    return imp__picture_make(c->ctx, &picture, &run, out);
+}
+
+/* ---- Blocks ---------------------------------------------------------------------- */
+
+static struct imp_estimate block_mean(const imp_film *f, int channel, const int from[2],
+                                      const int to[2])
+{
+    double sum = 0, square = 0;
+    const double n = (double)(to[0] - from[0]) * (to[1] - from[1]);
+    for (int y = from[1]; y < to[1]; y++)
+        for (int x = from[0]; x < to[0]; x++) {
+            const size_t i =
+                ((size_t)y * (size_t)f->width + (size_t)x) * (size_t)f->channels +
+                (size_t)channel;
+            sum += f->mean[i];
+            square += imp__sqr(f->se[i]);
+        }
+    return (struct imp_estimate){sum / n, sqrt(square) / n, 0};
+}
+
+static struct imp_estimate block_at(const imp_film *f, int channel, int k, int from[2],
+                                    int to[2])
+{
+    const int nx = imp_min(BLOCKS, f->width), ny = imp_min(BLOCKS, f->height);
+    const int i = k % nx, j = k / nx;
+    from[0] = i * f->width / nx;
+    from[1] = j * f->height / ny;
+    to[0] = (i + 1) * f->width / nx;
+    to[1] = (j + 1) * f->height / ny;
+    return block_mean(f, channel, from, to);
+}
+
+/* Variance of a block of the oracle, at least: what the other picture's walks say of its
+ * second moment, the square of the block's mean taken off. */
+static double predicted(const imp_film *own, int channels, int k, double mean)
+{
+    int from[2], to[2];
+    double sum = 0;
+    for (int c = 0; c < channels; c++) sum += block_at(own, c, k, from, to).value;
+    const double square = block_at(own, channels + SQUARE, k, from, to).value;
+    const double pixels = (double)(to[0] - from[0]) * (to[1] - from[1]);
+    const double part = sum > 0 ? mean / sum : 0;
+    return fmax(square * part * part - mean * mean, 0) / (pixels * (double)own->spp);
+}
+
+static enum imp_status channel_compare(struct imp__check *c, const imp_film *own,
+                                       const imp_film *oracle, int channel, int channels,
+                                       const char *name)
+{
+    enum imp_status st = IMP_OK;
+    const int blocks = imp_min(BLOCKS, own->width) * imp_min(BLOCKS, own->height);
+    double mean = 0, variance = 0;
+    struct imp_check_row worst = {.limit = Z_LIMIT, .error = -1};
+    char where[64] = "", all[64];
+    double chi2 = 0, n = 0;
+    for (int k = 0; k < blocks; k++) {
+        int from[2], to[2];
+        const struct imp_estimate x = block_at(own, channel, k, from, to),
+                                  y = block_at(oracle, channel, k, from, to);
+        const double own_variance = x.se * x.se,
+                     its_variance =
+                         fmax(y.se * y.se, predicted(own, channels, k, x.value)),
+                     se = sqrt(own_variance + its_variance);
+        mean += y.value;
+        variance += its_variance;
+        if (!(se > 0)) continue;
+        const double z = (x.value - y.value) / se;
+        chi2 += z * z;
+        n++;
+        if (fabs(z) <= worst.error) continue;
+        worst.value = x.value;
+        worst.reference = y.value;
+        worst.se = se;
+        worst.error = fabs(z);
+        snprintf(where, sizeof where, "%s in %d,%d..%d,%d", name, from[0], from[1],
+                 to[0] - 1, to[1] - 1);
+    }
+    if (n == 0) return IMP_OK; /* black, or the same in every walk */
+    const bool noisy = sqrt(variance) > NOISY * fabs(mean);
+    worst.ok = !(worst.error <= Z_LIMIT) ? 0 : noisy ? -1 : 1;
+    IMP_TRY(imp__check_row(c, "uniform", where, -1, &worst));
+    const double p = imp__chi2_tail(chi2, n);
+    struct imp_check_row sum = {
+        .value = chi2, .reference = n, .limit = 1 - P_LIMIT, .error = 1 - p};
+    sum.ok = !(p > P_LIMIT) ? 0 : noisy ? -1 : 1;
+    snprintf(all, sizeof all, "%s chi-square of %g blocks", name, n);
+    IMP_TRY(imp__check_row(c, "uniform", all, -1, &sum));
+out:
+    return st;
+}
+
+static enum imp_status blocks_compare(struct imp__check *c, const imp_film *own,
+                                      const imp_film *oracle, int channels)
+{
+    static const char *const name[] = {"R", "G", "B"};
+    enum imp_status st = IMP_OK;
+    for (int k = 0; k < channels; k++)
+        IMP_TRY(
+            channel_compare(c, own, oracle, k, channels, channels == 1 ? "Y" : name[k]));
+out:
+    return st;
+}
+
+/* ---- Energy ---------------------------------------------------------------------- */
+
+static enum imp_status energy_rows(struct imp__check *c, const imp_film *f, int channels)
+{
+    enum imp_status st = IMP_OK;
+    double energy = 0, draws = 0;
+    struct imp_estimate part[PARTS + IMP_DENSITIES];
+    const int from[2] = {0, 0}, to[2] = {f->width, f->height};
+    for (int k = 0; k < PARTS + IMP_DENSITIES; k++) {
+        part[k] = block_mean(f, channels + k, from, to);
+        *(k < PARTS ? &energy : &draws) += part[k].value;
+    }
+    if (!(energy > 0)) return IMP_OK;
+    for (int k = 0; k < PARTS; k++) {
+        const struct imp_check_row row = {.value = part[k].value / energy,
+                                          .reference = k < MET && draws > 0
+                                                           ? part[PARTS + k].value / draws
+                                                           : part[k].value / energy,
+                                          .ok = 1};
+        const char *name = k == MET         ? "met before"
+                           : k == CONNECTED ? "connections"
+                                            : imp__density_name[k];
+        if (part[k].value > 0 || row.reference > 0)
+            IMP_TRY(imp__check_row(c, "energy", name, -1, &row));
+    }
+out:
+    return st;
+}
+
+/* ---- What is aimed at ------------------------------------------------------------ */
+
+/* Does anything lie in the directions of a light or a proxy? Rays from where walks of the
+ * picture scatter. */
+struct ray_count {
+    double sent, met;
+};
+static void rays_send(const struct imp__check *c, struct imp_key key,
+                      const struct imp_vertex *v, struct ray_count *count)
+{
+    const struct imp_scene *scene = c->problem->scene;
+    for (int k = 0; k < scene->aims.n; k++) {
+        const struct imp_shape *shape = scene->aims.list[k].shape;
+        const imp_v3 p = imp__decided_v3(v->d.p);
+        const double u[2] = {imp__u01(key, (uint32_t)(2 * k)),
+                             imp__u01(key, (uint32_t)(2 * k + 1))};
+        struct imp_light_sample ls;
+        struct imp_hit hit;
+        if (!shape->ops->sample_toward(shape, &p, u, &ls)) continue;
+        const imp_v3 o = imp__offset(p, v->ng, ls.wi);
+        count[k].sent++;
+        count[k].met += scene->environment >= 0 ||
+                        imp__intersect(scene, &o, &ls.wi, 0, INFINITY, &hit);
+    }
+}
+
+static enum imp_status aim_rows(struct imp__check *c, const struct imp_tracer *tracer)
+{
+    enum imp_status st = IMP_OK;
+    const struct imp_scene *scene = c->problem->scene;
+    const struct imp_film_desc *film = &tracer->sensor->film;
+    const int n = scene->aims.n;
+    if (n == 0) return IMP_OK;
+    struct imp_arena arena;
+    struct ray_count *count = imp__alloc(c->ctx, (size_t)n, sizeof *count);
+    imp__arena_init(&arena, c->ctx);
+    if (!count) IMP_TRY(imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check"));
+    for (int i = 0; i < VERTICES; i++) {
+        const struct imp_key key = imp__key(tracer->seed, 0xa1, (uint64_t)i);
+        const struct imp_arena_mark mark = imp__arena_mark(&arena);
+        struct imp_walk walk;
+        imp__walk_trace(tracer, &arena, (int)(imp__u01(key, 0) * film->crop_w),
+                        (int)(imp__u01(key, 1) * film->crop_h), i, &walk);
+        for (const struct imp_vertex *v = walk.first; v; v = v->next)
+            if (v->bsdf && v->bsdf->flags & IMP_BSDF_SMOOTH) {
+                rays_send(c, key, v, count);
+                break;
+            }
+        imp__arena_rewind(&arena, mark);
+    }
+    for (int k = 0; k < n; k++) {
+        if (scene->aims.list[k].light && scene->aims.list[k].shape->index >= 0)
+            continue; /* a light is there to be met */
+        struct imp_check_row row = {.limit = 1, .reference = 1};
+        row.value = count[k].sent > 0 ? count[k].met / count[k].sent : 0;
+        row.ok = row.value > 0;
+        row.error = 1 - row.value;
+        const char *name = scene->aims.list[k].shape->name;
+        IMP_TRY(imp__check_row(c, "aim", name ? name : "proxy", -1, &row));
+    }
+out:
+    imp__arena_free(&arena);
+    imp__release(c->ctx, count);
+    return st;
+}
+
+/* ---- The check ------------------------------------------------------------------- */
+
+enum imp_status imp__check_sampling(struct imp__check *c)
+{
+    static const struct imp_mixing uniform = {
+        .weight = {[IMP_DENSITY_UNIFORM] = 1, [IMP_DENSITY_GUIDE] = 0}};
+    enum imp_status st = IMP_OK;
+    imp_film *own = NULL, *oracle = NULL;
+    /* Pixels that share no samples. */
+    struct imp_sensor sensor = *c->tracer.sensor;
+    for (size_t k = 0; imp__filter_kinds[k]; k++)
+        if (strcmp(imp__filter_kinds[k]->name, "box") == 0)
+            sensor.film.filter = (struct imp_filter){imp__filter_kinds[k], NULL, 0.5};
+    sensor.film.sample_border = false;
+    struct imp_walk_integrator blind = *c->tracer.integrator;
+    blind.directions = true;
+    blind.only_points = blind.lights;
+    blind.split = 0;
+    struct looked j = {
+        .tracer = c->tracer, .channels = c->problem->scene->channels, .parts = true};
+    j.tracer.active = NULL;
+    j.tracer.sensor = &sensor;
+    c->total = 2;
+    IMP_TRY(picture_make(c, &j, &own));
+    IMP_TRY(imp__check_progress(c, 1));
+    IMP_TRY(aim_rows(c, &j.tracer));
+    j.parts = false;
+    j.tracer.value_only = true;
+    j.tracer.seed = imp__mix64(c->tracer.seed ^ SECOND);
+    j.tracer.integrator = &blind;
+    j.tracer.mixing = &uniform;
+    IMP_TRY(picture_make(c, &j, &oracle));
+    IMP_TRY(blocks_compare(c, own, oracle, j.channels));
+    IMP_TRY(energy_rows(c, own, j.channels));
+    st = imp__check_progress(c, 1);
+out:
+    imp_film_destroy(own);
+    imp_film_destroy(oracle);
+    return st;
+}
