@@ -71,7 +71,7 @@ static imp_elements *solved(const struct experiment *x, imp_scene *s, double eps
                             int without)
 {
     static const struct imp_elements_phong wall = {
-        "*", {0.1, 0.1, 0.1}, {0.6, 0.6, 0.6}, 15};
+        sizeof wall, "*", {0.1, 0.1, 0.1}, {0.6, 0.6, 0.6}, 15};
     static const char *const lamp[12] = {
         "light_left", "light_right", "light_ceiling", "light_back", "extra_0", "extra_1",
         "extra_2",    "extra_3",     "extra_4",       "extra_5",    "extra_6", "extra_7"};
@@ -79,6 +79,7 @@ static imp_elements *solved(const struct experiment *x, imp_scene *s, double eps
     struct imp_elements_options o = IMP_ELEMENTS_OPTIONS_INIT;
     imp_elements *e;
     for (int k = 0; k < x->beams; k++) {
+        beams[k].size = sizeof *beams;
         beams[k].shape = lamp[k];
         beams[k].exponent = 20;
     }

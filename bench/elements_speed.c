@@ -87,11 +87,12 @@ struct result {
 static struct result run(int threads)
 {
     static const struct imp_elements_phong wall = {
-        "*", {0.1, 0.1, 0.1}, {0.6, 0.6, 0.6}, 15};
-    static const struct imp_elements_beam beams[4] = {{"light_left", {0}, 20},
-                                                      {"light_right", {0}, 20},
-                                                      {"light_ceiling", {0}, 20},
-                                                      {"light_back", {0}, 20}};
+        sizeof wall, "*", {0.1, 0.1, 0.1}, {0.6, 0.6, 0.6}, 15};
+    static const struct imp_elements_beam beams[4] = {
+        {sizeof *beams, "light_left", {0}, 20},
+        {sizeof *beams, "light_right", {0}, 20},
+        {sizeof *beams, "light_ceiling", {0}, 20},
+        {sizeof *beams, "light_back", {0}, 20}};
     struct imp_context_options co = IMP_CONTEXT_OPTIONS_INIT;
     struct imp_load_options load = IMP_LOAD_OPTIONS_INIT;
     struct imp_elements_options o = IMP_ELEMENTS_OPTIONS_INIT;

@@ -42,6 +42,7 @@ int elements_phong(const struct arg_list *list, struct imp_elements_phong **out)
     *out = cli_alloc(list->n + 1, sizeof **out);
     for (size_t i = 0; i < list->n; i++) {
         struct imp_elements_phong *p = &(*out)[i];
+        p->size = sizeof *p;
         double v[7];
         int n = 0;
         p->shape = named(list->item[i], v, 3, 7, &n);
@@ -64,6 +65,7 @@ int elements_beams(const struct arg_list *list, struct imp_elements_beam **out)
     *out = cli_alloc(list->n + 1, sizeof **out);
     for (size_t i = 0; i < list->n; i++) {
         struct imp_elements_beam *b = &(*out)[i];
+        b->size = sizeof *b;
         double v[4] = {0};
         int n = 0;
         b->shape = named(list->item[i], v, 1, 4, &n);
@@ -82,6 +84,7 @@ int elements_bounds(const struct arg_list *list, struct imp_elements_bounds **ou
     for (size_t i = 0; i < list->n; i++) {
         double v[2];
         int n = 0;
+        (*out)[i].size = sizeof **out;
         (*out)[i].glob = named(list->item[i], v, 2, 2, &n);
         if (!(*out)[i].glob)
             return cli_error(EXIT_USAGE, "--bounds '%s': GLOB=LO,HI", list->item[i]);

@@ -64,15 +64,19 @@ struct imp_elements_source {
 /** Reciprocal modified Phong in place of a shape's material, seen from its front:
  * kd/pi + ks (n+2)/(2 pi) max(0, mirror(wi).wo)^n. */
 struct imp_elements_phong {
+    size_t size;
     const char *shape; /**< name; "*" for all that are not lights */
     double kd[3], ks[3], exponent;
 };
 /** Give a shape's light a direction: radiance L0 max(0, w.axis)^exponent along w. */
 struct imp_elements_beam {
+    size_t size;
     const char *shape;
     double axis[3]; /**< world; all 0: the shape's normal */
     double exponent;
 };
+#define IMP_ELEMENTS_PHONG_INIT IMP_ELEMENTS_SIZED(struct imp_elements_phong)
+#define IMP_ELEMENTS_BEAM_INIT  IMP_ELEMENTS_SIZED(struct imp_elements_beam)
 
 struct imp_elements_options {
     size_t size;
@@ -94,9 +98,9 @@ struct imp_elements_options {
     size_t n_sources;                          /**< 0: the sensor's whole picture */
     const struct imp_elements_source *sources; /**< each as long as its own `size` */
     size_t n_phong;
-    const struct imp_elements_phong *phong;
+    const struct imp_elements_phong *phong; /**< likewise */
     size_t n_beams;
-    const struct imp_elements_beam *beams;
+    const struct imp_elements_beam *beams; /**< likewise */
     imp_progress_fn progress;
     void *progress_payload;
     int picture; /**< beside its sources the sensor's picture decides when to stop */
@@ -197,9 +201,11 @@ imp_elements_share_errors(imp_elements *elements, const struct imp_elements_row 
 
 /** Bounds for the active numbers of parameters that match; inside the scene's own. */
 struct imp_elements_bounds {
+    size_t size;
     const char *glob;
     double lo, hi;
 };
+#define IMP_ELEMENTS_BOUNDS_INIT IMP_ELEMENTS_SIZED(struct imp_elements_bounds)
 struct imp_elements_fit_options {
     size_t size;
     enum imp_optimizer optimizer; /**< IMP_ADAM, the 0: IMP_LM up to 256 numbers, else
@@ -209,7 +215,7 @@ struct imp_elements_fit_options {
     int rounds;            /**< at most, each on links refined at the last answer; 0: 3 */
     const double *targets; /**< [n_sources] of the elements' options */
     size_t n_bounds;
-    const struct imp_elements_bounds *bounds;
+    const struct imp_elements_bounds *bounds; /**< each as long as its own `size` */
 };
 #define IMP_ELEMENTS_FIT_OPTIONS_INIT IMP_ELEMENTS_SIZED(struct imp_elements_fit_options)
 struct imp_elements_goal {

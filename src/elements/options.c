@@ -87,8 +87,9 @@ enum imp_status imp__el_options(imp_elements *e,
     if (!phong || !beams || !e->sources || !e->weight || !e->each || !e->first_ray)
         IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for options"));
     for (size_t i = 0; i < o->n_phong; i++) {
-        const struct imp_elements_phong *p = &o->phong[i];
-        phong[i] = *p;
+        struct imp_elements_phong *p = &phong[i];
+        IMP_TRY(
+            imp__element_take(e->ctx, "elements", "phong", o->phong, i, p, sizeof *p));
         if (!p->shape || !(phong[i].shape = imp__arena_strdup(&e->arena, p->shape)))
             IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "a Phong material needs a shape"));
         for (int c = 0; c < 3; c++)
@@ -103,8 +104,9 @@ enum imp_status imp__el_options(imp_elements *e,
                                p->shape, p->exponent));
     }
     for (size_t i = 0; i < o->n_beams; i++) {
-        const struct imp_elements_beam *b = &o->beams[i];
-        beams[i] = *b;
+        struct imp_elements_beam *b = &beams[i];
+        IMP_TRY(
+            imp__element_take(e->ctx, "elements", "beams", o->beams, i, b, sizeof *b));
         if (!b->shape || !(beams[i].shape = imp__arena_strdup(&e->arena, b->shape)))
             IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "a beam needs a shape"));
         if (!(b->exponent >= 0) || b->exponent > 1e6 || !isfinite(b->axis[0]) ||

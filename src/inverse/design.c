@@ -59,8 +59,10 @@ static enum imp_status bounds_take(struct imp__design *d)
     if (d->o.n_bounds > 0 && !d->o.bounds)
         return imp__error(d->goal.ctx, IMP_E_ARG, "imp_elements_fit: bounds is NULL");
     for (size_t b = 0; b < d->o.n_bounds; b++) {
-        const struct imp_elements_bounds *want = &d->o.bounds[b];
+        struct imp_elements_bounds own = IMP_ELEMENTS_BOUNDS_INIT, *want = &own;
         bool met = false;
+        IMP_CHECKED(imp__element_take(d->goal.ctx, "imp_elements_fit", "bounds",
+                                      d->o.bounds, b, want, sizeof *want));
         if (!want->glob || !(want->lo <= want->hi))
             return imp__error(d->goal.ctx, IMP_E_ARG,
                               "bounds %g to %g of '%s' make no sense", want->lo, want->hi,

@@ -264,11 +264,13 @@ static void glossy(imp_context *ctx, int spp)
         mc[p] = (float)pixel.mean;
         var += tap_se(&pixel) * tap_se(&pixel);
     }
-    const struct imp_elements_phong wall = {"*", {0.1, 0.1, 0.1}, {0.6, 0.6, 0.6}, 15};
-    static const struct imp_elements_beam beams[4] = {{"light_left", {0}, 20},
-                                                      {"light_right", {0}, 20},
-                                                      {"light_ceiling", {0}, 20},
-                                                      {"light_back", {0}, 20}};
+    const struct imp_elements_phong wall = {
+        sizeof wall, "*", {0.1, 0.1, 0.1}, {0.6, 0.6, 0.6}, 15};
+    static const struct imp_elements_beam beams[4] = {
+        {sizeof *beams, "light_left", {0}, 20},
+        {sizeof *beams, "light_right", {0}, 20},
+        {sizeof *beams, "light_ceiling", {0}, 20},
+        {sizeof *beams, "light_back", {0}, 20}};
     struct imp_elements_options o = IMP_ELEMENTS_OPTIONS_INIT;
     o.phong = &wall;
     o.beams = beams;

@@ -210,7 +210,8 @@ int main(void)
     imp_context *ctx = test_context(2);
     imp_scene *s = scene_of(ctx);
     struct imp_elements_options o = IMP_ELEMENTS_OPTIONS_INIT;
-    const struct imp_elements_phong glossy = {"*", {0.2, 0.3, 0.1}, {0.4, 0.3, 0.5}, 10};
+    const struct imp_elements_phong glossy = {
+        sizeof glossy, "*", {0.2, 0.3, 0.1}, {0.4, 0.3, 0.5}, 10};
     const struct imp_elements_source two[2] = {
         {.size = sizeof *two, .region = {3, 2, 17, 11}, .weight = 0.5},
         {.size = sizeof *two}};

@@ -156,7 +156,7 @@ static void bounded(imp_context *ctx, enum imp_optimizer optimizer, const double
     struct imp_elements_source source[WALLS];
     struct imp_elements_options o = options(WALLS, source, walls);
     struct imp_elements_fit_options f = IMP_ELEMENTS_FIT_OPTIONS_INIT;
-    const struct imp_elements_bounds box = {"light*", lo, hi};
+    const struct imp_elements_bounds box = {sizeof box, "light*", lo, hi};
     const struct imp_elements_fit_result *r;
     const struct imp_elements_row *rows;
     imp_scene *s = test_scene(ctx, "elements/b.xml", IMP_MONO, "res=16");
@@ -306,7 +306,7 @@ static void refused(imp_context *ctx)
     struct imp_elements_source source;
     struct imp_elements_options o = options(1, &source, walls);
     struct imp_elements_fit_options f = IMP_ELEMENTS_FIT_OPTIONS_INIT;
-    struct imp_elements_bounds box = {"light*", 3, 2};
+    struct imp_elements_bounds box = {sizeof box, "light*", 3, 2};
     const struct imp_elements_fit_result *r = NULL;
     imp_scene *s = test_scene(ctx, "elements/b.xml", IMP_MONO, "res=16");
     imp_problem *none, *p = test_problem(ctx, s, "light*");
@@ -320,10 +320,12 @@ static void refused(imp_context *ctx)
     f.n_bounds = 1;
     f.bounds = &box;
     is_refused(e, p, &f, &r, "bounds");
-    box = (struct imp_elements_bounds){"nothing*", 0, 1};
+    box = (struct imp_elements_bounds){sizeof box, "nothing*", 0, 1};
     is_refused(e, p, &f, &r, "bounds");
-    box = (struct imp_elements_bounds){"light*", -2, -1};
+    box = (struct imp_elements_bounds){sizeof box, "light*", -2, -1};
     is_refused(e, p, &f, &r, "bounds");
+    box = (struct imp_elements_bounds){0, "light*", 0, 1};
+    is_refused(e, p, &f, &r, "size 0 of bounds");
     f.n_bounds = 0;
     target = NAN;
     is_refused(e, p, &f, &r, "target");

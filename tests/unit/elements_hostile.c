@@ -53,6 +53,53 @@ static void lamps_out(imp_context *ctx)
     imp_scene_destroy(s);
 }
 
+/* Arrays of a host that was compiled with a later header: longer structs, whose new fields
+ * must be 0; and structs of other sizes, or none. */
+static void later_structs(imp_context *ctx)
+{
+    struct later_phong {
+        struct imp_elements_phong now;
+        double more;
+    } phong[2] = {{{sizeof *phong, "floor", {0.1, 0.1, 0.1}, {0.6, 0.6, 0.6}, 15}, 0},
+                  {{sizeof *phong, "left", {0.2, 0.2, 0.2}, {0.5, 0.5, 0.5}, 9}, 0}};
+    struct later_beam {
+        struct imp_elements_beam now;
+        double more;
+    } beams[2] = {{{sizeof *beams, "light_left", {0}, 20}, 0},
+                  {{sizeof *beams, "light_right", {0}, 20}, 0}};
+    const struct imp_elements_phong p[2] = {
+        {sizeof *p, "floor", {0.1, 0.1, 0.1}, {0.6, 0.6, 0.6}, 15},
+        {sizeof *p, "left", {0.2, 0.2, 0.2}, {0.5, 0.5, 0.5}, 9}};
+    const struct imp_elements_beam q[2] = {{sizeof *q, "light_left", {0}, 20},
+                                           {sizeof *q, "light_right", {0}, 20}};
+    struct imp_elements_options o = IMP_ELEMENTS_OPTIONS_INIT;
+    imp_scene *s = test_scene(ctx, "elements/b.xml", IMP_MONO, "res=16");
+    imp_elements *e = NULL;
+    o.eps_last = 3e-3;
+    o.order = 4;
+    o.n_phong = 2, o.n_beams = 2;
+    o.phong = p, o.beams = q;
+    imp_elements *now = solved(s, &o);
+    o.phong = &phong[0].now, o.beams = &beams[0].now;
+    imp_elements *later = solved(s, &o);
+    tap_ok(imp__el_measure(now, NULL) == imp__el_measure(later, NULL),
+           "longer structs in arrays # %.9g", imp__el_measure(later, NULL));
+    imp_elements_destroy(now);
+    imp_elements_destroy(later);
+    for (int k = 0; k < 4; k++) {
+        phong[1].more = k == 0;
+        phong[1].now.size = k == 1 ? sizeof *p : sizeof *phong;
+        beams[0].now.size = k == 2 ? 0 : sizeof *beams;
+        beams[1].more = k == 3;
+        const enum imp_status st = imp_elements_create(s, &o, &e);
+        tap_ok(st == IMP_E_ARG &&
+                   strstr(imp_last_error(ctx), k < 2 ? "phong" : "beams") != NULL,
+               "refused # %s", st == IMP_OK ? "taken" : imp_last_error(ctx));
+        if (st == IMP_OK) imp_elements_destroy(e);
+    }
+    imp_scene_destroy(s);
+}
+
 static void planes(imp_context *ctx)
 {
     imp_scene *s = test_scene(ctx, "elements/b.xml", IMP_MONO, "res=8");
@@ -162,6 +209,7 @@ int main(void)
 {
     imp_context *ctx = test_context(2);
     lamps_out(ctx);
+    later_structs(ctx);
     planes(ctx);
     sizes(ctx);
     no_area(ctx);

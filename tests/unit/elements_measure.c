@@ -145,11 +145,12 @@ static void means(imp_context *ctx)
 static void shares(imp_context *ctx)
 {
     static const struct imp_elements_phong glossy = {
-        "*", {0.1, 0.1, 0.1}, {0.6, 0.6, 0.6}, 15};
-    static const struct imp_elements_beam beams[4] = {{"light_left", {0}, 20},
-                                                      {"light_right", {0}, 20},
-                                                      {"light_ceiling", {0}, 20},
-                                                      {"light_back", {0}, 20}};
+        sizeof glossy, "*", {0.1, 0.1, 0.1}, {0.6, 0.6, 0.6}, 15};
+    static const struct imp_elements_beam beams[4] = {
+        {sizeof *beams, "light_left", {0}, 20},
+        {sizeof *beams, "light_right", {0}, 20},
+        {sizeof *beams, "light_ceiling", {0}, 20},
+        {sizeof *beams, "light_back", {0}, 20}};
     imp_scene *s = test_scene(ctx, "elements/d.xml", IMP_MONO, "res=16");
     struct imp_elements_options o = IMP_ELEMENTS_OPTIONS_INIT;
     const struct imp_elements_row *rows;

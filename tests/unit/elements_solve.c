@@ -84,7 +84,8 @@ static void furnace(imp_context *ctx)
     imp_elements_destroy(e);
 
     /* Glossy: less leaves every element than kd + ks of what arrives. */
-    struct imp_elements_phong glossy = {"box", {0.2, 0.2, 0.2}, {0.4, 0.4, 0.4}, 10};
+    struct imp_elements_phong glossy = {
+        sizeof glossy, "box", {0.2, 0.2, 0.2}, {0.4, 0.4, 0.4}, 10};
     double z[24], w[24], most = 0, least = 1;
     o.phong = &glossy;
     o.n_phong = 1;
@@ -150,11 +151,12 @@ static void identity(imp_context *ctx, imp_scene *s, struct imp_elements_options
 }
 
 static const struct imp_elements_phong glossy = {
-    "*", {0.1, 0.1, 0.1}, {0.6, 0.6, 0.6}, 15};
-static const struct imp_elements_beam beams[4] = {{"light_left", {0}, 20},
-                                                  {"light_right", {0}, 20},
-                                                  {"light_ceiling", {0}, 20},
-                                                  {"light_back", {0}, 20}};
+    sizeof glossy, "*", {0.1, 0.1, 0.1}, {0.6, 0.6, 0.6}, 15};
+static const struct imp_elements_beam beams[4] = {
+    {sizeof *beams, "light_left", {0}, 20},
+    {sizeof *beams, "light_right", {0}, 20},
+    {sizeof *beams, "light_ceiling", {0}, 20},
+    {sizeof *beams, "light_back", {0}, 20}};
 
 static struct imp_elements_options options_d(void)
 {
@@ -281,7 +283,7 @@ static void chain(imp_context *ctx)
         "<rotate y='1' angle='-90'/><translate x='2' y='0' z='2'/></transform>"
         "<bsdf type='diffuse'><float name='reflectance' "
         "value='0.5'/></bsdf></shape></scene>";
-    const struct imp_elements_phong p = {"patch", {0.1, 0, 0}, {0.6, 0, 0}, 15};
+    const struct imp_elements_phong p = {sizeof p, "patch", {0.1, 0, 0}, {0.6, 0, 0}, 15};
     const double kd = 0.1, ks = 0.6, n = 15, le = 1000, area = 1e-4;
     imp_scene *s = test_scene_text(ctx, xml, IMP_MONO);
     double before = INFINITY;
@@ -666,11 +668,11 @@ static void integrator(imp_context *ctx)
 static void kinds(imp_context *ctx, imp_scene *d)
 {
     static const struct imp_elements_phong wall = {
-        "*", {0.1, 0.1, 0.1}, {0.6, 0.6, 0.6}, 15};
-    struct imp_elements_beam beams[4] = {{"light_left", {0}, 20},
-                                         {"light_right", {0}, 20},
-                                         {"light_ceiling", {0}, 20},
-                                         {"light_back", {0}, 20}};
+        sizeof wall, "*", {0.1, 0.1, 0.1}, {0.6, 0.6, 0.6}, 15};
+    struct imp_elements_beam beams[4] = {{sizeof *beams, "light_left", {0}, 20},
+                                         {sizeof *beams, "light_right", {0}, 20},
+                                         {sizeof *beams, "light_ceiling", {0}, 20},
+                                         {sizeof *beams, "light_back", {0}, 20}};
     struct imp_elements_options o = options();
     imp_scene *s = test_scene(ctx, "elements/glossy.xml", IMP_MONO, "res=24");
     const struct imp_elements_row *rows;
