@@ -9,6 +9,7 @@
 #ifndef IMP_KINDS_H
 #define IMP_KINDS_H
 
+#include "imp_merl.h"
 #include "kind/build.h"
 #include "math/rng.h"
 #include "math/warp.h"
@@ -100,6 +101,14 @@ static bool kind_make(struct kind_factory *f, const struct imp_bsdf_ops *ops,
         p->integer = truth;
         p->string = eq + 1;
     }
+    if (strcmp(ops->name, "merl") == 0) { /* what its file would hold */
+        static float rho[3 * 30 * 10 * 12];
+        static const struct imp_merl_data table = {30, 10, 12, rho};
+        const struct merl_model model = {
+            .alpha = 0.3, .diffuse = 0.2, .albedo = {0.7, 0.5, 0.3}};
+        merl_fill(30, 10, 12, &model, rho);
+        node->merl = &table;
+    }
     void *self = imp__arena_array(&f->arena, 1, ops->object_size + 1);
     const struct imp_input **input =
         imp__arena_array(&f->arena, IMP_INPUTS_MAX + 1, sizeof *input);
@@ -177,7 +186,9 @@ static inline void kind_inputs(const struct imp_bsdf *b, enum kind_set set, uint
             const double u =
                 imp__u01(key_j, (uint32_t)(4 * j + (kind_is_scalar(d) ? 0 : c)));
             double v = d->fallback;
-            if (set == KIND_LOWEST) v = lo;
+            /* What has no gradient does not take the others' away. */
+            const bool fixed = d->flags & IMP_INPUT_FIXED && d->role == IMP_REFLECTANCE;
+            if (set == KIND_LOWEST && !fixed) v = lo;
             else if (set == KIND_FALLBACK) v = d->fallback;
             else if (isfinite(hi)) v = lo + u * (hi - lo);
             else if (d->fallback > 0)
@@ -196,6 +207,12 @@ static inline bool kind_has_config(const struct kind_case *c, const char *prop)
     for (int i = 0; c->props && i < 6 && c->props[i]; i++)
         if (strcmp(c->props[i], prop) == 0) return true;
     return false;
+}
+
+/* Tables that are constant in their cells: value and density jump. */
+static inline bool kind_steps(const struct kind_case *c)
+{
+    return strstr(c->label, "merl") != NULL;
 }
 
 static inline int kinds_visit(struct kind_factory *f,

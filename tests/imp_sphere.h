@@ -66,6 +66,9 @@ static inline double sphere_cell_integral(const struct sphere_cell *c, double wh
             sphere_cell_integral(&q[k], part[k], f, payload, 0.5 * tolerance, depth - 1);
     return sum;
 }
+/* How often cells are cut at most: fewer times for functions that jump, where halving
+ * never ends. */
+static int sphere_depth = 12;
 /* Over the whole sphere (lo = -1) or part of it; first cut into cells about 1/16 wide. */
 static inline double sphere_integral(sphere_fn *f, void *payload, double lo, double hi,
                                      double tolerance)
@@ -81,7 +84,7 @@ static inline double sphere_integral(sphere_fn *f, void *payload, double lo, dou
                                           0,
                                           0};
             sum += sphere_cell_integral(&c, sphere_rule(&c, f, payload), f, payload,
-                                        tolerance / 64, 12);
+                                        tolerance / 64, sphere_depth);
         }
     return sum;
 }

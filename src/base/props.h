@@ -63,6 +63,13 @@ struct imp_ies_data {
     const double *candela; /* [n_horizontal][n_vertical] */
 };
 
+/* A measured isotropic BRDF by half-angle and difference angle (Rusinkiewicz 1998), in
+ * 1/sr: [n_half][n_difference][n_azimuth][3], red, green, blue. */
+struct imp_merl_data {
+    int n_half, n_difference, n_azimuth;
+    const float *rho;
+};
+
 struct imp_node {
     const char *tag, *type, *id; /* id NULL: none */
     const char *name;            /* slot under the parent; NULL: nameless */
@@ -81,6 +88,7 @@ struct imp_node {
     const struct imp_mesh_data *mesh; /* attached data, or NULL */
     const struct imp_image_data *image;
     const struct imp_ies_data *ies;
+    const struct imp_merl_data *merl;
     struct imp_body *body; /* attached: a graded index (format/graded_file.c), or NULL */
     void *object;          /* what was made from it (scene/scene_build.c) */
     const char *asked[24]; /* names of properties that were looked for, literals; */

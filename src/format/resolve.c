@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Nodes that name files get what the files hold: triangles for obj and ply, pixels for
- * bitmap and envmap, intensities for ies. */
+ * bitmap and envmap, intensities for ies, reflectances for merl. */
 #include "base/film.h"
 #include "color/rgb.h"
 #include "ies_file.h"
 #include "image.h"
 #include "load.h"
+#include "merl_file.h"
 #include "mesh_file.h"
 #include "search.h"
 #include <string.h>
@@ -149,6 +150,24 @@ static enum imp_status sky_expand(struct imp_scene *scene, struct imp_node *node
     return IMP_OK;
 }
 
+static enum imp_status merl_attach(struct imp_scene *scene, struct imp_node *node)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = scene->ctx;
+    struct imp_bytes file = {0};
+    const char *path;
+    struct imp_merl_data *data = imp__arena_array(&scene->arena, 1, sizeof *data);
+    if (!data) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "scene: out of memory"));
+    IMP_TRY(path_of(scene, node, &path));
+    st = imp__file_read(ctx, path, IMP_MERL_BYTES_MAX, &file);
+    if (st == IMP_OK) st = imp__merl_parse(ctx, &scene->arena, path, &file, data);
+    if (st != IMP_OK) IMP_TRY(placed(scene, node, st));
+    node->merl = data;
+out:
+    imp__bytes_free(ctx, &file);
+    return st;
+}
+
 static enum imp_status attach(struct imp_scene *scene, struct imp_node *node)
 {
     enum imp_status st = IMP_OK;
@@ -162,6 +181,8 @@ static enum imp_status attach(struct imp_scene *scene, struct imp_node *node)
         IMP_TRY(imp__graded_attach(scene, node));
     if (strcmp(node->tag, "emitter") == 0 && strcmp(node->type, "ies") == 0)
         IMP_TRY(ies_attach(scene, node));
+    if (strcmp(node->tag, "bsdf") == 0 && strcmp(node->type, "merl") == 0)
+        IMP_TRY(merl_attach(scene, node));
     if (strcmp(node->tag, "emitter") == 0 && strcmp(node->type, "envmap") == 0)
         IMP_TRY(sky_expand(scene, node));
     if (bitmap && !node->image) IMP_TRY(image_attach(scene, node));

@@ -8,7 +8,7 @@ void imp__weight_table_sum(struct imp__weight_table *t, const double *scale)
     for (int i = 0; i < t->height; i++) {
         double *c = t->column + (size_t)i * (size_t)t->width;
         for (int j = 1; j < t->width; j++) c[j] += c[j - 1];
-        sum += c[t->width - 1] * scale[i];
+        sum += c[t->width - 1] * (scale ? scale[i] : 1);
         t->row[i] = sum;
     }
 }

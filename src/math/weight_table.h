@@ -15,7 +15,8 @@ struct imp__weight_table {
     double *column; /* [height][width] running sums inside the rows */
 };
 
-/* From column[i][j], which hold the weights of the texels (>= 0), and scale[i] of row i. */
+/* From column[i][j], which hold the weights of the texels (>= 0), and scale[i] of row i
+ * (NULL: 1). */
 void imp__weight_table_sum(struct imp__weight_table *t, const double *scale);
 /* Sum of all weights; 0: there is nothing to draw. */
 static inline double imp__weight_table_total(const struct imp__weight_table *t)

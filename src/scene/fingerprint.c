@@ -37,6 +37,10 @@ static uint64_t node_hash(uint64_t h, const struct imp_node *node)
     h = imp__hash_text(h, node->tag);
     h = imp__hash_text(h, node->type);
     h = imp__hash_text(h, node->id);
+    if (node->merl)
+        h = imp__hash(h, node->merl->rho,
+                      3 * (size_t)node->merl->n_half * (size_t)node->merl->n_difference *
+                          (size_t)node->merl->n_azimuth * sizeof *node->merl->rho);
     for (size_t i = 0; i < node->n_props; i++) h = prop_hash(h, &node->props[i]);
     for (size_t i = 0; i < node->n_children; i++) {
         const struct imp_child *c = &node->children[i];

@@ -17,6 +17,7 @@
 #include "imp_kinds.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
+#include <unistd.h>
 
 #define SIDE    5
 #define BATCHES 12
@@ -24,6 +25,7 @@
 static bool is_long;
 static const char *only; /* cases whose name begins so */
 static imp_context *ctx;
+static char measured[64]; /* a file that kinds of tables can read */
 static double worst_z, worst_frozen, worst_dot;
 static int n_z, n_frozen;
 
@@ -171,6 +173,7 @@ static void bsdf_make(imp_scene *s, const struct subject *q,
     } else {
         props_make(s, q->props);
     }
+    if (strcmp(ops->name, "merl") == 0) imp_scene_string(s, "filename", measured);
     inputs_make(s, q, ops->name, ops->max_children ? NULL : q->props, ops->inputs, true,
                 seed);
     imp_scene_end(s);
@@ -595,6 +598,10 @@ int main(int argc, char **argv)
     is_long = argc > 1 && strcmp(argv[1], "long") == 0;
     only = argc > 2 ? argv[2] : NULL;
     ctx = test_context(is_long ? 0 : 1);
+    snprintf(measured, sizeof measured, "registry_%d.binary", (int)getpid());
+    if (!merl_write(measured, 20, 10, 12,
+                    &(struct merl_model){0.4, 0.3, {0.8, 0.6, 0.5}}))
+        return 1;
     for (int k = 0; imp__bsdf_kinds[k]; k++) {
         const struct imp_bsdf_ops *ops = imp__bsdf_kinds[k];
         if (!ops->inputs[0].name && !ops->max_children) continue; /* no parameters */
@@ -627,6 +634,7 @@ int main(int argc, char **argv)
             check(&(struct subject){.emitter = imp__emitter_kinds[k],
                                     .texture = imp__texture_kinds[i]});
     }
+    remove(measured);
     imp_context_destroy(ctx);
     return tap_done();
 }

@@ -50,6 +50,7 @@ static void albedo_visit(const struct kind_case *c, void *payload)
     double most = 0;
     struct tap_stat z = {0};
     (void)payload;
+    sphere_depth = kind_steps(c) ? 4 : 12;
     for (int i = 0; i < 8; i++) {
         imp_spec in[KINDS_MAX_INPUTS];
         kind_inputs(b, KIND_RANDOM, 70 + (uint64_t)i, in);

@@ -127,8 +127,9 @@ static struct result check(const struct point *p, int samples, uint64_t seed)
     for (int i = 0; i < tree.n; i++) {
         struct sphere_cell *c = &tree.cell[i];
         if (c->child || !(p->b->flags & IMP_BSDF_SMOOTH)) continue;
-        const double mass = sphere_cell_integral(c, sphere_rule(c, density, (void *)p),
-                                                 density, (void *)p, 0.02 / samples, 12);
+        const double mass =
+            sphere_cell_integral(c, sphere_rule(c, density, (void *)p), density,
+                                 (void *)p, 0.02 / samples, sphere_depth);
         r.total += mass;
         CELL(samples * mass, c->count);
     }
@@ -184,6 +185,7 @@ static void visit(const struct kind_case *c, void *payload)
     const int samples = SAMPLES_OF_A_KIND / DIRECTIONS / configurations + 1;
     double worst = 1, above = 0;
     bool sane = true;
+    sphere_depth = kind_steps(c) ? 5 : 12;
     for (int i = 0; i < DIRECTIONS; i++) {
         struct point p = {.b = &c->bsdf};
         kind_inputs(p.b,
