@@ -14,7 +14,7 @@
 /* Exit codes; the manual page is the contract. */
 enum {
     EXIT_DONE = 0,
-    EXIT_NO = 1,       /* check, compare: the answer is no */
+    EXIT_NO = 1,       /* check, selftest, compare: the answer is no */
     EXIT_USAGE = 2,    /* usage or scene error */
     EXIT_RUN = 3,      /* the run failed */
     EXIT_SIGNAL = 128, /* and the number of the signal that interrupted the run */
@@ -28,8 +28,8 @@ struct command {
     const char *answer; /* in the first line of that text; NULL: none is known */
 };
 extern const struct command command_render, command_gradient, command_jacobian,
-    command_check, command_fit, command_compare, command_info, command_bench,
-    command_bend, command_elements, command_merge;
+    command_check, command_selftest, command_fit, command_compare, command_info,
+    command_bench, command_bend, command_elements, command_merge;
 
 /* Option tables, to be named in args_spec.group. -o is a file, or a folder for commands
  * that write several files. */

@@ -30,6 +30,8 @@ _importon()
         esac
     elif ((COMP_CWORD == 2)) && [[ $command == bend ]]; then
         words='trace check fit view'
+    elif ((COMP_CWORD == 2)) && [[ $command == selftest ]]; then
+        words='material light camera'
     fi
     if [[ $words ]]; then
         mapfile -t COMPREPLY < <(compgen -W "$words" -- "$word")

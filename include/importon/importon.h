@@ -821,6 +821,55 @@ IMP_API IMP_MUST_CHECK enum imp_status
 imp_check(imp_problem *problem, const struct imp_check_options *options,
           const struct imp_run *run, const struct imp_check_row **rows, size_t *n_rows);
 
+/* ---- Testing the kinds of a scene ------------------------------------------------ */
+
+enum imp_selftest_subject {
+    IMP_SELFTEST_MATERIAL,
+    IMP_SELFTEST_LIGHT,
+    IMP_SELFTEST_CAMERA
+};
+/** One contract of one object, with the inputs that it has in the scene:
+ *
+ *   finite      answers for any direction: neither NaN nor infinite nor negative
+ *   covers      a density wherever the value or a derivative is not 0
+ *   normalised  integral of the density, lobes without one and missing draws: 1
+ *   draws       chi-square of draws against the density
+ *   albedo      by draws against quadrature
+ *   energy      power that leaves, of 1 that comes in: at most 1
+ *   reciprocal  directions exchanged (radiance over n^2); told only (ok -1) where not
+ *   derivative  against differences
+ *   density     of a light's draws against its density for the same point
+ *   light       by a light's own draws against directions drawn without it
+ *   unit, smooth, filter    rays and the reconstruction filter of a camera */
+struct imp_selftest_row {
+    const char *object, *kind, *contract;
+    double value, reference;
+    double se;      /**< of the difference; 0: none */
+    double answers; /**< of a count: how many were looked at */
+    double error;   /**< a count of failures, a relative error, or |z| */
+    double limit;   /**< of error */
+    double chance;  /**< of a value so far off, if all is right; -1: not statistical */
+    int ok;         /**< 1: it holds; 0: it does not; -1: not promised, and not so */
+};
+struct imp_selftest_options {
+    size_t size;
+    int samples;    /**< draws of an object; 0: 200,000 */
+    int directions; /**< of sight, or places of reference, of an object; 0: 12 */
+    uint64_t seed;
+};
+#define IMP_SELFTEST_OPTIONS_INIT                                                        \
+    {                                                                                    \
+        sizeof(struct imp_selftest_options), 0, 0, 0                                     \
+    }
+/** Test the contracts of kinds on the scene's own objects. Rows belong to the scene until
+ * its next self-test; their names live as long as the scene.
+ * @return IMP_OK also where rows fail: look at `ok`; IMP_E_ARG (an unknown subject, too few
+ * samples) or IMP_E_NOMEM. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_selftest(imp_scene *scene, enum imp_selftest_subject subject,
+             const struct imp_selftest_options *options,
+             const struct imp_selftest_row **rows, size_t *n_rows);
+
 /* ---- Comparing pictures -------------------------------------------------------- */
 
 struct imp_compare_result {

@@ -46,8 +46,8 @@ enum imp_status imp__merl_parse(imp_context *ctx, struct imp_arena *keep,
     const size_t cells = (size_t)n[0] * (size_t)n[1] * (size_t)n[2];
     if (cells > TABLE_MAX || file->size != HEADER + 24 * cells)
         return imp__error(ctx, IMP_E_SCENE,
-                          "%s: %zu bytes; a table of %d x %d x %d has %zu", name, file->size,
-                          n[0], n[1], n[2], HEADER + 24 * cells);
+                          "%s: %zu bytes; a table of %d x %d x %d has %zu", name,
+                          file->size, n[0], n[1], n[2], HEADER + 24 * cells);
     float *rho = imp__arena_take(keep, 3 * cells, sizeof *rho);
     if (!rho) return imp__error(ctx, IMP_E_NOMEM, "%s: no memory for its table", name);
     for (size_t c = 0; c < 3; c++)

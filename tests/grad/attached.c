@@ -7,8 +7,8 @@
  * the estimators: detached (two samplers), fully attached, and Stam's own term, which
  * keeps only the first part of the attached form and is wrong (E9). */
 #include "imp_kinds.h"
-#include "imp_sphere.h"
 #include "imp_tap.h"
+#include "math/sphere_cells.h"
 
 enum { AMBIENT, DIFFUSE, SPECULAR, EXPONENT };
 static const imp_v3 a = {-0.6, 0, 0.8, 0};
@@ -102,8 +102,9 @@ static void table(const struct imp_bsdf *phong, const struct imp_bsdf *cosine,
         c.b = cosine;
 #define WHAT(text)                                                                       \
     (snprintf(what, sizeof what, "%s D, alpha %g: %s", name, r->alpha, text), what)
-        const double I = sphere_integral(primal, &s, 0, 1, 1e-8);
-        const double dI = sphere_integral(derivative, &s, 0, 1, 1e-8);
+        const double I = imp__sphere_integral(primal, &s, 0, 1, 1e-8, IMP_SPHERE_SMOOTH);
+        const double dI =
+            imp__sphere_integral(derivative, &s, 0, 1, 1e-8, IMP_SPHERE_SMOOTH);
         tap_near(I, r->I, 1e-7, 6e-8, WHAT("I by quadrature"));
         tap_near(dI, r->dI, 1e-6, 1e-7, WHAT("dI/dalpha by quadrature"));
 
@@ -129,7 +130,7 @@ static void table(const struct imp_bsdf *phong, const struct imp_bsdf *cosine,
 static void mixtures(const struct imp_bsdf *b, const char *name)
 {
     struct setting s = {b, {imp__spec(0), imp__spec(0.4), imp__spec(0.6), imp__spec(12)}};
-    const double dI = sphere_integral(derivative, &s, 0, 1, 1e-8);
+    const double dI = imp__sphere_integral(derivative, &s, 0, 1, 1e-8, IMP_SPHERE_SMOOTH);
     const struct estimates e = estimate(&s, 200000, 99);
     tap_z(&e.detached, dI, 0.02 * fabs(dI), name);
     tap_z(&e.attached, dI, 0.02 * fabs(dI), name);

@@ -6,12 +6,10 @@
  * checker itself against planted mistakes. */
 #include "imp_kinds.h"
 #include "imp_tap.h"
+#include "inverse/selftest.h"
 #include "kind/bsdf/fresnel.h"
 
 enum { TRIALS = 60 };
-
-typedef void value_fn(const struct imp_bsdf *b, const imp_spec *in,
-                      const struct imp_dirs *d, imp_spec *f);
 
 static void emit_value(const struct imp_bsdf *b, const imp_spec *in,
                        const struct imp_dirs *d, imp_spec *f)
@@ -24,80 +22,21 @@ static void eval_value(const struct imp_bsdf *b, const imp_spec *in,
     b->ops->eval(b, in, d, f);
 }
 
-/* Fourth-order differences of lane c, central where there is room and one-sided at a
- * bound, with steps `scale` times the usual. The base value is taken off first, so that
- * what does not move gives exactly 0. */
-static double difference(const struct imp_bsdf *b, imp_spec *in, const struct imp_dirs *d,
-                         int j, int c, value_fn *value, double scale, bool *lanes_mixed)
-{
-    static const double central[4][2] = {
-        {-2, 1.0 / 12}, {-1, -8.0 / 12}, {1, 8.0 / 12}, {2, -1.0 / 12}};
-    static const double forward[4][2] = {{1, 4}, {2, -3}, {3, 4.0 / 3}, {4, -0.25}};
-    const struct imp_input_desc *desc = kind_input(b, j);
-    const bool scalar = kind_is_scalar(desc);
-    const imp_spec x = in[j];
-    double lo, hi;
-    kind_bounds(desc, &lo, &hi);
-    const double h = scale * 4e-5 * fmax(fabs(x[c]), 0.02);
-    const bool room_lo = x[c] - 2 * h >= lo, two = room_lo && x[c] + 2 * h <= hi;
-    const double sign = room_lo && !two ? -1 : 1;
-    imp_spec sum = imp__spec(0), f0, f;
-    value(b, in, d, &f0);
-    for (int k = 0; k < 4; k++) {
-        const double step = two ? central[k][0] : sign * forward[k][0];
-        const double weight = two ? central[k][1] : sign * forward[k][1];
-        if (scalar) in[j] = x + step * h;
-        else in[j][c] = x[c] + step * h;
-        value(b, in, d, &f);
-        in[j] = x;
-        sum += (f - f0) * (weight / h);
-    }
-    for (int o = 0; o < 3; o++)
-        if (o != c && !scalar && sum[o] != 0) *lanes_mixed = true;
-    return sum[c];
-}
-
 struct tally {
     double value, emission; /* largest relative errors */
     long points, nonzero, no_density, numbers, kinks;
     bool lanes_mixed;
 };
 
-/* Largest error of the derivatives at one point, relative to the derivative and to what
- * rounding of f allows a difference to see. Two steps that disagree mean that the value
- * is not smooth there (the fit of Beckmann's masking has a step): such points are
- * counted, not compared. A wrong derivative does not hide there: it has two steps that
- * agree. */
 static double point_error(const struct imp_bsdf *b, imp_spec *in,
-                          const struct imp_dirs *d, value_fn *value, const imp_spec *df,
-                          struct tally *t)
+                          const struct imp_dirs *d, imp__bsdf_value *value,
+                          const imp_spec *df, struct tally *t)
 {
-    imp_spec f;
-    double worst = 0;
-    value(b, in, d, &f);
-    for (int j = 0; j < b->n_in; j++) {
-        if (kind_input(b, j)->flags & IMP_INPUT_FIXED) { /* no gradient is offered */
-            if (!imp__is_zero(df[j])) worst = INFINITY;
-            continue;
-        }
-        for (int c = 0; c < 3; c++) {
-            const double scale =
-                fabs(df[j][c]) + 1e-5 * fabs(f[c]) / fmax(fabs(in[j][c]), 0.02);
-            const double fd = difference(b, in, d, j, c, value, 1, &t->lanes_mixed);
-            const double e = fabs(fd - df[j][c]);
-            t->numbers++;
-            if (e <= 1e-280) continue;
-            if (e > 1e-6 * scale) {
-                const double finer =
-                    difference(b, in, d, j, c, value, 0.25, &t->lanes_mixed);
-                if (fabs(fd - finer) > 0.2 * e) {
-                    t->kinks++;
-                    continue;
-                }
-            }
-            worst = fmax(worst, isfinite(e) ? e / scale : INFINITY);
-        }
-    }
+    struct imp__derivative_tally own = {0};
+    const double worst = imp__bsdf_derivative_error(b, in, d, value, df, 3, &own);
+    t->numbers += own.numbers;
+    t->kinks += own.kinks;
+    t->lanes_mixed |= own.lanes_mixed;
     return worst;
 }
 

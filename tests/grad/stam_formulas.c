@@ -4,8 +4,8 @@
  * each by quadrature or a small simulation of its own, and what the library does.
  * docs/stam.md quotes what this prints. */
 #include "imp_kinds.h"
-#include "imp_sphere.h"
 #include "imp_tap.h"
+#include "math/sphere_cells.h"
 
 enum { AMBIENT, DIFFUSE, SPECULAR, EXPONENT };
 
@@ -33,7 +33,8 @@ static void normal_distribution(void)
         struct power p = {alphas[k], 1, 0};
         snprintf(what, sizeof what,
                  "E11: int D cos dw = 1 with (alpha + 2)/2pi, alpha %g", p.alpha);
-        tap_near(sphere_integral(distribution, &p, 0, 1, 1e-9), 1, 1e-6, 0, what);
+        tap_near(imp__sphere_integral(distribution, &p, 0, 1, 1e-9, IMP_SPHERE_SMOOTH), 1,
+                 1e-6, 0, what);
     }
     /* Throughput of the lobe under its own sampling with the printed D: E[sin theta_m].
      */
@@ -42,7 +43,8 @@ static void normal_distribution(void)
     } ring[] = {{0, .667}, {10, .341}, {100, .123}};
     for (int k = 0; k < 3; k++) {
         struct power p = {ring[k].alpha, 1, 1};
-        const double albedo = sphere_integral(distribution, &p, 0, 1, 1e-9);
+        const double albedo =
+            imp__sphere_integral(distribution, &p, 0, 1, 1e-9, IMP_SPHERE_SMOOTH);
         const double beta =
             exp(lgamma(1.5) + lgamma(p.alpha / 2 + 1) - lgamma(p.alpha / 2 + 2.5));
         snprintf(what, sizeof what, "E10: albedo with the sine, alpha %g (without: 1)",
@@ -171,7 +173,8 @@ static void reciprocity(struct kind_factory *factory)
         for (int k = 0; k < 3; k++) {
             const double t = row[k].angle * M_PI / 180;
             l.wi = imp__v3(sin(t), 0, cos(t));
-            const double a = sphere_integral(light_side, &l, 0, 1, 1e-7);
+            const double a =
+                imp__sphere_integral(light_side, &l, 0, 1, 1e-7, IMP_SPHERE_SMOOTH);
             if (v == 0)
                 tap_ok(fabs(a / row[k].published - 1) < .01,
                        "E28: light-side albedo at %g degrees # %.3f, published %.2f",

@@ -4,11 +4,13 @@
  * more than 1; reciprocity where the model has it; and the published numbers of the
  * models. */
 #include "imp_kinds.h"
-#include "imp_sphere.h"
 #include "imp_tap.h"
 #include "kind/bsdf/fresnel.h"
 #include "kind/bsdf/microfacet.h"
 #include "kind/bsdf/presets.h"
+#include "math/quadrature.h"
+#include "math/sphere_cells.h"
+#include "math/stat.h"
 #include <complex.h>
 
 struct point {
@@ -50,7 +52,6 @@ static void albedo_visit(const struct kind_case *c, void *payload)
     double most = 0;
     struct tap_stat z = {0};
     (void)payload;
-    sphere_depth = kind_steps(c) ? 4 : 12;
     for (int i = 0; i < 8; i++) {
         imp_spec in[KINDS_MAX_INPUTS];
         kind_inputs(b, KIND_RANDOM, 70 + (uint64_t)i, in);
@@ -68,7 +69,11 @@ static void albedo_visit(const struct kind_case *c, void *payload)
             }
             struct point p = {b, in, wo, 0, false};
             const double smooth =
-                b->flags & IMP_BSDF_SMOOTH ? sphere_integral(value, &p, -1, 1, 1e-4) : 0;
+                b->flags & IMP_BSDF_SMOOTH
+                    ? imp__sphere_integral(value, &p, -1, 1, 1e-4,
+                                           kind_steps(c) ? IMP_SPHERE_STEPS
+                                                         : IMP_SPHERE_SMOOTH)
+                    : 0;
             struct tap_stat mc = {0};
             for (uint32_t n = 0; n < 4000; n++) {
                 const struct imp_key key = imp__key(33, (uint64_t)(100 * i + j), n);
@@ -97,9 +102,11 @@ static void albedo_visit(const struct kind_case *c, void *payload)
     }
     /* The format's sheen and clearcoat are added to all the rest. */
     const bool adds = strstr(c->label, "principled");
-    /* The fit of Beckmann's masking exceeds 1 by 6e-5 at its end. */
+    /* The fit of Beckmann's masking exceeds 1 by 6e-5 at its end, and that of the light
+     * that a coat keeps in by 1.2 % at an index of 3.2 (d'Eon and Irving 2011). */
     if (!adds)
-        tap_ok(most <= 1 + 2e-4, "%s: energy # largest albedo %.6f (%s)", c->label, most,
+        tap_ok(most <= (strstr(c->label, "plastic") ? 1.015 : 1 + 2e-4),
+               "%s: energy # largest albedo %.6f (%s)", c->label, most,
                tint ? tint : "-");
     if (z.n > 3)
         tap_ok(fabs(z.mean) * sqrt(z.n) < 4.5 &&
@@ -169,7 +176,7 @@ static double m2_albedo(int variant, double alpha, double degrees, bool from_lig
     const imp_spec in[4] = {{0}, {0}, imp__spec(1), imp__spec(alpha)};
     const double t = degrees * IMP_PI / 180;
     struct point p = {&m2[variant], in, imp__v3(sin(t), 0, cos(t)), 0, from_light};
-    return sphere_integral(value, &p, 0, 1, 1e-7);
+    return imp__sphere_integral(value, &p, 0, 1, 1e-7, IMP_SPHERE_SMOOTH);
 }
 
 static void stam_numbers(void)
@@ -327,10 +334,14 @@ static void microfacets(void)
         const struct facet_point d = {&f, {0}, 0},
                                  g = {&f, imp__normalize(imp__v3(0.7, -0.4, 0.2)), 1};
         const char *name = f.type == IMP_GGX ? "ggx" : "beckmann";
-        tap_ok(fabs(sphere_integral(facet_value, (void *)&d, 0, 1, 1e-7) - 1) < 1e-6,
+        tap_ok(fabs(imp__sphere_integral(facet_value, (void *)&d, 0, 1, 1e-7,
+                                         IMP_SPHERE_SMOOTH) -
+                    1) < 1e-6,
                "%s %g %g: int D cos = 1", name, f.au, f.av);
         /* Heitz' weak white furnace: visible normals make up the whole view. */
-        tap_ok(fabs(sphere_integral(facet_value, (void *)&g, 0, 1, 1e-7) - 1) < 1e-6,
+        tap_ok(fabs(imp__sphere_integral(facet_value, (void *)&g, 0, 1, 1e-7,
+                                         IMP_SPHERE_SMOOTH) -
+                    1) < 1e-6,
                "%s %g %g: visible normals integrate to 1", name, f.au, f.av);
     }
 }

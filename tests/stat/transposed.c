@@ -4,9 +4,9 @@
  * integrated over wo by quadrature, which takes f from eval alone, against its own
  * sampling; power through a dielectric; and value and cosine apart. */
 #include "imp_kinds.h"
-#include "imp_sphere.h"
 #include "imp_tap.h"
 #include "kind/bsdf/transport.h"
+#include "math/sphere_cells.h"
 
 #define SAMPLES 20000
 
@@ -41,7 +41,9 @@ static void smooth_visit(const struct kind_case *c, void *payload)
         imp_spec in[KINDS_MAX_INPUTS];
         kind_inputs(b, KIND_RANDOM, 300 + (uint64_t)i, in);
         struct point p = {b, in, kind_direction(i, 77)};
-        const double whole = sphere_integral(kernel, &p, -1, 1, 1e-5);
+        const double whole =
+            imp__sphere_integral(kernel, &p, -1, 1, 1e-5,
+                                 kind_steps(c) ? IMP_SPHERE_STEPS : IMP_SPHERE_SMOOTH);
         struct tap_stat mc = {0};
         for (uint32_t n = 0; n < SAMPLES; n++) {
             const struct imp_key key = imp__key(78, (uint64_t)i, n);

@@ -329,6 +329,7 @@ class Fixture:
         if name == "imp_team": s.gather = C.cast(self.keep.append(C.CFUNCTYPE(C.c_int)(lambda: 0)) or self.keep[-1], C.c_void_p)
         if name == "imp_fit_options": s.max_iterations = 2
         if name == "imp_check_options": s.paths, s.fresh_spp = 8, 4
+        if name == "imp_selftest_options": s.samples, s.directions = 1000, 1
         if name == "imp_run": s.spp = 2
         if name == "imp_elements_fit_options": s.targets, s.max_iterations = doubles(1, .1), 2
         if name == "imp_bend_fit_options": s.iterations[0] = 2
@@ -352,7 +353,7 @@ class Fixture:
                        "n_vertices": 3, "n_triangles": 1, "layers": 1, "a": 1., "pilots": 2, "n_groups": 1,
                        "n": {"imp_scene_set_values": 1, "imp_scene_spectrum": 2, "imp_problem_nlopt": 3}.get(function, 1)}
             zeros = {"scalar", "status", "cause", "sensor", "channel", "x", "y", "sample", "json", "i", "from_here",
-                     "kind", "progress", "rays", "ray", "bundle", "target", "edge", "most"}
+                     "kind", "progress", "rays", "ray", "bundle", "target", "edge", "most", "subject"}
             if key == "imp_bend_image.target": return 4, None  # the fixture adds it
             if function == "imp_parts_create": return {"index": 1, "count": 2}[a.name], None
             if a.name in scalars: return scalars[a.name], None

@@ -1,0 +1,61 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The contracts of kinds, tested on the objects of a scene: one file a concept, each with
+ * one function here and a line in selftest.c. */
+#ifndef IMP_INVERSE_SELFTEST_H
+#define IMP_INVERSE_SELFTEST_H
+
+#include "math/draws.h"
+#include "math/rng.h"
+#include "math/stat.h"
+#include "scene/scene.h"
+
+struct imp__selftest {
+    imp_context *ctx;
+    const struct imp_scene *scene;
+    struct imp_selftest_options options;
+    double level; /* of one chi-square, so that all together fail 1 % (Sidak 1967) */
+    struct imp__sphere_tree *tree;
+    struct imp_selftest_row *rows;
+    size_t n_rows, cap_rows;
+};
+
+/* Add a row; ok is error <= limit, or what it is already if that is -1. */
+enum imp_status imp__selftest_row(struct imp__selftest *t,
+                                  const struct imp_selftest_row *row);
+/* Number `value` of failures among n answers: there may be none. */
+enum imp_status imp__selftest_count(struct imp__selftest *t, const char *object,
+                                    const char *kind, const char *contract, double value,
+                                    double n);
+/* The least chance of some chi-squares. */
+enum imp_status imp__selftest_draws(struct imp__selftest *t, const char *object,
+                                    const char *kind, double chance);
+/* A z-score. */
+enum imp_status imp__selftest_z(struct imp__selftest *t, const char *object,
+                                const char *kind, const char *contract, double value,
+                                double se, double reference);
+
+enum imp_status imp__selftest_materials(struct imp__selftest *t);
+enum imp_status imp__selftest_lights(struct imp__selftest *t);
+enum imp_status imp__selftest_cameras(struct imp__selftest *t);
+
+/* A direction that is not near the horizon, above it for even i. */
+imp_v3 imp__selftest_direction(int i, uint64_t seed);
+
+/* ---- selftest_derivative.c: derivatives of a BSDF against differences ---- */
+typedef void imp__bsdf_value(const struct imp_bsdf *b, const imp_spec *in,
+                             const struct imp_dirs *d, imp_spec *f);
+struct imp__derivative_tally {
+    long numbers, kinks; /* compared; of these, where the value is not smooth */
+    bool lanes_mixed;
+};
+/* Input j as its kind declares it, children's included. */
+const struct imp_input_desc *imp__bsdf_input(const struct imp_bsdf *b, int j);
+/* Largest error of df, relative to the derivative and to what rounding of f allows a
+ * difference to see. `in` is moved and put back. */
+double imp__bsdf_derivative_error(const struct imp_bsdf *b, imp_spec *in,
+                                  const struct imp_dirs *d, imp__bsdf_value *value,
+                                  const imp_spec *df, int lanes,
+                                  struct imp__derivative_tally *t);
+
+#endif

@@ -1,0 +1,271 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Lights: what a sample says is what eval and pdf say; lights with an area and skies are
+ * the same light by their own draws and by directions drawn without them. */
+#include "math/warp.h"
+#include "selftest.h"
+#include "walk/walk.h"
+
+struct light {
+    const struct imp_scene *scene;
+    const struct imp_emitter *e;
+    int channels;
+    imp_v3 ref;
+};
+
+static double brightness(const struct light *l, imp_spec le)
+{
+    double sum = 0;
+    for (int c = 0; c < l->channels; c++) sum += le[c];
+    return sum / l->channels;
+}
+
+/* A point of the scene, or of the unit cube where nothing is. */
+static imp_v3 reference(const struct imp_scene *s, struct imp_key key)
+{
+    imp_v3 p = {0};
+    for (int c = 0; c < 3; c++) {
+        const double u = imp__u01(key, (uint32_t)c);
+        const bool there = s->n_shapes > 0;
+        const double lo = there ? s->lo[c] : -1, hi = there ? s->hi[c] : 1;
+        p[c] = lo + u * (hi - lo);
+    }
+    return p;
+}
+
+/* ---- A ray towards a light of area ------------------------------------------------ */
+
+/* The nearest hit of the ray, if it is the light's own shape, seen from its front. */
+static bool light_hit(const struct light *l, imp_v3 d, struct imp_hit *hit,
+                      struct imp_surface *at, struct imp_emission *x)
+{
+    if (!imp__intersect(l->scene, &l->ref, &d, 0, INFINITY, hit)) return false;
+    const struct imp_shape *s = l->scene->shapes[hit->shape];
+    if (s != l->e->shape) return false;
+    s->ops->surface(s, hit, &l->ref, &d, at);
+    *x = (struct imp_emission){{at->uv[0], at->uv[1]}, hit->t, -imp__dot(at->n, d), -d};
+    return x->cos_light > 0;
+}
+
+static double radiance(const struct light *l, const struct imp_emission *x, imp_v3 p)
+{
+    return brightness(l, imp__emitter_radiance(l->scene, l->e->index, x, p, NULL));
+}
+
+/* Directions that can meet the light: a cone around its shape, or all. */
+struct cone {
+    struct imp_frame frame;
+    double height; /* 1 - cosine of its angle */
+};
+static struct cone cone_of(const struct light *l)
+{
+    const struct imp_shape *s = l->e->shape;
+    struct cone c = {imp__frame_from_normal(imp__v3(0, 0, 1)), 2};
+    if (!s) return c;
+    const imp_v3 to = (s->lo + s->hi) * 0.5 - l->ref;
+    const double d = imp__length(to), r = 0.5001 * imp__length(s->hi - s->lo);
+    if (d <= r) return c;
+    c.frame = imp__frame_from_normal(to * (1 / d));
+    c.height = 1 - sqrt(1 - imp__sqr(r / d));
+    return c;
+}
+
+/* ---- What is measured -------------------------------------------------------------- */
+
+struct found {
+    double n, bad, uncovered, density; /* the last: worst relative difference */
+    double error;                      /* of derivatives */
+    double z, own, other, se;          /* light by own draws and by a cone: the worst */
+    double least;                      /* chance of the chi-squares, of a sky */
+    double total;                      /* of its density */
+};
+
+struct mean {
+    double n, mean, m2;
+};
+static void mean_add(struct mean *s, double x)
+{
+    const double d = x - s->mean;
+    s->n += 1;
+    s->mean += d / s->n;
+    s->m2 += d * (x - s->mean);
+}
+static double mean_variance(const struct mean *s) { return s->m2 / (s->n - 1) / s->n; }
+
+/* eval_d against central differences: exact, as light is linear in most inputs. */
+static double derivative_error(const struct light *l, const struct imp_emission *x,
+                               imp_v3 p)
+{
+    const struct imp_emitter *e = l->e;
+    struct imp_texcoord at = {{x->uv[0], x->uv[1]}, p, NULL};
+    imp_spec in[IMP_INPUTS_MAX], d[IMP_INPUTS_MAX], f, up, down;
+    double worst = 0;
+    imp__emitter_place(e, x, &at);
+    imp__inputs_eval(e->input, e->n_in, &at, in);
+    e->ops->eval(e, in, x, &f);
+    e->ops->eval_d(e, in, x, d);
+    for (int j = 0; j < e->n_in; j++) {
+        const imp_spec was = in[j];
+        for (int c = 0; c < l->channels; c++) {
+            const double h = 1e-4 * fmax(fabs(was[c]), 0.1);
+            in[j] = was + h;
+            e->ops->eval(e, in, x, &up);
+            in[j] = was - h;
+            e->ops->eval(e, in, x, &down);
+            in[j] = was;
+            const double slope = (up[c] - down[c]) / (2 * h);
+            const double error =
+                fabs(slope - d[j][c]) / (fabs(d[j][c]) + 1e-3 * fabs(f[c]) + 1e-12);
+            worst = fmax(worst, isfinite(error) ? error : INFINITY);
+        }
+    }
+    return worst;
+}
+
+/* One draw: what it says against pdf; the light that it brings over its density. */
+static double draw_take(const struct light *l, const double u[2], struct found *r)
+{
+    const struct imp_emitter_ops *ops = l->e->ops;
+    struct imp_light_sample s;
+    r->n++;
+    if (!ops->sample(l->e, &l->ref, u, &s)) return 0;
+    const struct imp_emission x = {{s.uv[0], s.uv[1]}, s.dist, s.cos_light, -s.wi};
+    bool sane = fabs(imp__length(s.wi) - 1) < 1e-9 && s.dist > 0 && s.pdf >= 0 &&
+                isfinite(s.pdf) && isfinite(s.cos_light);
+    const bool front = !(ops->flags & IMP_EMITTER_AREA) || s.cos_light > 0;
+    const double value = sane && front ? radiance(l, &x, s.p) : 0;
+    sane &= isfinite(value) && value >= 0;
+    r->bad += !sane;
+    if (!sane || !front || !(s.pdf > 0)) return 0;
+    if (ops->flags & IMP_EMITTER_DELTA) {
+        r->bad += s.pdf != 1;
+        return 0;
+    }
+    if (ops->flags & IMP_EMITTER_AREA) {
+        struct imp_hit hit;
+        struct imp_surface at;
+        struct imp_emission met;
+        if (!light_hit(l, s.wi, &hit, &at, &met) || fabs(hit.t / s.dist - 1) > 1e-3)
+            return 0; /* something is in its way */
+        if (s.cos_light > 0.05)
+            r->density = fmax(
+                r->density, fabs(ops->pdf(l->e, &l->ref, &s.wi, &hit, &at) / s.pdf - 1));
+        return value / s.pdf;
+    }
+    r->density =
+        fmax(r->density, fabs(ops->pdf(l->e, &l->ref, &s.wi, NULL, NULL) / s.pdf - 1));
+    return value / s.pdf;
+}
+
+/* One direction drawn without the light. */
+static double cone_take(const struct light *l, const struct cone *c, const double u[2],
+                        struct found *r)
+{
+    const double z = 1 - c->height * u[0], s = sqrt(fmax(0, (1 - z) * (1 + z)));
+    const imp_v3 d = imp__to_world(
+        &c->frame, imp__v3(s * cos(IMP_2PI * u[1]), s * sin(IMP_2PI * u[1]), z));
+    struct imp_hit hit;
+    struct imp_surface at;
+    struct imp_emission x = {.dist = INFINITY, .cos_light = 1, .d = -d};
+    const bool area = l->e->ops->flags & IMP_EMITTER_AREA;
+    r->n++;
+    if (area && !light_hit(l, d, &hit, &at, &x)) return 0;
+    const imp_v3 p = area ? at.p : (imp_v3){0};
+    const double value = radiance(l, &x, p);
+    const double pdf =
+        l->e->ops->pdf(l->e, &l->ref, &d, area ? &hit : NULL, area ? &at : NULL);
+    const bool sane = isfinite(value) && value >= 0 && isfinite(pdf) && pdf >= 0;
+    r->bad += !sane;
+    if (!sane) return 0;
+    r->uncovered += value > 0 && !(pdf > 0);
+    r->error = fmax(r->error, derivative_error(l, &x, p));
+    return value * IMP_2PI * c->height;
+}
+
+/* ---- A sky ------------------------------------------------------------------------- */
+
+static double sky_density(imp_v3 w, void *payload)
+{
+    const struct light *l = payload;
+    return l->e->ops->pdf(l->e, &l->ref, &w, NULL, NULL);
+}
+static bool sky_draw(void *payload, const double u[3], imp_v3 *w, int *lobe)
+{
+    const struct light *l = payload;
+    struct imp_light_sample s;
+    (void)lobe;
+    if (!l->e->ops->sample(l->e, &l->ref, u, &s) || !(s.pdf > 0)) return false;
+    *w = s.wi;
+    return true;
+}
+
+static enum imp_status light(struct imp__selftest *t, const struct imp_emitter *e)
+{
+    enum imp_status st = IMP_OK;
+    struct found r = {.least = 1};
+    const char *name = e->name, *kind = e->ops->name;
+    const bool delta = e->ops->flags & IMP_EMITTER_DELTA,
+               sky = e->ops->flags & IMP_EMITTER_ENVIRONMENT;
+    const int n = t->options.samples / t->options.directions + 1;
+    for (int i = 0; i < t->options.directions; i++) {
+        struct light l = {.scene = t->scene, .e = e, .channels = t->scene->channels};
+        struct mean own = {0}, other = {0};
+        l.ref = reference(t->scene, imp__key(t->options.seed, 31, (uint64_t)i));
+        const struct cone cone = cone_of(&l);
+        for (int k = 0; k < n; k++) {
+            const struct imp_key key =
+                imp__key(t->options.seed, 400 + (uint64_t)i, (uint64_t)k);
+            const double u[4] = {imp__u01(key, 0), imp__u01(key, 1), imp__u01(key, 2),
+                                 imp__u01(key, 3)};
+            mean_add(&own, draw_take(&l, u, &r));
+            if (!delta) mean_add(&other, cone_take(&l, &cone, &u[2], &r));
+        }
+        const double se = sqrt(mean_variance(&own) + mean_variance(&other)) +
+                          1e-5 * fabs(own.mean) + 1e-300;
+        const double z = delta ? 0 : (own.mean - other.mean) / se;
+        if (fabs(z) >= fabs(r.z))
+            r.z = z, r.own = own.mean, r.other = other.mean, r.se = se;
+        if (!sky || r.bad > 0 || i > 2) continue; /* the same from everywhere */
+        const struct imp__drawn d = {sky_draw, sky_density, NULL, &l};
+        const struct imp__draws test =
+            imp__draws_test(&d, t->options.samples / 3 + 1, t->options.seed + (uint64_t)i,
+                            IMP_SPHERE_STEPS, t->tree);
+        r.least = fmin(r.least, test.chance);
+        r.total = test.total;
+    }
+    IMP_TRY(imp__selftest_count(t, name, kind, "finite", r.bad, r.n));
+    if (r.bad > 0) return IMP_OK;
+    if (delta) return IMP_OK;
+    IMP_TRY(imp__selftest_count(t, name, kind, "covers", r.uncovered, r.n));
+    IMP_TRY(imp__selftest_row(t, &(struct imp_selftest_row){.object = name,
+                                                            .kind = kind,
+                                                            .contract = "density",
+                                                            .value = r.density,
+                                                            .error = r.density,
+                                                            .limit = 0.01,
+                                                            .chance = -1}));
+    if (sky) {
+        IMP_TRY(imp__selftest_z(t, name, kind, "normalised", r.total, 1e-3, 1));
+        IMP_TRY(imp__selftest_draws(t, name, kind, r.least));
+    }
+    IMP_TRY(imp__selftest_z(t, name, kind, "light", r.own, r.se, r.other));
+    IMP_TRY(imp__selftest_row(t, &(struct imp_selftest_row){.object = name,
+                                                            .kind = kind,
+                                                            .contract = "derivative",
+                                                            .value = r.error,
+                                                            .error = r.error,
+                                                            .limit = 1e-5,
+                                                            .chance = -1}));
+out:
+    return st;
+}
+
+enum imp_status imp__selftest_lights(struct imp__selftest *t)
+{
+    enum imp_status st = IMP_OK;
+    t->level = imp__sidak(0.01, 3);
+    for (int k = 0; k < t->scene->n_emitters; k++)
+        IMP_TRY(light(t, t->scene->emitters[k]));
+out:
+    return st;
+}

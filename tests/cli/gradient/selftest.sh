@@ -1,0 +1,9 @@
+# SPDX-License-Identifier: Apache-2.0
+cd "$ROOT/scenes" || exit 9
+importon selftest -q --samples 12000 material cornell.xml | head -3
+importon selftest -q --json --samples 12000 light cornell.xml | python3 -c '
+import json, sys
+a = json.load(sys.stdin)
+print(a["command"], a["subject"], a["failed"], [r["contract"] for r in a["rows"]])'
+importon selftest camera cornell.xml >/dev/null
+importon selftest phases cornell.xml
