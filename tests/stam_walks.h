@@ -206,7 +206,7 @@ static inline struct dual stam_value(const struct imp_walk *w, enum stam_variant
         const struct dual f =
             sphere ? stam_m2(&dirs, variant, theta)
                    : dual_scale(dual_control(theta, DIFFUSE3), v->d.wi[2] / M_PI);
-        T = dual_mul(T, dual_scale(f, v->scale));
+        T = dual_mul(T, dual_scale(f, v->scale[0]));
         ++*(sphere ? n2 : n3);
     }
     return dual_of(0);

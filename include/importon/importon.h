@@ -386,7 +386,9 @@ typedef struct imp_film imp_film;
     X(IMP_DROP_MEMORY, 4, "no memory for the vertices")                                  \
     X(IMP_DROP_LONG, 5, "nothing ended the walk in 16384 vertices")                      \
     X(IMP_DROP_BENT, 6, "a bent ray came to no end, or to what media cannot hold")       \
-    X(IMP_DROP_MOVED, 7, "what moves with an active field has no derivative there")
+    X(IMP_DROP_MOVED, 7, "what moves with an active field has no derivative there")      \
+    X(IMP_DROP_MEDIUM, 8, "left a medium that it was not in: a hole in its boundary")    \
+    X(IMP_DROP_MAJORANT, 9, "an extinction is above its bound, or negative")
 #define IMP_DROP_ENUM(name, value, text) name = value,
 enum imp_drop { IMP_DROP_LIST(IMP_DROP_ENUM) };
 

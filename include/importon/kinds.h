@@ -60,11 +60,14 @@ enum imp_input_flags {
                              what it is for decides */
     IMP_INPUT_INDEX = 64, /* refractive index behind the surface over the one before it:
                              where a medium fills the shape, the medium's */
-    IMP_INPUT_LUMINANCE = 128, /* no property: the luminance, in all lanes, of the input
+    IMP_INPUT_LUMINANCE = 128,   /* no property: the luminance, in all lanes, of the input
                                  declared before it under the same name. A kind whose
                                  lanes couple (a tint divided by its luminance) reads
                                  it, and the engine has its derivative */
-    IMP_INPUT_NUMBER = 256     /* of an IMP_INPUT_SCALAR: a texture is refused */
+    IMP_INPUT_NUMBER = 256,      /* of an IMP_INPUT_SCALAR: a texture is refused */
+    IMP_INPUT_EXTINCTION = 4096, /* of a medium: the extinction depends on it, and does
+                                       not fall where it rises */
+    IMP_INPUT_VOLUME = 8192      /* may be a volume */
 };
 
 struct imp_input_desc { /* the list ends with {0} */
@@ -254,8 +257,9 @@ struct imp_texture {
 };
 
 enum imp_texture_flags {
-    IMP_TEXTURE_SPECTRUM = 1 /* written as <spectrum> too, around the texture that is its
-                                input nested_texture */
+    IMP_TEXTURE_SPECTRUM = 1, /* written as <spectrum> too, around the texture that is its
+                                 input nested_texture */
+    IMP_TEXTURE_CONSTANT = 2  /* the same everywhere */
 };
 
 /* Number `element` of a parameter in a direction of theta. */
@@ -285,6 +289,109 @@ struct imp_texture_ops {
                   imp_spec d_uv[2]);
     /* As imp_bsdf_ops.changed; of its own texels too. */
     void (*changed)(const struct imp_texture *t);
+
+    /* Of volumes. A volume is a texture that looks at `at->p` alone. */
+    /* Lane by lane, no less than any value in the box from lo to hi of the world. NULL:
+     * not known, and no extinction can be made of it. */
+    void (*bound)(const struct imp_texture *t, const imp_v3 *lo, const imp_v3 *hi,
+                  bool scalar, imp_spec *most);
+    /* The box that it fills: an affine map of the world, three rows of four, under which
+     * it is the unit cube; and in how many cells along each axis its bounds are worth
+     * knowing. NULL: it has no end. */
+    void (*extent)(const struct imp_texture *t, double to_unit[12], int cells[3]);
+};
+
+/* ---- Phase function ------------------------------------------------------------ */
+
+/* How a point in a medium scatters light: a density over directions, the same whichever
+ * of the two is the light's. Directions are of the world, in imp_dirs as those of a BSDF,
+ * with lobe IMP_SMOOTH. */
+struct imp_phase {
+    const struct imp_phase_ops *ops;
+    void *self;
+    int n_own, n_in; /* inputs of its own, and with its children's */
+    const struct imp_input **input;
+    int n_child;
+    const struct imp_phase *child[2];
+    int child_in[2]; /* where the child's inputs start in `in` */
+    const char *name;
+};
+
+struct imp_phase_ops {
+    size_t size;
+    const char *name;
+    size_t object_size;
+    const struct imp_input_desc *inputs;
+    int min_children, max_children;
+    enum imp_status (*build)(const struct imp_build *build, void *self,
+                             struct imp_phase *p);
+    /* Draw d->wi for d->wo; u[0] chooses a child, u[1], u[2] the direction. */
+    void (*sample)(const struct imp_phase *p, const imp_spec *in, const double u[3],
+                   struct imp_dirs *d);
+    /* In 1/sr; its integral over d->wi is 1 in every lane. */
+    void (*eval)(const struct imp_phase *p, const imp_spec *in, const struct imp_dirs *d,
+                 imp_spec *f);
+    /* Density of sample, per steradian; not 0 where the value or a derivative is not. */
+    double (*pdf)(const struct imp_phase *p, const imp_spec *in,
+                  const struct imp_dirs *d);
+    /* df[j] = lane-wise derivative of eval with respect to input j, for all n_in; sets
+     * all. */
+    void (*eval_d)(const struct imp_phase *p, const imp_spec *in,
+                   const struct imp_dirs *d, imp_spec *df);
+    /* As imp_bsdf_ops.changed. */
+    void (*changed)(const struct imp_phase *p);
+};
+
+/* Cosine of the angle between the directions of travel before and after: 1 is straight
+ * on. The directions may be rounded. */
+static inline double imp_phase_cos(const struct imp_dirs *d)
+{
+    return -imp_v3_dot(&d->wo, &d->wi) /
+           __builtin_sqrt(imp_v3_dot(&d->wo, &d->wo) * imp_v3_dot(&d->wi, &d->wi));
+}
+
+/* ---- Medium -------------------------------------------------------------------- */
+
+/* What a medium is at a point, per unit of length. */
+struct imp_coefficients {
+    imp_spec extinction; /* chance to be scattered or absorbed */
+    imp_spec scattering; /* chance to be scattered, at most extinction */
+    imp_spec emission;   /* radiance of a body of it that nothing passes: a length emits
+                            (extinction - scattering) times it */
+};
+
+struct imp_medium {
+    const struct imp_medium_ops *ops;
+    void *self;
+    int n_own, n_in; /* inputs of its own, and with its phase function's behind them */
+    const struct imp_input **input;
+    const struct imp_phase *phase;
+    int index; /* in the scene */
+    const char *name;
+    bool emits; /* build sets it: the emission may differ from 0 */
+
+    /* The scene's. */
+    struct imp_majorants *majorants;  /* NULL: extinction is the same everywhere */
+    const struct imp_bsdf *scatterer; /* of a point in it: albedo times phase function */
+    const struct imp_bsdf *pure;      /* the same with albedo 1, without emission */
+};
+
+struct imp_medium_ops {
+    size_t size;
+    const char *name;
+    size_t object_size;
+    const struct imp_input_desc *inputs;
+    enum imp_status (*build)(const struct imp_build *build, void *self,
+                             struct imp_medium *m);
+    void (*eval)(const struct imp_medium *m, const imp_spec *in,
+                 struct imp_coefficients *c);
+    /* dc[j] = lane-wise derivative of eval with respect to input j, for all n_own; sets
+     * all. That of the extinction is 0 for inputs without IMP_INPUT_EXTINCTION. */
+    void (*eval_d)(const struct imp_medium *m, const imp_spec *in,
+                   struct imp_coefficients *dc);
+    /* As imp_bsdf_ops.changed. */
+    void (*changed)(const struct imp_medium *m);
+    bool boxed; /* it ends where the volume of its extinction ends */
 };
 
 /* A texture with inputs looks them up itself, at any point it likes: its eval, scatter and
@@ -358,6 +465,8 @@ struct imp_shape {
     const char *name;
     bool smooth; /* shading normals turn over flat facets; build sets it */
     const struct imp_body *body; /* of graded index, behind ng; NULL: none */
+    /* Behind ng and before it; both NULL at a surface that bounds no medium. */
+    const struct imp_medium *interior, *exterior;
 };
 
 /* A surface of constant curvature. */
@@ -521,6 +630,7 @@ struct imp_sensor {
     struct imp_film_desc film;
     int spp;
     const char *name;
+    const struct imp_medium *medium; /* that it is in; NULL: none */
 };
 struct imp_sensor_ops {
     size_t size;
@@ -547,6 +657,13 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_register_bsdf(imp_context *context,
                                                          const struct imp_bsdf_ops *ops);
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_register_texture(imp_context *context, const struct imp_texture_ops *ops);
+/** A volume has the table of a texture; `bound` makes it fit for an extinction. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_register_volume(imp_context *context, const struct imp_texture_ops *ops);
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_register_phase(imp_context *context, const struct imp_phase_ops *ops);
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_register_medium(imp_context *context, const struct imp_medium_ops *ops);
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_register_shape(imp_context *context, const struct imp_shape_ops *ops);
 /** A name may have two tables: one with IMP_EMITTER_AREA, for lights in shapes, and one

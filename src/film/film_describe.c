@@ -49,7 +49,10 @@ static void json(struct imp_text *t, const struct imp_scene *scene,
         imp__put(t, ",");
         put_string(t, "bsdf", v->bsdf ? v->bsdf->name : "");
         imp__put(t, ",");
-        if (v->shape) {
+        if (v->d.scatterer == IMP_IN_MEDIUM || v->d.scatterer == IMP_AT_SENSOR) {
+            put_vector(t, "position", imp__decided_v3(v->d.p), 3);
+            imp__put(t, ",\"distance\":%.9g,", v->t);
+        } else if (v->shape) {
             put_vector(t, "position", imp__decided_v3(v->d.p), 3);
             imp__put(t, ",");
             put_vector(t, "normal", v->ng, 3);
@@ -70,7 +73,7 @@ static void json(struct imp_text *t, const struct imp_scene *scene,
                 put_vector(t, "light_position", imp__decided_v3(v->d.light.p), 3);
                 imp__put(t, ",");
             }
-            put_vector(t, "light_sample", v->light_f * v->light_e * v->d.light.weight, C);
+            put_vector(t, "light_sample", v->light_f * v->light_e * v->light_w, C);
             imp__put(t, ",");
         } else if (v->d.connection == IMP_OCCLUDED) {
             imp__put(t, "\"light\":null,\"light_blocked\":true,");
@@ -107,7 +110,17 @@ static void plain(struct imp_text *t, const struct imp_scene *scene,
     imp_spec beta = imp__spec(1);
     int k = 0;
     for (const struct imp_vertex *v = w->first; v; v = v->next, k++) {
-        if (v->shape)
+        if (v->d.scatterer == IMP_AT_SENSOR) {
+            imp__put(t, "  sensor\n");
+            plain_spec(t, "weight", v->w, C);
+            beta *= v->w;
+            k--;
+            continue;
+        }
+        if (v->d.scatterer == IMP_IN_MEDIUM)
+            imp__put(t, "  %d: in %s at (%.6g, %.6g, %.6g), distance %.6g\n", k,
+                     v->bsdf->name, v->d.p[0], v->d.p[1], v->d.p[2], v->t);
+        else if (v->shape)
             imp__put(t,
                      "  %d: %s (%s) at (%.6g, %.6g, %.6g), distance %.6g, uv %.4f %.4f\n",
                      k, v->shape->name, *v->bsdf->name ? v->bsdf->name : "black",
@@ -120,7 +133,7 @@ static void plain(struct imp_text *t, const struct imp_scene *scene,
         if (v->d.connection == IMP_CONNECTED) {
             imp__put(t, "    light        %s\n",
                      scene->emitters[v->d.light.emitter]->name);
-            plain_spec(t, "light sample", v->light_f * v->light_e * v->d.light.weight, C);
+            plain_spec(t, "light sample", v->light_f * v->light_e * v->light_w, C);
         } else if (v->d.connection == IMP_OCCLUDED) {
             imp__put(t, "    light        blocked\n");
         }
@@ -141,7 +154,7 @@ static void plain(struct imp_text *t, const struct imp_scene *scene,
         }
         beta *= v->w;
     }
-    if (!w->first) imp__put(t, "  meets nothing\n");
+    if (k == 0) imp__put(t, "  meets nothing\n");
     if (w->dropped) imp__put(t, "  dropped: %s\n", imp_drop_text(w->dropped));
     plain_spec(t, "radiance", w->L, C);
 }

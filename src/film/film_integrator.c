@@ -115,4 +115,7 @@ const struct imp_integrator_ops *const imp__integrator_kinds[] = {
     &imp__integrator_stam,
     &imp__integrator_photons,
     &imp__integrator_elements,
+    &imp__integrator_volpath,
+    &imp__integrator_volpathmis,
+    &imp__integrator_prbvolpath,
     NULL};

@@ -76,6 +76,11 @@ static bool used_otherwise(const struct imp_scene *s, const uint8_t *chosen,
         for (int j = 0; j < s->bsdfs[i]->n_own; j++)
             if (s->bsdfs[i]->ops->inputs[j].role != IMP_EMISSION)
                 mark(s, s->bsdfs[i]->input[j], others);
+    for (int i = 0; i < s->n_media; i++)
+        for (int j = 0; j < s->media[i]->n_in; j++)
+            if (j >= s->media[i]->n_own ||
+                s->media[i]->ops->inputs[j].role != IMP_EMISSION)
+                mark(s, s->media[i]->input[j], others);
     for (size_t k = 0; k < s->n_params; k++)
         if (chosen[k] && others[k]) return true;
     return false;
@@ -146,6 +151,10 @@ static enum imp_status check_emission(struct imp__kept *k, uint8_t *chosen)
         for (int j = 0; j < s->bsdfs[i]->n_own; j++)
             if (s->bsdfs[i]->ops->inputs[j].role == IMP_EMISSION)
                 mark(s, s->bsdfs[i]->input[j], chosen);
+    for (int i = 0; i < s->n_media; i++)
+        for (int j = 0; j < s->media[i]->n_own; j++)
+            if (s->media[i]->ops->inputs[j].role == IMP_EMISSION)
+                mark(s, s->media[i]->input[j], chosen);
     if (!any_chosen(s, chosen) || used_otherwise(s, chosen, chosen + s->n_params))
         return IMP_OK; /* L is not of first degree then */
     return euler(k, chosen, NULL, "all emission");

@@ -26,6 +26,9 @@ struct imp_build {
 /* Tables; each ends with NULL. */
 extern const struct imp_bsdf_ops *const imp__bsdf_kinds[];
 extern const struct imp_texture_ops *const imp__texture_kinds[];
+extern const struct imp_texture_ops *const imp__volume_kinds[];
+extern const struct imp_phase_ops *const imp__phase_kinds[];
+extern const struct imp_medium_ops *const imp__medium_kinds[];
 extern const struct imp_shape_ops *const imp__shape_kinds[];
 extern const struct imp_emitter_ops *const imp__emitter_kinds[];
 extern const struct imp_sensor_ops *const imp__sensor_kinds[];

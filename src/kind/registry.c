@@ -27,6 +27,8 @@ BEGINS_WITH_HEAD(imp_shape_ops);
 BEGINS_WITH_HEAD(imp_emitter_ops);
 BEGINS_WITH_HEAD(imp_sensor_ops);
 BEGINS_WITH_HEAD(imp_filter_ops);
+BEGINS_WITH_HEAD(imp_phase_ops);
+BEGINS_WITH_HEAD(imp_medium_ops);
 
 static struct head head_of(const void *ops)
 {
@@ -43,6 +45,9 @@ static const void *built_in(enum imp_concept concept, size_t i)
     case IMP_CONCEPT_SHAPE: return imp__shape_kinds[i];
     case IMP_CONCEPT_EMITTER: return imp__emitter_kinds[i];
     case IMP_CONCEPT_SENSOR: return imp__sensor_kinds[i];
+    case IMP_CONCEPT_VOLUME: return imp__volume_kinds[i];
+    case IMP_CONCEPT_PHASE: return imp__phase_kinds[i];
+    case IMP_CONCEPT_MEDIUM: return imp__medium_kinds[i];
     case IMP_CONCEPT_FILTER: break;
     }
     return imp__filter_kinds[i];
@@ -240,6 +245,14 @@ out:
                               "%s: ops: '%s' has only one of " #one " and " #other,      \
                               __func__, (own).name ? (own).name : "");                   \
     } while (0)
+#define CHILDREN(own)                                                                    \
+    do {                                                                                 \
+        if ((own).min_children < 0 || (own).max_children > 2 ||                          \
+            (own).min_children > (own).max_children)                                     \
+            return imp__error(                                                           \
+                context, IMP_E_ARG, "%s: ops: '%s' takes %d to %d children", __func__,   \
+                (own).name ? (own).name : "", (own).min_children, (own).max_children);   \
+    } while (0)
 #define TAKE(own)                                                                        \
     IMP_REQUIRE(NULL, context, "context");                                               \
     IMP_REQUIRE(context, ops, "ops");                                                    \
@@ -254,11 +267,7 @@ enum imp_status imp_register_bsdf(imp_context *context, const struct imp_bsdf_op
     NEEDS(own, pdf);
     NEEDS(own, eval_d);
     NEEDS_BOTH_OR_NEITHER(own, emit, emit_d);
-    if (own.min_children < 0 || own.max_children > 2 ||
-        own.min_children > own.max_children)
-        return imp__error(context, IMP_E_ARG, "%s: ops: '%s' takes %d to %d children",
-                          __func__, own.name ? own.name : "", own.min_children,
-                          own.max_children);
+    CHILDREN(own);
     IMP_CHECKED(inputs_check(context, __func__, own.inputs));
     return append(context, __func__, IMP_CONCEPT_BSDF, &own, sizeof own, NULL);
 }
@@ -278,6 +287,42 @@ enum imp_status imp_register_texture(imp_context *context,
                               "%s: ops: input '%s': IMP_INPUT_LUMINANCE in a texture",
                               __func__, d->name);
     return append(context, __func__, IMP_CONCEPT_TEXTURE, &own, sizeof own, NULL);
+}
+
+enum imp_status imp_register_volume(imp_context *context,
+                                    const struct imp_texture_ops *ops)
+{
+    struct imp_texture_ops own = {0};
+    TAKE(own);
+    NEEDS(own, eval);
+    NEEDS(own, scatter);
+    NEEDS(own, tangent);
+    IMP_CHECKED(inputs_check(context, __func__, own.inputs));
+    return append(context, __func__, IMP_CONCEPT_VOLUME, &own, sizeof own, NULL);
+}
+
+enum imp_status imp_register_phase(imp_context *context, const struct imp_phase_ops *ops)
+{
+    struct imp_phase_ops own = {0};
+    TAKE(own);
+    NEEDS(own, sample);
+    NEEDS(own, eval);
+    NEEDS(own, pdf);
+    NEEDS(own, eval_d);
+    CHILDREN(own);
+    IMP_CHECKED(inputs_check(context, __func__, own.inputs));
+    return append(context, __func__, IMP_CONCEPT_PHASE, &own, sizeof own, NULL);
+}
+
+enum imp_status imp_register_medium(imp_context *context,
+                                    const struct imp_medium_ops *ops)
+{
+    struct imp_medium_ops own = {0};
+    TAKE(own);
+    NEEDS(own, eval);
+    NEEDS(own, eval_d);
+    IMP_CHECKED(inputs_check(context, __func__, own.inputs));
+    return append(context, __func__, IMP_CONCEPT_MEDIUM, &own, sizeof own, NULL);
 }
 
 enum imp_status imp_register_shape(imp_context *context, const struct imp_shape_ops *ops)

@@ -14,7 +14,10 @@ enum imp_concept {
     IMP_CONCEPT_SHAPE,
     IMP_CONCEPT_EMITTER,
     IMP_CONCEPT_SENSOR,
-    IMP_CONCEPT_FILTER
+    IMP_CONCEPT_FILTER,
+    IMP_CONCEPT_VOLUME,
+    IMP_CONCEPT_PHASE,
+    IMP_CONCEPT_MEDIUM
 };
 
 /* Table i of a concept (struct imp_bsdf_ops, ...); NULL after the last. */

@@ -120,7 +120,9 @@ enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *nod
                                "the object contains itself");
     node->visiting = 1;
     const void *found;
-    IMP_TRY(imp__kind_find(scene->ctx, IMP_CONCEPT_TEXTURE, node, &found));
+    const bool volume = strcmp(node->tag, "volume") == 0;
+    IMP_TRY(imp__kind_find(scene->ctx, volume ? IMP_CONCEPT_VOLUME : IMP_CONCEPT_TEXTURE,
+                           node, &found));
     const struct imp_texture_ops *ops = found;
 
     t = imp__arena_array(&scene->arena, 1, sizeof *t);
@@ -237,10 +239,11 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
         const bool spectrum = is_spectrum(ctx, child->node);
         if (spectrum && child->node->n_children)
             child->node->children[0].name = "nested_texture";
-        if (strcmp(child->node->tag, "texture") != 0 && !spectrum)
+        const bool volume = d->flags & IMP_INPUT_VOLUME;
+        if (strcmp(child->node->tag, volume ? "volume" : "texture") != 0 && !spectrum)
             IMP_TRY(imp__node_error(ctx, child->node, IMP_E_SCENE,
-                                    "'%s' must be a number, a colour or a texture",
-                                    d->name));
+                                    "'%s' must be a number, a colour or a %s", d->name,
+                                    volume ? "volume" : "texture"));
         if (d->flags & IMP_INPUT_NUMBER)
             IMP_TRY(imp__node_error(ctx, child->node, IMP_E_SCENE,
                                     "'%s' must be a number, not a texture", d->name));

@@ -115,6 +115,18 @@ enum imp_status imp__build_black(struct imp_scene *scene, struct imp_bsdf **out)
     return IMP_OK;
 }
 
+/* The medium that a sensor or a light says it is in; NULL: none. */
+static struct imp_node *medium_child(struct imp_node *node)
+{
+    for (size_t i = 0; i < node->n_children; i++) {
+        struct imp_child *c = &node->children[i];
+        if (strcmp(c->node->tag, "medium") != 0) continue;
+        c->used = true;
+        return c->node;
+    }
+    return NULL;
+}
+
 /* ---- Emitters, shapes, sensors ------------------------------------------------- */
 
 static void emitter_changed(void *payload)
@@ -169,6 +181,7 @@ enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *nod
     IMP_TRY(imp__props_float(ctx, node, "sampling_weight", 1, &e->weight));
     if (e->weight < 0)
         IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "sampling_weight is negative"));
+    medium_child(node); /* walks know where they are */
     const struct imp_build b = imp__build_make(scene, node);
     if (ops->build) IMP_TRY(ops->build(&b, self, e));
     IMP_TRY(imp__proxies_take(scene, node, e->name));
@@ -224,7 +237,7 @@ enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
     struct imp_shape *s;
     IMP_TRY(imp__proxies_take(scene, node, name));
 
-    struct imp_node *bsdf = NULL, *emitter = NULL, *medium = NULL;
+    struct imp_node *bsdf = NULL, *emitter = NULL, *side[2] = {NULL, NULL};
     for (size_t i = 0; i < node->n_children; i++) {
         struct imp_child *c = &node->children[i];
         const char *tag = c->node->tag;
@@ -236,10 +249,15 @@ enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
                 IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "has two emitters"));
             emitter = c->node;
         } else if (strcmp(tag, "medium") == 0) {
-            if (medium || !c->name || strcmp(c->name, "interior") != 0)
-                IMP_TRY(imp__node_error(ctx, c->node, IMP_E_UNSUPPORTED,
-                                        "a shape has one medium, named interior"));
-            medium = c->node;
+            const bool out = c->name && strcmp(c->name, "exterior") == 0;
+            if (!out && (!c->name || strcmp(c->name, "interior") != 0))
+                IMP_TRY(imp__node_error(ctx, c->node, IMP_E_SCENE,
+                                        "a shape's medium is named interior or "
+                                        "exterior"));
+            if (side[out])
+                IMP_TRY(imp__node_error(ctx, c->node, IMP_E_SCENE,
+                                        "the shape has another %s", c->name));
+            side[out] = c->node;
         } else if (strcmp(tag, "sensor") == 0) {
             IMP_TRY(imp__node_error(ctx, c->node, IMP_E_UNSUPPORTED,
                                     "this version has no %s inside a shape", tag));
@@ -263,14 +281,21 @@ enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
     } else {
         s->bsdf = -2;
     }
-    if (medium) {
+    if (side[1] && strcmp(side[1]->type, "graded") == 0)
+        IMP_TRY(imp__node_error(ctx, side[1], IMP_E_UNSUPPORTED,
+                                "a graded medium fills the interior of a shape"));
+    if (side[0] && strcmp(side[0]->type, "graded") == 0) {
         if (bsdf && (imp__props_has(bsdf, "int_ior") || imp__props_has(bsdf, "ext_ior")))
             IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
                                     "the index inside is its medium's, the one outside "
                                     "the medium's outside_index: the bsdf has no "
                                     "int_ior and no ext_ior"));
-        IMP_TRY(imp__build_body(scene, medium, name, &s->body));
+        IMP_TRY(imp__build_body(scene, side[0], name, &s->body));
+    } else if (side[0]) {
+        IMP_TRY(imp__build_medium(scene, side[0], name, "interior", &s->interior));
     }
+    if (side[1])
+        IMP_TRY(imp__build_medium(scene, side[1], name, "exterior", &s->exterior));
     if (emitter) {
         if (!(s->area > 0))
             IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
@@ -327,6 +352,8 @@ enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node
     IMP_TRY(imp__film_desc_build(&film_build, &s->film));
     IMP_TRY(imp__sampler_build(&sampler_build, &s->spp));
     IMP_TRY(ops->build(&b, self, s)); /* needs the film's shape */
+    struct imp_node *medium = medium_child(node);
+    if (medium) IMP_TRY(imp__build_medium(scene, medium, name, "medium", &s->medium));
     IMP_TRY(imp__props_finish(ctx, node));
     IMP_TRY(imp__build_list_add(scene, (void ***)&scene->sensors, &scene->n_sensors, s));
 out:

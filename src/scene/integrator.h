@@ -11,13 +11,14 @@
 struct imp_scene;
 
 enum imp_integrator_flags {
-    IMP_INTEGRATOR_WALKS = 1,     /* radiance along walks; self is a struct
+    IMP_INTEGRATOR_WALKS = 1,      /* radiance along walks; self is a struct
                                  imp_walk_integrator (walk/walk_integrator.h) */
-    IMP_INTEGRATOR_SOLVES = 2,    /* finite elements; self is a struct
+    IMP_INTEGRATOR_SOLVES = 2,     /* finite elements; self is a struct
                                   imp_elements_integrator */
-    IMP_INTEGRATOR_CONTAINS = 4,  /* others, which must be INNER */
-    IMP_INTEGRATOR_INNER = 8,     /* may be contained */
-    IMP_INTEGRATOR_NO_FIELDS = 16 /* has no derivative of a graded index */
+    IMP_INTEGRATOR_CONTAINS = 4,   /* others, which must be INNER */
+    IMP_INTEGRATOR_INNER = 8,      /* may be contained */
+    IMP_INTEGRATOR_NO_FIELDS = 16, /* has no derivative of a graded index */
+    IMP_INTEGRATOR_MEDIA = 32      /* media scatter its walks */
 };
 
 struct imp_integrator {

@@ -32,6 +32,8 @@ struct imp_param {
     imp_spec *lanes; /* LANES: info.count numbers in lanes 0.., a scalar in all of them */
     float *bulk;     /* BULK: [info.count] in place */
     double *doubles; /* DOUBLES: [info.count] in place */
+    bool probed;     /* an extinction depends on it: its derivative has side walks, and is
+                        not that of a frozen walk (walk/probe.c) */
 };
 
 /* A graded index inside shapes. What it is, and how rays step through it, is known to
@@ -91,6 +93,9 @@ struct imp_scene {
     struct imp_texture **textures;
     int n_bodies;
     struct imp_body **bodies; /* attached to nodes; those in use have an index */
+    int n_media;
+    struct imp_medium **media; /* those that scatter */
+    bool media_open;           /* some lie in others that their shapes do not name */
     struct imp_bsdf *default_bsdf, *black_bsdf;
     const struct imp_integrator *integrator; /* NULL: none was written */
     int environment;                         /* emitter index, -1: none */
@@ -137,7 +142,7 @@ enum imp_status imp__integrator_build(struct imp_scene *scene, struct imp_node *
 enum imp_status imp__integrator_ready(struct imp_scene *scene,
                                       const struct imp_integrator *i);
 
-/* ---- media.c ------------------------------------------------------------------- */
+/* ---- bodies.c ------------------------------------------------------------------- */
 /* The medium of a shape: its numbers become parameters where it is met first. */
 enum imp_status imp__build_body(struct imp_scene *scene, struct imp_node *node,
                                 const char *parent, const struct imp_body **out);

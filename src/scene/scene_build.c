@@ -59,9 +59,9 @@ static enum imp_status top_build(struct imp_scene *scene, struct imp_child *chil
                                     "an area emitter must be inside a shape"));
     } else if (strcmp(tag, "medium") == 0) {
         if (!node->id) node->id = name; /* declared; made where a shape refers to it */
-        if (!node->body)
-            IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
-                                    "this version has no such medium; it has graded"));
+        const struct imp_medium *m;
+        if (strcmp(node->type, "graded") != 0)
+            IMP_TRY(imp__build_medium(scene, node, "", "", &m));
     } else if (strcmp(tag, "integrator") == 0) {
         if (scene->integrator)
             IMP_TRY(
@@ -71,7 +71,8 @@ static enum imp_status top_build(struct imp_scene *scene, struct imp_child *chil
         IMP_TRY(imp__integrator_build(scene, node, integrators, i));
         scene->integrator = i;
     } else if (strcmp(tag, "film") != 0 && strcmp(tag, "sampler") != 0 &&
-               strcmp(tag, "rfilter") != 0) { /* those are declared for sensors */
+               strcmp(tag, "rfilter") != 0 && strcmp(tag, "phase") != 0 &&
+               strcmp(tag, "volume") != 0) { /* those are declared for others */
         IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
                                 "this version has no <%s>", tag));
     }
@@ -117,6 +118,7 @@ enum imp_status imp__scene_build(struct imp_scene *scene,
     IMP_TRY(imp__mixing_materials(scene));
     if (scene->integrator) IMP_TRY(imp__integrator_ready(scene, scene->integrator));
     IMP_TRY(imp__bodies_check(scene));
+    IMP_TRY(imp__media_check(scene));
     imp__theta_finish(scene);
     IMP_TRY(imp__intersector_create(scene));
     if (scene->aims.aimed) IMP_TRY(imp__aims_aim(scene));

@@ -38,6 +38,13 @@ enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *nod
 enum imp_status imp__build_bsdf(struct imp_scene *scene, struct imp_node *node,
                                 const char *parent, const char *slot,
                                 struct imp_bsdf **out);
+/* A medium that scatters, called `slot` below its parent if it has no id. */
+enum imp_status imp__build_medium(struct imp_scene *scene, struct imp_node *node,
+                                  const char *parent, const char *slot,
+                                  const struct imp_medium **out);
+/* When all objects are there: is the light of these media what the integrator can know?
+ */
+enum imp_status imp__media_check(struct imp_scene *scene);
 /* A material that reflects nothing: emitters' default. */
 enum imp_status imp__build_black(struct imp_scene *scene, struct imp_bsdf **out);
 /* An area light without a shape is only declared, and nothing is made. */

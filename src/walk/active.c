@@ -43,6 +43,20 @@ enum imp_status imp__active_create(const struct imp_scene *scene, const uint8_t 
     for (int e = 0; e < scene->n_emitters; e++)
         for (int k = 0; k < scene->emitters[e]->n_in; k++)
             a.emitter[e] |= input_depends(scene->emitters[e]->input[k], chosen);
+    for (int m = 0; m < scene->n_media; m++) {
+        const struct imp_medium *medium = scene->media[m];
+        for (int k = 0; k < medium->n_own; k++) {
+            if (!(medium->ops->inputs[k].flags & IMP_INPUT_EXTINCTION)) continue;
+            if (!input_depends(medium->input[k], chosen)) continue;
+            if (!a.medium) a.medium = imp__alloc(ctx, (size_t)scene->n_media, 1);
+            if (!a.medium) {
+                imp__active_destroy(ctx, &a);
+                return imp__error(ctx, IMP_E_NOMEM,
+                                  "no memory for the active parameters");
+            }
+            a.medium[m] = 1;
+        }
+    }
     for (int m = 0; m < scene->n_bodies; m++)
         for (int k = 0; k < scene->bodies[m]->n_numbers; k++) {
             const int param = scene->bodies[m]->numbers[k].param;
@@ -65,5 +79,6 @@ void imp__active_destroy(imp_context *ctx, struct imp_active *a)
     imp__release(ctx, a->bsdf);
     imp__release(ctx, a->emitter);
     imp__release(ctx, a->body);
+    imp__release(ctx, a->medium);
     *a = (struct imp_active){0};
 }

@@ -3,6 +3,7 @@
  * Values from decisions: what the scene's present parameters make of a walk whose
  * vertices, directions, densities, MIS weights and roulette are settled. */
 #include "graded.h"
+#include "tracking.h"
 
 static void place_decided(const struct imp_vertex *v, struct imp_place *p)
 {
@@ -12,9 +13,9 @@ static void place_decided(const struct imp_vertex *v, struct imp_place *p)
 
 /* What a vertex's decisions are worth. */
 struct values {
-    imp_spec e, b;             /* E_k, B_k */
-    imp_spec light_f, light_e; /* factors of B_k */
-    imp_spec f;                /* of the continuation: w_k without T/(p s) */
+    imp_spec e, b;                      /* E_k, B_k */
+    imp_spec light_f, light_e, light_w; /* factors of B_k */
+    imp_spec f;                         /* of the continuation: w_k without T/(p s) */
 };
 
 /* Of the vertex at place p; in: its inputs there. */
@@ -42,9 +43,22 @@ static void vertex_values(const struct imp_tracer *tracer, const struct imp_vert
         b->ops->eval(b, in, &dirs, &x->light_f);
         x->light_e = imp__emitter_radiance(scene, d->light.emitter, &to,
                                            imp__decided_v3(d->light.p), v->carried);
-        x->b = x->light_f * x->light_e * d->light.weight;
+        x->light_w = imp__spec(d->light.weight);
+        if (imp_unlikely(v->to_light != NULL))
+            x->light_w *= imp__track_eval(scene, v->to_light, v->carried);
+        x->b = x->light_f * x->light_e * x->light_w;
     }
-    if (d->goes_on) b->ops->eval(b, in, &p->dirs, &x->f);
+    x->f = imp__spec(1);
+    if (b && d->goes_on) b->ops->eval(b, in, &p->dirs, &x->f);
+}
+
+/* T of the segment that follows. */
+static imp_spec passes(const struct imp_tracer *tracer, const struct imp_vertex *v)
+{
+    const double decided = v->d.passes;
+    return imp_likely(!v->on)
+               ? imp__spec(decided)
+               : imp__track_eval(tracer->scene, v->on, v->carried) * decided;
 }
 
 void imp__walk_evaluate(const struct imp_tracer *tracer, struct imp_walk *walk)
@@ -59,13 +73,14 @@ void imp__walk_evaluate(const struct imp_tracer *tracer, struct imp_walk *walk)
         v->b = x.b;
         v->light_f = x.light_f;
         v->light_e = x.light_e;
+        v->light_w = x.light_w;
         v->w = (imp_spec){0};
-        v->scale = 0;
+        v->scale = (imp_spec){0};
         for (struct imp_side *s = v->side; s; s = s->next)
             imp__walk_evaluate(tracer, &s->walk);
         if (!d->goes_on) continue;
         imp__step_weigh(v, x.f, d->pdf, d->survive);
-        imp__step_pass(v, d->passes);
+        imp__step_pass(v, passes(tracer, v));
     }
 }
 
@@ -74,6 +89,7 @@ imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk
     imp_spec P = imp__spec(1), L = {0}, in[IMP_INPUTS_MAX];
     const imp_spec *entry = walk->entry;
     struct imp_moving moving = {{0}, {0}, {0}};
+    struct imp_vertex now;
     if (walk->dropped || !walk->valid) return L;
     for (const struct imp_vertex *v = walk->first; v; v = v->next) {
         const struct imp_segment_ops *segment = v->segment->ops;
@@ -88,7 +104,13 @@ imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk
         L += P * (entry ? own * *entry++ : own);
         for (const struct imp_side *s = v->side; s; s = s->next)
             L += P * imp__walk_frozen(tracer, &s->walk);
-        P *= x.f * v->scale;
+        if (imp_likely(!v->on)) {
+            P *= x.f * v->scale;
+        } else {
+            imp__step_weigh(&now, x.f, v->d.pdf, v->d.survive);
+            imp__step_pass(&now, passes(tracer, v));
+            P *= now.w;
+        }
     }
     return L;
 }

@@ -182,7 +182,7 @@ static enum imp_meeting meet_inside(struct imp_step *s, struct imp_hit *hit)
     const double ratio = r->j.eta / r->k.eta;
     const double passes = imp__decide1(ratio * ratio);
     if (s->recorded) last->d.passes = (imp_decided)passes;
-    imp__step_pass(last, passes);
+    imp__step_pass(last, imp__spec(passes));
     s->beta *= passes;
     s->eta /= ratio;
     return IMP_MEETS_SURFACE;

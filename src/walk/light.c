@@ -140,6 +140,7 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
         record(v, light, weight, there, x.d, point, dirs.wi);
         v->light_f = f;
         v->light_e = le;
+        v->light_w = imp__spec(weight);
     }
 
     /* Aimed from the moved origin at the point itself: a ray parallel to wi would meet a

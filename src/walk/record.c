@@ -138,6 +138,10 @@ enum imp_status imp__record_keep(struct imp_record *r, const struct imp_walk *wa
         if (v->side)
             return imp__error(r->ctx, IMP_E_UNSUPPORTED,
                               "a walk with others that hang on it cannot be kept");
+        else if (v->on || v->to_light)
+            return imp__error(r->ctx, IMP_E_UNSUPPORTED,
+                              "a walk that crosses media cannot be kept: what collided "
+                              "with it on its segments is not");
     const bool counts = walk->valid && walk->dropped == IMP_DROP_NONE;
     const int n = counts ? walk->n : 0;
     const enum imp_status st = imp__record_reserve(r, 1, (size_t)n);
@@ -207,6 +211,8 @@ static struct imp_vertex *vertex_add(const struct imp_scene *scene,
     v->t = 0;
     v->ng = (imp_v3){0};
     v->segment = &imp__straight;
+    v->on = v->to_light = NULL;
+    v->probe = NULL;
     v->in = (imp_spec *)(v + 1);
     v->d = *d;
     return v;

@@ -2,6 +2,7 @@
  *
  * Straight segments through nothing. */
 #include "graded.h"
+#include "tracking.h"
 
 static inline enum imp_meeting nearest_hit(struct imp_step *s, struct imp_hit *hit)
 {
@@ -33,7 +34,9 @@ static const struct imp_segment_ops straight = {
     .name = "straight", .connects = true, .meet = imp__straight_meet};
 struct imp_segment imp__straight = {&straight, NULL};
 
-const struct imp_segment_ops *imp__segment_first(const struct imp_scene *scene)
+const struct imp_segment_ops *imp__segment_first(const struct imp_tracer *tracer)
 {
-    return imp_unlikely(scene->n_bodies > 0) ? &imp__graded_outside : &straight;
+    return imp_unlikely(tracer->integrator->media)     ? &imp__tracking
+           : imp_unlikely(tracer->scene->n_bodies > 0) ? &imp__graded_outside
+                                                       : &straight;
 }

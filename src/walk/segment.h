@@ -2,7 +2,8 @@
  *
  * Segments join the vertices of a walk. What a ray crosses on its way, how it finds the
  * next vertex, and how that depends on parameters is known to the segment's kind alone:
- * straight through nothing (segment.c), or bent inside a body of graded index (graded.c).
+ * straight through nothing (segment.c) or through media that scatter (tracking.c), or bent
+ * inside a body of graded index (graded.c).
  * A slot that is NULL has nothing to do. */
 #ifndef IMP_WALK_SEGMENT_H
 #define IMP_WALK_SEGMENT_H
@@ -10,9 +11,11 @@
 #include "walk.h"
 
 struct imp_step;
+struct imp_shadow;
 
 enum imp_meeting {
     IMP_MEETS_SURFACE,
+    IMP_MEETS_MEDIUM,  /* a collision with the medium that it crosses */
     IMP_MEETS_NOTHING, /* the ray leaves the scene */
     IMP_MEETS_DROP     /* the walk is dropped */
 };
@@ -48,6 +51,11 @@ struct imp_segment_ops {
     void (*leave)(struct imp_step *s, const struct imp_vertex *v,
                   const struct imp_surface *at);
 
+    /* Is the light sample of v, a point of the surface `from` or of a medium, seen? Sets
+     * the transmittance on the way. NULL: it is seen where nothing is in between. */
+    bool (*sees)(struct imp_step *s, struct imp_vertex *v, const struct imp_surface *from,
+                 const struct imp_shadow *shadow, imp_spec *transmittance);
+
     /* ---- Evaluate ---- */
     /* Where v is now. False: the segment ends on another shape now. */
     bool (*place)(const struct imp_tracer *tracer, const struct imp_vertex *v,
@@ -63,7 +71,7 @@ struct imp_segment_ops {
 
 extern struct imp_segment imp__straight; /* nothing to keep */
 
-/* The kind that the first segment of a walk has in this scene. */
-const struct imp_segment_ops *imp__segment_first(const struct imp_scene *scene);
+/* The kind that the first segment of a walk has. */
+const struct imp_segment_ops *imp__segment_first(const struct imp_tracer *tracer);
 
 #endif

@@ -35,6 +35,16 @@ struct imp_mixed {
     imp_v3 p;
 };
 
+/* What a walk through media knows of where it is (tracking.c). */
+struct imp_flight {
+    const struct imp_medium *medium; /* that the ray in flight is in; NULL: none */
+    const struct imp_medium
+        *here;      /* that the vertex at work lies in, or is reached from */
+    imp_v3 at;      /* of the last collision */
+    double t, base; /* of the collision; length before the last surface that was passed */
+    double behind;  /* the ray begins so far behind the point that it leaves */
+};
+
 struct imp_step {
     const struct imp_tracer *tracer;
     const struct imp_scene *scene;
@@ -63,6 +73,8 @@ struct imp_step {
 
     struct imp_lane_mis lanes;
 
+    struct imp_flight flight;
+    struct imp_probing *probing;     /* NULL: nothing is probed */
     struct imp_graded_state *graded; /* NULL: no graded medium in the scene */
     struct imp_guided guided;
     struct imp_mixed mixed;
@@ -93,6 +105,12 @@ static inline void imp__store_v3(imp_decided out[3], imp_v3 v)
 void imp__vertex_place(struct imp_step *s, struct imp_vertex *v,
                        const struct imp_surface *at, const struct imp_frame *frame,
                        imp_v3 d, double t);
+/* The vertex that the first segment begins at, if it has a weight. False: no memory. */
+bool imp__sensor_vertex(struct imp_step *s);
+/* What is scattered at point p of a medium back along s->d: a walk of its own, that
+ * begins with a copy of s; its walk is empty. */
+imp_spec imp__walk_scattered(struct imp_step *s, const struct imp_bsdf *scatterer,
+                             imp_v3 p);
 
 /* ---- segment.c ---- */
 /* The nearest hit of the ray in flight. With hide_emitters, a camera ray skips area
@@ -108,18 +126,18 @@ static inline void imp__evaluate_inputs(const struct imp_bsdf *b,
                                         const struct imp_texcoord *at, imp_spec *in)
 {
     imp__inputs_eval(b->input, b->n_in, at, in);
-    if (imp_unlikely(shape->body != NULL)) imp__graded_inputs(b, shape, at, in);
+    if (imp_unlikely(shape && shape->body)) imp__graded_inputs(b, shape, at, in);
 }
 /* f with densities frozen becomes the weight of the step; T of the segment that follows
  * is not known yet. */
 static inline void imp__step_weigh(struct imp_vertex *v, imp_spec f, double pdf,
                                    double survive)
 {
-    v->scale = 1 / (pdf * survive);
+    v->scale = imp__spec(1 / (pdf * survive));
     v->w = f * v->scale;
 }
 /* ... and now it is. */
-static inline void imp__step_pass(struct imp_vertex *v, double transmittance)
+static inline void imp__step_pass(struct imp_vertex *v, imp_spec transmittance)
 {
     v->scale *= transmittance;
     v->w *= transmittance;

@@ -5,7 +5,7 @@
  * piece of gradient falls off at every vertex. Tangent: derivative and radiance together,
  * from the last vertex to the first. The three differ only in the order in which the
  * product rule is read. */
-#include "step.h"
+#include "probe.h"
 
 imp_spec imp__walk_fold(struct imp_walk *walk)
 {
@@ -83,7 +83,94 @@ static void light_d(const struct imp_vertex *v, imp_spec *d)
 {
     const struct imp_dirs dirs = imp__light_dirs(v);
     v->bsdf->ops->eval_d(v->bsdf, v->in, &dirs, d);
-    for (int j = 0; j < v->bsdf->n_in; j++) d[j] *= v->light_e * v->d.light.weight;
+    for (int j = 0; j < v->bsdf->n_in; j++) d[j] *= v->light_e * v->light_w;
+}
+
+/* ---- Media ----------------------------------------------------------------------- */
+
+/* Where collisions are does not stand for the derivative with respect to an extinction:
+ * probes give it, and a collision's albedo none of it. x [b->n_in] */
+static void extinction_drop(const struct imp_tracer *tracer, const struct imp_vertex *v,
+                            imp_spec *x)
+{
+    const struct imp_medium *m;
+    if (v->d.scatterer != IMP_IN_MEDIUM || tracer->collisions_stand) return;
+    m = v->bsdf->self;
+    for (int j = 0; j < m->n_own; j++)
+        if (m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION) x[j] = (imp_spec){0};
+}
+
+static bool crosses(const struct imp_vertex *v)
+{
+    return v->on || v->to_light || v->probe;
+}
+
+/* w_k without the value of what the segment crosses. */
+static imp_spec weight_before(const struct imp_vertex *v)
+{
+    const double scale = (double)v->d.passes / ((double)v->d.pdf * (double)v->d.survive);
+    imp_spec f = imp__spec(1);
+    if (v->bsdf) {
+        const struct imp_dirs dirs = imp__vertex_dirs(v);
+        v->bsdf->ops->eval(v->bsdf, v->in, &dirs, &f);
+    }
+    return f * scale;
+}
+
+/* Of the segment that goes on, if its derivative is that of its frozen collisions. */
+static bool segment_counts(const struct imp_tracer *tracer, const struct imp_vertex *v)
+{
+    return v->on && v->d.goes_on && tracer->collisions_stand;
+}
+/* d B_k / d T of the way to the light. */
+static imp_spec light_before(const struct imp_vertex *v)
+{
+    return v->light_f * v->light_e * (double)v->d.light.weight;
+}
+
+static void media_scatter(const struct imp_tracer *tracer, const struct imp_vertex *v,
+                          imp_spec P, imp_spec own, struct imp_sink *sink)
+{
+    if (v->to_light)
+        imp__track_sweep(tracer, v->to_light, v->carried, own * light_before(v), sink);
+    if (segment_counts(tracer, v))
+        imp__track_sweep(tracer, v->on, v->carried, P * weight_before(v) * v->beyond,
+                         sink);
+    if (v->probe) {
+        const struct imp_medium *m = v->probe->medium;
+        imp_spec d[IMP_INPUTS_MAX];
+        imp__probe_d(v, d);
+        for (int j = 0; j < m->n_own; j++) {
+            d[j] *= P;
+            if (m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION)
+                imp__inputs_scatter(&m->input[j], 1, &v->probe->at, &d[j], sink);
+        }
+    }
+}
+
+typedef double dot_fn(const void *x_dot, int param, size_t element);
+
+static imp_spec media_tangent(const struct imp_tracer *tracer, const struct imp_vertex *v,
+                              imp_spec own, dot_fn *dot, const void *x_dot)
+{
+    imp_spec L_dot = {0};
+    if (v->to_light)
+        L_dot += own * light_before(v) *
+                 imp__track_tangent(tracer, v->to_light, v->carried, dot, x_dot);
+    if (segment_counts(tracer, v))
+        L_dot += weight_before(v) * v->beyond *
+                 imp__track_tangent(tracer, v->on, v->carried, dot, x_dot);
+    if (v->probe) {
+        const struct imp_medium *m = v->probe->medium;
+        imp_spec d[IMP_INPUTS_MAX], in_dot;
+        imp__probe_d(v, d);
+        for (int j = 0; j < m->n_own; j++) {
+            if (!(m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION)) continue;
+            imp__inputs_tangent(&m->input[j], 1, &v->probe->at, dot, x_dot, &in_dot);
+            L_dot += d[j] * in_dot;
+        }
+    }
+    return L_dot;
 }
 
 /* ---- Reverse ------------------------------------------------------------------- */
@@ -122,7 +209,7 @@ void imp__walk_sweep(const struct imp_tracer *tracer, const struct imp_walk *wal
                             own * met->weight, sink);
         if (connected && active->emitter[light->emitter])
             emitter_scatter(tracer, light->emitter, imp__light_emission(light),
-                            imp__light_at(v), own * v->light_f * light->weight, sink);
+                            imp__light_at(v), own * v->light_f * v->light_w, sink);
         if (bsdf_active(active, b)) {
             imp_spec bar[IMP_INPUTS_MAX], d[IMP_INPUTS_MAX];
             bool any = false;
@@ -144,10 +231,12 @@ void imp__walk_sweep(const struct imp_tracer *tracer, const struct imp_walk *wal
                 any = true;
             }
             if (any) {
+                extinction_drop(tracer, v, bar);
                 const struct imp_texcoord at = imp__vertex_at(v);
                 imp__inputs_scatter(b->input, b->n_in, &at, bar, sink);
             }
         }
+        if (imp_unlikely(crosses(v))) media_scatter(tracer, v, P, own, sink);
         P *= v->w;
         if (imp__is_zero_used(P, v->carried)) break;
     }
@@ -207,10 +296,13 @@ imp_spec imp__walk_tangent(const struct imp_tracer *tracer, const struct imp_wal
         if (connected && active->emitter[light->emitter])
             L_dot += emitter_tangent(tracer, light->emitter, imp__light_emission(light),
                                      imp__light_at(v), &direction) *
-                     v->light_f * light->weight * own;
+                     v->light_f * v->light_w * own;
+        if (imp_unlikely(crosses(v)))
+            L_dot += media_tangent(tracer, v, own, direction_at, &direction);
         if (!bsdf_active(active, b)) continue;
         imp_spec in_dot[IMP_INPUTS_MAX], d[IMP_INPUTS_MAX];
         imp__inputs_tangent(b->input, b->n_in, &at, direction_at, &direction, in_dot);
+        extinction_drop(tracer, v, in_dot);
         if (v->d.glows) {
             glow_d(v, d);
             for (int j = 0; j < b->n_in; j++) L_dot += d[j] * in_dot[j] * own;

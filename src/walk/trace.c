@@ -9,7 +9,7 @@
  * Le/p^e for a light sample, power heuristic with exponent 2, w^B = 1 at the first vertex
  * and after a delta lobe. Depth: emission at vertex k counts if k < max_depth, scattering
  * goes on and samples lights if k + 1 < max_depth (docs/scene-format.md 11). */
-#include "step.h"
+#include "probe.h"
 #include <float.h>
 #include <stddef.h>
 
@@ -40,10 +40,12 @@ static struct imp_vertex *vertex_add(struct imp_step *s, int n_in)
     v->shape = NULL;
     v->side = NULL;
     v->w = v->e = v->b = v->beyond = (imp_spec){0};
-    v->scale = 0;
+    v->scale = (imp_spec){0};
     if (!s->recorded) return v;
 
     v->segment = &imp__straight;
+    v->on = v->to_light = NULL;
+    v->probe = NULL;
     v->in = (imp_spec *)(v + 1);
     v->carried = s->at.carried;
     struct imp_decision *d = &v->d;
@@ -95,8 +97,10 @@ static bool seen(const struct imp_step *s)
 }
 
 /* The ray leaves the scene and meets the environment. */
-static void sky_meet(struct imp_step *s, bool counts)
+static void sky_meet(struct imp_step *s)
 {
+    const int max_depth = s->tracer->integrator->max_depth;
+    const bool counts = max_depth < 0 || s->depth < max_depth;
     const bool hidden = s->tracer->integrator->hide_emitters && s->depth == 0;
     if (s->scene->environment < 0 || hidden || !counts) return;
     struct imp_vertex *v = vertex_add(s, 0);
@@ -136,6 +140,44 @@ static struct imp_vertex *surface_meet(struct imp_step *s, struct imp_hit *hit,
     return v;
 }
 
+/* The point of a medium where the segment ended in a collision. */
+static __attribute__((noinline)) struct imp_vertex *
+medium_meet(struct imp_step *s, const struct imp_bsdf *scatterer, int medium, imp_v3 p,
+            double t, struct imp_surface *at, struct imp_frame *frame)
+{
+    struct imp_vertex *v = vertex_add(s, scatterer->n_in);
+    if (!v) return NULL;
+    v->bsdf = scatterer;
+    if (s->recorded) {
+        v->d.shape = medium;
+        v->d.scatterer = IMP_IN_MEDIUM;
+    }
+    *at = (struct imp_surface){.p = p};
+    *frame = (struct imp_frame){{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
+    vertex_place(s, v, at, frame, s->d, t);
+    s->walk->valid = true;
+    return v;
+}
+
+bool imp__sensor_vertex(struct imp_step *s)
+{
+    struct imp_vertex *v = vertex_add(s, 0);
+    if (!v) return false;
+    s->walk->depth = -1;
+    v->t = 0;
+    imp__step_weigh(v, imp__spec(1), 1, 1);
+    if (!s->recorded) return true;
+    v->d.scatterer = IMP_AT_SENSOR;
+    v->d.goes_on = true;
+    v->d.pdf = 1;
+    v->d.uv[0] = v->d.uv[1] = 0;
+    v->d.lobe = IMP_SMOOTH;
+    imp__store_v3(v->d.p, s->o);
+    imp__store_v3(v->d.wo, (imp_v3){0});
+    imp__store_v3(v->d.wi, s->d);
+    return true;
+}
+
 /* Light that leaves the vertex by itself: what its BSDF glows with, and its emitter. */
 static void emission_add(struct imp_step *s, struct imp_vertex *v, double weight,
                          const struct imp_hit *hit, const struct imp_surface *at)
@@ -149,7 +191,7 @@ static void emission_add(struct imp_step *s, struct imp_vertex *v, double weight
             v->d.glow_weight = (imp_decided)weight;
         }
     }
-    if (v->shape->emitter >= 0) {
+    if (v->shape && v->shape->emitter >= 0) {
         imp__emission_meet(s, v, v->shape->emitter, weight, hit, at);
         s->walk->valid |= seen(s);
     }
@@ -161,7 +203,7 @@ static void walk_on(struct imp_step *s);
 static void share(const struct imp_step *s, struct imp_vertex *v, int n)
 {
     const double part = imp__decide1(1. / n);
-    imp__step_pass(v, part);
+    imp__step_pass(v, imp__spec(part));
     if (s->recorded) v->d.passes = (imp_decided)part;
 }
 
@@ -260,26 +302,32 @@ mixture_meet(struct imp_step *s, const struct imp_bsdf *b, const struct imp_surf
     s->mixed.splits = s->mixed.here && s->depth < s->tracer->integrator->split;
 }
 
-/* From the ray in flight to the next one; false: the walk ends. */
-static inline __attribute__((always_inline)) bool step(struct imp_step *s)
+/* The light sample counts as far as what lies between lets it pass. */
+static __attribute__((noinline)) void connect_through(struct imp_step *s,
+                                                      struct imp_vertex *v,
+                                                      const struct imp_surface *at,
+                                                      const struct imp_shadow *shadow)
+{
+    imp_spec T;
+    if (!s->segment->sees(s, v, at, shadow, &T)) return;
+    v->b = shadow->brings * T;
+    if (!s->recorded) return;
+    v->d.connection = IMP_CONNECTED;
+    v->light_w *= T;
+}
+
+/* At a vertex: what it emits, its light sample, and where the walk goes on; false: it
+ * ends. */
+static inline __attribute__((always_inline)) bool
+vertex_work(struct imp_step *s, struct imp_vertex *v, const struct imp_hit *hit,
+            const struct imp_surface *at, const struct imp_frame *frame)
 {
     const struct imp_walk_integrator *integrator = s->tracer->integrator;
     const int max_depth = integrator->max_depth;
     const bool counts = max_depth < 0 || s->depth < max_depth;
     const bool goes_on = max_depth < 0 || s->depth + 1 < max_depth;
-    struct imp_hit hit;
-    struct imp_surface at;
-    struct imp_frame frame;
-
-    /* Follow the ray to what it meets. */
-    const enum imp_meeting met = s->segment->meet(s, &hit);
-    if (met == IMP_MEETS_NOTHING) sky_meet(s, counts);
-    if (met != IMP_MEETS_SURFACE) return false;
-    struct imp_vertex *v = surface_meet(s, &hit, &at, &frame);
-    if (!v) return false;
-    if (imp_unlikely(s->guided.guide != NULL)) imp__guided_arrive(s, &hit, &at);
     if (imp_unlikely(s->mixed.all != NULL || s->guided.here))
-        mixture_meet(s, v->bsdf, &at);
+        mixture_meet(s, v->bsdf, at);
     else s->mixed.here = s->mixed.splits = false;
 
     /* Stam's walk collects emission only where it is absorbed. */
@@ -289,7 +337,7 @@ static inline __attribute__((always_inline)) bool step(struct imp_step *s)
     if (integrator->absorbs) s->walk->valid = true;
 
     /* Emission that is met. */
-    if (counts && emits > 0) emission_add(s, v, emits, &hit, &at);
+    if (counts && emits > 0) emission_add(s, v, emits, hit, at);
     if (absorbed || !goes_on) return false;
     if (!(v->bsdf->flags & IMP_BSDF_NULL)) s->walk->valid = true;
 
@@ -297,7 +345,7 @@ static inline __attribute__((always_inline)) bool step(struct imp_step *s)
     struct imp_shadow shadow;
     shadow.wanted = false;
     if ((v->bsdf->flags & IMP_BSDF_SMOOTH) && s->segment->connects && integrator->lights)
-        imp__light_sample(s, v, &at, &frame, &shadow);
+        imp__light_sample(s, v, at, frame, &shadow);
 
     /* The continuation. */
     const bool splits =
@@ -305,20 +353,60 @@ static inline __attribute__((always_inline)) bool step(struct imp_step *s)
         (imp_unlikely(s->tracer->split > 1) && s->depth == 0 && s->scene->n_bodies == 0);
     const bool continues =
         integrator->directions &&
-        (splits ? scatter_split(s, v, &at, &frame) : imp__scatter(s, v, &at, &frame));
+        (splits ? scatter_split(s, v, at, frame) : imp__scatter(s, v, at, frame));
 
     /* Is the light seen? */
-    if (shadow.wanted &&
-        !imp__occluded(s->scene, &shadow.o, &shadow.d, 0, shadow.reach)) {
-        v->b = shadow.brings;
-        if (s->recorded) v->d.connection = IMP_CONNECTED;
+    if (shadow.wanted) {
+        if (imp_unlikely(s->segment->sees != NULL)) connect_through(s, v, at, &shadow);
+        else if (!imp__occluded(s->scene, &shadow.o, &shadow.d, 0, shadow.reach)) {
+            v->b = shadow.brings;
+            if (s->recorded) v->d.connection = IMP_CONNECTED;
+        }
     }
     return continues && !s->walk->dropped;
+}
+
+/* From the ray in flight to the next one; false: the walk ends. */
+static inline __attribute__((always_inline)) bool step(struct imp_step *s)
+{
+    struct imp_hit hit;
+    struct imp_surface at;
+    struct imp_frame frame;
+    struct imp_vertex *v;
+
+    /* Follow the ray to what it meets. */
+    switch (s->segment->meet(s, &hit)) {
+    case IMP_MEETS_SURFACE:
+        v = surface_meet(s, &hit, &at, &frame);
+        if (v && imp_unlikely(s->guided.guide != NULL)) imp__guided_arrive(s, &hit, &at);
+        break;
+    case IMP_MEETS_MEDIUM:
+        v = medium_meet(s, s->flight.here->scatterer, s->flight.here->index, s->flight.at,
+                        s->flight.t, &at, &frame);
+        break;
+    case IMP_MEETS_NOTHING: sky_meet(s); return false;
+    default: return false;
+    }
+    return v && vertex_work(s, v, &hit, &at, &frame);
 }
 
 static void walk_on(struct imp_step *s)
 {
     while (step(s)) s->depth++;
+}
+
+imp_spec imp__walk_scattered(struct imp_step *s, const struct imp_bsdf *scatterer,
+                             imp_v3 p)
+{
+    struct imp_surface at;
+    struct imp_frame frame;
+    struct imp_vertex *v = medium_meet(s, scatterer, -1, p, 0, &at, &frame);
+    if (!v) return (imp_spec){0};
+    if (vertex_work(s, v, NULL, &at, &frame)) {
+        s->depth++;
+        walk_on(s);
+    }
+    return imp__walk_fold(s->walk);
 }
 
 /* ---- Walks ------------------------------------------------------------------------ */
@@ -388,7 +476,7 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
                                      (tracer->active && tracer->active->body),
                          .scratch = scratch,
                          .at.carried = tracer->carried,
-                         .segment = imp__segment_first(tracer->scene),
+                         .segment = imp__segment_first(tracer),
                          .o = walk->ray.o,
                          .d = walk->ray.d,
                          .t_min = walk->ray.t_near,
@@ -402,7 +490,12 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
     s.mixed.all = tracer->mixing              ? tracer->mixing
                   : tracer->integrator->mixes ? tracer->integrator->mixing
                                               : NULL;
+    struct imp_probing probing = {.n = 0};
+    if (imp_unlikely(tracer->active && tracer->active->medium) && s.recorded &&
+        !tracer->collisions_stand && tracer->integrator->media)
+        s.probing = &probing;
     if (imp_likely(s.segment->begin == NULL) || s.segment->begin(&s)) walk_on(&s);
+    if (imp_unlikely(s.probing != NULL)) imp__probe_follow(&s);
 
     imp__walk_close(tracer, walk);
 }

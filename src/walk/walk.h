@@ -37,7 +37,9 @@ typedef float imp_decided;
 enum imp_scatterer {
     IMP_AT_SURFACE,  /* a BSDF */
     IMP_AT_BOUNDARY, /* a surface that light passes as if nothing were there */
-    IMP_AT_SKY       /* the environment, met where the walk leaves the scene */
+    IMP_AT_SKY,      /* the environment, met where the walk leaves the scene */
+    IMP_IN_MEDIUM,   /* a phase function, between surfaces */
+    IMP_AT_SENSOR    /* where a walk begins, if its first segment crosses media */
 };
 
 enum imp_connection { IMP_NOT_CONNECTED, IMP_OCCLUDED, IMP_CONNECTED };
@@ -58,7 +60,7 @@ struct imp_light {
 };
 
 struct imp_decision {
-    int32_t shape;            /* index; -1: none, at the sky */
+    int32_t shape;            /* index; in a medium, the medium's; -1: none */
     uint8_t scatterer;        /* enum imp_scatterer */
     int8_t lobe;              /* of the continuation: IMP_SMOOTH or a delta lobe */
     uint8_t connection;       /* enum imp_connection: what became of the light sample */
@@ -78,6 +80,8 @@ struct imp_decision {
 /* ---- Record ---------------------------------------------------------------------- */
 
 struct imp_segment_ops;
+struct imp_track; /* what a segment crosses (tracking.h) */
+struct imp_probe; /* of an extinction's derivative (probe.h) */
 
 /* One segment of a record; kinds put what they keep behind it (segment.h). */
 struct imp_segment {
@@ -96,11 +100,11 @@ struct imp_vertex {
     const struct imp_bsdf *bsdf;   /* of the surface; NULL at the sky */
     const struct imp_shape *shape; /* NULL at the sky */
     double t;                      /* length of the segment that leads here */
-    double scale;                  /* T/(p s) */
+    imp_spec scale;                /* T/(p s) */
 
     /* Values. */
     imp_spec e;            /* E_k: all emission of this vertex, weighted */
-    imp_spec b;            /* B_k = light_f light_e light.weight */
+    imp_spec b;            /* B_k = light_f light_e light_w */
     imp_spec w;            /* f scale: weight of the step to the next vertex */
     imp_spec beyond;       /* L_{k+1}, set by fold */
     struct imp_side *side; /* walks that hang on this vertex; NULL: none */
@@ -108,6 +112,9 @@ struct imp_vertex {
     /* Walks for their value alone keep nothing from here on. */
     imp_v3 ng;                         /* geometric normal, world */
     imp_spec light_f, light_e;         /* BSDF towards the light, and its radiance */
+    imp_spec light_w;                  /* light.weight, times T on the way to the light */
+    struct imp_track *on, *to_light;   /* of the segments that begin here; NULL: T is 1 */
+    struct imp_probe *probe;           /* of the segment that goes on; NULL: none */
     struct imp_segment *segment;       /* from the last vertex to here (segment.h) */
     imp_spec *in;                      /* [bsdf->n_in] inputs at this point */
     const struct imp_carried *carried; /* of the walk; outlives it */
@@ -153,6 +160,7 @@ struct imp_active {
     uint8_t *bsdf;    /* [n_bsdfs] does it depend on an active number */
     uint8_t *emitter; /* [n_emitters] */
     uint8_t *body;    /* [n_bodies]; NULL: none of them */
+    uint8_t *medium;  /* [n_media] does its extinction; NULL: none of them */
 };
 /* `chosen` [n_params]. */
 enum imp_status imp__active_create(const struct imp_scene *scene, const uint8_t *chosen,
@@ -174,6 +182,8 @@ struct imp_tracer {
                                           the scene */
     const struct imp_mixing *mixing;   /* densities in place of the integrator's and the
                                         materials'; NULL: those */
+    bool collisions_stand; /* the derivative of a frozen walk is wanted, whose collisions
+                              stay where they are, also of extinctions: no probes */
     int split; /* continuations of the first vertex, each with its share; 0: one. Scenes
                   with graded media have one */
 };

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "walk_integrator.h"
 #include "math/hash.h"
+#include <string.h>
 
 const struct imp_walk_integrator *imp__walk_integrator(const struct imp_scene *scene)
 {
@@ -16,7 +17,8 @@ uint64_t imp__walk_integrator_hash(const struct imp_walk_integrator *i)
     if (!i) return 0;
     const int number[] = {i->max_depth, i->rr_depth,   i->hide_emitters,
                           i->lights,    i->directions, i->guided,
-                          i->absorbs,   i->first_hit,  (int)i->alpha_gradient};
+                          i->absorbs,   i->first_hit,  (int)i->alpha_gradient,
+                          i->media};
     uint64_t h = imp__hash(0, number, sizeof number);
     if (!i->mixes && !i->photons) return h;
     const double other[] = {i->photons ? i->h : 0, i->split};
@@ -99,6 +101,22 @@ static enum imp_status path_build(const struct imp_build *build, struct imp_inte
     IMP_TRY(depth_read(build, -1, i, w));
     IMP_TRY(mixture_read(build, w));
     w->rr_depth = (int)rr;
+out:
+    return st;
+}
+
+/* volpath, and Mitsuba's two other estimators of the same mean. */
+static enum imp_status volpath_build(const struct imp_build *build,
+                                     struct imp_integrator *i)
+{
+    struct imp_walk_integrator *w = i->self;
+    enum imp_status st = IMP_OK;
+    bool spectral;
+    IMP_TRY(path_build(build, i));
+    if (strcmp(i->ops->name, "volpathmis") == 0)
+        IMP_TRY(imp_build_bool(build, "use_spectral_mis", true, &spectral));
+    w->guided = false;
+    w->media = true;
 out:
     return st;
 }
@@ -210,3 +228,14 @@ const struct imp_integrator_ops imp__integrator_photons = {
     .flags = IMP_INTEGRATOR_WALKS | IMP_INTEGRATOR_INNER,
     .build = photons_build,
     .ready = photons_ready};
+
+#define VOLPATH(kind)                                                                    \
+    const struct imp_integrator_ops imp__integrator_##kind = {                           \
+        .size = sizeof(struct imp_integrator_ops),                                       \
+        .name = #kind,                                                                   \
+        .object_size = sizeof(struct imp_walk_integrator),                               \
+        .flags = IMP_INTEGRATOR_WALKS | IMP_INTEGRATOR_INNER | IMP_INTEGRATOR_MEDIA,     \
+        .build = volpath_build}
+VOLPATH(volpath);
+VOLPATH(volpathmis);
+VOLPATH(prbvolpath);

@@ -19,6 +19,7 @@ struct imp_walk_integrator {
     bool only_points; /* of lights, those that no direction meets: the others are met */
     bool directions;  /* walks go on behind the first vertex; false: lights alone */
     bool guided;      /* a guide's densities are made for these walks */
+    bool media;       /* media scatter, and surfaces of type null are no vertices */
     bool absorbs;     /* emission counts where the walk is absorbed only (stam.c), which
                         takes the place of Russian roulette */
     bool first_hit;   /* alpha is 1 where the first ray meets a surface, and hide_emitters
@@ -35,7 +36,8 @@ struct imp_walk_integrator {
 };
 
 extern const struct imp_integrator_ops imp__integrator_path, imp__integrator_direct,
-    imp__integrator_stam, imp__integrator_photons;
+    imp__integrator_stam, imp__integrator_photons, imp__integrator_volpath,
+    imp__integrator_volpathmis, imp__integrator_prbvolpath;
 
 /* NULL: not one of walks. */
 static inline const struct imp_walk_integrator *

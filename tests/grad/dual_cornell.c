@@ -54,7 +54,8 @@ static struct dual radiance(imp_context *ctx, imp_scene *scene, const struct imp
         if (v->d.connection == IMP_CONNECTED && v->d.light.cos_light > 0)
             L = add(L, times(mul(throughput, rho), fmax(0, v->d.light.wi[2]) / M_PI *
                                                        light_rgb[c] * v->d.light.weight));
-        throughput = times(mul(throughput, rho), fmax(0, v->d.wi[2]) / M_PI * v->scale);
+        throughput =
+            times(mul(throughput, rho), fmax(0, v->d.wi[2]) / M_PI * v->scale[0]);
         if (!v->d.goes_on) break;
     }
     return L;

@@ -19,10 +19,11 @@ static float ratio_float(const struct imp_walk *w, const double *theta, double a
             if (!v->next) {
                 L[k] *= (float)at[k][AMBIENT3] / (float)absorb;
             } else if (stam_is(v, "sphere")) {
-                L[k] *= (float)stam_m2(&dirs, STAM_MICROFACET, at[k]).v * (float)v->scale;
-            } else {
                 L[k] *=
-                    (float)at[k][DIFFUSE3] * (float)(v->d.wi[2] / M_PI) * (float)v->scale;
+                    (float)stam_m2(&dirs, STAM_MICROFACET, at[k]).v * (float)v->scale[0];
+            } else {
+                L[k] *= (float)at[k][DIFFUSE3] * (float)(v->d.wi[2] / M_PI) *
+                        (float)v->scale[0];
             }
         }
     return (L[0] * L[0]) / (L[1] * L[1]);

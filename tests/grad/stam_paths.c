@@ -37,7 +37,7 @@ static void one(struct stam *s, const struct imp_walk *w, enum stam_variant vari
         const struct imp_dirs dirs = imp__vertex_dirs(v);
         const double p = stam_is(v, "sphere") ? stam_m2_pdf(&dirs, sampling, t[EXPONENT])
                                               : v->d.wi[2] / M_PI;
-        keep(&worst->density, off(1 / v->scale, p * (1 - s->absorb), 0));
+        keep(&worst->density, off(1 / v->scale[0], p * (1 - s->absorb), 0));
     }
     for (int k = 0; k < N_CONTROLS; k++) {
         const double h = 1e-5 * t[k], size = k == EXPONENT ? .1 * n2 * L / t[k] : 0;

@@ -316,9 +316,8 @@ static void hostile(imp_context *ctx)
             "<shape type='sphere'><bsdf type='null'/><medium type='graded' "
             "name='exterior'>" N0("1") "</medium></shape>",
             no, "interior");
-    refused(ctx,
-            "<shape type='sphere'><medium type='homogeneous' name='interior'/></shape>",
-            no, "it has graded");
+    refused(ctx, "<shape type='sphere'><medium type='fog' name='interior'/></shape>", no,
+            "no such medium");
     refused(
         ctx,
         "<shape type='sphere'><float name='radius' value='9'/><bsdf "

@@ -1,0 +1,123 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "in_medium.h"
+#include "math/vec.h"
+
+static const struct imp_medium *medium_of(const struct imp_bsdf *b) { return b->self; }
+
+/* a/b, 0 where b is: nothing collides there. */
+static imp_spec over(imp_spec a, imp_spec b)
+{
+    imp_spec q;
+    for (int c = 0; c < 4; c++) q[c] = b[c] > 0 ? a[c] / b[c] : 0;
+    return q;
+}
+static imp_spec albedo_of(const struct imp_coefficients *c)
+{
+    return over(c->scattering, c->extinction);
+}
+/* albedo = scattering/extinction */
+static imp_spec albedo_d(const struct imp_coefficients *c,
+                         const struct imp_coefficients *dc)
+{
+    return over(dc->scattering - albedo_of(c) * dc->extinction, c->extinction);
+}
+
+static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
+                   struct imp_dirs *d)
+{
+    const struct imp_medium *m = medium_of(b);
+    d->lobe = IMP_SMOOTH;
+    m->phase->ops->sample(m->phase, in + m->n_own, u, d);
+    return true;
+}
+static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
+{
+    const struct imp_medium *m = medium_of(b);
+    return m->phase->ops->pdf(m->phase, in + m->n_own, d);
+}
+
+static void pure_eval(const struct imp_bsdf *b, const imp_spec *in,
+                      const struct imp_dirs *d, imp_spec *f)
+{
+    const struct imp_medium *m = medium_of(b);
+    m->phase->ops->eval(m->phase, in + m->n_own, d, f);
+}
+static void pure_eval_d(const struct imp_bsdf *b, const imp_spec *in,
+                        const struct imp_dirs *d, imp_spec *df)
+{
+    const struct imp_medium *m = medium_of(b);
+    for (int j = 0; j < m->n_own; j++) df[j] = (imp_spec){0};
+    m->phase->ops->eval_d(m->phase, in + m->n_own, d, df + m->n_own);
+}
+
+static void eval(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
+                 imp_spec *f)
+{
+    const struct imp_medium *m = medium_of(b);
+    struct imp_coefficients c;
+    m->ops->eval(m, in, &c);
+    pure_eval(b, in, d, f);
+    *f *= albedo_of(&c);
+}
+static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
+                   imp_spec *df)
+{
+    const struct imp_medium *m = medium_of(b);
+    struct imp_coefficients c, dc[IMP_INPUTS_MAX];
+    imp_spec p;
+    m->ops->eval(m, in, &c);
+    m->ops->eval_d(m, in, dc);
+    pure_eval(b, in, d, &p);
+    pure_eval_d(b, in, d, df);
+    for (int j = 0; j < m->n_own; j++) df[j] = albedo_d(&c, &dc[j]) * p;
+    for (int j = m->n_own; j < m->n_in; j++) df[j] *= albedo_of(&c);
+}
+
+/* What is absorbed at a collision is emitted there (1 - albedo times the emission). */
+static void emit(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
+                 imp_spec *e)
+{
+    const struct imp_medium *m = medium_of(b);
+    struct imp_coefficients c;
+    (void)wo;
+    m->ops->eval(m, in, &c);
+    *e = (1 - albedo_of(&c)) * c.emission;
+}
+static void emit_d(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
+                   imp_spec *de)
+{
+    const struct imp_medium *m = medium_of(b);
+    struct imp_coefficients c, dc[IMP_INPUTS_MAX];
+    (void)wo;
+    m->ops->eval(m, in, &c);
+    m->ops->eval_d(m, in, dc);
+    for (int j = 0; j < m->n_in; j++) de[j] = (imp_spec){0};
+    for (int j = 0; j < m->n_own; j++)
+        de[j] = (1 - albedo_of(&c)) * dc[j].emission - albedo_d(&c, &dc[j]) * c.emission;
+}
+
+static void albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
+                   imp_spec *a)
+{
+    const struct imp_medium *m = medium_of(b);
+    struct imp_coefficients c;
+    (void)wo;
+    m->ops->eval(m, in, &c);
+    *a = albedo_of(&c);
+}
+
+const struct imp_bsdf_ops imp__in_medium = {.size = sizeof(struct imp_bsdf_ops),
+                                            .name = "medium",
+                                            .sample = sample,
+                                            .eval = eval,
+                                            .pdf = pdf,
+                                            .eval_d = eval_d,
+                                            .emit = emit,
+                                            .emit_d = emit_d,
+                                            .albedo = albedo};
+const struct imp_bsdf_ops imp__in_pure_medium = {.size = sizeof(struct imp_bsdf_ops),
+                                                 .name = "medium of albedo 1",
+                                                 .sample = sample,
+                                                 .eval = pure_eval,
+                                                 .pdf = pdf,
+                                                 .eval_d = pure_eval_d};

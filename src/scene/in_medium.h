@@ -1,0 +1,15 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A point in a medium as a scatterer of walks, which know surfaces: a BSDF whose frame
+ * has the axes of the world. Its value is a phase function, without a cosine, times the
+ * albedo; what it emits is what the medium emits there, per collision. */
+#ifndef IMP_SCENE_IN_MEDIUM_H
+#define IMP_SCENE_IN_MEDIUM_H
+
+#include <importon/kinds.h>
+
+/* self: the struct imp_medium; inputs: all of it. The second has albedo 1 and does not
+ * emit. */
+extern const struct imp_bsdf_ops imp__in_medium, imp__in_pure_medium;
+
+#endif

@@ -1,0 +1,157 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "majorants.h"
+
+#define CELLS_MAX 64 /* along an axis */
+
+/* The extinction of the largest inputs in the world's box of a cell. An extinction does
+ * not fall where an input rises (IMP_INPUT_EXTINCTION). */
+static double cell_bound(const struct imp_majorants *g, const int cell[3])
+{
+    const struct imp_medium *m = g->medium;
+    imp_v3 lo = {INFINITY, INFINITY, INFINITY, 0}, hi = -lo;
+    imp_spec in[IMP_INPUTS_MAX];
+    struct imp_coefficients c;
+    for (int k = 0; k < 8; k++) {
+        imp_v3 p = {0};
+        for (int a = 0; a < 3; a++) p[a] = (double)(cell[a] + (k >> a & 1)) / g->n[a];
+        p = imp__point(&g->to_world, p);
+        for (int a = 0; a < 3; a++) lo[a] = fmin(lo[a], p[a]), hi[a] = fmax(hi[a], p[a]);
+    }
+    const struct imp_texcoord at = {.p = (lo + hi) * 0.5};
+    imp__inputs_eval(m->input, m->n_own, &at, in);
+    for (int j = 0; j < m->n_own; j++) {
+        const struct imp_texture *t = m->input[j]->texture;
+        if (t && m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION)
+            t->ops->bound(t, &lo, &hi, m->input[j]->scalar, &in[j]);
+    }
+    m->ops->eval(m, in, &c);
+    double most = 0;
+    for (int k = 0; k < g->channels; k++) most = fmax(most, c.extinction[k]);
+    return most;
+}
+
+/* Floats above what they bound. */
+static float above(double x)
+{
+    return x > 0 ? nextafterf((float)(x * (1 + 1e-7)), INFINITY) : 0;
+}
+
+static void fill(void *payload)
+{
+    struct imp_majorants *g = payload;
+    int cell[3];
+    float *to = g->bound;
+    g->most = 0;
+    for (cell[2] = 0; cell[2] < g->n[2]; cell[2]++)
+        for (cell[1] = 0; cell[1] < g->n[1]; cell[1]++)
+            for (cell[0] = 0; cell[0] < g->n[0]; cell[0]++) {
+                *to = above(cell_bound(g, cell));
+                g->most = fmaxf(g->most, *to++);
+            }
+}
+
+enum imp_status imp__majorants_create(struct imp_scene *scene,
+                                      const struct imp_node *node, struct imp_medium *m)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_majorants *g = NULL;
+    const struct imp_texture *box = NULL;
+    bool varies = false;
+    for (int j = 0; j < m->n_own; j++) {
+        const struct imp_texture *t = m->input[j]->texture;
+        if (!t || !(m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION)) continue;
+        varies |= !(t->ops->flags & IMP_TEXTURE_CONSTANT);
+        if (!box && t->ops->extent) box = t;
+        if (!t->ops->bound)
+            return imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
+                                   "'%s': a %s has no known bound, and cannot be an "
+                                   "extinction",
+                                   m->ops->inputs[j].name, t->ops->name);
+    }
+    if (!varies && !m->ops->boxed) return IMP_OK;
+    if (!box && !m->ops->boxed)
+        return imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
+                               "its extinction varies, and has no box to look for it in");
+    g = imp__arena_array(&scene->arena, 1, sizeof *g);
+    if (!g) return imp__build_no_memory(scene);
+    *g = (struct imp_majorants){.medium = m,
+                                .channels = scene->channels,
+                                .ends = true,
+                                .to_unit = imp__mat4_identity(),
+                                .n = {1, 1, 1}};
+    if (box) box->ops->extent(box, g->to_unit.m, g->n);
+    if (!imp__mat4_inverse(&g->to_unit, &g->to_world))
+        return imp__node_error(scene->ctx, node, IMP_E_SCENE, "its box is flat");
+    size_t n = 1;
+    for (int a = 0; a < 3; a++) {
+        g->n[a] = imp_min(imp_max(g->n[a], 1), CELLS_MAX);
+        n *= (size_t)g->n[a];
+    }
+    g->bound = imp__arena_array(&scene->arena, n, sizeof *g->bound);
+    if (!g->bound) return imp__build_no_memory(scene);
+    fill(g);
+    for (int j = 0; j < m->n_own; j++)
+        if (m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION)
+            IMP_TRY(imp__build_watch(scene, &m->input[j], 1, fill, g));
+    m->majorants = g;
+out:
+    return st;
+}
+
+/* ---- A ray through the cells ------------------------------------------------------- */
+
+static double bound_at(const struct imp_majorant_walk *w)
+{
+    const struct imp_majorants *g = w->of;
+    return g->bound[((size_t)w->cell[2] * (size_t)g->n[1] + (size_t)w->cell[1]) *
+                        (size_t)g->n[0] +
+                    (size_t)w->cell[0]];
+}
+static double wall(const struct imp_majorant_walk *w)
+{
+    return fmin(fmin(w->next[0], w->next[1]), fmin(w->next[2], w->end));
+}
+
+bool imp__majorants_enter(const struct imp_majorants *of, imp_v3 o, imp_v3 d, double near,
+                          double far, struct imp_majorant_walk *w)
+{
+    const imp_v3 u = imp__point(&of->to_unit, o), v = imp__vector(&of->to_unit, d);
+    w->of = of;
+    for (int a = 0; a < 3; a++) { /* the slab of each axis */
+        if (v[a] == 0) {
+            if (!(u[a] >= 0 && u[a] <= 1)) return false;
+            continue;
+        }
+        const double t0 = -u[a] / v[a], t1 = (1 - u[a]) / v[a];
+        near = fmax(near, fmin(t0, t1));
+        far = fmin(far, fmax(t0, t1));
+    }
+    if (!(near < far)) return false;
+    w->t = near;
+    w->end = far;
+    for (int a = 0; a < 3; a++) {
+        const double x = (u[a] + near * v[a]) * of->n[a], speed = v[a] * of->n[a];
+        w->cell[a] = (int)imp_clamp(floor(x), 0.0, of->n[a] - 1.0);
+        w->step[a] = speed > 0 ? 1 : -1;
+        w->each[a] = speed == 0 ? INFINITY : 1 / fabs(speed);
+        w->next[a] =
+            speed == 0 ? INFINITY : (w->cell[a] + (speed > 0) - u[a] * of->n[a]) / speed;
+    }
+    w->leave = wall(w);
+    w->bound = bound_at(w);
+    return true;
+}
+
+bool imp__majorants_next(struct imp_majorant_walk *w)
+{
+    int a = w->next[0] < w->next[1] ? 0 : 1;
+    if (w->next[2] < w->next[a]) a = 2;
+    if (!(w->next[a] < w->end)) return false;
+    w->cell[a] += w->step[a];
+    if (w->cell[a] < 0 || w->cell[a] >= w->of->n[a]) return false;
+    w->t = fmax(w->t, w->next[a]);
+    w->next[a] += w->each[a];
+    w->leave = wall(w);
+    w->bound = bound_at(w);
+    return true;
+}

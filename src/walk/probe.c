@@ -1,0 +1,107 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "probe.h"
+
+/* The value at distance t of the events behind `first`, which lie before it. */
+static imp_spec value_to(const struct imp_step *s, const struct imp_medium *m,
+                         const struct imp_track *track, int first, double near, double t)
+{
+    const struct imp_carried *carried = s->at.carried;
+    imp_spec f = imp__spec(1), in[IMP_INPUTS_MAX];
+    if (!m->majorants)
+        return imp__attenuation(
+            imp__extinction_at(m, imp__decided_v3(track->o), carried, in), t - near);
+    for (int i = first; i < track->n && track->event[i].t < t; i++) {
+        const struct imp_event *e = &track->event[i];
+        const imp_v3 p =
+            imp__decided_v3(track->o) + imp__decided_v3(track->d) * (double)e->t;
+        f *= 1 - imp__extinction_at(m, p, carried, in) * (1 / (double)e->bound);
+    }
+    return f;
+}
+
+void imp__probe_offer(struct imp_step *s, const struct imp_medium *m,
+                      const struct imp_track *track, int first, imp_spec before,
+                      double near, double far)
+{
+    struct imp_probing *p = s->probing;
+    struct imp_vertex *from = s->walk->last;
+    const struct imp_key key = imp__key_branch(s->walk->key, (int)p->n++, 0x9e0be);
+    const double length = far - near,
+                 weight = length * imp__max_used(s->beta, s->at.carried);
+    if (!(weight > 0)) return;
+    if (!isfinite(weight)) {
+        s->walk->dropped = IMP_DROP_INFINITE;
+        return;
+    }
+    p->total += weight;
+    if (!(imp__u01(key, 0) * p->total < weight)) return;
+
+    const double t = near + length * imp__u01(key, 1);
+    if (!p->state) p->state = imp__arena_take(s->arena, 1, sizeof *p->state);
+    if (!p->probe) p->probe = imp__arena_take(s->arena, 1, sizeof *p->probe);
+    if (!p->state || !p->probe) {
+        s->walk->dropped = IMP_DROP_MEMORY;
+        return;
+    }
+    const imp_spec f = before * value_to(s, m, track, first, near, t);
+    *p->state = *s;
+    const imp_spec pass = f * imp__lane_mis_decide(p->state, f);
+    p->state->beta *= pass;
+    p->state->flight.here = p->state->flight.medium = m;
+    p->weight = weight;
+    p->from = from;
+    *p->probe = (struct imp_probe){
+        .medium = m,
+        .at = {.p = s->o + s->d * (t - s->flight.base), .carried = s->at.carried},
+        .reach = from->w * pass,
+        .length = length};
+}
+
+void imp__probe_follow(struct imp_step *s)
+{
+    struct imp_probing *p = s->probing;
+    if (!p || !p->probe || s->walk->dropped) return;
+    const int max_depth = s->tracer->integrator->max_depth;
+    struct imp_probe *probe = p->probe;
+    struct imp_step side = *p->state;
+    struct imp_tracer tracer = *s->tracer;
+    struct imp_walk walk = {.key = imp__key_branch(s->walk->key, side.depth, 0x51de)};
+    imp_spec scratch[IMP_INPUTS_MAX];
+    probe->length *= p->total / p->weight;
+    probe->emits = max_depth < 0 || side.depth < max_depth;
+    p->from->probe = probe;
+    s->walk->valid = true; /* although nothing may have scattered it */
+    tracer.active = NULL;
+    tracer.value_only = true;
+    side.tracer = &tracer;
+    side.walk = &walk;
+    side.recorded = false;
+    side.probing = NULL;
+    side.scratch = scratch;
+    const struct imp_arena_mark mark = imp__arena_mark(s->arena);
+    probe->scattered = imp__walk_scattered(&side, probe->medium->pure, probe->at.p);
+    imp__arena_rewind(s->arena, mark);
+    s->walk->dropped = walk.dropped;
+}
+
+void imp__probe_d(const struct imp_vertex *v, imp_spec *d)
+{
+    const struct imp_probe *p = v->probe;
+    const struct imp_medium *m = p->medium;
+    const imp_spec lost = v->w * v->beyond;
+    imp_spec in[IMP_INPUTS_MAX];
+    struct imp_coefficients c, dc[IMP_INPUTS_MAX];
+    imp__inputs_eval(m->input, m->n_own, &p->at, in);
+    m->ops->eval(m, in, &c);
+    m->ops->eval_d(m, in, dc);
+    if (!p->emits) c.emission = (imp_spec){0};
+    for (int j = 0; j < m->n_own; j++) {
+        const imp_spec absorbing = dc[j].extinction - dc[j].scattering;
+        d[j] = (imp_spec){0};
+        if (m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION)
+            d[j] =
+                (p->reach * (dc[j].scattering * p->scattered + absorbing * c.emission) -
+                 dc[j].extinction * lost) *
+                p->length;
+    }
+}

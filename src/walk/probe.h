@@ -1,0 +1,53 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Derivatives with respect to extinction (docs/media.md 4). Along a segment of length D
+ * from vertex k
+ *
+ *     dL_k = w int_0^D T(s) [d sigma_s(s) S(s) + d(sigma_a Le)(s) - d sigma(s) L(s)] ds
+ *
+ * with S the light that is scattered into the segment at s for a scattering coefficient
+ * of 1, and L what arrives there from beyond. Differentiating the weights of collisions
+ * instead divides by sigma: where it is 0 nothing collides and the gain is never seen.
+ *
+ * The walk's own flight is a probe: it passed s with probability T(s). With s uniform on
+ * the length l that it flew in the medium, l times the bracket is an estimate, in which
+ * what the walk itself brings from beyond is L and an extra walk from s gives S. One
+ * stretch of a walk is chosen, by length times throughput, so that the cost is linear in
+ * the walk's length. */
+#ifndef IMP_WALK_PROBE_H
+#define IMP_WALK_PROBE_H
+
+#include "tracking.h"
+
+struct imp_probe {
+    const struct imp_medium *medium;
+    struct imp_texcoord at; /* the point */
+    imp_spec reach;         /* weight of what leaves the point for vertex k */
+    imp_spec scattered;     /* S */
+    double length;          /* l over the probability of having been chosen */
+    bool emits;             /* emission there counts */
+};
+
+/* The stretch that is chosen so far. */
+struct imp_probing {
+    double total;            /* weights of all stretches */
+    struct imp_step *state;  /* of the walk at the point */
+    struct imp_vertex *from; /* vertex k */
+    struct imp_probe *probe; /* NULL: none yet */
+    double weight;
+    uint32_t n; /* stretches */
+};
+
+/* The flight has gone l = far - near in m, with events [first, track->n) of the track;
+ * `before`: the segment's value at `near`. */
+void imp__probe_offer(struct imp_step *s, const struct imp_medium *m,
+                      const struct imp_track *track, int first, imp_spec before,
+                      double near, double far);
+/* The walk has ended: follow what was chosen. */
+void imp__probe_follow(struct imp_step *s);
+
+/* Derivative of what arrives at vertex v with respect to the inputs of the medium,
+ * d [n_own], lane by lane; of inputs that the extinction does not depend on 0. */
+void imp__probe_d(const struct imp_vertex *v, imp_spec *d);
+
+#endif

@@ -1,0 +1,63 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Segments that cross media (docs/media.md 2). A free flight ends in a collision with a
+ * medium, which is a vertex like any other, or at a surface. Surfaces of type null are
+ * passed on the way: they only say where media begin and end.
+ *
+ * What a flight decided is kept as its events, at distances along the segment. The
+ * segment's value is a product over them,
+ *
+ *     a uniform medium crossed for a length t      exp(-sigma t)
+ *     a collision after that length                sigma exp(-sigma t)
+ *     bounded by b, a null collision at t          1 - sigma(t)/b
+ *     bounded by b, a collision at t               sigma(t)/b
+ *
+ * which is also the density with which each lane would have drawn it, so the weight of a
+ * flight is 1 where extinction has no colour (lane_mis.h). Flights are analog: closed
+ * form, or delta tracking (Woodcock et al. 1965) under local bounds (majorants.h). To a
+ * light sample no collision is drawn: exp(-sigma t), or ratio tracking (Novak, Selle,
+ * Jarosz 2014), whose events are all null collisions. */
+#ifndef IMP_WALK_TRACKING_H
+#define IMP_WALK_TRACKING_H
+
+#include "step.h"
+
+enum imp_event_kind { IMP_CROSSES, IMP_COLLIDES, IMP_NULL_AT, IMP_REAL_AT };
+
+struct imp_event {
+    imp_decided t;     /* a length in a uniform medium; else distance from the start */
+    imp_decided bound; /* b */
+    int32_t medium;
+    int32_t kind;
+};
+
+struct imp_track {
+    imp_decided o[3], d[3]; /* start and unit direction of the segment, world */
+    int n, cap;
+    struct imp_event *event; /* [n] */
+};
+
+extern const struct imp_segment_ops imp__tracking;
+
+/* The segment's value at the scene's present parameters. */
+imp_spec imp__track_eval(const struct imp_scene *scene, const struct imp_track *track,
+                         const struct imp_carried *carried);
+/* Its derivative with the events where they are: f_bar to the sink, or along x_dot. */
+void imp__track_sweep(const struct imp_tracer *tracer, const struct imp_track *track,
+                      const struct imp_carried *carried, imp_spec f_bar,
+                      struct imp_sink *sink);
+imp_spec imp__track_tangent(const struct imp_tracer *tracer,
+                            const struct imp_track *track,
+                            const struct imp_carried *carried,
+                            double (*dot)(const void *x_dot, int param, size_t element),
+                            const void *x_dot);
+
+/* Extinction at p: those inputs alone that it depends on are looked up, the others are 0.
+ */
+imp_spec imp__extinction_at(const struct imp_medium *m, imp_v3 p,
+                            const struct imp_carried *carried, imp_spec *in);
+
+/* exp(-sigma t); 1 where sigma is 0, however large t. */
+imp_spec imp__attenuation(imp_spec sigma, double t);
+
+#endif
