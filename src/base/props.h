@@ -70,6 +70,12 @@ struct imp_merl_data {
     const float *rho;
 };
 
+struct imp_grid_data {
+    int n[3], channels; /* x, y, z */
+    float box[6];       /* two corners */
+    const float *value; /* [n[2]][n[1]][n[0]][channels] */
+};
+
 struct imp_node {
     const char *tag, *type, *id; /* id NULL: none */
     const char *name;            /* slot under the parent; NULL: nameless */
@@ -89,6 +95,7 @@ struct imp_node {
     const struct imp_image_data *image;
     const struct imp_ies_data *ies;
     const struct imp_merl_data *merl;
+    const struct imp_grid_data *grid;
     struct imp_body *body; /* attached: a graded index (format/graded_file.c), or NULL */
     void *object;          /* what was made from it (scene/scene_build.c) */
     const char *asked[24]; /* names of properties that were looked for, literals; */

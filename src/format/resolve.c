@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Nodes that name files get what the files hold: triangles for obj and ply, pixels for
- * bitmap and envmap, intensities for ies, reflectances for merl. */
+ * bitmap and envmap, intensities for ies, reflectances for merl, cells for gridvolume. */
 #include "base/film.h"
 #include "color/rgb.h"
 #include "ies_file.h"
@@ -10,6 +10,7 @@
 #include "merl_file.h"
 #include "mesh_file.h"
 #include "search.h"
+#include "vol_file.h"
 #include <string.h>
 
 /* The message that is there, with the place of the property and the object before it. */
@@ -168,6 +169,24 @@ out:
     return st;
 }
 
+static enum imp_status grid_attach(struct imp_scene *scene, struct imp_node *node)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = scene->ctx;
+    struct imp_bytes bytes = {0};
+    const char *path;
+    struct imp_grid_data *data = imp__arena_array(&scene->files, 1, sizeof *data);
+    if (!data) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "scene: out of memory"));
+    IMP_TRY(path_of(scene, node, &path));
+    st = imp__file_read(ctx, path, IMP_VOL_BYTES_MAX, &bytes);
+    if (st == IMP_OK) st = imp__vol_parse(ctx, &scene->files, path, &bytes, data);
+    if (st != IMP_OK) IMP_TRY(placed(scene, node, st));
+    node->grid = data;
+out:
+    imp__bytes_free(ctx, &bytes);
+    return st;
+}
+
 static enum imp_status attach(struct imp_scene *scene, struct imp_node *node)
 {
     enum imp_status st = IMP_OK;
@@ -185,6 +204,8 @@ static enum imp_status attach(struct imp_scene *scene, struct imp_node *node)
         IMP_TRY(merl_attach(scene, node));
     if (strcmp(node->tag, "emitter") == 0 && strcmp(node->type, "envmap") == 0)
         IMP_TRY(sky_expand(scene, node));
+    if (strcmp(node->tag, "volume") == 0 && strcmp(node->type, "gridvolume") == 0)
+        IMP_TRY(grid_attach(scene, node));
     if (bitmap && !node->image) IMP_TRY(image_attach(scene, node));
     else if (bitmap && imp__node_prop(node, "filename"))
         IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_SCENE,

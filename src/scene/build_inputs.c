@@ -197,6 +197,33 @@ static void texels_bound(struct imp_scene *scene, int param,
     p->info.hi = imp_min(p->info.hi, hi);
 }
 
+/* Values of a volume are in the bounds of what it stands for. */
+static enum imp_status volume_check(struct imp_scene *scene, const struct imp_node *node,
+                                    const struct imp_texture *t,
+                                    const struct imp_input_desc *d)
+{
+    const double hi =
+        (d->lo == 0 && d->hi == 0) || d->flags & IMP_INPUT_SOFT ? INFINITY : d->hi;
+    for (int k = 0; k < t->n_in; k++)
+        for (int c = 0; !t->input[k]->texture && c < t->input[k]->count; c++) {
+            const double v = t->input[k]->value[c];
+            if (v < d->lo || v > hi)
+                return imp__node_error(scene->ctx, node, IMP_E_SCENE,
+                                       "%s = %g is outside [%g, %g]", d->name, v, d->lo,
+                                       hi);
+        }
+    if (t->param < 0 || scene->params[t->param].store != IMP_STORE_BULK) return IMP_OK;
+    const struct imp_param *p = &scene->params[t->param];
+    size_t n = 1;
+    for (int k = 0; k < p->info.n_dims; k++) n *= p->info.dims[k];
+    for (size_t k = 0; k < n; k++)
+        if (!(p->bulk[k] >= d->lo && p->bulk[k] <= hi))
+            return imp__node_error(scene->ctx, node, IMP_E_SCENE,
+                                   "%s: value %zu, %g, is outside [%g, %g]", d->name, k,
+                                   (double)p->bulk[k], d->lo, hi);
+    return IMP_OK;
+}
+
 /* May it be written as <spectrum>, around a texture? */
 static bool is_spectrum(const imp_context *ctx, const struct imp_node *node)
 {
@@ -250,6 +277,7 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
         IMP_TRY(imp__build_texture(scene, child->node, name, d->name, &t));
         in->texture = t;
         texels_bound(scene, t->param, d);
+        if (volume) IMP_TRY(volume_check(scene, child->node, t, d));
         return IMP_OK;
     } else if (d->flags & IMP_INPUT_REQUIRED) {
         IMP_TRY(

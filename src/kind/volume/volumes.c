@@ -3,7 +3,9 @@
  * The volumes: one line a kind. */
 #include "kind/build.h"
 
-#define VOLUMES(X) X(imp__constvolume)
+#define VOLUMES(X)                                                                       \
+    X(imp__constvolume)                                                                  \
+    X(imp__gridvolume)
 
 #define DECLARE(kind) extern const struct imp_texture_ops kind;
 VOLUMES(DECLARE)

@@ -1,0 +1,242 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * gridvolume: values of a .vol file over a box. Cell (i, j, k) has its centre at ((i +
+ * .5)/nx, ...) of the unit cube. The value is linear in the cells: eval, scatter and
+ * tangent go through `footprint`. */
+#include "box.h"
+#include "color/rgb.h"
+#include "kind/texture/input.h"
+#include <math.h>
+#include <string.h>
+
+enum wrap { WRAP_CLAMP, WRAP_REPEAT, WRAP_MIRROR };
+enum filter { FILTER_TRILINEAR, FILTER_NEAREST };
+
+struct gridvolume {
+    int n[3], channels; /* 1 or 3 */
+    enum wrap wrap;
+    enum filter filter;
+    struct imp_mat4 to_unit;
+    float *data; /* [n[2]][n[1]][n[0]][channels] */
+};
+
+static enum imp_status box_read(const struct imp_build *b, const struct imp_grid_data *g,
+                                struct imp_mat4 *to_unit)
+{
+    enum imp_status st = IMP_OK;
+    bool use_box;
+    IMP_TRY(imp__box_read(b, to_unit));
+    IMP_TRY(imp_build_bool(b, "use_grid_bbox", false, &use_box));
+    if (use_box) { /* to_world is applied to the file's box */
+        struct imp_mat4 box = imp__mat4_identity(), from_box;
+        for (int a = 0; a < 3; a++) {
+            box.m[5 * a] = g->box[3 + a] - g->box[a];
+            box.m[4 * a + 3] = g->box[a];
+        }
+        if (!imp__mat4_inverse(&box, &from_box))
+            IMP_TRY(imp_build_error(b, "use_grid_bbox", IMP_E_SCENE,
+                                    "the box of its file is flat"));
+        *to_unit = imp__mat4_multiply(&from_box, to_unit);
+    }
+out:
+    return st;
+}
+
+static enum imp_status build(const struct imp_build *b, void *self,
+                             struct imp_texture *tex)
+{
+    static const char *const wraps[] = {"clamp", "repeat", "mirror"};
+    static const char *const filters[] = {"trilinear", "nearest"};
+    enum imp_status st = IMP_OK;
+    struct gridvolume *v = self;
+    const struct imp_grid_data *g = b->node->grid;
+    const char *filename;
+    bool raw, accel;
+    int wrap, filter;
+    double max_value, most = 0;
+    float lo = 0;
+    IMP_TRY(imp_build_string(b, "filename", NULL, &filename));
+    IMP_TRY(imp_build_choice(b, "wrap_mode", wraps, 3, WRAP_CLAMP, &wrap));
+    IMP_TRY(imp_build_choice(b, "filter_type", filters, 2, FILTER_TRILINEAR, &filter));
+    IMP_TRY(imp_build_bool(b, "raw", false, &raw));    /* colours are linear already */
+    IMP_TRY(imp_build_bool(b, "accel", true, &accel)); /* Mitsuba's */
+    IMP_TRY(imp_build_float(b, "max_value", 0, &max_value));
+    if (!g)
+        IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE,
+                                "needs a grid: 'filename' is required"));
+    IMP_TRY(box_read(b, g, &v->to_unit));
+    v->wrap = (enum wrap)wrap;
+    v->filter = (enum filter)filter;
+    memcpy(v->n, g->n, sizeof v->n);
+    const bool grey = g->channels == 3 && b->mode == IMP_MONO;
+    v->channels = grey ? 1 : g->channels;
+    const size_t cells = (size_t)v->n[0] * (size_t)v->n[1] * (size_t)v->n[2],
+                 n = cells * (size_t)v->channels;
+    v->data = imp__arena_take(b->arena, n, sizeof *v->data);
+    if (!v->data) return imp__error(b->ctx, IMP_E_NOMEM, "gridvolume does not fit");
+    for (size_t i = 0; i < n; i++) {
+        const float *from = g->value + (grey ? 3 * i : i);
+        v->data[i] =
+            grey ? (float)imp__luminance(from[0], from[1], from[2]) : g->value[i];
+        lo = imp_min(lo, v->data[i]);
+        most = imp_max(most, (double)v->data[i]);
+    }
+    if (imp_build_has(b, "max_value") && !(most <= max_value))
+        IMP_TRY(imp_build_error(b, "max_value", IMP_E_SCENE,
+                                "max_value = %g, and a value of the grid is %g",
+                                max_value, most));
+    const size_t grid[3] = {(size_t)v->n[2], (size_t)v->n[1], (size_t)v->n[0]};
+    const size_t colours[3] = {grid[0] * grid[1], grid[2], 3};
+    IMP_TRY(imp_build_texels(b, "data", v->data, 3, v->channels == 1 ? grid : colours,
+                             IMP_PARAM_DIFFERENTIABLE |
+                                 (v->channels == 3 ? IMP_PARAM_COLOR : 0u),
+                             lo < 0 ? -INFINITY : 0.0, INFINITY, &tex->param));
+out:
+    return st;
+}
+
+static int wrapped(int i, int n, enum wrap wrap)
+{
+    if (wrap == WRAP_CLAMP) return imp_clamp(i, 0, n - 1);
+    if (wrap == WRAP_REPEAT) return (i % n + n) % n;
+    const int k = (i % (2 * n) + 2 * n) % (2 * n);
+    return k < n ? k : 2 * n - 1 - k;
+}
+
+/* The up to eight cells that a lookup sees, and their weights. */
+struct footprint {
+    int n;
+    size_t cell[8];
+    double weight[8];
+};
+
+static void footprint(const struct gridvolume *v, imp_v3 p, struct footprint *f)
+{
+    const imp_v3 u = imp__point(&v->to_unit, p);
+    const size_t nx = (size_t)v->n[0], ny = (size_t)v->n[1];
+    size_t at[3][2];
+    double w[3];
+    for (int a = 0; a < 3; a++) {
+        const int n = v->n[a];
+        /* Far outside any cell will do: an int holds it. */
+        const double x = imp_clamp(u[a], -1e5, 1e5) * n;
+        const double shifted = v->filter == FILTER_TRILINEAR ? x - 0.5 : x;
+        const double below = floor(imp_clamp(shifted, -1e9, 1e9));
+        w[a] = shifted - below;
+        at[a][0] = (size_t)wrapped((int)below, n, v->wrap);
+        at[a][1] = (size_t)wrapped((int)below + 1, n, v->wrap);
+    }
+    f->n = v->filter == FILTER_TRILINEAR ? 8 : 1;
+    for (int k = 0; k < f->n; k++) {
+        f->cell[k] = (at[2][k >> 2 & 1] * ny + at[1][k >> 1 & 1]) * nx + at[0][k & 1];
+        f->weight[k] = 1;
+        for (int a = 0; a < 3 && f->n > 1; a++)
+            f->weight[k] *= k >> a & 1 ? w[a] : 1 - w[a];
+    }
+}
+
+static void eval(const struct imp_texture *t, const struct imp_texcoord *at, bool scalar,
+                 imp_spec *value)
+{
+    const struct gridvolume *v = t->self;
+    struct footprint f;
+    footprint(v, at->p, &f);
+    if (v->channels == 1) {
+        double sum = 0;
+        for (int k = 0; k < f.n; k++) sum += f.weight[k] * v->data[f.cell[k]];
+        *value = imp__spec(sum);
+        return;
+    }
+    imp_spec sum = {0};
+    for (int k = 0; k < f.n; k++) {
+        const float *c = v->data + 3 * f.cell[k];
+        sum += (imp_spec){c[0], c[1], c[2], 0} * f.weight[k];
+    }
+    *value = scalar ? imp__spec(imp__luminance(sum[0], sum[1], sum[2])) : sum;
+}
+
+static void scatter(const struct imp_texture *t, const struct imp_texcoord *at,
+                    bool scalar, const imp_spec *bar, struct imp_sink *sink)
+{
+    const struct gridvolume *v = t->self;
+    struct footprint f;
+    footprint(v, at->p, &f);
+    for (int k = 0; k < f.n; k++) {
+        const imp_spec part = *bar * f.weight[k];
+        if (v->channels == 1) sink->add(sink, t->param, f.cell[k], 1, &part);
+        else if (scalar) imp__luminance_scatter(sink, t->param, 3 * f.cell[k], part);
+        else sink->add(sink, t->param, 3 * f.cell[k], 3, &part);
+    }
+}
+
+static void tangent(const struct imp_texture *t, const struct imp_texcoord *at,
+                    bool scalar, imp_dot_fn *dot, const void *x_dot, imp_spec *value_dot)
+{
+    const struct gridvolume *v = t->self;
+    struct footprint f;
+    imp_spec sum = {0};
+    footprint(v, at->p, &f);
+    for (int k = 0; k < f.n; k++)
+        if (v->channels == 1)
+            sum += imp__spec(f.weight[k] * dot(x_dot, t->param, f.cell[k]));
+        else
+            for (size_t c = 0; c < 3; c++)
+                sum[c] += f.weight[k] * dot(x_dot, t->param, 3 * f.cell[k] + c);
+    *value_dot = scalar && v->channels == 3
+                     ? imp__spec(imp__luminance(sum[0], sum[1], sum[2]))
+                     : sum;
+}
+
+/* The largest of the cells that lookups in the box can see. */
+static void bound(const struct imp_texture *t, const imp_v3 *lo, const imp_v3 *hi,
+                  bool scalar, imp_spec *most)
+{
+    const struct gridvolume *v = t->self;
+    imp_v3 a = {INFINITY, INFINITY, INFINITY, 0}, b = -a;
+    int from[3], to[3];
+    for (int k = 0; k < 8; k++) {
+        const imp_v3 corner = {(k & 1 ? *hi : *lo)[0], (k & 2 ? *hi : *lo)[1],
+                               (k & 4 ? *hi : *lo)[2], 0};
+        const imp_v3 u = imp__point(&v->to_unit, corner);
+        for (int d = 0; d < 3; d++) a[d] = fmin(a[d], u[d]), b[d] = fmax(b[d], u[d]);
+    }
+    for (int d = 0; d < 3; d++) {
+        const double rim = 0.5001; /* of a trilinear lookup; more than rounding */
+        from[d] = (int)floor(imp_clamp(a[d], -1.0, 2.0) * v->n[d] - rim);
+        to[d] = (int)floor(imp_clamp(b[d], -1.0, 2.0) * v->n[d] + rim);
+        if ((a[d] < 0 || b[d] > 1) && v->wrap != WRAP_CLAMP)
+            from[d] = 0, to[d] = v->n[d] - 1;
+        from[d] = imp_clamp(from[d], 0, v->n[d] - 1);
+        to[d] = imp_clamp(to[d], 0, v->n[d] - 1);
+    }
+    imp_spec max = imp__spec(-INFINITY);
+    for (int z = from[2]; z <= to[2]; z++)
+        for (int y = from[1]; y <= to[1]; y++)
+            for (int x = from[0]; x <= to[0]; x++) {
+                const size_t cell =
+                    ((size_t)z * (size_t)v->n[1] + (size_t)y) * (size_t)v->n[0] +
+                    (size_t)x;
+                for (int c = 0; c < 4; c++)
+                    max[c] = fmax(
+                        max[c],
+                        v->data[cell * (size_t)v->channels + (size_t)(c % v->channels)]);
+            }
+    *most = scalar ? imp__spec(imp__max3(max)) : max;
+}
+
+static void extent(const struct imp_texture *t, double to_unit[12], int cells[3])
+{
+    const struct gridvolume *v = t->self;
+    memcpy(to_unit, v->to_unit.m, 12 * sizeof *to_unit);
+    for (int a = 0; a < 3; a++) cells[a] = (v->n[a] + 3) / 4;
+}
+
+const struct imp_texture_ops imp__gridvolume = {.size = sizeof(struct imp_texture_ops),
+                                                .name = "gridvolume",
+                                                .object_size = sizeof(struct gridvolume),
+                                                .build = build,
+                                                .eval = eval,
+                                                .scatter = scatter,
+                                                .tangent = tangent,
+                                                .bound = bound,
+                                                .extent = extent};
