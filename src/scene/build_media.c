@@ -110,7 +110,7 @@ static enum imp_status scatterers_make(struct imp_scene *scene, struct imp_mediu
     for (int k = 0; k < 2; k++)
         b[k] = (struct imp_bsdf){.ops = k ? &imp__in_pure_medium : &imp__in_medium,
                                  .self = m,
-                                 .flags = IMP_BSDF_SMOOTH |
+                                 .flags = IMP_BSDF_SMOOTH | IMP_BSDF_TRANSMIT |
                                           (k == 0 && m->emits ? IMP_BSDF_EMIT : 0u),
                                  .n_in = m->n_in,
                                  .input = m->input,

@@ -105,6 +105,12 @@ static void albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *w
     m->ops->eval(m, in, &c);
     *a = albedo_of(&c);
 }
+static bool directional_albedo(const struct imp_bsdf *b, const imp_spec *in,
+                               const imp_v3 *wo, imp_spec *H)
+{
+    albedo(b, in, wo, H);
+    return true;
+}
 
 const struct imp_bsdf_ops imp__in_medium = {.size = sizeof(struct imp_bsdf_ops),
                                             .name = "medium",
@@ -114,7 +120,8 @@ const struct imp_bsdf_ops imp__in_medium = {.size = sizeof(struct imp_bsdf_ops),
                                             .eval_d = eval_d,
                                             .emit = emit,
                                             .emit_d = emit_d,
-                                            .albedo = albedo};
+                                            .albedo = albedo,
+                                            .directional_albedo = directional_albedo};
 const struct imp_bsdf_ops imp__in_pure_medium = {.size = sizeof(struct imp_bsdf_ops),
                                                  .name = "medium of albedo 1",
                                                  .sample = sample,

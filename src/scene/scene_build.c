@@ -122,6 +122,7 @@ enum imp_status imp__scene_build(struct imp_scene *scene,
     imp__theta_finish(scene);
     IMP_TRY(imp__intersector_create(scene));
     if (scene->aims.aimed) IMP_TRY(imp__aims_aim(scene));
+    IMP_TRY(imp__media_survey(scene));
     scene->committed = true;
 out:
     return st;

@@ -45,6 +45,9 @@ enum imp_status imp__build_medium(struct imp_scene *scene, struct imp_node *node
 /* When all objects are there: is the light of these media what the integrator can know?
  */
 enum imp_status imp__media_check(struct imp_scene *scene);
+/* When rays can be traced: is it known where cameras and boundaries are? IMP_E_SCENE for
+ * a camera; what boundaries do not say is a warning, and scene->media_open. */
+enum imp_status imp__media_survey(struct imp_scene *scene);
 /* A material that reflects nothing: emitters' default. */
 enum imp_status imp__build_black(struct imp_scene *scene, struct imp_bsdf **out);
 /* An area light without a shape is only declared, and nothing is made. */

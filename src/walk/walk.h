@@ -194,7 +194,7 @@ static inline const struct imp_guide *imp__guide_of(const struct imp_scene *scen
                                                     const struct imp_walk_integrator *i,
                                                     const struct imp_guide *guide)
 {
-    return i->guided && scene->n_bodies == 0 ? guide : NULL;
+    return i->guided && scene->n_bodies == 0 && scene->n_media == 0 ? guide : NULL;
 }
 
 /* ---- Decide (trace.c) ------------------------------------------------------------ */

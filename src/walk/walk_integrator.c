@@ -83,7 +83,8 @@ static enum imp_status mixture_ready(struct imp_scene *scene,
     }
     const enum imp_status st = imp__mixing_settle(scene, w->mixing);
     w->mixes = scene->materials_mix || imp__mixing_mixes(w->mixing);
-    if (st == IMP_OK && w->split > 0 && scene->n_bodies > 0)
+    if (st == IMP_OK && w->split > 0 &&
+        (scene->n_bodies > 0 || (w->media && scene->n_media > 0)))
         return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
                           "integrator %s: walks through media do not split; set 'split' "
                           "to 0",
@@ -177,8 +178,11 @@ static enum imp_status photons_build(const struct imp_build *build,
 {
     struct imp_walk_integrator *w = i->self;
     enum imp_status st = IMP_OK;
-    *w = (struct imp_walk_integrator){
-        .rr_depth = 5, .directions = true, .guided = true, .photons = true};
+    *w = (struct imp_walk_integrator){.rr_depth = 5,
+                                      .directions = true,
+                                      .guided = true,
+                                      .photons = true,
+                                      .media = true};
     IMP_TRY(depth_read(build, -1, i, w));
     IMP_TRY(imp__props_float(build->ctx, build->node, "h", 1, &w->h));
     if (!(w->h > 0))
@@ -225,7 +229,7 @@ const struct imp_integrator_ops imp__integrator_photons = {
     .size = sizeof(struct imp_integrator_ops),
     .name = "photons",
     .object_size = sizeof(struct imp_walk_integrator),
-    .flags = IMP_INTEGRATOR_WALKS | IMP_INTEGRATOR_INNER,
+    .flags = IMP_INTEGRATOR_WALKS | IMP_INTEGRATOR_INNER | IMP_INTEGRATOR_MEDIA,
     .build = photons_build,
     .ready = photons_ready};
 
@@ -235,7 +239,8 @@ const struct imp_integrator_ops imp__integrator_photons = {
         .name = #kind,                                                                   \
         .object_size = sizeof(struct imp_walk_integrator),                               \
         .flags = IMP_INTEGRATOR_WALKS | IMP_INTEGRATOR_INNER | IMP_INTEGRATOR_MEDIA,     \
-        .build = volpath_build}
+        .build = volpath_build,                                                          \
+        .ready = mixture_ready}
 VOLPATH(volpath);
 VOLPATH(volpathmis);
 VOLPATH(prbvolpath);

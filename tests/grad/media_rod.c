@@ -12,10 +12,10 @@
  * divide by extinction: of collisions that stand where they are, none is ever in it. */
 #include "imp_scene.h"
 #include "imp_tap.h"
+#include "inverse/estimate.h"
 #include "math/warp.h"
 #include "vol_write.h"
 #include "walk/walk.h"
-#include "inverse/estimate.h"
 
 enum { CELLS = 8 };
 #define LEFT  .2

@@ -1,0 +1,97 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Looks where cameras and boundaries of media are, when the scene is made. A camera in a
+ * medium that it does not name would see it as vacuum; a body in fog that does not name
+ * the fog leaves a vacuum behind it, which is what the format says and Mitsuba does, and
+ * seldom what is meant. */
+#include "scene_build.h"
+
+#define HITS_MAX 256 /* boundaries that a ray is followed through */
+
+static const char *name_of(const struct imp_medium *m) { return m ? m->name : "none"; }
+
+/* The next surface that bounds media, from *o along d, opaque ones passed. */
+static const struct imp_shape *boundary(const struct imp_scene *scene, imp_v3 *o,
+                                        imp_v3 d, bool *outwards)
+{
+    for (int k = 0; k < HITS_MAX; k++) {
+        struct imp_hit hit;
+        struct imp_surface at;
+        if (!imp__intersect(scene, o, &d, 0, INFINITY, &hit)) return NULL;
+        const struct imp_shape *s = scene->shapes[hit.shape];
+        s->ops->surface(s, &hit, o, &d, &at);
+        *o = imp__offset(at.p, at.ng, d);
+        *outwards = imp__dot(at.ng, d) > 0;
+        if (s->interior || s->exterior) return s;
+    }
+    return NULL;
+}
+
+static enum imp_status camera_check(const struct imp_scene *scene,
+                                    const struct imp_sensor *sensor)
+{
+    const double lens[2] = {0.5, 0.5};
+    struct imp_sensor_ray ray;
+    bool outwards;
+    sensor->ops->ray(sensor, 0.5 * sensor->film.width, 0.5 * sensor->film.height, lens,
+                     &ray);
+    const struct imp_shape *s = boundary(scene, &ray.o, ray.d, &outwards);
+    if (!s) return IMP_OK;
+    const struct imp_medium *around = outwards ? s->interior : s->exterior;
+    if (around == sensor->medium) return IMP_OK;
+    if (outwards)
+        return imp__error(scene->ctx, IMP_E_SCENE,
+                          "sensor '%s' is inside shape '%s', whose medium is %s, and "
+                          "names %s: <ref id=\"...\"/> in the sensor says which medium "
+                          "it is in",
+                          sensor->name, s->name, name_of(around),
+                          name_of(sensor->medium));
+    return imp__error(scene->ctx, IMP_E_SCENE,
+                      "sensor '%s' is in medium %s, and shape '%s' before it has %s for "
+                      "its exterior",
+                      sensor->name, name_of(sensor->medium), s->name, name_of(around));
+}
+
+/* A line through the middle of the shape; false: what is behind one boundary is not what
+ * is before the next. */
+static bool line_check(struct imp_scene *scene, const struct imp_shape *shape, int axis)
+{
+    imp_v3 d = {0.03, 0.02, 0.01, 0}; /* not along the faces of boxes */
+    const imp_v3 centre = (shape->lo + shape->hi) * 0.5;
+    const struct imp_shape *s;
+    const struct imp_medium *m = NULL;
+    bool outwards, known = false;
+    d[axis] = 1;
+    d = imp__normalize(d);
+    imp_v3 o = centre - d * (2 * (1 + imp__length(scene->hi - scene->lo)));
+    for (int k = 0; k < HITS_MAX && (s = boundary(scene, &o, d, &outwards)); k++) {
+        const struct imp_medium *before = outwards ? s->interior : s->exterior;
+        if (known && before != m) {
+            imp__warn(scene->ctx,
+                      "shape '%s': before it is medium %s, and its %s is %s. A ray takes "
+                      "what the shape names, as in Mitsuba; bodies in a medium name it "
+                      "as their exterior",
+                      s->name, name_of(m), outwards ? "interior" : "exterior",
+                      name_of(before));
+            return false;
+        }
+        m = outwards ? s->exterior : s->interior;
+        known = true;
+    }
+    return true;
+}
+
+enum imp_status imp__media_survey(struct imp_scene *scene)
+{
+    enum imp_status st = IMP_OK;
+    if (scene->n_media == 0) return IMP_OK;
+    for (int i = 0; i < scene->n_sensors; i++)
+        IMP_TRY(camera_check(scene, scene->sensors[i]));
+    for (int i = 0; i < scene->n_shapes && !scene->media_open; i++) {
+        const struct imp_shape *s = scene->shapes[i];
+        for (int a = 0; a < 3 && (s->interior || s->exterior) && !scene->media_open; a++)
+            scene->media_open = !line_check(scene, s, a);
+    }
+out:
+    return st;
+}

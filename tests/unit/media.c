@@ -1,0 +1,250 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Media: transmittances in closed form, as hit fractions and with derivatives; colours of
+ * very different extinction; cameras inside; bounds that follow; what is refused. */
+#include "imp_scene.h"
+#include "imp_tap.h"
+#include "scene/majorants.h"
+#include "vol_write.h"
+
+static imp_context *ctx;
+
+/* A cube from z = 0 to 1 before a lamp of radiance 1, seen along z. */
+static imp_scene *column(const char *medium, const char *more, enum imp_color_mode mode)
+{
+    char text[4096];
+    snprintf(text, sizeof text,
+             "<scene version='3.0.0'><integrator type='volpath'/>%s"
+             "<shape type='cube'><bsdf type='null'/><ref id='fog' name='interior'/>"
+             "<transform name='to_world'><scale x='0.5' y='0.5' z='0.5'/>"
+             "<translate x='0.5' y='0.5' z='0.5'/></transform></shape>"
+             "<shape type='rectangle' id='lamp'><emitter type='area'>"
+             "<float name='radiance' value='1'/></emitter><transform name='to_world'>"
+             "<rotate x='1' angle='180'/><translate x='0.5' y='0.5' z='2'/></transform>"
+             "</shape><sensor type='orthographic'><transform name='to_world'>"
+             "<scale value='0.01'/><lookat origin='0.5,0.5,-1' target='0.5,0.5,1' "
+             "up='0,1,0'/></transform>"
+             "<film type='hdrfilm'><integer name='width' value='8'/>"
+             "<integer name='height' value='8'/><rfilter type='box'/></film>%s</sensor>"
+             "</scene>",
+             medium, more);
+    return test_scene_text(ctx, text, mode);
+}
+
+static void mean_of(imp_scene *s, int spp, double mean[3], double se[3])
+{
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_film_info info = {.size = sizeof info};
+    imp_film *film;
+    run.spp = spp;
+    run.seed = 5;
+    test_must(ctx, imp_render(s, &run, &film));
+    test_must(ctx, imp_film_get_info(film, &info));
+    const int n = info.width * info.height, channels = info.channels;
+    for (int c = 0; c < 3; c++) {
+        mean[c] = se[c] = 0;
+        for (int k = 0; k < n && c < channels; k++) {
+            mean[c] += (double)imp_film_mean(film)[k * channels + c] / n;
+            se[c] += pow((double)imp_film_se(film)[k * channels + c] / n, 2);
+        }
+        se[c] = sqrt(se[c]);
+    }
+    imp_film_destroy(film);
+}
+
+static void near_se(double mean, double se, double ref, double tight, const char *what)
+{
+    const double z = (mean - ref) / se;
+    tap_ok(fabs(z) <= 4 && se <= tight, "%s # %.6f se %.1e ref %.6f z %.2f", what, mean,
+           se, ref, z);
+}
+
+/* A walk is absorbed or passes: the variance is that of a coin. */
+static void transmittances(void)
+{
+    enum { N = 128 };
+    char path[64], text[512];
+    float value[N];
+    double mean[3], se[3];
+    static const struct {
+        const char *what;
+        double T;
+    } cases[] = {{"T of extinction 1", .367879},
+                 {"T of extinction 2 x", .367879},
+                 {"T of a narrow peak", .285557}};
+    for (int k = 0; k < 3; k++) {
+        for (int i = 0; i < N; i++) {
+            const double x = (i + .5) / N;
+            value[i] = (float)(k == 0   ? 1
+                               : k == 1 ? 2 * x
+                                        : 5 * exp(-(x - .5) * (x - .5) / .02));
+        }
+        vol_write(path, 1, 1, N, 1, value);
+        snprintf(text, sizeof text,
+                 "<medium type='heterogeneous' id='fog'><float name='albedo' value='0'/>"
+                 "<volume name='sigma_t' type='gridvolume' id='grid'>"
+                 "<string name='filename' value='%s'/></volume></medium>",
+                 path);
+        imp_scene *s = column(text, "", IMP_MONO);
+        mean_of(s, 8192, mean, se);
+        near_se(mean[0], se[0], cases[k].T, 1e-3, cases[k].what);
+        tap_near(se[0], sqrt(cases[k].T * (1 - cases[k].T) / (64. * 8192)), .03, 0,
+                 "... is a coin");
+
+        /* dT = -T times the length in each cell. */
+        imp_problem *p = test_problem(ctx, s, "grid.data");
+        struct imp_run run = IMP_RUN_INIT;
+        struct imp_estimate v;
+        double g[N], g_se[N], sum = 0, sum_se = 0;
+        run.spp = 2048;
+        test_must(ctx, imp_problem_functional(p, NULL, &run, &v, g, g_se));
+        for (int i = 0; i < N; i++) sum += g[i], sum_se += g_se[i] * g_se[i];
+        near_se(sum, 2 * sqrt(sum_se), -cases[k].T, 1e-2, "sum of its derivatives is -T");
+        imp_problem_destroy(p);
+        imp_scene_destroy(s);
+        remove(path);
+    }
+}
+
+static void colours(void)
+{
+    static const double sigma[3] = {2, 6, 9};
+    double mean[3], se[3];
+    imp_scene *s = column("<medium type='homogeneous' id='fog'><rgb name='sigma_t' "
+                          "value='2,6,9'/><float name='albedo' value='0'/></medium>",
+                          "", IMP_RGB);
+    mean_of(s, 16384, mean, se);
+    for (int c = 0; c < 3; c++)
+        near_se(mean[c], se[c], exp(-sigma[c]), .01 * exp(-sigma[c]),
+                "T of extinctions 2, 6, 9 from one set of walks");
+    imp_scene_destroy(s);
+    s = column("<medium type='homogeneous' id='fog'><rgb name='sigma_t' value='0,1,3'/>"
+               "<float name='albedo' value='0'/></medium>",
+               "", IMP_RGB);
+    mean_of(s, 4096, mean, se);
+    near_se(mean[0], se[0] + 1e-12, 1, .01, "a colour without extinction");
+    near_se(mean[2], se[2], exp(-3), .01, "beside one with");
+    imp_scene_destroy(s);
+}
+
+/* In an absorbing fog without an end: exp(-3 sigma), and its derivative. */
+static void inside(void)
+{
+    double mean[3], se[3], g[4], g_se[4];
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_estimate v;
+    const char *fog = "<medium type='homogeneous' id='fog'><float name='sigma_t' "
+                      "value='0.5'/><float name='albedo' value='0'/></medium>";
+    char text[2048];
+    snprintf(
+        text, sizeof text,
+        "<scene version='3.0.0'><integrator type='volpath'/>%s"
+        "<shape type='rectangle'><emitter type='area'>"
+        "<float name='radiance' value='1'/></emitter><transform name='to_world'>"
+        "<rotate x='1' angle='180'/><translate z='3'/></transform></shape>"
+        "<sensor type='orthographic'><transform name='to_world'><scale value='0.01'/>"
+        "</transform><float name='near_clip' value='1e-6'/><ref id='fog'/>"
+        "<film type='hdrfilm'><integer name='width' value='8'/>"
+        "<integer name='height' value='8'/><rfilter type='box'/></film></sensor>"
+        "</scene>",
+        fog);
+    imp_scene *s = test_scene_text(ctx, text, IMP_MONO);
+    mean_of(s, 4096, mean, se);
+    near_se(mean[0], se[0], exp(-1.5), .01, "a camera in fog");
+    imp_problem *p = test_problem(ctx, s, "fog.sigma_t.value");
+    run.spp = 4096;
+    test_must(ctx, imp_problem_functional(p, NULL, &run, &v, g, g_se));
+    near_se(g[0], g_se[0], -3 * exp(-1.5), .01, "its derivative");
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+}
+
+/* Numbers are set beyond the bounds that were made first. */
+static void bounds_follow(void)
+{
+    const float value[8] = {1, 0, 0, 0, 0, 0, 0, 0};
+    const double more[8] = {0, 0, 0, 5, 0, 0, 9, 0};
+    char path[64], text[512];
+    double mean[3], se[3];
+    size_t param;
+    vol_write(path, 1, 1, 8, 1, value);
+    snprintf(text, sizeof text,
+             "<medium type='heterogeneous' id='fog'><float name='albedo' value='0'/>"
+             "<volume name='sigma_t' type='gridvolume' id='grid'>"
+             "<string name='filter_type' value='nearest'/>"
+             "<string name='filename' value='%s'/></volume></medium>",
+             path);
+    imp_scene *s = column(text, "", IMP_MONO);
+    test_must(ctx, imp_scene_find_param(s, "grid.data", &param));
+    test_must(ctx, imp_scene_set_values(s, param, 8, more));
+    mean_of(s, 4096, mean, se);
+    near_se(mean[0], se[0], exp(-14. / 8), .01, "bounds follow what is set");
+    imp_scene_destroy(s);
+    remove(path);
+}
+
+static void refused(const char *medium, const char *more, const char *why)
+{
+    char text[4096];
+    struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
+    imp_scene *s = NULL;
+    snprintf(text, sizeof text,
+             "<scene version='3.0.0'><integrator type='volpath'/>%s"
+             "<shape type='sphere'><bsdf type='null'/><ref id='fog' name='interior'/>%s"
+             "</shape></scene>",
+             medium, more);
+    const enum imp_status st =
+        imp_scene_load_string(ctx, text, strlen(text), "test", &o, &s);
+    tap_ok(st != IMP_OK && strstr(imp_last_error(ctx), why), "refused: %s # %s", why,
+           imp_last_error(ctx));
+    if (st == IMP_OK) imp_scene_destroy(s);
+}
+
+int main(void)
+{
+    ctx = test_context(0);
+    transmittances();
+    colours();
+    inside();
+    bounds_follow();
+
+#define FOG(inner) "<medium type='homogeneous' id='fog'>" inner "</medium>"
+    refused(FOG("<float name='sigma_t' value='-1'/>"), "", "outside [0, inf]");
+    refused(FOG("<rgb name='albedo' value='0.5,1.5,0.5'/>"), "", "albedo");
+    refused(FOG("<phase type='hg'><float name='g' value='1'/></phase>"), "", "g = 1");
+    refused(FOG("<float name='scale' value='-2'/>"), "", "scale");
+    refused(FOG("<float name='sigma_s' value='1'/><float name='sigma_t' value='1'/>"), "",
+            "the one pair");
+    refused(FOG("<phase type='hg'/><phase type='rayleigh'/>"), "", "blendphase");
+    refused(FOG("<phase type='blendphase'><float name='weight' value='0.5'/>"
+                "<phase type='hg'/></phase>"),
+            "", "missing");
+    refused(FOG(""), "<ref id='fog' name='around'/>", "interior or exterior");
+    refused(FOG(""), "<emitter type='area'/>", "cannot emit");
+    refused("<medium type='heterogeneous' id='fog'><volume name='sigma_t' "
+            "type='gridvolume'/></medium>",
+            "", "filename");
+    refused(FOG("") "<sensor type='perspective'/>", "", "is inside shape");
+    refused(FOG("") "<sensor type='perspective'><transform name='to_world'>"
+                    "<translate z='-5'/></transform><ref id='fog'/></sensor>",
+            "", "is in medium fog");
+    float bad[2] = {1, -1};
+    char path[64], text[512];
+    vol_write(path, 1, 1, 2, 1, bad);
+    snprintf(text, sizeof text,
+             "<medium type='heterogeneous' id='fog'><volume name='sigma_t' "
+             "type='gridvolume'><string name='filename' value='%s'/></volume></medium>",
+             path);
+    refused(text, "", "value 1, -1");
+    remove(path);
+    bad[1] = NAN;
+    vol_write(path, 1, 1, 2, 1, bad);
+    snprintf(text, sizeof text,
+             "<medium type='heterogeneous' id='fog'><volume name='sigma_t' "
+             "type='gridvolume'><string name='filename' value='%s'/></volume></medium>",
+             path);
+    refused(text, "", "cell (0, 0, 1) is not finite");
+    remove(path);
+    imp_context_destroy(ctx);
+    return tap_done();
+}
