@@ -102,7 +102,8 @@ static enum imp_status phase_of(struct imp_scene *scene, struct imp_node *node,
 }
 
 /* Its points as what walks scatter at. */
-static enum imp_status scatterers_make(struct imp_scene *scene, struct imp_medium *m)
+static enum imp_status scatterers_make(struct imp_scene *scene, struct imp_medium *m,
+                                       struct imp_mixing *mixing)
 {
     enum imp_status st = IMP_OK;
     struct imp_bsdf *b = imp__arena_array(&scene->arena, 2, sizeof *b);
@@ -120,6 +121,8 @@ static enum imp_status scatterers_make(struct imp_scene *scene, struct imp_mediu
     m->scatterer = &b[0];
     m->pure = &b[1];
     IMP_TRY(imp__build_list_add(scene, (void ***)&scene->bsdfs, &scene->n_bsdfs, b));
+    IMP_TRY(imp__build_list_add(scene, (void ***)&scene->bsdf_mixing,
+                                &scene->n_bsdf_mixing, mixing));
 out:
     return st;
 }
@@ -177,12 +180,14 @@ enum imp_status imp__build_medium(struct imp_scene *scene, struct imp_node *node
     if (m->n_in) memcpy(m->input, in, (size_t)m->n_in * sizeof *m->input);
 
     const struct imp_build build = imp__build_make(scene, node);
+    struct imp_mixing *mixing;
     if (ops->build) IMP_TRY(ops->build(&build, self, m));
+    IMP_TRY(imp__mixing_read(&build, &mixing));
     IMP_TRY(imp__props_finish(ctx, node));
     if (ops->changed)
         IMP_TRY(imp__build_watch(scene, m->input, m->n_own, medium_changed, m));
     IMP_TRY(imp__majorants_create(scene, node, m));
-    IMP_TRY(scatterers_make(scene, m));
+    IMP_TRY(scatterers_make(scene, m, mixing));
     for (int j = 0; j < m->n_own; j++)
         if (ops->inputs[j].flags & IMP_INPUT_EXTINCTION) probed(scene, m->input[j]);
     IMP_TRY(imp__build_list_add(scene, (void ***)&scene->media, &scene->n_media, m));
@@ -209,7 +214,7 @@ enum imp_status imp__media_check(struct imp_scene *scene)
         const struct imp_shape *s = scene->shapes[i];
         const bool bounds = s->interior || s->exterior;
         used |= bounds;
-        if (s->body && (knows || bounds))
+        if (s->body && (bounds || scene->n_media > 0))
             return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
                               "shape '%s': light goes on bent lines in its graded "
                               "index, and is scattered by media on straight ones only",

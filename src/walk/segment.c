@@ -36,7 +36,7 @@ struct imp_segment imp__straight = {&straight, NULL};
 
 const struct imp_segment_ops *imp__segment_first(const struct imp_tracer *tracer)
 {
-    return imp_unlikely(tracer->integrator->media)     ? &imp__tracking
-           : imp_unlikely(tracer->scene->n_bodies > 0) ? &imp__graded_outside
-                                                       : &straight;
+    return imp_unlikely(tracer->scene->n_bodies > 0) ? &imp__graded_outside
+           : imp_unlikely(tracer->integrator->media) ? &imp__tracking
+                                                     : &straight;
 }
