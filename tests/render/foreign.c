@@ -67,6 +67,9 @@ int main(void)
              shared);
     agrees(ctx, folder, "test_orthographic_path.xml", "test_orthographic", IMP_RGB);
     agrees(ctx, folder, "test_orthographic_path.xml", "test_orthographic", IMP_MONO);
+    snprintf(folder, sizeof folder, "%s/mitsuba-scenes/tests/scenes/participating_media",
+             shared);
+    agrees(ctx, folder, "test_hetero_sigmat_volpath.xml", "test_hetero_sigmat", IMP_RGB);
     imp_context_destroy(ctx);
     return tap_done();
 }

@@ -183,6 +183,41 @@ static void bounds_follow(void)
     remove(path);
 }
 
+/* A ball of glass filled with what absorbs nothing, under uniform light: invisible, with
+ * refraction and its factor n^2. No walk leaves it through a hole. */
+static void furnace(void)
+{
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_film_info info = {.size = sizeof info};
+    imp_film *film;
+    imp_scene *s = test_scene_text(
+        ctx,
+        "<scene version='3.0.0'><integrator type='volpath'>"
+        "<integer name='rr_depth' value='1000'/></integrator>"
+        "<medium type='homogeneous' id='milk'><float name='sigma_t' value='3'/>"
+        "<float name='albedo' value='1'/></medium><shape type='sphere'>"
+        "<bsdf type='dielectric'><float name='int_ior' value='1.3'/>"
+        "<float name='ext_ior' value='1'/></bsdf><ref id='milk' name='interior'/></shape>"
+        "<emitter type='constant'/><sensor type='perspective'>"
+        "<float name='fov' value='25'/><transform name='to_world'>"
+        "<lookat origin='0,0,5' target='0,0,0' up='0,1,0'/></transform>"
+        "<film type='hdrfilm'><integer name='width' value='16'/>"
+        "<integer name='height' value='16'/><rfilter type='box'/></film></sensor>"
+        "</scene>",
+        IMP_MONO);
+    run.spp = 1024;
+    test_must(ctx, imp_render(s, &run, &film));
+    test_must(ctx, imp_film_get_info(film, &info));
+    double worst = 0;
+    for (int k = 0; k < info.width * info.height; k++)
+        worst = fmax(worst, fabs(imp_film_mean(film)[k] - 1.));
+    tap_near(worst, 0, 0, 2e-6, "a ball of glass and milk is invisible, on every walk");
+    tap_ok(info.dropped == 0, "no walk leaves through a hole # %llu of 262144",
+           (unsigned long long)info.dropped);
+    imp_film_destroy(film);
+    imp_scene_destroy(s);
+}
+
 static void refused(const char *medium, const char *more, const char *why)
 {
     char text[4096];
@@ -207,6 +242,7 @@ int main(void)
     colours();
     inside();
     bounds_follow();
+    furnace();
 
 #define FOG(inner) "<medium type='homogeneous' id='fog'>" inner "</medium>"
     refused(FOG("<float name='sigma_t' value='-1'/>"), "", "outside [0, inf]");
