@@ -37,14 +37,16 @@ from ._scene import Scene, Sensor, load_file, load_string, set_variant, variant
 from ._transform import ScalarTransform4f, Transform4f
 
 if TYPE_CHECKING:
-    from . import ad
+    from . import ad, bend, elements
+    from .elements import guide
 
 __all__ = [
     "ArgumentError", "BiasError", "Cancelled", "Check", "CheckRow", "Color3f", "Comparison", "Error",
     "FileError", "Fit", "FitVariable", "Gradient", "ImportonWarning", "Jacobian", "Loss", "NumericError",
     "OutOfMemoryError", "Part", "ParameterError", "ParameterInfo", "PathsError", "Picture", "Progress",
     "ScalarTransform4f", "Scene", "SceneError", "SceneParameters", "Sensor", "Transform4f", "UnsupportedError",
-    "Values", "__version__", "ad", "check", "compare", "cornell_box", "fit", "jacobian",
+    "Values", "__version__", "ad", "bend", "check", "compare", "cornell_box", "elements", "fit", "guide",
+    "jacobian",
     "library_path", "load_dict", "load_file", "load_string", "loss", "read", "render",
     "render_backward", "render_forward", "set_progress", "set_threads", "set_variant", "threads",
     "traverse", "variant", "write",
@@ -83,8 +85,10 @@ _ELSEWHERE = {
 
 
 def __getattr__(name: str) -> Any:
-    if name == "ad":
+    if name in ("ad", "bend", "elements", "jax", "torch"):
         return importlib.import_module("." + name, __name__)
+    if name == "guide":
+        return importlib.import_module(".elements", __name__).guide
     hint = ": " + _ELSEWHERE[name] if name in _ELSEWHERE else ""
     raise AttributeError("module 'importon' has no attribute '%s'%s" % (name, hint))
 

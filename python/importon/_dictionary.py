@@ -80,8 +80,11 @@ class _Builder:
                     given[key] = d.pop(n)
         if "positions" not in given or "indices" not in given:
             raise ArgumentError("a mesh needs 'vertex_positions' and 'faces'")
-        wide = lambda key, n: None if key not in given else numbers(
-            np.reshape(numbers(given[key], key, np.float32), (-1, n)), key, np.float32)
+
+        def wide(key: str, n: int) -> Any:
+            return None if key not in given else numbers(
+                np.reshape(numbers(given[key], key, np.float32), (-1, n)), key, np.float32)
+
         positions, normals, uvs = wide("positions", 3), wide("normals", 3), wide("uvs", 2)
         faces = np.reshape(numbers(given["indices"], "faces"), (-1, 3))
         if faces.size and (faces.min() < 0 or faces.max() >= len(positions) or np.any(faces != np.floor(faces))):
@@ -178,7 +181,7 @@ def load_dict(dictionary: Mapping[str, Any], *, mode: Optional[str] = None, sear
     ...     "sky": {"type": "constant"},
     ...     "ball": {"type": "sphere", "bsdf": {"type": "diffuse", "id": "paint"}}})
     >>> list(importon.traverse(scene))
-    ['paint.reflectance.value', 'sky.radiance.value']
+    ['sky.radiance.value', 'paint.reflectance.value']
     """
     not_inside()
     if not isinstance(dictionary, Mapping):
@@ -221,11 +224,14 @@ def cornell_box(res: int = 256, spp: int = 64) -> dict[str, Any]:
     --------
     >>> scene = importon.load_dict(importon.cornell_box(res=8))
     >>> list(importon.traverse(scene))[:2]
-    ['light.emitter.radiance.value', 'white.reflectance.value']
+    ['white.reflectance.value', 'green.reflectance.value']
     """
     T = Transform4f
     wall = {"type": "rectangle", "bsdf": {"type": "ref", "id": "white"}}
-    colour = lambda r, g, b: {"type": "diffuse", "reflectance": {"type": "rgb", "value": [r, g, b]}}
+
+    def colour(*rgb: float) -> dict[str, Any]:
+        return {"type": "diffuse", "reflectance": {"type": "rgb", "value": list(rgb)}}
+
     return {
         "type": "scene",
         "integrator": {"type": "path", "max_depth": 8},

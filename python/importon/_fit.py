@@ -10,7 +10,7 @@ import numpy as np
 
 from . import _c
 from ._array import copy_doubles
-from ._library import choice, failure, integer, lib, make, run, text
+from ._library import choice, decode, failure, integer, lib, make, run, text
 from ._params import Values
 from ._render import Problem, _run
 from ._scene import Scene
@@ -58,7 +58,6 @@ class Fit(Values):
 
     def __init__(self, scene: Scene, values: dict[str, Any], result: Any, names: list[str]) -> None:
         super().__init__(scene, values)
-        decode = lambda b: (b or b"").decode(errors="replace")
         self.iterations: int = result.iterations
         self.loss: float = result.objective.value
         self.loss_se: float = result.objective.se
@@ -100,9 +99,9 @@ def variables(result: Any, blocks: Any, start: Any, value: Any) -> dict[str, Fit
     errors either."""
     if result.variables:
         rows = (_c.imp_fit_variable * result.n).from_address(result.variables)
-        column = {f: np.array([getattr(r, f) for r in rows]) for f, _ in _c.imp_fit_variable._fields_}
+        column = {f: np.array([getattr(r, f) for r in rows]) for f in (q[0] for q in _c.imp_fit_variable._fields_)}
     else:
-        lo, hi = (np.concatenate([np.full(i.count, b) for i, b in pairs]) for pairs in (
+        lo, hi = (np.concatenate([np.full(i.size, b) for i, b in pairs]) for pairs in (
             [(i, i.lo) for i, _ in blocks], [(i, i.hi) for i, _ in blocks]))
         unknown = np.full(len(value), np.nan)
         column = {"start": start, "value": value, "se": unknown, "lo95": unknown, "hi95": unknown,
@@ -141,7 +140,9 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
     intervals : bool
         Estimate covariance and 95 % intervals at the end.
     checkpoint : path, optional
-        Rewritten every few seconds; `resume` continues from it.
+        Rewritten every few seconds.
+    resume : bool
+        Continue from the checkpoint, if it is there.
     spp, seed, sensor, loss, epsilon, weights, tikhonov, stay, smooth, drop_budget, guide
         As `loss`'s; `spp` is that of each iteration.
     noise_se : array, optional
@@ -189,8 +190,8 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
         answer = None
         if out.value and status in (_c.IMP_OK, _c.IMP_CANCELLED):
             result = _c.imp_fit_result.from_address(out.value)
-            names = [info.name + ("[%d]" % k if info.count > 1 else "") for info, _ in p.blocks
-                     for k in range(info.count)] if p.n <= 1024 else []
+            names = [info.name + ("[%d]" % k if info.size > 1 else "") for info, _ in p.blocks
+                     for k in range(info.size)] if p.n <= 1024 else []
             answer = Fit(p.scene, variables(result, p.blocks, start, p.x()), result, names)
         if status == _c.IMP_CANCELLED and answer and answer.reason == "time limit reached":
             return answer

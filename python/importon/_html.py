@@ -11,7 +11,9 @@ import numpy as np
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[Any]], caption: str = "") -> str:
-    cells = lambda tag, row: "".join("<%s style='text-align:left'>%s</%s>" % (tag, c, tag) for c in row)
+    def cells(tag: str, row: Iterable[str]) -> str:
+        return "".join("<%s style='text-align:left'>%s</%s>" % (tag, c, tag) for c in row)
+
     body = "".join("<tr>%s</tr>" % cells("td", [escape(str(c)) for c in row]) for row in rows)
     return "<table>%s<thead><tr>%s</tr></thead><tbody>%s</tbody></table>" % (
         "<caption style='text-align:left'>%s</caption>" % escape(caption) if caption else "",

@@ -143,14 +143,14 @@ def _runs_v3() -> bool:
 
 
 def _candidates() -> list[str]:
-    """The library asked for; the one in the package; the build folder's around it; the
+    """The library asked for; the one in the wheel; the build folder's around it; the
     system's. The first two folders hold two builds, of which results are the same."""
     asked = os.environ.get("IMPORTON_LIBRARY")
     if asked:
         return [asked]
     found = []
     fast = _runs_v3()
-    for folder, v3 in ((os.path.join(_HERE, "lib"), "libimporton-v3.so.0"),
+    for folder, v3 in ((os.path.join(_HERE, "..", ".importon.mesonpy.libs"), "libimporton-v3.so.0"),
                        (os.path.join(_HERE, "..", "..", "lib"), "glibc-hwcaps/x86-64-v3/libimporton.so.0")):
         found += [os.path.join(folder, v3)] if fast else []
         found += [os.path.join(folder, "libimporton.so.0")]
@@ -193,6 +193,11 @@ def make(struct: Any, **values: Any) -> Any:
     for name, value in {**getattr(struct, "initial", {}), **values}.items():
         setattr(s, name, value)
     return s
+
+
+def decode(value: Optional[bytes]) -> str:
+    """A string of C; NULL: empty."""
+    return (value or b"").decode(errors="replace")
 
 
 def word(enum: str, value: int) -> str:
@@ -399,9 +404,8 @@ class _Call:
         s = p.contents
         _inside.callback = True
         try:
-            said = self.progress(Progress(
-                *(x if isinstance(x, float) else (x or b"").decode(errors="replace")
-                  for x in (s.stage, s.fraction, s.elapsed_s, s.eta_s, s.rate, s.rate_unit, s.note))))
+            said = self.progress(Progress(decode(s.stage), s.fraction, s.elapsed_s, s.eta_s, s.rate,
+                                          decode(s.rate_unit), decode(s.note)))
             self.stop = self.stop or bool(said)
         except BaseException as error:
             self.error, self.stop = error, True
@@ -436,7 +440,7 @@ def run(ctx: Context, options: Any, progress: Any, function: Any, *arguments: An
 
     not_inside()
     call = _Call(callback_of(progress))
-    key = id(call)
+    key = options.progress_payload or id(call)  # of objects that keep their options: their own
     options.progress, options.progress_payload = PROGRESS_ADDRESS, key
     _calls[key] = call
     outcome: list[Any] = []

@@ -33,8 +33,8 @@ class ParameterInfo(NamedTuple):
     integer: bool
     color: bool
     why: str
-    index: int
-    count: int
+    position: int  # among the scene's parameters
+    size: int  # how many numbers
 
 
 def table(scene: Scene) -> dict[str, ParameterInfo]:
@@ -131,11 +131,11 @@ class SceneParameters(MutableMapping):  # type: ignore[type-arg]
             if not info.shape:
                 number = ctypes.c_double()
                 self._scene._context.check(
-                    lib.imp_scene_get_values(self._scene.pointer, info.index, ctypes.byref(number)))
+                    lib.imp_scene_get_values(self._scene.pointer, info.position, ctypes.byref(number)))
                 return number.value
             values = np.empty(info.shape)
             self._scene._context.check(
-                lib.imp_scene_get_values(self._scene.pointer, info.index, address(values)))
+                lib.imp_scene_get_values(self._scene.pointer, info.position, address(values)))
         alive = [h for h in self._handed.get(info.name, ()) if h[0]() is not None]
         self._handed[info.name] = [*alive, (weakref.ref(values), values.copy())]
         return values
@@ -147,13 +147,13 @@ class SceneParameters(MutableMapping):  # type: ignore[type-arg]
             self._set(info, 1, ctypes.byref(ctypes.c_double(value)))
             return
         v = numbers(value, info.name)
-        if v.shape != info.shape and not (v.size == 1 and v.ndim <= 1) and v.shape != (info.count,):
+        if v.shape != info.shape and not (v.size == 1 and v.ndim <= 1) and v.shape != (info.size,):
             raise ArgumentError("%s has shape %s, and the value given %s" % (info.name, info.shape, v.shape))
         self._set(info, v.size, address(v))
 
     def _set(self, info: ParameterInfo, n: int, values: Any) -> None:
         with self._scene.lock:
-            self._scene._context.check(lib.imp_scene_set_values(self._scene.pointer, info.index, n, values))
+            self._scene._context.check(lib.imp_scene_set_values(self._scene.pointer, info.position, n, values))
         self._handed.pop(info.name, None)
 
     def __delitem__(self, name: str) -> None:

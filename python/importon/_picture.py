@@ -14,7 +14,7 @@ from ._array import numbers, view
 from ._library import ArgumentError, Context, Handle, context, lib, make, text, warn_said, word
 
 
-class Picture(np.ndarray):  # type: ignore[type-arg]
+class Picture(np.ndarray):  # type: ignore[type-arg,unused-ignore]
     """A picture: float32 [height][width][channels], linear, row 0 at the top.
 
     It is an array over the library's memory, which lives as long as the array does, whatever
@@ -99,11 +99,12 @@ class Picture(np.ndarray):  # type: ignore[type-arg]
 
     def _repr_html_(self) -> Optional[str]:
         from ._html import picture
-        return picture(self)
+        shown: Optional[str] = picture(self)
+        return shown
 
 
 def _rebuild(array: Any, state: Any) -> Picture:
-    made = array.view(Picture)
+    made: Picture = array.view(Picture)
     made.se, made.channels, made.spp, made.dropped, made.signed = state
     return made
 

@@ -62,7 +62,7 @@ def callback_of(progress: Any) -> Optional[Any]:
     if not progress:
         return None
     try:
-        from tqdm.auto import tqdm
+        from tqdm.auto import tqdm  # type: ignore[import-untyped,import-not-found,unused-ignore]
     except ImportError:
         return None
     return Bar(tqdm)

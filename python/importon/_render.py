@@ -74,8 +74,8 @@ class Problem:
             while i < self.n:
                 self.check(lib.imp_problem_variable(self.pointer, i, ctypes.byref(index), None, None, None))
                 info = infos[index.value]
-                self.blocks.append((info, slice(i, i + info.count)))
-                i += info.count
+                self.blocks.append((info, slice(i, i + info.size)))
+                i += info.size
             return self
         except BaseException:
             self.__exit__()
@@ -257,8 +257,8 @@ def render(scene: Scene, params: Any = None, sensor: Any = 0, integrator: None =
     Examples
     --------
     >>> scene = importon.load_dict(importon.cornell_box(res=8))
-    >>> picture = importon.render(scene, spp=4)
-    >>> bool(abs(picture.mean() - 0.4) < 0.2 and picture.se.mean() < 0.3)
+    >>> picture = importon.render(scene, spp=64)
+    >>> bool(abs(picture.mean() - 0.14) < 0.03 and picture.se.mean() < 0.05)
     True
     """
     scene = _scene(scene)
@@ -438,10 +438,14 @@ def jacobian(scene: Scene, params: Any = None, sensor: Any = 0, seed: int = 0, s
         if status and not (status == _c.IMP_CANCELLED and picture is not None):
             raise failure(status, message)
         assert picture is not None
-        stack = lambda info, at, get: np.stack([get(q) for q in pictures[at]]).reshape(info.shape + picture.shape)
+        shape = picture.shape
+
+        def stack(info: ParameterInfo, arrays: list[Any]) -> Any:
+            return np.stack(arrays).reshape(info.shape + shape)
+
         made = Jacobian(p.scene,
-                        {info.name: stack(info, at, np.asarray) for info, at in p.blocks},
-                        {info.name: stack(info, at, lambda q: q.se) for info, at in p.blocks},
+                        {info.name: stack(info, [np.asarray(q) for q in pictures[at]]) for info, at in p.blocks},
+                        {info.name: stack(info, [q.se for q in pictures[at]]) for info, at in p.blocks},
                         picture, {info.name: pictures[at] for info, at in p.blocks})
         if status:
             raise failure(status, message, made)
@@ -617,7 +621,7 @@ class Check(Sequence):  # type: ignore[type-arg]
 
 
 def check_rows(address: Optional[int], n: int) -> Check:
-    rows = (_c.imp_check_row * n).from_address(address) if n and address else []
+    rows: Any = (_c.imp_check_row * n).from_address(address) if n and address else []
     return Check([CheckRow(r) for r in rows])
 
 
@@ -736,7 +740,9 @@ def compare(test: Any, reference: Any, *, variance: Any = None, n_test: float = 
     """
     from ._library import context
     from ._picture import to_film
-    load = lambda p: read(p) if isinstance(p, (str, bytes)) or hasattr(p, "__fspath__") else p
+    def load(p: Any) -> Any:
+        return read(p) if isinstance(p, (str, bytes)) or hasattr(p, "__fspath__") else p
+
     ctx = context()
     films = [None if p is None else to_film(load(p), ctx, n)
              for p, n in ((test, "test"), (reference, "reference"), (variance, "variance"))]

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple, Optional
 
 from . import _c
-from ._library import (ArgumentError, Handle, choice, context, lib, make, not_inside, register_lock,
+from ._library import (ArgumentError, Handle, choice, context, decode, lib, make, not_inside, register_lock,
                        text, warn_said, word)
 
 _mode = "rgb"
@@ -114,16 +114,15 @@ class Scene:
     def _sensor(self, index: int) -> Sensor:
         s = make(_c.imp_sensor_info)
         self._context.check(lib.imp_scene_get_sensor(self._handle.pointer, index, ctypes.byref(s)))
-        decode = lambda b: (b or b"").decode(errors="replace")
         return Sensor(decode(s.name), decode(s.type), s.width, s.height, s.spp, decode(s.filter),
                       s.filter_radius, decode(s.file_format))
 
     def sensor_index(self, sensor: Any) -> int:
         """The number of a sensor, given by number or name."""
         if isinstance(sensor, str):
-            for i, s in enumerate(self.sensors):
+            for at, s in enumerate(self.sensors):
                 if s.name == sensor:
-                    return i
+                    return at
             raise ArgumentError("there is no sensor '%s'; there are: %s" % (
                 sensor, ", ".join(s.name for s in self.sensors)))
         try:

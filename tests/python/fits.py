@@ -108,7 +108,7 @@ def test_texture():
     """A texture of thousands of numbers: no errors, and it comes closer"""
     s = im.load_file(os.path.join(SCENES, "textured.xml"))
     p = im.traverse(s)
-    name = max(p, key=lambda n: p.info(n).count)
+    name = max(p, key=lambda n: p.info(n).size)
     target, truth = im.render(s, spp=64, seed=1), p[name]
     p[name] = .5
     before = float(im.loss(s, target, name, spp=16, seed=9))

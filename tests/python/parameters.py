@@ -98,7 +98,7 @@ def test_keep():
 def test_textures():
     """A texture is an array [height][width][channels]"""
     p = im.traverse(textured())
-    name = max(p, key=lambda n: p.info(n).count)
+    name = max(p, key=lambda n: p.info(n).size)
     assert p[name].ndim == 3 and p[name].shape[2] in (1, 3)
     value = np.asfortranarray(np.random.default_rng(1).random(p[name].shape))
     p[name] = value
