@@ -231,7 +231,9 @@ static bool is_boundary(const struct imp_scene *scene, const struct imp_shape *s
 {
     const struct imp_bsdf *b = imp__shape_bsdf(scene, s);
     if (s->geometry != IMP_TRIANGLES || s->triangles.n_triangles <= FEW) return false;
-    if (s->body || (b->flags & (IMP_BSDF_TRANSMIT | IMP_BSDF_NULL))) return true;
+    if (s->body || s->interior || s->exterior ||
+        (b->flags & (IMP_BSDF_TRANSMIT | IMP_BSDF_NULL)))
+        return true;
     if (b->n_child > 0) return true; /* two-sided */
     const imp_v3 size = s->hi - s->lo;
     return s->triangles.volume < -0.05 * (size[0] * size[1] * size[2]);
