@@ -291,7 +291,8 @@ struct thread_job {
 static void *thread_run(void *payload)
 {
     struct thread_job *job = payload;
-    struct imp_scene scene = {.ctx = job->ctx};
+    struct imp_bsdf opaque = {.flags = IMP_BSDF_SMOOTH};
+    struct imp_scene scene = {.ctx = job->ctx, .default_bsdf = &opaque};
     struct imp_shape *list[8];
     imp__arena_init(&scene.arena, job->ctx);
     for (int k = 0; k < 8 && imp__shape_kinds[k]; k++) {
@@ -307,6 +308,7 @@ static void *thread_run(void *payload)
         *s = (struct imp_shape){
             .ops = imp__shape_kinds[k],
             .index = k,
+            .bsdf = -1,
             .self = imp__arena_array(&scene.arena, 1, imp__shape_kinds[k]->object_size)};
         const struct imp_build b = {.ctx = job->ctx, .node = n, .arena = &scene.arena};
         if (s->ops->build(&b, s->self, s) != IMP_OK) return NULL;

@@ -2,8 +2,8 @@
  *
  * twosided: seen from behind, the second child (or the only one) is turned over: the
  * mirror z -> -z is applied to both directions. */
-#include "kind/build.h"
 #include "blending.h"
+#include "kind/build.h"
 
 static enum imp_status build(const struct imp_build *build, void *self,
                              struct imp_bsdf *b)
