@@ -11,6 +11,7 @@ import _thread
 import ctypes
 import os
 import re
+import sys
 import threading
 import warnings
 import weakref
@@ -154,6 +155,9 @@ def _candidates() -> list[str]:
                        (os.path.join(_HERE, "..", "..", "lib"), "glibc-hwcaps/x86-64-v3/libimporton.so.0")):
         found += [os.path.join(folder, v3)] if fast else []
         found += [os.path.join(folder, "libimporton.so.0")]
+    for folder in sys.path:  # where machine code is installed apart from Python's
+        found += [os.path.join(folder, ".importon.mesonpy.libs", f) for f in
+                  (["libimporton-v3.so.0"] if fast else []) + ["libimporton.so.0"]]
     return [os.path.normpath(f) for f in found if os.path.exists(f)] + ["libimporton.so.0"]
 
 

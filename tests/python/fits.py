@@ -109,14 +109,14 @@ def test_texture():
     s = im.load_file(os.path.join(SCENES, "textured.xml"))
     p = im.traverse(s)
     name = max(p, key=lambda n: p.info(n).size)
-    target, truth = im.render(s, spp=64, seed=1), p[name]
+    target, truth = im.render(s, spp=32, seed=1), p[name]
     p[name] = .5
-    before = float(im.loss(s, target, name, spp=16, seed=9))
-    f = im.fit(s, target, name, spp=4, max_iterations=10, learning_rate=.1)
+    before = float(im.loss(s, target, name, spp=8, seed=9))
+    f = im.fit(s, target, name, spp=2, max_iterations=8, learning_rate=.1, intervals=False)
     v = f[name]
     assert v.value.shape == truth.shape and np.all(v.start == .5) and np.isnan(v.se).all() and f.covariance is None
     assert np.array_equal(v.value, p[name]) and np.array_equal(v.at_bound == 1, v.value >= 1)
-    assert float(im.loss(s, target, name, spp=16, seed=9)) < .7 * before and "numbers in" in repr(f) + f._repr_html_()
+    assert float(im.loss(s, target, name, spp=8, seed=9)) < .8 * before and "numbers in" in repr(f) + f._repr_html_()
 
 
 def test_views():
