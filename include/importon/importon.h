@@ -467,6 +467,16 @@ imp_film_write(const imp_film *film, const char *path,
 IMP_API IMP_MUST_CHECK enum imp_status imp_film_read(imp_context *context,
                                                      const char *path, imp_film **out);
 
+/** How a picture holds all directions: rows at equal angles from up to down, the first and
+ * the last at the poles, or rows at equal cosines, all texels of one solid angle. */
+enum imp_sky_projection { IMP_LATLONG, IMP_EQUAL_AREA };
+/** A map of the sky (an envmap's picture) in another projection or size. Its light as it is
+ * interpolated, the integral over all directions, is kept.
+ * @return IMP_OK; IMP_E_ARG for maps below 2 x 2; IMP_E_NOMEM. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_film_project(const imp_film *map, enum imp_sky_projection from,
+                 enum imp_sky_projection to, int width, int height, imp_film **out);
+
 /* ---- Rendering ----------------------------------------------------------------- */
 
 /** What walks are told about the light, to draw from (imp_elements_guide of elements.h).

@@ -2,7 +2,8 @@
  *
  * Pictures of the sky: solid angles of texels, densities against quadrature and against
  * draws, the table of texels against one of rectangles, irradiance against a sum over
- * texels, and maps that are refused. Both projections, turned and mirrored. */
+ * texels, maps in other projections, and maps that are refused. Both projections, turned
+ * and mirrored. */
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "kind/emitter/sphere_map.h"
@@ -31,7 +32,7 @@ struct sky {
 static struct sky sky_make(int projection, int w, int h, int channels,
                            const float *pixels, double rotation, bool turned)
 {
-    struct sky s = {.map = {(enum imp__projection)projection, w, h}};
+    struct sky s = {.map = {(enum imp_sky_projection)projection, w, h}};
     test_must(ctx, imp_scene_create(ctx, NULL, &s.scene));
     test_camera(s.scene, 3, 30, 4, 4);
     imp_scene_begin(s.scene, "emitter", "envmap", "sky", NULL);
@@ -140,8 +141,8 @@ static void geometry(int projection)
     static const int sizes[][2] = {{2, 2}, {3, 5}, {32, 16}, {1024, 512}, {64, 4096}};
     double total = 0, pixel = 0, back = 0;
     for (size_t k = 0; k < imp_count(sizes); k++) {
-        const struct imp__sphere_map m = {(enum imp__projection)projection, sizes[k][0],
-                                          sizes[k][1]};
+        const struct imp__sphere_map m = {(enum imp_sky_projection)projection,
+                                          sizes[k][0], sizes[k][1]};
         double sum = 0;
         for (int i = 0; i < m.height; i++) {
             const double w = imp__sphere_map_weight(&m, i);
@@ -167,7 +168,7 @@ static void geometry(int projection)
     tap_ok(back < 1e-9, "%s: texel to direction and back # %.1e", names[projection],
            back);
 
-    const struct imp__sphere_map m = {(enum imp__projection)projection, 8, 4};
+    const struct imp__sphere_map m = {(enum imp_sky_projection)projection, 8, 4};
     const imp_v3 d[5] = {{0, 0, 1}, {1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}};
     double u[5], row[5];
     for (int k = 0; k < 5; k++) imp__sphere_map_place(&m, d[k], &u[k], &row[k]);
@@ -181,7 +182,7 @@ static void rows(int projection)
 {
     double worst = 0;
     for (int h = 2; h <= 512; h *= 4) {
-        const struct imp__sphere_map m = {(enum imp__projection)projection, 2, h};
+        const struct imp__sphere_map m = {(enum imp_sky_projection)projection, 2, h};
         for (int i = 0; i < h; i += 1 + h / 7) {
             enum { N = 4000 };
             double drawn[2] = {0}, exact[2] = {0}, weight = 0;
@@ -420,7 +421,7 @@ static void light(int projection)
     /* Irradiance of a plane: of the map as it is interpolated, by a sum over texels, and
      * by a picture of a white square. */
     double sum = 0;
-    const struct imp__sphere_map m = {(enum imp__projection)projection, W, H};
+    const struct imp__sphere_map m = {(enum imp_sky_projection)projection, W, H};
     for (int i = 0; i < H; i++)
         for (int j = 0; j < W; j++) {
             const double u = (j + 0.5) / W;
@@ -450,6 +451,72 @@ static void light(int projection)
            names[projection], mean, exact, z);
     imp_film_destroy(film);
     imp_scene_destroy(s.scene);
+}
+
+/* ---- Projections -------------------------------------------------------------------- */
+
+/* The light of a map, Int L dw, as its texels' hats have it. */
+static double flux(const float *p, int projection, int w, int h, int c)
+{
+    const struct imp__sphere_map m = {(enum imp_sky_projection)projection, w, h};
+    double sum = 0;
+    for (int i = 0; i < h; i++)
+        for (int j = 0; j < w; j++)
+            sum += p[3 * (i * w + j) + c] * imp__sphere_map_weight(&m, i);
+    return sum;
+}
+
+static void projections(void)
+{
+    static const int sizes[][2] = {{32, 16}, {32, 64}, {77, 5}, {16, 33}, {2, 2}};
+    enum { W = 32, H = 16 };
+    imp_film *f, *g, *back;
+    test_must(ctx, imp_film_create(ctx, W, H, "R,G,B", &f));
+    for (int from = 0; from < 2; from++)
+        for (size_t k = 0; k < imp_count(sizes); k++)
+            for (int to = 0; to < 2; to++) {
+                const int w = sizes[k][0], h = sizes[k][1];
+                double worst = 0;
+                texels(imp_film_mean(f), 3 * W * H, 8);
+                test_must(ctx, imp_film_project(f, (enum imp_sky_projection)from,
+                                                (enum imp_sky_projection)to, w, h, &g));
+                for (int c = 0; c < 3; c++) {
+                    const double before = flux(imp_film_mean(f), from, W, H, c),
+                                 after = flux(imp_film_mean(g), to, w, h, c);
+                    worst = fmax(worst, fabs(after / before - 1));
+                }
+                tap_ok(worst < 1e-6, "%s to %s, %d x %d: the light is kept # %.1e",
+                       names[from], names[to], w, h, worst);
+                imp_film_destroy(g);
+            }
+
+    /* There and back, of a smooth map; one of a single colour is that everywhere. */
+    float *p = imp_film_mean(f);
+    for (int i = 0; i < H; i++)
+        for (int j = 0; j < W; j++)
+            for (int c = 0; c < 3; c++)
+                p[3 * (i * W + j) + c] = c == 2 ? 0.75F
+                                                : (float)(2 + cos(IMP_PI * i / (H - 1)) +
+                                                          sin(IMP_2PI * (j + 0.5) / W) *
+                                                              sin(IMP_PI * i / (H - 1)));
+    test_must(ctx, imp_film_project(f, IMP_LATLONG, IMP_EQUAL_AREA, W, 512, &g));
+    test_must(ctx, imp_film_project(g, IMP_EQUAL_AREA, IMP_LATLONG, W, H, &back));
+    double worst = 0, flat = 0;
+    for (int k = 0; k < W * H; k++) {
+        /* Around the poles all columns meet: there it is a mean over them. */
+        if (k / W > 1 && k / W < H - 2)
+            worst = fmax(worst, fabs(imp_film_mean(back)[3 * k] / p[3 * k] - 1));
+        flat = fmax(flat, fabs(imp_film_mean(back)[3 * k + 2] / 0.75 - 1));
+    }
+    tap_ok(worst < 0.02 && flat < 1e-6,
+           "a smooth map there and back # %.1e, of one colour %.1e", worst, flat);
+    imp_film_destroy(back);
+    imp_film_destroy(g);
+    enum imp_status st = imp_film_project(f, IMP_LATLONG, IMP_LATLONG, 1, 5, &g);
+    tap_ok(st == IMP_E_ARG, "1 x 5: refused # %s", imp_last_error(ctx));
+    st = imp_film_project(f, (enum imp_sky_projection)7, IMP_LATLONG, 8, 8, &g);
+    tap_ok(st == IMP_E_ARG, "no such projection # %s", imp_last_error(ctx));
+    imp_film_destroy(f);
 }
 
 /* ---- What is refused --------------------------------------------------------------- */
@@ -578,6 +645,7 @@ int main(void)
         light(p);
     }
     table();
+    projections();
     refusals();
     gaps();
     imp_context_destroy(ctx);

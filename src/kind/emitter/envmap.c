@@ -136,7 +136,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_e
                                 "scale and rotation are numbers, not textures"));
     IMP_TRY(texels_check(b, &s->texels));
     const int w = s->texels.width, h = s->texels.height;
-    s->map = (struct imp__sphere_map){(enum imp__projection)projection, w, h};
+    s->map = (struct imp__sphere_map){(enum imp_sky_projection)projection, w, h};
     s->table = (struct imp__weight_table){
         w, h, imp_build_alloc(b, (size_t)h, sizeof(double)),
         imp_build_alloc(b, (size_t)w * (size_t)h, sizeof(double))};

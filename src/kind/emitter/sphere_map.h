@@ -20,10 +20,10 @@
 #define IMP_KIND_EMITTER_SPHERE_MAP_H
 
 #include "math/vec.h"
+#include <importon/importon.h>
 
-enum imp__projection { IMP_LATLONG, IMP_EQUAL_AREA };
 struct imp__sphere_map {
-    enum imp__projection projection;
+    enum imp_sky_projection projection;
     int width, height; /* at least 2 */
 };
 
