@@ -79,6 +79,21 @@ static size_t node_find(const struct imp_sum_tree *t, size_t group, int level,
     return k;
 }
 
+/* Lock held, and given back: the node waits for its sibling, or for who takes it. */
+static enum imp_status node_keep(struct imp_sum_tree *t, struct imp_sum_node node)
+{
+    struct imp_sum_node *grown =
+        imp__grow(t->ctx, t->nodes, &t->cap_nodes, t->n_nodes + 1, sizeof *grown);
+    if (grown) {
+        t->nodes = grown;
+        t->nodes[t->n_nodes++] = node;
+    } else {
+        spare_add(t, node.sum);
+    }
+    pthread_mutex_unlock(&t->lock);
+    return grown ? IMP_OK : imp__error(t->ctx, IMP_E_NOMEM, "no memory for sums");
+}
+
 /* Put a node, and add up while siblings are there. */
 static enum imp_status node_put(struct imp_sum_tree *t, struct imp_sum_node node)
 {
@@ -88,18 +103,7 @@ static enum imp_status node_put(struct imp_sum_tree *t, struct imp_sum_node node
         if (node.index == 0 && (size_t)1 << node.level >= items) break;
         if (alone(items, node.level, node.index)) continue;
         const size_t k = node_find(t, node.group, node.level, node.index ^ 1);
-        if (k == t->n_nodes) {
-            struct imp_sum_node *grown =
-                imp__grow(t->ctx, t->nodes, &t->cap_nodes, t->n_nodes + 1, sizeof *grown);
-            if (grown) {
-                t->nodes = grown;
-                t->nodes[t->n_nodes++] = node;
-            } else {
-                spare_add(t, node.sum);
-            }
-            pthread_mutex_unlock(&t->lock);
-            return grown ? IMP_OK : imp__error(t->ctx, IMP_E_NOMEM, "no memory for sums");
-        }
+        if (k == t->n_nodes) return node_keep(t, node);
         void *other = t->nodes[k].sum;
         t->nodes[k] = t->nodes[--t->n_nodes];
         void *left = node.index & 1 ? other : node.sum;
@@ -116,16 +120,7 @@ static enum imp_status node_put(struct imp_sum_tree *t, struct imp_sum_node node
         imp__sum_tree_drop(t, node.sum);
         return st;
     }
-    struct imp_sum_node *grown =
-        imp__grow(t->ctx, t->nodes, &t->cap_nodes, t->n_nodes + 1, sizeof *grown);
-    if (grown) {
-        t->nodes = grown;
-        t->nodes[t->n_nodes++] = node;
-    } else {
-        spare_add(t, node.sum);
-    }
-    pthread_mutex_unlock(&t->lock);
-    return grown ? IMP_OK : imp__error(t->ctx, IMP_E_NOMEM, "no memory for sums");
+    return node_keep(t, node);
 }
 
 enum imp_status imp__sum_tree_put(struct imp_sum_tree *t, size_t item, void *room)
