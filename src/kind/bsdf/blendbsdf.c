@@ -3,8 +3,8 @@
  * blendbsdf: two materials mixed, f = (1 - w) f_0 + w f_1. Its derivative with respect to
  * the weight is f_1 - f_0, also where w is 0 or 1 (blending.h). Delta lobe l of material k
  * is lobe 2 l + k here. */
-#include "kind/build.h"
 #include "blending.h"
+#include "kind/build.h"
 
 enum { WEIGHT };
 

@@ -8,8 +8,8 @@
  * Its value is of first degree in o, from 0 to 1, and its derivative f_nested in one place
  * and -1 in the other. So the hole is drawn with a probability that stays away from 0 and
  * 1, where one of the two would never be seen. */
-#include "kind/build.h"
 #include "blending.h"
+#include "kind/build.h"
 
 enum { OPACITY };
 enum { HOLE }; /* lobe 0; those of the nested material follow */
