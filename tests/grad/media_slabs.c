@@ -19,7 +19,7 @@ struct row {
 
 static const char scene_text[] =
     "<scene version='3.0.0'>"
-    "<integrator type='volpath'><integer name='rr_depth' value='30'/></integrator>"
+    "%s"
     "<medium type='homogeneous' id='fog'><float name='sigma_t' value='%g'/>"
     "<float name='albedo' value='%g'/>%s</medium>"
     "<shape type='cube'><bsdf type='null'/><ref id='fog' name='interior'/>"
@@ -33,14 +33,20 @@ static const char scene_text[] =
     "<film type='hdrfilm'><integer name='width' value='16'/>"
     "<integer name='height' value='16'/><rfilter type='box'/></film></sensor></scene>";
 
-static imp_scene *slab(const struct row *r, bool reflected, double mu)
+#define VOLPATH                                                                          \
+    "<integrator type='volpath'><integer name='rr_depth' value='30'/></integrator>"
+#define PHOTONS                                                                          \
+    "<integrator type='photons'><string name='weights' value='kernel=1'/></integrator>"
+
+static imp_scene *slab(const struct row *r, bool reflected, double mu,
+                       const char *integrator)
 {
-    char phase[128], text[sizeof scene_text + 512];
+    char phase[128], text[sizeof scene_text + 1024];
     snprintf(phase, sizeof phase, "<phase type='%s'/>", r->phase);
     if (strcmp(r->phase, "hg") == 0)
         snprintf(phase, sizeof phase,
                  "<phase type='hg'><float name='g' value='%g'/></phase>", r->g);
-    snprintf(text, sizeof text, scene_text, r->tau, r->albedo, phase,
+    snprintf(text, sizeof text, scene_text, integrator, r->tau, r->albedo, phase,
              reflected ? 0. : 180., reflected ? -1. : 1., sqrt(1 - mu * mu), -.8 + mu);
     return test_scene_text(ctx, text, IMP_MONO);
 }
@@ -64,9 +70,10 @@ static void agrees(struct imp_estimate v, double ref, double tight, const struct
            v.value, v.se, ref, z);
 }
 
-static void check(const struct row *r, bool reflected, double mu, int spp)
+static void check(const struct row *r, bool reflected, double mu, int spp,
+                  const char *integrator)
 {
-    imp_scene *s = slab(r, reflected, mu);
+    imp_scene *s = slab(r, reflected, mu, integrator);
     imp_problem *p = test_problem(ctx, s, "fog.*");
     struct imp_run run = IMP_RUN_INIT;
     struct imp_estimate v;
@@ -111,7 +118,8 @@ int main(int argc, char **argv)
     for (int i = 0; i < (more ? 5 : 4); i++) /* the last has walks of hundred vertices */
         for (int k = 0; k < 4; k++)
             if (more || k < 2 || i == 2)
-                check(&rows[i], k & 1, k < 2 ? 1 : .4, more ? 16384 : 384);
+                check(&rows[i], k & 1, k < 2 ? 1 : .4, more ? 16384 : 384, VOLPATH);
+    check(&rows[2], true, 1, more ? 16384 : 384, PHOTONS); /* no connections */
     imp_context_destroy(ctx);
     return tap_done();
 }
