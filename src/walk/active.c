@@ -45,6 +45,13 @@ enum imp_status imp__active_create(const struct imp_scene *scene, const uint8_t 
             a.emitter[e] |= input_depends(scene->emitters[e]->input[k], chosen);
     for (int m = 0; m < scene->n_media; m++) {
         const struct imp_medium *medium = scene->media[m];
+        uint8_t *points = &a.bsdf[medium->scatterer->index];
+        if (*points) *points = IMP_BY_EXTINCTION;
+        for (int k = 0; k < medium->n_in; k++)
+            if ((k >= medium->n_own ||
+                 !(medium->ops->inputs[k].flags & IMP_INPUT_EXTINCTION)) &&
+                input_depends(medium->input[k], chosen))
+                *points = 1;
         for (int k = 0; k < medium->n_own; k++) {
             if (!(medium->ops->inputs[k].flags & IMP_INPUT_EXTINCTION)) continue;
             if (!input_depends(medium->input[k], chosen)) continue;

@@ -21,9 +21,10 @@ imp_spec imp__walk_fold(struct imp_walk *walk)
     return L;
 }
 
-static bool bsdf_active(const struct imp_active *a, const struct imp_bsdf *b)
+static bool bsdf_active(const struct imp_tracer *t, const struct imp_bsdf *b)
 {
-    return b && b->index >= 0 && a->bsdf[b->index];
+    if (!b || b->index < 0 || !t->active->bsdf[b->index]) return false;
+    return t->active->bsdf[b->index] != IMP_BY_EXTINCTION || t->collisions_stand;
 }
 
 /* ---- Lane by lane, d of a vertex's three pieces / d its inputs ------------------ */
@@ -98,6 +99,18 @@ static void extinction_drop(const struct imp_tracer *tracer, const struct imp_ve
     m = v->bsdf->self;
     for (int j = 0; j < m->n_own; j++)
         if (m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION) x[j] = (imp_spec){0};
+}
+
+/* The transpose: what a point of a medium gives to the inputs of its scatterer. */
+static void point_scatter(const struct imp_tracer *tracer, const struct imp_vertex *v,
+                          const struct imp_texcoord *at, const imp_spec *bar,
+                          struct imp_sink *sink)
+{
+    const struct imp_medium *m = v->bsdf->self;
+    for (int j = 0; j < m->n_in; j++)
+        if (j >= m->n_own || tracer->collisions_stand ||
+            !(m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION))
+            imp__inputs_scatter(&m->input[j], 1, at, &bar[j], sink);
 }
 
 static bool crosses(const struct imp_vertex *v)
@@ -210,7 +223,7 @@ void imp__walk_sweep(const struct imp_tracer *tracer, const struct imp_walk *wal
         if (connected && active->emitter[light->emitter])
             emitter_scatter(tracer, light->emitter, imp__light_emission(light),
                             imp__light_at(v), own * v->light_f * v->light_w, sink);
-        if (bsdf_active(active, b)) {
+        if (bsdf_active(tracer, b)) {
             imp_spec bar[IMP_INPUTS_MAX], d[IMP_INPUTS_MAX];
             bool any = false;
             for (int j = 0; j < b->n_in; j++) bar[j] = (imp_spec){0};
@@ -231,9 +244,10 @@ void imp__walk_sweep(const struct imp_tracer *tracer, const struct imp_walk *wal
                 any = true;
             }
             if (any) {
-                extinction_drop(tracer, v, bar);
                 const struct imp_texcoord at = imp__vertex_at(v);
-                imp__inputs_scatter(b->input, b->n_in, &at, bar, sink);
+                if (imp_unlikely(v->d.scatterer == IMP_IN_MEDIUM))
+                    point_scatter(tracer, v, &at, bar, sink);
+                else imp__inputs_scatter(b->input, b->n_in, &at, bar, sink);
             }
         }
         if (imp_unlikely(crosses(v))) media_scatter(tracer, v, P, own, sink);
@@ -299,7 +313,7 @@ imp_spec imp__walk_tangent(const struct imp_tracer *tracer, const struct imp_wal
                      v->light_f * v->light_w * own;
         if (imp_unlikely(crosses(v)))
             L_dot += media_tangent(tracer, v, own, direction_at, &direction);
-        if (!bsdf_active(active, b)) continue;
+        if (!bsdf_active(tracer, b)) continue;
         imp_spec in_dot[IMP_INPUTS_MAX], d[IMP_INPUTS_MAX];
         imp__inputs_tangent(b->input, b->n_in, &at, direction_at, &direction, in_dot);
         extinction_drop(tracer, v, in_dot);

@@ -153,11 +153,14 @@ struct imp_side {
     struct imp_walk walk;
 };
 
+enum { IMP_BY_EXTINCTION = 2 };
+
 /* Which numbers a derivative is wanted for, prepared once a job. */
 struct imp_active {
     size_t n;         /* numbers in x */
     int64_t *base;    /* [n_params] index in x of a parameter's first number, or -1 */
-    uint8_t *bsdf;    /* [n_bsdfs] does it depend on an active number */
+    uint8_t *bsdf;    /* [n_bsdfs] does it depend on an active number; IMP_BY_EXTINCTION:
+                         by extinctions alone, of which probes know */
     uint8_t *emitter; /* [n_emitters] */
     uint8_t *body;    /* [n_bodies]; NULL: none of them */
     uint8_t *medium;  /* [n_media] does its extinction; NULL: none of them */
