@@ -5,7 +5,7 @@
 
 enum {
     PILOT = 1500,
-    PILOT_LIMIT = 25,
+    PILOT_LIMIT = 12,
     MIN_EXPECTED = 10 /* cells below are pooled: chi-square is an approximation */
 };
 

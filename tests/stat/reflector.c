@@ -229,7 +229,9 @@ static struct photon_mean box(const char *type, double h, const char *weights, i
             photons_rays(&walk, &segments, &shadows);
             sum.segments += segments * parts;
             sum.shadows += shadows * parts;
-            if (!walk.first || walk.first->d.met.emitter < 0) tap_add(&pixel, walk.L[0]);
+            const struct imp_vertex *seen = walk.first;
+            if (seen && !seen->shape) seen = seen->next; /* behind the sensor itself */
+            if (!seen || seen->d.met.emitter < 0) tap_add(&pixel, walk.L[0]);
             imp__arena_rewind(&p.arena, mark);
         }
         if (pixel.n < 2) continue; /* the lamp itself */
