@@ -34,7 +34,7 @@ enum imp_status imp__record_create(const struct imp_tracer *tracer, size_t budge
         return imp__error(ctx, IMP_E_UNSUPPORTED,
                           "walks are kept for detached derivatives only: "
                           "alpha_gradient moves their directions");
-    if (tracer->split > 1)
+    if (tracer->split > 1 || tracer->integrator->split > 0)
         return imp__error(ctx, IMP_E_UNSUPPORTED,
                           "walks that split are not kept: of a walk and those that hang "
                           "on it, a record has the first");

@@ -34,9 +34,17 @@ static const struct imp_segment_ops straight = {
     .name = "straight", .connects = true, .meet = imp__straight_meet};
 struct imp_segment imp__straight = {&straight, NULL};
 
+/* Adjoint photons cross media where there are some; else they are walks of surfaces alone,
+ * as those of path. */
+static bool tracks(const struct imp_tracer *tracer)
+{
+    const struct imp_walk_integrator *i = tracer->integrator;
+    return i->media && (tracer->scene->n_media > 0 || !i->photons);
+}
+
 const struct imp_segment_ops *imp__segment_first(const struct imp_tracer *tracer)
 {
     return imp_unlikely(tracer->scene->n_bodies > 0) ? &imp__graded_outside
-           : imp_unlikely(tracer->integrator->media) ? &imp__tracking
+           : imp_unlikely(tracks(tracer))            ? &imp__tracking
                                                      : &straight;
 }
