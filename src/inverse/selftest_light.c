@@ -226,7 +226,7 @@ static enum imp_status light(struct imp__selftest *t, const struct imp_emitter *
         if (fabs(z) >= fabs(r.z))
             r.z = z, r.own = own.mean, r.other = other.mean, r.se = se;
         if (!sky || r.bad > 0 || i > 2) continue; /* the same from everywhere */
-        const struct imp__drawn d = {sky_draw, sky_density, NULL, &l};
+        const struct imp__drawn d = {sky_draw, sky_density, NULL, &l, 0};
         const struct imp__draws test =
             imp__draws_test(&d, t->options.samples / 3 + 1, t->options.seed + (uint64_t)i,
                             IMP_SPHERE_STEPS, t->tree);

@@ -250,7 +250,7 @@ static enum imp_status material(struct imp__selftest *t, const struct imp_bsdf *
         answers_take(t, &p, i, &a);
         if (a.bad > 0) continue; /* sums of NaN tell nothing more */
         const struct imp__drawn d = {draw, b->flags & IMP_BSDF_SMOOTH ? density : NULL,
-                                     chance, &p};
+                                     chance, &p, 0};
         const struct imp__draws test = imp__draws_test(
             &d, n, t->options.seed + 900 + (uint64_t)i, IMP_SPHERE_STEPS, t->tree);
         r.least = fmin(r.least, test.chance);

@@ -5,7 +5,7 @@
 
 enum {
     PILOT = 1500,
-    PILOT_LIMIT = 12,
+    PILOT_LIMIT = 25,
     MIN_EXPECTED = 10 /* cells below are pooled: chi-square is an approximation */
 };
 
@@ -44,7 +44,8 @@ struct imp__draws imp__draws_test(const struct imp__drawn *d, int samples, uint6
 
     imp__sphere_tree_init(tree);
     /* Enough of those with a density, however rare they are. */
-    for (uint32_t i = 0, n = 0; n < PILOT && i < (n ? 100 : 1) * PILOT; i++)
+    const uint32_t pilot = d->pilot ? d->pilot : PILOT;
+    for (uint32_t i = 0, n = 0; n < pilot && i < (n ? 100 : 1) * pilot; i++)
         if (draw(d, imp__key(seed, 1, 0), i, &w, &lobe) && lobe < 0) {
             imp__sphere_tree_pilot(tree, w, PILOT_LIMIT);
             n++;
