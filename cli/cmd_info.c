@@ -112,7 +112,7 @@ static int run_info(int n, char **operand)
     if (cli.json) {
         struct json j = cli_json();
         json_text(&j, "scene", cli.scene_path);
-        json_text(&j, "mode", s.mode == IMP_MONO ? "mono" : "rgb");
+        json_text(&j, "mode", cli_mode_word(s.mode));
         json_integer(&j, "shapes", s.n_shapes);
         json_integer(&j, "triangles", s.n_triangles);
         json_integer(&j, "emitters", s.n_emitters);
@@ -133,8 +133,8 @@ static int run_info(int n, char **operand)
         return rc;
     }
     printf("%s: %s, %d shapes (%lld triangles), %d emitters, %d bsdfs, %d textures\n",
-           cli.scene_path, s.mode == IMP_MONO ? "mono" : "rgb", s.n_shapes,
-           (long long)s.n_triangles, s.n_emitters, s.n_bsdfs, s.n_textures);
+           cli.scene_path, cli_mode_word(s.mode), s.n_shapes, (long long)s.n_triangles,
+           s.n_emitters, s.n_bsdfs, s.n_textures);
     if (s.bounds_min[0] <= s.bounds_max[0])
         printf("bounds: (%g, %g, %g) to (%g, %g, %g)\n", s.bounds_min[0], s.bounds_min[1],
                s.bounds_min[2], s.bounds_max[0], s.bounds_max[1], s.bounds_max[2]);

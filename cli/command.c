@@ -17,7 +17,9 @@
 
 struct cli cli;
 
-static const char *const mode_words[] = {"rgb", "mono", NULL};
+static const char *const mode_words[] = {"rgb", "mono", "spectral", "single", NULL};
+static const char *const wavelength_words[] = {"stratified", "independent", "importance",
+                                               NULL};
 static const char *const progress_words[] = {"auto", "always", "never", NULL};
 
 const struct arg_option options_file[] = {{ARG_TEXT, 'o', "output", "FILE",
@@ -53,8 +55,8 @@ const struct arg_option options_scene[] = {
      NULL},
     {ARG_TEXT, 'a', "search", "DIR[;DIR..]", "more folders to search for files",
      &cli.search, 0, 0, NULL},
-    {ARG_CHOICE, 'm', "mode", "MODE", "colour: rgb (default) or mono", &cli.mode, 0, 0,
-     mode_words},
+    {ARG_CHOICE, 'm', "mode", "MODE", "colour: rgb (default), mono, spectral or single",
+     &cli.mode, 0, 0, mode_words},
     {ARG_TEXT, 0, "weights", "NAME=W[,..]",
      "densities of directions, in place of those of the scene file: kernel, emitters, "
      "environment, proxies, guide, uniform",
@@ -75,6 +77,12 @@ const struct arg_option options_run[] = {
     {ARG_TEXT, 0, "part", "I/N",
      "compute part I of N (from 1), to the file of -o; 'importon merge' makes the whole",
      &cli.part, 0, 0, NULL},
+    {ARG_CHOICE, 0, "wavelengths", "HOW",
+     "of -m spectral and single: stratified (default), independent, or importance",
+     &cli.wavelengths, 0, 0, wavelength_words},
+    {ARG_INT, 0, "wavelength-set", "N",
+     "samples among which they are stratified (default: a quarter, at most 16)",
+     &cli.wavelength_set, 1, 1e9, NULL},
     {0}};
 
 const struct arg_option options_guide[] = {
@@ -264,6 +272,8 @@ static int guide_make(void)
     return cli_failed(st) ? cli_fail(st, cli.scene_path) : 0;
 }
 
+const char *cli_mode_word(enum imp_color_mode mode) { return mode_words[mode]; }
+
 int cli_load(const char *path)
 {
     struct imp_load_options options = IMP_LOAD_OPTIONS_INIT;
@@ -273,7 +283,7 @@ int cli_load(const char *path)
     if (rc) return rc;
 
     cli.scene_path = path;
-    options.mode = cli.mode == 1 ? IMP_MONO : IMP_RGB;
+    options.mode = (enum imp_color_mode)cli.mode; /* mode_words have its order */
     options.defines = cli.defines.item;
     options.n_defines = cli.defines.n;
     options.weights = cli.weights;
@@ -323,6 +333,8 @@ struct imp_run cli_run(void)
     run.time_limit_s = cli.time_s;
     run.progress = progress_report;
     run.guide = cli.guiding;
+    run.wavelengths = (enum imp_wavelength_sampling)cli.wavelengths;
+    run.wavelength_set = cli.wavelength_set;
     return run;
 }
 int cli_spp(const struct imp_run *run)

@@ -58,6 +58,7 @@ struct cli {
     double time_s;
     const char *part, *part_out; /* "I/N", and where it goes */
     imp_parts *parts;            /* the part in the making, or those that are merged */
+    int wavelengths, wavelength_set;
     /* options_guide */
     int guide;
     double guide_share, guide_roulette;
@@ -79,6 +80,8 @@ int cli_open(void);
  * --dump, or an exit code. */
 int cli_load(const char *path);
 void cli_close(void);
+/* As -m has it. */
+const char *cli_mode_word(enum imp_color_mode mode);
 /* From here on, what is printed goes to -o, if there is one. 0, or an exit code. */
 int cli_redirect(void);
 

@@ -214,7 +214,10 @@ typedef int (*imp_progress_fn)(const struct imp_progress *progress, void *payloa
 
 typedef struct imp_scene imp_scene;
 
-enum imp_color_mode { IMP_RGB = 0, IMP_MONO = 1 };
+/** What light is made of. In IMP_SPECTRAL a walk carries four wavelengths, a hero and its
+ * companions; in IMP_SINGLE it carries one. Pictures of both are linear sRGB, or what the
+ * film's response curves make of spectra (docs/spectra.md). */
+enum imp_color_mode { IMP_RGB = 0, IMP_MONO = 1, IMP_SPECTRAL = 2, IMP_SINGLE = 3 };
 
 struct imp_load_options {
     size_t size;
@@ -303,7 +306,7 @@ struct imp_scene_info {
     /** Scene units; min > max if there is no shape. */
     double bounds_min[3], bounds_max[3];
     enum imp_color_mode mode;
-    int channels; /**< of pictures: 3 for rgb, 1 for mono */
+    int channels; /**< of pictures: 1 for mono, else 3 */
     const char *integrator;
     int max_depth;       /**< -1: unlimited */
     size_t memory_bytes; /**< held by the scene, Embree's part included */
@@ -346,6 +349,8 @@ struct imp_param_info {
     double lo, hi;    /**< bounds of every number; may be infinite */
     unsigned flags;   /**< enum imp_param_flags */
     const char *why;  /**< why it has no gradient, where more can be said; or NULL */
+    /** [count] of a spectrum given by its values at wavelengths: those, in nm; else NULL. */
+    const double *wavelengths_nm;
 };
 
 /** Number of parameters, and of numbers in all of them together. */
@@ -484,6 +489,13 @@ imp_film_project(const imp_film *map, enum imp_sky_projection from,
 typedef struct imp_guide imp_guide;
 IMP_API void imp_guide_destroy(imp_guide *guide);
 
+/** How walks draw their wavelengths. */
+enum imp_wavelength_sampling {
+    IMP_WAVELENGTHS_STRATIFIED = 0, /**< uniformly, stratified within a pixel */
+    IMP_WAVELENGTHS_INDEPENDENT,    /**< uniformly, each walk on its own */
+    IMP_WAVELENGTHS_IMPORTANCE /**< by response times light, stratified within a pixel */
+};
+
 /** How Monte Carlo is run. The same (seed, spp) give the same bits on any thread count.
  */
 struct imp_run {
@@ -498,10 +510,15 @@ struct imp_run {
     imp_progress_fn progress;
     void *progress_payload;
     const imp_guide *guide; /**< NULL: none; paths (integrator path) alone follow it */
+    /** Of scenes in a spectral mode. */
+    enum imp_wavelength_sampling wavelengths;
+    /** Walks of a pixel among which wavelengths are stratified; 0: a quarter of the
+     * samples per pixel, at most 16. Standard errors come from the spread of such sets. */
+    int wavelength_set;
 };
 #define IMP_RUN_INIT                                                                     \
     {                                                                                    \
-        sizeof(struct imp_run), 0, 0, 0, 0, 0, 0, 0, 0                                   \
+        sizeof(struct imp_run), 0, 0, 0, 0, 0, 0, 0, 0, IMP_WAVELENGTHS_STRATIFIED, 0    \
     }
 
 /** Render the scene's integrator through a sensor.

@@ -90,14 +90,7 @@ struct imp_carried {
     double nm[4];
 };
 
-/* A spectrum as written: values at increasing wavelengths, linear between them, 0
- * outside. */
-struct imp_spectrum {
-    size_t n;
-    const double *nm;
-    double *value;
-};
-
+struct imp_spectrum; /* a value at every wavelength (src/color/spectrum.h) */
 struct imp_texture;
 /* One input of one object: a constant or a texture. */
 struct imp_input {
@@ -109,8 +102,8 @@ struct imp_input {
     int luminance;   /* > 0: the luminance of the input that stands so many before it */
     imp_spec value;  /* the constant, in all used lanes */
     imp_spec weight; /* of a luminance: of that input's lanes */
-    const struct imp_spectrum *spectrum; /* what a walk of wavelengths looks up; NULL:
-                                            none was written */
+    const struct imp_spectrum *spectrum; /* what walks that carry wavelengths look up;
+                                            NULL: the constant, at all of them */
 };
 
 struct imp_build; /* what build functions get; read by imp_build_*, below */
@@ -161,6 +154,7 @@ struct imp_bsdf {
     const char *name;
     int n_lobes; /* delta lobes have the indices below it; build sets it. 0 of a kind with
                     IMP_BSDF_DELTA: not said, at most 8 */
+    bool shaped; /* a scalar input is a spectrum: lanes differ in more than colour */
 };
 
 struct imp_bsdf_ops {
@@ -536,6 +530,7 @@ struct imp_emitter {
     int index;
     double weight; /* sampling_weight */
     const char *name;
+    bool shaped; /* as of imp_bsdf */
 };
 
 /* Of a light that is its first input times a function of the direction alone: what solvers
@@ -720,7 +715,7 @@ IMP_API enum imp_status imp_build_error(const struct imp_build *build, const cha
     IMP_FORMAT(4, 5);
 /** Zeroed memory, aligned to 32 bytes, that lives as long as the scene; NULL: none. */
 IMP_API void *imp_build_alloc(const struct imp_build *build, size_t n, size_t size);
-/** In mono mode lane 0 is all there is. */
+/** In mono mode lane 0 is all there is; in spectral modes lanes are wavelengths. */
 IMP_API enum imp_color_mode imp_build_color_mode(const struct imp_build *build);
 /** In `prepare`: write an input as if the scene had, one number or (n = 3) a colour. The
  * input must be absent. */

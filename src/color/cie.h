@@ -8,6 +8,7 @@
 #define IMP_CIE_N        95
 #define IMP_CIE_FIRST_NM 360.0
 #define IMP_CIE_STEP_NM  5.0
+#define IMP_CIE_LAST_NM  830.0
 /* Integral of the y curve, and what makes D65 a white of luminance 1. */
 #define IMP_CIE_Y_INTEGRAL 106.7502593994140625
 #define IMP_CIE_D65_SCALE  98.99741751876255

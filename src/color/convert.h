@@ -11,29 +11,51 @@
 #include "base/props.h"
 #include <importon/kinds.h>
 
-/* *value in all lanes; *count 1: one number, the same in all lanes, or 3: r, g, b. Of a
- * spectrum *kept becomes a copy in the arena, as it was written; else it stays.
- * `scalar` inputs get one number of a colour: the mean of the three in rgb mode, the
- * luminance in mono mode. @return IMP_OK, or IMP_E_SCENE with the place: not a colour,
- * not finite, a reflectance outside [0,1], negative light. */
-enum imp_status imp__color_convert(imp_context *ctx, const struct imp_node *node,
-                                   const struct imp_prop *prop, enum imp_role role,
-                                   bool scalar, enum imp_color_mode mode, imp_spec *value,
-                                   int *count, struct imp_arena *arena,
-                                   const struct imp_spectrum **kept);
+/* What is asked for. */
+struct imp__color_ask {
+    imp_context *ctx;
+    struct imp_arena *arena; /* for spectra */
+    enum imp_color_mode mode;
+    enum imp_role role;
+    bool scalar; /* one number of a colour: the mean of the three, in mono mode the
+                    luminance */
+    bool any_size; /* colours above 1 are lifted as they are, of a role that is no light */
+};
+
+/* What it turns into. In spectral modes `value` is the colour in rgb, for what needs no
+ * wavelengths, and `spectrum` what walks look up, with numbers of its own; NULL: value, at
+ * all wavelengths. */
+struct imp__color {
+    imp_spec value;  /* in all lanes */
+    int count;       /* 1: one number, the same in all lanes, or 3: r, g, b */
+    const char *key; /* name of its parameter below the property's: "value" */
+    struct imp_spectrum *spectrum;
+};
+
+static inline bool imp__is_spectral(enum imp_color_mode mode)
+{
+    return mode == IMP_SPECTRAL || mode == IMP_SINGLE;
+}
+
+/* @return IMP_OK, or IMP_E_SCENE with the place: not a colour, not finite, a reflectance
+ * outside [0,1], negative light. */
+enum imp_status imp__color_convert(const struct imp__color_ask *ask,
+                                   const struct imp_node *node,
+                                   const struct imp_prop *prop, struct imp__color *out);
 
 /* Value of an absent property. */
-void imp__color_default(double fallback, enum imp_role role, enum imp_color_mode mode,
-                        imp_spec *value, int *count);
+enum imp_status imp__color_default(const struct imp__color_ask *ask, double fallback,
+                                   struct imp__color *out);
 
 /* Is this node a colour that is written as an object (uniform, srgb, d65, ...)? */
 bool imp__color_is_object(const struct imp_node *node);
 /* The same for such a node (docs/scene-format.md 2.4). Reads and checks all its
- * properties; *key is the name of its parameter under the object. */
-enum imp_status imp__color_object(imp_context *ctx, struct imp_node *node,
-                                  enum imp_role role, bool scalar,
-                                  enum imp_color_mode mode, imp_spec *value, int *count,
-                                  const char **key, struct imp_arena *arena,
-                                  const struct imp_spectrum **kept);
+ * properties. */
+enum imp_status imp__color_object(const struct imp__color_ask *ask, struct imp_node *node,
+                                  struct imp__color *out);
+
+/* The colour in rgb of a spectrum whose numbers have changed; its mean if `scalar`. */
+void imp__color_preview(const struct imp_spectrum *s, enum imp_role role, bool scalar,
+                        imp_spec *value);
 
 #endif

@@ -1,32 +1,200 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "spectrum.h"
+#include "base/compiler.h"
+#include "cie.h"
+#include "rgb.h"
 #include <string.h>
 
-bool imp__spectrum_at(const struct imp_spectrum *s, double nm, size_t *first,
-                      double weight[2])
+/* ---- Forms ----------------------------------------------------------------------- */
+
+/* The sample at or below nm, which lies within the samples, and how far nm is beyond. */
+static size_t points_find(const struct imp_spectrum *s, double nm, double *part)
 {
-    if (s->n < 2 || !(nm >= s->nm[0]) || !(nm <= s->nm[s->n - 1])) return false;
     size_t lo = 0, hi = s->n - 1; /* nm[lo] <= nm <= nm[hi] */
+    if (imp_likely(s->per_nm > 0)) {
+        const double at = (nm - s->nm[0]) * s->per_nm;
+        lo = imp_min((size_t)at, s->n - 2);
+        *part = at - (double)lo;
+        return lo;
+    }
     while (hi - lo > 1) {
         const size_t middle = (lo + hi) / 2;
         if (s->nm[middle] <= nm) lo = middle;
         else hi = middle;
     }
-    const double t = (nm - s->nm[lo]) / (s->nm[hi] - s->nm[lo]);
-    *first = lo;
-    weight[0] = 1 - t;
-    weight[1] = t;
-    return true;
+    *part = (nm - s->nm[lo]) / (s->nm[hi] - s->nm[lo]);
+    return lo;
 }
 
-struct imp_spectrum *imp__spectrum_keep(struct imp_arena *arena, size_t n,
+/* Planck's law per wavelength; L = c1 / (l^5 (exp(c2/(l T)) - 1)), with the constants of
+ * docs/scene-format.md 2.4. */
+static double planck(double nm, double T, double *d_T)
+{
+    const double c = 2.99792458e8, h = 6.62607004e-34, k = 1.38064852e-23;
+    const double l = nm * 1e-9, c1 = 2 * h * c * c, x = h * c / (l * k * T);
+    const double e = expm1(x), L = c1 / (l * l * l * l * l * e) * 1e-9;
+    *d_T = x > 700 ? 0 : L * (e + 1) / e * x / T;
+    return L;
+}
+
+static double sellmeier(const double *c, int terms, double nm, double *d)
+{
+    const double l2 = nm * nm * 1e-6;
+    double n2 = 1;
+    for (int k = 0; k < terms; k++) n2 += c[k] * l2 / (l2 - c[terms + k]);
+    const double n = n2 > 0 ? sqrt(n2) : NAN;
+    for (int k = 0; k < terms; k++) {
+        const double r = 1 / (l2 - c[terms + k]);
+        d[k] = 0.5 * l2 * r / n;
+        d[terms + k] = 0.5 * c[k] * l2 * r * r / n;
+    }
+    return n;
+}
+
+static double form_value(const struct imp_spectrum *s, double nm)
+{
+    double part, d[IMP_SPECTRUM_NUMBERS];
+    switch (s->form) {
+    case IMP_SPECTRUM_POINTS: {
+        const size_t k = points_find(s, nm, &part);
+        return s->value[k] + part * (s->value[k + 1] - s->value[k]);
+    }
+    case IMP_SPECTRUM_NUMBER: return s->value[0];
+    case IMP_SPECTRUM_COLOR: return imp__lifted_value(&s->lifted, nm);
+    case IMP_SPECTRUM_BLACKBODY: return planck(nm, s->value[0], d);
+    case IMP_SPECTRUM_SELLMEIER: return sellmeier(s->value, (int)s->n / 2, nm, d);
+    case IMP_SPECTRUM_CAUCHY: {
+        const double per = 1e6 / (nm * nm);
+        return s->value[0] + per * (s->value[1] + per * s->value[2]);
+    }
+    }
+    return 0;
+}
+
+static double form_at(const struct imp_spectrum *s, double nm,
+                      struct imp__spectrum_at *out)
+{
+    double part;
+    out->first = 0;
+    out->n = (int)s->n;
+    switch (s->form) {
+    case IMP_SPECTRUM_POINTS:
+        out->first = points_find(s, nm, &part);
+        out->n = 2;
+        out->d[0] = 1 - part;
+        out->d[1] = part;
+        return s->value[out->first] +
+               part * (s->value[out->first + 1] - s->value[out->first]);
+    case IMP_SPECTRUM_NUMBER: out->d[0] = 1; return s->value[0];
+    case IMP_SPECTRUM_COLOR: return imp__lifted_value_d(&s->lifted, nm, out->d);
+    case IMP_SPECTRUM_BLACKBODY: return planck(nm, s->value[0], out->d);
+    case IMP_SPECTRUM_SELLMEIER: return sellmeier(s->value, (int)s->n / 2, nm, out->d);
+    case IMP_SPECTRUM_CAUCHY:
+        out->d[0] = 1;
+        out->d[1] = 1e6 / (nm * nm);
+        out->d[2] = out->d[1] * out->d[1];
+        return form_value(s, nm);
+    }
+    return 0;
+}
+
+/* ---- Values ---------------------------------------------------------------------- */
+
+static double factor(const struct imp_spectrum *s, double nm)
+{
+    double f = 1;
+    if (s->times) f *= imp__spectrum_value(s->times, nm);
+    if (s->over) f /= imp__spectrum_value(s->over, nm);
+    return f;
+}
+
+double imp__spectrum_value(const struct imp_spectrum *s, double nm)
+{
+    if (!(nm >= s->lo && nm <= s->hi)) return 0;
+    const double v = form_value(s, nm);
+    return imp_likely(!s->times && !s->over) ? v : v * factor(s, nm);
+}
+
+void imp__spectrum_at(const struct imp_spectrum *s, double nm,
+                      struct imp__spectrum_at *out)
+{
+    if (!(nm >= s->lo && nm <= s->hi)) {
+        out->value = 0;
+        out->n = 0;
+        return;
+    }
+    out->value = form_at(s, nm, out);
+    if (imp_likely(!s->times && !s->over)) return;
+    const double f = factor(s, nm);
+    out->value *= f;
+    for (int k = 0; k < out->n; k++) out->d[k] *= f;
+}
+
+void imp__spectrum_update(struct imp_spectrum *s)
+{
+    if (s->form != IMP_SPECTRUM_COLOR) return;
+    if (s->emission) imp__lift_unbounded(s->value, NULL, &s->lifted);
+    else imp__lift_reflectance(s->value, NULL, &s->lifted);
+}
+
+/* ---- Daylight -------------------------------------------------------------------- */
+
+static const double daylight_first = IMP_CIE_FIRST_NM; /* where the step is known */
+static const double daylight_scale = IMP_CIE_D65_SCALE;
+static const struct imp_spectrum daylight_unit = {
+    .form = IMP_SPECTRUM_NUMBER, .n = 1, .value = &daylight_scale, .hi = INFINITY};
+const struct imp_spectrum imp__daylight = {.form = IMP_SPECTRUM_POINTS,
+                                           .n = IMP_CIE_N,
+                                           .value = imp__cie_d65,
+                                           .nm = &daylight_first,
+                                           .per_nm = 1 / IMP_CIE_STEP_NM,
+                                           .lo = IMP_CIE_FIRST_NM,
+                                           .hi = IMP_CIE_LAST_NM,
+                                           .over = &daylight_unit};
+
+/* ---- Colour ---------------------------------------------------------------------- */
+
+void imp__spectrum_color(const struct imp_spectrum *s, bool daylight, double rgb[3])
+{
+    enum { POINTS = 1000 }; /* those of imp__spectrum_to_rgb */
+    double nm[POINTS], value[POINTS];
+    if (s->form == IMP_SPECTRUM_POINTS && !s->times && !s->over) {
+        imp__spectrum_to_rgb(s->n, s->nm, s->value, daylight, rgb);
+        return;
+    }
+    for (int i = 0; i < POINTS; i++) {
+        nm[i] =
+            IMP_CIE_FIRST_NM + (IMP_CIE_LAST_NM - IMP_CIE_FIRST_NM) * i / (POINTS - 1);
+        value[i] = imp__spectrum_value(s, nm[i]);
+    }
+    imp__spectrum_to_rgb(POINTS, nm, value, daylight, rgb);
+}
+
+/* ---- Making ---------------------------------------------------------------------- */
+
+/* 1/step of equidistant wavelengths, or 0. */
+static double per_step(size_t n, const double *nm)
+{
+    const double step = (nm[n - 1] - nm[0]) / (double)(n - 1);
+    for (size_t i = 1; i < n; i++)
+        if (fabs(nm[i] - (nm[0] + step * (double)i)) > 1e-12 * nm[n - 1]) return 0;
+    return 1 / step;
+}
+
+struct imp_spectrum *imp__spectrum_make(struct imp_arena *arena,
+                                        enum imp__spectrum_form form, size_t n,
                                         const double *nm, const double *value)
 {
     struct imp_spectrum *s = imp__arena_take(arena, 1, sizeof *s);
-    double *numbers = imp__arena_take(arena, 2 * n, sizeof *numbers);
+    double *numbers = imp__arena_take(arena, nm ? 2 * n : n, sizeof *numbers);
     if (!s || !numbers) return NULL;
-    memcpy(numbers, nm, n * sizeof *nm);
-    memcpy(numbers + n, value, n * sizeof *value);
-    *s = (struct imp_spectrum){n, numbers, numbers + n};
+    memcpy(numbers, value, n * sizeof *value);
+    if (nm) memcpy(numbers + n, nm, n * sizeof *nm);
+    *s = (struct imp_spectrum){.form = form, .n = n, .value = numbers, .own = numbers};
+    s->lo = nm ? nm[0] : 0;
+    s->hi = nm ? nm[n - 1] : INFINITY;
+    if (!nm) return s;
+    s->nm = numbers + n;
+    s->per_nm = per_step(n, nm);
     return s;
 }

@@ -1,19 +1,63 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A sampled spectrum at a wavelength: linear between its samples, 0 outside. */
+ * Spectra: what a colour is where walks carry wavelengths. A spectrum is a few numbers,
+ * which may be a parameter, and a rule that gives a value at every wavelength, with its
+ * derivatives by those numbers. */
 #ifndef IMP_COLOR_SPECTRUM_H
 #define IMP_COLOR_SPECTRUM_H
 
 #include "base/arena.h"
+#include "upsample.h"
 #include <importon/kinds.h>
 
-/* value = weight[0] value[first] + weight[1] value[first + 1]: what a lane's value is
- * made of, and where its derivative goes. False: outside, where it is 0. */
-bool imp__spectrum_at(const struct imp_spectrum *s, double nm, size_t *first,
-                      double weight[2]);
+enum imp__spectrum_form {
+    IMP_SPECTRUM_POINTS,    /* values at increasing wavelengths, linear between them */
+    IMP_SPECTRUM_NUMBER,    /* one number at all wavelengths */
+    IMP_SPECTRUM_COLOR,     /* r, g, b by the sigmoid of upsample.h */
+    IMP_SPECTRUM_BLACKBODY, /* temperature in K: radiance in W m^-2 sr^-1 nm^-1 */
+    IMP_SPECTRUM_SELLMEIER, /* n^2 = 1 + sum_k B_k l^2/(l^2 - C_k), l in um: B, then C */
+    IMP_SPECTRUM_CAUCHY     /* n = A + B/l^2 + C/l^4, l in um */
+};
 
-/* A copy that lives as long as the arena; NULL if out of memory. */
-struct imp_spectrum *imp__spectrum_keep(struct imp_arena *arena, size_t n,
+#define IMP_SPECTRUM_NUMBERS 8 /* on which the value at one wavelength depends, at most */
+
+struct imp_spectrum {
+    enum imp__spectrum_form form;
+    size_t n;            /* numbers */
+    const double *value; /* [n] */
+    double *own;         /* the same, to be set; NULL: a fixed spectrum */
+    const double *nm;    /* POINTS: [n]; the first alone where per_nm > 0 is enough */
+    double per_nm; /* POINTS: 1/step where the wavelengths are equidistant, else 0 */
+    double lo, hi; /* nm, outside of which it is 0 */
+    const struct imp_spectrum *times, *over; /* fixed; NULL: 1 */
+    struct imp__lifted lifted;               /* COLOR: what follows from value */
+    bool emission;                           /* COLOR: of any size, else <= 1 */
+};
+
+/* Value at one wavelength, and its derivatives by numbers first .. first + n - 1. */
+struct imp__spectrum_at {
+    double value, d[IMP_SPECTRUM_NUMBERS];
+    size_t first;
+    int n;
+};
+double imp__spectrum_value(const struct imp_spectrum *s, double nm);
+void imp__spectrum_at(const struct imp_spectrum *s, double nm,
+                      struct imp__spectrum_at *out);
+
+/* Colour in linear sRGB (docs/scene-format.md 2.3), not clamped. `daylight`: of a surface
+ * of this reflectance under D65; else of a light of this power. */
+void imp__spectrum_color(const struct imp_spectrum *s, bool daylight, double rgb[3]);
+
+/* Numbers have changed: what is derived from them is made anew. */
+void imp__spectrum_update(struct imp_spectrum *s);
+
+/* Daylight D65, 1 as a white of luminance 1. */
+extern const struct imp_spectrum imp__daylight;
+
+/* One that lives as long as the arena, with room for n numbers, which are copied, as are
+ * the wavelengths (NULL: none). NULL if out of memory. */
+struct imp_spectrum *imp__spectrum_make(struct imp_arena *arena,
+                                        enum imp__spectrum_form form, size_t n,
                                         const double *nm, const double *value);
 
 #endif

@@ -23,6 +23,16 @@ static void put_vector(struct imp_text *t, const char *key, imp_v3 v, int n)
     }
     imp__put(t, "]");
 }
+static void put_waves(struct imp_text *t, const char *key, const struct imp_waves *waves)
+{
+    const double *nm = waves->carried.nm;
+    put_vector(t, key, (imp_v3){nm[0], nm[1], nm[2], nm[3]}, waves->carried.n);
+}
+/* Values that its vertices have. */
+static int values_of(const struct imp_walk *w, const struct imp_scene *scene)
+{
+    return w->waves ? w->waves->carried.n : scene->channels;
+}
 static void put_string(struct imp_text *t, const char *key, const char *s)
 {
     imp__put(t, "\"%s\":", key);
@@ -32,14 +42,18 @@ static void put_string(struct imp_text *t, const char *key, const char *s)
 static void json(struct imp_text *t, const struct imp_scene *scene,
                  const struct imp_walk *w, int x, int y, int64_t sample)
 {
-    const int C = scene->channels;
+    const int C = values_of(w, scene);
     imp__put(t, "{\"pixel\":[%d,%d],\"sample\":%lld,", x, y, (long long)sample);
     imp__put(t, "\"film\":[%.9g,%.9g],", w->px, w->py);
     put_vector(t, "origin", w->ray.o, 3);
     imp__put(t, ",");
     put_vector(t, "direction", w->ray.d, 3);
     imp__put(t, ",");
-    put_vector(t, "radiance", w->L, C);
+    put_vector(t, "radiance", w->L, scene->channels);
+    if (w->waves) {
+        imp__put(t, ",");
+        put_waves(t, "wavelengths_nm", w->waves);
+    }
     imp__put(t, ",\"absorbed\":%s,\"dropped\":%d,\"vertices\":[",
              w->absorbed ? "true" : "false", (int)w->dropped);
     imp_spec beta = imp__spec(1);
@@ -102,11 +116,16 @@ static void plain_spec(struct imp_text *t, const char *name, imp_spec s, int C)
 static void plain(struct imp_text *t, const struct imp_scene *scene,
                   const struct imp_walk *w, int x, int y, int64_t sample)
 {
-    const int C = scene->channels;
+    const int C = values_of(w, scene);
     imp__put(t, "walk: pixel %d,%d sample %lld, film position %.4f %.4f\n", x, y,
              (long long)sample, w->px, w->py);
     imp__put(t, "  from (%.6g, %.6g, %.6g) along (%.6g, %.6g, %.6g)\n", w->ray.o[0],
              w->ray.o[1], w->ray.o[2], w->ray.d[0], w->ray.d[1], w->ray.d[2]);
+    if (w->waves) {
+        imp_spec nm;
+        for (int c = 0; c < 4; c++) nm[c] = w->waves->carried.nm[c];
+        plain_spec(t, "wavelengths", nm, C);
+    }
     imp_spec beta = imp__spec(1);
     int k = 0;
     for (const struct imp_vertex *v = w->first; v; v = v->next, k++) {
@@ -156,7 +175,7 @@ static void plain(struct imp_text *t, const struct imp_scene *scene,
     }
     if (k == 0) imp__put(t, "  meets nothing\n");
     if (w->dropped) imp__put(t, "  dropped: %s\n", imp_drop_text(w->dropped));
-    plain_spec(t, "radiance", w->L, C);
+    plain_spec(t, "radiance", w->L, scene->channels);
 }
 
 enum imp_status imp_walk_describe(const imp_scene *scene, const struct imp_run *run,
@@ -191,12 +210,12 @@ enum imp_status imp_walk_describe(const imp_scene *scene, const struct imp_run *
                               : IMP_E_SCENE,
                           "the scene's integrator makes no walks; "
                           "use path, direct or stam");
-    const struct imp_tracer tracer = {.scene = scene,
-                                      .integrator = integrator,
-                                      .sensor = sensor,
-                                      .seed = own.seed,
-                                      .guide =
-                                          imp__guide_of(scene, integrator, own.guide)};
+    struct imp_tracer tracer = {.scene = scene,
+                                .integrator = integrator,
+                                .sensor = sensor,
+                                .seed = own.seed,
+                                .guide = imp__guide_of(scene, integrator, own.guide)};
+    imp__tracer_waves(&tracer, &own, imp__walks_of(&own, sensor));
     struct imp_arena arena;
     imp__arena_init(&arena, scene->ctx);
     struct imp_walk walk;

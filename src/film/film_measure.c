@@ -105,9 +105,13 @@ enum imp_status imp__measure_create(const struct imp_scene *scene,
                                 .sensor = sensor,
                                 .seed = run->seed,
                                 .guide = run->guide,
+                                .run = run,
                                 .spp = run->spp > 0 ? run->spp : sensor->spp,
                                 .n = names.n,
                                 .names = (char *)names.text.bytes.data};
+    struct imp_tracer tracer = {.scene = scene};
+    imp__tracer_waves(&tracer, run, imp__walks_of(run, sensor));
+    out->set = tracer.set;
     return IMP_OK;
 }
 
@@ -246,13 +250,14 @@ static void radiance(const struct imp_measure *m,
                      imp_spec *L, double *alpha, struct imp_walk *walk)
 {
     static const struct imp_walk_integrator first_hit = {.max_depth = 0};
-    const struct imp_tracer tracer = {
+    struct imp_tracer tracer = {
         .scene = m->scene,
         .integrator = integrator ? integrator : &first_hit,
         .sensor = m->sensor,
         .seed = m->seed,
         .guide = integrator ? imp__guide_of(m->scene, integrator, m->guide) : NULL,
         .value_only = true};
+    imp__tracer_waves(&tracer, m->run, imp__walks_of(m->run, m->sensor));
     const enum imp_drop before = s->dropped;
     const struct imp_arena_mark mark = imp__arena_mark(s->arena);
     imp__sample_walk(s, &tracer, walk);

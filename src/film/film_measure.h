@@ -14,7 +14,9 @@ struct imp_measure {
     const struct imp_sensor *sensor;
     uint64_t seed;
     const struct imp_guide *guide;
+    const struct imp_run *run; /* outlives the measure */
     int spp;
+    int set;     /* of samples that depend on each other (imp_picture) */
     int n;       /* channels */
     char *names; /* "R,G,B,..." for imp__film_create */
 };

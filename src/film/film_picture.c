@@ -33,7 +33,12 @@ struct render {
     double *values;  /* [threads][n] */
     double *patches; /* [threads][stratum_side^2][IMP_WIDE_SUMS] what one pixel sends in a
                         pass through a wide filter */
-    int sweep_spp;   /* samples of a pixel in the sweep at work */
+    int set;         /* samples that depend on each other, about; 1: none do */
+    int64_t period;  /* samples of a pixel; 0: not known */
+    int sets, pass_sets; /* in all of them, in a pass */
+    double *set_values;  /* [threads][n] box: sums of a set */
+    double *set_patches; /* [threads] as patches, of a set: sums of w and w v alone */
+    int sweep_spp;       /* samples of a pixel in the sweep at work */
 };
 
 /* ---- One tile and pass ----------------------------------------------------------- */
@@ -52,6 +57,7 @@ static size_t apart(size_t n)
     return (n + line - 1) / line * line;
 }
 
+/* One sample, or the sums of a set: wv(c) = w value[c]. */
 static void accumulate(double *sums, double w, const double *value, int n)
 {
     sums[0] += w;
@@ -62,6 +68,23 @@ static void accumulate(double *sums, double w, const double *value, int n)
         sums[3 + 3 * c] += w * wv;
         sums[4 + 3 * c] += wv * wv;
     }
+}
+
+/* A set is one sample whose w and w v are sums. `set` has them in the places that they
+ * have in sums; it is cleared. */
+static void set_add(double *sums, double *set, int n)
+{
+    const double w = set[0];
+    if (set[1] == 0) return;
+    sums[0] += w;
+    sums[1] += w * w;
+    for (int c = 0; c < n; c++) {
+        const double wv = set[2 + 3 * c];
+        sums[2 + 3 * c] += wv;
+        sums[3 + 3 * c] += w * wv;
+        sums[4 + 3 * c] += wv * wv;
+    }
+    memset(set, 0, (size_t)IMP_WIDE_SUMS(n) * sizeof *set);
 }
 
 /* Weight a sample into the pixels that the filter reaches. */
@@ -135,12 +158,46 @@ static void sample_take(const struct render *r, struct imp_tile_worker *w,
     imp__tile_drop(w, s->dropped, s->x, s->y, s->index);
 }
 
+/* A sample of a set; n > 0: the set's last, of n. With a box filter sets of all sizes
+ * count the same: their sums are scaled to the mean size. */
+static void set_take(const struct render *r, const struct imp_tile *t, int worker,
+                     const struct imp_sample *s, double *own, double *patch, int n)
+{
+    const size_t width = IMP_WIDE_SUMS(r->n);
+    if (r->border > 0) {
+        double *set = r->set_patches + (size_t)worker * apart(patch_size(r));
+        const size_t side = (size_t)stratum_side(r);
+        splat(r, t, set, s);
+        for (size_t i = 0; n > 0 && i < side * side; i++)
+            set_add(patch + i * width, set + i * width, r->n);
+        return;
+    }
+    double *sum = r->set_values + (size_t)worker * apart((size_t)r->n);
+    const double scale = r->sets > 0 && n > 0 ? (double)r->period / r->sets / n : 1;
+    for (int c = 0; c < r->n; c++) sum[c] += s->value[c];
+    for (int c = 0; n > 0 && c < r->n; c++) {
+        const double all = scale * sum[c];
+        own[2 * c] += all;
+        own[2 * c + 1] += all * all;
+        sum[c] = 0;
+    }
+}
+
+/* First sample of a pass; passes end with sets. */
+static int pass_begin(const struct render *r, int pass)
+{
+    if (r->set > 1 && r->sets > 0)
+        return (int)(imp_min((int64_t)pass * r->pass_sets, (int64_t)r->sets) * r->period /
+                     r->sets);
+    return (int)imp_min((int64_t)pass * r->pass_spp, (int64_t)r->spp);
+}
+
 static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worker *w,
                                  void *result, void *payload)
 {
     struct render *r = payload;
-    const int s0 = (int)t->part * r->pass_spp;
-    const int s1 = r->spp - s0 > r->pass_spp ? s0 + r->pass_spp : r->spp;
+    const int s0 = pass_begin(r, (int)t->part), s1 = pass_begin(r, (int)t->part + 1);
+    int n_sets = 0;
     const int n = r->n;
     double *tile = result;
     double *patch = r->patches + (size_t)w->index * apart(patch_size(r));
@@ -154,6 +211,14 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
             for (int k = s0; k < s1; k++) {
                 s.index = r->picture->first + k;
                 sample_take(r, w, &s);
+                if (imp_unlikely(r->set > 1)) {
+                    int64_t first, n_set;
+                    imp__set_at(r->set, r->period, k, &first, &n_set);
+                    const bool last = k + 1 == first + n_set || k + 1 == s1;
+                    set_take(r, t, w->index, &s, own, patch, last ? (int)n_set : 0);
+                    n_sets += last;
+                    continue;
+                }
                 if (r->border > 0) {
                     splat(r, t, patch, &s);
                     continue;
@@ -163,7 +228,9 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
                     own[2 * c + 1] += s.value[c] * s.value[c];
                 }
             }
-            if (r->border > 0) stratum_add(r, t, patch, s.x, s.y, s1 - s0, tile);
+            if (r->border > 0)
+                stratum_add(r, t, patch, s.x, s.y, r->set > 1 ? n_sets : s1 - s0, tile);
+            n_sets = 0;
             const enum imp_status st = imp__tile_check(w);
             if (st != IMP_OK) return st;
         }
@@ -202,8 +269,14 @@ static enum imp_status render_plan(struct render *r, imp_context *ctx)
         r->side *= 2;
     /* With a time limit and no count: until the time is up. */
     r->spp = run->spp > 0 ? run->spp : run->time_limit_s > 0 ? 1 << 24 : p->sensor->spp;
+    r->set = imp_max(p->set, 1);
     r->pass_spp = run->time_limit_s > 0 ? PASS_SPP_TIMED : PASS_SPP;
-    r->passes = (r->spp - 1) / r->pass_spp + 1;
+    r->period = imp__walks_of(run, p->sensor);
+    r->sets = r->period > 0 ? (int)imp_max(r->period / r->set, (int64_t)1) : 0;
+    r->pass_sets = imp_max(r->pass_spp / r->set, 1);
+    if (r->set > 1 && r->sets == 0) r->pass_spp = r->pass_sets * r->set;
+    r->passes = r->set > 1 && r->sets > 0 ? (r->sets - 1) / r->pass_sets + 1
+                                          : (r->spp - 1) / r->pass_spp + 1;
     r->tiles = (struct imp_tiles){.ctx = ctx,
                                   .run = run,
                                   .width = width,
@@ -215,16 +288,18 @@ static enum imp_status render_plan(struct render *r, imp_context *ctx)
                                   .take = tile_take,
                                   .payload = r};
     const enum imp_status st = imp__tiles_create(&r->tiles);
-    r->sums = (struct imp_film_sums){.ctx = ctx,
-                                     .width = width,
-                                     .height = height,
-                                     .n = p->n,
-                                     .n_films = imp_max(p->n_films, 1),
-                                     .border = r->border,
-                                     .margin = r->tiles.margin,
-                                     .side = r->side,
-                                     .across = r->tiles.across,
-                                     .down = r->tiles.down};
+    r->sums =
+        (struct imp_film_sums){.ctx = ctx,
+                               .width = width,
+                               .height = height,
+                               .n = p->n,
+                               .n_films = imp_max(p->n_films, 1),
+                               .border = r->border,
+                               .margin = r->tiles.margin,
+                               .side = r->side,
+                               .set = r->sets > 0 ? (double)r->period / r->sets : r->set,
+                               .across = r->tiles.across,
+                               .down = r->tiles.down};
     r->tiles.size = imp__film_sums_tile(&r->sums) * sizeof(double);
     return st;
 }
@@ -240,7 +315,13 @@ static enum imp_status buffers_create(struct render *r, imp_context *ctx)
         imp__alloc(ctx, (size_t)ctx->threads, apart((size_t)r->n) * sizeof(double));
     r->patches =
         imp__alloc(ctx, (size_t)ctx->threads, apart(patch_size(r)) * sizeof(double));
-    if (!r->values || !r->patches)
+    if (r->set > 1) {
+        r->set_values =
+            imp__alloc(ctx, (size_t)ctx->threads, apart((size_t)r->n) * sizeof(double));
+        r->set_patches =
+            imp__alloc(ctx, (size_t)ctx->threads, apart(patch_size(r)) * sizeof(double));
+    }
+    if (!r->values || !r->patches || (r->set > 1 && (!r->set_values || !r->set_patches)))
         return imp__error(ctx, IMP_E_NOMEM, "no memory for samples of %d channels", r->n);
     return imp__film_sums_create(&r->sums);
 }
@@ -268,8 +349,7 @@ static enum imp_status render_run(struct render *r, int64_t *spp)
         2. * r->sums.margin * (r->sums.width + r->sums.height + 2. * r->sums.margin);
     for (int done = 0; done < r->passes && st == IMP_OK;) {
         const int n = sweep_passes(r, done);
-        const int64_t before = (int64_t)done * r->pass_spp;
-        const int64_t after = imp_min(before + (int64_t)n * r->pass_spp, (int64_t)r->spp);
+        const int64_t before = pass_begin(r, done), after = pass_begin(r, done + n);
         r->sweep_spp = (int)(after - before);
         r->tiles.walks = sampled * (double)(timed ? after : (int64_t)r->spp);
         const struct imp_tiles_pass pass = {
@@ -323,7 +403,9 @@ enum imp_status imp__picture_make(imp_context *ctx, const struct imp_picture *pi
         memset(out, 0, (size_t)n_films * sizeof *out);
         IMP_TRY(ended);
     }
-    IMP_TRY(imp__film_sums_finish(&r.sums, r.border > 0 && imp_min(r.spp, r.pass_spp) > 1,
+    IMP_TRY(imp__film_sums_finish(&r.sums,
+                                  r.border > 0 && imp_min(r.spp, r.pass_spp) > r.set &&
+                                      (r.sets == 0 || r.sets > 1),
                                   picture->weights, films));
     for (int k = 0; k < n_films; k++) {
         films[k]->spp = spp;
@@ -340,5 +422,7 @@ out:
     if (r.tiles.ctx) imp__tiles_destroy(&r.tiles);
     imp__release(ctx, r.values);
     imp__release(ctx, r.patches);
+    imp__release(ctx, r.set_values);
+    imp__release(ctx, r.set_patches);
     return st;
 }

@@ -30,6 +30,9 @@ struct imp_picture {
     int64_t first;   /* number of a pixel's first sample */
     int n_films;     /* the values are cut into so many films of equal size; 0: one */
     double *weights; /* [height][width] sums of filter weights; NULL: not wanted */
+    /* Consecutive samples of a pixel that depend on each other, from the first on: errors
+     * come from the spread of such sets. 0: none do. */
+    int set;
 };
 
 /* out [n_films]. A value that is not finite or beyond float is a dropped walk
@@ -39,6 +42,13 @@ struct imp_picture {
  * the first sample; IMP_E_NUMERIC if a pixel is not finite. */
 enum imp_status imp__picture_make(imp_context *ctx, const struct imp_picture *picture,
                                   const struct imp_run *run, imp_film **out);
+
+/* Walks of a pixel that a picture takes; 0: until its time is up. */
+static inline int64_t imp__walks_of(const struct imp_run *run,
+                                    const struct imp_sensor *sensor)
+{
+    return run->spp > 0 ? run->spp : run->time_limit_s > 0 ? 0 : sensor->spp;
+}
 
 /* The walk of a sample, which gets its film position, and the cause if it was dropped. */
 static inline void imp__sample_walk(struct imp_sample *s, const struct imp_tracer *tracer,

@@ -38,7 +38,8 @@ enum imp_status imp_render(const imp_scene *scene, const struct imp_run *run,
                                             .names = measure.names,
                                             .n = measure.n,
                                             .sample = imp__measure_sample,
-                                            .payload = &measure};
+                                            .payload = &measure,
+                                            .set = measure.set};
         st = imp__picture_make(scene->ctx, &picture, &own, out);
     }
     imp__measure_destroy(&measure);

@@ -152,14 +152,15 @@ static enum imp_status box_row(size_t item, int worker, int slot, void *payload)
     (void)worker, (void)slot;
     for (size_t x = 0; x < (size_t)s->width; x++) {
         const size_t pixel = y * (size_t)s->width + x;
-        const double W = count[x / (size_t)s->side], freedom = freedom_of(false, W, W);
+        const double W = count[x / (size_t)s->side], q = s->set;
+        const double freedom = freedom_of(false, W, W * q);
         if (f->weights) f->weights[pixel] = W;
         for (size_t k = pixel * C; k < (pixel + 1) * C; k++) {
             const double sum = W != 0 ? s->sum[f->film][k] : 0;
             const double mean = W != 0 ? sum / W : 0;
             if (f->errors) {
                 const double square = W != 0 ? s->square[f->film][k] : 0;
-                const double spread = square - 2 * mean * sum + mean * mean * W;
+                const double spread = square - 2 * (q * mean) * sum + q * mean * mean * W;
                 film->se[k] = error_of(freedom, W, spread);
             } else {
                 film->mean[k] = (float)mean;

@@ -13,6 +13,10 @@
  * here in a pass (strata of Cochran, Sampling Techniques, 5.3 and 6.10):
  *     sum over strata  m/(m - 1) [sum e^2 - (sum e)^2/m] / (sum w)^2.
  *
+ * Samples that depend on each other come in sets; then a set takes the place of a
+ * sample, with the sums of its w and w v. With a box filter and sets of q samples the
+ * squares are those of sets:  se^2 = R/(R - 1) [sum S^2 - q m^2 N] / N^2,  R = N/q.
+ *
  * Order of the sums: over the passes of a tile in a fixed binary tree; then, of the tiles
  * that reach a pixel through a wide filter, in the tiles' order. Tiles keep their sums
  * apart until the end, so that parts of a picture, by tiles or by passes, can be made
@@ -30,6 +34,7 @@ struct imp_film_sums {
     int n, n_films;                 /* values of a sample; films they are cut into */
     int border;                     /* reach of the filter in pixels; 0: box */
     int margin, side, across, down; /* of the tiles */
+    double set;                     /* samples of a set, in the mean */
     int32_t *count; /* [tiles] samples of a pixel that are in, 0: nothing is known */
     /* box: of film f, [height][width][n / n_films] */
     double **sum, **square;

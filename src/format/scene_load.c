@@ -15,7 +15,7 @@ enum imp_status imp__load_options(imp_context *ctx, const struct imp_load_option
 {
     *to = (struct imp_load_options)IMP_LOAD_OPTIONS_INIT;
     IMP_CHECKED(imp__options_take(ctx, "load", "options", from, to, sizeof *to));
-    if (to->mode != IMP_RGB && to->mode != IMP_MONO)
+    if ((int)to->mode < IMP_RGB || (int)to->mode > IMP_SINGLE)
         return imp__error(ctx, IMP_E_ARG, "colour mode %d is not known", (int)to->mode);
     if ((to->n_defines && !to->defines) || (to->n_search && !to->search))
         return imp__error(ctx, IMP_E_ARG, "definitions or search folders are NULL");

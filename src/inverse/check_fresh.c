@@ -136,7 +136,8 @@ static enum imp_status comparison_round(struct rows *r, struct comparison *c, in
     const struct imp_problem *p = r->fresh.check->problem;
     const struct imp_param *q = &p->scene->params[c->param];
     const size_t count = q->info.count, base = (size_t)p->active.base[c->param];
-    const bool linear = is_emission(p->scene, c->param);
+    const bool linear = is_emission(p->scene, c->param) &&
+                        p->scene->params[c->param].degree == IMP_DEGREE_LINEAR;
     double *buffer = imp__alloc(r->fresh.check->ctx, 2 * count + p->n, sizeof *buffer);
     if (!buffer)
         return imp__error(r->fresh.check->ctx, IMP_E_NOMEM, "no memory for a check");

@@ -98,7 +98,7 @@ static enum imp_status euler(struct imp__kept *k, const uint8_t *chosen,
     struct imp_active active = {0};
     struct imp_tracer tracer = c->tracer;
     struct imp__kept_list list = {
-        {.add = imp__kept_add}, &active, c->ctx, s->channels, NULL, 0, 0, false};
+        {.add = imp__kept_add}, &active, c->ctx, s->lanes, NULL, 0, 0, false};
     struct imp_check_row row = {.limit = IMP_EXACT_LIMIT, .ok = 1};
     double *theta = NULL;
 
@@ -124,7 +124,7 @@ static enum imp_status euler(struct imp__kept *k, const uint8_t *chosen,
         if (list.failed)
             IMP_TRY(imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check"));
         for (size_t q = 0; q < list.n; q++) sum += theta[list.at[q].i] * list.at[q].g;
-        const double error = fabs(sum - n * w->L) / (n * w->L);
+        const double error = fabs(sum - n * w->L) / fabs(n * w->L);
         if (error <= row.error && row.reference != 0) continue;
         row.error = error;
         row.value = sum;
@@ -137,6 +137,14 @@ out:
     imp__release(c->ctx, list.at);
     imp__release(c->ctx, theta);
     return st;
+}
+
+/* Do values grow as the chosen numbers do? */
+static bool first_degree(const struct imp_scene *s, const uint8_t *chosen)
+{
+    for (size_t p = 0; p < s->n_params; p++)
+        if (chosen[p] && s->params[p].degree == IMP_DEGREE_OTHER) return false;
+    return true;
 }
 
 static enum imp_status check_emission(struct imp__kept *k, uint8_t *chosen)
@@ -155,7 +163,8 @@ static enum imp_status check_emission(struct imp__kept *k, uint8_t *chosen)
         for (int j = 0; j < s->media[i]->n_own; j++)
             if (s->media[i]->ops->inputs[j].role == IMP_EMISSION)
                 mark(s, s->media[i]->input[j], chosen);
-    if (!any_chosen(s, chosen) || used_otherwise(s, chosen, chosen + s->n_params))
+    if (!any_chosen(s, chosen) || !first_degree(s, chosen) ||
+        used_otherwise(s, chosen, chosen + s->n_params))
         return IMP_OK; /* L is not of first degree then */
     return euler(k, chosen, NULL, "all emission");
 }
@@ -175,7 +184,8 @@ static enum imp_status check_reflectance(struct imp__kept *k, uint8_t *chosen)
             if (b->ops->inputs[j].role == IMP_REFLECTANCE) mark(s, b->input[j], chosen);
         char name[256];
         snprintf(name, sizeof name, "%s: reflectances", b->name ? b->name : b->ops->name);
-        if (any_chosen(s, chosen)) IMP_TRY(euler(k, chosen, b, name));
+        if (any_chosen(s, chosen) && first_degree(s, chosen))
+            IMP_TRY(euler(k, chosen, b, name));
     }
 out:
     return st;

@@ -158,9 +158,11 @@ static double loss(enum imp_loss kind, double I, double T)
     return at.value;
 }
 
-/* l'(I): central differences, or at 0 the one-sided formula of second order. */
+/* l'(I): central differences, or at 0 the one-sided formula of second order. Single walks
+ * that carry wavelengths may be outside the gamut; log takes what is below 0 for 0. */
 static double slope(enum imp_loss kind, double I, double T)
 {
+    if (kind == IMP_LOSS_LOG) I = fmax(I, 0);
     const double h = STEP * fmax(I, EPSILON);
     if (I > h) return (loss(kind, I + h, T) - loss(kind, I - h, T)) / (2 * h);
     return (4 * loss(kind, I + h, T) - 3 * loss(kind, I, T) - loss(kind, I + 2 * h, T)) /

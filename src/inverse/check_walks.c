@@ -1,23 +1,32 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "check_walks.h"
+#include "color/rgb.h"
 #include "film/film_picture.h"
 #include <math.h>
 #include <string.h>
 
 #define MEMORY_MAX ((size_t)512 << 20) /* of kept walks */
 
-static const double lane[3] = {1, 0.7, 1.3};
-
+imp_spec imp__kept_fold_bar(const struct imp__check *c)
+{
+    static const imp_spec lane = {1, 0.7, 1.3, 0};
+    const struct imp_scene *scene = c->problem->scene;
+    if (!scene->wavelengths) return scene->channels == 3 ? lane : (imp_spec){lane[0]};
+    /* X + 0.7 Y + 1.3 Z: no wavelength has a negative weight, so that nothing cancels. */
+    imp_spec bar = {0};
+    for (int c = 0; c < 3; c++) {
+        double xyz[3];
+        imp__rgb_to_xyz((double[3]){c == 0, c == 1, c == 2}, xyz);
+        for (int k = 0; k < 3; k++) bar[c] += lane[k] * xyz[k];
+    }
+    return bar;
+}
 double imp__kept_fold(const struct imp__check *c, imp_spec L)
 {
+    const imp_spec lane = imp__kept_fold_bar(c);
     double sum = 0;
     for (int k = 0; k < c->problem->scene->channels; k++) sum += lane[k] * L[k];
     return sum;
-}
-imp_spec imp__kept_fold_bar(const struct imp__check *c)
-{
-    return c->problem->scene->channels == 3 ? (imp_spec){lane[0], lane[1], lane[2], 0}
-                                            : (imp_spec){lane[0]};
 }
 
 void imp__kept_add(struct imp_sink *sink, int param, size_t element, int channels,
@@ -60,7 +69,7 @@ enum imp_status imp__kept_create(struct imp__kept *k)
     struct imp__kept_list list = {{.add = imp__kept_add},
                                   c->tracer.active,
                                   c->ctx,
-                                  c->problem->scene->channels,
+                                  c->problem->scene->lanes,
                                   NULL,
                                   0,
                                   0,

@@ -171,6 +171,10 @@ enum imp_status imp_problem_reverse(imp_problem *p, const float *seed_image,
     j.plan = imp__replicates_of(j.tracer.sensor, NULL, own.spp);
     if (imp__film_border(&j.tracer.sensor->film) > 0)
         IMP_TRY(splat_prepare(&j, &own, &splat));
+    /* The adjoint does not depend on the walks: those of a replicate may depend on each
+     * other, and replicates give the errors. */
+    if (own.wavelengths != IMP_WAVELENGTHS_INDEPENDENT) j.tracer.set = j.plan.n;
+    j.tracer.period = j.plan.n;
     IMP_TRY(imp__gradient_job_run(&j, &own, "gradient", 0, 1, imp__now()));
     IMP_TRY(imp__totals_share(p, &totals));
     IMP_TRY(imp__totals_again(p, &totals, &again));

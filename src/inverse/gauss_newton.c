@@ -97,9 +97,7 @@ static double replicate(const struct job *j, struct imp_tile_worker *tile,
         imp__walk_trace(&j->tracer, &tile->arena, x, y, sample, &walk);
         imp__tile_drop(tile, walk.dropped, x, y, sample);
         memset(w->x, 0, K * (size_t)j->channels * sizeof(double));
-        struct imp_lanes lanes = {
-            {imp__lanes_add, true}, j->tracer.active, j->channels, w->x};
-        imp__walk_sweep(&j->tracer, &walk, imp__lanes_adjoint(j->channels), &lanes.sink);
+        imp__lanes_sweep(&j->tracer, &walk, w->x);
         imp__arena_rewind(&tile->arena, mark);
         if (!quadratic) {
             memcpy(w->each_x + (size_t)i * width, w->x, width * sizeof(double));

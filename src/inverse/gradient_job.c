@@ -251,7 +251,7 @@ enum imp_status imp__gradient_job_run(struct imp__gradient_job *j,
     if (!j->tallies) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory"));
     for (int k = 0; k < ctx->threads; k++)
         IMP_TRY(imp__tally_create(ctx, j->want_gradient ? j->tracer.active : &j->nothing,
-                                  j->channels, &j->tallies[k]));
+                                  j->problem->scene->lanes, &j->tallies[k]));
     const struct imp_tiles_pass pass = {.stage = stage,
                                         .rate_unit = "walks",
                                         .units = walks,

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A sink that keeps the colour channels of a derivative apart: x[k][c] = dL_c / dx_k. By
- * the lane rule (kinds.h) channel c of a coloured parameter moves channel c of the
- * picture only, so one sweep with adjoint 1 yields the whole Jacobian of a walk. */
+ * A sink that keeps the channels of a derivative apart: x[k][c] = dL_c / dx_k. By the
+ * lane rule (kinds.h) lane c of a parameter's pieces moves lane c of a walk's values only,
+ * so one sweep with adjoint 1 in every lane yields the whole Jacobian of a walk. Lanes
+ * are channels, or wavelengths of which channels are sums. */
 #ifndef IMP_INVERSE_LANES_H
 #define IMP_INVERSE_LANES_H
 
@@ -11,8 +12,9 @@
 struct imp_lanes {
     struct imp_sink sink; /* first */
     const struct imp_active *active;
-    int lanes; /* 3 or 1 */
-    double *x; /* [active->n][lanes] */
+    const struct imp_walk *walk;
+    int channels; /* 3 or 1 */
+    double *x;    /* [active->n][channels] */
 };
 
 static inline void imp__lanes_add(struct imp_sink *sink, int param, size_t element,
@@ -21,14 +23,26 @@ static inline void imp__lanes_add(struct imp_sink *sink, int param, size_t eleme
     struct imp_lanes *s = (struct imp_lanes *)sink;
     const int64_t base = s->active->base[param];
     if (base < 0) return;
-    double *x = s->x + ((size_t)base + element) * (size_t)s->lanes;
-    for (int c = 0; c < s->lanes; c++) /* number c of a colour, channel c */
-        x[(channels == 3 ? c * s->lanes : 0) + c] += (*bar)[c];
+    double *x = s->x + ((size_t)base + element) * (size_t)s->channels;
+    if (imp_unlikely(s->walk->waves != NULL)) {
+        const imp_spec seen = imp__waves_channels(s->walk->waves, *bar);
+        for (int c = 0; c < s->channels; c++) x[c] += seen[c];
+        return;
+    }
+    for (int c = 0; c < s->channels; c++) /* number c of a colour, channel c */
+        x[(channels == 3 ? c * s->channels : 0) + c] += (*bar)[c];
 }
 
-static inline imp_spec imp__lanes_adjoint(int lanes)
+/* x [active->n][channels] += derivatives of the walk's channels. */
+static inline void imp__lanes_sweep(const struct imp_tracer *tracer,
+                                    const struct imp_walk *walk, double *x)
 {
-    return lanes == 3 ? (imp_spec){1, 1, 1, 0} : (imp_spec){1, 0, 0, 0};
+    struct imp_lanes lanes = {
+        {imp__lanes_add, true}, tracer->active, walk, tracer->scene->channels, x};
+    const int n = walk->waves ? walk->waves->carried.n : lanes.channels;
+    imp_spec one = {0};
+    for (int c = 0; c < n; c++) one[c] = 1;
+    imp__walk_sweep_values(tracer, walk, one, &lanes.sink);
 }
 
 /* A walk's radiance and its derivatives, value [1 + active][channels], as a sample of a
@@ -42,9 +56,7 @@ static inline void imp__lanes_sample(const struct imp_tracer *tracer,
     imp__sample_walk(s, tracer, &walk);
     for (size_t k = 0; k < n; k++) s->value[k] = 0;
     for (int c = 0; c < channels; c++) s->value[c] = walk.L[c];
-    struct imp_lanes lanes = {
-        {imp__lanes_add, true}, tracer->active, channels, s->value + channels};
-    imp__walk_sweep(tracer, &walk, imp__lanes_adjoint(channels), &lanes.sink);
+    imp__lanes_sweep(tracer, &walk, s->value + channels);
 }
 
 #endif

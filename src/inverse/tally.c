@@ -15,7 +15,7 @@ static void add_dense(struct imp_sink *sink, int param, size_t element, int chan
     double *batch = t->batch + base + element;
     if (channels == 3)
         for (int c = 0; c < 3; c++) batch[c] += (*bar)[c];
-    else batch[0] += t->lanes == 3 ? imp__sum3(*bar) : (*bar)[0];
+    else batch[0] += imp__sum_used(*bar, t->lanes);
 }
 
 /* Where key is, or would be (Fibonacci hashing; Knuth, vol. 3, 6.4). */
@@ -91,7 +91,7 @@ static void add_hashed(struct imp_sink *sink, int param, size_t element, int cha
         e->touched = true;
     }
     if (channels == 3) e->batch += *bar;
-    else e->batch[0] += t->lanes == 3 ? imp__sum3(*bar) : (*bar)[0];
+    else e->batch[0] += imp__sum_used(*bar, t->lanes);
 }
 
 enum imp_status imp__tally_create(imp_context *ctx, const struct imp_active *active,

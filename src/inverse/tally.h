@@ -28,7 +28,7 @@ struct imp_tally {
     struct imp_sink sink; /* first: the sweep gets a pointer to it */
     imp_context *ctx;
     const struct imp_active *active;
-    int lanes; /* 3 or 1 */
+    int lanes; /* of what sweeps bring: 1, 3 or 4 */
     bool dense, failed;
     /* dense: [n] each */
     double *batch, *sum, *square, *mean, *variance;

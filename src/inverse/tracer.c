@@ -75,5 +75,6 @@ enum imp_status imp__problem_tracer(const struct imp_problem *p,
                                .active = &p->active,
                                .seed = run->seed,
                                .guide = imp__guide_of(p->scene, integrator, run->guide)};
+    imp__tracer_waves(out, run, 0);
     return p->active.body ? imp__graded_survey(out) : IMP_OK;
 }

@@ -2,6 +2,7 @@
  *
  * Inputs of objects: constants, which become parameters, and textures. Names and tools
  * that all builders share stand first. */
+#include "color/convert.h"
 #include "color/rgb.h"
 #include "scene_build.h"
 
@@ -73,6 +74,8 @@ static enum imp_status add_bulk(const struct imp_build *b, const char *key, floa
     struct imp_scene *scene = b->scene;
     const struct imp_texture *t = b->node->object; /* set before build is called */
     struct imp_param p = {.store = IMP_STORE_BULK, .bulk = data};
+    if (imp__is_spectral(scene->mode) && n_dims > 0 && dims[n_dims - 1] == 3)
+        p.degree = IMP_DEGREE_OTHER; /* colours that are lifted to spectra */
     p.info.name = bulk_name(scene, t->name, key);
     if (!p.info.name) return imp__build_no_memory(scene);
     p.info.unit = "1";
@@ -156,29 +159,79 @@ out:
     return st;
 }
 
+/* A spectrum whose numbers are set. */
+struct spectrum_of {
+    struct imp_spectrum *spectrum;
+    struct imp_input *input;
+    enum imp_role role;
+};
+static void spectrum_changed(void *payload)
+{
+    const struct spectrum_of *s = payload;
+    imp__spectrum_update(s->spectrum);
+    imp__color_preview(s->spectrum, s->role, s->input->scalar, &s->input->value);
+}
+
+/* Coefficients of an index, which have no bounds of their own. */
+static bool formula(const struct imp_spectrum *s)
+{
+    return s && (s->form == IMP_SPECTRUM_SELLMEIER || s->form == IMP_SPECTRUM_CAUCHY);
+}
+
+static enum imp_degree degree_of(const struct imp_spectrum *s)
+{
+    if (!s || s->form == IMP_SPECTRUM_POINTS || s->form == IMP_SPECTRUM_NUMBER)
+        return IMP_DEGREE_LINEAR;
+    return s->form == IMP_SPECTRUM_COLOR && s->emission ? IMP_DEGREE_FIRST
+                                                        : IMP_DEGREE_OTHER;
+}
+
+/* color: what it was made of; its numbers live in the input, or in its spectrum. */
 static enum imp_status param_add(struct imp_scene *scene, const char *name,
-                                 const char *key, const struct imp_input_desc *d,
-                                 struct imp_input *in, int count)
+                                 const struct imp_input_desc *d,
+                                 const struct imp__color *color, struct imp_input *in)
 {
     char path[512];
-    snprintf(path, sizeof path, "%s.%s", d->name, key);
-    struct imp_param p = {.store = IMP_STORE_LANES, .lanes = &in->value};
+    struct imp_spectrum *spectrum = color->spectrum;
+    const bool points = spectrum && spectrum->form == IMP_SPECTRUM_POINTS;
+    const size_t count = spectrum ? spectrum->n : (size_t)color->count;
+    snprintf(path, sizeof path, "%s.%s", d->name, points ? "values" : color->key);
+    struct imp_param p = {
+        .degree = degree_of(spectrum), .store = IMP_STORE_LANES, .lanes = &in->value};
+    if (spectrum) {
+        p.store = IMP_STORE_DOUBLES;
+        p.doubles = spectrum->own;
+        p.info.wavelengths_nm = spectrum->nm;
+    }
     p.info.name = imp__build_name(scene, name, path);
     if (!p.info.name) return imp__build_no_memory(scene);
-    in->count = count;
     p.info.unit = d->unit ? d->unit : "1";
     p.info.n_dims = count > 1;
-    p.info.dims[0] = (size_t)count;
+    p.info.dims[0] = count;
     const bool unbounded = d->lo == 0 && d->hi == 0;
     p.info.lo = d->lo;
     p.info.hi = unbounded ? INFINITY : d->hi;
-    for (int k = 0; k < count && d->flags & IMP_INPUT_SOFT; k++)
-        if (in->value[k] > d->hi) p.info.hi = INFINITY;
+    for (size_t k = 0; k < count && d->flags & IMP_INPUT_SOFT; k++)
+        if (imp__param_get(&p, k) > d->hi) p.info.hi = INFINITY;
+    if (spectrum && spectrum->form == IMP_SPECTRUM_BLACKBODY) {
+        p.info.unit = "K";
+        p.info.lo = 1;
+        p.info.hi = INFINITY;
+    }
+    if (formula(spectrum)) {
+        p.info.lo = -INFINITY;
+        p.info.hi = INFINITY;
+    }
     if (!(d->flags & IMP_INPUT_FIXED)) p.info.flags |= IMP_PARAM_DIFFERENTIABLE;
     if (d->flags & (IMP_INPUT_EDGES | IMP_INPUT_FIXED))
         p.info.flags |= IMP_PARAM_DISCONTINUOUS;
-    if (count > 1) p.info.flags |= IMP_PARAM_COLOR;
-    return imp__theta_add(scene, &p, &in->param);
+    if (count > 1 && !points) p.info.flags |= IMP_PARAM_COLOR;
+    const enum imp_status st = imp__theta_add(scene, &p, &in->param);
+    if (st != IMP_OK || !spectrum) return st;
+    struct spectrum_of *of = imp__arena_array(&scene->arena, 1, sizeof *of);
+    if (!of) return imp__build_no_memory(scene);
+    *of = (struct spectrum_of){spectrum, in, d->role};
+    return imp__theta_watch(scene, in->param, spectrum_changed, of);
 }
 
 /* Texels that stand for an input stay within its bounds, if they are there to begin with:
@@ -242,8 +295,14 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
     const bool scalar = d->flags & IMP_INPUT_SCALAR;
     struct imp_prop *prop = imp__node_prop(node, d->name);
     struct imp_child *child = imp__node_child(node, d->name);
-    const char *key = "value";
-    int count = 1;
+    struct imp__color color = {.count = 1};
+    bool absent_here = false;
+    const struct imp__color_ask ask = {.ctx = ctx,
+                                       .arena = &scene->arena,
+                                       .mode = scene->mode,
+                                       .role = d->role,
+                                       .scalar = scalar,
+                                       .any_size = d->flags & IMP_INPUT_EXTINCTION};
     imp__node_ask(node, d->name);
     *in = (struct imp_input){.param = -1, .scalar = scalar};
     if (d->flags & IMP_INPUT_LUMINANCE) {
@@ -253,13 +312,10 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
 
     if (prop) {
         prop->used = true;
-        IMP_TRY(imp__color_convert(ctx, node, prop, d->role, scalar, scene->mode,
-                                   &in->value, &count, &scene->arena, &in->spectrum));
+        IMP_TRY(imp__color_convert(&ask, node, prop, &color));
     } else if (child && imp__color_is_object(child->node)) {
         child->used = true;
-        IMP_TRY(imp__color_object(ctx, child->node, d->role, scalar, scene->mode,
-                                  &in->value, &count, &key, &scene->arena,
-                                  &in->spectrum));
+        IMP_TRY(imp__color_object(&ask, child->node, &color));
     } else if (child) {
         struct imp_texture *t;
         child->used = true;
@@ -283,21 +339,28 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
         IMP_TRY(
             imp__node_error(ctx, node, IMP_E_SCENE, "property '%s' is missing", d->name));
     } else {
-        imp__color_default(d->fallback, scalar ? IMP_REFLECTANCE : d->role, scene->mode,
-                           &in->value, &count);
-        in->count = count;
-        if (d->flags & IMP_INPUT_OPTIONAL) return IMP_OK;
+        struct imp__color_ask absent = ask;
+        if (scalar) absent.role = IMP_REFLECTANCE;
+        IMP_TRY(imp__color_default(&absent, d->fallback, &color));
+        absent_here = d->flags & IMP_INPUT_OPTIONAL;
     }
-    in->count = count;
-    for (int k = 0; k < count; k++) {
+    in->value = color.value;
+    in->count = color.count;
+    in->spectrum = color.spectrum;
+    if (absent_here) return IMP_OK;
+    const size_t n_numbers = formula(color.spectrum) ? 0
+                             : color.spectrum        ? color.spectrum->n
+                                                     : (size_t)color.count;
+    for (size_t k = 0; k < n_numbers; k++) {
         const bool unbounded = (d->lo == 0 && d->hi == 0) || d->flags & IMP_INPUT_SOFT;
-        const double v = in->value[k], hi = unbounded ? INFINITY : d->hi;
+        const double v = color.spectrum ? color.spectrum->value[k] : in->value[k];
+        const double hi = unbounded ? INFINITY : d->hi;
         if (!isfinite(v) || v < d->lo || v > hi)
             IMP_TRY(imp__prop_error(ctx, node, prop, IMP_E_SCENE,
                                     "%s = %g is outside [%g, %g]", d->name, v, d->lo,
                                     hi));
     }
-    IMP_TRY(param_add(scene, name, key, d, in, count));
+    IMP_TRY(param_add(scene, name, d, &color, in));
     if (prop) prop->theta = true;
     else if (child) child->theta = true;
 out:
@@ -326,4 +389,12 @@ enum imp_status imp__build_inputs(struct imp_scene *scene, struct imp_node *node
     *n = count;
 out:
     return st;
+}
+
+bool imp__build_shaped(const struct imp_scene *scene,
+                       const struct imp_input *const *input, int n)
+{
+    bool any = false;
+    for (int j = 0; j < n; j++) any |= input[j]->scalar && input[j]->spectrum;
+    return any && scene->mode == IMP_SPECTRAL;
 }

@@ -115,6 +115,7 @@ static enum imp_status scatterers_make(struct imp_scene *scene, struct imp_mediu
                                           (k == 0 && m->emits ? IMP_BSDF_EMIT : 0u),
                                  .n_in = m->n_in,
                                  .input = m->input,
+                                 .shaped = imp__build_shaped(scene, m->input, m->n_in),
                                  .index_input = -1,
                                  .index = k ? -1 : scene->n_bsdfs,
                                  .name = m->name};

@@ -84,6 +84,7 @@ enum imp_status imp__build_bsdf(struct imp_scene *scene, struct imp_node *node,
             memcpy(b->input + b->child_in[k], b->child[k]->input,
                    (size_t)b->child[k]->n_in * sizeof *b->input);
 
+    b->shaped = imp__build_shaped(scene, b->input, b->n_in);
     b->index_input = -1;
     for (int j = 0; j < b->n_own; j++)
         if (ops->inputs[j].flags & IMP_INPUT_INDEX) b->index_input = j;
@@ -178,6 +179,7 @@ enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *nod
     if (!input) IMP_TRY(imp__build_no_memory(scene));
     IMP_TRY(imp__build_inputs(scene, node, e->name, ops->inputs, input, &e->n_in));
     e->input = input;
+    e->shaped = imp__build_shaped(scene, e->input, e->n_in);
     IMP_TRY(imp__props_float(ctx, node, "sampling_weight", 1, &e->weight));
     if (e->weight < 0)
         IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "sampling_weight is negative"));

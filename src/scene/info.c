@@ -15,7 +15,7 @@ enum imp_status imp_scene_get_info(const imp_scene *scene, struct imp_scene_info
     info->n_textures = scene->n_textures;
     info->n_sensors = scene->n_sensors;
     info->mode = scene->mode;
-    info->channels = scene->mode == IMP_MONO ? 1 : 3;
+    info->channels = scene->channels;
     info->integrator = scene->integrator ? scene->integrator->ops->name : "";
     info->max_depth = scene->integrator ? scene->integrator->max_depth : -1;
     for (int s = 0; s < scene->n_shapes; s++)

@@ -16,6 +16,7 @@ enum imp_status imp__scene_new(imp_context *ctx, enum imp_color_mode mode,
     pthread_mutex_unlock(&ctx->lock);
     scene->mode = mode;
     scene->channels = mode == IMP_MONO ? 1 : 3;
+    scene->lanes = imp__is_spectral(mode) ? 4 : scene->channels;
     scene->environment = -1;
     imp__arena_init(&scene->arena, ctx);
     imp__arena_init(&scene->files, ctx);

@@ -8,6 +8,8 @@
 
 #include "access.h"
 #include "aims.h"
+#include "color/convert.h"
+#include "color/wavelength.h"
 #include "integrator.h"
 #include "math/vec.h"
 
@@ -25,8 +27,16 @@ struct imp_watch { /* one of the listeners of a parameter */
     struct imp_listener *listener;
 };
 
+/* How the values of an input depend on its numbers. */
+enum imp_degree {
+    IMP_DEGREE_LINEAR,
+    IMP_DEGREE_FIRST, /* k times the numbers give k times the value */
+    IMP_DEGREE_OTHER
+};
+
 struct imp_param {
     struct imp_param_info info;
+    enum imp_degree degree;
     struct imp_watch *watches;
     enum imp_param_store store;
     imp_spec *lanes; /* LANES: info.count numbers in lanes 0.., a scalar in all of them */
@@ -35,6 +45,9 @@ struct imp_param {
     bool probed;     /* an extinction depends on it: its derivative has side walks, and is
                         not that of a frozen walk (walk/probe.c) */
 };
+
+/* Ways of drawing wavelengths that a sensor has. */
+enum { IMP_WAVES_UNIFORM, IMP_WAVES_IMPORTANCE, IMP_WAVES_DRAWN };
 
 /* A graded index inside shapes. What it is, and how rays step through it, is known to
  * `curved` alone; its numbers are parameters like all others. */
@@ -71,7 +84,10 @@ struct imp_scene {
     imp_context *ctx;
     struct imp_arena arena; /* nodes, objects, names */
     enum imp_color_mode mode;
-    int channels; /* 3 or 1 */
+    int channels; /* of a walk's radiance: 3 or 1 */
+    int lanes;    /* of its values: 4 wavelengths, else as many as channels */
+    const struct imp_wavelengths *wavelengths; /* [n_sensors][IMP_WAVES_DRAWN]; NULL:
+                                                  colours */
     bool committed;
 
     struct imp_node *root;   /* being built, or what the objects came from */
@@ -141,6 +157,10 @@ enum imp_status imp__integrator_build(struct imp_scene *scene, struct imp_node *
 /* When all objects are there: of an integrator and those in it. */
 enum imp_status imp__integrator_ready(struct imp_scene *scene,
                                       const struct imp_integrator *i);
+
+/* ---- scene_waves.c ------------------------------------------------------------- */
+/* scene->wavelengths, when sensors and lights are there. */
+enum imp_status imp__waves_build(struct imp_scene *scene);
 
 /* ---- bodies.c ------------------------------------------------------------------- */
 /* The medium of a shape: its numbers become parameters where it is met first. */

@@ -103,6 +103,7 @@ enum imp_status imp__scene_build(struct imp_scene *scene,
     enum imp_status st = IMP_OK;
     struct tag_counts counts = {0};
     scene->channels = scene->mode == IMP_MONO ? 1 : 3;
+    scene->lanes = imp__is_spectral(scene->mode) ? 4 : scene->channels;
     scene->environment = -1;
     scene->lo = imp__v3(INFINITY, INFINITY, INFINITY);
     scene->hi = -scene->lo;
@@ -117,6 +118,7 @@ enum imp_status imp__scene_build(struct imp_scene *scene,
     IMP_TRY(imp__aims_build(scene));
     IMP_TRY(imp__mixing_materials(scene));
     if (scene->integrator) IMP_TRY(imp__integrator_ready(scene, scene->integrator));
+    IMP_TRY(imp__waves_build(scene));
     IMP_TRY(imp__bodies_check(scene));
     IMP_TRY(imp__media_check(scene));
     imp__theta_finish(scene);

@@ -27,6 +27,9 @@ struct imp_build imp__build_make(struct imp_scene *scene, struct imp_node *node)
 enum imp_status imp__build_inputs(struct imp_scene *scene, struct imp_node *node,
                                   const char *name, const struct imp_input_desc *desc,
                                   const struct imp_input **out, int *n);
+/* Does a scalar input differ between the lanes of walks? */
+bool imp__build_shaped(const struct imp_scene *scene,
+                       const struct imp_input *const *input, int n);
 /* Call `changed` when a number behind these inputs is set: a constant's, or a texel. */
 enum imp_status imp__build_watch(struct imp_scene *scene,
                                  const struct imp_input *const *input, int n,

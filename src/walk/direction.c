@@ -139,6 +139,16 @@ static bool aim_draw(const struct imp_step *s, int group, const double u[3], imp
     return true;
 }
 
+/* As the lane that draws would. */
+static bool kernel_draw(const struct imp_step *s, const struct imp_bsdf *b,
+                        const double u[3], struct imp_dirs *dirs)
+{
+    imp_spec own[IMP_INPUTS_MAX];
+    if (imp_likely(!b->shaped)) return b->ops->sample(b, s->in, u, dirs);
+    imp__shaped_inputs(b, s->in, imp__waves_drew(s->at.carried), own);
+    return b->ops->sample(b, own, u, dirs);
+}
+
 /* A direction from member k; u[0] is uniform again. False: none. */
 static bool member_draw(const struct imp_step *s, int k, const struct imp_bsdf *b,
                         const struct imp_frame *frame, const double u[3],
@@ -165,7 +175,7 @@ static bool member_draw(const struct imp_step *s, int k, const struct imp_bsdf *
         if (!s->mixed.sphere) dirs->wi[2] = copysign(dirs->wi[2], dirs->wo[2]);
         return true;
     case IMP_DENSITY_KERNEL:
-    case IMP_DENSITIES: return b->ops->sample(b, s->in, u, dirs);
+    case IMP_DENSITIES: return kernel_draw(s, b, u, dirs);
     }
     dirs->wi = imp__to_local(frame, w);
     return true;
@@ -176,6 +186,7 @@ bool imp__mixture_draw(const struct imp_step *s, const struct imp_bsdf *b,
                        struct imp_dirs *dirs, int *drawn)
 {
     const struct imp_mixed *m = &s->mixed;
+    if (!m->here) return kernel_draw(s, b, u, dirs);
     if (m->only >= 0) {
         *drawn = m->only;
         return member_draw(s, m->only, b, frame, u, dirs);

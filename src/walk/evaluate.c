@@ -40,7 +40,7 @@ static void vertex_values(const struct imp_tracer *tracer, const struct imp_vert
         const struct imp_emission to = imp__light_emission(&d->light);
         struct imp_dirs dirs = imp__light_dirs(v);
         dirs.wo = p->dirs.wo;
-        b->ops->eval(b, in, &dirs, &x->light_f);
+        imp__bsdf_eval(b, v->carried, in, &dirs, &x->light_f);
         x->light_e = imp__emitter_radiance(scene, d->light.emitter, &to,
                                            imp__decided_v3(d->light.p), v->carried);
         x->light_w = imp__spec(d->light.weight);
@@ -49,7 +49,7 @@ static void vertex_values(const struct imp_tracer *tracer, const struct imp_vert
         x->b = x->light_f * x->light_e * x->light_w;
     }
     x->f = imp__spec(1);
-    if (b && d->goes_on) b->ops->eval(b, in, &p->dirs, &x->f);
+    if (b && d->goes_on) imp__bsdf_eval(b, v->carried, in, &p->dirs, &x->f);
 }
 
 /* T of the segment that follows. */
@@ -84,7 +84,7 @@ void imp__walk_evaluate(const struct imp_tracer *tracer, struct imp_walk *walk)
     }
 }
 
-imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk *walk)
+static imp_spec frozen(const struct imp_tracer *tracer, const struct imp_walk *walk)
 {
     imp_spec P = imp__spec(1), L = {0}, in[IMP_INPUTS_MAX];
     const imp_spec *entry = walk->entry;
@@ -103,7 +103,7 @@ imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk
         const imp_spec own = x.e + x.b;
         L += P * (entry ? own * *entry++ : own);
         for (const struct imp_side *s = v->side; s; s = s->next)
-            L += P * imp__walk_frozen(tracer, &s->walk);
+            L += P * frozen(tracer, &s->walk);
         if (imp_likely(!v->on)) {
             P *= x.f * v->scale;
         } else {
@@ -113,4 +113,9 @@ imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk
         }
     }
     return L;
+}
+
+imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk *walk)
+{
+    return imp__walk_channels(walk, frozen(tracer, walk));
 }

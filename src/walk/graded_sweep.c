@@ -262,7 +262,7 @@ void imp__graded_sweep(const struct imp_tracer *tracer, const struct imp_walk *w
                        imp_spec adjoint, struct imp_sink *sink)
 {
     if (!tracer->active->body) return;
-    const int lanes = tracer->scene->channels;
+    const int lanes = tracer->scene->lanes;
     imp_spec P = adjoint;
     bool any = false;
     for (const struct imp_vertex *v = walk->first; v; v = v->next) {

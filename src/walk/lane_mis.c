@@ -9,11 +9,7 @@ int imp__lane_mis_count(const struct imp_step *s)
 int imp__lane_mis_drew(struct imp_step *s)
 {
     struct imp_lane_mis *l = &s->lanes;
-    if (l->drew < 0) {
-        const int n = imp__lane_mis_count(s);
-        const double u = imp__u01(s->walk->key, imp__dim_start(IMP_DIM_LANE));
-        l->drew = imp_min((int)(u * n), n - 1);
-    }
+    if (l->drew < 0) l->drew = imp__lane_drawn(s->walk->key, imp__lane_mis_count(s));
     return l->drew;
 }
 
@@ -28,4 +24,13 @@ double imp__lane_mis_decide(struct imp_step *s, imp_spec p)
     const double before = l->weight;
     l->weight = n / sum;
     return imp__decide1(l->weight / (before * p[drew]));
+}
+
+double imp__lane_mis_density(const struct imp_step *s, imp_spec p)
+{
+    const struct imp_lane_mis *l = &s->lanes;
+    const int n = imp__lane_mis_count(s);
+    double sum = 0;
+    for (int j = 0; j < n; j++) sum += l->ratio[j] * p[j];
+    return sum * l->weight / n;
 }

@@ -15,6 +15,8 @@
 #ifndef IMP_WALK_LANE_MIS_H
 #define IMP_WALK_LANE_MIS_H
 
+#include "dims.h"
+#include "math/rng.h"
 #include <importon/kinds.h>
 
 struct imp_step;
@@ -27,6 +29,12 @@ struct imp_lane_mis {
 #define IMP_LANE_MIS_INIT                                                                \
     (struct imp_lane_mis) { .ratio = {1, 1, 1, 1}, .weight = 1, .drew = -1 }
 
+/* The lane of n that draws in the walk of this key. */
+static inline int imp__lane_drawn(struct imp_key key, int n)
+{
+    const int lane = (int)(imp__u01(key, imp__dim_start(IMP_DIM_LANE)) * n);
+    return lane < n ? lane : n - 1;
+}
 /* Lanes that have numbers of their own. */
 int imp__lane_mis_count(const struct imp_step *s);
 /* The lane that draws. */
@@ -34,5 +42,8 @@ int imp__lane_mis_drew(struct imp_step *s);
 /* A decision was drawn that has density p[j] for lane j; p of the lane that drew is not
  * 0. Returns W'/(W p_drew), as decided: the factor of all that follows. */
 double imp__lane_mis_decide(struct imp_step *s, imp_spec p);
+/* Density of a decision that was not drawn: the mean of p over the lanes, weighted by the
+ * densities of the walk so far. */
+double imp__lane_mis_density(const struct imp_step *s, imp_spec p);
 
 #endif

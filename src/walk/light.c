@@ -87,6 +87,30 @@ static inline void record(struct imp_vertex *v, int emitter, double weight, imp_
     v->d.connection = IMP_OCCLUDED; /* until it is seen */
 }
 
+/* Density with which the continuation would be drawn along w; 0: structurally zero. f:
+ * the value. */
+static inline double continuation_pdf(const struct imp_step *s, const struct imp_bsdf *b,
+                                      const struct imp_dirs *dirs, imp_v3 w, imp_spec *f)
+{
+    double competing;
+    if (imp_likely(!b->shaped)) {
+        const double kernel = imp__bsdf_pdf_eval(b, s->in, dirs, f);
+        if (!(kernel > 0)) return 0;
+        imp__direction_pdf(s, kernel, w, -1, IMP_SMOOTH, &competing);
+        return competing;
+    }
+    imp_spec p;
+    imp__shaped_pdf(b, s->at.carried, s->in, dirs, &p);
+    imp__shaped_eval(b, s->at.carried, s->in, dirs, f);
+    if (!(imp__lane_mis_density(s, p) > 0)) return 0;
+    for (int j = 0; j < s->at.carried->n; j++) {
+        imp__direction_pdf(s, p[j], w, -1, IMP_SMOOTH, &competing);
+        p[j] = competing;
+    }
+    return s->mixed.splits ? p[imp__waves_drew(s->at.carried)]
+                           : imp__lane_mis_density(s, p);
+}
+
 void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
                        const struct imp_surface *at, const struct imp_frame *frame,
                        struct imp_shadow *shadow)
@@ -115,10 +139,8 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
     const struct imp_dirs dirs = {s->wo, imp__decide(imp__to_local(frame, ls.wi)),
                                   IMP_SMOOTH};
     imp_spec f;
-    const double kernel = imp__bsdf_pdf_eval(b, s->in, &dirs, &f);
-    if (!(kernel > 0)) return; /* structurally zero: nothing to see, no derivative */
-    double pdf;
-    imp__direction_pdf(s, kernel, ls.wi, -1, IMP_SMOOTH, &pdf);
+    const double pdf = continuation_pdf(s, b, &dirs, ls.wi, &f);
+    if (!(pdf > 0)) return; /* structurally zero: nothing to see, no derivative */
     const double p = ls.pdf * pmf;
     const bool alone =
         (e->ops->flags & IMP_EMITTER_DELTA) || !s->tracer->integrator->directions;

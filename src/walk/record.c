@@ -7,7 +7,7 @@
 #include <string.h>
 
 _Static_assert(sizeof(struct imp_decision) <= 160, "a kept vertex");
-_Static_assert(sizeof(struct imp_record_walk) == 48, "no padding: it is written");
+_Static_assert(sizeof(struct imp_record_walk) == 56, "no padding: it is written");
 _Static_assert(IMP_WALK_MAX <= UINT16_MAX, "imp_record_walk.n");
 
 /* ---- Making ---------------------------------------------------------------------- */
@@ -19,10 +19,8 @@ static struct imp_record_of made_with(const struct imp_tracer *t)
         imp__walk_integrator_hash(t->integrator), imp__fingerprint_rays(t->scene)};
     for (int m = 0; m < t->scene->n_bodies; m++)
         of.rays = imp__graded_hash(of.rays, t->scene->bodies[m]);
-    if (t->carried) {
-        of.integrator = imp__hash(of.integrator, &t->carried->n, sizeof t->carried->n);
-        of.integrator = imp__hash(of.integrator, t->carried->nm, sizeof t->carried->nm);
-    }
+    if (t->wavelengths)
+        of.integrator = imp__wavelengths_hash(of.integrator, t->wavelengths);
     return of;
 }
 
@@ -149,6 +147,7 @@ enum imp_status imp__record_keep(struct imp_record *r, const struct imp_walk *wa
     r->walks[r->n_walks / IMP_RECORD_PAGE][r->n_walks % IMP_RECORD_PAGE] =
         (struct imp_record_walk){.px = walk->px,
                                  .py = walk->py,
+                                 .wave = walk->wave,
                                  .key = walk->key,
                                  .sample = sample,
                                  .first = r->n_vertices,
@@ -189,7 +188,6 @@ enum imp_status imp__record_check(const struct imp_record *r,
 }
 
 static struct imp_vertex *vertex_add(const struct imp_scene *scene,
-                                     const struct imp_carried *carried,
                                      struct imp_arena *arena, struct imp_walk *walk,
                                      const struct imp_decision *d)
 {
@@ -207,7 +205,7 @@ static struct imp_vertex *vertex_add(const struct imp_scene *scene,
     v->bsdf = bsdf;
     v->shape = shape;
     v->side = NULL;
-    v->carried = carried;
+    v->carried = walk->waves ? &walk->waves->carried : NULL;
     v->t = 0;
     v->ng = (imp_v3){0};
     v->segment = &imp__straight;
@@ -229,8 +227,9 @@ void imp__record_walk(const struct imp_record *r, size_t i,
                               .valid = k->valid,
                               .absorbed = k->absorbed,
                               .dropped = (enum imp_drop)k->dropped};
+    if (tracer->wavelengths && !imp__walk_wave(tracer, arena, k->wave, walk)) return;
     for (uint64_t j = k->first; j < k->first + k->n; j++)
-        if (!vertex_add(tracer->scene, tracer->carried, arena, walk,
+        if (!vertex_add(tracer->scene, arena, walk,
                         &r->vertices[j / IMP_RECORD_PAGE][j % IMP_RECORD_PAGE])) {
             walk->dropped = IMP_DROP_MEMORY;
             return;

@@ -14,6 +14,7 @@
 
 struct imp_record_walk {
     double px, py; /* film position */
+    double wave;   /* number from which its wavelengths were drawn; 0: it has none */
     struct imp_key key;
     int64_t sample;
     uint64_t first; /* vertex, of all in the record */

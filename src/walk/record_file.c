@@ -12,7 +12,7 @@
 
 #define MAGIC      "impwalks"
 #define BYTE_ORDER 0x01020304u
-#define VERSION    1
+#define VERSION    2
 
 struct head {
     char magic[8];
@@ -130,7 +130,8 @@ static bool walk_fits(const struct imp_scene *scene, const struct imp_record *r,
     const bool counts = w->valid == 1 && w->dropped == IMP_DROP_NONE;
     if (w->first != first || w->n > IMP_WALK_MAX || w->n > r->n_vertices - first ||
         w->valid > 1 || w->absorbed > 1 || w->dropped >= IMP_DROP_CAUSES ||
-        (w->n > 0 && !counts) || !isfinite(w->px) || !isfinite(w->py))
+        (w->n > 0 && !counts) || !isfinite(w->px) || !isfinite(w->py) ||
+        !(w->wave >= 0 && w->wave < 1))
         return false;
     for (uint64_t k = first; k < first + w->n; k++)
         if (!vertex_fits(scene, &r->vertices[k / IMP_RECORD_PAGE][k % IMP_RECORD_PAGE],

@@ -15,6 +15,12 @@ enum imp_status imp__run_take(imp_context *ctx, const char *function,
     if (!(r.drop_budget >= 0 && r.drop_budget <= 1))
         return imp__error(ctx, IMP_E_ARG, "%s: run->drop_budget %g is outside [0, 1]",
                           function, r.drop_budget);
+    if ((int)r.wavelengths < 0 || r.wavelengths > IMP_WAVELENGTHS_IMPORTANCE)
+        return imp__error(ctx, IMP_E_ARG, "%s: run->wavelengths %d is not known",
+                          function, (int)r.wavelengths);
+    if (r.wavelength_set < 0)
+        return imp__error(ctx, IMP_E_ARG, "%s: run->wavelength_set %d is negative",
+                          function, r.wavelength_set);
     *own = r;
     return IMP_OK;
 }

@@ -67,6 +67,31 @@ static bool roulette(struct imp_step *s, const struct imp_bsdf *b, imp_spec fact
     return imp__u01(s->walk->key, imp__dim(s->depth, IMP_DIM_SURVIVE)) < *survive;
 }
 
+/* Density of the direction as drawn, in all lanes together where they differ. 0: the walk
+ * ends. *competing as of imp__mixture_pdf; f: the value. Where a vertex splits, the members' MIS weights
+ * are those of the lane that drew, which add up to 1 for every lane. */
+static double density(struct imp_step *s, const struct imp_bsdf *b,
+                      const struct imp_dirs *dirs, imp_v3 w, int drawn, double *competing,
+                      imp_spec *f)
+{
+    if (imp_likely(!b->shaped)) {
+        const double kernel = imp__bsdf_pdf_eval(b, s->in, dirs, f);
+        if (!(kernel > 0)) return 0;
+        return imp__direction_pdf(s, kernel, w, drawn, dirs->lobe, competing);
+    }
+    imp_spec p;
+    imp__shaped_pdf(b, s->at.carried, s->in, dirs, &p);
+    imp__shaped_eval(b, s->at.carried, s->in, dirs, f);
+    if (!(imp__max_used(p, true) > 0)) return 0;
+    const int drew = imp__lane_mis_drew(s);
+    if (s->mixed.here && s->mixed.splits)
+        return imp__direction_pdf(s, p[drew], w, drawn, dirs->lobe, competing);
+    for (int j = 0; j < s->at.carried->n; j++)
+        p[j] = imp__direction_pdf(s, p[j], w, drawn, dirs->lobe, competing);
+    if (!(p[drew] > 0)) return 0;
+    return *competing = 1 / imp__lane_mis_decide(s, p);
+}
+
 bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_surface *at,
                   const struct imp_frame *frame)
 {
@@ -84,18 +109,18 @@ bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_sur
     dirs.wo = s->wo;
     dirs.wi = imp__decide(dirs.wi);
     imp_spec f;
-    const double kernel = imp__bsdf_pdf_eval(b, s->in, &dirs, &f);
-    if (!(kernel > 0)) return false; /* structurally zero */
     double competing;
-    const double pdf =
-        imp__decide1(imp__direction_pdf(s, kernel, w, drawn, dirs.lobe, &competing));
-    if (!(pdf > 0)) return false;
+    const double pdf = imp__decide1(density(s, b, &dirs, w, drawn, &competing, &f));
+    if (!(pdf > 0)) return false; /* structurally zero */
 
     /* Does the walk go on? */
     double survive = 1;
     if (imp_unlikely(s->guided.guide != NULL)) s->guided.before = s->beta;
     if (!throughput_add(s, b, f * (1 / pdf))) return false;
-    if (b->ops->index_ratio) s->eta *= b->ops->index_ratio(b, s->in, &dirs);
+    if (b->ops->index_ratio)
+        s->eta *= imp_likely(!b->shaped)
+                      ? b->ops->index_ratio(b, s->in, &dirs)
+                      : imp__shaped_index_ratio(b, s->at.carried, s->in, &dirs);
     if (!roulette(s, b, f * (1 / pdf), &survive)) return false;
     s->beta *= imp__spec(1 / survive);
     imp__step_weigh(v, f, pdf, survive);

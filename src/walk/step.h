@@ -9,6 +9,7 @@
 #include "dims.h"
 #include "lane_mis.h"
 #include "segment.h"
+#include "shaped.h"
 
 /* What a guide knows of the walk (guided.c). */
 struct imp_guided {
@@ -193,8 +194,9 @@ static inline bool imp__direction_draw(const struct imp_step *s, const struct im
                                        struct imp_dirs *dirs, int *drawn)
 {
     *drawn = IMP_DENSITY_KERNEL;
-    return imp_unlikely(s->mixed.here) ? imp__mixture_draw(s, b, frame, u, dirs, drawn)
-                                       : b->ops->sample(b, s->in, u, dirs);
+    return imp_unlikely(s->mixed.here || b->shaped)
+               ? imp__mixture_draw(s, b, frame, u, dirs, drawn)
+               : b->ops->sample(b, s->in, u, dirs);
 }
 static inline double imp__direction_pdf(const struct imp_step *s, double kernel, imp_v3 w,
                                         int drawn, int lobe, double *competing)

@@ -64,7 +64,8 @@ static void emitter_d(const struct imp_emitter *e, const struct imp_active *acti
 {
     imp_spec in[IMP_INPUTS_MAX];
     imp__inputs_eval(e->input, e->n_in, at, in);
-    e->ops->eval_d(e, in, x, d);
+    if (imp_likely(!e->shaped)) e->ops->eval_d(e, in, x, d);
+    else imp__shaped_light_d(e, at->carried, in, x, d);
     if (imp_unlikely(e->ops->place_d != NULL)) lookup_d(e, active, x, at, d);
 }
 
@@ -73,7 +74,7 @@ static void step_d(const struct imp_tracer *tracer, const struct imp_walk *walk,
                    const struct imp_vertex *v, int depth, imp_spec *d)
 {
     const struct imp_dirs dirs = imp__vertex_dirs(v);
-    v->bsdf->ops->eval_d(v->bsdf, v->in, &dirs, d);
+    imp__bsdf_eval_d(v->bsdf, v->carried, v->in, &dirs, d);
     for (int j = 0; j < v->bsdf->n_in; j++) d[j] *= v->scale;
     if (tracer->integrator->alpha_gradient != IMP_ALPHA_DETACHED)
         imp__attached_d(walk, v, depth, d);
@@ -83,7 +84,7 @@ static void step_d(const struct imp_tracer *tracer, const struct imp_walk *walk,
 static void light_d(const struct imp_vertex *v, imp_spec *d)
 {
     const struct imp_dirs dirs = imp__light_dirs(v);
-    v->bsdf->ops->eval_d(v->bsdf, v->in, &dirs, d);
+    imp__bsdf_eval_d(v->bsdf, v->carried, v->in, &dirs, d);
     for (int j = 0; j < v->bsdf->n_in; j++) d[j] *= v->light_e * v->light_w;
 }
 
@@ -125,7 +126,7 @@ static imp_spec weight_before(const struct imp_vertex *v)
     imp_spec f = imp__spec(1);
     if (v->bsdf) {
         const struct imp_dirs dirs = imp__vertex_dirs(v);
-        v->bsdf->ops->eval(v->bsdf, v->in, &dirs, &f);
+        imp__bsdf_eval(v->bsdf, v->carried, v->in, &dirs, &f);
     }
     return f * scale;
 }
@@ -200,8 +201,8 @@ static void emitter_scatter(const struct imp_tracer *tracer, int emitter,
     imp__inputs_scatter(e->input, e->n_in, &at, d, sink);
 }
 
-void imp__walk_sweep(const struct imp_tracer *tracer, const struct imp_walk *walk,
-                     imp_spec adjoint, struct imp_sink *sink)
+void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_walk *walk,
+                            imp_spec adjoint, struct imp_sink *sink)
 {
     const struct imp_active *active = tracer->active;
     if (walk->dropped || !walk->valid) return;
@@ -213,7 +214,7 @@ void imp__walk_sweep(const struct imp_tracer *tracer, const struct imp_walk *wal
         const imp_spec own =
             imp_likely(!walk->entry) ? P : P * walk->entry[depth - walk->depth];
         for (const struct imp_side *s = v->side; s; s = s->next)
-            imp__walk_sweep(tracer, &s->walk, P, sink);
+            imp__walk_sweep_values(tracer, &s->walk, P, sink);
         const struct imp_met *met = &v->d.met;
         const struct imp_light *light = &v->d.light;
         const bool connected = v->d.connection == IMP_CONNECTED;
@@ -257,6 +258,12 @@ void imp__walk_sweep(const struct imp_tracer *tracer, const struct imp_walk *wal
     if (walk->moving) walk->moving->sweep(tracer, walk, adjoint, sink);
 }
 
+void imp__walk_sweep(const struct imp_tracer *tracer, const struct imp_walk *walk,
+                     imp_spec adjoint, struct imp_sink *sink)
+{
+    imp__walk_sweep_values(tracer, walk, imp__walk_values(walk, adjoint), sink);
+}
+
 /* ---- Forward ------------------------------------------------------------------- */
 
 struct direction {
@@ -284,8 +291,8 @@ static imp_spec emitter_tangent(const struct imp_tracer *tracer, int emitter,
     return sum;
 }
 
-imp_spec imp__walk_tangent(const struct imp_tracer *tracer, const struct imp_walk *walk,
-                           const double *x_dot)
+static imp_spec tangent(const struct imp_tracer *tracer, const struct imp_walk *walk,
+                        const double *x_dot)
 {
     const struct imp_active *active = tracer->active;
     const struct direction direction = {active, x_dot};
@@ -296,7 +303,7 @@ imp_spec imp__walk_tangent(const struct imp_tracer *tracer, const struct imp_wal
         const struct imp_bsdf *b = v->bsdf;
         L_dot *= v->w;
         for (const struct imp_side *s = v->side; s; s = s->next)
-            L_dot += imp__walk_tangent(tracer, &s->walk, x_dot);
+            L_dot += tangent(tracer, &s->walk, x_dot);
         const imp_spec own =
             imp_likely(!walk->entry) ? imp__spec(1) : walk->entry[depth - walk->depth];
         const struct imp_met *met = &v->d.met;
@@ -332,4 +339,10 @@ imp_spec imp__walk_tangent(const struct imp_tracer *tracer, const struct imp_wal
     }
     if (walk->moving) L_dot += walk->moving->tangent(tracer, walk, x_dot);
     return L_dot;
+}
+
+imp_spec imp__walk_tangent(const struct imp_tracer *tracer, const struct imp_walk *walk,
+                           const double *x_dot)
+{
+    return imp__walk_channels(walk, tangent(tracer, walk, x_dot));
 }

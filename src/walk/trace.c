@@ -250,6 +250,8 @@ static __attribute__((noinline)) void split(const struct imp_step *before,
                                        .py = walk->py,
                                        .key = imp__key_branch(walk->key, s.depth, i),
                                        .ray = walk->ray,
+                                       .waves = walk->waves,
+                                       .wave = walk->wave,
                                        .depth = s.depth};
         s.walk = &side->walk;
         struct imp_vertex *u = vertex_add(&s, v->bsdf->n_in);
@@ -452,9 +454,9 @@ void imp__walk_close(const struct imp_tracer *tracer, struct imp_walk *walk)
 {
     const imp_spec L = imp__walk_fold(walk);
     imp_spec used = L;
-    if (!tracer->carried) used[3] = 0;
+    if (!tracer->wavelengths) used[3] = 0;
     if (imp_unlikely(!imp__is_within(used, FLT_MAX))) walk->dropped = drop_cause(used);
-    walk->L = walk->dropped || !walk->valid ? (imp_spec){0} : L;
+    walk->L = walk->dropped || !walk->valid ? (imp_spec){0} : imp__walk_channels(walk, L);
 }
 
 void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, int x,
@@ -467,6 +469,10 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
     const double lens[2] = {imp__u01(key, IMP_DIM_LENS_U), imp__u01(key, IMP_DIM_LENS_V)};
     sensor->ops->ray(sensor, walk->px, walk->py, lens, &walk->ray);
 
+    if (imp_unlikely(tracer->wavelengths != NULL) &&
+        !imp__walk_wave(tracer, arena, imp__wave_draw(tracer, key, sample), walk))
+        return;
+
     imp_spec scratch[IMP_INPUTS_MAX];
     struct imp_step s = {.tracer = tracer,
                          .scene = tracer->scene,
@@ -475,7 +481,7 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
                          .recorded = !tracer->value_only ||
                                      (tracer->active && tracer->active->body),
                          .scratch = scratch,
-                         .at.carried = tracer->carried,
+                         .at.carried = walk->waves ? &walk->waves->carried : NULL,
                          .segment = imp__segment_first(tracer),
                          .o = walk->ray.o,
                          .d = walk->ray.d,

@@ -25,6 +25,7 @@
 
 #include "math/rng.h"
 #include "scene/guide.h"
+#include "shaped.h"
 #include "walk_integrator.h"
 
 /* ---- Decisions ------------------------------------------------------------------- */
@@ -117,7 +118,7 @@ struct imp_vertex {
     struct imp_probe *probe;           /* of the segment that goes on; NULL: none */
     struct imp_segment *segment;       /* from the last vertex to here (segment.h) */
     imp_spec *in;                      /* [bsdf->n_in] inputs at this point */
-    const struct imp_carried *carried; /* of the walk; outlives it */
+    const struct imp_carried *carried; /* of the walk; NULL: colours */
     struct imp_decision d;
 };
 #define IMP_VERTEX_VALUES offsetof(struct imp_vertex, ng) /* bytes */
@@ -133,7 +134,12 @@ struct imp_walk {
     double px, py; /* film position, pixels of the full film */
     struct imp_key key;
     struct imp_sensor_ray ray;
-    imp_spec L;            /* radiance at the sensor */
+    imp_spec L; /* radiance at the sensor, by the scene's channels; of a side walk its
+                   values */
+    /* Of its values: wavelengths, and what channels make of them. NULL: values are
+     * channels. */
+    const struct imp_waves *waves;
+    double wave;           /* number from which its wavelengths were drawn */
     bool valid;            /* alpha 1 (docs/scene-format.md 11) */
     bool absorbed;         /* Stam: ended by absorption */
     enum imp_drop dropped; /* then L is 0 and there is nothing to sweep */
@@ -179,11 +185,16 @@ struct imp_tracer {
      * derivative (docs/estimators.md 9.2). */
     const struct imp_active *active;
     uint64_t seed;
-    const struct imp_guide *guide;     /* imp__guide_of; NULL: none */
-    bool value_only;                   /* a walk's L is wanted, and no record of it */
-    const struct imp_carried *carried; /* wavelengths of the walks; NULL: the colours of
-                                          the scene */
-    const struct imp_mixing *mixing;   /* densities in place of the integrator's and the
+    const struct imp_guide *guide; /* imp__guide_of; NULL: none */
+    bool value_only;               /* a walk's L is wanted, and no record of it */
+    /* How walks draw the wavelengths they carry; NULL: they carry the scene's colours. */
+    const struct imp_wavelengths *wavelengths;
+    /* Of the walks of a pixel, each whole of `period` is cut into sets of about `set`
+     * (imp__set_at), among which wavelengths are stratified; set 0 or 1: each walk is drawn
+     * on its own. Sets are independent of each other, walks of a set are not. */
+    int set;
+    int64_t period;                  /* 0: endless */
+    const struct imp_mixing *mixing; /* densities in place of the integrator's and the
                                         materials'; NULL: those */
     bool collisions_stand; /* the derivative of a frozen walk is wanted, whose collisions
                               stay where they are, also of extinctions: no probes */
@@ -199,6 +210,34 @@ static inline const struct imp_guide *imp__guide_of(const struct imp_scene *scen
 {
     return i->guided && scene->n_bodies == 0 && scene->n_media == 0 ? guide : NULL;
 }
+
+/* ---- Wavelengths (waves.c) ------------------------------------------------------- */
+
+/* Of its walks as a run wants them drawn, n walks of a pixel being one whole. */
+void imp__tracer_waves(struct imp_tracer *tracer, const struct imp_run *run, int64_t n);
+
+/* The set that a walk belongs to: its first walk, and how many it has. A whole is cut into
+ * period/set sets, whose sizes differ by one at most; without end, all have `set`. */
+static inline void imp__set_at(int set, int64_t period, int64_t sample, int64_t *first,
+                               int64_t *n)
+{
+    if (period <= 0) {
+        *first = sample - sample % set;
+        *n = set;
+        return;
+    }
+    const int64_t at = sample % period, sets = imp_max(period / set, (int64_t)1);
+    const int64_t k = ((at + 1) * sets - 1) / period;
+    *first = sample - at + k * period / sets;
+    *n = (k + 1) * period / sets - k * period / sets;
+}
+
+/* Number from which the wavelengths of a walk are drawn, on [0, 1). */
+double imp__wave_draw(const struct imp_tracer *tracer, struct imp_key key,
+                      int64_t sample);
+/* The walk's wavelengths from that number. False: no memory, it is dropped. */
+bool imp__walk_wave(const struct imp_tracer *tracer, struct imp_arena *arena, double u,
+                    struct imp_walk *walk);
 
 /* ---- Decide (trace.c) ------------------------------------------------------------ */
 
@@ -243,7 +282,7 @@ static inline imp_spec imp__emitter_radiance(const struct imp_scene *scene, int 
     imp_spec in[IMP_INPUTS_MAX], le;
     imp__emitter_place(e, x, &at);
     imp__inputs_eval(e->input, e->n_in, &at, in);
-    e->ops->eval(e, in, x, &le);
+    imp__light_eval(e, carried, in, x, &le);
     return le;
 }
 
@@ -252,9 +291,23 @@ static inline imp_spec imp__emitter_radiance(const struct imp_scene *scene, int 
 /* L = E + B + w L, from the last vertex to the first; sets `beyond` of every vertex. */
 imp_spec imp__walk_fold(struct imp_walk *walk);
 
-/* Reverse mode: adds (dL/dtheta)^T adjoint to the sink, lane by lane. */
+/* Reverse mode: adds (dL/dtheta)^T adjoint to the sink. */
 void imp__walk_sweep(const struct imp_tracer *tracer, const struct imp_walk *walk,
                      imp_spec adjoint, struct imp_sink *sink);
+/* The same for an adjoint of the walk's values, which are wavelengths where it carries
+ * some: the transpose of imp__walk_channels has been taken. */
+void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_walk *walk,
+                            imp_spec adjoint, struct imp_sink *sink);
+
+/* Channels of a walk's values, and the transpose. */
+static inline imp_spec imp__walk_channels(const struct imp_walk *walk, imp_spec values)
+{
+    return imp_likely(!walk->waves) ? values : imp__waves_channels(walk->waves, values);
+}
+static inline imp_spec imp__walk_values(const struct imp_walk *walk, imp_spec channels)
+{
+    return imp_likely(!walk->waves) ? channels : imp__waves_lanes(walk->waves, channels);
+}
 
 /* Forward mode: dL in the direction x_dot [active->n]. */
 imp_spec imp__walk_tangent(const struct imp_tracer *tracer, const struct imp_walk *walk,

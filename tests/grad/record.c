@@ -16,6 +16,7 @@
 #define PLENTY ((size_t)256 << 20)
 
 static imp_context *ctx;
+static enum imp_color_mode mode = IMP_RGB;
 static const char *const path = "kept_walks.tmp";
 
 /* ---- Walks of a scene ------------------------------------------------------------ */
@@ -33,7 +34,7 @@ struct traced {
 /* All parameters with a derivative are active, but those of media if `held`. */
 static void begin(struct traced *t, const char *file, const char *defines, bool held)
 {
-    imp_scene *scene = test_scene(ctx, file, IMP_RGB, defines);
+    imp_scene *scene = test_scene(ctx, file, mode, defines);
     *t = (struct traced){.scene = scene};
     t->chosen = calloc(scene->n_params + 1, 1);
     for (size_t k = 0; k < scene->n_params; k++)
@@ -206,7 +207,7 @@ static void kept_same(struct traced *t, const char *name, struct imp_record *rea
     test_must(ctx, imp__record_read(&alone, path, PLENTY, read));
     tap_ok(read->n_walks == N && read->n_vertices == kept.n_vertices &&
                sizeof **read->vertices <= 160 &&
-               imp__record_bytes(read) <= 160 * read->n_vertices + 48 * N,
+               imp__record_bytes(read) <= 160 * read->n_vertices + 56 * N,
            "%s: %zu walks of %zu vertices, %zu bytes a vertex, %.0f a walk", name,
            read->n_walks, read->n_vertices, sizeof **read->vertices,
            (double)imp__record_bytes(read) / N);
@@ -356,18 +357,20 @@ static void guided(void)
 
 static void wavelengths(void)
 {
-    static const struct imp_carried four = {4, {437, 555, 600, 690}},
-                                    other = {4, {437, 555, 600, 691}};
     struct imp_record read;
     struct traced t;
+    mode = IMP_SPECTRAL;
     begin(&t, "cornell.xml", "res=32", true);
-    t.tracer.carried = &four;
+    mode = IMP_RGB;
+    struct imp_wavelengths other = t.scene->wavelengths[0];
+    other.hi -= 1;
+    t.tracer.wavelengths = t.scene->wavelengths;
     kept_same(&t, "four wavelengths", &read);
-    t.tracer.carried = &other;
+    t.tracer.wavelengths = &other;
     const enum imp_status st = imp__record_check(&read, &t.tracer);
     tap_ok(st == IMP_E_ARG, "walks of other wavelengths are refused # %s",
            imp_last_error(ctx));
-    t.tracer.carried = NULL;
+    t.tracer.wavelengths = NULL;
     tap_ok(imp__record_check(&read, &t.tracer) == IMP_E_ARG, "and walks of colours");
     imp__record_destroy(&read);
     end(&t);

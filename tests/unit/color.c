@@ -39,22 +39,22 @@ static void check(const struct imp_node *node, enum imp_role role, bool scalar,
                   enum imp_color_mode mode, struct expected e, double tolerance,
                   const char *what)
 {
-    imp_spec v = {-7, -7, -7, -7};
-    int count = -7;
-    const struct imp_spectrum *kept = NULL;
+    const struct imp__color_ask ask = {ctx, &arena, mode, role, scalar};
+    struct imp__color c = {.value = {-7, -7, -7, -7}, .count = -7};
     const enum imp_status st =
-        imp__color_convert(ctx, node, imp__node_prop(node, "c"), role, scalar, mode, &v,
-                           &count, &arena, &kept);
+        imp__color_convert(&ask, node, imp__node_prop(node, "c"), &c);
     if (e.count == 0) {
         const char *message = imp_last_error(ctx);
-        tap_ok(st == IMP_E_SCENE && count == -7 && v[0] == -7 &&
+        tap_ok(st == IMP_E_SCENE && c.count == -7 && c.value[0] == -7 &&
                    strncmp(message, "a.xml:4:9: ", 11) == 0,
                "%s: refused with its place # %s", what, message);
         return;
     }
-    bool ok = st == IMP_OK && count == e.count;
-    for (int c = 0; c < 3; c++) ok &= fabs(v[c] - e.v[e.count == 1 ? 0 : c]) <= tolerance;
-    tap_ok(ok, "%s # %d: %.6f %.6f %.6f", what, count, v[0], v[1], v[2]);
+    bool ok = st == IMP_OK && c.count == e.count && !c.spectrum;
+    for (int k = 0; k < 3; k++)
+        ok &= fabs(c.value[k] - e.v[e.count == 1 ? 0 : k]) <= tolerance;
+    tap_ok(ok, "%s # %d: %.6f %.6f %.6f", what, c.count, c.value[0], c.value[1],
+           c.value[2]);
 }
 
 static const double four[8] = {400, 500, 600, 700, 0.1, 0.2, 0.8, 0.9};
@@ -166,27 +166,42 @@ static void table(void)
     check(t, IMP_REFLECTANCE, false, IMP_RGB, (struct expected){0, {0}}, 0, "a vector");
     struct imp_node *bad = node_make("");
     list_add(bad, 2, (double[]){500, 400, 1, 1});
-    const struct imp_spectrum *kept = NULL;
-    imp_spec v;
-    int count;
-    tap_ok(imp__color_convert(ctx, bad, imp__node_prop(bad, "c"), IMP_REFLECTANCE, false,
-                              IMP_RGB, &v, &count, &arena, &kept) == IMP_E_SCENE,
+    struct imp__color_ask ask = {ctx, &arena, IMP_RGB, IMP_REFLECTANCE, false};
+    struct imp__color c;
+    tap_ok(imp__color_convert(&ask, bad, imp__node_prop(bad, "c"), &c) == IMP_E_SCENE,
            "wavelengths that do not increase # %s", imp_last_error(ctx));
+    struct imp_node *negative = node_make("");
+    list_add(negative, 2, (double[]){400, 500, 1, -1});
+    tap_ok(imp__color_convert(&ask, negative, imp__node_prop(negative, "c"), &c) ==
+               IMP_E_SCENE,
+           "a negative sample # %s", imp_last_error(ctx));
+    struct imp_node *above = node_make("");
+    list_add(above, 2, (double[]){400, 500, 1, 1.5});
+    tap_ok(imp__color_convert(&ask, above, imp__node_prop(above, "c"), &c) == IMP_OK,
+           "a reflectance above 1 is clamped in rgb");
+    ask.mode = IMP_SPECTRAL;
+    tap_ok(imp__color_convert(&ask, above, imp__node_prop(above, "c"), &c) == IMP_E_SCENE,
+           "and refused as a spectrum # %s", imp_last_error(ctx));
+    ask.mode = IMP_RGB;
 
-    imp__color_default(0.5, IMP_REFLECTANCE, IMP_RGB, &v, &count);
-    tap_ok(count == 1 && v[0] == 0.5 && v[2] == 0.5, "default, R");
-    imp__color_default(1, IMP_EMISSION, IMP_RGB, &v, &count);
-    tap_ok(count == 3 && v[1] == 1, "default, E");
+    tap_ok(imp__color_default(&ask, 0.5, &c) == IMP_OK && c.count == 1 &&
+               c.value[0] == 0.5 && c.value[2] == 0.5,
+           "default, R");
+    ask.role = IMP_EMISSION;
+    tap_ok(imp__color_default(&ask, 1, &c) == IMP_OK && c.count == 3 && c.value[1] == 1,
+           "default, E");
 }
 
 static enum imp_status object(struct imp_node *n, enum imp_role role, imp_spec *v,
                               int *count)
 {
-    const char *key = "";
-    const struct imp_spectrum *kept = NULL;
-    const enum imp_status st =
-        imp__color_object(ctx, n, role, false, IMP_RGB, v, count, &key, &arena, &kept);
-    return st == IMP_OK && strcmp(key, "value") != 0 ? IMP_E_ARG : st;
+    const struct imp__color_ask ask = {ctx, &arena, IMP_RGB, role, false};
+    struct imp__color c;
+    const enum imp_status st = imp__color_object(&ask, n, &c);
+    if (st != IMP_OK) return st;
+    *v = c.value;
+    *count = c.count;
+    return strcmp(c.key, "value") != 0 ? IMP_E_ARG : st;
 }
 
 static void objects(void)

@@ -83,7 +83,7 @@ static void gather_add(struct imp_sink *sink, int param, size_t element, int cha
 static struct gather swept(const struct room *r, const struct imp_walk *w, imp_spec one)
 {
     struct gather g = {.sink = {.add = gather_add}, .active = &r->active};
-    imp__walk_sweep(&r->tracer, w, one, &g.sink);
+    imp__walk_sweep_values(&r->tracer, w, one, &g.sink);
     return g;
 }
 
@@ -251,6 +251,7 @@ static const double nodes[4] = {400, 500, 600, 700};
 static double at(const double *v, double nm, int k) /* k >= 0: d/dv[k] */
 {
     double sum = 0;
+    if (nm < 400 || nm > 700) return 0;
     for (int i = 0; i < 4; i++) {
         const double hat = fmax(0, 1 - fabs(nm - nodes[i]) / 100);
         sum += k < 0 ? hat * v[i] : i == k ? hat : 0;
@@ -258,69 +259,59 @@ static double at(const double *v, double nm, int k) /* k >= 0: d/dv[k] */
     return sum;
 }
 
-/* The parameter's numbers are the samples themselves, as they will be in a scene of
- * spectra. */
-static void samples_become_numbers(imp_scene *s, const char *name,
-                                   const struct imp_input *in)
-{
-    size_t k;
-    test_must(ctx, imp_scene_find_param(s, name, &k));
-    s->params[k].store = IMP_STORE_DOUBLES;
-    s->params[k].doubles = in->spectrum->value;
-    s->params[k].info.count = in->spectrum->n;
-}
-
 static void wavelengths(void)
 {
     static const double R[4] = {.2, .6, .4, .9}, E[4] = {1, 3, 2, .5};
-    static const struct imp_carried four = {4, {437, 555, 600, 690}}, one = {1, {512}};
     struct room r = {.scene =
                          test_scene_text(ctx,
                                          ROOM("<spectrum name='reflectance' "
                                               "value='400:.2, 500:.6, 600:.4, 700:.9'/>",
                                               "<spectrum name='radiance' "
                                               "value='400:1, 500:3, 600:2, 700:.5'/>"),
-                                         IMP_RGB)};
+                                         IMP_SPECTRAL)};
     static const double all[D] = {1, 1, 1, 1, 1};
     double value = 0, gradient = 0, frozen = 0, single = 0;
-    samples_become_numbers(r.scene, "wall.reflectance.value",
-                           r.scene->bsdfs[0]->input[0]);
-    for (int e = 0; e < r.scene->n_emitters; e++)
-        if (r.scene->emitters[e]->input[0]->spectrum)
-            samples_become_numbers(r.scene, "glow.radiance.value",
-                                   r.scene->emitters[e]->input[0]);
     choose(&r);
-    const size_t wall = index_of(&r, "wall.reflectance.value"),
-                 lamp = index_of(&r, "glow.radiance.value");
+    const struct imp_wavelengths *four = r.scene->wavelengths;
+    const size_t wall = index_of(&r, "wall.reflectance.values"),
+                 lamp = index_of(&r, "glow.radiance.values");
     for (int i = 0; i < WALKS; i++) {
         const struct imp_arena_mark mark = imp__arena_mark(&r.arena);
         struct imp_walk w;
-        r.tracer.carried = &four;
+        struct imp_wavelengths one = *four;
+        r.tracer.wavelengths = four;
         imp__walk_trace(&r.tracer, &r.arena, i % 8, i / 8 % 8, i, &w);
         const imp_spec F = imp__walk_frozen(&r.tracer, &w);
+        imp_spec L = {0};
         for (int c = 0; c < 4; c++) {
-            const double e = at(E, four.nm[c], -1);
-            double slope, p = poly(all, at(R, four.nm[c], -1), &slope);
+            const double nm = w.waves->carried.nm[c], e = at(E, nm, -1);
+            double slope, p = poly(all, at(R, nm, -1), &slope);
             imp_spec lane = {0};
             lane[c] = 1;
+            L[c] = e * p;
             const struct gather g = swept(&r, &w, lane);
-            value = fmax(value, fabs(w.L[c] / (e * p) - 1));
-            frozen = fmax(frozen, fabs(F[c] / w.L[c] - 1));
             for (int k = 0; k < 4; k++) {
-                const double by_r = e * slope * at(R, four.nm[c], k),
-                             by_e = p * at(E, four.nm[c], k);
+                const double by_r = e * slope * at(R, nm, k), by_e = p * at(E, nm, k);
                 gradient =
                     fmax(gradient, fabs(g.g[wall + (size_t)k] - by_r) / (1 + by_r));
                 gradient =
                     fmax(gradient, fabs(g.g[lamp + (size_t)k] - by_e) / (1 + by_e));
             }
         }
-        r.tracer.carried = &one;
+        const imp_spec seen = imp__walk_channels(&w, L);
+        for (int c = 0; c < 3; c++) {
+            value = fmax(value, fabs(w.L[c] - seen[c]) / (1 + fabs(seen[c])));
+            frozen = fmax(frozen, fabs(F[c] - w.L[c]) / (1 + fabs(seen[c])));
+        }
+        one.lanes = 1;
+        r.tracer.wavelengths = &one;
         imp__walk_trace(&r.tracer, &r.arena, i % 8, i / 8 % 8, i, &w);
+        const double nm = w.waves->carried.nm[0];
         double slope;
-        const double p = poly(all, at(R, 512, -1), &slope);
-        for (int c = 0; c < 4; c++)
-            single = fmax(single, fabs(w.L[c] / (at(E, 512, -1) * p) - 1));
+        L = imp__spec(at(E, nm, -1) * poly(all, at(R, nm, -1), &slope));
+        const imp_spec alone = imp__walk_channels(&w, L);
+        for (int c = 0; c < 3; c++)
+            single = fmax(single, fabs(w.L[c] - alone[c]) / (1 + fabs(alone[c])));
         imp__arena_rewind(&r.arena, mark);
     }
     tap_ok(value < STORED, "four wavelengths: E sum rho^k # %.1e", value);

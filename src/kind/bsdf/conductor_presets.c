@@ -3,6 +3,7 @@
  * Complex refractive indices of metals and other absorbers under rgb
  * (docs/scene-format.md A.3): measured spectra integrated against the observer, without
  * an illuminant. */
+#include "color/color_tables.h"
 #include "presets.h"
 #include <string.h>
 
@@ -87,6 +88,20 @@ static enum imp_status color_add(const struct imp_build *b, const char *name,
     return IMP_OK;
 }
 
+static enum imp_status spectrum_add(const struct imp_build *b, const char *name,
+                                    struct imp_loc loc, int n, const double *nm,
+                                    const double *value)
+{
+    struct imp_prop *p = imp__node_add(b->arena, b->node, name, IMP_PROP_SPECTRUM, loc);
+    double *list = imp__arena_take(b->arena, 2 * (size_t)n, sizeof *list);
+    if (!p || !list) return imp__error(b->ctx, IMP_E_NOMEM, "out of memory");
+    memcpy(list, nm, (size_t)n * sizeof *list);
+    memcpy(list + n, value, (size_t)n * sizeof *list);
+    p->list = list;
+    p->n = (size_t)n;
+    return IMP_OK;
+}
+
 enum imp_status imp__conductor_prepare(const struct imp_build *b)
 {
     enum imp_status st = IMP_OK;
@@ -107,6 +122,18 @@ enum imp_status imp__conductor_prepare(const struct imp_build *b)
                             "unknown material '%s'; the manual lists them (Ag, Al, Au, "
                             "Cu, ...)",
                             name));
+    if (b->mode == IMP_SPECTRAL || b->mode == IMP_SINGLE) {
+        const struct imp__metal *m = imp__metal_find(name);
+        if (!m)
+            IMP_TRY(imp_build_error(b, "material", IMP_E_UNSUPPORTED,
+                                    "'%s' has no table of wavelengths; in spectral modes "
+                                    "there are Ag, Al, Au, Cr and Cu: give 'eta' and 'k' "
+                                    "as spectra",
+                                    name));
+        IMP_TRY(spectrum_add(b, "eta", loc, m->n, m->nm, m->eta));
+        IMP_TRY(spectrum_add(b, "k", loc, m->n, m->nm, m->k));
+        goto out;
+    }
     IMP_TRY(color_add(b, "eta", loc, c->eta));
     IMP_TRY(color_add(b, "k", loc, c->k));
 out:

@@ -95,17 +95,28 @@ static double conductor(double c, double eta, double k, double *d_eta, double *d
     return 0.5 * Rs * (1 + ratio);
 }
 
+/* Lanes that differ: one where all are equal; of colours, whose fourth is 0, three. */
+static int lanes_of(const imp_spec *eta, const imp_spec *k)
+{
+    bool equal = true;
+    for (int i = 1; i < 4; i++) equal &= (*eta)[i] == (*eta)[0] && (*k)[i] == (*k)[0];
+    return equal ? 1 : (*eta)[3] == 0 && (*k)[3] == 0 ? 3 : 4;
+}
+
 void imp__fresnel_conductor(double c, const imp_spec *eta, const imp_spec *k, imp_spec *f)
 {
-    *f = imp__spec(0);
-    for (int i = 0; i < 3; i++) (*f)[i] = conductor(c, (*eta)[i], (*k)[i], NULL, NULL);
+    const int n = lanes_of(eta, k);
+    *f = imp__spec(n == 1 ? conductor(c, (*eta)[0], (*k)[0], NULL, NULL) : 0);
+    for (int i = 0; n > 1 && i < n; i++)
+        (*f)[i] = conductor(c, (*eta)[i], (*k)[i], NULL, NULL);
 }
 
 void imp__fresnel_conductor_d(double c, const imp_spec *eta, const imp_spec *k,
                               imp_spec *f, imp_spec *df_deta, imp_spec *df_dk)
 {
     *f = *df_deta = *df_dk = imp__spec(0);
-    for (int i = 0; i < 3; i++) {
+    const int n = lanes_of(eta, k) == 3 ? 3 : 4;
+    for (int i = 0; i < n; i++) {
         double de, dk;
         (*f)[i] = conductor(c, (*eta)[i], (*k)[i], &de, &dk);
         (*df_deta)[i] = de;

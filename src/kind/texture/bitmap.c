@@ -5,6 +5,7 @@
  * itself: eval, scatter and tangent all go through `footprint`. */
 #include "bitmap.h"
 #include "color/rgb.h"
+#include "color/upsample.h"
 #include "input.h"
 #include "math/vec.h"
 #include "uv.h"
@@ -23,6 +24,11 @@ struct bitmap {
     bool identity; /* to_uv does nothing */
     struct imp__to_uv to_uv;
     float *data; /* [height][width][channels], and one number more */
+    /* [height][width] of three channels in a spectral mode; NULL: values are colours. */
+    struct texel {
+        struct imp__lifted lifted;
+        float of[3]; /* what it was made from */
+    } * texels;
 };
 
 /* Pixels in one more number than needed: three channels are read with one load of four.
@@ -58,6 +64,38 @@ static enum imp_status data_convert(const struct imp_build *b,
             t->data[i * (size_t)t->channels + (size_t)c] = (float)p[c];
     }
     return IMP_OK;
+}
+
+/* Spectra of texels that have others now; `all`: of all. Equal neighbours have equal
+ * spectra. */
+static void texels_lift(struct bitmap *t, bool all)
+{
+    const size_t w = (size_t)t->width, n = w * (size_t)t->height;
+    for (size_t i = 0; i < n; i++) {
+        struct texel *to = &t->texels[i];
+        const float *p = t->data + 3 * i;
+        if (!all && memcmp(p, to->of, sizeof to->of) == 0) continue;
+        const struct texel *near = all ? (i ? to - 1 : NULL) : to;
+        const double rgb[3] = {p[0], p[1], p[2]};
+        if (all && i && memcmp(p, to[-1].of, sizeof to->of) == 0) {
+            *to = to[-1];
+            continue;
+        }
+        if (all && i >= w && memcmp(p, to[-(ptrdiff_t)w].of, sizeof to->of) == 0) {
+            *to = to[-(ptrdiff_t)w];
+            continue;
+        }
+        if (rgb[0] > 1 || rgb[1] > 1 || rgb[2] > 1)
+            imp__lift_unbounded(rgb, near ? &near->lifted : NULL, &to->lifted);
+        else imp__lift_reflectance(rgb, near ? &near->lifted : NULL, &to->lifted);
+        memcpy(to->of, p, sizeof to->of);
+    }
+}
+
+static void changed(const struct imp_texture *tex)
+{
+    struct bitmap *t = tex->self;
+    if (t->texels) texels_lift(t, false);
 }
 
 static enum imp_status build(const struct imp_build *b, void *self,
@@ -96,6 +134,14 @@ static enum imp_status build(const struct imp_build *b, void *self,
     const struct imp__to_uv id = {{{1, 0, 0}, {0, 1, 0}}};
     t->identity = memcmp(&id, &t->to_uv, sizeof id) == 0;
     IMP_TRY(data_convert(b, im, raw, t));
+
+    if (t->channels == 3 && (b->mode == IMP_SPECTRAL || b->mode == IMP_SINGLE)) {
+        const size_t n = (size_t)t->width * (size_t)t->height;
+        t->texels = imp__arena_take(b->arena, n, sizeof *t->texels);
+        if (!t->texels)
+            IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "bitmap does not fit as spectra"));
+        texels_lift(t, true);
+    }
 
     const size_t dims[3] = {(size_t)t->height, (size_t)t->width, (size_t)t->channels};
     float lo = 0;
@@ -171,12 +217,73 @@ static inline void footprint(const struct bitmap *t, const struct imp_texcoord *
     f->weight[3] = a * b;
 }
 
+/* ---- Wavelengths: the spectra of texels are interpolated ------------------------- */
+
+static bool by_wavelength(const struct bitmap *t, const struct imp_texcoord *at,
+                          bool scalar)
+{
+    return imp_unlikely(at->carried != NULL) && t->texels && !scalar;
+}
+
+static void spectral_eval(const struct bitmap *t, const struct footprint *f,
+                          const struct imp_carried *carried, imp_spec *value)
+{
+    for (int j = 0; j < carried->n; j++) {
+        double sum = 0;
+        for (int k = 0; k < f->n; k++)
+            sum += f->weight[k] *
+                   imp__lifted_value(&t->texels[f->texel[k]].lifted, carried->nm[j]);
+        (*value)[j] = sum;
+    }
+    for (int j = carried->n; j < 4; j++) (*value)[j] = (*value)[0];
+}
+
+static void spectral_scatter(const struct imp_texture *tex, const struct footprint *f,
+                             const struct imp_carried *carried, const imp_spec *bar,
+                             struct imp_sink *sink)
+{
+    const struct bitmap *t = tex->self;
+    for (int k = 0; k < f->n; k++) {
+        imp_spec part[3] = {{0}, {0}, {0}};
+        for (int j = 0; j < carried->n; j++) {
+            double d[3];
+            imp__lifted_value_d(&t->texels[f->texel[k]].lifted, carried->nm[j], d);
+            for (int c = 0; c < 3; c++) part[c][j] = (*bar)[j] * f->weight[k] * d[c];
+        }
+        for (size_t c = 0; c < 3; c++)
+            sink->add(sink, tex->param, 3 * f->texel[k] + c, 1, &part[c]);
+    }
+}
+
+static void spectral_tangent(const struct imp_texture *tex, const struct footprint *f,
+                             const struct imp_carried *carried, imp_dot_fn *dot,
+                             const void *x_dot, imp_spec *value_dot)
+{
+    const struct bitmap *t = tex->self;
+    *value_dot = imp__spec(0);
+    for (int k = 0; k < f->n && tex->param >= 0; k++)
+        for (int j = 0; j < carried->n; j++) {
+            double d[3];
+            imp__lifted_value_d(&t->texels[f->texel[k]].lifted, carried->nm[j], d);
+            for (size_t c = 0; c < 3; c++)
+                (*value_dot)[j] +=
+                    f->weight[k] * d[c] * dot(x_dot, tex->param, 3 * f->texel[k] + c);
+        }
+    for (int j = carried->n; j < 4; j++) (*value_dot)[j] = (*value_dot)[0];
+}
+
+/* ---- Values -------------------------------------------------------------------------- */
+
 static void eval(const struct imp_texture *tex, const struct imp_texcoord *at,
                  bool scalar, imp_spec *value)
 {
     const struct bitmap *t = tex->self;
     struct footprint f;
     footprint(t, at, &f);
+    if (by_wavelength(t, at, scalar)) {
+        spectral_eval(t, &f, at->carried, value);
+        return;
+    }
     if (t->channels == 1) {
         double sum = 0;
         for (int k = 0; k < f.n; k++) sum += f.weight[k] * t->data[f.texel[k]];
@@ -199,6 +306,10 @@ static void scatter(const struct imp_texture *tex, const struct imp_texcoord *at
     struct footprint f;
     if (tex->param < 0) return;
     footprint(t, at, &f);
+    if (by_wavelength(t, at, scalar)) {
+        spectral_scatter(tex, &f, at->carried, bar, sink);
+        return;
+    }
     for (int k = 0; k < f.n; k++) {
         const imp_spec part = *bar * f.weight[k];
         if (t->channels == 1) sink->add(sink, tex->param, f.texel[k], 1, &part);
@@ -214,6 +325,10 @@ static void tangent(const struct imp_texture *tex, const struct imp_texcoord *at
     struct footprint f;
     imp_spec sum = imp__spec(0);
     footprint(t, at, &f);
+    if (by_wavelength(t, at, scalar)) {
+        spectral_tangent(tex, &f, at->carried, dot, x_dot, value_dot);
+        return;
+    }
     for (int k = 0; k < f.n && tex->param >= 0; k++) {
         imp_spec p;
         if (t->channels == 1) {
@@ -273,4 +388,5 @@ const struct imp_texture_ops imp__bitmap = {.size = sizeof(struct imp_texture_op
                                             .eval = eval,
                                             .scatter = scatter,
                                             .tangent = tangent,
-                                            .slope = slope};
+                                            .slope = slope,
+                                            .changed = changed};

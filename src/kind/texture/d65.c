@@ -2,6 +2,7 @@
  *
  * d65 around a texture: daylight of the texture's colour. In rgb and mono modes it scales
  * (docs/scene-format.md 2.4); d65 around a colour is a constant (color/convert.c). */
+#include "color/spectrum.h"
 #include "input.h"
 #include "math/vec.h"
 
@@ -27,26 +28,32 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_t
                                "'scale' must be finite and not negative");
     return IMP_OK;
 }
+static imp_spec factor(const struct imp_texture *t, const struct imp_texcoord *at)
+{
+    const struct d65 *d = t->self;
+    imp_spec f = imp__spec(d->scale);
+    if (at->carried)
+        for (int k = 0; k < 4; k++)
+            f[k] *= imp__spectrum_value(&imp__daylight, at->carried->nm[k]);
+    return f;
+}
 static void eval(const struct imp_texture *t, const struct imp_texcoord *at, bool scalar,
                  imp_spec *value)
 {
-    const struct d65 *d = t->self;
     imp_input_eval(t->input[0], at, scalar, value);
-    *value *= d->scale;
+    *value *= factor(t, at);
 }
 static void scatter(const struct imp_texture *t, const struct imp_texcoord *at,
                     bool scalar, const imp_spec *bar, struct imp_sink *sink)
 {
-    const struct d65 *d = t->self;
-    const imp_spec scaled = *bar * d->scale;
+    const imp_spec scaled = *bar * factor(t, at);
     imp_input_scatter(t->input[0], at, scalar, &scaled, sink);
 }
 static void tangent(const struct imp_texture *t, const struct imp_texcoord *at,
                     bool scalar, imp_dot_fn *dot, const void *x_dot, imp_spec *value_dot)
 {
-    const struct d65 *d = t->self;
     imp_input_tangent(t->input[0], at, scalar, dot, x_dot, value_dot);
-    *value_dot *= d->scale;
+    *value_dot *= factor(t, at);
 }
 
 const struct imp_texture_ops imp__d65 = {.size = sizeof(struct imp_texture_ops),

@@ -32,37 +32,32 @@ static imp_spec mean(double r, double g, double b) { return imp__spec((r + g + b
 
 /* ---- Wavelengths ----------------------------------------------------------------- */
 
-/* Is it looked up by wavelength? One number is the same at all of them. */
-static bool by_wavelength(const struct imp_input *input, bool scalar,
-                          const struct imp_texcoord *at)
+/* Is it looked up by wavelength? */
+static bool by_wavelength(const struct imp_input *input, const struct imp_texcoord *at)
 {
-    return imp_unlikely(at->carried != NULL) && !scalar && input->spectrum;
+    return imp_unlikely(at->carried != NULL) && input->spectrum;
 }
 
 static void spectrum_eval(const struct imp_input *input, const struct imp_carried *c,
                           imp_spec *value)
 {
-    for (int k = 0; k < 4; k++) {
-        const double *v = input->spectrum->value;
-        size_t first;
-        double w[2];
-        const bool inside =
-            imp__spectrum_at(input->spectrum, c->nm[k < c->n ? k : 0], &first, w);
-        (*value)[k] = inside ? w[0] * v[first] + w[1] * v[first + 1] : 0;
-    }
+    for (int k = 0; k < c->n; k++)
+        (*value)[k] = imp__spectrum_value(input->spectrum, c->nm[k]);
+    for (int k = c->n; k < 4; k++) (*value)[k] = (*value)[0];
 }
 
+/* Lane by lane, so that each piece stays in its lane. */
 static void spectrum_scatter(const struct imp_input *input, const struct imp_carried *c,
                              const imp_spec *bar, struct imp_sink *sink)
 {
     for (int k = 0; k < c->n; k++) {
-        size_t first;
-        double w[2];
-        if (!imp__spectrum_at(input->spectrum, c->nm[k], &first, w)) continue;
-        for (size_t i = 0; i < 2; i++) {
+        struct imp__spectrum_at at;
+        imp__spectrum_at(input->spectrum, c->nm[k], &at);
+        for (int i = 0; i < at.n; i++) {
             imp_spec part = {0};
-            part[k] = w[i] * (*bar)[k];
-            sink->add(sink, input->param, first + i, 1, &part);
+            part[k] = at.d[i] * (*bar)[k];
+            if (part[k] != 0)
+                sink->add(sink, input->param, at.first + (size_t)i, 1, &part);
         }
     }
 }
@@ -70,14 +65,15 @@ static void spectrum_scatter(const struct imp_input *input, const struct imp_car
 static void spectrum_tangent(const struct imp_input *input, const struct imp_carried *c,
                              imp_dot_fn *dot, const void *x_dot, imp_spec *value_dot)
 {
-    *value_dot = imp__spec(0);
-    for (int k = 0; k < 4; k++) {
-        size_t first;
-        double w[2];
-        if (imp__spectrum_at(input->spectrum, c->nm[k < c->n ? k : 0], &first, w))
-            (*value_dot)[k] = w[0] * dot(x_dot, input->param, first) +
-                              w[1] * dot(x_dot, input->param, first + 1);
+    for (int k = 0; k < c->n; k++) {
+        struct imp__spectrum_at at;
+        double sum = 0;
+        imp__spectrum_at(input->spectrum, c->nm[k], &at);
+        for (int i = 0; i < at.n; i++)
+            sum += at.d[i] * dot(x_dot, input->param, at.first + (size_t)i);
+        (*value_dot)[k] = sum;
     }
+    for (int k = c->n; k < 4; k++) (*value_dot)[k] = (*value_dot)[0];
 }
 
 /* ---- One input ------------------------------------------------------------------- */
@@ -86,7 +82,7 @@ static void input_eval(const struct imp_input *input, const struct imp_texcoord 
                        bool scalar, imp_spec *value)
 {
     if (input->texture) input->texture->ops->eval(input->texture, at, scalar, value);
-    else if (by_wavelength(input, scalar, at)) spectrum_eval(input, at->carried, value);
+    else if (by_wavelength(input, at)) spectrum_eval(input, at->carried, value);
     else if (scalar && input->count == 3)
         *value = mean(input->value[0], input->value[1], input->value[2]);
     else *value = input->value;
@@ -98,8 +94,7 @@ static void input_scatter(const struct imp_input *input, const struct imp_texcoo
     if (input->texture)
         input->texture->ops->scatter(input->texture, at, scalar, bar, sink);
     else if (input->param < 0) return;
-    else if (by_wavelength(input, scalar, at))
-        spectrum_scatter(input, at->carried, bar, sink);
+    else if (by_wavelength(input, at)) spectrum_scatter(input, at->carried, bar, sink);
     else if (scalar && input->count == 3)
         weighted_scatter(sink, input->param, 0, *bar, third);
     else sink->add(sink, input->param, 0, input->count == 3 ? 3 : 1, bar);
@@ -113,7 +108,7 @@ static void input_tangent(const struct imp_input *input, const struct imp_texcoo
         input->texture->ops->tangent(input->texture, at, scalar, dot, x_dot, value_dot);
     } else if (input->param < 0) {
         *value_dot = imp__spec(0);
-    } else if (by_wavelength(input, scalar, at)) {
+    } else if (by_wavelength(input, at)) {
         spectrum_tangent(input, at->carried, dot, x_dot, value_dot);
     } else if (input->count != 3) {
         *value_dot = imp__spec(dot(x_dot, input->param, 0));

@@ -1,0 +1,500 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Colours written as objects (docs/scene-format.md 2.4). */
+#include "base/number.h"
+#include "cie.h"
+#include "color_set.h"
+#include "color_tables.h"
+#include "math/vec.h"
+#include "rgb.h"
+#include <string.h>
+#include <strings.h>
+
+enum object {
+    UNIFORM,
+    SRGB,
+    RAWCONSTANT,
+    D65,
+    REGULAR,
+    IRREGULAR,
+    BLACKBODY,
+    ILLUMINANT,
+    GLASS,
+    SELLMEIER,
+    CAUCHY,
+    INDEX_RATIO, /* these two are made by imp__ior_prepare */
+    WRITTEN,     /* what its property `value` says */
+    N_OBJECTS
+};
+static const char *const object_names[N_OBJECTS] = {
+    "uniform",   "srgb",        "rawconstant", "d65",   "regular",
+    "irregular", "blackbody",   "illuminant",  "glass", "sellmeier",
+    "cauchy",    "index_ratio", "written"};
+
+static enum object object_kind(const struct imp_node *node)
+{
+    for (int i = 0; i < N_OBJECTS; i++)
+        if (strcmp(node->type, object_names[i]) == 0) return (enum object)i;
+    return N_OBJECTS;
+}
+
+bool imp__color_is_object(const struct imp_node *node)
+{
+    const enum object kind = object_kind(node);
+    if (kind == D65 && imp__node_prop(node, "nested_texture")) return false;
+    if (kind == D65 && node->n_children && node->children[0].node) /* around a texture? */
+        return object_kind(node->children[0].node) != N_OBJECTS;
+    return kind != N_OBJECTS;
+}
+
+/* Numbers separated by commas and blanks; *list is released by the caller. */
+static enum imp_status list_read(imp_context *ctx, struct imp_node *node,
+                                 const char *name, double **list, size_t *n)
+{
+    enum imp_status st = IMP_OK;
+    const char *text = NULL;
+    double *values = NULL;
+    size_t cap = 0, len = 0;
+
+    IMP_TRY(imp__props_string(ctx, node, name, NULL, &text));
+    if (!text) IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "'%s' is required", name));
+    const char *s = text, *end = text + strlen(text);
+    while (*(s += strspn(s, ", \t\r\n"))) {
+        const char *start = s;
+        double v;
+        if (!imp__number(&s, end, &v) || (*s && !strchr(", \t\r\n", *s)) || !isfinite(v))
+            IMP_TRY(imp__prop_error(ctx, node, imp__node_prop(node, name), IMP_E_SCENE,
+                                    "'%s': '%.20s' is not a number", name, start));
+        if (len == cap) {
+            double *grown = imp__grow(ctx, values, &cap, len + 1, sizeof *values);
+            if (!grown) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "out of memory"));
+            values = grown;
+        }
+        values[len++] = v;
+    }
+    *list = values;
+    *n = len;
+    values = NULL;
+out:
+    imp__release(ctx, values);
+    return st;
+}
+
+static enum imp_status require(imp_context *ctx, struct imp_node *node, const char *name)
+{
+    if (imp__props_has(node, name)) return IMP_OK;
+    return imp__node_error(ctx, node, IMP_E_SCENE, "'%s' is required", name);
+}
+
+/* Read what must be there, and be finite. */
+static enum imp_status number_read(imp_context *ctx, struct imp_node *node,
+                                   const char *name, double *out)
+{
+    enum imp_status st = require(ctx, node, name);
+    if (st == IMP_OK) st = imp__props_float(ctx, node, name, 0, out);
+    if (st == IMP_OK && !isfinite(*out))
+        st = imp__prop_error(ctx, node, imp__node_prop(node, name), IMP_E_SCENE,
+                             "'%s' is not finite", name);
+    return st;
+}
+
+static enum imp_status samples_object(const struct imp__color_ask *ask,
+                                      struct imp_node *node, bool regular,
+                                      struct imp__color *out)
+{
+    imp_context *ctx = ask->ctx;
+    enum imp_status st = IMP_OK;
+    double *nm = NULL, *v = NULL;
+    size_t n = 0, n_nm = 0;
+
+    IMP_TRY(list_read(ctx, node, "values", &v, &n));
+    if (regular) {
+        double lo, hi;
+        IMP_TRY(require(ctx, node, "wavelength_min"));
+        IMP_TRY(require(ctx, node, "wavelength_max"));
+        IMP_TRY(imp__props_float(ctx, node, "wavelength_min", 0, &lo));
+        IMP_TRY(imp__props_float(ctx, node, "wavelength_max", 0, &hi));
+        nm = imp__alloc(ctx, n ? n : 1, sizeof *nm);
+        if (!nm) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "out of memory"));
+        for (size_t i = 0; i < n; i++) nm[i] = n > 1 ? lo + (hi - lo) * i / (n - 1) : lo;
+    } else {
+        IMP_TRY(list_read(ctx, node, "wavelengths", &nm, &n_nm));
+        if (n_nm != n)
+            IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
+                                    "%zu wavelengths, but %zu values", n_nm, n));
+    }
+    IMP_TRY(imp__color_samples_set(ask, node, NULL, n, nm, v, out));
+out:
+    imp__release(ctx, nm);
+    imp__release(ctx, v);
+    return st;
+}
+
+/* A number or a vector, as it is. */
+static enum imp_status raw_object(const struct imp__color_ask *ask, struct imp_node *node,
+                                  struct imp__color *out)
+{
+    static const double one[3] = {1, 1, 1};
+    imp_context *ctx = ask->ctx;
+    enum imp_status st = IMP_OK;
+    const struct imp_prop *p = imp__node_prop(node, "value");
+    double v[3];
+    if (p && p->type == IMP_PROP_VECTOR) {
+        if (imp__color_wants_spectrum(ask) && !ask->scalar)
+            IMP_TRY(imp__prop_error(ctx, node, p, IMP_E_UNSUPPORTED,
+                                    "three numbers are no spectrum: in a spectral mode "
+                                    "'value' is one"));
+        IMP_TRY(imp__props_vector(ctx, node, "value", one, v));
+    } else {
+        IMP_TRY(require(ctx, node, "value"));
+        IMP_TRY(imp__props_float(ctx, node, "value", 1, &v[0]));
+        v[1] = v[2] = v[0];
+    }
+    for (int c = 0; c < 3; c++)
+        if (!isfinite(v[c]))
+            IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "'value' is not finite"));
+    if (p && p->type == IMP_PROP_VECTOR) {
+        imp__color_rgb_set(ask, v, out);
+    } else {
+        out->value = imp__spec(v[0]);
+        out->count = 1;
+    }
+out:
+    return st;
+}
+
+/* Daylight times another spectrum: its numbers times `scale`. */
+static enum imp_status in_daylight(const struct imp__color_ask *ask, double scale,
+                                   struct imp__color *c)
+{
+    struct imp_spectrum *s = c->spectrum;
+    const double number = scale * c->value[0];
+    if (!imp__color_wants_spectrum(ask) || ask->scalar) return IMP_OK;
+    if (!s)
+        return imp__color_spectrum_make(ask, IMP_SPECTRUM_NUMBER, 1, NULL, &number,
+                                        &imp__daylight, c);
+    for (size_t i = 0; i < s->n; i++) s->own[i] *= scale;
+    s->times = &imp__daylight;
+    imp__spectrum_update(s);
+    return IMP_OK;
+}
+
+/* The property's colour, or white. */
+static enum imp_status d65_object(const struct imp__color_ask *ask, struct imp_node *node,
+                                  struct imp__color *out)
+{
+    static const double white[3] = {1, 1, 1};
+    imp_context *ctx = ask->ctx;
+    enum imp_status st = IMP_OK;
+    double scale;
+
+    IMP_TRY(imp__props_float(ctx, node, "scale", 1, &scale));
+    if (!isfinite(scale) || scale < 0)
+        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
+                                "'scale' must be finite and not negative"));
+    struct imp_prop *color = imp__node_prop(node, "color");
+    if (color) {
+        struct imp__color_ask light = *ask;
+        light.role = IMP_EMISSION;
+        color->used = true;
+        if (color->type != IMP_PROP_RGB)
+            IMP_TRY(
+                imp__prop_error(ctx, node, color, IMP_E_SCENE, "'color' must be an rgb"));
+        IMP_TRY(imp__color_check_rgb(&light, node, color, color->number));
+        imp__color_rgb_set(ask, color->number, out);
+        IMP_TRY(imp__color_lift(&light, color->number, out));
+    } else if (node->n_children) {
+        struct imp_child *child = &node->children[0];
+        child->used = true;
+        if (!child->node || !imp__color_is_object(child->node))
+            IMP_TRY(imp__node_error(ctx, node, IMP_E_UNSUPPORTED,
+                                    "d65 around a texture cannot be nested"));
+        IMP_TRY(imp__color_object(ask, child->node, out));
+    } else {
+        imp__color_rgb_set(ask, white, out);
+    }
+    IMP_TRY(in_daylight(ask, scale, out));
+    out->value *= scale;
+out:
+    return st;
+}
+
+static enum imp_status uniform_object(const struct imp__color_ask *ask,
+                                      struct imp_node *node, struct imp__color *out)
+{
+    imp_context *ctx = ask->ctx;
+    enum imp_status st = IMP_OK;
+    double c, lo, hi;
+    IMP_TRY(imp__props_float(ctx, node, "value", 1, &c));
+    IMP_TRY(imp__props_float(ctx, node, "wavelength_min", 360, &lo));
+    IMP_TRY(imp__props_float(ctx, node, "wavelength_max", 830, &hi));
+    if (!isfinite(c) || (ask->role == IMP_EMISSION && c < 0))
+        IMP_TRY(
+            imp__node_error(ctx, node, IMP_E_SCENE, "'value' %g is not allowed here", c));
+    imp__color_number_set(ask, c, out);
+    /* The range matters in spectral modes only. */
+    if (!imp__color_wants_spectrum(ask) ||
+        (lo <= IMP_CIE_FIRST_NM && hi >= IMP_CIE_LAST_NM))
+        goto out;
+    if (!(lo < hi))
+        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "a range of %g to %g nm is empty",
+                                lo, hi));
+    IMP_TRY(imp__color_spectrum_make(ask, IMP_SPECTRUM_NUMBER, 1, NULL, &c, NULL, out));
+    out->spectrum->lo = lo;
+    out->spectrum->hi = hi;
+out:
+    return st;
+}
+
+/* Radiance of a black body, in W m^-2 sr^-1 nm^-1, times `scale`. */
+static enum imp_status blackbody_object(const struct imp__color_ask *ask,
+                                        struct imp_node *node, struct imp__color *out)
+{
+    imp_context *ctx = ask->ctx;
+    enum imp_status st = IMP_OK;
+    double T, scale, lo, hi;
+    if (!imp__color_wants_spectrum(ask))
+        IMP_TRY(imp__node_error(ctx, node, IMP_E_UNSUPPORTED,
+                                "blackbody exists in spectral modes only "
+                                "(-m spectral, -m single)"));
+    IMP_TRY(number_read(ctx, node, "temperature", &T));
+    IMP_TRY(imp__props_float(ctx, node, "scale", 1, &scale));
+    IMP_TRY(imp__props_float(ctx, node, "wavelength_min", 360, &lo));
+    IMP_TRY(imp__props_float(ctx, node, "wavelength_max", 830, &hi));
+    if (!(T > 0))
+        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "a temperature of %g K", T));
+    if (!isfinite(scale) || scale < 0)
+        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
+                                "'scale' must be finite and not negative"));
+    if (!(lo < hi) || !(lo > 0))
+        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "a range of %g to %g nm is empty",
+                                lo, hi));
+    IMP_TRY(
+        imp__color_spectrum_make(ask, IMP_SPECTRUM_BLACKBODY, 1, NULL, &T, NULL, out));
+    out->spectrum->lo = lo;
+    out->spectrum->hi = hi;
+    if (scale != 1) {
+        struct imp__color factor = {.count = 1};
+        IMP_TRY(imp__color_spectrum_make(ask, IMP_SPECTRUM_NUMBER, 1, NULL, &scale, NULL,
+                                         &factor));
+        out->spectrum->times = factor.spectrum;
+    }
+    imp__color_preview(out->spectrum, ask->role, ask->scalar, &out->value);
+    out->count = 3;
+    out->key = "temperature";
+out:
+    return st;
+}
+
+/* ---- Lights and indices by name and by formula -------------------------------------- */
+
+static enum imp_status fixed_points(const struct imp__color_ask *ask, int n,
+                                    const double *nm, const double *value,
+                                    const struct imp_spectrum **out)
+{
+    struct imp__color c = {.count = 1};
+    const enum imp_status st = imp__color_spectrum_make(ask, IMP_SPECTRUM_POINTS,
+                                                        (size_t)n, nm, value, NULL, &c);
+    *out = c.spectrum;
+    return st;
+}
+
+/* `scale` times the light, whose luminance is 1. */
+static enum imp_status illuminant_object(const struct imp__color_ask *ask,
+                                         struct imp_node *node, struct imp__color *out)
+{
+    imp_context *ctx = ask->ctx;
+    enum imp_status st = IMP_OK;
+    const struct imp_spectrum *shape = &imp__daylight;
+    const struct imp__illuminant *light;
+    const char *name;
+    double scale, rgb[3], nm[IMP_CIE_N], value[IMP_CIE_N];
+    int n = IMP_CIE_N;
+    IMP_TRY(require(ctx, node, "name"));
+    IMP_TRY(imp__props_string(ctx, node, "name", "", &name));
+    IMP_TRY(imp__props_float(ctx, node, "scale", 1, &scale));
+    if (!isfinite(scale) || scale < 0)
+        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
+                                "'scale' must be finite and not negative"));
+    light = imp__illuminant_find(name);
+    if (strcasecmp(name, "D65") == 0) {
+        memcpy(value, imp__cie_d65, sizeof value);
+    } else if (strcasecmp(name, "E") == 0) {
+        for (int q = 0; q < n; q++) value[q] = 1;
+    } else if (light) {
+        n = light->n;
+        memcpy(value, light->value, (size_t)n * sizeof *value);
+    } else {
+        IMP_TRY(imp__prop_error(ctx, node, imp__node_prop(node, "name"), IMP_E_SCENE,
+                                "there is no illuminant '%s'; there are A, B, C, D50, "
+                                "D55, D65, D75, E and F1 to F12",
+                                name));
+    }
+    for (int q = 0; q < n; q++)
+        nm[q] = (light ? light->first_nm : IMP_CIE_FIRST_NM) + IMP_CIE_STEP_NM * q;
+    double Y = 0;
+    for (int q = 0; q < n; q++)
+        Y += value[q] * imp__cie_lookup(imp__cie_xyz[1], nm[q]) * IMP_CIE_STEP_NM /
+             IMP_CIE_Y_INTEGRAL;
+    for (int q = 0; q < n; q++) value[q] /= Y;
+    imp__spectrum_to_rgb((size_t)n, nm, value, ask->role != IMP_EMISSION, rgb);
+    for (int c = 0; c < 3; c++) rgb[c] = imp_max(scale * rgb[c], 0.0);
+    imp__color_rgb_set(ask, rgb, out);
+    if (imp__color_wants_spectrum(ask)) {
+        IMP_TRY(fixed_points(ask, n, nm, value, &shape));
+        IMP_TRY(imp__color_spectrum_make(ask, IMP_SPECTRUM_NUMBER, 1, NULL, &scale, shape,
+                                         out));
+        out->key = "scale";
+    }
+out:
+    return st;
+}
+
+/* An index by a formula; in modes without wavelengths it is that of the yellow d line. */
+static enum imp_status index_set(const struct imp__color_ask *ask, struct imp_node *node,
+                                 enum imp__spectrum_form form, size_t n,
+                                 const double *number, struct imp__color *out)
+{
+    enum imp_status st = imp__color_spectrum_make(ask, form, n, NULL, number, NULL, out);
+    if (st != IMP_OK) return st;
+    for (double nm = IMP_CIE_FIRST_NM; nm <= IMP_CIE_LAST_NM; nm += IMP_CIE_STEP_NM) {
+        const double index = imp__spectrum_value(out->spectrum, nm);
+        if (!(index > 0) || !isfinite(index))
+            return imp__node_error(ask->ctx, node, IMP_E_SCENE,
+                                   "the index at %g nm is %g", nm, index);
+    }
+    imp__color_preview(out->spectrum, ask->role, ask->scalar, &out->value);
+    out->count = 1;
+    out->key = form == IMP_SPECTRUM_CAUCHY ? "cauchy" : "sellmeier";
+    if (!imp__color_wants_spectrum(ask)) {
+        out->spectrum = NULL;
+        out->key = "value";
+    }
+    return IMP_OK;
+}
+
+static enum imp_status glass_object(const struct imp__color_ask *ask,
+                                    struct imp_node *node, struct imp__color *out)
+{
+    enum imp_status st = IMP_OK;
+    const char *name;
+    IMP_TRY(require(ask->ctx, node, "name"));
+    IMP_TRY(imp__props_string(ask->ctx, node, "name", "", &name));
+    const struct imp__glass *g = imp__glass_find(name);
+    if (!g)
+        IMP_TRY(imp__prop_error(ask->ctx, node, imp__node_prop(node, "name"), IMP_E_SCENE,
+                                "there is no glass '%s'; there are N-BK7, N-SF6, N-SF10, "
+                                "N-SF11, fused silica and others (the manual lists them)",
+                                name));
+    IMP_TRY(
+        index_set(ask, node, IMP_SPECTRUM_SELLMEIER, 2 * (size_t)g->n, g->number, out));
+out:
+    return st;
+}
+
+static enum imp_status formula_object(const struct imp__color_ask *ask,
+                                      struct imp_node *node, bool cauchy,
+                                      struct imp__color *out)
+{
+    imp_context *ctx = ask->ctx;
+    enum imp_status st = IMP_OK;
+    double *first = NULL, *second = NULL, number[IMP_SPECTRUM_NUMBERS] = {0};
+    size_t n = 0, m = 0;
+    if (cauchy) {
+        IMP_TRY(list_read(ctx, node, "coefficients", &first, &n));
+        if (n < 1 || n > 3)
+            IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
+                                    "'coefficients' has %zu numbers; 1 to 3 are possible",
+                                    n));
+        memcpy(number, first, n * sizeof *number);
+        IMP_TRY(index_set(ask, node, IMP_SPECTRUM_CAUCHY, 3, number, out));
+        goto out;
+    }
+    IMP_TRY(list_read(ctx, node, "B", &first, &n));
+    IMP_TRY(list_read(ctx, node, "C", &second, &m));
+    if (n != m || n < 1 || n > IMP_SPECTRUM_NUMBERS / 2)
+        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
+                                "'B' has %zu numbers and 'C' %zu; both have the same, 1 "
+                                "to %d",
+                                n, m, IMP_SPECTRUM_NUMBERS / 2));
+    memcpy(number, first, n * sizeof *number);
+    memcpy(number + n, second, n * sizeof *number);
+    IMP_TRY(index_set(ask, node, IMP_SPECTRUM_SELLMEIER, 2 * n, number, out));
+out:
+    imp__release(ctx, first);
+    imp__release(ctx, second);
+    return st;
+}
+
+/* Index behind a surface over the index before it. */
+static enum imp_status ratio_object(const struct imp__color_ask *ask,
+                                    struct imp_node *node, struct imp__color *out)
+{
+    enum imp_status st = IMP_OK;
+    struct imp__color side[2];
+    for (size_t k = 0; k < 2; k++) {
+        node->children[k].used = true;
+        IMP_TRY(imp__color_object(ask, node->children[k].node, &side[k]));
+        if (!side[k].spectrum && imp__color_wants_spectrum(ask))
+            IMP_TRY(imp__color_spectrum_make(ask, IMP_SPECTRUM_NUMBER, 1, NULL,
+                                             &(double){side[k].value[0]}, NULL,
+                                             &side[k]));
+    }
+    *out = side[0];
+    if (out->spectrum) out->spectrum->over = side[1].spectrum;
+    out->value /= side[1].value;
+    out->count = 1;
+out:
+    return st;
+}
+
+enum imp_status imp__color_object(const struct imp__color_ask *ask, struct imp_node *node,
+                                  struct imp__color *out)
+{
+    imp_context *ctx = ask->ctx;
+    enum imp_status st = IMP_OK;
+    struct imp__color color = {.key = "value", .count = 1};
+
+    switch (object_kind(node)) {
+    case UNIFORM: IMP_TRY(uniform_object(ask, node, &color)); break;
+    case SRGB: {
+        struct imp_prop *p = imp__node_prop(node, "color");
+        struct imp__color_ask surface = *ask;
+        surface.role = IMP_REFLECTANCE;
+        IMP_TRY(require(ctx, node, "color"));
+        if (!p || p->type != IMP_PROP_RGB)
+            IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "'color' must be an rgb"));
+        p->used = true;
+        IMP_TRY(imp__color_check_rgb(&surface, node, p, p->number));
+        imp__color_rgb_set(ask, p->number, &color);
+        IMP_TRY(imp__color_lift(&surface, p->number, &color));
+        break;
+    }
+    case RAWCONSTANT: IMP_TRY(raw_object(ask, node, &color)); break;
+    case D65: IMP_TRY(d65_object(ask, node, &color)); break;
+    case REGULAR:
+    case IRREGULAR:
+        IMP_TRY(samples_object(ask, node, object_kind(node) == REGULAR, &color));
+        break;
+    case BLACKBODY: IMP_TRY(blackbody_object(ask, node, &color)); break;
+    case ILLUMINANT: IMP_TRY(illuminant_object(ask, node, &color)); break;
+    case GLASS: IMP_TRY(glass_object(ask, node, &color)); break;
+    case SELLMEIER:
+    case CAUCHY:
+        IMP_TRY(formula_object(ask, node, object_kind(node) == CAUCHY, &color));
+        break;
+    case INDEX_RATIO: IMP_TRY(ratio_object(ask, node, &color)); break;
+    case WRITTEN: {
+        struct imp_prop *p = imp__node_prop(node, "value");
+        IMP_TRY(require(ctx, node, "value"));
+        p->used = true;
+        IMP_TRY(imp__color_convert(ask, node, p, &color));
+        break;
+    }
+    case N_OBJECTS: IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "is not a colour"));
+    }
+    IMP_TRY(imp__props_finish(ctx, node));
+    *out = color;
+out:
+    return st;
+}

@@ -1,0 +1,88 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "wavelength.h"
+#include "base/compiler.h"
+#include "cie.h"
+#include "math/hash.h"
+#include "rgb.h"
+
+/* Wavelength at u of the distribution, and its density per nm. */
+static double draw(const struct imp_wavelengths *w, double u, double *density)
+{
+    const double range = w->hi - w->lo;
+    if (!w->cdf) {
+        *density = 1 / range;
+        return w->lo + u * range;
+    }
+    int lo = 0, hi = w->n_bins; /* cdf[lo] <= u < cdf[hi] */
+    while (hi - lo > 1) {
+        const int middle = (lo + hi) / 2;
+        if (w->cdf[middle] <= u) lo = middle;
+        else hi = middle;
+    }
+    const double p = w->cdf[lo + 1] - w->cdf[lo], bin = range / w->n_bins;
+    *density = p / bin;
+    return w->lo + bin * (lo + (u - w->cdf[lo]) / p);
+}
+
+void imp__waves_response(const struct imp_waves *waves,
+                         const struct imp_spectrum *response, imp_spec *weight)
+{
+    *weight = (imp_spec){0};
+    for (int j = 0; j < waves->carried.n; j++)
+        (*weight)[j] =
+            imp__spectrum_value(response, waves->carried.nm[j]) / waves->density[j];
+}
+
+void imp__waves_make(const struct imp_wavelengths *w, double u, struct imp_waves *out)
+{
+    const int n = w->lanes;
+    out->carried.n = n;
+    out->n_channels = imp_min(w->n_channels, IMP_CHANNELS_MAX);
+    out->density = (imp_spec){1, 1, 1, 1};
+    for (int j = 0; j < n; j++) {
+        double at = u + (double)j / n, p;
+        if (at >= 1) at -= 1;
+        out->carried.nm[j] = draw(w, at, &p);
+        out->density[j] = p * n;
+    }
+    for (int j = n; j < 4; j++) out->carried.nm[j] = out->carried.nm[0];
+    for (int c = 0; c < out->n_channels; c++)
+        imp__waves_response(out, &w->response[c], &out->channel[c]);
+}
+
+struct imp_spectrum *imp__rgb_responses(struct imp_arena *arena)
+{
+    double nm[IMP_CIE_N], value[3][IMP_CIE_N];
+    struct imp_spectrum *out = imp__arena_take(arena, 3, sizeof *out);
+    for (int q = 0; q < IMP_CIE_N; q++) {
+        double xyz[3], rgb[3];
+        nm[q] = IMP_CIE_FIRST_NM + IMP_CIE_STEP_NM * q;
+        for (int c = 0; c < 3; c++) xyz[c] = imp__cie_xyz[c][q] / IMP_CIE_Y_INTEGRAL;
+        imp__xyz_to_rgb(xyz, rgb);
+        for (int c = 0; c < 3; c++) value[c][q] = rgb[c];
+    }
+    for (int c = 0; out && c < 3; c++) {
+        const struct imp_spectrum *s =
+            imp__spectrum_make(arena, IMP_SPECTRUM_POINTS, IMP_CIE_N, nm, value[c]);
+        if (!s) return NULL;
+        out[c] = *s;
+    }
+    return out;
+}
+
+uint64_t imp__wavelengths_hash(uint64_t h, const struct imp_wavelengths *w)
+{
+    h = imp__hash(h, &w->lanes, sizeof w->lanes);
+    h = imp__hash(h, &w->lo, sizeof w->lo);
+    h = imp__hash(h, &w->hi, sizeof w->hi);
+    for (int k = 0; w->cdf && k <= w->n_bins; k++) { /* computed: rounded */
+        const float f = (float)w->cdf[k];
+        h = imp__hash(h, &f, sizeof f);
+    }
+    for (int c = 0; c < w->n_channels; c++)
+        for (size_t i = 0; i < w->response[c].n; i++) {
+            const float f = (float)w->response[c].value[i];
+            h = imp__hash(h, &f, sizeof f);
+        }
+    return h;
+}

@@ -1,0 +1,96 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Spectra: upsampling of colours against their colour under daylight, against Mitsuba's
+ * table and against differences; every form's derivatives; wavelengths of walks. */
+#include "color/cie.h"
+#include "color/convert.h"
+#include "color/rgb.h"
+#include "color/wavelength.h"
+#include "imp_tap.h"
+#include <string.h>
+
+static imp_context *ctx;
+static struct imp_arena arena;
+
+/* ---- Upsampling ---------------------------------------------------------------------- */
+
+/* Colour of a reflectance under D65 by another quadrature: 1 nm, trapezoids. */
+static void colour_of(const struct imp__lifted *l, double rgb[3])
+{
+    double xyz[3] = {0, 0, 0}, white[3] = {0, 0, 0}, w[3];
+    for (int nm = 360; nm <= 830; nm++)
+        for (int c = 0; c < 3; c++) {
+            const double a =
+                imp__cie_lookup(imp__cie_xyz[c], nm) * imp__cie_lookup(imp__cie_d65, nm);
+            xyz[c] += a * imp__lifted_value(l, nm);
+            white[c] += a;
+        }
+    imp__xyz_to_rgb(xyz, rgb);
+    imp__xyz_to_rgb(white, w);
+    for (int c = 0; c < 3; c++) rgb[c] /= w[c];
+}
+
+static void upsampling(void)
+{
+    double worst = 0, saturated = 0, derivative = 0;
+    int n = 0, missed = 0;
+    for (int i = 0; i <= 10; i++)
+        for (int j = 0; j <= 10; j++)
+            for (int k = 0; k <= 10; k++) {
+                const double rgb[3] = {i / 10., j / 10., k / 10.};
+                struct imp__lifted l;
+                double is[3], error = 0;
+                imp__lift_reflectance(rgb, NULL, &l);
+                colour_of(&l, is);
+                for (int c = 0; c < 3; c++) error = fmax(error, fabs(is[c] - rgb[c]));
+                const bool edge = !(i && j && k) || i == 10 || j == 10 || k == 10;
+                if (edge) saturated = fmax(saturated, error);
+                else worst = fmax(worst, error);
+                n++;
+                missed += error > 1e-3;
+                if (edge) continue;
+                for (int c = 0; c < 3; c++) {
+                    const double h = 1e-5;
+                    struct imp__lifted a, b;
+                    double up[3], down[3];
+                    memcpy(up, rgb, sizeof up);
+                    memcpy(down, rgb, sizeof down);
+                    up[c] += h, down[c] -= h;
+                    imp__lift_reflectance(up, NULL, &a);
+                    imp__lift_reflectance(down, NULL, &b);
+                    for (double nm = 380; nm < 800; nm += 60) {
+                        double d[3];
+                        imp__lifted_value_d(&l, nm, d);
+                        const double q =
+                            (imp__lifted_value(&a, nm) - imp__lifted_value(&b, nm)) /
+                            (2 * h);
+                        derivative = fmax(derivative, fabs(d[c] - q) / (1 + fabs(q)));
+                    }
+                }
+            }
+    tap_ok(worst < 2e-4, "colours inside the cube are met under D65 # %.1e", worst);
+    tap_ok(saturated < 0.01, "and on its faces # %.1e, %d of %d off by 1e-3", saturated,
+           missed, n);
+    tap_ok(derivative < 1e-4, "derivatives by r, g, b # %.1e", derivative);
+}
+
+int main(void)
+{
+    const struct imp_context_options options = {.size = sizeof options, .threads = 1};
+    if (imp_context_create(&options, &ctx) != IMP_OK) return 1;
+    imp__arena_init(&arena, ctx);
+    upsampling();
+    for (int q = 0; q < 6; q++) {
+        static const double rgb[6][3] = {{.2, .5, .9}, {.9, .05, .05}, {1, 0, 0},
+                                         {.1, .8, .1}, {.5, .5, .1},   {.73, .72, .69}};
+        struct imp__lifted l;
+        imp__lift_reflectance(rgb[q], NULL, &l);
+        printf("# ");
+        for (int nm = 400; nm <= 700; nm += 50)
+            printf(" %.4f", imp__lifted_value(&l, nm));
+        printf("   %g %g %g\n", l.c[0], l.c[1], l.c[2]);
+    }
+    imp__arena_free(&arena);
+    imp_context_destroy(ctx);
+    return tap_done();
+}
