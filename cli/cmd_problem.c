@@ -38,8 +38,9 @@ const struct arg_option options_targets[] = {
      &problem_options.tikhonov, 0, 0, NULL},
     {ARG_LIST, 0, "stay", "GLOB=W", "add W/2 |x - start|^2 over these parameters",
      &problem_options.stay, 0, 0, NULL},
-    {ARG_LIST, 0, "smooth", "GLOB=W", "add W/2 |grad x|^2 over these textures",
-     &problem_options.smooth, 0, 0, NULL},
+    {ARG_LIST, 0, "smooth", "GLOB=W",
+     "add W/2 |grad x|^2 over these textures and spectra", &problem_options.smooth, 0, 0,
+     NULL},
     {0}};
 
 const char *loss_word(void) { return loss_words[problem_options.loss]; }

@@ -618,8 +618,8 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_problem_add_tikhonov(imp_problem *pro
                                                                 const char *glob,
                                                                 double weight,
                                                                 int from_here);
-/** 1/2 weight |grad x|^2, forward differences between neighbours of textures matching
- * `glob`. @return IMP_E_ARG if none has two dimensions. */
+/** 1/2 weight |grad x|^2, forward differences between neighbouring texels of textures, or
+ * samples of spectra, that match `glob`. @return IMP_E_ARG if none has neighbours. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_problem_add_smoothness(imp_problem *problem, const char *glob, double weight);
 

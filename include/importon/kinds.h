@@ -617,7 +617,12 @@ struct imp_film_desc {
     enum imp_pixel_format pixel_format;
     const char *file_format; /* "openexr", "rgbe", "pfm" */
     struct imp_filter filter;
+    /* Of a specfilm: its channels are these curves, per nm, and not the pixel_format. */
+    int n_responses;
+    const struct imp_spectrum *response; /* [n_responses] */
+    const char *const *response_name;
 };
+#define IMP_RESPONSES_MAX 64
 
 struct imp_sensor {
     const struct imp_sensor_ops *ops;

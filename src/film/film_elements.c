@@ -62,6 +62,9 @@ enum imp_status imp__render_elements(const struct imp_measure *m,
     imp_elements *e = NULL;
     imp_film *seen = NULL, *film = NULL;
     const int side = imp_clamp((int)ceil(sqrt(m->spp)), 1, 64);
+    if (imp__is_spectral(scene->mode))
+        IMP_TRY(imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                           "finite elements are solved in rgb and mono modes"));
     o.sensor = run->sensor;
     o.seed = run->seed;
     o.time_limit_s = run->time_limit_s;

@@ -72,7 +72,11 @@ static void names_make(struct names *s, const struct imp_scene *scene,
     const struct imp_integrator *top = scene->integrator;
     const struct imp_channels *more = imp__channels_of(top);
     const enum imp_pixel_format format = sensor->film.pixel_format;
-    for (int c = 0; c < base_channels(format); c++) names_add(s, "", "", base[format][c]);
+    const struct imp_film_desc *film = &sensor->film;
+    for (int c = 0; c < film->n_responses; c++)
+        names_add(s, "", "", film->response_name[c]);
+    for (int c = 0; film->n_responses == 0 && c < base_channels(format); c++)
+        names_add(s, "", "", base[format][c]);
     if (!more) return;
     for (int a = 0; a < more->n_aovs; a++)
         for (int c = 0; c < aov_channels(more->aovs[a].type); c++)
@@ -92,6 +96,11 @@ enum imp_status imp__measure_create(const struct imp_scene *scene,
     const struct imp_sensor *sensor;
     const enum imp_status st = imp__run_sensor(scene, run, &sensor);
     if (st != IMP_OK) return st;
+    if (sensor->film.n_responses > 0 &&
+        (imp__channels_of(scene->integrator) || !imp__walk_integrator(scene)))
+        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                          "a specfilm has the channels of its response curves alone: use "
+                          "an integrator of walks, without aov or moment");
     struct names names = {.text.ctx = scene->ctx};
     names_make(&names, scene, sensor);
     if (names.text.failed || names.n > IMP_MEASURE_MAX) {
@@ -269,6 +278,12 @@ static void radiance(const struct imp_measure *m,
         *L = imp__spec(walk->first && walk->first->shape ? walk->first->t : 0);
         *alpha = walk->first && walk->first->shape;
     }
+    const struct imp_film_desc *film = &m->sensor->film;
+    for (int c = 0; c < film->n_responses; c++) {
+        imp_spec weight = {0};
+        if (walk->waves) imp__waves_response(walk->waves, &film->response[c], &weight);
+        s->value[c] = imp__sum_used(weight * walk->values, 4);
+    }
     imp__arena_rewind(s->arena, mark);
 }
 
@@ -284,7 +299,7 @@ void imp__measure_sample(const void *measure, struct imp_sample *s)
     int n;
     if (!more) {
         radiance(m, imp__walk_integrator_of(top), s, &L, &alpha, &walk);
-        imp__measure_base(m, L, alpha, value);
+        if (m->sensor->film.n_responses == 0) imp__measure_base(m, L, alpha, value);
         return;
     }
 

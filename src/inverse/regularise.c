@@ -7,6 +7,16 @@
 #include <math.h>
 #include <string.h>
 
+/* Texels of a picture, or the samples of a spectrum. */
+static bool has_neighbours(const struct imp_param_info *info)
+{
+    return info->n_dims >= 2 || info->wavelengths_nm;
+}
+static size_t columns(const struct imp_param_info *info)
+{
+    return info->n_dims >= 2 ? info->dims[1] : 1;
+}
+
 static enum imp_status add(imp_problem *p, const char *glob, double weight, int kind,
                            bool from_here)
 {
@@ -28,7 +38,7 @@ static enum imp_status add(imp_problem *p, const char *glob, double weight, int 
     for (size_t k = 0; k < s->n_params; k++) {
         if (!imp__glob(glob, s->params[k].info.name)) continue;
         met++;
-        if (kind == IMP_SMOOTHNESS && s->params[k].info.n_dims < 2) continue;
+        if (kind == IMP_SMOOTHNESS && !has_neighbours(&s->params[k].info)) continue;
         usable++;
         r.on[k] = 1;
     }
@@ -36,8 +46,8 @@ static enum imp_status add(imp_problem *p, const char *glob, double weight, int 
     if (!usable)
         IMP_TRY(
             imp__error(p->ctx, IMP_E_ARG,
-                       "smoothness needs a texture: nothing that matches '%s' has two "
-                       "dimensions",
+                       "smoothness needs a texture or a spectrum: nothing that matches "
+                       "'%s' has neighbours",
                        glob));
     if (from_here) imp_scene_get_theta(s, r.origin);
 
@@ -127,9 +137,9 @@ double imp__regularise(const struct imp_problem *p, const double *x, double *gra
                 value += tikhonov(r->weight, info->count, &v,
                                   r->origin ? r->origin + info->offset : NULL, g);
             else
-                value += smoothness(r->weight, info->dims[0], info->dims[1],
+                value += smoothness(r->weight, info->dims[0], columns(info),
                                     info->count /
-                                        imp_max(info->dims[0] * info->dims[1], (size_t)1),
+                                        imp_max(info->dims[0] * columns(info), (size_t)1),
                                     &v, g);
         }
     }

@@ -75,6 +75,12 @@ enum imp_status imp__problem_tracer(const struct imp_problem *p,
                                .active = &p->active,
                                .seed = run->seed,
                                .guide = imp__guide_of(p->scene, integrator, run->guide)};
+    if (sensor->film.n_responses > 0 && sensor->film.n_responses != 3)
+        return imp__error(p->ctx, IMP_E_UNSUPPORTED,
+                          "derivatives and losses are of films with three channels; this "
+                          "specfilm has %d response curves",
+                          sensor->film.n_responses);
     imp__tracer_waves(out, run, 0);
+    out->set = 1; /* what leaves walks out needs walks that are independent */
     return p->active.body ? imp__graded_survey(out) : IMP_OK;
 }

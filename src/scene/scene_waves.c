@@ -74,8 +74,19 @@ enum imp_status imp__waves_build(struct imp_scene *scene)
                                     .hi = IMP_CIE_LAST_NM,
                                     .n_channels = 3,
                                     .response = rgb};
+        const struct imp_film_desc *film = &scene->sensors[s]->film;
+        if (film->n_responses > 0) {
+            w.n_channels = film->n_responses;
+            w.response = film->response;
+            w.lo = INFINITY;
+            w.hi = 0;
+            for (int c = 0; c < w.n_channels; c++) {
+                w.lo = fmin(w.lo, w.response[c].lo);
+                w.hi = fmax(w.hi, w.response[c].hi);
+            }
+        }
         all[s * IMP_WAVES_DRAWN + IMP_WAVES_UNIFORM] = w;
-        IMP_TRY(density_make(scene, &w, true));
+        IMP_TRY(density_make(scene, &w, film->n_responses == 0));
         all[s * IMP_WAVES_DRAWN + IMP_WAVES_IMPORTANCE] = w;
     }
     scene->wavelengths = all;

@@ -136,6 +136,7 @@ struct imp_walk {
     struct imp_sensor_ray ray;
     imp_spec L; /* radiance at the sensor, by the scene's channels; of a side walk its
                    values */
+    imp_spec values; /* radiance at the sensor by lanes; channels are made of it */
     /* Of its values: wavelengths, and what channels make of them. NULL: values are
      * channels. */
     const struct imp_waves *waves;

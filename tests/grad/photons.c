@@ -349,15 +349,19 @@ static void slips(void)
      * is 0 in every scene, and the second 470 times too dark. Box-shaped responses of one
      * unit below and above 595 nm: X and Y of an equal-energy sky are their widths. */
     struct tap_stat x = {0}, y = {0}, no_p = {0};
+    static const double one = 1;
+    static const struct imp_spectrum box[2] = {
+        {.form = IMP_SPECTRUM_NUMBER, .n = 1, .value = &one, .lo = 360, .hi = 595},
+        {.form = IMP_SPECTRUM_NUMBER, .n = 1, .value = &one, .lo = 595, .hi = 830}};
+    const struct imp_wavelengths waves = {
+        .lanes = 1, .lo = 360, .hi = 830, .n_channels = 2, .response = box};
+    p.tracer.wavelengths = &waves;
     for (int64_t k = 0; k < 20000; k++) {
-        const double nm = 360 + 470 * imp__u01(imp__key(5, 5, (uint64_t)k), 0);
-        const struct imp_carried carried = {1, {nm, nm, nm, nm}};
         const struct imp_arena_mark mark = imp__arena_mark(&p.arena);
-        p.tracer.carried = &carried;
         const struct imp_walk walk = photons_trace(&p, k);
-        tap_add(&x, walk.L[0] * (nm < 595) * 470);
-        tap_add(&y, walk.L[0] * (nm >= 595) * 470);
-        tap_add(&no_p, walk.L[0] * (nm < 595));
+        tap_add(&x, walk.L[0]);
+        tap_add(&y, walk.L[1]);
+        tap_add(&no_p, walk.L[0] / 470);
         imp__arena_rewind(&p.arena, mark);
     }
     expect(true, &x, 235, "one wavelength a photon: X");
