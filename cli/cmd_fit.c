@@ -195,7 +195,7 @@ static void print_table(const imp_problem *problem, const struct imp_fit_result 
             const struct imp_fit_variable all = variable_at(problem, b->first + i),
                                           *v = &all;
             printf("%-*s  %-11.6g %-11.6g ", width,
-                   cli_number_name(&b->info, i, name, sizeof name), v->start, v->value);
+                   cli_number_row(&b->info, i, name, sizeof name), v->start, v->value);
             char interval[64] = "-";
             if (isfinite(v->lo95) && isfinite(v->hi95))
                 snprintf(interval, sizeof interval, "[%.6g, %.6g]", v->lo95, v->hi95);

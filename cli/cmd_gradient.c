@@ -235,7 +235,7 @@ static void print_text(const struct result *r, const struct block *blocks,
         for (size_t i = 0; i < b->n; i++) {
             const size_t at = b->first + i;
             printf("%-*s  %-14.8g %-14.7g %.2g\n", width,
-                   cli_number_name(&b->info, i, name, sizeof name), r->x[at], r->grad[at],
+                   cli_number_row(&b->info, i, name, sizeof name), r->x[at], r->grad[at],
                    r->se[at]);
         }
     }

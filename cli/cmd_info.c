@@ -33,6 +33,7 @@ static void print_param_json(struct json *j, const struct imp_param_info *p,
     json_end_array(j);
     json_integer(j, "count", (int64_t)p->count);
     if (p->count <= 64) json_numbers(j, "value", p->count, values);
+    if (p->wavelengths_nm) json_numbers(j, "wavelengths_nm", p->count, p->wavelengths_nm);
     json_text(j, "unit", p->unit);
     json_number(j, "min", p->lo);
     json_number(j, "max", p->hi);

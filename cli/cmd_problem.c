@@ -237,13 +237,19 @@ struct block *problem_blocks(const imp_problem *problem, size_t *n_blocks)
     return blocks;
 }
 
-int block_is_large(const struct block *b) { return b->n > 12; }
+/* Spectra are tables of their wavelengths. */
+int block_is_large(const struct block *b)
+{
+    return b->n > (b->info.wavelengths_nm ? 1000 : 12);
+}
 
 void block_json(struct json *j, const struct block *b)
 {
     json_object(j, NULL);
     json_text(j, "name", b->info.name);
     json_text(j, "unit", b->info.unit);
+    if (b->info.wavelengths_nm)
+        json_numbers(j, "wavelengths_nm", b->info.count, b->info.wavelengths_nm);
 }
 
 static char *block_path(const struct block *b, const char *folder)

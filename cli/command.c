@@ -352,3 +352,12 @@ const char *cli_number_name(const struct imp_param_info *info, size_t element, c
     else snprintf(text, size, "%s[%zu]", info->name, element);
     return text;
 }
+const char *cli_number_row(const struct imp_param_info *info, size_t element, char *text,
+                           size_t size)
+{
+    cli_number_name(info, element, text, size);
+    const size_t used = strlen(text);
+    if (info->wavelengths_nm)
+        snprintf(text + used, size - used, " %g nm", info->wavelengths_nm[element]);
+    return text;
+}

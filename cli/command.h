@@ -119,5 +119,8 @@ void *cli_alloc(size_t n, size_t size);
 /* "name" of a parameter, or "name[element]" when it has several numbers. */
 const char *cli_number_name(const struct imp_param_info *info, size_t element, char *text,
                             size_t size);
+/* The same as a row's title: with the wavelength, where it is a sample of a spectrum. */
+const char *cli_number_row(const struct imp_param_info *info, size_t element, char *text,
+                           size_t size);
 
 #endif

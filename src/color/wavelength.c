@@ -30,7 +30,7 @@ void imp__waves_response(const struct imp_waves *waves,
     *weight = (imp_spec){0};
     for (int j = 0; j < waves->carried.n; j++)
         (*weight)[j] =
-            imp__spectrum_value(response, waves->carried.nm[j]) / waves->density[j];
+            imp__spectrum_lookup(response, waves->carried.nm[j]) / waves->density[j];
 }
 
 void imp__waves_make(const struct imp_wavelengths *w, double u, struct imp_waves *out)

@@ -95,15 +95,12 @@ int main(void)
         }
         const struct imp_fit_result *r = fit(p, prior ? 0.03 : 0, start);
         int open = 0;
-        double rms = 0, covered = 0, known = 0;
+        double rms = 0;
         for (int k = 0; k < N; k++) {
             const struct imp_fit_variable *v = &r->variables[k];
             const double error = v->value - macbeth[PATCH].rho[k];
             open += !v->determined;
             if (k >= 5 && k <= 29) rms += error * error / 25; /* 430 to 670 nm */
-            if (!v->determined) continue;
-            known++;
-            covered += error > v->lo95 - v->value && error < v->hi95 - v->value;
         }
         rms = sqrt(rms);
         printf(

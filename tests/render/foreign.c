@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Mitsuba's own test scenes against Mitsuba's own references, with the z-test that
- * `importon compare --variance` makes: the orthographic sensor, in rgb and in mono. The
+ * `importon compare --variance` makes: the orthographic sensor, in rgb, mono and spectral. The
  * pictures are not ours to copy: IMP_SHARED names the folder that holds `mitsuba-scenes`;
  * without it the test is skipped. */
 #include "imp_scene.h"
@@ -12,7 +12,9 @@
 static void agrees(imp_context *ctx, const char *folder, const char *scene_file,
                    const char *reference_stem, enum imp_color_mode mode)
 {
-    const char *suffix = mode == IMP_MONO ? "mono" : "rgb";
+    const char *suffix = mode == IMP_MONO       ? "mono"
+                         : mode == IMP_SPECTRAL ? "spectral"
+                                                : "rgb";
     struct imp_load_options load = IMP_LOAD_OPTIONS_INIT;
     struct imp_compare_options options = IMP_COMPARE_OPTIONS_INIT;
     struct imp_compare_result r = {.size = sizeof r};
@@ -67,6 +69,7 @@ int main(void)
              shared);
     agrees(ctx, folder, "test_orthographic_path.xml", "test_orthographic", IMP_RGB);
     agrees(ctx, folder, "test_orthographic_path.xml", "test_orthographic", IMP_MONO);
+    agrees(ctx, folder, "test_orthographic_path.xml", "test_orthographic", IMP_SPECTRAL);
     snprintf(folder, sizeof folder, "%s/mitsuba-scenes/tests/scenes/participating_media",
              shared);
     agrees(ctx, folder, "test_hetero_sigmat_volpath.xml", "test_hetero_sigmat", IMP_RGB);

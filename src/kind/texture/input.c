@@ -42,7 +42,7 @@ static void spectrum_eval(const struct imp_input *input, const struct imp_carrie
                           imp_spec *value)
 {
     for (int k = 0; k < c->n; k++)
-        (*value)[k] = imp__spectrum_value(input->spectrum, c->nm[k]);
+        (*value)[k] = imp__spectrum_lookup(input->spectrum, c->nm[k]);
     for (int k = c->n; k < 4; k++) (*value)[k] = (*value)[0];
 }
 
