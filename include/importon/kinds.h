@@ -124,6 +124,9 @@ struct imp_sink {
 struct imp_dirs {
     imp_v3 wo, wi;
     int lobe; /* IMP_SMOOTH, or the index of a delta lobe (with wi as sample set it) */
+    /* For sample and pdf: derivatives with respect to this material's inputs will be taken
+     * at what is drawn. A kind may draw without the parts whose value is 0, but then not. */
+    bool derivative;
 };
 
 enum imp_bsdf_flags {
@@ -172,7 +175,7 @@ struct imp_bsdf_ops {
     /* Draw d->wi and d->lobe for d->wo; pdf and eval say the rest. u[0] chooses the
      * lobe, u[1], u[2] the direction. False: no sample (structurally zero: nothing may
      * arrive from there, whatever the inputs). The density must not vanish where the
-     * value or a derivative does not. */
+     * value does not or, with d->derivative, a derivative does not. */
     bool (*sample)(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
                    struct imp_dirs *d);
     /* The BSDF times |cos(theta_i)|, in 1/sr, for d->lobe == IMP_SMOOTH; for a delta lobe

@@ -8,14 +8,13 @@
  * ends the lane (docs/estimators.md 9.2). False: all lanes have ended. */
 static bool throughput_add(struct imp_step *s, const struct imp_bsdf *b, imp_spec factor)
 {
-    const struct imp_active *active = s->tracer->active;
     const bool four = s->at.carried != NULL;
     if (imp_likely(factor[0] != 0 && factor[1] != 0 && factor[2] != 0 &&
                    (!four || factor[3] != 0))) {
         s->beta *= factor;
         return !imp__is_zero_used(s->beta, four);
     }
-    const bool differentiable = active && b->index >= 0 && active->bsdf[b->index];
+    const bool differentiable = imp__wants_derivative(s, b);
     const double stand_in = fmax(imp__max_used(factor, four), 0.5);
     for (int c = 0; c < 3 + four; c++) {
         if (factor[c] != 0) continue;
@@ -100,7 +99,8 @@ bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_sur
                          imp__u01(key, imp__dim(s->depth, IMP_DIM_DIR_U)),
                          imp__u01(key, imp__dim(s->depth, IMP_DIM_DIR_V))};
     const struct imp_bsdf *b = v->bsdf;
-    struct imp_dirs dirs = {.wo = s->wo_drawn, .lobe = IMP_SMOOTH};
+    struct imp_dirs dirs = {
+        .wo = s->wo_drawn, .lobe = IMP_SMOOTH, .derivative = imp__wants_derivative(s, b)};
 
     /* The direction, its density and its value. */
     int drawn;

@@ -223,4 +223,12 @@ static inline void imp__guided_leave(struct imp_guided *g)
 /* Survival by what is expected to come; `q`: by throughput. */
 double imp__guided_survival(const struct imp_step *s, double q);
 
+/* Are derivatives taken with respect to inputs of this material? */
+static inline bool imp__wants_derivative(const struct imp_step *s,
+                                         const struct imp_bsdf *b)
+{
+    const struct imp_active *active = s->tracer->active;
+    return imp_unlikely(active != NULL) && b->index >= 0 && active->bsdf[b->index];
+}
+
 #endif

@@ -333,7 +333,8 @@ static inline imp_v3 imp__vertex_wo(const struct imp_vertex *v)
 }
 static inline struct imp_dirs imp__vertex_dirs(const struct imp_vertex *v)
 {
-    return (struct imp_dirs){imp__vertex_wo(v), imp__decided_v3(v->d.wi), v->d.lobe};
+    return (struct imp_dirs){imp__vertex_wo(v), imp__decided_v3(v->d.wi), v->d.lobe,
+                             false};
 }
 static inline struct imp_emission imp__vertex_met(const struct imp_vertex *v)
 {
@@ -355,7 +356,7 @@ static inline struct imp_texcoord imp__light_at(const struct imp_vertex *v)
 static inline struct imp_dirs imp__light_dirs(const struct imp_vertex *v)
 {
     return (struct imp_dirs){imp__vertex_wo(v), imp__decided_v3(v->d.light.wi),
-                             IMP_SMOOTH};
+                             IMP_SMOOTH, false};
 }
 
 #endif

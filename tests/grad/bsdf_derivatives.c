@@ -46,7 +46,7 @@ static struct tally check_case(const struct imp_bsdf *b, enum kind_set set)
     imp_spec in[KINDS_MAX_INPUTS], df[KINDS_MAX_INPUTS];
     for (int i = 0; i < TRIALS; i++) {
         kind_inputs(b, set, 1000 + (uint64_t)i, in);
-        struct imp_dirs d = {kind_direction(i, 5), {0}, IMP_SMOOTH};
+        struct imp_dirs d = {kind_direction(i, 5), {0}, IMP_SMOOTH, true};
         struct kind_draw s;
         const struct imp_key key = imp__key(9, (uint64_t)i, 0);
         const double u[3] = {imp__u01(key, 0), imp__u01(key, 1), imp__u01(key, 2)};
@@ -94,7 +94,7 @@ static void visit(const struct kind_case *c, void *payload)
 static bool weight_at(const struct imp_bsdf *b, imp_spec *in, int j, double x,
                       const double u[3], imp_v3 wo, imp_spec *w, imp_v3 *wi)
 {
-    struct imp_dirs d = {wo, {0}, IMP_SMOOTH};
+    struct imp_dirs d = {wo, {0}, IMP_SMOOTH, false};
     struct kind_draw s;
     const imp_spec old = in[j];
     in[j] = imp__spec(x);
@@ -117,7 +117,7 @@ static void visit_attached(const struct kind_case *c, void *payload)
         kind_inputs(b, KIND_RANDOM, 40 + (uint64_t)i, in);
         const struct imp_key key = imp__key(11, (uint64_t)i, 0);
         const double u[3] = {imp__u01(key, 0), imp__u01(key, 1), imp__u01(key, 2)};
-        struct imp_dirs d = {kind_direction(i, 12), {0}, IMP_SMOOTH};
+        struct imp_dirs d = {kind_direction(i, 12), {0}, IMP_SMOOTH, false};
         struct kind_draw s;
         if (!kind_draw(b, in, u, &d, &s)) continue;
         for (int j = 0; j < b->n_in; j++) {
@@ -244,8 +244,8 @@ static void smallest_roughness(struct kind_factory *f)
     for (int k = 0; imp__bsdf_kinds[k]; k++)
         if (strcmp(imp__bsdf_kinds[k]->name, "roughconductor") == 0)
             kind_make(f, imp__bsdf_kinds[k], props, 1, NULL, 0, &b);
-    const struct imp_dirs dirs = {imp__v3(0.6, 0, 0.8), imp__v3(-0.6, 0, 0.8),
-                                  IMP_SMOOTH};
+    const struct imp_dirs dirs = {imp__v3(0.6, 0, 0.8), imp__v3(-0.6, 0, 0.8), IMP_SMOOTH,
+                                  false};
     kind_inputs(&b, KIND_FALLBACK, 1, in);
     for (int k = 0; k < 2; k++) {
         in[3] = imp__spec(k ? 1e-4 : 1e-6);

@@ -22,12 +22,12 @@ struct point {
     imp_v3 wo;
     struct imp_dirs lobe[IMP_DRAWS_LOBES]; /* as drawn */
     long draws;
-    bool sane;
+    bool sane, derivative;
 };
 static double density(imp_v3 wi, void *payload)
 {
     const struct point *p = payload;
-    const struct imp_dirs d = {p->wo, wi, IMP_SMOOTH};
+    const struct imp_dirs d = {p->wo, wi, IMP_SMOOTH, p->derivative};
     return p->b->ops->pdf(p->b, p->in, &d);
 }
 
@@ -64,7 +64,7 @@ static void draw_check(struct point *p, const struct imp_dirs *d,
 static bool draw(void *payload, const double u[3], imp_v3 *w, int *lobe)
 {
     struct point *p = payload;
-    struct imp_dirs d = {p->wo, {0}, IMP_SMOOTH};
+    struct imp_dirs d = {p->wo, {0}, IMP_SMOOTH, p->derivative};
     struct kind_draw s;
     if (!kind_draw(p->b, p->in, u, &d, &s)) return false;
     if (p->draws++ % 16 == 0) draw_check(p, &d, &s);
@@ -126,12 +126,17 @@ static void visit(const struct kind_case *c, void *payload)
     const bool sharp = strstr(c->label, "principled") != NULL;
     const int depth = kind_steps(c) ? IMP_SPHERE_STEPS : IMP_SPHERE_SMOOTH;
     for (int i = 0; i < DIRECTIONS; i++) {
-        struct point p = {.b = &c->bsdf};
+        struct point p = {.b = &c->bsdf, .derivative = i % 2 == 0};
         kind_inputs(p.b,
                     i % 6 == 5                 ? KIND_WIDE
                     : i == 0 && !too_narrow(c) ? KIND_LOWEST
                                                : KIND_RANDOM,
                     500 + (uint64_t)i, p.in);
+        /* Facets that one draw in a hundred finds, as narrow as 1e-3: cells follow a pilot
+         * run, which does not see them. */
+        for (int j = 0; j < p.b->n_in && p.b->n_child && too_narrow(c); j++)
+            if (strcmp(kind_input(p.b, j)->name, "roughness") == 0)
+                p.in[j] = imp__spec(fmax(p.in[j][0], 0.2));
         /* One-sided kinds have nothing below: three of four from above. */
         p.wo = kind_direction(i % 4 == 3 ? 2 * i + 1 : 2 * i, 21);
         const struct imp__draws r = check(&p, samples, 900 + (uint64_t)i, depth, sharp);

@@ -46,11 +46,11 @@ static bool asked(int k, const struct imp_dirs *d, struct imp_dirs *e)
 static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
                    struct imp_dirs *d)
 {
-    const double q = 1 - imp__mixing_chance(in[WEIGHT][0]);
+    const double q = 1 - imp__mixing_chance(in[WEIGHT][0], d);
     const int k = u[0] < q ? 0 : 1;
     const double v[3] = {imp__mixing_rest(u[0], k ? q : 0, k ? 1 : q), u[1], u[2]};
     const struct imp_bsdf *c = b->child[k];
-    struct imp_dirs e = {.wo = d->wo, .lobe = IMP_SMOOTH};
+    struct imp_dirs e = {.wo = d->wo, .lobe = IMP_SMOOTH, .derivative = d->derivative};
     if (!c->ops->sample(c, in + b->child_in[k], v, &e)) return false;
     d->wi = e.wi;
     d->lobe = e.lobe == IMP_SMOOTH ? IMP_SMOOTH : 2 * e.lobe + k;
@@ -58,7 +58,7 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
 }
 static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
 {
-    const double q = imp__mixing_chance(in[WEIGHT][0]);
+    const double q = imp__mixing_chance(in[WEIGHT][0], d);
     struct imp_dirs e;
     double sum = 0;
     for (int k = 0; k < 2; k++) {

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Materials that are mixtures of others. A weight w counts the second of two, 1 - w the
- * first; texels beyond [0, 1] are cut. The probability with which the second is drawn
- * stays away from 0 and 1, since there the derivative with respect to w, second minus
- * first, has a part that the value has not.
+ * first; texels beyond [0, 1] are cut. Where derivatives are taken, the probability with
+ * which the second is drawn stays away from 0 and 1, since there the derivative with
+ * respect to w, second minus first, has a part that the value has not.
  *
  * Delta lobes of nested materials are numbered anew, so that none share an index. */
 #ifndef IMP_KIND_BSDF_BLENDING_H
@@ -16,14 +16,27 @@
 #define IMP_LOBES_MAX    128 /* records keep them in a signed byte */
 
 static inline double imp__mixing_weight(double w) { return imp_clamp(w, 0, 1); }
-static inline double imp__mixing_chance(double w)
+static inline double imp__mixing_chance(double w, const struct imp_dirs *d)
 {
-    return imp_clamp(w, IMP_MIXING_LEAST, 1 - IMP_MIXING_LEAST);
+    const double least = d->derivative ? IMP_MIXING_LEAST : 0;
+    return imp_clamp(w, least, 1 - least);
 }
 /* What is left of u, uniform again, once it is known to lie in [lo, hi). */
 static inline double imp__mixing_rest(double u, double lo, double hi)
 {
     return imp_clamp((u - lo) / (hi - lo), 0, 0x1.fffffffffffffp-1);
+}
+
+/* Probability of the coat's lobe over that of a base, where the coat reflects F: its share,
+ * roughly. Where derivatives are taken, dark colours keep a part. */
+static inline double imp__coated_chance(imp_spec coat, imp_spec base,
+                                        const struct imp_dirs *d, double F)
+{
+    const double least = d->derivative ? 0.1 : 0;
+    const double s = F * imp_max(imp__max3(coat), least),
+                 r = (1 - F) * imp_max(imp__max3(base), least);
+    const double q = s + r > 0 ? s / (s + r) : 1;
+    return d->derivative ? imp_clamp(q, IMP_MIXING_LEAST, 1 - IMP_MIXING_LEAST) : q;
 }
 
 /* Delta lobes of a material. */

@@ -15,6 +15,7 @@
     X(imp__phong)                                                                        \
     X(imp__plastic)                                                                      \
     X(imp__principled)                                                                   \
+    X(imp__principledthin)                                                               \
     X(imp__roughconductor)                                                               \
     X(imp__roughdielectric)                                                              \
     X(imp__roughplastic)                                                                 \
@@ -31,7 +32,7 @@ const struct imp_bsdf_ops *const imp__bsdf_kinds[] = {BSDFS(ADDRESS) NULL};
 void imp__bsdf_albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
                       imp_spec *albedo)
 {
-    const struct imp_dirs dirs = {*wo, imp__v3(0, 0, 1), IMP_SMOOTH};
+    const struct imp_dirs dirs = {*wo, imp__v3(0, 0, 1), IMP_SMOOTH, false};
     *albedo = imp__spec(0);
     if (b->ops->albedo) {
         b->ops->albedo(b, in, wo, albedo);

@@ -6,8 +6,8 @@
  *   f = o f_nested,      coefficient of the hole 1 - o
  *
  * Its value is of first degree in o, from 0 to 1, and its derivative f_nested in one place
- * and -1 in the other. So the hole is drawn with a probability that stays away from 0 and
- * 1, where one of the two would never be seen. */
+ * and -1 in the other. So where derivatives are taken the hole is drawn with a
+ * probability that stays away from 0 and 1, at which one of the two would never be seen. */
 #include "blending.h"
 #include "kind/build.h"
 
@@ -47,7 +47,7 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
                    struct imp_dirs *d)
 {
     struct imp_dirs e;
-    const double q = 1 - imp__mixing_chance(in[OPACITY][0]);
+    const double q = 1 - imp__mixing_chance(in[OPACITY][0], d);
     if (u[0] < q) {
         d->wi = -d->wo;
         d->lobe = HOLE;
@@ -64,7 +64,7 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
 static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
 {
     struct imp_dirs e;
-    const double q = imp__mixing_chance(in[OPACITY][0]);
+    const double q = imp__mixing_chance(in[OPACITY][0], d);
     if (d->lobe == HOLE) return 1 - q;
     const struct imp_bsdf *c = nested(b, &in, d, &e);
     return q * c->ops->pdf(c, in, &e);

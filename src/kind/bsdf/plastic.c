@@ -9,6 +9,7 @@
  *
  * k = rho if `nonlinear`, so that the base's colour deepens with every reflection, else 1.
  * The index bends no path that is followed, and has a gradient. */
+#include "blending.h"
 #include "fresnel.h"
 #include "lambert.h"
 #include "presets.h"
@@ -51,13 +52,10 @@ static double fresnel(const imp_spec *in, double c)
     return imp__fresnel_dielectric(c, in[ETA][0], &cos_t, &eta_t);
 }
 
-/* Probability of the mirror lobe: its share of what is reflected, roughly. Colours below
- * the floor keep a part, since their derivatives do not vanish with them. */
-static double mirror_chance(const imp_spec *in, double F)
+/* Probability of the mirror lobe: its share of what is reflected, roughly. */
+static double mirror_chance(const imp_spec *in, const struct imp_dirs *d, double F)
 {
-    const double s = F * imp_max(imp__max3(in[TINT]), 0.1),
-                 d = (1 - F) * imp_max(imp__max3(in[DIFFUSE]), 0.1);
-    return s + d > 0 ? s / (s + d) : 1;
+    return imp__coated_chance(in[TINT], in[DIFFUSE], d, F);
 }
 
 static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
@@ -65,7 +63,7 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
 {
     (void)b;
     if (!(d->wo[2] > 0)) return false;
-    if (!(u[0] < mirror_chance(in, fresnel(in, d->wo[2]))))
+    if (!(u[0] < mirror_chance(in, d, fresnel(in, d->wo[2]))))
         return imp__lambert_sample(&u[1], d);
     d->lobe = MIRROR;
     d->wi = imp__v3(-d->wo[0], -d->wo[1], d->wo[2]);
@@ -75,7 +73,7 @@ static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp
 {
     (void)b;
     if (!(d->wo[2] > 0)) return 0;
-    const double q = mirror_chance(in, fresnel(in, d->wo[2]));
+    const double q = mirror_chance(in, d, fresnel(in, d->wo[2]));
     if (d->lobe == IMP_SMOOTH) return (1 - q) * imp__lambert(d);
     return d->lobe == MIRROR ? q : 0;
 }

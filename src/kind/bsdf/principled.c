@@ -17,8 +17,8 @@
  * and behind Fp = (1 - metallic) spec_trans F. Where spec_trans is not written, or the
  * number 0, nothing is transmitted. The clearcoat has no 1/(4 cos cos), as in the format.
  *
- * Lobes are drawn with probabilities that stay above a floor, since the derivative with
- * respect to a weight does not vanish with it. */
+ * Where derivatives are taken, all lobes keep a part of the draws, since the derivative
+ * with respect to a weight does not vanish with it. */
 #include "burley.h"
 #include "fresnel.h"
 #include "lambert.h"
@@ -335,16 +335,21 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
 struct chances {
     double facets, glass, diffuse, coat;
 };
-static struct chances chances_of(const struct look *l, const imp_spec *in)
+static struct chances chances_of(const struct look *l, const imp_spec *in,
+                                 bool derivative)
 {
     double cos_t, eta_t;
     const double m = l->metallic, t = l->trans;
     const double F = imp__fresnel_dielectric(l->wo[2], l->e, &cos_t, &eta_t);
-    struct chances q = {imp_max(m + (1 - m) * F, 0.1), 0, 0, 0};
-    if (l->p->transmits) q.glass = imp_max((1 - m) * t * (1 - F), 0.1);
+    const double sheen = in[SHEEN][0], coat = 0.25 * in[CLEARCOAT][0];
+    const double least = derivative ? 0.1 : 0.02;
+    struct chances q = {imp_max(m + (1 - m) * F, least), 0, 0, 0};
+    if (l->p->transmits && (derivative || t > 0))
+        q.glass = imp_max((1 - m) * t * (1 - F), least);
     if (!l->back) {
-        q.diffuse = imp_max((1 - m) * (1 - t), 0.1);
-        q.coat = l->p->coated ? imp_max(0.25 * in[CLEARCOAT][0], 0.03) : 0;
+        const double diffuse = (1 - m) * imp_max(1 - t, sheen);
+        q.diffuse = derivative ? imp_max(diffuse, least) : diffuse;
+        q.coat = l->p->coated && (derivative || coat > 0) ? imp_max(coat, 0.03) : 0;
     }
     const double all = 1 / (q.facets + q.glass + q.diffuse + q.coat);
     return (struct chances){q.facets * all, q.glass * all, q.diffuse * all, q.coat * all};
@@ -357,7 +362,7 @@ static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp
     struct look l = look_at(b, x, d);
     double d_log;
     if (d->lobe != IMP_SMOOTH || !half_set(&l)) return 0;
-    const struct chances q = chances_of(&l, x);
+    const struct chances q = chances_of(&l, x, d->derivative);
     const double p = imp__microfacet_pdf(&l.facets.f, &l.wo, &l.m);
     if (!l.reflects) return q.glass * p * l.e * l.e * -l.im / (l.n * l.n);
     double sum = q.facets * p / (4 * l.om) + q.diffuse * l.wi[2] * IMP_INV_PI;
@@ -382,7 +387,7 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
     inputs_cut(in, x);
     const struct look l = look_at(b, x, d);
     if (!(l.wo[2] > 0) || (l.back && !l.p->transmits)) return false;
-    const struct chances q = chances_of(&l, x);
+    const struct chances q = chances_of(&l, x, d->derivative);
     imp_v3 wi;
     bool up = true;
     if (u[0] < q.diffuse) {

@@ -8,6 +8,7 @@
  *
  * with k = rho if `nonlinear`, else 1. Roughness and index are numbers, since T and R are
  * tables that are made for them, and made anew when they change. */
+#include "blending.h"
 #include "coat.h"
 #include "fresnel.h"
 #include "lambert.h"
@@ -81,14 +82,12 @@ static double number(const struct at *a, imp__dual x)
     return imp__coat_at(&a->p->coat, x, a->alpha, a->eta);
 }
 
-/* Probability of the lobe of facets. Colours below the floor keep a part, since their
- * derivatives do not vanish with them. */
-static double facet_chance(const struct at *a, const imp_spec *in, double mu)
+/* Probability of the lobe of facets. */
+static double facet_chance(const struct at *a, const imp_spec *in,
+                           const struct imp_dirs *d)
 {
-    const double T = imp_clamp(number(a, imp__coat_T(&a->p->coat, mu)), 0, 1);
-    const double s = (1 - T) * imp_max(imp__max3(in[TINT]), 0.1),
-                 d = T * imp_max(imp__max3(in[DIFFUSE]), 0.1);
-    return imp_clamp(s / (s + d), 0.02, 0.98);
+    const double T = imp_clamp(number(a, imp__coat_T(&a->p->coat, d->wo[2])), 0, 1);
+    return imp__coated_chance(in[TINT], in[DIFFUSE], d, 1 - T);
 }
 
 static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
@@ -96,7 +95,7 @@ static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[
 {
     if (!(d->wo[2] > 0)) return false;
     const struct at a = at_inputs(b, in);
-    if (!(u[0] < facet_chance(&a, in, d->wo[2]))) return imp__lambert_sample(&u[1], d);
+    if (!(u[0] < facet_chance(&a, in, d))) return imp__lambert_sample(&u[1], d);
     const imp_v3 h = imp__microfacet_sample(&a.facets, &d->wo, &u[1]);
     const double c = imp__dot(d->wo, h);
     if (!(c > 0)) return false;
@@ -109,7 +108,7 @@ static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp
     if (!imp__front(d)) return 0;
     const struct at a = at_inputs(b, in);
     const imp_v3 h = imp__normalize(d->wo + d->wi);
-    const double q = facet_chance(&a, in, d->wo[2]);
+    const double q = facet_chance(&a, in, d);
     return q * imp__microfacet_pdf(&a.facets, &d->wo, &h) / (4 * imp__dot(d->wo, h)) +
            (1 - q) * imp__lambert(d);
 }

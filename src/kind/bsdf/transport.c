@@ -25,7 +25,7 @@ void imp__bsdf_transposed(const struct imp_bsdf *b, const imp_spec *in,
 
 static struct imp_dirs exchanged(const struct imp_dirs *d)
 {
-    return (struct imp_dirs){d->wi, d->wo, d->lobe};
+    return (struct imp_dirs){d->wi, d->wo, d->lobe, d->derivative};
 }
 
 bool imp__bsdf_transposed_sample(const struct imp_bsdf *b, const imp_spec *in,
