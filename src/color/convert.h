@@ -19,7 +19,8 @@ struct imp__color_ask {
     enum imp_role role;
     bool scalar; /* one number of a colour: the mean of the three, in mono mode the
                     luminance */
-    bool any_size; /* colours above 1 are lifted as they are, of a role that is no light */
+    bool
+        any_size; /* colours above 1 are lifted as they are, of a role that is no light */
 };
 
 /* What it turns into. In spectral modes `value` is the colour in rgb, for what needs no
