@@ -221,7 +221,19 @@ class Fixture:
         lib.imp_scene_find_param(self.scene, b"(marker)", C.byref(C.c_size_t()))
         lib.imp_context_create((C.c_size_t * 8)(12), C.byref(C.c_void_p()))
 
+    def aligned(self, ctype):
+        """Zeros at a multiple of 64 bytes, with room behind them: vectors are aligned to 32, and
+        the compiler lays structs with vectors out with gaps that ctypes does not know."""
+        raw = (C.c_char * (C.sizeof(ctype) + 320))()
+        a = ctype.from_buffer(raw, -C.addressof(raw) % 64)
+        self.keep += [raw, a]
+        return a
+
     def array(self, ctype, n, values=None):
+        if ctype is C.c_double:
+            a = self.aligned(ctype * n)
+            a[:len(values or [])] = values or []
+            return a
         a = (ctype * n)(*(values or []))
         self.keep.append(a)
         return a
@@ -396,14 +408,14 @@ class Fixture:
             return C.addressof(v), None if a.const else v
         if name in ("struct imp_input", "struct imp_sink") or name == "imp_dot_fn":
             nothing = C.CFUNCTYPE(C.c_double)(lambda: 0.)
-            s = a.struct() if a.struct is not None else None
+            s = self.aligned(a.struct) if a.struct is not None else None
             self.keep += [nothing, s]
             if s is None: return C.cast(nothing, C.c_void_p), None
             if name == "struct imp_sink": s.add = C.cast(nothing, C.c_void_p)
             else: s.count = 1  # one number, of parameter 0
             return C.addressof(s), None
         if a.struct is not None:  # arrays: exits, cotangents, arrivals
-            s = self.array(a.struct, 4096)
+            s = self.aligned(a.struct * 4096)
             if key == "imp_bend_adjoint.exits":
                 lib.imp_bend_trace(self.current_field, None, C.byref(self.struct("imp_bend_rays")), s, None, None)
             return C.addressof(s), None if a.const else s
