@@ -26,7 +26,7 @@ def setting(noise_spp=256, res=16):
 def test_answer():
     """The truth comes back within its errors; covariance and intervals belong together"""
     s, target, p, truth = setting()
-    f = im.fit(s, target, p, optimizer="lm", spp=64, seed=3)
+    f = im.fit(s, target, p, optimizer="lm", spp=256, seed=3)
     v = f["red.reflectance"]
     worst = z(v.value, truth, v.se, most_se=.1)
     assert np.allclose(p[RED], v.value) and np.allclose(v.start, [.4, .3, .2])
@@ -36,7 +36,7 @@ def test_answer():
     lo, hi = v.interval
     assert np.allclose((hi - lo)[free], 2 * 1.959964 * v.se[free], rtol=1e-5)
     assert f.names == [RED + "[%d]" % k for k in range(3)] and len(f.history) == f.iterations or f.iterations
-    z(f.chi2, 1, f.chi2_se, most_se=10, what="chi-square")
+    z(f.chi2, 1, f.chi2_se, most_se=3, what="chi-square")
     assert f.reason and RED in repr(f) and "<table>" in f._repr_html_() and "<svg" in f._repr_html_()
     return "z %.2f" % worst
 
