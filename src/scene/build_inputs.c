@@ -306,6 +306,10 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
     imp__node_ask(node, d->name);
     *in = (struct imp_input){.param = -1, .scalar = scalar};
     if (d->flags & IMP_INPUT_LUMINANCE) {
+        if (imp__is_spectral(scene->mode))
+            IMP_TRY(imp__node_error(ctx, node, IMP_E_UNSUPPORTED,
+                                    "needs the luminance of a colour, which a walk of "
+                                    "wavelengths does not know: use rgb or mono mode"));
         in->count = 1;
         return IMP_OK;
     }

@@ -57,6 +57,10 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_b
     enum imp_status st = IMP_OK;
     struct merl *m = self;
     const char *filename;
+    if (b->mode == IMP_SPECTRAL || b->mode == IMP_SINGLE)
+        IMP_TRY(imp_build_error(b, NULL, IMP_E_UNSUPPORTED,
+                                "is measured in red, green and blue: in rgb and mono "
+                                "modes only"));
     IMP_TRY(imp_build_string(b, "filename", NULL, &filename));
     m->table = b->node->merl;
     if (!m->table)

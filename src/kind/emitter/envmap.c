@@ -118,6 +118,9 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_e
     bool compensation;
     int projection;
 
+    if (b->mode == IMP_SPECTRAL || b->mode == IMP_SINGLE)
+        IMP_TRY(imp_build_error(b, NULL, IMP_E_UNSUPPORTED,
+                                "maps of the sky are in rgb and mono modes only"));
     IMP_TRY(imp_build_string(b, "filename", NULL, &filename));
     IMP_TRY(imp_build_choice(b, "projection", projections, 2, IMP_LATLONG, &projection));
     /* Mitsuba's, for less noise: accepted, without effect here. */

@@ -68,6 +68,9 @@ static enum imp_status build(const struct imp_build *b, void *self,
     v->wrap = (enum wrap)wrap;
     v->filter = (enum filter)filter;
     memcpy(v->n, g->n, sizeof v->n);
+    if (g->channels == 3 && (b->mode == IMP_SPECTRAL || b->mode == IMP_SINGLE))
+        return imp_build_error(b, NULL, IMP_E_UNSUPPORTED,
+                               "grids of three channels are in rgb and mono modes only");
     const bool grey = g->channels == 3 && b->mode == IMP_MONO;
     v->channels = grey ? 1 : g->channels;
     const size_t cells = (size_t)v->n[0] * (size_t)v->n[1] * (size_t)v->n[2],
