@@ -354,7 +354,8 @@ static void films(void)
         node_string(n, strings[k].name, strings[k].value);
         film_refused(n, IMP_E_SCENE, strings[k].words);
     }
-    film_refused(node_new("film", "tapefilm"), IMP_E_UNSUPPORTED, "there are: hdrfilm, specfilm");
+    film_refused(node_new("film", "tapefilm"), IMP_E_UNSUPPORTED,
+                 "there are: hdrfilm, specfilm");
     n = node_new("film", "hdrfilm");
     imp__node_add_child(&world.arena, n, node_new("rfilter", "lanczos"), NULL, n->loc);
     film_refused(n, IMP_E_UNSUPPORTED, "it has box, tent, gaussian");
