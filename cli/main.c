@@ -9,6 +9,8 @@
 
 #include <errno.h>
 #include <signal.h>
+#include <stdint.h>
+#include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -80,6 +82,7 @@ int cli_run_command(int argc, char **argv)
     cli.name = command->args.command;
     cli.answer = command->answer;
     cli.argc = argc;
+    free(cli.argv); /* of merge, which runs another command */
     cli.argv = cli_alloc((size_t)argc + 1, sizeof *cli.argv);
     memcpy(cli.argv, argv, (size_t)argc * sizeof *argv); /* getopt reorders argv */
     /* --help needs no operands. */
@@ -88,6 +91,7 @@ int cli_run_command(int argc, char **argv)
             args_help(&command->args, stdout);
             return EXIT_DONE;
         }
+    for (size_t k = 0; k < cli.typed.n; k++) free((void *)(uintptr_t)cli.typed.item[k]);
     args_list_free(&cli.typed);
     rc = args_parse(&command->args, argc, argv, &first, &cli.typed);
     cli.n_operands = argc - first;
