@@ -6,6 +6,7 @@
 #include "base/arguments.h"
 #include "estimate.h"
 #include "fit.h"
+#include "math/linalg.h"
 #include "search/covariance.h"
 #include <math.h>
 #include <string.h>
@@ -132,16 +133,53 @@ void imp__fit_answer_free(struct imp_problem *p)
     imp__arena_free(&p->fit_arena);
 }
 
-/* Of both sources of error together, in the result's memory. */
-static enum imp_status
-covariance_give(struct imp__fit *f, const struct imp__uncertainty *u, const double **out)
+/* The nearest matrix without negative eigenvalues, in place. */
+static enum imp_status clip_negative(imp_context *ctx, size_t n, double *matrix)
 {
-    const size_t nn = u->n * u->n;
-    if (!nn) return IMP_OK;
-    double *sum = imp__arena_array(&f->problem->fit_arena, nn, sizeof *sum);
-    if (!sum)
+    enum imp_status st = IMP_OK;
+    double *values = imp__alloc(ctx, n, sizeof *values);
+    double *vectors = imp__alloc(ctx, n * n, sizeof *vectors);
+    if (!values || !vectors)
+        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a covariance"));
+    if (!imp__eigen_symmetric(n, matrix, values, vectors))
+        IMP_TRY(imp__error(ctx, IMP_E_NUMERIC, "no eigenvalues of a covariance"));
+    memset(matrix, 0, n * n * sizeof *matrix);
+    for (size_t k = 0; k < n; k++)
+        for (size_t i = 0; values[k] > 0 && i < n; i++)
+            for (size_t j = 0; j < n; j++)
+                matrix[i * n + j] += values[k] * vectors[k * n + i] * vectors[k * n + j];
+out:
+    imp__release(ctx, values);
+    imp__release(ctx, vectors);
+    return st;
+}
+
+/* Of both sources of error together, in the result's memory. Each element is an unbiased
+ * estimate, so the matrix may have negative eigenvalues, and correlations beyond 1: these
+ * are clipped, and the variances are those of the intervals (rows). */
+static enum imp_status covariance_give(struct imp__fit *f,
+                                       const struct imp__uncertainty *u,
+                                       const struct imp_fit_variable *rows,
+                                       const double **out)
+{
+    const size_t n = u->n;
+    if (!n) return IMP_OK;
+    double *sum = imp__arena_array(&f->problem->fit_arena, n * n, sizeof *sum);
+    double *by = imp__arena_array(&f->problem->fit_arena, n, sizeof *by);
+    if (!sum || !by)
         return imp__error(f->problem->ctx, IMP_E_NOMEM, "no memory for a covariance");
-    for (size_t i = 0; i < nn; i++) sum[i] = u->measurement[i] + u->monte_carlo[i];
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j < n; j++) /* rounding leaves the halves a bit apart */
+            sum[i * n + j] =
+                0.5 * (u->measurement[i * n + j] + u->monte_carlo[i * n + j] +
+                       u->measurement[j * n + i] + u->monte_carlo[j * n + i]);
+    IMP_CHECKED(clip_negative(f->problem->ctx, n, sum));
+    for (size_t k = 0; k < n; k++) {
+        const double variance = sum[k * n + k];
+        by[k] = variance > 0 && isfinite(rows[k].se) ? rows[k].se / sqrt(variance) : 1;
+    }
+    for (size_t i = 0; i < n; i++)
+        for (size_t j = 0; j < n; j++) sum[i * n + j] *= by[i] * by[j];
     *out = sum;
     return IMP_OK;
 }
@@ -179,7 +217,7 @@ enum imp_status imp__fit_answer(struct imp__fit *f, struct imp__search *s,
         return imp__error(f->problem->ctx, IMP_E_NOMEM,
                           "no memory for the result of a fit");
     const double *covariance = NULL;
-    IMP_CHECKED(covariance_give(f, u, &covariance));
+    IMP_CHECKED(covariance_give(f, u, rows, &covariance));
     *answer = (struct imp__fit_answer){.search = s};
     const enum imp_status st = blocks_make(f, start);
     if (st != IMP_OK) {

@@ -6,7 +6,9 @@
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "inverse_scenes.h"
+#include "math/linalg.h"
 #include <math.h>
+#include <string.h>
 #include <unistd.h>
 
 static imp_context *ctx;
@@ -132,11 +134,12 @@ static void ball(void)
     imp_scene_destroy(s);
 }
 
-/* The covariance holds the standard errors of what no bound holds, and correlations. */
+/* The covariance holds the standard errors of what no bound holds, and correlations; it
+ * has no negative eigenvalue. */
 static void covariance_check(const struct imp_fit_result *r, const char *what)
 {
     int good = r->covariance != NULL;
-    size_t free = 0;
+    size_t n_free = 0;
     for (size_t k = 0; good && k < r->n; k++)
         for (size_t l = 0; l < r->n; l++) {
             const double c = r->covariance[k * r->n + l];
@@ -145,9 +148,21 @@ static void covariance_check(const struct imp_fit_result *r, const char *what)
             good &= fabs(c - r->covariance[l * r->n + k]) <= 1e-9 * a->se * b->se;
             good &= fabs(c) <= a->se * b->se * (1 + 1e-9);
             if (k == l) good &= fabs(sqrt(c) - a->se) <= 1e-12 * a->se;
-            free += k == l;
+            n_free += k == l;
         }
-    tap_ok(good && free > 0, "%s: covariance of %zu numbers", what, free);
+    double *copy = malloc(r->n * r->n * sizeof *copy), trace = 0;
+    double *values = malloc(r->n * sizeof *values);
+    double *vectors = malloc(r->n * r->n * sizeof *vectors);
+    if (good && copy && values && vectors) {
+        memcpy(copy, r->covariance, r->n * r->n * sizeof *copy);
+        good &= imp__eigen_symmetric(r->n, copy, values, vectors);
+        for (size_t k = 0; k < r->n; k++) trace += values[k];
+        good &= values[0] >= -1e-12 * trace;
+    }
+    free(copy);
+    free(values);
+    free(vectors);
+    tap_ok(good && n_free > 0, "%s: covariance of %zu numbers", what, n_free);
 }
 
 /* Both lamps of the box from one picture, colour by colour; the wall whose colour is seen
@@ -188,6 +203,35 @@ static void box(enum imp_optimizer kind)
     if (st == IMP_OK) covariance_check(r, optimizer[kind]);
     imp_problem_destroy(p);
     for (int k = 0; k < 2; k++) imp_film_destroy(film[k]);
+    imp_scene_destroy(s);
+}
+
+/* Few samples: the estimates of the covariances are as noisy as the picture, and what is
+ * given out is a covariance still. */
+static void few_samples(void)
+{
+    imp_scene *s = scene_open(ctx, box_xml, IMP_RGB);
+    imp_film *film;
+    struct imp_target t = target_of(ctx, s, 0, 64, 80, &film);
+    const char *const globs[] = {"lamp*", "green.*"};
+    for (uint64_t seed = 1; seed <= 4; seed++) {
+        struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
+        const struct imp_run run = run_of(4, seed);
+        const struct imp_fit_result *r = NULL;
+        imp_problem *p = problem_of(s, globs, 2);
+        char what[32];
+        snprintf(what, sizeof what, "4 samples, seed %d", (int)seed);
+        t.noise_se = NULL;
+        o.optimizer = IMP_LM;
+        o.intervals = 1;
+        o.max_iterations = 3;
+        enum imp_status st = imp_problem_add_target(p, &t);
+        if (st == IMP_OK) st = imp_fit(p, &o, &run, &r);
+        if (st == IMP_OK) covariance_check(r, what);
+        else tap_ok(0, "%s: %s", what, imp_last_error(ctx));
+        imp_problem_destroy(p);
+    }
+    imp_film_destroy(film);
     imp_scene_destroy(s);
 }
 
@@ -457,6 +501,7 @@ int main(void)
     ball();
     box(IMP_LM);
     box(IMP_ADAM);
+    few_samples();
     mask();
     resume(IMP_ADAM);
     resume(IMP_LM);
