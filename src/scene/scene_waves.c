@@ -5,7 +5,8 @@
 #include "color/cie.h"
 #include "scene_build.h"
 
-#define BIN_NM 1.0
+#define BIN_NM   1.0
+#define BINS_MAX 4096 /* of a range that a file may make as wide as it likes */
 /* Of the mean light, added everywhere: where lights are dark a derivative may not be. */
 #define LIGHT_FLOOR 0.05
 
@@ -32,7 +33,7 @@ static double seen_at(const struct imp_wavelengths *w, bool observer, double nm)
 static enum imp_status density_make(struct imp_scene *scene, struct imp_wavelengths *w,
                                     bool observer)
 {
-    const int n = (int)ceil((w->hi - w->lo) / BIN_NM);
+    const int n = (int)fmin(ceil((w->hi - w->lo) / BIN_NM), BINS_MAX);
     const double bin = (w->hi - w->lo) / n;
     double *cdf = imp__arena_array(&scene->arena, (size_t)n + 1, sizeof *cdf);
     double *light = imp__arena_array(&scene->arena, (size_t)n, sizeof *light);
