@@ -78,12 +78,14 @@ static struct imp_fit_variable variable_at(const imp_problem *problem, size_t i)
 }
 
 static void put_variable(struct json *j, const imp_problem *problem, size_t i,
-                         const char *unit, const char *name)
+                         const struct block *b, const char *name)
 {
     const struct imp_fit_variable all = variable_at(problem, i), *v = &all;
     json_object(j, NULL);
     json_text(j, "name", name);
-    json_text(j, "unit", unit);
+    json_text(j, "unit", b->info.unit);
+    json_number(j, "min", b->info.lo);
+    json_number(j, "max", b->info.hi);
     json_number(j, "start", v->start);
     json_number(j, "value", v->value);
     json_number(j, "se", v->se);
@@ -102,6 +104,23 @@ static void put_texture(struct json *j, const struct block *b, const char *path)
     json_text(j, "file", path);
     json_end_object(j);
 }
+
+/* What a report draws and a table does not print: the loss by iteration, and the
+ * covariance of few numbers. */
+static void put_curves(struct json *j, const struct imp_fit_result *r)
+{
+    enum { COVARIANCE_MAX = 64 };
+    json_object(j, "history");
+    json_numbers(j, "loss", r->n_history, r->history);
+    if (r->history_se) json_numbers(j, "se", r->n_history, r->history_se);
+    json_end_object(j);
+    if (!r->covariance || r->n > COVARIANCE_MAX) return;
+    json_array(j, "covariance");
+    for (size_t i = 0; i < r->n; i++)
+        json_numbers(j, NULL, r->n, r->covariance + i * r->n);
+    json_end_array(j);
+}
+
 static void put_json(struct json *j, const imp_problem *problem,
                      const struct imp_fit_result *r, const struct block *blocks,
                      size_t n_blocks, char **paths)
@@ -133,10 +152,11 @@ static void put_json(struct json *j, const imp_problem *problem,
             continue;
         }
         for (size_t i = 0; i < b->n; i++)
-            put_variable(j, problem, b->first + i, b->info.unit,
+            put_variable(j, problem, b->first + i, b,
                          cli_number_name(&b->info, i, name, sizeof name));
     }
     json_end_array(j);
+    put_curves(j, r);
 }
 
 static int write_json(const imp_problem *problem, const struct imp_fit_result *r,

@@ -47,26 +47,43 @@ int fit_pictures_write(const char *name, int spp)
     return rc;
 }
 
+/* The target as the fit compares it, with its standard errors where it has them. */
+static enum imp_status target_film(const struct imp_target *t, imp_film **out)
+{
+    const size_t n = (size_t)t->width * (size_t)t->height, c = (size_t)t->channels,
+                 all = t->noise_se ? 2 * c : c;
+    const char *names = c == 3        ? t->noise_se ? "R,G,B,se.R,se.G,se.B" : "R,G,B"
+                        : t->noise_se ? "Y,se.Y"
+                                      : "Y";
+    const enum imp_status st =
+        imp_film_create(cli.context, t->width, t->height, names, out);
+    if (st != IMP_OK) return st;
+    float *to = imp_film_mean(*out);
+    for (size_t i = 0; i < n; i++) {
+        memcpy(to + i * all, t->pixels + i * c, c * sizeof *to);
+        if (t->noise_se) memcpy(to + i * all + c, t->noise_se + i * c, c * sizeof *to);
+    }
+    return IMP_OK;
+}
+
 int fit_targets_write(void)
 {
+    const struct picture_options po = {0};
     int rc = 0;
     for (size_t i = 0; i < problem_options.targets.n && !rc; i++) {
         struct imp_target t = IMP_TARGET_INIT;
-        struct imp_write_options w = IMP_WRITE_OPTIONS_INIT;
+        const struct imp_run run = cli_run();
         imp_film *film = NULL;
         rc = picture_target(problem_options.targets.item[i], NULL, &t);
         if (rc) return rc;
-        enum imp_status st = imp_film_create(cli.context, t.width, t.height,
-                                             t.channels == 3 ? "R,G,B" : "Y", &film);
         char *path = picture_path("target", i);
-        memcpy(strrchr(path, '.'), ".png", 4);
-        if (st == IMP_OK) {
-            memcpy(imp_film_mean(film), t.pixels,
-                   (size_t)t.width * (size_t)t.height * (size_t)t.channels *
-                       sizeof(float));
-            st = imp_film_write(film, path, &w);
+        const enum imp_status st = target_film(&t, &film);
+        if (st != IMP_OK) {
+            rc = cli_fail(st, NULL);
+        } else {
+            picture_stamp(film, &run);
+            rc = picture_write(film, path, &po);
         }
-        if (st != IMP_OK) rc = cli_fail(st, NULL);
         imp_film_destroy(film);
         picture_target_free(&t);
         free(path);
@@ -96,7 +113,6 @@ int fit_pictures_writable(void)
     for (size_t i = 0; i < problem_options.targets.n; i++)
         for (size_t k = 0; k < 3 && !rc; k++) {
             char *path = picture_path(pictures[k], i);
-            if (k == 2) memcpy(strrchr(path, '.'), ".png", 4);
             rc = picture_writable(path, 1);
             free(path);
         }

@@ -17,6 +17,7 @@ enum output_kind {
     OUTPUT_CURVE,
     OUTPUT_JSON,
     OUTPUT_WALKS,
+    OUTPUT_PAGE,
     OUTPUT_PLY,
     OUTPUT_VOL,
     OUTPUT_PROFILE,

@@ -10,7 +10,7 @@
 set -uo pipefail
 library=${1:+$(realpath "$1")}
 cd "$(dirname "$0")/.." || exit 1
-rooms=(base math color kind scene search bend elements walk film inverse format render)
+rooms=(base math color kind scene search bend elements walk film inverse format render report)
 bad=0
 
 complain() {

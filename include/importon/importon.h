@@ -445,6 +445,10 @@ IMP_API float *imp_film_se(imp_film *film);
 IMP_API IMP_MUST_CHECK enum imp_status imp_film_set_text(imp_film *film, const char *key,
                                                          const char *value);
 
+/** The text attribute with this key, made here or read from an EXR file; belongs to the
+ * film. NULL if there is none. */
+IMP_API const char *imp_film_get_text(const imp_film *film, const char *key);
+
 struct imp_write_options {
     size_t size;
     int half;           /**< 16-bit floats instead of 32 (EXR) */

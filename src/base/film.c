@@ -150,6 +150,13 @@ const char *imp_film_channel(const imp_film *f, int channel)
 float *imp_film_mean(imp_film *f) { return f ? f->mean : NULL; }
 float *imp_film_se(imp_film *f) { return f ? f->se : NULL; }
 
+const char *imp_film_get_text(const imp_film *f, const char *key)
+{
+    for (size_t i = 0; f && key && i < f->n_texts; i++)
+        if (strcmp(f->texts[i].key, key) == 0) return f->texts[i].value;
+    return NULL;
+}
+
 enum imp_status imp_film_set_text(imp_film *f, const char *key, const char *value)
 {
     IMP_REQUIRE(NULL, f, "film");

@@ -376,7 +376,7 @@ class Fixture:
                      "imp_bend_load": os.path.join(top, "scenes", "bend", "maxwell.xml"),
                      "imp_film_write": self.folder + "/x.exr", "imp_elements_save": self.folder + "/x.el",
                      "imp_elements_export": self.folder + "/x.ply", "imp_field_write": self.folder + "/x.npy",
-                     "imp_parts_write": self.folder + "/x.part"}
+                     "imp_parts_write": self.folder + "/x.part", "imp_report_write": self.folder + "/x.html"}
             if key == "imp_film_read.path":
                 f, path = self.object("imp_film", ""), self.folder + "/read.exr"
                 lib.imp_film_write(f, path.encode(), None)

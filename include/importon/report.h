@@ -1,0 +1,61 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A result as one HTML page that opens anywhere: pictures with their errors, parameters
+ * with their intervals, losses, checks, and how they were made. The page holds its data as
+ * JSON (docs/report.md describes it, version 1), needs no network, and loads nothing.
+ * Same conventions as importon.h.
+ */
+#ifndef IMPORTON_REPORT_H
+#define IMPORTON_REPORT_H
+
+#include <importon/importon.h>
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/** One part of a report: a picture (`film` is set) or a JSON value (`json` is set). */
+struct imp_report_item {
+    size_t size;
+    const char *kind; /**< "picture", or "derivative": signed, of a parameter; "fit",
+                           "check" and "manifest": the JSON that these commands write.
+                           Others are kept in the page, and not shown */
+    const char *name; /**< what a reader sees; NULL: none */
+    const char *role; /**< of pictures: "target" or "picture", which the page compares;
+                           NULL: neither */
+    const char *unit; /**< of pictures; NULL: none */
+    int view;         /**< of pictures: those of one view are flipped in place */
+    const imp_film *film; /**< its means, and its standard errors if it has them */
+    const char *json;     /**< one JSON value (RFC 8259), UTF-8 */
+};
+#define IMP_REPORT_ITEM_INIT                                                             \
+    {                                                                                    \
+        sizeof(struct imp_report_item), 0, 0, 0, 0, 0, 0, 0                              \
+    }
+
+struct imp_report {
+    size_t size;
+    const char *title;   /**< NULL: "importon report" */
+    const char *command; /**< that made the result, to be copied; NULL: not known */
+    const struct imp_report_item *items; /**< [n_items]; all are copied into the page */
+    size_t n_items;
+};
+#define IMP_REPORT_INIT                                                                  \
+    {                                                                                    \
+        sizeof(struct imp_report), 0, 0, 0, 0                                            \
+    }
+
+/** Write the page; it appears whole or not at all. Pictures are stored as 16-bit floats,
+ * scaled by a power of two to their largest value: 11 significant bits, 8/3 bytes a
+ * number. Texts are shown as text whatever they contain.
+ * @return IMP_OK; IMP_E_ARG for an item without a kind, or with neither or both of film
+ *         and json, or JSON that does not parse (the message has its offset); IMP_E_IO;
+ *         IMP_E_NOMEM. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_report_write(imp_context *context, const struct imp_report *report, const char *path);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

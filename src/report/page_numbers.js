@@ -1,0 +1,195 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Parameters with their intervals, correlations, the loss by iteration, checks, and how
+ * the result was made. */
+"use strict";
+
+const rows_shown = 200; /* a table of a million rows helps nobody: the rest is searched */
+
+/* ---- Parameters ----------------------------------------------------------------------- */
+
+/* Start, value and interval on one axis; the bounds of the parameter are its ends where
+ * they are near. */
+function interval_bar(p) {
+    const svg = make_svg("svg", {width: 220, height: 20, viewBox: "0 0 220 20", role: "img", "aria-label": "interval"});
+    const known = [p.start, p.value, p.lo95, p.hi95].filter(is_number);
+    if (known.length < 2) return svg;
+    let lo = Math.min(...known), hi = Math.max(...known);
+    const margin = (hi - lo || Math.abs(hi) || 1) * 0.1;
+    [lo, hi] = [lo - margin, hi + margin];
+    if (is_number(p.min)) lo = Math.max(lo, p.min);
+    if (is_number(p.max)) hi = Math.min(hi, p.max);
+    if (!(hi > lo)) return svg;
+    const at = (v) => 6 + 208 * Math.min(Math.max((v - lo) / (hi - lo), 0), 1);
+    svg.append(make_svg("line", {x1: 6, y1: 10, x2: 214, y2: 10, class: "axis"}));
+    if (is_number(p.lo95) && is_number(p.hi95))
+        svg.append(make_svg("rect", {x: at(p.lo95), y: 5, width: Math.max(at(p.hi95) - at(p.lo95), 1.5), height: 10, class: "band"}));
+    if (is_number(p.start)) svg.append(make_svg("line", {x1: at(p.start), y1: 3, x2: at(p.start), y2: 17, class: "mark"}));
+    if (is_number(p.value)) svg.append(make_svg("circle", {cx: at(p.value), cy: 10, r: 3.5, fill: "var(--accent)"}));
+    return svg;
+}
+
+function state_of(p) {
+    if (p.determined === false) return ["not determined by the pictures", "warn"];
+    if (p.at_bound < 0) return ["at its lower bound", "warn"];
+    if (p.at_bound > 0) return ["at its upper bound", "warn"];
+    return ["", ""];
+}
+
+function parameter_section(fit) {
+    const numbers = fit.params.filter((p) => p.name !== undefined && p.file === undefined);
+    const files = fit.params.filter((p) => p.file !== undefined);
+    const body = make("tbody"), told = make("p", {class: "faint"});
+    function fill(pattern) {
+        const match = numbers.filter((p) => String(p.name).toLowerCase().includes(pattern.toLowerCase()));
+        body.replaceChildren(...match.slice(0, rows_shown).map((p) => {
+            const [text, colour] = state_of(p), relative = is_number(p.se) && p.value ? Math.abs(p.se / p.value) : NaN;
+            return make("tr", {}, make("td", {class: "mono"}, String(p.name)), make("td", {}, show(p.start)),
+                make("td", {}, show(p.value)), make("td", {}, show(p.se, 2)),
+                make("td", {}, is_number(relative) ? `${show(100 * relative, 2)} %` : "–"),
+                make("td", {}, is_number(p.lo95) ? `${show(p.lo95)} to ${show(p.hi95)}` : "–"),
+                make("td", {}, interval_bar(p)), make("td", {class: "text"}, p.unit === "1" ? "" : p.unit || ""),
+                make("td", {class: `text ${colour}`}, text));
+        }));
+        told.textContent = match.length > rows_shown ? `${rows_shown} of ${match.length} are shown; the field above finds others.` : "";
+    }
+    const find = make("input", {type: "search", "aria-label": "find a parameter", placeholder: "find a parameter", input: () => fill(find.value)});
+    fill("");
+    const least = numbers.filter((p) => is_number(p.se) && p.value).sort((a, b) => Math.abs(b.se / b.value) - Math.abs(a.se / a.value))[0];
+    const missing = numbers.filter((p) => p.determined === false);
+    return make("section", {id: "parameters"}, make("h2", {}, "Parameters"),
+        missing.length ? make("p", {class: "warning"}, `The pictures do not determine ${missing.length} of ${numbers.length} numbers: ${missing.slice(0, 5).map((p) => p.name).join(", ")}${missing.length > 5 ? ", ..." : ""}.`) : null,
+        least ? make("p", {}, `Least certain, relative to its value: ${least.name}, ± ${show(100 * Math.abs(least.se / least.value), 2)} % (one standard error).`) : null,
+        numbers.length > 12 ? make("div", {class: "bar noprint"}, find) : null,
+        numbers.length ? make("div", {class: "scroll"}, make("table", {}, make("thead", {}, make("tr", {},
+            ...["name", "start", "value", "se", "relative", "95 % interval", "start (tick), value (dot), interval", "unit", ""].map((t, i) =>
+                make("th", {class: i > 6 ? "text" : null, scope: "col"}, t)))), body)) : make("p", {}, "No single numbers were fitted."),
+        told, ...files.map((p) => make("p", {}, `${p.name}: ${p.count} numbers, in ${p.file}`)));
+}
+
+/* ---- Correlations --------------------------------------------------------------------- */
+
+function correlation_section(fit) {
+    const c = fit.covariance, names = fit.params.filter((p) => p.file === undefined).map((p) => String(p.name)), n = names.length;
+    if (!Array.isArray(c) || c.length !== n || n < 2 || n > 60) return null;
+    const r = c.map((row, i) => row.map((v, j) => v / Math.sqrt(c[i][i] * c[j][j])));
+    const cell = n > 24 ? 16 : 30, left = Math.min(240, 8 * Math.max(...names.map((s) => s.length)) + 10), size = n * cell;
+    const svg = make_svg("svg", {width: left + size + 10, height: size + 20 + 10, viewBox: `0 0 ${left + size + 10} ${size + 30}`, role: "img", "aria-label": "correlations"});
+    let worst = null;
+    r.forEach((row, i) => {
+        svg.append(make_svg("text", {x: left - 6, y: 20 + cell * i + cell / 2 + 4, "text-anchor": "end"}, names[i].length > 28 ? names[i].slice(0, 27) + "…" : names[i]));
+        svg.append(make_svg("text", {x: left + cell * (i + 0.5), y: 14, "text-anchor": "middle"}, String(i + 1)));
+        row.forEach((v, j) => {
+            if (!is_number(v)) return;
+            if (j < i && (!worst || Math.abs(v) > Math.abs(worst.v))) worst = {v, i, j};
+            const rect = make_svg("rect", {x: left + cell * j, y: 20 + cell * i, width: cell - 1, height: cell - 1, fill: `rgb(${signed_colour(v).map(Math.round).join(",")})`});
+            rect.append(make_svg("title", {}, `${names[i]}, ${names[j]}: ${show(v, 3)}`));
+            svg.append(rect);
+            if (cell >= 30) {
+                const text = make_svg("text", {x: left + cell * (j + 0.5), y: 20 + cell * (i + 0.5) + 4, "text-anchor": "middle", style: "fill: #111; font-size: 10px"}, v.toFixed(2).replace("0.", "."));
+                svg.append(text);
+            }
+        });
+    });
+    return make("section", {id: "correlations"}, make("h2", {}, "Correlations of the errors"),
+        worst && Math.abs(worst.v) > 0.9 ? make("p", {class: "warning"}, `${names[worst.i]} and ${names[worst.j]} are hard to tell apart: correlation ${show(worst.v, 3)}.`) : null,
+        make("div", {class: "scroll"}, svg));
+}
+
+/* ---- The loss -------------------------------------------------------------------------- */
+
+/* y as asinh(y / (2 unit)): logarithmic far above the errors, linear among them, since an
+ * unbiased loss may be negative. */
+function loss_section(fit) {
+    const h = fit.history;
+    if (!h || !Array.isArray(h.loss) || h.loss.length < 1) return null;
+    const se = Array.isArray(h.se) ? h.se : [], n = h.loss.length, w = 720, ht = 300, left = 84, bottom = 44, top = 14, right = 16;
+    const finite = h.loss.filter(is_number);
+    if (!finite.length) return null;
+    const errors = se.filter((s) => is_number(s) && s > 0);
+    const largest = Math.max(...finite.map(Math.abs)) || 1;
+    const unit = Math.max(errors.length ? Math.min(...errors) : largest * 1e-6, largest * 1e-8);
+    const hi = 1.2 * Math.max(...finite, unit), lo = Math.min(...finite, 0) - 0.5 * unit;
+    const bend = (y) => Math.asinh(y / (2 * unit));
+    const y_at = (y) => ht - bottom - (ht - bottom - top) * (bend(Math.min(Math.max(y, lo), hi)) - bend(lo)) / (bend(hi) - bend(lo));
+    const x_at = (i) => left + (w - left - right) * (n > 1 ? i / (n - 1) : 0.5);
+    const svg = make_svg("svg", {width: w, height: ht, viewBox: `0 0 ${w} ${ht}`, role: "img", "aria-label": "loss by iteration"});
+    const level = (v) => {
+        if (v < lo || v > hi) return;
+        svg.append(make_svg("line", {x1: left, x2: w - right, y1: y_at(v), y2: y_at(v), class: "axis"}),
+            make_svg("text", {x: left - 8, y: y_at(v) + 4, "text-anchor": "end"}, show(v, 2)));
+    };
+    level(0);
+    const first = Math.ceil(Math.log10(unit)), last = Math.log10(hi), step = Math.max(1, Math.ceil((last - first) / 8));
+    for (let k = first; k <= last; k += step) level(10 ** k);
+    const stride = Math.max(1, 10 ** Math.floor(Math.log10(Math.max(n - 1, 1) / 4)));
+    const each = [1, 2, 5, 10].map((m) => m * stride).find((m) => (n - 1) / m <= 10) || 10 * stride;
+    for (let i = 0; i < n; i += each) svg.append(make_svg("text", {x: x_at(i), y: ht - bottom + 18, "text-anchor": "middle"}, String(i)));
+    svg.append(make_svg("text", {x: (left + w - right) / 2, y: ht - 8, "text-anchor": "middle"}, "iteration"),
+        make_svg("text", {transform: `translate(14 ${(top + ht - bottom) / 2}) rotate(-90)`, "text-anchor": "middle"}, `loss (${fit.loss || "?"})`));
+    if (se.length === n && n > 1) {
+        const ok = h.loss.map((v, i) => i).filter((i) => is_number(h.loss[i]) && is_number(se[i]));
+        const up = ok.map((i) => `${x_at(i).toFixed(1)} ${y_at(h.loss[i] + se[i]).toFixed(1)}`);
+        const down = ok.map((i) => `${x_at(i).toFixed(1)} ${y_at(h.loss[i] - se[i]).toFixed(1)}`).reverse();
+        svg.append(make_svg("path", {class: "band", d: `M${[...up, ...down].join("L")}Z`}));
+    }
+    const points = h.loss.map((v, i) => [v, i]).filter(([v]) => is_number(v));
+    svg.append(make_svg("path", {class: "curve", d: `M${points.map(([v, i]) => `${x_at(i).toFixed(1)} ${y_at(v).toFixed(1)}`).join("L")}`}));
+    for (const [v, i] of points.length < 60 ? points : [])
+        svg.append(make_svg("circle", {cx: x_at(i), cy: y_at(v), r: 3, fill: "var(--accent)"}));
+    const cursor = make_svg("line", {y1: top, y2: ht - bottom, class: "mark"});
+    svg.append(cursor);
+    const told = make("p", {class: "mono", "aria-live": "polite"}), trace = make("div", {class: "scroll"});
+    const slider = make("input", {type: "range", min: 0, max: n - 1, value: n - 1, "aria-label": "iteration", input: () => go(Number(slider.value))});
+    function go(i) {
+        cursor.setAttribute("x1", x_at(i));
+        cursor.setAttribute("x2", x_at(i));
+        told.textContent = `iteration ${i}: loss ${show_error(h.loss[i], se[i])}`;
+        const x = h.x && h.x[i], names = h.names || [];
+        if (Array.isArray(x))
+            trace.replaceChildren(make("table", {}, make("tbody", {}, ...x.slice(0, 40).map((v, k) =>
+                make("tr", {}, make("td", {class: "mono"}, String(names[k] ?? k)), make("td", {}, show(v)))))));
+    }
+    go(n - 1);
+    return make("section", {id: "loss"}, make("h2", {}, "Loss"), make("div", {class: "scroll"}, svg),
+        n > 1 ? make("div", {class: "bar noprint"}, make("label", {}, "iteration ", slider)) : null, told, trace);
+}
+
+/* ---- Checks and provenance --------------------------------------------------------------- */
+
+function check_section(check) {
+    const rows = Array.isArray(check.rows) ? check.rows : [], bad = rows.filter((r) => r.ok === false && r.resolved !== false);
+    return make("section", {id: "check"}, make("h2", {}, "Checks of the gradient"),
+        make("p", {class: bad.length ? "error" : ""}, bad.length ? `${bad.length} of ${rows.length} rows disagree.` : `${rows.length} rows; none disagrees.`),
+        make("div", {class: "scroll"}, make("table", {}, make("thead", {}, make("tr", {},
+            ...["method", "parameter", "step", "derivative", "reference", "error", "limit", ""].map((t) => make("th", {scope: "col"}, t)))),
+            make("tbody", {}, ...rows.slice(0, rows_shown).map((r) => {
+                const [text, colour] = r.resolved === false ? ["too noisy to tell", "warn"] : r.ok === false ? ["disagrees", "bad"] : ["agrees", "good"];
+                return make("tr", {}, make("td", {}, String(r.method)), make("td", {class: "mono text"}, String(r.param)), make("td", {}, show(r.step, 2)),
+                    make("td", {}, show(r.value)), make("td", {}, show(r.reference)),
+                    make("td", {}, `${show(r.error, 3)}${r.se > 0 ? " se" : ""}`), make("td", {}, show(r.limit, 2)), make("td", {class: `text ${colour}`}, text));
+            })))));
+}
+
+function provenance_section(command, report, items) {
+    const facts = new Map([["made by", `importon ${report.importon}`]]);
+    for (const item of items) {
+        const d = item.data;
+        if (item.kind === "fit" && d)
+            for (const key of ["optimizer", "loss", "seed", "spp", "spp_taken", "iterations"])
+                if (d[key] !== undefined && d[key] !== null) facts.set(key.replace("_", " "), String(d[key]));
+        if (item.kind === "manifest" && d)
+            for (const [key, value] of Object.entries(d))
+                if (typeof value !== "object") facts.set(key.replace(/_/g, " "), String(value));
+    }
+    const copy = command ? make("button", {type: "button", class: "noprint", click: () => {
+        const done = () => { copy.textContent = "copied"; };
+        if (navigator.clipboard) navigator.clipboard.writeText(command).then(done, select);
+        else select();
+    }}, "copy the command") : null;
+    const text = make("code", {}, command || "");
+    function select() { getSelection().selectAllChildren(text); }
+    return make("section", {id: "provenance"}, make("h2", {}, "How it was made"),
+        command ? make("p", {}, text) : null, copy,
+        make("table", {}, make("tbody", {}, ...[...facts].map(([k, v]) => make("tr", {}, make("td", {}, k), make("td", {class: "text mono"}, v))))));
+}

@@ -1,0 +1,45 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "planes.h"
+#include <half.h> /* of Imath, which comes with OpenEXR */
+#include <math.h>
+
+enum { GROUP = 3 * 1024 }; /* bytes; a multiple of 3 needs no padding inside the text */
+
+static void put_base64(struct imp_text *t, const unsigned char *bytes, size_t n)
+{
+    static const char digit[] =
+        "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    char text[GROUP / 3 * 4];
+    size_t used = 0;
+    for (size_t i = 0; i < n; i += 3) {
+        const unsigned b = i + 1 < n ? bytes[i + 1] : 0, c = i + 2 < n ? bytes[i + 2] : 0;
+        const unsigned v = (unsigned)bytes[i] << 16 | b << 8 | c;
+        text[used++] = digit[v >> 18];
+        text[used++] = digit[v >> 12 & 63];
+        text[used++] = i + 1 < n ? digit[v >> 6 & 63] : '=';
+        text[used++] = i + 2 < n ? digit[v & 63] : '=';
+    }
+    t->failed = t->failed || !imp__bytes_add(t->ctx, &t->bytes, text, used);
+}
+
+double imp__planes_put(struct imp_text *t, const imp_film *f, const float *values)
+{
+    const size_t n = (size_t)f->width * (size_t)f->height, c = (size_t)f->channels;
+    unsigned char bytes[GROUP];
+    size_t used = 0;
+    float largest = 0;
+    int exponent = 0;
+    for (size_t i = 0; i < n * c; i++)
+        if (isfinite(values[i])) largest = fmaxf(largest, fabsf(values[i]));
+    if (largest > 0) (void)frexpf(largest, &exponent); /* largest < 2^exponent */
+    const double scale = largest > 0 ? ldexp(1, exponent - 15) : 1;
+    for (size_t k = 0; k < c; k++)
+        for (size_t i = 0; i < n; i++) {
+            const uint16_t h = imath_float_to_half((float)(values[i * c + k] / scale));
+            bytes[used++] = (unsigned char)h;
+            bytes[used++] = (unsigned char)(h >> 8);
+            if (used == GROUP) put_base64(t, bytes, used), used = 0;
+        }
+    put_base64(t, bytes, used);
+    return scale;
+}
