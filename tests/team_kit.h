@@ -14,6 +14,7 @@ enum { TEAM_MAX = 7 };
 struct team_hub {
     int ranks;
     int shares; /* no counter: equal shares */
+    const char *(*tamper)(const void *message, size_t bytes); /* with what rank 1 sends */
     pthread_barrier_t barrier;
     const void *message[TEAM_MAX];
     size_t bytes[TEAM_MAX];
@@ -32,6 +33,7 @@ static enum imp_status team_gather(const void *message, size_t bytes,
 {
     const struct team_rank *r = payload;
     struct team_hub *hub = r->hub;
+    if (hub->tamper && r->rank == 1) message = hub->tamper(message, bytes);
     hub->message[r->rank] = message;
     hub->bytes[r->rank] = bytes;
     if (r->rank == 0) hub->sent += bytes;

@@ -120,7 +120,8 @@ IMP_API int imp_context_threads(const imp_context *context);
  * same order with the same arguments, on scenes and targets that are the same. Each
  * computes a share of the walks, and all get the whole result, with the bits that one
  * process alone gives; what is not walks is computed by each. A failure, a cancel or a
- * time limit of one ends the call on all. Calls come from one thread a rank at a time. */
+ * time limit of one ends the call on all. Rank 0 writes files; where others are asked to,
+ * nothing happens. Calls come from one thread a rank at a time. */
 struct imp_team {
     size_t size;
     int rank, ranks; /**< this one, of how many */
@@ -136,10 +137,12 @@ struct imp_team {
      * ranks get equal shares, and none takes over what another has left. */
     int64_t (*next)(uint64_t round, void *payload);
     void *payload;
+    /** Non-zero: rank 0 reads files and gives their bytes to all. 0: each reads them. */
+    int broadcast;
 };
 #define IMP_TEAM_INIT                                                                    \
     {                                                                                    \
-        sizeof(struct imp_team), 0, 1, 0, 0, 0                                           \
+        sizeof(struct imp_team), 0, 1, 0, 0, 0, 0                                        \
     }
 
 /** Work on this context's calls from now on as one rank of a team; NULL: alone again.

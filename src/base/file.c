@@ -3,6 +3,7 @@
  * Reading and writing of whole files. A file is written beside its final name and
  * renamed, so that no reader meets half of it. */
 #include "file.h"
+#include "team.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <limits.h>
@@ -46,8 +47,8 @@ void imp__bytes_free(imp_context *ctx, struct imp_bytes *b)
     *b = (struct imp_bytes){0};
 }
 
-enum imp_status imp__file_read(imp_context *ctx, const char *path, size_t limit,
-                               struct imp_bytes *out)
+static enum imp_status own_read(imp_context *ctx, const char *path, size_t limit,
+                                struct imp_bytes *out)
 {
     enum imp_status st = IMP_OK;
     struct imp_bytes b = {0};
@@ -93,6 +94,52 @@ out:
     close(fd);
     if (st != IMP_OK) imp__bytes_free(ctx, &b);
     return st;
+}
+
+enum imp_status imp__file_read(imp_context *ctx, const char *path, size_t limit,
+                               struct imp_bytes *out)
+{
+    if (!imp__team_broadcasts(ctx)) return own_read(ctx, path, limit, out);
+    struct imp_bytes bytes = {0};
+    enum imp_status st = IMP_OK;
+    if (ctx->team->host.rank == 0) st = own_read(ctx, path, limit, &bytes);
+    st = imp__team_broadcast(ctx, st, &bytes);
+    if (st == IMP_OK) *out = bytes;
+    return st;
+}
+
+bool imp__file_exists(imp_context *ctx, const char *path)
+{
+    struct stat info;
+    struct imp_bytes answer = {0};
+    bool is = stat(path, &info) == 0;
+    if (!imp__team_broadcasts(ctx)) return is;
+    /* A failure shows at the next call of the team. */
+    if (is && !imp__bytes_add(ctx, &answer, "y", 1)) is = false;
+    if (imp__team_broadcast(ctx, IMP_OK, &answer) == IMP_OK) is = answer.size > 0;
+    imp__bytes_free(ctx, &answer);
+    return is;
+}
+
+enum imp_status imp__file_open(imp_context *ctx, const char *path, struct imp_bytes *held,
+                               FILE **out)
+{
+    *out = NULL;
+    *held = (struct imp_bytes){0};
+    if (imp__team_broadcasts(ctx)) {
+        if (!imp__file_exists(ctx, path)) return IMP_OK;
+        const enum imp_status st = imp__file_read(ctx, path, SIZE_MAX / 2, held);
+        if (st != IMP_OK) return st;
+        *out = fmemopen(held->data, held->size, "rb");
+    } else {
+        *out = fopen(path, "rbe");
+        if (!*out && errno == ENOENT) return IMP_OK;
+    }
+    if (*out) return IMP_OK;
+    imp__bytes_free(ctx, held);
+    char text[256];
+    return imp__error(ctx, IMP_E_IO, "%s: %s", path,
+                      strerror_r(errno, text, sizeof text));
 }
 
 static int write_all(int fd, const unsigned char *p, size_t size)
@@ -168,6 +215,7 @@ enum imp_status imp__file_write_by(imp_context *ctx, const char *path,
                                    const void *payload)
 {
     struct stat info;
+    if (!imp__team_writes(ctx)) return IMP_OK;
     const bool exists = stat(path, &info) == 0;
     if (exists && S_ISDIR(info.st_mode))
         return io_error(ctx, path, "cannot write", EISDIR);

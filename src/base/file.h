@@ -5,6 +5,7 @@
 #define IMP_BASE_FILE_H
 
 #include "context.h"
+#include <stdio.h>
 
 struct imp_bytes { /* growing memory; all zero is empty */
     unsigned char *data;
@@ -15,6 +16,11 @@ struct imp_bytes { /* growing memory; all zero is empty */
  * is a folder, or is longer than `limit`; IMP_E_NOMEM. */
 enum imp_status imp__file_read(imp_context *ctx, const char *path, size_t limit,
                                struct imp_bytes *out);
+/* For reading, as fopen: *out NULL and IMP_OK if there is no such file. `held` keeps bytes
+ * that come from another process: free them when the file is closed. */
+enum imp_status imp__file_open(imp_context *ctx, const char *path, struct imp_bytes *held,
+                               FILE **out);
+bool imp__file_exists(imp_context *ctx, const char *path);
 /* Write a temporary file beside it, flush it to the disk, rename it over `path`: at any
  * failure what was there stays. What is not a regular file (/dev/stdout) is written to.
  */

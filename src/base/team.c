@@ -125,6 +125,60 @@ enum imp_status imp__team_any(imp_context *ctx, bool here, bool *any)
     return team->host.gather(&own, 1, any_receive, any, team->host.payload);
 }
 
+struct broadcast {
+    imp_context *ctx;
+    enum imp_status st;
+    struct imp_bytes message; /* the status, then bytes or an error's text */
+};
+
+static void broadcast_receive(void *receiver, int rank, const void *message, size_t bytes)
+{
+    struct broadcast *b = receiver;
+    if (rank != 0) return;
+    if (bytes < sizeof(uint32_t))
+        b->st = imp__error(b->ctx, IMP_E_ARG, "rank 0 reads no file here");
+    else if (!imp__bytes_add(b->ctx, &b->message, message, bytes) ||
+             !imp__bytes_add(b->ctx, &b->message, "", 1)) /* a zero behind the end */
+        b->st =
+            imp__error(b->ctx, IMP_E_NOMEM, "no memory for a file of %zu bytes", bytes);
+}
+
+enum imp_status imp__team_broadcast(imp_context *ctx, enum imp_status st,
+                                    struct imp_bytes *bytes)
+{
+    const struct imp__team *team = ctx->team;
+    const bool first = team->host.rank == 0;
+    const char *text = imp_last_error(ctx);
+    const uint32_t own = st;
+    struct broadcast b = {.ctx = ctx};
+    struct imp_bytes out = {0};
+    const bool fits =
+        !first ||
+        (imp__bytes_add(ctx, &out, &own, sizeof own) &&
+         imp__bytes_add(ctx, &out, st == IMP_OK ? (const void *)bytes->data : text,
+                        st == IMP_OK ? bytes->size : strlen(text)));
+    /* Without memory for it, rank 0 sends nothing, and all fail. */
+    if (!fits) out.size = 0;
+    const enum imp_status sent =
+        team->host.gather(out.data, out.size, broadcast_receive, &b, team->host.payload);
+    imp__bytes_free(ctx, &out);
+    imp__bytes_free(ctx, bytes);
+    if (sent != IMP_OK) st = imp__error_prefix(ctx, sent, "the team");
+    else st = b.st;
+    if (st == IMP_OK) {
+        uint32_t theirs;
+        memcpy(&theirs, b.message.data, sizeof theirs);
+        b.message.size -= sizeof theirs + 1;
+        memmove(b.message.data, b.message.data + sizeof theirs, b.message.size + 1);
+        if (theirs != IMP_OK)
+            st = imp__error(ctx, (enum imp_status)theirs, "%s",
+                            (const char *)b.message.data);
+    }
+    if (st == IMP_OK) *bytes = b.message;
+    else imp__bytes_free(ctx, &b.message);
+    return st;
+}
+
 struct kept {
     void *bytes;
     size_t n;

@@ -49,6 +49,19 @@ static inline bool imp__team_merges(const imp_context *ctx)
     return ctx->team && ctx->team->role == IMP_TEAM_MERGE;
 }
 
+/* Does this process write files? Of the ranks of a team, the first. */
+static inline bool imp__team_writes(const imp_context *ctx)
+{
+    return !ctx->team || ctx->team->role != IMP_TEAM_RANK || ctx->team->host.rank == 0;
+}
+
+/* Do files come from rank 0? Then all ranks make every call that reads one, or asks
+ * whether it is there. */
+static inline bool imp__team_broadcasts(const imp_context *ctx)
+{
+    return ctx->team && ctx->team->role == IMP_TEAM_RANK && ctx->team->host.broadcast;
+}
+
 /* What imp__shared_sum finds out besides the sum. */
 struct imp_shared {
     struct imp_drops *drops; /* in: those of this rank's items; out: of all */
@@ -70,6 +83,11 @@ enum imp_status imp__shared_fixed(imp_context *ctx, struct imp_fixed_sum *f);
 /* Is it so on any rank? What a clock or a user says differs between ranks; what follows
  * may not. `here` where it cannot be asked (parts). */
 enum imp_status imp__team_any(imp_context *ctx, bool here, bool *any);
+
+/* All get the status of rank 0, its message, and its bytes. */
+struct imp_bytes;
+enum imp_status imp__team_broadcast(imp_context *ctx, enum imp_status st,
+                                    struct imp_bytes *bytes);
 
 /* Bytes that every rank has computed alike: parts keep them, and *known of a merge says
  * that they have been read instead. */

@@ -4,12 +4,13 @@
  * tolerance with a few warm-started sweeps each, until what was asked for hardly changes
  * (measurements; the picture, as the paper has it, where one is wanted), the tolerance
  * has reached its end, or a budget is spent. */
+#include "base/team.h"
 #include "color/rgb.h"
 #include "elements.h"
 #include <stdio.h>
 #include <string.h>
 
-void imp__el_tick(imp_elements *e, const char *stage, double fraction, const char *note)
+static void tick(imp_elements *e, const char *stage, double fraction, const char *note)
 {
     const double now = imp__now();
     if (e->deadline_s > 0 && now > e->deadline_s && !e->stop) {
@@ -33,6 +34,16 @@ void imp__el_tick(imp_elements *e, const char *stage, double fraction, const cha
         e->stop = true;
         e->reason = "asked to stop";
     }
+}
+
+void imp__el_tick(imp_elements *e, const char *stage, double fraction, const char *note)
+{
+    bool any;
+    tick(e, stage, fraction, note);
+    /* What a clock or a user says differs between ranks. */
+    if (imp__team_any(e->ctx, e->stop, &any) != IMP_OK) any = true;
+    if (any && !e->stop) e->reason = "stopped by another rank";
+    e->stop = any;
 }
 
 enum imp_status imp__el_create(const imp_scene *scene,

@@ -2,10 +2,10 @@
  *
  * The list of folders that files are searched in, and the search. */
 #include "search.h"
+#include "base/file.h"
 #include <limits.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/stat.h>
 
 static enum imp_status no_memory(imp_context *ctx)
 {
@@ -57,12 +57,6 @@ const char *imp__folder_of(struct imp_scene *scene, const char *path)
     return folder;
 }
 
-static bool exists(const char *path)
-{
-    struct stat info;
-    return stat(path, &info) == 0;
-}
-
 enum imp_status imp__search(struct imp_scene *scene, const char *first, const char *name,
                             const char **out)
 {
@@ -78,7 +72,7 @@ enum imp_status imp__search(struct imp_scene *scene, const char *first, const ch
                                plain ? "" : "/", name);
         if (n < 0 || (size_t)n >= sizeof path)
             return imp__error(ctx, IMP_E_IO, "file name is too long");
-        if (exists(path)) {
+        if (imp__file_exists(ctx, path)) {
             *out = imp__arena_strdup(&scene->arena, path);
             return *out ? IMP_OK : no_memory(ctx);
         }

@@ -4,7 +4,6 @@
 #include "checkpoint.h"
 #include "base/file.h"
 #include "math/hash.h"
-#include <errno.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -250,14 +249,13 @@ enum imp_status imp__checkpoint_read(imp_context *ctx, const char *path,
                                      struct imp__search *search, bool *found)
 {
     enum imp_status st = IMP_OK;
-    struct source s = {.ctx = ctx, .path = path, .f = fopen(path, "rb"), .goal = goal};
+    struct source s = {.ctx = ctx, .path = path, .goal = goal};
+    struct imp_bytes held;
     int iteration = 0, finished = 0;
 
+    st = imp__file_open(ctx, path, &held, &s.f);
     *found = s.f != NULL;
-    if (!s.f)
-        return errno == ENOENT
-                   ? IMP_OK
-                   : imp__error(ctx, IMP_E_IO, "%s: %s", path, strerror(errno));
+    if (!s.f) return st;
     if (fseek(s.f, 0, SEEK_END) != 0)
         IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: cannot be read", path));
     const long size = ftell(s.f);
@@ -274,5 +272,6 @@ enum imp_status imp__checkpoint_read(imp_context *ctx, const char *path,
     imp__search_finish(search, (enum imp__finish)finished);
 out:
     fclose(s.f);
+    imp__bytes_free(ctx, &held);
     return st;
 }

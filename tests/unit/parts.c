@@ -379,9 +379,11 @@ static void *member_main(void *payload)
 
 static struct member members[TEAM_MAX];
 
+static const char *(*tamper)(const void *message, size_t bytes);
+
 static size_t team(int ranks, int shares, const char *filter, enum job job)
 {
-    struct team_hub hub = {.ranks = ranks, .shares = shares};
+    struct team_hub hub = {.ranks = ranks, .shares = shares, .tamper = tamper};
     pthread_t thread[TEAM_MAX];
     pthread_barrier_init(&hub.barrier, NULL, (unsigned)ranks);
     for (int k = 0; k < ranks; k++) {
@@ -427,8 +429,28 @@ static void teams(const char *filter)
     }
 }
 
+/* As a rank on a processor with other instructions speaks of itself. */
+static const char *other_machine(const void *message, size_t bytes)
+{
+    static char other[512];
+    if (bytes > sizeof other) return message;
+    memcpy(other, message, bytes);
+    char *word = memmem(other, bytes, "importon ", 9);
+    if (word) strcpy(word, "importon 0.1.0 sse4.2 neon");
+    return other;
+}
+
 static void team_troubles(void)
 {
+    members_reset();
+    tamper = other_machine;
+    team(3, 0, "box", PICTURE);
+    tamper = NULL;
+    tap_ok(members[0].st == IMP_E_ARG && members[2].st == IMP_E_ARG &&
+               strstr(members[0].error, "rank 0 runs \"importon 0.1.0") &&
+               strstr(members[0].error, "rank 1 \"importon 0.1.0 sse4.2 neon\""),
+           "a rank on another processor: both are named # %s", members[0].error);
+
     members_reset();
     members[1].red = .61;
     team(3, 0, "box", PICTURE);
