@@ -290,4 +290,5 @@ const struct command command_bend = {
      2},
     run,
     0,
-    "check "};
+    "check ",
+    0};

@@ -125,4 +125,5 @@ const struct command command_check = {
      1},
     run_check,
     1,
-    "method "};
+    "method ",
+    1};

@@ -111,4 +111,5 @@ const struct command command_compare = {
      2},
     run_compare,
     1,
-    "mean  "};
+    "mean  ",
+    0};

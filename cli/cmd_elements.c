@@ -369,4 +369,5 @@ const struct command command_elements = {
      1},
     run_elements,
     0,
-    NULL};
+    NULL,
+    1};

@@ -51,4 +51,5 @@ const struct command command_envmap = {
      1},
     run_envmap,
     0,
-    NULL};
+    NULL,
+    0};

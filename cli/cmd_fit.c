@@ -10,6 +10,7 @@
 #include "output.h"
 #include "plot.h"
 #include "progress.h"
+#include "ranks.h"
 
 #include <errno.h>
 #include <math.h>
@@ -359,7 +360,8 @@ static int run_fit(int n, char **operand)
     }
     free(blocks);
     problem_close(problem);
-    if (!rc) checkpoint_hint(o.checkpoint);
+    const char *ended;
+    if (!rc || ranks_ended(&ended)) checkpoint_hint(o.checkpoint);
     return rc ? rc : cli_done();
 }
 
@@ -373,4 +375,5 @@ const struct command command_fit = {
      1},
     run_fit,
     0,
-    NULL};
+    NULL,
+    1};

@@ -302,4 +302,5 @@ const struct command command_gradient = {
      1},
     run_gradient,
     1,
-    " +- "};
+    " +- ",
+    1};

@@ -160,4 +160,5 @@ const struct command command_info = {{"info",
                                       1},
                                      run_info,
                                      1,
-                                     " triangles)"};
+                                     " triangles)",
+                                     0};

@@ -242,4 +242,5 @@ const struct command command_jacobian = {
      1},
     run_jacobian,
     0,
-    NULL};
+    NULL,
+    1};

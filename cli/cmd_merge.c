@@ -66,4 +66,5 @@ const struct command command_merge = {
      -1},
     run_merge,
     0,
-    NULL};
+    NULL,
+    0};

@@ -6,6 +6,7 @@
 
 #include "command.h"
 #include "overwrite.h"
+#include "ranks.h"
 
 #include <ctype.h>
 #include <errno.h>
@@ -34,6 +35,7 @@ char *join_path(const char *folder, const char *name)
 
 int make_folder(const char *path)
 {
+    if (!ranks_first()) return 0;
     char *copy = strdup(path);
     int rc = 0;
     if (!copy) return cli_error(EXIT_RUN, "out of memory");

@@ -199,4 +199,5 @@ const struct command command_render = {
      1},
     run_render,
     0,
-    "walk: pixel"};
+    "walk: pixel",
+    1};

@@ -111,4 +111,5 @@ const struct command command_selftest = {
      2},
     run_selftest,
     1,
-    "object "};
+    "object ",
+    0};

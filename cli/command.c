@@ -6,6 +6,7 @@
 
 #include "part.h"
 #include "progress.h"
+#include "ranks.h"
 #include "settings.h"
 
 #include <errno.h>
@@ -20,6 +21,7 @@ struct cli cli;
 static const char *const mode_words[] = {"rgb", "mono", "spectral", "single", NULL};
 static const char *const wavelength_words[] = {"stratified", "independent", "importance",
                                                NULL};
+static const char *const files_words[] = {"broadcast", "shared", NULL};
 static const char *const progress_words[] = {"auto", "always", "never", NULL};
 
 const struct arg_option options_file[] = {{ARG_TEXT, 'o', "output", "FILE",
@@ -77,6 +79,9 @@ const struct arg_option options_run[] = {
     {ARG_TEXT, 0, "part", "I/N",
      "compute part I of N (from 1), to the file of -o; 'importon merge' makes the whole",
      &cli.part, 0, 0, NULL},
+    {ARG_CHOICE, 0, "mpi-files", "HOW",
+     "with mpirun: broadcast (default: rank 0 reads files for all) or shared (each does)",
+     &cli.mpi_files, 0, 0, files_words},
     {ARG_CHOICE, 0, "wavelengths", "HOW",
      "of -m spectral and single: stratified (default), independent, or importance",
      &cli.wavelengths, 0, 0, wavelength_words},
@@ -100,14 +105,15 @@ const struct arg_option options_guide[] = {
 /* ---- Talking ------------------------------------------------------------------- */
 
 /* Messages quote files and arguments, which may hold what moves a terminal's cursor. */
-static void print(const char *before, const char *format, va_list args)
+static void print(bool error, const char *format, va_list args)
 {
     char *text = NULL;
     progress_clear();
     if (vasprintf(&text, format, args) < 0) return;
     for (char *p = text; *p; p++)
         if (((unsigned char)*p < 32 && *p != '\n' && *p != '\t') || *p == 127) *p = '?';
-    fprintf(stderr, "%s%s\n", before, text);
+    if (ranks_first()) fprintf(stderr, "%s%s\n", error ? "importon: " : "", text);
+    if (error) ranks_remember(true, text);
     free(text);
 }
 
@@ -115,7 +121,7 @@ int cli_error(int code, const char *format, ...)
 {
     va_list args;
     va_start(args, format);
-    print("importon: ", format, args);
+    print(true, format, args);
     va_end(args);
     return code;
 }
@@ -140,6 +146,9 @@ static int exit_code(enum imp_status status)
 int cli_fail(enum imp_status status, const char *what)
 {
     if (status == IMP_PART) return part_end();
+    const char *ended; /* the reason, where it is another rank */
+    const int ended_code = ranks_ended(&ended);
+    if (ended_code) return cli_error(ended_code, "%s", ended);
     const char *message = cli.context ? imp_last_error(cli.context) : "";
     if (!message[0]) message = imp_status_text(status);
     const size_t n =
@@ -158,7 +167,7 @@ void cli_say(const char *format, ...)
     va_list args;
     if (cli.quiet) return;
     va_start(args, format);
-    print("", format, args);
+    print(false, format, args);
     va_end(args);
 }
 
@@ -195,6 +204,7 @@ double cli_now(void)
 static void on_log(enum imp_log_level level, const char *message, void *payload)
 {
     (void)payload;
+    if (level == IMP_LOG_WARNING) ranks_remember(false, message);
     cli_say("importon: %s%s", level == IMP_LOG_WARNING ? "warning: " : "", message);
 }
 
@@ -206,7 +216,8 @@ int cli_open(void)
     options.log = on_log;
     const enum imp_status st = imp_context_create(&options, &cli.context);
     if (st != IMP_OK) return cli_fail(st, NULL);
-    return part_open();
+    const int rc = ranks_open(cli.context);
+    return rc ? rc : part_open();
 }
 
 /* Cut "a;b;c" into a list; the text lives as long as the process. */
@@ -291,9 +302,11 @@ int cli_load(const char *path)
     options.search = search.item;
     options.n_search = search.n;
     if (!strcmp(path, "-")) {
-        size_t length;
-        char *xml = read_all(stdin, SIZE_MAX, &length);
-        if (!xml) return cli_error(EXIT_RUN, "standard input: %s", strerror(errno));
+        size_t length = 0;
+        char *xml = ranks_first() ? read_all(stdin, SIZE_MAX, &length) : NULL;
+        if (!xml && ranks_first())
+            return cli_error(EXIT_RUN, "standard input: %s", strerror(errno));
+        if ((rc = ranks_broadcast(&xml, &length))) return rc;
         cli.scene_path = "<stdin>";
         st = imp_scene_load_string(cli.context, xml, length, cli.scene_path, &options,
                                    &cli.scene);

@@ -26,6 +26,7 @@ struct command {
     int (*run)(int n, char **operand);
     int prints;         /* all its data is text, so -o stands for standard output */
     const char *answer; /* in the first line of that text; NULL: none is known */
+    int shared;         /* may run in several processes, by mpirun */
 };
 extern const struct command command_render, command_gradient, command_jacobian,
     command_check, command_selftest, command_fit, command_compare, command_info,
@@ -57,6 +58,7 @@ struct cli {
     int sensor, spp;
     uint64_t seed;
     double time_s;
+    int mpi_files;               /* how ranks read files: as it is written */
     const char *part, *part_out; /* "I/N", and where it goes */
     imp_parts *parts;            /* the part in the making, or those that are merged */
     int wavelengths, wavelength_set;

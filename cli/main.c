@@ -6,6 +6,7 @@
 #include "output.h"
 #include "part.h"
 #include "progress.h"
+#include "ranks.h"
 
 #include <errno.h>
 #include <signal.h>
@@ -80,6 +81,9 @@ int cli_run_command(int argc, char **argv)
     int first, rc;
     if (!command) return EXIT_USAGE;
     cli.name = command->args.command;
+    if (ranks_count() > 1 && !command->shared)
+        return cli_error(EXIT_USAGE, "%s runs in one process, and mpirun started %d",
+                         cli.name, ranks_count());
     cli.answer = command->answer;
     cli.argc = argc;
     free(cli.argv); /* of merge, which runs another command */
@@ -100,7 +104,9 @@ int cli_run_command(int argc, char **argv)
     if (rc == 0) rc = part_begin();
     if (rc == 0 && command->prints) rc = cli_redirect();
     if (rc == 0) {
-        progress_init(cli.quiet ? PROGRESS_NEVER : (enum progress_mode)cli.progress);
+        ranks_heard();
+        progress_init(cli.quiet || !ranks_first() ? PROGRESS_NEVER
+                                                  : (enum progress_mode)cli.progress);
         rc = command->run(argc - first, argv + first);
         progress_clear();
     }
@@ -113,6 +119,7 @@ int main(int argc, char **argv)
     const struct command *command;
     int rc;
 
+    ranks_begin();
     if (!*name) {
         print_usage(stderr);
         return EXIT_USAGE;
@@ -131,5 +138,5 @@ int main(int argc, char **argv)
     }
     rc = cli_run_command(argc - 1, argv + 1);
     cli_close();
-    return finish(rc == EXIT_STOP ? EXIT_DONE : rc);
+    return ranks_close(finish(rc == EXIT_STOP ? EXIT_DONE : rc));
 }

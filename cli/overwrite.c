@@ -6,6 +6,7 @@
 #include "cmd_picture.h"
 #include "command.h"
 #include "progress.h"
+#include "ranks.h"
 
 #include <errno.h>
 #include <stdlib.h>
@@ -126,7 +127,7 @@ static int folder_check(const char *path)
 int overwrite_check(const char *path, enum output_kind kind)
 {
     struct stat info;
-    if (!strcmp(path, "-")) return 0;
+    if (!strcmp(path, "-") || !ranks_first()) return 0;
     if (stat(path, &info) != 0) return folder_check(path);
     if (S_ISDIR(info.st_mode)) return cannot(path, EISDIR);
     if (!S_ISREG(info.st_mode)) return 0;
@@ -162,7 +163,7 @@ int checkpoint_writable(const char *path, bool resume)
 {
     struct stat info;
     const int rc = path ? overwrite_check(path, OUTPUT_CHECKPOINT) : 0;
-    if (rc || !path || resume || cli.overwrite) return rc;
+    if (rc || !path || resume || cli.overwrite || !ranks_first()) return rc;
     if (stat(path, &info) != 0 || !S_ISREG(info.st_mode) || info.st_size == 0) return 0;
     return cli_error(EXIT_USAGE,
                      "%s: there is a checkpoint already: go on from it with --resume, or "
@@ -172,7 +173,8 @@ int checkpoint_writable(const char *path, bool resume)
 
 void checkpoint_hint(const char *path)
 {
-    if (!progress_interrupted()) return;
+    const char *ended;
+    if (!progress_interrupted() && !ranks_ended(&ended)) return;
     if (path) cli_say("importon: interrupted; go on from %s with --resume", path);
     else cli_say("importon: interrupted; with --checkpoint FILE a fit can be resumed");
 }

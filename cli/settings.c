@@ -4,6 +4,7 @@
 #include "settings.h"
 
 #include "command.h"
+#include "ranks.h"
 
 #include <errno.h>
 #include <stdlib.h>
@@ -81,19 +82,21 @@ out:
 /* "@FILE": one ID=VALUE a line; empty lines and lines that begin with # are skipped. */
 static int apply_set_file(const char *path)
 {
-    FILE *f = fopen(path, "r");
+    FILE *f = ranks_reads() ? fopen(path, "r") : NULL;
     size_t length = 0, number = 0;
     int rc = 0;
-    if (!f) return cli_error(EXIT_USAGE, "--set @%s: %s", path, strerror(errno));
-    char *text = read_all(f, SET_FILE_MAX, &length);
+    if (!f && ranks_reads())
+        return cli_error(EXIT_USAGE, "--set @%s: %s", path, strerror(errno));
+    char *text = f ? read_all(f, SET_FILE_MAX, &length) : NULL;
     const int code = errno;
-    fclose(f);
-    if (!text && code == EFBIG)
+    if (f) fclose(f);
+    if (f && !text && code == EFBIG)
         return cli_error(EXIT_USAGE, "--set @%s: not shorter than %zu MiB", path,
                          SET_FILE_MAX >> 20);
-    if (!text)
+    if (f && !text)
         return cli_error(code == ENOMEM ? EXIT_RUN : EXIT_USAGE, "--set @%s: %s", path,
                          strerror(code));
+    if (cli.mpi_files == 0 && (rc = ranks_broadcast(&text, &length))) return rc;
     for (char *line = text, *next; !rc && line < text + length; line = next) {
         char *end = memchr(line, '\n', (size_t)(text + length - line)), *where;
         if (!end) end = text + length;
