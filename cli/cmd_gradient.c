@@ -8,6 +8,7 @@
 #include "cmd_problem.h"
 #include "command.h"
 #include "progress.h"
+#include "ranks.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -95,7 +96,7 @@ static int estimate_for(imp_problem *problem, struct imp_run run, const float *s
 {
     enum { SMALL = 4 }; /* replicates need two */
     const size_t n = imp_problem_n(problem);
-    const double start = cli_now();
+    const double start = ranks_same(cli_now());
     struct result r = *sum;
     enum imp_status st = IMP_OK;
     r.grad = cli_alloc(n, sizeof *r.grad);
@@ -108,7 +109,7 @@ static int estimate_for(imp_problem *problem, struct imp_run run, const float *s
         run.seed ^= 0x632be59bd9b4e019u;
         st = estimate(problem, &run, seed, &r);
         run.seed ^= 0x632be59bd9b4e019u;
-        now = first = cli_now();
+        now = first = ranks_same(cli_now());
         const double fit = SMALL * (cli.time_s / fmax(now - start, 1e-6) - 1);
         if (fit < 2 * SMALL) {
             sum->spp = SMALL;
@@ -117,11 +118,11 @@ static int estimate_for(imp_problem *problem, struct imp_run run, const float *s
         } else if (fit < sum->spp) sum->spp = (int)fit;
     }
     run.spp = sum->spp;
-    while (st == IMP_OK && !progress_interrupted() &&
+    while (st == IMP_OK && !ranks_same(progress_interrupted()) &&
            (!sum->rounds || now - start + (now - first) / sum->rounds <= cli.time_s)) {
         st = estimate(problem, &run, seed, &r);
         if (st == IMP_OK) add_round(sum, &r, n);
-        now = cli_now();
+        now = ranks_same(cli_now());
         run.seed += 0x9e3779b97f4a7c15u; /* far from the seeds people choose */
     }
     free(r.grad);

@@ -165,6 +165,21 @@ int ranks_broadcast(char **bytes, size_t *n)
     return 0;
 }
 
+double ranks_same(double number)
+{
+    char *bytes = NULL;
+    size_t n = sizeof number;
+    if (r.ranks == 1) return number;
+    if (r.rank == 0) {
+        bytes = cli_alloc(1, n);
+        memcpy(bytes, &number, n);
+    }
+    /* A failure shows at the next call of the library. */
+    if (ranks_broadcast(&bytes, &n) == 0 && n == sizeof number) memcpy(&number, bytes, n);
+    free(bytes);
+    return number;
+}
+
 void ranks_remember(bool error, const char *text)
 {
     const size_t used = strlen(r.said);

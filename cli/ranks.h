@@ -27,6 +27,9 @@ void ranks_leave(void);
 /* The bytes that rank 0 has, for all; alone, nothing happens. */
 int ranks_broadcast(char **bytes, size_t *n);
 
+/* The number of rank 0, for what is decided by a clock or a user. */
+double ranks_same(double number);
+
 /* Keep what the first process is to print in the end. */
 void ranks_remember(bool error, const char *text);
 /* Why calls fail, where the reason is another rank: its exit code, and a text. 0: not. */

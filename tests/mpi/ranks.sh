@@ -134,6 +134,8 @@ rm -rf rank1/*
 ranks 2 bash each.sh render "$scenes/furnace.xml" --time 0.5 --json -o x.exr --no-preview >time.json
 grep -q '"complete":true' time.json
 ok $? "a time limit ends all ranks"
+ranks 2 importon gradient "$scenes/furnace.xml" --time 0.5 --json -q >time.json
+ok $? "that of gradients"
 ranks 2 importon elements "$scenes/elements/d.xml" --time 0.3 --json --no-image -q >time.json
 ok $? "that of finite elements too"
 
