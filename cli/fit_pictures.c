@@ -8,8 +8,10 @@
 #include "cmd_problem.h"
 #include "sheet.h"
 
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 
 /* "name.exr", or "name-1.exr" for the second of several targets. */
 static char *picture_path(const char *name, size_t i)
@@ -66,6 +68,20 @@ static enum imp_status target_film(const struct imp_target *t, imp_film **out)
     return IMP_OK;
 }
 
+/* A target that is where its copy would go stays as it is. */
+static bool is_there(size_t i, const char *path)
+{
+    const char *spec = problem_options.targets.item[i], *at = strrchr(spec, '@');
+    struct stat from, to;
+    if (stat(path, &to) != 0) return false;
+    char *file = picture_sensor(spec) >= 0 && at ? strndup(spec, (size_t)(at - spec))
+                                                 : strdup(spec);
+    const bool same = file && stat(file, &from) == 0 && from.st_dev == to.st_dev &&
+                      from.st_ino == to.st_ino;
+    free(file);
+    return same;
+}
+
 int fit_targets_write(void)
 {
     const struct picture_options po = {0};
@@ -74,9 +90,16 @@ int fit_targets_write(void)
         struct imp_target t = IMP_TARGET_INIT;
         const struct imp_run run = cli_run();
         imp_film *film = NULL;
-        rc = picture_target(problem_options.targets.item[i], NULL, &t);
-        if (rc) return rc;
         char *path = picture_path("target", i);
+        if (is_there(i, path)) {
+            free(path);
+            continue;
+        }
+        rc = picture_target(problem_options.targets.item[i], NULL, &t);
+        if (rc) {
+            free(path);
+            return rc;
+        }
         const enum imp_status st = target_film(&t, &film);
         if (st != IMP_OK) {
             rc = cli_fail(st, NULL);
@@ -113,7 +136,7 @@ int fit_pictures_writable(void)
     for (size_t i = 0; i < problem_options.targets.n; i++)
         for (size_t k = 0; k < 3 && !rc; k++) {
             char *path = picture_path(pictures[k], i);
-            rc = picture_writable(path, 1);
+            if (k < 2 || !is_there(i, path)) rc = picture_writable(path, 1);
             free(path);
         }
     return rc;

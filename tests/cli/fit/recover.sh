@@ -19,6 +19,11 @@ import json, sys
 a = json.load(open("answer.json"))["params"][0]
 (p,) = [p for p in json.load(sys.stdin)["params"] if p["name"] == a["name"]]
 assert abs(p["value"][0] - a["value"]) < 1e-8, (p, a)'
+# A target that lies where its copy would go is left alone.
+mkdir again
+cp t.exr again/target.exr
+importon fit "$scene" -D res=8 --spp 4 -q --target again/target.exr -p 'ball.*' -n 1 --no-intervals -o again >/dev/null || exit 8
+cmp t.exr again/target.exr
 printf '# a comment\n\nball.reflectance.value=much\n' >bad.txt
 importon info "$scene" --set @bad.txt
 importon info "$scene" --set @no.txt
