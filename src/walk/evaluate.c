@@ -44,9 +44,12 @@ static void vertex_values(const struct imp_tracer *tracer, const struct imp_vert
         x->light_e = imp__emitter_radiance(scene, d->light.emitter, &to,
                                            imp__decided_v3(d->light.p), v->carried);
         x->light_w = imp__spec(d->light.weight);
-        if (imp_unlikely(v->to_light != NULL))
-            x->light_w *= imp__track_eval(scene, v->to_light, v->carried);
         x->b = x->light_f * x->light_e * x->light_w;
+        if (imp_unlikely(v->to_light != NULL)) {
+            const imp_spec T = imp__track_eval(scene, v->to_light, v->carried);
+            x->light_w *= T;
+            x->b *= T; /* in the order of tracing, so that no bit differs */
+        }
     }
     x->f = imp__spec(1);
     if (b && d->goes_on) imp__bsdf_eval(b, v->carried, in, &p->dirs, &x->f);

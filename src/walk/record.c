@@ -7,7 +7,8 @@
 #include <string.h>
 
 _Static_assert(sizeof(struct imp_decision) <= 160, "a kept vertex");
-_Static_assert(sizeof(struct imp_record_walk) == 56, "no padding: it is written");
+_Static_assert(sizeof(struct imp_record_walk) == 72, "no padding: it is written");
+_Static_assert(sizeof(union imp_kept) == 16, "a kept event");
 _Static_assert(IMP_WALK_MAX <= UINT16_MAX, "imp_record_walk.n");
 
 /* ---- Making ---------------------------------------------------------------------- */
@@ -32,10 +33,6 @@ enum imp_status imp__record_create(const struct imp_tracer *tracer, size_t budge
         return imp__error(ctx, IMP_E_UNSUPPORTED,
                           "walks are kept for detached derivatives only: "
                           "alpha_gradient moves their directions");
-    if (tracer->split > 1 || tracer->integrator->split > 0)
-        return imp__error(ctx, IMP_E_UNSUPPORTED,
-                          "walks that split are not kept: of a walk and those that hang "
-                          "on it, a record has the first");
     *out = (struct imp_record){.ctx = ctx, .of = made_with(tracer), .budget = budget};
     return IMP_OK;
 }
@@ -45,19 +42,21 @@ void imp__record_destroy(struct imp_record *r)
     if (!r->ctx) return;
     for (size_t k = 0; k < r->n_walk_pages; k++) imp__release(r->ctx, r->walks[k]);
     for (size_t k = 0; k < r->n_vertex_pages; k++) imp__release(r->ctx, r->vertices[k]);
+    for (size_t k = 0; k < r->n_item_pages; k++) imp__release(r->ctx, r->items[k]);
     imp__release(r->ctx, r->walks);
     imp__release(r->ctx, r->vertices);
+    imp__release(r->ctx, r->items);
     *r = (struct imp_record){.ctx = NULL};
 }
 
-static size_t bytes_of(size_t walks, size_t vertices)
+static size_t bytes_of(size_t walks, size_t vertices, size_t items)
 {
     return walks * sizeof(struct imp_record_walk) +
-           vertices * sizeof(struct imp_decision);
+           vertices * sizeof(struct imp_decision) + items * sizeof(union imp_kept);
 }
 size_t imp__record_bytes(const struct imp_record *r)
 {
-    return bytes_of(r->n_walks, r->n_vertices);
+    return bytes_of(r->n_walks, r->n_vertices, r->n_items);
 }
 
 /* Pages for n elements in all. False: no memory. */
@@ -76,10 +75,12 @@ static bool pages_add(imp_context *ctx, void ***pages, size_t *n_pages, size_t *
     return true;
 }
 
-enum imp_status imp__record_reserve(struct imp_record *r, size_t walks, size_t vertices)
+enum imp_status imp__record_reserve(struct imp_record *r, size_t walks, size_t vertices,
+                                    size_t items)
 {
-    const size_t n_walks = r->n_walks + walks, n_vertices = r->n_vertices + vertices;
-    const size_t needed = bytes_of(n_walks, n_vertices);
+    const size_t n_walks = r->n_walks + walks, n_vertices = r->n_vertices + vertices,
+                 n_items = r->n_items + items;
+    const size_t needed = bytes_of(n_walks, n_vertices, n_items);
     if (needed > r->budget)
         return imp__error(r->ctx, IMP_E_NOMEM,
                           "%zu kept walks of %zu vertices need %zu bytes; "
@@ -88,7 +89,9 @@ enum imp_status imp__record_reserve(struct imp_record *r, size_t walks, size_t v
     if (!pages_add(r->ctx, (void ***)&r->walks, &r->n_walk_pages, &r->cap_walk_pages,
                    n_walks, sizeof **r->walks) ||
         !pages_add(r->ctx, (void ***)&r->vertices, &r->n_vertex_pages,
-                   &r->cap_vertex_pages, n_vertices, sizeof **r->vertices))
+                   &r->cap_vertex_pages, n_vertices, sizeof **r->vertices) ||
+        !pages_add(r->ctx, (void ***)&r->items, &r->n_item_pages, &r->cap_item_pages,
+                   n_items, sizeof **r->items))
         return imp__error(r->ctx, IMP_E_NOMEM, "no memory for %zu bytes of kept walks",
                           needed);
     return IMP_OK;
@@ -122,45 +125,113 @@ static struct imp_decision decided(const struct imp_decision *d)
     return k;
 }
 
+/* Vertices and items of a walk and what hangs on it. */
+struct extent {
+    size_t vertices, items;
+};
+
+static enum imp_status walk_measure(imp_context *ctx, const struct imp_walk *walk,
+                                    int nest, struct extent *extent)
+{
+    enum imp_status st = IMP_OK;
+    if (walk->entry)
+        return imp__error(ctx, IMP_E_UNSUPPORTED,
+                          "a walk whose light enters at its vertices cannot be kept");
+    if (nest > IMP_RECORD_NESTS)
+        return imp__error(ctx, IMP_E_UNSUPPORTED,
+                          "walks that hang on each other %d times cannot be kept", nest);
+    extent->vertices += (size_t)walk->n;
+    for (const struct imp_vertex *v = walk->first; v; v = v->next) {
+        if (v->probe)
+            return imp__error(ctx, IMP_E_UNSUPPORTED,
+                              "a walk with a probe of an extinction cannot be kept: its "
+                              "derivative is not that of its collisions");
+        if (v->on) extent->items += 2 + (size_t)v->on->n;
+        if (v->to_light) extent->items += 2 + (size_t)v->to_light->n;
+        for (const struct imp_side *s = v->side; s && st == IMP_OK; s = s->next) {
+            extent->items++;
+            st = walk_measure(ctx, &s->walk, nest + 1, extent);
+        }
+        if (st != IMP_OK) return st;
+    }
+    return st;
+}
+
+static union imp_kept *item_put(struct imp_record *r)
+{
+    union imp_kept *item = imp__record_item(r, r->n_items++);
+    memset(item, 0, sizeof *item);
+    return item;
+}
+
+static void track_put(struct imp_record *r, const struct imp_track *track,
+                      enum imp_kept_kind kind, uint32_t at)
+{
+    if (!track) return;
+    union imp_kept *item = item_put(r);
+    memcpy(item->head.o, track->o, sizeof track->o);
+    item->head.at = at & 0x3fffffff;
+    item->head.kind = kind & 3;
+    item = item_put(r);
+    memcpy(item->way.d, track->d, sizeof track->d);
+    item->way.n = (uint32_t)track->n;
+    for (int i = 0; i < track->n; i++) item_put(r)->event = track->event[i];
+}
+
+/* Its vertices, then what belongs to each; `first`: of the walk that it hangs on. */
+static void walk_put(struct imp_record *r, const struct imp_walk *walk, uint64_t first)
+{
+    uint32_t at = (uint32_t)(r->n_vertices - first);
+    for (const struct imp_vertex *v = walk->first; v; v = v->next)
+        *imp__record_vertex(r, r->n_vertices++) = decided(&v->d);
+    for (const struct imp_vertex *v = walk->first; v; v = v->next, at++) {
+        track_put(r, v->on, IMP_KEPT_ON, at);
+        track_put(r, v->to_light, IMP_KEPT_TO_LIGHT, at);
+        for (const struct imp_side *s = v->side; s; s = s->next) {
+            union imp_kept *item = item_put(r);
+            item->head.side.first = (uint32_t)(r->n_vertices - first);
+            item->head.side.n = (uint32_t)s->walk.n;
+            item->head.side.depth = s->walk.depth;
+            item->head.at = at & 0x3fffffff;
+            item->head.kind = IMP_KEPT_SIDE;
+            walk_put(r, &s->walk, first);
+        }
+    }
+}
+
 enum imp_status imp__record_keep(struct imp_record *r, const struct imp_walk *walk,
                                  int64_t sample)
 {
+    enum imp_status st;
+    struct extent extent = {0, 0};
     if (walk->moving)
         return imp__error(r->ctx, IMP_E_UNSUPPORTED,
                           "a walk through a medium whose numbers are active cannot be "
                           "kept: its vertices move with them");
-    if (walk->entry)
-        return imp__error(r->ctx, IMP_E_UNSUPPORTED,
-                          "a walk whose light enters at its vertices cannot be kept");
-    for (const struct imp_vertex *v = walk->first; v; v = v->next)
-        if (v->side)
-            return imp__error(r->ctx, IMP_E_UNSUPPORTED,
-                              "a walk with others that hang on it cannot be kept");
-        else if (v->on || v->to_light)
-            return imp__error(r->ctx, IMP_E_UNSUPPORTED,
-                              "a walk that crosses media cannot be kept: what collided "
-                              "with it on its segments is not");
-    const bool counts = walk->valid && walk->dropped == IMP_DROP_NONE;
-    const int n = counts ? walk->n : 0;
-    const enum imp_status st = imp__record_reserve(r, 1, (size_t)n);
+    st = walk_measure(r->ctx, walk, 0, &extent);
     if (st != IMP_OK) return st;
-    r->walks[r->n_walks / IMP_RECORD_PAGE][r->n_walks % IMP_RECORD_PAGE] =
+    const bool counts = walk->valid && walk->dropped == IMP_DROP_NONE;
+    if (!counts) extent = (struct extent){0, 0};
+    if (extent.vertices >= 1u << 30 || extent.items > UINT32_MAX)
+        return imp__error(r->ctx, IMP_E_UNSUPPORTED,
+                          "a walk of %zu vertices cannot be kept", extent.vertices);
+    st = imp__record_reserve(r, 1, extent.vertices, extent.items);
+    if (st != IMP_OK) return st;
+    *imp__record_at(r, r->n_walks++) =
         (struct imp_record_walk){.px = walk->px,
                                  .py = walk->py,
                                  .wave = walk->wave,
                                  .key = walk->key,
                                  .sample = sample,
                                  .first = r->n_vertices,
-                                 .n = (uint16_t)n,
+                                 .first_item = r->n_items,
+                                 .n_vertices = (uint32_t)extent.vertices,
+                                 .n_items = (uint32_t)extent.items,
+                                 .n = counts ? (uint16_t)walk->n : 0,
                                  .valid = walk->valid,
                                  .absorbed = walk->absorbed,
                                  .dropped = (uint8_t)walk->dropped};
-    r->n_walks++;
-    for (const struct imp_vertex *v = walk->first; n > 0 && v; v = v->next) {
-        r->vertices[r->n_vertices / IMP_RECORD_PAGE][r->n_vertices % IMP_RECORD_PAGE] =
-            decided(&v->d);
-        r->n_vertices++;
-    }
+    if (counts) walk_put(r, walk, r->n_vertices);
     return IMP_OK;
 }
 
@@ -185,55 +256,4 @@ enum imp_status imp__record_check(const struct imp_record *r,
 {
     const struct imp_record_of of = made_with(tracer);
     return imp__record_same(r->ctx, "kept walks", &r->of, &of);
-}
-
-static struct imp_vertex *vertex_add(const struct imp_scene *scene,
-                                     struct imp_arena *arena, struct imp_walk *walk,
-                                     const struct imp_decision *d)
-{
-    const struct imp_shape *shape = d->shape < 0 ? NULL : scene->shapes[d->shape];
-    const struct imp_bsdf *bsdf = shape ? imp__shape_bsdf(scene, shape) : NULL;
-    const size_t n_in = bsdf ? (size_t)bsdf->n_in : 0;
-    struct imp_vertex *v = imp__arena_take(arena, 1, sizeof *v + n_in * sizeof *v->in);
-    if (imp_unlikely(!v)) return NULL;
-    v->prev = walk->last;
-    v->next = NULL;
-    if (walk->last) walk->last->next = v;
-    else walk->first = v;
-    walk->last = v;
-    walk->n++;
-    v->bsdf = bsdf;
-    v->shape = shape;
-    v->side = NULL;
-    v->carried = walk->waves ? &walk->waves->carried : NULL;
-    v->t = 0;
-    v->ng = (imp_v3){0};
-    v->segment = &imp__straight;
-    v->on = v->to_light = NULL;
-    v->probe = NULL;
-    v->in = (imp_spec *)(v + 1);
-    v->d = *d;
-    return v;
-}
-
-void imp__record_walk(const struct imp_record *r, size_t i,
-                      const struct imp_tracer *tracer, struct imp_arena *arena,
-                      struct imp_walk *walk)
-{
-    const struct imp_record_walk *k = imp__record_at(r, i);
-    *walk = (struct imp_walk){.px = k->px,
-                              .py = k->py,
-                              .key = k->key,
-                              .valid = k->valid,
-                              .absorbed = k->absorbed,
-                              .dropped = (enum imp_drop)k->dropped};
-    if (tracer->wavelengths && !imp__walk_wave(tracer, arena, k->wave, walk)) return;
-    for (uint64_t j = k->first; j < k->first + k->n; j++)
-        if (!vertex_add(tracer->scene, arena, walk,
-                        &r->vertices[j / IMP_RECORD_PAGE][j % IMP_RECORD_PAGE])) {
-            walk->dropped = IMP_DROP_MEMORY;
-            return;
-        }
-    imp__walk_evaluate(tracer, walk);
-    imp__walk_close(tracer, walk);
 }

@@ -8,53 +8,87 @@
 #ifndef IMP_WALK_RECORD_H
 #define IMP_WALK_RECORD_H
 
-#include "walk.h"
+#include "tracking.h"
 
 /* ---- What is kept ---------------------------------------------------------------- */
 
+/* A walk and all that hangs on it: its own vertices, then those of its side walks. A walk
+ * that is dropped or not valid has none. */
 struct imp_record_walk {
     double px, py; /* film position */
     double wave;   /* number from which its wavelengths were drawn; 0: it has none */
     struct imp_key key;
     int64_t sample;
-    uint64_t first; /* vertex, of all in the record */
-    uint16_t n;     /* vertices: of a walk that is dropped or not valid, none */
+    uint64_t first, first_item; /* of all in the record */
+    uint32_t n_vertices, n_items;
+    uint16_t n; /* vertices of its own */
     uint8_t valid, absorbed, dropped;
     uint8_t reserved[3]; /* 0 */
 };
+
+/* What belongs to a vertex besides its decisions is a row of items of 16 bytes, in the
+ * order of vertices: a track (imp_track) is a head, its direction and its events; a side
+ * walk is a head, behind which the items of its own vertices follow. */
+enum imp_kept_kind {
+    IMP_KEPT_ON,       /* the track of the segment that goes on */
+    IMP_KEPT_TO_LIGHT, /* of the way to the light sample */
+    IMP_KEPT_SIDE      /* a walk that hangs on the vertex */
+};
+union imp_kept {
+    struct {
+        union {
+            imp_decided o[3]; /* where the track starts */
+            struct {
+                uint32_t first, n; /* vertices of the side walk, in those of the walk */
+                int32_t depth;
+            } side;
+        };
+        uint32_t at : 30, kind : 2; /* vertex, in those of the walk; enum imp_kept_kind */
+    } head;
+    struct {
+        imp_decided d[3];
+        uint32_t n; /* events that follow */
+    } way;
+    struct imp_event event;
+};
+/* Side walks hang on side walks this often at most: reading a walk is recursive. */
+#define IMP_RECORD_NESTS 64
 
 /* What the walks were made with: evaluated with anything else they mean nothing. */
 struct imp_record_of {
     uint64_t objects, sensor, integrator, rays; /* hashes: scene/fingerprint.h */
 };
 
-#define IMP_RECORD_PAGE 1024 /* walks, or vertices */
+#define IMP_RECORD_PAGE 1024 /* walks, vertices, or items */
 
 /* Not for sharing between threads while walks are added. */
 struct imp_record {
     imp_context *ctx;
     struct imp_record_of of;
-    size_t budget; /* bytes that walks and vertices may take */
-    size_t n_walks, n_vertices;
+    size_t budget; /* bytes that walks, vertices and items may take */
+    size_t n_walks, n_vertices, n_items;
     struct imp_record_walk **walks; /* pages, which never move */
     struct imp_decision **vertices;
-    size_t n_walk_pages, cap_walk_pages, n_vertex_pages, cap_vertex_pages;
+    union imp_kept **items;
+    size_t n_walk_pages, cap_walk_pages, n_vertex_pages, cap_vertex_pages, n_item_pages,
+        cap_item_pages;
 };
 
 /* An empty record for walks of this tracer, whose scene outlives it. `budget`: bytes of
- * walks and vertices; memory exceeds it by a page of each at most. IMP_E_UNSUPPORTED if
- * derivatives follow directions (alpha_gradient), since kept directions stand still, and
- * if walks split. */
+ * walks, vertices and items; memory exceeds it by a page of each at most.
+ * IMP_E_UNSUPPORTED if derivatives follow directions (alpha_gradient), since kept
+ * directions stand still. */
 enum imp_status imp__record_create(const struct imp_tracer *tracer, size_t budget,
                                    struct imp_record *out);
 void imp__record_destroy(struct imp_record *record);
 size_t imp__record_bytes(const struct imp_record *record);
 
-/* Append a walk that was traced with a record (not value_only); `sample` is its number.
- * IMP_E_UNSUPPORTED if its vertices move with a field, if walks hang on it, or if light
- * enters at its vertices (imp_walk.entry): a record has one list of vertices a walk, with
- * decisions only. IMP_E_NOMEM beyond the budget, the message says how much is needed. Then
- * nothing is appended. A guide decides as anything else does, and is not needed again. */
+/* Append a walk that was traced with a record (not value_only), with what hangs on it;
+ * `sample` is its number. IMP_E_UNSUPPORTED if its vertices move with a field, if an
+ * extinction has a probe (probe.h), which is no decision of the walk's value: trace with
+ * `collisions_stand`; or if light enters at its vertices (imp_walk.entry). IMP_E_NOMEM
+ * beyond the budget, the message says how much is needed. Then nothing is appended. A
+ * guide decides as anything else does, and is not needed again. */
 enum imp_status imp__record_keep(struct imp_record *record, const struct imp_walk *walk,
                                  int64_t sample);
 
@@ -65,15 +99,25 @@ enum imp_status imp__record_keep(struct imp_record *record, const struct imp_wal
 enum imp_status imp__record_check(const struct imp_record *record,
                                   const struct imp_tracer *tracer);
 
-static inline const struct imp_record_walk *imp__record_at(const struct imp_record *r,
-                                                           size_t i)
+static inline struct imp_record_walk *imp__record_at(const struct imp_record *r, size_t i)
 {
     return &r->walks[i / IMP_RECORD_PAGE][i % IMP_RECORD_PAGE];
 }
+static inline struct imp_decision *imp__record_vertex(const struct imp_record *r,
+                                                      uint64_t i)
+{
+    return &r->vertices[i / IMP_RECORD_PAGE][i % IMP_RECORD_PAGE];
+}
+static inline union imp_kept *imp__record_item(const struct imp_record *r, uint64_t i)
+{
+    return &r->items[i / IMP_RECORD_PAGE][i % IMP_RECORD_PAGE];
+}
 
 /* Walk i in the arena, with its values at the scene's present parameters, folded, to be
- * swept like any other; it has no camera ray, normals and lengths. Running out of memory
- * drops it. */
+ * swept like any other; it has no camera ray, normals and lengths. The derivative with
+ * respect to extinctions is that of frozen collisions: the tracer's `collisions_stand` is
+ * set. Where an extinction is now above the bound under which collisions were drawn, L may
+ * be negative; it is right in the mean. Running out of memory drops it. */
 void imp__record_walk(const struct imp_record *record, size_t i,
                       const struct imp_tracer *tracer, struct imp_arena *arena,
                       struct imp_walk *walk);
@@ -88,9 +132,9 @@ enum imp_status imp__record_write(const struct imp_record *record, const char *p
 enum imp_status imp__record_read(const struct imp_tracer *tracer, const char *path,
                                  size_t budget, struct imp_record *out);
 
-/* Room for so many walks and vertices more. */
+/* Room for so many walks, vertices and items more. */
 enum imp_status imp__record_reserve(struct imp_record *record, size_t walks,
-                                    size_t vertices);
+                                    size_t vertices, size_t items);
 enum imp_status imp__record_same(imp_context *ctx, const char *what,
                                  const struct imp_record_of *is,
                                  const struct imp_record_of *of);

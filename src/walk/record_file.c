@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Files of kept walks: a head, the walks, their vertices, and a checksum of all, as they
- * are in memory. What is read is checked vertex by vertex against the scene, so that
+ * Files of kept walks: a head, the walks, their vertices, what belongs to these, and a
+ * checksum of all, as they are in memory. What is read is checked vertex by vertex against the scene, so that
  * evaluating it is safe whatever the bytes are. */
 #include "base/file.h"
 #include "math/hash.h"
@@ -12,16 +12,16 @@
 
 #define MAGIC      "impwalks"
 #define BYTE_ORDER 0x01020304u
-#define VERSION    2
+#define VERSION    3
 
 struct head {
     char magic[8];
     uint32_t byte_order, version;
-    uint32_t walk_bytes, vertex_bytes;
+    uint32_t walk_bytes, vertex_bytes, item_bytes, reserved;
     struct imp_record_of of;
-    uint64_t n_walks, n_vertices;
+    uint64_t n_walks, n_vertices, n_items;
 };
-_Static_assert(sizeof(struct head) == 72, "no padding: it is written");
+_Static_assert(sizeof(struct head) == 88, "no padding: it is written");
 
 /* ---- Writing --------------------------------------------------------------------- */
 
@@ -42,17 +42,20 @@ enum imp_status imp__record_write(const struct imp_record *r, const char *path)
                               .version = VERSION,
                               .walk_bytes = sizeof **r->walks,
                               .vertex_bytes = sizeof **r->vertices,
+                              .item_bytes = sizeof **r->items,
                               .of = r->of,
                               .n_walks = r->n_walks,
-                              .n_vertices = r->n_vertices};
+                              .n_vertices = r->n_vertices,
+                              .n_items = r->n_items};
     uint64_t sum = 0;
-    struct imp_chunk *parts =
-        imp__alloc(r->ctx, r->n_walk_pages + r->n_vertex_pages + 2, sizeof *parts);
+    struct imp_chunk *parts = imp__alloc(
+        r->ctx, r->n_walk_pages + r->n_vertex_pages + r->n_item_pages + 2, sizeof *parts);
     if (!parts) return imp__error(r->ctx, IMP_E_NOMEM, "%s: out of memory", path);
     struct imp_chunk *end = parts;
     *end++ = (struct imp_chunk){&head, sizeof head};
     end = pages_put(end, (void *const *)r->walks, r->n_walks, sizeof **r->walks);
     end = pages_put(end, (void *const *)r->vertices, r->n_vertices, sizeof **r->vertices);
+    end = pages_put(end, (void *const *)r->items, r->n_items, sizeof **r->items);
     for (const struct imp_chunk *p = parts; p < end; p++)
         sum = imp__hash(sum, p->data, p->size);
     *end++ = (struct imp_chunk){&sum, sizeof sum};
@@ -106,38 +109,127 @@ static bool continuation_fits(const struct imp_bsdf *b, const struct imp_decisio
            isfinite(d->pdf) && d->pdf > 0 && isfinite(d->survive) && d->survive > 0;
 }
 
+/* Where the camera is, if the first segment crosses media. */
+static bool sensor_fits(const struct imp_decision *d)
+{
+    return d->goes_on && d->lobe == IMP_SMOOTH && unit(d->wi) && d->pdf == 1 &&
+           d->survive == 1 && !d->glows && d->met.emitter == -1 &&
+           d->connection == IMP_NOT_CONNECTED;
+}
+
 static bool vertex_fits(const struct imp_scene *scene, const struct imp_decision *d,
-                        bool last)
+                        bool first, bool last)
 {
     if (!all_finite(d->uv, 2) || !all_finite(d->p, 3) || !isfinite(d->passes) ||
         !weight(d->glow_weight) || (!d->goes_on && !last))
         return false;
+    if (d->shape == -1 && d->scatterer == IMP_AT_SENSOR) return first && sensor_fits(d);
     if (d->shape == -1)
         return d->scatterer == IMP_AT_SKY && last && !d->goes_on && !d->glows &&
                d->connection == IMP_NOT_CONNECTED && d->met.emitter >= 0 &&
                met_fits(scene, d);
-    if (d->shape < 0 || d->shape >= scene->n_shapes) return false;
-    const struct imp_bsdf *b = imp__shape_bsdf(scene, scene->shapes[d->shape]);
+    const bool inside = d->scatterer == IMP_IN_MEDIUM;
+    if (d->shape < 0 || d->shape >= (inside ? scene->n_media : scene->n_shapes))
+        return false;
+    const struct imp_bsdf *b = inside ? scene->media[d->shape]->scatterer
+                                      : imp__shape_bsdf(scene, scene->shapes[d->shape]);
     const bool null = b->flags & IMP_BSDF_NULL;
-    return d->scatterer == (null ? IMP_AT_BOUNDARY : IMP_AT_SURFACE) && unit(d->wo) &&
-           (!d->glows || (b->flags & IMP_BSDF_EMIT)) && met_fits(scene, d) &&
+    return (inside || d->scatterer == (null ? IMP_AT_BOUNDARY : IMP_AT_SURFACE)) &&
+           unit(d->wo) && (!d->glows || (b->flags & IMP_BSDF_EMIT)) &&
+           (inside ? d->met.emitter == -1 : met_fits(scene, d)) &&
            light_fits(scene, b, d) && continuation_fits(b, d);
 }
 
+static bool event_fits(const struct imp_scene *scene, const struct imp_event *e)
+{
+    if (e->medium < 0 || e->medium >= scene->n_media || !(e->t >= 0)) return false;
+    if (e->kind == IMP_CROSSES || e->kind == IMP_COLLIDES)
+        return !scene->media[e->medium]->majorants;
+    return (e->kind == IMP_NULL_AT || e->kind == IMP_REAL_AT) && isfinite(e->t) &&
+           isfinite(e->bound) && e->bound > 0;
+}
+
+/* A walk while its items are looked at: the walks that the item at hand may belong to,
+ * each of which hangs on the one before it. */
+struct fitting {
+    const struct imp_scene *scene;
+    const struct imp_record *record;
+    const struct imp_record_walk *walk;
+    uint32_t item, end; /* vertices that items before this one speak of */
+    struct {
+        uint32_t first, n;
+    } of[IMP_RECORD_NESTS + 1];
+    int nest;
+};
+
+static const union imp_kept *item_at(struct fitting *f)
+{
+    return f->item == f->walk->n_items
+               ? NULL
+               : imp__record_item(f->record, f->walk->first_item + f->item++);
+}
+
+/* Vertices that follow those before, of which each but the last goes on. */
+static bool chain_fits(struct fitting *f, uint32_t first, uint32_t n, bool side)
+{
+    if (first != f->end || n == 0 || n > IMP_WALK_MAX || n > f->walk->n_vertices - first)
+        return false;
+    for (uint32_t k = 0; k < n; k++)
+        if (!vertex_fits(f->scene,
+                         imp__record_vertex(f->record, f->walk->first + first + k),
+                         k == 0 && !side, k + 1 == n))
+            return false;
+    f->end = first + n;
+    return true;
+}
+
+static bool track_fits(struct fitting *f, const union imp_kept *head)
+{
+    const union imp_kept *way = item_at(f);
+    if (!way || !all_finite(head->head.o, 3) || !unit(way->way.d) ||
+        way->way.n > INT32_MAX || way->way.n > f->walk->n_items - f->item)
+        return false;
+    for (uint32_t i = 0; i < way->way.n; i++)
+        if (!event_fits(f->scene, &item_at(f)->event)) return false;
+    return true;
+}
+
+static bool items_fit(struct fitting *f)
+{
+    const union imp_kept *head;
+    while ((head = item_at(f)) != NULL) {
+        const uint32_t at = head->head.at;
+        while (at < f->of[f->nest].first || at - f->of[f->nest].first >= f->of[f->nest].n)
+            if (f->nest-- == 0) return false;
+        if (head->head.kind != IMP_KEPT_SIDE) {
+            if (head->head.kind > IMP_KEPT_SIDE || !track_fits(f, head)) return false;
+            continue;
+        }
+        const uint32_t first = head->head.side.first, n = head->head.side.n;
+        if (f->nest == IMP_RECORD_NESTS || head->head.side.depth < 0 ||
+            head->head.side.depth > IMP_WALK_MAX || !chain_fits(f, first, n, true))
+            return false;
+        f->nest++;
+        f->of[f->nest].first = first;
+        f->of[f->nest].n = n;
+    }
+    return f->end == f->walk->n_vertices;
+}
+
 static bool walk_fits(const struct imp_scene *scene, const struct imp_record *r,
-                      const struct imp_record_walk *w, uint64_t first)
+                      const struct imp_record_walk *w, uint64_t first,
+                      uint64_t first_item)
 {
     const bool counts = w->valid == 1 && w->dropped == IMP_DROP_NONE;
-    if (w->first != first || w->n > IMP_WALK_MAX || w->n > r->n_vertices - first ||
+    struct fitting f = {.scene = scene, .record = r, .walk = w, .of = {{0, w->n}}};
+    if (w->first != first || w->n_vertices > r->n_vertices - first ||
+        w->first_item != first_item || w->n_items > r->n_items - first_item ||
         w->valid > 1 || w->absorbed > 1 || w->dropped >= IMP_DROP_CAUSES ||
-        (w->n > 0 && !counts) || !isfinite(w->px) || !isfinite(w->py) ||
-        !(w->wave >= 0 && w->wave < 1))
+        (w->n_vertices > 0 && !counts) || (w->n == 0 && w->n_vertices > 0) ||
+        !isfinite(w->px) || !isfinite(w->py) || !(w->wave >= 0 && w->wave < 1))
         return false;
-    for (uint64_t k = first; k < first + w->n; k++)
-        if (!vertex_fits(scene, &r->vertices[k / IMP_RECORD_PAGE][k % IMP_RECORD_PAGE],
-                         k + 1 == first + w->n))
-            return false;
-    return true;
+    if (w->n > 0 && !chain_fits(&f, 0, w->n, false)) return false;
+    return items_fit(&f);
 }
 
 /* ---- Reading --------------------------------------------------------------------- */
@@ -181,7 +273,8 @@ static enum imp_status head_take(struct source *s, struct head *h)
                           "%s: kept walks of version %u; this program reads %d", s->path,
                           h->version, VERSION);
     if (h->walk_bytes != sizeof(struct imp_record_walk) ||
-        h->vertex_bytes != sizeof(struct imp_decision))
+        h->vertex_bytes != sizeof(struct imp_decision) ||
+        h->item_bytes != sizeof(union imp_kept) || h->reserved != 0)
         return imp__error(s->ctx, IMP_E_SCENE,
                           "%s: kept walks of another build: %u bytes a vertex, here %zu",
                           s->path, h->vertex_bytes, sizeof(struct imp_decision));
@@ -197,15 +290,21 @@ static enum imp_status body_take(struct source *s, struct imp_record *r,
     const size_t page = IMP_RECORD_PAGE;
     while (r->n_walks < h->n_walks) {
         const size_t n = (size_t)imp_min(h->n_walks - r->n_walks, (uint64_t)page);
-        IMP_TRY(imp__record_reserve(r, n, 0));
+        IMP_TRY(imp__record_reserve(r, n, 0, 0));
         IMP_TRY(take(s, r->walks[r->n_walks / page], n * sizeof **r->walks));
         r->n_walks += n;
     }
     while (r->n_vertices < h->n_vertices) {
         const size_t n = (size_t)imp_min(h->n_vertices - r->n_vertices, (uint64_t)page);
-        IMP_TRY(imp__record_reserve(r, 0, n));
+        IMP_TRY(imp__record_reserve(r, 0, n, 0));
         IMP_TRY(take(s, r->vertices[r->n_vertices / page], n * sizeof **r->vertices));
         r->n_vertices += n;
+    }
+    while (r->n_items < h->n_items) {
+        const size_t n = (size_t)imp_min(h->n_items - r->n_items, (uint64_t)page);
+        IMP_TRY(imp__record_reserve(r, 0, 0, n));
+        IMP_TRY(take(s, r->items[r->n_items / page], n * sizeof **r->items));
+        r->n_items += n;
     }
     const uint64_t sum = s->sum;
     uint64_t end;
@@ -224,7 +323,7 @@ enum imp_status imp__record_read(const struct imp_tracer *tracer, const char *pa
     struct source s = {.ctx = scene->ctx, .path = path, .f = fopen(path, "rbe")};
     struct imp_record r = {.ctx = NULL};
     struct head head;
-    uint64_t needed, vertices, first = 0;
+    uint64_t needed, vertices, items, first = 0, first_item = 0;
 
     if (!s.f) return imp__error(s.ctx, IMP_E_IO, "%s: %s", path, strerror(errno));
     IMP_TRY(imp__record_create(tracer, budget, &r));
@@ -232,7 +331,9 @@ enum imp_status imp__record_read(const struct imp_tracer *tracer, const char *pa
     IMP_TRY(imp__record_same(s.ctx, path, &head.of, &r.of));
     if (__builtin_mul_overflow(head.n_walks, sizeof **r.walks, &needed) ||
         __builtin_mul_overflow(head.n_vertices, sizeof **r.vertices, &vertices) ||
-        __builtin_add_overflow(needed, vertices, &needed))
+        __builtin_mul_overflow(head.n_items, sizeof **r.items, &items) ||
+        __builtin_add_overflow(needed, vertices, &needed) ||
+        __builtin_add_overflow(needed, items, &needed))
         IMP_TRY(damaged(&s, "absurd size"));
     if (needed > budget)
         IMP_TRY(imp__error(s.ctx, IMP_E_NOMEM,
@@ -241,11 +342,13 @@ enum imp_status imp__record_read(const struct imp_tracer *tracer, const char *pa
     IMP_TRY(body_take(&s, &r, &head));
     for (size_t i = 0; i < r.n_walks; i++) {
         const struct imp_record_walk *w = imp__record_at(&r, i);
-        if (!walk_fits(scene, &r, w, first))
+        if (!walk_fits(scene, &r, w, first, first_item))
             IMP_TRY(damaged(&s, "a walk that this scene cannot have"));
-        first += w->n;
+        first += w->n_vertices;
+        first_item += w->n_items;
     }
-    if (first != r.n_vertices) IMP_TRY(damaged(&s, "vertices of no walk"));
+    if (first != r.n_vertices || first_item != r.n_items)
+        IMP_TRY(damaged(&s, "vertices of no walk"));
     *out = r;
     r = (struct imp_record){.ctx = NULL};
 out:

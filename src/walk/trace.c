@@ -350,9 +350,9 @@ vertex_work(struct imp_step *s, struct imp_vertex *v, const struct imp_hit *hit,
         imp__light_sample(s, v, at, frame, &shadow);
 
     /* The continuation. */
-    const bool splits =
-        imp_unlikely(s->mixed.splits) ||
-        (imp_unlikely(s->tracer->split > 1) && s->depth == 0 && s->scene->n_bodies == 0);
+    const bool splits = imp_unlikely(s->mixed.splits) ||
+                        (imp_unlikely(s->tracer->split > 1) && s->depth == 0 &&
+                         s->scene->n_bodies + s->scene->n_media == 0);
     const bool continues =
         integrator->directions &&
         (splits ? scatter_split(s, v, at, frame) : imp__scatter(s, v, at, frame));

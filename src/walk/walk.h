@@ -200,7 +200,7 @@ struct imp_tracer {
     bool collisions_stand; /* the derivative of a frozen walk is wanted, whose collisions
                               stay where they are, also of extinctions: no probes */
     int split; /* continuations of the first vertex, each with its share; 0: one. Scenes
-                  with graded media have one */
+                  with media have one */
 };
 
 /* The guide that walks of this integrator follow: its densities are made for paths, in

@@ -1,14 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Walks that are kept, on every scene of this repository: kept, written, read and
- * evaluated they have the value and the pieces of gradient of the traced walk, to the
- * bit. At other parameters they have the value of the frozen walk, whose differences are
+ * Walks that are kept, on every scene of this repository, through media, and with walks
+ * that hang on them: kept, written, read and evaluated they have the value and the pieces
+ * of gradient of the traced walk, to the bit. At other parameters they have the value of the frozen walk, whose differences are
  * the sweep's. Files of another scene, version or byte order, and damaged ones, are
  * refused. */
 #include "walk/record.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "scene/guide.h"
+#include "vol_write.h"
 #include <importon/elements.h>
 #include <math.h>
 #include <stdbool.h>
@@ -34,7 +35,8 @@ struct traced {
 /* All parameters with a derivative are active, but those of media if `held`. */
 static void begin(struct traced *t, const char *file, const char *defines, bool held)
 {
-    imp_scene *scene = test_scene(ctx, file, mode, defines);
+    imp_scene *scene = file[0] == '<' ? test_scene_text(ctx, file, mode)
+                                      : test_scene(ctx, file, mode, defines);
     *t = (struct traced){.scene = scene};
     t->chosen = calloc(scene->n_params + 1, 1);
     for (size_t k = 0; k < scene->n_params; k++)
@@ -59,6 +61,7 @@ static void begin(struct traced *t, const char *file, const char *defines, bool 
                                     .integrator = &t->integrator,
                                     .sensor = sensor,
                                     .active = &t->active,
+                                    .collisions_stand = true,
                                     .seed = 11};
     imp__arena_init(&t->arena, ctx);
 }
@@ -169,20 +172,23 @@ static double weighed(imp_spec L) { return L[0] + 0.7 * L[1] + 1.3 * L[2]; }
 static const struct scene_case {
     const char *file, *defines;
     bool lanes_only; /* texels are floats: differences of them are too coarse */
+    int split;       /* continuations of the first vertex */
 } cases[] = {
-    {"cornell.xml", "res=32", false},
-    {"cornell.xml", "res=32 max_depth=-1", false},
-    {"textured.xml", NULL, true},
-    {"lamps.xml", NULL, false},
-    {"furnace.xml", NULL, false},
-    {"stam.xml", "integrator=stam", false},
-    {"stam.xml", "integrator=path", false},
-    {"elements/a.xml", NULL, false},
-    {"elements/b.xml", NULL, false},
-    {"elements/d.xml", NULL, false},
-    {"elements/d_lamps.xml", NULL, false},
-    {"elements/glossy.xml", NULL, false},
-    {"bend/seen.xml", "cells=1 width=8", true},
+    {"cornell.xml", "res=32", false, 0},
+    {"cornell.xml", "res=32 max_depth=-1", false, 0},
+    {"textured.xml", NULL, true, 0},
+    {"lamps.xml", NULL, false, 0},
+    {"furnace.xml", NULL, false, 0},
+    {"stam.xml", "integrator=stam", false, 0},
+    {"stam.xml", "integrator=path", false, 0},
+    {"elements/a.xml", NULL, false, 0},
+    {"elements/b.xml", NULL, false, 0},
+    {"elements/d.xml", NULL, false, 0},
+    {"elements/d_lamps.xml", NULL, false, 0},
+    {"elements/glossy.xml", NULL, false, 0},
+    {"bend/seen.xml", "cells=1 width=8", true, 0},
+    {"cornell.xml", "res=32", false, 3},
+    {"fog.xml", "res=32", false, 0},
 };
 
 enum { N = 3000 };
@@ -207,9 +213,10 @@ static void kept_same(struct traced *t, const char *name, struct imp_record *rea
     test_must(ctx, imp__record_read(&alone, path, PLENTY, read));
     tap_ok(read->n_walks == N && read->n_vertices == kept.n_vertices &&
                sizeof **read->vertices <= 160 &&
-               imp__record_bytes(read) <= 160 * read->n_vertices + 56 * N,
-           "%s: %zu walks of %zu vertices, %zu bytes a vertex, %.0f a walk", name,
-           read->n_walks, read->n_vertices, sizeof **read->vertices,
+               imp__record_bytes(read) <=
+                   160 * read->n_vertices + 16 * read->n_items + 72 * N,
+           "%s: %zu walks of %zu vertices and %zu items, %zu bytes a vertex, %.0f a walk",
+           name, read->n_walks, read->n_vertices, read->n_items, sizeof **read->vertices,
            (double)imp__record_bytes(read) / N);
     imp__record_destroy(&kept);
 
@@ -243,8 +250,10 @@ static void scene_test(const struct scene_case *c)
     struct imp_record read;
     static struct pieces two;
     char name[96];
-    snprintf(name, sizeof name, "%s %s", c->file, c->defines ? c->defines : "");
+    snprintf(name, sizeof name, "%s %s%s", c->file[0] == '<' ? "" : c->file,
+             c->defines ? c->defines : "", c->split ? " split" : "");
     begin(&t, c->file, c->defines, true);
+    t.tracer.split = c->split;
     kept_same(&t, name, &read);
 
     /* At others: against the walks traced at the first ones, frozen. */
@@ -299,8 +308,7 @@ static void scene_test(const struct scene_case *c)
     for (int i = 0; i < N && tried < 100; i++) {
         struct imp_walk w, k;
         const struct imp_record_walk *head = imp__record_at(&read, (size_t)i);
-        struct imp_decision *d =
-            &read.vertices[head->first / IMP_RECORD_PAGE][head->first % IMP_RECORD_PAGE];
+        struct imp_decision *d = imp__record_vertex(&read, head->first);
         trace(&t, i, &w);
         if (w.n > 0 && w.first->d.goes_on && weighed(w.first->beyond * w.first->w) > 0) {
             d->pdf = nextafterf(d->pdf, INFINITY);
@@ -374,6 +382,54 @@ static void wavelengths(void)
     tap_ok(imp__record_check(&read, &t.tracer) == IMP_E_ARG, "and walks of colours");
     imp__record_destroy(&read);
     end(&t);
+}
+
+/* ---- Media whose extinction varies, branches of every vertex ---------------------- */
+
+#define ROOM                                                                             \
+    "<sensor type='perspective'><float name='fov' value='40'/><transform "               \
+    "name='to_world'><lookat origin='0,1,6' target='0,.3,0' up='0,1,0'/></transform>"    \
+    "<film type='hdrfilm'><integer name='width' value='16'/><integer name='height' "     \
+    "value='16'/><rfilter type='box'/></film></sensor><emitter type='constant'>"         \
+    "<rgb name='radiance' value='.3,.4,.5'/></emitter><shape type='rectangle'>"          \
+    "<transform name='to_world'><rotate x='1' angle='-90'/><scale value='4'/>"           \
+    "<translate y='-1'/></transform><bsdf type='diffuse'/></shape><shape "               \
+    "type='sphere'><point name='center' x='1' y='3' z='0'/><float name='radius' "        \
+    "value='.5'/><emitter type='area'><float name='radiance' value='4'/></emitter>"      \
+    "</shape>"
+
+static void cloud(void)
+{
+    enum { N_CELLS = 4 * 4 * 4 };
+    float value[3 * N_CELLS];
+    char vol[64], xml[4096];
+    for (int k = 0; k < 3 * N_CELLS; k++) value[k] = (float)(4 * unit_noise((size_t)k));
+    vol_write(vol, 4, 4, 4, 3, value);
+    snprintf(xml, sizeof xml,
+             "<scene version='3.0.0'><integrator type='volpath'><integer name='rr_depth' "
+             "value='6'/></integrator>" ROOM
+             "<shape type='cube'><bsdf type='null'/><medium name='interior' "
+             "type='heterogeneous'><volume name='sigma_t' type='gridvolume'><string "
+             "name='filename' value='%s'/><transform name='to_world'><scale value='2'/>"
+             "<translate x='-1' y='-1' z='-1'/></transform></volume><rgb name='albedo' "
+             "value='.9,.7,.5'/><phase type='hg'><float name='g' value='.4'/></phase>"
+             "</medium></shape></scene>",
+             vol);
+    const struct scene_case c = {xml, "a coloured cloud", true, 0};
+    scene_test(&c);
+    remove(vol);
+}
+
+static void tree(void)
+{
+    const struct scene_case c = {
+        "<scene version='3.0.0'><integrator type='path'><string name='weights' "
+        "value='kernel=1,emitters=1,environment=1'/><integer name='split' value='2'/>"
+        "<integer name='max_depth' value='5'/></integrator>" ROOM
+        "<shape type='sphere'><bsdf type='phong'><float name='exponent' value='6'/>"
+        "</bsdf></shape></scene>",
+        "two vertices that branch", false, 0};
+    scene_test(&c);
 }
 
 /* ---- Refused --------------------------------------------------------------------- */
@@ -467,14 +523,18 @@ static void not_kept(void)
     tap_ok(imp__record_create(&t.tracer, PLENTY, &r) == IMP_E_UNSUPPORTED,
            "and attached derivatives # %s", imp_last_error(ctx));
     t.integrator.alpha_gradient = IMP_ALPHA_DETACHED;
-    t.tracer.split = 2;
-    tap_ok(imp__record_create(&t.tracer, PLENTY, &r) == IMP_E_UNSUPPORTED,
-           "and walks that split # %s", imp_last_error(ctx));
+    end(&t);
+
+    begin(&t, "fog.xml", "res=32", true);
+    t.tracer.collisions_stand = false;
+    r = some(&t, 100, PLENTY, &st);
+    tap_ok(st == IMP_E_UNSUPPORTED, "and probes of extinctions # %s",
+           imp_last_error(ctx));
+    imp__record_destroy(&r);
     end(&t);
 
     begin(&t, "cornell.xml", "res=32", true);
     const imp_spec one = {1, 1, 1, 1};
-    struct imp_side side = {.next = NULL};
     struct imp_walk w;
     for (int i = 0; trace(&t, i, &w), !w.first; i++) {}
     test_must(ctx, imp__record_create(&t.tracer, PLENTY, &r));
@@ -482,10 +542,6 @@ static void not_kept(void)
     tap_ok(imp__record_keep(&r, &w, 0) == IMP_E_UNSUPPORTED && r.n_walks == 0,
            "and walks whose light enters at their vertices # %s", imp_last_error(ctx));
     w.entry = NULL;
-    w.last->side = &side;
-    tap_ok(imp__record_keep(&r, &w, 0) == IMP_E_UNSUPPORTED && r.n_walks == 0,
-           "and walks with others on them # %s", imp_last_error(ctx));
-    w.last->side = NULL;
     tap_ok(imp__record_keep(&r, &w, 0) == IMP_OK && r.n_walks == 1, "and none else");
     imp__record_destroy(&r);
     end(&t);
@@ -546,8 +602,8 @@ static void files(void)
     struct imp_record kept = some(&t, 20, PLENTY, &st);
     test_must(ctx, imp__record_write(&kept, path));
     unsigned char *b = bytes_read(&n);
-    tap_ok(n == 72 + imp__record_bytes(&kept) + 8 && file_read(&t) == IMP_OK,
-           "a head of 72 bytes, the walks, a checksum # %zu", n);
+    tap_ok(n == 88 + imp__record_bytes(&kept) + 8 && file_read(&t) == IMP_OK,
+           "a head of 88 bytes, the walks, a checksum # %zu", n);
 
     static const struct {
         size_t at;
@@ -594,6 +650,83 @@ static void files(void)
     end(&t);
 }
 
+/* Decisions and items that no walk of the scene has, with a checksum that fits. */
+static void impossible(void)
+{
+    static const char *const what[] = {"a vertex beyond the walk's",
+                                       "more events than there are",
+                                       "another medium",
+                                       "an unknown event",
+                                       "a negative length",
+                                       "no direction",
+                                       "a vertex in no medium",
+                                       "a sensor twice"};
+    enum { CASES = sizeof what / sizeof *what };
+    struct traced t;
+    enum imp_status st;
+    begin(&t, "fog.xml", "res=32", true);
+    struct imp_record r = some(&t, 200, PLENTY, &st);
+    size_t i = 0; /* a walk that scatters in the fog first */
+    while (i < r.n_walks &&
+           !(imp__record_at(&r, i)->n > 2 &&
+             imp__record_vertex(&r, imp__record_at(&r, i)->first + 1)->scatterer ==
+                 IMP_IN_MEDIUM))
+        i++;
+    const struct imp_record_walk *w = imp__record_at(&r, i);
+    union imp_kept *head = imp__record_item(&r, w->first_item), *way = head + 1,
+                   *event = head + 2;
+    struct imp_decision *second = imp__record_vertex(&r, w->first + 1);
+    const union imp_kept good[3] = {*head, *way, *event};
+    const struct imp_decision good_second = *second;
+    int refused = 0;
+    for (int k = 0; k < CASES; k++) {
+        if (k == 0) head->head.at = w->n_vertices;
+        if (k == 1) way->way.n = w->n_items;
+        if (k == 2) event->event.medium = 1;
+        if (k == 3) event->event.kind = 4;
+        if (k == 4) event->event.t = -1;
+        if (k == 5) memset(way->way.d, 0, sizeof way->way.d);
+        if (k == 6) second->shape = 7;
+        if (k == 7) second->shape = -1, second->scatterer = IMP_AT_SENSOR;
+        test_must(ctx, imp__record_write(&r, path));
+        st = file_read(&t);
+        refused += st == IMP_E_SCENE && strstr(imp_last_error(ctx), "cannot have");
+        if (st == IMP_OK) printf("# read: %s\n", what[k]);
+        *head = good[0];
+        *way = good[1];
+        *event = good[2];
+        *second = good_second;
+    }
+    tap_ok(refused == CASES, "what no walk has is refused # %d of %d", refused, CASES);
+    test_must(ctx, imp__record_write(&r, path));
+    tap_ok(file_read(&t) == IMP_OK, "control: as they were they are read");
+    imp__record_destroy(&r);
+    end(&t);
+
+    /* Side walks that hang on nothing, or have vertices of others. */
+    begin(&t, "cornell.xml", "res=32", true);
+    t.tracer.split = 3;
+    r = some(&t, 50, PLENTY, &st);
+    for (i = 0; imp__record_at(&r, i)->n_items == 0; i++) {}
+    head = imp__record_item(&r, imp__record_at(&r, i)->first_item);
+    const union imp_kept side = *head;
+    refused = 0;
+    for (int k = 0; k < 5; k++) {
+        if (k == 0) head->head.side.n = 0;
+        if (k == 1) head->head.side.n += 1;
+        if (k == 2) head->head.side.first = 0;
+        if (k == 3) head->head.side.depth = -1;
+        if (k == 4) head->head.at = head->head.side.first;
+        test_must(ctx, imp__record_write(&r, path));
+        st = file_read(&t);
+        refused += st == IMP_E_SCENE && strstr(imp_last_error(ctx), "cannot have");
+        *head = side;
+    }
+    tap_ok(refused == 5, "and side walks that are none # %d of 5", refused);
+    imp__record_destroy(&r);
+    end(&t);
+}
+
 int main(void)
 {
     ctx = test_context(1);
@@ -602,7 +735,10 @@ int main(void)
     wavelengths();
     other_scenes();
     not_kept();
+    cloud();
+    tree();
     files();
+    impossible();
     remove(path);
     imp_context_destroy(ctx);
     return tap_done();
