@@ -52,12 +52,15 @@ static void print_text(const struct imp_check_row *rows, size_t n)
     }
 }
 
-static void print_json(const struct imp_run *run, const struct imp_check_row *rows,
-                       size_t n, size_t failed, size_t noisy)
+/* `taken`: samples per pixel of a fresh-seed difference, before noisy rows take more. */
+static void print_json(const struct imp_run *run, int taken,
+                       const struct imp_check_row *rows, size_t n, size_t failed,
+                       size_t noisy)
 {
     struct json j = cli_json();
     json_seed(&j, "seed", run->seed);
     json_integer(&j, "spp", cli_spp(run));
+    json_integer(&j, "spp_taken", taken);
     json_array(&j, "rows");
     for (size_t i = 0; i < n; i++) {
         const struct imp_check_row *r = &rows[i];
@@ -104,8 +107,12 @@ static int run_check(int n, char **operand)
             failed += !rows[i].ok;
             noisy += rows[i].ok < 0;
         }
-        if (cli.json) print_json(&run, rows, n_rows, failed, noisy);
-        else print_text(rows, n_rows);
+        struct imp_run fresh = run;
+        int taken = 0;
+        if (o.fresh_spp > 0) fresh.spp = o.fresh_spp;
+        if (!cli.json) print_text(rows, n_rows);
+        else if (!cli_failed(imp_problem_spp(problem, -1, &fresh, &taken)))
+            print_json(&run, taken, rows, n_rows, failed, noisy);
         cli_say("%zu checks, %zu failed, %zu too noisy to tell%s", n_rows, failed, noisy,
                 noisy ? " (more --fresh-spp)" : "");
         rc = cli_done();

@@ -141,6 +141,7 @@ static int answer(const struct imp_run *run, imp_film *primal, imp_film **films,
                   const struct block *blocks, size_t n_blocks)
 {
     const struct picture_options plain = {.standard_error = 1};
+    struct imp_film_info info = {.size = sizeof info};
     struct json j = {stdout, 0};
     struct output table;
     char *csv = join_path(cli.out, "controls.csv");
@@ -149,9 +150,11 @@ static int answer(const struct imp_run *run, imp_film *primal, imp_film **films,
     if (!rc) {
         fprintf(table.file, "file,mean,se,red\n");
         if (cli.json) {
+            imp_film_get_info(primal, &info);
             j = cli_json();
             json_seed(&j, "seed", run->seed);
             json_integer(&j, "spp", cli_spp(run));
+            json_integer(&j, "spp_taken", info.spp);
             json_array(&j, "controls");
         }
         picture_stamp(primal, run);
