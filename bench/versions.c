@@ -2,10 +2,14 @@
  *
  * Two builds of the program beside each other, say of today and of a month ago: processor
  * seconds (user and system) and peak memory of pictures, losses with gradients and checks,
- * one thread each. A round runs every job once with either build, in turn; the minimum of
+ * one thread each. Memory is told in all (maximum resident set), and without the pages of
+ * program and libraries, which are a part of files that all processes share. A round runs every job once with either build, in turn; the minimum of
  * all rounds counts. Prints a table for docs/speed.md.
  *
- *     versions [--rounds N] [--job TEXT] OLD NEW        (paths of two cli/importon) */
+ *     versions [--rounds N] [--job TEXT] [--scenes FOLDER] OLD NEW
+ *
+ * OLD and NEW are paths of two cli/importon; FOLDER has scenes that both can read: those
+ * of the older one. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -17,12 +21,12 @@ enum { WORDS_MAX = 32 };
 
 struct job {
     const char *name;
-    const char *words[WORDS_MAX]; /* of the command line, after the program */
-    double seconds[2], mib[2];    /* minima of the old and the new build */
+    const char *words[WORDS_MAX];      /* of the command line, after the program */
+    double seconds[2], mib[2], own[2]; /* minima of the old and the new build */
 };
 
-#define CORNELL  IMP_SCENES "/cornell.xml", "-D", "res=128"
-#define TEXTURED IMP_SCENES "/textured.xml", "-D", "width=160", "-D", "height=120"
+#define CORNELL  "@cornell.xml", "-D", "res=128"
+#define TEXTURED "@textured.xml", "-D", "width=160", "-D", "height=120"
 #define PICTURE  "--no-preview", "-o", "picture.exr"
 
 static struct job jobs[] = {
@@ -34,11 +38,11 @@ static struct job jobs[] = {
     {.name = "loss + gradient, textured",
      .words = {"gradient", TEXTURED, "--spp", "64", "-T", "textured.exr"}},
     {.name = "check, Cornell box",
-     .words = {"check", IMP_SCENES "/cornell.xml", "-D", "res=48", "--paths", "200",
-               "--fresh-spp", "16"}},
+     .words = {"check", "@cornell.xml", "-D", "res=48", "--paths", "200", "--fresh-spp",
+               "16"}},
     {.name = "check, textured, reflectances",
-     .words = {"check", IMP_SCENES "/textured.xml", "-D", "width=96", "-D", "height=72",
-               "--paths", "200", "--fresh-spp", "16", "-p", "*reflectance*"}}};
+     .words = {"check", "@textured.xml", "-D", "width=96", "-D", "height=72", "--paths",
+               "200", "--fresh-spp", "16", "-p", "*reflectance*"}}};
 enum { JOBS = sizeof jobs / sizeof jobs[0] };
 
 static const char *const targets[][WORDS_MAX] = {
@@ -47,15 +51,34 @@ static const char *const targets[][WORDS_MAX] = {
     {"render", TEXTURED, "--spp", "32", "--seed", "7", "--no-preview", "-o",
      "textured.exr"}};
 
+static const char *scenes = IMP_SCENES; /* where "@..." of a command line is */
+
+/* Resident pages that belong to no file, MiB; looked at every millisecond. */
+static double own_memory(pid_t pid)
+{
+    char name[64];
+    long size = 0, resident = 0, shared = 0;
+    snprintf(name, sizeof name, "/proc/%ld/statm", (long)pid);
+    FILE *f = fopen(name, "r");
+    if (!f) return 0;
+    if (fscanf(f, "%ld %ld %ld", &size, &resident, &shared) != 3) resident = shared;
+    fclose(f);
+    return (double)(resident - shared) * (double)sysconf(_SC_PAGESIZE) / 0x1p20;
+}
+
 /* Run it once; its processor seconds and peak memory. This program is small: what a child
  * has before it becomes `program` does not count. */
 static void run(const char *program, const char *const *words, double *seconds,
-                double *mib)
+                double *mib, double *own)
 {
-    char *argv[WORDS_MAX + 5] = {(char *)program};
+    char *argv[WORDS_MAX + 5] = {(char *)program}, scene[4096];
     struct rusage usage;
     int n = 1, status;
-    for (; *words; words++) argv[n++] = (char *)*words;
+    for (; *words; words++) {
+        argv[n++] = (*words)[0] == '@' ? scene : (char *)*words;
+        if ((*words)[0] == '@')
+            snprintf(scene, sizeof scene, "%s/%s", scenes, *words + 1);
+    }
     argv[n++] = "-t", argv[n++] = "1", argv[n++] = "-q";
     unlink("picture.exr");
     const pid_t pid = fork();
@@ -64,7 +87,12 @@ static void run(const char *program, const char *const *words, double *seconds,
         execv(program, argv);
         _exit(127);
     }
-    wait4(pid, &status, 0, &usage);
+    double most = 0;
+    while (wait4(pid, &status, WNOHANG, &usage) == 0) {
+        const double now = own_memory(pid);
+        if (now > most) most = now;
+        usleep(1000);
+    }
     /* 1: a check that a difference stays too noisy for. */
     if (!WIFEXITED(status) || WEXITSTATUS(status) > 1) {
         fprintf(stderr, "versions: %s %s failed\n", program, argv[1]);
@@ -75,6 +103,7 @@ static void run(const char *program, const char *const *words, double *seconds,
     const double m = (double)usage.ru_maxrss / 1024;
     if (s < *seconds) *seconds = s;
     if (m < *mib) *mib = m;
+    if (most < *own) *own = most;
 }
 
 int main(int argc, char **argv)
@@ -85,11 +114,14 @@ int main(int argc, char **argv)
     for (int k = 1; k < argc; k++) {
         if (!strcmp(argv[k], "--rounds") && k + 1 < argc) rounds = atoi(argv[++k]);
         else if (!strcmp(argv[k], "--job") && k + 1 < argc) wanted = argv[++k];
+        else if (!strcmp(argv[k], "--scenes") && k + 1 < argc)
+            scenes = realpath(argv[++k], NULL);
         else if (n < 2 && argv[k][0] != '-') program[n++] = argv[k];
         else n = 3;
     }
-    if (n != 2 || rounds < 1) {
-        fprintf(stderr, "usage: versions [--rounds N] [--job TEXT] OLD NEW\n");
+    if (n != 2 || rounds < 1 || !scenes) {
+        fprintf(stderr, "usage: versions [--rounds N] [--job TEXT] [--scenes FOLDER] "
+                        "OLD NEW\n");
         return 2;
     }
     for (int b = 0; b < 2; b++)
@@ -102,25 +134,28 @@ int main(int argc, char **argv)
         return 3;
     }
     for (size_t t = 0; t < sizeof targets / sizeof targets[0]; t++) {
-        double seconds = 1e30, mib = 1e30;
-        run(path[0], targets[t], &seconds, &mib);
+        double seconds = 1e30, mib = 1e30, own = 1e30;
+        run(path[0], targets[t], &seconds, &mib, &own);
     }
     for (int k = 0; k < JOBS; k++)
-        for (int b = 0; b < 2; b++) jobs[k].seconds[b] = jobs[k].mib[b] = 1e30;
+        for (int b = 0; b < 2; b++)
+            jobs[k].seconds[b] = jobs[k].mib[b] = jobs[k].own[b] = 1e30;
     for (int r = 0; r < rounds; r++)
         for (int k = 0; k < JOBS; k++)
             for (int b = 0; strstr(jobs[k].name, wanted) && b < 2; b++)
-                run(path[b], jobs[k].words, &jobs[k].seconds[b], &jobs[k].mib[b]);
+                run(path[b], jobs[k].words, &jobs[k].seconds[b], &jobs[k].mib[b],
+                    &jobs[k].own[b]);
 
-    printf("| %d rounds | old s | new s | new / old | old MiB | new MiB | new / old |\n"
-           "|---|---|---|---|---|---|---|\n",
+    printf("| %d rounds | old s | new s | new / old | old MiB | new MiB | new / old | "
+           "old own | new own | new / old |\n|---|---|---|---|---|---|---|---|---|---|\n",
            rounds);
     for (int k = 0; k < JOBS; k++) {
         const struct job *j = &jobs[k];
         if (!strstr(j->name, wanted)) continue;
-        printf("| %s | %.3f | %.3f | %.3f | %.1f | %.1f | %.2f |\n", j->name,
-               j->seconds[0], j->seconds[1], j->seconds[1] / j->seconds[0], j->mib[0],
-               j->mib[1], j->mib[1] / j->mib[0]);
+        printf("| %s | %.3f | %.3f | %.3f | %.1f | %.1f | %.2f | %.2f | %.2f | %.2f |\n",
+               j->name, j->seconds[0], j->seconds[1], j->seconds[1] / j->seconds[0],
+               j->mib[0], j->mib[1], j->mib[1] / j->mib[0], j->own[0], j->own[1],
+               j->own[1] / j->own[0]);
     }
     unlink("picture.exr"), unlink("cornell.exr"), unlink("textured.exr");
     if (chdir("/") == 0) rmdir(work);

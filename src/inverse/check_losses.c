@@ -281,11 +281,39 @@ out:
     return st;
 }
 
-enum imp_status imp__check_losses(struct imp__check *c)
+/* Only rounding is left, so part of a large picture says what all of it does: a window in
+ * its middle, or all of it if nothing arrives there. */
+#define WINDOW 48
+
+static void window_set(struct imp_film_desc *film)
+{
+    const int w = imp_min(film->crop_w, WINDOW), h = imp_min(film->crop_h, WINDOW);
+    film->crop_x += (film->crop_w - w) / 2;
+    film->crop_y += (film->crop_h - h) / 2;
+    film->crop_w = w;
+    film->crop_h = h;
+}
+
+static void losses_free(struct losses *l)
+{
+    for (int i = 0; i < N; i++) imp_film_destroy(l->films[i]);
+    imp__release(l->check->ctx, l->T);
+    imp__release(l->check->ctx, l->x_dot);
+}
+
+static bool any_light(const struct losses *l)
+{
+    for (int i = 0; i < N; i++)
+        for (size_t k = 0; k < l->values; k++)
+            if (radiance(l, i, k) > 0) return true;
+    return false;
+}
+
+/* The samples of the film as it is now. */
+static enum imp_status losses_begin(struct imp__check *c, struct losses *out)
 {
     enum imp_status st = IMP_OK;
-    struct imp_film_desc *film = &c->problem->scene->sensors[c->outer.sensor]->film;
-    const struct imp_filter filter = film->filter;
+    const struct imp_film_desc *film = &c->tracer.sensor->film;
     struct losses l = {.check = c,
                        .channels = (size_t)c->problem->scene->channels,
                        .seed = imp__mix64(c->outer.seed ^ 0x10557)};
@@ -295,16 +323,35 @@ enum imp_status imp__check_losses(struct imp__check *c)
     if (!l.T || !l.x_dot)
         IMP_TRY(imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check"));
     l.g = l.x_dot + c->problem->n;
-    film->filter.radius = 0.5; /* a sample belongs to its own pixel alone */
-    c->total = c->done + KINDS;
     IMP_TRY(direction_make(&l));
     IMP_TRY(samples_make(&l));
+out:
+    if (st != IMP_OK) losses_free(&l);
+    else *out = l;
+    return st;
+}
+
+enum imp_status imp__check_losses(struct imp__check *c)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_film_desc *film = &c->problem->scene->sensors[c->outer.sensor]->film;
+    const struct imp_film_desc whole = *film;
+    struct losses l = {.check = c};
+    film->filter.radius = 0.5; /* a sample belongs to its own pixel alone */
+    window_set(film);
+    c->total = c->done + KINDS;
+    IMP_TRY(losses_begin(c, &l));
+    if (!any_light(&l) && (film->crop_w < whole.crop_w || film->crop_h < whole.crop_h)) {
+        losses_free(&l);
+        l = (struct losses){.check = c};
+        *film = whole;
+        film->filter.radius = 0.5;
+        IMP_TRY(losses_begin(c, &l));
+    }
     target_make(&l);
     for (int k = 0; k < KINDS; k++) IMP_TRY(check_loss(&l, k));
 out:
-    film->filter = filter;
-    for (int i = 0; i < N; i++) imp_film_destroy(l.films[i]);
-    imp__release(c->ctx, l.T);
-    imp__release(c->ctx, l.x_dot);
+    *film = whole;
+    losses_free(&l);
     return st;
 }
