@@ -101,37 +101,48 @@ out:
 
 /* ---- Differences --------------------------------------------------------------- */
 
+/* F where the parameter has moved by `step`, for each seed. It is set once for all: what
+ * follows from a number may take longer than a picture (the table of a rough coat). */
 static enum imp_status at(struct imp__fresh *f, const struct imp__motion *m, double step,
-                          uint64_t seed, double *value)
+                          const uint64_t seed[IMP_CHECK_BATCHES],
+                          double value[IMP_CHECK_BATCHES])
 {
+    enum imp_status st = IMP_OK;
     struct imp_param p = *m->param;
     for (size_t e = 0; e < p.info.count; e++)
         if (m->weight[e] != 0) imp__param_set(&p, e, m->old[e] + step * m->weight[e]);
     imp__theta_announce(f->check->problem->scene);
-    const enum imp_status st = functional(f, NULL, seed, value);
+    for (int b = 0; b < IMP_CHECK_BATCHES; b++)
+        IMP_TRY(functional(f, NULL, seed[b], &value[b]));
+out:
     for (size_t e = 0; e < p.info.count; e++) imp__param_set(&p, e, m->old[e]);
     imp__theta_announce(f->check->problem->scene);
     return st;
 }
 
-/* Combine values at places with factors: sum factor F(place), batch by batch. `other`:
+#define PLACES 6
+
+/* Combine values at n places with factors: sum factor F(place), batch by batch. `other`:
  * factors of lower order, or NULL. */
 static enum imp_status combine(struct imp__fresh *f, const struct imp__motion *m, int n,
                                const double *place, const double *factor,
                                const double *other, struct imp__quotient *out)
 {
     enum imp_status st = IMP_OK;
+    double value[PLACES][IMP_CHECK_BATCHES];
     double sum = 0, square = 0, coarse = 0, largest = 0, factors = 0;
-    for (int i = 0; i < n; i++) factors += fabs(factor[i]);
+    uint64_t seed[IMP_CHECK_BATCHES];
+    for (int b = 0; b < IMP_CHECK_BATCHES; b++) seed[b] = imp__fresh_seed(f);
+    for (int i = 0; i < n; i++) {
+        IMP_TRY(at(f, m, place[i], seed, value[i]));
+        factors += fabs(factor[i]);
+    }
     for (int b = 0; b < IMP_CHECK_BATCHES; b++) {
-        const uint64_t seed = imp__fresh_seed(f);
         double difference = 0;
         for (int i = 0; i < n; i++) {
-            double value;
-            IMP_TRY(at(f, m, place[i], seed, &value));
-            difference += factor[i] * value;
-            if (other) coarse += other[i] * value / IMP_CHECK_BATCHES;
-            largest = fmax(largest, fabs(value));
+            difference += factor[i] * value[i][b];
+            if (other) coarse += other[i] * value[i][b] / IMP_CHECK_BATCHES;
+            largest = fmax(largest, fabs(value[i][b]));
         }
         sum += difference;
         square += difference * difference;
@@ -181,10 +192,10 @@ enum imp_status imp__fresh_difference(struct imp__fresh *f, const struct imp__mo
     const double side = above >= below ? 1 : -1;
     const double h = *step =
         side * 0.15 * part * fmin(fmax(below, above), fmax(scale, 1e-3));
-    const double place[6] = {0, h / 2, h, 3 * h / 2, 2 * h, 3 * h};
-    const double half[6] = {-11 / (3 * h), 6 / h, -3 / h, 2 / (3 * h), 0, 0};
-    const double full[6] = {-11 / (6 * h), 0, 3 / h, 0, -1.5 / h, 1 / (3 * h)};
-    double factor[6];
-    for (int i = 0; i < 6; i++) factor[i] = (8 * half[i] - full[i]) / 7;
-    return combine(f, m, 6, place, factor, half, out);
+    const double place[PLACES] = {0, h / 2, h, 3 * h / 2, 2 * h, 3 * h};
+    const double half[PLACES] = {-11 / (3 * h), 6 / h, -3 / h, 2 / (3 * h), 0, 0};
+    const double full[PLACES] = {-11 / (6 * h), 0, 3 / h, 0, -1.5 / h, 1 / (3 * h)};
+    double factor[PLACES];
+    for (int i = 0; i < PLACES; i++) factor[i] = (8 * half[i] - full[i]) / 7;
+    return combine(f, m, PLACES, place, factor, half, out);
 }

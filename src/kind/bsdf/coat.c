@@ -212,23 +212,25 @@ static void strip_add(const struct sight *s, imp__dual y, imp__dual dy, double r
         }
 }
 
+/* Gauss-Legendre on [0, 1]. */
+struct rules {
+    double x[NX], dx[NX], y[NY], dy[NY];
+};
+
 /* Mean over the facets seen at mu of what passes, or what comes back. */
-static imp__dual mean(enum imp__distribution type, double mu, imp__dual alpha,
-                      imp__dual e, bool back)
+static imp__dual mean(const struct rules *rules, enum imp__distribution type, double mu,
+                      imp__dual alpha, imp__dual e, bool back)
 {
     const struct sight s = {type, mu,   sqrt(imp_max(0, 1 - mu * mu)), alpha,
                             e,    back, constant(1) - product(e, e)};
     const double reach = type == IMP_GGX ? IMP_PI / 2 : BECKMANN_REACH;
     const imp__dual middle = last_y(&s, reach), end[3] = {{0}, middle, constant(reach)};
-    double node[NX], share[NX], y[NY], dy[NY];
     imp__dual sum[2] = {{0}, {0}};
-    imp__gauss_legendre(NX, 0, 1, node, share);
-    imp__gauss_legendre(NY, 0, 1, y, dy);
     for (int part = 0; part < (middle[0] < reach ? 2 : 1); part++) {
         const imp__dual width = end[part + 1] - end[part];
         for (int j = 0; j < NY; j++)
-            strip_add(&s, end[part] + width * y[j], width * dy[j], reach, node, share,
-                      sum);
+            strip_add(&s, end[part] + width * rules->y[j], width * rules->dy[j], reach,
+                      rules->x, rules->dx, sum);
     }
     return product(sum[1], inverse(sum[0]));
 }
@@ -239,10 +241,14 @@ void imp__coat_make(struct imp__coat *c, enum imp__distribution type, double alp
     if (c->alpha == alpha && c->eta == eta && c->type == type) return;
     *c = (struct imp__coat){.type = type, .alpha = alpha, .eta = eta};
     const imp__dual a = {alpha, 1, 0, 0}, e = {eta, 0, 1, 0};
+    struct rules rules;
+    imp__gauss_legendre(NX, 0, 1, rules.x, rules.dx);
+    imp__gauss_legendre(NY, 0, 1, rules.y, rules.dy);
     for (int k = 0; k < IMP_COAT_NODES; k++) {
         const double mu = imp_max(1e-6, k / (IMP_COAT_NODES - 1.));
-        c->T[k] = mean(type, mu, a, e, false);
-        c->R_int += mean(type, mu, a, inverse(e), true) * (2 * mu / IMP_COAT_NODES);
+        c->T[k] = mean(&rules, type, mu, a, e, false);
+        c->R_int +=
+            mean(&rules, type, mu, a, inverse(e), true) * (2 * mu / IMP_COAT_NODES);
     }
 }
 
