@@ -11,6 +11,8 @@
 #define TOLERANCE 3e-4
 /* The tables of its rough coats: means over 32 x 32 facets, 1e-3 off under grazing angles. */
 #define TOLERANCE_COAT 2e-3
+/* Its fit of the mean reflectance from inside is 5e-4 off, which is 1.2e-3 of the base. */
+#define TOLERANCE_PLASTIC 1.5e-3
 
 struct row {
     double uv[2];
@@ -62,7 +64,9 @@ static void row_check(const struct imp_bsdf *b, const struct imp_shape *shape,
 
 static void report(const struct tally *t)
 {
-    const double limit = strncmp(t->name, "coat", 4) ? TOLERANCE : TOLERANCE_COAT;
+    const double limit = strncmp(t->name, "coat", 4) == 0      ? TOLERANCE_COAT
+                         : strncmp(t->name, "plastic", 7) == 0 ? TOLERANCE_PLASTIC
+                                                               : TOLERANCE;
     if (t->name[0])
         tap_ok(t->worst < limit && t->lit > 8,
                "%s # largest error %.1e, %d values, %d lit, %d of delta lobes", t->name,

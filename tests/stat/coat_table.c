@@ -2,10 +2,12 @@
  *
  * Tables of rough coats (kind/bsdf/coat.h): against draws of visible normals, against
  * numbers computed elsewhere (docs/scene-format.md 16), and their derivatives against
- * differences of other tables. */
+ * differences of other tables. The mean reflectance of smooth ones (kind/bsdf/fresnel.h)
+ * against quadrature. */
 #include "imp_tap.h"
 #include "kind/bsdf/coat.h"
 #include "kind/bsdf/fresnel.h"
+#include "math/quadrature.h"
 #include "math/rng.h"
 
 enum { DRAWS = 40000 };
@@ -115,10 +117,51 @@ static void derivatives(void)
     tap_ok(worst < 1e-6, "derivatives by alpha and eta # %.1e", worst);
 }
 
+/* int 2 c F(c, e) dc, with c = t^2 for the root at 0, and above total reflection c^2 =
+ * 1 - e^2 + s^2 e^2, s the cosine on the far side: c dc = e^2 s ds. */
+static double mean_by_quadrature(double e, double *d_e)
+{
+    enum { NODES = 200 };
+    double x[NODES], w[NODES], sum = e < 1 ? 1 - e * e : 0;
+    imp__gauss_legendre(NODES, 0, 1, x, w);
+    *d_e = 0;
+    for (int k = 0; k < NODES; k++) {
+        const double t2 = x[k] * x[k];
+        const double c = e < 1 ? sqrt(1 - e * e + t2 * t2 * e * e) : t2;
+        const double by = e < 1 ? 4 * e * e * t2 * x[k] : 4 * t2 * x[k];
+        double dF_c, dF_e, cos_t, eta_t;
+        sum += w[k] * by * imp__fresnel_dielectric(c, e, &cos_t, &eta_t);
+        imp__fresnel_dielectric_d(c, e, &dF_c, &dF_e);
+        *d_e += w[k] * by * dF_e; /* the ends bring nothing: F is 1 there */
+    }
+    return sum;
+}
+static void smooth(void)
+{
+    static const double index[] = {.1,    .25,  1 / 1.4895, .9,     .999, 1, 1.00001,
+                                   1.001, 1.02, 1.1,        1.4895, 3,    10};
+    double worst = 0, worst_d = 0;
+    for (size_t k = 0; k < sizeof index / sizeof *index; k++) {
+        double d, d_e;
+        const double e = index[k], F = imp__fresnel_diffuse(e, &d);
+        worst = fmax(worst, fabs(F - mean_by_quadrature(e, &d_e)));
+        if (e > 1.005 || e < 0.99) worst_d = fmax(worst_d, fabs(d - d_e) / (1 + fabs(d)));
+    }
+    tap_ok(worst < 2e-9, "mean reflectance by quadrature # %.1e", worst);
+    tap_ok(worst_d < 1e-6, "and its derivative # %.1e", worst_d);
+    double d, above_1, below_1; /* slopes 1/3 and 7/3, where it has a kink */
+    above_1 = imp__fresnel_diffuse(1 + 1e-5, &d);
+    below_1 = imp__fresnel_diffuse(1 - 1e-5, &d);
+    tap_ok(imp__fresnel_diffuse(1, &d) == 0 && fabs(above_1 - 1e-5 / 3) < 1e-9 &&
+               fabs(below_1 - 7e-5 / 3) < 1e-9,
+           "and 0 where the indices are the same # %.3g, %.3g", above_1, below_1);
+}
+
 int main(void)
 {
     drawn();
     published();
     derivatives();
+    smooth();
     return tap_done();
 }

@@ -36,21 +36,45 @@ double imp__fresnel_dielectric_d(double c, double e, double *d_c, double *d_e)
     return 0.5 * (a * a + b * b);
 }
 
+/* int_0^1 2 c F(c, n) dc for n >= 1, and its derivative (Walsh, Dept. Sci. Ind. Res.
+ * Illum. Res. Tech. Pap. 2, 1926; Duntley, J. Opt. Soc. Am. 32, 1942):
+ *
+ *   1/2 + (n - 1)(3 n + 1)/(6 (n + 1)^2) + P ln((n - 1)/(n + 1)) - Q + R ln n
+ *
+ *   P = n^2 (n^2 - 1)^2/(n^2 + 1)^3,    Q = 2 n^3 (n^2 + 2 n - 1)/((n^2 + 1)(n^4 - 1)),
+ *   R = 8 n^4 (n^4 + 1)/((n^2 + 1)(n^4 - 1)^2)
+ *
+ * Near n = 1 its terms cancel: there it is (n - 1)/3. */
+static double diffuse_from_outside(double n, double *d)
+{
+    if (n - 1 < 2e-5) {
+        *d = 1. / 3;
+        return (n - 1) / 3;
+    }
+    const double n2 = n * n, n3 = n * n2, n4 = n2 * n2, above = n2 + 1,
+                 below = (n - 1) * (n + 1), both = below * above; /* n^4 - 1 */
+    const double P = n2 * below * below / (above * above * above),
+                 Q = 2 * n3 * (n2 + 2 * n - 1) / (above * both),
+                 R = 8 * n4 * (n4 + 1) / (above * both * both);
+    const double lnP = log((n - 1) / (n + 1)), lnR = log1p(n - 1);
+    const double dP = P * (2 / n + 4 * n / below - 6 * n / above),
+                 dQ = Q * (3 / n + (2 * n + 2) / (n2 + 2 * n - 1) - 2 * n / above -
+                           4 * n3 / both),
+                 dR = R * (4 / n + 4 * n3 / (n4 + 1) - 2 * n / above - 8 * n3 / both);
+    *d = 4 * n / (3 * (n + 1) * (n + 1) * (n + 1)) + dP * lnP + P * 2 / below - dQ +
+         dR * lnR + R / n;
+    return 0.5 + (n - 1) * (3 * n + 1) / (6 * (n + 1) * (n + 1)) + P * lnP - Q + R * lnR;
+}
+
+/* From the denser side: 1 - F(e) = e^2 (1 - F(1/e)), since as much light passes one way
+ * as the other. */
 double imp__fresnel_diffuse(double e, double *d_e)
 {
-    const double x = 1 / e;
-    if (e < 1) {
-        *d_e = -2 * 1.4399 * e + 0.7099 - 0.0636 * x * x;
-        return (-1.4399 * e + 0.7099) * e + 0.6681 + 0.0636 * x;
-    }
-    static const double c[6] = {0.919317, -3.4793, 6.75335, -7.80989, 4.98554, -1.36881};
-    double sum = 0, d = 0; /* Horner's scheme, and its derivative */
-    for (int k = 5; k >= 0; k--) {
-        d = d * x + sum;
-        sum = sum * x + c[k];
-    }
-    *d_e = -d * x * x;
-    return sum;
+    if (e >= 1) return diffuse_from_outside(e, d_e);
+    double d_n;
+    const double passes = 1 - diffuse_from_outside(1 / e, &d_n);
+    *d_e = -2 * e * passes - d_n;
+    return 1 - e * e * passes;
 }
 
 /* One lane. With

@@ -16,8 +16,7 @@ double imp__fresnel_dielectric(double c, double eta, double *cos_t, double *eta_
 double imp__fresnel_dielectric_d(double c, double e, double *d_c, double *d_e);
 
 /* Mean reflectance of a smooth boundary for light that is diffuse on the near side, e =
- * far/near, by fits: Egan and Hilgeman 1973 below e = 1, d'Eon and Irving 2011 above. With
- * its derivative. */
+ * far/near, with its derivative: int_0^1 2 c F(c, e) dc in closed form. */
 double imp__fresnel_diffuse(double e, double *d_e);
 
 /* Conductor in vacuum, c = cosine of incidence, lane by lane. */

@@ -21,16 +21,14 @@ struct plastic {
     bool nonlinear;
 };
 
-static const struct imp_input_desc inputs[] = {
-    {.name = "diffuse_reflectance",
-     .role = IMP_REFLECTANCE,
-     .fallback = 0.5,
-     .hi = 1,
-     .unit = "1"},
-    IMP_TINT_INPUT("specular_reflectance"),
-    /* The fits of F_dr hold in these bounds. */
-    IMP_IOR_INPUT(1.49 / 1.000277, 0.2, 3.5),
-    {0}};
+static const struct imp_input_desc inputs[] = {{.name = "diffuse_reflectance",
+                                                .role = IMP_REFLECTANCE,
+                                                .fallback = 0.5,
+                                                .hi = 1,
+                                                .unit = "1"},
+                                               IMP_TINT_INPUT("specular_reflectance"),
+                                               IMP_IOR_INPUT(1.49 / 1.000277, 0.1, 10),
+                                               {0}};
 
 static enum imp_status prepare(const struct imp_build *b)
 {
