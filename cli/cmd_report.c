@@ -14,11 +14,16 @@
 
 #define JSON_MAX ((size_t)1 << 28) /* bytes of one answer */
 
-static const char *title;
+static const char *title, *scene_file;
+static int walks;
 
 static const struct arg_option options[] = {
     {ARG_TEXT, 0, "title", "TEXT", "title of the page (default: the folder's name)",
      &title, 0, 0, NULL},
+    {ARG_TEXT, 0, "scene", "SCENE", "show random walks of this scene", &scene_file, 0, 0,
+     NULL},
+    {ARG_INT, 0, "walks", "N", "of a grid of N x N pixels (default 16)", &walks, 1, 64,
+     NULL},
     {0}};
 
 /* What the page will hold, and what it is made of. */
@@ -212,16 +217,62 @@ static int collect(struct collection *c, const char *folder)
     return rc;
 }
 
+/* ---- Walks ------------------------------------------------------------------------ */
+
+/* {"bounds":[[x,y,z],[x,y,z]],"walks":[..]}: one walk from the middle of each cell of a
+ * grid over the picture. */
+static int add_walks(struct collection *c)
+{
+    struct imp_sensor_info sensor = {.size = sizeof sensor};
+    struct imp_scene_info scene = {.size = sizeof scene};
+    const int side = walks ? walks : 16;
+    char *text = NULL;
+    size_t length = 0;
+    int rc = cli_load(scene_file);
+    if (rc) return rc;
+    const struct imp_run run = cli_run();
+    enum imp_status st = imp_scene_get_info(cli.scene, &scene);
+    if (st == IMP_OK) st = imp_scene_get_sensor(cli.scene, run.sensor, &sensor);
+    FILE *f = st == IMP_OK ? open_memstream(&text, &length) : NULL;
+    if (f) {
+        struct json j = {f, 0};
+        json_object(&j, NULL);
+        json_array(&j, "bounds");
+        json_numbers(&j, NULL, 3, scene.bounds_min);
+        json_numbers(&j, NULL, 3, scene.bounds_max);
+        json_end_array(&j);
+        fputs(",\"walks\":[", f);
+        for (int i = 0; i < side * side && st == IMP_OK; i++) {
+            char *walk = NULL;
+            st = imp_walk_describe(
+                cli.scene, &run, (int)((i % side + 0.5) * sensor.width / side),
+                (int)((i / side + 0.5) * sensor.height / side), 0, 1, &walk);
+            if (st == IMP_OK) fprintf(f, "%s%s", i ? "," : "", walk);
+            imp_free(cli.context, walk);
+        }
+        fputs("]}", f);
+        if (fclose(f) != 0 && st == IMP_OK) rc = cli_error(EXIT_RUN, "out of memory");
+    }
+    if (st != IMP_OK) rc = cli_fail(st, scene_file);
+    if (!text) return rc ? rc : cli_error(EXIT_RUN, "out of memory");
+    struct imp_report_item *item = add(c, "walks");
+    item->json = keep(c, text);
+    item->name = scene_file;
+    return rc;
+}
+
 static int run_report(int n, char **operand)
 {
     struct collection all = {0};
     struct imp_report report = IMP_REPORT_INIT;
     (void)n;
-    int rc = cli_open();
+    int rc = walks && !scene_file ? cli_error(EXIT_USAGE, "--walks needs --scene") : 0;
+    if (!rc) rc = cli_open();
     if (rc) return rc;
     char *automatic = cli.out ? NULL : join_path(operand[0], "report.html");
     const char *path = cli.out ? cli.out : automatic;
     rc = collect(&all, operand[0]);
+    if (!rc && scene_file) rc = add_walks(&all);
     if (!rc && strcmp(path, "-")) rc = overwrite_check(path, OUTPUT_PAGE);
     if (!rc) {
         report.title = title ? title : operand[0];
@@ -240,12 +291,14 @@ static int run_report(int n, char **operand)
     return rc;
 }
 
-const struct command command_report = {{"report",
-                                        "DIR",
-                                        "one HTML page of the results in a folder",
-                                        {options, options_file, options_general},
-                                        1,
-                                        1},
-                                       run_report,
-                                       0,
-                                       NULL};
+const struct command command_report = {
+    {"report",
+     "DIR",
+     "one HTML page of the results in a folder",
+     {options, options_scene, options_file, options_general},
+     1,
+     1},
+    run_report,
+    0,
+    NULL,
+    0};
