@@ -68,7 +68,7 @@ run("fit", cornell, *common, "--target", folder + "/t.exr", "--set", "red.reflec
     "light.*", "--spp", "32", "--optimizer", "lm", "--picture-spp", "16", "-o", result)
 run("jacobian", cornell, *common, "--spp", "16", "-p", "red.*", "-o", result)
 run("check", cornell, *common, "--spp", "16", "-p", "red.*", "--json", "-o", result + "/check.json")
-run("report", result, "-q")
+run("report", result, "-q", "--scene", cornell, "-D", "res=48", "--walks", "4")
 # The same pixels as the picture in the report, by another way out of the program.
 run("render", cornell, *common, "--spp", "64", "--seed", "5", "--no-preview", "-o", folder + "/t.npy")
 truth = np.load(folder + "/t.npy")
@@ -114,6 +114,18 @@ answer = look(page, keys)
 ok(answer["order"] == [2, 0, 1, 1], "keys 1 to 9 choose the layer, and one too many does nothing")
 ok(answer["pixel"] == "pixel 2, 1" and answer["focused"] and answer["reachable"],
    "arrows move the pixel; whatever can be pressed can be reached by Tab")
+
+walks = """
+const canvas = document.querySelector("#walks canvas"), press = (key) => canvas.dispatchEvent(new KeyboardEvent("keydown", {key, bubbles: true}));
+const before = canvas.toDataURL(), rows = () => document.querySelectorAll("#walks tbody tr").length;
+press("ArrowLeft");
+const turned = canvas.toDataURL() !== before, none = rows();
+press("n");
+return {turned, none, first: rows(), said: document.querySelector("#walks .mono[aria-live]").textContent};
+"""
+answer = look(page, walks)
+ok(answer["turned"] and answer["none"] == 0 and answer["first"] > 0 and answer["said"].startswith("pixel 6, 6, sample 0"),
+   "walks turn, and one is listed vertex by vertex")
 
 # ---- What it says ----------------------------------------------------------------------
 text = look(page, 'return document.getElementById("page").innerText')

@@ -10,6 +10,10 @@ importon report r -o - -q | cmp - <(importon report r -o - -q) && echo same
 echo mine >mine.html
 importon report r -o mine.html
 cat mine.html
+importon report r --scene "$ROOT/scenes/furnace.xml" -D res=8 --walks 3 -q || exit 9
+grep -o '"kind":"walks"' r/report.html
+grep -o '"pixel":' r/report.html | wc -l
+importon report r --walks 3
 # What is no result.
 mkdir empty broken
 importon report empty
