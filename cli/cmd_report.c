@@ -11,6 +11,7 @@
 #include <importon/report.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #define JSON_MAX ((size_t)1 << 28) /* bytes of one answer */
 
@@ -75,8 +76,8 @@ static bool ends(const char *name, const char *with)
     return n > m && !strcmp(name + n - m, with);
 }
 
-/* All of a text file, to be freed; NULL with the reason printed. */
-static char *file_text(const char *path)
+/* All of a file and a zero, to be freed; NULL with the reason printed. */
+static char *file_text(const char *path, size_t *length)
 {
     char *text = NULL;
     size_t used = 0, room = 0;
@@ -93,6 +94,7 @@ static char *file_text(const char *path)
         text = NULL;
     } else {
         text[used] = 0;
+        *length = used;
     }
     if (f) fclose(f);
     return text;
@@ -103,7 +105,8 @@ static char *file_text(const char *path)
 static int add_answer(struct collection *c, const char *path, const char *name)
 {
     static const char head[] = "{\"importon\":\"", second[] = "\",\"command\":\"";
-    char *text = file_text(path);
+    size_t length;
+    char *text = file_text(path, &length);
     if (!text) return EXIT_RUN;
     keep(c, text);
     const char *word =
@@ -170,6 +173,26 @@ static int add_picture(struct collection *c, const char *path, const char *name,
     return 0;
 }
 
+/* PNG and SVG files are taken where they are not the preview of a picture, or the curve
+ * that the page draws itself. */
+static int add_image(struct collection *c, const char *path, const char *name)
+{
+    char *exr = strdup(path);
+    size_t length;
+    if (!exr) return cli_error(EXIT_RUN, "out of memory");
+    memcpy(strrchr(exr, '.'), ".exr", 4);
+    const bool preview = access(exr, F_OK) == 0;
+    free(exr);
+    if (preview || !strcmp(name, "loss.svg")) return 0;
+    char *bytes = file_text(path, &length);
+    if (!bytes) return EXIT_RUN;
+    struct imp_report_item *item = add(c, "image");
+    item->name = name;
+    item->image = keep(c, bytes);
+    item->image_size = length;
+    return 0;
+}
+
 /* Target, result, start, and the others by their names. */
 static int place_of(const char *name)
 {
@@ -185,7 +208,11 @@ static int by_place(const struct dirent **a, const struct dirent **b)
 }
 static int is_result(const struct dirent *e)
 {
-    return e->d_name[0] != '.' && (ends(e->d_name, ".exr") || ends(e->d_name, ".json"));
+    static const char *const extension[] = {".exr", ".json", ".png", ".svg"};
+    bool good = false;
+    for (size_t k = 0; k < sizeof extension / sizeof *extension; k++)
+        good |= ends(e->d_name, extension[k]);
+    return good && e->d_name[0] != '.';
 }
 
 static int collect(struct collection *c, const char *folder)
@@ -195,20 +222,23 @@ static int collect(struct collection *c, const char *folder)
     const int n = scandir(folder, &entry, is_result, by_place);
     int rc = n < 0 ? cli_error(EXIT_USAGE, "%s: %s", folder, strerror(errno)) : 0;
     if (n == 0)
-        rc = cli_error(EXIT_USAGE, "%s: no results of importon are there (*.exr, *.json)",
+        rc = cli_error(EXIT_USAGE,
+                       "%s: no results of importon are there (*.exr, *.json, *.png)",
                        folder);
     FILE *f = n > 0 ? fopen(csv, "rb") : NULL;
     if (f) {
         fclose(f);
-        controls = file_text(csv);
+        size_t length;
+        controls = file_text(csv, &length);
     }
     free(csv);
     for (int i = 0; i < n; i++) {
         const char *name = keep(c, strdup(entry[i]->d_name));
         char *path = join_path(folder, name);
         if (!rc)
-            rc = ends(name, ".exr") ? add_picture(c, path, name, controls)
-                                    : add_answer(c, path, name);
+            rc = ends(name, ".exr")    ? add_picture(c, path, name, controls)
+                 : ends(name, ".json") ? add_answer(c, path, name)
+                                       : add_image(c, path, name);
         free(path);
         free(entry[i]);
     }

@@ -14,12 +14,13 @@
 extern "C" {
 #endif
 
-/** One part of a report: a picture (`film` is set) or a JSON value (`json` is set). */
+/** One part of a report: a picture (`film` is set), a JSON value (`json`) or the bytes of
+ * a file that browsers draw (`image`). */
 struct imp_report_item {
     size_t size;
     const char *kind; /**< "picture", or "derivative": signed, of a parameter; "fit",
-                           "check" and "manifest": the JSON that these commands write.
-                           Others are kept in the page, and not shown */
+                           "check", ...: the JSON that these commands write; "image".
+                           Of others the page lists the values */
     const char *name; /**< what a reader sees; NULL: none */
     const char *role; /**< of pictures: "target" or "picture", which the page compares;
                            NULL: neither */
@@ -27,10 +28,12 @@ struct imp_report_item {
     int view;         /**< of pictures: those of one view are flipped in place */
     const imp_film *film; /**< its means, and its standard errors if it has them */
     const char *json;     /**< one JSON value (RFC 8259), UTF-8 */
+    const void *image;    /**< [image_size] a PNG or SVG file */
+    size_t image_size;
 };
 #define IMP_REPORT_ITEM_INIT                                                             \
     {                                                                                    \
-        sizeof(struct imp_report_item), 0, 0, 0, 0, 0, 0, 0                              \
+        sizeof(struct imp_report_item), 0, 0, 0, 0, 0, 0, 0, 0, 0                        \
     }
 
 struct imp_report {
@@ -48,8 +51,8 @@ struct imp_report {
 /** Write the page; it appears whole or not at all. Pictures are stored as 16-bit floats,
  * scaled by a power of two to their largest value: 11 significant bits, 8/3 bytes a
  * number. Texts are shown as text whatever they contain.
- * @return IMP_OK; IMP_E_ARG for an item without a kind, or with neither or both of film
- *         and json, or JSON that does not parse (the message has its offset); IMP_E_IO;
+ * @return IMP_OK; IMP_E_ARG for an item without a kind, or without exactly one of film,
+ *         json and image, or JSON that does not parse (the message has its offset); IMP_E_IO;
  *         IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_report_write(imp_context *context, const struct imp_report *report, const char *path);

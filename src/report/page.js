@@ -43,7 +43,9 @@ function page(report) {
     const pictures = layers.length ? picture_section(layers) : null;
     const sections = [pictures, fit && Array.isArray(fit.params) ? parameter_section(fit) : null, fit && Array.isArray(fit.params) ? correlation_section(fit) : null,
         derivatives.length ? derivative_section(derivatives, pictures.choose) : null, fit ? loss_section(fit) : null,
-        ...of("check").map((i) => check_section(i.data)), ...of("walks").map((i) => walks_section(i.data)), provenance_section(report.command, report, items)];
+        ...of("check").map((i) => check_section(i.data)), ...of("walks").map((i) => walks_section(i.data)),
+        of("image").length ? image_section(of("image")) : null,
+        ...items.filter((i) => i.data && !["fit", "check", "walks"].includes(i.kind)).map(answer_section), provenance_section(report.command, report, items)];
     for (const section of sections) if (section) main.append(section);
     if (!items.length) main.append(make("p", {class: "warning"}, "This report holds nothing: no picture, no fit, no check."));
     document.documentElement.dataset.ready = "1";

@@ -171,6 +171,35 @@ function check_section(check) {
             })))));
 }
 
+/* ---- Answers of other commands, and drawings ----------------------------------------------- */
+
+/* Numbers and words in one table; lists of objects in one each. */
+function answer_section(item) {
+    const flat = [], lists = [];
+    const walk = (value, path) => {
+        if (Array.isArray(value) && value.length && value.every((v) => v && typeof v === "object" && !Array.isArray(v))) lists.push([path, value]);
+        else if (Array.isArray(value)) flat.push([path, value.slice(0, 12).map((v) => (is_number(v) ? show(v) : String(v))).join(", ") + (value.length > 12 ? ", ..." : "")]);
+        else if (value && typeof value === "object") for (const [k, v] of Object.entries(value)) walk(v, path ? `${path}.${k}` : k);
+        else flat.push([path, is_number(value) ? show(value) : value === null ? "–" : String(value)]);
+    };
+    walk(item.data, "");
+    const cell = (v) => (is_number(v) ? show(v) : Array.isArray(v) ? v.map((x) => (is_number(x) ? show(x, 4) : String(x))).join(", ") : v === null || v === undefined ? "–" : String(v));
+    return make("section", {}, make("h2", {}, [item.kind, item.name].filter(Boolean).join(": ")),
+        make("table", {}, make("tbody", {}, ...flat.slice(0, rows_shown).map(([k, v]) => make("tr", {}, make("td", {}, k), make("td", {class: "text"}, v))))),
+        ...lists.map(([path, rows]) => {
+            const keys = Object.keys(rows[0]).filter((k) => typeof rows[0][k] !== "object" || Array.isArray(rows[0][k])).slice(0, 12);
+            return make("div", {class: "scroll"}, make("p", {class: "faint"}, rows.length > rows_shown ? `${path}: ${rows_shown} of ${rows.length}` : path),
+                make("table", {}, make("thead", {}, make("tr", {}, ...keys.map((k) => make("th", {scope: "col"}, k)))),
+                    make("tbody", {}, ...rows.slice(0, rows_shown).map((r) => make("tr", {}, ...keys.map((k) => make("td", {}, cell(r[k]))))))));
+        }));
+}
+
+/* Files that browsers draw; an image cannot run scripts. */
+function image_section(items) {
+    return make("section", {id: "images"}, make("h2", {}, "Drawings"), make("div", {class: "drawings"}, ...items.map((i) =>
+        make("figure", {}, make("img", {src: `data:${i.type};base64,${i.file}`, alt: i.name || "", loading: "lazy"}), make("figcaption", {}, i.name || "")))));
+}
+
 function provenance_section(command, report, items) {
     const facts = new Map([["made by", `importon ${report.importon}`]]);
     for (const item of items) {

@@ -5,7 +5,7 @@
 
 enum { GROUP = 3 * 1024 }; /* bytes; a multiple of 3 needs no padding inside the text */
 
-static void put_base64(struct imp_text *t, const unsigned char *bytes, size_t n)
+static void put_group(struct imp_text *t, const unsigned char *bytes, size_t n)
 {
     static const char digit[] =
         "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -20,6 +20,11 @@ static void put_base64(struct imp_text *t, const unsigned char *bytes, size_t n)
         text[used++] = i + 2 < n ? digit[v & 63] : '=';
     }
     t->failed = t->failed || !imp__bytes_add(t->ctx, &t->bytes, text, used);
+}
+
+void imp__base64_put(struct imp_text *t, const unsigned char *bytes, size_t n)
+{
+    for (size_t i = 0; i < n; i += GROUP) put_group(t, bytes + i, imp_min(n - i, GROUP));
 }
 
 double imp__planes_put(struct imp_text *t, const imp_film *f, const float *values)
@@ -38,8 +43,8 @@ double imp__planes_put(struct imp_text *t, const imp_film *f, const float *value
             const uint16_t h = imath_float_to_half((float)(values[i * c + k] / scale));
             bytes[used++] = (unsigned char)h;
             bytes[used++] = (unsigned char)(h >> 8);
-            if (used == GROUP) put_base64(t, bytes, used), used = 0;
+            if (used == GROUP) put_group(t, bytes, used), used = 0;
         }
-    put_base64(t, bytes, used);
+    put_group(t, bytes, used);
     return scale;
 }

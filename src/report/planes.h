@@ -1,12 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Numbers of a picture as text: [channel][y][x], 16-bit floats, little-endian, in base64
- * (RFC 4648). */
+ * Bytes as text, in base64 (RFC 4648), and so the numbers of a picture: [channel][y][x],
+ * 16-bit floats, little-endian. */
 #ifndef IMP_REPORT_PLANES_H
 #define IMP_REPORT_PLANES_H
 
 #include "base/film.h"
 #include "base/text.h"
+
+void imp__base64_put(struct imp_text *t, const unsigned char *bytes, size_t n);
 
 /* values: [height][width][channels] of the film. Returns the power of two that the numbers
  * written are to be multiplied by: the largest finite one is then below 2^15, and those

@@ -43,19 +43,32 @@ static void put_film(struct imp_text *t, const struct imp_report_item *item)
     imp__put(t, "\",\"se_scale\":%.17g", se_scale);
 }
 
+/* As data URLs have it; NULL: no file that a browser draws. */
+static const char *image_type(const unsigned char *bytes, size_t n)
+{
+    static const char png[] = "\x89PNG\r\n\x1a\n", svg[] = "<svg ";
+    if (n >= 8 && !memcmp(bytes, png, 8)) return "image/png";
+    if (n >= 5 && !memcmp(bytes, svg, 5)) return "image/svg+xml";
+    return NULL;
+}
+
 static enum imp_status put_item(struct imp_text *t, const struct imp_report_item *item,
                                 size_t i)
 {
     size_t at;
     if (!item->kind || !*item->kind)
         return imp__error(t->ctx, IMP_E_ARG, "items[%zu]: it has no kind", i);
-    if (!item->film == !item->json)
+    const char *type = NULL;
+    if (!!item->film + !!item->json + !!item->image != 1)
         return imp__error(t->ctx, IMP_E_ARG,
-                          "items[%zu] (%s): it needs a film or json, and not both", i,
+                          "items[%zu] (%s): it needs one of film, json and image", i,
                           item->name ? item->name : item->kind);
     if (item->json && !imp__json_valid(item->json, &at))
         return imp__error(t->ctx, IMP_E_ARG, "items[%zu] (%s): no JSON, at byte %zu", i,
                           item->name ? item->name : item->kind, at);
+    if (item->image && !(type = image_type(item->image, item->image_size)))
+        return imp__error(t->ctx, IMP_E_ARG, "items[%zu] (%s): no PNG or SVG file", i,
+                          item->name ? item->name : item->kind);
     imp__put(t, "%s{\"kind\":", i ? "," : "");
     put_string(t, item->kind);
     put_member(t, "name", item->name);
@@ -63,6 +76,10 @@ static enum imp_status put_item(struct imp_text *t, const struct imp_report_item
     put_member(t, "unit", item->unit);
     if (item->film) {
         put_film(t, item);
+    } else if (item->image) {
+        imp__put(t, ",\"type\":\"%s\",\"file\":\"", type);
+        imp__base64_put(t, item->image, item->image_size);
+        imp__put(t, "\"");
     } else {
         imp__put(t, ",\"data\":");
         t->failed = t->failed ||

@@ -210,14 +210,19 @@ static void refused(void)
     struct imp_report report = IMP_REPORT_INIT;
     good.kind = "picture";
     good.film = film;
-    struct imp_report_item both = good, neither = good, nameless = good, text = good;
+    struct imp_report_item both = good, neither = good, nameless = good, text = good,
+                           image = good;
     both.json = "1";
     neither.film = NULL;
     nameless.kind = "";
     text.film = NULL;
     text.json = "{\"a\": 1 2}";
-    const struct imp_report_item bad[] = {both, neither, nameless, text};
-    static const char *const says[] = {"not both", "needs a film", "no kind", "byte 8"};
+    image.film = NULL;
+    image.image = "GIF89a";
+    image.image_size = 6;
+    const struct imp_report_item bad[] = {both, neither, nameless, text, image};
+    static const char *const says[] = {"needs one of", "needs one of", "no kind",
+                                       "byte 8", "no PNG"};
     for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
         const struct imp_report_item pair[] = {good, bad[i]};
         report.items = pair;
