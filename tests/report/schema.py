@@ -1,0 +1,55 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""The data in pages of reports against the published schema.
+
+Usage: schema.py IMPORTON SCENES SCHEMA
+"""
+import base64
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+
+importon, scenes, schema = sys.argv[1:]
+try:
+    import jsonschema
+except ImportError:
+    print("1..0 # SKIP no module jsonschema")
+    sys.exit(0)
+rules = jsonschema.Draft7Validator(json.load(open(schema)))
+
+
+def run(*words):
+    subprocess.run([importon, *words], check=True, capture_output=True)
+
+
+def data(page):
+    text = open(page, encoding="utf-8").read()
+    return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', text, re.S)[1])
+
+
+with tempfile.TemporaryDirectory() as folder:
+    cornell, lens = os.path.join(scenes, "cornell.xml"), os.path.join(scenes, "bend", "luneburg.xml")
+    common = ["-D", "res=16", "--spp", "8", "-q"]
+    run("render", cornell, *common, "--se", "-o", folder + "/t.exr")
+    run("fit", cornell, *common, "--target", folder + "/t.exr", "-p", "red.*", "-n", "2", "-o", folder + "/r")
+    run("jacobian", cornell, *common, "-p", "red.*", "-o", folder + "/r")
+    run("check", cornell, *common, "-p", "red.*", "--json", "-o", folder + "/r/check.json")
+    run("bend", "view", lens, "-q", "-o", folder + "/r")
+    run("report", folder + "/r", "--scene", cornell, "-D", "res=16", "-q", "--walks", "2")
+    report = data(folder + "/r/report.html")
+    errors = [e.message[:200] for e in rules.iter_errors(report)]
+    kinds = {i["kind"] for i in report["items"]}
+    good = not errors and {"picture", "derivative", "fit", "check", "image", "walks"} <= kinds
+    print("%sok 1 - a report of everything follows the schema # %s" % ("" if good else "not ", errors or ", ".join(sorted(kinds))))
+    sizes = [len(base64.b64decode(i[k])) == 2 * i["width"] * i["height"] * len(i["channels"])
+             for i in report["items"] if "pixels" in i for k in ("pixels", "se") if k in i]
+    print("%sok 2 - pictures are as long as their sizes say # %d" % ("" if all(sizes) and sizes else "not ", len(sizes)))
+    broken = [{**report, "version": 2}, {**report, "items": [{"kind": ""}]}, {**report, "items": [{"kind": "picture", "width": 1}]},
+              {k: v for k, v in report.items() if k != "items"}]
+    caught = [not rules.is_valid(b) for b in broken]
+    print("%sok 3 - the schema refuses what is no report" % ("" if all(caught) else "not "))
+    print("1..3")
+    sys.exit(not (good and all(sizes) and all(caught)))
