@@ -5,6 +5,7 @@
 #include "cmd_picture.h"
 
 #include "command.h"
+#include "display.h"
 #include "overwrite.h"
 #include "ranks.h"
 
@@ -166,6 +167,7 @@ int picture_write(const imp_film *film, const char *path, const struct picture_o
     options.exposure = o->exposure;
     options.diverging = o->diverging;
     options.range = o->range;
+    display_film(film, path);
     if (!strcmp(path, "-")) return write_to_stdout(film, &options);
 
     enum imp_status st = imp_film_write(film, path, &options);

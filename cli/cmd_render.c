@@ -3,6 +3,7 @@
  * importon render: a picture with its standard errors; or single walks, to look at. */
 #include "cmd_picture.h"
 #include "command.h"
+#include "display.h"
 #include "output.h"
 #include "progress.h"
 
@@ -160,7 +161,7 @@ static int run_render(int n, char **operand)
     (void)n;
     int rc = cli_load(operand[0]);
     if (rc) return rc;
-    const struct imp_run run = cli_run();
+    struct imp_run run = cli_run();
     const int one = o.pixel[0] != NO_PIXEL;
     if (o.sample && !one && !o.paths)
         return cli_error(EXIT_USAGE, "--sample needs --pixel or --paths");
@@ -176,6 +177,10 @@ static int run_render(int n, char **operand)
     const char *path = cli.out ? cli.out : automatic;
     rc = picture_writable(path, !o.picture.no_preview);
     if (!rc) {
+        if (cli.display) {
+            run.preview = display_preview;
+            run.preview_payload = (void *)(uintptr_t)path;
+        }
         const enum imp_status st = imp_render(cli.scene, &run, &film);
         if (cli_failed(st)) rc = cli_fail(st, cli.scene_path);
     }

@@ -4,6 +4,7 @@
  * settings. */
 #include "command.h"
 
+#include "display.h"
 #include "part.h"
 #include "progress.h"
 #include "ranks.h"
@@ -88,6 +89,9 @@ const struct arg_option options_run[] = {
     {ARG_INT, 0, "wavelength-set", "N",
      "samples among which they are stratified (default: a quarter, at most 16)",
      &cli.wavelength_set, 1, 1e9, NULL},
+    {ARG_TEXT, 0, "display", "HOST:PORT",
+     "show pictures in a viewer that listens there (tev: port 14158)", &cli.display, 0, 0,
+     NULL},
     {0}};
 
 const struct arg_option options_guide[] = {
@@ -291,6 +295,7 @@ int cli_load(const char *path)
     struct arg_list search = {0};
     enum imp_status st;
     int rc = cli_open();
+    if (!rc && ranks_first()) rc = display_open(); /* before the scene takes its time */
     if (rc) return rc;
 
     cli.scene_path = path;
@@ -328,6 +333,7 @@ int cli_load(const char *path)
 
 void cli_close(void)
 {
+    display_close();
     imp_guide_destroy(cli.guiding);
     imp_elements_destroy(cli.elements);
     imp_scene_destroy(cli.scene);

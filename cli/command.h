@@ -62,6 +62,7 @@ struct cli {
     const char *part, *part_out; /* "I/N", and where it goes */
     imp_parts *parts;            /* the part in the making, or those that are merged */
     int wavelengths, wavelength_set;
+    const char *display; /* HOST:PORT of a viewer */
     /* options_guide */
     int guide;
     double guide_share, guide_roulette;

@@ -503,6 +503,10 @@ enum imp_wavelength_sampling {
     IMP_WAVELENGTHS_IMPORTANCE /**< by response times light, stratified within a pixel */
 };
 
+/** A picture in the making, with standard errors: valid during the call, which comes from
+ * one thread and holds up the others. */
+typedef void (*imp_preview_fn)(const imp_film *picture, void *payload);
+
 /** How Monte Carlo is run. The same (seed, spp) give the same bits on any thread count.
  */
 struct imp_run {
@@ -522,10 +526,16 @@ struct imp_run {
     /** Walks of a pixel among which wavelengths are stratified; 0: a quarter of the
      * samples per pixel, at most 16. Standard errors come from the spread of such sets. */
     int wavelength_set;
+    /** Of pictures: shown what is there after 1, 2, 4, ... passes of 64 samples (with a time limit,
+     * of 4);
+     * NULL: nobody looks. */
+    imp_preview_fn preview;
+    void *preview_payload;
 };
 #define IMP_RUN_INIT                                                                     \
     {                                                                                    \
-        sizeof(struct imp_run), 0, 0, 0, 0, 0, 0, 0, 0, IMP_WAVELENGTHS_STRATIFIED, 0    \
+        sizeof(struct imp_run), 0, 0, 0, 0, 0, 0, 0, 0, IMP_WAVELENGTHS_STRATIFIED, 0,   \
+            0, 0                                                                         \
     }
 
 /** Render the scene's integrator through a sensor.

@@ -337,8 +337,27 @@ static int sweep_passes(const struct render *r, int done)
     return imp_min(n, r->passes - done);
 }
 
-/* Passes over all tiles; how many samples every pixel got. */
-static enum imp_status render_run(struct render *r, int64_t *spp)
+/* Were errors of a wide filter taken within strata? */
+static bool in_strata(const struct render *r)
+{
+    return r->border > 0 && imp_min(r->spp, r->pass_spp) > r->set &&
+           (r->sets == 0 || r->sets > 1);
+}
+
+/* Between sweeps, show what is there. */
+static enum imp_status show(struct render *r, imp_film *preview, int64_t spp)
+{
+    if (!preview) return IMP_OK;
+    const enum imp_status st = imp__film_sums_look(&r->sums, in_strata(r), &preview);
+    if (st != IMP_OK) return st;
+    preview->spp = spp;
+    r->run->preview(preview, r->run->preview_payload);
+    return IMP_OK;
+}
+
+/* Passes over all tiles; how many samples every pixel got. preview: NULL, or room for
+ * what is shown meanwhile. */
+static enum imp_status render_run(struct render *r, imp_film *preview, int64_t *spp)
 {
     enum imp_status st = IMP_OK;
     const bool timed = r->run->time_limit_s > 0;
@@ -371,6 +390,7 @@ static enum imp_status render_run(struct render *r, int64_t *spp)
         }
         done += n;
         if (st == IMP_OK) *spp = after;
+        if (st == IMP_OK && done < r->passes) st = show(r, preview, after);
     }
     if (st == IMP_OK || st == IMP_CANCELLED) {
         const double walks = pixels * (double)imp_max(*spp, (int64_t)r->pass_spp);
@@ -388,6 +408,7 @@ enum imp_status imp__picture_make(imp_context *ctx, const struct imp_picture *pi
     struct render r = {.picture = picture, .run = run};
     const int n_films = imp_max(picture->n_films, 1);
     int64_t spp = 0;
+    imp_film *preview = NULL;
     imp_film **films = imp__alloc(ctx, (size_t)n_films, sizeof *films);
     if (!films) return imp__error(ctx, IMP_E_NOMEM, "no memory for films");
     IMP_TRY(render_plan(&r, ctx));
@@ -395,7 +416,10 @@ enum imp_status imp__picture_make(imp_context *ctx, const struct imp_picture *pi
         IMP_TRY(imp__film_describe(ctx, r.sums.width, r.sums.height, picture->names,
                                    &films[k]));
     IMP_TRY(buffers_create(&r, ctx));
-    ended = render_run(&r, &spp);
+    if (run->preview && n_films == 1)
+        IMP_TRY(imp__film_create(ctx, r.sums.width, r.sums.height, picture->names, true,
+                                 &preview));
+    ended = render_run(&r, preview, &spp);
     if (ended != IMP_CANCELLED) IMP_TRY(ended);
     if (imp__team_part(ctx) && imp__team_shares(ctx)) IMP_TRY(IMP_PART);
     if (ended == IMP_CANCELLED && spp == 0 &&
@@ -403,10 +427,7 @@ enum imp_status imp__picture_make(imp_context *ctx, const struct imp_picture *pi
         memset(out, 0, (size_t)n_films * sizeof *out);
         IMP_TRY(ended);
     }
-    IMP_TRY(imp__film_sums_finish(&r.sums,
-                                  r.border > 0 && imp_min(r.spp, r.pass_spp) > r.set &&
-                                      (r.sets == 0 || r.sets > 1),
-                                  picture->weights, films));
+    IMP_TRY(imp__film_sums_finish(&r.sums, in_strata(&r), picture->weights, films));
     for (int k = 0; k < n_films; k++) {
         films[k]->spp = spp;
         films[k]->drops = r.tiles.drops;
@@ -418,6 +439,7 @@ enum imp_status imp__picture_make(imp_context *ctx, const struct imp_picture *pi
 out:
     for (int k = 0; k < n_films; k++) imp_film_destroy(films[k]);
     imp__release(ctx, films);
+    imp_film_destroy(preview);
     if (r.sums.ctx) imp__film_sums_destroy(&r.sums);
     if (r.tiles.ctx) imp__tiles_destroy(&r.tiles);
     imp__release(ctx, r.values);

@@ -113,6 +113,7 @@ void imp__film_sums_add(struct imp_film_sums *s, size_t tile, const double *in, 
 struct finish {
     struct imp_film_sums *s;
     bool strata, errors; /* box: errors, or means */
+    bool keep;           /* the sums stay, and films have their room */
     double *weights;
     imp_film **films;
     int film;  /* box: which */
@@ -181,14 +182,17 @@ static enum imp_status box_finish(struct finish *f)
         .n_items = (size_t)s->height, .work = box_row, .payload = f};
     for (f->film = 0; f->film < s->n_films; f->film++) {
         imp_film *film = f->films[f->film];
-        IMP_TRY(imp__film_room(film, &film->se));
+        if (!f->keep) IMP_TRY(imp__film_room(film, &film->se));
         f->errors = true;
         IMP_TRY(imp__parallel(s->ctx, &loop, NULL));
-        imp__release(s->ctx, s->square[f->film]);
-        s->square[f->film] = NULL;
-        IMP_TRY(imp__film_room(film, &film->mean));
+        if (!f->keep) {
+            imp__release(s->ctx, s->square[f->film]);
+            s->square[f->film] = NULL;
+            IMP_TRY(imp__film_room(film, &film->mean));
+        }
         f->errors = false;
         IMP_TRY(imp__parallel(s->ctx, &loop, NULL));
+        if (f->keep) continue;
         imp__release(s->ctx, s->sum[f->film]);
         s->sum[f->film] = NULL;
     }
@@ -251,7 +255,7 @@ static enum imp_status wide_finish(struct finish *f)
     f->t = imp__alloc(s->ctx, (size_t)s->ctx->threads,
                       (size_t)IMP_WIDE_SUMS(s->n) * sizeof *f->t);
     if (!f->t) IMP_TRY(imp__error(s->ctx, IMP_E_NOMEM, "no memory for a pixel's sums"));
-    for (int k = 0; k < s->n_films; k++) {
+    for (int k = 0; k < s->n_films && !f->keep; k++) {
         IMP_TRY(imp__film_room(f->films[k], &f->films[k]->mean));
         IMP_TRY(imp__film_room(f->films[k], &f->films[k]->se));
     }
@@ -261,7 +265,8 @@ static enum imp_status wide_finish(struct finish *f)
             .n_items = (size_t)(row1 - f->row0), .work = wide_row, .payload = f};
         IMP_TRY(imp__parallel(s->ctx, &loop, NULL));
         /* Tiles of row j reach rows before (j + 1) side - margin + border. */
-        for (; freed < s->down && (freed + 1) * s->side - s->margin + s->border <= row1;
+        for (; !f->keep && freed < s->down &&
+               (freed + 1) * s->side - s->margin + s->border <= row1;
              freed++) {
             imp__release(s->ctx, s->rows[freed]);
             s->rows[freed] = NULL;
@@ -276,5 +281,12 @@ enum imp_status imp__film_sums_finish(struct imp_film_sums *s, bool strata,
                                       double *weights, imp_film **films)
 {
     struct finish f = {.s = s, .strata = strata, .weights = weights, .films = films};
+    return s->border == 0 ? box_finish(&f) : wide_finish(&f);
+}
+
+enum imp_status imp__film_sums_look(struct imp_film_sums *s, bool strata,
+                                    imp_film **films)
+{
+    struct finish f = {.s = s, .strata = strata, .films = films, .keep = true};
     return s->border == 0 ? box_finish(&f) : wide_finish(&f);
 }

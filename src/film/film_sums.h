@@ -64,5 +64,8 @@ void imp__film_sums_add(struct imp_film_sums *s, size_t tile, const double *sums
  * way. `strata`: errors were taken within them. weights: as in struct imp_picture. */
 enum imp_status imp__film_sums_finish(struct imp_film_sums *s, bool strata,
                                       double *weights, imp_film **films);
+/* The same of what is there so far, into films with room for both; the sums stay. */
+enum imp_status imp__film_sums_look(struct imp_film_sums *s, bool strata,
+                                    imp_film **films);
 
 #endif
