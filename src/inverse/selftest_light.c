@@ -80,18 +80,6 @@ struct found {
     double total;                      /* of its density */
 };
 
-struct mean {
-    double n, mean, m2;
-};
-static void mean_add(struct mean *s, double x)
-{
-    const double d = x - s->mean;
-    s->n += 1;
-    s->mean += d / s->n;
-    s->m2 += d * (x - s->mean);
-}
-static double mean_variance(const struct mean *s) { return s->m2 / (s->n - 1) / s->n; }
-
 /* eval_d against central differences: exact, as light is linear in most inputs. */
 static double derivative_error(const struct light *l, const struct imp_emission *x,
                                imp_v3 p)
@@ -209,7 +197,7 @@ static enum imp_status light(struct imp__selftest *t, const struct imp_emitter *
     const int n = t->options.samples / t->options.directions + 1;
     for (int i = 0; i < t->options.directions; i++) {
         struct light l = {.scene = t->scene, .e = e, .channels = t->scene->channels};
-        struct mean own = {0}, other = {0};
+        struct imp__mean own = {0}, other = {0};
         l.ref = reference(t->scene, imp__key(t->options.seed, 31, (uint64_t)i));
         const struct cone cone = cone_of(&l);
         for (int k = 0; k < n; k++) {
@@ -217,10 +205,10 @@ static enum imp_status light(struct imp__selftest *t, const struct imp_emitter *
                 imp__key(t->options.seed, 400 + (uint64_t)i, (uint64_t)k);
             const double u[4] = {imp__u01(key, 0), imp__u01(key, 1), imp__u01(key, 2),
                                  imp__u01(key, 3)};
-            mean_add(&own, draw_take(&l, u, &r));
-            if (!delta) mean_add(&other, cone_take(&l, &cone, &u[2], &r));
+            imp__mean_add(&own, draw_take(&l, u, &r));
+            if (!delta) imp__mean_add(&other, cone_take(&l, &cone, &u[2], &r));
         }
-        const double se = sqrt(mean_variance(&own) + mean_variance(&other)) +
+        const double se = sqrt(imp__mean_variance(&own) + imp__mean_variance(&other)) +
                           1e-5 * fabs(own.mean) + 1e-300;
         const double z = delta ? 0 : (own.mean - other.mean) / se;
         if (fabs(z) >= fabs(r.z))

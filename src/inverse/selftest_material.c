@@ -180,18 +180,6 @@ static void answers_take(const struct imp__selftest *t, struct point *p, int i,
 
 /* ---- Draws ----------------------------------------------------------------------- */
 
-struct mean {
-    double n, mean, m2;
-};
-static void mean_add(struct mean *s, double x)
-{
-    const double d = x - s->mean;
-    s->n += 1;
-    s->mean += d / s->n;
-    s->m2 += d * (x - s->mean);
-}
-static double mean_se(const struct mean *s) { return sqrt(s->m2 / (s->n - 1) / s->n); }
-
 struct drawn {
     double least;          /* chance of the chi-squares */
     double total, total_z; /* density and missing draws: the worst */
@@ -204,7 +192,7 @@ struct drawn {
 static void albedo_take(const struct imp__selftest *t, struct point *p, int i, int n,
                         struct drawn *r)
 {
-    struct mean smooth[3] = {{0}}, all[3] = {{0}};
+    struct imp__mean smooth[3] = {{0}}, all[3] = {{0}};
     for (int k = 0; k < n; k++) {
         const struct imp_key key =
             imp__key(t->options.seed, 300 + (uint64_t)i, (uint64_t)k);
@@ -214,12 +202,12 @@ static void albedo_take(const struct imp__selftest *t, struct point *p, int i, i
         const double pdf = ok ? p->b->ops->pdf(p->b, p->in, &d) : 0;
         for (int c = 0; c < t->scene->channels; c++) {
             const double x = pdf > 0 ? power(p, &d, c) / pdf : 0;
-            mean_add(&all[c], x);
-            mean_add(&smooth[c], d.lobe < 0 ? x : 0);
+            imp__mean_add(&all[c], x);
+            imp__mean_add(&smooth[c], d.lobe < 0 ? x : 0);
         }
     }
     for (int c = 0; c < t->scene->channels; c++) {
-        const double se = mean_se(&all[c]);
+        const double se = sqrt(imp__mean_variance(&all[c]));
         if (all[c].mean - 4.5 * se > r->most - 4.5 * r->most_se)
             r->most = all[c].mean, r->most_se = se;
     }
@@ -230,8 +218,8 @@ static void albedo_take(const struct imp__selftest *t, struct point *p, int i, i
         if (!t->tree->cell[k].child)
             exact += imp__sphere_cell_integral(&t->tree->cell[k], power_towards, p, 1e-6,
                                                IMP_SPHERE_STEPS);
-    const struct mean *s = &smooth[p->lane];
-    const double se = hypot(mean_se(s), 1e-3 * exact + 1e-9);
+    const struct imp__mean *s = &smooth[p->lane];
+    const double se = hypot(sqrt(imp__mean_variance(s)), 1e-3 * exact + 1e-9);
     const double z = (s->mean - exact) / se;
     if (fabs(z) >= fabs(r->z))
         r->z = z, r->albedo = exact, r->sampled = s->mean, r->se = se;

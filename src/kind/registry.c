@@ -272,6 +272,19 @@ enum imp_status imp_register_bsdf(imp_context *context, const struct imp_bsdf_op
     return append(context, __func__, IMP_CONCEPT_BSDF, &own, sizeof own, NULL);
 }
 
+/* Of textures and volumes, which are looked up one by one. */
+static enum imp_status texture_inputs_check(imp_context *context, const char *function,
+                                            const struct imp_input_desc *inputs)
+{
+    IMP_CHECKED(inputs_check(context, function, inputs));
+    for (const struct imp_input_desc *d = inputs; d && d->name; d++)
+        if (d->flags & IMP_INPUT_LUMINANCE)
+            return imp__error(context, IMP_E_ARG,
+                              "%s: ops: input '%s': IMP_INPUT_LUMINANCE in a texture",
+                              function, d->name);
+    return IMP_OK;
+}
+
 enum imp_status imp_register_texture(imp_context *context,
                                      const struct imp_texture_ops *ops)
 {
@@ -280,12 +293,7 @@ enum imp_status imp_register_texture(imp_context *context,
     NEEDS(own, eval);
     NEEDS(own, scatter);
     NEEDS(own, tangent);
-    IMP_CHECKED(inputs_check(context, __func__, own.inputs));
-    for (const struct imp_input_desc *d = own.inputs; d && d->name; d++)
-        if (d->flags & IMP_INPUT_LUMINANCE) /* they are looked up one by one */
-            return imp__error(context, IMP_E_ARG,
-                              "%s: ops: input '%s': IMP_INPUT_LUMINANCE in a texture",
-                              __func__, d->name);
+    IMP_CHECKED(texture_inputs_check(context, __func__, own.inputs));
     return append(context, __func__, IMP_CONCEPT_TEXTURE, &own, sizeof own, NULL);
 }
 
@@ -297,7 +305,7 @@ enum imp_status imp_register_volume(imp_context *context,
     NEEDS(own, eval);
     NEEDS(own, scatter);
     NEEDS(own, tangent);
-    IMP_CHECKED(inputs_check(context, __func__, own.inputs));
+    IMP_CHECKED(texture_inputs_check(context, __func__, own.inputs));
     return append(context, __func__, IMP_CONCEPT_VOLUME, &own, sizeof own, NULL);
 }
 

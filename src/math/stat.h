@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Distributions that tests and intervals need. */
+ * Distributions that tests and intervals need, and means of what is drawn. */
 #ifndef IMP_MATH_STAT_H
 #define IMP_MATH_STAT_H
 
@@ -14,5 +14,22 @@ double imp__chi2_tail(double x, double k);
 /* Level for each of n tests, so that all together err with probability alpha (Sidak
  * 1967). */
 double imp__sidak(double alpha, double n);
+
+/* Mean and sum of squared deviations while numbers arrive (Welford 1962). */
+struct imp__mean {
+    double n, mean, m2;
+};
+static inline void imp__mean_add(struct imp__mean *s, double x)
+{
+    const double d = x - s->mean;
+    s->n += 1;
+    s->mean += d / s->n;
+    s->m2 += d * (x - s->mean);
+}
+/* Of the mean: its squared standard error. */
+static inline double imp__mean_variance(const struct imp__mean *s)
+{
+    return s->m2 / (s->n - 1) / s->n;
+}
 
 #endif

@@ -501,6 +501,7 @@ int main(void)
     refused(ctx, imp_register_texture(ctx, &t), "two inputs 'a'");
     two[1].flags = IMP_INPUT_LUMINANCE;
     refused(ctx, imp_register_texture(ctx, &t), "IMP_INPUT_LUMINANCE in a texture");
+    refused(ctx, imp_register_volume(ctx, &t), "IMP_INPUT_LUMINANCE in a texture");
     two[1].name = "b";
     refused(ctx, imp_register_texture(ctx, &t), "no input 'b' before its luminance");
     t = ramp;
