@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Sums over elements and links by all threads, the same to the bit for any number of
- * them: the parts are cut by the problem's size and added in order. */
+ * them: the parts are cut by the problem's size and added in a fixed binary tree
+ * (base/sum_tree.h). */
 #include "elements.h"
 
 enum { PARTS = 256, LEAST = 64 };
@@ -34,9 +35,10 @@ double imp__el_sum(const imp_elements *e, size_t n,
                     .part = part,
                     .how = how};
     const struct imp_loop loop = {.n_items = s.parts, .work = part_work, .payload = &s};
-    double sum = 0;
     if (imp__parallel(e->ctx, &loop, NULL) != IMP_OK) /* no memory for threads */
         for (size_t k = 0; k < s.parts; k++) part_work(k, 0, 0, &s);
-    for (size_t k = 0; k < s.parts; k++) sum += s.value[k];
-    return sum;
+    for (size_t step = 1; step < s.parts; step *= 2)
+        for (size_t k = 0; k + step < s.parts; k += 2 * step)
+            s.value[k] += s.value[k + step];
+    return s.value[0];
 }
