@@ -242,10 +242,10 @@ static enum imp_status check_differences(imp_bend *b, double *dot, double *bar)
             if (st != IMP_OK) goto out;
         }
         /* Curvature of the objective limits large steps and rounding small ones, so those
-         * between are judged; for trilinear fields the smallest (docs/bent-rays.md 3.3). The
-         * error left is 1/100 of the change from the next larger step; 1/50 is allowed.
-         * At a minimum the gradient may be what a change of theta by 1e-12, or by a
-         * float's last bit, makes of the curvature. */
+         * between are judged; for trilinear fields the smallest (docs/bent-rays.md 3.3).
+         * The error left is 1/100 of the change from the next larger step; 1/50 is
+         * allowed. At a minimum the gradient is as small as the curvature times a change
+         * of theta by 1e-12, or by the last bit of a float. */
         const double fd = (f[0] - f[1]) / (2 * eps);
         if (k <= 4) bend = fmax(bend, fabs(f[0] + f[1] - 2 * value) / (eps * eps));
         const double left = !smooth            ? bend * eps

@@ -356,7 +356,8 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
     if (f.levels > IMP_BEND_LEVELS_MAX)
         return imp__error(b->ctx, IMP_E_ARG, "%d levels: at most %d", f.levels,
                           IMP_BEND_LEVELS_MAX);
-    /* Adam's moments are those of steeper gradients: begun anew it is usually faster. */
+    /* Adam's moments are those of steeper gradients: it is usually faster to begin
+     * anew. */
     f.carries = o->carry > 0 || (o->carry == 0 && o->optimizer == IMP_LBFGS);
     if (o->optimizer == IMP_LM)
         return imp__error(b->ctx, IMP_E_UNSUPPORTED,

@@ -101,8 +101,8 @@ void imp__partial_add(struct imp__partials *p, size_t slice, struct imp__partial
     pthread_mutex_lock(&p->lock);
     own->next = p->ready;
     p->ready = own;
-    /* A busy part is skipped: before its thread leaves, it checks the list again under
-     * this lock, and so finds what has become ready meanwhile. */
+    /* A busy part is skipped. Before its thread leaves, it looks at the list again under
+     * this lock, and so adds what has become ready meanwhile. */
     for (int k = 0; k < p->n_parts; k++) {
         struct imp__partials_part *part =
             &p->part[((size_t)k + slice) % (size_t)p->n_parts];

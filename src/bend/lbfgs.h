@@ -8,8 +8,8 @@
 enum imp_status imp__lbfgs(const struct imp__goal *goal,
                            const struct imp__opt_options *options, struct imp__search *s);
 
-/* A search that has not begun takes over the pairs of `old`: y scaled so that the
- * curvature s.y stays what was seen. */
+/* A search that has not begun takes over the pairs of `old`; y is scaled so that the
+ * curvature s.y along s does not change. */
 enum imp_status imp__lbfgs_carry(const struct imp__search *old,
                                  const struct imp__carry *carry, struct imp__search *s);
 

@@ -36,7 +36,8 @@ static void constant_at(const double *p, double u, struct shape_at *s)
 }
 /* sqrt(2 - r^2/R^2) inside R, 1 outside. The gradient jumps at R. Rays that start or end
  * there are inside to rounding, and a scheme that begins or ends with a kick evaluates it
- * there: on the rim it is the inside's, or such a scheme would be of first order. */
+ * there: on the rim the gradient is that of the inside, since such a scheme would
+ * otherwise be of first order. */
 #define RIM 1e-12
 static void luneburg_at(const double *p, double u, struct shape_at *s)
 {

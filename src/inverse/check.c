@@ -35,7 +35,7 @@ static bool report(struct imp__check *c, double fraction)
 {
     if (!c->outer.progress) return false;
     const double elapsed = imp__now() - c->start_s;
-    fraction = c->shown = fmax(c->shown, fraction); /* rows may turn out to need more */
+    fraction = c->shown = fmax(c->shown, fraction); /* rows may need more samples */
     const struct imp_progress p = {
         .size = sizeof p,
         .stage = "check",
@@ -59,7 +59,7 @@ enum imp_status imp__check_progress(struct imp__check *c, double work)
     return c->stopped ? IMP_CANCELLED : IMP_OK;
 }
 
-/* One evaluation is one piece. */
+/* Progress of one evaluation, which is one piece of work. */
 static int inner_progress(const struct imp_progress *p, void *payload)
 {
     struct imp__check *c = payload;

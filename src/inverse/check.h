@@ -25,7 +25,7 @@ struct imp__check {
 enum imp_status imp__check_row(struct imp__check *c, const char *method,
                                const char *param, int64_t element,
                                const struct imp_check_row *row);
-/* Done with `work` more; IMP_CANCELLED if the caller wants to stop. */
+/* `work` more pieces are done; IMP_CANCELLED if the caller wants to stop. */
 enum imp_status imp__check_progress(struct imp__check *c, double work);
 
 /* Typical size of number e of a parameter: its value, not below 1e-3 of its range. */

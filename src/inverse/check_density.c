@@ -16,7 +16,7 @@
 #include <math.h>
 #include <string.h>
 
-#define DRAWS   16 /* pairs at a vertex; where that is noisy, */
+#define DRAWS   16 /* pairs of directions at a vertex; where the result is noisy, */
 #define MORE    16 /* so many times as many */
 #define DEPTH   4  /* vertices of a walk looked at */
 #define Z_LIMIT 5  /* 6e-7 by chance */

@@ -18,7 +18,7 @@
 #define STEP_LINEAR    0.8
 #define FLOAT_ROUNDING 1e-7 /* of a picture's mean: 2^-24, and some for its sums */
 
-/* What pictures are made of: radiance, or its derivative along x_dot. */
+/* The sample of a picture: radiance, or its derivative along x_dot. */
 struct sampled {
     struct imp_tracer tracer;
     const double *x_dot; /* NULL: radiance */

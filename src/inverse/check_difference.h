@@ -14,7 +14,7 @@ struct imp__fresh {
     struct imp__check *check;
     float *pattern; /* [height][width][channels] s */
     int channels;
-    int more; /* times the samples per pixel asked for that an evaluation takes */
+    int more; /* samples per pixel of an evaluation, in units of those asked for */
     uint64_t next_seed;
 };
 uint64_t imp__fresh_seed(struct imp__fresh *f);

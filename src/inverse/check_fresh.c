@@ -35,7 +35,7 @@ struct rows {
     size_t n, cap;
 };
 
-/* One row in the making: its number or direction, and what is known of it. */
+/* A row while rounds are added: its number or direction, and the samples so far. */
 struct comparison {
     size_t param, row;
     int64_t element; /* -1: the parameter's only number, or a direction through all */
@@ -150,8 +150,8 @@ static enum imp_status comparison_round(struct rows *r, struct comparison *c, in
         weight[e] = 1;
         mine = (struct imp_estimate){r->gradient[base + e], r->gradient_se[base + e], 0};
     } else {                                 /* one direction through all of them */
-        for (size_t e = 0; e < count; e++) { /* each to the side where it has more room:
-                                                texels may be at both bounds */
+        for (size_t e = 0; e < count; e++) { /* each moves to the side where it has
+                                                more room: texels may be at both bounds */
             const double w = 0.5 + imp__u01(imp__key(9, 9, 9), (uint32_t)e);
             const bool down = old[e] - q->info.lo > q->info.hi - old[e];
             weight[e] = x_dot[base + e] = down ? -w : w;
@@ -244,7 +244,7 @@ enum imp_status imp__check_fresh(struct imp__check *c)
         size_t open = 0;
         r.fresh.more = round_more[round];
         for (size_t k = 0; k < r.n; k++) {
-            if (round == 0) r.comparisons[k].noisy = true; /* nothing is known yet */
+            if (round == 0) r.comparisons[k].noisy = true; /* all rows take part */
             open += r.comparisons[k].noisy;
         }
         if (open == 0) break;

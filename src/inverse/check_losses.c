@@ -124,8 +124,8 @@ static double tangent(const struct losses *l, int i, size_t k)
     return l->films[i]->mean[k / C * 2 * C + C + k % C];
 }
 
-/* Is T so close to a sample, or to the mean of two, that a difference would step over the
- * kink of l1? */
+/* True if T is so close to a sample, or to the mean of two, that a difference would step
+ * over the kink of l1. */
 static bool near_kink(const struct losses *l, size_t k, double T)
 {
     for (int i = 0; i < N; i++)
@@ -136,7 +136,7 @@ static bool near_kink(const struct losses *l, size_t k, double T)
     return false;
 }
 
-/* Targets of the picture's size. */
+/* Random targets of the size of the mean radiance. */
 static void target_make(struct losses *l)
 {
     double mean = 0;
@@ -281,8 +281,8 @@ out:
     return st;
 }
 
-/* Only rounding is left, so part of a large picture says what all of it does: a window in
- * its middle, or all of it if nothing arrives there. */
+/* Both sides differ by rounding alone, so a part of a large picture tests as much as all
+ * of it: a window in its middle, or the whole picture if the window is dark. */
 #define WINDOW 48
 
 static void window_set(struct imp_film_desc *film)
@@ -309,7 +309,7 @@ static bool any_light(const struct losses *l)
     return false;
 }
 
-/* The samples of the film as it is now. */
+/* Samples of the film with its present window. */
 static enum imp_status losses_begin(struct imp__check *c, struct losses *out)
 {
     enum imp_status st = IMP_OK;

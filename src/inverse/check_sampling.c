@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Is light found where it is looked for? The picture again with directions drawn uniformly
- * by every material, and lights met, not sampled (those that nothing meets apart): an
- * oracle with no density of a kind in it but 1/2pi and 1/4pi. Both pictures are compared
- * block by block, and their z together by chi-square. And what each density of the
- * mixture is good for: its part of the directions of first choices, and of the energy
+ * Test of densities against an oracle: the picture again with directions drawn uniformly
+ * by every material, and with lights met, not sampled (those that no ray can meet
+ * apart), so that the only densities are 1/2pi and 1/4pi. Both pictures are compared
+ * block by block, and their z together by chi-square. Rows `energy` give, for each
+ * density of the mixture, its part of the directions of first choices and of the energy
  * that arrives through them. */
 #include "check.h"
 #include "film/film_picture.h"

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Do two pictures have the same expectation? A z-test of every pixel and channel, with
- * Sidak's level so that the picture as a whole fails by chance once in a hundred, and one
- * of every channel's mean, which sees a bias far below a pixel's noise
+ * Test of whether two pictures have the same expectation: a z-test of every pixel and
+ * channel, with Sidak's level so that the picture as a whole fails by chance once in a
+ * hundred, and one of every channel's mean, which sees a bias far below a pixel's noise
  * (docs/scene-format.md 14). Pixels must be independent: compare pictures made with box
  * filters. */
 #include "base/arguments.h"
@@ -16,10 +16,10 @@
 #define PIXELS_MAX_FAIL 0.0025 /* pixels beyond the level: fireflies are not normal */
 #define MEAN_Z_MAX      4
 #define OVER2_MAX       0.1 /* 0.0455 by chance; only where the variance is a reference's */
-/* One sigma of what pictures of equal scenes differ by for good, relative: Mitsuba's
- * white has moved by 3e-4 between versions with its colour tables. */
+/* One sigma of the relative systematic difference between pictures of equal scenes:
+ * Mitsuba's white has moved by 3e-4 between versions with its colour tables. */
 #define MEAN_SYSTEMATIC 1e-4
-#define WITHOUT_Z       1e-3 /* relative rmse that agrees where nothing is known of noise */
+#define WITHOUT_Z       1e-3 /* relative rmse allowed where noise is unknown */
 
 struct pair {
     const imp_film *test, *reference;

@@ -89,8 +89,9 @@ static enum imp_status bounds_take(struct imp__design *d)
     return IMP_OK;
 }
 
-/* Where links are refined first: lights that are off shine like the others, or by 1, or
- * the search would find them on links too coarse to tell what they do. */
+/* Weights by which links are refined first: lights that are off count as if they shone
+ * like the others, or by 1. Otherwise their links would be too coarse to show what they
+ * do. */
 static void lit(const struct imp__design *d, const double *x, double *out)
 {
     double most = 0;
@@ -122,7 +123,7 @@ static void scales(struct imp__design *d, const double *x)
     }
 }
 
-/* Numbers that may move and on which no regulariser puts a price. */
+/* Numbers that are free to move and that no regulariser weighs. */
 static size_t unpriced(const struct imp__design *d)
 {
     const struct imp_problem *p = d->p;
@@ -195,8 +196,8 @@ out:
     return st;
 }
 
-/* Refine at the scene's numbers, every source seen with the weight of its relative error.
- */
+/* Refine links at the scene's numbers, with every source weighted by its relative
+ * error. */
 static enum imp_status refine(struct imp__design *d)
 {
     enum imp_status st = IMP_OK;
@@ -335,15 +336,16 @@ enum imp_status imp_elements_fit(imp_elements *e, imp_problem *p,
     }
     e->opt.time_limit_s = time_limit;
     if (ended != IMP_OK && ended != IMP_CANCELLED) {
-        (void)!imp_problem_set_x(p, start); /* as if nothing had been tried */
+        (void)!imp_problem_set_x(p, start); /* the scene keeps its numbers */
         IMP_TRY(ended);
     }
     if (ended == IMP_CANCELLED) reason = e->reason;
-    /* Whoever asked to stop gets a whole solution: this part ends by itself. */
+    /* After a request to stop the solution is still completed: this part ends by
+     * itself. */
     e->opt.progress = NULL;
     e->stop = false;
     e->deadline_s = 0;
-    /* The elements measure what they were made for again, at the answer. */
+    /* Back to the measurements that the elements were made for, at the answer. */
     IMP_TRY(imp_problem_set_x(p, x));
     IMP_TRY(imp_elements_update(e));
     IMP_TRY(imp__design_measure(&d, d.J));

@@ -34,9 +34,9 @@ struct imp__design {
 
 /* IMP_CANCELLED if the host or the clock asked for it. */
 enum imp_status imp__design_stopped(const struct imp__design *d);
-/* Sources weigh `w` [goals] from here on. */
+/* Set the weights `w` [goals] of the sources. */
 enum imp_status imp__design_weigh(struct imp__design *d, const double *w);
-/* What every source measures in the present solution. */
+/* Measurements of all sources in the present solution. */
 enum imp_status imp__design_measure(struct imp__design *d, double *J);
 /* d->J at x: from the matrix, or by solving. */
 enum imp_status imp__design_at(struct imp__design *d, const double *x);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What the sources measure, its derivatives, and the goal that an optimiser sees. */
+ * Measurements of the sources, their derivatives, and the goal that an optimiser sees. */
 #include "design.h"
 #include <math.h>
 #include <string.h>
@@ -88,7 +88,7 @@ enum imp_status imp__design_eval(const double *x, uint64_t seed, struct imp_esti
     enum imp_status st = IMP_OK;
     (void)seed;
     st = imp__design_at(d, x);
-    if (st == IMP_E_NUMERIC) { /* reflections that never end: as far away as can be */
+    if (st == IMP_E_NUMERIC) { /* reflections do not converge: the worst value */
         *f = (struct imp_estimate){HUGE_VAL, 0, 0};
         if (g) memset(g, 0, d->n * sizeof *g);
         if (g_se) memset(g_se, 0, d->n * sizeof *g_se);

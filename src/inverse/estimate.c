@@ -15,7 +15,7 @@ static enum imp_status splat_prepare(struct imp__gradient_job *j,
                                      const struct imp_run *run, struct imp__splat *splat)
 {
     imp_context *ctx = j->problem->ctx;
-    /* What comes next needs these pictures: each part makes them whole. */
+    /* The second pass needs these pictures, so each part computes all of them. */
     const bool apart = ctx->team && ctx->team->role != IMP_TEAM_RANK;
     double value[2] = {0, 0};
     bool known = false;

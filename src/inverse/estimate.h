@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * How samples of a pixel are cut into replicates, and who uses them. */
+ * Replicates: the groups into which the samples of a pixel are cut, and who uses them. */
 #ifndef IMP_INVERSE_ESTIMATE_H
 #define IMP_INVERSE_ESTIMATE_H
 

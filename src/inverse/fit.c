@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Fit: run an optimiser on a problem, and say how well its answer is known. */
+ * Fit: an optimiser is run on a problem; covariance and intervals of its answer. */
 #include "fit.h"
 #include "base/arguments.h"
 #include "search/covariance.h"
@@ -21,10 +21,10 @@ static bool has_kink(const struct imp_problem *p)
     return kink;
 }
 
-/* Evaluate what the search found with random numbers that it has not seen. They depend on
- * the answer's bits too: two fits with one seed that end at different answers would
- * otherwise share the noise of their losses, and their chi-squares could not be compared.
- */
+/* Evaluate the answer with random numbers that the search has not used. The seed depends
+ * on the bits of the answer too: two fits with one seed that end at different answers
+ * would otherwise share the noise of their losses, and their chi-squares could not be
+ * compared. */
 static enum imp_status final_objective(struct imp__fit *f, const double *x,
                                        struct imp_estimate *out)
 {
@@ -38,16 +38,16 @@ static enum imp_status final_objective(struct imp__fit *f, const double *x,
     return f->goal.eval(x, seed, out, NULL, NULL, f);
 }
 
-/* Samples per pixel of each replicate. A search that averaged many evaluations with few
- * samples (Adam) knows more than a few more of them could tell. */
+/* Samples per pixel of each replicate. The answer of a search that averaged many
+ * evaluations with few samples (Adam) has less noise than its last evaluations. */
 static int replicate_spp(const struct imp__fit *f, const struct imp__search *s, int spp)
 {
     const double wanted = (double)spp * s->iteration / (EFFORT_SHARE * REPLICATES);
     return wanted > spp ? (int)fmin(wanted, 1 << 24) : f->outer.spp;
 }
 
-/* The part of the walks behind the answer that the replicates are. Weights that grow with
- * the iterate's number make n iterates as good as 3/4 n. */
+/* Walks of the replicates over walks behind the answer. Weights that grow with the number
+ * of the iterate make n iterates worth 3/4 n. */
 static double replicate_share(const struct imp__fit *f, const struct imp__search *s,
                               int spp)
 {
@@ -167,7 +167,7 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
     }
     st = ended;
 out:
-    if (st != IMP_OK && st != IMP_CANCELLED && start && s) /* as if nothing was tried */
+    if (st != IMP_OK && st != IMP_CANCELLED && start && s) /* x stays as it was */
         imp__fit_start_restore(p, f.spans != NULL, start, s);
     imp__uncertainty_destroy(ctx, &u);
     if (!kept) imp__search_destroy(s);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Between imp_fit, which runs a search on a problem, and the pieces it is made of. */
+ * What imp_fit, which runs a search on a problem, shares with its parts. */
 #ifndef IMP_INVERSE_FIT_H
 #define IMP_INVERSE_FIT_H
 
@@ -27,12 +27,12 @@ struct imp__fit {
     double fraction;
     double search_share;          /* of the work, the rest is what comes after it */
     int final_calls, final_total; /* evaluations after the search; total 0: not there */
-    int first_iteration;          /* of this call: not 0 when continued */
+    int first_iteration;          /* of this call; not 0 where the fit was continued */
     bool stopped;                 /* by the caller or the deadline */
     char note[96];
 };
 
-/* fit_goal.c: the goal of `problem`, everything of `fit` but the search. */
+/* fit_goal.c: the goal of `problem`; sets everything of `fit` but the search. */
 enum imp_status imp__fit_begin(struct imp_problem *problem,
                                const struct imp_fit_options *options,
                                const struct imp_run *run, struct imp__fit *fit);
@@ -58,7 +58,7 @@ enum imp_status imp__fit_answer(struct imp__fit *fit, struct imp__search *s,
                                 const char *why, const struct imp__fit_shift *shift,
                                 const struct imp_fit_result **out);
 
-/* fit_residual.c: what is left between scene and targets. NAN: cannot be said. */
+/* fit_residual.c: the residual between scene and targets; NAN: undefined. */
 struct imp__fit_residual {
     double relative;       /* root of sum w (I - T)^2 / sum w T^2, */
     double relative_hi;    /* and with two standard errors added to the loss */
@@ -69,7 +69,7 @@ struct imp__fit_residual imp__fit_residual(const struct imp__fit *fit, const dou
                                            struct imp_estimate objective,
                                            size_t determined);
 
-/* fit_bias.c: what the bias of few samples does to the answer. */
+/* fit_bias.c: the shift of the answer by the bias of few samples. */
 struct imp__fit_shift {
     size_t variable;        /* the one that moves most of its standard errors */
     double step, se, of_se; /* with four times the samples; of_se < 0: not known */

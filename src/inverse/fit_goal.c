@@ -41,7 +41,7 @@ static void report(struct imp__fit *f, double fraction)
     if (f->outer.progress(&p, f->outer.progress_payload) != 0) f->stopped = true;
 }
 
-/* From inside an evaluation. */
+/* Progress of the evaluation at work. */
 static int inner_progress(const struct imp_progress *p, void *payload)
 {
     struct imp__fit *f = payload;

@@ -6,10 +6,10 @@
 #include <string.h>
 
 #define NAMES_MAX 6
-#define MISFIT    2   /* chi^2 per degree of freedom that is worth a word, if it is */
+#define MISFIT    2   /* chi^2 per degree of freedom that is warned of, if it is */
 #define MISFIT_Z  3   /* so many standard errors above 1 */
-#define LEFT_OVER 0.2 /* of the targets, as a relative residual, that is worth a word */
-#define FEW       10  /* degrees of freedom that tell little of the targets' noise */
+#define LEFT_OVER 0.2 /* relative residual of the targets that is warned of */
+#define FEW       10  /* with fewer degrees of freedom chi^2 is too noisy to judge */
 
 struct text {
     char buffer[1536];
@@ -48,7 +48,7 @@ static void put_loose(struct text *t, const struct imp__fit *f,
         put_name(t, f, i);
     }
     if (count > shown) put(t, " and %zu more", count - shown);
-    /* A combination is worth naming; a single variable has been. */
+    /* Warn of an undetermined combination; a single variable has its own warning. */
     double largest = 0;
     for (size_t i = 0; i < n; i++) largest = fmax(largest, fabs(direction[i]));
     if (largest < 0.98) {

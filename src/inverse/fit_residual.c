@@ -56,7 +56,7 @@ struct imp__fit_residual imp__fit_residual(const struct imp__fit *f, const doubl
     struct imp__fit_residual r = {NAN, NAN, NAN, NAN, NAN, NAN};
     struct sums s = {0};
     for (size_t t = 0; t < p->n_targets; t++) {
-        if (p->targets[t].desc.loss == IMP_LOSS_L1) return r; /* own noise is in it */
+        if (p->targets[t].desc.loss == IMP_LOSS_L1) return r; /* contains our noise */
         add_target(f, &p->targets[t], &s);
     }
     const double data = objective.value - imp__regularise(p, x, NULL);

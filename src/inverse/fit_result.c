@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What a fit leaves with its problem, and where it began. Rows of 48 bytes are more than a
- * fit of millions of numbers takes: theirs are made when they are asked for, from the
- * search, which is kept. */
+ * The result that a fit leaves with its problem, and the numbers at its start. Rows of
+ * 48 bytes are more than a fit of millions of numbers takes: these are made on request,
+ * from the search, which is kept. */
 #include "base/arguments.h"
 #include "estimate.h"
 #include "fit.h"
@@ -88,7 +88,7 @@ static enum imp_status blocks_make(struct imp__fit *f, const double *start)
     return IMP_OK;
 }
 
-/* Without what the covariance says of it. */
+/* The row of a number, without standard error and interval. */
 static struct imp_fit_variable variable_of(const struct imp__fit_answer *a, size_t i)
 {
     size_t at = 0, end = a->n_blocks;
@@ -108,7 +108,8 @@ static struct imp_fit_variable variable_of(const struct imp__fit_answer *a, size
                                      .at_bound = value <= b->lo   ? -1
                                                  : value >= b->hi ? 1
                                                                   : 0,
-                                     .determined = 1}; /* nothing says the contrary */
+                                     .determined = 1}; /* until a covariance shows the
+                                                          contrary */
 }
 
 enum imp_status imp_problem_fit_variable(const imp_problem *p, size_t i,

@@ -78,7 +78,7 @@ static void sample_influence(const void *payload, struct imp_sample *s)
     else radiance(f, &own);
     s->px = own.px;
     s->py = own.py;
-    /* Of a dropped walk, which the picture has counted, the influence is that of a 0. */
+    /* A dropped walk, counted by the picture, has the influence of radiance 0. */
     s->dropped = own.dropped == IMP_DROP_MEMORY ? IMP_DROP_MEMORY : IMP_DROP_NONE;
     if (imp__film_border(film) > 0) {
         imp__film_taps(&film->filter, s->px - film->crop_x, 0, film->crop_w - 1, &across);
@@ -224,7 +224,8 @@ static enum imp_status picture_value(imp_context *ctx, struct functional *f,
                                         .sample = sample_value,
                                         .payload = f,
                                         .weights = weights};
-    /* Errors through a wide filter need the picture: each part makes it whole. */
+    /* Standard errors through a wide filter need the picture, so each part computes all
+     * of it. */
     const int spp = run->spp > 0 ? run->spp : f->tracer.sensor->spp;
     const bool one_pass = box && spp > 1,
                apart = ctx->team && !one_pass && ctx->team->role != IMP_TEAM_RANK;

@@ -300,7 +300,7 @@ static enum imp_status target_add(struct job *j, const struct imp__target *targe
     return st;
 }
 
-/* Pixels whose weight is not 0. */
+/* Number of pixels whose weight is not 0. */
 static double pixels_in_use(const struct imp__target *t)
 {
     const size_t n = (size_t)t->desc.width * (size_t)t->desc.height;

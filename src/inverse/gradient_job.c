@@ -149,9 +149,9 @@ static enum imp_status tile_take(size_t group, const void *sum, void *payload)
 
 /* ---- Sums of many numbers ------------------------------------------------------- */
 
-#define LOOKS      64 /* 1 in so many items tells how large terms are, and */
+#define LOOKS      64 /* 1 of so many items is sampled for the size of terms, and */
 #define LOOKS_MOST 16 /* no more than so many: */
-#define SPARE_BITS 12 /* none found is 2^12 times larger, or all is done again */
+#define SPARE_BITS 12 /* terms up to 2^12 times those fit; else all is redone */
 
 static double terms_most(const struct imp__gradient_job *j)
 {
@@ -159,8 +159,8 @@ static double terms_most(const struct imp__gradient_job *j)
            (double)j->problem->n_targets;
 }
 
-/* The largest terms of some tiles, of mean and spread; of more tiles where there is none.
- * Every rank of a team looks by itself. */
+/* Largest terms of mean and spread over some tiles; over more tiles where these have
+ * none. Every rank of a team computes this by itself. */
 static enum imp_status terms_look(struct imp__gradient_job *j,
                                   const struct imp_tiles_pass *run, double largest[2])
 {

@@ -25,7 +25,7 @@ struct imp__gradient_job {
     bool want_gradient;
     /* Set by imp__gradient_job_run. */
     int width, channels;
-    bool look;                           /* at the size of terms alone */
+    bool look;                           /* only the size of terms is wanted */
     struct imp_active nothing;           /* what the tally keeps without want_gradient */
     struct imp_fixed_sum *mean, *spread; /* of many numbers; spread NULL: not wanted */
     struct imp_tiles tiles;

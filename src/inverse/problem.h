@@ -24,7 +24,7 @@ struct imp__regulariser {
 
 struct imp__search;
 
-/* What imp_problem_fit_variable reads: of the last fit (fit_result.c). */
+/* The last fit, as imp_problem_fit_variable returns it (fit_result.c). */
 struct imp__fit_block { /* numbers of one parameter */
     size_t first;
     double lo, hi;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Is a problem the one that parts, or the other ranks of a team, have? */
+ * Comparison of a problem with that of the parts, or of the other ranks of a team. */
 #include "film/parts.h"
 #include "math/hash.h"
 #include "problem.h"

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What a target sees of a picture: its channels, or their luminance where the target has
+ * Channels of a target: those of the picture, or their luminance where the target has
  * one channel and the picture three. */
 #ifndef IMP_INVERSE_SEEN_H
 #define IMP_INVERSE_SEEN_H

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * imp_selftest: rows of contracts, and who keeps them. */
+ * imp_selftest: the rows, one a contract and object. */
 #include "selftest.h"
 #include "base/arguments.h"
 #include "math/warp.h"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Lights: what a sample says is what eval and pdf say; lights with an area and skies are
- * the same light by their own draws and by directions drawn without them. */
+ * Lights: samples agree with eval and pdf; lights with an area and skies give the same
+ * light by their own draws and by directions drawn without them. */
 #include "math/warp.h"
 #include "selftest.h"
 #include "walk/walk.h"
@@ -110,7 +110,7 @@ static double derivative_error(const struct light *l, const struct imp_emission 
     return worst;
 }
 
-/* One draw: what it says against pdf; the light that it brings over its density. */
+/* One draw: its density against pdf, and its light over its density. */
 static double draw_take(const struct light *l, const double u[2], struct found *r)
 {
     const struct imp_emitter_ops *ops = l->e->ops;

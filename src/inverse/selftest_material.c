@@ -236,7 +236,7 @@ static enum imp_status material(struct imp__selftest *t, const struct imp_bsdf *
         struct point p = {.lane = 0};
         place(t, b, i, &p);
         answers_take(t, &p, i, &a);
-        if (a.bad > 0) continue; /* sums of NaN tell nothing more */
+        if (a.bad > 0) continue; /* sums with NaN decide nothing */
         const struct imp__drawn d = {draw, b->flags & IMP_BSDF_SMOOTH ? density : NULL,
                                      chance, &p, 0};
         const struct imp__draws test = imp__draws_test(

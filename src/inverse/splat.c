@@ -121,7 +121,7 @@ static imp_spec pixel_adjoint(const struct imp__splat *s, int b, size_t p, doubl
     const double scale = t->scale * (s->target->weights ? s->target->weights[p] : 1);
     const double W = s->weights[b][p];
     const float *mean = s->films[b]->mean + p * (size_t)n;
-    for (int c = 0; c < n; c++) /* alone in its pixel: nothing is known without it */
+    for (int c = 0; c < n; c++) /* alone in its pixel: without it there is no estimate */
         rest[c] = W - w > 1e-9 * W ? (mean[c] * W - w * L[c]) / (W - w) : mean[c];
     for (int c = 0; c < t->channels; c++) {
         struct imp__loss_at at;

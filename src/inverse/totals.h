@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What the targets of a problem add to: the objective, and its gradient with variances, in
+ * Sums over the targets of a problem: the objective, and its gradient with variances, in
  * doubles for few numbers, in fixed point for many (base/fixed_sum.h). */
 #ifndef IMP_INVERSE_TOTALS_H
 #define IMP_INVERSE_TOTALS_H
@@ -23,8 +23,8 @@ enum imp_status imp__totals_begin(struct imp_problem *p, bool in_place, double *
                                   double *gradient_se, struct imp__totals *t);
 /* Sums in fixed point are complete when the other ranks' are added (base/team.h). */
 enum imp_status imp__totals_share(struct imp_problem *p, struct imp__totals *t);
-/* Were terms left out? Then all is to be added once more, with the unit that the largest
- * asks for. */
+/* *again: terms were too large for the unit and were left out. All is then to be added
+ * once more, with the unit that the largest asks for. */
 enum imp_status imp__totals_again(struct imp_problem *p, struct imp__totals *t,
                                   bool *again);
 void imp__totals_end(struct imp_problem *p, struct imp__totals *t, double *gradient,

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What a problem's walks are made with; and the reasons to refuse, where a gradient would
- * not be the whole one. */
+ * How the walks of a problem are made; and refusals, where a gradient would not be the
+ * whole one. */
 #include "estimate.h"
 #include "film/film_measure.h"
 #include "walk/graded.h"
@@ -31,7 +31,8 @@ static enum imp_status attached_allowed(const struct imp_scene *scene)
         "constant environment; use detached");
 }
 
-/* Light samples alone see no derivative of a light where it is dark. */
+/* Light samples alone never reach a light where it is dark, so its derivative there is
+ * missed. */
 static enum imp_status gaps_allowed(const struct imp_problem *p,
                                     const struct imp_walk_integrator *integrator)
 {
@@ -81,6 +82,6 @@ enum imp_status imp__problem_tracer(const struct imp_problem *p,
                           "specfilm has %d response curves",
                           sensor->film.n_responses);
     imp__tracer_waves(out, run, 0);
-    out->set = 1; /* what leaves walks out needs walks that are independent */
+    out->set = 1; /* leave-one-out needs independent walks */
     return p->active.body ? imp__graded_survey(out) : IMP_OK;
 }
