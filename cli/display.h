@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Pictures to a viewer that listens on a port: tev's protocol (github.com/Tom94/tev,
- * src/python/tev.py of its sources: CreateImage, version 3 of UpdateImage). */
+ * Pictures to a viewer that listens on a port: tev's protocol (github.com/Tom94/tev:
+ * CreateImage, and version 3 of UpdateImage). */
 #ifndef IMP_CLI_DISPLAY_H
 #define IMP_CLI_DISPLAY_H
 

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # A viewer is shown the picture while it is made, with its errors, and in the end what is written.
 cat >viewer.py <<'END'
-import socket, struct, sys
-import numpy as np
+import array, socket, struct
 
 server = socket.socket()
 server.bind(("127.0.0.1", 0))
@@ -30,27 +29,33 @@ while head := stream.read(4):
     if kind == 4:
         width, height, n = take("iii")
         names = [text() for _ in range(n)]
-        images[name] = (names, np.full((height, width, n), np.nan, "f4"))
+        images[name] = (names, width, array.array("f", [float("nan")]) * (width * height * n))
     else:
         assert kind == 6, kind
         (n,) = take("i")
         assert [text() for _ in range(n)] == images[name][0]
         x, y, w, h = take("iiii")
         offset, stride = take("%dq" % n), take("%dq" % n)
-        values = np.frombuffer(data[at:], "<f4")
-        for c in range(n):
-            images[name][1][y:y + h, x:x + w, c] = values[offset[c]:][:stride[c] * (w * h - 1) + 1:stride[c]].reshape(h, w)
-        updates += y + h == images[name][1].shape[0]
-for name, (names, pixels) in images.items():
-    print(name, *names, "whole" if np.isfinite(pixels).all() else "with holes", updates)
-    np.save("shown.npy", pixels[:, :, :3])
+        values = array.array("f", data[at:])
+        _, width, pixels = images[name]
+        for i in range(w * h):
+            for c in range(n):
+                pixels[((y + i // w) * width + x + i % w) * n + c] = values[offset[c] + i * stride[c]]
+        updates += (y + h) * width * n == len(pixels)
+for name, (names, width, pixels) in images.items():
+    n = len(names)
+    print(name, *names, "with holes" if any(v != v for v in pixels) else "whole", updates)
+    rows = [[pixels[(y * width + x) * n + c] for x in range(width) for c in range(3)] for y in range(len(pixels) // n // width)]
+    with open("shown.pfm", "wb") as file: # PFM has its rows from the bottom up
+        file.write(b"PF\n%d %d\n-1.0\n" % (width, len(rows)))
+        for row in reversed(rows): file.write(struct.pack("<%df" % len(row), *row))
 END
 python3 viewer.py >seen &
 for ((k = 0; k < 100; k++)); do [[ -s port ]] && break; sleep 0.1; done
-importon render "$ROOT/scenes/furnace.xml" -D res=24 --spp 256 -q --display "127.0.0.1:$(<port)" -o picture.npy || exit 9
+importon render "$ROOT/scenes/furnace.xml" -D res=24 --spp 256 -q --display "127.0.0.1:$(<port)" -o picture.pfm || exit 9
 wait
 cat seen
-python3 -c 'import numpy as np; print(np.array_equal(np.load("shown.npy"), np.load("picture.npy")))'
+cmp <(tail -c 6912 shown.pfm) <(tail -c 6912 picture.pfm) && echo same
 # Nobody there, and no address.
 importon render "$ROOT/scenes/furnace.xml" -D res=8 --display "127.0.0.1:$(<port)" -o no.exr 2>&1 | sed 's/:[0-9]*:/:PORT:/'
 importon render "$ROOT/scenes/furnace.xml" -D res=8 --display tev -o no.exr
