@@ -62,10 +62,11 @@ function decode_planes(text, scale) {
 }
 
 /* A layer is what the viewer shows: one or three planes, their errors, and how to read
- * them. `signed`: blue below 0, red above. */
+ * them. `signed`: blue below 0, red above. `luminance`: light, seen as it is; other single
+ * numbers (a depth) are seen in false colour. */
 class Layer {
     constructor(name, width, height, planes, errors, options = {}) {
-        Object.assign(this, {name, width, height, planes, errors, signed: false, unit: "", view: 0}, options);
+        Object.assign(this, {name, width, height, planes, errors, signed: false, luminance: true, unit: "", view: 0}, options);
         this.count = planes.length;
     }
     at(c, x, y) { return this.planes[c][y * this.width + x]; }
@@ -95,14 +96,17 @@ function layers_of(item) {
         groups.get(key).push(c);
     });
     const plane = (all, c) => all.subarray(c * n, (c + 1) * n);
-    const order = (c) => "RGBXYZ".indexOf(item.channels[c].slice(item.channels[c].lastIndexOf(".") + 1));
+    const last = (c) => item.channels[c].slice(item.channels[c].lastIndexOf(".") + 1);
     for (const [key, members] of groups) {
-        const sets = members.length === 3 ? [[...members].sort((a, b) => order(a) - order(b))] : members.map((c) => [c]);
+        const three = ["RGB", "XYZ"].map((names) => [...names].map((name) => members.find((c) => last(c) === name)))
+            .find((set) => set.every((c) => c !== undefined)) || [];
+        const sets = [...(three.length ? [three] : []), ...members.filter((c) => !three.includes(c)).map((c) => [c])];
         for (const set of sets) {
-            const own = set.length === 3 ? key : groups.size === 1 && members.length === 1 ? "" : item.channels[set[0]];
+            const own = set.length === 3 ? key : item.channels.length === 1 ? "" : item.channels[set[0]];
             layers.push(new Layer([item.name, own].filter(Boolean).join(" · "), item.width, item.height,
                 set.map((c) => plane(mean, c)), se ? set.map((c) => plane(se, c)) : null,
-                {signed: item.kind === "derivative", unit: item.unit || "", view: item.view || 0, role: item.role || ""}));
+                {signed: item.kind === "derivative", unit: item.unit || "", view: item.view || 0, role: key ? "" : item.role || "",
+                 luminance: set.length === 3 || last(set[0]) === "Y"}));
         }
     }
     return layers;

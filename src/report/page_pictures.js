@@ -20,7 +20,7 @@ function picture_section(layers) {
     const beside_box = make("input", {type: "checkbox", change: () => { state.beside = beside_box.checked; rebuild(); }});
 
     const look_of = (layer) => ({
-        mode: layer.signed ? "signed" : state.false_colour ? "false" : "colour",
+        mode: layer.signed ? "signed" : state.false_colour || !layer.luminance ? "false" : "colour",
         gain: 2 ** state.gain, range: layer.range(),
     });
     const shown = () => (state.beside ? of_view().slice(0, 4) : [of_view()[state.current]]);
