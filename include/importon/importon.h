@@ -831,6 +831,47 @@ IMP_API IMP_MUST_CHECK enum imp_status
 imp_problem_fit_variable(const imp_problem *problem, size_t i,
                          struct imp_fit_variable *variable);
 
+/* ---- Steps of an optimiser ------------------------------------------------------- */
+
+enum imp_rule {
+    IMP_RULE_ADAM = 0, /**< Kingma and Ba 2015, Algorithm 1 */
+    IMP_RULE_SGD       /**< gradient descent with momentum */
+};
+
+struct imp_optimizer_rule {
+    size_t size;
+    enum imp_rule kind;
+    double learning_rate; /**< > 0, in the unit of x (Adam) or x/gradient (SGD) */
+    double beta1, beta2;  /**< Adam: decay of the moments, in [0, 1) */
+    double epsilon;       /**< Adam: > 0, in the unit of the gradient */
+    double momentum;      /**< SGD: in [0, 1) */
+};
+#define IMP_OPTIMIZER_RULE_INIT                                                          \
+    {                                                                                    \
+        sizeof(struct imp_optimizer_rule), IMP_RULE_ADAM, 0.05, 0.9, 0.999, 1e-8, 0      \
+    }
+
+/** Length of the state of imp_optimizer_step for n numbers. */
+#define IMP_OPTIMIZER_STATE(n) (1 + 2 * (n))
+
+/**
+ * One step of a plain optimiser, for loops of a host's own: x [n] moves against gradient
+ * [n], and is then put inside its bounds. imp_fit searches better: it knows the errors of
+ * gradients, chooses its pace by them, and ends with intervals.
+ * @param rule  NULL for the defaults.
+ * @param lo    [n]; NULL: no lower bounds.
+ * @param hi    [n]; NULL: no upper bounds.
+ * @param[in,out] state [IMP_OPTIMIZER_STATE(n)], of the caller: all zeros before the first
+ *              step. state[0] is the number of steps taken.
+ * @param[in,out] x     [n].
+ * @return IMP_OK; IMP_E_ARG (message: imp_last_error(NULL)) for a number of the rule
+ *         outside its range or a gradient that is not finite: nothing is changed.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_optimizer_step(const struct imp_optimizer_rule *rule, size_t n,
+                   const double *gradient, const double *lo, const double *hi,
+                   double *state, double *x);
+
 /* ---- Checking ------------------------------------------------------------------ */
 
 /** One line of a gradient check: a method, a parameter, two numbers that must agree. */

@@ -163,6 +163,7 @@ NOT_OK = {
 NULLABLE = {"options", "run", "stats", "id", "objective", "gradient_se", "primal", "normals", "uvs",
             "axis", "hessian", "taps", "tap_bars", "tap_dots", "power", "bundle", "exit", "targets",
             "error", "order", "param", "element", "memory",
+            "imp_optimizer_step.rule", "imp_optimizer_step.lo", "imp_optimizer_step.hi",
             "imp_context_set_team.team", "imp_context_set_parts.parts",
             "imp_scene_begin.name", "imp_scene_begin.tag", "imp_scene_ref.name", "imp_scene_load_string.name",
             "imp_bend_load_string.name", "imp_problem_variable.lo", "imp_problem_variable.hi",
