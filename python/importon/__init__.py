@@ -3,8 +3,9 @@
 
 A scene is loaded (`load_file`, `load_string`, `load_dict`), its parameters are seen and set
 (`traverse`), pictures and derivatives are made from it (`render`, `render_forward`,
-`render_backward`, `jacobian`, `loss`), and its parameters are fitted to pictures (`fit`).
-Every number has its standard error. Names are Mitsuba 3's where both have the thing.
+`render_backward`, `jacobian`, `functional`, `loss`), and its parameters are fitted to pictures
+(`fit`). Every number has its standard error. `part` and `merge` cut a run into parts for many
+machines. Names are Mitsuba 3's where both have the thing.
 
 `importon.torch` and `importon.jax` put pictures and losses into those frameworks,
 `importon.bend` traces rays in graded indices, `importon.elements` solves by finite elements.
@@ -23,16 +24,19 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from ._c import VERSION as __version__
+from ._check import Check, CheckRow, Comparison, SelfTestRow, check, compare, selftest
 from ._dictionary import cornell_box, load_dict
 from ._fit import Fit, FitVariable, fit
+from ._gradient import Estimate, Jacobian, Loss, functional, jacobian, loss, render_backward, render_forward
 from ._library import (ArgumentError, BiasError, Cancelled, Error, FileError, ImportonWarning, NumericError, Part,
                        OutOfMemoryError, ParameterError, PathsError, Progress, SceneError, UnsupportedError,
                        library_path, set_threads, threads)
 from ._params import Gradient, ParameterInfo, SceneParameters, Values, traverse
-from ._picture import Picture, read, write
+from ._parts import PartsInfo, join_parts, merge, part, parts_info, team
+from ._picture import DroppedWalk, Picture, project, read, write
 from ._progress import set_progress
-from ._render import (Check, CheckRow, Comparison, Jacobian, Loss, check, compare, jacobian, loss, render,
-                      render_backward, render_forward)
+from ._render import render, walk
+from ._report import report
 from ._scene import Scene, Sensor, load_file, load_string, set_variant, variant
 from ._transform import ScalarTransform4f, Transform4f
 
@@ -41,15 +45,15 @@ if TYPE_CHECKING:
     from .elements import guide
 
 __all__ = [
-    "ArgumentError", "BiasError", "Cancelled", "Check", "CheckRow", "Color3f", "Comparison", "Error",
-    "FileError", "Fit", "FitVariable", "Gradient", "ImportonWarning", "Jacobian", "Loss", "NumericError",
-    "OutOfMemoryError", "Part", "ParameterError", "ParameterInfo", "PathsError", "Picture", "Progress",
-    "ScalarTransform4f", "Scene", "SceneError", "SceneParameters", "Sensor", "Transform4f", "UnsupportedError",
-    "Values", "__version__", "ad", "bend", "check", "compare", "cornell_box", "elements", "fit", "guide",
-    "jacobian",
-    "library_path", "load_dict", "load_file", "load_string", "loss", "read", "render",
-    "render_backward", "render_forward", "set_progress", "set_threads", "set_variant", "threads",
-    "traverse", "variant", "write",
+    "ArgumentError", "BiasError", "Cancelled", "Check", "CheckRow", "Color3f", "Comparison", "DroppedWalk", "Error",
+    "Estimate", "FileError", "Fit", "FitVariable", "Gradient", "ImportonWarning", "Jacobian", "Loss",
+    "NumericError", "OutOfMemoryError", "ParameterError", "ParameterInfo", "Part", "PartsInfo", "PathsError",
+    "Picture", "Progress", "ScalarTransform4f", "Scene", "SceneError", "SceneParameters", "SelfTestRow", "Sensor",
+    "Transform4f", "UnsupportedError", "Values", "__version__", "ad", "bend", "check", "compare", "cornell_box",
+    "elements", "fit", "functional", "guide", "jacobian", "join_parts", "library_path", "load_dict", "load_file",
+    "load_string", "loss", "merge", "part", "parts_info", "project", "read", "render", "render_backward",
+    "render_forward", "report", "selftest", "set_progress", "set_threads", "set_variant", "team", "threads",
+    "traverse", "variant", "walk", "write",
 ]
 
 for _name in __all__:  # errors and objects are known by the name that users import
@@ -60,7 +64,17 @@ del _name, _object
 
 
 def Color3f(*values: Any) -> Any:
-    """Three numbers, as Mitsuba's type of this name: an array [3].
+    """Three numbers, as Mitsuba's type of this name.
+
+    Parameters
+    ----------
+    *values : float or array
+        Three numbers, one for all, or an array of them.
+
+    Returns
+    -------
+    ndarray
+        [3]
 
     Examples
     --------

@@ -6,7 +6,7 @@ from typing import Any, Optional
 
 import numpy as np
 
-from ._library import ArgumentError
+from ._library import ArgumentError, lib
 
 _CPU = (1, 3, 11)  # DLPack device types whose memory a CPU reads: kDLCPU, CUDA's pinned, ROCm's
 
@@ -78,6 +78,13 @@ def copy_doubles(address: Optional[int], shape: tuple[int, ...]) -> Any:
     if not address:
         return None
     return np.array(np.asarray(_Memory(None, address, shape, "<f8")))
+
+
+def copy_points(context: Any, points: Any, n: int) -> Any:
+    """Points [n][4] that the library has made, which are freed."""
+    made = copy_doubles(points.value, (n, 4))
+    lib.imp_free(context.pointer, points)
+    return np.zeros((0, 4)) if made is None else made
 
 
 def address(array: Any) -> Any:

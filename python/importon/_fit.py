@@ -12,7 +12,7 @@ from . import _c
 from ._array import copy_doubles
 from ._library import choice, decode, failure, integer, lib, make, run, text
 from ._params import Values
-from ._render import Problem, _run
+from ._problem import Problem, run_options
 from ._scene import Scene
 
 
@@ -119,7 +119,8 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
         resume: bool = False, spp: int = 0, seed: int = 0, sensor: Any = 0, loss: str = "l2", epsilon: float = 0,
         weights: Any = None, noise_se: Any = None, tikhonov: Optional[Mapping[str, float]] = None,
         stay: Optional[Mapping[str, float]] = None, smooth: Optional[Mapping[str, float]] = None,
-        time_limit: float = 0, drop_budget: float = 0, guide: Any = None, progress: Any = None) -> Fit:
+        time_limit: float = 0, drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified",
+        wavelength_set: int = 0, progress: Any = None) -> Fit:
     """Fit parameters to target pictures; the scene ends at the best estimate.
 
     Parameters
@@ -143,7 +144,7 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
         Rewritten every few seconds.
     resume : bool
         Continue from the checkpoint, if it is there.
-    spp, seed, sensor, loss, epsilon, weights, tikhonov, stay, smooth, drop_budget, guide
+    spp, seed, sensor, loss, epsilon, weights, tikhonov, stay, smooth, drop_budget, guide, wavelengths, wavelength_set
         As `loss`'s; `spp` is that of each iteration.
     noise_se : array, optional
         [height][width][channels]: one standard error of the target's noise; default: that
@@ -177,7 +178,8 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
     True
     """
     with Problem(scene, params) as p:
-        options = _run(p.scene, seed=seed, spp=spp, time_limit=time_limit, drop_budget=drop_budget, guide=guide)
+        options = run_options(p.scene, seed=seed, spp=spp, time_limit=time_limit, drop_budget=drop_budget, guide=guide,
+                              wavelengths=wavelengths, wavelength_set=wavelength_set)
         p.add_targets(target, sensor=sensor, weights=weights, loss=loss, epsilon=epsilon, noise_se=noise_se)
         p.add_regularisers(tikhonov, stay, smooth)
         path = text(checkpoint, "checkpoint") if checkpoint is not None else None

@@ -16,7 +16,8 @@ from ._array import address, numbers
 from ._library import ArgumentError, lib
 from ._params import find
 from ._picture import Picture
-from ._render import Problem, _film, _run, _scene
+from ._problem import Problem, check_scene, run_options
+from ._render import make_picture
 
 _keys = itertools.count(1)
 _known: weakref.WeakValueDictionary[int, Any] = weakref.WeakValueDictionary()
@@ -33,7 +34,7 @@ class Function:
 
     def __init__(self, scene: Any, names: Iterable[str], sensor: Any, spp: int, spp_grad: int, drop_budget: float,
                  guide: Any, target: Any = None, **loss: Any) -> None:
-        self.scene = _scene(scene)
+        self.scene = check_scene(scene)
         self.infos = sorted({find(self.scene, n) for n in names}, key=lambda i: i.position)
         if not self.infos:
             raise ArgumentError("values: no parameter is named")
@@ -62,14 +63,14 @@ class Function:
         """[height][width][channels]"""
         with self._problem() as p:
             self._set(p, x)
-            options = _run(self.scene, sensor=self.sensor, seed=int(seed), spp=self.spp, **self.rest)
-            picture = _film(self.scene, None, options, False, lambda out: (
+            options = run_options(self.scene, sensor=self.sensor, seed=int(seed), spp=self.spp, **self.rest)
+            picture = make_picture(self.scene, None, options, False, lambda out: (
                 lib.imp_render, self.scene.pointer, ctypes.byref(options), out))
         if picture.channels == (("R", "G", "B") if self.shape[2] == 3 else ("Y",)):
             return picture
         # A film of another pixel format: derivatives are of the scene's channels.
         with Problem(self.scene, []) as p:
-            return _film(self.scene, None, options, False, lambda out: (
+            return make_picture(self.scene, None, options, False, lambda out: (
                 lib.imp_problem_jacobian, p.pointer, ctypes.byref(options), out, None))
 
     def backward(self, x: Any, image: Any, seed: int) -> Any:
@@ -77,7 +78,7 @@ class Function:
         image = numbers(image, "gradient", np.float32, shape=self.shape)
         with self._problem() as p:
             self._set(p, x)
-            options = _run(self.scene, sensor=self.sensor, seed=int(seed), spp=self.spp_grad, **self.rest)
+            options = run_options(self.scene, sensor=self.sensor, seed=int(seed), spp=self.spp_grad, **self.rest)
             g, se = p.gradient()
             p.run(options, False, lib.imp_problem_reverse, p.pointer, address(image), ctypes.byref(options), address(g),
                   address(se))
@@ -88,8 +89,8 @@ class Function:
         dot = numbers(x_dot, "tangent", shape=(self.n,))
         with self._problem() as p:
             self._set(p, x)
-            options = _run(self.scene, sensor=self.sensor, seed=int(seed), spp=self.spp_grad, **self.rest)
-            return _film(self.scene, None, options, False, lambda out: (
+            options = run_options(self.scene, sensor=self.sensor, seed=int(seed), spp=self.spp_grad, **self.rest)
+            return make_picture(self.scene, None, options, False, lambda out: (
                 lib.imp_problem_forward, p.pointer, address(dot), ctypes.byref(options), out), True)
 
     def loss(self, x: Any, seed: int, gradient: bool = True) -> tuple[float, Any]:
@@ -97,7 +98,7 @@ class Function:
         with self._problem() as p:
             p.add_targets(self.target, sensor=self.sensor, **self.loss_options)
             x = numbers(x, "values", shape=(self.n,))
-            options = _run(self.scene, seed=int(seed), spp=self.spp, **self.rest)
+            options = run_options(self.scene, seed=int(seed), spp=self.spp, **self.rest)
             value, (g, se) = _c.imp_estimate(), p.gradient()
             p.run(options, False, lib.imp_problem_objective, p.pointer, address(x), ctypes.byref(options),
                   ctypes.byref(value), address(g) if gradient else None, address(se) if gradient else None)
@@ -116,6 +117,8 @@ class RayFunction:
     """Where rays end, as a function of field, origins and directions."""
 
     def __init__(self, field: Any, options: dict[str, Any]) -> None:
+        if options.get("taps"):
+            raise ArgumentError("taps are not among what this function returns: importon.bend.trace has them")
         self.field, self.options = field, options
         self.n = len(field.theta)
         self.key = next(_keys)
@@ -129,4 +132,5 @@ class RayFunction:
     def backward(self, theta: Any, origins: Any, directions: Any, x_bar: Any, v_bar: Any, path_bar: Any) -> Any:
         from . import bend
         exits = self.trace(theta, origins, directions)
-        return bend.adjoint(self.field, origins, directions, exits, x_bar, v_bar, path_bar, progress=False, **self.options)
+        g = bend.adjoint(self.field, origins, directions, exits, x_bar, v_bar, path_bar, progress=False, **self.options)
+        return g.theta, g.origins, g.directions

@@ -57,7 +57,7 @@ def scene(s: Any) -> str:
 
 def parameters(p: Any) -> str:
     return _table(("name", "value", "bounds", "unit", "gradient"), [
-        (i.name, p.value_text(i.name), "[%g, %g]" % (i.lo, i.hi), i.unit,
+        (i.name, p._value_text(i.name), "[%g, %g]" % (i.lo, i.hi), i.unit,
          ("yes" if i.differentiable else "no") + (", moves edges" if i.discontinuous else "")
          + (": " + i.why if i.why else "")) for i in map(p.info, p)])
 
@@ -114,6 +114,10 @@ def fit(f: Any) -> str:
 
 
 def check(c: Any) -> str:
-    return _table(("method", "parameter", "value", "reference", "+-", "error", "verdict"), [
-        (r.method, r.param, "%.6g" % r.value, "%.6g" % r.reference, "%.2g" % r.se, "%.2g" % r.error, r.verdict)
-        for r in c], "gradient check: " + ("ok" if c.ok else "%d rows FAIL" % len(c.failed)))
+    rows = list(c)
+    selftest = bool(rows) and hasattr(rows[0], "contract")
+    names = ("object", "kind", "contract") if selftest else ("method", "param")
+    return _table([*names, "value", "reference", "+-", "error", "verdict"], [
+        [getattr(r, n) for n in names] + ["%.6g" % r.value, "%.6g" % r.reference, "%.2g" % r.se, "%.2g" % r.error, r.verdict]
+        for r in rows], "%s: %s" % ("self-test" if selftest else "check",
+                                    "ok" if c.ok else "%d rows FAIL" % len(c.failed)))

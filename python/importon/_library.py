@@ -8,6 +8,7 @@ progress callback that every such call has, and ends at its next tile.
 from __future__ import annotations
 
 import _thread
+import contextlib
 import ctypes
 import os
 import re
@@ -15,7 +16,7 @@ import sys
 import threading
 import warnings
 import weakref
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple, Optional
 
 from . import _c
@@ -182,7 +183,17 @@ lib = _load()
 
 
 def library_path() -> str:
-    """The file of the C library that is in use."""
+    """The file of the C library that is in use.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> "libimporton" in importon.library_path()
+    True
+    """
     return str(lib._name)
 
 
@@ -335,9 +346,26 @@ _context: Optional[Context] = None
 _context_lock = threading.Lock()
 
 
+_own = threading.local()
+
+
+@contextlib.contextmanager
+def own_context() -> Iterator[Context]:
+    """In this block and thread, new objects are made from a context of their own."""
+    before, made = getattr(_own, "context", None), Context(threads())
+    _own.context = made
+    try:
+        yield made
+    finally:
+        _own.context = before
+
+
 def context() -> Context:
     """The context that new objects are made from."""
     global _context
+    own: Optional[Context] = getattr(_own, "context", None)
+    if own is not None:
+        return own
     with _context_lock:
         if _context is None:
             _context = Context()
@@ -369,6 +397,10 @@ def set_threads(threads: int) -> None:
 
 def threads() -> int:
     """Number of threads that scenes loaded now use.
+
+    Returns
+    -------
+    int
 
     Examples
     --------

@@ -98,6 +98,7 @@ class SceneParameters(MutableMapping):  # type: ignore[type-arg]
 
     @property
     def scene(self) -> Scene:
+        """The scene whose parameters they are."""
         return self._scene
 
     def _find(self, name: Any) -> ParameterInfo:
@@ -111,6 +112,19 @@ class SceneParameters(MutableMapping):  # type: ignore[type-arg]
     def info(self, name: str) -> ParameterInfo:
         """Shape, bounds, unit and flags of a parameter.
 
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        ParameterInfo
+
+        Raises
+        ------
+        ParameterError
+            There is no such parameter.
+
         Examples
         --------
         >>> params = importon.traverse(importon.load_dict(importon.cornell_box(res=8)))
@@ -121,7 +135,24 @@ class SceneParameters(MutableMapping):  # type: ignore[type-arg]
         return self._find(name)
 
     def flags(self, name: str) -> set[str]:
-        """The flags of a parameter, as words: "differentiable", "discontinuous", ..."""
+        """The flags of a parameter, as words.
+
+        Parameters
+        ----------
+        name : str
+
+        Returns
+        -------
+        set of str
+            Of "differentiable", "discontinuous" (it moves edges of the picture), "integer" and
+            "color".
+
+        Examples
+        --------
+        >>> params = importon.traverse(importon.load_dict(importon.cornell_box(res=8)))
+        >>> sorted(params.flags("red.reflectance.value"))
+        ['color', 'differentiable']
+        """
         info = self._find(name)
         return {f for f in ("differentiable", "discontinuous", "integer", "color") if getattr(info, f)}
 
@@ -231,11 +262,21 @@ class SceneParameters(MutableMapping):  # type: ignore[type-arg]
         ----------
         values : mapping, optional
             Names and values; an optimiser of `importon.ad` is one.
+        **more
+            Further names and values.
 
         Returns
         -------
         list of (str, set of str)
             Objects that were changed, and their parameters, as in Mitsuba.
+
+        Examples
+        --------
+        >>> params = importon.traverse(importon.load_dict(importon.cornell_box(res=8)))
+        >>> red = params["red.reflectance.value"]
+        >>> red[2] = 0.5
+        >>> params.update()
+        [('red', {'red.reflectance.value'})]
         """
         changed: dict[str, set[str]] = {}
         for name, arrays in list(self._handed.items()):
@@ -253,13 +294,13 @@ class SceneParameters(MutableMapping):  # type: ignore[type-arg]
 
     def __repr__(self) -> str:
         rows = [("name", "value", "bounds", "unit", "gradient")]
-        rows += [(i.name, self.value_text(i.name), "[%g, %g]" % (i.lo, i.hi), i.unit,
+        rows += [(i.name, self._value_text(i.name), "[%g, %g]" % (i.lo, i.hi), i.unit,
                   ("yes" if i.differentiable else "no") + (", moves edges" if i.discontinuous else "")
                   + (": " + i.why if i.why else "")) for i in self._kept.values()]
         widths = [max(len(r[c]) for r in rows) for c in range(4)]
         return "\n".join("  ".join([*(t.ljust(w) for t, w in zip(r, widths)), r[4]]) for r in rows)
 
-    def value_text(self, name: str) -> str:
+    def _value_text(self, name: str) -> str:
         """The value in a table: all of a few numbers, or the extremes of many."""
         v = np.atleast_1d(np.asarray(self[name]))
         if v.size > 4:

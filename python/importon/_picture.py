@@ -4,14 +4,26 @@ from __future__ import annotations
 
 import ctypes
 import os
-from collections.abc import Sequence
-from typing import Any, Optional
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, Optional
 
 import numpy as np
 
 from . import _c
 from ._array import numbers, view
-from ._library import ArgumentError, Context, Handle, context, lib, make, text, warn_said, word
+from ._library import ArgumentError, Context, Handle, choice, context, decode, integer, lib, make, text, warn_said, word
+
+
+class DroppedWalk(NamedTuple):
+    """Where a walk was dropped: `importon.walk` with the same scene, sensor, seed, pixel and
+    sample is that walk, vertex by vertex."""
+
+    seed: int
+    sample: int
+    x: int
+    y: int
+    sensor: int
+    cause: str
 
 
 class Picture(np.ndarray):  # type: ignore[type-arg,unused-ignore]
@@ -31,6 +43,8 @@ class Picture(np.ndarray):  # type: ignore[type-arg,unused-ignore]
         Samples per pixel.
     dropped : dict
         How many walks were dropped (their value counts as 0), by cause.
+    dropped_walks : tuple of DroppedWalk
+        The first of them, at most eight.
     signed : bool
         A derivative: shown in blue and red.
 
@@ -48,6 +62,7 @@ class Picture(np.ndarray):  # type: ignore[type-arg,unused-ignore]
     channels: tuple[str, ...]
     spp: int
     dropped: dict[str, int]
+    dropped_walks: tuple[DroppedWalk, ...]
     signed: bool
     _film: Optional[Handle]
 
@@ -56,6 +71,7 @@ class Picture(np.ndarray):  # type: ignore[type-arg,unused-ignore]
         self.channels = ()
         self.spp = getattr(source, "spp", 0)
         self.dropped = getattr(source, "dropped", {})
+        self.dropped_walks = getattr(source, "dropped_walks", ())
         self.signed = getattr(source, "signed", False)
         self._film = None
 
@@ -85,12 +101,47 @@ class Picture(np.ndarray):  # type: ignore[type-arg,unused-ignore]
         return part
 
     def __reduce__(self) -> Any:
-        state = (self.se, self.channels, self.spp, self.dropped, self.signed)
+        state = (self.se, self.channels, self.spp, self.dropped, self.dropped_walks, self.signed)
         return _rebuild, (np.array(self.view(np.ndarray)), state)
 
     def write(self, path: Any, **options: Any) -> None:
-        """`importon.write` of this picture."""
+        """Write this picture.
+
+        Parameters
+        ----------
+        path : str or PathLike
+        **options
+            As `importon.write`'s.
+
+        Examples
+        --------
+        >>> importon.render(importon.load_dict(importon.cornell_box(res=8)), spp=4).write("box.exr")
+        >>> importon.read("box.exr").se.shape
+        (8, 8, 3)
+        """
         write(path, self, **options)
+
+    def attribute(self, key: str) -> Optional[str]:
+        """A text that belongs to the picture, such as how it was made.
+
+        Parameters
+        ----------
+        key : str
+            As given to `importon.write`, or read from an EXR file.
+
+        Returns
+        -------
+        str or None
+            None: there is none.
+
+        Examples
+        --------
+        >>> importon.write("grey.exr", np.full((2, 3, 3), 0.5), attributes={"comment": "grey"})
+        >>> importon.read("grey.exr").attribute("comment")
+        'grey'
+        """
+        found = None if self._film is None else lib.imp_film_get_text(self._film.pointer, text(key, "key"))
+        return None if found is None else decode(found)
 
     def _repr_png_(self) -> Optional[bytes]:
         if self.ndim not in (2, 3) or not self.size:
@@ -105,7 +156,7 @@ class Picture(np.ndarray):  # type: ignore[type-arg,unused-ignore]
 
 def _rebuild(array: Any, state: Any) -> Picture:
     made: Picture = array.view(Picture)
-    made.se, made.channels, made.spp, made.dropped, made.signed = state
+    made.se, made.channels, made.spp, made.dropped, made.dropped_walks, made.signed = state
     return made
 
 
@@ -122,6 +173,8 @@ def from_film(pointer: Optional[int], signed: bool = False) -> Picture:
     made.spp = info.spp
     counted = {word("imp_drop", c): int(n) for c, n in enumerate(info.dropped_by_cause) if n}
     made.dropped = counted or ({"unknown": int(info.dropped)} if info.dropped else {})
+    made.dropped_walks = tuple(DroppedWalk(k.seed, k.sample, k.x, k.y, k.sensor, word("imp_drop", k.cause))
+                               for k in info.drop_keys[:info.n_drop_keys])
     made.signed = signed
     made._film = film
     return made
@@ -190,7 +243,8 @@ def read(path: Any) -> Picture:
 
 
 def write(path: Any, picture: Any, *, half: bool = False, standard_error: bool = True,
-          exposure: float = 0, diverging: Optional[bool] = None, range: float = 0) -> None:
+          exposure: float = 0, diverging: Optional[bool] = None, range: float = 0,
+          attributes: Optional[Mapping[str, str]] = None) -> None:
     """Write a picture by extension: .exr, .pfm, .hdr, .png (sRGB), .npy.
 
     The file appears whole or not at all, in the place of an older one.
@@ -210,6 +264,8 @@ def write(path: Any, picture: Any, *, half: bool = False, standard_error: bool =
         Of a signed picture: blue, white, red (PNG). None: of derivatives.
     range : float
         The value drawn in full red; 0: the 99.5 percentile.
+    attributes : mapping of str to str, optional
+        Texts that are kept in the file (EXR), such as how the picture was made.
 
     Raises
     ------
@@ -223,10 +279,52 @@ def write(path: Any, picture: Any, *, half: bool = False, standard_error: bool =
     >>> importon.write("grey.png", np.full((2, 3, 3), 0.5))
     """
     film = to_film(picture)
+    for key, value in dict(attributes or {}).items():
+        context().check(lib.imp_film_set_text(film.pointer, text(key, "attributes"), text(value, "attributes")))
     signed = getattr(picture, "signed", False) if diverging is None else diverging
     options = make(_c.imp_write_options, half=bool(half), exposure=float(exposure), diverging=bool(signed),
                    range=float(range), standard_error=bool(standard_error and getattr(picture, "se", None) is not None))
     context().check(lib.imp_film_write(film.pointer, text(path, "path"), ctypes.byref(options)))
+
+
+def project(map: Any, source: str = "latlong", target: str = "equal_area", *, width: int = 0,
+            height: int = 0) -> Picture:
+    """A map of the sky in another projection or size, with its light kept.
+
+    Parameters
+    ----------
+    map : Picture, array or path
+        (height, width, channels) of all directions.
+    source, target : str
+        "latlong": rows at equal angles from up to down, the first and the last at the poles;
+        "equal_area": rows at equal cosines, all texels of one solid angle.
+    width, height : int
+        Of the result; 0: the map's.
+
+    Returns
+    -------
+    Picture
+        Its light as an `envmap` interpolates it, the integral over all directions, is the
+        map's.
+
+    Raises
+    ------
+    ArgumentError
+        A map below 2 x 2, or no such projection.
+
+    Examples
+    --------
+    >>> sky = importon.project(np.full((8, 16, 3), 0.5), "latlong", "equal_area", width=8, height=4)
+    >>> sky.shape, bool(abs(sky - 0.5).max() < 1e-6)
+    ((4, 8, 3), True)
+    """
+    if isinstance(map, (str, bytes)) or hasattr(map, "__fspath__"):
+        map = read(map)
+    film, shape, out = to_film(map, name="map"), np.shape(map), ctypes.c_void_p()
+    context().check(lib.imp_film_project(
+        film.pointer, choice("imp_sky_projection", source, "source"), choice("imp_sky_projection", target, "target"),
+        integer(width, "width") or shape[1], integer(height, "height") or shape[0], ctypes.byref(out)))
+    return from_film(out.value)
 
 
 def png(picture: Any) -> bytes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple, Optional
 
 from . import _c
@@ -42,6 +42,10 @@ def set_variant(*names: str) -> None:
 
 def variant() -> str:
     """The colour mode of scenes loaded now.
+
+    Returns
+    -------
+    str
 
     Examples
     --------
@@ -118,7 +122,28 @@ class Scene:
                       s.filter_radius, decode(s.file_format))
 
     def sensor_index(self, sensor: Any) -> int:
-        """The number of a sensor, given by number or name."""
+        """The number of a sensor.
+
+        Parameters
+        ----------
+        sensor : int or str
+            Its number or name.
+
+        Returns
+        -------
+        int
+
+        Raises
+        ------
+        ArgumentError
+            There is no such sensor; the message has those that there are.
+
+        Examples
+        --------
+        >>> scene = importon.load_dict(importon.cornell_box(res=8))
+        >>> scene.sensor_index(scene.sensors[0].name)
+        0
+        """
         if isinstance(sensor, str):
             for at, s in enumerate(self.sensors):
                 if s.name == sensor:
@@ -140,7 +165,17 @@ class Scene:
         return self._handle.pointer
 
     def close(self) -> None:
-        """Free the scene. Using it afterwards is an ArgumentError."""
+        """Free the scene; pictures made from it stay. Using it afterwards is an ArgumentError.
+
+        Examples
+        --------
+        >>> scene = importon.load_dict(importon.cornell_box(res=8))
+        >>> scene.close()
+        >>> importon.render(scene)
+        Traceback (most recent call last):
+        ...
+        importon.ArgumentError: the scene is closed
+        """
         not_inside()
         with self.lock:
             self._handle.close()
@@ -165,7 +200,8 @@ class Scene:
         return scene(self)
 
 
-def _load_options(mode: Optional[str], search: Sequence[Any], defines: dict[str, Any]) -> tuple[Any, Any]:
+def _load_options(mode: Optional[str], search: Sequence[Any], defines: dict[str, Any],
+                  weights: Optional[str] = None) -> tuple[Any, Any]:
     """imp_load_options, and what it points to."""
     if isinstance(search, (str, bytes)) or hasattr(search, "__fspath__"):
         search = [search]
@@ -175,7 +211,8 @@ def _load_options(mode: Optional[str], search: Sequence[Any], defines: dict[str,
     paths = (ctypes.c_char_p * (len(folders) + 1))(*folders)
     options = make(_c.imp_load_options, mode=choice("imp_color_mode", mode or _mode, "mode"),
                    defines=ctypes.addressof(names), n_defines=len(pairs),
-                   search=ctypes.addressof(paths), n_search=len(folders))
+                   search=ctypes.addressof(paths), n_search=len(folders),
+                   weights=None if weights is None else text(weights, "weights"))
     return options, (names, paths)
 
 
@@ -191,10 +228,10 @@ def _define(name: str, value: Any) -> str:
 
 
 def _load(function: Any, arguments: tuple[Any, ...], name: str, mode: Optional[str], search: Sequence[Any],
-          defines: dict[str, Any]) -> Scene:
+          weights: Any, defines: dict[str, Any]) -> Scene:
     not_inside()
     ctx = context()
-    options, kept = _load_options(mode, search, defines)
+    options, kept = _load_options(mode, search, defines, _weights(weights))
     out = ctypes.c_void_p()
     status = function(ctx.pointer, *arguments, ctypes.byref(options), ctypes.byref(out))
     del kept
@@ -205,17 +242,31 @@ def _load(function: Any, arguments: tuple[Any, ...], name: str, mode: Optional[s
     return Scene(Handle(out.value or 0, lib.imp_scene_destroy), ctx, name)
 
 
-def load_file(path: Any, *, mode: Optional[str] = None, search: Sequence[Any] = (), parallel: bool = True,
-              optimize: bool = True, **defaults: Any) -> Scene:
+def _weights(weights: Any) -> Optional[str]:
+    """Weights of densities as the scene format has them: "kernel=1, emitters=0.5"."""
+    if weights is None or isinstance(weights, str):
+        return weights
+    if not isinstance(weights, Mapping):
+        raise TypeError("weights is a %s: densities and their weights are wanted" % type(weights).__name__)
+    return ", ".join("%s=%r" % (k, float(v)) for k, v in weights.items())
+
+
+def load_file(path: Any, *, mode: Optional[str] = None, search: Sequence[Any] = (), weights: Any = None,
+              parallel: bool = True, optimize: bool = True, **defaults: Any) -> Scene:
     """Load a scene file (Mitsuba 3 XML).
 
     Parameters
     ----------
     path : str or PathLike
     mode : str, optional
-        What rays carry: "rgb", "mono", ... Default: that of `set_variant`.
+        What walks carry: "rgb", "mono", "spectral" (four wavelengths) or "single" (one).
+        Default: that of `set_variant`.
     search : sequence of path, optional
         Folders in which files that the scene names are searched for, too.
+    weights : mapping or str, optional
+        Densities that directions are drawn from, and their weights, in place of the
+        integrator's own: ``{"kernel": 1, "emitters": 0.5}`` ("kernel", "emitters",
+        "environment", "proxies", "guide", "uniform").
     parallel, optimize : bool
         Taken as Mitsuba's are; without effect.
     **defaults
@@ -242,11 +293,11 @@ def load_file(path: Any, *, mode: Optional[str] = None, search: Sequence[Any] = 
     >>> scene.sensors[0].width
     16
     """
-    return _load(lib.imp_scene_load, (text(path, "path"),), str(path), mode, search, defaults)
+    return _load(lib.imp_scene_load, (text(path, "path"),), str(path), mode, search, weights, defaults)
 
 
 def load_string(xml: str, *, name: str = "string", mode: Optional[str] = None, search: Sequence[Any] = (),
-                parallel: bool = True, optimize: bool = True, **defaults: Any) -> Scene:
+                weights: Any = None, parallel: bool = True, optimize: bool = True, **defaults: Any) -> Scene:
     """Load a scene from text, as `load_file` does from a file.
 
     Parameters
@@ -254,7 +305,7 @@ def load_string(xml: str, *, name: str = "string", mode: Optional[str] = None, s
     xml : str
     name : str
         Stands for the file in messages.
-    mode, search, parallel, optimize, **defaults
+    mode, search, weights, parallel, optimize, **defaults
         As `load_file`'s. Files are searched for in the working folder.
 
     Returns
@@ -274,4 +325,5 @@ def load_string(xml: str, *, name: str = "string", mode: Optional[str] = None, s
     importon.UnsupportedError: string:1:24: ...
     """
     data = xml.encode() if isinstance(xml, str) else bytes(xml)
-    return _load(lib.imp_scene_load_string, (data, len(data), text(name, "name")), name, mode, search, defaults)
+    return _load(lib.imp_scene_load_string, (data, len(data), text(name, "name")), name, mode, search,
+                 weights, defaults)

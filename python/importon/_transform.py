@@ -78,7 +78,14 @@ class Transform4f:
     """A transform of space: a matrix that is written by its parts.
 
     The methods may begin a transform (`Transform4f.translate(...)`) or go on with one
-    (`Transform4f().translate(...).rotate(...)`, applied from right to left, as `@` is).
+    (`Transform4f().translate(...).rotate(...)`, applied from right to left, as `@` is):
+    ``translate(v)`` moves by v [3]; ``scale(v)`` takes a number or three; ``rotate(axis, angle)``
+    turns by degrees; ``look_at(origin, target, up)`` is that of a camera.
+
+    Parameters
+    ----------
+    matrix : array, optional
+        [4][4]; None: the identity.
 
     Attributes
     ----------
@@ -106,6 +113,10 @@ class Transform4f:
 
     def inverse(self) -> Transform4f:
         """From world to local.
+
+        Returns
+        -------
+        Transform4f
 
         Examples
         --------

@@ -12,352 +12,63 @@ from typing import Any, NamedTuple, Optional
 import numpy as np
 
 from . import _c
-from ._array import address, copy_doubles, numbers, view
+from ._array import address, copy_doubles, copy_points, numbers, view
+from ._check import Check, check_rows
+from ._field import Field, _taken
 from ._library import (ArgumentError, Handle, choice, context, failure, integer, lib, make, not_inside,
-                       PROGRESS_ADDRESS, register_lock, run, text, warn_said)
-from ._render import Check, check_rows
+                       PROGRESS_ADDRESS, register_lock, run, text, warn_said, word)
+from ._rays import EXIT, Exits, Options, RayGradient, Rays, adjoint, exits_of, path, stats_of, tangent, trace
 from ._scene import _load_options
 from .elements import _struct
 
-#: One exit of a ray (`struct imp_bend_exit`): position, momentum, optical path length, ...
-EXIT = np.dtype([("x", "<f8", 3), ("v", "<f8", 3), ("path", "<f8"), ("tau", "<f8"), ("norm2", "<f8"),
-                 ("steps", "<u4"), ("surface", "<u2"), ("flags", "u1"), ("segments", "u1")])
-_COTANGENT = np.dtype([("x", "<f8", 3), ("v", "<f8", 3), ("path", "<f8")])
-assert EXIT.itemsize == ctypes.sizeof(_c.imp_bend_exit) and _COTANGENT.itemsize == ctypes.sizeof(_c.imp_bend_cotangent)
+_ARRIVAL = np.dtype([("x", "<f8", 3), ("d", "<f8", 3), ("path", "<f8"), ("weight", "<f8"), ("ray", "<u4"), ("", "<u4")])
+assert _ARRIVAL.itemsize == ctypes.sizeof(_c.imp_bend_arrival)
 
 
-def _stats(s: Any) -> dict[str, Any]:
-    return {f[0]: getattr(s, f[0]) for f in s._fields_ if f[0] != "size"}
+def _dispersion(material: Any) -> Any:
+    d, _ = _struct(_c.imp_dispersion, material, "a dispersion", {"model": "imp_dispersion_model"})
+    return d
 
 
-class Field:
-    """An index field: `theta` are its numbers.
-
-    Made by `grid`, `profile`, `radial`, `read`; a field that is given to `Bend` belongs to it.
-
-    Attributes
-    ----------
-    kind : str
-    theta : ndarray
-        [n]; assigning sets them.
-    bounds : tuple
-        Lowest and highest corner of where it is defined.
-
-    Examples
-    --------
-    >>> field = importon.bend.Field.profile("luneburg", [1, 0, 0, 0])
-    >>> field.kind, len(field.theta)
-    ('luneburg', 4)
-    >>> eta, gradient = field.eval([[0, 0, 0]])
-    >>> round(float(eta[0]), 6)
-    1.414214
-    """
-
-    def __init__(self, handle: Handle, ctx: Any, owner: Any = None) -> None:
-        self._handle, self._context, self._owner = handle, ctx, owner
-
-    @classmethod
-    def _make(cls, function: Any, *arguments: Any) -> Field:
-        not_inside()
-        ctx, out = context(), ctypes.c_void_p()
-        ctx.check(function(ctx.pointer, *arguments, ctypes.byref(out)))
-        warn_said(4)
-        return cls(Handle(out.value or 0, lib.imp_field_destroy), ctx)
-
-    @classmethod
-    def grid(cls, cells: Any, lo: Any, hi: Any, index: float = 1.0, *, interp: str = "spline", param: str = "eta",
-             single: bool = False, gladstone_dale: float = 0) -> Field:
-        """A grid with the same index everywhere.
-
-        Parameters
-        ----------
-        cells : three ints
-            Along x, y, z.
-        lo, hi : three floats
-            The box that they fill.
-        index : float
-        interp : str
-            "spline" (cubic B-spline) or "trilinear".
-        param : str
-            What the numbers are: "eta", or "eta2" for eta^2/2.
-        single : bool
-            Trace with float samples.
-        gladstone_dale : float
-            K: samples are densities rho, the index 1 + K rho; 0: samples are the index.
-
-        Examples
-        --------
-        >>> importon.bend.Field.grid([4, 4, 4], [0, 0, 0], [1, 1, 1], 1.5).theta.shape
-        (343,)
-        """
-        g, _ = _struct(_c.imp_field_grid, {"cells": cells, "lo": lo, "hi": hi, "interp": interp, "param": param,
-                                           "single": bool(single), "gladstone_dale": gladstone_dale}, "a grid",
-                       {"interp": "imp_field_interp", "param": "imp_field_param"})
-        return cls._make(lib.imp_field_grid_create, ctypes.byref(g), float(index))
-
-    @classmethod
-    def profile(cls, kind: str, params: Any, axis: Any = None) -> Field:
-        """A profile by name: "luneburg", "maxwell", "rod", "sech", ... (docs/curved-rays.md)."""
-        name = text(kind, "kind")
-        n = lib.imp_field_profile_count(name)
-        p = numbers(params, "params", shape=(n,)) if n else numbers(params, "params", ndim=1)
-        p = np.append(p, 0.0)  # of a kind that there is not, none
-        a = None if axis is None else numbers(axis, "axis", shape=(3,))
-        return cls._make(lib.imp_field_profile_create, name, address(p), address(a))
-
-    @classmethod
-    def radial(cls, index: float = 1.0, **options: Any) -> Field:
-        """A cubic spline in r^2: cylinder, centre, axis, radius, cells."""
-        r, _ = _struct(_c.imp_field_radial, options, "a radial field")
-        return cls._make(lib.imp_field_radial_create, ctypes.byref(r), float(index))
-
-    @classmethod
-    def read(cls, path: Any, **grid: Any) -> Field:
-        """Read .vol, .npy ([z][y][x]) or a profile as text; lo and hi give the box of a .npy."""
-        g, _ = _struct(_c.imp_field_grid, grid, "a grid", {"interp": "imp_field_interp", "param": "imp_field_param"})
-        return cls._make(lib.imp_field_read, text(path, "path"), ctypes.byref(g))
-
-    @property
-    def pointer(self) -> int:
-        if self._owner is not None:
-            return int(lib.imp_bend_field(self._owner.pointer))
-        return self._handle.pointer
-
-    def write(self, path: Any) -> None:
-        """Write samples (.vol, .npy), or a radial profile (.txt)."""
-        self._context.check(lib.imp_field_write(self.pointer, text(path, "path")))
-
-    @property
-    def kind(self) -> str:
-        return str(lib.imp_field_kind(self.pointer).decode())
-
-    @property
-    def theta(self) -> Any:
-        theta = np.empty(lib.imp_field_n_theta(self.pointer))
-        lib.imp_field_get_theta(self.pointer, address(theta))
-        return theta
-
-    @theta.setter
-    def theta(self, values: Any) -> None:
-        not_inside()
-        v = numbers(values, "theta", shape=(lib.imp_field_n_theta(self.pointer),))
-        self._context.check(lib.imp_field_set_theta(self.pointer, address(v)))
-
-    @property
-    def bounds(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        lo, hi = (ctypes.c_double * 3)(), (ctypes.c_double * 3)()
-        lib.imp_field_bounds(self.pointer, lo, hi)
-        return tuple(lo), tuple(hi)
-
-    def eval(self, x: Any) -> tuple[Any, Any]:
-        """Index [n] and its gradient [n][3] at points x [n][3]."""
-        points = numbers(x, "x", shape=(-1, 3))
-        eta, gradient = np.empty(len(points)), np.empty((len(points), 3))
-        for i in range(len(points)):
-            lib.imp_field_eval(self.pointer, points[i].ctypes.data, eta[i:].ctypes.data, gradient[i:].ctypes.data, None)
-        return eta, gradient
-
-    def __repr__(self) -> str:
-        return "<importon.bend.Field '%s', %d numbers>" % (self.kind, lib.imp_field_n_theta(self.pointer))
-
-
-class Exits(NamedTuple):
-    """Where rays end: positions and momenta [n][3], optical path lengths [n], `ok` [n]
-    (rays that were lost have no derivative), and how many were lost in which way."""
-
-    x: Any
-    v: Any
-    path: Any
-    ok: Any
-    stats: dict[str, Any]
-    records: Any
-
-
-_WORDS = {"scheme": "imp_bend_scheme", "way": "imp_bend_way"}
-_SURFACE = {"type": "imp_bend_surface_type", "event": "imp_bend_event"}
-
-
-class _Options:
-    """imp_bend_options and what they point to."""
-
-    def __init__(self, surfaces: Sequence[Any], options: Mapping[str, Any]) -> None:
-        self.struct, self.kept = _struct(_c.imp_bend_options, dict(options), "a trace", _WORDS)
-        rows = []
-        for s in surfaces:
-            s = dict(s)
-            extra = {k: s.pop(k) for k in ("sdf", "scene") if k in s}
-            row, kept = _struct(_c.imp_bend_surface, s, "a surface", _SURFACE)
-            for k, v in extra.items():
-                setattr(row, k, v.pointer)
-            rows.append(row)
-            self.kept += [kept, list(extra.values())]
-        self.surfaces = (_c.imp_bend_surface * max(len(rows), 1))(*rows)
-        self.struct.n_surfaces = len(rows)
-        self.struct.surfaces = ctypes.addressof(self.surfaces) if rows else None
-
-
-class _Rays:
-    def __init__(self, origins: Any, directions: Any) -> None:
-        self.x = numbers(origins, "origins", shape=(-1, 3))
-        self.d = numbers(directions, "directions", shape=(-1, 3))
-        if len(self.x) != len(self.d):
-            raise ArgumentError("%d origins and %d directions" % (len(self.x), len(self.d)))
-        for name, a in (("origins", self.x), ("directions", self.d)):
-            if not np.isfinite(a).all():
-                raise ArgumentError("%s has numbers that are not finite" % name)
-        self.n = len(self.x)
-        self.struct = make(_c.imp_bend_rays, n=self.n, x=address(self.x), d=address(self.d))
-
-
-def _exits(records: Any, stats: Any) -> Exits:
-    return Exits(records["x"], records["v"], records["path"], (records["flags"] & _c.IMP_BEND_DROPPED) == 0,
-                 _stats(stats), records)
-
-
-def trace(field: Field, origins: Any, directions: Any, *, surfaces: Sequence[Any] = (), progress: Any = None,
-          **options: Any) -> Exits:
-    """Trace rays through a field.
+def dispersion_index(material: Mapping[str, Any], um: float) -> float:
+    """The index of a material at a wavelength.
 
     Parameters
     ----------
-    field : Field
-    origins, directions : array
-        [n][3]; directions need not be unit.
-    surfaces : sequence of dict, optional
-        Where rays end: type ("plane", "sphere", "cylinder", "disc", "box", "sdf",
-        "approach", "mesh"), event ("end", "refract", "mirror", "stop"), normal, offset,
-        centre, radius, lo, hi, index, sdf (a Field), scene (a Scene). None: the field's box.
-    progress : bool or callable, optional
-        See `importon.set_progress`.
-    **options
-        scheme, way, step, max_steps, outside, outside_index, grazing, reversal: as in
-        `struct imp_bend_options`.
+    material : dict
+        model: "cauchy" (c0 + c1/l^2 + c2/l^4) or "sellmeier" (n^2 = 1 + sum of c_k l^2 / (l^2 -
+        c_{3+k})); coefficient: six numbers; reference: the wavelength at which a field is the
+        index. Wavelengths l are in micrometres.
+    um : float
+        Wavelength in micrometres.
 
     Returns
     -------
-    Exits
-        Same bits for any number of threads.
-
-    Raises
-    ------
-    ArgumentError
-        A number is not finite, or out of its range.
+    float
 
     Examples
     --------
-    >>> field = importon.bend.Field.profile("luneburg", [1, 0, 0, 0])
-    >>> exits = importon.bend.trace(field, [[0, 0.3, -0.9539]], [[0, 0, 1]], step=0.01,
-    ...                             surfaces=[{"type": "sphere", "radius": 1}])
-    >>> bool(abs(exits.x[0] - [0, 0, 1]).max() < 1e-2)
-    True
+    >>> round(importon.bend.dispersion_index({"model": "cauchy", "coefficient": [1.5, 0.004, 0, 0, 0, 0]}, 0.5), 6)
+    1.516
     """
-    o, rays = _Options(surfaces, options), _Rays(origins, directions)
-    records, stats = np.zeros(rays.n, EXIT), make(_c.imp_bend_stats)
-    status, message = run(field._context, o.struct, progress, lib.imp_bend_trace, field.pointer,
-                          ctypes.byref(o.struct), ctypes.byref(rays.struct), address(records), None, ctypes.byref(stats))
-    if status:
-        raise failure(status, message)
-    return _exits(records, stats)
-
-
-class RayGradient(NamedTuple):
-    """Derivatives with respect to the field's numbers [n_theta], origins and directions [n][3]."""
-
-    theta: Any
-    origins: Any
-    directions: Any
-
-
-def _cotangents(n: int, x: Any, v: Any, path: Any) -> Any:
-    bars = np.zeros(n, _COTANGENT)
-    for name, value, shape in (("x", x, (n, 3)), ("v", v, (n, 3)), ("path", path, (n,))):
-        if value is not None:
-            bars[name] = numbers(value, name + "_bar", shape=shape)
-    return bars
-
-
-def adjoint(field: Field, origins: Any, directions: Any, exits: Exits, x_bar: Any = None, v_bar: Any = None,
-            path_bar: Any = None, *, surfaces: Sequence[Any] = (), progress: Any = None, **options: Any) -> RayGradient:
-    """The exact derivative of `trace`, with the same arguments: reverse mode.
-
-    Parameters
-    ----------
-    field, origins, directions, surfaces, progress, **options
-        As `trace`'s.
-    exits : Exits
-        What it returned. Lost rays give nothing.
-    x_bar, v_bar : array, optional
-        [n][3]: derivative of an objective with respect to positions and momenta.
-    path_bar : array, optional
-        [n]: to optical path lengths.
-
-    Returns
-    -------
-    RayGradient
-
-    Raises
-    ------
-    BiasError
-        The scheme "arc_index" cannot be reversed.
-
-    Examples
-    --------
-    >>> field = importon.bend.Field.profile("luneburg", [1, 0, 0, 0])
-    >>> o, d, s = [[0, 0.3, -0.9539]], [[0, 0, 1]], [{"type": "sphere", "radius": 1}]
-    >>> exits = importon.bend.trace(field, o, d, surfaces=s, step=0.01)
-    >>> importon.bend.adjoint(field, o, d, exits, path_bar=[1.0], surfaces=s, step=0.01).theta.shape
-    (4,)
-    """
-    o, rays = _Options(surfaces, options), _Rays(origins, directions)
-    if not isinstance(exits, Exits) or len(exits.records) != rays.n:
-        raise ArgumentError("exits are not of these rays")
-    bars = _cotangents(rays.n, x_bar, v_bar, path_bar)
-    theta = np.zeros(lib.imp_field_n_theta(field.pointer))
-    gx, gd = np.zeros((rays.n, 3)), np.zeros((rays.n, 3))
-    out = make(_c.imp_bend_gradient, theta=address(theta), x=address(gx), d=address(gd))
-    records = np.ascontiguousarray(exits.records)
-    status, message = run(field._context, o.struct, progress, lib.imp_bend_adjoint, field.pointer,
-                          ctypes.byref(o.struct), ctypes.byref(rays.struct), address(records), None, address(bars),
-                          None, ctypes.byref(out), None)
-    if status:
-        raise failure(status, message)
-    return RayGradient(theta, gx, gd)
-
-
-def tangent(field: Field, origins: Any, directions: Any, theta_dot: Any = None, origins_dot: Any = None,
-            directions_dot: Any = None, *, surfaces: Sequence[Any] = (), progress: Any = None,
-            **options: Any) -> tuple[Any, Any, Any]:
-    """The derivative of `trace` along a direction: forward mode.
-
-    Parameters
-    ----------
-    field, origins, directions, surfaces, progress, **options
-        As `trace`'s.
-    theta_dot : array, optional
-        [n_theta]
-    origins_dot, directions_dot : array, optional
-        [n][3]
-
-    Returns
-    -------
-    x, v, path
-        [n][3], [n][3], [n].
-    """
-    o, rays = _Options(surfaces, options), _Rays(origins, directions)
-    t = None if theta_dot is None else numbers(theta_dot, "theta_dot", shape=(lib.imp_field_n_theta(field.pointer),))
-    x = None if origins_dot is None else numbers(origins_dot, "origins_dot", shape=(rays.n, 3))
-    d = None if directions_dot is None else numbers(directions_dot, "directions_dot", shape=(rays.n, 3))
-    dots = np.zeros(rays.n, _COTANGENT)
-    status, message = run(field._context, o.struct, progress, lib.imp_bend_tangent, field.pointer,
-                          ctypes.byref(o.struct), ctypes.byref(rays.struct), address(t), address(x), address(d),
-                          address(dots), None)
-    if status:
-        raise failure(status, message)
-    return dots["x"], dots["v"], dots["path"]
+    return float(lib.imp_dispersion_index(ctypes.byref(_dispersion(material)), float(um)))
 
 
 class BendFit(NamedTuple):
-    """An answer of `Bend.fit`."""
+    """An answer of `Bend.fit`.
+
+    Attributes
+    ----------
+    iterations, levels : int
+        Done.
+    start, value : float
+        Objective before (first level) and after (last).
+    history : ndarray
+        Objective of every evaluation.
+    reason : str
+    stats : dict
+        Of the final field.
+    """
 
     iterations: int
     levels: int
@@ -366,6 +77,26 @@ class BendFit(NamedTuple):
     history: Any
     reason: str
     stats: dict[str, Any]
+
+
+class Arrivals(NamedTuple):
+    """Where rays meet a target's plane, as `Bend.arrivals` gives them.
+
+    Attributes
+    ----------
+    x, d : ndarray
+        [m][3]: positions and directions.
+    path, weight : ndarray
+        [m]: optical path lengths, and shares of the target's power.
+    ray : ndarray
+        [m]: number of the ray.
+    """
+
+    x: Any
+    d: Any
+    path: Any
+    weight: Any
+    ray: Any
 
 
 class Bend:
@@ -392,7 +123,7 @@ class Bend:
                 raise TypeError("Bend takes a field of its own")
             out = ctypes.c_void_p()
             ctx = field._context
-            ctx.check(lib.imp_bend_create(ctx.pointer, field._handle.take(), ctypes.byref(out)))
+            ctx.check(lib.imp_bend_create(ctx.pointer, _taken(field), ctypes.byref(out)))
             field._owner = self
             _handle, _context = Handle(out.value or 0, lib.imp_bend_destroy), ctx
         self._handle, self._context = _handle, _context
@@ -406,7 +137,17 @@ class Bend:
         return self._handle.pointer
 
     def close(self) -> None:
-        """Free the problem and its field."""
+        """Free the problem and its field. Using it afterwards is an ArgumentError.
+
+        Examples
+        --------
+        >>> bend = importon.bend.load_file("rod.xml", count=4)
+        >>> bend.close()
+        >>> bend.n_rays
+        Traceback (most recent call last):
+        ...
+        importon.ArgumentError: this object is closed
+        """
         not_inside()
         with self.lock:
             self._handle.close()
@@ -425,34 +166,191 @@ class Bend:
 
     @property
     def n_rays(self) -> int:
+        """How many rays there are."""
         return int(lib.imp_bend_n_rays(self.pointer))
 
     @property
+    def n_bundles(self) -> int:
+        """How many bundles of rays there are."""
+        return int(lib.imp_bend_n_bundles(self.pointer))
+
+    @property
     def n_targets(self) -> int:
+        """How many targets there are."""
         return int(lib.imp_bend_n_targets(self.pointer))
 
+    def _check(self, status: int) -> None:
+        self._context.check(status)
+
+    # ---- What it is made of ----
+
     def add_rays(self, origins: Any, directions: Any, power: Any = None) -> int:
-        """A bundle of rays [n][3]; returns its number."""
-        rays = _Rays(origins, directions)
+        """Add a bundle: rays that share surfaces, taps and targets by its number.
+
+        Parameters
+        ----------
+        origins, directions : array
+            [n][3]; directions need not be unit.
+        power : array, optional
+            [n]; None: 1/n each.
+
+        Returns
+        -------
+        int
+            The bundle's number.
+
+        Raises
+        ------
+        ArgumentError
+            An array has another shape, or numbers that are not finite.
+
+        Examples
+        --------
+        >>> bend = importon.bend.Bend(importon.bend.Field.grid([4, 4, 4], [-1] * 3, [1] * 3, 1.5))
+        >>> bend.add_rays([[0, 0, -0.9], [0.1, 0, -0.9]], [[0, 0, 1], [0, 0, 1]])
+        0
+        """
+        rays = Rays(origins, directions)
         p = None if power is None else numbers(power, "power", shape=(rays.n,))
         bundle = ctypes.c_int()
         with self.lock:
-            self._context.check(lib.imp_bend_add_rays(self.pointer, rays.n, address(rays.x), address(rays.d), address(p),
-                                                      ctypes.byref(bundle)))
+            self._check(lib.imp_bend_add_rays(self.pointer, rays.n, address(rays.x), address(rays.d), address(p),
+                                              ctypes.byref(bundle)))
         return bundle.value
 
-    def set_options(self, *, surfaces: Sequence[Any] = (), **options: Any) -> None:
-        """Surfaces and options of all rays, as `trace` takes them."""
-        o = _Options(surfaces, options)
+    def set_options(self, *, surfaces: Sequence[Any] = (), taps: Sequence[Any] = (), **options: Any) -> None:
+        """Set surfaces, taps and options of all rays.
+
+        Parameters
+        ----------
+        surfaces, taps, **options
+            As `trace`'s.
+
+        Raises
+        ------
+        TypeError
+            There is no such option.
+
+        Examples
+        --------
+        >>> bend = importon.bend.Bend(importon.bend.Field.grid([4, 4, 4], [-1] * 3, [1] * 3, 1.5))
+        >>> bend.set_options(step=0.05, scheme="yoshida4")
+        >>> bend.options["step"], bend.options["scheme"]
+        (0.05, 'yoshida4')
+        """
+        o = Options(surfaces, taps, options)
         o.struct.progress, o.struct.progress_payload = PROGRESS_ADDRESS, id(self)
         with self.lock:
-            self._context.check(lib.imp_bend_set_options(self.pointer, ctypes.byref(o.struct)))
+            self._check(lib.imp_bend_set_options(self.pointer, ctypes.byref(o.struct)))
             self._kept.append(o)
 
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options in use, with the step that rays take."""
+        o = make(_c.imp_bend_options)
+        self._check(lib.imp_bend_get_options(self.pointer, ctypes.byref(o)))
+        made = {f[0]: getattr(o, f[0]) for f in o._fields_ if f[0] not in (
+            "size", "surfaces", "taps", "progress", "progress_payload")}
+        return {**made, "scheme": word("imp_bend_scheme", o.scheme), "way": word("imp_bend_way", o.way)}
+
+    def set_step(self, cells: float, most: float = 0) -> None:
+        """Set the step that the option step = 0 means.
+
+        Parameters
+        ----------
+        cells : float
+            In spacings of the grid.
+        most : float
+            At most; 0: no limit.
+
+        Examples
+        --------
+        >>> bend = importon.bend.Bend(importon.bend.Field.grid([4, 4, 4], [-1] * 3, [1] * 3, 1.5))
+        >>> bend.set_step(0.5, 0.1)
+        >>> bend.options["step"]
+        0.1
+        """
+        self._check(lib.imp_bend_set_step(self.pointer, float(cells), float(most)))
+
+    def set_wavelength(self, bundle: int, material: Mapping[str, Any], um: float) -> None:
+        """Give a bundle a wavelength: its rays see the index 1 + k (eta - 1), with k = (n(um) -
+        1) / (n(reference) - 1).
+
+        Parameters
+        ----------
+        bundle : int
+        material : dict
+            As `dispersion_index`'s.
+        um : float
+            In micrometres.
+
+        Raises
+        ------
+        ArgumentError
+            There is no such bundle, or k is not positive.
+
+        Examples
+        --------
+        >>> bend = importon.bend.load_file("rod.xml", count=4)
+        >>> bend.set_wavelength(0, {"model": "cauchy", "coefficient": [1.5, 0.004, 0, 0, 0, 0]}, 0.4861)
+        >>> bend.wavelength(0)
+        0.4861
+        """
+        with self.lock:
+            self._check(lib.imp_bend_set_wavelength(self.pointer, integer(bundle, "bundle"),
+                                                    ctypes.byref(_dispersion(material)), float(um)))
+
+    def wavelength(self, bundle: int) -> float:
+        """The wavelength of a bundle.
+
+        Parameters
+        ----------
+        bundle : int
+
+        Returns
+        -------
+        float
+            In micrometres; 0: it was given none.
+
+        Examples
+        --------
+        >>> importon.bend.load_file("rod.xml", count=4).wavelength(0)
+        0.0
+        """
+        return float(lib.imp_bend_wavelength(self.pointer, integer(bundle, "bundle")))
+
     def add_target(self, type: str, *, data: Any = None, pixels: Any = None, sdf: Any = None, **fields: Any) -> None:
-        """A target: type "focus", "spot", "points", "direction", "directions", "deflection",
-        "path", "wavefront", "image", "farfield" or "shape"; fields as in `struct
-        imp_bend_target`."""
+        """Add a target.
+
+        Parameters
+        ----------
+        type : str
+            "focus", "spot", "points", "direction", "directions", "deflection", "path",
+            "wavefront", "image", "farfield" or "shape".
+        data : array, optional
+            Of "points", "directions" and "deflection": [n][3]; of "path": [n].
+        pixels : array, optional
+            Of "image" and "farfield": [height][width].
+        sdf : Field, optional
+            Of "shape": the distance.
+        **fields
+            bundle, tap (-1: all rays, their exits), weight, at_plane, normal, offset, outside,
+            point, origin, u, v: as in `struct imp_bend_target`.
+
+        Raises
+        ------
+        ArgumentError
+            There is no such type, or arrays do not fit the rays.
+
+        Examples
+        --------
+        >>> bend = importon.bend.Bend(importon.bend.Field.grid([4, 4, 4], [-1] * 3, [1] * 3, 1.5))
+        >>> bend.add_rays([[0.2, 0, -0.9]], [[0, 0, 1]])
+        0
+        >>> bend.add_target("focus", point=[0, 0, 1])
+        >>> round(bend.objective()[0], 4)
+        0.02
+        """
         t, kept = _struct(_c.imp_bend_target, {"type": type, **fields}, "a target", {"type": "imp_bend_target_type"})
         if data is not None:
             bundle = fields.get("bundle", -1)
@@ -476,52 +374,312 @@ class Bend:
         if data is None and t.type in (_c.IMP_BEND_POINTS, _c.IMP_BEND_DIRECTIONS, _c.IMP_BEND_DEFLECTION, _c.IMP_BEND_PATH):
             raise ArgumentError("a target of type '%s' needs data" % type)
         with self.lock:
-            self._context.check(lib.imp_bend_add_target(self.pointer, ctypes.byref(t)))
+            self._check(lib.imp_bend_add_target(self.pointer, ctypes.byref(t)))
         del kept
 
     def add_smoothness(self, weight: float, order: int = 2, edge: float = 0) -> None:
-        """weight/2 sum of squared differences of grid coefficients, of order 1 or 2."""
+        """Add weight/2 times the sum of squared differences of grid coefficients along each axis.
+
+        Parameters
+        ----------
+        weight : float
+        order : int
+            Of the differences, 1 or 2.
+        edge : float
+            Above 0: the sum of sqrt(D^2 + edge^2) instead.
+
+        Examples
+        --------
+        >>> grid = importon.bend.Field.grid([4, 4, 4], [-1] * 3, [1] * 3, 1.5)
+        >>> grid.theta = grid.theta + 0.01 * (np.arange(len(grid.theta)) % 2)
+        >>> bend = importon.bend.Bend(grid)
+        >>> bend.add_rays([[0, 0, -0.9]], [[0, 0, 1]])
+        0
+        >>> bend.add_target("wavefront")
+        >>> before = bend.objective()[0]
+        >>> bend.add_smoothness(1.0)
+        >>> bend.objective()[0] > before
+        True
+        """
         with self.lock:
-            self._context.check(lib.imp_bend_add_smoothness(self.pointer, float(weight), integer(order, "order"), float(edge)))
+            self._check(lib.imp_bend_add_smoothness(self.pointer, float(weight), integer(order, "order"), float(edge)))
 
     def set_bounds(self, lo: float, hi: float) -> None:
-        """Bounds of every number of the field."""
-        with self.lock:
-            self._context.check(lib.imp_bend_set_bounds(self.pointer, float(lo), float(hi)))
+        """Bound every number of the field.
 
-    def objective(self, gradient: bool = True, progress: Any = None) -> tuple[float, Any]:
-        """Value and gradient [n_theta] (None without)."""
+        Parameters
+        ----------
+        lo, hi : float
+            May be infinite. Default for grids of the index: 1 and infinity.
+
+        Examples
+        --------
+        >>> bend = importon.bend.load_file("rod.xml", count=4)
+        >>> bend.set_bounds(0, float("inf"))
+        """
+        with self.lock:
+            self._check(lib.imp_bend_set_bounds(self.pointer, float(lo), float(hi)))
+
+    def hold_rim(self, layers: int, value: float = float("nan")) -> None:
+        """Hold the grid coefficients of the outermost layers: a fit does not change them.
+
+        Parameters
+        ----------
+        layers : int
+        value : float
+            They are set to it; NaN: they stay as they are.
+
+        Examples
+        --------
+        >>> bend = importon.bend.Bend(importon.bend.Field.grid([4, 4, 4], [-1] * 3, [1] * 3, 1.5))
+        >>> bend.hold_rim(1, 1.4)
+        >>> bool(np.isclose(bend.field.theta, 1.4).any())
+        True
+        """
+        with self.lock:
+            self._check(lib.imp_bend_hold_rim(self.pointer, integer(layers, "layers"), float(value)))
+
+    def hold_outside(self, centre: Any, radius: float, value: float = float("nan")) -> None:
+        """Hold the grid coefficients whose node is outside a sphere.
+
+        Parameters
+        ----------
+        centre : three floats
+        radius : float
+        value : float
+            As `hold_rim`'s.
+
+        Examples
+        --------
+        >>> bend = importon.bend.Bend(importon.bend.Field.grid([4, 4, 4], [-1] * 3, [1] * 3, 1.5))
+        >>> bend.hold_outside([0, 0, 0], 0.9, 1.0)
+        """
+        c = numbers(centre, "centre", shape=(3,))
+        with self.lock:
+            self._check(lib.imp_bend_hold_outside(self.pointer, address(c), float(radius), float(value)))
+
+    def hold_number(self, i: int, value: float = float("nan")) -> None:
+        """Hold one number of the field.
+
+        Parameters
+        ----------
+        i : int
+            Its place in `field.theta`.
+        value : float
+            As `hold_rim`'s.
+
+        Raises
+        ------
+        ArgumentError
+            There is no such number.
+
+        Examples
+        --------
+        >>> bend = importon.bend.load_file("rod.xml", count=4)
+        >>> bend.hold_number(0)
+        >>> bend.objective()[1][0]
+        np.float64(0.0)
+        """
+        with self.lock:
+            self._check(lib.imp_bend_hold_number(self.pointer, integer(i, "i", 0), float(value)))
+
+    # ---- What is computed ----
+
+    def objective(self, gradient: bool = True, progress: Any = None, parts: bool = False) -> Any:
+        """The objective and its gradient with respect to the field's numbers.
+
+        Parameters
+        ----------
+        gradient : bool
+        progress : bool or callable, optional
+            See `importon.set_progress`.
+        parts : bool
+            Also the part of each target.
+
+        Returns
+        -------
+        value : float
+        gradient : ndarray or None
+            [n_theta]; of held numbers 0.
+        parts : ndarray
+            [n_targets], with `parts`.
+
+        Raises
+        ------
+        NumericError
+            No ray comes to its end.
+
+        Examples
+        --------
+        >>> bend = importon.bend.load_file("rod.xml", count=16)
+        >>> value, gradient, parts = bend.objective(parts=True)
+        >>> gradient.shape == bend.field.theta.shape, bool(np.isclose(parts.sum(), value))
+        (True, True)
+        """
         value = ctypes.c_double()
         g = np.zeros(lib.imp_field_n_theta(self.field.pointer)) if gradient else None
-        self._run(progress, lib.imp_bend_objective, ctypes.byref(value), address(g), None, None)
-        return value.value, g
+        each = np.zeros(self.n_targets)
+        self._run(progress, lib.imp_bend_objective, ctypes.byref(value), address(g), address(each), None)
+        return (value.value, g, each) if parts else (value.value, g)
 
     def run(self, progress: Any = None) -> Exits:
-        """Exits of all rays with the field as it is."""
+        """Trace all rays through the field as it is.
+
+        Parameters
+        ----------
+        progress : bool or callable, optional
+
+        Returns
+        -------
+        Exits
+
+        Examples
+        --------
+        >>> importon.bend.load_file("rod.xml", count=16).run().x.shape
+        (16, 3)
+        """
+        n_taps = int(self.options["n_taps"])
         records, stats = np.zeros(self.n_rays, EXIT), make(_c.imp_bend_stats)
-        self._run(progress, lib.imp_bend_run, address(records), None, ctypes.byref(stats))
-        return _exits(records, stats)
+        taps = np.zeros((self.n_rays, n_taps), EXIT) if n_taps else None
+        self._run(progress, lib.imp_bend_run, address(records), address(taps), ctypes.byref(stats))
+        return exits_of(records, stats, taps)
 
     def ray(self, ray: int) -> Any:
-        """One ray as points [n][4]: x, y, z, optical path length."""
+        """One ray as points, for drawing.
+
+        Parameters
+        ----------
+        ray : int
+
+        Returns
+        -------
+        ndarray
+            [m][4]: x, y, z, optical path length.
+
+        Raises
+        ------
+        ArgumentError
+            There is no such ray.
+
+        Examples
+        --------
+        >>> importon.bend.load_file("rod.xml", count=16).ray(3).shape[1]
+        4
+        """
         points, n = ctypes.c_void_p(), ctypes.c_size_t()
         with self.lock:
-            self._context.check(lib.imp_bend_ray(self.pointer, integer(ray, "ray", 0), ctypes.byref(points), ctypes.byref(n)))
-            made = copy_doubles(points.value, (n.value, 4))
-            lib.imp_free(self._context.pointer, points.value)
-        return made
+            self._check(lib.imp_bend_ray(self.pointer, integer(ray, "ray", 0), ctypes.byref(points), ctypes.byref(n)))
+            return copy_points(self._context, points, n.value)
+
+    def arrivals(self, target: int, progress: Any = None) -> Arrivals:
+        """Where rays meet a target's plane, and with which share of its power.
+
+        Parameters
+        ----------
+        target : int
+        progress : bool or callable, optional
+
+        Returns
+        -------
+        Arrivals
+
+        Raises
+        ------
+        ArgumentError
+            There is no such target.
+
+        Examples
+        --------
+        >>> arrivals = importon.bend.load_file("rod.xml", count=16).arrivals(0)
+        >>> arrivals.x.shape, bool(abs(arrivals.weight.sum() - 1) < 1e-9)
+        ((16, 3), True)
+        """
+        records, n = np.zeros(max(self.n_rays, 1), _ARRIVAL), ctypes.c_size_t()
+        self._run(progress, lib.imp_bend_arrivals, integer(target, "target", 0), address(records), ctypes.byref(n))
+        there = records[:n.value]
+        return Arrivals(*(there[f] for f in ("x", "d", "path", "weight", "ray")))
 
     def image(self, target: int, progress: Any = None) -> Any:
-        """Irradiance [height][width] that an image target sees; mean 1 when all power arrives."""
+        """The irradiance that an image target sees.
+
+        Parameters
+        ----------
+        target : int
+        progress : bool or callable, optional
+
+        Returns
+        -------
+        ndarray
+            float32 [height][width]; mean 1 when all power arrives.
+
+        Raises
+        ------
+        ArgumentError
+            There is no such target, or it has no pixels.
+
+        Examples
+        --------
+        >>> bend = importon.bend.Bend(importon.bend.Field.grid([2, 2, 2], [-1] * 3, [1] * 3, 1.5))
+        >>> bend.add_rays([[0.1, 0.2, -0.9]], [[0, 0, 1]])
+        0
+        >>> bend.add_target("image", pixels=np.ones((4, 4)), origin=[-1, -1, 1], u=[2, 0, 0], v=[0, 2, 0],
+        ...                 at_plane=True, normal=[0, 0, 1], offset=1.0, outside=1.5)
+        >>> bend.image(0).shape
+        (4, 4)
+        """
         t = make(_c.imp_bend_target)
         with self.lock:
-            self._context.check(lib.imp_bend_get_target(self.pointer, integer(target, "target", 0), ctypes.byref(t)))
+            self._check(lib.imp_bend_get_target(self.pointer, integer(target, "target", 0), ctypes.byref(t)))
             pixels = np.zeros((max(t.height, 1), max(t.width, 1)), np.float32)
             self._run(progress, lib.imp_bend_image, target, address(pixels))
         return pixels
 
+    def step_error(self, pilots: int = 64, progress: Any = None) -> tuple[float, float]:
+        """The error of exits by the step, from rays traced with t, t/2 and t/4.
+
+        Parameters
+        ----------
+        pilots : int
+            About how many rays.
+        progress : bool or callable, optional
+
+        Returns
+        -------
+        error, order : float
+            Root mean square over rays; the order seen (0: not to be seen).
+
+        Raises
+        ------
+        NumericError
+            No ray comes to its end with all three steps.
+
+        Examples
+        --------
+        >>> error, order = importon.bend.load_file("rod.xml", count=16).step_error()
+        >>> 0 <= error < 1e-3
+        True
+        """
+        error, order = ctypes.c_double(), ctypes.c_double()
+        self._run(progress, lib.imp_bend_step_error, integer(pilots, "pilots", 1), ctypes.byref(error), ctypes.byref(order))
+        return error.value, order.value
+
     def check(self, progress: Any = None) -> Check:
-        """Check reversal, energy, step and gradients: rows, false if one failed."""
+        """Check reversal, energy, step and gradients of the problem as it stands.
+
+        Parameters
+        ----------
+        progress : bool or callable, optional
+
+        Returns
+        -------
+        importon.Check
+            Rows; false if one failed.
+
+        Examples
+        --------
+        >>> bool(importon.bend.load_file("rod.xml", count=16).check())
+        True
+        """
         rows, n = ctypes.c_void_p(), ctypes.c_size_t()
         with self.lock:
             self._run(progress, lib.imp_bend_check, ctypes.byref(rows), ctypes.byref(n))
@@ -540,13 +698,36 @@ class Bend:
             Grids are refined levels - 1 times.
         iterations : int or sequence
             Of each level; 0: as the level before; first 0: 50.
-        learning_rate, tolerance, scale, checkpoint, resume, carry
-            As in `struct imp_bend_fit_options`.
+        learning_rate, tolerance, scale : float
+            Of adam, and of the steps at which it stops, in parts of `scale`; and `scale`, a
+            large change of a number. 0: 0.05, 1e-6, 0.1.
+        checkpoint : path, optional
+            Rewritten at every level and every few seconds.
+        resume : bool
+            Continue from the checkpoint, if it is there.
+        carry : int
+            What the optimiser learnt at a level, at the next: 1: is carried on, -1: is not, 0: of
+            L-BFGS only.
         progress : bool or callable, optional
 
         Returns
         -------
         BendFit
+
+        Raises
+        ------
+        Cancelled
+            By the callback; `result` is the best field so far, which is set.
+        ArgumentError
+            An option is out of its range.
+
+        Examples
+        --------
+        >>> bend = importon.bend.load_file("rod.xml", count=16)
+        >>> bend.field.theta = 1.02 * bend.field.theta
+        >>> fit = bend.fit(iterations=10)
+        >>> fit.value < fit.start
+        True
         """
         each = [iterations] if np.ndim(iterations) == 0 else list(iterations)
         if len(each) > _c.IMP_BEND_LEVELS_MAX:
@@ -565,7 +746,7 @@ class Bend:
             if status in (_c.IMP_OK, _c.IMP_CANCELLED):
                 answer = BendFit(result.iterations, result.levels, result.start, result.value,
                                  copy_doubles(result.history, (result.n_history,)),
-                                 (result.reason or b"").decode(errors="replace"), _stats(result.stats))
+                                 (result.reason or b"").decode(errors="replace"), stats_of(result.stats))
             if status:
                 raise failure(status, message, answer)
         assert answer is not None
@@ -600,6 +781,11 @@ def load_file(path: Any, *, search: Sequence[Any] = (), **defaults: Any) -> Bend
     -------
     Bend
 
+    Raises
+    ------
+    FileError, SceneError, UnsupportedError, TypeError
+        As `importon.load_file`.
+
     Examples
     --------
     >>> importon.bend.load_file("rod.xml", count=16).n_rays
@@ -622,10 +808,24 @@ def load_string(xml: str, *, name: str = "string", search: Sequence[Any] = (), *
     Returns
     -------
     Bend
+
+    Raises
+    ------
+    SceneError, UnsupportedError, TypeError
+        As `importon.load_string`.
+
+    Examples
+    --------
+    >>> importon.bend.load_string(open("rod.xml").read(), name="rod", count=8).n_rays
+    8
     """
     data = xml.encode()
     return _load(lib.imp_bend_load_string, (data, len(data), text(name, "name")), search, defaults)
 
 
-__all__ = ["Bend", "BendFit", "EXIT", "Exits", "Field", "RayGradient", "adjoint", "load_file", "load_string", "tangent",
-           "trace"]
+for _thing in (Arrivals, Exits, Field, RayGradient, adjoint, path, tangent, trace):
+    _thing.__module__ = __name__  # known by the name that users import
+del _thing
+
+__all__ = ["Arrivals", "Bend", "BendFit", "EXIT", "Exits", "Field", "RayGradient", "adjoint", "dispersion_index",
+           "load_file", "load_string", "path", "tangent", "trace"]

@@ -17,7 +17,7 @@ from ._array import copy_doubles, numbers
 from ._library import ArgumentError, Handle, choice, failure, integer, lib, make, not_inside, run, text, warn_said
 from ._params import Values
 from ._picture import Picture, from_film
-from ._render import Problem, _scene
+from ._problem import Problem, check_scene
 from ._scene import Scene
 
 
@@ -112,7 +112,7 @@ class Elements:
     def __init__(self, scene: Scene, sources: Sequence[Any] = (), *, phong: Sequence[Any] = (),
                  beams: Sequence[Any] = (), open: Any = None, progress: Any = None, **options: Any) -> None:
         not_inside()
-        self.scene = _scene(scene)
+        self.scene = check_scene(scene)
         known = {f[0]: f[1] for f in _c.imp_elements_options._fields_}
         allowed = [k for k in known if k not in ("size", "n_sources", "sources", "n_phong", "phong", "n_beams",
                                                  "beams", "progress", "progress_payload")]
@@ -168,6 +168,16 @@ class Elements:
         Parameters
         ----------
         progress : bool or callable, optional
+
+        Examples
+        --------
+        >>> scene = importon.load_dict(importon.cornell_box(res=8))
+        >>> solution = importon.elements.Elements(scene, stop=0.2)
+        >>> before, params = solution.measure, importon.traverse(scene)
+        >>> params["light.emitter.radiance"] = 2 * params["light.emitter.radiance"]
+        >>> solution.update()
+        >>> round(solution.measure / before, 6)
+        2.0
         """
         self._solve(lib.imp_elements_update, progress)
 
@@ -186,6 +196,18 @@ class Elements:
         Returns
         -------
         Picture
+            Of kind "importance" with one channel; without standard errors: there is no noise.
+
+        Raises
+        ------
+        ArgumentError
+            There is no such sensor or kind.
+
+        Examples
+        --------
+        >>> scene = importon.load_dict(importon.cornell_box(res=8))
+        >>> importon.elements.Elements(scene, stop=0.2).image(kind="importance").channels
+        ('importance',)
         """
         not_inside()
         with self.scene.lock:
@@ -197,7 +219,7 @@ class Elements:
 
     @property
     def info(self) -> dict[str, Any]:
-        """What `struct imp_elements_info` has: sizes, memory, measurements."""
+        """Sizes, memory, measurements and the schedule's log: what `struct imp_elements_info` has."""
         with self.scene.lock:
             i = make(_c.imp_elements_info)
             self._context.check(lib.imp_elements_get_info(self.pointer, ctypes.byref(i)))
@@ -210,10 +232,12 @@ class Elements:
 
     @property
     def measures(self) -> Any:
+        """[n_sources]: each measurement by itself, without its weight."""
         return self.info["measures"]
 
     @property
     def measure(self) -> float:
+        """The weighted measurements together."""
         return float(self.info["measure"])
 
     def sensitivity(self, errors: bool = False) -> list[Sensitivity]:
@@ -229,6 +253,13 @@ class Elements:
         Returns
         -------
         list of Sensitivity
+
+        Examples
+        --------
+        >>> scene = importon.load_dict(importon.cornell_box(res=8))
+        >>> rows = importon.elements.Elements(scene, stop=0.2).sensitivity()
+        >>> round(sum(r.share for r in rows if r.emission), 6)  # linear in the lights
+        1.0
         """
         not_inside()
         function = lib.imp_elements_share_errors if errors else lib.imp_elements_sensitivity
@@ -266,6 +297,24 @@ class Elements:
         Returns
         -------
         ElementsFit
+
+        Raises
+        ------
+        Cancelled
+            By the callback; `result` is the state reached, which the scene has.
+        ArgumentError
+            A target is negative, or there are not as many as sources.
+        UnsupportedError
+            Finite elements have no derivative of an active number.
+
+        Examples
+        --------
+        >>> scene = importon.load_dict(importon.cornell_box(res=8))
+        >>> solution = importon.elements.Elements(scene, stop=0.2)
+        >>> fit = solution.fit([1.5 * solution.measure], "light.*", stay={"light.*": 1e-6}, rounds=1)
+        >>> target, before, after = fit.goals[0]
+        >>> abs(after / target - 1) < 1e-3
+        True
         """
         with Problem(self.scene, params) as p:
             n_sources = max(int(self._options.n_sources), 1)
@@ -289,12 +338,48 @@ class Elements:
             return answer
 
     def save(self, path: Any) -> None:
-        """Write elements and links to a file, which `Elements(scene, open=path)` reads."""
+        """Write elements and links to a file, which `Elements(scene, open=path)` reads.
+
+        Parameters
+        ----------
+        path : str or PathLike
+
+        Raises
+        ------
+        FileError
+            It cannot be written.
+
+        Examples
+        --------
+        >>> scene = importon.load_dict(importon.cornell_box(res=8))
+        >>> solution = importon.elements.Elements(scene, stop=0.2)
+        >>> solution.save("box.el")
+        >>> importon.elements.Elements(scene, stop=0.2, open="box.el").measure == solution.measure
+        True
+        """
         with self.scene.lock:
             self._context.check(lib.imp_elements_save(self.pointer, text(path, "path")))
 
     def export(self, path: Any) -> None:
-        """Write leaves with mean radiance and importance: .ply or .json."""
+        """Write leaves with mean radiance and importance.
+
+        Parameters
+        ----------
+        path : str or PathLike
+            .ply or .json.
+
+        Raises
+        ------
+        ArgumentError
+            Another extension.
+        FileError
+            It cannot be written.
+
+        Examples
+        --------
+        >>> scene = importon.load_dict(importon.cornell_box(res=8))
+        >>> importon.elements.Elements(scene, stop=0.2).export("box.ply")
+        """
         with self.scene.lock:
             self._context.check(lib.imp_elements_export(self.pointer, text(path, "path")))
 
@@ -382,3 +467,6 @@ def guide(elements: Elements, *, lights: bool = True, share: float = 0, roulette
         elements._context.check(lib.imp_elements_guide(elements.pointer, ctypes.byref(options), ctypes.byref(out)))
         warn_said()
         return Guide(elements, Handle(out.value or 0, lib.imp_guide_destroy))
+
+
+__all__ = ["Elements", "ElementsFit", "Guide", "Sensitivity", "guide"]

@@ -258,6 +258,15 @@ def bend_forward(field: Any, theta: Any, origins: Any, directions: Any, **option
     -------
     x, v, path : array
         [n][3], [n][3], [n].
+
+    Examples
+    --------
+    >>> field = importon.bend.Field.profile("luneburg", [1, 0, 0, 0])
+    >>> f = lambda t: importon.jax.bend_forward(field, t, [[0, 0.3, -0.9539]], [[0, 0, 1.0]], step=0.01,
+    ...                                         surfaces=[{"type": "sphere", "radius": 1}])[2]
+    >>> theta = jnp.array(field.theta)
+    >>> jax.jvp(f, (theta,), (jnp.ones_like(theta),))[1].shape
+    (1,)
     """
     f, arguments, result = _rays(field, theta, origins, directions, options)
 

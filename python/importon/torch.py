@@ -124,6 +124,8 @@ class Renderer:
         Parameters that its calls are given.
     sensor, spp, spp_grad, drop_budget, guide
         As `render`'s.
+    **loss
+        Of losses, which `importon.torch.loss` makes.
 
     Examples
     --------
@@ -146,7 +148,25 @@ class Renderer:
         self.full = dict(zip(self.given, self.function.names))
 
     def flat(self, values: Mapping[str, Tensor]) -> Tensor:
-        """All numbers in one tensor."""
+        """All numbers in one tensor, in the scene's order.
+
+        Parameters
+        ----------
+        values : mapping of str to Tensor
+            As those of its calls.
+
+        Returns
+        -------
+        Tensor
+            float64 [n].
+
+        Examples
+        --------
+        >>> scene = importon.load_dict(importon.cornell_box(res=8))
+        >>> renderer = importon.torch.Renderer(scene, ["red.reflectance.value"], spp=4)
+        >>> renderer.flat({"red.reflectance.value": torch.tensor(0.5)})
+        tensor([0.5000, 0.5000, 0.5000], dtype=torch.float64)
+        """
         if len(values) != len(self.given):
             raise ArgumentError("%d values are given, %d parameters were named" % (len(values), len(self.given)))
         parts = []

@@ -13,7 +13,7 @@ from importon import _c
 from importon._library import ERRORS
 from tap import TOP, Skip, run
 
-HEADERS = ["importon.h", "bend.h", "elements.h"]
+HEADERS = ["importon.h", "bend.h", "elements.h", "report.h"]
 INCLUDES = "".join("#include <importon/%s>\n" % h for h in HEADERS) + "#include <stddef.h>\n"
 STRUCTS = {n: s for n, s in vars(_c).items() if isinstance(s, type) and issubclass(s, ctypes.Structure)
            and n.startswith("imp_")}
@@ -121,6 +121,30 @@ def test_functions():
         assert names[result] == kind(m[1]), (name, result, m[1])
     assert not listed, "not declared: %s" % ", ".join(listed)
     return "%d functions" % len(_c._FUNCTIONS)
+
+
+# Public functions that the package does not call, and why.
+WITHOUT = {
+    "imp_scene_n_theta": "parameters are read and set by name: SceneParameters",
+    "imp_scene_get_theta": "the same",
+    "imp_scene_set_theta": "the same",
+    "imp_drop_text": "the header's sentences are in the declarations; Picture.dropped has the words",
+    "imp_problem_nlopt": "NLopt's callback in C: importon.loss is a function of Python, for any optimiser",
+    "imp_problem_set_run": "of that callback: functions take the run as keywords",
+    "imp_problem_fit_variable": "one number of a fit: Fit has arrays; numbers beyond 1,024 have no errors",
+}
+
+
+def test_counterparts():
+    """Every public function has its counterpart in Python, or is listed with a reason"""
+    import glob
+    source = "".join(open(f).read() for f in glob.glob(os.path.join(os.path.dirname(importon.__file__), "*.py"))
+                     if not f.endswith("_c.py"))
+    used = set(re.findall(r"\blib(?:rary)?\.(imp_\w+)", source))
+    declared = {name for name, *_ in _c._FUNCTIONS}
+    assert used <= declared, "not in the headers: %s" % sorted(used - declared)
+    assert declared - used == set(WITHOUT), (sorted(declared - used - set(WITHOUT)), sorted(set(WITHOUT) - (declared - used)))
+    return "%d of %d functions; not called: %s" % (len(used), len(declared), ", ".join(sorted(WITHOUT)))
 
 
 def test_errors():

@@ -14,8 +14,8 @@ import importon
 import numpy as np
 from tap import SCENES, TOP, Skip, needs, raises, run
 
-MODULES = ["_array", "_dictionary", "_fit", "_library", "_params", "_picture", "_progress", "_render", "_scene",
-           "_transform", "ad", "bend", "elements"]
+MODULES = sorted(f[:-3] for f in os.listdir(os.path.dirname(importon.__file__))
+                 if f.endswith(".py") and f not in ("__init__.py", "_c.py", "torch.py", "jax.py"))
 
 
 def examples(module, **more):
@@ -27,7 +27,7 @@ def examples(module, **more):
     done = 0
     for test in tests:
         done += runner.run(test, out=out.write).attempted
-    assert runner.failures == 0, out.getvalue()[-3000:]
+    assert runner.failures == 0, out.getvalue()[-8000:]
     return done
 
 
@@ -63,28 +63,80 @@ def test_jax_examples():
     return "%d lines" % examples(importon.jax, jax=jax, jnp=jnp)
 
 
+def public():
+    """Everything public with its name: functions, classes, their methods and properties, of the
+    package and of its modules."""
+    modules = [importon, importon.ad, importon.bend, importon.elements]
+    for name in ("torch", "jax"):
+        try:
+            needs(name)
+            modules.append(getattr(importon, name))
+        except Skip:
+            pass
+    for module in modules:
+        for name in module.__all__:
+            thing = getattr(module, name)
+            if inspect.ismodule(thing) or not callable(thing):
+                continue
+            yield "%s.%s" % (module.__name__, name), thing
+            if inspect.isclass(thing):
+                for method, value in vars(thing).items():
+                    if not method.startswith("_") and method != "pointer" and (
+                            inspect.isfunction(value) or isinstance(value, (classmethod, staticmethod, property))):
+                        yield "%s.%s.%s" % (module.__name__, name, method), getattr(thing, method) if not isinstance(
+                            value, property) else value
+
+
+def is_record(thing):
+    """What calls return or raise, and users do not make."""
+    return inspect.isclass(thing) and (issubclass(thing, (BaseException, tuple)) or thing.__name__ in RETURNED)
+
+
+RETURNED = {"Check", "Field", "Picture", "Progress", "CheckRow", "Comparison", "ElementsFit", "Estimate", "Fit", "Gradient", "Guide", "Jacobian", "Loss",
+            "Optimizer", "Scene", "SceneParameters", "SelfTestRow", "Values"}
+UNDERSTOOD = {"self", "cls"}
+
+
+def sections(doc):
+    """Title -> lines of a numpydoc docstring."""
+    found, title = {"": []}, ""
+    lines = doc.splitlines()
+    for i, line in enumerate(lines):
+        if i + 1 < len(lines) and re.fullmatch("-{3,}", lines[i + 1]) and len(lines[i + 1]) == len(line):
+            title = line
+            found[title] = []
+        elif not re.fullmatch("-{3,}", line):
+            found[title].append(line)
+    return found
+
+
 def test_docstrings():
-    """Every public function has parameters, returns and an example, and they are its own"""
-    bad = []
-    for name in importon.__all__:
-        if name in ("jax", "torch", "__version__", "ad", "bend", "elements"):
-            continue
-        thing = getattr(importon, name)
-        doc = inspect.getdoc(thing) or ""
-        if not doc:
+    """Everything public has a docstring in numpydoc form: its own parameters, what it returns, errors, an example"""
+    bad, n = [], 0
+    for name, thing in public():
+        n += 1
+        parts = sections(inspect.getdoc(thing) or "")
+        if not "".join(parts[""]).strip():
             bad.append(name + ": no docstring")
-        if not inspect.isfunction(thing) or name in ("Color3f", "threads", "variant", "library_path"):
             continue
-        for section in ("Parameters", "Examples"):
-            if section + "\n---" not in doc:
-                bad.append("%s: no %s" % (name, section))
-        told = set(re.findall(r"^(?:\*{0,2})(\w+)(?:, (?:\*{0,2}\w+))* :|^((?:\*{0,2}\w+, )*\*{0,2}\w+)$", doc, re.M) and
-                   re.findall(r"\w+", " ".join(line.split(":")[0] for line in doc.split("Parameters\n")[1].split("\n\n")[0].splitlines()
-                                               if line and not line.startswith(" "))))
-        for p in inspect.signature(thing).parameters:
-            if p not in told:
-                bad.append("%s: %s is not told" % (name, p))
-    assert not bad, bad
+        unknown = set(parts) - {"", "Parameters", "Attributes", "Returns", "Raises", "Examples"}
+        if unknown:
+            bad.append("%s: sections %s" % (name, unknown))
+        if isinstance(thing, property) or is_record(thing):
+            continue
+        if ">>> " not in "\n".join(parts.get("Examples", [])):
+            bad.append(name + ": no example")
+        told = {w.lstrip("*") for line in parts.get("Parameters", []) if line and not line.startswith(" ")
+                for w in re.split(r", *", line.split(" : ")[0])}
+        signature = inspect.signature(thing)
+        wanted = {p for p in signature.parameters if p not in UNDERSTOOD and not p.startswith("_")}
+        if wanted != told:
+            bad.append("%s: parameters %s are told, it has %s" % (name, sorted(told - wanted), sorted(wanted - told)))
+        if not inspect.isclass(thing) and "Returns" not in parts and signature.return_annotation not in (
+                "None", inspect.Signature.empty, "Any"):
+            bad.append("%s: what it returns is not told (%s)" % (name, signature.return_annotation))
+    assert not bad, "%d of %d\n" % (len(bad), n) + "\n".join(bad)
+    return "%d names" % n
 
 
 def snippets(path):

@@ -4,7 +4,7 @@ import os
 
 import importon as im
 import numpy as np
-from tap import SCENES, TOP, raises, run, z
+from tap import SCENES, TOP, raises, run, spread, z
 
 RED = "red.reflectance.value"
 
@@ -58,17 +58,19 @@ def test_loss():
     p = im.traverse(s)
     p.keep("red.*")
     p[RED] = p[RED] * .5 + .1
-    many = [im.loss(s, target, p, spp=4, seed=10 + k) for k in range(120)]
+    many = [im.loss(s, target, p, spp=4, seed=10 + k) for k in range(800)]
+    n = len(many)
     mean = im.render(s, spp=4096, seed=3)
     truth = .5 * np.sum((np.asarray(mean, float) - target)**2) - .5 * np.sum(mean.se.astype(float)**2)
     values = np.array([float(e) for e in many])
-    said = np.mean([e.se**2 for e in many]) / np.var(values, ddof=1)
-    assert .5 < said < 1.9, said
-    z(values.mean(), truth, np.hypot(values.std(ddof=1) / 120**.5, .02 * truth), what="value")
+    said = spread([e.se for e in many], values)
+    z(values.mean(), truth, np.hypot(values.std(ddof=1) / n**.5, .02 * truth), what="value")
     g = np.array([e.grad[RED] for e in many])
     one = im.render_backward(s, p, np.asarray(mean) - np.asarray(target), spp=4096, seed=5)
-    z(g.mean(axis=0), one[RED], np.hypot(g.std(axis=0, ddof=1) / 120**.5, one.se[RED]), what="gradient")
+    z(g.mean(axis=0), one[RED], np.hypot(g.std(axis=0, ddof=1) / n**.5, one.se[RED]), what="gradient")
+    more = [spread([e.grad_se[RED][k] for e in many], g[:, k], most=1) for k in range(3)]
     assert many[0].bias_order == 0 and "+-" in repr(many[0]) and "<table>" in many[0]._repr_html_()
+    return said + "; of the gradient " + ", ".join(m.split("variance ")[1] for m in more)
 
 
 def test_is_the_command():

@@ -53,6 +53,21 @@ def z(value, truth, se, limit=4.5, most_se=None, what=""):
     return worst
 
 
+def spread(errors, values, limit=4.5, most=.5):
+    """Do repeats [n] spread as their standard errors [n] say? The ratio of mean se^2 and the
+    variance, within `limit` of its own errors, which are no larger than `most`: (kurtosis - 1) / n
+    of the variance, and the spread of se^2."""
+    square, values = np.asarray(errors, float)**2, np.asarray(values, float)
+    n, d = len(values), values - values.mean()
+    variance = np.sum(d**2) / (n - 1)
+    kurtosis = np.mean(d**4) / np.mean(d**2)**2
+    ratio = square.mean() / variance
+    se = np.sqrt((kurtosis - 1) / n + square.var() / square.mean()**2 / n)
+    assert se <= most / limit, "the ratio is known to %.2g only" % se
+    assert abs(np.log(ratio)) <= limit * se, "reported / seen variance %.3f +- %.2f" % (ratio, se * ratio)
+    return "reported / seen variance %.3f +- %.3f" % (ratio, se * ratio)
+
+
 def run(namespace):
     """Run the tests of a program, in order of their lines; in a scratch folder."""
     tests = [(n, f) for n, f in namespace.items() if n.startswith("test_") and inspect.isfunction(f)]
@@ -73,7 +88,7 @@ def run(namespace):
             except BaseException:
                 bad = "not "
                 failed += 1
-                note = "\n" + "".join("# " + x for x in traceback.format_exc().splitlines(True)[-14:]).rstrip()
+                note = "\n" + "".join("# " + x for x in traceback.format_exc().splitlines(True)[-60:]).rstrip()
             title = (f.__doc__ or name[5:]).strip().split("\n")[0].rstrip(".")
             took = "" if note.startswith(" # SKIP") else " # %.1f s" % (time.time() - start)
             print("%sok %d - %s%s%s" % (bad, i, title, note, took if not note else ""), flush=True)

@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scenes with active parameters and targets, for the time of a call."""
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping
+from typing import Any, Optional
+
+import numpy as np
+
+from . import _c
+from ._array import address, numbers
+from ._library import ArgumentError, Handle, choice, integer, lib, make, run, text
+from ._params import ParameterInfo, SceneParameters, Values, names_of, table
+from ._picture import Picture, read
+from ._scene import Scene
+
+
+def check_scene(value: Any) -> Scene:
+    if not isinstance(value, Scene):
+        raise TypeError("a scene is wanted, not a %s" % type(value).__name__)
+    return value
+
+
+def _guide(guide: Any) -> Any:
+    if guide is None:
+        return None
+    pointer = getattr(guide, "_guide_pointer", None)
+    if pointer is None:
+        raise TypeError("guide is a %s: importon.guide(...) is wanted" % type(guide).__name__)
+    return pointer()
+
+
+def run_options(scene: Scene, *, sensor: Any = 0, seed: int = 0, spp: int = 0, time_limit: float = 0,
+                drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified",
+                wavelength_set: int = 0) -> Any:
+    """imp_run."""
+    return make(_c.imp_run, sensor=scene.sensor_index(sensor) if sensor else 0,
+                seed=integer(seed, "seed", 0, 2**64 - 1), spp=integer(spp, "spp"),
+                time_limit_s=float(time_limit), drop_budget=float(drop_budget), guide=_guide(guide),
+                wavelengths=choice("imp_wavelength_sampling", wavelengths, "wavelengths"),
+                wavelength_set=integer(wavelength_set, "wavelength_set"))
+
+
+def push(scene: Scene, params: Any) -> None:
+    """Changes made in place to arrays of `params` go to the scene before it is used."""
+    if isinstance(params, SceneParameters):
+        if params.scene is not scene:
+            raise ArgumentError("params are of another scene")
+        if params._handed:
+            params.update()
+
+
+class Problem:
+    """A scene with active parameters, for the time of a `with` block: holds the scene's lock."""
+
+    def __init__(self, scene: Any, params: Any) -> None:
+        self.scene, self.params = check_scene(scene), params
+        self.blocks: list[tuple[ParameterInfo, slice]] = []
+        self.handle: Optional[Handle] = None
+
+    def __enter__(self) -> Problem:
+        from ._library import not_inside
+        not_inside()
+        scene = self.scene
+        scene.lock.acquire()
+        try:
+            push(scene, self.params)
+            self.context = scene._context
+            out = ctypes.c_void_p()
+            self.context.check(lib.imp_problem_create(scene.pointer, ctypes.byref(out)))
+            self.handle = Handle(out.value or 0, lib.imp_problem_destroy)
+            for name in names_of(self.params):
+                self.check(lib.imp_problem_activate(self.pointer, text(name, "params")))
+            self.n = lib.imp_problem_n(self.pointer)
+            infos = list(table(scene).values())
+            i, index = 0, ctypes.c_size_t()
+            while i < self.n:
+                self.check(lib.imp_problem_variable(self.pointer, i, ctypes.byref(index), None, None, None))
+                info = infos[index.value]
+                self.blocks.append((info, slice(i, i + info.size)))
+                i += info.size
+            return self
+        except BaseException:
+            self.__exit__()
+            raise
+
+    def __exit__(self, *error: Any) -> None:
+        if self.handle:
+            self.handle.close()
+        self.scene.lock.release()
+
+    @property
+    def pointer(self) -> int:
+        assert self.handle
+        return self.handle.pointer
+
+    def check(self, status: int) -> None:
+        self.context.check(status)
+
+    def run(self, options: Any, progress: Any, function: Any, *arguments: Any) -> None:
+        status, message = run(self.context, options, progress, function, *arguments)
+        if status:
+            from ._library import failure
+            raise failure(status, message)
+
+    def split(self, x: Any) -> dict[str, Any]:
+        """Numbers [n] by parameter."""
+        return {info.name: x[at].reshape(info.shape)[()] for info, at in self.blocks}
+
+    def join(self, values: Any, name: str) -> Any:
+        """Numbers [n] from a mapping; what it does not name is 0."""
+        x = np.zeros(self.n)
+        given = Values(self.scene, dict(values)) if isinstance(values, Mapping) else None
+        if given is None:
+            return numbers(values, name, shape=(self.n,))
+        places = {info.name: (info, at) for info, at in self.blocks}
+        from ._params import find
+        for key in given:
+            info = find(self.scene, key)
+            if info.name not in places:
+                raise ArgumentError("%s has %s, which is not active" % (name, info.name))
+            v = numbers(given[key], key)
+            if v.shape != info.shape and v.size != 1:
+                raise ArgumentError("%s['%s'] has shape %s, not %s" % (name, key, v.shape, info.shape))
+            x[places[info.name][1]] = v.ravel()
+        return x
+
+    def x(self) -> Any:
+        """The active numbers of the scene."""
+        x = np.zeros(self.n)
+        if self.n:
+            lib.imp_problem_get_x(self.pointer, address(x))
+        return x
+
+    def spp(self, target: int, options: Any) -> int:
+        """Samples per pixel that a loss takes for a target."""
+        taken = ctypes.c_int()
+        self.check(lib.imp_problem_spp(self.pointer, target, ctypes.byref(options), ctypes.byref(taken)))
+        return taken.value
+
+    def gradient(self) -> tuple[Any, Any]:
+        return np.zeros(self.n), np.zeros(self.n)
+
+    def add_targets(self, target: Any, **options: Any) -> int:
+        """How many there are."""
+        made = targets(self.scene, target, **options)
+        for t in made:
+            self.check(lib.imp_problem_add_target(self.pointer, ctypes.byref(t[0])))
+        return len(made)
+
+    def add_regularisers(self, tikhonov: Any, stay: Any, smooth: Any) -> None:
+        for glob, weight in dict(tikhonov or {}).items():
+            self.check(lib.imp_problem_add_tikhonov(self.pointer, text(glob, "tikhonov"), float(weight), 0))
+        for glob, weight in dict(stay or {}).items():
+            self.check(lib.imp_problem_add_tikhonov(self.pointer, text(glob, "stay"), float(weight), 1))
+        for glob, weight in dict(smooth or {}).items():
+            self.check(lib.imp_problem_add_smoothness(self.pointer, text(glob, "smooth"), float(weight)))
+
+
+def _colours(picture: Picture, channels: int) -> tuple[Any, Any]:
+    """The colour channels of a file's picture, and their errors."""
+    names = list(picture.channels)
+    at = ([names.index(c) for c in "RGB"] if {"R", "G", "B"} <= set(names)
+          else [names.index("Y") if "Y" in names else 0])
+    pixels, se = np.asarray(picture), picture.se
+    if len(at) == 3 and channels == 1 or pixels.shape[2] == len(at):
+        return pixels, se
+    return pixels[..., at], None if se is None else se[..., at]
+
+
+def _one_target(scene: Scene, target: Any, sensor: int, weights: Any, loss: str, epsilon: float,
+                noise_se: Any) -> tuple[Any, Any]:
+    """imp_target, and what it points to."""
+    if isinstance(target, (str, bytes)) or hasattr(target, "__fspath__"):
+        target = read(target)
+    se = noise_se
+    if isinstance(target, Picture) and target.ndim == 3 and target.channels:
+        pixels, own = _colours(target, scene.channels)
+        if noise_se is None and own is not None and np.isfinite(own).all():
+            se = own  # one sample has no error
+    else:
+        pixels = target
+    pixels = numbers(pixels, "target", np.float32)
+    pixels = pixels[..., None] if pixels.ndim == 2 else pixels
+    if pixels.ndim != 3:
+        raise ArgumentError("target has shape %s: (height, width, channels) is wanted" % (pixels.shape,))
+    if se is not None:
+        se = np.reshape(numbers(se, "noise_se", np.float32), pixels.shape) if np.size(se) == pixels.size \
+            else numbers(se, "noise_se", np.float32, shape=pixels.shape)
+    if weights is not None:
+        if isinstance(weights, (str, bytes)) or hasattr(weights, "__fspath__"):
+            weights = np.asarray(read(weights))[..., 0]
+        weights = numbers(weights, "weights", np.float32, shape=pixels.shape[:2])
+    t = make(_c.imp_target, sensor=sensor, width=pixels.shape[1], height=pixels.shape[0],
+             channels=pixels.shape[2], pixels=address(pixels), weights=address(weights),
+             loss=choice("imp_loss", loss, "loss"), epsilon=float(epsilon), noise_se=address(se))
+    return t, (pixels, weights, se)
+
+
+def targets(scene: Scene, target: Any, *, sensor: Any = 0, weights: Any = None, loss: str = "l2",
+            epsilon: float = 0, noise_se: Any = None) -> list[tuple[Any, Any]]:
+    """imp_targets: of one target; of a list, one for each sensor in order; of a dictionary
+    by sensor."""
+    if isinstance(target, Mapping):
+        pairs = [(scene.sensor_index(s), t) for s, t in target.items()]
+    elif isinstance(target, (list, tuple)) and not np.isscalar(target[0] if target else 0) and (
+            np.ndim(target[0]) == 3 or isinstance(target[0], str) or hasattr(target[0], "__fspath__")):
+        if len(target) != len(scene.sensors):
+            raise ArgumentError("%d targets, but the scene has %d sensors: name them, {sensor: target}"
+                                % (len(target), len(scene.sensors)))
+        pairs = list(enumerate(target))
+    else:
+        pairs = [(scene.sensor_index(sensor), target)]
+
+    def part(value: Any, s: int, i: int) -> Any:
+        if isinstance(value, Mapping):
+            return value.get(s)
+        return value[i] if isinstance(value, (list, tuple)) and len(pairs) > 1 else value
+
+    return [_one_target(scene, t, s, part(weights, s, i), loss, epsilon, part(noise_se, s, i))
+            for i, (s, t) in enumerate(pairs)]
