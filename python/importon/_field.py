@@ -513,8 +513,8 @@ class Field:
         Examples
         --------
         >>> field = importon.bend.Field.grid([2, 2, 2], [-1] * 3, [1] * 3, interp="trilinear")
-        >>> field.samples_adjoint(np.ones(27)).sum()
-        np.float64(27.0)
+        >>> float(field.samples_adjoint(np.ones(27)).sum())
+        27.0
         """
         shape = self._corners()
         bar = numbers(theta_bar, "theta_bar", shape=(lib.imp_field_n_theta(self.pointer),))

@@ -477,8 +477,8 @@ class Bend:
         --------
         >>> bend = importon.bend.load_file("rod.xml", count=4)
         >>> bend.hold_number(0)
-        >>> bend.objective()[1][0]
-        np.float64(0.0)
+        >>> float(bend.objective()[1][0])
+        0.0
         """
         with self.lock:
             self._check(lib.imp_bend_hold_number(self.pointer, integer(i, "i", 0), float(value)))

@@ -51,7 +51,7 @@ def values(rng):
 class World:
     def __init__(self, seed):
         self.rng = random.Random(seed)
-        self.kept = []
+        self.kept, self.parts = [], []
         self.scenes = [im.load_dict(im.cornell_box(res=8, spp=2))]
 
     def pick(self, *kinds):
@@ -61,6 +61,10 @@ class World:
 
     def maybe(self, good):
         return good if self.rng.random() < .6 else values(self.rng)
+
+    def team(self, rank, ranks, gather):
+        with im.team(rank, ranks, gather):
+            return im.render(im.load_dict(im.cornell_box(res=8)), spp=1)
 
     def step(self):
         r, scene = self.rng, self.pick(im.Scene)
@@ -105,6 +109,28 @@ class World:
             lambda: im.elements.Elements(scene, self.maybe([]), stop=self.maybe(.5), max_level=self.maybe(2)),
             lambda: elements.image(self.maybe(0), self.maybe("flat")), lambda: elements.sensitivity(),
             lambda: elements.fit(self.maybe([1.0]), params, max_iterations=2), lambda: im.guide(elements, share=self.maybe(.2)),
+            lambda: im.functional(scene, params, self.maybe(None), spp=spp), lambda: im.walk(scene, self.maybe(1), self.maybe(2), json=True),
+            lambda: im.selftest(scene, self.maybe("camera"), samples=self.maybe(1000), directions=1),
+            lambda: im.check(scene, params, sampling=True, spp=2), lambda: im.render(scene, spp=2, wavelengths=self.maybe("independent")),
+            lambda: im.project(picture, self.maybe("latlong"), self.maybe("equal_area"), width=self.maybe(4)),
+            lambda: im.jacobian(scene, RED, spp=1).sums(self.maybe(None)), lambda: picture.attribute(values(r)),
+            lambda: im.write("a.exr", picture, attributes=self.maybe({"a": "b"})),
+            lambda: im.report(self.maybe("r.html"), [self.maybe(picture), {"json": values(r)}]),
+            lambda: self.parts.append(im.part(lambda: im.render(im.load_dict(im.cornell_box(res=8)), spp=2), self.maybe(1), self.maybe(2))),
+            lambda: im.merge(lambda: im.render(im.load_dict(im.cornell_box(res=8)), spp=2), self.maybe(self.parts[-2:])),
+            lambda: im.parts_info(self.maybe(self.parts[-2:])), lambda: self.team(self.maybe(0), self.maybe(1), self.maybe(lambda m: [m])),
+            lambda: im.bend.Field.sum([field, self.pick(im.bend.Field)]), lambda: im.bend.Field.scaled(field, self.maybe(1.1)),
+            lambda: im.bend.Field.tied(field, mirror=self.maybe((1, 1, 0)), fold=self.maybe(0)),
+            lambda: im.bend.Field.rz(self.maybe(1.5), radius=self.maybe(1.0), cells_r=self.maybe(2), cells_z=self.maybe(3)),
+            lambda: field.eval(self.maybe([[0, 0, 0]]), hessian=True), lambda: field.eval_adjoint(self.maybe([[0, 0, 0]]), self.maybe([1.]), values(r)),
+            lambda: field.eval_tangent([[0, 0, 0]], values(r)), lambda: field.set_samples(values(r)), lambda: field.samples_adjoint(values(r)),
+            lambda: field.refined_adjoint(values(r)), lambda: field.names, lambda: field.grid_info,
+            lambda: im.bend.trace(field, o, d, taps=self.maybe([{"offset": .3}]), groups=self.maybe(None), step=.1),
+            lambda: im.bend.path(field, o, d, self.maybe(0), step=.1), lambda: bend.hold_number(self.maybe(0), self.maybe(1.3)),
+            lambda: bend.hold_rim(self.maybe(1)), lambda: bend.hold_outside(self.maybe([0, 0, 0]), self.maybe(1.0)),
+            lambda: bend.set_wavelength(self.maybe(0), self.maybe({"coefficient": [1.5, .01, 0, 0, 0, 0]}), self.maybe(.5)),
+            lambda: bend.arrivals(self.maybe(0)), lambda: bend.step_error(self.maybe(4)), lambda: bend.options,
+            lambda: bend.set_step(self.maybe(.5), self.maybe(.1)), lambda: im.ad.Adam(self.maybe(.1), params={"x": self.maybe(1.0)}).step({"x": values(r)}),
             lambda: im.Transform4f(values(r)), lambda: im.Transform4f.look_at(values(r), [0, 0, 0]),
         ]
         try:

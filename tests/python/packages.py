@@ -169,4 +169,40 @@ def test_empty_root():
     return "%s, %.1f MB, by %s" % (os.path.basename(repaired), os.path.getsize(repaired) / 1e6, said[0])
 
 
+def test_bare_debian():
+    """pip install ./python from a clone on a bare Debian 12, with the packages of ./quickstart: the same bits"""
+    path = os.environ["PATH"] + ":/usr/sbin:/sbin"
+    debootstrap, unshare = shutil.which("debootstrap", path=path), shutil.which("unshare", path=path)
+    if os.geteuid() != 0 or not debootstrap or not unshare:
+        raise Skip("not root, or no debootstrap")
+    with open(os.path.join(TOP, "tools", "setup.sh")) as f:
+        packages = re.search(r"packages=\(([^)]*)\)", f.read())[1].split()
+    root = os.path.abspath("debian")
+    made = subprocess.run([debootstrap, "--variant=minbase", "--include=" + ",".join(["python3-venv", "ca-certificates", *packages]),
+                           "bookworm", root], capture_output=True, text=True, env=clean(PATH=path))
+    if made.returncode:
+        raise Skip("debootstrap: " + (made.stdout + made.stderr).strip().splitlines()[-1])
+    listed = command("git", "-C", TOP, "ls-files", "-co", "--exclude-standard").splitlines()
+    for f in listed:
+        if os.path.isfile(os.path.join(TOP, f)):
+            os.makedirs(os.path.dirname(os.path.join(root, "src", f)), exist_ok=True)
+            shutil.copy(os.path.join(TOP, f), os.path.join(root, "src", f))
+    for f in ("/etc/resolv.conf", "/etc/ssl/certs/ca-certificates.crt"):  # this network's, where it has its own
+        if os.path.exists(f):
+            shutil.copy(f, root + f)
+
+    def inside(line):
+        return command(unshare, "--mount", "sh", "-c", 'mount --bind /proc "$0/proc" && exec chroot "$0" /bin/sh -c "$1"', root, line,
+                       env={"PATH": path, "LC_ALL": "C.UTF-8", "REQUESTS_CA_BUNDLE": "/etc/ssl/certs/ca-certificates.crt"})
+    inside("python3 -m venv /v && /v/bin/pip install -q /src/python")
+    with open(root + "/smoke.py", "w") as f:
+        f.write(SMOKE)
+    said = inside("cd /tmp && /v/bin/python /smoke.py").split()
+    fresh = venv("fresh", sys.executable, "numpy")
+    command(fresh, "-m", "pip", "install", "-q", "--no-deps", "--force-reinstall", wheel(), env=clean())
+    here = command(fresh, "-c", SMOKE, env=clean()).split()
+    assert said[1] == here[1], (said, here)
+    return "Python %s, NumPy %s, by %s" % (said[3], said[2], said[0])
+
+
 run(globals())

@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What walks carry and draw from: colour modes, wavelengths, weights; self-tests; single walks;
 functionals; sums of derivative pictures; skies; single steps of optimisers."""
+import json
 import os
+import re
+import subprocess
 
 import importon as im
 import numpy as np
@@ -65,8 +68,6 @@ def test_weights():
 
 def test_selftest():
     """Self-tests of materials, lights and cameras: rows that hold; the command's numbers"""
-    import json
-    import subprocess
     s = im.load_file(CORNELL, res=12)
     for subject, contracts in (("material", {"draws", "albedo", "derivative"}), ("light", {"density", "light"}),
                                ("camera", {"unit", "filter"})):
@@ -163,7 +164,10 @@ def test_report():
     im.report("r.html", [p, {"picture": np.zeros((2, 3, 3)), "role": "target", "name": "<b>", "unit": "lx"}, dot,
                          {"json": {"a": [1, 2]}, "kind": "own"}, {"json": "[3]", "kind": "own"}], title="T & U", command="python x.py")
     page = open("r.html").read()
-    assert "T &amp; U" in page and "python x.py" in page and "<b>" not in page.split("<script")[0]
+    data = json.loads(re.search(r'<script[^>]*id="data"[^>]*>(.*?)</script>', page, re.S)[1])
+    assert (data["title"], data["command"]) == ("T & U", "python x.py") and "<b>" not in page
+    assert [i["kind"] for i in data["items"]] == ["picture", "picture", "derivative", "own", "own"]
+    assert data["items"][1]["name"] == "<b>" and data["items"][1]["role"] == "target" and data["items"][3]["data"] == {"a": [1, 2]}
     raises(TypeError, lambda: im.report("r.html", [{"pictur": p}]), "pictur")
     for bad in ({}, {"picture": p, "json": 1}, {"json": "{"}, {"picture": np.zeros(3)}):
         raises(im.ArgumentError, lambda: im.report("r.html", [bad]))
