@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple, Optional, Union
 
 from . import _c
-from ._library import ArgumentError, Context, Handle, Part, context, decode, integer, lib, make, own_context, text
+from ._library import ArgumentError, Context, Handle, Part, decode, integer, lib, make, own_context, text
 
 
 class PartsInfo(NamedTuple):

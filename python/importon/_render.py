@@ -7,7 +7,6 @@ import json as _json
 from collections.abc import Mapping
 from typing import Any, Union
 
-from . import _c
 from ._library import failure, integer, lib, not_inside, run
 from ._params import SceneParameters
 from ._picture import Picture, from_film

@@ -9,9 +9,9 @@ from typing import Any, Optional
 
 from . import _c
 from ._library import ArgumentError, context, integer, lib, make, text
-from ._picture import Picture, to_film
+from ._picture import to_film
 
-_KEYS = ("kind", "name", "role", "unit", "view", "picture", "json")
+_KEYS = ("kind", "name", "role", "unit", "view", "picture", "json", "image")
 
 
 def report(path: Any, items: Sequence[Any], *, title: Optional[str] = None, command: Optional[str] = None) -> None:
@@ -24,11 +24,11 @@ def report(path: Any, items: Sequence[Any], *, title: Optional[str] = None, comm
     path : str or PathLike
         The page appears whole or not at all.
     items : sequence of Picture, array or dict
-        Pictures; or dictionaries with "picture" or "json" (any value that JSON has, or its text),
-        "kind" ("picture", "derivative"; "fit", "check" and "manifest" for the JSON that these
-        commands write; others are kept in the page, and not shown), "name", "role" ("target" or
-        "picture", which the page compares), "unit" and "view" (pictures of one view are flipped
-        in place).
+        Pictures; or dictionaries with "picture", "json" (any value that JSON has, or its text) or
+        "image" (bytes of a PNG or SVG file), "kind" ("picture", "derivative", "image"; "fit",
+        "check", ... for the JSON that these commands write; of others the page lists the values),
+        "name", "role" ("target" or "picture", which the page compares), "unit" and "view"
+        (pictures of one view are flipped in place).
     title, command : str, optional
         What stands above; how the result was made, to be copied.
 
@@ -37,7 +37,7 @@ def report(path: Any, items: Sequence[Any], *, title: Optional[str] = None, comm
     TypeError
         A dictionary has another key.
     ArgumentError
-        An item has neither a picture nor JSON, or both, or JSON that does not parse.
+        An item has not exactly one of picture, JSON and image, or JSON that does not parse.
     FileError
         The file cannot be written.
 
@@ -49,20 +49,26 @@ def report(path: Any, items: Sequence[Any], *, title: Optional[str] = None, comm
     True
     """
     ctx = context()
-    rows, kept = [], []
+    rows: list[Any] = []
+    kept: list[Any] = []
     for item in items:
         d = dict(item) if isinstance(item, Mapping) else {"picture": item}
         for key in d:
             if key not in _KEYS:
                 raise TypeError("an item has no '%s'; it has: %s" % (key, ", ".join(_KEYS)))
-        picture, data = d.get("picture"), d.get("json")
-        if picture is None and "json" not in d:
-            raise ArgumentError("an item has neither 'picture' nor 'json'")
+        picture, data, image = d.get("picture"), d.get("json"), d.get("image")
+        if picture is None and image is None and "json" not in d:
+            raise ArgumentError("an item has none of 'picture', 'json' and 'image'")
         film = None if picture is None else to_film(picture, ctx)
         if "json" in d and not isinstance(data, str):
             data = json.dumps(data)
-        kind = d.get("kind") or ("derivative" if isinstance(picture, Picture) and picture.signed else "picture")
+        kind = d.get("kind") or ("image" if image is not None else "derivative" if getattr(picture, "signed", False)
+                                 else "picture")
         row = make(_c.imp_report_item, view=integer(d.get("view", 0), "view"), film=None if film is None else film.pointer)
+        if image is not None:
+            data_of = bytes(image)
+            row.image_size, row.image = len(data_of), ctypes.cast(ctypes.c_char_p(data_of), ctypes.c_void_p)
+            kept.append(data_of)
         for field, value in (("kind", kind), ("name", d.get("name")), ("role", d.get("role")), ("unit", d.get("unit")),
                              ("json", data)):
             setattr(row, field, None if value is None else text(value, field))

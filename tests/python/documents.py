@@ -12,7 +12,7 @@ import warnings
 
 import importon
 import numpy as np
-from tap import SCENES, TOP, Skip, needs, raises, run
+from tap import SCENES, TOP, Skip, needs, run
 
 MODULES = sorted(f[:-3] for f in os.listdir(os.path.dirname(importon.__file__))
                  if f.endswith(".py") and f not in ("__init__.py", "_c.py", "torch.py", "jax.py"))

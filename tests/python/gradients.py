@@ -4,7 +4,7 @@ import os
 
 import importon as im
 import numpy as np
-from tap import SCENES, TOP, raises, run, spread, z
+from tap import SCENES, raises, run, spread, z
 
 RED = "red.reflectance.value"
 

@@ -4,7 +4,6 @@ result, never a crash. In a build with the address sanitizer, run with its runti
 import gc
 import os
 import random
-import sys
 import warnings
 
 import importon as im

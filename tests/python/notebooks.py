@@ -2,14 +2,13 @@
 """The notebooks of examples/, run from their first cell to the last: by Jupyter's client where
 it is installed, else cell by cell here."""
 import contextlib
-import glob
 import io
 import json
 import os
-import sys
+import re
 import time
 
-from tap import SCENES, TOP, Skip, needs, run
+from tap import SCENES, TOP, needs, run
 
 
 def run_here(cells):
@@ -42,7 +41,8 @@ def execute(name, *modules):
     shown = [k for c in read.cells if c.cell_type == "code" for o in c.outputs for k in o.get("data", {})]
     assert "text/html" in shown, shown
     said = "".join(o.get("text", "") for c in read.cells if c.cell_type == "code" for o in c.outputs if o.output_type == "stream")
-    return "%.0f s, by Jupyter" % (time.time() - start) + ("; " + said.strip().splitlines()[-1] if said else "")
+    return "%.0f s, by Jupyter" % (time.time() - start) + "".join("; " + re.sub(r"  +", " ", x) for x in said.splitlines()
+                                                                       if "importon" in x or "Mitsuba" in x or "desk" in x or "rms" in x)
 
 
 def test_red_wall():

@@ -4,7 +4,6 @@ import gc
 import itertools
 import multiprocessing
 import os
-import random
 import subprocess
 import sys
 import threading

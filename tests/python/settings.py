@@ -162,14 +162,15 @@ def test_report():
     p = im.render(box(), spp=2)
     dot = im.render_forward(box(), RED, {RED: 1}, spp=2)
     im.report("r.html", [p, {"picture": np.zeros((2, 3, 3)), "role": "target", "name": "<b>", "unit": "lx"}, dot,
-                         {"json": {"a": [1, 2]}, "kind": "own"}, {"json": "[3]", "kind": "own"}], title="T & U", command="python x.py")
+                         {"json": {"a": [1, 2]}, "kind": "own"}, {"json": "[3]", "kind": "own"}, {"image": p._repr_png_()}],
+              title="T & U", command="python x.py")
     page = open("r.html").read()
     data = json.loads(re.search(r'<script[^>]*id="data"[^>]*>(.*?)</script>', page, re.S)[1])
     assert (data["title"], data["command"]) == ("T & U", "python x.py") and "<b>" not in page
-    assert [i["kind"] for i in data["items"]] == ["picture", "picture", "derivative", "own", "own"]
+    assert [i["kind"] for i in data["items"]] == ["picture", "picture", "derivative", "own", "own", "image"]
     assert data["items"][1]["name"] == "<b>" and data["items"][1]["role"] == "target" and data["items"][3]["data"] == {"a": [1, 2]}
     raises(TypeError, lambda: im.report("r.html", [{"pictur": p}]), "pictur")
-    for bad in ({}, {"picture": p, "json": 1}, {"json": "{"}, {"picture": np.zeros(3)}):
+    for bad in ({}, {"picture": p, "json": 1}, {"json": "{"}, {"picture": np.zeros(3)}, {"image": b"x", "json": 1}):
         raises(im.ArgumentError, lambda: im.report("r.html", [bad]))
     raises(im.FileError, lambda: im.report("no/where.html", [p]))
     assert open("r.html").read() == page
