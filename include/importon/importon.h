@@ -865,7 +865,8 @@ struct imp_optimizer_rule {
  *              step. state[0] is the number of steps taken.
  * @param[in,out] x     [n].
  * @return IMP_OK; IMP_E_ARG (message: imp_last_error(NULL)) for a number of the rule
- *         outside its range or a gradient that is not finite: nothing is changed.
+ *         outside its range, a gradient that is not finite or a bound that no number keeps:
+ *         nothing is changed.
  */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_optimizer_step(const struct imp_optimizer_rule *rule, size_t n,

@@ -62,9 +62,10 @@ static enum imp_status rule_check(const struct imp_optimizer_rule *r)
             return imp__error(NULL, IMP_E_ARG,
                               "imp_optimizer_step: %s = %g is outside [0, 1)",
                               decays[k].name, decays[k].value);
-    if (!(r->epsilon > 0))
+    if (!(r->epsilon > 0) || !isfinite(r->epsilon))
         return imp__error(NULL, IMP_E_ARG,
-                          "imp_optimizer_step: epsilon = %g is not positive", r->epsilon);
+                          "imp_optimizer_step: epsilon = %g is not positive and finite",
+                          r->epsilon);
     return IMP_OK;
 }
 
@@ -80,6 +81,10 @@ enum imp_status imp_optimizer_step(const struct imp_optimizer_rule *rule, size_t
     IMP_FINITE(NULL, own.learning_rate, "learning_rate");
     IMP_CHECKED(rule_check(&own));
     IMP_FINITE_ALL(NULL, gradient, n, "gradient");
+    for (size_t k = 0; k < n; k++) /* infinite: none, but not on the wrong side */
+        if ((lo && !(lo[k] < INFINITY)) || (hi && !(hi[k] > -INFINITY)))
+            return imp__error(NULL, IMP_E_ARG, "imp_optimizer_step: %s[%zu] is no bound",
+                              lo && !(lo[k] < INFINITY) ? "lo" : "hi", k);
     (own.kind == IMP_RULE_ADAM ? adam : descent)(&own, n, gradient, lo, hi, state, x);
     return IMP_OK;
 }

@@ -181,7 +181,8 @@ NOT_NULLABLE = {"imp_bend_set_options.o", "imp_elements_fit.options",
 INPUT = {"imp_bend_adjoint.out"}  # structs of pointers to write to, not written themselves
 # Numbers that may be anything: a NaN is a documented value, infinity is a bound, or the
 # number is not used with the good arguments. What comes out must be finite all the same.
-ANY_NUMBER = {"imp_bend_set_bounds.lo": "infinite: none", "imp_bend_set_bounds.hi": "infinite: none",
+ANY_NUMBER = {"imp_optimizer_step.lo": "infinite: none", "imp_optimizer_step.hi": "infinite: none",
+              "imp_bend_set_bounds.lo": "infinite: none", "imp_bend_set_bounds.hi": "infinite: none",
               "imp_bend_adjoint.taps": "there are none", "imp_bend_adjoint.tap_bars": "there are none",
               "imp_build_texels.lo": "infinite: none", "imp_build_texels.hi": "infinite: none",
               "imp_field_eval.x": "a function of x", "imp_field_splat.x": "adds a function of x",
