@@ -158,6 +158,10 @@ struct imp_bsdf {
     int n_lobes; /* delta lobes have the indices below it; build sets it. 0 of a kind with
                     IMP_BSDF_DELTA: not said, at most 8 */
     bool shaped; /* a scalar input is a spectrum: lanes differ in more than colour */
+    /* Bit l: delta lobe l goes straight on, wi = -wo, as through a hole; build sets it.
+     * volpath does not count it as a bounce, and light samples pass it. Its coefficient
+     * depends on the angle to the normal alone. */
+    uint64_t straight;
 };
 
 struct imp_bsdf_ops {

@@ -68,7 +68,7 @@ void imp__probe_follow(struct imp_step *s)
     struct imp_walk walk = {.key = imp__key_branch(s->walk->key, side.depth, 0x51de)};
     imp_spec scratch[IMP_INPUTS_MAX];
     probe->length *= p->total / p->weight;
-    probe->emits = max_depth < 0 || side.depth < max_depth;
+    probe->emits = max_depth < 0 || imp__bounces(&side) < max_depth;
     p->from->probe = probe;
     s->walk->valid = true; /* although nothing may have scattered it */
     tracer.active = NULL;

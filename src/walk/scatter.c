@@ -58,7 +58,7 @@ static bool roulette(struct imp_step *s, const struct imp_bsdf *b, imp_spec fact
     if (imp_unlikely(integrator->photons)) {
         q = photon_survival(s, b, factor);
     } else {
-        if (s->depth + 1 < integrator->rr_depth && !guided) return true;
+        if (imp__bounces(s) + 1 < integrator->rr_depth && !guided) return true;
         q = fmin(imp__max_used(s->beta, s->at.carried) * s->eta * s->eta, 0.95);
         if (guided) q = imp__guided_survival(s, q);
     }
@@ -91,6 +91,13 @@ static double density(struct imp_step *s, const struct imp_bsdf *b,
     return *competing = 1 / imp__lane_mis_decide(s, p);
 }
 
+/* May nothing follow but what is no bounce? */
+static bool last_bounce(const struct imp_step *s)
+{
+    const int max_depth = s->tracer->integrator->max_depth;
+    return max_depth >= 0 && imp__bounces(s) + 1 >= max_depth;
+}
+
 bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_surface *at,
                   const struct imp_frame *frame)
 {
@@ -108,6 +115,10 @@ bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_sur
     const imp_v3 w = imp__to_world(frame, dirs.wi);
     dirs.wo = s->wo;
     dirs.wi = imp__decide(dirs.wi);
+    const bool straight = imp_unlikely(b->straight) && s->segment->through &&
+                          dirs.lobe >= 0 && dirs.lobe < 64 &&
+                          b->straight >> dirs.lobe & 1;
+    if (imp_unlikely(!straight && b->straight) && last_bounce(s)) return false;
     imp_spec f;
     double competing;
     const double pdf = imp__decide1(density(s, b, &dirs, w, drawn, &competing, &f));
@@ -137,11 +148,15 @@ bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_sur
     imp__guided_leave(&s->guided);
     s->d = w;
     s->o = imp__offset(at->p, at->ng, s->d);
-    s->from = at->p;
     s->t_min = 0;
     s->t_max = INFINITY;
     if (imp_unlikely(s->segment->leave != NULL)) s->segment->leave(s, v, at);
     /* Where no connection could have been made, MIS has nothing to weigh. */
+    if (imp_unlikely(straight)) { /* it could have been made where the walk comes from */
+        s->straight++;
+        return true;
+    }
+    s->from = at->p;
     if (imp_likely(!s->mixed.splits)) competing = pdf;
     s->pdf = dirs.lobe == IMP_SMOOTH && s->segment->connects ? competing : 0;
     return true;

@@ -37,6 +37,8 @@ struct imp_moving {
 struct imp_segment_ops {
     const char *name;
     bool connects; /* a straight line from its end can reach a light */
+    bool through;  /* ... also through lobes that go straight on (imp_bsdf.straight),
+                      which are no bounces then */
 
     /* ---- Decide ---- */
     /* Before the first segment of a walk. False: the walk is dropped. */

@@ -52,7 +52,8 @@ struct imp_step {
     struct imp_walk *walk;
     struct imp_arena *arena;
     bool recorded; /* also where only the value counts, if vertices move with a field */
-    int depth;
+    int depth;     /* vertices before this one, which number its random numbers */
+    int straight;  /* of them, those that light passed straight on: no bounces */
 
     /* The vertex at work: as decided, in double; its inputs. */
     struct imp_texcoord at;
@@ -80,6 +81,12 @@ struct imp_step {
     struct imp_guided guided;
     struct imp_mixed mixed;
 };
+
+/* Depth of the vertex at work as max_depth counts it. */
+static inline int imp__bounces(const struct imp_step *s)
+{
+    return s->depth - s->straight;
+}
 
 /* What a record stores of v, in double again. */
 static inline imp_v3 imp__decide(imp_v3 v)

@@ -93,15 +93,15 @@ void imp__vertex_place(struct imp_step *s, struct imp_vertex *v,
 static bool seen(const struct imp_step *s)
 {
     const struct imp_walk_integrator *integrator = s->tracer->integrator;
-    return !integrator->hide_emitters || (integrator->first_hit && s->depth > 0);
+    return !integrator->hide_emitters || (integrator->first_hit && imp__bounces(s) > 0);
 }
 
 /* The ray leaves the scene and meets the environment. */
 static void sky_meet(struct imp_step *s)
 {
     const int max_depth = s->tracer->integrator->max_depth;
-    const bool counts = max_depth < 0 || s->depth < max_depth;
-    const bool hidden = s->tracer->integrator->hide_emitters && s->depth == 0;
+    const bool counts = max_depth < 0 || imp__bounces(s) < max_depth;
+    const bool hidden = s->tracer->integrator->hide_emitters && imp__bounces(s) == 0;
     if (s->scene->environment < 0 || hidden || !counts) return;
     struct imp_vertex *v = vertex_add(s, 0);
     if (!v) return;
@@ -326,8 +326,10 @@ vertex_work(struct imp_step *s, struct imp_vertex *v, const struct imp_hit *hit,
 {
     const struct imp_walk_integrator *integrator = s->tracer->integrator;
     const int max_depth = integrator->max_depth;
-    const bool counts = max_depth < 0 || s->depth < max_depth;
-    const bool goes_on = max_depth < 0 || s->depth + 1 < max_depth;
+    const bool counts = max_depth < 0 || imp__bounces(s) < max_depth;
+    const bool bounces = max_depth < 0 || imp__bounces(s) + 1 < max_depth;
+    const bool goes_on =
+        bounces || (imp_unlikely(v->bsdf->straight) && s->segment->through && counts);
     if (imp_unlikely(s->mixed.all != NULL || s->guided.here))
         mixture_meet(s, v->bsdf, at);
     else s->mixed.here = s->mixed.splits = false;
@@ -346,7 +348,8 @@ vertex_work(struct imp_step *s, struct imp_vertex *v, const struct imp_hit *hit,
     /* The connection to a light. */
     struct imp_shadow shadow;
     shadow.wanted = false;
-    if ((v->bsdf->flags & IMP_BSDF_SMOOTH) && s->segment->connects && integrator->lights)
+    if ((v->bsdf->flags & IMP_BSDF_SMOOTH) && s->segment->connects &&
+        integrator->lights && bounces)
         imp__light_sample(s, v, at, frame, &shadow);
 
     /* The continuation. */

@@ -58,16 +58,81 @@ static struct factor factor_of(const struct imp_event *e, imp_spec sigma, bool d
     return x;
 }
 
+/* ---- Surfaces that light samples pass ------------------------------------------------ */
+
+/* Where the surface was passed. */
+static struct imp_texcoord passed_at(const struct imp_track *track,
+                                     const struct imp_event *e,
+                                     const struct imp_carried *carried)
+{
+    return (struct imp_texcoord){
+        .uv = {e[1].t, e[1].bound}, .p = event_place(track, e), .carried = carried};
+}
+/* Lobe by lobe, directions in its frame, about the normal as one likes. */
+static struct imp_dirs passed_dirs(const struct imp_event *e, int lobe)
+{
+    const double c = imp_clamp((double)e->bound, -1.0, 1.0);
+    const imp_v3 wo = {sqrt(1 - c * c), 0, c, 0};
+    return (struct imp_dirs){.wo = wo, .wi = -wo, .lobe = lobe};
+}
+
+imp_spec imp__passes_eval(const struct imp_scene *scene, const struct imp_track *track,
+                          const struct imp_event *e, const struct imp_carried *carried)
+{
+    const struct imp_shape *shape = scene->shapes[e->medium];
+    const struct imp_bsdf *b = imp__shape_bsdf(scene, shape);
+    const struct imp_texcoord at = passed_at(track, e, carried);
+    imp_spec in[IMP_INPUTS_MAX], f, sum = {0};
+    imp__evaluate_inputs(b, shape, &at, in);
+    for (int l = 0; l < 64; l++) {
+        if (!(b->straight >> l & 1)) continue;
+        const struct imp_dirs dirs = passed_dirs(e, l);
+        imp__bsdf_eval(b, carried, in, &dirs, &f);
+        sum += f;
+    }
+    return sum;
+}
+
+/* Its derivatives with respect to the inputs of the material, d [n_in]. NULL: nobody wants
+ * them. */
+static const struct imp_bsdf *passes_d(const struct imp_tracer *tracer,
+                                       const struct imp_event *e,
+                                       const struct imp_texcoord *at, imp_spec *d)
+{
+    const struct imp_shape *shape = tracer->scene->shapes[e->medium];
+    const struct imp_bsdf *b = imp__shape_bsdf(tracer->scene, shape);
+    imp_spec in[IMP_INPUTS_MAX], of_lobe[IMP_INPUTS_MAX];
+    if (b->index < 0 || !tracer->active->bsdf[b->index]) return NULL;
+    imp__evaluate_inputs(b, shape, at, in);
+    for (int j = 0; j < b->n_in; j++) d[j] = (imp_spec){0};
+    for (int l = 0; l < 64; l++) {
+        if (!(b->straight >> l & 1)) continue;
+        const struct imp_dirs dirs = passed_dirs(e, l);
+        imp__bsdf_eval_d(b, at->carried, in, &dirs, of_lobe);
+        for (int j = 0; j < b->n_in; j++) d[j] += of_lobe[j];
+    }
+    return b;
+}
+
+/* ---- Products over the events --------------------------------------------------------- */
+
+static imp_spec event_factor(const struct imp_scene *scene, const struct imp_track *track,
+                             const struct imp_event *e, const struct imp_carried *carried)
+{
+    imp_spec in[IMP_INPUTS_MAX];
+    if (e->kind == IMP_PASSES) return imp__passes_eval(scene, track, e, carried);
+    if (e->kind == IMP_PASSES_UV) return imp__spec(1);
+    const imp_spec sigma =
+        imp__extinction_at(scene->media[e->medium], event_place(track, e), carried, in);
+    return factor_of(e, sigma, false).f;
+}
+
 imp_spec imp__track_eval(const struct imp_scene *scene, const struct imp_track *track,
                          const struct imp_carried *carried)
 {
-    imp_spec f = imp__spec(1), in[IMP_INPUTS_MAX];
-    for (int i = 0; i < track->n; i++) {
-        const struct imp_event *e = &track->event[i];
-        const imp_spec sigma = imp__extinction_at(scene->media[e->medium],
-                                                  event_place(track, e), carried, in);
-        f *= factor_of(e, sigma, false).f;
-    }
+    imp_spec f = imp__spec(1);
+    for (int i = 0; i < track->n; i++)
+        f *= event_factor(scene, track, &track->event[i], carried);
     return f;
 }
 
@@ -82,12 +147,8 @@ static struct product product_of(const struct imp_scene *scene,
                                  const struct imp_carried *carried)
 {
     struct product p = {.rest = imp__spec(1)};
-    imp_spec in[IMP_INPUTS_MAX];
     for (int i = 0; i < track->n; i++) {
-        const struct imp_event *e = &track->event[i];
-        const imp_spec sigma = imp__extinction_at(scene->media[e->medium],
-                                                  event_place(track, e), carried, in);
-        const imp_spec f = factor_of(e, sigma, false).f;
+        const imp_spec f = event_factor(scene, track, &track->event[i], carried);
         for (int c = 0; c < 4; c++)
             if (f[c] == 0) p.zeros[c]++;
             else p.rest[c] *= f[c];
@@ -105,16 +166,30 @@ static imp_spec others(const struct product *p, imp_spec f)
     return x;
 }
 
-/* d f/d in[j] of event i, for all n_own inputs of its medium. False: it has none. */
-static bool event_d(const struct imp_tracer *tracer, const struct imp_track *track, int i,
-                    const struct imp_carried *carried, const struct product *p,
-                    struct imp_texcoord *at, imp_spec *d)
+/* Inputs that the factor of event i depends on, how many, and d product/d each of them.
+ * NULL: nobody wants these. */
+static const struct imp_input *const *
+event_d(const struct imp_tracer *tracer, const struct imp_track *track, int i,
+        const struct imp_carried *carried, const struct product *p,
+        struct imp_texcoord *at, int *n, imp_spec *d)
 {
+    const struct imp_active *active = tracer->active;
     const struct imp_event *e = &track->event[i];
+    if (e->kind == IMP_PASSES_UV) return NULL;
+    if (e->kind == IMP_PASSES) {
+        *at = passed_at(track, e, carried);
+        const struct imp_bsdf *b = passes_d(tracer, e, at, d);
+        if (!b) return NULL;
+        const imp_spec rest =
+            others(p, imp__passes_eval(tracer->scene, track, e, carried));
+        for (int j = 0; j < b->n_in; j++) d[j] *= rest;
+        *n = b->n_in;
+        return b->input;
+    }
     const struct imp_medium *m = tracer->scene->media[e->medium];
     struct imp_coefficients dc[IMP_INPUTS_MAX];
     imp_spec in[IMP_INPUTS_MAX];
-    if (!tracer->active->medium || !tracer->active->medium[e->medium]) return false;
+    if (!active->medium || !active->medium[e->medium]) return NULL;
     *at = (struct imp_texcoord){.p = event_place(track, e), .carried = carried};
     const imp_spec sigma = imp__extinction_at(m, at->p, carried, in);
     const struct factor x = factor_of(e, sigma, true);
@@ -123,25 +198,34 @@ static bool event_d(const struct imp_tracer *tracer, const struct imp_track *tra
     for (int j = 0; j < m->n_own; j++)
         d[j] = m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION ? dc[j].extinction * slope
                                                               : (imp_spec){0};
-    return true;
+    *n = m->n_own;
+    return m->input;
+}
+
+/* Does the product have a derivative that is wanted? */
+static bool track_active(const struct imp_tracer *tracer, const struct imp_track *track)
+{
+    if (tracer->active->medium) return true;
+    for (int i = 0; i < track->n; i++)
+        if (track->event[i].kind == IMP_PASSES) return true;
+    return false;
 }
 
 void imp__track_sweep(const struct imp_tracer *tracer, const struct imp_track *track,
                       const struct imp_carried *carried, imp_spec f_bar,
                       struct imp_sink *sink)
 {
-    if (!tracer->active->medium) return;
+    if (!track_active(tracer, track)) return;
     const struct product p = product_of(tracer->scene, track, carried);
     for (int i = 0; i < track->n; i++) {
-        const struct imp_medium *m = tracer->scene->media[track->event[i].medium];
         struct imp_texcoord at;
         imp_spec d[IMP_INPUTS_MAX];
-        if (!event_d(tracer, track, i, carried, &p, &at, d)) continue;
-        for (int j = 0; j < m->n_own; j++) {
-            d[j] *= f_bar;
-            if (m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION)
-                imp__inputs_scatter(&m->input[j], 1, &at, &d[j], sink);
-        }
+        int n;
+        const struct imp_input *const *input =
+            event_d(tracer, track, i, carried, &p, &at, &n, d);
+        if (!input) continue;
+        for (int j = 0; j < n; j++) d[j] *= f_bar;
+        imp__inputs_scatter(input, n, &at, d, sink);
     }
 }
 
@@ -152,18 +236,17 @@ imp_spec imp__track_tangent(const struct imp_tracer *tracer,
                             const void *x_dot)
 {
     imp_spec f_dot = {0};
-    if (!tracer->active->medium) return f_dot;
+    if (!track_active(tracer, track)) return f_dot;
     const struct product p = product_of(tracer->scene, track, carried);
     for (int i = 0; i < track->n; i++) {
-        const struct imp_medium *m = tracer->scene->media[track->event[i].medium];
         struct imp_texcoord at;
-        imp_spec d[IMP_INPUTS_MAX], in_dot;
-        if (!event_d(tracer, track, i, carried, &p, &at, d)) continue;
-        for (int j = 0; j < m->n_own; j++) {
-            if (!(m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION)) continue;
-            imp__inputs_tangent(&m->input[j], 1, &at, dot, x_dot, &in_dot);
-            f_dot += d[j] * in_dot;
-        }
+        imp_spec d[IMP_INPUTS_MAX], in_dot[IMP_INPUTS_MAX];
+        int n;
+        const struct imp_input *const *input =
+            event_d(tracer, track, i, carried, &p, &at, &n, d);
+        if (!input) continue;
+        imp__inputs_tangent(input, n, &at, dot, x_dot, in_dot);
+        for (int j = 0; j < n; j++) f_dot += d[j] * in_dot[j];
     }
     return f_dot;
 }

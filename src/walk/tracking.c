@@ -222,7 +222,7 @@ static void pass(struct imp_step *s, const struct flight *w)
 static enum imp_meeting meet(struct imp_step *s, struct imp_hit *hit)
 {
     const struct imp_scene *scene = s->scene;
-    const bool hide = s->tracer->integrator->hide_emitters && s->depth == 0;
+    const bool hide = s->tracer->integrator->hide_emitters && imp__bounces(s) == 0;
     const imp_v3 start = s->o, d = s->d;
     enum imp_meeting met = IMP_MEETS_NOTHING;
     struct flight w = flight_from(s, start, d, ALONG_WALK);
@@ -292,6 +292,28 @@ static void leave(struct imp_step *s, const struct imp_vertex *v,
 
 /* ---- To light samples ---------------------------------------------------------------- */
 
+/* Past a surface that lets a part go straight on. False: nothing, or no memory. */
+static bool go_through(struct flight *w, const struct imp_shape *shape,
+                       const struct imp_surface *at)
+{
+    struct imp_step *s = w->s;
+    const struct imp_bsdf *b = imp__shape_bsdf(s->scene, shape);
+    struct imp_track here;
+    const struct imp_event e[2] = {{.t = (imp_decided)imp__dot(at->p - w->o, w->d),
+                                    .bound = (imp_decided)-imp__dot(at->n, w->d),
+                                    .medium = shape->index,
+                                    .kind = IMP_PASSES},
+                                   {.t = (imp_decided)at->uv[0],
+                                    .bound = (imp_decided)at->uv[1],
+                                    .kind = IMP_PASSES_UV}};
+    imp__store_v3(here.o, w->o);
+    imp__store_v3(here.d, w->d);
+    const imp_spec f = imp__passes_eval(s->scene, &here, e, s->at.carried);
+    if (imp__is_zero_used(f, s->at.carried) && !imp__wants_derivative(s, b)) return false;
+    w->f *= f;
+    return event_add(w, e[0]) && event_add(w, e[1]);
+}
+
 static bool sees(struct imp_step *s, struct imp_vertex *v, const struct imp_surface *from,
                  const struct imp_shadow *shadow, imp_spec *T)
 {
@@ -309,7 +331,8 @@ static bool sees(struct imp_step *s, struct imp_vertex *v, const struct imp_surf
         struct imp_hit hit;
         const bool found = imp__intersect(scene, &o, &d, 0, end - base, &hit);
         const struct imp_shape *shape = found ? scene->shapes[hit.shape] : NULL;
-        if (found && !is_passed(scene, shape)) return false;
+        const bool hole = found && is_passed(scene, shape);
+        if (found && !hole && !imp__shape_bsdf(scene, shape)->straight) return false;
         if (m) fly(&w, m, passed ? base : back, found ? base + hit.t : end, false, &t);
         if (s->walk->dropped) return false;
         if (!found) {
@@ -319,6 +342,7 @@ static bool sees(struct imp_step *s, struct imp_vertex *v, const struct imp_surf
         }
         struct imp_surface at;
         shape->ops->surface(shape, &hit, &o, &d, &at);
+        if (!hole && !go_through(&w, shape, &at)) return false;
         m = beyond(shape, at.ng, d, m);
         o = imp__offset(at.p, at.ng, d);
         base = imp__dot(o - start, d);
@@ -334,6 +358,7 @@ static bool sees(struct imp_step *s, struct imp_vertex *v, const struct imp_surf
 
 const struct imp_segment_ops imp__tracking = {.name = "tracking",
                                               .connects = true,
+                                              .through = true,
                                               .begin = begin,
                                               .meet = meet,
                                               .arrive = arrive,

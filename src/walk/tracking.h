@@ -11,6 +11,7 @@
  *     a collision after that length                sigma exp(-sigma t)
  *     bounded by b, a null collision at t          1 - sigma(t)/b
  *     bounded by b, a collision at t               sigma(t)/b
+ *     on the way to a light sample, a surface      sum of its lobes that go straight on
  *
  * which is also the density with which each lane would have drawn it, so the weight of a
  * flight is 1 where extinction has no colour (lane_mis.h). Flights are analog: closed
@@ -22,7 +23,15 @@
 
 #include "step.h"
 
-enum imp_event_kind { IMP_CROSSES, IMP_COLLIDES, IMP_NULL_AT, IMP_REAL_AT };
+enum imp_event_kind {
+    IMP_CROSSES,
+    IMP_COLLIDES,
+    IMP_NULL_AT,
+    IMP_REAL_AT,
+    IMP_PASSES,   /* bound: cosine at the shading normal of the side that it comes from,
+                     medium: the shape */
+    IMP_PASSES_UV /* follows it; t, bound: u, v */
+};
 
 struct imp_event {
     imp_decided t;     /* a length in a uniform medium; else distance from the start */
@@ -51,6 +60,10 @@ imp_spec imp__track_tangent(const struct imp_tracer *tracer,
                             const struct imp_carried *carried,
                             double (*dot)(const void *x_dot, int param, size_t element),
                             const void *x_dot);
+
+/* What goes straight on through a surface of this material, in the event and the next. */
+imp_spec imp__passes_eval(const struct imp_scene *scene, const struct imp_track *track,
+                          const struct imp_event *e, const struct imp_carried *carried);
 
 /* Extinction at p: those inputs alone that it depends on are looked up, the others are 0.
  */

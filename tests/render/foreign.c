@@ -90,6 +90,8 @@ int main(void)
              shared);
     agrees(ctx, folder, "test_hetero_sigmat_volpath.xml", "test_hetero_sigmat", IMP_RGB,
            1.005);
+    agrees(ctx, folder, "test_homo_area_light_volpath.xml", "test_homo_area_light",
+           IMP_RGB, 1.03);
     imp_context_destroy(ctx);
     return tap_done();
 }

@@ -160,6 +160,83 @@ static void inside(void)
 }
 
 /* Numbers are set beyond the bounds that were made first. */
+/* A floor under a lamp, seen from between it and a black pane of which `part` goes
+ * straight on: that is no bounce, and light samples pass it, of points too. */
+static imp_scene *under_pane(const char *pane, const char *lamp)
+{
+    char text[2048];
+    snprintf(text, sizeof text,
+             "<scene version='3.0.0'><integrator type='volpath'>"
+             "<integer name='max_depth' value='2'/></integrator>%s"
+             "<shape type='rectangle'><bsdf type='diffuse'/></shape>"
+             "<shape type='rectangle'>%s<transform name='to_world'><scale value='9'/>"
+             "<translate z='2'/></transform></shape>"
+             "<sensor type='orthographic'><transform name='to_world'>"
+             "<scale value='0.001'/><lookat origin='0,0,1' target='0,0,0' up='0,1,0'/>"
+             "</transform><film type='hdrfilm'><integer name='width' value='4'/>"
+             "<integer name='height' value='4'/><rfilter type='box'/></film></sensor>"
+             "</scene>",
+             lamp, pane);
+    return test_scene_text(ctx, text, IMP_MONO);
+}
+
+static void panes(void)
+{
+    static const char point[] = "<emitter type='point'><point name='position' x='0' "
+                                "y='0' z='3'/></emitter>",
+                      area[] = "<shape type='rectangle'><emitter type='area'/>"
+                               "<transform name='to_world'><rotate x='1' angle='180'/>"
+                               "<translate z='3'/></transform></shape>";
+    static const struct {
+        const char *what, *pane, *param;
+        double part, slope; /* d part/d param */
+    } cases[] = {
+        {"a mask",
+         "<bsdf type='mask' id='m'><float name='opacity' value='0.25'/>"
+         "<bsdf type='diffuse'><float name='reflectance' value='0'/></bsdf></bsdf>",
+         "m.opacity.value", .75, -1},
+        {"a mask that lets nothing pass",
+         "<bsdf type='mask' id='m'><float name='opacity' value='1'/>"
+         "<bsdf type='diffuse'><float name='reflectance' value='0'/></bsdf></bsdf>",
+         "m.opacity.value", 0, -1},
+        {"a thin sheet of index 1.5",
+         "<bsdf type='thindielectric' id='m'><float name='int_ior' value='1.5'/>"
+         "<float name='ext_ior' value='1'/>"
+         "<float name='specular_transmittance' value='0.5'/></bsdf>",
+         "m.specular_transmittance.value", .5 * 12 / 13, 12. / 13},
+        {"a hole in a mask in a blend",
+         "<bsdf type='blendbsdf' id='m'><float name='weight' value='0.5'/>"
+         "<bsdf type='null'/><bsdf type='mask'><float name='opacity' value='0.5'/>"
+         "<bsdf type='diffuse'><float name='reflectance' "
+         "value='0'/></bsdf></bsdf></bsdf>",
+         "m.weight.value", .75, -.5},
+    };
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++)
+        for (int broad = 0; broad < 2; broad++) {
+            const char *lamp = broad ? area : point;
+            double open[3], open_se[3], mean[3], se[3], g[8], g_se[8];
+            struct imp_run run = IMP_RUN_INIT;
+            struct imp_estimate v;
+            imp_scene *s = under_pane("<bsdf type='null'/>", lamp);
+            mean_of(s, 4096, open, open_se);
+            imp_scene_destroy(s);
+            s = under_pane(cases[k].pane, lamp);
+            mean_of(s, 4096, mean, se);
+            /* Light from all over the lamp meets the sheet at an angle. */
+            const double part = cases[k].part, slack = broad && k == 2 ? .003 : 1e-6;
+            near_se(mean[0], hypot(se[0], part * open_se[0]) + slack * open[0],
+                    part * open[0], .006 * open[0], cases[k].what);
+            imp_problem *p = test_problem(ctx, s, cases[k].param);
+            run.spp = 4096;
+            run.seed = 9;
+            test_must(ctx, imp_problem_functional(p, NULL, &run, &v, g, g_se));
+            near_se(g[0], hypot(g_se[0], open_se[0]) + slack * open[0],
+                    cases[k].slope * open[0], .02 * open[0], cases[k].param);
+            imp_problem_destroy(p);
+            imp_scene_destroy(s);
+        }
+}
+
 static void bounds_follow(void)
 {
     const float value[8] = {1, 0, 0, 0, 0, 0, 0, 0};
@@ -241,6 +318,7 @@ int main(void)
     transmittances();
     colours();
     inside();
+    panes();
     bounds_follow();
     furnace();
 

@@ -29,6 +29,8 @@ static enum imp_status build(const struct imp_build *build, void *self,
         b->flags |= b->child[k]->flags & ~(unsigned)IMP_BSDF_NULL;
         b->absorb = imp_max(b->absorb, b->child[k]->absorb);
         lobes = imp_max(lobes, imp__lobes_of(b->child[k]));
+        for (int l = 0; l < 32; l++)
+            b->straight |= (b->child[k]->straight >> l & 1) << (2 * l + k);
     }
     b->n_lobes = 2 * lobes;
     return imp__lobes_check(build, b);

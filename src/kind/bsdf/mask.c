@@ -30,6 +30,7 @@ static enum imp_status build(const struct imp_build *build, void *self,
     b->flags = (c->flags & ~(unsigned)IMP_BSDF_NULL) | IMP_BSDF_DELTA | IMP_BSDF_TRANSMIT;
     b->absorb = c->absorb;
     b->n_lobes = 1 + imp__lobes_of(c);
+    b->straight = 1u << HOLE | c->straight << 1;
     return imp__lobes_check(build, b);
 }
 

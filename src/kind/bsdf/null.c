@@ -15,6 +15,7 @@ static enum imp_status build(const struct imp_build *build, void *self,
     (void)build, (void)self;
     b->flags = IMP_BSDF_DELTA | IMP_BSDF_TRANSMIT | IMP_BSDF_NULL;
     b->n_lobes = 1;
+    b->straight = 1u << PASS;
     return IMP_OK;
 }
 

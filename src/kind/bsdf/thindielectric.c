@@ -31,6 +31,7 @@ static enum imp_status build(const struct imp_build *build, void *self,
     (void)build, (void)self;
     b->flags = IMP_BSDF_DELTA | IMP_BSDF_TRANSMIT;
     b->n_lobes = 2;
+    b->straight = 1u << PASS;
     return IMP_OK;
 }
 

@@ -14,8 +14,10 @@ static enum imp_status build(const struct imp_build *build, void *self,
     IMP_TRY(imp_build_bool(build, "allow_transmission", false, &allow));
     b->flags = 0;
     b->absorb = 0;
+    b->straight = ~UINT64_C(0);
     for (int k = 0; k < b->n_child; k++) {
         b->flags |= b->child[k]->flags;
+        b->straight &= b->child[k]->straight;
         b->n_lobes = imp_max(b->n_lobes, imp__lobes_of(b->child[k]));
         b->absorb = imp_max(b->absorb, b->child[k]->absorb);
     }
