@@ -18,11 +18,12 @@ static void add_dense(struct imp_sink *sink, int param, size_t element, int chan
     else batch[0] += imp__sum_used(*bar, t->lanes);
 }
 
-/* Where key is, or would be (Fibonacci hashing; Knuth, vol. 3, 6.4). */
+/* Where key is, or would be (Fibonacci hashing; Knuth, vol. 3, 6.4). Eight neighbours
+ * share a line of the cache: cells and texels are touched side by side. */
 static inline struct imp__tally_slot *slot_of(const struct imp_tally *t, uint32_t key)
 {
     const size_t mask = t->table_size - 1;
-    size_t k = (key * UINT64_C(0x9e3779b97f4a7c15)) >> 32 & mask;
+    size_t k = ((key >> 3) * UINT64_C(0x9e3779b97f4a7c15) >> 32 << 3 | (key & 7)) & mask;
     while (t->table[k].entry && t->table[k].key != key) k = (k + 1) & mask;
     return &t->table[k];
 }
@@ -35,36 +36,56 @@ static bool table_grow(struct imp_tally *t)
     imp__release(t->ctx, t->table);
     t->table = table;
     t->table_size = size;
-    for (size_t k = 0; k < t->n_entries; k++)
-        *slot_of(t, t->entries[k].key) =
-            (struct imp__tally_slot){t->entries[k].key, (uint32_t)k + 1};
+    for (size_t k = 0; k < t->n_triples; k++)
+        *slot_of(t, t->triples[k].key) =
+            (struct imp__tally_slot){t->triples[k].key, (uint32_t)k + 1};
+    for (size_t k = 0; k < t->n_singles; k++)
+        *slot_of(t, t->singles[k].key) = (struct imp__tally_slot){
+            t->singles[k].key, ((uint32_t)k + 1) | IMP__TALLY_SINGLE};
     return true;
 }
 
-static __attribute__((noinline)) struct imp__tally_entry *
-entry_add(struct imp_tally *t, uint32_t key, int channels)
+/* A new entry, and its index; -1: no memory. */
+static __attribute__((noinline)) int64_t entry_add(struct imp_tally *t, uint32_t key,
+                                                   bool single)
 {
-    if (2 * t->n_entries >= t->table_size && !table_grow(t)) return NULL;
-    void *grown = imp__grow(t->ctx, t->entries, &t->cap_entries, t->n_entries + 1,
-                            sizeof *t->entries);
-    if (!grown) return NULL;
-    t->entries = grown;
-    struct imp__tally_entry *e = &t->entries[t->n_entries++];
-    memset(e, 0, sizeof *e);
-    e->key = key;
-    e->channels = (uint32_t)channels;
-    *slot_of(t, key) = (struct imp__tally_slot){key, (uint32_t)t->n_entries};
-    return e;
+    if (2 * (t->n_triples + t->n_singles) >= t->table_size && !table_grow(t)) return -1;
+    if (single) {
+        void *grown = imp__grow(t->ctx, t->singles, &t->cap_singles, t->n_singles + 1,
+                                sizeof *t->singles);
+        if (!grown) return -1;
+        t->singles = grown;
+        t->singles[t->n_singles++] = (struct imp__tally_single){.key = key};
+        *slot_of(t, key) =
+            (struct imp__tally_slot){key, (uint32_t)t->n_singles | IMP__TALLY_SINGLE};
+        return (int64_t)t->n_singles - 1;
+    }
+    void *grown = imp__grow(t->ctx, t->triples, &t->cap_triples, t->n_triples + 1,
+                            sizeof *t->triples);
+    if (!grown) return -1;
+    t->triples = grown;
+    t->triples[t->n_triples++] = (struct imp__tally_triple){.key = key};
+    *slot_of(t, key) = (struct imp__tally_slot){key, (uint32_t)t->n_triples};
+    return (int64_t)t->n_triples - 1;
 }
 
-static inline struct imp__tally_entry *entry_find(struct imp_tally *t, uint32_t key,
-                                                  int channels)
+static inline int64_t entry_find(struct imp_tally *t, uint32_t key, bool single)
 {
     if (imp_likely(t->table_size > 0)) {
         const struct imp__tally_slot *s = slot_of(t, key);
-        if (imp_likely(s->entry)) return &t->entries[s->entry - 1];
+        if (imp_likely(s->entry)) return (int64_t)(s->entry & ~IMP__TALLY_SINGLE) - 1;
     }
-    return entry_add(t, key, channels);
+    return entry_add(t, key, single);
+}
+
+static bool touch(struct imp_tally *t, struct imp__tally_list *list, int64_t entry)
+{
+    void *grown =
+        imp__grow(t->ctx, list->index, &list->cap, list->n + 1, sizeof *list->index);
+    if (!grown) return false;
+    list->index = grown;
+    list->index[list->n++] = (uint32_t)entry;
+    return true;
 }
 
 static void add_hashed(struct imp_sink *sink, int param, size_t element, int channels,
@@ -73,25 +94,23 @@ static void add_hashed(struct imp_sink *sink, int param, size_t element, int cha
     struct imp_tally *t = (struct imp_tally *)sink;
     const int64_t base = t->active->base[param];
     if (base < 0 || t->failed) return;
-    struct imp__tally_entry *e =
-        entry_find(t, (uint32_t)((size_t)base + element), channels);
-    if (!e) {
+    const bool single = channels != 3;
+    const int64_t k = entry_find(t, (uint32_t)((size_t)base + element), single);
+    if (k < 0) {
         t->failed = true;
         return;
     }
-    if (!e->touched) {
-        void *grown = imp__grow(t->ctx, t->touched, &t->cap_touched, t->n_touched + 1,
-                                sizeof *t->touched);
-        if (!grown) {
-            t->failed = true;
-            return;
-        }
-        t->touched = grown;
-        t->touched[t->n_touched++] = (uint32_t)(e - t->entries);
+    if (imp_likely(single)) {
+        struct imp__tally_single *e = &t->singles[k];
+        if (!e->touched) t->failed |= !touch(t, &t->touched_singles, k);
         e->touched = true;
+        e->batch += imp__sum_used(*bar, t->lanes);
+    } else {
+        struct imp__tally_triple *e = &t->triples[k];
+        if (!e->touched) t->failed |= !touch(t, &t->touched_triples, k);
+        e->touched = true;
+        e->batch += *bar;
     }
-    if (channels == 3) e->batch += *bar;
-    else e->batch[0] += imp__sum_used(*bar, t->lanes);
 }
 
 enum imp_status imp__tally_create(imp_context *ctx, const struct imp_active *active,
@@ -100,8 +119,8 @@ enum imp_status imp__tally_create(imp_context *ctx, const struct imp_active *act
     struct imp_tally t = {.ctx = ctx, .active = active, .lanes = lanes};
     t.dense = active->n <= IMP_TALLY_DENSE;
     t.sink.add = t.dense ? add_dense : add_hashed;
-    if (active->n >= UINT32_MAX)
-        return imp__error(ctx, IMP_E_ARG, "more than %u active numbers", UINT32_MAX);
+    if (active->n >= INT32_MAX)
+        return imp__error(ctx, IMP_E_ARG, "more than %d active numbers", INT32_MAX);
     if (t.dense) {
         t.batch = imp__alloc(ctx, 5 * active->n, sizeof *t.batch);
         if (!t.batch) return imp__error(ctx, IMP_E_NOMEM, "no memory for gradients");
@@ -119,8 +138,10 @@ void imp__tally_destroy(struct imp_tally *t)
     if (!t->ctx) return;
     imp__release(t->ctx, t->batch);
     imp__release(t->ctx, t->table);
-    imp__release(t->ctx, t->entries);
-    imp__release(t->ctx, t->touched);
+    imp__release(t->ctx, t->triples);
+    imp__release(t->ctx, t->singles);
+    imp__release(t->ctx, t->touched_triples.index);
+    imp__release(t->ctx, t->touched_singles.index);
     *t = (struct imp_tally){0};
 }
 
@@ -130,7 +151,8 @@ void imp__tally_clear(struct imp_tally *t)
         memset(t->batch, 0, 5 * t->active->n * sizeof *t->batch);
     } else {
         if (t->table_size) memset(t->table, 0, t->table_size * sizeof *t->table);
-        t->n_entries = t->n_touched = 0;
+        t->n_triples = t->n_singles = 0;
+        t->touched_triples.n = t->touched_singles.n = 0;
     }
 }
 
@@ -144,11 +166,17 @@ void imp__tally_batch(struct imp_tally *t)
         }
         return;
     }
-    for (size_t k = 0; k < t->n_touched; k++) {
-        struct imp__tally_entry *e = &t->entries[t->touched[k]];
+    for (size_t k = 0; k < t->touched_triples.n; k++) {
+        struct imp__tally_triple *e = &t->triples[t->touched_triples.index[k]];
         e->sum += e->batch;
         e->square += e->batch * e->batch;
         e->batch = (imp_spec){0};
+    }
+    for (size_t k = 0; k < t->touched_singles.n; k++) {
+        struct imp__tally_single *e = &t->singles[t->touched_singles.index[k]];
+        e->sum += e->batch;
+        e->square += e->batch * e->batch;
+        e->batch = 0;
     }
 }
 
@@ -164,8 +192,8 @@ void imp__tally_pixel(struct imp_tally *t, double replicates, double by_mean,
         }
         return;
     }
-    for (size_t k = 0; k < t->n_touched; k++) {
-        struct imp__tally_entry *e = &t->entries[t->touched[k]];
+    for (size_t k = 0; k < t->touched_triples.n; k++) {
+        struct imp__tally_triple *e = &t->triples[t->touched_triples.index[k]];
         const imp_spec spread = e->square - e->sum * e->sum * r;
         for (int c = 0; c < 3; c++) {
             e->mean[c] += by_mean * e->sum[c];
@@ -174,17 +202,29 @@ void imp__tally_pixel(struct imp_tally *t, double replicates, double by_mean,
         e->sum = e->square = (imp_spec){0};
         e->touched = false;
     }
-    t->n_touched = 0;
+    for (size_t k = 0; k < t->touched_singles.n; k++) {
+        struct imp__tally_single *e = &t->singles[t->touched_singles.index[k]];
+        e->mean += by_mean * e->sum;
+        e->variance += by_variance * (e->square - e->sum * e->sum * r);
+        e->sum = e->square = 0;
+        e->touched = false;
+    }
+    t->touched_triples.n = t->touched_singles.n = 0;
 }
 
 void imp__tally_flush(const struct imp_tally *t, struct imp_fixed_sum *mean,
                       struct imp_fixed_sum *variance)
 {
-    for (size_t k = 0; k < t->n_entries; k++) {
-        const struct imp__tally_entry *e = &t->entries[k];
-        for (uint32_t c = 0; c < e->channels; c++) {
+    for (size_t k = 0; k < t->n_triples; k++) {
+        const struct imp__tally_triple *e = &t->triples[k];
+        for (uint32_t c = 0; c < 3; c++) {
             imp__fixed_add(mean, e->key + c, e->mean[c]);
             if (variance) imp__fixed_add(variance, e->key + c, e->variance[c]);
         }
+    }
+    for (size_t k = 0; k < t->n_singles; k++) {
+        const struct imp__tally_single *e = &t->singles[k];
+        imp__fixed_add(mean, e->key, e->mean);
+        if (variance) imp__fixed_add(variance, e->key, e->variance);
     }
 }

@@ -13,15 +13,21 @@
 #include "base/fixed_sum.h"
 #include "walk/walk.h"
 
-#define IMP_TALLY_DENSE 1024 /* numbers, above which the hash table is used */
+#define IMP__TALLY_SINGLE (UINT32_C(1) << 31)
+#define IMP_TALLY_DENSE   1024 /* numbers, above which the hash table is used */
 
-struct imp__tally_entry { /* three neighbouring numbers, or one (then lane 0) */
+struct imp__tally_triple { /* three neighbouring numbers */
     /* Of the pixel at work. What an addition needs is on one cache line. */
     imp_spec batch;
-    uint32_t key, channels;
+    uint32_t key;
     bool touched;
     _Alignas(IMP_CACHE_LINE) imp_spec sum, square;
     double mean[3], variance[3]; /* of the tile so far */
+};
+struct imp__tally_single {
+    double batch, sum, square, mean, variance;
+    uint32_t key;
+    bool touched;
 };
 
 struct imp_tally {
@@ -32,14 +38,18 @@ struct imp_tally {
     bool dense, failed;
     /* dense: [n] each */
     double *batch, *sum, *square, *mean, *variance;
-    /* hash: open addressing; `entries` in order of arrival, `touched` of the pixel */
+    /* hash: open addressing; entries in order of arrival, `touched` of the pixel */
     struct imp__tally_slot {
-        uint32_t key, entry; /* entry + 1, 0: free */
+        uint32_t key, entry; /* IMP__TALLY_SINGLE for singles + index + 1; 0: free */
     } * table;               /* [table_size], a power of two */
-    size_t table_size, n_entries, cap_entries;
-    struct imp__tally_entry *entries;
-    uint32_t *touched;
-    size_t n_touched, cap_touched;
+    size_t table_size;
+    struct imp__tally_triple *triples;
+    struct imp__tally_single *singles;
+    size_t n_triples, cap_triples, n_singles, cap_singles;
+    struct imp__tally_list {
+        uint32_t *index;
+        size_t n, cap;
+    } touched_triples, touched_singles;
 };
 
 enum imp_status imp__tally_create(imp_context *ctx, const struct imp_active *active,

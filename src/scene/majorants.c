@@ -109,7 +109,7 @@ static double bound_at(const struct imp_majorant_walk *w)
 }
 static double wall(const struct imp_majorant_walk *w)
 {
-    return fmin(fmin(w->next[0], w->next[1]), fmin(w->next[2], w->end));
+    return imp_min(imp_min(w->next[0], w->next[1]), imp_min(w->next[2], w->end));
 }
 
 bool imp__majorants_enter(const struct imp_majorants *of, imp_v3 o, imp_v3 d, double near,
@@ -123,8 +123,8 @@ bool imp__majorants_enter(const struct imp_majorants *of, imp_v3 o, imp_v3 d, do
             continue;
         }
         const double t0 = -u[a] / v[a], t1 = (1 - u[a]) / v[a];
-        near = fmax(near, fmin(t0, t1));
-        far = fmin(far, fmax(t0, t1));
+        near = imp_max(near, imp_min(t0, t1));
+        far = imp_min(far, imp_max(t0, t1));
     }
     if (!(near < far)) return false;
     w->t = near;
@@ -149,7 +149,7 @@ bool imp__majorants_next(struct imp_majorant_walk *w)
     if (!(w->next[a] < w->end)) return false;
     w->cell[a] += w->step[a];
     if (w->cell[a] < 0 || w->cell[a] >= w->of->n[a]) return false;
-    w->t = fmax(w->t, w->next[a]);
+    w->t = imp_max(w->t, w->next[a]);
     w->next[a] += w->each[a];
     w->leave = wall(w);
     w->bound = bound_at(w);

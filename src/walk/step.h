@@ -43,6 +43,7 @@ struct imp_flight {
         *here;      /* that the vertex at work lies in, or is reached from */
     imp_v3 at;      /* of the last collision */
     double t, base; /* of the collision; length before the last surface that was passed */
+    bool stands;    /* the collision, for derivatives */
     double behind;  /* the ray begins so far behind the point that it leaves */
 };
 

@@ -21,10 +21,12 @@ imp_spec imp__walk_fold(struct imp_walk *walk)
     return L;
 }
 
-static bool bsdf_active(const struct imp_tracer *t, const struct imp_bsdf *b)
+static bool bsdf_active(const struct imp_tracer *t, const struct imp_vertex *v)
 {
+    const struct imp_bsdf *b = v->bsdf;
     if (!b || b->index < 0 || !t->active->bsdf[b->index]) return false;
-    return t->active->bsdf[b->index] != IMP_BY_EXTINCTION || t->collisions_stand;
+    return t->active->bsdf[b->index] != IMP_BY_EXTINCTION || t->collisions_stand ||
+           v->d.stands;
 }
 
 /* ---- Lane by lane, d of a vertex's three pieces / d its inputs ------------------ */
@@ -96,7 +98,8 @@ static void extinction_drop(const struct imp_tracer *tracer, const struct imp_ve
                             imp_spec *x)
 {
     const struct imp_medium *m;
-    if (v->d.scatterer != IMP_IN_MEDIUM || tracer->collisions_stand) return;
+    if (v->d.scatterer != IMP_IN_MEDIUM || tracer->collisions_stand || v->d.stands)
+        return;
     m = v->bsdf->self;
     for (int j = 0; j < m->n_own; j++)
         if (m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION) x[j] = (imp_spec){0};
@@ -109,7 +112,7 @@ static void point_scatter(const struct imp_tracer *tracer, const struct imp_vert
 {
     const struct imp_medium *m = v->bsdf->self;
     for (int j = 0; j < m->n_in; j++)
-        if (j >= m->n_own || tracer->collisions_stand ||
+        if (j >= m->n_own || tracer->collisions_stand || v->d.stands ||
             !(m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION))
             imp__inputs_scatter(&m->input[j], 1, at, &bar[j], sink);
 }
@@ -131,25 +134,31 @@ static imp_spec weight_before(const struct imp_vertex *v)
     return f * scale;
 }
 
-/* Of the segment that goes on, if its derivative is that of its frozen collisions. */
-static bool segment_counts(const struct imp_tracer *tracer, const struct imp_vertex *v)
-{
-    return v->on && v->d.goes_on && tracer->collisions_stand;
-}
+/* Of the segment that goes on, does something stand for its derivative? */
+static bool segment_counts(const struct imp_vertex *v) { return v->on && v->d.goes_on; }
 /* d B_k / d T of the way to the light. */
 static imp_spec light_before(const struct imp_vertex *v)
 {
     return v->light_f * v->light_e * (double)v->d.light.weight;
 }
 
+/* T of the way to the light. */
+static imp_spec to_light_value(const struct imp_vertex *v)
+{
+    return v->light_w * (1 / (double)v->d.light.weight);
+}
+
 static void media_scatter(const struct imp_tracer *tracer, const struct imp_vertex *v,
                           imp_spec P, imp_spec own, struct imp_sink *sink)
 {
-    if (v->to_light)
-        imp__track_sweep(tracer, v->to_light, v->carried, own * light_before(v), sink);
-    if (segment_counts(tracer, v))
-        imp__track_sweep(tracer, v->on, v->carried, P * weight_before(v) * v->beyond,
+    if (v->to_light) {
+        const imp_spec T = to_light_value(v);
+        imp__track_sweep(tracer, v->to_light, v->carried, &T, own * light_before(v),
                          sink);
+    }
+    if (segment_counts(v))
+        imp__track_sweep(tracer, v->on, v->carried, NULL,
+                         P * weight_before(v) * v->beyond, sink);
     if (v->probe) {
         const struct imp_medium *m = v->probe->medium;
         imp_spec d[IMP_INPUTS_MAX];
@@ -168,12 +177,14 @@ static imp_spec media_tangent(const struct imp_tracer *tracer, const struct imp_
                               imp_spec own, dot_fn *dot, const void *x_dot)
 {
     imp_spec L_dot = {0};
-    if (v->to_light)
+    if (v->to_light) {
+        const imp_spec T = to_light_value(v);
         L_dot += own * light_before(v) *
-                 imp__track_tangent(tracer, v->to_light, v->carried, dot, x_dot);
-    if (segment_counts(tracer, v))
+                 imp__track_tangent(tracer, v->to_light, v->carried, &T, dot, x_dot);
+    }
+    if (segment_counts(v))
         L_dot += weight_before(v) * v->beyond *
-                 imp__track_tangent(tracer, v->on, v->carried, dot, x_dot);
+                 imp__track_tangent(tracer, v->on, v->carried, NULL, dot, x_dot);
     if (v->probe) {
         const struct imp_medium *m = v->probe->medium;
         imp_spec d[IMP_INPUTS_MAX], in_dot;
@@ -224,7 +235,7 @@ void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_wa
         if (connected && active->emitter[light->emitter])
             emitter_scatter(tracer, light->emitter, imp__light_emission(light),
                             imp__light_at(v), own * v->light_f * v->light_w, sink);
-        if (bsdf_active(tracer, b)) {
+        if (bsdf_active(tracer, v)) {
             imp_spec bar[IMP_INPUTS_MAX], d[IMP_INPUTS_MAX];
             bool any = false;
             for (int j = 0; j < b->n_in; j++) bar[j] = (imp_spec){0};
@@ -320,7 +331,7 @@ static imp_spec tangent(const struct imp_tracer *tracer, const struct imp_walk *
                      v->light_f * v->light_w * own;
         if (imp_unlikely(crosses(v)))
             L_dot += media_tangent(tracer, v, own, direction_at, &direction);
-        if (!bsdf_active(tracer, b)) continue;
+        if (!bsdf_active(tracer, v)) continue;
         imp_spec in_dot[IMP_INPUTS_MAX], d[IMP_INPUTS_MAX];
         imp__inputs_tangent(b->input, b->n_in, &at, direction_at, &direction, in_dot);
         extinction_drop(tracer, v, in_dot);

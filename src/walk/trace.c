@@ -51,7 +51,7 @@ static struct imp_vertex *vertex_add(struct imp_step *s, int n_in)
     struct imp_decision *d = &v->d;
     d->shape = d->met.emitter = -1;
     d->connection = IMP_NOT_CONNECTED;
-    d->glows = d->goes_on = false;
+    d->glows = d->goes_on = d->stands = false;
     d->drawn = IMP_DENSITY_KERNEL;
     d->pdf = 0;
     d->survive = d->passes = 1;
@@ -151,6 +151,7 @@ medium_meet(struct imp_step *s, const struct imp_bsdf *scatterer, int medium, im
     if (s->recorded) {
         v->d.shape = medium;
         v->d.scatterer = IMP_IN_MEDIUM;
+        v->d.stands = s->flight.stands;
     }
     *at = (struct imp_surface){.p = p};
     *frame = (struct imp_frame){{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};

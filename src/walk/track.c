@@ -121,7 +121,7 @@ static imp_spec event_factor(const struct imp_scene *scene, const struct imp_tra
 {
     imp_spec in[IMP_INPUTS_MAX];
     if (e->kind == IMP_PASSES) return imp__passes_eval(scene, track, e, carried);
-    if (e->kind == IMP_PASSES_UV) return imp__spec(1);
+    if (e->kind == IMP_PASSES_UV || e->kind == IMP_LINE_AT) return imp__spec(1);
     const imp_spec sigma =
         imp__extinction_at(scene->media[e->medium], event_place(track, e), carried, in);
     return factor_of(e, sigma, false).f;
@@ -166,34 +166,85 @@ static imp_spec others(const struct product *p, imp_spec f)
     return x;
 }
 
+/* How the product is differentiated. */
+struct derived {
+    const struct imp_tracer *tracer;
+    const struct imp_track *track;
+    const struct imp_carried *carried;
+    const imp_spec *value; /* the product, of the way to a light sample; else NULL */
+    bool apart;            /* `p` is set: factors may be 0 */
+    struct product p;
+};
+
+/* Is the factor of an event in a medium differentiated as it is? To a light sample it does
+ * not matter for uniform media: nothing is drawn. */
+static bool stands(const struct derived *x, const struct imp_event *e)
+{
+    return e->kind <= IMP_REAL_AT &&
+           (x->tracer->collisions_stand || (e->kind <= IMP_COLLIDES && e->bound > 0));
+}
+
+/* Factors of the events that surfaces have are differentiated as they are, and those of
+ * tentative collisions where these stand; else IMP_LINE_AT takes their place. */
+static bool derived_of(const struct imp_tracer *tracer, const struct imp_track *track,
+                       const struct imp_carried *carried, const imp_spec *value,
+                       struct derived *x)
+{
+    *x = (struct derived){.tracer = tracer,
+                          .track = track,
+                          .carried = carried,
+                          .value = value,
+                          .apart = tracer->collisions_stand};
+    for (int i = 0; i < track->n; i++)
+        x->apart |= track->event[i].kind == IMP_PASSES || stands(x, &track->event[i]);
+    if (!x->apart) return tracer->active->medium && value;
+    x->p = product_of(tracer->scene, track, carried);
+    return true;
+}
+
+/* d product/d extinction of event i; in: its medium's inputs there. False: it is 0. */
+static bool extinction_slope(const struct derived *x, const struct imp_event *e, imp_v3 p,
+                             imp_spec *in, imp_spec *slope)
+{
+    const struct imp_medium *m = x->tracer->scene->media[e->medium];
+    const bool as_is = stands(x, e);
+    if (!as_is && e->kind != IMP_LINE_AT && (e->kind != IMP_CROSSES || !x->value))
+        return false;
+    const imp_spec sigma = imp__extinction_at(m, p, x->carried, in);
+    if (as_is) {
+        const struct factor f = factor_of(e, sigma, true);
+        *slope = f.slope * others(&x->p, f.f);
+    } else {
+        const double l = e->kind == IMP_LINE_AT ? e->bound : e->t;
+        *slope = *x->value * (isfinite(l) ? -l : 0); /* there T is 0, or no path is */
+    }
+    return true;
+}
+
 /* Inputs that the factor of event i depends on, how many, and d product/d each of them.
  * NULL: nobody wants these. */
 static const struct imp_input *const *
-event_d(const struct imp_tracer *tracer, const struct imp_track *track, int i,
-        const struct imp_carried *carried, const struct product *p,
-        struct imp_texcoord *at, int *n, imp_spec *d)
+event_d(const struct derived *x, int i, struct imp_texcoord *at, int *n, imp_spec *d)
 {
-    const struct imp_active *active = tracer->active;
-    const struct imp_event *e = &track->event[i];
+    const struct imp_active *active = x->tracer->active;
+    const struct imp_event *e = &x->track->event[i];
     if (e->kind == IMP_PASSES_UV) return NULL;
     if (e->kind == IMP_PASSES) {
-        *at = passed_at(track, e, carried);
-        const struct imp_bsdf *b = passes_d(tracer, e, at, d);
+        *at = passed_at(x->track, e, x->carried);
+        const struct imp_bsdf *b = passes_d(x->tracer, e, at, d);
         if (!b) return NULL;
         const imp_spec rest =
-            others(p, imp__passes_eval(tracer->scene, track, e, carried));
+            others(&x->p, imp__passes_eval(x->tracer->scene, x->track, e, x->carried));
         for (int j = 0; j < b->n_in; j++) d[j] *= rest;
         *n = b->n_in;
         return b->input;
     }
-    const struct imp_medium *m = tracer->scene->media[e->medium];
+    const struct imp_medium *m = x->tracer->scene->media[e->medium];
     struct imp_coefficients dc[IMP_INPUTS_MAX];
-    imp_spec in[IMP_INPUTS_MAX];
+    imp_spec in[IMP_INPUTS_MAX], slope;
     if (!active->medium || !active->medium[e->medium]) return NULL;
-    *at = (struct imp_texcoord){.p = event_place(track, e), .carried = carried};
-    const imp_spec sigma = imp__extinction_at(m, at->p, carried, in);
-    const struct factor x = factor_of(e, sigma, true);
-    const imp_spec slope = x.slope * others(p, x.f);
+    *at = (struct imp_texcoord){.p = event_place(x->track, e), .carried = x->carried};
+    if (!extinction_slope(x, e, at->p, in, &slope)) return NULL;
     m->ops->eval_d(m, in, dc);
     for (int j = 0; j < m->n_own; j++)
         d[j] = m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION ? dc[j].extinction * slope
@@ -202,48 +253,40 @@ event_d(const struct imp_tracer *tracer, const struct imp_track *track, int i,
     return m->input;
 }
 
-/* Does the product have a derivative that is wanted? */
-static bool track_active(const struct imp_tracer *tracer, const struct imp_track *track)
-{
-    if (tracer->active->medium) return true;
-    for (int i = 0; i < track->n; i++)
-        if (track->event[i].kind == IMP_PASSES) return true;
-    return false;
-}
-
 void imp__track_sweep(const struct imp_tracer *tracer, const struct imp_track *track,
-                      const struct imp_carried *carried, imp_spec f_bar,
-                      struct imp_sink *sink)
+                      const struct imp_carried *carried, const imp_spec *value,
+                      imp_spec f_bar, struct imp_sink *sink)
 {
-    if (!track_active(tracer, track)) return;
-    const struct product p = product_of(tracer->scene, track, carried);
+    struct derived x;
+    if (!derived_of(tracer, track, carried, value, &x)) return;
     for (int i = 0; i < track->n; i++) {
         struct imp_texcoord at;
         imp_spec d[IMP_INPUTS_MAX];
         int n;
-        const struct imp_input *const *input =
-            event_d(tracer, track, i, carried, &p, &at, &n, d);
+        const struct imp_input *const *input = event_d(&x, i, &at, &n, d);
         if (!input) continue;
-        for (int j = 0; j < n; j++) d[j] *= f_bar;
-        imp__inputs_scatter(input, n, &at, d, sink);
+        for (int j = 0; j < n; j++) {
+            d[j] *= f_bar;
+            if (!imp__is_zero_used(d[j], true))
+                imp__inputs_scatter(&input[j], 1, &at, &d[j], sink);
+        }
     }
 }
 
 imp_spec imp__track_tangent(const struct imp_tracer *tracer,
                             const struct imp_track *track,
-                            const struct imp_carried *carried,
+                            const struct imp_carried *carried, const imp_spec *value,
                             double (*dot)(const void *x_dot, int param, size_t element),
                             const void *x_dot)
 {
     imp_spec f_dot = {0};
-    if (!track_active(tracer, track)) return f_dot;
-    const struct product p = product_of(tracer->scene, track, carried);
+    struct derived x;
+    if (!derived_of(tracer, track, carried, value, &x)) return f_dot;
     for (int i = 0; i < track->n; i++) {
         struct imp_texcoord at;
         imp_spec d[IMP_INPUTS_MAX], in_dot[IMP_INPUTS_MAX];
         int n;
-        const struct imp_input *const *input =
-            event_d(tracer, track, i, carried, &p, &at, &n, d);
+        const struct imp_input *const *input = event_d(&x, i, &at, &n, d);
         if (!input) continue;
         imp__inputs_tangent(input, n, &at, dot, x_dot, in_dot);
         for (int j = 0; j < n; j++) f_dot += d[j] * in_dot[j];

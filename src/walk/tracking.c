@@ -14,12 +14,18 @@ struct flight {
     imp_spec f;              /* the segment's value */
     struct imp_track *track; /* NULL: not kept */
     bool any;                /* it has crossed a medium */
+    struct imp_event line;   /* IMP_LINE_AT so far; bound 0: none */
+    double length;           /* of the stretches that it was chosen from */
 };
 
 static double uniform(struct flight *w) { return imp__u01(w->key, w->n++); }
 static double free_path(struct flight *w) { return -log1p(-uniform(w)); }
 
-enum { ALONG_WALK = 0x7001, TO_LIGHT }; /* streams of random numbers of a vertex */
+enum {
+    ALONG_WALK = 0x7001,
+    TO_LIGHT,
+    ON_LINE
+}; /* streams of random numbers of a vertex */
 
 static struct flight flight_from(struct imp_step *s, imp_v3 o, imp_v3 d, int stream)
 {
@@ -61,13 +67,17 @@ no_memory:
 
 /* ---- Media of uniform extinction --------------------------------------------------- */
 
+#define DEEP 0.5 /* optical depth from which on a stretch stands */
+
 static bool uniform_fly(struct flight *w, const struct imp_medium *m, double near,
-                        double far, bool collides, double *t)
+                        double far, bool collides, double *t, bool *stands)
 {
     imp_spec in[IMP_INPUTS_MAX];
     const imp_spec sigma = imp__extinction_at(m, w->o, w->s->at.carried, in);
-    double length = far - near;
+    double length = far - near, sum = 0;
     bool hit = false;
+    for (int c = 0; c < imp__lane_mis_count(w->s); c++) sum += sigma[c];
+    *stands = collides && sum * length >= DEEP * imp__lane_mis_count(w->s);
     if (collides) {
         const double path = free_path(w), mine = sigma[imp__lane_mis_drew(w->s)];
         hit = mine > 0 && path < length * mine;
@@ -78,6 +88,7 @@ static bool uniform_fly(struct flight *w, const struct imp_medium *m, double nea
     const imp_spec T = imp__attenuation(sigma, length);
     w->f *= hit ? sigma * T : T;
     event_add(w, (struct imp_event){.t = (imp_decided)length,
+                                    .bound = *stands,
                                     .medium = m->index,
                                     .kind = hit ? IMP_COLLIDES : IMP_CROSSES});
     return hit;
@@ -130,6 +141,31 @@ static bool varying_fly(struct flight *w, const struct imp_medium *m,
     }
 }
 
+/* The way to a light sample is in m from near to far: a point of it is chosen for the
+ * derivative of its transmittance, which tentative collisions do not have where the bound
+ * is 0. */
+static void line_offer(struct flight *w, const struct imp_medium *m, double near,
+                       double far)
+{
+    const struct imp_step *s = w->s;
+    const struct imp_key key = imp__key_branch(s->walk->key, s->depth, ON_LINE);
+    const double length = far - near;
+    const uint32_t n = 2 * (uint32_t)w->line.kind; /* stretches so far */
+    w->length += length;
+    w->line.kind++;
+    if (!(imp__u01(key, n) * w->length < length)) return;
+    w->line.t = (imp_decided)(near + length * imp__u01(key, n + 1));
+    w->line.medium = m->index;
+}
+static bool line_add(struct flight *w)
+{
+    struct imp_event e = w->line;
+    if (e.kind == 0) return true;
+    e.kind = IMP_LINE_AT;
+    e.bound = (imp_decided)w->length;
+    return event_add(w, e);
+}
+
 /* From near to far in a medium; true: a collision at *t. */
 static bool fly(struct flight *w, const struct imp_medium *m, double near, double far,
                 bool collides, double *t)
@@ -138,16 +174,18 @@ static bool fly(struct flight *w, const struct imp_medium *m, double near, doubl
     struct imp_majorant_walk cells;
     const imp_spec before = w->f;
     const int first = w->track ? w->track->n : 0;
-    bool hit;
+    bool hit, stands = false;
     if (!(near < far)) return false;
     if (!m->majorants) {
-        hit = uniform_fly(w, m, near, far, collides, t);
+        hit = uniform_fly(w, m, near, far, collides, t, &stands);
     } else {
         if (!imp__majorants_enter(m->majorants, w->o, w->d, near, far, &cells))
             return false;
         near = cells.t;
         far = cells.end;
         hit = varying_fly(w, m, &cells, collides, t);
+        if (!collides && s->probing && s->tracer->active->medium[m->index])
+            line_offer(w, m, near, far);
         /* A probe asks for a track, and an empty one has its start. */
         if (!w->track && s->probing && collides) {
             event_add(w, (struct imp_event){.t = 0});
@@ -155,7 +193,8 @@ static bool fly(struct flight *w, const struct imp_medium *m, double near, doubl
         }
     }
     if (s->walk->dropped) return false;
-    if (collides && s->probing && s->tracer->active->medium[m->index])
+    if (collides) s->flight.stands = stands;
+    if (collides && !stands && s->probing && s->tracer->active->medium[m->index])
         imp__probe_offer(s, m, w->track, first, before, near, hit ? *t : far);
     return hit;
 }
@@ -314,6 +353,15 @@ static bool go_through(struct flight *w, const struct imp_shape *shape,
     return event_add(w, e[0]) && event_add(w, e[1]);
 }
 
+/* The light sample of v is seen. */
+static bool arrived(struct flight *w, struct imp_vertex *v, imp_spec *T)
+{
+    if (!line_add(w)) return false;
+    *T = w->f;
+    if (w->s->recorded) v->to_light = w->track;
+    return true;
+}
+
 static bool sees(struct imp_step *s, struct imp_vertex *v, const struct imp_surface *from,
                  const struct imp_shadow *shadow, imp_spec *T)
 {
@@ -335,22 +383,15 @@ static bool sees(struct imp_step *s, struct imp_vertex *v, const struct imp_surf
         if (found && !hole && !imp__shape_bsdf(scene, shape)->straight) return false;
         if (m) fly(&w, m, passed ? base : back, found ? base + hit.t : end, false, &t);
         if (s->walk->dropped) return false;
-        if (!found) {
-            *T = w.f;
-            if (s->recorded) v->to_light = w.track;
-            return true;
-        }
+        if (!found) return arrived(&w, v, T);
         struct imp_surface at;
         shape->ops->surface(shape, &hit, &o, &d, &at);
         if (!hole && !go_through(&w, shape, &at)) return false;
         m = beyond(shape, at.ng, d, m);
         o = imp__offset(at.p, at.ng, d);
         base = imp__dot(o - start, d);
-        if (!(base < end)) { /* the last boundary lies within rounding of the light */
-            *T = w.f;
-            if (s->recorded) v->to_light = w.track;
-            return true;
-        }
+        if (!(base < end)) /* the last boundary lies within rounding of the light */
+            return arrived(&w, v, T);
     }
     s->walk->dropped = IMP_DROP_LONG;
     return false;

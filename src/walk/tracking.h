@@ -4,6 +4,12 @@
  * medium, which is a vertex like any other, or at a surface. Surfaces of type null are
  * passed on the way: they only say where media begin and end.
  *
+ * For the derivative with respect to an extinction a stretch of a uniform medium that is
+ * deep enough to collide in stands as it is decided, factor by factor. Shallow ones and
+ * media that vary, where a division by sigma has an unbounded variance, are probed
+ * (probe.h). Which it is depends on sigma times the length of the whole stretch, and not on
+ * the flight.
+ *
  * What a flight decided is kept as its events, at distances along the segment. The
  * segment's value is a product over them,
  *
@@ -28,14 +34,17 @@ enum imp_event_kind {
     IMP_COLLIDES,
     IMP_NULL_AT,
     IMP_REAL_AT,
-    IMP_PASSES,   /* bound: cosine at the shading normal of the side that it comes from,
+    IMP_PASSES,    /* bound: cosine at the shading normal of the side that it comes from,
                      medium: the shape */
-    IMP_PASSES_UV /* follows it; t, bound: u, v */
+    IMP_PASSES_UV, /* follows it; t, bound: u, v */
+    IMP_LINE_AT    /* factor 1. A point of the way to a light sample, uniform in the media
+                      whose extinction varies and has a derivative; bound: their length l.
+                      -l d sigma(t) is an estimate of the derivative of log T */
 };
 
 struct imp_event {
     imp_decided t;     /* a length in a uniform medium; else distance from the start */
-    imp_decided bound; /* b */
+    imp_decided bound; /* b; of a uniform medium 1 where the event stands, else 0 */
     int32_t medium;
     int32_t kind;
 };
@@ -51,13 +60,14 @@ extern const struct imp_segment_ops imp__tracking;
 /* The segment's value at the scene's present parameters. */
 imp_spec imp__track_eval(const struct imp_scene *scene, const struct imp_track *track,
                          const struct imp_carried *carried);
-/* Its derivative with the events where they are: f_bar to the sink, or along x_dot. */
+/* Its derivative with the events where they are: f_bar to the sink, or along x_dot.
+ * value: the segment's, to a light sample; NULL along a walk. */
 void imp__track_sweep(const struct imp_tracer *tracer, const struct imp_track *track,
-                      const struct imp_carried *carried, imp_spec f_bar,
-                      struct imp_sink *sink);
+                      const struct imp_carried *carried, const imp_spec *value,
+                      imp_spec f_bar, struct imp_sink *sink);
 imp_spec imp__track_tangent(const struct imp_tracer *tracer,
                             const struct imp_track *track,
-                            const struct imp_carried *carried,
+                            const struct imp_carried *carried, const imp_spec *value,
                             double (*dot)(const void *x_dot, int param, size_t element),
                             const void *x_dot);
 

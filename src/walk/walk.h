@@ -67,6 +67,8 @@ struct imp_decision {
     uint8_t connection;       /* enum imp_connection: what became of the light sample */
     bool glows : 1;           /* the BSDF's own emission counts */
     bool goes_on : 1;         /* the walk continues */
+    bool stands : 1;          /* in a medium: this collision stands for derivatives with
+                                 respect to the extinction (tracking.h) */
     uint8_t drawn : 3;        /* enum imp_density that drew the continuation */
     imp_decided uv[2], p[3];  /* the place; at the sky p is the direction */
     imp_decided wo[3], wi[3]; /* of the continuation, shading frame */

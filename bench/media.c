@@ -1,0 +1,189 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Media: samples and segments a second, time to 1 % in the median pixel, and what the
+ * gradient of the picture's mean with respect to every number of the extinction costs;
+ * one thread, processor time, picture and gradient in turn.
+ *
+ *     media DIR [REPEATS [SPP [N]]]
+ *
+ * A homogeneous box and a plume of N^3 cells (128) are written to DIR as scenes, which
+ * bench/peers/media.py has Mitsuba measure beside it. Lines for it are
+ *
+ *     NAME picture SECONDS gradient SECONDS variance SUM
+ *
+ * for `spp` samples a pixel, SUM the sum of the squared errors of all derivatives. */
+#include "plume.h"
+#include "walk/walk.h"
+#include <sys/resource.h>
+#include <time.h>
+
+static imp_context *ctx;
+
+static void must(enum imp_status st)
+{
+    if (st == IMP_OK) return;
+    fprintf(stderr, "media: %s\n", imp_last_error(ctx));
+    exit(3);
+}
+static double cpu(void)
+{
+    struct timespec t;
+    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+    return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+static int by_value(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+
+static const char scene_text[] =
+    "<scene version=\"3.0.0\">\n"
+    "<default name=\"integrator\" value=\"volpath\"/>\n"
+    "<integrator type=\"$integrator\"><integer name=\"max_depth\" value=\"16\"/>"
+    "</integrator>\n"
+    "<sensor type=\"perspective\"><float name=\"fov\" value=\"30\"/>\n"
+    "<transform name=\"to_world\"><lookat origin=\"0.5,0.5,3\" target=\"0.5,0.5,0.5\" "
+    "up=\"0,1,0\"/></transform>\n"
+    "<film type=\"hdrfilm\"><integer name=\"width\" value=\"128\"/><integer "
+    "name=\"height\" value=\"128\"/><rfilter type=\"box\"/></film></sensor>\n"
+    "%s\n"
+    "<shape type=\"cube\"><bsdf type=\"null\"/><ref id=\"smoke\" name=\"interior\"/>"
+    "<transform name=\"to_world\"><translate x=\"1\" y=\"1\" z=\"1\"/>"
+    "<scale value=\"0.5\"/></transform></shape>\n"
+    "<emitter type=\"constant\"><float name=\"radiance\" value=\"0.5\"/></emitter>\n"
+    "<shape type=\"sphere\"><point name=\"center\" x=\"3\" y=\"3\" z=\"2\"/>"
+    "<float name=\"radius\" value=\"0.3\"/><emitter type=\"area\">"
+    "<rgb name=\"radiance\" value=\"40,36,30\"/></emitter></shape>\n</scene>\n";
+static const char box_text[] =
+    "<medium type=\"homogeneous\" id=\"smoke\"><float name=\"sigma_t\" value=\"3\"/>"
+    "<float name=\"albedo\" value=\"0.9\"/><phase type=\"hg\"><float name=\"g\" "
+    "value=\"0.3\"/></phase></medium>";
+static const char plume_text[] =
+    "<medium type=\"heterogeneous\" id=\"smoke\"><volume type=\"gridvolume\" "
+    "name=\"sigma_t\" id=\"density\"><string name=\"filename\" value=\"plume.vol\"/>"
+    "</volume><float name=\"albedo\" value=\"0.9\"/><phase type=\"hg\"><float "
+    "name=\"g\" value=\"0.3\"/></phase></medium>";
+
+/* Median relative error of a pixel's green. */
+static double noise(imp_film *f)
+{
+    struct imp_film_info info = {.size = sizeof info};
+    must(imp_film_get_info(f, &info));
+    const int n = info.width * info.height;
+    double *e = malloc((size_t)n * sizeof *e), m;
+    for (int p = 0; p < n; p++)
+        e[p] = (double)imp_film_se(f)[3 * p + 1] / (double)imp_film_mean(f)[3 * p + 1];
+    qsort(e, (size_t)n, sizeof *e, by_value);
+    m = e[n / 2];
+    free(e);
+    return m;
+}
+
+/* Vertices of a walk, which is how many segments it has, in the mean. */
+static double segments(const imp_scene *s)
+{
+    const struct imp_tracer tracer = {.scene = s,
+                                      .integrator = imp__walk_integrator(s),
+                                      .sensor = s->sensors[0],
+                                      .value_only = true};
+    const struct imp_film_desc *film = &tracer.sensor->film;
+    struct imp_arena arena;
+    double sum = 0;
+    imp__arena_init(&arena, ctx);
+    for (int y = 0; y < film->crop_h; y++)
+        for (int x = 0; x < film->crop_w; x++) {
+            const struct imp_arena_mark mark = imp__arena_mark(&arena);
+            struct imp_walk w;
+            imp__walk_trace(&tracer, &arena, x, y, 0, &w);
+            sum += w.n;
+            imp__arena_rewind(&arena, mark);
+        }
+    imp__arena_free(&arena);
+    return sum / (film->crop_w * film->crop_h);
+}
+
+static long peak_kib(void)
+{
+    struct rusage u;
+    getrusage(RUSAGE_SELF, &u);
+    return u.ru_maxrss;
+}
+
+static void measure(const char *name, const char *path, const char *numbers, int repeats,
+                    int spp)
+{
+    imp_scene *scene;
+    imp_problem *p;
+    double *g, *se, picture = 1e300, gradient = 1e300, error = 0, sum = 0;
+    must(imp_scene_load(ctx, path, NULL, &scene));
+    must(imp_problem_create(scene, &p));
+    must(imp_problem_activate(p, numbers));
+    const size_t n = imp_problem_n(p);
+    g = malloc(n * sizeof *g);
+    se = malloc(n * sizeof *se);
+    const long before = peak_kib();
+    for (int r = 0; r < repeats; r++) {
+        struct imp_run run = IMP_RUN_INIT;
+        imp_film *f;
+        run.seed = (uint64_t)r + 1;
+        run.spp = spp;
+        double t = cpu();
+        must(imp_render(scene, &run, &f));
+        picture = fmin(picture, cpu() - t);
+        error = noise(f);
+        imp_film_destroy(f);
+        t = cpu();
+        must(imp_problem_functional(p, NULL, &run, NULL, g, se));
+        gradient = fmin(gradient, cpu() - t);
+        for (size_t i = 0; i < n; i++) sum += se[i] * se[i] / repeats;
+    }
+    const double samples = 128. * 128. * spp;
+    printf("%s: %zu numbers, %.3g samples and %.3g segments a second; 1 %% in the median "
+           "pixel in %.2f s; gradient/picture %.2f; memory of the gradient %.1f bytes a "
+           "number\n",
+           name, n, samples / picture, segments(scene) * samples / picture,
+           picture * pow(error / .01, 2), gradient / picture,
+           1024. * (double)(peak_kib() - before) / (double)n);
+    printf("%s picture %.4f gradient %.4f variance %.6g\n", name, picture, gradient, sum);
+    free(g);
+    free(se);
+    imp_problem_destroy(p);
+    imp_scene_destroy(scene);
+}
+
+static void scene_write(const char *path, const char *medium)
+{
+    FILE *f = fopen(path, "w");
+    if (!f || fprintf(f, scene_text, medium) < 0 || fclose(f) != 0) {
+        fprintf(stderr, "media: %s cannot be written\n", path);
+        exit(3);
+    }
+}
+
+int main(int argc, char **argv)
+{
+    struct imp_context_options o = IMP_CONTEXT_OPTIONS_INIT;
+    char box[1024], plume[1024], grid[1024];
+    if (argc < 2) {
+        fprintf(stderr, "usage: media DIR [REPEATS [SPP [N]]]\n");
+        return 2;
+    }
+    const int repeats = argc > 2 ? atoi(argv[2]) : 3, spp = argc > 3 ? atoi(argv[3]) : 32,
+              n = argc > 4 ? atoi(argv[4]) : 128;
+    snprintf(box, sizeof box, "%s/box.xml", argv[1]);
+    snprintf(plume, sizeof plume, "%s/plume.xml", argv[1]);
+    snprintf(grid, sizeof grid, "%s/plume.vol", argv[1]);
+    scene_write(box, box_text);
+    scene_write(plume, plume_text);
+    if (repeats < 1 || spp < 2 || n < 1 || !plume_write(grid, n, 7)) {
+        fprintf(stderr, "media: %s cannot be written\n", grid);
+        return 3;
+    }
+    o.threads = 1;
+    must(imp_context_create(&o, &ctx));
+    measure("box", box, "smoke.sigma_t.value", repeats, spp);
+    measure("plume", plume, "density.data", repeats, spp);
+    imp_context_destroy(ctx);
+    return 0;
+}
