@@ -180,6 +180,40 @@ static imp_scene *under_pane(const char *pane, const char *lamp)
     return test_scene_text(ctx, text, IMP_MONO);
 }
 
+/* A box of nothing, 1 high, on the way to the lamp: the derivative is there all the same,
+ * where bounds of the extinction are 0 and no tentative collision ever is. */
+static void empty_shadow(void)
+{
+    enum { N = 16, CELLS = N * N * N };
+    static float none[CELLS];
+    static double g[CELLS], g_se[CELLS];
+    char path[64], text[1024];
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_estimate v;
+    double sum = 0, square = 0;
+    vol_write(path, N, N, N, 1, none);
+    snprintf(text, sizeof text,
+             "<medium type='heterogeneous' id='fog'><volume name='sigma_t' "
+             "type='gridvolume' id='grid'><string name='filename' value='%s'/>"
+             "<transform name='to_world'><translate x='-0.5' y='-0.5' z='1.5'/>"
+             "</transform></volume></medium><shape type='cube'><bsdf type='null'/>"
+             "<ref id='fog' name='interior'/><transform name='to_world'>"
+             "<scale value='0.5'/><translate z='2'/></transform></shape>"
+             "<emitter type='point'><point name='position' x='0' y='0' z='3'/></emitter>",
+             path);
+    imp_scene *s = under_pane("<bsdf type='null'/>", text);
+    imp_problem *p = test_problem(ctx, s, "grid.data");
+    run.spp = 1024;
+    run.seed = 3;
+    test_must(ctx, imp_problem_functional(p, NULL, &run, &v, g, g_se));
+    for (int i = 0; i < CELLS; i++) sum += g[i], square += g_se[i] * g_se[i];
+    near_se(sum, sqrt(square) + 1e-7, -v.value, .02 * v.value,
+            "the shadow of an empty box has its derivative");
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+    remove(path);
+}
+
 static void panes(void)
 {
     static const char point[] = "<emitter type='point'><point name='position' x='0' "
@@ -319,6 +353,7 @@ int main(void)
     colours();
     inside();
     panes();
+    empty_shadow();
     bounds_follow();
     furnace();
 
