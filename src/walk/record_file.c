@@ -140,8 +140,15 @@ static bool vertex_fits(const struct imp_scene *scene, const struct imp_decision
            light_fits(scene, b, d) && continuation_fits(b, d);
 }
 
-static bool event_fits(const struct imp_scene *scene, const struct imp_event *e)
+/* `before`: kind of the event before it, -1: none. A surface that is passed has two. */
+static bool event_fits(const struct imp_scene *scene, const struct imp_event *e,
+                       int before)
 {
+    if ((e->kind == IMP_PASSES_UV) != (before == IMP_PASSES)) return false;
+    if (e->kind == IMP_PASSES_UV) return isfinite(e->t) && isfinite(e->bound);
+    if (e->kind == IMP_PASSES)
+        return e->medium >= 0 && e->medium < scene->n_shapes && isfinite(e->t) &&
+               isfinite(e->bound);
     if (e->medium < 0 || e->medium >= scene->n_media || !(e->t >= 0)) return false;
     if (e->kind == IMP_CROSSES || e->kind == IMP_COLLIDES)
         return !scene->media[e->medium]->majorants;
@@ -189,9 +196,13 @@ static bool track_fits(struct fitting *f, const union imp_kept *head)
     if (!way || !all_finite(head->head.o, 3) || !unit(way->way.d) ||
         way->way.n > INT32_MAX || way->way.n > f->walk->n_items - f->item)
         return false;
-    for (uint32_t i = 0; i < way->way.n; i++)
-        if (!event_fits(f->scene, &item_at(f)->event)) return false;
-    return true;
+    int before = -1;
+    for (uint32_t i = 0; i < way->way.n; i++) {
+        const struct imp_event *e = &item_at(f)->event;
+        if (!event_fits(f->scene, e, before)) return false;
+        before = e->kind;
+    }
+    return before != IMP_PASSES;
 }
 
 static bool items_fit(struct fitting *f)
