@@ -194,6 +194,8 @@ static inline void kind_inputs(const struct imp_bsdf *b, enum kind_set set, uint
             else if (d->fallback > 0)
                 v = d->fallback * exp2(set == KIND_WIDE ? 7 * u - 3.5 : 3 * u - 1.5);
             else v = lo + 3 * u;
+            if (d->flags & IMP_INPUT_VECTOR) /* a normal, on the side of the surface */
+                v = c == 2 ? 0.75 + 0.25 * u : 0.2 + 0.6 * u;
             in[j][c] = imp_clamp(v, lo, hi);
         }
         in[j][3] = kind_is_scalar(d) ? in[j][0] : NAN; /* nobody may read it */

@@ -18,7 +18,8 @@ from zcompare import mi, np
 CASES = ["stage", "stage_mono", "shapes", "shapes_flip", "shapes_mirror", "meshes", "lights",
          "lights_mono", "rough_ggx", "rough_beckmann", "alphas", "metals", "metals_mono", "glass",
          "twosided", "textures", "textures_nearest", "textures_mirror", "textures_raw",
-         "emission_forms", "reflectance_forms", "sensor_0", "sensor_4", "sensor_9"]
+         "emission_forms", "reflectance_forms", "sensor_0", "sensor_4", "sensor_9", "spots",
+         "spots_mono", "directional", "projector"]
 
 
 def quarters(stack):

@@ -64,7 +64,9 @@ enum imp_input_flags {
                                  declared before it under the same name. A kind whose
                                  lanes couple (a tint divided by its luminance) reads
                                  it, and the engine has its derivative */
-    IMP_INPUT_NUMBER = 256,      /* of an IMP_INPUT_SCALAR: a texture is refused */
+    IMP_INPUT_NUMBER = 256,      /* a texture is refused */
+    IMP_INPUT_VECTOR = 512,      /* a texture, whose three channels are lanes 0..2 as they
+                                    are, in all modes: not a colour */
     IMP_INPUT_EXTINCTION = 4096, /* of a medium: the extinction depends on it, and does
                                        not fall where it rises */
     IMP_INPUT_VOLUME = 8192      /* may be a volume */
@@ -99,6 +101,7 @@ struct imp_input {
     int count;                         /* numbers of a constant: 3, or 1 (in all lanes) */
     bool scalar;     /* declared IMP_INPUT_SCALAR: textures give one number */
     bool plain;      /* a constant: `value` as it is, unless lanes are wavelengths */
+    bool vector;     /* declared IMP_INPUT_VECTOR */
     int luminance;   /* > 0: the luminance of the input that stands so many before it */
     imp_spec value;  /* the constant, in all used lanes */
     imp_spec weight; /* of a luminance: of that input's lanes */
@@ -537,7 +540,8 @@ struct imp_emitter {
     int index;
     double weight; /* sampling_weight */
     const char *name;
-    bool shaped; /* as of imp_bsdf */
+    bool shaped;    /* as of imp_bsdf */
+    unsigned fixed; /* bit j: input j has no derivative in this object; build sets it */
 };
 
 /* Of a light that is its first input times a function of the direction alone: what solvers
@@ -585,6 +589,8 @@ struct imp_emitter_ops {
      * or neither where a constant moves the lookup. */
     void (*place_d)(const struct imp_emitter *e, const struct imp_emission *x, int j,
                     double duv[2]);
+    /* As imp_bsdf_ops.prepare. */
+    enum imp_status (*prepare)(const struct imp_build *build);
 };
 
 /* ---- Sensor and filter --------------------------------------------------------- */

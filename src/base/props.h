@@ -101,6 +101,10 @@ struct imp_node {
     const char *asked[24]; /* names of properties that were looked for, literals; */
     int n_asked;           /* what a misspelt one may have meant. Full: no more */
     int visiting;          /* cycle detection */
+    bool vector;           /* a texture read as IMP_INPUT_VECTOR */
+    bool surveyed, gone;   /* format/survey.c: visited; left out of a lenient scene */
+    bool lenient;          /* what nobody reads is left out, not an error: */
+    bool read;             /* its object was made: what is not used is used by nobody */
 };
 
 /* Nodes and everything in them live in the arena; arrays grow in it too. */

@@ -118,4 +118,8 @@ const struct imp_integrator_ops *const imp__integrator_kinds[] = {
     &imp__integrator_volpath,
     &imp__integrator_volpathmis,
     &imp__integrator_prbvolpath,
+    &imp__integrator_prb,
+    &imp__integrator_prb_basic,
+    &imp__integrator_prb_projective,
+    &imp__integrator_direct_projective,
     NULL};

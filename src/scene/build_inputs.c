@@ -314,6 +314,10 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
         return IMP_OK;
     }
 
+    if (d->flags & IMP_INPUT_VECTOR &&
+        (prop || (child && imp__color_is_object(child->node))))
+        IMP_TRY(imp__prop_error(ctx, node, prop, IMP_E_SCENE, "'%s' must be a texture",
+                                d->name));
     if (prop) {
         prop->used = true;
         IMP_TRY(imp__color_convert(&ask, node, prop, &color));
@@ -333,9 +337,18 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
                                     volume ? "volume" : "texture"));
         if (d->flags & IMP_INPUT_NUMBER)
             IMP_TRY(imp__node_error(ctx, child->node, IMP_E_SCENE,
-                                    "'%s' must be a number, not a texture", d->name));
+                                    "'%s' must be a %s, not a texture", d->name,
+                                    scalar ? "number" : "number or a colour"));
+        in->vector = d->flags & IMP_INPUT_VECTOR;
+        if (child->node->object && in->vector != child->node->vector &&
+            scene->mode == IMP_MONO)
+            IMP_TRY(imp__node_error(ctx, child->node, IMP_E_SCENE,
+                                    "is a colour in one place and a vector in another: "
+                                    "in mono mode each needs a texture of its own"));
+        if (!child->node->object) child->node->vector = in->vector;
         IMP_TRY(imp__build_texture(scene, child->node, name, d->name, &t));
         in->texture = t;
+        if (d->flags & IMP_INPUT_FIXED) imp__build_fix(scene, in);
         texels_bound(scene, t->param, d);
         if (volume) IMP_TRY(volume_check(scene, child->node, t, d));
         return IMP_OK;
@@ -393,6 +406,18 @@ enum imp_status imp__build_inputs(struct imp_scene *scene, struct imp_node *node
     *n = count;
 out:
     return st;
+}
+
+void imp__build_fix(struct imp_scene *scene, const struct imp_input *input)
+{
+    const struct imp_texture *t = input->texture;
+    const int param = t ? t->param : input->param;
+    if (param >= 0) {
+        struct imp_param_info *info = &scene->params[param].info;
+        info->flags &= ~(unsigned)IMP_PARAM_DIFFERENTIABLE;
+        info->flags |= IMP_PARAM_DISCONTINUOUS;
+    }
+    for (int k = 0; t && k < t->n_in; k++) imp__build_fix(scene, t->input[k]);
 }
 
 bool imp__build_shaped(const struct imp_scene *scene,

@@ -172,6 +172,8 @@ enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *nod
                               .name = imp__build_object_name(scene, node, parent, slot)};
     if (!e->name) IMP_TRY(imp__build_no_memory(scene));
     node->object = e;
+    const struct imp_build b = imp__build_make(scene, node);
+    if (ops->prepare) IMP_TRY(ops->prepare(&b));
     int n = 0;
     while (ops->inputs && ops->inputs[n].name) n++;
     const struct imp_input **input =
@@ -184,8 +186,9 @@ enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *nod
     if (e->weight < 0)
         IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "sampling_weight is negative"));
     medium_child(node); /* walks know where they are */
-    const struct imp_build b = imp__build_make(scene, node);
     if (ops->build) IMP_TRY(ops->build(&b, self, e));
+    for (int j = 0; j < e->n_in; j++)
+        if (e->fixed >> j & 1) imp__build_fix(scene, e->input[j]);
     IMP_TRY(imp__proxies_take(scene, node, e->name));
     IMP_TRY(imp__props_finish(ctx, node));
     if (ops->changed)

@@ -27,6 +27,8 @@ struct imp_build imp__build_make(struct imp_scene *scene, struct imp_node *node)
 enum imp_status imp__build_inputs(struct imp_scene *scene, struct imp_node *node,
                                   const char *name, const struct imp_input_desc *desc,
                                   const struct imp_input **out, int *n);
+/* No gradient with respect to what the input is made of: it would be biased. */
+void imp__build_fix(struct imp_scene *scene, const struct imp_input *input);
 /* Does a scalar input differ between the lanes of walks? */
 bool imp__build_shaped(const struct imp_scene *scene,
                        const struct imp_input *const *input, int n);

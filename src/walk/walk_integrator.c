@@ -92,18 +92,35 @@ static enum imp_status mixture_ready(struct imp_scene *scene,
     return st;
 }
 
-static enum imp_status path_build(const struct imp_build *build, struct imp_integrator *i)
+/* `depth`: default of max_depth. */
+static enum imp_status path_read(const struct imp_build *build, int depth,
+                                 struct imp_integrator *i)
 {
     struct imp_walk_integrator *w = i->self;
     enum imp_status st = IMP_OK;
     int64_t rr;
     *w = (struct imp_walk_integrator){.lights = true, .directions = true, .guided = true};
     IMP_TRY(imp__props_int(build->ctx, build->node, "rr_depth", 5, 1, INT32_MAX, &rr));
-    IMP_TRY(depth_read(build, -1, i, w));
+    IMP_TRY(depth_read(build, depth, i, w));
     IMP_TRY(mixture_read(build, w));
     w->rr_depth = (int)rr;
 out:
     return st;
+}
+
+static enum imp_status path_build(const struct imp_build *build, struct imp_integrator *i)
+{
+    return path_read(build, -1, i);
+}
+
+/* Mitsuba's integrators that differentiate have this max_depth where none is given. */
+#define DEPTH_OF_DERIVATIVES 6
+
+static void read_as(const struct imp_build *build, const struct imp_integrator *i,
+                    const char *name)
+{
+    imp__warn(build->ctx, "integrator '%s' is read as '%s', whose picture it makes",
+              i->ops->name, name);
 }
 
 /* volpath, and Mitsuba's two other estimators of the same mean. */
@@ -113,7 +130,9 @@ static enum imp_status volpath_build(const struct imp_build *build,
     struct imp_walk_integrator *w = i->self;
     enum imp_status st = IMP_OK;
     bool spectral;
-    IMP_TRY(path_build(build, i));
+    const bool derivative = strcmp(i->ops->name, "prbvolpath") == 0;
+    if (derivative) read_as(build, i, "volpath");
+    IMP_TRY(path_read(build, derivative ? DEPTH_OF_DERIVATIVES : -1, i));
     if (strcmp(i->ops->name, "volpathmis") == 0)
         IMP_TRY(imp_build_bool(build, "use_spectral_mis", true, &spectral));
     w->guided = false;
@@ -148,6 +167,37 @@ static enum imp_status direct_build(const struct imp_build *build,
                                 "emitter_samples and bsdf_samples are both 0"));
     w->lights = emitter > 0;
     w->directions = bsdf > 0;
+out:
+    return st;
+}
+
+/* Mitsuba's integrators for derivatives of path and direct; prb_basic samples no lights. */
+static enum imp_status derivative_build(const struct imp_build *build,
+                                        struct imp_integrator *i)
+{
+    struct imp_walk_integrator *w = i->self;
+    enum imp_status st = IMP_OK;
+    const char *name = i->ops->name, *text;
+    const bool direct = strcmp(name, "direct_projective") == 0;
+    static const char *const counts[] = {"sppc", "sppp", "sppi", "guiding_rounds"};
+    int64_t unused;
+    bool flag;
+    read_as(build, i, direct ? "direct" : "path");
+    if (strstr(name, "projective")) { /* how edges are sampled: without effect here */
+        for (size_t k = 0; k < imp_count(counts); k++)
+            IMP_TRY(imp_build_int(build, counts[k], 0, 0, INT32_MAX, &unused));
+        IMP_TRY(imp_build_string(build, "guiding", "octree", &text));
+        IMP_TRY(imp_build_string(build, "project_seed", "both", &text));
+        IMP_TRY(imp_build_bool(build, "guiding_proj", true, &flag));
+    }
+    if (direct) {
+        IMP_TRY(imp_build_int(build, "max_depth", 2, -1, INT32_MAX, &unused));
+        IMP_TRY(imp_build_int(build, "rr_depth", 5, 1, INT32_MAX, &unused));
+        IMP_TRY(direct_build(build, i));
+        return IMP_OK;
+    }
+    IMP_TRY(path_read(build, DEPTH_OF_DERIVATIVES, i));
+    if (strcmp(name, "prb_basic") == 0) w->lights = w->guided = false;
 out:
     return st;
 }
@@ -244,3 +294,16 @@ const struct imp_integrator_ops imp__integrator_photons = {
 VOLPATH(volpath);
 VOLPATH(volpathmis);
 VOLPATH(prbvolpath);
+
+#define DERIVATIVE(kind, ready_)                                                         \
+    const struct imp_integrator_ops imp__integrator_##kind = {                           \
+        .size = sizeof(struct imp_integrator_ops),                                       \
+        .name = #kind,                                                                   \
+        .object_size = sizeof(struct imp_walk_integrator),                               \
+        .flags = IMP_INTEGRATOR_WALKS | IMP_INTEGRATOR_INNER,                            \
+        .build = derivative_build,                                                       \
+        .ready = ready_}
+DERIVATIVE(prb, mixture_ready);
+DERIVATIVE(prb_basic, mixture_ready);
+DERIVATIVE(prb_projective, mixture_ready);
+DERIVATIVE(direct_projective, NULL);

@@ -37,7 +37,9 @@ struct imp_walk_integrator {
 
 extern const struct imp_integrator_ops imp__integrator_path, imp__integrator_direct,
     imp__integrator_stam, imp__integrator_photons, imp__integrator_volpath,
-    imp__integrator_volpathmis, imp__integrator_prbvolpath;
+    imp__integrator_volpathmis, imp__integrator_prbvolpath, imp__integrator_prb,
+    imp__integrator_prb_basic, imp__integrator_prb_projective,
+    imp__integrator_direct_projective;
 
 /* NULL: not one of walks. */
 static inline const struct imp_walk_integrator *

@@ -17,6 +17,7 @@
 #include "imp_kinds.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
+#include "vol_write.h"
 #include <unistd.h>
 
 #define SIDE    5
@@ -90,6 +91,28 @@ static double random_in(const struct imp_input_desc *d, uint64_t seed, uint32_t 
     return imp_clamp(typical * (0.6 + 0.8 * u), lo, hi);
 }
 
+/* Volumes are files, which are read when a scene is made. */
+static char grid_file[64][64];
+static int n_grids;
+static void grid_make(imp_scene *s, const char *slot, const float cells[24])
+{
+    const double room[16] = {2, 0, 0, -1, 0, 2, 0, -1, 0, 0, 2, -1, 0, 0, 0, 1};
+    char *path = grid_file[n_grids++ % 64];
+    vol_write(path, 2, 2, 2, 3, cells);
+    imp_scene_begin(s, "volume", "gridvolume", NULL, slot);
+    imp_scene_string(s, "filename", path);
+    imp_scene_transform(s, "to_world", room);
+    imp_scene_end(s);
+}
+static void grids_remove(void)
+{
+    while (n_grids > 0) remove(grid_file[--n_grids % 64]);
+}
+static bool is_volume(const struct imp_texture_ops *t)
+{
+    return t->inputs && t->inputs[0].flags & IMP_INPUT_VOLUME;
+}
+
 static void texture_make(imp_scene *s, const struct subject *q, const char *slot,
                          const struct imp_input_desc *d, uint64_t seed, bool outer)
 {
@@ -105,11 +128,17 @@ static void texture_make(imp_scene *s, const struct subject *q, const char *slot
     for (int j = 0; t->inputs && t->inputs[j].name; j++) {
         struct imp_input_desc e = t->inputs[j];
         double v[3];
+        const bool volume = e.flags & IMP_INPUT_VOLUME;
         if (d->role != IMP_REFLECTANCE) e.fallback = d->fallback;
         else if (d->flags & IMP_INPUT_SCALAR) e.fallback = fmin(e.fallback, 0.5);
         for (uint32_t k = 0; k < 3; k++)
             v[k] = random_in(&e, seed, 50 + 3 * (uint32_t)j + k);
-        if (q->nested && outer)
+        if (volume) {
+            float cells[3 * 8];
+            for (uint32_t k = 0; k < 24; k++)
+                cells[k] = (float)random_in(d, seed, 100 + k);
+            grid_make(s, t->inputs[j].name, cells);
+        } else if (q->nested && outer)
             texture_make(s, q, t->inputs[j].name, &e, seed + 7 + (uint64_t)j, false);
         else if (d->flags & IMP_INPUT_SCALAR) imp_scene_float(s, t->inputs[j].name, v[0]);
         else imp_scene_rgb(s, t->inputs[j].name, v);
@@ -173,6 +202,16 @@ static void bsdf_make(imp_scene *s, const struct subject *q,
     } else {
         props_make(s, q->props);
     }
+    if (strcmp(ops->name, "normalmap") == 0) { /* it has no gradient */
+        float pixels[27];
+        for (uint32_t k = 0; k < 27; k++)
+            pixels[k] =
+                (float)(k % 3 == 2 ? 1 : 0.3 + 0.4 * imp__u01(imp__key(9, 9, 9), k));
+        imp_scene_begin(s, "texture", "bitmap", NULL, "normalmap");
+        imp_scene_image(s, 3, 3, 3, pixels);
+        imp_scene_bool(s, "raw", 1);
+        imp_scene_end(s);
+    }
     if (strcmp(ops->name, "merl") == 0) imp_scene_string(s, "filename", measured);
     inputs_make(s, q, ops->name, ops->max_children ? NULL : q->props, ops->inputs, true,
                 seed);
@@ -189,15 +228,20 @@ static void grey(imp_scene *s, double value)
 
 static void emitter_make(imp_scene *s, const struct subject *q)
 {
-    const bool texture = q->emitter->flags & IMP_EMITTER_AREA;
-    const double at[16] = {1, 0, 0, -0.3, 0, 1, 0, 0.7, 0, 0, 1, 0.4, 0, 0, 0, 1};
+    const bool sky = q->emitter->flags & IMP_EMITTER_ENVIRONMENT;
+    const bool texture =
+        q->emitter->flags & IMP_EMITTER_AREA || (q->emitter->place && !sky);
+    /* Above and beside the ball, towards it. */
+    const double x = sqrt(0.8), z = sqrt(0.2);
+    const double at[16] = {x, 0.2,   0.4, -0.3, z, -0.4, -0.8, 0.7,
+                           0, 2 * z, -z,  0.4,  0, 0,    0,    1};
     imp_scene_begin(s, "emitter", q->emitter->name, "subject", NULL);
     if (q->emitter->flags & IMP_EMITTER_DELTA) imp_scene_transform(s, "to_world", at);
     if (strcmp(q->emitter->name, "ies") == 0) {
         imp_scene_string(s, "filename", IMP_SCENES "/lamps/wallwash.ies");
         imp_scene_string(s, "units", "radiometric");
     }
-    if (q->emitter->place) { /* a picture of the sky, some of it dark */
+    if (q->emitter->place && sky) { /* a picture of the sky, some of it dark */
         float pixels[5 * 4 * 3];
         for (uint32_t k = 0; k < 60; k++)
             pixels[k] = k % 7 ? (float)random_in(q->emitter->inputs, 5, 100 + k) : 0;
@@ -235,7 +279,8 @@ static imp_scene *scene_make(const struct subject *q, const char *integrator,
     imp_scene_end(s);
     imp_scene_end(s);
 
-    const bool open = q->emitter && q->emitter->flags & IMP_EMITTER_ENVIRONMENT;
+    const bool sky = q->emitter && q->emitter->flags & IMP_EMITTER_ENVIRONMENT;
+    const bool open = sky || (q->emitter && !strcmp(q->emitter->name, "directional"));
     if (!open) {
         imp_scene_begin(s, "shape", "cube", "room", NULL);
         imp_scene_bool(s, "flip_normals", 1);
@@ -265,7 +310,7 @@ static imp_scene *scene_make(const struct subject *q, const char *integrator,
         imp_scene_end(s);
     } else {
         emitter_make(s, q);
-        if (!open || q->emitter->place) { /* so that scale 0 is not darkness */
+        if (!sky || q->emitter->place) { /* so that scale 0 is not darkness */
             const double at[3] = {0.2, 0.6, 0.3};
             imp_scene_begin(s, "emitter", "point", NULL, NULL);
             imp_scene_vector(s, "position", at);
@@ -281,6 +326,7 @@ static imp_scene *scene_make(const struct subject *q, const char *integrator,
     imp_scene_end(s);
     if (q->bsdf) bsdf_make(s, q, q->bsdf, "subject", 1);
     test_must(ctx, imp_scene_commit(s));
+    grids_remove();
     return s;
 }
 
@@ -528,6 +574,12 @@ static void check_one(const struct subject *q, const char *integrator,
             is_left_out(what, q->props, inputs[j].name))
             continue;
         if (q->bsdf && is_left_out(q->bsdf->name, q->props, inputs[j].name)) continue;
+        /* Its texture moves, and has no slope there. */
+        if (strcmp(part, "subject.cutoff_angle") == 0 && q->texture &&
+            strcmp(q->texture->name, "bitmap") != 0) {
+            tap_ok(!active_has(p, s, part), "%s: %s has no gradient", what, part);
+            continue;
+        }
         if (!active_has(p, s, part)) tap_ok(0, "%s: %s is a parameter", what, part);
     }
     frozen(all, what, false);
@@ -622,16 +674,24 @@ int main(int argc, char **argv)
         for (size_t i = 0; i < imp_count(kind_configs); i++)
             if (strcmp(kind_configs[i].kind, ops->name) == 0)
                 check(&(struct subject){.bsdf = ops, .props = kind_configs[i].props});
-        for (int i = 0; imp__texture_kinds[i]; i++)
-            for (int nested = 0; nested <= (imp__texture_kinds[i]->inputs &&
+        for (int i = 0; imp__texture_kinds[i]; i++) {
+            if (is_volume(imp__texture_kinds[i]) && !is_long &&
+                strcmp(ops->name, "diffuse") != 0)
+                continue;
+            for (int nested = 0; nested <= (!is_volume(imp__texture_kinds[i]) &&
+                                            imp__texture_kinds[i]->inputs &&
                                             imp__texture_kinds[i]->inputs[0].name);
                  nested++)
                 check(&(struct subject){
                     .bsdf = ops, .texture = imp__texture_kinds[i], .nested = nested});
+        }
     }
     for (int k = 0; imp__emitter_kinds[k]; k++) {
         check(&(struct subject){.emitter = imp__emitter_kinds[k]});
-        if (!(imp__emitter_kinds[k]->flags & IMP_EMITTER_AREA)) continue;
+        if (!(imp__emitter_kinds[k]->flags & IMP_EMITTER_AREA) &&
+            (!imp__emitter_kinds[k]->place ||
+             imp__emitter_kinds[k]->flags & IMP_EMITTER_ENVIRONMENT))
+            continue;
         for (int i = 0; imp__texture_kinds[i]; i++)
             check(&(struct subject){.emitter = imp__emitter_kinds[k],
                                     .texture = imp__texture_kinds[i]});

@@ -105,7 +105,8 @@ static void loss_at_truth(const char *filter, int spp)
 int main(void)
 {
     static const char *const filters[] = {
-        "<rfilter type='box'/>", "<rfilter type='gaussian'/>", "<rfilter type='tent'/>"};
+        "<rfilter type='box'/>", "<rfilter type='gaussian'/>", "<rfilter type='tent'/>",
+        "<rfilter type='mitchell'/>", "<rfilter type='lanczos'/>"};
     ctx = test_context(0);
     for (size_t k = 0; k < sizeof filters / sizeof *filters; k++) {
         errors(filters[k], 8);

@@ -10,6 +10,7 @@
     X(imp__dielectric)                                                                   \
     X(imp__diffuse)                                                                      \
     X(imp__mask)                                                                         \
+    X(imp__normalmap)                                                                    \
     X(imp__merl)                                                                         \
     X(imp__null)                                                                         \
     X(imp__phong)                                                                        \

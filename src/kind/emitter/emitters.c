@@ -11,7 +11,10 @@
     X(imp__ies_light)                                                                    \
     X(imp__ies_area)                                                                     \
     X(imp__constant)                                                                     \
-    X(imp__envmap)
+    X(imp__envmap)                                                                       \
+    X(imp__directional)                                                                  \
+    X(imp__spot_light)                                                                   \
+    X(imp__projector)
 
 #define DECLARE(kind) extern const struct imp_emitter_ops kind;
 EMITTERS(DECLARE)

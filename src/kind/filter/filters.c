@@ -7,7 +7,10 @@
 #define FILTERS(X)                                                                       \
     X(imp__box)                                                                          \
     X(imp__tent)                                                                         \
-    X(imp__gaussian)
+    X(imp__gaussian)                                                                     \
+    X(imp__mitchell)                                                                     \
+    X(imp__catmullrom)                                                                   \
+    X(imp__lanczos)
 
 #define DECLARE(kind) extern const struct imp_filter_ops kind;
 FILTERS(DECLARE)

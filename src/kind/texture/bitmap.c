@@ -38,7 +38,7 @@ static enum imp_status data_convert(const struct imp_build *b,
                                     struct bitmap *t)
 {
     const size_t n = (size_t)im->width * (size_t)im->height;
-    const bool grey = im->channels == 3 && b->mode == IMP_MONO;
+    const bool grey = im->channels == 3 && b->mode == IMP_MONO && !b->node->vector;
     t->channels = grey ? 1 : im->channels;
     t->data = imp__arena_take(b->arena, n * (size_t)t->channels + 1, sizeof *t->data);
     if (!t->data) return imp__error(b->ctx, IMP_E_NOMEM, "bitmap does not fit");

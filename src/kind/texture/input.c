@@ -81,7 +81,12 @@ static void spectrum_tangent(const struct imp_input *input, const struct imp_car
 static void input_eval(const struct imp_input *input, const struct imp_texcoord *at,
                        bool scalar, imp_spec *value)
 {
-    if (input->texture) input->texture->ops->eval(input->texture, at, scalar, value);
+    if (imp_unlikely(input->vector)) { /* no colour: whatever the walk carries */
+        struct imp_texcoord plain = *at;
+        plain.carried = NULL;
+        input->texture->ops->eval(input->texture, &plain, false, value);
+    } else if (input->texture)
+        input->texture->ops->eval(input->texture, at, scalar, value);
     else if (by_wavelength(input, at)) spectrum_eval(input, at->carried, value);
     else if (scalar && input->count == 3)
         *value = mean(input->value[0], input->value[1], input->value[2]);

@@ -6,7 +6,8 @@
 #define TEXTURES(X)                                                                      \
     X(imp__bitmap)                                                                       \
     X(imp__checkerboard)                                                                 \
-    X(imp__d65)
+    X(imp__d65)                                                                          \
+    X(imp__volume_texture)
 
 #define DECLARE(kind) extern const struct imp_texture_ops kind;
 TEXTURES(DECLARE)

@@ -1,0 +1,78 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * directional: parallel light from infinitely far, travelling along `direction` (or +z of
+ * to_world). `irradiance` is measured across the ray. */
+#include "from_point.h"
+#include "math/transform.h"
+#include "math/vec.h"
+#include <math.h>
+
+enum { IRRADIANCE };
+
+struct directional {
+    imp_v3 along; /* unit, world */
+};
+
+static const struct imp_input_desc inputs[] = {{.name = "irradiance",
+                                                .role = IMP_EMISSION,
+                                                .flags = IMP_INPUT_NUMBER,
+                                                .fallback = 1,
+                                                .unit = "W m^-2"},
+                                               {0}};
+
+static enum imp_status build(const struct imp_build *b, void *self, struct imp_emitter *e)
+{
+    enum imp_status st = IMP_OK;
+    struct directional *l = self;
+    struct imp_mat4 to_world;
+    double d[3];
+
+    if (imp_build_has(b, "direction") && imp_build_has(b, "to_world"))
+        IMP_TRY(imp_build_error(b, "to_world", IMP_E_SCENE,
+                                "give direction or to_world, not both"));
+    (void)e;
+    IMP_TRY(imp_build_vector(b, "direction", (double[3]){0, 0, 1}, d));
+    IMP_TRY(imp_build_transform(b, "to_world", to_world.m));
+    l->along = imp__vector(&to_world, imp__v3(d[0], d[1], d[2]));
+    const double length = imp__length(l->along);
+    if (!(length > 0 && length < INFINITY))
+        IMP_TRY(imp_build_error(b, imp_build_has(b, "direction") ? "direction" : NULL,
+                                IMP_E_SCENE, "its direction has length %g", length));
+    l->along *= imp__spec(1 / length);
+out:
+    return st;
+}
+
+static void eval(const struct imp_emitter *e, const imp_spec *in,
+                 const struct imp_emission *x, imp_spec *le)
+{
+    (void)e, (void)x;
+    *le = in[IRRADIANCE];
+}
+static void eval_d(const struct imp_emitter *e, const imp_spec *in,
+                   const struct imp_emission *x, imp_spec *dle)
+{
+    (void)e, (void)in, (void)x;
+    dle[IRRADIANCE] = imp__spec(1);
+}
+static bool sample(const struct imp_emitter *e, const imp_v3 *ref, const double u[2],
+                   struct imp_light_sample *out)
+{
+    (void)ref, (void)u;
+    const struct directional *l = e->self;
+    *out = (struct imp_light_sample){
+        .wi = -l->along, .dist = INFINITY, .pdf = 1, .cos_light = 1, .ng = l->along};
+    return true;
+}
+
+const struct imp_emitter_ops imp__directional = {.size = sizeof(struct imp_emitter_ops),
+                                                 .name = "directional",
+                                                 .object_size =
+                                                     sizeof(struct directional),
+                                                 .flags = IMP_EMITTER_DELTA,
+                                                 .inputs = inputs,
+                                                 .build = build,
+                                                 .eval = eval,
+                                                 .eval_d = eval_d,
+                                                 .sample = sample,
+                                                 .pdf = imp__point_light_pdf};
