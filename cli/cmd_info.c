@@ -103,10 +103,20 @@ static int print_params(struct json *j)
     return 0;
 }
 
+/* A scene that other commands refuse is not fine. */
+static int verdict(const struct imp_scene_info *s)
+{
+    if (s->n_missing == 0) return 0;
+    return cli_error(EXIT_USAGE, "%s: %d %s not supported; --lenient goes on without",
+                     cli.scene_path, s->n_missing,
+                     s->n_missing == 1 ? "thing is" : "things are");
+}
+
 static int run_info(int n, char **operand)
 {
     struct imp_scene_info s = {.size = sizeof s};
     (void)n;
+    cli.lenient = 2; /* listed, without warnings */
     int rc = cli_load(operand[0]);
     if (rc) return rc;
     imp_scene_get_info(cli.scene, &s);
@@ -124,6 +134,9 @@ static int run_info(int n, char **operand)
         json_text(&j, "integrator", s.integrator);
         json_integer(&j, "max_depth", s.max_depth);
         json_integer(&j, "memory_bytes", (int64_t)s.memory_bytes);
+        json_array(&j, "not_supported");
+        for (int i = 0; i < s.n_missing; i++) json_text(&j, NULL, s.missing[i]);
+        json_end_array(&j);
         json_array(&j, "sensors");
         for (int i = 0; i < s.n_sensors; i++) print_sensor_json(&j, i);
         json_end_array(&j);
@@ -131,7 +144,7 @@ static int run_info(int n, char **operand)
         rc = print_params(&j);
         json_end_array(&j);
         cli_json_end(&j);
-        return rc;
+        return rc ? rc : verdict(&s);
     }
     printf("%s: %s, %d shapes (%lld triangles), %d emitters, %d bsdfs, %d textures\n",
            cli.scene_path, cli_mode_word(s.mode), s.n_shapes, (long long)s.n_triangles,
@@ -139,6 +152,7 @@ static int run_info(int n, char **operand)
     if (s.bounds_min[0] <= s.bounds_max[0])
         printf("bounds: (%g, %g, %g) to (%g, %g, %g)\n", s.bounds_min[0], s.bounds_min[1],
                s.bounds_min[2], s.bounds_max[0], s.bounds_max[1], s.bounds_max[2]);
+    for (int i = 0; i < s.n_missing; i++) printf("without: %s\n", s.missing[i]);
     printf("integrator: %s", s.integrator ? s.integrator : "none");
     if (s.max_depth >= 0) printf(", max_depth %d", s.max_depth);
     printf("\n");
@@ -149,7 +163,8 @@ static int run_info(int n, char **operand)
             "sensor %d: %s (%s), %d x %d, %d samples per pixel, %s filter of radius %g\n",
             i, c.name, c.type, c.width, c.height, c.spp, c.filter, c.filter_radius);
     }
-    return print_params(NULL);
+    rc = print_params(NULL);
+    return rc ? rc : verdict(&s);
 }
 
 const struct command command_info = {{"info",

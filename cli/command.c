@@ -64,6 +64,9 @@ const struct arg_option options_scene[] = {
      "densities of directions, in place of those of the scene file: kernel, emitters, "
      "environment, proxies, guide, uniform",
      &cli.weights, 0, 0, NULL},
+    {ARG_FLAG, 0, "lenient", NULL,
+     "go on without plugins and properties that this version does not have", &cli.lenient,
+     0, 0, NULL},
     {ARG_FLAG, 0, "dump", NULL, "print the parameters and their values, and stop",
      &cli.dump, 0, 0, NULL},
     {0}};
@@ -303,6 +306,7 @@ int cli_load(const char *path)
     options.defines = cli.defines.item;
     options.n_defines = cli.defines.n;
     options.weights = cli.weights;
+    options.lenient = cli.lenient;
     if (cli.search) split_search(cli.search, &search);
     options.search = search.item;
     options.n_search = search.n;

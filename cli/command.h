@@ -53,7 +53,7 @@ struct cli {
     /* options_scene */
     struct arg_list defines, sets;
     const char *search, *weights;
-    int mode, dump;
+    int mode, dump, lenient;
     /* options_run */
     int sensor, spp;
     uint64_t seed;

@@ -233,10 +233,13 @@ struct imp_load_options {
     /** Of scene files: the property `weights` of the integrator (of the first one in aov
      * and moment), in place of what the file says; NULL: that. */
     const char *weights;
+    /** Not 0: the scene goes on without plugins and properties that this version does not
+     * have, and imp_scene_info lists them. 1: each is a warning, too. */
+    int lenient;
 };
 #define IMP_LOAD_OPTIONS_INIT                                                            \
     {                                                                                    \
-        sizeof(struct imp_load_options), IMP_RGB, 0, 0, 0, 0, 0                          \
+        sizeof(struct imp_load_options), IMP_RGB, 0, 0, 0, 0, 0, 0                       \
     }
 
 /** Load a scene file (Mitsuba 3 XML). The scene is committed and ready. `options` may be
@@ -313,6 +316,10 @@ struct imp_scene_info {
     const char *integrator;
     int max_depth;       /**< -1: unlimited */
     size_t memory_bytes; /**< held by the scene, Embree's part included */
+    /** [n_missing] what a lenient scene goes on without: place, plugin or property, and
+     * what is lost. */
+    const char *const *missing;
+    int n_missing;
 };
 /** Set info->size first; strings belong to the scene. @return IMP_OK; IMP_E_ARG. */
 IMP_API enum imp_status imp_scene_get_info(const imp_scene *scene,

@@ -312,6 +312,10 @@ enum imp_status imp__props_finish(imp_context *ctx, const struct imp_node *node)
                  imp__loc_text(c->loc, where, sizeof where));
     }
     if (!*list) return IMP_OK;
+    if (node->lenient) { /* format/survey.c lists it */
+        ((struct imp_node *)node)->read = true;
+        return IMP_OK;
+    }
     return imp__prop_error(ctx, node, first, IMP_E_SCENE,
                            "not a property of this plugin: %s%s", list, meant);
 }

@@ -47,9 +47,11 @@ void imp__load_close(imp_context *ctx, struct imp__load_file *f)
 
 enum imp_status imp__scene_finish(struct imp_scene *scene)
 {
-    enum imp_status st = imp__files_attach(scene);
+    enum imp_status st = imp__survey(scene);
+    if (st == IMP_OK) st = imp__files_attach(scene);
     if (st == IMP_OK) st = imp__scene_build(scene, imp__integrator_kinds);
     if (st == IMP_OK) st = imp__graded_finish(scene);
+    if (st == IMP_OK) st = imp__survey_finish(scene);
     imp__scene_release_files(scene);
     return st;
 }
@@ -88,6 +90,7 @@ static enum imp_status load(imp_context *ctx, const struct imp_bytes *text,
     enum imp_status st = IMP_OK;
     struct imp_scene *scene = NULL;
     IMP_TRY(imp__scene_new(ctx, o->mode, &scene));
+    scene->lenient = o->lenient;
     IMP_TRY(imp__search_init(scene, o->search, o->n_search, folder));
     IMP_TRY(imp__xml_read(scene, text, name, o));
     if (o->weights) IMP_TRY(weights_set(scene, o->weights));

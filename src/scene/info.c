@@ -25,6 +25,8 @@ enum imp_status imp_scene_get_info(const imp_scene *scene, struct imp_scene_info
         info->bounds_min[c] = scene->lo[c];
         info->bounds_max[c] = scene->hi[c];
     }
+    info->missing = scene->missing;
+    info->n_missing = scene->n_missing;
     info->memory_bytes = scene->arena.total + imp__intersector_bytes(scene) +
                          scene->cap_params * sizeof *scene->params;
     IMP_GIVE(scene->ctx, out, all, "info");

@@ -89,6 +89,9 @@ struct imp_scene {
     const struct imp_wavelengths *wavelengths; /* [n_sensors][IMP_WAVES_DRAWN]; NULL:
                                                   colours */
     bool committed;
+    int lenient; /* not 0: it goes on without what there is not; 1: with warnings */
+    const char **missing; /* [n_missing] a line for each */
+    int n_missing;
 
     struct imp_node *root;   /* being built, or what the objects came from */
     struct imp_node **stack; /* open objects of imp_scene_begin */

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # A name that is nearly one of ours: what was meant is said beside what there is.
-say() { importon info - <<<"<scene version='3.0.0'>$1</scene>"; }
+say() { importon render --dump - <<<"<scene version='3.0.0'>$1</scene>"; }
 say "<shape type='shpere'/>"
 say "<shape type='sphere'><bsdf type='roughconducter'/></shape>"
 say "<integrator type='paht'/>"

@@ -1,4 +1,4 @@
 # SPDX-License-Identifier: Apache-2.0
 # What no object asks for is an error with file, line and column.
 cd "$SCENES" || exit 9
-importon info unused_property.xml
+importon render --dump unused_property.xml

@@ -3,7 +3,7 @@
 say() {
     importon info - <<<"<scene version='3.0.0'>
 $1
-<sensor type='perspective'/></scene>" | sed -n 's/^integrator.*/&, fine/p'
+<sensor type='perspective'/></scene>" | sed -n 's/^integrator.*/&, fine/p; /^without/p'
 }
 weights() { say "<integrator type='${2-path}'><string name='weights' value='$1'/></integrator>$3"; }
 weights 'kernel=1, uniform=.5'
@@ -29,6 +29,6 @@ say "<emitter type='point'><shape type='sphere' name='proxy'/></emitter>"
 say "<shape type='sphere'><shape type='sphere' name='prox'/></shape>"
 say "<shape type='mesh' name='proxy_2'/>"
 scene="<scene version='3.0.0'><integrator type='path'/></scene>"
-importon info --weights kernel=1,uniform=1 - <<<"$scene" | sed -n 's/^integrator.*/&, fine/p'
+importon info --weights kernel=1,uniform=1 - <<<"$scene" | sed -n 's/^integrator.*/&, fine/p; /^without/p'
 importon info --weights kernel=1,unifrom=1 - <<<"$scene"
 importon info --weights kernel=1 - <<<"<scene version='3.0.0'/>"

@@ -1,0 +1,229 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What a scene names and this version does not have: all of it at once, before anything is
+ * made. A lenient scene goes on without: each such object is removed or replaced, and what
+ * is lost is said. */
+#include "color/color_set.h"
+#include "film/film_integrator.h"
+#include "kind/registry.h"
+#include "load.h"
+#include "scene/scene_build.h"
+#include <stdio.h>
+#include <string.h>
+
+/* What stands for an object of a tag that cannot be made. */
+static const struct rule {
+    const char *tag;
+    int concept;      /* enum imp_concept, or one of these: */
+    const char *lost; /* where it is removed, or replaced */
+    const char *type; /* that replaces it; NULL: it is removed */
+} rules[] = {
+    {"bsdf", IMP_CONCEPT_BSDF, "its surfaces are diffuse grey", "diffuse"},
+    {"texture", IMP_CONCEPT_TEXTURE, "the slot has its default", NULL},
+    {"shape", IMP_CONCEPT_SHAPE, "it is left out, and its light", NULL},
+    {"emitter", IMP_CONCEPT_EMITTER, "its light is missing", NULL},
+    {"sensor", IMP_CONCEPT_SENSOR, "sensors after it have other numbers", NULL},
+    {"rfilter", IMP_CONCEPT_FILTER, "the film has a gaussian", NULL},
+    {"volume", IMP_CONCEPT_VOLUME, "the slot has its default", NULL},
+    {"phase", IMP_CONCEPT_PHASE, "the medium scatters alike in all directions", NULL},
+    {"medium", IMP_CONCEPT_MEDIUM, "nothing scatters there", NULL},
+};
+
+static bool is_kind(const struct imp_scene *scene, const struct rule *r,
+                    const struct imp_node *node)
+{
+    const struct {
+        size_t size;
+        const char *name;
+    } * head;
+    for (size_t i = 0; (head = imp__kind_at(scene->ctx, (enum imp_concept)r->concept, i));
+         i++)
+        if (strcmp(head->name, node->type) == 0) return true;
+    return r->concept == IMP_CONCEPT_MEDIUM && strcmp(node->type, "graded") == 0;
+}
+
+static const struct rule *rule_of(const struct imp_node *node)
+{
+    for (size_t k = 0; k < imp_count(rules); k++)
+        if (strcmp(rules[k].tag, node->tag) == 0) return &rules[k];
+    return NULL;
+}
+
+static const void *integrator_at(const void *payload, size_t i)
+{
+    (void)payload;
+    return imp__integrator_kinds[i];
+}
+static bool integrator_exists(const char *type)
+{
+    for (size_t k = 0; imp__integrator_kinds[k]; k++)
+        if (strcmp(imp__integrator_kinds[k]->name, type) == 0) return true;
+    return false;
+}
+
+struct survey {
+    struct imp_scene *scene;
+    int n; /* found */
+    const struct imp_node *first;
+    char list[768]; /* the others, with their places */
+};
+
+/* One line of what a lenient scene goes on without (imp_scene_info). */
+static enum imp_status lost_add(struct imp_scene *scene, const char *text)
+{
+    char *copy = imp__arena_strdup(&scene->arena, text);
+    if (!copy) return imp__error(scene->ctx, IMP_E_NOMEM, "scene: out of memory");
+    if (scene->lenient == 1) imp__warn(scene->ctx, "%s", text);
+    return imp__build_list_add(scene, (void ***)&scene->missing, &scene->n_missing, copy);
+}
+
+static enum imp_status note(struct survey *s, const struct imp_node *node,
+                            const char *lost)
+{
+    char where[256], text[512];
+    imp__loc_text(node->loc, where, sizeof where);
+    if (s->scene->lenient) {
+        snprintf(text, sizeof text, "%s: %s %s%s%s%s: not supported; %s", where,
+                 node->tag, node->type, node->id ? " '" : "", node->id ? node->id : "",
+                 node->id ? "'" : "", lost);
+        return lost_add(s->scene, text);
+    }
+    const size_t n = strlen(s->list);
+    if (s->n++ == 0) s->first = node;
+    else
+        snprintf(s->list + n, sizeof s->list - n, "%s%s %s (%s)", n ? ", " : "",
+                 node->tag, node->type, where);
+    return IMP_OK;
+}
+
+static void child_remove(struct imp_node *parent, size_t i)
+{
+    parent->n_children--;
+    memmove(&parent->children[i], &parent->children[i + 1],
+            (parent->n_children - i) * sizeof *parent->children);
+}
+
+/* A material around another becomes one that changes nothing; others a plain one. */
+static enum imp_status material_replace(struct imp_scene *scene, struct imp_node *node,
+                                        const char *type)
+{
+    struct imp_child *nested = NULL;
+    for (size_t i = 0; i < node->n_children && !nested; i++)
+        if (node->children[i].node && strcmp(node->children[i].node->tag, "bsdf") == 0)
+            nested = &node->children[i];
+    node->n_props = 0;
+    node->type = nested ? "mask" : type;
+    node->n_children = nested != NULL;
+    if (!nested) return IMP_OK;
+    node->children[0] = *nested;
+    node->children[0].name = NULL;
+    struct imp_prop *p =
+        imp__node_add(&scene->arena, node, "opacity", IMP_PROP_FLOAT, node->loc);
+    if (!p) return imp__error(scene->ctx, IMP_E_NOMEM, "scene: out of memory");
+    p->number[0] = 1;
+    return IMP_OK;
+}
+
+/* The integrator becomes path, with its max_depth. */
+static void integrator_replace(struct imp_node *node)
+{
+    size_t kept = 0;
+    for (size_t i = 0; i < node->n_props; i++)
+        if (strcmp(node->props[i].name, "max_depth") == 0 ||
+            strcmp(node->props[i].name, "hide_emitters") == 0)
+            node->props[kept++] = node->props[i];
+    node->n_props = kept;
+    node->n_children = 0;
+    node->type = "path";
+}
+
+/* Is what the node is supported? *gone: its parent goes on without it. */
+static enum imp_status look(struct survey *s, struct imp_node *node, bool *gone)
+{
+    const bool lenient = s->scene->lenient;
+    const struct rule *r = rule_of(node);
+    enum imp_status st = IMP_OK;
+    *gone = false;
+    if (strcmp(node->tag, "integrator") == 0 && !integrator_exists(node->type)) {
+        IMP_TRY(note(s, node, "the picture is that of path"));
+        if (lenient) integrator_replace(node);
+    }
+    if (!r || imp__color_is_object(node) || is_kind(s->scene, r, node)) return IMP_OK;
+    const bool nested = strcmp(node->tag, "bsdf") == 0 && node->n_children > 0;
+    IMP_TRY(note(s, node, nested ? "what is nested in it stands for it" : r->lost));
+    if (!lenient) return IMP_OK;
+    *gone = !r->type;
+    if (r->type) IMP_TRY(material_replace(s->scene, node, r->type));
+out:
+    return st;
+}
+
+static enum imp_status walk(struct survey *s, struct imp_node *node)
+{
+    enum imp_status st = IMP_OK;
+    if (node->surveyed) return IMP_OK;
+    node->surveyed = true;
+    node->lenient = s->scene->lenient;
+    /* What describes a field of indices has names of its own (graded_file.c). */
+    if (strcmp(node->tag, "medium") == 0 && strcmp(node->type, "graded") == 0)
+        return IMP_OK;
+    for (size_t i = 0; i < node->n_children; i++) {
+        struct imp_node *child = node->children[i].node;
+        bool gone = child->gone;
+        if (!child->surveyed) IMP_TRY(look(s, child, &gone));
+        child->gone = gone;
+        if (gone) child_remove(node, i--);
+        else IMP_TRY(walk(s, child));
+    }
+out:
+    return st;
+}
+
+enum imp_status imp__survey(struct imp_scene *scene)
+{
+    struct survey s = {.scene = scene};
+    const enum imp_status st = scene->root ? walk(&s, scene->root) : IMP_OK;
+    if (st != IMP_OK || s.n < 2) return st; /* of one the builder says so */
+    char first[1024];
+    const void *none;
+    const struct rule *r = rule_of(s.first);
+    const enum imp_status why =
+        r ? imp__kind_find(scene->ctx, (enum imp_concept)r->concept, s.first, &none)
+          : imp__kind_choose(scene->ctx, s.first, integrator_at, NULL, &none);
+    snprintf(first, sizeof first, "%s", imp_last_error(scene->ctx));
+    return imp__error(scene->ctx, why, "%s; nor has it %s", first, s.list);
+}
+
+static enum imp_status unused_list(struct imp_scene *scene, struct imp_node *node)
+{
+    enum imp_status st = IMP_OK;
+    char where[256], text[512];
+    if (!node->surveyed) return IMP_OK; /* seen */
+    node->surveyed = false;
+    for (size_t i = 0; i < node->n_props; i++) {
+        const struct imp_prop *p = &node->props[i];
+        if (p->used || !node->read) continue;
+        imp__loc_text(p->loc, where, sizeof where);
+        snprintf(text, sizeof text, "%s: %s %s: no property '%s'; it is left out", where,
+                 node->tag, node->type, p->name);
+        IMP_TRY(lost_add(scene, text));
+    }
+    for (size_t i = 0; i < node->n_children; i++) {
+        const struct imp_child *c = &node->children[i];
+        if (!c->used && node->read) {
+            imp__loc_text(c->loc, where, sizeof where);
+            snprintf(text, sizeof text,
+                     "%s: %s %s: has no place for a %s; it is left out", where, node->tag,
+                     node->type, c->node->tag);
+            IMP_TRY(lost_add(scene, text));
+        }
+        IMP_TRY(unused_list(scene, c->node));
+    }
+out:
+    return st;
+}
+
+enum imp_status imp__survey_finish(struct imp_scene *scene)
+{
+    return scene->lenient && scene->root ? unused_list(scene, scene->root) : IMP_OK;
+}
