@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * From nodes to objects, in document order. Parameters get their names on the way
- * (docs/scene-format.md 12.2): by an object's own id, else below its parent's name. */
+ * (docs/scene-format.md 12.2): by an object's own id, else below its parent's name; at the
+ * top by its name. */
 #include "scene_build.h"
 
 /* Top-level objects without id: <tag><n>, counted per tag. */
@@ -13,10 +14,22 @@ struct tag_counts {
     } tags[16]; /* there are not as many */
 };
 
-static const char *top_name(struct imp_scene *scene, const struct imp_node *node,
+/* Is `name` the id of the node or of something in it? */
+static bool is_id(const struct imp_node *node, const char *name)
+{
+    if (node->id && strcmp(node->id, name) == 0) return true;
+    for (size_t i = 0; i < node->n_children; i++)
+        if (!node->children[i].ref && is_id(node->children[i].node, name)) return true;
+    return false;
+}
+
+/* Exporters write `name` where an id would stand. */
+static const char *top_name(struct imp_scene *scene, const struct imp_child *child,
                             struct tag_counts *counts)
 {
+    const struct imp_node *node = child->node;
     if (node->id) return node->id;
+    if (child->name && !is_id(scene->root, child->name)) return child->name;
     int k = 0;
     while (k < counts->n_tags && strcmp(counts->tags[k].tag, node->tag) != 0) k++;
     if (k == counts->n_tags && k < (int)imp_count(counts->tags))
@@ -33,7 +46,7 @@ static enum imp_status top_build(struct imp_scene *scene, struct imp_child *chil
 {
     enum imp_status st = IMP_OK;
     struct imp_node *node = child->node;
-    const char *tag = node->tag, *name = top_name(scene, node, counts);
+    const char *tag = node->tag, *name = top_name(scene, child, counts);
     if (!name) return imp__build_no_memory(scene);
     child->used = true;
     if (strcmp(tag, "shape") == 0) {

@@ -172,6 +172,16 @@ def test_tour():
                               ", without " + " and ".join(without) if without else "")
 
 
+def test_from_mitsuba():
+    """The snippet of docs/from-mitsuba.md finds the red wall"""
+    beside_scenes()
+    space = {}
+    n = run_snippets("docs/from-mitsuba.md", space)
+    value = space["fit"]["red.reflectance.value"].value
+    assert abs(value[0] - 0.4913) < 0.05 and value[1] < 0.2, value
+    return "%d snippet" % n
+
+
 def test_readme():
     """The README's lines of Python"""
     shutil.rmtree("cornell", ignore_errors=True)
