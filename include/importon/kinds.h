@@ -445,6 +445,38 @@ struct imp_light_sample {
     imp_v3 ng;        /* its geometric normal */
 };
 
+/* Where a light walk begins, and whither. Its throughput is
+ *
+ *     Le cos_p / (pdf_p pdf_d),    Le: eval of the emitter, at distance 1 from a point
+ */
+struct imp_emission_sample {
+    imp_v3 p;         /* on the light, or before the scene on its way in */
+    imp_v3 ng;        /* geometric normal there; 0 where there is no surface */
+    imp_v3 d;         /* unit, away from the light, world */
+    double uv[2];     /* of the surface */
+    double cos_light; /* as of struct imp_emission */
+    double cos_p; /* |cosine| that turns area at p into area across d; 1 where pdf_p is
+                         per area across d, or p is a point */
+    double pdf_p; /* per area; 1: a point */
+    double pdf_d; /* per steradian; 1: one direction alone */
+};
+/* All of a scene lies in it. */
+struct imp_ball {
+    imp_v3 centre;
+    double radius;
+};
+
+/* A point of a sensor as seen from `ref`. */
+struct imp_sensor_sample {
+    imp_v3 wo;     /* unit, from ref towards the sensor */
+    imp_v3 p;      /* where the sensor's ray starts: nothing behind it counts */
+    double dist;   /* from ref to p */
+    double px, py; /* film position */
+    double weight; /* film area, in pixels, per steradian at ref and lens point drawn */
+    imp_v3 ng;     /* of a sensor that is a surface: its geometric normal */
+    double cos_sensor; /* and the cosine there; of others 1 */
+};
+
 enum imp_geometry { IMP_TRIANGLES, IMP_ANALYTIC };
 
 struct imp_triangles { /* world space */
@@ -471,6 +503,7 @@ struct imp_shape {
     const struct imp_body *body; /* of graded index, behind ng; NULL: none */
     /* Behind ng and before it; both NULL at a surface that bounds no medium. */
     const struct imp_medium *interior, *exterior;
+    const struct imp_sensor *sensor; /* that it is the surface of; NULL: none */
 };
 
 /* A surface of constant curvature. */
@@ -510,6 +543,10 @@ struct imp_shape_ops {
                          const struct imp_hit *hit, const struct imp_surface *at);
     /* The sphere or cylinder that it is part of; NULL: flat where it is hit. */
     void (*round)(const struct imp_shape *s, struct imp_round *out);
+    /* Draw a point uniformly by area, density 1/area; of IMP_SHAPE_SQUARE its uv is u.
+     * NULL: light walks cannot begin on it. */
+    void (*sample_area)(const struct imp_shape *s, const double u[2],
+                        struct imp_surface *out);
 };
 
 /* ---- Emitter ------------------------------------------------------------------- */
@@ -591,6 +628,14 @@ struct imp_emitter_ops {
                     double duv[2]);
     /* As imp_bsdf_ops.prepare. */
     enum imp_status (*prepare)(const struct imp_build *build);
+
+    /* Where a light walk begins: u[0], u[1] choose the point, u[2], u[3] the direction.
+     * The density must not vanish where eval does not. False: none. NULL: no walk can
+     * begin at this light. */
+    bool (*sample_emission)(const struct imp_emitter *e, const struct imp_ball *scene,
+                            const double u[4], struct imp_emission_sample *out);
+    /* pdf_d of direction x->d, from the point that x describes. With sample_emission. */
+    double (*pdf_emission)(const struct imp_emitter *e, const struct imp_emission *x);
 };
 
 /* ---- Sensor and filter --------------------------------------------------------- */
@@ -644,6 +689,16 @@ struct imp_sensor {
     int spp;
     const char *name;
     const struct imp_medium *medium; /* that it is in; NULL: none */
+    const struct imp_shape *shape;   /* of a sensor that is a surface; else NULL */
+    double
+        scale; /* reading over the mean of its rays' radiance: pi of irradiance, else 1 */
+    const struct imp_ball *scene; /* set when the scene is whole */
+    bool photometric;             /* readings are luminances, in lux or cd/m^2 */
+};
+enum imp_sensor_flags {
+    IMP_SENSOR_AREA = 1, /* its rays start on the shape that it stands in */
+    IMP_SENSOR_PARALLEL =
+        2 /* its rays are parallel: `connect` knows no point without end */
 };
 struct imp_sensor_ops {
     size_t size;
@@ -655,6 +710,14 @@ struct imp_sensor_ops {
      * film; lens: two uniform numbers. */
     void (*ray)(const struct imp_sensor *s, double px, double py, const double lens[2],
                 struct imp_sensor_ray *out);
+    unsigned flags;
+    /* The connection of a light walk, the adjoint of `ray`: a point of the sensor, drawn by
+     * u[0], u[1], as seen from ref; u[2], u[3] choose a film position where nothing else
+     * does. With `far`, ref is the direction, from the sensor, of a point without end, and
+     * the weight is per steradian at the sensor. False: not seen. NULL: no light walk can
+     * be connected to it. */
+    bool (*connect)(const struct imp_sensor *s, const imp_v3 *ref, bool far,
+                    const double u[4], struct imp_sensor_sample *out);
 };
 
 /* ---- Registering ---------------------------------------------------------------- */

@@ -242,7 +242,8 @@ enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
     struct imp_shape *s;
     IMP_TRY(imp__proxies_take(scene, node, name));
 
-    struct imp_node *bsdf = NULL, *emitter = NULL, *side[2] = {NULL, NULL};
+    struct imp_node *bsdf = NULL, *emitter = NULL, *sensor = NULL;
+    struct imp_node *side[2] = {NULL, NULL};
     for (size_t i = 0; i < node->n_children; i++) {
         struct imp_child *c = &node->children[i];
         const char *tag = c->node->tag;
@@ -264,8 +265,9 @@ enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
                                         "the shape has another %s", c->name));
             side[out] = c->node;
         } else if (strcmp(tag, "sensor") == 0) {
-            IMP_TRY(imp__node_error(ctx, c->node, IMP_E_UNSUPPORTED,
-                                    "this version has no %s inside a shape", tag));
+            if (sensor)
+                IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "has two sensors"));
+            sensor = c->node;
         } else {
             continue;
         }
@@ -307,6 +309,14 @@ enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
                                     "has an emitter, but no area to emit from"));
         IMP_TRY(imp__build_emitter(scene, emitter, name, "emitter", s));
     }
+    if (sensor && emitter)
+        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
+                                "has an emitter and a sensor; put them on two shapes"));
+    if (sensor) {
+        const char *sensor_name = imp__build_object_name(scene, sensor, name, "sensor");
+        if (!sensor_name) IMP_TRY(imp__build_no_memory(scene));
+        IMP_TRY(imp__build_sensor(scene, sensor, sensor_name, s));
+    }
     IMP_TRY(imp__build_list_add(scene, (void ***)&scene->shapes, &scene->n_shapes, s));
     scene->lo = (imp_v3){fmin(scene->lo[0], s->lo[0]), fmin(scene->lo[1], s->lo[1]),
                          fmin(scene->lo[2], s->lo[2]), 0};
@@ -335,18 +345,32 @@ static enum imp_status child_or_default(struct imp_scene *scene, struct imp_node
 }
 
 enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node,
-                                  const char *name)
+                                  const char *name, struct imp_shape *shape)
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = scene->ctx;
     const void *found;
     IMP_TRY(imp__kind_find(scene->ctx, IMP_CONCEPT_SENSOR, node, &found));
     const struct imp_sensor_ops *ops = found;
+    const bool area = ops->flags & IMP_SENSOR_AREA;
+    if (area && !shape)
+        return IMP_OK; /* declared only; used where a shape refers to it */
+    if (!area && shape)
+        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "cannot be attached to a shape"));
+    if (node->object)
+        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
+                                "is attached to a second shape; each needs its own"));
     struct imp_sensor *s = imp__arena_array(&scene->arena, 1, sizeof *s);
     void *self = imp__arena_array(&scene->arena, 1, ops->object_size);
     if (!s || !self) IMP_TRY(imp__build_no_memory(scene));
-    *s = (struct imp_sensor){.ops = ops, .self = self, .name = name};
+    *s = (struct imp_sensor){.ops = ops,
+                             .self = self,
+                             .name = name,
+                             .shape = shape,
+                             .scale = 1,
+                             .scene = &scene->ball};
     node->object = s;
+    if (shape) shape->sensor = s;
 
     struct imp_node *film, *sampler;
     IMP_TRY(child_or_default(scene, node, "film", "hdrfilm", &film));
@@ -356,9 +380,14 @@ enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node
     const struct imp_build b = imp__build_make(scene, node);
     IMP_TRY(imp__film_desc_build(&film_build, &s->film));
     IMP_TRY(imp__sampler_build(&sampler_build, &s->spp));
+    static const char *const units[] = {"radiometric", "photometric"};
+    int unit;
+    IMP_TRY(imp_build_choice(&b, "units", units, 2, 0, &unit));
+    s->photometric = unit == 1;
     IMP_TRY(ops->build(&b, self, s)); /* needs the film's shape */
     struct imp_node *medium = medium_child(node);
     if (medium) IMP_TRY(imp__build_medium(scene, medium, name, "medium", &s->medium));
+    else if (shape) s->medium = shape->exterior;
     IMP_TRY(imp__props_finish(ctx, node));
     IMP_TRY(imp__build_list_add(scene, (void ***)&scene->sensors, &scene->n_sensors, s));
 out:

@@ -51,7 +51,11 @@ enum imp_status imp_scene_get_sensor(const imp_scene *scene, int sensor,
                                         .spp = s->spp,
                                         .filter = s->film.filter.ops->name,
                                         .filter_radius = s->film.filter.radius,
-                                        .file_format = s->film.file_format};
+                                        .file_format = s->film.file_format,
+                                        .unit = s->shape
+                                                    ? s->photometric ? "lx" : "W m^-2"
+                                                : s->photometric ? "cd m^-2"
+                                                                 : "W m^-2 sr^-1"};
     IMP_GIVE(scene->ctx, info, all, "info");
     return IMP_OK;
 }

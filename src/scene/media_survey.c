@@ -4,6 +4,7 @@
  * medium that it does not name would see it as vacuum; a body in fog that does not name
  * the fog leaves a vacuum behind it, which is what the format says and Mitsuba does, and
  * seldom what is meant. */
+#include "media_around.h"
 #include "scene_build.h"
 
 #define HITS_MAX 256 /* boundaries that a ray is followed through */
@@ -25,6 +26,14 @@ static const struct imp_shape *boundary(const struct imp_scene *scene, imp_v3 *o
         if (s->interior || s->exterior) return s;
     }
     return NULL;
+}
+
+const struct imp_medium *imp__medium_around(const struct imp_scene *scene, imp_v3 p,
+                                            imp_v3 d, const struct imp_medium *otherwise)
+{
+    bool outwards;
+    const struct imp_shape *s = boundary(scene, &p, d, &outwards);
+    return !s ? otherwise : outwards ? s->interior : s->exterior;
 }
 
 static enum imp_status camera_check(const struct imp_scene *scene,

@@ -11,6 +11,7 @@
 #include "color/convert.h"
 #include "color/wavelength.h"
 #include "integrator.h"
+#include "math/offset.h"
 #include "math/vec.h"
 
 enum imp_param_store { IMP_STORE_LANES, IMP_STORE_BULK, IMP_STORE_DOUBLES };
@@ -132,7 +133,8 @@ struct imp_scene {
     struct imp_listener *listeners;
 
     void *intersector;
-    imp_v3 lo, hi; /* bounds of all shapes */
+    imp_v3 lo, hi;        /* bounds of all shapes */
+    struct imp_ball ball; /* around them */
     struct imp__access access;
 };
 
@@ -208,18 +210,6 @@ bool imp__intersect(const struct imp_scene *scene, const imp_v3 *o, const imp_v3
 /* Is anything between? */
 bool imp__occluded(const struct imp_scene *scene, const imp_v3 *o, const imp_v3 *d,
                    double tmin, double tmax);
-
-/* Origin of a ray leaving p on a surface with geometric normal ng towards d, moved to the
- * side of d by (1 + max|p_k|) eps. Hits are recomputed in double, so what has to be
- * cleared is Embree's own rounding, a few units of 2^-24; Mitsuba takes 1500 of them
- * (docs/scene-format.md 3.1), which shows at grazing angles inside a glowing sphere
- * (tests/grad/closed_forms.c). */
-#define IMP_RAY_EPSILON (96 * 0x1p-24)
-static inline imp_v3 imp__offset(imp_v3 p, imp_v3 ng, imp_v3 d)
-{
-    const double scale = imp_max(fabs(p[0]), imp_max(fabs(p[1]), fabs(p[2])));
-    return p + ng * copysign((1 + scale) * IMP_RAY_EPSILON, imp__dot(ng, d));
-}
 
 static inline const struct imp_bsdf *imp__shape_bsdf(const struct imp_scene *scene,
                                                      const struct imp_shape *s)

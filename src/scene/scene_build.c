@@ -52,7 +52,7 @@ static enum imp_status top_build(struct imp_scene *scene, struct imp_child *chil
     if (strcmp(tag, "shape") == 0) {
         if (!node->object) IMP_TRY(imp__build_shape(scene, node, name));
     } else if (strcmp(tag, "sensor") == 0) {
-        if (!node->object) IMP_TRY(imp__build_sensor(scene, node, name));
+        if (!node->object) IMP_TRY(imp__build_sensor(scene, node, name, NULL));
     } else if (strcmp(tag, "bsdf") == 0) {
         struct imp_bsdf *b;
         node->id = name;
@@ -110,6 +110,15 @@ static enum imp_status lights_build(struct imp_scene *scene)
     return IMP_OK;
 }
 
+/* Around all shapes, with room for rays to start outside. */
+static struct imp_ball ball_around(const struct imp_scene *scene)
+{
+    if (scene->n_shapes == 0) return (struct imp_ball){{0}, 1};
+    const imp_v3 size = scene->hi - scene->lo;
+    return (struct imp_ball){(scene->lo + scene->hi) * 0.5,
+                             0.5 * imp__length(size) * (1 + 1e-3)};
+}
+
 enum imp_status imp__scene_build(struct imp_scene *scene,
                                  const struct imp_integrator_ops *const *integrators)
 {
@@ -127,6 +136,7 @@ enum imp_status imp__scene_build(struct imp_scene *scene,
         if (!imp__is_proxy(&scene->root->children[i]))
             IMP_TRY(top_build(scene, &scene->root->children[i], integrators, &counts));
     IMP_TRY(imp__props_finish(scene->ctx, scene->root));
+    scene->ball = ball_around(scene);
     IMP_TRY(lights_build(scene));
     IMP_TRY(imp__aims_build(scene));
     IMP_TRY(imp__mixing_materials(scene));

@@ -64,7 +64,8 @@ enum imp_status imp__build_shape_bare(struct imp_scene *scene, struct imp_node *
                                       const char *name, struct imp_shape **out);
 enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
                                  const char *name);
+/* shape: that it stands in, or NULL. A sensor that needs one is made there alone. */
 enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node,
-                                  const char *name);
+                                  const char *name, struct imp_shape *shape);
 
 #endif

@@ -3,6 +3,7 @@
  * Light from a surface: the same radiance in all directions on the front, the side of the
  * shading normal, and none behind. `stam_m1` is Stam's pure emitter, the same thing under
  * his name for its strength (Stam 2020, section 3). */
+#include "emission.h"
 #include "math/vec.h"
 #include "surface.h"
 
@@ -45,14 +46,18 @@ const struct imp_emitter_ops imp__area = {.size = sizeof(struct imp_emitter_ops)
                                           .eval = eval,
                                           .eval_d = eval_d,
                                           .sample = imp__surface_light_sample,
-                                          .pdf = imp__surface_light_pdf};
-const struct imp_emitter_ops imp__stam_m1 = {.size = sizeof(struct imp_emitter_ops),
-                                             .name = "stam_m1",
-                                             .flags =
-                                                 IMP_EMITTER_AREA | IMP_EMITTER_UNIFORM,
-                                             .inputs = stam_inputs,
-                                             .build = build,
-                                             .eval = eval,
-                                             .eval_d = eval_d,
-                                             .sample = imp__surface_light_sample,
-                                             .pdf = imp__surface_light_pdf};
+                                          .pdf = imp__surface_light_pdf,
+                                          .sample_emission = imp__surface_emission_sample,
+                                          .pdf_emission = imp__surface_emission_pdf};
+const struct imp_emitter_ops imp__stam_m1 = {
+    .size = sizeof(struct imp_emitter_ops),
+    .name = "stam_m1",
+    .flags = IMP_EMITTER_AREA | IMP_EMITTER_UNIFORM,
+    .inputs = stam_inputs,
+    .build = build,
+    .eval = eval,
+    .eval_d = eval_d,
+    .sample = imp__surface_light_sample,
+    .pdf = imp__surface_light_pdf,
+    .sample_emission = imp__surface_emission_sample,
+    .pdf_emission = imp__surface_emission_pdf};

@@ -6,6 +6,7 @@
  *
  * with the surface's normal for an axis unless one is given: the spot lamps of
  * Christensen, Salesin and DeRose (1993). Points are drawn as for `area`. */
+#include "emission.h"
 #include "math/vec.h"
 #include "surface.h"
 
@@ -71,14 +72,17 @@ static int lobe(const struct imp_emitter *e, const imp_v3 *normal, imp_v3 *axis)
     return EXPONENT;
 }
 
-const struct imp_emitter_ops imp__beam_light = {.size = sizeof(struct imp_emitter_ops),
-                                                .name = "beam",
-                                                .object_size = sizeof(struct beam),
-                                                .flags = IMP_EMITTER_AREA,
-                                                .inputs = inputs,
-                                                .build = build,
-                                                .eval = eval,
-                                                .eval_d = eval_d,
-                                                .sample = imp__surface_light_sample,
-                                                .pdf = imp__surface_light_pdf,
-                                                .lobe = lobe};
+const struct imp_emitter_ops imp__beam_light = {
+    .size = sizeof(struct imp_emitter_ops),
+    .name = "beam",
+    .object_size = sizeof(struct beam),
+    .flags = IMP_EMITTER_AREA,
+    .inputs = inputs,
+    .build = build,
+    .eval = eval,
+    .eval_d = eval_d,
+    .sample = imp__surface_light_sample,
+    .pdf = imp__surface_light_pdf,
+    .lobe = lobe,
+    .sample_emission = imp__surface_emission_sample,
+    .pdf_emission = imp__surface_emission_pdf};

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The same radiance from everywhere around the scene, drawn uniformly over the sphere. */
+#include "emission.h"
 #include "kind/build.h"
 #include "math/warp.h"
 
@@ -57,4 +58,6 @@ const struct imp_emitter_ops imp__constant = {.size = sizeof(struct imp_emitter_
                                               .eval = eval,
                                               .eval_d = eval_d,
                                               .sample = sample,
-                                              .pdf = pdf};
+                                              .pdf = pdf,
+                                              .sample_emission = imp__sky_emission_sample,
+                                              .pdf_emission = imp__sky_emission_pdf};

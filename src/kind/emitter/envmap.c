@@ -16,6 +16,7 @@
  * derivative that is the slope of the map: it is continuous and moves no edge of
  * visibility. */
 #include "color/rgb.h"
+#include "emission.h"
 #include "kind/build.h"
 #include "kind/shape/shape.h"
 #include "kind/texture/bitmap.h"
@@ -254,4 +255,6 @@ const struct imp_emitter_ops imp__envmap = {.size = sizeof(struct imp_emitter_op
                                             .pdf = pdf,
                                             .changed = changed,
                                             .place = place,
-                                            .place_d = place_d};
+                                            .place_d = place_d,
+                                            .sample_emission = imp__sky_emission_sample,
+                                            .pdf_emission = imp__sky_emission_pdf};

@@ -17,6 +17,7 @@
  *
  * Between angles the table is interpolated bilinearly; above and below, it is 0. */
 #include "ies.h"
+#include "emission.h"
 #include "from_point.h"
 #include "kind/build.h"
 #include "kind/shape/shape.h"
@@ -309,6 +310,15 @@ static bool point_sample(const struct imp_emitter *e, const imp_v3 *ref,
     return imp__point_light_sample(p->position, *ref, out);
 }
 
+static bool emission_sample(const struct imp_emitter *e, const struct imp_ball *scene,
+                            const double u[4], struct imp_emission_sample *out)
+{
+    (void)scene;
+    const struct imp__ies *p = e->self;
+    imp__point_emission_sample(p->position, u, out);
+    return true;
+}
+
 /* ---- As a surface -------------------------------------------------------------- */
 
 static void area_eval_d(const struct imp_emitter *e, const imp_spec *in,
@@ -359,7 +369,9 @@ const struct imp_emitter_ops imp__ies_light = {.size = sizeof(struct imp_emitter
                                                .eval = point_eval,
                                                .eval_d = point_eval_d,
                                                .sample = point_sample,
-                                               .pdf = imp__point_light_pdf};
+                                               .pdf = imp__point_light_pdf,
+                                               .sample_emission = emission_sample,
+                                               .pdf_emission = imp__point_emission_pdf};
 const struct imp_emitter_ops imp__ies_area = {.size = sizeof(struct imp_emitter_ops),
                                               .name = "ies",
                                               .object_size = sizeof(struct imp__ies),
@@ -370,4 +382,7 @@ const struct imp_emitter_ops imp__ies_area = {.size = sizeof(struct imp_emitter_
                                               .eval_d = area_eval_d,
                                               .sample = area_sample,
                                               .pdf = area_pdf,
-                                              .profile = &area_profile};
+                                              .profile = &area_profile,
+                                              .sample_emission =
+                                                  imp__surface_emission_sample,
+                                              .pdf_emission = imp__surface_emission_pdf};

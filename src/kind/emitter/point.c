@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A point that radiates alike in all directions: irradiance I/r^2 across the ray. */
+#include "emission.h"
 #include "from_point.h"
 #include "math/transform.h"
 
@@ -56,6 +57,15 @@ static bool sample(const struct imp_emitter *e, const imp_v3 *ref, const double 
     return imp__point_light_sample(p->position, *ref, out);
 }
 
+static bool emission_sample(const struct imp_emitter *e, const struct imp_ball *scene,
+                            const double u[4], struct imp_emission_sample *out)
+{
+    (void)scene;
+    const struct point *p = e->self;
+    imp__point_emission_sample(p->position, u, out);
+    return true;
+}
+
 const struct imp_emitter_ops imp__point_light = {.size = sizeof(struct imp_emitter_ops),
                                                  .name = "point",
                                                  .object_size = sizeof(struct point),
@@ -65,4 +75,6 @@ const struct imp_emitter_ops imp__point_light = {.size = sizeof(struct imp_emitt
                                                  .eval = eval,
                                                  .eval_d = eval_d,
                                                  .sample = sample,
-                                                 .pdf = imp__point_light_pdf};
+                                                 .pdf = imp__point_light_pdf,
+                                                 .sample_emission = emission_sample,
+                                                 .pdf_emission = imp__point_emission_pdf};

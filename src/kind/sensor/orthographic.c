@@ -28,9 +28,36 @@ static void ray(const struct imp_sensor *s, double px, double py, const double l
                         imp__v3(0, 0, 1), out);
 }
 
+/* Film area over area across the rays. */
+static bool connect(const struct imp_sensor *s, const imp_v3 *ref, bool far,
+                    const double u[4], struct imp_sensor_sample *out)
+{
+    (void)u;
+    const struct orthographic *p = s->self;
+    const struct imp_projection *j = &p->projection;
+    if (far) return false;
+    const imp_v3 q = imp__point(&j->to_local, *ref);
+    if (!(q[2] > j->near_clip && q[2] < j->far_clip)) return false;
+    const imp_v3 x = imp__vector(&j->to_world, imp__v3(1, 0, 0));
+    const imp_v3 y = imp__vector(&j->to_world, imp__v3(0, 1, 0));
+    const imp_v3 d = imp__normalize(imp__vector(&j->to_world, imp__v3(0, 0, 1)));
+    const double across = fabs(imp__dot(imp__cross(x, y), d));
+    *out = (struct imp_sensor_sample){
+        .wo = -d,
+        .p = imp__point(&j->to_world, imp__v3(q[0], q[1], j->near_clip)),
+        .px = (q[0] - 1) / p->dx,
+        .py = (q[1] - p->y0) / p->dy,
+        .weight = 1 / (fabs(p->dx * p->dy) * across),
+        .cos_sensor = 1};
+    out->dist = imp__length(out->p - *ref);
+    return true;
+}
+
 const struct imp_sensor_ops imp__orthographic = {.size = sizeof(struct imp_sensor_ops),
                                                  .name = "orthographic",
                                                  .object_size =
                                                      sizeof(struct orthographic),
                                                  .build = build,
-                                                 .ray = ray};
+                                                 .ray = ray,
+                                                 .flags = IMP_SENSOR_PARALLEL,
+                                                 .connect = connect};

@@ -7,7 +7,7 @@
 
 struct perspective {
     struct imp_projection projection;
-    double x0, dx, y0, dy; /* direction = (x0 + px dx, y0 + py dy, 1) */
+    struct imp_film_plane film;
 };
 
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_sensor *s)
@@ -21,10 +21,10 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
     IMP_TRY(imp__fov_build(b, a, &t));
     IMP_TRY(imp_build_float(b, "principal_point_offset_x", 0, &offset_x));
     IMP_TRY(imp_build_float(b, "principal_point_offset_y", 0, &offset_y));
-    p->x0 = t * (1 - 2 * offset_x);
-    p->dx = -2 * t / w;
-    p->y0 = t / a * (1 - 2 * offset_y);
-    p->dy = -2 * t / a / h;
+    p->film.x0 = t * (1 - 2 * offset_x);
+    p->film.dx = -2 * t / w;
+    p->film.y0 = t / a * (1 - 2 * offset_y);
+    p->film.dy = -2 * t / a / h;
 out:
     return st;
 }
@@ -34,12 +34,23 @@ static void ray(const struct imp_sensor *s, double px, double py, const double l
 {
     (void)lens;
     const struct perspective *p = s->self;
-    imp__projection_ray(&p->projection, imp__v3(0, 0, 0),
-                        imp__v3(p->x0 + px * p->dx, p->y0 + py * p->dy, 1), out);
+    imp__projection_ray(
+        &p->projection, imp__v3(0, 0, 0),
+        imp__v3(p->film.x0 + px * p->film.dx, p->film.y0 + py * p->film.dy, 1), out);
+}
+
+static bool connect(const struct imp_sensor *s, const imp_v3 *ref, bool far,
+                    const double u[4], struct imp_sensor_sample *out)
+{
+    (void)u;
+    const struct perspective *p = s->self;
+    return imp__projection_connect(&p->projection, &p->film, imp__v3(0, 0, 0), 1, *ref,
+                                   far, out);
 }
 
 const struct imp_sensor_ops imp__perspective = {.size = sizeof(struct imp_sensor_ops),
                                                 .name = "perspective",
                                                 .object_size = sizeof(struct perspective),
                                                 .build = build,
-                                                .ray = ray};
+                                                .ray = ray,
+                                                .connect = connect};

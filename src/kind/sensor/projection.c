@@ -8,7 +8,7 @@
 #include <strings.h>
 
 static enum imp_status placement_read(const struct imp_build *b, bool rigid,
-                                      struct imp_mat4 *out)
+                                      struct imp_mat4 *out, struct imp_mat4 *out_inverse)
 {
     enum imp_status st = IMP_OK;
     struct imp_mat4 m, inverse;
@@ -30,6 +30,7 @@ static enum imp_status placement_read(const struct imp_build *b, bool rigid,
                                         "rotation and translation only"));
         }
     *out = m;
+    *out_inverse = inverse;
 out:
     return st;
 }
@@ -41,7 +42,7 @@ enum imp_status imp__projection_build(const struct imp_build *b, bool rigid,
     struct imp_projection p;
     double open, close;
 
-    IMP_TRY(placement_read(b, rigid, &p.to_world));
+    IMP_TRY(placement_read(b, rigid, &p.to_world, &p.to_local));
     IMP_TRY(imp_build_float(b, "near_clip", 1e-2, &p.near_clip));
     IMP_TRY(imp_build_float(b, "far_clip", 1e4, &p.far_clip));
     if (!(p.near_clip > 0))
@@ -65,6 +66,28 @@ enum imp_status imp__projection_build(const struct imp_build *b, bool rigid,
     *out = p;
 out:
     return st;
+}
+
+bool imp__projection_connect(const struct imp_projection *p,
+                             const struct imp_film_plane *film, imp_v3 o, double focus,
+                             imp_v3 ref, bool far, struct imp_sensor_sample *out)
+{
+    const imp_v3 q =
+        far ? imp__vector(&p->to_local, ref) : imp__point(&p->to_local, ref) - o;
+    if (!(q[2] > 0) || (!far && !(q[2] > p->near_clip && q[2] < p->far_clip)))
+        return false;
+    const imp_v3 v = q * (1 / q[2]);
+    const double length = imp__length(v), r2 = far ? 1 : imp__dot(q, q);
+    const imp_v3 d = imp__normalize(imp__vector(&p->to_world, v));
+    *out = (struct imp_sensor_sample){.wo = -d,
+                                      .p = imp__point(&p->to_world, o + v * p->near_clip),
+                                      .px = (v[0] + o[0] / focus - film->x0) / film->dx,
+                                      .py = (v[1] + o[1] / focus - film->y0) / film->dy,
+                                      .weight = length * length * length /
+                                                (fabs(film->dx * film->dy) * r2),
+                                      .cos_sensor = 1};
+    out->dist = far ? INFINITY : imp__length(out->p - ref);
+    return true;
 }
 
 /* "50mm", "35.5 mm" or "50"; by hand, because strtod follows the host's locale. */

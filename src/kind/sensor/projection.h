@@ -9,7 +9,7 @@
 #include "math/transform.h"
 
 struct imp_projection {
-    struct imp_mat4 to_world;
+    struct imp_mat4 to_world, to_local;
     double near_clip, far_clip, focus_distance;
 };
 
@@ -36,5 +36,16 @@ static inline void imp__projection_ray(const struct imp_projection *p, imp_v3 o,
     out->t_near = 0;
     out->t_far = (p->far_clip - p->near_clip) * inv_z * length;
 }
+
+/* Of a camera whose rays through local point o run along (x0 + px dx, y0 + py dy, 1) - o/f:
+ * the ray that comes from ref (imp_sensor_ops.connect). Solid angle and film area are
+ *
+ *     dw = |dx dy| cos(theta)^3 dpx dpy,    theta: the angle with the axis */
+struct imp_film_plane {
+    double x0, dx, y0, dy;
+};
+bool imp__projection_connect(const struct imp_projection *p,
+                             const struct imp_film_plane *film, imp_v3 o, double focus,
+                             imp_v3 ref, bool far, struct imp_sensor_sample *out);
 
 #endif

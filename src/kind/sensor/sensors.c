@@ -6,7 +6,10 @@
 #define SENSORS(X)                                                                       \
     X(imp__perspective)                                                                  \
     X(imp__thinlens)                                                                     \
-    X(imp__orthographic)
+    X(imp__orthographic)                                                                 \
+    X(imp__irradiancemeter)                                                              \
+    X(imp__radiancemeter)                                                                \
+    X(imp__distant)
 
 #define DECLARE(kind) extern const struct imp_sensor_ops kind;
 SENSORS(DECLARE)

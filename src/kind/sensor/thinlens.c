@@ -8,7 +8,7 @@
 struct thinlens {
     struct imp_projection projection;
     double aperture_radius;
-    double x0, dx, y0, dy; /* the pinhole's direction (x0 + px dx, y0 + py dy, 1) */
+    struct imp_film_plane film; /* the pinhole's directions */
 };
 
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_sensor *s)
@@ -26,10 +26,10 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
     if (p->aperture_radius < 0)
         IMP_TRY(imp_build_error(b, "aperture_radius", IMP_E_SCENE,
                                 "aperture_radius = %g is negative", p->aperture_radius));
-    p->x0 = t;
-    p->dx = -2 * t / w;
-    p->y0 = t / a;
-    p->dy = -2 * t / a / h;
+    p->film.x0 = t;
+    p->film.dx = -2 * t / w;
+    p->film.y0 = t / a;
+    p->film.dy = -2 * t / a / h;
 out:
     return st;
 }
@@ -42,12 +42,25 @@ static void ray(const struct imp_sensor *s, double px, double py, const double l
     imp__concentric_disk(lens, xy);
     const imp_v3 o = imp__v3(p->aperture_radius * xy[0], p->aperture_radius * xy[1], 0);
     const imp_v3 focus =
-        imp__v3(p->x0 + px * p->dx, p->y0 + py * p->dy, 1) * p->projection.focus_distance;
+        imp__v3(p->film.x0 + px * p->film.dx, p->film.y0 + py * p->film.dy, 1) *
+        p->projection.focus_distance;
     imp__projection_ray(&p->projection, o, focus - o, out);
+}
+
+static bool connect(const struct imp_sensor *s, const imp_v3 *ref, bool far,
+                    const double u[4], struct imp_sensor_sample *out)
+{
+    const struct thinlens *p = s->self;
+    double xy[2];
+    imp__concentric_disk(u, xy);
+    const imp_v3 o = imp__v3(p->aperture_radius * xy[0], p->aperture_radius * xy[1], 0);
+    return imp__projection_connect(&p->projection, &p->film, o,
+                                   p->projection.focus_distance, *ref, far, out);
 }
 
 const struct imp_sensor_ops imp__thinlens = {.size = sizeof(struct imp_sensor_ops),
                                              .name = "thinlens",
                                              .object_size = sizeof(struct thinlens),
                                              .build = build,
-                                             .ray = ray};
+                                             .ray = ray,
+                                             .connect = connect};

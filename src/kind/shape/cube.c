@@ -37,4 +37,5 @@ const struct imp_shape_ops imp__cube = {.size = sizeof(struct imp_shape_ops),
                                         .build = build,
                                         .surface = imp__mesh_surface,
                                         .sample_toward = imp__mesh_sample,
-                                        .pdf_toward = imp__mesh_pdf};
+                                        .pdf_toward = imp__mesh_pdf,
+                                        .sample_area = imp__mesh_sample_area};

@@ -103,6 +103,12 @@ static void surface(const struct imp_shape *s, const struct imp_hit *hit, const 
     surface_at(k, x * r, y * r, hit->v, out);
 }
 
+static void sample_area(const struct imp_shape *s, const double u[2],
+                        struct imp_surface *out)
+{
+    surface_at(s->self, cos(IMP_2PI * u[0]), sin(IMP_2PI * u[0]), u[1], out);
+}
+
 static bool sample_toward(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
                           struct imp_light_sample *out)
 {
@@ -135,4 +141,5 @@ const struct imp_shape_ops imp__cylinder = {.size = sizeof(struct imp_shape_ops)
                                             .surface = surface,
                                             .sample_toward = sample_toward,
                                             .pdf_toward = pdf_toward,
-                                            .round = round_of};
+                                            .round = round_of,
+                                            .sample_area = sample_area};

@@ -74,6 +74,14 @@ static void surface(const struct imp_shape *s, const struct imp_hit *hit, const 
     surface_at(s->self, hit->u, hit->v, out);
 }
 
+static void sample_area(const struct imp_shape *s, const double u[2],
+                        struct imp_surface *out)
+{
+    double xy[2];
+    imp__concentric_disk(u, xy);
+    surface_at(s->self, xy[0], xy[1], out);
+}
+
 static bool sample_toward(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
                           struct imp_light_sample *out)
 {
@@ -102,4 +110,5 @@ const struct imp_shape_ops imp__disk = {.size = sizeof(struct imp_shape_ops),
                                         .intersect = intersect,
                                         .surface = surface,
                                         .sample_toward = sample_toward,
-                                        .pdf_toward = pdf_toward};
+                                        .pdf_toward = pdf_toward,
+                                        .sample_area = sample_area};

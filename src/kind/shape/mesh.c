@@ -315,11 +315,10 @@ out:
     return st;
 }
 
-bool imp__mesh_sample(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
-                      struct imp_light_sample *out)
+/* A triangle by its area, and barycentric weights in it. */
+static inline struct imp_hit draw(const struct imp_shape *s, const struct imp__mesh *m,
+                                  const double u[2])
 {
-    const struct imp__mesh *m = s->self;
-    if (!(s->area > 0)) return false;
     /* The first triangle whose cumulative area exceeds x: those without area never are.
      * Without branches: each would be a coin toss. */
     const double x = u[0] * s->area;
@@ -334,7 +333,16 @@ bool imp__mesh_sample(const struct imp_shape *s, const imp_v3 *ref, const double
         imp_min(imp_max((x - below) / width, 0.0), 0x1.fffffffffffffp-1);
     double b[2];
     imp__uniform_triangle((double[2]){within, u[1]}, b);
-    const struct imp_hit hit = {.prim = (int)lo, .u = b[0], .v = b[1]};
+    return (struct imp_hit){.prim = (int)lo, .u = b[0], .v = b[1]};
+}
+
+bool imp__mesh_sample(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
+                      struct imp_light_sample *out)
+{
+    const struct imp__mesh *m = s->self;
+    if (!(s->area > 0)) return false;
+    const struct imp_hit hit = draw(s, m, u);
+    const size_t lo = (size_t)hit.prim;
     const struct imp__facet *f = m->facets ? &m->facets[lo] : NULL;
     const struct corner c = f ? (struct corner){f->p0, f->e1, f->e2} : corner(m, lo);
     struct imp_surface at;
@@ -342,6 +350,13 @@ bool imp__mesh_sample(const struct imp_shape *s, const imp_v3 *ref, const double
     out->uv[0] = at.uv[0];
     out->uv[1] = at.uv[1];
     return imp__light_from_area(*ref, at.p, at.ng, at.n, m->inv_area, out);
+}
+
+void imp__mesh_sample_area(const struct imp_shape *s, const double u[2],
+                           struct imp_surface *out)
+{
+    const struct imp_hit hit = draw(s, s->self, u);
+    imp__mesh_surface(s, &hit, NULL, NULL, out);
 }
 
 double imp__mesh_pdf(const struct imp_shape *s, const imp_v3 *ref,
@@ -381,18 +396,21 @@ const struct imp_shape_ops imp__mesh = {.size = sizeof(struct imp_shape_ops),
                                         .build = mesh_build,
                                         .surface = imp__mesh_surface,
                                         .sample_toward = imp__mesh_sample,
-                                        .pdf_toward = imp__mesh_pdf};
+                                        .pdf_toward = imp__mesh_pdf,
+                                        .sample_area = imp__mesh_sample_area};
 const struct imp_shape_ops imp__obj = {.size = sizeof(struct imp_shape_ops),
                                        .name = "obj",
                                        .object_size = sizeof(struct imp__mesh),
                                        .build = file_build,
                                        .surface = imp__mesh_surface,
                                        .sample_toward = imp__mesh_sample,
-                                       .pdf_toward = imp__mesh_pdf};
+                                       .pdf_toward = imp__mesh_pdf,
+                                       .sample_area = imp__mesh_sample_area};
 const struct imp_shape_ops imp__ply = {.size = sizeof(struct imp_shape_ops),
                                        .name = "ply",
                                        .object_size = sizeof(struct imp__mesh),
                                        .build = file_build,
                                        .surface = imp__mesh_surface,
                                        .sample_toward = imp__mesh_sample,
-                                       .pdf_toward = imp__mesh_pdf};
+                                       .pdf_toward = imp__mesh_pdf,
+                                       .sample_area = imp__mesh_sample_area};

@@ -72,6 +72,16 @@ static void surface(const struct imp_shape *s, const struct imp_hit *hit, const 
     out->dp_dv = r->ev;
 }
 
+static void sample_area(const struct imp_shape *s, const double u[2],
+                        struct imp_surface *out)
+{
+    /* uv of the triangle before the diagonal or behind it, as `surface` reads them. */
+    struct imp_hit hit = {.prim = u[1] > u[0]};
+    hit.u = hit.prim ? u[0] : u[0] - u[1];
+    hit.v = hit.prim ? u[1] - u[0] : u[1];
+    surface(s, &hit, NULL, NULL, out);
+}
+
 static bool sample_toward(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
                           struct imp_light_sample *out)
 {
@@ -97,4 +107,5 @@ const struct imp_shape_ops imp__rectangle = {.size = sizeof(struct imp_shape_ops
                                              .build = build,
                                              .surface = surface,
                                              .sample_toward = sample_toward,
-                                             .pdf_toward = pdf_toward};
+                                             .pdf_toward = pdf_toward,
+                                             .sample_area = sample_area};

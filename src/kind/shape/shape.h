@@ -112,6 +112,8 @@ struct imp__mesh {
 };
 void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit,
                        const imp_v3 *o, const imp_v3 *d, struct imp_surface *out);
+void imp__mesh_sample_area(const struct imp_shape *s, const double u[2],
+                           struct imp_surface *out);
 bool imp__mesh_sample(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
                       struct imp_light_sample *out);
 double imp__mesh_pdf(const struct imp_shape *s, const imp_v3 *ref,

@@ -87,6 +87,13 @@ static void surface(const struct imp_shape *s, const struct imp_hit *hit, const 
     surface_at(p, imp__normalize(*o + *d * hit->t - p->center), out);
 }
 
+static void sample_area(const struct imp_shape *s, const double u[2],
+                        struct imp_surface *out)
+{
+    const struct sphere *p = s->self;
+    surface_at(p, imp__to_world(&p->axes, imp__uniform_sphere(u)), out);
+}
+
 /* 1 - cos(theta_max) of the cone seen from distance r; < 0 on and inside the sphere. A
  * point of the sphere itself may lie outside by rounding: its cone would hold nothing but
  * itself. */
@@ -162,4 +169,5 @@ const struct imp_shape_ops imp__sphere = {.size = sizeof(struct imp_shape_ops),
                                           .surface = surface,
                                           .sample_toward = sample_toward,
                                           .pdf_toward = pdf_toward,
-                                          .round = round_of};
+                                          .round = round_of,
+                                          .sample_area = sample_area};

@@ -1,0 +1,77 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "emission.h"
+#include "math/warp.h"
+
+/* Light leaves where the cosine at the shading normal is positive; power goes by that at
+ * the geometric normal. */
+bool imp__surface_emission_sample(const struct imp_emitter *e,
+                                  const struct imp_ball *scene, const double u[4],
+                                  struct imp_emission_sample *out)
+{
+    (void)scene;
+    const struct imp_shape *s = e->shape;
+    struct imp_surface at;
+    if (!s->ops->sample_area) return false;
+    s->ops->sample_area(s, u, &at);
+    const imp_v3 local = imp__cosine_hemisphere(u + 2);
+    const struct imp_frame frame = imp__frame_from_normal(at.n);
+    const imp_v3 d = imp__normalize(imp__to_world(&frame, local));
+    *out = (struct imp_emission_sample){.p = at.p,
+                                        .ng = at.ng,
+                                        .d = d,
+                                        .uv = {at.uv[0], at.uv[1]},
+                                        .cos_light = imp__dot(at.n, d),
+                                        .cos_p = fabs(imp__dot(at.ng, d)),
+                                        .pdf_p = 1 / s->area,
+                                        .pdf_d = local[2] * IMP_INV_PI};
+    return local[2] > 0;
+}
+
+double imp__surface_emission_pdf(const struct imp_emitter *e,
+                                 const struct imp_emission *x)
+{
+    (void)e;
+    return fmax(x->cos_light, 0) * IMP_INV_PI;
+}
+
+void imp__point_emission_sample(imp_v3 position, const double u[4],
+                                struct imp_emission_sample *out)
+{
+    *out = (struct imp_emission_sample){.p = position,
+                                        .d = imp__uniform_sphere(u + 2),
+                                        .cos_light = 1,
+                                        .cos_p = 1,
+                                        .pdf_p = 1,
+                                        .pdf_d = IMP_INV_PI / 4};
+}
+
+double imp__point_emission_pdf(const struct imp_emitter *e, const struct imp_emission *x)
+{
+    (void)e, (void)x;
+    return IMP_INV_PI / 4;
+}
+
+bool imp__sky_emission_sample(const struct imp_emitter *e, const struct imp_ball *scene,
+                              const double u[4], struct imp_emission_sample *out)
+{
+    struct imp_light_sample sky;
+    double xy[2];
+    if (!e->ops->sample(e, &scene->centre, u + 2, &sky) || !(sky.pdf > 0)) return false;
+    const struct imp_frame f = imp__frame_from_normal(sky.wi);
+    const double r = scene->radius;
+    imp__concentric_disk(u, xy);
+    *out = (struct imp_emission_sample){.p = scene->centre +
+                                             (f.s * xy[0] + f.t * xy[1] + sky.wi) * r,
+                                        .d = -sky.wi,
+                                        .cos_light = 1,
+                                        .cos_p = 1,
+                                        .pdf_p = IMP_INV_PI / (r * r),
+                                        .pdf_d = sky.pdf};
+    return true;
+}
+
+double imp__sky_emission_pdf(const struct imp_emitter *e, const struct imp_emission *x)
+{
+    const imp_v3 wi = -x->d;
+    return e->ops->pdf(e, &wi, &wi, NULL, NULL);
+}

@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * How light walks begin: at a surface with the cosine of its shading normal, at a point in
+ * any direction, or on a disk before the scene, across a direction in which the sky is
+ * drawn. */
+#ifndef IMP_KIND_EMITTER_EMISSION_H
+#define IMP_KIND_EMITTER_EMISSION_H
+
+#include "kind/build.h"
+
+/* imp_emitter_ops.sample_emission and pdf_emission of lights that are surfaces. */
+bool imp__surface_emission_sample(const struct imp_emitter *e,
+                                  const struct imp_ball *scene, const double u[4],
+                                  struct imp_emission_sample *out);
+double imp__surface_emission_pdf(const struct imp_emitter *e,
+                                 const struct imp_emission *x);
+
+/* Of a light at one point. */
+void imp__point_emission_sample(imp_v3 position, const double u[4],
+                                struct imp_emission_sample *out);
+double imp__point_emission_pdf(const struct imp_emitter *e, const struct imp_emission *x);
+
+/* Of the environment, whose `sample` and `pdf` do not look at the receiver. */
+bool imp__sky_emission_sample(const struct imp_emitter *e, const struct imp_ball *scene,
+                              const double u[4], struct imp_emission_sample *out);
+double imp__sky_emission_pdf(const struct imp_emitter *e, const struct imp_emission *x);
+
+#endif

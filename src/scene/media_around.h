@@ -1,0 +1,11 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef IMP_SCENE_MEDIA_AROUND_H
+#define IMP_SCENE_MEDIA_AROUND_H
+
+#include "scene.h"
+
+/* The medium at p, as the next boundary along d says; `otherwise` if there is none. */
+const struct imp_medium *imp__medium_around(const struct imp_scene *scene, imp_v3 p,
+                                            imp_v3 d, const struct imp_medium *otherwise);
+
+#endif
