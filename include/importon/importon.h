@@ -333,6 +333,8 @@ struct imp_sensor_info {
     const char *filter;
     double filter_radius;
     const char *file_format; /**< "openexr", "rgbe" or "pfm" */
+    const char *unit;        /**< of its numbers: "W m^-2 sr^-1", of an irradiancemeter
+                                "W m^-2"; or "cd m^-2", "lx" where the scene says so */
 };
 /** Set info->size first; strings belong to the scene.
  * @return IMP_OK; IMP_E_ARG if there is no such sensor. */
@@ -514,6 +516,13 @@ enum imp_wavelength_sampling {
  * one thread and holds up the others. */
 typedef void (*imp_preview_fn)(const imp_film *picture, void *payload);
 
+/** The end at which walks begin. */
+enum imp_from {
+    IMP_FROM_SCENE = 0, /**< that of the scene's integrator: the lights for ptracer */
+    IMP_FROM_SENSOR,
+    IMP_FROM_LIGHTS
+};
+
 /** How Monte Carlo is run. The same (seed, spp) give the same bits on any thread count.
  */
 struct imp_run {
@@ -538,11 +547,14 @@ struct imp_run {
      * NULL: nobody looks. */
     imp_preview_fn preview;
     void *preview_payload;
+    /** Both ends give the same numbers; what cannot begin there is refused with its name. Of
+     * walks from the lights spp times the pixels are made for the whole film. */
+    enum imp_from from;
 };
 #define IMP_RUN_INIT                                                                     \
     {                                                                                    \
         sizeof(struct imp_run), 0, 0, 0, 0, 0, 0, 0, 0, IMP_WAVELENGTHS_STRATIFIED, 0,   \
-            0, 0                                                                         \
+            0, 0, IMP_FROM_SCENE                                                         \
     }
 
 /** Render the scene's integrator through a sensor.

@@ -25,7 +25,7 @@ static inline unsigned imp__dim(int vertex, int use)
 
 /* Uses that came later have blocks in the upper half of the dimensions, so that none of
  * the numbers above moves: one for the start of a walk, one for each vertex. */
-enum { IMP_DIM_TIME, IMP_DIM_WAVELENGTH, IMP_DIM_LANE };
+enum { IMP_DIM_TIME, IMP_DIM_WAVELENGTH, IMP_DIM_LANE, IMP_DIM_EMITTER };
 enum {
     IMP_DIM_TECHNIQUE, /* which way of continuing or connecting */
     IMP_DIM_MEDIUM,    /* first of what tracking through a medium needs */

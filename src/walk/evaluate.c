@@ -32,17 +32,22 @@ static void vertex_values(const struct imp_tracer *tracer, const struct imp_vert
         b->ops->emit(b, in, &p->dirs.wo, &glow);
         x->e += glow * d->glow_weight;
     }
-    if (d->met.emitter >= 0)
+    const bool light = d->scatterer == IMP_AT_LIGHT;
+    if (imp_unlikely(d->from_light)) x->e = imp__spec(d->met.weight);
+    else if (d->met.emitter >= 0)
         x->e +=
             imp__emitter_radiance(scene, d->met.emitter, &p->met, p->at.p, v->carried) *
             d->met.weight;
     if (d->connection == IMP_CONNECTED) {
         const struct imp_emission to = imp__light_emission(&d->light);
         struct imp_dirs dirs = imp__light_dirs(v);
-        dirs.wo = p->dirs.wo;
-        imp__bsdf_eval(b, v->carried, in, &dirs, &x->light_f);
-        x->light_e = imp__emitter_radiance(scene, d->light.emitter, &to,
-                                           imp__decided_v3(d->light.p), v->carried);
+        if (imp_likely(!d->from_light)) dirs.wo = p->dirs.wo;
+        if (imp_likely(!light)) imp__bsdf_eval(b, v->carried, in, &dirs, &x->light_f);
+        else x->light_f = imp__spec(1);
+        x->light_e = imp_unlikely(d->light.emitter < 0)
+                         ? imp__spec(1)
+                         : imp__emitter_radiance(scene, d->light.emitter, &to,
+                                                 imp__decided_v3(d->light.p), v->carried);
         x->light_w = imp__spec(d->light.weight);
         x->b = x->light_f * x->light_e * x->light_w;
         if (imp_unlikely(v->to_light != NULL)) {
@@ -53,6 +58,9 @@ static void vertex_values(const struct imp_tracer *tracer, const struct imp_vert
     }
     x->f = imp__spec(1);
     if (b && d->goes_on) imp__bsdf_eval(b, v->carried, in, &p->dirs, &x->f);
+    if (imp_unlikely(light) && d->goes_on)
+        in[0] = x->f =
+            imp__emitter_radiance(scene, d->met.emitter, &p->met, p->at.p, v->carried);
 }
 
 /* T of the segment that follows. */
@@ -90,7 +98,7 @@ void imp__walk_evaluate(const struct imp_tracer *tracer, struct imp_walk *walk)
 static imp_spec frozen(const struct imp_tracer *tracer, const struct imp_walk *walk)
 {
     imp_spec P = imp__spec(1), L = {0}, in[IMP_INPUTS_MAX];
-    const imp_spec *entry = walk->entry;
+    const struct imp_entry *entry = walk->entry;
     struct imp_moving moving = {{0}, {0}, {0}};
     struct imp_vertex now;
     if (walk->dropped || !walk->valid) return L;
@@ -103,8 +111,8 @@ static imp_spec frozen(const struct imp_tracer *tracer, const struct imp_walk *w
             return imp__spec(NAN);
         vertex_values(tracer, v, &p, in, &x);
         P *= p.ratio * p.ratio;
-        const imp_spec own = x.e + x.b;
-        L += P * (entry ? own * *entry++ : own);
+        L += P * (entry ? x.e * entry->e + x.b * entry->b : x.e + x.b);
+        if (entry) entry++;
         for (const struct imp_side *s = v->side; s; s = s->next)
             L += P * frozen(tracer, &s->walk);
         if (imp_likely(!v->on)) {

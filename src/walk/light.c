@@ -53,18 +53,9 @@ void imp__emission_meet(struct imp_step *s, struct imp_vertex *v, int emitter,
 /* A light, by sampling weights or as the guide says; its probability. */
 static int light_choose(const struct imp_step *s, double u, double *pmf)
 {
-    const struct imp_scene *scene = s->scene;
     const struct imp_guided *g = &s->guided;
-    int light = 0, above = scene->n_emitters - 1;
-    if (imp_unlikely(g->here)) {
-        light = g->guide->light(g->guide, &g->at, u);
-    } else { /* the first whose cumulative weight exceeds u */
-        while (light < above) {
-            const int middle = (light + above) / 2;
-            if (u < scene->light_cdf[middle]) above = middle;
-            else light = middle + 1;
-        }
-    }
+    if (imp_likely(!g->here)) return imp__light_pick(s->scene, u, pmf);
+    const int light = g->guide->light(g->guide, &g->at, u);
     *pmf = light_pmf_at(s, g->here, &g->at, light);
     return light;
 }

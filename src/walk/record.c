@@ -33,6 +33,10 @@ enum imp_status imp__record_create(const struct imp_tracer *tracer, size_t budge
         return imp__error(ctx, IMP_E_UNSUPPORTED,
                           "walks are kept for detached derivatives only: "
                           "alpha_gradient moves their directions");
+    if (tracer->sensor->shape)
+        return imp__error(ctx, IMP_E_UNSUPPORTED,
+                          "walks from a sensor that is a surface (%s) are not kept",
+                          tracer->sensor->name);
     *out = (struct imp_record){.ctx = ctx, .of = made_with(tracer), .budget = budget};
     return IMP_OK;
 }

@@ -21,6 +21,9 @@ enum imp_status imp__run_take(imp_context *ctx, const char *function,
     if (r.wavelength_set < 0)
         return imp__error(ctx, IMP_E_ARG, "%s: run->wavelength_set %d is negative",
                           function, r.wavelength_set);
+    if ((int)r.from < 0 || r.from > IMP_FROM_LIGHTS)
+        return imp__error(ctx, IMP_E_ARG, "%s: run->from %d is not known", function,
+                          (int)r.from);
     *own = r;
     return IMP_OK;
 }

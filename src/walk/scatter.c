@@ -3,10 +3,7 @@
  * Whether a walk goes on, and where: the draw of a direction, and roulette. */
 #include "step.h"
 
-/* beta *= f/p, where a lane's first factor that is zero but has a derivative is left out:
- * the walk goes on, because what arrives from beyond is that derivative. A second one
- * ends the lane (docs/estimators.md 9.2). False: all lanes have ended. */
-static bool throughput_add(struct imp_step *s, const struct imp_bsdf *b, imp_spec factor)
+bool imp__throughput_add(struct imp_step *s, const struct imp_bsdf *b, imp_spec factor)
 {
     const bool four = s->at.carried != NULL;
     if (imp_likely(factor[0] != 0 && factor[1] != 0 && factor[2] != 0 &&
@@ -127,7 +124,7 @@ bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_sur
     /* Does the walk go on? */
     double survive = 1;
     if (imp_unlikely(s->guided.guide != NULL)) s->guided.before = s->beta;
-    if (!throughput_add(s, b, f * (1 / pdf))) return false;
+    if (!imp__throughput_add(s, b, f * (1 / pdf))) return false;
     if (b->ops->index_ratio)
         s->eta *= imp_likely(!b->shaped)
                       ? b->ops->index_ratio(b, s->in, &dirs)

@@ -109,6 +109,14 @@ static inline void imp__store_v3(imp_decided out[3], imp_v3 v)
 }
 
 /* ---- trace.c ---- */
+/* A vertex behind the last one, with room for the inputs of its BSDF. NULL: the walk is
+ * dropped. */
+struct imp_vertex *imp__vertex_add(struct imp_step *s, int n_in);
+/* The vertex where the ray in flight ended, as the segment's `meet` said; NULL: there is
+ * none. */
+struct imp_vertex *imp__vertex_meet(struct imp_step *s, enum imp_meeting met,
+                                    struct imp_hit *hit, struct imp_surface *at,
+                                    struct imp_frame *frame);
 /* Where the surface is, as decided, and its inputs; d: direction of arrival, t: length of
  * the segment that leads there. */
 void imp__vertex_place(struct imp_step *s, struct imp_vertex *v,
@@ -214,7 +222,25 @@ static inline double imp__direction_pdf(const struct imp_step *s, double kernel,
                : (*competing = kernel);
 }
 
+/* A light by its sampling weight, and the probability of that. */
+static inline int imp__light_pick(const struct imp_scene *scene, double u, double *pmf)
+{
+    /* The first whose cumulative weight exceeds u. */
+    int light = 0, above = scene->n_emitters - 1;
+    while (light < above) {
+        const int middle = (light + above) / 2;
+        if (u < scene->light_cdf[middle]) above = middle;
+        else light = middle + 1;
+    }
+    *pmf = scene->light_cdf[light] - (light ? scene->light_cdf[light - 1] : 0);
+    return light;
+}
+
 /* ---- scatter.c ---- */
+/* beta *= f/p, where a lane's first factor that is zero but has a derivative is left out:
+ * the walk goes on, because what arrives from beyond is that derivative. A second one
+ * ends the lane (docs/estimators.md 9.2). False: all lanes have ended. */
+bool imp__throughput_add(struct imp_step *s, const struct imp_bsdf *b, imp_spec factor);
 /* Decide whether and whither the walk goes on. False: it ends here. */
 bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_surface *at,
                   const struct imp_frame *frame);

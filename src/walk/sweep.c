@@ -10,11 +10,15 @@
 imp_spec imp__walk_fold(struct imp_walk *walk)
 {
     imp_spec L = {0};
-    const imp_spec *entry = walk->entry ? walk->entry + walk->n : NULL;
+    const struct imp_entry *entry = walk->entry ? walk->entry + walk->n : NULL;
     for (struct imp_vertex *v = walk->last; v; v = v->prev) {
         v->beyond = L;
-        L = imp_likely(!entry) ? v->e + v->w * L + v->b
-                               : *--entry * (v->e + v->b) + v->w * L;
+        if (imp_likely(!entry)) {
+            L = v->e + v->w * L + v->b;
+        } else {
+            entry--;
+            L = (entry->e * v->e + entry->b * v->b) + v->w * L;
+        }
         for (struct imp_side *s = v->side; s; s = s->next)
             L += s->walk.L = imp__walk_fold(&s->walk);
     }
@@ -130,6 +134,8 @@ static imp_spec weight_before(const struct imp_vertex *v)
     if (v->bsdf) {
         const struct imp_dirs dirs = imp__vertex_dirs(v);
         imp__bsdf_eval(v->bsdf, v->carried, v->in, &dirs, &f);
+    } else if (v->d.scatterer == IMP_AT_LIGHT) {
+        f = v->in[0];
     }
     return f * scale;
 }
@@ -221,9 +227,11 @@ void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_wa
     int depth = walk->depth;
     for (const struct imp_vertex *v = walk->first; v; v = v->next, depth++) {
         const struct imp_bsdf *b = v->bsdf;
-        /* The adjoint of the vertex's own light. */
-        const imp_spec own =
-            imp_likely(!walk->entry) ? P : P * walk->entry[depth - walk->depth];
+        /* The adjoints of the vertex's own light, and of its light sample. */
+        const struct imp_entry *entry =
+            imp_likely(!walk->entry) ? NULL : &walk->entry[depth - walk->depth];
+        const imp_spec own = imp_likely(!entry) ? P : P * entry->e;
+        const imp_spec lit = imp_likely(!entry) ? P : P * entry->b;
         for (const struct imp_side *s = v->side; s; s = s->next)
             imp__walk_sweep_values(tracer, &s->walk, P, sink);
         const struct imp_met *met = &v->d.met;
@@ -231,10 +239,13 @@ void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_wa
         const bool connected = v->d.connection == IMP_CONNECTED;
         if (met->emitter >= 0 && active->emitter[met->emitter])
             emitter_scatter(tracer, met->emitter, imp__vertex_met(v), imp__vertex_at(v),
-                            own * met->weight, sink);
-        if (connected && active->emitter[light->emitter])
+                            imp_likely(v->d.scatterer != IMP_AT_LIGHT)
+                                ? own * met->weight
+                                : P * v->beyond * v->scale,
+                            sink);
+        if (connected && light->emitter >= 0 && active->emitter[light->emitter])
             emitter_scatter(tracer, light->emitter, imp__light_emission(light),
-                            imp__light_at(v), own * v->light_f * v->light_w, sink);
+                            imp__light_at(v), lit * v->light_f * v->light_w, sink);
         if (bsdf_active(tracer, v)) {
             imp_spec bar[IMP_INPUTS_MAX], d[IMP_INPUTS_MAX];
             bool any = false;
@@ -246,7 +257,7 @@ void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_wa
             }
             if (connected) {
                 light_d(v, d);
-                for (int j = 0; j < b->n_in; j++) bar[j] += d[j] * own;
+                for (int j = 0; j < b->n_in; j++) bar[j] += d[j] * lit;
                 any = true;
             }
             const imp_spec arriving = P * v->beyond;
@@ -262,7 +273,7 @@ void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_wa
                 else imp__inputs_scatter(b->input, b->n_in, &at, bar, sink);
             }
         }
-        if (imp_unlikely(crosses(v))) media_scatter(tracer, v, P, own, sink);
+        if (imp_unlikely(crosses(v))) media_scatter(tracer, v, P, lit, sink);
         P *= v->w;
         if (imp__is_zero_used(P, v->carried)) break;
     }
@@ -315,8 +326,10 @@ static imp_spec tangent(const struct imp_tracer *tracer, const struct imp_walk *
         L_dot *= v->w;
         for (const struct imp_side *s = v->side; s; s = s->next)
             L_dot += tangent(tracer, &s->walk, x_dot);
-        const imp_spec own =
-            imp_likely(!walk->entry) ? imp__spec(1) : walk->entry[depth - walk->depth];
+        const struct imp_entry *entry =
+            imp_likely(!walk->entry) ? NULL : &walk->entry[depth - walk->depth];
+        const imp_spec own = imp_likely(!entry) ? imp__spec(1) : entry->e;
+        const imp_spec lit = imp_likely(!entry) ? imp__spec(1) : entry->b;
         const struct imp_met *met = &v->d.met;
         const struct imp_light *light = &v->d.light;
         const bool connected = v->d.connection == IMP_CONNECTED;
@@ -324,13 +337,14 @@ static imp_spec tangent(const struct imp_tracer *tracer, const struct imp_walk *
         if (met->emitter >= 0 && active->emitter[met->emitter])
             L_dot += emitter_tangent(tracer, met->emitter, imp__vertex_met(v), at,
                                      &direction) *
-                     met->weight * own;
-        if (connected && active->emitter[light->emitter])
+                     (imp_likely(v->d.scatterer != IMP_AT_LIGHT) ? met->weight * own
+                                                                 : v->beyond * v->scale);
+        if (connected && light->emitter >= 0 && active->emitter[light->emitter])
             L_dot += emitter_tangent(tracer, light->emitter, imp__light_emission(light),
                                      imp__light_at(v), &direction) *
-                     v->light_f * v->light_w * own;
+                     v->light_f * v->light_w * lit;
         if (imp_unlikely(crosses(v)))
-            L_dot += media_tangent(tracer, v, own, direction_at, &direction);
+            L_dot += media_tangent(tracer, v, lit, direction_at, &direction);
         if (!bsdf_active(tracer, v)) continue;
         imp_spec in_dot[IMP_INPUTS_MAX], d[IMP_INPUTS_MAX];
         imp__inputs_tangent(b->input, b->n_in, &at, direction_at, &direction, in_dot);
@@ -341,7 +355,7 @@ static imp_spec tangent(const struct imp_tracer *tracer, const struct imp_walk *
         }
         if (connected) {
             light_d(v, d);
-            for (int j = 0; j < b->n_in; j++) L_dot += d[j] * in_dot[j] * own;
+            for (int j = 0; j < b->n_in; j++) L_dot += d[j] * in_dot[j] * lit;
         }
         if (v->d.goes_on) {
             step_d(tracer, walk, v, depth, d);

@@ -9,6 +9,7 @@
  * Le/p^e for a light sample, power heuristic with exponent 2, w^B = 1 at the first vertex
  * and after a delta lobe. Depth: emission at vertex k counts if k < max_depth, scattering
  * goes on and samples lights if k + 1 < max_depth (docs/scene-format.md 11). */
+#include "meter.h"
 #include "probe.h"
 #include <float.h>
 #include <stddef.h>
@@ -16,7 +17,7 @@
 /* ---- Vertices -------------------------------------------------------------------- */
 
 /* With room behind it for n_in inputs of its BSDF, unless only its value counts. */
-static struct imp_vertex *vertex_add(struct imp_step *s, int n_in)
+static inline struct imp_vertex *vertex_add(struct imp_step *s, int n_in)
 {
     struct imp_walk *w = s->walk;
     if (imp_unlikely(w->n == IMP_WALK_MAX)) {
@@ -51,12 +52,17 @@ static struct imp_vertex *vertex_add(struct imp_step *s, int n_in)
     struct imp_decision *d = &v->d;
     d->shape = d->met.emitter = -1;
     d->connection = IMP_NOT_CONNECTED;
-    d->glows = d->goes_on = d->stands = false;
+    d->glows = d->goes_on = d->stands = d->from_light = false;
     d->drawn = IMP_DENSITY_KERNEL;
     d->pdf = 0;
     d->survive = d->passes = 1;
     d->met.weight = d->glow_weight = 1;
     return v;
+}
+
+struct imp_vertex *imp__vertex_add(struct imp_step *s, int n_in)
+{
+    return vertex_add(s, n_in);
 }
 
 static inline void vertex_place(struct imp_step *s, struct imp_vertex *v,
@@ -158,6 +164,17 @@ medium_meet(struct imp_step *s, const struct imp_bsdf *scatterer, int medium, im
     vertex_place(s, v, at, frame, s->d, t);
     s->walk->valid = true;
     return v;
+}
+
+struct imp_vertex *imp__vertex_meet(struct imp_step *s, enum imp_meeting met,
+                                    struct imp_hit *hit, struct imp_surface *at,
+                                    struct imp_frame *frame)
+{
+    if (met == IMP_MEETS_SURFACE) return surface_meet(s, hit, at, frame);
+    if (met == IMP_MEETS_MEDIUM)
+        return medium_meet(s, s->flight.here->scatterer, s->flight.here->index,
+                           s->flight.at, s->flight.t, at, frame);
+    return NULL;
 }
 
 bool imp__sensor_vertex(struct imp_step *s)
@@ -415,6 +432,17 @@ imp_spec imp__walk_scattered(struct imp_step *s, const struct imp_bsdf *scattere
     return imp__walk_fold(s->walk);
 }
 
+/* From a sensor that is a surface. */
+static __attribute__((noinline)) void meter_walk(struct imp_step *s)
+{
+    struct imp_surface at;
+    struct imp_frame frame;
+    struct imp_vertex *v = imp__meter_begin(s, &at, &frame);
+    if (!v || !vertex_work(s, v, NULL, &at, &frame)) return;
+    s->depth++;
+    walk_on(s);
+}
+
 /* ---- Walks ------------------------------------------------------------------------ */
 
 /* Keys use full-film pixels: a crop renders the same samples as the whole picture. The
@@ -505,7 +533,8 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
     if (imp_unlikely(tracer->active && tracer->active->medium) && s.recorded &&
         !tracer->collisions_stand && tracer->integrator->media)
         s.probing = &probing;
-    if (imp_likely(s.segment->begin == NULL) || s.segment->begin(&s)) walk_on(&s);
+    if (imp_unlikely(sensor->shape != NULL)) meter_walk(&s);
+    else if (imp_likely(s.segment->begin == NULL) || s.segment->begin(&s)) walk_on(&s);
     if (imp_unlikely(s.probing != NULL)) imp__probe_follow(&s);
 
     imp__walk_close(tracer, walk);

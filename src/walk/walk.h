@@ -40,7 +40,8 @@ enum imp_scatterer {
     IMP_AT_BOUNDARY, /* a surface that light passes as if nothing were there */
     IMP_AT_SKY,      /* the environment, met where the walk leaves the scene */
     IMP_IN_MEDIUM,   /* a phase function, between surfaces */
-    IMP_AT_SENSOR    /* where a walk begins, if its first segment crosses media */
+    IMP_AT_SENSOR,   /* where a walk begins, if its first segment crosses media */
+    IMP_AT_LIGHT     /* where a walk from a light begins (light_walk.h) */
 };
 
 enum imp_connection { IMP_NOT_CONNECTED, IMP_OCCLUDED, IMP_CONNECTED };
@@ -61,15 +62,17 @@ struct imp_light {
 };
 
 struct imp_decision {
-    int32_t shape;            /* index; in a medium, the medium's; -1: none */
-    uint8_t scatterer;        /* enum imp_scatterer */
-    int8_t lobe;              /* of the continuation: IMP_SMOOTH or a delta lobe */
-    uint8_t connection;       /* enum imp_connection: what became of the light sample */
-    bool glows : 1;           /* the BSDF's own emission counts */
-    bool goes_on : 1;         /* the walk continues */
-    bool stands : 1;          /* in a medium: this collision stands for derivatives with
+    int32_t shape;       /* index; in a medium, the medium's; -1: none */
+    uint8_t scatterer;   /* enum imp_scatterer */
+    int8_t lobe;         /* of the continuation: IMP_SMOOTH or a delta lobe */
+    uint8_t connection;  /* enum imp_connection: what became of the light sample */
+    bool glows : 1;      /* the BSDF's own emission counts */
+    bool goes_on : 1;    /* the walk continues */
+    bool stands : 1;     /* in a medium: this collision stands for derivatives with
                                  respect to the extinction (tracking.h) */
-    uint8_t drawn : 3;        /* enum imp_density that drew the continuation */
+    uint8_t drawn : 3;   /* enum imp_density that drew the continuation */
+    bool from_light : 1; /* of a walk from a light: the light sample is a connection to
+                                 the sensor, what is met the sensor, wi is given */
     imp_decided uv[2], p[3];  /* the place; at the sky p is the direction */
     imp_decided wo[3], wi[3]; /* of the continuation, shading frame */
     imp_decided pdf, survive; /* p, s of the continuation */
@@ -129,6 +132,10 @@ struct imp_vertex {
  * without roulette. With roulette at 0.95 the chance to get here is 1e-365. */
 #define IMP_WALK_MAX (1 << 14)
 
+struct imp_entry {
+    imp_spec e, b;
+};
+
 struct imp_walk {
     struct imp_vertex *first, *last;
     int n;         /* vertices */
@@ -146,10 +153,9 @@ struct imp_walk {
     bool valid;            /* alpha 1 (docs/scene-format.md 11) */
     bool absorbed;         /* Stam: ended by absorption */
     enum imp_drop dropped; /* then L is 0 and there is nothing to sweep */
-    /* [n] adjoint with which the light of vertex k itself enters: what a sensor that it
-     * reaches makes of it. NULL: 1, as of a walk from the sensor, whose adjoint enters at
-     * its start. */
-    const imp_spec *entry;
+    /* [n] adjoints with which E and B of vertex k enter: what a sensor that they reach makes
+     * of them. NULL: 1, as of a walk from the sensor, whose adjoint enters at its start. */
+    const struct imp_entry *entry;
     /* Kind of the segments that move with an active parameter; NULL: none does. */
     const struct imp_segment_ops *moving;
 };
@@ -357,6 +363,9 @@ static inline struct imp_texcoord imp__light_at(const struct imp_vertex *v)
 }
 static inline struct imp_dirs imp__light_dirs(const struct imp_vertex *v)
 {
+    if (imp_unlikely(v->d.from_light))
+        return (struct imp_dirs){imp__decided_v3(v->d.light.wi), imp__decided_v3(v->d.wi),
+                                 IMP_SMOOTH, false};
     return (struct imp_dirs){imp__vertex_wo(v), imp__decided_v3(v->d.light.wi),
                              IMP_SMOOTH, false};
 }

@@ -20,10 +20,27 @@ uint64_t imp__walk_integrator_hash(const struct imp_walk_integrator *i)
                           i->absorbs,   i->first_hit,  (int)i->alpha_gradient,
                           i->media};
     uint64_t h = imp__hash(0, number, sizeof number);
+    if (i->from_lights) h = imp__hash(h, &i->rr_depth, sizeof i->rr_depth);
     if (!i->mixes && !i->photons) return h;
     const double other[] = {i->photons ? i->h : 0, i->split};
     h = imp__hash(h, other, sizeof other);
     return imp__hash(h, i->mixing->weight, sizeof i->mixing->weight);
+}
+
+enum imp_status imp__walks_from(const struct imp_scene *scene,
+                                const struct imp_walk_integrator *of, enum imp_from from,
+                                const struct imp_walk_integrator **out)
+{
+    *out = of;
+    if (from == IMP_FROM_SCENE || !of || (from == IMP_FROM_LIGHTS) == of->from_lights)
+        return IMP_OK;
+    if (!of->other_end)
+        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                          "integrator %s: its walks begin at the sensor alone; use path, "
+                          "volpath, photons or ptracer",
+                          scene->integrator->ops->name);
+    *out = of->other_end;
+    return IMP_OK;
 }
 
 /* ---- Kinds ----------------------------------------------------------------------- */
@@ -92,6 +109,22 @@ static enum imp_status mixture_ready(struct imp_scene *scene,
     return st;
 }
 
+/* The same from the other end. */
+static enum imp_status other_end_make(const struct imp_build *build,
+                                      struct imp_walk_integrator *w)
+{
+    struct imp_walk_integrator *other = imp__arena_array(build->arena, 1, sizeof *other);
+    if (!other)
+        return imp__error(build->ctx, IMP_E_NOMEM, "no memory for the integrator");
+    *other = *w;
+    other->from_lights = !w->from_lights;
+    other->guided = false;
+    other->mixing = NULL;
+    other->split = 0;
+    w->other_end = other;
+    return IMP_OK;
+}
+
 /* `depth`: default of max_depth. */
 static enum imp_status path_read(const struct imp_build *build, int depth,
                                  struct imp_integrator *i)
@@ -104,6 +137,7 @@ static enum imp_status path_read(const struct imp_build *build, int depth,
     IMP_TRY(depth_read(build, depth, i, w));
     IMP_TRY(mixture_read(build, w));
     w->rr_depth = (int)rr;
+    IMP_TRY(other_end_make(build, w));
 out:
     return st;
 }
@@ -136,7 +170,7 @@ static enum imp_status volpath_build(const struct imp_build *build,
     if (strcmp(i->ops->name, "volpathmis") == 0)
         IMP_TRY(imp_build_bool(build, "use_spectral_mis", true, &spectral));
     w->guided = false;
-    w->media = true;
+    w->media = w->other_end->media = true;
 out:
     return st;
 }
@@ -239,6 +273,7 @@ static enum imp_status photons_build(const struct imp_build *build,
         IMP_TRY(imp__node_error(build->ctx, build->node, IMP_E_SCENE,
                                 "h = %g is not positive", w->h));
     IMP_TRY(mixture_read(build, w));
+    IMP_TRY(other_end_make(build, w));
 out:
     return st;
 }
@@ -254,6 +289,32 @@ static enum imp_status photons_ready(struct imp_scene *scene,
                 "photon can meet it; use path, or a light with a shape",
                 scene->emitters[e]->name, scene->emitters[e]->ops->name);
     return mixture_ready(scene, i);
+}
+
+/* Walks from the lights, connected to the sensor (Mitsuba's name). */
+static enum imp_status ptracer_build(const struct imp_build *build,
+                                     struct imp_integrator *i)
+{
+    struct imp_walk_integrator *w = i->self;
+    enum imp_status st = IMP_OK;
+    int64_t rr;
+    *w = (struct imp_walk_integrator){
+        .lights = true, .directions = true, .media = true, .from_lights = true};
+    IMP_TRY(imp__props_int(build->ctx, build->node, "rr_depth", 5, 1, INT32_MAX, &rr));
+    IMP_TRY(depth_read(build, -1, i, w));
+    w->rr_depth = (int)rr;
+    IMP_TRY(other_end_make(build, w));
+out:
+    return st;
+}
+
+/* Without media they are walks of surfaces alone. */
+static enum imp_status ptracer_ready(struct imp_scene *scene,
+                                     const struct imp_integrator *i)
+{
+    struct imp_walk_integrator *w = i->self;
+    w->media = w->other_end->media = scene->n_media > 0;
+    return IMP_OK;
 }
 
 const struct imp_integrator_ops imp__integrator_path = {
@@ -282,6 +343,14 @@ const struct imp_integrator_ops imp__integrator_photons = {
     .flags = IMP_INTEGRATOR_WALKS | IMP_INTEGRATOR_INNER | IMP_INTEGRATOR_MEDIA,
     .build = photons_build,
     .ready = photons_ready};
+
+const struct imp_integrator_ops imp__integrator_ptracer = {
+    .size = sizeof(struct imp_integrator_ops),
+    .name = "ptracer",
+    .object_size = sizeof(struct imp_walk_integrator),
+    .flags = IMP_INTEGRATOR_WALKS | IMP_INTEGRATOR_MEDIA,
+    .build = ptracer_build,
+    .ready = ptracer_ready};
 
 #define VOLPATH(kind)                                                                    \
     const struct imp_integrator_ops imp__integrator_##kind = {                           \

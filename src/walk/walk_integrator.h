@@ -33,13 +33,16 @@ struct imp_walk_integrator {
     struct imp_mixing *mixing; /* weights */
     bool mixes;                /* some vertex may draw from more than its kernel */
     int split;                 /* so many vertices of a walk draw from each density */
+    bool from_lights;          /* walks begin at the lights (light_walk.h) */
+    struct imp_walk_integrator *other_end; /* the same numbers from the other end; NULL:
+                                              there is none */
 };
 
 extern const struct imp_integrator_ops imp__integrator_path, imp__integrator_direct,
     imp__integrator_stam, imp__integrator_photons, imp__integrator_volpath,
     imp__integrator_volpathmis, imp__integrator_prbvolpath, imp__integrator_prb,
     imp__integrator_prb_basic, imp__integrator_prb_projective,
-    imp__integrator_direct_projective;
+    imp__integrator_direct_projective, imp__integrator_ptracer;
 
 /* NULL: not one of walks. */
 static inline const struct imp_walk_integrator *
@@ -50,6 +53,11 @@ imp__walk_integrator_of(const struct imp_integrator *i)
 /* The radiance integrator of a scene: itself, or the first in moment or aov; NULL: none
  * (depth alone). */
 const struct imp_walk_integrator *imp__walk_integrator(const struct imp_scene *scene);
+/* What walks of a run are made by, from the end that it asks for. *out is `of` where no end
+ * is asked for. IMP_E_UNSUPPORTED, by name, where its walks have one end. */
+enum imp_status imp__walks_from(const struct imp_scene *scene,
+                                const struct imp_walk_integrator *of, enum imp_from from,
+                                const struct imp_walk_integrator **out);
 /* Hash of the settings, for files made with walks (scene/fingerprint.h); NULL has one. */
 uint64_t imp__walk_integrator_hash(const struct imp_walk_integrator *integrator);
 

@@ -141,7 +141,8 @@ static void entries(void)
         static const double all[D] = {1, 1, 1, 1, 1}, any[D] = {0.5, -2, 0, 3, 1};
         const struct imp_arena_mark mark = imp__arena_mark(&r.arena);
         struct imp_walk w;
-        imp_spec entry[D], sum = {0};
+        struct imp_entry entry[D];
+        imp_spec sum = {0};
         imp__walk_trace(&r.tracer, &r.arena, i % 8, i / 8 % 8, i, &w);
         const imp_spec L = w.L;
         whole = fmax(whole, walk_error(&r, &w, all));
@@ -149,11 +150,11 @@ static void entries(void)
         for (int j = 0; j < D; j++) {
             double one[D] = {0};
             one[j] = 1;
-            for (int k = 0; k < D; k++) entry[k] = imp__spec(one[k]);
+            for (int k = 0; k < D; k++) entry[k].e = entry[k].b = imp__spec(one[k]);
             inner = fmax(inner, walk_error(&r, &w, one));
             sum += imp__walk_fold(&w);
         }
-        for (int k = 0; k < D; k++) entry[k] = imp__spec(any[k]);
+        for (int k = 0; k < D; k++) entry[k].e = entry[k].b = imp__spec(any[k]);
         mixed = fmax(mixed, walk_error(&r, &w, any));
         for (int c = 0; c < 3; c++) parts = fmax(parts, fabs(sum[c] / L[c] - 1));
         imp__arena_rewind(&r.arena, mark);

@@ -23,6 +23,17 @@ void imp__bsdf_transposed(const struct imp_bsdf *b, const imp_spec *in,
     *f *= ratio * ratio;
 }
 
+double imp__bsdf_exchange(const struct imp_bsdf *b, const imp_spec *in,
+                          const struct imp_dirs *d, double cos_o, double cos_i)
+{
+    if (!(fabs(cos_i) > 0)) return 0;
+    const double cosines = fabs(cos_o) / fabs(cos_i);
+    if (d->lobe == IMP_SMOOTH) return cosines;
+    const double ratio = b->ops->index_ratio ? b->ops->index_ratio(b, in, d) : 1;
+    const double shading = fabs(d->wi[2]) / fabs(d->wo[2]);
+    return isfinite(shading) ? ratio * ratio * cosines * shading : 0;
+}
+
 static struct imp_dirs exchanged(const struct imp_dirs *d)
 {
     return (struct imp_dirs){d->wi, d->wo, d->lobe, d->derivative};

@@ -23,6 +23,15 @@ void imp__bsdf_value(const struct imp_bsdf *b, const imp_spec *in,
 /* K*, or the coefficient of a delta lobe. */
 void imp__bsdf_transposed(const struct imp_bsdf *b, const imp_spec *in,
                           const struct imp_dirs *d, imp_spec *f);
+/* K* over K: what the transposed kernel has more, where the cosines that light is measured
+ * with are those at the geometric normal, cos_o and cos_i,
+ *
+ *     |cos_o|/|cos_i|                                       of a density
+ *     (n_i/n_o)^2 |cos_o| |cos_i^s| / (|cos_i| |cos_o^s|)   of a delta lobe, ^s: shading
+ *
+ * (Veach 1997, 5.3.2). K bears |cos_i^s|: K* is eval times this, with shading normals too. */
+double imp__bsdf_exchange(const struct imp_bsdf *b, const imp_spec *in,
+                          const struct imp_dirs *d, double cos_o, double cos_i);
 /* Draw d->wo and d->lobe for d->wi, by the kind's sampling with the directions exchanged:
  * it is where f is large, since f hardly changes when they are. False: no sample. */
 bool imp__bsdf_transposed_sample(const struct imp_bsdf *b, const imp_spec *in,

@@ -1,0 +1,119 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The reasons to refuse walks from the lights. */
+#include "light_walk.h"
+
+/* Is what the material emits 0, whatever is differentiated? */
+static bool is_dark(const struct imp_bsdf *b, const struct imp_active *active)
+{
+    for (int j = 0; j < b->n_own; j++) {
+        const struct imp_input *in = b->input[j];
+        if (b->ops->inputs[j].role != IMP_EMISSION) continue;
+        if (in->texture || !imp__is_zero(in->value)) return false;
+        if (active && in->param >= 0 && active->base[in->param] >= 0) return false;
+    }
+    for (int k = 0; k < b->n_child; k++)
+        if (!is_dark(b->child[k], active)) return false;
+    return true;
+}
+
+/* Nothing but lights may emit, and each must be able to send a walk. */
+static enum imp_status emission_allowed(const struct imp_scene *scene,
+                                        const struct imp_active *active)
+{
+    imp_context *ctx = scene->ctx;
+    for (int i = 0; i < scene->n_emitters; i++) {
+        const struct imp_emitter *e = scene->emitters[i];
+        if (!e->ops->sample_emission || !e->ops->pdf_emission ||
+            (e->shape && !e->shape->ops->sample_area))
+            return imp__error(ctx, IMP_E_UNSUPPORTED,
+                              "walks from the lights: no walk can begin at light '%s' "
+                              "(%s); let walks begin at the sensor",
+                              e->name, e->ops->name);
+        if (e->weight == 0)
+            return imp__error(
+                ctx, IMP_E_UNSUPPORTED,
+                "walks from the lights: light '%s' (%s) has sampling_weight "
+                "0, and no walk would begin there",
+                e->name, e->ops->name);
+    }
+    for (int m = 0; m < scene->n_media; m++)
+        if (scene->media[m]->emits)
+            return imp__error(ctx, IMP_E_UNSUPPORTED,
+                              "walks from the lights: medium '%s' emits, and no walk "
+                              "begins there; let walks begin at the sensor",
+                              scene->media[m]->name);
+    for (int b = 0; b < scene->n_bsdfs; b++)
+        if (scene->bsdfs[b]->flags & IMP_BSDF_EMIT && !is_dark(scene->bsdfs[b], active))
+            return imp__error(ctx, IMP_E_UNSUPPORTED,
+                              "walks from the lights: material '%s' (%s) glows, and no "
+                              "walk begins there; let walks begin at the sensor",
+                              scene->bsdfs[b]->name, scene->bsdfs[b]->ops->name);
+    if (scene->n_bodies > 0)
+        return imp__error(ctx, IMP_E_UNSUPPORTED,
+                          "walks from the lights: they do not bend in media of graded "
+                          "index; let walks begin at the sensor");
+    return IMP_OK;
+}
+
+static enum imp_status sensor_allowed(const struct imp_scene *scene,
+                                      const struct imp_sensor *sensor,
+                                      const struct imp_walk_integrator *integrator)
+{
+    imp_context *ctx = scene->ctx;
+    if (!sensor->ops->connect)
+        return imp__error(
+            ctx, IMP_E_UNSUPPORTED,
+            "walks from the lights: sensor '%s' (%s) measures one ray, which "
+            "they meet never; let walks begin at the sensor",
+            sensor->name, sensor->ops->name);
+    if (!integrator->lights && !sensor->shape)
+        return imp__error(
+            ctx, IMP_E_UNSUPPORTED,
+            "photons from the lights: sensor '%s' (%s) is no surface, which "
+            "they could meet; use ptracer, or an irradiancemeter",
+            sensor->name, sensor->ops->name);
+    if (scene->environment >= 0 && (sensor->ops->flags & IMP_SENSOR_PARALLEL))
+        return imp__error(
+            ctx, IMP_E_UNSUPPORTED,
+            "walks from the lights: sensor '%s' (%s) has one direction, in "
+            "which light '%s' is never drawn; let walks begin at the sensor",
+            sensor->name, sensor->ops->name, scene->emitters[scene->environment]->name);
+    bool area = false;
+    for (int i = 0; i < scene->n_emitters; i++) area |= scene->emitters[i]->shape != NULL;
+    if (integrator->hide_emitters && area &&
+        (sensor->shape || (integrator->media && scene->n_media > 0)))
+        return imp__error(ctx, IMP_E_UNSUPPORTED,
+                          "walks from the lights: with hide_emitters they pass no light "
+                          "on their way through media or to a surface; let walks begin "
+                          "at the sensor");
+    return IMP_OK;
+}
+
+/* Where collisions are drawn depends on the extinction. That they stand still makes a
+ * derivative that is whole only where every collision had a chance to be drawn. */
+static enum imp_status media_allowed(const struct imp_scene *scene,
+                                     const struct imp_active *active)
+{
+    for (int m = 0; active->medium && m < scene->n_media; m++)
+        if (active->medium[m] && scene->media[m]->majorants)
+            return imp__error(scene->ctx, IMP_E_BIAS,
+                              "walks from the lights: the derivative with respect to the "
+                              "extinction of medium '%s', which varies, is not whole "
+                              "where it is 0; let walks begin at the sensor",
+                              scene->media[m]->name);
+    return IMP_OK;
+}
+
+enum imp_status imp__light_walks_allowed(const struct imp_scene *scene,
+                                         const struct imp_sensor *sensor,
+                                         const struct imp_walk_integrator *integrator,
+                                         const struct imp_active *active)
+{
+    enum imp_status st = IMP_OK;
+    IMP_TRY(emission_allowed(scene, active));
+    IMP_TRY(sensor_allowed(scene, sensor, integrator));
+    if (active) IMP_TRY(media_allowed(scene, active));
+out:
+    return st;
+}

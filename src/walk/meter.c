@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "meter.h"
+#include "math/warp.h"
+
+static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
+                   struct imp_dirs *d)
+{
+    (void)b, (void)in;
+    d->wi = imp__cosine_hemisphere(u + 1);
+    return d->wi[2] > 0;
+}
+static void eval(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
+                 imp_spec *f)
+{
+    (void)b, (void)in;
+    *f = imp__spec(fmax(d->wi[2], 0) * IMP_INV_PI);
+}
+static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
+{
+    (void)b, (void)in;
+    return fmax(d->wi[2], 0) * IMP_INV_PI;
+}
+static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
+                   imp_spec *df)
+{
+    (void)b, (void)in, (void)d, (void)df;
+}
+
+static const struct imp_bsdf_ops white_ops = {.size = sizeof(struct imp_bsdf_ops),
+                                              .name = "",
+                                              .sample = sample,
+                                              .eval = eval,
+                                              .pdf = pdf,
+                                              .eval_d = eval_d};
+static const struct imp_bsdf white = {.ops = &white_ops,
+                                      .flags = IMP_BSDF_SMOOTH,
+                                      .index_input = -1,
+                                      .index = -1,
+                                      .name = "sensor"};
+
+struct imp_vertex *imp__meter_begin(struct imp_step *s, struct imp_surface *at,
+                                    struct imp_frame *frame)
+{
+    struct imp_walk *walk = s->walk;
+    const struct imp_sensor *sensor = s->tracer->sensor;
+    const struct imp_film_desc *film = &sensor->film;
+    const double u[2] = {imp_clamp(walk->px / film->width, 0.0, 0x1.fffffffffffffp-1),
+                         imp_clamp(walk->py / film->height, 0.0, 0x1.fffffffffffffp-1)};
+    s->flight.medium = s->flight.here = sensor->medium;
+    if (!imp__sensor_vertex(s)) return NULL;
+    struct imp_vertex *v = walk->last;
+    const double density = imp__decide1(1 / sensor->scale);
+    imp__step_weigh(v, imp__spec(1), density, 1);
+    if (s->recorded) v->d.pdf = (imp_decided)density;
+
+    /* Its numbers are those of another walk: depth -1 has none. */
+    walk->depth = -2;
+    walk->key = imp__key_branch(walk->key, 0, 1);
+    s->depth = -1;
+    sensor->shape->ops->sample_area(sensor->shape, u, at);
+    *frame = imp__frame_from_normal(at->ng);
+    at->n = at->ng;
+    at->s = frame->s;
+    at->t = frame->t;
+    v = imp__vertex_add(s, 0);
+    if (!v) return NULL;
+    v->shape = sensor->shape;
+    v->bsdf = &white;
+    if (s->recorded) {
+        v->d.shape = sensor->shape->index;
+        v->d.scatterer = IMP_AT_SURFACE;
+    }
+    imp__vertex_place(s, v, at, frame, -at->ng, 0);
+    return v;
+}
