@@ -29,7 +29,15 @@ enum imp_status imp__run_sensor(const struct imp_scene *scene, const struct imp_
     if (run->spp < 0)
         return imp__error(scene->ctx, IMP_E_ARG, "samples per pixel = %d is negative",
                           run->spp);
-    *out = scene->sensors[run->sensor];
+    const struct imp_sensor *sensor = scene->sensors[run->sensor];
+    const struct imp_walk_integrator *walks = imp__walk_integrator(scene);
+    if (sensor->shape && (!walks || walks->absorbs || walks->hide_emitters ||
+                          imp__channels_of(scene->integrator)))
+        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                          "sensor '%s' (%s) is read by walks of path, direct, volpath, "
+                          "photons or ptracer, without hide_emitters",
+                          sensor->name, sensor->ops->name);
+    *out = sensor;
     return IMP_OK;
 }
 
@@ -94,13 +102,22 @@ enum imp_status imp__measure_create(const struct imp_scene *scene,
                                     const struct imp_run *run, struct imp_measure *out)
 {
     const struct imp_sensor *sensor;
-    const enum imp_status st = imp__run_sensor(scene, run, &sensor);
+    enum imp_status st = imp__run_sensor(scene, run, &sensor);
     if (st != IMP_OK) return st;
     if (sensor->film.n_responses > 0 &&
         (imp__channels_of(scene->integrator) || !imp__walk_integrator(scene)))
         return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
                           "a specfilm has the channels of its response curves alone: use "
                           "an integrator of walks, without aov or moment");
+    const struct imp_walk_integrator *walks = imp__walk_integrator_of(scene->integrator);
+    const struct imp_walk_integrator *from = walks;
+    if (run->from != IMP_FROM_SCENE && !walks)
+        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                          "integrator %s: the end at which walks begin is asked of "
+                          "integrators of walks alone",
+                          scene->integrator->ops->name);
+    st = imp__walks_from(scene, walks, run->from, &from);
+    if (st != IMP_OK) return st;
     struct names names = {.text.ctx = scene->ctx};
     names_make(&names, scene, sensor);
     if (names.text.failed || names.n > IMP_MEASURE_MAX) {
@@ -117,6 +134,8 @@ enum imp_status imp__measure_create(const struct imp_scene *scene,
                                 .run = run,
                                 .spp = run->spp > 0 ? run->spp : sensor->spp,
                                 .n = names.n,
+                                .integrator = from,
+                                .from_lights = from && from->from_lights,
                                 .names = (char *)names.text.bytes.data};
     struct imp_tracer tracer = {.scene = scene};
     imp__tracer_waves(&tracer, run, imp__walks_of(run, sensor));
@@ -298,7 +317,7 @@ void imp__measure_sample(const void *measure, struct imp_sample *s)
     double alpha = 0;
     int n;
     if (!more) {
-        radiance(m, imp__walk_integrator_of(top), s, &L, &alpha, &walk);
+        radiance(m, m->integrator, s, &L, &alpha, &walk);
         if (m->sensor->film.n_responses == 0) imp__measure_base(m, L, alpha, value);
         return;
     }

@@ -16,7 +16,9 @@ struct imp_measure {
     const struct imp_guide *guide;
     const struct imp_run *run; /* outlives the measure */
     int spp;
-    int set;     /* of samples that depend on each other (imp_picture) */
+    int set; /* of samples that depend on each other (imp_picture) */
+    const struct imp_walk_integrator *integrator; /* of the scene, from the run's end */
+    bool from_lights;
     int n;       /* channels */
     char *names; /* "R,G,B,..." for imp__film_create */
 };

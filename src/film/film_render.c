@@ -2,6 +2,7 @@
  *
  * imp_render: the scene's integrator decides which solver makes the picture. */
 #include "film_render.h"
+#include "film_light.h"
 #include "film_measure.h"
 #include "film_picture.h"
 #include "parts.h"
@@ -32,6 +33,8 @@ enum imp_status imp_render(const imp_scene *scene, const struct imp_run *run,
     if (st != IMP_OK) return st;
     if (solves) {
         st = imp__render_elements(&measure, &own, out);
+    } else if (measure.from_lights) {
+        st = imp__render_from_lights(&measure, &own, out);
     } else {
         const struct imp_picture picture = {.sensor = measure.sensor,
                                             .stage = "render",

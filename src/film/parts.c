@@ -463,7 +463,7 @@ int imp__same_run(const struct imp_scene *scene, const struct imp_run *run,
         }
     }
     const uint64_t how[3] = {run->seed, (uint64_t)(run->spp > 0 ? run->spp : sensor->spp),
-                             run->guide != NULL};
+                             (uint64_t)(run->guide != NULL) | (uint64_t)run->from << 1};
     int n = 0;
     same[n++] = (struct imp_same){"call", imp__hash_text(0, call)};
     same[n++] = (struct imp_same){"scene", imp__fingerprint_objects(scene)};

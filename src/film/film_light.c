@@ -1,0 +1,407 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "film_light.h"
+#include "base/team.h"
+#include "film_measure.h"
+#include <float.h>
+#include <stdio.h>
+#include <string.h>
+
+/* ---- Filters ---------------------------------------------------------------------- */
+
+/* 1 over the integral of the filter about each pixel's middle, over the film [lo, hi]. */
+static enum imp_status scale_make(imp_context *ctx, const struct imp_filter *f, int n,
+                                  int margin, double **out)
+{
+    enum { STEPS = 2048 };
+    double *scale = imp__alloc(ctx, (size_t)n, sizeof *scale);
+    if (!scale) return imp__error(ctx, IMP_E_NOMEM, "no memory for a filter");
+    for (int i = 0; i < n; i++) {
+        const double at = i + 0.5, lo = fmax(at - f->radius, -margin);
+        const double hi = fmin(at + f->radius, n + margin), step = (hi - lo) / STEPS;
+        double sum = 0;
+        for (int k = 0; k < STEPS; k++)
+            sum += f->ops->eval(f, lo + (k + 0.5) * step - at);
+        scale[i] = sum != 0 ? 1 / (sum * step) : 0;
+    }
+    *out = scale;
+    return IMP_OK;
+}
+
+enum imp_status imp__splat_scale_create(imp_context *ctx,
+                                        const struct imp_film_desc *film,
+                                        struct imp_splat_scale *out)
+{
+    enum imp_status st = IMP_OK;
+    const int border = imp__film_border(film);
+    *out = (struct imp_splat_scale){.margin = film->sample_border ? border : 0};
+    if (border == 0) return IMP_OK;
+    IMP_TRY(scale_make(ctx, &film->filter, film->crop_w, out->margin, &out->across));
+    IMP_TRY(scale_make(ctx, &film->filter, film->crop_h, out->margin, &out->down));
+out:
+    return st;
+}
+
+void imp__splat_scale_destroy(imp_context *ctx, struct imp_splat_scale *s)
+{
+    imp__release(ctx, s->across);
+    imp__release(ctx, s->down);
+}
+
+static void axis_taps(const struct imp_filter *f, const double *scale, double x, int n,
+                      int margin, struct imp_taps *out)
+{
+    *out = (struct imp_taps){.n = 0};
+    if (!(x >= -margin && x < n + margin)) return;
+    if (!scale) {
+        *out = (struct imp_taps){.first = (int)x, .n = 1, .w = {1}};
+        return;
+    }
+    imp__film_taps(f, x, 0, n - 1, out);
+    for (int k = 0; k < out->n; k++) out->w[k] *= scale[out->first + k];
+}
+
+void imp__splat_taps(const struct imp_film_desc *film,
+                     const struct imp_splat_scale *scale, double px, double py,
+                     struct imp_splat_taps *out)
+{
+    axis_taps(&film->filter, scale->across, px - film->crop_x, film->crop_w,
+              scale->margin, &out->across);
+    axis_taps(&film->filter, scale->down, py - film->crop_y, film->crop_h, scale->margin,
+              &out->down);
+}
+
+/* ---- Sums of walks ---------------------------------------------------------------- */
+
+#define ITEMS_MAX   64
+#define ITEM_WALKS  256 /* at least */
+#define CHECK_WALKS 1024
+
+struct worker {
+    struct imp_arena arena;
+    struct imp_drops drops;
+    int32_t *slot; /* [pixels] where the walk at work has a pixel, from 1; 0: nowhere */
+    int32_t *touched; /* [cap] pixels of the walk at work */
+    double *sum;      /* [cap][n] what it adds to them */
+    int n_touched, cap;
+    double *value; /* [n] */
+};
+
+struct job {
+    const struct imp_light_picture *picture;
+    const struct imp_film_desc *film;
+    imp_context *ctx;
+    struct imp_splat_scale scale;
+    size_t pixels, n, items;
+    struct worker *workers; /* [threads] */
+    pthread_mutex_t lock;   /* guards drops */
+    bool has_lock;
+    struct imp_drops drops;
+    double *mean, *se;
+};
+
+static enum imp_status touch(const struct job *j, struct worker *w, size_t pixel,
+                             double weight)
+{
+    const size_t n = j->n;
+    int32_t at = w->slot[pixel];
+    if (at == 0) {
+        if (w->n_touched == w->cap) {
+            const int cap = w->cap ? 2 * w->cap : 64;
+            int32_t *touched = imp__alloc(j->ctx, (size_t)cap, sizeof *touched);
+            double *sum = imp__alloc(j->ctx, (size_t)cap * n, sizeof *sum);
+            if (!touched || !sum) {
+                imp__release(j->ctx, touched);
+                imp__release(j->ctx, sum);
+                return imp__error(j->ctx, IMP_E_NOMEM, "no memory for a walk's pixels");
+            }
+            if (w->cap) {
+                memcpy(touched, w->touched, (size_t)w->cap * sizeof *touched);
+                memcpy(sum, w->sum, (size_t)w->cap * n * sizeof *sum);
+            }
+            imp__release(j->ctx, w->touched);
+            imp__release(j->ctx, w->sum);
+            w->touched = touched;
+            w->sum = sum;
+            w->cap = cap;
+        }
+        at = w->slot[pixel] = ++w->n_touched;
+        w->touched[at - 1] = (int32_t)pixel;
+        memset(w->sum + (size_t)(at - 1) * n, 0, n * sizeof *w->sum);
+    }
+    double *sum = w->sum + (size_t)(at - 1) * n;
+    for (size_t c = 0; c < n; c++) sum[c] += weight * w->value[c];
+    return IMP_OK;
+}
+
+static void walk_drop(const struct job *j, struct worker *w, enum imp_drop cause,
+                      int64_t index)
+{
+    const struct imp_run *run = j->picture->run;
+    const struct imp_drop_key key = {.seed = run->seed,
+                                     .sample = index,
+                                     .x = -1,
+                                     .y = -1,
+                                     .sensor = run->sensor,
+                                     .cause = (int32_t)cause};
+    imp__drops_add(&w->drops, &key);
+}
+
+/* Adds walk `index` to the item's sums, [pixels][n][2]. */
+static enum imp_status walk_add(const struct job *j, struct worker *w, int64_t index,
+                                double *sums)
+{
+    const struct imp_light_picture *p = j->picture;
+    const struct imp_arena_mark mark = imp__arena_mark(&w->arena);
+    struct imp_light_walk walk;
+    enum imp_status st = IMP_OK;
+    imp__light_walk_trace(p->tracer, &w->arena, index, &walk);
+    if (imp_unlikely(walk.walk.dropped == IMP_DROP_MEMORY || w->arena.failed))
+        IMP_TRY(imp__error(j->ctx, IMP_E_NOMEM, "no memory to record a walk"));
+    if (imp_unlikely(walk.walk.dropped)) walk_drop(j, w, walk.walk.dropped, index);
+    if (p->whole && walk.reach) {
+        p->whole(p->payload, &walk, w->value);
+        IMP_TRY(touch(j, w, 0, 1));
+    }
+    for (const struct imp_reach *r = p->whole ? NULL : walk.reach; r; r = r->next) {
+        struct imp_splat_taps taps;
+        imp__splat_taps(j->film, &j->scale, r->px, r->py, &taps);
+        if (taps.across.n <= 0 || taps.down.n <= 0) continue;
+        p->values(p->payload, &walk, r, w->value);
+        for (int y = 0; y < taps.down.n; y++)
+            for (int x = 0; x < taps.across.n; x++)
+                IMP_TRY(touch(j, w,
+                              (size_t)(taps.down.first + y) * (size_t)j->film->crop_w +
+                                  (size_t)(taps.across.first + x),
+                              taps.down.w[y] * taps.across.w[x]));
+    }
+    for (int k = 0; k < w->n_touched; k++) {
+        const size_t pixel = (size_t)w->touched[k];
+        double *to = sums + pixel * j->n * 2;
+        const double *from = w->sum + (size_t)k * j->n;
+        for (size_t c = 0; c < j->n; c++) {
+            to[2 * c] += from[c];
+            to[2 * c + 1] += from[c] * from[c];
+        }
+        w->slot[pixel] = 0;
+    }
+    w->n_touched = 0;
+out:
+    imp__arena_rewind(&w->arena, mark);
+    return st;
+}
+
+static enum imp_status item_work(size_t item, int worker, void *result, void *payload)
+{
+    struct job *j = payload;
+    const struct imp_light_picture *p = j->picture;
+    struct worker *w = &j->workers[worker];
+    double *sums = result;
+    enum imp_status st = IMP_OK;
+    const int64_t from = p->first + p->walks * (int64_t)item / (int64_t)j->items;
+    const int64_t to = p->first + p->walks * (int64_t)(item + 1) / (int64_t)j->items;
+    memset(sums, 0, j->pixels * j->n * 2 * sizeof *sums);
+    for (int64_t i = from; i < to && st == IMP_OK; i++) {
+        st = walk_add(j, w, i, sums);
+        if (st == IMP_OK && (i - from) % CHECK_WALKS == 0 && imp__drops_total(&w->drops))
+            st = imp__drops_budget(j->ctx, &w->drops, p->run->drop_budget,
+                                   (double)p->walks);
+    }
+    if (imp__drops_total(&w->drops) > 0) {
+        pthread_mutex_lock(&j->lock);
+        imp__drops_merge(&j->drops, &w->drops);
+        pthread_mutex_unlock(&j->lock);
+        memset(&w->drops, 0, sizeof w->drops);
+    }
+    return st;
+}
+
+static void item_add(void *into, const void *from, void *payload)
+{
+    const struct job *j = payload;
+    double *a = into;
+    const double *b = from;
+    for (size_t k = 0; k < j->pixels * j->n * 2; k++) a[k] += b[k];
+}
+
+static enum imp_status sums_take(size_t group, void *sum, void *payload)
+{
+    const struct job *j = payload;
+    const double *s = sum, N = (double)j->picture->walks;
+    (void)group;
+    for (size_t k = 0; k < j->pixels * j->n; k++) {
+        const double total = s[2 * k], square = s[2 * k + 1];
+        j->mean[k] = total / N;
+        if (j->se)
+            j->se[k] =
+                N > 1 ? sqrt(fmax(0, square - total * total / N) / (N * (N - 1))) : NAN;
+    }
+    return IMP_OK;
+}
+
+static enum imp_status workers_create(struct job *j)
+{
+    imp_context *ctx = j->ctx;
+    const size_t threads = (size_t)ctx->threads;
+    char what[96];
+    int levels = 2;
+    while ((size_t)1 << levels < j->items) levels++;
+    snprintf(what, sizeof what, "walks from the lights to %d x %d pixels of %zu values",
+             j->film->crop_w, j->film->crop_h, j->n);
+    const double sums = (double)(j->pixels * j->n * 2) * sizeof(double);
+    const enum imp_status st = imp__memory_check(
+        ctx, sums * ((double)threads + levels) + (double)j->pixels * 4. * (double)threads,
+        what);
+    if (st != IMP_OK) return st;
+    j->workers = imp__alloc(ctx, threads, sizeof *j->workers);
+    j->has_lock = j->workers && pthread_mutex_init(&j->lock, NULL) == 0;
+    if (!j->has_lock) return imp__error(ctx, IMP_E_NOMEM, "no memory for workers");
+    for (size_t k = 0; k < threads; k++) {
+        struct worker *w = &j->workers[k];
+        imp__arena_init(&w->arena, ctx);
+        w->slot = imp__alloc(ctx, j->pixels, sizeof *w->slot);
+        w->value = imp__alloc(ctx, j->n, sizeof *w->value);
+        if (!w->slot || !w->value)
+            return imp__error(ctx, IMP_E_NOMEM, "no memory for workers");
+    }
+    return IMP_OK;
+}
+
+static void workers_destroy(struct job *j)
+{
+    for (int k = 0; j->has_lock && k < j->ctx->threads; k++) {
+        struct worker *w = &j->workers[k];
+        if (w->arena.ctx) imp__arena_free(&w->arena);
+        imp__release(j->ctx, w->slot);
+        imp__release(j->ctx, w->touched);
+        imp__release(j->ctx, w->sum);
+        imp__release(j->ctx, w->value);
+    }
+    if (j->has_lock) pthread_mutex_destroy(&j->lock);
+    imp__release(j->ctx, j->workers);
+}
+
+enum imp_status imp__light_picture_make(const struct imp_light_picture *p, double *mean,
+                                        double *se, struct imp_drops *drops)
+{
+    enum imp_status st = IMP_OK;
+    const struct imp_film_desc *film = &p->tracer->sensor->film;
+    imp_context *ctx = p->tracer->scene->ctx;
+    struct job j = {.picture = p,
+                    .film = film,
+                    .ctx = ctx,
+                    .pixels = p->whole ? 1 : (size_t)film->crop_w * (size_t)film->crop_h,
+                    .n = (size_t)p->n,
+                    .mean = mean,
+                    .se = se};
+    j.items = (size_t)imp_clamp(p->walks / ITEM_WALKS, (int64_t)1, (int64_t)ITEMS_MAX);
+    if (j.pixels > INT32_MAX)
+        IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,
+                           "walks from the lights: more than 2^31 pixels"));
+    IMP_TRY(imp__splat_scale_create(ctx, film, &j.scale));
+    IMP_TRY(workers_create(&j));
+    struct imp_shared shared = {.drops = &j.drops};
+    const struct imp_sum_desc desc = {.n_items = j.items,
+                                      .group = j.items,
+                                      .size = j.pixels * j.n * 2 * sizeof(double),
+                                      .add = item_add,
+                                      .take = sums_take,
+                                      .payload = &j};
+    const struct imp_loop loop = {.n_items = j.items,
+                                  .payload = &j,
+                                  .progress = p->run->progress,
+                                  .progress_payload = p->run->progress_payload,
+                                  .stage = p->stage,
+                                  .rate_unit = "walks",
+                                  .units = (double)p->walks,
+                                  .fraction_lo = p->lo,
+                                  .fraction_hi = p->hi};
+    IMP_TRY(imp__shared_sum(ctx, &loop, &desc, item_work, &shared));
+    IMP_TRY(imp__drops_budget(ctx, &j.drops, p->run->drop_budget, (double)p->walks));
+    if (drops) imp__drops_merge(drops, &j.drops);
+out:
+    workers_destroy(&j);
+    imp__splat_scale_destroy(ctx, &j.scale);
+    return st;
+}
+
+/* ---- The picture of a run --------------------------------------------------------- */
+
+static void measure_values(const void *payload, const struct imp_light_walk *walk,
+                           const struct imp_reach *reach, double *value)
+{
+    const struct imp_measure *m = payload;
+    const struct imp_film_desc *film = &m->sensor->film;
+    for (int c = 0; c < film->n_responses; c++) {
+        imp_spec weight = {0};
+        if (walk->walk.waves)
+            imp__waves_response(walk->walk.waves, &film->response[c], &weight);
+        value[c] = imp__sum_used(weight * reach->values, 4);
+    }
+    if (film->n_responses == 0) imp__measure_base(m, reach->L, 1, value);
+}
+
+enum imp_status imp__render_from_lights(const struct imp_measure *m,
+                                        const struct imp_run *run, imp_film **out)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = m->scene->ctx;
+    const struct imp_film_desc *f = &m->sensor->film;
+    const size_t values = (size_t)f->crop_w * (size_t)f->crop_h * (size_t)m->n;
+    const struct imp_walk_integrator *integrator =
+        imp__walk_integrator_of(m->scene->integrator);
+    double *mean = NULL, *se = NULL;
+    imp_film *film = NULL;
+    struct imp_drops drops = {0};
+    IMP_TRY(imp__walks_from(m->scene, integrator, IMP_FROM_LIGHTS, &integrator));
+    IMP_TRY(imp__light_walks_allowed(m->scene, m->sensor, integrator, NULL));
+    if (f->n_responses == 0 &&
+        (f->pixel_format == IMP_PIXEL_LUMINANCE_ALPHA ||
+         f->pixel_format == IMP_PIXEL_RGBA || f->pixel_format == IMP_PIXEL_XYZA))
+        IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,
+                           "walks from the lights know no alpha: use pixel_format rgb, "
+                           "xyz or luminance"));
+    if (run->time_limit_s > 0 && run->spp == 0)
+        IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,
+                           "walks from the lights have no time limit; give the samples "
+                           "per pixel"));
+    struct imp_tracer tracer = {.scene = m->scene,
+                                .integrator = integrator,
+                                .sensor = m->sensor,
+                                .seed = run->seed,
+                                .value_only = true};
+    imp__tracer_waves(&tracer, run, 0);
+    tracer.set = 1;
+    const struct imp_light_picture picture = {.tracer = &tracer,
+                                              .run = run,
+                                              .stage = "render",
+                                              .n = m->n,
+                                              .values = measure_values,
+                                              .payload = m,
+                                              .walks =
+                                                  imp__light_walks_of(run, m->sensor)};
+    IMP_TRY(imp__film_describe(ctx, f->crop_w, f->crop_h, m->names, &film));
+    mean = imp__alloc(ctx, values, sizeof *mean);
+    se = imp__alloc(ctx, values, sizeof *se);
+    if (!mean || !se) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a picture"));
+    IMP_TRY(imp__light_picture_make(&picture, mean, se, &drops));
+    if (imp__team_part(ctx) && imp__team_shares(ctx)) IMP_TRY(IMP_PART);
+    IMP_TRY(imp__film_room(film, &film->mean));
+    IMP_TRY(imp__film_room(film, &film->se));
+    for (size_t k = 0; k < values; k++) {
+        film->mean[k] = (float)mean[k];
+        film->se[k] = (float)se[k];
+        if (!isfinite(film->mean[k]))
+            IMP_TRY(
+                imp__error(ctx, IMP_E_NUMERIC, "a pixel of the picture is not finite"));
+    }
+    film->spp = run->spp > 0 ? run->spp : m->sensor->spp;
+    film->drops = drops;
+    film->dropped = imp__drops_total(&drops);
+    *out = film;
+    film = NULL;
+out:
+    imp_film_destroy(film);
+    imp__release(ctx, mean);
+    imp__release(ctx, se);
+    return st;
+}

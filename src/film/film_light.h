@@ -1,0 +1,73 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Pictures by walks from the lights, each of which may reach any pixel. A pixel is
+ *
+ *     I_p = 1/N sum_i c_ip,    c_ip = sum over the reaches of walk i of h(x - x_p) L / H_p
+ *
+ * with the filter h and its integral H_p over the part of the film that is sampled. Walks
+ * are independent, c_ip is 0 in most pixels, and se^2 = (sum c^2 - (sum c)^2/N)/(N (N-1)).
+ *
+ * Order of the sums: the walks are cut into a fixed number of items, each adds its walks up
+ * one by one in a film of its own, and items are added in a fixed binary tree. */
+#ifndef IMP_FILM_LIGHT_H
+#define IMP_FILM_LIGHT_H
+
+#include "base/drops.h"
+#include "film_filter.h"
+#include "walk/light_walk.h"
+
+/* 1/H_p along both axes of a film; a filter no wider than a pixel (box) has 1. */
+struct imp_splat_scale {
+    int margin;            /* sampled beyond the picture on every side */
+    double *across, *down; /* [crop_w], [crop_h]; NULL: box */
+};
+enum imp_status imp__splat_scale_create(imp_context *ctx,
+                                        const struct imp_film_desc *film,
+                                        struct imp_splat_scale *out);
+void imp__splat_scale_destroy(imp_context *ctx, struct imp_splat_scale *s);
+
+/* The pixels that a film position reaches, with weights h/H. */
+struct imp_splat_taps {
+    struct imp_taps across, down; /* n 0: none */
+};
+void imp__splat_taps(const struct imp_film_desc *film,
+                     const struct imp_splat_scale *scale, double px, double py,
+                     struct imp_splat_taps *out);
+
+/* The walks of a picture with the spp of the run; all of them, not of a pixel. */
+static inline int64_t imp__light_walks_of(const struct imp_run *run,
+                                          const struct imp_sensor *sensor)
+{
+    const int64_t spp = run->spp > 0 ? run->spp : sensor->spp;
+    return spp * sensor->film.crop_w * sensor->film.crop_h;
+}
+
+/* What a reach adds to a picture: n values. */
+typedef void imp__reach_values(const void *payload, const struct imp_light_walk *walk,
+                               const struct imp_reach *reach, double *value);
+
+struct imp_light_picture {
+    const struct imp_tracer *tracer;
+    const struct imp_run *run;
+    const char *stage;
+    int n; /* values of a pixel */
+    imp__reach_values *values;
+    /* In place of a picture: n values of a whole walk, whose mean is one pixel. */
+    void (*whole)(const void *payload, const struct imp_light_walk *walk, double *value);
+    const void *payload;
+    int64_t first, walks; /* of the light walks: these numbers */
+    double lo, hi;        /* part of the progress; hi 0: all */
+};
+
+/* mean, se [height][width][n]; se may be NULL. The budget of dropped walks is asked.
+ * @return IMP_OK; IMP_CANCELLED, with nothing; IMP_E_PATHS; IMP_E_NOMEM. */
+enum imp_status imp__light_picture_make(const struct imp_light_picture *picture,
+                                        double *mean, double *se,
+                                        struct imp_drops *drops);
+
+/* The picture of a run (film_render.c). */
+struct imp_measure;
+enum imp_status imp__render_from_lights(const struct imp_measure *measure,
+                                        const struct imp_run *run, imp_film **out);
+
+#endif
