@@ -6,6 +6,7 @@
 #include "base/team.h"
 #include "film/film_filter.h"
 #include "gradient_job.h"
+#include "light_gradient.h"
 #include "loss.h"
 #include "walk/run.h"
 #include <string.h>
@@ -50,8 +51,17 @@ static enum imp_status target_estimate(struct imp_problem *p,
     struct imp__gradient_job j = {
         .problem = p, .totals = totals, .target = target, .want_gradient = want_gradient};
     own.sensor = target->desc.sensor;
-    enum imp_status st = imp__problem_tracer(p, &own, &j.tracer);
+    enum imp_status st = imp__problem_tracer_of_any_end(p, &own, &j.tracer);
     if (st != IMP_OK) return st;
+    if (j.tracer.integrator->from_lights && want_gradient && totals->many)
+        return imp__error(p->ctx, IMP_E_UNSUPPORTED,
+                          "losses of walks from the lights have gradients of at most %d "
+                          "numbers; let walks begin at the sensor",
+                          IMP_TALLY_DENSE);
+    if (j.tracer.integrator->from_lights)
+        return imp__light_objective(
+            p, target, &own, &totals->objective, &totals->variance,
+            want_gradient ? totals->gradient : NULL, totals->gradient_variance);
     if (!want_gradient) j.tracer.active = NULL;
     j.plan = imp__replicates_of(j.tracer.sensor, target, own.spp);
     if (imp__film_border(&j.tracer.sensor->film) > 0)
@@ -166,8 +176,19 @@ enum imp_status imp_problem_reverse(imp_problem *p, const float *seed_image,
         .problem = p, .totals = &totals, .seed = seed_image, .want_gradient = true};
     IMP_TRY(imp__problem_same(p, &own, "reverse"));
     IMP_TRY(imp__totals_begin(p, false, gradient, gradient_se, &totals));
-    IMP_TRY(imp__problem_tracer(p, &own, &j.tracer));
+    IMP_TRY(imp__problem_tracer_of_any_end(p, &own, &j.tracer));
     IMP_TRY(imp__adjoint_check(p, &j.tracer.sensor->film, seed_image, "seed_image"));
+    if (j.tracer.integrator->from_lights) {
+        IMP_TRY(imp__light_reverse(p, &j.tracer, seed_image, &own, &totals));
+        IMP_TRY(imp__totals_share(p, &totals));
+        IMP_TRY(imp__totals_again(p, &totals, &again));
+        if (again) {
+            IMP_TRY(imp__light_reverse(p, &j.tracer, seed_image, &own, &totals));
+            IMP_TRY(imp__totals_share(p, &totals));
+        }
+        imp__totals_end(p, &totals, gradient, gradient_se);
+        goto out;
+    }
     j.plan = imp__replicates_of(j.tracer.sensor, NULL, own.spp);
     if (imp__film_border(&j.tracer.sensor->film) > 0)
         IMP_TRY(splat_prepare(&j, &own, &splat));

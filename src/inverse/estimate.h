@@ -37,6 +37,11 @@ enum imp_status imp__problem_objective(struct imp_problem *p, const double *x,
 /* The tracer of a sensor for this problem, with every reason to refuse checked. */
 enum imp_status imp__problem_tracer(const struct imp_problem *p,
                                     const struct imp_run *run, struct imp_tracer *out);
+/* The same, and walks may begin at the lights: whoever calls it makes those, and takes
+ * frozen collisions for derivatives with respect to extinctions. */
+enum imp_status imp__problem_tracer_of_any_end(const struct imp_problem *p,
+                                               const struct imp_run *run,
+                                               struct imp_tracer *out);
 /* Are all numbers of an adjoint image finite? `name` is the argument's. */
 enum imp_status imp__adjoint_check(const struct imp_problem *problem,
                                    const struct imp_film_desc *film, const float *adjoint,

@@ -20,6 +20,7 @@
 #include "estimate.h"
 #include "film/film_picture.h"
 #include "lanes.h"
+#include "light_gradient.h"
 #include "walk/run.h"
 #include <math.h>
 #include <stdio.h>
@@ -172,7 +173,7 @@ static enum imp_status begin(imp_problem *p, const float *adjoint,
                              double **weights, float **ones)
 {
     imp_context *ctx = p->ctx;
-    const enum imp_status st = imp__problem_tracer(p, run, &f->tracer);
+    const enum imp_status st = imp__problem_tracer_of_any_end(p, run, &f->tracer);
     if (st != IMP_OK) return st;
     f->film = &f->tracer.sensor->film;
     f->channels = p->scene->channels;
@@ -286,7 +287,9 @@ enum imp_status imp_problem_functional(imp_problem *p, const float *adjoint,
     }
     if (value) {
         IMP_TRY(imp__problem_same(p, &own, "functional"));
-        IMP_TRY(picture_value(ctx, &f, weights, &own, &estimate));
+        if (f.tracer.integrator->from_lights)
+            IMP_TRY(imp__light_functional(&f.tracer, f.adjoint, f.norm, &own, &estimate));
+        else IMP_TRY(picture_value(ctx, &f, weights, &own, &estimate));
     }
     if (imp__team_part(ctx)) IMP_TRY(IMP_PART);
     if (value) *value = estimate;
@@ -345,6 +348,9 @@ enum imp_status imp_problem_jacobian_sums(imp_problem *p, const float *adjoint,
     float *ones = NULL;
     int *each = NULL;
     IMP_TRY(begin(p, adjoint, &own, &f, &weights, &ones));
+    if (f.tracer.integrator->from_lights)
+        IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,
+                           "derivative pictures are made by walks from the sensor"));
     for (size_t k = 0; k <= p->n; k++) {
         const imp_film *film = k < p->n ? films[k] : primal;
         if (!film || film->width != f.film->crop_w || film->height != f.film->crop_h ||

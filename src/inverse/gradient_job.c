@@ -3,6 +3,7 @@
 #include "adjoint.h"
 #include "base/team.h"
 #include "film/film_filter.h"
+#include "light_gradient.h"
 #include <string.h>
 
 /* ---- One pixel's replicate ----------------------------------------------------- */
@@ -17,6 +18,10 @@ struct part {
 static double replicate(struct imp__gradient_job *j, struct imp_tile_worker *w, int x,
                         int y, int b)
 {
+    if (imp_unlikely(j->light != NULL)) {
+        imp__light_replicate(j, w, x, y, b);
+        return 0;
+    }
     const int n = j->plan.n;
     struct imp_tally *tally = &j->tallies[w->index];
     const struct imp_arena_mark mark = imp__arena_mark(&w->arena);

@@ -22,6 +22,8 @@ struct imp__gradient_job {
     const struct imp__target *target; /* NULL: fixed adjoint */
     const float *seed;                /* fixed adjoint image, [h][w][channels] */
     const struct imp__splat *splat;   /* wide filters: pass 2; NULL: box */
+    const struct imp__light_adjoints
+        *light; /* of walks from the lights; NULL: not those */
     bool want_gradient;
     /* Set by imp__gradient_job_run. */
     int width, channels;

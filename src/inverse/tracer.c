@@ -5,6 +5,7 @@
 #include "estimate.h"
 #include "film/film_measure.h"
 #include "walk/graded.h"
+#include "walk/light_walk.h"
 #include <string.h>
 
 /* The attached form of the exponent here has neither the gradient of what arrives nor
@@ -51,6 +52,18 @@ static enum imp_status gaps_allowed(const struct imp_problem *p,
 enum imp_status imp__problem_tracer(const struct imp_problem *p,
                                     const struct imp_run *run, struct imp_tracer *out)
 {
+    const enum imp_status st = imp__problem_tracer_of_any_end(p, run, out);
+    if (st != IMP_OK || !out->integrator->from_lights) return st;
+    return imp__error(p->ctx, IMP_E_UNSUPPORTED,
+                      "walks from the lights make pictures, losses, their gradients and "
+                      "those of linear functions, but not this; let walks begin at the "
+                      "sensor");
+}
+
+enum imp_status imp__problem_tracer_of_any_end(const struct imp_problem *p,
+                                               const struct imp_run *run,
+                                               struct imp_tracer *out)
+{
     const struct imp_sensor *sensor;
     enum imp_status st = imp__run_sensor(p->scene, run, &sensor);
     if (st != IMP_OK) return st;
@@ -64,6 +77,17 @@ enum imp_status imp__problem_tracer(const struct imp_problem *p,
         return imp__error(p->ctx, IMP_E_SCENE,
                           "the scene's integrator has no derivative; "
                           "use path, direct or stam");
+    if (run->from != IMP_FROM_SCENE && !imp__walk_integrator_of(p->scene->integrator))
+        return imp__error(p->ctx, IMP_E_UNSUPPORTED,
+                          "integrator %s: the end at which walks begin is asked of "
+                          "integrators of walks alone",
+                          p->scene->integrator->ops->name);
+    st = imp__walks_from(p->scene, integrator, run->from, &integrator);
+    if (st != IMP_OK) return st;
+    if (integrator->from_lights) {
+        st = imp__light_walks_allowed(p->scene, sensor, integrator, &p->active);
+        if (st != IMP_OK) return st;
+    }
     if (integrator->alpha_gradient == IMP_ALPHA_ATTACHED) {
         st = attached_allowed(p->scene);
         if (st != IMP_OK) return st;
@@ -75,7 +99,8 @@ enum imp_status imp__problem_tracer(const struct imp_problem *p,
                                .sensor = sensor,
                                .active = &p->active,
                                .seed = run->seed,
-                               .guide = imp__guide_of(p->scene, integrator, run->guide)};
+                               .guide = imp__guide_of(p->scene, integrator, run->guide),
+                               .collisions_stand = integrator->from_lights};
     if (sensor->film.n_responses > 0 && sensor->film.n_responses != 3)
         return imp__error(p->ctx, IMP_E_UNSUPPORTED,
                           "derivatives and losses are of films with three channels; this "

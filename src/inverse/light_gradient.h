@@ -1,0 +1,62 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Losses and gradients of pictures made by walks from the lights. A walk reaches many
+ * pixels, so that no pixel's walks can be left out of its adjoint: sets of walks take the
+ * place of walks. Groups are of two sets A, B of n walks a pixel each,
+ *
+ *     loss   of a quadratic l:  w/2 (I_A - T)(I_B - T)
+ *     gradient:                 1/2 [ l'(I_A) dI_B + l'(I_B) dI_A ]
+ *
+ * each product of different sets: without bias where l is quadratic. Groups share no walk,
+ * and their spread gives the standard errors (G - 1 degrees of freedom). */
+#ifndef IMP_INVERSE_LIGHT_GRADIENT_H
+#define IMP_INVERSE_LIGHT_GRADIENT_H
+
+#include "estimate.h"
+#include "film/film_light.h"
+#include "totals.h"
+
+#define IMP_LIGHT_GROUPS 8 /* most of a loss */
+
+struct imp_tile_worker;
+struct imp__gradient_job;
+
+/* Adjoints of light walks: replicate b of a job has image b % n_images. */
+struct imp__light_adjoints {
+    const struct imp_film_desc *film;
+    int channels;
+    const struct imp_splat_scale *scale;
+    int64_t first; /* number of the first walk */
+    int n_images;
+    const double *image[2]; /* [crop_h][crop_w][channels] */
+};
+
+/* The walks of replicate b of a pixel, swept (gradient_job.c). Pixels only number walks:
+ * walk i of pixel q in replicate b is first + (b n + i) pixels + q. */
+void imp__light_replicate(struct imp__gradient_job *job, struct imp_tile_worker *worker,
+                          int x, int y, int b);
+
+/* imp_problem_reverse; adds to the totals, which are to be shared and ended. */
+enum imp_status imp__light_reverse(struct imp_problem *p, const struct imp_tracer *tracer,
+                                   const float *adjoint, const struct imp_run *run,
+                                   struct imp__totals *totals);
+/* Loss of one target: adds value and variance to *objective and *variance, and to gradient
+ * and gradient_variance [n], which may be NULL. */
+enum imp_status imp__light_objective(struct imp_problem *p,
+                                     const struct imp__target *target,
+                                     const struct imp_run *run, double *objective,
+                                     double *variance, double *gradient,
+                                     double *gradient_variance);
+/* F = sum of adjoint times picture, over norm. */
+enum imp_status imp__light_functional(const struct imp_tracer *tracer,
+                                      const float *adjoint, double norm,
+                                      const struct imp_run *run,
+                                      struct imp_estimate *value);
+
+/* Groups of two sets of n walks a pixel. */
+struct imp__light_plan {
+    int groups, n;
+};
+struct imp__light_plan imp__light_plan_of(const struct imp_sensor *sensor, int spp);
+
+#endif
