@@ -23,6 +23,7 @@ static const char *const mode_words[] = {"rgb", "mono", "spectral", "single", NU
 static const char *const wavelength_words[] = {"stratified", "independent", "importance",
                                                NULL};
 static const char *const files_words[] = {"broadcast", "shared", NULL};
+static const char *const from_words[] = {"scene", "sensor", "lights", NULL};
 static const char *const progress_words[] = {"auto", "always", "never", NULL};
 
 const struct arg_option options_file[] = {{ARG_TEXT, 'o', "output", "FILE",
@@ -95,6 +96,10 @@ const struct arg_option options_run[] = {
     {ARG_TEXT, 0, "display", "HOST:PORT",
      "show pictures in a viewer that listens there (tev: port 14158)", &cli.display, 0, 0,
      NULL},
+    {ARG_CHOICE, 0, "from", "END",
+     "end at which walks begin: scene (as its integrator says, default), sensor or "
+     "lights",
+     &cli.from, 0, 0, from_words},
     {0}};
 
 const struct arg_option options_guide[] = {
@@ -358,6 +363,7 @@ struct imp_run cli_run(void)
     run.guide = cli.guiding;
     run.wavelengths = (enum imp_wavelength_sampling)cli.wavelengths;
     run.wavelength_set = cli.wavelength_set;
+    run.from = (enum imp_from)cli.from;
     return run;
 }
 int cli_spp(const struct imp_run *run)
