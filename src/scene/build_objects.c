@@ -384,6 +384,9 @@ enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node
     int unit;
     IMP_TRY(imp_build_choice(&b, "units", units, 2, 0, &unit));
     s->photometric = unit == 1;
+    if (s->photometric && imp__is_spectral(scene->mode))
+        IMP_TRY(imp_build_error(&b, "units", IMP_E_UNSUPPORTED,
+                                "photometric units are those of rgb and mono modes"));
     IMP_TRY(ops->build(&b, self, s)); /* needs the film's shape */
     struct imp_node *medium = medium_child(node);
     if (medium) IMP_TRY(imp__build_medium(scene, medium, name, "medium", &s->medium));

@@ -332,23 +332,21 @@ static void shading_normals(void)
 /* ---- Everything at once ----------------------------------------------------------- */
 
 #define ROOM                                                                             \
-    "<shape type='cube'>" AT("<scale value='2'/>") "<boolean name='flip_normals' "       \
-                                                   "value='true'/>" DIFFUSE(             \
-                                                       ".6,.5,.4") "</shape>"            \
-                                                                   "<shape "             \
-                                                                   "type='rectangle'"    \
-                                                                   ">" AT(               \
-                                                                       "<scale x='.6' "  \
-                                                                       "y='.6'/"         \
-                                                                       "><rotate x='1' " \
-                                                                       "angle='90'/>"    \
-                                                                       "<translate "     \
-                                                                       "y='1.95'/>")     \
-                                                                       LAMP(             \
-                                                                           "5,4,3") "</" \
-                                                                                    "sh" \
-                                                                                    "ap" \
-                                                                                    "e>"
+    "<shape type='cube'>" AT(                                                            \
+        "<scale value='2'/>") "<boolean name='flip_normals' "                            \
+                              "value='true'/>" DIFFUSE(                                  \
+                                  ".6,.5,.4") "</shape>"                                 \
+                                              "<shape "                                  \
+                                              "type='rectangle'"                         \
+                                              ">" AT("<scale x='.6' "                    \
+                                                     "y='.6'/"                           \
+                                                     "><rotate x='1' "                   \
+                                                     "angle='90'/>"                      \
+                                                     "<translate "                       \
+                                                     "y='1.95'/>") LAMP("5,4,3") "</"    \
+                                                                                 "sh"    \
+                                                                                 "ap"    \
+                                                                                 "e>"
 #define BALL(x, bsdf)                                                                    \
     "<shape type='sphere'><float name='radius' value='.6'/><point name='center' "        \
     "value='" x "'/>" bsdf "</shape>"
