@@ -23,6 +23,7 @@
 
 /* Luminance of linear sRGB, as the scene format defines it (section 2). */
 static const double luminance[3] = {0.212671, 0.715160, 0.072169};
+const double *const picture_luminance = luminance;
 
 /* ---- Files --------------------------------------------------------------------- */
 
@@ -313,6 +314,55 @@ int picture_sensor(const char *spec)
     return at ? atoi(at + 1) : -1;
 }
 
+/* "=V", "=V,V,V" or either with "+-SE": the reading of a sensor of one pixel. */
+static int number_target(const char *text, int sensor, struct imp_target *target)
+{
+    struct imp_sensor_info info = {.size = sizeof info};
+    struct imp_scene_info scene = {.size = sizeof scene};
+    double value[3], se = 0;
+    int n = 0, fine = 0;
+    imp_scene_get_info(cli.scene, &scene);
+    const enum imp_status st = imp_scene_get_sensor(cli.scene, sensor, &info);
+    if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+    for (const char *p = text + 1; n < 3;) {
+        char *end;
+        value[n++] = strtod(p, &end);
+        if (end == p) break;
+        p = end + 1;
+        if (*end == ',') continue;
+        fine = !*end;
+        if (!strncmp(end, "+-", 2)) {
+            se = strtod(end + 2, &end);
+            fine = !*end && se > 0;
+        }
+        break;
+    }
+    if (!fine || (n != 1 && n != scene.channels))
+        return cli_error(
+            EXIT_USAGE,
+            "--target %s: expected =NUMBER, or =R,G,B, and +-ERROR behind it "
+            "if that is known",
+            text);
+    if (info.width != 1 || info.height != 1)
+        return cli_error(
+            EXIT_USAGE,
+            "--target %s: sensor %d ('%s') makes %d x %d pixels; a number is "
+            "the target of one",
+            text, sensor, info.name, info.width, info.height);
+    float *pixels = cli_alloc((size_t)n, sizeof *pixels);
+    float *errors = se > 0 ? cli_alloc((size_t)n, sizeof *errors) : NULL;
+    for (int k = 0; k < n; k++) {
+        pixels[k] = (float)value[k];
+        if (errors) errors[k] = (float)se;
+    }
+    target->sensor = sensor;
+    target->width = target->height = 1;
+    target->channels = n;
+    target->pixels = pixels;
+    target->noise_se = errors;
+    return 0;
+}
+
 int picture_target(const char *spec, const char *mask, struct imp_target *target)
 {
     struct imp_film_info info = {.size = sizeof info},
@@ -323,7 +373,13 @@ int picture_target(const char *spec, const char *mask, struct imp_target *target
     const char *at = sensor_part(spec);
     char *path = at ? strndup(spec, (size_t)(at - spec)) : strdup(spec);
     if (!path) return cli_error(EXIT_RUN, "out of memory");
-    int rc = picture_read(path, &film);
+    int rc = 0;
+    if (*path == '=') {
+        rc = mask ? cli_error(EXIT_USAGE, "--target %s: a number has no mask", spec)
+                  : number_target(path, at ? picture_sensor(spec) : cli.sensor, target);
+        goto out;
+    }
+    rc = picture_read(path, &film);
     if (rc) goto out;
     imp_scene_get_info(cli.scene, &scene);
     imp_film_get_info(film, &info);

@@ -31,7 +31,11 @@ int picture_sensor(const char *spec);
 /* The value of full red in a signed picture's preview: 99.5 % of the pixels are below. */
 double picture_range(imp_film *film);
 
-/* A target for a loss: "FILE[@N]", with an optional mask file (NULL: none). Without @N
+/* Weights of R, G and B in the luminance [3]. */
+extern const double *const picture_luminance;
+
+/* A target for a loss: "FILE[@N]", with an optional mask file (NULL: none), or "=V[@N]",
+ * the reading of a sensor of one pixel. Without @N
  * the caller sets target->sensor. Pixels are brought to the scene's channels: its R, G,
  * B, or its Y, or in mono mode their luminance. target->pixels, weights and noise_se are
  * to be freed. */

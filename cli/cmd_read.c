@@ -1,0 +1,211 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * importon read: the numbers of a scene's sensors, means over their films, with standard
+ * errors, units and derivatives; from either end, or from both to compare them. */
+#include "cmd_picture.h"
+#include "cmd_problem.h"
+#include "command.h"
+#include "progress.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define APART 5 /* standard errors between the ends that chance does not explain */
+
+static struct {
+    int ends;
+} o;
+
+static const struct arg_option options[] = {
+    {ARG_FLAG, 0, "ends", NULL,
+     "read from both ends, and compare: exit status 1 if they differ", &o.ends, 0, 0,
+     NULL},
+    {0}};
+
+struct reading {
+    struct imp_estimate value;
+    double *grad, *se; /* NULL: no derivatives are asked for */
+};
+
+/* Adjoint of the mean over the film of one channel, or of the luminance (channel -1). */
+static float *adjoint_of(const struct imp_sensor_info *sensor, int channels, int channel)
+{
+    const size_t pixels = (size_t)sensor->width * (size_t)sensor->height;
+    float *a = cli_alloc(pixels * (size_t)channels, sizeof *a);
+    for (size_t p = 0; p < pixels; p++)
+        for (int c = 0; c < channels; c++)
+            a[p * (size_t)channels + (size_t)c] =
+                (float)((channel == c                   ? 1
+                         : channel < 0 && channels == 1 ? 1
+                         : channel < 0                  ? picture_luminance[c]
+                                                        : 0) /
+                        (double)pixels);
+    return a;
+}
+
+static void print_number(struct json *j, const char *key, double value, double se)
+{
+    json_object(j, key);
+    json_number(j, "value", value);
+    json_number(j, "se", se);
+    json_end_object(j);
+}
+
+static void print_derivatives(const struct block *blocks, size_t n_blocks,
+                              const struct reading *r, const char *unit)
+{
+    for (size_t b = 0; b < n_blocks; b++)
+        for (size_t k = 0; k < blocks[b].n && !block_is_large(&blocks[b]); k++) {
+            char name[256];
+            const size_t at = blocks[b].first + k;
+            cli_number_row(&blocks[b].info, k, name, sizeof name);
+            printf("    d/d %-28s %-12.6g +- %-8.2g %s / (%s)\n", name, r->grad[at],
+                   r->se[at], unit, blocks[b].info.unit);
+        }
+}
+
+static void json_derivatives(struct json *j, const struct block *blocks, size_t n_blocks,
+                             const struct reading *r)
+{
+    json_array(j, "derivatives");
+    for (size_t b = 0; b < n_blocks; b++) {
+        block_json(j, &blocks[b]);
+        json_numbers(j, "grad", blocks[b].n, r->grad + blocks[b].first);
+        json_numbers(j, "se", blocks[b].n, r->se + blocks[b].first);
+        json_end_object(j);
+    }
+    json_end_array(j);
+}
+
+/* One number of one sensor; *apart: do the ends differ? */
+static int number_read(imp_problem *problem, struct json *j, struct imp_run run,
+                       const struct imp_sensor_info *info, const char *channel,
+                       const float *adjoint, const struct block *blocks, size_t n_blocks,
+                       int *apart)
+{
+    const size_t n = n_blocks ? imp_problem_n(problem) : 0;
+    struct reading r = {.grad = n ? cli_alloc(n, sizeof(double)) : NULL,
+                        .se = n ? cli_alloc(n, sizeof(double)) : NULL};
+    struct imp_estimate other = {0, 0, 0};
+    int rc = 0;
+    if (o.ends) run.from = IMP_FROM_SENSOR;
+    enum imp_status st =
+        imp_problem_functional(problem, adjoint, &run, &r.value, r.grad, r.se);
+    if (st == IMP_OK && o.ends) {
+        run.from = IMP_FROM_LIGHTS;
+        st = imp_problem_functional(problem, adjoint, &run, &other, NULL, NULL);
+    }
+    if (st != IMP_OK) {
+        rc = cli_fail(st, cli.scene_path);
+        goto out;
+    }
+    const double both = hypot(r.value.se, other.se);
+    const double z = both > 0                       ? (other.value - r.value.value) / both
+                     : other.value == r.value.value ? 0
+                                                    : INFINITY;
+    if (o.ends) *apart |= !(fabs(z) <= APART);
+    if (cli.json) {
+        json_object(j, NULL);
+        json_text(j, "sensor", info->name);
+        json_text(j, "channel", channel);
+        json_text(j, "unit", info->unit);
+        json_number(j, "value", r.value.value);
+        json_number(j, "se", r.value.se);
+        if (o.ends) {
+            print_number(j, "from_lights", other.value, other.se);
+            json_number(j, "z", z);
+        }
+        if (n) json_derivatives(j, blocks, n_blocks, &r);
+        json_end_object(j);
+    } else {
+        printf("%-20s %-3s %-12.6g +- %-8.2g %s", info->name, channel, r.value.value,
+               r.value.se, info->unit);
+        if (o.ends)
+            printf("   from the lights %-12.6g +- %-8.2g z %.1f", other.value, other.se,
+                   z);
+        printf("\n");
+        if (n) print_derivatives(blocks, n_blocks, &r, info->unit);
+    }
+out:
+    free(r.grad);
+    free(r.se);
+    return rc;
+}
+
+static int sensor_read(imp_problem *problem, struct json *j, struct imp_run run,
+                       const struct block *blocks, size_t n_blocks, int *apart)
+{
+    static const char *const names[] = {"R", "G", "B"};
+    struct imp_sensor_info info = {.size = sizeof info};
+    struct imp_scene_info scene = {.size = sizeof scene};
+    imp_scene_get_info(cli.scene, &scene);
+    const enum imp_status st = imp_scene_get_sensor(cli.scene, run.sensor, &info);
+    if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+    const int luminous = strchr("lc", info.unit[0]) != NULL; /* lx, cd m^-2 */
+    const int one = luminous || scene.channels == 1;
+    int rc = 0;
+    for (int c = 0; c < (one ? 1 : scene.channels) && !rc; c++) {
+        float *adjoint = adjoint_of(&info, scene.channels, one ? -1 : c);
+        rc = number_read(problem, j, run, &info, one ? "Y" : names[c], adjoint, blocks,
+                         n_blocks, apart);
+        free(adjoint);
+    }
+    return rc;
+}
+
+static int run_read(int n, char **operand)
+{
+    struct imp_scene_info scene = {.size = sizeof scene};
+    struct block *blocks = NULL;
+    size_t n_blocks = 0;
+    imp_problem *problem = NULL;
+    int apart = 0;
+    (void)n;
+    int rc = cli_load(operand[0]);
+    if (rc) return rc;
+    struct imp_run run = cli_run();
+    imp_scene_get_info(cli.scene, &scene);
+    if (cli.time_s > 0)
+        return cli_error(EXIT_USAGE, "read takes --spp samples, and has no --time");
+    if (o.ends && cli.from)
+        return cli_error(EXIT_USAGE, "--ends reads from both: it goes without --from");
+    const enum imp_status st = imp_problem_create(cli.scene, &problem);
+    if (st != IMP_OK) return cli_fail(st, NULL);
+    if (problem_options.params.n) {
+        imp_problem_destroy(problem);
+        rc = problem_open(&problem);
+        if (rc) return rc;
+        blocks = problem_blocks(problem, &n_blocks);
+    }
+    struct json j;
+    if (cli.json) {
+        j = cli_json();
+        json_integer(&j, "spp", cli_spp(&run));
+        json_array(&j, "readings");
+    }
+    for (int s = 0; s < scene.n_sensors && !rc; s++) {
+        run.sensor = s;
+        rc = sensor_read(problem, &j, run, blocks, n_blocks, &apart);
+    }
+    if (cli.json && !rc) {
+        json_end_array(&j);
+        cli_json_end(&j);
+    }
+    free(blocks);
+    problem_close(problem);
+    if (rc) return rc;
+    return apart ? EXIT_NO : cli_done();
+}
+
+const struct command command_read = {
+    {"read",
+     "SCENE",
+     "the readings of all sensors, with units, errors and derivatives",
+     {options, options_params, options_run, options_scene, options_file, options_general},
+     1,
+     1},
+    run_read,
+    1,
+    NULL,
+    0};

@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: Apache-2.0
+# What has one end, or cannot be reached, is refused by name.
+furnace="$ROOT/scenes/furnace.xml"
+importon read "$ROOT/scenes/desk.xml" --ends --from lights
+importon render "$ROOT/scenes/stam.xml" --from lights -o a.exr
+importon jacobian "$ROOT/scenes/cornell.xml" -D res=4 --from lights -o J
+cat >ray.xml <<'X'
+<scene version="3.0.0"><integrator type="ptracer"/><sensor type="radiancemeter"><film type="hdrfilm">
+<integer name="width" value="1"/><integer name="height" value="1"/></film></sensor>
+<shape type="sphere"><emitter type="area"/></shape></scene>
+X
+importon read ray.xml
+cat >stray.xml <<'X'
+<scene version="3.0.0"><integrator type="path"/><sensor type="irradiancemeter"/></scene>
+X
+importon read stray.xml
+cat >large.xml <<'X'
+<scene version="3.0.0"><integrator type="path"/><shape type="sphere"><sensor type="irradiancemeter"/></shape></scene>
+X
+importon read large.xml
+importon fit "$ROOT/scenes/desk.xml" -T =@0 -o F
+importon fit "$ROOT/scenes/desk.xml" -D nx=2 -T =3@0 -o F
+true
