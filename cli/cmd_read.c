@@ -166,6 +166,8 @@ static int run_read(int n, char **operand)
     if (rc) return rc;
     struct imp_run run = cli_run();
     imp_scene_get_info(cli.scene, &scene);
+    if (scene.n_sensors == 0)
+        return cli_error(EXIT_USAGE, "%s: there is no sensor in it", cli.scene_path);
     if (cli.time_s > 0)
         return cli_error(EXIT_USAGE, "read takes --spp samples, and has no --time");
     if (o.ends && cli.from)

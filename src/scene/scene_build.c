@@ -53,6 +53,9 @@ static enum imp_status top_build(struct imp_scene *scene, struct imp_child *chil
         if (!node->object) IMP_TRY(imp__build_shape(scene, node, name));
     } else if (strcmp(tag, "sensor") == 0) {
         if (!node->object) IMP_TRY(imp__build_sensor(scene, node, name, NULL));
+        if (!node->object && !node->id)
+            IMP_TRY(imp__node_error(scene->ctx, node, IMP_E_SCENE,
+                                    "it must be inside a shape"));
     } else if (strcmp(tag, "bsdf") == 0) {
         struct imp_bsdf *b;
         node->id = name;

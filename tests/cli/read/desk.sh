@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 # Lux from both ends, with a derivative: twice the lamp, twice its part of the light.
-importon read "$ROOT/scenes/desk.xml" -m mono --spp 20000 --ends -p 'batwing.scale' -p 'downlight.scale' --json \
+importon read "$ROOT/scenes/desk.xml" -m mono --spp 20000 --ends -p 'batwing.scale.value' -p 'downlight.scale.value' --json \
     >answer.json || exit 9
 python3 - <<'END'
 import json

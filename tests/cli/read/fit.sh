@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # A number is a target: the pendant is dimmed until the desk has 400 lx.
-importon fit "$ROOT/scenes/desk.xml" -m mono --spp 2000 -p batwing.scale -T =400+-1@0 -q -o F >/dev/null || exit 9
-importon read "$ROOT/scenes/desk.xml" -m mono --spp 20000 --set @F/params.txt --json >answer.json 2>/dev/null ||
+importon fit "$ROOT/scenes/desk.xml" -m mono --spp 2000 -p batwing.scale.value -T =400+-1@0 -q -o F >/dev/null || exit 9
+importon read "$ROOT/scenes/desk.xml" -m mono --spp 20000 --set @F/recovered.txt --json >answer.json 2>/dev/null ||
     { ls F >&2; exit 8; }
 python3 - <<'END'
 import json
