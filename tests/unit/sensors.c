@@ -97,6 +97,13 @@ static void fields_of_view(void)
 }
 
 /* Section 9 in numbers: direction or origin in local coordinates, then to_world. */
+/* Sensors on surfaces and of far light are none. */
+static bool is_camera(const struct imp_sensor_ops *ops)
+{
+    return !strcmp(ops->name, "perspective") || !strcmp(ops->name, "thinlens") ||
+           !strcmp(ops->name, "orthographic");
+}
+
 static void rays(void)
 {
     const int w = 640, h = 360;
@@ -106,6 +113,7 @@ static void rays(void)
         return;
     for (int kind = 0; imp__sensor_kinds[kind]; kind++) {
         const char *type = imp__sensor_kinds[kind]->name;
+        if (!is_camera(imp__sensor_kinds[kind])) continue;
         const int perspective = strcmp(type, "perspective") == 0;
         const int ortho = strcmp(type, "orthographic") == 0;
         struct imp_mat4 m = look;
@@ -187,6 +195,7 @@ static void sensor_errors(void)
     struct imp_node *n;
     for (int kind = 0; imp__sensor_kinds[kind]; kind++) {
         const char *type = imp__sensor_kinds[kind]->name;
+        if (!is_camera(imp__sensor_kinds[kind])) continue;
         const int ortho = strcmp(type, "orthographic") == 0;
         static const struct {
             const char *name, *words;
