@@ -10,6 +10,7 @@
 #include "output.h"
 #include "plot.h"
 #include "progress.h"
+#include "proof.h"
 #include "ranks.h"
 
 #include <errno.h>
@@ -292,26 +293,44 @@ static int answer(imp_problem *problem, const struct imp_fit_result *r,
     return rc;
 }
 
+/* Besides pictures. */
+static const struct {
+    const char *name;
+    enum output_kind kind;
+} outputs[] = {{"loss.csv", OUTPUT_TABLE},
+               {"loss.svg", OUTPUT_CURVE},
+               {"parameters.json", OUTPUT_JSON},
+               {"recovered.txt", OUTPUT_SETTINGS}};
+
 /* May everything be written? A checkpoint is begun over, or gone on from, when that is
  * said. */
 static int writable(const struct block *blocks, size_t n_blocks)
 {
-    static const struct {
-        const char *name;
-        enum output_kind kind;
-    } files[] = {{"loss.csv", OUTPUT_TABLE},
-                 {"loss.svg", OUTPUT_CURVE},
-                 {"parameters.json", OUTPUT_JSON},
-                 {"recovered.txt", OUTPUT_SETTINGS}};
     int rc = checkpoint_writable(o.checkpoint, o.resume);
     if (rc || !cli.out) return rc;
     rc = make_folder(cli.out);
-    for (size_t k = 0; k < sizeof files / sizeof *files && !rc; k++)
-        rc = overwrite_check_in(cli.out, files[k].name, files[k].kind);
+    for (size_t k = 0; k < sizeof outputs / sizeof *outputs && !rc; k++)
+        rc = overwrite_check_in(cli.out, outputs[k].name, outputs[k].kind);
     if (!rc) rc = fit_pictures_writable();
     for (size_t k = 0; k < n_blocks && !rc; k++)
         if (block_is_large(&blocks[k])) rc = block_writable(&blocks[k], cli.out);
     if (!rc && o.sheet) rc = picture_writable(o.sheet, 0);
+    return rc;
+}
+
+/* The numbers that were found, for the manifest. */
+static int note_results(const imp_problem *problem, const struct imp_fit_result *r)
+{
+    const size_t n = imp_problem_n(problem);
+    if (!cli.manifest) return 0;
+    double *x = cli_alloc(3 * n, sizeof *x);
+    for (size_t i = 0; i < n; i++) {
+        const struct imp_fit_variable v = variable_at(problem, i);
+        x[i] = v.value, x[n + i] = v.lo95, x[2 * n + i] = v.hi95;
+    }
+    int rc = manifest_numbers("parameters", x, 3 * n);
+    if (!rc) rc = manifest_numbers("losses", r->history, r->n_history);
+    free(x);
     return rc;
 }
 
@@ -348,15 +367,23 @@ static int run_fit(int n, char **operand)
     if (!rc && cli.out) rc = fit_pictures_write("before", o.picture_spp);
     if (!rc) {
         const struct imp_run run = cli_run();
-        const enum imp_status st = imp_fit(problem, &fit, &run, &result);
+        rc = manifest_begin();
+        const enum imp_status st = rc ? IMP_OK : imp_fit(problem, &fit, &run, &result);
         /* a checkpoint that cannot be written names itself */
         if (cli_failed(st)) rc = cli_fail(st, st == IMP_E_IO ? NULL : cli.scene_path);
+        if (!rc) rc = manifest_pause();
+        if (!rc && result) rc = note_results(problem, result);
     }
-    if (!rc && result) rc = answer(problem, result, blocks, n_blocks);
+    if (!rc && result && !cli.verifies) rc = answer(problem, result, blocks, n_blocks);
     if (!rc && result && cli.out) {
         progress_resume(); /* after Ctrl-C the state reached is still written */
         rc = fit_pictures_write("recovered", o.picture_spp);
         if (!rc && o.sheet) rc = fit_sheet_write(o.sheet);
+    }
+    for (size_t k = 0; k < sizeof outputs / sizeof *outputs && !rc && cli.out; k++) {
+        char *path = join_path(cli.out, outputs[k].name);
+        rc = manifest_output(path);
+        free(path);
     }
     free(blocks);
     problem_close(problem);

@@ -8,6 +8,7 @@
 #include "cmd_problem.h"
 #include "command.h"
 #include "progress.h"
+#include "proof.h"
 #include "ranks.h"
 
 #include <math.h>
@@ -268,7 +269,12 @@ static int run_gradient(int n, char **operand)
     if (textures) rc = make_folder(textures);
     for (size_t k = 0; k < n_blocks && !rc && textures; k++)
         if (block_is_large(&blocks[k])) rc = block_writable(&blocks[k], textures);
+    if (!rc) rc = manifest_begin();
     if (!rc) rc = compute(problem, &run, &r);
+    if (!rc) rc = manifest_pause();
+    if (!rc) rc = manifest_numbers("value", (double[2]){r.value.value, r.value.se}, 2);
+    if (!rc) rc = manifest_numbers("gradient", r.grad, n_x);
+    if (!rc) rc = manifest_numbers("errors of the gradient", r.se, n_x);
     for (size_t k = 0; k < n_blocks && !rc && textures; k++)
         if (block_is_large(&blocks[k]))
             rc = block_write(&blocks[k], r.grad, r.se, textures, &paths[k]);

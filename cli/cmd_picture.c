@@ -7,7 +7,6 @@
 #include "command.h"
 #include "display.h"
 #include "overwrite.h"
-#include "ranks.h"
 
 #include <ctype.h>
 #include <errno.h>
@@ -37,7 +36,7 @@ char *join_path(const char *folder, const char *name)
 
 int make_folder(const char *path)
 {
-    if (!ranks_first()) return 0;
+    if (!cli_writes()) return 0;
     char *copy = strdup(path);
     int rc = 0;
     if (!copy) return cli_error(EXIT_RUN, "out of memory");
@@ -163,6 +162,7 @@ static int write_to_stdout(const imp_film *film, const struct imp_write_options 
 int picture_write(const imp_film *film, const char *path, const struct picture_options *o)
 {
     struct imp_write_options options = IMP_WRITE_OPTIONS_INIT;
+    if (cli.verifies) return 0;
     options.half = o->half;
     options.standard_error = o->standard_error;
     options.exposure = o->exposure;

@@ -6,6 +6,7 @@
 #include "display.h"
 #include "output.h"
 #include "progress.h"
+#include "proof.h"
 
 #include <errno.h>
 #include <limits.h>
@@ -177,17 +178,26 @@ static int run_render(int n, char **operand)
     const char *path = cli.out ? cli.out : automatic;
     rc = picture_writable(path, !o.picture.no_preview);
     if (!rc) {
-        if (cli.display) {
+        if (cli.display && cli_writes()) {
             run.preview = display_preview;
             run.preview_payload = (void *)(uintptr_t)path;
         }
-        const enum imp_status st = imp_render(cli.scene, &run, &film);
+        rc = manifest_begin();
+        const enum imp_status st = rc ? IMP_OK : imp_render(cli.scene, &run, &film);
         if (cli_failed(st)) rc = cli_fail(st, cli.scene_path);
+        if (!rc) rc = manifest_pause();
+        if (!rc && film) rc = manifest_film("picture", film);
+    }
+    if (cli.verifies) {
+        imp_film_destroy(film);
+        free(automatic);
+        return rc ? rc : cli_done();
     }
     if (!film && !rc) cli_say("interrupted in the first pass: no picture is written");
     if (film && !rc) {
         picture_stamp(film, &run);
         rc = picture_write(film, path, &o.picture);
+        if (!rc) rc = manifest_output(path);
         if (!rc) report(path, film, &run);
     }
     imp_film_destroy(film);

@@ -7,6 +7,7 @@
 #include "display.h"
 #include "part.h"
 #include "progress.h"
+#include "proof.h"
 #include "ranks.h"
 #include "settings.h"
 
@@ -84,6 +85,9 @@ const struct arg_option options_run[] = {
     {ARG_TEXT, 0, "part", "I/N",
      "compute part I of N (from 1), to the file of -o; 'importon merge' makes the whole",
      &cli.part, 0, 0, NULL},
+    {ARG_TEXT, 0, "manifest", "FILE",
+     "write what 'importon verify' needs to prove the result (render, gradient, fit)",
+     &cli.manifest_path, 0, 0, NULL},
     {ARG_CHOICE, 0, "mpi-files", "HOW",
      "with mpirun: broadcast (default: rank 0 reads files for all) or shared (each does)",
      &cli.mpi_files, 0, 0, files_words},
@@ -229,8 +233,11 @@ int cli_open(void)
     const enum imp_status st = imp_context_create(&options, &cli.context);
     if (st != IMP_OK) return cli_fail(st, NULL);
     const int rc = ranks_open(cli.context);
-    return rc ? rc : part_open();
+    if (!rc) return cli.part ? part_open() : manifest_open();
+    return rc;
 }
+
+int cli_writes(void) { return ranks_first() && !cli.verifies; }
 
 /* Cut "a;b;c" into a list; the text lives as long as the process. */
 static void split_search(const char *paths, struct arg_list *list)
@@ -347,6 +354,7 @@ void cli_close(void)
     imp_elements_destroy(cli.elements);
     imp_scene_destroy(cli.scene);
     imp_parts_destroy(cli.parts);
+    imp_manifest_destroy(cli.manifest);
     imp_context_destroy(cli.context);
     args_list_free(&cli.defines);
     args_list_free(&cli.sets);

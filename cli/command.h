@@ -31,7 +31,7 @@ struct command {
 extern const struct command command_render, command_gradient, command_jacobian,
     command_check, command_selftest, command_fit, command_compare, command_info,
     command_bench, command_bend, command_elements, command_envmap, command_merge,
-    command_report, command_read;
+    command_report, command_read, command_verify;
 
 /* Option tables, to be named in args_spec.group. -o is a file, or a folder for commands
  * that write several files. */
@@ -58,6 +58,9 @@ struct cli {
     int sensor, spp;
     uint64_t seed;
     double time_s;
+    const char *manifest_path;
+    imp_manifest *manifest;      /* in the making, or what is verified */
+    int verifies;                /* results are compared, and not written */
     int mpi_files;               /* how ranks read files: as it is written */
     const char *part, *part_out; /* "I/N", and where it goes */
     imp_parts *parts;            /* the part in the making, or those that are merged */
@@ -77,6 +80,9 @@ extern struct cli cli;
 
 /* Run a command as if typed: argv[0] is its name. Returns an exit code. */
 int cli_run_command(int argc, char **argv);
+
+/* Does this process print answers and write files? */
+int cli_writes(void);
 
 /* Make the context, unless there is one. 0, or an exit code with the reason printed. */
 int cli_open(void);

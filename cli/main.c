@@ -6,6 +6,7 @@
 #include "output.h"
 #include "part.h"
 #include "progress.h"
+#include "proof.h"
 #include "ranks.h"
 
 #include <errno.h>
@@ -19,7 +20,7 @@ static const struct command *const commands[] = {
     &command_render,   &command_gradient, &command_jacobian, &command_check,
     &command_selftest, &command_fit,      &command_compare,  &command_info,
     &command_bend,     &command_bench,    &command_elements, &command_envmap,
-    &command_merge,    &command_report,   &command_read};
+    &command_merge,    &command_report,   &command_read,     &command_verify};
 #define N_COMMANDS (sizeof commands / sizeof *commands)
 
 static void print_usage(FILE *to)
@@ -102,7 +103,7 @@ int cli_run_command(int argc, char **argv)
     cli.operand = argv + first;
     for (int i = first; rc == 0 && i < argc; i++) overwrite_protect(argv[i]);
     if (rc == 0) rc = part_begin();
-    if (rc == 0 && command->prints) rc = cli_redirect();
+    if (rc == 0 && command->prints && !cli.verifies) rc = cli_redirect();
     if (rc == 0) {
         ranks_heard();
         progress_init(cli.quiet || !ranks_first() ? PROGRESS_NEVER
@@ -137,6 +138,7 @@ int main(int argc, char **argv)
         return finish(rc);
     }
     rc = cli_run_command(argc - 1, argv + 1);
+    rc = manifest_end(finish(rc == EXIT_STOP ? EXIT_DONE : rc));
     cli_close();
-    return ranks_close(finish(rc == EXIT_STOP ? EXIT_DONE : rc));
+    return ranks_close(rc);
 }

@@ -5,7 +5,6 @@
 #include "output.h"
 
 #include "command.h"
-#include "ranks.h"
 
 #include <errno.h>
 #include <limits.h>
@@ -33,7 +32,7 @@ int output_open(struct output *o, const char *path, enum output_kind kind)
     *o = (struct output){.path = path};
     const int rc = overwrite_check(path, kind);
     if (rc) return rc;
-    if (!ranks_first()) path = "/dev/null";
+    if (!cli_writes()) path = "/dev/null";
     if (!strcmp(path, "-")) {
         o->file = stdout;
         return 0;

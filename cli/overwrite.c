@@ -26,6 +26,7 @@ static const struct {
     [OUTPUT_CHECKPOINT] = {"a checkpoint", {"importon checkpoint "}, NULL},
     [OUTPUT_SOLUTION] = {"a saved solution", {"IMPELEM"}, NULL},
     [OUTPUT_PART] = {"a part of a run", {"impparts"}, NULL},
+    [OUTPUT_MANIFEST] = {"a manifest", {"impproof"}, NULL},
     [OUTPUT_SETTINGS] = {"a list of settings (ID=VALUE)", {NULL}, NULL},
     [OUTPUT_TABLE] = {"a table of importon's",
                       {"iteration,loss,se\n", "evaluation,objective\n", "ray,bundle,x,y,",
@@ -127,7 +128,7 @@ static int folder_check(const char *path)
 int overwrite_check(const char *path, enum output_kind kind)
 {
     struct stat info;
-    if (!strcmp(path, "-") || !ranks_first()) return 0;
+    if (!strcmp(path, "-") || !cli_writes()) return 0;
     if (stat(path, &info) != 0) return folder_check(path);
     if (S_ISDIR(info.st_mode)) return cannot(path, EISDIR);
     if (!S_ISREG(info.st_mode)) return 0;

@@ -12,6 +12,7 @@ enum output_kind {
     OUTPUT_CHECKPOINT,
     OUTPUT_SOLUTION,
     OUTPUT_PART,
+    OUTPUT_MANIFEST,
     OUTPUT_SETTINGS, /* name=value,.. for --set @FILE */
     OUTPUT_TABLE,
     OUTPUT_CURVE,

@@ -35,8 +35,10 @@ int part_begin(void)
 /* Options that do not change the result. */
 static int aside(const char *option)
 {
-    static const char *const names[] = {"part", "output",   "overwrite", "threads",
-                                        "json", "progress", "quiet",     "help"};
+    static const char *const names[] = {"part",     "output",     "overwrite", "threads",
+                                        "json",     "progress",   "quiet",     "help",
+                                        "manifest", "checkpoint", "resume",    "sheet",
+                                        "textures", "mpi-files",  "display"};
     const size_t n = strcspn(option + 2, "=");
     for (size_t k = 0; k < sizeof names / sizeof *names; k++)
         if (strlen(names[k]) == n && !strncmp(option + 2, names[k], n)) return 1;
@@ -52,8 +54,7 @@ static void word_print(FILE *to, const char *word)
     fputc('\'', to);
 }
 
-/* The command without its name of the part; the caller frees it. */
-static char *command_text(void)
+char *part_command(void)
 {
     char *text = NULL;
     size_t size;
@@ -95,7 +96,7 @@ char **part_command_words(const char *text, int *argc)
 int part_open(void)
 {
     if (!cli.part) return 0;
-    char *text = command_text();
+    char *text = part_command();
     if (!text) return cli_error(EXIT_RUN, "out of memory");
     enum imp_status st = imp_parts_create(cli.context, index_, count, text, &cli.parts);
     if (st == IMP_OK) st = imp_context_set_parts(cli.context, cli.parts);

@@ -80,7 +80,7 @@ int sheet_write(const struct sheet *s, size_t columns, const char *path)
     struct imp_write_options options = IMP_WRITE_OPTIONS_INIT;
     imp_film *sheet = NULL;
     size_t zoom, w, h;
-    if (!ranks_first()) return 0;
+    if (!cli_writes()) return 0;
     ranks_leave(); /* the pictures are read here only */
     int rc = tile_size(s, &w, &h, &zoom);
     if (rc) return rc;

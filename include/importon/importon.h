@@ -194,6 +194,59 @@ IMP_API enum imp_status imp_parts_get_info(imp_parts *parts, struct imp_parts_in
 IMP_API IMP_MUST_CHECK enum imp_status imp_context_set_parts(imp_context *context,
                                                              imp_parts *parts);
 
+/** A manifest: what a result was made from (the files that were read, the version, the
+ * command), the hash of its bits, and the sums of up to 64 chunks of every sum on the
+ * way. With it anybody can compute the result again, or a random part of the chunks, on
+ * any number of threads or ranks. Hashes are no signatures: they find changes and
+ * mistakes, and false results by the work that somebody spends on them. */
+typedef struct imp_manifest imp_manifest;
+
+/** A manifest in the making: files that are read from now on are inputs of the last
+ * that was made in the context. `command`: how the result was asked for, kept as it is.
+ * @return IMP_OK; IMP_E_ARG; IMP_E_NOMEM. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_manifest_create(imp_context *context, const char *command, imp_manifest **out);
+/** Read one, to verify it: files that are read from now on are compared with its inputs,
+ * and its output files are read and compared now.
+ * @param fraction of the chunks that the calls after imp_context_set_manifest compute
+ *        again, 0 < fraction <= 1; 1 where the manifest has no sums.
+ * @param seed which they are.
+ * @return IMP_OK; IMP_E_ARG; IMP_E_IO; IMP_E_SCENE if it is damaged or of another
+ *         version; IMP_E_NOMEM. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_manifest_read(imp_context *context,
+                                                         const char *path,
+                                                         double fraction, uint64_t seed,
+                                                         imp_manifest **out);
+IMP_API void imp_manifest_destroy(imp_manifest *manifest);
+/** The sums of the calls that follow are kept, or verified; NULL: no more. In a team of
+ * ranks sums are not kept. @return IMP_OK; IMP_E_ARG; IMP_E_NOMEM. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_context_set_manifest(imp_context *context,
+                                                                imp_manifest *manifest);
+/** A result, by name: its hash is kept, or compared. @return IMP_OK; IMP_E_ARG;
+ * IMP_E_NOMEM. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_manifest_result(imp_manifest *manifest,
+                                                           const char *name,
+                                                           const void *bytes, size_t n);
+/** A file that was written. @return IMP_OK; IMP_E_ARG; IMP_E_IO; IMP_E_NOMEM. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_manifest_output(imp_manifest *manifest,
+                                                           const char *path);
+/** Whole or not at all. @return IMP_OK; IMP_E_ARG; IMP_E_IO; IMP_E_NOMEM. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_manifest_write(const imp_manifest *manifest,
+                                                          const char *path);
+
+struct imp_manifest_info {
+    size_t size;
+    const char *command; /**< as given to imp_manifest_create; belongs to the manifest */
+    int n_inputs, n_results, n_outputs;
+    uint64_t n_sums; /**< chunks whose sums are kept; 0: the whole is computed again */
+    uint64_t n_verified; /**< of these, computed again so far */
+    int n_missing;       /**< inputs and results that were not met so far */
+    const char *refuted; /**< the first difference that was found; NULL: none */
+};
+/** Set info->size first. @return IMP_OK; IMP_E_ARG. */
+IMP_API enum imp_status imp_manifest_get_info(imp_manifest *manifest,
+                                              struct imp_manifest_info *info);
+
 /* ---- Progress and cancel ------------------------------------------------------- */
 
 struct imp_progress {

@@ -35,6 +35,9 @@ struct imp_context {
     struct imp__error_text *errors; /* list of all threads' texts, freed at the end */
     struct imp_pool *pool;          /* made on first use */
     struct imp__team *team;         /* NULL: alone */
+    /* Told of every file that is read whole; NULL: nobody. */
+    void (*on_read)(void *payload, const char *path, const void *bytes, size_t n);
+    void *on_read_payload;
     struct imp_registered *kinds;
     bool has_scenes;      /* one was made: kinds are not registered any more */
     _Atomic int held;     /* by the host, and by every object made from it */

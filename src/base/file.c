@@ -99,13 +99,15 @@ out:
 enum imp_status imp__file_read(imp_context *ctx, const char *path, size_t limit,
                                struct imp_bytes *out)
 {
-    if (!imp__team_broadcasts(ctx)) return own_read(ctx, path, limit, out);
     struct imp_bytes bytes = {0};
     enum imp_status st = IMP_OK;
-    if (ctx->team->host.rank == 0) st = own_read(ctx, path, limit, &bytes);
-    st = imp__team_broadcast(ctx, st, &bytes);
-    if (st == IMP_OK) *out = bytes;
-    return st;
+    const bool broadcasts = imp__team_broadcasts(ctx);
+    if (!broadcasts || ctx->team->host.rank == 0) st = own_read(ctx, path, limit, &bytes);
+    if (broadcasts) st = imp__team_broadcast(ctx, st, &bytes);
+    if (st != IMP_OK) return st;
+    if (ctx->on_read) ctx->on_read(ctx->on_read_payload, path, bytes.data, bytes.size);
+    *out = bytes;
+    return IMP_OK;
 }
 
 bool imp__file_exists(imp_context *ctx, const char *path)

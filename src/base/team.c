@@ -199,7 +199,7 @@ enum imp_status imp__team_keep(imp_context *ctx, void *bytes, size_t n, bool *kn
     struct imp__team *team = ctx->team;
     struct kept k = {bytes, n, false, false};
     *known = false;
-    if (!imp__team_shares(ctx) || team->role == IMP_TEAM_RANK) return IMP_OK;
+    if (!imp__team_shares(ctx) || !imp__team_apart(ctx)) return IMP_OK;
     if (team->role == IMP_TEAM_PART)
         return team->host.gather(bytes, n, NULL, NULL, team->host.payload);
     const enum imp_status st =
@@ -279,6 +279,8 @@ enum imp_status imp__shared_fixed(imp_context *ctx, struct imp_fixed_sum *f)
     struct imp_bytes out = {0};
     enum imp_status st = IMP_OK;
     if (!imp__team_shares(ctx)) return IMP_OK;
+    if (team->role == IMP_TEAM_RECORD) team->in_fixed = true;
+    if (team->role == IMP_TEAM_RECORD || team->role == IMP_TEAM_VERIFY) return IMP_OK;
     struct fixed_head head = {
         .n = f->n, .too_large = f->too_large, .bits = f->bits, .unit = f->unit};
     bool fits = imp__bytes_add(ctx, &out, &head, sizeof head);

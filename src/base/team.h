@@ -20,15 +20,20 @@
 
 enum imp_team_role {
     IMP_TEAM_RANK,
-    IMP_TEAM_PART, /* what the others compute is not known: results are not whole */
-    IMP_TEAM_MERGE /* computes no item */
+    IMP_TEAM_PART,   /* what the others compute is not known: results are not whole */
+    IMP_TEAM_MERGE,  /* computes no item */
+    IMP_TEAM_RECORD, /* computes all, chunk by chunk, and keeps the sums of each */
+    IMP_TEAM_VERIFY  /* computes some of the chunks again, and takes the sums of all */
 };
 
 struct imp__team {
     struct imp_team host;
     enum imp_team_role role;
     uint64_t round;
-    int alone; /* > 0: inside of what every rank computes whole */
+    int alone;                   /* > 0: inside of what every rank computes whole */
+    bool (*pick)(void *payload); /* is the next chunk verified? */
+    bool in_fixed;               /* recorded: there were sums in fixed point */
+    bool differs; /* verified: a chunk did not have the sums that were kept */
 };
 
 /* Is work of this context divided now? */
@@ -41,6 +46,13 @@ static inline bool imp__team_shares(const imp_context *ctx)
 static inline bool imp__team_part(const imp_context *ctx)
 {
     return ctx->team && ctx->team->role == IMP_TEAM_PART;
+}
+
+/* Do results of other processes go into this one's, at another time? */
+static inline bool imp__team_apart(const imp_context *ctx)
+{
+    return ctx->team &&
+           (ctx->team->role == IMP_TEAM_PART || ctx->team->role == IMP_TEAM_MERGE);
 }
 
 /* Are walks read from parts, in the place of being made? */

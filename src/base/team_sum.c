@@ -4,6 +4,7 @@
 #include "file.h"
 #include "team.h"
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 /* ---- Who computes what --------------------------------------------------------------- */
@@ -164,25 +165,49 @@ static void receive(void *receiver, int rank, const void *message, size_t bytes)
     }
 }
 
+/* Threads complete groups in any order. */
+static int place_compare(const void *a, const void *b)
+{
+    struct place x, y;
+    memcpy(&x, a, sizeof x);
+    memcpy(&y, b, sizeof y);
+    if (x.group != y.group) return x.group < y.group ? -1 : 1;
+    if (x.level != y.level) return x.level < y.level ? -1 : 1;
+    return (x.index > y.index) - (x.index < y.index);
+}
+static void nodes_sort(struct sharing *s)
+{
+    qsort(s->message.data + sizeof(struct head), (size_t)s->nodes,
+          sizeof(struct place) + s->desc->size, place_compare);
+}
+
+/* The message: what was computed, and how it went. In `head` alone where there is no
+ * memory for it. */
+static void message_end(struct sharing *s, enum imp_status st,
+                        const struct imp_shared *shared, struct head *head)
+{
+    memset(head, 0, sizeof *head); /* with what is between the fields: it is written */
+    for (size_t k = 0; k < s->tree.n_nodes; k++) message_node(s, &s->tree.nodes[k]);
+    if (s->no_memory) st = imp__error(s->ctx, IMP_E_NOMEM, "no memory for a message");
+    head->status = st;
+    head->late = shared->late;
+    head->items = s->desc->n_items;
+    head->group = s->tree.desc.group;
+    head->size = s->desc->size;
+    head->nodes = s->no_memory ? 0 : s->nodes;
+    head->drops = *shared->drops;
+    if (st != IMP_OK)
+        snprintf(head->error, sizeof head->error, "%s", imp_last_error(s->ctx));
+    if (!s->no_memory) memcpy(s->message.data, head, sizeof *head);
+}
+
 /* Tell what this rank computed, and complete the tree with what the others did. */
 static enum imp_status exchange(struct sharing *s, enum imp_status st,
                                 struct imp_shared *shared)
 {
     struct imp__team *team = s->share.team;
     struct head head;
-    memset(&head, 0, sizeof head); /* with what is between the fields: it is written */
-    for (size_t k = 0; k < s->tree.n_nodes; k++) message_node(s, &s->tree.nodes[k]);
-    if (s->no_memory) st = imp__error(s->ctx, IMP_E_NOMEM, "no memory for a message");
-    head.status = st;
-    head.late = shared->late;
-    head.items = s->desc->n_items;
-    head.group = s->tree.desc.group;
-    head.size = s->desc->size;
-    head.nodes = s->no_memory ? 0 : s->nodes;
-    head.drops = *shared->drops;
-    if (st != IMP_OK)
-        snprintf(head.error, sizeof head.error, "%s", imp_last_error(s->ctx));
-    if (!s->no_memory) memcpy(s->message.data, &head, sizeof head);
+    message_end(s, st, shared, &head);
     s->own = false;
     st = team->host.gather(s->no_memory ? (const void *)&head : s->message.data,
                            s->no_memory ? sizeof head : s->message.size, receive, s,
@@ -201,6 +226,124 @@ static enum imp_status exchange(struct sharing *s, enum imp_status st,
     return st;
 }
 
+/* ---- Sums that are kept, or verified -------------------------------------------------- */
+
+#define KEPT_CHUNKS 64 /* of a sum, at most */
+
+/* Items of a chunk: aligned, so that few nodes are its sum. */
+static size_t chunk_size(const struct imp_sum_desc *desc)
+{
+    size_t n = 1;
+    while (n * KEPT_CHUNKS < desc->n_items) n *= 2;
+    return desc->group < n ? (n + desc->group - 1) / desc->group * desc->group : n;
+}
+
+static enum imp_status chunk_take(size_t group, void *sum, void *payload)
+{
+    struct sharing *c = payload;
+    const size_t items =
+        imp_min(c->tree.desc.group, c->desc->n_items - group * c->tree.desc.group);
+    struct imp_sum_node node = {.group = group, .sum = sum};
+    while ((size_t)1 << node.level < items) node.level++;
+    pthread_mutex_lock(&c->share.lock);
+    message_node(c, &node);
+    pthread_mutex_unlock(&c->share.lock);
+    return IMP_OK;
+}
+
+/* The message that a rank would send that computed items [first, end). */
+static enum imp_status chunk_compute(const struct sharing *s, const struct imp_loop *loop,
+                                     size_t first, size_t end, struct imp_shared *shared,
+                                     struct imp_bytes *message)
+{
+    enum imp_status st = IMP_OK;
+    const struct head none = {0};
+    struct sharing c = {
+        .ctx = s->ctx, .desc = s->desc, .work = s->work, .payload = s->payload};
+    struct imp_sum_desc own = *s->desc;
+    struct imp_loop each = *loop;
+    struct head head;
+    const double all = (double)s->desc->n_items,
+                 span = loop->fraction_hi - loop->fraction_lo;
+    own.add = sum_add;
+    own.take = chunk_take;
+    own.payload = &c;
+    *shared->drops = (struct imp_drops){0};
+    IMP_TRY(imp__sum_tree_create(s->ctx, &own, &c.tree));
+    if (pthread_mutex_init(&c.share.lock, NULL) != 0 ||
+        !imp__bytes_add(s->ctx, &c.message, &none, sizeof none))
+        IMP_TRY(imp__error(s->ctx, IMP_E_NOMEM, "no memory for a message"));
+    each.n_items = end - first;
+    each.fraction_lo = loop->fraction_lo + span * (double)first / all;
+    each.fraction_hi = loop->fraction_lo + span * (double)end / all;
+    IMP_TRY(imp__parallel_sum(s->ctx, &each, &c.tree, first, c.work, NULL));
+    message_end(&c, IMP_OK, shared, &head);
+    if (c.no_memory) IMP_TRY(IMP_E_NOMEM);
+    nodes_sort(&c);
+    *message = c.message;
+    c.message = (struct imp_bytes){0};
+out:
+    if (c.tree.ctx) pthread_mutex_destroy(&c.share.lock);
+    imp__bytes_free(s->ctx, &c.message);
+    imp__sum_tree_destroy(&c.tree);
+    return st;
+}
+
+struct stored {
+    const void *message;
+    size_t bytes;
+};
+static void stored_receive(void *receiver, int rank, const void *message, size_t bytes)
+{
+    (void)rank;
+    *(struct stored *)receiver = (struct stored){message, bytes};
+}
+
+static bool same_nodes(const struct stored *m, const struct imp_bytes *own)
+{
+    const size_t head = sizeof(struct head);
+    return m->bytes == own->size && m->bytes >= head &&
+           !memcmp((const unsigned char *)m->message + head, own->data + head,
+                   own->size - head);
+}
+
+/* Chunk by chunk: compute and keep it, or take what was kept, after computing it again
+ * where it was picked. */
+static enum imp_status chunks_exchange(struct sharing *s, const struct imp_loop *loop,
+                                       struct imp_shared *shared)
+{
+    struct imp__team *team = s->share.team;
+    const bool records = team->role == IMP_TEAM_RECORD;
+    const size_t n = s->desc->n_items, step = chunk_size(s->desc);
+    enum imp_status st = IMP_OK;
+    struct imp_bytes message = {0};
+    for (size_t first = 0; first < n; first += step) {
+        const size_t end = imp_min(first + step, n);
+        struct stored m = {0};
+        const bool computes = records || team->pick(team->host.payload);
+        if (computes) IMP_TRY(chunk_compute(s, loop, first, end, shared, &message));
+        if (records) m = (struct stored){message.data, message.size};
+        IMP_TRY(team->host.gather(m.message, m.bytes, stored_receive, &m,
+                                  team->host.payload));
+        if (computes && !records && !same_nodes(&m, &message)) {
+            team->differs = true;
+            IMP_TRY(imp__error(s->ctx, IMP_E_ARG,
+                               "walks %zu to %zu of %zu pieces have other sums", first,
+                               end - 1, n));
+        }
+        receive(s, team->host.rank + 1, m.message, m.bytes);
+        imp__bytes_free(s->ctx, &message);
+        if (s->strange)
+            IMP_TRY(imp__error(s->ctx, IMP_E_ARG,
+                               "the sums that were kept are of "
+                               "another run"));
+    }
+    *shared->drops = s->all.drops;
+out:
+    imp__bytes_free(s->ctx, &message);
+    return st;
+}
+
 enum imp_status imp__shared_sum(imp_context *ctx, const struct imp_loop *loop,
                                 const struct imp_sum_desc *desc,
                                 enum imp_status (*work)(size_t i, int worker,
@@ -212,6 +355,8 @@ enum imp_status imp__shared_sum(imp_context *ctx, const struct imp_loop *loop,
     struct sharing s = {.ctx = ctx, .desc = desc, .work = work, .payload = loop->payload};
     const struct head none = {0};
     const bool shares = imp__team_shares(ctx);
+    const bool keeps = shares && (ctx->team->role == IMP_TEAM_RECORD ||
+                                  ctx->team->role == IMP_TEAM_VERIFY);
     shared->late = false;
     if (shares) {
         own.add = sum_add;
@@ -219,6 +364,11 @@ enum imp_status imp__shared_sum(imp_context *ctx, const struct imp_loop *loop,
         own.payload = &s;
     }
     IMP_TRY(imp__sum_tree_create(ctx, &own, &s.tree));
+    if (keeps) {
+        s.share.team = ctx->team;
+        st = chunks_exchange(&s, loop, shared);
+        goto out;
+    }
     if (!shares) {
         st = imp__parallel_sum(ctx, loop, &s.tree, 0, work, NULL);
     } else {

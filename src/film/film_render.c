@@ -24,8 +24,7 @@ enum imp_status imp_render(const imp_scene *scene, const struct imp_run *run,
         st = imp__team_same(scene->ctx, same, imp__same_run(scene, &own, "render", same));
     const bool solves =
         scene->integrator && scene->integrator->ops->flags & IMP_INTEGRATOR_SOLVES;
-    if (st == IMP_OK && solves && scene->ctx->team &&
-        scene->ctx->team->role != IMP_TEAM_RANK)
+    if (st == IMP_OK && solves && imp__team_apart(scene->ctx))
         st = imp__error(scene->ctx, IMP_E_UNSUPPORTED,
                         "a picture by finite elements cannot be made in parts");
     if (st != IMP_OK) return st;

@@ -439,6 +439,9 @@ enum imp_status imp__team_same(imp_context *ctx, const struct imp_same *same, in
         return imp__error(ctx, IMP_E_ARG,
                           "the %s of rank %d differs from that of rank %d",
                           same[c.differs].name, c.rank, team->host.rank);
+    if (team->role == IMP_TEAM_VERIFY)
+        return imp__error(ctx, IMP_E_ARG, "the result was made with another %s",
+                          same[c.differs].name);
     const struct imp_parts *p = team->host.payload;
     return imp__error(ctx, IMP_E_ARG, "part %u of %u was made with another %s",
                       p->sources[c.rank].index, p->sources[c.rank].count,

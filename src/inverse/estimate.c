@@ -17,7 +17,7 @@ static enum imp_status splat_prepare(struct imp__gradient_job *j,
 {
     imp_context *ctx = j->problem->ctx;
     /* The second pass needs these pictures, so each part computes all of them. */
-    const bool apart = ctx->team && ctx->team->role != IMP_TEAM_RANK;
+    const bool apart = imp__team_apart(ctx);
     double value[2] = {0, 0};
     bool known = false;
     enum imp_status st = IMP_OK;

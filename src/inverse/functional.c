@@ -228,8 +228,7 @@ static enum imp_status picture_value(imp_context *ctx, struct functional *f,
     /* Standard errors through a wide filter need the picture, so each part computes all
      * of it. */
     const int spp = run->spp > 0 ? run->spp : f->tracer.sensor->spp;
-    const bool one_pass = box && spp > 1,
-               apart = ctx->team && !one_pass && ctx->team->role != IMP_TEAM_RANK;
+    const bool one_pass = box && spp > 1, apart = !one_pass && imp__team_apart(ctx);
     double kept[2] = {0, 0}; /* the value, and samples per pixel */
     bool known = false;
     if (apart && imp__team_merges(ctx))
@@ -372,12 +371,12 @@ enum imp_status imp_problem_jacobian_sums(imp_problem *p, const float *adjoint,
     f.films = films;
     f.spp = (int)primal->spp;
     for (size_t k = 0; k <= n; k++) se[k] = NAN;
-    if (ctx->team && ctx->team->role != IMP_TEAM_RANK) ctx->team->alone++;
+    if (imp__team_apart(ctx)) ctx->team->alone++;
     if (f.spp > 0) { /* else interrupted before every pixel had its samples */
         if (weights) ended = weights_make(ctx, &f, &own, weights);
         if (ended == IMP_OK) ended = influence(ctx, &f, &own, se);
     }
-    if (ctx->team && ctx->team->role != IMP_TEAM_RANK) ctx->team->alone--;
+    if (imp__team_apart(ctx)) ctx->team->alone--;
     if (f.spp > 0) {
         if (ended != IMP_CANCELLED) IMP_TRY(ended);
     }

@@ -36,9 +36,8 @@ enum imp_status imp__problem_same(struct imp_problem *p, const struct imp_run *r
                                   const char *call)
 {
     struct imp_same same[IMP_SAME_MAX];
-    const struct imp__team *team = p->ctx->team;
     if (!imp__team_shares(p->ctx)) return IMP_OK;
-    if (team->role == IMP_TEAM_RANK && p->same_known) return IMP_OK;
+    if (!imp__team_apart(p->ctx) && p->same_known) return IMP_OK;
     int n = imp__same_run(p->scene, run, call, same);
     uint64_t what = imp__hash(0, p->chosen, p->scene->n_params);
     for (size_t i = 0; i < p->n_targets; i++) {
@@ -55,7 +54,7 @@ enum imp_status imp__problem_same(struct imp_problem *p, const struct imp_run *r
 
 enum imp_status imp__problem_no_parts(const struct imp_problem *p, const char *call)
 {
-    if (!p->ctx->team || p->ctx->team->role == IMP_TEAM_RANK) return IMP_OK;
+    if (!imp__team_apart(p->ctx)) return IMP_OK;
     return imp__error(p->ctx, IMP_E_UNSUPPORTED,
                       "%s cannot be made in parts: what is computed next depends on what "
                       "was before; a team of processes can",

@@ -164,7 +164,7 @@ NULLABLE = {"options", "run", "stats", "id", "objective", "gradient_se", "primal
             "axis", "hessian", "taps", "tap_bars", "tap_dots", "power", "bundle", "exit", "targets",
             "error", "order", "param", "element", "memory",
             "imp_optimizer_step.rule", "imp_optimizer_step.lo", "imp_optimizer_step.hi",
-            "imp_context_set_team.team", "imp_context_set_parts.parts",
+            "imp_context_set_team.team", "imp_context_set_parts.parts", "imp_context_set_manifest.manifest",
             "imp_scene_begin.name", "imp_scene_begin.tag", "imp_scene_ref.name", "imp_scene_load_string.name",
             "imp_bend_load_string.name", "imp_problem_variable.lo", "imp_problem_variable.hi",
             "imp_problem_objective.x", "imp_problem_objective.gradient",
@@ -288,6 +288,7 @@ class Fixture:
                 if lib.imp_bend_add_target(b, C.byref(t)) != OK: raise RuntimeError(self.said())
             return b
         if kind == "imp_guide": return None
+        if kind == "imp_manifest": return self.make("imp_manifest_create", context, b"command")
         if kind == "imp_parts": return self.make("imp_parts_create", context, 1, 2, b"command")
         raise KeyError(kind)
 
@@ -361,7 +362,7 @@ class Fixture:
         if a.name == "words": return C.addressof(self.array(C.c_char_p, 1, [b"word"])), None
         if a.name == "dims": return C.addressof(self.array(C.c_size_t, 1, [1])), None
         if not a.pointer:
-            scalars = {"fallback": 1., "flags": 0, "size": 8, "width": 4, "height": 4, "channels": 3, "length": len(self.good(xml, function)[0]) if "load_string" in function else 0, "weight": 1., "order": 1,
+            scalars = {"fallback": 1., "fraction": 1., "seed": 1, "flags": 0, "size": 8, "width": 4, "height": 4, "channels": 3, "length": len(self.good(xml, function)[0]) if "load_string" in function else 0, "weight": 1., "order": 1,
                        "index": 1.5 if a.ctype is C.c_double else 0, "cells": 1., "um": .5, "k": 1.,
                        "radius": 2., "hi": 3., "lo": 1., "value": 1.5 if a.ctype is C.c_double else 1,
                        "n_vertices": 3, "n_triangles": 1, "layers": 1, "a": 1., "pilots": 2, "n_groups": 1,
@@ -378,7 +379,13 @@ class Fixture:
                      "imp_bend_load": os.path.join(top, "scenes", "bend", "maxwell.xml"),
                      "imp_film_write": self.folder + "/x.exr", "imp_elements_save": self.folder + "/x.el",
                      "imp_elements_export": self.folder + "/x.ply", "imp_field_write": self.folder + "/x.npy",
-                     "imp_parts_write": self.folder + "/x.part", "imp_report_write": self.folder + "/x.html"}
+                     "imp_parts_write": self.folder + "/x.part", "imp_report_write": self.folder + "/x.html",
+                     "imp_manifest_write": self.folder + "/x.proof"}
+            if key == "imp_manifest_output.path": return os.path.join(top, "scenes", "furnace.xml").encode(), None
+            if key == "imp_manifest_read.path":
+                path = (self.folder + "/read.proof").encode()
+                if lib.imp_manifest_write(self.object("imp_manifest", ""), path) != OK: raise RuntimeError(self.said())
+                return path, None
             if key == "imp_film_read.path":
                 f, path = self.object("imp_film", ""), self.folder + "/read.exr"
                 lib.imp_film_write(f, path.encode(), None)

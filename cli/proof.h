@@ -1,0 +1,22 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * --manifest FILE: what a result was made from, for importon verify. */
+#ifndef IMP_CLI_PROOF_H
+#define IMP_CLI_PROOF_H
+
+#include "command.h"
+
+/* Begin the manifest of the context that was just made. 0, or an exit code. */
+int manifest_open(void);
+/* Around the calls whose sums are kept, or verified. 0, or an exit code. */
+int manifest_begin(void);
+int manifest_pause(void);
+/* Results, by name; nothing where there is no manifest. 0, or an exit code. */
+int manifest_numbers(const char *name, const double *x, size_t n);
+int manifest_film(const char *name, const imp_film *film);
+/* A file that was written. */
+int manifest_output(const char *path);
+/* Write it, if the run was not refused. The exit code. */
+int manifest_end(int rc);
+
+#endif
