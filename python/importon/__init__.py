@@ -30,7 +30,7 @@ from ._fit import Fit, FitVariable, fit
 from ._gradient import Estimate, Jacobian, Loss, functional, jacobian, loss, render_backward, render_forward
 from ._library import (ArgumentError, BiasError, Cancelled, Error, FileError, ImportonWarning, NumericError, Part,
                        OutOfMemoryError, ParameterError, PathsError, Progress, SceneError, UnsupportedError,
-                       library_path, set_threads, threads)
+                       explained, library_path, set_threads, threads)
 from ._params import Gradient, ParameterInfo, SceneParameters, Values, traverse
 from ._parts import PartsInfo, join_parts, merge, part, parts_info, team
 from ._picture import DroppedWalk, Picture, project, read, write
@@ -60,6 +60,8 @@ for _name in __all__:  # errors and objects are known by the name that users imp
     _object = globals().get(_name)
     if getattr(_object, "__module__", "").startswith("importon."):
         _object.__module__ = "importon"
+        if type(_object) is type(explained):
+            globals()[_name] = explained(_object)
 del _name, _object
 
 

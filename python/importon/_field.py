@@ -40,7 +40,7 @@ class Field:
         not_inside()
         ctx, out = context(), ctypes.c_void_p()
         ctx.check(function(ctx.pointer, *arguments, ctypes.byref(out)))
-        warn_said(4)
+        warn_said()
         return cls(Handle(out.value or 0, lib.imp_field_destroy), ctx)
 
     @classmethod

@@ -10,6 +10,7 @@ from __future__ import annotations
 import _thread
 import contextlib
 import ctypes
+import functools
 import os
 import re
 import sys
@@ -17,7 +18,7 @@ import threading
 import warnings
 import weakref
 from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple, Optional
+from typing import Any, NamedTuple, Optional, TypeVar, cast
 
 from . import _c
 
@@ -197,6 +198,32 @@ def library_path() -> str:
     return str(lib._name)
 
 
+# ---- Keywords ----------------------------------------------------------------------
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def explained(function: F) -> F:
+    """The function; its error for a keyword that it does not have says what was meant."""
+    @functools.wraps(function)
+    def call(*arguments: Any, **keywords: Any) -> Any:
+        try:
+            return function(*arguments, **keywords)
+        except TypeError as error:
+            said = re.match(r".*\(\) got an unexpected keyword argument '(\w+)'", str(error))
+            trace = error.__traceback__
+            if said is None or trace is None or trace.tb_next is not None:  # raised further inside
+                raise
+        import difflib
+        import inspect
+        names = [n for n in inspect.signature(function).parameters if n != "self" and not n.startswith("_")]
+        near = difflib.get_close_matches(said[1], names, 1)
+        raise TypeError("%s() has no keyword '%s'%s" % (
+            function.__qualname__.replace(".__init__", "").split(".")[-1], said[1], "; did you mean '%s'?" % near[0] if near else "; it has: " + ", ".join(names)))
+
+    return cast(F, call)
+
+
 # ---- Structs -----------------------------------------------------------------------
 
 
@@ -275,10 +302,16 @@ def _log(level: int, message: bytes, payload: Any) -> None:
 _LOG = ctypes.CFUNCTYPE(None, ctypes.c_int, ctypes.c_char_p, ctypes.c_void_p)(_log)
 
 
-def warn_said(stacklevel: int = 3) -> None:
-    """Pass on what the library has warned of since the last call."""
+def warn_said() -> None:
+    """Pass on what the library has warned of since the last call, at the place of the caller of
+    this package."""
+    if not _said:
+        return
+    level, frame = 1, sys._getframe(0)
+    while frame.f_back is not None and os.path.dirname(frame.f_code.co_filename) == os.path.dirname(__file__):
+        level, frame = level + 1, frame.f_back
     while _said:
-        warnings.warn(_said.pop(0), ImportonWarning, stacklevel=stacklevel + 1)
+        warnings.warn(_said.pop(0), ImportonWarning, stacklevel=level)
 
 
 class Handle:

@@ -238,7 +238,7 @@ def _load(function: Any, arguments: tuple[Any, ...], name: str, mode: Optional[s
     if status and "was given, but nothing uses $" in ctx.message():
         raise TypeError(ctx.message().replace("parameter", "keyword", 1))
     ctx.check(status)
-    warn_said(4)
+    warn_said()
     return Scene(Handle(out.value or 0, lib.imp_scene_destroy), ctx, name)
 
 

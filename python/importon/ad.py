@@ -15,7 +15,7 @@ import numpy as np
 
 from . import _c
 from ._array import address, numbers
-from ._library import ArgumentError, choice, failure, lib, make
+from ._library import ArgumentError, choice, explained, failure, lib, make
 
 
 class Optimizer(MutableMapping):  # type: ignore[type-arg]
@@ -148,6 +148,7 @@ class SGD(Optimizer):
     0.8
     """
 
+    @explained
     def __init__(self, lr: float, momentum: float = 0, params: Any = None) -> None:
         super().__init__("sgd", params, learning_rate=lr, momentum=momentum)
 
@@ -174,6 +175,7 @@ class Adam(Optimizer):
     0.9
     """
 
+    @explained
     def __init__(self, lr: float, beta_1: float = 0.9, beta_2: float = 0.999, epsilon: float = 1e-8,
                  params: Optional[Any] = None) -> None:
         super().__init__("adam", params, learning_rate=lr, beta1=beta_1, beta2=beta_2, epsilon=epsilon)

@@ -15,7 +15,7 @@ from . import _c
 from ._array import address, copy_doubles, copy_points, numbers, view
 from ._check import Check, check_rows
 from ._field import Field, _taken
-from ._library import (ArgumentError, Handle, choice, context, failure, integer, lib, make, not_inside,
+from ._library import (ArgumentError, Handle, choice, context, explained, failure, integer, lib, make, not_inside,
                        PROGRESS_ADDRESS, register_lock, run, text, warn_said, word)
 from ._rays import EXIT, Exits, Options, RayGradient, Rays, adjoint, exits_of, path, stats_of, tangent, trace
 from ._scene import _load_options
@@ -685,6 +685,7 @@ class Bend:
             self._run(progress, lib.imp_bend_check, ctypes.byref(rows), ctypes.byref(n))
             return check_rows(rows.value, n.value)
 
+    @explained
     def fit(self, *, optimizer: str = "lbfgs", levels: int = 1, iterations: Any = 0, learning_rate: float = 0,
             tolerance: float = 0, scale: float = 0, checkpoint: Any = None, resume: bool = False, carry: int = 0,
             progress: Any = None) -> BendFit:
@@ -763,7 +764,7 @@ def _load(function: Any, arguments: tuple[Any, ...], search: Sequence[Any], defa
     if status and "was given, but nothing uses $" in ctx.message():
         raise TypeError(ctx.message().replace("parameter", "keyword", 1))
     ctx.check(status)
-    warn_said(4)
+    warn_said()
     return Bend(None, Handle(out.value or 0, lib.imp_bend_destroy), ctx)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from . import _c
 from ._array import copy_doubles, numbers
-from ._library import ArgumentError, Handle, choice, failure, integer, lib, make, not_inside, run, text, warn_said
+from ._library import ArgumentError, Handle, choice, explained, failure, integer, lib, make, not_inside, run, text, warn_said
 from ._params import Values
 from ._picture import Picture, from_film
 from ._problem import Problem, check_scene
@@ -270,6 +270,7 @@ class Elements:
             return [Sensitivity(r.name.decode(errors="replace"), r.param, r.element, bool(r.emission), r.value,
                                 r.derivative, r.share, r.share_error) for r in found]
 
+    @explained
     def fit(self, targets: Any, params: Any = None, *, optimizer: Optional[str] = None, max_iterations: int = 0,
             tolerance: float = 0, rounds: int = 0, bounds: Optional[Mapping[str, Any]] = None,
             tikhonov: Optional[Mapping[str, float]] = None, stay: Optional[Mapping[str, float]] = None,
@@ -433,6 +434,7 @@ class Guide:
         return self._handle.pointer
 
 
+@explained
 def guide(elements: Elements, *, lights: bool = True, share: float = 0, roulette: float = 0) -> Guide:
     """A solution as a guide for walks: it changes the noise of pictures and gradients, never
     their mean.

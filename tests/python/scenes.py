@@ -161,11 +161,27 @@ def test_cornell_box():
 
 
 def test_warnings():
-    """What the library warns of are Python warnings"""
+    """What the library warns of are Python warnings, at the caller's place"""
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         im.load_string(XML)
     assert any(issubclass(w.category, im.ImportonWarning) and "axis" in str(w.message) for w in said)
+    assert {os.path.basename(w.filename) for w in said} == {"scenes.py"}
+
+
+def test_keywords():
+    """Unknown keywords are a TypeError that says what was meant; errors further inside are as they were"""
+    s = im.load_dict(im.cornell_box(res=8))
+    for call, *words in ((lambda: im.render(s, ssp=4), "render()", "'ssp'", "'spp'"), (lambda: im.fit(s, s, optimiser="lm"), "'optimizer'"),
+                         (lambda: im.loss(s, s, weigths=1), "'weights'"), (lambda: im.compare(1, 2, qqq=3), "n_reference"),
+                         (lambda: im.ad.Adam(lr=1, beta1=.9), "Adam()", "'beta_1'"), (lambda: im.write("a.exr", s, exposur=1), "'exposure'"),
+                         (lambda: im.elements.Elements(s, stop=.5, max_level=2).fit([1.0], max_iteration=3), "'max_iterations'")):
+        raises(TypeError, call, *words)
+
+    def own(p, wrong=1):
+        return im.render(s, spp=2, progress=lambda p: own(ssp=1))
+    raises(TypeError, lambda: im.part(lambda: own(sspp=1), 1, 2), "sspp")
+    assert im.render.__module__ == "importon" and "spp" in im.render.__doc__
 
 
 run(globals())
