@@ -131,6 +131,9 @@ WITHOUT = {
     "imp_drop_text": "the header's sentences are in the declarations; Picture.dropped has the words",
     "imp_problem_nlopt": "NLopt's callback in C: importon.loss is a function of Python, for any optimiser",
     "imp_problem_set_run": "of that callback: functions take the run as keywords",
+    **{"imp_manifest_" + word: "a manifest says what a command line computed; importon verify reads it"
+       for word in ("create", "destroy", "get_info", "output", "read", "result", "write")},
+    "imp_context_set_manifest": "the same",
     "imp_problem_fit_variable": "one number of a fit: Fit has arrays; numbers beyond 1,024 have no errors",
 }
 

@@ -408,6 +408,9 @@ class Fixture:
             words = {"fallback": b"text", "format": b"text", "names": b"R,G,B", "key": b"key", "value": b"value", "tag": b"shape", "type": b"sphere", "id": b"id",
                      "glob": PARAM.encode(), "kind": b"luneburg"}
             return words[a.name], None
+        if key == "imp_problem_jacobian_sums.sums":  # [n_groups], or one for each number
+            s = self.aligned(a.struct * 64)
+            return C.addressof(s), s
         if a.struct is not None and (a.sized or a.struct.__name__ in ("imp_bend_rays", "imp_estimate")):
             s = self.struct(a.struct.__name__, function)
             self.keep.append(s)
