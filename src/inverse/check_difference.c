@@ -60,7 +60,7 @@ static enum imp_status functional(struct imp__fresh *f, const double *x_dot,
                                         .sample = sample,
                                         .payload = &t};
     imp_film *film = NULL;
-    if (!x_dot) t.tracer.active = NULL;
+    if (!x_dot) t.tracer.active = NULL, t.tracer.value_only = true;
     run.spp = imp__fresh_batch(f);
     run.seed = t.tracer.seed = seed;
     const enum imp_status st = imp__picture_make(f->check->ctx, &picture, &run, &film);
