@@ -5,11 +5,13 @@
  * density (chi-square over cosine and azimuth, and the weight's mean); it is the same
  * whichever direction is the light's; eval_d is the derivative of eval. */
 #include "color/rgb.h"
+#include "imp_scene.h"
 #include "imp_tap.h"
 #include "kind/build.h"
 #include "math/rng.h"
 #include "math/stat.h"
 #include "math/vec.h"
+#include "scene/scene.h"
 
 enum { NZ = 24, NPHI = 8, DRAWS = 400000, FINE = 60 };
 
@@ -116,8 +118,40 @@ static void check(const struct imp_phase *p, uint64_t stream, const char *name)
     tap_ok(worst < 1e-6, "%s: derivatives are those of the value # %.1e", name, worst);
 }
 
+/* A table, as a scene has it; against Mitsuba 3.9.1's tabphase. */
+static void table(void)
+{
+    static const struct {
+        double c, p;
+    } peer[] = {{-1, .03183098882},
+                {-.5, .05570422858},
+                {0, .09549296647},
+                {.5, .11140845716},
+                {1, .06366197765}};
+    imp_context *ctx = test_context(1);
+    imp_scene *s = test_scene_text(
+        ctx,
+        "<scene version='3.0.0'><integrator type='volpath'/><medium type='homogeneous' "
+        "id='m'><phase type='tabphase'><string name='values' value='0.5, 1.0,2 1'/>"
+        "</phase></medium><shape type='cube'><bsdf type='null'/>"
+        "<ref id='m' name='interior'/></shape><sensor type='perspective'><transform "
+        "name='to_world'><translate z='-5'/></transform></sensor></scene>",
+        IMP_RGB);
+    const struct imp_phase *p = s->media[0]->phase;
+    const imp_spec in[IMP_INPUTS_MAX] = {{0}};
+    struct imp_dirs d = {.wo = {0, 0, -1, 0}, .lobe = IMP_SMOOTH};
+    for (size_t k = 0; k < sizeof peer / sizeof *peer; k++) {
+        d.wi = direction(peer[k].c, 1);
+        tap_near(p->ops->pdf(p, in, &d), peer[k].p, 0, 1e-8, "tabphase: as Mitsuba's");
+    }
+    check(p, 77, "tabphase");
+    imp_scene_destroy(s);
+    imp_context_destroy(ctx);
+}
+
 int main(void)
 {
+    table();
     const struct imp_phase_ops *hg = NULL, *rayleigh = NULL;
     for (size_t k = 0; imp__phase_kinds[k]; k++) {
         if (strcmp(imp__phase_kinds[k]->name, "hg") == 0) hg = imp__phase_kinds[k];

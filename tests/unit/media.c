@@ -365,6 +365,15 @@ int main(void)
     refused(FOG("<float name='sigma_s' value='1'/><float name='sigma_t' value='1'/>"), "",
             "the one pair");
     refused(FOG("<phase type='hg'/><phase type='rayleigh'/>"), "", "blendphase");
+#define TABLE(values)                                                                    \
+    FOG("<phase type='tabphase'><string name='values' value='" values "'/></phase>")
+    refused(FOG("<phase type='tabphase'/>"), "", "'values' is required");
+    refused(TABLE("1"), "", "not a row");
+    refused(TABLE("1, x"), "", "not a row");
+    refused(TABLE("1, -1, 2"), "", "value 1, -1, is negative");
+    refused(TABLE("1, nan"), "", "not finite");
+    refused(TABLE("0 0 0"), "", "integral");
+    refused(TABLE("1e308 1e308"), "", "integral");
     refused(FOG("<phase type='blendphase'><float name='weight' value='0.5'/>"
                 "<phase type='hg'/></phase>"),
             "", "missing");

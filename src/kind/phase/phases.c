@@ -7,7 +7,8 @@
     X(imp__blendphase)                                                                   \
     X(imp__hg)                                                                           \
     X(imp__isotropic)                                                                    \
-    X(imp__rayleigh)
+    X(imp__rayleigh)                                                                     \
+    X(imp__tabphase)
 
 #define DECLARE(kind) extern const struct imp_phase_ops kind;
 PHASES(DECLARE)
