@@ -13,7 +13,7 @@
  * the length l that it flew in the medium, l times the bracket is an estimate, in which
  * what the walk itself brings from beyond is L and an extra walk from s gives S. One
  * stretch of a walk is chosen, by length times throughput, so that the cost is linear in
- * the walk's length. */
+ * the walk's length. Deep stretches of uniform media have no probe (tracking.h). */
 #ifndef IMP_WALK_PROBE_H
 #define IMP_WALK_PROBE_H
 
