@@ -25,6 +25,7 @@ static const char *const wavelength_words[] = {"stratified", "independent", "imp
                                                NULL};
 static const char *const files_words[] = {"broadcast", "shared", NULL};
 static const char *const from_words[] = {"scene", "sensor", "lights", NULL};
+static const char *const upsampling_words[] = {"sigmoid", "linear", NULL};
 static const char *const progress_words[] = {"auto", "always", "never", NULL};
 
 const struct arg_option options_file[] = {{ARG_TEXT, 'o', "output", "FILE",
@@ -62,6 +63,10 @@ const struct arg_option options_scene[] = {
      &cli.search, 0, 0, NULL},
     {ARG_CHOICE, 'm', "mode", "MODE", "colour: rgb (default), mono, spectral or single",
      &cli.mode, 0, 0, mode_words},
+    {ARG_CHOICE, 0, "upsampling", "HOW",
+     "of -m spectral and single: colours become spectra by a sigmoid (default), or by a "
+     "linear basis",
+     &cli.upsampling, 0, 0, upsampling_words},
     {ARG_TEXT, 0, "weights", "NAME=W[,..]",
      "densities of directions, in place of those of the scene file: kernel, emitters, "
      "environment, proxies, guide, uniform",
@@ -315,6 +320,7 @@ int cli_load(const char *path)
 
     cli.scene_path = path;
     options.mode = (enum imp_color_mode)cli.mode; /* mode_words have its order */
+    options.upsampling = (enum imp_upsampling)cli.upsampling;
     options.defines = cli.defines.item;
     options.n_defines = cli.defines.n;
     options.weights = cli.weights;

@@ -275,6 +275,11 @@ typedef struct imp_scene imp_scene;
  * film's response curves make of spectra (docs/spectra.md). */
 enum imp_color_mode { IMP_RGB = 0, IMP_MONO = 1, IMP_SPECTRAL = 2, IMP_SINGLE = 3 };
 
+/** How three numbers become a spectrum in spectral modes (docs/spectra.md): by the sigmoid
+ * of a quadratic, smooth as measured spectra are; or as the sum of three fixed spectra, so
+ * that all is linear in the numbers. */
+enum imp_upsampling { IMP_UPSAMPLING_SIGMOID = 0, IMP_UPSAMPLING_LINEAR = 1 };
+
 struct imp_load_options {
     size_t size;
     enum imp_color_mode mode;
@@ -289,10 +294,12 @@ struct imp_load_options {
     /** Not 0: the scene goes on without plugins and properties that this version does not
      * have, and imp_scene_info lists them. 1: each is a warning, too. */
     int lenient;
+    enum imp_upsampling upsampling;
 };
 #define IMP_LOAD_OPTIONS_INIT                                                            \
     {                                                                                    \
-        sizeof(struct imp_load_options), IMP_RGB, 0, 0, 0, 0, 0, 0                       \
+        sizeof(struct imp_load_options), IMP_RGB, 0, 0, 0, 0, 0, 0,                      \
+            IMP_UPSAMPLING_SIGMOID                                                       \
     }
 
 /** Load a scene file (Mitsuba 3 XML). The scene is committed and ready. `options` may be
@@ -388,6 +395,9 @@ struct imp_sensor_info {
     const char *file_format; /**< "openexr", "rgbe" or "pfm" */
     const char *unit;        /**< of its numbers: "W m^-2 sr^-1", of an irradiancemeter
                                 "W m^-2"; or "cd m^-2", "lx" where the scene says so */
+    /** Of a specfilm: the names of its response curves, which are its channels; else 0. */
+    int n_responses;
+    const char *const *response_names; /**< [n_responses] */
 };
 /** Set info->size first; strings belong to the scene.
  * @return IMP_OK; IMP_E_ARG if there is no such sensor. */

@@ -69,7 +69,12 @@ enum imp_input_flags {
                                     are, in all modes: not a colour */
     IMP_INPUT_EXTINCTION = 4096, /* of a medium: the extinction depends on it, and does
                                        not fall where it rises */
-    IMP_INPUT_VOLUME = 8192      /* may be a volume */
+    IMP_INPUT_VOLUME = 8192,     /* may be a volume */
+    /* In spectral modes: */
+    IMP_INPUT_DAYLIGHT = 16384, /* a bitmap's texels are daylight of their colours, of any
+                                   size */
+    IMP_INPUT_LINEAR = 32768    /* colours become spectra by the linear basis, so that
+                                   inputs add as their colours do */
 };
 
 struct imp_input_desc { /* the list ends with {0} */
@@ -258,6 +263,8 @@ struct imp_texture {
     const struct imp_input **input;
     int param; /* of its bulk data; -1: none */
     const char *name;
+    const struct imp_input_desc *asked; /* an input that it stands for; NULL: none yet.
+                                           `changed` is called when it is known */
 };
 
 enum imp_texture_flags {

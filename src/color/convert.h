@@ -21,6 +21,7 @@ struct imp__color_ask {
                     luminance */
     bool
         any_size; /* colours above 1 are lifted as they are, of a role that is no light */
+    bool linear;  /* colours are lifted by the linear basis */
 };
 
 /* What it turns into. In spectral modes `value` is the colour in rgb, for what needs no

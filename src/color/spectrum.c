@@ -130,11 +130,45 @@ void imp__spectrum_at(const struct imp_spectrum *s, double nm,
     for (int k = 0; k < out->n; k++) out->d[k] *= f;
 }
 
+/* Formulas have no bound that is simple: they are smooth, and looked at closely. */
+static double formula_most(const struct imp_spectrum *s)
+{
+    const double lo = imp_max(s->lo, IMP_CIE_FIRST_NM - 100),
+                 hi = imp_min(s->hi, IMP_CIE_LAST_NM + 300);
+    double most = 0;
+    for (double nm = lo; nm <= hi; nm += 1) most = fmax(most, form_value(s, nm));
+    return fmax(most, form_value(s, hi)) * 1.001;
+}
+
+double imp__spectrum_most(const struct imp_spectrum *s)
+{
+    double most = 0;
+    switch (s->form) {
+    case IMP_SPECTRUM_POINTS:
+        for (size_t k = 0; k < s->n; k++) most = fmax(most, s->value[k]);
+        break;
+    case IMP_SPECTRUM_NUMBER: most = fmax(s->value[0], 0); break;
+    case IMP_SPECTRUM_COLOR: most = imp__lifted_most(&s->lifted); break;
+    case IMP_SPECTRUM_BLACKBODY:
+    case IMP_SPECTRUM_SELLMEIER:
+    case IMP_SPECTRUM_CAUCHY: most = formula_most(s); break;
+    }
+    if (s->times) most *= imp__spectrum_most(s->times);
+    if (s->over) { /* of numbers and indices */
+        double least = INFINITY;
+        for (double nm = IMP_CIE_FIRST_NM; nm <= IMP_CIE_LAST_NM; nm += 1)
+            least = fmin(least, imp__spectrum_value(s->over, nm));
+        most /= least;
+    }
+    return most;
+}
+
 void imp__spectrum_update(struct imp_spectrum *s)
 {
     if (s->form != IMP_SPECTRUM_COLOR) return;
-    if (s->emission) imp__lift_unbounded(s->value, NULL, &s->lifted);
-    else imp__lift_reflectance(s->value, NULL, &s->lifted);
+    if (s->linear) imp__lift_linear(s->value, !s->emission, &s->lifted);
+    else if (s->emission) imp__lift_unbounded(s->value, &s->lifted);
+    else imp__lift_reflectance(s->value, &s->lifted);
 }
 
 /* ---- Daylight -------------------------------------------------------------------- */
@@ -168,6 +202,34 @@ void imp__spectrum_color(const struct imp_spectrum *s, bool daylight, double rgb
         value[i] = imp__spectrum_value(s, nm[i]);
     }
     imp__spectrum_to_rgb(POINTS, nm, value, daylight, rgb);
+}
+
+bool imp__spectrum_color_prepare(struct imp_arena *arena, bool daylight,
+                                 struct imp_spectrum *s)
+{
+    enum { POINTS = 1000 };
+    const double range = IMP_CIE_LAST_NM - IMP_CIE_FIRST_NM;
+    if (s->color_d) return true;
+    double *d = imp__arena_array(arena, s->n * 3, sizeof *d);
+    if (!d) return false;
+    for (int i = 0; i < POINTS && s->form != IMP_SPECTRUM_COLOR; i++) {
+        const double nm = IMP_CIE_FIRST_NM + range * i / (POINTS - 1);
+        const double light =
+            daylight ? imp__cie_lookup(imp__cie_d65, nm) / IMP_CIE_D65_SCALE : 1;
+        struct imp__spectrum_at at;
+        double xyz[3], rgb[3];
+        imp__spectrum_at(s, nm, &at);
+        for (int c = 0; c < 3; c++)
+            xyz[c] = light * imp__cie_lookup(imp__cie_xyz[c], nm) * range / POINTS /
+                     IMP_CIE_Y_INTEGRAL;
+        imp__xyz_to_rgb(xyz, rgb);
+        for (int k = 0; k < at.n; k++)
+            for (size_t c = 0; c < 3; c++)
+                d[3 * (at.first + (size_t)k) + c] += at.d[k] * rgb[c];
+    }
+    for (size_t k = 0; k < s->n && s->form == IMP_SPECTRUM_COLOR; k++) d[4 * k] = 1;
+    s->color_d = d;
+    return true;
 }
 
 /* ---- Making ---------------------------------------------------------------------- */

@@ -32,6 +32,8 @@ struct imp_spectrum {
     const struct imp_spectrum *times, *over; /* fixed; NULL: 1 */
     struct imp__lifted lifted;               /* COLOR: what follows from value */
     bool emission;                           /* COLOR: of any size, else <= 1 */
+    bool linear;                             /* COLOR: linear in its numbers */
+    double *color_d; /* [n][3] d colour/d number, where it was asked for; NULL */
 };
 
 /* Value at one wavelength, and its derivatives by numbers first .. first + n - 1. */
@@ -54,10 +56,17 @@ static inline double imp__spectrum_lookup(const struct imp_spectrum *s, double n
 }
 void imp__spectrum_at(const struct imp_spectrum *s, double nm,
                       struct imp__spectrum_at *out);
+/* No less than the value at any wavelength. */
+double imp__spectrum_most(const struct imp_spectrum *s);
 
 /* Colour in linear sRGB (docs/scene-format.md 2.3), not clamped. `daylight`: of a surface
  * of this reflectance under D65; else of a light of this power. */
 void imp__spectrum_color(const struct imp_spectrum *s, bool daylight, double rgb[3]);
+
+/* Sets color_d, of a form whose values are linear in its numbers, or a colour. False: no
+ * memory. */
+bool imp__spectrum_color_prepare(struct imp_arena *arena, bool daylight,
+                                 struct imp_spectrum *s);
 
 /* Numbers have changed: what is derived from them is made anew. */
 void imp__spectrum_update(struct imp_spectrum *s);

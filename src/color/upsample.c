@@ -1,23 +1,27 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The coefficients are found by Gauss-Newton steps with damping (Levenberg), which end
- * where the colour is met to 1e-10: all but the most saturated colours of sRGB, whose
- * spectra would have to be steeper than COEFFICIENT_MAX allows. */
+ * The coefficients are found by Gauss-Newton steps with damping (Levenberg) from the grey
+ * of the same mean, so that they depend on the colour alone. They end where the colour is
+ * met to 1e-12: all but the most saturated colours of sRGB, whose spectra would have to be
+ * steeper than COEFFICIENT_MAX allows. */
 #include "upsample.h"
 #include "base/compiler.h"
 #include "cie.h"
 #include "math/linalg.h"
 #include "rgb.h"
+#include "rgb_basis.h"
 #include <string.h>
 
 #define COEFFICIENT_MAX 200.0
 #define V_MAX           1e6 /* S(V_MAX) = 1 - 2.5e-13 */
 #define STEPS           60
-#define MET             1e-10
+#define MET             1e-12
 
+/* x; outside the range in which colours are seen, as at its ends. */
 static double place(double nm)
 {
-    return (nm - IMP_CIE_FIRST_NM) / (IMP_CIE_STEP_NM * (IMP_CIE_N - 1));
+    const double x = (nm - IMP_CIE_FIRST_NM) / (IMP_CIE_STEP_NM * (IMP_CIE_N - 1));
+    return imp_clamp(x, 0.0, 1.0);
 }
 static double sigmoid(double v) { return 0.5 + 0.5 * v / sqrt(1 + v * v); }
 static double sigmoid_d(double v)
@@ -108,8 +112,7 @@ static double grey_v(double a)
 }
 
 /* Coefficients, and d_c = (J/peak)^-1. */
-static void fit(const double target[3], const struct imp__lifted *near,
-                struct imp__lifted *out)
+static void fit(const double target[3], struct imp__lifted *out)
 {
     double weight[POINTS][3], rgb[3], J[9], peak, damping = 1e-6;
     double *c = out->c;
@@ -118,8 +121,6 @@ static void fit(const double target[3], const struct imp__lifted *near,
     const bool grey = target[0] == target[1] && target[1] == target[2];
     c[2] = grey ? grey_v(target[0])
                 : grey_v(imp_clamp((target[0] + target[1] + target[2]) / 3, 0.02, 0.98));
-    if (near && !grey && fabs(near->c[2]) < COEFFICIENT_MAX)
-        memcpy(c, near->c, sizeof near->c);
     colour_of(weight, c, rgb, J, &peak);
     double error = distance2(rgb, target);
     for (int step = 0; step < STEPS && !grey && error > MET * MET; step++) {
@@ -159,13 +160,12 @@ static void fit(const double target[3], const struct imp__lifted *near,
     }
 }
 
-void imp__lift_reflectance(const double rgb[3], const struct imp__lifted *near,
-                           struct imp__lifted *out)
+void imp__lift_reflectance(const double rgb[3], struct imp__lifted *out)
 {
     double inside[3];
     struct imp__lifted l = {.scale = 1};
     for (int k = 0; k < 3; k++) inside[k] = imp_clamp(rgb[k], 0.0, 1.0);
-    fit(inside, near, &l);
+    fit(inside, &l);
     for (int k = 0; k < 3; k++)
         if (rgb[k] < 0 || rgb[k] > 1)
             for (int i = 0; i < 3; i++) l.d_c[i][k] = 0;
@@ -173,8 +173,7 @@ void imp__lift_reflectance(const double rgb[3], const struct imp__lifted *near,
 }
 
 /* value = s S(c(rgb/s)), s = 2 m: the part of drgb along rgb changes the size alone. */
-void imp__lift_unbounded(const double rgb[3], const struct imp__lifted *near,
-                         struct imp__lifted *out)
+void imp__lift_unbounded(const double rgb[3], struct imp__lifted *out)
 {
     int top = 0;
     for (int k = 1; k < 3; k++)
@@ -184,7 +183,7 @@ void imp__lift_unbounded(const double rgb[3], const struct imp__lifted *near,
     struct imp__lifted l = {.scale = s};
     if (s > 0)
         for (int k = 0; k < 3; k++) part[k] = imp_max(rgb[k] / s, 0.0);
-    fit(part, near, &l);
+    fit(part, &l);
     l.d_scale[top] = 2;
     for (int i = 0; i < 3; i++) {
         double along = 0;
@@ -195,14 +194,36 @@ void imp__lift_unbounded(const double rgb[3], const struct imp__lifted *near,
     *out = l;
 }
 
+void imp__lift_linear(const double rgb[3], bool bounded, struct imp__lifted *out)
+{
+    struct imp__lifted l = {.linear = true};
+    for (int k = 0; k < 3; k++) {
+        const bool inside = rgb[k] >= 0 && !(bounded && rgb[k] > 1);
+        l.c[k] = inside ? rgb[k] : rgb[k] > 0;
+        l.d_scale[k] = inside;
+    }
+    *out = l;
+}
+
 double imp__lifted_value(const struct imp__lifted *l, double nm)
 {
+    if (l->linear) {
+        double b[3];
+        imp__rgb_basis(nm, b);
+        return l->c[0] * b[0] + l->c[1] * b[1] + l->c[2] * b[2];
+    }
     const double x = place(nm);
     return l->scale * sigmoid((l->c[0] * x + l->c[1]) * x + l->c[2]);
 }
 
 double imp__lifted_value_d(const struct imp__lifted *l, double nm, double d[3])
 {
+    if (l->linear) {
+        double b[3];
+        imp__rgb_basis(nm, b);
+        for (int k = 0; k < 3; k++) d[k] = l->d_scale[k] * b[k];
+        return l->c[0] * b[0] + l->c[1] * b[1] + l->c[2] * b[2];
+    }
     const double x = place(nm);
     const double v = (l->c[0] * x + l->c[1]) * x + l->c[2], S = sigmoid(v);
     const double slope = l->scale * sigmoid_d(v) / l->peak;
@@ -210,4 +231,16 @@ double imp__lifted_value_d(const struct imp__lifted *l, double nm, double d[3])
         d[k] = l->d_scale[k] * S +
                slope * ((l->d_c[0][k] * x + l->d_c[1][k]) * x + l->d_c[2][k]);
     return l->scale * S;
+}
+
+/* S rises with v, which is largest at an end or at the vertex of the parabola; the basis
+ * sums to 1. */
+double imp__lifted_most(const struct imp__lifted *l)
+{
+    const double *c = l->c;
+    if (l->linear) return imp_max(imp_max(c[0], c[1]), c[2]);
+    double v = imp_max(c[2], c[0] + c[1] + c[2]);
+    const double x = c[0] < 0 ? -c[1] / (2 * c[0]) : 0;
+    if (x > 0 && x < 1) v = imp_max(v, (c[0] * x + c[1]) * x + c[2]);
+    return l->scale * sigmoid(v);
 }

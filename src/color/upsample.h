@@ -7,29 +7,36 @@
  *     S(l) = 1/2 + v/(2 sqrt(1 + v^2)),   v = c0 x^2 + c1 x + c2,   x = (l - 360)/470
  *
  * with l in nm and c such that the linear sRGB colour of S under D65 is the given one.
- * Where that equation holds its derivative gives dc/drgb. */
+ * Where that equation holds its derivative gives dc/drgb. On request the spectrum is
+ * linear in the colour instead (rgb_basis.h), which derivatives and sums of colours like
+ * better and measured spectra resemble less. */
 #ifndef IMP_COLOR_UPSAMPLE_H
 #define IMP_COLOR_UPSAMPLE_H
 
 #include <math.h>
+#include <stdbool.h>
 
-/* scale S, and its derivatives by the colour's three numbers. */
+/* scale S, and its derivatives by the colour's three numbers; or, if linear, the sum of
+ * c_k B_k, whose derivatives are d_scale[k] B_k. */
 struct imp__lifted {
+    bool linear;
     double scale, c[3];
     double peak;                  /* the largest S'(v) of all wavelengths */
     double d_scale[3], d_c[3][3]; /* by r, g, b; d_c [i][k] = peak dc_i/drgb_k */
 };
 
-/* rgb in [0,1]; outside it is clamped, and its derivative there is 0. `near`: of a similar
- * colour, where the search begins; or NULL. */
-void imp__lift_reflectance(const double rgb[3], const struct imp__lifted *near,
-                           struct imp__lifted *out);
+/* rgb in [0,1]; outside it is clamped, and its derivative there is 0. */
+void imp__lift_reflectance(const double rgb[3], struct imp__lifted *out);
 /* rgb >= 0: 2 m S of rgb/(2 m), m its largest. */
-void imp__lift_unbounded(const double rgb[3], const struct imp__lifted *near,
-                         struct imp__lifted *out);
+void imp__lift_unbounded(const double rgb[3], struct imp__lifted *out);
+
+/* Linear. `bounded`: a reflectance, clamped to [0,1]; else rgb >= 0. */
+void imp__lift_linear(const double rgb[3], bool bounded, struct imp__lifted *out);
 
 double imp__lifted_value(const struct imp__lifted *l, double nm);
 /* d [3] by r, g, b. */
 double imp__lifted_value_d(const struct imp__lifted *l, double nm, double d[3]);
+/* No less than the value at any wavelength. */
+double imp__lifted_most(const struct imp__lifted *l);
 
 #endif

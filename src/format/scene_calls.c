@@ -64,7 +64,7 @@ enum imp_status imp_scene_create(imp_context *ctx, const struct imp_load_options
         IMP_TRY(imp__error(ctx, IMP_E_ARG,
                            "weights are of use with scene files only; set the "
                            "integrator's property"));
-    IMP_TRY(imp__scene_new(ctx, o.mode, &scene));
+    IMP_TRY(imp__scene_new(ctx, o.mode, o.upsampling, &scene));
     scene->lenient = o.lenient;
     IMP_TRY(imp__search_init(scene, o.search, o.n_search, NULL));
     scene->tree = imp__arena_array(&scene->arena, 1, sizeof *scene->tree);

@@ -17,6 +17,10 @@ enum imp_status imp__load_options(imp_context *ctx, const struct imp_load_option
     IMP_CHECKED(imp__options_take(ctx, "load", "options", from, to, sizeof *to));
     if ((int)to->mode < IMP_RGB || (int)to->mode > IMP_SINGLE)
         return imp__error(ctx, IMP_E_ARG, "colour mode %d is not known", (int)to->mode);
+    if ((int)to->upsampling < IMP_UPSAMPLING_SIGMOID ||
+        (int)to->upsampling > IMP_UPSAMPLING_LINEAR)
+        return imp__error(ctx, IMP_E_ARG, "upsampling %d is not known",
+                          (int)to->upsampling);
     if ((to->n_defines && !to->defines) || (to->n_search && !to->search))
         return imp__error(ctx, IMP_E_ARG, "definitions or search folders are NULL");
     return IMP_OK;
@@ -89,7 +93,7 @@ static enum imp_status load(imp_context *ctx, const struct imp_bytes *text,
 {
     enum imp_status st = IMP_OK;
     struct imp_scene *scene = NULL;
-    IMP_TRY(imp__scene_new(ctx, o->mode, &scene));
+    IMP_TRY(imp__scene_new(ctx, o->mode, o->upsampling, &scene));
     scene->lenient = o->lenient;
     IMP_TRY(imp__search_init(scene, o->search, o->n_search, folder));
     IMP_TRY(imp__xml_read(scene, text, name, o));

@@ -15,6 +15,7 @@ struct imp_build {
     struct imp_node *node;
     struct imp_arena *arena; /* lives as long as the scene */
     enum imp_color_mode mode;
+    bool linear_colors; /* colours become spectra by the linear basis */
     /* Register the bulk data of a texture as a parameter: `data` [count] in place, shape
      * `dims`. Sets *param. */
     enum imp_status (*add_bulk)(const struct imp_build *b, const char *key, float *data,
@@ -64,6 +65,10 @@ static inline void imp__inputs_eval(const struct imp_input *const *input, int n,
 void imp__inputs_scatter(const struct imp_input *const *input, int n,
                          const struct imp_texcoord *at, const imp_spec *in_bar,
                          struct imp_sink *sink);
+/* Lane by lane, no less than the input anywhere in the box, at any wavelength. A texture
+ * has a bound. */
+void imp__input_most(const struct imp_input *input, const imp_v3 *lo, const imp_v3 *hi,
+                     imp_spec *most);
 /* Derivative in a direction: in_dot [n]. */
 void imp__inputs_tangent(const struct imp_input *const *input, int n,
                          const struct imp_texcoord *at, imp_dot_fn *dot,

@@ -52,6 +52,7 @@ struct imp_build imp__build_make(struct imp_scene *scene, struct imp_node *node)
                               .node = node,
                               .arena = &scene->arena,
                               .mode = scene->mode,
+                              .linear_colors = scene->linear_colors,
                               .add_bulk = add_bulk,
                               .scene = scene};
 }
@@ -74,8 +75,10 @@ static enum imp_status add_bulk(const struct imp_build *b, const char *key, floa
     struct imp_scene *scene = b->scene;
     const struct imp_texture *t = b->node->object; /* set before build is called */
     struct imp_param p = {.store = IMP_STORE_BULK, .bulk = data};
-    if (imp__is_spectral(scene->mode) && n_dims > 0 && dims[n_dims - 1] == 3)
-        p.degree = IMP_DEGREE_OTHER; /* colours that are lifted to spectra */
+    if (imp__is_spectral(scene->mode) && !scene->linear_colors && n_dims > 0 &&
+        dims[n_dims - 1] == 3) /* colours that are lifted to spectra */
+        p.degree = t->asked && t->asked->flags & IMP_INPUT_DAYLIGHT ? IMP_DEGREE_FIRST
+                                                                    : IMP_DEGREE_OTHER;
     p.info.name = bulk_name(scene, t->name, key);
     if (!p.info.name) return imp__build_no_memory(scene);
     p.info.unit = "1";
@@ -102,19 +105,41 @@ out:
     return st;
 }
 
+static enum imp_status colour_prepare(struct imp_scene *scene, const struct imp_input *in,
+                                      enum imp_role role);
+
 static void texture_changed(void *payload)
 {
     const struct imp_texture *t = payload;
     t->ops->changed(t);
 }
 
+/* Do two inputs want the same spectra of a texture's colours? */
+static bool same_spectra(const struct imp_input_desc *a, const struct imp_input_desc *b)
+{
+    const bool reflect[2] = {a->role == IMP_REFLECTANCE, b->role == IMP_REFLECTANCE};
+    return ((a->flags ^ b->flags) & IMP_INPUT_DAYLIGHT) == 0 &&
+           (!((a->flags | b->flags) & IMP_INPUT_VOLUME) || reflect[0] == reflect[1]);
+}
+
 enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *node,
                                    const char *parent, const char *slot,
+                                   const struct imp_input_desc *asked,
                                    struct imp_texture **out)
 {
     enum imp_status st = IMP_OK;
     struct imp_texture *t = node->object;
     if (t) {
+        if (!t->asked) {
+            t->asked = asked;
+            if (t->ops->changed) t->ops->changed(t);
+        } else if (imp__is_spectral(scene->mode) && !same_spectra(t->asked, asked)) {
+            return imp__node_error(
+                scene->ctx, node, IMP_E_UNSUPPORTED,
+                "stands for '%s' and for '%s', which are different "
+                "spectra of the same colours: it must be written twice",
+                t->asked->name, asked->name);
+        }
         *out = t;
         return IMP_OK;
     }
@@ -134,7 +159,8 @@ enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *nod
     *t = (struct imp_texture){.ops = ops,
                               .self = self,
                               .param = -1,
-                              .name = imp__build_object_name(scene, node, parent, slot)};
+                              .name = imp__build_object_name(scene, node, parent, slot),
+                              .asked = asked};
     if (!t->name) IMP_TRY(imp__build_no_memory(scene));
     node->object = t;
     int n = 0;
@@ -144,6 +170,8 @@ enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *nod
     if (!input) IMP_TRY(imp__build_no_memory(scene));
     IMP_TRY(imp__build_inputs(scene, node, t->name, ops->inputs, input, &t->n_in));
     t->input = input;
+    for (int k = 0; k < t->n_in; k++)
+        IMP_TRY(colour_prepare(scene, t->input[k], ops->inputs[k].role));
     const struct imp_build b = imp__build_make(scene, node);
     if (ops->build) IMP_TRY(ops->build(&b, self, t));
     IMP_TRY(imp__props_finish(scene->ctx, node));
@@ -178,9 +206,24 @@ static bool formula(const struct imp_spectrum *s)
     return s && (s->form == IMP_SPECTRUM_SELLMEIER || s->form == IMP_SPECTRUM_CAUCHY);
 }
 
+/* A spectrum that may be asked for as a colour, or as one number: what its numbers do to
+ * that. */
+static enum imp_status colour_prepare(struct imp_scene *scene, const struct imp_input *in,
+                                      enum imp_role role)
+{
+    struct imp_spectrum *s = (struct imp_spectrum *)in->spectrum; /* the scene's own */
+    struct imp_input *own = (struct imp_input *)in;
+    if (!s || formula(s) || s->form == IMP_SPECTRUM_BLACKBODY) return IMP_OK;
+    if (!imp__spectrum_color_prepare(&scene->arena, role != IMP_EMISSION, s))
+        return imp__build_no_memory(scene);
+    imp__color_preview(s, role, in->scalar, &own->value);
+    return IMP_OK;
+}
+
 static enum imp_degree degree_of(const struct imp_spectrum *s)
 {
-    if (!s || s->form == IMP_SPECTRUM_POINTS || s->form == IMP_SPECTRUM_NUMBER)
+    if (!s || s->form == IMP_SPECTRUM_POINTS || s->form == IMP_SPECTRUM_NUMBER ||
+        (s->form == IMP_SPECTRUM_COLOR && s->linear))
         return IMP_DEGREE_LINEAR;
     return s->form == IMP_SPECTRUM_COLOR && s->emission ? IMP_DEGREE_FIRST
                                                         : IMP_DEGREE_OTHER;
@@ -302,14 +345,12 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
                                        .mode = scene->mode,
                                        .role = d->role,
                                        .scalar = scalar,
-                                       .any_size = d->flags & IMP_INPUT_EXTINCTION};
+                                       .any_size = d->flags & IMP_INPUT_EXTINCTION,
+                                       .linear = scene->linear_colors ||
+                                                 d->flags & IMP_INPUT_LINEAR};
     imp__node_ask(node, d->name);
     *in = (struct imp_input){.param = -1, .scalar = scalar};
     if (d->flags & IMP_INPUT_LUMINANCE) {
-        if (imp__is_spectral(scene->mode))
-            IMP_TRY(imp__node_error(ctx, node, IMP_E_UNSUPPORTED,
-                                    "needs the luminance of a colour, which a walk of "
-                                    "wavelengths does not know: use rgb or mono mode"));
         in->count = 1;
         return IMP_OK;
     }
@@ -346,7 +387,7 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
                                     "is a colour in one place and a vector in another: "
                                     "in mono mode each needs a texture of its own"));
         if (!child->node->object) child->node->vector = in->vector;
-        IMP_TRY(imp__build_texture(scene, child->node, name, d->name, &t));
+        IMP_TRY(imp__build_texture(scene, child->node, name, d->name, d, &t));
         in->texture = t;
         if (d->flags & IMP_INPUT_FIXED) imp__build_fix(scene, in);
         texels_bound(scene, t->param, d);
@@ -399,6 +440,8 @@ enum imp_status imp__build_inputs(struct imp_scene *scene, struct imp_node *node
             in->weight = scene->mode == IMP_MONO ? (imp_spec){1} : luminance;
             for (in->luminance = 1; in->luminance < count; in->luminance++)
                 if (strcmp(desc[count - in->luminance].name, d->name) == 0) break;
+            const int colour = count - in->luminance;
+            IMP_TRY(colour_prepare(scene, out[colour], desc[colour].role));
         }
         in->plain = !in->texture && !in->luminance && !(in->scalar && in->count == 3);
         out[count++] = in;

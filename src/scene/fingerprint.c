@@ -110,6 +110,7 @@ static uint64_t emitter_hash(uint64_t h, const struct imp_emitter *e)
 uint64_t imp__fingerprint_objects(const struct imp_scene *scene)
 {
     uint64_t h = HASH(0, scene->mode);
+    if (scene->linear_colors) h = HASH(h, scene->linear_colors);
     for (size_t i = 0; i < scene->root->n_children; i++) {
         const struct imp_child *c = &scene->root->children[i];
         if (c->node && is_object(c->node)) h = node_hash(h, c->node);

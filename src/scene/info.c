@@ -55,7 +55,9 @@ enum imp_status imp_scene_get_sensor(const imp_scene *scene, int sensor,
                                         .unit = s->shape
                                                     ? s->photometric ? "lx" : "W m^-2"
                                                 : s->photometric ? "cd m^-2"
-                                                                 : "W m^-2 sr^-1"};
+                                                                 : "W m^-2 sr^-1",
+                                        .n_responses = s->film.n_responses,
+                                        .response_names = s->film.response_name};
     IMP_GIVE(scene->ctx, info, all, "info");
     return IMP_OK;
 }

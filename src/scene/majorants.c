@@ -19,11 +19,9 @@ static double cell_bound(const struct imp_majorants *g, const int cell[3])
     }
     const struct imp_texcoord at = {.p = (lo + hi) * 0.5};
     imp__inputs_eval(m->input, m->n_own, &at, in);
-    for (int j = 0; j < m->n_own; j++) {
-        const struct imp_texture *t = m->input[j]->texture;
-        if (t && m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION)
-            t->ops->bound(t, &lo, &hi, m->input[j]->scalar, &in[j]);
-    }
+    for (int j = 0; j < m->n_own; j++)
+        if (m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION)
+            imp__input_most(m->input[j], &lo, &hi, &in[j]);
     m->ops->eval(m, in, &c);
     double most = 0;
     for (int k = 0; k < g->channels; k++) most = fmax(most, c.extinction[k]);

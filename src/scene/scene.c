@@ -4,7 +4,7 @@
 #include "scene.h"
 
 enum imp_status imp__scene_new(imp_context *ctx, enum imp_color_mode mode,
-                               struct imp_scene **out)
+                               enum imp_upsampling upsampling, struct imp_scene **out)
 {
     struct imp_scene *scene = imp__alloc(ctx, 1, sizeof *scene);
     if (!scene) return imp__error(ctx, IMP_E_NOMEM, "scene: out of memory");
@@ -15,6 +15,7 @@ enum imp_status imp__scene_new(imp_context *ctx, enum imp_color_mode mode,
     ctx->has_scenes = true;
     pthread_mutex_unlock(&ctx->lock);
     scene->mode = mode;
+    scene->linear_colors = upsampling == IMP_UPSAMPLING_LINEAR;
     scene->channels = mode == IMP_MONO ? 1 : 3;
     scene->lanes = imp__is_spectral(mode) ? 4 : scene->channels;
     scene->environment = -1;

@@ -85,8 +85,9 @@ struct imp_scene {
     imp_context *ctx;
     struct imp_arena arena; /* nodes, objects, names */
     enum imp_color_mode mode;
-    int channels; /* of a walk's radiance: 3 or 1 */
-    int lanes;    /* of its values: 4 wavelengths, else as many as channels */
+    bool linear_colors; /* become spectra by the linear basis */
+    int channels;       /* of a walk's radiance: 3 or 1 */
+    int lanes;          /* of its values: 4 wavelengths, else as many as channels */
     const struct imp_wavelengths *wavelengths; /* [n_sensors][IMP_WAVES_DRAWN]; NULL:
                                                   colours */
     bool committed;
@@ -141,7 +142,7 @@ struct imp_scene {
 /* ---- scene.c ------------------------------------------------------------------- */
 /* An empty scene without folders to search; imp_scene_destroy ends it. */
 enum imp_status imp__scene_new(imp_context *ctx, enum imp_color_mode mode,
-                               struct imp_scene **out);
+                               enum imp_upsampling upsampling, struct imp_scene **out);
 /* The last object owned is the first destroyed; on failure it is destroyed at once. */
 enum imp_status imp__scene_own(struct imp_scene *scene, void *object,
                                void (*destroy)(void *object));

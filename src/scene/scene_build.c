@@ -64,7 +64,7 @@ static enum imp_status top_build(struct imp_scene *scene, struct imp_child *chil
         struct imp_texture *t;
         if (strcmp(tag, "texture") == 0 && !imp__color_is_object(node)) {
             node->id = name;
-            IMP_TRY(imp__build_texture(scene, node, "", "", &t));
+            IMP_TRY(imp__build_texture(scene, node, "", "", NULL, &t));
         }
     } else if (strcmp(tag, "emitter") == 0) {
         const bool had_id = node->id;

@@ -36,8 +36,10 @@ bool imp__build_shaped(const struct imp_scene *scene,
 enum imp_status imp__build_watch(struct imp_scene *scene,
                                  const struct imp_input *const *input, int n,
                                  void (*changed)(void *payload), void *payload);
+/* asked: the input that it stands for; NULL: it is declared only. */
 enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *node,
                                    const char *parent, const char *slot,
+                                   const struct imp_input_desc *asked,
                                    struct imp_texture **out);
 
 enum imp_status imp__build_bsdf(struct imp_scene *scene, struct imp_node *node,

@@ -5,8 +5,10 @@
 #include "color/cie.h"
 #include "color/convert.h"
 #include "color/rgb.h"
+#include "color/rgb_basis.h"
 #include "color/wavelength.h"
 #include "imp_tap.h"
+#include "math/rng.h"
 #include <string.h>
 
 static imp_context *ctx;
@@ -40,7 +42,7 @@ static void upsampling(void)
                 const double rgb[3] = {i / 10., j / 10., k / 10.};
                 struct imp__lifted l;
                 double is[3], error = 0;
-                imp__lift_reflectance(rgb, NULL, &l);
+                imp__lift_reflectance(rgb, &l);
                 colour_of(&l, is);
                 for (int c = 0; c < 3; c++) error = fmax(error, fabs(is[c] - rgb[c]));
                 const bool edge = !(i && j && k) || i == 10 || j == 10 || k == 10;
@@ -56,8 +58,8 @@ static void upsampling(void)
                     memcpy(up, rgb, sizeof up);
                     memcpy(down, rgb, sizeof down);
                     up[c] += h, down[c] -= h;
-                    imp__lift_reflectance(up, NULL, &a);
-                    imp__lift_reflectance(down, NULL, &b);
+                    imp__lift_reflectance(up, &a);
+                    imp__lift_reflectance(down, &b);
                     for (double nm = 380; nm < 800; nm += 60) {
                         double d[3];
                         imp__lifted_value_d(&l, nm, d);
@@ -74,17 +76,87 @@ static void upsampling(void)
     tap_ok(derivative < 1e-4, "derivatives by r, g, b # %.1e", derivative);
 }
 
+/* The linear basis: nowhere negative, of sum 1, with the colours of the axes; derivatives;
+ * and bounds of both kinds of spectra. */
+static void linear(void)
+{
+    double least = 1, sum = 0, colour = 0, slope = 0, above = 0, tight = 0;
+    for (double nm = 350; nm <= 840; nm += 0.5) {
+        double b[3];
+        imp__rgb_basis(nm, b);
+        for (int c = 0; c < 3; c++) least = fmin(least, b[c]);
+        sum = fmax(sum, fabs(b[0] + b[1] + b[2] - 1));
+    }
+    for (int k = 0; k < 200; k++) {
+        double rgb[3], is[3], d[3];
+        for (int c = 0; c < 3; c++) {
+            rgb[c] = imp__u01(imp__key(1, 2, 3), (uint32_t)(3 * k + c));
+            if (k < 8) rgb[c] = k >> c & 1;
+        }
+        for (int form = 0; form < 3; form++) {
+            struct imp__lifted l;
+            double most = 0;
+            if (form == 0) imp__lift_linear(rgb, true, &l);
+            else if (form == 1) imp__lift_reflectance(rgb, &l);
+            else imp__lift_unbounded(rgb, &l);
+            for (double nm = 360; nm <= 830; nm += 0.5)
+                most = fmax(most, imp__lifted_value(&l, nm));
+            above = fmax(above, most - imp__lifted_most(&l));
+            if (form > 0) tight = fmax(tight, imp__lifted_most(&l) - most - 1e-3 * most);
+            if (form > 0) continue;
+            colour_of(&l, is);
+            for (int c = 0; c < 3; c++) colour = fmax(colour, fabs(is[c] - rgb[c]));
+            for (double nm = 380; nm < 800; nm += 37) {
+                const double v = imp__lifted_value_d(&l, nm, d);
+                slope =
+                    fmax(slope, fabs(v - rgb[0] * d[0] - rgb[1] * d[1] - rgb[2] * d[2]));
+            }
+        }
+    }
+    tap_ok(least >= 0 && sum < 1e-11, "the linear basis is a partition of 1 # %.1e", sum);
+    tap_ok(colour < 1e-4, "its colours are met under D65 # %.1e", colour);
+    tap_ok(slope < 1e-14, "and it is linear in them # %.1e", slope);
+    tap_ok(above <= 1e-12 && tight < 1e-3, "bounds hold, and are met # %.1e, %.1e", above,
+           tight);
+}
+
+/* Bounds of spectra, against a close look. */
+static void bounds(void)
+{
+    static const double nm[4] = {360, 500, 510, 830}, v[4] = {.1, .2, 7, .3}, T = 4000,
+                        B[6] = {1.04, .23, 1.01, .006, .02, 103.6};
+    const struct imp_spectrum *s[3] = {
+        imp__spectrum_make(&arena, IMP_SPECTRUM_POINTS, 4, nm, v),
+        imp__spectrum_make(&arena, IMP_SPECTRUM_BLACKBODY, 1, NULL, &T),
+        imp__spectrum_make(&arena, IMP_SPECTRUM_SELLMEIER, 6, NULL, B)};
+    int held = 0;
+    for (int k = 0; k < 3; k++) {
+        double most = 0;
+        for (double l = 360; l <= 830; l += 0.01)
+            most = fmax(most, imp__spectrum_value(s[k], l));
+        held += imp__spectrum_most(s[k]) >= most;
+    }
+    struct imp_spectrum lit = *s[0];
+    lit.times = &imp__daylight;
+    double most = 0;
+    for (double l = 360; l <= 830; l += 0.01)
+        most = fmax(most, imp__spectrum_value(&lit, l));
+    tap_ok(held == 3 && imp__spectrum_most(&lit) >= most, "bounds of spectra");
+}
+
 int main(void)
 {
     const struct imp_context_options options = {.size = sizeof options, .threads = 1};
     if (imp_context_create(&options, &ctx) != IMP_OK) return 1;
     imp__arena_init(&arena, ctx);
     upsampling();
+    linear();
+    bounds();
     for (int q = 0; q < 6; q++) {
         static const double rgb[6][3] = {{.2, .5, .9}, {.9, .05, .05}, {1, 0, 0},
                                          {.1, .8, .1}, {.5, .5, .1},   {.73, .72, .69}};
         struct imp__lifted l;
-        imp__lift_reflectance(rgb[q], NULL, &l);
+        imp__lift_reflectance(rgb[q], &l);
         printf("# ");
         for (int nm = 400; nm <= 700; nm += 50)
             printf(" %.4f", imp__lifted_value(&l, nm));

@@ -190,7 +190,7 @@ static enum imp_status load(imp_context *ctx, const struct imp_bytes *text,
 {
     enum imp_status st = IMP_OK;
     struct imp__bendfile l = {.ctx = ctx};
-    IMP_TRY(imp__scene_new(ctx, o->mode, &l.scene));
+    IMP_TRY(imp__scene_new(ctx, o->mode, o->upsampling, &l.scene));
     IMP_TRY(imp__search_init(l.scene, o->search, o->n_search, folder));
     IMP_TRY(imp__xml_read(l.scene, text, name, o));
     IMP_TRY(build(&l));

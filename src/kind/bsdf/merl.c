@@ -5,8 +5,9 @@
  *     f cos(theta_i) = scale (red rho_r + green rho_g + blue rho_b) cos(theta_i), front
  *
  * rho from a table (merl.h; docs/scene-format.md 5.2). red, green and blue are the colours of its three planes: in
- * rgb their own lanes, in mono their luminances, and by wavelength the spectra that the
- * scene's colours have, so that a material of three numbers needs no case for them.
+ * rgb their own lanes, in mono their luminances, and by wavelength the linear basis of
+ * colours (color/rgb_basis.h): what is grey stays grey, and nothing exceeds 1 that did
+ * not before.
  *
  * Directions are drawn by half-vectors, with the table's own lobe for the direction of
  * sight, and by the cosine: p = s cos/pi + (1 - s) p(h)/(4 wo.h). The cosine's share s
@@ -20,8 +21,8 @@ enum { SCALE, RED, GREEN, BLUE, N_INPUTS };
 
 #define PLANE(key)                                                                       \
     {                                                                                    \
-        .name = key, .role = IMP_REFLECTANCE, .flags = IMP_INPUT_FIXED, .fallback = 1,   \
-        .hi = 1, .unit = "1"                                                             \
+        .name = key, .role = IMP_REFLECTANCE,                                            \
+        .flags = IMP_INPUT_FIXED | IMP_INPUT_LINEAR, .fallback = 1, .hi = 1, .unit = "1" \
     }
 static const struct imp_input_desc inputs[] = {{.name = "scale",
                                                 .role = IMP_REFLECTANCE,
@@ -57,10 +58,6 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_b
     enum imp_status st = IMP_OK;
     struct merl *m = self;
     const char *filename;
-    if (b->mode == IMP_SPECTRAL || b->mode == IMP_SINGLE)
-        IMP_TRY(imp_build_error(b, NULL, IMP_E_UNSUPPORTED,
-                                "is measured in red, green and blue: in rgb and mono "
-                                "modes only"));
     IMP_TRY(imp_build_string(b, "filename", NULL, &filename));
     m->table = b->node->merl;
     if (!m->table)

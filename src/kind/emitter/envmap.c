@@ -27,20 +27,23 @@
 
 enum { DATA, SCALE, ROTATION };
 
-static const struct imp_input_desc inputs[] = {
-    {.name = "data", .role = IMP_EMISSION, .fallback = 1, .unit = "W m^-2 sr^-1"},
-    {.name = "scale",
-     .role = IMP_UNBOUNDED,
-     .flags = IMP_INPUT_SCALAR,
-     .fallback = 1,
-     .unit = "1"},
-    {.name = "rotation",
-     .role = IMP_UNBOUNDED,
-     .flags = IMP_INPUT_SCALAR,
-     .lo = -INFINITY,
-     .hi = INFINITY,
-     .unit = "degree"},
-    {0}};
+static const struct imp_input_desc inputs[] = {{.name = "data",
+                                                .role = IMP_EMISSION,
+                                                .flags = IMP_INPUT_DAYLIGHT,
+                                                .fallback = 1,
+                                                .unit = "W m^-2 sr^-1"},
+                                               {.name = "scale",
+                                                .role = IMP_UNBOUNDED,
+                                                .flags = IMP_INPUT_SCALAR,
+                                                .fallback = 1,
+                                                .unit = "1"},
+                                               {.name = "rotation",
+                                                .role = IMP_UNBOUNDED,
+                                                .flags = IMP_INPUT_SCALAR,
+                                                .lo = -INFINITY,
+                                                .hi = INFINITY,
+                                                .unit = "degree"},
+                                               {0}};
 
 struct envmap {
     struct imp__sphere_map map;
@@ -119,9 +122,6 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_e
     bool compensation;
     int projection;
 
-    if (b->mode == IMP_SPECTRAL || b->mode == IMP_SINGLE)
-        IMP_TRY(imp_build_error(b, NULL, IMP_E_UNSUPPORTED,
-                                "maps of the sky are in rgb and mono modes only"));
     IMP_TRY(imp_build_string(b, "filename", NULL, &filename));
     IMP_TRY(imp_build_choice(b, "projection", projections, 2, IMP_LATLONG, &projection));
     /* Mitsuba's, for less noise: accepted, without effect here. */

@@ -5,8 +5,9 @@
  * itself: eval, scatter and tangent all go through `footprint`. */
 #include "bitmap.h"
 #include "color/rgb.h"
-#include "color/upsample.h"
+#include "color/spectrum.h"
 #include "input.h"
+#include "lifted_texels.h"
 #include "math/vec.h"
 #include "uv.h"
 #include <math.h>
@@ -23,12 +24,10 @@ struct bitmap {
     enum filter filter;
     bool identity; /* to_uv does nothing */
     struct imp__to_uv to_uv;
-    float *data; /* [height][width][channels], and one number more */
-    /* [height][width] of three channels in a spectral mode; NULL: values are colours. */
-    struct texel {
-        struct imp__lifted lifted;
-        float of[3]; /* what it was made from */
-    } * texels;
+    float *data;                      /* [height][width][channels], and one number more */
+    bool spectral;                    /* walks carry wavelengths */
+    bool daylight;                    /* ... in which it is times daylight */
+    struct imp__lifted_texels lifted; /* of three channels in a spectral mode */
 };
 
 /* Pixels in one more number than needed: three channels are read with one load of four.
@@ -66,36 +65,14 @@ static enum imp_status data_convert(const struct imp_build *b,
     return IMP_OK;
 }
 
-/* Spectra of texels that have others now; `all`: of all. Equal neighbours have equal
- * spectra. */
-static void texels_lift(struct bitmap *t, bool all)
-{
-    const size_t w = (size_t)t->width, n = w * (size_t)t->height;
-    for (size_t i = 0; i < n; i++) {
-        struct texel *to = &t->texels[i];
-        const float *p = t->data + 3 * i;
-        if (!all && memcmp(p, to->of, sizeof to->of) == 0) continue;
-        const struct texel *near = all ? (i ? to - 1 : NULL) : to;
-        const double rgb[3] = {p[0], p[1], p[2]};
-        if (all && i && memcmp(p, to[-1].of, sizeof to->of) == 0) {
-            *to = to[-1];
-            continue;
-        }
-        if (all && i >= w && memcmp(p, to[-(ptrdiff_t)w].of, sizeof to->of) == 0) {
-            *to = to[-(ptrdiff_t)w];
-            continue;
-        }
-        if (rgb[0] > 1 || rgb[1] > 1 || rgb[2] > 1)
-            imp__lift_unbounded(rgb, near ? &near->lifted : NULL, &to->lifted);
-        else imp__lift_reflectance(rgb, near ? &near->lifted : NULL, &to->lifted);
-        memcpy(to->of, p, sizeof to->of);
-    }
-}
-
+/* Another input may ask first, or texels be set. */
 static void changed(const struct imp_texture *tex)
 {
     struct bitmap *t = tex->self;
-    if (t->texels) texels_lift(t, false);
+    t->daylight = t->spectral && tex->asked && tex->asked->flags & IMP_INPUT_DAYLIGHT;
+    if (t->channels != 3 || !t->spectral) return;
+    imp__lifted_texels_update(&t->lifted,
+                              t->daylight ? IMP__LIFT_ANY_SIZE : IMP__LIFT_BY_SIZE);
 }
 
 static enum imp_status build(const struct imp_build *b, void *self,
@@ -135,13 +112,11 @@ static enum imp_status build(const struct imp_build *b, void *self,
     t->identity = memcmp(&id, &t->to_uv, sizeof id) == 0;
     IMP_TRY(data_convert(b, im, raw, t));
 
-    if (t->channels == 3 && (b->mode == IMP_SPECTRAL || b->mode == IMP_SINGLE)) {
-        const size_t n = (size_t)t->width * (size_t)t->height;
-        t->texels = imp__arena_take(b->arena, n, sizeof *t->texels);
-        if (!t->texels)
-            IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "bitmap does not fit as spectra"));
-        texels_lift(t, true);
-    }
+    t->spectral = b->mode == IMP_SPECTRAL || b->mode == IMP_SINGLE;
+    if (t->channels == 3 && t->spectral)
+        IMP_TRY(imp__lifted_texels_make(b, t->data, (size_t)t->width * (size_t)t->height,
+                                        (size_t)t->width, &t->lifted));
+    changed(tex);
 
     const size_t dims[3] = {(size_t)t->height, (size_t)t->width, (size_t)t->channels};
     float lo = 0;
@@ -217,59 +192,24 @@ static inline void footprint(const struct bitmap *t, const struct imp_texcoord *
     f->weight[3] = a * b;
 }
 
-/* ---- Wavelengths: the spectra of texels are interpolated ------------------------- */
+/* ---- Wavelengths ------------------------------------------------------------------- */
 
 static bool by_wavelength(const struct bitmap *t, const struct imp_texcoord *at,
                           bool scalar)
 {
-    return imp_unlikely(at->carried != NULL) && t->texels && !scalar;
+    return imp_unlikely(at->carried != NULL) && t->spectral && !scalar;
 }
-
-static void spectral_eval(const struct bitmap *t, const struct footprint *f,
-                          const struct imp_carried *carried, imp_spec *value)
+static struct imp__texel_sum seen(const struct footprint *f)
 {
-    for (int j = 0; j < carried->n; j++) {
-        double sum = 0;
-        for (int k = 0; k < f->n; k++)
-            sum += f->weight[k] *
-                   imp__lifted_value(&t->texels[f->texel[k]].lifted, carried->nm[j]);
-        (*value)[j] = sum;
-    }
-    for (int j = carried->n; j < 4; j++) (*value)[j] = (*value)[0];
+    return (struct imp__texel_sum){f->n, f->texel, f->weight};
 }
-
-static void spectral_scatter(const struct imp_texture *tex, const struct footprint *f,
-                             const struct imp_carried *carried, const imp_spec *bar,
-                             struct imp_sink *sink)
+/* What grey texels, too, are times. */
+static imp_spec light(const struct bitmap *t, const struct imp_carried *carried)
 {
-    const struct bitmap *t = tex->self;
-    for (int k = 0; k < f->n; k++) {
-        imp_spec part[3] = {{0}, {0}, {0}};
-        for (int j = 0; j < carried->n; j++) {
-            double d[3];
-            imp__lifted_value_d(&t->texels[f->texel[k]].lifted, carried->nm[j], d);
-            for (int c = 0; c < 3; c++) part[c][j] = (*bar)[j] * f->weight[k] * d[c];
-        }
-        for (size_t c = 0; c < 3; c++)
-            sink->add(sink, tex->param, 3 * f->texel[k] + c, 1, &part[c]);
-    }
-}
-
-static void spectral_tangent(const struct imp_texture *tex, const struct footprint *f,
-                             const struct imp_carried *carried, imp_dot_fn *dot,
-                             const void *x_dot, imp_spec *value_dot)
-{
-    const struct bitmap *t = tex->self;
-    *value_dot = imp__spec(0);
-    for (int k = 0; k < f->n && tex->param >= 0; k++)
-        for (int j = 0; j < carried->n; j++) {
-            double d[3];
-            imp__lifted_value_d(&t->texels[f->texel[k]].lifted, carried->nm[j], d);
-            for (size_t c = 0; c < 3; c++)
-                (*value_dot)[j] +=
-                    f->weight[k] * d[c] * dot(x_dot, tex->param, 3 * f->texel[k] + c);
-        }
-    for (int j = carried->n; j < 4; j++) (*value_dot)[j] = (*value_dot)[0];
+    imp_spec f = imp__spec(1);
+    for (int j = 0; j < 4 && t->daylight; j++)
+        f[j] = imp__spectrum_value(&imp__daylight, carried->nm[j]);
+    return f;
 }
 
 /* ---- Values -------------------------------------------------------------------------- */
@@ -280,14 +220,17 @@ static void eval(const struct imp_texture *tex, const struct imp_texcoord *at,
     const struct bitmap *t = tex->self;
     struct footprint f;
     footprint(t, at, &f);
-    if (by_wavelength(t, at, scalar)) {
-        spectral_eval(t, &f, at->carried, value);
-        return;
-    }
     if (t->channels == 1) {
         double sum = 0;
         for (int k = 0; k < f.n; k++) sum += f.weight[k] * t->data[f.texel[k]];
         *value = imp__spec(sum);
+        if (by_wavelength(t, at, scalar)) *value *= light(t, at->carried);
+        return;
+    }
+    if (by_wavelength(t, at, scalar)) {
+        const struct imp__texel_sum sum = seen(&f);
+        imp__lifted_texels_eval(&t->lifted, &sum, at->carried, value);
+        *value *= light(t, at->carried);
         return;
     }
     imp_spec sum = imp__spec(0);
@@ -306,12 +249,15 @@ static void scatter(const struct imp_texture *tex, const struct imp_texcoord *at
     struct footprint f;
     if (tex->param < 0) return;
     footprint(t, at, &f);
-    if (by_wavelength(t, at, scalar)) {
-        spectral_scatter(tex, &f, at->carried, bar, sink);
+    imp_spec own = *bar;
+    if (by_wavelength(t, at, scalar)) own *= light(t, at->carried);
+    if (by_wavelength(t, at, scalar) && t->channels == 3) {
+        const struct imp__texel_sum sum = seen(&f);
+        imp__lifted_texels_scatter(&t->lifted, &sum, at->carried, tex->param, &own, sink);
         return;
     }
     for (int k = 0; k < f.n; k++) {
-        const imp_spec part = *bar * f.weight[k];
+        const imp_spec part = own * f.weight[k];
         if (t->channels == 1) sink->add(sink, tex->param, f.texel[k], 1, &part);
         else if (scalar) imp__luminance_scatter(sink, tex->param, 3 * f.texel[k], part);
         else sink->add(sink, tex->param, 3 * f.texel[k], 3, &part);
@@ -325,8 +271,11 @@ static void tangent(const struct imp_texture *tex, const struct imp_texcoord *at
     struct footprint f;
     imp_spec sum = imp__spec(0);
     footprint(t, at, &f);
-    if (by_wavelength(t, at, scalar)) {
-        spectral_tangent(tex, &f, at->carried, dot, x_dot, value_dot);
+    if (by_wavelength(t, at, scalar) && t->channels == 3) {
+        const struct imp__texel_sum seen_at = seen(&f);
+        imp__lifted_texels_tangent(&t->lifted, &seen_at, at->carried, tex->param, dot,
+                                   x_dot, value_dot);
+        *value_dot *= light(t, at->carried);
         return;
     }
     for (int k = 0; k < f.n && tex->param >= 0; k++) {
@@ -343,6 +292,7 @@ static void tangent(const struct imp_texture *tex, const struct imp_texcoord *at
     *value_dot = scalar && t->channels == 3
                      ? imp__spec(imp__luminance(sum[0], sum[1], sum[2]))
                      : sum;
+    if (by_wavelength(t, at, scalar)) *value_dot *= light(t, at->carried);
 }
 
 /* Bilinear lookups alone: the others jump. Rows of to_uv give d(u', v')/d(u, v). */
@@ -359,6 +309,13 @@ static bool slope(const struct imp_texture *tex, const struct imp_texcoord *at,
         texel[k] = t->channels == 1 ? imp__spec(p[0]) : (imp_spec){p[0], p[1], p[2], 0};
         if (scalar && t->channels == 3)
             texel[k] = imp__spec(imp__luminance(p[0], p[1], p[2]));
+        if (by_wavelength(t, at, scalar)) {
+            const double one = 1;
+            const struct imp__texel_sum own = {1, &f.texel[k], &one};
+            if (t->channels == 3)
+                imp__lifted_texels_eval(&t->lifted, &own, at->carried, &texel[k]);
+            texel[k] *= light(t, at->carried);
+        }
     }
     const double a = f.weight[1] + f.weight[3], b = f.weight[2] + f.weight[3];
     d[0] = ((texel[1] - texel[0]) * (1 - b) + (texel[3] - texel[2]) * b) * t->width;

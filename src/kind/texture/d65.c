@@ -28,11 +28,13 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_t
                                "'scale' must be finite and not negative");
     return IMP_OK;
 }
-static imp_spec factor(const struct imp_texture *t, const struct imp_texcoord *at)
+/* As one number it is the scale alone. */
+static imp_spec factor(const struct imp_texture *t, const struct imp_texcoord *at,
+                       bool scalar)
 {
     const struct d65 *d = t->self;
     imp_spec f = imp__spec(d->scale);
-    if (at->carried)
+    if (at->carried && !scalar)
         for (int k = 0; k < 4; k++)
             f[k] *= imp__spectrum_value(&imp__daylight, at->carried->nm[k]);
     return f;
@@ -41,19 +43,19 @@ static void eval(const struct imp_texture *t, const struct imp_texcoord *at, boo
                  imp_spec *value)
 {
     imp_input_eval(t->input[0], at, scalar, value);
-    *value *= factor(t, at);
+    *value *= factor(t, at, scalar);
 }
 static void scatter(const struct imp_texture *t, const struct imp_texcoord *at,
                     bool scalar, const imp_spec *bar, struct imp_sink *sink)
 {
-    const imp_spec scaled = *bar * factor(t, at);
+    const imp_spec scaled = *bar * factor(t, at, scalar);
     imp_input_scatter(t->input[0], at, scalar, &scaled, sink);
 }
 static void tangent(const struct imp_texture *t, const struct imp_texcoord *at,
                     bool scalar, imp_dot_fn *dot, const void *x_dot, imp_spec *value_dot)
 {
     imp_input_tangent(t->input[0], at, scalar, dot, x_dot, value_dot);
-    *value_dot *= factor(t, at);
+    *value_dot *= factor(t, at, scalar);
 }
 
 const struct imp_texture_ops imp__d65 = {.size = sizeof(struct imp_texture_ops),

@@ -32,10 +32,18 @@ static imp_spec mean(double r, double g, double b) { return imp__spec((r + g + b
 
 /* ---- Wavelengths ----------------------------------------------------------------- */
 
-/* Is it looked up by wavelength? */
-static bool by_wavelength(const struct imp_input *input, const struct imp_texcoord *at)
+/* Is a colour asked for as one number? Then it is the number of the mode rgb, whatever
+ * walks carry; a scalar input that is a spectrum has a number at each wavelength. */
+static bool as_number(const struct imp_input *input, bool scalar)
 {
-    return imp_unlikely(at->carried != NULL) && input->spectrum;
+    return scalar && !input->scalar;
+}
+/* Is it looked up by wavelength? */
+static bool by_wavelength(const struct imp_input *input, const struct imp_texcoord *at,
+                          bool scalar)
+{
+    return imp_unlikely(at->carried != NULL) && input->spectrum &&
+           !as_number(input, scalar);
 }
 
 static void spectrum_eval(const struct imp_input *input, const struct imp_carried *c,
@@ -76,6 +84,47 @@ static void spectrum_tangent(const struct imp_input *input, const struct imp_car
     for (int k = c->n; k < 4; k++) (*value_dot)[k] = (*value_dot)[0];
 }
 
+/* As a colour, though the mode has spectra: luminances ask so, and numbers made of
+ * colours. The colour is that of imp__color_preview. */
+static bool by_colour(const struct imp_input *input, const struct imp_texcoord *at,
+                      bool scalar)
+{
+    return input->spectrum && input->spectrum->color_d &&
+           (!at->carried || as_number(input, scalar));
+}
+
+static double colour_slope(const struct imp_input *input, size_t k, size_t c)
+{
+    const bool cut = input->value[c] == 0 || input->value[c] == 1;
+    if (cut && input->spectrum->form != IMP_SPECTRUM_COLOR) return 0;
+    return input->spectrum->color_d[3 * k + c];
+}
+
+static void colour_scatter(const struct imp_input *input, bool number,
+                           const imp_spec *bar, struct imp_sink *sink)
+{
+    for (size_t k = 0; k < input->spectrum->n; k++) {
+        imp_spec part = {0};
+        double sum = 0;
+        for (size_t c = 0; c < 3; c++) {
+            part[c] = (*bar)[c] * colour_slope(input, k, c);
+            sum += colour_slope(input, k, c) / 3;
+        }
+        if (number) part = *bar * sum;
+        sink->add(sink, input->param, k, 1, &part);
+    }
+}
+
+static void colour_tangent(const struct imp_input *input, bool number, imp_dot_fn *dot,
+                           const void *x_dot, imp_spec *value_dot)
+{
+    imp_spec sum = {0};
+    for (size_t k = 0; k < input->spectrum->n; k++)
+        for (size_t c = 0; c < 3; c++)
+            sum[c] += colour_slope(input, k, c) * dot(x_dot, input->param, k);
+    *value_dot = number ? mean(sum[0], sum[1], sum[2]) : sum;
+}
+
 /* ---- One input ------------------------------------------------------------------- */
 
 static void input_eval(const struct imp_input *input, const struct imp_texcoord *at,
@@ -87,8 +136,8 @@ static void input_eval(const struct imp_input *input, const struct imp_texcoord 
         input->texture->ops->eval(input->texture, &plain, false, value);
     } else if (input->texture)
         input->texture->ops->eval(input->texture, at, scalar, value);
-    else if (by_wavelength(input, at)) spectrum_eval(input, at->carried, value);
-    else if (scalar && input->count == 3)
+    else if (by_wavelength(input, at, scalar)) spectrum_eval(input, at->carried, value);
+    else if (scalar && (input->count == 3 || by_colour(input, at, scalar)))
         *value = mean(input->value[0], input->value[1], input->value[2]);
     else *value = input->value;
 }
@@ -99,7 +148,9 @@ static void input_scatter(const struct imp_input *input, const struct imp_texcoo
     if (input->texture)
         input->texture->ops->scatter(input->texture, at, scalar, bar, sink);
     else if (input->param < 0) return;
-    else if (by_wavelength(input, at)) spectrum_scatter(input, at->carried, bar, sink);
+    else if (by_wavelength(input, at, scalar))
+        spectrum_scatter(input, at->carried, bar, sink);
+    else if (by_colour(input, at, scalar)) colour_scatter(input, scalar, bar, sink);
     else if (scalar && input->count == 3)
         weighted_scatter(sink, input->param, 0, *bar, third);
     else sink->add(sink, input->param, 0, input->count == 3 ? 3 : 1, bar);
@@ -113,8 +164,10 @@ static void input_tangent(const struct imp_input *input, const struct imp_texcoo
         input->texture->ops->tangent(input->texture, at, scalar, dot, x_dot, value_dot);
     } else if (input->param < 0) {
         *value_dot = imp__spec(0);
-    } else if (by_wavelength(input, at)) {
+    } else if (by_wavelength(input, at, scalar)) {
         spectrum_tangent(input, at->carried, dot, x_dot, value_dot);
+    } else if (by_colour(input, at, scalar)) {
+        colour_tangent(input, scalar, dot, x_dot, value_dot);
     } else if (input->count != 3) {
         *value_dot = imp__spec(dot(x_dot, input->param, 0));
     } else {
@@ -122,6 +175,16 @@ static void input_tangent(const struct imp_input *input, const struct imp_texcoo
                      b = dot(x_dot, input->param, 2);
         *value_dot = scalar ? mean(r, g, b) : (imp_spec){r, g, b, 0};
     }
+}
+
+void imp__input_most(const struct imp_input *input, const imp_v3 *lo, const imp_v3 *hi,
+                     imp_spec *most)
+{
+    const struct imp_texcoord at = {.p = (*lo + *hi) * 0.5};
+    const struct imp_texture *t = input->texture;
+    if (t) t->ops->bound(t, lo, hi, input->scalar, most);
+    else if (input->spectrum) *most = imp__spec(imp__spectrum_most(input->spectrum));
+    else input_eval(input, &at, input->scalar, most);
 }
 
 /* For textures with inputs. */
@@ -166,6 +229,23 @@ static double weighted(imp_spec weight, imp_spec value)
     return sum;
 }
 
+/* Walks that carry wavelengths look the colour up once more, as a colour. */
+static struct imp_texcoord as_colour(const struct imp_texcoord *at)
+{
+    struct imp_texcoord colour = *at;
+    colour.carried = NULL;
+    return colour;
+}
+static double luminance_of(const struct imp_input *colour, imp_spec weight,
+                           const struct imp_texcoord *at, imp_spec value)
+{
+    if (at->carried) {
+        const struct imp_texcoord plain = as_colour(at);
+        input_eval(colour, &plain, colour->scalar, &value);
+    }
+    return weighted(weight, value);
+}
+
 /* Takes what a colour's numbers get through a luminance: all of it belongs to the lane of
  * the picture that asked, whichever number it goes to. */
 struct one_lane {
@@ -189,12 +269,14 @@ static void luminance_scatter(const struct imp_input *colour, imp_spec weight,
                               const struct imp_texcoord *at, const imp_spec *bar,
                               struct imp_sink *sink)
 {
-    for (int lane = 0; lane < 3; lane++) {
+    const struct imp_texcoord plain = as_colour(at);
+    const int lanes = at->carried ? at->carried->n : 3;
+    for (int lane = 0; lane < lanes; lane++) {
         struct one_lane one = {{one_lane_add, sink->apart}, sink, lane};
-        if (weight[lane] == 0) continue; /* a lane that is not used */
+        if (!at->carried && weight[lane] == 0) continue; /* a lane that is not used */
         const imp_spec part = weight * (*bar)[lane];
         if (part[0] != 0 || part[1] != 0 || part[2] != 0)
-            input_scatter(colour, at, colour->scalar, &part, &one.sink);
+            input_scatter(colour, &plain, colour->scalar, &part, &one.sink);
     }
 }
 
@@ -208,7 +290,8 @@ void imp__inputs_look_up(const struct imp_input *const *input, int n,
         const struct imp_input *i = input[j];
         if (imp_likely(i->plain && colours)) in[j] = i->value;
         else if (i->luminance)
-            in[j] = imp__spec(weighted(i->weight, in[j - i->luminance]));
+            in[j] = imp__spec(luminance_of(input[j - i->luminance], i->weight, at,
+                                           in[j - i->luminance]));
         else input_eval(i, at, i->scalar, &in[j]);
     }
 }
@@ -237,8 +320,14 @@ void imp__inputs_tangent(const struct imp_input *const *input, int n,
 {
     for (int j = 0; j < n; j++) {
         const struct imp_input *i = input[j];
-        if (imp_unlikely(i->luminance))
-            in_dot[j] = imp__spec(weighted(i->weight, in_dot[j - i->luminance]));
-        else input_tangent(i, at, i->scalar, dot, x_dot, &in_dot[j]);
+        if (imp_unlikely(i->luminance)) {
+            imp_spec colour_dot = in_dot[j - i->luminance];
+            if (at->carried) {
+                const struct imp_texcoord plain = as_colour(at);
+                input_tangent(input[j - i->luminance], &plain, false, dot, x_dot,
+                              &colour_dot);
+            }
+            in_dot[j] = imp__spec(weighted(i->weight, colour_dot));
+        } else input_tangent(i, at, i->scalar, dot, x_dot, &in_dot[j]);
     }
 }

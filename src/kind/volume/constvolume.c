@@ -38,8 +38,8 @@ static void tangent(const struct imp_texture *t, const struct imp_texcoord *at,
 static void bound(const struct imp_texture *t, const imp_v3 *lo, const imp_v3 *hi,
                   bool scalar, imp_spec *most)
 {
-    const struct imp_texcoord at = {.p = (*lo + *hi) * 0.5};
-    eval(t, &at, scalar, most);
+    imp__input_most(t->input[VALUE], lo, hi, most);
+    if (scalar) imp_spec_fill(most, fmax(fmax((*most)[0], (*most)[1]), (*most)[2]));
 }
 static void extent(const struct imp_texture *t, double to_unit[12], int cells[3])
 {

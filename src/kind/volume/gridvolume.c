@@ -6,6 +6,7 @@
 #include "box.h"
 #include "color/rgb.h"
 #include "kind/texture/input.h"
+#include "kind/texture/lifted_texels.h"
 #include <math.h>
 #include <string.h>
 
@@ -17,7 +18,9 @@ struct gridvolume {
     enum wrap wrap;
     enum filter filter;
     struct imp_mat4 to_unit;
-    float *data; /* [n[2]][n[1]][n[0]][channels] */
+    float *data;                      /* [n[2]][n[1]][n[0]][channels] */
+    bool spectral;                    /* three channels, and walks carry wavelengths */
+    struct imp__lifted_texels lifted; /* ... of the cells */
 };
 
 static enum imp_status box_read(const struct imp_build *b, const struct imp_grid_data *g,
@@ -40,6 +43,15 @@ static enum imp_status box_read(const struct imp_build *b, const struct imp_grid
     }
 out:
     return st;
+}
+
+static void changed(const struct imp_texture *tex)
+{
+    struct gridvolume *v = tex->self;
+    const bool bounded = tex->asked && tex->asked->role == IMP_REFLECTANCE;
+    if (!v->spectral) return;
+    imp__lifted_texels_update(&v->lifted,
+                              bounded ? IMP__LIFT_REFLECTANCE : IMP__LIFT_ANY_SIZE);
 }
 
 static enum imp_status build(const struct imp_build *b, void *self,
@@ -68,9 +80,6 @@ static enum imp_status build(const struct imp_build *b, void *self,
     v->wrap = (enum wrap)wrap;
     v->filter = (enum filter)filter;
     memcpy(v->n, g->n, sizeof v->n);
-    if (g->channels == 3 && (b->mode == IMP_SPECTRAL || b->mode == IMP_SINGLE))
-        return imp_build_error(b, NULL, IMP_E_UNSUPPORTED,
-                               "grids of three channels are in rgb and mono modes only");
     const bool grey = g->channels == 3 && b->mode == IMP_MONO;
     v->channels = grey ? 1 : g->channels;
     const size_t cells = (size_t)v->n[0] * (size_t)v->n[1] * (size_t)v->n[2],
@@ -88,6 +97,10 @@ static enum imp_status build(const struct imp_build *b, void *self,
         IMP_TRY(imp_build_error(b, "max_value", IMP_E_SCENE,
                                 "max_value = %g, and a value of the grid is %g",
                                 max_value, most));
+    v->spectral = v->channels == 3 && (b->mode == IMP_SPECTRAL || b->mode == IMP_SINGLE);
+    if (v->spectral)
+        IMP_TRY(imp__lifted_texels_make(b, v->data, cells, (size_t)v->n[0], &v->lifted));
+    changed(tex);
     const size_t grid[3] = {(size_t)v->n[2], (size_t)v->n[1], (size_t)v->n[0]};
     const size_t colours[3] = {grid[0] * grid[1], grid[2], 3};
     IMP_TRY(imp_build_texels(b, "data", v->data, 3, v->channels == 1 ? grid : colours,
@@ -138,12 +151,23 @@ static void footprint(const struct gridvolume *v, imp_v3 p, struct footprint *f)
     }
 }
 
+static bool by_wavelength(const struct gridvolume *v, const struct imp_texcoord *at,
+                          bool scalar)
+{
+    return imp_unlikely(at->carried != NULL) && v->spectral && !scalar;
+}
+
 static void eval(const struct imp_texture *t, const struct imp_texcoord *at, bool scalar,
                  imp_spec *value)
 {
     const struct gridvolume *v = t->self;
     struct footprint f;
     footprint(v, at->p, &f);
+    if (by_wavelength(v, at, scalar)) {
+        const struct imp__texel_sum seen = {f.n, f.cell, f.weight};
+        imp__lifted_texels_eval(&v->lifted, &seen, at->carried, value);
+        return;
+    }
     if (v->channels == 1) {
         double sum = 0;
         for (int k = 0; k < f.n; k++) sum += f.weight[k] * v->data[f.cell[k]];
@@ -164,6 +188,11 @@ static void scatter(const struct imp_texture *t, const struct imp_texcoord *at,
     const struct gridvolume *v = t->self;
     struct footprint f;
     footprint(v, at->p, &f);
+    if (by_wavelength(v, at, scalar)) {
+        const struct imp__texel_sum seen = {f.n, f.cell, f.weight};
+        imp__lifted_texels_scatter(&v->lifted, &seen, at->carried, t->param, bar, sink);
+        return;
+    }
     for (int k = 0; k < f.n; k++) {
         const imp_spec part = *bar * f.weight[k];
         if (v->channels == 1) sink->add(sink, t->param, f.cell[k], 1, &part);
@@ -179,6 +208,12 @@ static void tangent(const struct imp_texture *t, const struct imp_texcoord *at,
     struct footprint f;
     imp_spec sum = {0};
     footprint(v, at->p, &f);
+    if (by_wavelength(v, at, scalar)) {
+        const struct imp__texel_sum seen = {f.n, f.cell, f.weight};
+        imp__lifted_texels_tangent(&v->lifted, &seen, at->carried, t->param, dot, x_dot,
+                                   value_dot);
+        return;
+    }
     for (int k = 0; k < f.n; k++)
         if (v->channels == 1)
             sum += imp__spec(f.weight[k] * dot(x_dot, t->param, f.cell[k]));
@@ -219,7 +254,9 @@ static void bound(const struct imp_texture *t, const imp_v3 *lo, const imp_v3 *h
                 const size_t cell =
                     ((size_t)z * (size_t)v->n[1] + (size_t)y) * (size_t)v->n[0] +
                     (size_t)x;
-                for (int c = 0; c < 4; c++)
+                for (int c = 0; c < 4 && v->spectral && !scalar; c++)
+                    max[c] = fmax(max[c], imp__lifted_texels_most(&v->lifted, cell));
+                for (int c = 0; c < 4 && !(v->spectral && !scalar); c++)
                     max[c] = fmax(
                         max[c],
                         v->data[cell * (size_t)v->channels + (size_t)(c % v->channels)]);
@@ -242,4 +279,5 @@ const struct imp_texture_ops imp__gridvolume = {.size = sizeof(struct imp_textur
                                                 .scatter = scatter,
                                                 .tangent = tangent,
                                                 .bound = bound,
-                                                .extent = extent};
+                                                .extent = extent,
+                                                .changed = changed};
