@@ -277,8 +277,24 @@ static int colour_channels(imp_film *film, int n, int index[3])
     return 1;
 }
 
+/* Those of a film's response curves, by name. */
+static int curve_channels(imp_film *film, const char *path,
+                          const struct imp_film_info *info,
+                          const struct imp_sensor_info *sensor, int *index)
+{
+    for (int c = 0; c < sensor->n_responses; c++) {
+        index[c] = channel_index(film, info->channels, sensor->response_names[c]);
+        if (index[c] < 0)
+            return cli_error(EXIT_USAGE,
+                             "%s has no channel '%s', which is a response curve of the "
+                             "sensor's film",
+                             path, sensor->response_names[c]);
+    }
+    return 0;
+}
+
 /* What becomes of one pixel's numbers; se's are added in squares. */
-static double mix(const float *from, const int index[3], int squares)
+static double mix(const float *from, const int *index, int squares)
 {
     double sum = 0;
     for (int c = 0; c < 3; c++) {
@@ -288,7 +304,7 @@ static double mix(const float *from, const int index[3], int squares)
     return squares ? sqrt(sum) : sum;
 }
 
-static float *extract(const float *from, size_t n_pixels, int stride, const int index[3],
+static float *extract(const float *from, size_t n_pixels, int stride, const int *index,
                       int channels_in, int channels_out, int squares)
 {
     float *out = cli_alloc(n_pixels * (size_t)channels_out, sizeof *out);
@@ -369,7 +385,8 @@ int picture_target(const char *spec, const char *mask, struct imp_target *target
                          mask_info = {.size = sizeof mask_info};
     struct imp_scene_info scene = {.size = sizeof scene};
     imp_film *film = NULL, *weights = NULL;
-    int index[3];
+    struct imp_sensor_info sensor = {.size = sizeof sensor};
+    int *index = NULL;
     const char *at = sensor_part(spec);
     char *path = at ? strndup(spec, (size_t)(at - spec)) : strdup(spec);
     if (!path) return cli_error(EXIT_RUN, "out of memory");
@@ -383,12 +400,19 @@ int picture_target(const char *spec, const char *mask, struct imp_target *target
     if (rc) goto out;
     imp_scene_get_info(cli.scene, &scene);
     imp_film_get_info(film, &info);
-    const int channels = colour_channels(film, info.channels, index);
-    const size_t n = (size_t)info.width * (size_t)info.height;
     target->sensor = at ? picture_sensor(spec) : cli.sensor;
+    if (imp_scene_get_sensor(cli.scene, target->sensor, &sensor) != IMP_OK)
+        sensor.n_responses = 0; /* which the problem will say */
+    index = cli_alloc((size_t)sensor.n_responses + 3, sizeof *index);
+    int channels = sensor.n_responses;
+    if (channels) rc = curve_channels(film, path, &info, &sensor, index);
+    else channels = colour_channels(film, info.channels, index);
+    if (rc) goto out;
+    const size_t n = (size_t)info.width * (size_t)info.height;
     target->width = info.width;
     target->height = info.height;
-    target->channels = channels < scene.channels ? channels : scene.channels;
+    target->channels =
+        channels < scene.channels || sensor.n_responses ? channels : scene.channels;
     target->pixels = extract(imp_film_mean(film), n, info.channels, index, channels,
                              target->channels, 0);
     if (imp_film_se(film))
@@ -411,6 +435,7 @@ int picture_target(const char *spec, const char *mask, struct imp_target *target
 out:
     imp_film_destroy(film);
     imp_film_destroy(weights);
+    free(index);
     free(path);
     if (rc) picture_target_free(target);
     return rc;

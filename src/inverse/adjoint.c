@@ -56,20 +56,19 @@ double imp__replicate_adjoints(const struct imp__target *target, int channels,
 {
     const struct imp_target *t = &target->desc;
     const double scale = t->scale * (target->weights ? target->weights[pixel] : 1);
-    const bool same = t->channels == channels;
+    const bool luminance = imp__sees_luminance(target, channels);
     double value = 0, l[IMP_REPLICATE_MAX], a[IMP_REPLICATE_MAX];
     for (int i = 0; i < n; i++) P[i] = (imp_spec){0};
     for (int c = 0; c < t->channels; c++) {
         const struct loss f = {t->loss, scale, t->epsilon,
                                target->pixels[pixel * (size_t)t->channels + (size_t)c]};
         for (int i = 0; i < n; i++)
-            l[i] = imp__seen(t->channels, channels,
-                             (double[3]){L[i][0], L[i][1], L[i][2]}, c);
+            l[i] = imp__seen(luminance, (double[3]){L[i][0], L[i][1], L[i][2]}, c);
         value += imp__loss_quadratic(t->loss) ? leave_one_out(&f, n, l, a)
                                               : jackknife(&f, n, l, a);
         for (int i = 0; i < n; i++)
-            if (same) P[i][c] = a[i];
-            else P[i] = imp__seen_bar(t->channels, channels, &a[i]);
+            if (luminance) P[i] = imp__seen_bar(true, 1, &a[i]);
+            else P[i][c] = a[i];
     }
     return value;
 }

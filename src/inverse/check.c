@@ -97,7 +97,7 @@ enum imp_status imp_check(imp_problem *p, const struct imp_check_options *option
     c.run.progress = inner_progress;
     c.run.progress_payload = &c;
     if (c.options.fresh_spp > 0) c.run.spp = c.options.fresh_spp;
-    IMP_TRY(imp__problem_tracer(p, &c.outer, &c.tracer));
+    IMP_TRY(imp__problem_tracer(p, &c.outer, NULL, &c.tracer));
     imp__arena_free(&p->check_arena);
 
     if (c.options.sampling) {

@@ -41,7 +41,7 @@ out:
 }
 
 static enum imp_status target_estimate(struct imp_problem *p,
-                                       const struct imp__target *target,
+                                       const struct imp__target *target, int part,
                                        const struct imp_run *run, double lo, double hi,
                                        double start_s, bool want_gradient,
                                        struct imp__totals *totals)
@@ -50,8 +50,7 @@ static enum imp_status target_estimate(struct imp_problem *p,
     struct imp__splat splat = {0};
     struct imp__gradient_job j = {
         .problem = p, .totals = totals, .target = target, .want_gradient = want_gradient};
-    own.sensor = target->desc.sensor;
-    enum imp_status st = imp__problem_tracer_of_any_end(p, &own, &j.tracer);
+    enum imp_status st = imp__target_tracer(p, target, part, true, &own, &j.tracer);
     if (st != IMP_OK) return st;
     if (j.tracer.integrator->from_lights && want_gradient && totals->many)
         return imp__error(p->ctx, IMP_E_UNSUPPORTED,
@@ -77,9 +76,14 @@ static enum imp_status targets_estimate(struct imp_problem *p, const struct imp_
 {
     const double start = imp__now(), n = (double)p->n_targets;
     enum imp_status st = IMP_OK;
-    for (size_t t = 0; t < p->n_targets && st == IMP_OK; t++)
-        st = target_estimate(p, &p->targets[t], run, (double)t / n, (double)(t + 1) / n,
-                             start, want_gradient, totals);
+    for (size_t t = 0; t < p->n_targets; t++) {
+        const int parts = imp__target_parts(&p->targets[t]);
+        for (int k = 0; k < parts && st == IMP_OK; k++)
+            st = target_estimate(p, imp__target_part(&p->targets[t], k), k, run,
+                                 ((double)t + (double)k / parts) / n,
+                                 ((double)t + (double)(k + 1) / parts) / n, start,
+                                 want_gradient, totals);
+    }
     return st;
 }
 
@@ -176,7 +180,7 @@ enum imp_status imp_problem_reverse(imp_problem *p, const float *seed_image,
         .problem = p, .totals = &totals, .seed = seed_image, .want_gradient = true};
     IMP_TRY(imp__problem_same(p, &own, "reverse"));
     IMP_TRY(imp__totals_begin(p, false, gradient, gradient_se, &totals));
-    IMP_TRY(imp__problem_tracer_of_any_end(p, &own, &j.tracer));
+    IMP_TRY(imp__problem_tracer_of_any_end(p, &own, NULL, &j.tracer));
     IMP_TRY(imp__adjoint_check(p, &j.tracer.sensor->film, seed_image, "seed_image"));
     if (j.tracer.integrator->from_lights) {
         IMP_TRY(imp__light_reverse(p, &j.tracer, seed_image, &own, &totals));

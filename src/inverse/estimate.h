@@ -34,14 +34,23 @@ enum imp_status imp__problem_objective(struct imp_problem *p, const double *x,
                                        const struct imp_run *run, bool in_place,
                                        struct imp_estimate *objective, double *gradient,
                                        double *gradient_se);
-/* The tracer of a sensor for this problem, with every reason to refuse checked. */
+/* The tracer of a sensor for this problem, with every reason to refuse checked. waves
+ * [IMP_WAVES_DRAWN]: wavelengths and responses in place of the sensor's; or NULL. */
 enum imp_status imp__problem_tracer(const struct imp_problem *p,
-                                    const struct imp_run *run, struct imp_tracer *out);
+                                    const struct imp_run *run,
+                                    const struct imp_wavelengths *waves,
+                                    struct imp_tracer *out);
 /* The same, and walks may begin at the lights: whoever calls it makes those, and takes
  * frozen collisions for derivatives with respect to extinctions. */
 enum imp_status imp__problem_tracer_of_any_end(const struct imp_problem *p,
                                                const struct imp_run *run,
+                                               const struct imp_wavelengths *waves,
                                                struct imp_tracer *out);
+/* That of a part of a target, of any end or not; `run` becomes what is run for it. */
+enum imp_status imp__target_tracer(const struct imp_problem *p,
+                                   const struct imp__target *target, int part,
+                                   bool any_end, struct imp_run *run,
+                                   struct imp_tracer *out);
 /* Are all numbers of an adjoint image finite? `name` is the argument's. */
 enum imp_status imp__adjoint_check(const struct imp_problem *problem,
                                    const struct imp_film_desc *film, const float *adjoint,

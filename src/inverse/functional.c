@@ -173,7 +173,7 @@ static enum imp_status begin(imp_problem *p, const float *adjoint,
                              double **weights, float **ones)
 {
     imp_context *ctx = p->ctx;
-    const enum imp_status st = imp__problem_tracer_of_any_end(p, run, &f->tracer);
+    const enum imp_status st = imp__problem_tracer_of_any_end(p, run, NULL, &f->tracer);
     if (st != IMP_OK) return st;
     f->film = &f->tracer.sensor->film;
     f->channels = p->scene->channels;

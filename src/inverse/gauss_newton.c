@@ -68,7 +68,7 @@ static struct imp__normal_sums sums_at(double *p, size_t K)
 static int seen_channels(const struct job *j) { return j->target->desc.channels; }
 static double seen(const struct job *j, const double *lanes, int c)
 {
-    return imp__seen(seen_channels(j), j->channels, lanes, c);
+    return imp__seen(imp__sees_luminance(j->target, j->channels), lanes, c);
 }
 
 /* One replicate of a pixel: adds to the tile's matrices with factor `share`, writes its
@@ -260,14 +260,13 @@ static enum imp_status workers_create(struct job *j, imp_context *ctx)
 }
 
 static enum imp_status target_add(struct job *j, const struct imp__target *target,
-                                  const struct imp_run *run, double lo, double hi,
-                                  double start)
+                                  int part, const struct imp_run *run, double lo,
+                                  double hi, double start)
 {
     const struct imp_problem *p = j->problem;
     struct imp_run own = *run;
-    own.sensor = target->desc.sensor;
     j->target = target;
-    enum imp_status st = imp__problem_tracer(p, &own, &j->tracer);
+    enum imp_status st = imp__target_tracer(p, target, part, false, &own, &j->tracer);
     if (st != IMP_OK) return st;
     const struct imp_film_desc *film = &j->tracer.sensor->film;
     if (imp__film_border(film) > 0) {
@@ -354,8 +353,11 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
 
     const double start = imp__now(), targets = (double)p->n_targets;
     for (size_t t = 0; t < p->n_targets; t++) {
-        IMP_TRY(target_add(&j, &p->targets[t], &own, (double)t / targets,
-                           (double)(t + 1) / targets, start));
+        const int parts = imp__target_parts(&p->targets[t]);
+        for (int k = 0; k < parts; k++)
+            IMP_TRY(target_add(&j, imp__target_part(&p->targets[t], k), k, &own,
+                               ((double)t + (double)k / parts) / targets,
+                               ((double)t + (double)(k + 1) / parts) / targets, start));
         residuals +=
             (double)(p->targets[t].desc.channels) * pixels_in_use(&p->targets[t]);
         const int bias = imp__loss_bias_order(p->targets[t].desc.loss);

@@ -38,7 +38,7 @@ enum imp_status imp_problem_forward(imp_problem *p, const double *x_dot,
     IMP_READS(p->scene);
     struct forward f = {.x_dot = x_dot, .channels = p->scene->channels};
     enum imp_status st = imp__problem_same(p, &own, "forward");
-    if (st == IMP_OK) st = imp__problem_tracer(p, &own, &f.tracer);
+    if (st == IMP_OK) st = imp__problem_tracer(p, &own, NULL, &f.tracer);
     if (st != IMP_OK) return st;
     const struct imp_picture picture = {.sensor = f.tracer.sensor,
                                         .stage = "derivative",
@@ -77,7 +77,7 @@ enum imp_status imp_problem_jacobian(imp_problem *p, const struct imp_run *run,
     imp_film **made = imp__alloc(ctx, (size_t)n, sizeof *made);
     if (!made) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory"));
     IMP_TRY(imp__problem_same(p, &own, "jacobian"));
-    IMP_TRY(imp__problem_tracer(p, &own, &tracer));
+    IMP_TRY(imp__problem_tracer(p, &own, NULL, &tracer));
     const struct imp_picture picture = {.sensor = tracer.sensor,
                                         .stage = "jacobian",
                                         .names = C == 3 ? "R,G,B" : "Y",

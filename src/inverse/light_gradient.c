@@ -202,6 +202,7 @@ static double group_loss(struct sets *s)
 {
     const struct imp_target *t = &s->target->desc;
     const int n = s->channels;
+    const bool luminance = imp__sees_luminance(s->target, n);
     double sum = 0;
     for (size_t p = 0; p < s->pixels; p++) {
         const double scale = t->scale * (s->target->weights ? s->target->weights[p] : 1);
@@ -211,7 +212,7 @@ static double group_loss(struct sets *s)
             double I[2];
             struct imp__loss_at at;
             for (int k = 0; k < 2; k++)
-                I[k] = imp__seen(t->channels, n, s->image[k] + p * (size_t)n, c);
+                I[k] = imp__seen(luminance, s->image[k] + p * (size_t)n, c);
             for (int k = 0; k < 2; k++) {
                 imp__loss_eval(t->loss, scale, t->epsilon, I[k], T, &at);
                 bar[1 - k][c] = at.d1;
@@ -225,7 +226,7 @@ static double group_loss(struct sets *s)
             }
         }
         for (int k = 0; k < 2; k++) {
-            const imp_spec P = imp__seen_bar(t->channels, n, bar[k]);
+            const imp_spec P = imp__seen_bar(luminance, t->channels, bar[k]);
             for (int c = 0; c < n; c++) s->adjoint[k][p * (size_t)n + (size_t)c] = P[c];
         }
     }
@@ -274,7 +275,7 @@ enum imp_status imp__light_objective(struct imp_problem *p,
     struct imp_splat_scale scale = {0};
     struct sets s = {.target = target, .channels = p->scene->channels};
     double *g = NULL, *sum = NULL, *square = NULL, value = 0, value2 = 0;
-    IMP_TRY(imp__problem_tracer_of_any_end(p, run, &tracer));
+    IMP_TRY(imp__problem_tracer_of_any_end(p, run, NULL, &tracer));
     if (imp__team_shares(ctx))
         IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,
                            "losses of walks from the lights are not divided between "

@@ -35,18 +35,11 @@ out:
     return st;
 }
 
-static void target_free(imp_context *ctx, struct imp__target *t)
-{
-    imp__release(ctx, t->pixels);
-    imp__release(ctx, t->weights);
-    imp__release(ctx, t->noise_se);
-}
-
 void imp_problem_destroy(imp_problem *p)
 {
     if (!p) return;
     imp_context *ctx = p->ctx;
-    for (size_t i = 0; i < p->n_targets; i++) target_free(p->ctx, &p->targets[i]);
+    for (size_t i = 0; i < p->n_targets; i++) imp__target_free(p->ctx, &p->targets[i]);
     imp__release(p->ctx, p->targets);
     for (size_t i = 0; i < p->n_regularisers; i++) {
         imp__release(p->ctx, p->regularisers[i].on);
@@ -271,7 +264,14 @@ enum imp_status imp_problem_add_target(imp_problem *p, const struct imp_target *
                            "target is %d x %d, but sensor %d ('%s') makes %d x %d pixels",
                            d->width, d->height, d->sensor, sensor.name ? sensor.name : "",
                            sensor.width, sensor.height));
-    if (d->channels != 1 && d->channels != p->scene->channels)
+    const bool other = sensor.n_responses > 0 && sensor.n_responses != 3;
+    if (other && d->channels != sensor.n_responses)
+        IMP_TRY(
+            imp__error(p->ctx, IMP_E_ARG,
+                       "target has %d channels; the film of sensor %d has %d response "
+                       "curves",
+                       d->channels, d->sensor, sensor.n_responses));
+    if (!other && d->channels != 1 && d->channels != p->scene->channels)
         IMP_TRY(imp__error(p->ctx, IMP_E_ARG,
                            "target has %d channels; this scene's pictures have %d",
                            d->channels, p->scene->channels));
@@ -295,6 +295,7 @@ enum imp_status imp_problem_add_target(imp_problem *p, const struct imp_target *
     t.desc.pixels = t.pixels;
     t.desc.weights = t.weights;
     t.desc.noise_se = t.noise_se;
+    IMP_TRY(imp__target_split(p, &t));
 
     struct imp__target *grown =
         imp__grow(p->ctx, p->targets, &p->cap_targets, p->n_targets + 1, sizeof *grown);
@@ -303,7 +304,7 @@ enum imp_status imp_problem_add_target(imp_problem *p, const struct imp_target *
     p->targets[p->n_targets++] = t;
     return IMP_OK;
 out:
-    target_free(p->ctx, &t);
+    imp__target_free(p->ctx, &t);
     return st;
 }
 

@@ -8,12 +8,35 @@
 
 #include "base/film.h"
 #include "base/pool.h"
+#include "color/wavelength.h"
+#include "scene/scene.h"
 #include "walk/walk.h"
+
+struct imp_problem;
 
 struct imp__target {
     struct imp_target desc; /* pixels, weights, noise_se point to copies */
     float *pixels, *weights, *noise_se;
+    /* Of a film with response curves, unless they are three: targets of up to three of
+     * its curves, each with walks of its own; they share the weights. n_parts 0: none. */
+    int n_parts;
+    struct imp__target *part;
+    bool of_curves;                                /* it is such a part */
+    struct imp_wavelengths waves[IMP_WAVES_DRAWN]; /* of a part: its curves */
 };
+static inline int imp__target_parts(const struct imp__target *t)
+{
+    return t->n_parts ? t->n_parts : 1;
+}
+static inline const struct imp__target *imp__target_part(const struct imp__target *t,
+                                                         int k)
+{
+    return t->n_parts ? &t->part[k] : t;
+}
+/* ---- target_curves.c ---- */
+/* Makes the parts; t has been checked. */
+enum imp_status imp__target_split(struct imp_problem *p, struct imp__target *t);
+void imp__target_free(imp_context *ctx, struct imp__target *t);
 
 struct imp__regulariser {
     enum { IMP_TIKHONOV, IMP_SMOOTHNESS } kind;

@@ -24,6 +24,7 @@ static double picture_loss(const struct imp__splat *s, const imp_film *film)
 {
     const struct imp_target *t = &s->target->desc;
     const size_t pixels = (size_t)film->width * (size_t)film->height;
+    const bool luminance = imp__sees_luminance(s->target, s->channels);
     double total = 0;
     for (size_t p = 0; p < pixels; p++) {
         const double scale = t->scale * (s->target->weights ? s->target->weights[p] : 1);
@@ -33,9 +34,9 @@ static double picture_loss(const struct imp__splat *s, const imp_film *film)
                 mean[k] = film->mean[p * (size_t)s->channels + (size_t)k];
                 se[k] = film->se[p * (size_t)s->channels + (size_t)k];
             }
-            const double I = imp__seen(t->channels, s->channels, mean, c);
+            const double I = imp__seen(luminance, mean, c);
             /* Channels of a sample correlate: the luminance of their errors. */
-            const double variance = imp__sqr(imp__seen(t->channels, s->channels, se, c));
+            const double variance = imp__sqr(imp__seen(luminance, se, c));
             const double T = s->target->pixels[p * (size_t)t->channels + (size_t)c];
             struct imp__loss_at at;
             imp__loss_eval(t->loss, scale, t->epsilon, I, T, &at);
@@ -115,21 +116,22 @@ static imp_spec pixel_adjoint(const struct imp__splat *s, int b, size_t p, doubl
     double bar[3] = {0, 0, 0}, rest[3];
     if (!s->target) {
         for (int c = 0; c < n; c++) bar[c] = s->seed[p * (size_t)n + (size_t)c];
-        return imp__seen_bar(n, n, bar);
+        return imp__seen_bar(false, n, bar);
     }
     const struct imp_target *t = &s->target->desc;
     const double scale = t->scale * (s->target->weights ? s->target->weights[p] : 1);
     const double W = s->weights[b][p];
+    const bool luminance = imp__sees_luminance(s->target, n);
     const float *mean = s->films[b]->mean + p * (size_t)n;
     for (int c = 0; c < n; c++) /* alone in its pixel: without it there is no estimate */
         rest[c] = W - w > 1e-9 * W ? (mean[c] * W - w * L[c]) / (W - w) : mean[c];
     for (int c = 0; c < t->channels; c++) {
         struct imp__loss_at at;
-        imp__loss_eval(t->loss, scale, t->epsilon, imp__seen(t->channels, n, rest, c),
+        imp__loss_eval(t->loss, scale, t->epsilon, imp__seen(luminance, rest, c),
                        s->target->pixels[p * (size_t)t->channels + (size_t)c], &at);
         bar[c] = at.d1;
     }
-    return imp__seen_bar(t->channels, n, bar);
+    return imp__seen_bar(luminance, t->channels, bar);
 }
 
 imp_spec imp__splat_adjoint(const struct imp__splat *s, int b, double px, double py,

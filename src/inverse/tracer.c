@@ -50,9 +50,11 @@ static enum imp_status gaps_allowed(const struct imp_problem *p,
 }
 
 enum imp_status imp__problem_tracer(const struct imp_problem *p,
-                                    const struct imp_run *run, struct imp_tracer *out)
+                                    const struct imp_run *run,
+                                    const struct imp_wavelengths *waves,
+                                    struct imp_tracer *out)
 {
-    const enum imp_status st = imp__problem_tracer_of_any_end(p, run, out);
+    const enum imp_status st = imp__problem_tracer_of_any_end(p, run, waves, out);
     if (st != IMP_OK || !out->integrator->from_lights) return st;
     return imp__error(p->ctx, IMP_E_UNSUPPORTED,
                       "walks from the lights make pictures, losses, their gradients and "
@@ -62,6 +64,7 @@ enum imp_status imp__problem_tracer(const struct imp_problem *p,
 
 enum imp_status imp__problem_tracer_of_any_end(const struct imp_problem *p,
                                                const struct imp_run *run,
+                                               const struct imp_wavelengths *waves,
                                                struct imp_tracer *out)
 {
     const struct imp_sensor *sensor;
@@ -101,12 +104,17 @@ enum imp_status imp__problem_tracer_of_any_end(const struct imp_problem *p,
                                .seed = run->seed,
                                .guide = imp__guide_of(p->scene, integrator, run->guide),
                                .collisions_stand = integrator->from_lights};
-    if (sensor->film.n_responses > 0 && sensor->film.n_responses != 3)
-        return imp__error(p->ctx, IMP_E_UNSUPPORTED,
-                          "derivatives and losses are of films with three channels; this "
-                          "specfilm has %d response curves",
-                          sensor->film.n_responses);
+    if (!waves && sensor->film.n_responses > 0 && sensor->film.n_responses != 3)
+        return imp__error(
+            p->ctx, IMP_E_UNSUPPORTED,
+            "derivatives of pictures are of films with three channels; this "
+            "specfilm has %d response curves (a loss takes any number)",
+            sensor->film.n_responses);
     imp__tracer_waves(out, run, 0);
+    if (waves)
+        out->wavelengths =
+            &waves[run->wavelengths == IMP_WAVELENGTHS_IMPORTANCE ? IMP_WAVES_IMPORTANCE
+                                                                  : IMP_WAVES_UNIFORM];
     out->set = 1; /* leave-one-out needs independent walks */
     return p->active.body ? imp__graded_survey(out) : IMP_OK;
 }

@@ -35,6 +35,7 @@ struct wide {
     const float *weights, *noise_se;
     const struct imp_film_desc *film;
     int width, height, channels, seen; /* of the scene, of the target */
+    bool luminance;                    /* that is what the target sees */
     int R;
     size_t K;
     imp_film *films[MANY]; /* channels: the radiance, then [K][channels] */
@@ -113,7 +114,7 @@ static void gather(struct wide *w, size_t pixel, int c)
             double lanes[3];
             for (int l = 0; l < w->channels; l++)
                 lanes[l] = from[k * (size_t)w->channels + (size_t)l];
-            const double v = imp__seen(w->seen, w->channels, lanes, c);
+            const double v = imp__seen(w->luminance, lanes, c);
             if (k == 0) w->L[b] = v;
             else w->X[(size_t)b * w->K + k - 1] = v;
         }
@@ -372,6 +373,7 @@ enum imp_status imp__gauss_newton_wide(const struct imp_problem *p,
                      .height = tracer->sensor->film.crop_h,
                      .channels = p->scene->channels,
                      .seen = target->desc.channels,
+                     .luminance = imp__sees_luminance(target, p->scene->channels),
                      .K = p->n};
     IMP_TRY(buffers(&w));
     IMP_TRY(replicates(&w, tracer, run, lo, hi));

@@ -83,7 +83,7 @@ static void begin(struct setting *s, imp_scene *scene, const char *active, int s
     struct imp_tracer tracer;
     struct imp_arena arena;
     const size_t size = (s->K + 1) * C;
-    test_must(ctx, imp__problem_tracer(s->problem, &s->run, &tracer));
+    test_must(ctx, imp__problem_tracer(s->problem, &s->run, NULL, &tracer));
     imp__arena_init(&arena, ctx);
     s->walk = calloc(PIXELS * SPP_MAX * size, sizeof *s->walk);
     for (int p = 0; p < PIXELS; p++)

@@ -190,7 +190,7 @@ int main(void)
     size_t param;
     test_must(ctx, imp_scene_find_param(scene, "sigma.data", &param));
     sums.param = (int)param;
-    test_must(ctx, imp__problem_tracer(p, &run, &tracer));
+    test_must(ctx, imp__problem_tracer(p, &run, NULL, &tracer));
     tracer.collisions_stand = true;
     imp__arena_init(&arena, ctx);
     const int walks = 400000;
