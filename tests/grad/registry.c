@@ -2,7 +2,7 @@
  *
  * Gradients of every parameter of every kind of the tables: each material, light and
  * texture in a room lit directly and indirectly, through every integrator that has
- * derivatives, in colour and in mono. For each of its parameters
+ * derivatives, in colour, in mono and by wavelengths. For each of its parameters
  *
  *   frozen   sweep against central differences of kept walks, 1e-6; forward against
  *            reverse per walk, 1e-12; Euler identities, 1e-12 (imp_check)
@@ -23,6 +23,7 @@
 #define SIDE    5
 #define BATCHES 12
 
+static const char *const mode_names[] = {"rgb", "mono", "spectral", "single"};
 static bool is_long;
 static const char *only; /* cases whose name begins so */
 static imp_context *ctx;
@@ -226,7 +227,8 @@ static void grey(imp_scene *s, double value)
     imp_scene_end(s);
 }
 
-static void emitter_make(imp_scene *s, const struct subject *q)
+/* lifted: colours become spectra, which have no derivative where a number is 0. */
+static void emitter_make(imp_scene *s, const struct subject *q, bool lifted)
 {
     const bool sky = q->emitter->flags & IMP_EMITTER_ENVIRONMENT;
     const bool texture =
@@ -244,7 +246,8 @@ static void emitter_make(imp_scene *s, const struct subject *q)
     if (q->emitter->place && sky) { /* a picture of the sky, some of it dark */
         float pixels[5 * 4 * 3];
         for (uint32_t k = 0; k < 60; k++)
-            pixels[k] = k % 7 ? (float)random_in(q->emitter->inputs, 5, 100 + k) : 0;
+            pixels[k] =
+                k % 7 || lifted ? (float)random_in(q->emitter->inputs, 5, 100 + k) : 0;
         imp_scene_image(s, 5, 4, 3, pixels);
         inputs_make(s, q, q->emitter->name, NULL, q->emitter->inputs + 1, false, 5);
         imp_scene_end(s);
@@ -301,7 +304,7 @@ static imp_scene *scene_make(const struct subject *q, const char *integrator,
         imp_scene_begin(s, "shape", "rectangle", "lamp", NULL);
         imp_scene_transform(s, "to_world", ceiling);
         if (q->emitter) {
-            emitter_make(s, q);
+            emitter_make(s, q, mode >= IMP_SPECTRAL);
         } else {
             imp_scene_begin(s, "emitter", "area", NULL, NULL);
             imp_scene_rgb(s, "radiance", bright);
@@ -309,7 +312,7 @@ static imp_scene *scene_make(const struct subject *q, const char *integrator,
         }
         imp_scene_end(s);
     } else {
-        emitter_make(s, q);
+        emitter_make(s, q, mode >= IMP_SPECTRAL);
         if (!sky || q->emitter->place) { /* so that scale 0 is not darkness */
             const double at[3] = {0.2, 0.6, 0.3};
             imp_scene_begin(s, "emitter", "point", NULL, NULL);
@@ -416,6 +419,7 @@ static void fresh(imp_scene *s, imp_problem *p, size_t param, const double *v,
     }
     if (scale == 0) scale = isfinite(info.hi) ? info.hi : 1;
     run.spp = 4 * BATCHES * spp;
+    run.wavelengths = IMP_WAVELENGTHS_INDEPENDENT; /* as the forward picture has them */
     run.seed = 77;
     test_must(ctx, imp_problem_forward(p, x_dot, &run, &film));
     const struct imp_estimate mine = functional(film);
@@ -559,8 +563,7 @@ static void check_one(const struct subject *q, const char *integrator,
     if (q->texture && n < 200)
         n += snprintf(what + n, 256 - (size_t)n, " %s%s", q->nested ? "nested " : "",
                       q->texture->name);
-    snprintf(what + n, 256 - (size_t)n, ", %s, %s", integrator,
-             mode == IMP_RGB ? "rgb" : "mono");
+    snprintf(what + n, 256 - (size_t)n, ", %s, %s", integrator, mode_names[mode]);
 
     if (only && strncmp(what, only, strlen(only)) != 0) return;
     const int failed = tap_failed;
@@ -637,11 +640,13 @@ static void check(const struct subject *q)
 {
     static const char *const integrators[] = {"path", "direct", "stam"};
     for (int i = 0; i < 3; i++)
-        for (int mode = IMP_RGB; mode <= IMP_MONO; mode++) {
+        for (int mode = IMP_RGB; mode <= IMP_SINGLE; mode++) {
             /* Stam's walks take no light samples and never meet a point. */
             if (i == 2 && q->emitter && q->emitter->flags & IMP_EMITTER_DELTA) continue;
             if (!is_long && mode == IMP_MONO && (i != 0 || q->texture || q->back))
                 continue;
+            if (!is_long && mode == IMP_SPECTRAL && (i != 0 || q->back)) continue;
+            if (!is_long && mode == IMP_SINGLE) continue;
             if (!is_long && i != 0 && (q->texture || q->back)) continue;
             check_one(q, integrators[i], (enum imp_color_mode)mode);
         }
