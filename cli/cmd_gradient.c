@@ -7,6 +7,8 @@
 #include "cmd_picture.h"
 #include "cmd_problem.h"
 #include "command.h"
+#include "overwrite.h"
+#include "plot.h"
 #include "progress.h"
 #include "proof.h"
 #include "ranks.h"
@@ -15,12 +17,14 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char *adjoint_path, *textures;
+static const char *adjoint_path, *textures, *spectra;
 static const struct arg_option options[] = {
     {ARG_TEXT, 0, "adjoint", "FILE",
      "derivative of sum(FILE * picture), in place of a loss", &adjoint_path, 0, 0, NULL},
     {ARG_TEXT, 0, "textures", "DIR", "write gradients of textures there, as pictures",
      &textures, 0, 0, NULL},
+    {ARG_TEXT, 0, "spectra", "DIR",
+     "write gradients to spectra there, as plots over wavelengths", &spectra, 0, 0, NULL},
     {0}};
 
 struct result {
@@ -243,6 +247,47 @@ static void print_text(const struct result *r, const struct block *blocks,
     }
 }
 
+/* ---- Plots of spectra -------------------------------------------------------------- */
+
+static char *plot_path(const struct block *b)
+{
+    const size_t n = strlen(b->info.name) + 5;
+    char *name = cli_alloc(n, 1);
+    snprintf(name, n, "%s.svg", b->info.name);
+    make_file_name(name);
+    char *path = join_path(spectra, name);
+    free(name);
+    return path;
+}
+
+/* A number of the spectrum moves a hat about its wavelength: by the hat's area the
+ * derivative is that by the spectrum itself, per nm. */
+static int plot_block(const struct block *b, const struct result *r)
+{
+    const double *nm = b->info.wavelengths_nm;
+    double *y = cli_alloc(2 * b->n, sizeof *y), *se = y + b->n;
+    char label[256], *path = plot_path(b);
+    double most = 0;
+    for (size_t k = 0; k < b->n; k++) {
+        const double area = 0.5 * (nm[k + 1 < b->n ? k + 1 : k] - nm[k ? k - 1 : k]);
+        y[k] = r->grad[b->first + k] / area;
+        se[k] = r->se[b->first + k] / area;
+        most = fmax(most, fabs(y[k]));
+    }
+    const double power = most > 0 ? 3 * floor(log10(most) / 3) : 0;
+    for (size_t k = 0; k < 2 * b->n; k++) y[k] *= pow(10, -power);
+    if (power == 0) snprintf(label, sizeof label, "d %s per nm", r->functional);
+    else snprintf(label, sizeof label, "d %s per nm, 1e%g", r->functional, power);
+    const int rc = plot_spectrum(path, b->info.name, label, b->n, nm, y, se);
+    free(path);
+    free(y);
+    return rc;
+}
+static int is_spectrum(const struct block *b)
+{
+    return b->info.wavelengths_nm && b->n > 1;
+}
+
 static int run_gradient(int n, char **operand)
 {
     imp_problem *problem = NULL;
@@ -269,12 +314,21 @@ static int run_gradient(int n, char **operand)
     if (textures) rc = make_folder(textures);
     for (size_t k = 0; k < n_blocks && !rc && textures; k++)
         if (block_is_large(&blocks[k])) rc = block_writable(&blocks[k], textures);
+    if (spectra && !rc) rc = make_folder(spectra);
+    for (size_t k = 0; k < n_blocks && !rc && spectra; k++)
+        if (is_spectrum(&blocks[k])) {
+            char *path = plot_path(&blocks[k]);
+            rc = overwrite_check(path, OUTPUT_CURVE);
+            free(path);
+        }
     if (!rc) rc = manifest_begin();
     if (!rc) rc = compute(problem, &run, &r);
     if (!rc) rc = manifest_pause();
     if (!rc) rc = manifest_numbers("value", (double[2]){r.value.value, r.value.se}, 2);
     if (!rc) rc = manifest_numbers("gradient", r.grad, n_x);
     if (!rc) rc = manifest_numbers("errors of the gradient", r.se, n_x);
+    for (size_t k = 0; k < n_blocks && !rc && spectra; k++)
+        if (is_spectrum(&blocks[k])) rc = plot_block(&blocks[k], &r);
     for (size_t k = 0; k < n_blocks && !rc && textures; k++)
         if (block_is_large(&blocks[k]))
             rc = block_write(&blocks[k], r.grad, r.se, textures, &paths[k]);

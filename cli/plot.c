@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The curve of a fit's loss, as SVG. */
+ * The curve of a fit's loss, and numbers over wavelengths, as SVG. */
 #include "plot.h"
 
 #include "command.h"
@@ -14,18 +14,26 @@ enum { WIDTH = 720, HEIGHT = 440, LEFT = 84, RIGHT = 24, TOP = 44, BOTTOM = 58 }
 
 /* y is drawn as asinh(y / (2 unit)): logarithmic where |y| is far above `unit`, linear
  * below. An unbiased loss may be negative near its end, and such a scale has room for it.
- */
+ * Over wavelengths it is drawn as it is. */
 struct axes {
     double n;
     double unit;
-    double lo, hi; /* of y */
+    double lo, hi;    /* of y */
+    const double *nm; /* [n]; NULL: 0, 1, .. n-1 */
 };
 
-static double x_at(const struct axes *a, double i)
+static double x_part(double part) { return LEFT + (WIDTH - LEFT - RIGHT) * part; }
+static double x_at(const struct axes *a, size_t i)
 {
-    return LEFT + (WIDTH - LEFT - RIGHT) * (a->n > 1 ? i / (a->n - 1) : 0.5);
+    const size_t last = (size_t)a->n - 1;
+    if (last == 0) return x_part(0.5);
+    if (!a->nm) return x_part((double)i / (a->n - 1));
+    return x_part((a->nm[i] - a->nm[0]) / (a->nm[last] - a->nm[0]));
 }
-static double bend(const struct axes *a, double y) { return asinh(0.5 * y / a->unit); }
+static double bend(const struct axes *a, double y)
+{
+    return a->nm ? y : asinh(0.5 * y / a->unit);
+}
 static double y_at(const struct axes *a, double y)
 {
     const double lo = bend(a, a->lo), hi = bend(a, a->hi);
@@ -37,7 +45,7 @@ static double y_at(const struct axes *a, double y)
  * most eight decades are shown. */
 static struct axes find_axes(size_t n, const double *y, const double *se)
 {
-    struct axes a = {(double)n, INFINITY, INFINITY, -INFINITY};
+    struct axes a = {(double)n, INFINITY, INFINITY, -INFINITY, NULL};
     for (size_t i = 0; i < n; i++) {
         if (!isfinite(y[i])) continue;
         const double small = se && se[i] > 0 ? se[i] : fabs(y[i]);
@@ -78,8 +86,26 @@ static void put_level(FILE *f, const struct axes *a, double value)
     put_tick(f, LEFT - 8, y + 4, "end", text);
 }
 
+static void put_wavelengths(FILE *f, const struct axes *a)
+{
+    const double first = a->nm[0], last = a->nm[(size_t)a->n - 1];
+    const double step_x = nice_step(last - first), step_y = nice_step(a->hi - a->lo);
+    char text[32];
+    for (double y = step_y * ceil(a->lo / step_y); y <= a->hi; y += step_y)
+        put_level(f, a, fabs(y) < 1e-9 * step_y ? 0 : y);
+    for (double nm = step_x * ceil(first / step_x); nm <= last; nm += step_x) {
+        snprintf(text, sizeof text, "%g", nm);
+        put_tick(f, x_part((nm - first) / (last - first)), HEIGHT - BOTTOM + 20, "middle",
+                 text);
+    }
+}
+
 static void put_axes(FILE *f, const struct axes *a)
 {
+    if (a->nm) {
+        put_wavelengths(f, a);
+        return;
+    }
     const double step_x = a->n > 2 ? fmax(1, nice_step(a->n - 1)) : 1;
     const double first = ceil(log10(a->unit)), last = log10(fmax(a->hi, -a->lo));
     const double step_y = fmax(1, ceil((last - first) / 8));
@@ -91,7 +117,7 @@ static void put_axes(FILE *f, const struct axes *a)
     }
     for (double i = 0; i < a->n; i += step_x) {
         snprintf(text, sizeof text, "%.0f", i);
-        put_tick(f, x_at(a, i), HEIGHT - BOTTOM + 20, "middle", text);
+        put_tick(f, x_at(a, (size_t)i), HEIGHT - BOTTOM + 20, "middle", text);
     }
 }
 
@@ -100,17 +126,17 @@ static void put_band(FILE *f, const struct axes *a, size_t n, const double *y,
 {
     fprintf(f, "<path fill=\"#c8d4f0\" d=\"");
     for (size_t i = 0; i < n; i++)
-        fprintf(f, "%c%.2f %.2f ", i ? 'L' : 'M', x_at(a, (double)i),
-                y_at(a, y[i] + se[i]));
+        fprintf(f, "%c%.2f %.2f ", i ? 'L' : 'M', x_at(a, i), y_at(a, y[i] + se[i]));
     for (size_t i = n; i-- > 0;)
-        fprintf(f, "L%.2f %.2f ", x_at(a, (double)i), y_at(a, y[i] - se[i]));
+        fprintf(f, "L%.2f %.2f ", x_at(a, i), y_at(a, y[i] - se[i]));
     fprintf(f, "Z\"/>\n");
 }
 
-int plot_curve(const char *path, const char *title, const char *x_label,
-               const char *y_label, size_t n, const double *y, const double *se)
+static int plot(const char *path, const char *title, const char *x_label,
+                const char *y_label, const struct axes *a, const double *y,
+                const double *se)
 {
-    const struct axes a = find_axes(n, y, se);
+    const size_t n = (size_t)a->n;
     int finite = 1;
     struct output to;
     const int rc = output_open(&to, path, OUTPUT_CURVE);
@@ -121,15 +147,14 @@ int plot_curve(const char *path, const char *title, const char *x_label,
             "viewBox=\"0 0 %d %d\" font-family=\"sans-serif\" font-size=\"13\">\n"
             "<rect width=\"100%%\" height=\"100%%\" fill=\"white\"/>\n",
             WIDTH, HEIGHT, WIDTH, HEIGHT);
-    put_axes(f, &a);
+    put_axes(f, a);
     for (size_t i = 0; i < n; i++)
         if (!isfinite(y[i]) || (se && !isfinite(se[i]))) finite = 0;
-    if (se && n > 1 && finite) put_band(f, &a, n, y, se);
+    if (se && n > 1 && finite) put_band(f, a, n, y, se);
     fprintf(f, "<path fill=\"none\" stroke=\"#3060c0\" stroke-width=\"2\" d=\"");
     for (size_t i = 0, started = 0; i < n; i++) {
         if (!isfinite(y[i])) continue;
-        fprintf(f, "%c%.2f %.2f ", started ? 'L' : 'M', x_at(&a, (double)i),
-                y_at(&a, y[i]));
+        fprintf(f, "%c%.2f %.2f ", started ? 'L' : 'M', x_at(a, i), y_at(a, y[i]));
         started = 1;
     }
     fprintf(f,
@@ -142,4 +167,24 @@ int plot_curve(const char *path, const char *title, const char *x_label,
             "</text>\n</svg>\n",
             (TOP + HEIGHT - BOTTOM) / 2, y_label);
     return output_close(&to, 0);
+}
+
+int plot_curve(const char *path, const char *title, const char *x_label,
+               const char *y_label, size_t n, const double *y, const double *se)
+{
+    const struct axes a = find_axes(n, y, se);
+    return plot(path, title, x_label, y_label, &a, y, se);
+}
+
+int plot_spectrum(const char *path, const char *title, const char *y_label, size_t n,
+                  const double *nm, const double *y, const double *se)
+{
+    struct axes a = {.n = (double)n, .lo = 0, .hi = 0, .nm = nm};
+    for (size_t i = 0; i < n; i++) {
+        if (!isfinite(y[i]) || !isfinite(se[i])) continue;
+        a.lo = fmin(a.lo, 1.05 * (y[i] - se[i]));
+        a.hi = fmax(a.hi, 1.05 * (y[i] + se[i]));
+    }
+    if (!(a.lo < a.hi)) a.hi = a.lo + 1;
+    return plot(path, title, "wavelength (nm)", y_label, &a, y, se);
 }
