@@ -3,7 +3,7 @@
 #
 # Everything in docs/adjoint-photons.md that was computed, computed again: its pictures, and the
 # parts between "<!-- NAME -->" and "<!-- /NAME -->". Two to four minutes. With the name of a figure
-# (3, 4 or 5) that one alone.
+# (3, 4, 5 or 11) that one alone.
 #
 #     docs/make_photons.sh [BUILD FOLDER, default build] [FIGURE]
 set -euo pipefail
@@ -56,6 +56,14 @@ if wanted 4; then
             { time "$importon" render -t 1 scenes/cornell.xml -m mono -D res=64 -D integrator="$integrator" \
                 -D split="$split" --weights $weights --spp 256 --no-preview -q --overwrite -o "$out/t.exr"; } 2>&1
         done | sort -n | head -1 >"$out/time_${integrator}_$split"
+    done
+fi
+if wanted 11; then
+    say "Figure 11: a colour chart by 4, 16 and 49 wavelengths a pixel"
+    for how in independent stratified; do
+        for n in 4 16 49; do
+            picture chart_${how}_$n scenes/photons/chart.xml -m single -D spp=$n --wavelengths $how --wavelength-set $n
+        done
     done
 fi
 if wanted 5; then

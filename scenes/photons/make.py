@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Writes paraboloid.ply and sky.pfm, which the scenes of this folder use, beside itself."""
+"""Writes paraboloid.ply and sky.pfm, which the scenes of this folder use, and chart.xml beside itself."""
 import math
 import os
+import re
 import struct
 
 here = os.path.dirname(os.path.abspath(__file__))
@@ -40,3 +41,48 @@ with open(os.path.join(here, "sky.pfm"), "wb") as f:
             if 19 <= i <= 20 and 7 <= j <= 8:
                 c = (220, 200, 160)
             f.write(struct.pack("<3f", *c))
+
+# A colour chart in daylight, from the reflectances that the tests have.
+chart = open(os.path.join(here, "..", "..", "tests", "macbeth.h")).read()
+patches = re.findall(r'\{"([^"]+)", \{([^}]*)\}\}', chart)
+assert len(patches) == 24
+with open(os.path.join(here, "chart.xml"), "w") as f:
+    f.write('''<?xml version="1.0" encoding="utf-8"?>
+<!-- SPDX-License-Identifier: Apache-2.0
+
+     A Macbeth chart in daylight, without absorption: what is noise is the wavelengths' (Morley et al. 2006, Fig. 11).
+     Reflectances: average of 30 charts, (c) Danny Pascale (BabelColor), used by permission in colour-science. Written
+     by make.py.
+
+     importon render scenes/photons/chart.xml -m single -o chart.exr -->
+<scene version="3.0.0">
+    <default name="spp" value="49"/>
+    <default name="width" value="144"/>
+    <default name="height" value="96"/>
+    <integrator type="photons">
+        <integer name="max_depth" value="2"/>
+        <float name="h" value="1000"/>
+    </integrator>
+    <sensor type="orthographic">
+        <transform name="to_world">
+            <scale x="3" y="3" z="1"/>
+            <lookat origin="0, 0, 1" target="0, 0, 0" up="0, 1, 0"/>
+        </transform>
+        <sampler type="independent"><integer name="sample_count" value="$spp"/></sampler>
+        <film type="hdrfilm">
+            <integer name="width" value="$width"/>
+            <integer name="height" value="$height"/>
+            <rfilter type="box"/>
+        </film>
+    </sensor>
+    <emitter type="constant"/>
+''')
+    for k, (name, values) in enumerate(patches):
+        rho = [float(v) for v in values.replace("\n", " ").split(",") if v.strip()]
+        pairs = ", ".join("%d:%g" % (380 + 10 * i, v) for i, v in enumerate(rho))
+        f.write('''    <shape type="rectangle" id="%s">
+        <transform name="to_world"><scale value="0.44"/><translate x="%g" y="%g"/></transform>
+        <bsdf type="diffuse"><spectrum name="reflectance" value="%s, 830:%g"/></bsdf>
+    </shape>
+''' % (name.replace(" ", "_").replace(",", "").replace(".", "_").replace("(", "").replace(")", ""), k % 6 - 2.5, 1.5 - k // 6, pairs, rho[-1]))
+    f.write("</scene>\n")
