@@ -13,7 +13,8 @@ clock, and of processor seconds, which a busy machine stretches less.
   gradient   the same of a squared loss with the gradient of all 15 numbers: `importon gradient
              --target`, Mitsuba's mi.render with prb and backward()
 
-Variants: scalar_rgb (no gradients), llvm_ad_rgb (needs an LLVM that Dr.Jit accepts).
+Variants: scalar_rgb (no gradients), llvm_ad_rgb (needs an LLVM that Dr.Jit accepts); a spectral one, like
+llvm_ad_spectral, is beside importon's mode spectral. The means of the pictures' channels are compared too.
 """
 import argparse
 import json
@@ -65,9 +66,13 @@ def run(command):
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
 
 
+def mode(variant):
+    return ["-m", "spectral"] if "spectral" in variant else []
+
+
 def time_pictures(program, variant, repeats, folder):
     """Pairs of seconds (importon, Mitsuba) from process start to picture."""
-    own = [program, "render", SCENE, "-D", "res=64", "--spp", "4", "-q", "--no-preview", "-o",
+    own = [program, "render", SCENE] + mode(variant) + ["-D", "res=64", "--spp", "4", "-q", "--no-preview", "-o",
            os.path.join(folder, "own.exr")]
     peer = [sys.executable, "-c", PICTURE, variant, SCENE, os.path.join(folder, "peer.exr")]
     run(peer)  # compiled kernels are kept on disk; the first run makes them
@@ -88,7 +93,8 @@ class Peer:
             self.dr = dr
             self.params = mi.traverse(self.scene)
             self.keys = [k for k in self.params.keys()
-                         if k.endswith((".reflectance.value", ".radiance.value"))]
+                         if k.endswith((".reflectance.value", ".radiance.value", ".reflectance.values",
+                                        ".radiance.values"))]
             self.integrator = mi.load_dict({"type": "prb", "max_depth": 6})
             self.target = mi.TensorXf(mi.Bitmap(target))
             for k in self.keys:
@@ -98,7 +104,7 @@ class Peer:
 
     def render(self):
         self.seed += 1
-        return np.array(mi.render(self.scene, spp=self.spp, seed=self.seed)).mean()
+        self.picture = np.array(mi.render(self.scene, spp=self.spp, seed=self.seed))
 
     def gradient(self):
         dr = self.dr
@@ -145,7 +151,7 @@ def main():
             rows.append(ratios(time_pictures(args.importon, variant, args.repeats, folder),
                                "picture", variant, 64 * 64 * 4, "64 x 64, 4 spp, from start"))
             target = os.path.join(folder, "target.exr")
-            common = [SCENE, "-D", "res=%d" % args.res, "-q"]
+            common = [SCENE, "-D", "res=%d" % args.res, "-q"] + mode(variant)
             run([args.importon, "render", "--spp", "16", "--seed", "99", "--no-preview", "-o",
                  target] + common)
             spp = args.spp if variant != "scalar_rgb" else max(1, args.spp // 8)
@@ -159,6 +165,12 @@ def main():
                 renders.append((clock(lambda: run(render)), clock(peer.render)))
                 if peer.gradients:
                     gradients.append((clock(lambda: run(gradient)), clock(peer.gradient)))
+            own = np.array(mi.Bitmap(os.path.join(folder, "own.exr")))[..., :3].mean(axis=(0, 1))
+        means = [float(v) for v in peer.picture[..., :3].mean(axis=(0, 1))]
+        rows.append({"what": "mean", "variant": variant, "importon": [float(v) for v in own], "mitsuba": means})
+        print("%-9s %-12s importon %s  mitsuba %s  ratio %s" %
+              ("mean", variant, *(" ".join("%.5f" % v for v in x) for x in (own, means, own / means))),
+              file=sys.stderr, flush=True)
         samples = args.res * args.res * spp
         unit = "%d x %d, %d spp" % (args.res, args.res, spp)
         rows.append(ratios(renders, "render", variant, samples, unit))
