@@ -2,30 +2,62 @@
  * <medium type="graded">: the index field from <volume>s, the options of tracing, bounds
  * and held numbers of a fit. */
 #include "bend_load.h"
+#include "color/color_tables.h"
 #include "format/search.h"
 #include <string.h>
 
-/* cauchy = "A B C", or sellmeier_b and sellmeier_c, in powers of micrometres. */
+/* A glass that materials know by the same name. */
+static enum imp_status glass_read(struct imp__bendfile *l, struct imp_node *node)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_dispersion *d = &l->dispersion;
+    const char *name;
+    IMP_TRY(imp__props_string(l->ctx, node, "glass", "", &name));
+    const struct imp_prop *at = imp__node_prop(node, "glass");
+    const struct imp__glass *g = imp__glass_find(name);
+    if (!g)
+        IMP_TRY(imp__prop_error(l->ctx, node, at, IMP_E_SCENE,
+                                "there is no glass '%s'; there are N-BK7, N-SF6, N-SF10, "
+                                "N-SF11, fused silica and others (the manual lists them)",
+                                name));
+    if (g->n > 3)
+        IMP_TRY(imp__prop_error(l->ctx, node, at, IMP_E_UNSUPPORTED,
+                                "'%s' has a formula of %d terms; here it has up to three",
+                                name, g->n));
+    d->model = IMP_SELLMEIER;
+    for (int k = 0; k < g->n; k++) {
+        d->coefficient[k] = g->number[k];
+        d->coefficient[3 + k] = g->number[g->n + k];
+    }
+out:
+    return st;
+}
+
+/* cauchy = "A B C", or sellmeier_b and sellmeier_c, in powers of micrometres, or a glass by
+ * name. */
 static enum imp_status dispersion_read(struct imp__bendfile *l, struct imp_node *node)
 {
     enum imp_status st = IMP_OK;
     struct imp_dispersion *d = &l->dispersion;
     const double zero[3] = {0};
     const bool cauchy = imp__props_has(node, "cauchy"),
-               sellmeier = imp__props_has(node, "sellmeier_b");
+               sellmeier = imp__props_has(node, "sellmeier_b"),
+               glass = imp__props_has(node, "glass");
     *d = (struct imp_dispersion)IMP_DISPERSION_INIT;
     IMP_TRY(imp__bendfile_number(l, node, "reference", d->reference, 0.01, 1000,
                                  &d->reference));
-    if (cauchy && sellmeier)
+    if (cauchy + sellmeier + glass > 1)
         IMP_TRY(imp__node_error(l->ctx, node, IMP_E_SCENE,
-                                "has both 'cauchy' and 'sellmeier_b'"));
+                                "has more than one of 'cauchy', 'sellmeier_b' and "
+                                "'glass'"));
     IMP_TRY(imp__props_vector(l->ctx, node, "cauchy", zero, d->coefficient));
     if (sellmeier) {
         d->model = IMP_SELLMEIER;
         IMP_TRY(imp__props_vector(l->ctx, node, "sellmeier_b", zero, d->coefficient));
         IMP_TRY(imp__props_vector(l->ctx, node, "sellmeier_c", zero, d->coefficient + 3));
     }
-    l->dispersive = cauchy || sellmeier;
+    if (glass) IMP_TRY(glass_read(l, node));
+    l->dispersive = cauchy || sellmeier || glass;
 out:
     return st;
 }

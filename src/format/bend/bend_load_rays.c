@@ -135,9 +135,10 @@ static enum imp_status wavelengths_read(struct imp__bendfile *l, struct imp_node
     um[0] = 0;
     if (st != IMP_OK || !text) return st;
     if (!l->dispersive)
-        return imp__node_error(l->ctx, node, IMP_E_SCENE,
-                               "has wavelengths, and the medium neither 'cauchy' nor "
-                               "'sellmeier_b'");
+        return imp__node_error(
+            l->ctx, node, IMP_E_SCENE,
+            "has wavelengths, and the medium none of 'cauchy', 'glass' and "
+            "'sellmeier_b'");
     const char *end = text + strlen(text);
     for (;;) {
         text += strspn(text, " ,");
