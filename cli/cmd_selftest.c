@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * importon selftest: do the materials, lights and cameras of a scene keep their contracts?
+ * importon selftest: do the materials, lights, cameras and media of a scene keep their
+ * contracts?
  */
 #include "command.h"
 
@@ -20,7 +21,8 @@ static const struct arg_option options[] = {
      NULL},
     {0}};
 
-static const char *const subjects[] = {"material", "light", "camera"};
+static const char *const subjects[] = {"material", "light", "camera", "phase", "medium"};
+enum { SUBJECTS = sizeof subjects / sizeof subjects[0] };
 
 static const char *verdict(const struct imp_selftest_row *r)
 {
@@ -82,9 +84,11 @@ static int run_selftest(int n, char **operand)
     const struct imp_selftest_row *rows = NULL;
     size_t n_rows = 0, failed = 0, subject = 0;
     (void)n;
-    while (subject < 3 && strcmp(operand[0], subjects[subject]) != 0) subject++;
-    if (subject == 3)
-        return cli_error(EXIT_USAGE, "selftest: '%s' is not material, light or camera",
+    while (subject < SUBJECTS && strcmp(operand[0], subjects[subject]) != 0) subject++;
+    if (subject == SUBJECTS)
+        return cli_error(EXIT_USAGE,
+                         "selftest: '%s' is not material, light, camera, phase or "
+                         "medium",
                          operand[0]);
     int rc = cli_load(operand[1]);
     if (rc) return rc;
@@ -104,8 +108,8 @@ static int run_selftest(int n, char **operand)
 
 const struct command command_selftest = {
     {"selftest",
-     "material|light|camera SCENE",
-     "test the contracts of a scene's materials, lights or cameras",
+     "material|light|camera|phase|medium SCENE",
+     "test the contracts of a scene's materials, lights, cameras or media",
      {options, options_scene, options_file, options_general},
      2,
      2},

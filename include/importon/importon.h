@@ -996,7 +996,9 @@ imp_check(imp_problem *problem, const struct imp_check_options *options,
 enum imp_selftest_subject {
     IMP_SELFTEST_MATERIAL,
     IMP_SELFTEST_LIGHT,
-    IMP_SELFTEST_CAMERA
+    IMP_SELFTEST_CAMERA,
+    IMP_SELFTEST_PHASE, /**< phase functions of media */
+    IMP_SELFTEST_MEDIUM /**< what media are at places of their box, or at the origin */
 };
 /** One contract of one object, with the inputs that it has in the scene:
  *
@@ -1010,7 +1012,9 @@ enum imp_selftest_subject {
  *   derivative  against differences
  *   density     of a light's draws against its density for the same point
  *   light       by a light's own draws against directions drawn without it
- *   unit, smooth, filter    rays and the reconstruction filter of a camera */
+ *   unit, smooth, filter    rays and the reconstruction filter of a camera
+ *   part        scattering is not above the extinction
+ *   bounded     extinction is not above what flights take for its bound */
 struct imp_selftest_row {
     const char *object, *kind, *contract;
     double value, reference;

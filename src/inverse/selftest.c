@@ -119,6 +119,8 @@ static enum imp_status run(struct imp__selftest *t, enum imp_selftest_subject su
     case IMP_SELFTEST_MATERIAL: return imp__selftest_materials(t);
     case IMP_SELFTEST_LIGHT: return imp__selftest_lights(t);
     case IMP_SELFTEST_CAMERA: return imp__selftest_cameras(t);
+    case IMP_SELFTEST_PHASE: return imp__selftest_phases(t);
+    case IMP_SELFTEST_MEDIUM: return imp__selftest_media(t);
     }
     return imp__error(t->ctx, IMP_E_ARG, "imp_selftest: subject = %d", (int)subject);
 }

@@ -38,6 +38,12 @@ enum imp_status imp__selftest_z(struct imp__selftest *t, const char *object,
 enum imp_status imp__selftest_materials(struct imp__selftest *t);
 enum imp_status imp__selftest_lights(struct imp__selftest *t);
 enum imp_status imp__selftest_cameras(struct imp__selftest *t);
+enum imp_status imp__selftest_phases(struct imp__selftest *t);
+enum imp_status imp__selftest_media(struct imp__selftest *t);
+
+/* The contracts of one material, or of what scatters like one; name and kind are told. */
+enum imp_status imp__selftest_bsdf(struct imp__selftest *t, const struct imp_bsdf *b,
+                                   const char *name, const char *kind);
 
 /* A direction that is not near the horizon, above it for even i. */
 imp_v3 imp__selftest_direction(int i, uint64_t seed);

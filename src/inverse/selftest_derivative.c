@@ -1,8 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include "scene/in_medium.h"
 #include "selftest.h"
 
 const struct imp_input_desc *imp__bsdf_input(const struct imp_bsdf *b, int j)
 {
+    if (imp__is_in_medium(b)) return imp__in_medium_input(b, j);
     if (j < b->n_own) return &b->ops->inputs[j];
     for (int k = b->n_child - 1; k >= 0; k--)
         if (j >= b->child_in[k]) return imp__bsdf_input(b->child[k], j - b->child_in[k]);

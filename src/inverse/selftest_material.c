@@ -3,6 +3,7 @@
  * Materials with the inputs that they have in the scene, at random places of their
  * textures and for random directions of sight. */
 #include "math/warp.h"
+#include "scene/in_medium.h"
 #include "selftest.h"
 
 struct point {
@@ -128,9 +129,10 @@ static void smooth_answer(const struct imp__selftest *t, struct point *p,
     imp_spec g;
     const struct imp_dirs e = {d.wi, d.wo, IMP_SMOOTH, false};
     b->ops->eval(b, p->in, &e, &g);
+    const bool cosine = !imp__is_in_medium(b); /* is in the value */
     for (int c = 0; c < t->scene->channels; c++) {
-        const double x = f[c] / fabs(d.wi[2]) * index_ratio(p, &d),
-                     y = g[c] / fabs(d.wo[2]) * index_ratio(p, &e);
+        const double x = f[c] / (cosine ? fabs(d.wi[2]) : 1) * index_ratio(p, &d),
+                     y = g[c] / (cosine ? fabs(d.wo[2]) : 1) * index_ratio(p, &e);
         a->mirrored = fmax(a->mirrored, fabs(x - y) / (fmax(x, y) + 1e-3));
     }
     a->error = fmax(a->error, imp__bsdf_derivative_error(b, p->in, &d, eval_value, df,
@@ -225,12 +227,12 @@ static void albedo_take(const struct imp__selftest *t, struct point *p, int i, i
         r->z = z, r->albedo = exact, r->sampled = s->mean, r->se = se;
 }
 
-static enum imp_status material(struct imp__selftest *t, const struct imp_bsdf *b)
+enum imp_status imp__selftest_bsdf(struct imp__selftest *t, const struct imp_bsdf *b,
+                                   const char *name, const char *kind)
 {
     enum imp_status st = IMP_OK;
     struct answers a = {0};
     struct drawn r = {.least = 1, .most = -1, .total = 1};
-    const char *name = b->name, *kind = b->ops->name;
     const int n = t->options.samples / t->options.directions + 1;
     for (int i = 0; i < t->options.directions; i++) {
         struct point p = {.lane = 0};
@@ -294,7 +296,11 @@ enum imp_status imp__selftest_materials(struct imp__selftest *t)
 {
     enum imp_status st = IMP_OK;
     t->level = imp__sidak(0.01, (double)t->options.directions * t->scene->n_bsdfs);
-    for (int k = 0; k < t->scene->n_bsdfs; k++) IMP_TRY(material(t, t->scene->bsdfs[k]));
+    for (int k = 0; k < t->scene->n_bsdfs; k++) {
+        const struct imp_bsdf *b = t->scene->bsdfs[k];
+        if (imp__is_in_medium(b)) continue; /* phase functions have tests of their own */
+        IMP_TRY(imp__selftest_bsdf(t, b, b->name, b->ops->name));
+    }
 out:
     return st;
 }

@@ -4,6 +4,18 @@
 
 static const struct imp_medium *medium_of(const struct imp_bsdf *b) { return b->self; }
 
+static const struct imp_input_desc *phase_input(const struct imp_phase *p, int j)
+{
+    for (int k = p->n_child - 1; k >= 0; k--)
+        if (j >= p->child_in[k]) return phase_input(p->child[k], j - p->child_in[k]);
+    return &p->ops->inputs[j];
+}
+const struct imp_input_desc *imp__in_medium_input(const struct imp_bsdf *b, int j)
+{
+    const struct imp_medium *m = medium_of(b);
+    return j < m->n_own ? &m->ops->inputs[j] : phase_input(m->phase, j - m->n_own);
+}
+
 /* a/b, 0 where b is: nothing collides there. */
 static imp_spec over(imp_spec a, imp_spec b)
 {

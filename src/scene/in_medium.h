@@ -12,4 +12,11 @@
  * emit. */
 extern const struct imp_bsdf_ops imp__in_medium, imp__in_pure_medium;
 
+static inline bool imp__is_in_medium(const struct imp_bsdf *b)
+{
+    return b->ops == &imp__in_medium || b->ops == &imp__in_pure_medium;
+}
+/* Input j as the medium or its phase function declares it. */
+const struct imp_input_desc *imp__in_medium_input(const struct imp_bsdf *b, int j);
+
 #endif

@@ -206,15 +206,109 @@ static void planted(void)
     imp_context_destroy(ctx);
 }
 
+/* ---- Broken media ------------------------------------------------------------------ */
+
+static const struct imp_phase_ops *isotropic(void)
+{
+    for (int k = 0; imp__phase_kinds[k]; k++)
+        if (strcmp(imp__phase_kinds[k]->name, "isotropic") == 0)
+            return imp__phase_kinds[k];
+    return NULL;
+}
+static const struct imp_medium_ops *homogeneous(void)
+{
+    for (int k = 0; imp__medium_kinds[k]; k++)
+        if (strcmp(imp__medium_kinds[k]->name, "homogeneous") == 0)
+            return imp__medium_kinds[k];
+    return NULL;
+}
+static double half_phase_pdf(const struct imp_phase *p, const imp_spec *in,
+                             const struct imp_dirs *d)
+{
+    return 0.5 * isotropic()->pdf(p, in, d);
+}
+static void bright_medium_eval(const struct imp_medium *m, const imp_spec *in,
+                               struct imp_coefficients *c)
+{
+    homogeneous()->eval(m, in, c);
+    c->scattering = c->extinction * 1.01;
+}
+static void slanted_eval_d(const struct imp_medium *m, const imp_spec *in,
+                           struct imp_coefficients *dc)
+{
+    homogeneous()->eval_d(m, in, dc);
+    dc[0].extinction *= 1.001;
+}
+
+static void broken_media(void)
+{
+    imp_context *ctx = test_context(1);
+    struct imp_phase_ops half = *isotropic();
+    struct imp_medium_ops bright = *homogeneous(), slanted = *homogeneous();
+    half.name = "half";
+    half.pdf = half_phase_pdf;
+    bright.name = "bright";
+    bright.eval = bright_medium_eval;
+    slanted.name = "slanted";
+    slanted.eval_d = slanted_eval_d;
+    test_must(ctx, imp_register_phase(ctx, &half));
+    test_must(ctx, imp_register_medium(ctx, &bright));
+    test_must(ctx, imp_register_medium(ctx, &slanted));
+    static const char *const media[3][2] = {
+        {"homogeneous", "half"}, {"bright", "isotropic"}, {"slanted", "isotropic"}};
+    imp_scene *s;
+    test_must(ctx, imp_scene_create(ctx, NULL, &s));
+    imp_scene_begin(s, "integrator", "volpath", NULL, NULL);
+    imp_scene_end(s);
+    for (int k = 0; k < 3; k++) {
+        const double at[3] = {3. * k, 0, 0};
+        imp_scene_begin(s, "shape", "sphere", NULL, NULL);
+        imp_scene_vector(s, "center", at);
+        imp_scene_begin(s, "medium", media[k][0], media[k][0], "interior");
+        imp_scene_begin(s, "phase", media[k][1], NULL, NULL);
+        imp_scene_end(s);
+        imp_scene_end(s);
+        imp_scene_begin(s, "bsdf", "null", NULL, NULL);
+        imp_scene_end(s);
+        imp_scene_end(s);
+    }
+    test_must(ctx, imp_scene_commit(s));
+    const struct imp_selftest_row *rows;
+    size_t n, wrong[2] = {0, 0};
+    bool caught[3] = {false, false, false};
+    test_must(ctx, imp_selftest(s, IMP_SELFTEST_PHASE, NULL, &rows, &n));
+    for (size_t k = 0; k < n; k++) {
+        if (strcmp(rows[k].kind, "half") == 0)
+            caught[0] |= rows[k].ok == 0 && strcmp(rows[k].contract, "normalised") == 0;
+        else wrong[0] += rows[k].ok == 0;
+    }
+    test_must(ctx, imp_selftest(s, IMP_SELFTEST_MEDIUM, NULL, &rows, &n));
+    for (size_t k = 0; k < n; k++) {
+        if (rows[k].ok != 0) continue;
+        if (strcmp(rows[k].kind, "bright") == 0 && strcmp(rows[k].contract, "part") == 0)
+            caught[1] = true;
+        else if (strcmp(rows[k].kind, "slanted") == 0 &&
+                 strcmp(rows[k].contract, "derivative") == 0)
+            caught[2] = true;
+        else wrong[1] += strcmp(rows[k].kind, "bright") != 0;
+    }
+    tap_ok(caught[0] && caught[1] && caught[2] && wrong[0] + wrong[1] == 0,
+           "broken phase functions and media are caught # %d %d %d, others %zu %zu",
+           caught[0], caught[1], caught[2], wrong[0], wrong[1]);
+    imp_scene_destroy(s);
+    imp_context_destroy(ctx);
+}
+
 /* ---- Honest scenes ----------------------------------------------------------------- */
 
 static void honest(imp_context *ctx, const char *file, enum imp_color_mode mode)
 {
-    static const char *const names[] = {"materials", "lights", "cameras"};
+    static const char *const names[] = {"materials", "lights", "cameras",
+                                        "phase functions", "media"};
     imp_scene *s = test_scene(ctx, file, mode, NULL);
     struct imp_selftest_options o = IMP_SELFTEST_OPTIONS_INIT;
     o.samples = 60000;
-    for (int subject = 0; subject < 3; subject++) {
+    for (int subject = 0; subject < 5; subject++) {
         const struct imp_selftest_row *rows;
         size_t n, failed = 0;
         test_must(ctx,
@@ -226,7 +320,10 @@ static void honest(imp_context *ctx, const char *file, enum imp_color_mode mode)
                    rows[k].kind, rows[k].contract, rows[k].value, rows[k].reference,
                    rows[k].se, rows[k].error, rows[k].limit);
         }
-        tap_ok(failed == 0, "%s%s: %s # %zu rows", file, mode == IMP_MONO ? ", mono" : "",
+        tap_ok(failed == 0, "%s%s: %s # %zu rows", file,
+               mode == IMP_MONO       ? ", mono"
+               : mode == IMP_SPECTRAL ? ", spectral"
+                                      : "",
                names[subject], n);
     }
     imp_scene_destroy(s);
@@ -235,10 +332,13 @@ static void honest(imp_context *ctx, const char *file, enum imp_color_mode mode)
 int main(void)
 {
     planted();
+    broken_media();
     imp_context *ctx = test_context(1);
     honest(ctx, "cornell.xml", IMP_RGB);
     honest(ctx, "stam.xml", IMP_MONO);
     honest(ctx, "lamps.xml", IMP_RGB);
+    honest(ctx, "fog.xml", IMP_RGB);
+    honest(ctx, "fog.xml", IMP_SPECTRAL);
     static const char *const peers[] = {"lights", "rough",  "glass",    "sensors",
                                         "sky",    "alphas", "textures", "twosided"};
     for (size_t k = 0; k < imp_count(peers); k++) {
