@@ -281,13 +281,16 @@ out:
 static enum imp_status photons_ready(struct imp_scene *scene,
                                      const struct imp_integrator *i)
 {
-    for (int e = 0; e < scene->n_emitters; e++)
-        if (scene->emitters[e]->ops->flags & IMP_EMITTER_DELTA)
-            return imp__error(
-                scene->ctx, IMP_E_UNSUPPORTED,
-                "integrator photons: light '%s' (%s) has no surface, and no "
-                "photon can meet it; use path, or a light with a shape",
-                scene->emitters[e]->name, scene->emitters[e]->ops->name);
+    for (size_t k = 0; k < scene->root->n_children; k++) { /* they are in no shape */
+        const struct imp_node *node = scene->root->children[k].node;
+        if (!node || strcmp(node->tag, "emitter") != 0 || !node->object) continue;
+        const struct imp_emitter *e = node->object;
+        if (e->ops->flags & IMP_EMITTER_DELTA)
+            return imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
+                                   "integrator photons: this light has no surface, and "
+                                   "no photon can meet it; use path, or a light with a "
+                                   "shape");
+    }
     return mixture_ready(scene, i);
 }
 

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The same bits for 1, 2, 3 and 7 threads: pictures, losses, gradients of few and of many
- * numbers, derivative pictures, Gauss-Newton matrices. */
+ * numbers, derivative pictures, Gauss-Newton matrices; paths and photons by mixtures,
+ * colours and wavelengths. */
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "inverse/problem.h"
@@ -115,6 +116,24 @@ static imp_scene *default_filter(imp_context *ctx)
     return test_scene_text(ctx, plain, IMP_RGB);
 }
 static imp_scene *map_gaussian(imp_context *ctx) { return map(ctx, "gaussian"); }
+#define SKY "width=21 height=17 weights=kernel=1,environment=1,uniform=.2"
+static imp_scene *photons(imp_context *ctx)
+{
+    return test_scene(ctx, "photons/sky.xml", IMP_RGB, SKY);
+}
+static imp_scene *photons_spectral(imp_context *ctx)
+{
+    return test_scene(ctx, "photons/sky.xml", IMP_SPECTRAL, SKY);
+}
+static imp_scene *proxies_single(imp_context *ctx)
+{
+    return test_scene(ctx, "photons/reflector.xml", IMP_SINGLE,
+                      "res=20 weights=kernel=1,proxies=1");
+}
+static imp_scene *cornell_spectral(imp_context *ctx)
+{
+    return test_scene(ctx, "cornell.xml", IMP_SPECTRAL, "res=20");
+}
 
 int main(void)
 {
@@ -126,7 +145,11 @@ int main(void)
                  {"cornell", cornell, true},
                  {"the default filter", default_filter, true},
                  {"texture, box filter", map_box, false},
-                 {"texture, gaussian filter", map_gaussian, false}};
+                 {"texture, gaussian filter", map_gaussian, false},
+                 {"photons under a sky", photons, false},
+                 {"photons under a sky, spectral", photons_spectral, false},
+                 {"photons and proxies, single", proxies_single, false},
+                 {"cornell, spectral", cornell_spectral, false}};
     for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
         struct output one = {0};
         run_all(1, cases[k].make, cases[k].few, &one);

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: Apache-2.0
+# Spectra and response curves that are none are errors with their place.
+scene() { # CHILDREN OF THE MATERIAL, CHILDREN OF THE SENSOR
+    importon info -m spectral - <<<"<scene version='3.0.0'><emitter type='constant'/>
+<sensor type='perspective'>${2:-}</sensor>
+<shape type='sphere'><bsdf type='diffuse' id='paint'>${1:-}</bsdf></shape></scene>" | sed -n 's/^integrator.*/&, fine/p'
+}
+points() { scene "<spectrum name='reflectance' value='$1'/>"; }
+points '400:.1, 500:.2'
+points '400:.1, 390:.2'
+points ''
+points '400:.1'
+points '400:-.1, 500:.2'
+points '400:.1, 500:1.2'
+points '400:.1, 500:nan'
+file() {
+    printf "$1" >a.spd
+    scene "<spectrum name='reflectance' filename='a.spd'/>"
+}
+file ''
+file '# nothing\n'
+file '400 .1\n'
+file '500 .1\n400 .2\n'
+file '400 .1\n500 -.2\n'
+file '400 .1 .3\n500 .2\n'
+file '400 x\n500 .2\n'
+regular() {
+    scene "<spectrum name='reflectance' type='regular'><string name='values' value='$1'/>
+<float name='wavelength_min' value='$2'/><float name='wavelength_max' value='$3'/></spectrum>"
+}
+regular '.1 .2 .3' 400 700
+regular '.1' 400 700
+regular '' 400 700
+regular '.1 .2' 700 400
+irregular() {
+    scene "<spectrum name='reflectance' type='irregular'><string name='values' value='$1'/>
+<string name='wavelengths' value='$2'/></spectrum>"
+}
+irregular '.1 .2' '400'
+irregular '.1 .2' '500 400'
+film() { scene "" "<film type='specfilm'>$1</film>"; }
+film "<spectrum name='a' value='400:0, 500:1'/>"
+film ""
+film "<spectrum name='a' value='400:0, 500:0'/>"
+film "<spectrum name='a' value='500:1, 400:1'/>"
+film "<spectrum name='a' value='400:1'/>"
+film "<spectrum name='a' value='400:1, 500:1'/><spectrum name='a' value='400:1, 500:1'/>"
+film "<spectrum name='a' filename='none.spd'/>"
+importon info - <<<"<scene version='3.0.0'><sensor type='perspective'><film type='specfilm'>
+<spectrum name='a' value='400:0, 500:1'/></film></sensor></scene>"
