@@ -645,7 +645,8 @@ static void check(const struct subject *q)
             if (i == 2 && q->emitter && q->emitter->flags & IMP_EMITTER_DELTA) continue;
             if (!is_long && mode == IMP_MONO && (i != 0 || q->texture || q->back))
                 continue;
-            if (!is_long && mode == IMP_SPECTRAL && (i != 0 || q->back)) continue;
+            if (!is_long && mode == IMP_SPECTRAL && (i != 0 || q->back || q->texture))
+                continue;
             if (!is_long && mode == IMP_SINGLE) continue;
             if (!is_long && i != 0 && (q->texture || q->back)) continue;
             check_one(q, integrators[i], (enum imp_color_mode)mode);
