@@ -65,7 +65,7 @@ static enum imp_status sensor_allowed(const struct imp_scene *scene,
         return imp__error(
             ctx, IMP_E_UNSUPPORTED,
             "walks from the lights: sensor '%s' (%s) measures one ray, which "
-            "they meet never; let walks begin at the sensor",
+            "they never meet; let walks begin at the sensor",
             sensor->name, sensor->ops->name);
     if (!integrator->lights && !sensor->shape)
         return imp__error(

@@ -1,0 +1,197 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Derivatives of walks from the lights, walk by walk, with another adjoint wherever they
+ * reach the sensor: reverse against forward mode, and both against central differences of
+ * frozen walks, which are linear in lamps and smooth in all else. */
+#include "imp_scene.h"
+#include "imp_tap.h"
+#include "scene/scene.h"
+#include "walk/light_walk.h"
+
+#define WALKS 4000
+#define MANY  64
+
+static imp_context *ctx;
+
+struct sum {
+    struct imp_sink sink; /* first: the sweep gets a pointer to it */
+    const struct imp_active *active;
+    double g[MANY];
+};
+static void sum_add(struct imp_sink *sink, int param, size_t element, int channels,
+                    const imp_spec *bar)
+{
+    struct sum *s = (struct sum *)sink;
+    const int64_t base = s->active->base[param];
+    if (base < 0) return;
+    double *g = s->g + base + element;
+    if (channels == 1) *g += ((*bar)[0] + (*bar)[1]) + (*bar)[2];
+    else
+        for (int c = 0; c < channels; c++) g[c] += (*bar)[c];
+}
+
+/* Of number k in x's order. */
+static struct imp_param *param_at(const struct imp_scene *scene,
+                                  const struct imp_active *active, size_t k, size_t *e)
+{
+    for (size_t i = 0; i < scene->n_params; i++) {
+        const int64_t base = active->base[i];
+        if (base < 0 || k < (size_t)base ||
+            k >= (size_t)base + scene->params[i].info.count)
+            continue;
+        *e = k - (size_t)base;
+        return &scene->params[i];
+    }
+    return NULL;
+}
+
+static void set(struct imp_scene *scene, struct imp_param *p, size_t e, double value)
+{
+    imp__param_set(p, e, value);
+    imp__theta_announce(scene);
+}
+
+#define HEAD                                                                             \
+    "<scene version='3.0.0'><integrator type='ptracer'><integer name='max_depth' "       \
+    "value='6'/></integrator>"
+#define AT(t) "<transform name='to_world'>" t "</transform>"
+#define ROOM                                                                             \
+    "<shape type='cube'>" AT(                                                            \
+        "<scale value='2'/>") "<boolean name='flip_normals' value='true'/><bsdf "        \
+                              "type='diffuse'><rgb "                                     \
+                              "name='reflectance' "                                      \
+                              "value='.6,.5,.4'/></bsdf></shape><shape "                 \
+                              "type='rectangle'>" AT("<scale x='.6' y='.6'/><rotate "    \
+                                                     "x='1' angle='90'/><translate "     \
+                                                     "y='1.95'/>") "<emitter "           \
+                                                                   "type='beam'><rgb "   \
+                                                                   "name='radiance' "    \
+                                                                   "value='5,4,3'/"      \
+                                                                   "><float "            \
+                                                                   "name='exponent' "    \
+                                                                   "value='2'/></"       \
+                                                                   "emitter></shape>"
+#define BALL(x, bsdf)                                                                    \
+    "<shape type='sphere'><float name='radius' value='.6'/><point name='center' "        \
+    "value='" x "'/>" bsdf "</shape>"
+#define CAMERA                                                                           \
+    "<sensor type='perspective'><float name='fov' value='80'/>" AT(                      \
+        "<lookat origin='0,0,1.9' target='0,0,0' up='0,1,0'/>") "<film "                 \
+                                                                "type='hdrfilm'><"       \
+                                                                "integer name='width' "  \
+                                                                "value='6'/><integer "   \
+                                                                "name='height' "         \
+                                                                "value='4'/><rfilter "   \
+                                                                "type='box'/></film></"  \
+                                                                "sensor></scene>"
+#define FOG                                                                              \
+    "<shape type='cube'>" AT(                                                            \
+        "<scale value='.7'/><translate x='.9' y='-.9' z='.4'/>") "<bsdf "                \
+                                                                 "type='null'/><medium " \
+                                                                 "name='interior' "      \
+                                                                 "type='homogeneous'><"  \
+                                                                 "rgb name='sigma_t' "   \
+                                                                 "value='1,1.5,2'/"      \
+                                                                 "><rgb name='albedo' "  \
+                                                                 "value='.8,.7,.6'/"     \
+                                                                 "><phase "              \
+                                                                 "type='hg'><float "     \
+                                                                 "name='g' "             \
+                                                                 "value='.4'/></"        \
+                                                                 "phase></medium></"     \
+                                                                 "shape>"
+
+static void check(const char *what, const char *xml)
+{
+    imp_scene *scene = test_scene_text(ctx, xml, IMP_RGB);
+    uint8_t chosen[MANY] = {0};
+    struct imp_active active;
+    struct imp_arena arena;
+    double exact = 0, frozen = 0;
+    int reached = 0, compared = 0;
+    for (size_t i = 0; i < scene->n_params && i < MANY; i++)
+        chosen[i] = scene->params[i].info.flags & IMP_PARAM_DIFFERENTIABLE;
+    test_must(ctx, imp__active_create(scene, chosen, &active));
+    const struct imp_walk_integrator *integrator = imp__walk_integrator(scene);
+    test_must(ctx,
+              imp__light_walks_allowed(scene, scene->sensors[0], integrator, &active));
+    const struct imp_tracer tracer = {.scene = scene,
+                                      .integrator = integrator,
+                                      .sensor = scene->sensors[0],
+                                      .active = &active,
+                                      .seed = 5,
+                                      .collisions_stand = true};
+    imp__arena_init(&arena, ctx);
+    for (int i = 0; i < WALKS; i++) {
+        const struct imp_arena_mark mark = imp__arena_mark(&arena);
+        struct imp_light_walk w;
+        imp__light_walk_trace(&tracer, &arena, i, &w);
+        struct imp_entry *entry =
+            imp__arena_array(&arena, (size_t)w.walk.n + 1, sizeof *entry);
+        imp_spec whole = {0};
+        for (const struct imp_reach *r = w.reach; r; r = r->next) {
+            const imp_spec P = {1 + r->px / 7, 2 - r->py / 9, 0.5 + r->number, 0};
+            if (r->met) entry[r->number].e = P;
+            else entry[r->number].b = P;
+            whole += P * r->values;
+        }
+        if (w.n_reach == 0) {
+            imp__arena_rewind(&arena, mark);
+            continue;
+        }
+        reached++;
+        w.walk.entry = entry;
+        const imp_spec L = imp__walk_fold(&w.walk);
+        for (int c = 0; c < 3; c++)
+            exact = fmax(exact, fabs(L[c] - whole[c]) / (1e-30 + fabs(whole[c])));
+        struct sum s = {.sink = {.add = sum_add}, .active = &active};
+        imp__walk_sweep(&tracer, &w.walk, imp__spec(1), &s.sink);
+        double x_dot[MANY] = {0}, dot = 0, size = 0;
+        for (size_t k = 0; k < active.n; k++) {
+            x_dot[k] = sin((double)(k + 1) * (i % 97 + 1));
+            dot += x_dot[k] * s.g[k];
+            size += fabs(x_dot[k] * s.g[k]);
+        }
+        const imp_spec t = imp__walk_tangent(&tracer, &w.walk, x_dot);
+        if (size > 0) exact = fmax(exact, fabs((t[0] + t[1]) + t[2] - dot) / size);
+        const size_t k = (size_t)i % active.n;
+        size_t e;
+        struct imp_param *p = param_at(scene, &active, k, &e);
+        const double x = imp__param_get(p, e), h = 1e-4 * fmax(fabs(x), 0.1);
+        set(scene, p, e, x + h);
+        const imp_spec up = imp__walk_frozen(&tracer, &w.walk);
+        set(scene, p, e, x - h);
+        const imp_spec down = imp__walk_frozen(&tracer, &w.walk);
+        set(scene, p, e, x);
+        const imp_spec d = (up - down) * (1 / (2 * h));
+        const double value = fabs(whole[0]) + fabs(whole[1]) + fabs(whole[2]);
+        frozen = fmax(frozen, fabs((d[0] + d[1]) + d[2] - s.g[k]) /
+                                  (fabs(s.g[k]) + value / fmax(fabs(x), 0.1)));
+        compared += s.g[k] != 0;
+        imp__arena_rewind(&arena, mark);
+    }
+    tap_ok(exact < 1e-12 && reached > WALKS / 8,
+           "%s: fold, forward and reverse, %zu numbers, %d walks # %.1e", what, active.n,
+           reached, exact);
+    tap_ok(frozen < 1e-6 && compared > WALKS / 64,
+           "%s: frozen differences of %d walks # %.1e", what, compared, frozen);
+    imp__arena_free(&arena);
+    imp__active_destroy(ctx, &active);
+    imp_scene_destroy(scene);
+}
+
+int main(void)
+{
+    ctx = test_context(1);
+    check("a room", HEAD ROOM CAMERA);
+    check("rough metal and plastic",
+          HEAD ROOM BALL("-.8,-.9,-.5", "<bsdf type='roughconductor'><float name='alpha' "
+                                        "value='.3'/></bsdf>")
+              BALL("1,-1,.3", "<bsdf type='phong'/>") CAMERA);
+    check("fog, with its density", HEAD ROOM FOG CAMERA);
+    check("point light and sky", HEAD
+          "<emitter type='point'><point name='position' value='.3,1,1'/></emitter>"
+          "<emitter type='constant'/>" BALL("0,0,0", "<bsdf type='diffuse'/>") CAMERA);
+    imp_context_destroy(ctx);
+    return tap_done();
+}
