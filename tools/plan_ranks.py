@@ -1,0 +1,62 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""What a step of many ranks costs on the network, on paper (docs/machines.md).
+
+Every rank gives its nodes of the tree of sums to all (src/base/team_sum.c): at most one for each
+of the 16 chunks of work that it takes, of 24 bytes for the place and the sum itself, after a
+head of 768 bytes; textures and grids go in fixed point (src/base/team.c), at most all their
+blocks from each rank. A rank receives what all send; a ring passes it on at the speed of one link,
+in ranks - 1 steps of 10 us.
+
+    tools/plan_ranks.py [RANKS...]      the table, for 64, 1000 and 10000 by default
+"""
+import math
+import sys
+
+CHUNKS, PLACE, HEAD, LATENCY = 16, 24, 768, 10e-6
+WIDTH, HEIGHT, SUMS = 1920, 1080, 7  # of a pixel: three means, three squares, a weight
+TEXELS = 3 * 1024 * 1024
+ITEMS = 1 << 20  # of work in the step
+
+
+def gradient(ranks, numbers):
+    """Bytes that a rank receives: value and gradient, each with its spread."""
+    return ranks * (HEAD + CHUNKS * (PLACE + 8 * (2 * numbers + 4)))
+
+
+def picture(ranks):
+    """Every tile comes from one rank, or a few; all of the picture arrives once."""
+    return ranks * (HEAD + CHUNKS * PLACE) + 8 * SUMS * WIDTH * HEIGHT
+
+
+def texture(ranks):
+    """The worst case: every rank touches all blocks; mean, and spread in two parts."""
+    return ranks * (HEAD + 3 * 8 * TEXELS)
+
+
+def seconds(received, ranks, gigabits):
+    return received * 8 / (gigabits * 1e9) + (ranks - 1) * LATENCY
+
+
+def size(n):
+    for unit in ("B", "kB", "MB", "GB"):
+        if n < 1000: return "%.3g %s" % (n, unit)
+        n /= 1000
+    return "%.3g TB" % n
+
+
+def main():
+    ranks = [int(a) for a in sys.argv[1:]] or [64, 1000, 10000]
+    rows = [("gradient, %d numbers" % k, lambda r, k=k: gradient(r, k)) for k in (10, 100, 1000)]
+    rows += [("picture, %d x %d" % (WIDTH, HEIGHT), picture), ("texture of 3.1 million, all touched", texture)]
+    print("Depth of the tree over %d items: %d." % (ITEMS, math.ceil(math.log2(ITEMS))))
+    print()
+    print("| a step | ranks | received by each | at 1 Gbit/s | at 25 Gbit/s |")
+    print("|---|---|---|---|---|")
+    for name, bytes_of in rows:
+        for r in ranks:
+            n = bytes_of(r)
+            print("| %s | %d | %s | %.3g s | %.3g s |" % (name, r, size(n), seconds(n, r, 1), seconds(n, r, 25)))
+
+
+main()
