@@ -2,6 +2,7 @@
  *
  * The reasons to refuse walks from the lights. */
 #include "light_walk.h"
+#include "scene/media_around.h"
 
 /* Is what the material emits 0, whatever is differentiated? */
 static bool is_dark(const struct imp_bsdf *b, const struct imp_active *active)
@@ -56,6 +57,16 @@ static enum imp_status emission_allowed(const struct imp_scene *scene,
     return IMP_OK;
 }
 
+/* Does the sensor's medium go on outside of everything? */
+static bool is_endless(const struct imp_scene *scene, const struct imp_sensor *sensor)
+{
+    if (!sensor->medium) return false;
+    const struct imp_ball *ball = sensor->scene;
+    const imp_v3 up = imp__v3(0, 0, 2 * ball->radius);
+    return imp__medium_around(scene, ball->centre + up, imp__v3(0, 0, -1),
+                              sensor->medium) != NULL;
+}
+
 static enum imp_status sensor_allowed(const struct imp_scene *scene,
                                       const struct imp_sensor *sensor,
                                       const struct imp_walk_integrator *integrator)
@@ -79,6 +90,12 @@ static enum imp_status sensor_allowed(const struct imp_scene *scene,
             "walks from the lights: sensor '%s' (%s) has one direction, in "
             "which light '%s' is never drawn; let walks begin at the sensor",
             sensor->name, sensor->ops->name, scene->emitters[scene->environment]->name);
+    if (scene->environment >= 0 && is_endless(scene, sensor))
+        return imp__error(
+            ctx, IMP_E_UNSUPPORTED,
+            "walks from the lights: medium '%s' has no end, and light '%s' lies "
+            "beyond it; let walks begin at the sensor",
+            sensor->medium->name, scene->emitters[scene->environment]->name);
     bool area = false;
     for (int i = 0; i < scene->n_emitters; i++) area |= scene->emitters[i]->shape != NULL;
     if (integrator->hide_emitters && area &&

@@ -18,6 +18,12 @@ cat >large.xml <<'X'
 <scene version="3.0.0"><integrator type="path"/><shape type="sphere"><sensor type="irradiancemeter"/></shape></scene>
 X
 importon read large.xml
+cat >endless.xml <<'X'
+<scene version="3.0.0"><integrator type="volpath"/><medium type="homogeneous" id="haze"/>
+<sensor type="perspective"><ref id="haze" name="medium"/><film type="hdrfilm"><integer name="width" value="4"/><integer name="height" value="4"/></film></sensor>
+<emitter type="constant" id="sky"/><shape type="sphere"/></scene>
+X
+importon render endless.xml --from lights -o a.exr
 importon fit "$ROOT/scenes/desk.xml" -T =@0 -o F
 importon fit "$ROOT/scenes/desk.xml" -D nx=2 -T =3@0 -o F
 true
