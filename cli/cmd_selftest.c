@@ -109,7 +109,7 @@ static int run_selftest(int n, char **operand)
 const struct command command_selftest = {
     {"selftest",
      "material|light|camera|phase|medium SCENE",
-     "test the contracts of a scene's materials, lights, cameras or media",
+     "test the contracts of materials, lights, cameras and media",
      {options, options_scene, options_file, options_general},
      2,
      2},

@@ -32,6 +32,7 @@ static void smooth_visit(const struct kind_case *c, void *payload)
     struct tap_stat z2 = {0};
     (void)payload;
     if (!(b->flags & IMP_BSDF_SMOOTH) || (b->flags & IMP_BSDF_DELTA)) return;
+    if (b->flags & IMP_BSDF_TURNED) return; /* refused */
     /* Lambert drawn from a narrow lobe: the tails are too heavy for a z-test. */
     if (kind_has_config(c, "sampling=phong")) return;
     /* Two-sided glass: seen from behind another material, which does not draw what comes

@@ -73,7 +73,13 @@ static void bsdf_xml(const struct imp_bsdf_ops *ops, char *xml, size_t size)
     char inner[256] = "";
     for (int k = 0; k < ops->min_children; k++) strcat(inner, "<bsdf type='diffuse'/>");
     for (const struct imp_input_desc *d = ops->inputs; d && d->name; d++)
-        if (d->flags & IMP_INPUT_REQUIRED || strcmp(d->name, "alpha") == 0)
+        if (d->flags & IMP_INPUT_VECTOR)
+            snprintf(
+                inner + strlen(inner), sizeof inner - strlen(inner),
+                "<texture type='checkerboard' name='%s'><rgb name='color0' value='.6'/>"
+                "<rgb name='color1' value='.4,.5,.9'/></texture>",
+                d->name);
+        else if (d->flags & IMP_INPUT_REQUIRED || strcmp(d->name, "alpha") == 0)
             snprintf(inner + strlen(inner), sizeof inner - strlen(inner),
                      "<float name='%s' value='%s'/>", d->name,
                      strcmp(d->name, "alpha") == 0 ? ".8" : ".4");

@@ -20,7 +20,8 @@ static const struct imp_input_desc inputs[] = {
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_bsdf *bsdf)
 {
     const struct imp_bsdf *c = bsdf->child[0];
-    bsdf->flags = c->flags & ~(unsigned)(IMP_BSDF_NULL | IMP_BSDF_LINEAR);
+    bsdf->flags =
+        (c->flags & ~(unsigned)(IMP_BSDF_NULL | IMP_BSDF_LINEAR)) | IMP_BSDF_TURNED;
     bsdf->absorb = c->absorb;
     bsdf->n_lobes = c->n_lobes;
     return imp__turning_read(b, self);

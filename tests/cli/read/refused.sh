@@ -24,6 +24,12 @@ cat >endless.xml <<'X'
 <emitter type="constant" id="sky"/><shape type="sphere"/></scene>
 X
 importon render endless.xml --from lights -o a.exr
+cat >turned.xml <<'X'
+<scene version="3.0.0"><integrator type="ptracer"/><sensor type="perspective"/>
+<shape type="sphere"><bsdf type="twosided" id="tiles"><bsdf type="normalmap"><texture type="checkerboard" name="normalmap"/><bsdf type="diffuse"/></bsdf></bsdf></shape>
+<shape type="sphere"><emitter type="area"/></shape></scene>
+X
+importon render turned.xml -o a.exr
 importon fit "$ROOT/scenes/desk.xml" -T =@0 -o F
 importon fit "$ROOT/scenes/desk.xml" -D nx=2 -T =3@0 -o F
 true
