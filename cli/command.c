@@ -26,6 +26,7 @@ static const char *const wavelength_words[] = {"stratified", "independent", "imp
 static const char *const files_words[] = {"broadcast", "shared", NULL};
 static const char *const from_words[] = {"scene", "sensor", "lights", NULL};
 static const char *const upsampling_words[] = {"sigmoid", "linear", NULL};
+static const char *const point_words[] = {"scene", "independent", "sobol", NULL};
 static const char *const progress_words[] = {"auto", "always", "never", NULL};
 
 const struct arg_option options_file[] = {{ARG_TEXT, 'o', "output", "FILE",
@@ -109,6 +110,10 @@ const struct arg_option options_run[] = {
      "end at which walks begin: scene (as its integrator says, default), sensor or "
      "lights",
      &cli.from, 0, 0, from_words},
+    {ARG_CHOICE, 0, "points", "KIND",
+     "random numbers of a pixel's samples: independent, sobol, or scene (default: what "
+     "the scene's sampler says)",
+     &cli.points, 0, 0, point_words},
     {0}};
 
 const struct arg_option options_guide[] = {
@@ -378,6 +383,7 @@ struct imp_run cli_run(void)
     run.wavelengths = (enum imp_wavelength_sampling)cli.wavelengths;
     run.wavelength_set = cli.wavelength_set;
     run.from = (enum imp_from)cli.from;
+    run.points = (enum imp_points)cli.points;
     return run;
 }
 int cli_spp(const struct imp_run *run)

@@ -64,7 +64,7 @@ struct cli {
     int mpi_files;               /* how ranks read files: as it is written */
     const char *part, *part_out; /* "I/N", and where it goes */
     imp_parts *parts;            /* the part in the making, or those that are merged */
-    int upsampling, wavelengths, wavelength_set, from;
+    int upsampling, wavelengths, wavelength_set, from, points;
     const char *display; /* HOST:PORT of a viewer */
     /* options_guide */
     int guide;

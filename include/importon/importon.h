@@ -578,6 +578,16 @@ enum imp_wavelength_sampling {
 /** A picture in the making, with standard errors: valid during the call, which comes from
  * one thread and holds up the others. */
 typedef void (*imp_preview_fn)(const imp_film *picture, void *payload);
+/** The random numbers of a pixel's walks. */
+enum imp_points {
+    IMP_POINTS_SCENE = 0,   /**< as the sampler of the sensor says */
+    IMP_POINTS_INDEPENDENT, /**< independent */
+    /** Sets of up to 64 points of Sobol's sequence, scrambled by Owen's method. Pixels and
+     * sets are independent of each other. Means stay what they are, errors shrink; standard
+     * errors of gradients come from independent sets, those of pictures from parts of sets,
+     * and are a little too large. */
+    IMP_POINTS_SOBOL
+};
 
 /** The end at which walks begin. */
 enum imp_from {
@@ -613,11 +623,12 @@ struct imp_run {
     /** Both ends give the same numbers; what cannot begin there is refused with its name. Of
      * walks from the lights spp times the pixels are made for the whole film. */
     enum imp_from from;
+    enum imp_points points;
 };
 #define IMP_RUN_INIT                                                                     \
     {                                                                                    \
         sizeof(struct imp_run), 0, 0, 0, 0, 0, 0, 0, 0, IMP_WAVELENGTHS_STRATIFIED, 0,   \
-            0, 0, IMP_FROM_SCENE                                                         \
+            0, 0, IMP_FROM_SCENE, IMP_POINTS_SCENE                                       \
     }
 
 /** Render the scene's integrator through a sensor.

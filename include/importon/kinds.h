@@ -704,6 +704,7 @@ struct imp_sensor {
         scale; /* reading over the mean of its rays' radiance: pi of irradiance, else 1 */
     const struct imp_ball *scene; /* set when the scene is whole */
     bool photometric;             /* readings are luminances, in lux or cd/m^2 */
+    enum imp_points points;       /* what its sampler asks for */
 };
 enum imp_sensor_flags {
     IMP_SENSOR_AREA = 1, /* its rays start on the shape that it stands in */

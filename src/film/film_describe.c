@@ -222,7 +222,7 @@ enum imp_status imp_walk_describe(const imp_scene *scene, const struct imp_run *
                                 .sensor = sensor,
                                 .seed = own.seed,
                                 .guide = imp__guide_of(scene, integrator, own.guide)};
-    imp__tracer_waves(&tracer, &own, imp__walks_of(&own, sensor));
+    imp__tracer_numbers(&tracer, &own, imp__walks_of(&own, sensor));
     struct imp_arena arena;
     imp__arena_init(&arena, scene->ctx);
     struct imp_walk walk;

@@ -369,7 +369,7 @@ enum imp_status imp__render_from_lights(const struct imp_measure *m,
                                 .sensor = m->sensor,
                                 .seed = run->seed,
                                 .value_only = true};
-    imp__tracer_waves(&tracer, run, 0);
+    imp__tracer_numbers(&tracer, run, 0);
     tracer.set = 1;
     const struct imp_light_picture picture = {.tracer = &tracer,
                                               .run = run,

@@ -138,8 +138,9 @@ enum imp_status imp__measure_create(const struct imp_scene *scene,
                                 .from_lights = from && from->from_lights,
                                 .names = (char *)names.text.bytes.data};
     struct imp_tracer tracer = {.scene = scene};
-    imp__tracer_waves(&tracer, run, imp__walks_of(run, sensor));
-    out->set = tracer.set;
+    const int64_t samples = imp__walks_of(run, sensor);
+    imp__tracer_numbers(&tracer, run, samples);
+    out->set = imp__tracer_set(&tracer, samples);
     return IMP_OK;
 }
 
@@ -221,9 +222,11 @@ static imp_spec albedo(const struct imp_measure *m, const struct imp_hit *hit,
 }
 
 static int aov_value(const struct imp_measure *m, const struct imp_channels *top,
-                     struct imp_key key, double px, double py, double *value)
+                     const struct imp_walk *w, double *value)
 {
-    const double lens[2] = {imp__u01(key, IMP_DIM_LENS_U), imp__u01(key, IMP_DIM_LENS_V)};
+    const double px = w->px, py = w->py;
+    const double lens[2] = {imp__start_number(w->key, w->point, IMP_DIM_LENS_U),
+                            imp__start_number(w->key, w->point, IMP_DIM_LENS_V)};
     struct imp_sensor_ray ray;
     struct imp_hit hit;
     struct imp_surface at;
@@ -285,7 +288,7 @@ static void radiance(const struct imp_measure *m,
         .seed = m->seed,
         .guide = integrator ? imp__guide_of(m->scene, integrator, m->guide) : NULL,
         .value_only = true};
-    imp__tracer_waves(&tracer, m->run, imp__walks_of(m->run, m->sensor));
+    imp__tracer_numbers(&tracer, m->run, imp__walks_of(m->run, m->sensor));
     const enum imp_drop before = s->dropped;
     const struct imp_arena_mark mark = imp__arena_mark(s->arena);
     imp__sample_walk(s, &tracer, walk);
@@ -328,7 +331,7 @@ void imp__measure_sample(const void *measure, struct imp_sample *s)
     const int after_base = n;
     if (!more->moments) {
         radiance(m, NULL, s, &L, &alpha, &walk);
-        n += aov_value(m, more, walk.key, walk.px, walk.py, value + n);
+        n += aov_value(m, more, &walk, value + n);
     }
     for (int k = 0; k < top->n_inner; k++) {
         radiance(m, imp__walk_integrator_of(&top->inner[k]), s, &L, &alpha, &walk);

@@ -198,7 +198,8 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
     struct render *r = payload;
     const int s0 = pass_begin(r, (int)t->part), s1 = pass_begin(r, (int)t->part + 1);
     int n_sets = 0;
-    const int n = r->n;
+    int64_t first = 0, n_set = 0; /* of the set at work */
+    const int n = r->n, step = imp_max(r->picture->step, 1);
     double *tile = result;
     double *patch = r->patches + (size_t)w->index * apart(patch_size(r));
     struct imp_sample s = {.arena = &w->arena,
@@ -209,11 +210,11 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
             double *own =
                 tile + (size_t)((s.y - t->y0) * r->side + s.x - t->x0) * 2 * (size_t)n;
             for (int k = s0; k < s1; k++) {
-                s.index = r->picture->first + k;
+                s.index = r->picture->first + (int64_t)k * step;
                 sample_take(r, w, &s);
                 if (imp_unlikely(r->set > 1)) {
-                    int64_t first, n_set;
-                    imp__set_at(r->set, r->period, k, &first, &n_set);
+                    if (k == s0 || k >= first + n_set)
+                        imp__set_at(r->set, r->period, k, &first, &n_set);
                     const bool last = k + 1 == first + n_set || k + 1 == s1;
                     set_take(r, t, w->index, &s, own, patch, last ? (int)n_set : 0);
                     n_sets += last;

@@ -28,6 +28,7 @@ struct imp_picture {
     void (*sample)(const void *payload, struct imp_sample *s);
     const void *payload;
     int64_t first;   /* number of a pixel's first sample */
+    int step;        /* from a sample's number to that of the next; 0: 1 */
     int n_films;     /* the values are cut into so many films of equal size; 0: one */
     double *weights; /* [height][width] sums of filter weights; NULL: not wanted */
     /* Consecutive samples of a pixel that depend on each other, from the first on: errors

@@ -8,7 +8,7 @@
 #include "base/file.h"
 #include "math/hash.h"
 #include "scene/fingerprint.h"
-#include "walk/walk_integrator.h"
+#include "walk/walk.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -476,5 +476,7 @@ int imp__same_run(const struct imp_scene *scene, const struct imp_run *run,
     same[n++] = (struct imp_same){"set of parameter values", theta};
     same[n++] =
         (struct imp_same){"seed or number of samples", imp__hash(0, how, sizeof how)};
+    same[n++] = (struct imp_same){"kind of points",
+                                  imp__points_of(sensor, run) == IMP_POINTS_SOBOL};
     return n;
 }

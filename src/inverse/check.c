@@ -92,6 +92,7 @@ enum imp_status imp_check(imp_problem *p, const struct imp_check_options *option
     if (c.options.paths < 0 || c.options.fresh_spp < 0)
         IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "paths and fresh_spp must be >= 0"));
     if (c.options.paths == 0) c.options.paths = 1000;
+    c.outer.points = IMP_POINTS_INDEPENDENT; /* samples are compared one by one */
     c.run = c.outer;
     c.run.time_limit_s = 0;
     c.run.progress = inner_progress;

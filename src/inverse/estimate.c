@@ -62,7 +62,7 @@ static enum imp_status target_estimate(struct imp_problem *p,
             p, target, &own, &totals->objective, &totals->variance,
             want_gradient ? totals->gradient : NULL, totals->gradient_variance);
     if (!want_gradient) j.tracer.active = NULL;
-    j.plan = imp__replicates_of(j.tracer.sensor, target, own.spp);
+    j.plan = imp__replicates_of(p->scene, target, &own);
     if (imp__film_border(&j.tracer.sensor->film) > 0)
         st = splat_prepare(&j, &own, &splat);
     if (st == IMP_OK && (!j.splat || want_gradient))
@@ -193,13 +193,15 @@ enum imp_status imp_problem_reverse(imp_problem *p, const float *seed_image,
         imp__totals_end(p, &totals, gradient, gradient_se);
         goto out;
     }
-    j.plan = imp__replicates_of(j.tracer.sensor, NULL, own.spp);
+    j.plan = imp__replicates_of(p->scene, NULL, &own);
     if (imp__film_border(&j.tracer.sensor->film) > 0)
         IMP_TRY(splat_prepare(&j, &own, &splat));
     /* The adjoint does not depend on the walks: those of a replicate may depend on each
      * other, and replicates give the errors. */
-    if (own.wavelengths != IMP_WAVELENGTHS_INDEPENDENT) j.tracer.set = j.plan.n;
-    j.tracer.period = j.plan.n;
+    if (!j.tracer.points) {
+        if (own.wavelengths != IMP_WAVELENGTHS_INDEPENDENT) j.tracer.set = j.plan.n;
+        j.tracer.period = j.plan.n;
+    }
     IMP_TRY(imp__gradient_job_run(&j, &own, "gradient", 0, 1, imp__now()));
     IMP_TRY(imp__totals_share(p, &totals));
     IMP_TRY(imp__totals_again(p, &totals, &again));

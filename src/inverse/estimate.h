@@ -11,21 +11,40 @@
 #define IMP_WIDE_REPLICATES  8 /* most of a Gauss-Newton matrix through wide filters */
 
 /* R replicates of n samples; spp = R n >= the spp asked for. R = 1 only where spp < 4:
- * then neighbouring pixels are paired, which makes the variance an upper bound. */
+ * then neighbouring pixels are paired, which makes the variance an upper bound.
+ *
+ * The samples of a replicate are m sets, independent of each other; what leaves one out
+ * leaves out a set. Independent samples are sets of one. Sets of points have n/m samples,
+ * rounded up or down, and their estimates count the same. */
 struct imp__replicates {
     int n, R, chunks; /* chunks: work items per tile, each with at least 2 replicates */
+    int m;
+    int stride; /* from the number of a set's first sample to that of the next set */
 };
+/* Of independent samples. */
 struct imp__replicates imp__replicates_plan(int spp, int batch_max);
-/* Those of imp_problem_objective for a target, of imp_problem_reverse for none; spp 0:
- * the sensor's. */
-struct imp__replicates imp__replicates_of(const struct imp_sensor *sensor,
-                                          const struct imp__target *target, int spp);
+/* Those of imp_problem_objective for a target, of imp_problem_reverse for none. */
+struct imp__replicates imp__replicates_of(const struct imp_scene *scene,
+                                          const struct imp__target *target,
+                                          const struct imp_run *run);
 /* Those of Gauss-Newton matrices. */
-struct imp__replicates imp__replicates_normal(const struct imp_sensor *sensor, int spp);
+struct imp__replicates imp__replicates_normal(const struct imp_scene *scene,
+                                              const struct imp__target *target,
+                                              const struct imp_run *run);
 /* Replicates b0 <= b < b1 of chunk k. */
 static inline int imp__replicates_begin(struct imp__replicates r, int k)
 {
     return (int)((int64_t)r.R * k / r.chunks);
+}
+/* Set s of a replicate has its samples from this one on; s = m: its end. */
+static inline int imp__replicates_set(struct imp__replicates r, int s)
+{
+    return (int)((int64_t)r.n * s / r.m);
+}
+/* Number of the first sample of set s of replicate b, as of imp__walk_trace. */
+static inline int64_t imp__replicates_first(struct imp__replicates r, int b, int s)
+{
+    return ((int64_t)b * r.m + s) * r.stride;
 }
 
 /* imp_problem_objective; `in_place`: sums of many numbers are made in gradient and

@@ -171,6 +171,12 @@ static void fingerprint(struct imp__fit *f)
                               f->options.tolerance,
                               f->run.spp > 0 ? f->run.spp : sensor->spp};
     h->options = imp__hash(f->outer.seed, number, sizeof number);
+    if (imp__points_of(sensor, &f->outer) == IMP_POINTS_SOBOL) {
+        const struct imp__replicates plan =
+            imp__replicates_of(p->scene, &p->targets[0], &f->outer);
+        const int sets[3] = {plan.n, plan.m, IMP_SET_POINTS};
+        h->options = imp__hash(h->options, sets, sizeof sets);
+    }
 }
 
 /* A large change of a variable: its whole range, or its size at the start. Zeros take the

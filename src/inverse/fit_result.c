@@ -190,11 +190,10 @@ static int spp_taken(const struct imp__fit *f)
     const struct imp_problem *p = f->problem;
     int most = 0;
     for (size_t t = 0; t < p->n_targets; t++) {
-        const struct imp_sensor *sensor = p->scene->sensors[p->targets[t].desc.sensor];
         const struct imp__replicates r =
             f->options.optimizer == IMP_LM
-                ? imp__replicates_normal(sensor, f->outer.spp)
-                : imp__replicates_of(sensor, &p->targets[t], f->outer.spp);
+                ? imp__replicates_normal(p->scene, &p->targets[t], &f->outer)
+                : imp__replicates_of(p->scene, &p->targets[t], &f->outer);
         most = imp_max(most, r.n * r.R);
     }
     return most;

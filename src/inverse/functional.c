@@ -130,7 +130,8 @@ static enum imp_status influence(imp_context *ctx, const struct functional *f,
                                         .names = names,
                                         .n = (int)n,
                                         .sample = sample_influence,
-                                        .payload = f};
+                                        .payload = f,
+                                        .set = imp__tracer_set(&f->tracer, own.spp)};
     IMP_TRY(imp__picture_make(ctx, &picture, &own, &film));
     for (size_t k = 0; k < n; k++) {
         double sum = 0;
@@ -218,13 +219,15 @@ static enum imp_status picture_value(imp_context *ctx, struct functional *f,
     struct imp_estimate value = {0, 0, 0};
     imp_film *film = NULL;
     f->tracer.active = NULL; /* nothing is differentiated here */
-    const struct imp_picture picture = {.sensor = f->tracer.sensor,
-                                        .stage = "picture",
-                                        .names = names[n - 1],
-                                        .n = n,
-                                        .sample = sample_value,
-                                        .payload = f,
-                                        .weights = weights};
+    const struct imp_picture picture = {
+        .sensor = f->tracer.sensor,
+        .stage = "picture",
+        .names = names[n - 1],
+        .n = n,
+        .sample = sample_value,
+        .payload = f,
+        .weights = weights,
+        .set = imp__tracer_set(&f->tracer, imp__walks_of(run, f->tracer.sensor))};
     /* Standard errors through a wide filter need the picture, so each part computes all
      * of it. */
     const int spp = run->spp > 0 ? run->spp : f->tracer.sensor->spp;

@@ -7,7 +7,7 @@
  *     (J^T r)_k  ~ w { [S/(n-1) - T] mean(x_k) - sum_i L_i x_ik / (n (n-1)) }
  *
  * (products of two different walks, i != j; the mean of the others, leave-one-out),
- * averaged over replicates; the same-sample matrix, which a naive product of mean
+ * averaged over replicates; of points in sets, L and x are those of a set. The same-sample matrix, which a naive product of mean
  * pictures would give, comes along for damping. Losses that are not quadratic enter with
  * Gauss and Newton's w at the mean, and with the gradient of adjoint.c: r = l'/w at the
  * mean of a few walks would have the bias that the jackknife takes off.
@@ -37,7 +37,7 @@ struct job {
     size_t K;
     struct imp_tiles tiles;
     struct worker {
-        double *x;      /* [K][channels] of one walk */
+        double *x;      /* [K][channels] of one walk, or set: mean */
         double *sum_x;  /* [K][seen] of a replicate */
         double *sum_lx; /* [K][seen] */
         double *sum_xx; /* [seen][K*K] */
@@ -71,6 +71,30 @@ static double seen(const struct job *j, const double *lanes, int c)
     return imp__seen(imp__sees_luminance(j->target, j->channels), lanes, c);
 }
 
+/* Set s of a replicate: its mean radiance, and x, the mean of its derivatives. */
+static imp_spec set_mean(const struct job *j, struct imp_tile_worker *tile, int x, int y,
+                         int b, int s)
+{
+    double *sum_x = j->workers[tile->index].x;
+    const size_t width = j->K * (size_t)j->channels;
+    const int64_t number = imp__replicates_first(j->plan, b, s);
+    const int n = imp__replicates_set(j->plan, s + 1) - imp__replicates_set(j->plan, s);
+    imp_spec L = {0};
+    memset(sum_x, 0, width * sizeof *sum_x);
+    for (int64_t sample = number; sample < number + n; sample++) {
+        const struct imp_arena_mark mark = imp__arena_mark(&tile->arena);
+        struct imp_walk walk;
+        imp__walk_trace(&j->tracer, &tile->arena, x, y, sample, &walk);
+        imp__tile_drop(tile, walk.dropped, x, y, sample);
+        imp__lanes_sweep(&j->tracer, &walk, sum_x);
+        imp__arena_rewind(&tile->arena, mark);
+        L += walk.L;
+    }
+    if (n == 1) return L;
+    for (size_t k = 0; k < width; k++) sum_x[k] /= n;
+    return L / imp__spec(n);
+}
+
 /* One replicate of a pixel: adds to the tile's matrices with factor `share`, writes its
  * gradient, returns its loss. */
 static double replicate(const struct job *j, struct imp_tile_worker *tile,
@@ -80,8 +104,8 @@ static double replicate(const struct job *j, struct imp_tile_worker *tile,
     struct worker *w = &j->workers[tile->index];
     const size_t K = j->K, S = (size_t)seen_channels(j);
     const struct imp_target *t = &j->target->desc;
-    const int n = j->plan.n;
-    const double N = n;
+    const int m = j->plan.m;
+    const double N = m;
     const size_t width = K * (size_t)j->channels;
     const bool quadratic = imp__loss_quadratic(t->loss);
     double sum[3] = {0}, square[3] = {0}, value = 0;
@@ -90,20 +114,13 @@ static double replicate(const struct job *j, struct imp_tile_worker *tile,
     memset(w->sum_xx, 0, K * K * S * sizeof(double));
     memset(g, 0, K * sizeof *g);
 
-    for (int i = 0; i < n; i++) {
-        const struct imp_arena_mark mark = imp__arena_mark(&tile->arena);
-        const int64_t sample = (int64_t)b * n + i;
-        struct imp_walk walk;
-        imp__walk_trace(&j->tracer, &tile->arena, x, y, sample, &walk);
-        imp__tile_drop(tile, walk.dropped, x, y, sample);
-        memset(w->x, 0, K * (size_t)j->channels * sizeof(double));
-        imp__lanes_sweep(&j->tracer, &walk, w->x);
-        imp__arena_rewind(&tile->arena, mark);
+    for (int i = 0; i < m; i++) {
+        const imp_spec mean = set_mean(j, tile, x, y, b, i);
         if (!quadratic) {
             memcpy(w->each_x + (size_t)i * width, w->x, width * sizeof(double));
-            w->L[i] = walk.L;
+            w->L[i] = mean;
         }
-        const double L[3] = {walk.L[0], walk.L[1], walk.L[2]};
+        const double L[3] = {mean[0], mean[1], mean[2]};
         for (size_t c = 0; c < S; c++) {
             const double l = seen(j, L, (int)c);
             double *xx = w->sum_xx + c * K * K;
@@ -114,16 +131,16 @@ static double replicate(const struct job *j, struct imp_tile_worker *tile,
                 if (xk == 0) continue;
                 w->sum_x[k * S + c] += xk;
                 w->sum_lx[k * S + c] += l * xk;
-                for (size_t m = 0; m <= k; m++)
-                    xx[k * K + m] += xk * seen(j, w->x + m * (size_t)j->channels, (int)c);
+                for (size_t l = 0; l <= k; l++)
+                    xx[k * K + l] += xk * seen(j, w->x + l * (size_t)j->channels, (int)c);
             }
         }
     }
 
     const size_t pixel = (size_t)y * (size_t)j->width + (size_t)x;
     if (!quadratic) {
-        value = imp__replicate_adjoints(j->target, j->channels, pixel, n, w->L, w->P);
-        for (int i = 0; i < n; i++)
+        value = imp__replicate_adjoints(j->target, j->channels, pixel, m, w->L, w->P);
+        for (int i = 0; i < m; i++)
             for (size_t k = 0; k < width; k++)
                 g[k / (size_t)j->channels] +=
                     w->P[i][k % (size_t)j->channels] * w->each_x[(size_t)i * width + k];
@@ -157,15 +174,15 @@ static double replicate(const struct job *j, struct imp_tile_worker *tile,
             if (quadratic)
                 g[k] += weight * ((sum[c] / (N - 1) - T) * xk / N -
                                   w->sum_lx[k * S + c] / (N * (N - 1)));
-            for (size_t m = 0; m <= k; m++) {
-                const double product = xk * w->sum_x[m * S + c],
-                             u = product - xx[k * K + m];
-                out->H[k * K + m] += a * u;
-                out->H_same[k * K + m] += same * product;
-                out->H_meas[k * K + m] += meas * u;
+            for (size_t l = 0; l <= k; l++) {
+                const double product = xk * w->sum_x[l * S + c],
+                             u = product - xx[k * K + l];
+                out->H[k * K + l] += a * u;
+                out->H_same[k * K + l] += same * product;
+                out->H_meas[k * K + l] += meas * u;
                 if (known) continue;
-                U[k * K + m] += square_w * u;
-                AU[k * K + m] += square_w * residual * u;
+                U[k * K + l] += square_w * u;
+                AU[k * K + l] += square_w * residual * u;
             }
         }
     }
@@ -274,7 +291,7 @@ static enum imp_status target_add(struct job *j, const struct imp__target *targe
         return imp__gauss_newton_wide(p, &j->tracer, target, &own, lo, hi, &total);
     }
     j->width = film->crop_w;
-    j->plan = imp__replicates_normal(j->tracer.sensor, own.spp);
+    j->plan = imp__replicates_normal(p->scene, target, &own);
     const double walks = (double)film->crop_w * film->crop_h * j->plan.n * j->plan.R;
     j->tiles = (struct imp_tiles){.ctx = p->ctx,
                                   .run = &own,

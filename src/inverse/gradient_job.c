@@ -22,12 +22,13 @@ static double replicate(struct imp__gradient_job *j, struct imp_tile_worker *w, 
         imp__light_replicate(j, w, x, y, b);
         return 0;
     }
-    const int n = j->plan.n;
+    const int n = j->plan.n, m = j->plan.m;
     struct imp_tally *tally = &j->tallies[w->index];
     const struct imp_arena_mark mark = imp__arena_mark(&w->arena);
     struct imp_walk *walks = imp__arena_take(&w->arena, (size_t)n, sizeof *walks);
-    imp_spec *L = imp__arena_take(&w->arena, (size_t)n, sizeof *L);
-    imp_spec *P = imp__arena_take(&w->arena, (size_t)n, sizeof *P);
+    /* Of sets: means of L, and their adjoints. */
+    imp_spec *L = imp__arena_take(&w->arena, (size_t)m, sizeof *L);
+    imp_spec *P = imp__arena_take(&w->arena, (size_t)m, sizeof *P);
     double value = 0;
     if (!walks || !L || !P) {
         w->no_memory = true;
@@ -35,29 +36,40 @@ static double replicate(struct imp__gradient_job *j, struct imp_tile_worker *w, 
     }
     const bool keep = j->target && !j->splat; /* the others' mean is needed first */
     const size_t pixel = (size_t)y * (size_t)j->width + (size_t)x;
-    for (int i = 0; i < n; i++) {
-        const struct imp_arena_mark one = imp__arena_mark(&w->arena);
-        const int64_t sample = (int64_t)b * n + i;
-        imp__walk_trace(&j->tracer, &w->arena, x, y, sample, &walks[i]);
-        imp__tile_drop(w, walks[i].dropped, x, y, sample);
-        L[i] = walks[i].L;
-        if (keep) continue;
-        if (j->splat)
-            P[0] = imp__splat_adjoint(j->splat, b, walks[i].px, walks[i].py, L[i]);
-        else
-            for (int c = 0; c < 4; c++)
-                P[0][c] =
-                    c < j->channels
-                        ? j->seed[pixel * (size_t)j->channels + (size_t)c] / (double)n
-                        : 0;
-        imp__walk_sweep(&j->tracer, &walks[i], P[0], &tally->sink);
-        imp__arena_rewind(&w->arena, one);
+    for (int s = 0; s < m; s++) {
+        const int first = imp__replicates_set(j->plan, s);
+        const int end = imp__replicates_set(j->plan, s + 1);
+        L[s] = (imp_spec){0};
+        for (int i = first; i < end; i++) {
+            const struct imp_arena_mark one = imp__arena_mark(&w->arena);
+            const int64_t sample = imp__replicates_first(j->plan, b, s) + i - first;
+            imp__walk_trace(&j->tracer, &w->arena, x, y, sample, &walks[i]);
+            imp__tile_drop(w, walks[i].dropped, x, y, sample);
+            L[s] += walks[i].L;
+            if (keep) continue;
+            if (j->splat)
+                P[0] = imp__splat_adjoint(j->splat, b, s, walks[i].px, walks[i].py,
+                                          walks[i].L);
+            else
+                for (int c = 0; c < 4; c++)
+                    P[0][c] =
+                        c < j->channels
+                            ? j->seed[pixel * (size_t)j->channels + (size_t)c] / (double)n
+                            : 0;
+            imp__walk_sweep(&j->tracer, &walks[i], P[0], &tally->sink);
+            imp__arena_rewind(&w->arena, one);
+        }
+        if (end - first > 1) L[s] /= imp__spec(end - first);
     }
     if (keep) {
-        value = imp__replicate_adjoints(j->target, j->channels, pixel, n, L, P);
-        if (j->want_gradient)
-            for (int i = 0; i < n; i++)
-                imp__walk_sweep(&j->tracer, &walks[i], P[i], &tally->sink);
+        value = imp__replicate_adjoints(j->target, j->channels, pixel, m, L, P);
+        for (int s = 0; j->want_gradient && s < m; s++) {
+            const int first = imp__replicates_set(j->plan, s);
+            const int end = imp__replicates_set(j->plan, s + 1);
+            if (end - first > 1) P[s] /= imp__spec(end - first);
+            for (int i = first; i < end; i++)
+                imp__walk_sweep(&j->tracer, &walks[i], P[s], &tally->sink);
+        }
     }
     imp__tally_batch(tally);
 out:

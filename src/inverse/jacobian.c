@@ -40,12 +40,14 @@ enum imp_status imp_problem_forward(imp_problem *p, const double *x_dot,
     enum imp_status st = imp__problem_same(p, &own, "forward");
     if (st == IMP_OK) st = imp__problem_tracer(p, &own, NULL, &f.tracer);
     if (st != IMP_OK) return st;
-    const struct imp_picture picture = {.sensor = f.tracer.sensor,
-                                        .stage = "derivative",
-                                        .names = f.channels == 3 ? "R,G,B" : "Y",
-                                        .n = f.channels,
-                                        .sample = sample_tangent,
-                                        .payload = &f};
+    const struct imp_picture picture = {
+        .sensor = f.tracer.sensor,
+        .stage = "derivative",
+        .names = f.channels == 3 ? "R,G,B" : "Y",
+        .n = f.channels,
+        .sample = sample_tangent,
+        .payload = &f,
+        .set = imp__tracer_set(&f.tracer, imp__walks_of(&own, f.tracer.sensor))};
     return imp__picture_make(p->ctx, &picture, &own, out);
 }
 
@@ -78,13 +80,15 @@ enum imp_status imp_problem_jacobian(imp_problem *p, const struct imp_run *run,
     if (!made) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory"));
     IMP_TRY(imp__problem_same(p, &own, "jacobian"));
     IMP_TRY(imp__problem_tracer(p, &own, NULL, &tracer));
-    const struct imp_picture picture = {.sensor = tracer.sensor,
-                                        .stage = "jacobian",
-                                        .names = C == 3 ? "R,G,B" : "Y",
-                                        .n = n * C,
-                                        .sample = sample_jacobian,
-                                        .payload = &tracer,
-                                        .n_films = n};
+    const struct imp_picture picture = {
+        .sensor = tracer.sensor,
+        .stage = "jacobian",
+        .names = C == 3 ? "R,G,B" : "Y",
+        .n = n * C,
+        .sample = sample_jacobian,
+        .payload = &tracer,
+        .n_films = n,
+        .set = imp__tracer_set(&tracer, imp__walks_of(&own, tracer.sensor))};
     st = imp__picture_make(ctx, &picture, &own, made);
     if (st != IMP_OK && st != IMP_CANCELLED) goto out;
     if (films) memcpy(films, made + 1, p->n * sizeof *made);

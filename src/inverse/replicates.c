@@ -5,42 +5,97 @@
 #include "loss.h"
 #include "walk/run.h"
 
-struct imp__replicates imp__replicates_plan(int spp, int batch_max)
+#define WIDE_MANY 16 /* samples per pixel */
+
+/* Sets of points in a replicate: the two that a product needs, and some more where a loss
+ * that is not quadratic has its bias cut by leaving sets out. A fixed adjoint needs none. */
+enum { SETS = 2, SETS_CURVED = 4, SETS_FIXED = 1 };
+
+static bool curved(const struct imp__target *t)
+{
+    return t && !imp__loss_quadratic(t->desc.loss);
+}
+static int sets_of(const struct imp__target *t)
+{
+    return !t ? SETS_FIXED : curved(t) ? SETS_CURVED : SETS;
+}
+
+/* The samples of a replicate as `sets` sets of points, or as independent ones (0). */
+static struct imp__replicates in_sets(struct imp__replicates r, int sets)
+{
+    const int m = r.n >= 2 * sets ? sets : r.n; /* points one by one are independent */
+    r.m = sets > 0 ? m : r.n;
+    r.stride = 1;
+    if (sets > 0) r.stride = (((r.n - 1) / r.m) / IMP_SET_POINTS + 1) * IMP_SET_POINTS;
+    return r;
+}
+
+static struct imp__replicates box_plan(int spp, int batch_max, int sets)
 {
     struct imp__replicates r;
     spp = imp_max(spp, 2);
     r.n = spp < 4 ? spp : imp_min(spp / 2, batch_max);
     r.R = (spp - 1) / r.n + 1;
     r.chunks = imp_max(1, r.R / IMP_BATCHES_PER_ITEM);
-    return r;
+    return in_sets(r, sets);
 }
 
-/* Of pictures, which filters wider than a pixel need. */
-static struct imp__replicates wide_plan(int spp)
+struct imp__replicates imp__replicates_plan(int spp, int batch_max)
 {
-    struct imp__replicates r = {.R = spp >= 16 ? 4 : 2, .chunks = 1};
+    return box_plan(spp, batch_max, 0);
+}
+
+/* Of pictures, which filters wider than a pixel need. In sets, two of them are one
+ * replicate: the picture of one has the adjoint of the other. */
+static struct imp__replicates wide_plan(int spp, int sets)
+{
+    const bool many = spp >= WIDE_MANY;
+    struct imp__replicates r = {.R = many ? 4 : 2, .chunks = 1};
     r.n = imp_max(2, (spp - 1) / r.R + 1);
-    return r;
+    if (!sets || sets == SETS_FIXED) return in_sets(r, sets);
+    if (!many) return in_sets(r, r.n);
+    r.R = 2;
+    r.n *= 2;
+    return in_sets(r, SETS);
 }
 
-struct imp__replicates imp__replicates_of(const struct imp_sensor *sensor,
-                                          const struct imp__target *target, int spp)
+static int spp_of(const struct imp_sensor *sensor, const struct imp_run *run)
 {
-    if (spp <= 0) spp = sensor->spp;
-    if (imp__film_border(&sensor->film) > 0) return wide_plan(spp);
+    return run->spp > 0 ? run->spp : sensor->spp;
+}
+static const struct imp_sensor *sensor_of(const struct imp_scene *scene,
+                                          const struct imp__target *t,
+                                          const struct imp_run *run)
+{
+    return scene->sensors[t ? t->desc.sensor : run->sensor];
+}
+
+struct imp__replicates imp__replicates_of(const struct imp_scene *scene,
+                                          const struct imp__target *t,
+                                          const struct imp_run *run)
+{
+    const struct imp_sensor *sensor = sensor_of(scene, t, run);
+    const int sets = imp__points_of(sensor, run) == IMP_POINTS_SOBOL ? sets_of(t) : 0;
+    if (imp__film_border(&sensor->film) > 0) return wide_plan(spp_of(sensor, run), sets);
     /* A loss that is not quadratic has its bias cut by longer batches. */
-    const bool longer = target && !imp__loss_quadratic(target->desc.loss);
-    return imp__replicates_plan(spp, longer ? IMP_REPLICATE_MAX : IMP_BATCH_MAX);
+    const int most = curved(t) ? IMP_REPLICATE_MAX
+                     : sets    ? sets * IMP_SET_POINTS
+                               : IMP_BATCH_MAX;
+    return box_plan(spp_of(sensor, run), most, sets);
 }
 
-struct imp__replicates imp__replicates_normal(const struct imp_sensor *sensor, int spp)
+struct imp__replicates imp__replicates_normal(const struct imp_scene *scene,
+                                              const struct imp__target *t,
+                                              const struct imp_run *run)
 {
-    spp = imp_max(spp > 0 ? spp : sensor->spp, 4);
+    const struct imp_sensor *sensor = sensor_of(scene, t, run);
+    const int sets = imp__points_of(sensor, run) == IMP_POINTS_SOBOL ? sets_of(t) : 0;
+    const int spp = imp_max(spp_of(sensor, run), 4);
     if (imp__film_border(&sensor->film) == 0)
-        return imp__replicates_plan(spp, IMP_BATCH_MAX);
+        return box_plan(spp, sets ? sets * IMP_SET_POINTS : IMP_BATCH_MAX, sets);
     struct imp__replicates r = {.R = spp < 32 ? 4 : IMP_WIDE_REPLICATES, .chunks = 1};
     r.n = (spp - 1) / r.R + 1;
-    return r;
+    return in_sets(r, sets ? SETS_FIXED : 0);
 }
 
 enum imp_status imp_problem_spp(const imp_problem *p, int target,
@@ -58,8 +113,7 @@ enum imp_status imp_problem_spp(const imp_problem *p, int target,
     if (sensor < 0 || sensor >= p->scene->n_sensors || own.spp < 0)
         return imp__error(p->ctx, IMP_E_ARG, "run: there is no sensor %d, or spp %d < 0",
                           sensor, own.spp);
-    const struct imp__replicates r =
-        imp__replicates_of(p->scene->sensors[sensor], t, own.spp);
+    const struct imp__replicates r = imp__replicates_of(p->scene, t, &own);
     *spp = r.n * r.R;
     return IMP_OK;
 }

@@ -19,6 +19,42 @@ static void sample_position(const void *payload, struct imp_sample *s)
     s->value[0] = 0;
 }
 
+static void mean_of(const struct imp__splat *s, int film, size_t p, double mean[3])
+{
+    const float *from = s->films[film]->mean + p * (size_t)s->channels;
+    for (int k = 0; k < s->channels; k++) mean[k] = from[k];
+}
+
+/* The loss of one replicate from the pictures of its sets, from `first` on. */
+static double sets_loss(const struct imp__splat *s, int first)
+{
+    const struct imp_target *t = &s->target->desc;
+    const imp_film *film = s->films[first];
+    const bool luminance = imp__sees_luminance(s->target, s->channels);
+    const size_t pixels = (size_t)film->width * (size_t)film->height;
+    double total = 0;
+    for (size_t p = 0; p < pixels; p++) {
+        const double scale = t->scale * (s->target->weights ? s->target->weights[p] : 1);
+        for (int c = 0; c < t->channels; c++) {
+            const double T = s->target->pixels[p * (size_t)t->channels + (size_t)c];
+            double mean[3], sum = 0, square = 0;
+            for (int k = first; k < first + s->m; k++) {
+                mean_of(s, k, p, mean);
+                const double I = imp__seen(luminance, mean, c);
+                sum += I;
+                square += I * I;
+            }
+            const double w = imp__loss_weight(t->loss, scale, t->epsilon, T);
+            struct imp__loss_at at;
+            imp__loss_eval(t->loss, scale, t->epsilon, sum / s->m, T, &at);
+            total += imp__loss_quadratic(t->loss)
+                         ? imp__loss_unbiased(w, T, s->m, sum, square)
+                         : at.value;
+        }
+    }
+    return total;
+}
+
 /* The loss of one replicate's picture; the variance of a quadratic one is taken off. */
 static double picture_loss(const struct imp__splat *s, const imp_film *film)
 {
@@ -60,17 +96,22 @@ enum imp_status imp__splat_create(const struct imp_problem *p,
                            .seed = seed,
                            .film = &tracer->sensor->film,
                            .channels = p->scene->channels,
-                           .R = plan.R};
+                           .m = target && plan.m < plan.n ? plan.m : 1};
+    const bool one_by_one = plan.m == plan.n;
     const size_t pixels = (size_t)s.film->crop_w * (size_t)s.film->crop_h;
     double sum = 0, square = 0;
-    s.weights = imp__alloc(ctx, (size_t)plan.R, sizeof *s.weights);
-    s.films = imp__alloc(ctx, (size_t)plan.R, sizeof *s.films);
+    s.n = plan.R * s.m;
+    s.weights = imp__alloc(ctx, (size_t)s.n, sizeof *s.weights);
+    s.films = imp__alloc(ctx, (size_t)s.n, sizeof *s.films);
     if (!s.weights || !s.films) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory"));
-    for (int b = 0; b < plan.R; b++) {
-        s.weights[b] = imp__alloc(ctx, pixels, sizeof **s.weights);
-        if (!s.weights[b]) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory"));
+    for (int k = 0; k < s.n; k++) {
+        const int b = k / s.m, set = k % s.m;
+        s.weights[k] = imp__alloc(ctx, pixels, sizeof **s.weights);
+        if (!s.weights[k]) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory"));
         struct imp_run own = *run;
         own.spp = plan.n;
+        if (s.m > 1)
+            own.spp = imp__replicates_set(plan, set + 1) - imp__replicates_set(plan, set);
         own.time_limit_s = 0;
         const int n = target ? s.channels : 1;
         const struct imp_picture picture = {.sensor = tracer->sensor,
@@ -80,11 +121,13 @@ enum imp_status imp__splat_create(const struct imp_problem *p,
                                             .sample = target ? sample_radiance
                                                              : sample_position,
                                             .payload = tracer,
-                                            .first = (int64_t)b * plan.n,
-                                            .weights = s.weights[b]};
-        IMP_TRY(imp__picture_make(ctx, &picture, &own, &s.films[b]));
-        if (!target) continue;
-        const double value = picture_loss(&s, s.films[b]);
+                                            .first = imp__replicates_first(plan, b, set),
+                                            .step = one_by_one ? plan.stride : 1,
+                                            .weights = s.weights[k]};
+        IMP_TRY(imp__picture_make(ctx, &picture, &own, &s.films[k]));
+        if (!target || set < s.m - 1) continue;
+        const double value =
+            s.m > 1 ? sets_loss(&s, b * s.m) : picture_loss(&s, s.films[k]);
         sum += value;
         square += value * value;
     }
@@ -99,18 +142,38 @@ out:
 
 void imp__splat_destroy(imp_context *ctx, struct imp__splat *s)
 {
-    for (int b = 0; b < s->R; b++) {
-        if (s->weights) imp__release(ctx, s->weights[b]);
-        if (s->films) imp_film_destroy(s->films[b]);
+    for (int k = 0; k < s->n; k++) {
+        if (s->weights) imp__release(ctx, s->weights[k]);
+        if (s->films) imp_film_destroy(s->films[k]);
     }
     imp__release(ctx, s->weights);
     imp__release(ctx, s->films);
     *s = (struct imp__splat){0};
 }
 
-/* l' of pixel p without the sample, as an adjoint of radiance. */
-static imp_spec pixel_adjoint(const struct imp__splat *s, int b, size_t p, double w,
-                              imp_spec L)
+/* Pixel p without the sample, or without its set. */
+static void rest_of(const struct imp__splat *s, int b, int k, size_t p, double w,
+                    imp_spec L, double rest[3])
+{
+    if (s->m > 1) {
+        for (int c = 0; c < s->channels; c++) rest[c] = 0;
+        for (int t = 0; t < s->m; t++) {
+            double mean[3];
+            if (t == k) continue;
+            mean_of(s, b * s->m + t, p, mean);
+            for (int c = 0; c < s->channels; c++) rest[c] += mean[c] / (s->m - 1);
+        }
+        return;
+    }
+    const double W = s->weights[b][p];
+    mean_of(s, b, p, rest);
+    for (int c = 0; c < s->channels; c++) /* alone in its pixel: nothing else is known */
+        if (W - w > 1e-9 * W) rest[c] = (rest[c] * W - w * L[c]) / (W - w);
+}
+
+/* l' there, as an adjoint of radiance. */
+static imp_spec pixel_adjoint(const struct imp__splat *s, int b, int k, size_t p,
+                              double w, imp_spec L)
 {
     const int n = s->channels;
     double bar[3] = {0, 0, 0}, rest[3];
@@ -120,11 +183,8 @@ static imp_spec pixel_adjoint(const struct imp__splat *s, int b, size_t p, doubl
     }
     const struct imp_target *t = &s->target->desc;
     const double scale = t->scale * (s->target->weights ? s->target->weights[p] : 1);
-    const double W = s->weights[b][p];
     const bool luminance = imp__sees_luminance(s->target, n);
-    const float *mean = s->films[b]->mean + p * (size_t)n;
-    for (int c = 0; c < n; c++) /* alone in its pixel: without it there is no estimate */
-        rest[c] = W - w > 1e-9 * W ? (mean[c] * W - w * L[c]) / (W - w) : mean[c];
+    rest_of(s, b, k, p, w, L, rest);
     for (int c = 0; c < t->channels; c++) {
         struct imp__loss_at at;
         imp__loss_eval(t->loss, scale, t->epsilon, imp__seen(luminance, rest, c),
@@ -134,12 +194,13 @@ static imp_spec pixel_adjoint(const struct imp__splat *s, int b, size_t p, doubl
     return imp__seen_bar(luminance, t->channels, bar);
 }
 
-imp_spec imp__splat_adjoint(const struct imp__splat *s, int b, double px, double py,
-                            imp_spec L)
+imp_spec imp__splat_adjoint(const struct imp__splat *s, int b, int k, double px,
+                            double py, imp_spec L)
 {
     const struct imp_film_desc *film = s->film;
     const struct imp_filter *f = &film->filter;
     struct imp_taps across, down;
+    const double *weights = s->weights[s->m > 1 ? b * s->m + k : b];
     imp_spec P = {0};
     imp__film_taps(f, px - film->crop_x, 0, film->crop_w - 1, &across);
     imp__film_taps(f, py - film->crop_y, 0, film->crop_h - 1, &down);
@@ -148,8 +209,8 @@ imp_spec imp__splat_adjoint(const struct imp__splat *s, int b, double px, double
             const double w = down.w[j] * across.w[i];
             const size_t p = (size_t)(down.first + j) * (size_t)film->crop_w +
                              (size_t)(across.first + i);
-            if (w == 0 || s->weights[b][p] == 0) continue;
-            P += pixel_adjoint(s, b, p, w, L) * (w / s->weights[b][p]);
+            if (w == 0 || weights[p] == 0) continue;
+            P += pixel_adjoint(s, b, k, p, w, L) * (w / (weights[p] * s->m));
         }
     return P;
 }

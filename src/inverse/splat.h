@@ -7,7 +7,12 @@
  *     P_i = sum_p  w_ip / W_p  l'_p( (S_p - w_ip L_i) / (W_p - w_ip) )
  *
  * over the pixels p it reaches: its own part left out, the normaliser W fixed (it depends
- * on positions only; docs/estimators.md 5.4). */
+ * on positions only; docs/estimators.md 5.4).
+ *
+ * Where the samples of a replicate are m sets of points, each set has a picture, and a
+ * sample of set s takes the mean of the other sets' pictures:
+ *
+ *     P_i = 1/m sum_p  w_ip / W_p,s  l'_p( mean of S_p,t / W_p,t over t != s ) */
 #ifndef IMP_INVERSE_SPLAT_H
 #define IMP_INVERSE_SPLAT_H
 
@@ -17,9 +22,11 @@ struct imp__splat {
     const struct imp__target *target; /* NULL: a fixed adjoint image */
     const float *seed;
     const struct imp_film_desc *film;
-    int channels, R;
-    double **weights; /* [R][height][width] W_p */
-    imp_film **films; /* [R] pictures; NULL entries with a fixed adjoint */
+    int channels;
+    int n; /* pictures: of the replicates, or of their sets of points, m each */
+    int m; /* 1: pictures of replicates */
+    double **weights; /* [n][height][width] W_p */
+    imp_film **films; /* [n] pictures; NULL entries with a fixed adjoint */
     double objective, objective_variance;
 };
 
@@ -30,8 +37,8 @@ enum imp_status imp__splat_create(const struct imp_problem *p,
                                   struct imp__replicates plan, const struct imp_run *run,
                                   struct imp__splat *out);
 void imp__splat_destroy(imp_context *ctx, struct imp__splat *s);
-/* P_i of a sample of replicate b at film position (px, py). */
-imp_spec imp__splat_adjoint(const struct imp__splat *s, int b, double px, double py,
-                            imp_spec L);
+/* P_i of a sample of replicate b, set k of it, at film position (px, py). */
+imp_spec imp__splat_adjoint(const struct imp__splat *s, int b, int k, double px,
+                            double py, imp_spec L);
 
 #endif

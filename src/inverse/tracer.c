@@ -110,11 +110,11 @@ enum imp_status imp__problem_tracer_of_any_end(const struct imp_problem *p,
             "derivatives of pictures are of films with three channels; this "
             "specfilm has %d response curves (a loss takes any number)",
             sensor->film.n_responses);
-    imp__tracer_waves(out, run, 0);
+    imp__tracer_numbers(out, run, 0);
     if (waves)
         out->wavelengths =
             &waves[run->wavelengths == IMP_WAVELENGTHS_IMPORTANCE ? IMP_WAVES_IMPORTANCE
                                                                   : IMP_WAVES_UNIFORM];
-    out->set = 1; /* leave-one-out needs independent walks */
+    out->set = 1; /* leave-one-out needs independent walks, or sets */
     return p->active.body ? imp__graded_survey(out) : IMP_OK;
 }

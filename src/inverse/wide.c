@@ -31,7 +31,8 @@
 
 struct wide {
     imp_context *ctx;
-    const struct imp_target *target;
+    const struct imp__target *of;
+    const struct imp_target *target; /* its description */
     const float *weights, *noise_se;
     const struct imp_film_desc *film;
     int width, height, channels, seen; /* of the scene, of the target */
@@ -74,7 +75,7 @@ static enum imp_status replicates(struct wide *w, const struct imp_tracer *trace
 {
     enum imp_status st = IMP_OK;
     const int n = (int)(w->K + 1) * w->channels;
-    const struct imp__replicates plan = imp__replicates_normal(tracer->sensor, run->spp);
+    const struct imp__replicates plan = imp__replicates_normal(tracer->scene, w->of, run);
     w->R = plan.R;
     char *names = imp__alloc(w->ctx, (size_t)n, 12);
     if (!names) IMP_TRY(imp__error(w->ctx, IMP_E_NOMEM, "no memory"));
@@ -96,7 +97,7 @@ static enum imp_status replicates(struct wide *w, const struct imp_tracer *trace
                                             .n = n,
                                             .sample = sample,
                                             .payload = &pass,
-                                            .first = (int64_t)b * own.spp};
+                                            .first = imp__replicates_first(plan, b, 0)};
         IMP_TRY(imp__picture_make(w->ctx, &picture, &own, &w->films[b]));
     }
 out:
@@ -365,6 +366,7 @@ enum imp_status imp__gauss_newton_wide(const struct imp_problem *p,
 {
     enum imp_status st = IMP_OK;
     struct wide w = {.ctx = p->ctx,
+                     .of = target,
                      .target = &target->desc,
                      .weights = target->weights,
                      .noise_se = target->noise_se,

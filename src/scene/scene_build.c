@@ -4,6 +4,7 @@
  * (docs/scene-format.md 12.2): by an object's own id, else below its parent's name; at the
  * top by its name. */
 #include "scene_build.h"
+#include "math/points.h"
 
 /* Top-level objects without id: <tag><n>, counted per tag. */
 struct tag_counts {
@@ -122,6 +123,15 @@ static struct imp_ball ball_around(const struct imp_scene *scene)
                              0.5 * imp__length(size) * (1 + 1e-3)};
 }
 
+static enum imp_status points_build(struct imp_scene *scene)
+{
+    struct imp_point_table *points = imp__arena_array(&scene->arena, 1, sizeof *points);
+    if (!points) return imp__build_no_memory(scene);
+    imp__points_make(points);
+    scene->points = points;
+    return IMP_OK;
+}
+
 enum imp_status imp__scene_build(struct imp_scene *scene,
                                  const struct imp_integrator_ops *const *integrators)
 {
@@ -141,6 +151,7 @@ enum imp_status imp__scene_build(struct imp_scene *scene,
     IMP_TRY(imp__props_finish(scene->ctx, scene->root));
     scene->ball = ball_around(scene);
     IMP_TRY(lights_build(scene));
+    IMP_TRY(points_build(scene));
     IMP_TRY(imp__aims_build(scene));
     IMP_TRY(imp__mixing_materials(scene));
     if (scene->integrator) IMP_TRY(imp__integrator_ready(scene, scene->integrator));

@@ -60,6 +60,13 @@ static int light_choose(const struct imp_step *s, double u, double *pmf)
     return light;
 }
 
+/* Where u, which chose the light, lies in its interval, on [0, 1). */
+static double light_part(const struct imp_scene *scene, int light, double u, double pmf)
+{
+    const double below = light > 0 ? scene->light_cdf[light - 1] : 0;
+    return imp_clamp((u - below) / pmf, 0, 0x1.fffffffffffffp-1);
+}
+
 /* there: uv, distance, cosine at the light. */
 static inline void record(struct imp_vertex *v, int emitter, double weight, imp_v3 there,
                           imp_v3 d, imp_v3 p, imp_v3 wi)
@@ -108,20 +115,23 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
 {
     const struct imp_scene *scene = s->scene;
     const struct imp_bsdf *b = v->bsdf;
-    const struct imp_key key = s->walk->key;
     if (scene->n_emitters == 0) return;
 
     /* A light and a point on it. */
+    double u[2] = {imp__step_number(s, IMP_DIM_LIGHT_U),
+                   imp__step_number(s, IMP_DIM_LIGHT_V)};
+    /* Of points in sets, the first number chooses the light too: those that a light gets
+     * then cover it evenly. */
+    const bool one = s->walk->point.points && !s->guided.here;
     double pmf;
     const int light =
-        light_choose(s, imp__u01(key, imp__dim(s->depth, IMP_DIM_LIGHT)), &pmf);
+        light_choose(s, one ? u[0] : imp__step_number(s, IMP_DIM_LIGHT), &pmf);
     if (!(pmf > 0)) return;
+    if (one) u[0] = light_part(scene, light, u[0], pmf);
     const struct imp_emitter *e = scene->emitters[light];
     if (imp_unlikely(s->tracer->integrator->only_points) &&
         !(e->ops->flags & IMP_EMITTER_DELTA))
         return;
-    const double u[2] = {imp__u01(key, imp__dim(s->depth, IMP_DIM_LIGHT_U)),
-                         imp__u01(key, imp__dim(s->depth, IMP_DIM_LIGHT_V))};
     struct imp_light_sample ls;
     if (!e->ops->sample(e, &at->p, u, &ls) || !(ls.pdf > 0)) return;
     if ((e->ops->flags & IMP_EMITTER_AREA) && !(ls.cos_light > 0)) return; /* its back */

@@ -521,7 +521,7 @@ void imp__light_walk_trace(const struct imp_tracer *tracer, struct imp_arena *ar
     *out = (struct imp_light_walk){.walk = {.key = key, .valid = true}};
     struct imp_walk *walk = &out->walk;
     if (tracer->wavelengths &&
-        !imp__walk_wave(tracer, arena, imp__wave_draw(tracer, key, index), walk))
+        !imp__walk_wave(tracer, arena, imp__wave_draw(tracer, walk, index), walk))
         return;
     imp_spec scratch[IMP_INPUTS_MAX];
     struct light_step w = {.s = {.tracer = tracer,

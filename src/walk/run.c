@@ -24,6 +24,9 @@ enum imp_status imp__run_take(imp_context *ctx, const char *function,
     if ((int)r.from < 0 || r.from > IMP_FROM_LIGHTS)
         return imp__error(ctx, IMP_E_ARG, "%s: run->from %d is not known", function,
                           (int)r.from);
+    if ((int)r.points < 0 || r.points > IMP_POINTS_SOBOL)
+        return imp__error(ctx, IMP_E_ARG, "%s: run->points %d is not known", function,
+                          (int)r.points);
     *own = r;
     return IMP_OK;
 }

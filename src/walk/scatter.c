@@ -60,7 +60,7 @@ static bool roulette(struct imp_step *s, const struct imp_bsdf *b, imp_spec fact
         if (guided) q = imp__guided_survival(s, q);
     }
     *survive = imp__decide1(q);
-    return imp__u01(s->walk->key, imp__dim(s->depth, IMP_DIM_SURVIVE)) < *survive;
+    return imp__step_number(s, IMP_DIM_SURVIVE) < *survive;
 }
 
 /* Density of the direction as drawn, in all lanes together where they differ. 0: the walk
@@ -98,10 +98,9 @@ static bool last_bounce(const struct imp_step *s)
 bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_surface *at,
                   const struct imp_frame *frame)
 {
-    const struct imp_key key = s->walk->key;
-    const double u[3] = {imp__u01(key, imp__dim(s->depth, IMP_DIM_LOBE)),
-                         imp__u01(key, imp__dim(s->depth, IMP_DIM_DIR_U)),
-                         imp__u01(key, imp__dim(s->depth, IMP_DIM_DIR_V))};
+    const double u[3] = {imp__step_number(s, IMP_DIM_LOBE),
+                         imp__step_number(s, IMP_DIM_DIR_U),
+                         imp__step_number(s, IMP_DIM_DIR_V)};
     const struct imp_bsdf *b = v->bsdf;
     struct imp_dirs dirs = {
         .wo = s->wo_drawn, .lobe = IMP_SMOOTH, .derivative = imp__wants_derivative(s, b)};

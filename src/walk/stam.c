@@ -8,7 +8,7 @@ bool imp__absorb(struct imp_step *s, const struct imp_bsdf *b, double *weight)
 {
     const double a = b->absorb;
     if (!(a > 0)) return false;
-    if (imp__u01(s->walk->key, imp__dim(s->depth, IMP_DIM_SURVIVE)) < a) {
+    if (imp__step_number(s, IMP_DIM_SURVIVE) < a) {
         s->walk->absorbed = true;
         *weight = imp__decide1(1 / a);
         return true;
@@ -23,9 +23,11 @@ void imp__attached_d(const struct imp_walk *walk, const struct imp_vertex *v, in
     const struct imp_bsdf *b = v->bsdf;
     if (!b->ops->sample_d) return;
     const struct imp_dirs dirs = imp__vertex_dirs(v);
-    const double u[3] = {imp__u01(walk->key, imp__dim(depth, IMP_DIM_LOBE)),
-                         imp__u01(walk->key, imp__dim(depth, IMP_DIM_DIR_U)),
-                         imp__u01(walk->key, imp__dim(depth, IMP_DIM_DIR_V))};
+    const struct imp_key key = walk->key;
+    const struct imp_point point = walk->point;
+    const double u[3] = {imp__vertex_number(key, point, depth, IMP_DIM_LOBE),
+                         imp__vertex_number(key, point, depth, IMP_DIM_DIR_U),
+                         imp__vertex_number(key, point, depth, IMP_DIM_DIR_V)};
     for (int j = 0; j < b->n_in; j++) {
         imp_spec dweight;
         imp_v3

@@ -52,6 +52,7 @@ struct imp_step {
     const struct imp_scene *scene;
     struct imp_walk *walk;
     struct imp_arena *arena;
+    struct imp_point_block block; /* of the walk's point, for the vertex at work */
     bool recorded; /* also where only the value counts, if vertices move with a field */
     int depth;     /* vertices before this one, which number its random numbers */
     int straight;  /* of them, those that light passed straight on: no bounces */
@@ -87,6 +88,19 @@ struct imp_step {
 static inline int imp__bounces(const struct imp_step *s)
 {
     return s->depth - s->straight;
+}
+
+/* Random number of the vertex at work for a use (dims.h). */
+static inline double imp__step_number(const struct imp_step *s, int use)
+{
+    if (s->walk->point.points) return imp__block_number(s->block, imp__slot(use));
+    return imp__u01(s->walk->key, imp__dim(s->depth, use));
+}
+
+static inline void imp__step_numbers(struct imp_step *s)
+{
+    if (s->walk->point.points)
+        s->block = imp__point_block(s->walk->point, imp__block(s->depth));
 }
 
 /* What a record stores of v, in double again. */

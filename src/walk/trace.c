@@ -246,6 +246,13 @@ static bool branch_scatter(struct imp_step *s, struct imp_vertex *v, int i,
     return true;
 }
 
+/* The point of the same number in another set. */
+static struct imp_point point_branch(struct imp_point point, int vertex, int i)
+{
+    point.set = imp__key_branch((struct imp_key){point.set}, vertex, i).state;
+    return point;
+}
+
 /* Further continuations of v hang on it as side walks. `before`: the walk before its own
  * continuation was drawn. */
 static __attribute__((noinline)) void split(const struct imp_step *before,
@@ -267,11 +274,13 @@ static __attribute__((noinline)) void split(const struct imp_step *before,
         side->walk = (struct imp_walk){.px = walk->px,
                                        .py = walk->py,
                                        .key = imp__key_branch(walk->key, s.depth, i),
+                                       .point = point_branch(walk->point, s.depth, i),
                                        .ray = walk->ray,
                                        .waves = walk->waves,
                                        .wave = walk->wave,
                                        .depth = s.depth};
         s.walk = &side->walk;
+        imp__step_numbers(&s);
         struct imp_vertex *u = vertex_add(&s, v->bsdf->n_in);
         if (!u) {
             walk->dropped = side->walk.dropped;
@@ -348,6 +357,7 @@ vertex_work(struct imp_step *s, struct imp_vertex *v, const struct imp_hit *hit,
     const bool bounces = max_depth < 0 || imp__bounces(s) + 1 < max_depth;
     const bool goes_on =
         bounces || (imp_unlikely(v->bsdf->straight) && s->segment->through && counts);
+    imp__step_numbers(s);
     if (imp_unlikely(s->mixed.all != NULL || s->guided.here))
         mixture_meet(s, v->bsdf, at);
     else s->mixed.here = s->mixed.splits = false;
@@ -447,26 +457,35 @@ static __attribute__((noinline)) void meter_walk(struct imp_step *s)
 
 /* Keys use full-film pixels: a crop renders the same samples as the whole picture. The
  * border of wide filters may lie outside the film, hence the offset. */
-static struct imp_key walk_key(const struct imp_tracer *tracer, int x, int y,
-                               int64_t sample)
+static struct imp_walk walk_numbered(const struct imp_tracer *tracer, int x, int y,
+                                     int64_t sample)
 {
     const struct imp_film_desc *film = &tracer->sensor->film;
     const uint64_t row = (uint64_t)(y + film->crop_y + 0x8000);
-    const uint64_t column = (uint64_t)(x + film->crop_x + 0x8000);
-    return imp__key(tracer->seed, row << 32 | column, (uint64_t)sample);
+    const uint64_t column = (uint64_t)(x + film->crop_x + 0x8000),
+                   pixel = row << 32 | column;
+    struct imp_walk walk = {.key = imp__key(tracer->seed, pixel, (uint64_t)sample)};
+    if (!tracer->points) return walk;
+    const uint64_t set = (uint64_t)sample / IMP_SET_POINTS | 1ull << 63;
+    walk.point = (struct imp_point){.points = tracer->points,
+                                    .set = imp__key(tracer->seed, pixel, set).state,
+                                    .index = (uint32_t)sample % IMP_SET_POINTS};
+    return walk;
 }
 
-static inline void position(const struct imp_tracer *tracer, struct imp_key key, int x,
-                            int y, double *px, double *py)
+static inline void position(const struct imp_tracer *tracer, const struct imp_walk *w,
+                            int x, int y, double *px, double *py)
 {
-    *px = tracer->sensor->film.crop_x + x + imp__u01(key, IMP_DIM_PIXEL_X);
-    *py = tracer->sensor->film.crop_y + y + imp__u01(key, IMP_DIM_PIXEL_Y);
+    const struct imp_film_desc *film = &tracer->sensor->film;
+    *px = film->crop_x + x + imp__start_number(w->key, w->point, IMP_DIM_PIXEL_X);
+    *py = film->crop_y + y + imp__start_number(w->key, w->point, IMP_DIM_PIXEL_Y);
 }
 
 void imp__walk_position(const struct imp_tracer *tracer, int x, int y, int64_t sample,
                         double *px, double *py)
 {
-    position(tracer, walk_key(tracer, x, y, sample), x, y, px, py);
+    const struct imp_walk walk = walk_numbered(tracer, x, y, sample);
+    position(tracer, &walk, x, y, px, py);
 }
 
 /* Why a walk of this radiance is dropped: no light can have it, or no picture can hold
@@ -496,14 +515,14 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
                      int y, int64_t sample, struct imp_walk *walk)
 {
     const struct imp_sensor *sensor = tracer->sensor;
-    const struct imp_key key = walk_key(tracer, x, y, sample);
-    *walk = (struct imp_walk){.key = key};
-    position(tracer, key, x, y, &walk->px, &walk->py);
-    const double lens[2] = {imp__u01(key, IMP_DIM_LENS_U), imp__u01(key, IMP_DIM_LENS_V)};
+    *walk = walk_numbered(tracer, x, y, sample);
+    position(tracer, walk, x, y, &walk->px, &walk->py);
+    const double lens[2] = {imp__start_number(walk->key, walk->point, IMP_DIM_LENS_U),
+                            imp__start_number(walk->key, walk->point, IMP_DIM_LENS_V)};
     sensor->ops->ray(sensor, walk->px, walk->py, lens, &walk->ray);
 
     if (imp_unlikely(tracer->wavelengths != NULL) &&
-        !imp__walk_wave(tracer, arena, imp__wave_draw(tracer, key, sample), walk))
+        !imp__walk_wave(tracer, arena, imp__wave_draw(tracer, walk, sample), walk))
         return;
 
     imp_spec scratch[IMP_INPUTS_MAX];

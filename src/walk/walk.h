@@ -23,7 +23,7 @@
 #ifndef IMP_WALK_H
 #define IMP_WALK_H
 
-#include "math/rng.h"
+#include "math/points.h"
 #include "scene/guide.h"
 #include "shaped.h"
 #include "walk_integrator.h"
@@ -142,6 +142,7 @@ struct imp_walk {
     int depth;     /* of the first vertex: 0, unless it hangs on another walk */
     double px, py; /* film position, pixels of the full film */
     struct imp_key key;
+    struct imp_point point; /* of its set; of none: its numbers are the key's */
     struct imp_sensor_ray ray;
     imp_spec L; /* radiance at the sensor, by the scene's channels; of a side walk its
                    values */
@@ -202,7 +203,11 @@ struct imp_tracer {
      * (imp__set_at), among which wavelengths are stratified; set 0 or 1: each walk is drawn
      * on its own. Sets are independent of each other, walks of a set are not. */
     int set;
-    int64_t period;                  /* 0: endless */
+    bool stratified; /* walks of a set of points have stratified wavelengths */
+    int64_t period;  /* 0: endless */
+    /* NULL: a pixel's walks are independent. Else those with the numbers 64 s to 64 s + 63
+     * are set s of points, of which any number from the first on may be used. */
+    const struct imp_point_table *points;
     const struct imp_mixing *mixing; /* densities in place of the integrator's and the
                                         materials'; NULL: those */
     bool collisions_stand; /* the derivative of a frozen walk is wanted, whose collisions
@@ -220,10 +225,23 @@ static inline const struct imp_guide *imp__guide_of(const struct imp_scene *scen
     return i->guided && scene->n_bodies == 0 && scene->n_media == 0 ? guide : NULL;
 }
 
+/* The points of a run through a sensor: independent, or Sobol's. */
+static inline enum imp_points imp__points_of(const struct imp_sensor *sensor,
+                                             const struct imp_run *run)
+{
+    return run->points != IMP_POINTS_SCENE ? run->points : sensor->points;
+}
+
 /* ---- Wavelengths (waves.c) ------------------------------------------------------- */
 
-/* Of its walks as a run wants them drawn, n walks of a pixel being one whole. */
-void imp__tracer_waves(struct imp_tracer *tracer, const struct imp_run *run, int64_t n);
+/* Random numbers and wavelengths as a run wants them, n walks of a pixel being one
+ * whole. */
+void imp__tracer_numbers(struct imp_tracer *tracer, const struct imp_run *run, int64_t n);
+
+/* Walks of a pixel that a picture's errors take together, since they depend on each other;
+ * n in all, 0: not known. Of points, a quarter of a set is a net by itself: its parts vary as
+ * independent ones of their size at least, so that their spread is an upper bound. */
+int imp__tracer_set(const struct imp_tracer *tracer, int64_t n);
 
 /* The set that a walk belongs to: its first walk, and how many it has. A whole is cut into
  * period/set sets, whose sizes differ by one at most; without end, all have `set`. */
@@ -242,7 +260,7 @@ static inline void imp__set_at(int set, int64_t period, int64_t sample, int64_t 
 }
 
 /* Number from which the wavelengths of a walk are drawn, on [0, 1). */
-double imp__wave_draw(const struct imp_tracer *tracer, struct imp_key key,
+double imp__wave_draw(const struct imp_tracer *tracer, const struct imp_walk *walk,
                       int64_t sample);
 /* The walk's wavelengths from that number. False: no memory, it is dropped. */
 bool imp__walk_wave(const struct imp_tracer *tracer, struct imp_arena *arena, double u,

@@ -1,0 +1,52 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "points.h"
+
+enum { BITS = 6 }; /* of a point's index */
+_Static_assert(1 << BITS == IMP_SET_POINTS, "bits of an index");
+
+/* Owen's nested scrambling of the leading BITS bits of x < 2^BITS: each bit is flipped at
+ * random, by what the bits above it are. */
+static uint32_t scramble(uint32_t x, uint64_t seed)
+{
+    uint32_t out = 0;
+    for (int b = BITS - 1; b >= 0; b--) {
+        const uint64_t above = (uint64_t)1 << (BITS - b) | x >> (b + 1);
+        out |= (x ^ (uint32_t)(imp__mix64(seed + above) & 1) << b) & 1u << b;
+    }
+    return out;
+}
+
+/* Radical inverse of i in base 2, times 2^BITS. */
+static uint32_t reversed(uint32_t i)
+{
+    uint32_t x = 0;
+    for (int b = 0; b < BITS; b++) x |= (i >> b & 1) << (BITS - 1 - b);
+    return x;
+}
+
+/* The second coordinate of Sobol's sequence: direction numbers of x + 1, which with
+ * `reversed` make a (0,2)-sequence. */
+static uint32_t second(uint32_t i)
+{
+    uint32_t x = 0;
+    for (uint32_t v = 1u << (BITS - 1); i; i >>= 1, v ^= v >> 1)
+        if (i & 1) x ^= v;
+    return x;
+}
+
+void imp__points_make(struct imp_point_table *points)
+{
+    for (uint64_t b = 0; b < IMP_POINT_BLOCKS; b++)
+        for (uint64_t k = 0; k < IMP_BLOCK_NUMBERS; k++) {
+            const uint64_t order = imp__mix64(0x5eed0001 + (b << 8 | k >> 1));
+            const uint64_t digits = imp__mix64(0x5eed0002 + (b << 8 | k));
+            for (uint32_t i = 0; i < IMP_SET_POINTS; i++) {
+                const uint32_t at = scramble(i, order);
+                const uint32_t x = scramble(k & 1 ? second(at) : reversed(at), digits);
+                /* Bits below those of the net are random. */
+                const uint64_t rest = imp__mix64(digits + ((uint64_t)(i + 1) << 32));
+                points->number[b][i][k] =
+                    (uint16_t)(x << (16 - BITS) | (rest & ((1u << (16 - BITS)) - 1)));
+            }
+        }
+}

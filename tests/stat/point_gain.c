@@ -1,0 +1,221 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * What points in sets gain over independent ones at 64 samples per pixel: variance over
+ * seeds of pictures and of gradients of a loss, with its errors as they are stated. Both
+ * kinds have the same means. Run with "long" for the larger pictures and all scenes. */
+#include "imp_scene.h"
+#include "imp_tap.h"
+#include <stdbool.h>
+#include <stdlib.h>
+
+enum { SEEDS = 64, SPP = 64, PARAMS = 64 };
+
+static imp_context *ctx;
+
+/* Two meshes, rough metal, sky and lamp. */
+static const char open_xml[] =
+    "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' "
+    "value='5'/></integrator><sensor type='perspective'><float name='fov' value='40'/>"
+    "<transform name='to_world'><lookat origin='0,2.4,5' target='0,.6,0' "
+    "up='0,1,0'/></transform><sampler type='independent'/><film type='hdrfilm'><integer "
+    "name='width' value='%d'/><integer name='height' value='%d'/><rfilter "
+    "type='box'/></film></sensor>"
+    "<emitter type='constant' id='sky'><rgb name='radiance' value='.3,.4,.6'/></emitter>"
+    "<shape type='rectangle'><transform name='to_world'><rotate x='1' angle='90'/>"
+    "<translate x='-1' y='3' z='1'/></transform><emitter type='area' id='lamp'><rgb "
+    "name='radiance' value='6,5,4'/></emitter></shape>"
+    "<shape type='rectangle'><transform name='to_world'><scale value='4'/><rotate x='1' "
+    "angle='-90'/></transform><bsdf type='diffuse' id='clay'><rgb name='reflectance' "
+    "value='.6,.4,.3'/></bsdf></shape>"
+    "<shape type='obj'><string name='filename' value='%s/cornell/tall_block.obj'/>"
+    "<transform name='to_world'><scale value='.004'/><translate x='-2.2' z='-1.6'/>"
+    "</transform><bsdf type='roughconductor' id='metal'><string name='material' "
+    "value='Cu'/><string name='distribution' value='ggx'/><float name='alpha' "
+    "value='.2'/></bsdf></shape>"
+    "<shape type='obj'><string name='filename' value='%s/cornell/short_block.obj'/>"
+    "<transform name='to_world'><scale value='.004'/><translate x='.2' z='.2'/>"
+    "</transform><bsdf type='diffuse' id='chalk'><rgb name='reflectance' "
+    "value='.7,.7,.65'/></bsdf></shape></scene>";
+
+enum which { CORNELL, OPEN, TEXTURED };
+static const char *const scene_names[] = {"cornell", "open", "textured"};
+
+static imp_scene *scene_of(enum which which, int side)
+{
+    char text[4096], size[64];
+    if (which == OPEN) {
+        snprintf(text, sizeof text, open_xml, side, side, IMP_SCENES, IMP_SCENES);
+        return test_scene_text(ctx, text, IMP_RGB);
+    }
+    if (which == CORNELL) snprintf(size, sizeof size, "res=%d", side);
+    else snprintf(size, sizeof size, "width=%d height=%d", side * 7 / 6, side * 7 / 8);
+    return test_scene(ctx, which == CORNELL ? "cornell.xml" : "textured.xml", IMP_RGB,
+                      size);
+}
+
+static int by_value(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+static double median(double *x, size_t n)
+{
+    qsort(x, n, sizeof *x, by_value);
+    return n ? x[n / 2] : NAN;
+}
+static struct imp_film_info size_of(const imp_film *film)
+{
+    struct imp_film_info info = {.size = sizeof info};
+    test_must(ctx, imp_film_get_info(film, &info));
+    return info;
+}
+static double variance(const struct tap_stat *s) { return s->m2 / (s->n - 1); }
+static struct imp_run run_of(enum imp_points points, int seed)
+{
+    struct imp_run run = IMP_RUN_INIT;
+    run.spp = SPP;
+    run.seed = (uint64_t)seed + (points == IMP_POINTS_SOBOL ? 5000 : 1000);
+    run.points = points;
+    return run;
+}
+
+/* ---- Pictures ---------------------------------------------------------------------- */
+
+/* `most`: of the median pixel's variance. */
+static void picture(enum which which, int side, double most)
+{
+    imp_scene *scene = scene_of(which, side);
+    const char *name = scene_names[which];
+    struct tap_stat *value[2] = {NULL, NULL};
+    double *stated = NULL, *ratio, *error, z2 = 0;
+    size_t n = 0, used = 0;
+    for (int kind = 0; kind < 2; kind++)
+        for (int seed = 0; seed < SEEDS; seed++) {
+            const struct imp_run run =
+                run_of(kind ? IMP_POINTS_SOBOL : IMP_POINTS_INDEPENDENT, seed);
+            imp_film *film;
+            test_must(ctx, imp_render(scene, &run, &film));
+            n = 3 * (size_t)size_of(film).width * (size_t)size_of(film).height;
+            if (!value[kind]) value[kind] = calloc(n, sizeof **value);
+            if (!stated) stated = calloc(n, sizeof *stated);
+            for (size_t i = 0; i < n; i++) {
+                tap_add(&value[kind][i], imp_film_mean(film)[i]);
+                if (kind) stated[i] += pow(imp_film_se(film)[i], 2) / SEEDS;
+            }
+            imp_film_destroy(film);
+        }
+    ratio = malloc(2 * n * sizeof *ratio);
+    error = ratio + n;
+    for (size_t i = 0; i < n; i++) {
+        const double a = variance(&value[0][i]), b = variance(&value[1][i]);
+        if (!(a > 0)) continue;
+        error[used] = sqrt(stated[i] / b);
+        ratio[used++] = b / a;
+        z2 += pow(value[0][i].mean - value[1][i].mean, 2) / ((a + b) / SEEDS);
+    }
+    const double mid = median(ratio, used), mid_error = median(error, used);
+    tap_ok(mid <= most, "%s, picture: variance of the median pixel # %.3f, at most %g",
+           name, mid, most);
+    tap_ok(fabs(z2 / (double)used - 1) < 0.25, "%s, picture: same mean # z^2 %.3f", name,
+           z2 / (double)used);
+    tap_ok(mid_error > 0.9 && mid_error < 1.2,
+           "%s, picture: error of the median pixel # stated/seen %.3f", name, mid_error);
+    for (int kind = 0; kind < 2; kind++) free(value[kind]);
+    free(stated);
+    free(ratio);
+    imp_scene_destroy(scene);
+}
+
+/* ---- Gradients --------------------------------------------------------------------- */
+
+static const char *const actives[][5] = {
+    {"white.reflectance.value", "red.reflectance.value", "green.reflectance.value",
+     "light.radiance.value"},
+    {"clay.reflectance.value", "chalk.reflectance.value", "metal.alpha*",
+     "sky.radiance.value", "lamp.radiance.value"},
+    {"wall.reflectance.color0.value", "wall.reflectance.color1.value", "metal.alpha*",
+     "sky.radiance.value", "lamp.radiance.value"}};
+
+static void gradient(enum which which, int side, bool away, double most)
+{
+    imp_scene *scene = scene_of(which, side);
+    const char *name = scene_names[which], *state = away ? "away" : "at the optimum";
+    imp_film *film;
+    imp_problem *p;
+    struct imp_run run = run_of(IMP_POINTS_INDEPENDENT, 7);
+    run.spp = 1024;
+    test_must(ctx, imp_render(scene, &run, &film));
+    test_must(ctx, imp_problem_create(scene, &p));
+    for (int k = 0; k < 5 && actives[which][k]; k++)
+        test_must(ctx, imp_problem_activate(p, actives[which][k]));
+    struct imp_target target = IMP_TARGET_INIT;
+    target.pixels = imp_film_mean(film);
+    target.width = size_of(film).width;
+    target.height = size_of(film).height;
+    target.channels = 3;
+    test_must(ctx, imp_problem_add_target(p, &target));
+    const size_t n = imp_problem_n(p);
+    double x[PARAMS], g[PARAMS], se[PARAMS], ratio[PARAMS], error[PARAMS];
+    double stated[PARAMS + 1] = {0}, z_most = 0, lowest = INFINITY, highest = 0;
+    imp_problem_get_x(p, x);
+    for (size_t k = 0; k < n && away; k++) /* not the lamp */
+        if (x[k] < 1) x[k] = x[k] < 0.25 && which != CORNELL ? .3 : .4;
+    static struct tap_stat value[2][PARAMS + 1];
+    memset(value, 0, sizeof value);
+    for (int kind = 0; kind < 2; kind++)
+        for (int seed = 0; seed < SEEDS; seed++) {
+            struct imp_estimate f;
+            run = run_of(kind ? IMP_POINTS_SOBOL : IMP_POINTS_INDEPENDENT, seed);
+            test_must(ctx, imp_problem_objective(p, x, &run, &f, g, se));
+            for (size_t k = 0; k < n; k++) tap_add(&value[kind][k], g[k]);
+            for (size_t k = 0; k < n && kind; k++) stated[k] += se[k] * se[k] / SEEDS;
+            tap_add(&value[kind][n], f.value);
+            if (kind) stated[n] += f.se * f.se / SEEDS;
+        }
+    for (size_t k = 0; k <= n; k++) {
+        const double a = variance(&value[0][k]), b = variance(&value[1][k]);
+        const double se_mean = sqrt((a + b) / SEEDS);
+        z_most = fmax(z_most, fabs(value[0][k].mean - value[1][k].mean) / se_mean);
+        if (k == n) {
+            tap_ok(stated[n] / b > 0.5 && stated[n] / b < 2 && b < 1.2 * a,
+                   "%s, loss %s # variance %.3f, stated/seen error %.3f", name, state,
+                   b / a, sqrt(stated[n] / b));
+            break;
+        }
+        ratio[k] = b / a;
+        error[k] = sqrt(stated[k] / b);
+        lowest = fmin(lowest, error[k]);
+        highest = fmax(highest, error[k]);
+    }
+    const double mid = median(ratio, n), mid_error = median(error, n);
+    tap_ok(mid <= most,
+           "%s, gradient %s: variance of the median # %.3f of %.2f to %.2f, at most %g",
+           name, state, mid, ratio[0], ratio[n - 1], most);
+    tap_ok(z_most < 4, "%s, gradient %s: same means # %.2f", name, state, z_most);
+    tap_ok(mid_error >= 0.85 && mid_error <= 1.2 && lowest >= 0.7 && highest <= 1.4,
+           "%s, gradient %s: errors # stated/seen %.3f, of %.2f to %.2f", name, state,
+           mid_error, lowest, highest);
+    imp_film_destroy(film);
+    imp_problem_destroy(p);
+    imp_scene_destroy(scene);
+}
+
+int main(int argc, char **argv)
+{
+    const bool all = argc > 1 && strcmp(argv[1], "long") == 0;
+    ctx = test_context(0);
+    const int side = all ? 48 : 12;
+    picture(CORNELL, side, .55);
+    gradient(CORNELL, side, false, .25);
+    if (all) {
+        gradient(CORNELL, side, true, .25);
+        picture(OPEN, side, .42);
+        gradient(OPEN, side, false, .5);
+        gradient(OPEN, side, true, .5);
+        picture(TEXTURED, side, .32);
+        gradient(TEXTURED, side, false, .45);
+        gradient(TEXTURED, side, true, .45);
+    }
+    imp_context_destroy(ctx);
+    return tap_done();
+}
