@@ -379,7 +379,7 @@ enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node
     const struct imp_build sampler_build = imp__build_make(scene, sampler);
     const struct imp_build b = imp__build_make(scene, node);
     IMP_TRY(imp__film_desc_build(&film_build, &s->film));
-    IMP_TRY(imp__sampler_build(&sampler_build, &s->spp));
+    IMP_TRY(imp__sampler_build(&sampler_build, &s->spp, &s->points));
     static const char *const units[] = {"radiometric", "photometric"};
     int unit;
     IMP_TRY(imp_build_choice(&b, "units", units, 2, 0, &unit));

@@ -510,35 +510,44 @@ static void samplers(void)
                 {"multijitter", 7, 8}, {"multijitter", 16, 16}, {"multijitter", 17, 20},
                 {"orthogonal", 1, 4},  {"orthogonal", 10, 25},  {"orthogonal", 26, 49},
                 {"ldsampler", 1, 4},   {"ldsampler", 5, 16},    {"ldsampler", 64, 64}};
-    int spp = 0, bad = 0;
+    int spp = 0, bad = 0, misread = 0;
+    enum imp_points points = IMP_POINTS_SCENE;
     struct imp_build b = {.ctx = ctx, .arena = &world.arena};
     for (size_t k = 0; k < imp_count(rows); k++) {
         b.node = node_new("sampler", rows[k].type);
         node_int(b.node, "sample_count", rows[k].asked);
         node_int(b.node, "seed", 3);
-        if (imp__sampler_build(&b, &spp) != IMP_OK || spp != rows[k].expected) bad++;
+        if (imp__sampler_build(&b, &spp, &points) != IMP_OK || spp != rows[k].expected)
+            bad++;
+        misread += points != (k == 0 ? IMP_POINTS_INDEPENDENT : IMP_POINTS_SOBOL);
     }
     tap_ok(bad == 0, "sample counts are rounded as section 10 says");
+    tap_ok(misread == 0, "all but independent ask for points in sets");
     b.node = NULL;
-    tap_ok(imp__sampler_build(&b, &spp) == IMP_OK && spp == 4, "no sampler: 4");
+    tap_ok(imp__sampler_build(&b, &spp, &points) == IMP_OK && spp == 4 &&
+               points == IMP_POINTS_INDEPENDENT,
+           "no sampler: 4 independent samples");
     static const int counts[] = {0, -1};
     for (int k = 0; k < 2; k++) {
         b.node = node_new("sampler", "independent");
         node_int(b.node, "sample_count", counts[k]);
-        tap_ok(imp__sampler_build(&b, &spp) == IMP_E_SCENE && spp == 4,
+        tap_ok(imp__sampler_build(&b, &spp, &points) == IMP_E_SCENE && spp == 4,
                "sample_count %d is refused", counts[k]);
     }
     b.node = node_new("sampler", "independent");
     node_bool(b.node, "jitter", true);
-    tap_ok(imp__sampler_build(&b, &spp) == IMP_E_SCENE, "jitter is not of independent");
+    tap_ok(imp__sampler_build(&b, &spp, &points) == IMP_E_SCENE,
+           "jitter is not of independent");
     b.node = node_new("sampler", "sobol");
-    tap_ok(imp__sampler_build(&b, &spp) == IMP_E_UNSUPPORTED, "an unknown sampler");
+    tap_ok(imp__sampler_build(&b, &spp, &points) == IMP_E_UNSUPPORTED,
+           "an unknown sampler");
     warnings = 0;
     b.node = node_new("sampler", "orthogonal");
     node_bool(b.node, "jitter", false);
     node_int(b.node, "strength", 3);
     node_int(b.node, "sample_count", 1 << 30);
-    tap_ok(imp__sampler_build(&b, &spp) == IMP_OK && spp == 1 << 30 && warnings == 1,
+    tap_ok(imp__sampler_build(&b, &spp, &points) == IMP_OK && spp == 1 << 30 &&
+               warnings == 1,
            "jitter=false warns; the count stays bounded");
 }
 

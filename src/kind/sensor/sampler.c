@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Samplers. All of them mean independent samples here, of which there are as many as the
- * kind rounds up to, so that a file costs the same everywhere
+ * Samplers: independent points, or points in sets, which all other names mean here. There
+ * are as many samples as the kind rounds up to, so that a file costs the same everywhere
  * (docs/scene-format.md 10). */
 #include "base/compiler.h"
 #include "sensor_film.h"
@@ -47,7 +47,8 @@ static int64_t round_ldsampler(int64_t n)
     return r;
 }
 
-enum imp_status imp__sampler_build(const struct imp_build *b, int *spp)
+enum imp_status imp__sampler_build(const struct imp_build *b, int *spp,
+                                   enum imp_points *points)
 {
     static const struct {
         const char *name;
@@ -65,6 +66,7 @@ enum imp_status imp__sampler_build(const struct imp_build *b, int *spp)
 
     if (!b->node) {
         *spp = 4;
+        *points = IMP_POINTS_INDEPENDENT;
         return IMP_OK;
     }
     while (kind < imp_count(kinds) && strcmp(kinds[kind].name, b->node->type) != 0)
@@ -83,6 +85,7 @@ enum imp_status imp__sampler_build(const struct imp_build *b, int *spp)
                   b->node->type);
     IMP_TRY(imp__props_finish(b->ctx, b->node));
     *spp = (int)imp_min(kinds[kind].round(count), SPP_MAX);
+    *points = kind == 0 ? IMP_POINTS_INDEPENDENT : IMP_POINTS_SOBOL;
 out:
     return st;
 }

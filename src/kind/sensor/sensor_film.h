@@ -13,7 +13,8 @@ enum imp_status imp__film_desc_build(const struct imp_build *b,
                                      struct imp_film_desc *out);
 
 /* Samples per pixel of the sampler b->node, rounded up as its kind does
- * (docs/scene-format.md 10); node NULL: 4. */
-enum imp_status imp__sampler_build(const struct imp_build *b, int *spp);
+ * (docs/scene-format.md 10), and the kind of its points; node NULL: 4, independent. */
+enum imp_status imp__sampler_build(const struct imp_build *b, int *spp,
+                                   enum imp_points *points);
 
 #endif
