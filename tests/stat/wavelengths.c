@@ -220,9 +220,9 @@ static void chart(const struct imp_wavelengths *w, const struct imp_spectrum *xy
             for (int i = 0; i < N; i++) {
                 struct imp_waves waves;
                 imp_spec L = {0};
-                const struct imp_key key =
-                    imp__key(77, (uint64_t)(24 * r + p), (uint64_t)i);
-                imp__waves_make(w, imp__wave_draw(&tracer, key, i), &waves);
+                const struct imp_walk walk = {
+                    .key = imp__key(77, (uint64_t)(24 * r + p), (uint64_t)i)};
+                imp__waves_make(w, imp__wave_draw(&tracer, &walk, i), &waves);
                 for (int j = 0; j < waves.carried.n; j++) {
                     const double nm = waves.carried.nm[j];
                     L[j] = light_at(nm) * patch_at(p, nm) / Y;
