@@ -12,7 +12,7 @@ struct imp_same {
     const char *name;
     uint64_t hash;
 };
-#define IMP_SAME_MAX 8
+#define IMP_SAME_MAX 12
 
 /* Equal on all ranks and in all parts, or IMP_E_ARG with the first name that differs. */
 enum imp_status imp__team_same(imp_context *ctx, const struct imp_same *same, int n);

@@ -24,7 +24,8 @@ static void put_group(struct imp_text *t, const unsigned char *bytes, size_t n)
 
 void imp__base64_put(struct imp_text *t, const unsigned char *bytes, size_t n)
 {
-    for (size_t i = 0; i < n; i += GROUP) put_group(t, bytes + i, imp_min(n - i, (size_t)GROUP));
+    for (size_t i = 0; i < n; i += GROUP)
+        put_group(t, bytes + i, imp_min(n - i, (size_t)GROUP));
 }
 
 double imp__planes_put(struct imp_text *t, const imp_film *f, const float *values)
