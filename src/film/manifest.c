@@ -7,6 +7,7 @@
 #include "base/team.h"
 #include "math/hash.h"
 #include "math/rng.h"
+#include "parts.h"
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -16,7 +17,8 @@
 #define VERSION        1
 #define NODES_MOST     ((size_t)256 << 20) /* bytes of sums that are kept */
 
-#define SMALL 64 /* bytes of messages that are no sums */
+/* Bytes of messages that are no sums: what a call has in common, at most. */
+#define SMALL (IMP_SAME_MAX * sizeof(uint64_t))
 
 enum kind { INPUT, RESULT, OUTPUT };
 

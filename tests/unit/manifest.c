@@ -152,8 +152,8 @@ static void good(enum job job)
     for (int threads = 1; threads <= 2; threads++) {
         const char *found = verify(job, 1, threads, &info);
         tap_ok(!*found && info.n_verified == info.n_sums && info.n_sums > 4,
-               "%s: verified by %d threads, %d sums # %s", names[job], threads,
-               (int)info.n_sums, found);
+               "%s: verified by %d threads, %d of %d sums # %s", names[job], threads,
+               (int)info.n_verified, (int)info.n_sums, found);
     }
     const char *found = verify(job, .3, 1, &info);
     tap_ok(!*found && info.n_verified > 0 && info.n_verified < info.n_sums,
