@@ -155,7 +155,7 @@ def check_rows(address: Optional[int], n: int, struct: Any = _c.imp_check_row, r
 
 def check(scene: Scene, params: Any = None, target: Any = None, *, spp: int = 0, seed: int = 0, sensor: Any = 0,
           loss: str = "l2", epsilon: float = 0, paths: int = 0, fresh_spp: int = 0, sampling: bool = False,
-          drop_budget: float = 0, wavelengths: str = "stratified", wavelength_set: int = 0,
+          drop_budget: float = 0, wavelengths: str = "stratified", wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene",
           progress: Any = None) -> Check:
     """Check gradients: each walk against differences with its decisions frozen, pictures
     against differences with fresh random numbers, forward against reverse, densities
@@ -168,7 +168,7 @@ def check(scene: Scene, params: Any = None, target: Any = None, *, spp: int = 0,
         The active parameters; None: all that have a gradient.
     target : optional
         As `loss`'s; checks its gradient too.
-    spp, seed, sensor, loss, epsilon, drop_budget, wavelengths, wavelength_set, progress
+    spp, seed, sensor, loss, epsilon, drop_budget, wavelengths, wavelength_set, points, walks_from, progress
         As `loss`'s.
     paths : int
         Frozen walks looked at; 0: 1000.
@@ -193,7 +193,7 @@ def check(scene: Scene, params: Any = None, target: Any = None, *, spp: int = 0,
     """
     with Problem(scene, params) as p:
         options = run_options(p.scene, sensor=sensor, seed=seed, spp=spp, drop_budget=drop_budget,
-                              wavelengths=wavelengths, wavelength_set=wavelength_set)
+                              wavelengths=wavelengths, wavelength_set=wavelength_set, points=points, walks_from=walks_from)
         if target is not None:
             p.add_targets(target, sensor=sensor, loss=loss, epsilon=epsilon)
         wanted = make(_c.imp_check_options, paths=integer(paths, "paths"), fresh_spp=integer(fresh_spp, "fresh_spp"),

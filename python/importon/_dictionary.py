@@ -144,7 +144,7 @@ class _Builder:
 
 
 def load_dict(dictionary: Mapping[str, Any], *, mode: Optional[str] = None, search: Sequence[Any] = (),
-              parallel: bool = True, optimize: bool = True) -> Scene:
+              upsampling: str = "sigmoid", parallel: bool = True, optimize: bool = True) -> Scene:
     """Make a scene from a dictionary, as Mitsuba does.
 
     Parameters
@@ -157,7 +157,7 @@ def load_dict(dictionary: Mapping[str, Any], *, mode: Optional[str] = None, sear
         references ``{"type": "ref", "id": ...}``. A "mesh" takes arrays:
         "vertex_positions" [n][3], "faces" [m][3], "vertex_normals" and
         "vertex_texcoords"; a "bitmap" takes "bitmap", linear [height][width][1 or 3].
-    mode, search, parallel, optimize
+    mode, search, upsampling, parallel, optimize
         As `load_file`'s.
 
     Returns
@@ -191,7 +191,7 @@ def load_dict(dictionary: Mapping[str, Any], *, mode: Optional[str] = None, sear
     if kind != "scene":
         raise ArgumentError("the dictionary's type is %r: 'scene' is wanted" % (kind,))
     ctx = context()
-    options, kept = _load_options(mode, search, {})
+    options, kept = _load_options(mode, search, {}, None, upsampling)
     out = ctypes.c_void_p()
     ctx.check(lib.imp_scene_create(ctx.pointer, ctypes.byref(options), ctypes.byref(out)))
     handle = Handle(out.value or 0, lib.imp_scene_destroy)

@@ -120,7 +120,7 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
         weights: Any = None, noise_se: Any = None, tikhonov: Optional[Mapping[str, float]] = None,
         stay: Optional[Mapping[str, float]] = None, smooth: Optional[Mapping[str, float]] = None,
         time_limit: float = 0, drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified",
-        wavelength_set: int = 0, progress: Any = None) -> Fit:
+        wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene", progress: Any = None) -> Fit:
     """Fit parameters to target pictures; the scene ends at the best estimate.
 
     Parameters
@@ -144,7 +144,7 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
         Rewritten every few seconds.
     resume : bool
         Continue from the checkpoint, if it is there.
-    spp, seed, sensor, loss, epsilon, weights, tikhonov, stay, smooth, drop_budget, guide, wavelengths, wavelength_set
+    spp, seed, sensor, loss, epsilon, weights, tikhonov, stay, smooth, drop_budget, guide, wavelengths, wavelength_set, points, walks_from
         As `loss`'s; `spp` is that of each iteration.
     noise_se : array, optional
         [height][width][channels]: one standard error of the target's noise; default: that
@@ -179,7 +179,7 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
     """
     with Problem(scene, params) as p:
         options = run_options(p.scene, seed=seed, spp=spp, time_limit=time_limit, drop_budget=drop_budget, guide=guide,
-                              wavelengths=wavelengths, wavelength_set=wavelength_set)
+                              wavelengths=wavelengths, wavelength_set=wavelength_set, points=points, walks_from=walks_from)
         p.add_targets(target, sensor=sensor, weights=weights, loss=loss, epsilon=epsilon, noise_se=noise_se)
         p.add_regularisers(tikhonov, stay, smooth)
         path = text(checkpoint, "checkpoint") if checkpoint is not None else None

@@ -29,11 +29,17 @@ def other_seed(seed: int) -> int:
     return (int(seed) ^ 0x9E3779B97F4A7C15) & (2**64 - 1)
 
 
+def rest_of(drop_budget: float, guide: Any, wavelengths: str, wavelength_set: int, points: str) -> dict[str, Any]:
+    """What is the same of all runs of a Function."""
+    return {"drop_budget": drop_budget, "guide": guide, "wavelengths": wavelengths, "wavelength_set": wavelength_set,
+            "points": points}
+
+
 class Function:
     """A picture, and where there is a target a loss, as a function of x [n]."""
 
-    def __init__(self, scene: Any, names: Iterable[str], sensor: Any, spp: int, spp_grad: int, drop_budget: float,
-                 guide: Any, target: Any = None, **loss: Any) -> None:
+    def __init__(self, scene: Any, names: Iterable[str], sensor: Any, spp: int, spp_grad: int,
+                 rest: dict[str, Any], target: Any = None, **loss: Any) -> None:
         self.scene = check_scene(scene)
         self.infos = sorted({find(self.scene, n) for n in names}, key=lambda i: i.position)
         if not self.infos:
@@ -44,7 +50,7 @@ class Function:
         s = self.scene.sensors[self.sensor]
         self.shape = (s.height, s.width, self.scene.channels)
         self.spp, self.spp_grad = spp, spp_grad or spp
-        self.rest = {"drop_budget": drop_budget, "guide": guide}
+        self.rest = rest  # of run_options
         self.target, self.loss_options = target, loss
         self.key = next(_keys)
         _known[self.key] = self

@@ -20,7 +20,7 @@ from ._scene import Scene
 
 def render_forward(scene: Scene, params: Any, dot: Any, sensor: Any = 0, seed: int = 0, spp: int = 0, *,
                    time_limit: float = 0, drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified",
-                   wavelength_set: int = 0, progress: Any = None) -> Picture:
+                   wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene", progress: Any = None) -> Picture:
     """Forward derivative: the picture J dot, J = d picture / d parameters.
 
     Parameters
@@ -31,7 +31,7 @@ def render_forward(scene: Scene, params: Any, dot: Any, sensor: Any = 0, seed: i
     dot : mapping or array
         Of each parameter, its part of the direction, in its unit; parameters that are not
         named stay. Or an array of all active numbers.
-    sensor, seed, spp, time_limit, drop_budget, guide, wavelengths, wavelength_set, progress
+    sensor, seed, spp, time_limit, drop_budget, guide, wavelengths, wavelength_set, points, walks_from, progress
         As `render`'s.
 
     Returns
@@ -56,7 +56,7 @@ def render_forward(scene: Scene, params: Any, dot: Any, sensor: Any = 0, seed: i
         x = p.join(dot, "dot")
         options = run_options(p.scene, sensor=sensor, seed=seed, spp=spp, time_limit=time_limit,
                               drop_budget=drop_budget, guide=guide, wavelengths=wavelengths,
-                              wavelength_set=wavelength_set)
+                              wavelength_set=wavelength_set, points=points, walks_from=walks_from)
         return make_picture(p.scene, None, options, progress, lambda out: (
             lib.imp_problem_forward, p.pointer, address(x), ctypes.byref(options), out), True)
 
@@ -73,7 +73,7 @@ def _adjoint(scene: Scene, image: Any, sensor: Any, name: str) -> Any:
 
 def render_backward(scene: Scene, params: Any, grad_in: Any, sensor: Any = 0, seed: int = 0, spp: int = 0, *,
                     drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified",
-                    wavelength_set: int = 0, progress: Any = None) -> Gradient:
+                    wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene", progress: Any = None) -> Gradient:
     """Reverse derivative: J^T grad_in, J = d picture / d parameters.
 
     Parameters
@@ -86,7 +86,7 @@ def render_backward(scene: Scene, params: Any, grad_in: Any, sensor: Any = 0, se
         picture. It must come from other random numbers than `seed`: an adjoint image made
         from the same walks is correlated with J, and the gradient then has a bias. `loss`
         has none.
-    sensor, seed, spp, drop_budget, guide, wavelengths, wavelength_set, progress
+    sensor, seed, spp, drop_budget, guide, wavelengths, wavelength_set, points, walks_from, progress
         As `render`'s.
 
     Returns
@@ -104,7 +104,7 @@ def render_backward(scene: Scene, params: Any, grad_in: Any, sensor: Any = 0, se
     with Problem(scene, params) as p:
         image = _adjoint(p.scene, grad_in, sensor, "grad_in")
         options = run_options(p.scene, sensor=sensor, seed=seed, spp=spp, drop_budget=drop_budget, guide=guide,
-                              wavelengths=wavelengths, wavelength_set=wavelength_set)
+                              wavelengths=wavelengths, wavelength_set=wavelength_set, points=points, walks_from=walks_from)
         g, se = p.gradient()
         p.run(options, progress, lib.imp_problem_reverse, p.pointer, address(image), ctypes.byref(options),
               address(g), address(se))
@@ -147,7 +147,7 @@ class Estimate:
 
 def functional(scene: Scene, params: Any = None, adjoint: Any = None, sensor: Any = 0, seed: int = 0,
                spp: int = 0, *, drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified",
-               wavelength_set: int = 0, progress: Any = None) -> Estimate:
+               wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene", progress: Any = None) -> Estimate:
     """A number made of the picture, F = sum(adjoint * picture), and its gradient J^T adjoint.
 
     Parameters
@@ -158,7 +158,7 @@ def functional(scene: Scene, params: Any = None, adjoint: Any = None, sensor: An
     adjoint : array, optional
         [height][width][channels], from other random numbers than `seed`; None: 1/(pixels
         channels), so that F is the mean of the picture.
-    sensor, seed, spp, drop_budget, guide, wavelengths, wavelength_set, progress
+    sensor, seed, spp, drop_budget, guide, wavelengths, wavelength_set, points, walks_from, progress
         As `render`'s.
 
     Returns
@@ -182,7 +182,7 @@ def functional(scene: Scene, params: Any = None, adjoint: Any = None, sensor: An
     with Problem(scene, params) as p:
         image = None if adjoint is None else _adjoint(p.scene, adjoint, sensor, "adjoint")
         options = run_options(p.scene, sensor=sensor, seed=seed, spp=spp, drop_budget=drop_budget, guide=guide,
-                              wavelengths=wavelengths, wavelength_set=wavelength_set)
+                              wavelengths=wavelengths, wavelength_set=wavelength_set, points=points, walks_from=walks_from)
         value, (g, se) = _c.imp_estimate(), p.gradient()
         p.run(options, progress, lib.imp_problem_functional, p.pointer, address(image), ctypes.byref(options),
               ctypes.byref(value), address(g) if p.n else None, address(se) if p.n else None)
@@ -247,12 +247,12 @@ class Jacobian(Values):
 
 def jacobian(scene: Scene, params: Any = None, sensor: Any = 0, seed: int = 0, spp: int = 0, *,
              time_limit: float = 0, drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified",
-             wavelength_set: int = 0, progress: Any = None) -> Jacobian:
+             wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene", progress: Any = None) -> Jacobian:
     """A derivative picture for each active number (at most 256), from one set of walks.
 
     Parameters
     ----------
-    scene, params, sensor, seed, spp, time_limit, drop_budget, guide, wavelengths, wavelength_set, progress
+    scene, params, sensor, seed, spp, time_limit, drop_budget, guide, wavelengths, wavelength_set, points, walks_from, progress
         As `render_forward`'s.
 
     Returns
@@ -279,7 +279,7 @@ def jacobian(scene: Scene, params: Any = None, sensor: Any = 0, seed: int = 0, s
         if p.n > 256:
             raise ArgumentError("%d numbers are active; derivative pictures are for at most 256" % p.n)
         made = {"sensor": sensor, "seed": seed, "spp": spp, "drop_budget": drop_budget, "guide": guide,
-                "wavelengths": wavelengths, "wavelength_set": wavelength_set}
+                "wavelengths": wavelengths, "wavelength_set": wavelength_set, "points": points, "walks_from": walks_from}
         options = run_options(p.scene, time_limit=time_limit, **made)
         films, primal = (ctypes.c_void_p * (p.n + 1))(), ctypes.c_void_p()
         try:
@@ -337,7 +337,7 @@ class Loss(Estimate):
 def loss(scene: Scene, target: Any, params: Any = None, *, spp: int = 0, seed: int = 0, sensor: Any = 0,
          loss: str = "l2", epsilon: float = 0, weights: Any = None, tikhonov: Optional[Mapping[str, float]] = None,
          stay: Optional[Mapping[str, float]] = None, smooth: Optional[Mapping[str, float]] = None,
-         drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified", wavelength_set: int = 0,
+         drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified", wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene",
          progress: Any = None) -> Loss:
     """A loss between scene and target, and its gradient, from the same walks.
 
@@ -366,7 +366,7 @@ def loss(scene: Scene, target: Any, params: Any = None, *, spp: int = 0, seed: i
         [height][width], >= 0.
     tikhonov, stay, smooth : mapping, optional
         Pattern -> weight W: W/2 |x|^2, W/2 |x - x now|^2, W/2 |grad x|^2 (of textures).
-    drop_budget, guide, wavelengths, wavelength_set, progress
+    drop_budget, guide, wavelengths, wavelength_set, points, walks_from, progress
         As `render`'s.
 
     Returns
@@ -394,7 +394,7 @@ def loss(scene: Scene, target: Any, params: Any = None, *, spp: int = 0, seed: i
     """
     with Problem(scene, params) as p:
         options = run_options(p.scene, seed=seed, spp=spp, drop_budget=drop_budget, guide=guide,
-                              wavelengths=wavelengths, wavelength_set=wavelength_set)
+                              wavelengths=wavelengths, wavelength_set=wavelength_set, points=points, walks_from=walks_from)
         n = p.add_targets(target, sensor=sensor, weights=weights, loss=loss, epsilon=epsilon)
         p.add_regularisers(tikhonov, stay, smooth)
         value, (g, se) = _c.imp_estimate(), p.gradient()

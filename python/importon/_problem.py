@@ -33,13 +33,15 @@ def _guide(guide: Any) -> Any:
 
 def run_options(scene: Scene, *, sensor: Any = 0, seed: int = 0, spp: int = 0, time_limit: float = 0,
                 drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified",
-                wavelength_set: int = 0) -> Any:
+                wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene") -> Any:
     """imp_run."""
     return make(_c.imp_run, sensor=scene.sensor_index(sensor) if sensor else 0,
                 seed=integer(seed, "seed", 0, 2**64 - 1), spp=integer(spp, "spp"),
                 time_limit_s=float(time_limit), drop_budget=float(drop_budget), guide=_guide(guide),
                 wavelengths=choice("imp_wavelength_sampling", wavelengths, "wavelengths"),
-                wavelength_set=integer(wavelength_set, "wavelength_set"))
+                wavelength_set=integer(wavelength_set, "wavelength_set"),
+                points=choice("imp_points", points, "points"),
+                **{"from": choice("imp_from", walks_from, "walks_from")})
 
 
 def push(scene: Scene, params: Any) -> None:

@@ -16,7 +16,7 @@ from ._scene import Scene
 
 def render(scene: Scene, params: Any = None, sensor: Any = 0, integrator: None = None, seed: int = 0,
            seed_grad: int = 0, spp: int = 0, spp_grad: int = 0, *, time_limit: float = 0,
-           drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified", wavelength_set: int = 0,
+           drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified", wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene",
            progress: Any = None) -> Picture:
     """Render a picture, with the standard error of every number.
 
@@ -48,6 +48,12 @@ def render(scene: Scene, params: Any = None, sensor: Any = 0, integrator: None =
     wavelength_set : int
         Walks of a pixel among which wavelengths are stratified; 0: a quarter of the samples
         per pixel, at most 16.
+    points : str
+        Random numbers of a pixel's walks: "scene" (what its sampler asks for), "independent",
+        or "sobol" (sets of scrambled points: less noise, the same mean).
+    walks_from : str
+        The end at which walks begin: "scene" (what its integrator says), "sensor" or
+        "lights".
     progress : bool or callable, optional
         See `set_progress`.
 
@@ -75,7 +81,7 @@ def render(scene: Scene, params: Any = None, sensor: Any = 0, integrator: None =
         raise TypeError("integrator: the scene's own is used; write it into the scene")
     options = run_options(scene, sensor=sensor, seed=seed, spp=spp, time_limit=time_limit,
                           drop_budget=drop_budget, guide=guide, wavelengths=wavelengths,
-                          wavelength_set=wavelength_set)
+                          wavelength_set=wavelength_set, points=points, walks_from=walks_from)
     integer(seed_grad, "seed_grad", 0, 2**64 - 1)
     integer(spp_grad, "spp_grad", 0)
     return make_picture(scene, params, options, progress,
@@ -104,7 +110,7 @@ def make_picture(scene: Scene, params: Any, options: Any, progress: Any, call: A
 
 
 def walk(scene: Scene, x: int, y: int, sample: int = 0, *, seed: int = 0, spp: int = 0, sensor: Any = 0,
-         guide: Any = None, wavelengths: str = "stratified", wavelength_set: int = 0,
+         guide: Any = None, wavelengths: str = "stratified", wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene",
          json: bool = False) -> Union[str, dict[str, Any]]:
     """One random walk, vertex by vertex: the same one that pictures and gradients of this
     seed use.
@@ -116,7 +122,7 @@ def walk(scene: Scene, x: int, y: int, sample: int = 0, *, seed: int = 0, spp: i
         Pixel of the picture, from the left and from the top.
     sample : int
         Number of the sample in the pixel.
-    seed, spp, sensor, guide, wavelengths, wavelength_set
+    seed, spp, sensor, guide, wavelengths, wavelength_set, points, walks_from
         As `render`'s, of the picture that the walk belongs to.
     json : bool
         A dictionary in place of text.
@@ -139,7 +145,7 @@ def walk(scene: Scene, x: int, y: int, sample: int = 0, *, seed: int = 0, spp: i
     scene = check_scene(scene)
     not_inside()
     options = run_options(scene, sensor=sensor, seed=seed, spp=spp, guide=guide, wavelengths=wavelengths,
-                          wavelength_set=wavelength_set)
+                          wavelength_set=wavelength_set, points=points, walks_from=walks_from)
     with scene.lock:
         out, context = ctypes.c_void_p(), scene._context
         context.check(lib.imp_walk_describe(scene.pointer, ctypes.byref(options), integer(x, "x"), integer(y, "y"),

@@ -201,7 +201,8 @@ class Scene:
 
 
 def _load_options(mode: Optional[str], search: Sequence[Any], defines: dict[str, Any],
-                  weights: Optional[str] = None) -> tuple[Any, Any]:
+                  weights: Optional[str] = None, upsampling: str = "sigmoid",
+                  lenient: bool = False) -> tuple[Any, Any]:
     """imp_load_options, and what it points to."""
     if isinstance(search, (str, bytes)) or hasattr(search, "__fspath__"):
         search = [search]
@@ -212,7 +213,8 @@ def _load_options(mode: Optional[str], search: Sequence[Any], defines: dict[str,
     options = make(_c.imp_load_options, mode=choice("imp_color_mode", mode or _mode, "mode"),
                    defines=ctypes.addressof(names), n_defines=len(pairs),
                    search=ctypes.addressof(paths), n_search=len(folders),
-                   weights=None if weights is None else text(weights, "weights"))
+                   weights=None if weights is None else text(weights, "weights"),
+                   upsampling=choice("imp_upsampling", upsampling, "upsampling"), lenient=int(bool(lenient)))
     return options, (names, paths)
 
 
@@ -228,10 +230,10 @@ def _define(name: str, value: Any) -> str:
 
 
 def _load(function: Any, arguments: tuple[Any, ...], name: str, mode: Optional[str], search: Sequence[Any],
-          weights: Any, defines: dict[str, Any]) -> Scene:
+          weights: Any, upsampling: str, lenient: bool, defines: dict[str, Any]) -> Scene:
     not_inside()
     ctx = context()
-    options, kept = _load_options(mode, search, defines, _weights(weights))
+    options, kept = _load_options(mode, search, defines, _weights(weights), upsampling, lenient)
     out = ctypes.c_void_p()
     status = function(ctx.pointer, *arguments, ctypes.byref(options), ctypes.byref(out))
     del kept
@@ -252,7 +254,8 @@ def _weights(weights: Any) -> Optional[str]:
 
 
 def load_file(path: Any, *, mode: Optional[str] = None, search: Sequence[Any] = (), weights: Any = None,
-              parallel: bool = True, optimize: bool = True, **defaults: Any) -> Scene:
+              upsampling: str = "sigmoid", lenient: bool = False, parallel: bool = True, optimize: bool = True,
+              **defaults: Any) -> Scene:
     """Load a scene file (Mitsuba 3 XML).
 
     Parameters
@@ -267,6 +270,10 @@ def load_file(path: Any, *, mode: Optional[str] = None, search: Sequence[Any] = 
         Densities that directions are drawn from, and their weights, in place of the
         integrator's own: ``{"kernel": 1, "emitters": 0.5}`` ("kernel", "emitters",
         "environment", "proxies", "guide", "uniform").
+    upsampling : str
+        Of spectral modes: how colours become spectra, "sigmoid" (Jakob and Hanika) or "linear".
+    lenient : bool
+        Go on without plugins and properties that this version does not have, with warnings.
     parallel, optimize : bool
         Taken as Mitsuba's are; without effect.
     **defaults
@@ -293,11 +300,13 @@ def load_file(path: Any, *, mode: Optional[str] = None, search: Sequence[Any] = 
     >>> scene.sensors[0].width
     16
     """
-    return _load(lib.imp_scene_load, (text(path, "path"),), str(path), mode, search, weights, defaults)
+    return _load(lib.imp_scene_load, (text(path, "path"),), str(path), mode, search, weights,
+                 upsampling, lenient, defaults)
 
 
 def load_string(xml: str, *, name: str = "string", mode: Optional[str] = None, search: Sequence[Any] = (),
-                weights: Any = None, parallel: bool = True, optimize: bool = True, **defaults: Any) -> Scene:
+                weights: Any = None, upsampling: str = "sigmoid", lenient: bool = False, parallel: bool = True,
+                optimize: bool = True, **defaults: Any) -> Scene:
     """Load a scene from text, as `load_file` does from a file.
 
     Parameters
@@ -305,7 +314,7 @@ def load_string(xml: str, *, name: str = "string", mode: Optional[str] = None, s
     xml : str
     name : str
         Stands for the file in messages.
-    mode, search, weights, parallel, optimize, **defaults
+    mode, search, weights, upsampling, lenient, parallel, optimize, **defaults
         As `load_file`'s. Files are searched for in the working folder.
 
     Returns
@@ -326,4 +335,4 @@ def load_string(xml: str, *, name: str = "string", mode: Optional[str] = None, s
     """
     data = xml.encode() if isinstance(xml, str) else bytes(xml)
     return _load(lib.imp_scene_load_string, (data, len(data), text(name, "name")), name, mode, search,
-                 weights, defaults)
+                 weights, upsampling, lenient, defaults)

@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ._functional import Function, RayFunction, other_seed
+from ._functional import Function, RayFunction, other_seed, rest_of
 
 
 def _flat(function: Function, values: Mapping[str, Any]) -> Any:
@@ -56,7 +56,8 @@ def _seed(words: Any, which: int) -> int:
 
 
 def render(scene: Any, values: Mapping[str, Any], *, sensor: Any = 0, spp: int = 0, seed: Any = 0,
-           seed_grad: Optional[Any] = None, spp_grad: int = 0, drop_budget: float = 0, guide: Any = None) -> Any:
+           seed_grad: Optional[Any] = None, spp_grad: int = 0, drop_budget: float = 0, guide: Any = None,
+           wavelengths: str = "stratified", wavelength_set: int = 0, points: str = "scene") -> Any:
     """A picture as a function of parameters, with a reverse rule.
 
     Parameters
@@ -67,7 +68,7 @@ def render(scene: Any, values: Mapping[str, Any], *, sensor: Any = 0, spp: int =
         Of the parameter's shape, or one number.
     seed : int or array
         May be traced.
-    sensor, spp, drop_budget, guide
+    sensor, spp, drop_budget, guide, wavelengths, wavelength_set, points
         As `importon.render`'s.
     seed_grad, spp_grad : optional
         Of the backward pass; by default other random numbers than the picture's.
@@ -90,7 +91,7 @@ def render(scene: Any, values: Mapping[str, Any], *, sensor: Any = 0, spp: int =
     >>> jax.grad(f)(jnp.array([0.5, 0.1, 0.1])).shape
     (3,)
     """
-    f = Function(scene, values, sensor, spp, spp_grad, drop_budget, guide)
+    f = Function(scene, values, sensor, spp, spp_grad, rest_of(drop_budget, guide, wavelengths, wavelength_set, points))
 
     @jax.custom_vjp
     def picture(x: Any, words: Any) -> Any:
@@ -110,12 +111,13 @@ def render(scene: Any, values: Mapping[str, Any], *, sensor: Any = 0, spp: int =
 
 
 def render_forward(scene: Any, values: Mapping[str, Any], *, sensor: Any = 0, spp: int = 0, seed: Any = 0,
-                   seed_grad: Optional[Any] = None, spp_grad: int = 0, drop_budget: float = 0, guide: Any = None) -> Any:
+                   seed_grad: Optional[Any] = None, spp_grad: int = 0, drop_budget: float = 0, guide: Any = None,
+                   wavelengths: str = "stratified", wavelength_set: int = 0, points: str = "scene") -> Any:
     """A picture as a function of parameters, with a forward rule: for `jax.jvp`.
 
     Parameters
     ----------
-    scene, values, sensor, spp, seed, seed_grad, spp_grad, drop_budget, guide
+    scene, values, sensor, spp, seed, seed_grad, spp_grad, drop_budget, guide, wavelengths, wavelength_set, points
         As `render`'s.
 
     Returns
@@ -131,7 +133,7 @@ def render_forward(scene: Any, values: Mapping[str, Any], *, sensor: Any = 0, sp
     >>> jax.jvp(f, (x,), (jnp.ones(3),))[1].shape
     (8, 8, 3)
     """
-    f = Function(scene, values, sensor, spp, spp_grad, drop_budget, guide)
+    f = Function(scene, values, sensor, spp, spp_grad, rest_of(drop_budget, guide, wavelengths, wavelength_set, points))
     result = _like(f.shape, jnp.float32)
 
     @jax.custom_jvp
@@ -148,13 +150,14 @@ def render_forward(scene: Any, values: Mapping[str, Any], *, sensor: Any = 0, sp
 
 
 def loss(scene: Any, target: Any, values: Mapping[str, Any], *, spp: int = 0, seed: Any = 0, sensor: Any = 0,
-         loss: str = "l2", epsilon: float = 0, weights: Any = None, drop_budget: float = 0, guide: Any = None) -> Any:
+         loss: str = "l2", epsilon: float = 0, weights: Any = None, drop_budget: float = 0, guide: Any = None,
+         wavelengths: str = "stratified", wavelength_set: int = 0, points: str = "scene") -> Any:
     """A loss as a function of parameters: value and gradient from one pass, each walk
     compared with the mean of the others, so without bias for quadratic losses.
 
     Parameters
     ----------
-    scene, target, spp, sensor, loss, epsilon, weights, drop_budget, guide
+    scene, target, spp, sensor, loss, epsilon, weights, drop_budget, guide, wavelengths, wavelength_set, points
         As `importon.loss`'s.
     values, seed
         As `render`'s.
@@ -172,7 +175,8 @@ def loss(scene: Any, target: Any, values: Mapping[str, Any], *, spp: int = 0, se
     >>> jax.value_and_grad(f)(jnp.array([0.5, 0.1, 0.1]))[1].shape
     (3,)
     """
-    f = Function(scene, values, sensor, spp, 0, drop_budget, guide, np.asarray(target) if isinstance(target, jax.Array) else target,
+    f = Function(scene, values, sensor, spp, 0, rest_of(drop_budget, guide, wavelengths, wavelength_set, points),
+                 np.asarray(target) if isinstance(target, jax.Array) else target,
                  loss=loss, epsilon=epsilon, weights=weights)
     x = _flat(f, values)
     scalar = _like((), x.dtype)

@@ -15,7 +15,7 @@ import torch
 from torch import Tensor
 
 from ._array import numbers
-from ._functional import Function, RayFunction, known, other_seed
+from ._functional import Function, RayFunction, known, other_seed, rest_of
 from ._library import ArgumentError
 
 
@@ -122,7 +122,7 @@ class Renderer:
     scene : Scene
     names : iterable of str
         Parameters that its calls are given.
-    sensor, spp, spp_grad, drop_budget, guide
+    sensor, spp, spp_grad, drop_budget, guide, wavelengths, wavelength_set, points
         As `render`'s.
     **loss
         Of losses, which `importon.torch.loss` makes.
@@ -136,9 +136,11 @@ class Renderer:
     """
 
     def __init__(self, scene: Any, names: Any, *, sensor: Any = 0, spp: int = 0, spp_grad: int = 0,
-                 drop_budget: float = 0, guide: Any = None, **loss: Any) -> None:
+                 drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified", wavelength_set: int = 0, points: str = "scene",
+                 **loss: Any) -> None:
         names = list(names)
-        self.function = Function(scene, names, sensor, spp, spp_grad, drop_budget, guide, **loss)
+        rest = rest_of(drop_budget, guide, wavelengths, wavelength_set, points)
+        self.function = Function(scene, names, sensor, spp, spp_grad, rest, **loss)
         self.key = self.function.key
         from ._params import find
         order = {i.name: k for k, i in enumerate(self.function.infos)}
@@ -221,7 +223,8 @@ def _renderer(scene: Any, names: tuple[str, ...], **options: Any) -> Renderer:
 
 
 def render(scene: Any, values: Mapping[str, Tensor], *, sensor: Any = 0, spp: int = 0, seed: int = 0,
-           seed_grad: Optional[int] = None, spp_grad: int = 0, drop_budget: float = 0, guide: Any = None) -> Tensor:
+           seed_grad: Optional[int] = None, spp_grad: int = 0, drop_budget: float = 0, guide: Any = None,
+           wavelengths: str = "stratified", wavelength_set: int = 0, points: str = "scene") -> Tensor:
     """A picture as a function of parameters.
 
     Parameters
@@ -230,7 +233,7 @@ def render(scene: Any, values: Mapping[str, Tensor], *, sensor: Any = 0, spp: in
         Its parameters are set to `values`.
     values : mapping of str to Tensor
         Of the parameter's shape, or one number.
-    sensor, spp, seed, drop_budget, guide
+    sensor, spp, seed, drop_budget, guide, wavelengths, wavelength_set, points
         As `importon.render`'s.
     seed_grad, spp_grad : int, optional
         Of the backward pass. By default its random numbers are others than the picture's:
@@ -256,18 +259,21 @@ def render(scene: Any, values: Mapping[str, Tensor], *, sensor: Any = 0, spp: in
     >>> x.grad.shape
     torch.Size([3])
     """
-    r: Renderer = _renderer(scene, tuple(values), sensor=sensor, spp=spp, spp_grad=spp_grad, drop_budget=drop_budget, guide=guide)
+    r: Renderer = _renderer(scene, tuple(values), sensor=sensor, spp=spp, spp_grad=spp_grad, drop_budget=drop_budget,
+                            guide=guide, wavelengths=wavelengths, wavelength_set=wavelength_set, points=points)
     return r(values, seed, seed_grad)
 
 
 def loss(scene: Any, target: Any, values: Mapping[str, Tensor], *, spp: int = 0, seed: int = 0, sensor: Any = 0,
-         loss: str = "l2", epsilon: float = 0, weights: Any = None, drop_budget: float = 0, guide: Any = None) -> Tensor:
+         loss: str = "l2", epsilon: float = 0, weights: Any = None, drop_budget: float = 0, guide: Any = None,
+         wavelengths: str = "stratified", wavelength_set: int = 0, points: str = "scene") -> Tensor:
     """A loss as a function of parameters: value and gradient from one pass, each walk
     compared with the mean of the others, so without bias for quadratic losses.
 
     Parameters
     ----------
-    scene, target, spp, seed, sensor, loss, epsilon, weights, drop_budget, guide
+    scene, target, spp, seed, sensor, loss, epsilon, weights, drop_budget, guide, wavelengths,
+    wavelength_set, points
         As `importon.loss`'s. `target` may be a tensor.
     values : mapping of str to Tensor
         As `render`'s.
@@ -286,7 +292,8 @@ def loss(scene: Any, target: Any, values: Mapping[str, Tensor], *, spp: int = 0,
     >>> x.grad.shape
     torch.Size([3])
     """
-    r: Renderer = _losses(scene, target, tuple(values), spp, sensor, loss, epsilon, weights, drop_budget, guide)
+    r: Renderer = _losses(scene, target, tuple(values), spp, sensor, loss, epsilon, weights, drop_budget, guide,
+                          wavelengths, wavelength_set, points)
     x = r.flat(values)
     value: Tensor = _loss(x, r.key, _signed(seed), torch.is_grad_enabled() and x.requires_grad)[0]
     return value
@@ -294,13 +301,16 @@ def loss(scene: Any, target: Any, values: Mapping[str, Tensor], *, spp: int = 0,
 
 @torch.compiler.disable  # type: ignore[untyped-decorator,unused-ignore]
 def _losses(scene: Any, target: Any, names: tuple[str, ...], spp: int, sensor: Any, loss: str, epsilon: float,
-            weights: Any, drop_budget: float, guide: Any) -> Renderer:
+            weights: Any, drop_budget: float, guide: Any, wavelengths: str, wavelength_set: int,
+            points: str) -> Renderer:
     def make() -> Renderer:
         t = target.detach().cpu().numpy() if isinstance(target, Tensor) else target
-        return Renderer(scene, names, sensor=sensor, spp=spp, drop_budget=drop_budget, guide=guide, target=t, loss=loss,
+        return Renderer(scene, names, sensor=sensor, spp=spp, drop_budget=drop_budget, guide=guide,
+                        wavelengths=wavelengths, wavelength_set=wavelength_set, points=points, target=t, loss=loss,
                         epsilon=epsilon, weights=weights)
 
-    key = (id(scene), id(target), names, spp, sensor, loss, epsilon, id(weights), drop_budget, id(guide))
+    key = (id(scene), id(target), names, spp, sensor, loss, epsilon, id(weights), drop_budget, id(guide), wavelengths,
+           wavelength_set, points)
     made: Renderer = _cached(key, make, (scene, target, weights, guide))
     return made
 

@@ -51,6 +51,39 @@ def test_modes():
     return "z " + " ".join(said)
 
 
+def test_walks():
+    """Points in sets, and walks from the lights: other noise, the same picture and loss"""
+    s = im.load_file(CORNELL, res=12)
+    plain = im.render(s, spp=256, seed=1)
+    said = []
+    for key, value in (("points", "sobol"), ("walks_from", "lights")):
+        p = im.render(s, spp=256, seed=2, **{key: value})
+        assert not np.array_equal(p, plain)
+        said.append("%.1f" % same_mean(p, plain, value))
+        raises(im.ArgumentError, lambda: im.render(s, **{key: "lihgts"}), key)
+    target = im.render(s, spp=256, seed=9)
+    e, f = (im.loss(s, target, RED, spp=64, seed=5, points=p) for p in ("independent", "sobol"))
+    assert np.all(f.grad_se[RED] < e.grad_se[RED]) and float(e) != float(f)
+    return "z " + " ".join(said)
+
+
+def test_upsampling():
+    """Colours as spectra in two ways: the picture of each is nearly that of rgb; what is not known is skipped if asked"""
+    rgb, sigmoid, linear = (im.render(im.load_dict(im.cornell_box(res=12), mode=mode, upsampling=u), spp=256, seed=1)
+                            for mode, u in (("rgb", "sigmoid"), ("spectral", "sigmoid"), ("spectral", "linear")))
+    assert not np.array_equal(sigmoid, linear)
+    for p in (sigmoid, linear):  # light between walls has spectra, not three numbers
+        assert abs(p.mean() / rgb.mean() - 1) < .05
+    raises(im.ArgumentError, lambda: im.load_file(CORNELL, upsampling="sigmod"), "sigmoid")
+    xml = "<scene version='3.0.0'><shape type='sphere'/><shape type='teapot'/></scene>"
+    raises(im.UnsupportedError, lambda: im.load_string(xml), "teapot")
+    import warnings
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        assert im.load_string(xml, lenient=True).n_shapes == 1
+    assert any("teapot" in str(w.message) for w in said)
+
+
 def test_weights():
     """Weights of densities, as a mapping and as text: other walks, the same picture; a check of sampling"""
     plain = im.load_file(CORNELL, res=12)
