@@ -301,8 +301,8 @@ def loss(scene: Any, target: Any, values: Mapping[str, Tensor], *, spp: int = 0,
 
 @torch.compiler.disable  # type: ignore[untyped-decorator,unused-ignore]
 def _losses(scene: Any, target: Any, names: tuple[str, ...], spp: int, sensor: Any, loss: str, epsilon: float,
-            weights: Any, drop_budget: float, guide: Any, wavelengths: str, wavelength_set: int,
-            points: str) -> Renderer:
+            weights: Any, drop_budget: float, guide: Any, wavelengths: str = "stratified", wavelength_set: int = 0,
+            points: str = "scene") -> Renderer:
     def make() -> Renderer:
         t = target.detach().cpu().numpy() if isinstance(target, Tensor) else target
         return Renderer(scene, names, sensor=sensor, spp=spp, drop_budget=drop_budget, guide=guide,
