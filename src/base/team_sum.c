@@ -136,7 +136,8 @@ static void receive(void *receiver, int rank, const void *message, size_t bytes)
     if (s->strange) return;
     memcpy(&head, at, sizeof head);
     s->strange = head.items != s->desc->n_items || head.group != s->tree.desc.group ||
-                 head.size != s->desc->size ||
+                 head.size != s->desc->size || head.drops.n_keys < 0 ||
+                 head.drops.n_keys > IMP_DROP_KEYS ||
                  (bytes - sizeof head) / (sizeof(struct place) + head.size) < head.nodes;
     if (s->strange) return;
     head.error[sizeof head.error - 1] = 0;
