@@ -35,7 +35,7 @@ ok() {
 ranks() {
     local n=$1 rc
     shift
-    timeout 100 "$mpirun" -n "$n" "$@" 2>stderr
+    timeout 200 "$mpirun" -n "$n" "$@" 2>stderr
     rc=$?
     return $rc
 }
