@@ -3,6 +3,7 @@
  * Derivatives of walks from the lights, walk by walk, with another adjoint wherever they
  * reach the sensor: reverse against forward mode, and both against central differences of
  * frozen walks, which are linear in lamps and smooth in all else. */
+#include "imp_light_room.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "scene/scene.h"
@@ -54,7 +55,6 @@ static void set(struct imp_scene *scene, struct imp_param *p, size_t e, double v
 #define HEAD                                                                             \
     "<scene version='3.0.0'><integrator type='ptracer'><integer name='max_depth' "       \
     "value='6'/></integrator>"
-#define AT(t) "<transform name='to_world'>" t "</transform>"
 #define ROOM                                                                             \
     "<shape type='cube'>" AT(                                                            \
         "<scale value='2'/>") "<boolean name='flip_normals' value='true'/><bsdf "        \
@@ -71,9 +71,6 @@ static void set(struct imp_scene *scene, struct imp_param *p, size_t e, double v
                                                                    "name='exponent' "    \
                                                                    "value='2'/></"       \
                                                                    "emitter></shape>"
-#define BALL(x, bsdf)                                                                    \
-    "<shape type='sphere'><float name='radius' value='.6'/><point name='center' "        \
-    "value='" x "'/>" bsdf "</shape>"
 #define CAMERA                                                                           \
     "<sensor type='perspective'><float name='fov' value='80'/>" AT(                      \
         "<lookat origin='0,0,1.9' target='0,0,0' up='0,1,0'/>") "<film "                 \
@@ -84,22 +81,6 @@ static void set(struct imp_scene *scene, struct imp_param *p, size_t e, double v
                                                                 "value='4'/><rfilter "   \
                                                                 "type='box'/></film></"  \
                                                                 "sensor></scene>"
-#define FOG                                                                              \
-    "<shape type='cube'>" AT(                                                            \
-        "<scale value='.7'/><translate x='.9' y='-.9' z='.4'/>") "<bsdf "                \
-                                                                 "type='null'/><medium " \
-                                                                 "name='interior' "      \
-                                                                 "type='homogeneous'><"  \
-                                                                 "rgb name='sigma_t' "   \
-                                                                 "value='1,1.5,2'/"      \
-                                                                 "><rgb name='albedo' "  \
-                                                                 "value='.8,.7,.6'/"     \
-                                                                 "><phase "              \
-                                                                 "type='hg'><float "     \
-                                                                 "name='g' "             \
-                                                                 "value='.4'/></"        \
-                                                                 "phase></medium></"     \
-                                                                 "shape>"
 
 static void check(const char *what, const char *xml)
 {

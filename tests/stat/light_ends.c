@@ -4,6 +4,7 @@
  * reading is the same number from either end, R = R_A (Veach 1997, 3.7; Morley et al.
  * 2006, section 1). No factor stands between them but those of the scattering functions;
  * each of these, left out of a walk, must be missed (planted). */
+#include "imp_light_room.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "kind/bsdf/transport.h"
@@ -25,7 +26,6 @@ static imp_context *ctx;
     "</transform>" FILM(6, 4, "box") "</sensor>"
 #define LAMP(e)    "<emitter type='area'><rgb name='radiance' value='" e "'/></emitter>"
 #define DIFFUSE(r) "<bsdf type='diffuse'><rgb name='reflectance' value='" r "'/></bsdf>"
-#define AT(t)      "<transform name='to_world'>" t "</transform>"
 
 static imp_scene *scene_of(int max_depth, const char *body, enum imp_color_mode mode)
 {
@@ -347,28 +347,9 @@ static void shading_normals(void)
                                                                                  "sh"    \
                                                                                  "ap"    \
                                                                                  "e>"
-#define BALL(x, bsdf)                                                                    \
-    "<shape type='sphere'><float name='radius' value='.6'/><point name='center' "        \
-    "value='" x "'/>" bsdf "</shape>"
 #define GLASS                                                                            \
     "<bsdf type='dielectric'><float name='int_ior' value='1.5'/><float name='ext_ior' "  \
     "value='1'/></bsdf>"
-#define FOG                                                                              \
-    "<shape type='cube'>" AT(                                                            \
-        "<scale value='.7'/><translate x='.9' y='-.9' z='.4'/>") "<bsdf "                \
-                                                                 "type='null'/><medium " \
-                                                                 "name='interior' "      \
-                                                                 "type='homogeneous'><"  \
-                                                                 "rgb name='sigma_t' "   \
-                                                                 "value='1,1.5,2'/"      \
-                                                                 "><rgb name='albedo' "  \
-                                                                 "value='.8,.7,.6'/"     \
-                                                                 "><phase "              \
-                                                                 "type='hg'><float "     \
-                                                                 "name='g' "             \
-                                                                 "value='.4'/></"        \
-                                                                 "phase></medium></"     \
-                                                                 "shape>"
 
 static void rooms(bool slow)
 {
