@@ -136,7 +136,7 @@ static void check(const char *what, const char *xml)
         const imp_spec t = imp__walk_tangent(&tracer, &w.walk, x_dot);
         if (size > 0) exact = fmax(exact, fabs((t[0] + t[1]) + t[2] - dot) / size);
         const size_t k = (size_t)i % active.n;
-        size_t e;
+        size_t e = 0;
         struct imp_param *p = param_at(scene, &active, k, &e);
         const double x = imp__param_get(p, e), h = 1e-4 * fmax(fabs(x), 0.1);
         set(scene, p, e, x + h);
