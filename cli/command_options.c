@@ -1,0 +1,115 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Options that commands share. */
+#include "command.h"
+
+/* In the order of enum imp_color_mode. */
+static const char *const mode_words[] = {"rgb", "mono", "spectral", "single", NULL};
+static const char *const wavelength_words[] = {"stratified", "independent", "importance",
+                                               NULL};
+static const char *const files_words[] = {"broadcast", "shared", NULL};
+static const char *const from_words[] = {"scene", "sensor", "lights", NULL};
+static const char *const upsampling_words[] = {"sigmoid", "linear", NULL};
+static const char *const point_words[] = {"scene", "independent", "sobol", NULL};
+static const char *const progress_words[] = {"auto", "always", "never", NULL};
+
+const struct arg_option options_file[] = {{ARG_TEXT, 'o', "output", "FILE",
+                                           "output file; '-' is standard output",
+                                           &cli.out, 0, 0, NULL},
+                                          {0}};
+const struct arg_option options_folder[] = {
+    {ARG_TEXT, 'o', "output", "DIR", "output folder", &cli.out, 0, 0, NULL}, {0}};
+const struct arg_option options_file_or_folder[] = {
+    {ARG_TEXT, 'o', "output", "PATH",
+     "output: a file for trace and check, a folder for fit and view", &cli.out, 0, 0,
+     NULL},
+    {0}};
+
+const struct arg_option options_general[] = {
+    {ARG_FLAG, 0, "overwrite", NULL,
+     "replace files of another kind, and older checkpoints", &cli.overwrite, 0, 0, NULL},
+    {ARG_INT, 't', "threads", "N", "threads; 0: all cores (default)", &cli.threads, 0,
+     4096, NULL},
+    {ARG_FLAG, 0, "json", NULL, "print JSON", &cli.json, 0, 0, NULL},
+    {ARG_CHOICE, 0, "progress", "WHEN", "auto (on a terminal), always or never",
+     &cli.progress, 0, 0, progress_words},
+    {ARG_FLAG, 'q', "quiet", NULL,
+     "print only errors on standard error, and no progress bar", &cli.quiet, 0, 0, NULL},
+    {ARG_FLAG, 'h', "help", NULL, "print this text", &cli.help, 0, 0, NULL},
+    {0}};
+
+const struct arg_option options_scene[] = {
+    {ARG_LIST, 'D', "define", "NAME=VALUE", "set a $parameter of the scene file",
+     &cli.defines, 0, 0, NULL},
+    {ARG_LIST, 0, "set", "ID=V[,V..]",
+     "set a scene parameter ('importon info' lists them); @FILE: many", &cli.sets, 0, 0,
+     NULL},
+    {ARG_TEXT, 'a', "search", "DIR[;DIR..]", "more folders to search for files",
+     &cli.search, 0, 0, NULL},
+    {ARG_CHOICE, 'm', "mode", "MODE", "colour: rgb (default), mono, spectral or single",
+     &cli.mode, 0, 0, mode_words},
+    {ARG_CHOICE, 0, "upsampling", "HOW",
+     "of -m spectral and single: colours become spectra by a sigmoid (default), or by a "
+     "linear basis",
+     &cli.upsampling, 0, 0, upsampling_words},
+    {ARG_TEXT, 0, "weights", "NAME=W[,..]",
+     "densities of directions, in place of those of the scene file: kernel, emitters, "
+     "environment, proxies, guide, uniform",
+     &cli.weights, 0, 0, NULL},
+    {ARG_FLAG, 0, "lenient", NULL,
+     "go on without plugins and properties that this version does not have", &cli.lenient,
+     0, 0, NULL},
+    {ARG_FLAG, 0, "dump", NULL, "print the parameters and their values, and stop",
+     &cli.dump, 0, 0, NULL},
+    {0}};
+
+const struct arg_option options_run[] = {
+    {ARG_INT, 's', "sensor", "N", "number of the sensor, from 0", &cli.sensor, 0, 1e6,
+     NULL},
+    {ARG_INT, 0, "spp", "N", "samples per pixel (default: those of the scene)", &cli.spp,
+     1, 1e9, NULL},
+    {ARG_SEED, 0, "seed", "N", "seed of the random numbers (default 0)", &cli.seed, 0, 0,
+     NULL},
+    {ARG_NUMBER, 0, "time", "SECONDS", "stop after this time and keep the results so far",
+     &cli.time_s, 1e-3, 1e9, NULL},
+    {ARG_TEXT, 0, "part", "I/N",
+     "compute part I of N (from 1), to the file of -o; 'importon merge' makes the whole",
+     &cli.part, 0, 0, NULL},
+    {ARG_TEXT, 0, "manifest", "FILE",
+     "write what 'importon verify' needs to prove the result (render, gradient, fit)",
+     &cli.manifest_path, 0, 0, NULL},
+    {ARG_CHOICE, 0, "mpi-files", "HOW",
+     "with mpirun: broadcast (default: rank 0 reads files for all) or shared (each does)",
+     &cli.mpi_files, 0, 0, files_words},
+    {ARG_CHOICE, 0, "wavelengths", "HOW",
+     "of -m spectral and single: stratified (default), independent, or importance",
+     &cli.wavelengths, 0, 0, wavelength_words},
+    {ARG_INT, 0, "wavelength-set", "N",
+     "samples among which they are stratified (default: a quarter, at most 16)",
+     &cli.wavelength_set, 1, 1e9, NULL},
+    {ARG_TEXT, 0, "display", "HOST:PORT",
+     "show pictures in a viewer that listens there (tev: port 14158)", &cli.display, 0, 0,
+     NULL},
+    {ARG_CHOICE, 0, "from", "END",
+     "end at which walks begin: scene (as its integrator says, default), sensor or "
+     "lights",
+     &cli.from, 0, 0, from_words},
+    {ARG_CHOICE, 0, "points", "KIND",
+     "random numbers of a pixel's samples: independent, sobol, or scene (default: what "
+     "the scene's sampler says)",
+     &cli.points, 0, 0, point_words},
+    {0}};
+
+const struct arg_option options_guide[] = {
+    {ARG_FLAG, 0, "guide", NULL,
+     "solve by finite elements first, and choose lights by what they send to a point",
+     &cli.guide, 0, 0, NULL},
+    {ARG_NUMBER, 0, "guide-share", "S",
+     "fraction of directions drawn towards indirect light, below 1 (default 0)",
+     &cli.guide_share, 0, 0.99, NULL},
+    {ARG_NUMBER, 0, "guide-roulette", "S",
+     "survival by S times the expected remaining light (default: by throughput)",
+     &cli.guide_roulette, 0, 1e6, NULL},
+    {0}};
+
+const char *cli_mode_word(enum imp_color_mode mode) { return mode_words[mode]; }
