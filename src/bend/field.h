@@ -108,6 +108,7 @@ static inline imp_v3 imp__jet_times(const struct imp__jet *j, imp_v3 m) /* H m *
 double imp__field_index_max(const imp_field *f);
 
 /* grid.c: spline and trilinear share nodes, files and levels. */
+#define IMP_GRID_CELLS_MAX 8192 /* along an axis */
 struct imp__grid {
     imp_field base;
     struct imp_field_grid desc;
