@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A PLY file as it is read: its header, and where the body goes. */
+#ifndef IMP_PLY_FILE_H
+#define IMP_PLY_FILE_H
+
+#include "mesh_file.h"
+
+#define ELEMENTS_MAX   64
+#define PROPERTIES_MAX 256
+
+enum ply_format { PLY_ASCII, PLY_LITTLE, PLY_BIG };
+enum ply_type {
+    PLY_I8,
+    PLY_U8,
+    PLY_I16,
+    PLY_U16,
+    PLY_I32,
+    PLY_U32,
+    PLY_F32,
+    PLY_F64,
+    PLY_NONE
+};
+/* Of a number in the body. */
+static inline int imp__ply_bytes(enum ply_type type)
+{
+    static const int bytes[] = {1, 1, 2, 2, 4, 4, 4, 8};
+    return bytes[type];
+}
+
+/* Meaning of a vertex property; SKIP: ignored. */
+enum ply_use {
+    USE_X,
+    USE_Y,
+    USE_Z,
+    USE_NX,
+    USE_NY,
+    USE_NZ,
+    USE_U,
+    USE_V,
+    USES,
+    USE_SKIP
+};
+
+struct ply_property {
+    enum ply_type type, count; /* count NONE: a scalar */
+    enum ply_use use;
+    bool indices;
+};
+struct ply_element {
+    char name[32];
+    size_t n;
+    int first, n_properties; /* in ply.properties */
+};
+
+struct ply {
+    const struct imp_mesh_source *source;
+    imp_context *ctx;
+    const unsigned char *at, *end;
+    int64_t line; /* of the header, and of ascii bodies */
+    enum ply_format format;
+    struct ply_element elements[ELEMENTS_MAX];
+    struct ply_property properties[PROPERTIES_MAX];
+    int n_elements, n_properties, vertex, face;
+    float *positions, *normals, *uvs;
+    uint32_t *indices;
+};
+
+enum imp_status IMP_PRINTF(2, 3)
+    imp__ply_error(const struct ply *p, const char *format, ...);
+bool imp__ply_has(const struct ply *p, enum ply_use use);
+/* Up to the first byte of the body. The counts are not larger than the file can hold. */
+enum imp_status imp__ply_header(struct ply *p);
+
+#endif
