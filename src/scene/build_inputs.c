@@ -1,191 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Inputs of objects: constants, which become parameters, and textures. Names and tools
- * that all builders share stand first. */
+ * Inputs of objects: constants, which become parameters, and textures. */
 #include "color/convert.h"
 #include "color/rgb.h"
 #include "scene_build.h"
-
-enum imp_status imp__build_no_memory(struct imp_scene *scene)
-{
-    return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for the scene");
-}
-
-char *imp__build_name(struct imp_scene *scene, const char *parent, const char *key)
-{
-    const size_t n = strlen(parent) + strlen(key) + 2;
-    char *s = imp__arena_take(&scene->arena, n, 1);
-    if (s) snprintf(s, n, "%s.%s", parent, key);
-    return s;
-}
-
-/* The name of an object: its id, else the slot below the parent. */
-const char *imp__build_object_name(struct imp_scene *scene, const struct imp_node *node,
-                                   const char *parent, const char *slot)
-{
-    return node->id ? node->id : imp__build_name(scene, parent, slot);
-}
-
-/* Append to one of the scene's lists; they live in the arena and double. */
-enum imp_status imp__build_list_add(struct imp_scene *scene, void ***list, int *n,
-                                    void *object)
-{
-    const size_t count = (size_t)*n;
-    if ((count & (count - 1)) == 0) { /* 0, 1, 2, 4, 8: full */
-        void **grown =
-            imp__arena_take(&scene->arena, count ? 2 * count : 1, sizeof *grown);
-        if (!grown) return imp__build_no_memory(scene);
-        if (count) memcpy(grown, *list, count * sizeof *grown);
-        *list = grown;
-    }
-    (*list)[(*n)++] = object;
-    return IMP_OK;
-}
-
-static enum imp_status add_bulk(const struct imp_build *b, const char *key, float *data,
-                                int n_dims, const size_t dims[3], unsigned flags,
-                                double lo, double hi, int *param);
-
-struct imp_build imp__build_make(struct imp_scene *scene, struct imp_node *node)
-{
-    return (struct imp_build){.ctx = scene->ctx,
-                              .node = node,
-                              .arena = &scene->arena,
-                              .mode = scene->mode,
-                              .linear_colors = scene->linear_colors,
-                              .add_bulk = add_bulk,
-                              .scene = scene};
-}
-
-/* ---- Inputs and textures ------------------------------------------------------- */
-
-/* The data of a picture in a slot that is called data are that slot: sky.data. */
-static const char *bulk_name(struct imp_scene *scene, const char *texture,
-                             const char *key)
-{
-    const char *slot = strrchr(texture, '.');
-    return slot && strcmp(slot + 1, key) == 0 ? texture
-                                              : imp__build_name(scene, texture, key);
-}
-
-static enum imp_status add_bulk(const struct imp_build *b, const char *key, float *data,
-                                int n_dims, const size_t dims[3], unsigned flags,
-                                double lo, double hi, int *param)
-{
-    struct imp_scene *scene = b->scene;
-    const struct imp_texture *t = b->node->object; /* set before build is called */
-    struct imp_param p = {.store = IMP_STORE_BULK, .bulk = data};
-    if (imp__is_spectral(scene->mode) && !scene->linear_colors && n_dims > 0 &&
-        dims[n_dims - 1] == 3) /* colours that are lifted to spectra */
-        p.degree = t->asked && t->asked->flags & IMP_INPUT_DAYLIGHT ? IMP_DEGREE_FIRST
-                                                                    : IMP_DEGREE_OTHER;
-    p.info.name = bulk_name(scene, t->name, key);
-    if (!p.info.name) return imp__build_no_memory(scene);
-    p.info.unit = "1";
-    p.info.n_dims = n_dims;
-    for (int d = 0; d < n_dims; d++) p.info.dims[d] = dims[d];
-    p.info.flags = flags;
-    p.info.lo = lo;
-    p.info.hi = hi;
-    return imp__theta_add(scene, &p, param);
-}
-
-enum imp_status imp__build_watch(struct imp_scene *scene,
-                                 const struct imp_input *const *input, int n,
-                                 void (*changed)(void *payload), void *payload)
-{
-    enum imp_status st = IMP_OK;
-    for (int j = 0; j < n; j++) {
-        const struct imp_texture *t = input[j]->texture;
-        const int param = t ? t->param : input[j]->param;
-        if (param >= 0) IMP_TRY(imp__theta_watch(scene, param, changed, payload));
-        if (t) IMP_TRY(imp__build_watch(scene, t->input, t->n_in, changed, payload));
-    }
-out:
-    return st;
-}
-
-static enum imp_status colour_prepare(struct imp_scene *scene, const struct imp_input *in,
-                                      enum imp_role role);
-
-static void texture_changed(void *payload)
-{
-    const struct imp_texture *t = payload;
-    t->ops->changed(t);
-}
-
-/* Do two inputs want the same spectra of a texture's colours? */
-static bool same_spectra(const struct imp_input_desc *a, const struct imp_input_desc *b)
-{
-    const bool reflect[2] = {a->role == IMP_REFLECTANCE, b->role == IMP_REFLECTANCE};
-    return ((a->flags ^ b->flags) & IMP_INPUT_DAYLIGHT) == 0 &&
-           (!((a->flags | b->flags) & IMP_INPUT_VOLUME) || reflect[0] == reflect[1]);
-}
-
-enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *node,
-                                   const char *parent, const char *slot,
-                                   const struct imp_input_desc *asked,
-                                   struct imp_texture **out)
-{
-    enum imp_status st = IMP_OK;
-    struct imp_texture *t = node->object;
-    if (t) {
-        if (!t->asked) {
-            t->asked = asked;
-            if (t->ops->changed) t->ops->changed(t);
-        } else if (imp__is_spectral(scene->mode) && !same_spectra(t->asked, asked)) {
-            return imp__node_error(
-                scene->ctx, node, IMP_E_UNSUPPORTED,
-                "stands for '%s' and for '%s', which are different "
-                "spectra of the same colours: it must be written twice",
-                t->asked->name, asked->name);
-        }
-        *out = t;
-        return IMP_OK;
-    }
-    if (node->visiting)
-        return imp__node_error(scene->ctx, node, IMP_E_SCENE,
-                               "the object contains itself");
-    node->visiting = 1;
-    const void *found;
-    const bool volume = strcmp(node->tag, "volume") == 0;
-    IMP_TRY(imp__kind_find(scene->ctx, volume ? IMP_CONCEPT_VOLUME : IMP_CONCEPT_TEXTURE,
-                           node, &found));
-    const struct imp_texture_ops *ops = found;
-
-    t = imp__arena_array(&scene->arena, 1, sizeof *t);
-    void *self = imp__arena_array(&scene->arena, 1, ops->object_size);
-    if (!t || !self) IMP_TRY(imp__build_no_memory(scene));
-    *t = (struct imp_texture){.ops = ops,
-                              .self = self,
-                              .param = -1,
-                              .name = imp__build_object_name(scene, node, parent, slot),
-                              .asked = asked};
-    if (!t->name) IMP_TRY(imp__build_no_memory(scene));
-    node->object = t;
-    int n = 0;
-    while (ops->inputs && ops->inputs[n].name) n++;
-    const struct imp_input **input =
-        imp__arena_array(&scene->arena, (size_t)n + 1, sizeof *input);
-    if (!input) IMP_TRY(imp__build_no_memory(scene));
-    IMP_TRY(imp__build_inputs(scene, node, t->name, ops->inputs, input, &t->n_in));
-    t->input = input;
-    for (int k = 0; k < t->n_in; k++)
-        IMP_TRY(colour_prepare(scene, t->input[k], ops->inputs[k].role));
-    const struct imp_build b = imp__build_make(scene, node);
-    if (ops->build) IMP_TRY(ops->build(&b, self, t));
-    IMP_TRY(imp__props_finish(scene->ctx, node));
-    if (ops->changed) {
-        IMP_TRY(imp__build_watch(scene, t->input, t->n_in, texture_changed, t));
-        if (t->param >= 0) IMP_TRY(imp__theta_watch(scene, t->param, texture_changed, t));
-    }
-    IMP_TRY(
-        imp__build_list_add(scene, (void ***)&scene->textures, &scene->n_textures, t));
-    *out = t;
-out:
-    node->visiting = 0;
-    return st;
-}
 
 /* A spectrum whose numbers are set. */
 struct spectrum_of {
@@ -206,10 +24,8 @@ static bool formula(const struct imp_spectrum *s)
     return s && (s->form == IMP_SPECTRUM_SELLMEIER || s->form == IMP_SPECTRUM_CAUCHY);
 }
 
-/* A spectrum that may be asked for as a colour, or as one number: what its numbers do to
- * that. */
-static enum imp_status colour_prepare(struct imp_scene *scene, const struct imp_input *in,
-                                      enum imp_role role)
+enum imp_status imp__build_spectrum(struct imp_scene *scene, const struct imp_input *in,
+                                    enum imp_role role)
 {
     struct imp_spectrum *s = (struct imp_spectrum *)in->spectrum; /* the scene's own */
     struct imp_input *own = (struct imp_input *)in;
@@ -441,7 +257,7 @@ enum imp_status imp__build_inputs(struct imp_scene *scene, struct imp_node *node
             for (in->luminance = 1; in->luminance < count; in->luminance++)
                 if (strcmp(desc[count - in->luminance].name, d->name) == 0) break;
             const int colour = count - in->luminance;
-            IMP_TRY(colour_prepare(scene, out[colour], desc[colour].role));
+            IMP_TRY(imp__build_spectrum(scene, out[colour], desc[colour].role));
         }
         in->plain = !in->texture && !in->luminance && !(in->scalar && in->count == 3);
         out[count++] = in;

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Shared by the files that make objects from nodes: scene_build.c (the scene), build_objects.c
- * (materials, lights, shapes, sensors), build_inputs.c (their inputs, and textures). */
+ * (materials, lights, shapes, sensors), build_inputs.c (their inputs), build_texture.c,
+ * build_tools.c (names, lists, watches). */
 #ifndef IMP_SCENE_BUILD_H
 #define IMP_SCENE_BUILD_H
 
@@ -36,6 +37,10 @@ bool imp__build_shaped(const struct imp_scene *scene,
 enum imp_status imp__build_watch(struct imp_scene *scene,
                                  const struct imp_input *const *input, int n,
                                  void (*changed)(void *payload), void *payload);
+/* A spectrum that may be asked for as a colour, or as one number: what its numbers do to
+ * that. */
+enum imp_status imp__build_spectrum(struct imp_scene *scene, const struct imp_input *in,
+                                    enum imp_role role);
 /* asked: the input that it stands for; NULL: it is declared only. */
 enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *node,
                                    const char *parent, const char *slot,
