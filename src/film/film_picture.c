@@ -4,8 +4,7 @@
  * the first 2^k passes are a node of the tree over passes, so what is there and the next
  * sweep are its two children, and one set of sums is enough for a picture that can be had
  * at any time. */
-#include "film_picture.h"
-#include "film_sums.h"
+#include "film_patch.h"
 #include <float.h>
 #include <stdio.h>
 #include <string.h>
@@ -24,17 +23,16 @@
 struct render {
     const struct imp_run *run;
     const struct imp_picture *picture;
-    const struct imp_film_desc *film;
+    struct imp_patch patch;
     struct imp_tiles tiles;
     struct imp_film_sums sums;
-    int n, side, border;
     int spp, passes, pass_spp;
     /* Rows of the threads on cache lines of their own. */
-    double *values;  /* [threads][n] */
-    double *patches; /* [threads][stratum_side^2][IMP_WIDE_SUMS] what one pixel sends in a
+    double *values;      /* [threads][n] */
+    double *patches;     /* [threads][imp__patch_size] what one pixel sends in a
                         pass through a wide filter */
-    int set;         /* samples that depend on each other, about; 1: none do */
-    int64_t period;  /* samples of a pixel; 0: not known */
+    int set;             /* samples that depend on each other, about; 1: none do */
+    int64_t period;      /* samples of a pixel; 0: not known */
     int sets, pass_sets; /* in all of them, in a pass */
     double *set_values;  /* [threads][n] box: sums of a set */
     double *set_patches; /* [threads] as patches, of a set: sums of w and w v alone */
@@ -43,95 +41,11 @@ struct render {
 
 /* ---- One tile and pass ----------------------------------------------------------- */
 
-/* Pixels that samples of one pixel reach: `border` on each side, and one more, for a
- * position may be rounded up to the pixel's end. */
-static int stratum_side(const struct render *r) { return 2 * r->border + 2; }
-static size_t patch_size(const struct render *r)
-{
-    return (size_t)(stratum_side(r) * stratum_side(r)) * (size_t)IMP_WIDE_SUMS(r->n);
-}
 /* Doubles from one thread's row of n to the next's: no cache line is written by two. */
 static size_t apart(size_t n)
 {
     const size_t line = IMP_CACHE_LINE / sizeof(double);
     return (n + line - 1) / line * line;
-}
-
-/* One sample, or the sums of a set: wv(c) = w value[c]. */
-static void accumulate(double *sums, double w, const double *value, int n)
-{
-    sums[0] += w;
-    sums[1] += w * w;
-    for (int c = 0; c < n; c++) {
-        const double wv = w * value[c];
-        sums[2 + 3 * c] += wv;
-        sums[3 + 3 * c] += w * wv;
-        sums[4 + 3 * c] += wv * wv;
-    }
-}
-
-/* A set is one sample whose w and w v are sums. `set` has them in the places that they
- * have in sums; it is cleared. */
-static void set_add(double *sums, double *set, int n)
-{
-    const double w = set[0];
-    if (set[1] == 0) return;
-    sums[0] += w;
-    sums[1] += w * w;
-    for (int c = 0; c < n; c++) {
-        const double wv = set[2 + 3 * c];
-        sums[2 + 3 * c] += wv;
-        sums[3 + 3 * c] += w * wv;
-        sums[4 + 3 * c] += wv * wv;
-    }
-    memset(set, 0, (size_t)IMP_WIDE_SUMS(n) * sizeof *set);
-}
-
-/* Weight a sample into the pixels that the filter reaches. */
-static void splat(const struct render *r, const struct imp_tile *t, double *patch,
-                  const struct imp_sample *s)
-{
-    const struct imp_filter *f = &r->film->filter;
-    const int n = r->n, b = r->border, side = stratum_side(r);
-    struct imp_taps across, down;
-    imp__film_taps(f, s->px - r->film->crop_x, imp_max(s->x, t->x0) - b,
-                   imp_min(s->x + 1, t->x1 - 1) + b, &across);
-    imp__film_taps(f, s->py - r->film->crop_y, imp_max(s->y, t->y0) - b,
-                   imp_min(s->y + 1, t->y1 - 1) + b, &down);
-    for (int j = 0; j < down.n; j++)
-        for (int i = 0; i < across.n; i++) {
-            const double w = down.w[j] * across.w[i];
-            const int u = across.first + i - s->x + b, v = down.first + j - s->y + b;
-            if (w != 0)
-                accumulate(patch + (size_t)(v * side + u) * (size_t)IMP_WIDE_SUMS(n), w,
-                           s->value, n);
-        }
-}
-
-/* Add what pixel (x, y) sent in m samples to the tile, whose corner is (x0, y0) minus the
- * border, and clear the patch. */
-static void stratum_add(const struct render *r, const struct imp_tile *t, double *patch,
-                        int x, int y, int m, double *tile)
-{
-    const int n = r->n, side = stratum_side(r), stride = r->side + 2 * r->border;
-    const size_t sums = (size_t)IMP_WIDE_SUMS(n);
-    const double each = m > 1 ? 1. / m : 0, factor = m > 1 ? m / (m - 1.) : 1;
-    for (int j = 0; j < side; j++)
-        for (int i = 0; i < side; i++) {
-            double *from = patch + (size_t)(j * side + i) * sums;
-            if (from[1] == 0) continue;
-            double *to = tile + (size_t)((y - t->y0 + j) * stride + x - t->x0 + i) * sums;
-            const double W = from[0];
-            to[0] += W;
-            to[1] += factor * (from[1] - W * W * each);
-            for (int c = 0; c < n; c++) {
-                const double wv = from[2 + 3 * c];
-                to[2 + 3 * c] += wv;
-                to[3 + 3 * c] += factor * (from[3 + 3 * c] - W * wv * each);
-                to[4 + 3 * c] += factor * (from[4 + 3 * c] - wv * wv * each);
-            }
-            memset(from, 0, sums * sizeof *from);
-        }
 }
 
 /* A picture holds floats. */
@@ -152,9 +66,9 @@ static void sample_take(const struct render *r, struct imp_tile_worker *w,
     s->dropped = IMP_DROP_NONE;
     r->picture->sample(r->picture->payload, s);
     imp__arena_rewind(s->arena, mark);
-    if (s->dropped == IMP_DROP_NONE) s->dropped = beyond_float(s->value, r->n);
+    if (s->dropped == IMP_DROP_NONE) s->dropped = beyond_float(s->value, r->patch.n);
     if (imp_likely(s->dropped == IMP_DROP_NONE)) return;
-    memset(s->value, 0, (size_t)r->n * sizeof *s->value);
+    memset(s->value, 0, (size_t)r->patch.n * sizeof *s->value);
     imp__tile_drop(w, s->dropped, s->x, s->y, s->index);
 }
 
@@ -163,19 +77,19 @@ static void sample_take(const struct render *r, struct imp_tile_worker *w,
 static void set_take(const struct render *r, const struct imp_tile *t, int worker,
                      const struct imp_sample *s, double *own, double *patch, int n)
 {
-    const size_t width = IMP_WIDE_SUMS(r->n);
-    if (r->border > 0) {
-        double *set = r->set_patches + (size_t)worker * apart(patch_size(r));
-        const size_t side = (size_t)stratum_side(r);
-        splat(r, t, set, s);
+    const size_t width = IMP_WIDE_SUMS(r->patch.n);
+    if (r->patch.border > 0) {
+        double *set = r->set_patches + (size_t)worker * apart(imp__patch_size(&r->patch));
+        const size_t side = (size_t)imp__patch_side(&r->patch);
+        imp__patch_splat(&r->patch, t, set, s);
         for (size_t i = 0; n > 0 && i < side * side; i++)
-            set_add(patch + i * width, set + i * width, r->n);
+            imp__patch_set(patch + i * width, set + i * width, r->patch.n);
         return;
     }
-    double *sum = r->set_values + (size_t)worker * apart((size_t)r->n);
+    double *sum = r->set_values + (size_t)worker * apart((size_t)r->patch.n);
     const double scale = r->sets > 0 && n > 0 ? (double)r->period / r->sets / n : 1;
-    for (int c = 0; c < r->n; c++) sum[c] += s->value[c];
-    for (int c = 0; n > 0 && c < r->n; c++) {
+    for (int c = 0; c < r->patch.n; c++) sum[c] += s->value[c];
+    for (int c = 0; n > 0 && c < r->patch.n; c++) {
         const double all = scale * sum[c];
         own[2 * c] += all;
         own[2 * c + 1] += all * all;
@@ -199,16 +113,17 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
     const int s0 = pass_begin(r, (int)t->part), s1 = pass_begin(r, (int)t->part + 1);
     int n_sets = 0;
     int64_t first = 0, n_set = 0; /* of the set at work */
-    const int n = r->n, step = imp_max(r->picture->step, 1);
+    const int n = r->patch.n, step = imp_max(r->picture->step, 1);
     double *tile = result;
-    double *patch = r->patches + (size_t)w->index * apart(patch_size(r));
+    double *patch = r->patches + (size_t)w->index * apart(imp__patch_size(&r->patch));
     struct imp_sample s = {.arena = &w->arena,
                            .value = r->values + (size_t)w->index * apart((size_t)n)};
     memset(tile, 0, imp__film_sums_tile(&r->sums) * sizeof *tile);
     for (s.y = t->y0; s.y < t->y1; s.y++)
         for (s.x = t->x0; s.x < t->x1; s.x++) {
             double *own =
-                tile + (size_t)((s.y - t->y0) * r->side + s.x - t->x0) * 2 * (size_t)n;
+                tile + (size_t)((s.y - t->y0) * r->patch.tile_side + s.x - t->x0) * 2 *
+                           (size_t)n;
             for (int k = s0; k < s1; k++) {
                 s.index = r->picture->first + (int64_t)k * step;
                 sample_take(r, w, &s);
@@ -220,8 +135,8 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
                     n_sets += last;
                     continue;
                 }
-                if (r->border > 0) {
-                    splat(r, t, patch, &s);
+                if (r->patch.border > 0) {
+                    imp__patch_splat(&r->patch, t, patch, &s);
                     continue;
                 }
                 for (int c = 0; c < n; c++) {
@@ -229,8 +144,9 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
                     own[2 * c + 1] += s.value[c] * s.value[c];
                 }
             }
-            if (r->border > 0)
-                stratum_add(r, t, patch, s.x, s.y, r->set > 1 ? n_sets : s1 - s0, tile);
+            if (r->patch.border > 0)
+                imp__patch_add(&r->patch, t, patch, s.x, s.y,
+                               r->set > 1 ? n_sets : s1 - s0, tile);
             n_sets = 0;
             const enum imp_status st = imp__tile_check(w);
             if (st != IMP_OK) return st;
@@ -260,14 +176,15 @@ static enum imp_status render_plan(struct render *r, imp_context *ctx)
 {
     const struct imp_picture *p = r->picture;
     const struct imp_run *run = r->run;
-    r->film = &p->sensor->film;
-    r->n = p->n;
-    r->border = imp__film_border(r->film);
-    const int width = r->film->crop_w, height = r->film->crop_h;
-    r->side = IMP_TILE_SIDE;
-    while (r->border > 0 && r->side < SIDE_MAX &&
-           (double)width * height >= MANY_TILES * 4. * r->side * r->side)
-        r->side *= 2;
+    r->patch.film = &p->sensor->film;
+    r->patch.n = p->n;
+    r->patch.border = imp__film_border(r->patch.film);
+    const int width = r->patch.film->crop_w, height = r->patch.film->crop_h;
+    r->patch.tile_side = IMP_TILE_SIDE;
+    while (r->patch.border > 0 && r->patch.tile_side < SIDE_MAX &&
+           (double)width * height >=
+               MANY_TILES * 4. * r->patch.tile_side * r->patch.tile_side)
+        r->patch.tile_side *= 2;
     /* With a time limit and no count: until the time is up. */
     r->spp = run->spp > 0 ? run->spp : run->time_limit_s > 0 ? 1 << 24 : p->sensor->spp;
     r->set = imp_max(p->set, 1);
@@ -278,16 +195,17 @@ static enum imp_status render_plan(struct render *r, imp_context *ctx)
     if (r->set > 1 && r->sets == 0) r->pass_spp = r->pass_sets * r->set;
     r->passes = r->set > 1 && r->sets > 0 ? (r->sets - 1) / r->pass_sets + 1
                                           : (r->spp - 1) / r->pass_spp + 1;
-    r->tiles = (struct imp_tiles){.ctx = ctx,
-                                  .run = run,
-                                  .width = width,
-                                  .height = height,
-                                  .margin = r->film->sample_border ? r->border : 0,
-                                  .side = r->side,
-                                  .work = tile_work,
-                                  .add = tile_add,
-                                  .take = tile_take,
-                                  .payload = r};
+    r->tiles =
+        (struct imp_tiles){.ctx = ctx,
+                           .run = run,
+                           .width = width,
+                           .height = height,
+                           .margin = r->patch.film->sample_border ? r->patch.border : 0,
+                           .side = r->patch.tile_side,
+                           .work = tile_work,
+                           .add = tile_add,
+                           .take = tile_take,
+                           .payload = r};
     const enum imp_status st = imp__tiles_create(&r->tiles);
     r->sums =
         (struct imp_film_sums){.ctx = ctx,
@@ -295,9 +213,9 @@ static enum imp_status render_plan(struct render *r, imp_context *ctx)
                                .height = height,
                                .n = p->n,
                                .n_films = imp_max(p->n_films, 1),
-                               .border = r->border,
+                               .border = r->patch.border,
                                .margin = r->tiles.margin,
-                               .side = r->side,
+                               .side = r->patch.tile_side,
                                .set = r->sets > 0 ? (double)r->period / r->sets : r->set,
                                .across = r->tiles.across,
                                .down = r->tiles.down};
@@ -309,21 +227,22 @@ static enum imp_status buffers_create(struct render *r, imp_context *ctx)
 {
     char what[80];
     snprintf(what, sizeof what, "a picture of %d x %d with %d channels", r->sums.width,
-             r->sums.height, r->n);
+             r->sums.height, r->patch.n);
     enum imp_status st = imp__memory_check(ctx, imp__film_sums_bytes(&r->sums), what);
     if (st != IMP_OK) return st;
     r->values =
-        imp__alloc(ctx, (size_t)ctx->threads, apart((size_t)r->n) * sizeof(double));
-    r->patches =
-        imp__alloc(ctx, (size_t)ctx->threads, apart(patch_size(r)) * sizeof(double));
+        imp__alloc(ctx, (size_t)ctx->threads, apart((size_t)r->patch.n) * sizeof(double));
+    r->patches = imp__alloc(ctx, (size_t)ctx->threads,
+                            apart(imp__patch_size(&r->patch)) * sizeof(double));
     if (r->set > 1) {
-        r->set_values =
-            imp__alloc(ctx, (size_t)ctx->threads, apart((size_t)r->n) * sizeof(double));
-        r->set_patches =
-            imp__alloc(ctx, (size_t)ctx->threads, apart(patch_size(r)) * sizeof(double));
+        r->set_values = imp__alloc(ctx, (size_t)ctx->threads,
+                                   apart((size_t)r->patch.n) * sizeof(double));
+        r->set_patches = imp__alloc(ctx, (size_t)ctx->threads,
+                                    apart(imp__patch_size(&r->patch)) * sizeof(double));
     }
     if (!r->values || !r->patches || (r->set > 1 && (!r->set_values || !r->set_patches)))
-        return imp__error(ctx, IMP_E_NOMEM, "no memory for samples of %d channels", r->n);
+        return imp__error(ctx, IMP_E_NOMEM, "no memory for samples of %d channels",
+                          r->patch.n);
     return imp__film_sums_create(&r->sums);
 }
 
@@ -341,7 +260,7 @@ static int sweep_passes(const struct render *r, int done)
 /* Were errors of a wide filter taken within strata? */
 static bool in_strata(const struct render *r)
 {
-    return r->border > 0 && imp_min(r->spp, r->pass_spp) > r->set &&
+    return r->patch.border > 0 && imp_min(r->spp, r->pass_spp) > r->set &&
            (r->sets == 0 || r->sets > 1);
 }
 
