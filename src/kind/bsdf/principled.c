@@ -19,106 +19,10 @@
  *
  * Where derivatives are taken, all lobes keep a part of the draws, since the derivative
  * with respect to a weight does not vanish with it. */
+#include "principled.h"
 #include "burley.h"
 #include "fresnel.h"
 #include "lambert.h"
-
-enum {
-    BASE,
-    LUM,
-    ROUGHNESS,
-    ANISOTROPIC,
-    METALLIC,
-    TRANS,
-    ETA,
-    SPECULAR,
-    SPEC_TINT,
-    SHEEN,
-    SHEEN_TINT,
-    FLATNESS,
-    CLEARCOAT,
-    GLOSS,
-    N_INPUTS
-};
-
-#define OPTIONAL(key) IMP_BURLEY_NUMBER(key, IMP_INPUT_OPTIONAL, 0)
-static const struct imp_input_desc inputs[] = {
-    IMP_BURLEY_COLOR("base_color"),
-    {.name = "base_color", .flags = IMP_INPUT_LUMINANCE, .fallback = 0.5, .hi = 1},
-    IMP_BURLEY_NUMBER("roughness", 0, 0.5),
-    OPTIONAL("anisotropic"),
-    OPTIONAL("metallic"),
-    OPTIONAL("spec_trans"),
-    {.name = "eta",
-     .role = IMP_UNBOUNDED,
-     .flags = IMP_INPUT_SCALAR | IMP_INPUT_OPTIONAL | IMP_INPUT_NUMBER,
-     .fallback = 1.5,
-     .lo = 0.1,
-     .hi = 10,
-     .unit = "1"},
-    IMP_BURLEY_NUMBER("specular", IMP_INPUT_OPTIONAL | IMP_INPUT_NUMBER, 0.5),
-    OPTIONAL("spec_tint"),
-    OPTIONAL("sheen"),
-    OPTIONAL("sheen_tint"),
-    OPTIONAL("flatness"),
-    OPTIONAL("clearcoat"),
-    OPTIONAL("clearcoat_gloss"),
-    {0}};
-
-struct principled {
-    bool transmits, coated, by_eta;
-};
-
-/* The number that a property is written as; NaN: it is absent, or no number. */
-static double number(const struct imp_node *node, const char *name)
-{
-    const struct imp_prop *p = imp__node_prop(node, name);
-    if (p && p->type == IMP_PROP_FLOAT) return p->number[0];
-    return p && p->type == IMP_PROP_INTEGER ? (double)p->integer : NAN;
-}
-static void number_set(struct imp_node *node, const char *name, double value)
-{
-    struct imp_prop *p = imp__node_prop(node, name);
-    p->type = IMP_PROP_FLOAT;
-    p->number[0] = value;
-}
-
-static enum imp_status prepare(const struct imp_build *b)
-{
-    enum imp_status st = IMP_OK;
-    struct imp_node *node = b->node;
-    if (imp_build_has(b, "eta") && imp_build_has(b, "specular"))
-        IMP_TRY(imp_build_error(b, "specular", IMP_E_SCENE,
-                                "give either 'eta' or 'specular'"));
-    if (number(node, "spec_trans") == 0) imp__node_remove(node, "spec_trans");
-    if (!imp_build_has(b, "eta") && !imp_build_has(b, "specular"))
-        IMP_TRY(imp_build_set(b, "specular", 1, &(double){0.5}));
-    if (imp_build_has(b, "spec_trans")) { /* glass has an index */
-        if (number(node, "eta") == 1) number_set(node, "eta", 1.001);
-        if (number(node, "specular") == 0) number_set(node, "specular", 1e-3);
-    }
-out:
-    return st;
-}
-
-static enum imp_status build(const struct imp_build *b, void *self, struct imp_bsdf *bsdf)
-{
-    /* How Mitsuba shares out its draws: they change no mean. */
-    static const char *const rates[] = {"main_specular_sampling_rate",
-                                        "clearcoat_sampling_rate",
-                                        "diffuse_reflectance_sampling_rate"};
-    enum imp_status st = IMP_OK;
-    struct principled *p = self;
-    double rate;
-    for (size_t k = 0; k < imp_count(rates); k++)
-        IMP_TRY(imp_build_float(b, rates[k], 1, &rate));
-    p->transmits = imp_build_has(b, "spec_trans");
-    p->coated = imp_build_has(b, "clearcoat");
-    p->by_eta = imp_build_has(b, "eta");
-    bsdf->flags = IMP_BSDF_SMOOTH | (p->transmits ? IMP_BSDF_TRANSMIT : 0);
-out:
-    return st;
-}
 
 /* Textures may leave [0, 1]: there they are cut, and constant. */
 static bool is_number(int j) { return j >= ROUGHNESS && j != ETA; }
@@ -132,7 +36,7 @@ static void inputs_cut(const imp_spec *in, imp_spec x[N_INPUTS])
 
 /* Seen from behind, z is reversed and the index inverted: below wo is always above. */
 struct look {
-    const struct principled *p;
+    const struct imp__principled_self *p;
     imp_v3 wo, wi, m; /* m: half-vector, upwards */
     bool back, reflects;
     double e, de;     /* index behind over before; d e/d(eta or specular) */
@@ -143,7 +47,8 @@ struct look {
 
 /* 2/(1 - q) - 1 with q^2 = 0.08 specular, not below what glass must have. F begins with (eta - 1)^2, hence with specular:
  * far below any effect, the root keeps a slope. */
-static double eta_of(const struct principled *p, const imp_spec *in, double *slope)
+static double eta_of(const struct imp__principled_self *p, const imp_spec *in,
+                     double *slope)
 {
     *slope = 1;
     if (p->by_eta) return in[ETA][0];
@@ -157,7 +62,7 @@ static double eta_of(const struct principled *p, const imp_spec *in, double *slo
 static struct look look_at(const struct imp_bsdf *b, const imp_spec *in,
                            const struct imp_dirs *d)
 {
-    const struct principled *p = b->self;
+    const struct imp__principled_self *p = b->self;
     struct look l = {.p = p, .wo = d->wo, .wi = d->wi, .back = d->wo[2] < 0};
     l.e = eta_of(p, in, &l.de);
     if (l.back) {
@@ -426,10 +331,11 @@ static void albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *w
 
 const struct imp_bsdf_ops imp__principled = {.size = sizeof(struct imp_bsdf_ops),
                                              .name = "principled",
-                                             .object_size = sizeof(struct principled),
-                                             .inputs = inputs,
-                                             .prepare = prepare,
-                                             .build = build,
+                                             .object_size =
+                                                 sizeof(struct imp__principled_self),
+                                             .inputs = imp__principled_inputs,
+                                             .prepare = imp__principled_prepare,
+                                             .build = imp__principled_build,
                                              .sample = sample,
                                              .eval = eval,
                                              .pdf = pdf,
