@@ -82,7 +82,7 @@ static inline double imp__uv_turn(double x, double y)
     return turn < 1 ? turn : 0;
 }
 
-/* A mesh from arrays that live as long as the scene (mesh.c); b, s as in build. */
+/* A mesh from arrays that live as long as the scene (mesh_build.c); b, s as in build. */
 enum imp_status imp__mesh_build(const struct imp_build *b, void *self,
                                 struct imp_shape *s, const struct imp_mesh_data *data,
                                 bool face_normals);

@@ -1,0 +1,202 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Triangle meshes are made: arrays placed in the world, areas, and what a hit would
+ * otherwise compute again. */
+#include "mesh_triangle.h"
+#include "shape.h"
+
+/* Embree takes larger coordinates for invalid. */
+#define COORDINATE_MAX 1e18
+
+static enum imp_status positions_place(const struct imp_build *b, struct imp_shape *s,
+                                       const struct imp_mesh_data *data,
+                                       const struct imp_placement *at, float *out)
+{
+    s->lo = imp__v3(INFINITY, INFINITY, INFINITY);
+    s->hi = -s->lo;
+    for (size_t k = 0; k < data->n_vertices; k++) {
+        const float *q = data->positions + 3 * k;
+        const imp_v3 p = imp__point(&at->to_world, imp__v3(q[0], q[1], q[2]));
+        for (int i = 0; i < 3; i++) {
+            if (!(fabs(p[i]) < COORDINATE_MAX))
+                return imp_build_error(b, NULL, IMP_E_SCENE,
+                                       "vertex %zu is not finite, or further out than %g",
+                                       k, COORDINATE_MAX);
+            const float x = (float)p[i];
+            out[3 * k + i] = x;
+            s->lo[i] = fmin(s->lo[i], x);
+            s->hi[i] = fmax(s->hi[i], x);
+        }
+    }
+    s->lo[3] = s->hi[3] = 0;
+    return IMP_OK;
+}
+
+static enum imp_status normals_place(const struct imp_build *b, const struct imp_shape *s,
+                                     const struct imp_mesh_data *data,
+                                     const struct imp_placement *at, float *out)
+{
+    for (size_t k = 0; k < data->n_vertices; k++) {
+        const float *q = data->normals + 3 * k;
+        imp_v3 n = imp__normal(&at->to_local, imp__v3(q[0], q[1], q[2]));
+        const double length = imp__length(n);
+        if (!isfinite(length))
+            return imp_build_error(b, NULL, IMP_E_SCENE,
+                                   "the normal of vertex %zu is not finite", k);
+        if (length > 0) n = n * ((s->flip_normals ? -1 : 1) / length);
+        for (int i = 0; i < 3; i++) out[3 * k + i] = (float)n[i];
+    }
+    return IMP_OK;
+}
+
+static enum imp_status data_check(const struct imp_build *b,
+                                  const struct imp_mesh_data *data)
+{
+    if (data->n_triangles == 0 || data->n_vertices == 0)
+        return imp_build_error(b, NULL, IMP_E_SCENE, "it has no triangles");
+    if (data->n_triangles > INT32_MAX || data->n_vertices > INT32_MAX)
+        return imp_build_error(b, NULL, IMP_E_SCENE,
+                               "it has more than 2^31 triangles or vertices");
+    for (size_t k = 0; k < 3 * data->n_triangles; k++)
+        if (data->indices[k] >= data->n_vertices)
+            return imp_build_error(b, NULL, IMP_E_SCENE,
+                                   "triangle %zu names vertex %u; there are %zu", k / 3,
+                                   data->indices[k], data->n_vertices);
+    for (size_t k = 0; data->uvs && k < 2 * data->n_vertices; k++)
+        if (!isfinite(data->uvs[k]))
+            return imp_build_error(b, NULL, IMP_E_SCENE,
+                                   "the uv of vertex %zu is not finite", k / 2);
+    return IMP_OK;
+}
+
+static enum imp_status areas_sum(const struct imp_build *b, struct imp__mesh *m,
+                                 struct imp_shape *s, size_t n)
+{
+    m->cumulative = imp__arena_take(b->arena, n + 1, sizeof *m->cumulative);
+    double *normals = imp__arena_take(b->arena, 3 * n, sizeof *normals);
+    m->face_normals = normals;
+    if (!m->cumulative || !normals)
+        return imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory");
+    const imp_v3 centre = (s->lo + s->hi) * 0.5;
+    double sum = 0, volume = 0;
+    m->cumulative[0] = 0;
+    for (size_t k = 0; k < n; k++) {
+        const uint32_t *i = m->indices + 3 * k;
+        const imp_v3 p = imp__mesh_load(m->positions, i[0]);
+        const imp_v3 c = imp__cross(imp__mesh_load(m->positions, i[1]) - p,
+                                    imp__mesh_load(m->positions, i[2]) - p);
+        const double before = sum, length = imp__length(c);
+        const imp_v3 ng = length > 0 ? c * (1 / length) : imp__v3(0, 0, 1);
+        for (int j = 0; j < 3; j++) normals[3 * k + (size_t)j] = ng[j];
+        sum += length / 2;
+        volume += imp__dot(p - centre, c) / 6;
+        if (sum > before) m->last = k;
+        m->cumulative[k + 1] = sum;
+    }
+    if (!isfinite(sum))
+        return imp_build_error(b, NULL, IMP_E_SCENE, "its area is not finite");
+    s->area = sum;
+    s->triangles.volume = volume;
+    m->inv_area = sum > 0 ? 1 / sum : 0;
+    return IMP_OK;
+}
+
+/* Do all vertex normals say what the faces say? Then they are not worth looking up. */
+static bool is_flat(const struct imp__mesh *m, const float *normals, size_t n)
+{
+    for (size_t k = 0; k < 3 * n; k++) {
+        const double *ng = m->face_normals + k / 3 * 3;
+        const imp_v3 d =
+            imp__mesh_load(normals, m->indices[k]) - imp__v3(ng[0], ng[1], ng[2]);
+        if (!(imp__dot(d, d) < 1e-13)) return false;
+    }
+    return true;
+}
+
+/* Frames of a mesh whose normals are its faces': made once. */
+static enum imp_status tangents_make(const struct imp_build *b, struct imp__mesh *m,
+                                     size_t n)
+{
+    double *tangents = imp__arena_take(b->arena, 3 * n, sizeof *tangents);
+    if (!tangents) return imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory");
+    for (size_t k = 0; k < n; k++) {
+        const struct imp_hit hit = {.prim = (int)k};
+        const struct imp__mesh_corner c = imp__mesh_corner(m, k);
+        struct imp_surface at;
+        imp__mesh_point(m, &hit, &c, imp__mesh_face_normal(m, k), &at);
+        imp__mesh_slopes(m, m->indices + 3 * k, &c, &at);
+        imp__surface_frame(&at);
+        for (int j = 0; j < 3; j++) tangents[3 * k + (size_t)j] = at.s[j];
+    }
+    m->face_tangents = tangents;
+    return IMP_OK;
+}
+
+static enum imp_status facets_make(const struct imp_build *b, struct imp__mesh *m,
+                                   size_t n)
+{
+    struct imp__facet *facets = imp__arena_take(b->arena, n, sizeof *facets);
+    if (!facets) return imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory");
+    for (size_t k = 0; k < n; k++) {
+        const struct imp_hit hit = {.prim = (int)k};
+        const struct imp__mesh_corner c = imp__mesh_corner(m, k);
+        struct imp_surface at;
+        imp__mesh_from_arrays(m, &hit, &at);
+        facets[k] =
+            (struct imp__facet){c.p0, c.e1, c.e2, at.ng, at.dp_du, at.dp_dv, at.s, at.t};
+    }
+    m->facets = facets;
+    return IMP_OK;
+}
+
+enum imp_status imp__mesh_build(const struct imp_build *b, void *self,
+                                struct imp_shape *s, const struct imp_mesh_data *data,
+                                bool face_normals)
+{
+    enum imp_status st = IMP_OK;
+    struct imp__mesh *m = self;
+    struct imp_placement at;
+
+    IMP_TRY(imp__shape_placement(b, s, &at));
+    IMP_TRY(data_check(b, data));
+    const size_t n = data->n_vertices;
+    float *positions = imp_build_alloc(b, 3 * n + IMP_MESH_PADDING, sizeof *positions);
+    float *normals = face_normals
+                         ? NULL
+                         : imp_build_alloc(b, 3 * n + IMP_MESH_PADDING, sizeof *normals);
+    if (!positions || (!normals && !face_normals))
+        IMP_TRY(imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory"));
+    IMP_TRY(positions_place(b, s, data, &at, positions));
+    m->positions = positions;
+    m->uvs = data->uvs;
+    m->indices = data->indices;
+    m->reversed = at.mirrored != s->flip_normals;
+    if (m->reversed) {
+        uint32_t *indices =
+            imp__arena_take(b->arena, 3 * data->n_triangles, sizeof *indices);
+        if (!indices) IMP_TRY(imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory"));
+        for (size_t k = 0; k < data->n_triangles; k++) {
+            indices[3 * k] = data->indices[3 * k];
+            indices[3 * k + 1] = data->indices[3 * k + 2];
+            indices[3 * k + 2] = data->indices[3 * k + 1];
+        }
+        m->indices = indices;
+    }
+    if (normals && data->normals) IMP_TRY(normals_place(b, s, data, &at, normals));
+    else if (normals)
+        IMP_TRY(imp__mesh_normals(b->ctx, n, data->n_triangles, m->positions, m->indices,
+                                  normals));
+    IMP_TRY(areas_sum(b, m, s, data->n_triangles));
+    m->normals = normals && !is_flat(m, normals, data->n_triangles) ? normals : NULL;
+    if (!m->normals) IMP_TRY(tangents_make(b, m, data->n_triangles));
+    if (data->n_triangles <= IMP_FACETS_MAX)
+        IMP_TRY(facets_make(b, m, data->n_triangles));
+    s->geometry = IMP_TRIANGLES;
+    s->smooth = m->normals != NULL;
+    s->triangles.n_vertices = n;
+    s->triangles.n_triangles = data->n_triangles;
+    s->triangles.positions = m->positions;
+    s->triangles.indices = m->indices;
+out:
+    return st;
+}
