@@ -38,7 +38,7 @@ while IFS=: read -r file include; do
 done < <(grep -rE '^#include "([a-z_]+/|\.\./)' cli --include='*.[ch]')
 
 while IFS=: read -r file include; do
-    [[ $file == src/scene/intersect.c ]] || complain "$file: $include"
+    [[ $file == src/scene/intersector.h ]] || complain "$file: $include"
 done < <(grep -rE '^#include <embree' src cli include --include='*.[ch]')
 
 # Meson names an object after its path: src_ROOM_FILE.c.o, '/' written as '_'.

@@ -2,7 +2,7 @@
  *
  * The scene: what is there, and the numbers that describe it. Objects are made once from
  * a tree of nodes (scene_build.c), theta is a list of places where their numbers live
- * (theta.c), and rays are answered by intersect.c, the one file that includes Embree. */
+ * (theta.c), and rays are answered by intersect.c (intersector.h alone includes Embree). */
 #ifndef IMP_SCENE_H
 #define IMP_SCENE_H
 

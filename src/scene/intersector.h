@@ -1,0 +1,22 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Shared by intersect.c and intersect_build.c, the two files that see Embree. */
+#ifndef IMP_INTERSECTOR_H
+#define IMP_INTERSECTOR_H
+
+#include "scene.h"
+#include <embree3/rtcore.h>
+
+struct imp_intersector {
+    RTCScene rtc;
+    bool analytic; /* some shape answers through its ops */
+    int64_t bytes;
+};
+
+/* What Embree calls for analytic shapes. */
+void imp__analytic_intersect(const struct RTCIntersectFunctionNArguments *args);
+void imp__analytic_occluded(const struct RTCOccludedFunctionNArguments *args);
+/* The same where all hits of a ray are gathered. */
+void imp__gather_analytic(const struct RTCIntersectFunctionNArguments *args);
+
+#endif
