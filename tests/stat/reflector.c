@@ -201,19 +201,20 @@ static struct photon_mean box(const char *type, double h, const char *weights, i
                               int64_t n)
 {
     struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
-    char path[1024], integrator[64], splits[32];
-    const char *list[] = {"res=16", integrator, splits};
+    char path[1024], integrator[64];
+    const char *list[] = {"res=16", integrator};
     imp_scene *scene;
     snprintf(path, sizeof path, "%s/cornell.xml", IMP_SCENES);
     snprintf(integrator, sizeof integrator, "integrator=%s", type);
-    snprintf(splits, sizeof splits, "split=%d", split);
     o.mode = IMP_MONO;
     o.defines = list;
-    o.n_defines = 3;
+    o.n_defines = 2;
     o.weights = weights;
     test_must(ctx, imp_scene_load(ctx, path, &o, &scene));
+    struct imp_walk_integrator *settings = scene->integrator->self;
+    settings->h = h;
+    settings->split = split;
     struct photons p = photons_open(ctx, scene, 9);
-    ((struct imp_walk_integrator *)scene->integrator->self)->h = h;
     const int64_t pixels = (int64_t)p.width * p.height;
     /* The mean of the pixels' variances: what a picture's error is made of. */
     struct photon_mean sum = {{0}, 0, 0};
