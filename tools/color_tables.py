@@ -76,9 +76,10 @@ def terms(n):  # B_k and C_k in um^2; the first kind of formula has the roots of
     return B, C
 
 
-METALS = [('Ag', 'Johnson', 'Johnson and Christy 1972'), ('Al', 'Rakic', 'Rakic 1995'),
-          ('Au', 'Johnson', 'Johnson and Christy 1972'), ('Cu', 'Johnson', 'Johnson and Christy 1972'),
-          ('Cr', 'Johnson', 'Johnson and Christy 1974'), ('W', 'Rakic-BB', 'Rakic et al. 1998')]
+# Of the data base's tables for a metal, the one whose reflectance is nearest to the presets of the mode rgb.
+METALS = [('Ag', 'Rakic-BB', 'Rakic et al. 1998'), ('Al', 'Rakic', 'Rakic 1995'),
+          ('Au', 'McPeak', 'McPeak et al. 2015'), ('Cu', 'Hagemann', 'Hagemann et al. 1974'),
+          ('Cr', 'Rakic-BB', 'Rakic et al. 1998'), ('W', 'Rakic-BB', 'Rakic et al. 1998')]
 
 
 def floats(b):
