@@ -19,7 +19,8 @@ CASES = ["stage", "stage_mono", "shapes", "shapes_flip", "shapes_mirror", "meshe
          "lights_mono", "rough_ggx", "rough_beckmann", "alphas", "metals", "metals_mono", "glass",
          "twosided", "textures", "textures_nearest", "textures_mirror", "textures_raw",
          "emission_forms", "reflectance_forms", "sensor_0", "sensor_4", "sensor_9", "spots",
-         "spots_mono", "directional", "projector"]
+         "spots_mono", "directional", "projector", "stage_spectral", "rough_spectral", "glass_spectral",
+         "textures_spectral", "emission_forms_spectral", "reflectance_forms_spectral", "sky_spectral"]
 
 
 def quarters(stack):

@@ -59,7 +59,7 @@ def importon_render(program, case, spp, seed, out):
 
 def mitsuba_render(case, spp):
     """Batches of Mitsuba's picture: channel -> [batch][row][column]."""
-    mi.set_variant("llvm_ad_mono" if case.mode == "mono" else "llvm_ad_rgb")
+    mi.set_variant("llvm_ad_" + case.mode)
     define = dict(d.split("=", 1) for d in case.defines)
     start = time.time()
     scene = mi.load_file(case.scene, optimize=False, **define)
@@ -136,8 +136,8 @@ class Case:
         self.skip, self.wide = [], False
         self.scene = words[0] if os.path.isabs(words[0]) else os.path.join(root, words[0])
         for w in words[1:]:
-            if w == "mono":
-                self.mode = "mono"
+            if w in ("mono", "spectral"):
+                self.mode = w
             elif w == "wide":
                 self.wide = True
             elif w.startswith("sensor:"):
