@@ -20,6 +20,12 @@ const struct arg_option options_params[] = {
     {ARG_LIST, 'p', "param", "GLOB",
      "active parameters: a name or a pattern (default '*')", &problem_options.params, 0,
      0, NULL},
+    {ARG_LIST, 0, "same", "GLOB,..", "numbers of all these are equal: one paint",
+     &problem_options.same, 0, 0, NULL},
+    {ARG_LIST, 0, "factor", "GLOB,..", "all these keep their ratios: one factor",
+     &problem_options.factor, 0, 0, NULL},
+    {ARG_LIST, 0, "log", "GLOB,..", "these move as logarithms, and stay positive",
+     &problem_options.log, 0, 0, NULL},
     {0}};
 
 const struct arg_option options_targets[] = {
@@ -182,6 +188,22 @@ static int add_targets(imp_problem *problem)
     return 0;
 }
 
+static enum imp_status add_ties(imp_problem *problem)
+{
+    const struct problem_options *o = &problem_options;
+    const struct {
+        const struct arg_list *globs;
+        enum imp_tie kind;
+    } ties[] = {
+        {&o->same, IMP_TIE_SAME}, {&o->factor, IMP_TIE_FACTOR}, {&o->log, IMP_TIE_LOG}};
+    enum imp_status st = IMP_OK;
+    /* Equal numbers that are logarithms become logarithms together: first these. */
+    for (size_t k = 0; k < 3 && st == IMP_OK; k++)
+        for (size_t i = 0; i < ties[k].globs->n && st == IMP_OK; i++)
+            st = imp_problem_tie(problem, ties[k].globs->item[i], ties[k].kind);
+    return st;
+}
+
 int problem_open(imp_problem **out)
 {
     const struct problem_options *o = &problem_options;
@@ -192,6 +214,7 @@ int problem_open(imp_problem **out)
     for (size_t i = 0; i < o->params.n && st == IMP_OK; i++)
         st = imp_problem_activate(problem, o->params.item[i]);
     if (st == IMP_OK && o->params.n == 0) st = imp_problem_activate(problem, "*");
+    if (st == IMP_OK) st = add_ties(problem);
     if (st != IMP_OK) rc = cli_fail(st, cli.scene_path);
     if (!rc) rc = add_targets(problem);
     const struct imp_run run = cli_run();
@@ -210,6 +233,9 @@ void problem_close(imp_problem *problem)
     struct problem_options *o = &problem_options;
     imp_problem_destroy(problem);
     args_list_free(&o->params);
+    args_list_free(&o->same);
+    args_list_free(&o->factor);
+    args_list_free(&o->log);
     args_list_free(&o->targets);
     args_list_free(&o->masks);
     args_list_free(&o->tikhonov);
@@ -226,11 +252,20 @@ struct block *problem_blocks(const imp_problem *problem, size_t *n_blocks)
         struct block *b = &blocks[*n_blocks];
         size_t param;
         b->info.size = sizeof b->info;
+        b->tie.size = sizeof b->tie;
         if (imp_problem_variable(problem, i, &param, NULL, NULL, NULL) != IMP_OK ||
+            imp_problem_get_tie(problem, i, &b->tie) != IMP_OK ||
             imp_scene_get_param(cli.scene, param, &b->info) != IMP_OK || !b->info.count)
             break;
+        if (b->tie.factor) {
+            b->info.name = b->tie.name;
+            b->info.unit = "1";
+            b->info.count = 1;
+            b->info.n_dims = 0;
+            b->info.wavelengths_nm = NULL;
+        }
         b->first = i;
-        b->n = b->info.count; /* parameters are active as a whole */
+        b->n = b->tie.count; /* parameters are active as a whole */
         i += b->n;
         ++*n_blocks;
     }
@@ -250,6 +285,16 @@ void block_json(struct json *j, const struct block *b)
     json_text(j, "unit", b->info.unit);
     if (b->info.wavelengths_nm)
         json_numbers(j, "wavelengths_nm", b->info.count, b->info.wavelengths_nm);
+    block_ties_json(j, b);
+}
+
+void block_ties_json(struct json *j, const struct block *b)
+{
+    if (b->tie.log) json_bool(j, "log", 1);
+    if (!b->tie.factor && b->tie.n_members < 2) return;
+    json_array(j, b->tie.factor ? "multiplies" : "same");
+    for (size_t i = 0; i < b->tie.n_members; i++) json_text(j, NULL, b->tie.members[i]);
+    json_end_array(j);
 }
 
 static char *block_path(const struct block *b, const char *folder)

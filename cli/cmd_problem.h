@@ -8,7 +8,7 @@
 #include "command.h"
 
 struct problem_options {
-    struct arg_list params, targets, masks, tikhonov, stay, smooth;
+    struct arg_list params, same, factor, log, targets, masks, tikhonov, stay, smooth;
     int loss;
     double epsilon;
 };
@@ -20,16 +20,19 @@ extern const struct arg_option options_params[], options_targets[];
 int problem_open(imp_problem **out);
 void problem_close(imp_problem *problem);
 
-/* x in pieces: one for each active parameter. */
+/* x in pieces: one for each active parameter, or for several that are tied. */
 struct block {
-    struct imp_param_info info;
-    size_t first, n; /* x[first .. first + n) */
+    struct imp_param_info info; /* of the first; of a factor, what it is called */
+    size_t first, n;            /* x[first .. first + n) */
+    struct imp_tie_info tie;
 };
 struct block *problem_blocks(const imp_problem *problem, size_t *n_blocks);
 /* Too long for a line of numbers: goes to a picture, or is summed up. */
 int block_is_large(const struct block *b);
 /* {"name":..,"unit":..} and what the caller adds before json_end_object. */
 void block_json(struct json *j, const struct block *b);
+/* "log", "same", "multiplies", where they apply. */
+void block_ties_json(struct json *j, const struct block *b);
 /* May block_write write there? */
 int block_writable(const struct block *b, const char *folder);
 /* A texture's numbers as a picture in `folder`, named by the parameter: `x` in plain

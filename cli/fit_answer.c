@@ -56,6 +56,7 @@ static void put_variable(struct json *j, const imp_problem *problem, size_t i,
     json_number(j, "hi95", v->hi95);
     json_integer(j, "at_bound", v->at_bound);
     json_bool(j, "determined", v->determined);
+    block_ties_json(j, b);
     json_end_object(j);
 }
 
@@ -199,11 +200,36 @@ static int write_textures(const struct fit_answer *a, char **paths)
     int rc = 0;
     double *x = cli_alloc(imp_problem_n(a->problem), sizeof *x);
     imp_problem_get_x(a->problem, x);
+    for (size_t k = 0; k < a->n_blocks; k++) {
+        const struct block *b = &a->blocks[k];
+        for (size_t i = 0; b->tie.log && i < b->n; i++)
+            x[b->first + i] = exp(x[b->first + i]);
+    }
     for (size_t k = 0; k < a->n_blocks && !rc; k++)
         if (block_is_large(&a->blocks[k]))
             rc = block_write(&a->blocks[k], x, NULL, cli.out, &paths[k]);
     free(x);
     return rc;
+}
+
+/* As the scene has it: of numbers that are tied, each parameter's own. */
+static void write_member(FILE *file, const char *name)
+{
+    struct block b = {.info.size = sizeof b.info};
+    size_t index;
+    if (imp_scene_find_param(cli.scene, name, &index) != IMP_OK ||
+        imp_scene_get_param(cli.scene, index, &b.info) != IMP_OK)
+        return;
+    b.n = b.info.count;
+    if (block_is_large(&b)) return;
+    double *values = cli_alloc(b.n, sizeof *values);
+    if (imp_scene_get_values(cli.scene, index, values) == IMP_OK) {
+        fprintf(file, "%s=", name);
+        for (size_t i = 0; i < b.n; i++)
+            fprintf(file, "%s%.17g", i ? "," : "", values[i]);
+        fprintf(file, "\n");
+    }
+    free(values);
 }
 
 /* What was recovered as --set @FILE takes it, for the next fit, or a render. */
@@ -215,11 +241,8 @@ static int write_set(const struct fit_answer *a)
     for (size_t k = 0; !rc && k < a->n_blocks; k++) {
         const struct block *b = &a->blocks[k];
         if (block_is_large(b)) continue;
-        fprintf(to.file, "%s=", b->info.name);
-        for (size_t i = 0; i < b->n; i++)
-            fprintf(to.file, "%s%.17g", i ? "," : "",
-                    fit_variable(a->problem, b->first + i).value);
-        fprintf(to.file, "\n");
+        for (size_t m = 0; m < b->tie.n_members; m++)
+            write_member(to.file, b->tie.members[m]);
     }
     rc = output_close(&to, rc);
     free(path);

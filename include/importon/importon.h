@@ -676,10 +676,48 @@ IMP_API void imp_problem_destroy(imp_problem *problem);
  *         gradient. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_activate(imp_problem *problem,
                                                             const char *glob);
+enum imp_tie {
+    IMP_TIE_SAME =
+        0,          /**< equal numbers: one x for all of them, from the first's values */
+    IMP_TIE_FACTOR, /**< one x, from 1, multiplies all of them as they are now */
+    IMP_TIE_LOG     /**< v = exp(x), each number by itself: it stays positive */
+};
+
+/** Tie all active parameters that match: numbers that are the same paint, lamps of one
+ * dimmer. x, gradients, Jacobians, covariances and bounds are then of the tied numbers, with
+ * their standard errors; regularisers weigh x. A parameter has at most one tie of equality
+ * or factor, and one logarithm; checks look at every number by itself. A fit's rows have
+ * numbers in the parameter's own unit also where x is a logarithm, a factor's are factors.
+ * @param glob  as for imp_problem_activate, which comes first; or several, with commas
+ *              between them: "left.*,right.*".
+ * @return IMP_OK; IMP_E_ARG if nothing is tied by it, sizes or bounds do not agree, a
+ *         factor multiplies zeros only, a number is not positive, or has such a tie
+ *         already; IMP_E_UNSUPPORTED for factors and logarithms in fields of indices. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_problem_tie(imp_problem *problem, const char *glob, enum imp_tie kind);
+
+struct imp_tie_info {
+    size_t size;
+    const char *name; /**< the parameter's, or factor(GLOB) */
+    int factor;       /**< x multiplies what the members had when they were tied */
+    int log;          /**< x is a logarithm */
+    size_t count;     /**< numbers of x that belong together */
+    size_t n_members; /**< parameters that follow them */
+    const char *const *members; /**< [n_members] their names; owned by the problem */
+};
+#define IMP_TIE_INFO_INIT                                                                \
+    {                                                                                    \
+        sizeof(struct imp_tie_info), 0, 0, 0, 0, 0, 0                                    \
+    }
+
+/** What number i < imp_problem_n of x stands for. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_problem_get_tie(const imp_problem *problem, size_t i, struct imp_tie_info *out);
+
 /** Length of x: how many numbers are active. */
 IMP_API size_t imp_problem_n(const imp_problem *problem);
-/** Of active number i: its parameter, its index inside it, its bounds. Outputs may be
- * NULL. */
+/** Of active number i: its parameter (the first that follows it, if several do), its
+ * index inside it, its bounds. Outputs may be NULL. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_problem_variable(const imp_problem *problem,
                                                             size_t i, size_t *param,
                                                             size_t *element, double *lo,

@@ -119,7 +119,7 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
         resume: bool = False, spp: int = 0, seed: int = 0, sensor: Any = 0, loss: str = "l2", epsilon: float = 0,
         weights: Any = None, noise_se: Any = None, tikhonov: Optional[Mapping[str, float]] = None,
         stay: Optional[Mapping[str, float]] = None, smooth: Optional[Mapping[str, float]] = None,
-        time_limit: float = 0, drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified",
+        same: Any = None, factor: Any = None, log: Any = None, time_limit: float = 0, drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified",
         wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene", progress: Any = None) -> Fit:
     """Fit parameters to target pictures; the scene ends at the best estimate.
 
@@ -149,6 +149,12 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
     noise_se : array, optional
         [height][width][channels]: one standard error of the target's noise; default: that
         of the target, else estimated from what is left over.
+    same : pattern, or list of them, optional
+        Parameters that are equal numbers, from the first's: "left.*,right.*".
+    factor : pattern, or list of them, optional
+        Parameters that keep their ratios: one factor multiplies them, `fit["factor(lamp.*)"]`.
+    log : pattern, or list of them, optional
+        Parameters that move as logarithms, and stay positive. Values are in their own unit.
     time_limit : float
         In seconds; 0: none.
     progress : bool or callable, optional
@@ -177,7 +183,7 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
     >>> bool(np.all(abs(fit["red.reflectance"].value - truth) < 5 * fit["red.reflectance"].se))
     True
     """
-    with Problem(scene, params) as p:
+    with Problem(scene, params, same, factor, log) as p:
         options = run_options(p.scene, seed=seed, spp=spp, time_limit=time_limit, drop_budget=drop_budget, guide=guide,
                               wavelengths=wavelengths, wavelength_set=wavelength_set, points=points, walks_from=walks_from)
         p.add_targets(target, sensor=sensor, weights=weights, loss=loss, epsilon=epsilon, noise_se=noise_se)
@@ -194,7 +200,7 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
             result = _c.imp_fit_result.from_address(out.value)
             names = [info.name + ("[%d]" % k if info.size > 1 else "") for info, _ in p.blocks
                      for k in range(info.size)] if p.n <= 1024 else []
-            answer = Fit(p.scene, variables(result, p.blocks, start, p.x()), result, names)
+            answer = Fit(p.scene, variables(result, p.blocks, p.natural(start), p.natural(p.x())), result, names)
         if status == _c.IMP_CANCELLED and answer and answer.reason == "time limit reached":
             return answer
         if status:

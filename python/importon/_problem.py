@@ -56,9 +56,13 @@ def push(scene: Scene, params: Any) -> None:
 class Problem:
     """A scene with active parameters, for the time of a `with` block: holds the scene's lock."""
 
-    def __init__(self, scene: Any, params: Any) -> None:
+    def __init__(self, scene: Any, params: Any, same: Any = None, factor: Any = None, log: Any = None) -> None:
         self.scene, self.params = check_scene(scene), params
+        self.ties = [(glob, kind, name) for name, kind, globs in (
+            ("same", _c.IMP_TIE_SAME, same), ("factor", _c.IMP_TIE_FACTOR, factor), ("log", _c.IMP_TIE_LOG, log))
+            for glob in ([] if globs is None else [globs] if isinstance(globs, str) else globs)]
         self.blocks: list[tuple[ParameterInfo, slice]] = []
+        self.logs: list[bool] = []
         self.handle: Optional[Handle] = None
 
     def __enter__(self) -> Problem:
@@ -74,13 +78,22 @@ class Problem:
             self.handle = Handle(out.value or 0, lib.imp_problem_destroy)
             for name in names_of(self.params):
                 self.check(lib.imp_problem_activate(self.pointer, text(name, "params")))
+            for glob, kind, name in self.ties:
+                self.check(lib.imp_problem_tie(self.pointer, text(glob, name), kind))
             self.n = lib.imp_problem_n(self.pointer)
             infos = list(table(scene).values())
             i, index = 0, ctypes.c_size_t()
             while i < self.n:
                 self.check(lib.imp_problem_variable(self.pointer, i, ctypes.byref(index), None, None, None))
-                info = infos[index.value]
+                info, log = infos[index.value], False
+                if self.ties:
+                    tie = make(_c.imp_tie_info)
+                    self.check(lib.imp_problem_get_tie(self.pointer, i, ctypes.byref(tie)))
+                    log = bool(tie.log)
+                    if tie.factor:
+                        info = info._replace(name=tie.name.decode(), unit="1", shape=(), size=1)
                 self.blocks.append((info, slice(i, i + info.size)))
+                self.logs.append(log)
                 i += info.size
             return self
         except BaseException:
@@ -133,6 +146,14 @@ class Problem:
         x = np.zeros(self.n)
         if self.n:
             lib.imp_problem_get_x(self.pointer, address(x))
+        return x
+
+    def natural(self, x: Any) -> Any:
+        """Numbers of x in the units of their parameters."""
+        x = np.array(x)
+        for (_, at), log in zip(self.blocks, self.logs):
+            if log:
+                x[at] = np.exp(x[at])
         return x
 
     def spp(self, target: int, options: Any) -> int:

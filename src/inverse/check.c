@@ -66,14 +66,11 @@ static int inner_progress(const struct imp_progress *p, void *payload)
     return report(c, (c->done + p->fraction) / fmax(c->total, 1));
 }
 
-enum imp_status imp_check(imp_problem *p, const struct imp_check_options *options,
-                          const struct imp_run *run, const struct imp_check_row **rows,
-                          size_t *n_rows)
+static enum imp_status check(imp_problem *p, const struct imp_check_options *options,
+                             const struct imp_run *run, const struct imp_check_row **rows,
+                             size_t *n_rows)
 {
     enum imp_status st = IMP_OK, ended = IMP_OK;
-    IMP_REQUIRE(NULL, p, "problem");
-    IMP_REQUIRE(p->ctx, rows, "rows");
-    IMP_REQUIRE(p->ctx, n_rows, "n_rows");
     IMP_CHECKED(imp__problem_no_parts(p, "check"));
     IMP_FLOAT_MODE;
     IMP_SETS(p->scene, st);
@@ -84,8 +81,9 @@ enum imp_status imp_check(imp_problem *p, const struct imp_check_options *option
                            .outer = IMP_RUN_INIT,
                            .start_s = imp__now()};
 
-    IMP_OPTIONS(p->ctx, c.options, options, "options");
-    IMP_RUN(p->ctx, c.outer, run);
+    IMP_CHECKED(imp__options_take(p->ctx, "imp_check", "options", options, &c.options,
+                                  sizeof c.options));
+    IMP_CHECKED(imp__run_take(p->ctx, "imp_check", run, &c.outer));
     if (p->n == 0 && !c.options.sampling)
         IMP_TRY(
             imp__error(p->ctx, IMP_E_ARG, "nothing to check: no parameter is active"));
@@ -119,4 +117,22 @@ enum imp_status imp_check(imp_problem *p, const struct imp_check_options *option
 out:
     imp__release(p->ctx, c.rows);
     return st;
+}
+
+/* Numbers are checked one by one, whatever ties they have. */
+enum imp_status imp_check(imp_problem *p, const struct imp_check_options *options,
+                          const struct imp_run *run, const struct imp_check_row **rows,
+                          size_t *n_rows)
+{
+    IMP_REQUIRE(NULL, p, "problem");
+    IMP_REQUIRE(p->ctx, rows, "rows");
+    IMP_REQUIRE(p->ctx, n_rows, "n_rows");
+    const size_t ties = p->n_ties;
+    if (ties == 0) return check(p, options, run, rows, n_rows);
+    p->n_ties = 0;
+    enum imp_status st = imp__problem_layout(p, p->chosen);
+    if (st == IMP_OK) st = check(p, options, run, rows, n_rows);
+    p->n_ties = ties;
+    const enum imp_status back = imp__problem_layout(p, p->chosen);
+    return st != IMP_OK ? st : back;
 }

@@ -48,12 +48,11 @@ static enum imp_status sort_out(struct imp__design *d)
 static enum imp_status bounds_take(struct imp__design *d)
 {
     const struct imp_scene *scene = d->p->scene;
-    for (size_t k = 0; k < scene->n_params; k++) {
-        const struct imp_param_info *info = &scene->params[k].info;
-        const int64_t base = d->p->active.base[k];
-        for (size_t i = 0; base >= 0 && i < info->count; i++) {
-            d->lo[(size_t)base + i] = info->lo;
-            d->hi[(size_t)base + i] = info->hi;
+    for (size_t k = 0; k < d->p->n_blocks; k++) {
+        const struct imp__block *b = &d->p->blocks[k];
+        for (size_t i = b->first; i < b->first + b->count; i++) {
+            d->lo[i] = b->lo;
+            d->hi[i] = b->hi;
         }
     }
     if (d->o.n_bounds > 0 && !d->o.bounds)
@@ -77,8 +76,8 @@ static enum imp_status bounds_take(struct imp__design *d)
                                   "bounds %g to %g of %s are outside its own, %g to %g",
                                   want->lo, want->hi, info->name, info->lo, info->hi);
             for (size_t i = (size_t)base; i < (size_t)base + info->count; i++) {
-                d->lo[i] = fmax(info->lo, want->lo);
-                d->hi[i] = fmin(info->hi, want->hi);
+                d->lo[i] = fmax(d->lo[i], want->lo);
+                d->hi[i] = fmin(d->hi[i], want->hi);
             }
         }
         if (!met)
@@ -153,6 +152,7 @@ static enum imp_status begin(struct imp__design *d)
         d->o.optimizer = n <= IMP_DENSE_MAX ? IMP_LM : IMP_LBFGS;
     if (n == 0)
         return imp__error(ctx, IMP_E_ARG, "nothing to fit: no parameter is active");
+    IMP_CHECKED(imp__ties_equal_only(d->p, "imp_elements_fit"));
     if (!d->o.targets)
         return imp__error(ctx, IMP_E_ARG, "nothing to fit to: targets is NULL");
     if (d->o.max_iterations < 0 || d->o.rounds < 0 || !(d->o.tolerance > 0) ||

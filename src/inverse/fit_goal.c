@@ -165,6 +165,7 @@ static void fingerprint(struct imp__fit *f)
     for (int m = 0; m < p->scene->n_bodies; m++)
         if (!medium_active(p->scene->bodies[m], p->active.base))
             h->scene = imp__graded_hash(h->scene, p->scene->bodies[m]);
+    if (p->n_ties > 0) h->parameters = imp__ties_hash(p, h->parameters);
     h->targets = imp__problem_targets_hash(p);
     const struct imp_sensor *sensor = p->scene->sensors[p->targets[0].desc.sensor];
     const double number[4] = {f->options.optimizer, f->options.learning_rate,
@@ -185,27 +186,27 @@ void imp__fit_scales(struct imp__fit *f, const struct imp__search *search)
 {
     const struct imp_problem *p = f->problem;
     size_t span = 0;
-    for (size_t k = 0; k < p->scene->n_params; k++) {
-        const struct imp_param_info *info = &p->scene->params[k].info;
-        const int64_t base = p->active.base[k];
+    for (size_t k = 0; k < p->n_blocks; k++) {
+        const struct imp__block *b = &p->blocks[k];
         double square = 0;
-        if (base < 0) continue;
-        for (size_t e = 0; e < info->count; e++)
-            square += imp__sqr(imp__search_start(search, (size_t)base + e));
-        const double typical = square > 0 ? sqrt(square / (double)info->count) : 1;
+        for (size_t e = 0; e < b->count; e++)
+            square += imp__sqr(imp__search_start(search, b->first + e));
+        /* a logarithm's is a factor of e */
+        const double typical =
+            square > 0 && !b->log ? sqrt(square / (double)b->count) : 1;
+        const double range = b->hi - b->lo;
         const bool bounded =
-            isfinite(info->lo) && isfinite(info->hi) && info->hi - info->lo < DBL_MAX;
-        const double range = info->hi - info->lo;
+            !b->log && isfinite(b->lo) && isfinite(b->hi) && range < DBL_MAX;
         if (f->spans) {
             const double scale = bounded ? range : typical;
-            f->spans[span].by_start = !bounded;
+            f->spans[span].by_start = !bounded && !b->log;
             f->spans[span++].scale = scale > 0 ? scale : 1;
             continue;
         }
-        for (size_t e = 0; e < info->count; e++) {
-            const double start = fabs(imp__search_start(search, (size_t)base + e));
-            const double scale = bounded ? range : fmax(start, typical);
-            f->scale[(size_t)base + e] = scale > 0 ? scale : 1;
+        for (size_t e = 0; e < b->count; e++) {
+            const double start = fabs(imp__search_start(search, b->first + e));
+            const double scale = bounded ? range : b->log ? 1 : fmax(start, typical);
+            f->scale[b->first + e] = scale > 0 ? scale : 1;
         }
     }
 }
@@ -225,16 +226,14 @@ static enum imp_status bounds_make(struct imp__fit *f)
         f->scale = f->lo + 2 * n;
         f->g_se = f->lo + 3 * n;
     }
-    for (size_t k = 0; k < p->scene->n_params; k++) {
-        const struct imp_param_info *info = &p->scene->params[k].info;
-        const int64_t base = p->active.base[k];
-        if (base < 0) continue;
+    for (size_t k = 0; k < p->n_blocks; k++) {
+        const struct imp__block *b = &p->blocks[k];
         if (many)
-            f->spans[f->n_spans++] = (struct imp__span){(size_t)base + info->count,
-                                                        info->lo, info->hi, 1, false};
-        for (size_t e = 0; !many && e < info->count; e++) {
-            f->lo[(size_t)base + e] = info->lo;
-            f->hi[(size_t)base + e] = info->hi;
+            f->spans[f->n_spans++] =
+                (struct imp__span){b->first + b->count, b->lo, b->hi, 1, false};
+        for (size_t e = 0; !many && e < b->count; e++) {
+            f->lo[b->first + e] = b->lo;
+            f->hi[b->first + e] = b->hi;
         }
     }
     return IMP_OK;

@@ -28,10 +28,8 @@ IMP_PRINTF(2, 3) static void put(struct text *t, const char *format, ...)
 
 static void put_name(struct text *t, const struct imp__fit *f, size_t i)
 {
-    size_t k = 0, e = 0;
-    if (imp_problem_variable(f->problem, i, &k, &e, NULL, NULL) != IMP_OK) return;
-    const struct imp_param_info *info = &f->problem->scene->params[k].info;
-    put(t, info->count > 1 ? "%s[%zu]" : "%s", info->name, e);
+    const struct imp__block *b = imp__problem_block(f->problem, i);
+    put(t, b->count > 1 ? "%s[%zu]" : "%s", imp__block_name(f->problem, b), i - b->first);
 }
 
 static void put_loose(struct text *t, const struct imp__fit *f,

@@ -13,16 +13,16 @@
 
 /* ---- Where it began ------------------------------------------------------------ */
 
-/* Is parameter k active, and kept in doubles? */
-static bool is_double(const struct imp_problem *p, size_t k)
+/* Are the block's numbers kept in doubles? */
+static bool is_double(const struct imp_problem *p, const struct imp__block *b)
 {
-    return p->active.base[k] >= 0 && p->scene->params[k].store != IMP_STORE_BULK;
+    return p->scene->params[b->param].store != IMP_STORE_BULK;
 }
 static size_t many_doubles(const struct imp_problem *p)
 {
     size_t n = 0;
-    for (size_t k = 0; k < p->scene->n_params; k++)
-        n += is_double(p, k) ? p->scene->params[k].info.count : 0;
+    for (size_t k = 0; k < p->n_blocks; k++)
+        n += is_double(p, &p->blocks[k]) ? p->blocks[k].count : 0;
     return n;
 }
 
@@ -37,10 +37,10 @@ enum imp_status imp__fit_start_keep(const struct imp_problem *p, bool many, doub
         imp_problem_get_x(p, start);
         return IMP_OK;
     }
-    for (size_t k = 0; k < p->scene->n_params; k++) {
-        const struct imp_param *q = &p->scene->params[k];
-        for (size_t e = 0; is_double(p, k) && e < q->info.count; e++)
-            start[used++] = imp__param_get(q, e);
+    for (size_t k = 0; k < p->n_blocks; k++) {
+        const struct imp__block *b = &p->blocks[k];
+        for (size_t e = 0; is_double(p, b) && e < b->count; e++)
+            start[used++] = imp__block_get(p, b, e);
     }
     return IMP_OK;
 }
@@ -54,9 +54,11 @@ void imp__fit_start_restore(struct imp_problem *p, bool many, const double *star
         return;
     }
     for (size_t k = 0; k < p->n; k++) s->x[k] = imp__search_start(s, k);
-    for (size_t k = 0; k < p->scene->n_params; k++)
-        for (size_t e = 0; is_double(p, k) && e < p->scene->params[k].info.count; e++)
-            s->x[(size_t)p->active.base[k] + e] = start[used++];
+    for (size_t k = 0; k < p->n_blocks; k++) {
+        const struct imp__block *b = &p->blocks[k];
+        for (size_t e = 0; is_double(p, b) && e < b->count; e++)
+            s->x[b->first + e] = start[used++];
+    }
     (void)!imp_problem_set_x(p, s->x);
 }
 
@@ -75,14 +77,14 @@ static enum imp_status blocks_make(struct imp__fit *f, const double *start)
     if (!a->blocks || (many && !kept))
         return imp__error(p->ctx, IMP_E_NOMEM, "no memory for the result of a fit");
     for (size_t b = 0; b < p->n_blocks; b++) {
-        const size_t k = p->blocks[b];
-        const struct imp_param_info *info = &p->scene->params[k].info;
-        const bool doubles = many && is_double(p, k);
-        a->blocks[b] = (struct imp__fit_block){.first = (size_t)p->active.base[k],
-                                               .lo = info->lo,
-                                               .hi = info->hi,
+        const struct imp__block *own = &p->blocks[b];
+        const bool doubles = many && is_double(p, own);
+        a->blocks[b] = (struct imp__fit_block){.first = own->first,
+                                               .lo = own->lo,
+                                               .hi = own->hi,
+                                               .log = own->log,
                                                .start = doubles ? kept : NULL};
-        for (size_t e = 0; doubles && e < info->count; e++) *kept++ = *start++;
+        for (size_t e = 0; doubles && e < own->count; e++) *kept++ = *start++;
     }
     a->n_blocks = p->n_blocks;
     return IMP_OK;
@@ -98,16 +100,17 @@ static struct imp_fit_variable variable_of(const struct imp__fit_answer *a, size
         else end = middle;
     }
     const struct imp__fit_block *b = &a->blocks[at];
-    const double value = a->search->x[i];
-    return (struct imp_fit_variable){.start = b->start ? b->start[i - b->first]
-                                                       : imp__search_start(a->search, i),
-                                     .value = value,
+    const double x = a->search->x[i];
+    const double start =
+        b->start ? b->start[i - b->first] : imp__search_start(a->search, i);
+    return (struct imp_fit_variable){.start = b->log ? exp(start) : start,
+                                     .value = b->log ? exp(x) : x,
                                      .se = NAN,
                                      .lo95 = NAN,
                                      .hi95 = NAN,
-                                     .at_bound = value <= b->lo   ? -1
-                                                 : value >= b->hi ? 1
-                                                                  : 0,
+                                     .at_bound = x <= b->lo   ? -1
+                                                 : x >= b->hi ? 1
+                                                              : 0,
                                      .determined = 1}; /* until a covariance shows the
                                                           contrary */
 }
@@ -161,7 +164,7 @@ out:
 static enum imp_status covariance_give(struct imp__fit *f,
                                        const struct imp__uncertainty *u,
                                        const struct imp_fit_variable *rows,
-                                       const double **out)
+                                       const double *x, const double **out)
 {
     const size_t n = u->n;
     if (!n) return IMP_OK;
@@ -178,6 +181,7 @@ static enum imp_status covariance_give(struct imp__fit *f,
     for (size_t k = 0; k < n; k++) {
         const double variance = sum[k * n + k];
         by[k] = variance > 0 && isfinite(rows[k].se) ? rows[k].se / sqrt(variance) : 1;
+        if (imp__problem_block(f->problem, k)->log) by[k] *= exp(x[k]);
     }
     for (size_t i = 0; i < n; i++)
         for (size_t j = 0; j < n; j++) sum[i * n + j] *= by[i] * by[j];
@@ -217,7 +221,7 @@ enum imp_status imp__fit_answer(struct imp__fit *f, struct imp__search *s,
         return imp__error(f->problem->ctx, IMP_E_NOMEM,
                           "no memory for the result of a fit");
     const double *covariance = NULL;
-    IMP_CHECKED(covariance_give(f, u, rows, &covariance));
+    IMP_CHECKED(covariance_give(f, u, rows, s->x, &covariance));
     *answer = (struct imp__fit_answer){.search = s};
     const enum imp_status st = blocks_make(f, start);
     if (st != IMP_OK) {
@@ -228,9 +232,10 @@ enum imp_status imp__fit_answer(struct imp__fit *f, struct imp__search *s,
         const struct imp_fit_variable known = rows[k];
         rows[k] = variable_of(answer, k);
         if (!u->n) continue;
-        rows[k].se = known.se;
-        rows[k].lo95 = known.lo95;
-        rows[k].hi95 = known.hi95;
+        const bool log = imp__problem_block(f->problem, k)->log;
+        rows[k].se = known.se * (log ? rows[k].value : 1);
+        rows[k].lo95 = log ? exp(known.lo95) : known.lo95;
+        rows[k].hi95 = log ? exp(known.hi95) : known.hi95;
         rows[k].determined = known.determined;
         determined -= !known.determined;
     }

@@ -17,12 +17,29 @@ struct imp_lanes {
     double *x;    /* [active->n][channels] */
 };
 
+static inline void imp__lanes_add_tied(struct imp_lanes *s, int param, size_t element,
+                                       int channels, const imp_spec *bar)
+{
+    const int numbers = channels == 3 && !s->walk->waves ? 3 : 1;
+    const imp_spec seen =
+        s->walk->waves ? imp__waves_channels(s->walk->waves, *bar) : *bar;
+    for (int c = 0; c < s->channels; c++) {
+        const size_t e = element + (numbers == 3 ? (size_t)c : 0);
+        s->x[imp__active_at(s->active, param, e) * (size_t)s->channels + (size_t)c] +=
+            seen[c] * imp__active_slope(s->active, param, e);
+    }
+}
+
 static inline void imp__lanes_add(struct imp_sink *sink, int param, size_t element,
                                   int channels, const imp_spec *bar)
 {
     struct imp_lanes *s = (struct imp_lanes *)sink;
     const int64_t base = s->active->base[param];
     if (base < 0) return;
+    if (imp_unlikely(s->active->tied != NULL)) {
+        imp__lanes_add_tied(s, param, element, channels, bar);
+        return;
+    }
     double *x = s->x + ((size_t)base + element) * (size_t)s->channels;
     if (imp_unlikely(s->walk->waves != NULL)) {
         const imp_spec seen = imp__waves_channels(s->walk->waves, *bar);

@@ -48,6 +48,7 @@ void imp_problem_destroy(imp_problem *p)
     imp__release(p->ctx, p->regularisers);
     imp__active_destroy(p->ctx, &p->active);
     imp__release(p->ctx, p->blocks);
+    imp__ties_free(p);
     imp__fit_answer_free(p);
     imp__arena_free(&p->check_arena);
     imp__release(ctx, p->chosen);
@@ -87,13 +88,10 @@ enum imp_status imp_problem_activate(imp_problem *p, const char *glob)
     IMP_REQUIRE(NULL, p, "problem");
     IMP_REQUIRE(p->ctx, glob, "glob");
     const struct imp_scene *s = p->scene;
-    struct imp_active active = {0};
     uint8_t *chosen = imp__alloc(p->ctx, imp_max(s->n_params, (size_t)1), 1);
-    size_t *blocks = imp__alloc(p->ctx, imp_max(s->n_params, (size_t)1), sizeof *blocks);
-    size_t n_blocks = 0;
 
     if (!*glob) IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "no parameter is named"));
-    if (!chosen || !blocks)
+    if (!chosen)
         IMP_TRY(imp__error(p->ctx, IMP_E_NOMEM, "no memory for active parameters"));
     memcpy(chosen, p->chosen, s->n_params);
     if (!imp__has_wildcards(glob)) {
@@ -116,19 +114,8 @@ enum imp_status imp_problem_activate(imp_problem *p, const char *glob)
             IMP_TRY(activate_named(p, s->params[last].info.name, chosen));
         }
     }
-    IMP_TRY(imp__active_create(s, chosen, &active));
-    imp__active_destroy(p->ctx, &p->active);
-    p->active = active;
-    p->n = active.n;
-    memcpy(p->chosen, chosen, s->n_params);
-    for (size_t k = 0; k < s->n_params; k++)
-        if (chosen[k]) blocks[n_blocks++] = k;
-    imp__release(p->ctx, p->blocks);
-    p->blocks = blocks;
-    p->n_blocks = n_blocks;
-    blocks = NULL;
+    IMP_TRY(imp__problem_layout(p, chosen));
 out:
-    imp__release(p->ctx, blocks);
     imp__release(p->ctx, chosen);
     return st;
 }
@@ -142,20 +129,11 @@ enum imp_status imp_problem_variable(const imp_problem *p, size_t i, size_t *par
     if (i >= p->n)
         return imp__error(p->ctx, IMP_E_ARG,
                           "there is no active number %zu (there are %zu)", i, p->n);
-    /* The last block that begins at i or before. Blocks of no numbers share their place
-     * with the next, and come before it. */
-    size_t at = 0, end = p->n_blocks;
-    while (end - at > 1) {
-        const size_t middle = at + (end - at) / 2;
-        if ((size_t)p->active.base[p->blocks[middle]] <= i) at = middle;
-        else end = middle;
-    }
-    const size_t k = p->blocks[at];
-    const struct imp_param_info *info = &p->scene->params[k].info;
-    if (param) *param = k;
-    if (element) *element = i - (size_t)p->active.base[k];
-    if (lo) *lo = info->lo;
-    if (hi) *hi = info->hi;
+    const struct imp__block *b = imp__problem_block(p, i);
+    if (param) *param = b->param;
+    if (element) *element = i - b->first;
+    if (lo) *lo = b->lo;
+    if (hi) *hi = b->hi;
     return IMP_OK;
 }
 
@@ -164,12 +142,9 @@ void imp_problem_get_x(const imp_problem *p, double *x)
     IMP_REQUIRE_OR(NULL, p, "problem", );
     IMP_REQUIRE_OR(p->ctx, x, "x", );
     IMP_READS(p->scene);
-    for (size_t k = 0; k < p->scene->n_params; k++) {
-        const int64_t base = p->active.base[k];
-        if (base < 0) continue;
-        const struct imp_param *param = &p->scene->params[k];
-        for (size_t e = 0; e < param->info.count; e++)
-            x[(size_t)base + e] = imp__param_get(param, e);
+    for (size_t k = 0; k < p->n_blocks; k++) {
+        const struct imp__block *b = &p->blocks[k];
+        for (size_t e = 0; e < b->count; e++) x[b->first + e] = imp__block_get(p, b, e);
     }
 }
 
@@ -181,22 +156,17 @@ enum imp_status imp_problem_set_x(imp_problem *p, const double *x)
     IMP_SETS(p->scene, st);
     if (st != IMP_OK) return st;
     /* All or nothing: look at everything before the first is set. */
-    for (size_t k = 0; k < p->scene->n_params; k++) {
-        const struct imp_param_info *info = &p->scene->params[k].info;
-        const int64_t base = p->active.base[k];
-        for (size_t e = 0; base >= 0 && e < info->count; e++) {
-            const double v = x[(size_t)base + e];
-            if (!isfinite(v) || v < info->lo || v > info->hi)
+    for (size_t k = 0; k < p->n_blocks; k++) {
+        const struct imp__block *b = &p->blocks[k];
+        for (size_t e = 0; e < b->count; e++) {
+            const double v = x[b->first + e];
+            if (!isfinite(v) || v < b->lo || v > b->hi)
                 return imp__error(p->ctx, IMP_E_ARG, "%s[%zu] = %g is outside [%g, %g]",
-                                  info->name, e, v, info->lo, info->hi);
+                                  imp__block_name(p, b), e, v, b->lo, b->hi);
         }
     }
-    for (size_t k = 0; k < p->scene->n_params; k++) {
-        const int64_t base = p->active.base[k];
-        struct imp_param *param = &p->scene->params[k];
-        for (size_t e = 0; base >= 0 && e < param->info.count; e++)
-            imp__param_set(param, e, x[(size_t)base + e]);
-    }
+    for (size_t k = 0; k < p->scene->n_params; k++)
+        if (p->active.base[k] >= 0) imp__tied_set(&p->active, &p->scene->params[k], k, x);
     imp__theta_announce(p->scene);
     return IMP_OK;
 }

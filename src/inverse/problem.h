@@ -45,12 +45,32 @@ struct imp__regulariser {
     double *origin; /* [n_theta] x0, or NULL for 0 */
 };
 
+/* Parameters that follow common numbers (ties.c). */
+struct imp__param_tie {
+    enum imp_tie kind;
+    uint8_t *on; /* [n_params] its parameters, two or more but for logarithms */
+    char *name;  /* of a common factor */
+    size_t n_members;
+    const char **members; /* their names; of the scene */
+    double *origin;       /* of a factor: [n_theta] what it multiplies; else NULL */
+};
+
+/* Numbers of x that belong together: an active parameter, or one that speaks for others.
+ * v = x, exp(x) with log, and times what a common factor multiplies. */
+struct imp__block {
+    size_t param, first, count;
+    double lo, hi; /* of x */
+    bool log;
+    int tie; /* of the problem: SAME or FACTOR; -1: no others follow */
+};
+
 struct imp__search;
 
 /* The last fit, as imp_problem_fit_variable returns it (fit_result.c). */
 struct imp__fit_block { /* numbers of one parameter */
     size_t first;
-    double lo, hi;
+    double lo, hi; /* of x */
+    bool log;
     const double *start; /* of numbers kept in doubles; NULL: the search's */
 };
 struct imp__fit_answer {
@@ -68,7 +88,10 @@ struct imp_problem {
     uint8_t *chosen;          /* [n_params] */
     struct imp_active active; /* follows chosen */
     size_t n;                 /* active numbers */
-    size_t n_blocks, *blocks; /* active parameters, in the order of their numbers */
+    size_t n_blocks;
+    struct imp__block *blocks; /* in the order of their numbers */
+    size_t n_ties, cap_ties;
+    struct imp__param_tie *ties;
     size_t n_targets, cap_targets;
     struct imp__target *targets;
     size_t n_regularisers, cap_regularisers;
@@ -79,6 +102,34 @@ struct imp_problem {
     struct imp__fit_answer fit_answer;
     struct imp_arena check_arena; /* of the last check's rows */
 };
+
+/* ---- ties.c ---- */
+/* What is active if `chosen` [n_params] is, with the problem's ties: replaces active and
+ * blocks, or leaves all as it was. */
+enum imp_status imp__problem_layout(struct imp_problem *p, const uint8_t *chosen);
+/* Number i of x: its block. */
+const struct imp__block *imp__problem_block(const struct imp_problem *p, size_t i);
+static inline const struct imp__param_tie *imp__block_tie(const struct imp_problem *p,
+                                                          const struct imp__block *b)
+{
+    return b->tie < 0 ? NULL : &p->ties[b->tie];
+}
+static inline bool imp__block_factor(const struct imp_problem *p,
+                                     const struct imp__block *b)
+{
+    return b->tie >= 0 && p->ties[b->tie].kind == IMP_TIE_FACTOR;
+}
+/* The name of its parameter, or of its factor. */
+const char *imp__block_name(const struct imp_problem *p, const struct imp__block *b);
+/* Number e of a block, as x has it, from the scene. */
+double imp__block_get(const struct imp_problem *p, const struct imp__block *b, size_t e);
+/* Parameter k takes its numbers from x. */
+void imp__tied_set(const struct imp_active *active, struct imp_param *param, size_t k,
+                   const double *x);
+void imp__ties_free(struct imp_problem *p);
+uint64_t imp__ties_hash(const struct imp_problem *p, uint64_t hash);
+/* IMP_E_UNSUPPORTED where `what` knows equal numbers alone. */
+enum imp_status imp__ties_equal_only(const struct imp_problem *p, const char *what);
 
 /* Of pixels, weights, losses and regularisers. */
 uint64_t imp__problem_targets_hash(const struct imp_problem *p);

@@ -76,23 +76,33 @@ enum imp_status imp_problem_add_smoothness(imp_problem *p, const char *glob,
     return add(p, glob, weight, IMP_SMOOTHNESS, false);
 }
 
-/* Numbers of a parameter: x, or where that is NULL those that the scene has now. */
+/* Numbers of a block: x, or where that is NULL those that the scene has now. */
 struct numbers {
     const double *x;
-    const struct imp_param *param;
+    const struct imp_problem *problem;
+    const struct imp__block *block;
 };
 static double at(const struct numbers *v, size_t e)
 {
-    return v->x ? v->x[e] : imp__param_get(v->param, e);
+    return v->x ? v->x[e] : imp__block_get(v->problem, v->block, e);
+}
+
+/* x0 of a block, of the numbers [n_theta] at its start. */
+static double origin_of(const struct numbers *v, const double *origin, size_t e)
+{
+    const struct imp__block *b = v->block;
+    if (!origin) return 0;
+    if (imp__block_factor(v->problem, b)) return b->log ? 0 : 1;
+    const double v0 = origin[v->problem->scene->params[b->param].info.offset + e];
+    return b->log ? imp_clamp(log(v0), b->lo, b->hi) : v0;
 }
 
 /* 1/2 w sum (x - x0)^2 */
-static double tikhonov(double w, size_t n, const struct numbers *v, const double *x0,
-                       double *g)
+static double tikhonov(double w, const struct numbers *v, const double *origin, double *g)
 {
     double sum = 0;
-    for (size_t e = 0; e < n; e++) {
-        const double d = at(v, e) - (x0 ? x0[e] : 0);
+    for (size_t e = 0; e < v->block->count; e++) {
+        const double d = at(v, e) - origin_of(v, origin, e);
         sum += d * d;
         if (g) g[e] += w * d;
     }
@@ -127,16 +137,15 @@ double imp__regularise(const struct imp_problem *p, const double *x, double *gra
     double value = 0;
     for (size_t i = 0; i < p->n_regularisers; i++) {
         const struct imp__regulariser *r = &p->regularisers[i];
-        for (size_t k = 0; k < p->scene->n_params; k++) {
-            const int64_t base = p->active.base[k];
-            if (base < 0 || !r->on[k]) continue;
-            const struct imp_param_info *info = &p->scene->params[k].info;
-            const struct numbers v = {x ? x + base : NULL, &p->scene->params[k]};
-            double *g = gradient ? gradient + base : NULL;
-            if (r->kind == IMP_TIKHONOV)
-                value += tikhonov(r->weight, info->count, &v,
-                                  r->origin ? r->origin + info->offset : NULL, g);
-            else
+        for (size_t k = 0; k < p->n_blocks; k++) {
+            const struct imp__block *b = &p->blocks[k];
+            const bool factor = imp__block_factor(p, b);
+            if (!r->on[b->param]) continue;
+            const struct imp_param_info *info = &p->scene->params[b->param].info;
+            const struct numbers v = {x ? x + b->first : NULL, p, b};
+            double *g = gradient ? gradient + b->first : NULL;
+            if (r->kind == IMP_TIKHONOV) value += tikhonov(r->weight, &v, r->origin, g);
+            else if (!factor)
                 value += smoothness(r->weight, info->dims[0], columns(info),
                                     info->count /
                                         imp_max(info->dims[0] * columns(info), (size_t)1),

@@ -40,6 +40,7 @@ enum imp_status imp__problem_same(struct imp_problem *p, const struct imp_run *r
     if (!imp__team_apart(p->ctx) && p->same_known) return IMP_OK;
     int n = imp__same_run(p->scene, run, call, same);
     uint64_t what = imp__hash(0, p->chosen, p->scene->n_params);
+    if (p->n_ties > 0) what = imp__ties_hash(p, what);
     for (size_t i = 0; i < p->n_targets; i++) {
         const uint64_t sensor =
             imp__fingerprint_sensor(p->scene->sensors[p->targets[i].desc.sensor]);

@@ -12,6 +12,15 @@ static void add_dense(struct imp_sink *sink, int param, size_t element, int chan
     struct imp_tally *t = (struct imp_tally *)sink;
     const int64_t base = t->active->base[param];
     if (base < 0) return;
+    if (imp_unlikely(t->active->tied != NULL)) {
+        for (int c = 0; c < (channels == 3 ? 3 : 1); c++) {
+            const size_t e = element + (size_t)c;
+            const double d = channels == 3 ? (*bar)[c] : imp__sum_used(*bar, t->lanes);
+            t->batch[imp__active_at(t->active, param, e)] +=
+                d * imp__active_slope(t->active, param, e);
+        }
+        return;
+    }
     double *batch = t->batch + base + element;
     if (channels == 3)
         for (int c = 0; c < 3; c++) batch[c] += (*bar)[c];
@@ -88,14 +97,9 @@ static bool touch(struct imp_tally *t, struct imp__tally_list *list, int64_t ent
     return true;
 }
 
-static void add_hashed(struct imp_sink *sink, int param, size_t element, int channels,
-                       const imp_spec *bar)
+static void add_entry(struct imp_tally *t, size_t at, bool single, const imp_spec *bar)
 {
-    struct imp_tally *t = (struct imp_tally *)sink;
-    const int64_t base = t->active->base[param];
-    if (base < 0 || t->failed) return;
-    const bool single = channels != 3;
-    const int64_t k = entry_find(t, (uint32_t)((size_t)base + element), single);
+    const int64_t k = entry_find(t, (uint32_t)at, single);
     if (k < 0) {
         t->failed = true;
         return;
@@ -111,6 +115,26 @@ static void add_hashed(struct imp_sink *sink, int param, size_t element, int cha
         e->touched = true;
         e->batch += *bar;
     }
+}
+
+static void add_hashed(struct imp_sink *sink, int param, size_t element, int channels,
+                       const imp_spec *bar)
+{
+    struct imp_tally *t = (struct imp_tally *)sink;
+    const int64_t base = t->active->base[param];
+    if (base < 0 || t->failed) return;
+    const bool single = channels != 3;
+    if (imp_likely(!t->active->tied)) {
+        add_entry(t, (size_t)base + element, single, bar);
+        return;
+    }
+    imp_spec tied = {0};
+    for (int c = 0; c < (single ? t->lanes : 3); c++)
+        tied[c] = (*bar)[c] *
+                  imp__active_slope(t->active, param, element + (single ? 0 : (size_t)c));
+    const bool one = t->active->tied[param].factor != NULL;
+    add_entry(t, imp__active_at(t->active, param, element), single || one,
+              one && !single ? &(imp_spec){tied[0] + tied[1] + tied[2]} : &tied);
 }
 
 enum imp_status imp__tally_create(imp_context *ctx, const struct imp_active *active,

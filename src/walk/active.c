@@ -83,9 +83,17 @@ enum imp_status imp__active_create(const struct imp_scene *scene, const uint8_t 
 void imp__active_destroy(imp_context *ctx, struct imp_active *a)
 {
     imp__release(ctx, a->base);
+    imp__release(ctx, a->tied);
     imp__release(ctx, a->bsdf);
     imp__release(ctx, a->emitter);
     imp__release(ctx, a->body);
     imp__release(ctx, a->medium);
     *a = (struct imp_active){0};
+}
+
+double imp__tied_slope(const struct imp_tied *tied, size_t e)
+{
+    if (!tied->param) return 1;
+    if (tied->log) return imp__param_get(tied->param, e);
+    return tied->factor ? tied->factor[e] : 1;
 }

@@ -297,7 +297,9 @@ static double direction_at(const void *payload, int param, size_t element)
 {
     const struct direction *d = payload;
     const int64_t base = d->active->base[param];
-    return base < 0 ? 0 : d->x_dot[(size_t)base + element];
+    if (base < 0) return 0;
+    return d->x_dot[imp__active_at(d->active, param, element)] *
+           imp__active_slope(d->active, param, element);
 }
 
 static imp_spec emitter_tangent(const struct imp_tracer *tracer, int emitter,

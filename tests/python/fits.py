@@ -7,6 +7,8 @@ import numpy as np
 from tap import SCENES, raises, run, z
 
 RED = "red.reflectance.value"
+GREEN = "green.reflectance.value"
+LIGHT = "light.emitter.radiance.value"
 
 
 def box(res=16, **kw):
@@ -83,6 +85,28 @@ def test_cancel_and_resume():
     s, target, p, truth = setting()
     again = im.fit(s, target, p, spp=16, max_iterations=12, tolerance=1e-12, checkpoint="c", resume=True)
     assert np.array_equal(again[RED].value, whole[RED].value)
+
+
+def test_ties():
+    """Equal numbers, a common factor and logarithms, back from a picture"""
+    s = box(12)
+    p = im.traverse(s)
+    p[GREEN] = p[RED] = .5, .2, .3
+    before = p[LIGHT]
+    target = im.render(s, spp=1024, seed=1)
+    p[GREEN] = .3  # the first of the scene: red follows
+    p[LIGHT] = .7 * before
+    f = im.fit(s, target, ["red.*", "green.*", "light.*"], optimizer="lm", spp=64, seed=2, same="red.*,green.*",
+               factor=["light.*"], log=["light.*"])
+    names = {GREEN + "[%d]" % k for k in range(3)} | {"factor(light.*)"}
+    assert set(f.names) == names, f.names
+    one = f["factor(light.*)"]
+    worst = max(z(one.value, 1 / .7, one.se, most_se=.2), z(f[GREEN].value, (.5, .2, .3), f[GREEN].se, most_se=.2))
+    assert np.allclose(p[RED], f[GREEN].value) and np.allclose(p[LIGHT], .7 * before * one.value)
+    lo, hi = one.interval
+    assert np.isclose(lo * hi, one.value ** 2)
+    raises(im.ArgumentError, lambda: im.fit(s, target, ["red.*"], same="red.*"), "alone")
+    return "z %.2f" % worst
 
 
 def test_intervals_off():

@@ -205,13 +205,14 @@ static void regularisers(imp_scene *s)
     struct imp_param two[1] = {{.info = {.count = 6, .dims = {2, 3, 1}, .n_dims = 3}}};
     struct imp_scene fake = {.n_params = 1, .params = two};
     uint8_t on[1] = {1};
-    int64_t base[1] = {0};
+    struct imp__block block = {.count = 6, .tie = -1};
     struct imp__regulariser r = {.kind = IMP_SMOOTHNESS, .weight = 2, .on = on};
     struct imp_problem q = {.scene = &fake,
                             .n = 6,
                             .n_regularisers = 1,
                             .regularisers = &r,
-                            .active = {.n = 6, .base = base}};
+                            .n_blocks = 1,
+                            .blocks = &block};
     const double t[6] = {1, 2, 4, 3, 3, 0};
     double gt[6] = {0};
     /* rows: 1, 2 | 0, -3; columns: 2, 1, -4: squares 1+4+0+9+4+1+16 = 35 */

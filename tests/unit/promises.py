@@ -369,6 +369,7 @@ class Fixture:
                        "n": {"imp_scene_set_values": 1, "imp_scene_spectrum": 2, "imp_problem_nlopt": 3}.get(function, 1)}
             zeros = {"scalar", "status", "cause", "sensor", "channel", "x", "y", "sample", "json", "i", "from_here",
                      "kind", "progress", "rays", "ray", "bundle", "target", "edge", "most", "subject", "from", "to"}
+            if key == "imp_problem_tie.kind": return constants["IMP_TIE_LOG"], None
             if key == "imp_bend_image.target": return 4, None  # the fixture adds it
             if function == "imp_parts_create": return {"index": 1, "count": 2}[a.name], None
             if a.name in scalars: return scalars[a.name], None
