@@ -6,6 +6,7 @@
 
 #include "cmd_picture.h"
 
+#include <math.h>
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
@@ -164,6 +165,22 @@ int problem_spp(const struct imp_run *run)
     return problem_options.targets.n && spp == 1 ? 2 : spp;
 }
 
+/* Files of 8 bits are read as sRGB. Where the film has a gamma of its own, it is the
+ * numbers of the file that count. */
+static void undo_srgb(const char *spec, struct imp_target *t)
+{
+    struct imp_sensor_info sensor = {.size = sizeof sensor};
+    float *v = (float *)t->pixels; /* ours: picture_target made them */
+    if (!strcasestr(spec, ".png") && !strcasestr(spec, ".jp")) return;
+    if (imp_scene_get_sensor(cli.scene, t->sensor, &sensor) != IMP_OK ||
+        !sensor.photograph)
+        return;
+    for (size_t i = 0; i < (size_t)t->width * (size_t)t->height * (size_t)t->channels;
+         i++)
+        v[i] =
+            v[i] <= 0.0031308f ? 12.92f * v[i] : 1.055f * powf(v[i], 1 / 2.4f) - 0.055f;
+}
+
 static int add_targets(imp_problem *problem)
 {
     const struct problem_options *o = &problem_options;
@@ -179,6 +196,7 @@ static int add_targets(imp_problem *problem)
         if (rc) return rc;
         warn_clipped(o->targets.item[i], &target);
         target.sensor = target_sensor(i);
+        undo_srgb(o->targets.item[i], &target);
         target.loss = losses[o->loss];
         target.epsilon = o->epsilon;
         const enum imp_status st = imp_problem_add_target(problem, &target);

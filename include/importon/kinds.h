@@ -704,6 +704,8 @@ struct imp_sensor {
         scale; /* reading over the mean of its rays' radiance: pi of irradiance, else 1 */
     const struct imp_ball *scene; /* set when the scene is whole */
     bool photometric;             /* readings are luminances, in lux or cd/m^2 */
+    const struct imp_camera_gain
+        *gain; /* exposure and its like, between radiance and picture; NULL: 1 */
     enum imp_points points;       /* what its sampler asks for */
 };
 enum imp_sensor_flags {

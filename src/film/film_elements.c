@@ -65,6 +65,11 @@ enum imp_status imp__render_elements(const struct imp_measure *m,
     if (imp__is_spectral(scene->mode))
         IMP_TRY(imp__error(scene->ctx, IMP_E_UNSUPPORTED,
                            "finite elements are solved in rgb and mono modes"));
+    if (scene->sensors[run->sensor]->gain)
+        IMP_TRY(imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                           "finite elements make radiance: the film of sensor %d has an "
+                           "exposure",
+                           run->sensor));
     o.sensor = run->sensor;
     o.seed = run->seed;
     o.time_limit_s = run->time_limit_s;

@@ -13,16 +13,19 @@ struct imp_lanes {
     struct imp_sink sink; /* first */
     const struct imp_active *active;
     const struct imp_walk *walk;
-    int channels; /* 3 or 1 */
-    double *x;    /* [active->n][channels] */
+    int channels;  /* 3 or 1 */
+    double *x;     /* [active->n][channels] */
+    imp_spec gain; /* the camera's; of walks with wavelengths it comes after them */
+    bool own;      /* pieces are of channels, of the camera's own numbers */
 };
 
 static inline void imp__lanes_add_tied(struct imp_lanes *s, int param, size_t element,
                                        int channels, const imp_spec *bar)
 {
-    const int numbers = channels == 3 && !s->walk->waves ? 3 : 1;
+    const bool waves = s->walk->waves && !s->own;
+    const int numbers = channels == 3 && !waves ? 3 : 1;
     const imp_spec seen =
-        s->walk->waves ? imp__waves_channels(s->walk->waves, *bar) : *bar;
+        waves ? imp__waves_channels(s->walk->waves, *bar) * s->gain : *bar;
     for (int c = 0; c < s->channels; c++) {
         const size_t e = element + (numbers == 3 ? (size_t)c : 0);
         s->x[imp__active_at(s->active, param, e) * (size_t)s->channels + (size_t)c] +=
@@ -41,8 +44,8 @@ static inline void imp__lanes_add(struct imp_sink *sink, int param, size_t eleme
         return;
     }
     double *x = s->x + ((size_t)base + element) * (size_t)s->channels;
-    if (imp_unlikely(s->walk->waves != NULL)) {
-        const imp_spec seen = imp__waves_channels(s->walk->waves, *bar);
+    if (imp_unlikely(s->walk->waves != NULL) && !s->own) {
+        const imp_spec seen = imp__waves_channels(s->walk->waves, *bar) * s->gain;
         for (int c = 0; c < s->channels; c++) x[c] += seen[c];
         return;
     }
@@ -54,12 +57,22 @@ static inline void imp__lanes_add(struct imp_sink *sink, int param, size_t eleme
 static inline void imp__lanes_sweep(const struct imp_tracer *tracer,
                                     const struct imp_walk *walk, double *x)
 {
-    struct imp_lanes lanes = {
-        {imp__lanes_add, true}, tracer->active, walk, tracer->scene->channels, x};
+    const bool gained = tracer->sensor->gain != NULL;
+    struct imp_lanes lanes = {.sink = {imp__lanes_add, true},
+                              .active = tracer->active,
+                              .walk = walk,
+                              .channels = tracer->scene->channels,
+                              .x = x,
+                              .gain = imp__spec(1)};
     const int n = walk->waves ? walk->waves->carried.n : lanes.channels;
     imp_spec one = {0};
     for (int c = 0; c < n; c++) one[c] = 1;
+    if (imp_unlikely(gained)) lanes.gain = imp__walk_gain(tracer, walk);
+    if (imp_unlikely(gained) && !walk->waves) one *= lanes.gain;
     imp__walk_sweep_values(tracer, walk, one, &lanes.sink);
+    if (imp_likely(!gained)) return;
+    lanes.own = true; /* what comes now is of channels */
+    imp__gain_sweep(tracer, walk, imp__spec(1), &lanes.sink);
 }
 
 /* A walk's radiance and its derivatives, value [1 + active][channels], as a sample of a

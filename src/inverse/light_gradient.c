@@ -59,7 +59,7 @@ void imp__light_replicate(struct imp__gradient_job *job, struct imp_tile_worker 
         }
         for (const struct imp_reach *r = walk.reach; r; r = r->next) {
             const imp_spec P =
-                imp__walk_values(&walk.walk, adjoint_at(a, image, r->px, r->py));
+                imp__walk_lanes(&walk.walk, adjoint_at(a, image, r->px, r->py));
             if (r->met) entry[r->number].e = P;
             else entry[r->number].b = P;
         }

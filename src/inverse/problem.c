@@ -218,6 +218,23 @@ static enum imp_status target_check(imp_problem *p, struct imp__target *t)
     return IMP_OK;
 }
 
+/* Values of a photograph are compared by their own size, whatever the exponent: their
+ * noise is estimated from what is left over. */
+static void photograph_take(imp_problem *p, struct imp__target *t)
+{
+    const struct imp_sensor *s = p->scene->sensors[t->desc.sensor];
+    if (!s->gain || !s->gain->fitted_gamma) return;
+    t->photograph = (struct imp_photograph){.pixels = t->pixels,
+                                            .x = s->film.crop_x,
+                                            .y = s->film.crop_y,
+                                            .width = t->desc.width,
+                                            .height = t->desc.height,
+                                            .channels = t->desc.channels};
+    imp__release(p->ctx, t->noise_se);
+    t->noise_se = NULL;
+    t->desc.noise_se = NULL;
+}
+
 enum imp_status imp_problem_add_target(imp_problem *p, const struct imp_target *target)
 {
     enum imp_status st = IMP_OK;
@@ -265,6 +282,7 @@ enum imp_status imp_problem_add_target(imp_problem *p, const struct imp_target *
     t.desc.pixels = t.pixels;
     t.desc.weights = t.weights;
     t.desc.noise_se = t.noise_se;
+    photograph_take(p, &t);
     IMP_TRY(imp__target_split(p, &t));
 
     struct imp__target *grown =

@@ -9,6 +9,7 @@
 #include "base/film.h"
 #include "base/pool.h"
 #include "color/wavelength.h"
+#include "scene/camera_gain.h"
 #include "scene/scene.h"
 #include "walk/walk.h"
 
@@ -17,6 +18,7 @@ struct imp_problem;
 struct imp__target {
     struct imp_target desc; /* pixels, weights, noise_se point to copies */
     float *pixels, *weights, *noise_se;
+    struct imp_photograph photograph; /* the pixels, if they have a gamma; else NULL */
     /* Of a film with response curves, unless they are three: targets of up to three of
      * its curves, each with walks of its own; they share the weights. n_parts 0: none. */
     int n_parts;

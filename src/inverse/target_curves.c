@@ -74,6 +74,9 @@ enum imp_status imp__target_tracer(const struct imp_problem *p,
     run->sensor = target->desc.sensor;
     /* Sums over parts are of independent terms. */
     run->seed += (uint64_t)part * UINT64_C(0x9e3779b97f4a7c15);
-    return any_end && !waves ? imp__problem_tracer_of_any_end(p, run, NULL, out)
-                             : imp__problem_tracer(p, run, waves, out);
+    const enum imp_status st = any_end && !waves
+                                   ? imp__problem_tracer_of_any_end(p, run, NULL, out)
+                                   : imp__problem_tracer(p, run, waves, out);
+    if (target->photograph.pixels) out->photograph = &target->photograph;
+    return st;
 }

@@ -378,7 +378,11 @@ enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node
     const struct imp_build film_build = imp__build_make(scene, film);
     const struct imp_build sampler_build = imp__build_make(scene, sampler);
     const struct imp_build b = imp__build_make(scene, node);
+    struct imp_camera_gain *gain = NULL;
+    IMP_TRY(imp__build_gain(scene, film, name, &gain));
     IMP_TRY(imp__film_desc_build(&film_build, &s->film));
+    IMP_TRY(imp__gain_fit(scene, film, &s->film, gain));
+    s->gain = gain;
     IMP_TRY(imp__sampler_build(&sampler_build, &s->spp, &s->points));
     static const char *const units[] = {"radiometric", "photometric"};
     int unit;

@@ -2,6 +2,7 @@
  *
  * What a scene holds, for people and host programs. */
 #include "base/arguments.h"
+#include "camera_gain.h"
 #include "scene.h"
 
 enum imp_status imp_scene_get_info(const imp_scene *scene, struct imp_scene_info *out)
@@ -57,6 +58,7 @@ enum imp_status imp_scene_get_sensor(const imp_scene *scene, int sensor,
                                                 : s->photometric ? "cd m^-2"
                                                                  : "W m^-2 sr^-1",
                                         .n_responses = s->film.n_responses,
+                                        .photograph = s->gain && s->gain->fitted_gamma,
                                         .response_names = s->film.response_name};
     IMP_GIVE(scene->ctx, info, all, "info");
     return IMP_OK;

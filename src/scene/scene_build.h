@@ -50,6 +50,13 @@ enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *nod
 enum imp_status imp__build_bsdf(struct imp_scene *scene, struct imp_node *node,
                                 const char *parent, const char *slot,
                                 struct imp_bsdf **out);
+/* Exposure, white balance, vignetting and response that a film has; NULL: none. */
+enum imp_status imp__build_gain(struct imp_scene *scene, struct imp_node *film,
+                                const char *name, struct imp_camera_gain **out);
+/* When the film's size is known; gain may be NULL. */
+enum imp_status imp__gain_fit(struct imp_scene *scene, struct imp_node *film,
+                              const struct imp_film_desc *desc,
+                              struct imp_camera_gain *gain);
 /* A medium that scatters, called `slot` below its parent if it has no id. */
 enum imp_status imp__build_medium(struct imp_scene *scene, struct imp_node *node,
                                   const char *parent, const char *slot,

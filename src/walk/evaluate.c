@@ -128,5 +128,5 @@ static imp_spec frozen(const struct imp_tracer *tracer, const struct imp_walk *w
 
 imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk *walk)
 {
-    return imp__walk_channels(walk, frozen(tracer, walk));
+    return imp__walk_channels(tracer, walk, frozen(tracer, walk));
 }

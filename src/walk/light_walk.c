@@ -505,7 +505,7 @@ static void close(const struct imp_tracer *tracer, struct imp_light_walk *out)
             if (!tracer->wavelengths) used[3] = 0;
             if (imp_unlikely(!imp__is_within(used, FLT_MAX)))
                 walk->dropped = drop_cause(used);
-            r->L = imp__walk_channels(walk, r->values);
+            r->L = imp__walk_seen(walk, r->values);
         }
         P *= v->w;
     }

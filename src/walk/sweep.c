@@ -283,7 +283,9 @@ void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_wa
 void imp__walk_sweep(const struct imp_tracer *tracer, const struct imp_walk *walk,
                      imp_spec adjoint, struct imp_sink *sink)
 {
-    imp__walk_sweep_values(tracer, walk, imp__walk_values(walk, adjoint), sink);
+    imp__walk_sweep_values(tracer, walk, imp__walk_values(tracer, walk, adjoint), sink);
+    if (imp_unlikely(tracer->sensor->gain != NULL))
+        imp__gain_sweep(tracer, walk, adjoint, sink);
 }
 
 /* ---- Forward ------------------------------------------------------------------- */
@@ -371,5 +373,9 @@ static imp_spec tangent(const struct imp_tracer *tracer, const struct imp_walk *
 imp_spec imp__walk_tangent(const struct imp_tracer *tracer, const struct imp_walk *walk,
                            const double *x_dot)
 {
-    return imp__walk_channels(walk, tangent(tracer, walk, x_dot));
+    imp_spec L_dot = imp__walk_channels(tracer, walk, tangent(tracer, walk, x_dot));
+    if (imp_unlikely(tracer->sensor->gain != NULL))
+        L_dot +=
+            imp__walk_seen(walk, walk->values) * imp__gain_tangent(tracer, walk, x_dot);
+    return L_dot;
 }

@@ -508,7 +508,7 @@ void imp__walk_close(const struct imp_tracer *tracer, struct imp_walk *walk)
     if (!tracer->wavelengths) used[3] = 0;
     if (imp_unlikely(!imp__is_within(used, FLT_MAX))) walk->dropped = drop_cause(used);
     walk->values = walk->dropped || !walk->valid ? (imp_spec){0} : L;
-    walk->L = imp__walk_channels(walk, walk->values);
+    walk->L = imp__walk_channels(tracer, walk, walk->values);
 }
 
 void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, int x,

@@ -235,6 +235,7 @@ struct imp_tracer {
                                         materials'; NULL: those */
     bool collisions_stand; /* the derivative of a frozen walk is wanted, whose collisions
                               stay where they are, also of extinctions: no probes */
+    const struct imp_photograph *photograph; /* that is compared with; NULL: none */
     int split; /* continuations of the first vertex, each with its share; 0: one. Scenes
                   with media have one */
 };
@@ -349,14 +350,39 @@ void imp__walk_sweep(const struct imp_tracer *tracer, const struct imp_walk *wal
 void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_walk *walk,
                             imp_spec adjoint, struct imp_sink *sink);
 
-/* Channels of a walk's values, and the transpose. */
-static inline imp_spec imp__walk_channels(const struct imp_walk *walk, imp_spec values)
+/* ---- From a walk to the picture (gain.c) ------------------------------------------ */
+
+/* The camera's factor for this walk, by channel. */
+imp_spec imp__walk_gain(const struct imp_tracer *tracer, const struct imp_walk *walk);
+/* What an adjoint of the walk's channels gives to the camera's own numbers. */
+void imp__gain_sweep(const struct imp_tracer *tracer, const struct imp_walk *walk,
+                     imp_spec adjoint, struct imp_sink *sink);
+/* d gain in the direction x_dot. */
+imp_spec imp__gain_tangent(const struct imp_tracer *tracer, const struct imp_walk *walk,
+                           const double *x_dot);
+
+/* Channels of a walk's values, without the camera's factor, and the transpose. */
+static inline imp_spec imp__walk_seen(const struct imp_walk *walk, imp_spec values)
 {
     return imp_likely(!walk->waves) ? values : imp__waves_channels(walk->waves, values);
 }
-static inline imp_spec imp__walk_values(const struct imp_walk *walk, imp_spec channels)
+static inline imp_spec imp__walk_lanes(const struct imp_walk *walk, imp_spec channels)
 {
     return imp_likely(!walk->waves) ? channels : imp__waves_lanes(walk->waves, channels);
+}
+/* With it. */
+static inline imp_spec imp__walk_channels(const struct imp_tracer *tracer,
+                                          const struct imp_walk *walk, imp_spec values)
+{
+    const imp_spec seen = imp__walk_seen(walk, values);
+    return imp_likely(!tracer->sensor->gain) ? seen : seen * imp__walk_gain(tracer, walk);
+}
+static inline imp_spec imp__walk_values(const struct imp_tracer *tracer,
+                                        const struct imp_walk *walk, imp_spec channels)
+{
+    if (imp_unlikely(tracer->sensor->gain != NULL))
+        channels *= imp__walk_gain(tracer, walk);
+    return imp__walk_lanes(walk, channels);
 }
 
 /* Forward mode: dL in the direction x_dot [active->n]. */

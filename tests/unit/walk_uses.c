@@ -299,7 +299,7 @@ static void wavelengths(void)
                     fmax(gradient, fabs(g.g[lamp + (size_t)k] - by_e) / (1 + by_e));
             }
         }
-        const imp_spec seen = imp__walk_channels(&w, L);
+        const imp_spec seen = imp__walk_seen(&w, L);
         for (int c = 0; c < 3; c++) {
             value = fmax(value, fabs(w.L[c] - seen[c]) / (1 + fabs(seen[c])));
             frozen = fmax(frozen, fabs(F[c] - w.L[c]) / (1 + fabs(seen[c])));
@@ -310,7 +310,7 @@ static void wavelengths(void)
         const double nm = w.waves->carried.nm[0];
         double slope;
         L = imp__spec(at(E, nm, -1) * poly(all, at(R, nm, -1), &slope));
-        const imp_spec alone = imp__walk_channels(&w, L);
+        const imp_spec alone = imp__walk_seen(&w, L);
         for (int c = 0; c < 3; c++)
             single = fmax(single, fabs(w.L[c] - alone[c]) / (1 + fabs(alone[c])));
         imp__arena_rewind(&r.arena, mark);
