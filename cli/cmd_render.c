@@ -18,13 +18,16 @@
 
 static struct {
     struct picture_options picture;
-    int pixel[2], sample, count;
+    int pixel[2], sample, count, denoise;
     const char *paths;
 } o = {.pixel = {NO_PIXEL, NO_PIXEL}};
 
 static const struct arg_option options[] = {
     {ARG_FLAG, 0, "se", NULL, "add the standard error of every channel to the EXR file",
      &o.picture.standard_error, 0, 0, NULL},
+    {ARG_FLAG, 0, "denoise", NULL,
+     "without noise, by Open Image Denoise; such a picture has no standard errors",
+     &o.denoise, 0, 0, NULL},
     {ARG_FLAG, 0, "half", NULL, "16-bit floats in the EXR file", &o.picture.half, 0, 0,
      NULL},
     {ARG_NUMBER, 0, "exposure", "STOPS", "exposure of the PNG preview",
@@ -156,6 +159,20 @@ static void report(const char *path, imp_film *film, const struct imp_run *run)
     cli_json_end(&j);
 }
 
+/* The picture's place is taken by one without noise, and without errors. */
+static int denoise(const struct imp_run *run, imp_film **film)
+{
+    imp_film *made = NULL;
+    struct imp_run own = *run;
+    own.preview = NULL;
+    enum imp_status st = imp_denoise(cli.scene, &own, *film, &made);
+    if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+    imp_film_destroy(*film);
+    *film = made;
+    st = imp_film_set_text(made, "denoised", "Open Image Denoise");
+    return st == IMP_OK ? 0 : cli_fail(st, cli.scene_path);
+}
+
 static int run_render(int n, char **operand)
 {
     imp_film *film = NULL;
@@ -167,6 +184,12 @@ static int run_render(int n, char **operand)
     if (o.sample && !one && !o.paths)
         return cli_error(EXIT_USAGE, "--sample needs --pixel or --paths");
     if (o.count && !o.paths) return cli_error(EXIT_USAGE, "--count needs --paths");
+    if (o.denoise && o.picture.standard_error)
+        return cli_error(EXIT_USAGE,
+                         "--denoise and --se: how far a denoised picture is off "
+                         "nobody knows");
+    if (o.denoise && (one || o.paths))
+        return cli_error(EXIT_USAGE, "--denoise is of pictures, not of walks");
     if (one) {
         rc = cli_redirect();
         return rc ? rc
@@ -195,8 +218,9 @@ static int run_render(int n, char **operand)
     }
     if (!film && !rc) cli_say("interrupted in the first pass: no picture is written");
     if (film && !rc) {
-        picture_stamp(film, &run);
-        rc = picture_write(film, path, &o.picture);
+        if (o.denoise) rc = denoise(&run, &film);
+        if (!rc) picture_stamp(film, &run);
+        if (!rc) rc = picture_write(film, path, &o.picture);
         if (!rc) rc = manifest_output(path);
         if (!rc) report(path, film, &run);
     }

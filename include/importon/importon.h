@@ -641,6 +641,22 @@ struct imp_run {
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_render(const imp_scene *scene, const struct imp_run *run, imp_film **out);
 
+/**
+ * A picture without its noise, by Intel's Open Image Denoise (version 2, found when this is
+ * called) from the colours and the albedo and normal of first surfaces, for people to look
+ * at. How far it is off nobody knows, so it has no standard errors, and it is no target for
+ * a fit. Channels other than R, G, B or Y are copied.
+ * @param run     of the picture: its sensor and seed; NULL for defaults.
+ * @param picture that imp_render made of the scene; borrowed.
+ * @param[out] out a new picture with the same channels; the caller destroys it.
+ * @return IMP_OK; IMP_E_UNSUPPORTED, with what to do, if there is no such library, or no
+ *         channel to denoise; IMP_E_ARG for another size; IMP_E_NOMEM; IMP_CANCELLED.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status imp_denoise(const imp_scene *scene,
+                                                   const struct imp_run *run,
+                                                   const imp_film *picture,
+                                                   imp_film **out);
+
 /** One walk, vertex by vertex, as text (json 0) or JSON: sample number `sample` of pixel
  * (x, y) of the picture, the same walk that renders and gradients of run->seed use. Pixels
  * of the border that a film with sample_border samples for its filter have numbers below 0

@@ -35,7 +35,7 @@ from ._params import Gradient, ParameterInfo, SceneParameters, Values, traverse
 from ._parts import PartsInfo, join_parts, merge, part, parts_info, team
 from ._picture import DroppedWalk, Picture, project, read, write
 from ._progress import set_progress
-from ._render import render, walk
+from ._render import denoise, render, walk
 from ._report import report
 from ._scene import Scene, Sensor, load_file, load_string, set_variant, variant
 from ._transform import ScalarTransform4f, Transform4f
@@ -49,7 +49,7 @@ __all__ = [
     "Estimate", "FileError", "Fit", "FitVariable", "Gradient", "ImportonWarning", "Jacobian", "Loss",
     "NumericError", "OutOfMemoryError", "ParameterError", "ParameterInfo", "Part", "PartsInfo", "PathsError",
     "Picture", "Progress", "ScalarTransform4f", "Scene", "SceneError", "SceneParameters", "SelfTestRow", "Sensor",
-    "Transform4f", "UnsupportedError", "Values", "__version__", "ad", "bend", "check", "compare", "cornell_box",
+    "Transform4f", "UnsupportedError", "Values", "__version__", "ad", "bend", "check", "compare", "cornell_box", "denoise",
     "elements", "fit", "functional", "guide", "jacobian", "join_parts", "library_path", "load_dict", "load_file",
     "load_string", "loss", "merge", "part", "parts_info", "project", "read", "render", "render_backward",
     "render_forward", "report", "selftest", "set_progress", "set_threads", "set_variant", "team", "threads",

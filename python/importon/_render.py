@@ -109,6 +109,50 @@ def make_picture(scene: Scene, params: Any, options: Any, progress: Any, call: A
         return picture
 
 
+def denoise(scene: Scene, picture: Picture, *, sensor: Any = 0, seed: int = 0, progress: Any = None) -> Picture:
+    """A picture without its noise, by Intel's Open Image Denoise, to look at: how far it is off
+    nobody knows, so it has no standard errors.
+
+    Parameters
+    ----------
+    scene : Scene
+        As it was when the picture was made: its first surfaces' albedos and normals help.
+    picture : Picture
+        From `render`.
+    sensor : int or str
+        The picture's.
+    seed : int
+        Of the samples of first surfaces.
+    progress : bool or callable, optional
+        See `set_progress`.
+
+    Returns
+    -------
+    Picture
+        With the same channels; those that are no colours are copied.
+
+    Raises
+    ------
+    UnsupportedError
+        There is no such library; the message says what to do.
+
+    Examples
+    --------
+    >>> scene = importon.load_dict(importon.cornell_box(res=8))
+    >>> picture = importon.render(scene, spp=16)
+    >>> try:
+    ...     picture = importon.denoise(scene, picture)
+    ... except importon.UnsupportedError:
+    ...     pass  # this machine has no Open Image Denoise
+    """
+    scene = check_scene(scene)
+    if not isinstance(picture, Picture) or picture._film is None:
+        raise TypeError("picture: a Picture as render returns it")
+    options, film = run_options(scene, sensor=sensor, seed=seed), picture._film.pointer
+    return make_picture(scene, None, options, progress,
+                        lambda out: (lib.imp_denoise, scene.pointer, ctypes.byref(options), film, out))
+
+
 def walk(scene: Scene, x: int, y: int, sample: int = 0, *, seed: int = 0, spp: int = 0, sensor: Any = 0,
          guide: Any = None, wavelengths: str = "stratified", wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene",
          json: bool = False) -> Union[str, dict[str, Any]]:

@@ -301,12 +301,28 @@ static void radiance(const struct imp_measure *m,
         *alpha = walk->first && walk->first->shape;
     }
     const struct imp_film_desc *film = &m->sensor->film;
+    const double gain = imp_likely(!m->sensor->gain)
+                            ? 1 /* of all curves: they have no white balance */
+                            : imp__walk_gain(&tracer, walk)[0];
     for (int c = 0; c < film->n_responses; c++) {
         imp_spec weight = {0};
         if (walk->waves) imp__waves_response(walk->waves, &film->response[c], &weight);
-        s->value[c] = imp__sum_used(weight * walk->values, 4);
+        s->value[c] = gain * imp__sum_used(weight * walk->values, 4);
     }
     imp__arena_rewind(s->arena, mark);
+}
+
+void imp__measure_features(const void *measure, struct imp_sample *s)
+{
+    static struct imp_aov features[] = {{"albedo", IMP_AOV_ALBEDO},
+                                        {"normal", IMP_AOV_SH_NORMAL}};
+    static const struct imp_channels both = {.n_aovs = 2, .aovs = features};
+    const struct imp_measure *m = measure;
+    struct imp_walk walk;
+    imp_spec L;
+    double alpha;
+    radiance(m, NULL, s, &L, &alpha, &walk);
+    aov_value(m, &both, &walk, s->value);
 }
 
 void imp__measure_sample(const void *measure, struct imp_sample *s)

@@ -30,6 +30,9 @@ void imp__measure_destroy(struct imp_measure *m);
 /* Takes the sample (payload: the measure). */
 void imp__measure_sample(const void *measure, struct imp_sample *sample);
 
+/* Albedo and normal of the first surface, in the scene's colours: [6]. */
+void imp__measure_features(const void *measure, struct imp_sample *sample);
+
 /* Radiance and alpha in the film's pixel format; how many values. */
 int imp__measure_base(const struct imp_measure *m, imp_spec L, double alpha,
                       double *value);

@@ -159,6 +159,8 @@ NOT_OK = {
     "imp_problem_add_smoothness": "the scene has no texture",
     "imp_problem_fit_variable": "there was no fit",
 }
+try: C.CDLL("libOpenImageDenoise.so.2")
+except OSError: NOT_OK["imp_denoise"] = "there is no Open Image Denoise"
 # Pointers that may be NULL, by name, or by function and name.
 NULLABLE = {"options", "run", "stats", "id", "objective", "gradient_se", "primal", "normals", "uvs",
             "axis", "hessian", "taps", "tap_bars", "tap_dots", "power", "bundle", "exit", "targets",

@@ -1,0 +1,15 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Intel's Open Image Denoise, found when it is asked for: the library has no need of it
+ * otherwise. */
+#ifndef IMP_FILM_DENOISER_H
+#define IMP_FILM_DENOISER_H
+
+#include "base/context.h"
+
+/* Colour, albedo and normal are [height][width][3]; out too, and may be colour.
+ * IMP_E_UNSUPPORTED, with what to do, where there is none. */
+enum imp_status imp__denoise(imp_context *ctx, int width, int height, float *colour,
+                             float *albedo, float *normal, float *out);
+
+#endif
