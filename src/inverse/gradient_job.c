@@ -11,7 +11,7 @@
 /* An item's result, and the sum of several. */
 struct part {
     double objective, variance;
-    double dense[]; /* [2][n] gradient and its variance, of few numbers */
+    double dense[]; /* [2 or 3][n] of few numbers, as of imp__tally_dense */
 };
 
 /* Replicate b of a pixel: trace, fold, adjoints, sweep. Returns its loss estimate. */
@@ -71,13 +71,19 @@ static double replicate(struct imp__gradient_job *j, struct imp_tile_worker *w, 
                 imp__walk_sweep(&j->tracer, &walks[i], P[s], &tally->sink);
         }
     }
-    imp__tally_batch(tally);
+    imp__tally_batch(tally, b);
 out:
     imp__arena_rewind(&w->arena, mark);
     return value;
 }
 
 /* ---- Tiles --------------------------------------------------------------------- */
+
+static size_t dense_numbers(const struct imp__gradient_job *j)
+{
+    const size_t rows = j->shared ? 3 : 2;
+    return j->want_gradient && !j->totals->many ? rows * j->problem->n : 0;
+}
 
 static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worker *w,
                                  void *result, void *payload)
@@ -89,6 +95,7 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
     const int b1 = imp__replicates_begin(j->plan, (int)t->part + 1);
     const double R = b1 - b0, all = j->plan.R;
     const bool paired = j->plan.R == 1; /* pixels two by two stand in for replicates */
+    const double by_variance = paired ? 0 : R / ((R - 1) * all * all);
     double first = 0;
     int in_pair = 0;
 
@@ -107,7 +114,7 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
             if (st != IMP_OK) return st;
             if (!paired) {
                 /* mean over all R replicates; variance R/(R-1) spread / all^2 */
-                imp__tally_pixel(tally, R, 1 / all, R / ((R - 1) * all * all));
+                imp__tally_pixel(tally, R, 1 / all, by_variance);
                 out->objective += sum / all;
                 out->variance += (square - sum * sum / R) * R / ((R - 1) * all * all);
                 continue;
@@ -125,16 +132,12 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
         imp__tally_pixel(tally, 2, 1, 2);
         out->variance += imp__sqr(first);
     }
-    if (tally->dense)
+    if (tally->dense) {
+        if (j->shared) imp__tally_tile(tally, by_variance);
         memcpy(out->dense, imp__tally_dense(tally),
-               2 * tally->active->n * sizeof *out->dense);
-    else imp__tally_flush(tally, j->mean, j->spread);
+               dense_numbers(j) * sizeof *out->dense);
+    } else imp__tally_flush(tally, by_variance, j->overlap.gradient, j->mean, j->spread);
     return IMP_OK;
-}
-
-static size_t dense_numbers(const struct imp__gradient_job *j)
-{
-    return j->want_gradient && !j->totals->many ? 2 * j->problem->n : 0;
 }
 
 static void tile_add(void *into, const void *from, void *payload)
@@ -150,7 +153,7 @@ static void tile_add(void *into, const void *from, void *payload)
 static enum imp_status tile_take(size_t group, const void *sum, void *payload)
 {
     const struct imp__gradient_job *j = payload;
-    const size_t n = dense_numbers(j) / 2;
+    const size_t n = dense_numbers(j) ? j->problem->n : 0;
     const struct part *in = sum;
     struct imp__totals *to = j->totals;
     (void)group;
@@ -158,8 +161,12 @@ static enum imp_status tile_take(size_t group, const void *sum, void *payload)
     to->objective += in->objective;
     to->variance += in->variance;
     for (size_t k = 0; k < n; k++) {
+        double variance = in->dense[n + k];
+        if (j->shared)
+            variance = imp__overlap_variance(j->overlap.gradient, j->overlap.few,
+                                             variance, in->dense[2 * n + k]);
         to->gradient[k] += in->dense[k];
-        to->gradient_variance[k] += in->dense[n + k];
+        to->gradient_variance[k] += variance;
     }
     return IMP_OK;
 }
@@ -250,25 +257,29 @@ enum imp_status imp__gradient_job_run(struct imp__gradient_job *j,
     const struct imp_film_desc *film = &j->tracer.sensor->film;
     j->width = film->crop_w;
     j->channels = j->problem->scene->channels;
+    const int margin = j->splat && film->sample_border ? imp__film_border(film) : 0;
+    j->shared = j->splat != NULL;
+    if (j->shared) j->overlap = imp__overlap_of(film, margin, j->plan.R);
     const double walks = (double)film->crop_w * film->crop_h * j->plan.n * j->plan.R;
-    j->tiles = (struct imp_tiles){
-        .ctx = ctx,
-        .run = run,
-        .walks = walks,
-        .width = film->crop_w,
-        .height = film->crop_h,
-        .margin = j->splat && film->sample_border ? imp__film_border(film) : 0,
-        .work = tile_work,
-        .size = sizeof(struct part) + dense_numbers(j) * sizeof(double),
-        .add = tile_add,
-        .take = tile_take,
-        .payload = j};
+    j->tiles = (struct imp_tiles){.ctx = ctx,
+                                  .run = run,
+                                  .walks = walks,
+                                  .width = film->crop_w,
+                                  .height = film->crop_h,
+                                  .margin = margin,
+                                  .work = tile_work,
+                                  .size = sizeof(struct part) +
+                                          dense_numbers(j) * sizeof(double),
+                                  .add = tile_add,
+                                  .take = tile_take,
+                                  .payload = j};
     IMP_TRY(imp__tiles_create(&j->tiles));
     j->tallies = imp__alloc(ctx, (size_t)ctx->threads, sizeof *j->tallies);
     if (!j->tallies) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory"));
     for (int k = 0; k < ctx->threads; k++)
         IMP_TRY(imp__tally_create(ctx, j->want_gradient ? j->tracer.active : &j->nothing,
-                                  j->problem->scene->lanes, &j->tallies[k]));
+                                  j->problem->scene->lanes, j->shared ? j->plan.R : 0,
+                                  &j->tallies[k]));
     const struct imp_tiles_pass pass = {.stage = stage,
                                         .rate_unit = "walks",
                                         .units = walks,

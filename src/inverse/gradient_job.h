@@ -10,6 +10,7 @@
 
 #include "estimate.h"
 #include "film/film_tiles.h"
+#include "overlap.h"
 #include "splat.h"
 #include "tally.h"
 #include "totals.h"
@@ -27,6 +28,8 @@ struct imp__gradient_job {
     bool want_gradient;
     /* Set by imp__gradient_job_run. */
     int width, channels;
+    bool shared; /* pixels share walks, to the extent of overlap */
+    struct imp__overlap overlap;
     bool look;                           /* only the size of terms is wanted */
     struct imp_active nothing;           /* what the tally keeps without want_gradient */
     struct imp_fixed_sum *mean, *spread; /* of many numbers; spread NULL: not wanted */

@@ -72,7 +72,7 @@ void imp__light_replicate(struct imp__gradient_job *job, struct imp_tile_worker 
         }
         imp__arena_rewind(&worker->arena, mark);
     }
-    imp__tally_batch(tally);
+    imp__tally_batch(tally, b);
 }
 
 /* With the first of the walks numbered `first`; totals that are to be shared and ended. */

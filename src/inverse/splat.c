@@ -1,8 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "splat.h"
 #include "film/film_picture.h"
+#include "film/film_tiles.h"
 #include "loss.h"
+#include "overlap.h"
 #include "seen.h"
+
+#define REPLICATES 4 /* most of a plan for wide filters */
 
 static void sample_radiance(const void *payload, struct imp_sample *s)
 {
@@ -25,63 +29,96 @@ static void mean_of(const struct imp__splat *s, int film, size_t p, double mean[
     for (int k = 0; k < s->channels; k++) mean[k] = from[k];
 }
 
-/* The loss of one replicate from the pictures of its sets, from `first` on. */
-static double sets_loss(const struct imp__splat *s, int first)
+/* Adds the loss of pixel p, from the pictures of the sets of replicate b. */
+static void sets_loss(const struct imp__splat *s, int b, size_t p, double *total)
 {
     const struct imp_target *t = &s->target->desc;
-    const imp_film *film = s->films[first];
     const bool luminance = imp__sees_luminance(s->target, s->channels);
-    const size_t pixels = (size_t)film->width * (size_t)film->height;
-    double total = 0;
-    for (size_t p = 0; p < pixels; p++) {
-        const double scale = t->scale * (s->target->weights ? s->target->weights[p] : 1);
-        for (int c = 0; c < t->channels; c++) {
-            const double T = s->target->pixels[p * (size_t)t->channels + (size_t)c];
-            double mean[3], sum = 0, square = 0;
-            for (int k = first; k < first + s->m; k++) {
-                mean_of(s, k, p, mean);
-                const double I = imp__seen(luminance, mean, c);
-                sum += I;
-                square += I * I;
-            }
-            const double w = imp__loss_weight(t->loss, scale, t->epsilon, T);
-            struct imp__loss_at at;
-            imp__loss_eval(t->loss, scale, t->epsilon, sum / s->m, T, &at);
-            total += imp__loss_quadratic(t->loss)
-                         ? imp__loss_unbiased(w, T, s->m, sum, square)
-                         : at.value;
+    const double scale = t->scale * (s->target->weights ? s->target->weights[p] : 1);
+    for (int c = 0; c < t->channels; c++) {
+        const double T = s->target->pixels[p * (size_t)t->channels + (size_t)c];
+        double mean[3], sum = 0, square = 0;
+        for (int k = b * s->m; k < (b + 1) * s->m; k++) {
+            mean_of(s, k, p, mean);
+            const double I = imp__seen(luminance, mean, c);
+            sum += I;
+            square += I * I;
         }
+        const double w = imp__loss_weight(t->loss, scale, t->epsilon, T);
+        struct imp__loss_at at;
+        imp__loss_eval(t->loss, scale, t->epsilon, sum / s->m, T, &at);
+        *total += imp__loss_quadratic(t->loss)
+                      ? imp__loss_unbiased(w, T, s->m, sum, square)
+                      : at.value;
     }
-    return total;
 }
 
-/* The loss of one replicate's picture; the variance of a quadratic one is taken off. */
-static double picture_loss(const struct imp__splat *s, const imp_film *film)
+/* The same, from the picture of a replicate; the variance of a quadratic loss is taken
+ * off. */
+static void picture_loss(const struct imp__splat *s, int b, size_t p, double *total)
 {
     const struct imp_target *t = &s->target->desc;
-    const size_t pixels = (size_t)film->width * (size_t)film->height;
+    const imp_film *film = s->films[b];
     const bool luminance = imp__sees_luminance(s->target, s->channels);
-    double total = 0;
-    for (size_t p = 0; p < pixels; p++) {
-        const double scale = t->scale * (s->target->weights ? s->target->weights[p] : 1);
-        for (int c = 0; c < t->channels; c++) {
-            double mean[3], se[3];
-            for (int k = 0; k < s->channels; k++) {
-                mean[k] = film->mean[p * (size_t)s->channels + (size_t)k];
-                se[k] = film->se[p * (size_t)s->channels + (size_t)k];
-            }
-            const double I = imp__seen(luminance, mean, c);
-            /* Channels of a sample correlate: the luminance of their errors. */
-            const double variance = imp__sqr(imp__seen(luminance, se, c));
-            const double T = s->target->pixels[p * (size_t)t->channels + (size_t)c];
-            struct imp__loss_at at;
-            imp__loss_eval(t->loss, scale, t->epsilon, I, T, &at);
-            total += at.value;
-            if (imp__loss_quadratic(t->loss) && isfinite(variance))
-                total -= 0.5 * imp__loss_weight(t->loss, scale, t->epsilon, T) * variance;
+    const double scale = t->scale * (s->target->weights ? s->target->weights[p] : 1);
+    for (int c = 0; c < t->channels; c++) {
+        double mean[3], se[3];
+        for (int k = 0; k < s->channels; k++) {
+            mean[k] = film->mean[p * (size_t)s->channels + (size_t)k];
+            se[k] = film->se[p * (size_t)s->channels + (size_t)k];
         }
+        const double I = imp__seen(luminance, mean, c);
+        /* Channels of a sample correlate: the luminance of their errors. */
+        const double variance = imp__sqr(imp__seen(luminance, se, c));
+        const double T = s->target->pixels[p * (size_t)t->channels + (size_t)c];
+        struct imp__loss_at at;
+        imp__loss_eval(t->loss, scale, t->epsilon, I, T, &at);
+        *total += at.value;
+        if (imp__loss_quadratic(t->loss) && isfinite(variance))
+            *total -= 0.5 * imp__loss_weight(t->loss, scale, t->epsilon, T) * variance;
     }
-    return total;
+}
+
+static void pixel_loss(const struct imp__splat *s, int b, size_t p, double *total)
+{
+    if (s->m > 1) sets_loss(s, b, p, total);
+    else picture_loss(s, b, p, total);
+}
+
+/* ---- The loss ------------------------------------------------------------------ */
+
+/* Of a mean over R replicates. */
+static double spread_of(const double *values, int R)
+{
+    double sum = 0, square = 0;
+    for (int b = 0; b < R; b++) {
+        sum += values[b];
+        square += values[b] * values[b];
+    }
+    return (square - sum * sum / R) / (R * (R - 1.0));
+}
+
+static double loss_variance(const struct imp__splat *s, int R)
+{
+    const int width = s->film->crop_w, height = s->film->crop_h, side = IMP_TILE_SIDE;
+    double pixels = 0, tiles = 0;
+    for (int y0 = 0; y0 < height; y0 += side)
+        for (int x0 = 0; x0 < width; x0 += side) {
+            double tile[REPLICATES] = {0};
+            for (int y = y0; y < imp_min(y0 + side, height); y++)
+                for (int x = x0; x < imp_min(x0 + side, width); x++) {
+                    const size_t p = (size_t)y * (size_t)width + (size_t)x;
+                    double pixel[REPLICATES] = {0};
+                    for (int b = 0; b < R; b++) {
+                        pixel_loss(s, b, p, &pixel[b]);
+                        tile[b] += pixel[b];
+                    }
+                    pixels += spread_of(pixel, R);
+                }
+            tiles += spread_of(tile, R);
+        }
+    const struct imp__overlap overlap = imp__overlap_of(s->film, 0, R);
+    return imp__overlap_variance(overlap.loss, overlap.few, pixels, tiles);
 }
 
 enum imp_status imp__splat_create(const struct imp_problem *p,
@@ -99,7 +136,7 @@ enum imp_status imp__splat_create(const struct imp_problem *p,
                            .m = target && plan.m < plan.n ? plan.m : 1};
     const bool one_by_one = plan.m == plan.n;
     const size_t pixels = (size_t)s.film->crop_w * (size_t)s.film->crop_h;
-    double sum = 0, square = 0;
+    double sum = 0;
     s.n = plan.R * s.m;
     s.weights = imp__alloc(ctx, (size_t)s.n, sizeof *s.weights);
     s.films = imp__alloc(ctx, (size_t)s.n, sizeof *s.films);
@@ -126,14 +163,12 @@ enum imp_status imp__splat_create(const struct imp_problem *p,
                                             .weights = s.weights[k]};
         IMP_TRY(imp__picture_make(ctx, &picture, &own, &s.films[k]));
         if (!target || set < s.m - 1) continue;
-        const double value =
-            s.m > 1 ? sets_loss(&s, b * s.m) : picture_loss(&s, s.films[k]);
+        double value = 0;
+        for (size_t p = 0; p < pixels; p++) pixel_loss(&s, b, p, &value);
         sum += value;
-        square += value * value;
     }
-    const double R = plan.R;
-    s.objective = sum / R;
-    s.objective_variance = (square - sum * sum / R) / (R * (R - 1));
+    s.objective = sum / plan.R;
+    if (target) s.objective_variance = loss_variance(&s, plan.R);
     *out = s;
 out:
     if (st != IMP_OK) imp__splat_destroy(ctx, &s);

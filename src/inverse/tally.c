@@ -2,6 +2,7 @@
  *
  * The sink of sweeps: batches, pixels and tiles, in arrays or in a hash table. */
 #include "tally.h"
+#include "overlap.h"
 #include <string.h>
 
 #define TABLE_MIN 1024
@@ -54,11 +55,35 @@ static bool table_grow(struct imp_tally *t)
     return true;
 }
 
+/* Room for what a new entry has of the tile. */
+static bool of_tile_grow(struct imp_tally *t, bool single)
+{
+    const size_t R = (size_t)t->R;
+    if (R == 0) return true;
+    if (single) {
+        const size_t n = t->n_singles + 1;
+        double *grown = imp__grow(t->ctx, t->singles_of_tile, &t->cap_singles_of_tile, n,
+                                  R * sizeof *grown);
+        if (!grown) return false;
+        t->singles_of_tile = grown;
+        memset(grown + (n - 1) * R, 0, R * sizeof *grown);
+        return true;
+    }
+    const size_t n = t->n_triples + 1;
+    imp_spec *grown = imp__grow(t->ctx, t->triples_of_tile, &t->cap_triples_of_tile, n,
+                                R * sizeof *grown);
+    if (!grown) return false;
+    t->triples_of_tile = grown;
+    memset(grown + (n - 1) * R, 0, R * sizeof *grown);
+    return true;
+}
+
 /* A new entry, and its index; -1: no memory. */
 static __attribute__((noinline)) int64_t entry_add(struct imp_tally *t, uint32_t key,
                                                    bool single)
 {
     if (2 * (t->n_triples + t->n_singles) >= t->table_size && !table_grow(t)) return -1;
+    if (!of_tile_grow(t, single)) return -1;
     if (single) {
         void *grown = imp__grow(t->ctx, t->singles, &t->cap_singles, t->n_singles + 1,
                                 sizeof *t->singles);
@@ -138,20 +163,22 @@ static void add_hashed(struct imp_sink *sink, int param, size_t element, int cha
 }
 
 enum imp_status imp__tally_create(imp_context *ctx, const struct imp_active *active,
-                                  int lanes, struct imp_tally *out)
+                                  int lanes, int R, struct imp_tally *out)
 {
-    struct imp_tally t = {.ctx = ctx, .active = active, .lanes = lanes};
+    struct imp_tally t = {.ctx = ctx, .active = active, .lanes = lanes, .R = R};
     t.dense = active->n <= IMP_TALLY_DENSE;
     t.sink.add = t.dense ? add_dense : add_hashed;
     if (active->n >= INT32_MAX)
         return imp__error(ctx, IMP_E_ARG, "more than %d active numbers", INT32_MAX);
     if (t.dense) {
-        t.batch = imp__alloc(ctx, 5 * active->n, sizeof *t.batch);
+        t.batch = imp__alloc(ctx, (6 + (size_t)R) * active->n, sizeof *t.batch);
         if (!t.batch) return imp__error(ctx, IMP_E_NOMEM, "no memory for gradients");
         t.sum = t.batch + active->n;
         t.square = t.sum + active->n;
         t.mean = t.square + active->n;
         t.variance = t.mean + active->n;
+        t.tile = t.variance + active->n;
+        t.of_tile = t.tile + active->n;
     }
     *out = t;
     return IMP_OK;
@@ -164,6 +191,8 @@ void imp__tally_destroy(struct imp_tally *t)
     imp__release(t->ctx, t->table);
     imp__release(t->ctx, t->triples);
     imp__release(t->ctx, t->singles);
+    imp__release(t->ctx, t->triples_of_tile);
+    imp__release(t->ctx, t->singles_of_tile);
     imp__release(t->ctx, t->touched_triples.index);
     imp__release(t->ctx, t->touched_singles.index);
     *t = (struct imp_tally){0};
@@ -172,7 +201,7 @@ void imp__tally_destroy(struct imp_tally *t)
 void imp__tally_clear(struct imp_tally *t)
 {
     if (t->dense) {
-        memset(t->batch, 0, 5 * t->active->n * sizeof *t->batch);
+        memset(t->batch, 0, (6 + (size_t)t->R) * t->active->n * sizeof *t->batch);
     } else {
         if (t->table_size) memset(t->table, 0, t->table_size * sizeof *t->table);
         t->n_triples = t->n_singles = 0;
@@ -180,26 +209,33 @@ void imp__tally_clear(struct imp_tally *t)
     }
 }
 
-void imp__tally_batch(struct imp_tally *t)
+void imp__tally_batch(struct imp_tally *t, int b)
 {
+    const size_t R = (size_t)t->R, at = R ? (size_t)b : 0;
     if (t->dense) {
+        double *of_tile = t->of_tile + at * t->active->n;
         for (size_t k = 0; k < t->active->n; k++) {
             t->sum[k] += t->batch[k];
             t->square[k] += t->batch[k] * t->batch[k];
+            if (R) of_tile[k] += t->batch[k];
             t->batch[k] = 0;
         }
         return;
     }
     for (size_t k = 0; k < t->touched_triples.n; k++) {
-        struct imp__tally_triple *e = &t->triples[t->touched_triples.index[k]];
+        const size_t number = t->touched_triples.index[k];
+        struct imp__tally_triple *e = &t->triples[number];
         e->sum += e->batch;
         e->square += e->batch * e->batch;
+        if (R) t->triples_of_tile[number * R + at] += e->batch;
         e->batch = (imp_spec){0};
     }
     for (size_t k = 0; k < t->touched_singles.n; k++) {
-        struct imp__tally_single *e = &t->singles[t->touched_singles.index[k]];
+        const size_t number = t->touched_singles.index[k];
+        struct imp__tally_single *e = &t->singles[number];
         e->sum += e->batch;
         e->square += e->batch * e->batch;
+        if (R) t->singles_of_tile[number * R + at] += e->batch;
         e->batch = 0;
     }
 }
@@ -236,19 +272,52 @@ void imp__tally_pixel(struct imp_tally *t, double replicates, double by_mean,
     t->touched_triples.n = t->touched_singles.n = 0;
 }
 
-void imp__tally_flush(const struct imp_tally *t, struct imp_fixed_sum *mean,
-                      struct imp_fixed_sum *variance)
+void imp__tally_tile(struct imp_tally *t, double by_variance)
 {
+    const size_t n = t->active->n;
+    for (size_t k = 0; k < n; k++) {
+        double sum = 0, square = 0;
+        for (int b = 0; b < t->R; b++) {
+            const double v = t->of_tile[(size_t)b * n + k];
+            sum += v;
+            square += v * v;
+        }
+        t->tile[k] = by_variance * (square - sum * sum / t->R);
+    }
+}
+
+void imp__tally_flush(const struct imp_tally *t, double by_variance, double factor,
+                      struct imp_fixed_sum *mean, struct imp_fixed_sum *variance)
+{
+    const size_t R = (size_t)t->R;
     for (size_t k = 0; k < t->n_triples; k++) {
         const struct imp__tally_triple *e = &t->triples[k];
+        imp_spec sum = {0}, square = {0};
+        for (size_t b = 0; b < R; b++) {
+            const imp_spec v = t->triples_of_tile[k * R + b];
+            sum += v;
+            square += v * v;
+        }
         for (uint32_t c = 0; c < 3; c++) {
+            double v = e->variance[c];
+            if (R)
+                v = imp__overlap_variance(
+                    factor, true, v, by_variance * (square[c] - sum[c] * sum[c] / t->R));
             imp__fixed_add(mean, e->key + c, e->mean[c]);
-            if (variance) imp__fixed_add(variance, e->key + c, e->variance[c]);
+            if (variance) imp__fixed_add(variance, e->key + c, v);
         }
     }
     for (size_t k = 0; k < t->n_singles; k++) {
         const struct imp__tally_single *e = &t->singles[k];
+        double v = e->variance, sum = 0, square = 0;
+        for (size_t b = 0; b < R; b++) {
+            sum += t->singles_of_tile[k * R + b];
+            square += imp__sqr(t->singles_of_tile[k * R + b]);
+        }
+        if (R)
+            v = imp__overlap_variance(factor, true, v,
+                                      by_variance * (square - sum * sum / t->R));
         imp__fixed_add(mean, e->key, e->mean);
-        if (variance) imp__fixed_add(variance, e->key, e->variance);
+        if (variance) imp__fixed_add(variance, e->key, v);
     }
 }

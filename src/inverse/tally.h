@@ -4,7 +4,8 @@
  *
  * The samples of a pixel come in R independent replicates of n, each with its own
  * leave-one-out adjoint; a pixel's gradient is their mean, its variance comes from their
- * spread, and pixels are independent, so variances add (docs/estimators.md 14). Few
+ * spread, and pixels are independent, so variances add (docs/estimators.md 14). Where
+ * pixels share walks, replicates are also added up over the tile (overlap.h). Few
  * numbers are kept in arrays; many (textures) in a hash table of what a tile of pixels
  * touched, so memory and time follow the touched texels and not the texture. */
 #ifndef IMP_INVERSE_TALLY_H
@@ -36,8 +37,13 @@ struct imp_tally {
     const struct imp_active *active;
     int lanes; /* of what sweeps bring: 1, 3 or 4 */
     bool dense, failed;
-    /* dense: [n] each */
-    double *batch, *sum, *square, *mean, *variance;
+    int R; /* replicates of pixels that share walks; 0: pixels share none */
+    /* dense: [n] each; tile: variance of sums over the tile, from of_tile [R][n] */
+    double *batch, *sum, *square, *mean, *variance, *tile, *of_tile;
+    /* hash: of each entry [R] sums over the tile */
+    double *singles_of_tile;
+    imp_spec *triples_of_tile;
+    size_t cap_singles_of_tile, cap_triples_of_tile;
     /* hash: open addressing; entries in order of arrival, `touched` of the pixel */
     struct imp__tally_slot {
         uint32_t key, entry; /* IMP__TALLY_SINGLE for singles + index + 1; 0: free */
@@ -52,26 +58,32 @@ struct imp_tally {
     } touched_triples, touched_singles;
 };
 
+/* R: replicates of pixels that share walks; 0: of others. */
 enum imp_status imp__tally_create(imp_context *ctx, const struct imp_active *active,
-                                  int lanes, struct imp_tally *out);
+                                  int lanes, int R, struct imp_tally *out);
 void imp__tally_destroy(struct imp_tally *t);
 /* Between tiles. */
 void imp__tally_clear(struct imp_tally *t);
-/* After the sweeps of one replicate. */
-void imp__tally_batch(struct imp_tally *t);
+/* After the sweeps of one replicate, number b of the pixel. */
+void imp__tally_batch(struct imp_tally *t, int b);
 /* After a pixel's `replicates`: tile mean += by_mean sum, tile variance += by_variance
  * (sum of squares - sum^2/replicates). */
 void imp__tally_pixel(struct imp_tally *t, double replicates, double by_mean,
                       double by_variance);
+/* Few numbers, after a tile whose pixels share walks: the variance of sums over it,
+ * by_variance (sum of squares - sum^2/R). */
+void imp__tally_tile(struct imp_tally *t, double by_variance);
 
-/* Few numbers: mean and variance of the tile, [2][n] in x's order. */
+/* Few numbers: mean, variance and, where pixels share walks, that of sums over the tile,
+ * [3][n] in x's order. */
 static inline const double *imp__tally_dense(const struct imp_tally *t)
 {
     return t->mean;
 }
 /* Many numbers: add mean and variance of the tile to sums in x's order; variance may be
- * NULL. */
-void imp__tally_flush(const struct imp_tally *t, struct imp_fixed_sum *mean,
-                      struct imp_fixed_sum *variance);
+ * NULL. Where pixels share walks: by_variance as of imp__tally_tile, factor as of
+ * imp__overlap_variance. */
+void imp__tally_flush(const struct imp_tally *t, double by_variance, double factor,
+                      struct imp_fixed_sum *mean, struct imp_fixed_sum *variance);
 
 #endif
