@@ -251,8 +251,11 @@ static void wide(void)
     }
     for (int b = 0; b < R; b++) variance += pow(v[b][0] - mean, 2) / (R * (R - 1));
     test_must(ctx, imp_problem_objective(s.problem, NULL, &s.run, &f, g, NULL));
-    /* Pictures are kept in float. */
-    tap_ok(relative(f.value, mean) < 1e-5 && relative(f.se, sqrt(variance)) < 1e-4,
+    /* Pictures are kept in float. Errors count what tiles have in common, with more degrees
+     * of freedom than the three of whole pictures (stat/wide_errors). */
+    const double by_pictures = sqrt(variance);
+    tap_ok(relative(f.value, mean) < 1e-5 && f.se > by_pictures / 3 &&
+               f.se < 3 * by_pictures,
            "wide filter: loss # %g +- %g", f.value, f.se);
     tap_ok(worst_of(g, ref, 3) < 1e-5, "wide filter: gradient # %.1e",
            worst_of(g, ref, 3));
