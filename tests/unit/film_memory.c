@@ -75,10 +75,10 @@ static double peak(enum job job, int side, const char *filter, int spp, int *cha
     return most;
 }
 
-/* Bytes that one pixel more costs. */
+/* Bytes that one pixel more costs. Many samples: of fewer pixels. */
 static double per_pixel(enum job job, const char *filter, int spp, int *channels)
 {
-    const int small = 64, large = 320;
+    const int small = 64, large = spp > 1 ? 160 : 320;
     const double a = peak(job, small, filter, spp, channels);
     const double b = peak(job, large, filter, spp, channels);
     return (b - a) / (large * large - small * small);

@@ -217,7 +217,7 @@ int main(void)
         scene = test_scene_text(ctx, text, IMP_RGB);
         snprintf(text, sizeof text, xml, "gaussian");
         wide = test_scene_text(ctx, text, IMP_RGB);
-        texture = textured(1024);
+        texture = textured(256);
         problem = matching(scene, IMP_LOSS_L2);
         l1_problem = matching(scene, IMP_LOSS_L1);
         wide_problem = matching(wide, IMP_LOSS_L2);
@@ -230,7 +230,7 @@ int main(void)
         check("objective", objective);
         check("objective, L1", objective_l1);
         check("objective through a wide filter", objective_wide);
-        check("objective of a texture of 1024 x 1024", objective_texture);
+        check("objective of a texture of 256 x 256", objective_texture);
         check("reverse", reverse);
         check("forward", forward);
         check("jacobian", jacobian);
