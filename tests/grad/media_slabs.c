@@ -78,12 +78,16 @@ static void check(const struct row *r, bool reflected, double mu, int spp,
     struct imp_run run = IMP_RUN_INIT;
     struct imp_estimate v;
     double g[8], se[8];
-    const double h = 1e-4, tight = (r->tau < 5 ? .25 : 1.5) / sqrt(spp);
+    /* Of the radiance and its derivatives: standard error of one sample, at most. The thick
+     * slab's are a tenth to a quarter above what was measured. */
+    const double thick[4] = {.06, .045, 3.4, 2.6};
+    const double thin[4] = {.05, .25 / fmax(1, r->tau), .25, .25};
+    const double *most = r->tau < 5 ? thin : thick, h = 1e-4;
     run.spp = spp;
     run.seed = 7;
     test_must(ctx, imp_problem_functional(p, NULL, &run, &v, g, se));
-    agrees(v, truth(r, reflected, mu, r->tau, r->albedo, r->g), tight * .2, r, "radiance",
-           reflected, mu);
+    agrees(v, truth(r, reflected, mu, r->tau, r->albedo, r->g), most[0] / sqrt(spp), r,
+           "radiance", reflected, mu);
     static const char *const names[] = {"fog.sigma_t.value", "fog.albedo.value",
                                         "fog.phase.g.value"};
     for (int k = 0; k < (strcmp(r->phase, "hg") == 0 ? 3 : 2); k++) {
@@ -94,8 +98,7 @@ static void check(const struct row *r, bool reflected, double mu, int spp,
         at[k] += 2 * h;
         const double above = truth(r, reflected, mu, at[0], at[1], at[2]);
         agrees((struct imp_estimate){g[i], se[i], 0}, (above - below) / (2 * h),
-               tight * (r->tau < 5 ? 1 : 3) * (k == 0 ? 1 / fmax(1, r->tau) : 1), r,
-               names[k], reflected, mu);
+               most[k + 1] / sqrt(spp), r, names[k], reflected, mu);
     }
     imp_problem_destroy(p);
     imp_scene_destroy(s);
