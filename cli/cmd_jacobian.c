@@ -215,7 +215,7 @@ static int run_jacobian(int n, char **operand)
     group = cli_alloc(n_x, sizeof *group);
     const int n_groups = group_numbers(blocks, n_blocks, group);
     enum imp_status st = imp_problem_jacobian(problem, &run, &primal, films);
-    if (primal && !cli_failed(st)) {
+    if (st == IMP_PART || (primal && !cli_failed(st))) {
         progress_resume(); /* a time limit was that of the pictures */
         st = imp_problem_jacobian_sums(problem, NULL, &run, primal, films, group,
                                        n_groups, &mean, means);

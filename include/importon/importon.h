@@ -880,7 +880,8 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_problem_jacobian(imp_problem *problem
  * F = sum(adjoint * picture) of the pictures that imp_problem_jacobian made, with
  * standard errors taken sample by sample (see imp_problem_functional): of the picture
  * itself, and of groups of derivative pictures, such as the three numbers of a colour. At
- * most a quarter of the pictures' walks (but 16 per pixel) are made again.
+ * most a quarter of the pictures' walks (but 16 per pixel) are made again, without the
+ * pictures: a part of them (imp_parts_create) is made with primal and films NULL.
  * @param adjoint  as imp_problem_functional's.
  * @param run      that of imp_problem_jacobian; with a time limit, it is not one here.
  * @param primal   the picture; borrowed.

@@ -15,7 +15,7 @@
 
 #define MAGIC       "impparts"
 #define PARTS_ORDER 0x01020304u
-#define VERSION     1
+#define VERSION     2
 
 struct message {
     size_t at, size; /* in the bytes of its file */

@@ -11,9 +11,14 @@
 enum { WIDTH = 20, HEIGHT = 14, PIXELS = WIDTH * HEIGHT * 3, TEXELS = 20, SPP = 18 };
 enum { MANY = TEXELS * TEXELS * 3 + 64 }; /* more than 1,024: summed in fixed point */
 
-enum job { PICTURE, LOSS, TEXTURE, REVERSE, JACOBIAN, JOBS, FIT = JOBS };
-static const char *const names[] = {"picture", "loss and gradient",
-                                    "gradient of a texture", "adjoint image", "Jacobian"};
+enum job { PICTURE, LOSS, TEXTURE, REVERSE, JACOBIAN, MEAN, JOBS, FIT = JOBS };
+static const char *const names[] = {"picture",
+                                    "loss and gradient",
+                                    "gradient of a texture",
+                                    "adjoint image",
+                                    "Jacobian and its table",
+                                    "mean of a picture",
+                                    "fit"};
 
 /* All that is compared, bit by bit. */
 struct result {
@@ -122,12 +127,32 @@ static enum imp_status job_run(imp_context *ctx, imp_scene *s, enum job job,
     case REVERSE:
         st = imp_problem_reverse(p, target, &run, r->gradient, r->gradient_se);
         break;
-    case JACOBIAN:
-        st = imp_problem_jacobian(p, &run, NULL, films);
+    case JACOBIAN: {
+        struct imp_estimate sums[2];
+        const int group[3] = {0, 1, 0};
+        st = imp_problem_jacobian(p, &run, &film, films);
+        if (st != IMP_OK && st != IMP_PART) break;
+        /* The walks of a part, for its pictures and their sums. */
+        const enum imp_status made = imp_problem_jacobian_sums(
+            p, NULL, &run, film, st == IMP_OK ? films : NULL, group, 2, &e, sums);
+        if (made != st) tap_ok(0, "sums of a Jacobian # %s", imp_last_error(ctx));
         if (st != IMP_OK) break;
+        r->objective[0] = e.value;
+        r->objective[1] = e.se;
+        for (int k = 0; k < 2; k++) {
+            r->gradient[k] = sums[k].value;
+            r->gradient_se[k] = sums[k].se;
+        }
         film_take(films[2], r);
         imp_film_destroy(films[1]);
         imp_film_destroy(films[0]);
+        imp_film_destroy(film);
+        break;
+    }
+    case MEAN:
+        st = imp_problem_functional(p, NULL, &run, &e, r->gradient, r->gradient_se);
+        r->objective[0] = e.value;
+        r->objective[1] = e.se;
         break;
     default: {
         struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
@@ -407,9 +432,6 @@ static void members_reset(void)
 
 static void teams(const char *filter)
 {
-    static const char *const all[] = {
-        "picture",       "loss and gradient", "gradient of a texture",
-        "adjoint image", "Jacobian",          "fit"};
     static struct result whole;
     for (enum job job = 0; job <= FIT; job++) {
         int same = 0, want = 0;
@@ -425,7 +447,7 @@ static void teams(const char *filter)
             }
         }
         tap_ok(same == want, "%s, %s: 2, 3 and 7 ranks, each has the bits # %d of %d",
-               all[job], filter, same, want);
+               names[job], filter, same, want);
     }
 }
 
