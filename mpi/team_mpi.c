@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The two functions of a team by MPI.
+ * The functions of a team by MPI.
  *
  * A gather begins with a head from every rank: how many bytes it has, or that it has
  * ended. Waiting is a loop of tests with short sleeps, so that ranks that wait leave the
@@ -290,6 +290,35 @@ static enum imp_status gather(const void *message, size_t bytes, receive_fn *rec
     return good ? IMP_OK : IMP_E_IO;
 }
 
+/* ---- Sums ---------------------------------------------------------------------------- */
+
+static enum imp_status sum(int64_t *numbers, size_t n, void *payload)
+{
+    struct imp_mpi *m = payload;
+    const size_t piece = PIECE / sizeof *numbers;
+    if (m->over) return IMP_E_IO;
+    if (m->asked) (void)answer_take(m);
+    /* A rank that has ended is met by its head. */
+    if (m->over || !heads_exchange(m, (struct head){0, MESSAGE, 0})) return IMP_E_IO;
+    for (int k = 0; k < m->ranks; k++) {
+        if (m->heads[k].kind != ENDED) continue;
+        endings(m, "", NULL, NULL);
+        return IMP_E_IO;
+    }
+    for (size_t at = 0; at < n; at += piece) {
+        const size_t here = n - at < piece ? n - at : piece;
+        MPI_Request request;
+        pthread_mutex_lock(&m->lock);
+        MPI_Iallreduce(MPI_IN_PLACE, numbers + at, (int)here, MPI_INT64_T, MPI_SUM,
+                       m->comm, &request);
+        pthread_mutex_unlock(&m->lock);
+        if (!wait_for(m, &request)) return IMP_E_IO;
+    }
+    m->sent += 2 * n * sizeof *numbers;
+    m->received += 2 * n * sizeof *numbers;
+    return IMP_OK;
+}
+
 /* ---- Public -------------------------------------------------------------------------- */
 
 /* Do all ranks share memory? Then the counter is there. */
@@ -323,7 +352,7 @@ enum imp_status imp_mpi_open(const struct imp_mpi_options *options, imp_mpi **ou
 {
     struct imp_mpi_options o = IMP_MPI_OPTIONS_INIT;
     int is = 0, level = 0;
-    if (!out || !team || team->size < offsetof(struct imp_team, payload))
+    if (!out || !team || team->size < offsetof(struct imp_team, broadcast))
         return IMP_E_ARG;
     if (options && options->size != sizeof o) return IMP_E_ARG;
     if (options) o = *options;
@@ -360,6 +389,7 @@ enum imp_status imp_mpi_open(const struct imp_mpi_options *options, imp_mpi **ou
     team->ranks = m->ranks;
     team->gather = gather;
     team->next = next;
+    if (team->size >= sizeof *team) team->sum = sum;
     team->payload = m;
     *out = m;
     return IMP_OK;

@@ -4,16 +4,18 @@
 
 Every rank gives its nodes of the tree of sums to all (src/base/team_sum.c): at most one for each
 of the 16 chunks of work that it takes, of 24 bytes for the place and the sum itself, after a
-head of 768 bytes; textures and grids go in fixed point (src/base/team.c), at most all their
-blocks from each rank. A rank receives what all send; a ring passes it on at the speed of one link,
-in ranks - 1 steps of 10 us.
+head of 784 bytes. A rank receives what all send; a ring passes it on at the speed of one link,
+in ranks - 1 steps of 10 us. Textures and grids go in fixed point (src/base/team_fixed.c): the blocks
+that any rank has touched are added up on the way in pieces of 2^20 numbers, which takes two times
+their bytes from each link (Rabenseifner's algorithm) and 2 log2(ranks) steps a piece.
 
     tools/plan_ranks.py [RANKS...]      the table, for 64, 1000 and 10000 by default
 """
 import math
 import sys
 
-CHUNKS, PLACE, HEAD, LATENCY = 16, 24, 768, 10e-6
+CHUNKS, PLACE, HEAD, LATENCY = 16, 24, 784, 10e-6
+FIXED_HEAD, PIECE = 48, 1 << 20
 WIDTH, HEIGHT, SUMS = 1920, 1080, 7  # of a pixel: three means, three squares, a weight
 TEXELS = 3 * 1024 * 1024
 ITEMS = 1 << 20  # of work in the step
@@ -30,12 +32,21 @@ def picture(ranks):
 
 
 def texture(ranks):
-    """The worst case: every rank touches all blocks; mean, and spread in two parts."""
-    return ranks * (HEAD + 3 * 8 * TEXELS)
+    """The worst case: all blocks are touched; mean, and spread in two parts."""
+    return ranks * 2 * FIXED_HEAD + 2 * 3 * 8 * TEXELS
 
 
-def seconds(received, ranks, gigabits):
-    return received * 8 / (gigabits * 1e9) + (ranks - 1) * LATENCY
+def seconds(received, ranks, gigabits, steps):
+    return received * 8 / (gigabits * 1e9) + steps * LATENCY
+
+
+def ring(ranks):
+    return ranks - 1
+
+
+def pieces(ranks):
+    """Heads by a ring, then the pieces of all three arrays."""
+    return 2 * ring(ranks) + math.ceil(3 * TEXELS / PIECE) * 2 * math.ceil(math.log2(ranks))
 
 
 def size(n):
@@ -47,16 +58,17 @@ def size(n):
 
 def main():
     ranks = [int(a) for a in sys.argv[1:]] or [64, 1000, 10000]
-    rows = [("gradient, %d numbers" % k, lambda r, k=k: gradient(r, k)) for k in (10, 100, 1000)]
-    rows += [("picture, %d x %d" % (WIDTH, HEIGHT), picture), ("texture of 3.1 million, all touched", texture)]
+    rows = [("gradient, %d numbers" % k, lambda r, k=k: gradient(r, k), ring) for k in (10, 100, 1000)]
+    rows += [("picture, %d x %d" % (WIDTH, HEIGHT), picture, ring),
+             ("texture of 3.1 million, all touched", texture, pieces)]
     print("Depth of the tree over %d items: %d." % (ITEMS, math.ceil(math.log2(ITEMS))))
     print()
     print("| a step | ranks | received by each | at 1 Gbit/s | at 25 Gbit/s |")
     print("|---|---|---|---|---|")
-    for name, bytes_of in rows:
+    for name, bytes_of, steps in rows:
         for r in ranks:
             n = bytes_of(r)
-            print("| %s | %d | %s | %.3g s | %.3g s |" % (name, r, size(n), seconds(n, r, 1), seconds(n, r, 25)))
+            print("| %s | %d | %s | %.3g s | %.3g s |" % (name, r, size(n), seconds(n, r, 1, steps(r)), seconds(n, r, 25, steps(r))))
 
 
 main()

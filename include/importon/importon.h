@@ -139,10 +139,15 @@ struct imp_team {
     void *payload;
     /** Non-zero: rank 0 reads files and gives their bytes to all. 0: each reads them. */
     int broadcast;
+    /** Put the sums over all ranks in the place of numbers [n]: what an MPI_Allreduce of
+     * MPI_INT64_T does. Gradients of textures and grids then cost a rank bytes that do not
+     * grow with the ranks. All ranks have equal n. NULL: they are gathered.
+     * @return as gather. */
+    enum imp_status (*sum)(int64_t *numbers, size_t n, void *payload);
 };
 #define IMP_TEAM_INIT                                                                    \
     {                                                                                    \
-        sizeof(struct imp_team), 0, 1, 0, 0, 0, 0                                        \
+        sizeof(struct imp_team), 0, 1, 0, 0, 0, 0, 0                                     \
     }
 
 /** Work on this context's calls from now on as one rank of a team; NULL: alone again.

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * importon with MPI: the two functions of a team (importon.h, "Many processes"), by Open
+ * importon with MPI: the functions of a team (importon.h, "Many processes"), by Open
  * MPI (libimporton-openmpi) or by MPICH (libimporton-mpich). libimporton links neither;
  * a host links the one it was built for, or opens it when it finds itself started by
  * mpirun, as the command does:
@@ -36,8 +36,8 @@ struct imp_mpi_options {
     }
 
 /** Join: MPI_Init_thread with MPI_THREAD_SERIALIZED unless the host has done it, and then
- * MPI_Finalize when closed. `team` gets rank, ranks, gather, next and payload; it is to be
- * left (imp_context_set_team with NULL, or the end of the context) before imp_mpi_close.
+ * MPI_Finalize when closed. `team` gets rank, ranks, gather, next, sum and payload; it is
+ * to be left (imp_context_set_team with NULL, or the end of the context) before imp_mpi_close.
  * @param options NULL for the defaults.
  * @return IMP_OK; IMP_E_ARG; IMP_E_UNSUPPORTED if MPI allows one thread only; IMP_E_NOMEM.
  */
@@ -56,7 +56,8 @@ IMP_API void imp_mpi_end(imp_mpi *mpi, int *code, const char *text,
                          void (*said)(int rank, const char *text, void *payload),
                          void *payload);
 
-/** Bytes that this rank has sent, and received from others, in gathers. */
+/** Bytes that this rank has sent, and received from others, in gathers and sums; of a
+ * sum, those that the best algorithms need: twice its numbers. */
 IMP_API void imp_mpi_traffic(const imp_mpi *mpi, uint64_t *sent, uint64_t *received);
 
 /** Free; without imp_mpi_end before, that first. mpi NULL: nothing happens. */

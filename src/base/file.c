@@ -47,8 +47,8 @@ void imp__bytes_free(imp_context *ctx, struct imp_bytes *b)
     *b = (struct imp_bytes){0};
 }
 
-static enum imp_status own_read(imp_context *ctx, const char *path, size_t limit,
-                                struct imp_bytes *out)
+enum imp_status imp__file_read_own(imp_context *ctx, const char *path, size_t limit,
+                                   struct imp_bytes *out)
 {
     enum imp_status st = IMP_OK;
     struct imp_bytes b = {0};
@@ -102,7 +102,8 @@ enum imp_status imp__file_read(imp_context *ctx, const char *path, size_t limit,
     struct imp_bytes bytes = {0};
     enum imp_status st = IMP_OK;
     const bool broadcasts = imp__team_broadcasts(ctx);
-    if (!broadcasts || ctx->team->host.rank == 0) st = own_read(ctx, path, limit, &bytes);
+    if (!broadcasts || ctx->team->host.rank == 0)
+        st = imp__file_read_own(ctx, path, limit, &bytes);
     if (broadcasts) st = imp__team_broadcast(ctx, st, &bytes);
     if (st != IMP_OK) return st;
     if (ctx->on_read) ctx->on_read(ctx->on_read_payload, path, bytes.data, bytes.size);

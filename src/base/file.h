@@ -16,6 +16,9 @@ struct imp_bytes { /* growing memory; all zero is empty */
  * is a folder, or is longer than `limit`; IMP_E_NOMEM. */
 enum imp_status imp__file_read(imp_context *ctx, const char *path, size_t limit,
                                struct imp_bytes *out);
+/* As imp__file_read, by this process for itself, of a file that is no input of a run. */
+enum imp_status imp__file_read_own(imp_context *ctx, const char *path, size_t limit,
+                                   struct imp_bytes *out);
 /* For reading, as fopen: *out NULL and IMP_OK if there is no such file. `held` keeps bytes
  * that come from another process: free them when the file is closed. */
 enum imp_status imp__file_open(imp_context *ctx, const char *path, struct imp_bytes *held,

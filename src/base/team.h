@@ -30,6 +30,9 @@ struct imp__team {
     struct imp_team host;
     enum imp_team_role role;
     uint64_t round;
+    /* Hash of the parameters and random numbers of the present call: ranks that follow an
+     * optimiser of their own find out where one of them has left the others. 0: none. */
+    uint64_t state;
     int alone;                   /* > 0: inside of what every rank computes whole */
     bool (*pick)(void *payload); /* is the next chunk verified? */
     bool in_fixed;               /* recorded: there were sums in fixed point */

@@ -20,6 +20,7 @@
 #include "gauss_newton.h"
 #include "adjoint.h"
 #include "film/film_filter.h"
+#include "film/parts.h"
 #include "loss.h"
 #include "normal_tiles.h"
 
@@ -134,6 +135,7 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
                            "%zu numbers are active; Gauss-Newton takes 1 to %d", p->n,
                            GAUSS_NEWTON_MAX));
     if (x) IMP_TRY(imp_problem_set_x(p, x));
+    imp__team_state(p->scene, &own);
     j.workers = imp__alloc(ctx, (size_t)ctx->threads, sizeof *j.workers);
     j.total = imp__alloc(ctx, imp__normal_count(j.K), sizeof *j.total);
     if (!j.workers || !j.total)

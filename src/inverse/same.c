@@ -37,6 +37,7 @@ enum imp_status imp__problem_same(struct imp_problem *p, const struct imp_run *r
 {
     struct imp_same same[IMP_SAME_MAX];
     if (!imp__team_shares(p->ctx)) return IMP_OK;
+    imp__team_state(p->scene, run);
     if (!imp__team_apart(p->ctx) && p->same_known) return IMP_OK;
     int n = imp__same_run(p->scene, run, call, same);
     uint64_t what = imp__hash(0, p->chosen, p->scene->n_params);
