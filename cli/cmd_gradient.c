@@ -321,7 +321,7 @@ static int run_gradient(int n, char **operand)
             rc = overwrite_check(path, OUTPUT_CURVE);
             free(path);
         }
-    if (!rc) rc = manifest_begin();
+    if (!rc) rc = manifest_begin(cli.out);
     if (!rc) rc = compute(problem, &run, &r);
     if (!rc) rc = manifest_pause();
     if (!rc) rc = manifest_numbers("value", (double[2]){r.value.value, r.value.se}, 2);

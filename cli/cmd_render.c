@@ -205,7 +205,7 @@ static int run_render(int n, char **operand)
             run.preview = display_preview;
             run.preview_payload = (void *)(uintptr_t)path;
         }
-        rc = manifest_begin();
+        rc = manifest_begin(path);
         const enum imp_status st = rc ? IMP_OK : imp_render(cli.scene, &run, &film);
         if (cli_failed(st)) rc = cli_fail(st, cli.scene_path);
         if (!rc) rc = manifest_pause();

@@ -59,6 +59,7 @@ struct cli {
     uint64_t seed;
     double time_s;
     const char *manifest_path;
+    int no_manifest;             /* none beside an output file */
     imp_manifest *manifest;      /* in the making, or what is verified */
     int verifies;                /* results are compared, and not written */
     int mpi_files;               /* how ranks read files: as it is written */

@@ -35,10 +35,10 @@ int part_begin(void)
 /* Options that do not change the result. */
 static int aside(const char *option)
 {
-    static const char *const names[] = {"part",     "output",     "overwrite", "threads",
-                                        "json",     "progress",   "quiet",     "help",
-                                        "manifest", "checkpoint", "resume",    "sheet",
-                                        "textures", "mpi-files",  "display"};
+    static const char *const names[] = {
+        "part",     "output",    "overwrite", "threads",    "json",   "progress",
+        "quiet",    "help",      "manifest",  "checkpoint", "resume", "sheet",
+        "textures", "mpi-files", "display",   "no-manifest"};
     const size_t n = strcspn(option + 2, "=");
     for (size_t k = 0; k < sizeof names / sizeof *names; k++)
         if (strlen(names[k]) == n && !strncmp(option + 2, names[k], n)) return 1;

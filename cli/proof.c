@@ -9,31 +9,39 @@
 
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+
+static char *beside; /* where the manifest goes that nobody asked for; NULL: nowhere */
 
 static int status(enum imp_status st) { return st == IMP_OK ? 0 : cli_fail(st, NULL); }
 
-int manifest_open(void)
+static int is_manifest_command(void)
 {
     static const char *const commands[] = {"render", "gradient", "fit"};
-    int known = 0;
-    if (!cli.manifest_path) return 0;
     for (size_t k = 0; k < sizeof commands / sizeof *commands; k++)
-        known |= !strcmp(cli.name, commands[k]);
-    if (!known)
-        return cli_error(EXIT_USAGE, "%s: --manifest is for render, gradient and fit",
-                         cli.name);
+        if (!strcmp(cli.name, commands[k])) return 1;
+    return 0;
+}
+
+/* Why the run cannot be repeated; NULL: it can. */
+static const char *unrepeatable(void)
+{
+    if (!is_manifest_command()) return "--manifest is for render, gradient and fit";
     if (cli.time_s > 0)
-        return cli_error(EXIT_USAGE,
-                         "%s: --manifest and --time do not go together: a clock cannot "
-                         "be repeated",
-                         cli.name);
+        return "--manifest and --time do not go together: a clock cannot be repeated";
     for (int k = 0; k < cli.n_operands; k++)
         if (!strcmp(cli.operand[k], "-"))
-            return cli_error(EXIT_USAGE,
-                             "%s: what comes from standard input cannot be verified "
-                             "later: --manifest needs files",
-                             cli.name);
-    int rc = overwrite_check(cli.manifest_path, OUTPUT_MANIFEST);
+            return "what comes from standard input cannot be verified later: --manifest "
+                   "needs files";
+    return NULL;
+}
+
+int manifest_open(void)
+{
+    const char *why = unrepeatable();
+    if (!cli.manifest_path && (cli.no_manifest || why)) return 0;
+    if (why) return cli_error(EXIT_USAGE, "%s: %s", cli.name, why);
+    int rc = cli.manifest_path ? overwrite_check(cli.manifest_path, OUTPUT_MANIFEST) : 0;
     if (rc) return rc;
     char *text = part_command();
     if (!text) return cli_error(EXIT_RUN, "out of memory");
@@ -42,14 +50,51 @@ int manifest_open(void)
     return rc;
 }
 
-int manifest_begin(void)
+static void beside_drop(void)
 {
-    if (!cli.manifest) return 0;
-    return status(imp_context_set_manifest(cli.context, cli.manifest));
+    imp_manifest_destroy(cli.manifest);
+    cli.manifest = NULL;
+    free(beside);
+    beside = NULL;
+}
+
+/* Not a pipe or a device, which cannot be read again. */
+static int is_file_or_none(const char *path)
+{
+    struct stat s;
+    return stat(path, &s) != 0 || S_ISREG(s.st_mode) || S_ISDIR(s.st_mode);
+}
+static int replaceable(const char *path)
+{
+    char magic[8] = "";
+    FILE *file = fopen(path, "rb");
+    if (!file) return 1;
+    const size_t n = fread(magic, 1, sizeof magic, file);
+    fclose(file);
+    return n == 0 || !memcmp(magic, "impproof", sizeof magic);
+}
+
+int manifest_begin(const char *output)
+{
+    if (!cli.manifest || cli.verifies || cli.manifest_path)
+        return cli.manifest ? status(imp_context_set_manifest(cli.context, cli.manifest))
+                            : 0;
+    /* Beside an output file, without sums: these would be kept chunk by chunk. */
+    if (!output || !strcmp(output, "-") || !is_file_or_none(output)) {
+        beside_drop();
+        return 0;
+    }
+    beside = cli_alloc(strlen(output) + sizeof "/.manifest", 1);
+    sprintf(beside, strcmp(cli.name, "fit") ? "%s.manifest" : "%s/manifest", output);
+    if (replaceable(beside)) return 0;
+    cli_say("importon: warning: %s is no manifest, and stays", beside);
+    beside_drop();
+    return 0;
 }
 int manifest_pause(void)
 {
-    return cli.manifest ? status(imp_context_set_manifest(cli.context, NULL)) : 0;
+    return cli.manifest && !beside ? status(imp_context_set_manifest(cli.context, NULL))
+                                   : 0;
 }
 
 int manifest_numbers(const char *name, const double *x, size_t n)
@@ -84,9 +129,19 @@ int manifest_output(const char *path)
 
 int manifest_end(int rc)
 {
-    if (!cli.manifest || cli.verifies || rc != EXIT_DONE || progress_interrupted())
-        return rc;
+    enum imp_status st = IMP_OK;
+    if (!cli.manifest || cli.verifies || rc != EXIT_DONE || progress_interrupted() ||
+        !(beside || cli.manifest_path))
+        goto out;
     /* Of commands that print, the answer. */
     if (!strcmp(cli.name, "gradient") && cli.out) rc = manifest_output(cli.out);
-    return rc ? rc : status(imp_manifest_write(cli.manifest, cli.manifest_path));
+    if (!rc) st = imp_manifest_write(cli.manifest, beside ? beside : cli.manifest_path);
+    /* The result is there; without one that was asked for, the run has failed. */
+    if (st != IMP_OK && beside)
+        cli_say("importon: warning: no manifest: %s", imp_last_error(cli.context));
+    else rc = rc ? rc : status(st);
+out:
+    free(beside);
+    beside = NULL;
+    return rc;
 }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * --manifest FILE: what a result was made from, for importon verify. */
+ * Manifests, what a result was made from, for importon verify: --manifest FILE, or beside
+ * an output file. */
 #ifndef IMP_CLI_PROOF_H
 #define IMP_CLI_PROOF_H
 
@@ -8,8 +9,9 @@
 
 /* Begin the manifest of the context that was just made. 0, or an exit code. */
 int manifest_open(void);
-/* Around the calls whose sums are kept, or verified. 0, or an exit code. */
-int manifest_begin(void);
+/* Around the calls whose sums are kept, or verified; `output` is the file, or folder, that
+ * gets the result, NULL: none. 0, or an exit code. */
+int manifest_begin(const char *output);
 int manifest_pause(void);
 /* Results, by name; nothing where there is no manifest. 0, or an exit code. */
 int manifest_numbers(const char *name, const double *x, size_t n);

@@ -43,3 +43,14 @@ importon render scene.xml --manifest scene.xml
 importon verify picture.proof --fraction 0
 importon verify picture.proof --fraction 1e-6 --seed 1
 echo "exit $?"
+# Without being asked for, a small manifest stands beside an output file.
+"${render[@]}" -o other.exr
+importon verify other.exr.manifest
+importon verify other.exr.manifest --fraction 0.5
+"${render[@]}" -o none.exr --no-manifest
+"${render[@]}" -o none.exr --time 1
+"${gradient[@]}" -o - >none.txt
+echo "a file of another kind" >none.exr.manifest
+"${render[@]}" -o none.exr
+ls | grep none
+cat none.exr.manifest
