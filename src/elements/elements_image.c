@@ -3,6 +3,7 @@
  * Pictures of a solution: flat, interpolated without cracks, with a final gather, and of
  * the importance. */
 #include "base/film.h"
+#include "base/team.h"
 #include "elements.h"
 #include <string.h>
 
@@ -198,12 +199,17 @@ struct picture {
     imp_film *film;
 };
 
-static enum imp_status row_work(size_t item, int worker, int slot, void *payload)
+static size_t row_bytes(const struct picture *p)
+{
+    return (size_t)p->film->width * (size_t)p->film->channels * sizeof(float);
+}
+
+static enum imp_status row_work(size_t item, int worker, void *result, void *payload)
 {
     const struct picture *p = payload;
     const imp_elements *e = p->e;
     const int n = p->side * p->side, channels = p->film->channels;
-    (void)worker, (void)slot;
+    (void)worker;
     for (int x = 0; x < p->film->width; x++) {
         double sum[3] = {0};
         for (int k = 0; k < n; k++) {
@@ -220,10 +226,16 @@ static enum imp_status row_work(size_t item, int worker, int slot, void *payload
             }
             for (int c = 0; c < channels; c++) sum[c] += out[c];
         }
-        float *pixel = p->film->mean +
-                       (item * (size_t)p->film->width + (size_t)x) * (size_t)channels;
+        float *pixel = (float *)result + (size_t)x * (size_t)channels;
         for (int c = 0; c < channels; c++) pixel[c] = (float)(sum[c] / n);
     }
+    return IMP_OK;
+}
+
+static enum imp_status row_take(size_t row, void *sum, void *payload)
+{
+    const struct picture *p = payload;
+    memcpy(p->film->mean + row * row_bytes(p) / sizeof(float), sum, row_bytes(p));
     return IMP_OK;
 }
 
@@ -255,9 +267,20 @@ enum imp_status imp_elements_image(const imp_elements *e, int sensor,
                                                              : "R,G,B",
                              false, &p.film));
     p.film->spp = (int64_t)p.side * p.side;
-    const struct imp_loop loop = {
-        .n_items = (size_t)f->crop_h, .work = row_work, .payload = &p};
-    IMP_TRY(imp__parallel(e->ctx, &loop, NULL));
+    /* Rows are shared by the ranks of a team; each is a sum of its own. */
+    const struct imp_loop loop = {.n_items = (size_t)f->crop_h, .payload = &p};
+    const struct imp_sum_desc desc = {.n_items = loop.n_items,
+                                      .group = 1,
+                                      .size = row_bytes(&p),
+                                      .take = row_take,
+                                      .payload = &p};
+    struct imp_drops none = {0};
+    struct imp_shared shared = {.drops = &none};
+    const bool apart = imp__team_apart(e->ctx);
+    if (apart) e->ctx->team->alone++;
+    st = imp__shared_sum(e->ctx, &loop, &desc, row_work, &shared);
+    if (apart) e->ctx->team->alone--;
+    IMP_TRY(st);
     *out = p.film;
     p.film = NULL;
 out:
