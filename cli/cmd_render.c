@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * importon render: a picture with its standard errors; or single walks, to look at. */
+#include "check_rows.h"
 #include "cmd_picture.h"
 #include "command.h"
 #include "display.h"
@@ -18,7 +19,7 @@
 
 static struct {
     struct picture_options picture;
-    int pixel[2], sample, count, denoise;
+    int pixel[2], sample, count, denoise, sampling;
     const char *paths;
 } o = {.pixel = {NO_PIXEL, NO_PIXEL}};
 
@@ -43,6 +44,10 @@ static const struct arg_option options[] = {
      NULL},
     {ARG_INT, 0, "count", "N", "number of walks for --paths (default 100)", &o.count, 1,
      1e7, NULL},
+    {ARG_FLAG, 0, "verify-sampling", NULL,
+     "compare the picture with one of uniform directions, and tell who delivers its "
+     "light",
+     &o.sampling, 0, 0, NULL},
     {0}};
 
 static int describe(const struct imp_run *run, int x, int y, int64_t sample, int json,
@@ -119,7 +124,25 @@ static void report_drops(const struct imp_film_info *info)
                 (unsigned long long)info->drop_keys[0].seed);
 }
 
-static void report(const char *path, imp_film *film, const struct imp_run *run)
+/* The picture as drawn against uniform directions: rows of `importon check`. */
+struct sampling {
+    imp_problem *problem; /* holds the rows */
+    const struct imp_check_row *rows;
+    size_t n;
+};
+static int sampling_check(const struct imp_run *run, struct sampling *s)
+{
+    struct imp_check_options check = IMP_CHECK_OPTIONS_INIT;
+    struct imp_run again = *run;
+    check.sampling = 1;
+    again.preview = NULL;
+    enum imp_status st = imp_problem_create(cli.scene, &s->problem);
+    if (st == IMP_OK) st = imp_check(s->problem, &check, &again, &s->rows, &s->n);
+    return cli_failed(st) ? cli_fail(st, cli.scene_path) : 0;
+}
+
+static void report(const char *path, imp_film *film, const struct imp_run *run,
+                   const struct sampling *sampling)
 {
     struct imp_film_info info = {.size = sizeof info};
     imp_film_get_info(film, &info);
@@ -130,6 +153,7 @@ static void report(const char *path, imp_film *film, const struct imp_run *run)
                 ? ", interrupted"
                 : ", interrupted in the first pass: a part of the picture is there");
     report_drops(&info);
+    if (!cli.json && sampling->rows) check_rows_print(sampling->rows, sampling->n);
     if (!cli.json || !strcmp(path, "-")) return;
     struct json j = cli_json();
     json_text(&j, "file", path);
@@ -156,6 +180,11 @@ static void report(const char *path, imp_film *film, const struct imp_run *run)
         json_end_object(&j);
     }
     json_end_array(&j);
+    if (sampling->rows) {
+        json_object(&j, "sampling");
+        check_rows_json(&j, sampling->rows, sampling->n);
+        json_end_object(&j);
+    }
     cli_json_end(&j);
 }
 
@@ -173,11 +202,31 @@ static int denoise(const struct imp_run *run, imp_film **film)
     return st == IMP_OK ? 0 : cli_fail(st, cli.scene_path);
 }
 
+/* What does not go with --verify-sampling. 0, or an exit code. */
+static int sampling_refused(void)
+{
+    if (o.pixel[0] != NO_PIXEL || o.paths)
+        return cli_error(EXIT_USAGE, "--verify-sampling is about the picture: not with "
+                                     "--pixel and --paths");
+    if (cli.part || cli.manifest_path || cli.verifies)
+        return cli_error(EXIT_USAGE,
+                         "--verify-sampling of render: not with parts and "
+                         "manifests; 'importon check --verify-sampling' takes "
+                         "them");
+    if (cli.out && !strcmp(cli.out, "-"))
+        return cli_error(EXIT_USAGE,
+                         "--verify-sampling prints a table: write the picture "
+                         "to a file");
+    return 0;
+}
+
 static int run_render(int n, char **operand)
 {
     imp_film *film = NULL;
+    struct sampling sampling = {NULL, NULL, 0};
     (void)n;
-    int rc = cli_load(operand[0]);
+    int rc = o.sampling ? sampling_refused() : 0;
+    if (!rc) rc = cli_load(operand[0]);
     if (rc) return rc;
     struct imp_run run = cli_run();
     const int one = o.pixel[0] != NO_PIXEL;
@@ -222,11 +271,16 @@ static int run_render(int n, char **operand)
         if (!rc) picture_stamp(film, &run);
         if (!rc) rc = picture_write(film, path, &o.picture);
         if (!rc) rc = manifest_output(path);
-        if (!rc) report(path, film, &run);
+        if (!rc && o.sampling && !progress_interrupted())
+            rc = sampling_check(&run, &sampling);
+        if (!rc) report(path, film, &run, &sampling);
     }
     imp_film_destroy(film);
     free(automatic);
-    return rc ? rc : cli_done();
+    if (!rc) rc = cli_done();
+    if (!rc && check_rows_count(sampling.rows, sampling.n, 0)) rc = EXIT_NO;
+    imp_problem_destroy(sampling.problem);
+    return rc;
 }
 
 const struct command command_render = {

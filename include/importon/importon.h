@@ -1050,8 +1050,9 @@ struct imp_check_options {
      * uniformly and lights met by chance, are compared in 8 x 8 blocks: rows "uniform",
      * the worst block of each channel, and chi-square of all. Rows "energy": the part of
      * the light that arrives through directions that a density drew at the first choice
-     * of a walk (value), and the part of these directions (reference). Rows "aim": the
-     * part of the directions towards a proxy in which anything lies. */
+     * of a walk (value), and the part of these directions (reference); also of
+     * each light and proxy, where there are several, 16 at most. Rows "aim": the part of
+     * the directions towards a proxy in which anything lies. */
     int sampling;
 };
 #define IMP_CHECK_OPTIONS_INIT                                                           \

@@ -5,7 +5,7 @@
  * apart), so that the only densities are 1/2pi and 1/4pi. Both pictures are compared
  * block by block, and their z together by chi-square. Rows `energy` give, for each
  * density of the mixture, its part of the directions of first choices and of the energy
- * that arrives through them. */
+ * that arrives through them; where there are several lights or proxies, also for each. */
 #include "check.h"
 #include "film/film_picture.h"
 #include "math/stat.h"
@@ -19,6 +19,7 @@
 #define NOISY    0.05  /* relative error of the oracle that decides nothing */
 #define SECOND   0x5a3 /* distinguishes the seeds of the two pictures */
 #define VERTICES 2000  /* from which rays are sent towards lights and proxies */
+#define AIMS     16    /* lights and proxies with rows of their own, at most */
 
 /* Values of a sample: radiance, then parts of the first channels' sum. */
 enum { MET = IMP_DENSITIES, CONNECTED, PARTS, SQUARE = PARTS + IMP_DENSITIES, LOOKED };
@@ -26,7 +27,42 @@ struct looked {
     struct imp_tracer tracer;
     int channels;
     bool parts;
+    int aims; /* of them energy and draws follow, LOOKED + 2 k */
 };
+
+/* Lights and proxies that get rows of their own: none where one is all of its density. */
+static int aims_told(const struct imp_scene *scene)
+{
+    const struct imp_aims *t = &scene->aims;
+    const bool several = t->n_lights > 1 || t->n - t->n_lights > 1;
+    return t->aimed && several && t->n <= AIMS ? t->n : 0;
+}
+
+/* A direction that was drawn towards lights or proxies, shared out among them by how
+ * probable it is that it was each: S_t p_t(w)/sum, and S_t/sum before w is known. */
+static void aims_add(const struct looked *j, const struct imp_vertex *v, double energy,
+                     double *part)
+{
+    const struct imp_aims *t = &j->tracer.scene->aims;
+    const bool proxies = v->d.drawn == IMP_DENSITY_PROXIES;
+    if (j->aims == 0 || (!proxies && v->d.drawn != IMP_DENSITY_EMITTERS)) return;
+    const int first = proxies ? t->n_lights : 0, end = proxies ? t->n : t->n_lights;
+    const imp_v3 p = imp__decided_v3(v->d.p);
+    double chance[AIMS], along[AIMS], chances = 0, sum = 0;
+    imp__aims_apart(t, p, NULL, chance);
+    for (int k = first; k < end; k++) chances += chance[k];
+    if (v->next) {
+        const imp_v3 next = imp__decided_v3(v->next->d.p);
+        const imp_v3 w = v->next->d.shape >= 0 ? imp__normalize(next - p) : next;
+        imp__aims_apart(t, p, &w, along);
+        for (int k = first; k < end; k++) sum += along[k];
+    }
+    for (int k = first; k < end; k++) {
+        const double drawn = chances > 0 ? chance[k] / chances : 0;
+        part[LOOKED + 2 * k] += energy * (sum > 0 ? along[k] / sum : drawn);
+        part[LOOKED + 2 * k + 1] += drawn;
+    }
+}
 
 static double sum_used(const struct looked *j, imp_spec L)
 {
@@ -46,8 +82,10 @@ static void parts_add(const struct looked *j, const struct imp_walk *walk, imp_s
         for (const struct imp_side *s = v->side; s; s = s->next)
             parts_add(j, &s->walk, P, part);
         if (choice) {
-            part[v->d.drawn] += sum_used(j, P * v->w * v->beyond);
+            const double energy = sum_used(j, P * v->w * v->beyond);
+            part[v->d.drawn] += energy;
             part[PARTS + v->d.drawn] += 1;
+            aims_add(j, v, energy, part);
             return;
         }
         P *= v->w;
@@ -86,7 +124,7 @@ static void sample(const void *payload, struct imp_sample *out)
     imp__sample_walk(out, &j->tracer, &walk);
     for (int c = 0; c < j->channels; c++) out->value[c] = walk.L[c];
     if (!j->parts) return;
-    for (int k = 0; k < LOOKED; k++) part[k] = 0;
+    for (int k = 0; k < LOOKED + 2 * j->aims; k++) part[k] = 0;
     if (walk.dropped || !walk.valid) return;
     parts_add(j, &walk, imp__spec(1), part);
     part[SQUARE] = fmin(square_of(j, &walk), 1e30);
@@ -95,9 +133,10 @@ static void sample(const void *payload, struct imp_sample *out)
 static enum imp_status picture_make(struct imp__check *c, const struct looked *j,
                                     imp_film **out)
 {
-    char names[256] = "R,G,B";
+    const int parts = j->parts ? LOOKED + 2 * j->aims : 0;
+    char names[8 + 5 * (LOOKED + 2 * AIMS)] = "R,G,B";
     if (j->channels == 1) snprintf(names, sizeof names, "Y");
-    for (int k = 0; j->parts && k < LOOKED; k++) {
+    for (int k = 0; k < parts; k++) {
         const size_t n = strlen(names);
         snprintf(names + n, sizeof names - n, ",p%d", k);
     }
@@ -105,7 +144,7 @@ static enum imp_status picture_make(struct imp__check *c, const struct looked *j
     const struct imp_picture picture = {.sensor = j->tracer.sensor,
                                         .stage = "check",
                                         .names = names,
-                                        .n = j->channels + (j->parts ? LOOKED : 0),
+                                        .n = j->channels + parts,
                                         .sample = sample,
                                         .payload = j};
     run.seed = j->tracer.seed;
@@ -215,28 +254,42 @@ out:
 
 /* ---- Energy ---------------------------------------------------------------------- */
 
-static enum imp_status energy_rows(struct imp__check *c, const imp_film *f, int channels)
+/* `drew`: part of the directions; below 0: nothing draws it. */
+static enum imp_status energy_row(struct imp__check *c, const char *name, double arrives,
+                                  double drew)
+{
+    const struct imp_check_row row = {
+        .value = arrives, .reference = drew < 0 ? arrives : drew, .ok = 1};
+    if (!(arrives > 0) && !(row.reference > 0)) return IMP_OK;
+    return imp__check_row(c, "energy", name, -1, &row);
+}
+
+static enum imp_status energy_rows(struct imp__check *c, const imp_film *f,
+                                   const struct looked *j)
 {
     enum imp_status st = IMP_OK;
-    double energy = 0, draws = 0;
-    struct imp_estimate part[PARTS + IMP_DENSITIES];
+    double energy = 0, draws = 0, part[LOOKED + 2 * AIMS];
+    const struct imp_aims *t = &j->tracer.scene->aims;
     const int from[2] = {0, 0}, to[2] = {f->width, f->height};
-    for (int k = 0; k < PARTS + IMP_DENSITIES; k++) {
-        part[k] = block_mean(f, channels + k, from, to);
-        *(k < PARTS ? &energy : &draws) += part[k].value;
-    }
+    for (int k = 0; k < LOOKED + 2 * j->aims; k++)
+        part[k] = block_mean(f, j->channels + k, from, to).value;
+    for (int k = 0; k < PARTS; k++) energy += part[k];
+    for (int k = 0; k < IMP_DENSITIES; k++) draws += part[PARTS + k];
     if (!(energy > 0)) return IMP_OK;
-    for (int k = 0; k < PARTS; k++) {
-        const struct imp_check_row row = {.value = part[k].value / energy,
-                                          .reference = k < MET && draws > 0
-                                                           ? part[PARTS + k].value / draws
-                                                           : part[k].value / energy,
-                                          .ok = 1};
-        const char *name = k == MET         ? "met before"
-                           : k == CONNECTED ? "connections"
-                                            : imp__density_name[k];
-        if (part[k].value > 0 || row.reference > 0)
-            IMP_TRY(imp__check_row(c, "energy", name, -1, &row));
+    for (int k = 0; k < IMP_DENSITIES; k++)
+        IMP_TRY(energy_row(c, imp__density_name[k], part[k] / energy,
+                           draws > 0 ? part[PARTS + k] / draws : 0));
+    IMP_TRY(energy_row(c, "met before", part[MET] / energy, -1));
+    IMP_TRY(energy_row(c, "connections", part[CONNECTED] / energy, -1));
+    for (int k = 0; k < j->aims; k++) {
+        char name[128];
+        const char *own = t->list[k].shape->name;
+        snprintf(name, sizeof name, "%s: %s",
+                 imp__density_name[k < t->n_lights ? IMP_DENSITY_EMITTERS
+                                                   : IMP_DENSITY_PROXIES],
+                 own ? own : "");
+        IMP_TRY(energy_row(c, name, part[LOOKED + 2 * k] / energy,
+                           draws > 0 ? part[LOOKED + 2 * k + 1] / draws : 0));
     }
 out:
     return st;
@@ -326,8 +379,10 @@ enum imp_status imp__check_sampling(struct imp__check *c)
     blind.directions = true;
     blind.only_points = blind.lights;
     blind.split = 0;
-    struct looked j = {
-        .tracer = c->tracer, .channels = c->problem->scene->channels, .parts = true};
+    struct looked j = {.tracer = c->tracer,
+                       .channels = c->problem->scene->channels,
+                       .parts = true,
+                       .aims = aims_told(c->problem->scene)};
     j.tracer.active = NULL;
     j.tracer.sensor = &sensor;
     c->total = 2;
@@ -341,7 +396,7 @@ enum imp_status imp__check_sampling(struct imp__check *c)
     j.tracer.mixing = &uniform;
     IMP_TRY(picture_make(c, &j, &oracle));
     IMP_TRY(blocks_compare(c, own, oracle, j.channels));
-    IMP_TRY(energy_rows(c, own, j.channels));
+    IMP_TRY(energy_rows(c, own, &j));
     st = imp__check_progress(c, 1);
 out:
     imp_film_destroy(own);

@@ -236,13 +236,14 @@ int imp__aim_choose(const struct imp_aims *t, int first, int end, double sum, im
     return chosen;
 }
 
+/* Of all aims that lie along w. */
 #define HITS 32
-void imp__aims_pdf(const struct imp_aims *t, const double sum[2], imp_v3 from, imp_v3 w,
-                   double p[2])
+typedef void met_fn(void *payload, int aim, double p);
+static void along(const struct imp_aims *t, const double sum[2], imp_v3 from, imp_v3 w,
+                  met_fn *met, void *payload)
 {
     struct imp_hit hit[HITS], last;
     const double scale = fmax(fabs(from[0]), fmax(fabs(from[1]), fabs(from[2])));
-    p[0] = p[1] = 0;
     for (int n = HITS, all = 0; n == HITS; last = hit[HITS - 1], all += n) {
         n = imp__aims_hit(t, &from, &w, (1 + scale) * IMP_RAY_EPSILON, all ? &last : NULL,
                           HITS, hit);
@@ -253,8 +254,32 @@ void imp__aims_pdf(const struct imp_aims *t, const double sum[2], imp_v3 from, i
             struct imp_surface at;
             if (!(sum[group] > 0)) continue;
             shape->ops->surface(shape, &hit[k], &from, &w, &at);
-            p[group] += strength_at(aim, from) / sum[group] *
-                        shape->ops->pdf_toward(shape, &from, &hit[k], &at);
+            met(payload, hit[k].shape,
+                strength_at(aim, from) / sum[group] *
+                    shape->ops->pdf_toward(shape, &from, &hit[k], &at));
         }
     }
+}
+
+struct grouped {
+    int n_lights;
+    double *p;
+};
+static void add_grouped(void *payload, int aim, double p)
+{
+    const struct grouped *g = payload;
+    g->p[aim >= g->n_lights] += p;
+}
+void imp__aims_pdf(const struct imp_aims *t, const double sum[2], imp_v3 from, imp_v3 w,
+                   double p[2])
+{
+    p[0] = p[1] = 0;
+    along(t, sum, from, w, add_grouped, &(struct grouped){t->n_lights, p});
+}
+
+static void add_apart(void *payload, int aim, double p) { ((double *)payload)[aim] += p; }
+void imp__aims_apart(const struct imp_aims *t, imp_v3 from, const imp_v3 *w, double *part)
+{
+    for (int k = 0; k < t->n; k++) part[k] = w ? 0 : strength_at(&t->list[k], from);
+    if (w) along(t, (const double[]){1, 1}, from, *w, add_apart, part);
 }

@@ -59,6 +59,10 @@ double imp__aims_sum(const struct imp_aims *t, int first, int end, imp_v3 from);
 void imp__aims_pdf(const struct imp_aims *t, const double sum[2], imp_v3 from, imp_v3 w,
                    double p[2]);
 
+/* part [t->n]: S_t/r_t^2 p_t(w) of every aim; w NULL: S_t/r_t^2. */
+void imp__aims_apart(const struct imp_aims *t, imp_v3 from, const imp_v3 *w,
+                     double *part);
+
 /* ---- intersect.c ---- */
 enum imp_status imp__aims_commit(struct imp_scene *scene);
 /* Hits of o + t d, t > tmin, with aims, nearest first, at most `max` of those behind
