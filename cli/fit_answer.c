@@ -180,7 +180,8 @@ static void print_table(const struct fit_answer *a, char **paths)
                    cli_number_row(&b->info, i, name, sizeof name), v->start, v->value);
             char interval[64] = "-";
             if (isfinite(v->lo95) && isfinite(v->hi95))
-                snprintf(interval, sizeof interval, "[%.6g, %.6g]", v->lo95, v->hi95);
+                snprintf(interval, sizeof interval, "[%.6g, %.6g]%s", v->lo95, v->hi95,
+                         v->determined ? "" : " (prior)");
             else if (!a->no_intervals && !v->determined)
                 snprintf(interval, sizeof interval, "not determined");
             printf("%-22s %s", interval, b->info.unit);

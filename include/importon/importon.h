@@ -932,10 +932,12 @@ struct imp_fit_options {
 
 struct imp_fit_variable {
     double start, value;
-    double se;         /**< one standard error: measurement and Monte Carlo together */
-    double lo95, hi95; /**< 95 % interval; NaN if the picture does not determine it */
-    int at_bound;      /**< -1: at the lower bound, 1: at the upper */
-    int determined;    /**< 0: the picture does not determine it */
+    double se; /**< one standard error: measurement and Monte Carlo together */
+    double lo95,
+        hi95;     /**< 95 % interval; NaN if neither pictures nor a prior determine it */
+    int at_bound; /**< -1: at the lower bound, 1: at the upper */
+    int determined; /**< 0: the picture does not determine it; an interval is then that
+                            of the posterior */
 };
 
 struct imp_fit_result {

@@ -20,7 +20,7 @@ class FitVariable(NamedTuple):
     """A fitted parameter; every field has the parameter's shape.
 
     `se` is one standard error, of measurement and Monte Carlo together; `interval` is the
-    95 % interval, NaN where the picture does not determine the number; `at_bound` is -1
+    95 % interval, NaN where neither the picture nor a prior determines the number; `at_bound` is -1
     at the lower bound, 1 at the upper."""
 
     value: Any

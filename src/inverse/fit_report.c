@@ -36,8 +36,11 @@ static void put_loose(struct text *t, const struct imp__fit *f,
                       const struct imp_fit_variable *v, const double *direction)
 {
     const size_t n = f->problem->n;
-    size_t count = 0, shown = 0;
-    for (size_t i = 0; i < n; i++) count += !v[i].determined;
+    size_t count = 0, held = 0, shown = 0;
+    for (size_t i = 0; i < n; i++) {
+        count += !v[i].determined;
+        held += !v[i].determined && isfinite(v[i].se);
+    }
     if (count == 0) return;
     put(t, "%sthe pictures do not determine ", t->used ? "; " : "");
     for (size_t i = 0; i < n && shown < NAMES_MAX; i++) {
@@ -46,6 +49,7 @@ static void put_loose(struct text *t, const struct imp__fit *f,
         put_name(t, f, i);
     }
     if (count > shown) put(t, " and %zu more", count - shown);
+    if (held) put(t, ", whose intervals rest on the prior");
     /* Warn of an undetermined combination; a single variable has its own warning. */
     double largest = 0;
     for (size_t i = 0; i < n; i++) largest = fmax(largest, fabs(direction[i]));

@@ -4,6 +4,11 @@
  *
  *     measurement   G (J^T W Sigma W J) G      noise of the pictures
  *     Monte Carlo   G Cov(g) G                 noise of our own estimate of g
+ *     prior         kappa G H_prior G          of directions that it alone determines
+ *
+ * where kappa is the variance of the pictures in units of 1/weight: J/kappa is then the
+ * negative logarithm of the posterior density. What the pictures determine takes no part
+ * of its interval from a prior.
  *
  * and x - G g, from random numbers that x does not depend on, is a point whose error is
  * described by their sum, wherever in its neighbourhood x was. */
@@ -117,22 +122,23 @@ static double noise_scale(const struct imp__sampled *s, const struct imp__direct
     return freedom > 0 ? fmax((e->chi2 - fmax(q, 0)) / freedom, 0) : 0;
 }
 
-static void interval_free(const struct imp__goal *goal, size_t k, bool is_loose,
-                          double se, struct imp_fit_variable *v)
+/* se NAN: there is no interval. */
+static void interval_free(const struct imp__goal *goal, size_t k, double se,
+                          struct imp_fit_variable *v)
 {
-    v->determined = !is_loose;
-    v->se = is_loose ? NAN : se;
-    v->lo95 = is_loose ? NAN : imp__into_bounds(goal, k, v->value - Z_TWO_SIDED * se);
-    v->hi95 = is_loose ? NAN : imp__into_bounds(goal, k, v->value + Z_TWO_SIDED * se);
+    const bool open = isnan(se);
+    v->se = se;
+    v->lo95 = open ? NAN : imp__into_bounds(goal, k, v->value - Z_TWO_SIDED * se);
+    v->hi95 = open ? NAN : imp__into_bounds(goal, k, v->value + Z_TWO_SIDED * se);
 }
 
 /* At a bound the interval is one-sided: from the bound to what the data still allow,
  * about the point `u` that they would choose without it. */
-static void interval_bound(const struct imp__goal *goal, size_t k, bool is_loose,
-                           double u, double se, struct imp_fit_variable *v)
+static void interval_bound(const struct imp__goal *goal, size_t k, double u, double se,
+                           struct imp_fit_variable *v)
 {
-    interval_free(goal, k, is_loose, se, v);
-    if (is_loose) return;
+    interval_free(goal, k, se, v);
+    if (isnan(se)) return;
     if (v->at_bound < 0) {
         v->lo95 = goal->lo[k];
         v->hi95 = imp__into_bounds(goal, k, fmax(u, goal->lo[k]) + Z_ONE_SIDED * se);
@@ -221,12 +227,43 @@ out:
     return st;
 }
 
-/* Standard error of variable k from the two covariances [n][n]. */
-static double standard_error(size_t n, size_t k, const double *measurement,
-                             const double *monte_carlo)
+/* Standard error of variable k from the two covariances [n][n]; NAN: nothing determines
+ * it. */
+static double standard_error(const struct imp__directions *a, size_t n, size_t k,
+                             const double *measurement, const double *monte_carlo)
 {
     const size_t d = k * n + k;
+    if (imp__is_loose(a, k) && !a->held) return NAN;
     return sqrt(fmax(measurement[d], 0) + fmax(monte_carlo[d], 0));
+}
+
+/* Variance of the data in units of 1/weight, where their noise is known: of the
+ * combinations that they tell most of. */
+static double noise_ratio(const struct imp__sampled *s)
+{
+    double noise = 0, data = 0;
+    for (size_t k = 0; k < s->n; k++) {
+        const size_t d = k * s->n + k;
+        const double square = s->scale[k] * s->scale[k];
+        noise += square * s->mean.H_meas[d];
+        data += square * (s->mean.H[d] - s->mean.H_prior[d]);
+    }
+    return data > 0 ? fmax(noise / data, 0) : 0;
+}
+
+/* measurement += kappa G H_prior G of directions that the prior alone determines. */
+static enum imp_status prior_add(const struct imp__sampled *s,
+                                 const struct imp__directions *a, double kappa,
+                                 double *measurement)
+{
+    if (!a->held) return IMP_OK;
+    const size_t nn = s->n * s->n;
+    double *part = imp__alloc(s->ctx, nn, sizeof *part);
+    if (!part) return no_memory(s->ctx);
+    const enum imp_status st = sandwich(s->ctx, s->n, a->G, s->mean.H_prior, part);
+    for (size_t i = 0; st == IMP_OK && i < nn; i++) measurement[i] += kappa * part[i];
+    imp__release(s->ctx, part);
+    return st;
 }
 
 static enum imp_status uncertainty_create(imp_context *ctx, size_t n,
@@ -272,9 +309,10 @@ enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
     IMP_TRY(accept(goal, x, u.x, &go));
     if (!go) memcpy(u.x, x, n * sizeof *x);
 
+    const double kappa = s.mean.noise_known ? noise_ratio(&s) : noise_scale(&s, &free);
     double *noise = s.mean.H_meas;
     if (!s.mean.noise_known) {
-        u.noise_scale = noise_scale(&s, &free);
+        u.noise_scale = kappa;
         for (size_t i = 0; i < n * n; i++)
             noise[i] = u.noise_scale * (s.mean.H[i] - s.mean.H_prior[i]);
     }
@@ -282,6 +320,8 @@ enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
     IMP_TRY(sandwich(ctx, n, free.G, s.mean.cov_g, u.monte_carlo));
     IMP_TRY(sandwich(ctx, n, every.G, noise, measurement));
     IMP_TRY(sandwich(ctx, n, every.G, s.mean.cov_g, monte_carlo));
+    IMP_TRY(prior_add(&s, &free, kappa, u.measurement));
+    IMP_TRY(prior_add(&s, &every, kappa, measurement));
 
     memcpy(u.G, free.G, n * n * sizeof *u.G);
     u.condition = every.values[0] > 0 && !every.loose[0]
@@ -293,12 +333,13 @@ enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
         struct imp_fit_variable *v = &variables[k];
         v->value = u.x[k];
         v->at_bound = imp__at_bound(goal, u.x, k);
+        v->determined = !imp__is_loose(fixed[k] ? &every : &free, k);
         if (fixed[k])
-            interval_bound(goal, k, imp__is_loose(&every, k), wish[k],
-                           standard_error(n, k, measurement, monte_carlo), v);
+            interval_bound(goal, k, wish[k],
+                           standard_error(&every, n, k, measurement, monte_carlo), v);
         else
-            interval_free(goal, k, imp__is_loose(&free, k),
-                          standard_error(n, k, u.measurement, u.monte_carlo), v);
+            interval_free(goal, k,
+                          standard_error(&free, n, k, u.measurement, u.monte_carlo), v);
     }
     *out = u;
     u = (struct imp__uncertainty){0};

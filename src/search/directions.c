@@ -115,6 +115,42 @@ out:
     return st;
 }
 
+/* G = D (sum max(lambda, 0) v v^T + D H_prior D)^-1 D, if the prior leaves no direction
+ * open that the data leave open. */
+#define PRIOR_LEAST 1e-10 /* eigenvalue over the largest */
+static enum imp_status inverse_held(const struct imp__sampled *s,
+                                    struct imp__directions *a)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = s->ctx;
+    const size_t m = a->m, n = s->n;
+    double *A = imp__alloc(ctx, 2 * m * m + m, sizeof *A);
+    if (!A) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a covariance"));
+    double *vectors = A + m * m, *values = vectors + m * m;
+    for (size_t p = 0; p < m; p++)
+        for (size_t q = 0; q < m; q++) {
+            const size_t k = a->index[p], l = a->index[q];
+            A[p * m + q] = s->scale[k] * s->scale[l] * s->mean.H_prior[k * n + l];
+            for (size_t j = 0; j < m; j++)
+                A[p * m + q] +=
+                    fmax(a->values[j], 0) * a->vectors[j * m + p] * a->vectors[j * m + q];
+        }
+    if (!imp__eigen_symmetric(m, A, values, vectors))
+        IMP_TRY(imp__error(ctx, IMP_E_NUMERIC, "J^T J is not finite"));
+    a->held = values[0] > PRIOR_LEAST * values[m - 1];
+    for (size_t p = 0; a->held && p < m; p++)
+        for (size_t q = 0; q < m; q++) {
+            double sum = 0;
+            for (size_t j = 0; j < m; j++)
+                sum += vectors[j * m + p] * vectors[j * m + q] / values[j];
+            const size_t k = a->index[p], l = a->index[q];
+            a->G[k * n + l] = s->scale[k] * s->scale[l] * sum;
+        }
+out:
+    imp__release(ctx, A);
+    return st;
+}
+
 enum imp_status imp__directions_find(const struct imp__sampled *s, const bool *fixed,
                                      struct imp__directions *a)
 {
@@ -134,7 +170,8 @@ enum imp_status imp__directions_find(const struct imp__sampled *s, const bool *f
         if (!fixed || !fixed[k]) a->index[a->m++] = k;
     if (a->m == 0) goto out;
     IMP_TRY(spectrum(s, a));
-    IMP_TRY(inverse(s, a));
+    if (a->n_loose > 0) IMP_TRY(inverse_held(s, a));
+    if (!a->held) IMP_TRY(inverse(s, a));
 out:
     return st;
 }

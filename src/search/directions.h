@@ -25,6 +25,7 @@ struct imp__directions {      /* of a subset of the variables; all zero is none 
     double *se;               /* [m] of the eigenvalues */
     size_t n_loose;
     bool *loose; /* [m] eigenvalue not above its noise */
+    bool held;   /* some are loose, and the prior determines these: G is all of H^-1 */
     double *G;   /* [n][n] generalised inverse, 0 outside */
 };
 
