@@ -189,6 +189,9 @@ static const struct scene_case {
     {"bend/seen.xml", "cells=1 width=8", true, 0},
     {"cornell.xml", "res=32", false, 3},
     {"fog.xml", "res=32", false, 0},
+    {"photons/sky.xml", NULL, true, 0},
+    {"photons/reflector.xml", "weights=kernel=1,emitters=1,proxies=1,uniform=.3", false,
+     0},
 };
 
 enum { N = 3000 };
