@@ -126,6 +126,10 @@ static int run_info(int n, char **operand)
         json_text(&j, "mode", cli_mode_word(s.mode));
         json_integer(&j, "shapes", s.n_shapes);
         json_integer(&j, "triangles", s.n_triangles);
+        if (s.n_instances) {
+            json_integer(&j, "instances", s.n_instances);
+            json_number(&j, "triangles_met", s.triangles_met);
+        }
         json_integer(&j, "emitters", s.n_emitters);
         json_integer(&j, "bsdfs", s.n_bsdfs);
         json_integer(&j, "textures", s.n_textures);
@@ -149,6 +153,9 @@ static int run_info(int n, char **operand)
     printf("%s: %s, %d shapes (%lld triangles), %d emitters, %d bsdfs, %d textures\n",
            cli.scene_path, cli_mode_word(s.mode), s.n_shapes, (long long)s.n_triangles,
            s.n_emitters, s.n_bsdfs, s.n_textures);
+    if (s.n_instances)
+        printf("instances: %d, by which rays can meet %.9g triangles\n", s.n_instances,
+               s.triangles_met);
     if (s.bounds_min[0] <= s.bounds_max[0])
         printf("bounds: (%g, %g, %g) to (%g, %g, %g)\n", s.bounds_min[0], s.bounds_min[1],
                s.bounds_min[2], s.bounds_max[0], s.bounds_max[1], s.bounds_max[2]);

@@ -385,6 +385,10 @@ struct imp_scene_info {
      * what is lost. */
     const char *const *missing;
     int n_missing;
+    /** Instances of groups, those inside groups counted once; and the triangles that a ray
+     * can meet, each as often as it stands in the scene. */
+    int n_instances;
+    double triangles_met;
 };
 /** Set info->size first; strings belong to the scene. @return IMP_OK; IMP_E_ARG. */
 IMP_API enum imp_status imp_scene_get_info(const imp_scene *scene,

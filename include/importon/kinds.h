@@ -97,6 +97,7 @@ struct imp_carried {
     double nm[4];
 };
 
+struct imp_course;   /* a value at every time (src/math/course.h) */
 struct imp_spectrum; /* a value at every wavelength (src/color/spectrum.h) */
 struct imp_texture;
 /* One input of one object: a constant or a texture. */
@@ -435,6 +436,9 @@ struct imp_hit {
     double t;
     double u, v; /* of triangles: barycentric weights of the second and third vertex;
                     of analytic shapes: what its `intersect` wrote */
+    /* The scene's: the instance in which the shape was met, 0 for none, and when. */
+    int64_t place;
+    double time;
 };
 
 struct imp_surface {
@@ -567,8 +571,9 @@ enum imp_emitter_flags {
     IMP_EMITTER_ENVIRONMENT = 4,
     IMP_EMITTER_UNIFORM = 8, /* eval is its first input, whatever the direction (of a
                                 surface: on its front) */
-    IMP_EMITTER_GAPS = 16    /* the density of sample is 0 where eval is, also where a
+    IMP_EMITTER_GAPS = 16,   /* the density of sample is 0 where eval is, also where a
                                 derivative is not */
+    IMP_EMITTER_FAR = 32     /* a delta light without end: its light is parallel */
 };
 
 struct imp_emission { /* where and whither light leaves */
@@ -589,6 +594,7 @@ struct imp_emitter {
     const char *name;
     bool shaped;    /* as of imp_bsdf */
     unsigned fixed; /* bit j: input j has no derivative in this object; build sets it */
+    const struct imp_course *course; /* the scene's: factor over time; NULL: 1 */
 };
 
 /* Of a light that is its first input times a function of the direction alone: what solvers
@@ -707,6 +713,9 @@ struct imp_sensor {
     const struct imp_camera_gain
         *gain; /* exposure and its like, between radiance and picture; NULL: 1 */
     enum imp_points points;       /* what its sampler asks for */
+    /* The scene's: its rays have times from `open` to `close`, evenly or as `course`. */
+    double open, close;
+    const struct imp_course *course;
 };
 enum imp_sensor_flags {
     IMP_SENSOR_AREA = 1, /* its rays start on the shape that it stands in */

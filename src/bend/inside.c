@@ -116,7 +116,7 @@ static inline imp_v3 vertex(const struct imp_triangles *t, uint32_t i)
 void imp__hit_at(const struct imp_shape *s, imp_v3 x, imp_v3 d, double far,
                  struct imp_hit *hit)
 {
-    struct imp_hit found;
+    struct imp_hit found = *hit;
     hit->t = far;
     if (s->geometry == IMP_ANALYTIC) {
         const imp_v3 o = x - d * far;

@@ -222,6 +222,16 @@ enum imp_status imp__el_roots(imp_elements *e)
 {
     enum imp_status st = IMP_OK;
     const struct imp_scene *scene = e->scene;
+    if (scene->world)
+        IMP_TRY(imp__error(e->ctx, IMP_E_UNSUPPORTED,
+                           "the scene has instances: finite elements keep numbers for "
+                           "each place, and take shapes that stand there by themselves"));
+    for (int i = 0; i < scene->n_emitters; i++)
+        if (scene->emitters[i]->course)
+            IMP_TRY(imp__error(e->ctx, IMP_E_UNSUPPORTED,
+                               "emitter '%s' varies in time: finite elements know one "
+                               "time",
+                               scene->emitters[i]->name));
     for (int i = 0; i < scene->n_emitters; i++)
         if (!(scene->emitters[i]->ops->flags & IMP_EMITTER_AREA))
             IMP_TRY(imp__el_refused_at(

@@ -6,6 +6,7 @@
 #include "base/text.h"
 #include "color/rgb.h"
 #include "film_integrator.h"
+#include "scene/instances.h"
 #include "walk/dims.h"
 #include <stdio.h>
 #include <string.h>
@@ -180,15 +181,15 @@ int imp__measure_base(const struct imp_measure *m, imp_spec L, double alpha,
 }
 
 /* First hit of the ray through a film position; false: none. */
-static bool first_surface(const struct imp_measure *m, double px, double py,
+static bool first_surface(const struct imp_measure *m, double time, double px, double py,
                           const double lens[2], struct imp_sensor_ray *ray,
                           struct imp_hit *hit, struct imp_surface *at)
 {
     m->sensor->ops->ray(m->sensor, px, py, lens, ray);
-    if (!imp__intersect(m->scene, &ray->o, &ray->d, ray->t_near, ray->t_far, hit))
+    if (!imp__intersect_at(m->scene, time, &ray->o, &ray->d, ray->t_near, ray->t_far,
+                           hit))
         return false;
-    const struct imp_shape *s = m->scene->shapes[hit->shape];
-    s->ops->surface(s, hit, &ray->o, &ray->d, at);
+    imp__hit_surface(m->scene, hit, &ray->o, &ray->d, at);
     return true;
 }
 
@@ -230,7 +231,7 @@ static int aov_value(const struct imp_measure *m, const struct imp_channels *top
     struct imp_sensor_ray ray;
     struct imp_hit hit;
     struct imp_surface at;
-    const bool found = first_surface(m, px, py, lens, &ray, &hit, &at);
+    const bool found = first_surface(m, w->time, px, py, lens, &ray, &hit, &at);
     const double h = 1 / sqrt(fmax(m->spp, 1));
     int n = 0;
     for (int a = 0; a < top->n_aovs; a++) {

@@ -7,6 +7,7 @@
 #include "film/film_integrator.h"
 #include "kind/registry.h"
 #include "load.h"
+#include "scene/instances.h"
 #include "scene/scene_build.h"
 #include <stdio.h>
 #include <string.h>
@@ -39,6 +40,7 @@ static bool is_kind(const struct imp_scene *scene, const struct rule *r,
     for (size_t i = 0; (head = imp__kind_at(scene->ctx, (enum imp_concept)r->concept, i));
          i++)
         if (strcmp(head->name, node->type) == 0) return true;
+    if (imp__is_group(node) || imp__is_instance(node)) return true;
     return r->concept == IMP_CONCEPT_MEDIUM && strcmp(node->type, "graded") == 0;
 }
 

@@ -11,6 +11,7 @@ void imp__tree_init(struct imp_tree *t, struct imp_scene *scene)
 {
     *t = (struct imp_tree){.ctx = scene->ctx,
                            .arena = &scene->arena,
+                           .brief = &scene->files,
                            .ids.ctx = scene->ctx,
                            .slots.ctx = scene->ctx};
 }
@@ -83,6 +84,13 @@ static enum imp_status empty_refused(struct imp_tree *t, const char *what,
     return imp__loc_error(t->ctx, loc, IMP_E_SCENE, "empty %s", what);
 }
 
+static struct imp_arena *arena_of(const struct imp_tree *t, const char *tag,
+                                  const char *type)
+{
+    const bool many = type && strcmp(tag, "shape") == 0 && strcmp(type, "instance") == 0;
+    return many ? t->brief : t->arena;
+}
+
 enum imp_status imp__tree_open(struct imp_tree *t, struct imp_node *parent,
                                const char *tag, const char *type, const char *id,
                                const char *name, struct imp_loc loc,
@@ -94,11 +102,14 @@ enum imp_status imp__tree_open(struct imp_tree *t, struct imp_node *parent,
     struct imp_node **nodes =
         imp__grow(t->ctx, t->nodes, &t->cap_nodes, t->n_nodes + 1, sizeof *nodes);
     if (nodes) t->nodes = nodes;
-    struct imp_node *node = imp__node_create(t->arena, tag, type, id, name, loc);
+    struct imp_node *node =
+        imp__node_create(arena_of(t, tag, type), tag, type, id, name, loc);
     if (!nodes || !node) IMP_TRY(no_memory(t->ctx));
     if (id) IMP_TRY(id_take(t, node->id, node, loc));
     if (parent) {
-        if (!imp__node_add_child(t->arena, parent, node, name, loc))
+        const bool many = arena_of(t, tag, type) == t->brief;
+        struct imp_arena *list = many ? t->brief : arena_of(t, parent->tag, parent->type);
+        if (!imp__node_add_child(list, parent, node, name, loc))
             IMP_TRY(no_memory(t->ctx));
         if (name) IMP_TRY(slot_take(t, parent, node->name, loc));
     } else t->root = node;
@@ -114,10 +125,11 @@ enum imp_status imp__tree_prop(struct imp_tree *t, struct imp_node *node,
 {
     enum imp_status st = IMP_OK;
     IMP_TRY(empty_refused(t, "name", name, loc));
-    const char *copy = imp__arena_strdup(t->arena, name);
+    struct imp_arena *arena = arena_of(t, node->tag, node->type);
+    const char *copy = imp__arena_strdup(arena, name);
     if (!copy) IMP_TRY(no_memory(t->ctx));
     IMP_TRY(slot_take(t, node, copy, loc));
-    struct imp_prop *p = imp__node_add(t->arena, node, name, type, loc);
+    struct imp_prop *p = imp__node_add(arena, node, name, type, loc);
     if (!p) IMP_TRY(no_memory(t->ctx));
     *out = p;
 out:
@@ -130,9 +142,10 @@ enum imp_status imp__tree_ref(struct imp_tree *t, struct imp_node *parent, const
     enum imp_status st = IMP_OK;
     IMP_TRY(empty_refused(t, "id", id, loc));
     IMP_TRY(empty_refused(t, "name", name, loc));
-    struct imp_child *c = imp__node_add_child(t->arena, parent, NULL, name, loc);
+    struct imp_arena *arena = arena_of(t, parent->tag, parent->type);
+    struct imp_child *c = imp__node_add_child(arena, parent, NULL, name, loc);
     if (!c) IMP_TRY(no_memory(t->ctx));
-    c->ref = imp__arena_strdup(t->arena, id);
+    c->ref = imp__arena_strdup(arena, id);
     if (!c->ref) IMP_TRY(no_memory(t->ctx));
     if (name) IMP_TRY(slot_take(t, parent, c->name, loc));
 out:

@@ -13,6 +13,8 @@
 struct imp_tree {
     imp_context *ctx;
     struct imp_arena *arena;
+    struct imp_arena *brief; /* of instances' nodes and lists of them, which nobody needs
+                                once the scene is built, and which are long */
     struct imp_node *root;   /* tag "scene" */
     struct imp_names ids;    /* owner NULL; value: the node */
     struct imp_names slots;  /* owner: a node */

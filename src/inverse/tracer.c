@@ -13,7 +13,7 @@
  * object under a constant environment whose weight does not jump at the horizon. */
 static enum imp_status attached_allowed(const struct imp_scene *scene)
 {
-    bool fine = scene->n_shapes == 1 && scene->environment >= 0 &&
+    bool fine = scene->n_shapes == 1 && !scene->world && scene->environment >= 0 &&
                 scene->n_emitters == 1 &&
                 scene->emitters[0]->ops->flags & IMP_EMITTER_UNIFORM &&
                 scene->shapes[0]->ops->flags & IMP_SHAPE_CONVEX;

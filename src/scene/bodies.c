@@ -120,6 +120,11 @@ enum imp_status imp__bodies_check(struct imp_scene *scene)
     for (int i = 0; i < scene->n_bodies; i++) {
         struct imp_body *m = scene->bodies[i];
         if (m->index < 0) continue;
+        if (scene->world)
+            return imp__node_error(scene->ctx, m->node, IMP_E_UNSUPPORTED,
+                                   "a scene with instances has no graded index: where "
+                                   "its rays end would have to be known to their "
+                                   "derivatives");
         m->ball = ball_of(scene, m);
         const char *why = fixed_because(scene, m);
         for (int k = 0; k < m->n_numbers; k++) {

@@ -211,7 +211,7 @@ enum imp_status imp__media_check(struct imp_scene *scene)
 {
     const bool knows = knows_media(scene->integrator);
     bool used = false;
-    for (int i = 0; i < scene->n_shapes; i++) {
+    for (int i = 0; i < scene->n_all_shapes; i++) {
         const struct imp_shape *s = scene->shapes[i];
         const bool bounds = s->interior || s->exterior;
         used |= bounds;

@@ -2,7 +2,9 @@
  *
  * Builds BSDFs, emitters, shapes and sensors. Each is built once, where it first appears
  * in document order, however many references it has. */
+#include "base/number.h"
 #include "kind/sensor/sensor_film.h"
+#include "math/course.h"
 #include "scene_build.h"
 
 /* ---- BSDFs --------------------------------------------------------------------- */
@@ -128,6 +130,44 @@ static struct imp_node *medium_child(struct imp_node *node)
     return NULL;
 }
 
+/* "time:factor, ..." of lights and sensors that vary in time. NULL: they do not. */
+static enum imp_status course_read(struct imp_scene *scene, struct imp_node *node,
+                                   const struct imp_course **out)
+{
+    enum imp_status st = IMP_OK;
+    const struct imp_prop *p = imp__node_prop(node, "times");
+    const char *text;
+    double sum = 0;
+    size_t n = 0;
+    IMP_TRY(imp__props_string(scene->ctx, node, "times", NULL, &text));
+    if (!text) return IMP_OK;
+    const char *end = text + strlen(text);
+    double *number = imp__arena_take(&scene->arena, strlen(text) + 2, sizeof *number);
+    struct imp_course *c = imp__arena_array(&scene->arena, 1, sizeof *c);
+    if (!number || !c) IMP_TRY(imp__build_no_memory(scene));
+    double *value = number + (end - text) / 2 + 1; /* a pair has four characters */
+    for (const char *s = text + strspn(text, " ,\t\n"); s < end; n++) {
+        bool good = imp__number(&s, end, &number[n]) && *s == ':';
+        if (good) s++, good = imp__number(&s, end, &value[n]);
+        good = good && (s == end || strspn(s, " ,\t\n") > 0);
+        if (!good || !isfinite(number[n]) || !isfinite(value[n]) || value[n] < 0 ||
+            (n > 0 && !(number[n] > number[n - 1])))
+            IMP_TRY(imp__prop_error(scene->ctx, node, p, IMP_E_SCENE,
+                                    "times = '%.60s': it has pairs time:factor, of "
+                                    "ascending times and factors not below 0",
+                                    text));
+        sum += value[n];
+        s += strspn(s, " ,\t\n");
+    }
+    if (!(sum > 0))
+        IMP_TRY(imp__prop_error(scene->ctx, node, p, IMP_E_SCENE,
+                                "times = '%.60s': it is 0 at all times", text));
+    *c = (struct imp_course){n, number, value};
+    *out = c;
+out:
+    return st;
+}
+
 /* ---- Emitters, shapes, sensors ------------------------------------------------- */
 
 static void emitter_changed(void *payload)
@@ -185,6 +225,7 @@ enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *nod
     IMP_TRY(imp__props_float(ctx, node, "sampling_weight", 1, &e->weight));
     if (e->weight < 0)
         IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "sampling_weight is negative"));
+    IMP_TRY(course_read(scene, node, &e->course));
     medium_child(node); /* walks know where they are */
     if (ops->build) IMP_TRY(ops->build(&b, self, e));
     for (int j = 0; j < e->n_in; j++)
@@ -344,6 +385,30 @@ static enum imp_status child_or_default(struct imp_scene *scene, struct imp_node
     return *out ? IMP_OK : imp__build_no_memory(scene);
 }
 
+static enum imp_status shutter_read(struct imp_scene *scene, struct imp_node *node,
+                                    struct imp_sensor *s)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = scene->ctx;
+    IMP_TRY(imp__props_float(ctx, node, "shutter_open", 0, &s->open));
+    IMP_TRY(imp__props_float(ctx, node, "shutter_close", s->open, &s->close));
+    if (s->close < s->open)
+        IMP_TRY(imp__prop_error(
+            ctx, node, imp__node_prop(node, "shutter_close"), IMP_E_SCENE,
+            "shutter_close = %g comes before shutter_open = %g", s->close, s->open));
+    IMP_TRY(course_read(scene, node, &s->course));
+    const bool instant = s->open == s->close;
+    if (s->course && !instant &&
+        !(imp__course_integral(s->course, s->open, s->close) > 0))
+        IMP_TRY(
+            imp__prop_error(ctx, node, imp__node_prop(node, "times"), IMP_E_SCENE,
+                            "times: the response is 0 while the shutter is open, from "
+                            "%g to %g",
+                            s->open, s->close));
+out:
+    return st;
+}
+
 enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node,
                                   const char *name, struct imp_shape *shape)
 {
@@ -391,6 +456,7 @@ enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node
     if (s->photometric && imp__is_spectral(scene->mode))
         IMP_TRY(imp_build_error(&b, "units", IMP_E_UNSUPPORTED,
                                 "photometric units are those of rgb and mono modes"));
+    IMP_TRY(shutter_read(scene, node, s));
     IMP_TRY(ops->build(&b, self, s)); /* needs the film's shape */
     struct imp_node *medium = medium_child(node);
     if (medium) IMP_TRY(imp__build_medium(scene, medium, name, "medium", &s->medium));

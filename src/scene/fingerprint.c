@@ -3,6 +3,8 @@
  * Numbers that were computed, not read, are rounded to floats before they are hashed:
  * another mathematical library may differ in their last bits. */
 #include "fingerprint.h"
+#include "instances.h"
+#include "math/course.h"
 #include "math/hash.h"
 #include <string.h>
 
@@ -86,6 +88,26 @@ static uint64_t shape_hash(uint64_t h, const struct imp_shape *s)
     return h;
 }
 
+static uint64_t group_hash(uint64_t h, const struct imp_group *g)
+{
+    h = imp__hash_text(h, g->name);
+    h = HASH(h, g->first);
+    h = HASH(h, g->n_shapes);
+    for (int k = 0; k < g->n_instances; k++) {
+        const struct imp_instance *p = &g->instance[k];
+        const int covered = p->covered ? p->covered->first : -1;
+        for (int j = 0; j < 12; j++) h = number_hash(h, p->to_world.m[j]);
+        h = HASH(h, p->group->first);
+        h = HASH(h, covered);
+        if (!p->motion) continue;
+        struct imp_map end, inverse;
+        imp__motion_at(p->motion, p->motion->end, &end, &inverse);
+        h = number_hash(number_hash(h, p->motion->start), p->motion->end);
+        for (int j = 0; j < 12; j++) h = number_hash(h, end.m[j]);
+    }
+    return h;
+}
+
 /* Light of unit inputs, by direction: tables of luminaires. */
 static uint64_t emitter_hash(uint64_t h, const struct imp_emitter *e)
 {
@@ -115,7 +137,9 @@ uint64_t imp__fingerprint_objects(const struct imp_scene *scene)
         const struct imp_child *c = &scene->root->children[i];
         if (c->node && is_object(c->node)) h = node_hash(h, c->node);
     }
-    for (int s = 0; s < scene->n_shapes; s++) h = shape_hash(h, scene->shapes[s]);
+    for (int s = 0; s < scene->n_all_shapes; s++) h = shape_hash(h, scene->shapes[s]);
+    for (int g = 0; g < scene->n_groups; g++) h = group_hash(h, scene->groups[g]);
+    if (scene->world) h = group_hash(h, scene->world);
     for (int e = 0; e < scene->n_emitters; e++) h = emitter_hash(h, scene->emitters[e]);
     for (size_t k = 0; k < scene->n_params; k++) {
         const struct imp_param_info *info = &scene->params[k].info;
@@ -135,6 +159,11 @@ uint64_t imp__fingerprint_sensor(const struct imp_sensor *sensor)
                         f->crop_w, f->crop_h, f->sample_border};
     uint64_t h = imp__hash_text(0, sensor->ops->name);
     h = HASH(h, size);
+    if (sensor->open != 0 || sensor->close != 0)
+        h = number_hash(number_hash(h, sensor->open), sensor->close);
+    for (size_t k = 0; sensor->course && k < sensor->course->n; k++)
+        h = number_hash(number_hash(h, sensor->course->time[k]),
+                        sensor->course->value[k]);
     h = imp__hash_text(h, f->filter.ops->name);
     h = number_hash(h, f->filter.radius);
     for (int k = 0; k < 4; k++)

@@ -3,14 +3,13 @@
  * What a scene holds, for people and host programs. */
 #include "base/arguments.h"
 #include "camera_gain.h"
-#include "scene.h"
+#include "instances.h"
 
 enum imp_status imp_scene_get_info(const imp_scene *scene, struct imp_scene_info *out)
 {
     struct imp_scene_info all = {.size = sizeof all}, *info = &all;
     IMP_REQUIRE(NULL, scene, "scene");
     IMP_REQUIRE(scene->ctx, out, "info");
-    info->n_shapes = scene->n_shapes;
     info->n_emitters = scene->n_emitters;
     info->n_bsdfs = scene->n_bsdfs;
     info->n_textures = scene->n_textures;
@@ -19,9 +18,7 @@ enum imp_status imp_scene_get_info(const imp_scene *scene, struct imp_scene_info
     info->channels = scene->channels;
     info->integrator = scene->integrator ? scene->integrator->ops->name : "";
     info->max_depth = scene->integrator ? scene->integrator->max_depth : -1;
-    for (int s = 0; s < scene->n_shapes; s++)
-        if (scene->shapes[s]->geometry == IMP_TRIANGLES)
-            info->n_triangles += (int64_t)scene->shapes[s]->triangles.n_triangles;
+    imp__instances_count(scene, info);
     for (int c = 0; c < 3; c++) {
         info->bounds_min[c] = scene->lo[c];
         info->bounds_max[c] = scene->hi[c];

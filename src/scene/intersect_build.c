@@ -6,6 +6,7 @@
  * thread library makes a thread when a device is released, or when a second one is made,
  * and ends the process if it cannot. Scenes are built in the thread that commits, the
  * same way each time; no thread of Embree's is used. */
+#include "instances.h"
 #include "intersector.h"
 #include <stdatomic.h>
 #include <stdio.h>
@@ -79,16 +80,41 @@ static enum imp_status device_get(imp_context *ctx, RTCDevice *out)
     return st;
 }
 
+static void bounds_set(imp_v3 lo, imp_v3 hi, struct RTCBounds *b)
+{
+    b->lower_x = nextafterf((float)lo[0], -INFINITY);
+    b->lower_y = nextafterf((float)lo[1], -INFINITY);
+    b->lower_z = nextafterf((float)lo[2], -INFINITY);
+    b->upper_x = nextafterf((float)hi[0], INFINITY);
+    b->upper_y = nextafterf((float)hi[1], INFINITY);
+    b->upper_z = nextafterf((float)hi[2], INFINITY);
+}
+
 static void analytic_bounds(const struct RTCBoundsFunctionArguments *args)
 {
     const struct imp_shape *s = args->geometryUserPtr;
-    struct RTCBounds *b = args->bounds_o;
-    b->lower_x = nextafterf((float)s->lo[0], -INFINITY);
-    b->lower_y = nextafterf((float)s->lo[1], -INFINITY);
-    b->lower_z = nextafterf((float)s->lo[2], -INFINITY);
-    b->upper_x = nextafterf((float)s->hi[0], INFINITY);
-    b->upper_y = nextafterf((float)s->hi[1], INFINITY);
-    b->upper_z = nextafterf((float)s->hi[2], INFINITY);
+    bounds_set(s->lo, s->hi, args->bounds_o);
+}
+
+static void instance_bounds(const struct RTCBoundsFunctionArguments *args)
+{
+    const struct imp_group *g = args->geometryUserPtr;
+    imp_v3 lo, hi;
+    imp__instance_box(&g->instance[args->primID], &lo, &hi);
+    bounds_set(lo, hi, args->bounds_o);
+}
+
+static RTCGeometry instances_create(RTCDevice rtc, const struct imp_group *g)
+{
+    RTCGeometry made = rtcNewGeometry(rtc, RTC_GEOMETRY_TYPE_USER);
+    if (!made) return NULL;
+    rtcSetGeometryUserPrimitiveCount(made, (unsigned)g->n_instances);
+    rtcSetGeometryUserData(made, (void *)(uintptr_t)g);
+    rtcSetGeometryBoundsFunction(made, instance_bounds, NULL);
+    rtcSetGeometryIntersectFunction(made, imp__instance_intersect);
+    rtcSetGeometryOccludedFunction(made, imp__instance_occluded);
+    rtcCommitGeometry(made);
+    return made;
 }
 
 /* all: its geometries are asked for all hits of a ray, not for the nearest. */
@@ -135,9 +161,39 @@ static bool is_boundary(const struct imp_scene *scene, const struct imp_shape *s
     return s->triangles.volume < -0.05 * (size[0] * size[1] * size[2]);
 }
 
-/* Of n shapes, the scene's (aims NULL) or the aims'. */
-static enum imp_status intersector_make(struct imp_scene *scene,
-                                        const struct imp_aims *aims, int n, void **out)
+/* What an intersector is made of: n shapes of the scene from `first` on and the instances
+ * of a group, or the aims'. */
+struct content {
+    const struct imp_aims *aims;
+    const struct imp_group *group; /* NULL: no instances */
+    int first, n;
+};
+
+static const struct imp_shape *shape_at(const struct imp_scene *scene,
+                                        const struct content *c, int i)
+{
+    return c->aims ? c->aims->list[i].shape : scene->shapes[c->first + i];
+}
+
+/* With a material of an instance, too. */
+static bool is_robust(const struct imp_scene *scene, const struct content *c)
+{
+    for (int i = 0; !c->aims && i < c->n; i++)
+        if (is_boundary(scene, shape_at(scene, c, i))) return true;
+    for (int k = 0; !c->aims && k < scene->n_covered; k++) {
+        const struct imp_covered *cover = scene->covered[k];
+        for (int i = 0; i < cover->group->n_within; i++) {
+            const int within = cover->group->within[i] - c->first;
+            if (within >= 0 && within < c->n &&
+                is_boundary(scene, scene->shapes[cover->first + i]))
+                return true;
+        }
+    }
+    return c->aims != NULL;
+}
+
+static enum imp_status intersector_make(struct imp_scene *scene, const struct content *c,
+                                        void **out)
 {
     enum imp_status st = IMP_OK;
     RTCDevice rtc;
@@ -149,19 +205,21 @@ static enum imp_status intersector_make(struct imp_scene *scene,
         IMP_TRY(imp__error(scene->ctx, IMP_E_NOMEM, "out of memory for the intersector"));
 
     told = (struct commit){.error = RTC_ERROR_NONE};
+    x->first = c->first;
     x->rtc = rtcNewScene(rtc);
-    bool robust = aims != NULL;
-    for (int i = 0; !aims && i < n; i++) robust |= is_boundary(scene, scene->shapes[i]);
     if (x->rtc)
-        rtcSetSceneFlags(x->rtc, (robust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE) |
-                                     (aims ? RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION : 0));
-    for (int i = 0; x->rtc && i < n && told.error == RTC_ERROR_NONE; i++) {
-        const struct imp_shape *s = aims ? aims->list[i].shape : scene->shapes[i];
-        RTCGeometry g = geometry_create(rtc, s, aims != NULL);
+        rtcSetSceneFlags(
+            x->rtc, (is_robust(scene, c) ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE) |
+                        (c->aims ? RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION : 0));
+    const bool instances = c->group && c->group->n_instances > 0;
+    for (int i = 0; x->rtc && i < c->n + instances && told.error == RTC_ERROR_NONE; i++) {
+        const struct imp_shape *s = i < c->n ? shape_at(scene, c, i) : NULL;
+        RTCGeometry g = s ? geometry_create(rtc, s, c->aims != NULL)
+                          : instances_create(rtc, c->group);
         if (!g) break;
         rtcAttachGeometryByID(x->rtc, g, (unsigned)i);
         rtcReleaseGeometry(g); /* the scene holds it now */
-        x->analytic |= s->geometry == IMP_ANALYTIC;
+        x->analytic |= !s || s->geometry == IMP_ANALYTIC;
     }
     if (x->rtc && told.error == RTC_ERROR_NONE) rtcCommitScene(x->rtc);
     const enum RTCError error =
@@ -180,12 +238,22 @@ out:
 
 enum imp_status imp__intersector_create(struct imp_scene *scene)
 {
-    return intersector_make(scene, NULL, scene->n_shapes, &scene->intersector);
+    enum imp_status st = IMP_OK;
+    for (int k = 0; k < scene->n_groups; k++) { /* those inside others come first */
+        struct imp_group *g = scene->groups[k];
+        const struct content c = {.group = g, .first = g->first, .n = g->n_shapes};
+        IMP_TRY(intersector_make(scene, &c, &g->intersector));
+    }
+    const struct content c = {.group = scene->world, .n = scene->n_shapes};
+    IMP_TRY(intersector_make(scene, &c, &scene->intersector));
+out:
+    return st;
 }
 enum imp_status imp__aims_commit(struct imp_scene *scene)
 {
     struct imp_aims *t = &scene->aims;
-    return intersector_make(scene, t, t->n, &t->intersector);
+    const struct content c = {.aims = t, .n = t->n};
+    return intersector_make(scene, &c, &t->intersector);
 }
 
 static void intersector_release(struct imp_scene *scene, void **intersector)
@@ -202,6 +270,8 @@ void imp__intersector_destroy(struct imp_scene *scene)
 {
     intersector_release(scene, &scene->intersector);
     intersector_release(scene, &scene->aims.intersector);
+    for (int k = 0; k < scene->n_groups; k++)
+        intersector_release(scene, &scene->groups[k]->intersector);
 }
 
 static size_t bytes_of(const struct imp_intersector *x)
@@ -210,5 +280,8 @@ static size_t bytes_of(const struct imp_intersector *x)
 }
 size_t imp__intersector_bytes(const struct imp_scene *scene)
 {
-    return bytes_of(scene->intersector) + bytes_of(scene->aims.intersector);
+    size_t bytes = bytes_of(scene->intersector) + bytes_of(scene->aims.intersector);
+    for (int k = 0; k < scene->n_groups; k++)
+        bytes += bytes_of(scene->groups[k]->intersector);
+    return bytes;
 }

@@ -9,14 +9,18 @@
 
 struct imp_intersector {
     RTCScene rtc;
-    bool analytic; /* some shape answers through its ops */
+    bool analytic; /* some shape answers through its ops, or there are instances */
+    int first;     /* index of its first shape */
     int64_t bytes;
 };
 
 /* What Embree calls for analytic shapes. */
 void imp__analytic_intersect(const struct RTCIntersectFunctionNArguments *args);
 void imp__analytic_occluded(const struct RTCOccludedFunctionNArguments *args);
-/* The same where all hits of a ray are gathered. */
+/* ... and for instances. */
+void imp__instance_intersect(const struct RTCIntersectFunctionNArguments *args);
+void imp__instance_occluded(const struct RTCOccludedFunctionNArguments *args);
+/* Those of analytic shapes where all hits of a ray are gathered. */
 void imp__gather_analytic(const struct RTCIntersectFunctionNArguments *args);
 
 #endif

@@ -4,6 +4,7 @@
  * medium that it does not name would see it as vacuum; a body in fog that does not name
  * the fog leaves a vacuum behind it, which is what the format says and Mitsuba does, and
  * seldom what is meant. */
+#include "instances.h"
 #include "media_around.h"
 #include "scene_build.h"
 
@@ -20,7 +21,7 @@ static const struct imp_shape *boundary(const struct imp_scene *scene, imp_v3 *o
         struct imp_surface at;
         if (!imp__intersect(scene, o, &d, 0, INFINITY, &hit)) return NULL;
         const struct imp_shape *s = scene->shapes[hit.shape];
-        s->ops->surface(s, &hit, o, &d, &at);
+        imp__hit_surface(scene, &hit, o, &d, &at);
         *o = imp__offset(at.p, at.ng, d);
         *outwards = imp__dot(at.ng, d) > 0;
         if (s->interior || s->exterior) return s;

@@ -107,7 +107,12 @@ struct imp_scene {
     struct imp_owned *owned;
 
     int n_shapes, n_bsdfs, n_emitters, n_sensors, n_textures;
-    struct imp_shape **shapes;
+    int n_all_shapes;          /* with those of groups */
+    struct imp_shape **shapes; /* [n_all_shapes] */
+    int n_groups, n_covered;
+    struct imp_group **groups; /* instances.h */
+    struct imp_covered **covered;
+    struct imp_group *world; /* its shapes and instances; NULL: there are no instances */
     struct imp_bsdf **bsdfs; /* every node, nested ones too */
     struct imp_emitter **emitters;
     struct imp_sensor **sensors;
@@ -205,13 +210,25 @@ enum imp_status imp__param_check(const struct imp_scene *scene, const struct imp
 enum imp_status imp__intersector_create(struct imp_scene *scene);
 void imp__intersector_destroy(struct imp_scene *scene);
 size_t imp__intersector_bytes(const struct imp_scene *scene);
-/* Nearest hit of o + t d, tmin < t < tmax, tmin >= 0. Rays that are not finite hit
- * nothing. */
-bool imp__intersect(const struct imp_scene *scene, const imp_v3 *o, const imp_v3 *d,
-                    double tmin, double tmax, struct imp_hit *hit);
+/* Nearest hit of o + t d, tmin < t < tmax, tmin >= 0, at a time. Rays that are not finite
+ * hit nothing. */
+bool imp__intersect_at(const struct imp_scene *scene, double time, const imp_v3 *o,
+                       const imp_v3 *d, double tmin, double tmax, struct imp_hit *hit);
 /* Is anything between? */
-bool imp__occluded(const struct imp_scene *scene, const imp_v3 *o, const imp_v3 *d,
-                   double tmin, double tmax);
+bool imp__occluded_at(const struct imp_scene *scene, double time, const imp_v3 *o,
+                      const imp_v3 *d, double tmin, double tmax);
+/* At time 0. */
+static inline bool imp__intersect(const struct imp_scene *scene, const imp_v3 *o,
+                                  const imp_v3 *d, double tmin, double tmax,
+                                  struct imp_hit *hit)
+{
+    return imp__intersect_at(scene, 0, o, d, tmin, tmax, hit);
+}
+static inline bool imp__occluded(const struct imp_scene *scene, const imp_v3 *o,
+                                 const imp_v3 *d, double tmin, double tmax)
+{
+    return imp__occluded_at(scene, 0, o, d, tmin, tmax);
+}
 
 static inline const struct imp_bsdf *imp__shape_bsdf(const struct imp_scene *scene,
                                                      const struct imp_shape *s)

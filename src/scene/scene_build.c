@@ -4,6 +4,7 @@
  * (docs/scene-format.md 12.2): by an object's own id, else below its parent's name; at the
  * top by its name. */
 #include "scene_build.h"
+#include "instances.h"
 #include "math/points.h"
 
 /* Top-level objects without id: <tag><n>, counted per tag. */
@@ -51,6 +52,7 @@ static enum imp_status top_build(struct imp_scene *scene, struct imp_child *chil
     if (!name) return imp__build_no_memory(scene);
     child->used = true;
     if (strcmp(tag, "shape") == 0) {
+        if (imp__is_group(node) || imp__is_instance(node)) return IMP_OK; /* later */
         if (!node->object) IMP_TRY(imp__build_shape(scene, node, name));
     } else if (strcmp(tag, "sensor") == 0) {
         if (!node->object) IMP_TRY(imp__build_sensor(scene, node, name, NULL));
@@ -117,7 +119,7 @@ static enum imp_status lights_build(struct imp_scene *scene)
 /* Around all shapes, with room for rays to start outside. */
 static struct imp_ball ball_around(const struct imp_scene *scene)
 {
-    if (scene->n_shapes == 0) return (struct imp_ball){{0}, 1};
+    if (!(scene->lo[0] <= scene->hi[0])) return (struct imp_ball){{0}, 1};
     const imp_v3 size = scene->hi - scene->lo;
     return (struct imp_ball){(scene->lo + scene->hi) * 0.5,
                              0.5 * imp__length(size) * (1 + 1e-3)};
@@ -148,6 +150,7 @@ enum imp_status imp__scene_build(struct imp_scene *scene,
     for (size_t i = 0; i < scene->root->n_children; i++)
         if (!imp__is_proxy(&scene->root->children[i]))
             IMP_TRY(top_build(scene, &scene->root->children[i], integrators, &counts));
+    IMP_TRY(imp__instances_build(scene));
     IMP_TRY(imp__props_finish(scene->ctx, scene->root));
     scene->ball = ball_around(scene);
     IMP_TRY(lights_build(scene));

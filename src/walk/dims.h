@@ -26,9 +26,9 @@ static inline unsigned imp__dim(int vertex, int use)
 }
 
 /* Where the points of a set have the same numbers (math/points.h): block 0 is that of the
- * start, as above and one more, block k + 1 that of vertex k. Numbers that decide one thing
+ * start, as above and two more, block k + 1 that of vertex k. Numbers that decide one thing
  * together are a pair. */
-enum { IMP_SLOT_WAVELENGTH = IMP_DIM_VERTEX };
+enum { IMP_SLOT_WAVELENGTH = IMP_DIM_VERTEX, IMP_SLOT_TIME };
 static inline int imp__slot(int use)
 {
     static const int slots[IMP_DIMS_PER_VERTEX] = {

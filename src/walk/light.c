@@ -40,6 +40,7 @@ void imp__emission_meet(struct imp_step *s, struct imp_vertex *v, int emitter,
         const double pe = pmf * e->ops->pdf(e, &s->from, &s->d, hit, at);
         weight = imp__decide1(weight * power_heuristic(s->pdf, pe));
     }
+    weight = imp__emitter_timed(e, s->walk->time, weight);
     v->e += imp__emitter_radiance(s->scene, emitter, &x, s->at.p, s->at.carried) * weight;
     if (!s->recorded) return;
     struct imp_met *m = &v->d.met;
@@ -145,7 +146,8 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
     const double p = ls.pdf * pmf;
     const bool alone =
         (e->ops->flags & IMP_EMITTER_DELTA) || !s->tracer->integrator->directions;
-    const double weight = imp__decide1((alone ? 1 : power_heuristic(p, pdf)) / p);
+    const double weight = imp__emitter_timed(
+        e, s->walk->time, imp__decide1((alone ? 1 : power_heuristic(p, pdf)) / p));
 
     /* What it brings, if it is seen. */
     const imp_v3 there = imp__decide((imp_v3){ls.uv[0], ls.uv[1], ls.dist, ls.cos_light});

@@ -95,7 +95,7 @@ static bool seen_past_lights(const struct imp_step *s, imp_v3 o, imp_v3 d, doubl
 {
     struct imp_hit hit;
     double from = 0;
-    while (imp__intersect(s->scene, &o, &d, from, reach, &hit)) {
+    while (imp__intersect_at(s->scene, s->walk->time, &o, &d, from, reach, &hit)) {
         if (s->scene->shapes[hit.shape]->emitter < 0) return false;
         from = hit.t + (1 + fabs(hit.t)) * IMP_RAY_EPSILON;
     }
@@ -110,7 +110,8 @@ static bool sees(struct imp_step *s, struct imp_vertex *v, const struct imp_surf
     if (s->segment->sees) return s->segment->sees(s, v, from, shadow, T);
     if (imp_unlikely(s->tracer->integrator->hide_emitters))
         return seen_past_lights(s, shadow->o, shadow->d, shadow->reach);
-    return !imp__occluded(s->scene, &shadow->o, &shadow->d, 0, shadow->reach);
+    return !imp__occluded_at(s->scene, s->walk->time, &shadow->o, &shadow->d, 0,
+                             shadow->reach);
 }
 
 static void sensor_numbers(const struct imp_step *s, double u[4])
@@ -210,6 +211,11 @@ static void vertex_connect(struct light_step *w, struct imp_vertex *v,
 
 /* ---- The light -------------------------------------------------------------------- */
 
+static bool is_far(const struct imp_emitter *e)
+{
+    return e->ops->flags & (IMP_EMITTER_ENVIRONMENT | IMP_EMITTER_FAR);
+}
+
 /* As decisions keep it. */
 static struct imp_emission emission_of(const struct imp_emission_sample *e, double dist,
                                        double cos_light, imp_v3 d)
@@ -229,7 +235,7 @@ static void light_connect(struct light_step *w, struct imp_vertex *v, int light,
     const struct imp_emitter *e = s->scene->emitters[light];
     const struct imp_sensor *sensor = s->tracer->sensor;
     const struct imp_walk_integrator *i = s->tracer->integrator;
-    const bool far = e->ops->flags & IMP_EMITTER_ENVIRONMENT;
+    const bool far = is_far(e);
     const bool point = e->ops->flags & IMP_EMITTER_DELTA;
     if (!i->lights || i->hide_emitters || !depth_allows(s, 1) || !sensor->ops->connect ||
         (point && !sensor->shape))
@@ -246,8 +252,9 @@ static void light_connect(struct light_step *w, struct imp_vertex *v, int light,
         emission_of(start, far ? INFINITY : 1, surface ? imp__dot(n, d) : 1, d);
     const double pdf = far ? 0 : e->ops->pdf_emission(e, &x);
     if (!far && !(pdf > 0)) return; /* this way nothing is emitted */
-    const double weight = imp__decide1(
-        to.weight * c * connect_weight(s, &to, pdf, far ? start->pdf_p : 0) / per);
+    const double weight =
+        imp__decide1(imp__emitter_timed(e, s->walk->time, to.weight * c) *
+                     connect_weight(s, &to, pdf, far ? start->pdf_p : 0) / per);
     const imp_spec le =
         imp__emitter_radiance(s->scene, light, &x, s->at.p, s->at.carried);
     const struct imp_active *active = s->tracer->active;
@@ -292,7 +299,7 @@ static const struct imp_medium *medium_at(const struct imp_step *s,
     if (e->shape && (e->shape->interior || e->shape->exterior))
         return imp__dot(start->ng, start->d) < 0 ? e->shape->interior
                                                  : e->shape->exterior;
-    const bool far = e->ops->flags & IMP_EMITTER_ENVIRONMENT;
+    const bool far = is_far(e);
     return imp__medium_around(s->scene, start->p, start->d,
                               far ? NULL : s->tracer->sensor->medium);
 }
@@ -312,7 +319,7 @@ static bool begin(struct light_step *w)
     const double u[4] = {imp__u01(key, IMP_DIM_PIXEL_X), imp__u01(key, IMP_DIM_PIXEL_Y),
                          imp__u01(key, IMP_DIM_LENS_U), imp__u01(key, IMP_DIM_LENS_V)};
     if (!(pmf > 0) || !e->ops->sample_emission(e, &scene->ball, u, &start)) return false;
-    const bool far = e->ops->flags & IMP_EMITTER_ENVIRONMENT;
+    const bool far = is_far(e);
     const double per = pmf * start.pdf_p * start.pdf_d;
     if (!(per > 0)) return false;
 
@@ -355,7 +362,9 @@ static bool begin(struct light_step *w)
     if (!depth_allows(s, s->tracer->sensor->shape ? 1 : 2) || !(start.cos_p > 0))
         return false;
 
-    const double pdf = imp__decide1(per / start.cos_p);
+    const double shines = imp__emitter_timed(e, s->walk->time, 1);
+    if (!(shines > 0)) return false;
+    const double pdf = imp__decide1(per / (start.cos_p * shines));
     const imp_spec le = imp__emitter_radiance(scene, light, &x, s->at.p, s->at.carried);
     const struct imp_active *active = s->tracer->active;
     if (imp__is_zero_used(le, s->at.carried) && !(active && active->emitter[light]))
@@ -520,6 +529,7 @@ void imp__light_walk_trace(const struct imp_tracer *tracer, struct imp_arena *ar
     const struct imp_key key = imp__key(tracer->seed, LIGHT_WALKS, (uint64_t)index);
     *out = (struct imp_light_walk){.walk = {.key = key, .valid = true}};
     struct imp_walk *walk = &out->walk;
+    walk->time = imp__walk_time(tracer, walk);
     if (tracer->wavelengths &&
         !imp__walk_wave(tracer, arena, imp__wave_draw(tracer, walk, index), walk))
         return;

@@ -71,7 +71,8 @@ void imp__probe_follow(struct imp_step *s)
     struct imp_probe *probe = p->probe;
     struct imp_step side = *p->state;
     struct imp_tracer tracer = *s->tracer;
-    struct imp_walk walk = {.key = imp__key_branch(s->walk->key, side.depth, 0x51de)};
+    struct imp_walk walk = {.key = imp__key_branch(s->walk->key, side.depth, 0x51de),
+                            .time = s->walk->time};
     imp_spec scratch[IMP_INPUTS_MAX];
     probe->length *= p->total / (p->weight * FOLLOWED);
     probe->emits = max_depth < 0 || imp__bounces(&side) < max_depth;

@@ -129,7 +129,7 @@ static bool vertex_fits(const struct imp_scene *scene, const struct imp_decision
                d->connection == IMP_NOT_CONNECTED && d->met.emitter >= 0 &&
                met_fits(scene, d);
     const bool inside = d->scatterer == IMP_IN_MEDIUM;
-    if (d->shape < 0 || d->shape >= (inside ? scene->n_media : scene->n_shapes))
+    if (d->shape < 0 || d->shape >= (inside ? scene->n_media : scene->n_all_shapes))
         return false;
     const struct imp_bsdf *b = inside ? scene->media[d->shape]->scatterer
                                       : imp__shape_bsdf(scene, scene->shapes[d->shape]);
@@ -147,7 +147,7 @@ static bool event_fits(const struct imp_scene *scene, const struct imp_event *e,
     if ((e->kind == IMP_PASSES_UV) != (before == IMP_PASSES)) return false;
     if (e->kind == IMP_PASSES_UV) return isfinite(e->t) && isfinite(e->bound);
     if (e->kind == IMP_PASSES)
-        return e->medium >= 0 && e->medium < scene->n_shapes && isfinite(e->t) &&
+        return e->medium >= 0 && e->medium < scene->n_all_shapes && isfinite(e->t) &&
                isfinite(e->bound);
     if (e->medium < 0 || e->medium >= scene->n_media || !(e->t >= 0)) return false;
     if (e->kind == IMP_CROSSES || e->kind == IMP_COLLIDES)

@@ -6,7 +6,8 @@
 
 static inline enum imp_meeting nearest_hit(struct imp_step *s, struct imp_hit *hit)
 {
-    return imp__intersect(s->scene, &s->o, &s->d, s->t_min, s->t_max, hit)
+    return imp__intersect_at(s->scene, s->walk->time, &s->o, &s->d, s->t_min, s->t_max,
+                             hit)
                ? IMP_MEETS_SURFACE
                : IMP_MEETS_NOTHING;
 }

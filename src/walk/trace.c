@@ -11,6 +11,7 @@
  * goes on and samples lights if k + 1 < max_depth (docs/scene-format.md 11). */
 #include "meter.h"
 #include "probe.h"
+#include "scene/instances.h"
 #include <float.h>
 #include <stddef.h>
 
@@ -127,7 +128,7 @@ static struct imp_vertex *surface_meet(struct imp_step *s, struct imp_hit *hit,
                                        struct imp_surface *at, struct imp_frame *frame)
 {
     const struct imp_shape *shape = s->scene->shapes[hit->shape];
-    shape->ops->surface(shape, hit, &s->o, &s->d, at);
+    imp__hit_surface(s->scene, hit, &s->o, &s->d, at);
     const struct imp_bsdf *bsdf = imp__shape_bsdf(s->scene, shape);
     struct imp_vertex *v = vertex_add(s, bsdf->n_in);
     if (!v) return NULL;
@@ -276,6 +277,7 @@ static __attribute__((noinline)) void split(const struct imp_step *before,
                                        .key = imp__key_branch(walk->key, s.depth, i),
                                        .point = point_branch(walk->point, s.depth, i),
                                        .ray = walk->ray,
+                                       .time = walk->time,
                                        .waves = walk->waves,
                                        .wave = walk->wave,
                                        .depth = s.depth};
@@ -391,7 +393,8 @@ vertex_work(struct imp_step *s, struct imp_vertex *v, const struct imp_hit *hit,
     /* Is the light seen? */
     if (shadow.wanted) {
         if (imp_unlikely(s->segment->sees != NULL)) connect_through(s, v, at, &shadow);
-        else if (!imp__occluded(s->scene, &shadow.o, &shadow.d, 0, shadow.reach)) {
+        else if (!imp__occluded_at(s->scene, s->walk->time, &shadow.o, &shadow.d, 0,
+                                   shadow.reach)) {
             v->b = shadow.brings;
             if (s->recorded) v->d.connection = IMP_CONNECTED;
         }
@@ -520,6 +523,7 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
     const double lens[2] = {imp__start_number(walk->key, walk->point, IMP_DIM_LENS_U),
                             imp__start_number(walk->key, walk->point, IMP_DIM_LENS_V)};
     sensor->ops->ray(sensor, walk->px, walk->py, lens, &walk->ray);
+    walk->time = imp__walk_time(tracer, walk);
 
     if (imp_unlikely(tracer->wavelengths != NULL) &&
         !imp__walk_wave(tracer, arena, imp__wave_draw(tracer, walk, sample), walk))

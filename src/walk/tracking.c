@@ -3,6 +3,7 @@
  * Flights through media while a walk is decided, and the way to its light samples. */
 #include "tracking.h"
 #include "probe.h"
+#include "scene/instances.h"
 #include "scene/majorants.h"
 
 /* A ray through media, from its start. */
@@ -267,7 +268,8 @@ static enum imp_meeting meet(struct imp_step *s, struct imp_hit *hit)
     struct flight w = flight_from(s, start, d, ALONG_WALK);
     double t, t_max = s->t_max, base = 0;
     for (int passed = 0;; passed++) {
-        const bool found = imp__intersect(scene, &s->o, &d, s->t_min, t_max, hit);
+        const bool found =
+            imp__intersect_at(scene, s->walk->time, &s->o, &d, s->t_min, t_max, hit);
         const double near = passed ? base : fmax(s->t_min, s->flight.behind),
                      far = base + (found ? hit->t : t_max);
         const struct imp_medium *m = s->flight.medium;
@@ -288,7 +290,7 @@ static enum imp_meeting meet(struct imp_step *s, struct imp_hit *hit)
             break;
         }
         struct imp_surface at;
-        shape->ops->surface(shape, hit, &s->o, &d, &at);
+        imp__hit_surface(scene, hit, &s->o, &d, &at);
         const bool wrong = !consistent(s, shape, at.ng, d, m);
         const bool left = wrong && hit->t <= 2 * s->flight.behind && !passed;
         if (wrong && !left) {
@@ -366,6 +368,7 @@ static bool sees(struct imp_step *s, struct imp_vertex *v, const struct imp_surf
                  const struct imp_shadow *shadow, imp_spec *T)
 {
     const struct imp_scene *scene = s->scene;
+    const double time = s->walk->time;
     const double length = imp__length(shadow->d);
     const imp_v3 d = shadow->d * (1 / length);
     const double back = v->shape ? 0 : behind(from->p);
@@ -377,7 +380,7 @@ static bool sees(struct imp_step *s, struct imp_vertex *v, const struct imp_surf
     double t, base = 0;
     for (int passed = 0; passed <= IMP_WALK_MAX; passed++) {
         struct imp_hit hit;
-        const bool found = imp__intersect(scene, &o, &d, 0, end - base, &hit);
+        const bool found = imp__intersect_at(scene, time, &o, &d, 0, end - base, &hit);
         const struct imp_shape *shape = found ? scene->shapes[hit.shape] : NULL;
         const bool hole = found && is_passed(scene, shape);
         if (found && !hole && !imp__shape_bsdf(scene, shape)->straight) return false;
@@ -385,7 +388,7 @@ static bool sees(struct imp_step *s, struct imp_vertex *v, const struct imp_surf
         if (s->walk->dropped) return false;
         if (!found) return arrived(&w, v, T);
         struct imp_surface at;
-        shape->ops->surface(shape, &hit, &o, &d, &at);
+        imp__hit_surface(scene, &hit, &o, &d, &at);
         if (!hole && !go_through(&w, shape, &at)) return false;
         m = beyond(shape, at.ng, d, m);
         o = imp__offset(at.p, at.ng, d);

@@ -23,6 +23,7 @@
 #ifndef IMP_WALK_H
 #define IMP_WALK_H
 
+#include "math/course.h"
 #include "math/points.h"
 #include "scene/guide.h"
 #include "shaped.h"
@@ -142,6 +143,7 @@ struct imp_walk {
     int depth;     /* of the first vertex: 0, unless it hangs on another walk */
     double px, py; /* film position, pixels of the full film */
     struct imp_key key;
+    double time;
     struct imp_point point; /* of its set; of none: its numbers are the key's */
     struct imp_sensor_ray ray;
     imp_spec L; /* radiance at the sensor, by the scene's channels; of a side walk its
@@ -283,6 +285,9 @@ static inline void imp__set_at(int set, int64_t period, int64_t sample, int64_t 
     *n = (k + 1) * period / sets - k * period / sets;
 }
 
+/* When its light reaches the sensor. */
+double imp__walk_time(const struct imp_tracer *tracer, const struct imp_walk *walk);
+
 /* Number from which the wavelengths of a walk are drawn, on [0, 1). */
 double imp__wave_draw(const struct imp_tracer *tracer, const struct imp_walk *walk,
                       int64_t sample);
@@ -315,6 +320,16 @@ void imp__walk_evaluate(const struct imp_tracer *tracer, struct imp_walk *walk);
 /* Fold, and L as it counts: a walk that is not valid brings 0, and one whose value no
  * light can have, or no picture can hold, is dropped (trace.c). */
 void imp__walk_close(const struct imp_tracer *tracer, struct imp_walk *walk);
+
+/* The weight of light from an emitter that varies in time: a decision, since no parameter
+ * moves its course. */
+static inline double imp__emitter_timed(const struct imp_emitter *e, double time,
+                                        double weight)
+{
+    if (imp_likely(e->course == NULL)) return weight;
+    const imp_decided timed = (imp_decided)(weight * imp__course_at(e->course, time));
+    return timed;
+}
 
 /* Where the emitter's inputs are looked up. */
 static inline void imp__emitter_place(const struct imp_emitter *e,

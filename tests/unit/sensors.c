@@ -207,7 +207,6 @@ static void sensor_errors(void)
             {"far_clip", "far_clip = 0.01 must", 0.01},
             {"near_clip", "not finite", NAN},
             {"focus_distance", "focus_distance = 0 must", 0},
-            {"shutter_close", "before shutter_open", -1},
             {"x_fov", "'x_fov'", 3}};
         for (size_t k = 0; k < imp_count(numbers); k++) {
             n = sensor_node(type);

@@ -40,7 +40,6 @@ enum imp_status imp__projection_build(const struct imp_build *b, bool rigid,
 {
     enum imp_status st = IMP_OK;
     struct imp_projection p;
-    double open, close;
 
     IMP_TRY(placement_read(b, rigid, &p.to_world, &p.to_local));
     IMP_TRY(imp_build_float(b, "near_clip", 1e-2, &p.near_clip));
@@ -57,12 +56,6 @@ enum imp_status imp__projection_build(const struct imp_build *b, bool rigid,
         IMP_TRY(imp_build_error(b, "focus_distance", IMP_E_SCENE,
                                 "focus_distance = %g must be greater than 0",
                                 p.focus_distance));
-    IMP_TRY(imp_build_float(b, "shutter_open", 0, &open));
-    IMP_TRY(imp_build_float(b, "shutter_close", 0, &close));
-    if (close < open)
-        IMP_TRY(imp_build_error(b, "shutter_close", IMP_E_SCENE,
-                                "shutter_close = %g comes before shutter_open = %g",
-                                close, open));
     *out = p;
 out:
     return st;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What the projective sensors share: placement, clipping planes, shutter, field of view.
+ * What the projective sensors share: placement, clipping planes, field of view.
  */
 #ifndef IMP_KIND_PROJECTION_H
 #define IMP_KIND_PROJECTION_H
@@ -13,8 +13,7 @@ struct imp_projection {
     double near_clip, far_clip, focus_distance;
 };
 
-/* to_world, near_clip, far_clip, focus_distance and the shutter (accepted: nothing
- * moves). `rigid`: a scale in to_world is an error (tolerance 1e-3). */
+/* to_world, near_clip, far_clip and focus_distance. `rigid`: a scale in to_world is an error (tolerance 1e-3). */
 enum imp_status imp__projection_build(const struct imp_build *b, bool rigid,
                                       struct imp_projection *out);
 

@@ -1,0 +1,82 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Groups of shapes, and the instances by which they stand in a scene: each has a
+ * placement of its own, and the shapes are there once. A group may hold instances of
+ * others, so a hit lies at a place: one instance of the scene, one of its group, and so
+ * on. Places are numbered from 1, depth first:
+ *
+ *     number of place (i, rest) of a group = before_i + 1 + number of `rest` in group i
+ *
+ * with 0 for "no instance", and before_i the places in the instances before i. */
+#ifndef IMP_SCENE_INSTANCES_H
+#define IMP_SCENE_INSTANCES_H
+
+#include "math/motion.h"
+#include "scene.h"
+
+struct imp_instance {
+    struct imp_map to_world,
+        to_local; /* where it stands; of one that moves at its start */
+    const struct imp_group *group;
+    const struct imp_motion *motion;   /* NULL: it stands still */
+    const struct imp_covered *covered; /* what its own material makes of the group's
+                                          shapes; NULL: they have theirs */
+    int64_t before;                    /* places in the instances before it */
+};
+
+/* The shapes of a group with another material: copies of them, of which the first has
+ * index `first`, in the order of group->within. */
+struct imp_covered {
+    const struct imp_group *group;
+    int bsdf, first;
+};
+
+struct imp_group {
+    const char *name;
+    int first, n_shapes; /* its own shapes, in the scene's list */
+    int n_instances;
+    struct imp_instance *instance; /* [n_instances] */
+    int64_t n_places;              /* in all of them */
+    int n_within;
+    int *within;   /* [n_within] all shapes that a ray can meet in it, ascending; of a
+                      group only */
+    imp_v3 lo, hi; /* bounds of all of it */
+    void *intersector;
+};
+
+/* ---- build_instances.c ---- */
+/* Is it what `shape` objects of these types are? */
+bool imp__is_group(const struct imp_node *node);
+bool imp__is_instance(const struct imp_node *node);
+/* All groups and instances of the scene, when its other shapes are there. */
+enum imp_status imp__instances_build(struct imp_scene *scene);
+/* Its shapes, triangles and instances, and the triangles that rays can meet. */
+void imp__instances_count(const struct imp_scene *scene, struct imp_scene_info *info);
+
+/* ---- instances.c ---- */
+/* From the world of an instance to its group, at a time; `room`: for what moves. */
+static inline const struct imp_map *
+imp__instance_local(const struct imp_instance *p, double time, struct imp_map room[2])
+{
+    if (imp_likely(p->motion == NULL)) return &p->to_local;
+    imp__motion_at(p->motion, time, &room[0], &room[1]);
+    return &room[1];
+}
+/* The box of an instance at all times, in the world around it. */
+void imp__instance_box(const struct imp_instance *p, imp_v3 *lo, imp_v3 *hi);
+/* The surface at a hit in an instance. */
+void imp__placed_surface(const struct imp_scene *scene, const struct imp_hit *hit,
+                         const imp_v3 *o, const imp_v3 *d, struct imp_surface *out);
+/* Index of the shape that was hit at this place, with the material it has there. */
+int imp__placed_shape(const struct imp_scene *scene, int shape, int64_t place);
+/* The surface at a hit of the ray (o, d). */
+static inline void imp__hit_surface(const struct imp_scene *scene,
+                                    const struct imp_hit *hit, const imp_v3 *o,
+                                    const imp_v3 *d, struct imp_surface *out)
+{
+    const struct imp_shape *s = scene->shapes[hit->shape];
+    if (imp_likely(hit->place == 0)) s->ops->surface(s, hit, o, d, out);
+    else imp__placed_surface(scene, hit, o, d, out);
+}
+
+#endif
