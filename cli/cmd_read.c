@@ -154,6 +154,14 @@ static int sensor_read(imp_problem *problem, struct json *j, struct imp_run run,
     return rc;
 }
 
+/* Is one sensor asked for, and not all? */
+static int sensor_named(void)
+{
+    for (size_t k = 0; k < cli.typed.n; k++)
+        if (strncmp(cli.typed.item[k], "--sensor=", 9) == 0) return 1;
+    return 0;
+}
+
 static int run_read(int n, char **operand)
 {
     struct imp_scene_info scene = {.size = sizeof scene};
@@ -186,7 +194,8 @@ static int run_read(int n, char **operand)
         json_integer(&j, "spp", cli_spp(&run));
         json_array(&j, "readings");
     }
-    for (int s = 0; s < scene.n_sensors && !rc; s++) {
+    const int one = sensor_named(), first = one ? cli.sensor : 0;
+    for (int s = first; s < (one ? first + 1 : scene.n_sensors) && !rc; s++) {
         run.sensor = s;
         rc = sensor_read(problem, &j, run, blocks, n_blocks, &apart);
     }
