@@ -63,6 +63,15 @@ static enum imp_status emission_allowed(const struct imp_scene *scene,
     return IMP_OK;
 }
 
+/* A light without end; NULL: there is none. */
+static const struct imp_emitter *far_light(const struct imp_scene *scene)
+{
+    for (int i = 0; i < scene->n_emitters; i++)
+        if (scene->emitters[i]->ops->flags & (IMP_EMITTER_ENVIRONMENT | IMP_EMITTER_FAR))
+            return scene->emitters[i];
+    return NULL;
+}
+
 /* Does the sensor's medium go on outside of everything? */
 static bool is_endless(const struct imp_scene *scene, const struct imp_sensor *sensor)
 {
@@ -101,12 +110,13 @@ static enum imp_status sensor_allowed(const struct imp_scene *scene,
             "walks from the lights: sensor '%s' (%s) has one direction, in "
             "which light '%s' is never drawn; let walks begin at the sensor",
             sensor->name, sensor->ops->name, scene->emitters[scene->environment]->name);
-    if (scene->environment >= 0 && is_endless(scene, sensor))
+    const struct imp_emitter *far = far_light(scene);
+    if (far && is_endless(scene, sensor))
         return imp__error(
             ctx, IMP_E_UNSUPPORTED,
             "walks from the lights: medium '%s' has no end, and light '%s' lies "
             "beyond it; let walks begin at the sensor",
-            sensor->medium->name, scene->emitters[scene->environment]->name);
+            sensor->medium->name, far->name);
     bool area = false;
     for (int i = 0; i < scene->n_emitters; i++) area |= scene->emitters[i]->shape != NULL;
     if (integrator->hide_emitters && area &&

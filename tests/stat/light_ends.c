@@ -401,6 +401,34 @@ static void rooms(bool slow)
          "<shape type='rectangle'>" AT("<rotate y='1' angle='90'/><translate x='-1.5'/>")
              DIFFUSE(".7") "</shape>",
          IMP_MONO, 40000 * k, 40000 * k, NAN, .01);
+    ends("a spot and a meter", 3,
+         "<emitter type='spot'><transform name='to_world'><lookat origin='.3,0,1.2' "
+         "target='0,0,0' up='0,1,0'/></transform><float name='cutoff_angle' "
+         "value='40'/></emitter>"
+         "<shape type='disk'>" DIFFUSE(".5") METER
+         "</shape>"
+         "<shape type='rectangle'>" AT("<rotate y='1' angle='90'/><translate x='-.5'/>")
+             DIFFUSE(".7") "</shape>",
+         IMP_MONO, 40000 * k, 80000 * k, NAN, .01);
+    ends("a projector, seen by a camera", 3,
+         "<emitter type='projector'><transform name='to_world'><lookat origin='.5,0,2' "
+         "target='0,0,0' up='0,1,0'/></transform><float name='fov' value='50'/><texture "
+         "type='checkerboard' name='irradiance'/></emitter>"
+         "<shape type='rectangle'>" DIFFUSE(".5") "</shape>" BALL("0,0,.2", DIFFUSE(".7"))
+             CAMERA(3),
+         IMP_RGB, 4000 * k, 20000 * k, NAN, .015);
+    ends("parallel light and a meter", 3,
+         "<emitter type='directional'><vector name='direction' value='.3,.1,-1'/>"
+         "</emitter><shape type='disk'>" DIFFUSE(".5") METER
+         "</shape>"
+         "<shape type='rectangle'>" AT("<rotate y='1' angle='90'/><translate x='-1.5'/>")
+             DIFFUSE(".7") "</shape>",
+         IMP_MONO, 40000 * k, 80000 * k, NAN, .01);
+    ends("parallel light, seen by a camera", 3,
+         "<emitter type='directional'><vector name='direction' value='.3,.1,-1'/>"
+         "</emitter><shape type='rectangle'>" DIFFUSE(".5") "</shape>" BALL(
+             "0,0,.2", DIFFUSE(".7")) CAMERA(3),
+         IMP_RGB, 2000 * k, 16000 * k, NAN, .015);
     ends("distant sensor", 4,
          BALL("0,0,0", DIFFUSE(".5")) "<shape type='rectangle'>" AT(
              "<rotate x='1' angle='90'/><translate y='1.5'/>")

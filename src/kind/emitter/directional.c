@@ -5,6 +5,7 @@
 #include "from_point.h"
 #include "math/transform.h"
 #include "math/vec.h"
+#include "math/warp.h"
 #include <math.h>
 
 enum { IRRADIANCE };
@@ -65,14 +66,40 @@ static bool sample(const struct imp_emitter *e, const imp_v3 *ref, const double 
     return true;
 }
 
-const struct imp_emitter_ops imp__directional = {.size = sizeof(struct imp_emitter_ops),
-                                                 .name = "directional",
-                                                 .object_size =
-                                                     sizeof(struct directional),
-                                                 .flags = IMP_EMITTER_DELTA,
-                                                 .inputs = inputs,
-                                                 .build = build,
-                                                 .eval = eval,
-                                                 .eval_d = eval_d,
-                                                 .sample = sample,
-                                                 .pdf = imp__point_light_pdf};
+/* From a disk before the scene. */
+static bool sample_emission(const struct imp_emitter *e, const struct imp_ball *scene,
+                            const double u[4], struct imp_emission_sample *out)
+{
+    const struct directional *l = e->self;
+    const struct imp_frame f = imp__frame_from_normal(l->along);
+    const double r = scene->radius;
+    double xy[2];
+    imp__concentric_disk(u, xy);
+    *out = (struct imp_emission_sample){.p = scene->centre +
+                                             (f.s * xy[0] + f.t * xy[1] - l->along) * r,
+                                        .d = l->along,
+                                        .cos_light = 1,
+                                        .cos_p = 1,
+                                        .pdf_p = IMP_INV_PI / (r * r),
+                                        .pdf_d = 1};
+    return true;
+}
+static double pdf_emission(const struct imp_emitter *e, const struct imp_emission *x)
+{
+    (void)e, (void)x;
+    return 1;
+}
+
+const struct imp_emitter_ops imp__directional = {
+    .size = sizeof(struct imp_emitter_ops),
+    .name = "directional",
+    .object_size = sizeof(struct directional),
+    .flags = IMP_EMITTER_DELTA | IMP_EMITTER_FAR,
+    .inputs = inputs,
+    .build = build,
+    .eval = eval,
+    .eval_d = eval_d,
+    .sample = sample,
+    .pdf = imp__point_light_pdf,
+    .sample_emission = sample_emission,
+    .pdf_emission = pdf_emission};

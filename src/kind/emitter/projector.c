@@ -84,6 +84,37 @@ static bool sample(const struct imp_emitter *e, const imp_v3 *ref, const double 
     return imp__point_light_sample(p->frame.origin, *ref, out);
 }
 
+/* Uniformly on the screen, 4 t_x t_y at distance 1, whose density per steradian is as the
+ * light of an even picture, 1/cos^3. */
+static double pdf_emission(const struct imp_emitter *e, const struct imp_emission *x)
+{
+    const struct projector *p = e->self;
+    const double area = 4 * p->tan_half[0] * p->tan_half[1];
+    const imp_v3 d = imp__light_frame_local(&p->frame, &x->d);
+    double uv[2];
+    place(e, x, uv);
+    if (!(uv[0] >= 0 && uv[0] <= 1 && uv[1] >= 0 && uv[1] <= 1)) return 0;
+    return 1 / (area * d[2] * d[2] * d[2]);
+}
+static bool sample_emission(const struct imp_emitter *e, const struct imp_ball *scene,
+                            const double u[4], struct imp_emission_sample *out)
+{
+    (void)scene;
+    const struct projector *p = e->self;
+    const struct imp__light_frame *f = &p->frame;
+    const imp_v3 d =
+        imp__normalize(f->axis[0] * ((1 - 2 * u[2]) * p->tan_half[0]) +
+                       f->axis[1] * ((1 - 2 * u[3]) * p->tan_half[1]) + f->axis[2]);
+    const struct imp_emission x = {.dist = 1, .cos_light = 1, .d = d};
+    *out = (struct imp_emission_sample){.p = f->origin,
+                                        .d = d,
+                                        .cos_light = 1,
+                                        .cos_p = 1,
+                                        .pdf_p = 1,
+                                        .pdf_d = pdf_emission(e, &x)};
+    return out->pdf_d > 0;
+}
+
 const struct imp_emitter_ops imp__projector = {.size = sizeof(struct imp_emitter_ops),
                                                .name = "projector",
                                                .object_size = sizeof(struct projector),
@@ -94,4 +125,6 @@ const struct imp_emitter_ops imp__projector = {.size = sizeof(struct imp_emitter
                                                .eval_d = eval_d,
                                                .sample = sample,
                                                .pdf = imp__point_light_pdf,
-                                               .place = place};
+                                               .place = place,
+                                               .sample_emission = sample_emission,
+                                               .pdf_emission = pdf_emission};

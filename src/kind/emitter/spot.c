@@ -133,6 +133,34 @@ static bool sample(const struct imp_emitter *e, const imp_v3 *ref, const double 
     return imp__point_light_sample(f->origin, *ref, out);
 }
 
+/* Uniformly in the cone of the cutoff, at whose border the light is 0. */
+static double cone_height(const struct imp_emitter *e)
+{
+    const double s = sin(e->input[CUTOFF]->value[0] * (DEGREE / 2));
+    return 2 * s * s; /* 1 - cos */
+}
+static double pdf_emission(const struct imp_emitter *e, const struct imp_emission *x)
+{
+    return angle(e, x) < e->input[CUTOFF]->value[0] ? 1 / (IMP_2PI * cone_height(e)) : 0;
+}
+static bool sample_emission(const struct imp_emitter *e, const struct imp_ball *scene,
+                            const double u[4], struct imp_emission_sample *out)
+{
+    (void)scene;
+    const struct imp__light_frame *f = e->self;
+    const double height = cone_height(e), k = u[2] * height, phi = IMP_2PI * u[3];
+    const double r = sqrt(k * (2 - k));
+    const imp_v3 d =
+        f->axis[0] * (r * cos(phi)) + f->axis[1] * (r * sin(phi)) + f->axis[2] * (1 - k);
+    *out = (struct imp_emission_sample){.p = f->origin,
+                                        .d = imp__normalize(d),
+                                        .cos_light = 1,
+                                        .cos_p = 1,
+                                        .pdf_p = 1,
+                                        .pdf_d = 1 / (IMP_2PI * height)};
+    return true;
+}
+
 const struct imp_emitter_ops imp__spot_light = {.size = sizeof(struct imp_emitter_ops),
                                                 .name = "spot",
                                                 .object_size =
@@ -146,4 +174,6 @@ const struct imp_emitter_ops imp__spot_light = {.size = sizeof(struct imp_emitte
                                                 .sample = sample,
                                                 .pdf = imp__point_light_pdf,
                                                 .place = place,
-                                                .place_d = place_d};
+                                                .place_d = place_d,
+                                                .sample_emission = sample_emission,
+                                                .pdf_emission = pdf_emission};
