@@ -149,7 +149,8 @@ static inline const struct imp_input_desc *kind_input(const struct imp_bsdf *b, 
 /* One number, in all lanes. */
 static inline bool kind_is_scalar(const struct imp_input_desc *d)
 {
-    return d->flags & (IMP_INPUT_SCALAR | IMP_INPUT_LUMINANCE);
+    return !(d->flags & IMP_INPUT_BUMP) &&
+           d->flags & (IMP_INPUT_SCALAR | IMP_INPUT_LUMINANCE);
 }
 static inline void kind_bounds(const struct imp_input_desc *d, double *lo, double *hi)
 {
@@ -194,9 +195,10 @@ static inline void kind_inputs(const struct imp_bsdf *b, enum kind_set set, uint
             else if (d->fallback > 0)
                 v = d->fallback * exp2(set == KIND_WIDE ? 7 * u - 3.5 : 3 * u - 1.5);
             else v = lo + 3 * u;
-            if (d->flags & IMP_INPUT_VECTOR) /* a normal, on the side of the surface */
+            if (d->flags & (IMP_INPUT_VECTOR |
+                            IMP_INPUT_BUMP)) /* a normal, on the side of the surface */
                 v = c == 2 ? 0.75 + 0.25 * u : 0.2 + 0.6 * u;
-            in[j][c] = imp_clamp(v, lo, hi);
+            in[j][c] = d->flags & IMP_INPUT_BUMP ? 2 * v - 1 : imp_clamp(v, lo, hi);
         }
         in[j][3] = kind_is_scalar(d) ? in[j][0] : NAN; /* nobody may read it */
         ((struct imp_input *)b->input[j])->value = in[j];

@@ -73,8 +73,12 @@ enum imp_input_flags {
     /* In spectral modes: */
     IMP_INPUT_DAYLIGHT = 16384, /* a bitmap's texels are daylight of their colours, of any
                                    size */
-    IMP_INPUT_LINEAR = 32768    /* colours become spectra by the linear basis, so that
+    IMP_INPUT_LINEAR = 32768,   /* colours become spectra by the linear basis, so that
                                    inputs add as their colours do */
+    IMP_INPUT_BUMP = 65536 /* a texture, read as one number, of which the slope counts:
+                                   lanes 0..2 are the normal, not unit, of the surface that
+                                   is raised by the texture times the property scale, in
+                                   the shading frame */
 };
 
 struct imp_input_desc { /* the list ends with {0} */
@@ -108,6 +112,7 @@ struct imp_input {
     bool scalar;     /* declared IMP_INPUT_SCALAR: textures give one number */
     bool plain;      /* a constant: `value` as it is, unless lanes are wavelengths */
     bool vector;     /* declared IMP_INPUT_VECTOR */
+    bool bump;       /* declared IMP_INPUT_BUMP */
     int luminance;   /* > 0: the luminance of the input that stands so many before it */
     imp_spec value;  /* the constant, in all used lanes */
     imp_spec weight; /* of a luminance: of that input's lanes */
@@ -254,10 +259,16 @@ struct imp_bsdf_ops {
 
 /* ---- Texture ------------------------------------------------------------------- */
 
+struct imp_shape;
+struct imp_surface;
 struct imp_texcoord {
     double uv[2];
     imp_v3 p;                          /* world position */
     const struct imp_carried *carried; /* what is looked up; NULL: the scene's colours */
+    const struct imp_shape *shape;     /* that is looked up; NULL: none, or not known */
+    /* Of a shape that is looked up by triangle: its number, and the surface there. */
+    int prim;
+    const struct imp_surface *surface;
 };
 
 struct imp_texture {
@@ -518,6 +529,15 @@ struct imp_shape {
     /* Behind ng and before it; both NULL at a surface that bounds no medium. */
     const struct imp_medium *interior, *exterior;
     const struct imp_sensor *sensor; /* that it is the surface of; NULL: none */
+    /* Textures by name that mesh_attribute looks up on this shape. */
+    int n_attributes;
+    const struct imp_attribute {
+        const char *name;
+        const struct imp_texture *texture;
+    } * attribute;
+    /* Its textures ask for more than uv: what `surface` and the draws of points write to uv
+     * then stands for the triangle, and `place` gives uv back. */
+    bool by_triangle;
 };
 
 /* A surface of constant curvature. */
@@ -527,12 +547,13 @@ struct imp_round {
 };
 
 enum imp_shape_flags {
-    IMP_SHAPE_CONVEX = 1, /* whatever its to_world: no line meets it more than twice, and
+    IMP_SHAPE_CONVEX = 1,  /* whatever its to_world: no line meets it more than twice, and
                              nothing of it is seen from its outside but by the front */
-    IMP_SHAPE_SQUARE = 2, /* uv covers [0,1]^2 once, and its border is where u or v is
+    IMP_SHAPE_SQUARE = 2,  /* uv covers [0,1]^2 once, and its border is where u or v is
                              0 or 1 */
-    IMP_SHAPE_NEAREST = 4 /* of the points on a line, sample_toward draws the nearest
+    IMP_SHAPE_NEAREST = 4, /* of the points on a line, sample_toward draws the nearest
                              only; else all of them */
+    IMP_SHAPE_TRIANGLES = 8 /* it can be looked up by triangle */
 };
 
 struct imp_shape_ops {
@@ -561,6 +582,11 @@ struct imp_shape_ops {
      * NULL: light walks cannot begin on it. */
     void (*sample_area)(const struct imp_shape *s, const double u[2],
                         struct imp_surface *out);
+    /* The surface at a place that was met before: what it had in uv, and p, of which the last
+     * digits may be lost. Sets *prim where it is looked up by triangle. NULL: bump maps are
+     * refused. */
+    void (*place)(const struct imp_shape *s, const double uv[2], const imp_v3 *p,
+                  struct imp_surface *out, int *prim);
 };
 
 /* ---- Emitter ------------------------------------------------------------------- */

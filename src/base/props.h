@@ -46,6 +46,14 @@ struct imp_mesh_data {
     const float *positions, *normals, *uvs; /* normals, uvs may be NULL */
     const uint32_t *indices;
     bool normals_from_file; /* else: compute them unless face_normals */
+    int n_attributes;
+    struct imp_attribute_data {
+        const char *name; /* vertex_..., face_... */
+        size_t n;         /* vertices or triangles */
+        int channels;     /* 1 or 3 */
+        bool face, color;
+        float *values; /* [n][channels] */
+    } * attribute;
 };
 struct imp_image_data {
     int width, height, channels; /* 1 or 3 */
@@ -96,6 +104,7 @@ struct imp_node {
     const struct imp_ies_data *ies;
     const struct imp_merl_data *merl;
     const struct imp_grid_data *grid;
+    const struct imp_attribute_data *attribute;
     struct imp_body *body; /* attached: a graded index (format/graded_file.c), or NULL */
     void *object;          /* what was made from it (scene/scene_build.c) */
     const char *asked[24]; /* names of properties that were looked for, literals; */

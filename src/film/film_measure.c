@@ -213,7 +213,8 @@ static imp_spec albedo(const struct imp_measure *m, const struct imp_hit *hit,
                        const struct imp_surface *at, imp_v3 d)
 {
     const struct imp_bsdf *b = imp__shape_bsdf(m->scene, m->scene->shapes[hit->shape]);
-    const struct imp_texcoord where = {.uv = {at->uv[0], at->uv[1]}, .p = at->p};
+    const struct imp_texcoord where = {
+        .uv = {at->uv[0], at->uv[1]}, .p = at->p, .shape = m->scene->shapes[hit->shape]};
     const struct imp_frame frame = {at->s, at->t, at->n};
     const imp_v3 wo = imp__to_local(&frame, -d);
     imp_spec in[IMP_INPUTS_MAX], rho;

@@ -16,8 +16,12 @@ enum imp_status imp__mesh_arrays(const struct imp_mesh_source *source, size_t n_
     if (!*positions || !*indices || (normals && !*normals) || (uvs && !*uvs))
         return imp__error(source->ctx, IMP_E_NOMEM, "%s: no memory for %zu triangles",
                           source->name, n_triangles);
-    *out = (struct imp_mesh_data){
-        n_vertices,        n_triangles, *positions,     normals ? *normals : NULL,
-        uvs ? *uvs : NULL, *indices,    normals != NULL};
+    *out = (struct imp_mesh_data){.n_vertices = n_vertices,
+                                  .n_triangles = n_triangles,
+                                  .positions = *positions,
+                                  .normals = normals ? *normals : NULL,
+                                  .uvs = uvs ? *uvs : NULL,
+                                  .indices = *indices,
+                                  .normals_from_file = normals != NULL};
     return IMP_OK;
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * PLY 1.0: ascii, binary_little_endian, binary_big_endian. Of vertices x y z, nx ny nz
- * and uv are read, of faces vertex_index or vertex_indices; other properties are skipped.
- */
+ * and uv are read, of faces vertex_index or vertex_indices; other numbers are attributes
+ * (ply_attributes.c); other lists and elements are skipped. */
 #include "base/number.h"
 #include "ply_file.h"
 #include <math.h>
@@ -118,7 +118,9 @@ static enum imp_status element_read(struct ply *p, int index)
             if (!number_read(p, q->count == PLY_NONE ? q->type : q->count, &x))
                 IMP_TRY(row_error(p, e, row));
             if (q->count == PLY_NONE) value[q->use] = x;
-            else if (q->indices) IMP_TRY(corners_read(p, q, e, row, x));
+            if (q->attribute >= 0) IMP_TRY(imp__ply_attribute_store(p, q, row, x));
+            if (q->count == PLY_NONE) continue;
+            if (q->indices) IMP_TRY(corners_read(p, q, e, row, x));
             else IMP_TRY(list_skip(p, q, e, row, x));
         }
         if (index == p->vertex) IMP_TRY(vertex_store(p, row, value));
@@ -136,6 +138,7 @@ static enum imp_status body_read(struct ply *p, struct imp_mesh_data *out)
     IMP_TRY(imp__mesh_arrays(p->source, p->elements[p->vertex].n, p->elements[p->face].n,
                              &p->positions, normals ? &p->normals : NULL,
                              uvs ? &p->uvs : NULL, &p->indices, out));
+    IMP_TRY(imp__ply_attributes(p));
     for (int i = 0; i < p->n_elements; i++) IMP_TRY(element_read(p, i));
     if (p->format == PLY_ASCII)
         while (p->at < p->end && strchr(" \t\r\n", *p->at) && *p->at) p->at++;
@@ -161,6 +164,7 @@ enum imp_status imp__ply_parse(const struct imp_mesh_source *source,
     p->vertex = p->face = -1;
     IMP_TRY(imp__ply_header(p));
     IMP_TRY(body_read(p, &mesh));
+    IMP_TRY(imp__ply_attributes_keep(p, &mesh));
     *out = mesh;
 out:
     imp__release(source->ctx, p);

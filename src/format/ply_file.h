@@ -8,6 +8,7 @@
 
 #define ELEMENTS_MAX   64
 #define PROPERTIES_MAX 256
+#define ATTRIBUTES_MAX 64
 
 enum ply_format { PLY_ASCII, PLY_LITTLE, PLY_BIG };
 enum ply_type {
@@ -28,7 +29,7 @@ static inline int imp__ply_bytes(enum ply_type type)
     return bytes[type];
 }
 
-/* Meaning of a vertex property; SKIP: ignored. */
+/* Meaning of a vertex property; SKIP: ignored, or a channel of an attribute. */
 enum ply_use {
     USE_X,
     USE_Y,
@@ -46,6 +47,8 @@ struct ply_property {
     enum ply_type type, count; /* count NONE: a scalar */
     enum ply_use use;
     bool indices;
+    char name[48];
+    int attribute, channel; /* that it is part of; attribute -1: of none */
 };
 struct ply_element {
     char name[32];
@@ -62,6 +65,8 @@ struct ply {
     struct ply_element elements[ELEMENTS_MAX];
     struct ply_property properties[PROPERTIES_MAX];
     int n_elements, n_properties, vertex, face;
+    struct imp_attribute_data attribute[ATTRIBUTES_MAX];
+    int n_attributes;
     float *positions, *normals, *uvs;
     uint32_t *indices;
 };
@@ -71,5 +76,12 @@ enum imp_status IMP_PRINTF(2, 3)
 bool imp__ply_has(const struct ply *p, enum ply_use use);
 /* Up to the first byte of the body. The counts are not larger than the file can hold. */
 enum imp_status imp__ply_header(struct ply *p);
+
+/* Attributes: found in the header, with room for their numbers; number x of property q
+ * goes to row `row`; and they are the mesh's. */
+enum imp_status imp__ply_attributes(struct ply *p);
+enum imp_status imp__ply_attribute_store(struct ply *p, const struct ply_property *q,
+                                         size_t row, double x);
+enum imp_status imp__ply_attributes_keep(const struct ply *p, struct imp_mesh_data *mesh);
 
 #endif

@@ -97,12 +97,15 @@ static enum imp_status property_add(struct ply *p, char *const words[5], int n)
     if (p->n_properties == PROPERTIES_MAX)
         return imp__ply_error(p, "more than %d properties", PROPERTIES_MAX);
     struct ply_element *e = &p->elements[p->n_elements - 1];
-    struct ply_property q = {
-        .type = type_of(words[list ? 3 : 1]), .count = PLY_NONE, .use = USE_SKIP};
+    struct ply_property q = {.type = type_of(words[list ? 3 : 1]),
+                             .count = PLY_NONE,
+                             .use = USE_SKIP,
+                             .attribute = -1};
     if (list) q.count = type_of(words[2]);
     if (q.type == PLY_NONE || (list && (q.count == PLY_NONE || q.count >= PLY_F32)))
         return imp__ply_error(p, "line %lld: unknown type", (long long)p->line);
     const char *name = words[list ? 4 : 2];
+    snprintf(q.name, sizeof q.name, "%s", name);
     if (p->vertex == p->n_elements - 1 && !list) q.use = use_of(name);
     if (p->face == p->n_elements - 1 && list)
         q.indices =

@@ -39,6 +39,22 @@ static enum imp_status path_of(struct imp_scene *scene, struct imp_node *node,
     return st == IMP_OK ? st : placed(scene, node, st);
 }
 
+/* Attributes of a mesh are textures in its shape, unless the scene has put others there. */
+static enum imp_status attributes_attach(struct imp_scene *scene, struct imp_node *node,
+                                         const struct imp_mesh_data *data)
+{
+    for (int k = 0; k < data->n_attributes; k++) {
+        const struct imp_attribute_data *a = &data->attribute[k];
+        if (imp__node_child(node, a->name)) continue;
+        struct imp_node *t = imp__node_create(&scene->arena, "texture", "attribute", NULL,
+                                              NULL, node->loc);
+        if (!t || !imp__node_add_child(&scene->arena, node, t, a->name, t->loc))
+            return imp__error(scene->ctx, IMP_E_NOMEM, "scene: out of memory");
+        t->attribute = a;
+    }
+    return IMP_OK;
+}
+
 static enum imp_status mesh_attach(struct imp_scene *scene, struct imp_node *node,
                                    bool obj)
 {
@@ -55,6 +71,7 @@ static enum imp_status mesh_attach(struct imp_scene *scene, struct imp_node *nod
         st = obj ? imp__obj_parse(&source, data) : imp__ply_parse(&source, data);
     if (st != IMP_OK) IMP_TRY(placed(scene, node, st));
     node->mesh = data;
+    IMP_TRY(attributes_attach(scene, node, data));
 out:
     imp__bytes_free(ctx, &source.text);
     return st;

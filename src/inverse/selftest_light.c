@@ -85,7 +85,7 @@ static double derivative_error(const struct light *l, const struct imp_emission 
                                imp_v3 p)
 {
     const struct imp_emitter *e = l->e;
-    struct imp_texcoord at = {{x->uv[0], x->uv[1]}, p, NULL};
+    struct imp_texcoord at = {.uv = {x->uv[0], x->uv[1]}, .p = p, .shape = l->e->shape};
     imp_spec in[IMP_INPUTS_MAX], d[IMP_INPUTS_MAX], f, up, down;
     double worst = 0;
     imp__emitter_place(e, x, &at);

@@ -59,8 +59,7 @@ static void place(const struct imp__selftest *t, const struct imp_bsdf *b, int i
                   struct point *p)
 {
     const struct imp_key key = imp__key(t->options.seed, 11, (uint64_t)i);
-    const struct imp_texcoord at = {
-        {imp__u01(key, 0), imp__u01(key, 1)}, imp__v3(0, 0, 0), NULL};
+    const struct imp_texcoord at = {.uv = {imp__u01(key, 0), imp__u01(key, 1)}};
     p->b = b;
     p->wo = imp__selftest_direction(i % 4 == 3 ? 2 * i + 1 : 2 * i, t->options.seed);
     imp__inputs_eval(b->input, b->n_in, &at, p->in);

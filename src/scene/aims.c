@@ -99,7 +99,8 @@ static double intensity(const struct imp_scene *scene, const struct imp_emitter 
         if (!e->ops->sample(e, &from, u + 2, &ls) || !(ls.pdf > 0)) continue;
         const struct imp_emission x = {
             {ls.uv[0], ls.uv[1]}, ls.dist, ls.cos_light, -ls.wi};
-        const struct imp_texcoord at = {{ls.uv[0], ls.uv[1]}, ls.p, NULL};
+        const struct imp_texcoord at = {
+            .uv = {ls.uv[0], ls.uv[1]}, .p = ls.p, .shape = e->shape};
         imp__inputs_eval(e->input, e->n_in, &at, in);
         e->ops->eval(e, in, &x, &le);
         sum +=

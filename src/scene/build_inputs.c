@@ -95,8 +95,8 @@ static enum imp_status param_add(struct imp_scene *scene, const char *name,
 
 /* Texels that stand for an input stay within its bounds, if they are there to begin with:
  * a search may not raise a reflectance above 1. */
-static void texels_bound(struct imp_scene *scene, int param,
-                         const struct imp_input_desc *d)
+void imp__build_texels_bound(struct imp_scene *scene, int param,
+                             const struct imp_input_desc *d)
 {
     if (param < 0 || scene->params[param].store != IMP_STORE_BULK) return;
     struct imp_param *p = &scene->params[param];
@@ -171,7 +171,8 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
         return IMP_OK;
     }
 
-    if (d->flags & IMP_INPUT_VECTOR &&
+    const bool bump = d->flags & IMP_INPUT_BUMP;
+    if ((bump || d->flags & IMP_INPUT_VECTOR) &&
         (prop || (child && imp__color_is_object(child->node))))
         IMP_TRY(imp__prop_error(ctx, node, prop, IMP_E_SCENE, "'%s' must be a texture",
                                 d->name));
@@ -197,6 +198,12 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
                                     "'%s' must be a %s, not a texture", d->name,
                                     scalar ? "number" : "number or a colour"));
         in->vector = d->flags & IMP_INPUT_VECTOR;
+        in->bump = bump;
+        if (bump) {
+            double scale;
+            IMP_TRY(imp__props_float(ctx, node, "scale", 1, &scale));
+            in->value = imp__spec(scale);
+        }
         if (child->node->object && in->vector != child->node->vector &&
             scene->mode == IMP_MONO)
             IMP_TRY(imp__node_error(ctx, child->node, IMP_E_SCENE,
@@ -205,8 +212,12 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
         if (!child->node->object) child->node->vector = in->vector;
         IMP_TRY(imp__build_texture(scene, child->node, name, d->name, d, &t));
         in->texture = t;
+        if (bump && !t->ops->slope)
+            IMP_TRY(imp__node_error(ctx, child->node, IMP_E_UNSUPPORTED,
+                                    "the slope of such a texture is not known: it raises "
+                                    "nothing"));
         if (d->flags & IMP_INPUT_FIXED) imp__build_fix(scene, in);
-        texels_bound(scene, t->param, d);
+        imp__build_texels_bound(scene, t->param, d);
         if (volume) IMP_TRY(volume_check(scene, child->node, t, d));
         return IMP_OK;
     } else if (d->flags & IMP_INPUT_REQUIRED) {

@@ -4,12 +4,13 @@
  * in document order, however many references it has. */
 #include "base/number.h"
 #include "kind/sensor/sensor_film.h"
+#include "kind/texture/mesh_attribute.h"
 #include "math/course.h"
 #include "scene_build.h"
 
 /* ---- BSDFs --------------------------------------------------------------------- */
 
-static void bsdf_changed(void *payload)
+void imp__bsdf_changed(void *payload)
 {
     const struct imp_bsdf *b = payload;
     b->ops->changed(b);
@@ -96,7 +97,7 @@ enum imp_status imp__build_bsdf(struct imp_scene *scene, struct imp_node *node,
     IMP_TRY(imp__mixing_read(&build, &mixing));
     IMP_TRY(imp__props_finish(ctx, node));
     if (ops->changed)
-        IMP_TRY(imp__build_watch(scene, b->input, b->n_in, bsdf_changed, b));
+        IMP_TRY(imp__build_watch(scene, b->input, b->n_in, imp__bsdf_changed, b));
     b->index = scene->n_bsdfs;
     IMP_TRY(imp__build_list_add(scene, (void ***)&scene->bsdfs, &scene->n_bsdfs, b));
     IMP_TRY(imp__build_list_add(scene, (void ***)&scene->bsdf_mixing,
@@ -170,7 +171,7 @@ out:
 
 /* ---- Emitters, shapes, sensors ------------------------------------------------- */
 
-static void emitter_changed(void *payload)
+void imp__emitter_changed(void *payload)
 {
     const struct imp_emitter *e = payload;
     e->ops->changed(e);
@@ -233,7 +234,7 @@ enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *nod
     IMP_TRY(imp__proxies_take(scene, node, e->name));
     IMP_TRY(imp__props_finish(ctx, node));
     if (ops->changed)
-        IMP_TRY(imp__build_watch(scene, e->input, e->n_in, emitter_changed, e));
+        IMP_TRY(imp__build_watch(scene, e->input, e->n_in, imp__emitter_changed, e));
     if (ops->flags & IMP_EMITTER_ENVIRONMENT) {
         if (scene->environment >= 0)
             IMP_TRY(
@@ -309,12 +310,14 @@ enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
             if (sensor)
                 IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "has two sensors"));
             sensor = c->node;
-        } else {
+        } else if (strcmp(tag, "texture") != 0 || !c->name ||
+                   !imp__attribute_name(c->name)) {
             continue;
         }
         c->used = true;
     }
     IMP_TRY(imp__build_shape_bare(scene, node, name, &s));
+    IMP_TRY(imp__build_shape_attributes(scene, node, s));
     s->index = scene->n_shapes;
     node->object = s;
 
@@ -329,6 +332,7 @@ enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
     } else {
         s->bsdf = -2;
     }
+    IMP_TRY(imp__build_bumps_survey(scene, node, s));
     if (side[1] && strcmp(side[1]->type, "graded") == 0)
         IMP_TRY(imp__node_error(ctx, side[1], IMP_E_UNSUPPORTED,
                                 "a graded medium fills the interior of a shape"));

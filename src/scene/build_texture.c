@@ -8,8 +8,9 @@ static const char *bulk_name(struct imp_scene *scene, const char *texture,
                              const char *key)
 {
     const char *slot = strrchr(texture, '.');
-    return slot && strcmp(slot + 1, key) == 0 ? texture
-                                              : imp__build_name(scene, texture, key);
+    return !*key || (slot && strcmp(slot + 1, key) == 0)
+               ? texture
+               : imp__build_name(scene, texture, key);
 }
 
 static enum imp_status add_bulk(const struct imp_build *b, const char *key, float *data,

@@ -152,6 +152,7 @@ enum imp_status imp__scene_build(struct imp_scene *scene,
             IMP_TRY(top_build(scene, &scene->root->children[i], integrators, &counts));
     IMP_TRY(imp__instances_build(scene));
     IMP_TRY(imp__props_finish(scene->ctx, scene->root));
+    IMP_TRY(imp__build_attributes(scene));
     scene->ball = ball_around(scene);
     IMP_TRY(lights_build(scene));
     IMP_TRY(points_build(scene));

@@ -57,6 +57,20 @@ enum imp_status imp__build_gain(struct imp_scene *scene, struct imp_node *film,
 enum imp_status imp__gain_fit(struct imp_scene *scene, struct imp_node *film,
                               const struct imp_film_desc *desc,
                               struct imp_camera_gain *gain);
+/* Listeners of these objects' numbers; payload: the object. */
+void imp__bsdf_changed(void *payload);
+void imp__emitter_changed(void *payload);
+/* Bounds of an input for the texels that stand for it. */
+void imp__build_texels_bound(struct imp_scene *scene, int param,
+                             const struct imp_input_desc *d);
+/* Attributes (build_attributes.c): the textures that stand in a shape under such names;
+ * whether its material has bump maps, which ask for its surface; and, when all objects are
+ * made, the textures that mesh_attributes look up. */
+enum imp_status imp__build_shape_attributes(struct imp_scene *scene,
+                                            struct imp_node *node, struct imp_shape *s);
+enum imp_status imp__build_bumps_survey(struct imp_scene *scene,
+                                        const struct imp_node *node, struct imp_shape *s);
+enum imp_status imp__build_attributes(struct imp_scene *scene);
 /* A medium that scatters, called `slot` below its parent if it has no id. */
 enum imp_status imp__build_medium(struct imp_scene *scene, struct imp_node *node,
                                   const char *parent, const char *slot,

@@ -376,7 +376,8 @@ bool imp__graded_place(const struct imp_tracer *tracer, const struct imp_vertex 
         x = at.p;
         ng = at.ng;
         p->dirs.wo[2] = -imp__dot(at.n, d);
-        p->at = (struct imp_texcoord){{at.uv[0], at.uv[1]}, x, v->carried};
+        p->at = (struct imp_texcoord){
+            .uv = {at.uv[0], at.uv[1]}, .p = x, .carried = v->carried, .shape = v->shape};
         p->met.uv[0] = at.uv[0];
         p->met.uv[1] = at.uv[1];
     }

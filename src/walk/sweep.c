@@ -212,6 +212,7 @@ static void emitter_scatter(const struct imp_tracer *tracer, int emitter,
 {
     const struct imp_emitter *e = tracer->scene->emitters[emitter];
     imp_spec d[IMP_INPUTS_MAX];
+    at.shape = e->shape; /* of a walk's light vertex, too */
     imp__emitter_place(e, &x, &at);
     emitter_d(e, tracer->active, &x, &at, d);
     for (int j = 0; j < e->n_in; j++) d[j] *= bar;
@@ -245,7 +246,8 @@ void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_wa
                             sink);
         if (connected && light->emitter >= 0 && active->emitter[light->emitter])
             emitter_scatter(tracer, light->emitter, imp__light_emission(light),
-                            imp__light_at(v), lit * v->light_f * v->light_w, sink);
+                            imp__light_at(tracer->scene, v),
+                            lit * v->light_f * v->light_w, sink);
         if (bsdf_active(tracer, v)) {
             imp_spec bar[IMP_INPUTS_MAX], d[IMP_INPUTS_MAX];
             bool any = false;
@@ -310,6 +312,7 @@ static imp_spec emitter_tangent(const struct imp_tracer *tracer, int emitter,
 {
     const struct imp_emitter *e = tracer->scene->emitters[emitter];
     imp_spec d[IMP_INPUTS_MAX], in_dot[IMP_INPUTS_MAX], sum = {0};
+    at.shape = e->shape; /* of a walk's light vertex, too */
     imp__emitter_place(e, &x, &at);
     emitter_d(e, tracer->active, &x, &at, d);
     imp__inputs_tangent(e->input, e->n_in, &at, direction_at, direction, in_dot);
@@ -345,7 +348,7 @@ static imp_spec tangent(const struct imp_tracer *tracer, const struct imp_walk *
                                                                  : v->beyond * v->scale);
         if (connected && light->emitter >= 0 && active->emitter[light->emitter])
             L_dot += emitter_tangent(tracer, light->emitter, imp__light_emission(light),
-                                     imp__light_at(v), &direction) *
+                                     imp__light_at(tracer->scene, v), &direction) *
                      v->light_f * v->light_w * lit;
         if (imp_unlikely(crosses(v)))
             L_dot += media_tangent(tracer, v, lit, direction_at, &direction);

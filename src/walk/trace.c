@@ -75,6 +75,7 @@ static inline void vertex_place(struct imp_step *s, struct imp_vertex *v,
     s->at.uv[0] = imp__decide1(at->uv[0]);
     s->at.uv[1] = imp__decide1(at->uv[1]);
     s->at.p = imp__decide(at->p);
+    s->at.shape = v->shape;
     s->wo_drawn = imp__to_local(frame, -d);
     s->wo = imp__decide(s->wo_drawn);
     s->in = in;
@@ -113,7 +114,7 @@ static void sky_meet(struct imp_step *s)
     struct imp_vertex *v = vertex_add(s, 0);
     if (!v) return;
     v->t = INFINITY;
-    s->at = (struct imp_texcoord){{0, 0}, imp__decide(s->d), s->at.carried};
+    s->at = (struct imp_texcoord){.p = imp__decide(s->d), .carried = s->at.carried};
     if (s->recorded) {
         v->d.scatterer = IMP_AT_SKY;
         v->d.uv[0] = v->d.uv[1] = 0;

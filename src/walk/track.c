@@ -61,12 +61,15 @@ static struct factor factor_of(const struct imp_event *e, imp_spec sigma, bool d
 /* ---- Surfaces that light samples pass ------------------------------------------------ */
 
 /* Where the surface was passed. */
-static struct imp_texcoord passed_at(const struct imp_track *track,
+static struct imp_texcoord passed_at(const struct imp_shape *shape,
+                                     const struct imp_track *track,
                                      const struct imp_event *e,
                                      const struct imp_carried *carried)
 {
-    return (struct imp_texcoord){
-        .uv = {e[1].t, e[1].bound}, .p = event_place(track, e), .carried = carried};
+    return (struct imp_texcoord){.uv = {e[1].t, e[1].bound},
+                                 .p = event_place(track, e),
+                                 .carried = carried,
+                                 .shape = shape};
 }
 /* Lobe by lobe, directions in its frame, about the normal as one likes. */
 static struct imp_dirs passed_dirs(const struct imp_event *e, int lobe)
@@ -81,7 +84,7 @@ imp_spec imp__passes_eval(const struct imp_scene *scene, const struct imp_track 
 {
     const struct imp_shape *shape = scene->shapes[e->medium];
     const struct imp_bsdf *b = imp__shape_bsdf(scene, shape);
-    const struct imp_texcoord at = passed_at(track, e, carried);
+    const struct imp_texcoord at = passed_at(shape, track, e, carried);
     imp_spec in[IMP_INPUTS_MAX], f, sum = {0};
     imp__evaluate_inputs(b, shape, &at, in);
     for (int l = 0; l < 64; l++) {
@@ -230,7 +233,7 @@ event_d(const struct derived *x, int i, struct imp_texcoord *at, int *n, imp_spe
     const struct imp_event *e = &x->track->event[i];
     if (e->kind == IMP_PASSES_UV) return NULL;
     if (e->kind == IMP_PASSES) {
-        *at = passed_at(x->track, e, x->carried);
+        *at = passed_at(x->tracer->scene->shapes[e->medium], x->track, e, x->carried);
         const struct imp_bsdf *b = passes_d(x->tracer, e, at, d);
         if (!b) return NULL;
         const imp_spec rest =

@@ -344,7 +344,8 @@ static inline imp_spec imp__emitter_radiance(const struct imp_scene *scene, int 
                                              const struct imp_carried *carried)
 {
     const struct imp_emitter *e = scene->emitters[emitter];
-    struct imp_texcoord at = {{x->uv[0], x->uv[1]}, p, carried};
+    struct imp_texcoord at = {
+        .uv = {x->uv[0], x->uv[1]}, .p = p, .carried = carried, .shape = e->shape};
     imp_spec in[IMP_INPUTS_MAX], le;
     imp__emitter_place(e, x, &at);
     imp__inputs_eval(e->input, e->n_in, &at, in);
@@ -413,8 +414,10 @@ static inline imp_v3 imp__decided_v3(const imp_decided v[3])
 static inline struct imp_texcoord imp__vertex_at(const struct imp_vertex *v)
 {
     if (imp_unlikely(v->segment->exact != NULL)) return v->segment->exact->at;
-    return (struct imp_texcoord){
-        {v->d.uv[0], v->d.uv[1]}, imp__decided_v3(v->d.p), v->carried};
+    return (struct imp_texcoord){.uv = {v->d.uv[0], v->d.uv[1]},
+                                 .p = imp__decided_v3(v->d.p),
+                                 .carried = v->carried,
+                                 .shape = v->shape};
 }
 static inline imp_v3 imp__vertex_wo(const struct imp_vertex *v)
 {
@@ -438,10 +441,14 @@ static inline struct imp_emission imp__light_emission(const struct imp_light *l)
     return (struct imp_emission){
         {l->uv[0], l->uv[1]}, l->dist, l->cos_light, imp__decided_v3(l->d)};
 }
-static inline struct imp_texcoord imp__light_at(const struct imp_vertex *v)
+static inline struct imp_texcoord imp__light_at(const struct imp_scene *scene,
+                                                const struct imp_vertex *v)
 {
     const struct imp_light *l = &v->d.light;
-    return (struct imp_texcoord){{l->uv[0], l->uv[1]}, imp__decided_v3(l->p), v->carried};
+    return (struct imp_texcoord){.uv = {l->uv[0], l->uv[1]},
+                                 .p = imp__decided_v3(l->p),
+                                 .carried = v->carried,
+                                 .shape = scene->emitters[l->emitter]->shape};
 }
 static inline struct imp_dirs imp__light_dirs(const struct imp_vertex *v)
 {

@@ -192,6 +192,8 @@ static const struct scene_case {
     {"photons/sky.xml", NULL, true, 0},
     {"photons/reflector.xml", "weights=kernel=1,emitters=1,proxies=1,uniform=.3", false,
      0},
+    {"../tests/render/attributes_lamp.xml", "res=32", true, 0},
+    {"../tests/render/attributes_lamp.xml", "res=32 integrator=volpath", true, 0},
 };
 
 enum { N = 3000 };

@@ -203,12 +203,13 @@ static void bsdf_make(imp_scene *s, const struct subject *q,
     } else {
         props_make(s, q->props);
     }
-    if (strcmp(ops->name, "normalmap") == 0) { /* it has no gradient */
+    const bool bump = strcmp(ops->name, "bumpmap") == 0;
+    if (bump || strcmp(ops->name, "normalmap") == 0) { /* it has no gradient */
         float pixels[27];
         for (uint32_t k = 0; k < 27; k++)
             pixels[k] =
                 (float)(k % 3 == 2 ? 1 : 0.3 + 0.4 * imp__u01(imp__key(9, 9, 9), k));
-        imp_scene_begin(s, "texture", "bitmap", NULL, "normalmap");
+        imp_scene_begin(s, "texture", "bitmap", NULL, bump ? "height" : "normalmap");
         imp_scene_image(s, 3, 3, 3, pixels);
         imp_scene_bool(s, "raw", 1);
         imp_scene_end(s);

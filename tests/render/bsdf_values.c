@@ -48,9 +48,8 @@ static void row_check(const struct imp_bsdf *b, const struct imp_shape *shape,
                       const struct row *r, bool delta, double factor, struct tally *t)
 {
     imp_spec in[IMP_INPUTS_MAX], f;
-    const struct imp_texcoord at = {.uv = {r->uv[0], r->uv[1]}};
+    const struct imp_texcoord at = {.uv = {r->uv[0], r->uv[1]}, .shape = shape};
     const struct imp_dirs d = {r->wo, r->wi, IMP_SMOOTH, false};
-    (void)shape;
     imp__inputs_eval(b->input, b->n_in, &at, in);
     if (delta) delta_eval(b, in, r, &f);
     else if (b->flags & IMP_BSDF_SMOOTH) b->ops->eval(b, in, &d, &f);

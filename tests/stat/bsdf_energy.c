@@ -160,7 +160,7 @@ static void reciprocity_visit(const struct kind_case *c, void *payload)
     /* The condition that the format has for its transmission. */
     if (strstr(c->label, "principledthin")) return;
     /* The turned frame depends on wo, the shadowing on wi. */
-    if (strcmp(c->kind, "normalmap") == 0) return;
+    if (strcmp(c->kind, "normalmap") == 0 || strcmp(c->kind, "bumpmap") == 0) return;
     /* Light that comes through two-sided glass has seen another material. */
     if (strcmp(c->kind, "twosided") == 0 && b->flags & IMP_BSDF_TRANSMIT) return;
     for (int i = 0; i < 400; i++) {

@@ -70,10 +70,15 @@ static void expect(const struct outcome *o, const char *what)
 /* A kind with what it must have. */
 static void bsdf_xml(const struct imp_bsdf_ops *ops, char *xml, size_t size)
 {
-    char inner[256] = "";
+    char inner[1024] = "";
     for (int k = 0; k < ops->min_children; k++) strcat(inner, "<bsdf type='diffuse'/>");
     for (const struct imp_input_desc *d = ops->inputs; d && d->name; d++)
-        if (d->flags & IMP_INPUT_VECTOR)
+        if (d->flags & IMP_INPUT_BUMP)
+            snprintf(
+                inner + strlen(inner), sizeof inner - strlen(inner),
+                "<texture type='bitmap'><string name='filename' value='%s'/></texture>",
+                IMP_SCENES "/../tests/render/peer/files/grey.png");
+        else if (d->flags & IMP_INPUT_VECTOR)
             snprintf(
                 inner + strlen(inner), sizeof inner - strlen(inner),
                 "<texture type='checkerboard' name='%s'><rgb name='color0' value='.6'/>"

@@ -6,6 +6,7 @@
 
 #define BSDFS(X)                                                                         \
     X(imp__blendbsdf)                                                                    \
+    X(imp__bumpmap)                                                                      \
     X(imp__conductor)                                                                    \
     X(imp__dielectric)                                                                   \
     X(imp__diffuse)                                                                      \

@@ -17,16 +17,6 @@ static const struct imp_input_desc inputs[] = {
      .unit = "1"},
     {0}};
 
-static enum imp_status build(const struct imp_build *b, void *self, struct imp_bsdf *bsdf)
-{
-    const struct imp_bsdf *c = bsdf->child[0];
-    bsdf->flags =
-        (c->flags & ~(unsigned)(IMP_BSDF_NULL | IMP_BSDF_LINEAR)) | IMP_BSDF_TURNED;
-    bsdf->absorb = c->absorb;
-    bsdf->n_lobes = c->n_lobes;
-    return imp__turning_read(b, self);
-}
-
 static imp_v3 normal(const imp_spec *in)
 {
     const imp_spec c = in[NORMAL];
@@ -74,7 +64,7 @@ const struct imp_bsdf_ops imp__normalmap = {.size = sizeof(struct imp_bsdf_ops),
                                             .inputs = inputs,
                                             .min_children = 1,
                                             .max_children = 1,
-                                            .build = build,
+                                            .build = imp__turning_build,
                                             .sample = sample,
                                             .eval = eval,
                                             .pdf = pdf,

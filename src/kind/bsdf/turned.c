@@ -3,9 +3,16 @@
 #include "math/vec.h"
 #include <math.h>
 
-enum imp_status imp__turning_read(const struct imp_build *b, struct imp__turning *out)
+enum imp_status imp__turning_build(const struct imp_build *b, void *self,
+                                   struct imp_bsdf *bsdf)
 {
     enum imp_status st = IMP_OK;
+    struct imp__turning *out = self;
+    const struct imp_bsdf *c = bsdf->child[0];
+    bsdf->flags =
+        (c->flags & ~(unsigned)(IMP_BSDF_NULL | IMP_BSDF_LINEAR)) | IMP_BSDF_TURNED;
+    bsdf->absorb = c->absorb;
+    bsdf->n_lobes = c->n_lobes;
     IMP_TRY(imp_build_bool(b, "flip_invalid_normals", true, &out->flip));
     IMP_TRY(imp_build_bool(b, "use_shadowing_function", true, &out->shadow));
 out:

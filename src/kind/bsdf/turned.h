@@ -17,8 +17,10 @@
 struct imp__turning {
     bool flip, shadow;
 };
-/* flip_invalid_normals and use_shadowing_function. */
-enum imp_status imp__turning_read(const struct imp_build *b, struct imp__turning *out);
+/* imp_bsdf_ops.build: flip_invalid_normals and use_shadowing_function; flags are the nested
+ * material's. */
+enum imp_status imp__turning_build(const struct imp_build *b, void *self,
+                                   struct imp_bsdf *bsdf);
 
 /* Normals of the nested material, in the frame of the surface, from the inputs: the only
  * thing in which kinds differ. It need not be unit. */

@@ -207,7 +207,7 @@ static double density(const struct imp_emitter *e, imp_v3 w)
     const struct envmap *s = e->self;
     const struct imp_texture *map = e->input[DATA]->texture;
     const double total = imp__weight_table_total(&s->table);
-    struct imp_texcoord at = {{0, 0}, w, NULL};
+    struct imp_texcoord at = {.p = w};
     imp_spec l;
     if (!(total > 0)) return IMP_INV_PI / 4; /* all texels have been set to 0 */
     lookup(e, w, at.uv);

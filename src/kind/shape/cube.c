@@ -32,10 +32,11 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
 
 const struct imp_shape_ops imp__cube = {.size = sizeof(struct imp_shape_ops),
                                         .name = "cube",
-                                        .flags = IMP_SHAPE_CONVEX,
+                                        .flags = IMP_SHAPE_CONVEX | IMP_SHAPE_TRIANGLES,
                                         .object_size = sizeof(struct imp__mesh),
                                         .build = build,
                                         .surface = imp__mesh_surface,
                                         .sample_toward = imp__mesh_sample,
                                         .pdf_toward = imp__mesh_pdf,
-                                        .sample_area = imp__mesh_sample_area};
+                                        .sample_area = imp__mesh_sample_area,
+                                        .place = imp__mesh_place};

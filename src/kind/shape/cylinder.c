@@ -103,6 +103,13 @@ static void surface(const struct imp_shape *s, const struct imp_hit *hit, const 
     surface_at(k, x * r, y * r, hit->v, out);
 }
 
+static void place(const struct imp_shape *s, const double uv[2], const imp_v3 *at,
+                  struct imp_surface *out, int *prim)
+{
+    (void)at, (void)prim;
+    surface_at(s->self, cos(IMP_2PI * uv[0]), sin(IMP_2PI * uv[0]), uv[1], out);
+}
+
 static void sample_area(const struct imp_shape *s, const double u[2],
                         struct imp_surface *out)
 {
@@ -142,4 +149,5 @@ const struct imp_shape_ops imp__cylinder = {.size = sizeof(struct imp_shape_ops)
                                             .sample_toward = sample_toward,
                                             .pdf_toward = pdf_toward,
                                             .round = round_of,
-                                            .sample_area = sample_area};
+                                            .sample_area = sample_area,
+                                            .place = place};

@@ -74,6 +74,14 @@ static void surface(const struct imp_shape *s, const struct imp_hit *hit, const 
     surface_at(s->self, hit->u, hit->v, out);
 }
 
+static void place(const struct imp_shape *s, const double uv[2], const imp_v3 *at,
+                  struct imp_surface *out, int *prim)
+{
+    (void)at, (void)prim;
+    const double phi = IMP_2PI * uv[1];
+    surface_at(s->self, uv[0] * cos(phi), uv[0] * sin(phi), out);
+}
+
 static void sample_area(const struct imp_shape *s, const double u[2],
                         struct imp_surface *out)
 {
@@ -111,4 +119,5 @@ const struct imp_shape_ops imp__disk = {.size = sizeof(struct imp_shape_ops),
                                         .surface = surface,
                                         .sample_toward = sample_toward,
                                         .pdf_toward = pdf_toward,
-                                        .sample_area = sample_area};
+                                        .sample_area = sample_area,
+                                        .place = place};

@@ -6,10 +6,22 @@
 #include "math/warp.h"
 #include "mesh_triangle.h"
 
-void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit,
-                       const imp_v3 *o, const imp_v3 *d, struct imp_surface *out)
+/* The number of a triangle as two floats, in which it is exact. */
+#define PRIM_BITS 22
+static void prim_write(int prim, double uv[2])
 {
-    (void)o, (void)d;
+    uv[0] = prim & ((1 << PRIM_BITS) - 1);
+    uv[1] = prim >> PRIM_BITS;
+}
+static int prim_read(const struct imp_shape *s, const double uv[2])
+{
+    const double k = uv[0] + uv[1] * (1 << PRIM_BITS);
+    return k >= 0 && k < (double)s->triangles.n_triangles ? (int)k : 0;
+}
+
+static void surface(const struct imp_shape *s, const struct imp_hit *hit,
+                    struct imp_surface *out)
+{
     const struct imp__mesh *m = s->self;
     if (imp_unlikely(!m->facets)) {
         imp__mesh_from_arrays(m, hit, out);
@@ -25,6 +37,39 @@ void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit,
     } else {
         imp__surface_frame(out);
     }
+}
+
+void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit,
+                       const imp_v3 *o, const imp_v3 *d, struct imp_surface *out)
+{
+    (void)o, (void)d;
+    surface(s, hit, out);
+    if (imp_unlikely(s->by_triangle)) prim_write(hit->prim, out->uv);
+}
+
+void imp__triangle_weights(const struct imp_shape *s, int prim, const imp_v3 *p,
+                           double b[3])
+{
+    const uint32_t *i = s->triangles.indices + 3 * (size_t)prim;
+    const imp_v3 p0 = imp__mesh_load(s->triangles.positions, i[0]);
+    const imp_v3 e1 = imp__mesh_load(s->triangles.positions, i[1]) - p0,
+                 e2 = imp__mesh_load(s->triangles.positions, i[2]) - p0, d = *p - p0;
+    const double a = imp__dot(e1, e1), c = imp__dot(e2, e2), m = imp__dot(e1, e2);
+    const double det = a * c - m * m, x = imp__dot(e1, d), y = imp__dot(e2, d);
+    const bool sliver = !(det > 0);
+    b[1] = sliver ? 0 : imp_clamp((c * x - m * y) / det, 0.0, 1.0);
+    b[2] = sliver ? 0 : imp_clamp((a * y - m * x) / det, 0.0, 1.0 - b[1]);
+    b[0] = 1 - b[1] - b[2];
+}
+
+void imp__mesh_place(const struct imp_shape *s, const double uv[2], const imp_v3 *p,
+                     struct imp_surface *out, int *prim)
+{
+    double b[3];
+    *prim = prim_read(s, uv);
+    imp__triangle_weights(s, *prim, p, b);
+    const struct imp_hit hit = {.prim = *prim, .u = b[1], .v = b[2]};
+    surface(s, &hit, out);
 }
 
 /* A triangle by its area, and barycentric weights in it. */
@@ -60,6 +105,7 @@ bool imp__mesh_sample(const struct imp_shape *s, const imp_v3 *ref, const double
         f ? (struct imp__mesh_corner){f->p0, f->e1, f->e2} : imp__mesh_corner(m, lo);
     struct imp_surface at;
     imp__mesh_point(m, &hit, &c, f ? f->ng : imp__mesh_face_normal(m, lo), &at);
+    if (imp_unlikely(s->by_triangle)) prim_write(hit.prim, at.uv);
     out->uv[0] = at.uv[0];
     out->uv[1] = at.uv[1];
     return imp__light_from_area(*ref, at.p, at.ng, at.n, m->inv_area, out);
@@ -110,7 +156,9 @@ const struct imp_shape_ops imp__mesh = {.size = sizeof(struct imp_shape_ops),
                                         .surface = imp__mesh_surface,
                                         .sample_toward = imp__mesh_sample,
                                         .pdf_toward = imp__mesh_pdf,
-                                        .sample_area = imp__mesh_sample_area};
+                                        .sample_area = imp__mesh_sample_area,
+                                        .flags = IMP_SHAPE_TRIANGLES,
+                                        .place = imp__mesh_place};
 const struct imp_shape_ops imp__obj = {.size = sizeof(struct imp_shape_ops),
                                        .name = "obj",
                                        .object_size = sizeof(struct imp__mesh),
@@ -118,7 +166,9 @@ const struct imp_shape_ops imp__obj = {.size = sizeof(struct imp_shape_ops),
                                        .surface = imp__mesh_surface,
                                        .sample_toward = imp__mesh_sample,
                                        .pdf_toward = imp__mesh_pdf,
-                                       .sample_area = imp__mesh_sample_area};
+                                       .sample_area = imp__mesh_sample_area,
+                                       .flags = IMP_SHAPE_TRIANGLES,
+                                       .place = imp__mesh_place};
 const struct imp_shape_ops imp__ply = {.size = sizeof(struct imp_shape_ops),
                                        .name = "ply",
                                        .object_size = sizeof(struct imp__mesh),
@@ -126,4 +176,6 @@ const struct imp_shape_ops imp__ply = {.size = sizeof(struct imp_shape_ops),
                                        .surface = imp__mesh_surface,
                                        .sample_toward = imp__mesh_sample,
                                        .pdf_toward = imp__mesh_pdf,
-                                       .sample_area = imp__mesh_sample_area};
+                                       .sample_area = imp__mesh_sample_area,
+                                       .flags = IMP_SHAPE_TRIANGLES,
+                                       .place = imp__mesh_place};

@@ -72,6 +72,14 @@ static void surface(const struct imp_shape *s, const struct imp_hit *hit, const 
     out->dp_dv = r->ev;
 }
 
+static void place(const struct imp_shape *s, const double uv[2], const imp_v3 *at,
+                  struct imp_surface *out, int *prim)
+{
+    (void)at, (void)prim;
+    const struct imp_hit hit = {.prim = 0, .u = uv[0] - uv[1], .v = uv[1]};
+    surface(s, &hit, NULL, NULL, out);
+}
+
 static void sample_area(const struct imp_shape *s, const double u[2],
                         struct imp_surface *out)
 {
@@ -108,4 +116,5 @@ const struct imp_shape_ops imp__rectangle = {.size = sizeof(struct imp_shape_ops
                                              .surface = surface,
                                              .sample_toward = sample_toward,
                                              .pdf_toward = pdf_toward,
-                                             .sample_area = sample_area};
+                                             .sample_area = sample_area,
+                                             .place = place};

@@ -87,6 +87,14 @@ static void surface(const struct imp_shape *s, const struct imp_hit *hit, const 
     surface_at(p, imp__normalize(*o + *d * hit->t - p->center), out);
 }
 
+static void place(const struct imp_shape *s, const double uv[2], const imp_v3 *at,
+                  struct imp_surface *out, int *prim)
+{
+    (void)uv, (void)prim;
+    const struct sphere *p = s->self;
+    surface_at(p, imp__normalize(*at - p->center), out);
+}
+
 static void sample_area(const struct imp_shape *s, const double u[2],
                         struct imp_surface *out)
 {
@@ -170,4 +178,5 @@ const struct imp_shape_ops imp__sphere = {.size = sizeof(struct imp_shape_ops),
                                           .sample_toward = sample_toward,
                                           .pdf_toward = pdf_toward,
                                           .round = round_of,
-                                          .sample_area = sample_area};
+                                          .sample_area = sample_area,
+                                          .place = place};

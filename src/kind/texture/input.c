@@ -125,12 +125,60 @@ static void colour_tangent(const struct imp_input *input, bool number, imp_dot_f
     *value_dot = number ? mean(sum[0], sum[1], sum[2]) : sum;
 }
 
+/* ---- Surfaces ---------------------------------------------------------------------- */
+
+/* A shape that is looked up by triangle: uv, triangle and surface from what is known. */
+struct site {
+    struct imp_texcoord at;
+    struct imp_surface surface;
+};
+static const struct imp_texcoord *site_of(const struct imp_texcoord *at,
+                                          struct site *site)
+{
+    if (imp_likely(!at->shape || !at->shape->by_triangle) || at->surface) return at;
+    site->at = *at;
+    at->shape->ops->place(at->shape, at->uv, &at->p, &site->surface, &site->at.prim);
+    for (int k = 0; k < 2; k++) site->at.uv[k] = site->surface.uv[k];
+    site->at.surface = &site->surface;
+    return &site->at;
+}
+
+/* With h the height, the slopes of the raised surface have h_u and h_v along the normal in
+ * place of what they had (Blinn 1978; along the normal a surface's own slopes vanish, but
+ * where normals are interpolated): the normal is their cross product, on the side of the
+ * geometric one. */
+static imp_spec bumped(const struct imp_input *input, const struct imp_texcoord *at)
+{
+    struct imp_texcoord plain = *at;
+    struct imp_surface made;
+    const struct imp_surface *x = at->surface;
+    imp_spec slope[2];
+    int prim;
+    plain.carried = NULL;
+    if (!at->shape || !input->texture->ops->slope(input->texture, &plain, true, slope))
+        return (imp_spec){0, 0, 1, 0};
+    if (!x) {
+        at->shape->ops->place(at->shape, at->uv, &at->p, &made, &prim);
+        x = &made;
+    }
+    const double scale = input->value[0];
+    const imp_v3 u = imp__v3(imp__dot(x->s, x->dp_du), imp__dot(x->t, x->dp_du),
+                             scale * slope[0][0]),
+                 v = imp__v3(imp__dot(x->s, x->dp_dv), imp__dot(x->t, x->dp_dv),
+                             scale * slope[1][0]);
+    const imp_v3 n = imp__cross(u, v);
+    const imp_v3 world = x->s * n[0] + x->t * n[1] + x->n * n[2];
+    return imp__dot(world, x->ng) < 0 ? -n : n;
+}
+
 /* ---- One input ------------------------------------------------------------------- */
 
 static void input_eval(const struct imp_input *input, const struct imp_texcoord *at,
                        bool scalar, imp_spec *value)
 {
-    if (imp_unlikely(input->vector)) { /* no colour: whatever the walk carries */
+    if (imp_unlikely(input->bump)) {
+        *value = bumped(input, at);
+    } else if (imp_unlikely(input->vector)) { /* no colour: whatever the walk carries */
         struct imp_texcoord plain = *at;
         plain.carried = NULL;
         input->texture->ops->eval(input->texture, &plain, false, value);
@@ -145,6 +193,7 @@ static void input_eval(const struct imp_input *input, const struct imp_texcoord 
 static void input_scatter(const struct imp_input *input, const struct imp_texcoord *at,
                           bool scalar, const imp_spec *bar, struct imp_sink *sink)
 {
+    if (input->bump) return;
     if (input->texture)
         input->texture->ops->scatter(input->texture, at, scalar, bar, sink);
     else if (input->param < 0) return;
@@ -160,7 +209,9 @@ static void input_tangent(const struct imp_input *input, const struct imp_texcoo
                           bool scalar, imp_dot_fn *dot, const void *x_dot,
                           imp_spec *value_dot)
 {
-    if (input->texture) {
+    if (input->bump) {
+        *value_dot = imp__spec(0);
+    } else if (input->texture) {
         input->texture->ops->tangent(input->texture, at, scalar, dot, x_dot, value_dot);
     } else if (input->param < 0) {
         *value_dot = imp__spec(0);
@@ -285,6 +336,8 @@ static void luminance_scatter(const struct imp_input *colour, imp_spec weight,
 void imp__inputs_look_up(const struct imp_input *const *input, int n,
                          const struct imp_texcoord *at, imp_spec *in)
 {
+    struct site site;
+    at = site_of(at, &site);
     const bool colours = imp_likely(!at->carried);
     for (int j = 0; j < n; j++) {
         const struct imp_input *i = input[j];
@@ -300,6 +353,8 @@ void imp__inputs_scatter(const struct imp_input *const *input, int n,
                          const struct imp_texcoord *at, const imp_spec *in_bar,
                          struct imp_sink *sink)
 {
+    struct site site;
+    at = site_of(at, &site);
     const bool colours = imp_likely(!at->carried);
     for (int j = 0; j < n; j++) {
         const struct imp_input *i = input[j];
@@ -318,6 +373,8 @@ void imp__inputs_tangent(const struct imp_input *const *input, int n,
                          const struct imp_texcoord *at, imp_dot_fn *dot,
                          const void *x_dot, imp_spec *in_dot)
 {
+    struct site site;
+    at = site_of(at, &site);
     for (int j = 0; j < n; j++) {
         const struct imp_input *i = input[j];
         if (imp_unlikely(i->luminance)) {
