@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Meshes: the first byte chooses OBJ or PLY and whether v is flipped. What is read has
+ * Meshes: the first byte chooses OBJ, PLY or serialized and whether v is flipped. What is read has
  * indices in range and finite numbers. */
 #include "format/mesh_file.h"
 #include <math.h>
@@ -18,6 +18,12 @@ static void check(const struct imp_mesh_data *m)
             abort();
     for (size_t i = 0; m->uvs && i < 2 * m->n_vertices; i++)
         if (!isfinite(m->uvs[i])) abort();
+    for (int a = 0; a < m->n_attributes; a++) {
+        const struct imp_attribute_data *x = &m->attribute[a];
+        if (x->n != (x->face ? m->n_triangles : m->n_vertices)) abort();
+        for (size_t i = 0; i < x->n * (size_t)x->channels; i++)
+            if (!isfinite(x->values[i])) abort();
+    }
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
@@ -37,8 +43,9 @@ int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
                                            .text = {(unsigned char *)data, size, size},
                                            .flip_v = choice & 2};
     struct imp_mesh_data mesh;
-    if ((choice & 1 ? imp__ply_parse(&source, &mesh) : imp__obj_parse(&source, &mesh)) ==
-        IMP_OK)
+    if ((choice & 4   ? imp__serialized_parse(&source, choice >> 3 & 1, &mesh)
+         : choice & 1 ? imp__ply_parse(&source, &mesh)
+                      : imp__obj_parse(&source, &mesh)) == IMP_OK)
         check(&mesh);
     imp__arena_free(&keep);
     imp__arena_free(&temporary);

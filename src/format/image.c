@@ -43,8 +43,13 @@ enum imp_status imp__image_parse(imp_context *ctx, const char *name,
         return imp__png_parse(ctx, name, file, out);
     if (n >= 2 && d[0] == 0xff && d[1] == 0xd8)
         return imp__jpeg_parse(ctx, name, file, out);
+    if (n >= 2 && d[0] == 'B' && d[1] == 'M') return imp__bmp_parse(ctx, name, file, out);
+    if (n >= 2 && d[0] == 'P' && (d[1] == '5' || d[1] == '6'))
+        return imp__ppm_parse(ctx, name, file, out);
+    if (imp__tga_is(file)) return imp__tga_parse(ctx, name, file, out);
     return imp__error(ctx, IMP_E_SCENE,
-                      "%s: not an EXR, PNG, JPEG, HDR, PFM or NPY picture", name);
+                      "%s: not an EXR, PNG, JPEG, BMP, TGA, PPM, HDR, PFM or NPY picture",
+                      name);
 }
 
 enum imp_status imp__image_read(imp_context *ctx, const char *path, imp_film **out,

@@ -40,6 +40,15 @@ enum imp_status imp__npy_parse(imp_context *ctx, const char *name,
 
 enum imp_status imp__hdr_parse(imp_context *ctx, const char *name,
                                const struct imp_bytes *file, imp_film **out);
+enum imp_status imp__bmp_parse(imp_context *ctx, const char *name,
+                               const struct imp_bytes *file, imp_film **out);
+/* Of at least two bytes. */
+enum imp_status imp__ppm_parse(imp_context *ctx, const char *name,
+                               const struct imp_bytes *file, imp_film **out);
+/* Can it be one? */
+bool imp__tga_is(const struct imp_bytes *file);
+enum imp_status imp__tga_parse(imp_context *ctx, const char *name,
+                               const struct imp_bytes *file, imp_film **out);
 
 enum imp_status imp__exr_encode(const imp_film *film,
                                 const struct imp_write_options *options,

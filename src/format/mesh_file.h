@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Triangle meshes in files (docs/scene-format.md 13.1, 13.2). What a shape keeps (uvs,
+ * Triangle meshes in files (docs/scene-format.md 13.1 to 13.3). What a shape keeps (uvs,
  * indices) goes to the arena `keep`, what it copies (positions, normals) to `temporary`.
  * Every number is finite and every index in range in what is returned; messages begin
  * with the file's name and name line, vertex or face. */
@@ -25,6 +25,10 @@ enum imp_status imp__obj_parse(const struct imp_mesh_source *source,
                                struct imp_mesh_data *out);
 enum imp_status imp__ply_parse(const struct imp_mesh_source *source,
                                struct imp_mesh_data *out);
+
+/* Mesh `index` of those in the file. */
+enum imp_status imp__serialized_parse(const struct imp_mesh_source *source, int index,
+                                      struct imp_mesh_data *out);
 
 /* Arrays for a mesh of this size; positions have room for 16 bytes after the end. */
 enum imp_status imp__mesh_arrays(const struct imp_mesh_source *source, size_t n_vertices,

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Nodes that name files get what the files hold: triangles for obj and ply, pixels for
+ * Nodes that name files get what the files hold: triangles for obj,
+ * ply and serialized, pixels for
  * bitmap and envmap, intensities for ies, reflectances for merl, cells for gridvolume. */
 #include "base/film.h"
 #include "color/rgb.h"
@@ -55,20 +56,25 @@ static enum imp_status attributes_attach(struct imp_scene *scene, struct imp_nod
     return IMP_OK;
 }
 
-static enum imp_status mesh_attach(struct imp_scene *scene, struct imp_node *node,
-                                   bool obj)
+static enum imp_status mesh_attach(struct imp_scene *scene, struct imp_node *node)
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = scene->ctx;
+    const bool obj = strcmp(node->type, "obj") == 0, ply = strcmp(node->type, "ply") == 0;
+    int64_t index = 0;
     struct imp_mesh_source source = {
         .ctx = ctx, .keep = &scene->arena, .temporary = &scene->files};
     struct imp_mesh_data *data = imp__arena_array(&scene->files, 1, sizeof *data);
     if (!data) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "scene: out of memory"));
     IMP_TRY(imp__props_bool(ctx, node, "flip_tex_coords", obj, &source.flip_v));
+    if (!obj && !ply)
+        IMP_TRY(imp__props_int(ctx, node, "shape_index", 0, 0, INT32_MAX, &index));
     IMP_TRY(path_of(scene, node, &source.name));
     st = imp__file_read(ctx, source.name, IMP_MESH_BYTES_MAX, &source.text);
     if (st == IMP_OK)
-        st = obj ? imp__obj_parse(&source, data) : imp__ply_parse(&source, data);
+        st = obj   ? imp__obj_parse(&source, data)
+             : ply ? imp__ply_parse(&source, data)
+                   : imp__serialized_parse(&source, (int)index, data);
     if (st != IMP_OK) IMP_TRY(placed(scene, node, st));
     node->mesh = data;
     IMP_TRY(attributes_attach(scene, node, data));
@@ -208,11 +214,12 @@ static enum imp_status attach(struct imp_scene *scene, struct imp_node *node)
 {
     enum imp_status st = IMP_OK;
     const bool shape = strcmp(node->tag, "shape") == 0,
-               obj = shape && strcmp(node->type, "obj") == 0,
-               ply = shape && strcmp(node->type, "ply") == 0,
+               mesh = shape &&
+                      (strcmp(node->type, "obj") == 0 || strcmp(node->type, "ply") == 0 ||
+                       strcmp(node->type, "serialized") == 0),
                bitmap =
                    strcmp(node->tag, "texture") == 0 && strcmp(node->type, "bitmap") == 0;
-    if (obj || ply) IMP_TRY(mesh_attach(scene, node, obj));
+    if (mesh) IMP_TRY(mesh_attach(scene, node));
     if (strcmp(node->tag, "medium") == 0 && strcmp(node->type, "graded") == 0)
         IMP_TRY(imp__graded_attach(scene, node));
     if (strcmp(node->tag, "emitter") == 0 && strcmp(node->type, "ies") == 0)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Triangle meshes, from files (`obj`, `ply`) or from calls (`mesh`), in world space after
+ * Triangle meshes, from files (`obj`, `ply`, `serialized`) or from calls (`mesh`), in world space after
  * build. A mirroring to_world or flip_normals reverses the winding, so that geometric and
  * shading normals agree (docs/scene-format.md 4.3, as Mitsuba 3.10). */
 #include "math/warp.h"
@@ -149,6 +149,14 @@ static enum imp_status file_build(const struct imp_build *b, void *self,
     return mesh_build(b, self, s);
 }
 
+static enum imp_status serialized_build(const struct imp_build *b, void *self,
+                                        struct imp_shape *s)
+{
+    int64_t index;
+    const enum imp_status st = imp_build_int(b, "shape_index", 0, 0, INT32_MAX, &index);
+    return st == IMP_OK ? file_build(b, self, s) : st;
+}
+
 const struct imp_shape_ops imp__mesh = {.size = sizeof(struct imp_shape_ops),
                                         .name = "mesh",
                                         .object_size = sizeof(struct imp__mesh),
@@ -179,3 +187,13 @@ const struct imp_shape_ops imp__ply = {.size = sizeof(struct imp_shape_ops),
                                        .sample_area = imp__mesh_sample_area,
                                        .flags = IMP_SHAPE_TRIANGLES,
                                        .place = imp__mesh_place};
+const struct imp_shape_ops imp__serialized = {.size = sizeof(struct imp_shape_ops),
+                                              .name = "serialized",
+                                              .object_size = sizeof(struct imp__mesh),
+                                              .build = serialized_build,
+                                              .surface = imp__mesh_surface,
+                                              .sample_toward = imp__mesh_sample,
+                                              .pdf_toward = imp__mesh_pdf,
+                                              .sample_area = imp__mesh_sample_area,
+                                              .flags = IMP_SHAPE_TRIANGLES,
+                                              .place = imp__mesh_place};

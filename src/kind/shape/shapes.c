@@ -11,7 +11,8 @@
     X(imp__cube)                                                                         \
     X(imp__mesh)                                                                         \
     X(imp__obj)                                                                          \
-    X(imp__ply)
+    X(imp__ply)                                                                          \
+    X(imp__serialized)
 
 #define DECLARE(kind) extern const struct imp_shape_ops kind;
 SHAPES(DECLARE)
