@@ -19,7 +19,7 @@ static const char *const optimizer_words[] = {"adam", "lm",    "lbfgs",
                                               "mma",  "slsqp", NULL};
 
 static struct {
-    int optimizer, iterations, no_intervals, resume, picture_spp;
+    int optimizer, iterations, no_intervals, resume, picture_spp, levels;
     double learning_rate, tolerance;
     const char *checkpoint, *sheet;
 } o;
@@ -32,6 +32,9 @@ static const struct arg_option options[] = {
      1e9, NULL},
     {ARG_NUMBER, 0, "lr", "RATE", "learning rate of adam (default 0.05)",
      &o.learning_rate, 1e-12, 1e6, NULL},
+    {ARG_INT, 0, "levels", "N",
+     "of adam: fit textures and volumes from coarse to fine, in N levels", &o.levels, 1,
+     16, NULL},
     {ARG_NUMBER, 0, "tolerance", "T",
      "stop when relative steps stay below (default 1e-4)", &o.tolerance, 1e-15, 1, NULL},
     {ARG_FLAG, 0, "no-intervals", NULL, "do not estimate 95 % intervals at the end",
@@ -113,6 +116,7 @@ static int run_fit(int n, char **operand)
     fit.tolerance = o.tolerance;
     fit.intervals = !o.no_intervals;
     fit.checkpoint = o.checkpoint;
+    fit.levels = o.levels;
     fit.resume = o.resume;
     blocks = problem_blocks(problem, &n_blocks);
     rc = writable(blocks, n_blocks);

@@ -5,6 +5,7 @@
 #include "cmd_problem.h"
 
 #include "cmd_picture.h"
+#include "overwrite.h"
 
 #include <math.h>
 #include <stdbool.h>
@@ -315,19 +316,42 @@ void block_ties_json(struct json *j, const struct block *b)
     json_end_array(j);
 }
 
-static char *block_path(const struct block *b, const char *folder)
+static int is_volume(const struct block *b)
+{
+    return (b->info.flags & IMP_PARAM_VOLUME) != 0;
+}
+
+/* `of`: "", or ".se" of a volume's standard errors. */
+static char *block_path(const struct block *b, const char *folder, const char *of)
 {
     char name[512];
-    snprintf(name, sizeof name, "%s.exr", b->info.name);
+    snprintf(name, sizeof name, "%s%s.%s", b->info.name, of,
+             is_volume(b) ? "vol" : "exr");
     make_file_name(name);
     return join_path(folder, name);
 }
 int block_writable(const struct block *b, const char *folder)
 {
-    char *path = block_path(b, folder);
-    const int rc = picture_writable(path, 1);
+    char *path = block_path(b, folder, "");
+    const int rc =
+        is_volume(b) ? overwrite_check(path, OUTPUT_VOL) : picture_writable(path, 1);
     free(path);
     return rc;
+}
+
+/* A .vol file; standard errors have one of their own. */
+static int volume_write(const struct block *b, const double *x, const double *se,
+                        const char *folder, char **path)
+{
+    size_t param;
+    enum imp_status st = imp_scene_find_param(cli.scene, b->info.name, &param);
+    char *errors = se ? block_path(b, folder, ".se") : NULL;
+    *path = block_path(b, folder, "");
+    if (st == IMP_OK) st = imp_scene_write_volume(cli.scene, param, x + b->first, *path);
+    if (st == IMP_OK && se)
+        st = imp_scene_write_volume(cli.scene, param, se + b->first, errors);
+    free(errors);
+    return st == IMP_OK ? 0 : cli_fail(st, *path);
 }
 
 int block_write(const struct block *b, const double *x, const double *se,
@@ -347,7 +371,8 @@ int block_write(const struct block *b, const double *x, const double *se,
                                                     {"R,G,B", "R,G,B,se.R,se.G,se.B"}};
     const struct imp_run run = cli_run();
     imp_film *film = NULL;
-    *path = block_path(b, folder);
+    if (is_volume(b)) return volume_write(b, x, se, folder, path);
+    *path = block_path(b, folder, "");
     const enum imp_status st =
         imp_film_create(cli.context, (int)width, (int)height,
                         channel_names[channels == 3][se != NULL], &film);

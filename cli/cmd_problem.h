@@ -37,7 +37,7 @@ void block_ties_json(struct json *j, const struct block *b);
 int block_writable(const struct block *b, const char *folder);
 /* A texture's numbers as a picture in `folder`, named by the parameter: `x` in plain
  * colours, or, with `se` of the same length, signed. [h][w] or [h][w][1 or 3]; what has
- * another shape is a row. *path is to be freed. 0, or an exit code with the reason
+ * another shape is a row. Of a volume, a .vol file. *path is to be freed. 0, or an exit code with the reason
  * printed. */
 int block_write(const struct block *b, const double *x, const double *se,
                 const char *folder, char **path);

@@ -421,7 +421,8 @@ enum imp_param_flags {
     IMP_PARAM_DIFFERENTIABLE = 1, /**< a gradient exists, without bias */
     IMP_PARAM_DISCONTINUOUS = 2,  /**< changing it can move edges of the picture */
     IMP_PARAM_INTEGER = 4,
-    IMP_PARAM_COLOR = 8 /**< its last dimension holds the channels */
+    IMP_PARAM_COLOR = 8,  /**< its last dimension holds the channels */
+    IMP_PARAM_VOLUME = 16 /**< a grid that imp_scene_write_volume writes */
 };
 
 struct imp_param_info {
@@ -437,6 +438,9 @@ struct imp_param_info {
     const char *why;  /**< why it has no gradient, where more can be said; or NULL */
     /** [count] of a spectrum given by its values at wavelengths: those, in nm; else NULL. */
     const double *wavelengths_nm;
+    /** Of a grid in space: its sizes are dims [layers][y][x], or of colours
+     * [layers y][x][3]; else 0. */
+    size_t layers;
 };
 
 /** Number of parameters, and of numbers in all of them together. */
@@ -463,6 +467,16 @@ IMP_API IMP_MUST_CHECK enum imp_status
 imp_scene_set_values(imp_scene *scene, size_t index, size_t n, const double *values);
 IMP_API IMP_MUST_CHECK enum imp_status imp_scene_get_values(const imp_scene *scene,
                                                             size_t index, double *values);
+/** Write a grid in space (IMP_PARAM_VOLUME) as a .vol file of version 3, in 32-bit floats,
+ * with the box of the file that it was read from: what a fit has found becomes the file of
+ * another scene.
+ * @param values [info.count]; NULL: those that the scene has.
+ * @return IMP_OK; IMP_E_ARG if there is no such parameter or it is no grid in space;
+ *         IMP_E_IO. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_scene_write_volume(const imp_scene *scene,
+                                                              size_t index,
+                                                              const double *values,
+                                                              const char *path);
 
 /* ---- Pictures ------------------------------------------------------------------ */
 
@@ -928,10 +942,15 @@ struct imp_fit_options {
     int intervals;          /**< estimate covariance and 95 % intervals at the end */
     const char *checkpoint; /**< file, rewritten every few seconds; NULL: none */
     int resume;             /**< start from the checkpoint if it is there */
+    /** Adam: textures and volumes are fitted from coarse to fine. Level k of `levels` (at
+     * most 16) has one variable for 2^(levels - k) cells along each axis, between which
+     * the cells are linear, and an equal share of the iterations; a checkpoint holds the
+     * last level. 0, 1: cells alone. */
+    int levels;
 };
 #define IMP_FIT_OPTIONS_INIT                                                             \
     {                                                                                    \
-        sizeof(struct imp_fit_options), IMP_ADAM, 0, 0, 0, 0, 0, 0                       \
+        sizeof(struct imp_fit_options), IMP_ADAM, 0, 0, 0, 0, 0, 0, 0                    \
     }
 
 struct imp_fit_variable {

@@ -853,7 +853,8 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_build_set(const struct imp_build *bui
                                                      const double *values);
 /** Of a texture: make `data` [dims[0]]..[dims[n_dims - 1]] a parameter <name>.<key>. The
  * numbers are read and set in place; `flags` are IMP_PARAM_*. *param is what an
- * imp_sink gets. */
+ * imp_sink gets. n_dims is 1 to 3; of a volume (IMP_PARAM_VOLUME) 3, [z][y][x], or 4,
+ * [z][y][x][channels]. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_build_texels(const struct imp_build *build, const char *key, float *data, int n_dims,
                  const size_t *dims, unsigned flags, double lo, double hi, int *param);

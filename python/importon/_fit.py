@@ -120,7 +120,8 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
         weights: Any = None, noise_se: Any = None, tikhonov: Optional[Mapping[str, float]] = None,
         stay: Optional[Mapping[str, float]] = None, smooth: Optional[Mapping[str, float]] = None,
         same: Any = None, factor: Any = None, log: Any = None, time_limit: float = 0, drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified",
-        wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene", progress: Any = None) -> Fit:
+        wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene", levels: int = 0,
+        progress: Any = None) -> Fit:
     """Fit parameters to target pictures; the scene ends at the best estimate.
 
     Parameters
@@ -138,6 +139,9 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
         Of adam, as a part of each variable's scale; 0: 0.05.
     tolerance : float
         Stop when relative steps stay below; 0: 1e-4.
+    levels : int
+        Of adam: fit textures and volumes from coarse to fine, first with one number for
+        2^(levels - 1) cells along each axis; 0: as they are.
     intervals : bool
         Estimate covariance and 95 % intervals at the end.
     checkpoint : path, optional
@@ -191,7 +195,8 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
         path = text(checkpoint, "checkpoint") if checkpoint is not None else None
         wanted = make(_c.imp_fit_options, optimizer=choice("imp_optimizer", optimizer, "optimizer"),
                       max_iterations=integer(max_iterations, "max_iterations"), learning_rate=float(learning_rate),
-                      tolerance=float(tolerance), intervals=bool(intervals), checkpoint=path, resume=bool(resume))
+                      tolerance=float(tolerance), intervals=bool(intervals), checkpoint=path, resume=bool(resume),
+                      levels=integer(levels, "levels"))
         out, start = ctypes.c_void_p(), p.x()
         status, message = run(p.context, options, progress, lib.imp_fit, p.pointer, ctypes.byref(wanted),
                               ctypes.byref(options), ctypes.byref(out))

@@ -171,6 +171,31 @@ class SceneParameters(MutableMapping):  # type: ignore[type-arg]
         self._handed[info.name] = [*alive, (weakref.ref(values), values.copy())]
         return values
 
+    def write_volume(self, name: str, path: Any) -> None:
+        """Write a grid in space as a .vol file, with the box of the file it was read from.
+
+        Parameters
+        ----------
+        name : str
+        path : path
+
+        Raises
+        ------
+        ArgumentError
+            The parameter is no volume.
+
+        Examples
+        --------
+        >>> params = importon.traverse(importon.load_dict(importon.cornell_box(res=8)))
+        >>> params.write_volume("red.reflectance", "red.vol")
+        Traceback (most recent call last):
+        importon.ArgumentError: red.reflectance.value is no volume
+        """
+        info = self._find(name)
+        with self._scene.lock:
+            self._scene._context.check(lib.imp_scene_write_volume(
+                self._scene.pointer, info.position, None, text(path, "path")))
+
     def __setitem__(self, name: str, value: Any) -> None:
         not_inside()
         info = self._find(name)

@@ -3,6 +3,7 @@
  * Reads a picture of any known format: tells the format from the first bytes, and
  * picks the colour channels of the film that comes out. */
 #include "image.h"
+#include "vol_file.h"
 #include <string.h>
 #include <strings.h>
 
@@ -37,6 +38,7 @@ enum imp_status imp__image_parse(imp_context *ctx, const char *name,
         return imp__npy_parse(ctx, name, file, out);
     if (n >= 3 && d[0] == 'P' && (d[1] == 'F' || d[1] == 'f'))
         return imp__pfm_parse(ctx, name, file, out);
+    if (n >= 3 && memcmp(d, "VOL", 3) == 0) return imp__vol_picture(ctx, name, file, out);
     if (n >= 2 && d[0] == '#' && d[1] == '?') return imp__hdr_parse(ctx, name, file, out);
     *srgb = true;
     if (n >= 4 && memcmp(d, "\x89PNG", 4) == 0)

@@ -1,5 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "vol_file.h"
+#include "base/arguments.h"
+#include "image.h"
+#include "scene/scene.h"
 #include <math.h>
 #include <string.h>
 
@@ -68,4 +71,76 @@ enum imp_status imp__vol_parse(imp_context *ctx, struct imp_arena *keep, const c
     g.value = value;
     *out = g;
     return IMP_OK;
+}
+
+enum imp_status imp__vol_picture(imp_context *ctx, const char *name,
+                                 const struct imp_bytes *file, imp_film **out)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_arena arena;
+    struct imp_grid_data g;
+    imp_film *film;
+    imp__arena_init(&arena, ctx);
+    IMP_TRY(imp__vol_parse(ctx, &arena, name, file, &g));
+    const uint64_t height = (uint64_t)g.n[1] * (uint64_t)g.n[2];
+    IMP_TRY(imp__image_film(ctx, name, (uint64_t)g.n[0], height,
+                            g.channels == 3 ? "R,G,B" : "Y", file->size, 1, &film));
+    memcpy(film->mean, g.value,
+           (size_t)g.n[0] * (size_t)height * (size_t)g.channels * sizeof *g.value);
+    *out = film;
+out:
+    imp__arena_free(&arena);
+    return st;
+}
+
+/* ---- Writing ------------------------------------------------------------------------- */
+
+struct written {
+    const struct imp_param *param;
+    const double *values; /* NULL: the parameter's */
+};
+
+static void put_word(struct imp_file_writer *w, uint32_t x)
+{
+    const unsigned char b[4] = {(unsigned char)x, (unsigned char)(x >> 8),
+                                (unsigned char)(x >> 16), (unsigned char)(x >> 24)};
+    imp__file_put(w, b, sizeof b);
+}
+static void put_number(struct imp_file_writer *w, float x)
+{
+    uint32_t bits;
+    memcpy(&bits, &x, sizeof bits);
+    put_word(w, bits);
+}
+
+static void fill(struct imp_file_writer *w, const void *payload)
+{
+    const struct written *v = payload;
+    const struct imp_param_info *info = &v->param->info;
+    const bool colour = info->flags & IMP_PARAM_COLOR;
+    imp__file_put(w, "VOL\3", 4);
+    put_word(w, 1);
+    put_word(w, (uint32_t)(colour ? info->dims[1] : info->dims[2]));
+    put_word(w, (uint32_t)(colour ? info->dims[0] / info->layers : info->dims[1]));
+    put_word(w, (uint32_t)info->layers);
+    put_word(w, colour ? 3 : 1);
+    for (int k = 0; k < 6; k++) put_number(w, v->param->box[k]);
+    for (size_t i = 0; i < info->count; i++)
+        put_number(w, (float)(v->values ? v->values[i] : imp__param_get(v->param, i)));
+}
+
+enum imp_status imp_scene_write_volume(const imp_scene *scene, size_t index,
+                                       const double *values, const char *path)
+{
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_REQUIRE(scene->ctx, path, "path");
+    if (index >= scene->n_params)
+        return imp__error(scene->ctx, IMP_E_ARG, "there is no parameter %zu", index);
+    const struct written v = {&scene->params[index], values};
+    const struct imp_param_info *info = &v.param->info;
+    if (!(info->flags & IMP_PARAM_VOLUME))
+        return imp__error(scene->ctx, IMP_E_ARG, "%s is no volume", info->name);
+    if (values) IMP_FINITE_ALL(scene->ctx, values, info->count, "values");
+    IMP_READS(scene);
+    return imp__file_write_by(scene->ctx, path, fill, &v);
 }

@@ -16,4 +16,8 @@
 enum imp_status imp__vol_parse(imp_context *ctx, struct imp_arena *keep, const char *name,
                                const struct imp_bytes *bytes, struct imp_grid_data *out);
 
+/* Layers below each other, those of the smallest z first; channels Y, or R, G, B. */
+enum imp_status imp__vol_picture(imp_context *ctx, const char *name,
+                                 const struct imp_bytes *file, imp_film **out);
+
 #endif

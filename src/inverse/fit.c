@@ -121,10 +121,10 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
         IMP_TRY(imp__checkpoint_read(ctx, f.options.checkpoint, &f.fingerprint, &f.goal,
                                      s, &found));
     imp__fit_scales(&f, s);
-    f.search = s;
     f.first_iteration = s->iteration;
-
-    st = imp__optimize(&f.goal, &o, s);
+    if (f.options.levels > 1 && !found) st = imp__fit_levels(&f, &o, s);
+    f.search = s;
+    if (st == IMP_OK) st = imp__optimize(&f.goal, &o, s);
     if (st != IMP_OK && st != IMP_CANCELLED) goto out;
     ended = st;
     st = IMP_OK;

@@ -39,6 +39,17 @@ enum imp_status imp__fit_begin(struct imp_problem *problem,
 /* Scales of the variables, from where the search starts. */
 void imp__fit_scales(struct imp__fit *fit, const struct imp__search *search);
 void imp__fit_end(struct imp__fit *fit);
+/* Scale of the block's numbers in x [n], for `spans`. */
+void imp__fit_span_scale(const struct imp__block *block, const double *x,
+                         struct imp__span *span);
+
+/* fit_levels.c: the searches on coarse cells, before the first iteration of `fine`, which
+ * then begins where they end and has their history. IMP_CANCELLED: so far. */
+enum imp_status imp__fit_levels(struct imp__fit *fit,
+                                const struct imp__opt_options *options,
+                                struct imp__search *fine);
+enum imp_status imp__fit_levels_allowed(const struct imp_problem *problem,
+                                        const struct imp_fit_options *options);
 
 struct imp__uncertainty;
 

@@ -182,6 +182,30 @@ static void fingerprint(struct imp__fit *f)
 
 /* A large change of a variable: its whole range, or its size at the start. Zeros take the
  * size of their neighbours in the same parameter, or 1 in the parameter's unit. */
+static bool is_bounded(const struct imp__block *b)
+{
+    return !b->log && isfinite(b->lo) && isfinite(b->hi) && b->hi - b->lo < DBL_MAX;
+}
+/* A logarithm's is a factor of e. */
+static double typical_of(const struct imp__block *b, double square)
+{
+    return square > 0 && !b->log ? sqrt(square / (double)b->count) : 1;
+}
+static void span_scale(const struct imp__block *b, double square, struct imp__span *span)
+{
+    const bool bounded = is_bounded(b);
+    const double scale = bounded ? b->hi - b->lo : typical_of(b, square);
+    span->by_start = !bounded && !b->log;
+    span->scale = scale > 0 ? scale : 1;
+}
+void imp__fit_span_scale(const struct imp__block *b, const double *x,
+                         struct imp__span *span)
+{
+    double square = 0;
+    for (size_t e = 0; e < b->count; e++) square += imp__sqr(x[b->first + e]);
+    span_scale(b, square, span);
+}
+
 void imp__fit_scales(struct imp__fit *f, const struct imp__search *search)
 {
     const struct imp_problem *p = f->problem;
@@ -191,21 +215,16 @@ void imp__fit_scales(struct imp__fit *f, const struct imp__search *search)
         double square = 0;
         for (size_t e = 0; e < b->count; e++)
             square += imp__sqr(imp__search_start(search, b->first + e));
-        /* a logarithm's is a factor of e */
-        const double typical =
-            square > 0 && !b->log ? sqrt(square / (double)b->count) : 1;
-        const double range = b->hi - b->lo;
-        const bool bounded =
-            !b->log && isfinite(b->lo) && isfinite(b->hi) && range < DBL_MAX;
         if (f->spans) {
-            const double scale = bounded ? range : typical;
-            f->spans[span].by_start = !bounded && !b->log;
-            f->spans[span++].scale = scale > 0 ? scale : 1;
+            span_scale(b, square, &f->spans[span++]);
             continue;
         }
+        const double typical = typical_of(b, square);
         for (size_t e = 0; e < b->count; e++) {
             const double start = fabs(imp__search_start(search, b->first + e));
-            const double scale = bounded ? range : b->log ? 1 : fmax(start, typical);
+            const double scale = is_bounded(b) ? b->hi - b->lo
+                                 : b->log      ? 1
+                                               : fmax(start, typical);
             f->scale[b->first + e] = scale > 0 ? scale : 1;
         }
     }
@@ -267,6 +286,7 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
             "max_iterations %d, learning_rate %g (0 to 1), tolerance %g: out of "
             "range",
             f.options.max_iterations, f.options.learning_rate, f.options.tolerance);
+    IMP_CHECKED(imp__fit_levels_allowed(p, &f.options));
     if (f.options.resume && !f.options.checkpoint)
         return imp__error(ctx, IMP_E_ARG, "resume needs the name of a checkpoint");
     if (f.options.max_iterations == 0)

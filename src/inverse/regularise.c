@@ -2,6 +2,7 @@
  *
  * Regularisers: exact functions of x, added to the estimated data term. */
 #include "base/arguments.h"
+#include "cells.h"
 #include "match.h"
 #include "problem.h"
 #include <math.h>
@@ -11,10 +12,6 @@
 static bool has_neighbours(const struct imp_param_info *info)
 {
     return info->n_dims >= 2 || info->wavelengths_nm;
-}
-static size_t columns(const struct imp_param_info *info)
-{
-    return info->n_dims >= 2 ? info->dims[1] : 1;
 }
 
 static enum imp_status add(imp_problem *p, const char *glob, double weight, int kind,
@@ -109,18 +106,21 @@ static double tikhonov(double w, const struct numbers *v, const double *origin, 
     return 0.5 * w * sum;
 }
 
-/* 1/2 w sum over neighbours of (x_q - x_p)^2, along both axes of [h][w][c] */
-static double smoothness(double weight, size_t h, size_t w, size_t c,
+/* 1/2 w sum over neighbours of (x_q - x_p)^2, along the axes of [z][y][x][channels] */
+static double smoothness(double weight, const struct imp__cells *n,
                          const struct numbers *v, double *g)
 {
+    const size_t c = n->channels, rows = n->n[0] * n->n[1];
     double sum = 0;
-    for (size_t i = 0; i < h; i++)
-        for (size_t j = 0; j < w; j++)
+    for (size_t i = 0; i < rows; i++)
+        for (size_t j = 0; j < n->n[2]; j++)
             for (size_t k = 0; k < c; k++) {
-                const size_t here = (i * w + j) * c + k;
-                const size_t next[2] = {here + c, here + w * c};
-                const bool inside[2] = {j + 1 < w, i + 1 < h};
-                for (int a = 0; a < 2; a++) {
+                const size_t here = (i * n->n[2] + j) * c + k;
+                const size_t next[3] = {here + c, here + n->n[2] * c,
+                                        here + n->n[1] * n->n[2] * c};
+                const bool inside[3] = {j + 1 < n->n[2], (i + 1) % n->n[1] != 0,
+                                        i + n->n[1] < rows};
+                for (int a = 0; a < 3; a++) {
                     if (!inside[a]) continue;
                     const double d = at(v, next[a]) - at(v, here);
                     sum += d * d;
@@ -141,15 +141,14 @@ double imp__regularise(const struct imp_problem *p, const double *x, double *gra
             const struct imp__block *b = &p->blocks[k];
             const bool factor = imp__block_factor(p, b);
             if (!r->on[b->param]) continue;
-            const struct imp_param_info *info = &p->scene->params[b->param].info;
             const struct numbers v = {x ? x + b->first : NULL, p, b};
             double *g = gradient ? gradient + b->first : NULL;
             if (r->kind == IMP_TIKHONOV) value += tikhonov(r->weight, &v, r->origin, g);
-            else if (!factor)
-                value += smoothness(r->weight, info->dims[0], columns(info),
-                                    info->count /
-                                        imp_max(info->dims[0] * columns(info), (size_t)1),
-                                    &v, g);
+            else if (!factor) {
+                const struct imp__cells cells =
+                    imp__cells_of(&p->scene->params[b->param].info);
+                value += smoothness(r->weight, &cells, &v, g);
+            }
         }
     }
     return value;

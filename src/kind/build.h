@@ -19,8 +19,8 @@ struct imp_build {
     /* Register the bulk data of a texture as a parameter: `data` [count] in place, shape
      * `dims`. Sets *param. */
     enum imp_status (*add_bulk)(const struct imp_build *b, const char *key, float *data,
-                                int n_dims, const size_t dims[3], unsigned flags,
-                                double lo, double hi, int *param);
+                                int n_dims, const size_t *dims, unsigned flags, double lo,
+                                double hi, int *param);
     void *scene;
 };
 

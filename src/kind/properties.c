@@ -131,9 +131,11 @@ enum imp_status imp_build_texels(const struct imp_build *build, const char *key,
     IMP_REQUIRE(build->ctx, data, "data");
     IMP_REQUIRE(build->ctx, dims, "dims");
     IMP_REQUIRE(build->ctx, param, "param");
-    if (n_dims < 1 || n_dims > 3)
-        return imp__error(build->ctx, IMP_E_ARG, "%s: n_dims = %d is outside [1, 3]",
-                          __func__, n_dims);
+    const int least = flags & IMP_PARAM_VOLUME ? 3 : 1,
+              most = flags & IMP_PARAM_VOLUME ? 4 : 3;
+    if (n_dims < least || n_dims > most)
+        return imp__error(build->ctx, IMP_E_ARG, "%s: n_dims = %d is outside [%d, %d]",
+                          __func__, n_dims, least, most);
     if (!(lo <= hi))
         return imp__error(build->ctx, IMP_E_ARG, "%s: lo = %g is above hi = %g", __func__,
                           lo, hi);

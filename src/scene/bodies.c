@@ -27,6 +27,7 @@ enum imp_status imp__build_body(struct imp_scene *scene, struct imp_node *node,
         p.info.n_dims = n->n_dims;
         for (int d = 0; d < n->n_dims; d++) p.info.dims[d] = n->dims[d];
         p.info.flags = IMP_PARAM_DISCONTINUOUS;
+        if (n->n_dims == 3) p.info.layers = n->dims[0];
         p.info.lo = n->lo;
         p.info.hi = n->hi;
         IMP_TRY(imp__theta_add(scene, &p, &n->param));

@@ -13,9 +13,20 @@ static const char *bulk_name(struct imp_scene *scene, const char *texture,
                : imp__build_name(scene, texture, key);
 }
 
+/* dims as imp_build_texels has them. */
+static void set_dims(struct imp_param_info *info, int n_dims, const size_t *dims)
+{
+    const size_t *from = dims;
+    if (info->flags & IMP_PARAM_VOLUME) info->layers = dims[0];
+    info->n_dims = imp_min(n_dims, 3);
+    if (n_dims > 3) from++;
+    for (int d = 0; d < info->n_dims; d++) info->dims[d] = from[d];
+    if (n_dims > 3) info->dims[0] *= dims[0];
+}
+
 static enum imp_status add_bulk(const struct imp_build *b, const char *key, float *data,
-                                int n_dims, const size_t dims[3], unsigned flags,
-                                double lo, double hi, int *param)
+                                int n_dims, const size_t *dims, unsigned flags, double lo,
+                                double hi, int *param)
 {
     struct imp_scene *scene = b->scene;
     const struct imp_texture *t = b->node->object; /* set before build is called */
@@ -27,9 +38,10 @@ static enum imp_status add_bulk(const struct imp_build *b, const char *key, floa
     p.info.name = bulk_name(scene, t->name, key);
     if (!p.info.name) return imp__build_no_memory(scene);
     p.info.unit = "1";
-    p.info.n_dims = n_dims;
-    for (int d = 0; d < n_dims; d++) p.info.dims[d] = dims[d];
     p.info.flags = flags;
+    set_dims(&p.info, n_dims, dims);
+    if (flags & IMP_PARAM_VOLUME && b->node->grid)
+        memcpy(p.box, b->node->grid->box, sizeof p.box);
     p.info.lo = lo;
     p.info.hi = hi;
     return imp__theta_add(scene, &p, param);

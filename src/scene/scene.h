@@ -42,6 +42,7 @@ struct imp_param {
     enum imp_param_store store;
     imp_spec *lanes; /* LANES: info.count numbers in lanes 0.., a scalar in all of them */
     float *bulk;     /* BULK: [info.count] in place */
+    float box[6];    /* of a volume: its file's, corner by corner */
     double *doubles; /* DOUBLES: [info.count] in place */
     bool probed;     /* an extinction depends on it: its derivative has side walks, and is
                         not that of a frozen walk (walk/probe.c) */

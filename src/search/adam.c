@@ -72,6 +72,12 @@ out:
     return st;
 }
 
+void imp__adam_moved(struct imp__search *s)
+{
+    for (size_t k = 0; k < s->n; k++) s->array[HERE][k] = s->x[k];
+    window_begin(s);
+}
+
 /* ---- Directions ---------------------------------------------------------------- */
 
 /* out_i = sum_j V[i row + j column] in_j */

@@ -22,6 +22,8 @@ static inline bool imp__adam_is_many(const struct imp__goal *goal)
 {
     return goal->spans != NULL;
 }
+/* adam.c: x is another, before the first iteration of few variables. */
+void imp__adam_moved(struct imp__search *s);
 enum imp_status imp__adam_many_init(struct imp__search *s);
 enum imp_status imp__adam_many_run(const struct imp__goal *goal,
                                    const struct imp__opt_options *options,

@@ -151,6 +151,25 @@ enum imp_status imp__search_iterated(const struct imp__goal *goal, struct imp__s
     return goal->iterated ? goal->iterated(s, goal->payload) : IMP_OK;
 }
 
+void imp__search_move(const struct imp__goal *goal, struct imp__search *s,
+                      const double *x)
+{
+    for (size_t k = 0; k < s->n; k++) s->x[k] = imp__into_bounds(goal, k, x[k]);
+    if (!imp__adam_is_many(goal)) imp__adam_moved(s);
+}
+
+void imp__search_take_history(struct imp__search *s, struct imp__search *from)
+{
+    imp__release(s->ctx, s->history);
+    imp__release(s->ctx, s->history_se);
+    s->history = from->history, s->history_se = from->history_se;
+    s->n_history = from->n_history;
+    s->cap_history = from->cap_history, s->cap_history_se = from->cap_history_se;
+    s->iteration = from->iteration;
+    from->history = from->history_se = NULL;
+    from->n_history = from->cap_history = from->cap_history_se = 0;
+}
+
 uint64_t imp__search_seed(const struct imp__goal *goal, int i, int k)
 {
     return imp__mix64(imp__mix64(goal->seed + 0x9e3779b97f4a7c15u) + 64 * (uint64_t)i +

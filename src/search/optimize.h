@@ -117,6 +117,12 @@ double imp__search_answer(const struct imp__search *search, size_t k);
 /* x: the answer; of many variables, the memory of what led there is given back. */
 void imp__search_settle(struct imp__search *search);
 
+/* Of Adam, before its first iteration: go on from x, while `start` stays. */
+void imp__search_move(const struct imp__goal *goal, struct imp__search *search,
+                      const double *x);
+/* Its iterations and their losses follow those of `from`, which has none then. */
+void imp__search_take_history(struct imp__search *search, struct imp__search *from);
+
 /* Numbers of old variables -> of new ones: how a change of the old is one of the new. */
 struct imp__carry {
     enum imp_status (*map)(const double *in, double *out, void *payload);

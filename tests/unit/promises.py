@@ -158,6 +158,7 @@ NOT_OK = {
     "imp_scene_commit": "the scene is committed",
     "imp_problem_add_smoothness": "the scene has no texture",
     "imp_problem_fit_variable": "there was no fit",
+    "imp_scene_write_volume": "the scene has no volume",
 }
 try: C.CDLL("libOpenImageDenoise.so.2")
 except OSError: NOT_OK["imp_denoise"] = "there is no Open Image Denoise"
@@ -174,7 +175,7 @@ NULLABLE = {"options", "run", "stats", "id", "objective", "gradient_se", "primal
             "imp_problem_functional.gradient", "imp_problem_jacobian_sums.adjoint",
             "imp_problem_jacobian_sums.group", "imp_problem_jacobian_sums.value",
             "imp_problem_nlopt.gradient", "imp_field_eval.gradient", "imp_bend_objective.gradient",
-            "imp_build_error.name", "imp_build_string.fallback", "imp_field_read.grid", "imp_bend_tangent.theta_dot", "imp_bend_tangent.x_dot",
+            "imp_scene_write_volume.values", "imp_build_error.name", "imp_build_string.fallback", "imp_field_read.grid", "imp_bend_tangent.theta_dot", "imp_bend_tangent.x_dot",
             "imp_bend_tangent.d_dot", "imp_bend_fit.result", "imp_last_error.context",
             "imp_bend_set_progress.payload", "imp_bend_set_progress.progress",
             "imp_input_tangent.x_dot"}
@@ -382,7 +383,7 @@ class Fixture:
                      "imp_bend_load": os.path.join(top, "scenes", "bend", "maxwell.xml"),
                      "imp_film_write": self.folder + "/x.exr", "imp_elements_save": self.folder + "/x.el",
                      "imp_elements_export": self.folder + "/x.ply", "imp_field_write": self.folder + "/x.npy",
-                     "imp_parts_write": self.folder + "/x.part", "imp_report_write": self.folder + "/x.html",
+                     "imp_parts_write": self.folder + "/x.part", "imp_scene_write_volume": self.folder + "/x.vol", "imp_report_write": self.folder + "/x.html",
                      "imp_manifest_write": self.folder + "/x.proof"}
             if key == "imp_manifest_output.path": return os.path.join(top, "scenes", "furnace.xml").encode(), None
             if key == "imp_manifest_read.path":

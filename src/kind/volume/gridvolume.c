@@ -101,10 +101,9 @@ static enum imp_status build(const struct imp_build *b, void *self,
     if (v->spectral)
         IMP_TRY(imp__lifted_texels_make(b, v->data, cells, (size_t)v->n[0], &v->lifted));
     changed(tex);
-    const size_t grid[3] = {(size_t)v->n[2], (size_t)v->n[1], (size_t)v->n[0]};
-    const size_t colours[3] = {grid[0] * grid[1], grid[2], 3};
-    IMP_TRY(imp_build_texels(b, "data", v->data, 3, v->channels == 1 ? grid : colours,
-                             IMP_PARAM_DIFFERENTIABLE |
+    const size_t grid[4] = {(size_t)v->n[2], (size_t)v->n[1], (size_t)v->n[0], 3};
+    IMP_TRY(imp_build_texels(b, "data", v->data, v->channels == 1 ? 3 : 4, grid,
+                             IMP_PARAM_DIFFERENTIABLE | IMP_PARAM_VOLUME |
                                  (v->channels == 3 ? IMP_PARAM_COLOR : 0u),
                              lo < 0 ? -INFINITY : 0.0, INFINITY, &tex->param));
 out:
