@@ -13,7 +13,10 @@
  * with P+- the phase function, averaged over azimuth and normalised to 1 over the sphere
  * times 4 pi. Two equal layers on top of each other:
  *
- *     T2 = T (1 - R R)^-1 T,    R2 = R + T (1 - R R)^-1 R T */
+ *     T2 = T (1 - R R)^-1 T,    R2 = R + T (1 - R R)^-1 R T
+ *
+ * Behind smooth boundaries of index n, radiance inside meets Fresnel's reflectance F(mu), 1
+ * beyond the critical angle, so the half range is cut there into two. */
 #ifndef IMP_ADDING_DOUBLING_H
 #define IMP_ADDING_DOUBLING_H
 
@@ -84,15 +87,24 @@ static inline double ad_rayleigh(double c, double g)
     return .75 * (1 + c * c);
 }
 
-/* mu [n_asked]: directions that are asked for, behind the nodes of the quadrature. */
-static inline void ad_make(struct ad_slab *s, double tau, double albedo, ad_phase *phase,
-                           double g, int n_asked, const double *asked)
+/* mu [n_asked]: directions that are asked for, behind the nodes of the quadrature, half of
+ * which lie below the cosine `cut`; 0: all above. */
+static inline void ad_make_cut(struct ad_slab *s, double tau, double albedo,
+                               ad_phase *phase, double g, int n_asked,
+                               const double *asked, double cut)
 {
     enum { AZIMUTH = 256, DOUBLINGS = 26 };
     static ad_matrix plus, minus, RR, TX, X, Y;
     const double t = ldexp(tau, -DOUBLINGS);
     const int n = s->n = AD_GAUSS + n_asked;
-    ad_gauss(AD_GAUSS, s->mu, s->w);
+    const int below = cut > 0 ? AD_GAUSS / 2 : 0;
+    if (below) ad_gauss(below, s->mu, s->w);
+    ad_gauss(AD_GAUSS - below, s->mu + below, s->w + below);
+    for (int i = 0; i < AD_GAUSS; i++) {
+        const double lo = i < below ? 0 : cut, hi = i < below ? cut : 1;
+        s->mu[i] = lo + (hi - lo) * s->mu[i];
+        s->w[i] *= hi - lo;
+    }
     for (int k = 0; k < n_asked; k++) {
         s->mu[AD_GAUSS + k] = asked[k];
         s->w[AD_GAUSS + k] = 0;
@@ -134,6 +146,12 @@ static inline void ad_make(struct ad_slab *s, double tau, double albedo, ad_phas
     }
 }
 
+static inline void ad_make(struct ad_slab *s, double tau, double albedo, ad_phase *phase,
+                           double g, int n_asked, const double *asked)
+{
+    ad_make_cut(s, tau, albedo, phase, g, n_asked, asked, 0);
+}
+
 /* Radiance towards node i under uniform radiance 1 from one side: also the flux that a
  * narrow beam from there gives (reciprocity). */
 static inline double ad_row(const struct ad_slab *s, const ad_matrix A, int i)
@@ -148,6 +166,52 @@ static inline double ad_flux(const struct ad_slab *s, const ad_matrix A)
     double sum = 0;
     for (int i = 0; i < s->n; i++) sum += 2 * s->mu[i] * s->w[i] * ad_row(s, A, i);
     return sum;
+}
+
+/* Unpolarised reflectance, from inside index n, at cosine mu there. */
+static inline double ad_fresnel(double n, double mu)
+{
+    const double sin2 = n * n * (1 - mu * mu);
+    if (sin2 >= 1) return 1;
+    const double out = sqrt(1 - sin2), s = (n * mu - out) / (n * mu + out),
+                 p = (mu - n * out) / (mu + n * out);
+    return (s * s + p * p) / 2;
+}
+
+/* A slab between smooth boundaries of index n, under uniform radiance 1 from one side:
+ * radiance that leaves it at cosine mu outside, on that side (mirrored light included) and
+ * on the other. */
+static inline void ad_behind_glass(double n, double tau, double albedo, ad_phase *phase,
+                                   double g, double mu, double *reflected,
+                                   double *transmitted)
+{
+    static struct ad_slab s;
+    const double inside = sqrt(1 - (1 - mu * mu) / (n * n));
+    double F[AD_MAX], in[AD_MAX], down[AD_MAX], up[AD_MAX] = {0}, low[AD_MAX] = {0};
+    ad_make_cut(&s, tau, albedo, phase, g, 1, &inside, sqrt(1 - 1 / (n * n)));
+    const int m = s.n;
+    for (int i = 0; i < m; i++) {
+        F[i] = ad_fresnel(n, s.mu[i]);
+        in[i] = (1 - F[i]) * n * n;
+    }
+    /* up: at the top; low: downwards at the bottom. Both boundaries mirror in turn. */
+    for (int k = 0; k < 20000; k++) {
+        double change = 0, next_up[AD_MAX] = {0}, next_low[AD_MAX] = {0};
+        for (int i = 0; i < m; i++) down[i] = in[i] + F[i] * up[i];
+        for (int i = 0; i < m; i++) {
+            for (int j = 0; j < m; j++) {
+                next_up[i] += s.R[i][j] * down[j] + s.T[i][j] * F[j] * low[j];
+                next_low[i] += s.T[i][j] * down[j] + s.R[i][j] * F[j] * low[j];
+            }
+            change = fmax(change, fabs(next_up[i] - up[i]) + fabs(next_low[i] - low[i]));
+        }
+        memcpy(up, next_up, sizeof up);
+        memcpy(low, next_low, sizeof low);
+        if (change < 1e-13) break;
+    }
+    const int asked = m - 1;
+    *reflected = F[asked] + (1 - F[asked]) / (n * n) * up[asked];
+    *transmitted = (1 - F[asked]) / (n * n) * low[asked];
 }
 
 #endif
