@@ -566,6 +566,17 @@ IMP_API void imp_bend_get_rays(const imp_bend *bend, struct imp_bend_rays *rays)
 IMP_API IMP_MUST_CHECK enum imp_status imp_bend_get_options(const imp_bend *bend,
                                                             struct imp_bend_options *o);
 
+/** A fit between two iterations. */
+struct imp_bend_fit_step {
+    size_t size;
+    int level, levels; /**< the first level is 0 */
+    int iteration;     /**< completed ones of this level */
+    double value;      /**< objective, the last of its history */
+};
+/** Called after each iteration from the thread that called imp_bend_fit; the field is the
+ * best so far, and may be traced and drawn, not changed. Non-zero asks to stop. */
+typedef int (*imp_bend_fit_step_fn)(const struct imp_bend_fit_step *step, void *payload);
+
 #define IMP_BEND_LEVELS_MAX 8
 struct imp_bend_fit_options {
     size_t size;
@@ -582,10 +593,13 @@ struct imp_bend_fit_options {
     int carry; /**< what the optimiser learnt at a level, at the next: 1: is carried on
                     (L-BFGS: pairs, Adam: moments; MMA keeps nothing), -1: is not, 0: of
                     L-BFGS only */
+    imp_bend_fit_step_fn step; /**< NULL: nobody looks */
+    void *step_payload;
 };
 #define IMP_BEND_FIT_OPTIONS_INIT                                                        \
     {                                                                                    \
-        sizeof(struct imp_bend_fit_options), IMP_LBFGS, 0, {0}, 0, 0, 0, 0, 0, 0, 0, 0   \
+        sizeof(struct imp_bend_fit_options), IMP_LBFGS, 0, {0}, 0, 0, 0, 0, 0, 0, 0, 0,  \
+            0, 0                                                                         \
     }
 
 struct imp_bend_fit_result {

@@ -933,6 +933,19 @@ enum imp_optimizer {
     IMP_SLSQP /**< NLopt, bounded, common random numbers */
 };
 
+/** A fit between two iterations. Pointers live during the call. */
+struct imp_fit_step {
+    size_t size;
+    int iteration;   /**< completed ones */
+    size_t n;        /**< of the problem; 0 for Adam of more than 1024 numbers */
+    const double *x; /**< [n] the best estimate so far */
+    size_t n_history;
+    const double *history, *history_se, *history_x; /**< as in imp_fit_result */
+};
+/** Called after each iteration from the thread that called imp_fit. The scene may be
+ * rendered at these numbers (imp_problem_set_x, imp_render). Non-zero asks to stop. */
+typedef int (*imp_fit_step_fn)(const struct imp_fit_step *step, void *payload);
+
 struct imp_fit_options {
     size_t size;
     enum imp_optimizer optimizer;
@@ -947,10 +960,12 @@ struct imp_fit_options {
      * the cells are linear, and an equal share of the iterations; a checkpoint holds the
      * last level. 0, 1: cells alone. */
     int levels;
+    imp_fit_step_fn step;   /**< NULL: nobody looks */
+    void *step_payload;
 };
 #define IMP_FIT_OPTIONS_INIT                                                             \
     {                                                                                    \
-        sizeof(struct imp_fit_options), IMP_ADAM, 0, 0, 0, 0, 0, 0, 0                    \
+        sizeof(struct imp_fit_options), IMP_ADAM, 0, 0, 0, 0, 0, 0, 0, 0, 0              \
     }
 
 struct imp_fit_variable {
@@ -991,6 +1006,12 @@ struct imp_fit_result {
     const double *covariance;
     int spp; /**< samples per pixel that each evaluation of the search took, of the
                   target with most of them */
+    /** [n_history][n] where the objective was evaluated; NULL for n > 64. */
+    const double *history_x;
+    /** [n] the change of the numbers that the pictures determine least, in units of x;
+     * imp_problem_forward makes the picture of it. NULL where all numbers are determined,
+     * or there are no intervals. */
+    const double *loosest;
 };
 
 /** Fit the active parameters to the targets; the scene ends at the best estimate.

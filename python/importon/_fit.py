@@ -41,6 +41,8 @@ class Fit(Values):
         At the answer.
     history, history_se : ndarray
         Loss of each iteration.
+    history_x : ndarray or None
+        [iterations][n], the numbers at which these were computed; of up to 64 numbers.
     covariance : ndarray or None
         [n][n] of all numbers (`names` lists them), measurement and Monte Carlo together,
         in the directions that the pictures determine and no bound holds.
@@ -64,6 +66,7 @@ class Fit(Values):
         self.bias_order: int = result.objective.bias_order
         self.history = copy_doubles(result.history, (result.n_history,))
         self.history_se = copy_doubles(result.history_se, (result.n_history,))
+        self.history_x = copy_doubles(result.history_x, (result.n_history, result.n))
         self.covariance = copy_doubles(result.covariance, (result.n, result.n))
         self.names = names
         self.condition: float = result.condition

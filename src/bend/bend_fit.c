@@ -5,6 +5,7 @@
  * coarse coefficient's share goes to eight fine ones). Adam's rate is halved. */
 #include "bend_fingerprint.h"
 #include "lbfgs.h"
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -93,6 +94,19 @@ static enum imp_status goal_eval(const double *x, uint64_t seed, struct imp_esti
     return IMP_OK;
 }
 
+/* True: it asks to stop. */
+static bool show_step(struct fit *f, const struct imp__search *s)
+{
+    const struct imp_bend_fit_step step = {
+        .size = sizeof step,
+        .level = f->level,
+        .levels = f->levels,
+        .iteration = s->iteration,
+        .value = s->n_history ? s->history[s->n_history - 1] : NAN};
+    return f->o->step && theta_set(f, s->x) == IMP_OK &&
+           f->o->step(&step, f->o->step_payload) != 0;
+}
+
 static enum imp_status goal_iterated(const struct imp__search *s, void *payload)
 {
     struct fit *f = payload;
@@ -104,7 +118,8 @@ static enum imp_status goal_iterated(const struct imp__search *s, void *payload)
             imp__checkpoint_write(f->b->ctx, f->o->checkpoint, &f->print, s);
         if (st != IMP_OK) return st;
     }
-    return report(f, false) ? IMP_CANCELLED : IMP_OK;
+    const bool stops = show_step(f, s);
+    return report(f, false) || stops ? IMP_CANCELLED : IMP_OK;
 }
 
 static enum imp_status level_begin(struct fit *f)

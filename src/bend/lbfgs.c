@@ -152,7 +152,7 @@ enum imp_status imp__lbfgs(const struct imp__goal *goal,
         s->scalar[VALUE] = e.value;
         if (s->scalar[HAVE] == 0) s->scalar[PAIRS] = 0;
         s->scalar[HAVE] = 1;
-        IMP_TRY(imp__search_log(s, e));
+        IMP_TRY(imp__search_log(s, e, s->x));
     }
     while (!s->finished && s->iteration < options->max_iterations) {
         bool found;
@@ -178,7 +178,7 @@ enum imp_status imp__lbfgs(const struct imp__goal *goal,
         for (size_t k = 0; k < n; k++)
             moved = fmax(moved, fabs(s->array[X][k] - s->x[k]) / goal->scale[k]);
         memcpy(s->x, s->array[X], n * sizeof(double));
-        IMP_TRY(imp__search_log(s, (struct imp_estimate){s->scalar[VALUE], 0, 0}));
+        IMP_TRY(imp__search_log(s, (struct imp_estimate){s->scalar[VALUE], 0, 0}, s->x));
         if (moved < options->tolerance) {
             imp__search_finish(s, IMP_FINISH_STEPS);
         }

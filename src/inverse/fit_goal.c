@@ -56,6 +56,21 @@ static int inner_progress(const struct imp_progress *p, void *payload)
     return f->stopped;
 }
 
+/* Of many variables the answer so far takes memory to be made, and none is shown. */
+static void show_step(struct imp__fit *f, const struct imp__search *s)
+{
+    const struct imp_fit_step step = {.size = sizeof step,
+                                      .iteration = s->iteration,
+                                      .n = s->start ? s->n : 0,
+                                      .x = s->start ? s->x : NULL,
+                                      .n_history = s->n_history,
+                                      .history = s->history,
+                                      .history_se = s->history_se,
+                                      .history_x = s->history_x};
+    if (f->options.step && f->options.step(&step, f->options.step_payload) != 0)
+        f->stopped = true;
+}
+
 static enum imp_status iterated(const struct imp__search *s, void *payload)
 {
     struct imp__fit *f = payload;
@@ -72,6 +87,7 @@ static enum imp_status iterated(const struct imp__search *s, void *payload)
         f->checkpoint_cost_s = f->last_checkpoint_s - now;
     }
     report(f, f->search_share * s->iteration / f->options.max_iterations);
+    show_step(f, s);
     const enum imp_status st = imp__team_any(f->problem->ctx, f->stopped, &f->stopped);
     if (st != IMP_OK) return st;
     return f->stopped ? IMP_CANCELLED : IMP_OK;

@@ -189,6 +189,20 @@ static enum imp_status covariance_give(struct imp__fit *f,
     return IMP_OK;
 }
 
+/* In units of x; NULL where all numbers are determined. */
+static enum imp_status loosest_give(struct imp__fit *f, const struct imp__uncertainty *u,
+                                    bool missing, const double **out)
+{
+    if (!u->n || !missing) return IMP_OK;
+    double *change = imp__arena_array(&f->problem->fit_arena, u->n, sizeof *change);
+    if (!change)
+        return imp__error(f->problem->ctx, IMP_E_NOMEM,
+                          "no memory for the result of a fit");
+    for (size_t i = 0; i < u->n; i++) change[i] = u->loosest[i] * f->scale[i];
+    *out = change;
+    return IMP_OK;
+}
+
 static int spp_taken(const struct imp__fit *f)
 {
     const struct imp_problem *p = f->problem;
@@ -215,7 +229,9 @@ enum imp_status imp__fit_answer(struct imp__fit *f, struct imp__search *s,
     const size_t n = f->problem->n;
     size_t determined = n;
     struct imp_fit_result *r = imp__arena_array(arena, 1, sizeof *r);
-    double *history = imp__arena_array(arena, 2 * s->n_history + 1, sizeof *history);
+    const size_t n_trail = imp__search_trail(s);
+    double *history =
+        imp__arena_array(arena, 2 * s->n_history + n_trail + 1, sizeof *history);
 
     if (!r || !history)
         return imp__error(f->problem->ctx, IMP_E_NOMEM,
@@ -239,9 +255,12 @@ enum imp_status imp__fit_answer(struct imp__fit *f, struct imp__search *s,
         rows[k].determined = known.determined;
         determined -= !known.determined;
     }
+    const double *loosest = NULL;
+    IMP_CHECKED(loosest_give(f, u, determined < n, &loosest));
     if (s->n_history > 0) {
         memcpy(history, s->history, s->n_history * sizeof *history);
         memcpy(history + s->n_history, s->history_se, s->n_history * sizeof *history);
+        memcpy(history + 2 * s->n_history, s->history_x, n_trail * sizeof *history);
     }
     const struct imp__fit_residual left =
         imp__fit_residual(f, s->x, objective, determined);
@@ -252,6 +271,7 @@ enum imp_status imp__fit_answer(struct imp__fit *f, struct imp__search *s,
         .n_history = s->n_history,
         .history = history,
         .history_se = history + s->n_history,
+        .history_x = n_trail ? history + 2 * s->n_history : NULL,
         .n = n,
         .variables = rows,
         .condition = u->condition,
@@ -266,7 +286,8 @@ enum imp_status imp__fit_answer(struct imp__fit *f, struct imp__search *s,
         .residual_hi = left.relative_hi,
         .chi2 = left.chi2,
         .chi2_se = left.chi2_se,
-        .covariance = covariance};
+        .covariance = covariance,
+        .loosest = loosest};
     answer->n = n;
     answer->rows = rows;
     if (rows) answer->search = NULL; /* all is said */

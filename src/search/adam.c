@@ -304,7 +304,7 @@ static enum imp_status run(const struct imp__goal *goal,
         if (s->iteration >= s->scalar[TURN]) IMP_TRY(look_round(goal, s));
         IMP_TRY(goal->eval(s->array[HERE], imp__search_seed(goal, s->iteration, 0), &f, g,
                            NULL, goal->payload));
-        IMP_TRY(imp__search_log(s, f));
+        IMP_TRY(imp__search_log(s, f, s->array[HERE]));
         s->scalar[LOSS] += f.value;
         s->scalar[LOSS_VAR] += f.se * f.se;
         IMP_TRY(step(goal, options->learning_rate, s, g, g + goal->n));

@@ -200,7 +200,7 @@ enum imp_status imp__adam_many_run(const struct imp__goal *goal,
         struct imp_estimate f;
         IMP_TRY(goal->eval(s->x, imp__search_seed(goal, s->iteration, 0), &f, g, NULL,
                            goal->payload));
-        IMP_TRY(imp__search_log(s, f));
+        IMP_TRY(imp__search_log(s, f, s->x));
         s->scalar[LOSS] += f.value;
         s->scalar[LOSS_VAR] += f.se * f.se;
         step(goal, options->learning_rate, s, g);

@@ -9,7 +9,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define MAGIC "importon checkpoint 2\n"
+#define MAGIC "importon checkpoint 3\n"
 
 /* ---- Writing ------------------------------------------------------------------- */
 
@@ -73,6 +73,7 @@ static void contents_put(struct imp_file_writer *w, const void *payload)
     put_array(&s, "x", search->x, search->n);
     put_array(&s, "history", search->history, search->n_history);
     put_array(&s, "history_se", search->history_se, search->n_history);
+    put_array(&s, "history_x", search->history_x, imp__search_trail(search));
     put_array(&s, "scalars", search->scalar, IMP_SEARCH_SCALARS);
     for (int k = 0; k < IMP_SEARCH_ARRAYS; k++) {
         snprintf(name, sizeof name, "array%d", k);
@@ -222,9 +223,11 @@ static enum imp_status read_body(struct source *s, struct imp__search *t)
     IMP_TRY(get_array(s, "x", t->x, t->n, is_inside));
     IMP_TRY(get_head(s, "history", &n));
     for (size_t k = 0; s->take && k < n; k++)
-        IMP_TRY(imp__search_log(t, (struct imp_estimate){0}));
+        IMP_TRY(imp__search_log(t, (struct imp_estimate){0}, t->x));
     IMP_TRY(get_numbers(s, "history", t->history, n, NULL));
     IMP_TRY(get_array(s, "history_se", t->history_se, n, NULL));
+    IMP_TRY(get_array(s, "history_x", t->history_x, t->n <= IMP_TRAIL_MAX ? n * t->n : 0,
+                      is_number));
     IMP_TRY(get_array(s, "scalars", t->scalar, IMP_SEARCH_SCALARS, NULL));
     for (int k = 0; k < IMP_SEARCH_ARRAYS; k++) {
         snprintf(name, sizeof name, "array%d", k);

@@ -186,7 +186,7 @@ static enum imp_status iterate(const struct imp__goal *goal,
     const double f0 = w->eq.f.value;
     free_set(goal, s->x, w);
     if (w->n_free == 0) {
-        IMP_TRY(imp__search_log(s, w->eq.f));
+        IMP_TRY(imp__search_log(s, w->eq.f, s->x));
         imp__search_finish(s, IMP_FINISH_BOUNDED);
         goto out;
     }
@@ -206,7 +206,7 @@ static enum imp_status iterate(const struct imp__goal *goal,
         if (ratio > 0.75) mu = fmax(mu / 10, MU_MIN);
         else if (!(ratio > 0.25)) mu = fmin(fmax(mu, 1e-4) * 5, MU_MAX);
     }
-    IMP_TRY(imp__search_log(s, w->eq.f));
+    IMP_TRY(imp__search_log(s, w->eq.f, s->x));
     s->scalar[MU] = mu;
     if (moved) memcpy(s->x, w->trial, n * sizeof *s->x);
     if (s->finished) goto out;

@@ -56,7 +56,7 @@ static enum imp_status evaluate(struct call *c, struct imp_estimate *f)
         s->array[RECORD][at + 1] = f->se;
         for (size_t k = 0; k < goal->n; k++) s->array[RECORD][at + 2 + k] = c->g[k];
     }
-    IMP_TRY(imp__search_log(s, *f));
+    IMP_TRY(imp__search_log(s, *f, c->x));
     if (f->value < s->scalar[BEST]) {
         s->scalar[BEST] = f->value;
         for (size_t k = 0; k < goal->n; k++) s->x[k] = c->x[k];

@@ -55,6 +55,7 @@ void imp__search_destroy(struct imp__search *s)
     for (int k = 0; k < IMP_SEARCH_ARRAYS; k++) imp__release(s->ctx, s->array[k]);
     imp__release(s->ctx, s->history);
     imp__release(s->ctx, s->history_se);
+    imp__release(s->ctx, s->history_x);
     imp__release(s->ctx, s->start);
     imp__release(s->ctx, s->x);
     imp__release(s->ctx, s);
@@ -130,16 +131,23 @@ enum imp_status imp__search_carry(const struct imp__search *old,
                                                        : IMP_OK;
 }
 
-enum imp_status imp__search_log(struct imp__search *s, struct imp_estimate f)
+enum imp_status imp__search_log(struct imp__search *s, struct imp_estimate f,
+                                const double *x)
 {
+    const size_t n = s->n <= IMP_TRAIL_MAX ? s->n : 0;
     double *h =
         imp__grow(s->ctx, s->history, &s->cap_history, s->n_history + 1, sizeof *h);
     if (h) s->history = h;
     double *e =
         imp__grow(s->ctx, s->history_se, &s->cap_history_se, s->n_history + 1, sizeof *e);
     if (e) s->history_se = e;
-    if (!h || !e)
+    double *trail = n ? imp__grow(s->ctx, s->history_x, &s->cap_history_x,
+                                  (s->n_history + 1) * n, sizeof *trail)
+                      : NULL;
+    if (trail) s->history_x = trail;
+    if (!h || !e || (n && !trail))
         return imp__error(s->ctx, IMP_E_NOMEM, "no memory for the loss history");
+    if (n) memcpy(trail + s->n_history * n, x, n * sizeof *x);
     h[s->n_history] = f.value;
     e[s->n_history++] = f.se;
     return IMP_OK;

@@ -13,6 +13,7 @@
 
 #define IMP_DENSE_MAX  256  /* most variables of methods that hold [n][n] matrices */
 #define IMP_SEARCH_FEW 1024 /* variables, above which Adam's memory counts */
+#define IMP_TRAIL_MAX  64   /* variables, up to which a search keeps where it was */
 
 /* Normal equations at one x, from one set of random numbers. */
 struct imp__normal {
@@ -89,8 +90,9 @@ struct imp__search {
     const char *reason;        /* why it stopped, a constant string */
     double *start;             /* [n] where it began; NULL: see imp__search_start */
     double *x;                 /* [n] the best estimate so far, inside the bounds */
-    size_t n_history, cap_history, cap_history_se;
+    size_t n_history, cap_history, cap_history_se, cap_history_x;
     double *history, *history_se;
+    double *history_x; /* [n_history][n] where these were; NULL for n > IMP_TRAIL_MAX */
     /* Private to the optimiser. */
     double *array[IMP_SEARCH_ARRAYS];
     size_t array_n[IMP_SEARCH_ARRAYS], array_cap[IMP_SEARCH_ARRAYS];
@@ -153,7 +155,9 @@ extern const struct imp__opt_kind imp__opt_adam, imp__opt_lm, imp__opt_nlopt;
  * with no room to spare. */
 enum imp_status imp__search_exact(struct imp__search *s, int k, size_t n);
 enum imp_status imp__search_array(struct imp__search *s, int k, size_t n);
-enum imp_status imp__search_log(struct imp__search *s, struct imp_estimate f);
+/* The objective f at x [n]. */
+enum imp_status imp__search_log(struct imp__search *s, struct imp_estimate f,
+                                const double *x);
 /* iteration++, and tell the goal. */
 enum imp_status imp__search_iterated(const struct imp__goal *goal, struct imp__search *s);
 /* Random numbers of iteration i, purpose k: independent of each other. */
@@ -161,6 +165,12 @@ uint64_t imp__search_seed(const struct imp__goal *goal, int i, int k);
 
 enum imp_status imp__normal_create(imp_context *ctx, size_t n, struct imp__normal *out);
 void imp__normal_destroy(imp_context *ctx, struct imp__normal *normal);
+
+/* Numbers in history_x. */
+static inline size_t imp__search_trail(const struct imp__search *s)
+{
+    return s->n <= IMP_TRAIL_MAX ? s->n_history * s->n : 0;
+}
 
 static inline struct imp__span imp__goal_span(const struct imp__goal *goal, size_t k)
 {

@@ -495,6 +495,84 @@ static void progress(void)
     imp_scene_destroy(s);
 }
 
+/* ---- Somebody who looks on ------------------------------------------------------ */
+
+struct looker {
+    imp_problem *problem;
+    imp_scene *scene;
+    int steps, failed, stop_after;
+};
+
+/* Renders at the numbers of each iteration, and walks through one pixel. */
+static int look(const struct imp_fit_step *step, void *payload)
+{
+    struct looker *l = payload;
+    struct imp_run run = run_of(1, 9);
+    imp_film *film = NULL;
+    char *text = NULL;
+    const size_t last = step->n_history - 1;
+    l->steps++;
+    l->failed += step->iteration != l->steps || step->n != 3 || !step->history_x ||
+                 !(step->history[last] > -INFINITY) || !(step->history_se[last] >= 0) ||
+                 imp_problem_set_x(l->problem, step->x) != IMP_OK ||
+                 imp_render(l->scene, &run, &film) != IMP_OK ||
+                 imp_walk_describe(l->scene, &run, 5, 5, 0, 1, &text) != IMP_OK;
+    imp_film_destroy(film);
+    imp_free(ctx, text);
+    return l->steps == l->stop_after;
+}
+
+static void looked_at(enum imp_optimizer kind)
+{
+    imp_scene *s = scene_open(ctx, ball_xml, IMP_RGB);
+    const char *const glob = "ball.reflectance.value";
+    float pixels[12 * 10 * 3];
+    double x[3][3], history[64 * 4];
+    int iterations[3], steps = 0, failed = 0, same = 1;
+    for (int i = 0; i < 360; i++) pixels[i] = 0.3f + 0.3f * (float)(i % 3);
+    struct imp_target t = IMP_TARGET_INIT;
+    t.width = 12, t.height = 10, t.channels = 3, t.pixels = pixels;
+    for (int k = 0; k < 3; k++) { /* nobody looks; somebody does; and stops it */
+        imp_problem *p = problem_of(s, &glob, 1);
+        struct looker l = {p, s, 0, 0, k == 2 ? 2 : -1};
+        struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
+        o.optimizer = kind;
+        o.max_iterations = 6;
+        o.step = k ? look : NULL;
+        o.step_payload = &l;
+        const struct imp_run run = run_of(4, 3);
+        const struct imp_fit_result *r = NULL;
+        const double start[3] = {0.3, 0.5, 0.7};
+        enum imp_status st = imp_problem_add_target(p, &t);
+        if (st == IMP_OK) st = imp_problem_set_x(p, start);
+        if (st == IMP_OK) st = imp_fit(p, &o, &run, &r);
+        iterations[k] = st == (k == 2 ? IMP_CANCELLED : IMP_OK) ? r->iterations : -1;
+        if (k == 1) steps = l.steps;
+        failed += l.failed;
+        imp_problem_get_x(p, x[k]);
+        for (size_t i = 0; r && r->history_x && i < r->n_history; i++) {
+            if (i == 0) same &= !memcmp(r->history_x, start, sizeof start);
+            for (int j = 0; j < 3 && k == 0 && i < 64; j++)
+                history[4 * i + (size_t)j] = r->history_x[3 * i + (size_t)j];
+            if (k == 0 && i < 64) history[4 * i + 3] = r->history[i];
+            else if (i < 64)
+                same &=
+                    !memcmp(history + 4 * i, r->history_x + 3 * i, 3 * sizeof *history) &&
+                    r->history[i] == history[4 * i + 3];
+        }
+        same &= r && r->history_x;
+        imp_problem_destroy(p);
+    }
+    tap_ok(iterations[0] > 0 && iterations[1] == iterations[0] &&
+               steps == iterations[0] && !failed && !memcmp(x[0], x[1], sizeof x[0]) &&
+               same,
+           "%s: looked at after each iteration, the same bits # %d iterations",
+           optimizer[kind], iterations[0]);
+    tap_ok(iterations[2] == 2 || iterations[0] < 2, "%s: stopped by who looks # after %d",
+           optimizer[kind], iterations[2]);
+    imp_scene_destroy(s);
+}
+
 int main(void)
 {
     if (imp_context_create(NULL, &ctx) != IMP_OK) return 1;
@@ -508,6 +586,9 @@ int main(void)
     resume(IMP_LBFGS);
     threads();
     progress();
+    looked_at(IMP_ADAM);
+    looked_at(IMP_LM);
+    looked_at(IMP_LBFGS);
     arguments();
     imp_context_destroy(ctx);
     return tap_done();

@@ -55,7 +55,9 @@ static void round_trip(enum imp_optimizer kind, const char *name)
             !memcmp(part->x, whole->x, TOY_N * sizeof(double)) &&
             !memcmp(part->history, whole->history, whole->n_history * sizeof(double)) &&
             !memcmp(part->history_se, whole->history_se,
-                    whole->n_history * sizeof(double)),
+                    whole->n_history * sizeof(double)) &&
+            !memcmp(part->history_x, whole->history_x,
+                    imp__search_trail(whole) * sizeof(double)),
         "%s: stopped after %d of %d iterations, resumed: the same bits", name, at,
         whole->iteration);
     imp__search_destroy(part);
@@ -137,7 +139,7 @@ int main(void)
            harmless);
     tap_ok(!memcmp(s->x, before, sizeof before), "and changes nothing");
 
-    write_bytes("importon checkpoint 2\noptimizer 0\nvariables 4\n"
+    write_bytes("importon checkpoint 3\noptimizer 0\nvariables 4\n"
                 "of 1 2 3 4\niteration 1\nfinished 0\nstart 99999999999999\n",
                 101);
     tap_ok(imp__checkpoint_read(ctx, path, &of, &t.goal, s, &found) == IMP_E_SCENE,

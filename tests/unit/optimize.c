@@ -46,6 +46,15 @@ static void answers(enum imp_optimizer kind)
     tap_ok(st == IMP_OK && distance(&t, s->x, ls) < (kind == IMP_ADAM ? 1e-3 : 1e-5),
            "%s, no noise # distance %.1e after %d iterations: %s", name[kind],
            distance(&t, s->x, ls), s->iteration, s->reason);
+    double off = s->history_x ? 0 : INFINITY;
+    for (size_t i = 0; s->history_x && i < s->n_history; i++) {
+        struct imp_estimate at;
+        t.goal.eval(s->history_x + i * TOY_N, 0, &at, NULL, NULL, &t);
+        off = fmax(off, fabs(at.value - s->history[i]));
+    }
+    tap_ok(off <= 1e-12 * s->history[0],
+           "%s: where it was at each iteration has the loss of that iteration # %.1e",
+           name[kind], off);
     imp__search_destroy(s);
 
     /* With noise: within 5 standard errors of what one evaluation could tell. */

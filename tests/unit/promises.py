@@ -47,7 +47,7 @@ for m in re.finditer(r"enum \w+ \{([^}]*)\}", code):
 SCALARS = {"size_t": C.c_size_t, "int": C.c_int, "unsigned": C.c_uint, "double": C.c_double,
            "float": C.c_float, "int64_t": C.c_int64, "uint64_t": C.c_uint64, "int32_t": C.c_int32,
            "uint32_t": C.c_uint32, "uint16_t": C.c_uint16, "uint8_t": C.c_uint8,
-           "imp_progress_fn": C.c_void_p, "imp_preview_fn": C.c_void_p, "imp_dot_fn": C.c_void_p,
+           "imp_progress_fn": C.c_void_p, "imp_preview_fn": C.c_void_p, "imp_fit_step_fn": C.c_void_p, "imp_bend_fit_step_fn": C.c_void_p, "imp_dot_fn": C.c_void_p,
            "bool": C.c_bool, "imp_v3": C.c_double * 4, "imp_spec": C.c_double * 4}
 structs = {}
 
