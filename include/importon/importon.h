@@ -541,6 +541,11 @@ IMP_API const char *imp_film_channel(const imp_film *film, int channel);
 IMP_API float *imp_film_mean(imp_film *film);
 /** One standard error of each mean, in the same order; NULL if there are none. */
 IMP_API float *imp_film_se(imp_film *film);
+/** Take the samples of another picture of the same scene, made with another seed, too: means
+ * by samples per pixel, and their standard errors where both have them.
+ * @return IMP_OK; IMP_E_ARG if sizes or channels differ, or one has no samples. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_film_merge(imp_film *film,
+                                                      const imp_film *other);
 /** Attach a text attribute (provenance); it is written to EXR files. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_film_set_text(imp_film *film, const char *key,
                                                          const char *value);

@@ -3,6 +3,8 @@
  * Creation and public access of films. */
 #include "film.h"
 #include "arguments.h"
+#include "float_mode.h"
+#include <math.h>
 #include <string.h>
 
 /* "R,G,B" -> names; blanks around names do not count, empty and repeated names are
@@ -105,6 +107,44 @@ enum imp_status imp_film_create(imp_context *ctx, int width, int height,
     IMP_REQUIRE(ctx, names, "names");
     IMP_REQUIRE(ctx, out, "out");
     return imp__film_create(ctx, width, height, names, false, out);
+}
+
+static bool same_shape(const imp_film *a, const imp_film *b)
+{
+    bool same =
+        a->width == b->width && a->height == b->height && a->channels == b->channels;
+    for (int c = 0; same && c < a->channels; c++)
+        same = !strcmp(a->names[c], b->names[c]);
+    return same;
+}
+
+/* With n1 and n2 samples, w = n2/(n1 + n2):
+ *
+ *     m = (1 - w) m1 + w m2,    s^2 = (1 - w)^2 s1^2 + w^2 s2^2 */
+enum imp_status imp_film_merge(imp_film *f, const imp_film *other)
+{
+    IMP_REQUIRE(NULL, f, "film");
+    IMP_REQUIRE(f->ctx, other, "other");
+    IMP_FLOAT_MODE;
+    if (!same_shape(f, other))
+        return imp__error(f->ctx, IMP_E_ARG, "pictures of other sizes or channels");
+    if (f->spp < 1 || other->spp < 1)
+        return imp__error(f->ctx, IMP_E_ARG,
+                          "a picture without samples per pixel is not merged");
+    const size_t n = imp__film_values(f);
+    const double w = (double)other->spp / ((double)f->spp + (double)other->spp);
+    for (size_t i = 0; i < n; i++)
+        f->mean[i] = (float)((1 - w) * f->mean[i] + w * other->mean[i]);
+    if (!other->se) {
+        imp__release(f->ctx, f->se);
+        f->se = NULL;
+    }
+    for (size_t i = 0; f->se && i < n; i++)
+        f->se[i] = (float)hypot((1 - w) * f->se[i], w * other->se[i]);
+    f->spp += other->spp;
+    f->dropped += other->dropped;
+    imp__drops_merge(&f->drops, &other->drops);
+    return IMP_OK;
 }
 
 void imp_film_destroy(imp_film *f)

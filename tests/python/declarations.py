@@ -134,6 +134,7 @@ WITHOUT = {
     **{"imp_manifest_" + word: "a manifest says what a command line computed; importon verify reads it"
        for word in ("create", "destroy", "get_info", "output", "read", "result", "write")},
     "imp_context_set_manifest": "the same",
+    "imp_film_merge": "pictures are arrays, whose means are one line",
     "imp_problem_fit_variable": "one number of a fit: Fit has arrays; numbers beyond 1,024 have no errors",
 }
 

@@ -258,6 +258,8 @@ class Fixture:
             return scene
         if kind == "imp_film" and function == "imp_problem_jacobian_sums":
             return self.jacobian()[0]
+        if kind == "imp_film" and function == "imp_film_merge":
+            return self.make("imp_render", scene, None)
         if kind == "imp_film": return self.make("imp_film_create", context, 4, 4, b"R,G,B")
         if kind == "imp_problem":
             p = self.make("imp_problem_create", scene)
