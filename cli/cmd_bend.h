@@ -8,6 +8,12 @@
 
 int bend_fit(imp_bend *bend);
 extern const struct arg_option bend_fit_options[];
+/* --truth: a file that bend_truth_open takes; NULL. */
+extern const char *bend_truth_path;
+/* "NAME": value of each named number of the field. */
+void bend_put_numbers(imp_bend *bend, FILE *to, struct json *j);
+/* The field, into cli.out: field.vol and field.npy, or field.txt. */
+int bend_field_write(const imp_bend *bend);
 /* Counts of a trace. */
 void bend_print_stats(FILE *to, const struct imp_bend_stats *s);
 void bend_put_stats(struct json *j, const struct imp_bend_stats *s);

@@ -43,11 +43,14 @@ const struct arg_option bend_fit_options[] = {
      &o.carry, 0, 0, carry_words},
     {ARG_FLAG, 0, "resume", NULL, "fit: continue from the checkpoint", &o.resume, 0, 0,
      NULL},
+    {ARG_TEXT, 0, "truth", "FILE",
+     "fit, view: the true field, a .xml with rays or a field's file; a report compares",
+     &bend_truth_path, 0, 0, NULL},
     {0}};
 
-static int write_field(imp_bend *bend)
+int bend_field_write(const imp_bend *bend)
 {
-    const imp_field *f = imp_bend_field(bend);
+    const imp_field *f = imp_bend_field((imp_bend *)(uintptr_t)bend);
     const char *kind = imp_field_kind(f);
     const int grid = !strcmp(kind, "spline") || !strcmp(kind, "trilinear") ||
                      !strcmp(kind, "tied grid");
@@ -65,7 +68,7 @@ static int write_field(imp_bend *bend)
     return st == IMP_OK ? 0 : cli_fail(st, cli.out);
 }
 
-static void put_numbers(imp_bend *bend, FILE *to, struct json *j)
+void bend_put_numbers(imp_bend *bend, FILE *to, struct json *j)
 {
     const imp_field *f = imp_bend_field(bend);
     const size_t n = imp_field_n_theta(f);
@@ -120,16 +123,54 @@ static int writable(void)
     static const struct {
         const char *name;
         enum output_kind kind;
-    } files[] = {{"field.vol", OUTPUT_VOL},
-                 {"field.txt", OUTPUT_PROFILE},
-                 {"field.npy", OUTPUT_NPY},
-                 {"loss.csv", OUTPUT_TABLE},
-                 {"loss.svg", OUTPUT_CURVE}};
+    } files[] = {{"field.vol", OUTPUT_VOL},  {"field.txt", OUTPUT_PROFILE},
+                 {"field.npy", OUTPUT_NPY},  {"loss.csv", OUTPUT_TABLE},
+                 {"loss.svg", OUTPUT_CURVE}, {"bend.json", OUTPUT_JSON}};
     int rc = 0;
     for (size_t k = 0; k < sizeof files / sizeof *files && !rc; k++)
         rc = overwrite_check_in(cli.out, files[k].name, files[k].kind);
     if (!rc) rc = bend_view_writable(cli.out, "before-");
     return rc ? rc : bend_view_writable(cli.out, "");
+}
+
+static void put_answer(struct json *j, imp_bend *bend,
+                       const struct imp_bend_fit_result *r, double seconds)
+{
+    json_number(j, "start", r->start);
+    json_number(j, "value", r->value);
+    json_integer(j, "evaluations", r->iterations);
+    json_integer(j, "levels", r->levels);
+    json_number(j, "seconds", seconds);
+    json_text(j, "reason", r->reason);
+    json_bool(j, "complete", !progress_interrupted());
+    bend_put_stats(j, &r->stats);
+    json_object(j, "field");
+    bend_put_numbers(bend, NULL, j);
+    json_end_object(j);
+}
+
+/* The answer and the losses, for reports. */
+static int write_answer(imp_bend *bend, const struct imp_bend_fit_result *r,
+                        double seconds)
+{
+    char *path = join_path(cli.out, "bend.json");
+    struct output to;
+    int rc = output_open(&to, path, OUTPUT_JSON);
+    if (!rc) {
+        struct json j = {to.file, 0};
+        json_object(&j, NULL);
+        json_text(&j, "importon", imp_version());
+        json_text(&j, "command", "bend");
+        put_answer(&j, bend, r, seconds);
+        json_object(&j, "history");
+        json_numbers(&j, "loss", r->n_history, r->history);
+        json_end_object(&j);
+        json_end_object(&j);
+        fputc('\n', to.file);
+        rc = output_close(&to, 0);
+    }
+    free(path);
+    return rc;
 }
 
 int bend_fit(imp_bend *bend)
@@ -162,27 +203,18 @@ int bend_fit(imp_bend *bend)
     progress_resume(); /* what is there is drawn and written, also after Ctrl-C */
     if (cli.json) {
         struct json j = cli_json();
-        json_number(&j, "start", r.start);
-        json_number(&j, "value", r.value);
-        json_integer(&j, "evaluations", r.iterations);
-        json_integer(&j, "levels", r.levels);
-        json_number(&j, "seconds", seconds);
-        json_text(&j, "reason", r.reason);
-        json_bool(&j, "complete", !progress_interrupted());
-        bend_put_stats(&j, &r.stats);
-        json_object(&j, "field");
-        put_numbers(bend, NULL, &j);
-        json_end_object(&j);
+        put_answer(&j, bend, &r, seconds);
         cli_json_end(&j);
     } else {
         printf("objective %.9g -> %.9g in %d evaluations, %d level%s, %.1f s: %s\n",
                r.start, r.value, r.iterations, r.levels, r.levels > 1 ? "s" : "", seconds,
                r.reason);
-        put_numbers(bend, stdout, NULL);
+        bend_put_numbers(bend, stdout, NULL);
         bend_print_stats(stdout, &r.stats);
     }
-    if (cli.out) rc = write_field(bend);
+    if (cli.out) rc = bend_field_write(bend);
     if (cli.out && !rc) rc = write_history(&r);
+    if (cli.out && !rc) rc = write_answer(bend, &r, seconds);
     if (cli.out && !rc) rc = bend_view(bend, cli.out, "", NULL);
     if (!rc) checkpoint_hint(o.checkpoint);
     return rc ? rc : cli_done();

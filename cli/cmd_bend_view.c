@@ -2,15 +2,19 @@
  *
  * Pictures of bent rays: slices of the index through the middle, ray paths projected onto
  * them, spot diagrams, and irradiance beside its target. */
+#include "bend_items.h"
 #include "cmd_bend.h"
 #include "cmd_bend_chart.h"
-#include "overwrite.h"
+#include "cmd_picture.h"
+#include "output.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 enum { SIDE = 512, PATHS = 60, TARGETS = 8 };
+
+const char *bend_truth_path;
 
 int bend_view_writable(const char *folder, const char *prefix)
 {
@@ -27,7 +31,9 @@ int bend_view_writable(const char *folder, const char *prefix)
         snprintf(file, sizeof file, "%s%s.png", prefix, name);
         rc = overwrite_check_in(folder, file, OUTPUT_PNG);
     }
-    return rc;
+    char file[64];
+    snprintf(file, sizeof file, "%srays.json", prefix);
+    return rc ? rc : overwrite_check_in(folder, file, OUTPUT_JSON);
 }
 
 /* ---- Colours ------------------------------------------------------------------- */
@@ -104,30 +110,6 @@ static void legend(struct chart *c, const struct palette *p)
 
 /* ---- Slices and paths ---------------------------------------------------------- */
 
-/* The field's box, or that of the rays and their ends. */
-static void box_of(imp_bend *b, double lo[3], double hi[3])
-{
-    struct imp_bend_rays r;
-    imp_field_bounds(imp_bend_field(b), lo, hi);
-    imp_bend_get_rays(b, &r);
-    struct imp_bend_exit *e = cli_alloc(r.n, sizeof *e);
-    const int traced = imp_bend_run(b, e, NULL, NULL) == IMP_OK;
-    for (int k = 0; k < 3; k++) {
-        if (isfinite(lo[k]) && isfinite(hi[k])) continue;
-        lo[k] = INFINITY, hi[k] = -INFINITY;
-        for (size_t i = 0; i < r.n; i++) {
-            lo[k] = fmin(lo[k], r.x[i][k]), hi[k] = fmax(hi[k], r.x[i][k]);
-            if (!traced || e[i].flags & IMP_BEND_DROPPED) continue;
-            lo[k] = fmin(lo[k], e[i].x[k]), hi[k] = fmax(hi[k], e[i].x[k]);
-        }
-    }
-    double most = 1e-12;
-    for (int k = 0; k < 3; k++) most = fmax(most, hi[k] - lo[k]);
-    for (int k = 0; k < 3; k++)
-        if (hi[k] - lo[k] < 0.02 * most) lo[k] -= 0.5 * most, hi[k] += 0.5 * most;
-    free(e);
-}
-
 /* The index on the plane through the middle, across axis `held`. */
 static void slice(const imp_field *f, struct chart *c, int u, int v, const double lo[3],
                   const double hi[3], double range[2])
@@ -181,7 +163,7 @@ static int slices(imp_bend *b, const struct palette *palette, const char *folder
     static const char *const names[3] = {"x", "y", "z"};
     double lo[3], hi[3];
     int rc = 0;
-    box_of(b, lo, hi);
+    bend_box(b, lo, hi);
     if (j) json_array(j, "slices");
     for (int held = 0; held < 3 && !rc; held++) {
         const int u = held == 0 ? 1 : 0, v = held == 2 ? 1 : 2;
@@ -355,11 +337,37 @@ static int targets(imp_bend *b, const struct palette *palette, const char *folde
     return rc;
 }
 
+/* The same for reports, as numbers. */
+static int rays_write(imp_bend *b, const char *folder, const char *prefix)
+{
+    struct bend_truth truth;
+    struct output to;
+    char name[64];
+    snprintf(name, sizeof name, "%srays.json", prefix);
+    char *path = join_path(folder, name);
+    int rc = bend_truth_open(bend_truth_path, &truth);
+    if (!rc) rc = output_open(&to, path, OUTPUT_JSON);
+    if (!rc) {
+        struct json j = {to.file, 0};
+        json_object(&j, NULL);
+        json_text(&j, "importon", imp_version());
+        json_text(&j, "command", "rays");
+        rc = bend_rays_json(&j, b, bend_truth_field(&truth));
+        json_end_object(&j);
+        fputc('\n', to.file);
+        rc = output_close(&to, rc);
+    }
+    bend_truth_close(&truth);
+    free(path);
+    return rc;
+}
+
 int bend_view(imp_bend *b, const char *folder, const char *prefix, struct json *j)
 {
     struct palette palette;
     palette_of(b, &palette);
     int rc = slices(b, &palette, folder, prefix, j);
     if (!rc) rc = targets(b, &palette, folder, prefix, j);
+    if (!rc) rc = rays_write(b, folder, prefix);
     return rc;
 }

@@ -7,6 +7,7 @@
 #include "cmd_problem.h"
 #include "command.h"
 #include "fit_answer.h"
+#include "fit_options.h"
 #include "fit_pictures.h"
 #include "overwrite.h"
 #include "progress.h"
@@ -15,30 +16,12 @@
 
 #include <stdlib.h>
 
-static const char *const optimizer_words[] = {"adam", "lm",    "lbfgs",
-                                              "mma",  "slsqp", NULL};
-
 static struct {
-    int optimizer, iterations, no_intervals, resume, picture_spp, levels;
-    double learning_rate, tolerance;
+    int resume, picture_spp;
     const char *checkpoint, *sheet;
 } o;
 
 static const struct arg_option options[] = {
-    {ARG_CHOICE, 0, "optimizer", "NAME", "adam (default), lm, lbfgs, mma or slsqp",
-     &o.optimizer, 0, 0, optimizer_words},
-    {ARG_INT, 'n', "iterations", "N",
-     "maximum number of iterations (default 200 for adam, else 30)", &o.iterations, 1,
-     1e9, NULL},
-    {ARG_NUMBER, 0, "lr", "RATE", "learning rate of adam (default 0.05)",
-     &o.learning_rate, 1e-12, 1e6, NULL},
-    {ARG_INT, 0, "levels", "N",
-     "of adam: fit textures and volumes from coarse to fine, in N levels", &o.levels, 1,
-     16, NULL},
-    {ARG_NUMBER, 0, "tolerance", "T",
-     "stop when relative steps stay below (default 1e-4)", &o.tolerance, 1e-15, 1, NULL},
-    {ARG_FLAG, 0, "no-intervals", NULL, "do not estimate 95 % intervals at the end",
-     &o.no_intervals, 0, 0, NULL},
     {ARG_TEXT, 0, "checkpoint", "FILE",
      "save the state while the fit runs, and at Ctrl-C", &o.checkpoint, 0, 0, NULL},
     {ARG_FLAG, 0, "resume", NULL, "continue from the checkpoint, if it exists", &o.resume,
@@ -49,27 +32,13 @@ static const struct arg_option options[] = {
      "one PNG of before, target and recovered (with -o)", &o.sheet, 0, 0, NULL},
     {0}};
 
-/* Besides pictures. */
-static const struct {
-    const char *name;
-    enum output_kind kind;
-} outputs[] = {{"loss.csv", OUTPUT_TABLE},
-               {"loss.svg", OUTPUT_CURVE},
-               {"parameters.json", OUTPUT_JSON},
-               {"recovered.txt", OUTPUT_SETTINGS}};
-
 /* May everything be written? A checkpoint is begun over, or gone on from, when that is
  * said. */
 static int writable(const struct block *blocks, size_t n_blocks)
 {
     int rc = checkpoint_writable(o.checkpoint, o.resume);
     if (rc || !cli.out) return rc;
-    rc = make_folder(cli.out);
-    for (size_t k = 0; k < sizeof outputs / sizeof *outputs && !rc; k++)
-        rc = overwrite_check_in(cli.out, outputs[k].name, outputs[k].kind);
-    if (!rc) rc = fit_pictures_writable();
-    for (size_t k = 0; k < n_blocks && !rc; k++)
-        if (block_is_large(&blocks[k])) rc = block_writable(&blocks[k], cli.out);
+    rc = fit_answer_writable(blocks, n_blocks);
     if (!rc && o.sheet) rc = picture_writable(o.sheet, 0);
     return rc;
 }
@@ -92,9 +61,7 @@ static int note_results(const imp_problem *problem, const struct imp_fit_result 
 
 static int run_fit(int n, char **operand)
 {
-    static const enum imp_optimizer optimizers[] = {IMP_ADAM, IMP_LM, IMP_LBFGS, IMP_MMA,
-                                                    IMP_SLSQP};
-    struct imp_fit_options fit = IMP_FIT_OPTIONS_INIT;
+    struct imp_fit_options fit = fit_choice_options();
     const struct imp_fit_result *result = NULL;
     imp_problem *problem = NULL;
     struct block *blocks;
@@ -110,13 +77,7 @@ static int run_fit(int n, char **operand)
     if (!rc) rc = problem_open(&problem);
     if (rc) return rc;
 
-    fit.optimizer = optimizers[o.optimizer];
-    fit.max_iterations = o.iterations;
-    fit.learning_rate = o.learning_rate;
-    fit.tolerance = o.tolerance;
-    fit.intervals = !o.no_intervals;
     fit.checkpoint = o.checkpoint;
-    fit.levels = o.levels;
     fit.resume = o.resume;
     blocks = problem_blocks(problem, &n_blocks);
     rc = writable(blocks, n_blocks);
@@ -133,18 +94,14 @@ static int run_fit(int n, char **operand)
     }
     if (!rc && result && !cli.verifies)
         rc = fit_answer_give(&(struct fit_answer){problem, result, blocks, n_blocks,
-                                                  optimizer_words[o.optimizer],
-                                                  o.no_intervals});
+                                                  fit_optimizer_word(),
+                                                  fit_choice.no_intervals});
     if (!rc && result && cli.out) {
         progress_resume(); /* after Ctrl-C the state reached is still written */
         rc = fit_pictures_write("recovered", o.picture_spp);
         if (!rc && o.sheet) rc = fit_sheet_write(o.sheet);
     }
-    for (size_t k = 0; k < sizeof outputs / sizeof *outputs && !rc && cli.out; k++) {
-        char *path = join_path(cli.out, outputs[k].name);
-        rc = manifest_output(path);
-        free(path);
-    }
+    if (!rc && cli.out) rc = fit_answer_manifest();
     free(blocks);
     problem_close(problem);
     const char *ended;
@@ -156,8 +113,8 @@ const struct command command_fit = {
     {"fit",
      "SCENE --target FILE",
      "recover parameters from target pictures",
-     {options, options_targets, options_params, options_run, options_guide, options_scene,
-      options_folder, options_general},
+     {options_search, options, options_targets, options_params, options_run,
+      options_guide, options_scene, options_folder, options_general},
      1,
      1},
     run_fit,

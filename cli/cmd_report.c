@@ -5,6 +5,7 @@
 #include "cmd_picture.h"
 #include "command.h"
 #include "output.h"
+#include "walk_items.h"
 
 #include <dirent.h>
 #include <errno.h>
@@ -155,10 +156,16 @@ static int add_picture(struct collection *c, const char *path, const char *name,
     c->film = grown(c->film, c->n_films + 1, sizeof *c->film);
     c->film[c->n_films++] = film;
     char *stem = keep(c, strndup(name, strlen(name) - strlen(".exr")));
-    const bool control = controls && is_control(controls, name);
+    /* What the numbers do that a fit did not determine is a derivative, too. */
+    const bool loose = !strncmp(name, "undetermined", strlen("undetermined"));
+    const bool control = loose || (controls && is_control(controls, name));
     struct imp_report_item *item = add(c, control ? "derivative" : "picture");
     item->name = stem;
     item->film = film;
+    if (loose) {
+        item->view = view_of(stem);
+        item->role = "undetermined";
+    }
     if (control) return 0;
     for (size_t k = 0; k < sizeof known / sizeof *known; k++) {
         const size_t n = strlen(known[k].begins);
@@ -249,46 +256,29 @@ static int collect(struct collection *c, const char *folder)
 
 /* ---- Walks ------------------------------------------------------------------------ */
 
-/* {"bounds":[[x,y,z],[x,y,z]],"walks":[..]}: one walk from the middle of each cell of a
- * grid over the picture. */
+/* One walk from the middle of each cell of a grid over the picture. */
 static int add_walks(struct collection *c)
 {
     struct imp_sensor_info sensor = {.size = sizeof sensor};
-    struct imp_scene_info scene = {.size = sizeof scene};
     const int side = walks ? walks : 16;
-    char *text = NULL;
-    size_t length = 0;
     int rc = cli_load(scene_file);
     if (rc) return rc;
     const struct imp_run run = cli_run();
-    enum imp_status st = imp_scene_get_info(cli.scene, &scene);
-    if (st == IMP_OK) st = imp_scene_get_sensor(cli.scene, run.sensor, &sensor);
-    FILE *f = st == IMP_OK ? open_memstream(&text, &length) : NULL;
-    if (f) {
-        struct json j = {f, 0};
-        json_object(&j, NULL);
-        json_array(&j, "bounds");
-        json_numbers(&j, NULL, 3, scene.bounds_min);
-        json_numbers(&j, NULL, 3, scene.bounds_max);
-        json_end_array(&j);
-        fputs(",\"walks\":[", f);
-        for (int i = 0; i < side * side && st == IMP_OK; i++) {
-            char *walk = NULL;
-            st = imp_walk_describe(
-                cli.scene, &run, (int)((i % side + 0.5) * sensor.width / side),
-                (int)((i / side + 0.5) * sensor.height / side), 0, 1, &walk);
-            if (st == IMP_OK) fprintf(f, "%s%s", i ? "," : "", walk);
-            imp_free(cli.context, walk);
-        }
-        fputs("]}", f);
-        if (fclose(f) != 0 && st == IMP_OK) rc = cli_error(EXIT_RUN, "out of memory");
+    const enum imp_status st = imp_scene_get_sensor(cli.scene, run.sensor, &sensor);
+    if (st != IMP_OK) return cli_fail(st, scene_file);
+    int(*pixel)[2] = cli_alloc((size_t)side * (size_t)side, sizeof *pixel);
+    for (int i = 0; i < side * side; i++) {
+        pixel[i][0] = (int)((i % side + 0.5) * sensor.width / side);
+        pixel[i][1] = (int)((i / side + 0.5) * sensor.height / side);
     }
-    if (st != IMP_OK) rc = cli_fail(st, scene_file);
-    if (!text) return rc ? rc : cli_error(EXIT_RUN, "out of memory");
+    char *text =
+        walks_json(&run, (size_t)side * (size_t)side, (const int(*)[2])pixel, 1, &rc);
+    free(pixel);
+    if (!text) return rc;
     struct imp_report_item *item = add(c, "walks");
     item->json = keep(c, text);
     item->name = scene_file;
-    return rc;
+    return 0;
 }
 
 static int run_report(int n, char **operand)

@@ -5,9 +5,11 @@
 
 #include "cmd_picture.h"
 #include "command.h"
+#include "fit_pictures.h"
 #include "output.h"
 #include "plot.h"
 #include "progress.h"
+#include "proof.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -69,15 +71,72 @@ static void put_texture(struct json *j, const struct block *b, const char *path)
     json_end_object(j);
 }
 
-/* What a report draws and a table does not print: the loss by iteration, and the
- * covariance of few numbers. */
-static void put_curves(struct json *j, const struct imp_fit_result *r)
+static void put_names(struct json *j, const struct block *blocks, size_t n_blocks)
+{
+    char name[512];
+    json_array(j, "names");
+    for (size_t k = 0; k < n_blocks; k++)
+        for (size_t i = 0; i < blocks[k].n; i++)
+            json_text(j, NULL, cli_number_name(&blocks[k].info, i, name, sizeof name));
+    json_end_array(j);
+}
+
+/* Numbers that a fit searches by their logarithm are told as they are. */
+static void put_row(struct json *j, const struct block *blocks, size_t n_blocks,
+                    const double *x)
+{
+    json_array(j, NULL);
+    for (size_t k = 0; k < n_blocks; k++)
+        for (size_t i = 0; i < blocks[k].n; i++) {
+            const double v = x[blocks[k].first + i];
+            json_number(j, NULL, blocks[k].tie.log ? exp(v) : v);
+        }
+    json_end_array(j);
+}
+
+void fit_history_json(struct json *j, const struct fit_history *h,
+                      const struct block *blocks, size_t n_blocks)
+{
+    json_object(j, "history");
+    json_numbers(j, "loss", h->n, h->loss);
+    if (h->se) json_numbers(j, "se", h->n, h->se);
+    if (h->x) {
+        put_names(j, blocks, n_blocks);
+        json_array(j, "x");
+        for (size_t i = 0; i < h->n; i++)
+            put_row(j, blocks, n_blocks, h->x + i * h->n_numbers);
+        json_end_array(j);
+    }
+    json_end_object(j);
+}
+
+/* The change that is determined least; of a logarithm, relative. */
+static void put_loosest(struct json *j, const struct fit_answer *a)
+{
+    json_object(j, "undetermined");
+    put_names(j, a->blocks, a->n_blocks);
+    json_array(j, "direction");
+    for (size_t k = 0; k < a->n_blocks; k++)
+        for (size_t i = 0; i < a->blocks[k].n; i++) {
+            const size_t at = a->blocks[k].first + i;
+            const double by =
+                a->blocks[k].tie.log ? fit_variable(a->problem, at).value : 1;
+            json_number(j, NULL, by * a->result->loosest[at]);
+        }
+    json_end_array(j);
+    json_end_object(j);
+}
+
+/* What a report draws and a table does not print: the loss and the numbers by iteration,
+ * the combination that is determined least, and the covariance of few numbers. */
+static void put_curves(struct json *j, const struct fit_answer *a)
 {
     enum { COVARIANCE_MAX = 64 };
-    json_object(j, "history");
-    json_numbers(j, "loss", r->n_history, r->history);
-    if (r->history_se) json_numbers(j, "se", r->n_history, r->history_se);
-    json_end_object(j);
+    const struct imp_fit_result *r = a->result;
+    const struct fit_history h = {r->n_history, r->n, r->history, r->history_se,
+                                  r->history_x};
+    fit_history_json(j, &h, a->blocks, a->n_blocks);
+    if (r->loosest) put_loosest(j, a);
     if (!r->covariance || r->n > COVARIANCE_MAX) return;
     json_array(j, "covariance");
     for (size_t i = 0; i < r->n; i++)
@@ -85,7 +144,7 @@ static void put_curves(struct json *j, const struct imp_fit_result *r)
     json_end_array(j);
 }
 
-static void put_json(struct json *j, const struct fit_answer *a, char **paths)
+void fit_answer_json(struct json *j, const struct fit_answer *a, char **paths)
 {
     const struct imp_fit_result *r = a->result;
     json_text(j, "optimizer", a->optimizer);
@@ -111,7 +170,7 @@ static void put_json(struct json *j, const struct fit_answer *a, char **paths)
         const struct block *b = &a->blocks[k];
         char name[512];
         if (block_is_large(b)) {
-            put_texture(j, b, paths[k]);
+            put_texture(j, b, paths ? paths[k] : NULL);
             continue;
         }
         for (size_t i = 0; i < b->n; i++)
@@ -119,7 +178,7 @@ static void put_json(struct json *j, const struct fit_answer *a, char **paths)
                          cli_number_name(&b->info, i, name, sizeof name));
     }
     json_end_array(j);
-    put_curves(j, r);
+    put_curves(j, a);
 }
 
 static int write_json(const struct fit_answer *a, char **paths)
@@ -132,7 +191,7 @@ static int write_json(const struct fit_answer *a, char **paths)
         json_object(&j, NULL);
         json_text(&j, "importon", imp_version());
         json_text(&j, "command", "fit");
-        put_json(&j, a, paths);
+        fit_answer_json(&j, a, paths);
         cli_json_end(&j);
         rc = output_close(&to, 0);
     }
@@ -250,26 +309,73 @@ static int write_set(const struct fit_answer *a)
     return rc;
 }
 
+/* Besides pictures. */
+static const struct {
+    const char *name;
+    enum output_kind kind;
+} outputs[] = {{"loss.csv", OUTPUT_TABLE},
+               {"loss.svg", OUTPUT_CURVE},
+               {"parameters.json", OUTPUT_JSON},
+               {"recovered.txt", OUTPUT_SETTINGS}};
+
+int fit_answer_writable(const struct block *blocks, size_t n_blocks)
+{
+    int rc = make_folder(cli.out);
+    for (size_t k = 0; k < sizeof outputs / sizeof *outputs && !rc; k++)
+        rc = overwrite_check_in(cli.out, outputs[k].name, outputs[k].kind);
+    if (!rc) rc = fit_pictures_writable();
+    for (size_t k = 0; k < n_blocks && !rc; k++)
+        if (block_is_large(&blocks[k])) rc = block_writable(&blocks[k], cli.out);
+    return rc;
+}
+
+int fit_answer_manifest(void)
+{
+    int rc = 0;
+    for (size_t k = 0; k < sizeof outputs / sizeof *outputs && !rc; k++) {
+        char *path = join_path(cli.out, outputs[k].name);
+        rc = manifest_output(path);
+        free(path);
+    }
+    return rc;
+}
+
+static int write_all(const struct fit_answer *a, char **paths)
+{
+    int rc = write_textures(a, paths);
+    if (!rc) rc = write_history(a->result);
+    if (!rc) rc = write_json(a, paths);
+    if (!rc) rc = write_set(a);
+    if (!rc && a->result->loosest) rc = fit_loosest_write(a->problem, a->result->loosest);
+    return rc;
+}
+
+static void paths_free(const struct fit_answer *a, char **paths)
+{
+    for (size_t k = 0; k < a->n_blocks; k++) free(paths[k]);
+    free(paths);
+}
+
+int fit_answer_write(const struct fit_answer *a)
+{
+    char **paths = cli_alloc(a->n_blocks, sizeof *paths);
+    const int rc = write_all(a, paths);
+    paths_free(a, paths);
+    return rc;
+}
+
 int fit_answer_give(const struct fit_answer *a)
 {
-    const struct imp_fit_result *r = a->result;
     char **paths = cli_alloc(a->n_blocks, sizeof *paths);
-    int rc = 0;
-    if (cli.out) {
-        rc = write_textures(a, paths);
-        if (!rc) rc = write_history(r);
-        if (!rc) rc = write_json(a, paths);
-        if (!rc) rc = write_set(a);
-    }
+    const int rc = cli.out ? write_all(a, paths) : 0;
     if (cli.json) {
         struct json j = cli_json();
-        put_json(&j, a, paths);
+        fit_answer_json(&j, a, paths);
         cli_json_end(&j);
     } else {
         print_table(a, paths);
     }
-    if (r->warning) cli_say("importon: warning: %s", r->warning);
-    for (size_t k = 0; k < a->n_blocks; k++) free(paths[k]);
-    free(paths);
+    if (a->result->warning) cli_say("importon: warning: %s", a->result->warning);
+    paths_free(a, paths);
     return rc;
 }

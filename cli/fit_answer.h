@@ -14,8 +14,26 @@ struct fit_answer {
     const char *optimizer;
     int no_intervals; /* they were not asked for */
 };
-/* 0, or an exit code with the reason printed. */
+/* Print it, and write it into -o DIR. 0, or an exit code with the reason printed, as the
+ * next two. */
 int fit_answer_give(const struct fit_answer *a);
+/* Write it: all but what sensors see. */
+int fit_answer_write(const struct fit_answer *a);
+/* May that, and the pictures of a fit, be written? */
+int fit_answer_writable(const struct block *blocks, size_t n_blocks);
+/* Name these files in the manifest. */
+int fit_answer_manifest(void);
+/* The members of its JSON. paths [n_blocks]: files of large blocks; NULL: none. */
+void fit_answer_json(struct json *j, const struct fit_answer *a, char **paths);
+
+/* Losses [n], their errors and where they were [n][n_numbers]; these may be NULL. */
+struct fit_history {
+    size_t n, n_numbers;
+    const double *loss, *se, *x;
+};
+/* "history":{..} */
+void fit_history_json(struct json *j, const struct fit_history *h,
+                      const struct block *blocks, size_t n_blocks);
 
 /* Number i of the fit. */
 struct imp_fit_variable fit_variable(const imp_problem *problem, size_t i);

@@ -49,8 +49,28 @@ int fit_pictures_write(const char *name, int spp)
     return rc;
 }
 
-/* The target as the fit compares it, with its standard errors where it has them. */
-static enum imp_status target_film(const struct imp_target *t, imp_film **out)
+int fit_loosest_write(imp_problem *problem, const double *x_dot)
+{
+    const struct picture_options po = {.standard_error = 1, .diverging = 1};
+    int rc = 0;
+    for (size_t i = 0; i < problem_options.targets.n && !rc; i++) {
+        struct imp_run run = cli_run();
+        imp_film *film = NULL;
+        run.sensor = target_sensor(i);
+        run.time_limit_s = 0;
+        const enum imp_status st = imp_problem_forward(problem, x_dot, &run, &film);
+        if (cli_failed(st)) return cli_fail(st, cli.scene_path);
+        if (!film) return cli_done();
+        char *path = picture_path("undetermined", i);
+        picture_stamp(film, &run);
+        rc = picture_write(film, path, &po);
+        free(path);
+        imp_film_destroy(film);
+    }
+    return rc;
+}
+
+static enum imp_status film_of(const struct imp_target *t, imp_film **out)
 {
     const size_t n = (size_t)t->width * (size_t)t->height, c = (size_t)t->channels,
                  all = t->noise_se ? 2 * c : c;
@@ -66,6 +86,16 @@ static enum imp_status target_film(const struct imp_target *t, imp_film **out)
         if (t->noise_se) memcpy(to + i * all + c, t->noise_se + i * c, c * sizeof *to);
     }
     return IMP_OK;
+}
+
+int fit_target_film(size_t i, imp_film **out)
+{
+    struct imp_target t = IMP_TARGET_INIT;
+    int rc = picture_target(problem_options.targets.item[i], NULL, &t);
+    if (rc) return rc;
+    const enum imp_status st = film_of(&t, out);
+    picture_target_free(&t);
+    return st == IMP_OK ? 0 : cli_fail(st, NULL);
 }
 
 /* A target that is where its copy would go stays as it is. */
@@ -87,28 +117,17 @@ int fit_targets_write(void)
     const struct picture_options po = {0};
     int rc = 0;
     for (size_t i = 0; i < problem_options.targets.n && !rc; i++) {
-        struct imp_target t = IMP_TARGET_INIT;
         const struct imp_run run = cli_run();
         imp_film *film = NULL;
         char *path = picture_path("target", i);
-        if (is_there(i, path)) {
-            free(path);
-            continue;
+        if (!is_there(i, path)) {
+            rc = fit_target_film(i, &film);
+            if (!rc) {
+                picture_stamp(film, &run);
+                rc = picture_write(film, path, &po);
+            }
+            imp_film_destroy(film);
         }
-        rc = picture_target(problem_options.targets.item[i], NULL, &t);
-        if (rc) {
-            free(path);
-            return rc;
-        }
-        const enum imp_status st = target_film(&t, &film);
-        if (st != IMP_OK) {
-            rc = cli_fail(st, NULL);
-        } else {
-            picture_stamp(film, &run);
-            rc = picture_write(film, path, &po);
-        }
-        imp_film_destroy(film);
-        picture_target_free(&t);
         free(path);
     }
     return rc;
@@ -131,12 +150,13 @@ int fit_sheet_write(const char *to)
 
 int fit_pictures_writable(void)
 {
-    static const char *const pictures[] = {"before", "recovered", "target"};
+    static const char *const pictures[] = {"before", "recovered", "undetermined",
+                                           "target"};
     int rc = 0;
     for (size_t i = 0; i < problem_options.targets.n; i++)
-        for (size_t k = 0; k < 3 && !rc; k++) {
+        for (size_t k = 0; k < 4 && !rc; k++) {
             char *path = picture_path(pictures[k], i);
-            if (k < 2 || !is_there(i, path)) rc = picture_writable(path, 1);
+            if (k < 3 || !is_there(i, path)) rc = picture_writable(path, 1);
             free(path);
         }
     return rc;

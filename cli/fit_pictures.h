@@ -5,12 +5,20 @@
 #ifndef IMP_CLI_FIT_PICTURES_H
 #define IMP_CLI_FIT_PICTURES_H
 
+#include <importon/importon.h>
+
 /* May they all be written? */
 int fit_pictures_writable(void);
 /* The scene as it is now, through the sensor of every target. spp 0: the run's. */
 int fit_pictures_write(const char *name, int spp);
+/* Target i as the fit compares it, with its standard errors where it has them; the
+ * caller destroys it. */
+int fit_target_film(size_t i, imp_film **out);
 /* A copy of each target, so that the folder tells the whole story. */
 int fit_targets_write(void);
+/* undetermined.exr: the change of each sensor's picture when the problem's numbers change
+ * by x_dot. */
+int fit_loosest_write(imp_problem *problem, const double *x_dot);
 /* One PNG with a row for each target. */
 int fit_sheet_write(const char *to);
 

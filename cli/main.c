@@ -23,7 +23,8 @@ static const struct command *const commands[] = {
     &command_render,   &command_gradient, &command_jacobian, &command_check,
     &command_selftest, &command_fit,      &command_compare,  &command_info,
     &command_bend,     &command_bench,    &command_elements, &command_envmap,
-    &command_merge,    &command_report,   &command_read,     &command_verify};
+    &command_merge,    &command_report,   &command_read,     &command_verify,
+    &command_view};
 #define N_COMMANDS (sizeof commands / sizeof *commands)
 
 static void print_usage(FILE *to)

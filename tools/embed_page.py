@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
 """The page of a report as C strings: style and scripts go into the template, which is cut
-where its data goes.
+where its addresses and its data go.
 
 Usage: embed_page.py OUT.c page.html page.css SCRIPT.js...
 """
@@ -10,7 +10,8 @@ import sys
 out, page, style, *scripts = sys.argv[1:]
 read = lambda path: open(path, encoding="utf-8").read()
 text = read(page).replace("@STYLE@", read(style)).replace("@SCRIPT@", "\n".join(map(read, scripts)))
-head, tail = text.split("@DATA@")
+head, rest = text.split("@CONNECT@")
+body, tail = rest.split("@DATA@")
 
 
 def array(name, text):
@@ -20,4 +21,5 @@ def array(name, text):
 
 
 with open(out, "w", encoding="ascii") as file:
-    file.write('#include "report/page_text.h"\n' + array("imp__page_head", head) + array("imp__page_tail", tail))
+    file.write('#include "report/page_text.h"\n' + "".join(
+        array("imp__page_" + name, text) for name, text in (("head", head), ("body", body), ("tail", tail))))

@@ -42,10 +42,12 @@ struct imp_report {
     const char *command; /**< that made the result, to be copied; NULL: not known */
     const struct imp_report_item *items; /**< [n_items]; all are copied into the page */
     size_t n_items;
+    int live; /**< not 0: the page is served, and hears from its server while work goes on
+                   (docs/report.md, section 5). 0: it may use no network */
 };
 #define IMP_REPORT_INIT                                                                  \
     {                                                                                    \
-        sizeof(struct imp_report), 0, 0, 0, 0                                            \
+        sizeof(struct imp_report), 0, 0, 0, 0, 0                                         \
     }
 
 /** Write the page; it appears whole or not at all. Pictures are stored as 16-bit floats,
@@ -56,6 +58,17 @@ struct imp_report {
  *         IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_report_write(imp_context *context, const struct imp_report *report, const char *path);
+
+/** The same page in memory, for servers; and its data alone, the JSON that stands in the
+ * page. The caller frees *text, which ends with a zero, with imp_free.
+ * @param[out] length without that zero; may be NULL.
+ * @return as imp_report_write. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_report_page(imp_context *context,
+                                                       const struct imp_report *report,
+                                                       char **text, size_t *length);
+IMP_API IMP_MUST_CHECK enum imp_status imp_report_data(imp_context *context,
+                                                       const struct imp_report *report,
+                                                       char **text, size_t *length);
 
 #ifdef __cplusplus
 }

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The page in order: the verdict, pictures, parameters, correlations, derivatives, loss,
- * checks, provenance. docs/report.md describes the data. */
+ * checks, walks, rays, drawings, other answers, provenance. docs/report.md
+ * describes the data. */
 "use strict";
 
 function verdict(fit) {
@@ -20,10 +21,9 @@ function verdict(fit) {
     return lines;
 }
 
-function page(report) {
-    const items = Array.isArray(report.items) ? report.items : [], of = (kind) => items.filter((i) => i.kind === kind);
-    const fit = of("fit").map((i) => i.data)[0];
-    const layers = [], failed = [];
+/* Layers of all pictures, with residuals; messages of those that cannot be shown. */
+function all_layers(items) {
+    const layers = [], failed = [], of = (kind) => items.filter((i) => i.kind === kind);
     for (const item of [...of("picture"), ...of("derivative")])
         try {
             layers.push(...layers_of(item));
@@ -35,26 +35,67 @@ function page(report) {
         const residual = target && picture && residual_of(picture, target);
         if (residual) layers.splice(layers.indexOf(picture) + 1, 0, residual);
     }
-    const main = document.getElementById("page");
-    main.replaceChildren(make("header", {}, make("h1", {}, report.title || "importon report"), ...(fit ? verdict(fit) : [])));
+    return {layers, failed};
+}
+
+/* Sections in their order: the kinds of items that each is made of, and the elements that
+ * it makes. A section whose items change is made again, and the others stay. */
+const known_kinds = ["picture", "derivative", "fit", "check", "walks", "rays", "bend", "image"];
+const sections = [
+    {kinds: ["fit"], make: (report, of) => [make("header", {}, make("h1", {}, report.title || "importon report"), ...(of("fit").length ? verdict(of("fit")[0].data) : []))]},
+    {kinds: ["picture", "derivative"], make: (report, of, page) => {
+        const {layers, failed} = all_layers([...of("picture"), ...of("derivative")]);
+        const notes = failed.map((text) => make("p", {class: "error"}, `This picture cannot be shown: ${text}`));
+        if (page.pictures && layers.length) page.pictures.update(layers);
+        else page.pictures = layers.length ? picture_section(layers, page.live) : null;
+        page.layers = layers;
+        page.derivatives = layers.filter((l) => l.signed && l.role === "");
+        return [...notes, page.pictures];
+    }},
+    {kinds: ["fit"], make: (report, of, page) => {
+        const fit = of("fit").length && of("fit")[0].data;
+        if (!fit || !Array.isArray(fit.params)) return [];
+        const loose = fit.undetermined ? page.layers.filter((l) => l.role === "undetermined") : [], parameters = parameter_section(fit);
+        if (loose.length) parameters.append(loosest_figures(loose, fit.undetermined, page.pictures.choose));
+        return [parameters, correlation_section(fit)];
+    }},
+    {kinds: ["picture", "derivative", "fit"], make: (report, of, page) => [page.derivatives && page.derivatives.length ? derivative_section(page.derivatives, page.pictures.choose) : null]},
+    {kinds: ["fit", "bend"], make: (report, of) => [...of("fit"), ...of("bend")].map((i) => (i.data ? loss_section(i.data) : null))},
+    {kinds: ["check"], make: (report, of) => of("check").map((i) => check_section(i.data))},
+    {kinds: ["walks"], make: (report, of) => of("walks").map((i) => walks_section(i.data, i.name, report))},
+    {kinds: ["rays"], make: (report, of) => of("rays").sort((a, b) => /^before/.test(a.name) - /^before/.test(b.name)).map((i) => rays_section(i.data, i.name))},
+    {kinds: ["image"], make: (report, of) => [of("image").length ? image_section(of("image")) : null]},
+    {kinds: null, make: (report) => report.items.filter((i) => i.data && (!known_kinds.includes(i.kind) || i.kind === "bend")).map(answer_section)},
+    {kinds: null, make: (report) => [provenance_section(report.command, report, report.items)]},
+];
+
+function page_of(report) {
+    const page = {live: null, places: sections.map(() => make("div"))}, main = document.getElementById("page");
+    const empty = make("p", {class: "warning"}, "This report holds nothing: no picture, no fit, no check.");
+    /* changed: kinds of items; null: all. */
+    page.update = (changed) => {
+        const of = (kind) => report.items.filter((i) => i.kind === kind);
+        sections.forEach((section, k) => {
+            if (changed && !(section.kinds ? section.kinds.some((kind) => changed.includes(kind)) : changed.some((kind) => !known_kinds.includes(kind) || kind === "bend"))) return;
+            const made = section.make(report, of, page).filter(Boolean), place = page.places[k];
+            if (made.length !== place.children.length || made.some((e, i) => e !== place.children[i])) place.replaceChildren(...made);
+        });
+        empty.hidden = report.items.length > 0 || Boolean(report.live);
+    };
+    if (!Array.isArray(report.items)) report.items = [];
     document.title = report.title || "importon report";
-    for (const text of failed) main.append(make("p", {class: "error"}, `This picture cannot be shown: ${text}`));
-    const derivatives = layers.filter((l) => l.signed && l.role === "");
-    const pictures = layers.length ? picture_section(layers) : null;
-    const sections = [pictures, fit && Array.isArray(fit.params) ? parameter_section(fit) : null, fit && Array.isArray(fit.params) ? correlation_section(fit) : null,
-        derivatives.length ? derivative_section(derivatives, pictures.choose) : null, fit ? loss_section(fit) : null,
-        ...of("check").map((i) => check_section(i.data)), ...of("walks").map((i) => walks_section(i.data)),
-        of("image").length ? image_section(of("image")) : null,
-        ...items.filter((i) => i.data && !["fit", "check", "walks"].includes(i.kind)).map(answer_section), provenance_section(report.command, report, items)];
-    for (const section of sections) if (section) main.append(section);
-    if (!items.length) main.append(make("p", {class: "warning"}, "This report holds nothing: no picture, no fit, no check."));
-    document.documentElement.dataset.ready = "1";
+    main.replaceChildren(page.places[0]);
+    if (report.live) main.append(live_section(report, page));
+    main.append(...page.places.slice(1), empty);
+    page.update(null);
+    return page;
 }
 
 try {
     const report = JSON.parse(document.getElementById("data").textContent);
     if (report.schema !== "importon-report" || report.version !== 1) throw new Error(`the data is of schema ${report.schema}, version ${report.version}; this page shows importon-report, version 1`);
-    page(report);
+    page_of(report);
+    document.documentElement.dataset.ready = "1";
 } catch (error) {
     document.getElementById("page").replaceChildren(make("p", {class: "error"}, `This page cannot show its data: ${error.message}`));
     document.documentElement.dataset.ready = "failed";

@@ -97,14 +97,22 @@ function layers_of(item) {
     });
     const plane = (all, c) => all.subarray(c * n, (c + 1) * n);
     const last = (c) => item.channels[c].slice(item.channels[c].lastIndexOf(".") + 1);
+    /* Channels "se.R" of a picture without errors of its own are those of "R". */
+    const error_of = new Map();
+    if (!se)
+        item.channels.forEach((channel, c) => {
+            const of = channel.startsWith("se.") ? item.channels.indexOf(channel.slice(3)) : -1;
+            if (of >= 0) error_of.set(of, c);
+        });
     for (const [key, members] of groups) {
+        if (key === "se" && members.every((c) => [...error_of.values()].includes(c))) continue;
         const three = ["RGB", "XYZ"].map((names) => [...names].map((name) => members.find((c) => last(c) === name)))
             .find((set) => set.every((c) => c !== undefined)) || [];
         const sets = [...(three.length ? [three] : []), ...members.filter((c) => !three.includes(c)).map((c) => [c])];
         for (const set of sets) {
             const own = set.length === 3 ? key : item.channels.length === 1 ? "" : item.channels[set[0]];
             layers.push(new Layer([item.name, own].filter(Boolean).join(" · "), item.width, item.height,
-                set.map((c) => plane(mean, c)), se ? set.map((c) => plane(se, c)) : null,
+                set.map((c) => plane(mean, c)), se ? set.map((c) => plane(se, c)) : set.every((c) => error_of.has(c)) ? set.map((c) => plane(mean, error_of.get(c))) : null,
                 {signed: item.kind === "derivative", unit: item.unit || "", view: item.view || 0, role: key ? "" : item.role || "",
                  luminance: set.length === 3 || last(set[0]) === "Y"}));
         }

@@ -84,6 +84,7 @@ void main() {
     } else colour = vec4(vec3(srgb(g * gain)), 1);
 }`;
 
+let forget_layer = () => {}; /* of its texture */
 const draw = (() => {
     const canvas = document.createElement("canvas"), gl = canvas.getContext("webgl2", {alpha: true, preserveDrawingBuffer: true});
     if (!gl) return (context, layer, look, at) => draw_by_processor(context, layer, look, at, context.canvas.width, context.canvas.height);
@@ -115,6 +116,10 @@ const draw = (() => {
         gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
         textures.set(layer, texture);
         return texture;
+    };
+    forget_layer = (layer) => {
+        if (textures.has(layer)) gl.deleteTexture(textures.get(layer));
+        textures.delete(layer);
     };
     return (context, layer, look, at) => {
         const {width, height} = context.canvas, limit = gl.getParameter(gl.MAX_TEXTURE_SIZE);

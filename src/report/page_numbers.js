@@ -21,11 +21,14 @@ function interval_bar(p) {
     if (is_number(p.max)) hi = Math.min(hi, p.max);
     if (!(hi > lo)) return svg;
     const at = (v) => 6 + 208 * Math.min(Math.max((v - lo) / (hi - lo), 0), 1);
+    const then = make_svg("circle", {cx: 0, cy: 10, r: 5, class: "then", visibility: "hidden"});
+    svg.at_iteration = (v) => { then.setAttribute("visibility", is_number(v) ? "visible" : "hidden"); if (is_number(v)) then.setAttribute("cx", at(v)); };
     svg.append(make_svg("line", {x1: 6, y1: 10, x2: 214, y2: 10, class: "axis"}));
     if (is_number(p.lo95) && is_number(p.hi95))
         svg.append(make_svg("rect", {x: at(p.lo95), y: 5, width: Math.max(at(p.hi95) - at(p.lo95), 1.5), height: 10, class: "band"}));
     if (is_number(p.start)) svg.append(make_svg("line", {x1: at(p.start), y1: 3, x2: at(p.start), y2: 17, class: "mark"}));
     if (is_number(p.value)) svg.append(make_svg("circle", {cx: at(p.value), cy: 10, r: 3.5, fill: "var(--accent)"}));
+    svg.append(then);
     return svg;
 }
 
@@ -40,15 +43,31 @@ function parameter_section(fit) {
     const numbers = fit.params.filter((p) => p.name !== undefined && p.file === undefined);
     const files = fit.params.filter((p) => p.file !== undefined);
     const body = make("tbody"), told = make("p", {class: "faint"});
+    let rows = [];
+    /* While an iteration is looked at, values are those of then, and a ring is where they were. */
+    document.addEventListener("iteration", (e) => {
+        if (!body.isConnected) return;
+        for (const row of rows) {
+            const then = e.detail ? e.detail.at.get(row.name) : undefined;
+            row.value.textContent = show(is_number(then) ? then : row.p.value);
+            row.value.className = is_number(then) ? "then" : "";
+            if (row.bar.at_iteration) row.bar.at_iteration(then);
+        }
+        heading.textContent = e.detail ? `value at iteration ${e.detail.iteration}` : "value";
+    });
+    const heading = make("th", {scope: "col"}, "value");
     function fill(pattern) {
+        rows = [];
         const match = numbers.filter((p) => String(p.name).toLowerCase().includes(pattern.toLowerCase()));
         body.replaceChildren(...match.slice(0, rows_shown).map((p) => {
             const [text, colour] = state_of(p), relative = is_number(p.se) && p.value ? Math.abs(p.se / p.value) : NaN;
+            const bar = interval_bar(p), value = make("td", {}, show(p.value));
+            rows.push({name: String(p.name), bar, value, p});
             return make("tr", {}, make("td", {class: "mono"}, String(p.name)), make("td", {}, show(p.start)),
-                make("td", {}, show(p.value)), make("td", {}, show(p.se, 2)),
+                value, make("td", {}, show(p.se, 2)),
                 make("td", {}, is_number(relative) ? `${show(100 * relative, 2)} %` : "–"),
                 make("td", {}, is_number(p.lo95) ? `${show(p.lo95)} to ${show(p.hi95)}` : "–"),
-                make("td", {}, interval_bar(p)), make("td", {class: "text"}, p.unit === "1" ? "" : p.unit || ""),
+                make("td", {}, bar), make("td", {class: "unit"}, p.unit === "1" ? "" : p.unit || ""),
                 make("td", {class: `text ${colour}`}, text));
         }));
         told.textContent = match.length > rows_shown ? `${rows_shown} of ${match.length} are shown; the field above finds others.` : "";
@@ -63,7 +82,7 @@ function parameter_section(fit) {
         numbers.length > 12 ? make("div", {class: "bar noprint"}, find) : null,
         numbers.length ? make("div", {class: "scroll"}, make("table", {}, make("thead", {}, make("tr", {},
             ...["name", "start", "value", "se", "relative", "95 % interval", "start (tick), value (dot), interval", "unit", ""].map((t, i) =>
-                make("th", {class: i > 6 ? "text" : null, scope: "col"}, t)))), body)) : make("p", {}, "No single numbers were fitted."),
+                (i === 2 ? heading : make("th", {class: i > 6 ? "text" : null, scope: "col"}, t))))), body)) : make("p", {}, "No single numbers were fitted."),
         told, ...files.map((p) => make("p", {}, `${p.name}: ${p.count} numbers, in ${p.file}`)));
 }
 
@@ -139,20 +158,35 @@ function loss_section(fit) {
         svg.append(make_svg("circle", {cx: x_at(i), cy: y_at(v), r: 3, fill: "var(--accent)"}));
     const cursor = make_svg("line", {y1: top, y2: ht - bottom, class: "mark"});
     svg.append(cursor);
-    const told = make("p", {class: "mono", "aria-live": "polite"}), trace = make("div", {class: "scroll"});
+    const told = make("p", {class: "mono", "aria-live": "polite"});
     const slider = make("input", {type: "range", min: 0, max: n - 1, value: n - 1, "aria-label": "iteration", input: () => go(Number(slider.value))});
     function go(i) {
         cursor.setAttribute("x1", x_at(i));
         cursor.setAttribute("x2", x_at(i));
         told.textContent = `iteration ${i}: loss ${show_error(h.loss[i], se[i])}`;
         const x = h.x && h.x[i], names = h.names || [];
-        if (Array.isArray(x))
-            trace.replaceChildren(make("table", {}, make("tbody", {}, ...x.slice(0, 40).map((v, k) =>
-                make("tr", {}, make("td", {class: "mono"}, String(names[k] ?? k)), make("td", {}, show(v)))))));
+        if (!Array.isArray(x)) return;
+        const at = new Map(x.map((v, k) => [String(names[k]), v]));
+        document.dispatchEvent(new CustomEvent("iteration", {detail: i === n - 1 ? null : {iteration: i, at}}));
     }
     go(n - 1);
     return make("section", {id: "loss"}, make("h2", {}, "Loss"), make("div", {class: "scroll"}, svg),
-        n > 1 ? make("div", {class: "bar noprint"}, make("label", {}, "iteration ", slider)) : null, told, trace);
+        n > 1 ? make("div", {class: "bar noprint"}, make("label", {}, "iteration ", slider), Array.isArray(h.x) ? make("span", {class: "faint"}, "the numbers above move with it") : null) : null, told,
+        Array.isArray(h.x) && n > 1 ? make("div", {class: "traces"}, ...trace_figures(h)) : null);
+}
+
+/* Each number by iteration: those that move most of their own size first, at most 12. */
+function trace_figures(h) {
+    const names = Array.isArray(h.names) ? h.names : [], n = h.x.length, of = (k) => h.x.map((row) => row[k]);
+    const moved = (k) => { const v = of(k).filter(is_number), size = Math.max(...v.map(Math.abs)); return size > 0 ? (Math.max(...v) - Math.min(...v)) / size : 0; };
+    const order = h.x[0].map((_, k) => k).map((k) => [moved(k), k]).sort((a, b) => b[0] - a[0]).slice(0, 12).map(([, k]) => k).sort((a, b) => a - b);
+    return order.map((k) => {
+        const v = of(k), finite = v.filter(is_number), lo = Math.min(...finite), hi = Math.max(...finite), margin = 0.06 * (hi - lo) || Math.abs(hi) * 0.05 || 1;
+        if (!finite.length) return null;
+        const {svg, at} = plot_axes({width: 300, height: 150, x: [0, n - 1], y: [lo - margin, hi + margin], label: `${names[k] ?? k} by iteration`, left: 60});
+        svg.append(make_svg("path", {class: "curve", d: `M${v.map((y, i) => (is_number(y) ? at(i, y).map((c) => c.toFixed(1)).join(" ") : "")).filter(Boolean).join("L")}`}));
+        return make("figure", {}, make("figcaption", {class: "mono"}, String(names[k] ?? k)), svg);
+    });
 }
 
 /* ---- Checks and provenance --------------------------------------------------------------- */

@@ -5,8 +5,8 @@
  * compared in place; "side by side" shows several with one zoom. */
 "use strict";
 
-function picture_section(layers) {
-    const views = [...new Set(layers.map((l) => l.view))];
+function picture_section(layers, live) {
+    let views = [...new Set(layers.map((l) => l.view))];
     const state = {view: views[0], current: 0, beside: false, gain: 0, scale: 0, false_colour: false, zoom: 1, x: 0, y: 0, px: -1, py: -1};
     const of_view = () => layers.filter((l) => l.view === state.view);
     const buttons = make("div", {class: "bar noprint", role: "toolbar", "aria-label": "layers"});
@@ -68,6 +68,10 @@ function picture_section(layers) {
         }
         readout.replaceChildren(make("p", {class: "mono", id: "pixel"}, `pixel ${state.px}, ${state.py}`), make("table", {}, body));
     }
+    /* A page that is served asks for the walks of the pixel. */
+    function ask_walks() {
+        if (live && live.walks && state.px >= 0) live.ask("walks", {x: state.px, y: state.py});
+    }
     function choose(i) {
         if (i < 0 || i >= of_view().length) return;
         state.current = i;
@@ -91,15 +95,23 @@ function picture_section(layers) {
         keep_inside(layer);
         redraw();
     }
-    function canvas_of(layer) {
+    function canvas_of(layer, slot) {
         const scale = Math.max(1, Math.min(4, Math.ceil(900 / layer.width)));
         const canvas = make("canvas", {class: "view", tabindex: 0, width: layer.width * scale, height: layer.height * scale,
             role: "img", "aria-label": `${layer.name}, ${layer.width} x ${layer.height}`});
         let drag = null;
         canvas.addEventListener("pointerdown", (e) => { drag = {x: e.clientX, y: e.clientY, moved: false}; canvas.setPointerCapture(e.pointerId); });
-        canvas.addEventListener("pointerup", () => { drag = null; });
+        canvas.addEventListener("pointerup", (e) => {
+            const still = drag && !drag.moved;
+            drag = null;
+            if (!still) return;
+            pick(layer, canvas, e);
+            ask_walks();
+        });
         canvas.addEventListener("pointermove", (e) => {
             if (!drag) { pick(layer, canvas, e); return; }
+            drag.moved = drag.moved || Math.abs(e.clientX - drag.x) + Math.abs(e.clientY - drag.y) > 2;
+            if (!drag.moved) return;
             const step = window_of(layer, canvas).step * canvas.width / canvas.getBoundingClientRect().width;
             state.x -= (e.clientX - drag.x) * step;
             state.y -= (e.clientY - drag.y) * step;
@@ -128,6 +140,7 @@ function picture_section(layers) {
             } else if (e.key === "+" || e.key === "=") zoom_at(layer, 1.25, Math.max(state.px, 0), Math.max(state.py, 0));
             else if (e.key === "-") zoom_at(layer, 0.8, Math.max(state.px, 0), Math.max(state.py, 0));
             else if (e.key === "0") { state.zoom = 1; keep_inside(layer); redraw(); }
+            else if (e.key === "Enter" && live && live.walks) ask_walks();
             else return;
             e.preventDefault();
         });
@@ -137,7 +150,7 @@ function picture_section(layers) {
     function rebuild() {
         buttons.replaceChildren(...of_view().map((layer, i) => make("button", {type: "button", click: () => choose(i)},
             (i < 9 ? `${i + 1} ` : "") + layer.name)));
-        canvases.replaceChildren(...shown().map(canvas_of));
+        canvases.replaceChildren(...shown().map((layer, slot) => canvas_of(layer, slot)));
         redraw();
     }
     document.addEventListener("keydown", (e) => {
@@ -155,6 +168,18 @@ function picture_section(layers) {
             make("span", {class: "faint"}, "keys 1 to 9 change the layer; on the picture: arrows, + and -, 0; drag moves it")),
         make("div", {class: "stage"}, make("div", {}, canvases, scale_box), readout));
     rebuild();
+    /* New layers take the place of those with the same names; the rest of the view stays. */
+    section.update = (fresh) => {
+        const chosen = of_view()[state.current], same = layers.length === fresh.length && layers.every((l, i) => l.name === fresh[i].name && l.width === fresh[i].width && l.height === fresh[i].height);
+        for (const layer of layers) if (!fresh.includes(layer)) forget_layer(layer);
+        layers.splice(0, layers.length, ...fresh);
+        views = [...new Set(layers.map((l) => l.view))];
+        if (!views.includes(state.view)) state.view = views[0];
+        const at = of_view().findIndex((l) => chosen && l.name === chosen.name);
+        state.current = Math.max(at, 0);
+        if (same) redraw();
+        else rebuild();
+    };
     section.choose = (layer) => { state.view = layer.view; rebuild(); choose(of_view().indexOf(layer)); section.scrollIntoView(); };
     return section;
 }
@@ -174,15 +199,27 @@ function scale_of(layer, look) {
     return svg;
 }
 
+/* The change of the picture that numbers stand for which the pictures do not determine:
+ * what can be added to the answer, and hardly be seen. */
+function loosest_figures(layers, undetermined, choose) {
+    const names = Array.isArray(undetermined.names) ? undetermined.names : [], direction = Array.isArray(undetermined.direction) ? undetermined.direction : [];
+    const largest = Math.max(...direction.map(Math.abs)), terms = direction.map((d, k) => [d, names[k]]).filter(([d]) => Math.abs(d) > 0.05 * largest).slice(0, 8);
+    return make("div", {id: "undetermined"}, make("h3", {}, "What the pictures determine least"),
+        make("p", {}, `This change of the numbers changes the picture as it is drawn: ${terms.map(([d, name]) => `${name} by ${d > 0 ? "+" : "−"}${show(Math.abs(d), 3)}`).join(", ")}.`),
+        make("div", {class: "thumbs"}, ...layers.map((layer) => thumb(layer, choose))));
+}
+
+function thumb(layer, choose) {
+    const canvas = make("canvas", {width: layer.width, height: layer.height, tabindex: 0, role: "button",
+        "aria-label": layer.name, click: () => choose(layer), keydown: (e) => { if (e.key === "Enter") choose(layer); }});
+    const look = {mode: "signed", gain: 1, range: layer.range()};
+    draw(canvas.getContext("2d"), layer, look, {x: 0, y: 0, step: 1});
+    return make("figure", {}, canvas, scale_of(layer, look), make("figcaption", {}, layer.name));
+}
+
 /* Small pictures of what is signed, one a parameter. */
 function derivative_section(layers, choose) {
     return make("section", {id: "derivatives"}, make("h2", {}, "Derivatives of the picture"),
         make("p", {class: "faint"}, "Red: more of the parameter makes the pixel brighter. A click shows it above."),
-        make("div", {class: "thumbs"}, ...layers.map((layer) => {
-            const canvas = make("canvas", {width: layer.width, height: layer.height, tabindex: 0, role: "button",
-                "aria-label": layer.name, click: () => choose(layer), keydown: (e) => { if (e.key === "Enter") choose(layer); }});
-            const look = {mode: "signed", gain: 1, range: layer.range()};
-            draw(canvas.getContext("2d"), layer, look, {x: 0, y: 0, step: 1});
-            return make("figure", {}, canvas, scale_of(layer, look), make("figcaption", {}, layer.name));
-        })));
+        make("div", {class: "thumbs"}, ...layers.map((layer) => thumb(layer, choose))));
 }

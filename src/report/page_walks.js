@@ -19,43 +19,18 @@ function walks_section(data) {
     const walks = (Array.isArray(data.walks) ? data.walks : []).filter((w) => Array.isArray(w.vertices) && w.vertices.length && Array.isArray(w.origin));
     if (!walks.length) return null;
     const shapes = [...new Set(walks.flatMap((w) => w.vertices.map((v) => String(v.shape))))];
-    const state = {chosen: -1, turn: 0, tilt: 0.35, zoom: 1, only: false, by: Object.keys(walk_colours)[0]};
+    const state = {chosen: -1, only: false, by: Object.keys(walk_colours)[0]};
     let [lo, hi] = Array.isArray(data.bounds) && data.bounds.flat().every(is_number) ? data.bounds : [null, null];
     if (!lo || hi.some((v, c) => v - lo[c] > 1e15)) {
         const points = walks.flatMap((w) => w.vertices.map((v) => v.position));
         lo = [0, 1, 2].map((c) => Math.min(...points.map((p) => p[c])));
         hi = [0, 1, 2].map((c) => Math.max(...points.map((p) => p[c])));
     }
-    const centre = lo.map((v, c) => (v + hi[c]) / 2), radius = Math.hypot(...lo.map((v, c) => hi[c] - v)) / 2 || 1;
-    /* Begin as the camera looks, a bit from the side. */
-    const away = walks[0].origin.map((v, c) => v - centre[c]);
-    state.turn = Math.atan2(away[0], away[2]) + 0.5;
-    state.tilt = Math.atan2(away[1], Math.hypot(away[0], away[2])) + 0.25;
+    const away = walks[0].origin.map((v, c) => v - (lo[c] + hi[c]) / 2), radius = Math.hypot(...lo.map((v, c) => hi[c] - v)) / 2 || 1;
+    const table = make("div", {class: "scroll"}), told = make("p", {class: "mono", "aria-live": "polite"});
+    let space = null;
 
-    const canvas = make("canvas", {width: 900, height: 600, tabindex: 0, role: "img", style: "max-width: 100%; touch-action: none",
-        "aria-label": `${walks.length} random walks in the scene`});
-    const context = canvas.getContext("2d"), table = make("div", {class: "scroll"}), told = make("p", {class: "mono", "aria-live": "polite"});
-
-    function project(p) {
-        const x = p[0] - centre[0], y = p[1] - centre[1], z = p[2] - centre[2];
-        const ct = Math.cos(state.turn), st = Math.sin(state.turn), cp = Math.cos(state.tilt), sp = Math.sin(state.tilt);
-        const u = ct * x - st * z, depth = st * x + ct * z;
-        const scale = state.zoom * 0.62 * canvas.height / radius;
-        return [canvas.width / 2 + scale * u, canvas.height / 2 - scale * (cp * y - sp * depth)];
-    }
-    function line(from, to) {
-        const a = project(from), b = project(to);
-        context.beginPath();
-        context.moveTo(...a);
-        context.lineTo(...b);
-        context.stroke();
-    }
-    function box() {
-        const corner = (i) => [i & 1 ? hi[0] : lo[0], i & 2 ? hi[1] : lo[1], i & 4 ? hi[2] : lo[2]];
-        context.strokeStyle = getComputedStyle(document.documentElement).getPropertyValue("--line");
-        for (let i = 0; i < 8; i++) for (const bit of [1, 2, 4]) if (!(i & bit)) line(corner(i), corner(i | bit));
-    }
-    function one(walk, strong) {
+    function one(context, line, walk, strong) {
         const value = walk_colours[state.by], top = one.top;
         /* From far away, the first segment would leave the picture: it begins at the box. */
         let from = walk.origin;
@@ -77,20 +52,17 @@ function walks_section(data) {
         });
         context.globalAlpha = 1;
     }
-    function redraw() {
-        context.clearRect(0, 0, canvas.width, canvas.height);
-        context.lineWidth = 1;
-        box();
+    function paint(context, line, project) {
         for (const walk of walks)
             for (const v of walk.vertices) {
                 const [x, y] = project(v.position);
                 context.fillStyle = shape_colour(shapes.indexOf(String(v.shape)));
-                context.fillRect(x - 1.5, y - 1.5, 3, 3);
+                context.fillRect(x - 2, y - 2, 4, 4);
             }
         const all = walks.flatMap((w) => w.vertices.map((v, k) => walk_colours[state.by](w, k))).filter(is_number).sort((a, b) => a - b);
         one.top = all[Math.floor(0.98 * all.length)] || 1;
-        if (!(state.only && state.chosen >= 0)) walks.forEach((w) => one(w, false));
-        if (state.chosen >= 0) one(walks[state.chosen], true);
+        if (!(state.only && state.chosen >= 0)) walks.forEach((w) => one(context, line, w, false));
+        if (state.chosen >= 0) one(context, line, walks[state.chosen], true);
     }
     function tell() {
         const walk = walks[state.chosen];
@@ -112,15 +84,15 @@ function walks_section(data) {
     function choose(i) {
         state.chosen = (i + walks.length) % walks.length;
         tell();
-        redraw();
+        space.redraw();
     }
     /* The walk with a vertex or a segment nearest to the point. */
     function nearest(x, y) {
-        let best = -1, least = 12 ** 2;
+        let best = -1, least = 16 ** 2;
         walks.forEach((walk, i) => {
-            let from = project(walk.vertices[0].position);
+            let from = space.project(walk.vertices[0].position);
             for (const v of walk.vertices) {
-                const to = project(v.position), d = [to[0] - from[0], to[1] - from[1]], n = d[0] ** 2 + d[1] ** 2;
+                const to = space.project(v.position), d = [to[0] - from[0], to[1] - from[1]], n = d[0] ** 2 + d[1] ** 2;
                 const t = n ? Math.min(Math.max(((x - from[0]) * d[0] + (y - from[1]) * d[1]) / n, 0), 1) : 0;
                 const far = (from[0] + t * d[0] - x) ** 2 + (from[1] + t * d[1] - y) ** 2;
                 if (far < least) [best, least] = [i, far];
@@ -129,40 +101,22 @@ function walks_section(data) {
         });
         return best;
     }
-    let drag = null;
-    canvas.addEventListener("pointerdown", (e) => { drag = {x: e.clientX, y: e.clientY, moved: false}; canvas.setPointerCapture(e.pointerId); });
-    canvas.addEventListener("pointermove", (e) => {
-        if (!drag) return;
-        state.turn -= (e.clientX - drag.x) * 0.01;
-        state.tilt = Math.min(Math.max(state.tilt + (e.clientY - drag.y) * 0.01, -1.57), 1.57);
-        drag = {x: e.clientX, y: e.clientY, moved: true};
-        redraw();
-    });
-    canvas.addEventListener("pointerup", (e) => {
-        const moved = drag && drag.moved, b = canvas.getBoundingClientRect();
-        drag = null;
-        if (moved) return;
-        state.chosen = nearest((e.clientX - b.left) * canvas.width / b.width, (e.clientY - b.top) * canvas.height / b.height);
-        tell();
-        redraw();
-    });
-    canvas.addEventListener("keydown", (e) => {
-        const step = {ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1]}[e.key];
-        if (step) {
-            state.turn += step[0];
-            state.tilt = Math.min(Math.max(state.tilt + step[1], -1.57), 1.57);
-        } else if (e.key === "+" || e.key === "=") state.zoom *= 1.25;
-        else if (e.key === "-") state.zoom /= 1.25;
-        else if (e.key === "n") choose(state.chosen + 1);
-        else if (e.key === "p") choose(state.chosen - 1);
-        else return;
-        e.preventDefault();
-        redraw();
-    });
-    const by = make("select", {change: () => { state.by = by.value; redraw(); }}, ...Object.keys(walk_colours).map((k) => make("option", {}, k)));
-    const only = make("input", {type: "checkbox", change: () => { state.only = only.checked; redraw(); }});
+    space = space_view(lo, hi, away, `${walks.length} random walks in the scene`, {draw: paint,
+        click: (x, y) => {
+            state.chosen = nearest(x, y);
+            tell();
+            space.redraw();
+        },
+        key: (e) => {
+            if (e.key !== "n" && e.key !== "p") return false;
+            choose(state.chosen + (e.key === "n" ? 1 : -1));
+            return true;
+        }});
+    const {canvas} = space;
+    const by = make("select", {change: () => { state.by = by.value; space.redraw(); }}, ...Object.keys(walk_colours).map((k) => make("option", {}, k)));
+    const only = make("input", {type: "checkbox", change: () => { state.only = only.checked; space.redraw(); }});
     tell();
-    redraw();
+    space.redraw();
     return make("section", {id: "walks"}, make("h2", {}, "Random walks"), make("div", {class: "bar noprint"},
         make("label", {}, "coloured by ", by), make("label", {}, only, "the chosen one only"),
         make("span", {class: "faint"}, "drag or arrows turn, + and - zoom, dashed: towards a light")), canvas,

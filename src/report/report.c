@@ -89,19 +89,67 @@ static enum imp_status put_item(struct imp_text *t, const struct imp_report_item
     return IMP_OK;
 }
 
-static void fill(struct imp_file_writer *w, const void *payload)
+/* ---- The page ---------------------------------------------------------------------- */
+
+/* Receives the pieces of a page. */
+typedef void (*put_fn)(void *to, const void *bytes, size_t n);
+
+struct page {
+    const struct imp_bytes *data;
+    bool live;
+};
+
+static void page_put(const struct page *p, put_fn put, void *to)
 {
-    const struct imp_bytes *data = payload;
-    const char *at = (const char *)data->data, *end = at + data->size;
-    imp__file_put(w, imp__page_head, strlen(imp__page_head));
+    const char *at = (const char *)p->data->data, *end = at + p->data->size;
+    const char *connect = p->live ? "'self'" : "'none'";
+    put(to, imp__page_head, strlen(imp__page_head));
+    put(to, connect, strlen(connect));
+    put(to, imp__page_body, strlen(imp__page_body));
     while (at < end) {
         const char *bracket = memchr(at, '<', (size_t)(end - at));
         const size_t n = (size_t)((bracket ? bracket : end) - at);
-        imp__file_put(w, at, n);
+        put(to, at, n);
         at += n;
-        if (bracket) imp__file_put(w, "\\u003c", 6), at++;
+        if (bracket) put(to, "\\u003c", 6), at++;
     }
-    imp__file_put(w, imp__page_tail, strlen(imp__page_tail));
+    put(to, imp__page_tail, strlen(imp__page_tail));
+}
+
+static void put_file(void *to, const void *bytes, size_t n)
+{
+    imp__file_put(to, bytes, n);
+}
+static void put_text(void *to, const void *bytes, size_t n)
+{
+    struct imp_text *t = to;
+    t->failed = t->failed || !imp__bytes_add(t->ctx, &t->bytes, bytes, n);
+}
+static void fill(struct imp_file_writer *w, const void *payload)
+{
+    page_put(payload, put_file, w);
+}
+
+/* The JSON of a report, whose options are the library's own. */
+static enum imp_status data_make(imp_context *context, const char *caller,
+                                 const struct imp_report *r, struct imp_text *t)
+{
+    imp__put(t, "{\"schema\":\"importon-report\",\"version\":1,\"importon\":");
+    put_string(t, imp_version());
+    put_member(t, "title", r->title);
+    put_member(t, "command", r->command);
+    if (r->live) imp__put(t, ",\"live\":true");
+    imp__put(t, ",\"items\":[");
+    for (size_t i = 0; i < r->n_items; i++) {
+        struct imp_report_item item = IMP_REPORT_ITEM_INIT;
+        IMP_CHECKED(imp__element_take(context, caller, "report->items", r->items, i,
+                                      &item, sizeof item));
+        IMP_CHECKED(put_item(t, &item, i));
+    }
+    imp__put(t, "]}");
+    if (t->failed)
+        return imp__error(context, IMP_E_NOMEM, "no memory for the page of a report");
+    return IMP_OK;
 }
 
 enum imp_status imp_report_write(imp_context *context, const struct imp_report *report,
@@ -115,23 +163,61 @@ enum imp_status imp_report_write(imp_context *context, const struct imp_report *
     IMP_OPTIONS(context, own, report, "report");
     if (own.n_items) IMP_REQUIRE(context, own.items, "report->items");
     IMP_FLOAT_MODE;
-    struct imp_text t = {.ctx = context};
-    imp__put(&t, "{\"schema\":\"importon-report\",\"version\":1,\"importon\":");
-    put_string(&t, imp_version());
-    put_member(&t, "title", own.title);
-    put_member(&t, "command", own.command);
-    imp__put(&t, ",\"items\":[");
-    for (size_t i = 0; i < own.n_items; i++) {
-        struct imp_report_item item = IMP_REPORT_ITEM_INIT;
-        IMP_TRY(imp__element_take(context, __func__, "report->items", own.items, i, &item,
-                                  sizeof item));
-        IMP_TRY(put_item(&t, &item, i));
-    }
-    imp__put(&t, "]}");
-    if (t.failed)
-        IMP_TRY(imp__error(context, IMP_E_NOMEM, "no memory for the page of a report"));
-    IMP_TRY(imp__file_write_by(context, path, fill, &t.bytes));
+    struct imp_text data = {.ctx = context};
+    IMP_TRY(data_make(context, __func__, &own, &data));
+    const struct page page = {&data.bytes, own.live};
+    IMP_TRY(imp__file_write_by(context, path, fill, &page));
 out:
-    imp__bytes_free(context, &t.bytes);
+    imp__bytes_free(context, &data.bytes);
+    return st;
+}
+
+/* The text goes to the caller, who frees it. */
+static void give(struct imp_text *t, char **text, size_t *length)
+{
+    *text = (char *)t->bytes.data;
+    if (length) *length = t->bytes.size;
+    t->bytes = (struct imp_bytes){0};
+}
+
+enum imp_status imp_report_page(imp_context *context, const struct imp_report *report,
+                                char **text, size_t *length)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_report own = IMP_REPORT_INIT;
+    IMP_REQUIRE(NULL, context, "context");
+    IMP_REQUIRE(context, report, "report");
+    IMP_REQUIRE(context, text, "text");
+    IMP_OPTIONS(context, own, report, "report");
+    if (own.n_items) IMP_REQUIRE(context, own.items, "report->items");
+    IMP_FLOAT_MODE;
+    struct imp_text data = {.ctx = context}, page = {.ctx = context};
+    IMP_TRY(data_make(context, __func__, &own, &data));
+    page_put(&(struct page){&data.bytes, own.live}, put_text, &page);
+    if (page.failed)
+        IMP_TRY(imp__error(context, IMP_E_NOMEM, "no memory for the page of a report"));
+    give(&page, text, length);
+out:
+    imp__bytes_free(context, &data.bytes);
+    imp__bytes_free(context, &page.bytes);
+    return st;
+}
+
+enum imp_status imp_report_data(imp_context *context, const struct imp_report *report,
+                                char **text, size_t *length)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_report own = IMP_REPORT_INIT;
+    IMP_REQUIRE(NULL, context, "context");
+    IMP_REQUIRE(context, report, "report");
+    IMP_REQUIRE(context, text, "text");
+    IMP_OPTIONS(context, own, report, "report");
+    if (own.n_items) IMP_REQUIRE(context, own.items, "report->items");
+    IMP_FLOAT_MODE;
+    struct imp_text data = {.ctx = context};
+    IMP_TRY(data_make(context, __func__, &own, &data));
+    give(&data, text, length);
+out:
+    imp__bytes_free(context, &data.bytes);
     return st;
 }

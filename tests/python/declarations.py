@@ -135,6 +135,8 @@ WITHOUT = {
        for word in ("create", "destroy", "get_info", "output", "read", "result", "write")},
     "imp_context_set_manifest": "the same",
     "imp_film_merge": "pictures are arrays, whose means are one line",
+    "imp_report_page": "for servers of a live page: importon view",
+    "imp_report_data": "the same",
     "imp_problem_fit_variable": "one number of a fit: Fit has arrays; numbers beyond 1,024 have no errors",
 }
 

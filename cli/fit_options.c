@@ -1,0 +1,41 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "fit_options.h"
+
+static const char *const optimizer_words[] = {"adam", "lm",    "lbfgs",
+                                              "mma",  "slsqp", NULL};
+
+struct fit_choice fit_choice;
+
+const struct arg_option options_search[] = {
+    {ARG_CHOICE, 0, "optimizer", "NAME", "adam (default), lm, lbfgs, mma or slsqp",
+     &fit_choice.optimizer, 0, 0, optimizer_words},
+    {ARG_INT, 'n', "iterations", "N",
+     "maximum number of iterations (default 200 for adam, else 30)",
+     &fit_choice.iterations, 1, 1e9, NULL},
+    {ARG_NUMBER, 0, "lr", "RATE", "learning rate of adam (default 0.05)",
+     &fit_choice.learning_rate, 1e-12, 1e6, NULL},
+    {ARG_INT, 0, "levels", "N",
+     "of adam: fit textures and volumes from coarse to fine, in N levels",
+     &fit_choice.levels, 1, 16, NULL},
+    {ARG_NUMBER, 0, "tolerance", "T",
+     "stop when relative steps stay below (default 1e-4)", &fit_choice.tolerance, 1e-15,
+     1, NULL},
+    {ARG_FLAG, 0, "no-intervals", NULL, "do not estimate 95 % intervals at the end",
+     &fit_choice.no_intervals, 0, 0, NULL},
+    {0}};
+
+struct imp_fit_options fit_choice_options(void)
+{
+    static const enum imp_optimizer optimizers[] = {IMP_ADAM, IMP_LM, IMP_LBFGS, IMP_MMA,
+                                                    IMP_SLSQP};
+    struct imp_fit_options fit = IMP_FIT_OPTIONS_INIT;
+    fit.optimizer = optimizers[fit_choice.optimizer];
+    fit.max_iterations = fit_choice.iterations;
+    fit.learning_rate = fit_choice.learning_rate;
+    fit.tolerance = fit_choice.tolerance;
+    fit.levels = fit_choice.levels;
+    fit.intervals = !fit_choice.no_intervals;
+    return fit;
+}
+
+const char *fit_optimizer_word(void) { return optimizer_words[fit_choice.optimizer]; }

@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * How a fit searches: options that fit and view share. */
+#ifndef IMP_CLI_FIT_OPTIONS_H
+#define IMP_CLI_FIT_OPTIONS_H
+
+#include "command.h"
+
+struct fit_choice {
+    int optimizer, iterations, no_intervals, levels;
+    double learning_rate, tolerance;
+};
+extern struct fit_choice fit_choice;
+extern const struct arg_option options_search[];
+struct imp_fit_options fit_choice_options(void);
+const char *fit_optimizer_word(void);
+
+#endif

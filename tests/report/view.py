@@ -1,0 +1,249 @@
+#!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
+"""importon view without a browser: who may ask, what it tells, and how it ends.
+
+Usage: view.py IMPORTON SCENES
+"""
+import http.client
+import json
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import urllib.parse
+
+importon, scenes = sys.argv[1:]
+count = failed = 0
+PATIENCE = 120
+
+
+def ok(good, what):
+    global count, failed
+    count += 1
+    failed += not good
+    print("%sok %d - %s" % ("" if good else "not ", count, what), flush=True)
+
+
+class View:
+    """A running view; `news` [(event, value)] grows while it runs."""
+
+    def __init__(self, *words, session=False):
+        self.process = subprocess.Popen([importon, "view", *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                        start_new_session=session)
+        self.url = self.process.stdout.readline().strip()
+        at = urllib.parse.urlsplit(self.url)
+        self.host, self.port, self.path = at.hostname, at.port, at.path
+        self.news, self.changed, self.ended = [], threading.Condition(), False
+        threading.Thread(target=self.listen, daemon=True).start()
+
+    def ask(self, path="", method="GET", token=None, **headers):
+        """Status, headers and text of an answer."""
+        c = http.client.HTTPConnection(self.host, self.port, timeout=PATIENCE)
+        c.putrequest(method, (self.path if token is None else "/%s/" % token) + path, skip_host="Host" in headers)
+        for name, value in headers.items(): c.putheader(name.replace("_", "-"), value)
+        c.endheaders()
+        answer = c.getresponse()
+        text = answer.read().decode()
+        c.close()
+        return answer.status, answer.headers, text
+
+    def act(self, what, **more):
+        return self.ask("act?" + urllib.parse.urlencode({"do": what, **more}), "POST")[0]
+
+    def listen(self):
+        event = None
+        try:
+            c = http.client.HTTPConnection(self.host, self.port, timeout=PATIENCE)
+            c.request("GET", self.path + "events")
+            for line in c.getresponse():
+                line = line.decode().rstrip("\n")
+                if line.startswith("event: "): event = line[7:]
+                elif line.startswith("data: "):
+                    with self.changed:
+                        self.news.append((event, json.loads(line[6:])))
+                        self.changed.notify_all()
+        except OSError:
+            pass
+        with self.changed:
+            self.ended = True
+            self.changed.notify_all()
+
+    def wait(self, good, since=0):
+        """The first piece of news, from number `since`, that is good; None: it never came."""
+        with self.changed:
+            end = time.monotonic() + PATIENCE
+            while True:
+                for event, value in self.news[since:]:
+                    if good(event, value): return value
+                if self.ended or time.monotonic() > end: return None
+                self.changed.wait(1)
+
+    def state(self, word, since=0):
+        return self.wait(lambda event, value: event == "state" and value["state"] == word, since)
+
+    def items(self, kind):
+        with self.changed:
+            return [i for event, value in self.news if event == "report" for i in value["items"] if i["kind"] == kind]
+
+    def end(self, number=signal.SIGINT):
+        self.process.send_signal(number)
+        code = self.process.wait(PATIENCE)
+        self.said = self.process.stderr.read()
+        return code
+
+
+folder = tempfile.mkdtemp()
+cornell = os.path.join(scenes, "cornell.xml")
+common = ["-D", "res=16", "--seed", "3"]
+
+
+def run(*words):
+    return subprocess.run([importon, *words], check=True, capture_output=True, text=True).stdout
+
+
+# ---- Who may ask ------------------------------------------------------------------------
+out = os.path.join(folder, "picture.exr")
+view = View(cornell, *common, "--spp", "64", "-p", "red.*", "-p", "light.*", "-o", out)
+try:
+    ok(re.fullmatch(r"http://127\.0\.0\.1:\d+/[0-9a-f]{32}/", view.url) is not None, "the address has a token of 128 bits")
+    port = "%04X" % view.port
+    heard = [line.split()[1] for name in ("tcp", "tcp6") if os.path.exists("/proc/net/" + name)
+             for line in open("/proc/net/" + name).readlines()[1:] if line.split()[3] == "0A" and line.split()[1].endswith(":" + port)]
+    ok(heard == ["0100007F:" + port], "it listens on 127.0.0.1 and nowhere else # %s" % heard)
+    status, headers, page = view.ask()
+    ok(status == 200 and "connect-src 'self'" in page and headers["Cache-Control"] == "no-store" and headers["X-Frame-Options"] == "DENY"
+       and "Access-Control-Allow-Origin" not in headers, "the page, which nobody frames, keeps or reads from elsewhere")
+    token = view.path.strip("/")
+    wrong = token[:-1] + ("0" if token[-1] != "0" else "1")
+    got = [view.ask(token=t)[0] for t in (wrong, "", token[:-1], token + "0", "x" * 32)] + [view.ask("", "GET", wrong + "/events")[0]]
+    ok(got == [404] * 6, "without the token there is nothing # %s" % got)
+    host = "127.0.0.1:%d" % view.port
+    got = [view.ask(Host=h)[0] for h in ("evil.example", "localhost:%d" % view.port, "127.0.0.1", "evil.example:%d" % view.port)]
+    ok(got == [403] * 4 and view.ask(Host=host)[0] == 200, "another Host, which a name of a stranger's has, is refused # %s" % got)
+    got = [view.ask("act?do=stop", "POST", Origin=o)[0] for o in ("http://evil.example", "null", "https://" + host, "http://127.0.0.1")]
+    ok(got == [403] * 4 and view.ask(Origin="http://" + host)[0] == 200, "another Origin is refused # %s" % got)
+    got = [view.ask(Sec_Fetch_Site=s)[0] for s in ("cross-site", "same-site", "same-origin", "none")]
+    ok(got == [403, 403, 200, 200], "what browsers call another site is refused # %s" % got)
+    got = [view.ask("act?do=stop")[0], view.ask("", "POST")[0], view.ask("other")[0], view.act("no-such"), view.act("again"),
+           view.act("set", name="red.reflectance.value[0]", value="2"), view.act("set", name="no", value="1"),
+           view.act("set", name="red.reflectance.value[0]", value="nan"), view.act("walks", x="1"), view.act("walks", x="-1", y="0")]
+    ok(got == [405, 405, 404, 400, 400, 400, 400, 400, 400, 400], "and so is what there is not # %s" % got)
+    with socket.create_connection((view.host, view.port), timeout=PATIENCE) as s:
+        try:
+            s.sendall(b"GET / HTTP/1.1\r\n" + b"X: " + b"y" * 100000 + b"\r\n\r\n" + bytes(range(256)))
+            answer = s.recv(4096)
+        except OSError:
+            answer = b""
+    ok(b" 200 " not in answer and view.ask()[0] == 200, "garbage is answered with an error, and the view goes on")
+
+    # ---- A render ---------------------------------------------------------------------------
+    ok(view.state("done") is not None, "the picture is done")
+    spp = [i["spp"] for i in view.items("picture")]
+    ok(spp[-1] == 64 and all(a <= b for a, b in zip(spp, spp[1:])), "it came with more and more samples # %s" % spp)
+    numbers = view.wait(lambda event, value: event == "numbers")
+    ok([n["name"] for n in numbers] == ["red.reflectance.value[%d]" % k for k in range(3)] + ["light.radiance.value[%d]" % k for k in range(3)]
+       and numbers[0]["min"] == 0 and numbers[3]["max"] is None, "a slider for each number of -p, with its bounds")
+    n = len(view.news)
+    ok(view.act("walks", x=8, y=12) == 200 and (walks := view.wait(lambda e, v: e == "report" and v["items"][0]["kind"] == "walks", n))
+       and all(w["pixel"] == [8, 12] for w in walks["items"][0]["data"]["walks"]) and len(walks["items"][0]["data"]["walks"]) == 16,
+       "random walks of a pixel")
+    ok(view.act("save") == 200 and view.wait(lambda e, v: e == "state" and "saved" in (v["message"] or "")) is not None, "saved")
+    run("render", cornell, *common, "--spp", "64", "--se", "--no-preview", "-q", "-o", folder + "/render.exr")
+    text = run("compare", out, folder + "/render.exr", "--json")
+    ok(json.loads(text)["max_abs"] == 0, "and it is what importon render makes, to the bit")
+    n = len(view.news)
+    bright = view.items("picture")[-1]
+    ok(view.act("set", name="light.radiance.value[0]", value="40") == 200 and view.state("running", n) and view.state("done", n),
+       "a slider is moved, and the picture made again")
+    moved = view.items("picture")[-1]
+    ok(moved["pixels"] != bright["pixels"] and view.wait(lambda e, v: e == "numbers" and v[3]["value"] == 40, n), "with the light that was asked for")
+    code = view.end()
+    ok(code == 130 and view.said.count("\n") == 1, "Ctrl-C ends it # %d" % code)
+    ok(view.wait(lambda e, v: False) is None and view.ended, "and the page's connection")
+finally:
+    if view.process.poll() is None: view.process.kill()
+
+# ---- Stop and resume, and the end of the terminal ------------------------------------------
+view = View(cornell, "-D", "res=64", "--seed", "3", "--spp", "4096", "-o", folder + "/long.exr")
+try:
+    # Rounds of few samples are over, and the long one has begun.
+    view.wait(lambda e, v: e == "report" and v["items"][0]["kind"] == "picture" and v["items"][0]["spp"] >= 64)
+    n = len(view.news)
+    view.act("stop")
+    stopped = view.state("stopped", n)
+    at = view.items("picture")[-1]["spp"]
+    ok(stopped is not None and 0 < at < 4096, "stopped with what it has # %d samples" % at)
+    n = len(view.news)
+    view.act("go")
+    ok(view.state("running", n) is not None, "resumed")
+    view.act("stop")
+    view.state("stopped", n)
+    ok(view.items("picture")[-1]["spp"] >= at, "and what was there still counts # %d samples" % view.items("picture")[-1]["spp"])
+    code = view.end(signal.SIGHUP)
+    ok(code == 129, "it ends with its terminal # %d" % code)
+finally:
+    if view.process.poll() is None: view.process.kill()
+
+# ---- A fit ------------------------------------------------------------------------------------
+run("render", cornell, *common, "--spp", "64", "--se", "--no-preview", "-q", "-o", folder + "/t.exr")
+fit = [cornell, *common, "--spp", "4", "--target", folder + "/t.exr", "--set", "red.reflectance.value=0.4", "-p", "red.*", "-p", "light.*",
+       "--optimizer", "adam", "-n", "300"]
+alone = json.loads(run("fit", *fit, "--json", "-q"))
+view = View(*fit, "-o", folder + "/fit")
+try:
+    ok(view.wait(lambda e, v: e == "report" and v["items"][0]["kind"] == "fit" and v["items"][0]["data"]["iterations"] >= 3) is not None,
+       "a fit tells its iterations as it runs")
+    n = len(view.news)
+    view.act("stop")
+    stopped = view.state("stopped", n)
+    last = view.items("fit")[-1]["data"]
+    ok(stopped is not None and last["iterations"] < 300, "stopped after %d iterations" % last["iterations"])
+    view.act("set", name="red.reflectance.value[0]", value="0.9")
+    n = len(view.news)
+    view.act("go")
+    ok(view.state("done", n) is not None, "resumed to its end")
+    last = view.items("fit")[-1]["data"]
+    ok([p["value"] for p in last["params"]] == [p["value"] for p in alone["params"]] and last["history"] == alone["history"],
+       "with the bits of a fit that was never stopped")
+    x, loss = last["history"]["x"], last["history"]["loss"]
+    ok(len(x) == len(loss) == 300 and x[0] == [p["start"] for p in last["params"]] and len(last["history"]["names"]) == 6,
+       "the numbers of every iteration are there")
+    roles = {(i["name"], i.get("role")) for i in view.items("picture")}
+    ok({("target", "target"), ("start", None), ("recovered", "picture")} <= roles, "pictures: target, start, recovered")
+    view.act("save")
+    view.wait(lambda e, v: e == "state" and "saved" in (v["message"] or ""))
+    ok(json.load(open(folder + "/fit/parameters.json"))["params"] == alone["params"] and os.path.exists(folder + "/fit/recovered.exr"),
+       "saved as importon fit does")
+    n = len(view.news)
+    view.act("set", name="red.reflectance.value[0]", value="0.2")
+    view.wait(lambda e, v: e == "numbers" and v[0]["value"] == 0.2, n)
+    view.act("again")
+    again = view.wait(lambda e, v: e == "report" and v["items"][0]["kind"] == "fit" and v["items"][0]["data"]["iterations"] < 250, n)
+    ok(again is not None and again["items"][0]["data"]["params"][0]["start"] == 0.2, "begun anew where the slider is")
+    ok(view.end(signal.SIGTERM) == 143, "ended while it runs")
+finally:
+    if view.process.poll() is None: view.process.kill()
+
+# ---- Bent rays -----------------------------------------------------------------------------------
+lens = os.path.join(scenes, "bend", "focus.xml")
+view = View(lens, "-n", "12")
+try:
+    ok(view.state("done") is not None, "bend fit: to its end")
+    rays, answers = view.items("rays"), [i["data"] for i in view.items("bend")]
+    ok(len(rays) >= 2 and len(rays[0]["data"]["slices"]) == 3 and rays[-1]["data"]["slices"] != rays[0]["data"]["slices"],
+       "rays and the index follow the fit # %d times" % len(rays))
+    ok(answers[-1]["history"]["loss"][-1] < answers[-1]["history"]["loss"][0], "and so does the objective # %.3g to %.3g"
+       % (answers[-1]["history"]["loss"][0], answers[-1]["history"]["loss"][-1]))
+    ok(view.end() == 130, "ended")
+finally:
+    if view.process.poll() is None: view.process.kill()
+
+shutil.rmtree(folder, ignore_errors=True)
+print("1..%d" % count)
+sys.exit(failed > 0)
