@@ -27,6 +27,7 @@ struct result {
 };
 
 static float target[PIXELS];
+static enum imp_points points = IMP_POINTS_INDEPENDENT;
 
 static void rgb(imp_scene *s, const char *name, double r, double g, double b)
 {
@@ -110,6 +111,7 @@ static enum imp_status job_run(imp_context *ctx, imp_scene *s, enum job job,
     imp_film *film = NULL, *films[3] = {0};
     struct imp_estimate e = {0, 0, 0};
     run.seed = seed;
+    run.points = points;
     memset(r, 0, sizeof *r);
     if (job == PICTURE) {
         st = imp_render(s, &run, &film);

@@ -81,6 +81,7 @@ importon render "$scenes/furnace.xml" --spp 64 -q --no-preview -o f.exr || exit 
 job render render "${cornell[@]}" --spp 20 --se -o x.exr
 job guided render "${cornell[@]}" --spp 6 --guide --guide-share .3 -o x.exr
 job gradient gradient "${cornell[@]}" -T "$work/target.exr" --spp 8 --json
+job points gradient "${cornell[@]}" -T "$work/target.exr" --spp 16 --points sobol --json
 job texture gradient "${textured[@]}" -T "$work/textured.exr" --spp 4 --json
 job jacobian jacobian "${cornell[@]}" -p '*radiance*' --spp 6 -o x --json
 job check check "$scenes/furnace.xml" --paths 20 --spp 4 --json

@@ -75,8 +75,9 @@ static void cuts(const char *filter)
                         IMP_OK &&
                     !memcmp(&merged, &whole, sizeof whole);
         }
-        tap_ok(same == 3, "%s, %s: parts of three cuts merge to the bit # %d %s",
-               names[job], filter, same, error);
+        tap_ok(same == 3, "%s, %s%s: parts of three cuts merge to the bit # %d %s",
+               names[job], filter, points == IMP_POINTS_SOBOL ? ", sobol" : "", same,
+               error);
     }
 }
 
@@ -237,6 +238,9 @@ int main(void)
     target_set();
     cuts("box");
     cuts("gaussian");
+    points = IMP_POINTS_SOBOL;
+    cuts("gaussian");
+    points = IMP_POINTS_INDEPENDENT;
     refusals();
     no_parts();
     larger_parts();

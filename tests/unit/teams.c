@@ -114,8 +114,9 @@ static void teams(const char *filter)
                     printf("# rank %d: %s\n", k, members[k].error);
             }
         }
-        tap_ok(same == want, "%s, %s: 2, 3 and 7 ranks, each has the bits # %d of %d",
-               names[job], filter, same, want);
+        tap_ok(same == want, "%s, %s%s: 2, 3 and 7 ranks, each has the bits # %d of %d",
+               names[job], filter, points == IMP_POINTS_SOBOL ? ", sobol" : "", same,
+               want);
     }
 }
 
@@ -205,6 +206,9 @@ int main(void)
     target_set();
     teams("box");
     teams("gaussian");
+    points = IMP_POINTS_SOBOL;
+    teams("box");
+    points = IMP_POINTS_INDEPENDENT;
     team_troubles();
     idle();
     traffic();

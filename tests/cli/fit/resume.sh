@@ -11,6 +11,13 @@ for optimizer in lm lbfgs; do
     for file in parameters.json loss.csv recovered.txt; do cmp $optimizer.{1,2}/$file; done
     grep -o '"reason":"[^"]*"' $optimizer.2/parameters.json
 done
+# Points are part of a fit.
+"${fit[@]}" -o sobol.0 --resume --points sobol >/dev/null
+echo "exit $?"
+rm $optimizer.state
+"${fit[@]}" -o sobol.1 --points sobol >/dev/null || exit 9
+"${fit[@]}" -o sobol.2 --points sobol --resume >/dev/null || exit 9
+for file in parameters.json loss.csv recovered.txt; do cmp sobol.{1,2}/$file; done
 echo garbage >>lm.state
 importon fit "$scene" --spp 16 -q --target t.exr --set ball.reflectance.value=0.8 -p 'ball.*' --optimizer lm \
     --checkpoint lm.state --resume
