@@ -121,7 +121,7 @@ for f in pathlib.Path(sys.argv[1]).rglob("*.exr"):
         i += 4 + struct.unpack_from("<i", b, i)[0]
     f.write_bytes(b[struct.unpack_from("<q", b, i + 1)[0]:])
 END
-find out -type f -printf '%P\n' | LC_ALL=C sort | while read -r f; do
+find out -type f ! -name '*manifest' -printf '%P\n' | LC_ALL=C sort | while read -r f; do
     printf '%s  %s\n' "$(sha256sum "out/$f" | cut -c1-16)" "$f"
 done
 if [[ $keep ]]; then rm -rf "$keep"; cp -r out "$keep"; fi
