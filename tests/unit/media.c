@@ -159,7 +159,6 @@ static void inside(void)
     imp_scene_destroy(s);
 }
 
-/* Numbers are set beyond the bounds that were made first. */
 /* A floor under a lamp, seen from between it and a black pane of which `part` goes
  * straight on: that is no bounce, and light samples pass it, of points too. */
 static imp_scene *under_pane(const char *pane, const char *lamp)
@@ -271,6 +270,58 @@ static void panes(void)
         }
 }
 
+/* A box of extinction 1, 1 high, on the way to the lamp, under bounds b: ratio tracking has
+ * the mean exp(-1) whatever b, and the variance T^2 (exp(int sigma^2/b) - 1). A bound that
+ * is too low is told. */
+static void bounds_do_not_matter(void)
+{
+    static const struct {
+        double bound, variance;
+    } cases[] = {{1, .232544}, {2, .087795}, {10, .014233}, {.5, 0}};
+    static const float one[1] = {1};
+    char path[64], text[1024];
+    double open[3], open_se[3], mean[3], se[3];
+    imp_scene *s = under_pane("<bsdf type='null'/>",
+                              "<emitter type='point'><point name='position' x='0' y='0' "
+                              "z='3'/></emitter>");
+    mean_of(s, 2, open, open_se);
+    imp_scene_destroy(s);
+    vol_write(path, 1, 1, 1, 1, one);
+    snprintf(text, sizeof text,
+             "<medium type='heterogeneous' id='fog'><volume name='sigma_t' "
+             "type='gridvolume'><string name='filename' value='%s'/>"
+             "<transform name='to_world'><translate x='-0.5' y='-0.5' z='1.5'/>"
+             "</transform></volume></medium><shape type='cube'><bsdf type='null'/>"
+             "<ref id='fog' name='interior'/><transform name='to_world'>"
+             "<scale value='0.5'/><translate z='2'/></transform></shape>"
+             "<emitter type='point'><point name='position' x='0' y='0' z='3'/></emitter>",
+             path);
+    for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+        enum { SPP = 4096 };
+        s = under_pane("<bsdf type='null'/>", text);
+        struct imp_majorants *g = (struct imp_majorants *)s->media[0]->majorants;
+        g->bound[0] = (float)(cases[k].bound * (1 + 1e-6));
+        if (cases[k].variance == 0) {
+            struct imp_run run = IMP_RUN_INIT;
+            imp_film *film = NULL;
+            run.spp = 4;
+            tap_ok(imp_render(s, &run, &film) == IMP_E_PATHS &&
+                       strstr(imp_last_error(ctx), "above its bound"),
+                   "a bound that is too low is told # %s", imp_last_error(ctx));
+            imp_film_destroy(film);
+        } else {
+            mean_of(s, SPP, mean, se);
+            near_se(mean[0] / open[0], se[0] / open[0], exp(-1), .003,
+                    "T by ratio tracking, whatever the bound");
+            tap_near(se[0] * se[0] * 16 * SPP / (open[0] * open[0]), cases[k].variance,
+                     .06, 0, "... and its variance");
+        }
+        imp_scene_destroy(s);
+    }
+    remove(path);
+}
+
+/* Numbers are set beyond the bounds that were made first. */
 static void bounds_follow(void)
 {
     const float value[8] = {1, 0, 0, 0, 0, 0, 0, 0};
@@ -354,6 +405,7 @@ int main(void)
     inside();
     panes();
     empty_shadow();
+    bounds_do_not_matter();
     bounds_follow();
     furnace();
 
@@ -402,6 +454,26 @@ int main(void)
              "type='gridvolume'><string name='filename' value='%s'/></volume></medium>",
              path);
     refused(text, "", "cell (0, 0, 1) is not finite");
+    remove(path);
+    bad[1] = 3;
+    vol_write(path, 1, 1, 2, 1, bad);
+    snprintf(text, sizeof text,
+             "<medium type='heterogeneous' id='fog'><volume name='sigma_t' "
+             "type='gridvolume'><string name='filename' value='%s'/>"
+             "<float name='max_value' value='2'/></volume></medium>",
+             path);
+    refused(text, "", "a value of the grid is 3");
+    snprintf(
+        text, sizeof text,
+        "<medium type='heterogeneous' id='fog'><float name='sigma_t' value='1'/>"
+        "<volume name='albedo' type='gridvolume'><string name='filename' value='%s'/>"
+        "</volume></medium>",
+        path);
+    refused(text, "", "value 1, 3");
+    FILE *f = fopen(path, "r+b");
+    const int32_t huge[3] = {1 << 20, 1 << 20, 1 << 20};
+    if (f && fseek(f, 8, SEEK_SET) == 0 && fwrite(huge, 4, 3, f) == 3 && fclose(f) == 0)
+        refused(text, "", "56 bytes for 1048576 x 1048576 x 1048576 cells");
     remove(path);
     imp_context_destroy(ctx);
     return tap_done();
