@@ -108,7 +108,7 @@ static inline struct imp_node *kind_node(const struct imp_shape_ops *ops)
 {
     struct imp_node *n = node_new("shape", ops->name);
     if (strcmp(ops->name, "mesh") == 0 || strcmp(ops->name, "obj") == 0 ||
-        strcmp(ops->name, "ply") == 0)
+        strcmp(ops->name, "ply") == 0 || strcmp(ops->name, "serialized") == 0)
         n->mesh = &octahedron;
     return n;
 }

@@ -512,6 +512,12 @@ struct imp_triangles { /* world space */
                                 open meshes that of the cones to the centre of its box */
 };
 
+/* A texture of a shape under a name. */
+struct imp_attribute {
+    const char *name;
+    const struct imp_texture *texture;
+};
+
 struct imp_shape {
     const struct imp_shape_ops *ops;
     void *self;
@@ -531,10 +537,7 @@ struct imp_shape {
     const struct imp_sensor *sensor; /* that it is the surface of; NULL: none */
     /* Textures by name that mesh_attribute looks up on this shape. */
     int n_attributes;
-    const struct imp_attribute {
-        const char *name;
-        const struct imp_texture *texture;
-    } * attribute;
+    const struct imp_attribute *attribute;
     /* Its textures ask for more than uv: what `surface` and the draws of points write to uv
      * then stands for the triangle, and `place` gives uv back. */
     bool by_triangle;

@@ -40,8 +40,9 @@ static void areas(void)
 {
     const struct imp_mat4 even = scale_then_turn(3, 3, 3),
                           uneven = scale_then_turn(2, 3, 5);
-    static const char *const kinds[] = {"rectangle", "disk", "sphere", "cylinder",
-                                        "cube",      "mesh", "obj",    "ply"};
+    static const char *const kinds[] = {"rectangle", "disk", "sphere",
+                                        "cylinder",  "cube", "mesh",
+                                        "obj",       "ply",  "serialized"};
     for (size_t k = 0; k < imp_count(kinds); k++) {
         const int round = k == 2 || k == 3;
         const double expected[] = {4 * 2 * 3,
