@@ -145,7 +145,7 @@ function loss_section(fit) {
     const each = [1, 2, 5, 10].map((m) => m * stride).find((m) => (n - 1) / m <= 10) || 10 * stride;
     for (let i = 0; i < n; i += each) svg.append(make_svg("text", {x: x_at(i), y: ht - bottom + 18, "text-anchor": "middle"}, String(i)));
     svg.append(make_svg("text", {x: (left + w - right) / 2, y: ht - 8, "text-anchor": "middle"}, "iteration"),
-        make_svg("text", {transform: `translate(14 ${(top + ht - bottom) / 2}) rotate(-90)`, "text-anchor": "middle"}, `loss (${fit.loss || "?"})`));
+        make_svg("text", {transform: `translate(14 ${(top + ht - bottom) / 2}) rotate(-90)`, "text-anchor": "middle"}, fit.loss ? `loss (${fit.loss})` : "objective"));
     if (se.length === n && n > 1) {
         const ok = h.loss.map((v, i) => i).filter((i) => is_number(h.loss[i]) && is_number(se[i]));
         const up = ok.map((i) => `${x_at(i).toFixed(1)} ${y_at(h.loss[i] + se[i]).toFixed(1)}`);

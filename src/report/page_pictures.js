@@ -186,17 +186,12 @@ function picture_section(layers, live) {
 
 /* What the colours mean. */
 function scale_of(layer, look) {
-    const svg = make_svg("svg", {viewBox: "0 0 600 44", class: "scale", role: "img", preserveAspectRatio: "none",
-        "aria-label": "scale of colours"});
     if (look.mode === "colour") return make("p", {class: "faint"}, layer.unit ? `in ${layer.unit}` : "");
-    const top = look.range / look.gain, bottom = look.mode === "signed" ? -top : 0;
-    for (let i = 0; i < 100; i++) {
-        const t = (i + 0.5) / 100, c = look.mode === "signed" ? signed_colour(2 * t - 1) : false_colour(t);
-        svg.append(make_svg("rect", {x: 6 * i, y: 4, width: 6.5, height: 16, fill: `rgb(${c.map(Math.round).join(",")})`}));
-    }
-    for (const [t, anchor] of [[0, "start"], [0.5, "middle"], [1, "end"]])
-        svg.append(make_svg("text", {x: 600 * t, y: 38, "text-anchor": anchor}, `${show(bottom + t * (top - bottom), 3)}${t === 1 && layer.unit ? " " + layer.unit : ""}`));
-    return svg;
+    const top = look.range / look.gain, bottom = look.mode === "signed" ? -top : 0, bar = make("canvas", {width: 100, height: 1, class: "scale", role: "img", "aria-label": "scale of colours"});
+    const context = bar.getContext("2d"), image = context.createImageData(100, 1);
+    for (let i = 0; i < 100; i++) image.data.set([...(look.mode === "signed" ? signed_colour((i + 0.5) / 50 - 1) : false_colour((i + 0.5) / 100)), 255], 4 * i);
+    context.putImageData(image, 0, 0);
+    return make("div", {}, bar, make("div", {class: "scale_numbers"}, ...[0, 0.5, 1].map((t) => make("span", {}, show(bottom + t * (top - bottom), 3)))), layer.unit ? make("div", {class: "faint"}, layer.unit) : null);
 }
 
 /* The change of the picture that numbers stand for which the pictures do not determine:

@@ -108,7 +108,7 @@ const canvas = document.querySelector("canvas.view");
 canvas.focus();
 for (const key of ["ArrowRight", "ArrowRight", "ArrowDown"]) press(key, canvas);
 return {order, pixel: document.getElementById("pixel").textContent, focused: document.activeElement === canvas,
-    reachable: [...document.querySelectorAll("button, input, select, canvas.view, .thumbs canvas")].every((e) => e.tabIndex >= 0)};
+    reachable: [...document.querySelectorAll("button, input, select, canvas.view, .thumbs canvas[role=button]")].every((e) => e.tabIndex >= 0)};
 """
 answer = look(page, keys)
 ok(answer["order"] == [2, 0, 1, 1], "keys 1 to 9 choose the layer, and one too many does nothing")
@@ -137,6 +137,29 @@ ok(all(p["name"] in text for p in told["params"]) and "none disagrees" in text, 
 sizes = look(page, 'return [...document.querySelectorAll("#correlations rect title")].map((t) => t.textContent)')
 ok(len(sizes) == len(told["params"]) ** 2 and all(abs(float(s.rsplit(": ")[1].replace("–", "nan"))) <= 1 + 1e-9 for s in sizes),
    "correlations are between -1 and 1")
+
+# ---- Iterations ------------------------------------------------------------------------
+scrub = """
+const slider = document.querySelector("#loss input[type=range]"), cells = () => [...document.querySelectorAll("#parameters tbody tr")].map((r) => r.cells[2].textContent);
+const go = (i) => { slider.value = i; slider.dispatchEvent(new Event("input")); return cells(); };
+const end = cells();
+return {end, first: go(0), last: go(slider.max), heads: document.querySelector("#parameters th:nth-child(3)").textContent, drawn: document.querySelectorAll("#loss .traces svg").length};
+"""
+answer = look(page, scrub)
+first = [float(x) for x in answer["first"]]
+ok(all(abs(a - b) <= 1e-5 * abs(b) for a, b in zip(first, told["history"]["x"][0])) and answer["last"] == answer["end"] and answer["end"] != answer["first"]
+   and answer["drawn"] == len(first), "scrubbing moves the parameters to those of the iteration, and back")
+
+# ---- Bent rays --------------------------------------------------------------------------
+lens = os.path.join(scenes, "bend", "focus.xml")
+run("bend", "view", lens, "-q", "-o", folder + "/lens", "--truth", lens)
+run("report", folder + "/lens", "-q")
+answer = look(folder + "/lens/report.html", """const s = document.getElementById("rays"), canvas = s.querySelector("canvas.space"), before = canvas.toDataURL();
+canvas.dispatchEvent(new KeyboardEvent("keydown", {key: "ArrowLeft", bubbles: true}));
+return {turned: canvas.toDataURL() !== before, rays: s.querySelectorAll("path.ray").length, spots: s.querySelectorAll("circle.spot").length, truth: s.querySelectorAll("path.truth").length,
+    said: [...s.querySelectorAll("figcaption")].map((c) => c.textContent).join("\\n")}""")
+ok(answer["turned"] and answer["rays"] > 100 and answer["spots"] > 100 and answer["truth"] == 3 and "0 apart at most" in answer["said"],
+   "bent rays in space, in sections, as spots; and found over true # %(rays)d, %(spots)d" % answer)
 
 # ---- Widths, and a page from strangers ----------------------------------------------------
 for width in (400, 800, 2000):
