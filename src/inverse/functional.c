@@ -85,13 +85,16 @@ static enum imp_status weights_make(imp_context *ctx, const struct imp__function
     imp_film *film = NULL;
     own.spp = f->spp;
     own.time_limit_s = 0;
-    const struct imp_picture picture = {.sensor = f->tracer.sensor,
-                                        .stage = "errors",
-                                        .names = "W",
-                                        .n = 1,
-                                        .sample = sample_position,
-                                        .payload = f,
-                                        .weights = weights};
+    const struct imp_picture picture = {
+        .sensor = f->tracer.sensor,
+        .stage = "errors",
+        .names = "W",
+        .n = 1,
+        .sample = sample_position,
+        .payload = f,
+        .weights = weights,
+        /* in the order in which the picture adds them */
+        .set = imp__tracer_set(&f->tracer, imp__walks_of(run, f->tracer.sensor))};
     const enum imp_status st = imp__picture_make(ctx, &picture, &own, &film);
     imp_film_destroy(film);
     return st;
