@@ -26,12 +26,23 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     (void)b, (void)in, (void)d, (void)df;
 }
 
+/* Nothing is lost at a sensor: roulette of photons goes by this, and not by the weight of a
+ * direction that was drawn towards a small light. */
+static bool directional_albedo(const struct imp_bsdf *b, const imp_spec *in,
+                               const imp_v3 *wo, imp_spec *albedo)
+{
+    (void)b, (void)in, (void)wo;
+    *albedo = imp__spec(1);
+    return true;
+}
+
 static const struct imp_bsdf_ops white_ops = {.size = sizeof(struct imp_bsdf_ops),
                                               .name = "",
                                               .sample = sample,
                                               .eval = eval,
                                               .pdf = pdf,
-                                              .eval_d = eval_d};
+                                              .eval_d = eval_d,
+                                              .directional_albedo = directional_albedo};
 static const struct imp_bsdf white = {.ops = &white_ops,
                                       .flags = IMP_BSDF_SMOOTH,
                                       .index_input = -1,

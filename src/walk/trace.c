@@ -331,7 +331,9 @@ static __attribute__((noinline)) void
 mixture_meet(struct imp_step *s, const struct imp_bsdf *b, const struct imp_surface *at)
 {
     imp__mixture_prepare(s, b, at->p);
-    s->mixed.splits = s->mixed.here && s->depth < s->tracer->integrator->split;
+    /* The vertex of a sensor that is a surface, of depth -1, is not scattering. */
+    s->mixed.splits =
+        s->mixed.here && s->depth >= 0 && s->depth < s->tracer->integrator->split;
 }
 
 /* The light sample counts as far as what lies between lets it pass. */
