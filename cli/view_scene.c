@@ -21,7 +21,7 @@ static struct {
     size_t n;
     const char *path; /* of "save" */
     imp_film *film;   /* the best so far; NULL: none */
-    int sessions;     /* runs that are in it: each has its seed */
+    int sessions;     /* seeds in use: each run that is merged has its own */
 } r;
 
 /* ---- Numbers -------------------------------------------------------------------------- */
@@ -105,10 +105,17 @@ static void numbers_move(void)
 
 /* ---- Pictures ------------------------------------------------------------------------- */
 
+static int64_t spp_of(const imp_film *film)
+{
+    struct imp_film_info info = {.size = sizeof info};
+    return film && imp_film_get_info(film, &info) == IMP_OK ? info.spp : 0;
+}
+
 static void show(const imp_film *film, void *payload)
 {
     const struct imp_run run = cli_run();
     const char *unit = NULL;
+    if (spp_of(film) < spp_of(r.film)) return; /* what is there has less noise */
     struct imp_sensor_info sensor = {.size = sizeof sensor};
     struct imp_report_item item = IMP_REPORT_ITEM_INIT;
     (void)payload;
@@ -122,36 +129,33 @@ static void show(const imp_film *film, void *payload)
     view_show(VIEW_PICTURE, &item, 1);
 }
 
-static int64_t spp_of(const imp_film *film)
-{
-    struct imp_film_info info = {.size = sizeof info};
-    return film && imp_film_get_info(film, &info) == IMP_OK ? info.spp : 0;
-}
-
 static void forget(void)
 {
     imp_film_destroy(r.film);
     r.film = NULL;
-    r.sessions = 0;
+    r.sessions = 1;
 }
 
-/* spp more samples, merged with those that are there; as far as they come. */
-static int take(int64_t spp)
+/* spp samples, as far as they come: by themselves, in place of fewer that are there; or
+ * with new random numbers, merged with those. */
+static int take(int64_t spp, bool merges)
 {
     struct imp_run run = cli_run();
     imp_film *film = NULL;
     run.spp = (int)spp;
-    run.seed += (uint64_t)r.sessions;
+    run.seed += merges ? (uint64_t)r.sessions : 0;
     run.progress = view_progress;
-    run.preview = r.film ? NULL : show;
+    run.preview = merges ? NULL : show;
     const enum imp_status st = imp_render(cli.scene, &run, &film);
     if (cli_failed(st)) return cli_fail(st, cli.scene_path);
-    if (!spp_of(film)) { /* stopped in the first pass */
+    if (merges) r.sessions++;
+    const bool better = merges ? spp_of(film) > 0
+                               : spp_of(film) > spp_of(r.film); /* 0: in the first pass */
+    if (!better) {
         imp_film_destroy(film);
         return 0;
     }
-    r.sessions++;
-    if (r.film && imp_film_merge(film, r.film) != IMP_OK)
+    if (merges && imp_film_merge(film, r.film) != IMP_OK)
         cli_say("importon: %s", imp_last_error(cli.context));
     imp_film_destroy(r.film);
     r.film = film;
@@ -164,13 +168,10 @@ static int take(int64_t spp)
 static int rounds(int64_t all)
 {
     int rc = 0;
-    for (int64_t spp = 1; spp < all && !view_asked() && !rc; spp *= GROWS) {
-        forget();
-        rc = take(spp);
-    }
-    if (rc || view_asked()) return rc;
     forget();
-    return take(all);
+    for (int64_t spp = 1; spp < all && !view_asked() && !rc; spp *= GROWS)
+        rc = take(spp, false);
+    return rc || view_asked() ? rc : take(all, false);
 }
 
 static void save(char *said, size_t size)
@@ -196,7 +197,7 @@ static int work(void)
     for (;;) {
         if (running && (fresh || spp_of(r.film) < all)) {
             view_state(VIEW_RUNNING, said);
-            rc = fresh ? rounds(all) : take(all - spp_of(r.film));
+            rc = fresh ? rounds(all) : take(all - spp_of(r.film), true);
             fresh = !r.film;
         }
         if (rc) return rc;
