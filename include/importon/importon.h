@@ -965,7 +965,7 @@ struct imp_fit_options {
      * the cells are linear, and an equal share of the iterations; a checkpoint holds the
      * last level. 0, 1: cells alone. */
     int levels;
-    imp_fit_step_fn step;   /**< NULL: nobody looks */
+    imp_fit_step_fn step; /**< NULL: nobody looks */
     void *step_payload;
 };
 #define IMP_FIT_OPTIONS_INIT                                                             \

@@ -138,9 +138,9 @@ enum imp_status imp_scene_write_volume(const imp_scene *scene, size_t index,
         return imp__error(scene->ctx, IMP_E_ARG, "there is no parameter %zu", index);
     const struct written v = {&scene->params[index], values};
     const struct imp_param_info *info = &v.param->info;
+    if (values) IMP_FINITE_ALL(scene->ctx, values, info->count, "values");
     if (!(info->flags & IMP_PARAM_VOLUME))
         return imp__error(scene->ctx, IMP_E_ARG, "%s is no volume", info->name);
-    if (values) IMP_FINITE_ALL(scene->ctx, values, info->count, "values");
     IMP_READS(scene);
     return imp__file_write_by(scene->ctx, path, fill, &v);
 }

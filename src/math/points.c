@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "points.h"
+#include <pthread.h>
 
 enum { BITS = 6 }; /* of a point's index */
 _Static_assert(1 << BITS == IMP_SET_POINTS, "bits of an index");
@@ -49,4 +50,14 @@ void imp__points_make(struct imp_point_table *points)
                     (uint16_t)(x << (16 - BITS) | (rest & ((1u << (16 - BITS)) - 1)));
             }
         }
+}
+
+static struct imp_point_table table;
+static void table_make(void) { imp__points_make(&table); }
+
+const struct imp_point_table *imp__points(void)
+{
+    static pthread_once_t once = PTHREAD_ONCE_INIT;
+    pthread_once(&once, table_make);
+    return &table;
 }

@@ -126,8 +126,7 @@ struct imp_scene {
     struct imp_bsdf *default_bsdf, *black_bsdf;
     const struct imp_integrator *integrator; /* NULL: none was written */
     int environment;                         /* emitter index, -1: none */
-    double *light_cdf;                    /* [n_emitters] by sampling_weight, last is 1 */
-    const struct imp_point_table *points; /* that sets of walks are drawn from */
+    double *light_cdf; /* [n_emitters] by sampling_weight, last is 1 */
     int n_bsdf_mixing;
     struct imp_mixing **bsdf_mixing; /* [n_bsdfs] NULL: the integrator's */
     bool materials_mix;              /* some material has weights */

@@ -5,7 +5,6 @@
  * top by its name. */
 #include "scene_build.h"
 #include "instances.h"
-#include "math/points.h"
 
 /* Top-level objects without id: <tag><n>, counted per tag. */
 struct tag_counts {
@@ -125,15 +124,6 @@ static struct imp_ball ball_around(const struct imp_scene *scene)
                              0.5 * imp__length(size) * (1 + 1e-3)};
 }
 
-static enum imp_status points_build(struct imp_scene *scene)
-{
-    struct imp_point_table *points = imp__arena_array(&scene->arena, 1, sizeof *points);
-    if (!points) return imp__build_no_memory(scene);
-    imp__points_make(points);
-    scene->points = points;
-    return IMP_OK;
-}
-
 enum imp_status imp__scene_build(struct imp_scene *scene,
                                  const struct imp_integrator_ops *const *integrators)
 {
@@ -155,7 +145,6 @@ enum imp_status imp__scene_build(struct imp_scene *scene,
     IMP_TRY(imp__build_attributes(scene));
     scene->ball = ball_around(scene);
     IMP_TRY(lights_build(scene));
-    IMP_TRY(points_build(scene));
     IMP_TRY(imp__aims_build(scene));
     IMP_TRY(imp__mixing_materials(scene));
     if (scene->integrator) IMP_TRY(imp__integrator_ready(scene, scene->integrator));

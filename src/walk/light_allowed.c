@@ -94,10 +94,11 @@ static enum imp_status sensor_allowed(const struct imp_scene *scene,
             "they never meet; let walks begin at the sensor",
             sensor->name, sensor->ops->name);
     if (sensor->gain)
-        return imp__error(ctx, IMP_E_UNSUPPORTED,
-                          "walks from the lights: the film of sensor '%s' has an exposure; "
-                          "let walks begin at the sensor",
-                          sensor->name);
+        return imp__error(
+            ctx, IMP_E_UNSUPPORTED,
+            "walks from the lights: the film of sensor '%s' has an exposure; "
+            "let walks begin at the sensor",
+            sensor->name);
     if (!integrator->lights && !sensor->shape)
         return imp__error(
             ctx, IMP_E_UNSUPPORTED,

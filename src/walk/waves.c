@@ -28,7 +28,7 @@ void imp__tracer_numbers(struct imp_tracer *tracer, const struct imp_run *run, i
     const struct imp_wavelengths *all = scene->wavelengths;
     const struct imp_sensor *sensor = scene->sensors[run->sensor];
     tracer->points =
-        imp__points_of(sensor, run) == IMP_POINTS_SOBOL ? scene->points : NULL;
+        imp__points_of(sensor, run) == IMP_POINTS_SOBOL ? imp__points() : NULL;
     if (!all) return;
     const int drawn = run->wavelengths == IMP_WAVELENGTHS_IMPORTANCE
                           ? IMP_WAVES_IMPORTANCE

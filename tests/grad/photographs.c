@@ -37,8 +37,8 @@ static imp_context *ctx;
 #define ALL                                                                              \
     NUMBER("exposure", ".3")                                                             \
     NUMBER("white_balance_red", "1.2")                                                   \
-    NUMBER("white_balance_blue", ".8") NUMBER("vignetting_2", "-.3")                     \
-        NUMBER("vignetting_4", ".05")
+    NUMBER("white_balance_blue", ".8")                                                   \
+    NUMBER("vignetting_2", "-.3") NUMBER("vignetting_4", ".05")
 
 static struct imp_run run_of(int spp, uint64_t seed, int sensor)
 {

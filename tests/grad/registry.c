@@ -109,6 +109,11 @@ static void grids_remove(void)
 {
     while (n_grids > 0) remove(grid_file[--n_grids % 64]);
 }
+/* Numbers of a mesh are tested by grad/attributes. */
+static bool of_meshes(const struct imp_texture_ops *t)
+{
+    return strcmp(t->name, "attribute") == 0 || strcmp(t->name, "mesh_attribute") == 0;
+}
 static bool is_volume(const struct imp_texture_ops *t)
 {
     return t->inputs && t->inputs[0].flags & IMP_INPUT_VOLUME;
@@ -117,7 +122,9 @@ static bool is_volume(const struct imp_texture_ops *t)
 static void texture_make(imp_scene *s, const struct subject *q, const char *slot,
                          const struct imp_input_desc *d, uint64_t seed, bool outer)
 {
-    const struct imp_texture_ops *t = outer ? q->texture : imp__texture_kinds[0];
+    int first = 0;
+    while (of_meshes(imp__texture_kinds[first])) first++;
+    const struct imp_texture_ops *t = outer ? q->texture : imp__texture_kinds[first];
     imp_scene_begin(s, "texture", t->name, NULL, slot);
     if (strcmp(t->name, "bitmap") == 0) {
         float pixels[3 * 3 * 3];
@@ -685,9 +692,10 @@ int main(int argc, char **argv)
                     imp__bsdf_kinds[i]->inputs[0].name)
                     check(&(struct subject){.bsdf = ops, .back = imp__bsdf_kinds[i]});
             for (int i = 0; imp__texture_kinds[i] && ops->inputs[0].name; i++)
-                check(&(struct subject){.bsdf = ops,
-                                        .back = kind("diffuse"),
-                                        .texture = imp__texture_kinds[i]});
+                if (!of_meshes(imp__texture_kinds[i]))
+                    check(&(struct subject){.bsdf = ops,
+                                            .back = kind("diffuse"),
+                                            .texture = imp__texture_kinds[i]});
             continue;
         }
         check(&(struct subject){.bsdf = ops});
@@ -695,8 +703,9 @@ int main(int argc, char **argv)
             if (strcmp(kind_configs[i].kind, ops->name) == 0)
                 check(&(struct subject){.bsdf = ops, .props = kind_configs[i].props});
         for (int i = 0; imp__texture_kinds[i]; i++) {
-            if (is_volume(imp__texture_kinds[i]) && !is_long &&
-                strcmp(ops->name, "diffuse") != 0)
+            if (of_meshes(imp__texture_kinds[i]) ||
+                (is_volume(imp__texture_kinds[i]) && !is_long &&
+                 strcmp(ops->name, "diffuse") != 0))
                 continue;
             for (int nested = 0; nested <= (!is_volume(imp__texture_kinds[i]) &&
                                             imp__texture_kinds[i]->inputs &&
@@ -713,8 +722,9 @@ int main(int argc, char **argv)
              imp__emitter_kinds[k]->flags & IMP_EMITTER_ENVIRONMENT))
             continue;
         for (int i = 0; imp__texture_kinds[i]; i++)
-            check(&(struct subject){.emitter = imp__emitter_kinds[k],
-                                    .texture = imp__texture_kinds[i]});
+            if (!of_meshes(imp__texture_kinds[i]))
+                check(&(struct subject){.emitter = imp__emitter_kinds[k],
+                                        .texture = imp__texture_kinds[i]});
     }
     remove(measured);
     imp_context_destroy(ctx);
