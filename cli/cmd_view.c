@@ -14,8 +14,6 @@ static const struct arg_option options[] = {
      &view_options.port, 1, 65535, NULL},
     {ARG_TEXT, 0, "checkpoint", "FILE", "where a fit that is stopped is kept",
      &view_options.checkpoint, 0, 0, NULL},
-    {ARG_INT, 0, "levels", "N", "bent rays: refine grids N - 1 times (default 1)",
-     &view_options.levels, 1, IMP_BEND_LEVELS_MAX, NULL},
     {ARG_TEXT, 0, "truth", "FILE", "bent rays: the true field, to compare",
      &bend_truth_path, 0, 0, NULL},
     {0}};

@@ -15,7 +15,7 @@ const struct arg_option options_search[] = {
     {ARG_NUMBER, 0, "lr", "RATE", "learning rate of adam (default 0.05)",
      &fit_choice.learning_rate, 1e-12, 1e6, NULL},
     {ARG_INT, 0, "levels", "N",
-     "of adam: fit textures and volumes from coarse to fine, in N levels",
+     "of adam, and of bent rays: from coarse to fine, in N levels",
      &fit_choice.levels, 1, 16, NULL},
     {ARG_NUMBER, 0, "tolerance", "T",
      "stop when relative steps stay below (default 1e-4)", &fit_choice.tolerance, 1e-15,

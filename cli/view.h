@@ -82,7 +82,7 @@ void view_show_film(enum view_channel channel, const imp_film *film, const char 
 /* ---- The views ----------------------------------------------------------------------- */
 
 struct view_options {
-    int port, levels;
+    int port;
     const char *checkpoint;
 };
 extern struct view_options view_options;

@@ -145,7 +145,7 @@ static int options_read(struct imp_bend_fit_options *o)
     o->iterations[0] = fit_choice.iterations;
     o->learning_rate = fit_choice.learning_rate;
     o->tolerance = fit_choice.tolerance;
-    o->levels = view_options.levels;
+    o->levels = fit_choice.levels;
     o->progress = view_progress;
     o->step = step;
     return 0;
