@@ -260,7 +260,8 @@ enum imp_status imp__fit_answer(struct imp__fit *f, struct imp__search *s,
     if (s->n_history > 0) {
         memcpy(history, s->history, s->n_history * sizeof *history);
         memcpy(history + s->n_history, s->history_se, s->n_history * sizeof *history);
-        memcpy(history + 2 * s->n_history, s->history_x, n_trail * sizeof *history);
+        if (n_trail > 0)
+            memcpy(history + 2 * s->n_history, s->history_x, n_trail * sizeof *history);
     }
     const struct imp__fit_residual left =
         imp__fit_residual(f, s->x, objective, determined);

@@ -32,6 +32,8 @@ function interval_bar(p) {
     return svg;
 }
 
+function percent(x) { return `${x >= 0.995 ? Math.round(100 * x) : show(100 * x, 2)} %`; }
+
 function state_of(p) {
     if (p.determined === false) return ["not determined by the pictures", "warn"];
     if (p.at_bound < 0) return ["at its lower bound", "warn"];
@@ -53,6 +55,7 @@ function parameter_section(fit) {
             row.value.className = is_number(then) ? "then" : "";
             if (row.bar.at_iteration) row.bar.at_iteration(then);
         }
+        body.className = e.detail ? "of-then" : ""; /* the other columns are of the answer */
         heading.textContent = e.detail ? `value at iteration ${e.detail.iteration}` : "value";
     });
     const heading = make("th", {scope: "col"}, "value");
@@ -65,10 +68,10 @@ function parameter_section(fit) {
             rows.push({name: String(p.name), bar, value, p});
             return make("tr", {}, make("td", {class: "mono"}, String(p.name)), make("td", {}, show(p.start)),
                 value, make("td", {}, show(p.se, 2)),
-                make("td", {}, is_number(relative) ? `${show(100 * relative, 2)} %` : "–"),
-                make("td", {}, is_number(p.lo95) ? `${show(p.lo95)} to ${show(p.hi95)}` : "–"),
-                make("td", {}, bar), make("td", {class: "unit"}, p.unit === "1" ? "" : p.unit || ""),
-                make("td", {class: `text ${colour}`}, text));
+                make("td", {}, is_number(relative) ? percent(relative) : "–"),
+                make("td", {}, is_number(p.lo95) ? `${show(p.lo95)} to ${show(p.hi95)}` : text ? "" : "–",
+                    text ? make("div", {class: `note ${colour}`}, text) : null),
+                make("td", {}, bar), make("td", {class: "unit"}, p.unit === "1" ? "" : p.unit || ""));
         }));
         told.textContent = match.length > rows_shown ? `${rows_shown} of ${match.length} are shown; the field above finds others.` : "";
     }
@@ -78,10 +81,10 @@ function parameter_section(fit) {
     const missing = numbers.filter((p) => p.determined === false);
     return make("section", {id: "parameters"}, make("h2", {}, "Parameters"),
         missing.length ? make("p", {class: "warning"}, `The pictures do not determine ${missing.length} of ${numbers.length} numbers: ${missing.slice(0, 5).map((p) => p.name).join(", ")}${missing.length > 5 ? ", ..." : ""}.`) : null,
-        least ? make("p", {}, `Least certain, relative to its value: ${least.name}, ± ${show(100 * Math.abs(least.se / least.value), 2)} % (one standard error).`) : null,
+        least ? make("p", {}, `Least certain, relative to its value: ${least.name}, ± ${percent(Math.abs(least.se / least.value))} (one standard error).`) : null,
         numbers.length > 12 ? make("div", {class: "bar noprint"}, find) : null,
         numbers.length ? make("div", {class: "scroll"}, make("table", {}, make("thead", {}, make("tr", {},
-            ...["name", "start", "value", "se", "relative", "95 % interval", "start (tick), value (dot), interval", "unit", ""].map((t, i) =>
+            ...["name", "start", "value", "se", "relative", "95 % interval", "start (tick), value (dot), interval", "unit"].map((t, i) =>
                 (i === 2 ? heading : make("th", {class: i > 6 ? "text" : null, scope: "col"}, t))))), body)) : make("p", {}, "No single numbers were fitted."),
         told, ...files.map((p) => make("p", {}, `${p.name}: ${p.count} numbers, in ${p.file}`)));
 }
@@ -92,26 +95,27 @@ function correlation_section(fit) {
     const c = fit.covariance, names = fit.params.filter((p) => p.file === undefined).map((p) => String(p.name)), n = names.length;
     if (!Array.isArray(c) || c.length !== n || n < 2 || n > 60) return null;
     const r = c.map((row, i) => row.map((v, j) => v / Math.sqrt(c[i][i] * c[j][j])));
-    const cell = n > 24 ? 16 : 30, left = Math.min(240, 8 * Math.max(...names.map((s) => s.length)) + 10), size = n * cell;
+    const cell = n > 24 ? 16 : 30, left = Math.min(260, 8 * Math.max(...names.map((s) => s.length)) + 30), size = n * cell;
     const svg = make_svg("svg", {width: left + size + 10, height: size + 20 + 10, viewBox: `0 0 ${left + size + 10} ${size + 30}`, role: "img", "aria-label": "correlations"});
-    let worst = null;
+    let worst = null, tied = 0;
     r.forEach((row, i) => {
-        svg.append(make_svg("text", {x: left - 6, y: 20 + cell * i + cell / 2 + 4, "text-anchor": "end"}, names[i].length > 28 ? names[i].slice(0, 27) + "…" : names[i]));
+        svg.append(make_svg("text", {x: left - 6, y: 20 + cell * i + cell / 2 + 4, "text-anchor": "end"}, (names[i].length > 28 ? names[i].slice(0, 27) + "…" : names[i]) + ` ${i + 1}`));
         svg.append(make_svg("text", {x: left + cell * (i + 0.5), y: 14, "text-anchor": "middle"}, String(i + 1)));
         row.forEach((v, j) => {
             if (!is_number(v)) return;
+            if (j < i && Math.abs(v) > 0.99) tied++;
             if (j < i && (!worst || Math.abs(v) > Math.abs(worst.v))) worst = {v, i, j};
             const rect = make_svg("rect", {x: left + cell * j, y: 20 + cell * i, width: cell - 1, height: cell - 1, fill: `rgb(${signed_colour(v).map(Math.round).join(",")})`});
             rect.append(make_svg("title", {}, `${names[i]}, ${names[j]}: ${show(v, 3)}`));
             svg.append(rect);
             if (cell >= 30) {
-                const text = make_svg("text", {x: left + cell * (j + 0.5), y: 20 + cell * (i + 0.5) + 4, "text-anchor": "middle", style: "fill: #111; font-size: 10px"}, v.toFixed(2).replace("0.", "."));
+                const text = make_svg("text", {x: left + cell * (j + 0.5), y: 20 + cell * (i + 0.5) + 4, "text-anchor": "middle", style: `fill: ${Math.abs(v) > 0.55 ? "#fff" : "#111"}; font-size: 10px`}, v.toFixed(2).replace("0.", "."));
                 svg.append(text);
             }
         });
     });
     return make("section", {id: "correlations"}, make("h2", {}, "Correlations of the errors"),
-        worst && Math.abs(worst.v) > 0.9 ? make("p", {class: "warning"}, `${names[worst.i]} and ${names[worst.j]} are hard to tell apart: correlation ${show(worst.v, 3)}.`) : null,
+        worst && Math.abs(worst.v) > 0.9 ? make("p", {class: "warning"}, `${names[worst.i]} and ${names[worst.j]} are hard to tell apart: correlation ${show(worst.v, 3)}${tied > 1 ? `; so are ${tied - 1} other pair${tied > 2 ? "s" : ""} beyond .99` : ""}.`) : null,
         make("div", {class: "scroll"}, svg));
 }
 

@@ -115,8 +115,29 @@ out:
     return st;
 }
 
-/* G = D (sum max(lambda, 0) v v^T + D H_prior D)^-1 D, if the prior leaves no direction
- * open that the data leave open. */
+/* A = sum max(lambda, 0) v v^T + D H_prior D, of all directions, or of those alone that the
+ * data determine, and its eigenvalues. */
+static enum imp_status with_prior(const struct imp__sampled *s,
+                                  const struct imp__directions *a, bool loose_too,
+                                  double *A, double *values, double *vectors)
+{
+    const size_t m = a->m, n = s->n;
+    for (size_t p = 0; p < m; p++)
+        for (size_t q = 0; q < m; q++) {
+            const size_t k = a->index[p], l = a->index[q];
+            A[p * m + q] = s->scale[k] * s->scale[l] * s->mean.H_prior[k * n + l];
+            for (size_t j = 0; j < m; j++)
+                if (loose_too || !a->loose[j])
+                    A[p * m + q] += fmax(a->values[j], 0) * a->vectors[j * m + p] *
+                                    a->vectors[j * m + q];
+        }
+    return imp__eigen_symmetric(m, A, values, vectors)
+               ? IMP_OK
+               : imp__error(s->ctx, IMP_E_NUMERIC, "J^T J is not finite");
+}
+
+/* G = D A^-1 D, if the prior leaves no direction open that the data leave open: what these
+ * have from the data is noise, and decides nothing. */
 #define PRIOR_LEAST 1e-10 /* eigenvalue over the largest */
 static enum imp_status inverse_held(const struct imp__sampled *s,
                                     struct imp__directions *a)
@@ -127,18 +148,11 @@ static enum imp_status inverse_held(const struct imp__sampled *s,
     double *A = imp__alloc(ctx, 2 * m * m + m, sizeof *A);
     if (!A) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for a covariance"));
     double *vectors = A + m * m, *values = vectors + m * m;
-    for (size_t p = 0; p < m; p++)
-        for (size_t q = 0; q < m; q++) {
-            const size_t k = a->index[p], l = a->index[q];
-            A[p * m + q] = s->scale[k] * s->scale[l] * s->mean.H_prior[k * n + l];
-            for (size_t j = 0; j < m; j++)
-                A[p * m + q] +=
-                    fmax(a->values[j], 0) * a->vectors[j * m + p] * a->vectors[j * m + q];
-        }
-    if (!imp__eigen_symmetric(m, A, values, vectors))
-        IMP_TRY(imp__error(ctx, IMP_E_NUMERIC, "J^T J is not finite"));
+    IMP_TRY(with_prior(s, a, false, A, values, vectors));
     a->held = values[0] > PRIOR_LEAST * values[m - 1];
-    for (size_t p = 0; a->held && p < m; p++)
+    if (!a->held) goto out;
+    IMP_TRY(with_prior(s, a, true, A, values, vectors));
+    for (size_t p = 0; p < m; p++)
         for (size_t q = 0; q < m; q++) {
             double sum = 0;
             for (size_t j = 0; j < m; j++)

@@ -573,6 +573,45 @@ static void looked_at(enum imp_optimizer kind)
     imp_scene_destroy(s);
 }
 
+/* A lamp's own reflectance is hardly seen: of so few samples its part of J^T J is noise, which
+ * is no knowledge. Without a prior it has no interval. */
+static void hardly_seen(void)
+{
+    imp_scene *s = test_scene(ctx, "cornell.xml", IMP_RGB, "res=32");
+    const char *const all = "*";
+    imp_problem *p = problem_of(s, &all, 1);
+    struct imp_run run = run_of(256, 1);
+    imp_film *film = NULL;
+    struct imp_target t = IMP_TARGET_INIT;
+    struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
+    const struct imp_fit_result *r = NULL;
+    double x[15];
+    enum imp_status st = imp_render(s, &run, &film);
+    t.width = t.height = 32, t.channels = 3;
+    t.pixels = st == IMP_OK ? imp_film_mean(film) : NULL;
+    t.noise_se = st == IMP_OK ? imp_film_se(film) : NULL;
+    if (st == IMP_OK) st = imp_problem_add_target(p, &t);
+    imp_problem_get_x(p, x);
+    x[3] = 0.3;
+    if (st == IMP_OK) st = imp_problem_set_x(p, x);
+    o.optimizer = IMP_LM;
+    o.intervals = 1;
+    run = run_of(16, 0);
+    if (st == IMP_OK) st = imp_fit(p, &o, &run, &r);
+    int loose = 0, open = 0;
+    for (size_t k = 0; st == IMP_OK && k < r->n; k++) {
+        const struct imp_fit_variable *v = &r->variables[k];
+        loose += !v->determined;
+        open += !v->determined && isnan(v->se) && isnan(v->lo95) && isnan(v->hi95);
+    }
+    tap_ok(st == IMP_OK && loose > 0 && open == loose && !strstr(r->warning, "prior"),
+           "what only noise determines has no interval # %d of %d: %s", open, loose,
+           st == IMP_OK ? r->warning : imp_last_error(ctx));
+    imp_film_destroy(film);
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+}
+
 int main(void)
 {
     if (imp_context_create(NULL, &ctx) != IMP_OK) return 1;
@@ -590,6 +629,7 @@ int main(void)
     looked_at(IMP_LM);
     looked_at(IMP_LBFGS);
     arguments();
+    hardly_seen();
     imp_context_destroy(ctx);
     return tap_done();
 }
