@@ -29,12 +29,16 @@ static void add_dense(struct imp_sink *sink, int param, size_t element, int chan
 }
 
 /* Where key is, or would be (Fibonacci hashing; Knuth, vol. 3, 6.4). Eight neighbours
- * share a line of the cache: cells and texels are touched side by side. */
-static inline struct imp__tally_slot *slot_of(const struct imp_tally *t, uint32_t key)
+ * share a line of the cache: cells and texels are touched side by side. A texture that is
+ * read as a colour here and as one number there has a triple and a single of one key. */
+static inline struct imp__tally_slot *slot_of(const struct imp_tally *t, uint32_t key,
+                                              bool single)
 {
     const size_t mask = t->table_size - 1;
     size_t k = ((key >> 3) * UINT64_C(0x9e3779b97f4a7c15) >> 32 << 3 | (key & 7)) & mask;
-    while (t->table[k].entry && t->table[k].key != key) k = (k + 1) & mask;
+    while (t->table[k].entry &&
+           (t->table[k].key != key || (t->table[k].entry >= IMP__TALLY_SINGLE) != single))
+        k = (k + 1) & mask;
     return &t->table[k];
 }
 
@@ -47,10 +51,10 @@ static bool table_grow(struct imp_tally *t)
     t->table = table;
     t->table_size = size;
     for (size_t k = 0; k < t->n_triples; k++)
-        *slot_of(t, t->triples[k].key) =
+        *slot_of(t, t->triples[k].key, false) =
             (struct imp__tally_slot){t->triples[k].key, (uint32_t)k + 1};
     for (size_t k = 0; k < t->n_singles; k++)
-        *slot_of(t, t->singles[k].key) = (struct imp__tally_slot){
+        *slot_of(t, t->singles[k].key, true) = (struct imp__tally_slot){
             t->singles[k].key, ((uint32_t)k + 1) | IMP__TALLY_SINGLE};
     return true;
 }
@@ -90,7 +94,7 @@ static __attribute__((noinline)) int64_t entry_add(struct imp_tally *t, uint32_t
         if (!grown) return -1;
         t->singles = grown;
         t->singles[t->n_singles++] = (struct imp__tally_single){.key = key};
-        *slot_of(t, key) =
+        *slot_of(t, key, true) =
             (struct imp__tally_slot){key, (uint32_t)t->n_singles | IMP__TALLY_SINGLE};
         return (int64_t)t->n_singles - 1;
     }
@@ -99,14 +103,14 @@ static __attribute__((noinline)) int64_t entry_add(struct imp_tally *t, uint32_t
     if (!grown) return -1;
     t->triples = grown;
     t->triples[t->n_triples++] = (struct imp__tally_triple){.key = key};
-    *slot_of(t, key) = (struct imp__tally_slot){key, (uint32_t)t->n_triples};
+    *slot_of(t, key, false) = (struct imp__tally_slot){key, (uint32_t)t->n_triples};
     return (int64_t)t->n_triples - 1;
 }
 
 static inline int64_t entry_find(struct imp_tally *t, uint32_t key, bool single)
 {
     if (imp_likely(t->table_size > 0)) {
-        const struct imp__tally_slot *s = slot_of(t, key);
+        const struct imp__tally_slot *s = slot_of(t, key, single);
         if (imp_likely(s->entry)) return (int64_t)(s->entry & ~IMP__TALLY_SINGLE) - 1;
     }
     return entry_add(t, key, single);
