@@ -942,7 +942,8 @@ enum imp_optimizer {
 struct imp_fit_step {
     size_t size;
     int iteration;   /**< completed ones */
-    size_t n;        /**< of the problem; 0 for Adam of more than 1024 numbers */
+    size_t n;        /**< of the problem; 0 for Adam of more than 1024 numbers, and of all
+                          levels but the last: then x and history_x are NULL */
     const double *x; /**< [n] the best estimate so far */
     size_t n_history;
     const double *history, *history_se, *history_x; /**< as in imp_fit_result */

@@ -15,6 +15,8 @@ struct level {
     size_t n;                /* variables */
     double *x, *g;           /* [problem->n] fine numbers, and the gradient */
     struct imp__span *spans; /* [n_blocks] of the variables */
+    double *trail;           /* [n_trail][problem->n] of the fine search's history_x */
+    size_t n_trail, cap_trail;
 };
 
 /* The grid of a block's numbers: its parameter's, unless it is a factor of many. */
@@ -64,9 +66,24 @@ static enum imp_status eval(const double *c, uint64_t seed, struct imp_estimate 
     return st;
 }
 
+/* x is where the iteration had its objective. */
+static enum imp_status trail_add(struct level *l)
+{
+    const struct imp_problem *p = l->fit->problem;
+    if (p->n > IMP_TRAIL_MAX) return IMP_OK;
+    double *grown = imp__grow(p->ctx, l->trail, &l->cap_trail, (l->n_trail + 1) * p->n,
+                              sizeof *grown);
+    if (!grown) return imp__error(p->ctx, IMP_E_NOMEM, "no memory for the loss history");
+    l->trail = grown;
+    memcpy(grown + l->n_trail++ * p->n, l->x, p->n * sizeof *grown);
+    return IMP_OK;
+}
+
 static enum imp_status iterated(const struct imp__search *s, void *payload)
 {
-    const struct level *l = payload;
+    struct level *l = payload;
+    const enum imp_status st = trail_add(l);
+    if (st != IMP_OK) return st;
     return l->fit->goal.iterated(s, l->fit->goal.payload);
 }
 
@@ -147,7 +164,11 @@ enum imp_status imp__fit_levels(struct imp__fit *fit,
     }
     if (st != IMP_OK && st != IMP_CANCELLED) goto out;
     imp__search_move(&fit->goal, fine, x);
-    if (s) imp__search_take_history(fine, s);
+    if (s) {
+        imp__search_take_history(fine, s);
+        fine->history_x = l.trail, fine->cap_history_x = l.cap_trail;
+        l.trail = NULL;
+    }
 out:
     fit->options.checkpoint = checkpoint;
     fit->search = NULL;
@@ -156,6 +177,7 @@ out:
     imp__release(p->ctx, l.x);
     imp__release(p->ctx, l.g);
     imp__release(p->ctx, l.spans);
+    imp__release(p->ctx, l.trail);
     return st;
 }
 

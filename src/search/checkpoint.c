@@ -226,7 +226,7 @@ static enum imp_status read_body(struct source *s, struct imp__search *t)
         IMP_TRY(imp__search_log(t, (struct imp_estimate){0}, t->x));
     IMP_TRY(get_numbers(s, "history", t->history, n, NULL));
     IMP_TRY(get_array(s, "history_se", t->history_se, n, NULL));
-    IMP_TRY(get_array(s, "history_x", t->history_x, t->n <= IMP_TRAIL_MAX ? n * t->n : 0,
+    IMP_TRY(get_array(s, "history_x", t->history_x, imp__search_trails(t) ? n * t->n : 0,
                       is_number));
     IMP_TRY(get_array(s, "scalars", t->scalar, IMP_SEARCH_SCALARS, NULL));
     for (int k = 0; k < IMP_SEARCH_ARRAYS; k++) {

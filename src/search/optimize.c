@@ -134,7 +134,7 @@ enum imp_status imp__search_carry(const struct imp__search *old,
 enum imp_status imp__search_log(struct imp__search *s, struct imp_estimate f,
                                 const double *x)
 {
-    const size_t n = s->n <= IMP_TRAIL_MAX ? s->n : 0;
+    const size_t n = imp__search_trails(s) ? s->n : 0;
     double *h =
         imp__grow(s->ctx, s->history, &s->cap_history, s->n_history + 1, sizeof *h);
     if (h) s->history = h;

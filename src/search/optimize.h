@@ -92,7 +92,7 @@ struct imp__search {
     double *x;                 /* [n] the best estimate so far, inside the bounds */
     size_t n_history, cap_history, cap_history_se, cap_history_x;
     double *history, *history_se;
-    double *history_x; /* [n_history][n] where these were; NULL for n > IMP_TRAIL_MAX */
+    double *history_x; /* [n_history][n] where these were; see imp__search_trail */
     /* Private to the optimiser. */
     double *array[IMP_SEARCH_ARRAYS];
     size_t array_n[IMP_SEARCH_ARRAYS], array_cap[IMP_SEARCH_ARRAYS];
@@ -122,7 +122,8 @@ void imp__search_settle(struct imp__search *search);
 /* Of Adam, before its first iteration: go on from x, while `start` stays. */
 void imp__search_move(const struct imp__goal *goal, struct imp__search *search,
                       const double *x);
-/* Its iterations and their losses follow those of `from`, which has none then. */
+/* Its iterations and their losses follow those of `from`, which has none then; history_x
+ * is the caller's to make. */
 void imp__search_take_history(struct imp__search *search, struct imp__search *from);
 
 /* Numbers of old variables -> of new ones: how a change of the old is one of the new. */
@@ -166,10 +167,16 @@ uint64_t imp__search_seed(const struct imp__goal *goal, int i, int k);
 enum imp_status imp__normal_create(imp_context *ctx, size_t n, struct imp__normal *out);
 void imp__normal_destroy(imp_context *ctx, struct imp__normal *normal);
 
+/* Does it keep where it was? Of few variables, unless they stand for others
+ * (fit_levels.c). */
+static inline bool imp__search_trails(const struct imp__search *s)
+{
+    return s->start && s->n <= IMP_TRAIL_MAX;
+}
 /* Numbers in history_x. */
 static inline size_t imp__search_trail(const struct imp__search *s)
 {
-    return s->n <= IMP_TRAIL_MAX ? s->n_history * s->n : 0;
+    return imp__search_trails(s) ? s->n_history * s->n : 0;
 }
 
 static inline struct imp__span imp__goal_span(const struct imp__goal *goal, size_t k)
