@@ -44,17 +44,18 @@ enum imp_status imp__build_bumps_survey(struct imp_scene *scene,
     return IMP_OK;
 }
 
-/* The textures of the scene's shapes that a mesh_attribute looks up become its inputs. */
+/* The textures of the scene's shapes, also of those in groups, that a mesh_attribute looks
+ * up become its inputs. */
 static enum imp_status link_inputs(struct imp_scene *scene, struct imp_texture *t)
 {
     enum imp_status st = IMP_OK;
     int n = 0;
-    for (int i = 0; i < scene->n_shapes; i++) n += scene->shapes[i]->n_attributes;
+    for (int i = 0; i < scene->n_all_shapes; i++) n += scene->shapes[i]->n_attributes;
     const struct imp_input **input =
         imp__arena_array(&scene->arena, (size_t)n + 1, sizeof *input);
     if (!input) IMP_TRY(imp__build_no_memory(scene));
     t->n_in = 0;
-    for (int i = 0; i < scene->n_shapes; i++)
+    for (int i = 0; i < scene->n_all_shapes; i++)
         for (int k = 0; k < scene->shapes[i]->n_attributes; k++) {
             const struct imp_attribute *a = &scene->shapes[i]->attribute[k];
             if (!imp__attribute_asked(t, a->name)) continue;
@@ -91,7 +92,8 @@ enum imp_status imp__build_attributes(struct imp_scene *scene)
 {
     enum imp_status st = IMP_OK;
     bool any = false;
-    for (int i = 0; i < scene->n_shapes; i++) any |= scene->shapes[i]->n_attributes > 0;
+    for (int i = 0; i < scene->n_all_shapes; i++)
+        any |= scene->shapes[i]->n_attributes > 0;
     if (!any) return IMP_OK;
     for (int i = 0; i < scene->n_textures; i++)
         if (strcmp(scene->textures[i]->ops->name, "mesh_attribute") == 0)
