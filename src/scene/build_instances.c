@@ -122,8 +122,9 @@ static enum imp_status within_list(struct imp_scene *scene, struct imp_group *g)
 
 /* ---- Materials by instance ------------------------------------------------------------ */
 
-static enum imp_status covered_make(struct imp_scene *scene, const struct imp_group *g,
-                                    int bsdf, const struct imp_covered **out)
+static enum imp_status covered_make(struct imp_scene *scene, const struct imp_node *node,
+                                    const struct imp_group *g, int bsdf,
+                                    const struct imp_covered **out)
 {
     enum imp_status st = IMP_OK;
     for (int k = 0; k < scene->n_covered; k++)
@@ -140,6 +141,7 @@ static enum imp_status covered_make(struct imp_scene *scene, const struct imp_gr
         *s = *scene->shapes[g->within[k]];
         s->bsdf = bsdf;
         s->index = scene->n_shapes;
+        IMP_TRY(imp__build_bumps_survey(scene, node, s));
         IMP_TRY(
             imp__build_list_add(scene, (void ***)&scene->shapes, &scene->n_shapes, s));
     }
@@ -240,7 +242,7 @@ static enum imp_status instance_build(struct imp_scene *scene, struct imp_node *
     if (bsdf) {
         struct imp_bsdf *made;
         IMP_TRY(imp__build_bsdf(scene, bsdf, name, "bsdf", &made));
-        IMP_TRY(covered_make(scene, p->group, made->index, &p->covered));
+        IMP_TRY(covered_make(scene, node, p->group, made->index, &p->covered));
     }
     IMP_TRY(imp__props_finish(ctx, node));
 out:
