@@ -10,6 +10,8 @@ struct imp__cells imp__cells_of(const struct imp_param_info *p)
         c = (struct imp__cells){{p->layers, p->dims[0] / p->layers, p->dims[1]}, 3};
     else if (p->layers > 0)
         c = (struct imp__cells){{p->dims[0], p->dims[1], p->dims[2]}, 1};
+    else if (p->n_dims == 2 && p->flags & IMP_PARAM_COLOR) /* colours in a row */
+        c = (struct imp__cells){{1, 1, p->dims[0]}, p->dims[1]};
     else if (p->n_dims >= 2)
         c = (struct imp__cells){{1, p->dims[0], p->dims[1]},
                                 p->n_dims > 2 ? p->dims[2] : 1};
