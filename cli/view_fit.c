@@ -40,6 +40,14 @@ static double shown(const struct block *b, const double *x, size_t i)
     return b->tie.log ? exp(x[b->first + i]) : x[b->first + i];
 }
 
+/* And back: number i of x from one that is shown, inside its bounds. */
+static double hidden(const struct block *b, double v, size_t i)
+{
+    double lo = -INFINITY, hi = INFINITY;
+    (void)!imp_problem_variable(f.problem, i, NULL, NULL, &lo, &hi); /* it is there */
+    return fmin(fmax(b->tie.log ? log(v) : v, lo), hi);
+}
+
 /* Of all blocks but textures, in the order of x. */
 static size_t few(const double *x, double *out)
 {
@@ -83,7 +91,8 @@ static void numbers_move(void)
     imp_problem_get_x(f.problem, x);
     for (size_t k = 0; k < f.n_blocks; k++)
         for (size_t i = 0; !block_is_large(&f.blocks[k]) && i < f.blocks[k].n; i++)
-            x[f.blocks[k].first + i] = f.blocks[k].tie.log ? log(value[n++]) : value[n++];
+            x[f.blocks[k].first + i] =
+                hidden(&f.blocks[k], value[n++], f.blocks[k].first + i);
     if (imp_problem_set_x(f.problem, x) != IMP_OK)
         cli_say("importon: %s", imp_last_error(cli.context));
     imp_problem_get_x(f.problem, x);
@@ -273,10 +282,8 @@ static int write_all(void)
     double *found = cli_alloc(f.n, sizeof *found), *now = cli_alloc(f.n, sizeof *now);
     imp_problem_get_x(f.problem, now);
     for (size_t k = 0; k < f.n_blocks; k++)
-        for (size_t i = f.blocks[k].first; i < f.blocks[k].first + f.blocks[k].n; i++) {
-            const double v = fit_variable(f.problem, i).value;
-            found[i] = f.blocks[k].tie.log ? log(v) : v;
-        }
+        for (size_t i = f.blocks[k].first; i < f.blocks[k].first + f.blocks[k].n; i++)
+            found[i] = hidden(&f.blocks[k], fit_variable(f.problem, i).value, i);
     int rc = imp_problem_set_x(f.problem, found) == IMP_OK ? 0 : EXIT_RUN;
     if (!rc) rc = fit_answer_write(&a);
     if (!rc) rc = fit_targets_write();
