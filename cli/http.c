@@ -1,16 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "http.h"
 
+#include "http_server.h"
+
 #include "command.h"
 
 #include <arpa/inet.h>
 #include <errno.h>
-#include <microhttpd.h>
 #include <pthread.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/random.h>
 #include <sys/socket.h>
+
+static struct http_server mhd; /* since http_start */
 
 enum { TOKEN_BYTES = 16, CONNECTIONS = 32 };
 
@@ -57,7 +60,7 @@ static int is_token(const char *text)
 
 static const char *header(struct MHD_Connection *c, const char *name)
 {
-    return MHD_lookup_connection_value(c, MHD_HEADER_KIND, name);
+    return mhd.lookup_connection_value(c, MHD_HEADER_KIND, name);
 }
 
 /* What follows the token in the path; NULL with the status to answer. */
@@ -90,10 +93,10 @@ static enum MHD_Result answer(struct MHD_Connection *c, unsigned status,
     };
     if (!r) return MHD_NO;
     for (size_t k = 0; k < sizeof fixed / sizeof *fixed; k++)
-        (void)MHD_add_response_header(r, fixed[k][0], fixed[k][1]);
-    (void)MHD_add_response_header(r, "Content-Type", type);
-    const enum MHD_Result done = MHD_queue_response(c, status, r);
-    MHD_destroy_response(r);
+        (void)mhd.add_response_header(r, fixed[k][0], fixed[k][1]);
+    (void)mhd.add_response_header(r, "Content-Type", type);
+    const enum MHD_Result done = mhd.queue_response(c, status, r);
+    mhd.destroy_response(r);
     return done;
 }
 
@@ -101,7 +104,7 @@ static enum MHD_Result answer_text(struct MHD_Connection *c, unsigned status,
                                    const char *text)
 {
     return answer(c, status,
-                  MHD_create_response_from_buffer(strlen(text), (void *)(uintptr_t)text,
+                  mhd.create_response_from_buffer(strlen(text), (void *)(uintptr_t)text,
                                                   MHD_RESPMEM_MUST_COPY),
                   "text/plain; charset=utf-8");
 }
@@ -140,7 +143,7 @@ static ssize_t read_news(void *payload, uint64_t offset, char *to, size_t room)
         t->at += (size_t)n;
     } else {
         t->waits = 1;
-        MHD_suspend_connection(t->connection);
+        mhd.suspend_connection(t->connection);
     }
     pthread_mutex_unlock(&s.lock);
     return n;
@@ -163,7 +166,7 @@ static void wake_all(void)
     for (struct stream *t = s.streams; t; t = t->next)
         if (t->waits) {
             t->waits = 0;
-            MHD_resume_connection(t->connection);
+            mhd.resume_connection(t->connection);
         }
 }
 
@@ -172,7 +175,7 @@ static enum MHD_Result listen_to(struct MHD_Connection *c)
     struct stream *t = calloc(1, sizeof *t);
     if (!t) return MHD_NO;
     t->connection = c;
-    struct MHD_Response *r = MHD_create_response_from_callback(MHD_SIZE_UNKNOWN, 1 << 16,
+    struct MHD_Response *r = mhd.create_response_from_callback(MHD_SIZE_UNKNOWN, 1 << 16,
                                                                read_news, t, stream_free);
     if (!r) {
         free(t);
@@ -203,7 +206,7 @@ void http_send(int channel, const char *event, char *text)
 
 static const char *argument(void *request, const char *name)
 {
-    return MHD_lookup_connection_value(request, MHD_GET_ARGUMENT_KIND, name);
+    return mhd.lookup_connection_value(request, MHD_GET_ARGUMENT_KIND, name);
 }
 
 static enum MHD_Result handle(void *payload, struct MHD_Connection *c, const char *path,
@@ -229,7 +232,7 @@ static enum MHD_Result handle(void *payload, struct MHD_Connection *c, const cha
     const int gets = !strcmp(method, "GET"), posts = !strcmp(method, "POST");
     if (!strcmp(rest, "/") && gets)
         return answer(c, MHD_HTTP_OK,
-                      MHD_create_response_from_buffer(s.service.page_size,
+                      mhd.create_response_from_buffer(s.service.page_size,
                                                       (void *)(uintptr_t)s.service.page,
                                                       MHD_RESPMEM_PERSISTENT),
                       "text/html; charset=utf-8");
@@ -266,10 +269,12 @@ int http_open(const struct http_service *service, int port)
     at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     const int rc = token_make();
     if (rc) return rc;
+    const int found = http_server_find(&mhd);
+    if (found) return found;
     s.service = *service;
     s.closing = 0;
     errno = 0;
-    s.daemon = MHD_start_daemon(
+    s.daemon = mhd.start_daemon(
         MHD_USE_INTERNAL_POLLING_THREAD | MHD_ALLOW_SUSPEND_RESUME, 0, NULL, NULL, handle,
         NULL, MHD_OPTION_SOCK_ADDR, &at, MHD_OPTION_CONNECTION_LIMIT,
         (unsigned)CONNECTIONS, MHD_OPTION_END);
@@ -277,7 +282,7 @@ int http_open(const struct http_service *service, int port)
         return cli_error(EXIT_RUN, "127.0.0.1:%d cannot be listened on: %s", port,
                          errno ? strerror(errno) : "the server does not start");
     const union MHD_DaemonInfo *info =
-        MHD_get_daemon_info(s.daemon, MHD_DAEMON_INFO_BIND_PORT);
+        mhd.get_daemon_info(s.daemon, MHD_DAEMON_INFO_BIND_PORT);
     snprintf(s.host, sizeof s.host, "127.0.0.1:%u", info ? info->port : (unsigned)port);
     snprintf(s.origin, sizeof s.origin, "http://%s", s.host);
     snprintf(s.url, sizeof s.url, "%s/%s/", s.origin, s.token);
@@ -293,7 +298,7 @@ void http_close(void)
     s.closing = 1;
     wake_all();
     pthread_mutex_unlock(&s.lock);
-    MHD_stop_daemon(s.daemon);
+    mhd.stop_daemon(s.daemon);
     s.daemon = NULL;
     for (int k = 0; k < HTTP_CHANNELS; k++) {
         free(s.news[k].text);
