@@ -26,8 +26,11 @@ enum imp_status imp__build_gain(struct imp_scene *scene, struct imp_node *film,
     bool written[IMP_GAIN_INPUTS], any = false;
     const struct imp_input *in[IMP_INPUTS_MAX];
     int n = 0;
-    for (int k = 0; k < IMP_GAIN_INPUTS; k++)
+    for (int k = 0; k < IMP_GAIN_INPUTS; k++) {
+        imp__node_ask(film,
+                      inputs[k].name); /* also where none is written: for messages */
         any |= written[k] = imp__node_prop(film, inputs[k].name) != NULL;
+    }
     if (!any) return IMP_OK;
     struct imp_camera_gain *g = imp__arena_array(&scene->arena, 1, sizeof *g);
     if (!g) return imp__build_no_memory(scene);
