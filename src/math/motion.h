@@ -15,25 +15,15 @@ struct imp_map { /* the rows of an affine map: p' = m p + its last column */
 
 static inline imp_v3 imp__map_point(const struct imp_map *a, imp_v3 p)
 {
-    const double *m = a->m;
-    return imp__v3(m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3],
-                   m[4] * p[0] + m[5] * p[1] + m[6] * p[2] + m[7],
-                   m[8] * p[0] + m[9] * p[1] + m[10] * p[2] + m[11]);
+    return imp__rows_point(a->m, p);
 }
 static inline imp_v3 imp__map_vector(const struct imp_map *a, imp_v3 v)
 {
-    const double *m = a->m;
-    return imp__v3(m[0] * v[0] + m[1] * v[1] + m[2] * v[2],
-                   m[4] * v[0] + m[5] * v[1] + m[6] * v[2],
-                   m[8] * v[0] + m[9] * v[1] + m[10] * v[2]);
+    return imp__rows_vector(a->m, v);
 }
-/* Normals go with the transpose of the inverse. Not normalised. */
 static inline imp_v3 imp__map_normal(const struct imp_map *inverse, imp_v3 n)
 {
-    const double *m = inverse->m;
-    return imp__v3(m[0] * n[0] + m[4] * n[1] + m[8] * n[2],
-                   m[1] * n[0] + m[5] * n[1] + m[9] * n[2],
-                   m[2] * n[0] + m[6] * n[1] + m[10] * n[2]);
+    return imp__rows_normal(inverse->m, n);
 }
 struct imp_map imp__map_of(const struct imp_mat4 *a);
 /* False, and *out unchanged, if it is singular. */

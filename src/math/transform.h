@@ -28,28 +28,39 @@ static inline struct imp_mat4 imp__mat4_multiply(const struct imp_mat4 *a,
     return c;
 }
 
-/* Affine maps: the last row is taken to be 0 0 0 1. */
-static inline imp_v3 imp__point(const struct imp_mat4 *a, imp_v3 p)
+/* The rows m [12] of an affine map: p' = m p + its last column. */
+static inline imp_v3 imp__rows_point(const double *m, imp_v3 p)
 {
-    const double *m = a->m;
     return imp__v3(m[0] * p[0] + m[1] * p[1] + m[2] * p[2] + m[3],
                    m[4] * p[0] + m[5] * p[1] + m[6] * p[2] + m[7],
                    m[8] * p[0] + m[9] * p[1] + m[10] * p[2] + m[11]);
 }
-static inline imp_v3 imp__vector(const struct imp_mat4 *a, imp_v3 v)
+static inline imp_v3 imp__rows_vector(const double *m, imp_v3 v)
 {
-    const double *m = a->m;
     return imp__v3(m[0] * v[0] + m[1] * v[1] + m[2] * v[2],
                    m[4] * v[0] + m[5] * v[1] + m[6] * v[2],
                    m[8] * v[0] + m[9] * v[1] + m[10] * v[2]);
 }
-/* Normals go with the inverse transpose: pass the inverse of the map. Not normalised. */
-static inline imp_v3 imp__normal(const struct imp_mat4 *inverse, imp_v3 n)
+/* Normals go with the transpose of the inverse: m is the inverse. Not normalised. */
+static inline imp_v3 imp__rows_normal(const double *m, imp_v3 n)
 {
-    const double *m = inverse->m;
     return imp__v3(m[0] * n[0] + m[4] * n[1] + m[8] * n[2],
                    m[1] * n[0] + m[5] * n[1] + m[9] * n[2],
                    m[2] * n[0] + m[6] * n[1] + m[10] * n[2]);
+}
+
+/* Affine maps: the last row is taken to be 0 0 0 1. */
+static inline imp_v3 imp__point(const struct imp_mat4 *a, imp_v3 p)
+{
+    return imp__rows_point(a->m, p);
+}
+static inline imp_v3 imp__vector(const struct imp_mat4 *a, imp_v3 v)
+{
+    return imp__rows_vector(a->m, v);
+}
+static inline imp_v3 imp__normal(const struct imp_mat4 *inverse, imp_v3 n)
+{
+    return imp__rows_normal(inverse->m, n);
 }
 
 static inline bool imp__mat4_is_affine(const struct imp_mat4 *a)
