@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A walk while it is decided, and what happens at a vertex: emission is met, a light is
- * sampled (light.c), the continuation is drawn (direction.c, scatter.c). Only trace.c
- * puts them together. */
+ * sampled (light.c), the continuation is drawn (direction.c, scatter.c), and branches
+ * where the walk is split (walk_split.c). Only trace.c puts them together, walk_trace.c
+ * begins a walk and closes it. */
 #ifndef IMP_WALK_STEP_H
 #define IMP_WALK_STEP_H
 
@@ -138,10 +139,25 @@ void imp__vertex_place(struct imp_step *s, struct imp_vertex *v,
                        imp_v3 d, double t);
 /* The vertex that the first segment begins at, if it has a weight. False: no memory. */
 bool imp__sensor_vertex(struct imp_step *s);
+/* Step after step from the ray in flight, until the walk ends; from a sensor that is a
+ * surface, whose vertex comes first. */
+void imp__walk_on(struct imp_step *s);
+void imp__walk_on_meter(struct imp_step *s);
 /* What is scattered at point p of a medium back along s->d: a walk of its own, that
  * begins with a copy of s; its walk is empty. */
 imp_spec imp__walk_scattered(struct imp_step *s, const struct imp_bsdf *scatterer,
                              imp_v3 p);
+
+/* ---- walk_split.c ---- */
+/* The continuation of v, and its branches: one from each member of the mixture, or as many
+ * as the tracer wants. False: the walk itself ends here. */
+bool imp__scatter_split(struct imp_step *s, struct imp_vertex *v,
+                        const struct imp_surface *at, const struct imp_frame *frame);
+
+/* ---- walk_trace.c ---- */
+/* Why a walk of this radiance is dropped: no light can have it, or no picture can hold
+ * it. */
+enum imp_drop imp__drop_cause(imp_spec L);
 
 /* ---- segment.c ---- */
 /* The nearest hit of the ray in flight. With hide_emitters, a camera ray skips area

@@ -10,9 +10,7 @@
  * and after a delta lobe. Depth: emission at vertex k counts if k < max_depth, scattering
  * goes on and samples lights if k + 1 < max_depth (docs/scene-format.md 11). */
 #include "meter.h"
-#include "probe.h"
 #include "scene/instances.h"
-#include <float.h>
 #include <stddef.h>
 
 /* ---- Vertices -------------------------------------------------------------------- */
@@ -217,115 +215,6 @@ static void emission_add(struct imp_step *s, struct imp_vertex *v, double weight
     }
 }
 
-static void walk_on(struct imp_step *s);
-
-/* The continuation of v counts by a share of 1/n. */
-static void share(const struct imp_step *s, struct imp_vertex *v, int n)
-{
-    const double part = imp__decide1(1. / n);
-    imp__step_pass(v, imp__spec(part));
-    if (s->recorded) v->d.passes = (imp_decided)part;
-}
-
-/* Continuations of a vertex that splits: one from each member of the mixture, with weights
- * of MIS in the densities; or as many as the tracer wants, each with its share. */
-static int branches(const struct imp_step *s)
-{
-    return s->mixed.splits ? s->mixed.members : s->tracer->split;
-}
-static bool branch_scatter(struct imp_step *s, struct imp_vertex *v, int i,
-                           const struct imp_surface *at, const struct imp_frame *frame)
-{
-    if (s->mixed.splits) { /* the i-th member that has a share */
-        int k = 0;
-        for (;; k++)
-            if (s->mixed.share[k] > 0 && i-- == 0) break;
-        s->mixed.only = k;
-        return imp__scatter(s, v, at, frame);
-    }
-    if (!imp__scatter(s, v, at, frame)) return false;
-    share(s, v, s->tracer->split);
-    return true;
-}
-
-/* The point of the same number in another set. */
-static struct imp_point point_branch(struct imp_point point, int vertex, int i)
-{
-    point.set = imp__key_branch((struct imp_key){point.set}, vertex, i).state;
-    return point;
-}
-
-/* Further continuations of v hang on it as side walks. `before`: the walk before its own
- * continuation was drawn. */
-static __attribute__((noinline)) void split(const struct imp_step *before,
-                                            struct imp_vertex *v,
-                                            const struct imp_surface *at,
-                                            const struct imp_frame *frame)
-{
-    struct imp_walk *walk = before->walk;
-    const int n = branches(before);
-    for (int i = 1; i < n && !walk->dropped; i++) {
-        struct imp_step s = *before;
-        struct imp_side *side = imp__arena_take(s.arena, 1, sizeof *side);
-        if (!side) {
-            walk->dropped = IMP_DROP_MEMORY;
-            return;
-        }
-        side->next = v->side;
-        v->side = side;
-        side->walk = (struct imp_walk){.px = walk->px,
-                                       .py = walk->py,
-                                       .key = imp__key_branch(walk->key, s.depth, i),
-                                       .point = point_branch(walk->point, s.depth, i),
-                                       .ray = walk->ray,
-                                       .time = walk->time,
-                                       .waves = walk->waves,
-                                       .wave = walk->wave,
-                                       .depth = s.depth};
-        s.walk = &side->walk;
-        imp__step_numbers(&s);
-        struct imp_vertex *u = vertex_add(&s, v->bsdf->n_in);
-        if (!u) {
-            walk->dropped = side->walk.dropped;
-            return;
-        }
-        u->shape = v->shape;
-        u->bsdf = v->bsdf;
-        u->t = v->t;
-        if (s.recorded) {
-            u->ng = v->ng;
-            u->d.shape = v->d.shape;
-            u->d.scatterer = v->d.scatterer;
-            u->d.uv[0] = v->d.uv[0];
-            u->d.uv[1] = v->d.uv[1];
-            imp__store_v3(u->d.p, s.at.p);
-            imp__store_v3(u->d.wo, s.wo);
-        }
-        imp_spec *in = s.recorded ? u->in : s.scratch;
-        imp__evaluate_inputs(u->bsdf, u->shape, &s.at, in);
-        s.in = in;
-        if (branch_scatter(&s, u, i, at, frame)) {
-            s.depth++;
-            walk_on(&s);
-        }
-        walk->valid |= side->walk.valid;
-        side->walk.valid = true;
-        walk->dropped = side->walk.dropped;
-    }
-}
-
-/* The continuation of v, and its branches where the walk is split. */
-static __attribute__((noinline)) bool scatter_split(struct imp_step *s,
-                                                    struct imp_vertex *v,
-                                                    const struct imp_surface *at,
-                                                    const struct imp_frame *frame)
-{
-    const struct imp_step before = *s;
-    const bool continues = branch_scatter(s, v, 0, at, frame);
-    split(&before, v, at, frame);
-    return continues;
-}
-
 /* The densities at the vertex that was met, and whether it splits. */
 static __attribute__((noinline)) void
 mixture_meet(struct imp_step *s, const struct imp_bsdf *b, const struct imp_surface *at)
@@ -391,7 +280,7 @@ vertex_work(struct imp_step *s, struct imp_vertex *v, const struct imp_hit *hit,
                          s->scene->n_bodies + s->scene->n_media == 0);
     const bool continues =
         integrator->directions &&
-        (splits ? scatter_split(s, v, at, frame) : imp__scatter(s, v, at, frame));
+        (splits ? imp__scatter_split(s, v, at, frame) : imp__scatter(s, v, at, frame));
 
     /* Is the light seen? */
     if (shadow.wanted) {
@@ -429,7 +318,7 @@ static inline __attribute__((always_inline)) bool step(struct imp_step *s)
     return v && vertex_work(s, v, &hit, &at, &frame);
 }
 
-static void walk_on(struct imp_step *s)
+void imp__walk_on(struct imp_step *s)
 {
     while (step(s)) s->depth++;
 }
@@ -443,125 +332,17 @@ imp_spec imp__walk_scattered(struct imp_step *s, const struct imp_bsdf *scattere
     if (!v) return (imp_spec){0};
     if (vertex_work(s, v, NULL, &at, &frame)) {
         s->depth++;
-        walk_on(s);
+        imp__walk_on(s);
     }
     return imp__walk_fold(s->walk);
 }
 
-/* From a sensor that is a surface. */
-static __attribute__((noinline)) void meter_walk(struct imp_step *s)
+void imp__walk_on_meter(struct imp_step *s)
 {
     struct imp_surface at;
     struct imp_frame frame;
     struct imp_vertex *v = imp__meter_begin(s, &at, &frame);
     if (!v || !vertex_work(s, v, NULL, &at, &frame)) return;
     s->depth++;
-    walk_on(s);
-}
-
-/* ---- Walks ------------------------------------------------------------------------ */
-
-/* Keys use full-film pixels: a crop renders the same samples as the whole picture. The
- * border of wide filters may lie outside the film, hence the offset. */
-static struct imp_walk walk_numbered(const struct imp_tracer *tracer, int x, int y,
-                                     int64_t sample)
-{
-    const struct imp_film_desc *film = &tracer->sensor->film;
-    const uint64_t row = (uint64_t)(y + film->crop_y + 0x8000);
-    const uint64_t column = (uint64_t)(x + film->crop_x + 0x8000),
-                   pixel = row << 32 | column;
-    struct imp_walk walk = {.key = imp__key(tracer->seed, pixel, (uint64_t)sample)};
-    if (!tracer->points) return walk;
-    const uint64_t set = (uint64_t)sample / IMP_SET_POINTS | 1ull << 63;
-    walk.point = (struct imp_point){.points = tracer->points,
-                                    .set = imp__key(tracer->seed, pixel, set).state,
-                                    .index = (uint32_t)sample % IMP_SET_POINTS};
-    return walk;
-}
-
-static inline void position(const struct imp_tracer *tracer, const struct imp_walk *w,
-                            int x, int y, double *px, double *py)
-{
-    const struct imp_film_desc *film = &tracer->sensor->film;
-    *px = film->crop_x + x + imp__start_number(w->key, w->point, IMP_DIM_PIXEL_X);
-    *py = film->crop_y + y + imp__start_number(w->key, w->point, IMP_DIM_PIXEL_Y);
-}
-
-void imp__walk_position(const struct imp_tracer *tracer, int x, int y, int64_t sample,
-                        double *px, double *py)
-{
-    const struct imp_walk walk = walk_numbered(tracer, x, y, sample);
-    position(tracer, &walk, x, y, px, py);
-}
-
-/* Why a walk of this radiance is dropped: no light can have it, or no picture can hold
- * it. */
-static __attribute__((noinline)) enum imp_drop drop_cause(imp_spec L)
-{
-    double sum = 0, largest = 0;
-    for (int c = 0; c < 4; c++) {
-        sum += L[c];
-        largest = fmax(largest, fabs(L[c]));
-    }
-    if (isnan(sum)) return IMP_DROP_NAN;
-    return largest <= FLT_MAX ? IMP_DROP_NEGATIVE : IMP_DROP_INFINITE;
-}
-
-void imp__walk_close(const struct imp_tracer *tracer, struct imp_walk *walk)
-{
-    const imp_spec L = imp__walk_fold(walk);
-    imp_spec used = L;
-    if (!tracer->wavelengths) used[3] = 0;
-    if (imp_unlikely(!imp__is_within(used, FLT_MAX))) walk->dropped = drop_cause(used);
-    walk->values = walk->dropped || !walk->valid ? (imp_spec){0} : L;
-    walk->L = imp__walk_channels(tracer, walk, walk->values);
-}
-
-void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, int x,
-                     int y, int64_t sample, struct imp_walk *walk)
-{
-    const struct imp_sensor *sensor = tracer->sensor;
-    *walk = walk_numbered(tracer, x, y, sample);
-    position(tracer, walk, x, y, &walk->px, &walk->py);
-    const double lens[2] = {imp__start_number(walk->key, walk->point, IMP_DIM_LENS_U),
-                            imp__start_number(walk->key, walk->point, IMP_DIM_LENS_V)};
-    sensor->ops->ray(sensor, walk->px, walk->py, lens, &walk->ray);
-    walk->time = imp__walk_time(tracer, walk);
-
-    if (imp_unlikely(tracer->wavelengths != NULL) &&
-        !imp__walk_wave(tracer, arena, imp__wave_draw(tracer, walk, sample), walk))
-        return;
-
-    imp_spec scratch[IMP_INPUTS_MAX];
-    struct imp_step s = {.tracer = tracer,
-                         .scene = tracer->scene,
-                         .walk = walk,
-                         .arena = arena,
-                         .recorded = !tracer->value_only ||
-                                     (tracer->active && tracer->active->body),
-                         .scratch = scratch,
-                         .at.carried = walk->waves ? &walk->waves->carried : NULL,
-                         .segment = imp__segment_first(tracer),
-                         .o = walk->ray.o,
-                         .d = walk->ray.d,
-                         .t_min = walk->ray.t_near,
-                         .t_max = walk->ray.t_far,
-                         .from = walk->ray.o,
-                         .beta = {1, 1, 1, 1},
-                         .eta = 1,
-                         .lanes = IMP_LANE_MIS_INIT,
-                         .guided.guide = tracer->guide};
-    s.mixed.same = tracer->mixing != NULL;
-    s.mixed.all = tracer->mixing              ? tracer->mixing
-                  : tracer->integrator->mixes ? tracer->integrator->mixing
-                                              : NULL;
-    struct imp_probing probing = {.n = 0};
-    if (imp_unlikely(tracer->active && tracer->active->medium) && s.recorded &&
-        !tracer->collisions_stand && tracer->integrator->media)
-        s.probing = &probing;
-    if (imp_unlikely(sensor->shape != NULL)) meter_walk(&s);
-    else if (imp_likely(s.segment->begin == NULL) || s.segment->begin(&s)) walk_on(&s);
-    if (imp_unlikely(s.probing != NULL)) imp__probe_follow(&s);
-
-    imp__walk_close(tracer, walk);
+    imp__walk_on(s);
 }

@@ -1,204 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Flights through media while a walk is decided, and the way to its light samples. */
+ * Segments through media while a walk is decided, and the way to its light samples. */
 #include "tracking.h"
-#include "probe.h"
+#include "flight.h"
 #include "scene/instances.h"
-#include "scene/majorants.h"
-
-/* A ray through media, from its start. */
-struct flight {
-    struct imp_step *s;
-    struct imp_key key;      /* of its own random numbers */
-    uint32_t n;              /* of them used */
-    imp_v3 o, d;             /* as decided: where extinction is looked up */
-    imp_spec f;              /* the segment's value */
-    struct imp_track *track; /* NULL: not kept */
-    bool any;                /* it has crossed a medium */
-    struct imp_event line;   /* IMP_LINE_AT so far; bound 0: none */
-    double length;           /* of the stretches that it was chosen from */
-};
-
-static double uniform(struct flight *w) { return imp__u01(w->key, w->n++); }
-static double free_path(struct flight *w) { return -log1p(-uniform(w)); }
-
-enum {
-    ALONG_WALK = 0x7001,
-    TO_LIGHT,
-    ON_LINE
-}; /* streams of random numbers of a vertex */
-
-static struct flight flight_from(struct imp_step *s, imp_v3 o, imp_v3 d, int stream)
-{
-    return (struct flight){.s = s,
-                           .key = imp__key_branch(s->walk->key, s->depth, stream),
-                           .o = imp__decide(o),
-                           .d = imp__decide(d),
-                           .f = imp__spec(1)};
-}
-
-/* What a flight has done is kept where the walk is. */
-static bool event_add(struct flight *w, struct imp_event e)
-{
-    struct imp_step *s = w->s;
-    struct imp_track *k = w->track;
-    w->any = true;
-    if (!s->recorded) return true;
-    if (!k) {
-        k = w->track = imp__arena_take(s->arena, 1, sizeof *k);
-        if (!k) goto no_memory;
-        *k = (struct imp_track){.n = 0};
-        imp__store_v3(k->o, w->o);
-        imp__store_v3(k->d, w->d);
-    }
-    if (k->n == k->cap) {
-        const int cap = k->cap ? 2 * k->cap : 2;
-        struct imp_event *more = imp__arena_take(s->arena, (size_t)cap, sizeof *more);
-        if (!more) goto no_memory;
-        for (int i = 0; i < k->n; i++) more[i] = k->event[i];
-        k->event = more;
-        k->cap = cap;
-    }
-    k->event[k->n++] = e;
-    return true;
-no_memory:
-    s->walk->dropped = IMP_DROP_MEMORY;
-    return false;
-}
-
-/* ---- Media of uniform extinction --------------------------------------------------- */
-
-#define DEEP 0.5 /* optical depth from which on a stretch stands */
-
-static bool uniform_fly(struct flight *w, const struct imp_medium *m, double near,
-                        double far, bool collides, double *t, bool *stands)
-{
-    imp_spec in[IMP_INPUTS_MAX];
-    const imp_spec sigma = imp__extinction_at(m, w->o, w->s->at.carried, in);
-    double length = far - near, sum = 0;
-    bool hit = false;
-    for (int c = 0; c < imp__lane_mis_count(w->s); c++) sum += sigma[c];
-    *stands = collides && sum * length >= DEEP * imp__lane_mis_count(w->s);
-    if (collides) {
-        const double path = free_path(w), mine = sigma[imp__lane_mis_drew(w->s)];
-        hit = mine > 0 && path < length * mine;
-        if (hit) length = path / mine;
-    }
-    *t = near + length;
-    length = imp__decide1(length);
-    const imp_spec T = imp__attenuation(sigma, length);
-    w->f *= hit ? sigma * T : T;
-    event_add(w, (struct imp_event){.t = (imp_decided)length,
-                                    .bound = *stands,
-                                    .medium = m->index,
-                                    .kind = hit ? IMP_COLLIDES : IMP_CROSSES});
-    return hit;
-}
-
-/* ---- Media whose extinction varies -------------------------------------------------- */
-
-/* A tentative collision at t. Real, by the lane that draws? */
-static bool collide(struct flight *w, const struct imp_medium *m, double t, double bound,
-                    bool collides)
-{
-    struct imp_step *s = w->s;
-    imp_spec in[IMP_INPUTS_MAX];
-    const imp_spec sigma =
-        imp__extinction_at(m, w->o + w->d * t, s->at.carried, in) * (1 / bound);
-    for (int c = 0; c < imp__lane_mis_count(s); c++)
-        if (!(sigma[c] >= 0 && sigma[c] <= 1)) {
-            s->walk->dropped = IMP_DROP_MAJORANT;
-            return true;
-        }
-    const bool real = collides && uniform(w) < sigma[imp__lane_mis_drew(s)];
-    w->f *= real ? sigma : 1 - sigma;
-    event_add(w, (struct imp_event){.t = (imp_decided)t,
-                                    .bound = (imp_decided)bound,
-                                    .medium = m->index,
-                                    .kind = real ? IMP_REAL_AT : IMP_NULL_AT});
-    return real;
-}
-
-/* Tentative collisions with the density of the local bound, one after another. */
-static bool varying_fly(struct flight *w, const struct imp_medium *m,
-                        struct imp_majorant_walk *cells, bool collides, double *t)
-{
-    double path = free_path(w), at = cells->t;
-    for (;;) {
-        const double room = (cells->leave - at) * cells->bound;
-        if (!(path < room)) {
-            path -= room;
-            if (!imp__majorants_next(cells)) return false;
-            at = cells->t;
-            continue;
-        }
-        at += path / cells->bound;
-        path = free_path(w);
-        const bool real = collide(w, m, imp__decide1(at), cells->bound, collides);
-        if (w->s->walk->dropped) return false;
-        if (!real) continue;
-        *t = at;
-        return true;
-    }
-}
-
-/* The way to a light sample is in m from near to far: a point of it is chosen for the
- * derivative of its transmittance, which tentative collisions do not have where the bound
- * is 0. */
-static void line_offer(struct flight *w, const struct imp_medium *m, double near,
-                       double far)
-{
-    const struct imp_step *s = w->s;
-    const struct imp_key key = imp__key_branch(s->walk->key, s->depth, ON_LINE);
-    const double length = far - near;
-    const uint32_t n = 2 * (uint32_t)w->line.kind; /* stretches so far */
-    w->length += length;
-    w->line.kind++;
-    if (!(imp__u01(key, n) * w->length < length)) return;
-    w->line.t = (imp_decided)(near + length * imp__u01(key, n + 1));
-    w->line.medium = m->index;
-}
-static bool line_add(struct flight *w)
-{
-    struct imp_event e = w->line;
-    if (e.kind == 0) return true;
-    e.kind = IMP_LINE_AT;
-    e.bound = (imp_decided)w->length;
-    return event_add(w, e);
-}
-
-/* From near to far in a medium; true: a collision at *t. */
-static bool fly(struct flight *w, const struct imp_medium *m, double near, double far,
-                bool collides, double *t)
-{
-    struct imp_step *s = w->s;
-    struct imp_majorant_walk cells;
-    const imp_spec before = w->f;
-    const int first = w->track ? w->track->n : 0;
-    bool hit, stands = false;
-    if (!(near < far)) return false;
-    if (!m->majorants) {
-        hit = uniform_fly(w, m, near, far, collides, t, &stands);
-    } else {
-        if (!imp__majorants_enter(m->majorants, w->o, w->d, near, far, &cells))
-            return false;
-        near = cells.t;
-        far = cells.end;
-        hit = varying_fly(w, m, &cells, collides, t);
-        if (!collides && s->probing && s->tracer->active->medium[m->index])
-            line_offer(w, m, near, far);
-        /* A probe asks for a track, and an empty one has its start. */
-        if (!w->track && s->probing && collides) {
-            event_add(w, (struct imp_event){.t = 0});
-            if (w->track) w->track->n = 0;
-        }
-    }
-    if (s->walk->dropped) return false;
-    if (collides) s->flight.stands = stands;
-    if (collides && !stands && s->probing && s->tracer->active->medium[m->index])
-        imp__probe_offer(s, m, w->track, first, before, near, hit ? *t : far);
-    return hit;
-}
 
 /* ---- Segments ---------------------------------------------------------------------- */
 
@@ -246,7 +51,7 @@ static enum imp_meeting collision(struct imp_step *s, const struct imp_medium *m
 }
 
 /* The step that led here has crossed media. */
-static void pass(struct imp_step *s, const struct flight *w)
+static void pass(struct imp_step *s, const struct imp_free_flight *w)
 {
     struct imp_vertex *from = s->walk->last;
     if (!w->any) return;
@@ -265,7 +70,7 @@ static enum imp_meeting meet(struct imp_step *s, struct imp_hit *hit)
     const bool hide = s->tracer->integrator->hide_emitters && imp__bounces(s) == 0;
     const imp_v3 start = s->o, d = s->d;
     enum imp_meeting met = IMP_MEETS_NOTHING;
-    struct flight w = flight_from(s, start, d, ALONG_WALK);
+    struct imp_free_flight w = imp__flight_from(s, start, d, IMP_FLIGHT_ALONG);
     double t, t_max = s->t_max, base = 0;
     for (int passed = 0;; passed++) {
         const bool found =
@@ -274,7 +79,7 @@ static enum imp_meeting meet(struct imp_step *s, struct imp_hit *hit)
                      far = base + (found ? hit->t : t_max);
         const struct imp_medium *m = s->flight.medium;
         s->flight.base = base;
-        if (m && fly(&w, m, near, far, true, &t)) {
+        if (m && imp__fly(&w, m, near, far, true, &t)) {
             met = collision(s, m, s->o + d * (t - base), t);
             break;
         }
@@ -334,7 +139,7 @@ static void leave(struct imp_step *s, const struct imp_vertex *v,
 /* ---- To light samples ---------------------------------------------------------------- */
 
 /* Past a surface that lets a part go straight on. False: nothing, or no memory. */
-static bool go_through(struct flight *w, const struct imp_shape *shape,
+static bool go_through(struct imp_free_flight *w, const struct imp_shape *shape,
                        const struct imp_surface *at)
 {
     struct imp_step *s = w->s;
@@ -352,13 +157,13 @@ static bool go_through(struct flight *w, const struct imp_shape *shape,
     const imp_spec f = imp__passes_eval(s->scene, &here, e, s->at.carried);
     if (imp__is_zero_used(f, s->at.carried) && !imp__wants_derivative(s, b)) return false;
     w->f *= f;
-    return event_add(w, e[0]) && event_add(w, e[1]);
+    return imp__flight_event(w, e[0]) && imp__flight_event(w, e[1]);
 }
 
 /* The light sample of v is seen. */
-static bool arrived(struct flight *w, struct imp_vertex *v, imp_spec *T)
+static bool arrived(struct imp_free_flight *w, struct imp_vertex *v, imp_spec *T)
 {
-    if (!line_add(w)) return false;
+    if (!imp__flight_line(w)) return false;
     *T = w->f;
     if (w->s->recorded) v->to_light = w->track;
     return true;
@@ -375,7 +180,7 @@ static bool sees(struct imp_step *s, struct imp_vertex *v, const struct imp_surf
     const imp_v3 start = shadow->o - d * back;
     const double end = shadow->reach * length + back;
     const struct imp_medium *m = beyond(v->shape, from->ng, d, s->flight.here);
-    struct flight w = flight_from(s, start, d, TO_LIGHT);
+    struct imp_free_flight w = imp__flight_from(s, start, d, IMP_FLIGHT_TO_LIGHT);
     imp_v3 o = start;
     double t, base = 0;
     for (int passed = 0; passed <= IMP_WALK_MAX; passed++) {
@@ -384,7 +189,8 @@ static bool sees(struct imp_step *s, struct imp_vertex *v, const struct imp_surf
         const struct imp_shape *shape = found ? scene->shapes[hit.shape] : NULL;
         const bool hole = found && is_passed(scene, shape);
         if (found && !hole && !imp__shape_bsdf(scene, shape)->straight) return false;
-        if (m) fly(&w, m, passed ? base : back, found ? base + hit.t : end, false, &t);
+        if (m)
+            imp__fly(&w, m, passed ? base : back, found ? base + hit.t : end, false, &t);
         if (s->walk->dropped) return false;
         if (!found) return arrived(&w, v, T);
         struct imp_surface at;

@@ -1,0 +1,182 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Free flights through media: closed form where extinction is uniform, delta tracking
+ * where it varies. */
+#include "flight.h"
+#include "probe.h"
+#include "scene/majorants.h"
+
+static double uniform(struct imp_free_flight *w) { return imp__u01(w->key, w->n++); }
+static double free_path(struct imp_free_flight *w) { return -log1p(-uniform(w)); }
+
+struct imp_free_flight imp__flight_from(struct imp_step *s, imp_v3 o, imp_v3 d,
+                                        int stream)
+{
+    return (struct imp_free_flight){.s = s,
+                                    .key =
+                                        imp__key_branch(s->walk->key, s->depth, stream),
+                                    .o = imp__decide(o),
+                                    .d = imp__decide(d),
+                                    .f = imp__spec(1)};
+}
+
+bool imp__flight_event(struct imp_free_flight *w, struct imp_event e)
+{
+    struct imp_step *s = w->s;
+    struct imp_track *k = w->track;
+    w->any = true;
+    if (!s->recorded) return true;
+    if (!k) {
+        k = w->track = imp__arena_take(s->arena, 1, sizeof *k);
+        if (!k) goto no_memory;
+        *k = (struct imp_track){.n = 0};
+        imp__store_v3(k->o, w->o);
+        imp__store_v3(k->d, w->d);
+    }
+    if (k->n == k->cap) {
+        const int cap = k->cap ? 2 * k->cap : 2;
+        struct imp_event *more = imp__arena_take(s->arena, (size_t)cap, sizeof *more);
+        if (!more) goto no_memory;
+        for (int i = 0; i < k->n; i++) more[i] = k->event[i];
+        k->event = more;
+        k->cap = cap;
+    }
+    k->event[k->n++] = e;
+    return true;
+no_memory:
+    s->walk->dropped = IMP_DROP_MEMORY;
+    return false;
+}
+
+/* ---- Media of uniform extinction --------------------------------------------------- */
+
+#define DEEP 0.5 /* optical depth from which on a stretch stands */
+
+static bool uniform_fly(struct imp_free_flight *w, const struct imp_medium *m,
+                        double near, double far, bool collides, double *t, bool *stands)
+{
+    imp_spec in[IMP_INPUTS_MAX];
+    const imp_spec sigma = imp__extinction_at(m, w->o, w->s->at.carried, in);
+    double length = far - near, sum = 0;
+    bool hit = false;
+    for (int c = 0; c < imp__lane_mis_count(w->s); c++) sum += sigma[c];
+    *stands = collides && sum * length >= DEEP * imp__lane_mis_count(w->s);
+    if (collides) {
+        const double path = free_path(w), mine = sigma[imp__lane_mis_drew(w->s)];
+        hit = mine > 0 && path < length * mine;
+        if (hit) length = path / mine;
+    }
+    *t = near + length;
+    length = imp__decide1(length);
+    const imp_spec T = imp__attenuation(sigma, length);
+    w->f *= hit ? sigma * T : T;
+    imp__flight_event(w, (struct imp_event){.t = (imp_decided)length,
+                                            .bound = *stands,
+                                            .medium = m->index,
+                                            .kind = hit ? IMP_COLLIDES : IMP_CROSSES});
+    return hit;
+}
+
+/* ---- Media whose extinction varies -------------------------------------------------- */
+
+/* A tentative collision at t. Real, by the lane that draws? */
+static bool collide(struct imp_free_flight *w, const struct imp_medium *m, double t,
+                    double bound, bool collides)
+{
+    struct imp_step *s = w->s;
+    imp_spec in[IMP_INPUTS_MAX];
+    const imp_spec sigma =
+        imp__extinction_at(m, w->o + w->d * t, s->at.carried, in) * (1 / bound);
+    for (int c = 0; c < imp__lane_mis_count(s); c++)
+        if (!(sigma[c] >= 0 && sigma[c] <= 1)) {
+            s->walk->dropped = IMP_DROP_MAJORANT;
+            return true;
+        }
+    const bool real = collides && uniform(w) < sigma[imp__lane_mis_drew(s)];
+    w->f *= real ? sigma : 1 - sigma;
+    imp__flight_event(w, (struct imp_event){.t = (imp_decided)t,
+                                            .bound = (imp_decided)bound,
+                                            .medium = m->index,
+                                            .kind = real ? IMP_REAL_AT : IMP_NULL_AT});
+    return real;
+}
+
+/* Tentative collisions with the density of the local bound, one after another. */
+static bool varying_fly(struct imp_free_flight *w, const struct imp_medium *m,
+                        struct imp_majorant_walk *cells, bool collides, double *t)
+{
+    double path = free_path(w), at = cells->t;
+    for (;;) {
+        const double room = (cells->leave - at) * cells->bound;
+        if (!(path < room)) {
+            path -= room;
+            if (!imp__majorants_next(cells)) return false;
+            at = cells->t;
+            continue;
+        }
+        at += path / cells->bound;
+        path = free_path(w);
+        const bool real = collide(w, m, imp__decide1(at), cells->bound, collides);
+        if (w->s->walk->dropped) return false;
+        if (!real) continue;
+        *t = at;
+        return true;
+    }
+}
+
+/* The way to a light sample is in m from near to far: a point of it is chosen for the
+ * derivative of its transmittance, which tentative collisions do not have where the bound
+ * is 0. */
+static void line_offer(struct imp_free_flight *w, const struct imp_medium *m, double near,
+                       double far)
+{
+    const struct imp_step *s = w->s;
+    const struct imp_key key = imp__key_branch(s->walk->key, s->depth, IMP_FLIGHT_LINE);
+    const double length = far - near;
+    const uint32_t n = 2 * (uint32_t)w->line.kind; /* stretches so far */
+    w->length += length;
+    w->line.kind++;
+    if (!(imp__u01(key, n) * w->length < length)) return;
+    w->line.t = (imp_decided)(near + length * imp__u01(key, n + 1));
+    w->line.medium = m->index;
+}
+bool imp__flight_line(struct imp_free_flight *w)
+{
+    struct imp_event e = w->line;
+    if (e.kind == 0) return true;
+    e.kind = IMP_LINE_AT;
+    e.bound = (imp_decided)w->length;
+    return imp__flight_event(w, e);
+}
+
+bool imp__fly(struct imp_free_flight *w, const struct imp_medium *m, double near,
+              double far, bool collides, double *t)
+{
+    struct imp_step *s = w->s;
+    struct imp_majorant_walk cells;
+    const imp_spec before = w->f;
+    const int first = w->track ? w->track->n : 0;
+    bool hit, stands = false;
+    if (!(near < far)) return false;
+    if (!m->majorants) {
+        hit = uniform_fly(w, m, near, far, collides, t, &stands);
+    } else {
+        if (!imp__majorants_enter(m->majorants, w->o, w->d, near, far, &cells))
+            return false;
+        near = cells.t;
+        far = cells.end;
+        hit = varying_fly(w, m, &cells, collides, t);
+        if (!collides && s->probing && s->tracer->active->medium[m->index])
+            line_offer(w, m, near, far);
+        /* A probe asks for a track, and an empty one has its start. */
+        if (!w->track && s->probing && collides) {
+            imp__flight_event(w, (struct imp_event){.t = 0});
+            if (w->track) w->track->n = 0;
+        }
+    }
+    if (s->walk->dropped) return false;
+    if (collides) s->flight.stands = stands;
+    if (collides && !stands && s->probing && s->tracer->active->medium[m->index])
+        imp__probe_offer(s, m, w->track, first, before, near, hit ? *t : far);
+    return hit;
+}

@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A free flight through media while it is decided (tracking.h says what its events
+ * are). */
+#ifndef IMP_WALK_FLIGHT_H
+#define IMP_WALK_FLIGHT_H
+
+#include "tracking.h"
+
+/* A ray through media, from its start. */
+struct imp_free_flight {
+    struct imp_step *s;
+    struct imp_key key;      /* of its own random numbers */
+    uint32_t n;              /* of them used */
+    imp_v3 o, d;             /* as decided: where extinction is looked up */
+    imp_spec f;              /* the segment's value */
+    struct imp_track *track; /* NULL: not kept */
+    bool any;                /* it has crossed a medium */
+    struct imp_event line;   /* IMP_LINE_AT so far; bound 0: none */
+    double length;           /* of the stretches that it was chosen from */
+};
+
+/* Streams of random numbers of a vertex. */
+enum { IMP_FLIGHT_ALONG = 0x7001, IMP_FLIGHT_TO_LIGHT, IMP_FLIGHT_LINE };
+
+struct imp_free_flight imp__flight_from(struct imp_step *s, imp_v3 o, imp_v3 d,
+                                        int stream);
+/* Keep an event where the walk is recorded. False: no memory. */
+bool imp__flight_event(struct imp_free_flight *w, struct imp_event e);
+/* From near to far in a medium; true: a collision at *t. */
+bool imp__fly(struct imp_free_flight *w, const struct imp_medium *m, double near,
+              double far, bool collides, double *t);
+/* The point of the way to a light sample that was chosen, if any, is kept. False: no
+ * memory. */
+bool imp__flight_line(struct imp_free_flight *w);
+
+#endif
