@@ -1,123 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Builds BSDFs, emitters, shapes and sensors. Each is built once, where it first appears
- * in document order, however many references it has. */
-#include "base/number.h"
+ * Builds emitters, shapes and sensors. Each is built once, where it first appears in
+ * document order, however many references it has. */
 #include "kind/sensor/sensor_film.h"
 #include "kind/texture/mesh_attribute.h"
-#include "math/course.h"
 #include "scene_build.h"
-
-/* ---- BSDFs --------------------------------------------------------------------- */
-
-void imp__bsdf_changed(void *payload)
-{
-    const struct imp_bsdf *b = payload;
-    b->ops->changed(b);
-}
-
-enum imp_status imp__build_bsdf(struct imp_scene *scene, struct imp_node *node,
-                                const char *parent, const char *slot,
-                                struct imp_bsdf **out)
-{
-    enum imp_status st = IMP_OK;
-    imp_context *ctx = scene->ctx;
-    if (node->object) {
-        *out = node->object;
-        return IMP_OK;
-    }
-    if (node->visiting)
-        return imp__node_error(ctx, node, IMP_E_SCENE, "the object contains itself");
-    node->visiting = 1;
-    const void *found;
-    IMP_TRY(imp__kind_find(scene->ctx, IMP_CONCEPT_BSDF, node, &found));
-    const struct imp_bsdf_ops *ops = found;
-
-    struct imp_bsdf *b = imp__arena_array(&scene->arena, 1, sizeof *b);
-    void *self = imp__arena_array(&scene->arena, 1, ops->object_size);
-    if (!b || !self) IMP_TRY(imp__build_no_memory(scene));
-    *b = (struct imp_bsdf){.ops = ops,
-                           .self = self,
-                           .flags = IMP_BSDF_SMOOTH,
-                           .name = imp__build_object_name(scene, node, parent, slot)};
-    if (!b->name) IMP_TRY(imp__build_no_memory(scene));
-
-    const struct imp_build build = imp__build_make(scene, node);
-    if (ops->prepare) IMP_TRY(ops->prepare(&build));
-    int n_own = 0;
-    while (ops->inputs && ops->inputs[n_own].name) n_own++;
-    const struct imp_input **own =
-        imp__arena_array(&scene->arena, (size_t)n_own + 1, sizeof *own);
-    if (!own) IMP_TRY(imp__build_no_memory(scene));
-    IMP_TRY(imp__build_inputs(scene, node, b->name, ops->inputs, own, &b->n_own));
-
-    b->n_in = b->n_own;
-    for (size_t i = 0; i < node->n_children && ops->max_children > 0; i++) {
-        struct imp_child *c = &node->children[i];
-        if (strcmp(c->node->tag, "bsdf") != 0) continue;
-        c->used = true;
-        if (b->n_child == imp_min(ops->max_children, 2))
-            IMP_TRY(imp__node_error(ctx, c->node, IMP_E_SCENE,
-                                    "'%s' takes at most %d bsdfs", ops->name,
-                                    ops->max_children));
-        char child_slot[32];
-        if (ops->max_children == 1 && !ops->child_name)
-            snprintf(child_slot, sizeof child_slot, "nested_bsdf");
-        else
-            snprintf(child_slot, sizeof child_slot, "%s_%d",
-                     ops->child_name ? ops->child_name : "bsdf", b->n_child);
-        struct imp_bsdf *child;
-        IMP_TRY(imp__build_bsdf(scene, c->node, b->name, child_slot, &child));
-        b->child_in[b->n_child] = b->n_in;
-        b->child[b->n_child++] = child;
-        b->n_in += child->n_in;
-        if (b->n_in > IMP_INPUTS_MAX)
-            IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
-                                    "has %d inputs with all that is nested in it; at "
-                                    "most %d are possible",
-                                    b->n_in, IMP_INPUTS_MAX));
-    }
-    if (b->n_child < ops->min_children)
-        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "a nested bsdf is missing"));
-    b->input = imp__arena_array(&scene->arena, (size_t)b->n_in + 1, sizeof *b->input);
-    if (!b->input) IMP_TRY(imp__build_no_memory(scene));
-    memcpy(b->input, own, (size_t)b->n_own * sizeof *own);
-    for (int k = 0; k < b->n_child; k++)
-        if (b->child[k]->n_in)
-            memcpy(b->input + b->child_in[k], b->child[k]->input,
-                   (size_t)b->child[k]->n_in * sizeof *b->input);
-
-    b->shaped = imp__build_shaped(scene, b->input, b->n_in);
-    b->index_input = -1;
-    for (int j = 0; j < b->n_own; j++)
-        if (ops->inputs[j].flags & IMP_INPUT_INDEX) b->index_input = j;
-
-    struct imp_mixing *mixing;
-    if (ops->build) IMP_TRY(ops->build(&build, self, b));
-    IMP_TRY(imp__mixing_read(&build, &mixing));
-    IMP_TRY(imp__props_finish(ctx, node));
-    if (ops->changed)
-        IMP_TRY(imp__build_watch(scene, b->input, b->n_in, imp__bsdf_changed, b));
-    b->index = scene->n_bsdfs;
-    IMP_TRY(imp__build_list_add(scene, (void ***)&scene->bsdfs, &scene->n_bsdfs, b));
-    IMP_TRY(imp__build_list_add(scene, (void ***)&scene->bsdf_mixing,
-                                &scene->n_bsdf_mixing, mixing));
-    node->object = b;
-    *out = b;
-out:
-    node->visiting = 0;
-    return st;
-}
-
-enum imp_status imp__build_black(struct imp_scene *scene, struct imp_bsdf **out)
-{
-    struct imp_bsdf *b = imp__arena_array(&scene->arena, 1, sizeof *b);
-    if (!b) return imp__build_no_memory(scene);
-    *b =
-        (struct imp_bsdf){.ops = &imp__black, .index_input = -1, .index = -1, .name = ""};
-    *out = b; /* flags 0: nothing is reflected, so no light samples and no continuation */
-    return IMP_OK;
-}
 
 /* The medium that a sensor or a light says it is in; NULL: none. */
 static struct imp_node *medium_child(struct imp_node *node)
@@ -130,46 +17,6 @@ static struct imp_node *medium_child(struct imp_node *node)
     }
     return NULL;
 }
-
-/* "time:factor, ..." of lights and sensors that vary in time. NULL: they do not. */
-static enum imp_status course_read(struct imp_scene *scene, struct imp_node *node,
-                                   const struct imp_course **out)
-{
-    enum imp_status st = IMP_OK;
-    const struct imp_prop *p = imp__node_prop(node, "times");
-    const char *text;
-    double sum = 0;
-    size_t n = 0;
-    IMP_TRY(imp__props_string(scene->ctx, node, "times", NULL, &text));
-    if (!text) return IMP_OK;
-    const char *end = text + strlen(text);
-    double *number = imp__arena_take(&scene->arena, strlen(text) + 2, sizeof *number);
-    struct imp_course *c = imp__arena_array(&scene->arena, 1, sizeof *c);
-    if (!number || !c) IMP_TRY(imp__build_no_memory(scene));
-    double *value = number + (end - text) / 2 + 1; /* a pair has four characters */
-    for (const char *s = text + strspn(text, " ,\t\n"); s < end; n++) {
-        bool good = imp__number(&s, end, &number[n]) && *s == ':';
-        if (good) s++, good = imp__number(&s, end, &value[n]);
-        good = good && (s == end || strspn(s, " ,\t\n") > 0);
-        if (!good || !isfinite(number[n]) || !isfinite(value[n]) || value[n] < 0 ||
-            (n > 0 && !(number[n] > number[n - 1])))
-            IMP_TRY(imp__prop_error(scene->ctx, node, p, IMP_E_SCENE,
-                                    "times = '%.60s': it has pairs time:factor, of "
-                                    "ascending times and factors not below 0",
-                                    text));
-        sum += value[n];
-        s += strspn(s, " ,\t\n");
-    }
-    if (!(sum > 0))
-        IMP_TRY(imp__prop_error(scene->ctx, node, p, IMP_E_SCENE,
-                                "times = '%.60s': it is 0 at all times", text));
-    *c = (struct imp_course){n, number, value};
-    *out = c;
-out:
-    return st;
-}
-
-/* ---- Emitters, shapes, sensors ------------------------------------------------- */
 
 void imp__emitter_changed(void *payload)
 {
@@ -226,7 +73,7 @@ enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *nod
     IMP_TRY(imp__props_float(ctx, node, "sampling_weight", 1, &e->weight));
     if (e->weight < 0)
         IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "sampling_weight is negative"));
-    IMP_TRY(course_read(scene, node, &e->course));
+    IMP_TRY(imp__build_course(scene, node, &e->course));
     medium_child(node); /* walks know where they are */
     if (ops->build) IMP_TRY(ops->build(&b, self, e));
     for (int j = 0; j < e->n_in; j++)
@@ -389,30 +236,6 @@ static enum imp_status child_or_default(struct imp_scene *scene, struct imp_node
     return *out ? IMP_OK : imp__build_no_memory(scene);
 }
 
-static enum imp_status shutter_read(struct imp_scene *scene, struct imp_node *node,
-                                    struct imp_sensor *s)
-{
-    enum imp_status st = IMP_OK;
-    imp_context *ctx = scene->ctx;
-    IMP_TRY(imp__props_float(ctx, node, "shutter_open", 0, &s->open));
-    IMP_TRY(imp__props_float(ctx, node, "shutter_close", s->open, &s->close));
-    if (s->close < s->open)
-        IMP_TRY(imp__prop_error(
-            ctx, node, imp__node_prop(node, "shutter_close"), IMP_E_SCENE,
-            "shutter_close = %g comes before shutter_open = %g", s->close, s->open));
-    IMP_TRY(course_read(scene, node, &s->course));
-    const bool instant = s->open == s->close;
-    if (s->course && !instant &&
-        !(imp__course_integral(s->course, s->open, s->close) > 0))
-        IMP_TRY(
-            imp__prop_error(ctx, node, imp__node_prop(node, "times"), IMP_E_SCENE,
-                            "times: the response is 0 while the shutter is open, from "
-                            "%g to %g",
-                            s->open, s->close));
-out:
-    return st;
-}
-
 enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node,
                                   const char *name, struct imp_shape *shape)
 {
@@ -460,7 +283,7 @@ enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node
     if (s->photometric && imp__is_spectral(scene->mode))
         IMP_TRY(imp_build_error(&b, "units", IMP_E_UNSUPPORTED,
                                 "photometric units are those of rgb and mono modes"));
-    IMP_TRY(shutter_read(scene, node, s));
+    IMP_TRY(imp__build_shutter(scene, node, s));
     IMP_TRY(ops->build(&b, self, s)); /* needs the film's shape */
     struct imp_node *medium = medium_child(node);
     if (medium) IMP_TRY(imp__build_medium(scene, medium, name, "medium", &s->medium));

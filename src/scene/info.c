@@ -5,6 +5,44 @@
 #include "camera_gain.h"
 #include "instances.h"
 
+static double triangles_of(const struct imp_scene *scene, int first, int n)
+{
+    double sum = 0;
+    for (int k = first; k < first + n; k++)
+        if (scene->shapes[k]->geometry == IMP_TRIANGLES)
+            sum += (double)scene->shapes[k]->triangles.n_triangles;
+    return sum;
+}
+
+/* Of a group, with those in its instances. */
+static double triangles_met(const struct imp_scene *scene, const struct imp_group *g)
+{
+    double sum = triangles_of(scene, g->first, g->n_shapes), of_last = 0;
+    const struct imp_group *last = NULL;
+    for (int i = 0; i < g->n_instances; i++) {
+        if (g->instance[i].group != last)
+            of_last = triangles_met(scene, last = g->instance[i].group);
+        sum += of_last;
+    }
+    return sum;
+}
+
+/* Its shapes, triangles and instances, and the triangles that rays can meet. */
+static void instances_count(const struct imp_scene *scene, struct imp_scene_info *info)
+{
+    double own = triangles_of(scene, 0, scene->n_shapes);
+    info->n_shapes = scene->n_shapes;
+    info->triangles_met = scene->world ? triangles_met(scene, scene->world) : own;
+    info->n_instances = scene->world ? scene->world->n_instances : 0;
+    for (int k = 0; k < scene->n_groups; k++) {
+        const struct imp_group *g = scene->groups[k];
+        info->n_shapes += g->n_shapes;
+        info->n_instances += g->n_instances;
+        own += triangles_of(scene, g->first, g->n_shapes);
+    }
+    info->n_triangles = (int64_t)own;
+}
+
 enum imp_status imp_scene_get_info(const imp_scene *scene, struct imp_scene_info *out)
 {
     struct imp_scene_info all = {.size = sizeof all}, *info = &all;
@@ -18,7 +56,7 @@ enum imp_status imp_scene_get_info(const imp_scene *scene, struct imp_scene_info
     info->channels = scene->channels;
     info->integrator = scene->integrator ? scene->integrator->ops->name : "";
     info->max_depth = scene->integrator ? scene->integrator->max_depth : -1;
-    imp__instances_count(scene, info);
+    instances_count(scene, info);
     for (int c = 0; c < 3; c++) {
         info->bounds_min[c] = scene->lo[c];
         info->bounds_max[c] = scene->hi[c];

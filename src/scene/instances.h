@@ -50,8 +50,6 @@ bool imp__is_group(const struct imp_node *node);
 bool imp__is_instance(const struct imp_node *node);
 /* All groups and instances of the scene, when its other shapes are there. */
 enum imp_status imp__instances_build(struct imp_scene *scene);
-/* Its shapes, triangles and instances, and the triangles that rays can meet. */
-void imp__instances_count(const struct imp_scene *scene, struct imp_scene_info *info);
 
 /* ---- instances.c ---- */
 /* From the world of an instance to its group, at a time; `room`: for what moves. */

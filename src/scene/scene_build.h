@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Shared by the files that make objects from nodes: scene_build.c (the scene), build_objects.c
- * (materials, lights, shapes, sensors), build_inputs.c (their inputs), build_texture.c,
- * build_tools.c (names, lists, watches). */
+ * Shared by the files that make objects from nodes: scene_build.c (the scene), build_bsdf.c,
+ * build_objects.c (lights, shapes, sensors), build_time.c (courses, shutters),
+ * build_inputs.c (their inputs), build_texture.c, build_tools.c (names, lists, watches). */
 #ifndef IMP_SCENE_BUILD_H
 #define IMP_SCENE_BUILD_H
 
@@ -50,6 +50,13 @@ enum imp_status imp__build_texture(struct imp_scene *scene, struct imp_node *nod
 enum imp_status imp__build_bsdf(struct imp_scene *scene, struct imp_node *node,
                                 const char *parent, const char *slot,
                                 struct imp_bsdf **out);
+/* times = "time:factor, ..." of a light or a sensor that varies in time. NULL: it does
+ * not. */
+enum imp_status imp__build_course(struct imp_scene *scene, struct imp_node *node,
+                                  const struct imp_course **out);
+/* When the shutter is open, and how the response varies meanwhile. */
+enum imp_status imp__build_shutter(struct imp_scene *scene, struct imp_node *node,
+                                   struct imp_sensor *s);
 /* Exposure, white balance, vignetting and response that a film has; NULL: none. */
 enum imp_status imp__build_gain(struct imp_scene *scene, struct imp_node *film,
                                 const char *name, struct imp_camera_gain **out);
