@@ -79,6 +79,14 @@ void view_walks(const int pixel[2]);
 void view_show_film(enum view_channel channel, const imp_film *film, const char *name,
                     const char *role, int view);
 
+/* ---- view_pictures.c ---- */
+/* The pictures of --target, as VIEW_TARGET. */
+void view_targets(void);
+/* Pictures through the sensor of every target, at the scene's numbers. spp 0: as many as
+ * the command says, with progress. */
+void view_pictures(enum view_channel channel, const char *name, const char *role,
+                   int spp);
+
 /* ---- The views ----------------------------------------------------------------------- */
 
 struct view_options {

@@ -101,60 +101,6 @@ static void numbers_move(void)
     free(x);
 }
 
-/* ---- Pictures --------------------------------------------------------------------------- */
-
-static void targets_show(void)
-{
-    const size_t n = problem_options.targets.n;
-    struct imp_report_item *item = cli_alloc(n, sizeof *item);
-    imp_film **film = cli_alloc(n, sizeof *film);
-    size_t used = 0;
-    for (size_t i = 0; i < n; i++) {
-        if (fit_target_film(i, &film[used])) continue;
-        item[used] = (struct imp_report_item)IMP_REPORT_ITEM_INIT;
-        item[used].kind = "picture";
-        item[used].name = item[used].role = "target";
-        item[used].view = (int)i;
-        item[used].film = film[used];
-        used++;
-    }
-    view_show(VIEW_TARGET, item, used);
-    for (size_t i = 0; i < used; i++) imp_film_destroy(film[i]);
-    free(film);
-    free(item);
-}
-
-/* Through the sensor of every target, at the scene's numbers. */
-static void pictures_show(enum view_channel channel, const char *name, const char *role,
-                          int spp)
-{
-    const size_t n = problem_options.targets.n;
-    struct imp_report_item *item = cli_alloc(n, sizeof *item);
-    imp_film **film = cli_alloc(n, sizeof *film);
-    size_t used = 0;
-    const double start = cli_now();
-    for (size_t i = 0; i < n && !view_asked(); i++) {
-        struct imp_run run = cli_run();
-        run.sensor = target_sensor(i);
-        run.time_limit_s = 0;
-        if (spp) run.spp = spp;
-        run.progress = spp ? NULL : view_progress;
-        if (cli_failed(imp_render(cli.scene, &run, &film[used])) || !film[used]) continue;
-        item[used] = (struct imp_report_item)IMP_REPORT_ITEM_INIT;
-        item[used].kind = "picture";
-        item[used].name = name;
-        item[used].role = role;
-        item[used].view = (int)i;
-        item[used].film = film[used];
-        used++;
-    }
-    if (used) view_show(channel, item, used);
-    for (size_t i = 0; i < used; i++) imp_film_destroy(film[i]);
-    free(film);
-    free(item);
-    f.pictures_s += cli_now() - start;
-}
-
 /* ---- The fit ---------------------------------------------------------------------------- */
 
 static struct json answer_open(char **text, size_t *size)
@@ -221,8 +167,11 @@ static int step(const struct imp_fit_step *s, void *payload)
     if (s->x) {
         numbers_show(s->x);
         if (f.pictures_s <= PICTURE_SHARE * (cli_now() - f.begun_s) &&
-            imp_problem_set_x(f.problem, s->x) == IMP_OK)
-            pictures_show(VIEW_PICTURE, "recovered", "picture", SPP);
+            imp_problem_set_x(f.problem, s->x) == IMP_OK) {
+            const double start = cli_now();
+            view_pictures(VIEW_PICTURE, "recovered", "picture", SPP);
+            f.pictures_s += cli_now() - start;
+        }
     }
     return view_asked();
 }
@@ -269,7 +218,7 @@ static int run_fit(bool *whole)
         result_show();
         imp_problem_get_x(f.problem, x);
         numbers_show(x);
-        pictures_show(VIEW_PICTURE, "recovered", "picture", 0);
+        view_pictures(VIEW_PICTURE, "recovered", "picture", 0);
     }
     free(x);
     return rc;
@@ -314,9 +263,9 @@ static int work(void)
             running = false;
         } else if (moved) { /* what the sliders say, until one asks for more */
             view_state(VIEW_STOPPED, "a picture of the numbers as they are");
-            pictures_show(VIEW_PICTURE, "recovered", "picture", 1);
-            pictures_show(VIEW_PICTURE, "recovered", "picture", 8);
-            pictures_show(VIEW_PICTURE, "recovered", "picture", 0);
+            view_pictures(VIEW_PICTURE, "recovered", "picture", 1);
+            view_pictures(VIEW_PICTURE, "recovered", "picture", 8);
+            view_pictures(VIEW_PICTURE, "recovered", "picture", 0);
         }
         if (rc) return rc;
         if (!view_asked()) {
@@ -387,8 +336,8 @@ int view_fit(void)
     if (!rc) rc = view_open(&kind, view_options.port);
     if (!rc) {
         numbers_show(f.start);
-        targets_show();
-        pictures_show(VIEW_START, "start", NULL, 0);
+        view_targets();
+        view_pictures(VIEW_START, "start", NULL, 0);
         if (cli.out) rc = fit_pictures_write("before", 0);
     }
     if (!rc) rc = work();
