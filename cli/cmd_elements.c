@@ -6,7 +6,8 @@
 #include "cmd_elements.h"
 #include "cmd_picture.h"
 #include "cmd_problem.h"
-#include "overwrite.h"
+#include "elements_items.h"
+#include "output.h"
 #include "progress.h"
 
 #include <math.h>
@@ -17,8 +18,9 @@ static struct {
     struct picture_options picture;
     struct elements_sources sources;
     struct arg_list phong, beams, exports;
-    const char *save, *open;
-    int kind, order, no_importance, rays, level, max_links, sensitivity, no_picture;
+    const char *save, *open, *report;
+    int kind, order, no_importance, rays, level, max_links, sensitivity, no_picture,
+        no_separate;
     double stop, eps, max_mb;
 } o = {.kind = IMP_ELEMENTS_GOURAUD, .stop = -1}; /* -1: not given */
 
@@ -63,6 +65,8 @@ static const struct arg_option options[] = {
     {ARG_TEXT, 0, "open", "FILE", "read a saved solution instead of solving", &o.open, 0,
      0, NULL},
     {ARG_LIST, 0, "export", "FILE", "write the elements as .ply or .json", &o.exports, 0,
+     0, NULL},
+    {ARG_TEXT, 0, "report", "DIR", "write what `importon report DIR` draws", &o.report, 0,
      0, NULL},
     {ARG_NUMBER, 0, "exposure", "STOPS", "exposure of the PNG preview",
      &o.picture.exposure, -100, 100, NULL},
@@ -160,154 +164,43 @@ static int write_picture(const imp_elements *e, const struct imp_run *run)
     return rc;
 }
 
-/* What was measured, each by its name, and their sum from both sides. */
-static void print_measures(const struct imp_elements_info *i)
-{
-    double only = named.n_sources == 1 ? named.sources[0].weight : 0;
-    for (size_t k = 0; k < named.n_sources; k++) {
-        const struct imp_elements_source *s = &named.sources[k];
-        const char *name = elements_source_name(&o.sources, k);
-        const double *u = s->edge_u, *v = s->edge_v;
-        const double n[3] = {u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2],
-                             u[0] * v[1] - u[1] * v[0]};
-        const double area = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
-        if (s->kind == IMP_ELEMENTS_CAMERA)
-            cli_say("mean of the region %s: %.9g", name, i->measures[k]);
-        else if (s->kind == IMP_ELEMENTS_SHAPE)
-            cli_say("mean illuminance of %s: %.9g", name, i->measures[k]);
-        else /* + 0.0: no negative zero */
-            cli_say("mean illuminance of the plane %s, which faces %.3g,%.3g,%.3g: %.9g",
-                    name, n[0] / area + 0.0, n[1] / area + 0.0, n[2] / area + 0.0,
-                    i->measures[k]);
-    }
-    if (named.n_sources == 0) cli_say("mean of the picture: %.9g", i->measure);
-    else if (only != 1) cli_say("weighted sum: %.9g", i->measure);
-    if (isfinite(i->luminance)) cli_say("mean luminance: %.9g", i->luminance);
-    if (isfinite(i->measure_adjoint))
-        cli_say("the same from the lights, emission x importance: %.9g",
-                i->measure_adjoint);
-}
-
-static void print_info(struct json *j, const struct imp_elements_info *i, int complete)
-{
-    if (!j) {
-        cli_say("%zu polygons, %zu elements (%zu leaves), %zu links, %lld rays; order %d",
-                i->polygons, i->elements, i->leaves, i->links, (long long)i->rays,
-                i->order);
-        print_measures(i);
-        const double change = i->n_steps > 1 ? i->steps[i->n_steps - 2].change : NAN;
-        if (isfinite(change))
-            cli_say("%s (last change %.2g %%)", i->reason, 100 * change);
-        else cli_say("%s", i->reason);
-        return;
-    }
-    json_number(j, "measure", i->measure);
-    json_number(j, "luminance", i->luminance);
-    json_array(j, "measurements");
-    for (size_t k = 0; k < named.n_sources; k++) {
-        json_object(j, NULL);
-        json_text(j, "name", elements_source_name(&o.sources, k));
-        json_number(j, "value", i->measures[k]);
-        json_end_object(j);
-    }
-    json_end_array(j);
-    json_number(j, "measure_direct", i->measure_direct);
-    json_number(j, "measure_adjoint", i->measure_adjoint);
-    json_bool(j, "complete", complete);
-    json_text(j, "reason", i->reason);
-    json_integer(j, "order", i->order);
-    json_integer(j, "functions", i->functions);
-    json_integer(j, "polygons", (int64_t)i->polygons);
-    json_integer(j, "skipped", (int64_t)i->skipped);
-    json_integer(j, "elements", (int64_t)i->elements);
-    json_integer(j, "leaves", (int64_t)i->leaves);
-    json_integer(j, "links", (int64_t)i->links);
-    json_integer(j, "rays", i->rays);
-    json_integer(j, "bytes", (int64_t)i->bytes);
-    json_number(j, "bytes_per_link", i->bytes_per_link);
-    json_number(j, "bytes_per_element", i->bytes_per_element);
-    json_number(j, "lobe_error", i->worst_residual);
-    json_array(j, "steps");
-    for (size_t k = 0; k < i->n_steps; k++) {
-        const struct imp_elements_step *s = &i->steps[k];
-        json_object(j, NULL);
-        json_number(j, "eps", s->eps);
-        json_integer(j, "links", (int64_t)s->links);
-        json_integer(j, "elements", (int64_t)s->elements);
-        json_number(j, "measure", s->measure);
-        json_number(j, "change", s->change);
-        json_number(j, "seconds", s->elapsed_s);
-        json_end_object(j);
-    }
-    json_end_array(j);
-}
-
-static const char *row_name(const struct imp_elements_row *r, char *text, size_t size)
-{
-    struct imp_param_info info = {.size = sizeof info};
-    if (r->param >= 0 &&
-        imp_scene_get_param(cli.scene, (size_t)r->param, &info) == IMP_OK)
-        return cli_number_name(&info, r->element, text, size);
-    snprintf(text, size, "%s[%zu]", r->name, r->element);
-    return text;
-}
-
-static int print_sensitivity(imp_elements *e, struct json *j)
-{
-    const struct imp_elements_row *rows;
-    size_t n;
-    double sum = 0;
-    int loose = 0;
-    char text[256];
-    const enum imp_status st = imp_elements_share_errors(e, &rows, &n);
-    if (st != IMP_OK) return cli_fail(st, cli.scene_path);
-    if (j) json_array(j, "sensitivity");
-    else printf("%-44s %13s %13s %10s\n", "number", "value", "derivative", "elasticity");
-    for (size_t k = 0; k < n; k++) {
-        const struct imp_elements_row *r = &rows[k];
-        const char *name = row_name(r, text, sizeof text);
-        if (r->emission) sum += r->share;
-        if (j) {
-            json_object(j, NULL);
-            json_text(j, "name", name);
-            json_bool(j, "emission", r->emission);
-            json_number(j, "value", r->value);
-            json_number(j, "derivative", r->derivative);
-            json_number(j, "share", r->share);
-            json_number(j, "share_error", r->share_error);
-            json_end_object(j);
-        } else {
-            printf("%-44s %13.6g %13.6g %9.3f%%", name, r->value, r->derivative,
-                   100 * r->share);
-            if (r->share_error > 0.05 * fabs(r->share))
-                printf(" +- %.2g%%", 100 * r->share_error);
-            printf("\n");
-            loose |= r->share_error > 0.05 * fabs(r->share);
-        }
-    }
-    if (j) {
-        json_end_array(j);
-        json_number(j, "euler", sum);
-    } else {
-        printf("the lights' elasticities add up to %.6f%%\n", 100 * sum);
-        if (loose)
-            printf("+-: the change from a neighbouring directional order; --order L sets "
-                   "it\n");
-    }
-    return 0;
-}
-
 /* May everything be written? */
 static int writable(void)
 {
     int rc = 0;
-    if (!o.no_picture) rc = picture_writable(cli.out ? cli.out : "elements.exr", 1);
+    if (!o.no_separate) rc = picture_writable(cli.out ? cli.out : "elements.exr", 1);
     if (!rc && o.save) rc = overwrite_check(o.save, OUTPUT_SOLUTION);
     for (size_t k = 0; k < o.exports.n && !rc; k++) {
         const char *path = o.exports.item[k];
         rc = overwrite_check(path, ends_with(path, ".json") ? OUTPUT_JSON : OUTPUT_PLY);
     }
+    if (!rc && o.report) rc = make_folder(o.report);
+    if (!rc && o.report) rc = elements_report_writable(o.report);
     return rc ? rc : elements_fit_writable();
+}
+
+static int write_report(imp_elements *e, const struct elements_answer *a,
+                        const struct imp_run *run)
+{
+    const enum imp_elements_image kind[] = {
+        o.kind == IMP_ELEMENTS_IMPORTANCE ? IMP_ELEMENTS_GOURAUD : o.kind,
+        IMP_ELEMENTS_IMPORTANCE};
+    int rc = 0;
+    for (int k = 0; k < 2 && !rc && !o.no_picture; k++) {
+        char *path = join_path(o.report, k ? "importance.exr" : "picture.exr");
+        imp_film *film = NULL;
+        const enum imp_status st =
+            imp_elements_image(e, cli.sensor, kind[k], o.rays, &film);
+        if (st == IMP_OK) {
+            picture_stamp(film, run);
+            rc = picture_write(film, path, &(struct picture_options){.no_preview = 1});
+        } else {
+            rc = cli_fail(st, cli.scene_path);
+        }
+        imp_film_destroy(film);
+        free(path);
+    }
+    return rc ? rc : elements_report_write(e, a, o.report);
 }
 
 static int run_elements(int n, char **operand)
@@ -319,7 +212,11 @@ static int run_elements(int n, char **operand)
     (void)n;
     int rc = cli_load(operand[0]), complete = 1;
     if (!rc) rc = options_make(&options_e);
-    if (!rc) rc = writable();
+    if (!rc) {
+        /* The report has its picture. */
+        o.no_separate = o.no_picture || (o.report && !cli.out);
+        rc = writable();
+    }
     if (rc) return rc;
     const struct imp_run run = cli_run();
     if (o.open) {
@@ -339,20 +236,27 @@ static int run_elements(int n, char **operand)
     struct json json, *j = NULL;
     const int to_stdout = cli.out && !strcmp(cli.out, "-");
     st = imp_elements_get_info(e, &info);
-    if (!o.no_picture) rc = write_picture(e, &run);
+    if (!o.no_separate) rc = write_picture(e, &run);
     if (!rc && o.save && (st = imp_elements_save(e, o.save)) != IMP_OK)
         rc = cli_fail(st, NULL);
     for (size_t k = 0; k < o.exports.n && !rc; k++)
         if ((st = imp_elements_export(e, o.exports.item[k])) != IMP_OK)
             rc = cli_fail(st, NULL);
+    struct elements_answer a = {&info,           complete,   named.sources, named.targets,
+                                named.n_sources, &o.sources, NULL,          0};
+    if (!rc && (o.report || (o.sensitivity && !to_stdout))) {
+        st = imp_elements_share_errors(e, &a.rows, &a.n_rows);
+        if (st != IMP_OK) rc = cli_fail(st, cli.scene_path);
+    }
+    if (!rc && o.report) rc = write_report(e, &a, &run);
     if (!rc && cli.json && !to_stdout) {
         json = cli_json();
         j = &json;
     }
-    if (!rc) print_info(j, &info, complete);
+    if (!rc) elements_answer_info(&a, j);
     if (!rc && elements_fit_wanted())
         rc = elements_fit_answer(j, to_stdout ? NULL : &o.sources);
-    if (!rc && o.sensitivity && !to_stdout) rc = print_sensitivity(e, j);
+    if (!rc && o.sensitivity && !to_stdout) elements_answer_sensitivity(&a, j);
     if (j) cli_json_end(j);
     elements_fit_close();
     imp_elements_destroy(e);

@@ -19,6 +19,23 @@ int elements_sources(const struct elements_sources *s, int sensor,
 /* As typed. */
 const char *elements_source_name(const struct elements_sources *s, size_t i);
 
+/* elements_answer.c: what was found. */
+struct elements_answer {
+    const struct imp_elements_info *info;
+    int complete;
+    const struct imp_elements_source *sources; /* [n_sources] */
+    const double *targets;
+    size_t n_sources;
+    const struct elements_sources *typed;
+    const struct imp_elements_row *rows; /* [n_rows] */
+    size_t n_rows;
+};
+/* Members of the answer, or text for j NULL. */
+void elements_answer_info(const struct elements_answer *a, struct json *j);
+void elements_answer_sensitivity(const struct elements_answer *a, struct json *j);
+/* Into text, or of a parameter. */
+const char *elements_row_name(const struct imp_elements_row *r, char *text, size_t size);
+
 /* cmd_elements_fit.c: importon elements --fit. */
 extern const struct arg_option options_elements_fit[];
 int elements_fit_wanted(void);
@@ -28,6 +45,8 @@ int elements_fit_writable(void);
 int elements_fit_check(const double *targets, size_t n);
 /* Search, and keep the answer; *complete 0: it was stopped. */
 int elements_fit(imp_elements *e, const double *targets, int *complete);
+/* Its member "fit" of an answer. */
+void elements_fit_json(struct json *j, const struct elements_sources *s);
 /* Print it, as JSON if j, and write --recovered. */
 int elements_fit_answer(struct json *j, const struct elements_sources *s);
 void elements_fit_close(void);

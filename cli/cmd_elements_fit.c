@@ -167,11 +167,19 @@ static int write_set(const struct block *blocks, size_t n_blocks)
     return output_close(&to, 0);
 }
 
+void elements_fit_json(struct json *j, const struct elements_sources *s)
+{
+    size_t n_blocks;
+    struct block *blocks = problem_blocks(found.problem, &n_blocks);
+    put_json(j, s, blocks, n_blocks);
+    free(blocks);
+}
+
 int elements_fit_answer(struct json *j, const struct elements_sources *s)
 {
     size_t n_blocks;
     struct block *blocks = problem_blocks(found.problem, &n_blocks);
-    int rc = o.recovered ? write_set(blocks, n_blocks) : 0;
+    const int rc = o.recovered ? write_set(blocks, n_blocks) : 0;
     if (!rc && j && s) put_json(j, s, blocks, n_blocks);
     else if (!rc && s) print(s, blocks, n_blocks);
     free(blocks);

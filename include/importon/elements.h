@@ -291,6 +291,59 @@ IMP_API IMP_MUST_CHECK enum imp_status
 imp_elements_open(const imp_scene *scene, const struct imp_elements_options *options,
                   const char *path, imp_elements **out);
 
+/* ---- One element at a time, to be drawn ------------------------------------------ */
+
+#define IMP_ELEMENTS_NO_PARENT SIZE_MAX
+/** A leaf, or what leaves are parts of. World coordinates; one value a channel (mono: the
+ * first of three). */
+struct imp_elements_element {
+    size_t size;
+    const char *shape; /**< its name, of the scene; NULL: a measuring plane */
+    size_t polygon;    /**< of the input; the sides of a two-sided one are two */
+    size_t parent;     /**< index of an element, or IMP_ELEMENTS_NO_PARENT */
+    int level;         /**< of subdivision, 0: the whole polygon */
+    int leaf;
+    int source;  /**< the first source of the options that measures it; -1: none does */
+    int corners; /**< 3 or 4 */
+    double corner[4][3];  /**< counterclockwise, seen from the front */
+    double area;          /**< of what no solid covers */
+    double radiance[3];   /**< exitant, mean over the hemisphere */
+    double importance;    /**< likewise, per solid angle */
+    double irradiance[3]; /**< NaN: black and not measured, or covered */
+    double illuminance;   /**< luminance of the irradiance */
+};
+#define IMP_ELEMENTS_ELEMENT_INIT IMP_ELEMENTS_SIZED(struct imp_elements_element)
+/** Element `index`, below imp_elements_info.elements. Strings belong to the scene. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_elements_get_element(const imp_elements *elements, size_t index,
+                         struct imp_elements_element *out);
+
+struct imp_elements_arrival { /**< what one link brings */
+    size_t from;              /**< index of the element that sends */
+    double irradiance[3];
+    double illuminance;
+    double measure; /**< of the measurement: what passes here, radiance x importance */
+};
+/**
+ * What arrives at an element, link by link, brightest first: over its own links, those of
+ * all above it (their part for this element) and those of its parts. Irradiances add up
+ * to the element's, but for what the last sweep of the solution moved.
+ * @param[out] arrivals [*n], to be freed with imp_free.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_elements_arrivals(const imp_elements *elements, size_t index,
+                      struct imp_elements_arrival **arrivals, size_t *n);
+
+/**
+ * Illuminance at points of the polygon of an element, with the kernel and visibility of
+ * each point itself instead of means over elements: the middles of width x height cells,
+ * along the polygon's first edge (x) and its last (y, from the first corner).
+ * @param[out] illuminance [height][width]; NaN outside a triangle.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_elements_illuminance(const imp_elements *elements, size_t index, int width,
+                         int height, double *illuminance);
+
 /** Leaves with their mean exitant radiance and importance, by extension: .ply, .json. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_elements_export(const imp_elements *elements,
                                                            const char *path);

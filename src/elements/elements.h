@@ -345,6 +345,8 @@ double imp__el_measure(const imp_elements *e, double *direct);
 double imp__el_luminance(const imp_elements *e);
 /* The same from the emitters: emission x importance. */
 double imp__el_measure_adjoint(const imp_elements *e);
+/* The first source that measures a root; -1: none. */
+int imp__el_source_of(const imp_elements *e, uint32_t root);
 /* What every source measures by itself, from radiance, without weights: J [n_sources]. */
 enum imp_status imp__el_measure_each(imp_elements *e, double *J);
 
@@ -365,6 +367,15 @@ enum imp_status imp__el_look(imp_elements *e, double *change);
 /* elements_image.c */
 /* Radiance of a hit towards its w, from the leaf. */
 void imp__el_flat(const imp_elements *e, const struct imp__el_hit *hit, double out[3]);
+/* Add what arrives at (u, v) of a root over the links of its leaf and of all above that,
+ * evaluated for this very point: four pieces of each source, with the kernel exact and a
+ * ray to their centres. `to`: reflected that way (world) by the true BRDF; NULL:
+ * irradiance. */
+void imp__el_gather(const imp_elements *e, uint32_t root, double u, double v,
+                    const imp_v3 *to, double out[3]);
+/* export.c: mean exitant radiance over the hemisphere and importance, per solid angle. */
+void imp__el_means(const imp_elements *e, const struct imp__element *x,
+                   double radiance[3], double *importance);
 /* solve.c: sweeps until the solution moves by less than `tolerance`, `n` at a time. */
 enum imp_status imp__el_settle(imp_elements *e, int n, bool importance, double tolerance);
 /* Lights and reflectances as the scene has them now; the polygons stay. */

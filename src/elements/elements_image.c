@@ -136,45 +136,49 @@ static void gouraud(const imp_elements *e, const struct imp__el_hit *hit, double
 
 /* ---- Final gather -------------------------------------------------------------- */
 
-/* The links of the leaf and of all above it, evaluated for this very point with the true
- * BRDF: four pieces of the source each, with the kernel exact and a ray to their centres.
- */
-static void gather(const imp_elements *e, const struct imp__el_hit *hit, double out[3])
+void imp__el_gather(const imp_elements *e, uint32_t root, double u, double v,
+                    const imp_v3 *to, double out[3])
 {
-    out[0] = out[1] = out[2] = 0;
-    if (hit->root == EL_NONE) return;
-    const struct imp__el_root *r = &e->roots[hit->root];
+    const struct imp__el_root *r = &e->roots[root];
     const struct imp__el_material *m = &e->materials[r->material];
-    emitted_add(e, r, hit->w, out);
-    if (m->n == 0) return;
-    const imp_v3 x = imp__el_point(r->corners, r->v, hit->u, hit->v);
-    const imp_v3 wo = imp__to_local(&r->frame, hit->w);
-    uint32_t at = imp__el_find(e, hit->root, hit->u, hit->v, NULL);
+    const imp_v3 x = imp__el_point(r->corners, r->v, u, v);
+    const imp_v3 wo = to ? imp__to_local(&r->frame, *to) : imp__v3(0, 0, 1);
+    uint32_t at = imp__el_find(e, root, u, v, NULL);
     for (; at != EL_NONE; at = e->elements[at].parent)
         for (size_t k = e->in_start[at]; k < e->in_start[at + 1]; k++) {
             const uint32_t src = e->links[k].src;
             const struct imp__element *j = &e->elements[src];
             const struct imp__el_root *rj = imp__el_root_of(e, j);
             for (int q = 0; q < 4; q++) {
-                imp_v3 v[4], y = imp__v3(0, 0, 0);
-                imp__el_quarter(j, q, v);
+                imp_v3 corner[4], y = imp__v3(0, 0, 0);
+                imp__el_quarter(j, q, corner);
                 const double factor =
-                    imp__polygon_factor(x, r->frame.n, j->corners, v, rj->frame.n);
+                    imp__polygon_factor(x, r->frame.n, j->corners, corner, rj->frame.n);
                 if (factor <= 0) continue;
-                for (int i = 0; i < j->corners; i++) y += v[i] * (1.0 / j->corners);
+                for (int i = 0; i < j->corners; i++) y += corner[i] * (1.0 / j->corners);
                 const imp_v3 w = imp__normalize(y - x);
                 const imp_v3 wi = imp__to_local(&r->frame, w);
-                double light[3] = {0}, f[3], h[EL_N_MAX];
+                double light[3] = {0}, f[3] = {1, 1, 1}, h[EL_N_MAX];
                 if (wi[2] <= 0 || !imp__el_sees(e, r, x, rj, y)) continue;
                 if (imp__el_n(e, rj) > 0) {
                     basis_at(e, rj, -w, h);
                     reflected(e, j->child ? j->child + (uint32_t)q : src, h, light);
                 }
                 emitted_add(e, rj, -w, light);
-                imp__el_brdf(m, wo, wi, f);
+                if (to) imp__el_brdf(m, wo, wi, f);
                 for (int c = 0; c < e->ch; c++) out[c] += f[c] * factor * light[c];
             }
         }
+}
+
+static void gather(const imp_elements *e, const struct imp__el_hit *hit, double out[3])
+{
+    out[0] = out[1] = out[2] = 0;
+    if (hit->root == EL_NONE) return;
+    const struct imp__el_root *r = &e->roots[hit->root];
+    emitted_add(e, r, hit->w, out);
+    if (e->materials[r->material].n)
+        imp__el_gather(e, hit->root, hit->u, hit->v, &hit->w, out);
 }
 
 static void importance(const imp_elements *e, const struct imp__el_hit *hit,

@@ -48,6 +48,21 @@ enum imp_status imp__el_measure_shape(imp_elements *e,
     return IMP_OK;
 }
 
+int imp__el_source_of(const imp_elements *e, uint32_t root)
+{
+    uint32_t plane = root; /* their roots are the last, in the sources' order */
+    while (plane > 0 && e->roots[plane - 1].shape < 0) plane--;
+    for (size_t k = 0; k < e->n_sources; k++) {
+        const struct imp_elements_source *src = &e->sources[k];
+        if (src->kind == IMP_ELEMENTS_SHAPE && is_measured(e, &e->roots[root], src))
+            return (int)k;
+        if (src->kind == IMP_ELEMENTS_PLANE && e->roots[root].shape < 0 &&
+            plane++ == root)
+            return (int)k;
+    }
+    return -1;
+}
+
 void imp__el_weigh(imp_elements *e, const double *w)
 {
     size_t plane = 0; /* their roots are the last, in the sources' order */

@@ -57,9 +57,8 @@ static void put_string(struct writer *w, const char *s)
     w->ok = w->ok && imp__json_string(w->ctx, &w->out, s);
 }
 
-/* Mean exitant radiance over the hemisphere and importance, per solid angle. */
-static void means_of(const imp_elements *e, const struct imp__element *x,
-                     double radiance[3], double *importance)
+void imp__el_means(const imp_elements *e, const struct imp__element *x,
+                   double radiance[3], double *importance)
 {
     const struct imp__el_root *r = imp__el_root_of(e, x);
     const int n = imp__el_n(e, r);
@@ -94,7 +93,7 @@ static enum imp_status ply(const imp_elements *e, struct writer *w)
     for (size_t k = 0; k < e->n_elements; k++) {
         double l[3], g;
         if (!is_leaf(e, k)) continue;
-        means_of(e, &e->elements[k], l, &g);
+        imp__el_means(e, &e->elements[k], l, &g);
         sorted[faces++] = l[1];
         vertices += e->elements[k].corners;
     }
@@ -120,7 +119,7 @@ static enum imp_status ply(const imp_elements *e, struct writer *w)
         const struct imp__element *x = &e->elements[k];
         double l[3], g;
         if (!is_leaf(e, k)) continue;
-        means_of(e, x, l, &g);
+        imp__el_means(e, x, l, &g);
         put(w, &x->corners, 1);
         for (int i = 0; i < x->corners; i++) put_u32(w, next++);
         for (int c = 0; c < 3; c++) {
@@ -142,7 +141,7 @@ static void json(const imp_elements *e, struct writer *w)
         double l[3], g;
         char text[48];
         if (!is_leaf(e, k)) continue;
-        means_of(e, x, l, &g);
+        imp__el_means(e, x, l, &g);
         put_text(w, first ? "\n{\"shape\":" : ",\n{\"shape\":");
         first = false;
         put_string(w, e->scene->shapes[imp__el_root_of(e, x)->shape]->name);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * The page in order: the verdict, pictures, parameters, correlations, derivatives, loss,
- * checks, walks, rays, drawings, other answers, provenance. docs/report.md
+ * checks, walks, rays, elements, drawings, other answers, provenance. docs/report.md
  * describes the data. */
 "use strict";
 
@@ -40,9 +40,11 @@ function all_layers(items) {
 
 /* Sections in their order: the kinds of items that each is made of, and the elements that
  * it makes. A section whose items change is made again, and the others stay. */
-const known_kinds = ["picture", "derivative", "fit", "check", "walks", "rays", "bend", "image"];
+const known_kinds = ["picture", "derivative", "fit", "check", "walks", "rays", "bend", "elements", "mesh", "image"];
+const listed_kinds = ["bend", "elements"]; /* they have sections, and the answer is a table besides */
 const sections = [
-    {kinds: ["fit"], make: (report, of) => [make("header", {}, make("h1", {}, report.title || "importon report"), ...(of("fit").length ? verdict(of("fit")[0].data) : []))]},
+    {kinds: ["fit", "elements"], make: (report, of) => [make("header", {}, make("h1", {}, report.title || "importon report"), ...(of("fit").length ? verdict(of("fit")[0].data) : []),
+        ...of("elements").filter((i) => i.data).flatMap((i) => elements_verdict(i.data)))]},
     {kinds: ["picture", "derivative"], make: (report, of, page) => {
         const {layers, failed} = all_layers([...of("picture"), ...of("derivative")]);
         const notes = failed.map((text) => make("p", {class: "error"}, `This picture cannot be shown: ${text}`));
@@ -64,8 +66,9 @@ const sections = [
     {kinds: ["check"], make: (report, of) => of("check").map((i) => check_section(i.data))},
     {kinds: ["walks"], make: (report, of) => of("walks").map((i) => walks_section(i.data, i.name, report))},
     {kinds: ["rays"], make: (report, of) => of("rays").sort((a, b) => /^before/.test(a.name) - /^before/.test(b.name)).map((i) => rays_section(i.data, i.name))},
+    {kinds: ["mesh"], make: (report, of) => of("mesh").map((i) => (i.data ? elements_section(i.data) : null))},
     {kinds: ["image"], make: (report, of) => [of("image").length ? image_section(of("image")) : null]},
-    {kinds: null, make: (report) => report.items.filter((i) => i.data && (!known_kinds.includes(i.kind) || i.kind === "bend")).map(answer_section)},
+    {kinds: null, make: (report) => report.items.filter((i) => i.data && (!known_kinds.includes(i.kind) || listed_kinds.includes(i.kind))).map(answer_section)},
     {kinds: null, make: (report) => [provenance_section(report.command, report, report.items)]},
 ];
 
@@ -76,7 +79,7 @@ function page_of(report) {
     page.update = (changed) => {
         const of = (kind) => report.items.filter((i) => i.kind === kind);
         sections.forEach((section, k) => {
-            if (changed && !(section.kinds ? section.kinds.some((kind) => changed.includes(kind)) : changed.some((kind) => !known_kinds.includes(kind) || kind === "bend"))) return;
+            if (changed && !(section.kinds ? section.kinds.some((kind) => changed.includes(kind)) : changed.some((kind) => !known_kinds.includes(kind) || listed_kinds.includes(kind)))) return;
             const made = section.make(report, of, page).filter(Boolean), place = page.places[k];
             if (made.length !== place.children.length || made.some((e, i) => e !== place.children[i])) place.replaceChildren(...made);
         });

@@ -52,20 +52,9 @@ function slice_figure(slice, rays, colours, what) {
     const index = what === "truth" ? slice.truth : what === "difference" ? slice.index.map((v, i) => v - slice.truth[i]) : slice.index;
     const finite = index.filter(is_number), least = finite.reduce((a, b) => Math.min(a, b), Infinity), most = finite.reduce((a, b) => Math.max(a, b), -Infinity);
     const signed = what === "difference", size = Math.max(Math.abs(least), Math.abs(most)) || 1, flat = !(most - least > 1e-12 * size);
-    const canvas = make("canvas", {width, height}), image = canvas.getContext("2d").createImageData(width, height);
-    index.forEach((v, i) => image.data.set([...(!is_number(v) ? [128, 128, 128] : signed ? signed_colour(v / size) : false_colour(flat ? 0.5 : (v - least) / (most - least))), 255], 4 * i));
-    canvas.getContext("2d").putImageData(image, 0, 0);
-    const aspect = (hi[1] - lo[1]) / (hi[0] - lo[0]) || 1, wide = 480, tall = Math.min(Math.max((wide - 80) * aspect + 52, 180), 640);
-    const {svg, at} = plot_axes({width: wide, height: tall, x: [lo[0], hi[0]], y: [lo[1], hi[1]], x_label: across[0], y_label: across[1], label: `index, ${slice.axis} = ${show(slice.at, 3)}`});
-    const [x0, y1] = at(lo[0], lo[1]), [x1, y0] = at(hi[0], hi[1]), dx = (x1 - x0) / width, dy = (y1 - y0) / height;
-    svg.append(make_svg("image", {href: canvas.toDataURL(), x: x0, y: y0, width: x1 - x0, height: y1 - y0, preserveAspectRatio: "none"}));
     const levels = flat ? [] : ticks(least, most, 7);
-    for (const level of levels) {
-        const d = isolines(index, width, height, level).map(([a, b, c, e]) => `M${(x0 + (a + 0.5) * dx).toFixed(1)} ${(y0 + (b + 0.5) * dy).toFixed(1)}L${(x0 + (c + 0.5) * dx).toFixed(1)} ${(y0 + (e + 0.5) * dy).toFixed(1)}`).join("");
-        const path = make_svg("path", {d, class: "isoline"});
-        path.append(make_svg("title", {}, show(level, 5)));
-        svg.append(path);
-    }
+    const {svg, at, corners: [x0, y0, x1, y1]} = field_plot({values: index, width, height, x: [lo[0], hi[0]], y: [lo[1], hi[1]], x_label: across[0], y_label: across[1], label: `index, ${slice.axis} = ${show(slice.at, 3)}`,
+        levels, colour: (v) => (signed ? signed_colour(v / size) : false_colour(flat ? 0.5 : (v - least) / (most - least)))});
     const step = Math.max(1, Math.ceil(rays.length / 60));
     const clip = `clip-${slice.axis}-${Math.random().toString(36).slice(2)}`;
     const box = make_svg("clipPath", {id: clip});

@@ -6,32 +6,35 @@
 const style_of = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 /* A canvas for what is between the corners lo and hi, seen at first from the direction
- * `away`. draw(context, line, project) draws it: line(a, b) between places, project(p) ->
- * [x, y] on the canvas, further away where depth(p) is smaller. click(x, y) and key(event)
- * (true: it is taken) may be missing. */
+ * `away`. draw(context, line, project, towards) draws it: line(a, b) between places,
+ * project(p) -> [x, y, nearness], towards() -> the direction to the eye. click(x, y) and
+ * key(event) (true: it is taken) may be missing. */
 function space_view(lo, hi, away, label, {draw: paint, click, key}) {
     const centre = lo.map((v, c) => (v + hi[c]) / 2), radius = Math.hypot(...lo.map((v, c) => hi[c] - v)) / 2 || 1;
-    const state = {turn: Math.atan2(away[0], away[2]) + 0.5, tilt: Math.atan2(away[1], Math.hypot(away[0], away[2])) + 0.25, zoom: 1};
+    const state = {turn: Math.atan2(away[0], away[2]) + 0.5, tilt: Math.atan2(away[1], Math.hypot(away[0], away[2])) + 0.25, zoom: 1}, first = {...state};
     const canvas = make("canvas", {width: 1200, height: 800, tabindex: 0, role: "img", class: "space", "aria-label": label}), context = canvas.getContext("2d");
     function project(p) {
         const x = p[0] - centre[0], y = p[1] - centre[1], z = p[2] - centre[2];
         const ct = Math.cos(state.turn), st = Math.sin(state.turn), cp = Math.cos(state.tilt), sp = Math.sin(state.tilt);
         const u = ct * x - st * z, depth = st * x + ct * z, scale = state.zoom * 0.56 * canvas.height / radius;
-        return [canvas.width / 2 + scale * u, canvas.height / 2 - scale * (cp * y - sp * depth)];
+        return [canvas.width / 2 + scale * u, canvas.height / 2 - scale * (cp * y - sp * depth), sp * y + cp * depth];
     }
     function line(from, to) {
+        const a = project(from), b = project(to);
         context.beginPath();
-        context.moveTo(...project(from));
-        context.lineTo(...project(to));
+        context.moveTo(a[0], a[1]);
+        context.lineTo(b[0], b[1]);
         context.stroke();
     }
+    const towards = () => [Math.sin(state.turn) * Math.cos(state.tilt), Math.sin(state.tilt), Math.cos(state.turn) * Math.cos(state.tilt)];
+    function zoom(factor) { state.zoom = Math.min(Math.max(state.zoom * factor, 0.1), 50); }
     function redraw() {
         const corner = (i) => [i & 1 ? hi[0] : lo[0], i & 2 ? hi[1] : lo[1], i & 4 ? hi[2] : lo[2]];
         context.clearRect(0, 0, canvas.width, canvas.height);
         context.lineWidth = 1.3;
         context.strokeStyle = style_of("--line");
         for (let i = 0; i < 8; i++) for (const bit of [1, 2, 4]) if (!(i & bit)) line(corner(i), corner(i | bit));
-        paint(context, line, project);
+        paint(context, line, project, towards);
     }
     let drag = null;
     canvas.addEventListener("pointerdown", (e) => { drag = {x: e.clientX, y: e.clientY, moved: false}; canvas.setPointerCapture(e.pointerId); });
@@ -47,13 +50,20 @@ function space_view(lo, hi, away, label, {draw: paint, click, key}) {
         drag = null;
         if (still && click) click((e.clientX - b.left) * canvas.width / b.width, (e.clientY - b.top) * canvas.height / b.height);
     });
+    canvas.addEventListener("wheel", (e) => {
+        if (!e.ctrlKey && document.activeElement !== canvas) return; /* the page scrolls */
+        e.preventDefault();
+        zoom(e.deltaY < 0 ? 1.1 : 1 / 1.1);
+        redraw();
+    }, {passive: false});
     canvas.addEventListener("keydown", (e) => {
         const step = {ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1]}[e.key];
         if (step) {
             state.turn += step[0];
             state.tilt = Math.min(Math.max(state.tilt + step[1], -1.57), 1.57);
-        } else if (e.key === "+" || e.key === "=") state.zoom *= 1.25;
-        else if (e.key === "-") state.zoom /= 1.25;
+        } else if (e.key === "+" || e.key === "=") zoom(1.25);
+        else if (e.key === "-") zoom(0.8);
+        else if (e.key === "0") Object.assign(state, first);
         else if (!key || !key(e)) return;
         e.preventDefault();
         redraw();
@@ -85,6 +95,28 @@ function plot_axes({width = 420, height = 300, x, y, x_label = "", y_label = "",
     svg.append(make_svg("text", {x: (left + width - right) / 2, y: height - 6, "text-anchor": "middle"}, x_label),
         make_svg("text", {transform: `translate(13 ${(top + height - bottom) / 2}) rotate(-90)`, "text-anchor": "middle"}, y_label));
     return {svg, at: (u, v) => [at_x(u), at_y(v)]};
+}
+
+/* Samples [height][width], row 0 on top, over x[0] to x[1] and y[0] to y[1]: an image by
+ * colour(value) -> [r, g, b], and isolines with their numbers. */
+function field_plot({values, width, height, wide = 480, x, y, x_label, y_label, label, colour, levels, digits = 5}) {
+    const canvas = make("canvas", {width, height}), image = canvas.getContext("2d").createImageData(width, height);
+    values.forEach((v, i) => image.data.set([...(is_number(v) ? colour(v) : [128, 128, 128]), 255], 4 * i));
+    canvas.getContext("2d").putImageData(image, 0, 0);
+    const aspect = (y[1] - y[0]) / (x[1] - x[0]) || 1, tall = Math.min(Math.max((wide - 80) * aspect + 52, 180), 640);
+    const {svg, at} = plot_axes({width: wide, height: tall, x, y, x_label, y_label, label});
+    const [x0, y1] = at(x[0], y[0]), [x1, y0] = at(x[1], y[1]), dx = (x1 - x0) / width, dy = (y1 - y0) / height;
+    svg.append(make_svg("image", {href: canvas.toDataURL(), x: x0, y: y0, width: x1 - x0, height: y1 - y0, preserveAspectRatio: "none"}));
+    const place = (a, b) => [x0 + (a + 0.5) * dx, y0 + (b + 0.5) * dy];
+    for (const level of levels) {
+        const pieces = isolines(values, width, height, level);
+        if (!pieces.length) continue;
+        const path = make_svg("path", {class: "isoline", d: pieces.map(([a, b, c, e]) => `M${place(a, b).map((v) => v.toFixed(1)).join(" ")}L${place(c, e).map((v) => v.toFixed(1)).join(" ")}`).join("")});
+        path.append(make_svg("title", {}, show(level, digits)));
+        const [tx, ty] = place(...pieces[Math.floor(pieces.length / 2)]);
+        svg.append(path, make_svg("text", {x: Math.min(Math.max(tx, x0 + 16), x1 - 16), y: Math.min(Math.max(ty + 4, y0 + 10), y1 - 4), "text-anchor": "middle", class: "level"}, show(level, digits)));
+    }
+    return {svg, at, corners: [x0, y0, x1, y1]};
 }
 
 /* Curves of one level through samples [height][width], row 0 on top: pieces [x, y, x, y]
