@@ -270,6 +270,98 @@ class Elements:
             return [Sensitivity(r.name.decode(errors="replace"), r.param, r.element, bool(r.emission), r.value,
                                 r.derivative, r.share, r.share_error) for r in found]
 
+    def element(self, index: int) -> dict[str, Any]:
+        """One element of the hierarchy, to be drawn.
+
+        Parameters
+        ----------
+        index : int
+            Below ``info["elements"]``.
+
+        Returns
+        -------
+        dict
+            What `struct imp_elements_element` has; `corner` as an array [corners][3], `parent` None
+            for whole polygons, `shape` None for measuring planes.
+
+        Examples
+        --------
+        >>> scene = importon.load_dict(importon.cornell_box(res=8))
+        >>> solution = importon.elements.Elements(scene, stop=0.2)
+        >>> solution.element(0)["level"], solution.element(0)["parent"]
+        (0, None)
+        """
+        with self.scene.lock:
+            x = make(_c.imp_elements_element)
+            self._context.check(lib.imp_elements_get_element(self.pointer, integer(index, "index", 0, 2**64 - 1), ctypes.byref(x)))
+            made = {f[0]: getattr(x, f[0]) for f in x._fields_ if f[0] != "size"}
+            made["shape"] = None if x.shape is None else x.shape.decode(errors="replace")
+            made["parent"] = None if x.parent == 2 ** (8 * ctypes.sizeof(ctypes.c_size_t)) - 1 else x.parent
+            made["corner"] = np.array(x.corner).reshape(4, 3)[:x.corners].copy()
+            for name in ("radiance", "irradiance"):
+                made[name] = np.array(made[name])
+            made["leaf"] = bool(x.leaf)
+            return made
+
+    def arrivals(self, index: int) -> Any:
+        """What arrives at an element, link by link, the brightest first.
+
+        Parameters
+        ----------
+        index : int
+
+        Returns
+        -------
+        ndarray
+            A structured array: `from` (an element), `irradiance` [3], `illuminance`, `measure` (of the
+            measurement: what passes here).
+
+        Examples
+        --------
+        >>> scene = importon.load_dict(importon.cornell_box(res=8))
+        >>> solution = importon.elements.Elements(scene, stop=0.2)
+        >>> rows, element = solution.arrivals(0), solution.element(0)
+        >>> bool(abs(rows["illuminance"].sum() - element["illuminance"]) < 1e-3 * element["illuminance"])
+        True
+        """
+        kind = np.dtype([("from", np.uintp), ("irradiance", float, 3), ("illuminance", float), ("measure", float)])
+        assert kind.itemsize == ctypes.sizeof(_c.imp_elements_arrival)
+        with self.scene.lock:
+            rows, n = ctypes.c_void_p(), ctypes.c_size_t()
+            self._context.check(lib.imp_elements_arrivals(self.pointer, integer(index, "index", 0, 2**64 - 1),
+                                                          ctypes.byref(rows), ctypes.byref(n)))
+            data = ctypes.string_at(rows.value, n.value * kind.itemsize) if rows.value else b""
+            lib.imp_free(self._context.pointer, rows)
+            return np.frombuffer(data, kind).copy()
+
+    def illuminance(self, index: int, width: int, height: int) -> Any:
+        """Illuminance at points of the polygon of an element, each with its own visibility.
+
+        Parameters
+        ----------
+        index : int
+        width, height : int
+            Of cells along the polygon's first edge and along its last.
+
+        Returns
+        -------
+        ndarray
+            [height][width]; NaN outside a triangle.
+
+        Examples
+        --------
+        >>> scene = importon.load_dict(importon.cornell_box(res=8))
+        >>> solution = importon.elements.Elements(scene, [{"kind": "shape", "shape": "floor"}], stop=0.2)
+        >>> solution.illuminance(0, 4, 4).shape
+        (4, 4)
+        """
+        not_inside()
+        cells = (integer(width, "width", 1, 4096), integer(height, "height", 1, 4096))
+        out = np.empty((cells[1], cells[0]))
+        with self.scene.lock:
+            self._context.check(lib.imp_elements_illuminance(self.pointer, integer(index, "index", 0, 2**64 - 1), *cells, out.ctypes.data))
+        return out
+
     @explained
     def fit(self, targets: Any, params: Any = None, *, optimizer: Optional[str] = None, max_iterations: int = 0,
             tolerance: float = 0, rounds: int = 0, bounds: Optional[Mapping[str, Any]] = None,

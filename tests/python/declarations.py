@@ -79,7 +79,7 @@ def test_initialisers():
             a, b = getattr(made, field), getattr(real, field)
             if isinstance(a, ctypes.Structure):
                 continue
-            assert (list(a) if hasattr(a, "_length_") else a) == (list(b) if hasattr(b, "_length_") else b), (name, field)
+            assert (bytes(a) if hasattr(a, "_length_") else a) == (bytes(b) if hasattr(b, "_length_") else b), (name, field)
         checked += 1
     assert checked >= 15
     return "%d initialisers" % checked
