@@ -22,6 +22,7 @@ struct team_hub {
     const void *message[TEAM_MAX];
     size_t bytes[TEAM_MAX];
     size_t sent; /* by rank 0, all in all */
+    size_t most; /* of its messages */
     int64_t *numbers[TEAM_MAX];
     _Atomic int64_t counter[2];
     int slow; /* rank 1 takes its time before it asks for more */
@@ -43,6 +44,7 @@ static enum imp_status team_gather(const void *message, size_t bytes,
     hub->message[r->rank] = message;
     hub->bytes[r->rank] = bytes;
     if (r->rank == 0) hub->sent += bytes;
+    if (r->rank == 0 && bytes > hub->most) hub->most = bytes;
     pthread_barrier_wait(&hub->barrier);
     for (int k = 0; k < hub->ranks; k++)
         receive(receiver, k, hub->message[k], hub->bytes[k]);

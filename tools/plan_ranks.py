@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a step of many ranks costs on the network, on paper (docs/machines.md).
 
-Every rank gives its nodes of the tree of sums to all (src/base/team_sum.c): at most one for each
-of the 16 chunks of work that it takes, of 24 bytes for the place and the sum itself, after a
-head of 784 bytes. A rank receives what all send; a ring passes it on at the speed of one link,
+Every rank gives its nodes of the tree of sums to all (src/base/team_sum.c): one for each of the
+chunks of work that it takes, of 24 bytes for the place and the sum itself, after a head of 784
+bytes. A rank receives what all send; a ring passes it on at the speed of one link,
 in ranks - 1 steps of 10 us. Textures and grids go in fixed point (src/base/team_fixed.c): the blocks
 that any rank has touched are added up on the way in pieces of 2^20 numbers, which takes two times
 their bytes from each link (Rabenseifner's algorithm) and 2 log2(ranks) steps a piece.
@@ -14,21 +14,31 @@ their bytes from each link (Rabenseifner's algorithm) and 2 log2(ranks) steps a 
 import math
 import sys
 
-CHUNKS, PLACE, HEAD, LATENCY = 16, 24, 784, 10e-6
+PLACE, HEAD, LATENCY = 24, 784, 10e-6
 FIXED_HEAD, PIECE = 48, 1 << 20
 WIDTH, HEIGHT, SUMS = 1920, 1080, 7  # of a pixel: three means, three squares, a weight
 TEXELS = 3 * 1024 * 1024
 ITEMS = 1 << 20  # of work in the step
 
 
+def chunks(ranks):
+    """Of all ranks: as many of one size as there are ranks, then of half of what is left."""
+    left, n = ITEMS, 0
+    while left > 0:
+        size = max(1 << max((left // (2 * ranks)).bit_length() - 1, 0), 1)
+        taken = ranks if size > 1 else left
+        left, n = left - taken * size, n + taken
+    return n
+
+
 def gradient(ranks, numbers):
     """Bytes that a rank receives: value and gradient, each with its spread."""
-    return ranks * (HEAD + CHUNKS * (PLACE + 8 * (2 * numbers + 4)))
+    return ranks * HEAD + chunks(ranks) * (PLACE + 8 * (2 * numbers + 4))
 
 
 def picture(ranks):
     """Every tile comes from one rank, or a few; all of the picture arrives once."""
-    return ranks * (HEAD + CHUNKS * PLACE) + 8 * SUMS * WIDTH * HEIGHT
+    return ranks * HEAD + chunks(ranks) * PLACE + 8 * SUMS * WIDTH * HEIGHT
 
 
 def texture(ranks):
@@ -61,7 +71,9 @@ def main():
     rows = [("gradient, %d numbers" % k, lambda r, k=k: gradient(r, k), ring) for k in (10, 100, 1000)]
     rows += [("picture, %d x %d" % (WIDTH, HEIGHT), picture, ring),
              ("texture of 3.1 million, all touched", texture, pieces)]
-    print("Depth of the tree over %d items: %d." % (ITEMS, math.ceil(math.log2(ITEMS))))
+    print("Depth of the tree over %d items: %d. Chunks of a rank: %s." % (
+        ITEMS, math.ceil(math.log2(ITEMS)),
+        ", ".join("%.0f of %d ranks" % (chunks(r) / r, r) for r in ranks)))
     print()
     print("| a step | ranks | received by each | at 1 Gbit/s | at 25 Gbit/s |")
     print("|---|---|---|---|---|")

@@ -67,7 +67,8 @@ static bool report(struct run *r, size_t committed, bool force)
     if (l->progress && (force || now - r->last_report_s > 0.1)) {
         r->last_report_s = now;
         const double hi = l->fraction_hi > 0 ? l->fraction_hi : 1;
-        const double part = (double)committed / (double)imp_max(l->n_items, (size_t)1);
+        const size_t reached = l->reached ? l->reached(l->payload) : committed;
+        const double part = (double)reached / (double)imp_max(l->n_items, (size_t)1);
         const double fraction = l->fraction_lo + (hi - l->fraction_lo) * part;
         const double elapsed = now - r->start_s;
         const double origin = l->start_s > 0 ? l->start_s : r->start_s;

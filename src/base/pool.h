@@ -32,6 +32,8 @@ struct imp_loop {
     /* Without commits: items this far after the oldest in work are not begun; 0: all are.
      */
     size_t window;
+    /* Items done, where others do some of them; NULL: those that this loop has done. */
+    size_t (*reached)(void *payload);
 };
 
 /* Result buffers a loop may need at once: a worker that runs ahead of the commits waits.

@@ -5,6 +5,7 @@
 #include "team.h"
 #include "arguments.h"
 #include "file.h"
+#include <stddef.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -125,57 +126,88 @@ enum imp_status imp__team_any(imp_context *ctx, bool here, bool *any)
     return team->host.gather(&own, 1, any_receive, any, team->host.payload);
 }
 
-struct broadcast {
-    imp_context *ctx;
-    enum imp_status st;
-    struct imp_bytes message; /* the status, then bytes or an error's text */
+/* What rank 0 says first; the text of an error follows it. */
+struct broadcast_head {
+    uint64_t bytes;
+    uint32_t status;
+    bool there;
 };
 
-static void broadcast_receive(void *receiver, int rank, const void *message, size_t bytes)
+struct broadcast {
+    imp_context *ctx;
+    struct broadcast_head head;
+    char text[512];
+    unsigned char *to; /* [head.bytes + 1]; NULL: rank 0 itself, or there is no memory */
+    size_t at;
+    bool strange;
+};
+
+static void head_receive(void *receiver, int rank, const void *message, size_t bytes)
+{
+    struct broadcast *b = receiver;
+    if (rank != 0 || bytes < sizeof b->head) return;
+    memcpy(&b->head, message, sizeof b->head);
+    snprintf(b->text, sizeof b->text, "%.*s",
+             (int)imp_min(bytes - sizeof b->head, sizeof b->text - 1),
+             (const char *)message + sizeof b->head);
+}
+
+static void piece_receive(void *receiver, int rank, const void *message, size_t bytes)
 {
     struct broadcast *b = receiver;
     if (rank != 0) return;
-    if (bytes < sizeof(uint32_t))
-        b->st = imp__error(b->ctx, IMP_E_ARG, "rank 0 reads no file here");
-    else if (!imp__bytes_add(b->ctx, &b->message, message, bytes) ||
-             !imp__bytes_add(b->ctx, &b->message, "", 1)) /* a zero behind the end */
-        b->st =
-            imp__error(b->ctx, IMP_E_NOMEM, "no memory for a file of %zu bytes", bytes);
+    b->strange |= bytes > b->head.bytes - b->at;
+    if (b->strange) return;
+    if (b->to) memcpy(b->to + b->at, message, bytes);
+    b->at += bytes;
 }
+
+/* In pieces, so that no rank has a file twice. */
+#define BROADCAST_PIECE ((size_t)4 << 20)
 
 enum imp_status imp__team_broadcast(imp_context *ctx, enum imp_status st,
                                     struct imp_bytes *bytes)
 {
     const struct imp__team *team = ctx->team;
-    const bool first = team->host.rank == 0;
-    const char *text = imp_last_error(ctx);
-    const uint32_t own = st;
+    const struct imp_team *host = &team->host;
+    const bool first = host->rank == 0;
     struct broadcast b = {.ctx = ctx};
-    struct imp_bytes out = {0};
-    const bool fits =
-        !first ||
-        (imp__bytes_add(ctx, &out, &own, sizeof own) &&
-         imp__bytes_add(ctx, &out, st == IMP_OK ? (const void *)bytes->data : text,
-                        st == IMP_OK ? bytes->size : strlen(text)));
-    /* Without memory for it, rank 0 sends nothing, and all fail. */
-    if (!fits) out.size = 0;
-    const enum imp_status sent =
-        team->host.gather(out.data, out.size, broadcast_receive, &b, team->host.payload);
-    imp__bytes_free(ctx, &out);
-    imp__bytes_free(ctx, bytes);
-    if (sent != IMP_OK) st = imp__error_prefix(ctx, sent, "the team");
-    else st = b.st;
-    if (st == IMP_OK) {
-        uint32_t theirs;
-        memcpy(&theirs, b.message.data, sizeof theirs);
-        b.message.size -= sizeof theirs + 1;
-        memmove(b.message.data, b.message.data + sizeof theirs, b.message.size + 1);
-        if (theirs != IMP_OK)
-            st = imp__error(ctx, (enum imp_status)theirs, "%s",
-                            (const char *)b.message.data);
+    struct {
+        struct broadcast_head head;
+        char text[512];
+    } said = {
+        .head = {.bytes = st == IMP_OK ? bytes->size : 0, .status = st, .there = true}};
+    if (!first) imp__bytes_free(ctx, bytes);
+    if (st != IMP_OK) snprintf(said.text, sizeof said.text, "%s", imp_last_error(ctx));
+    const size_t n = offsetof(__typeof__(said), text) + strlen(said.text);
+    enum imp_status sent = host->gather(first ? &said : NULL, first ? n : 0, head_receive,
+                                        &b, host->payload);
+    const enum imp_status theirs = (enum imp_status)b.head.status;
+    if (sent == IMP_OK && theirs == IMP_OK && b.head.there && !first) {
+        const bool fits = b.head.bytes < SIZE_MAX / 2;
+        b.to = fits ? imp__alloc_raw(ctx, (size_t)b.head.bytes + 1, 1) : NULL;
     }
-    if (st == IMP_OK) *bytes = b.message;
-    else imp__bytes_free(ctx, &b.message);
+    /* Who has no memory takes part all the same: the others wait for it. */
+    while (sent == IMP_OK && b.at < b.head.bytes && !b.strange) {
+        const size_t piece = imp_min((size_t)b.head.bytes - b.at, BROADCAST_PIECE);
+        sent = host->gather(first ? bytes->data + b.at : NULL, first ? piece : 0,
+                            piece_receive, &b, host->payload);
+    }
+    if (sent != IMP_OK) st = imp__error_prefix(ctx, sent, "the team");
+    else if (!b.head.there || b.strange)
+        st = imp__error(ctx, IMP_E_ARG, "rank 0 reads no file here");
+    else if (theirs != IMP_OK) st = imp__error(ctx, theirs, "%s", b.text);
+    else if (!first && !b.to)
+        st = imp__error(ctx, IMP_E_NOMEM, "no memory for a file of %llu bytes",
+                        (unsigned long long)b.head.bytes);
+    else st = IMP_OK;
+    if (st == IMP_OK && !first) {
+        b.to[b.head.bytes] = 0; /* behind the end, as of files that are read */
+        *bytes = (struct imp_bytes){b.to, (size_t)b.head.bytes, (size_t)b.head.bytes + 1};
+    } else if (st != IMP_OK) {
+        imp__bytes_free(ctx, bytes);
+        imp__release(ctx, b.to);
+    }
     return st;
 }
 

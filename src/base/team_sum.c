@@ -8,22 +8,54 @@
 
 /* ---- Who computes what --------------------------------------------------------------- */
 
-/* Chunks of a rank, where whoever is idle takes the next. */
-#define CHUNKS 16
+/* A picture is exchanged in windows: what a rank sends and receives between two gathers
+ * takes this much memory, or 64 groups of each rank, which are enough for equal shares. */
+#define WINDOW_BYTES  ((size_t)2 << 20)
+#define WINDOW_GROUPS ((size_t)64)
 
-static void share_begin(struct imp__share *s, struct imp__team *team, size_t n_items)
+static size_t window_items(const struct imp__sharing *s)
 {
-    const size_t ranks = (size_t)team->host.ranks, rank = (size_t)team->host.rank;
-    *s = (struct imp__share){.team = team, .n_items = n_items, .chunk = 1};
-    if (team->role == IMP_TEAM_MERGE) return;
-    if (team->host.next) {
-        while (s->chunk * 2 * ranks * CHUNKS <= n_items) s->chunk *= 2;
-        s->more = true;
-        return;
-    }
+    const size_t n = s->desc->n_items, group = s->tree.desc.group;
+    const size_t groups =
+        imp_max(WINDOW_BYTES / (s->desc->size + sizeof(struct imp__sum_place)),
+                WINDOW_GROUPS * (size_t)s->share.team->host.ranks);
+    return groups < n / group ? groups * group : n;
+}
+
+static void share_begin(struct imp__share *s, size_t first, size_t n_items)
+{
+    const struct imp_team *team = &s->team->host;
+    const size_t ranks = (size_t)team->ranks, rank = (size_t)team->rank;
+    s->first = s->begin = s->next = s->end = first;
+    s->n_items = n_items;
+    s->before = s->after = s->team->role == IMP_TEAM_MERGE ? n_items : 0;
+    s->more = team->next != NULL;
+    if (s->team->role == IMP_TEAM_MERGE || team->next) return;
     /* Parts of any two cuts with a common border meet there: floor(n i/k). */
-    s->next = (size_t)((unsigned __int128)n_items * rank / ranks);
-    s->end = (size_t)((unsigned __int128)n_items * (rank + 1) / ranks);
+    s->begin = s->next = first + (size_t)((unsigned __int128)n_items * rank / ranks);
+    s->end = first + (size_t)((unsigned __int128)n_items * (rank + 1) / ranks);
+    s->after = n_items;
+}
+
+/* Whoever is idle takes the next chunk. As many chunks as there are ranks have one size,
+ * the largest power of two with which they take half of what is left: the first begin at
+ * multiples of their size, so that few nodes are their sums, and the last are one item, so
+ * that all ranks end together. Returns false behind the last. */
+static bool chunk_at(struct imp__share *s, uint64_t chunk)
+{
+    const size_t ranks = (size_t)s->team->host.ranks;
+    size_t done = 0, size = 1;
+    while (size * 2 * ranks * 2 <= s->n_items) size *= 2;
+    for (;; chunk -= ranks) {
+        while (size > 1 && size * ranks * 2 > s->n_items - done) size /= 2;
+        if (chunk < ranks || size == 1) break;
+        done += ranks * size;
+    }
+    s->before = imp_min(done + chunk / ranks * ranks * size, s->n_items);
+    s->after = imp_min(s->before + ranks * size, s->n_items);
+    s->begin = s->next = s->first + imp_min(done + (size_t)chunk * size, s->n_items);
+    s->end = imp_min(s->next + size, s->first + s->n_items);
+    return s->next < s->end;
 }
 
 static bool share_take(struct imp__share *s, size_t *item)
@@ -31,16 +63,25 @@ static bool share_take(struct imp__share *s, size_t *item)
     pthread_mutex_lock(&s->lock);
     while (s->next == s->end && s->more) {
         const int64_t c = s->team->host.next(s->team->round, s->team->host.payload);
-        s->more = c >= 0 && (uint64_t)c <= s->n_items / s->chunk;
-        if (!s->more) break;
-        s->next = imp_min((size_t)c * s->chunk, s->n_items);
-        s->end = imp_min(s->next + s->chunk, s->n_items);
-        s->more = s->next < s->n_items;
+        s->more = c >= 0 && (uint64_t)c <= s->n_items && chunk_at(s, (uint64_t)c);
     }
     const bool got = s->next < s->end;
     if (got) *item = s->next++;
     pthread_mutex_unlock(&s->lock);
     return got;
+}
+
+/* Of all ranks, were they equally fast. */
+static size_t share_reached(void *payload)
+{
+    struct imp__share *s = &((struct imp__sharing *)payload)->share;
+    pthread_mutex_lock(&s->lock);
+    const double part = s->end > s->begin
+                            ? (double)(s->next - s->begin) / (double)(s->end - s->begin)
+                            : 1;
+    const size_t reached = s->before + (size_t)(part * (double)(s->after - s->before));
+    pthread_mutex_unlock(&s->lock);
+    return reached;
 }
 
 /* ---- What a rank tells the others ------------------------------------------------------ */
@@ -199,6 +240,37 @@ static enum imp_status exchange(struct imp__sharing *s, enum imp_status st,
 
 /* ---- All --------------------------------------------------------------------------- */
 
+/* Items [first, end): each rank computes some, and all get the sums of all. */
+static enum imp_status window_run(struct imp__sharing *s, const struct imp_loop *loop,
+                                  size_t first, size_t end, struct imp_shared *shared)
+{
+    const struct imp__sum_head none = {0};
+    const double hi = loop->fraction_hi > 0 ? loop->fraction_hi : 1,
+                 span = hi - loop->fraction_lo, all = (double)s->desc->n_items;
+    struct imp_loop each = *loop;
+    enum imp_status st = IMP_OK;
+    share_begin(&s->share, first, end - first);
+    s->own = true;
+    s->nodes = 0;
+    s->message.size = 0;
+    *shared->drops = (struct imp_drops){0};
+    /* A rank that cannot begin tells the others. */
+    s->no_memory |= !imp__bytes_add(s->ctx, &s->message, &none, sizeof none);
+    each.n_items = end - first;
+    each.fraction_lo = loop->fraction_lo + span * (double)first / all;
+    each.fraction_hi = loop->fraction_lo + span * (double)end / all;
+    each.units *= (double)(end - first) / all;
+    each.work = item_work;
+    each.commit = NULL;
+    each.payload = s;
+    each.window = imp__sum_window(s->ctx);
+    each.reached = share_reached;
+    if (!s->no_memory) st = imp__parallel(s->ctx, &each, NULL);
+    shared->late =
+        st == IMP_CANCELLED && loop->deadline_s > 0 && imp__now() >= loop->deadline_s;
+    return exchange(s, st, shared);
+}
+
 enum imp_status imp__shared_sum(imp_context *ctx, const struct imp_loop *loop,
                                 const struct imp_sum_desc *desc,
                                 enum imp_status (*work)(size_t i, int worker,
@@ -209,42 +281,30 @@ enum imp_status imp__shared_sum(imp_context *ctx, const struct imp_loop *loop,
     struct imp_sum_desc own = *desc;
     struct imp__sharing s = {
         .ctx = ctx, .desc = desc, .work = work, .payload = loop->payload};
-    const struct imp__sum_head none = {0};
     const bool shares = imp__team_shares(ctx);
-    const bool keeps = shares && (ctx->team->role == IMP_TEAM_RECORD ||
-                                  ctx->team->role == IMP_TEAM_VERIFY);
     shared->late = false;
     if (shares) {
         own.add = imp__sharing_add;
         own.take = sum_take;
         own.payload = &s;
+        s.share.team = ctx->team;
     }
     IMP_TRY(imp__sum_tree_create(ctx, &own, &s.tree));
-    if (keeps) {
-        s.share.team = ctx->team;
-        st = imp__chunks_exchange(&s, loop, shared);
-        goto out;
-    }
     if (!shares) {
         st = imp__parallel_sum(ctx, loop, &s.tree, 0, work, NULL);
+        shared->late =
+            st == IMP_CANCELLED && loop->deadline_s > 0 && imp__now() >= loop->deadline_s;
+    } else if (ctx->team->role == IMP_TEAM_RECORD || ctx->team->role == IMP_TEAM_VERIFY) {
+        st = imp__chunks_exchange(&s, loop, shared);
     } else {
-        struct imp_loop each = *loop;
-        share_begin(&s.share, ctx->team, desc->n_items);
-        s.own = true;
         const bool locks = pthread_mutex_init(&s.share.lock, NULL) == 0;
-        /* A rank that cannot begin tells the others. */
-        s.no_memory = !locks || !imp__bytes_add(ctx, &s.message, &none, sizeof none);
-        each.work = item_work;
-        each.commit = NULL;
-        each.payload = &s;
-        each.window = imp__sum_window(ctx);
-        if (!s.no_memory) st = imp__parallel(ctx, &each, NULL);
-    }
-    shared->late =
-        st == IMP_CANCELLED && loop->deadline_s > 0 && imp__now() >= loop->deadline_s;
-    if (shares) {
-        st = exchange(&s, st, shared);
-        pthread_mutex_destroy(&s.share.lock);
+        /* Files hold one message a sum. */
+        const size_t n = desc->n_items,
+                     window = imp__team_apart(ctx) ? n : window_items(&s);
+        s.no_memory = !locks;
+        for (size_t first = 0; first < n && st == IMP_OK; first += window)
+            st = window_run(&s, loop, first, imp_min(first + window, n), shared);
+        if (locks) pthread_mutex_destroy(&s.share.lock);
     }
 out:
     imp__bytes_free(ctx, &s.message);

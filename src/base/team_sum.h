@@ -8,13 +8,14 @@
 #include "sum_tree.h"
 #include "team.h"
 
-/* The items of this rank, in the order of its calls. */
+/* The items of this rank among [first, first + n_items), in the order of its calls. */
 struct imp__share {
     struct imp__team *team;
     pthread_mutex_t lock;
-    size_t n_items, chunk;
-    size_t next, end; /* of the present chunk */
-    bool more;        /* there may be other chunks */
+    size_t first, n_items;
+    size_t begin, next, end; /* of the present chunk */
+    size_t before, after; /* items that the team has done when it begins, and has ended */
+    bool more;            /* there may be other chunks */
 };
 
 /* What a rank tells the others: a head, then nodes of the tree, each behind its place. */

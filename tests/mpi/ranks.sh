@@ -79,6 +79,7 @@ importon render "${cornell[@]}" --spp 64 -q --no-preview -o target.exr || exit 9
 importon render "${textured[@]}" --spp 64 -q --no-preview -o textured.exr || exit 99
 importon render "$scenes/furnace.xml" --spp 64 -q --no-preview -o f.exr || exit 99
 job render render "${cornell[@]}" --spp 20 --se -o x.exr
+job large render "$scenes/furnace.xml" -D res=360 --spp 1 -o x.exr
 job guided render "${cornell[@]}" --spp 6 --guide --guide-share .3 -o x.exr
 job gradient gradient "${cornell[@]}" -T "$work/target.exr" --spp 8 --json
 job points gradient "${cornell[@]}" -T "$work/target.exr" --spp 16 --points sobol --json

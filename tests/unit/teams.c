@@ -2,6 +2,8 @@
  *
  * Teams: pictures, losses, gradients, Jacobians, means and fits have the bits of one
  * process, for any number of ranks and threads; a rank that differs is found by all. */
+#include "base/compiler.h"
+#include "math/hash.h"
 #include "parts_kit.h"
 #include "team_kit.h"
 #include <math.h>
@@ -17,12 +19,58 @@ struct member {
     enum imp_status st;
     char error[400];
     struct result r;
+    double fraction; /* the last that was reported before the end */
 };
 
 static int stop_now(const struct imp_progress *p, void *payload)
 {
     (void)p, (void)payload;
     return 1;
+}
+
+static int fraction_note(const struct imp_progress *p, void *payload)
+{
+    double *last = payload;
+    if (p->fraction < 1) *last = imp_max(*last, p->fraction);
+    return 0;
+}
+
+/* A picture of many tiles: a ball under a sky, one sample a pixel. */
+#define SIDE 400
+static enum imp_status large_run(imp_context *ctx, struct result *r)
+{
+    struct imp_run run = IMP_RUN_INIT;
+    imp_scene *s;
+    imp_film *film;
+    test_must(ctx, imp_scene_create(ctx, NULL, &s));
+    imp_scene_begin(s, "integrator", "path", NULL, NULL);
+    imp_scene_integer(s, "max_depth", 2);
+    imp_scene_end(s);
+    imp_scene_begin(s, "sensor", "perspective", NULL, NULL);
+    imp_scene_transform(s, "to_world",
+                        (double[16]){-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, -1, 4, 0, 0, 0, 1});
+    imp_scene_begin(s, "film", "hdrfilm", NULL, NULL);
+    imp_scene_integer(s, "width", SIDE);
+    imp_scene_integer(s, "height", SIDE);
+    imp_scene_begin(s, "rfilter", "gaussian", NULL, NULL);
+    imp_scene_end(s);
+    imp_scene_end(s);
+    imp_scene_end(s);
+    imp_scene_begin(s, "emitter", "constant", NULL, NULL);
+    imp_scene_end(s);
+    imp_scene_begin(s, "shape", "sphere", NULL, NULL);
+    imp_scene_end(s);
+    test_must(ctx, imp_scene_commit(s));
+    run.spp = 1;
+    const enum imp_status st = imp_render(s, &run, &film);
+    if (st == IMP_OK) {
+        const uint64_t hash =
+            imp__hash(0, imp_film_mean(film), sizeof(float[SIDE * SIDE * 3]));
+        memcpy(r->objective, &hash, sizeof hash);
+        imp_film_destroy(film);
+    }
+    imp_scene_destroy(s);
+    return st;
 }
 
 /* The optimisers of two ranks have come to different parameters: `member_main` with
@@ -45,13 +93,16 @@ static void *member_main(void *payload)
     imp_context *ctx = test_context(m->threads);
     imp_scene *s = scene_make(ctx, m->filter, m->red);
     m->st = team_join(ctx, &m->rank);
-    if (m->st == IMP_OK && m->fails == 3) {
+    if (m->st == IMP_OK && m->fails == 4) {
+        m->st = large_run(ctx, &m->r);
+    } else if (m->st == IMP_OK && m->fails == 3) {
         m->st = diverge(ctx, s, m->rank.rank);
     } else if (m->st == IMP_OK && m->fails) { /* a user stops this rank */
         struct imp_run run = IMP_RUN_INIT;
         imp_problem *p = problem_make(ctx, s, "ball.*");
         double g[3];
-        if (m->fails == 1) run.progress = stop_now;
+        run.progress = m->fails == 1 ? stop_now : fraction_note;
+        run.progress_payload = &m->fraction;
         run.spp = 4096;
         m->st = imp_problem_objective(p, NULL, &run, NULL, g, NULL);
         imp_problem_destroy(p);
@@ -68,6 +119,7 @@ static struct member members[TEAM_MAX];
 
 static const char *(*tamper)(const void *message, size_t bytes);
 static int slow, taken[TEAM_MAX];
+static size_t most;
 
 static size_t team(int ranks, int shares, const char *filter, enum job job)
 {
@@ -89,6 +141,7 @@ static size_t team(int ranks, int shares, const char *filter, enum job job)
     for (int k = 0; k < ranks; k++) pthread_join(thread[k], NULL);
     pthread_barrier_destroy(&hub.barrier);
     for (int k = 0; k < ranks; k++) taken[k] = hub.taken[k];
+    most = hub.most;
     return hub.sent;
 }
 
@@ -169,6 +222,28 @@ static void team_troubles(void)
            members[2].st);
 }
 
+/* Pictures are exchanged in windows: of their sums, a rank holds and sends no more than
+ * some megabytes at a time. */
+static void large(void)
+{
+    static struct result whole;
+    int same = 0;
+    imp_context *ctx = test_context(2);
+    test_must(ctx, large_run(ctx, &whole));
+    imp_context_destroy(ctx);
+    for (int ranks = 2; ranks <= 3; ranks++) {
+        members_reset();
+        for (int k = 0; k < ranks; k++) members[k].fails = 4;
+        team(ranks, ranks == 3, "box", PICTURE);
+        for (int k = 0; k < ranks; k++)
+            same +=
+                members[k].st == IMP_OK && !memcmp(&members[k].r, &whole, sizeof whole);
+    }
+    tap_ok(same == 5 && most < (size_t)3 << 20,
+           "a picture of %d x %d: %d of 5 ranks have the bits, messages take %zu bytes",
+           SIDE, SIDE, same, most);
+}
+
 /* A rank that is slow computes less, and the others what it leaves. */
 static void idle(void)
 {
@@ -190,6 +265,11 @@ static void traffic(void)
     const size_t few = team(2, 1, "box", LOSS);
     for (int k = 0; k < 2; k++) members[k].fails = 2; /* 4096 samples instead of 18 */
     const size_t many = team(2, 1, "box", LOSS);
+    const double shares = members[0].fraction;
+    team(2, 0, "box", LOSS);
+    tap_ok(shares > .6 && members[0].fraction > .6,
+           "progress is that of all ranks: %g and %g before the end", shares,
+           members[0].fraction);
     tap_ok(many < 1.2 * (double)few && few < 16384,
            "bytes of a rank: %zu at 18 samples, %zu at 4096", few, many);
     /* Of a texture, where integers are added on the way: two times its numbers for mean,
@@ -210,6 +290,7 @@ int main(void)
     teams("box");
     points = IMP_POINTS_INDEPENDENT;
     team_troubles();
+    large();
     idle();
     traffic();
     return tap_done();
