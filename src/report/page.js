@@ -43,11 +43,15 @@ function all_layers(items) {
 const known_kinds = ["picture", "derivative", "fit", "check", "walks", "rays", "bend", "elements", "mesh", "image"];
 const listed_kinds = ["bend", "elements"]; /* they have sections, and the answer is a table besides */
 const sections = [
-    {kinds: ["fit", "elements"], make: (report, of) => [make("header", {}, make("h1", {}, report.title || "importon report"), ...(of("fit").length ? verdict(of("fit")[0].data) : []),
+    {kinds: ["fit", "elements"], make: (report, of) => [make("header", {}, make("h1", {}, report.title || "importon report"), ...(of("fit").length && of("fit")[0].data ? verdict(of("fit")[0].data) : []),
         ...of("elements").filter((i) => i.data).flatMap((i) => elements_verdict(i.data)))]},
     {kinds: ["picture", "derivative"], make: (report, of, page) => {
         const {layers, failed} = all_layers([...of("picture"), ...of("derivative")]);
         const notes = failed.map((text) => make("p", {class: "error"}, `This picture cannot be shown: ${text}`));
+        for (const layer of layers) {
+            const without = layer.role === "residual" ? 0 : layer.without_number();
+            if (without) notes.push(make("p", {class: "warning"}, `${layer.name}: ${without} of ${layer.width * layer.height} pixels are not numbers, and magenta.`));
+        }
         if (page.pictures && layers.length) page.pictures.update(layers);
         else page.pictures = layers.length ? picture_section(layers, page.live) : null;
         page.layers = layers;
@@ -80,7 +84,13 @@ function page_of(report) {
         const of = (kind) => report.items.filter((i) => i.kind === kind);
         sections.forEach((section, k) => {
             if (changed && !(section.kinds ? section.kinds.some((kind) => changed.includes(kind)) : changed.some((kind) => !known_kinds.includes(kind) || listed_kinds.includes(kind)))) return;
-            const made = section.make(report, of, page).filter(Boolean), place = page.places[k];
+            let made;
+            try {
+                made = section.make(report, of, page).filter(Boolean);
+            } catch (error) { /* data that others wrote: the rest of the page stands */
+                made = [make("p", {class: "error"}, `${section.kinds ? `This part (${section.kinds.join(", ")})` : "A part"} cannot be shown: ${error.message}`)];
+            }
+            const place = page.places[k];
             if (made.length !== place.children.length || made.some((e, i) => e !== place.children[i])) place.replaceChildren(...made);
         });
         empty.hidden = report.items.length > 0 || Boolean(report.live);

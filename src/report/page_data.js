@@ -71,6 +71,12 @@ class Layer {
     }
     at(c, x, y) { return this.planes[c][y * this.width + x]; }
     error_at(c, x, y) { return this.errors ? this.errors[c][y * this.width + x] : NaN; }
+    /* Pixels of which some channel is infinite or not a number. */
+    without_number() {
+        let n = 0;
+        for (let i = 0; i < this.width * this.height; i++) n += this.planes.some((p) => !Number.isFinite(p[i]));
+        return n;
+    }
     /* 99.5 % of |values| are below. */
     range() {
         if (this.range_ === undefined) {

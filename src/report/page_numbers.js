@@ -109,7 +109,7 @@ function correlation_section(fit) {
             rect.append(make_svg("title", {}, `${names[i]}, ${names[j]}: ${show(v, 3)}`));
             svg.append(rect);
             if (cell >= 30) {
-                const text = make_svg("text", {x: left + cell * (j + 0.5), y: 20 + cell * (i + 0.5) + 4, "text-anchor": "middle", style: `fill: ${Math.abs(v) > 0.55 ? "#fff" : "#111"}; font-size: 10px`}, v.toFixed(2).replace("0.", "."));
+                const text = make_svg("text", {x: left + cell * (j + 0.5), y: 20 + cell * (i + 0.5) + 4, "text-anchor": "middle", style: `fill: ${v < -0.62 ? "#fff" : "#000"}; font-size: 10px`}, v.toFixed(2).replace("0.", "."));
                 svg.append(text);
             }
         });

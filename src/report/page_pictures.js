@@ -96,7 +96,7 @@ function picture_section(layers, live) {
         redraw();
     }
     function canvas_of(layer, slot) {
-        const scale = Math.max(1, Math.min(4, Math.ceil(900 / layer.width)));
+        const scale = Math.max(1, Math.min(16, Math.ceil(720 / layer.width)));
         const canvas = make("canvas", {class: "view", tabindex: 0, width: layer.width * scale, height: layer.height * scale,
             role: "img", "aria-label": `${layer.name}, ${layer.width} x ${layer.height}`});
         let drag = null;

@@ -30,9 +30,11 @@ function space_view(lo, hi, away, label, {draw: paint, click, key}) {
     function zoom(factor) { state.zoom = Math.min(Math.max(state.zoom * factor, 0.1), 50); }
     function redraw() {
         const corner = (i) => [i & 1 ? hi[0] : lo[0], i & 2 ? hi[1] : lo[1], i & 4 ? hi[2] : lo[2]];
-        context.clearRect(0, 0, canvas.width, canvas.height);
+        /* Colours stand for values, from dark to bright: the ground is dark in all themes. */
+        context.fillStyle = "#15171a";
+        context.fillRect(0, 0, canvas.width, canvas.height);
         context.lineWidth = 1.3;
-        context.strokeStyle = style_of("--line");
+        context.strokeStyle = "#8a929c";
         for (let i = 0; i < 8; i++) for (const bit of [1, 2, 4]) if (!(i & bit)) line(corner(i), corner(i | bit));
         paint(context, line, project, towards);
     }

@@ -1,24 +1,21 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Pages of reports in a headless Chromium, from file://.
+"""What pages of reports show, in a headless Chromium, from file://. (hold.py: numbers,
+keyboard, widths, looks.)
 
 Usage: browser.py IMPORTON SCENES
-
-A copy of the page gets one more script, which acts as a reader does and leaves what it
-found in the page; the browser prints the page.
 """
 import json
 import os
-import re
 import shutil
 import subprocess
 import sys
 import tempfile
 
-import numpy as np
+from chromium import PROGRAM, Browser
 
 importon, scenes = sys.argv[1:]
-browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+VERSION = 1  # of the data
 count = failed = 0
 
 
@@ -33,31 +30,19 @@ def run(*words):
     return subprocess.run([importon, *words], check=True, capture_output=True, text=True).stdout
 
 
-def look(page, script, *options):
+def look(page, script):
     """What `script`, the body of an async function, returns in the page."""
-    text = open(page, encoding="utf-8", errors="replace").read()
-    end = text.rindex("</body>")
-    probe = "<script>(async () => { let found; try { found = await (async () => { %s })(); }" \
-            " catch (error) { found = {error: String(error.stack)}; }" \
-            " const out = document.createElement('pre'); out.id = 'found'; out.textContent = JSON.stringify(found);" \
-            " document.body.append(out); })();</script>" % script
-    copy = os.path.join(os.path.dirname(page), "probe.html")
-    open(copy, "w", encoding="utf-8").write(text[:end] + probe + text[end:])
-    done = subprocess.run([browser, "--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader",
-        "--enable-unsafe-swiftshader", "--virtual-time-budget=20000", "--user-data-dir=" + os.path.join(folder, "profile"),
-        "--host-resolver-rules=MAP * ~NOTFOUND", *options, "--dump-dom", "file://" + copy],
-        capture_output=True, text=True, timeout=300)
-    found = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.S)
-    if not found: raise RuntimeError("the page left nothing: " + done.stderr[-500:])
-    import html
-    answer = json.loads(html.unescape(found[1]))
-    if isinstance(answer, dict) and "error" in answer: raise RuntimeError(answer["error"])
+    tab = browser.tab("file://" + page)
+    answer = tab.run(script)
+    errors.extend(tab.errors)
+    tab.close()
     return answer
 
 
-if not browser:
+if not PROGRAM:
     print("1..0 # SKIP no chromium")
     sys.exit(0)
+browser, errors = Browser(), []
 folder = tempfile.mkdtemp()
 result = os.path.join(folder, "result")
 page = os.path.join(result, "report.html")
@@ -69,52 +54,7 @@ run("fit", cornell, *common, "--target", folder + "/t.exr", "--set", "red.reflec
 run("jacobian", cornell, *common, "--spp", "16", "-p", "red.*", "-o", result)
 run("check", cornell, *common, "--spp", "16", "-p", "red.*", "--json", "-o", result + "/check.json")
 run("report", result, "-q", "--scene", cornell, "-D", "res=48", "--walks", "4")
-# The same pixels as the picture in the report, by another way out of the program.
-run("render", cornell, *common, "--spp", "64", "--seed", "5", "--no-preview", "-o", folder + "/t.npy")
-truth = np.load(folder + "/t.npy")
-
-# ---- Numbers under the cursor ---------------------------------------------------------
-read = """
-const canvas = document.querySelector("canvas.view"), box = canvas.getBoundingClientRect(), found = [];
-for (const [x, y] of [[0, 0], [24, 24], [47, 47], [10, 30], [30, 12], [25, 3]]) {
-    canvas.dispatchEvent(new PointerEvent("pointermove", {clientX: box.left + (x + 0.5) * box.width / 48,
-        clientY: box.top + (y + 0.5) * box.height / 48, bubbles: true}));
-    found.push({x, y, place: document.getElementById("pixel").textContent,
-        rows: [...document.querySelectorAll("#pictures .stage tr")].map((r) => r.cells[0].textContent + "=" + r.cells[1].textContent)});
-}
-return {found, ready: document.documentElement.dataset.ready, gl: !!document.createElement("canvas").getContext("webgl2")};
-"""
-answer = look(page, read)
-ok(answer["ready"] == "1", "the page is drawn, offline%s" % ("" if answer["gl"] else " # without WebGL2"))
-worst, places = 0., True
-for pixel in answer["found"]:
-    places &= pixel["place"] == "pixel %d, %d" % (pixel["x"], pixel["y"])
-    rows = dict(r.split("=") for r in pixel["rows"])
-    for c, name in enumerate("RGB"):
-        shown, _, se = rows["target " + name].partition(" ± ")
-        value = float(truth[pixel["y"], pixel["x"], c])
-        # Shown with two digits of its error: what is cut off is below a twentieth of it.
-        allowed = abs(value) * 2. ** -11 + (0.05 * float(se) if se else 5e-6 * abs(value))
-        worst = max(worst, abs(float(shown) - value) / allowed if allowed else 0)
-ok(places and worst <= 1, "the pixel under the cursor is the file's # %.2f of half a unit and what is shown" % worst)
-
-# ---- By keyboard alone ----------------------------------------------------------------
-keys = """
-const press = (key, where = document.body) => where.dispatchEvent(new KeyboardEvent("keydown", {key, bubbles: true}));
-const pressed = () => [...document.querySelectorAll("#pictures button")].findIndex((b) => b.getAttribute("aria-pressed") === "true");
-const order = [];
-for (const key of ["3", "1", "2", "9"]) { press(key); order.push(pressed()); }
-const canvas = document.querySelector("canvas.view");
-canvas.focus();
-for (const key of ["ArrowRight", "ArrowRight", "ArrowDown"]) press(key, canvas);
-return {order, pixel: document.getElementById("pixel").textContent, focused: document.activeElement === canvas,
-    reachable: [...document.querySelectorAll("button, input, select, canvas.view, .thumbs canvas[role=button]")].every((e) => e.tabIndex >= 0)};
-"""
-answer = look(page, keys)
-ok(answer["order"] == [2, 0, 1, 1], "keys 1 to 9 choose the layer, and one too many does nothing")
-ok(answer["pixel"] == "pixel 2, 1" and answer["focused"] and answer["reachable"],
-   "arrows move the pixel; whatever can be pressed can be reached by Tab")
-
+# ---- Walks ------------------------------------------------------------------------------
 walks = """
 const canvas = document.querySelector("#walks canvas"), press = (key) => canvas.dispatchEvent(new KeyboardEvent("keydown", {key, bubbles: true}));
 const before = canvas.toDataURL(), rows = () => document.querySelectorAll("#walks tbody tr").length;
@@ -161,12 +101,7 @@ return {turned: canvas.toDataURL() !== before, rays: s.querySelectorAll("path.ra
 ok(answer["turned"] and answer["rays"] > 100 and answer["spots"] > 100 and answer["truth"] == 3 and "0 apart at most" in answer["said"],
    "bent rays in space, in sections, as spots; and found over true # %(rays)d, %(spots)d" % answer)
 
-# ---- Widths, and a page from strangers ----------------------------------------------------
-for width in (400, 800, 2000):
-    wide = look(page, "return [document.documentElement.scrollWidth, innerWidth]", "--window-size=%d,900" % width)
-    # Chromium's windows are 500 pixels wide at least.
-    ok(wide[0] <= wide[1], "%d pixels wide: nothing runs over the edge # %d" % (wide[1], wide[0]))
-
+# ---- Pages from strangers ----------------------------------------------------------------
 strange = os.path.join(folder, "strange")
 os.mkdir(strange)
 name = "</script><img src=x onerror=document.title=1><script>document.title=2</script>"
@@ -182,6 +117,47 @@ answer = look(strange + "/report.html", """return {ready: document.documentEleme
 ok(answer["ready"] == "1" and answer["images"] == 0 and answer["title"] == name and answer["header"] == name and answer["name"] == name,
    "names that look like markup are text")
 ok(answer["rows"] == 200, "of 100,000 parameters without values, 200 are listed")
+# Names that look like markup, wherever a page shows one; numbers that are none; nothing at all.
+ugly = os.path.join(folder, "ugly")
+os.mkdir(ugly)
+run("render", cornell, "-D", "res=8", "-q", "--spp", "4", "--se", "-o", ugly + "/picture.exr", "--no-preview")
+json.dump({"importon": "0", "command": "fit", "loss": name, "optimizer": name, "value": 1, "se": 1, "iterations": 1, "reason": name, "warning": name,
+           "residual": None, "residual_hi": None, "chi2_per_freedom": None, "covariance": [[1, 0], [0, None]], "undetermined": {"names": [name], "direction": [None]},
+           "params": [dict(rows[0], value=1, se=0, lo95=1, hi95=1, start=name), dict(rows[1], name=name + "2", unit=None, start=None)],
+           "history": {"loss": [1, None, 2], "se": [None, 0, 1], "names": [name, 3], "x": [[1, None], [None, None], [2, 2]]}}, open(ugly + "/parameters.json", "w"))
+walk = {"pixel": [0, 0], "sample": 0, "origin": [0, 0, 0], "direction": [0, 0, 1], "radiance": [None], "vertices": [
+    {"shape": name, "bsdf": name, "light": name, "position": [0, 0, 1], "throughput": [None], "emission": [], "arriving": [None]},
+    {"shape": "", "bsdf": "", "escapes": [0, 0, 1], "throughput": [1], "emission": [1], "arriving": [0]}]}
+answers = {"check": {"rows": [{"method": name, "param": name, "value": None, "reference": None, "error": None, "limit": None, "ok": False}]},
+           "gradient": {name: name, "params": [{"name": name, name: [name], "grad": None}], "empty": [], "nothing": None}, "walks": {"bounds": [[None] * 3] * 2, "walks": [walk, {}]},
+           "bend": {"rays": None, "history": {"loss": []}}, "elements": {}, name: {name: [{name: name}]}}
+for number, (kind, content) in enumerate(answers.items()):
+    json.dump({"importon": "0", "command": kind, **content}, open(ugly + "/%d.json" % number, "w"))
+run("report", ugly, "-q", "--title", name)
+errors.clear()
+answer = look(ugly + "/report.html", """return {ready: document.documentElement.dataset.ready, images: document.images.length, title: document.title,
+    scripts: document.scripts.length, text: document.getElementById("page").innerText}""")
+ok(answer["ready"] == "1" and answer["images"] == 0 and answer["title"] == name and answer["scripts"] == 2 and name in answer["text"] and not errors,
+   "and so they are in walks, checks, gradients and histories, beside numbers that are none%s" % (" # " + "; ".join(errors[:3]) if errors else ""))
+
+# The page is drawn from data that nobody wrote so far: kinds that it does not know, wrong types, nothing.
+bare = open(page, encoding="utf-8").read()
+start = bare.index('id="data">') + len('id="data">')
+end = bare.index("</script>", start)
+known = ("picture", "derivative", "fit", "check", "walks", "rays", "bend", "image", "elements", "gradient", "manifest")
+cases = {"no items": [], "unknown kinds": [{"kind": "later", "data": {"a": 1}}, {"kind": "later"}],
+         "empty data": [{"kind": k, "data": {}} for k in known if k not in ("picture", "derivative", "image")],
+         "wrong types": [{"kind": k, "data": d} for k in ("fit", "check", "walks", "rays", "bend", "elements") for d in (None, [], 3, "text", {"params": 3, "rows": 3, "walks": 3, "history": 3})],
+         "pictures of nothing": [{"kind": "picture", "name": "x", "width": 1, "height": 1, "spp": 0, "view": 0, "channels": ["R"], "pixels": p, "scale": 1} for p in ("AH4=", "AHw=", "", "???")]}
+for what, items in cases.items():
+    text = json.dumps({"schema": "importon-report", "version": VERSION, "importon": "0", "items": items}).replace("<", "\\u003c")
+    open(folder + "/bare.html", "w", encoding="utf-8").write(bare[:start] + text + bare[end:])
+    errors.clear()
+    answer = look(folder + "/bare.html", 'return [document.documentElement.dataset.ready, document.getElementById("page").innerText]')
+    ok(answer[0] == "1" and not errors and (items or "holds nothing" in answer[1]), "%s: the page stands%s" % (what, " # %s %s" % (answer[1][:80], "; ".join(errors[:3])) if answer[0] != "1" or errors else ""))
+    if what == "pictures of nothing": ok("x: 1 of 1 pixels are not numbers" in answer[1] and "cannot be shown" in answer[1], "and says what is no number, and what is no picture")
+    if what == "wrong types": ok("cannot be shown" in answer[1], "and says what it cannot show")
+browser.close()
 shutil.rmtree(folder, ignore_errors=True)
 print("1..%d" % count)
 sys.exit(failed > 0)
