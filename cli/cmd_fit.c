@@ -86,6 +86,7 @@ static int run_fit(int n, char **operand)
     if (!rc) {
         const struct imp_run run = cli_run();
         rc = manifest_begin(cli.out);
+        if (!rc && o.resume) rc = manifest_whole();
         const enum imp_status st = rc ? IMP_OK : imp_fit(problem, &fit, &run, &result);
         /* a checkpoint that cannot be written names itself */
         if (cli_failed(st)) rc = cli_fail(st, st == IMP_E_IO ? NULL : cli.scene_path);

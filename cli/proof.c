@@ -11,6 +11,9 @@
 #include <string.h>
 #include <sys/stat.h>
 
+/* Bytes of sums in a manifest that nobody asked for. */
+#define LIMIT_BESIDE ((size_t)1 << 20)
+
 static char *beside; /* where the manifest goes that nobody asked for; NULL: nowhere */
 
 static int status(enum imp_status st) { return st == IMP_OK ? 0 : cli_fail(st, NULL); }
@@ -74,27 +77,34 @@ static int replaceable(const char *path)
     return n == 0 || !memcmp(magic, "impproof", sizeof magic);
 }
 
+int manifest_whole(void)
+{
+    return cli.manifest ? status(imp_manifest_set_limit(cli.manifest, 0)) : 0;
+}
+
 int manifest_begin(const char *output)
 {
     if (!cli.manifest || cli.verifies || cli.manifest_path)
         return cli.manifest ? status(imp_context_set_manifest(cli.context, cli.manifest))
                             : 0;
-    /* Beside an output file, without sums: these would be kept chunk by chunk. */
     if (!output || !strcmp(output, "-") || !is_file_or_none(output)) {
         beside_drop();
         return 0;
     }
     beside = cli_alloc(strlen(output) + sizeof "/.manifest", 1);
     sprintf(beside, strcmp(cli.name, "fit") ? "%s.manifest" : "%s/manifest", output);
-    if (replaceable(beside)) return 0;
+    if (replaceable(beside)) {
+        enum imp_status st = imp_manifest_set_limit(cli.manifest, LIMIT_BESIDE);
+        if (st == IMP_OK) st = imp_context_set_manifest(cli.context, cli.manifest);
+        return status(st);
+    }
     cli_say("importon: warning: %s is no manifest, and stays", beside);
     beside_drop();
     return 0;
 }
 int manifest_pause(void)
 {
-    return cli.manifest && !beside ? status(imp_context_set_manifest(cli.context, NULL))
-                                   : 0;
+    return cli.manifest ? status(imp_context_set_manifest(cli.context, NULL)) : 0;
 }
 
 int manifest_numbers(const char *name, const double *x, size_t n)

@@ -13,6 +13,8 @@ int manifest_open(void);
  * gets the result, NULL: none. 0, or an exit code. */
 int manifest_begin(const char *output);
 int manifest_pause(void);
+/* The sums to come are not those of the whole run: keep none. */
+int manifest_whole(void);
 /* Results, by name; nothing where there is no manifest. 0, or an exit code. */
 int manifest_numbers(const char *name, const double *x, size_t n);
 int manifest_film(const char *name, const imp_film *film);

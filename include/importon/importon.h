@@ -211,6 +211,10 @@ typedef struct imp_manifest imp_manifest;
  * @return IMP_OK; IMP_E_ARG; IMP_E_NOMEM. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_manifest_create(imp_context *context, const char *command, imp_manifest **out);
+/** Keep sums while all of them take no more than `bytes` (256 MiB before this call); a
+ * run whose sums take more is verified as a whole. The more sums a run has, the fewer chunks
+ * are kept of each. @return IMP_OK; IMP_E_ARG. */
+IMP_API enum imp_status imp_manifest_set_limit(imp_manifest *manifest, size_t bytes);
 /** Read one, to verify it: files that are read from now on are compared with its inputs,
  * and its output files are read and compared now.
  * @param fraction of the chunks that the calls after imp_context_set_manifest compute

@@ -22,7 +22,7 @@ enum imp_team_role {
     IMP_TEAM_RANK,
     IMP_TEAM_PART,   /* what the others compute is not known: results are not whole */
     IMP_TEAM_MERGE,  /* computes no item */
-    IMP_TEAM_RECORD, /* computes all, chunk by chunk, and keeps the sums of each */
+    IMP_TEAM_RECORD, /* computes all, and keeps the sums of chunks */
     IMP_TEAM_VERIFY  /* computes some of the chunks again, and takes the sums of all */
 };
 
@@ -35,8 +35,12 @@ struct imp__team {
     uint64_t state;
     int alone;                   /* > 0: inside of what every rank computes whole */
     bool (*pick)(void *payload); /* is the next chunk verified? */
-    bool in_fixed;               /* recorded: there were sums in fixed point */
-    bool differs; /* verified: a chunk did not have the sums that were kept */
+    /* Chunks of a sum to keep, no more than `most`, which take so many bytes, and for each
+     * chunk so many; 0: the sum is not kept. */
+    size_t (*chunks)(size_t bytes, size_t each, size_t most, void *payload);
+    size_t n_kept; /* chunks */
+    bool in_fixed; /* recorded: there were sums in fixed point */
+    bool differs;  /* verified: a chunk did not have the sums that were kept */
 };
 
 /* Is work of this context divided now? */

@@ -130,6 +130,22 @@ static enum imp_status item_work(size_t i, int worker, int slot, void *payload)
     return st;
 }
 
+bool imp__message_nodes_put(struct imp__sharing *s, const unsigned char *at, size_t bytes,
+                            uint64_t nodes)
+{
+    struct imp__sum_place p;
+    if (bytes / (sizeof p + s->desc->size) < nodes) return false;
+    for (uint64_t k = 0; k < nodes; k++, at += sizeof p + s->desc->size) {
+        memcpy(&p, at, sizeof p);
+        const struct imp_sum_node node = {.group = (size_t)p.group,
+                                          .index = (size_t)p.index,
+                                          .level = (int)p.level,
+                                          .sum = (void *)(uintptr_t)(at + sizeof p)};
+        if (imp__sum_tree_put_node(&s->tree, &node) != IMP_OK) return false;
+    }
+    return true;
+}
+
 void imp__sharing_receive(void *receiver, int rank, const void *message, size_t bytes)
 {
     struct imp__sharing *s = receiver;
@@ -139,11 +155,9 @@ void imp__sharing_receive(void *receiver, int rank, const void *message, size_t 
     s->strange = bytes < sizeof head;
     if (s->strange) return;
     memcpy(&head, at, sizeof head);
-    s->strange =
-        head.items != s->desc->n_items || head.group != s->tree.desc.group ||
-        head.size != s->desc->size || head.drops.n_keys < 0 ||
-        head.drops.n_keys > IMP_DROP_KEYS ||
-        (bytes - sizeof head) / (sizeof(struct imp__sum_place) + head.size) < head.nodes;
+    s->strange = head.items != s->desc->n_items || head.group != s->tree.desc.group ||
+                 head.size != s->desc->size || head.drops.n_keys < 0 ||
+                 head.drops.n_keys > IMP_DROP_KEYS;
     if (s->strange) return;
     head.error[sizeof head.error - 1] = 0;
     if (s->share.team->role == IMP_TEAM_RANK && head.state != s->share.team->state &&
@@ -159,34 +173,9 @@ void imp__sharing_receive(void *receiver, int rank, const void *message, size_t 
         s->failed = rank;
         memcpy(s->all.error, head.error, sizeof head.error);
     }
-    at += sizeof head;
     if (rank == s->share.team->host.rank) return;
-    for (uint64_t k = 0; k < head.nodes && !s->strange; k++) {
-        struct imp__sum_place p;
-        memcpy(&p, at, sizeof p);
-        at += sizeof p;
-        const struct imp_sum_node node = {.group = (size_t)p.group,
-                                          .index = (size_t)p.index,
-                                          .level = (int)p.level,
-                                          .sum = (void *)(uintptr_t)at};
-        s->strange = imp__sum_tree_put_node(&s->tree, &node) != IMP_OK;
-        at += s->desc->size;
-    }
-}
-
-static int place_compare(const void *a, const void *b)
-{
-    struct imp__sum_place x, y;
-    memcpy(&x, a, sizeof x);
-    memcpy(&y, b, sizeof y);
-    if (x.group != y.group) return x.group < y.group ? -1 : 1;
-    if (x.level != y.level) return x.level < y.level ? -1 : 1;
-    return (x.index > y.index) - (x.index < y.index);
-}
-void imp__message_sort(struct imp__sharing *s)
-{
-    qsort(s->message.data + sizeof(struct imp__sum_head), (size_t)s->nodes,
-          sizeof(struct imp__sum_place) + s->desc->size, place_compare);
+    s->strange =
+        !imp__message_nodes_put(s, at + sizeof head, bytes - sizeof head, head.nodes);
 }
 
 void imp__message_end(struct imp__sharing *s, enum imp_status st,
@@ -294,8 +283,10 @@ enum imp_status imp__shared_sum(imp_context *ctx, const struct imp_loop *loop,
         st = imp__parallel_sum(ctx, loop, &s.tree, 0, work, NULL);
         shared->late =
             st == IMP_CANCELLED && loop->deadline_s > 0 && imp__now() >= loop->deadline_s;
-    } else if (ctx->team->role == IMP_TEAM_RECORD || ctx->team->role == IMP_TEAM_VERIFY) {
-        st = imp__chunks_exchange(&s, loop, shared);
+    } else if (ctx->team->role == IMP_TEAM_RECORD) {
+        st = imp__chunks_keep(&s, loop, shared);
+    } else if (ctx->team->role == IMP_TEAM_VERIFY) {
+        st = imp__chunks_verify(&s, loop, shared);
     } else {
         const bool locks = pthread_mutex_init(&s.share.lock, NULL) == 0;
         /* Files hold one message a sum. */

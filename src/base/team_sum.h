@@ -52,15 +52,19 @@ void imp__message_node(struct imp__sharing *s, const struct imp_sum_node *node);
  * memory for it. */
 void imp__message_end(struct imp__sharing *s, enum imp_status st,
                       const struct imp_shared *shared, struct imp__sum_head *head);
-/* Threads complete groups in any order. */
-void imp__message_sort(struct imp__sharing *s);
+/* Put the nodes of a message, behind its head, into the tree. False: there are less, or
+ * they are of another tree. */
+bool imp__message_nodes_put(struct imp__sharing *s, const unsigned char *at, size_t bytes,
+                            uint64_t nodes);
 /* As imp_sum_desc.add, and as the `receive` of a gather; their payload is the sharing. */
 void imp__sharing_add(void *into, const void *from, void *payload);
 void imp__sharing_receive(void *receiver, int rank, const void *message, size_t bytes);
 
-/* Chunk by chunk: compute and keep it, or take what was kept, after computing it again
- * where it was picked. */
-enum imp_status imp__chunks_exchange(struct imp__sharing *s, const struct imp_loop *loop,
-                                     struct imp_shared *shared);
+/* Compute all, and keep the sums of chunks. */
+enum imp_status imp__chunks_keep(struct imp__sharing *s, const struct imp_loop *loop,
+                                 struct imp_shared *shared);
+/* Chunk by chunk: take what was kept, after computing it again where it was picked. */
+enum imp_status imp__chunks_verify(struct imp__sharing *s, const struct imp_loop *loop,
+                                   struct imp_shared *shared);
 
 #endif

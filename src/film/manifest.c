@@ -10,7 +10,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define NODES_MOST ((size_t)256 << 20) /* bytes of sums that are kept */
+#define LIMIT ((size_t)256 << 20) /* of bytes of sums, where nothing is said */
 
 static void refute(imp_manifest *m, const char *what, const char *name, const char *why)
 {
@@ -73,28 +73,49 @@ static void on_read(void *payload, const char *path, const void *bytes, size_t n
 
 /* ---- The team that keeps, and verifies ------------------------------------------------ */
 
+static void without_sums(imp_manifest *m)
+{
+    m->whole = true;
+    imp__bytes_free(m->ctx, &m->bytes);
+    m->n_messages = 0;
+}
+
 static enum imp_status keep(const void *message, size_t bytes,
                             void (*receive)(void *, int, const void *, size_t),
                             void *receiver, void *payload)
 {
     imp_manifest *m = payload;
     (void)receive, (void)receiver;
-    m->n_sums += bytes > IMP_MESSAGE_SMALL;
     if (m->whole) return IMP_OK;
     const struct imp__kept_message here = {m->bytes.size, bytes};
     struct imp__kept_message *grown = imp__grow(m->ctx, m->messages, &m->cap_messages,
                                                 m->n_messages + 1, sizeof *grown);
     if (grown) m->messages = grown;
     /* Proofs that are larger than that, or than memory, are left to the whole. */
-    if (!grown || m->bytes.size + bytes > NODES_MOST ||
-        !imp__bytes_add(m->ctx, &m->bytes, message, bytes)) {
-        m->whole = true;
-        imp__bytes_free(m->ctx, &m->bytes);
-        m->n_messages = 0;
-        return IMP_OK;
-    }
-    m->messages[m->n_messages++] = here;
+    if (!grown || bytes > m->limit - m->bytes.size ||
+        !imp__bytes_add(m->ctx, &m->bytes, message, bytes))
+        without_sums(m);
+    else m->messages[m->n_messages++] = here;
     return IMP_OK;
+}
+
+/* The first sums of a run get much room, later ones little: one sum is verified in parts,
+ * of many steps some. A step of a fit takes a thousandth of what is left. */
+static size_t chunks(size_t bytes, size_t each, size_t most, void *payload)
+{
+    imp_manifest *m = payload;
+    if (m->whole) return 0;
+    const size_t left = m->limit - m->bytes.size;
+    const unsigned before = imp_min(m->n_calls, 60u);
+    const size_t room = imp_max(left / 1024, m->limit / 8 >> before);
+    size_t n = most;
+    while (n > 1 && n * each > room) n /= 2;
+    if (bytes > left || n * each > left - bytes) {
+        without_sums(m);
+        return 0;
+    }
+    m->n_calls++;
+    return n;
 }
 
 static enum imp_status read_back(const void *message, size_t bytes,
@@ -129,6 +150,7 @@ enum imp_status imp_context_set_manifest(imp_context *ctx, imp_manifest *m)
                                     ctx->team->role == IMP_TEAM_VERIFY);
     if (kept) {
         imp_manifest *before = ctx->team->host.payload;
+        before->n_sums += ctx->team->n_kept;
         if (ctx->team->in_fixed) before->whole = true;
         if (ctx->team->differs)
             refute(before, "the sums", "of a chunk", "have other bits");
@@ -144,7 +166,10 @@ enum imp_status imp_context_set_manifest(imp_context *ctx, imp_manifest *m)
     team.gather = m->making ? keep : read_back;
     const enum imp_status st =
         imp__team_join(ctx, &team, m->making ? IMP_TEAM_RECORD : IMP_TEAM_VERIFY);
-    if (st == IMP_OK) ctx->team->pick = pick;
+    if (st == IMP_OK) {
+        ctx->team->pick = pick;
+        ctx->team->chunks = chunks;
+    }
     return st;
 }
 
@@ -184,6 +209,7 @@ enum imp_status imp_manifest_create(imp_context *ctx, const char *command,
     enum imp_status st = manifest_new(ctx, &m);
     if (st != IMP_OK) return st;
     m->making = true;
+    m->limit = LIMIT;
     m->command = imp__strdup(ctx, command);
     if (!m->command) {
         imp_manifest_destroy(m);
@@ -192,6 +218,13 @@ enum imp_status imp_manifest_create(imp_context *ctx, const char *command,
     ctx->on_read = on_read;
     ctx->on_read_payload = m;
     *out = m;
+    return IMP_OK;
+}
+
+enum imp_status imp_manifest_set_limit(imp_manifest *m, size_t bytes)
+{
+    IMP_REQUIRE(NULL, m, "manifest");
+    m->limit = imp_max(bytes, m->bytes.size);
     return IMP_OK;
 }
 

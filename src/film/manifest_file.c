@@ -6,7 +6,7 @@
 
 #define MAGIC          "impproof"
 #define MANIFEST_ORDER 0x01020304u
-#define VERSION        2
+#define VERSION        3
 
 struct head {
     char magic[8];
@@ -50,8 +50,8 @@ static bool contents_read(imp_manifest *m, struct imp__reading *r,
         if (!imp__take(r, &size, sizeof size) || size > r->end - r->at) return false;
         m->messages[m->n_messages] = (struct imp__kept_message){r->at, (size_t)size};
         r->at += (size_t)size;
-        m->n_sums += size > IMP_MESSAGE_SMALL;
     }
+    m->n_sums = head->n_sums;
     m->whole = head->n_messages == 0;
     return r->at == r->end;
 }
@@ -95,7 +95,7 @@ bool imp__manifest_bytes(const imp_manifest *m, struct imp_bytes *out)
     head.command_bytes = strlen(m->command);
     head.n_items = m->n_items;
     head.n_sums = m->n_sums;
-    head.n_messages = m->whole ? 0 : m->n_messages;
+    head.n_messages = m->whole || m->n_sums == 0 ? 0 : m->n_messages;
     bool fits = imp__bytes_add(ctx, out, &head, sizeof head) &&
                 imp__bytes_add(ctx, out, m->command, head.command_bytes);
     for (size_t k = 0; k < m->n_items && fits; k++) {

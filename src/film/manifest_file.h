@@ -7,9 +7,6 @@
 #include "parts.h"
 #include "parts_file.h"
 
-/* Bytes of messages that are no sums: what a call has in common, at most. */
-#define IMP_MESSAGE_SMALL (IMP_SAME_MAX * sizeof(uint64_t))
-
 enum imp__item_kind { IMP_ITEM_INPUT, IMP_ITEM_RESULT, IMP_ITEM_OUTPUT };
 
 /* Something that has a hash. */
@@ -28,9 +25,11 @@ struct imp_manifest {
     size_t n_items, cap_items;
     struct imp__item *items;
     struct imp_bytes bytes; /* the messages; when reading, the file */
+    size_t limit;           /* of them; beyond it, none are kept */
     size_t n_messages, cap_messages, next;
     struct imp__kept_message *messages;
-    uint64_t n_sums, n_verified;
+    uint64_t n_sums, n_verified; /* chunks of sums */
+    unsigned n_calls;            /* sums that have been kept */
     double fraction;
     uint64_t seed;
     bool no_memory;

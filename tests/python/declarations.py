@@ -132,7 +132,7 @@ WITHOUT = {
     "imp_problem_nlopt": "NLopt's callback in C: importon.loss is a function of Python, for any optimiser",
     "imp_problem_set_run": "of that callback: functions take the run as keywords",
     **{"imp_manifest_" + word: "a manifest says what a command line computed; importon verify reads it"
-       for word in ("create", "destroy", "get_info", "output", "read", "result", "write")},
+       for word in ("create", "destroy", "get_info", "output", "read", "result", "set_limit", "write")},
     "imp_context_set_manifest": "the same",
     "imp_film_merge": "pictures are arrays, whose means are one line",
     "imp_report_page": "for servers of a live page: importon view",

@@ -43,10 +43,17 @@ importon render scene.xml --manifest scene.xml
 importon verify picture.proof --fraction 0
 importon verify picture.proof --fraction 1e-6 --seed 1
 echo "exit $?"
-# Without being asked for, a small manifest stands beside an output file.
+# Without being asked for, a small manifest stands beside an output file; where sums take
+# more than a megabyte, it has none.
 "${render[@]}" -o other.exr
 importon verify other.exr.manifest
-importon verify other.exr.manifest --fraction 0.5
+importon verify other.exr.manifest --fraction 0.5 --seed 3
+importon render scene.xml -D res=160 --spp 1 -q --no-preview -o large.exr
+importon verify large.exr.manifest --fraction 0.5
+"${fit[@]}" -o kept >/dev/null
+importon verify kept/manifest --fraction 0.1 --seed 1
+"${fit[@]}" -n 6 --checkpoint state --resume -o resumed >/dev/null
+importon verify resumed/manifest --fraction 0.1
 "${render[@]}" -o none.exr --no-manifest
 "${render[@]}" -o none.exr --time 1
 "${gradient[@]}" -o - >none.txt
