@@ -19,8 +19,9 @@ enum imp_status imp_render(const imp_scene *scene, const struct imp_run *run,
     IMP_READS(scene);
     struct imp_measure measure;
     struct imp_same same[IMP_SAME_MAX];
-    enum imp_status st = IMP_OK;
-    if (imp__team_shares(scene->ctx))
+    const struct imp_sensor *sensor;
+    enum imp_status st = imp__run_sensor(scene, &own, &sensor);
+    if (st == IMP_OK && imp__team_shares(scene->ctx))
         st = imp__team_same(scene->ctx, same, imp__same_run(scene, &own, "render", same));
     const bool solves =
         scene->integrator && scene->integrator->ops->flags & IMP_INTEGRATOR_SOLVES;

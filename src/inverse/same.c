@@ -37,6 +37,9 @@ enum imp_status imp__problem_same(struct imp_problem *p, const struct imp_run *r
 {
     struct imp_same same[IMP_SAME_MAX];
     if (!imp__team_shares(p->ctx)) return IMP_OK;
+    if (run->sensor < 0 || run->sensor >= p->scene->n_sensors)
+        return imp__error(p->ctx, IMP_E_ARG, "there is no sensor %d; the scene has %d",
+                          run->sensor, p->scene->n_sensors);
     imp__team_state(p->scene, run);
     if (!imp__team_apart(p->ctx) && p->same_known) return IMP_OK;
     int n = imp__same_run(p->scene, run, call, same);

@@ -198,6 +198,33 @@ static void refuted(enum job job)
     tap_ok(*found != 0, "%s: another call # %s", names[job], found);
 }
 
+/* Sums are announced with a hash of the sensor: one that is not there is an error first. */
+static void no_sensor(void)
+{
+    imp_context *ctx = test_context(1);
+    imp_scene *s = scene_load(ctx);
+    struct imp_run run = IMP_RUN_INIT;
+    imp_manifest *m;
+    imp_film *film;
+    imp_problem *p;
+    double g[3], g_se[3];
+    test_must(ctx, imp_manifest_create(ctx, "a test", &m));
+    test_must(ctx, imp_context_set_manifest(ctx, m));
+    test_must(ctx, imp_problem_create(s, &p));
+    test_must(ctx, imp_problem_activate(p, "ball.*"));
+    for (run.sensor = -1; run.sensor < 3; run.sensor += 3) {
+        tap_ok(imp_render(s, &run, &film) == IMP_E_ARG, "picture of sensor %d # %s",
+               run.sensor, imp_last_error(ctx));
+        tap_ok(imp_problem_reverse(p, target, &run, g, g_se) == IMP_E_ARG,
+               "gradient of sensor %d # %s", run.sensor, imp_last_error(ctx));
+    }
+    test_must(ctx, imp_context_set_manifest(ctx, NULL));
+    imp_problem_destroy(p);
+    imp_manifest_destroy(m);
+    imp_scene_destroy(s);
+    imp_context_destroy(ctx);
+}
+
 int main(void)
 {
     char text[1 << 14];
@@ -216,6 +243,7 @@ int main(void)
     text_put(output, "what was written\n");
     for (enum job job = 0; job < JOBS; job++) good(job);
     for (enum job job = 0; job < JOBS; job++) refuted(job);
+    no_sensor();
     char command[96];
     snprintf(command, sizeof command, "rm -r %s", folder);
     if (system(command) != 0) tap_ok(0, "the folder is removed");
