@@ -36,39 +36,9 @@ static imp_v3 normal(const imp_spec *in)
     return imp__v3(in[HEIGHT][0], in[HEIGHT][1], in[HEIGHT][2]);
 }
 
-static bool sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
-                   struct imp_dirs *d)
+static enum imp_status build(const struct imp_build *b, void *self, struct imp_bsdf *bsdf)
 {
-    return imp__turned_sample(b, in, u, d, normal);
-}
-static void eval(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
-                 imp_spec *f)
-{
-    imp__turned_eval(b, in, d, normal, f);
-}
-static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
-{
-    return imp__turned_pdf(b, in, d, normal);
-}
-static double index_ratio(const struct imp_bsdf *b, const imp_spec *in,
-                          const struct imp_dirs *d)
-{
-    return imp__turned_index_ratio(b, in, d, normal);
-}
-static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d,
-                   imp_spec *df)
-{
-    imp__turned_eval_d(b, in, d, normal, df);
-}
-static void emit(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
-                 imp_spec *e)
-{
-    imp__turned_emit(b, in, wo, normal, e);
-}
-static void emit_d(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
-                   imp_spec *de)
-{
-    imp__turned_emit_d(b, in, wo, normal, de);
+    return imp__turning_build(b, self, normal, bsdf);
 }
 
 const struct imp_bsdf_ops imp__bumpmap = {.size = sizeof(struct imp_bsdf_ops),
@@ -78,12 +48,12 @@ const struct imp_bsdf_ops imp__bumpmap = {.size = sizeof(struct imp_bsdf_ops),
                                           .min_children = 1,
                                           .max_children = 1,
                                           .prepare = prepare,
-                                          .build = imp__turning_build,
-                                          .sample = sample,
-                                          .eval = eval,
-                                          .pdf = pdf,
-                                          .index_ratio = index_ratio,
-                                          .eval_d = eval_d,
-                                          .emit = emit,
-                                          .emit_d = emit_d,
+                                          .build = build,
+                                          .sample = imp__turned_sample,
+                                          .eval = imp__turned_eval,
+                                          .pdf = imp__turned_pdf,
+                                          .index_ratio = imp__turned_index_ratio,
+                                          .eval_d = imp__turned_eval_d,
+                                          .emit = imp__turned_emit,
+                                          .emit_d = imp__turned_emit_d,
                                           .albedo = imp__turned_albedo};

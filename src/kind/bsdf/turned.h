@@ -14,35 +14,35 @@
 
 #include "kind/build.h"
 
-struct imp__turning {
-    bool flip, shadow;
-};
-/* imp_bsdf_ops.build: flip_invalid_normals and use_shadowing_function; flags are the nested
- * material's. */
-enum imp_status imp__turning_build(const struct imp_build *b, void *self,
-                                   struct imp_bsdf *bsdf);
-
-/* Normals of the nested material, in the frame of the surface, from the inputs: the only
+/* Normal of the nested material, in the frame of the surface, from the inputs: the only
  * thing in which kinds differ. It need not be unit. */
 typedef imp_v3 imp__turned_normal(const imp_spec *in);
 
-/* What the functions of a table do; b->self begins with a struct imp__turning. */
+/* What an object of such a kind begins with. */
+struct imp__turning {
+    imp__turned_normal *normal;
+    bool flip, shadow;
+};
+/* For imp_bsdf_ops.build: `normal`, flip_invalid_normals and use_shadowing_function; flags
+ * are the nested material's. */
+enum imp_status imp__turning_build(const struct imp_build *b, struct imp__turning *self,
+                                   imp__turned_normal *normal, struct imp_bsdf *bsdf);
+
+/* The functions of a table. The inputs that turn have no derivative: 0. */
 bool imp__turned_sample(const struct imp_bsdf *b, const imp_spec *in, const double u[3],
-                        struct imp_dirs *d, imp__turned_normal *normal);
+                        struct imp_dirs *d);
 void imp__turned_eval(const struct imp_bsdf *b, const imp_spec *in,
-                      const struct imp_dirs *d, imp__turned_normal *normal, imp_spec *f);
+                      const struct imp_dirs *d, imp_spec *f);
 double imp__turned_pdf(const struct imp_bsdf *b, const imp_spec *in,
-                       const struct imp_dirs *d, imp__turned_normal *normal);
+                       const struct imp_dirs *d);
 double imp__turned_index_ratio(const struct imp_bsdf *b, const imp_spec *in,
-                               const struct imp_dirs *d, imp__turned_normal *normal);
-/* The inputs that turn have no derivative: 0. */
+                               const struct imp_dirs *d);
 void imp__turned_eval_d(const struct imp_bsdf *b, const imp_spec *in,
-                        const struct imp_dirs *d, imp__turned_normal *normal,
-                        imp_spec *df);
+                        const struct imp_dirs *d, imp_spec *df);
 void imp__turned_emit(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
-                      imp__turned_normal *normal, imp_spec *e);
+                      imp_spec *e);
 void imp__turned_emit_d(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
-                        imp__turned_normal *normal, imp_spec *de);
+                        imp_spec *de);
 void imp__turned_albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
                         imp_spec *albedo);
 

@@ -20,18 +20,6 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_e
     return IMP_OK;
 }
 
-static void eval(const struct imp_emitter *e, const imp_spec *in,
-                 const struct imp_emission *x, imp_spec *le)
-{
-    (void)e, (void)x;
-    *le = in[RADIANCE];
-}
-static void eval_d(const struct imp_emitter *e, const imp_spec *in,
-                   const struct imp_emission *x, imp_spec *dle)
-{
-    (void)e, (void)in, (void)x;
-    dle[RADIANCE] = imp__spec(1);
-}
 static bool sample(const struct imp_emitter *e, const imp_v3 *ref, const double u[2],
                    struct imp_light_sample *out)
 {
@@ -55,8 +43,8 @@ const struct imp_emitter_ops imp__constant = {.size = sizeof(struct imp_emitter_
                                                        IMP_EMITTER_UNIFORM,
                                               .inputs = inputs,
                                               .build = build,
-                                              .eval = eval,
-                                              .eval_d = eval_d,
+                                              .eval = imp__even_eval,
+                                              .eval_d = imp__even_eval_d,
                                               .sample = sample,
                                               .pdf = pdf,
                                               .sample_emission = imp__sky_emission_sample,

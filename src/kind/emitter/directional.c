@@ -2,13 +2,12 @@
  *
  * directional: parallel light from infinitely far, travelling along `direction` (or +z of
  * to_world). `irradiance` is measured across the ray. */
+#include "emission.h"
 #include "from_point.h"
 #include "math/transform.h"
 #include "math/vec.h"
 #include "math/warp.h"
 #include <math.h>
-
-enum { IRRADIANCE };
 
 struct directional {
     imp_v3 along; /* unit, world */
@@ -44,18 +43,6 @@ out:
     return st;
 }
 
-static void eval(const struct imp_emitter *e, const imp_spec *in,
-                 const struct imp_emission *x, imp_spec *le)
-{
-    (void)e, (void)x;
-    *le = in[IRRADIANCE];
-}
-static void eval_d(const struct imp_emitter *e, const imp_spec *in,
-                   const struct imp_emission *x, imp_spec *dle)
-{
-    (void)e, (void)in, (void)x;
-    dle[IRRADIANCE] = imp__spec(1);
-}
 static bool sample(const struct imp_emitter *e, const imp_v3 *ref, const double u[2],
                    struct imp_light_sample *out)
 {
@@ -97,8 +84,8 @@ const struct imp_emitter_ops imp__directional = {
     .flags = IMP_EMITTER_DELTA | IMP_EMITTER_FAR,
     .inputs = inputs,
     .build = build,
-    .eval = eval,
-    .eval_d = eval_d,
+    .eval = imp__even_eval,
+    .eval_d = imp__even_eval_d,
     .sample = sample,
     .pdf = imp__point_light_pdf,
     .sample_emission = sample_emission,

@@ -1,12 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * How light walks begin: at a surface with the cosine of its shading normal, at a point in
- * any direction, or on a disk before the scene, across a direction in which the sky is
- * drawn. */
+ * What kinds of lights share. Light walks begin at a surface with the cosine of its shading
+ * normal, at a point in any direction, or on a disk before the scene, across a direction in
+ * which the sky is drawn. */
 #ifndef IMP_KIND_EMITTER_EMISSION_H
 #define IMP_KIND_EMITTER_EMISSION_H
 
 #include "kind/build.h"
+
+/* imp_emitter_ops.eval and eval_d where Le is the first input, whatever the direction. */
+void imp__even_eval(const struct imp_emitter *e, const imp_spec *in,
+                    const struct imp_emission *x, imp_spec *le);
+void imp__even_eval_d(const struct imp_emitter *e, const imp_spec *in,
+                      const struct imp_emission *x, imp_spec *dle);
 
 /* imp_emitter_ops.sample_emission and pdf_emission of lights that are surfaces. */
 bool imp__surface_emission_sample(const struct imp_emitter *e,
