@@ -23,7 +23,7 @@ static const struct arg_option options_bend[] = {
 
 static imp_bend *bend;
 
-static int load(const char *path)
+int bend_open(const char *path, imp_bend **out)
 {
     struct imp_load_options lo = IMP_LOAD_OPTIONS_INIT;
     int rc = cli_open();
@@ -32,11 +32,8 @@ static int load(const char *path)
     lo.defines = cli.defines.item;
     lo.n_defines = cli.defines.n;
     if (cli.search) lo.search = &cli.search, lo.n_search = 1;
-    const enum imp_status st = imp_bend_load(cli.context, path, &lo, &bend);
-    if (st == IMP_OK) {
-        imp_bend_set_progress(bend, progress_report, NULL);
-        return 0;
-    }
+    const enum imp_status st = imp_bend_load(cli.context, path, &lo, out);
+    if (st == IMP_OK) return 0;
     rc = cli_fail(st, NULL);
     return st == IMP_E_IO ? EXIT_USAGE : rc;
 }
@@ -269,8 +266,11 @@ static int run(int n, char **operand)
     (void)n;
     for (size_t i = 0; i < sizeof verbs / sizeof *verbs; i++) {
         if (strcmp(operand[0], verbs[i].word)) continue;
-        int rc = load(operand[1]);
-        if (!rc) rc = verbs[i].fn();
+        int rc = bend_open(operand[1], &bend);
+        if (!rc) {
+            imp_bend_set_progress(bend, progress_report, NULL);
+            rc = verbs[i].fn();
+        }
         imp_bend_destroy(bend);
         bend = NULL;
         return rc;

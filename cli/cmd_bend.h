@@ -6,6 +6,8 @@
 #include "output.h"
 #include <importon/bend.h>
 
+/* A file with rays and a field. 0, or an exit code with the reason printed. */
+int bend_open(const char *path, imp_bend **out);
 int bend_fit(imp_bend *bend);
 extern const struct arg_option bend_fit_options[];
 /* --truth: a file that bend_truth_open takes; NULL. */

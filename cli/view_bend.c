@@ -47,7 +47,7 @@ static void numbers_open(void)
     if (n <= NUMBERS && imp_field_param_name(f, 0)) b.n = n;
     if (b.n) imp_field_get_theta(f, theta);
     for (size_t i = 0; i < b.n; i++)
-        number[i] = (struct view_number){strdup(imp_field_param_name(f, i)),
+        number[i] = (struct view_number){cli_strdup(imp_field_param_name(f, i)),
                                          "1",
                                          -INFINITY,
                                          INFINITY,
@@ -236,15 +236,8 @@ int view_is_bend(const char *path)
 
 int view_bend(const char *path)
 {
-    struct imp_load_options lo = IMP_LOAD_OPTIONS_INIT;
-    int rc = cli_open();
+    int rc = bend_open(path, &b.bend);
     if (rc) return rc;
-    cli.scene_path = path;
-    lo.defines = cli.defines.item;
-    lo.n_defines = cli.defines.n;
-    if (cli.search) lo.search = &cli.search, lo.n_search = 1;
-    const enum imp_status st = imp_bend_load(cli.context, path, &lo, &b.bend);
-    if (st != IMP_OK) return cli_fail(st, NULL);
     b.fits = imp_bend_n_targets(b.bend) > 0;
     const struct view_kind kind = {b.fits ? "bend fit" : "rays", cli.out, b.fits, 0};
     struct imp_bend_fit_options trial = IMP_BEND_FIT_OPTIONS_INIT;
