@@ -425,8 +425,10 @@ enum imp_param_flags {
     IMP_PARAM_DIFFERENTIABLE = 1, /**< a gradient exists, without bias */
     IMP_PARAM_DISCONTINUOUS = 2,  /**< changing it can move edges of the picture */
     IMP_PARAM_INTEGER = 4,
-    IMP_PARAM_COLOR = 8,  /**< its last dimension holds the channels */
-    IMP_PARAM_VOLUME = 16 /**< a grid that imp_scene_write_volume writes */
+    IMP_PARAM_COLOR = 8,   /**< its last dimension holds the channels */
+    IMP_PARAM_VOLUME = 16, /**< a grid that imp_scene_write_volume writes */
+    IMP_PARAM_LIST = 32    /**< rows that have no order, like vertices: none is another's
+                             neighbour */
 };
 
 struct imp_param_info {

@@ -266,7 +266,8 @@ struct imp_texcoord {
     imp_v3 p;                          /* world position */
     const struct imp_carried *carried; /* what is looked up; NULL: the scene's colours */
     const struct imp_shape *shape;     /* that is looked up; NULL: none, or not known */
-    /* Of a shape that is looked up by triangle: its number, and the surface there. */
+    /* Of a shape that is looked up by triangle: its number, and the surface there, of a
+     * shape in a group as it is in the group. */
     int prim;
     const struct imp_surface *surface;
 };
@@ -539,7 +540,7 @@ struct imp_shape {
     int n_attributes;
     const struct imp_attribute *attribute;
     /* Its textures ask for more than uv: what `surface` and the draws of points write to uv
-     * then stands for the triangle, and `place` gives uv back. */
+     * then stands for the triangle and the point in it, and `place` gives uv back. */
     bool by_triangle;
 };
 
@@ -585,11 +586,10 @@ struct imp_shape_ops {
      * NULL: light walks cannot begin on it. */
     void (*sample_area)(const struct imp_shape *s, const double u[2],
                         struct imp_surface *out);
-    /* The surface at a place that was met before: what it had in uv, and p, of which the last
-     * digits may be lost. Sets *prim where it is looked up by triangle. NULL: bump maps are
-     * refused. */
-    void (*place)(const struct imp_shape *s, const double uv[2], const imp_v3 *p,
-                  struct imp_surface *out, int *prim);
+    /* The surface at a place that was met before, from what it had in uv, as floats. Sets
+     * *prim where it is looked up by triangle. NULL: bump maps are refused. */
+    void (*place)(const struct imp_shape *s, const double uv[2], struct imp_surface *out,
+                  int *prim);
 };
 
 /* ---- Emitter ------------------------------------------------------------------- */
@@ -857,7 +857,7 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_build_set(const struct imp_build *bui
 /** Of a texture: make `data` [dims[0]]..[dims[n_dims - 1]] a parameter <name>.<key>. The
  * numbers are read and set in place; `flags` are IMP_PARAM_*. *param is what an
  * imp_sink gets. n_dims is 1 to 3; of a volume (IMP_PARAM_VOLUME) 3, [z][y][x], or 4,
- * [z][y][x][channels]. */
+ * [z][y][x][channels]. Where rows have no order, say so (IMP_PARAM_LIST). */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_build_texels(const struct imp_build *build, const char *key, float *data, int n_dims,
                  const size_t *dims, unsigned flags, double lo, double hi, int *param);

@@ -10,9 +10,7 @@ struct imp__cells imp__cells_of(const struct imp_param_info *p)
         c = (struct imp__cells){{p->layers, p->dims[0] / p->layers, p->dims[1]}, 3};
     else if (p->layers > 0)
         c = (struct imp__cells){{p->dims[0], p->dims[1], p->dims[2]}, 1};
-    else if (p->n_dims == 2 && p->flags & IMP_PARAM_COLOR) /* colours in a row */
-        c = (struct imp__cells){{1, 1, p->dims[0]}, p->dims[1]};
-    else if (p->n_dims >= 2)
+    else if (imp__cells_are_many(p))
         c = (struct imp__cells){{1, p->dims[0], p->dims[1]},
                                 p->n_dims > 2 ? p->dims[2] : 1};
     return c;
@@ -20,7 +18,7 @@ struct imp__cells imp__cells_of(const struct imp_param_info *p)
 
 bool imp__cells_are_many(const struct imp_param_info *p)
 {
-    return p->layers > 0 || p->n_dims >= 2;
+    return p->layers > 0 || (p->n_dims >= 2 && !(p->flags & IMP_PARAM_LIST));
 }
 
 struct imp__cells imp__cells_coarse(const struct imp__cells *fine, int level)

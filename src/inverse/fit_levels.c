@@ -185,14 +185,24 @@ enum imp_status imp__fit_levels_allowed(const struct imp_problem *p,
                                         const struct imp_fit_options *o)
 {
     bool cells = false;
+    const char *list = NULL; /* name of one that is active */
     if (o->levels < 0 || o->levels > 16)
         return imp__error(p->ctx, IMP_E_ARG, "levels = %d is outside [0, 16]", o->levels);
     if (o->levels < 2) return IMP_OK;
-    for (size_t b = 0; b < p->n_blocks; b++) cells |= are_many(p, b);
+    for (size_t b = 0; b < p->n_blocks; b++) {
+        const struct imp_param_info *info = &p->scene->params[p->blocks[b].param].info;
+        cells |= are_many(p, b);
+        if (info->flags & IMP_PARAM_LIST) list = info->name;
+    }
     if (o->optimizer != IMP_ADAM)
         return imp__error(p->ctx, IMP_E_ARG,
                           "levels from coarse to fine are Adam's: no other optimiser has "
                           "them");
+    if (!cells && list)
+        return imp__error(p->ctx, IMP_E_ARG,
+                          "levels need a texture or a volume: '%s' is a list of numbers "
+                          "without neighbours",
+                          list);
     if (!cells)
         return imp__error(p->ctx, IMP_E_ARG,
                           "levels need a texture or a volume: nothing that is active has "

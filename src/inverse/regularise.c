@@ -11,7 +11,7 @@
 /* Texels of a picture, or the samples of a spectrum. */
 static bool has_neighbours(const struct imp_param_info *info)
 {
-    return info->n_dims >= 2 || info->wavelengths_nm;
+    return imp__cells_are_many(info) || info->wavelengths_nm;
 }
 
 static enum imp_status add(imp_problem *p, const char *glob, double weight, int kind,
@@ -23,6 +23,7 @@ static enum imp_status add(imp_problem *p, const char *glob, double weight, int 
     const struct imp_scene *s = p->scene;
     struct imp__regulariser r = {.kind = kind, .weight = weight};
     size_t met = 0, usable = 0;
+    const char *list = NULL; /* name of one that is met */
 
     if (!*glob) return imp__error(p->ctx, IMP_E_ARG, "no parameter is named");
     if (!(weight >= 0) || !isfinite(weight))
@@ -35,11 +36,17 @@ static enum imp_status add(imp_problem *p, const char *glob, double weight, int 
     for (size_t k = 0; k < s->n_params; k++) {
         if (!imp__glob(glob, s->params[k].info.name)) continue;
         met++;
+        if (s->params[k].info.flags & IMP_PARAM_LIST) list = s->params[k].info.name;
         if (kind == IMP_SMOOTHNESS && !has_neighbours(&s->params[k].info)) continue;
         usable++;
         r.on[k] = 1;
     }
     if (!met) IMP_TRY(imp__error(p->ctx, IMP_E_ARG, "no parameter matches '%s'", glob));
+    if (!usable && list)
+        IMP_TRY(imp__error(p->ctx, IMP_E_ARG,
+                           "'%s' is a list of numbers without neighbours: smoothness "
+                           "needs a texture or a spectrum",
+                           list));
     if (!usable)
         IMP_TRY(
             imp__error(p->ctx, IMP_E_ARG,

@@ -85,8 +85,11 @@ imp_spec imp__gain_at(const struct imp_camera_gain *g, const struct imp_photogra
     for (int k = 0; k < IMP_GAIN_INPUTS; k++) v[k] = g->input[k]->value[0];
     const double x = (px - g->middle[0]) * g->per_half_diagonal,
                  y = (py - g->middle[1]) * g->per_half_diagonal, r2 = x * x + y * y;
-    const double lens =
+    /* Where the polynomial is below 0 no light arrives. */
+    const double fall =
         1 + v[IMP_GAIN_VIGNETTING_2] * r2 + v[IMP_GAIN_VIGNETTING_4] * r2 * r2;
+    const bool dark = fall < 0;
+    const double lens = dark ? 0 : fall;
     const double exposure = v[IMP_GAIN_EXPOSURE];
     const imp_spec balance = {v[IMP_GAIN_RED], 1, v[IMP_GAIN_BLUE], 1};
     imp_spec by_gamma;
@@ -97,8 +100,8 @@ imp_spec imp__gain_at(const struct imp_camera_gain *g, const struct imp_photogra
         d[IMP_GAIN_EXPOSURE] = rest * lens;
         d[IMP_GAIN_RED] = (imp_spec){power[0] * exposure * lens};
         d[IMP_GAIN_BLUE] = (imp_spec){0, 0, power[2] * exposure * lens};
-        d[IMP_GAIN_VIGNETTING_2] = rest * (exposure * r2);
-        d[IMP_GAIN_VIGNETTING_4] = rest * (exposure * r2 * r2);
+        d[IMP_GAIN_VIGNETTING_2] = rest * (dark ? 0 : exposure * r2);
+        d[IMP_GAIN_VIGNETTING_4] = rest * (dark ? 0 : exposure * r2 * r2);
         d[IMP_GAIN_GAMMA] = balance * by_gamma * (exposure * lens);
     }
     return rest * (exposure * lens);

@@ -7,6 +7,7 @@
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include <math.h>
+#include <stdbool.h>
 
 static imp_context *ctx;
 
@@ -42,7 +43,7 @@ static void all_rows(enum imp_color_mode mode, const char *name, const char *def
 
 /* Corners (0,0), (4,0), (0,4) of a plane seen from above, one pixel on the middle of a
  * cell; the sky is white and the integrator stops after one reflection. */
-static void plane(void)
+static void plane(bool grouped)
 {
     FILE *f = fopen("plane_attributes.ply", "w");
     fprintf(f,
@@ -52,18 +53,33 @@ static void plane(void)
             "vertex_indices\nend_header\n-2 -2 0 .1 .2 .3\n6 -2 0 .9 .4 .5\n-2 6 0 .6 "
             ".8 .1\n3 0 1 2\n");
     fclose(f);
-    static const char xml[] =
+    static const char head[] =
         "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' "
         "value='2'/></integrator><sensor type='orthographic'><transform "
         "name='to_world'><scale x='1' y='1'/><lookat origin='0,0,3' target='0,0,0' "
         "up='0,1,0'/></transform><film type='hdrfilm'><integer name='width' "
         "value='4'/><integer name='height' value='4'/><rfilter "
         "type='box'/></film></sensor>"
-        "<emitter type='constant'><float name='radiance' value='1'/></emitter>"
+        "<emitter type='constant'><float name='radiance' value='1'/></emitter>";
+    static const char shape[] =
         "<shape type='ply' id='plane'><string name='filename' "
-        "value='plane_attributes.ply'/><bsdf type='diffuse'><texture "
+        "value='plane_attributes.ply'/>%s<bsdf type='diffuse'><texture "
         "type='mesh_attribute' name='reflectance'><string name='name' "
-        "value='vertex_paint_color'/></texture></bsdf></shape></scene>";
+        "value='vertex_paint_color'/></texture></bsdf></shape>";
+    char own[2048], xml[4096];
+    /* In a group it is smaller and elsewhere; the instance undoes that. */
+    snprintf(own, sizeof own, shape,
+             grouped ? "<transform name='to_world'><scale value='.25'/><translate x='1' "
+                       "y='2' z='3'/></transform>"
+                     : "");
+    snprintf(xml, sizeof xml,
+             grouped ? "%s<shape type='shapegroup' id='g'>%s</shape><shape "
+                       "type='instance'><ref id='g'/><transform name='to_world'>"
+                       "<translate x='-1' y='-2' z='-3'/><scale value='4'/></transform>"
+                       "</shape></scene>"
+                     : "%s%s</scene>",
+             head, own);
+    const char *which = grouped ? "a plane in a group" : "a plane";
     static const double corner[3][3] = {{.1, .2, .3}, {.9, .4, .5}, {.6, .8, .1}};
     imp_scene *scene = test_scene_text(ctx, xml, IMP_RGB);
     struct imp_run run = IMP_RUN_INIT;
@@ -87,7 +103,7 @@ static void plane(void)
             }
         }
     tap_ok(worst < 4.5 && largest < .01,
-           "light of a plane: reflectance between vertices # largest z %.2f, se %.1e",
+           "light of %s: reflectance between vertices # largest z %.2f, se %.1e", which,
            worst, largest);
     imp_film_destroy(film);
 
@@ -105,8 +121,25 @@ static void plane(void)
             z = fmax(z, fabs(grad[3 * v + c] - truth) / se[3 * v + c]);
             sum += grad[3 * v + c];
         }
-    tap_ok(z < 4.5, "its derivatives: barycentric weights # largest z %.2f, sum %.4f", z,
-           sum);
+    tap_ok(z < 4.5 && fabs(sum - 1) < .01,
+           "its derivatives: barycentric weights # largest z %.2f, sum %.4f", z, sum);
+    /* Vertices stand in a list: the next of it is no neighbour. */
+    enum imp_status st = imp_problem_add_smoothness(p, "plane.*", 1);
+    tap_ok(st == IMP_E_ARG &&
+               strstr(imp_last_error(ctx), "'plane.vertex_paint_color' is a list"),
+           "smoothness of them is refused # %s", imp_last_error(ctx));
+    const struct imp_fit_result *r;
+    struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
+    struct imp_target target = IMP_TARGET_INIT;
+    static const float black[48];
+    target.width = target.height = 4, target.channels = 3, target.pixels = black;
+    test_must(ctx, imp_problem_add_target(p, &target));
+    o.optimizer = IMP_ADAM;
+    o.levels = 2;
+    st = imp_fit(p, &o, &run, &r);
+    tap_ok(st == IMP_E_ARG &&
+               strstr(imp_last_error(ctx), "'plane.vertex_paint_color' is"),
+           "and so are levels # %s", imp_last_error(ctx));
     imp_problem_destroy(p);
     imp_scene_destroy(scene);
     remove("plane_attributes.ply");
@@ -119,7 +152,8 @@ int main(void)
     all_rows(IMP_MONO, "mono", NULL, 4);
     all_rows(IMP_SPECTRAL, "spectral", NULL, 5);
     all_rows(IMP_RGB, "rgb, volpath", "integrator=volpath", 6);
-    plane();
+    plane(false);
+    plane(true);
     imp_context_destroy(ctx);
     return tap_done();
 }

@@ -263,6 +263,72 @@ static void fits(void)
     remove(path);
 }
 
+static int stop_early(const struct imp_fit_step *step, void *payload)
+{
+    (void)payload;
+    return step->iteration >= 3;
+}
+
+/* Of few numbers it is told where the objective was: in those of the problem, also while
+ * cells are taken together. */
+static void trail(void)
+{
+    enum { SIDE = 4, FEW = SIDE * SIDE * SIDE, ITERATIONS = 12 };
+    static float value[FEW];
+    static double flat[FEW];
+    char path[64];
+    for (int k = 0; k < FEW; k++) value[k] = (float)(.5 + k % SIDE);
+    vol_write(path, SIDE, SIDE, SIDE, 1, value);
+    imp_scene *seen = scene_of(path, 1), *s = scene_of(path, 1);
+    imp_problem *p = test_problem(ctx, s, "grid.data");
+    struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
+    struct imp_run run = IMP_RUN_INIT;
+    const struct imp_fit_result *r;
+    int pairs = 0, inside = 1;
+    add_pictures(seen, p);
+    for (int k = 0; k < FEW; k++) flat[k] = .5;
+    test_must(ctx, imp_problem_set_x(p, flat));
+    run.spp = 4;
+    o.max_iterations = ITERATIONS;
+    o.learning_rate = .2;
+    o.levels = 2;
+    o.intervals = 0;
+    test_must(ctx, imp_fit(p, &o, &run, &r));
+    const double *x = r->history_x;
+    for (size_t i = 0; i < r->n_history; i++)
+        for (int k = 0; k < FEW; k++) inside &= x[i * FEW + (size_t)k] > 0;
+    tap_ok(r->n_history == ITERATIONS && inside && !memcmp(x, flat, sizeof flat),
+           "the trail begins at the start, and is inside the bounds");
+    /* Half of the iterations, which hardly move at first, have one number for two cells: between the middles of two the
+     * grid is linear, and at its ends flat: cells 0 of an axis is a coarse number c0, and 1
+     * and 2 lie a quarter from c0 and c1: x1 - x0 = x3 - x2 = (x2 - x1)/2. */
+    for (size_t i = 0; i < r->n_history; i++) {
+        const double *row = x + i * FEW;
+        double off = 0, size = 0;
+        for (int k = 0; k < FEW; k += SIDE) {
+            const double d = row[k + 1] - row[k];
+            off = fmax(off, fabs(row[k + 3] - row[k + 2] - d));
+            off = fmax(off, fabs(row[k + 2] - row[k + 1] - 2 * d));
+            size = fmax(size, fabs(d));
+        }
+        pairs += i > 1 && i < ITERATIONS / 2 && size > 1e-3 && off < 1e-12;
+    }
+    tap_ok(pairs == ITERATIONS / 2 - 2,
+           "and on the coarse level it is the fine grid # %d", pairs);
+    /* One that is stopped there has its trail, too. */
+    o.step = stop_early;
+    test_must(ctx, imp_problem_set_x(p, flat));
+    const enum imp_status st = imp_fit(p, &o, &run, &r);
+    tap_ok(st == IMP_CANCELLED && r && r->n_history == 3 &&
+               !memcmp(r->history_x, flat, sizeof flat),
+           "one that is stopped there has its own # %s, %zu iterations",
+           imp_status_text(st), r ? r->n_history : 0);
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+    imp_scene_destroy(seen);
+    remove(path);
+}
+
 int main(void)
 {
     ctx = test_context(1);
@@ -272,6 +338,7 @@ int main(void)
     written(1);
     written(3);
     fits();
+    trail();
     imp_context_destroy(ctx);
     return tap_done();
 }

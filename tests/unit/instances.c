@@ -249,6 +249,64 @@ static void placed(const char *what, const struct member *m, int n,
     free(a.at), free(b.at), free(of);
 }
 
+/* A bump map that an instance puts on shapes which had none. */
+static void bumped(void)
+{
+    static const struct member m[] = {
+        {"rectangle", "red"}, {"mesh", "blue"}, {"sphere", "red"}};
+    const struct imp_mat4 at[2] = {turned(-2, 0, 0, 20, 1), turned(4, 1, 1, 50, 1)};
+    struct text a = {0}, b = {0};
+    char path[64];
+    snprintf(path, sizeof path, "instances_%ld.pfm", (long)getpid());
+    FILE *f = fopen(path, "wb");
+    fprintf(f, "Pf\n8 8\n-1\n");
+    for (int k = 0; k < 64; k++)
+        fwrite(&(float){.3f * (float)(k * 29 % 13) / 13}, sizeof(float), 1, f);
+    fclose(f);
+    for (int k = 0; k < 2; k++) {
+        struct text *t = k ? &b : &a;
+        put_head(t);
+        put(t,
+            "<bsdf type='twosided' id='rough'><bsdf type='bumpmap'><texture "
+            "type='bitmap' name='height'><string name='filename' value='%s'/><boolean "
+            "name='raw' value='true'/></texture><bsdf type='diffuse' id='rough_paint'>"
+            "<rgb name='reflectance' value='.5,.4,.7'/></bsdf></bsdf></bsdf>",
+            path);
+    }
+    put(&a, "<shape type='shapegroup' id='group'>");
+    for (int k = 0; k < 3; k++) {
+        const struct imp_mat4 in = of_member(k);
+        put_member(&a, &m[k], &in, NULL);
+    }
+    put(&a, "</shape>");
+    for (int i = 0; i < 2; i++) {
+        put(&a, "<shape type='instance'><ref id='group'/><ref id='rough'/>");
+        put_matrix(&a, "to_world", &at[i]);
+        put(&a, "</shape>");
+        for (int k = 0; k < 3; k++) {
+            const struct imp_mat4 there = times(at[i], of_member(k));
+            put_member(&b, &m[k], &there, "rough");
+        }
+    }
+    put(&a, "</scene>"), put(&b, "</scene>");
+    imp_scene *with = test_scene_text(ctx, a.at, IMP_RGB),
+              *copies = test_scene_text(ctx, b.at, IMP_RGB);
+    outputs_compare("a bump map by instance", with, copies);
+    imp_scene_destroy(with);
+    imp_scene_destroy(copies);
+    /* One that mirrors is refused. */
+    struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
+    a.n -= strlen("</scene>");
+    put(&a, "<shape type='instance'><ref id='group'/><ref id='rough'/><transform "
+            "name='to_world'><scale x='-1'/></transform></shape></scene>");
+    const enum imp_status st =
+        imp_scene_load_string(ctx, a.at, strlen(a.at), "test", &o, &with);
+    tap_ok(st == IMP_E_UNSUPPORTED && strstr(imp_last_error(ctx), "mirrors, shears"),
+           "a mirrored bump map is refused # %s", imp_last_error(ctx));
+    free(a.at), free(b.at);
+    remove(path);
+}
+
 /* Two instances of a group of two instances and a shape. */
 static void nested(void)
 {
@@ -433,6 +491,7 @@ int main(void)
     placed("sheared", flat, 3, sheared, 3, false);
     placed("mirrored cubes", flat, 1, mirrored, 3, false);
     placed("materials by instance", flat, 4, even, 3, true);
+    bumped();
     nested();
     motions();
     memory();

@@ -103,10 +103,10 @@ static void surface(const struct imp_shape *s, const struct imp_hit *hit, const 
     surface_at(k, x * r, y * r, hit->v, out);
 }
 
-static void place(const struct imp_shape *s, const double uv[2], const imp_v3 *at,
-                  struct imp_surface *out, int *prim)
+static void place(const struct imp_shape *s, const double uv[2], struct imp_surface *out,
+                  int *prim)
 {
-    (void)at, (void)prim;
+    (void)prim;
     surface_at(s->self, cos(IMP_2PI * uv[0]), sin(IMP_2PI * uv[0]), uv[1], out);
 }
 

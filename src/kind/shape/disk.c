@@ -74,10 +74,10 @@ static void surface(const struct imp_shape *s, const struct imp_hit *hit, const 
     surface_at(s->self, hit->u, hit->v, out);
 }
 
-static void place(const struct imp_shape *s, const double uv[2], const imp_v3 *at,
-                  struct imp_surface *out, int *prim)
+static void place(const struct imp_shape *s, const double uv[2], struct imp_surface *out,
+                  int *prim)
 {
-    (void)at, (void)prim;
+    (void)prim;
     const double phi = IMP_2PI * uv[1];
     surface_at(s->self, uv[0] * cos(phi), uv[0] * sin(phi), out);
 }

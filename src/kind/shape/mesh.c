@@ -5,18 +5,57 @@
  * shading normals agree (docs/scene-format.md 4.3, as Mitsuba 3.10). */
 #include "math/warp.h"
 #include "mesh_triangle.h"
+#include <math.h>
+#include <string.h>
 
-/* The number of a triangle as two floats, in which it is exact. */
-#define PRIM_BITS 22
-static void prim_write(int prim, double uv[2])
+/* A point of a triangle in two floats: 60 bits, of which the triangle's number takes what
+ * it needs, and two barycentric weights the rest. So a point is found without its position,
+ * which of a mesh in a group is another in each instance. An integer k below 2^30 is the
+ * float of bits k + 0x00800000, between 2^-126 and 4: no operation rounds it. */
+#define WORD_BITS  30
+#define FLOAT_BASE 0x00800000u
+
+static int weight_bits(const struct imp_shape *s)
 {
-    uv[0] = prim & ((1 << PRIM_BITS) - 1);
-    uv[1] = prim >> PRIM_BITS;
+    int prim = 0;
+    while (prim < 31 && s->triangles.n_triangles > (size_t)1 << prim) prim++;
+    return imp_min((2 * WORD_BITS - prim) / 2, 26);
 }
-static int prim_read(const struct imp_shape *s, const double uv[2])
+static double word_write(uint64_t k)
 {
-    const double k = uv[0] + uv[1] * (1 << PRIM_BITS);
-    return k >= 0 && k < (double)s->triangles.n_triangles ? (int)k : 0;
+    const uint32_t bits = (uint32_t)(k & ((1u << WORD_BITS) - 1)) + FLOAT_BASE;
+    float out;
+    memcpy(&out, &bits, sizeof out);
+    return out;
+}
+static uint64_t word_read(double v)
+{
+    const float in = (float)v;
+    uint32_t bits;
+    memcpy(&bits, &in, sizeof bits);
+    return (bits - FLOAT_BASE) & ((1u << WORD_BITS) - 1);
+}
+static void point_write(const struct imp_shape *s, const struct imp_hit *hit,
+                        double uv[2])
+{
+    const int n = weight_bits(s);
+    const double most = (double)((1u << n) - 1);
+    const uint64_t u = (uint64_t)rint(imp_clamp(hit->u, 0., 1.) * most),
+                   v = (uint64_t)rint(imp_clamp(hit->v, 0., 1.) * most);
+    const uint64_t word = ((uint64_t)hit->prim << n | u) << n | v;
+    uv[0] = word_write(word);
+    uv[1] = word_write(word >> WORD_BITS);
+}
+static struct imp_hit point_read(const struct imp_shape *s, const double uv[2])
+{
+    const int n = weight_bits(s);
+    const uint64_t word = word_read(uv[1]) << WORD_BITS | word_read(uv[0]);
+    const uint64_t most = (1u << n) - 1, prim = word >> 2 * n;
+    const double u = (double)(word >> n & most) / (double)most,
+                 v = (double)(word & most) / (double)most;
+    return (struct imp_hit){.prim = prim < s->triangles.n_triangles ? (int)prim : 0,
+                            .u = u,
+                            .v = fmin(v, 1 - u)};
 }
 
 static void surface(const struct imp_shape *s, const struct imp_hit *hit,
@@ -44,7 +83,7 @@ void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit,
 {
     (void)o, (void)d;
     surface(s, hit, out);
-    if (imp_unlikely(s->by_triangle)) prim_write(hit->prim, out->uv);
+    if (imp_unlikely(s->by_triangle)) point_write(s, hit, out->uv);
 }
 
 void imp__triangle_weights(const struct imp_shape *s, int prim, const imp_v3 *p,
@@ -62,13 +101,11 @@ void imp__triangle_weights(const struct imp_shape *s, int prim, const imp_v3 *p,
     b[0] = 1 - b[1] - b[2];
 }
 
-void imp__mesh_place(const struct imp_shape *s, const double uv[2], const imp_v3 *p,
+void imp__mesh_place(const struct imp_shape *s, const double uv[2],
                      struct imp_surface *out, int *prim)
 {
-    double b[3];
-    *prim = prim_read(s, uv);
-    imp__triangle_weights(s, *prim, p, b);
-    const struct imp_hit hit = {.prim = *prim, .u = b[1], .v = b[2]};
+    const struct imp_hit hit = point_read(s, uv);
+    *prim = hit.prim;
     surface(s, &hit, out);
 }
 
@@ -105,7 +142,7 @@ bool imp__mesh_sample(const struct imp_shape *s, const imp_v3 *ref, const double
         f ? (struct imp__mesh_corner){f->p0, f->e1, f->e2} : imp__mesh_corner(m, lo);
     struct imp_surface at;
     imp__mesh_point(m, &hit, &c, f ? f->ng : imp__mesh_face_normal(m, lo), &at);
-    if (imp_unlikely(s->by_triangle)) prim_write(hit.prim, at.uv);
+    if (imp_unlikely(s->by_triangle)) point_write(s, &hit, at.uv);
     out->uv[0] = at.uv[0];
     out->uv[1] = at.uv[1];
     return imp__light_from_area(*ref, at.p, at.ng, at.n, m->inv_area, out);

@@ -72,10 +72,10 @@ static void surface(const struct imp_shape *s, const struct imp_hit *hit, const 
     out->dp_dv = r->ev;
 }
 
-static void place(const struct imp_shape *s, const double uv[2], const imp_v3 *at,
-                  struct imp_surface *out, int *prim)
+static void place(const struct imp_shape *s, const double uv[2], struct imp_surface *out,
+                  int *prim)
 {
-    (void)at, (void)prim;
+    (void)prim;
     const struct imp_hit hit = {.prim = 0, .u = uv[0] - uv[1], .v = uv[1]};
     surface(s, &hit, NULL, NULL, out);
 }

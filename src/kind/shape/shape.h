@@ -113,7 +113,7 @@ struct imp__mesh {
 void imp__mesh_surface(const struct imp_shape *s, const struct imp_hit *hit,
                        const imp_v3 *o, const imp_v3 *d, struct imp_surface *out);
 /* As imp_shape_ops.place. */
-void imp__mesh_place(const struct imp_shape *s, const double uv[2], const imp_v3 *p,
+void imp__mesh_place(const struct imp_shape *s, const double uv[2],
                      struct imp_surface *out, int *prim);
 /* Barycentric weights of the point of a triangle that is next to p in its plane, within
  * the triangle. */

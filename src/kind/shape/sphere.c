@@ -87,12 +87,14 @@ static void surface(const struct imp_shape *s, const struct imp_hit *hit, const 
     surface_at(p, imp__normalize(*o + *d * hit->t - p->center), out);
 }
 
-static void place(const struct imp_shape *s, const double uv[2], const imp_v3 *at,
-                  struct imp_surface *out, int *prim)
+static void place(const struct imp_shape *s, const double uv[2], struct imp_surface *out,
+                  int *prim)
 {
-    (void)uv, (void)prim;
+    (void)prim;
     const struct sphere *p = s->self;
-    surface_at(p, imp__normalize(*at - p->center), out);
+    const double phi = IMP_2PI * uv[0], theta = IMP_PI * uv[1], rho = sin(theta);
+    const imp_v3 q = imp__v3(rho * cos(phi), rho * sin(phi), cos(theta));
+    surface_at(p, imp__to_world(&p->axes, q), out);
 }
 
 static void sample_area(const struct imp_shape *s, const double u[2],

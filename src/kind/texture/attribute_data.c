@@ -55,7 +55,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_t
     changed(t);
     const size_t dims[2] = {a->n, (size_t)a->channels};
     IMP_TRY(imp_build_texels(b, "", a->data, 2, dims,
-                             IMP_PARAM_DIFFERENTIABLE |
+                             IMP_PARAM_DIFFERENTIABLE | IMP_PARAM_LIST |
                                  (from->color ? (unsigned)IMP_PARAM_COLOR : 0),
                              negative ? -INFINITY : 0.0, INFINITY, &t->param));
 out:
@@ -77,7 +77,7 @@ static void see(const struct attribute *a, const struct imp_texcoord *at, struct
     f->row[0] = (size_t)at->prim;
     f->weight[0] = 1;
     if (a->face) return;
-    imp__triangle_weights(at->shape, at->prim, &at->p, f->weight);
+    imp__triangle_weights(at->shape, at->prim, &at->surface->p, f->weight);
     for (int k = 0; k < 3; k++) f->row[k] = t->indices[3 * (size_t)at->prim + (size_t)k];
 }
 

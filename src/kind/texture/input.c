@@ -137,7 +137,7 @@ static const struct imp_texcoord *site_of(const struct imp_texcoord *at,
 {
     if (imp_likely(!at->shape || !at->shape->by_triangle) || at->surface) return at;
     site->at = *at;
-    at->shape->ops->place(at->shape, at->uv, &at->p, &site->surface, &site->at.prim);
+    at->shape->ops->place(at->shape, at->uv, &site->surface, &site->at.prim);
     for (int k = 0; k < 2; k++) site->at.uv[k] = site->surface.uv[k];
     site->at.surface = &site->surface;
     return &site->at;
@@ -158,7 +158,7 @@ static imp_spec bumped(const struct imp_input *input, const struct imp_texcoord 
     if (!at->shape || !input->texture->ops->slope(input->texture, &plain, true, slope))
         return (imp_spec){0, 0, 1, 0};
     if (!x) {
-        at->shape->ops->place(at->shape, at->uv, &at->p, &made, &prim);
+        at->shape->ops->place(at->shape, at->uv, &made, &prim);
         x = &made;
     }
     const double scale = input->value[0];
