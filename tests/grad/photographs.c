@@ -89,6 +89,51 @@ static void picture(enum imp_color_mode mode)
     imp_scene_destroy(s);
 }
 
+/* 1 - r^2 - r^4 is below 0 in the corners: no light arrives there, and its derivative is
+ * that of the rest. The mean is linear in both numbers but where a sample is dark on one
+ * side of a difference only: one sample in 10,000 or so, whose value is then below h. */
+static void dark_corners(void)
+{
+    imp_scene *s =
+        test_scene_text(ctx,
+                        ROOM CAMERA("cam", "0",
+                                    NUMBER("vignetting_2", "-.99")
+                                        NUMBER("vignetting_4", "-.98")) "</scene>",
+                        IMP_RGB);
+    imp_film *film = render(s, 16, 1, 0);
+    const float *mean = imp_film_mean(film);
+    const int corner[4] = {0, WIDTH - 1, PIXELS - WIDTH, PIXELS - 1};
+    double least = INFINITY, most = 0;
+    for (int i = 0; i < 3 * PIXELS; i++) least = fmin(least, (double)mean[i]);
+    for (int k = 0; k < 4; k++) most = fmax(most, (double)mean[3 * corner[k]]);
+    tap_ok(least == 0 && most == 0 && mean[3 * (PIXELS / 2 + WIDTH / 2)] > 0,
+           "vignetting is dark in the corners, and nowhere negative # %g", least);
+    imp_film_destroy(film);
+
+    imp_problem *p = test_problem(ctx, s, "cam.vignetting*");
+    struct imp_run run = run_of(16, 1, 0);
+    double x[2], g[2], worst = 0;
+    const double h = 1e-4;
+    test_must(ctx, imp_problem_functional(p, NULL, &run, NULL, g, NULL));
+    imp_problem_get_x(p, x);
+    for (int k = 0; k < 2; k++) {
+        struct imp_estimate up, down;
+        const double at = x[k];
+        x[k] = at + h;
+        test_must(ctx, imp_problem_set_x(p, x));
+        test_must(ctx, imp_problem_functional(p, NULL, &run, &up, NULL, NULL));
+        x[k] = at - h;
+        test_must(ctx, imp_problem_set_x(p, x));
+        test_must(ctx, imp_problem_functional(p, NULL, &run, &down, NULL, NULL));
+        x[k] = at;
+        worst = fmax(worst, fabs((up.value - down.value) / (2 * h) / g[k] - 1));
+    }
+    tap_ok(g[0] > 0 && g[1] > 0 && worst < 1e-4, "and so are its derivatives # %.1e",
+           worst);
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+}
+
 /* T = (g L)^(1/gamma) of a quiet picture. */
 static void photograph(imp_scene *s, int sensor, double gamma, float *out)
 {
@@ -225,6 +270,7 @@ int main(void)
 {
     ctx = test_context(2);
     picture(IMP_RGB);
+    dark_corners();
     picture(IMP_SPECTRAL);
     loss();
     room();
