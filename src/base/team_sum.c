@@ -204,12 +204,15 @@ static enum imp_status exchange(struct imp__sharing *s, enum imp_status st,
     struct imp__team *team = s->share.team;
     struct imp__sum_head head;
     imp__message_end(s, st, shared, &head);
+    const enum imp_status mine = (enum imp_status)head.status;
     s->own = false;
     st = team->host.gather(s->no_memory ? (const void *)&head : s->message.data,
                            s->no_memory ? sizeof head : s->message.size,
                            imp__sharing_receive, s, team->host.payload);
     team->round++;
     if (st != IMP_OK) return imp__error_prefix(s->ctx, st, "the team");
+    /* Nobody answers a part: what it knows is what itself did. */
+    if (team->role == IMP_TEAM_PART && mine != IMP_OK) return mine;
     if (s->strange)
         return imp__error(s->ctx, IMP_E_ARG,
                           "what the ranks of a team, or parts, have computed is not of "

@@ -341,7 +341,8 @@ enum imp_status imp__picture_make(imp_context *ctx, const struct imp_picture *pi
                                  &preview));
     ended = render_run(&r, preview, &spp);
     if (ended != IMP_CANCELLED) IMP_TRY(ended);
-    if (imp__team_part(ctx) && imp__team_shares(ctx)) IMP_TRY(IMP_PART);
+    if (imp__team_part(ctx) && imp__team_shares(ctx))
+        IMP_TRY(ended == IMP_CANCELLED ? ended : IMP_PART);
     if (ended == IMP_CANCELLED && spp == 0 &&
         (double)r.sums.width * r.sums.height > LARGE_PICTURE) {
         memset(out, 0, (size_t)n_films * sizeof *out);

@@ -15,45 +15,61 @@ struct head {
     uint64_t command_bytes, n_items, n_sums, n_messages;
 };
 
-/* Text of n bytes, in new memory; NULL: there is none. */
-static char *take_text(imp_context *ctx, struct imp__reading *r, uint64_t n)
+static enum imp_status no_memory(imp_context *ctx)
 {
-    if (n > r->end - r->at) return NULL;
-    char *text = imp__alloc(ctx, (size_t)n + 1, 1);
-    if (text && !imp__take(r, text, (size_t)n)) return NULL;
-    return text;
+    return imp__error(ctx, IMP_E_NOMEM, "no memory for a manifest");
 }
 
-static bool contents_read(imp_manifest *m, struct imp__reading *r,
-                          const struct head *head)
+/* Text of n bytes, in new memory. Here and below, IMP_E_SCENE, without a message, is for
+ * damaged bytes. */
+static enum imp_status take_text(imp_context *ctx, struct imp__reading *r, uint64_t n,
+                                 char **out)
 {
-    if (!(m->command = take_text(m->ctx, r, head->command_bytes))) return false;
-    for (uint64_t k = 0; k < head->n_items; k++) {
-        struct imp__item i = {0};
-        uint32_t kind;
-        uint64_t bytes;
-        if (!imp__take(r, &kind, sizeof kind) || !imp__take(r, &i.size, sizeof i.size) ||
-            !imp__take(r, &i.hash, sizeof i.hash) ||
-            !imp__take(r, &bytes, sizeof bytes) || kind > IMP_ITEM_OUTPUT ||
-            !(i.name = take_text(m->ctx, r, bytes)))
-            return false;
-        const bool added =
-            imp__manifest_add(m, (enum imp__item_kind)kind, i.name, i.size, i.hash);
-        imp__release(m->ctx, i.name);
-        if (!added) return false;
-    }
-    if (head->n_messages > (r->end - r->at) / sizeof(uint64_t)) return false;
+    if (n > r->end - r->at) return IMP_E_SCENE;
+    *out = imp__alloc(ctx, (size_t)n + 1, 1);
+    if (!*out) return no_memory(ctx);
+    imp__take(r, *out, (size_t)n);
+    return IMP_OK;
+}
+
+static enum imp_status item_read(imp_manifest *m, struct imp__reading *r)
+{
+    uint32_t kind;
+    uint64_t size, hash, bytes;
+    char *name = NULL;
+    if (!imp__take(r, &kind, sizeof kind) || !imp__take(r, &size, sizeof size) ||
+        !imp__take(r, &hash, sizeof hash) || !imp__take(r, &bytes, sizeof bytes) ||
+        kind > IMP_ITEM_OUTPUT)
+        return IMP_E_SCENE;
+    enum imp_status st = take_text(m->ctx, r, bytes, &name);
+    if (st == IMP_OK &&
+        !imp__manifest_add(m, (enum imp__item_kind)kind, name, size, hash))
+        st = no_memory(m->ctx);
+    imp__release(m->ctx, name);
+    return st;
+}
+
+static enum imp_status contents_read(imp_manifest *m, struct imp__reading *r,
+                                     const struct head *head)
+{
+    enum imp_status st = IMP_OK;
+    IMP_TRY(take_text(m->ctx, r, head->command_bytes, &m->command));
+    for (uint64_t k = 0; k < head->n_items; k++) IMP_TRY(item_read(m, r));
+    if (head->n_messages > (r->end - r->at) / sizeof(uint64_t)) return IMP_E_SCENE;
     m->messages = imp__alloc(m->ctx, (size_t)head->n_messages + 1, sizeof *m->messages);
-    if (!m->messages) return false;
+    if (!m->messages) return no_memory(m->ctx);
     for (; m->n_messages < head->n_messages; m->n_messages++) {
         uint64_t size;
-        if (!imp__take(r, &size, sizeof size) || size > r->end - r->at) return false;
+        if (!imp__take(r, &size, sizeof size) || size > r->end - r->at)
+            return IMP_E_SCENE;
         m->messages[m->n_messages] = (struct imp__kept_message){r->at, (size_t)size};
         r->at += (size_t)size;
     }
     m->n_sums = head->n_sums;
     m->whole = head->n_messages == 0;
-    return r->at == r->end;
+    if (r->at != r->end) return IMP_E_SCENE;
+out:
+    return st;
 }
 
 enum imp_status imp__manifest_take(imp_manifest *m, const char *path)
@@ -78,9 +94,8 @@ enum imp_status imp__manifest_take(imp_manifest *m, const char *path)
         return imp__error(m->ctx, IMP_E_ARG,
                           "%s: made on \"%s\", this is \"%s\": bits cannot be compared",
                           path, head.machine, m->machine);
-    if (!contents_read(m, &r, &head))
-        return imp__error(m->ctx, IMP_E_SCENE, "%s: damaged", path);
-    return IMP_OK;
+    const enum imp_status st = contents_read(m, &r, &head);
+    return st == IMP_E_SCENE ? imp__error(m->ctx, st, "%s: damaged", path) : st;
 }
 
 bool imp__manifest_bytes(const imp_manifest *m, struct imp_bytes *out)

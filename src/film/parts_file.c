@@ -15,29 +15,32 @@ struct head {
     uint64_t command_bytes, n_sources;
 };
 
-static bool source_read(struct imp_parts *p, struct imp__reading *r, size_t file)
+/* IMP_E_SCENE, without a message, for damaged bytes. */
+static enum imp_status source_read(struct imp_parts *p, struct imp__reading *r,
+                                   size_t file)
 {
     struct imp__part_source s = {.file = file};
     uint64_t n = 0;
     if (!imp__take(r, &s.index, sizeof s.index) ||
         !imp__take(r, &s.count, sizeof s.count) || !imp__take(r, &n, sizeof n) ||
         s.index < 1 || s.index > s.count || n > (r->end - r->at) / sizeof(uint64_t))
-        return false;
+        return IMP_E_SCENE;
     struct imp__part_source *grown =
         imp__grow(p->ctx, p->sources, &p->cap_sources, p->n_sources + 1, sizeof *grown);
-    if (!grown) return false;
+    if (!grown) return imp__error(p->ctx, IMP_E_NOMEM, "no memory for parts");
     p->sources = grown;
     s.n_messages = (size_t)n;
     s.messages = imp__alloc(p->ctx, s.n_messages + 1, sizeof *s.messages);
     p->sources[p->n_sources++] = s;
-    if (!s.messages) return false;
+    if (!s.messages) return imp__error(p->ctx, IMP_E_NOMEM, "no memory for parts");
     for (size_t k = 0; k < s.n_messages; k++) {
         uint64_t size;
-        if (!imp__take(r, &size, sizeof size) || size > r->end - r->at) return false;
+        if (!imp__take(r, &size, sizeof size) || size > r->end - r->at)
+            return IMP_E_SCENE;
         s.messages[k] = (struct imp__kept_message){r->at, (size_t)size};
         r->at += (size_t)size;
     }
-    return true;
+    return IMP_OK;
 }
 
 enum imp_status imp__parts_file_read(struct imp_parts *p, const char *path, size_t k)
@@ -80,10 +83,10 @@ enum imp_status imp__parts_file_read(struct imp_parts *p, const char *path, size
                           path, head.machine, p->machine);
     }
     r.at += bytes;
-    for (uint64_t n = 0; n < head.n_sources; n++)
-        if (!source_read(p, &r, k))
-            return imp__error(p->ctx, IMP_E_SCENE, "%s: damaged", path);
-    if (r.at != r.end || head.n_sources == 0)
+    for (uint64_t n = 0; n < head.n_sources && st == IMP_OK; n++)
+        st = source_read(p, &r, k);
+    if (st == IMP_E_NOMEM) return st;
+    if (st != IMP_OK || r.at != r.end || head.n_sources == 0)
         return imp__error(p->ctx, IMP_E_SCENE, "%s: damaged", path);
     return IMP_OK;
 }

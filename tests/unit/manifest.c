@@ -3,6 +3,7 @@
  * Manifests: a run that keeps one has the bits of a run without; it is verified on any
  * number of threads, whole or in part; and what is false is found: a scene, a result, a
  * sum on the way. */
+#include "imp_fail_alloc.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "math/hash.h"
@@ -223,6 +224,32 @@ static void no_sensor(void)
     imp_manifest_destroy(m);
     imp_scene_destroy(s);
     imp_context_destroy(ctx);
+}
+
+/* Without memory a good file is not damaged. */
+static void starved(void)
+{
+    static double result[PIXELS];
+    size_t numbers;
+    struct fail_alloc heap = {0};
+    enum imp_status st;
+    int other = 0, n = 0;
+    imp_context *ctx = fail_alloc_context(&heap);
+    make(GRADIENT, result, &numbers);
+    do {
+        imp_manifest *m = NULL;
+        heap.calls = 0;
+        heap.fail_at = ++n;
+        st = imp_manifest_read(ctx, proof, 1, 1, &m);
+        heap.fail_at = 0;
+        other += st != IMP_OK && st != IMP_E_NOMEM;
+        imp_manifest_destroy(m);
+    } while (st != IMP_OK && n < 1000);
+    tap_ok(st == IMP_OK && n > 3 && other == 0,
+           "%d allocations fail in turn: out of memory, %d times something else", n - 1,
+           other);
+    imp_context_destroy(ctx);
+    tap_ok(heap.live == 0, "and nothing leaks");
 }
 
 int main(void)

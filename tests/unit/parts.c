@@ -2,6 +2,7 @@
  *
  * Parts: pictures, losses, gradients, Jacobians with their tables, and means have the
  * bits of one run, for any cut; what does not belong together is refused. */
+#include "imp_fail_alloc.h"
 #include "math/hash.h"
 #include "parts_kit.h"
 #include <unistd.h>
@@ -231,6 +232,64 @@ static void larger_parts(void)
     imp_context_destroy(ctx);
 }
 
+static int stop(const struct imp_progress *progress, void *payload)
+{
+    (void)progress, (void)payload;
+    return 1;
+}
+
+/* A part that was stopped is none, and says so. */
+static void stopped(void)
+{
+    imp_parts *part;
+    imp_context *ctx = test_context(1);
+    imp_scene *s = scene_make(ctx, "box", .6);
+    imp_problem *p = problem_make(ctx, s, "ball.*");
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_estimate e;
+    double g[3], se[3];
+    imp_film *film = NULL;
+    run.progress = stop;
+    test_must(ctx, imp_parts_create(ctx, 1, 2, "a test", &part));
+    test_must(ctx, imp_context_set_parts(ctx, part));
+    enum imp_status st = imp_render(s, &run, &film);
+    tap_ok(st == IMP_CANCELLED && !film, "a part of a picture is cancelled # %s",
+           imp_status_text(st));
+    st = imp_problem_objective(p, NULL, &run, &e, g, se);
+    tap_ok(st == IMP_CANCELLED, "a part of a loss is cancelled # %s",
+           imp_status_text(st));
+    imp_problem_destroy(p);
+    imp_parts_destroy(part);
+    imp_scene_destroy(s);
+    imp_context_destroy(ctx);
+}
+
+/* Without memory a good file is not damaged. */
+static void starved(void)
+{
+    char path[96];
+    const char *const paths[] = {part_path(path, 1, 2)};
+    struct fail_alloc heap = {0};
+    enum imp_status st;
+    int other = 0, n = 0;
+    imp_context *ctx = fail_alloc_context(&heap);
+    part_make("box", PICTURE, 1, 2, 1);
+    do {
+        imp_parts *parts = NULL;
+        heap.calls = 0;
+        heap.fail_at = ++n;
+        st = imp_parts_read(ctx, paths, 1, &parts);
+        heap.fail_at = 0;
+        other += st != IMP_OK && st != IMP_E_NOMEM;
+        imp_parts_destroy(parts);
+    } while (st != IMP_OK && n < 1000);
+    tap_ok(st == IMP_OK && n > 3 && other == 0,
+           "%d allocations fail in turn: out of memory, %d times something else", n - 1,
+           other);
+    imp_context_destroy(ctx);
+    tap_ok(heap.live == 0, "and nothing leaks");
+}
+
 int main(void)
 {
     snprintf(folder, sizeof folder, "/tmp/parts.XXXXXX");
@@ -244,6 +303,8 @@ int main(void)
     refusals();
     no_parts();
     larger_parts();
+    stopped();
+    starved();
     char command[96];
     snprintf(command, sizeof command, "rm -r %s", folder);
     if (system(command) != 0) tap_ok(0, "the folder is removed");
