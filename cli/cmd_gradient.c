@@ -313,7 +313,7 @@ static int run_gradient(int n, char **operand)
 
     if (textures) rc = make_folder(textures);
     for (size_t k = 0; k < n_blocks && !rc && textures; k++)
-        if (block_is_large(&blocks[k])) rc = block_writable(&blocks[k], textures);
+        if (block_is_large(&blocks[k])) rc = block_writable(&blocks[k], textures, 1);
     if (spectra && !rc) rc = make_folder(spectra);
     for (size_t k = 0; k < n_blocks && !rc && spectra; k++)
         if (is_spectrum(&blocks[k])) {

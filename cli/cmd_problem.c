@@ -330,12 +330,13 @@ static char *block_path(const struct block *b, const char *folder, const char *o
     make_file_name(name);
     return join_path(folder, name);
 }
-int block_writable(const struct block *b, const char *folder)
+int block_writable(const struct block *b, const char *folder, int errors)
 {
-    char *path = block_path(b, folder, "");
-    const int rc =
-        is_volume(b) ? overwrite_check(path, OUTPUT_VOL) : picture_writable(path, 1);
+    char *path = block_path(b, folder, ""), *se = block_path(b, folder, ".se");
+    int rc = is_volume(b) ? overwrite_check(path, OUTPUT_VOL) : picture_writable(path, 1);
+    if (!rc && is_volume(b) && errors) rc = overwrite_check(se, OUTPUT_VOL);
     free(path);
+    free(se);
     return rc;
 }
 

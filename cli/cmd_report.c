@@ -240,7 +240,7 @@ static int collect(struct collection *c, const char *folder)
     }
     free(csv);
     for (int i = 0; i < n; i++) {
-        const char *name = keep(c, strdup(entry[i]->d_name));
+        const char *name = keep(c, cli_strdup(entry[i]->d_name));
         char *path = join_path(folder, name);
         if (!rc)
             rc = ends(name, ".exr")    ? add_picture(c, path, name, controls)

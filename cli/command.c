@@ -108,6 +108,13 @@ void *cli_alloc(size_t n, size_t size)
     return memory;
 }
 
+char *cli_strdup(const char *text)
+{
+    char *copy = strdup(text);
+    if (!copy) exit(cli_error(EXIT_RUN, "out of memory"));
+    return copy;
+}
+
 double cli_now(void)
 {
     struct timespec t;
@@ -142,8 +149,7 @@ int cli_writes(void) { return ranks_first() && !cli.verifies; }
 /* Cut "a;b;c" into a list; the text lives as long as the process. */
 static void split_search(const char *paths, struct arg_list *list)
 {
-    char *copy = strdup(paths), *save = NULL;
-    if (!copy) exit(cli_error(EXIT_RUN, "out of memory"));
+    char *copy = cli_strdup(paths), *save = NULL;
     for (char *p = strtok_r(copy, ";", &save); p; p = strtok_r(NULL, ";", &save))
         args_list_add(list, p);
 }

@@ -126,6 +126,8 @@ double cli_now(void);
 
 /* malloc that ends the process when there is no memory; the cli may. */
 void *cli_alloc(size_t n, size_t size);
+/* strdup, the same. */
+char *cli_strdup(const char *text);
 
 /* "name" of a parameter, or "name[element]" when it has several numbers. */
 const char *cli_number_name(const struct imp_param_info *info, size_t element, char *text,

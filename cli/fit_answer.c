@@ -325,7 +325,7 @@ int fit_answer_writable(const struct block *blocks, size_t n_blocks)
         rc = overwrite_check_in(cli.out, outputs[k].name, outputs[k].kind);
     if (!rc) rc = fit_pictures_writable();
     for (size_t k = 0; k < n_blocks && !rc; k++)
-        if (block_is_large(&blocks[k])) rc = block_writable(&blocks[k], cli.out);
+        if (block_is_large(&blocks[k])) rc = block_writable(&blocks[k], cli.out, 0);
     return rc;
 }
 

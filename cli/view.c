@@ -232,7 +232,7 @@ void view_show(enum view_channel channel, const struct imp_report_item *items, s
         cli_say("importon: the page misses something: %s", imp_last_error(cli.context));
         return;
     }
-    http_send((int)channel, "report", strdup(text));
+    http_send((int)channel, "report", cli_strdup(text));
     imp_free(cli.context, text);
 }
 

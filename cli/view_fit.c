@@ -76,8 +76,8 @@ static void numbers_open(void)
         for (size_t i = 0; !block_is_large(b) && i < b->n; i++) {
             cli_number_name(&b->info, i, name, sizeof name);
             number[n++] = (struct view_number){
-                strdup(name), b->info.unit,         b->info.lo,
-                b->info.hi,   shown(b, f.start, i), shown(b, f.start, i)};
+                cli_strdup(name), b->info.unit,         b->info.lo,
+                b->info.hi,       shown(b, f.start, i), shown(b, f.start, i)};
         }
     }
     view_numbers(number, n);
@@ -299,7 +299,7 @@ static int work(void)
 static int checkpoint_open(void)
 {
     if (view_options.checkpoint) {
-        f.checkpoint = strdup(view_options.checkpoint);
+        f.checkpoint = cli_strdup(view_options.checkpoint);
         return 0;
     }
     const char *folder = getenv("TMPDIR");

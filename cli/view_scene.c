@@ -64,8 +64,8 @@ static int numbers_open(void)
             r.param[r.n] = k;
             r.element[r.n] = e;
             number[r.n++] =
-                (struct view_number){strdup(name), info.unit,      info.lo,
-                                     info.hi,      value_at(k, e), value_at(k, e)};
+                (struct view_number){cli_strdup(name), info.unit,      info.lo,
+                                     info.hi,          value_at(k, e), value_at(k, e)};
         }
     }
     if (!r.n && problem_options.params.n) {
