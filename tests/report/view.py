@@ -230,6 +230,41 @@ try:
 finally:
     if view.process.poll() is None: view.process.kill()
 
+# Logarithms have bounds that are no powers of e: what a slider or a result says lies inside them. And --levels is the fit's.
+logs = [cornell, *common, "--spp", "4", "--target", folder + "/t.exr", "-p", "red.*", "--log", "red.*", "--optimizer", "adam", "-n", "3"]
+view = View(*logs, "-o", folder + "/logs")
+try:
+    ok(view.state("done") is not None, "a fit of logarithms")
+    n = len(view.news)
+    view.act("set", name="red.reflectance.value[1]", value="0")
+    moved = view.wait(lambda e, v: e == "numbers" and v[1]["value"] < 1e-9, n)
+    ok(moved is not None, "a slider at 0 moves to the least number")
+    n = len(view.news)
+    view.act("again")
+    ok(view.state("running", n) is not None and view.state("done", n) is not None
+       and view.items("fit")[-1]["data"]["params"][1]["start"] < 1e-9, "and a fit begins there")
+    n = len(view.news)
+    view.act("save")
+    said = view.wait(lambda e, v: e == "state" and "saved" in (v["message"] or ""), n)
+    ok(said is not None and "not saved" not in said["message"] and os.path.exists(folder + "/logs/parameters.json"),
+       "whose result is saved # %s" % (said or {}).get("message"))
+    ok(view.end() == 130, "ended")
+finally:
+    if view.process.poll() is None: view.process.kill()
+
+textured = [os.path.join(scenes, "textured.xml"), "-D", "width=16", "-D", "height=12", "--seed", "3"]
+run("render", *textured, "--spp", "16", "--se", "--no-preview", "-q", "-o", folder + "/floor.exr")
+levels = [*textured, "--spp", "4", "--target", folder + "/floor.exr", "-p", "floor.*", "--optimizer", "adam", "-n", "6", "--levels", "3",
+          "--set", "floor.reflectance.data=0.3"]
+alone, whole = (json.loads(run("fit", *levels[:len(levels) - k], *more, "--json", "-q"))["history"]["loss"] for k, more in ((0, []), (4, levels[-2:])))
+view = View(*levels)
+try:
+    ok(view.state("done") is not None and view.items("fit")[-1]["data"]["history"]["loss"] == alone and alone != whole,
+       "a fit from coarse to fine, with the bits of importon fit --levels")
+    ok(view.end() == 130, "ended")
+finally:
+    if view.process.poll() is None: view.process.kill()
+
 # ---- Bent rays -----------------------------------------------------------------------------------
 lens = os.path.join(scenes, "bend", "focus.xml")
 view = View(lens, "-n", "12")

@@ -83,10 +83,66 @@ static void gradient(int threads, float all, float one, double *g, double *se)
     imp_context_destroy(ctx);
 }
 
+/* A picture that a material reads as a colour and another as one number: the derivative
+ * is the sum of those of two pictures with the same texels. */
+static void read_twice(void)
+{
+    enum { TWICE = 2 * N };
+    static float pixels[N];
+    static double g[2][TWICE];
+    double worst = 0, largest = 0;
+    for (int k = 0; k < N; k++) pixels[k] = 0.3f + 0.4f * (float)(k % 5) / 5;
+    for (int shared = 0; shared < 2; shared++) {
+        imp_context *ctx = test_context(1);
+        static float target[SIDE * SIDE * 3];
+        struct imp_target t = IMP_TARGET_INIT;
+        struct imp_run run = IMP_RUN_INIT;
+        struct imp_estimate e;
+        imp_scene *s;
+        test_must(ctx, imp_scene_create(ctx, NULL, &s));
+        test_camera(s, 3, 30, SIDE, SIDE);
+        for (int k = 0; k < 2 - shared; k++) {
+            imp_scene_begin(s, "texture", "bitmap", k ? "other" : "one", NULL);
+            imp_scene_image(s, TEXELS, TEXELS, 3, pixels);
+            imp_scene_end(s);
+        }
+        imp_scene_begin(s, "emitter", "constant", NULL, NULL);
+        imp_scene_end(s);
+        imp_scene_begin(s, "shape", "rectangle", NULL, NULL);
+        imp_scene_begin(s, "bsdf", "blendbsdf", NULL, NULL);
+        imp_scene_ref(s, shared ? "one" : "other", "weight");
+        for (int k = 0; k < 2; k++) {
+            imp_scene_begin(s, "bsdf", "diffuse", NULL, NULL);
+            if (k) imp_scene_ref(s, "one", "reflectance");
+            imp_scene_end(s);
+        }
+        imp_scene_end(s);
+        imp_scene_end(s);
+        test_must(ctx, imp_scene_commit(s));
+        imp_problem *p = test_problem(ctx, s, "*data*");
+        if (imp_problem_n(p) != (shared ? N : TWICE)) exit(99);
+        t.width = t.height = SIDE, t.channels = 3, t.pixels = target;
+        run.spp = 4;
+        test_must(ctx, imp_problem_add_target(p, &t));
+        test_must(ctx, imp_problem_objective(p, NULL, &run, &e, g[shared], NULL));
+        imp_problem_destroy(p);
+        imp_scene_destroy(s);
+        imp_context_destroy(ctx);
+    }
+    for (int k = 0; k < N; k++) {
+        worst = fmax(worst, fabs(g[1][k] - g[0][k] - g[0][k + N]));
+        largest = fmax(largest, fabs(g[1][k]));
+    }
+    tap_ok(largest > 0 && worst < 1e-12 * largest,
+           "a picture read as a colour and as a number # off by %.1e of the largest",
+           worst / largest);
+}
+
 int main(void)
 {
     static double g[3][N], se[3][N];
     integers();
+    read_twice();
 
     gradient(1, 1, 1, g[0], se[0]);
     gradient(2, 1, 1, g[1], se[1]);
