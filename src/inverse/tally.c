@@ -7,38 +7,52 @@
 
 #define TABLE_MIN 1024
 
+/* ---- Few numbers ---------------------------------------------------------------- */
+
 static void add_dense(struct imp_sink *sink, int param, size_t element, int channels,
                       const imp_spec *bar)
 {
     struct imp_tally *t = (struct imp_tally *)sink;
     const int64_t base = t->active->base[param];
     if (base < 0) return;
-    if (imp_unlikely(t->active->tied != NULL)) {
-        for (int c = 0; c < (channels == 3 ? 3 : 1); c++) {
-            const size_t e = element + (size_t)c;
-            const double d = channels == 3 ? (*bar)[c] : imp__sum_used(*bar, t->lanes);
-            t->batch[imp__active_at(t->active, param, e)] +=
-                d * imp__active_slope(t->active, param, e);
-        }
-        return;
-    }
     double *batch = t->batch + base + element;
     if (channels == 3)
         for (int c = 0; c < 3; c++) batch[c] += (*bar)[c];
     else batch[0] += imp__sum_used(*bar, t->lanes);
 }
 
+/* Where some numbers are tied to others. */
+static void add_dense_tied(struct imp_sink *sink, int param, size_t element, int channels,
+                           const imp_spec *bar)
+{
+    struct imp_tally *t = (struct imp_tally *)sink;
+    if (t->active->base[param] < 0) return;
+    for (int c = 0; c < (channels == 3 ? 3 : 1); c++) {
+        const size_t e = element + (size_t)c;
+        const double d = channels == 3 ? (*bar)[c] : imp__sum_used(*bar, t->lanes);
+        t->batch[imp__active_at(t->active, param, e)] +=
+            d * imp__active_slope(t->active, param, e);
+    }
+}
+
+/* ---- Many numbers --------------------------------------------------------------- */
+
+/* What a slot is found by, never 0. A texture that is read as a colour here and as one
+ * number there has a triple and a single of one key. */
+static inline uint32_t tag_of(uint32_t key, bool single)
+{
+    return (key << 1 | single) + 1;
+}
+
 /* Where key is, or would be (Fibonacci hashing; Knuth, vol. 3, 6.4). Eight neighbours
- * share a line of the cache: cells and texels are touched side by side. A texture that is
- * read as a colour here and as one number there has a triple and a single of one key. */
+ * share a line of the cache: cells and texels are touched side by side. */
 static inline struct imp__tally_slot *slot_of(const struct imp_tally *t, uint32_t key,
                                               bool single)
 {
-    const size_t mask = t->table_size - 1;
-    size_t k = ((key >> 3) * UINT64_C(0x9e3779b97f4a7c15) >> 32 << 3 | (key & 7)) & mask;
-    while (t->table[k].entry &&
-           (t->table[k].key != key || (t->table[k].entry >= IMP__TALLY_SINGLE) != single))
-        k = (k + 1) & mask;
+    const uint32_t tag = tag_of(key, single), hash = (key >> 3) * UINT32_C(0x9e3779b9);
+    size_t k = (size_t)(hash >> t->shift) << 3 | (key & 7);
+    while (imp_unlikely(t->table[k].tag != tag) && t->table[k].tag != 0)
+        k = (k + 1) & (t->table_size - 1);
     return &t->table[k];
 }
 
@@ -50,12 +64,16 @@ static bool table_grow(struct imp_tally *t)
     imp__release(t->ctx, t->table);
     t->table = table;
     t->table_size = size;
-    for (size_t k = 0; k < t->n_triples; k++)
-        *slot_of(t, t->triples[k].key, false) =
-            (struct imp__tally_slot){t->triples[k].key, (uint32_t)k + 1};
-    for (size_t k = 0; k < t->n_singles; k++)
-        *slot_of(t, t->singles[k].key, true) = (struct imp__tally_slot){
-            t->singles[k].key, ((uint32_t)k + 1) | IMP__TALLY_SINGLE};
+    t->shift = size > (size_t)1 << 31 ? 0 : 35 - __builtin_ctzll(size);
+    for (size_t k = 0; k < t->n_triples; k++) {
+        const uint32_t key = t->triples[k].key;
+        *slot_of(t, key, false) =
+            (struct imp__tally_slot){tag_of(key, false), (uint32_t)k};
+    }
+    for (size_t k = 0; k < t->n_singles; k++) {
+        const uint32_t key = t->singles[k].key;
+        *slot_of(t, key, true) = (struct imp__tally_slot){tag_of(key, true), (uint32_t)k};
+    }
     return true;
 }
 
@@ -82,68 +100,80 @@ static bool of_tile_grow(struct imp_tally *t, bool single)
     return true;
 }
 
-/* A new entry, and its index; -1: no memory. */
-static __attribute__((noinline)) int64_t entry_add(struct imp_tally *t, uint32_t key,
-                                                   bool single)
+/* A new entry. False: no memory. */
+static bool entry_add(struct imp_tally *t, uint32_t key, bool single, size_t *index)
 {
-    if (2 * (t->n_triples + t->n_singles) >= t->table_size && !table_grow(t)) return -1;
-    if (!of_tile_grow(t, single)) return -1;
+    if (2 * (t->n_triples + t->n_singles) >= t->table_size && !table_grow(t))
+        return false;
+    if (!of_tile_grow(t, single)) return false;
     if (single) {
         void *grown = imp__grow(t->ctx, t->singles, &t->cap_singles, t->n_singles + 1,
                                 sizeof *t->singles);
-        if (!grown) return -1;
+        if (!grown) return false;
         t->singles = grown;
-        t->singles[t->n_singles++] = (struct imp__tally_single){.key = key};
-        *slot_of(t, key, true) =
-            (struct imp__tally_slot){key, (uint32_t)t->n_singles | IMP__TALLY_SINGLE};
-        return (int64_t)t->n_singles - 1;
+        *index = t->n_singles++;
+        t->singles[*index] = (struct imp__tally_single){.key = key};
+    } else {
+        void *grown = imp__grow(t->ctx, t->triples, &t->cap_triples, t->n_triples + 1,
+                                sizeof *t->triples);
+        if (!grown) return false;
+        t->triples = grown;
+        *index = t->n_triples++;
+        t->triples[*index] = (struct imp__tally_triple){.key = key};
     }
-    void *grown = imp__grow(t->ctx, t->triples, &t->cap_triples, t->n_triples + 1,
-                            sizeof *t->triples);
-    if (!grown) return -1;
-    t->triples = grown;
-    t->triples[t->n_triples++] = (struct imp__tally_triple){.key = key};
-    *slot_of(t, key, false) = (struct imp__tally_slot){key, (uint32_t)t->n_triples};
-    return (int64_t)t->n_triples - 1;
+    *slot_of(t, key, single) =
+        (struct imp__tally_slot){tag_of(key, single), (uint32_t)*index};
+    return true;
 }
 
-static inline int64_t entry_find(struct imp_tally *t, uint32_t key, bool single)
+static bool touch(struct imp_tally *t, struct imp__tally_list *list, size_t entry)
 {
-    if (imp_likely(t->table_size > 0)) {
-        const struct imp__tally_slot *s = slot_of(t, key, single);
-        if (imp_likely(s->entry)) return (int64_t)(s->entry & ~IMP__TALLY_SINGLE) - 1;
+    if (imp_unlikely(list->n == list->cap)) {
+        void *grown =
+            imp__grow(t->ctx, list->index, &list->cap, list->n + 1, sizeof *list->index);
+        if (!grown) return false;
+        list->index = grown;
     }
-    return entry_add(t, key, single);
-}
-
-static bool touch(struct imp_tally *t, struct imp__tally_list *list, int64_t entry)
-{
-    void *grown =
-        imp__grow(t->ctx, list->index, &list->cap, list->n + 1, sizeof *list->index);
-    if (!grown) return false;
-    list->index = grown;
     list->index[list->n++] = (uint32_t)entry;
     return true;
 }
 
-static void add_entry(struct imp_tally *t, size_t at, bool single, const imp_spec *bar)
+/* The first addition of a pixel to an entry, which the tile may not have yet. */
+static __attribute__((noinline)) void add_first(struct imp_tally *t, uint32_t key,
+                                                bool single, const imp_spec *bar)
 {
-    const int64_t k = entry_find(t, (uint32_t)at, single);
-    if (k < 0) {
-        t->failed = true;
-        return;
-    }
-    if (imp_likely(single)) {
-        struct imp__tally_single *e = &t->singles[k];
-        if (!e->touched) t->failed |= !touch(t, &t->touched_singles, k);
-        e->touched = true;
-        e->batch += imp__sum_used(*bar, t->lanes);
+    const struct imp__tally_slot *s = slot_of(t, key, single);
+    size_t k = s->entry;
+    if (s->tag == 0 && !entry_add(t, key, single, &k)) goto no_memory;
+    if (!touch(t, single ? &t->touched_singles : &t->touched_triples, k)) goto no_memory;
+    if (single) {
+        t->singles[k].touched = true;
+        t->singles[k].batch += imp__sum_used(*bar, t->lanes);
     } else {
-        struct imp__tally_triple *e = &t->triples[k];
-        if (!e->touched) t->failed |= !touch(t, &t->touched_triples, k);
-        e->touched = true;
-        e->batch += *bar;
+        t->triples[k].touched = true;
+        t->triples[k].batch += *bar;
     }
+    return;
+no_memory:
+    t->failed = true;
+}
+
+static inline void add_entry(struct imp_tally *t, size_t at, bool single,
+                             const imp_spec *bar)
+{
+    const uint32_t key = (uint32_t)at;
+    const struct imp__tally_slot *s = slot_of(t, key, single);
+    if (imp_likely(s->tag != 0)) {
+        if (single && imp_likely(t->singles[s->entry].touched)) {
+            t->singles[s->entry].batch += imp__sum_used(*bar, t->lanes);
+            return;
+        }
+        if (!single && imp_likely(t->triples[s->entry].touched)) {
+            t->triples[s->entry].batch += *bar;
+            return;
+        }
+    }
+    add_first(t, key, single, bar);
 }
 
 static void add_hashed(struct imp_sink *sink, int param, size_t element, int channels,
@@ -151,12 +181,16 @@ static void add_hashed(struct imp_sink *sink, int param, size_t element, int cha
 {
     struct imp_tally *t = (struct imp_tally *)sink;
     const int64_t base = t->active->base[param];
-    if (base < 0 || t->failed) return;
+    if (base >= 0) add_entry(t, (size_t)base + element, channels != 3, bar);
+}
+
+/* Where some numbers are tied to others. */
+static void add_hashed_tied(struct imp_sink *sink, int param, size_t element,
+                            int channels, const imp_spec *bar)
+{
+    struct imp_tally *t = (struct imp_tally *)sink;
     const bool single = channels != 3;
-    if (imp_likely(!t->active->tied)) {
-        add_entry(t, (size_t)base + element, single, bar);
-        return;
-    }
+    if (t->active->base[param] < 0) return;
     imp_spec tied = {0};
     for (int c = 0; c < (single ? t->lanes : 3); c++)
         tied[c] = (*bar)[c] *
@@ -166,12 +200,15 @@ static void add_hashed(struct imp_sink *sink, int param, size_t element, int cha
               one && !single ? &(imp_spec){tied[0] + tied[1] + tied[2]} : &tied);
 }
 
+/* ---- Tallies -------------------------------------------------------------------- */
+
 enum imp_status imp__tally_create(imp_context *ctx, const struct imp_active *active,
                                   int lanes, int R, struct imp_tally *out)
 {
     struct imp_tally t = {.ctx = ctx, .active = active, .lanes = lanes, .R = R};
     t.dense = active->n <= IMP_TALLY_DENSE;
-    t.sink.add = t.dense ? add_dense : add_hashed;
+    if (active->tied) t.sink.add = t.dense ? add_dense_tied : add_hashed_tied;
+    else t.sink.add = t.dense ? add_dense : add_hashed;
     if (active->n >= INT32_MAX)
         return imp__error(ctx, IMP_E_ARG, "more than %d active numbers", INT32_MAX);
     if (t.dense) {
@@ -183,6 +220,8 @@ enum imp_status imp__tally_create(imp_context *ctx, const struct imp_active *act
         t.variance = t.mean + active->n;
         t.tile = t.variance + active->n;
         t.of_tile = t.tile + active->n;
+    } else if (!table_grow(&t)) {
+        return imp__error(ctx, IMP_E_NOMEM, "no memory for gradients");
     }
     *out = t;
     return IMP_OK;
@@ -207,7 +246,7 @@ void imp__tally_clear(struct imp_tally *t)
     if (t->dense) {
         memset(t->batch, 0, (6 + (size_t)t->R) * t->active->n * sizeof *t->batch);
     } else {
-        if (t->table_size) memset(t->table, 0, t->table_size * sizeof *t->table);
+        memset(t->table, 0, t->table_size * sizeof *t->table);
         t->n_triples = t->n_singles = 0;
         t->touched_triples.n = t->touched_singles.n = 0;
     }

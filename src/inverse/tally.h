@@ -14,8 +14,7 @@
 #include "base/fixed_sum.h"
 #include "walk/walk.h"
 
-#define IMP__TALLY_SINGLE (UINT32_C(1) << 31)
-#define IMP_TALLY_DENSE   1024 /* numbers, above which the hash table is used */
+#define IMP_TALLY_DENSE 1024 /* numbers, above which the hash table is used */
 
 struct imp__tally_triple { /* three neighbouring numbers */
     /* Of the pixel at work. What an addition needs is on one cache line. */
@@ -46,9 +45,10 @@ struct imp_tally {
     size_t cap_singles_of_tile, cap_triples_of_tile;
     /* hash: open addressing; entries in order of arrival, `touched` of the pixel */
     struct imp__tally_slot {
-        uint32_t key, entry; /* IMP__TALLY_SINGLE for singles + index + 1; 0: free */
+        uint32_t tag, entry; /* key and kind of the entry, 0: free; its index */
     } * table;               /* [table_size], a power of two */
     size_t table_size;
+    int shift; /* of a hash of 32 bits to a table of this size in eights */
     struct imp__tally_triple *triples;
     struct imp__tally_single *singles;
     size_t n_triples, cap_triples, n_singles, cap_singles;
