@@ -62,9 +62,23 @@ static inline void imp__inputs_eval(const struct imp_input *const *input, int n,
     else if (n > 0) imp__inputs_look_up(input, n, at, in);
 }
 /* Transpose: in_bar [n] goes to the parameters behind the inputs. */
-void imp__inputs_scatter(const struct imp_input *const *input, int n,
-                         const struct imp_texcoord *at, const imp_spec *in_bar,
-                         struct imp_sink *sink);
+void imp__inputs_give_back(const struct imp_input *const *input, int n,
+                           const struct imp_texcoord *at, const imp_spec *in_bar,
+                           struct imp_sink *sink);
+static inline void imp__plain_scatter(const struct imp_input *input, const imp_spec *bar,
+                                      struct imp_sink *sink)
+{
+    if (input->param >= 0)
+        sink->add(sink, input->param, 0, input->count == 3 ? 3 : 1, bar);
+}
+static inline void imp__inputs_scatter(const struct imp_input *const *input, int n,
+                                       const struct imp_texcoord *at,
+                                       const imp_spec *in_bar, struct imp_sink *sink)
+{
+    if (imp_likely(n == 1 && input[0]->plain && !at->carried))
+        imp__plain_scatter(input[0], in_bar, sink);
+    else if (n > 0) imp__inputs_give_back(input, n, at, in_bar, sink);
+}
 /* Lane by lane, no less than the input anywhere in the box, at any wavelength. A texture
  * has a bound. */
 void imp__input_most(const struct imp_input *input, const imp_v3 *lo, const imp_v3 *hi,

@@ -64,9 +64,9 @@ static void lookup_d(const struct imp_emitter *e, const struct imp_active *activ
 }
 
 /* E_k or B_k through an emitter: d[emitter->n_in], without the factor in front. */
-static void emitter_d(const struct imp_emitter *e, const struct imp_active *active,
-                      const struct imp_emission *x, const struct imp_texcoord *at,
-                      imp_spec *d)
+static inline void emitter_d(const struct imp_emitter *e, const struct imp_active *active,
+                             const struct imp_emission *x, const struct imp_texcoord *at,
+                             imp_spec *d)
 {
     imp_spec in[IMP_INPUTS_MAX];
     imp__inputs_eval(e->input, e->n_in, at, in);
@@ -206,17 +206,31 @@ static imp_spec media_tangent(const struct imp_tracer *tracer, const struct imp_
 
 /* ---- Reverse ------------------------------------------------------------------- */
 
-static void emitter_scatter(const struct imp_tracer *tracer, int emitter,
-                            struct imp_emission x, struct imp_texcoord at, imp_spec bar,
-                            struct imp_sink *sink)
+static inline __attribute__((always_inline)) void
+emitter_scatter(const struct imp_tracer *tracer, int emitter, struct imp_emission *x,
+                struct imp_texcoord *at, imp_spec bar, struct imp_sink *sink)
 {
     const struct imp_emitter *e = tracer->scene->emitters[emitter];
     imp_spec d[IMP_INPUTS_MAX];
-    at.shape = e->shape; /* of a walk's light vertex, too */
-    imp__emitter_place(e, &x, &at);
-    emitter_d(e, tracer->active, &x, &at, d);
+    at->shape = e->shape; /* of a walk's light vertex, too */
+    imp__emitter_place(e, x, at);
+    emitter_d(e, tracer->active, x, at, d);
     for (int j = 0; j < e->n_in; j++) d[j] *= bar;
-    imp__inputs_scatter(e->input, e->n_in, &at, d, sink);
+    imp__inputs_scatter(e->input, e->n_in, at, d, sink);
+}
+static void met_scatter(const struct imp_tracer *tracer, const struct imp_vertex *v,
+                        imp_spec bar, struct imp_sink *sink)
+{
+    struct imp_emission x = imp__vertex_met(v);
+    struct imp_texcoord at = imp__vertex_at(v);
+    emitter_scatter(tracer, v->d.met.emitter, &x, &at, bar, sink);
+}
+static void light_scatter(const struct imp_tracer *tracer, const struct imp_vertex *v,
+                          imp_spec bar, struct imp_sink *sink)
+{
+    struct imp_emission x = imp__light_emission(&v->d.light);
+    struct imp_texcoord at = imp__light_at(tracer->scene, v);
+    emitter_scatter(tracer, v->d.light.emitter, &x, &at, bar, sink);
 }
 
 void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_walk *walk,
@@ -239,15 +253,13 @@ void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_wa
         const struct imp_light *light = &v->d.light;
         const bool connected = v->d.connection == IMP_CONNECTED;
         if (met->emitter >= 0 && active->emitter[met->emitter])
-            emitter_scatter(tracer, met->emitter, imp__vertex_met(v), imp__vertex_at(v),
-                            imp_likely(v->d.scatterer != IMP_AT_LIGHT)
-                                ? own * met->weight
-                                : P * v->beyond * v->scale,
-                            sink);
+            met_scatter(tracer, v,
+                        imp_likely(v->d.scatterer != IMP_AT_LIGHT)
+                            ? own * met->weight
+                            : P * v->beyond * v->scale,
+                        sink);
         if (connected && light->emitter >= 0 && active->emitter[light->emitter])
-            emitter_scatter(tracer, light->emitter, imp__light_emission(light),
-                            imp__light_at(tracer->scene, v),
-                            lit * v->light_f * v->light_w, sink);
+            light_scatter(tracer, v, lit * v->light_f * v->light_w, sink);
         if (bsdf_active(tracer, v)) {
             imp_spec bar[IMP_INPUTS_MAX], d[IMP_INPUTS_MAX];
             bool any = false;
@@ -280,14 +292,6 @@ void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_wa
         if (imp__is_zero_used(P, v->carried)) break;
     }
     if (walk->moving) walk->moving->sweep(tracer, walk, adjoint, sink);
-}
-
-void imp__walk_sweep(const struct imp_tracer *tracer, const struct imp_walk *walk,
-                     imp_spec adjoint, struct imp_sink *sink)
-{
-    imp__walk_sweep_values(tracer, walk, imp__walk_values(tracer, walk, adjoint), sink);
-    if (imp_unlikely(tracer->sensor->gain != NULL))
-        imp__gain_sweep(tracer, walk, adjoint, sink);
 }
 
 /* ---- Forward ------------------------------------------------------------------- */

@@ -358,11 +358,8 @@ static inline imp_spec imp__emitter_radiance(const struct imp_scene *scene, int 
 /* L = E + B + w L, from the last vertex to the first; sets `beyond` of every vertex. */
 imp_spec imp__walk_fold(struct imp_walk *walk);
 
-/* Reverse mode: adds (dL/dtheta)^T adjoint to the sink. */
-void imp__walk_sweep(const struct imp_tracer *tracer, const struct imp_walk *walk,
-                     imp_spec adjoint, struct imp_sink *sink);
-/* The same for an adjoint of the walk's values, which are wavelengths where it carries
- * some: the transpose of imp__walk_channels has been taken. */
+/* Reverse mode: adds (dL/dtheta)^T adjoint to the sink; adjoint of the walk's values, which
+ * are wavelengths where it carries some. */
 void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_walk *walk,
                             imp_spec adjoint, struct imp_sink *sink);
 
@@ -399,6 +396,16 @@ static inline imp_spec imp__walk_values(const struct imp_tracer *tracer,
     if (imp_unlikely(tracer->sensor->gain != NULL))
         channels *= imp__walk_gain(tracer, walk);
     return imp__walk_lanes(walk, channels);
+}
+
+/* Reverse mode, for an adjoint of the walk's channels. */
+static inline void imp__walk_sweep(const struct imp_tracer *tracer,
+                                   const struct imp_walk *walk, imp_spec adjoint,
+                                   struct imp_sink *sink)
+{
+    imp__walk_sweep_values(tracer, walk, imp__walk_values(tracer, walk, adjoint), sink);
+    if (imp_unlikely(tracer->sensor->gain != NULL))
+        imp__gain_sweep(tracer, walk, adjoint, sink);
 }
 
 /* Forward mode: dL in the direction x_dot [active->n]. */

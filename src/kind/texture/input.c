@@ -349,9 +349,9 @@ void imp__inputs_look_up(const struct imp_input *const *input, int n,
     }
 }
 
-void imp__inputs_scatter(const struct imp_input *const *input, int n,
-                         const struct imp_texcoord *at, const imp_spec *in_bar,
-                         struct imp_sink *sink)
+void imp__inputs_give_back(const struct imp_input *const *input, int n,
+                           const struct imp_texcoord *at, const imp_spec *in_bar,
+                           struct imp_sink *sink)
 {
     struct site site;
     at = site_of(at, &site);
@@ -359,8 +359,7 @@ void imp__inputs_scatter(const struct imp_input *const *input, int n,
     for (int j = 0; j < n; j++) {
         const struct imp_input *i = input[j];
         if (imp_likely(i->plain && colours)) {
-            if (i->param >= 0)
-                sink->add(sink, i->param, 0, i->count == 3 ? 3 : 1, &in_bar[j]);
+            imp__plain_scatter(i, &in_bar[j], sink);
         } else if (i->luminance) {
             luminance_scatter(input[j - i->luminance], i->weight, at, &in_bar[j], sink);
         } else {
