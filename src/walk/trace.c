@@ -112,7 +112,9 @@ static void sky_meet(struct imp_step *s)
     struct imp_vertex *v = vertex_add(s, 0);
     if (!v) return;
     v->t = INFINITY;
-    s->at = (struct imp_texcoord){.p = imp__decide(s->d), .carried = s->at.carried};
+    s->at.p = imp__decide(s->d);
+    s->at.uv[0] = s->at.uv[1] = 0;
+    s->at.shape = NULL;
     if (s->recorded) {
         v->d.scatterer = IMP_AT_SKY;
         v->d.uv[0] = v->d.uv[1] = 0;
@@ -123,8 +125,9 @@ static void sky_meet(struct imp_step *s)
 }
 
 /* The surface that was met, and its material there. NULL: the walk is dropped. */
-static struct imp_vertex *surface_meet(struct imp_step *s, struct imp_hit *hit,
-                                       struct imp_surface *at, struct imp_frame *frame)
+static inline __attribute__((always_inline)) struct imp_vertex *
+surface_meet(struct imp_step *s, struct imp_hit *hit, struct imp_surface *at,
+             struct imp_frame *frame)
 {
     const struct imp_shape *shape = s->scene->shapes[hit->shape];
     imp__hit_surface(s->scene, hit, &s->o, &s->d, at);
@@ -197,8 +200,9 @@ bool imp__sensor_vertex(struct imp_step *s)
 }
 
 /* Light that leaves the vertex by itself: what its BSDF glows with, and its emitter. */
-static void emission_add(struct imp_step *s, struct imp_vertex *v, double weight,
-                         const struct imp_hit *hit, const struct imp_surface *at)
+static inline __attribute__((always_inline)) void
+emission_add(struct imp_step *s, struct imp_vertex *v, double weight,
+             const struct imp_hit *hit, const struct imp_surface *at)
 {
     if (v->bsdf->flags & IMP_BSDF_EMIT) {
         imp_spec glow;

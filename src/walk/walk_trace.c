@@ -8,20 +8,19 @@
 
 /* Keys use full-film pixels: a crop renders the same samples as the whole picture. The
  * border of wide filters may lie outside the film, hence the offset. */
-static struct imp_walk walk_numbered(const struct imp_tracer *tracer, int x, int y,
-                                     int64_t sample)
+static inline void number(const struct imp_tracer *tracer, int x, int y, int64_t sample,
+                          struct imp_walk *walk)
 {
     const struct imp_film_desc *film = &tracer->sensor->film;
     const uint64_t row = (uint64_t)(y + film->crop_y + 0x8000);
     const uint64_t column = (uint64_t)(x + film->crop_x + 0x8000),
                    pixel = row << 32 | column;
-    struct imp_walk walk = {.key = imp__key(tracer->seed, pixel, (uint64_t)sample)};
-    if (!tracer->points) return walk;
+    walk->key = imp__key(tracer->seed, pixel, (uint64_t)sample);
+    walk->point.points = tracer->points;
+    if (imp_likely(!tracer->points)) return;
     const uint64_t set = (uint64_t)sample / IMP_SET_POINTS | 1ull << 63;
-    walk.point = (struct imp_point){.points = tracer->points,
-                                    .set = imp__key(tracer->seed, pixel, set).state,
-                                    .index = (uint32_t)sample % IMP_SET_POINTS};
-    return walk;
+    walk->point.set = imp__key(tracer->seed, pixel, set).state;
+    walk->point.index = (uint32_t)sample % IMP_SET_POINTS;
 }
 
 static inline void position(const struct imp_tracer *tracer, const struct imp_walk *w,
@@ -35,7 +34,8 @@ static inline void position(const struct imp_tracer *tracer, const struct imp_wa
 void imp__walk_position(const struct imp_tracer *tracer, int x, int y, int64_t sample,
                         double *px, double *py)
 {
-    const struct imp_walk walk = walk_numbered(tracer, x, y, sample);
+    struct imp_walk walk;
+    number(tracer, x, y, sample, &walk);
     position(tracer, &walk, x, y, px, py);
 }
 
@@ -50,7 +50,8 @@ enum imp_drop imp__drop_cause(imp_spec L)
     return largest <= FLT_MAX ? IMP_DROP_NEGATIVE : IMP_DROP_INFINITE;
 }
 
-void imp__walk_close(const struct imp_tracer *tracer, struct imp_walk *walk)
+static inline __attribute__((always_inline)) void
+walk_close(const struct imp_tracer *tracer, struct imp_walk *walk)
 {
     const imp_spec L = imp__walk_fold(walk);
     imp_spec used = L;
@@ -61,12 +62,78 @@ void imp__walk_close(const struct imp_tracer *tracer, struct imp_walk *walk)
     walk->L = imp__walk_channels(tracer, walk, walk->values);
 }
 
+void imp__walk_close(const struct imp_tracer *tracer, struct imp_walk *walk)
+{
+    walk_close(tracer, walk);
+}
+
+/* Field by field, here and below: compilers clear structs of this size by an instruction
+ * that takes 2 % of a walk. */
+static inline void walk_begin(const struct imp_tracer *tracer, int x, int y,
+                              int64_t sample, struct imp_walk *walk)
+{
+    walk->first = walk->last = NULL;
+    walk->n = walk->depth = 0;
+    number(tracer, x, y, sample, walk);
+    position(tracer, walk, x, y, &walk->px, &walk->py);
+    walk->ray.o = walk->ray.d = (imp_v3){0};
+    walk->ray.t_near = walk->ray.t_far = 0;
+    walk->L = walk->values = (imp_spec){0};
+    walk->waves = NULL;
+    walk->wave = 0;
+    walk->valid = walk->absorbed = false;
+    walk->dropped = IMP_DROP_NONE;
+    walk->entry = NULL;
+    walk->moving = NULL;
+}
+
+/* The first ray in flight. What a guide and a mixture know is written where they are
+ * asked, and read behind that only. */
+static inline void step_begin(const struct imp_tracer *tracer, struct imp_arena *arena,
+                              struct imp_walk *walk, imp_spec *scratch,
+                              struct imp_step *s)
+{
+    s->tracer = tracer;
+    s->scene = tracer->scene;
+    s->walk = walk;
+    s->arena = arena;
+    s->recorded = !tracer->value_only || (tracer->active && tracer->active->body);
+    s->scratch = scratch;
+    s->depth = s->straight = 0;
+    s->at.carried = walk->waves ? &walk->waves->carried : NULL;
+    s->at.surface = NULL;
+    s->at.prim = 0;
+    s->segment = imp__segment_first(tracer);
+    s->o = s->from = walk->ray.o;
+    s->d = walk->ray.d;
+    s->t_min = walk->ray.t_near;
+    s->t_max = walk->ray.t_far;
+    s->pdf = 0;
+    s->beta = imp__spec(1);
+    s->eta = 1;
+    for (int c = 0; c < 4; c++) s->zeros[c] = 0;
+    s->lanes = IMP_LANE_MIS_INIT;
+    s->flight.medium = s->flight.here = NULL;
+    s->flight.at = (imp_v3){0};
+    s->flight.t = s->flight.base = s->flight.behind = 0;
+    s->flight.stands = false;
+    s->probing = NULL;
+    s->graded = NULL;
+    s->guided.guide = tracer->guide;
+    s->guided.here = s->guided.left = false;
+    s->guided.reference = 0;
+    s->mixed.same = tracer->mixing != NULL;
+    s->mixed.all = tracer->mixing              ? tracer->mixing
+                   : tracer->integrator->mixes ? tracer->integrator->mixing
+                                               : NULL;
+    s->mixed.here = s->mixed.splits = s->mixed.sphere = false;
+}
+
 void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, int x,
                      int y, int64_t sample, struct imp_walk *walk)
 {
     const struct imp_sensor *sensor = tracer->sensor;
-    *walk = walk_numbered(tracer, x, y, sample);
-    position(tracer, walk, x, y, &walk->px, &walk->py);
+    walk_begin(tracer, x, y, sample, walk);
     const double lens[2] = {imp__start_number(walk->key, walk->point, IMP_DIM_LENS_U),
                             imp__start_number(walk->key, walk->point, IMP_DIM_LENS_V)};
     sensor->ops->ray(sensor, walk->px, walk->py, lens, &walk->ray);
@@ -77,36 +144,18 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
         return;
 
     imp_spec scratch[IMP_INPUTS_MAX];
-    struct imp_step s = {.tracer = tracer,
-                         .scene = tracer->scene,
-                         .walk = walk,
-                         .arena = arena,
-                         .recorded = !tracer->value_only ||
-                                     (tracer->active && tracer->active->body),
-                         .scratch = scratch,
-                         .at.carried = walk->waves ? &walk->waves->carried : NULL,
-                         .segment = imp__segment_first(tracer),
-                         .o = walk->ray.o,
-                         .d = walk->ray.d,
-                         .t_min = walk->ray.t_near,
-                         .t_max = walk->ray.t_far,
-                         .from = walk->ray.o,
-                         .beta = {1, 1, 1, 1},
-                         .eta = 1,
-                         .lanes = IMP_LANE_MIS_INIT,
-                         .guided.guide = tracer->guide};
-    s.mixed.same = tracer->mixing != NULL;
-    s.mixed.all = tracer->mixing              ? tracer->mixing
-                  : tracer->integrator->mixes ? tracer->integrator->mixing
-                                              : NULL;
-    struct imp_probing probing = {.n = 0};
+    struct imp_step s;
+    step_begin(tracer, arena, walk, scratch, &s);
+    struct imp_probing probing;
     if (imp_unlikely(tracer->active && tracer->active->medium) && s.recorded &&
-        !tracer->collisions_stand && tracer->integrator->media)
+        !tracer->collisions_stand && tracer->integrator->media) {
+        probing = (struct imp_probing){.n = 0};
         s.probing = &probing;
+    }
     if (imp_unlikely(sensor->shape != NULL)) imp__walk_on_meter(&s);
     else if (imp_likely(s.segment->begin == NULL) || s.segment->begin(&s))
         imp__walk_on(&s);
     if (imp_unlikely(s.probing != NULL)) imp__probe_follow(&s);
 
-    imp__walk_close(tracer, walk);
+    walk_close(tracer, walk);
 }
