@@ -10,6 +10,7 @@
 #include <importon/kinds.h>
 #include <math.h>
 #include <stdbool.h>
+#include <stdint.h>
 
 #define IMP_PI     3.14159265358979323846
 #define IMP_INV_PI 0.31830988618379067154
@@ -37,6 +38,11 @@ static inline imp_v3 imp__widen(imp_float4 v)
 #endif
 }
 
+static inline imp_v3 imp__abs(imp_v3 v)
+{
+    typedef int64_t bits __attribute__((vector_size(32)));
+    return (imp_v3)((bits)v & INT64_MAX);
+}
 static inline double imp__dot(imp_v3 a, imp_v3 b)
 {
     const imp_v3 p = a * b;

@@ -41,7 +41,7 @@ void imp__analytic_intersect(const struct RTCIntersectFunctionNArguments *args)
     const struct RTCRayHit *r = (const struct RTCRayHit *)args->rayhit;
     struct imp_hit hit;
     if (!args->valid[0]) return;
-    const double tmax = fmin(r->ray.tfar, q->tmax);
+    const double tmax = imp_min((double)r->ray.tfar, q->tmax);
     if (!s->ops->intersect(s, q->o, q->d, q->tmin, tmax, &hit)) return;
     hit.shape = s->index;
     hit.place = 0;
@@ -120,10 +120,8 @@ static void gather_triangle(const struct RTCFilterFunctionNArguments *args)
 /* Rays that are not within Embree's numbers hit nothing. */
 static inline bool ray_valid(const imp_v3 *o, const imp_v3 *d, double tmin, double tmax)
 {
-    const double size =
-        ((fabs((*o)[0]) + fabs((*o)[1])) + (fabs((*o)[2]) + fabs((*d)[0]))) +
-        (fabs((*d)[1]) + fabs((*d)[2]));
-    return size < IMP_REACH_MAX && tmin >= 0 && tmin < tmax;
+    const imp_v3 size = imp__abs(*o) + imp__abs(*d);
+    return (size[0] + size[1]) + size[2] < IMP_REACH_MAX && tmin >= 0 && tmin < tmax;
 }
 
 /* Embree reads (org, tnear) and (dir, time) as 16 bytes each. Written as single floats
@@ -235,7 +233,7 @@ void imp__instance_intersect(const struct RTCIntersectFunctionNArguments *args)
     imp_v3 o, d;
     if (!args->valid[0]) return;
     const struct imp_intersector *x = ray_enter(p, q, &o, &d);
-    const double tmax = fmin(r->ray.tfar, q->tmax);
+    const double tmax = imp_min((double)r->ray.tfar, q->tmax);
     if (!nearest(x, q->time, &o, &d, q->tmin, tmax, &hit)) return;
     hit.place += p->before + 1;
     query_hit(q, &hit, args);

@@ -3,16 +3,11 @@
  * Whether a walk goes on, and where: the draw of a direction, and roulette. */
 #include "step.h"
 
-bool imp__throughput_add(struct imp_step *s, const struct imp_bsdf *b, imp_spec factor)
+bool imp__throughput_part(struct imp_step *s, const struct imp_bsdf *b, imp_spec factor)
 {
     const bool four = s->at.carried != NULL;
-    if (imp_likely(factor[0] != 0 && factor[1] != 0 && factor[2] != 0 &&
-                   (!four || factor[3] != 0))) {
-        s->beta *= factor;
-        return !imp__is_zero_used(s->beta, four);
-    }
     const bool differentiable = imp__wants_derivative(s, b);
-    const double stand_in = fmax(imp__max_used(factor, four), 0.5);
+    const double stand_in = imp_max(imp__max_used(factor, four), 0.5);
     for (int c = 0; c < 3 + four; c++) {
         if (factor[c] != 0) continue;
         if (differentiable && s->zeros[c]++ == 0) factor[c] = stand_in;
@@ -36,7 +31,7 @@ static double photon_survival(const struct imp_step *s, const struct imp_bsdf *b
     if (active && b->index >= 0 && active->bsdf[b->index])
         for (int c = 0; c < 3 + four; c++)
             if (H[c] == 0) brightest = fmax(brightest, 0.5);
-    return fmin(1, brightest * s->tracer->integrator->h);
+    return imp_min(brightest * s->tracer->integrator->h, 1);
 }
 
 /* Survival probability, as decided; false: the walk ends. Zero factors that still
@@ -56,7 +51,7 @@ static bool roulette(struct imp_step *s, const struct imp_bsdf *b, imp_spec fact
         q = photon_survival(s, b, factor);
     } else {
         if (imp__bounces(s) + 1 < integrator->rr_depth && !guided) return true;
-        q = fmin(imp__max_used(s->beta, s->at.carried) * s->eta * s->eta, 0.95);
+        q = imp_min(imp__max_used(s->beta, s->at.carried) * s->eta * s->eta, 0.95);
         if (guided) q = imp__guided_survival(s, q);
     }
     *survive = imp__decide1(q);

@@ -270,7 +270,17 @@ static inline int imp__light_pick(const struct imp_scene *scene, double u, doubl
 /* beta *= f/p, where a lane's first factor that is zero but has a derivative is left out:
  * the walk goes on, because what arrives from beyond is that derivative. A second one
  * ends the lane (docs/estimators.md 9.2). False: all lanes have ended. */
-bool imp__throughput_add(struct imp_step *s, const struct imp_bsdf *b, imp_spec factor);
+bool imp__throughput_part(struct imp_step *s, const struct imp_bsdf *b, imp_spec factor);
+static inline bool imp__throughput_add(struct imp_step *s, const struct imp_bsdf *b,
+                                       imp_spec factor)
+{
+    const bool four = s->at.carried != NULL;
+    if (imp_unlikely(factor[0] == 0 || factor[1] == 0 || factor[2] == 0 ||
+                     (four && factor[3] == 0)))
+        return imp__throughput_part(s, b, factor);
+    s->beta *= factor;
+    return !imp__is_zero_used(s->beta, four);
+}
 /* Decide whether and whither the walk goes on. False: it ends here. */
 bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_surface *at,
                   const struct imp_frame *frame);

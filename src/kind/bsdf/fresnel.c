@@ -88,14 +88,15 @@ double imp__fresnel_diffuse(double e, double *d_e)
  * cancellation in A + t, and whose derivatives exist at eta k = 0. */
 static double conductor(double c, double eta, double k, double *d_eta, double *d_k)
 {
-    const double c2 = c * c, s2 = fmax(0, 1 - c2);
+    const double c2 = c * c, s2 = imp_max(1 - c2, 0);
     const double ek = eta * k, t = eta * eta - k * k - s2;
     const double A = sqrt(t * t + 4 * ek * ek);
     const double q = t < 0 ? sqrt(2 / (A - t)) : 0;
     const double a = t < 0 ? ek * q : sqrt(0.5 * (A + t));
     const double P = A + c2, Q = 2 * a * c, U = A * c2 + s2 * s2, V = Q * s2;
     const double s_sum = P + Q, p_sum = U + V;
-    const double Rs = s_sum > 0 ? fmax(P - Q, 0) / s_sum : 1; /* eta = 1, k = 0: P = Q */
+    const double Rs =
+        s_sum > 0 ? imp_max(P - Q, 0) / s_sum : 1; /* eta = 1, k = 0: P = Q */
     const double ratio = p_sum > 0 ? (U - V) / p_sum : 1;
     if (d_eta) {
         const double dt[2] = {2 * eta, -2 * k};

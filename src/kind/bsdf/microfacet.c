@@ -132,7 +132,7 @@ static double beckmann_slope(double c, double s, double u)
     const double all = 0.5 * (c * erfc(-hi) + s * exp(-hi * hi) * inv_root_pi);
     const double target = u * all;
     const double normal = erf_inverse_start(imp_clamp(2 * u - 1, -1 + 1e-15, 1 - 1e-15));
-    double x = c * normal - (1 - c) * sqrt(-log(fmax(u, 1e-16)));
+    double x = c * normal - (1 - c) * sqrt(-log(imp_max(u, 1e-16)));
     if (!(x > lo && x < hi)) x = 0.5 * (lo + hi);
     for (int i = 0; i < 60; i++) {
         const double g = exp(-x * x) * inv_root_pi, t = c - s * x;
@@ -170,9 +170,9 @@ static imp_v3 ggx_visible(const struct imp__microfacet *f, const imp_v3 *v,
 {
     const imp_v3 w = imp__normalize(imp__v3(f->au * (*v)[0], f->av * (*v)[1], (*v)[2]));
     const double phi = IMP_2PI * u[0], z = (1 - u[1]) * (1 + w[2]) - w[2];
-    const double r = sqrt(fmax(0, (1 - z) * (1 + z)));
+    const double r = sqrt(imp_max((1 - z) * (1 + z), 0));
     const imp_v3 h = imp__v3(r * cos(phi), r * sin(phi), z) + w;
-    return imp__normalize(imp__v3(f->au * h[0], f->av * h[1], fmax(h[2], 0)));
+    return imp__normalize(imp__v3(f->au * h[0], f->av * h[1], imp_max(h[2], 0)));
 }
 
 imp_v3 imp__microfacet_sample(const struct imp__microfacet *f, const imp_v3 *v,

@@ -42,7 +42,7 @@ static void eval(const struct imp_bsdf *b, const imp_spec *in, const struct imp_
     const double D = imp__microfacet_d(&m, &h, NULL);
     const double G =
         imp__microfacet_g1(&m, &d->wi, NULL) * imp__microfacet_g1(&m, &d->wo, NULL);
-    imp__fresnel_conductor(fmin(1, imp__dot(d->wo, h)), &in[ETA], &in[K], f);
+    imp__fresnel_conductor(imp_min(imp__dot(d->wo, h), 1), &in[ETA], &in[K], f);
     *f *= in[TINT] * (D * G / (4 * d->wo[2]));
 }
 static double pdf(const struct imp_bsdf *b, const imp_spec *in, const struct imp_dirs *d)
@@ -61,7 +61,7 @@ static double pdf_eval(const struct imp_bsdf *b, const imp_spec *in,
     const double D = imp__microfacet_d(&m, &h, NULL),
                  Go = imp__microfacet_g1(&m, &d->wo, NULL),
                  G = imp__microfacet_g1(&m, &d->wi, NULL) * Go;
-    imp__fresnel_conductor(fmin(1, imp__dot(d->wo, h)), &in[ETA], &in[K], f);
+    imp__fresnel_conductor(imp_min(imp__dot(d->wo, h), 1), &in[ETA], &in[K], f);
     *f *= in[TINT] * (D * G / (4 * d->wo[2]));
     return imp__microfacet_pdf_of(&m, &d->wo, &h, D, Go) / (4 * imp__dot(d->wo, h));
 }
@@ -92,7 +92,7 @@ static void eval_d(const struct imp_bsdf *b, const imp_spec *in, const struct im
     const double D = imp__microfacet_d(&m, &h, dlog_D);
     const double Gi = imp__microfacet_g1(&m, &d->wi, dGi),
                  Go = imp__microfacet_g1(&m, &d->wo, dGo);
-    imp__fresnel_conductor_d(fmin(1, imp__dot(d->wo, h)), &in[ETA], &in[K], &F, &F_eta,
+    imp__fresnel_conductor_d(imp_min(imp__dot(d->wo, h), 1), &in[ETA], &in[K], &F, &F_eta,
                              &F_k);
 
     const double c = D / (4 * d->wo[2]);

@@ -35,8 +35,8 @@ static inline struct imp__microfacet imp__roughness_at(const struct imp__roughne
                                                        const imp_spec *in)
 {
     const double au = in[r->anisotropic ? 1 : 0][0], av = in[r->anisotropic ? 2 : 0][0];
-    return (struct imp__microfacet){r->type, r->visible, fmax(au, IMP_ALPHA_MIN),
-                                    fmax(av, IMP_ALPHA_MIN)};
+    return (struct imp__microfacet){r->type, r->visible, imp_max(au, IMP_ALPHA_MIN),
+                                    imp_max(av, IMP_ALPHA_MIN)};
 }
 /* Adds df by (au, av), lane by lane, to the derivatives `df` by the three inputs. */
 static inline void imp__roughness_d(const struct imp__roughness *r, const imp_spec *in,

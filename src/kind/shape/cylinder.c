@@ -66,7 +66,7 @@ static bool intersect(const struct imp_shape *s, const imp_v3 *o, const imp_v3 *
     if (!(e >= 0)) return false; /* and rays along the axis, where a is 0 */
     const double q = b + copysign(sqrt(a * e), b), c = p[0] * p[0] + p[1] * p[1] - r2;
     const double ta = q / a, tb = q != 0 ? c / q : ta;
-    const double t[2] = {fmin(ta, tb), fmax(ta, tb)};
+    const double t[2] = {imp_min(ta, tb), imp_max(ta, tb)};
     for (int i = 0; i < 2; i++) {
         const double z = p[2] + t[i] * w[2];
         if (!(t[i] > tmin && t[i] < tmax && z >= 0 && z <= k->length)) continue;

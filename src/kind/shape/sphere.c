@@ -55,7 +55,7 @@ static bool intersect(const struct imp_shape *s, const imp_v3 *o, const imp_v3 *
     if (!(e >= 0)) return false;
     const double q = b + copysign(sqrt(a * e), b), c = imp__dot(oc, oc) - r2;
     const double ta = q / a, tb = q != 0 ? c / q : ta;
-    const double t0 = fmin(ta, tb), t1 = fmax(ta, tb);
+    const double t0 = imp_min(ta, tb), t1 = imp_max(ta, tb);
     const double t = t0 > tmin ? t0 : t1;
     if (!(t > tmin && t < tmax)) return false;
     hit->t = t;
@@ -111,7 +111,7 @@ static double cone_height(const struct sphere *p, double distance)
 {
     if (!(distance > p->radius * (1 + 1e-9))) return -1;
     const double s2 = imp__sqr(p->radius / distance);
-    return s2 / (1 + sqrt(fmax(0, 1 - s2)));
+    return s2 / (1 + sqrt(imp_max(1 - s2, 0)));
 }
 
 static bool sample_toward(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
@@ -134,7 +134,7 @@ static bool sample_toward(const struct imp_shape *s, const imp_v3 *ref, const do
      * / sin(theta_max); alpha = gamma - theta the angle at the centre. */
     const double k = u[0] * height, sin2 = k * (2 - k), cos_theta = 1 - k;
     const double sin_theta = sqrt(sin2), sin2_max = height * (2 - height);
-    const double sin2_gamma = fmin(1, sin2 / sin2_max);
+    const double sin2_gamma = imp_min(sin2 / sin2_max, 1);
     const double sin_gamma = sqrt(sin2_gamma), cos_gamma = sqrt(1 - sin2_gamma);
     const double cos_alpha = cos_gamma * cos_theta + sin_gamma * sin_theta;
     const double sin_alpha = sin_gamma * cos_theta - cos_gamma * sin_theta;
