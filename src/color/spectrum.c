@@ -115,6 +115,20 @@ double imp__spectrum_value(const struct imp_spectrum *s, double nm)
     return imp_likely(!s->times && !s->over) ? v : v * factor(s, nm);
 }
 
+void imp__spectrum_lanes_any(const struct imp_spectrum *s, const double nm[4],
+                             imp_spec *value)
+{
+    const bool alone = !s->times && !s->over;
+    if (s->form == IMP_SPECTRUM_NUMBER && alone)
+        for (int j = 0; j < 4; j++) (*value)[j] = s->value[0];
+    else if (s->form == IMP_SPECTRUM_COLOR && alone)
+        imp__lifted_lanes(&s->lifted, nm, value);
+    else
+        for (int j = 0; j < 4; j++)
+            (*value)[j] =
+                j > 0 && nm[j] == nm[0] ? (*value)[0] : imp__spectrum_value(s, nm[j]);
+}
+
 void imp__spectrum_at(const struct imp_spectrum *s, double nm,
                       struct imp__spectrum_at *out)
 {

@@ -7,6 +7,7 @@
 #define IMP_COLOR_SPECTRUM_H
 
 #include "base/arena.h"
+#include "base/compiler.h"
 #include "upsample.h"
 #include <importon/kinds.h>
 
@@ -18,6 +19,8 @@ enum imp__spectrum_form {
     IMP_SPECTRUM_SELLMEIER, /* n^2 = 1 + sum_k B_k l^2/(l^2 - C_k), l in um: B, then C */
     IMP_SPECTRUM_CAUCHY     /* n = A + B/l^2 + C/l^4, l in um */
 };
+
+typedef int32_t imp_int4 __attribute__((vector_size(16)));
 
 #define IMP_SPECTRUM_NUMBERS 8 /* on which the value at one wavelength depends, at most */
 
@@ -43,16 +46,29 @@ struct imp__spectrum_at {
     int n;
 };
 double imp__spectrum_value(const struct imp_spectrum *s, double nm);
-/* The same, for lookups of walks: equidistant samples without a call. */
-static inline double imp__spectrum_lookup(const struct imp_spectrum *s, double nm)
+/* The same at the wavelengths of a walk, to the bit. */
+void imp__spectrum_lanes_any(const struct imp_spectrum *s, const double nm[4],
+                             imp_spec *value);
+/* Equidistant samples without a call. */
+static inline void imp__spectrum_lanes(const struct imp_spectrum *s, const double nm[4],
+                                       imp_spec *value)
 {
-    if (s->form != IMP_SPECTRUM_POINTS || !(s->per_nm > 0) || s->times || s->over)
-        return imp__spectrum_value(s, nm);
-    if (!(nm >= s->lo && nm <= s->hi)) return 0;
-    const double at = (nm - s->lo) * s->per_nm;
-    const int last = (int)s->n - 2, k = (int)at < last ? (int)at : last;
-    const double *v = s->value + k;
-    return v[0] + (at - k) * (v[1] - v[0]);
+    if (imp_unlikely(s->form != IMP_SPECTRUM_POINTS || !(s->per_nm > 0) || s->times ||
+                     s->over)) {
+        imp__spectrum_lanes_any(s, nm, value);
+        return;
+    }
+    typedef __typeof__((imp_spec){0} >= (imp_spec){0}) mask;
+    const imp_spec l = {nm[0], nm[1], nm[2], nm[3]}, zero = {0};
+    const mask inside = (l >= zero + s->lo) & (l <= zero + s->hi);
+    const imp_spec at = (imp_spec)((mask)((l - s->lo) * s->per_nm) & inside);
+    imp_int4 k = __builtin_convertvector(at, imp_int4);
+    k += k > (int)s->n - 2; /* true is -1: the last point ends the last interval */
+    const double *v = s->value;
+    const imp_spec low = {v[k[0]], v[k[1]], v[k[2]], v[k[3]]},
+                   high = {v[k[0] + 1], v[k[1] + 1], v[k[2] + 1], v[k[3] + 1]};
+    const imp_spec x = low + (at - __builtin_convertvector(k, imp_spec)) * (high - low);
+    *value = (imp_spec)((mask)x & inside);
 }
 void imp__spectrum_at(const struct imp_spectrum *s, double nm,
                       struct imp__spectrum_at *out);

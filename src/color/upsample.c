@@ -216,6 +216,20 @@ double imp__lifted_value(const struct imp__lifted *l, double nm)
     return l->scale * sigmoid((l->c[0] * x + l->c[1]) * x + l->c[2]);
 }
 
+void imp__lifted_lanes(const struct imp__lifted *l, const double nm[4], imp_spec *value)
+{
+    if (l->linear) {
+        for (int j = 0; j < 4; j++) (*value)[j] = imp__lifted_value(l, nm[j]);
+        return;
+    }
+    double out[4];
+    for (int j = 0; j < 4; j++) {
+        const double x = place(nm[j]);
+        out[j] = l->scale * sigmoid((l->c[0] * x + l->c[1]) * x + l->c[2]);
+    }
+    *value = (imp_spec){out[0], out[1], out[2], out[3]};
+}
+
 double imp__lifted_value_d(const struct imp__lifted *l, double nm, double d[3])
 {
     if (l->linear) {

@@ -13,6 +13,7 @@
 #ifndef IMP_COLOR_UPSAMPLE_H
 #define IMP_COLOR_UPSAMPLE_H
 
+#include <importon/kinds.h>
 #include <math.h>
 #include <stdbool.h>
 
@@ -34,6 +35,8 @@ void imp__lift_unbounded(const double rgb[3], struct imp__lifted *out);
 void imp__lift_linear(const double rgb[3], bool bounded, struct imp__lifted *out);
 
 double imp__lifted_value(const struct imp__lifted *l, double nm);
+/* At four wavelengths, to the bit. */
+void imp__lifted_lanes(const struct imp__lifted *l, const double nm[4], imp_spec *value);
 /* d [3] by r, g, b. */
 double imp__lifted_value_d(const struct imp__lifted *l, double nm, double d[3]);
 /* No less than the value at any wavelength. */

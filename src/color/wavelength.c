@@ -8,18 +8,13 @@
 /* Wavelength at u of the distribution, and its density per nm. */
 static double draw(const struct imp_wavelengths *w, double u, double *density)
 {
-    const double range = w->hi - w->lo;
-    if (!w->cdf) {
-        *density = 1 / range;
-        return w->lo + u * range;
-    }
     int lo = 0, hi = w->n_bins; /* cdf[lo] <= u < cdf[hi] */
     while (hi - lo > 1) {
         const int middle = (lo + hi) / 2;
         if (w->cdf[middle] <= u) lo = middle;
         else hi = middle;
     }
-    const double p = w->cdf[lo + 1] - w->cdf[lo], bin = range / w->n_bins;
+    const double p = w->cdf[lo + 1] - w->cdf[lo], bin = (w->hi - w->lo) / w->n_bins;
     *density = p / bin;
     return w->lo + bin * (lo + (u - w->cdf[lo]) / p);
 }
@@ -27,10 +22,10 @@ static double draw(const struct imp_wavelengths *w, double u, double *density)
 void imp__waves_response(const struct imp_waves *waves,
                          const struct imp_spectrum *response, imp_spec *weight)
 {
-    *weight = (imp_spec){0};
-    for (int j = 0; j < waves->carried.n; j++)
-        (*weight)[j] =
-            imp__spectrum_lookup(response, waves->carried.nm[j]) / waves->density[j];
+    imp_spec r;
+    imp__spectrum_lanes(response, waves->carried.nm, &r);
+    *weight = r / waves->density;
+    for (int j = waves->carried.n; j < 4; j++) (*weight)[j] = 0;
 }
 
 void imp__waves_make(const struct imp_wavelengths *w, double u, struct imp_waves *out)
@@ -39,10 +34,12 @@ void imp__waves_make(const struct imp_wavelengths *w, double u, struct imp_waves
     out->carried.n = n;
     out->n_channels = imp_min(w->n_channels, IMP_CHANNELS_MAX);
     out->density = (imp_spec){1, 1, 1, 1};
+    const double range = w->hi - w->lo;
+    double p = 1 / range;
     for (int j = 0; j < n; j++) {
-        double at = u + (double)j / n, p;
+        double at = u + (double)j / n;
         if (at >= 1) at -= 1;
-        out->carried.nm[j] = draw(w, at, &p);
+        out->carried.nm[j] = w->cdf ? draw(w, at, &p) : w->lo + at * range;
         out->density[j] = p * n;
     }
     for (int j = n; j < 4; j++) out->carried.nm[j] = out->carried.nm[0];

@@ -46,14 +46,6 @@ static bool by_wavelength(const struct imp_input *input, const struct imp_texcoo
            !as_number(input, scalar);
 }
 
-static void spectrum_eval(const struct imp_input *input, const struct imp_carried *c,
-                          imp_spec *value)
-{
-    for (int k = 0; k < c->n; k++)
-        (*value)[k] = imp__spectrum_lookup(input->spectrum, c->nm[k]);
-    for (int k = c->n; k < 4; k++) (*value)[k] = (*value)[0];
-}
-
 /* Lane by lane, so that each piece stays in its lane. */
 static void spectrum_scatter(const struct imp_input *input, const struct imp_carried *c,
                              const imp_spec *bar, struct imp_sink *sink)
@@ -184,7 +176,8 @@ static void input_eval(const struct imp_input *input, const struct imp_texcoord 
         input->texture->ops->eval(input->texture, &plain, false, value);
     } else if (input->texture)
         input->texture->ops->eval(input->texture, at, scalar, value);
-    else if (by_wavelength(input, at, scalar)) spectrum_eval(input, at->carried, value);
+    else if (by_wavelength(input, at, scalar))
+        imp__spectrum_lanes(input->spectrum, at->carried->nm, value);
     else if (scalar && (input->count == 3 || by_colour(input, at, scalar)))
         *value = mean(input->value[0], input->value[1], input->value[2]);
     else *value = input->value;
@@ -342,6 +335,8 @@ void imp__inputs_look_up(const struct imp_input *const *input, int n,
     for (int j = 0; j < n; j++) {
         const struct imp_input *i = input[j];
         if (imp_likely(i->plain && colours)) in[j] = i->value;
+        else if (i->plain && i->spectrum)
+            imp__spectrum_lanes(i->spectrum, at->carried->nm, &in[j]);
         else if (i->luminance)
             in[j] = imp__spec(luminance_of(input[j - i->luminance], i->weight, at,
                                            in[j - i->luminance]));
