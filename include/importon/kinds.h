@@ -724,6 +724,8 @@ struct imp_film_desc {
     int n_responses;
     const struct imp_spectrum *response; /* [n_responses] */
     const char *const *response_name;
+    const struct imp_spectrum
+        *srf; /* a factor of the channels of another film; NULL: 1 */
 };
 #define IMP_RESPONSES_MAX 64
 

@@ -76,10 +76,16 @@ uint64_t imp__wavelengths_hash(uint64_t h, const struct imp_wavelengths *w)
         const float f = (float)w->cdf[k];
         h = imp__hash(h, &f, sizeof f);
     }
-    for (int c = 0; c < w->n_channels; c++)
-        for (size_t i = 0; i < w->response[c].n; i++) {
-            const float f = (float)w->response[c].value[i];
+    for (int c = 0; c < w->n_channels; c++) {
+        const struct imp_spectrum *r = &w->response[c];
+        for (size_t i = 0; i < r->n; i++) {
+            const float f = (float)r->value[i];
             h = imp__hash(h, &f, sizeof f);
         }
+        for (double nm = w->lo; r->times && nm <= w->hi; nm += 1) {
+            const float f = (float)imp__spectrum_value(r->times, nm);
+            h = imp__hash(h, &f, sizeof f);
+        }
+    }
     return h;
 }

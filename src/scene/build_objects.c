@@ -3,6 +3,7 @@
  * Builds emitters, shapes and sensors. Each is built once, where it first appears in
  * document order, however many references it has. */
 #include "kind/sensor/sensor_film.h"
+#include "kind/sensor/sensor_response.h"
 #include "kind/texture/mesh_attribute.h"
 #include "scene_build.h"
 
@@ -283,6 +284,7 @@ enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node
     if (s->photometric && imp__is_spectral(scene->mode))
         IMP_TRY(imp_build_error(&b, "units", IMP_E_UNSUPPORTED,
                                 "photometric units are those of rgb and mono modes"));
+    IMP_TRY(imp__srf_read(&b, &s->film));
     IMP_TRY(imp__build_shutter(scene, node, s));
     IMP_TRY(ops->build(&b, self, s)); /* needs the film's shape */
     struct imp_node *medium = medium_child(node);

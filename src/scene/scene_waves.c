@@ -19,19 +19,19 @@ static double light_at(const struct imp_emitter *e, double nm)
 }
 
 /* What the film sees of a wavelength. */
-static double seen_at(const struct imp_wavelengths *w, bool observer, double nm)
+static double seen_at(const struct imp_film_desc *film, double nm)
 {
     double sum = 0;
-    if (observer)
-        for (int c = 0; c < 3; c++) sum += imp__cie_lookup(imp__cie_xyz[c], nm);
-    else
-        for (int c = 0; c < w->n_channels; c++)
-            sum += fabs(imp__spectrum_value(&w->response[c], nm));
-    return sum;
+    for (int c = 0; c < film->n_responses; c++)
+        sum += imp__spectrum_value(&film->response[c], nm);
+    if (film->n_responses > 0) return sum;
+    for (int c = 0; c < 3; c++) sum += imp__cie_lookup(imp__cie_xyz[c], nm);
+    return film->srf ? sum * imp__spectrum_value(film->srf, nm) : sum;
 }
 
-static enum imp_status density_make(struct imp_scene *scene, struct imp_wavelengths *w,
-                                    bool observer)
+static enum imp_status density_make(struct imp_scene *scene,
+                                    const struct imp_film_desc *film,
+                                    struct imp_wavelengths *w)
 {
     const int n = (int)fmin(ceil((w->hi - w->lo) / BIN_NM), BINS_MAX);
     const double bin = (w->hi - w->lo) / n;
@@ -50,13 +50,95 @@ static enum imp_status density_make(struct imp_scene *scene, struct imp_waveleng
     if (!(mean > 0) || !isfinite(mean)) return IMP_OK; /* dark: uniform */
     for (int k = 0; k < n; k++) {
         const double nm = w->lo + bin * (k + 0.5);
-        cdf[k + 1] = cdf[k] + seen_at(w, observer, nm) * (light[k] + LIGHT_FLOOR * mean);
+        cdf[k + 1] = cdf[k] + seen_at(film, nm) * (light[k] + LIGHT_FLOOR * mean);
     }
     sum = cdf[n];
     if (!(sum > 0) || !isfinite(sum)) return IMP_OK;
     for (int k = 0; k <= n; k++) cdf[k] /= sum;
     w->n_bins = n;
     w->cdf = cdf;
+    return IMP_OK;
+}
+
+/* ---- Does light reach the responses? ----------------------------------------------- */
+
+struct range {
+    double lo, hi;
+};
+
+/* Where a spectrum may be other than 0, whatever its numbers become. */
+static struct range range_of(const struct imp_spectrum *s)
+{
+    struct range r = {s->lo, s->hi};
+    if (!s->times) return r;
+    const struct range t = range_of(s->times);
+    return (struct range){fmax(r.lo, t.lo), fmin(r.hi, t.hi)};
+}
+/* The same of a curve, whose numbers stay: without the zeros at its ends. */
+static struct range curve_range(const struct imp_spectrum *s)
+{
+    struct range r = range_of(s);
+    size_t first = 0, last = s->n - 1;
+    if (s->form != IMP_SPECTRUM_POINTS) return r;
+    while (first + 1 < s->n && s->value[first + 1] == 0 && s->value[first] == 0) first++;
+    while (last > 0 && s->value[last - 1] == 0 && s->value[last] == 0) last--;
+    const double step = s->per_nm > 0 ? 1 / s->per_nm : 0;
+    r.lo = fmax(r.lo, step > 0 ? s->nm[0] + step * (double)first : s->nm[first]);
+    r.hi = fmin(r.hi, step > 0 ? s->nm[0] + step * (double)last : s->nm[last]);
+    return r;
+}
+
+/* Does light of these inputs reach the range? *any: one of them is light. */
+static bool inputs_reach(const struct imp_input_desc *desc,
+                         const struct imp_input *const *input, int n, struct range seen,
+                         bool *any)
+{
+    for (int j = 0; j < n; j++) {
+        if (desc[j].role != IMP_EMISSION) continue;
+        *any = true;
+        if (input[j]->texture || !input[j]->spectrum) return true; /* not known */
+        const struct range r = range_of(input[j]->spectrum);
+        if (fmax(r.lo, seen.lo) < fmin(r.hi, seen.hi)) return true;
+    }
+    return false;
+}
+static bool light_reaches(const struct imp_scene *scene, struct range seen)
+{
+    bool any = false, met = false;
+    for (int e = 0; e < scene->n_emitters && !met; e++)
+        met = inputs_reach(scene->emitters[e]->ops->inputs, scene->emitters[e]->input,
+                           scene->emitters[e]->n_in, seen, &any);
+    for (int k = 0; k < scene->n_bsdfs && !met; k++)
+        met = inputs_reach(scene->bsdfs[k]->ops->inputs, scene->bsdfs[k]->input,
+                           scene->bsdfs[k]->n_in, seen, &any);
+    for (int m = 0; m < scene->n_media && !met; m++)
+        met = inputs_reach(scene->media[m]->ops->inputs, scene->media[m]->input,
+                           scene->media[m]->n_in, seen, &any);
+    return met || !any; /* a scene without light is dark, and no error */
+}
+
+/* The node that an object was made from. */
+static const struct imp_node *node_of(const struct imp_node *at, const void *object)
+{
+    const struct imp_node *found = at->object == object ? at : NULL;
+    for (size_t k = 0; k < at->n_children && !found; k++)
+        if (at->children[k].node && !at->children[k].ref)
+            found = node_of(at->children[k].node, object);
+    return found;
+}
+
+static enum imp_status lit_check(const struct imp_scene *scene,
+                                 const struct imp_sensor *s)
+{
+    for (int c = 0; c < s->film.n_responses; c++) {
+        const struct range seen = curve_range(&s->film.response[c]);
+        const struct imp_node *node = node_of(scene->root, s);
+        if (light_reaches(scene, seen)) continue;
+        return imp__node_error(scene->ctx, node ? node : scene->root, IMP_E_SCENE,
+                               "response '%s' sees nothing: no light of the scene has "
+                               "wavelengths between %g and %g nm",
+                               s->film.response_name[c], seen.lo, seen.hi);
+    }
     return IMP_OK;
 }
 
@@ -86,8 +168,20 @@ enum imp_status imp__waves_build(struct imp_scene *scene)
                 w.hi = fmax(w.hi, w.response[c].hi);
             }
         }
+        if (film->srf) {
+            struct imp_spectrum *own = imp__arena_array(&scene->arena, 3, sizeof *own);
+            if (!own) IMP_TRY(imp__build_no_memory(scene));
+            for (int c = 0; c < 3; c++) {
+                own[c] = rgb[c];
+                own[c].times = film->srf;
+            }
+            w.response = own;
+            w.lo = fmax(w.lo, film->srf->lo);
+            w.hi = fmin(w.hi, film->srf->hi);
+        }
+        IMP_TRY(lit_check(scene, scene->sensors[s]));
         all[s * IMP_WAVES_DRAWN + IMP_WAVES_UNIFORM] = w;
-        IMP_TRY(density_make(scene, &w, film->n_responses == 0));
+        IMP_TRY(density_make(scene, film, &w));
         all[s * IMP_WAVES_DRAWN + IMP_WAVES_IMPORTANCE] = w;
     }
     scene->wavelengths = all;

@@ -59,7 +59,51 @@ static imp_scene *scene_make(imp_context *ctx, enum imp_color_mode mode, const c
     return test_scene_text(ctx, text, mode);
 }
 
-static void sphere(imp_context *ctx, enum imp_color_mode mode, const char *film)
+/* A factor of all channels: `srf` of the sensor. */
+static const double srf[N] = {0, .2, 1, .5, .8, 1, .3, 0};
+
+/* Response c without the scene's own product. */
+static double response(const imp_scene *s, int c, bool factor, double nm)
+{
+    struct imp_spectrum r = s->wavelengths[0].response[c];
+    if (factor) r.times = NULL;
+    return imp__spectrum_value(&r, nm) * (factor ? at(srf, nm) : 1);
+}
+
+/* Pictures however their wavelengths are drawn. */
+static void pictures(imp_context *ctx, const imp_scene *s, enum imp_color_mode mode)
+{
+    static const enum imp_wavelength_sampling how[] = {IMP_WAVELENGTHS_STRATIFIED,
+                                                     IMP_WAVELENGTHS_INDEPENDENT,
+                                                     IMP_WAVELENGTHS_IMPORTANCE};
+    double want[3] = {0};
+    for (double nm = 360.05; nm < 830; nm += 0.1)
+        for (int c = 0; c < 3; c++)
+            want[c] += 0.1 * response(s, c, true, nm) * at(e, nm) / (1 - at(rho, nm));
+    for (int k = 0; k < 3; k++) {
+        struct imp_run run = IMP_RUN_INIT;
+        imp_film *film;
+        double mean[3] = {0}, var[3] = {0}, z = 0, relative = 0;
+        run.spp = 256;
+        run.seed = 11;
+        run.wavelengths = how[k];
+        test_must(ctx, imp_render(s, &run, &film));
+        for (int i = 0; i < 64 * 3; i++) {
+            mean[i % 3] += (double)imp_film_mean(film)[i] / 64;
+            var[i % 3] += imp__sqr((double)imp_film_se(film)[i] / 64);
+        }
+        imp_film_destroy(film);
+        for (int c = 0; c < 3; c++) {
+            z = fmax(z, fabs(mean[c] - want[c]) / sqrt(var[c]));
+            relative = fmax(relative, sqrt(var[c]) / fabs(want[c]));
+        }
+        tap_ok(z < 4 && relative < 0.04, "srf, %s, way %d # z %.2f, se %.1e",
+               mode == IMP_SINGLE ? "one wavelength" : "four", k, z, relative);
+    }
+}
+
+static void sphere(imp_context *ctx, enum imp_color_mode mode, const char *film,
+                   bool factor)
 {
     imp_scene *s = scene_make(ctx, mode, film);
     imp_problem *p;
@@ -73,10 +117,9 @@ static void sphere(imp_context *ctx, enum imp_color_mode mode, const char *film)
     test_must(ctx, imp_problem_functional(p, NULL, &run, &value, g, se));
 
     double want[2 * N] = {0}, sum[2] = {0, 0}, size[2] = {0, 0};
-    const struct imp_wavelengths *w = &s->wavelengths[0];
     for (double nm = 360.05; nm < 830; nm += 0.1)
         for (int c = 0; c < 3; c++) { /* the mean of three channels */
-            const double a = 0.1 * imp__spectrum_value(&w->response[c], nm) / 3;
+            const double a = 0.1 * response(s, c, factor, nm) / 3;
             const double q = 1 / (1 - at(rho, nm)), E = at(e, nm);
             R += a * E * q;
             bounces += a * E * q * q * at(rho, nm);
@@ -99,6 +142,7 @@ static void sphere(imp_context *ctx, enum imp_color_mode mode, const char *film)
            relative);
     tap_ok(fabs(sum[1] - R) < 4 * size[1] && fabs(sum[0] - bounces) < 4 * size[0],
            "Euler: %.5f is R %.5f, %.5f bounces %.5f", sum[1], R, sum[0], bounces);
+    if (factor) pictures(ctx, s, mode);
     imp_problem_destroy(p);
     imp_scene_destroy(s);
 }
@@ -228,9 +272,14 @@ int main(void)
                    "value='400:0,500:.01,600:0'/><spectrum name='b' "
                    "value='500:0,600:.01,700:0'/><spectrum name='c' "
                    "value='600:0,700:.01,800:0'/></film>";
-    sphere(ctx, IMP_SPECTRAL, rgb);
-    sphere(ctx, IMP_SINGLE, rgb);
-    sphere(ctx, IMP_SPECTRAL, three);
+    char curve[512], both[1024];
+    list(srf, curve, sizeof curve);
+    snprintf(both, sizeof both, "%s<spectrum name='srf' value='%s'/>", rgb, curve);
+    sphere(ctx, IMP_SPECTRAL, rgb, false);
+    sphere(ctx, IMP_SINGLE, rgb, false);
+    sphere(ctx, IMP_SPECTRAL, three, false);
+    sphere(ctx, IMP_SPECTRAL, both, true);
+    sphere(ctx, IMP_SINGLE, both, true);
     loss(ctx, 1, IMP_SPECTRAL);
     loss(ctx, 2, IMP_SPECTRAL);
     loss(ctx, 5, IMP_SPECTRAL);

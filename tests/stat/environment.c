@@ -521,9 +521,11 @@ static void projections(void)
 
 /* ---- What is refused --------------------------------------------------------------- */
 
+static enum imp_color_mode refused_in = IMP_RGB;
 static void refused(const char *text, const char *inside, const char *message)
 {
     struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
+    o.mode = refused_in;
     imp_scene *s = NULL;
     char xml[2000];
     snprintf(xml, sizeof xml,
@@ -565,8 +567,12 @@ static void refusals(void)
     refused("", MAP(""), "1 x 5 texels");
     picture(file, 5, 1, 1, -1, 0);
     refused("", MAP(""), "5 x 1 texels");
-    picture(file, 4, 3, 1, 3 * 6 + 1, -2);
-    refused("", MAP(""), "texel (2, 1) of the map is negative: -2");
+    picture(file, 4, 3, 1, 3 * 6 + 1, -0.5f);
+    for (int mode = IMP_RGB; mode <= IMP_SINGLE; mode++) {
+        refused_in = (enum imp_color_mode)mode; /* mono has a luminance above 0 there */
+        refused("", MAP(""), "texel (2, 1) of the map is negative: -0.5");
+    }
+    refused_in = IMP_RGB;
     picture(file, 4, 3, 1, 3 * 9, INFINITY);
     refused("", MAP(""), "pixel (1, 2) of the picture is not finite");
     picture(file, 4, 3, 1, 3 * 9, NAN);

@@ -79,14 +79,12 @@ static enum imp_status texels_check(const struct imp_build *b,
         return imp_build_error(b, NULL, IMP_E_SCENE,
                                "a map of %d x %d texels: it needs 2 x 2 or more",
                                t->width, t->height);
-    for (size_t k = 0; k < n * (size_t)t->channels; k++) {
-        const size_t texel = k / (size_t)t->channels, w = (size_t)t->width;
-        if (t->data[k] < 0)
-            return imp_build_error(b, NULL, IMP_E_SCENE,
-                                   "texel (%zu, %zu) of the map is negative: %g",
-                                   texel % w, texel / w, (double)t->data[k]);
-        lit |= t->data[k] > 0;
-    }
+    if (t->negative >= 0)
+        return imp_build_error(b, NULL, IMP_E_SCENE,
+                               "texel (%d, %d) of the map is negative: %g",
+                               (int)(t->negative % t->width),
+                               (int)(t->negative / t->width), t->negative_value);
+    for (size_t k = 0; k < n * (size_t)t->channels; k++) lit |= t->data[k] > 0;
     if (!lit)
         return imp_build_error(b, NULL, IMP_E_SCENE,
                                "all %zu texels of the map are 0: there is no light in it",

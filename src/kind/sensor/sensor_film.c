@@ -3,9 +3,8 @@
  * Reads film and sampler of a sensor: size, crop, filter, samples per pixel. */
 #include "sensor_film.h"
 #include "base/compiler.h"
-#include "color/cie.h"
-#include "color/convert.h"
 #include "kind/filter/filter.h"
+#include "sensor_response.h"
 #include <string.h>
 
 /* Sides and pixels of the full film: beyond any picture, within int and double. */
@@ -78,93 +77,6 @@ out:
     return st;
 }
 
-/* ---- Response curves -------------------------------------------------------------- */
-
-/* What a curve gives for the same radiance at all wavelengths. */
-static double total(const struct imp_spectrum *s)
-{
-    double sum = 0;
-    for (double nm = fmax(s->lo, 1); nm <= fmin(s->hi, 1e5); nm += 1)
-        sum += fabs(imp__spectrum_value(s, nm));
-    return sum;
-}
-
-static enum imp_status response_add(const struct imp_build *b, const char *name,
-                                    const struct imp__color *color,
-                                    struct imp_spectrum *curve, const char **names,
-                                    int *n)
-{
-    if (*n == IMP_RESPONSES_MAX)
-        return imp_build_error(b, NULL, IMP_E_SCENE, "more than %d response curves",
-                               IMP_RESPONSES_MAX);
-    if (color->spectrum) {
-        curve[*n] = *color->spectrum;
-    } else { /* a number: the same from 360 to 830 nm */
-        struct imp_spectrum *s = imp__spectrum_make(b->arena, IMP_SPECTRUM_NUMBER, 1,
-                                                    NULL, &(double){color->value[0]});
-        if (!s) return imp__error(b->ctx, IMP_E_NOMEM, "out of memory");
-        curve[*n] = *s;
-    }
-    if (!isfinite(curve[*n].hi)) {
-        curve[*n].lo = IMP_CIE_FIRST_NM;
-        curve[*n].hi = IMP_CIE_LAST_NM;
-    }
-    if (!(total(&curve[*n]) > 0))
-        return imp_build_error(b, name, IMP_E_SCENE,
-                               "response '%s' sees nothing: it is 0 everywhere", name);
-    for (int k = 0; k < *n; k++)
-        if (strcmp(names[k], name) == 0)
-            return imp_build_error(b, name, IMP_E_SCENE, "two responses named '%s'",
-                                   name);
-    names[(*n)++] = name;
-    return IMP_OK;
-}
-
-/* Every <spectrum name=...> in the film is a channel of that name. */
-static enum imp_status responses_read(const struct imp_build *b, struct imp_film_desc *f)
-{
-    enum imp_status st = IMP_OK;
-    const struct imp__color_ask ask = {
-        .ctx = b->ctx, .arena = b->arena, .mode = b->mode, .role = IMP_UNBOUNDED};
-    struct imp_node *node = b->node;
-    struct imp_spectrum *curve =
-        imp__arena_array(b->arena, IMP_RESPONSES_MAX, sizeof *curve);
-    const char **names = imp__arena_array(b->arena, IMP_RESPONSES_MAX, sizeof *names);
-    int n = 0;
-    if (!imp__is_spectral(b->mode))
-        IMP_TRY(imp_build_error(b, NULL, IMP_E_UNSUPPORTED,
-                                "specfilm exists in spectral modes only "
-                                "(-m spectral, -m single)"));
-    if (!curve || !names) IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "out of memory"));
-    for (size_t i = 0; i < node->n_props; i++) {
-        struct imp_prop *p = &node->props[i];
-        struct imp__color color;
-        if (p->type != IMP_PROP_SPECTRUM && p->type != IMP_PROP_UNIFORM) continue;
-        p->used = true;
-        IMP_TRY(imp__color_convert(&ask, node, p, &color));
-        IMP_TRY(response_add(b, p->name, &color, curve, names, &n));
-    }
-    for (size_t i = 0; i < node->n_children; i++) {
-        struct imp_child *c = &node->children[i];
-        struct imp__color color;
-        if (!c->node || !imp__color_is_object(c->node)) continue;
-        c->used = true;
-        if (!c->name)
-            IMP_TRY(imp__node_error(b->ctx, c->node, IMP_E_SCENE,
-                                    "a response curve needs a name"));
-        IMP_TRY(imp__color_object(&ask, c->node, &color));
-        IMP_TRY(response_add(b, c->name, &color, curve, names, &n));
-    }
-    if (n == 0)
-        IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE,
-                                "has no response curve: <spectrum name=...> gives one"));
-    f->n_responses = n;
-    f->response = curve;
-    f->response_name = names;
-out:
-    return st;
-}
-
 static enum imp_status filter_read(const struct imp_build *b, struct imp_film_desc *f)
 {
     struct imp_node *filter = NULL;
@@ -199,7 +111,7 @@ enum imp_status imp__film_desc_build(const struct imp_build *b, struct imp_film_
                                 "no such film in this version; there are: hdrfilm, "
                                 "specfilm"));
     IMP_TRY(size_read(&own, &f));
-    if (curves) IMP_TRY(responses_read(&own, &f));
+    if (curves) IMP_TRY(imp__responses_read(&own, &f));
     IMP_TRY(format_read(&own, &f));
     IMP_TRY(imp_build_bool(&own, "sample_border", false, &f.sample_border));
     IMP_TRY(imp_build_bool(&own, "banner", true, &ignored));

@@ -24,7 +24,9 @@ struct bitmap {
     enum filter filter;
     bool identity; /* to_uv does nothing */
     struct imp__to_uv to_uv;
-    float *data;                      /* [height][width][channels], and one number more */
+    float *data;      /* [height][width][channels], and one number more */
+    int64_t negative; /* as of struct imp__texels */
+    double negative_value;
     bool spectral;                    /* walks carry wavelengths */
     bool daylight;                    /* ... in which it is times daylight */
     struct imp__lifted_texels lifted; /* of three channels in a spectral mode */
@@ -42,6 +44,7 @@ static enum imp_status data_convert(const struct imp_build *b,
     t->data = imp__arena_take(b->arena, n * (size_t)t->channels + 1, sizeof *t->data);
     if (!t->data) return imp__error(b->ctx, IMP_E_NOMEM, "bitmap does not fit");
     t->data[n * (size_t)t->channels] = 0;
+    t->negative = -1;
     double decoded[256]; /* 8-bit files have no other values, and pow takes its time */
     for (int k = 0; k < 256 && im->srgb; k++) decoded[k] = imp__srgb_decode(k / 255.0);
     for (size_t i = 0; i < n; i++) {
@@ -52,6 +55,10 @@ static enum imp_status data_convert(const struct imp_build *b,
                 return imp_build_error(b, NULL, IMP_E_SCENE,
                                        "pixel (%zu, %zu) of the picture is not finite",
                                        i % (size_t)im->width, i / (size_t)im->width);
+            if (p[c] < 0 && t->negative < 0) {
+                t->negative = (int64_t)i;
+                t->negative_value = p[c];
+            }
             if (im->srgb && !raw) {
                 const double k = rint(p[c] * 255);
                 const bool byte = k >= 0 && k <= 255 && (float)(k / 255) == (float)p[c];
@@ -329,9 +336,14 @@ bool imp__bitmap_texels(const struct imp_texture *tex, struct imp__texels *out)
 {
     const struct bitmap *t = tex->self;
     if (tex->ops != &imp__bitmap) return false;
-    *out = (struct imp__texels){t->width, t->height, t->channels, t->data,
+    *out = (struct imp__texels){t->width,
+                                t->height,
+                                t->channels,
+                                t->data,
                                 t->identity && t->wrap == WRAP_REPEAT &&
-                                    t->filter == FILTER_BILINEAR};
+                                    t->filter == FILTER_BILINEAR,
+                                t->negative,
+                                t->negative_value};
     return true;
 }
 

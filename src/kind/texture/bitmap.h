@@ -10,6 +10,9 @@ struct imp__texels {
     int width, height, channels; /* 1 or 3 */
     const float *data;           /* [height][width][channels], lives as the texture */
     bool plain;                  /* bilinear and repeated, and to_uv does nothing */
+    int64_t negative; /* first texel of which the picture has a negative number,
+                                    whatever became of it (mono); -1: none */
+    double negative_value;
 };
 /* False: t is another texture. */
 bool imp__bitmap_texels(const struct imp_texture *t, struct imp__texels *out);

@@ -46,5 +46,17 @@ film "<spectrum name='a' value='500:1, 400:1'/>"
 film "<spectrum name='a' value='400:1'/>"
 film "<spectrum name='a' value='400:1, 500:1'/><spectrum name='a' value='400:1, 500:1'/>"
 film "<spectrum name='a' filename='none.spd'/>"
+film "<spectrum name='a' value='400:1, 500:-.1, 600:1'/>"
+film "<spectrum name='a' value='-.1'/>"
+film "<spectrum name='a' value='800:0, 850:0, 900:1, 950:0'/>"
+film "<spectrum name='a' value='800:0, 825:0, 900:1, 950:0'/>"
+srf() { scene "" "<spectrum name='srf' value='$1'/>${2:-}"; }
+srf '400:0, 500:1'
+srf '400:0, 500:0'
+srf '400:0, 500:-1'
+srf '840:1, 900:1'
+srf '400:0, 500:1' "<film type='specfilm'><spectrum name='a' value='400:1, 500:1'/></film>"
+importon info - <<<"<scene version='3.0.0'><sensor type='perspective'>
+<spectrum name='srf' value='400:0, 500:1'/></sensor></scene>"
 importon info - <<<"<scene version='3.0.0'><sensor type='perspective'><film type='specfilm'>
 <spectrum name='a' value='400:0, 500:1'/></film></sensor></scene>"
