@@ -499,7 +499,8 @@ typedef struct imp_film imp_film;
     X(IMP_DROP_BENT, 6, "a bent ray came to no end, or to what media cannot hold")       \
     X(IMP_DROP_MOVED, 7, "what moves with an active field has no derivative there")      \
     X(IMP_DROP_MEDIUM, 8, "left a medium that it was not in: a hole in its boundary")    \
-    X(IMP_DROP_MAJORANT, 9, "an extinction is above its bound, or negative")
+    X(IMP_DROP_MAJORANT, 9, "an extinction is above its bound, or negative")             \
+    X(IMP_DROP_EVENTS, 10, "nothing ended the walk in 1048576 tentative collisions")
 #define IMP_DROP_ENUM(name, value, text) name = value,
 enum imp_drop { IMP_DROP_LIST(IMP_DROP_ENUM) };
 

@@ -79,12 +79,19 @@ static bool uniform_fly(struct imp_free_flight *w, const struct imp_medium *m,
 
 /* ---- Media whose extinction varies -------------------------------------------------- */
 
+/* Of a walk, in all; extinctions without measure would go on for hours. */
+#define EVENTS_MAX (1 << 20)
+
 /* A tentative collision at t. Real, by the lane that draws? */
 static bool collide(struct imp_free_flight *w, const struct imp_medium *m, double t,
                     double bound, bool collides)
 {
     struct imp_step *s = w->s;
     imp_spec in[IMP_INPUTS_MAX];
+    if (imp_unlikely(s->flight.events++ == EVENTS_MAX)) {
+        s->walk->dropped = IMP_DROP_EVENTS;
+        return true;
+    }
     const imp_spec sigma =
         imp__extinction_at(m, w->o + w->d * t, s->at.carried, in) * (1 / bound);
     for (int c = 0; c < imp__lane_mis_count(s); c++)
@@ -118,9 +125,12 @@ static bool varying_fly(struct imp_free_flight *w, const struct imp_medium *m,
         path = free_path(w);
         const bool real = collide(w, m, imp__decide1(at), cells->bound, collides);
         if (w->s->walk->dropped) return false;
-        if (!real) continue;
-        *t = at;
-        return true;
+        if (real) {
+            *t = at;
+            return true;
+        }
+        /* No factor that follows changes a transmittance of 0. */
+        if (!collides && imp__is_zero_used(w->f, w->s->at.carried)) return false;
     }
 }
 

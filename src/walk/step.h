@@ -45,6 +45,7 @@ struct imp_flight {
     imp_v3 at;      /* of the last collision */
     double t, base; /* of the collision; length before the last surface that was passed */
     bool stands;    /* the collision, for derivatives */
+    int events;     /* tentative collisions of the walk */
     double behind;  /* the ray begins so far behind the point that it leaves */
 };
 

@@ -2,8 +2,7 @@
  *
  * Media: transmittances in closed form, as hit fractions and with derivatives; colours of
  * very different extinction; cameras inside; bounds that follow; what is refused. */
-#include "imp_scene.h"
-#include "imp_tap.h"
+#include "media_kit.h"
 #include "scene/majorants.h"
 #include "vol_write.h"
 
@@ -29,34 +28,6 @@ static imp_scene *column(const char *medium, const char *more, enum imp_color_mo
              "</scene>",
              medium, more);
     return test_scene_text(ctx, text, mode);
-}
-
-static void mean_of(imp_scene *s, int spp, double mean[3], double se[3])
-{
-    struct imp_run run = IMP_RUN_INIT;
-    struct imp_film_info info = {.size = sizeof info};
-    imp_film *film;
-    run.spp = spp;
-    run.seed = 5;
-    test_must(ctx, imp_render(s, &run, &film));
-    test_must(ctx, imp_film_get_info(film, &info));
-    const int n = info.width * info.height, channels = info.channels;
-    for (int c = 0; c < 3; c++) {
-        mean[c] = se[c] = 0;
-        for (int k = 0; k < n && c < channels; k++) {
-            mean[c] += (double)imp_film_mean(film)[k * channels + c] / n;
-            se[c] += pow((double)imp_film_se(film)[k * channels + c] / n, 2);
-        }
-        se[c] = sqrt(se[c]);
-    }
-    imp_film_destroy(film);
-}
-
-static void near_se(double mean, double se, double ref, double tight, const char *what)
-{
-    const double z = (mean - ref) / se;
-    tap_ok(fabs(z) <= 4 && se <= tight, "%s # %.6f se %.1e ref %.6f z %.2f", what, mean,
-           se, ref, z);
 }
 
 /* A walk is absorbed or passes: the variance is that of a coin. */
@@ -86,8 +57,8 @@ static void transmittances(void)
                  "<string name='filename' value='%s'/></volume></medium>",
                  path);
         imp_scene *s = column(text, "", IMP_MONO);
-        mean_of(s, 8192, mean, se);
-        near_se(mean[0], se[0], cases[k].T, 1e-3, cases[k].what);
+        media_mean(ctx, s, 8192, mean, se);
+        media_near(mean[0], se[0], cases[k].T, 1e-3, cases[k].what);
         tap_near(se[0], sqrt(cases[k].T * (1 - cases[k].T) / (64. * 8192)), .03, 0,
                  "... is a coin");
 
@@ -99,7 +70,8 @@ static void transmittances(void)
         run.spp = 2048;
         test_must(ctx, imp_problem_functional(p, NULL, &run, &v, g, g_se));
         for (int i = 0; i < N; i++) sum += g[i], sum_se += g_se[i] * g_se[i];
-        near_se(sum, 2 * sqrt(sum_se), -cases[k].T, 1e-2, "sum of its derivatives is -T");
+        media_near(sum, 2 * sqrt(sum_se), -cases[k].T, 1e-2,
+                   "sum of its derivatives is -T");
         imp_problem_destroy(p);
         imp_scene_destroy(s);
         remove(path);
@@ -113,17 +85,17 @@ static void colours(void)
     imp_scene *s = column("<medium type='homogeneous' id='fog'><rgb name='sigma_t' "
                           "value='2,6,9'/><float name='albedo' value='0'/></medium>",
                           "", IMP_RGB);
-    mean_of(s, 16384, mean, se);
+    media_mean(ctx, s, 16384, mean, se);
     for (int c = 0; c < 3; c++)
-        near_se(mean[c], se[c], exp(-sigma[c]), .01 * exp(-sigma[c]),
-                "T of extinctions 2, 6, 9 from one set of walks");
+        media_near(mean[c], se[c], exp(-sigma[c]), .01 * exp(-sigma[c]),
+                   "T of extinctions 2, 6, 9 from one set of walks");
     imp_scene_destroy(s);
     s = column("<medium type='homogeneous' id='fog'><rgb name='sigma_t' value='0,1,3'/>"
                "<float name='albedo' value='0'/></medium>",
                "", IMP_RGB);
-    mean_of(s, 4096, mean, se);
-    near_se(mean[0], se[0] + 1e-12, 1, .01, "a colour without extinction");
-    near_se(mean[2], se[2], exp(-3), .01, "beside one with");
+    media_mean(ctx, s, 4096, mean, se);
+    media_near(mean[0], se[0] + 1e-12, 1, .01, "a colour without extinction");
+    media_near(mean[2], se[2], exp(-3), .01, "beside one with");
     imp_scene_destroy(s);
 }
 
@@ -149,12 +121,12 @@ static void inside(void)
         "</scene>",
         fog);
     imp_scene *s = test_scene_text(ctx, text, IMP_MONO);
-    mean_of(s, 4096, mean, se);
-    near_se(mean[0], se[0], exp(-1.5), .01, "a camera in fog");
+    media_mean(ctx, s, 4096, mean, se);
+    media_near(mean[0], se[0], exp(-1.5), .01, "a camera in fog");
     imp_problem *p = test_problem(ctx, s, "fog.sigma_t.value");
     run.spp = 4096;
     test_must(ctx, imp_problem_functional(p, NULL, &run, &v, g, g_se));
-    near_se(g[0], g_se[0], -3 * exp(-1.5), .01, "its derivative");
+    media_near(g[0], g_se[0], -3 * exp(-1.5), .01, "its derivative");
     imp_problem_destroy(p);
     imp_scene_destroy(s);
 }
@@ -206,8 +178,8 @@ static void empty_shadow(void)
     run.seed = 3;
     test_must(ctx, imp_problem_functional(p, NULL, &run, &v, g, g_se));
     for (int i = 0; i < CELLS; i++) sum += g[i], square += g_se[i] * g_se[i];
-    near_se(sum, sqrt(square) + 1e-7, -v.value, .02 * v.value,
-            "the shadow of an empty box has its derivative");
+    media_near(sum, sqrt(square) + 1e-7, -v.value, .02 * v.value,
+               "the shadow of an empty box has its derivative");
     imp_problem_destroy(p);
     imp_scene_destroy(s);
     remove(path);
@@ -251,20 +223,20 @@ static void panes(void)
             struct imp_run run = IMP_RUN_INIT;
             struct imp_estimate v;
             imp_scene *s = under_pane("<bsdf type='null'/>", lamp);
-            mean_of(s, 4096, open, open_se);
+            media_mean(ctx, s, 4096, open, open_se);
             imp_scene_destroy(s);
             s = under_pane(cases[k].pane, lamp);
-            mean_of(s, 4096, mean, se);
+            media_mean(ctx, s, 4096, mean, se);
             /* Light from all over the lamp meets the sheet at an angle. */
             const double part = cases[k].part, slack = broad && k == 2 ? .003 : 1e-6;
-            near_se(mean[0], hypot(se[0], part * open_se[0]) + slack * open[0],
-                    part * open[0], .006 * open[0], cases[k].what);
+            media_near(mean[0], hypot(se[0], part * open_se[0]) + slack * open[0],
+                       part * open[0], .006 * open[0], cases[k].what);
             imp_problem *p = test_problem(ctx, s, cases[k].param);
             run.spp = 4096;
             run.seed = 9;
             test_must(ctx, imp_problem_functional(p, NULL, &run, &v, g, g_se));
-            near_se(g[0], hypot(g_se[0], open_se[0]) + slack * open[0],
-                    cases[k].slope * open[0], .02 * open[0], cases[k].param);
+            media_near(g[0], hypot(g_se[0], open_se[0]) + slack * open[0],
+                       cases[k].slope * open[0], .02 * open[0], cases[k].param);
             imp_problem_destroy(p);
             imp_scene_destroy(s);
         }
@@ -284,7 +256,7 @@ static void bounds_do_not_matter(void)
     imp_scene *s = under_pane("<bsdf type='null'/>",
                               "<emitter type='point'><point name='position' x='0' y='0' "
                               "z='3'/></emitter>");
-    mean_of(s, 2, open, open_se);
+    media_mean(ctx, s, 2, open, open_se);
     imp_scene_destroy(s);
     vol_write(path, 1, 1, 1, 1, one);
     snprintf(text, sizeof text,
@@ -310,9 +282,9 @@ static void bounds_do_not_matter(void)
                    "a bound that is too low is told # %s", imp_last_error(ctx));
             imp_film_destroy(film);
         } else {
-            mean_of(s, SPP, mean, se);
-            near_se(mean[0] / open[0], se[0] / open[0], exp(-1), .003,
-                    "T by ratio tracking, whatever the bound");
+            media_mean(ctx, s, SPP, mean, se);
+            media_near(mean[0] / open[0], se[0] / open[0], exp(-1), .003,
+                       "T by ratio tracking, whatever the bound");
             tap_near(se[0] * se[0] * 16 * SPP / (open[0] * open[0]), cases[k].variance,
                      .06, 0, "... and its variance");
         }
@@ -339,8 +311,8 @@ static void bounds_follow(void)
     imp_scene *s = column(text, "", IMP_MONO);
     test_must(ctx, imp_scene_find_param(s, "grid.data", &param));
     test_must(ctx, imp_scene_set_values(s, param, 8, more));
-    mean_of(s, 4096, mean, se);
-    near_se(mean[0], se[0], exp(-14. / 8), .01, "bounds follow what is set");
+    media_mean(ctx, s, 4096, mean, se);
+    media_near(mean[0], se[0], exp(-14. / 8), .01, "bounds follow what is set");
     imp_scene_destroy(s);
     remove(path);
 }
