@@ -535,6 +535,8 @@ struct imp_shape {
     const struct imp_body *body; /* of graded index, behind ng; NULL: none */
     /* Behind ng and before it; both NULL at a surface that bounds no medium. */
     const struct imp_medium *interior, *exterior;
+    int priority; /* where shapes overlap, the highest is there (scene/priorities.h); 0: it
+                     has none */
     const struct imp_sensor *sensor; /* that it is the surface of; NULL: none */
     /* Textures by name that mesh_attribute looks up on this shape. */
     int n_attributes;

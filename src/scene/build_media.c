@@ -227,6 +227,12 @@ enum imp_status imp__media_check(struct imp_scene *scene)
                               s->name);
     }
     for (int i = 0; i < scene->n_sensors; i++) used |= scene->sensors[i]->medium != NULL;
+    if (scene->priorities && !knows)
+        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                          "shapes have a priority, which the integrator, %s, does not "
+                          "know: volpath and photons do",
+                          scene->integrator ? scene->integrator->ops->name
+                                            : "path by default");
     if (used && !knows)
         imp__warn(scene->ctx,
                   "the scene has media, and its integrator, %s, does not see them: "

@@ -5,6 +5,7 @@
 #include "kind/sensor/sensor_film.h"
 #include "kind/sensor/sensor_response.h"
 #include "kind/texture/mesh_attribute.h"
+#include "priorities.h"
 #include "scene_build.h"
 
 /* The medium that a sensor or a light says it is in; NULL: none. */
@@ -130,7 +131,9 @@ enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
     enum imp_status st = IMP_OK;
     imp_context *ctx = scene->ctx;
     struct imp_shape *s;
+    int64_t priority;
     IMP_TRY(imp__proxies_take(scene, node, name));
+    IMP_TRY(imp__props_int(ctx, node, "priority", 0, 0, IMP_PRIORITY_MAX, &priority));
 
     struct imp_node *bsdf = NULL, *emitter = NULL, *sensor = NULL;
     struct imp_node *side[2] = {NULL, NULL};
@@ -167,6 +170,7 @@ enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
     IMP_TRY(imp__build_shape_bare(scene, node, name, &s));
     IMP_TRY(imp__build_shape_attributes(scene, node, s));
     s->index = scene->n_shapes;
+    s->priority = (int)priority;
     node->object = s;
 
     if (!bsdf && !emitter) { /* as if <bsdf type="diffuse"/> had been written */

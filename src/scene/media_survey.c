@@ -6,13 +6,15 @@
  * seldom what is meant. */
 #include "instances.h"
 #include "media_around.h"
+#include "priorities.h"
 #include "scene_build.h"
 
 #define HITS_MAX 256 /* boundaries that a ray is followed through */
 
 static const char *name_of(const struct imp_medium *m) { return m ? m->name : "none"; }
 
-/* The next surface that bounds media, from *o along d, opaque ones passed. */
+/* The next surface that bounds media, from *o along d, opaque ones passed; those with a
+ * priority say nothing of what is around them. */
 static const struct imp_shape *boundary(const struct imp_scene *scene, imp_v3 *o,
                                         imp_v3 d, bool *outwards)
 {
@@ -24,7 +26,7 @@ static const struct imp_shape *boundary(const struct imp_scene *scene, imp_v3 *o
         imp__hit_surface(scene, &hit, o, &d, &at);
         *o = imp__offset(at.p, at.ng, d);
         *outwards = imp__dot(at.ng, d) > 0;
-        if (s->interior || s->exterior) return s;
+        if ((s->interior || s->exterior) && s->priority == 0) return s;
     }
     return NULL;
 }
@@ -37,6 +39,26 @@ const struct imp_medium *imp__medium_around(const struct imp_scene *scene, imp_v
     return !s ? otherwise : outwards ? s->interior : s->exterior;
 }
 
+/* In shapes with priorities a camera knows its medium by them. */
+static enum imp_status nest_check(const struct imp_scene *scene,
+                                  const struct imp_sensor *sensor,
+                                  const struct imp_sensor_ray *ray)
+{
+    struct imp_nest nest;
+    if (!imp__nest_at(scene, 0, ray->o, ray->d, &nest))
+        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                          "sensor '%s' is in more than %d shapes with a priority",
+                          sensor->name, IMP_NEST_MAX);
+    const struct imp_shape *top = imp__nest_top(scene, &nest);
+    if (top && sensor->medium && top->interior == sensor->medium)
+        return imp__error(scene->ctx, IMP_E_SCENE,
+                          "sensor '%s' is inside shape '%s', whose priority says which "
+                          "medium is there; the sensor names what lies around the shapes "
+                          "with priorities, or none",
+                          sensor->name, top->name);
+    return IMP_OK;
+}
+
 static enum imp_status camera_check(const struct imp_scene *scene,
                                     const struct imp_sensor *sensor)
 {
@@ -45,6 +67,10 @@ static enum imp_status camera_check(const struct imp_scene *scene,
     bool outwards;
     sensor->ops->ray(sensor, 0.5 * sensor->film.width, 0.5 * sensor->film.height, lens,
                      &ray);
+    if (scene->priorities) {
+        const enum imp_status st = nest_check(scene, sensor, &ray);
+        if (st != IMP_OK) return st;
+    }
     const struct imp_shape *s = boundary(scene, &ray.o, ray.d, &outwards);
     if (!s) return IMP_OK;
     const struct imp_medium *around = outwards ? s->interior : s->exterior;
@@ -94,12 +120,13 @@ static bool line_check(struct imp_scene *scene, const struct imp_shape *shape, i
 enum imp_status imp__media_survey(struct imp_scene *scene)
 {
     enum imp_status st = IMP_OK;
-    if (scene->n_media == 0) return IMP_OK;
+    if (scene->n_media == 0 && !scene->priorities) return IMP_OK;
     for (int i = 0; i < scene->n_sensors; i++)
         IMP_TRY(camera_check(scene, scene->sensors[i]));
     for (int i = 0; i < scene->n_shapes && !scene->media_open; i++) {
         const struct imp_shape *s = scene->shapes[i];
-        for (int a = 0; a < 3 && (s->interior || s->exterior) && !scene->media_open; a++)
+        const bool tells = (s->interior || s->exterior) && s->priority == 0;
+        for (int a = 0; a < 3 && tells && !scene->media_open; a++)
             scene->media_open = !line_check(scene, s, a);
     }
 out:

@@ -5,6 +5,7 @@
  * top by its name. */
 #include "scene_build.h"
 #include "instances.h"
+#include "priorities.h"
 
 /* Top-level objects without id: <tag><n>, counted per tag. */
 struct tag_counts {
@@ -150,6 +151,7 @@ enum imp_status imp__scene_build(struct imp_scene *scene,
     if (scene->integrator) IMP_TRY(imp__integrator_ready(scene, scene->integrator));
     IMP_TRY(imp__waves_build(scene));
     IMP_TRY(imp__bodies_check(scene));
+    IMP_TRY(imp__priorities_build(scene));
     IMP_TRY(imp__media_check(scene));
     imp__theta_finish(scene);
     IMP_TRY(imp__intersector_create(scene));

@@ -48,6 +48,7 @@ void imp__probe_offer(struct imp_step *s, const struct imp_medium *m,
     const imp_spec pass = f * imp__lane_mis_decide(p->state, f);
     p->state->beta *= pass;
     p->state->flight.here = p->state->flight.medium = m;
+    p->state->flight.nest_here = s->flight.nest;
     p->weight = weight;
     p->from = from;
     *p->probe = (struct imp_probe){

@@ -40,7 +40,8 @@ struct imp_segment imp__straight = {&straight, NULL};
 static bool tracks(const struct imp_tracer *tracer)
 {
     const struct imp_walk_integrator *i = tracer->integrator;
-    return i->media && (tracer->scene->n_media > 0 || !(i->photons || i->from_lights));
+    return i->media && (tracer->scene->n_media > 0 || tracer->scene->priorities ||
+                        !(i->photons || i->from_lights));
 }
 
 const struct imp_segment_ops *imp__segment_first(const struct imp_tracer *tracer)

@@ -9,6 +9,7 @@
 
 #include "dims.h"
 #include "lane_mis.h"
+#include "scene/priorities.h"
 #include "segment.h"
 #include "shaped.h"
 
@@ -46,7 +47,10 @@ struct imp_flight {
     double t, base; /* of the collision; length before the last surface that was passed */
     bool stands;    /* the collision, for derivatives */
     int events;     /* tentative collisions of the walk */
-    double behind;  /* the ray begins so far behind the point that it leaves */
+    /* Where shapes have priorities: around the ray in flight, and around the vertex at work
+     * without the surface that it lies on. */
+    struct imp_nest nest, nest_here;
+    double behind; /* the ray begins so far behind the point that it leaves */
 };
 
 struct imp_step {
@@ -159,6 +163,11 @@ bool imp__scatter_split(struct imp_step *s, struct imp_vertex *v,
 /* Why a walk of this radiance is dropped: no light can have it, or no picture can hold
  * it. */
 enum imp_drop imp__drop_cause(imp_spec L);
+
+/* ---- tracking.c ---- */
+/* The shapes with a priority around p, where a walk begins, by a ray along d. False: it is
+ * dropped. */
+bool imp__nest_begin(struct imp_step *s, imp_v3 p, imp_v3 d);
 
 /* ---- segment.c ---- */
 /* The nearest hit of the ray in flight. With hide_emitters, a camera ray skips area

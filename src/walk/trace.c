@@ -131,7 +131,10 @@ surface_meet(struct imp_step *s, struct imp_hit *hit, struct imp_surface *at,
 {
     const struct imp_shape *shape = s->scene->shapes[hit->shape];
     imp__hit_surface(s->scene, hit, &s->o, &s->d, at);
-    const struct imp_bsdf *bsdf = imp__shape_bsdf(s->scene, shape);
+    const struct imp_bsdf *bsdf =
+        imp_unlikely(s->scene->priorities != NULL)
+            ? imp__nest_bsdf(s->scene, &s->flight.nest_here, shape)
+            : imp__shape_bsdf(s->scene, shape);
     struct imp_vertex *v = vertex_add(s, bsdf->n_in);
     if (!v) return NULL;
     v->shape = shape;

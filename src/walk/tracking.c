@@ -15,6 +15,25 @@ static const struct imp_medium *beyond(const struct imp_shape *shape, imp_v3 ng,
     return imp__dot(ng, d) < 0 ? shape->interior : shape->exterior;
 }
 
+/* Go from a surface to the side that d points to, in a nest without the surface. False:
+ * the walk is dropped. */
+static bool side_take(struct imp_step *s, const struct imp_shape *shape, imp_v3 ng,
+                      imp_v3 d, struct imp_nest *nest, const struct imp_medium **medium)
+{
+    if (imp_likely(s->scene->priorities == NULL)) {
+        *medium = beyond(shape, ng, d, *medium);
+        return true;
+    }
+    if (!shape || shape->priority == 0) {
+        nest->around = beyond(shape, ng, d, nest->around);
+    } else if (imp__dot(ng, d) < 0 && !imp__nest_enter(nest, shape->index)) {
+        s->walk->dropped = IMP_DROP_MEDIUM;
+        return false;
+    }
+    *medium = imp__nest_medium(s->scene, nest);
+    return true;
+}
+
 /* Rays from a point of a medium begin a little behind it: a boundary as near as Embree's
  * rounding is met then, and met from its wrong side it is not there. */
 static double behind(imp_v3 p)
@@ -30,14 +49,46 @@ static bool is_passed(const struct imp_scene *scene, const struct imp_shape *sha
 
 /* Is the ray in the medium that should be behind it here? */
 static bool consistent(const struct imp_step *s, const struct imp_shape *shape, imp_v3 ng,
-                       imp_v3 d, const struct imp_medium *m)
+                       imp_v3 d, const struct imp_nest *nest, const struct imp_medium *m)
 {
+    if (imp_unlikely(shape->priority > 0))
+        return (imp__dot(ng, d) < 0) != imp__nest_has(nest, shape->index);
+    if (imp_unlikely(s->scene->priorities != NULL)) m = nest->around;
     return s->scene->media_open || beyond(shape, ng, -d, m) == m;
+}
+
+/* A ray arrives at a surface with a priority, which is taken out of its nest: is another
+ * shape there? */
+static bool hidden(const struct imp_step *s, const struct imp_shape *shape, imp_v3 ng,
+                   imp_v3 d, struct imp_nest *nest)
+{
+    if (imp__dot(ng, d) > 0) imp__nest_leave(nest, shape->index);
+    return !imp__nest_sees(s->scene, nest, shape);
+}
+
+/* Entered while it is in the nest, the shape stands there more than once. */
+static bool is_copy(const struct imp_shape *shape, imp_v3 ng, imp_v3 d)
+{
+    return shape->priority > 0 && imp__dot(ng, d) < 0;
+}
+
+bool imp__nest_begin(struct imp_step *s, imp_v3 p, imp_v3 d)
+{
+    struct imp_nest nest = {.around = s->tracer->sensor->medium};
+    if (!imp__nest_at(s->scene, s->walk->time, p, d, &nest)) {
+        s->walk->dropped = IMP_DROP_MEDIUM;
+        return false;
+    }
+    s->flight.nest = s->flight.nest_here = nest;
+    s->flight.medium = s->flight.here = imp__nest_medium(s->scene, &nest);
+    return true;
 }
 
 static bool begin(struct imp_step *s)
 {
     s->flight.medium = s->flight.here = s->tracer->sensor->medium;
+    if (imp_unlikely(s->scene->priorities != NULL) && !imp__nest_begin(s, s->o, s->d))
+        return false;
     return imp__sensor_vertex(s);
 }
 
@@ -45,6 +96,7 @@ static enum imp_meeting collision(struct imp_step *s, const struct imp_medium *m
                                   imp_v3 p, double t)
 {
     s->flight.here = m;
+    s->flight.nest_here = s->flight.nest;
     s->flight.at = p;
     s->flight.t = t;
     return IMP_MEETS_MEDIUM;
@@ -85,23 +137,27 @@ static enum imp_meeting meet(struct imp_step *s, struct imp_hit *hit)
         }
         if (s->walk->dropped) return IMP_MEETS_DROP;
         s->flight.here = m;
+        if (imp_unlikely(scene->priorities != NULL)) s->flight.nest_here = s->flight.nest;
         if (!found) break;
 
         /* A surface: does the ray end there, and what is behind it? */
         const struct imp_shape *shape = scene->shapes[hit->shape];
-        const bool passes = is_passed(scene, shape) || (hide && shape->emitter >= 0);
-        if (!passes && !shape->interior && !shape->exterior) {
+        bool passes = is_passed(scene, shape) || (hide && shape->emitter >= 0);
+        if (!passes && !shape->interior && !shape->exterior && shape->priority == 0) {
             met = IMP_MEETS_SURFACE;
             break;
         }
         struct imp_surface at;
         imp__hit_surface(scene, hit, &s->o, &d, &at);
-        const bool wrong = !consistent(s, shape, at.ng, d, m);
+        struct imp_nest *nest = &s->flight.nest_here;
+        const bool wrong = !consistent(s, shape, at.ng, d, nest, m);
         const bool left = wrong && hit->t <= 2 * s->flight.behind && !passed;
-        if (wrong && !left) {
+        if (wrong && !left && !is_copy(shape, at.ng, d)) {
             s->walk->dropped = IMP_DROP_MEDIUM;
             return IMP_MEETS_DROP;
         }
+        if (imp_unlikely(shape->priority > 0) && !left)
+            passes |= hidden(s, shape, at.ng, d, nest);
         if (!passes && !left) {
             met = IMP_MEETS_SURFACE;
             break;
@@ -110,7 +166,9 @@ static enum imp_meeting meet(struct imp_step *s, struct imp_hit *hit)
             s->walk->dropped = IMP_DROP_LONG;
             return IMP_MEETS_DROP;
         }
-        if (!left) s->flight.medium = beyond(shape, at.ng, d, m);
+        if (!left && !side_take(s, shape, at.ng, d, nest, &s->flight.medium))
+            return IMP_MEETS_DROP;
+        if (imp_unlikely(scene->priorities != NULL)) s->flight.nest = *nest;
         s->o = imp__offset(at.p, at.ng, d);
         base = imp__dot(s->o - start, d);
         t_max -= hit->t;
@@ -131,7 +189,9 @@ static bool arrive(struct imp_step *s, struct imp_vertex *v, struct imp_hit *hit
 static void leave(struct imp_step *s, const struct imp_vertex *v,
                   const struct imp_surface *at)
 {
-    s->flight.medium = beyond(v->shape, at->ng, s->d, s->flight.here);
+    s->flight.medium = s->flight.here;
+    s->flight.nest = s->flight.nest_here;
+    side_take(s, v->shape, at->ng, s->d, &s->flight.nest, &s->flight.medium);
     s->flight.behind = v->shape ? 0 : behind(at->p);
     s->o -= s->d * s->flight.behind;
 }
@@ -179,24 +239,38 @@ static bool sees(struct imp_step *s, struct imp_vertex *v, const struct imp_surf
     const double back = v->shape ? 0 : behind(from->p);
     const imp_v3 start = shadow->o - d * back;
     const double end = shadow->reach * length + back;
-    const struct imp_medium *m = beyond(v->shape, from->ng, d, s->flight.here);
+    const struct imp_medium *m = s->flight.here;
+    struct imp_nest nest = s->flight.nest_here;
     struct imp_free_flight w = imp__flight_from(s, start, d, IMP_FLIGHT_TO_LIGHT);
     imp_v3 o = start;
     double t, base = 0;
+    if (!side_take(s, v->shape, from->ng, d, &nest, &m)) return false;
     for (int passed = 0; passed <= IMP_WALK_MAX; passed++) {
         struct imp_hit hit;
         const bool found = imp__intersect_at(scene, time, &o, &d, 0, end - base, &hit);
         const struct imp_shape *shape = found ? scene->shapes[hit.shape] : NULL;
-        const bool hole = found && is_passed(scene, shape);
-        if (found && !hole && !imp__shape_bsdf(scene, shape)->straight) return false;
+        const bool ranks = found && shape->priority > 0;
+        struct imp_surface at;
+        bool hole = found && is_passed(scene, shape), left = false;
+        if (found && !hole && !ranks && !imp__shape_bsdf(scene, shape)->straight)
+            return false;
+        if (found) imp__hit_surface(scene, &hit, &o, &d, &at);
+        if (imp_unlikely(ranks)) {
+            const bool wrong = !consistent(s, shape, at.ng, d, &nest, m);
+            left = wrong && hit.t <= 2 * back && !passed;
+            if (wrong && !left && !is_copy(shape, at.ng, d)) {
+                s->walk->dropped = IMP_DROP_MEDIUM;
+                return false;
+            }
+            hole |= left || hidden(s, shape, at.ng, d, &nest);
+            if (!hole && !imp__shape_bsdf(scene, shape)->straight) return false;
+        }
         if (m)
             imp__fly(&w, m, passed ? base : back, found ? base + hit.t : end, false, &t);
         if (s->walk->dropped) return false;
         if (!found) return arrived(&w, v, T);
-        struct imp_surface at;
-        imp__hit_surface(scene, &hit, &o, &d, &at);
         if (!hole && !go_through(&w, shape, &at)) return false;
-        m = beyond(shape, at.ng, d, m);
+        if (!left && !side_take(s, shape, at.ng, d, &nest, &m)) return false;
         o = imp__offset(at.p, at.ng, d);
         base = imp__dot(o - start, d);
         if (!(base < end)) /* the last boundary lies within rounding of the light */

@@ -248,7 +248,9 @@ static inline const struct imp_guide *imp__guide_of(const struct imp_scene *scen
                                                     const struct imp_walk_integrator *i,
                                                     const struct imp_guide *guide)
 {
-    return i->guided && scene->n_bodies == 0 && scene->n_media == 0 ? guide : NULL;
+    return i->guided && scene->n_bodies == 0 && scene->n_media == 0 && !scene->priorities
+               ? guide
+               : NULL;
 }
 
 /* The points of a run through a sensor: independent, or Sobol's. */

@@ -101,7 +101,7 @@ static enum imp_status mixture_ready(struct imp_scene *scene,
     const enum imp_status st = imp__mixing_settle(scene, w->mixing);
     w->mixes = scene->materials_mix || imp__mixing_mixes(w->mixing);
     if (st == IMP_OK && w->split > 0 &&
-        (scene->n_bodies > 0 || (w->media && scene->n_media > 0)))
+        (scene->n_bodies > 0 || (w->media && (scene->n_media > 0 || scene->priorities))))
         return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
                           "integrator %s: walks through media do not split; set 'split' "
                           "to 0",
@@ -316,7 +316,7 @@ static enum imp_status ptracer_ready(struct imp_scene *scene,
                                      const struct imp_integrator *i)
 {
     struct imp_walk_integrator *w = i->self;
-    w->media = w->other_end->media = scene->n_media > 0;
+    w->media = w->other_end->media = scene->n_media > 0 || scene->priorities;
     return IMP_OK;
 }
 

@@ -10,6 +10,8 @@
 
 enum imp_stam_alpha { IMP_ALPHA_DETACHED, IMP_ALPHA_ATTACHED, IMP_ALPHA_PAPER };
 
+enum imp_transmittance { IMP_RATIO_TRACKING, IMP_RESIDUAL_TRACKING, IMP_DELTA_TRACKING };
+
 /* What walks are made by. */
 struct imp_walk_integrator {
     int max_depth; /* segments; -1: unlimited */
@@ -20,9 +22,10 @@ struct imp_walk_integrator {
     bool directions;  /* walks go on behind the first vertex; false: lights alone */
     bool guided;      /* a guide's densities are made for these walks */
     bool media;       /* media scatter, and surfaces of type null are no vertices */
-    bool absorbs;     /* emission counts where the walk is absorbed only (stam.c), which
+    enum imp_transmittance transmittance; /* on the way to light samples (tracking.h) */
+    bool absorbs;   /* emission counts where the walk is absorbed only (stam.c), which
                         takes the place of Russian roulette */
-    bool first_hit;   /* alpha is 1 where the first ray meets a surface, and hide_emitters
+    bool first_hit; /* alpha is 1 where the first ray meets a surface, and hide_emitters
                         hides lights from that ray alone (docs/scene-format.md 11) */
     enum imp_stam_alpha alpha_gradient;
     bool photons; /* survival min(1, H h) at every vertex, with H the directional albedo

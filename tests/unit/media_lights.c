@@ -228,6 +228,13 @@ static void scattering(void)
                   "value='1.5'/><float name='albedo' value='0'/></medium>"
                   "<ref id='fog' name='exterior'/></shape>" EYE(IN_FOG)),
             scattered_nested, 8192, "fog.*", "of a point in a ball of other fog");
+    compare(SCENE(2, FOG BLACK POINT
+                  "<shape type='sphere'><integer name='priority' value='1'/><point "
+                  "name='center' x='1' y='0' z='0'/><float name='radius' value='0.5'/>"
+                  "<bsdf type='null'/><medium type='homogeneous' name='interior'><float "
+                  "name='sigma_t' value='1.5'/><float name='albedo' value='0'/></medium>"
+                  "</shape>" EYE(IN_FOG)),
+            scattered_nested, 8192, "fog.*", "... that has a priority");
 }
 
 /* ---- Boundaries of another index --------------------------------------------------- */
