@@ -134,6 +134,45 @@ static bool varying_fly(struct imp_free_flight *w, const struct imp_medium *m,
     }
 }
 
+/* A tentative collision with what the control leaves. */
+static bool residual_at(struct imp_free_flight *w, const struct imp_medium *m, double t,
+                        const struct imp_control *c)
+{
+    struct imp_step *s = w->s;
+    imp_spec in[IMP_INPUTS_MAX];
+    if (imp_unlikely(s->flight.events++ == EVENTS_MAX)) {
+        s->walk->dropped = IMP_DROP_EVENTS;
+        return false;
+    }
+    const imp_spec sigma = imp__extinction_at(m, w->o + w->d * t, s->at.carried, in);
+    const struct imp_event e[2] = {{.t = (imp_decided)t,
+                                    .bound = c->reach,
+                                    .medium = m->index,
+                                    .kind = IMP_RESIDUAL_AT},
+                                   {.t = c->mean, .kind = IMP_RESIDUAL_OF}};
+    w->f *= imp__residual(sigma, e);
+    return imp__flight_event(w, e[0]) && imp__flight_event(w, e[1]) &&
+           !imp__is_zero_used(w->f, s->at.carried);
+}
+
+/* Residual ratio tracking, cell by cell. */
+static void residual_fly(struct imp_free_flight *w, const struct imp_medium *m,
+                         struct imp_majorant_walk *cells)
+{
+    double path = free_path(w);
+    do {
+        const struct imp_control *c = &m->majorants->control[imp__majorants_cell(cells)];
+        double at = cells->t;
+        w->control += (double)c->mean * (cells->leave - at);
+        while (path < (cells->leave - at) * (double)c->reach) {
+            at += path / (double)c->reach;
+            path = free_path(w);
+            if (!residual_at(w, m, imp__decide1(at), c)) return;
+        }
+        path -= (cells->leave - at) * (double)c->reach;
+    } while (imp__majorants_next(cells));
+}
+
 /* The way to a light sample is in m from near to far: a point of it is chosen for the
  * derivative of its transmittance, which tentative collisions do not have where the bound
  * is 0. */
@@ -150,9 +189,16 @@ static void line_offer(struct imp_free_flight *w, const struct imp_medium *m, do
     w->line.t = (imp_decided)(near + length * imp__u01(key, n + 1));
     w->line.medium = m->index;
 }
-bool imp__flight_line(struct imp_free_flight *w)
+bool imp__flight_end(struct imp_free_flight *w)
 {
     struct imp_event e = w->line;
+    const double depth = imp__decide1(w->control);
+    if (depth > 0) {
+        w->f *= exp(-depth);
+        if (!imp__flight_event(
+                w, (struct imp_event){.t = (imp_decided)depth, .kind = IMP_CONTROL}))
+            return false;
+    }
     if (e.kind == 0) return true;
     e.kind = IMP_LINE_AT;
     e.bound = (imp_decided)w->length;
@@ -175,7 +221,9 @@ bool imp__fly(struct imp_free_flight *w, const struct imp_medium *m, double near
             return false;
         near = cells.t;
         far = cells.end;
-        hit = varying_fly(w, m, &cells, collides, t);
+        hit = false;
+        if (!collides && m->majorants->control) residual_fly(w, m, &cells);
+        else hit = varying_fly(w, m, &cells, collides, t);
         if (!collides && s->probing && s->tracer->active->medium[m->index])
             line_offer(w, m, near, far);
         /* A probe asks for a track, and an empty one has its start. */

@@ -18,6 +18,7 @@ struct imp_free_flight {
     bool any;                /* it has crossed a medium */
     struct imp_event line;   /* IMP_LINE_AT so far; bound 0: none */
     double length;           /* of the stretches that it was chosen from */
+    double control;          /* optical depth of controls on the way */
 };
 
 /* Streams of random numbers of a vertex. */
@@ -30,8 +31,8 @@ bool imp__flight_event(struct imp_free_flight *w, struct imp_event e);
 /* From near to far in a medium; true: a collision at *t. */
 bool imp__fly(struct imp_free_flight *w, const struct imp_medium *m, double near,
               double far, bool collides, double *t);
-/* The point of the way to a light sample that was chosen, if any, is kept. False: no
- * memory. */
-bool imp__flight_line(struct imp_free_flight *w);
+/* At a light sample: controls are taken into account, and the point of the way that was
+ * chosen, if any, is kept. False: no memory. */
+bool imp__flight_end(struct imp_free_flight *w);
 
 #endif

@@ -145,15 +145,19 @@ static bool event_fits(const struct imp_scene *scene, const struct imp_event *e,
                        int before)
 {
     if ((e->kind == IMP_PASSES_UV) != (before == IMP_PASSES)) return false;
+    if ((e->kind == IMP_RESIDUAL_OF) != (before == IMP_RESIDUAL_AT)) return false;
     if (e->kind == IMP_PASSES_UV) return isfinite(e->t) && isfinite(e->bound);
+    if (e->kind == IMP_RESIDUAL_OF || e->kind == IMP_CONTROL)
+        return isfinite(e->t) && e->t >= 0;
     if (e->kind == IMP_PASSES)
         return e->medium >= 0 && e->medium < scene->n_all_shapes && isfinite(e->t) &&
                isfinite(e->bound);
     if (e->medium < 0 || e->medium >= scene->n_media || !(e->t >= 0)) return false;
     if (e->kind == IMP_CROSSES || e->kind == IMP_COLLIDES)
         return !scene->media[e->medium]->majorants;
-    return (e->kind == IMP_NULL_AT || e->kind == IMP_REAL_AT) && isfinite(e->t) &&
-           isfinite(e->bound) && e->bound > 0;
+    return (e->kind == IMP_NULL_AT || e->kind == IMP_REAL_AT ||
+            e->kind == IMP_RESIDUAL_AT) &&
+           isfinite(e->t) && isfinite(e->bound) && e->bound > 0;
 }
 
 /* A walk while its items are looked at: the walks that the item at hand may belong to,
@@ -202,7 +206,7 @@ static bool track_fits(struct fitting *f, const union imp_kept *head)
         if (!event_fits(f->scene, e, before)) return false;
         before = e->kind;
     }
-    return before != IMP_PASSES;
+    return before != IMP_PASSES && before != IMP_RESIDUAL_AT;
 }
 
 static bool items_fit(struct fitting *f)

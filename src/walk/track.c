@@ -40,6 +40,11 @@ static imp_v3 event_place(const struct imp_track *track, const struct imp_event 
 static struct factor factor_of(const struct imp_event *e, imp_spec sigma, bool derivative)
 {
     struct factor x = {{0}, {0}};
+    if (e->kind == IMP_RESIDUAL_AT) {
+        x.f = imp__residual(sigma, e);
+        x.slope = imp__spec(-1 / (double)e->bound);
+        return x;
+    }
     if (e->kind == IMP_NULL_AT || e->kind == IMP_REAL_AT) {
         const double over = 1 / (double)e->bound, sign = e->kind == IMP_REAL_AT ? 1 : -1;
         x.f = sigma * over;
@@ -124,7 +129,9 @@ static imp_spec event_factor(const struct imp_scene *scene, const struct imp_tra
 {
     imp_spec in[IMP_INPUTS_MAX];
     if (e->kind == IMP_PASSES) return imp__passes_eval(scene, track, e, carried);
-    if (e->kind == IMP_PASSES_UV || e->kind == IMP_LINE_AT) return imp__spec(1);
+    if (e->kind == IMP_CONTROL) return imp__spec(exp(-(double)e->t));
+    if (e->kind == IMP_PASSES_UV || e->kind == IMP_RESIDUAL_OF || e->kind == IMP_LINE_AT)
+        return imp__spec(1);
     const imp_spec sigma =
         imp__extinction_at(scene->media[e->medium], event_place(track, e), carried, in);
     return factor_of(e, sigma, false).f;
@@ -183,7 +190,7 @@ struct derived {
  * not matter for uniform media: nothing is drawn. */
 static bool stands(const struct derived *x, const struct imp_event *e)
 {
-    return e->kind <= IMP_REAL_AT &&
+    return (e->kind <= IMP_REAL_AT || e->kind == IMP_RESIDUAL_AT) &&
            (x->tracer->collisions_stand || (e->kind <= IMP_COLLIDES && e->bound > 0));
 }
 
@@ -231,7 +238,8 @@ event_d(const struct derived *x, int i, struct imp_texcoord *at, int *n, imp_spe
 {
     const struct imp_active *active = x->tracer->active;
     const struct imp_event *e = &x->track->event[i];
-    if (e->kind == IMP_PASSES_UV) return NULL;
+    if (e->kind == IMP_PASSES_UV || e->kind == IMP_RESIDUAL_OF || e->kind == IMP_CONTROL)
+        return NULL;
     if (e->kind == IMP_PASSES) {
         *at = passed_at(x->tracer->scene->shapes[e->medium], x->track, e, x->carried);
         const struct imp_bsdf *b = passes_d(x->tracer, e, at, d);

@@ -223,7 +223,7 @@ static bool go_through(struct imp_free_flight *w, const struct imp_shape *shape,
 /* The light sample of v is seen. */
 static bool arrived(struct imp_free_flight *w, struct imp_vertex *v, imp_spec *T)
 {
-    if (!imp__flight_line(w)) return false;
+    if (!imp__flight_end(w)) return false;
     *T = w->f;
     if (w->s->recorded) v->to_light = w->track;
     return true;

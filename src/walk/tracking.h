@@ -17,13 +17,17 @@
  *     a collision after that length                sigma exp(-sigma t)
  *     bounded by b, a null collision at t          1 - sigma(t)/b
  *     bounded by b, a collision at t               sigma(t)/b
+ *     near a control c, a null collision at t      1 - (sigma(t) - c)/r
+ *     controls along the way, of optical depth t   exp(-t)
  *     on the way to a light sample, a surface      sum of its lobes that go straight on
  *
  * which is also the density with which each lane would have drawn it, so the weight of a
  * flight is 1 where extinction has no colour (lane_mis.h). Flights are analog: closed
  * form, or delta tracking (Woodcock et al. 1965) under local bounds (majorants.h). To a
  * light sample no collision is drawn: exp(-sigma t), or ratio tracking (Novak, Selle,
- * Jarosz 2014), whose events are all null collisions. */
+ * Jarosz 2014), whose events are all null collisions. Residual ratio tracking (the same)
+ * takes a control c out of the extinction of each cell, in closed form, and draws null
+ * collisions with a rate r >= |sigma - c| for the rest. */
 #ifndef IMP_WALK_TRACKING_H
 #define IMP_WALK_TRACKING_H
 
@@ -37,7 +41,10 @@ enum imp_event_kind {
     IMP_PASSES,    /* bound: cosine at the shading normal of the side that it comes from,
                      medium: the shape */
     IMP_PASSES_UV, /* follows it; t, bound: u, v */
-    IMP_LINE_AT    /* factor 1. A point of the way to a light sample, uniform in the media
+    IMP_RESIDUAL_AT, /* bound: r */
+    IMP_RESIDUAL_OF, /* follows it; t: c */
+    IMP_CONTROL,
+    IMP_LINE_AT /* factor 1. A point of the way to a light sample, uniform in the media
                       whose extinction varies and has a derivative; bound: their length l.
                       -l d sigma(t) is an estimate of the derivative of log T */
 };
@@ -79,6 +86,12 @@ imp_spec imp__passes_eval(const struct imp_scene *scene, const struct imp_track 
  */
 imp_spec imp__extinction_at(const struct imp_medium *m, imp_v3 p,
                             const struct imp_carried *carried, imp_spec *in);
+
+/* Factor of IMP_RESIDUAL_AT, and of what follows it. */
+static inline imp_spec imp__residual(imp_spec sigma, const struct imp_event e[2])
+{
+    return 1 - (sigma - (double)e[1].t) * (1 / (double)e[0].bound);
+}
 
 /* exp(-sigma t); 1 where sigma is 0, however large t. */
 imp_spec imp__attenuation(imp_spec sigma, double t);

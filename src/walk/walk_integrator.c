@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "walk_integrator.h"
 #include "math/hash.h"
+#include "scene/majorants.h"
 #include <string.h>
 
 const struct imp_walk_integrator *imp__walk_integrator(const struct imp_scene *scene)
@@ -20,6 +21,7 @@ uint64_t imp__walk_integrator_hash(const struct imp_walk_integrator *i)
                           i->absorbs,   i->first_hit,  (int)i->alpha_gradient,
                           i->media};
     uint64_t h = imp__hash(0, number, sizeof number);
+    if (i->transmittance) h = imp__hash(h, &i->transmittance, sizeof i->transmittance);
     if (i->from_lights) h = imp__hash(h, &i->rr_depth, sizeof i->rr_depth);
     if (!i->mixes && !i->photons) return h;
     const double other[] = {i->photons ? i->h : 0, i->split};
@@ -171,7 +173,23 @@ static enum imp_status volpath_build(const struct imp_build *build,
         IMP_TRY(imp_build_bool(build, "use_spectral_mis", true, &spectral));
     w->guided = false;
     w->media = w->other_end->media = true;
+    static const char *const estimators[] = {"ratio", "residual"};
+    int estimator;
+    IMP_TRY(imp__props_choice(build->ctx, build->node, "transmittance", estimators, 2, 0,
+                              &estimator));
+    w->transmittance = w->other_end->transmittance = (enum imp_transmittance)estimator;
 out:
+    return st;
+}
+
+static enum imp_status volpath_ready(struct imp_scene *scene,
+                                     const struct imp_integrator *i)
+{
+    const struct imp_walk_integrator *w = i->self;
+    enum imp_status st = mixture_ready(scene, i);
+    for (int m = 0; m < scene->n_media && st == IMP_OK; m++)
+        if (w->transmittance == IMP_RESIDUAL_TRACKING && scene->media[m]->majorants)
+            st = imp__majorants_control(scene, scene->media[m]->majorants);
     return st;
 }
 
@@ -362,7 +380,7 @@ const struct imp_integrator_ops imp__integrator_ptracer = {
         .object_size = sizeof(struct imp_walk_integrator),                               \
         .flags = IMP_INTEGRATOR_WALKS | IMP_INTEGRATOR_INNER | IMP_INTEGRATOR_MEDIA,     \
         .build = volpath_build,                                                          \
-        .ready = mixture_ready}
+        .ready = volpath_ready}
 VOLPATH(volpath);
 VOLPATH(volpathmis);
 VOLPATH(prbvolpath);
