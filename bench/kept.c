@@ -86,13 +86,16 @@ static void trace_all(struct job *j, bool keep, bool swept)
 }
 static void evaluate_all(struct job *j, bool swept)
 {
+    j->tracer.value_only = !swept;
     for (size_t i = 0; i < j->record.n_walks; i++) {
         const struct imp_arena_mark mark = imp__arena_mark(&j->arena);
         struct imp_walk w;
         imp__record_walk(&j->record, i, &j->tracer, &j->arena, &w);
         if (swept) sweep(j, &w);
+        else j->sum += w.L[0] + w.L[1] + w.L[2];
         imp__arena_rewind(&j->arena, mark);
     }
+    j->tracer.value_only = false;
 }
 
 static void measure(const char *file, const char *define)

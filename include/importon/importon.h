@@ -633,6 +633,9 @@ enum imp_from {
     IMP_FROM_LIGHTS
 };
 
+/** Walks whose decisions were kept (walks.h). */
+typedef struct imp_walks imp_walks;
+
 /** How Monte Carlo is run. The same (seed, spp) give the same bits on any thread count.
  */
 struct imp_run {
@@ -661,11 +664,15 @@ struct imp_run {
      * walks from the lights spp times the pixels are made for the whole film. */
     enum imp_from from;
     enum imp_points points;
+    /** Kept walks, which are evaluated in place of tracing new ones. Seed, samples, points
+     * and wavelengths are those that they were drawn with, whatever stands here. NULL:
+     * walks are traced. */
+    const imp_walks *walks;
 };
 #define IMP_RUN_INIT                                                                     \
     {                                                                                    \
         sizeof(struct imp_run), 0, 0, 0, 0, 0, 0, 0, 0, IMP_WAVELENGTHS_STRATIFIED, 0,   \
-            0, 0, IMP_FROM_SCENE, IMP_POINTS_SCENE                                       \
+            0, 0, IMP_FROM_SCENE, IMP_POINTS_SCENE, 0                                    \
     }
 
 /** Render the scene's integrator through a sensor.

@@ -133,7 +133,6 @@ enum imp_status imp__measure_create(const struct imp_scene *scene,
                                 .seed = run->seed,
                                 .guide = run->guide,
                                 .run = run,
-                                .spp = run->spp > 0 ? run->spp : sensor->spp,
                                 .n = names.n,
                                 .integrator = from,
                                 .from_lights = from && from->from_lights,
@@ -141,8 +140,20 @@ enum imp_status imp__measure_create(const struct imp_scene *scene,
     struct imp_tracer tracer = {.scene = scene};
     const int64_t samples = imp__walks_of(run, sensor);
     imp__tracer_numbers(&tracer, run, samples);
+    if (run->walks) {
+        tracer.integrator = from;
+        tracer.sensor = sensor;
+        if (!walks || imp__channels_of(scene->integrator))
+            st = imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                            "kept walks make pictures of path, direct, volpath, photons "
+                            "and stam, without aov and moment");
+        else st = imp__walks_use(run, &tracer);
+    }
+    out->kept = tracer.kept;
+    out->spp = (int)imp_max(samples, (int64_t)1);
     out->set = imp__tracer_set(&tracer, samples);
-    return IMP_OK;
+    if (st != IMP_OK) imp__measure_destroy(out);
+    return st;
 }
 
 void imp__measure_destroy(struct imp_measure *m)
@@ -289,7 +300,8 @@ static void radiance(const struct imp_measure *m,
         .sensor = m->sensor,
         .seed = m->seed,
         .guide = integrator ? imp__guide_of(m->scene, integrator, m->guide) : NULL,
-        .value_only = true};
+        .value_only = true,
+        .kept = m->kept};
     imp__tracer_numbers(&tracer, m->run, imp__walks_of(m->run, m->sensor));
     const enum imp_drop before = s->dropped;
     const struct imp_arena_mark mark = imp__arena_mark(s->arena);

@@ -14,7 +14,8 @@ struct imp_measure {
     const struct imp_sensor *sensor;
     uint64_t seed;
     const struct imp_guide *guide;
-    const struct imp_run *run; /* outlives the measure */
+    const struct imp_run *run;    /* outlives the measure */
+    const struct imp_store *kept; /* walks that are evaluated; NULL: they are traced */
     int spp;
     int set; /* of samples that depend on each other (imp_picture) */
     const struct imp_walk_integrator *integrator; /* of the scene, from the run's end */

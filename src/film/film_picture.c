@@ -186,10 +186,10 @@ static enum imp_status render_plan(struct render *r, imp_context *ctx)
                MANY_TILES * 4. * r->patch.tile_side * r->patch.tile_side)
         r->patch.tile_side *= 2;
     /* With a time limit and no count: until the time is up. */
-    r->spp = run->spp > 0 ? run->spp : run->time_limit_s > 0 ? 1 << 24 : p->sensor->spp;
+    r->period = imp__walks_of(run, p->sensor);
+    r->spp = r->period > 0 ? (int)r->period : 1 << 24;
     r->set = imp_max(p->set, 1);
     r->pass_spp = run->time_limit_s > 0 ? PASS_SPP_TIMED : PASS_SPP;
-    r->period = imp__walks_of(run, p->sensor);
     r->sets = r->period > 0 ? (int)imp_max(r->period / r->set, (int64_t)1) : 0;
     r->pass_sets = imp_max(r->pass_spp / r->set, 1);
     if (r->set > 1 && r->sets == 0) r->pass_spp = r->pass_sets * r->set;

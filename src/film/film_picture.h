@@ -6,7 +6,7 @@
 
 #include "base/film.h"
 #include "film_filter.h"
-#include "walk/walk.h"
+#include "walk/store.h"
 
 /* A sample of a pixel: which one, and what comes of it. */
 struct imp_sample {
@@ -48,6 +48,9 @@ enum imp_status imp__picture_make(imp_context *ctx, const struct imp_picture *pi
 static inline int64_t imp__walks_of(const struct imp_run *run,
                                     const struct imp_sensor *sensor)
 {
+    const struct imp_store *kept =
+        imp_unlikely(run->walks != NULL) ? imp__walks_store(run->walks, sensor) : NULL;
+    if (imp_unlikely(kept != NULL)) return (int64_t)kept->n;
     return run->spp > 0 ? run->spp : run->time_limit_s > 0 ? 0 : sensor->spp;
 }
 
@@ -55,7 +58,9 @@ static inline int64_t imp__walks_of(const struct imp_run *run,
 static inline void imp__sample_walk(struct imp_sample *s, const struct imp_tracer *tracer,
                                     struct imp_walk *walk)
 {
-    imp__walk_trace(tracer, s->arena, s->x, s->y, s->index, walk);
+    if (imp_likely(!tracer->kept))
+        imp__walk_trace(tracer, s->arena, s->x, s->y, s->index, walk);
+    else imp__store_walk_at(tracer, s->arena, s->x, s->y, s->index, walk);
     s->px = walk->px;
     s->py = walk->py;
     s->dropped = walk->dropped;

@@ -145,7 +145,7 @@ static enum imp_status picture_value(imp_context *ctx, struct imp__functional *f
         .weights = weights,
         .set = imp__tracer_set(&f->tracer, imp__walks_of(run, f->tracer.sensor))};
     /* Through a box filter errors are the pixels', if these have any. */
-    const int spp = run->spp > 0 ? run->spp : f->tracer.sensor->spp;
+    const int spp = (int)imp_max(imp__walks_of(run, f->tracer.sensor), (int64_t)1);
     const bool one_pass = box && spp > 1;
     st = imp__picture_make(ctx, &picture, run, &film);
     if (st != IMP_PART) IMP_TRY(st);

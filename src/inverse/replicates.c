@@ -15,8 +15,10 @@ static bool curved(const struct imp__target *t)
 {
     return t && !imp__loss_quadratic(t->desc.loss);
 }
-static int sets_of(const struct imp__target *t)
+/* Walks that are kept are kept for all of them. */
+static int sets_of(const struct imp__target *t, const struct imp_run *run)
 {
+    if (run->walks) return SETS;
     return !t ? SETS_FIXED : curved(t) ? SETS_CURVED : SETS;
 }
 
@@ -75,12 +77,14 @@ struct imp__replicates imp__replicates_of(const struct imp_scene *scene,
                                           const struct imp_run *run)
 {
     const struct imp_sensor *sensor = sensor_of(scene, t, run);
-    const int sets = imp__points_of(sensor, run) == IMP_POINTS_SOBOL ? sets_of(t) : 0;
+    const int sets =
+        imp__points_of(sensor, run) == IMP_POINTS_SOBOL ? sets_of(t, run) : 0;
     if (imp__film_border(&sensor->film) > 0) return wide_plan(spp_of(sensor, run), sets);
     /* A loss that is not quadratic has its bias cut by longer batches. */
-    const int most = curved(t) ? IMP_REPLICATE_MAX
-                     : sets    ? sets * IMP_SET_POINTS
-                               : IMP_BATCH_MAX;
+    const bool kept_sets = run->walks && sets;
+    const int most = curved(t) && !kept_sets ? IMP_REPLICATE_MAX
+                     : sets                  ? sets * IMP_SET_POINTS
+                                             : IMP_BATCH_MAX;
     return box_plan(spp_of(sensor, run), most, sets);
 }
 
@@ -89,7 +93,8 @@ struct imp__replicates imp__replicates_normal(const struct imp_scene *scene,
                                               const struct imp_run *run)
 {
     const struct imp_sensor *sensor = sensor_of(scene, t, run);
-    const int sets = imp__points_of(sensor, run) == IMP_POINTS_SOBOL ? sets_of(t) : 0;
+    const int sets =
+        imp__points_of(sensor, run) == IMP_POINTS_SOBOL ? sets_of(t, run) : 0;
     const int spp = imp_max(spp_of(sensor, run), 4);
     if (imp__film_border(&sensor->film) == 0)
         return box_plan(spp, sets ? sets * IMP_SET_POINTS : IMP_BATCH_MAX, sets);

@@ -116,5 +116,13 @@ enum imp_status imp__problem_tracer_of_any_end(const struct imp_problem *p,
             &waves[run->wavelengths == IMP_WAVELENGTHS_IMPORTANCE ? IMP_WAVES_IMPORTANCE
                                                                   : IMP_WAVES_UNIFORM];
     out->set = 1; /* leave-one-out needs independent walks, or sets */
+    if (run->walks) {
+        if (waves)
+            return imp__error(p->ctx, IMP_E_UNSUPPORTED,
+                              "losses of films with other than three response curves "
+                              "have several walks for each sample; none are kept");
+        out->collisions_stand = true;
+        return imp__walks_use(run, out);
+    }
     return p->active.body ? imp__graded_survey(out) : IMP_OK;
 }

@@ -7,7 +7,7 @@
 
 static bool texture_depends(const struct imp_texture *t, const uint8_t *chosen);
 
-static bool input_depends(const struct imp_input *in, const uint8_t *chosen)
+bool imp__input_depends(const struct imp_input *in, const uint8_t *chosen)
 {
     if (in->texture) return texture_depends(in->texture, chosen);
     return in->param >= 0 && chosen[in->param];
@@ -17,7 +17,7 @@ static bool texture_depends(const struct imp_texture *t, const uint8_t *chosen)
 {
     if (t->param >= 0 && chosen[t->param]) return true;
     for (int k = 0; k < t->n_in; k++)
-        if (input_depends(t->input[k], chosen)) return true;
+        if (imp__input_depends(t->input[k], chosen)) return true;
     return false;
 }
 
@@ -39,10 +39,10 @@ enum imp_status imp__active_create(const struct imp_scene *scene, const uint8_t 
     }
     for (int b = 0; b < scene->n_bsdfs; b++)
         for (int k = 0; k < scene->bsdfs[b]->n_in; k++)
-            a.bsdf[b] |= input_depends(scene->bsdfs[b]->input[k], chosen);
+            a.bsdf[b] |= imp__input_depends(scene->bsdfs[b]->input[k], chosen);
     for (int e = 0; e < scene->n_emitters; e++)
         for (int k = 0; k < scene->emitters[e]->n_in; k++)
-            a.emitter[e] |= input_depends(scene->emitters[e]->input[k], chosen);
+            a.emitter[e] |= imp__input_depends(scene->emitters[e]->input[k], chosen);
     for (int m = 0; m < scene->n_media; m++) {
         const struct imp_medium *medium = scene->media[m];
         uint8_t *points = &a.bsdf[medium->scatterer->index];
@@ -50,11 +50,11 @@ enum imp_status imp__active_create(const struct imp_scene *scene, const uint8_t 
         for (int k = 0; k < medium->n_in; k++)
             if ((k >= medium->n_own ||
                  !(medium->ops->inputs[k].flags & IMP_INPUT_EXTINCTION)) &&
-                input_depends(medium->input[k], chosen))
+                imp__input_depends(medium->input[k], chosen))
                 *points = 1;
         for (int k = 0; k < medium->n_own; k++) {
             if (!(medium->ops->inputs[k].flags & IMP_INPUT_EXTINCTION)) continue;
-            if (!input_depends(medium->input[k], chosen)) continue;
+            if (!imp__input_depends(medium->input[k], chosen)) continue;
             if (!a.medium) a.medium = imp__alloc(ctx, (size_t)scene->n_media, 1);
             if (!a.medium) {
                 imp__active_destroy(ctx, &a);

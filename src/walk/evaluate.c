@@ -18,12 +18,21 @@ struct values {
     imp_spec f;                         /* of the continuation: w_k without T/(p s) */
 };
 
-/* Of the vertex at place p; in: its inputs there. */
-static void vertex_values(const struct imp_tracer *tracer, const struct imp_vertex *v,
-                          const struct imp_place *p, imp_spec *in, struct values *x)
+/* What is evaluated: a vertex, or a kept decision of which none is made. */
+struct decided {
+    const struct imp_decision *d;
+    const struct imp_bsdf *bsdf;
+    const struct imp_shape *shape;
+    const struct imp_carried *carried;
+    const struct imp_track *to_light;
+};
+
+/* At place p; in: the inputs there. Lookups that nobody asks for are left out. */
+static inline __attribute__((always_inline)) void
+decided_values(const struct imp_scene *scene, const struct decided *v,
+               const struct imp_place *p, imp_spec *in, struct values *x)
 {
-    const struct imp_scene *scene = tracer->scene;
-    const struct imp_decision *d = &v->d;
+    const struct imp_decision *d = v->d;
     const struct imp_bsdf *b = v->bsdf;
     *x = (struct values){.e = {0}};
     if (b) imp__evaluate_inputs(b, v->shape, &p->at, in);
@@ -40,8 +49,10 @@ static void vertex_values(const struct imp_tracer *tracer, const struct imp_vert
             d->met.weight;
     if (d->connection == IMP_CONNECTED) {
         const struct imp_emission to = imp__light_emission(&d->light);
-        struct imp_dirs dirs = imp__light_dirs(v);
-        if (imp_likely(!d->from_light)) dirs.wo = p->dirs.wo;
+        const imp_v3 wi = imp__decided_v3(d->light.wi);
+        struct imp_dirs dirs = {p->dirs.wo, wi, IMP_SMOOTH, false};
+        if (imp_unlikely(d->from_light))
+            dirs = (struct imp_dirs){wi, imp__decided_v3(d->wi), IMP_SMOOTH, false};
         if (imp_likely(!light)) imp__bsdf_eval(b, v->carried, in, &dirs, &x->light_f);
         else x->light_f = imp__spec(1);
         x->light_e = imp_unlikely(d->light.emitter < 0)
@@ -61,6 +72,50 @@ static void vertex_values(const struct imp_tracer *tracer, const struct imp_vert
     if (imp_unlikely(light) && d->goes_on)
         in[0] = x->f =
             imp__emitter_radiance(scene, d->met.emitter, &p->met, p->at.p, v->carried);
+}
+
+/* Of the vertex at place p. */
+static void vertex_values(const struct imp_tracer *tracer, const struct imp_vertex *v,
+                          const struct imp_place *p, imp_spec *in, struct values *x)
+{
+    const struct decided at = {&v->d, v->bsdf, v->shape, v->carried, v->to_light};
+    decided_values(tracer->scene, &at, p, in, x);
+}
+
+void imp__decided_values(const struct imp_tracer *tracer, const struct imp_decision *d,
+                         const struct imp_bsdf *b, const struct imp_carried *carried,
+                         struct imp_values *out)
+{
+    const struct imp_scene *scene = tracer->scene;
+    const struct imp_shape *shape =
+        b && d->scatterer != IMP_IN_MEDIUM ? scene->shapes[d->shape] : NULL;
+    const struct decided v = {d, b, shape, carried, NULL};
+    const struct imp_met *m = &d->met;
+    struct imp_place
+        p; /* member by member: clearing all of it takes as long as the rest */
+    p.at.uv[0] = d->uv[0];
+    p.at.uv[1] = d->uv[1];
+    p.at.p = imp__decided_v3(d->p);
+    p.at.carried = carried;
+    p.at.shape = shape;
+    p.at.prim = 0;
+    p.at.surface = NULL;
+    p.dirs.wo = imp__decided_v3(d->wo);
+    p.dirs.wi = imp__decided_v3(d->wi);
+    p.dirs.lobe = d->lobe;
+    p.dirs.derivative = false;
+    if (m->emitter >= 0)
+        p.met = (struct imp_emission){
+            {d->uv[0], d->uv[1]}, m->dist, m->cos_light, imp__decided_v3(m->d)};
+    imp_spec in[IMP_INPUTS_MAX];
+    struct values x;
+    decided_values(scene, &v, &p, in, &x);
+    out->e = x.e;
+    out->b = x.b;
+    out->w = (imp_spec){0};
+    if (!d->goes_on) return;
+    out->w = x.f * imp__spec(1 / ((double)d->pdf * (double)d->survive));
+    out->w *= imp__spec((double)d->passes);
 }
 
 /* T of the segment that follows. */

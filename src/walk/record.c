@@ -126,6 +126,7 @@ static struct imp_decision decided(const struct imp_decision *d)
         memcpy(k.wi, d->wi, sizeof k.wi);
         k.lobe = d->lobe;
         k.pdf = d->pdf;
+        k.kernel = d->kernel;
         k.survive = d->survive;
     }
     if (d->met.emitter >= 0) k.met = d->met;
@@ -241,6 +242,32 @@ enum imp_status imp__record_keep(struct imp_record *r, const struct imp_walk *wa
                                  .dropped = (uint8_t)walk->dropped};
     if (counts) walk_put(r, walk, r->n_vertices);
     return IMP_OK;
+}
+
+/* The last page shrinks to what it holds. */
+static bool page_trim(imp_context *ctx, void **pages, size_t n_pages, size_t n,
+                      size_t size)
+{
+    const size_t last = n % IMP_RECORD_PAGE;
+    if (n_pages == 0 || last == 0) return true;
+    void *small = imp__alloc_raw(ctx, last, size);
+    if (!small) return false;
+    memcpy(small, pages[n_pages - 1], last * size);
+    imp__release(ctx, pages[n_pages - 1]);
+    pages[n_pages - 1] = small;
+    return true;
+}
+
+enum imp_status imp__record_trim(struct imp_record *r)
+{
+    if (page_trim(r->ctx, (void **)r->walks, r->n_walk_pages, r->n_walks,
+                  sizeof **r->walks) &&
+        page_trim(r->ctx, (void **)r->vertices, r->n_vertex_pages, r->n_vertices,
+                  sizeof **r->vertices) &&
+        page_trim(r->ctx, (void **)r->items, r->n_item_pages, r->n_items,
+                  sizeof **r->items))
+        return IMP_OK;
+    return imp__error(r->ctx, IMP_E_NOMEM, "no memory for kept walks");
 }
 
 /* ---- Evaluating ------------------------------------------------------------------ */

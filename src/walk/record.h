@@ -92,6 +92,9 @@ size_t imp__record_bytes(const struct imp_record *record);
 enum imp_status imp__record_keep(struct imp_record *record, const struct imp_walk *walk,
                                  int64_t sample);
 
+/* No more is appended: give back what the last pages do not hold. */
+enum imp_status imp__record_trim(struct imp_record *record);
+
 /* ---- Evaluated ------------------------------------------------------------------- */
 
 /* Before walks are evaluated: IMP_E_ARG if the scene, sensor or integrator is another, or
@@ -113,11 +116,22 @@ static inline union imp_kept *imp__record_item(const struct imp_record *r, uint6
     return &r->items[i / IMP_RECORD_PAGE][i % IMP_RECORD_PAGE];
 }
 
+/* The scatterer of a kept vertex; NULL at the sky and the sensor. */
+static inline const struct imp_bsdf *imp__decided_bsdf(const struct imp_scene *scene,
+                                                       const struct imp_decision *d)
+{
+    if (d->shape < 0) return NULL;
+    return d->scatterer == IMP_IN_MEDIUM
+               ? scene->media[d->shape]->scatterer
+               : imp__shape_bsdf(scene, scene->shapes[d->shape]);
+}
+
 /* Walk i in the arena, with its values at the scene's present parameters, folded, to be
  * swept like any other; it has no camera ray, normals and lengths. The derivative with
  * respect to extinctions is that of frozen collisions: the tracer's `collisions_stand` is
  * set. Where an extinction is now above the bound under which collisions were drawn, L may
- * be negative; it is right in the mean. Running out of memory drops it. */
+ * * be negative; it is right in the mean. Running out of memory drops it. With a tracer that
+ * wants no derivatives, it may have no vertices. */
 void imp__record_walk(const struct imp_record *record, size_t i,
                       const struct imp_tracer *tracer, struct imp_arena *arena,
                       struct imp_walk *walk);

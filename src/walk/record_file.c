@@ -12,7 +12,7 @@
 
 #define MAGIC      "impwalks"
 #define BYTE_ORDER 0x01020304u
-#define VERSION    3
+#define VERSION    4
 
 struct head {
     char magic[8];
@@ -106,7 +106,8 @@ static bool continuation_fits(const struct imp_bsdf *b, const struct imp_decisio
     if (!d->goes_on) return true;
     const unsigned needs = d->lobe == IMP_SMOOTH ? IMP_BSDF_SMOOTH : IMP_BSDF_DELTA;
     return d->lobe >= IMP_SMOOTH && (b->flags & (needs | IMP_BSDF_NULL)) && unit(d->wi) &&
-           isfinite(d->pdf) && d->pdf > 0 && isfinite(d->survive) && d->survive > 0;
+           isfinite(d->pdf) && d->pdf > 0 && isfinite(d->kernel) && d->kernel >= 0 &&
+           isfinite(d->survive) && d->survive > 0;
 }
 
 /* Where the camera is, if the first segment crosses media. */

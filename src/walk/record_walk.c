@@ -5,20 +5,14 @@
 #include "record.h"
 #include <string.h>
 
-static const struct imp_bsdf *scatterer_of(const struct imp_scene *scene,
-                                           const struct imp_decision *d)
-{
-    if (d->shape < 0) return NULL;
-    return d->scatterer == IMP_IN_MEDIUM
-               ? scene->media[d->shape]->scatterer
-               : imp__shape_bsdf(scene, scene->shapes[d->shape]);
-}
+#define AHEAD 6  /* vertices that are fetched ahead */
+#define SHORT 64 /* vertices of walks of which none are made for their value alone */
 
 static struct imp_vertex *vertex_add(const struct imp_scene *scene,
                                      struct imp_arena *arena, struct imp_walk *walk,
                                      const struct imp_decision *d)
 {
-    const struct imp_bsdf *bsdf = scatterer_of(scene, d);
+    const struct imp_bsdf *bsdf = imp__decided_bsdf(scene, d);
     const size_t n_in = bsdf ? (size_t)bsdf->n_in : 0;
     struct imp_vertex *v = imp__arena_take(arena, 1, sizeof *v + n_in * sizeof *v->in);
     if (imp_unlikely(!v)) return NULL;
@@ -129,11 +123,42 @@ static bool items_get(struct reading *g)
     return true;
 }
 
+/* The value alone, without making vertices: what evaluate and fold give, to the bit. */
+static void value_fold(const struct imp_record *r, const struct imp_record_walk *k,
+                       const struct imp_tracer *tracer, struct imp_walk *walk)
+{
+    const struct imp_carried *carried = walk->waves ? &walk->waves->carried : NULL;
+    struct imp_values v[SHORT];
+    imp_spec L = {0};
+    for (int j = 0; j < k->n; j++) { /* in the order of memory */
+        const struct imp_decision *d = imp__record_vertex(r, k->first + (uint64_t)j);
+        imp__decided_values(tracer, d, imp__decided_bsdf(tracer->scene, d), carried,
+                            &v[j]);
+    }
+    for (int j = k->n; j-- > 0;) L = v[j].e + v[j].w * L + v[j].b;
+    imp__walk_value(tracer, walk, L);
+}
+
+/* What is read next lies behind what is read now, and has left the caches. */
+static inline void fetch_ahead(const struct imp_record *r, size_t i,
+                               const struct imp_record_walk *k)
+{
+    const uint64_t first = k->first + k->n_vertices;
+    const uint64_t end = imp_min(first + AHEAD, (uint64_t)r->n_vertices);
+    for (uint64_t j = first; j < end; j++) {
+        const char *d = (const char *)imp__record_vertex(r, j);
+        for (size_t b = 0; b < sizeof(struct imp_decision); b += IMP_CACHE_LINE)
+            __builtin_prefetch(d + b);
+    }
+    if (i + 2 < r->n_walks) __builtin_prefetch(imp__record_at(r, i + 2));
+}
+
 void imp__record_walk(const struct imp_record *r, size_t i,
                       const struct imp_tracer *tracer, struct imp_arena *arena,
                       struct imp_walk *walk)
 {
     const struct imp_record_walk *k = imp__record_at(r, i);
+    fetch_ahead(r, i, k);
     struct reading g = {
         .record = r, .scene = tracer->scene, .arena = arena, .walk = walk, .kept = k};
     *walk = (struct imp_walk){.px = k->px,
@@ -144,6 +169,11 @@ void imp__record_walk(const struct imp_record *r, size_t i,
                               .dropped = (enum imp_drop)k->dropped};
     if (tracer->wavelengths && !imp__walk_wave(tracer, arena, k->wave, walk)) return;
     bool whole = true;
+    if ((tracer->value_only || !tracer->active) && k->n_items == 0 && k->n <= SHORT &&
+        !tracer->integrator->first_hit) {
+        value_fold(r, k, tracer, walk);
+        return;
+    }
     if (imp_unlikely(k->n_items > 0)) {
         g.vertex = imp__arena_take(arena, k->n_vertices, sizeof *g.vertex);
         whole = g.vertex != NULL;

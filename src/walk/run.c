@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "run.h"
+#include "store.h"
 #include <math.h>
 
 enum imp_status imp__run_take(imp_context *ctx, const char *function,
@@ -27,6 +28,7 @@ enum imp_status imp__run_take(imp_context *ctx, const char *function,
     if ((int)r.points < 0 || r.points > IMP_POINTS_SOBOL)
         return imp__error(ctx, IMP_E_ARG, "%s: run->points %d is not known", function,
                           (int)r.points);
+    if (r.walks) IMP_CHECKED(imp__walks_run(ctx, function, &r));
     *own = r;
     return IMP_OK;
 }

@@ -54,27 +54,29 @@ static bool roulette(struct imp_step *s, const struct imp_bsdf *b, imp_spec fact
         q = imp_min(imp__max_used(s->beta, s->at.carried) * s->eta * s->eta, 0.95);
         if (guided) q = imp__guided_survival(s, q);
     }
+    q = fmax(q, s->tracer->survival);
     *survive = imp__decide1(q);
     return imp__step_number(s, IMP_DIM_SURVIVE) < *survive;
 }
 
 /* Density of the direction as drawn, in all lanes together where they differ. 0: the walk
- * ends. *competing as of imp__mixture_pdf; f: the value. Where a vertex splits, the members' MIS weights
+ * ends. *kernel: of the BSDF alone; *competing as of imp__mixture_pdf; f: the value. Where a vertex splits, the members' MIS weights
  * are those of the lane that drew, which add up to 1 for every lane. */
 static double density(struct imp_step *s, const struct imp_bsdf *b,
-                      const struct imp_dirs *dirs, imp_v3 w, int drawn, double *competing,
-                      imp_spec *f)
+                      const struct imp_dirs *dirs, imp_v3 w, int drawn, double *kernel,
+                      double *competing, imp_spec *f)
 {
     if (imp_likely(!b->shaped)) {
-        const double kernel = imp__bsdf_pdf_eval(b, s->in, dirs, f);
-        if (!(kernel > 0)) return 0;
-        return imp__direction_pdf(s, kernel, w, drawn, dirs->lobe, competing);
+        *kernel = imp__bsdf_pdf_eval(b, s->in, dirs, f);
+        if (!(*kernel > 0)) return 0;
+        return imp__direction_pdf(s, *kernel, w, drawn, dirs->lobe, competing);
     }
     imp_spec p;
     imp__shaped_pdf(b, s->at.carried, s->in, dirs, &p);
     imp__shaped_eval(b, s->at.carried, s->in, dirs, f);
     if (!(imp__max_used(p, true) > 0)) return 0;
     const int drew = imp__lane_mis_drew(s);
+    *kernel = p[drew];
     if (s->mixed.here && s->mixed.splits)
         return imp__direction_pdf(s, p[drew], w, drawn, dirs->lobe, competing);
     for (int j = 0; j < s->at.carried->n; j++)
@@ -111,8 +113,9 @@ bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_sur
                           b->straight >> dirs.lobe & 1;
     if (imp_unlikely(!straight && b->straight) && last_bounce(s)) return false;
     imp_spec f;
-    double competing;
-    const double pdf = imp__decide1(density(s, b, &dirs, w, drawn, &competing, &f));
+    double kernel = 0, competing;
+    const double pdf =
+        imp__decide1(density(s, b, &dirs, w, drawn, &kernel, &competing, &f));
     if (!(pdf > 0)) return false; /* structurally zero */
 
     /* Does the walk go on? */
@@ -131,6 +134,7 @@ bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_sur
         v->d.lobe = (int8_t)dirs.lobe;
         v->d.drawn = (uint8_t)(drawn & 7);
         v->d.pdf = (imp_decided)pdf;
+        v->d.kernel = (imp_decided)kernel;
         v->d.survive = (imp_decided)survive;
         v->d.goes_on = true;
     }

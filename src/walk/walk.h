@@ -77,6 +77,8 @@ struct imp_decision {
     imp_decided uv[2], p[3];  /* the place; at the sky p is the direction */
     imp_decided wo[3], wi[3]; /* of the continuation, shading frame */
     imp_decided pdf, survive; /* p, s of the continuation */
+    imp_decided kernel;       /* density of wi by the BSDF alone; of lanes that differ, by
+                                 the one that drew */
     imp_decided passes;       /* T of the segment that follows, where no parameter that
                                  is differentiated changes it */
     imp_decided glow_weight;  /* of the BSDF's own emission: 1, or 1/absorb */
@@ -86,6 +88,7 @@ struct imp_decision {
 
 /* ---- Record ---------------------------------------------------------------------- */
 
+struct imp_store;
 struct imp_segment_ops;
 struct imp_track; /* what a segment crosses (tracking.h) */
 struct imp_probe; /* of an extinction's derivative (probe.h) */
@@ -206,7 +209,8 @@ static inline double imp__active_slope(const struct imp_active *a, int param, si
 {
     return imp_likely(!a->tied) ? 1 : imp__tied_slope(&a->tied[param], e);
 }
-/* `chosen` [n_params]. */
+/* Does it depend on a parameter that is chosen? `chosen` [n_params]. */
+bool imp__input_depends(const struct imp_input *input, const uint8_t *chosen);
 enum imp_status imp__active_create(const struct imp_scene *scene, const uint8_t *chosen,
                                    struct imp_active *out);
 void imp__active_destroy(imp_context *ctx, struct imp_active *active);
@@ -240,6 +244,10 @@ struct imp_tracer {
     const struct imp_photograph *photograph; /* that is compared with; NULL: none */
     int split; /* continuations of the first vertex, each with its share; 0: one. Scenes
                   with media have one */
+    double
+        survival; /* least probability with which roulette lets a walk go on; 0: none */
+    const struct imp_store *kept; /* walks that are evaluated in place of tracing
+                                    (store.h); NULL: they are traced */
 };
 
 /* The guide that walks of this integrator follow: its densities are made for paths, in
@@ -322,6 +330,15 @@ void imp__walk_evaluate(const struct imp_tracer *tracer, struct imp_walk *walk);
 /* Fold, and L as it counts: a walk that is not valid brings 0, and one whose value no
  * light can have, or no picture can hold, is dropped (trace.c). */
 void imp__walk_close(const struct imp_tracer *tracer, struct imp_walk *walk);
+/* The same when L has been folded. */
+void imp__walk_value(const struct imp_tracer *tracer, struct imp_walk *walk, imp_spec L);
+/* E_k, B_k and w_k of a vertex that no track belongs to, from its decisions alone. */
+struct imp_values {
+    imp_spec e, b, w;
+};
+void imp__decided_values(const struct imp_tracer *tracer, const struct imp_decision *d,
+                         const struct imp_bsdf *bsdf, const struct imp_carried *carried,
+                         struct imp_values *out);
 
 /* The weight of light from an emitter that varies in time: a decision, since no parameter
  * moves its course. */

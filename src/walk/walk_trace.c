@@ -4,6 +4,7 @@
  * and wavelengths; its steps (trace.c); the fold. */
 #include "meter.h"
 #include "probe.h"
+#include "store.h"
 #include <float.h>
 
 /* Keys use full-film pixels: a crop renders the same samples as the whole picture. The
@@ -53,7 +54,11 @@ enum imp_drop imp__drop_cause(imp_spec L)
 static inline __attribute__((always_inline)) void
 walk_close(const struct imp_tracer *tracer, struct imp_walk *walk)
 {
-    const imp_spec L = imp__walk_fold(walk);
+    imp__walk_value(tracer, walk, imp__walk_fold(walk));
+}
+
+void imp__walk_value(const struct imp_tracer *tracer, struct imp_walk *walk, imp_spec L)
+{
     imp_spec used = L;
     if (!tracer->wavelengths) used[3] = 0;
     if (imp_unlikely(!imp__is_within(used, FLT_MAX)))
@@ -133,6 +138,10 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
                      int y, int64_t sample, struct imp_walk *walk)
 {
     const struct imp_sensor *sensor = tracer->sensor;
+    if (imp_unlikely(tracer->kept != NULL)) {
+        imp__store_walk(tracer, arena, x, y, sample, walk);
+        return;
+    }
     walk_begin(tracer, x, y, sample, walk);
     const double lens[2] = {imp__start_number(walk->key, walk->point, IMP_DIM_LENS_U),
                             imp__start_number(walk->key, walk->point, IMP_DIM_LENS_V)};

@@ -13,7 +13,7 @@ from importon import _c
 from importon._library import ERRORS
 from tap import TOP, Skip, run
 
-HEADERS = ["importon.h", "bend.h", "elements.h", "report.h"]
+HEADERS = ["importon.h", "bend.h", "elements.h", "report.h", "walks.h"]
 INCLUDES = "".join("#include <importon/%s>\n" % h for h in HEADERS) + "#include <stddef.h>\n"
 STRUCTS = {n: s for n, s in vars(_c).items() if isinstance(s, type) and issubclass(s, ctypes.Structure)
            and n.startswith("imp_")}
@@ -135,6 +135,7 @@ WITHOUT = {
        for word in ("create", "destroy", "get_info", "output", "read", "result", "set_limit", "write")},
     "imp_context_set_manifest": "the same",
     "imp_film_merge": "pictures are arrays, whose means are one line",
+    **{"imp_walks_" + word: "not yet" for word in ("keep", "destroy", "get_info", "scene", "weigh")},
     "imp_report_page": "for servers of a live page: importon view",
     "imp_report_data": "the same",
     "imp_problem_fit_variable": "one number of a fit: Fit has arrays; numbers beyond 1,024 have no errors",

@@ -175,7 +175,7 @@ NULLABLE = {"imp_report_page.length", "imp_report_data.length", "options", "run"
             "imp_problem_functional.gradient", "imp_problem_jacobian_sums.adjoint",
             "imp_problem_jacobian_sums.group", "imp_problem_jacobian_sums.value",
             "imp_problem_nlopt.gradient", "imp_field_eval.gradient", "imp_bend_objective.gradient",
-            "imp_scene_write_volume.values", "imp_build_error.name", "imp_build_string.fallback", "imp_field_read.grid", "imp_bend_tangent.theta_dot", "imp_bend_tangent.x_dot",
+            "imp_scene_write_volume.values", "imp_walks_weigh.mask", "imp_build_error.name", "imp_build_string.fallback", "imp_field_read.grid", "imp_bend_tangent.theta_dot", "imp_bend_tangent.x_dot",
             "imp_bend_tangent.d_dot", "imp_bend_fit.result", "imp_last_error.context",
             "imp_bend_set_progress.payload", "imp_bend_set_progress.progress",
             "imp_input_tangent.x_dot"}
@@ -293,6 +293,7 @@ class Fixture:
                 if lib.imp_bend_add_target(b, C.byref(t)) != OK: raise RuntimeError(self.said())
             return b
         if kind == "imp_guide": return None
+        if kind == "imp_walks": return self.make("imp_walks_keep", scene, None, None)
         if kind == "imp_manifest": return self.make("imp_manifest_create", context, b"command")
         if kind == "imp_parts": return self.make("imp_parts_create", context, 1, 2, b"command")
         raise KeyError(kind)

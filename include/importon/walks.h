@@ -1,0 +1,113 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * importon: kept walks. What rays and random numbers have settled of a walk (where it
+ * scattered, its directions, densities, light samples and what stood in their way) does
+ * not depend on reflectances, lamps and roughness. It can be kept, and evaluated at other
+ * parameters without a ray:
+ *
+ *     imp_walks_keep          draw and keep the walks of a scene
+ *     imp_scene_set_values    other parameters
+ *     run.walks = walks       imp_render, imp_problem_objective and all others that take
+ *                             an imp_run then evaluate these walks in place of tracing
+ *     imp_walks_weigh         how many of them still count
+ *     imp_walks_write         ... and what needs no scene file, meshes or images
+ *
+ * At the parameters that they were drawn at, kept walks give what tracing gives, to the
+ * bit, unless roulette was given a floor (imp_walks_options). At others they are unbiased,
+ * and their variance grows where densities move away: with a narrower lobe much, with
+ * reflectances and lamps not at all. Many evaluations of the same walks share their noise,
+ * so that a fit's errors have to come from fresh ones (imp_fit takes care of that).
+ */
+#ifndef IMPORTON_WALKS_H
+#define IMPORTON_WALKS_H
+
+#include "importon.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+struct imp_walks_options {
+    size_t size;
+    double memory; /**< bytes that the walks may take; 0: 2^30 */
+    /** 0: the walks of imp_render with this run. 1: those of losses and their gradients
+     * (imp_problem_objective), of which pictures can be made too. They are the same walks
+     * unless points are those of Sobol's sequence, whose sets have to be independent of
+     * each other for a loss. */
+    int losses;
+    int all_sensors; /**< not 0: of all sensors; 0: of run->sensor alone */
+    /** Least probability with which roulette lets a walk go on: reflectances up to its root
+     * keep a finite variance however long walks are. 0: .8; negative: what the integrator
+     * decides, as for walks that are not kept. */
+    double survival;
+    /** Least effective sample size, a fraction of the walks, with which they are evaluated;
+     * 0: .5. */
+    double ess;
+};
+#define IMP_WALKS_OPTIONS_INIT                                                           \
+    {                                                                                    \
+        sizeof(struct imp_walks_options), 0, 0, 0, 0, 0                                  \
+    }
+
+/** Draw walks at the scene's present parameters and keep them: about 160 bytes a vertex.
+ * The scene must outlive them. Parameters with a gradient may change afterwards, but for
+ * those of graded indices and extinctions, which move rays and collisions.
+ * @param run     as of imp_render; NULL for the defaults.
+ * @param options NULL for the defaults.
+ * @param[out] out the caller destroys it.
+ * @return IMP_OK; IMP_CANCELLED; IMP_E_ARG; IMP_E_NOMEM if they need more than
+ *         options->memory (the message says how much); IMP_E_UNSUPPORTED, with the reason,
+ *         for walks from the lights, through graded indices that are active, from sensors
+ *         that are surfaces, integrators that make no walks, and in a team of ranks. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_walks_keep(imp_scene *scene, const struct imp_run *run,
+               const struct imp_walks_options *options, imp_walks **out);
+IMP_API void imp_walks_destroy(imp_walks *walks);
+
+struct imp_walks_info {
+    size_t size;
+    int n_sensors; /**< with kept walks */
+    int spp;       /**< walks of a pixel, of the first of these sensors */
+    uint64_t seed;
+    double n_walks, n_vertices, bytes;
+    double survival; /**< floor of roulette; 0: none */
+    int losses;      /**< as of imp_walks_options */
+};
+/** Set info->size first. @return IMP_OK; IMP_E_ARG. */
+IMP_API enum imp_status imp_walks_get_info(const imp_walks *walks,
+                                           struct imp_walks_info *info);
+
+/** The scene in which they are evaluated; belongs to the walks where these were read from
+ * a file, and has neither shapes nor rays then. */
+IMP_API imp_scene *imp_walks_scene(const imp_walks *walks);
+
+struct imp_walks_weight {
+    size_t size;
+    /** Effective sample size as a fraction of the walks, from 0 to 1: of the densities'
+     * ratios w = p(theta')/p(theta), (sum w)^2/(n sum w^2). It says which of two draws is
+     * better, not how large a variance is. */
+    double ess;
+    /** Growth of the second moment from step to step of roulette, estimated; from 1 on,
+     * walks without a last depth have no finite variance. 0: no roulette. */
+    double growth;
+    double n_walks;      /**< that were looked at */
+    const char *refused; /**< why they are not evaluated at these parameters; NULL: they
+                              are. Of this thread, until its next call. */
+};
+#define IMP_WALKS_WEIGHT_INIT                                                            \
+    {                                                                                    \
+        sizeof(struct imp_walks_weight), 0, 0, 0, 0                                      \
+    }
+/** What the walks of a sensor are worth at the scene's present parameters.
+ * @param mask [height][width]: pixels with 0 are left out; NULL: none are.
+ * @param[out] weight set its size first.
+ * @return IMP_OK, also where they are refused; IMP_E_ARG if there are none of this
+ *         sensor; IMP_E_NOMEM. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_walks_weigh(const imp_walks *walks, int sensor,
+                                                       const float *mask,
+                                                       struct imp_walks_weight *weight);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

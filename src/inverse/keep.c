@@ -1,0 +1,270 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Walks are drawn and kept (walk/store.h), by all threads, tile by tile. Of a team, every
+ * rank keeps all of them, and evaluates its share. */
+#include "keep.h"
+#include "base/arguments.h"
+#include "base/team.h"
+#include "estimate.h"
+#include "film/film_filter.h"
+#include "film/film_measure.h"
+#include "walk/run.h"
+#include <string.h>
+
+#define SURVIVAL 0.8
+#define ESS      0.5
+#define MEMORY   0x1p30
+
+/* ---- Their numbers --------------------------------------------------------------- */
+
+struct numbers {
+    imp_context *ctx;
+    int64_t *sample;
+    size_t n, cap;
+};
+
+static enum imp_status number_add(struct numbers *s, int64_t k)
+{
+    int64_t *grown = imp__grow(s->ctx, s->sample, &s->cap, s->n + 1, sizeof *grown);
+    if (!grown) return imp__error(s->ctx, IMP_E_NOMEM, "no memory for kept walks");
+    s->sample = grown;
+    grown[s->n++] = k;
+    return IMP_OK;
+}
+
+/* Of a picture: 0, 1, 2, ...; of independent ones enough for losses of all kinds. */
+static enum imp_status numbers_of(const struct imp_scene *scene, int sensor,
+                                  const struct imp_walks *w, struct numbers *out)
+{
+    const struct imp__target l2 = {.desc = {.sensor = sensor, .loss = IMP_LOSS_L2}};
+    const struct imp__target log = {.desc = {.sensor = sensor, .loss = IMP_LOSS_LOG}};
+    struct imp_run run = w->run;
+    run.sensor = sensor;
+    const int spp = run.spp > 0 ? run.spp : scene->sensors[sensor]->spp;
+    const bool sobol = imp__points_of(scene->sensors[sensor], &run) == IMP_POINTS_SOBOL;
+    if (w->losses && sobol) {
+        run.walks = w;
+        const struct imp__replicates r = imp__replicates_of(scene, &l2, &run);
+        for (int b = 0; b < r.R; b++)
+            for (int s = 0; s < r.m; s++) {
+                const int n = imp__replicates_set(r, s + 1) - imp__replicates_set(r, s);
+                for (int i = 0; i < n; i++)
+                    IMP_CHECKED(number_add(out, imp__replicates_first(r, b, s) + i));
+            }
+        return IMP_OK;
+    }
+    int64_t n = spp;
+    if (w->losses) {
+        const struct imp__replicates plans[] = {imp__replicates_of(scene, &l2, &run),
+                                                imp__replicates_of(scene, &log, &run),
+                                                imp__replicates_of(scene, NULL, &run),
+                                                imp__replicates_normal(scene, &l2, &run)};
+        for (size_t k = 0; k < imp_count(plans); k++)
+            n = imp_max(n, (int64_t)plans[k].n * plans[k].R);
+    }
+    for (int64_t k = 0; k < n; k++) IMP_CHECKED(number_add(out, k));
+    return IMP_OK;
+}
+
+/* ---- Drawing --------------------------------------------------------------------- */
+
+struct filling {
+    struct imp_store *store;
+    struct imp_tracer tracer;
+    struct imp_arena *arenas; /* [threads] */
+};
+
+static enum imp_status tile_fill(size_t item, int worker, int slot, void *payload)
+{
+    (void)slot;
+    struct filling *f = payload;
+    return imp__store_fill(f->store, &f->tracer, &f->arenas[worker], item);
+}
+
+static enum imp_status store_fill(imp_context *ctx, const struct imp_run *run,
+                                  struct filling *f)
+{
+    enum imp_status st = IMP_OK;
+    const double walks = (double)f->store->width * f->store->height * (double)f->store->n;
+    const struct imp_loop loop = {.n_items = imp__store_tiles(f->store),
+                                  .work = tile_fill,
+                                  .payload = f,
+                                  .progress = run->progress,
+                                  .progress_payload = run->progress_payload,
+                                  .stage = "walks",
+                                  .rate_unit = "walks",
+                                  .units = walks,
+                                  .fraction_lo = 0,
+                                  .fraction_hi = 1,
+                                  .start_s = imp__now()};
+    f->arenas = imp__alloc(ctx, (size_t)ctx->threads, sizeof *f->arenas);
+    if (!f->arenas) return imp__error(ctx, IMP_E_NOMEM, "no memory for kept walks");
+    for (int k = 0; k < ctx->threads; k++) imp__arena_init(&f->arenas[k], ctx);
+    st = imp__parallel(ctx, &loop, NULL);
+    for (int k = 0; k < ctx->threads; k++) imp__arena_free(&f->arenas[k]);
+    imp__release(ctx, f->arenas);
+    return st;
+}
+
+static enum imp_status sensor_keep(struct imp_walks *w, const struct imp_active *active,
+                                   int index, size_t budget)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_scene *scene = w->scene;
+    const struct imp_sensor *sensor = scene->sensors[index];
+    struct numbers numbers = {.ctx = w->ctx};
+    struct imp_run run = w->run;
+    struct imp_store *store = &w->stores[w->n_stores];
+    struct filling f = {.store = store};
+    run.sensor = index;
+    IMP_TRY(numbers_of(scene, index, w, &numbers));
+    f.tracer =
+        (struct imp_tracer){.scene = scene,
+                            .integrator = w->integrator,
+                            .sensor = sensor,
+                            .active = active,
+                            .seed = run.seed,
+                            .guide = imp__guide_of(scene, w->integrator, run.guide),
+                            .collisions_stand = true,
+                            .survival = w->survival};
+    imp__tracer_numbers(&f.tracer, &run, w->losses ? 0 : (int64_t)numbers.n);
+    if (w->losses) f.tracer.set = 1;
+    IMP_TRY(imp__store_create(&f.tracer, index,
+                              sensor->film.sample_border ? imp__film_border(&sensor->film)
+                                                         : 0,
+                              numbers.sample, numbers.n, budget, store));
+    w->n_stores++;
+    if (w->losses && f.tracer.points) {
+        const struct imp__target l2 = {.desc = {.sensor = index}};
+        run.walks = w;
+        const struct imp__replicates r = imp__replicates_of(scene, &l2, &run);
+        store->set = r.n / r.m;
+    }
+    IMP_TRY(store_fill(w->ctx, &w->run, &f));
+out:
+    imp__release(w->ctx, numbers.sample);
+    return st;
+}
+
+/* ---- All of them ----------------------------------------------------------------- */
+
+/* Those with a derivative that is one of frozen walks. */
+static enum imp_status chosen_make(struct imp_walks *w)
+{
+    const struct imp_scene *scene = w->scene;
+    w->chosen = imp__alloc(w->ctx, scene->n_params + 1, 1);
+    w->theta = imp__alloc(w->ctx, scene->n_theta + 1, sizeof *w->theta);
+    if (!w->chosen || !w->theta)
+        return imp__error(w->ctx, IMP_E_NOMEM, "no memory for kept walks");
+    for (size_t k = 0; k < scene->n_params; k++) {
+        const struct imp_param *p = &scene->params[k];
+        w->chosen[k] = (p->info.flags & IMP_PARAM_DIFFERENTIABLE) && !p->probed;
+        for (size_t e = 0; e < p->info.count; e++)
+            w->theta[p->info.offset + e] = imp__param_get(p, e);
+    }
+    for (int b = 0; b < scene->n_bodies; b++)
+        for (int k = 0; k < scene->bodies[b]->n_numbers; k++)
+            if (scene->bodies[b]->numbers[k].param >= 0)
+                w->chosen[scene->bodies[b]->numbers[k].param] = 0;
+    return IMP_OK;
+}
+
+enum imp_status imp__walks_begin(imp_scene *scene, const struct imp_run *run,
+                                 const struct imp_walks_options *o, imp_walks **out)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = scene->ctx;
+    const struct imp_walk_integrator *integrator =
+        scene->integrator ? imp__walk_integrator_of(scene->integrator) : NULL;
+    struct imp_walks *w;
+    if (!integrator)
+        return imp__error(ctx, IMP_E_UNSUPPORTED,
+                          "walks are kept of path, direct, volpath, photons and stam");
+    IMP_CHECKED(imp__walks_from(scene, integrator, run->from, &integrator));
+    if (integrator->from_lights)
+        return imp__error(ctx, IMP_E_UNSUPPORTED,
+                          "walks from the lights are not kept; let them begin at the "
+                          "sensor");
+    w = imp__alloc(ctx, 1, sizeof *w);
+    if (!w) return imp__error(ctx, IMP_E_NOMEM, "no memory for kept walks");
+    *w = (struct imp_walks){.ctx = ctx,
+                            .scene = scene,
+                            .run = *run,
+                            .losses = o->losses != 0,
+                            .survival = o->survival < 0 ? 0 : o->survival,
+                            .ess = o->ess,
+                            .integrator = integrator};
+    w->stores = imp__alloc(ctx, (size_t)scene->n_sensors + 1, sizeof *w->stores);
+    if (!w->stores) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for kept walks"));
+    IMP_TRY(chosen_make(w));
+    IMP_TRY(imp__densities_create(scene, integrator, w->survival, &w->densities));
+    *out = w;
+    return IMP_OK;
+out:
+    imp__walks_destroy(w);
+    return st;
+}
+
+enum imp_status imp__walks_make(imp_scene *scene, const struct imp_run *run,
+                                const struct imp_walks_options *o, const uint8_t *sensors,
+                                imp_walks **out)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_walks *w = NULL;
+    struct imp_active active = {0};
+    double left = o->memory;
+    if (imp__team_apart(scene->ctx))
+        return imp__error(scene->ctx, IMP_E_UNSUPPORTED, "walks are not kept in parts");
+    IMP_TRY(imp__walks_begin(scene, run, o, &w));
+    IMP_TRY(imp__active_create(scene, w->chosen, &active));
+    for (int k = 0; k < scene->n_sensors; k++) {
+        if (!sensors[k]) continue;
+        IMP_TRY(sensor_keep(w, &active, k, (size_t)fmin(left, 0x1p62)));
+        left -= (double)w->stores[w->n_stores - 1].bytes;
+    }
+    w->run.progress = NULL; /* of this call alone */
+    w->run.guide = NULL;
+    *out = w;
+    w = NULL;
+out:
+    imp__active_destroy(scene->ctx, &active);
+    imp__walks_destroy(w);
+    return st;
+}
+
+enum imp_status imp_walks_keep(imp_scene *scene, const struct imp_run *run,
+                               const struct imp_walks_options *options, imp_walks **out)
+{
+    struct imp_run own;
+    struct imp_walks_options o = IMP_WALKS_OPTIONS_INIT;
+    IMP_REQUIRE(NULL, scene, "scene");
+    imp_context *ctx = scene->ctx;
+    IMP_REQUIRE(ctx, out, "out");
+    IMP_RUN(ctx, own, run);
+    IMP_OPTIONS(ctx, o, options, "options");
+    IMP_FLOAT_MODE;
+    IMP_READS(scene);
+    enum imp_status st = IMP_OK;
+    const struct imp_sensor *sensor;
+    uint8_t *sensors = NULL;
+    if (!(o.memory >= 0) || !(o.survival <= 1) || !(o.ess >= 0 && o.ess <= 1) ||
+        isinf(o.memory))
+        return imp__error(ctx, IMP_E_ARG,
+                          "options: memory %g, survival %g or ess %g is out of range",
+                          o.memory, o.survival, o.ess);
+    if (own.walks || own.time_limit_s > 0)
+        return imp__error(ctx, IMP_E_ARG,
+                          "walks that are kept are traced, as many as run->spp says");
+    if (o.memory == 0) o.memory = MEMORY;
+    if (o.survival == 0) o.survival = SURVIVAL;
+    if (o.ess == 0) o.ess = ESS;
+    IMP_TRY(imp__run_sensor(scene, &own, &sensor));
+    sensors = imp__alloc(ctx, (size_t)scene->n_sensors, 1);
+    if (!sensors) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for kept walks"));
+    for (int k = 0; k < scene->n_sensors; k++)
+        sensors[k] = o.all_sensors || k == own.sensor;
+    IMP_TRY(imp__walks_make(scene, &own, &o, sensors, out));
+out:
+    imp__release(ctx, sensors);
+    return st;
+}

@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef IMP_INVERSE_KEEP_H
+#define IMP_INVERSE_KEEP_H
+
+#include "walk/store.h"
+
+/* The walks of some sensors, marked [n_sensors], drawn at the scene's present parameters.
+ * options have their defaults filled in; run->sensor is ignored. As of imp_walks_keep. */
+enum imp_status imp__walks_make(imp_scene *scene, const struct imp_run *run,
+                                const struct imp_walks_options *options,
+                                const uint8_t *sensors, imp_walks **out);
+/* Everything but walks: the parameters that may change, and densities. */
+enum imp_status imp__walks_begin(imp_scene *scene, const struct imp_run *run,
+                                 const struct imp_walks_options *options,
+                                 imp_walks **out);
+
+#endif

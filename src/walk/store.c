@@ -1,0 +1,134 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "store.h"
+#include <assert.h>
+#include <string.h>
+
+enum imp_status imp__store_create(const struct imp_tracer *tracer, int index, int margin,
+                                  const int64_t *samples, size_t n, size_t budget,
+                                  struct imp_store *out)
+{
+    enum imp_status st = IMP_OK;
+    const struct imp_film_desc *film = &tracer->sensor->film;
+    imp_context *ctx = tracer->scene->ctx;
+    struct imp_store s = {.ctx = ctx,
+                          .sensor = tracer->sensor,
+                          .index = index,
+                          .width = film->crop_w,
+                          .height = film->crop_h,
+                          .margin = margin,
+                          .n = n,
+                          .budget = budget};
+    s.across = (s.width + 2 * margin + IMP_STORE_SIDE - 1) / IMP_STORE_SIDE;
+    s.down = (s.height + 2 * margin + IMP_STORE_SIDE - 1) / IMP_STORE_SIDE;
+    s.sample = imp__alloc(ctx, n, sizeof *s.sample);
+    s.records = imp__alloc(ctx, imp__store_tiles(&s), sizeof *s.records);
+    if (!s.sample || !s.records)
+        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for kept walks"));
+    memcpy(s.sample, samples, n * sizeof *samples);
+    IMP_TRY(imp__record_create(tracer, budget, &s.records[0]));
+    for (size_t k = 1; k < imp__store_tiles(&s); k++) s.records[k] = s.records[0];
+    *out = s;
+    return IMP_OK;
+out:
+    imp__release(ctx, s.sample);
+    imp__release(ctx, s.records);
+    return st;
+}
+
+void imp__store_destroy(struct imp_store *s)
+{
+    if (!s->ctx) return;
+    for (size_t k = 0; k < imp__store_tiles(s); k++) imp__record_destroy(&s->records[k]);
+    imp__release(s->ctx, s->sample);
+    imp__release(s->ctx, s->records);
+    s->ctx = NULL;
+}
+
+/* Pixels of a tile: [x0, x1) x [y0, y1), from the crop's corner. */
+struct tile {
+    int x0, y0, x1, y1;
+};
+static struct tile tile_at(const struct imp_store *s, size_t k)
+{
+    const int x0 = (int)(k % (size_t)s->across) * IMP_STORE_SIDE - s->margin;
+    const int y0 = (int)(k / (size_t)s->across) * IMP_STORE_SIDE - s->margin;
+    return (struct tile){x0, y0, imp_min(x0 + IMP_STORE_SIDE, s->width + s->margin),
+                         imp_min(y0 + IMP_STORE_SIDE, s->height + s->margin)};
+}
+
+/* Does the walk have a step that roulette could have ended? */
+static bool was_played(const struct imp_walk *w)
+{
+    for (const struct imp_vertex *v = w->first; v; v = v->next)
+        if (v->d.goes_on && v->d.survive < 1) return true;
+    return false;
+}
+
+enum imp_status imp__store_fill(struct imp_store *s, const struct imp_tracer *tracer,
+                                struct imp_arena *arena, size_t k)
+{
+    enum imp_status st = IMP_OK;
+    const struct tile t = tile_at(s, k);
+    struct imp_record *r = &s->records[k];
+    bool roulette = false;
+    for (int y = t.y0; y < t.y1; y++)
+        for (int x = t.x0; x < t.x1; x++)
+            for (size_t i = 0; i < s->n; i++) {
+                const struct imp_arena_mark mark = imp__arena_mark(arena);
+                struct imp_walk w;
+                imp__walk_trace(tracer, arena, x, y, s->sample[i], &w);
+                if (!roulette) roulette = was_played(&w);
+                st = imp__record_keep(r, &w, s->sample[i]);
+                imp__arena_rewind(arena, mark);
+                if (st == IMP_E_NOMEM) goto full;
+                if (st != IMP_OK) return st;
+            }
+    IMP_TRY(imp__record_trim(r));
+    if (roulette) atomic_store(&s->roulette, true);
+    if (atomic_fetch_add(&s->bytes, imp__record_bytes(r)) + imp__record_bytes(r) <=
+        s->budget)
+        return IMP_OK;
+full:;
+    const double walks = (double)(s->width + 2 * s->margin) *
+                         (double)(s->height + 2 * s->margin) * (double)s->n;
+    return imp__error(s->ctx, IMP_E_NOMEM,
+                      "%.4g kept walks need about %.3g MB; %.3g MB are allowed", walks,
+                      walks * (double)imp__record_bytes(r) /
+                          (double)imp_max(r->n_walks, (size_t)1) / 1e6,
+                      (double)s->budget / 1e6);
+out:
+    return st;
+}
+
+int64_t imp__store_find(const struct imp_store *s, int64_t sample)
+{
+    if (sample >= 0 && (uint64_t)sample < s->n && s->sample[sample] == sample)
+        return sample;
+    size_t lo = 0, hi = s->n;
+    while (lo < hi) {
+        const size_t middle = (lo + hi) / 2;
+        if (s->sample[middle] < sample) lo = middle + 1;
+        else hi = middle;
+    }
+    return lo < s->n && s->sample[lo] == sample ? (int64_t)lo : -1;
+}
+
+void imp__store_walk_at(const struct imp_tracer *tracer, struct imp_arena *arena, int x,
+                        int y, int64_t at, struct imp_walk *walk)
+{
+    const struct imp_store *s = tracer->kept;
+    const int column = x + s->margin, row = y + s->margin;
+    const size_t k = (size_t)(row / IMP_STORE_SIDE) * (size_t)s->across +
+                     (size_t)(column / IMP_STORE_SIDE);
+    assert(at >= 0 && (uint64_t)at < s->n && column >= 0 && row >= 0 &&
+           k < imp__store_tiles(s));
+    const struct tile t = tile_at(s, k);
+    const size_t pixel = (size_t)(y - t.y0) * (size_t)(t.x1 - t.x0) + (size_t)(x - t.x0);
+    imp__record_walk(&s->records[k], pixel * s->n + (size_t)at, tracer, arena, walk);
+}
+
+void imp__store_walk(const struct imp_tracer *tracer, struct imp_arena *arena, int x,
+                     int y, int64_t sample, struct imp_walk *walk)
+{
+    imp__store_walk_at(tracer, arena, x, y, imp__store_find(tracer->kept, sample), walk);
+}

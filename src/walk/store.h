@@ -1,0 +1,131 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * All kept walks of one sensor: a record for each tile of its film, made by one thread
+ * each, so that walks and their order do not depend on the number of threads. A tracer
+ * with `kept` set evaluates them where it would trace. */
+#ifndef IMP_WALK_STORE_H
+#define IMP_WALK_STORE_H
+
+#include "record.h"
+#include <importon/walks.h>
+#include <stdatomic.h>
+
+#define IMP_STORE_SIDE 8 /* pixels of a tile */
+
+/* Steps from materials of class a to class b, of those that roulette looked at. */
+#define IMP_STORE_CLASSES 32
+
+struct imp_store {
+    imp_context *ctx;
+    const struct imp_sensor *sensor;
+    int index;         /* of the sensor */
+    int width, height; /* of the film's crop, and pixels sampled beyond it: */
+    int margin;
+    int across, down; /* tiles */
+    size_t n;         /* walks of a pixel */
+    int set;          /* of them that depend on each other; 0: as of a picture */
+    int64_t *sample;  /* [n] their numbers, ascending */
+    struct imp_record *records; /* [across down] */
+    size_t budget;
+    atomic_size_t bytes;  /* so far */
+    atomic_bool roulette; /* some step had a survival below 1 */
+};
+
+/* Empty. samples [n], ascending, are copied; IMP_E_UNSUPPORTED as of imp__record_create. */
+enum imp_status imp__store_create(const struct imp_tracer *tracer, int index, int margin,
+                                  const int64_t *samples, size_t n, size_t budget,
+                                  struct imp_store *out);
+void imp__store_destroy(struct imp_store *store);
+static inline size_t imp__store_tiles(const struct imp_store *s)
+{
+    return (size_t)s->across * (size_t)s->down;
+}
+
+/* Trace and keep the walks of a tile. Tiles may be made by several threads at once.
+ * IMP_E_NOMEM beyond the budget, with an estimate of what all of them need. */
+enum imp_status imp__store_fill(struct imp_store *store, const struct imp_tracer *tracer,
+                                struct imp_arena *arena, size_t tile);
+
+/* Place of a walk with this number in its pixel; -1: it was not kept. */
+int64_t imp__store_find(const struct imp_store *store, int64_t sample);
+
+/* As imp__walk_trace, of the tracer's kept walks: with that number, or the k-th of its
+ * pixel. */
+void imp__store_walk(const struct imp_tracer *tracer, struct imp_arena *arena, int x,
+                     int y, int64_t sample, struct imp_walk *walk);
+void imp__store_walk_at(const struct imp_tracer *tracer, struct imp_arena *arena, int x,
+                        int y, int64_t k, struct imp_walk *walk);
+
+/* ---- Densities (store_weight.c) -------------------------------------------------- */
+
+/* What the densities of walks depend on. */
+struct imp_densities {
+    const struct imp_scene *scene;
+    const struct imp_walk_integrator *integrator;
+    double survival;  /* of the tracer they were drawn with */
+    uint32_t *inputs; /* [n_bsdfs] bit j: the density depends on input j */
+    uint8_t *moved;   /* [n_bsdfs] it has changed */
+    bool any;         /* of moved */
+    bool weights;     /* some value that roulette looks at has changed */
+};
+enum imp_status imp__densities_create(const struct imp_scene *scene,
+                                      const struct imp_walk_integrator *integrator,
+                                      double survival, struct imp_densities *out);
+void imp__densities_destroy(imp_context *ctx, struct imp_densities *d);
+/* changed [n_params]: parameters whose numbers are not those that walks were drawn at. */
+void imp__densities_move(struct imp_densities *d, const uint8_t *changed);
+
+/* Sums over walks of the ratio of densities w = p(theta')/p(theta), and over steps that
+ * roulette looked at of what they add to the second moment. */
+struct imp_moments {
+    double n, w, w2;
+    double steps[IMP_STORE_CLASSES];                        /* from class a */
+    double growth[IMP_STORE_CLASSES][IMP_STORE_CLASSES][4]; /* from a to b, by lane */
+};
+/* Adds the walks of a tile; mask [height][width]: pixels with 0 are left out; NULL: none
+ * are. */
+enum imp_status imp__store_moments(const struct imp_store *store,
+                                   const struct imp_densities *d,
+                                   const struct imp_tracer *tracer,
+                                   struct imp_arena *arena, size_t tile,
+                                   const float *mask, struct imp_moments *sum);
+/* ---- All of a scene (kept_use.c) -------------------------------------------------- */
+
+struct imp_walks {
+    imp_context *ctx;
+    imp_scene *scene; /* that they are evaluated in */
+    bool owns_scene;  /* it was read with them */
+    struct imp_run
+        run;     /* seed, samples, points and wavelengths that they were drawn with */
+    bool losses; /* numbers of samples are those of losses */
+    double survival, ess;
+    const struct imp_walk_integrator *integrator;
+    double *theta;   /* [n_theta] where they were drawn */
+    uint8_t *chosen; /* [n_params] parameters that may change */
+    int n_stores;
+    struct imp_store *stores;
+    struct imp_densities densities; /* its `moved` is of nobody: see imp__walks_weigh */
+};
+void imp__walks_destroy(struct imp_walks *walks);
+/* The walks of a sensor; NULL: there are none. */
+const struct imp_store *imp__walks_store(const struct imp_walks *walks,
+                                         const struct imp_sensor *sensor);
+/* A run of these walks: its seed, samples, points and wavelengths are theirs. */
+enum imp_status imp__walks_run(imp_context *ctx, const char *function,
+                               struct imp_run *run);
+/* tracer->kept, where run->walks is set. IMP_E_ARG: they are another scene's, or none of
+ * this sensor. IMP_E_UNSUPPORTED: a parameter has changed, or is active, with which they
+ * say nothing. IMP_E_NUMERIC: too few of them count now, or their variance is infinite. */
+enum imp_status imp__walks_use(const struct imp_run *run, struct imp_tracer *tracer);
+/* What they are worth at the scene's present parameters; mask as of imp__store_moments. */
+enum imp_status imp__walks_weigh(const struct imp_walks *walks,
+                                 const struct imp_store *store, const float *mask,
+                                 struct imp_walks_weight *out);
+/* The parameters whose numbers have changed, [n_params]; IMP_E_UNSUPPORTED as above. */
+enum imp_status imp__walks_changed(const struct imp_walks *walks, uint8_t *changed);
+
+/* Spectral radius of the growth of the second moment from step to step: 1 and more, and
+ * the variance of walks of any length is infinite. 0: roulette looked at no step. */
+double imp__moments_radius(const struct imp_moments *sum);
+
+#endif

@@ -1,0 +1,316 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * How far kept walks are from those that would be drawn now. The densities of a walk at
+ * theta' over those at theta, that it was drawn with, are
+ *
+ *     w = prod over steps of  p(theta')/p(theta)  s(theta')/s(theta)
+ *
+ * one positive number a walk, and the effective sample size of n walks is
+ * (sum w)^2/(n sum w^2) of n. It ranks draws: where it is below .8 a new draw is worth its
+ * price. A direction that another density than the BSDF's drew counts 1, since the choice
+ * of the density is part of the draw.
+ *
+ * No sample shows that a variance is infinite. A step that is survived with probability q
+ * adds to the second moment of the throughput the factor f'^2/(p^2 q); from materials a to
+ * materials b these have the mean T_ab (0 where the walk leaves the scene), and the second
+ * moment grows from step to step as the spectral radius of T. The first step at which
+ * roulette plays in a walk is left out: it answers for the throughput of all before it. */
+#include "step.h"
+#include "store.h"
+#include <string.h>
+
+/* ---- What densities depend on ---------------------------------------------------- */
+
+#define TRIES 24 /* pairs of directions */
+
+/* A value of an input inside its bounds. */
+static imp_spec drawn_input(const struct imp_input_desc *d, uint64_t k)
+{
+    const double hi = d->hi > d->lo && isfinite(d->hi) ? d->hi : d->lo + 2;
+    const double lo = isfinite(d->lo) ? d->lo : 0;
+    imp_spec v = {0};
+    for (int c = 0; c < 4; c++)
+        v[c] = lo + (hi - lo) * (0.1 + 0.8 * imp__u01((struct imp_key){k}, (uint32_t)c));
+    return d->flags & IMP_INPUT_SCALAR ? imp__spec(v[0]) : v;
+}
+
+/* Declaration of input j of b, its children's included. */
+static const struct imp_input_desc *desc_of(const struct imp_bsdf *b, int j)
+{
+    if (j < b->n_own) {
+        for (int k = 0, n = 0; b->ops->inputs && b->ops->inputs[k].name; k++)
+            if (n++ == j) return &b->ops->inputs[k];
+        return NULL;
+    }
+    for (int k = b->n_child - 1; k >= 0; k--)
+        if (j >= b->child_in[k]) return desc_of(b->child[k], j - b->child_in[k]);
+    return NULL;
+}
+
+/* Does it derive something from its inputs once for all directions? */
+static bool derives(const struct imp_bsdf *b)
+{
+    if (b->ops->changed) return true;
+    for (int k = 0; k < b->n_child; k++)
+        if (derives(b->child[k])) return true;
+    return false;
+}
+
+/* Does the density differ where input j does? Found by trying: kinds do not declare it. */
+static bool depends(const struct imp_bsdf *b, int j)
+{
+    const struct imp_input_desc *own = desc_of(b, j);
+    imp_spec in[IMP_INPUTS_MAX];
+    if (!own || derives(b)) return true;
+    for (uint64_t k = 0; k < TRIES; k++) {
+        const struct imp_key key = {0x9e3779b97f4a7c15u * (k + 1)};
+        for (int i = 0; i < b->n_in; i++) {
+            const struct imp_input_desc *d = desc_of(b, i);
+            in[i] = d ? drawn_input(d, key.state + 64 * (uint64_t)i) : imp__spec(0.5);
+        }
+        double z[2], phi[2];
+        for (int i = 0; i < 2; i++) {
+            z[i] = 1 - 2 * imp__u01(key, 100 + (uint32_t)i);
+            phi[i] = 6.28 * imp__u01(key, 200 + (uint32_t)i);
+        }
+        if (k % 2) z[1] = copysign(z[1], z[0]); /* reflection too */
+        struct imp_dirs dirs = {.lobe = IMP_SMOOTH, .derivative = true};
+        const double r0 = sqrt(1 - z[0] * z[0]), r1 = sqrt(1 - z[1] * z[1]);
+        dirs.wo = imp__v3(r0 * cos(phi[0]), r0 * sin(phi[0]), z[0]);
+        dirs.wi = k % 3 ? imp__v3(r1 * cos(phi[1]), r1 * sin(phi[1]), z[1])
+                        : imp__v3(-dirs.wo[0], -dirs.wo[1], dirs.wo[2]);
+        const int lobes = b->flags & IMP_BSDF_DELTA ? imp_max(b->n_lobes, 2) : 0;
+        for (int lobe = IMP_SMOOTH; lobe < lobes; lobe++) {
+            dirs.lobe = lobe;
+            const imp_spec before = in[j];
+            const double p = b->ops->pdf(b, in, &dirs);
+            in[j] = drawn_input(own, key.state + 7777 + (uint64_t)j);
+            const double q = b->ops->pdf(b, in, &dirs);
+            in[j] = before;
+            if (p != q) return true;
+        }
+    }
+    return false;
+}
+
+enum imp_status imp__densities_create(const struct imp_scene *scene,
+                                      const struct imp_walk_integrator *integrator,
+                                      double survival, struct imp_densities *out)
+{
+    struct imp_densities d = {
+        .scene = scene, .integrator = integrator, .survival = survival};
+    const size_t n = (size_t)scene->n_bsdfs + 1;
+    d.inputs = imp__alloc(scene->ctx, n, sizeof *d.inputs);
+    d.moved = imp__alloc(scene->ctx, n, sizeof *d.moved);
+    if (!d.inputs || !d.moved) {
+        imp__densities_destroy(scene->ctx, &d);
+        return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for kept walks");
+    }
+    for (int b = 0; b < scene->n_bsdfs; b++) {
+        const struct imp_bsdf *bsdf = scene->bsdfs[b];
+        const bool medium = bsdf->ops->inputs == NULL && bsdf->n_in > 0;
+        for (int j = 0; j < bsdf->n_in; j++)
+            if (medium || bsdf->shaped || depends(bsdf, j))
+                d.inputs[b] |= UINT32_C(1) << j;
+    }
+    *out = d;
+    return IMP_OK;
+}
+
+void imp__densities_destroy(imp_context *ctx, struct imp_densities *d)
+{
+    imp__release(ctx, d->inputs);
+    imp__release(ctx, d->moved);
+    d->inputs = NULL;
+    d->moved = NULL;
+}
+
+void imp__densities_move(struct imp_densities *d, const uint8_t *changed)
+{
+    d->any = d->weights = false;
+    for (int b = 0; b < d->scene->n_bsdfs; b++) {
+        const struct imp_bsdf *bsdf = d->scene->bsdfs[b];
+        d->moved[b] = 0;
+        for (int j = 0; j < bsdf->n_in; j++) {
+            if (!imp__input_depends(bsdf->input[j], changed)) continue;
+            d->weights = true;
+            d->moved[b] |= d->inputs[b] >> j & 1;
+        }
+        d->any |= d->moved[b];
+    }
+}
+
+/* ---- Walks ----------------------------------------------------------------------- */
+
+static int class_of(const struct imp_bsdf *b)
+{
+    return b && b->index >= 0 ? b->index % IMP_STORE_CLASSES : 0;
+}
+
+/* A vertex that is looked at. */
+struct looked {
+    const struct imp_bsdf *bsdf;
+    const struct imp_carried *carried;
+    imp_spec in[IMP_INPUTS_MAX];
+    struct imp_dirs dirs;
+};
+
+static void look(const struct imp_scene *scene, const struct imp_decision *d,
+                 struct looked *v)
+{
+    const struct imp_shape *shape =
+        d->scatterer == IMP_IN_MEDIUM ? NULL : scene->shapes[d->shape];
+    const struct imp_texcoord at = {.uv = {d->uv[0], d->uv[1]},
+                                    .p = imp__decided_v3(d->p),
+                                    .carried = v->carried,
+                                    .shape = shape};
+    imp__evaluate_inputs(v->bsdf, shape, &at, v->in);
+    v->dirs =
+        (struct imp_dirs){imp__decided_v3(d->wo), imp__decided_v3(d->wi), d->lobe, true};
+}
+
+/* Density now over the density when the direction was drawn. */
+static double density_ratio(const struct looked *v, const struct imp_decision *d)
+{
+    if (d->drawn != IMP_DENSITY_KERNEL || !(d->kernel > 0)) return 1;
+    double p;
+    if (imp_likely(!v->bsdf->shaped)) {
+        p = v->bsdf->ops->pdf(v->bsdf, v->in, &v->dirs);
+    } else {
+        imp_spec lanes;
+        imp__shaped_pdf(v->bsdf, v->carried, v->in, &v->dirs, &lanes);
+        p = lanes[imp__waves_drew(v->carried)];
+    }
+    return p / (double)d->kernel;
+}
+
+/* Survival that roulette would decide now (scatter.c). */
+static double survival_now(const struct imp_densities *m, const struct looked *v,
+                           imp_spec factor, imp_spec beta, double eta, bool four)
+{
+    double q;
+    if (m->integrator->photons) {
+        imp_spec H;
+        if (!v->bsdf->ops->directional_albedo ||
+            !v->bsdf->ops->directional_albedo(v->bsdf, v->in, &v->dirs.wo, &H))
+            H = factor;
+        q = fmin(1, imp__max_used(H, four) * m->integrator->h);
+    } else {
+        q = fmin(imp__max_used(beta, four) * eta * eta, 0.95);
+    }
+    return fmax(q, m->survival);
+}
+
+/* w of the walk's own vertices, and its steps' share in the growth. */
+static double walk_weight(const struct imp_store *s, const struct imp_record *r,
+                          const struct imp_densities *m, const struct imp_record_walk *k,
+                          const struct imp_walk *walk, struct imp_moments *sum)
+{
+    const struct imp_carried *carried = walk->waves ? &walk->waves->carried : NULL;
+    const struct imp_scene *scene = m->scene;
+    const bool rolls = s->roulette && m->weights && !m->integrator->absorbs;
+    imp_spec beta = imp__spec(1);
+    double w = 1, eta = 1;
+    bool settled = false; /* roulette's first step answers for all before it */
+    for (uint32_t j = 0; j < k->n_vertices; j++) {
+        const struct imp_decision *d = imp__record_vertex(r, k->first + j);
+        struct looked v;
+        v.carried = carried;
+        v.bsdf = imp__decided_bsdf(scene, d);
+        if (!v.bsdf || !d->goes_on) continue;
+        const bool moved = v.bsdf->index >= 0 && m->moved[v.bsdf->index];
+        const bool own = rolls && j < k->n;
+        if (!moved && !own) continue;
+        look(scene, d, &v);
+        const double ratio = moved ? density_ratio(&v, d) : 1;
+        w *= ratio;
+        if (!own) continue;
+        imp_spec f;
+        imp__bsdf_eval(v.bsdf, carried, v.in, &v.dirs, &f);
+        const imp_spec step = f * (1 / (double)d->pdf);
+        imp_spec now = step * (1 / fmax(ratio, 1e-300));
+        const double stand_in = fmax(imp__max_used(now, carried != NULL), 0.5);
+        for (int c = 0; c < 4; c++)
+            if (now[c] == 0) now[c] = stand_in;
+        beta *= now;
+        if (v.bsdf->ops->index_ratio && !v.bsdf->shaped)
+            eta *= v.bsdf->ops->index_ratio(v.bsdf, v.in, &v.dirs);
+        if (!(d->survive < 1)) continue;
+        const double q = survival_now(m, &v, step, beta, eta, carried != NULL);
+        w *= q / (double)d->survive;
+        beta *= imp__spec(1 / q);
+        const bool first = !settled;
+        settled = true;
+        if (first) continue;
+        const int a = class_of(v.bsdf);
+        const struct imp_bsdf *next =
+            j + 1 < k->n
+                ? imp__decided_bsdf(scene, imp__record_vertex(r, k->first + j + 1))
+                : NULL;
+        sum->steps[a]++;
+        for (int c = 0; next && c < 4; c++)
+            sum->growth[a][class_of(next)][c] += step[c] * step[c] / (double)d->survive;
+    }
+    return w;
+}
+
+enum imp_status imp__store_moments(const struct imp_store *s,
+                                   const struct imp_densities *d,
+                                   const struct imp_tracer *tracer,
+                                   struct imp_arena *arena, size_t tile,
+                                   const float *mask, struct imp_moments *sum)
+{
+    const struct imp_record *r = &s->records[tile];
+    const int x0 = (int)(tile % (size_t)s->across) * IMP_STORE_SIDE - s->margin;
+    const int y0 = (int)(tile / (size_t)s->across) * IMP_STORE_SIDE - s->margin;
+    const int side = imp_min(IMP_STORE_SIDE, s->width + s->margin - x0);
+    for (size_t i = 0; i < r->n_walks; i++) {
+        const struct imp_record_walk *k = imp__record_at(r, i);
+        const int pixel = (int)(i / s->n);
+        const int x = imp_clamp(x0 + pixel % side, 0, s->width - 1);
+        const int y = imp_clamp(y0 + pixel / side, 0, s->height - 1);
+        struct imp_walk walk = {.key = k->key};
+        if (mask && !(mask[(size_t)y * (size_t)s->width + (size_t)x] > 0)) continue;
+        const struct imp_arena_mark mark = imp__arena_mark(arena);
+        if (tracer->wavelengths && !imp__walk_wave(tracer, arena, k->wave, &walk))
+            return imp__error(s->ctx, IMP_E_NOMEM, "no memory for a walk");
+        const double w = walk_weight(s, r, d, k, &walk, sum);
+        sum->n++;
+        sum->w += w;
+        sum->w2 += w * w;
+        imp__arena_rewind(arena, mark);
+    }
+    return IMP_OK;
+}
+
+double imp__moments_radius(const struct imp_moments *sum)
+{
+    double most = 0;
+    for (int c = 0; c < 4; c++) {
+        double x[IMP_STORE_CLASSES], radius = 0;
+        for (int a = 0; a < IMP_STORE_CLASSES; a++) x[a] = 1;
+        for (int round = 0; round < 100; round++) { /* power iteration */
+            double y[IMP_STORE_CLASSES], largest = 0;
+            for (int a = 0; a < IMP_STORE_CLASSES; a++) {
+                y[a] = 0;
+                for (int b = 0; sum->steps[a] > 0 && b < IMP_STORE_CLASSES; b++)
+                    y[a] += sum->growth[a][b][c] / sum->steps[a] * x[b];
+                largest = fmax(largest, y[a]);
+            }
+            if (!(largest > 0)) {
+                radius = 0;
+                break;
+            }
+            /* Shifted, so that classes that take turns do not oscillate. */
+            radius = largest;
+            double norm = 0;
+            for (int a = 0; a < IMP_STORE_CLASSES; a++) {
+                x[a] = y[a] + 0.1 * largest * x[a];
+                norm = fmax(norm, x[a]);
+            }
+            for (int a = 0; a < IMP_STORE_CLASSES; a++) x[a] /= norm;
+        }
+        most = fmax(most, radius);
+    }
+    return most;
+}
