@@ -5,22 +5,6 @@
  * describes the data. */
 "use strict";
 
-function verdict(fit) {
-    const lines = [];
-    if (is_number(fit.value)) lines.push(make("p", {}, `${fit.loss || "loss"} ${show_error(fit.value, fit.se)} after ${fit.iterations} iterations: ${fit.reason || ""}`));
-    if (is_number(fit.residual_hi)) {
-        const p = (x) => `${show(100 * x, 2)} %`;
-        lines.push(make("p", {class: fit.residual > 0.2 ? "warning" : ""}, fit.residual_hi <= 0 ? "The residual is within its noise."
-            : fit.residual_hi > 1.5 * fit.residual ? `The residual is below ${p(fit.residual_hi)} of the targets.` : `The residual is ${p(fit.residual)} of the targets.`));
-    }
-    if (is_number(fit.chi2_per_freedom)) lines.push(make("p", {}, fit.chi2_se < 1 || fit.chi2_per_freedom > 3 * fit.chi2_se
-        ? `Chi-square per degree of freedom: ${show_error(fit.chi2_per_freedom, fit.chi2_se)}.`
-        : "Chi-square needs more samples: the noise of the fit's own pictures is above the targets'."));
-    if (fit.warning) lines.push(make("p", {class: "warning"}, String(fit.warning)));
-    if (fit.complete === false) lines.push(make("p", {class: "warning"}, "The fit was interrupted; this is the state that it had reached."));
-    return lines;
-}
-
 /* Layers of all pictures, with residuals; messages of those that cannot be shown. */
 function all_layers(items) {
     const layers = [], failed = [], of = (kind) => items.filter((i) => i.kind === kind);
@@ -40,10 +24,11 @@ function all_layers(items) {
 
 /* Sections in their order: the kinds of items that each is made of, and the elements that
  * it makes. A section whose items change is made again, and the others stay. */
-const known_kinds = ["picture", "derivative", "fit", "check", "walks", "rays", "bend", "elements", "mesh", "image"];
+const known_kinds = ["picture", "explained", "derivative", "fit", "check", "walks", "rays", "bend", "elements", "mesh", "image"];
 const listed_kinds = ["bend", "elements"]; /* they have sections, and the answer is a table besides */
 const sections = [
-    {kinds: ["fit", "elements"], make: (report, of) => [make("header", {}, make("h1", {}, report.title || "importon report"), ...(of("fit").length && of("fit")[0].data ? verdict(of("fit")[0].data) : []),
+    {kinds: ["fit", "elements", "explained"], make: (report, of, page) => [make("header", {}, make("h1", {}, report.title || "importon report"), ...explained_lines(of("explained"), of("picture"), (r, view) => { if (page.pictures) page.pictures.show(view, "residual", Math.floor(r.x + r.width / 2), Math.floor(r.y + r.height / 2)); }),
+        ...(of("fit").length && of("fit")[0].data ? verdict(of("fit")[0].data) : []),
         ...of("elements").filter((i) => i.data).flatMap((i) => elements_verdict(i.data)))]},
     {kinds: ["picture", "derivative"], make: (report, of, page) => {
         const {layers, failed} = all_layers([...of("picture"), ...of("derivative")]);

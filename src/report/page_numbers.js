@@ -130,9 +130,10 @@ function loss_section(fit) {
     const finite = h.loss.filter(is_number);
     if (!finite.length) return null;
     const errors = se.filter((s) => is_number(s) && s > 0);
-    const largest = Math.max(...finite.map(Math.abs)) || 1;
-    const unit = Math.max(errors.length ? Math.min(...errors) : largest * 1e-6, largest * 1e-8);
-    const hi = 1.2 * Math.max(...finite, unit), lo = Math.min(...finite, 0) - 0.5 * unit;
+    const least_of = (v, start) => v.reduce((a, b) => Math.min(a, b), start), most_of = (v, start) => v.reduce((a, b) => Math.max(a, b), start);
+    const largest = most_of(finite.map(Math.abs), 0) || 1;
+    const unit = Math.max(errors.length ? least_of(errors, Infinity) : largest * 1e-6, largest * 1e-8);
+    const hi = 1.2 * most_of(finite, unit), lo = least_of(finite, 0) - 0.5 * unit;
     const bend = (y) => Math.asinh(y / (2 * unit));
     const y_at = (y) => ht - bottom - (ht - bottom - top) * (bend(Math.min(Math.max(y, lo), hi)) - bend(lo)) / (bend(hi) - bend(lo));
     const x_at = (i) => left + (w - left - right) * (n > 1 ? i / (n - 1) : 0.5);
@@ -163,28 +164,28 @@ function loss_section(fit) {
     const cursor = make_svg("line", {y1: top, y2: ht - bottom, class: "mark"});
     svg.append(cursor);
     const told = make("p", {class: "mono", "aria-live": "polite"});
-    const slider = make("input", {type: "range", min: 0, max: n - 1, value: n - 1, "aria-label": "iteration", input: () => go(Number(slider.value))});
+    const slider = make("input", {type: "range", min: 0, max: n, value: n, "aria-label": "iteration, and the answer behind the last", input: () => go(Number(slider.value))});
+    /* Stops 0 to n - 1 are iterations, n is the answer. */
     function go(i) {
-        cursor.setAttribute("x1", x_at(i));
-        cursor.setAttribute("x2", x_at(i));
-        told.textContent = `iteration ${i}: loss ${show_error(h.loss[i], se[i])}`;
-        const x = h.x && h.x[i], names = h.names || [];
-        if (!Array.isArray(x)) return;
-        const at = new Map(x.map((v, k) => [String(names[k]), v]));
-        document.dispatchEvent(new CustomEvent("iteration", {detail: i === n - 1 ? null : {iteration: i, at}}));
+        const at = x_at(Math.min(i, n - 1));
+        cursor.setAttribute("x1", at);
+        cursor.setAttribute("x2", at);
+        slider.setAttribute("aria-valuetext", i < n ? `iteration ${i}` : "the answer");
+        told.textContent = i < n ? `iteration ${i} of ${n - 1}: loss ${show_error(h.loss[i], se[i])}` : `the answer, after all iterations: loss ${show_error(fit.value, fit.se)}`;
+        const x = i < n && h.x ? h.x[i] : null, names = h.names || [];
+        document.dispatchEvent(new CustomEvent("iteration", {detail: Array.isArray(x) ? {iteration: i, at: new Map(x.map((v, k) => [String(names[k]), v]))} : null}));
     }
-    go(n - 1);
+    go(n);
     return make("section", {id: "loss"}, make("h2", {}, "Loss"), make("div", {class: "scroll"}, svg),
         n > 1 ? make("div", {class: "bar noprint"}, make("label", {}, "iteration ", slider), Array.isArray(h.x) ? make("span", {class: "faint"}, "the numbers above move with it") : null) : null, told,
+        Array.isArray(h.x) && n > 1 ? make("p", {class: "faint"}, `All ${h.x[0].length} numbers by iteration:`) : null,
         Array.isArray(h.x) && n > 1 ? make("div", {class: "traces"}, ...trace_figures(h)) : null);
 }
 
-/* Each number by iteration: those that move most of their own size first, at most 12. */
+/* Each number by iteration; a history has those of at most 64. */
 function trace_figures(h) {
     const names = Array.isArray(h.names) ? h.names : [], n = h.x.length, of = (k) => h.x.map((row) => row[k]);
-    const moved = (k) => { const v = of(k).filter(is_number), size = Math.max(...v.map(Math.abs)); return size > 0 ? (Math.max(...v) - Math.min(...v)) / size : 0; };
-    const order = h.x[0].map((_, k) => k).map((k) => [moved(k), k]).sort((a, b) => b[0] - a[0]).slice(0, 12).map(([, k]) => k).sort((a, b) => a - b);
-    return order.map((k) => {
+    return h.x[0].slice(0, rows_shown).map((_, k) => {
         const v = of(k), finite = v.filter(is_number), lo = Math.min(...finite), hi = Math.max(...finite), margin = 0.06 * (hi - lo) || Math.abs(hi) * 0.05 || 1;
         if (!finite.length) return null;
         const {svg, at} = plot_axes({width: 300, height: 150, x: [0, n - 1], y: [lo - margin, hi + margin], label: `${names[k] ?? k} by iteration`, left: 60});

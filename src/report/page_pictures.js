@@ -59,7 +59,7 @@ function picture_section(layers, live) {
             return;
         }
         const body = make("tbody");
-        for (const layer of of_view()) {
+        for (const layer of of_view().slice(0, rows_shown)) {
             if (state.px >= layer.width || state.py >= layer.height) continue;
             for (let c = 0; c < layer.count; c++)
                 body.append(make("tr", {}, make("td", {}, layer.name + (layer.count === 3 ? ` ${"RGB"[c]}` : "")),
@@ -167,6 +167,8 @@ function picture_section(layers, live) {
             make("label", {}, false_box, "false colour"), make("label", {}, beside_box, "side by side"),
             make("span", {class: "faint"}, "keys 1 to 9 change the layer; on the picture: arrows, + and -, 0; drag moves it")),
         make("div", {class: "stage"}, make("div", {}, canvases, scale_box), readout));
+    const bad = layers.filter((l) => l.not_finite > 0);
+    if (bad.length) section.append(make("p", {class: "warning"}, `Numbers that are not finite (NaN or infinite) are drawn in magenta: ${bad.slice(0, 5).map((l) => `${l.name}: ${l.not_finite}${l.not_finite === l.planes[0].length * l.of_channels ? ", all of it" : ""}`).join("; ")}.`));
     rebuild();
     /* New layers take the place of those with the same names; the rest of the view stays. */
     section.update = (fresh) => {
@@ -179,6 +181,13 @@ function picture_section(layers, live) {
         state.current = Math.max(at, 0);
         if (same) redraw();
         else rebuild();
+    };
+    /* The layer of a role, with a marked pixel. */
+    section.show = (view, role, x, y) => {
+        const layer = layers.find((l) => l.view === view && l.role === role) || layers.find((l) => l.view === view);
+        if (!layer) return;
+        [state.px, state.py] = [x, y];
+        section.choose(layer);
     };
     section.choose = (layer) => { state.view = layer.view; rebuild(); choose(of_view().indexOf(layer)); section.scrollIntoView(); };
     return section;

@@ -6,10 +6,12 @@
 #include "base/arguments.h"
 #include "base/film.h"
 #include "base/text.h"
+#include "explained.h"
 #include "json_text.h"
 #include "page_text.h"
 #include "planes.h"
 #include <importon/report.h>
+#include <math.h>
 #include <string.h>
 
 static void put_string(struct imp_text *t, const char *text)
@@ -34,7 +36,9 @@ static void put_film(struct imp_text *t, const struct imp_report_item *item)
         if (c) imp__put(t, ",");
         put_string(t, f->names[c]);
     }
-    imp__put(t, "],\"pixels\":\"");
+    size_t bad = 0;
+    for (size_t i = 0; i < imp__film_values(f); i++) bad += !isfinite(f->mean[i]);
+    imp__put(t, "],\"not_finite\":%zu,\"pixels\":\"", bad);
     const double scale = imp__planes_put(t, f, f->mean);
     imp__put(t, "\",\"scale\":%.17g", scale);
     if (!f->se) return;
@@ -130,10 +134,57 @@ static void fill(struct imp_file_writer *w, const void *payload)
     page_put(payload, put_file, w);
 }
 
+/* Pictures that are compared: one of each role a view. */
+struct compared {
+    const imp_film **picture, **target; /* [views] */
+    int *view;
+    size_t n;
+};
+
+static enum imp_status compared_take(imp_context *context, struct compared *c,
+                                     size_t most, const struct imp_report_item *item)
+{
+    size_t k = 0;
+    const bool picture = item->role && !strcmp(item->role, "picture"),
+               target = item->role && !strcmp(item->role, "target");
+    if (!item->film || !(picture || target)) return IMP_OK;
+    if (!c->view) {
+        c->view = imp__alloc(context, most, sizeof *c->view);
+        c->picture = imp__alloc(context, most, sizeof *c->picture);
+        c->target = imp__alloc(context, most, sizeof *c->target);
+        if (!c->view || !c->picture || !c->target)
+            return imp__error(context, IMP_E_NOMEM, "no memory for the page of a report");
+    }
+    while (k < c->n && c->view[k] != item->view) k++;
+    c->n = imp_max(c->n, k + 1);
+    c->view[k] = item->view;
+    if (picture && !c->picture[k]) c->picture[k] = item->film;
+    if (target && !c->target[k]) c->target[k] = item->film;
+    return IMP_OK;
+}
+
+static void compared_put(struct imp_text *t, const struct compared *c)
+{
+    for (size_t k = 0; k < c->n; k++) {
+        struct imp_text own = {.ctx = t->ctx};
+        if (c->picture[k] && c->target[k] &&
+            imp__explained_put(&own, c->picture[k], c->target[k])) {
+            imp__put(t, ",{\"kind\":\"explained\",\"view\":%d,\"data\":", c->view[k]);
+            t->failed = t->failed || !imp__bytes_add(t->ctx, &t->bytes, own.bytes.data,
+                                                     own.bytes.size);
+            imp__put(t, "}");
+        }
+        t->failed = t->failed || own.failed;
+        imp__bytes_free(t->ctx, &own.bytes);
+    }
+}
+
 /* The JSON of a report, whose options are the library's own. */
 static enum imp_status data_make(imp_context *context, const char *caller,
                                  const struct imp_report *r, struct imp_text *t)
 {
+    enum imp_status st = IMP_OK;
+    struct compared compared = {0};
     imp__put(t, "{\"schema\":\"importon-report\",\"version\":1,\"importon\":");
     put_string(t, imp_version());
     put_member(t, "title", r->title);
@@ -142,14 +193,20 @@ static enum imp_status data_make(imp_context *context, const char *caller,
     imp__put(t, ",\"items\":[");
     for (size_t i = 0; i < r->n_items; i++) {
         struct imp_report_item item = IMP_REPORT_ITEM_INIT;
-        IMP_CHECKED(imp__element_take(context, caller, "report->items", r->items, i,
-                                      &item, sizeof item));
-        IMP_CHECKED(put_item(t, &item, i));
+        IMP_TRY(imp__element_take(context, caller, "report->items", r->items, i, &item,
+                                  sizeof item));
+        IMP_TRY(put_item(t, &item, i));
+        IMP_TRY(compared_take(context, &compared, r->n_items, &item));
     }
+    compared_put(t, &compared);
     imp__put(t, "]}");
     if (t->failed)
-        return imp__error(context, IMP_E_NOMEM, "no memory for the page of a report");
-    return IMP_OK;
+        IMP_TRY(imp__error(context, IMP_E_NOMEM, "no memory for the page of a report"));
+out:
+    imp__release(context, compared.view);
+    imp__release(context, compared.picture);
+    imp__release(context, compared.target);
+    return st;
 }
 
 enum imp_status imp_report_write(imp_context *context, const struct imp_report *report,

@@ -3,6 +3,7 @@
  * Reports: which texts are JSON, what a page holds of pictures and of hostile names, and
  * what is refused. */
 #include "base/context.h"
+#include "base/film.h"
 #include "imp_tap.h"
 #include "report/json_text.h"
 #include <importon/report.h>
@@ -203,6 +204,102 @@ static void hostile(void)
     imp_film_destroy(film);
 }
 
+/* ---- Is the picture explained? ------------------------------------------------------- */
+
+static double gaussian(uint64_t *state)
+{
+    double u[2];
+    for (int k = 0; k < 2; k++) {
+        *state = *state * 6364136223846793005u + 1442695040888963407u;
+        u[k] = ((double)(*state >> 11) + 0.5) / 9007199254740992.;
+    }
+    return sqrt(-2 * log(u[0])) * cos(6.283185307179586 * u[1]);
+}
+
+enum { SIDE = 64 };
+
+/* target, and a picture of it with noise whose standard errors are known; `bump` is added
+ * to 8 x 12 pixels from (40, 4). The answer; NULL: there is none. */
+static char *explained(uint64_t seed, int with_se, double bump, double told)
+{
+    imp_film *film[2];
+    struct imp_report_item item[2] = {IMP_REPORT_ITEM_INIT, IMP_REPORT_ITEM_INIT};
+    struct imp_report report = IMP_REPORT_INIT;
+    uint64_t state = seed;
+    for (int k = 0; k < 2; k++) {
+        film[k] = NULL;
+        if (imp__film_create(ctx, SIDE, SIDE, "R,G,B", with_se, &film[k]) != IMP_OK)
+            return NULL;
+        item[k].kind = "picture";
+        item[k].role = k ? "picture" : "target";
+        item[k].film = film[k];
+    }
+    for (int i = 0; i < SIDE * SIDE * 3; i++) {
+        const int x = i / 3 % SIDE, y = i / 3 / SIDE;
+        const double truth = 1 + 0.5 * sin(x * 0.2) * cos(y * 0.1), s = 0.02 * truth;
+        for (int k = 0; k < 2; k++) {
+            film[k]->mean[i] = (float)(truth + s * gaussian(&state));
+            if (with_se) film[k]->se[i] = (float)(told * s);
+        }
+        if (x >= 40 && x < 48 && y >= 4 && y < 16)
+            film[1]->mean[i] += (float)(bump * truth);
+    }
+    report.items = item;
+    report.n_items = 2;
+    char *page = NULL, *found = NULL;
+    if (imp_report_data(ctx, &report, &page, NULL) == IMP_OK) {
+        char *at = strstr(page, "{\"kind\":\"explained\"");
+        if (at) found = strdup(at);
+    }
+    imp_free(ctx, page);
+    imp_film_destroy(film[0]);
+    imp_film_destroy(film[1]);
+    return found;
+}
+
+static double number_after(const char *text, const char *key)
+{
+    const char *at = text ? strstr(text, key) : NULL;
+    return at ? strtod(at + strlen(key), NULL) : NAN;
+}
+
+static void agreement(void)
+{
+    int yes = 0, no = 0;
+    double sum = 0;
+    for (uint64_t seed = 1; seed <= 40; seed++) {
+        char *t = explained(seed, 1, 0, 1);
+        sum += number_after(t, "\"chi2\":");
+        yes += t && strstr(t, "\"explained\":true");
+        no += t && strstr(t, "\"explained\":false");
+        free(t);
+    }
+    /* A block's ratio of sums of 48 squares: its mean is 1 where the errors are exact. */
+    tap_near(sum / 40, 1, 5 * sqrt(2. / (3 * SIDE * SIDE) / 40), 0,
+             "chi-square of noise is 1");
+    tap_ok(yes == 40 && !no, "noise alone is explained # %d of 40", yes);
+    char *t = explained(3, 1, 0.05, 1);
+    const double x = number_after(t, "\"regions\":[{\"x\":"),
+                 y = number_after(t, "\"y\":"), w = number_after(t, ",\"width\":"),
+                 h = number_after(t, ",\"height\":");
+    tap_ok(t && strstr(t, "\"explained\":false") && strstr(t, "\"n_regions\":1,"),
+           "a region that differs by 5 %% is not");
+    tap_ok(x == 40 && y == 4 && w == 8 && h == 12, "it lies where it is # %g %g, %g x %g",
+           x, y, w, h);
+    tap_near(number_after(t, "\"relative\":"), 0.05, 0.02, 0, "and is told");
+    free(t);
+    t = explained(4, 1, 0, 0.5);
+    tap_ok(t && strstr(t, "\"explained\":false") &&
+               fabs(number_after(t, "\"chi2\":") - 4) < 0.3,
+           "errors that are told too small # %g", number_after(t, "\"chi2\":"));
+    free(t);
+    t = explained(5, 0, 0.5, 1);
+    tap_ok(t && strstr(t, "\"noise\":\"none\"") && strstr(t, "\"explained\":null") &&
+               strstr(t, "\"chi2\":null") && number_after(t, "[{\"x\":") == 40,
+           "without errors nothing is said but where the largest difference is");
+    free(t);
+}
+
 static void refused(void)
 {
     imp_film *film = film_of(1, 1);
@@ -256,6 +353,7 @@ int main(void)
     not_finite();
     hostile();
     refused();
+    agreement();
     unlink(path);
     imp_context_destroy(ctx);
     return tap_done();
