@@ -223,6 +223,7 @@ int cli_load(const char *path)
     options.defines = cli.defines.item;
     options.n_defines = cli.defines.n;
     options.weights = cli.weights;
+    options.bins = cli.bins;
     options.lenient = cli.lenient;
     if (cli.search) split_search(cli.search, &search);
     options.search = search.item;

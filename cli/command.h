@@ -52,7 +52,7 @@ struct cli {
     int threads, json, progress, help, quiet, overwrite;
     /* options_scene */
     struct arg_list defines, sets;
-    const char *search, *weights;
+    const char *search, *weights, *bins;
     int mode, dump, lenient;
     /* options_run */
     int sensor, spp;

@@ -52,6 +52,9 @@ const struct arg_option options_scene[] = {
      "of -m spectral and single: colours become spectra by a sigmoid (default), or by a "
      "linear basis",
      &cli.upsampling, 0, 0, upsampling_words},
+    {ARG_TEXT, 0, "bins", "FROM,TO,N",
+     "of -m spectral and single: pictures have N bins of wavelengths in nm for channels",
+     &cli.bins, 0, 0, NULL},
     {ARG_TEXT, 0, "weights", "NAME=W[,..]",
      "densities of directions, in place of those of the scene file: kernel, emitters, "
      "environment, proxies, guide, uniform",

@@ -304,11 +304,14 @@ struct imp_load_options {
      * have, and imp_scene_info lists them. 1: each is a warning, too. */
     int lenient;
     enum imp_upsampling upsampling;
+    /** Of scene files in spectral modes: "from, to, n" in nm: films have n bins of
+     * wavelengths for channels (docs/spectra.md 5), in place of what they have; NULL: that. */
+    const char *bins;
 };
 #define IMP_LOAD_OPTIONS_INIT                                                            \
     {                                                                                    \
         sizeof(struct imp_load_options), IMP_RGB, 0, 0, 0, 0, 0, 0,                      \
-            IMP_UPSAMPLING_SIGMOID                                                       \
+            IMP_UPSAMPLING_SIGMOID, 0                                                    \
     }
 
 /** Load a scene file (Mitsuba 3 XML). The scene is committed and ready. `options` may be

@@ -202,7 +202,7 @@ class Scene:
 
 def _load_options(mode: Optional[str], search: Sequence[Any], defines: dict[str, Any],
                   weights: Optional[str] = None, upsampling: str = "sigmoid",
-                  lenient: bool = False) -> tuple[Any, Any]:
+                  lenient: bool = False, bins: Optional[str] = None) -> tuple[Any, Any]:
     """imp_load_options, and what it points to."""
     if isinstance(search, (str, bytes)) or hasattr(search, "__fspath__"):
         search = [search]
@@ -214,6 +214,7 @@ def _load_options(mode: Optional[str], search: Sequence[Any], defines: dict[str,
                    defines=ctypes.addressof(names), n_defines=len(pairs),
                    search=ctypes.addressof(paths), n_search=len(folders),
                    weights=None if weights is None else text(weights, "weights"),
+                   bins=None if bins is None else text(bins, "bins"),
                    upsampling=choice("imp_upsampling", upsampling, "upsampling"), lenient=int(bool(lenient)))
     return options, (names, paths)
 
@@ -230,10 +231,10 @@ def _define(name: str, value: Any) -> str:
 
 
 def _load(function: Any, arguments: tuple[Any, ...], name: str, mode: Optional[str], search: Sequence[Any],
-          weights: Any, upsampling: str, lenient: bool, defines: dict[str, Any]) -> Scene:
+          weights: Any, upsampling: str, lenient: bool, bins: Any, defines: dict[str, Any]) -> Scene:
     not_inside()
     ctx = context()
-    options, kept = _load_options(mode, search, defines, _weights(weights), upsampling, lenient)
+    options, kept = _load_options(mode, search, defines, _weights(weights), upsampling, lenient, _bins(bins))
     out = ctypes.c_void_p()
     status = function(ctx.pointer, *arguments, ctypes.byref(options), ctypes.byref(out))
     del kept
@@ -253,9 +254,17 @@ def _weights(weights: Any) -> Optional[str]:
     return ", ".join("%s=%r" % (k, float(v)) for k, v in weights.items())
 
 
+def _bins(bins: Any) -> Optional[str]:
+    """Bins of wavelengths as the scene format has them: "400, 700, 30"."""
+    if bins is None or isinstance(bins, str):
+        return bins
+    lo, hi, n = bins
+    return "%r, %r, %d" % (float(lo), float(hi), int(n))
+
+
 def load_file(path: Any, *, mode: Optional[str] = None, search: Sequence[Any] = (), weights: Any = None,
-              upsampling: str = "sigmoid", lenient: bool = False, parallel: bool = True, optimize: bool = True,
-              **defaults: Any) -> Scene:
+              upsampling: str = "sigmoid", lenient: bool = False, bins: Any = None, parallel: bool = True,
+              optimize: bool = True, **defaults: Any) -> Scene:
     """Load a scene file (Mitsuba 3 XML).
 
     Parameters
@@ -274,6 +283,9 @@ def load_file(path: Any, *, mode: Optional[str] = None, search: Sequence[Any] = 
         Of spectral modes: how colours become spectra, "sigmoid" (Jakob and Hanika) or "linear".
     lenient : bool
         Go on without plugins and properties that this version does not have, with warnings.
+    bins : sequence of three numbers, optional
+        Of spectral modes: (from, to, n) in nm; pictures have n bins of wavelengths for
+        channels, in place of the film's.
     parallel, optimize : bool
         Taken as Mitsuba's are; without effect.
     **defaults
@@ -301,12 +313,12 @@ def load_file(path: Any, *, mode: Optional[str] = None, search: Sequence[Any] = 
     16
     """
     return _load(lib.imp_scene_load, (text(path, "path"),), str(path), mode, search, weights,
-                 upsampling, lenient, defaults)
+                 upsampling, lenient, bins, defaults)
 
 
 def load_string(xml: str, *, name: str = "string", mode: Optional[str] = None, search: Sequence[Any] = (),
-                weights: Any = None, upsampling: str = "sigmoid", lenient: bool = False, parallel: bool = True,
-                optimize: bool = True, **defaults: Any) -> Scene:
+                weights: Any = None, upsampling: str = "sigmoid", lenient: bool = False, bins: Any = None,
+                parallel: bool = True, optimize: bool = True, **defaults: Any) -> Scene:
     """Load a scene from text, as `load_file` does from a file.
 
     Parameters
@@ -314,7 +326,7 @@ def load_string(xml: str, *, name: str = "string", mode: Optional[str] = None, s
     xml : str
     name : str
         Stands for the file in messages.
-    mode, search, weights, upsampling, lenient, parallel, optimize, **defaults
+    mode, search, weights, upsampling, lenient, bins, parallel, optimize, **defaults
         As `load_file`'s. Files are searched for in the working folder.
 
     Returns
@@ -335,4 +347,4 @@ def load_string(xml: str, *, name: str = "string", mode: Optional[str] = None, s
     """
     data = xml.encode() if isinstance(xml, str) else bytes(xml)
     return _load(lib.imp_scene_load_string, (data, len(data), text(name, "name")), name, mode, search,
-                 weights, upsampling, lenient, defaults)
+                 weights, upsampling, lenient, bins, defaults)

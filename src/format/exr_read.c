@@ -5,6 +5,7 @@
  * errors. */
 #include "base/number.h"
 #include "exr.h"
+#include "exr_spectral.h"
 #include "image.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -23,7 +24,9 @@ struct exr_reader {
     exr_attr_box2i_t window;
     const exr_attr_chlist_t *list;
     int n_planes, n_se;
-    int *order;     /* of the channels in the film: index in list */
+    bool
+        skip_rgb; /* R, G, B are made from the spectrum, and have no errors of their own */
+    int *order;   /* of the channels in the film: index in list */
     float **target; /* by index in list: first number of the channel */
     imp_film *film;
 };
@@ -64,6 +67,14 @@ static int channel_compare(const struct exr_reader *r, int a, int b)
 {
     const char *name[2] = {channel_name(r, a), channel_name(r, b)}, *last[2];
     size_t layer[2];
+    char own[2][IMP_EXR_NAME_ROOM];
+    double nm[2];
+    for (int k = 0; k < 2; k++) {
+        imp__exr_name_to_film(name[k], own[k]);
+        nm[k] = imp__exr_wavelength(own[k], NULL);
+    }
+    if (nm[0] > 0 && nm[1] > 0 && strncmp(own[0], own[1], 2) == 0 && nm[0] != nm[1])
+        return nm[0] < nm[1] ? -1 : 1;
     for (int k = 0; k < 2; k++) {
         const char *dot = strrchr(name[k], '.');
         last[k] = dot ? dot + 1 : name[k];
@@ -127,18 +138,26 @@ static enum imp_status film_make(struct exr_reader *r)
     r->target = imp__alloc(ctx, (size_t)n, sizeof *r->target);
     if (!r->order || !r->target)
         IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "%s: out of memory", r->io->name));
+    const exr_attribute_t *rgb;
+    r->skip_rgb =
+        exr_get_attribute_by_name(r->exr, 0, IMP_EXR_RGB_OF, &rgb) == EXR_ERR_SUCCESS &&
+        n > 3;
+    *r->io->message = 0; /* that there is none is no error */
     for (int i = 0; i < n; i++) {
         if (se_of(r, i) >= 0) {
             r->n_se++;
             continue;
         }
+        const char *name = channel_name(r, i);
+        if (r->skip_rgb && name[0] && !name[1] && strchr("RGB", name[0])) continue;
         int k = r->n_planes++;
         for (; k > 0 && channel_compare(r, r->order[k - 1], i) > 0; k--)
             r->order[k] = r->order[k - 1];
         r->order[k] = i;
     }
     for (int k = 0; k < r->n_planes; k++) {
-        const char *name = channel_name(r, r->order[k]);
+        char name[IMP_EXR_NAME_ROOM];
+        imp__exr_name_to_film(channel_name(r, r->order[k]), name);
         if (!imp__bytes_add(ctx, &names, ",", k > 0) ||
             !imp__bytes_add(ctx, &names, name, strlen(name)))
             IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "%s: out of memory", r->io->name));
@@ -238,7 +257,8 @@ static enum imp_status texts_read(struct exr_reader *r)
         const exr_attribute_t *a;
         EXR(exr_get_attribute_by_index(r->exr, 0, EXR_ATTR_LIST_FILE_ORDER, i, &a));
         if (a->type != EXR_ATTR_STRING || !a->string || !a->string->str || !*a->name ||
-            strlen(a->name) > 200 || strcmp(a->name, "type") == 0)
+            strlen(a->name) > 200 || strcmp(a->name, "type") == 0 ||
+            strcmp(a->name, IMP_EXR_RGB_OF) == 0)
             continue;
         const char *s = a->string->str, *end = s + strlen(s);
         int64_t value;

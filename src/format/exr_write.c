@@ -2,6 +2,7 @@
  *
  * Writing EXR: one part of scanlines, ZIP, half or float. */
 #include "exr.h"
+#include "exr_spectral.h"
 #include "image.h"
 #include <math.h>
 #include <stdio.h>
@@ -14,16 +15,41 @@
     } while (0)
 
 #define HALF_MAX  65504.0f
-#define NAME_ROOM 256
+#define NAME_ROOM IMP_EXR_NAME_ROOM
 
 struct exr_writer {
     struct imp_exr *io;
     exr_result_t (*compress)(exr_encode_pipeline_t *); /* the library's own */
     exr_context_t exr;
     const imp_film *film;
+    imp_film *rgb;          /* what a spectral film looks like; NULL: it is none */
     const float *mean, *se; /* se NULL: not written */
     bool half;
 };
+
+/* Texts of the layout for spectral images. The unit is the one that the layout knows;
+ * numbers are per nm. */
+static enum imp_status spectral_texts(struct exr_writer *w, int part)
+{
+    enum imp_status st = IMP_OK;
+    const imp_film *f = w->film;
+    static const char *const texts[][2] = {{"spectralLayoutVersion", "1.0"},
+                                           {"emissiveUnits", "W.m^-2.sr^-1"},
+                                           {"polarisationHandedness", "right"}};
+    bool any = false, emissive = false;
+    for (int c = 0; c < f->channels; c++) {
+        bool light;
+        if (!(imp__exr_wavelength(f->names[c], &light) > 0)) continue;
+        any = true;
+        emissive = emissive || light;
+    }
+    for (int k = 0; any && k < (emissive ? 3 : 1); k++)
+        if (!imp_film_get_text(f, texts[k][0]))
+            EXR(exr_attr_set_string(w->exr, part, texts[k][0], texts[k][1]));
+    if (w->rgb) EXR(exr_attr_set_string(w->exr, part, IMP_EXR_RGB_OF, "spectrum"));
+out:
+    return st;
+}
 
 static enum imp_status header_write(struct exr_writer *w)
 {
@@ -38,10 +64,16 @@ static enum imp_status header_write(struct exr_writer *w)
                                             EXR_COMPRESSION_ZIP));
     for (int se = 0; se < (w->se ? 2 : 1); se++)
         for (int c = 0; c < f->channels; c++) {
-            snprintf(text, sizeof text, "%s%s", se ? "se." : "", f->names[c]);
+            char name[NAME_ROOM];
+            snprintf(name, sizeof name, "%s%s", se ? "se." : "", f->names[c]);
+            imp__exr_name_to_file(name, text);
             EXR(exr_add_channel(w->exr, part, text, type, EXR_PERCEPTUALLY_LOGARITHMIC, 1,
                                 1));
         }
+    for (int c = 0; w->rgb && c < 3; c++)
+        EXR(exr_add_channel(w->exr, part, w->rgb->names[c], type,
+                            EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1));
+    IMP_TRY(spectral_texts(w, part));
     if (imp__film_find(f, "X") >= 0 && imp__film_find(f, "Z") >= 0) {
         /* Primaries that say: these numbers are X, Y, Z (equal-energy white). */
         const exr_attr_chromaticities_t xyz = {1, 0, 0, 1, 0, 0, 1 / 3.0f, 1 / 3.0f};
@@ -85,7 +117,7 @@ static enum imp_status pixels_write(struct exr_writer *w)
     enum imp_status st = IMP_OK;
     const imp_film *f = w->film;
     exr_encode_pipeline_t pipe = EXR_ENCODE_PIPELINE_INITIALIZER;
-    const size_t c = (size_t)f->channels, row = (size_t)f->width * c;
+    const size_t c = (size_t)f->channels;
     int32_t lines;
     EXR(exr_get_scanlines_per_chunk(w->exr, 0, &lines));
     for (int y = 0; y < f->height; y += lines) {
@@ -94,17 +126,25 @@ static enum imp_status pixels_write(struct exr_writer *w)
         if (y == 0) EXR(exr_encoding_initialize(w->exr, 0, &chunk, &pipe));
         else EXR(exr_encoding_update(w->exr, 0, &chunk, &pipe));
         for (int i = 0; i < pipe.channel_count; i++) {
-            exr_coding_channel_info_t *from = &pipe.channels[i];
-            const char *name = from->channel_name;
+            exr_coding_channel_info_t *to = &pipe.channels[i];
+            char name[NAME_ROOM];
+            imp__exr_name_to_film(to->channel_name, name);
+            const float *from = w->mean;
+            size_t n = c; /* numbers from pixel to pixel */
             int k = imp__film_find(f, name);
-            const bool se = k < 0;
-            if (se) k = imp__film_find(f, name + strlen("se."));
-            from->encode_from_ptr =
-                (const uint8_t *)((se ? w->se : w->mean) + (size_t)y * row + (size_t)k);
-            from->user_data_type = EXR_PIXEL_FLOAT;
-            from->user_bytes_per_element = sizeof(float);
-            from->user_pixel_stride = (int32_t)(c * sizeof(float));
-            from->user_line_stride = (int32_t)(row * sizeof(float));
+            if (k < 0 && w->rgb && (k = imp__film_find(w->rgb, name)) >= 0) {
+                from = w->rgb->mean;
+                n = 3;
+            } else if (k < 0) {
+                from = w->se;
+                k = imp__film_find(f, name + strlen("se."));
+            }
+            const size_t line = (size_t)f->width * n;
+            to->encode_from_ptr = (const uint8_t *)(from + (size_t)y * line + (size_t)k);
+            to->user_data_type = EXR_PIXEL_FLOAT;
+            to->user_bytes_per_element = sizeof(float);
+            to->user_pixel_stride = (int32_t)(n * sizeof(float));
+            to->user_line_stride = (int32_t)(line * sizeof(float));
         }
         if (y == 0) {
             EXR(exr_encoding_choose_default_routines(w->exr, 0, &pipe));
@@ -120,12 +160,15 @@ out:
 }
 
 /* Numbers beyond the largest half become the largest half, not infinity. */
+static float clamp_half(float v)
+{
+    return isfinite(v) ? imp_clamp(v, -HALF_MAX, HALF_MAX) : v;
+}
 static float *clamped(imp_context *ctx, const imp_film *f, const float *from)
 {
     const size_t n = imp__film_values(f);
     float *to = imp__alloc(ctx, n, sizeof *to);
-    for (size_t i = 0; to && i < n; i++)
-        to[i] = isfinite(from[i]) ? imp_clamp(from[i], -HALF_MAX, HALF_MAX) : from[i];
+    for (size_t i = 0; to && i < n; i++) to[i] = clamp_half(from[i]);
     return to;
 }
 
@@ -140,6 +183,7 @@ enum imp_status imp__exr_encode(const imp_film *f, const struct imp_write_option
     float *mean = NULL, *se = NULL;
     const exr_context_initializer_t setup = imp__exr_begin(&io);
 
+    IMP_TRY(imp__exr_spectral_rgb(f, &w->rgb));
     w->mean = f->mean;
     w->se = o->standard_error ? f->se : NULL;
     if ((size_t)f->width * (size_t)f->channels > 1 << 28)
@@ -149,6 +193,8 @@ enum imp_status imp__exr_encode(const imp_film *f, const struct imp_write_option
         if (w->se) w->se = se = clamped(ctx, f, f->se);
         if (!mean || (f->se && o->standard_error && !se))
             IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "EXR: no memory for the picture"));
+        for (size_t i = 0; w->rgb && i < imp__film_values(w->rgb); i++)
+            w->rgb->mean[i] = clamp_half(w->rgb->mean[i]);
     }
     EXR(exr_start_write(&w->exr, "picture", EXR_WRITE_FILE_DIRECTLY, &setup));
     IMP_TRY(header_write(w));
@@ -160,6 +206,7 @@ out:
     if (w->exr) exr_finish(&w->exr);
     imp__exr_end(&io);
     imp__bytes_free(ctx, &bytes);
+    imp_film_destroy(w->rgb);
     imp__release(ctx, mean);
     imp__release(ctx, se);
     return st;

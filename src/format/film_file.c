@@ -3,6 +3,7 @@
  * Films in files: reading, and writing by extension. */
 #include "base/arguments.h"
 #include "color/rgb.h"
+#include "exr_spectral.h"
 #include "image.h"
 #include <math.h>
 #include <string.h>
@@ -76,9 +77,8 @@ static void diverge(const imp_film *f, const struct imp_pick *pick, double range
     }
 }
 
-static enum imp_status preview_encode(const imp_film *f,
-                                      const struct imp_write_options *o,
-                                      struct imp_bytes *out)
+static enum imp_status png_encode(const imp_film *f, const struct imp_write_options *o,
+                                  struct imp_bytes *out)
 {
     struct imp_pick pick = imp__image_pick(f);
     if (!pick.n) pick = (struct imp_pick){1, {0, 0, 0}, false};
@@ -91,6 +91,18 @@ static enum imp_status preview_encode(const imp_film *f,
     const enum imp_status st =
         imp__png_encode(f->ctx, f->width, f->height, channels, to, out);
     imp__release(f->ctx, to);
+    return st;
+}
+
+/* Of spectra, their colours. */
+static enum imp_status preview_encode(const imp_film *f,
+                                      const struct imp_write_options *o,
+                                      struct imp_bytes *out)
+{
+    imp_film *rgb;
+    enum imp_status st = imp__exr_spectral_rgb(f, &rgb);
+    if (st == IMP_OK) st = png_encode(rgb && !o->diverging ? rgb : f, o, out);
+    imp_film_destroy(rgb);
     return st;
 }
 

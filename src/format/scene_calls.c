@@ -60,6 +60,10 @@ enum imp_status imp_scene_create(imp_context *ctx, const struct imp_load_options
     IMP_TRY(imp__load_options(ctx, options, &o));
     if (o.n_defines)
         IMP_TRY(imp__error(ctx, IMP_E_ARG, "definitions are of use in scene files only"));
+    if (o.bins)
+        IMP_TRY(imp__error(ctx, IMP_E_ARG,
+                           "bins are of use with scene files only; set the film's "
+                           "property"));
     if (o.weights)
         IMP_TRY(imp__error(ctx, IMP_E_ARG,
                            "weights are of use with scene files only; set the "

@@ -86,6 +86,33 @@ static enum imp_status weights_set(struct imp_scene *scene, const char *text)
     return IMP_OK;
 }
 
+/* The property `bins` of all films, whatever the file says of their channels. */
+static enum imp_status bins_set(struct imp_scene *scene, const char *text)
+{
+    static const struct imp_loc nowhere = {NULL, 0, 0};
+    struct imp_arena *arena = &scene->arena;
+    for (size_t i = 0; scene->root && i < scene->root->n_children; i++) {
+        struct imp_node *sensor = scene->root->children[i].node, *film = NULL;
+        if (!sensor || strcmp(sensor->tag, "sensor") != 0) continue;
+        for (size_t k = 0; k < sensor->n_children; k++) {
+            struct imp_node *child = sensor->children[k].node;
+            if (child && strcmp(child->tag, "film") == 0) film = child;
+        }
+        if (!film)
+            return imp__node_error(scene->ctx, sensor, IMP_E_SCENE,
+                                   "bins: this sensor has no film");
+        struct imp_prop *p = imp__node_prop(film, "bins");
+        if (!p) p = imp__node_add(arena, film, "bins", IMP_PROP_STRING, nowhere);
+        char *copy = imp__arena_strdup(arena, text);
+        film->type = imp__arena_strdup(arena, "specfilm");
+        if (!p || !copy || !film->type)
+            return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for the scene");
+        p->type = IMP_PROP_STRING;
+        p->string = copy;
+    }
+    return IMP_OK;
+}
+
 /* `name` of the scene file; its folder is the last that is searched. */
 static enum imp_status load(imp_context *ctx, const struct imp_bytes *text,
                             const char *name, const char *folder,
@@ -98,6 +125,7 @@ static enum imp_status load(imp_context *ctx, const struct imp_bytes *text,
     IMP_TRY(imp__search_init(scene, o->search, o->n_search, folder));
     IMP_TRY(imp__xml_read(scene, text, name, o));
     if (o->weights) IMP_TRY(weights_set(scene, o->weights));
+    if (o->bins) IMP_TRY(bins_set(scene, o->bins));
     IMP_TRY(imp__scene_finish(scene));
     *out = scene;
     return IMP_OK;

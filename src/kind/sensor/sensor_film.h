@@ -12,6 +12,10 @@
 enum imp_status imp__film_desc_build(const struct imp_build *b,
                                      struct imp_film_desc *out);
 
+/* Response curves that are bins of equal width: text "from, to, n", in nm. */
+enum imp_status imp__film_bins_build(const struct imp_build *b, const char *text,
+                                     struct imp_film_desc *f);
+
 /* Samples per pixel of the sampler b->node, rounded up as its kind does
  * (docs/scene-format.md 10), and the kind of its points; node NULL: 4, independent. */
 enum imp_status imp__sampler_build(const struct imp_build *b, int *spp,

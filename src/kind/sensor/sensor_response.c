@@ -3,6 +3,7 @@
 #include "base/compiler.h"
 #include "color/cie.h"
 #include "color/convert.h"
+#include "sensor_film.h"
 #include <string.h>
 
 static enum imp_status curve_check(const struct imp_build *b, const char *name,
@@ -83,12 +84,14 @@ enum imp_status imp__responses_read(const struct imp_build *b, struct imp_film_d
     struct imp_spectrum *curve =
         imp__arena_array(b->arena, IMP_RESPONSES_MAX, sizeof *curve);
     const char **names = imp__arena_array(b->arena, IMP_RESPONSES_MAX, sizeof *names);
+    const char *bins;
     int n = 0;
     if (!imp__is_spectral(b->mode))
         IMP_TRY(imp_build_error(b, NULL, IMP_E_UNSUPPORTED,
                                 "specfilm exists in spectral modes only "
                                 "(-m spectral, -m single)"));
     if (!curve || !names) IMP_TRY(imp__error(b->ctx, IMP_E_NOMEM, "out of memory"));
+    IMP_TRY(imp_build_string(b, "bins", NULL, &bins));
     for (size_t i = 0; i < node->n_props; i++) {
         struct imp_prop *p = &node->props[i];
         struct imp__color color;
@@ -108,9 +111,17 @@ enum imp_status imp__responses_read(const struct imp_build *b, struct imp_film_d
         IMP_TRY(imp__color_object(&ask, c->node, &color));
         IMP_TRY(response_add(b, c->name, &color, curve, names, &n));
     }
+    if (bins && n > 0)
+        IMP_TRY(imp_build_error(b, "bins", IMP_E_SCENE,
+                                "has response curves and bins: one of them"));
+    if (bins) {
+        st = imp__film_bins_build(b, bins, f);
+        goto out;
+    }
     if (n == 0)
         IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE,
-                                "has no response curve: <spectrum name=...> gives one"));
+                                "has no response curve: <spectrum name=...> gives one, "
+                                "and bins some"));
     f->n_responses = n;
     f->response = curve;
     f->response_name = names;
