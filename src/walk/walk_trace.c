@@ -6,6 +6,7 @@
 #include "probe.h"
 #include "store.h"
 #include <float.h>
+#include <string.h>
 
 /* Keys use full-film pixels: a crop renders the same samples as the whole picture. The
  * border of wide filters may lie outside the film, hence the offset. */
@@ -72,11 +73,19 @@ void imp__walk_close(const struct imp_tracer *tracer, struct imp_walk *walk)
     walk_close(tracer, walk);
 }
 
-/* Field by field, here and below: compilers clear structs of this size by an instruction
- * that takes 2 % of a walk. */
+/* Walks and steps are begun field by field: compilers clear structs of this size by an
+ * instruction that takes 2 % of a walk. Builds with assertions fill them first, so that a
+ * field that was forgotten is found. */
+#ifdef NDEBUG
+#define FILL(p) ((void)0)
+#else
+#define FILL(p) memset((p), 0xff, sizeof *(p))
+#endif
+
 static inline void walk_begin(const struct imp_tracer *tracer, int x, int y,
                               int64_t sample, struct imp_walk *walk)
 {
+    FILL(walk);
     walk->first = walk->last = NULL;
     walk->n = walk->depth = 0;
     number(tracer, x, y, sample, walk);
@@ -98,6 +107,7 @@ static inline void step_begin(const struct imp_tracer *tracer, struct imp_arena 
                               struct imp_walk *walk, imp_spec *scratch,
                               struct imp_step *s)
 {
+    FILL(s);
     s->tracer = tracer;
     s->scene = tracer->scene;
     s->walk = walk;
@@ -122,6 +132,9 @@ static inline void step_begin(const struct imp_tracer *tracer, struct imp_arena 
     s->flight.at = (imp_v3){0};
     s->flight.t = s->flight.base = s->flight.behind = 0;
     s->flight.stands = false;
+    s->flight.events = 0;
+    s->flight.nest.around = s->flight.nest_here.around = NULL;
+    s->flight.nest.n = s->flight.nest_here.n = 0;
     s->probing = NULL;
     s->graded = NULL;
     s->guided.guide = tracer->guide;

@@ -271,6 +271,7 @@ int main(void)
     for (enum job job = 0; job < JOBS; job++) good(job);
     for (enum job job = 0; job < JOBS; job++) refuted(job);
     no_sensor();
+    starved();
     char command[96];
     snprintf(command, sizeof command, "rm -r %s", folder);
     if (system(command) != 0) tap_ok(0, "the folder is removed");
