@@ -119,14 +119,18 @@ void imp__spectrum_lanes_any(const struct imp_spectrum *s, const double nm[4],
                              imp_spec *value)
 {
     const bool alone = !s->times && !s->over;
-    if (s->form == IMP_SPECTRUM_NUMBER && alone)
+    if (s->form == IMP_SPECTRUM_NUMBER && alone) {
         for (int j = 0; j < 4; j++) (*value)[j] = s->value[0];
-    else if (s->form == IMP_SPECTRUM_COLOR && alone)
+    } else if (s->form == IMP_SPECTRUM_COLOR && alone) {
         imp__lifted_lanes(&s->lifted, nm, value);
-    else
+    } else {
         for (int j = 0; j < 4; j++)
             (*value)[j] =
                 j > 0 && nm[j] == nm[0] ? (*value)[0] : imp__spectrum_value(s, nm[j]);
+        return;
+    }
+    for (int j = 0; j < 4; j++)
+        if (!(nm[j] >= s->lo && nm[j] <= s->hi)) (*value)[j] = 0;
 }
 
 void imp__spectrum_at(const struct imp_spectrum *s, double nm,
