@@ -120,6 +120,7 @@ enum imp_status imp__design_normal(const double *x, uint64_t seed,
     if (!d->linear) IMP_TRY(rows_of(d, d->A));
     memset(out->g, 0, n * sizeof *out->g);
     memset(out->cov_g, 0, n * n * sizeof *out->cov_g);
+    memset(out->cov_excess, 0, n * n * sizeof *out->cov_excess);
     memset(out->H_meas, 0, n * n * sizeof *out->H_meas);
     memcpy(out->H_prior, d->H_prior, n * n * sizeof *out->H_prior);
     memcpy(out->H, d->H_prior, n * n * sizeof *out->H);

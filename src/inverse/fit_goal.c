@@ -117,7 +117,8 @@ static enum imp_status normal(const double *x, uint64_t seed, struct imp__normal
                                    .H_meas = out->H_meas,
                                    .g = out->g,
                                    .g_se = fit->g_se,
-                                   .cov_g = out->cov_g};
+                                   .cov_g = out->cov_g,
+                                   .cov_excess = out->cov_excess};
     fit->run.seed = seed;
     fit->final_calls++;
     const enum imp_status st = imp__gauss_newton(fit->problem, x, &fit->run, &gn);

@@ -62,6 +62,7 @@ static enum imp_status target_add(struct imp__normal_job *j,
     const struct imp_film_desc *film = &j->tracer.sensor->film;
     if (imp__film_border(film) > 0) {
         struct imp__normal_sums total = imp__normal_at(j->total, j->K);
+        total.cov_excess = j->excess;
         return imp__gauss_newton_wide(p, &j->tracer, target, &own, lo, hi, &total);
     }
     j->width = film->crop_w;
@@ -137,10 +138,11 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
     if (x) IMP_TRY(imp_problem_set_x(p, x));
     imp__team_state(p->scene, &own);
     j.workers = imp__alloc(ctx, (size_t)ctx->threads, sizeof *j.workers);
-    j.total = imp__alloc(ctx, imp__normal_count(j.K), sizeof *j.total);
+    j.total = imp__alloc(ctx, imp__normal_count(j.K) + j.K * j.K, sizeof *j.total);
     if (!j.workers || !j.total)
         IMP_TRY(
             imp__error(ctx, IMP_E_NOMEM, "no memory for %zu x %zu matrices", j.K, j.K));
+    j.excess = j.total + imp__normal_count(j.K);
     IMP_TRY(workers_create(&j, ctx));
 
     const double start = imp__now(), targets = (double)p->n_targets;
@@ -166,6 +168,7 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
     matrix_copy(out->H_same, total.H_same, j.K);
     matrix_copy(out->H_meas, total.H_meas, j.K);
     matrix_copy(out->cov_g, total.cov_g, j.K);
+    matrix_copy(out->cov_excess, j.excess, j.K);
     for (size_t k = 0; k < j.K; k++) {
         if (out->g) out->g[k] = total.g[k];
         if (out->g_se) out->g_se[k] = sqrt(fmax(0, total.cov_g[k * j.K + k]));

@@ -9,13 +9,13 @@
 #include "seen.h"
 
 struct imp__normal_sums { /* matrices [K*K], lower triangles */
-    double *H, *H_same, *H_meas, *cov_g, *g;
+    double *H, *H_same, *H_meas, *cov_g, *cov_excess, *g;
     double *scalars; /* [IMP_NORMAL_SCALARS] */
 };
 /* Of a target: loss, its variance, chi^2. */
 enum { IMP_NORMAL_OBJECTIVE, IMP_NORMAL_VARIANCE, IMP_NORMAL_CHI2, IMP_NORMAL_SCALARS };
 
-/* Adds H, H_same, H_meas, g, cov_g and chi2 of a target seen through a filter wider than
+/* Adds H, H_same, H_meas, g, cov_g, cov_excess and chi2 of a target seen through a filter wider than
  * a pixel; lo, hi: the part of the caller's progress. */
 enum imp_status imp__gauss_newton_wide(const struct imp_problem *p,
                                        const struct imp_tracer *tracer,

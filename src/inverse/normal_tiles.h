@@ -28,7 +28,7 @@ struct imp__normal_job {
                            quadratic; NULL: there are none */
         imp_spec L[IMP_BATCH_MAX], P[IMP_BATCH_MAX];
     } * workers;
-    double *total; /* [imp__normal_count] */
+    double *total, *excess; /* [imp__normal_count]; [K*K] of wide filters alone */
 };
 
 static inline size_t imp__normal_count(size_t K)

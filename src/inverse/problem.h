@@ -159,7 +159,9 @@ struct imp__gauss_newton {
                        NULL; sigma^2 from the residuals where a target gives none */
     double *g, *g_se; /* [K] leave-one-out gradient of the data term, standard errors; or
                          NULL */
-    double *cov_g;    /* [K*K] covariance of g; or NULL */
+    double *cov_g;    /* [K*K] covariance of g, too large by */
+    double *cov_excess; /* [K*K] this, unbiased (0 but through filters wider than a
+                           pixel: pair_noise.h); or NULL both */
     struct imp_estimate objective; /* data term */
     double chi2;                   /* sum w (mean - T)^2 - w Var(mean), unbiased */
     double n_residuals;

@@ -98,7 +98,7 @@ struct imp__replicates imp__replicates_normal(const struct imp_scene *scene,
     const int spp = imp_max(spp_of(sensor, run), 4);
     if (imp__film_border(&sensor->film) == 0)
         return box_plan(spp, sets ? sets * IMP_SET_POINTS : IMP_BATCH_MAX, sets);
-    struct imp__replicates r = {.R = spp < 32 ? 4 : IMP_WIDE_REPLICATES, .chunks = 1};
+    struct imp__replicates r = {.R = spp < 8 ? 4 : IMP_WIDE_REPLICATES, .chunks = 1};
     r.n = (spp - 1) / r.R + 1;
     return in_sets(r, sets ? SETS_FIXED : 0);
 }

@@ -9,10 +9,7 @@
  *
  * unbiased but for the pixel itself, a ratio of sums (splat.h).
  *
- * Covariance of the gradient: the jackknife over replicates, which counts the part of
- * second order twice and so errs to the safe side (Efron and Stein, Ann. Statist. 9,
- * 1981), of sums over blocks of pixels; blocks further apart than the filter reaches
- * share no walk.
+ * Covariance of the gradient: pair_noise.h.
  *
  * Noise of the target is taken as correlated from pixel to pixel as the filter makes it,
  * since targets come through the same filter: H_meas = sum_pq w_p w_q rho(p - q)
@@ -21,13 +18,13 @@
 #include "gauss_newton.h"
 #include "lanes.h"
 #include "loss.h"
+#include "pair_noise.h"
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define MANY  IMP_WIDE_REPLICATES
-#define BLOCK 8  /* pixels */
-#define TAPS  16 /* reach of rho in pixels, at most */
+#define MANY IMP_WIDE_REPLICATES
+#define TAPS 16 /* reach of rho in pixels, at most */
 
 struct wide {
     imp_context *ctx;
@@ -42,8 +39,7 @@ struct wide {
     imp_film *films[MANY]; /* channels: the radiance, then [K][channels] */
     double *L, *X;         /* of a pixel and channel: [R], [R][K] */
     double *sum;           /* [K] */
-    int blocks_x, blocks_y;
-    double *leave; /* [blocks][R][K] gradient of a block without replicate b */
+    struct imp__pair_noise noise;
     /* Of one channel and half of the replicates, for H_meas: [pixels], [K][pixels]. */
     double *sigma2, *Xc, *Xd, *row;
 };
@@ -157,9 +153,9 @@ static void jackknife(const struct wide *w, size_t pixel, int c, double S, doubl
 
 /* ---- H, g, and the gradient's own noise ---------------------------------------- */
 
-static void pixel_add(struct wide *w, size_t pixel, int c, double *leave,
-                      struct imp__normal_sums *out)
+static void pixel_add(struct wide *w, int px, int py, int c, struct imp__normal_sums *out)
 {
+    const size_t pixel = (size_t)py * (size_t)w->width + (size_t)px;
     const size_t K = w->K;
     const double R = w->R;
     double S = 0, S2 = 0, T;
@@ -176,6 +172,9 @@ static void pixel_add(struct wide *w, size_t pixel, int c, double *leave,
     double factor[MANY];
     if (!quadratic) jackknife(w, pixel, c, S, factor);
     out->scalars[IMP_NORMAL_CHI2] += 2 * imp__loss_unbiased(weight, T, R, S, S2);
+    double residual[MANY];
+    for (int b = 0; b < w->R; b++) residual[b] = w->L[b] - T;
+    imp__pair_noise_add(&w->noise, px, py, weight, residual, w->X);
     for (size_t k = 0; k < K; k++) {
         double lx = 0;
         for (int b = 0; b < w->R; b++) lx += w->L[b] * w->X[(size_t)b * K + k];
@@ -185,12 +184,6 @@ static void pixel_add(struct wide *w, size_t pixel, int c, double *leave,
         else
             for (int b = 0; b < w->R; b++)
                 out->g[k] += factor[b] * w->X[(size_t)b * K + k];
-        for (int b = 0; b < w->R; b++) {
-            const double l = w->L[b], x = w->X[(size_t)b * K + k], x1 = w->sum[k] - x;
-            leave[(size_t)b * K + k] +=
-                weight *
-                (((S - l) * x1 - (lx - l * x)) / ((R - 1) * (R - 2)) - T * x1 / (R - 1));
-        }
         for (size_t m = 0; m <= k; m++) {
             double xx = 0;
             for (int b = 0; b < w->R; b++)
@@ -205,41 +198,8 @@ static void pixel_add(struct wide *w, size_t pixel, int c, double *leave,
 static void normal_add(struct wide *w, struct imp__normal_sums *out)
 {
     for (int y = 0; y < w->height; y++)
-        for (int x = 0; x < w->width; x++) {
-            const size_t block = (size_t)(y / BLOCK * w->blocks_x + x / BLOCK);
-            for (int c = 0; c < w->seen; c++)
-                pixel_add(w, (size_t)y * (size_t)w->width + (size_t)x, c,
-                          w->leave + block * (size_t)w->R * w->K, out);
-        }
-}
-
-static void covariance_add(struct wide *w, struct imp__normal_sums *out)
-{
-    const size_t K = w->K, R = (size_t)w->R;
-    const int blocks = w->blocks_x * w->blocks_y;
-    for (int t = 0; t < blocks; t++) { /* deviations from the replicates' mean */
-        double *leave = w->leave + (size_t)t * R * K;
-        for (size_t k = 0; k < K; k++) {
-            double mean = 0;
-            for (size_t b = 0; b < R; b++) mean += leave[b * K + k] / (double)R;
-            for (size_t b = 0; b < R; b++) leave[b * K + k] -= mean;
-        }
-    }
-    const int reach = (2 * imp__film_border(w->film) + BLOCK - 1) / BLOCK;
-    for (int t = 0; t < blocks; t++) {
-        const int x = t % w->blocks_x, y = t / w->blocks_x;
-        for (int v = imp_max(0, y - reach); v <= imp_min(w->blocks_y - 1, y + reach); v++)
-            for (int u = imp_max(0, x - reach); u <= imp_min(w->blocks_x - 1, x + reach);
-                 u++) {
-                const double *a = w->leave + (size_t)t * R * K;
-                const double *d = w->leave + (size_t)(v * w->blocks_x + u) * R * K;
-                for (size_t b = 0; b < R; b++)
-                    for (size_t k = 0; k < K; k++)
-                        for (size_t m = 0; m <= k; m++)
-                            out->cov_g[k * K + m] +=
-                                a[b * K + k] * d[b * K + m] * (double)(R - 1) / (double)R;
-            }
-    }
+        for (int x = 0; x < w->width; x++)
+            for (int c = 0; c < w->seen; c++) pixel_add(w, x, y, c, out);
 }
 
 /* ---- Noise of the target ------------------------------------------------------- */
@@ -340,14 +300,10 @@ static void measurement_add(struct wide *w, struct imp__normal_sums *out)
 static enum imp_status buffers(struct wide *w)
 {
     const size_t K = w->K, pixels = (size_t)w->width * (size_t)w->height;
-    w->blocks_x = (w->width + BLOCK - 1) / BLOCK;
-    w->blocks_y = (w->height + BLOCK - 1) / BLOCK;
     w->L = imp__alloc(w->ctx, MANY + (MANY + 1) * K, sizeof(double));
-    w->leave = imp__alloc(w->ctx, (size_t)w->blocks_x * (size_t)w->blocks_y,
-                          MANY * K * sizeof(double));
     w->sigma2 = imp__alloc(w->ctx, pixels, (2 * K + 1) * sizeof(double));
     w->row = imp__alloc(w->ctx, (size_t)imp_max(w->width, w->height), sizeof(double));
-    if (!w->L || !w->leave || !w->sigma2 || !w->row)
+    if (!w->L || !w->sigma2 || !w->row)
         return imp__error(w->ctx, IMP_E_NOMEM,
                           "no memory for %zu derivative pictures of %d x %d", K, w->width,
                           w->height);
@@ -379,13 +335,15 @@ enum imp_status imp__gauss_newton_wide(const struct imp_problem *p,
                      .K = p->n};
     IMP_TRY(buffers(&w));
     IMP_TRY(replicates(&w, tracer, run, lo, hi));
+    IMP_TRY(imp__pair_noise_create(w.ctx, w.width, w.height, w.R, w.K, &w.noise));
     normal_add(&w, out);
-    covariance_add(&w, out);
+    IMP_TRY(imp__pair_noise_covariance(&w.noise, 2 * imp__film_border(w.film), out->cov_g,
+                                       out->cov_excess));
     measurement_add(&w, out);
 out:
     for (int b = 0; b < MANY; b++) imp_film_destroy(w.films[b]);
     imp__release(w.ctx, w.L);
-    imp__release(w.ctx, w.leave);
+    imp__pair_noise_destroy(&w.noise);
     imp__release(w.ctx, w.sigma2);
     imp__release(w.ctx, w.row);
     return st;

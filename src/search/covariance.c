@@ -14,6 +14,7 @@
  * described by their sum, wherever in its neighbourhood x was. */
 #include "covariance.h"
 #include "directions.h"
+#include "excess.h"
 #include <math.h>
 #include <string.h>
 
@@ -77,12 +78,14 @@ static enum imp_status sample(const struct imp__goal *goal, const double *x,
             sum->H_prior[i] += r * one.H_prior[i];
             sum->H_meas[i] += r * one.H_meas[i];
             sum->cov_g[i] += r * r * one.cov_g[i]; /* of the mean of independent ones */
+            sum->cov_excess[i] += r * r * one.cov_excess[i];
         }
         for (size_t k = 0; k < n; k++) sum->g[k] += r * one.g[k];
         sum->chi2 += r * one.chi2;
         sum->n_residuals = one.n_residuals;
         sum->noise_known = one.noise_known;
     }
+    IMP_TRY(imp__excess_take(s->ctx, n, sum->cov_g, sum->cov_excess));
 out:
     imp__normal_destroy(s->ctx, &one);
     return st;

@@ -187,7 +187,7 @@ uint64_t imp__search_seed(const struct imp__goal *goal, int i, int k)
 enum imp_status imp__normal_create(imp_context *ctx, size_t n, struct imp__normal *out)
 {
     struct imp__normal m = {0};
-    double *all = imp__alloc(ctx, 5 * n * n + n, sizeof *all);
+    double *all = imp__alloc(ctx, 6 * n * n + n, sizeof *all);
     if (!all)
         return imp__error(ctx, IMP_E_NOMEM, "no memory for %zu x %zu matrices", n, n);
     m.H = all;
@@ -195,7 +195,8 @@ enum imp_status imp__normal_create(imp_context *ctx, size_t n, struct imp__norma
     m.H_prior = all + 2 * n * n;
     m.cov_g = all + 3 * n * n;
     m.H_meas = all + 4 * n * n;
-    m.g = all + 5 * n * n;
+    m.cov_excess = all + 5 * n * n;
+    m.g = all + 6 * n * n;
     *out = m;
     return IMP_OK;
 }

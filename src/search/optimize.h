@@ -17,12 +17,13 @@
 
 /* Normal equations at one x, from one set of random numbers. */
 struct imp__normal {
-    double *H;       /* [n][n] Gauss-Newton matrix, unbiased; may be indefinite */
-    double *H_same;  /* [n][n] biased upwards, positive semi-definite: damps H */
-    double *H_prior; /* [n][n] the part of H and H_same that is not from data; exact */
-    double *g;       /* [n] gradient */
-    double *cov_g;   /* [n][n] its covariance by Monte Carlo */
-    double *H_meas;  /* [n][n] its covariance by noise of the data */
+    double *H;          /* [n][n] Gauss-Newton matrix, unbiased; may be indefinite */
+    double *H_same;     /* [n][n] biased upwards, positive semi-definite: damps H */
+    double *H_prior;    /* [n][n] the part of H and H_same that is not from data; exact */
+    double *g;          /* [n] gradient */
+    double *cov_g;      /* [n][n] its covariance by Monte Carlo, too large by */
+    double *cov_excess; /* [n][n] this: unbiased, noisy, less than 2/3 of cov_g */
+    double *H_meas;     /* [n][n] its covariance by noise of the data */
     struct imp_estimate f;
     double chi2; /* sum of weighted squared residuals, Monte Carlo's part taken off */
     double n_residuals;

@@ -1,0 +1,166 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Covariance of the gradient that Gauss-Newton takes from pictures through a wide filter,
+ * against the spread over seeds, in every eigenvector of J^T W J: where the pictures tell
+ * little, most of the noise is of second order, of two replicates at once. Run with "long"
+ * for whole fits: how often their intervals hold the truth. */
+#include "imp_scene.h"
+#include "imp_tap.h"
+#include "inverse/problem.h"
+#include "math/linalg.h"
+
+enum { N = 9, SIDE = 12, SPP = 16, SEEDS = 300, FITS = 100 };
+
+static const char *const active[] = {"white.reflectance.value", "red.reflectance.value",
+                                     "green.reflectance.value"};
+
+/* The Cornell box through another filter. */
+static imp_scene *box(imp_context *ctx, const char *filter)
+{
+    static char text[65536], changed[66000];
+    const char element[] = "<rfilter type=\"box\"/>";
+    const char *defines[] = {"res=12"}, *folders[] = {IMP_SCENES};
+    struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
+    char path[1024];
+    imp_scene *scene;
+    snprintf(path, sizeof path, "%s/cornell.xml", IMP_SCENES);
+    FILE *f = fopen(path, "rb");
+    const size_t n = f ? fread(text, 1, sizeof text - 1, f) : 0;
+    if (f) fclose(f);
+    text[n] = 0;
+    const char *at = strstr(text, element);
+    if (!at) exit(99);
+    snprintf(changed, sizeof changed, "%.*s<rfilter type='%s'/>%s", (int)(at - text),
+             text, filter, at + sizeof element - 1);
+    o.defines = defines;
+    o.n_defines = 1;
+    o.search = folders;
+    o.n_search = 1;
+    test_must(ctx,
+              imp_scene_load_string(ctx, changed, strlen(changed), path, &o, &scene));
+    return scene;
+}
+
+static double along(const double *v, const double *matrix)
+{
+    double sum = 0;
+    for (int i = 0; i < N; i++)
+        for (int j = 0; j < N; j++) sum += v[i] * matrix[i * N + j] * v[j];
+    return sum;
+}
+
+static void filter(imp_context *ctx, const char *name, enum imp_points points)
+{
+    double H[N * N], C[N * N], S[N * N], g[SEEDS][N], told[N * N] = {0},
+                                                               mean[N * N] = {0};
+    double values[N], vectors[N * N];
+    struct imp_target target = IMP_TARGET_INIT;
+    struct imp_run run = IMP_RUN_INIT;
+    imp_scene *scene = box(ctx, name);
+    imp_problem *p;
+    imp_film *film;
+    test_must(ctx, imp_problem_create(scene, &p));
+    for (int k = 0; k < 3; k++) test_must(ctx, imp_problem_activate(p, active[k]));
+    run.spp = 4096;
+    run.seed = 7;
+    test_must(ctx, imp_render(scene, &run, &film));
+    target.pixels = imp_film_mean(film);
+    target.width = target.height = SIDE;
+    target.channels = 3;
+    test_must(ctx, imp_problem_add_target(p, &target));
+    run.spp = SPP;
+    run.points = points;
+    for (int seed = 0; seed < SEEDS; seed++) {
+        struct imp__gauss_newton normal = {
+            .H = H, .g = g[seed], .cov_g = C, .cov_excess = S};
+        run.seed = 100 + (uint64_t)seed;
+        test_must(ctx, imp__gauss_newton(p, NULL, &run, &normal));
+        for (int i = 0; i < N * N; i++) {
+            mean[i] += H[i] / SEEDS;
+            told[i] += (C[i] - S[i]) / SEEDS;
+        }
+    }
+    if (!imp__eigen_symmetric(N, mean, values, vectors)) exit(99);
+    double least = INFINITY, most = 0;
+    for (int e = 0; e < N; e++) {
+        struct tap_stat seen = {0};
+        for (int seed = 0; seed < SEEDS; seed++) {
+            double at = 0;
+            for (int k = 0; k < N; k++) at += vectors[e * N + k] * g[seed][k];
+            tap_add(&seen, at);
+        }
+        const double ratio =
+            sqrt(along(vectors + (size_t)e * N, told) / (seen.m2 / (seen.n - 1)));
+        least = fmin(least, ratio);
+        most = fmax(most, ratio);
+    }
+    tap_ok(least > 0.85 && most < 1.18, "%s, %s # told/seen %.2f to %.2f", name,
+           points == IMP_POINTS_SOBOL ? "sobol" : "independent", least, most);
+    imp_film_destroy(film);
+    imp_problem_destroy(p);
+    imp_scene_destroy(scene);
+}
+
+/* Noisy pictures, each fitted with walks of its own. */
+static void fits(imp_context *ctx, const char *name, enum imp_points points)
+{
+    imp_scene *scene = box(ctx, name);
+    struct tap_stat z2 = {0};
+    double truth[N], start[N];
+    int held = 0;
+    for (int seed = 0; seed < FITS; seed++) {
+        const struct imp_fit_result *r;
+        struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
+        struct imp_target target = IMP_TARGET_INIT;
+        struct imp_run run = IMP_RUN_INIT;
+        imp_problem *p;
+        imp_film *film;
+        test_must(ctx, imp_problem_create(scene, &p));
+        for (int k = 0; k < 3; k++) test_must(ctx, imp_problem_activate(p, active[k]));
+        if (seed == 0) imp_problem_get_x(p, truth);
+        test_must(ctx, imp_problem_set_x(p, truth));
+        run.spp = 64;
+        run.seed = 500 + (uint64_t)seed;
+        run.points = IMP_POINTS_INDEPENDENT;
+        test_must(ctx, imp_render(scene, &run, &film));
+        target.pixels = imp_film_mean(film);
+        target.noise_se = imp_film_se(film);
+        target.width = target.height = SIDE;
+        target.channels = 3;
+        test_must(ctx, imp_problem_add_target(p, &target));
+        for (int k = 0; k < N; k++) start[k] = 0.8 * truth[k];
+        test_must(ctx, imp_problem_set_x(p, start));
+        o.optimizer = IMP_LM;
+        o.intervals = 1;
+        run.spp = SPP;
+        run.seed = 9000 + (uint64_t)seed;
+        run.points = points;
+        test_must(ctx, imp_fit(p, &o, &run, &r));
+        for (int k = 0; k < N; k++) {
+            const double z = (r->variables[k].value - truth[k]) / r->variables[k].se;
+            tap_add(&z2, z * z);
+            held += fabs(z) < 1.959964;
+        }
+        imp_problem_destroy(p);
+        imp_film_destroy(film);
+    }
+    const double share = (double)held / (N * FITS);
+    tap_ok(share >= 0.93 && share <= 0.975 && z2.mean > 0.75 && z2.mean < 1.2,
+           "fits, %s, %s # %.1f %% of intervals hold the truth, mean z^2 %.2f", name,
+           points == IMP_POINTS_SOBOL ? "sobol" : "independent", 100 * share, z2.mean);
+    imp_scene_destroy(scene);
+}
+
+int main(int argc, char **argv)
+{
+    static const char *const filters[] = {"box", "tent", "gaussian", "mitchell"};
+    imp_context *ctx = test_context(2);
+    filter(ctx, "gaussian", IMP_POINTS_INDEPENDENT);
+    filter(ctx, "tent", IMP_POINTS_SOBOL);
+    for (int f = 0; argc > 1 && strcmp(argv[1], "long") == 0 && f < 4; f++) {
+        fits(ctx, filters[f], IMP_POINTS_INDEPENDENT);
+        fits(ctx, filters[f], IMP_POINTS_SOBOL);
+    }
+    imp_context_destroy(ctx);
+    return tap_done();
+}
