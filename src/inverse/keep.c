@@ -247,8 +247,8 @@ enum imp_status imp_walks_keep(imp_scene *scene, const struct imp_run *run,
     enum imp_status st = IMP_OK;
     const struct imp_sensor *sensor;
     uint8_t *sensors = NULL;
-    if (!(o.memory >= 0) || !(o.survival <= 1) || !(o.ess >= 0 && o.ess <= 1) ||
-        isinf(o.memory))
+    if (!(o.memory >= 0) || !(o.survival <= 1) || isinf(o.survival) ||
+        !(o.ess >= 0 && o.ess <= 1) || isinf(o.memory))
         return imp__error(ctx, IMP_E_ARG,
                           "options: memory %g, survival %g or ess %g is out of range",
                           o.memory, o.survival, o.ess);

@@ -279,6 +279,11 @@ enum imp_status imp_walks_weigh(const imp_walks *w, int sensor, const float *mas
     if (!store)
         return imp__error(w->ctx, IMP_E_ARG, "there are no kept walks of sensor %d",
                           sensor);
+    const struct imp_film_desc *film = &store->sensor->film;
+    const size_t pixels = (size_t)film->crop_w * (size_t)film->crop_h;
+    for (size_t i = 0; mask && i < pixels; i++)
+        if (!isfinite(mask[i]))
+            return imp__error(w->ctx, IMP_E_ARG, "mask: pixel %zu is %g", i, mask[i]);
     enum imp_status st = imp__walks_weigh(w, store, mask, &all);
     if (st == IMP_OK) st = worth_check(w, &all);
     if (st != IMP_OK && st != IMP_E_UNSUPPORTED && st != IMP_E_NUMERIC) return st;
