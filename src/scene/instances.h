@@ -41,7 +41,7 @@ struct imp_group {
     int *within;   /* [n_within] all shapes that a ray can meet in it, ascending; of a
                       group only */
     imp_v3 lo, hi; /* bounds of all of it */
-    bool bumped; /* a material in it has a bump map */
+    bool bumped;   /* a material in it has a bump map */
     void *intersector;
 };
 

@@ -74,8 +74,8 @@ static double response(const imp_scene *s, int c, bool factor, double nm)
 static void pictures(imp_context *ctx, const imp_scene *s, enum imp_color_mode mode)
 {
     static const enum imp_wavelength_sampling how[] = {IMP_WAVELENGTHS_STRATIFIED,
-                                                     IMP_WAVELENGTHS_INDEPENDENT,
-                                                     IMP_WAVELENGTHS_IMPORTANCE};
+                                                       IMP_WAVELENGTHS_INDEPENDENT,
+                                                       IMP_WAVELENGTHS_IMPORTANCE};
     double want[3] = {0};
     for (double nm = 360.05; nm < 830; nm += 0.1)
         for (int c = 0; c < 3; c++)
