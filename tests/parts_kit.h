@@ -7,6 +7,8 @@
 
 #include "imp_scene.h"
 #include "imp_tap.h"
+#include <importon/kinds.h>
+#include <stdatomic.h>
 
 enum { WIDTH = 20, HEIGHT = 14, PIXELS = WIDTH * HEIGHT * 3, TEXELS = 20, SPP = 18 };
 enum { MANY = TEXELS * TEXELS * 3 + 64 }; /* more than 1,024: summed in fixed point */
@@ -29,6 +31,43 @@ struct result {
 static float target[PIXELS];
 static enum imp_points points = IMP_POINTS_INDEPENDENT;
 
+/* A texture that counts how often it is looked at: by walks. */
+static _Atomic uint64_t looked;
+static enum imp_status counted_build(const struct imp_build *b, void *self,
+                                     struct imp_texture *t)
+{
+    (void)b, (void)self, (void)t;
+    return IMP_OK;
+}
+static void counted_eval(const struct imp_texture *t, const struct imp_texcoord *at,
+                         bool scalar, imp_spec *value)
+{
+    (void)t, (void)at, (void)scalar;
+    atomic_fetch_add(&looked, 1);
+    imp_spec_fill(value, .4);
+}
+/* It has no numbers. */
+static void counted_scatter(const struct imp_texture *t, const struct imp_texcoord *at,
+                            bool scalar, const imp_spec *bar, struct imp_sink *sink)
+{
+    (void)t, (void)at, (void)scalar, (void)bar, (void)sink;
+}
+static void counted_tangent(const struct imp_texture *t, const struct imp_texcoord *at,
+                            bool scalar, imp_dot_fn *dot, const void *x_dot,
+                            imp_spec *value_dot)
+{
+    (void)t, (void)at, (void)scalar, (void)dot, (void)x_dot;
+    imp_spec_fill(value_dot, 0);
+}
+static bool counted_slope(const struct imp_texture *t, const struct imp_texcoord *at,
+                          bool scalar, imp_spec d_uv[2])
+{
+    (void)t, (void)at, (void)scalar;
+    imp_spec_fill(&d_uv[0], 0);
+    imp_spec_fill(&d_uv[1], 0);
+    return true;
+}
+
 static void rgb(imp_scene *s, const char *name, double r, double g, double b)
 {
     imp_scene_rgb(s, name, (double[3]){r, g, b});
@@ -37,10 +76,19 @@ static void rgb(imp_scene *s, const char *name, double r, double g, double b)
 /* A wall with a texture, and a red ball, under a lamp. */
 static imp_scene *scene_make(imp_context *ctx, const char *filter, double red)
 {
+    static const struct imp_texture_ops counted = {.size = sizeof counted,
+                                                   .name = "counted",
+                                                   .object_size = 1,
+                                                   .build = counted_build,
+                                                   .eval = counted_eval,
+                                                   .scatter = counted_scatter,
+                                                   .tangent = counted_tangent,
+                                                   .slope = counted_slope};
     static float pixels[TEXELS * TEXELS * 3];
     imp_scene *s;
     for (int k = 0; k < TEXELS * TEXELS * 3; k++)
         pixels[k] = 0.2f + 0.5f * (float)(k % 7) / 7;
+    test_must(ctx, imp_register_texture(ctx, &counted));
     test_must(ctx, imp_scene_create(ctx, NULL, &s));
     imp_scene_begin(s, "integrator", "path", NULL, NULL);
     imp_scene_integer(s, "max_depth", 3);
@@ -72,6 +120,14 @@ static imp_scene *scene_make(imp_context *ctx, const char *filter, double red)
     imp_scene_float(s, "radius", 0.6);
     imp_scene_begin(s, "bsdf", "diffuse", "ball", NULL);
     rgb(s, "reflectance", red, .2, .1);
+    imp_scene_end(s);
+    imp_scene_end(s);
+    imp_scene_begin(s, "shape", "sphere", NULL, NULL);
+    imp_scene_vector(s, "center", (double[3]){-1, -.6, 0});
+    imp_scene_float(s, "radius", 0.4);
+    imp_scene_begin(s, "bsdf", "diffuse", "pebble", NULL);
+    imp_scene_begin(s, "texture", "counted", NULL, "reflectance");
+    imp_scene_end(s);
     imp_scene_end(s);
     imp_scene_end(s);
     imp_scene_begin(s, "shape", "sphere", NULL, NULL);
@@ -184,6 +240,55 @@ static void alone(const char *filter, enum job job, struct result *r)
 static void target_set(void)
 {
     for (int k = 0; k < PIXELS; k++) target[k] = 0.05f + 0.4f * (float)(k % 11) / 11;
+}
+
+/* ---- Parts in files -------------------------------------------------------------- */
+
+static char folder[64] __attribute__((unused));
+__attribute__((unused)) static const char *part_path(char path[96], int i, int n)
+{
+    snprintf(path, 96, "%s/%d-%d.part", folder, i, n);
+    return path;
+}
+
+__attribute__((unused)) static void part_make(const char *filter, enum job job, int i,
+                                              int n, int threads)
+{
+    char path[96];
+    struct result none;
+    imp_parts *part;
+    imp_context *ctx = test_context(threads);
+    imp_scene *s = scene_make(ctx, filter, .6);
+    test_must(ctx, imp_parts_create(ctx, i, n, "a test", &part));
+    test_must(ctx, imp_context_set_parts(ctx, part));
+    const enum imp_status st = job_run(ctx, s, job, 5, &none);
+    if (st != IMP_PART) tap_ok(0, "a part ends with IMP_PART # %s", imp_last_error(ctx));
+    test_must(ctx, imp_parts_write(part, part_path(path, i, n)));
+    imp_parts_destroy(part);
+    imp_scene_destroy(s);
+    imp_context_destroy(ctx);
+}
+
+/* Of the parts [n] named i/k; NULL: what the merge said is in `error`. */
+__attribute__((unused)) static enum imp_status merge(const char *filter, enum job job,
+                                                     const int (*which)[2], int n,
+                                                     double red, uint64_t seed,
+                                                     struct result *r, char error[400])
+{
+    char path[64][96];
+    const char *paths[64];
+    imp_parts *parts = NULL;
+    imp_context *ctx = test_context(2);
+    imp_scene *s = scene_make(ctx, filter, red);
+    for (int k = 0; k < n; k++) paths[k] = part_path(path[k], which[k][0], which[k][1]);
+    enum imp_status st = imp_parts_read(ctx, paths, (size_t)n, &parts);
+    if (st == IMP_OK) st = imp_context_set_parts(ctx, parts);
+    if (st == IMP_OK) st = job_run(ctx, s, job, seed, r);
+    snprintf(error, 400, "%s", imp_last_error(ctx));
+    imp_parts_destroy(parts);
+    imp_scene_destroy(s);
+    imp_context_destroy(ctx);
+    return st;
 }
 
 #endif

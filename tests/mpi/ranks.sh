@@ -13,8 +13,9 @@ export PATH=$1:$PATH LC_ALL=C OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CO
 # Where nothing but this machine takes part, no network is needed.
 export OMPI_MCA_btl_vader_single_copy_mechanism=none OMPI_MCA_rmaps_base_oversubscribe=1 OMPI_MCA_hwloc_base_binding_policy=none
 unset TMPDIR
-# MPI keeps memory until its processes end.
-export ASAN_OPTIONS=${ASAN_OPTIONS:+$ASAN_OPTIONS:}detect_leaks=0
+# Who has left memory behind is found in whole stacks: MPI's libraries have no frame pointers.
+export ASAN_OPTIONS=${ASAN_OPTIONS:+$ASAN_OPTIONS:}fast_unwind_on_malloc=0
+export LSAN_OPTIONS=suppressions=$ROOT/tests/mpi/lsan.supp:print_suppressions=0
 mpirun=$(command -v "mpirun.$mpi" || command -v mpirun) || { echo "1..0 # SKIP no mpirun of $mpi"; exit 0; }
 case $mpi in
     openmpi) "$mpirun" --version 2>&1 | grep -qi 'open *mpi\|open mpi\|openrte' ;;
@@ -87,6 +88,7 @@ job texture gradient "${textured[@]}" -T "$work/textured.exr" --spp 4 --json
 job jacobian jacobian "${cornell[@]}" -p '*radiance*' --spp 6 -o x --json
 job check check "$scenes/furnace.xml" --paths 20 --spp 4 --json
 job elements elements "$scenes/elements/a.xml" -D res=8 --json -o x.exr
+job elements_fit elements "$scenes/elements/b.xml" -m mono -D res=16 --eps 5e-3 -q --no-image --fit -p 'light_left*' --lux floor=0.25 --json
 for optimizer in adam lm lbfgs mma slsqp; do
     job "fit_$optimizer" fit "$scenes/furnace.xml" -T "$work/f.exr" -p 'ball.*' --set ball.reflectance.value=0.8 --spp 8 \
         -n 4 --optimizer $optimizer --picture-spp 2 --checkpoint state -o x --json

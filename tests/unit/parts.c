@@ -7,52 +7,7 @@
 #include "parts_kit.h"
 #include <unistd.h>
 
-/* ---- Parts --------------------------------------------------------------------------- */
-
-static char folder[64];
-static const char *part_path(char path[96], int i, int n)
-{
-    snprintf(path, 96, "%s/%d-%d.part", folder, i, n);
-    return path;
-}
-
-static void part_make(const char *filter, enum job job, int i, int n, int threads)
-{
-    char path[96];
-    struct result none;
-    imp_parts *part;
-    imp_context *ctx = test_context(threads);
-    imp_scene *s = scene_make(ctx, filter, .6);
-    test_must(ctx, imp_parts_create(ctx, i, n, "a test", &part));
-    test_must(ctx, imp_context_set_parts(ctx, part));
-    const enum imp_status st = job_run(ctx, s, job, 5, &none);
-    if (st != IMP_PART) tap_ok(0, "a part ends with IMP_PART # %s", imp_last_error(ctx));
-    test_must(ctx, imp_parts_write(part, part_path(path, i, n)));
-    imp_parts_destroy(part);
-    imp_scene_destroy(s);
-    imp_context_destroy(ctx);
-}
-
-/* Of the parts [n] named i/k; NULL: what the merge said is in `error`. */
-static enum imp_status merge(const char *filter, enum job job, const int (*which)[2],
-                             int n, double red, uint64_t seed, struct result *r,
-                             char error[400])
-{
-    char path[8][96];
-    const char *paths[8];
-    imp_parts *parts = NULL;
-    imp_context *ctx = test_context(2);
-    imp_scene *s = scene_make(ctx, filter, red);
-    for (int k = 0; k < n; k++) paths[k] = part_path(path[k], which[k][0], which[k][1]);
-    enum imp_status st = imp_parts_read(ctx, paths, (size_t)n, &parts);
-    if (st == IMP_OK) st = imp_context_set_parts(ctx, parts);
-    if (st == IMP_OK) st = job_run(ctx, s, job, seed, r);
-    snprintf(error, 400, "%s", imp_last_error(ctx));
-    imp_parts_destroy(parts);
-    imp_scene_destroy(s);
-    imp_context_destroy(ctx);
-    return st;
-}
+/* ---- Cuts --------------------------------------------------------------------------- */
 
 static void cuts(const char *filter)
 {
