@@ -295,10 +295,7 @@ static enum imp_status pass_run(imp_context *ctx, const struct imp__functional *
     const double walks =
         (double)p.spp * (width + 2. * f->margin) * (height + 2. * f->margin);
     p.set = imp_max(imp__tracer_set(&f->tracer, p.spp), 1);
-    /* Of one set nothing varies: its walks, taken for independent ones, vary as much at
-     * least. */
-    if (p.spp < 2 * p.set) p.set = 1;
-    p.sets = imp_max(p.spp / p.set, 1);
+    p.sets = p.spp / p.set; /* at least 4 of dependent walks: see imp__tracer_set */
     p.parts = imp_max(p.sets / imp_max(PART_SPP / p.set, 2), (int64_t)1);
     own.spp = p.spp;
     own.time_limit_s = 0;

@@ -173,34 +173,6 @@ static void values(const char *filter)
     imp_scene_destroy(scene);
 }
 
-/* Four samples are one set of wavelengths, in which walks depend on each other: nothing
- * varies between sets, and the error is that of as many independent walks, which is not
- * below. 64 seeds know a standard deviation to 9 %: 1.3 is 3.4 of that above 1. */
-static void one_set(const char *filter)
-{
-    enum { SETS = 64 };
-    imp_scene *scene = scene_of(filter, IMP_SPECTRAL);
-    imp_problem *p = test_problem(ctx, scene, "lamp.*");
-    struct spread mean = {{0}, 0};
-    int none = 0;
-    for (int k = 0; k < SETS; k++) {
-        struct imp_run run = IMP_RUN_INIT;
-        struct imp_estimate e;
-        run.spp = 4;
-        run.wavelength_set = 4;
-        run.seed = 1000 + (uint64_t)k;
-        test_must(ctx, imp_problem_functional(p, NULL, &run, &e, NULL, NULL));
-        none += !(e.se > 0);
-        tap_add(&mean.value, e.value);
-        mean.variance += e.se * e.se / SETS;
-    }
-    const double r = ratio(&mean);
-    tap_ok(none == 0 && r < 1.3 && r > 0.2,
-           "one set of wavelengths: spread/reported %.2f", r);
-    imp_problem_destroy(p);
-    imp_scene_destroy(scene);
-}
-
 int main(void)
 {
     static const char *const filters[] = {
@@ -212,7 +184,6 @@ int main(void)
         values(filters[k]);
     }
     errors(filters[1], IMP_MONO, 100); /* two passes, and a part of the walks */
-    one_set(filters[1]);
     imp_context_destroy(ctx);
     return tap_done();
 }
