@@ -17,15 +17,15 @@
 #define JSON_MAX ((size_t)1 << 28) /* bytes of one answer */
 
 static const char *title, *scene_file;
-static int walks;
+static struct arg_list walks;
 
 static const struct arg_option options[] = {
     {ARG_TEXT, 0, "title", "TEXT", "title of the page (default: the folder's name)",
      &title, 0, 0, NULL},
     {ARG_TEXT, 0, "scene", "SCENE", "show random walks of this scene", &scene_file, 0, 0,
      NULL},
-    {ARG_INT, 0, "walks", "N", "of a grid of N x N pixels (default 16)", &walks, 1, 64,
-     NULL},
+    {ARG_LIST, 0, "walks", "N|X,Y",
+     "of a grid of N x N pixels (default 16), or of this pixel", &walks, 0, 0, NULL},
     {0}};
 
 /* What the page will hold, and what it is made of. */
@@ -256,23 +256,52 @@ static int collect(struct collection *c, const char *folder)
 
 /* ---- Walks ------------------------------------------------------------------------ */
 
-/* One walk from the middle of each cell of a grid over the picture. */
+/* --walks: a grid's side, or pixels; 0, or an exit code with the reason printed. */
+static int pixels_read(const struct imp_sensor_info *sensor, int (**out)[2], size_t *n)
+{
+    int side = walks.n ? 0 : 16;
+    *out = cli_alloc(walks.n + 64 * 64, sizeof **out);
+    *n = 0;
+    for (size_t k = 0; k < walks.n; k++) {
+        int x, y, end = 0;
+        const char *text = walks.item[k];
+        if (sscanf(text, "%d,%d%n", &x, &y, &end) == 2 && !text[end]) {
+            if (x < 0 || y < 0 || x >= sensor->width || y >= sensor->height)
+                return cli_error(EXIT_USAGE, "--walks %s: the picture has %d x %d pixels",
+                                 text, sensor->width, sensor->height);
+            (*out)[*n][0] = x;
+            (*out)[(*n)++][1] = y;
+        } else if (sscanf(text, "%d%n", &x, &end) == 1 && !text[end] && x >= 1 &&
+                   x <= 64 && !side) {
+            side = x;
+        } else {
+            return cli_error(EXIT_USAGE,
+                             "--walks '%s': a number from 1 to 64, or a pixel X,Y", text);
+        }
+    }
+    for (int i = 0; i < side * side; i++, ++*n) {
+        (*out)[*n][0] = (int)((i % side + 0.5) * sensor->width / side);
+        (*out)[*n][1] = (int)((i / side + 0.5) * sensor->height / side);
+    }
+    return 0;
+}
+
+/* One walk from the middle of each cell of a grid over the picture, or 16 of each pixel
+ * that is named. */
 static int add_walks(struct collection *c)
 {
     struct imp_sensor_info sensor = {.size = sizeof sensor};
-    const int side = walks ? walks : 16;
+    int(*pixel)[2] = NULL;
+    size_t n = 0;
     int rc = cli_load(scene_file);
     if (rc) return rc;
     const struct imp_run run = cli_run();
     const enum imp_status st = imp_scene_get_sensor(cli.scene, run.sensor, &sensor);
     if (st != IMP_OK) return cli_fail(st, scene_file);
-    int(*pixel)[2] = cli_alloc((size_t)side * (size_t)side, sizeof *pixel);
-    for (int i = 0; i < side * side; i++) {
-        pixel[i][0] = (int)((i % side + 0.5) * sensor.width / side);
-        pixel[i][1] = (int)((i / side + 0.5) * sensor.height / side);
-    }
-    char *text =
-        walks_json(&run, (size_t)side * (size_t)side, (const int(*)[2])pixel, 1, &rc);
+    rc = pixels_read(&sensor, &pixel, &n);
+    char *text = rc ? NULL
+                    : walks_json(&run, n, (const int(*)[2])pixel,
+                                 walks.n && strchr(walks.item[0], ',') ? 16 : 1, &rc);
     free(pixel);
     if (!text) return rc;
     struct imp_report_item *item = add(c, "walks");
@@ -286,7 +315,7 @@ static int run_report(int n, char **operand)
     struct collection all = {0};
     struct imp_report report = IMP_REPORT_INIT;
     (void)n;
-    int rc = walks && !scene_file ? cli_error(EXIT_USAGE, "--walks needs --scene") : 0;
+    int rc = walks.n && !scene_file ? cli_error(EXIT_USAGE, "--walks needs --scene") : 0;
     if (!rc) rc = cli_open();
     if (rc) return rc;
     char *automatic = cli.out ? NULL : join_path(operand[0], "report.html");

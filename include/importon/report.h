@@ -70,6 +70,29 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_report_data(imp_context *context,
                                                        const struct imp_report *report,
                                                        char **text, size_t *length);
 
+/* ---- What carried a pixel --------------------------------------------------------- */
+
+/**
+ * What parameters do to one pixel, over its own walks: shares x dR/dx / R, summed over the
+ * numbers of a parameter, of R, the mean over channels of the radiance of the walks that
+ * start in the pixel. Those of all emission add up to 1, where it is all active; that of a
+ * reflectance is the mean number of reflections by it, weighted by what they carry.
+ * @param run      its sensor, seed and spp; NULL for defaults.
+ * @param[out] share      [imp_scene_n_params]; 0: not active, or a black
+ *                        pixel.
+ * @param[out] share_se   [imp_scene_n_params], one standard error.
+ * @param[out] radiance   R.
+ * @param[out] walk_share [n_walks][imp_scene_n_params] x dL/dx of the pixel's first walks
+ *                        (those of imp_walk_describe), in units of radiance; may be NULL
+ *                        for no walks.
+ * @return IMP_OK; IMP_E_ARG without an active parameter, for a pixel that is not there, or
+ *         more walks than run->spp; what imp_problem_reverse refuses; IMP_E_NOMEM.
+ */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_problem_shares(imp_problem *problem, const struct imp_run *run, int x, int y,
+                   double *share, double *share_se, struct imp_estimate *radiance,
+                   double *walk_share, int64_t n_walks);
+
 #ifdef __cplusplus
 }
 #endif

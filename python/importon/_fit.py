@@ -12,7 +12,8 @@ from . import _c
 from ._array import copy_doubles
 from ._library import choice, decode, failure, integer, lib, make, run, text
 from ._params import Values
-from ._problem import Problem, run_options
+from ._picture import read
+from ._problem import Problem, run_options, target_list
 from ._scene import Scene
 
 
@@ -58,8 +59,10 @@ class Fit(Values):
     reason, warning : str
     """
 
-    def __init__(self, scene: Scene, values: dict[str, Any], result: Any, names: list[str]) -> None:
+    def __init__(self, scene: Scene, values: dict[str, Any], result: Any, names: list[str], infos: Mapping[str, Any],
+                 targets: list[Any], optimizer: str, loss: str) -> None:
         super().__init__(scene, values)
+        self._infos, self._targets, self._optimizer, self._loss_word = infos, targets, optimizer, loss
         self.iterations: int = result.iterations
         self.loss: float = result.objective.value
         self.loss_se: float = result.objective.se
@@ -78,6 +81,69 @@ class Fit(Values):
         self.reason: str = decode(result.reason)
         self.warning: str = decode(result.warning)
 
+    def report(self, path: Any, *, title: Optional[str] = None, command: Optional[str] = None, spp: int = 0) -> None:
+        """Write the fit as one HTML page that opens anywhere: the target beside the picture that was
+        recovered, whether it is explained, numbers with their intervals, correlations, losses.
+
+        Parameters
+        ----------
+        path : str or PathLike
+        title, command : str, optional
+            What stands above; how the fit was made, to be copied.
+        spp : int
+            Samples per pixel of the recovered pictures, rendered now, with the scene as it is; 0: the
+            scene's.
+
+        Raises
+        ------
+        FileError
+            The file cannot be written.
+
+        Examples
+        --------
+        >>> scene = importon.load_dict(importon.cornell_box(res=8))
+        >>> target = importon.render(scene, spp=64, seed=1)
+        >>> fit = importon.fit(scene, target, "red.*", optimizer="lm", spp=16)
+        >>> fit.report("fit.html", spp=16)
+        >>> "red.reflectance.value[0]" in open("fit.html").read()
+        True
+        """
+        from ._render import render
+        from ._report import report
+        items: list[Any] = []
+        for view, (sensor, target) in enumerate(self._targets):
+            if isinstance(target, (str, bytes)) or hasattr(target, "__fspath__"):
+                target = read(target)
+            items.append({"picture": target, "name": "target", "role": "target", "view": view})
+            items.append({"picture": render(self._scene, sensor=sensor, spp=spp), "name": "recovered", "role": "picture",
+                          "view": view})
+        rows: list[dict[str, Any]] = []
+        for name, v in self.items():
+            info, flat = self._infos.get(name), [np.atleast_1d(x).ravel() for x in (
+                v.start, v.value, v.se, *v.interval, v.at_bound, v.determined)]
+            about = {"unit": info.unit, "min": info.lo, "max": info.hi} if info else {"unit": "1"}
+            if flat[0].size > 12:
+                rows.append({"name": name, "count": flat[0].size, "file": "the layer " + name, **about})
+                field = np.asarray(v.value, float)
+                if field.ndim in (2, 3) and field.shape[-1] in (1, 3) or field.ndim == 2:
+                    items.append({"picture": field, "name": name, "view": len(self._targets)})
+                continue
+            label = info.name if info else name
+            for k, (start, value, se, lo, hi, at_bound, determined) in enumerate(zip(*flat)):
+                rows.append({"name": "%s[%d]" % (label, k) if flat[0].size > 1 else label, **about, "start": start, "value": value,
+                             "se": se, "lo95": lo, "hi95": hi, "at_bound": int(at_bound), "determined": bool(determined)})
+        history: dict[str, Any] = {"loss": self.history, "se": self.history_se}
+        if self.history_x is not None:
+            history.update(names=self.names, x=self.history_x)
+        answer = {"optimizer": self._optimizer, "loss": self._loss_word, "iterations": self.iterations, "value": self.loss,
+                  "se": self.loss_se, "residual": self.residual, "residual_hi": self.residual_hi, "chi2_per_freedom": self.chi2,
+                  "chi2_se": self.chi2_se, "shift": self.shift, "condition": self.condition, "reason": self.reason,
+                  "warning": self.warning or None, "params": rows, "history": history}
+        if self.covariance is not None and len(self.covariance) <= 64:
+            answer["covariance"] = self.covariance
+        items.append({"kind": "fit", "json": _plain(answer)})
+        report(path, items, title=title, command=command)
+
     def __repr__(self) -> str:
         lines = ["%d iterations, loss %.4g +- %.2g: %s" % (self.iterations, self.loss, self.loss_se, self.reason)]
         for name, v in self.items():
@@ -95,6 +161,17 @@ class Fit(Values):
     def _repr_html_(self) -> str:
         from ._html import fit
         return fit(self)
+
+
+def _plain(value: Any) -> Any:
+    """As JSON has it: NaN and infinities become null."""
+    if isinstance(value, Mapping):
+        return {k: _plain(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return [_plain(v) for v in value]
+    if isinstance(value, (float, np.floating)):
+        return float(value) if np.isfinite(value) else None
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def variables(result: Any, blocks: Any, start: Any, value: Any) -> dict[str, FitVariable]:
@@ -208,7 +285,8 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
             result = _c.imp_fit_result.from_address(out.value)
             names = [info.name + ("[%d]" % k if info.size > 1 else "") for info, _ in p.blocks
                      for k in range(info.size)] if p.n <= 1024 else []
-            answer = Fit(p.scene, variables(result, p.blocks, p.natural(start), p.natural(p.x())), result, names)
+            answer = Fit(p.scene, variables(result, p.blocks, p.natural(start), p.natural(p.x())), result, names,
+                         {info.name: info for info, _ in p.blocks}, target_list(p.scene, target, sensor), optimizer, loss)
         if status == _c.IMP_CANCELLED and answer and answer.reason == "time limit reached":
             return answer
         if status:

@@ -221,20 +221,24 @@ def _one_target(scene: Scene, target: Any, sensor: int, weights: Any, loss: str,
     return t, (pixels, weights, se)
 
 
-def targets(scene: Scene, target: Any, *, sensor: Any = 0, weights: Any = None, loss: str = "l2",
-            epsilon: float = 0, noise_se: Any = None) -> list[tuple[Any, Any]]:
-    """imp_targets: of one target; of a list, one for each sensor in order; of a dictionary
+def target_list(scene: Scene, target: Any, sensor: Any) -> list[tuple[int, Any]]:
+    """(sensor, target): of one target; of a list, one for each sensor in order; of a dictionary
     by sensor."""
     if isinstance(target, Mapping):
-        pairs = [(scene.sensor_index(s), t) for s, t in target.items()]
-    elif isinstance(target, (list, tuple)) and not np.isscalar(target[0] if target else 0) and (
+        return [(scene.sensor_index(s), t) for s, t in target.items()]
+    if isinstance(target, (list, tuple)) and not np.isscalar(target[0] if target else 0) and (
             np.ndim(target[0]) == 3 or isinstance(target[0], str) or hasattr(target[0], "__fspath__")):
         if len(target) != len(scene.sensors):
             raise ArgumentError("%d targets, but the scene has %d sensors: name them, {sensor: target}"
                                 % (len(target), len(scene.sensors)))
-        pairs = list(enumerate(target))
-    else:
-        pairs = [(scene.sensor_index(sensor), target)]
+        return list(enumerate(target))
+    return [(scene.sensor_index(sensor), target)]
+
+
+def targets(scene: Scene, target: Any, *, sensor: Any = 0, weights: Any = None, loss: str = "l2",
+            epsilon: float = 0, noise_se: Any = None) -> list[tuple[Any, Any]]:
+    """imp_targets of target_list."""
+    pairs = target_list(scene, target, sensor)
 
     def part(value: Any, s: int, i: int) -> Any:
         if isinstance(value, Mapping):

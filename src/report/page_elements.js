@@ -44,7 +44,7 @@ const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 /* Shares of the measurement as bars, with their errors. */
 function share_table(rows, what) {
     const most = Math.max(...rows.map((r) => Math.abs(r.share)).filter(is_number), 1e-12);
-    return make("div", {class: "scroll"}, make("table", {class: "shares"}, make("thead", {}, make("tr", {}, ...[what, "share of the measurement", ""].map((t) => make("th", {scope: "col"}, t)))),
+    return make("div", {class: "scroll"}, make("table", {class: "shares"}, make("thead", {}, make("tr", {}, ...[what, "share", ""].map((t) => make("th", {scope: "col"}, t)))),
         make("tbody", {}, ...rows.slice(0, rows_shown).map((r) => {
             const svg = make_svg("svg", {width: 220, height: 16, viewBox: "0 0 220 16", role: "img", "aria-label": "share"}), at = (v) => 4 + 200 * Math.min(Math.abs(v) / most, 1.05);
             svg.append(make_svg("rect", {x: 4, y: 3, width: at(r.share) - 4, height: 10, fill: r.share < 0 ? "var(--warn)" : "var(--accent)"}));

@@ -138,6 +138,7 @@ WITHOUT = {
     **{"imp_walks_" + word: "not yet" for word in ("keep", "destroy", "get_info", "scene", "weigh")},
     "imp_report_page": "for servers of a live page: importon view",
     "imp_report_data": "the same",
+    "imp_problem_shares": "of one pixel, for pages of walks: importon report --scene; render_backward has its gradient",
     "imp_problem_fit_variable": "one number of a fit: Fit has arrays; numbers beyond 1,024 have no errors",
 }
 

@@ -43,6 +43,34 @@ def test_answer():
     return "z %.2f" % worst
 
 
+def test_report():
+    """A page of a fit has its numbers, its target and what was recovered"""
+    import json
+    import re
+    s, target, p, _ = setting()
+    f = im.fit(s, target, p, optimizer="lm", spp=64, seed=3)
+    f.report("fit.html", title="A <fit>", spp=64)
+    data = json.loads(re.search(r'id="data">(.*?)</script>', open("fit.html", encoding="utf-8").read(), re.S)[1])
+    items = {(i["kind"], i.get("role")): i for i in data["items"]}
+    fit = items["fit", None]["data"]
+    assert data["title"] == "A <fit>" and {("picture", "target"), ("picture", "picture"), ("explained", None)} <= set(items)
+    assert items["explained", None]["data"]["explained"] is True
+    v = f[RED]
+    for k, row in enumerate(fit["params"]):
+        assert row["name"] == RED + "[%d]" % k and row["value"] == v.value[k] and row["se"] == v.se[k]
+        assert row["lo95"] == v.interval[0][k] and row["start"] == v.start[k] and (row["min"], row["max"]) == (0, 1)
+    assert fit["value"] == f.loss and fit["chi2_per_freedom"] == f.chi2 and fit["history"]["x"] == f.history_x.tolist()
+    assert np.array_equal(np.array(fit["covariance"]), f.covariance) and len(fit["history"]["loss"]) == len(f.history)
+    scene = im.load_file(os.path.join(SCENES, "textured.xml"), width=8, height=8)
+    name = next(n for n in im.traverse(scene) if n.endswith(".data") and np.size(im.traverse(scene)[n]) > 12)
+    shot = im.render(scene, spp=4)
+    g = im.fit(scene, shot, name, spp=2, max_iterations=2, intervals=False)
+    g.report("field.html", spp=2)
+    data = json.loads(re.search(r'id="data">(.*?)</script>', open("field.html", encoding="utf-8").read(), re.S)[1])
+    assert [i["data"]["params"][0]["count"] for i in data["items"] if i["kind"] == "fit"] == [np.size(g[name].value)]
+    raises(im.FileError, lambda: f.report("/nowhere/fit.html", spp=1))
+
+
 def test_is_the_command():
     """The same bits as `importon fit`"""
     import json

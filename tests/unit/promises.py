@@ -163,7 +163,7 @@ NOT_OK = {
 try: C.CDLL("libOpenImageDenoise.so.2")
 except OSError: NOT_OK["imp_denoise"] = "there is no Open Image Denoise"
 # Pointers that may be NULL, by name, or by function and name.
-NULLABLE = {"imp_report_page.length", "imp_report_data.length", "options", "run", "stats", "id", "objective", "gradient_se", "primal", "normals", "uvs",
+NULLABLE = {"imp_report_page.length", "imp_problem_shares.walk_share", "imp_report_data.length", "options", "run", "stats", "id", "objective", "gradient_se", "primal", "normals", "uvs",
             "axis", "hessian", "taps", "tap_bars", "tap_dots", "power", "bundle", "exit", "targets",
             "error", "order", "param", "element", "memory",
             "imp_optimizer_step.rule", "imp_optimizer_step.lo", "imp_optimizer_step.hi",
@@ -374,7 +374,7 @@ class Fixture:
                        "n_vertices": 3, "n_triangles": 1, "layers": 1, "a": 1., "pilots": 2, "n_groups": 1,
                        "n": {"imp_scene_set_values": 1, "imp_scene_spectrum": 2, "imp_problem_nlopt": 3}.get(function, 1)}
             zeros = {"scalar", "status", "cause", "sensor", "channel", "x", "y", "sample", "json", "i", "from_here",
-                     "kind", "progress", "rays", "ray", "bundle", "target", "edge", "most", "subject", "from", "to"}
+                     "kind", "progress", "rays", "ray", "bundle", "n_walks", "target", "edge", "most", "subject", "from", "to"}
             if key == "imp_problem_tie.kind": return constants["IMP_TIE_LOG"], None
             if key == "imp_bend_image.target": return 4, None  # the fixture adds it
             if function == "imp_parts_create": return {"index": 1, "count": 2}[a.name], None
