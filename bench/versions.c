@@ -3,8 +3,10 @@
  * Two builds of the program beside each other, say of today and of a month ago: processor
  * seconds (user and system) and peak memory of pictures, losses with gradients and checks,
  * one thread each. Memory is told in all (maximum resident set), and without the pages of
- * program and libraries, which are a part of files that all processes share. A round runs every job once with either build, in turn; the minimum of
- * all rounds counts. Prints a table for docs/speed.md.
+ * program and libraries, which are a part of files that all processes share. A round runs
+ * every job once with either build, in turn. The minimum of all rounds counts; of memory
+ * without files, which is looked at every millisecond, so that a round may miss its peak,
+ * the maximum. Prints a table for docs/speed.md.
  *
  *     versions [--rounds N] [--job TEXT] [--scenes FOLDER] OLD NEW
  *
@@ -22,7 +24,7 @@ enum { WORDS_MAX = 32 };
 struct job {
     const char *name;
     const char *words[WORDS_MAX];      /* of the command line, after the program */
-    double seconds[2], mib[2], own[2]; /* minima of the old and the new build */
+    double seconds[2], mib[2], own[2]; /* of the old and the new build */
 };
 
 #define CORNELL  "@cornell.xml", "-D", "res=128"
@@ -103,7 +105,7 @@ static void run(const char *program, const char *const *words, double *seconds,
     const double m = (double)usage.ru_maxrss / 1024;
     if (s < *seconds) *seconds = s;
     if (m < *mib) *mib = m;
-    if (most < *own) *own = most;
+    if (most > *own) *own = most;
 }
 
 int main(int argc, char **argv)
@@ -134,12 +136,11 @@ int main(int argc, char **argv)
         return 3;
     }
     for (size_t t = 0; t < sizeof targets / sizeof targets[0]; t++) {
-        double seconds = 1e30, mib = 1e30, own = 1e30;
+        double seconds = 1e30, mib = 1e30, own = 0;
         run(path[0], targets[t], &seconds, &mib, &own);
     }
     for (int k = 0; k < JOBS; k++)
-        for (int b = 0; b < 2; b++)
-            jobs[k].seconds[b] = jobs[k].mib[b] = jobs[k].own[b] = 1e30;
+        for (int b = 0; b < 2; b++) jobs[k].seconds[b] = jobs[k].mib[b] = 1e30;
     for (int r = 0; r < rounds; r++)
         for (int k = 0; k < JOBS; k++)
             for (int b = 0; strstr(jobs[k].name, wanted) && b < 2; b++)
