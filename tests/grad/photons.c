@@ -139,7 +139,7 @@ static void albedos(void)
                  row[r].type, row[r].inside);
         imp_scene *s = test_scene_text(ctx, xml, IMP_RGB);
         const struct imp_bsdf *b = s->bsdfs[s->shapes[0]->bsdf];
-        const struct imp_texcoord at = {{.5, .5}, {0}, NULL};
+        const struct imp_texcoord at = {.uv = {.5, .5}};
         imp_spec in[IMP_INPUTS_MAX];
         imp__inputs_eval(b->input, b->n_in, &at, in);
         for (size_t k = 0; k < sizeof direction / sizeof *direction; k++) {
@@ -173,6 +173,76 @@ static void albedos(void)
                    "%s # %.6f drawn %.6f se %.6f", what, H[1], sum.mean, se);
         }
         imp_scene_destroy(s);
+    }
+}
+
+/* Kinds that do not know it: the weight of the direction that was drawn takes its place.
+ * A glowing sphere of the kind, seen from inside, about a ball of it, by two settings of h
+ * and two mixtures, against walks of `path` that nothing ends before their cap; dL/de,
+ * which is L/e, with the same roulette. */
+static void drawn_weights(void)
+{
+    static const struct {
+        const char *type, *inside;
+    } row[] = {{"roughconductor", "<string name='material' value='Cu'/><float "
+                                  "name='alpha' value='.3'/>"},
+               {"roughplastic", "<float name='alpha' value='.2'/>"},
+               {"plastic", ""},
+               {"phong", "<float name='exponent' value='8'/>"},
+               {"principled",
+                "<float name='roughness' value='.4'/><float name='metallic' "
+                "value='.5'/>"}};
+    static const char *const setting[] = {
+        "type='path'><integer name='rr_depth' value='100'/>",
+        "type='photons'><float name='h' value='.5'/>",
+        "type='photons'><float name='h' value='.9'/>",
+        "type='photons'><float name='h' value='1'/><string name='weights' "
+        "value='kernel=1,uniform=1'/>"};
+    for (size_t r = 0; r < sizeof row / sizeof *row; r++) {
+        struct tap_stat truth = {0};
+        for (size_t k = 0; k < sizeof setting / sizeof *setting; k++) {
+            char xml[4096], what[96];
+            snprintf(xml, sizeof xml,
+                     "<scene version='3.0.0'><integrator %s<integer name='max_depth' "
+                     "value='5'/></integrator><sensor type='perspective'><float "
+                     "name='fov' value='60'/><transform name='to_world'><lookat "
+                     "origin='0,0,-1.5' target='0,0,0' up='0,1,0'/></transform><film "
+                     "type='hdrfilm'><integer name='width' value='4'/><integer "
+                     "name='height' value='4'/><rfilter type='box'/></film></sensor>"
+                     "<bsdf type='%s' id='wall'>%s</bsdf><shape type='sphere'><float "
+                     "name='radius' value='2'/><boolean name='flip_normals' "
+                     "value='true'/><ref id='wall'/><emitter type='area' id='glow'>"
+                     "<float name='radiance' value='.2'/></emitter></shape><shape "
+                     "type='sphere'><float name='radius' value='.6'/><ref id='wall'/>"
+                     "</shape></scene>",
+                     setting[k], row[r].type, row[r].inside);
+            struct photons p = photons_open(ctx, test_scene_text(ctx, xml, IMP_MONO), 21);
+            const struct imp_bsdf *b = p.scene->bsdfs[p.scene->shapes[0]->bsdf];
+            const struct photon_mean m = photons_mean(&p, 40000);
+            snprintf(what, sizeof what, "%s without H, setting %zu", row[r].type, k);
+            if (k == 0) {
+                tap_ok(!b->ops->directional_albedo, "%s does not know its albedo",
+                       row[r].type);
+                truth = m.L;
+            } else {
+                tap_same(&m.L, &truth, what);
+            }
+            photons_close(&p);
+            if (k != 1) continue;
+            imp_scene *scene = test_scene_text(ctx, xml, IMP_MONO);
+            imp_problem *problem = test_problem(ctx, scene, "glow.*");
+            struct imp_run run = IMP_RUN_INIT;
+            struct imp_estimate value;
+            double g, se;
+            run.spp = 2500;
+            run.seed = 4;
+            test_must(ctx, imp_problem_functional(problem, NULL, &run, &value, &g, &se));
+            const double z = (g - truth.mean / .2) / hypot(se, tap_se(&truth) / .2);
+            tap_ok(fabs(z) < 4.5 && se < .02 * g, "%s: dL/de # %.4f se %.4f z %.2f",
+                   row[r].type, g, se, z);
+            imp_problem_destroy(problem);
+            imp_scene_destroy(scene);
+        }
     }
 }
 
@@ -376,6 +446,7 @@ int main(void)
     ctx = test_context(2);
     roulette();
     albedos();
+    drawn_weights();
     refused();
     slips();
     checks();
