@@ -120,6 +120,46 @@ static void linear(void)
            tight);
 }
 
+/* At four wavelengths at once as one by one, to the bit, beyond the ends too. */
+static void lanes(void)
+{
+    static const double even[] = {400, 450, 500, 550}, odd[] = {400, 410, 500, 550},
+                        v[] = {.1, .7, .2, .9}, rgb[] = {.7, .3, .05},
+                        sellmeier[] = {1.0396, .2318, 1.0105, .006, .02, 103.56},
+                        cauchy[] = {1.5, .0042, 0}, kelvin = 3000;
+    struct imp_spectrum *s[] = {
+        imp__spectrum_make(&arena, IMP_SPECTRUM_POINTS, 4, even, v),
+        imp__spectrum_make(&arena, IMP_SPECTRUM_POINTS, 4, odd, v),
+        imp__spectrum_make(&arena, IMP_SPECTRUM_POINTS, 2, even, v),
+        imp__spectrum_make(&arena, IMP_SPECTRUM_NUMBER, 1, NULL, v),
+        imp__spectrum_make(&arena, IMP_SPECTRUM_NUMBER, 1, NULL, v),
+        imp__spectrum_make(&arena, IMP_SPECTRUM_COLOR, 3, NULL, rgb),
+        imp__spectrum_make(&arena, IMP_SPECTRUM_COLOR, 3, NULL, rgb),
+        imp__spectrum_make(&arena, IMP_SPECTRUM_SELLMEIER, 6, NULL, sellmeier),
+        imp__spectrum_make(&arena, IMP_SPECTRUM_CAUCHY, 3, NULL, cauchy),
+        imp__spectrum_make(&arena, IMP_SPECTRUM_BLACKBODY, 1, NULL, &kelvin),
+        imp__spectrum_make(&arena, IMP_SPECTRUM_POINTS, 4, even, v)};
+    const size_t n = sizeof s / sizeof *s;
+    s[4]->lo = 420, s[4]->hi = 470;
+    s[6]->linear = true;
+    s[n - 1]->times = &imp__daylight;
+    size_t differ = 0, nonzero = 0;
+    for (size_t k = 0; k < n; k++) {
+        imp__spectrum_update(s[k]);
+        for (double at = 380; at <= 570; at += .5) {
+            const double nm[4] = {at, 780 - at, at + .125, at < 475 ? 400 : 550};
+            imp_spec value;
+            imp__spectrum_lanes(s[k], nm, &value);
+            for (int j = 0; j < 4; j++) {
+                differ += value[j] != imp__spectrum_value(s[k], nm[j]);
+                nonzero += value[j] != 0;
+            }
+        }
+    }
+    tap_ok(differ == 0 && nonzero > 1000 * n,
+           "four wavelengths at once # %zu of %zu differ", differ, nonzero);
+}
+
 /* Bounds of spectra, against a close look. */
 static void bounds(void)
 {
@@ -152,6 +192,7 @@ int main(void)
     upsampling();
     linear();
     bounds();
+    lanes();
     for (int q = 0; q < 6; q++) {
         static const double rgb[6][3] = {{.2, .5, .9}, {.9, .05, .05}, {1, 0, 0},
                                          {.1, .8, .1}, {.5, .5, .1},   {.73, .72, .69}};
