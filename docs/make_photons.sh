@@ -27,7 +27,7 @@ twice() {
     "$importon" compare "$out/$name.a.exr" "$out/$name.b.exr" --json >"$out/$name.json" || true
 }
 picture() { # NAME OPTIONS...
-    "$importon" render "${@:2}" --seed 1 -q --overwrite -o "$images/photons_$1.png"
+    "$importon" render "${@:2}" --seed 1 -q --overwrite --no-manifest -o "$images/photons_$1.png"
 }
 
 if wanted 3; then
