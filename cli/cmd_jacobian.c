@@ -15,13 +15,16 @@
 #include <string.h>
 
 static int separate;
-static const char *sheet_path;
+static const char *sheet_path, *layers_path;
 static struct sheet sheet;
 static const struct arg_option options[] = {
     {ARG_FLAG, 0, "separate", NULL, "one picture per number, also for colours", &separate,
      0, 0, NULL},
     {ARG_TEXT, 0, "sheet", "FILE.png", "one PNG with all the pictures side by side",
      &sheet_path, 0, 0, NULL},
+    {ARG_TEXT, 0, "layers", "FILE.exr",
+     "one EXR with the picture and its derivatives as layers d.NAME, for viewers",
+     &layers_path, 0, 0, NULL},
     {0}};
 
 /* Sum of the films of one colour; they do not overlap, so errors add in squares. */
@@ -72,6 +75,7 @@ static int writable(const struct block *blocks, size_t n_blocks)
             free(path);
         }
     if (!rc && sheet_path) rc = picture_writable(sheet_path, 0);
+    if (!rc && layers_path) rc = picture_writable(layers_path, 0);
     return rc;
 }
 
@@ -135,6 +139,22 @@ static int write_block(struct json *j, FILE *table, const struct block *b,
     return rc;
 }
 
+/* The picture, which is changed, with all derivatives as layers. */
+static int write_layers(imp_film *primal, imp_film **films, const struct block *blocks,
+                        size_t n_blocks)
+{
+    const struct picture_options o = {.standard_error = 1, .no_preview = 1};
+    char name[512], layer[520];
+    enum imp_status st = imp_film_set_text(primal, PICTURE_LAYERS, "derivatives");
+    for (size_t k = 0; k < n_blocks; k++)
+        for (size_t i = 0; i < n_controls(&blocks[k]) && st == IMP_OK; i++) {
+            control_name(&blocks[k], i, name, sizeof name);
+            snprintf(layer, sizeof layer, "d.%s", name);
+            st = imp_film_add_layer(primal, films[blocks[k].first + i], layer);
+        }
+    return st == IMP_OK ? picture_write(primal, layers_path, &o) : cli_fail(st, NULL);
+}
+
 /* Everything, once the walks are done. */
 static int answer(const struct imp_run *run, imp_film *primal, imp_film **films,
                   struct imp_estimate mean, const struct imp_estimate *means,
@@ -178,6 +198,7 @@ static int answer(const struct imp_run *run, imp_film *primal, imp_film **films,
         rc = output_close(&table, rc);
     }
     if (!rc && sheet_path) rc = sheet_write(&sheet, 4, sheet_path);
+    if (!rc && layers_path) rc = write_layers(primal, films, blocks, n_blocks);
     free(path);
     free(csv);
     return rc;

@@ -13,6 +13,9 @@ int picture_read(const char *path, imp_film **out);
 /* Record command line, version, seed, spp and time in the film. */
 void picture_stamp(imp_film *film, const struct imp_run *run);
 
+/* Text of pictures whose layers are other pictures' too. */
+#define PICTURE_LAYERS "importon.layers"
+
 struct picture_options {
     int standard_error;
     int half;

@@ -155,6 +155,8 @@ static int add_picture(struct collection *c, const char *path, const char *name,
     if (rc) return rc;
     c->film = grown(c->film, c->n_films + 1, sizeof *c->film);
     c->film[c->n_films++] = film;
+    /* The derivatives are there one by one. */
+    if (imp_film_get_text(film, PICTURE_LAYERS)) return 0;
     char *stem = keep(c, strndup(name, strlen(name) - strlen(".exr")));
     /* What the numbers do that a fit did not determine is a derivative, too. */
     const bool loose = !strncmp(name, "undetermined", strlen("undetermined"));

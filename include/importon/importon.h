@@ -556,6 +556,13 @@ IMP_API float *imp_film_se(imp_film *film);
  * @return IMP_OK; IMP_E_ARG if sizes or channels differ, or one has no samples. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_film_merge(imp_film *film,
                                                       const imp_film *other);
+/** Append the channels of another picture of the same size as "layer.NAME": viewers show them
+ * as a layer. Standard errors stay where both have them.
+ * @return IMP_OK; IMP_E_ARG if sizes differ, the name is no layer's or is there; IMP_E_NOMEM.
+ * On an error the picture is what it was. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_film_add_layer(imp_film *film,
+                                                          const imp_film *other,
+                                                          const char *layer);
 /** Attach a text attribute (provenance); it is written to EXR files. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_film_set_text(imp_film *film, const char *key,
                                                          const char *value);

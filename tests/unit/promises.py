@@ -258,7 +258,7 @@ class Fixture:
             return scene
         if kind == "imp_film" and function == "imp_problem_jacobian_sums":
             return self.jacobian()[0]
-        if kind == "imp_film" and function == "imp_film_merge":
+        if kind == "imp_film" and function in ("imp_film_merge", "imp_film_add_layer"):
             return self.make("imp_render", scene, None)
         if kind == "imp_film": return self.make("imp_film_create", context, 4, 4, b"R,G,B")
         if kind == "imp_problem":

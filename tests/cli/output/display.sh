@@ -56,6 +56,13 @@ importon render "$ROOT/scenes/furnace.xml" -D res=24 --spp 256 -q --display "127
 wait
 cat seen
 cmp <(tail -c 6912 shown.pfm) <(tail -c 6912 picture.pfm) && echo same
+# Derivatives and their errors, as layers of one picture and one by one.
+rm port
+python3 viewer.py >seen &
+for ((k = 0; k < 100; k++)); do [[ -s port ]] && break; sleep 0.1; done
+importon jacobian "$ROOT/scenes/furnace.xml" -D res=8 --spp 4 -q -p 'ball.*' --display "127.0.0.1:$(<port)" -o J --layers J.exr >/dev/null || exit 9
+wait
+cat seen
 # Nobody there, and no address.
 importon render "$ROOT/scenes/furnace.xml" -D res=8 --display "127.0.0.1:$(<port)" -o no.exr 2>&1 | sed 's/:[0-9]*:/:PORT:/'
 importon render "$ROOT/scenes/furnace.xml" -D res=8 --display tev -o no.exr
