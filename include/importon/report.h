@@ -2,7 +2,7 @@
  *
  * A result as one HTML page that opens anywhere: pictures with their errors, parameters
  * with their intervals, losses, checks, and how they were made. The page holds its data as
- * JSON (docs/report.md describes it, version 1), needs no network, and loads nothing.
+ * JSON (docs/report.md describes it, version 2), needs no network, and loads nothing.
  * Same conventions as importon.h.
  */
 #ifndef IMPORTON_REPORT_H

@@ -33,10 +33,6 @@ const sections = [
     {kinds: ["picture", "derivative"], make: (report, of, page) => {
         const {layers, failed} = all_layers([...of("picture"), ...of("derivative")]);
         const notes = failed.map((text) => make("p", {class: "error"}, `This picture cannot be shown: ${text}`));
-        for (const layer of layers) {
-            const without = layer.role === "residual" ? 0 : layer.without_number();
-            if (without) notes.push(make("p", {class: "warning"}, `${layer.name}: ${without} of ${layer.width * layer.height} pixels are not numbers, and magenta.`));
-        }
         if (page.pictures && layers.length) page.pictures.update(layers);
         else page.pictures = layers.length ? picture_section(layers, page.live) : null;
         page.layers = layers;
@@ -89,12 +85,18 @@ function page_of(report) {
     return page;
 }
 
-try {
-    const report = JSON.parse(document.getElementById("data").textContent);
-    if (report.schema !== "importon-report" || report.version !== 1) throw new Error(`the data is of schema ${report.schema}, version ${report.version}; this page shows importon-report, version 1`);
-    page_of(report);
-    document.documentElement.dataset.ready = "1";
-} catch (error) {
-    document.getElementById("page").replaceChildren(make("p", {class: "error"}, `This page cannot show its data: ${error.message}`));
-    document.documentElement.dataset.ready = "failed";
+async function begin() {
+    document.getElementById("wait").textContent = "Reading the pictures.";
+    try {
+        const report = JSON.parse(document.getElementById("data").textContent);
+        if (report.schema !== "importon-report" || report.version !== 2) throw new Error(`the data is of schema ${report.schema}, version ${report.version}; this page shows importon-report, version 2`);
+        if (Array.isArray(report.items)) await unpack(report.items);
+        page_of(report);
+        document.documentElement.dataset.ready = "1";
+    } catch (error) {
+        document.getElementById("page").replaceChildren(make("p", {class: "error"}, `This page cannot show its data: ${error.message}`));
+        document.documentElement.dataset.ready = "failed";
+    }
+    performance.mark("ready");
 }
+begin();

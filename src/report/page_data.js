@@ -53,12 +53,29 @@ const half_table = (() => {
     return t;
 })();
 
-/* Planes [channel][y][x] of halves, little-endian, times `scale`. */
-function decode_planes(text, scale) {
-    const bytes = atob(text), out = new Float32Array(bytes.length >> 1);
-    for (let i = 0; i < out.length; i++)
-        out[i] = scale * half_table[bytes.charCodeAt(2 * i) | (bytes.charCodeAt(2 * i + 1) << 8)];
+/* Numbers [channel][y][x] times `scale`, of n halves: a zlib stream of their low bytes and
+ * then of their high bytes. */
+async function decode_planes(text, scale, n) {
+    const packed = atob(text), bytes = new Uint8Array(packed.length), out = new Float32Array(n);
+    for (let i = 0; i < bytes.length; i++) bytes[i] = packed.charCodeAt(i);
+    const halves = new Uint8Array(await new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"))).arrayBuffer());
+    if (halves.length !== 2 * n) throw new Error(`${halves.length} bytes for ${n} numbers`);
+    for (let i = 0; i < n; i++) out[i] = scale * half_table[halves[i] | (halves[n + i] << 8)];
     return out;
+}
+/* Pictures among the items get their numbers, or an `error`. */
+async function unpack(items) {
+    await Promise.all(items.map(async (item) => {
+        if (!item || typeof item.pixels !== "string") return;
+        try {
+            const n = item.width * item.height * item.channels.length;
+            item.mean = await decode_planes(item.pixels, item.scale, n);
+            item.errors = item.se ? await decode_planes(item.se, item.se_scale, n) : null;
+        } catch (error) {
+            item.error = error;
+        }
+        item.pixels = item.se = null; /* the text is large */
+    }));
 }
 
 /* A layer is what the viewer shows: one or three planes, their errors, and how to read
@@ -71,12 +88,6 @@ class Layer {
     }
     at(c, x, y) { return this.planes[c][y * this.width + x]; }
     error_at(c, x, y) { return this.errors ? this.errors[c][y * this.width + x] : NaN; }
-    /* Pixels of which some channel is infinite or not a number. */
-    without_number() {
-        let n = 0;
-        for (let i = 0; i < this.width * this.height; i++) n += this.planes.some((p) => !Number.isFinite(p[i]));
-        return n;
-    }
     /* 99.5 % of |values| are below. */
     range() {
         if (this.range_ === undefined) {
@@ -94,8 +105,8 @@ class Layer {
  * "albedo.G", "albedo.B" are the layer "albedo". */
 function layers_of(item) {
     const n = item.width * item.height, groups = new Map(), layers = [];
-    const mean = decode_planes(item.pixels, item.scale);
-    const se = item.se ? decode_planes(item.se, item.se_scale) : null;
+    if (!item.mean) throw item.error || new Error("it has no pixels");
+    const mean = item.mean, se = item.errors;
     item.channels.forEach((channel, c) => {
         const dot = channel.lastIndexOf("."), key = dot < 0 ? "" : channel.slice(0, dot);
         if (!groups.has(key)) groups.set(key, []);

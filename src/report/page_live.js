@@ -84,7 +84,9 @@ function live_section(report, page) {
         all.forEach((n, i) => { if (is_number(n.value) && !pending.has(n.name)) state.sliders[i].set(n.value); });
         enable();
     });
-    on("report", (part) => {
+    let before = Promise.resolve(); /* what came first is shown first */
+    on("report", (part) => { before = before.then(() => unpack(part.items)).then(() => take(part)); });
+    function take(part) {
         const kinds = [...new Set(part.items.map((i) => i.kind))], key = (i) => (i.kind === "walks" ? i.kind : [i.kind, i.name, i.role, i.view].join("\n"));
         for (const item of part.items) {
             const at = report.items.findIndex((i) => key(i) === key(item));
@@ -93,7 +95,7 @@ function live_section(report, page) {
         }
         page.update(kinds);
         document.documentElement.dataset.news = String(Number(document.documentElement.dataset.news || 0) + 1);
-    });
+    }
     events.onerror = () => { said.textContent = events.readyState === 2 ? "importon has ended; this is the last that it told." : "The connection is lost; trying again."; };
     page.live = {ask, walks: false};
     enable();

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Bytes as text, in base64 (RFC 4648), and so the numbers of a picture: [channel][y][x],
- * 16-bit floats, little-endian. */
+ * Bytes as text, in base64 (RFC 4648), and so the numbers of a picture, 16-bit floats
+ * [channel][y][x]: their low bytes and then their high bytes, as a zlib stream (RFC 1950). */
 #ifndef IMP_REPORT_PLANES_H
 #define IMP_REPORT_PLANES_H
 

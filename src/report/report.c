@@ -185,7 +185,7 @@ static enum imp_status data_make(imp_context *context, const char *caller,
 {
     enum imp_status st = IMP_OK;
     struct compared compared = {0};
-    imp__put(t, "{\"schema\":\"importon-report\",\"version\":1,\"importon\":");
+    imp__put(t, "{\"schema\":\"importon-report\",\"version\":2,\"importon\":");
     put_string(t, imp_version());
     put_member(t, "title", r->title);
     put_member(t, "command", r->command);

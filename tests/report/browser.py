@@ -5,17 +5,19 @@ keyboard, widths, looks.)
 
 Usage: browser.py IMPORTON SCENES
 """
+import base64
 import json
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
+import zlib
 
 from chromium import PROGRAM, Browser
 
 importon, scenes = sys.argv[1:]
-VERSION = 1  # of the data
+VERSION = 2  # of the data
 count = failed = 0
 
 
@@ -33,6 +35,7 @@ def run(*words):
 def look(page, script):
     """What `script`, the body of an async function, returns in the page."""
     tab = browser.tab("file://" + page)
+    tab.wait("document.documentElement.dataset.ready")
     answer = tab.run(script)
     errors.extend(tab.errors)
     tab.close()
@@ -148,14 +151,14 @@ known = ("picture", "derivative", "fit", "check", "walks", "rays", "bend", "imag
 cases = {"no items": [], "unknown kinds": [{"kind": "later", "data": {"a": 1}}, {"kind": "later"}],
          "empty data": [{"kind": k, "data": {}} for k in known if k not in ("picture", "derivative", "image")],
          "wrong types": [{"kind": k, "data": d} for k in ("fit", "check", "walks", "rays", "bend", "elements") for d in (None, [], 3, "text", {"params": 3, "rows": 3, "walks": 3, "history": 3})],
-         "pictures of nothing": [{"kind": "picture", "name": "x", "width": 1, "height": 1, "spp": 0, "view": 0, "channels": ["R"], "pixels": p, "scale": 1} for p in ("AH4=", "AHw=", "", "???")]}
+         "pictures of nothing": [{"kind": "picture", "name": "x", "width": 1, "height": 1, "spp": 0, "view": 0, "not_finite": 1, "channels": ["R"], "pixels": p, "scale": 1} for p in (base64.b64encode(zlib.compress(bytes([0, 0x7e]))).decode(), "AHw=", "", "???")]}
 for what, items in cases.items():
     text = json.dumps({"schema": "importon-report", "version": VERSION, "importon": "0", "items": items}).replace("<", "\\u003c")
     open(folder + "/bare.html", "w", encoding="utf-8").write(bare[:start] + text + bare[end:])
     errors.clear()
     answer = look(folder + "/bare.html", 'return [document.documentElement.dataset.ready, document.getElementById("page").innerText]')
     ok(answer[0] == "1" and not errors and (items or "holds nothing" in answer[1]), "%s: the page stands%s" % (what, " # %s %s" % (answer[1][:80], "; ".join(errors[:3])) if answer[0] != "1" or errors else ""))
-    if what == "pictures of nothing": ok("x: 1 of 1 pixels are not numbers" in answer[1] and "cannot be shown" in answer[1], "and says what is no number, and what is no picture")
+    if what == "pictures of nothing": ok("not finite" in answer[1] and "all of it" in answer[1] and "cannot be shown" in answer[1], "and says what is no number, and what is no picture")
     if what == "wrong types": ok("cannot be shown" in answer[1], "and says what it cannot show")
 browser.close()
 shutil.rmtree(folder, ignore_errors=True)
