@@ -30,13 +30,18 @@ out:
     return st;
 }
 
+bool imp__is_bumped(const struct imp_scene *scene, int bsdf)
+{
+    const struct imp_bsdf *b = bsdf >= 0 ? scene->bsdfs[bsdf] : NULL;
+    for (int j = 0; b && j < b->n_in; j++)
+        if (b->input[j]->bump) return true;
+    return false;
+}
+
 enum imp_status imp__build_bumps_survey(struct imp_scene *scene,
                                         const struct imp_node *node, struct imp_shape *s)
 {
-    if (s->bsdf < 0) return IMP_OK;
-    const struct imp_bsdf *b = scene->bsdfs[s->bsdf];
-    bool bump = false;
-    for (int j = 0; j < b->n_in; j++) bump |= b->input[j]->bump;
+    const bool bump = imp__is_bumped(scene, s->bsdf);
     if (bump && !s->ops->place)
         return imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
                                "a %s cannot have a bumpmap", s->ops->name);

@@ -91,14 +91,6 @@ out:
     return st;
 }
 
-static bool is_bumped(const struct imp_scene *scene, int bsdf)
-{
-    const struct imp_bsdf *b = bsdf >= 0 ? scene->bsdfs[bsdf] : NULL;
-    for (int j = 0; b && j < b->n_in; j++)
-        if (b->input[j]->bump) return true;
-    return false;
-}
-
 /* All shapes that can be met in the group, without repeats. */
 static int by_index(const void *a, const void *b)
 {
@@ -126,7 +118,7 @@ static enum imp_status within_list(struct imp_scene *scene, struct imp_group *g)
             all[g->n_within++] = all[k];
     g->within = all;
     for (int k = 0; k < g->n_within; k++)
-        g->bumped |= is_bumped(scene, scene->shapes[all[k]]->bsdf);
+        g->bumped |= imp__is_bumped(scene, scene->shapes[all[k]]->bsdf);
     return IMP_OK;
 }
 
@@ -269,7 +261,7 @@ static enum imp_status instance_build(struct imp_scene *scene, struct imp_node *
     }
     struct imp_map last = p->to_world, inverse;
     if (p->motion) imp__motion_at(p->motion, p->motion->end, &last, &inverse);
-    if ((bsdf ? is_bumped(scene, p->covered->bsdf) : p->group->bumped) &&
+    if ((bsdf ? imp__is_bumped(scene, p->covered->bsdf) : p->group->bumped) &&
         !(is_similar(&p->to_world) && is_similar(&last)))
         IMP_TRY(imp__node_error(ctx, node, IMP_E_UNSUPPORTED,
                                 "it mirrors, shears or stretches a group with a bumpmap: "

@@ -78,6 +78,8 @@ enum imp_status imp__build_shape_attributes(struct imp_scene *scene,
 enum imp_status imp__build_bumps_survey(struct imp_scene *scene,
                                         const struct imp_node *node, struct imp_shape *s);
 enum imp_status imp__build_attributes(struct imp_scene *scene);
+/* Has a material (index; below 0: none) bump maps? */
+bool imp__is_bumped(const struct imp_scene *scene, int bsdf);
 /* A medium that scatters, called `slot` below its parent if it has no id. */
 enum imp_status imp__build_medium(struct imp_scene *scene, struct imp_node *node,
                                   const char *parent, const char *slot,
