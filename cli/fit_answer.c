@@ -62,12 +62,56 @@ static void put_variable(struct json *j, const imp_problem *problem, size_t i,
     json_end_object(j);
 }
 
-/* Numbers of textures are in their pictures, not in lists. */
-static void put_texture(struct json *j, const struct block *b, const char *path)
+/* The numbers of a field that are least certain, and their place in it. */
+enum { LEAST_CERTAIN = 5 };
+
+static void put_least_certain(struct json *j, const struct fit_answer *a,
+                              const struct block *b)
 {
+    size_t found[LEAST_CERTAIN], n = 0;
+    for (size_t i = 0; i < b->n; i++) {
+        const double se = fit_variable(a->problem, b->first + i).se;
+        size_t at = n;
+        if (!isfinite(se)) continue;
+        while (at > 0 && fit_variable(a->problem, b->first + found[at - 1]).se < se) at--;
+        if (at == LEAST_CERTAIN) continue;
+        n = n < LEAST_CERTAIN ? n + 1 : n;
+        for (size_t k = n - 1; k > at; k--) found[k] = found[k - 1];
+        found[at] = i;
+    }
+    if (!n) return;
+    json_array(j, "least_certain");
+    for (size_t k = 0; k < n; k++) {
+        char name[512];
+        put_variable(j, a->problem, b->first + found[k], b,
+                     cli_number_name(&b->info, found[k], name, sizeof name));
+    }
+    json_end_array(j);
+}
+
+/* Numbers of textures are in their pictures, not in lists. */
+static void put_texture(struct json *j, const struct fit_answer *a, const struct block *b,
+                        const char *path)
+{
+    double lo = INFINITY, hi = -INFINITY, sum = 0;
+    int64_t known = 0, bound = 0;
+    for (size_t i = 0; i < b->n; i++) {
+        const struct imp_fit_variable v = fit_variable(a->problem, b->first + i);
+        lo = fmin(lo, v.value);
+        hi = fmax(hi, v.value);
+        sum += v.value;
+        bound += v.at_bound != 0;
+        known += isfinite(v.lo95) && isfinite(v.hi95);
+    }
     block_json(j, b);
     json_integer(j, "count", (int64_t)b->n);
     json_text(j, "file", path);
+    json_number(j, "least", lo);
+    json_number(j, "most", hi);
+    json_number(j, "mean", sum / (double)b->n);
+    json_integer(j, "n_at_bound", bound);
+    json_integer(j, "n_intervals", known);
+    put_least_certain(j, a, b);
     json_end_object(j);
 }
 
@@ -170,7 +214,7 @@ void fit_answer_json(struct json *j, const struct fit_answer *a, char **paths)
         const struct block *b = &a->blocks[k];
         char name[512];
         if (block_is_large(b)) {
-            put_texture(j, b, paths ? paths[k] : NULL);
+            put_texture(j, a, b, paths ? paths[k] : NULL);
             continue;
         }
         for (size_t i = 0; i < b->n; i++)
@@ -254,6 +298,30 @@ static void print_table(const struct fit_answer *a, char **paths)
     print_residual(r);
 }
 
+/* Half the width of the 95 % intervals of a field as a picture of its own, where there are
+ * any: NAME.interval.exr. Volumes have none. */
+static int write_intervals(const struct fit_answer *a, const struct block *b)
+{
+    double *half = cli_alloc(imp_problem_n(a->problem), sizeof *half);
+    char name[512], *path = NULL;
+    struct block of = *b;
+    int known = 0, rc = 0;
+    for (size_t i = 0; i < b->n; i++) {
+        const struct imp_fit_variable v = fit_variable(a->problem, b->first + i);
+        half[b->first + i] = (v.hi95 - v.lo95) / 2;
+        known |= isfinite(half[b->first + i]);
+    }
+    snprintf(name, sizeof name, "%s.interval", b->info.name);
+    of.info.name = name;
+    if (known && !(b->info.flags & IMP_PARAM_VOLUME)) {
+        rc = block_writable(&of, cli.out, 0);
+        if (!rc) rc = block_write(&of, half, NULL, cli.out, &path);
+    }
+    free(path);
+    free(half);
+    return rc;
+}
+
 /* Recovered textures, as pictures. */
 static int write_textures(const struct fit_answer *a, char **paths)
 {
@@ -268,6 +336,8 @@ static int write_textures(const struct fit_answer *a, char **paths)
     for (size_t k = 0; k < a->n_blocks && !rc; k++)
         if (block_is_large(&a->blocks[k]))
             rc = block_write(&a->blocks[k], x, NULL, cli.out, &paths[k]);
+    for (size_t k = 0; k < a->n_blocks && !rc; k++)
+        if (block_is_large(&a->blocks[k])) rc = write_intervals(a, &a->blocks[k]);
     free(x);
     return rc;
 }

@@ -41,6 +41,17 @@ function state_of(p) {
     return ["", ""];
 }
 
+/* Many numbers of one parameter: their range, and those that are least certain. */
+function field_summary(p) {
+    const least = Array.isArray(p.least_certain) ? p.least_certain : [];
+    return make("div", {class: "field"}, make("h3", {class: "mono"}, String(p.name)),
+        make("p", {}, `${p.count} numbers${p.file ? `, drawn from ${p.file}` : ""}${is_number(p.least) ? `: ${show(p.least, 4)} to ${show(p.most, 4)}, mean ${show(p.mean, 4)}` : ""}${p.n_at_bound > 0 ? `; ${p.n_at_bound} at a bound` : ""}. `
+            + (p.n_intervals > 0 ? `${p.n_intervals} have intervals, whose half width is the picture "${p.name}.interval".` : "They have no intervals: there are too many numbers, or none were asked for.")),
+        least.length ? make("p", {}, "Least certain:") : null,
+        least.length ? make("div", {class: "scroll"}, make("table", {}, make("tbody", {}, ...least.map((v) => make("tr", {}, make("td", {class: "mono"}, String(v.name)), make("td", {}, show_error(v.value, v.se)),
+            make("td", {}, is_number(v.lo95) ? `${show(v.lo95)} to ${show(v.hi95)}` : "–")))))) : null);
+}
+
 function parameter_section(fit) {
     const numbers = fit.params.filter((p) => p.name !== undefined && p.file === undefined);
     const files = fit.params.filter((p) => p.file !== undefined);
@@ -86,7 +97,7 @@ function parameter_section(fit) {
         numbers.length ? make("div", {class: "scroll"}, make("table", {}, make("thead", {}, make("tr", {},
             ...["name", "start", "value", "se", "relative", "95 % interval", "start (tick), value (dot), interval", "unit"].map((t, i) =>
                 (i === 2 ? heading : make("th", {class: i > 6 ? "text" : null, scope: "col"}, t))))), body)) : make("p", {}, "No single numbers were fitted."),
-        told, ...files.map((p) => make("p", {}, `${p.name}: ${p.count} numbers, in ${p.file}`)));
+        told, ...files.map(field_summary));
 }
 
 /* ---- Correlations --------------------------------------------------------------------- */
