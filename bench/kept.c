@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * What a kept walk costs: evaluated, folded and swept, over traced and swept, one thread,
- * processor time; the median of pairs measured in turn.
+ * processor time; the median of pairs measured in turn. Then whole pictures, and searches
+ * by L-BFGS.
  *
  *     kept [--repeats N] [--spp N] */
 #include "walk/record.h"
-#include <importon/importon.h>
+#include <importon/walks.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -152,6 +153,99 @@ static void measure(const char *file, const char *define)
     imp_scene_destroy(scene);
 }
 
+/* Whole pictures, through the film: kept ones over traced ones. */
+static void measure_picture(const char *file, const char *define)
+{
+    struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
+    struct imp_run run = IMP_RUN_INIT;
+    char path[1024];
+    imp_scene *scene;
+    imp_walks *walks;
+    double ratio[64];
+    o.defines = &define;
+    o.n_defines = define != NULL;
+    snprintf(path, sizeof path, "%s/%s", IMP_SCENES, file);
+    must(imp_scene_load(ctx, path, &o, &scene));
+    run.spp = spp;
+    must(imp_walks_keep(scene, &run, NULL, &walks));
+    for (int k = 0; k < repeats; k++) {
+        double took[2];
+        for (int kept = 0; kept < 2; kept++) {
+            imp_film *film;
+            const double start = cpu();
+            run.walks = kept ? walks : NULL;
+            must(imp_render(scene, &run, &film));
+            took[kept] = cpu() - start;
+            imp_film_destroy(film);
+        }
+        ratio[k] = took[1] / took[0];
+    }
+    printf("%-14s %-16s picture of kept walks %.3f of its render\n", file,
+           define ? define : "", median(ratio, repeats));
+    imp_walks_destroy(walks);
+    imp_scene_destroy(scene);
+}
+
+/* A search of 15 evaluations with kept walks over one that traces them, without what comes
+ * after it. */
+static void measure_fit(const char *file, const char *define, const char *glob)
+{
+    struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_target t = IMP_TARGET_INIT;
+    char path[1024], said[256] = "";
+    imp_scene *scene;
+    imp_film *film;
+    double ratio[64];
+    o.defines = &define;
+    o.n_defines = define != NULL;
+    snprintf(path, sizeof path, "%s/%s", IMP_SCENES, file);
+    must(imp_scene_load(ctx, path, &o, &scene));
+    run.spp = 64;
+    must(imp_render(scene, &run, &film));
+    struct imp_film_info info = {.size = sizeof info};
+    must(imp_film_get_info(film, &info));
+    t.width = info.width;
+    t.height = info.height;
+    t.channels = info.channels;
+    t.pixels = imp_film_mean(film);
+    for (int k = 0; k < repeats; k++) {
+        double took[2];
+        for (int kept = 0; kept < 2; kept++) {
+            struct imp_fit_options f = IMP_FIT_OPTIONS_INIT;
+            const struct imp_fit_result *r;
+            imp_problem *p;
+            double x[256];
+            must(imp_problem_create(scene, &p));
+            must(imp_problem_activate(p, glob));
+            must(imp_problem_add_target(p, &t));
+            imp_problem_get_x(p, x);
+            const size_t n = imp_problem_n(p);
+            double *at = calloc(n, sizeof *at);
+            if (!at || n > 256) exit(3);
+            for (size_t i = 0; i < n; i++) at[i] = 0.7 * x[i];
+            must(imp_problem_set_x(p, at));
+            run.seed = 9;
+            f.optimizer = IMP_LBFGS;
+            f.max_iterations = 15;
+            f.tolerance = 1e-9;
+            f.memory = kept ? 4e9 : -1;
+            const double start = cpu();
+            must(imp_fit(p, &f, &run, &r));
+            took[kept] = cpu() - start;
+            if (kept) snprintf(said, sizeof said, "%s", r->walks);
+            must(imp_problem_set_x(p, x));
+            imp_problem_destroy(p);
+            free(at);
+        }
+        ratio[k] = took[0] / took[1];
+    }
+    printf("%-14s %-16s lbfgs, 15 evaluations and the last: %.2f times as fast; %s\n",
+           file, define ? define : "", median(ratio, repeats), said);
+    imp_film_destroy(film);
+    imp_scene_destroy(scene);
+}
+
 int main(int argc, char **argv)
 {
     struct imp_context_options o = IMP_CONTEXT_OPTIONS_INIT;
@@ -167,6 +261,12 @@ int main(int argc, char **argv)
     measure("stam.xml", "integrator=stam");
     measure("textured.xml", NULL);
     measure("lamps.xml", NULL);
+    measure_picture("cornell.xml", "res=64");
+    measure_picture("stam.xml", "integrator=path");
+    measure_picture("textured.xml", NULL);
+    measure_picture("lamps.xml", NULL);
+    measure_fit("cornell.xml", "res=64", "*");
+    measure_fit("stam.xml", "integrator=path", "*");
     imp_context_destroy(ctx);
     return 0;
 }

@@ -445,6 +445,7 @@ int fit_answer_give(const struct fit_answer *a)
     } else {
         print_table(a, paths);
     }
+    if (a->result->walks) cli_say("importon: walks: %s", a->result->walks);
     if (a->result->warning) cli_say("importon: warning: %s", a->result->warning);
     paths_free(a, paths);
     return rc;

@@ -4,7 +4,7 @@
 static const char *const optimizer_words[] = {"adam", "lm",    "lbfgs",
                                               "mma",  "slsqp", NULL};
 
-struct fit_choice fit_choice;
+struct fit_choice fit_choice = {.memory = -1};
 
 const struct arg_option options_search[] = {
     {ARG_CHOICE, 0, "optimizer", "NAME", "adam (default), lm, lbfgs, mma or slsqp",
@@ -20,6 +20,9 @@ const struct arg_option options_search[] = {
     {ARG_NUMBER, 0, "tolerance", "T",
      "stop when relative steps stay below (default 1e-4)", &fit_choice.tolerance, 1e-15,
      1, NULL},
+    {ARG_NUMBER, 0, "memory", "MB",
+     "of lbfgs, mma and slsqp, for the walks that they keep (default 1074; 0: none)",
+     &fit_choice.memory, 0, 1e12, NULL},
     {ARG_FLAG, 0, "no-intervals", NULL, "do not estimate 95 % intervals at the end",
      &fit_choice.no_intervals, 0, 0, NULL},
     {0}};
@@ -34,6 +37,9 @@ struct imp_fit_options fit_choice_options(void)
     fit.learning_rate = fit_choice.learning_rate;
     fit.tolerance = fit_choice.tolerance;
     fit.levels = fit_choice.levels;
+    fit.memory = fit_choice.memory < 0    ? 0
+                 : fit_choice.memory == 0 ? -1
+                                          : 1e6 * fit_choice.memory;
     fit.intervals = !fit_choice.no_intervals;
     return fit;
 }

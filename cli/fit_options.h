@@ -9,6 +9,7 @@
 struct fit_choice {
     int optimizer, iterations, no_intervals, levels;
     double learning_rate, tolerance;
+    double memory; /* MB; < 0: not given */
 };
 extern struct fit_choice fit_choice;
 extern const struct arg_option options_search[];

@@ -992,10 +992,15 @@ struct imp_fit_options {
     int levels;
     imp_fit_step_fn step; /**< NULL: nobody looks */
     void *step_payload;
+    /** IMP_LBFGS, IMP_MMA and IMP_SLSQP evaluate one draw of walks, which is kept (walks.h)
+     * in so many bytes; 0: 2^30; negative: walks are traced each time, as they are where
+     * the memory does not suffice. Objective and intervals of the answer are of fresh
+     * walks. */
+    double memory;
 };
 #define IMP_FIT_OPTIONS_INIT                                                             \
     {                                                                                    \
-        sizeof(struct imp_fit_options), IMP_ADAM, 0, 0, 0, 0, 0, 0, 0, 0, 0              \
+        sizeof(struct imp_fit_options), IMP_ADAM, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0           \
     }
 
 struct imp_fit_variable {
@@ -1042,6 +1047,8 @@ struct imp_fit_result {
      * imp_problem_forward makes the picture of it. NULL where all numbers are determined,
      * or there are no intervals. */
     const double *loosest;
+    const char *walks; /**< which evaluations of the search were of kept walks, or why none
+                            were; NULL: the optimizer draws new ones each time */
 };
 
 /** Fit the active parameters to the targets; the scene ends at the best estimate.

@@ -57,6 +57,8 @@ class Fit(Values):
         How far four times the samples would move an answer, in standard errors, where the
         loss leaves a bias; else NaN.
     reason, warning : str
+    walks : str
+        Which evaluations of lbfgs, mma and slsqp were of kept walks, or why none were.
     """
 
     def __init__(self, scene: Scene, values: dict[str, Any], result: Any, names: list[str], infos: Mapping[str, Any],
@@ -80,6 +82,7 @@ class Fit(Values):
         self.shift: float = result.shift
         self.reason: str = decode(result.reason)
         self.warning: str = decode(result.warning)
+        self.walks: str = decode(result.walks)
 
     def report(self, path: Any, *, title: Optional[str] = None, command: Optional[str] = None, spp: int = 0) -> None:
         """Write the fit as one HTML page that opens anywhere: the target beside the picture that was
@@ -200,7 +203,7 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
         weights: Any = None, noise_se: Any = None, tikhonov: Optional[Mapping[str, float]] = None,
         stay: Optional[Mapping[str, float]] = None, smooth: Optional[Mapping[str, float]] = None,
         same: Any = None, factor: Any = None, log: Any = None, time_limit: float = 0, drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified",
-        wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene", levels: int = 0,
+        wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene", levels: int = 0, memory: float = 0,
         progress: Any = None) -> Fit:
     """Fit parameters to target pictures; the scene ends at the best estimate.
 
@@ -222,6 +225,9 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
     levels : int
         Of adam: fit textures and volumes from coarse to fine, first with one number for
         2^(levels - 1) cells along each axis; 0: as they are.
+    memory : float
+        Bytes for the walks that lbfgs, mma and slsqp keep, since they evaluate one draw;
+        0: 2^30; negative: walks are traced each time. `Fit.walks` says what was kept.
     intervals : bool
         Estimate covariance and 95 % intervals at the end.
     checkpoint : path, optional
@@ -276,7 +282,7 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
         wanted = make(_c.imp_fit_options, optimizer=choice("imp_optimizer", optimizer, "optimizer"),
                       max_iterations=integer(max_iterations, "max_iterations"), learning_rate=float(learning_rate),
                       tolerance=float(tolerance), intervals=bool(intervals), checkpoint=path, resume=bool(resume),
-                      levels=integer(levels, "levels"))
+                      levels=integer(levels, "levels"), memory=float(memory))
         out, start = ctypes.c_void_p(), p.x()
         status, message = run(p.context, options, progress, lib.imp_fit, p.pointer, ctypes.byref(wanted),
                               ctypes.byref(options), ctypes.byref(out))

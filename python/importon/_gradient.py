@@ -147,7 +147,8 @@ class Estimate:
 
 def functional(scene: Scene, params: Any = None, adjoint: Any = None, sensor: Any = 0, seed: int = 0,
                spp: int = 0, *, drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified",
-               wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene", progress: Any = None) -> Estimate:
+               wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene", walks: Any = None,
+               progress: Any = None) -> Estimate:
     """A number made of the picture, F = sum(adjoint * picture), and its gradient J^T adjoint.
 
     Parameters
@@ -158,7 +159,7 @@ def functional(scene: Scene, params: Any = None, adjoint: Any = None, sensor: An
     adjoint : array, optional
         [height][width][channels], from other random numbers than `seed`; None: 1/(pixels
         channels), so that F is the mean of the picture.
-    sensor, seed, spp, drop_budget, guide, wavelengths, wavelength_set, points, walks_from, progress
+    sensor, seed, spp, drop_budget, guide, wavelengths, wavelength_set, points, walks_from, walks, progress
         As `render`'s.
 
     Returns
@@ -182,7 +183,7 @@ def functional(scene: Scene, params: Any = None, adjoint: Any = None, sensor: An
     with Problem(scene, params) as p:
         image = None if adjoint is None else _adjoint(p.scene, adjoint, sensor, "adjoint")
         options = run_options(p.scene, sensor=sensor, seed=seed, spp=spp, drop_budget=drop_budget, guide=guide,
-                              wavelengths=wavelengths, wavelength_set=wavelength_set, points=points, walks_from=walks_from)
+                              wavelengths=wavelengths, wavelength_set=wavelength_set, points=points, walks_from=walks_from, walks=walks)
         value, (g, se) = _c.imp_estimate(), p.gradient()
         p.run(options, progress, lib.imp_problem_functional, p.pointer, address(image), ctypes.byref(options),
               ctypes.byref(value), address(g) if p.n else None, address(se) if p.n else None)
@@ -337,7 +338,7 @@ class Loss(Estimate):
 def loss(scene: Scene, target: Any, params: Any = None, *, spp: int = 0, seed: int = 0, sensor: Any = 0,
          loss: str = "l2", epsilon: float = 0, weights: Any = None, tikhonov: Optional[Mapping[str, float]] = None,
          stay: Optional[Mapping[str, float]] = None, smooth: Optional[Mapping[str, float]] = None,
-         drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified", wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene",
+         drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified", wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene", walks: Any = None,
          progress: Any = None) -> Loss:
     """A loss between scene and target, and its gradient, from the same walks.
 
@@ -366,7 +367,7 @@ def loss(scene: Scene, target: Any, params: Any = None, *, spp: int = 0, seed: i
         [height][width], >= 0.
     tikhonov, stay, smooth : mapping, optional
         Pattern -> weight W: W/2 |x|^2, W/2 |x - x now|^2, W/2 |grad x|^2 (of textures).
-    drop_budget, guide, wavelengths, wavelength_set, points, walks_from, progress
+    drop_budget, guide, wavelengths, wavelength_set, points, walks_from, walks, progress
         As `render`'s.
 
     Returns
@@ -394,7 +395,7 @@ def loss(scene: Scene, target: Any, params: Any = None, *, spp: int = 0, seed: i
     """
     with Problem(scene, params) as p:
         options = run_options(p.scene, seed=seed, spp=spp, drop_budget=drop_budget, guide=guide,
-                              wavelengths=wavelengths, wavelength_set=wavelength_set, points=points, walks_from=walks_from)
+                              wavelengths=wavelengths, wavelength_set=wavelength_set, points=points, walks_from=walks_from, walks=walks)
         n = p.add_targets(target, sensor=sensor, weights=weights, loss=loss, epsilon=epsilon)
         p.add_regularisers(tikhonov, stay, smooth)
         value, (g, se) = _c.imp_estimate(), p.gradient()

@@ -31,11 +31,20 @@ def _guide(guide: Any) -> Any:
     return pointer()
 
 
+def _walks(walks: Any, scene: Scene) -> Any:
+    if walks is None:
+        return None
+    pointer = getattr(walks, "_walks_pointer", None)
+    if pointer is None:
+        raise TypeError("walks is a %s: importon.keep(...) is wanted" % type(walks).__name__)
+    return pointer(scene)
+
+
 def run_options(scene: Scene, *, sensor: Any = 0, seed: int = 0, spp: int = 0, time_limit: float = 0,
                 drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified",
-                wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene") -> Any:
+                wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene", walks: Any = None) -> Any:
     """imp_run."""
-    return make(_c.imp_run, sensor=scene.sensor_index(sensor) if sensor else 0,
+    return make(_c.imp_run, walks=_walks(walks, scene), sensor=scene.sensor_index(sensor) if sensor else 0,
                 seed=integer(seed, "seed", 0, 2**64 - 1), spp=integer(spp, "spp"),
                 time_limit_s=float(time_limit), drop_budget=float(drop_budget), guide=_guide(guide),
                 wavelengths=choice("imp_wavelength_sampling", wavelengths, "wavelengths"),

@@ -17,7 +17,7 @@ from ._scene import Scene
 def render(scene: Scene, params: Any = None, sensor: Any = 0, integrator: None = None, seed: int = 0,
            seed_grad: int = 0, spp: int = 0, spp_grad: int = 0, *, time_limit: float = 0,
            drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified", wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene",
-           progress: Any = None) -> Picture:
+           walks: Any = None, progress: Any = None) -> Picture:
     """Render a picture, with the standard error of every number.
 
     Parameters
@@ -54,6 +54,9 @@ def render(scene: Scene, params: Any = None, sensor: Any = 0, integrator: None =
     walks_from : str
         The end at which walks begin: "scene" (what its integrator says), "sensor" or
         "lights".
+    walks : Walks, optional
+        From `keep`: kept walks that are evaluated in place of tracing; seed, samples, points
+        and wavelengths are theirs.
     progress : bool or callable, optional
         See `set_progress`.
 
@@ -81,7 +84,7 @@ def render(scene: Scene, params: Any = None, sensor: Any = 0, integrator: None =
         raise TypeError("integrator: the scene's own is used; write it into the scene")
     options = run_options(scene, sensor=sensor, seed=seed, spp=spp, time_limit=time_limit,
                           drop_budget=drop_budget, guide=guide, wavelengths=wavelengths,
-                          wavelength_set=wavelength_set, points=points, walks_from=walks_from)
+                          wavelength_set=wavelength_set, points=points, walks_from=walks_from, walks=walks)
     integer(seed_grad, "seed_grad", 0, 2**64 - 1)
     integer(spp_grad, "spp_grad", 0)
     return make_picture(scene, params, options, progress,

@@ -185,6 +185,7 @@ enum imp_status imp_walk_describe(const imp_scene *scene, const struct imp_run *
     IMP_REQUIRE(NULL, scene, "scene");
     IMP_REQUIRE(scene->ctx, out, "text");
     IMP_RUN(scene->ctx, own, run);
+    IMP_CHECKED(imp__run_traces(scene->ctx, __func__, &own));
     IMP_FLOAT_MODE;
     IMP_READS(scene);
     const struct imp_sensor *sensor;

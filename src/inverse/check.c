@@ -84,6 +84,7 @@ static enum imp_status check(imp_problem *p, const struct imp_check_options *opt
     IMP_CHECKED(imp__options_take(p->ctx, "imp_check", "options", options, &c.options,
                                   sizeof c.options));
     IMP_CHECKED(imp__run_take(p->ctx, "imp_check", run, &c.outer));
+    IMP_CHECKED(imp__run_traces(p->ctx, "imp_check", &c.outer));
     if (p->n == 0 && !c.options.sampling)
         IMP_TRY(
             imp__error(p->ctx, IMP_E_ARG, "nothing to check: no parameter is active"));

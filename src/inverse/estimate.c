@@ -63,6 +63,8 @@ static enum imp_status target_estimate(struct imp_problem *p,
             want_gradient ? totals->gradient : NULL, totals->gradient_variance);
     if (!want_gradient) j.tracer.active = NULL;
     j.plan = imp__replicates_of(p->scene, target, &own);
+    st = imp__replicates_kept(&j.tracer, j.plan);
+    if (st != IMP_OK) return st;
     if (imp__film_border(&j.tracer.sensor->film) > 0)
         st = splat_prepare(&j, &own, &splat);
     if (st == IMP_OK && (!j.splat || want_gradient))
@@ -194,6 +196,7 @@ enum imp_status imp_problem_reverse(imp_problem *p, const float *seed_image,
         goto out;
     }
     j.plan = imp__replicates_of(p->scene, NULL, &own);
+    IMP_TRY(imp__replicates_kept(&j.tracer, j.plan));
     if (imp__film_border(&j.tracer.sensor->film) > 0)
         IMP_TRY(splat_prepare(&j, &own, &splat));
     /* The adjoint does not depend on the walks: those of a replicate may depend on each

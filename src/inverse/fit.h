@@ -29,6 +29,14 @@ struct imp__fit {
     int final_calls, final_total; /* evaluations after the search; total 0: not there */
     int first_iteration;          /* of this call; not 0 where the fit was continued */
     bool stopped;                 /* by the caller or the deadline */
+
+    /* Of searches with common random numbers (fit_kept.c): walks that are evaluated. */
+    imp_walks *walks; /* NULL: none are */
+    uint64_t walks_seed;
+    double walks_bytes; /* of the last draw */
+    int draws, evaluated, traced;
+    bool stale;          /* the last evaluation was far from the draw */
+    const char *untaken; /* why walks are not kept; NULL: they are, or were not wanted */
     char note[96];
 };
 
@@ -50,6 +58,16 @@ enum imp_status imp__fit_levels(struct imp__fit *fit,
                                 struct imp__search *fine);
 enum imp_status imp__fit_levels_allowed(const struct imp_problem *problem,
                                         const struct imp_fit_options *options);
+
+/* fit_kept.c: walks of the search are drawn and kept, where its method evaluates one draw;
+ * what belongs to imp__goal.draw and is_stale. */
+bool imp__fit_keeps(const struct imp__fit *fit);
+enum imp_status imp__fit_draw(const double *x, uint64_t seed, void *fit);
+bool imp__fit_is_stale(void *fit);
+/* run->walks, if the walks of this seed may be evaluated at x. */
+enum imp_status imp__fit_take_walks(struct imp__fit *fit, const double *x, uint64_t seed);
+/* What was kept, as a sentence; NULL: nothing was wanted. In the problem's fit_arena. */
+const char *imp__fit_walks_text(const struct imp__fit *fit);
 
 struct imp__uncertainty;
 

@@ -8,6 +8,7 @@
 #include "math/hash.h"
 #include "scene/fingerprint.h"
 #include "walk/run.h"
+#include "walk/store.h"
 #include <float.h>
 #include <math.h>
 #include <stdio.h>
@@ -101,8 +102,10 @@ static enum imp_status eval(const double *x, uint64_t seed, struct imp_estimate 
     struct imp__fit *fit = payload;
     fit->run.seed = seed;
     fit->final_calls++;
-    const enum imp_status st =
-        imp__problem_objective(fit->problem, x, &fit->run, true, f, g, g_se);
+    enum imp_status st = imp__fit_take_walks(fit, x, seed);
+    if (st == IMP_OK)
+        st = imp__problem_objective(fit->problem, x, &fit->run, true, f, g, g_se);
+    fit->run.walks = NULL;
     if (st == IMP_CANCELLED) fit->stopped = true; /* by this rank or another */
     return st;
 }
@@ -189,6 +192,8 @@ static void fingerprint(struct imp__fit *f)
                               f->options.tolerance,
                               f->run.spp > 0 ? f->run.spp : sensor->spp};
     h->options = imp__hash(f->outer.seed, number, sizeof number);
+    if (imp__fit_keeps(f))
+        h->options = imp__hash(h->options, &f->options.memory, sizeof f->options.memory);
     if (imp__points_of(sensor, &f->outer) == IMP_POINTS_SOBOL) {
         const struct imp__replicates plan =
             imp__replicates_of(p->scene, &p->targets[0], &f->outer);
@@ -288,6 +293,7 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
     IMP_CHECKED(imp__options_take(ctx, "imp_fit", "options", options, &f.options,
                                   sizeof f.options));
     IMP_CHECKED(imp__run_take(ctx, "imp_fit", run, &f.outer));
+    IMP_CHECKED(imp__run_traces(ctx, "imp_fit", &f.outer));
     if ((unsigned)f.options.optimizer > IMP_SLSQP)
         return imp__error(ctx, IMP_E_ARG, "optimizer %d does not exist",
                           (int)f.options.optimizer);
@@ -303,6 +309,8 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
             "max_iterations %d, learning_rate %g (0 to 1), tolerance %g: out of "
             "range",
             f.options.max_iterations, f.options.learning_rate, f.options.tolerance);
+    if (!isfinite(f.options.memory))
+        return imp__error(ctx, IMP_E_ARG, "options: memory %g", f.options.memory);
     IMP_CHECKED(imp__fit_levels_allowed(p, &f.options));
     if (f.options.resume && !f.options.checkpoint)
         return imp__error(ctx, IMP_E_ARG, "resume needs the name of a checkpoint");
@@ -344,6 +352,10 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
                                    .normal = n <= IMP_DENSE_MAX ? normal : NULL,
                                    .iterated = iterated,
                                    .payload = out};
+    if (imp__fit_keeps(out)) {
+        out->goal.draw = imp__fit_draw;
+        out->goal.is_stale = imp__fit_is_stale;
+    }
     return IMP_OK;
 out:
     imp__fit_end(&f);
@@ -353,6 +365,7 @@ out:
 void imp__fit_end(struct imp__fit *f)
 {
     if (!f->problem) return;
+    imp__walks_destroy(f->walks);
     imp__release(f->problem->ctx, f->lo);
     imp__release(f->problem->ctx, f->spans);
     imp__release(f->problem->ctx, f->H_prior);

@@ -288,7 +288,8 @@ enum imp_status imp__fit_answer(struct imp__fit *f, struct imp__search *s,
         .chi2 = left.chi2,
         .chi2_se = left.chi2_se,
         .covariance = covariance,
-        .loosest = loosest};
+        .loosest = loosest,
+        .walks = imp__fit_walks_text(f)};
     answer->n = n;
     answer->rows = rows;
     if (rows) answer->search = NULL; /* all is said */

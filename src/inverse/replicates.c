@@ -4,6 +4,7 @@
 #include "film/film_filter.h"
 #include "loss.h"
 #include "walk/run.h"
+#include "walk/store.h"
 
 #define WIDE_MANY 16 /* samples per pixel */
 
@@ -101,6 +102,24 @@ struct imp__replicates imp__replicates_normal(const struct imp_scene *scene,
     struct imp__replicates r = {.R = spp < 8 ? 4 : IMP_WIDE_REPLICATES, .chunks = 1};
     r.n = (spp - 1) / r.R + 1;
     return in_sets(r, sets ? SETS_FIXED : 0);
+}
+
+enum imp_status imp__replicates_kept(const struct imp_tracer *tracer,
+                                     struct imp__replicates r)
+{
+    if (!tracer->kept) return IMP_OK;
+    for (int b = 0; b < r.R; b++)
+        for (int s = 0; s < r.m; s++) {
+            const int n = imp__replicates_set(r, s + 1) - imp__replicates_set(r, s);
+            const int64_t first = imp__replicates_first(r, b, s);
+            if (imp__store_find(tracer->kept, first) < 0 ||
+                imp__store_find(tracer->kept, first + n - 1) < 0)
+                return imp__error(
+                    tracer->scene->ctx, IMP_E_ARG,
+                    "these walks were kept for pictures; a loss needs walks "
+                    "in sets of their own: keep them with `losses`");
+        }
+    return IMP_OK;
 }
 
 enum imp_status imp_problem_spp(const imp_problem *p, int target,

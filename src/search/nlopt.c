@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * NLopt's gradient methods under common random numbers: with one seed the objective is a
- * fixed function of x, up to the jumps where a walk's decisions change.
+ * fixed function of x, up to the jumps where a walk's decisions change. Where the goal
+ * draws for several evaluations, the function is one of this draw; when the best x has gone
+ * too far for it, the method begins anew there, with a new draw.
  *
  * NLopt cannot be stopped and continued. Its evaluations are kept instead: a continued
- * search starts again at the first x and is given the recorded answers, which brings the
- * method into the state it had, to the last bit. */
+ * search starts again at the first x of the draw and is given the recorded answers, which
+ * brings the method into the state it had, to the last bit. */
 #include "optimize.h"
 #include <math.h>
 #include <nlopt.h>
@@ -14,8 +16,11 @@
 #define SLSQP_MAX  1000   /* it is O(n^3) per step */
 #define FIRST_STEP 0.1
 
-enum { RECORD }; /* arrays: rows of (f, se, g[n]) */
-enum { BEST };   /* scalars */
+/* Arrays: rows of (f, se, g[n]); where the last draw was made, empty: the start. */
+enum { RECORD, BASE };
+/* Scalars: the lowest objective, iterations before the last draw, and whether the best x
+ * asks for a new one. */
+enum { BEST, BEFORE, STALE };
 
 struct call {
     const struct imp__goal *goal;
@@ -60,6 +65,7 @@ static enum imp_status evaluate(struct call *c, struct imp_estimate *f)
     if (f->value < s->scalar[BEST]) {
         s->scalar[BEST] = f->value;
         for (size_t k = 0; k < goal->n; k++) s->x[k] = c->x[k];
+        s->scalar[STALE] = goal->is_stale && goal->is_stale(goal->payload);
     }
     st = imp__search_iterated(goal, s);
 out:
@@ -74,7 +80,8 @@ static double objective(unsigned n, const double *y, double *gradient, void *pay
     const size_t row = (size_t)n + 2, at = c->calls * row;
     struct imp_estimate f;
 
-    if (c->st != IMP_OK) return HUGE_VAL; /* some methods finish a line search first */
+    /* Some methods finish a line search first. */
+    if (c->st != IMP_OK || s->scalar[STALE] != 0) return HUGE_VAL;
     if (at + row <= s->array_n[RECORD]) { /* replayed */
         f = (struct imp_estimate){s->array[RECORD][at], s->array[RECORD][at + 1], 0};
         for (size_t k = 0; k < n; k++) c->g[k] = s->array[RECORD][at + 2 + k];
@@ -82,10 +89,8 @@ static double objective(unsigned n, const double *y, double *gradient, void *pay
         for (size_t k = 0; k < n; k++)
             c->x[k] = imp__into_bounds(goal, k, y[k] * goal->scale[k]);
         c->st = evaluate(c, &f);
-        if (c->st != IMP_OK) {
-            nlopt_force_stop(c->opt);
-            return HUGE_VAL;
-        }
+        if (c->st != IMP_OK || s->scalar[STALE] != 0) nlopt_force_stop(c->opt);
+        if (c->st != IMP_OK) return HUGE_VAL;
     }
     /* The methods begin with a step of the length of the gradient. */
     if (c->calls++ == 0) {
@@ -106,33 +111,35 @@ static nlopt_algorithm algorithm(enum imp_optimizer kind)
                                : NLOPT_LD_LBFGS;
 }
 
-static enum imp_status run(const struct imp__goal *goal,
-                           const struct imp__opt_options *options, struct imp__search *s)
+/* The method from the last draw on. */
+static enum imp_status run_draw(const struct imp__goal *goal,
+                                const struct imp__opt_options *options,
+                                struct imp__search *s, double *work)
 {
     enum imp_status st = IMP_OK;
     const size_t n = goal->n;
-    double *work = imp__alloc(goal->ctx, 5 * n + 1, sizeof *work);
-    if (!work)
-        return imp__error(goal->ctx, IMP_E_NOMEM, "no memory for %zu variables", n);
     struct call c = {.goal = goal, .s = s, .x = work, .g = work + n};
     double *y = work + 2 * n, *lo = work + 3 * n, *hi = work + 4 * n;
+    const double *base = s->array_n[BASE] ? s->array[BASE] : s->start;
     double value;
 
     c.opt = nlopt_create(algorithm(s->kind), (unsigned)n);
     if (!c.opt || n > 0x7fffffff)
         IMP_TRY(imp__error(goal->ctx, IMP_E_NOMEM, "no memory for %zu variables", n));
-    const bool replay = s->array_n[RECORD] > 0 || s->iteration == 0;
+    const bool replay = s->array_n[RECORD] > 0 || s->iteration == (int)s->scalar[BEFORE];
     for (size_t k = 0; k < n; k++) {
-        y[k] = (replay ? s->start : s->x)[k] / goal->scale[k];
+        c.x[k] = (replay ? base : s->x)[k];
+        y[k] = c.x[k] / goal->scale[k];
         lo[k] = goal->lo[k] / goal->scale[k];
         hi[k] = goal->hi[k] / goal->scale[k];
         y[k] = imp_clamp(y[k], lo[k], hi[k]);
     }
-    const int limit = options->max_iterations - (replay ? 0 : s->iteration);
+    if (goal->draw) IMP_TRY(goal->draw(c.x, imp__search_seed(goal, 0, 0), goal->payload));
+    const int done = replay ? (int)s->scalar[BEFORE] : s->iteration;
     if (nlopt_set_min_objective(c.opt, objective, &c) < 0 ||
         nlopt_set_lower_bounds(c.opt, lo) < 0 || nlopt_set_upper_bounds(c.opt, hi) < 0 ||
         nlopt_set_xtol_abs1(c.opt, options->tolerance) < 0 ||
-        nlopt_set_maxeval(c.opt, imp_max(limit, 1)) < 0)
+        nlopt_set_maxeval(c.opt, imp_max(options->max_iterations - done, 1)) < 0)
         IMP_TRY(imp__error(goal->ctx, IMP_E_NUMERIC, "NLopt refuses the problem"));
     const nlopt_result r = nlopt_optimize(c.opt, y, &value);
     if (c.st != IMP_OK) IMP_TRY(c.st);
@@ -141,13 +148,34 @@ static enum imp_status run(const struct imp__goal *goal,
             imp__error(goal->ctx, IMP_E_NOMEM, "NLopt: no memory for %zu variables", n));
     if (r == NLOPT_INVALID_ARGS)
         IMP_TRY(imp__error(goal->ctx, IMP_E_NUMERIC, "NLopt refuses the problem"));
-    if (r == NLOPT_MAXEVAL_REACHED) goto out;
+    if (r == NLOPT_MAXEVAL_REACHED || s->scalar[STALE] != 0) goto out;
     imp__search_finish(s, r == NLOPT_XTOL_REACHED || r == NLOPT_SUCCESS ||
                                   r == NLOPT_FTOL_REACHED
                               ? IMP_FINISH_STEPS
                               : IMP_FINISH_LOWEST);
 out:
     if (c.opt) nlopt_destroy(c.opt);
+    return st;
+}
+
+static enum imp_status run(const struct imp__goal *goal,
+                           const struct imp__opt_options *options, struct imp__search *s)
+{
+    enum imp_status st = IMP_OK;
+    double *work = imp__alloc(goal->ctx, 5 * goal->n + 1, sizeof *work);
+    if (!work)
+        return imp__error(goal->ctx, IMP_E_NOMEM, "no memory for %zu variables", goal->n);
+    for (;;) {
+        if (s->scalar[STALE] == 0) IMP_TRY(run_draw(goal, options, s, work));
+        if (s->scalar[STALE] == 0 || s->iteration >= options->max_iterations) break;
+        IMP_TRY(imp__search_array(s, BASE, goal->n));
+        for (size_t k = 0; k < goal->n; k++) s->array[BASE][k] = s->x[k];
+        s->array_n[RECORD] = 0;
+        s->scalar[BEFORE] = s->iteration;
+        s->scalar[BEST] = INFINITY; /* of another function */
+        s->scalar[STALE] = 0;
+    }
+out:
     imp__release(goal->ctx, work);
     return st;
 }

@@ -57,6 +57,12 @@ struct imp__goal {
     /* For Levenberg-Marquardt and covariances: sets all of `out`. NULL: not offered. */
     enum imp_status (*normal)(const double *x, uint64_t seed, struct imp__normal *out,
                               void *payload);
+    /* For methods with common random numbers: those of `seed` are drawn at x, and are the
+     * ones of all evaluations with this seed until the next draw. NULL: evaluations draw
+     * their own. */
+    enum imp_status (*draw)(const double *x, uint64_t seed, void *payload);
+    /* Was the last evaluation too far from where its numbers were drawn? NULL: never. */
+    bool (*is_stale)(void *payload);
     /* Called after each complete iteration, when `search` may be copied: report progress,
      * write a checkpoint. Returns IMP_CANCELLED to stop. May be NULL. */
     enum imp_status (*iterated)(const struct imp__search *search, void *payload);

@@ -5,10 +5,39 @@
 #include "graded.h"
 #include "tracking.h"
 
-static void place_decided(const struct imp_vertex *v, struct imp_place *p)
+/* Where a vertex was decided. Member by member: clearing all of it would take as long as
+ * what is done with it. */
+static inline void place_set(const struct imp_decision *d, const struct imp_shape *shape,
+                             const struct imp_carried *carried, struct imp_place *p)
 {
-    *p =
-        (struct imp_place){imp__vertex_at(v), imp__vertex_dirs(v), imp__vertex_met(v), 1};
+    const struct imp_met *m = &d->met;
+    p->at.uv[0] = d->uv[0];
+    p->at.uv[1] = d->uv[1];
+    p->at.p = imp__decided_v3(d->p);
+    p->at.carried = carried;
+    p->at.shape = shape;
+    p->at.prim = 0;
+    p->at.surface = NULL;
+    p->dirs.wo = imp__decided_v3(d->wo);
+    p->dirs.wi = imp__decided_v3(d->wi);
+    p->dirs.lobe = d->lobe;
+    p->dirs.derivative = false;
+    p->ratio = 1;
+    if (m->emitter < 0 && d->scatterer != IMP_AT_LIGHT) return;
+    p->met.uv[0] = d->uv[0];
+    p->met.uv[1] = d->uv[1];
+    p->met.dist = m->dist;
+    p->met.cos_light = m->cos_light;
+    p->met.d = imp__decided_v3(m->d);
+}
+
+static inline void place_decided(const struct imp_vertex *v, struct imp_place *p)
+{
+    place_set(&v->d, v->shape, v->carried, p);
+    if (imp_likely(!v->segment->exact)) return;
+    p->at = imp__vertex_at(v);
+    p->dirs = imp__vertex_dirs(v);
+    p->met = imp__vertex_met(v);
 }
 
 /* What a vertex's decisions are worth. */
@@ -90,23 +119,8 @@ void imp__decided_values(const struct imp_tracer *tracer, const struct imp_decis
     const struct imp_shape *shape =
         b && d->scatterer != IMP_IN_MEDIUM ? scene->shapes[d->shape] : NULL;
     const struct decided v = {d, b, shape, carried, NULL};
-    const struct imp_met *m = &d->met;
-    struct imp_place
-        p; /* member by member: clearing all of it takes as long as the rest */
-    p.at.uv[0] = d->uv[0];
-    p.at.uv[1] = d->uv[1];
-    p.at.p = imp__decided_v3(d->p);
-    p.at.carried = carried;
-    p.at.shape = shape;
-    p.at.prim = 0;
-    p.at.surface = NULL;
-    p.dirs.wo = imp__decided_v3(d->wo);
-    p.dirs.wi = imp__decided_v3(d->wi);
-    p.dirs.lobe = d->lobe;
-    p.dirs.derivative = false;
-    if (m->emitter >= 0)
-        p.met = (struct imp_emission){
-            {d->uv[0], d->uv[1]}, m->dist, m->cos_light, imp__decided_v3(m->d)};
+    struct imp_place p;
+    place_set(d, shape, carried, &p);
     imp_spec in[IMP_INPUTS_MAX];
     struct values x;
     decided_values(scene, &v, &p, in, &x);

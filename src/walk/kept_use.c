@@ -138,18 +138,25 @@ static int growing_steps(const struct imp_walk_integrator *i)
     return i->max_depth < 0 ? -1 : imp_max(i->max_depth - imp_max(i->rr_depth, 1), 0);
 }
 
+bool imp__walks_finite(const struct imp_walks *w, const struct imp_walks_weight *x)
+{
+    const int steps = growing_steps(w->integrator);
+    return !(x->growth > 0) ||
+           (steps < 0 ? x->growth < 1 : pow(x->growth, steps) <= GROWTH_MOST);
+}
+
 /* The reason why walks of this worth are not evaluated, as an error. */
 static enum imp_status worth_check(const struct imp_walks *w,
                                    const struct imp_walks_weight *x)
 {
-    const int steps = growing_steps(w->integrator);
-    if (x->growth > 0 &&
-        (steps < 0 ? x->growth >= 1 : pow(x->growth, steps) > GROWTH_MOST))
+    if (!imp__walks_finite(w, x))
         return imp__error(w->ctx, IMP_E_NUMERIC,
                           "kept walks: by roulette their second moment grows by %.3g a "
                           "step at these parameters%s; draw new ones",
                           x->growth,
-                          steps < 0 ? ", so that their variance is infinite" : "");
+                          growing_steps(w->integrator) < 0
+                              ? ", so that their variance is infinite"
+                              : "");
     if (x->ess < w->ess)
         return imp__error(w->ctx, IMP_E_NUMERIC,
                           "kept walks: at these parameters %.2g of them count "
@@ -227,8 +234,10 @@ enum imp_status imp__walks_use(const struct imp_run *run, struct imp_tracer *tra
     if (tracer->integrator != w->integrator)
         return imp__error(ctx, IMP_E_ARG, "kept walks of another integrator");
     IMP_CHECKED(active_check(w, tracer->active));
-    IMP_CHECKED(imp__walks_weigh(w, store, NULL, &worth));
-    IMP_CHECKED(worth_check(w, &worth));
+    if (w->ess >= 0) { /* else whoever made them has looked */
+        IMP_CHECKED(imp__walks_weigh(w, store, NULL, &worth));
+        IMP_CHECKED(worth_check(w, &worth));
+    }
     tracer->kept = store;
     return IMP_OK;
 }

@@ -32,3 +32,14 @@ enum imp_status imp__run_take(imp_context *ctx, const char *function,
     *own = r;
     return IMP_OK;
 }
+
+enum imp_status imp__run_traces(imp_context *ctx, const char *function,
+                                const struct imp_run *run)
+{
+    if (!run->walks) return IMP_OK;
+    return imp__error(
+        ctx, IMP_E_ARG,
+        "%s: run->walks: this traces walks of its own, and evaluates no kept "
+        "ones",
+        function);
+}

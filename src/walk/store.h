@@ -98,7 +98,7 @@ struct imp_walks {
     struct imp_run
         run;     /* seed, samples, points and wavelengths that they were drawn with */
     bool losses; /* numbers of samples are those of losses */
-    double survival, ess;
+    double survival, ess; /* ess < 0: imp__walks_use does not look at it */
     const struct imp_walk_integrator *integrator;
     double *theta;   /* [n_theta] where they were drawn */
     uint8_t *chosen; /* [n_params] parameters that may change */
@@ -121,6 +121,8 @@ enum imp_status imp__walks_use(const struct imp_run *run, struct imp_tracer *tra
 enum imp_status imp__walks_weigh(const struct imp_walks *walks,
                                  const struct imp_store *store, const float *mask,
                                  struct imp_walks_weight *out);
+/* Is their variance, as far as roulette makes it? */
+bool imp__walks_finite(const struct imp_walks *walks, const struct imp_walks_weight *x);
 /* The parameters whose numbers have changed, [n_params]; IMP_E_UNSUPPORTED as above. */
 enum imp_status imp__walks_changed(const struct imp_walks *walks, uint8_t *changed);
 

@@ -443,6 +443,24 @@ static void refusals(void)
     imp_scene_destroy(scene);
     imp_scene_destroy(other);
 
+    scene = test_scene(ctx, "cornell.xml", IMP_RGB, "res=8");
+    walks = keep(scene, 64, 3, IMP_POINTS_SOBOL, false, 0);
+    imp_problem *p = problem_of(scene, "red.*");
+    struct imp_estimate f;
+    run = (struct imp_run)IMP_RUN_INIT;
+    run.walks = walks;
+    tap_ok(imp_problem_objective(p, NULL, &run, &f, NULL, NULL) == IMP_E_ARG &&
+               strstr(imp_last_error(ctx), "losses"),
+           "a loss of a picture's points # %s", imp_last_error(ctx));
+    const struct imp_fit_result *r;
+    tap_ok(imp_fit(p, NULL, &run, &r) == IMP_E_ARG &&
+               strstr(imp_last_error(ctx), "run->walks"),
+           "a fit of kept walks, whose intervals would be too short # %s",
+           imp_last_error(ctx));
+    imp_problem_destroy(p);
+    imp_walks_destroy(walks);
+    imp_scene_destroy(scene);
+
     scene = test_scene(ctx, "fog.xml", IMP_RGB, "res=8");
     walks = keep(scene, 2, 3, IMP_POINTS_SCENE, true, 0);
     for (size_t k = 0; k < scene->n_params; k++)

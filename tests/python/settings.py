@@ -51,6 +51,33 @@ def test_modes():
     return "z " + " ".join(said)
 
 
+def test_kept_walks():
+    """Kept walks: the same picture and loss, others within their errors, and refusals"""
+    s = im.load_file(CORNELL, res=12)
+    params = im.traverse(s)
+    walks = im.keep(s, spp=64, seed=3, losses=True, survival=-1)
+    assert walks.spp == 64 and walks.seed == 3 and walks.bytes > 160 * walks.n_vertices and "MB" in repr(walks)
+    assert im.render(s, walks=walks).tobytes() == im.render(s, spp=64, seed=3).tobytes()
+    target = im.render(s, spp=16, seed=9)
+    a, b = (im.loss(s, target, RED, **key) for key in ({"walks": walks}, {"spp": 64, "seed": 3}))
+    assert a.value == b.value and a.se == b.se and (a.grad[RED] == b.grad[RED]).all()
+    assert walks.weigh() == (1, 0, None)
+    params[RED] = params[RED] * 0.5
+    kept, fresh = im.render(s, params, walks=walks), im.render(s, spp=64, seed=4)
+    said = same_mean(kept, fresh, "other reflectance")
+    f, g = im.functional(s, RED, walks=walks), im.functional(s, RED, spp=64, seed=4)
+    z(f.value, g.value, np.hypot(f.se, g.se), what="mean")
+    mask = np.zeros((12, 12))
+    mask[:6] = 1
+    assert walks.weigh(mask=mask)[0] > 0.9
+    other = im.load_file(CORNELL, res=12)
+    raises(im.ArgumentError, lambda: im.render(other, walks=walks), "another scene")
+    raises(TypeError, lambda: im.render(s, walks=3), "importon.keep")
+    raises(im.OutOfMemoryError, lambda: im.keep(s, spp=64, memory=1e5), "MB")
+    raises(im.ArgumentError, lambda: im.render(s, walks=walks, time_limit=1), "time_limit")
+    return "z %.1f" % said
+
+
 def test_walks():
     """Points in sets, and walks from the lights: other noise, the same picture and loss"""
     s = im.load_file(CORNELL, res=12)

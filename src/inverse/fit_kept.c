@@ -1,0 +1,131 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Methods with common random numbers (L-BFGS, MMA, SLSQP) evaluate one draw of walks many
+ * times: the walks are kept, and evaluated at other numbers without a ray. A new draw is
+ * made where the search has gone so far that less than a share of them count
+ * (walk/store_weight.c). What is told of an answer (objective, intervals) is made of fresh
+ * walks (fit.c): those of the search have been fitted, and their errors are too small. */
+#include "fit.h"
+#include "keep.h"
+#include <stdio.h>
+
+#define REDRAW_ESS 0.8 /* a new draw is worth its price */
+#define TRACED_ESS 0.5 /* too few count: a point that far is traced */
+#define SURVIVAL   0.8
+#define MEMORY     0x1p30
+
+bool imp__fit_keeps(const struct imp__fit *f)
+{
+    const enum imp_optimizer o = f->options.optimizer;
+    return (o == IMP_LBFGS || o == IMP_MMA || o == IMP_SLSQP) && f->options.memory >= 0;
+}
+
+/* The reason why these walks cannot be kept, or that they cannot be evaluated. */
+static void give_up(struct imp__fit *f)
+{
+    imp__walks_destroy(f->walks);
+    f->walks = NULL;
+    f->untaken =
+        imp__arena_strdup(&f->problem->fit_arena, imp_last_error(f->problem->ctx));
+}
+
+/* Is everything that is active among what may change? */
+static bool all_chosen(const struct imp_problem *p, const imp_walks *w)
+{
+    for (size_t k = 0; k < p->scene->n_params; k++)
+        if (p->active.base[k] >= 0 && !w->chosen[k]) {
+            imp__error(p->ctx, IMP_E_UNSUPPORTED,
+                       "%s moves rays or collisions, so that walks are not kept",
+                       p->scene->params[k].info.name);
+            return false;
+        }
+    return true;
+}
+
+enum imp_status imp__fit_draw(const double *x, uint64_t seed, void *payload)
+{
+    struct imp__fit *f = payload;
+    struct imp_problem *p = f->problem;
+    struct imp_run run = f->run;
+    const struct imp_walks_options o = {
+        .size = sizeof o,
+        .memory = f->options.memory > 0 ? f->options.memory : MEMORY,
+        .losses = 1,
+        .survival = SURVIVAL,
+        .ess = -1}; /* looked at below */
+    imp__walks_destroy(f->walks);
+    f->walks = NULL;
+    f->stale = false;
+    if (f->untaken) return IMP_OK;
+    for (size_t t = 0; t < p->n_targets; t++)
+        if (p->targets[t].n_parts > 0) {
+            imp__error(p->ctx, IMP_E_UNSUPPORTED,
+                       "walks are not kept of films with other than three response "
+                       "curves");
+            give_up(f);
+            return IMP_OK;
+        }
+    uint8_t *sensors = imp__alloc(p->ctx, (size_t)p->scene->n_sensors + 1, 1);
+    if (!sensors) return imp__error(p->ctx, IMP_E_NOMEM, "no memory for kept walks");
+    for (size_t t = 0; t < p->n_targets; t++) sensors[p->targets[t].desc.sensor] = 1;
+    run.seed = seed;
+    enum imp_status st = imp_problem_set_x(p, x);
+    if (st == IMP_OK) {
+        st = imp__walks_make(p->scene, &run, &o, sensors, &f->walks);
+        if (st == IMP_E_NOMEM || st == IMP_E_UNSUPPORTED ||
+            (st == IMP_OK && !all_chosen(p, f->walks))) {
+            give_up(f);
+            st = IMP_OK;
+        }
+    }
+    imp__release(p->ctx, sensors);
+    if (st != IMP_OK || !f->walks) return st;
+    f->walks_seed = seed;
+    f->walks_bytes = 0;
+    for (int k = 0; k < f->walks->n_stores; k++)
+        f->walks_bytes += (double)f->walks->stores[k].bytes;
+    f->draws++;
+    return IMP_OK;
+}
+
+bool imp__fit_is_stale(void *payload) { return ((struct imp__fit *)payload)->stale; }
+
+enum imp_status imp__fit_take_walks(struct imp__fit *f, const double *x, uint64_t seed)
+{
+    double ess = 1;
+    bool finite = true;
+    f->run.walks = NULL;
+    f->stale = false;
+    if (!f->walks || seed != f->walks_seed) return IMP_OK;
+    enum imp_status st = imp_problem_set_x(f->problem, x);
+    for (int k = 0; k < f->walks->n_stores && st == IMP_OK; k++) {
+        struct imp_walks_weight w;
+        st = imp__walks_weigh(f->walks, &f->walks->stores[k], NULL, &w);
+        ess = fmin(ess, w.ess);
+        finite &= imp__walks_finite(f->walks, &w);
+    }
+    if (st != IMP_OK) return st;
+    f->stale = ess < REDRAW_ESS || !finite;
+    if (ess < TRACED_ESS || !finite) {
+        f->traced++;
+        return IMP_OK;
+    }
+    f->evaluated++;
+    f->run.walks = f->walks;
+    return IMP_OK;
+}
+
+const char *imp__fit_walks_text(const struct imp__fit *f)
+{
+    char text[512];
+    if (!imp__fit_keeps(f) || (f->draws == 0 && !f->untaken)) return NULL;
+    if (f->untaken)
+        snprintf(text, sizeof text, "every evaluation traced its walks: %s", f->untaken);
+    else
+        snprintf(text, sizeof text,
+                 "%d of %d evaluations are of kept walks, which were drawn %d time%s "
+                 "(%.3g MB)",
+                 f->evaluated, f->evaluated + f->traced, f->draws,
+                 f->draws == 1 ? "" : "s", f->walks_bytes / 1e6);
+    return imp__arena_strdup(&f->problem->fit_arena, text);
+}
