@@ -6,7 +6,7 @@
  * program and libraries, which are a part of files that all processes share. A round runs
  * every job once with either build, in turn. The minimum of all rounds counts; of memory
  * without files, which is looked at every millisecond, so that a round may miss its peak,
- * the maximum. Prints a table for docs/speed.md.
+ * the median. Prints a table for docs/speed.md.
  *
  *     versions [--rounds N] [--job TEXT] [--scenes FOLDER] OLD NEW
  *
@@ -19,12 +19,12 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-enum { WORDS_MAX = 32 };
+enum { WORDS_MAX = 32, ROUNDS_MAX = 99 };
 
 struct job {
     const char *name;
-    const char *words[WORDS_MAX];      /* of the command line, after the program */
-    double seconds[2], mib[2], own[2]; /* of the old and the new build */
+    const char *words[WORDS_MAX]; /* of the command line, after the program */
+    double seconds[2], mib[2], own[2][ROUNDS_MAX]; /* of the old and the new build */
 };
 
 #define CORNELL  "@cornell.xml", "-D", "res=128"
@@ -105,7 +105,18 @@ static void run(const char *program, const char *const *words, double *seconds,
     const double m = (double)usage.ru_maxrss / 1024;
     if (s < *seconds) *seconds = s;
     if (m < *mib) *mib = m;
-    if (most > *own) *own = most;
+    *own = most;
+}
+
+static int compare(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return (x > y) - (x < y);
+}
+static double median(double *x, int n)
+{
+    qsort(x, (size_t)n, sizeof *x, compare);
+    return n % 2 ? x[n / 2] : (x[n / 2 - 1] + x[n / 2]) / 2;
 }
 
 int main(int argc, char **argv)
@@ -121,7 +132,7 @@ int main(int argc, char **argv)
         else if (n < 2 && argv[k][0] != '-') program[n++] = argv[k];
         else n = 3;
     }
-    if (n != 2 || rounds < 1 || !scenes) {
+    if (n != 2 || rounds < 1 || rounds > ROUNDS_MAX || !scenes) {
         fprintf(stderr, "usage: versions [--rounds N] [--job TEXT] [--scenes FOLDER] "
                         "OLD NEW\n");
         return 2;
@@ -136,7 +147,7 @@ int main(int argc, char **argv)
         return 3;
     }
     for (size_t t = 0; t < sizeof targets / sizeof targets[0]; t++) {
-        double seconds = 1e30, mib = 1e30, own = 0;
+        double seconds = 1e30, mib = 1e30, own;
         run(path[0], targets[t], &seconds, &mib, &own);
     }
     for (int k = 0; k < JOBS; k++)
@@ -145,18 +156,19 @@ int main(int argc, char **argv)
         for (int k = 0; k < JOBS; k++)
             for (int b = 0; strstr(jobs[k].name, wanted) && b < 2; b++)
                 run(path[b], jobs[k].words, &jobs[k].seconds[b], &jobs[k].mib[b],
-                    &jobs[k].own[b]);
+                    &jobs[k].own[b][r]);
 
     printf("| %d rounds | old s | new s | new / old | old MiB | new MiB | new / old | "
            "old own | new own | new / old |\n|---|---|---|---|---|---|---|---|---|---|\n",
            rounds);
     for (int k = 0; k < JOBS; k++) {
-        const struct job *j = &jobs[k];
+        struct job *j = &jobs[k];
         if (!strstr(j->name, wanted)) continue;
+        const double own[2] = {median(j->own[0], rounds), median(j->own[1], rounds)};
         printf("| %s | %.3f | %.3f | %.3f | %.1f | %.1f | %.2f | %.2f | %.2f | %.2f |\n",
                j->name, j->seconds[0], j->seconds[1], j->seconds[1] / j->seconds[0],
-               j->mib[0], j->mib[1], j->mib[1] / j->mib[0], j->own[0], j->own[1],
-               j->own[1] / j->own[0]);
+               j->mib[0], j->mib[1], j->mib[1] / j->mib[0], own[0], own[1],
+               own[1] / own[0]);
     }
     unlink("picture.exr"), unlink("cornell.exr"), unlink("textured.exr");
     if (chdir("/") == 0) rmdir(work);
