@@ -5,9 +5,9 @@
 #include "bend_problem.h"
 #include "search/checkpoint.h"
 
-/* What a checkpoint belongs to: rays, how they are traced, targets, the rules and the
- * size of the field, held [n_theta]; not the field's numbers, which the search has
- * changed. */
+/* Hash of the problem that a checkpoint was made for: rays, options of tracing, targets,
+ * rules, size of the field, held [n_theta]. The field's numbers are left out, since the
+ * search changes them. */
 void imp__bend_fingerprint(const imp_bend *b, const uint8_t *held,
                            enum imp_optimizer optimizer, int level,
                            struct imp__fingerprint *out);

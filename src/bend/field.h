@@ -135,7 +135,9 @@ void imp__grid_destroy(imp_field *f);
 extern const struct imp__field_ops imp__field_spline, imp__field_trilinear,
     imp__field_radial, imp__field_rz, imp__field_tie, imp__field_sum;
 
-/* Fields of numbers u = eta^2/2: g = grad u / eta, H = (Hess u - g g^T)/eta. In place. */
+/* From the jet of u = eta^2/2, the number that some fields store, to that of eta, in place:
+ *
+ *     eta = sqrt(2 u),    g = grad u / eta,    H = (Hess u - g g^T)/eta */
 static inline void imp__jet_from_eta2(struct imp__jet *j, int order)
 {
     j->eta = sqrt(2 * j->eta);
@@ -144,8 +146,9 @@ static inline void imp__jet_from_eta2(struct imp__jet *j, int order)
     if (order < 2) return;
     for (int k = 0; k < 3; k++) j->h[k] = (j->h[k] - j->g * j->g[k]) * inv;
 }
-/* d eta = du/eta, dg = (d grad u - g d eta)/eta: cotangents of eta, g -> of u, grad u ...
- */
+/* Its transpose, from cotangents of eta and g to those of u and grad u, by
+ *
+ *     d eta = du/eta,    dg = (d grad u - g d eta)/eta                              ... */
 static inline void imp__eta2_vjp(const struct imp__jet *at, double *a, imp_v3 *b)
 {
     const double inv = 1 / at->eta;

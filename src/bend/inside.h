@@ -30,15 +30,15 @@ static inline double imp__graded_index(const struct imp_graded *g, const imp_v3 
     imp__field_eval1(g->bend->field, x, 1, &j);
     return j.eta;
 }
-/* What of a medium is no parameter (where its field lies, a profile's axis) shows in its
- * index at some points. */
+/* Add to a hash what is no parameter of a medium (where its field lies, a profile's axis),
+ * by the index at some points. */
 uint64_t imp__graded_hash(uint64_t h, const struct imp_body *m);
 
 /* The surface of a shape near a point p of it, as a level set. */
 void imp__level(const struct imp_shape *s, imp_v3 p, imp_v3 ng,
                 struct imp__surface *level);
-/* The hit of a ray with unit direction d that reaches x, on the shape, after the distance
- * `far`: what the shape's `surface` needs to recompute x. */
+/* The hit that the shape's `surface` needs to recompute x: of a straight ray of unit
+ * direction d that reaches x, on the shape, after the distance `far`. */
 void imp__hit_at(const struct imp_shape *s, imp_v3 x, imp_v3 d, double far,
                  struct imp_hit *hit);
 

@@ -8,9 +8,12 @@
 
 #define IMP_REPLICATE_MAX 256 /* walks of a pixel that are kept at once */
 
-/* Of the 2 <= n <= IMP_REPLICATE_MAX walks of one replicate of a pixel: L [n] their
- * radiances, P [n] what the gradient of each is multiplied with, so that the sum over
- * them estimates the gradient of the pixel's loss. Returns the estimate of the loss. */
+/* Adjoints of the 2 <= n <= IMP_REPLICATE_MAX walks of one replicate of a pixel, from
+ * their radiances L [n]: the gradient of the pixel's loss is estimated by
+ *
+ *     sum_i P_i dL_i
+ *
+ * Returns the estimate of the loss. */
 double imp__replicate_adjoints(const struct imp__target *target, int channels,
                                size_t pixel, int n, const imp_spec *L, imp_spec *P);
 

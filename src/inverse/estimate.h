@@ -62,13 +62,13 @@ enum imp_status imp__problem_tracer(const struct imp_problem *p,
                                     const struct imp_run *run,
                                     const struct imp_wavelengths *waves,
                                     struct imp_tracer *out);
-/* The same, and walks may begin at the lights: whoever calls it makes those, and takes
- * frozen collisions for derivatives with respect to extinctions. */
+/* The same for an integrator whose walks may begin at the lights. The caller traces those
+ * itself, and derivatives with respect to extinctions are those of frozen collisions. */
 enum imp_status imp__problem_tracer_of_any_end(const struct imp_problem *p,
                                                const struct imp_run *run,
                                                const struct imp_wavelengths *waves,
                                                struct imp_tracer *out);
-/* That of a part of a target, of any end or not; `run` becomes what is run for it. */
+/* The tracer of one part of a target (struct imp__target). `run` becomes the part's run. */
 enum imp_status imp__target_tracer(const struct imp_problem *p,
                                    const struct imp__target *target, int part,
                                    bool any_end, struct imp_run *run,

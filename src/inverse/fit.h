@@ -71,8 +71,8 @@ const char *imp__fit_walks_text(const struct imp__fit *fit);
 
 struct imp__uncertainty;
 
-/* fit_result.c: the numbers before the fit, to go back to. Of `many`: those that are not
- * floats, which the search keeps. */
+/* fit_result.c: the numbers before the fit, for its report and to restore them. Of `many`
+ * only those that are not stored as floats; the search keeps the others. */
 enum imp_status imp__fit_start_keep(const struct imp_problem *p, bool many, double **out);
 void imp__fit_start_restore(struct imp_problem *p, bool many, const double *start,
                             struct imp__search *s);

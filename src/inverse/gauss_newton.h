@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Between the two ways to J^T W J: walk by walk where a walk has one pixel
- * (gauss_newton.c), picture by picture where filters give it several (wide.c). */
+ * What the two estimators of J^T W J share: walk by walk where a walk reaches one pixel
+ * (gauss_newton.c), picture by picture where the filter gives it several (wide.c). */
 #ifndef IMP_INVERSE_GAUSS_NEWTON_H
 #define IMP_INVERSE_GAUSS_NEWTON_H
 

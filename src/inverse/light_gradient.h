@@ -1,14 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Losses and gradients of pictures made by walks from the lights. A walk reaches many
- * pixels, so that no pixel's walks can be left out of its adjoint: sets of walks take the
- * place of walks. Groups are of two sets A, B of n walks a pixel each,
+ * pixels, so the adjoint of a pixel cannot leave out one walk at a time; it leaves out a
+ * set of walks. A group has two sets A, B, of n walks a pixel each, and estimates
  *
  *     loss   of a quadratic l:  w/2 (I_A - T)(I_B - T)
  *     gradient:                 1/2 [ l'(I_A) dI_B + l'(I_B) dI_A ]
  *
- * each product of different sets: without bias where l is quadratic. Groups share no walk,
- * and their spread gives the standard errors (G - 1 degrees of freedom). */
+ * The factors of each product come from different sets, so both are unbiased where l is
+ * quadratic. Groups share no walk, and their spread gives the standard errors (G - 1
+ * degrees of freedom). */
 #ifndef IMP_INVERSE_LIGHT_GRADIENT_H
 #define IMP_INVERSE_LIGHT_GRADIENT_H
 

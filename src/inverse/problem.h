@@ -106,8 +106,8 @@ struct imp_problem {
 };
 
 /* ---- ties.c ---- */
-/* What is active if `chosen` [n_params] is, with the problem's ties: replaces active and
- * blocks, or leaves all as it was. */
+/* Make the parameters `chosen` [n_params] active, and lay out x by the problem's ties.
+ * Replaces active and blocks; after a failure they are as before. */
 enum imp_status imp__problem_layout(struct imp_problem *p, const uint8_t *chosen);
 /* Number i of x: its block. */
 const struct imp__block *imp__problem_block(const struct imp_problem *p, size_t i);
