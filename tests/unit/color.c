@@ -39,7 +39,8 @@ static void check(const struct imp_node *node, enum imp_role role, bool scalar,
                   enum imp_color_mode mode, struct expected e, double tolerance,
                   const char *what)
 {
-    const struct imp__color_ask ask = {ctx, &arena, mode, role, scalar};
+    const struct imp__color_ask ask = {
+        .ctx = ctx, .arena = &arena, .mode = mode, .role = role, .scalar = scalar};
     struct imp__color c = {.value = {-7, -7, -7, -7}, .count = -7};
     const enum imp_status st =
         imp__color_convert(&ask, node, imp__node_prop(node, "c"), &c);
@@ -166,7 +167,8 @@ static void table(void)
     check(t, IMP_REFLECTANCE, false, IMP_RGB, (struct expected){0, {0}}, 0, "a vector");
     struct imp_node *bad = node_make("");
     list_add(bad, 2, (double[]){500, 400, 1, 1});
-    struct imp__color_ask ask = {ctx, &arena, IMP_RGB, IMP_REFLECTANCE, false};
+    struct imp__color_ask ask = {
+        .ctx = ctx, .arena = &arena, .mode = IMP_RGB, .role = IMP_REFLECTANCE};
     struct imp__color c;
     tap_ok(imp__color_convert(&ask, bad, imp__node_prop(bad, "c"), &c) == IMP_E_SCENE,
            "wavelengths that do not increase # %s", imp_last_error(ctx));
@@ -195,7 +197,8 @@ static void table(void)
 static enum imp_status object(struct imp_node *n, enum imp_role role, imp_spec *v,
                               int *count)
 {
-    const struct imp__color_ask ask = {ctx, &arena, IMP_RGB, role, false};
+    const struct imp__color_ask ask = {
+        .ctx = ctx, .arena = &arena, .mode = IMP_RGB, .role = role};
     struct imp__color c;
     const enum imp_status st = imp__color_object(&ask, n, &c);
     if (st != IMP_OK) return st;

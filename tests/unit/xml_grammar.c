@@ -130,7 +130,8 @@ static void check_transforms(void)
 static void check_parameters(void)
 {
     static const char *const defines[] = {"n=1", "n=7", "ab=x"};
-    const struct imp_load_options o = {sizeof o, IMP_RGB, defines, 3, NULL, 0, NULL};
+    const struct imp_load_options o = {
+        .size = sizeof o, .mode = IMP_RGB, .defines = defines, .n_defines = 3};
     struct imp_scene s;
     enum imp_status st =
         parse(IN("<default name='n' value='3'/><default name='a' value='short'/>"
@@ -158,7 +159,8 @@ static void check_parameters(void)
     parse_close(&s);
 
     static const char *const bad[] = {"novalue"};
-    const struct imp_load_options wrong = {sizeof o, IMP_RGB, bad, 1, NULL, 0, NULL};
+    const struct imp_load_options wrong = {
+        .size = sizeof o, .mode = IMP_RGB, .defines = bad, .n_defines = 1};
     tap_ok(parse(IN(""), &wrong, &s) == IMP_E_ARG, "a definition needs '='");
     parse_close(&s);
 
