@@ -5,7 +5,8 @@
 #include "color/cie.h"
 #include "scene_build.h"
 
-#define BIN_NM   1.0
+/* Steps of the density stop stratification at about 100 walks if they are as wide as 1 nm. */
+#define BIN_NM   0.125
 #define BINS_MAX 4096 /* of a range that a file may make as wide as it likes */
 /* Of the mean light, added everywhere: where lights are dark a derivative may not be. */
 #define LIGHT_FLOOR 0.05
