@@ -40,7 +40,17 @@ chromium --headless --no-sandbox --use-gl=angle --use-angle=swiftshader --enable
     --window-size=900,900 --virtual-time-budget=5000 --screenshot="$PWD/$images/report.png" \
     "file://$(realpath "$out/fit/report.html")" 2>/dev/null
 
-for picture in report textured lenses cornell_jacobian cornell_fit; do
+say "report: finite elements, as Chromium shows them"
+"$importon" elements scenes/elements/d.xml --phong '*=0.1,0.6,15' --beam light_left=20 --beam light_right=20 --lux floor \
+    --plane 0,0.4,0,0,0,1,1,0,0 --report "$out/elements" -q
+"$importon" report "$out/elements" --title "Four lamps in a glossy room" -q
+page=$out/elements/report.html
+sed -i 's|</body>|<script>document.querySelector("#elements canvas").dispatchEvent(new KeyboardEvent("keydown", {key: "n"}));document.getElementById("pictures").remove()</script></body>|' "$page"
+chromium --headless --no-sandbox --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --hide-scrollbars \
+    --window-size=620,820 --virtual-time-budget=5000 --screenshot="$PWD/$images/report_elements.png" \
+    "file://$(realpath "$page")" 2>/dev/null
+
+for picture in report report_elements textured lenses cornell_jacobian cornell_fit; do
     bytes=$(stat -c %s "$images/$picture.png")
     say "$images/$picture.png: $bytes bytes"
     ((bytes < most)) || { echo "$images/$picture.png is larger than $most bytes" >&2; exit 1; }

@@ -99,8 +99,8 @@ function elements_section(data) {
             context.closePath();
             context.globalAlpha = plane ? 0.35 : 1;
             context.fillStyle = context.strokeStyle = css(elements[i]);
-            context.fill();
-            if (state.edges) context.strokeStyle = "rgba(128,128,128,.35)";
+            if (!plane || state.by === "illuminance" || state.by === "importance") context.fill(); /* it sends no light */
+            if (state.edges) context.strokeStyle = plane ? "rgba(128,128,128,.15)" : "rgba(128,128,128,.35)";
             context.lineWidth = 0.7;
             context.stroke();
         }

@@ -16,7 +16,7 @@ function space_view(lo, hi, away, label, {draw: paint, click, key}) {
     function project(p) {
         const x = p[0] - centre[0], y = p[1] - centre[1], z = p[2] - centre[2];
         const ct = Math.cos(state.turn), st = Math.sin(state.turn), cp = Math.cos(state.tilt), sp = Math.sin(state.tilt);
-        const u = ct * x - st * z, depth = st * x + ct * z, scale = state.zoom * 0.56 * canvas.height / radius;
+        const u = ct * x - st * z, depth = st * x + ct * z, scale = state.zoom * 0.5 * canvas.height / radius;
         return [canvas.width / 2 + scale * u, canvas.height / 2 - scale * (cp * y - sp * depth), sp * y + cp * depth];
     }
     function line(from, to) {
