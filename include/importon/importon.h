@@ -560,9 +560,8 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_film_merge(imp_film *film,
  * as a layer. Standard errors stay where both have them.
  * @return IMP_OK; IMP_E_ARG if sizes differ, the name is no layer's or is there; IMP_E_NOMEM.
  * On an error the picture is what it was. */
-IMP_API IMP_MUST_CHECK enum imp_status imp_film_add_layer(imp_film *film,
-                                                          const imp_film *other,
-                                                          const char *layer);
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_film_add_layer(imp_film *film, const imp_film *other, const char *layer);
 /** Attach a text attribute (provenance); it is written to EXR files. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_film_set_text(imp_film *film, const char *key,
                                                          const char *value);
@@ -1047,7 +1046,8 @@ struct imp_fit_result {
      * imp_problem_forward makes the picture of it. NULL where all numbers are determined,
      * or there are no intervals. */
     const double *loosest;
-    const char *walks; /**< which evaluations of the search were of kept walks, or why none
+    const char
+        *walks; /**< which evaluations of the search were of kept walks, or why none
                             were; NULL: the optimizer draws new ones each time */
 };
 

@@ -10,7 +10,6 @@
  *     run.walks = walks       imp_render, imp_problem_objective and all others that take
  *                             an imp_run then evaluate these walks in place of tracing
  *     imp_walks_weigh         how many of them still count
- *     imp_walks_write         ... and what needs no scene file, meshes or images
  *
  * At the parameters that they were drawn at, kept walks give what tracing gives, to the
  * bit, unless roulette was given a floor (imp_walks_options). At others they are unbiased,

@@ -26,12 +26,18 @@ class Walks:
     n_walks, n_vertices, bytes : float
     survival : float
         Least probability with which roulette let a walk go on; 0: none.
+
+    Examples
+    --------
+    >>> walks = importon.keep(importon.load_dict(importon.cornell_box(res=8)), spp=16)
+    >>> walks.spp, walks.n_walks
+    (16, 1024.0)
     """
 
-    def __init__(self, scene: Scene, handle: Handle) -> None:
-        self.scene, self._handle = scene, handle
+    def __init__(self, _scene: Scene, _handle: Handle) -> None:
+        self.scene, self._handle = _scene, _handle
         info = make(_c.imp_walks_info)
-        lib.imp_walks_get_info(handle.pointer, ctypes.byref(info))
+        lib.imp_walks_get_info(_handle.pointer, ctypes.byref(info))
         self.spp: int = info.spp
         self.seed: int = info.seed
         self.n_walks: float = info.n_walks
@@ -65,6 +71,18 @@ class Walks:
             The effective sample size as a fraction of the walks; the growth of the second
             moment from step to step of roulette (0: no roulette); and why the walks are not
             evaluated at these parameters, or None.
+
+        Raises
+        ------
+        ArgumentError
+            There are no walks of this sensor, or the mask is not finite.
+
+        Examples
+        --------
+        >>> scene = importon.load_dict(importon.cornell_box(res=8))
+        >>> ess, growth, refused = importon.keep(scene, spp=16).weigh()
+        >>> ess, refused
+        (1.0, None)
         """
         scene, weight = self.scene, make(_c.imp_walks_weight)
         index = scene.sensor_index(sensor) if sensor else 0

@@ -11,12 +11,12 @@ importon fit small.xml -D width=24 -D height=18 --target t.exr -p floor.reflecta
     --picture-spp 16 -q -o r >/dev/null || exit 9
 importon report r -q || exit 9
 python3 - <<'END'
-import base64, json, re, struct
+import base64, json, re, struct, zlib
 data = json.loads(re.search(r'id="data">(.*?)</script>', open("r/report.html").read(), re.S)[1])
 p = next(i["data"] for i in data["items"] if i["kind"] == "fit")["params"][0]
 def numbers(name):
     i = next(i for i in data["items"] if i.get("name") == name)
-    halves = struct.unpack("<%de" % (i["width"] * i["height"] * 3), base64.b64decode(i["pixels"]))
+    halves = struct.unpack("<%de" % (i["width"] * i["height"] * 3), zlib.decompress(base64.b64decode(i["pixels"])))
     plane = i["width"] * i["height"]
     return [halves[c * plane + k] * i["scale"] for k in range(plane) for c in range(3)]
 v, half = numbers("floor.reflectance.data"), numbers("floor.reflectance.data.interval")
