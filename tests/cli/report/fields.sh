@@ -16,8 +16,9 @@ data = json.loads(re.search(r'id="data">(.*?)</script>', open("r/report.html").r
 p = next(i["data"] for i in data["items"] if i["kind"] == "fit")["params"][0]
 def numbers(name):
     i = next(i for i in data["items"] if i.get("name") == name)
-    halves = struct.unpack("<%de" % (i["width"] * i["height"] * 3), zlib.decompress(base64.b64decode(i["pixels"])))
     plane = i["width"] * i["height"]
+    packed = zlib.decompress(base64.b64decode(i["pixels"])) # low bytes, then high bytes
+    halves = struct.unpack("<%de" % (3 * plane), bytes(b for pair in zip(packed[:3 * plane], packed[3 * plane:]) for b in pair))
     return [halves[c * plane + k] * i["scale"] for k in range(plane) for c in range(3)]
 v, half = numbers("floor.reflectance.data"), numbers("floor.reflectance.data.interval")
 near = lambda a, b: abs(a - b) < 1e-3
