@@ -87,6 +87,15 @@ void view_targets(void);
 void view_pictures(enum view_channel channel, const char *name, const char *role,
                    int spp);
 
+/* ---- view_kept.c ---- */
+/* Keep walks at the numbers as they are, at most `most` of a pixel, unless those that are
+ * kept do; any wish ends it. */
+void view_kept_draw(int64_t most);
+/* The picture at these numbers by the walks that are kept, and their effective sample size;
+ * the caller destroys it. NULL: there are none, or they are worth too little. */
+imp_film *view_kept_picture(int64_t most, double *ess);
+void view_kept_close(void);
+
 /* ---- The views ----------------------------------------------------------------------- */
 
 struct view_options {

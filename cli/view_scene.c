@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * A picture that is made while one looks on, and made again when a number is moved: with
- * few samples first, then with more, at last as importon render makes it. What is stopped
- * goes on with new random numbers, and both count. */
+ * few samples first, by kept walks where they can be had, then with more, at last as
+ * importon render makes it. What is stopped goes on with new random numbers, and both
+ * count. */
 #include "view.h"
 
 #include "cmd_picture.h"
@@ -21,6 +22,8 @@ static struct {
     size_t n;
     const char *path; /* of "save" */
     imp_film *film;   /* the best so far; NULL: none */
+    bool kept;        /* it was made of kept walks */
+    bool said_so;     /* and the page says so */
     int sessions;     /* seeds in use: each run that is merged has its own */
 } r;
 
@@ -127,12 +130,15 @@ static void show(const imp_film *film, void *payload)
     item.unit = unit;
     item.film = film;
     view_show(VIEW_PICTURE, &item, 1);
+    if (r.said_so && film != r.film) view_state(VIEW_RUNNING, "");
+    r.said_so &= film == r.film;
 }
 
 static void forget(void)
 {
     imp_film_destroy(r.film);
     r.film = NULL;
+    r.kept = r.said_so = false;
     r.sessions = 1;
 }
 
@@ -159,19 +165,47 @@ static int take(int64_t spp, bool merges)
         cli_say("importon: %s", imp_last_error(cli.context));
     imp_film_destroy(r.film);
     r.film = film;
+    if (r.said_so) view_state(VIEW_RUNNING, "");
+    r.kept = r.said_so = false;
     show(film, NULL);
     return 0;
 }
 
+/* The picture by walks that are kept from other numbers: it is shown until a fresh one has
+ * more samples. */
+static void take_kept(int64_t all)
+{
+    char text[160];
+    double ess;
+    imp_film *film = view_kept_picture((all - 1) / GROWS, &ess);
+    if (!film) return;
+    r.film = film;
+    r.kept = true;
+    show(film, NULL);
+    snprintf(
+        text, sizeof text,
+        "this picture: %lld kept walks per pixel, of which %.2g count; fresh ones are "
+        "on their way",
+        (long long)spp_of(film), ess);
+    view_state(VIEW_RUNNING, text);
+    r.said_so = true;
+}
+
 /* Rounds of 1, 4, 16, ... samples, each by itself, then all that are wanted: the last one
- * is what importon render makes. */
+ * is what importon render makes. Those that kept walks take the place of are left out. */
 static int rounds(int64_t all)
 {
     int rc = 0;
     forget();
-    for (int64_t spp = 1; spp < all && !view_asked() && !rc; spp *= GROWS)
+    take_kept(all);
+    for (int64_t spp = r.kept ? GROWS * spp_of(r.film) : 1;
+         spp < all && !view_asked() && !rc; spp *= GROWS) {
         rc = take(spp, false);
-    return rc || view_asked() ? rc : take(all, false);
+        if (!rc && spp > GROWS && !view_asked()) view_kept_draw((all - 1) / GROWS);
+    }
+    if (!rc && !view_asked()) rc = take(all, false);
+    if (!rc && !view_asked()) view_kept_draw((all - 1) / GROWS);
+    return rc;
 }
 
 static void save(char *said, size_t size)
@@ -180,6 +214,10 @@ static void save(char *said, size_t size)
     const struct picture_options po = {.standard_error = 1};
     if (!r.film) {
         snprintf(said, size, "there is no picture yet");
+        return;
+    }
+    if (r.kept) {
+        snprintf(said, size, "not saved: the picture is one of kept walks; resume first");
         return;
     }
     picture_stamp(r.film, &run);
@@ -198,7 +236,7 @@ static int work(void)
         if (running && (fresh || spp_of(r.film) < all)) {
             view_state(VIEW_RUNNING, said);
             rc = fresh ? rounds(all) : take(all - spp_of(r.film), true);
-            fresh = !r.film;
+            fresh = !r.film || r.kept;
         }
         if (rc) return rc;
         if (!view_asked()) { /* all is done, or nothing is to be done */
@@ -248,6 +286,7 @@ int view_scene(void)
     }
     view_close();
     forget();
+    view_kept_close();
     free(r.param);
     free(r.element);
     free(automatic);

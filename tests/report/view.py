@@ -4,6 +4,7 @@
 
 Usage: view.py IMPORTON SCENES
 """
+import base64
 import http.client
 import json
 import os
@@ -11,12 +12,14 @@ import re
 import shutil
 import signal
 import socket
+import struct
 import subprocess
 import sys
 import tempfile
 import threading
 import time
 import urllib.parse
+import zlib
 
 importon, scenes = sys.argv[1:]
 count = failed = 0
@@ -103,13 +106,21 @@ cornell = os.path.join(scenes, "cornell.xml")
 common = ["-D", "res=16", "--seed", "3"]
 
 
+def mean(item):
+    """Mean of the numbers of a picture's item: halves, all low bytes first."""
+    packed = zlib.decompress(base64.b64decode(item["pixels"]))
+    half = len(packed) // 2
+    numbers = struct.unpack("<%de" % half, bytes(b for pair in zip(packed[:half], packed[half:]) for b in pair))
+    return sum(numbers) * item["scale"] / half
+
+
 def run(*words):
     return subprocess.run([importon, *words], check=True, capture_output=True, text=True).stdout
 
 
 # ---- Who may ask ------------------------------------------------------------------------
 out = os.path.join(folder, "picture.exr")
-view = View(cornell, *common, "--spp", "64", "-p", "red.*", "-p", "light.*", "-o", out)
+view = View(cornell, *common, "--spp", "256", "-p", "red.*", "-p", "light.*", "-o", out)
 try:
     ok(re.fullmatch(r"http://127\.0\.0\.1:\d+/[0-9a-f]{32}/", view.url) is not None, "the address has a token of 128 bits")
     port = "%04X" % view.port
@@ -145,7 +156,7 @@ try:
     # ---- A render ---------------------------------------------------------------------------
     ok(view.state("done") is not None, "the picture is done")
     spp = [i["spp"] for i in view.items("picture")]
-    ok(spp[-1] == 64 and all(a <= b for a, b in zip(spp, spp[1:])), "it came with more and more samples # %s" % spp)
+    ok(spp[-1] == 256 and all(a <= b for a, b in zip(spp, spp[1:])), "it came with more and more samples # %s" % spp)
     numbers = view.wait(lambda event, value: event == "numbers")
     ok([n["name"] for n in numbers] == ["red.reflectance.value[%d]" % k for k in range(3)] + ["light.radiance.value[%d]" % k for k in range(3)]
        and numbers[0]["min"] == 0 and numbers[3]["max"] is None, "a slider for each number of -p, with its bounds")
@@ -154,7 +165,7 @@ try:
        and all(w["pixel"] == [8, 12] for w in walks["items"][0]["data"]["walks"]) and len(walks["items"][0]["data"]["walks"]) == 16,
        "random walks of a pixel")
     ok(view.act("save") == 200 and view.wait(lambda e, v: e == "state" and "saved" in (v["message"] or "")) is not None, "saved")
-    run("render", cornell, *common, "--spp", "64", "--se", "--no-preview", "-q", "-o", folder + "/render.exr")
+    run("render", cornell, *common, "--spp", "256", "--se", "--no-preview", "-q", "-o", folder + "/render.exr")
     text = run("compare", out, folder + "/render.exr", "--json")
     ok(json.loads(text)["max_abs"] == 0, "and it is what importon render makes, to the bit")
     n = len(view.news)
@@ -163,6 +174,25 @@ try:
        "a slider is moved, and the picture made again")
     moved = view.items("picture")[-1]
     ok(moved["pixels"] != bright["pixels"] and view.wait(lambda e, v: e == "numbers" and v[3]["value"] == 40, n), "with the light that was asked for")
+    told = view.wait(lambda e, v: e == "state" and "kept walks" in (v["message"] or ""), n)
+    first = view.wait(lambda e, v: e == "report" and v["items"][0]["kind"] == "picture", n)["items"][0]
+    ratio = mean(first) / mean(moved)
+    ok(told is not None and first["spp"] == 16 and abs(ratio - 1) < .1,
+       "first by kept walks, as the page says # %d samples, %.3f of the mean of fresh ones" % (first["spp"], ratio))
+    view.act("save")
+    view.wait(lambda e, v: e == "state" and "saved" in (v["message"] or ""), n)
+    light = next(p["value"] for p in json.loads(run("info", cornell, "-D", "res=16", "--json"))["params"] if p["name"] == "light.radiance.value")
+    run("render", cornell, *common, "--set", "light.radiance.value=40,%r,%r" % tuple(light[1:]), "--spp", "256", "--se", "--no-preview", "-q", "-o", folder + "/moved.exr")
+    ok(json.loads(run("compare", out, folder + "/moved.exr", "--json"))["max_abs"] == 0, "and at last what importon render makes there, to the bit")
+    n = len(view.news)
+    view.act("set", name="red.reflectance.value[0]", value="0")
+    view.state("running", n), view.state("done", n)
+    back = len(view.news)
+    view.act("set", name="red.reflectance.value[0]", value="0.6")
+    view.state("running", back), view.state("done", back)
+    dark, red = view.items("picture")[-1], mean(view.items("picture")[-1])
+    first = view.wait(lambda e, v: e == "report" and v["items"][0]["kind"] == "picture", back)["items"][0]
+    ok(first["spp"] == 16 and abs(mean(first) / red - 1) < .1, "walks that were kept before a wall was black still count # %.3f" % (mean(first) / red))
     code = view.end()
     ok(code == 130 and view.said.count("\n") == 1, "Ctrl-C ends it # %d" % code)
     ok(view.wait(lambda e, v: False) is None and view.ended, "and the page's connection")
