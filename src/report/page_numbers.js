@@ -108,13 +108,14 @@ function correlation_section(fit) {
     const r = c.map((row, i) => row.map((v, j) => v / Math.sqrt(c[i][i] * c[j][j])));
     const cell = n > 24 ? 16 : 30, left = Math.min(260, 8 * Math.max(...names.map((s) => s.length)) + 30), size = n * cell;
     const svg = make_svg("svg", {width: left + size + 10, height: size + 20 + 10, viewBox: `0 0 ${left + size + 10} ${size + 30}`, role: "img", "aria-label": "correlations"});
-    let worst = null, tied = 0;
+    let worst = null;
+    const tied = [];
     r.forEach((row, i) => {
         svg.append(make_svg("text", {x: left - 6, y: 20 + cell * i + cell / 2 + 4, "text-anchor": "end"}, (names[i].length > 28 ? names[i].slice(0, 27) + "…" : names[i]) + ` ${i + 1}`));
         svg.append(make_svg("text", {x: left + cell * (i + 0.5), y: 14, "text-anchor": "middle"}, String(i + 1)));
         row.forEach((v, j) => {
             if (!is_number(v)) return;
-            if (j < i && Math.abs(v) > 0.99) tied++;
+            if (j < i && Math.abs(v) > 0.99) tied.push([j, i]);
             if (j < i && (!worst || Math.abs(v) > Math.abs(worst.v))) worst = {v, i, j};
             const rect = make_svg("rect", {x: left + cell * j, y: 20 + cell * i, width: cell - 1, height: cell - 1, fill: `rgb(${signed_colour(v).map(Math.round).join(",")})`});
             rect.append(make_svg("title", {}, `${names[i]}, ${names[j]}: ${show(v, 3)}`));
@@ -125,8 +126,9 @@ function correlation_section(fit) {
             }
         });
     });
+    const also = tied.filter(([j, i]) => i !== worst.i || j !== worst.j).map(([j, i]) => `${names[i]} and ${names[j]}`);
     return make("section", {id: "correlations"}, make("h2", {}, "Correlations of the errors"),
-        worst && Math.abs(worst.v) > 0.9 ? make("p", {class: "warning"}, `${names[worst.i]} and ${names[worst.j]} are hard to tell apart: correlation ${show(worst.v, 3)}${tied > 1 ? `; so are ${tied - 1} other pair${tied > 2 ? "s" : ""} beyond .99` : ""}.`) : null,
+        worst && Math.abs(worst.v) > 0.9 ? make("p", {class: "warning"}, `${names[worst.i]} and ${names[worst.j]} are hard to tell apart: correlation ${show(worst.v, 3)}${also.length ? `; so are ${also.slice(0, 3).join(", ")}${also.length > 3 ? ` and ${also.length - 3} more pairs` : ""}` : ""}.`) : null,
         make("div", {class: "scroll"}, svg));
 }
 
@@ -142,12 +144,14 @@ function loss_section(fit) {
     if (!finite.length) return null;
     const errors = se.filter((s) => is_number(s) && s > 0);
     const least_of = (v, start) => v.reduce((a, b) => Math.min(a, b), start), most_of = (v, start) => v.reduce((a, b) => Math.max(a, b), start);
-    const largest = most_of(finite.map(Math.abs), 0) || 1;
+    const answer = is_number(fit.value), stops = answer ? n : n - 1; /* the answer stands behind the last iteration */
+    const band = (sign) => [...h.loss, fit.value].map((v, i) => v + sign * ([...se.slice(0, n), ...Array(Math.max(0, n - se.length)).fill(0), fit.se][i] || 0)).filter(is_number);
+    const largest = most_of([...finite, fit.value].filter(is_number).map(Math.abs), 0) || 1;
     const unit = Math.max(errors.length ? least_of(errors, Infinity) : largest * 1e-6, largest * 1e-8);
-    const hi = 1.2 * most_of(finite, unit), lo = least_of(finite, 0) - 0.5 * unit;
+    const hi = 1.1 * most_of(band(1), unit), lo = least_of(band(-1), 0) - 0.2 * unit;
     const bend = (y) => Math.asinh(y / (2 * unit));
     const y_at = (y) => ht - bottom - (ht - bottom - top) * (bend(Math.min(Math.max(y, lo), hi)) - bend(lo)) / (bend(hi) - bend(lo));
-    const x_at = (i) => left + (w - left - right) * (n > 1 ? i / (n - 1) : 0.5);
+    const x_at = (i) => left + (w - left - right) * (stops > 0 ? i / stops : 0.5);
     const svg = make_svg("svg", {width: w, height: ht, viewBox: `0 0 ${w} ${ht}`, role: "img", "aria-label": "loss by iteration"});
     const level = (v) => {
         if (v < lo || v > hi) return;
@@ -157,6 +161,8 @@ function loss_section(fit) {
     level(0);
     const first = Math.ceil(Math.log10(unit)), last = Math.log10(hi), step = Math.max(1, Math.ceil((last - first) / 8));
     for (let k = first; k <= last; k += step) level(10 ** k);
+    if (last - first < 2) level(3 * 10 ** (first - 1));
+    if (lo < -unit) level(-(10 ** Math.floor(Math.log10(-lo))));
     const stride = Math.max(1, 10 ** Math.floor(Math.log10(Math.max(n - 1, 1) / 4)));
     const each = [1, 2, 5, 10].map((m) => m * stride).find((m) => (n - 1) / m <= 10) || 10 * stride;
     for (let i = 0; i < n; i += each) svg.append(make_svg("text", {x: x_at(i), y: ht - bottom + 18, "text-anchor": "middle"}, String(i)));
@@ -172,13 +178,17 @@ function loss_section(fit) {
     svg.append(make_svg("path", {class: "curve", d: `M${points.map(([v, i]) => `${x_at(i).toFixed(1)} ${y_at(v).toFixed(1)}`).join("L")}`}));
     for (const [v, i] of points.length < 60 ? points : [])
         svg.append(make_svg("circle", {cx: x_at(i), cy: y_at(v), r: 3, fill: "var(--accent)"}));
+    if (answer) {
+        if (is_number(fit.se)) svg.append(make_svg("line", {x1: x_at(n), x2: x_at(n), y1: y_at(fit.value - fit.se), y2: y_at(fit.value + fit.se), class: "curve"}));
+        svg.append(make_svg("circle", {cx: x_at(n), cy: y_at(fit.value), r: 4, fill: "var(--accent)"}), make_svg("text", {x: x_at(n), y: ht - bottom + 18, "text-anchor": "end"}, "answer"));
+    }
     const cursor = make_svg("line", {y1: top, y2: ht - bottom, class: "mark"});
     svg.append(cursor);
     const told = make("p", {class: "mono", "aria-live": "polite"});
     const slider = make("input", {type: "range", min: 0, max: n, value: n, "aria-label": "iteration, and the answer behind the last", input: () => go(Number(slider.value))});
     /* Stops 0 to n - 1 are iterations, n is the answer. */
     function go(i) {
-        const at = x_at(Math.min(i, n - 1));
+        const at = x_at(Math.min(i, stops));
         cursor.setAttribute("x1", at);
         cursor.setAttribute("x2", at);
         slider.setAttribute("aria-valuetext", i < n ? `iteration ${i}` : "the answer");
@@ -188,19 +198,25 @@ function loss_section(fit) {
     }
     go(n);
     return make("section", {id: "loss"}, make("h2", {}, "Loss"), make("div", {class: "scroll"}, svg),
-        n > 1 ? make("div", {class: "bar noprint"}, make("label", {}, "iteration ", slider), Array.isArray(h.x) ? make("span", {class: "faint"}, "the numbers above move with it") : null) : null, told,
-        Array.isArray(h.x) && n > 1 ? make("p", {class: "faint"}, `All ${h.x[0].length} numbers by iteration:`) : null,
-        Array.isArray(h.x) && n > 1 ? make("div", {class: "traces"}, ...trace_figures(h)) : null);
+        make("p", {class: "faint"}, `The band is one standard error.${lo < -unit ? " A loss may be below 0: the noise of its own samples is taken off, so that it is right on average." : ""}`),
+        n > 1 ? make("div", {class: "bar noprint"}, make("label", {}, "iteration ", slider), Array.isArray(h.x) ? make("span", {class: "faint"}, "values in the table of parameters move with it") : null) : null, told,
+        Array.isArray(h.x) && n > 1 ? make("p", {class: "faint"}, `All ${h.x[0].length} numbers by iteration, and the answer with its 95 % interval:`) : null,
+        Array.isArray(h.x) && n > 1 ? make("div", {class: "traces"}, ...trace_figures(h, fit.params)) : null);
 }
 
-/* Each number by iteration; a history has those of at most 64. */
-function trace_figures(h) {
+/* Each number by iteration, and the answer behind the last; a history has those of at most
+ * 64. */
+function trace_figures(h, params) {
+    const answers = new Map((Array.isArray(params) ? params : []).map((p) => [String(p.name), p]));
     const names = Array.isArray(h.names) ? h.names : [], n = h.x.length, of = (k) => h.x.map((row) => row[k]);
     return h.x[0].slice(0, rows_shown).map((_, k) => {
-        const v = of(k), finite = v.filter(is_number), lo = Math.min(...finite), hi = Math.max(...finite), margin = 0.06 * (hi - lo) || Math.abs(hi) * 0.05 || 1;
+        const p = answers.get(String(names[k])) || {}, ends = [p.lo95, p.hi95].filter(is_number), known = is_number(p.value);
+        const v = of(k), finite = [...v, ...ends, p.value].filter(is_number), lo = Math.min(...finite), hi = Math.max(...finite), margin = 0.06 * (hi - lo) || Math.abs(hi) * 0.05 || 1;
         if (!finite.length) return null;
-        const {svg, at} = plot_axes({width: 300, height: 150, x: [0, n - 1], y: [lo - margin, hi + margin], label: `${names[k] ?? k} by iteration`, left: 60});
+        const {svg, at} = plot_axes({width: 300, height: 150, x: [0, known ? n : n - 1], y: [lo - margin, hi + margin], label: `${names[k] ?? k} by iteration`, left: 60});
         svg.append(make_svg("path", {class: "curve", d: `M${v.map((y, i) => (is_number(y) ? at(i, y).map((c) => c.toFixed(1)).join(" ") : "")).filter(Boolean).join("L")}`}));
+        if (known && ends.length === 2) svg.append(make_svg("line", {x1: at(n, p.value)[0], x2: at(n, p.value)[0], y1: at(n, ends[0])[1], y2: at(n, ends[1])[1], class: "curve"}));
+        if (known) svg.append(make_svg("circle", {cx: at(n, p.value)[0], cy: at(n, p.value)[1], r: 3.5, fill: "var(--accent)"}));
         return make("figure", {}, make("figcaption", {class: "mono"}, String(names[k] ?? k)), svg);
     });
 }
