@@ -32,7 +32,7 @@ struct imp_walks_options {
     /** 0: the walks of imp_render with this run. 1: those of losses and their gradients
      * (imp_problem_objective), of which pictures can be made too. They are the same walks
      * unless points are those of Sobol's sequence, whose sets have to be independent of
-     * each other for a loss. */
+     * each other for a loss, or wavelengths are stratified. */
     int losses;
     int all_sensors; /**< not 0: of all sensors; 0: of run->sensor alone */
     /** Least probability with which roulette lets a walk go on: reflectances up to its root
@@ -56,8 +56,9 @@ struct imp_walks_options {
  * @param[out] out the caller destroys it.
  * @return IMP_OK; IMP_CANCELLED; IMP_E_ARG; IMP_E_NOMEM if they need more than
  *         options->memory (the message says how much); IMP_E_UNSUPPORTED, with the reason,
- *         for walks from the lights, through graded indices that are active, from sensors
- *         that are surfaces, integrators that make no walks, and in a team of ranks. */
+ *         for walks from the lights, through graded indices that are active, past shapes
+ *         with a priority, from sensors that are surfaces, integrators that make no walks,
+ *         and in parts. Ranks of a team keep all walks each. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_walks_keep(imp_scene *scene, const struct imp_run *run,
                const struct imp_walks_options *options, imp_walks **out);
@@ -76,8 +77,7 @@ struct imp_walks_info {
 IMP_API enum imp_status imp_walks_get_info(const imp_walks *walks,
                                            struct imp_walks_info *info);
 
-/** The scene in which they are evaluated; belongs to the walks where these were read from
- * a file, and has neither shapes nor rays then. */
+/** The scene in which they are evaluated; the caller's. */
 IMP_API imp_scene *imp_walks_scene(const imp_walks *walks);
 
 struct imp_walks_weight {

@@ -85,6 +85,7 @@ class Walks:
         (1.0, None)
         """
         scene, weight = self.scene, make(_c.imp_walks_weight)
+        not_inside()
         index = scene.sensor_index(sensor) if sensor else 0
         with scene.lock:
             push(scene, params)

@@ -291,6 +291,7 @@ class Elements:
         >>> solution.element(0)["level"], solution.element(0)["parent"]
         (0, None)
         """
+        not_inside()
         with self.scene.lock:
             x = make(_c.imp_elements_element)
             self._context.check(lib.imp_elements_get_element(self.pointer, integer(index, "index", 0, 2**64 - 1), ctypes.byref(x)))
@@ -326,6 +327,7 @@ class Elements:
         """
         kind = np.dtype([("from", np.uintp), ("irradiance", float, 3), ("illuminance", float), ("measure", float)])
         assert kind.itemsize == ctypes.sizeof(_c.imp_elements_arrival)
+        not_inside()
         with self.scene.lock:
             rows, n = ctypes.c_void_p(), ctypes.c_size_t()
             self._context.check(lib.imp_elements_arrivals(self.pointer, integer(index, "index", 0, 2**64 - 1),

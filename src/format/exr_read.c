@@ -43,12 +43,14 @@ static int find(const struct exr_reader *r, const char *name)
     return -1;
 }
 
-/* Index in the list of the channel whose standard error this is; -1: an ordinary channel.
- */
+/* Index in the list of the channel whose standard error this is; -1: an ordinary channel,
+ * as one is that would be the error of an error. */
 static int se_of(const struct exr_reader *r, int i)
 {
     const char *name = channel_name(r, i);
-    return strncmp(name, "se.", 3) == 0 ? find(r, name + 3) : -1;
+    if (strncmp(name, "se.", 3) != 0) return -1;
+    const int of = find(r, name + 3);
+    return of >= 0 && se_of(r, of) < 0 ? of : -1;
 }
 
 /* R, G, B, A stand in this order though files keep them by the alphabet; layers stay

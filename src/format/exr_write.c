@@ -65,6 +65,10 @@ static enum imp_status header_write(struct exr_writer *w)
     for (int se = 0; se < (w->se ? 2 : 1); se++)
         for (int c = 0; c < f->channels; c++) {
             char name[NAME_ROOM];
+            if (strlen(f->names[c]) + strlen("se.") >= sizeof name)
+                IMP_TRY(imp__error(w->io->ctx, IMP_E_ARG,
+                                   "the name of channel %d is longer than %zu letters", c,
+                                   sizeof name - strlen("se.") - 1));
             snprintf(name, sizeof name, "%s%s", se ? "se." : "", f->names[c]);
             imp__exr_name_to_file(name, text);
             EXR(exr_add_channel(w->exr, part, text, type, EXR_PERCEPTUALLY_LOGARITHMIC, 1,
@@ -112,6 +116,24 @@ static exr_result_t compress(exr_encode_pipeline_t *pipe)
     return code;
 }
 
+/* Channel of the film that has this name in the file, behind `prefix` there; -1: none.
+ * Names of wavelengths are not those of the file, and not always found by their number. */
+static int channel_of(const imp_film *f, const char *prefix, const char *of_file)
+{
+    char name[NAME_ROOM], text[NAME_ROOM];
+    const size_t skip = strlen(prefix);
+    imp__exr_name_to_film(of_file, name);
+    const int k = strncmp(name, prefix, skip) == 0 ? imp__film_find(f, name + skip) : -1;
+    for (int c = -1; c < f->channels; c++) {
+        const int at = c < 0 ? k : c;
+        if (at < 0) continue;
+        snprintf(name, sizeof name, "%s%s", prefix, f->names[at]);
+        imp__exr_name_to_file(name, text);
+        if (strcmp(text, of_file) == 0) return at;
+    }
+    return -1;
+}
+
 static enum imp_status pixels_write(struct exr_writer *w)
 {
     enum imp_status st = IMP_OK;
@@ -127,18 +149,19 @@ static enum imp_status pixels_write(struct exr_writer *w)
         else EXR(exr_encoding_update(w->exr, 0, &chunk, &pipe));
         for (int i = 0; i < pipe.channel_count; i++) {
             exr_coding_channel_info_t *to = &pipe.channels[i];
-            char name[NAME_ROOM];
-            imp__exr_name_to_film(to->channel_name, name);
             const float *from = w->mean;
             size_t n = c; /* numbers from pixel to pixel */
-            int k = imp__film_find(f, name);
-            if (k < 0 && w->rgb && (k = imp__film_find(w->rgb, name)) >= 0) {
+            int k = channel_of(f, "", to->channel_name);
+            if (k < 0 && w->rgb && (k = imp__film_find(w->rgb, to->channel_name)) >= 0) {
                 from = w->rgb->mean;
                 n = 3;
-            } else if (k < 0) {
+            } else if (k < 0 && w->se) {
                 from = w->se;
-                k = imp__film_find(f, name + strlen("se."));
+                k = channel_of(f, "se.", to->channel_name);
             }
+            if (k < 0)
+                IMP_TRY(imp__error(w->io->ctx, IMP_E_ARG, "channel '%s' has no pixels",
+                                   to->channel_name));
             const size_t line = (size_t)f->width * n;
             to->encode_from_ptr = (const uint8_t *)(from + (size_t)y * line + (size_t)k);
             to->user_data_type = EXR_PIXEL_FLOAT;

@@ -9,6 +9,7 @@
 #include "light_gradient.h"
 #include "loss.h"
 #include "walk/run.h"
+#include "walk/store.h"
 #include <string.h>
 
 /* Pass 1 of a wide filter: the replicates' pictures, and the adjoints of their pixels. */
@@ -64,6 +65,11 @@ static enum imp_status target_estimate(struct imp_problem *p,
     if (!want_gradient) j.tracer.active = NULL;
     j.plan = imp__replicates_of(p->scene, target, &own);
     st = imp__replicates_kept(&j.tracer, j.plan);
+    if (st == IMP_OK && j.tracer.kept && j.tracer.kept->stratified)
+        st =
+            imp__error(p->ctx, IMP_E_ARG,
+                       "these walks were kept for pictures, with stratified wavelengths; "
+                       "a loss needs independent ones: keep them with `losses`");
     if (st != IMP_OK) return st;
     if (imp__film_border(&j.tracer.sensor->film) > 0)
         st = splat_prepare(&j, &own, &splat);

@@ -5,6 +5,7 @@
  * made where the search has gone so far that less than a share of them count
  * (walk/store_weight.c). What is told of an answer (objective, intervals) is made of fresh
  * walks (fit.c): those of the search have been fitted, and their errors are too small. */
+#include "base/team.h"
 #include "fit.h"
 #include "keep.h"
 #include <stdio.h>
@@ -79,6 +80,17 @@ enum imp_status imp__fit_draw(const double *x, uint64_t seed, void *payload)
         }
     }
     imp__release(p->ctx, sensors);
+    /* Draws are each rank's own; what follows one may not differ between ranks. */
+    bool stopped, without;
+    const enum imp_status asked = imp__team_any(p->ctx, st == IMP_CANCELLED, &stopped);
+    if (asked != IMP_OK) return asked;
+    if (stopped) st = IMP_CANCELLED;
+    if (st == IMP_OK) st = imp__team_any(p->ctx, !f->walks, &without);
+    if (st == IMP_OK && without && f->walks) {
+        imp__error(p->ctx, IMP_E_NOMEM, "another rank keeps no walks");
+        give_up(f);
+    }
+    if (st == IMP_CANCELLED) f->stopped = true;
     if (st != IMP_OK || !f->walks) return st;
     f->walks_seed = seed;
     f->walks_bytes = 0;

@@ -292,6 +292,13 @@ static enum imp_status pass_run(imp_context *ctx, const struct imp__functional *
                      .border = f->W ? imp__film_border(f->film) : 0,
                      .spp = error_spp(f->spp)};
     const int width = f->film->crop_w, height = f->film->crop_h;
+    if (f->tracer.kept && (f->tracer.kept->set > 0 || f->tracer.kept->n < 2))
+        IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,
+                           f->tracer.kept->n < 2
+                               ? "one kept walk of a pixel tells no error: keep more"
+                               : "these walks were kept for losses, in sets of points; "
+                                 "numbers made of pictures need walks that are kept "
+                                 "without `losses`"));
     const double walks =
         (double)p.spp * (width + 2. * f->margin) * (height + 2. * f->margin);
     p.set = imp_max(imp__tracer_set(&f->tracer, p.spp), 1);

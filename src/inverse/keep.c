@@ -134,6 +134,7 @@ static enum imp_status sensor_keep(struct imp_walks *w, const struct imp_active 
                                                          : 0,
                               numbers.sample, numbers.n, budget, store));
     w->n_stores++;
+    store->stratified = f.tracer.wavelengths && f.tracer.set > 1;
     if (w->losses && f.tracer.points) {
         const struct imp__target l2 = {.desc = {.sensor = index}};
         run.walks = w;
@@ -187,6 +188,7 @@ enum imp_status imp__walks_begin(imp_scene *scene, const struct imp_run *run,
                           "sensor");
     w = imp__alloc(ctx, 1, sizeof *w);
     if (!w) return imp__error(ctx, IMP_E_NOMEM, "no memory for kept walks");
+    imp__context_hold(ctx);
     *w = (struct imp_walks){.ctx = ctx,
                             .scene = scene,
                             .run = *run,

@@ -42,6 +42,7 @@ struct shares {
     double *one, *set;         /* [n] of a walk, of the walks of a set */
     double *g, *gg, *gl;       /* [n] sums over sets */
     double l, ll, l_set, sets; /* of the radiance */
+    double lm, mm, m_set;      /* with the numbers of walks of the sets */
 };
 
 static void set_close(struct shares *s)
@@ -54,7 +55,9 @@ static void set_close(struct shares *s)
     }
     s->l += s->l_set;
     s->ll += s->l_set * s->l_set;
-    s->l_set = 0;
+    s->lm += s->l_set * s->m_set;
+    s->mm += s->m_set * s->m_set;
+    s->l_set = s->m_set = 0;
     s->sets += 1;
 }
 
@@ -69,10 +72,10 @@ static void shares_end(const struct shares *s, const imp_problem *p, double walk
         share[k] = active ? r : 0;
         share_se[k] = active ? sqrt(more * fmax(square, 0)) / fabs(l) : 0;
     }
-    const double mean = l / s->sets;
-    radiance->value = l / walks;
-    radiance->se =
-        sqrt(more * fmax(s->ll / s->sets - mean * mean, 0) / s->sets) * s->sets / walks;
+    const double mean = l / walks,
+                 square = s->ll - 2 * mean * s->lm + mean * mean * s->mm;
+    radiance->value = mean;
+    radiance->se = sqrt(more * fmax(square, 0)) / walks;
     radiance->bias_order = 0;
 }
 
@@ -91,6 +94,8 @@ static enum imp_status walks_take(const struct imp_tracer *tracer, struct shares
     for (int64_t i = 0; i < n && st == IMP_OK; i++) {
         const struct imp_arena_mark mark = imp__arena_mark(&arena);
         struct imp_walk walk;
+        int64_t first, count;
+        imp__set_at(set, n, i, &first, &count);
         imp__walk_trace(tracer, &arena, x, y, i, &walk);
         if (walk.dropped == IMP_DROP_MEMORY)
             st =
@@ -98,11 +103,12 @@ static enum imp_status walks_take(const struct imp_tracer *tracer, struct shares
         for (size_t k = 0; k < s->n; k++) s->one[k] = 0;
         if (!walk.dropped) imp__walk_sweep(tracer, &walk, bar, &sink.sink);
         for (int c = 0; c < scene->channels; c++) s->l_set += bar[c] * walk.L[c];
+        s->m_set += 1;
         for (size_t k = 0; k < s->n; k++) {
             s->set[k] += s->one[k];
             if (i < n_walks) walk_share[(size_t)i * s->n + k] = s->one[k];
         }
-        if ((i + 1) % set == 0 || i + 1 == n) set_close(s);
+        if (i + 1 == first + count) set_close(s);
         imp__arena_rewind(&arena, mark);
     }
     imp__arena_free(&arena);
@@ -129,6 +135,11 @@ enum imp_status imp_problem_shares(imp_problem *problem, const struct imp_run *r
     if (n_walks < 0 || (n_walks > 0 && !walk_share))
         return imp__error(problem->ctx, IMP_E_ARG, "shares of %lld walks: no room",
                           (long long)n_walks);
+    if (own.walks || own.time_limit_s > 0)
+        return imp__error(
+            problem->ctx, IMP_E_UNSUPPORTED,
+            "shares are those of a number of walks that are traced: no kept "
+            "walks, no time limit");
     IMP_TRY(imp__problem_tracer(problem, &own, NULL, &tracer));
     const int64_t n = imp__walks_of(&own, tracer.sensor);
     const struct imp_film_desc *film = &tracer.sensor->film;

@@ -64,7 +64,7 @@ static bool table_grow(struct imp_tally *t)
     imp__release(t->ctx, t->table);
     t->table = table;
     t->table_size = size;
-    t->shift = size > (size_t)1 << 31 ? 0 : 35 - __builtin_ctzll(size);
+    t->shift = imp_max(35 - __builtin_ctzll(size), 0);
     for (size_t k = 0; k < t->n_triples; k++) {
         const uint32_t key = t->triples[k].key;
         *slot_of(t, key, false) =

@@ -21,6 +21,7 @@
 
 #define CORRELATED 4.
 #define LIMIT      4.
+#define CERTAIN    1e-3 /* relative: half floats stay below */
 enum { SIDE_MAX = 32, BLOCK_MIN = 4, REGIONS = 5, CHANNELS = 4, SAMPLES_MIN = 8 };
 
 struct pair { /* colour channels of both: index, and of the error; -1: none */
@@ -55,7 +56,9 @@ static bool pair_make(struct pair *p, const imp_film *picture, const imp_film *t
         p->n++;
     }
     for (int side = 0; side < 2 && p->n; side++)
-        p->noise[side] = p->film[side]->se || p->error[side][0] >= 0;
+        for (int c = 0; c < p->n; c++)
+            p->noise[side] = p->film[side]->se ||
+                             (p->error[side][c] >= 0 && (c == 0 || p->noise[side]));
     return p->n > 0;
 }
 
@@ -78,12 +81,14 @@ struct block {
     double dd, ss;             /* of d^2 and of s^2 */
     double variance;           /* of the sum over pixels of the channels' mean */
     double pixels;
-    int state; /* -1, 1: beyond the limit on that side; 0 else */
+    double certain; /* numbers without noise that differ */
+    int state;      /* -1, 1: beyond the limit on that side; 0 else */
     bool seen;
 };
 
 struct sums {
     double n, left_out; /* numbers with a residual, and those without */
+    double certain;     /* of the blocks */
     int block, columns, rows;
     struct block *blocks;
 };
@@ -108,6 +113,7 @@ static void pixel_take(const struct pair *p, struct sums *s, size_t pixel,
             b->ss += size * size;
         } else {
             s->left_out += 1;
+            b->certain += fabs(v - t) > CERTAIN * fmax(fabs(v), fabs(t));
         }
     }
     b->variance += error * error;
@@ -228,6 +234,9 @@ static size_t find_regions(struct sums *s, int channels, struct region *regions,
     size_t found = 0;
     int worst = 0;
     for (int side = 4; side > 0 && s->n > 0; side /= 2) windows_mark(s, channels, side);
+    for (int k = 0; k < n && s->certain > 0; k++)
+        if (s->blocks[k].certain > 0)
+            s->blocks[k].state = s->blocks[k].difference > 0 ? 1 : -1;
     for (int k = 0; k < n; k++)
         if (fabs(s->blocks[k].difference) > fabs(s->blocks[worst].difference)) worst = k;
     for (int k = 0; k < n; k++) {
@@ -285,6 +294,9 @@ static void put_answer(struct imp_text *t, const struct pair *p, struct sums *s,
                        double *ratios, struct region *regions, int *stack)
 {
     static const char *const noise[2][2] = {{"none", "target"}, {"picture", "both"}};
+    const bool both = p->noise[0] && p->noise[1];
+    for (int k = 0; k < s->columns * s->rows && both; k++)
+        s->certain += s->blocks[k].certain;
     const size_t found = find_regions(s, p->n, regions, stack);
     const int64_t samples = least_samples(p);
     const bool known = s->n > 0 && (samples == 0 || samples >= SAMPLES_MIN);
@@ -298,7 +310,7 @@ static void put_answer(struct imp_text *t, const struct pair *p, struct sums *s,
     else imp__put(t, "null");
     /* Noise that is not known can only explain more. */
     const bool fits = known && chi2 <= 1 + 2 * error && found == 0;
-    const bool differs = known && !fits && p->noise[0] && p->noise[1];
+    const bool differs = both && ((known && !fits) || s->certain > 0);
     imp__put(t, ",\"explained\":%s", fits ? "true" : differs ? "false" : "null");
     imp__put(t, ",\"block\":%d", s->block);
     put_regions(t, p, s, regions, found);

@@ -85,7 +85,7 @@ function live_section(report, page) {
         enable();
     });
     let before = Promise.resolve(); /* what came first is shown first */
-    on("report", (part) => { before = before.then(() => unpack(part.items)).then(() => take(part)); });
+    on("report", (part) => { before = before.then(() => unpack(part.items)).then(() => take(part)).catch((error) => { said.textContent = String(error.message || error); }); });
     function take(part) {
         const kinds = [...new Set(part.items.map((i) => i.kind))], key = (i) => (i.kind === "walks" ? i.kind : [i.kind, i.name, i.role, i.view].join("\n"));
         for (const item of part.items) {

@@ -94,7 +94,7 @@ static bool inputs_reach(const struct imp_input_desc *desc,
                          const struct imp_input *const *input, int n, struct range seen,
                          bool *any)
 {
-    for (int j = 0; j < n; j++) {
+    for (int j = 0; desc && j < n; j++) { /* of its own: children are asked themselves */
         if (desc[j].role != IMP_EMISSION) continue;
         *any = true;
         if (input[j]->texture || !input[j]->spectrum) return true; /* not known */
@@ -111,10 +111,10 @@ static bool light_reaches(const struct imp_scene *scene, struct range seen)
                            scene->emitters[e]->n_in, seen, &any);
     for (int k = 0; k < scene->n_bsdfs && !met; k++)
         met = inputs_reach(scene->bsdfs[k]->ops->inputs, scene->bsdfs[k]->input,
-                           scene->bsdfs[k]->n_in, seen, &any);
+                           scene->bsdfs[k]->n_own, seen, &any);
     for (int m = 0; m < scene->n_media && !met; m++)
         met = inputs_reach(scene->media[m]->ops->inputs, scene->media[m]->input,
-                           scene->media[m]->n_in, seen, &any);
+                           scene->media[m]->n_own, seen, &any);
     return met || !any; /* a scene without light is dark, and no error */
 }
 

@@ -30,6 +30,7 @@ void imp__walks_destroy(struct imp_walks *w)
     imp__release(ctx, w->chosen);
     if (w->owns_scene) imp_scene_destroy(w->scene);
     imp__release(ctx, w);
+    imp__context_drop(ctx);
 }
 
 enum imp_status imp__walks_run(imp_context *ctx, const char *function,

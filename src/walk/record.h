@@ -130,7 +130,7 @@ static inline const struct imp_bsdf *imp__decided_bsdf(const struct imp_scene *s
  * swept like any other; it has no camera ray, normals and lengths. The derivative with
  * respect to extinctions is that of frozen collisions: the tracer's `collisions_stand` is
  * set. Where an extinction is now above the bound under which collisions were drawn, L may
- * * be negative; it is right in the mean. Running out of memory drops it. With a tracer that
+ * be negative; it is right in the mean. Running out of memory drops it. With a tracer that
  * wants no derivatives, it may have no vertices. */
 void imp__record_walk(const struct imp_record *record, size_t i,
                       const struct imp_tracer *tracer, struct imp_arena *arena,

@@ -24,6 +24,7 @@ struct imp_store {
     int across, down; /* tiles */
     size_t n;         /* walks of a pixel */
     int set;          /* of them that depend on each other; 0: as of a picture */
+    bool stratified;  /* wavelengths of a picture's walks depend on each other */
     int64_t *sample;  /* [n] their numbers, ascending */
     struct imp_record *records; /* [across down] */
     size_t budget;

@@ -53,7 +53,7 @@ static inline struct imp_vertex *vertex_add(struct imp_step *s, int n_in)
     d->connection = IMP_NOT_CONNECTED;
     d->glows = d->goes_on = d->stands = d->from_light = false;
     d->drawn = IMP_DENSITY_KERNEL;
-    d->pdf = 0;
+    d->pdf = d->kernel = 0;
     d->survive = d->passes = 1;
     d->met.weight = d->glow_weight = 1;
     return v;

@@ -461,6 +461,26 @@ static void refusals(void)
     imp_walks_destroy(walks);
     imp_scene_destroy(scene);
 
+    scene = test_scene(ctx, "cornell.xml", IMP_SPECTRAL, "res=8");
+    walks = keep(scene, 16, 3, IMP_POINTS_INDEPENDENT, false, 0);
+    p = problem_of(scene, "red.*");
+    run = (struct imp_run)IMP_RUN_INIT;
+    run.walks = walks;
+    run.points = IMP_POINTS_INDEPENDENT;
+    tap_ok(imp_problem_objective(p, NULL, &run, &f, NULL, NULL) == IMP_E_ARG &&
+               strstr(imp_last_error(ctx), "stratified wavelengths"),
+           "a loss of a picture's wavelengths # %s", imp_last_error(ctx));
+    imp_problem_destroy(p);
+    imp_walks_destroy(walks);
+    walks = keep(scene, 1, 3, IMP_POINTS_INDEPENDENT, true, 0);
+    p = problem_of(scene, "red.*");
+    run.walks = walks;
+    tap_ok(imp_problem_functional(p, NULL, &run, &f, NULL, NULL) == IMP_E_UNSUPPORTED,
+           "an error from one walk a pixel # %s", imp_last_error(ctx));
+    imp_problem_destroy(p);
+    imp_walks_destroy(walks);
+    imp_scene_destroy(scene);
+
     scene = test_scene(ctx, "fog.xml", IMP_RGB, "res=8");
     walks = keep(scene, 2, 3, IMP_POINTS_SCENE, true, 0);
     for (size_t k = 0; k < scene->n_params; k++)

@@ -103,12 +103,41 @@ static void errors(imp_context *ctx, enum imp_points points, const char *name)
     imp_scene_destroy(s);
 }
 
+/* Sets of unequal size: a pixel of one radiance has no error. And what is refused. */
+static void edges(imp_context *ctx)
+{
+    imp_scene *s = test_scene(ctx, "cornell.xml", IMP_RGB, "res=8");
+    const size_t n = imp_scene_n_params(s);
+    double *share = calloc(n, sizeof *share), *se = calloc(n, sizeof *se);
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_estimate r;
+    imp_problem *p;
+    double even;
+    test_must(ctx, imp_problem_create(s, &p));
+    test_must(ctx, imp_problem_activate(p, "*"));
+    run.points = IMP_POINTS_SOBOL;
+    run.spp = 96;
+    test_must(ctx, imp_problem_shares(p, &run, X, Y, share, se, &r, NULL, 0));
+    even = r.se / r.value;
+    run.spp = 100; /* six sets, four of which have one walk more */
+    test_must(ctx, imp_problem_shares(p, &run, X, Y, share, se, &r, NULL, 0));
+    tap_ok(r.se / r.value < 1.5 * even, "sets of 16 and 17 walks # %.3f beside %.3f",
+           r.se / r.value, even);
+    run.time_limit_s = 1;
+    tap_ok(imp_problem_shares(p, &run, X, Y, share, se, &r, NULL, 0) == IMP_E_UNSUPPORTED,
+           "a time limit # %s", imp_last_error(ctx));
+    free(share), free(se);
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+}
+
 int main(void)
 {
     imp_context *ctx = test_context(1);
     against_reverse(ctx);
     errors(ctx, IMP_POINTS_INDEPENDENT, "independent samples");
     errors(ctx, IMP_POINTS_SOBOL, "points in sets");
+    edges(ctx);
     imp_context_destroy(ctx);
     return tap_done();
 }

@@ -82,6 +82,32 @@ static void round_trip(imp_context *ctx)
     imp_film_destroy(back);
 }
 
+/* Names whose way into a file and back ends elsewhere, and errors of errors. */
+static void odd_names(imp_context *ctx)
+{
+    static const char *const lists[] = {"S0.550.0nm,R", "S0.25.7142857nm,S0.1e-07nm",
+                                        "R,se.R,se.se.R"};
+    int wrong = 0;
+    for (int k = 0; k < 3; k++) {
+        char path[] = "/tmp/importonXXXXXX.exr";
+        const int fd = mkstemps(path, 4);
+        imp_film *film = NULL, *back = NULL;
+        if (fd >= 0) close(fd);
+        wrong += imp__film_create(ctx, 3, 2, lists[k], false, &film) != IMP_OK;
+        for (size_t i = 0; film && i < imp__film_values(film); i++)
+            film->mean[i] = (float)i + .5f;
+        wrong += imp_film_write(film, path, NULL) != IMP_OK ||
+                 imp_film_read(ctx, path, &back) != IMP_OK ||
+                 back->channels != 2; /* of the third, se.R is the error of R */
+        for (int i = 0; k < 2 && back && i < 12; i++)
+            wrong += fmodf(back->mean[i], 1) != .5f;
+        unlink(path);
+        imp_film_destroy(film);
+        imp_film_destroy(back);
+    }
+    tap_ok(wrong == 0, "odd names of channels # %d wrong", wrong);
+}
+
 /* Flat spectra of 47 channels of 10 nm. */
 static void colours(imp_context *ctx)
 {
@@ -120,6 +146,7 @@ int main(void)
     imp_context *ctx = test_context(1);
     names();
     round_trip(ctx);
+    odd_names(ctx);
     colours(ctx);
     imp_context_destroy(ctx);
     return tap_done();

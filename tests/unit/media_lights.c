@@ -34,7 +34,7 @@ static void compare(const char *text, double (*truth)(const double fog[NUMBERS])
                     const char *numbers, const char *what)
 {
     imp_scene *s = test_scene_text(ctx, text, IMP_MONO);
-    double mean[3], se[3], g[NUMBERS], g_se[NUMBERS];
+    double mean[3], se[3], g[16], g_se[16];
     struct imp_estimate v;
     struct imp_run run = IMP_RUN_INIT;
     const double exact = truth(fog);
