@@ -61,9 +61,12 @@ static char *control_path(const char *name)
 }
 
 /* May everything be written? */
+enum { LAYERS_MAX = 254, LAYER_NAME = 148 }; /* of four channels, 1024 in all */
+
 static int writable(const struct block *blocks, size_t n_blocks)
 {
     char name[512];
+    size_t layers = 0;
     int rc = overwrite_check_in(cli.out, "controls.csv", OUTPUT_TABLE);
     char *picture = join_path(cli.out, "picture.exr");
     if (!rc) rc = picture_writable(picture, 1);
@@ -73,7 +76,14 @@ static int writable(const struct block *blocks, size_t n_blocks)
             char *path = control_path(control_name(&blocks[k], i, name, sizeof name));
             rc = picture_writable(path, 1);
             free(path);
+            if (!rc && layers_path && (strpbrk(name, " ,") || strlen(name) > LAYER_NAME))
+                rc = cli_error(EXIT_USAGE, "--layers: '%.60s' is no name of a layer",
+                               name);
+            layers++;
         }
+    if (!rc && layers_path && layers > LAYERS_MAX)
+        rc = cli_error(EXIT_USAGE, "--layers: %zu derivatives; a file has room for %d",
+                       layers, LAYERS_MAX);
     if (!rc && sheet_path) rc = picture_writable(sheet_path, 0);
     if (!rc && layers_path) rc = picture_writable(layers_path, 0);
     return rc;

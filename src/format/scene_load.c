@@ -3,6 +3,7 @@
  * imp_scene_load and imp_scene_load_string: options, the scene file, its tree, and the
  * scene that is built from the tree. */
 #include "base/arguments.h"
+#include "color/convert.h"
 #include "film/film_integrator.h"
 #include "load.h"
 #include "search.h"
@@ -86,7 +87,23 @@ static enum imp_status weights_set(struct imp_scene *scene, const char *text)
     return IMP_OK;
 }
 
-/* The property `bins` of all films, whatever the file says of their channels. */
+/* Leave out the response curves of a film. */
+static void curves_drop(struct imp_node *film)
+{
+    size_t n = 0;
+    for (size_t k = 0; k < film->n_props; k++)
+        if (film->props[k].type != IMP_PROP_SPECTRUM &&
+            film->props[k].type != IMP_PROP_UNIFORM)
+            film->props[n++] = film->props[k];
+    film->n_props = n;
+    n = 0;
+    for (size_t k = 0; k < film->n_children; k++)
+        if (!film->children[k].node || !imp__color_is_object(film->children[k].node))
+            film->children[n++] = film->children[k];
+    film->n_children = n;
+}
+
+/* The property `bins` of the films of sensors beside shapes, whatever the file says of their channels. */
 static enum imp_status bins_set(struct imp_scene *scene, const char *text)
 {
     static const struct imp_loc nowhere = {NULL, 0, 0};
@@ -101,6 +118,7 @@ static enum imp_status bins_set(struct imp_scene *scene, const char *text)
         if (!film)
             return imp__node_error(scene->ctx, sensor, IMP_E_SCENE,
                                    "bins: this sensor has no film");
+        curves_drop(film);
         struct imp_prop *p = imp__node_prop(film, "bins");
         if (!p) p = imp__node_add(arena, film, "bins", IMP_PROP_STRING, nowhere);
         char *copy = imp__arena_strdup(arena, text);

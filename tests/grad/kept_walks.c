@@ -472,7 +472,7 @@ static void refusals(void)
            "a loss of a picture's wavelengths # %s", imp_last_error(ctx));
     imp_problem_destroy(p);
     imp_walks_destroy(walks);
-    walks = keep(scene, 1, 3, IMP_POINTS_INDEPENDENT, true, 0);
+    walks = keep(scene, 1, 3, IMP_POINTS_INDEPENDENT, false, 0);
     p = problem_of(scene, "red.*");
     run.walks = walks;
     tap_ok(imp_problem_functional(p, NULL, &run, &f, NULL, NULL) == IMP_E_UNSUPPORTED,

@@ -198,11 +198,6 @@ int main(void)
                                    "name='to_world'><translate z='0.5'/></transform>"
                                    "<ref id='a'/></sensor>"),
             "whose priority says");
-    /* Straight segments of ptracer know nothing of them, from either end. */
-    refused(
-        "<scene version='3.0.0'><integrator type='ptracer'/><shape type='sphere'>" RANK(
-            1) "<bsdf type='dielectric'/></shape></scene>",
-        "priority");
     imp_context_destroy(ctx);
     return tap_done();
 }
