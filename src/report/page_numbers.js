@@ -153,8 +153,10 @@ function loss_section(fit) {
     const y_at = (y) => ht - bottom - (ht - bottom - top) * (bend(Math.min(Math.max(y, lo), hi)) - bend(lo)) / (bend(hi) - bend(lo));
     const x_at = (i) => left + (w - left - right) * (stops > 0 ? i / stops : 0.5);
     const svg = make_svg("svg", {width: w, height: ht, viewBox: `0 0 ${w} ${ht}`, role: "img", "aria-label": "loss by iteration"});
-    const level = (v) => {
-        if (v < lo || v > hi) return;
+    const levels = [];
+    const level = (v) => { /* where its number has room */
+        if (v < lo || v > hi || levels.some((y) => Math.abs(y - y_at(v)) < 14)) return;
+        levels.push(y_at(v));
         svg.append(make_svg("line", {x1: left, x2: w - right, y1: y_at(v), y2: y_at(v), class: "axis"}),
             make_svg("text", {x: left - 8, y: y_at(v) + 4, "text-anchor": "end"}, show(v, 2)));
     };
