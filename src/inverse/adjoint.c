@@ -5,8 +5,8 @@
  *     P_i = (1/n) l'( (S - L_i)/(n - 1) ),   S = sum L                (leave-one-out)
  *
  * which is independent of L_i and of its derivative: the gradient of a quadratic loss is
- * unbiased at any n >= 2 (docs/estimators.md 5.2). A smooth loss that is not
- * quadratic has what its curvature does to that mean taken off by the jackknife (5.4). */
+ * unbiased at any n >= 2 (docs/estimators.md 5.2). For a smooth loss that is not
+ * quadratic, the jackknife removes the bias of order 1/n (5.4). */
 #include "adjoint.h"
 #include "loss.h"
 #include "seen.h"

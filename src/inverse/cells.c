@@ -33,7 +33,8 @@ size_t imp__cells_count(const struct imp__cells *c)
     return c->n[0] * c->n[1] * c->n[2] * c->channels;
 }
 
-/* The two coarse cells between whose middles fine cell i lies, along an axis of n. */
+/* The two coarse cells between whose centres that of fine cell i lies, with the weights
+ * of linear interpolation; n coarse cells along the axis. */
 struct between {
     size_t at[2];
     double weight[2];
@@ -47,7 +48,8 @@ static struct between between(size_t i, size_t n, int level)
         {1 - (u - below), u - below}};
 }
 
-/* For each fine value, the up to eight coarse ones that it is made of. */
+/* Trilinear interpolation P from the coarse grid to the fine one. up: to += P from, else
+ * the transpose, to += P^T from. */
 static void visit(const struct imp__cells *fine, int level, const double *from,
                   double *to, bool up)
 {

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Rows `aim`: does anything lie in the directions of a light or a proxy? A proxy that no
- * ray meets from where walks scatter draws directions in vain. */
+ * Rows `aim`: of rays from scattering vertices towards a light or a proxy, the fraction
+ * that hits anything, surface or environment. A proxy that no ray hits draws directions
+ * in vain. */
 #include "check.h"
 #include "scene/aims.h"
 
 #define VERTICES 2000 /* from which rays are sent towards lights and proxies */
 
-/* Rays from where walks of the picture scatter. */
+/* Rays sent from scattering vertices, and how many of them hit something. */
 struct ray_count {
     double sent, met;
 };

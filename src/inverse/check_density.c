@@ -6,19 +6,19 @@
  *
  *     E_p[ q/(q + p') ] = int p q/(q + p')   and   E_q[ p'/(q + p') ] = int q p'/(q + p')
  *
- * are equal if p' = p; if p' = a p their ratio is a. Both averages are over numbers
- * between 0 and 1. q is a mixture of a uniform density and lobes about the mirror
- * direction, so that it is not small where p is large. Looked at where the kept walks
- * scatter. */
+ * are equal if p' = p; if p' = a p their ratio is a. The averaged fractions are between 0
+ * and 1, so their variances are bounded. q is a mixture of a uniform density and lobes
+ * about the mirror direction, so that it is not small where p is large. The test is made
+ * at vertices of the kept walks. */
 #include "check_walks.h"
 #include "math/rng.h"
 #include "math/warp.h"
 #include <math.h>
 #include <string.h>
 
-#define DRAWS   16 /* pairs of directions at a vertex; where the result is noisy, */
-#define MORE    4  /* four times as many, and */
-#define ROUNDS  3  /* once more */
+#define DRAWS   16 /* pairs of directions at a vertex, in the first round */
+#define MORE    4  /* factor from round to round, while the result is noisy */
+#define ROUNDS  3  /* at most */
 #define DEPTH   4  /* vertices of a walk looked at */
 #define Z_LIMIT 5  /* 6e-7 by chance */
 /* An SE above this part of the averages decides nothing: 5 SE are then 10 %. */
@@ -54,10 +54,10 @@ static imp_v3 q_sample(imp_v3 axis, const double u[3])
     return imp__to_world(&f, (imp_v3){s * cos(phi), s * sin(phi), c});
 }
 
-/* Sums over the vertices of one material, of means over their pairs. */
+/* Sums over the vertices of one material; each vertex adds its two averages. */
 struct density {
     double n, drawn, given; /* vertices, averages over p and over q */
-    double square;          /* of given - drawn */
+    double square;          /* (given - drawn)^2 */
 };
 
 static void vertex_add(const struct imp_vertex *v, struct imp_key key, int draws,

@@ -11,9 +11,10 @@
 #include "film/film_picture.h"
 #include <math.h>
 
-/* Steps as parts of the room that a number has: large, for noise falls with 1/step. F is
- * exactly linear in emission. Elsewhere the error of Richardson's combination is 0.3^4 =
- * 0.8 % of the term of fifth order. */
+/* Steps as fractions of the distance to the bounds, or of the number's scale where that
+ * is smaller. They are large because noise falls with 1/step. F is exactly linear in
+ * emission. Elsewhere the error of Richardson's combination is 0.3^4 = 0.8 % of the term
+ * of fifth order. */
 #define STEP           0.3
 #define STEP_LINEAR    0.8
 #define FLOAT_ROUNDING 1e-7 /* of a picture's mean: 2^-24, and some for its sums */
@@ -101,8 +102,8 @@ out:
 
 /* ---- Differences --------------------------------------------------------------- */
 
-/* F where the parameter has moved by `step`, for each seed. It is set once for all: what
- * follows from a number may take longer than a picture (the table of a rough coat). */
+/* F where the parameter has moved by `step`, for each seed. It is set once for all seeds:
+ * a table that depends on it (a rough coat's) may take longer than a picture. */
 static enum imp_status at(struct imp__fresh *f, const struct imp__motion *m, double step,
                           const uint64_t seed[IMP_CHECK_BATCHES],
                           double value[IMP_CHECK_BATCHES])
@@ -187,8 +188,8 @@ enum imp_status imp__fresh_difference(struct imp__fresh *f, const struct imp__mo
         return combine(f, m, linear ? 2 : 4, place, linear ? one : two,
                        linear ? NULL : half, out);
     }
-    /* At a bound, to the side where there is room: D(h) = (-11 F(0) + 18 F(h) - 9 F(2h) +
-     * 2 F(3h)) / 6h, and h/2. */
+    /* At a bound, D(h) = (-11 F(0) + 18 F(h) - 9 F(2h) + 2 F(3h)) / 6h towards the
+     * farther bound, and the same with h/2. */
     const double side = above >= below ? 1 : -1;
     const double h = *step =
         side * 0.15 * part * fmin(fmax(below, above), fmax(scale, 1e-3));

@@ -20,9 +20,9 @@
  * a gradient with a term missing, so it decides nothing. */
 #define RESOLVED 0.2
 /* A row that fails by its z is undecided if D(h) and D(h/2) differ by more than RESOLVED
- * of the value: at a kink no order of the formula holds. Of that difference the
- * combination (4 D(h/2) - D(h))/3 moves D(h/2) by 1/3, and (8 D(h/2) - D(h))/7 by 1/7:
- * KINK times what it moves is at least the difference. */
+ * of the value: at a kink no order of the formula holds. (4 D(h/2) - D(h))/3 differs from
+ * D(h/2) by 1/3 of that difference, and (8 D(h/2) - D(h))/7 by 1/7, so KINK times the
+ * correction is at least the difference. */
 #define KINK 7
 /* Samples of the three rounds: 1, 4 and 16 times what was asked for, in all. */
 #define ROUNDS 3
@@ -129,7 +129,7 @@ static bool is_emission(const struct imp_scene *s, size_t param)
     return emission && !other;
 }
 
-/* `before`: how many times the samples asked for the row has had. */
+/* `before`: samples that the row has had, in multiples of those asked for. */
 static enum imp_status comparison_round(struct rows *r, struct comparison *c, int before)
 {
     enum imp_status st = IMP_OK;
@@ -211,7 +211,7 @@ out:
     return st;
 }
 
-/* Pieces of work that a round is: differences take 2 to 6 pictures. */
+/* Work of a round in pictures: a difference takes 2 to 6, counted as 4. */
 static double round_work(const struct rows *r)
 {
     double work = 1;

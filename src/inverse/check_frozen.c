@@ -6,8 +6,8 @@
 #include <math.h>
 #include <string.h>
 
-#define SINGLE_MAX 12 /* numbers of a parameter that are each a direction; of more: */
-#define DIRECTIONS 6  /* random ones */
+#define SINGLE_MAX 12 /* parameters of up to so many numbers: each is a direction; */
+#define DIRECTIONS 6  /* larger ones: random directions */
 #define N_STEPS    4
 /* Central differences leave an error of step^2 times the third derivative, and rounding
  * of 1e-16/step: 1e-8 to 1e-10 at the better steps. A wrong term is far above. */
@@ -15,9 +15,9 @@
 /* Of the larger of two values of a walk: products of up to some hundred factors, each
  * with a rounding of 1e-16. */
 #define WALK_ROUNDING 5e-14
-/* Derivatives are compared with themselves, or with this part of the walk's L per
- * relative change of the parameter where they are smaller: they are then differences of
- * larger terms, whose rounding they keep. */
+/* Errors are relative to the derivative, or to this part of the walk's L per relative
+ * change of the parameter where the derivative is smaller: it is then a difference of
+ * larger terms, and has their rounding. */
 #define TINY 1e-3
 
 static const double steps[N_STEPS] = {1e-3, 1e-4, 1e-5, 1e-6};
@@ -68,8 +68,8 @@ static double component(const struct direction *d, size_t e)
     return 2 * imp__u01(imp__key(d->seed, 1, 2), (uint32_t)e) - 1;
 }
 
-/* A float stands at both ends of a difference exactly as far from where it was: the
- * motion is rounded to what the larger end can hold. */
+/* For floats, rounds the step so that both ends of a difference are representable at the
+ * same distance from the start. The end of larger magnitude has the coarser spacing. */
 static double representable(const struct imp_param *p, double old, double move)
 {
     if (p->store != IMP_STORE_BULK) return move;
@@ -108,8 +108,8 @@ static bool two_sided(const struct direction *d, double step)
 }
 
 /* Differences of all walks along d: value[0] becomes the difference, value[1] the largest
- * number it is a difference of, d->moved the motion; bend[]: how much the slope above the
- * start is larger than that below, by the step (0 where there is one side only). */
+ * of the values that are subtracted, d->moved the motion; bend[]: the slope above the
+ * start less that below, with this step (0 where there is one side only). */
 static enum imp_status difference(struct imp__kept *k, struct direction *d, double step,
                                   const double *start, double *bend)
 {
@@ -177,10 +177,11 @@ static double beyond(double off, double rounding, double worth)
     return off <= rounding ? 0 : isfinite(off) ? (off - rounding) / worth : INFINITY;
 }
 
-/* Relative error of a walk, the smaller of two. One: at the step where the quotient
- * changed least from the step before, what is beyond that change and the rounding; near a
- * kink no quotient settles. Two: at the step that agrees best, what is beyond the
- * rounding; a kink a little way off lies within the larger steps only. */
+/* Relative error of a walk: the smaller of two estimates. The first takes the step whose
+ * quotient changed least from the previous step, and subtracts that change and the
+ * rounding; near a kink no quotient converges. The second takes the step that agrees
+ * best, and subtracts the rounding only: a kink at some distance is crossed by the larger
+ * steps alone. */
 static double judge_walk(const struct imp__kept *k, const struct quotients *q, size_t i,
                          int *step)
 {
@@ -349,7 +350,7 @@ enum imp_status imp__check_frozen(struct imp__check *c)
     struct imp__kept k = {.check = c};
 
     imp__arena_init(&k.arena, c->ctx);
-    c->tracer.collisions_stand = true; /* extinctions too, by what stands still */
+    c->tracer.collisions_stand = true; /* extinctions: with frozen collisions too */
     IMP_TRY(imp__kept_create(&k));
     if (k.n == 0)
         IMP_TRY(imp__error(c->ctx, IMP_E_NUMERIC,

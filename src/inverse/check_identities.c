@@ -115,7 +115,8 @@ static enum imp_status euler(struct imp__kept *k, const uint8_t *chosen,
         if (counted) {
             n = 0;
             for (const struct imp_vertex *v = w->walk.first; v && v->next; v = v->next)
-                /* Light collected on the way, where nothing absorbs: L is no product. */
+                /* Emission before the last vertex: L is a sum of products, not one
+                 * product. */
                 n = imp__is_zero(v->e) ? n + (v->bsdf == counted) : -INFINITY;
         }
         if (fabs(w->L) <= IMP_KEPT_NOTHING || n <= 0) continue;
@@ -139,7 +140,7 @@ out:
     return st;
 }
 
-/* Do values grow as the chosen numbers do? */
+/* Are the values of first degree in all chosen numbers? */
 static bool first_degree(const struct imp_scene *s, const uint8_t *chosen)
 {
     for (size_t p = 0; p < s->n_params; p++)

@@ -8,8 +8,7 @@
  *     l2, relative   value  w/2 (A - T)(B - T)        gradient  (l'(A) x_B + l'(B) x_A)/2
  *     l1             value  l(M)                      gradient  (l'(A) x_B + l'(B) x_A)/2
  *     log            value  2 l(M) - (l(A) + l(B))/2
- *                                  gradient  l'(M) (x_A + x_B) - (l'(A) x_A + l'(B)
- * x_B)/2
+ *                    gradient  l'(M) (x_A + x_B) - (l'(A) x_A + l'(B) x_B)/2
  *
  * Products of different samples only, so the first two lines need no argument to be
  * unbiased (of l1: the gradient of one sample's loss); the third is the jackknife. The
@@ -149,7 +148,7 @@ static void target_make(struct losses *l)
     }
 }
 
-/* ---- What they give ------------------------------------------------------------ */
+/* ---- Expected from the samples ------------------------------------------------- */
 
 static double loss(enum imp_loss kind, double I, double T)
 {
@@ -193,7 +192,7 @@ static void pair_add(enum imp_loss kind, double T, double A, double B, double x_
         term(-(of_A * x_A + of_B * x_B) / 2, g, g_size);
         return;
     }
-    if (imp__loss_quadratic(kind)) { /* M^2 - (A - B)^2/4 = A B, all about T */
+    if (imp__loss_quadratic(kind)) { /* A B = M^2 - (A - B)^2/4, relative to T */
         term(loss(kind, M, T), v, v_size);
         term(-loss(kind, T + (A - B) / 2, T), v, v_size);
     } else {

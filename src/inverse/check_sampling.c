@@ -1,11 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Test of densities against an oracle: the picture again with directions drawn uniformly
- * by every material, and with lights met, not sampled (those that no ray can meet
- * apart), so that the only densities are 1/2pi and 1/4pi. Both pictures are compared
- * block by block, and their z together by chi-square. Rows `energy` give, for each
- * density of the mixture, its part of the directions of first choices and of the energy
- * that arrives through them; where there are several lights or proxies, also for each. */
+ * by every material, and with lights hit by rays instead of sampled (except those that no
+ * ray can hit), so that the only densities are 1/2pi and 1/4pi. Both pictures are
+ * compared block by block, and their z together by chi-square. Rows `energy` give, for
+ * each density of the mixture, its share of the first directions that walks draw from a
+ * mixture, and of the energy that arrives through them; where there are several lights or
+ * proxies, also for each. */
 #include "check.h"
 #include "film/film_picture.h"
 #include "math/stat.h"
@@ -26,10 +27,11 @@ struct looked {
     struct imp_tracer tracer;
     int channels;
     bool parts;
-    int aims; /* of them energy and draws follow, LOOKED + 2 k */
+    int aims; /* with rows of their own; energy and draws of k: LOOKED + 2 k */
 };
 
-/* Lights and proxies that get rows of their own: none where one is all of its density. */
+/* Number of lights and proxies with rows of their own; 0 if there is at most one light
+ * and one proxy, whose rows would repeat those of the density. */
 static int aims_told(const struct imp_scene *scene)
 {
     const struct imp_aims *t = &scene->aims;
@@ -37,8 +39,9 @@ static int aims_told(const struct imp_scene *scene)
     return t->aimed && several && t->n <= AIMS ? t->n : 0;
 }
 
-/* A direction that was drawn towards lights or proxies, shared out among them by how
- * probable it is that it was each: S_t p_t(w)/sum, and S_t/sum before w is known. */
+/* Distributes a direction that was drawn towards lights or proxies over them: its energy
+ * by the posterior probability S_t p_t(w)/sum of each, its count by S_t/sum, which also
+ * stands in where w is unknown. */
 static void aims_add(const struct looked *j, const struct imp_vertex *v, double energy,
                      double *part)
 {
@@ -68,9 +71,9 @@ static double sum_used(const struct looked *j, imp_spec L)
     return j->channels == 1 ? L[0] : imp__sum3(L);
 }
 
-/* Light that arrives by the first direction that was drawn from a mixture, by the density
- * that drew it, and what was found before it: emission that is met, light samples. Counts
- * the draws behind. */
+/* Splits the light of a walk: emission that is hit and light samples before the first
+ * direction drawn from a mixture, and what arrives through that direction, by the density
+ * that drew it. Counts these draws from PARTS on. */
 static void parts_add(const struct looked *j, const struct imp_walk *walk, imp_spec P,
                       double *part)
 {
@@ -91,10 +94,11 @@ static void parts_add(const struct looked *j, const struct imp_walk *walk, imp_s
     }
 }
 
-/* Second moment that the oracle's walks have, by those of the picture: a term c of a walk
+/* Second moment of the oracle's walks, estimated by the picture's: a term c of a walk
  * that drew its directions with densities p has E_u[c_u^2] = E_p[c_p^2 prod p/u], with u
- * the uniform density. Terms are taken one by one, and a light sample as if its weight
- * were 1/p. It finds what the oracle itself meets too rarely to know of. */
+ * the uniform density. Products of two terms are left out, and a light sample counts as
+ * if its weight were 1/p. The estimate includes light that the oracle itself hits too
+ * rarely. */
 static double square_of(const struct looked *j, const struct imp_walk *walk)
 {
     imp_spec P = imp__spec(1);
@@ -180,8 +184,8 @@ static struct imp_estimate block_at(const imp_film *f, int channel, int k, int f
     return block_mean(f, channel, from, to);
 }
 
-/* Variance of a block of the oracle, at least: what the other picture's walks say of its
- * second moment, the square of the block's mean taken off. */
+/* Least variance of a block of the oracle: the second moment that the other picture's
+ * walks predict, less the square of the block's mean. */
 static double predicted(const imp_film *own, int channels, int k, double mean)
 {
     int from[2], to[2];

@@ -15,7 +15,7 @@
 #define LEVEL           0.01   /* of the whole picture */
 #define PIXELS_MAX_FAIL 0.0025 /* pixels beyond the level: fireflies are not normal */
 #define MEAN_Z_MAX      4
-#define OVER2_MAX       0.1 /* 0.0455 by chance; only where the variance is a reference's */
+#define OVER2_MAX       0.1 /* 0.0455 by chance; used if the variance is a reference's */
 /* One sigma of the relative systematic difference between pictures of equal scenes:
  * Mitsuba's white has moved by 3e-4 between versions with its colour tables. */
 #define MEAN_SYSTEMATIC 1e-4
@@ -57,8 +57,8 @@ static enum imp_status match(imp_context *ctx, const imp_film *film,
     return IMP_OK;
 }
 
-/* Variance of test - reference in value i of channel c, from whatever is known; < 0:
- * nothing. `floor` is of the variance of one sample. */
+/* Variance of test - reference in value i of channel c, from the variances that are
+ * known; < 0: none is. `floor`: the least variance of one sample. */
 static double variance_at(const struct pair *p, size_t pixel, int c, double floor)
 {
     const struct imp_compare_options *o = p->options;

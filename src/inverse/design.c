@@ -88,9 +88,9 @@ static enum imp_status bounds_take(struct imp__design *d)
     return IMP_OK;
 }
 
-/* Weights by which links are refined first: lights that are off count as if they shone
- * like the others, or by 1. Otherwise their links would be too coarse to show what they
- * do. */
+/* Emission that weighs links in the first refinement: a light that is off counts as if it
+ * shone like the brightest, or by 1 if all are off. Otherwise its links would be too
+ * coarse to show its effect. */
 static void lit(const struct imp__design *d, const double *x, double *out)
 {
     double most = 0;
@@ -340,8 +340,8 @@ enum imp_status imp_elements_fit(imp_elements *e, imp_problem *p,
         IMP_TRY(ended);
     }
     if (ended == IMP_CANCELLED) reason = e->reason;
-    /* After a request to stop the solution is still completed: this part ends by
-     * itself. */
+    /* After a request to stop, the solution at the answer is still completed, without a
+     * further callback. */
     e->opt.progress = NULL;
     e->stop = false;
     e->deadline_s = 0;

@@ -205,8 +205,8 @@ enum imp_status imp_problem_reverse(imp_problem *p, const float *seed_image,
     IMP_TRY(imp__replicates_kept(&j.tracer, j.plan));
     if (imp__film_border(&j.tracer.sensor->film) > 0)
         IMP_TRY(splat_prepare(&j, &own, &splat));
-    /* The adjoint does not depend on the walks: those of a replicate may depend on each
-     * other, and replicates give the errors. */
+    /* With a fixed adjoint the walks of a replicate may depend on each other: standard
+     * errors come from the spread between replicates. */
     if (!j.tracer.points) {
         if (own.wavelengths != IMP_WAVELENGTHS_INDEPENDENT) j.tracer.set = j.plan.n;
         j.tracer.period = j.plan.n;

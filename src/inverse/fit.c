@@ -11,8 +11,8 @@
 #define EFFORT_SHARE 4 /* they take at least 1/4 of the samples that the search took */
 #define FINAL_SEED   0x40000001
 
-/* A loss that is not differentiable twice anywhere it matters: the expansion behind
- * Gauss-Newton and its covariances does not exist. */
+/* A loss that is not twice differentiable at its minimum has no second-order expansion,
+ * on which Gauss-Newton and its covariances rely. */
 static bool has_kink(const struct imp_problem *p)
 {
     bool kink = false;
@@ -46,8 +46,8 @@ static int replicate_spp(const struct imp__fit *f, const struct imp__search *s, 
     return wanted > spp ? (int)fmin(wanted, 1 << 24) : f->outer.spp;
 }
 
-/* Walks of the replicates over walks behind the answer. Weights that grow with the number
- * of the iterate make n iterates worth 3/4 n. */
+/* Walks of the replicates over walks behind the answer. An average of n iterates with
+ * weights 1, 2, ..., n has the variance of 3/4 n equally weighted ones. */
 static double replicate_share(const struct imp__fit *f, const struct imp__search *s,
                               int spp)
 {

@@ -2,8 +2,9 @@
  *
  * How far the bias of few samples moves an answer. Losses that are not quadratic, and
  * pixels that are ratios of sums (wide filters), leave a bias b(N) that falls at least
- * like 1/N. At the answer x of N samples the gradient by 4 N samples is g, and x - G g,
- * G the inverse of H, is where these would end: 3/4 of the bias away, or more. */
+ * like 1/N. At the answer x of N samples let g be the gradient by 4 N samples and G the
+ * inverse of H: the Newton point x - G g is the answer of 4 N samples, and G g at least
+ * 3/4 of the bias of x. */
 #include "film/film_picture.h"
 #include "fit.h"
 #include "loss.h"

@@ -57,7 +57,7 @@ static int inner_progress(const struct imp_progress *p, void *payload)
     return f->stopped;
 }
 
-/* Of many variables the answer so far takes memory to be made, and none is shown. */
+/* With many variables the answer so far would need extra memory: none is shown. */
 static void show_step(struct imp__fit *f, const struct imp__search *s)
 {
     const struct imp_fit_step step = {.size = sizeof step,
@@ -132,7 +132,8 @@ static enum imp_status normal(const double *x, uint64_t seed, struct imp__normal
     out->chi2 = gn.chi2;
     out->n_residuals = gn.n_residuals;
     out->noise_known = true;
-    /* Residuals at a minimum are smaller than the noise: M - n of M are free. */
+    /* A fit of n variables reduces the squared residuals of M pixels by (M - n)/M on
+     * average; undone where they stand in for the noise. */
     const double freedom = gn.n_residuals - (double)n;
     const double widen = fit->noise_known || freedom < 1 ? 1 : gn.n_residuals / freedom;
     for (size_t i = 0; i < n * n; i++) out->H_meas[i] *= widen;
@@ -208,7 +209,7 @@ static bool is_bounded(const struct imp__block *b)
 {
     return !b->log && isfinite(b->lo) && isfinite(b->hi) && b->hi - b->lo < DBL_MAX;
 }
-/* A logarithm's is a factor of e. */
+/* The large change of a logarithm is 1, a factor of e. */
 static double typical_of(const struct imp__block *b, double square)
 {
     return square > 0 && !b->log ? sqrt(square / (double)b->count) : 1;

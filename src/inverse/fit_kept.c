@@ -2,16 +2,17 @@
  *
  * Methods with common random numbers (L-BFGS, MMA, SLSQP) evaluate one draw of walks many
  * times: the walks are kept, and evaluated at other numbers without a ray. A new draw is
- * made where the search has gone so far that less than a share of them count
- * (walk/store_weight.c). What is told of an answer (objective, intervals) is made of fresh
- * walks (fit.c): those of the search have been fitted, and their errors are too small. */
+ * made when the effective sample size of n walks falls below REDRAW_ESS n
+ * (walk/store_weight.c). The objective and the intervals of an answer come from fresh
+ * walks (fit.c): the search has fitted the noise of its own walks, whose errors would be
+ * too small. */
 #include "base/team.h"
 #include "fit.h"
 #include "keep.h"
 #include <stdio.h>
 
-#define REDRAW_ESS 0.8 /* a new draw is worth its price */
-#define TRACED_ESS 0.5 /* too few count: a point that far is traced */
+#define REDRAW_ESS 0.8 /* below: a new draw */
+#define TRACED_ESS 0.5 /* below: the evaluation traces its own walks */
 #define SURVIVAL   0.8
 #define MEMORY     0x1p30
 
@@ -21,7 +22,7 @@ bool imp__fit_keeps(const struct imp__fit *f)
     return (o == IMP_LBFGS || o == IMP_MMA || o == IMP_SLSQP) && f->options.memory >= 0;
 }
 
-/* The reason why these walks cannot be kept, or that they cannot be evaluated. */
+/* No walks are kept from here on; the last error is the reason that is reported. */
 static void give_up(struct imp__fit *f)
 {
     imp__walks_destroy(f->walks);
@@ -30,7 +31,7 @@ static void give_up(struct imp__fit *f)
         imp__arena_strdup(&f->problem->fit_arena, imp_last_error(f->problem->ctx));
 }
 
-/* Is everything that is active among what may change? */
+/* May all active parameters change while walks are kept? */
 static bool all_chosen(const struct imp_problem *p, const imp_walks *w)
 {
     for (size_t k = 0; k < p->scene->n_params; k++)
@@ -53,7 +54,7 @@ enum imp_status imp__fit_draw(const double *x, uint64_t seed, void *payload)
         .memory = f->options.memory > 0 ? f->options.memory : MEMORY,
         .losses = 1,
         .survival = SURVIVAL,
-        .ess = -1}; /* looked at below */
+        .ess = -1}; /* imp__fit_take_walks checks it */
     imp__walks_destroy(f->walks);
     f->walks = NULL;
     f->stale = false;
@@ -80,7 +81,7 @@ enum imp_status imp__fit_draw(const double *x, uint64_t seed, void *payload)
         }
     }
     imp__release(p->ctx, sensors);
-    /* Draws are each rank's own; what follows one may not differ between ranks. */
+    /* A draw may fail on one rank alone, but all ranks must go on alike. */
     bool stopped, without;
     const enum imp_status asked = imp__team_any(p->ctx, st == IMP_CANCELLED, &stopped);
     if (asked != IMP_OK) return asked;

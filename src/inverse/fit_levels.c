@@ -2,8 +2,8 @@
  *
  * A fit from coarse to fine: the first searches have one variable for each 2^level cells
  * of a grid along an axis (cells.h), so that few numbers settle what is large before many
- * settle what is small. With x = P c the gradient with respect to c is P^T g, unbiased as g
- * is. Parameters without cells are fitted as they are on every level. */
+ * settle what is small. With x = P c the gradient with respect to c is P^T g, unbiased as
+ * g is. Parameters without cells are fitted as they are on every level. */
 #include "cells.h"
 #include "estimate.h"
 #include "fit.h"
@@ -155,7 +155,7 @@ enum imp_status imp__fit_levels(struct imp__fit *fit,
     if (!l.x || !l.g || !l.spans || !x)
         IMP_TRY(imp__error(p->ctx, IMP_E_NOMEM, "no memory for %zu variables", p->n));
     memcpy(x, fine->x, p->n * sizeof *x);
-    fit->options.checkpoint = NULL; /* it holds the search of single cells */
+    fit->options.checkpoint = NULL; /* a checkpoint holds the finest search */
     for (int k = 1; k < levels && st == IMP_OK; k++) {
         struct imp__opt_options o = *options;
         o.max_iterations = (int)((int64_t)options->max_iterations * k / levels);

@@ -6,9 +6,9 @@
 #include <string.h>
 
 #define NAMES_MAX 6
-#define MISFIT    2   /* chi^2 per degree of freedom that is warned of, if it is */
-#define MISFIT_Z  3   /* so many standard errors above 1 */
-#define LEFT_OVER 0.2 /* relative residual of the targets that is warned of */
+#define MISFIT    2   /* warn above this chi^2 per degree of freedom, if it is also */
+#define MISFIT_Z  3   /* this many standard errors above 1 */
+#define LEFT_OVER 0.2 /* warn above this relative residual of the targets */
 #define FEW       10  /* with fewer degrees of freedom chi^2 is too noisy to judge */
 
 struct text {

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Does the answer of a fit explain its pictures? The loss at the answer, our own noise
- * taken off, beside what the targets' noise alone leaves,
+ * Does the answer of a fit explain its pictures? The loss at the answer, less our own
+ * Monte Carlo noise, is compared with what the targets' noise alone leaves,
  *
  *     chi^2 per degree of freedom = J / [ sum 1/2 w sigma^2 (M - m)/M ]
  *

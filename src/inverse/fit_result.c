@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The result that a fit leaves with its problem, and the numbers at its start. Rows of
- * 48 bytes are more than a fit of millions of numbers takes: these are made on request,
- * from the search, which is kept. */
+ * The result that a fit leaves with its problem, and the numbers at its start. Rows of 48
+ * bytes for millions of numbers would take more memory than the fit: they are made on
+ * request, from the search, which is kept. */
 #include "base/arguments.h"
 #include "estimate.h"
 #include "fit.h"
@@ -158,9 +158,10 @@ out:
     return st;
 }
 
-/* Of both sources of error together, in the result's memory. Each element is an unbiased
- * estimate, so the matrix may have negative eigenvalues, and correlations beyond 1: these
- * are clipped, and the variances are those of the intervals (rows). */
+/* Covariance by both sources of error, measurement and Monte Carlo. Each element is an
+ * unbiased estimate, so the matrix may have negative eigenvalues, and correlations beyond
+ * 1: these are clipped, and the matrix is rescaled to the variances of the intervals
+ * (rows). */
 static enum imp_status covariance_give(struct imp__fit *f,
                                        const struct imp__uncertainty *u,
                                        const struct imp_fit_variable *rows,

@@ -100,8 +100,8 @@ static enum imp_status weights_make(imp_context *ctx, const struct imp__function
     return st;
 }
 
-/* Standard errors [1 + n_groups]. `picture_W`: W is known from the picture, where there is
- * one. A part keeps the sums of its walks, and all else is computed where it is needed. */
+/* Standard errors [1 + n_groups]. `picture_W`: W is known from the picture, if there is
+ * one. A part keeps the sums of its walks; all else is computed where it is needed. */
 static enum imp_status errors(imp_context *ctx, const struct imp__functional *f,
                               const struct imp_run *run, double *weights, bool picture_W,
                               double *se)
@@ -224,7 +224,7 @@ static enum imp_status pictures_check(const imp_problem *p,
     return IMP_OK;
 }
 
-/* Parts of these sums are of the same adjoint and groups? */
+/* Were all parts of these sums made with the same adjoint and groups? */
 static enum imp_status sums_same(imp_problem *p, const struct imp__functional *f,
                                  const struct imp_run *run)
 {

@@ -1,22 +1,22 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * J^T W J and J^T W r without bias (docs/estimators.md 15). With x_ik = dL_i/dx_k of walk
- * i and a replicate of n walks in one pixel and channel,
+ * i, S = sum_i L_i, and a replicate of n walks in one pixel and channel,
  *
  *     (J^T J)_kl ~ w [ (sum_i x_ik)(sum_i x_il) - sum_i x_ik x_il ] / (n (n-1))
  *     (J^T r)_k  ~ w { [S/(n-1) - T] mean(x_k) - sum_i L_i x_ik / (n (n-1)) }
  *
- * (products of two different walks, i != j; the mean of the others, leave-one-out),
- * averaged over replicates; of points in sets, L and x are those of a set. The same-sample matrix, which a naive product of mean
- * pictures would give, comes along for damping. Losses that are not quadratic enter with
- * Gauss and Newton's w at the mean, and with the gradient of adjoint.c: r = l'/w at the
- * mean of a few walks would have the bias that the jackknife takes off.
+ * averaged over replicates. The first line contains only products of two different walks,
+ * the second the leave-one-out mean. With points in sets, L and x are those of a set. The
+ * same-sample matrix, the naive product of mean pictures, is computed too, for damping.
+ * Losses that are not quadratic enter with Gauss and Newton's w at the mean, and with the
+ * gradient of adjoint.c: r = l'/w at the mean of a few walks would have the bias that the
+ * jackknife removes.
  *
- * Noise of the pictures themselves: sum w^2 sigma^2 J^T J is the gradient's covariance by
- * it. Where sigma is not given, the squared residual stands in for sigma^2, pixel by
- * pixel, which holds however the noise differs between pixels (White, Econometrica 48,
- * 1980); residual and J^T J come from different replicates, so that their own noise is
- * not correlated. */
+ * The noise of the targets gives the gradient the covariance sum w^2 sigma^2 J^T J. Where
+ * sigma is not given, the squared residual stands in for sigma^2, pixel by pixel, which
+ * holds however the noise differs between pixels (White, Econometrica 48, 1980); residual
+ * and J^T J come from different replicates, so that their own noise is not correlated. */
 #include "gauss_newton.h"
 #include "adjoint.h"
 #include "film/film_filter.h"

@@ -94,7 +94,7 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
     const int b0 = imp__replicates_begin(j->plan, (int)t->part);
     const int b1 = imp__replicates_begin(j->plan, (int)t->part + 1);
     const double R = b1 - b0, all = j->plan.R;
-    const bool paired = j->plan.R == 1; /* pixels two by two stand in for replicates */
+    const bool paired = j->plan.R == 1; /* spread from pairs of pixels instead */
     const double by_variance = paired ? 0 : R / ((R - 1) * all * all);
     double first = 0;
     int in_pair = 0;
@@ -173,9 +173,9 @@ static enum imp_status tile_take(size_t group, const void *sum, void *payload)
 
 /* ---- Sums of many numbers ------------------------------------------------------- */
 
-#define LOOKS      64 /* 1 of so many items is sampled for the size of terms, and */
-#define LOOKS_MOST 16 /* no more than so many: */
-#define SPARE_BITS 12 /* terms up to 2^12 times those fit; else all is redone */
+#define LOOKS      64 /* one item in so many is run to find the size of terms, */
+#define LOOKS_MOST 16 /* at first at most so many items */
+#define SPARE_BITS 12 /* terms up to 2^12 times as large fit; else all is redone */
 
 static double terms_most(const struct imp__gradient_job *j)
 {

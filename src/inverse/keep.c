@@ -32,7 +32,9 @@ static enum imp_status number_add(struct numbers *s, int64_t k)
     return IMP_OK;
 }
 
-/* Of a picture: 0, 1, 2, ...; of independent ones enough for losses of all kinds. */
+/* Sample numbers to keep. A picture needs 0, 1, 2, ...; losses need those of the
+ * replicates: the sets of Sobol points, or with independent points enough for all kinds
+ * of loss. */
 static enum imp_status numbers_of(const struct imp_scene *scene, int sensor,
                                   const struct imp_walks *w, struct numbers *out)
 {
@@ -149,7 +151,7 @@ out:
 
 /* ---- All of them ----------------------------------------------------------------- */
 
-/* Those with a derivative that is one of frozen walks. */
+/* Chooses the parameters whose derivative is that of frozen walks. */
 static enum imp_status chosen_make(struct imp_walks *w)
 {
     const struct imp_scene *scene = w->scene;

@@ -75,7 +75,7 @@ void imp__light_replicate(struct imp__gradient_job *job, struct imp_tile_worker 
     imp__tally_batch(tally, b);
 }
 
-/* With the first of the walks numbered `first`; totals that are to be shared and ended. */
+/* All sweeps of the plan, into totals that the caller shares between ranks and ends. */
 static enum imp_status sweep_all(struct imp_problem *p, const struct imp_tracer *tracer,
                                  const struct imp__light_adjoints *adjoints,
                                  struct imp__replicates plan, const struct imp_run *run,

@@ -24,7 +24,8 @@ static void correlate(const double *a, int n, double *out)
     }
 }
 
-/* sum of k over the pairs in tiles of `side` pixels that cut `width` pixels. */
+/* Sum of k over the pairs of pixels within one tile, along an axis of `width` pixels in
+ * tiles of `side`. */
 static double pairs(const double *k, int n, int width, int side)
 {
     double sum = 0;

@@ -46,7 +46,8 @@ void imp__pair_noise_add(struct imp__pair_noise *n, int x, int y, double w,
         }
 }
 
-/* Of one tile and number: h_ab into h_ab - m - e_a - e_b, in place, and e [R]. */
+/* Hoeffding decomposition of one tile and number: with m the mean over pairs, h_ab
+ * becomes h_ab - m - e_a - e_b, in place, and e [R] the first-order terms. */
 static void split(const struct imp__pair_noise *n, double *h, double *e)
 {
     const int R = n->R;
@@ -69,8 +70,8 @@ static void split(const struct imp__pair_noise *n, double *h, double *e)
             *h -= mean + e[a * (ptrdiff_t)n->K] + e[b * (ptrdiff_t)n->K];
 }
 
-/* out [K][K] += scale * sum over tiles, `count` vectors each, of v times the sum of v over
- * the tiles around: the lower triangle of the symmetric part. */
+/* out [K][K] += scale * sum over tiles, `count` vectors each, of v times the sum of v
+ * over the tiles around: the lower triangle of the symmetric part. */
 static void products(const struct imp__pair_noise *n, const double *v, int count,
                      int around, double scale, double *sum, double *out)
 {

@@ -8,15 +8,15 @@
 
 #define WIDE_MANY 16 /* samples per pixel */
 
-/* Sets of points in a replicate: the two that a product needs, and some more where a loss
- * that is not quadratic has its bias cut by leaving sets out. A fixed adjoint needs none. */
+/* Sets of points in a replicate: two for a product of independent means, more for the
+ * jackknife of a loss that is not quadratic. A fixed adjoint needs one. */
 enum { SETS = 2, SETS_CURVED = 4, SETS_FIXED = 1 };
 
 static bool curved(const struct imp__target *t)
 {
     return t && !imp__loss_quadratic(t->desc.loss);
 }
-/* Walks that are kept are kept for all of them. */
+/* Kept walks serve all kinds of loss, with one number of sets. */
 static int sets_of(const struct imp__target *t, const struct imp_run *run)
 {
     if (run->walks) return SETS;
@@ -48,8 +48,8 @@ struct imp__replicates imp__replicates_plan(int spp, int batch_max)
     return box_plan(spp, batch_max, 0);
 }
 
-/* Of pictures, which filters wider than a pixel need. In sets, two of them are one
- * replicate: the picture of one has the adjoint of the other. */
+/* The plan of replicates that are pictures, for filters wider than a pixel. In sets, two
+ * pictures are one replicate: the adjoint of each comes from the other. */
 static struct imp__replicates wide_plan(int spp, int sets)
 {
     const bool many = spp >= WIDE_MANY;
@@ -81,7 +81,7 @@ struct imp__replicates imp__replicates_of(const struct imp_scene *scene,
     const int sets =
         imp__points_of(sensor, run) == IMP_POINTS_SOBOL ? sets_of(t, run) : 0;
     if (imp__film_border(&sensor->film) > 0) return wide_plan(spp_of(sensor, run), sets);
-    /* A loss that is not quadratic has its bias cut by longer batches. */
+    /* Longer batches reduce the bias of a loss that is not quadratic. */
     const bool kept_sets = run->walks && sets;
     const int most = curved(t) && !kept_sets ? IMP_REPLICATE_MAX
                      : sets                  ? sets * IMP_SET_POINTS

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Phase functions, as what scatters like a material of albedo 1 on the whole sphere; and
- * media: coefficients at random places of their box, against each other, against the
- * bounds that flights take, and their derivatives against differences. */
+ * Phase functions are tested as materials of albedo 1 on the whole sphere. Coefficients
+ * of media at random places of their box are tested against each other and against the
+ * majorants of free flights, and their derivatives against differences. */
 #include "color/convert.h"
 #include "scene/in_medium.h"
 #include "scene/majorants.h"

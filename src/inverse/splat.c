@@ -53,8 +53,8 @@ static void sets_loss(const struct imp__splat *s, int b, size_t p, double *total
     }
 }
 
-/* The same, from the picture of a replicate; the variance of a quadratic loss is taken
- * off. */
+/* The same, from the picture of a replicate; a quadratic loss is made unbiased by
+ * subtracting the variance of the mean. */
 static void picture_loss(const struct imp__splat *s, int b, size_t p, double *total)
 {
     const struct imp_target *t = &s->target->desc;
@@ -186,7 +186,7 @@ void imp__splat_destroy(imp_context *ctx, struct imp__splat *s)
     *s = (struct imp__splat){0};
 }
 
-/* Pixel p without the sample, or without its set. */
+/* Mean of pixel p without the sample, or over the other sets. */
 static void rest_of(const struct imp__splat *s, int b, int k, size_t p, double w,
                     imp_spec L, double rest[3])
 {
@@ -206,7 +206,7 @@ static void rest_of(const struct imp__splat *s, int b, int k, size_t p, double w
         if (W - w > 1e-9 * W) rest[c] = (rest[c] * W - w * L[c]) / (W - w);
 }
 
-/* l' there, as an adjoint of radiance. */
+/* l' at that mean, as an adjoint of radiance. */
 static imp_spec pixel_adjoint(const struct imp__splat *s, int b, int k, size_t p,
                               double w, imp_spec L)
 {

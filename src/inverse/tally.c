@@ -37,8 +37,8 @@ static void add_dense_tied(struct imp_sink *sink, int param, size_t element, int
 
 /* ---- Many numbers --------------------------------------------------------------- */
 
-/* What a slot is found by, never 0. A texture that is read as a colour here and as one
- * number there has a triple and a single of one key. */
+/* The tag of a slot of the table; 0 is an empty slot. One key may have two entries: a
+ * triple where a texture is read as a colour, a single where it is read as one number. */
 static inline uint32_t tag_of(uint32_t key, bool single)
 {
     return (key << 1 | single) + 1;
@@ -77,7 +77,7 @@ static bool table_grow(struct imp_tally *t)
     return true;
 }
 
-/* Room for what a new entry has of the tile. */
+/* Grows the tile's sums by those of a new entry. */
 static bool of_tile_grow(struct imp_tally *t, bool single)
 {
     const size_t R = (size_t)t->R;

@@ -72,7 +72,7 @@ enum imp_status imp__target_tracer(const struct imp_problem *p,
 {
     const struct imp_wavelengths *waves = target->of_curves ? target->waves : NULL;
     run->sensor = target->desc.sensor;
-    /* Sums over parts are of independent terms. */
+    /* A seed for each part makes the parts independent. */
     run->seed += (uint64_t)part * UINT64_C(0x9e3779b97f4a7c15);
     const enum imp_status st = any_end && !waves
                                    ? imp__problem_tracer_of_any_end(p, run, NULL, out)

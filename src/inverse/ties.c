@@ -40,7 +40,8 @@ double imp__block_get(const struct imp_problem *p, const struct imp__block *b, s
     double v;
     if (b->tie < 0 && !b->log) return imp__param_get(q, e);
     if (imp__block_factor(p, b)) {
-        /* By the largest of the numbers it multiplies, which rounding changes least. */
+        /* From the largest number that the factor multiplies: its relative rounding is
+         * least. */
         const double *origin = imp__block_tie(p, b)->origin + q->info.offset;
         size_t most = 0;
         for (size_t i = 1; i < q->info.count; i++)
@@ -277,13 +278,13 @@ static enum imp_status members_find(imp_problem *p, const char *glob,
     return IMP_OK;
 }
 
-/* Equal numbers begin as the first parameter's. */
+/* Sets tied numbers to the values of the first parameter. */
 static void made_equal(imp_problem *p, const struct imp__param_tie *t)
 {
     size_t first = 0;
     while (!t->on[first]) first++;
     const struct imp__block *b = imp__problem_block(p, (size_t)p->active.base[first]);
-    for (size_t k = p->scene->n_params; k-- > first;) { /* the first last: it is read */
+    for (size_t k = p->scene->n_params; k-- > first;) { /* the source comes last */
         struct imp_param *q = &p->scene->params[k];
         for (size_t e = 0; t->on[k] && e < q->info.count; e++)
             imp__param_set(q, e,

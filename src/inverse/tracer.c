@@ -1,7 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * How the walks of a problem are made; and refusals, where a gradient would not be the
- * whole one. */
+ * The tracer of a problem, and refusals where its gradient would lack a term. */
 #include "estimate.h"
 #include "film/film_measure.h"
 #include "walk/graded.h"
@@ -32,8 +31,8 @@ static enum imp_status attached_allowed(const struct imp_scene *scene)
         "constant environment; use detached");
 }
 
-/* Light samples alone never reach a light where it is dark, so its derivative there is
- * missed. */
+/* Light sampling alone never samples a light where its emission is 0, so it misses the
+ * derivative there. */
 static enum imp_status gaps_allowed(const struct imp_problem *p,
                                     const struct imp_walk_integrator *integrator)
 {

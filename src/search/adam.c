@@ -7,8 +7,8 @@
  * Adam divides each coordinate by the size of its gradient, so it is slow where the
  * objective depends on products of coordinates (a lamp and a reflectance). With few
  * variables its coordinates are therefore the eigenvectors of the Gauss-Newton matrix
- * (basis.h). A variable at a bound becomes a direction by itself: a projected step that is
- * not along the axes need not end in a minimum (Bertsekas, SIAM J. Control Optim. 20,
+ * (basis.h). A variable at a bound becomes a direction by itself: a projected step that
+ * is not along the axes need not end in a minimum (Bertsekas, SIAM J. Control Optim. 20,
  * 1982).
  *
  * A direction without net motion over a window of iterations has met only noise, or
@@ -31,8 +31,8 @@
 #define FAR     IMP_ADAM_FAR  /* by which it is so low that older iterates do not count */
 
 /* Arrays of length n, except V (eigenvectors) and A (matrix): n x n, and empty if the
- * coordinates are the variables. FIRST, SECOND, NET, WAY (path length) and PACE (rate) are
- * in the coordinates of the rows of V. AVERAGE is that of the iterates. */
+ * coordinates are the variables. FIRST, SECOND, NET, WAY (path length) and PACE (rate)
+ * are in the coordinates of the rows of V. AVERAGE is that of the iterates. */
 enum { FIRST, SECOND, HERE, SUM, AVERAGE, ALIGNED, NET, WAY, PACE, V, A };
 enum {
     COUNT,
@@ -160,7 +160,8 @@ out:
     return st;
 }
 
-/* Variables that met a bound go their own way, those that left theirs join again. */
+/* Variables at a bound become directions by themselves; with `leave`, those that left it
+ * join the others again. */
 static enum imp_status align(const struct imp__goal *goal, struct imp__search *s,
                              bool leave)
 {
@@ -191,7 +192,8 @@ static enum imp_status step(const struct imp__goal *goal, double learning_rate,
         v[j] = BETA2 * v[j] + (1 - BETA2) * work[j] * work[j];
         mean_v += v[j] / (double)s->n;
     }
-    /* Keeps what was never seen at rest, whatever the objective's unit. */
+    /* Relative to the mean of v, whatever the objective's unit: variables that never had
+     * a gradient stay at rest. */
     const double tiny = 1e-8 * sqrt(mean_v / c2) + 1e-300;
     double pace = 0, rate = learning_rate; /* of many variables, all the same */
     for (size_t j = 0; j < s->n; j++) {
@@ -216,15 +218,16 @@ static enum imp_status step(const struct imp__goal *goal, double learning_rate,
     }
     s->scalar[COUNT]++;
     const enum imp_status st = align(goal, s, false);
-    for (size_t k = 0; k < s->n; k++) { /* at a bound: free to leave */
+    for (size_t k = 0; k < s->n; k++) { /* momentum into a bound would delay leaving it */
         const int wall = imp__at_bound(goal, x, k);
         if ((wall < 0 && m[k] > 0) || (wall > 0 && m[k] < 0)) m[k] = 0;
     }
     return st;
 }
 
-/* Slower, from the window's mean, in directions that only wandered. With many variables,
- * whose own ways say little, in all or none. work: [2 n]. */
+/* Directions without net motion continue from the window's mean, with a smaller rate.
+ * With many variables, where the path of a single one says little, all do or none. work:
+ * [2 n]. */
 static void cool(const struct imp__goal *goal, struct imp__search *s, bool all, bool fell,
                  double *work)
 {
@@ -317,8 +320,9 @@ out:
     return st;
 }
 
-/* m and sqrt(v) are gradients: mapped as such, their quotient, the step, is that of the
- * old variables. Only along the axes: others are found anew. */
+/* m and sqrt(v) are mapped as gradients are, so that their quotient, the step, stays that
+ * of the old variables. Only moments along the axes are carried: other directions are
+ * found anew. */
 static enum imp_status carry(const struct imp__search *old, const struct imp__carry *c,
                              struct imp__search *s)
 {

@@ -24,7 +24,7 @@ enum {
     AVERAGED = IMP_SEARCH_AVERAGED /* 0: the search has not wandered yet */
 };
 
-typedef float __attribute__((may_alias)) packed; /* in the place of doubles */
+typedef float __attribute__((may_alias)) packed; /* stored in arrays of doubles */
 
 static packed *floats(const struct imp__search *s, int k)
 {
@@ -120,7 +120,8 @@ static void step(const struct imp__goal *goal, double learning_rate,
     const double age = ++s->scalar[AGE], mean_v = moments(goal, s, g);
     const double c1 = 1 - pow(IMP_ADAM_BETA1, age), c2 = 1 - pow(IMP_ADAM_BETA2, age);
     const double rate = learning_rate * pow(1 + s->scalar[PACE], -IMP_ADAM_COOLING);
-    /* Keeps what was never seen at rest, whatever the objective's unit. */
+    /* Relative to the mean of v, whatever the objective's unit: variables that never had
+     * a gradient stay at rest. */
     const double tiny = 1e-8 * sqrt(mean_v / c2) + 1e-300;
     for (size_t i = 0, k = 0; i < goal->n_spans; i++) {
         const struct imp__span *a = &goal->spans[i];
@@ -133,7 +134,7 @@ static void step(const struct imp__goal *goal, double learning_rate,
             s->scalar[WAY] += fabs(moved);
             net[k] = (float)(net[k] + moved);
             sum[k] += net[k];
-            /* At a bound: free to leave. */
+            /* Momentum into a bound would delay leaving it. */
             if ((s->x[k] <= a->lo && m[k] > 0) || (s->x[k] >= a->hi && m[k] < 0))
                 m[k] = 0;
         }

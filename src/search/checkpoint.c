@@ -91,8 +91,8 @@ enum imp_status imp__checkpoint_write(imp_context *ctx, const char *path,
 
 /* ---- Reading ------------------------------------------------------------------- */
 
-/* The file is read twice: looked at, then taken. A second search to fill would take as
- * much memory as the first. */
+/* The file is read twice: checked, then taken over. A second search, to be filled and
+ * then checked, would take as much memory as the first. */
 struct source {
     FILE *f;
     imp_context *ctx;

@@ -10,8 +10,8 @@
  * negative logarithm of the posterior density. What the pictures determine takes no part
  * of its interval from a prior.
  *
- * and x - G g, from random numbers that x does not depend on, is a point whose error is
- * described by their sum, wherever in its neighbourhood x was. */
+ * The error of the point x - G g, with g from random numbers that x does not depend on,
+ * has the sum of these covariances, wherever in its neighbourhood x was. */
 #include "covariance.h"
 #include "directions.h"
 #include "excess.h"
@@ -110,9 +110,9 @@ static enum imp_status sandwich(imp_context *ctx, size_t n, const double *G,
     return IMP_OK;
 }
 
-/* Covariance of the gradient by noise of the data. With unknown noise of variance s^2/w
- * the best estimate is s^2 = chi2_min/(M - m), chi2_min the value at the minimum, reached
- * from here by the Newton step; the part of g^T G g that is our own noise is left in. */
+/* Estimate of s^2 where the data have unknown noise of variance s^2/w: chi2_min/(M - m),
+ * with m determined variables and chi2_min the value at the minimum, g^T G g below that
+ * at x. The part of g^T G g that is our own noise is subtracted from it first. */
 static double noise_scale(const struct imp__sampled *s, const struct imp__directions *a)
 {
     const size_t n = s->n;
@@ -135,8 +135,8 @@ static void interval_free(const struct imp__goal *goal, size_t k, double se,
     v->hi95 = open ? NAN : imp__into_bounds(goal, k, v->value + Z_TWO_SIDED * se);
 }
 
-/* At a bound the interval is one-sided: from the bound to what the data still allow,
- * about the point `u` that they would choose without it. */
+/* At a bound the interval is one-sided: from the bound to the 95 % limit about `u`, the
+ * Newton point without bounds. */
 static void interval_bound(const struct imp__goal *goal, size_t k, double u, double se,
                            struct imp_fit_variable *v)
 {
@@ -202,9 +202,9 @@ out:
     return st;
 }
 
-/* Newton's point over the variables that are free to move: `fixed` [n] are those that
- * press against a bound, and what the step pushes over one, which stays there while the
- * others go without it. */
+/* Newton's point over the variables that are free to move. `fixed` [n]: variables that
+ * the gradient presses against a bound, or that the step would push over theirs; the step
+ * is then computed again without them. */
 static enum imp_status newton_free(const struct imp__goal *goal,
                                    const struct imp__sampled *s, const double *x,
                                    bool *fixed, struct imp__directions *free,
@@ -240,8 +240,8 @@ static double standard_error(const struct imp__directions *a, size_t n, size_t k
     return sqrt(fmax(measurement[d], 0) + fmax(monte_carlo[d], 0));
 }
 
-/* Variance of the data in units of 1/weight, where their noise is known: of the
- * combinations that they tell most of. */
+/* Variance of the data in units of 1/weight, where their noise is known: the ratio of the
+ * traces of D H_meas D and D H_data D, which the best determined directions dominate. */
 static double noise_ratio(const struct imp__sampled *s)
 {
     double noise = 0, data = 0;

@@ -7,8 +7,8 @@
 #include <math.h>
 #include <string.h>
 
-/* Part of a variable in a loose direction, in units of the scales, that makes it loose.
- */
+/* A variable is loose if its component in a loose direction exceeds this, in units of the
+ * scales. */
 #define LOOSE_SHARE 0.1
 
 void imp__directions_destroy(imp_context *ctx, struct imp__directions *a)
@@ -115,8 +115,8 @@ out:
     return st;
 }
 
-/* A = sum max(lambda, 0) v v^T + D H_prior D, of all directions, or of those alone that the
- * data determine, and its eigenvalues. */
+/* A = sum max(lambda, 0) v v^T + D H_prior D, over all directions or over those alone
+ * that the data determine, and its eigenvalues. */
 static enum imp_status with_prior(const struct imp__sampled *s,
                                   const struct imp__directions *a, bool loose_too,
                                   double *A, double *values, double *vectors)
@@ -136,8 +136,8 @@ static enum imp_status with_prior(const struct imp__sampled *s,
                : imp__error(s->ctx, IMP_E_NUMERIC, "J^T J is not finite");
 }
 
-/* G = D A^-1 D, if the prior leaves no direction open that the data leave open: what these
- * have from the data is noise, and decides nothing. */
+/* G = D A^-1 D, if data and prior together determine every direction. The data count in
+ * the test only where they determine a direction: elsewhere their part is noise. */
 #define PRIOR_LEAST 1e-10 /* eigenvalue over the largest */
 static enum imp_status inverse_held(const struct imp__sampled *s,
                                     struct imp__directions *a)

@@ -2,8 +2,8 @@
  *
  * NLopt's gradient methods under common random numbers: with one seed the objective is a
  * fixed function of x, up to the jumps where a walk's decisions change. Where the goal
- * draws for several evaluations, the function is one of this draw; when the best x has gone
- * too far for it, the method begins anew there, with a new draw.
+ * draws walks for several evaluations, the function is that of one draw; when the best x
+ * has moved too far for it, the method begins anew there, with a new draw.
  *
  * NLopt cannot be stopped and continued. Its evaluations are kept instead: a continued
  * search starts again at the first x of the draw and is given the recorded answers, which
@@ -80,7 +80,7 @@ static double objective(unsigned n, const double *y, double *gradient, void *pay
     const size_t row = (size_t)n + 2, at = c->calls * row;
     struct imp_estimate f;
 
-    /* Some methods finish a line search first. */
+    /* After a forced stop some methods still finish a line search. */
     if (c->st != IMP_OK || s->scalar[STALE] != 0) return HUGE_VAL;
     if (at + row <= s->array_n[RECORD]) { /* replayed */
         f = (struct imp_estimate){s->array[RECORD][at], s->array[RECORD][at + 1], 0};
@@ -172,7 +172,7 @@ static enum imp_status run(const struct imp__goal *goal,
         for (size_t k = 0; k < goal->n; k++) s->array[BASE][k] = s->x[k];
         s->array_n[RECORD] = 0;
         s->scalar[BEFORE] = s->iteration;
-        s->scalar[BEST] = INFINITY; /* of another function */
+        s->scalar[BEST] = INFINITY; /* a new draw is a new function */
         s->scalar[STALE] = 0;
     }
 out:

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Single steps of plain Adam and of gradient descent with momentum, for hosts with loops
- * of their own. adam.c is the search of imp_fit, which chooses its pace by what it sees. */
+ * of their own. adam.c is the search of imp_fit, which adapts its rate. */
 #include "base/arguments.h"
 #include <math.h>
 #include <stdbool.h>
@@ -81,7 +81,7 @@ enum imp_status imp_optimizer_step(const struct imp_optimizer_rule *rule, size_t
     IMP_FINITE(NULL, own.learning_rate, "learning_rate");
     IMP_CHECKED(rule_check(&own));
     IMP_FINITE_ALL(NULL, gradient, n, "gradient");
-    for (size_t k = 0; k < n; k++) /* infinite: none, but not on the wrong side */
+    for (size_t k = 0; k < n; k++) /* no bound: lo = -inf, hi = +inf only */
         if ((lo && !(lo[k] < INFINITY)) || (hi && !(hi[k] > -INFINITY)))
             return imp__error(NULL, IMP_E_ARG, "imp_optimizer_step: %s[%zu] is no bound",
                               lo && !(lo[k] < INFINITY) ? "lo" : "hi", k);
