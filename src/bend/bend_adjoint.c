@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The exact adjoint of traced rays (docs/bent-rays.md 2.2 - 2.4). The ray is reversed from
- * its exit state, together with its cotangents lam = dC/dx, mu = dC/dv, and each kick
- * adds to the gradient of the field. Memory: the exits, one gradient for each slice of
- * rays at work, and nothing that grows with the number of steps. */
+ * The exact adjoint of traced rays (docs/bent-rays.md 2.2 - 2.4). Each ray is integrated
+ * backwards from its exit state, together with its cotangents lam = dC/dx, mu = dC/dv;
+ * each kick adds to the gradient of the field. Memory holds the exits and one gradient
+ * for each slice of rays in progress. Only IMP_BEND_STORED needs memory that grows with
+ * the number of steps, for the states of the rays in progress. */
 #include "bend_adjoint.h"
 #include <string.h>
 
@@ -133,8 +134,8 @@ static enum imp_status commit(size_t item, int slot_index, void *payload)
 #define SLICES_MIN 8
 #define LOOK_MAX   4096 /* rays sampled to choose the number of slices */
 
-/* Mean fraction of the field that the bounding box of a slice's starts and ends covers:
- * about the fraction of the coefficients that a slice reaches. */
+/* Fraction of the field's volume in the bounding box of a slice's starts and exits, as a
+ * mean over slices. It estimates what part of the coefficients a slice reaches. */
 static double share(const struct imp__adjoint *job, size_t slices)
 {
     const imp_field *f = job->plan->field;
@@ -163,8 +164,8 @@ static double share(const struct imp__adjoint *job, size_t slices)
 
 /* Rays in a slice. Many slices keep many threads busy; but each clears and adds up the
  * coefficients that it reaches, which should cost at most a tenth of tracing its rays
- * (about n_theta^(1/3) steps each). The number depends on the problem alone, so that sums
- * have one order. */
+ * (about n_theta^(1/3) steps each). The number depends on the problem and not on the
+ * number of threads, so that sums have one order. */
 static size_t slice_rays(const struct imp__adjoint *job)
 {
     const size_t n = job->rays->n, n_theta = job->plan->field->n_theta;
@@ -178,7 +179,7 @@ static size_t slice_rays(const struct imp__adjoint *job)
     return imp_max((n + slices - 1) / slices, (size_t)4 * IMP_LANES);
 }
 
-/* As traced: what is not dropped is finite. */
+/* The tracer writes finite exits, except for dropped rays. */
 static enum imp_status exits_check(imp_context *ctx, const struct imp_bend_exit *exits,
                                    size_t n)
 {

@@ -183,8 +183,9 @@ static void trilinear_leaf(imp_field *f, size_t offset, void *payload)
     t->spacing = f->spacing;
 }
 
-/* In a trilinear field the objective has a kink where a ray runs along cell faces (the
- * middle ray of a beam may): all rays are shifted by a thousandth of a cell. */
+/* In a trilinear field the objective has a kink where a ray runs along cell faces, as the
+ * middle ray of a beam may. So each start is moved across its ray, at random, by about a
+ * thousandth of a cell. */
 static void aside(const imp_bend *b, double by, double (*x)[3])
 {
     for (size_t i = 0; i < b->n; i++) {
@@ -195,7 +196,7 @@ static void aside(const imp_bend *b, double by, double (*x)[3])
     }
 }
 
-/* Central differences along the gradient, scaled to a greatest component of 1. */
+/* Central differences along the direction g / max_i |g_i|, g the gradient. */
 static enum imp_status check_differences(imp_bend *b, double *dot, double *bar)
 {
     enum imp_status st = IMP_OK;
@@ -241,11 +242,12 @@ static enum imp_status check_differences(imp_bend *b, double *dot, double *bar)
             if (st == IMP_E_NUMERIC) f[side] = NAN, st = IMP_OK; /* this row fails */
             if (st != IMP_OK) goto out;
         }
-        /* Curvature of the objective limits large steps and rounding small ones, so those
-         * between are judged; for trilinear fields the smallest (docs/bent-rays.md 3.3).
-         * The error left is 1/100 of the change from the next larger step; 1/50 is
-         * allowed. At a minimum the gradient is as small as the curvature times a change
-         * of theta by 1e-12, or by the last bit of a float. */
+        /* Curvature of the objective limits large steps, rounding small ones. Sums and
+         * trilinear fields are judged at the smallest step, 1e-8 (docs/bent-rays.md 3.3),
+         * all others at 1e-4 to 1e-6. There a central difference has an error of
+         * O(eps^2), so about 1/100 of the change from the ten times larger step is left;
+         * 1/50 is allowed. Near a minimum the gradient is so small that the rounding of
+         * theta counts: curvature times 1e-12, or 1e-7 where theta is stored as float. */
         const double fd = (f[0] - f[1]) / (2 * eps);
         if (k <= 4) bend = fmax(bend, fabs(f[0] + f[1] - 2 * value) / (eps * eps));
         const double left = !smooth            ? bend * eps

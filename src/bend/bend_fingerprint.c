@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What a checkpoint of a fit belongs to. */
+ * Hashes of a fit's rays, targets, parameters and options. A checkpoint holds them, and
+ * resumes only a fit that has the same. */
 #include "bend_fingerprint.h"
 #include "math/hash.h"
 

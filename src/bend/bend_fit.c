@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  * Fits: a problem's objective is minimised level by level by the optimisers of
- * src/search. Each level refines the grid without changing the function, and carries the
- * optimiser's memory: steps are prolonged by P, gradients as well and scaled by 1/8 (a
- * coarse coefficient's share goes to eight fine ones). Adam's rate is halved. */
+ * src/search. Each level refines the grid by a prolongation P that keeps the field, and
+ * may carry the optimiser's memory: steps s become P s and gradients g become P g / 8,
+ * because eight fine coefficients share the gradient of a coarse one. Adam's rate is
+ * halved. */
 #include "bend_fingerprint.h"
 #include "lbfgs.h"
 #include <math.h>
@@ -94,7 +95,7 @@ static enum imp_status goal_eval(const double *x, uint64_t seed, struct imp_esti
     return IMP_OK;
 }
 
-/* True: it asks to stop. */
+/* Call the caller's function after an iteration. True: it asks to stop the fit. */
 static bool show_step(struct fit *f, const struct imp__search *s)
 {
     const struct imp_bend_fit_step step = {
@@ -310,8 +311,8 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
     if (f.levels > IMP_BEND_LEVELS_MAX)
         return imp__error(b->ctx, IMP_E_ARG, "%d levels: at most %d", f.levels,
                           IMP_BEND_LEVELS_MAX);
-    /* Adam's moments are those of steeper gradients: it is usually faster to begin
-     * anew. */
+    /* Adam's moments come from the steeper gradients of the coarse grid: it is usually
+     * faster to begin anew. */
     f.carries = o->carry > 0 || (o->carry == 0 && o->optimizer == IMP_LBFGS);
     if (o->optimizer == IMP_LM)
         return imp__error(b->ctx, IMP_E_UNSUPPORTED,
@@ -321,10 +322,10 @@ enum imp_status imp_bend_fit(imp_bend *b, const struct imp_bend_fit_options *opt
         return imp__error(b->ctx, IMP_E_ARG, "levels are for grids, not for a %s field",
                           b->field->ops->name);
     b->n_history = 0;
-    b->options.progress = NULL; /* a search is stopped between its iterations only */
+    b->options.progress = NULL; /* a fit is cancelled between iterations only */
     IMP_TRY(level_begin(&f));
-    /* Before the search moves what lies outside its bounds: a resumed fit has the same.
-     */
+    /* The start is evaluated before the search moves numbers into their bounds, so that a
+     * resumed fit reports the same value. */
     IMP_TRY(imp_bend_objective(b, &start, NULL, NULL, &f.stats));
     const uint64_t traced = f.stats.traced;
     if (o->checkpoint && o->resume) {

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Sums of large gradients. A slice of rays reaches few of the coefficients of a large
- * grid, so a slice's buffer begins uncleared, blocks are cleared when first touched, and
- * adding up costs what was touched. Threads add up side by side, each a part of the
- * coefficients; every coefficient gets its slices in order. */
+ * grid, so a slice's buffer starts uninitialised, a block of it is cleared when it is
+ * first touched, and only touched blocks are added up. Threads add different parts of the
+ * coefficients at the same time. Each coefficient adds its slices in order of their
+ * number, so the sum has the same bits for any number of threads. */
 #include "bend_adjoint.h"
 #include <string.h>
 
@@ -101,8 +102,8 @@ void imp__partial_add(struct imp__partials *p, size_t slice, struct imp__partial
     pthread_mutex_lock(&p->lock);
     own->next = p->ready;
     p->ready = own;
-    /* A busy part is skipped. Before its thread leaves, it looks at the list again under
-     * this lock, and so adds what has become ready meanwhile. */
+    /* A part that another thread is adding is skipped: before that thread leaves, it
+     * reads the list again under this lock, and so adds what has become ready since. */
     for (int k = 0; k < p->n_parts; k++) {
         struct imp__partials_part *part =
             &p->part[((size_t)k + slice) % (size_t)p->n_parts];

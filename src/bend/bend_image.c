@@ -2,9 +2,9 @@
  *
  * Irradiance of rays on a picture, and its adjoint. The kernel is a cubic B-spline one
  * pixel wide on each axis: a partition of unity, so energy is exact, and twice
- * differentiable (docs/bent-rays.md 4). Pictures are normalised by constants, the power
- * of the rays and the target's mean: 1 is the mean of all power spread over the
- * picture. */
+ * differentiable (docs/bent-rays.md 4). Pictures are divided by constants: that of the
+ * rays by their power per pixel, the target by its mean. So 1 is the irradiance of all
+ * power spread evenly over the picture. */
 #include "bend_problem.h"
 #include <string.h>
 

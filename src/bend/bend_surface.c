@@ -78,8 +78,9 @@ bool imp__surface_covers(const struct imp__surface *s, const imp_v3 *x)
     return imp__dot(y, y) <= s->radius * s->radius;
 }
 
-/* a = n.v; q^2 = e2^2 - |v|^2 + a^2; v' = v + (sign(a) q - a) n, or reflected if q^2 < 0.
- */
+/* Refraction of the momentum v at a normal n, into the index e2:
+ *     a = n.v,  q^2 = e2^2 - |v|^2 + a^2,  v' = v + (sign(a) q - a) n
+ * Mirrors reflect, and so does any surface if q^2 <= 0: v' = v - 2 a n. */
 void imp__bend_turn(const imp_v3 *n, const imp_v3 *v, double e2, bool mirror,
                     struct imp__bend_turn *t)
 {
@@ -148,7 +149,7 @@ bool imp__facet(const struct imp__surface *s, const imp_v3 *a, const imp_v3 *b,
             facet->offset = imp__dot(at.ng, at.p);
             return true;
         }
-        from = hit.t * (1 + 1e-6) + nearest; /* of the other side: go on */
+        from = hit.t * (1 + 1e-6) + nearest; /* crossed the other way */
     }
     return false;
 }

@@ -168,7 +168,7 @@ double imp__bend_factor(const imp_bend *b, const struct imp_bend_rays *rays, siz
     return group < b->cap_dispersion ? b->dispersion[group] : 1;
 }
 
-/* End of the run of rays from `first` on that have one factor. */
+/* One past the last of the rays from `first` on that have the same factor k. */
 static size_t run_end(const imp_bend *b, const struct imp_bend_rays *rays, size_t first)
 {
     if (!b->dispersion) return rays->n;

@@ -103,8 +103,9 @@ static void line_from_samples_vjp(int n_in, const double *c_bar, int n_out, doub
     }
 }
 
-/* Masks (1 4 6 4 1)/8 and (1 2 1)/2: the function stays the same. Fine node j is at
- * coarse node j/2; arrays of a spline begin at node -1. */
+/* Subdivision masks (1 4 6 4 1)/8 of the cubic spline and (1 2 1)/2 of the linear grid:
+ * both keep the function. Fine node j is at coarse node j/2; arrays of a spline begin at
+ * node -1. */
 static void line_refine_spline(int n_in, const double *c, int n_out, double *fine)
 {
     (void)n_in;

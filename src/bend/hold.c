@@ -62,7 +62,7 @@ struct hold_job {
     double *theta;
 };
 
-/* The outermost layers across the axis, and at both of its ends. */
+/* Hold the outermost layers in r, and the outermost layers at both ends of z. */
 static void hold_rz(const imp_field *f, size_t offset, const struct hold_job *j)
 {
     const struct imp__rz *r = (const struct imp__rz *)f;
@@ -79,7 +79,7 @@ static void hold_leaf(imp_field *f, size_t offset, void *payload)
 {
     const struct hold_job *j = payload;
     const struct imp__hold *h = j->hold;
-    const uint32_t *number; /* in a tied grid one held node holds its orbit */
+    const uint32_t *number; /* in a tied grid a held node holds its orbit */
     const struct imp__grid *g = imp__field_nodes(f, &number);
     if (f->ops == &imp__field_rz && h->kind == IMP_HOLD_RIM) hold_rz(f, offset, j);
     if (!g) return;
@@ -128,8 +128,9 @@ struct bounds_job {
     double *lo, *hi;
 };
 
-/* Bounds are on the index: on coefficients where these are indices (spline weights are >=
- * 0 and sum to 1), not on the numbers of profiles. */
+/* Bounds of the index are applied to the coefficients of grids and splines: weights are
+ * >= 0 and sum to 1, so the index keeps the bounds too. Coefficients of eta^2/2 have the
+ * bounds of eta^2/2. Numbers of profiles have none. */
 static void bounds_leaf(imp_field *f, size_t offset, void *payload)
 {
     const struct bounds_job *j = payload;
@@ -146,7 +147,8 @@ void imp__bend_bounds(const imp_bend *b, double *lo, double *hi)
 {
     struct bounds_job j = {b, lo, hi};
     imp__field_leaves(b->field, 0, bounds_leaf, &j);
-    /* In a sum a part may be below the index's bound: the sum is what is bounded. */
+    /* A part of a sum may lie outside the default bounds, which are those of the whole
+     * index: parts are bounded only where the caller set bounds. */
     if (b->field->ops == &imp__field_sum && !b->bounds_set)
         for (size_t i = 0; i < b->field->n_theta; i++)
             lo[i] = -INFINITY, hi[i] = INFINITY;

@@ -71,7 +71,7 @@ enum imp_status imp__graded_ready(struct imp_graded *g, imp_v3 lo, imp_v3 hi)
         }
         o.step = size / (STEPS_DEFAULT * fmax(most, 1e-3));
     }
-    struct imp_bend_surface end = IMP_BEND_SURFACE_INIT; /* unused: the scene ends rays */
+    struct imp_bend_surface end = IMP_BEND_SURFACE_INIT; /* not used: shapes end rays */
     o.surfaces = &end;
     o.n_surfaces = 1;
     o.n_taps = 0;
@@ -156,7 +156,7 @@ static bool land(const struct imp__plan *p, const struct imp__surface *s,
         const double move = sa.g / slope;
         if (!(fabs(t - move - first) <= 0.5 * p->t)) return false;
         t -= move;
-        if (fabs(move) <= 1e-7 * p->t) { /* the next would be its square */
+        if (fabs(move) <= 1e-7 * p->t) { /* quadratic: the rest is rounding */
             *tau = t;
             *at = *from;
             imp__step(p->scheme, p->field, t, 1, &at->x, &at->v, &at->path);
@@ -194,8 +194,8 @@ bool imp__ride(const struct imp_body *m, const struct imp_scene *scene, imp_v3 x
     if (m->ball) m->ball->ops->round(m->ball, &ball);
     const double inside2 = imp__sqr(ball.radius) * (1 - 1e-9);
     const struct imp__plan *p = &g->plan;
-    /* Chords overlap by the intersector's rounding, so that none misses a surface
-     * between. */
+    /* Each chord is lengthened at both ends by the intersector's rounding, so that no
+     * surface is missed between two chords. */
     const double overlap = IMP_RAY_EPSILON * (p->size + imp__length(x));
     struct imp__state s = {x, d, 0};
     *r = (struct imp__ride){.x = x, .d = d};

@@ -57,8 +57,8 @@ static void block_flush(const struct imp__graded_active *to, struct imp__block *
     b->grid = NULL;
 }
 
-/* Splat into the coefficients of one cell: through a grid of the same kind, one cell
- * large. */
+/* Splat into the coefficients of one cell, by the splat of a grid of the same kind that
+ * consists of that cell. */
 static void grid_splat(const struct splat_job *j, imp_field *f, size_t offset)
 {
     const struct imp__grid *g = (const struct imp__grid *)f;

@@ -145,7 +145,8 @@ enum imp_status imp__lane_begin(const struct imp__adjoint *job,
     b->mu[i] = imp__v3_load(bar->v);
     b->path_bar[i] = bar->path;
     s = imp__exit_surface(p, group, e);
-    /* Reflections and facets of meshes are not in the exit: the ray is traced again. */
+    /* An exit holds neither the reflections of its ray nor the facet of a mesh: such a
+     * ray is traced again. */
     if (stored || e->segments > 1 || s->kind == IMP__MESH) {
         track->states = stored;
         const enum imp_status st = imp__track_ray(p, job->rays, ray, track);
@@ -162,7 +163,7 @@ enum imp_status imp__lane_begin(const struct imp__adjoint *job,
     if (s->event == IMP_BEND_REFRACT) {
         struct imp__surface_at sa;
         imp__surface_eval(s, &x, &v_in, &sa);
-        if (!l->track) { /* the exit has |v|^2 inside: the normal part follows */
+        if (!l->track) { /* the exit has v after refraction, and |v|^2 before it */
             const imp_v3 n = imp__normalize(sa.gx);
             const imp_v3 along = v_in - n * imp__dot(n, v_in);
             const double q2 = e->norm2 - imp__dot(along, along);
@@ -250,7 +251,7 @@ void imp__lane_end(const struct imp__adjoint *job, struct imp__adjoint_slot *slo
         surface_bar(slot, entry, s->at.x, rho, zero, zero, 0);
         mu += s->tau * lam;
         d_bar = p->outside_index * mu;
-    } else { /* v0 = eta(x0) d0: the term that the paper's supplement leaves out (5)-(6)
+    } else { /* v0 = eta(x0) d0: a term that (5), (6) of the paper's supplement lack
               */
         const double eta_bar = imp__dot(mu, s->d0);
         if (theta_bar)

@@ -14,7 +14,8 @@
 #define TRIES  25
 
 enum { S, Y, X, G, WORK }; /* arrays: [MEMORY][n], [MEMORY][n], [n], .. */
-/* Scalars. HAVE: 1 if VALUE is that of X; -1: pairs are there, carried, no value. */
+/* Scalars. HAVE is 1 where VALUE and G are those of X, -1 where only pairs are there,
+ * carried from a coarser level, and 0 at the start. */
 enum { PAIRS, VALUE, HAVE };
 
 struct run {
@@ -124,7 +125,8 @@ static enum imp_status line(struct run *r, bool *found)
             *found = true;
             return IMP_OK;
         }
-        /* Minimum of the parabola through f0, slope and the value, kept in 0.1 .. 0.5. */
+        /* Shorten the step to the minimum of the parabola that has value f0 and the slope
+         * at its start and e.value at its end, by a factor of 0.1 to 0.5. */
         const double curve = e.value - f0 - slope;
         double q = isfinite(curve) && curve > 0 ? -slope / (2 * curve) : 0.5;
         step *= imp_clamp(q, 0.1, 0.5);

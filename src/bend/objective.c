@@ -64,7 +64,7 @@ enum imp_status imp_bend_objective(imp_bend *b, double *value, double *gradient,
     IMP_FLOAT_MODE;
     enum imp_status st = passes_trace(b, gradient != NULL, &p, &s);
     if (st != IMP_OK) goto out;
-    /* The counts give the reason, also when nothing was traced. */
+    /* Counts are returned also where no ray came to its end: they give the reason. */
     if (stats) IMP_TRY(imp__info_give(b->ctx, __func__, "stats", stats, &s, sizeof s));
     IMP_TRY(imp__bend_traced(b, &s));
     parts = imp__alloc(b->ctx, b->n_targets + 1, sizeof *parts);

@@ -34,10 +34,10 @@ static void constant_at(const double *p, double u, struct shape_at *s)
     s->f = p[0];
     s->fp[0] = 1;
 }
-/* sqrt(2 - r^2/R^2) inside R, 1 outside. The gradient jumps at R. Rays that start or end
- * there are inside to rounding, and a scheme that begins or ends with a kick evaluates it
- * there: on the rim the gradient is that of the inside, since such a scheme would
- * otherwise be of first order. */
+/* sqrt(2 - r^2/R^2) inside R, 1 outside. The gradient jumps at R. Rays start and end at R
+ * to rounding, and a scheme that begins or ends with a kick evaluates the gradient there.
+ * It is that of the inside, up to a tolerance RIM, else such a scheme would be of first
+ * order. */
 #define RIM 1e-12
 static void luneburg_at(const double *p, double u, struct shape_at *s)
 {
@@ -184,7 +184,8 @@ struct profile {
     imp_v3 axis;
 };
 
-/* y with u = |y|^2 (or a.y, along), about the centre held behind the own parameters. */
+/* y and u of the coordinate above. The centre follows the profile's own parameters in
+ * theta. */
 static inline imp_v3 offset_of(const struct profile *p, imp_v3 x, double *u)
 {
     const double *c = p->base.theta + p->kind->n_own;
@@ -272,7 +273,7 @@ static const char *profile_param_name(const imp_field *f, size_t i)
     return i < (size_t)k->n_own ? k->names[i] : centre_names[i - (size_t)k->n_own];
 }
 
-/* The kinds share one table but for the name, and what jumps. */
+/* All kinds have the same functions; only their names and what jumps differ. */
 #define PROFILE_THAT(text, why)                                                          \
     {                                                                                    \
         .name = text, .eval = profile_eval, .splat = profile_splat,                      \

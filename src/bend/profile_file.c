@@ -82,7 +82,7 @@ static enum imp_status rz_read(imp_context *ctx, const char *path, struct text *
     r.lo = z[0], r.hi = z[1];
     r.cells_r = (int)n[0] - 3, r.cells_z = (int)n[1] - 3;
     *count = (double)((int)n[0] * (int)n[1]);
-    if (*count > (double)(t->end - t->s)) /* a number takes a character at least */
+    if (*count > (double)(t->end - t->s)) /* each takes at least one character */
         return imp__error(ctx, IMP_E_SCENE, "%s: fewer than %.0f coefficients", path,
                           *count);
     return imp_field_rz_create(ctx, &r, 1, out);

@@ -248,8 +248,9 @@ static void index_step_tangent(const imp_field *f, double t, const double *theta
     r->path += t * eta_dot;
 }
 
-/* Exact with the states before the step; without them (25), (26) with eta and g taken at
- * the nearest point that is known explicitly: biased, O(s) (docs/bent-rays.md 1.3). */
+/* Exact where the states before the step are stored. Without them it is (25), (26) of the
+ * supplement, with eta and g taken at the nearest point that is known explicitly; its
+ * bias is O(s) (docs/bent-rays.md 1.3). */
 static void index_step_adjoint(const imp_field *f, double t, int n, struct imp__back *b,
                                const struct imp__state *const *before,
                                struct imp__bar *bar)

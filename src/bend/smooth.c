@@ -13,7 +13,7 @@ struct job {
 static void leaf(imp_field *f, size_t offset, void *payload)
 {
     struct job *j = payload;
-    const uint32_t *number; /* of ties: where the gradient of a node goes */
+    const uint32_t *number; /* of a tied grid: a node's index in the gradient */
     const struct imp__grid *g = imp__field_nodes(f, &number);
     if (!g) return;
     const double weight = j->s->weight, edge = j->s->edge;

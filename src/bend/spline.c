@@ -2,8 +2,8 @@
  *
  * Tensor cubic B-spline: eta = sum theta_abc w_a(u) w_b(v) w_c(w). Twice differentiable,
  * so the adjoint of a traced ray is also the macroscopic derivative
- * (docs/bent-rays.md 3.1, 3.3). The x axis is contiguous: rows of four coefficients are
- * vectors, reduced over y, then z, and only at the end multiplied with the weights of x.
+ * (docs/bent-rays.md 3.1, 3.3). The x axis is contiguous: four coefficients along x are
+ * one vector. Vectors are summed over y, then z, and multiplied by the weights of x last.
  */
 #include "grid_back.h"
 
@@ -46,7 +46,7 @@ static inline imp_spec weights_dd(double u, double inv_h)
     return (imp_spec){1 - u, 3 * u - 2, 1 - 3 * u, u} * (inv_h * inv_h);
 }
 
-/* Weights along the axes at a point; derivatives are times 1/h and 1/h^2. */
+/* Weights along the axes at a point; derivatives include the factors 1/h and 1/h^2. */
 struct basis {
     size_t corner;
     imp_spec wx, wy, wz, dx, dy, dz;

@@ -84,8 +84,9 @@ static bool starts_inside(const struct imp__plan *p, const struct imp__domain *d
     return true;
 }
 
-/* From inside: v = eta d. From outside: along the line to the surface that is entered
- * last, and refracted there (with event `end`, index-matched: unchanged). */
+/* A ray that starts inside has v = eta d. One that starts outside follows a straight line
+ * to the surface that it enters last. There it is refracted if that is the surface's
+ * event; otherwise indices match, and v stays. */
 void imp__start_ray(const struct imp__plan *p, const struct imp_bend_rays *rays, size_t i,
                     struct imp__start *s)
 {

@@ -3,8 +3,8 @@
  * weighted by the shares of power w_i p_i. */
 #include "bend_problem.h"
 
-/* Weight of an arrival by the cosine c on the plane: 0 below 0.05, 1 above 0.15, smooth
- * between (docs/bent-rays.md 2.6 b). */
+/* Weight of an arrival by the cosine c between ray and normal of the plane: 0 below 0.05,
+ * 1 above 0.15, smooth between (docs/bent-rays.md 2.6 b). */
 static double slant_weight(double c, double *slope)
 {
     const double t = imp_clamp((c - 0.05) / 0.1, 0.0, 1.0);
@@ -140,7 +140,7 @@ enum imp_status imp__target_value(const imp_bend *b, const struct imp__target_of
             weight += share;
         }
         if (weight > 0) sum *= 1 / weight, mean_path /= weight;
-        centre = sum; /* its own change adds nothing: residuals about a mean sum to 0 */
+        centre = sum; /* its derivative drops out: residuals about a mean sum to 0 */
     }
     double total = 0;
     const double scale = desc->weight / t->power;

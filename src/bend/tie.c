@@ -154,7 +154,7 @@ static enum imp_status rings(const struct imp__grid *g,
     if (!ring) return imp__error(ctx, IMP_E_NOMEM, "no memory for a symmetry");
     const int half = g->nodes[a] - 1;
     size_t at = 0;
-    for (int pass = 0; pass < 2; pass++) /* rings are counted before layers are */
+    for (int pass = 0; pass < 2; pass++) /* layers need the count of rings */
         for (at = 0; at < g->base.n_theta; at++) {
             const int p[3] = {(int)(at % (size_t)g->nodes[0]),
                               (int)(at / (size_t)g->nodes[0] % (size_t)g->nodes[1]),
