@@ -130,7 +130,7 @@ function layers_of(item) {
             const own = set.length === 3 ? key : item.channels.length === 1 ? "" : item.channels[set[0]];
             layers.push(new Layer([item.name, own].filter(Boolean).join(" · "), item.width, item.height,
                 set.map((c) => plane(mean, c)), se ? set.map((c) => plane(se, c)) : set.every((c) => error_of.has(c)) ? set.map((c) => plane(mean, error_of.get(c))) : null,
-                {signed: item.kind === "derivative", unit: item.unit || "", view: item.view || 0, role: key ? "" : item.role || "",
+                {signed: item.kind === "derivative", unit: item.unit || "", view: item.view || 0, role: key ? "" : item.role || "", not_finite: layers.length ? 0 : item.not_finite || 0, of_channels: item.channels.length,
                  luminance: set.length === 3 || last(set[0]) === "Y"}));
         }
     }

@@ -167,6 +167,8 @@ function picture_section(layers, live) {
             make("label", {}, false_box, "false colour"), make("label", {}, beside_box, "side by side"),
             make("span", {class: "faint"}, "keys 1 to 9 change the layer; on the picture: arrows, + and -, 0; drag moves it")),
         make("div", {class: "stage"}, make("div", {}, canvases, scale_box), readout));
+    const bad = layers.filter((l) => l.not_finite > 0 && !l.name.endsWith(".interval")); /* there NaN: no interval */
+    if (bad.length) section.append(make("p", {class: "warning"}, `Numbers that are not finite (NaN or infinite) are drawn in magenta: ${bad.slice(0, 5).map((l) => `${l.name}: ${l.not_finite}${l.not_finite === l.planes[0].length * l.of_channels ? ", all of it" : ""}`).join("; ")}.`));
     rebuild();
     /* New layers take the place of those with the same names; the rest of the view stays. */
     section.update = (fresh) => {

@@ -39,8 +39,9 @@ def look(page, script):
     """What `script`, the body of a function, returns in the page."""
     text = open(page, encoding="utf-8").read()
     end = text.rindex("</body>")
-    probe = "<script>{ let found; try { found = (() => { %s })(); } catch (error) { found = {error: String(error.stack)}; }" \
-            " const out = document.createElement('pre'); out.id = 'found'; out.textContent = JSON.stringify(found); document.body.append(out); }</script>" % script
+    probe = "<script>(function wait() { if (document.documentElement.dataset.ready !== '1') { setTimeout(wait, 20); return; }" \
+            " let found; try { found = (() => { %s })(); } catch (error) { found = {error: String(error.stack)}; }" \
+            " const out = document.createElement('pre'); out.id = 'found'; out.textContent = JSON.stringify(found); document.body.append(out); })()</script>" % script
     copy = os.path.join(os.path.dirname(page), "probe.html")
     open(copy, "w", encoding="utf-8").write(text[:end] + probe + text[end:])
     done = subprocess.run([browser, "--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=20000",

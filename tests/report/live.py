@@ -127,6 +127,7 @@ try:
     ok(tab.wait("""document.querySelector("#loss svg") && document.querySelectorAll("#parameters tbody tr").length === 3"""), "a fit shows its numbers and its loss as it runs")
     tab.click(*centre(tab, "#do-stop"))
     ok(tab.wait(said + """.startsWith("fit: stopped")"""), "stop stops it")
+    time.sleep(0.5) # what was sent before is unpacked behind the news of its state
     at = tab.run("""return document.querySelector("#parameters tbody").textContent""")
     time.sleep(0.5)
     still = tab.run("""return document.querySelector("#parameters tbody").textContent""")
