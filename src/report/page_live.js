@@ -84,10 +84,30 @@ function live_section(report, page) {
         all.forEach((n, i) => { if (is_number(n.value) && !pending.has(n.name)) state.sliders[i].set(n.value); });
         enable();
     });
-    let before = Promise.resolve(); /* what came first is shown first */
-    on("report", (part) => { before = before.then(() => unpack(part.items)).then(() => take(part)).catch((error) => { said.textContent = String(error.message || error); }); });
+    /* What a page is too slow for is not shown: of items that take each other's place the
+     * last. */
+    const key = (i) => (i.kind === "walks" ? i.kind : [i.kind, i.name, i.role, i.view].join("\n"));
+    const waiting = new Map();
+    let busy = false;
+    on("report", async (part) => {
+        for (const item of part.items) waiting.set(key(item), item);
+        if (busy) return;
+        busy = true;
+        while (waiting.size) {
+            const items = [...waiting.values()];
+            waiting.clear();
+            try {
+                await unpack(items);
+                take({items});
+            } catch (error) {
+                said.textContent = String(error.message || error);
+            }
+            await new Promise((next) => setTimeout(next)); /* news first */
+        }
+        busy = false;
+    });
     function take(part) {
-        const kinds = [...new Set(part.items.map((i) => i.kind))], key = (i) => (i.kind === "walks" ? i.kind : [i.kind, i.name, i.role, i.view].join("\n"));
+        const kinds = [...new Set(part.items.map((i) => i.kind))];
         for (const item of part.items) {
             const at = report.items.findIndex((i) => key(i) === key(item));
             if (at >= 0) report.items[at] = item;
