@@ -145,7 +145,9 @@ static void fits(imp_context *ctx, const char *name, enum imp_points points)
         imp_film_destroy(film);
     }
     const double share = (double)held / (N * FITS);
-    tap_ok(share >= 0.93 && share <= 0.975 && z2.mean > 0.75 && z2.mean < 1.2,
+    /* Rare bright walks make a picture's errors and its told errors large together, so that
+     * the mean of z^2 lies below 1. */
+    tap_ok(share >= 0.93 && share <= 0.975 && z2.mean > 0.65 && z2.mean < 1.2,
            "fits, %s, %s # %.1f %% of intervals hold the truth, mean z^2 %.2f", name,
            points == IMP_POINTS_SOBOL ? "sobol" : "independent", 100 * share, z2.mean);
     imp_scene_destroy(scene);
