@@ -145,9 +145,7 @@ static void fits(imp_context *ctx, const char *name, enum imp_points points)
         imp_film_destroy(film);
     }
     const double share = (double)held / (N * FITS);
-    /* Rare bright walks make a picture's errors and its told errors large together, so that
-     * the mean of z^2 lies below 1. */
-    tap_ok(share >= 0.93 && share <= 0.975 && z2.mean > 0.65 && z2.mean < 1.2,
+    tap_ok(share >= 0.93 && share <= 0.975 && z2.mean > 0.75 && z2.mean < 1.2,
            "fits, %s, %s # %.1f %% of intervals hold the truth, mean z^2 %.2f", name,
            points == IMP_POINTS_SOBOL ? "sobol" : "independent", 100 * share, z2.mean);
     imp_scene_destroy(scene);
@@ -155,11 +153,11 @@ static void fits(imp_context *ctx, const char *name, enum imp_points points)
 
 int main(int argc, char **argv)
 {
-    static const char *const filters[] = {"box", "tent", "gaussian", "mitchell"};
+    static const char *const filters[] = {"tent", "gaussian", "mitchell"};
     imp_context *ctx = test_context(2);
     filter(ctx, "gaussian", IMP_POINTS_INDEPENDENT);
     filter(ctx, "tent", IMP_POINTS_SOBOL);
-    for (int f = 0; argc > 1 && strcmp(argv[1], "long") == 0 && f < 4; f++) {
+    for (int f = 0; argc > 1 && strcmp(argv[1], "long") == 0 && f < 3; f++) {
         fits(ctx, filters[f], IMP_POINTS_INDEPENDENT);
         fits(ctx, filters[f], IMP_POINTS_SOBOL);
     }
