@@ -1115,7 +1115,7 @@ imp_optimizer_step(const struct imp_optimizer_rule *rule, size_t n,
 
 /** One line of a gradient check: a method, a parameter, two numbers that must agree. */
 struct imp_check_row {
-    const char *method; /**< "frozen", "fresh", "dot", "euler", "density", "loss";
+    const char *method; /**< "frozen", "fresh", "dot", "euler", "density", "loss", "ends";
                              "uniform", "energy", "aim" (imp_check_options.sampling) */
     const char *param;
     double step;                 /**< of a difference; 0: none */

@@ -97,15 +97,22 @@ static enum imp_status check(imp_problem *p, const struct imp_check_options *opt
     c.run.progress = inner_progress;
     c.run.progress_payload = &c;
     if (c.options.fresh_spp > 0) c.run.spp = c.options.fresh_spp;
-    IMP_TRY(imp__problem_tracer(p, &c.outer, NULL, &c.tracer));
+    IMP_TRY(imp__problem_tracer_of_any_end(p, &c.outer, NULL, &c.tracer));
+    const bool lights = c.tracer.integrator->from_lights;
+    if (lights && c.options.sampling)
+        IMP_TRY(
+            imp__error(p->ctx, IMP_E_UNSUPPORTED,
+                       "sampling is checked of walks from the sensor; let walks begin "
+                       "there"));
     imp__arena_free(&p->check_arena);
 
     if (c.options.sampling) {
         ended = imp__check_sampling(&c);
     } else {
-        ended = imp__check_frozen(&c);
+        if (!lights) ended = imp__check_frozen(&c);
         if (ended == IMP_OK) ended = imp__check_fresh(&c);
-        if (ended == IMP_OK) ended = imp__check_losses(&c);
+        if (ended == IMP_OK && !lights) ended = imp__check_losses(&c);
+        if (ended == IMP_OK) ended = imp__check_ends(&c);
     }
     if (ended != IMP_OK && ended != IMP_CANCELLED) IMP_TRY(ended);
     struct imp_check_row *kept =

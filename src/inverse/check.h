@@ -34,6 +34,7 @@ double imp__check_scale(const struct imp_param *p, size_t e);
 enum imp_status imp__check_frozen(struct imp__check *c); /* frozen, dot, euler */
 enum imp_status imp__check_fresh(struct imp__check *c);
 enum imp_status imp__check_losses(struct imp__check *c);
+enum imp_status imp__check_ends(struct imp__check *c);
 enum imp_status imp__check_sampling(struct imp__check *c); /* uniform, energy, aim */
 enum imp_status imp__check_aims(struct imp__check *c, const struct imp_tracer *tracer);
 

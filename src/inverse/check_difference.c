@@ -47,6 +47,25 @@ int imp__fresh_batch(const struct imp__fresh *f)
     return (int)fmin(ceil(spp * f->more / IMP_CHECK_BATCHES), 1 << 24);
 }
 
+/* The same by walks from the lights. */
+static enum imp_status functional_of_lights(struct imp__fresh *f, const double *x_dot,
+                                            uint64_t seed, double *value)
+{
+    struct imp_problem *p = f->check->problem;
+    struct imp_run run = f->check->run;
+    struct imp_estimate F = {0, 0, 0};
+    double *g = x_dot ? imp__alloc(p->ctx, p->n, sizeof *g) : NULL;
+    if (x_dot && !g) return imp__error(p->ctx, IMP_E_NOMEM, "no memory for a check");
+    run.spp = imp__fresh_batch(f);
+    run.seed = seed;
+    const enum imp_status st =
+        imp_problem_functional(p, f->pattern, &run, x_dot ? NULL : &F, g, NULL);
+    *value = F.value;
+    for (size_t k = 0; g && k < p->n; k++) *value += x_dot[k] * g[k];
+    imp__release(p->ctx, g);
+    return st;
+}
+
 /* F, or its derivative along x_dot, with the random numbers of `seed`. */
 static enum imp_status functional(struct imp__fresh *f, const double *x_dot,
                                   uint64_t seed, double *value)
@@ -61,6 +80,8 @@ static enum imp_status functional(struct imp__fresh *f, const double *x_dot,
                                         .sample = sample,
                                         .payload = &t};
     imp_film *film = NULL;
+    if (t.tracer.integrator->from_lights)
+        return functional_of_lights(f, x_dot, seed, value);
     if (!x_dot) t.tracer.active = NULL, t.tracer.value_only = true;
     run.spp = imp__fresh_batch(f);
     run.seed = t.tracer.seed = seed;

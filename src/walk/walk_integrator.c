@@ -79,10 +79,10 @@ out:
 
 /* If nobody wrote weights: path draws from kernels, and towards proxies, which are there to
  * be aimed at; photons, which no connection helps, towards lights as well. */
-static enum imp_status mixture_ready(struct imp_scene *scene,
-                                     const struct imp_integrator *i)
+static enum imp_status mixture_settle(struct imp_scene *scene,
+                                      const struct imp_integrator *i,
+                                      struct imp_walk_integrator *w)
 {
-    struct imp_walk_integrator *w = i->self;
     if (!w->mixing) {
         w->mixing = imp__arena_array(&scene->arena, 1, sizeof *w->mixing);
         if (!w->mixing)
@@ -109,6 +109,12 @@ static enum imp_status mixture_ready(struct imp_scene *scene,
                           "to 0",
                           i->ops->name);
     return st;
+}
+
+static enum imp_status mixture_ready(struct imp_scene *scene,
+                                     const struct imp_integrator *i)
+{
+    return mixture_settle(scene, i, i->self);
 }
 
 /* The same from the other end. */
@@ -329,13 +335,13 @@ out:
     return st;
 }
 
-/* Without media they are walks of surfaces alone. */
+/* Without media they are walks of surfaces alone. From the sensor they are those of path. */
 static enum imp_status ptracer_ready(struct imp_scene *scene,
                                      const struct imp_integrator *i)
 {
     struct imp_walk_integrator *w = i->self;
     w->media = w->other_end->media = scene->n_media > 0 || scene->priorities;
-    return IMP_OK;
+    return mixture_settle(scene, i, w->other_end);
 }
 
 const struct imp_integrator_ops imp__integrator_path = {

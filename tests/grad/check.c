@@ -12,9 +12,10 @@
 static imp_context *ctx;
 
 struct counts {
-    int rows, failed, frozen, dot, euler, fresh, noisy, density, wrong_density, loss;
+    int rows, failed, frozen, dot, euler, fresh, noisy, density, wrong_density, loss,
+        ends;
     bool plain; /* z is (value - reference)/se */
-    double worst_exact, worst_frozen, worst_z;
+    double worst_exact, worst_frozen, worst_z, worst_end;
 };
 
 static struct counts check(imp_problem *p, int paths, int spp, uint64_t seed)
@@ -48,6 +49,9 @@ static struct counts check(imp_problem *p, int paths, int spp, uint64_t seed)
         } else if (!strcmp(r->method, "density")) {
             n.density++;
             n.wrong_density += !r->ok;
+        } else if (!strcmp(r->method, "ends")) {
+            n.ends++;
+            n.worst_end = fmax(n.worst_end, r->error);
         } else if (!strcmp(r->method, "loss")) {
             n.loss++;
         } else {
@@ -60,7 +64,7 @@ static struct counts check(imp_problem *p, int paths, int spp, uint64_t seed)
 }
 
 static void passes(imp_scene *s, const char *what, int paths, int spp, int frozen,
-                   int euler, int fresh)
+                   int euler, int fresh, int ends)
 {
     imp_problem *p = NULL;
     test_must(ctx, imp_problem_create(s, &p));
@@ -70,11 +74,11 @@ static void passes(imp_scene *s, const char *what, int paths, int spp, int froze
     const struct counts n = check(p, paths, spp, 5);
     imp_problem_get_x(p, after);
     tap_ok(n.failed == 0 && n.frozen == frozen && n.dot == 1 && n.euler == euler &&
-               n.fresh == fresh && n.plain && n.loss == 8,
+               n.fresh == fresh && n.plain && n.loss == 8 && n.ends == ends,
            "%s # frozen %d (worst %.1e), dot, euler %d (worst %.1e), "
-           "fresh %d (worst z %.2f), failed %d, noisy %d",
+           "fresh %d (worst z %.2f), ends %d (%.2f), failed %d, noisy %d",
            what, n.frozen, n.worst_frozen, n.euler, n.worst_exact, n.fresh, n.worst_z,
-           n.failed, n.noisy);
+           n.ends, n.worst_end, n.failed, n.noisy);
     tap_ok(!memcmp(before, after, imp_problem_n(p) * sizeof *before),
            "and leaves the scene alone");
     imp_problem_destroy(p);
@@ -150,6 +154,48 @@ static void wrong_densities(void)
         }
     const struct counts n = check(p, 0, 1, 5);
     tap_ok(n.density == 3 && !n.wrong_density, "and the right one is not");
+    imp_problem_destroy(p);
+    imp_scene_destroy(s);
+}
+
+/* Walks from a light whose density is not the one they are drawn with. */
+static const struct imp_emitter_ops *right_light;
+static bool wrong_emission(const struct imp_emitter *e, const struct imp_ball *scene,
+                           const double u[4], struct imp_emission_sample *out)
+{
+    const bool drawn = right_light->sample_emission(e, scene, u, out);
+    out->pdf_p *= 1.15;
+    return drawn;
+}
+
+/* No check of one end alone sees it: pictures and gradients are wrong alike. */
+static void wrong_end(void)
+{
+    imp_scene *s = test_scene(ctx, "cornell.xml", IMP_RGB, "res=16");
+    imp_problem *p = test_problem(ctx, s, "*");
+    struct imp_emitter *light = s->emitters[0];
+    right_light = light->ops;
+    struct imp_emitter_ops wrong = *right_light;
+    wrong.sample_emission = wrong_emission;
+    light->ops = &wrong;
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_check_options o = IMP_CHECK_OPTIONS_INIT;
+    const struct imp_check_row *rows;
+    size_t n, caught = 0, other = 0;
+    run.spp = 400;
+    run.from = IMP_FROM_LIGHTS;
+    o.fresh_spp = 64;
+    for (int k = 0; k < 2; k++) {
+        caught = other = 0;
+        test_must(ctx, imp_check(p, &o, &run, &rows, &n));
+        for (size_t i = 0; i < n; i++)
+            *(strcmp(rows[i].method, "ends") ? &other : &caught) += rows[i].ok == 0;
+        tap_ok(other == 0 && (k == 0 ? caught >= 6 : caught == 0),
+               k == 0 ? "light that is drawn with another density is caught # %zu rows"
+                      : "and walks from the lights that are right are not # %zu rows",
+               caught);
+        light->ops = right_light;
+    }
     imp_problem_destroy(p);
     imp_scene_destroy(s);
 }
@@ -240,24 +286,24 @@ int main(void)
     ctx = test_context(0);
     imp_scene *s = test_scene(ctx, "stam.xml", IMP_MONO, "res=16");
     /* seven controls; emission, sphere, walls */
-    passes(s, "Stam's box", 1000, 256, 7 * 4, 3, 7);
+    passes(s, "Stam's box", 1000, 256, 7 * 4, 3, 7, 0);
     imp_scene_destroy(s);
     s = test_scene(ctx, "stam.xml", IMP_MONO,
                    "res=16 variant=reciprocal sampling=cosine");
-    passes(s, "Stam's box, reciprocal, cosine sampling", 300, 64, 7 * 4, 3, 7);
+    passes(s, "Stam's box, reciprocal, cosine sampling", 300, 64, 7 * 4, 3, 7, 0);
     imp_scene_destroy(s);
     s = test_scene(ctx, "cornell.xml", IMP_RGB, "res=16");
     /* white, red, green, lamp, light: three numbers each */
-    passes(s, "Cornell box", 300, 32, 5 * 4, 1, 15);
+    passes(s, "Cornell box", 300, 32, 5 * 4, 1, 15, 16);
     imp_scene_destroy(s);
     s = scene_open(ctx, ball_xml, IMP_RGB);
-    passes(s, "ball under a sky", 300, 64, 2 * 4, 1, 6);
+    passes(s, "ball under a sky", 300, 64, 2 * 4, 1, 6, 0);
 
     /* Parameters that are exactly zero, and at an upper bound. */
     size_t k;
     test_must(ctx, imp_scene_find_param(s, "ball.reflectance.value", &k));
     test_must(ctx, imp_scene_set_values(s, k, 3, (double[]){0, 1, 0.5}));
-    passes(s, "at the bounds", 300, 64, 2 * 4, 1, 6);
+    passes(s, "at the bounds", 300, 64, 2 * 4, 1, 6, 0);
 
     imp_problem *p = NULL;
     const struct imp_check_row *rows = NULL;
@@ -277,6 +323,7 @@ int main(void)
     imp_scene_destroy(s);
     planted();
     more_samples();
+    wrong_end();
     wrong_densities();
     black_and_white();
     imp_context_destroy(ctx);
