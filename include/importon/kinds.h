@@ -75,6 +75,9 @@ enum imp_input_flags {
                                    size */
     IMP_INPUT_LINEAR = 32768,   /* colours become spectra by the linear basis, so that
                                    inputs add as their colours do */
+    IMP_INPUT_WAVELENGTH = 131072, /* no property: the wavelength of each lane, in nm, of
+                                      a kind whose rule depends on it; 0 where lanes are
+                                      colours */
     IMP_INPUT_BUMP = 65536 /* a texture, read as one number, of which the slope counts:
                                    lanes 0..2 are the normal, not unit, of the surface that
                                    is raised by the texture times the property scale, in

@@ -204,6 +204,15 @@ const struct imp_spectrum imp__daylight = {.form = IMP_SPECTRUM_POINTS,
                                            .hi = IMP_CIE_LAST_NM,
                                            .over = &daylight_unit};
 
+/* A power of two: nothing is rounded. */
+static const double wavelength_ends[2] = {0, 131072};
+const struct imp_spectrum imp__wavelength = {.form = IMP_SPECTRUM_POINTS,
+                                             .n = 2,
+                                             .value = wavelength_ends,
+                                             .nm = wavelength_ends,
+                                             .per_nm = 1. / 131072,
+                                             .hi = 131072};
+
 /* ---- Colour ---------------------------------------------------------------------- */
 
 void imp__spectrum_color(const struct imp_spectrum *s, bool daylight, double rgb[3])

@@ -90,6 +90,9 @@ void imp__spectrum_update(struct imp_spectrum *s);
 /* Daylight D65, 1 as a white of luminance 1. */
 extern const struct imp_spectrum imp__daylight;
 
+/* The wavelength itself, in nm. */
+extern const struct imp_spectrum imp__wavelength;
+
 /* One that lives as long as the arena, with room for n numbers, which are copied, as are
  * the wavelengths (NULL: none). NULL if out of memory. */
 struct imp_spectrum *imp__spectrum_make(struct imp_arena *arena,

@@ -278,10 +278,11 @@ static enum imp_status texture_inputs_check(imp_context *context, const char *fu
 {
     IMP_CHECKED(inputs_check(context, function, inputs));
     for (const struct imp_input_desc *d = inputs; d && d->name; d++)
-        if (d->flags & IMP_INPUT_LUMINANCE)
-            return imp__error(context, IMP_E_ARG,
-                              "%s: ops: input '%s': IMP_INPUT_LUMINANCE in a texture",
-                              function, d->name);
+        if (d->flags & (IMP_INPUT_LUMINANCE | IMP_INPUT_WAVELENGTH))
+            return imp__error(
+                context, IMP_E_ARG, "%s: ops: input '%s': IMP_INPUT_%s in a texture",
+                function, d->name,
+                d->flags & IMP_INPUT_LUMINANCE ? "LUMINANCE" : "WAVELENGTH");
     return IMP_OK;
 }
 

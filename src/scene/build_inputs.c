@@ -164,12 +164,13 @@ static enum imp_status input_build(struct imp_scene *scene, struct imp_node *nod
                                        .any_size = d->flags & IMP_INPUT_EXTINCTION,
                                        .linear = scene->linear_colors ||
                                                  d->flags & IMP_INPUT_LINEAR};
-    imp__node_ask(node, d->name);
     *in = (struct imp_input){.param = -1, .scalar = scalar};
-    if (d->flags & IMP_INPUT_LUMINANCE) {
+    if (d->flags & (IMP_INPUT_LUMINANCE | IMP_INPUT_WAVELENGTH)) {
         in->count = 1;
+        if (d->flags & IMP_INPUT_WAVELENGTH) in->spectrum = &imp__wavelength;
         return IMP_OK;
     }
+    imp__node_ask(node, d->name);
 
     const bool bump = d->flags & IMP_INPUT_BUMP;
     if ((bump || d->flags & IMP_INPUT_VECTOR) &&
