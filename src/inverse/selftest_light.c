@@ -11,7 +11,9 @@ struct light {
     const struct imp_emitter *e;
     int channels;
     imp_v3 ref;
+    const struct imp_carried *carried; /* in spectral modes: four wavelengths */
 };
+static const struct imp_carried waves = {4, {460, 530, 600, 670}};
 
 static double brightness(const struct light *l, imp_spec le)
 {
@@ -49,18 +51,21 @@ static bool light_hit(const struct light *l, imp_v3 d, struct imp_hit *hit,
 
 static double radiance(const struct light *l, const struct imp_emission *x, imp_v3 p)
 {
-    return brightness(l, imp__emitter_radiance(l->scene, l->e->index, x, p, NULL));
+    return brightness(l, imp__emitter_radiance(l->scene, l->e->index, x, p, l->carried));
 }
 
-/* Directions that can meet the light: a cone around its shape, or all. */
+/* Directions that can meet the light: a cone around its shape, or all. Of a sky, half of
+ * them are drawn from a cone about its brightest spot, which may be as small as the sun. */
 struct cone {
     struct imp_frame frame;
     double height; /* 1 - cosine of its angle */
+    bool spot;
 };
+#define SPOT_HEIGHT 2e-4 /* of an angle of 1.15 degrees */
 static struct cone cone_of(const struct light *l)
 {
     const struct imp_shape *s = l->e->shape;
-    struct cone c = {imp__frame_from_normal(imp__v3(0, 0, 1)), 2};
+    struct cone c = {imp__frame_from_normal(imp__v3(0, 0, 1)), 2, false};
     if (!s) return c;
     const imp_v3 to = (s->lo + s->hi) * 0.5 - l->ref;
     const double d = imp__length(to), r = 0.5001 * imp__length(s->hi - s->lo);
@@ -68,6 +73,24 @@ static struct cone cone_of(const struct light *l)
     c.frame = imp__frame_from_normal(to * (1 / d));
     c.height = 1 - sqrt(1 - imp__sqr(r / d));
     return c;
+}
+
+/* A sky's brightest direction of some that it draws. */
+static void spot_set(const struct light *l, uint64_t seed, struct cone *c)
+{
+    double most = -1;
+    for (uint32_t k = 0; k < 1000; k++) {
+        const struct imp_key key = imp__key(seed, 399, k);
+        const double u[2] = {imp__u01(key, 0), imp__u01(key, 1)};
+        struct imp_light_sample s;
+        if (!l->e->ops->sample(l->e, &l->ref, u, &s) || !(s.pdf > 0)) continue;
+        const struct imp_emission x = {.dist = INFINITY, .cos_light = 1, .d = -s.wi};
+        const double value = radiance(l, &x, (imp_v3){0});
+        if (!(value > most)) continue;
+        most = value;
+        c->frame = imp__frame_from_normal(s.wi);
+        c->spot = true;
+    }
 }
 
 /* ---- What is measured -------------------------------------------------------------- */
@@ -85,7 +108,8 @@ static double derivative_error(const struct light *l, const struct imp_emission 
                                imp_v3 p)
 {
     const struct imp_emitter *e = l->e;
-    struct imp_texcoord at = {.uv = {x->uv[0], x->uv[1]}, .p = p, .shape = l->e->shape};
+    struct imp_texcoord at = {
+        .uv = {x->uv[0], x->uv[1]}, .p = p, .carried = l->carried, .shape = l->e->shape};
     imp_spec in[IMP_INPUTS_MAX], d[IMP_INPUTS_MAX], f, up, down;
     double worst = 0;
     imp__emitter_place(e, x, &at);
@@ -93,15 +117,21 @@ static double derivative_error(const struct light *l, const struct imp_emission 
     e->ops->eval(e, in, x, &f);
     e->ops->eval_d(e, in, x, d);
     for (int j = 0; j < e->n_in; j++) {
+        if (e->ops->inputs[j].flags & IMP_INPUT_WAVELENGTH) continue;
         const imp_spec was = in[j];
         for (int c = 0; c < l->channels; c++) {
             const double h = 1e-4 * fmax(fabs(was[c]), 0.1);
-            in[j] = was + h;
-            e->ops->eval(e, in, x, &up);
-            in[j] = was - h;
-            e->ops->eval(e, in, x, &down);
+            double step[2]; /* slopes of h and h/2: extrapolated, for corners */
+            for (int k = 0; k < 2; k++) {
+                const double half = k ? 0.5 * h : h;
+                in[j] = was + half;
+                e->ops->eval(e, in, x, &up);
+                in[j] = was - half;
+                e->ops->eval(e, in, x, &down);
+                step[k] = (up[c] - down[c]) / (2 * half);
+            }
             in[j] = was;
-            const double slope = (up[c] - down[c]) / (2 * h);
+            const double slope = 2 * step[1] - step[0];
             const double error =
                 fabs(slope - d[j][c]) / (fabs(d[j][c]) + 1e-3 * fabs(f[c]) + 1e-12);
             worst = fmax(worst, isfinite(error) ? error : INFINITY);
@@ -149,7 +179,13 @@ static double draw_take(const struct light *l, const double u[2], struct found *
 static double cone_take(const struct light *l, const struct cone *c, const double u[2],
                         struct found *r)
 {
-    const double z = 1 - c->height * u[0], s = sqrt(fmax(0, (1 - z) * (1 + z)));
+    const bool inside = c->spot && u[0] < 0.5;
+    const double first = c->spot ? 2 * u[0] - !inside : u[0];
+    const double away = (inside ? SPOT_HEIGHT : c->height) * first;
+    const double z = 1 - away, s = sqrt(fmax(0, away * (2 - away)));
+    const double share = /* density of the direction times 2 pi */
+        c->spot ? 0.5 / c->height + (away < SPOT_HEIGHT ? 0.5 / SPOT_HEIGHT : 0)
+                : 1 / c->height;
     const imp_v3 d = imp__to_world(
         &c->frame, imp__v3(s * cos(IMP_2PI * u[1]), s * sin(IMP_2PI * u[1]), z));
     struct imp_hit hit;
@@ -167,7 +203,7 @@ static double cone_take(const struct light *l, const struct cone *c, const doubl
     if (!sane) return 0;
     r->uncovered += value > 0 && !(pdf > 0);
     r->error = fmax(r->error, derivative_error(l, &x, p));
-    return value * IMP_2PI * c->height;
+    return value * IMP_2PI / share;
 }
 
 /* ---- A sky ------------------------------------------------------------------------- */
@@ -196,10 +232,16 @@ static enum imp_status light(struct imp__selftest *t, const struct imp_emitter *
                sky = e->ops->flags & IMP_EMITTER_ENVIRONMENT;
     const int n = t->options.samples / t->options.directions + 1;
     for (int i = 0; i < t->options.directions; i++) {
-        struct light l = {.scene = t->scene, .e = e, .channels = t->scene->channels};
+        const bool spectral =
+            t->scene->mode == IMP_SPECTRAL || t->scene->mode == IMP_SINGLE;
+        struct light l = {.scene = t->scene,
+                          .e = e,
+                          .channels = t->scene->channels,
+                          .carried = spectral ? &waves : NULL};
         struct imp__mean own = {0}, other = {0};
         l.ref = reference(t->scene, imp__key(t->options.seed, 31, (uint64_t)i));
-        const struct cone cone = cone_of(&l);
+        struct cone cone = cone_of(&l);
+        if (sky) spot_set(&l, t->options.seed, &cone);
         for (int k = 0; k < n; k++) {
             const struct imp_key key =
                 imp__key(t->options.seed, 400 + (uint64_t)i, (uint64_t)k);
