@@ -1,5 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "emission.h"
+#include "kind/shape/shape.h"
+#include "math/transform.h"
 #include "math/warp.h"
 
 void imp__even_eval(const struct imp_emitter *e, const imp_spec *in,
@@ -87,4 +89,22 @@ double imp__sky_emission_pdf(const struct imp_emitter *e, const struct imp_emiss
 {
     const imp_v3 wi = -x->d;
     return e->ops->pdf(e, &wi, &wi, NULL, NULL);
+}
+
+enum imp_status imp__sky_axes(const struct imp_build *b, imp_v3 axis[3])
+{
+    struct imp_mat4 m;
+    enum imp_status st = imp_build_transform(b, "to_world", m.m);
+    if (st != IMP_OK) return st;
+    const double scale = imp__length(imp__mat4_column(&m, 0));
+    bool fine = imp__mat4_is_finite(&m) && imp__mat4_is_affine(&m) && scale > 0;
+    for (int k = 0; k < 3; k++) axis[k] = imp__mat4_column(&m, k) * (1 / scale);
+    for (int k = 0; fine && k < 3; k++)
+        fine = fabs(imp__length(axis[k]) - 1) < 1e-6 &&
+               fabs(imp__dot(axis[k], axis[(k + 1) % 3])) < 1e-6;
+    if (!fine)
+        return imp_build_error(b, "to_world", IMP_E_SCENE,
+                               "to_world of an environment can turn and mirror it only");
+    for (int k = 0; k < 3; k++) axis[k] = imp__normalize(axis[k]);
+    return IMP_OK;
 }

@@ -14,7 +14,8 @@
     X(imp__envmap)                                                                       \
     X(imp__directional)                                                                  \
     X(imp__spot_light)                                                                   \
-    X(imp__projector)
+    X(imp__projector)                                                                    \
+    X(imp__sunsky)
 
 #define DECLARE(kind) extern const struct imp_emitter_ops kind;
 EMITTERS(DECLARE)

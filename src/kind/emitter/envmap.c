@@ -20,7 +20,6 @@
 #include "kind/build.h"
 #include "kind/shape/shape.h"
 #include "kind/texture/bitmap.h"
-#include "math/transform.h"
 #include "math/warp.h"
 #include "math/weight_table.h"
 #include "sphere_map.h"
@@ -92,24 +91,6 @@ static enum imp_status texels_check(const struct imp_build *b,
     return IMP_OK;
 }
 
-static enum imp_status axes_set(const struct imp_build *b, imp_v3 axis[3])
-{
-    struct imp_mat4 m;
-    enum imp_status st = imp_build_transform(b, "to_world", m.m);
-    if (st != IMP_OK) return st;
-    const double scale = imp__length(imp__mat4_column(&m, 0));
-    bool fine = imp__mat4_is_finite(&m) && imp__mat4_is_affine(&m) && scale > 0;
-    for (int k = 0; k < 3; k++) axis[k] = imp__mat4_column(&m, k) * (1 / scale);
-    for (int k = 0; fine && k < 3; k++)
-        fine = fabs(imp__length(axis[k]) - 1) < 1e-6 &&
-               fabs(imp__dot(axis[k], axis[(k + 1) % 3])) < 1e-6;
-    if (!fine)
-        return imp_build_error(b, "to_world", IMP_E_SCENE,
-                               "to_world of an environment can turn and mirror it only");
-    for (int k = 0; k < 3; k++) axis[k] = imp__normalize(axis[k]);
-    return IMP_OK;
-}
-
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_emitter *e)
 {
     static const char *const projections[] = {"latlong", "equal_area"};
@@ -124,7 +105,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_e
     IMP_TRY(imp_build_choice(b, "projection", projections, 2, IMP_LATLONG, &projection));
     /* Mitsuba's, for less noise: accepted, without effect here. */
     IMP_TRY(imp_build_bool(b, "mis_compensation", false, &compensation));
-    IMP_TRY(axes_set(b, s->axis));
+    IMP_TRY(imp__sky_axes(b, s->axis));
     if (!data || !imp__bitmap_texels(data, &s->texels))
         IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE,
                                 "needs a picture: 'filename', or a texture of type "

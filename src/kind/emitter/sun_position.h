@@ -1,0 +1,19 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#ifndef IMP_KIND_EMITTER_SUN_POSITION_H
+#define IMP_KIND_EMITTER_SUN_POSITION_H
+
+#include "math/vec.h"
+
+struct imp__sun_date {
+    double latitude, longitude; /* degrees, north and east positive */
+    double timezone;            /* hours east of Greenwich */
+    int year, month, day;
+    double hour, minute, second; /* of that zone's clock */
+};
+
+/* Direction to the sun: z is up, x points south, y west. To .5 arc minutes from 1999 to
+ * 2015 (Blanco-Muriel, Alarcon-Padilla, Lopez-Moratalla and Lara-Coira 2001, "Computing the
+ * solar vector"). */
+imp_v3 imp__sun_direction(const struct imp__sun_date *d);
+
+#endif

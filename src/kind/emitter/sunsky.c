@@ -1,0 +1,411 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * sunsky: the clear sky of skylight.h with its sun, in the frame of Mitsuba's kind: z is up,
+ * and the sun stands at sun_direction, or where it is at a place and a time. Below the
+ * horizon all is black.
+ *
+ *     L = sky_scale L_sky + sun_scale L_sun (r_0/r)^2 inside the disc of radius r
+ *
+ * approximately: the disc may be larger than the sun's, r_0, and its power stays, so that
+ * the factor is the ratio of their solid angles. L_sun is the mean over the disc, or darker
+ * towards its limb and towards the horizon (complex_sun).
+ *
+ * Directions are drawn from the disc, evenly, and from cells of the upper hemisphere by the
+ * luminance of the sky there, with a share of each by its power. */
+#include "color/cie.h"
+#include "color/rgb.h"
+#include "emission.h"
+#include "math/transform.h"
+#include "math/trig.h"
+#include "math/weight_table.h"
+#include "skylight.h"
+#include "sun_position.h"
+
+enum { TURBIDITY, ALBEDO, SKY_SCALE, SUN_SCALE, WAVELENGTH, N_INPUTS };
+
+#define SCALE(key)                                                                       \
+    {                                                                                    \
+        .name = key, .role = IMP_UNBOUNDED,                                              \
+        .flags = IMP_INPUT_SCALAR | IMP_INPUT_NUMBER, .fallback = 1, .unit = "1"         \
+    }
+static const struct imp_input_desc inputs[] = {
+    {.name = "turbidity",
+     .role = IMP_UNBOUNDED,
+     .flags = IMP_INPUT_SCALAR | IMP_INPUT_NUMBER,
+     .fallback = 3,
+     .lo = 1,
+     .hi = 10,
+     .unit = "1"},
+    {.name = "albedo",
+     .role = IMP_REFLECTANCE,
+     .flags = IMP_INPUT_NUMBER,
+     .fallback = 0.3,
+     .hi = 1,
+     .unit = "1"},
+    SCALE("sky_scale"),
+    SCALE("sun_scale"),
+    {.name = "wavelength", .flags = IMP_INPUT_WAVELENGTH, .unit = "nm"},
+    {0}};
+
+#define SUN_RADIUS_DEGREES (0.5358 / 2)
+enum { TURNS = 64, HEIGHTS = 32 }; /* cells, of equal solid angle */
+#define CELL_LEAST  0.02           /* of the mean: what a cell's middle does not see */
+#define SHARE_LEAST 0.05           /* of the sky, and of the sun */
+
+struct sunsky {
+    struct imp__skylight light;
+    imp_v3 axis[3], sun; /* of the sky, unit, world; the sun in their frame */
+    double cos_radius, sun_solid, dim; /* dim: of the disc against the sun's */
+    bool by_wave, mono, limb, dark;    /* dark: the sun is below the horizon */
+    struct imp__weight_table table;
+    double *sun_share; /* of directions that are drawn from the disc */
+};
+
+/* ---- Radiance -------------------------------------------------------------------- */
+
+/* One channel's, with derivatives. */
+struct both {
+    struct imp__sky_value sky, sun;
+};
+
+struct at { /* a direction, in the frame of the sky */
+    double cos_theta, cos_gamma;
+    bool in_disc;
+};
+static struct at at_direction(const struct sunsky *s, imp_v3 w)
+{
+    const double c = imp__dot(w, s->sun);
+    return (struct at){w[2], c, c >= s->cos_radius};
+}
+
+/* The sun's eleven wavelengths. */
+static void sun_waves(const struct sunsky *s, const struct at *x, double turbidity,
+                      struct imp__sky_value out[IMP_SKY_WAVES])
+{
+    if (!s->limb) {
+        imp__sun_mean(&s->light, turbidity, out);
+        return;
+    }
+    const double away = (1 - x->cos_gamma) / (1 - s->cos_radius);
+    imp__sun_radiance(turbidity, asin(x->cos_theta), sqrt(fmax(0, 1 - away)), out);
+}
+
+static void add(struct imp__sky_value *sum, double factor, const struct imp__sky_value *v)
+{
+    sum->value += factor * v->value;
+    sum->by_turbidity += factor * v->by_turbidity;
+    sum->by_albedo += factor * v->by_albedo;
+}
+
+/* At one wavelength: lines between the model's. */
+static void at_wave(const struct sunsky *s, const struct at *x, double turbidity,
+                    double albedo, double nm, const struct imp__sky_value *sun,
+                    struct both *out)
+{
+    const double at = (nm - IMP_SKY_FIRST_NM) / IMP_SKY_STEP_NM;
+    *out = (struct both){0};
+    if (!(at >= 0 && at <= IMP_SKY_WAVES - 1)) return;
+    const int k = (int)fmin(at, IMP_SKY_WAVES - 2);
+    for (int j = 0; j < 2; j++) {
+        const double share = j ? at - k : 1 - (at - k);
+        const struct imp__sky_value sky = imp__sky_radiance(
+            &s->light, k + j, turbidity, albedo, x->cos_theta, x->cos_gamma);
+        add(&out->sky, share, &sky);
+        if (x->in_disc) add(&out->sun, share, &sun[k + j]);
+    }
+}
+
+/* Of colour c: the sky's tables are of colours, in units of luminance. */
+static void at_color(const struct sunsky *s, const struct at *x, double turbidity,
+                     double albedo, int c, const struct imp__sky_value *sun,
+                     struct both *out)
+{
+    const struct imp__sky_value sky =
+        imp__sky_radiance(&s->light, c, turbidity, albedo, x->cos_theta, x->cos_gamma);
+    *out = (struct both){0};
+    add(&out->sky, 1 / IMP_CIE_Y_INTEGRAL, &sky);
+    for (int k = 0; k < IMP_SKY_WAVES && x->in_disc; k++)
+        add(&out->sun, s->light.color[c][k], &sun[k]);
+}
+
+/* All lanes, the sun as dim as its disc is large. */
+static void lanes(const struct sunsky *s, const imp_spec *in, imp_v3 w,
+                  struct both out[4])
+{
+    const struct at x = at_direction(s, w);
+    const double turbidity = in[TURBIDITY][0];
+    struct imp__sky_value sun[IMP_SKY_WAVES];
+    for (int c = 0; c < 4; c++) out[c] = (struct both){0};
+    if (s->dark || !(x.cos_theta >= 0)) return;
+    if (x.in_disc) sun_waves(s, &x, turbidity, sun);
+    for (int c = 0; c < (s->by_wave ? 4 : 3); c++) {
+        const double albedo = in[ALBEDO][s->mono ? 0 : c];
+        if (s->by_wave)
+            at_wave(s, &x, turbidity, albedo, in[WAVELENGTH][c], sun, &out[c]);
+        else at_color(s, &x, turbidity, albedo, c, sun, &out[c]);
+        const struct imp__sky_value full = out[c].sun;
+        out[c].sun = (struct imp__sky_value){0};
+        add(&out[c].sun, s->dim, &full);
+    }
+    if (!s->mono) return;
+    static const double weight[3] = {IMP_LUM_R, IMP_LUM_G, IMP_LUM_B};
+    struct both sum = {0};
+    for (int c = 0; c < 3; c++) {
+        add(&sum.sky, weight[c], &out[c].sky);
+        add(&sum.sun, weight[c], &out[c].sun);
+    }
+    for (int c = 0; c < 4; c++) out[c] = sum;
+}
+
+static imp_v3 local(const struct sunsky *s, imp_v3 w)
+{
+    return imp__v3(imp__dot(w, s->axis[0]), imp__dot(w, s->axis[1]),
+                   imp__dot(w, s->axis[2]));
+}
+
+static void eval(const struct imp_emitter *e, const imp_spec *in,
+                 const struct imp_emission *x, imp_spec *le)
+{
+    const struct sunsky *s = e->self;
+    struct both b[4];
+    lanes(s, in, local(s, -x->d), b);
+    for (int c = 0; c < 4; c++)
+        (*le)[c] = in[SKY_SCALE][0] * b[c].sky.value + in[SUN_SCALE][0] * b[c].sun.value;
+}
+static void eval_d(const struct imp_emitter *e, const imp_spec *in,
+                   const struct imp_emission *x, imp_spec *dle)
+{
+    const struct sunsky *s = e->self;
+    const double sky = in[SKY_SCALE][0], sun = in[SUN_SCALE][0];
+    struct both b[4];
+    lanes(s, in, local(s, -x->d), b);
+    for (int c = 0; c < 4; c++) {
+        dle[TURBIDITY][c] = sky * b[c].sky.by_turbidity + sun * b[c].sun.by_turbidity;
+        dle[ALBEDO][c] = sky * b[c].sky.by_albedo;
+        dle[SKY_SCALE][c] = b[c].sky.value;
+        dle[SUN_SCALE][c] = b[c].sun.value;
+        dle[WAVELENGTH][c] = 0;
+    }
+}
+
+/* ---- Sampling -------------------------------------------------------------------- */
+
+/* Luminance of the sky, and of the sun, in a direction, at the numbers as they stand. */
+static void luminances(const struct imp_emitter *e, imp_v3 w, double *sky, double *sun)
+{
+    const struct sunsky *s = e->self;
+    const imp_spec a = e->input[ALBEDO]->value;
+    const bool one = s->mono || e->input[ALBEDO]->count == 1;
+    imp_spec in[N_INPUTS] = {
+        [TURBIDITY] = e->input[TURBIDITY]->value,
+        [ALBEDO] = imp__spec(one ? a[0] : imp__luminance(a[0], a[1], a[2]))};
+    double y_sky = 0, y_sun = 0;
+    for (int first = 0; first < (s->by_wave ? IMP_SKY_WAVES : 1); first += 4) {
+        struct both b[4];
+        for (int c = 0; c < 4; c++)
+            in[WAVELENGTH][c] = IMP_SKY_FIRST_NM +
+                                IMP_SKY_STEP_NM * imp_min(first + c, IMP_SKY_WAVES - 1);
+        lanes(s, in, w, b);
+        for (int c = 0; c < (s->by_wave ? 4 : 3) && first + c < IMP_SKY_WAVES; c++) {
+            const int k = first + c;
+            const double y =
+                s->by_wave ? imp__luminance(s->light.color[0][k], s->light.color[1][k],
+                                            s->light.color[2][k])
+                           : imp__luminance(c == 0 && !s->mono, c == 1 && !s->mono,
+                                            c == 2 && !s->mono) +
+                                 (s->mono && c == 0);
+            y_sky += y * b[c].sky.value;
+            y_sun += y * b[c].sun.value;
+        }
+    }
+    *sky = y_sky;
+    *sun = y_sun;
+}
+
+static imp_v3 cell_direction(int i, int j, double up, double round)
+{
+    const double z = (i + up) / HEIGHTS, r = sqrt(fmax(0, (1 - z) * (1 + z)));
+    double sine, cosine;
+    imp__sincos_turn((j + round) / TURNS, &sine, &cosine);
+    return imp__v3(r * cosine, r * sine, z);
+}
+
+static void changed(const struct imp_emitter *e)
+{
+    const struct sunsky *s = e->self;
+    struct imp__weight_table t = s->table;
+    double total = 0, unused, sun;
+    for (int i = 0; i < HEIGHTS; i++)
+        for (int j = 0; j < TURNS; j++) {
+            double sum = 0, y;
+            for (int k = 0; k < 4; k++) {
+                luminances(e, cell_direction(i, j, k / 2 ? .75 : .25, k % 2 ? .75 : .25),
+                           &y, &unused);
+                sum += fmax(0, y) / 4;
+            }
+            t.column[i * TURNS + j] = sum;
+            total += sum;
+        }
+    const double mean = total / (HEIGHTS * TURNS);
+    for (int k = 0; k < HEIGHTS * TURNS; k++)
+        t.column[k] += mean > 0 ? CELL_LEAST * mean : 1;
+    imp__weight_table_sum(&t, NULL);
+    luminances(e, s->sun, &unused, &sun);
+    sun = fmax(0, sun) * s->sun_solid * e->input[SUN_SCALE]->value[0];
+    const double sky = mean * IMP_2PI * e->input[SKY_SCALE]->value[0];
+    *s->sun_share =
+        sun + sky > 0 ? imp_clamp(sun / (sun + sky), SHARE_LEAST, 1 - SHARE_LEAST) : 0.5;
+}
+
+static double density(const struct imp_emitter *e, imp_v3 w)
+{
+    const struct sunsky *s = e->self;
+    const struct imp__weight_table *t = &s->table;
+    const struct at x = at_direction(s, w);
+    double p = x.in_disc ? *s->sun_share / s->sun_solid : 0;
+    if (w[2] >= 0) {
+        const double turn = atan2(w[1], w[0]) * (IMP_INV_PI / 2);
+        const int i = imp_min((int)(w[2] * HEIGHTS), HEIGHTS - 1);
+        const int j = imp_min((int)((turn < 0 ? turn + 1 : turn) * TURNS), TURNS - 1);
+        const double *c = t->column + i * TURNS;
+        const double weight = c[j] - (j ? c[j - 1] : 0);
+        p += (1 - *s->sun_share) * weight / imp__weight_table_total(t) *
+             (HEIGHTS * TURNS / IMP_2PI);
+    }
+    return p;
+}
+
+static bool sample(const struct imp_emitter *e, const imp_v3 *ref, const double u[2],
+                   struct imp_light_sample *out)
+{
+    const struct sunsky *s = e->self;
+    const double share = *s->sun_share;
+    imp_v3 d;
+    (void)ref;
+    if (u[0] < share) {
+        const struct imp_frame f = imp__frame_from_normal(s->sun);
+        const double away = u[0] / share * (1 - s->cos_radius);
+        const double r = sqrt(away * (2 - away));
+        double sine, cosine;
+        imp__sincos_turn(u[1], &sine, &cosine);
+        d = imp__normalize(imp__to_world(&f, imp__v3(r * cosine, r * sine, 1 - away)));
+    } else {
+        const double v[2] = {(u[0] - share) / (1 - share), u[1]};
+        double r[2];
+        int i, j;
+        imp__weight_table_draw(&s->table, v, &i, &j, r);
+        d = cell_direction(i, j, r[1], r[0]);
+    }
+    const imp_v3 w = s->axis[0] * d[0] + s->axis[1] * d[1] + s->axis[2] * d[2];
+    *out = (struct imp_light_sample){
+        .wi = w, .dist = INFINITY, .pdf = density(e, local(s, w)), .cos_light = 1};
+    return true;
+}
+
+static double pdf(const struct imp_emitter *e, const imp_v3 *ref, const imp_v3 *wi,
+                  const struct imp_hit *hit, const struct imp_surface *at)
+{
+    (void)ref, (void)hit, (void)at;
+    return density(e, local(e->self, *wi));
+}
+
+/* ---- Building -------------------------------------------------------------------- */
+
+static enum imp_status date_read(const struct imp_build *b, imp_v3 *sun)
+{
+    enum imp_status st = IMP_OK;
+    struct imp__sun_date d;
+    int64_t year, month, day;
+    IMP_TRY(imp_build_float(b, "latitude", 35.6894, &d.latitude));
+    IMP_TRY(imp_build_float(b, "longitude", 139.6917, &d.longitude));
+    IMP_TRY(imp_build_float(b, "timezone", 9, &d.timezone));
+    IMP_TRY(imp_build_int(b, "year", 2010, 1900, 2100, &year));
+    IMP_TRY(imp_build_int(b, "month", 7, 1, 12, &month));
+    IMP_TRY(imp_build_int(b, "day", 10, 1, 31, &day));
+    IMP_TRY(imp_build_float(b, "hour", 15, &d.hour));
+    IMP_TRY(imp_build_float(b, "minute", 0, &d.minute));
+    IMP_TRY(imp_build_float(b, "second", 0, &d.second));
+    d.year = (int)year;
+    d.month = (int)month;
+    d.day = (int)day;
+    if (!(fabs(d.latitude) <= 90))
+        IMP_TRY(imp_build_error(b, "latitude", IMP_E_SCENE,
+                                "latitude = %g is outside [-90, 90]", d.latitude));
+    *sun = imp__sun_direction(&d);
+out:
+    return st;
+}
+
+static enum imp_status sun_read(const struct imp_build *b, struct sunsky *s)
+{
+    static const char *const times[] = {"latitude", "longitude", "timezone",
+                                        "year",     "month",     "day",
+                                        "hour",     "minute",    "second"};
+    enum imp_status st = IMP_OK;
+    double d[3];
+    if (!imp_build_has(b, "sun_direction")) return date_read(b, &s->sun);
+    for (size_t k = 0; k < sizeof times / sizeof *times; k++)
+        if (imp_build_has(b, times[k]))
+            IMP_TRY(
+                imp_build_error(b, times[k], IMP_E_SCENE,
+                                "give sun_direction, or a place and a time, not both"));
+    IMP_TRY(imp_build_vector(b, "sun_direction", (double[3]){0, 0, 1}, d));
+    s->sun = imp__v3(d[0], d[1], d[2]);
+    const double length = imp__length(s->sun);
+    if (!(length > 0) || !isfinite(length))
+        IMP_TRY(imp_build_error(b, "sun_direction", IMP_E_SCENE,
+                                "sun_direction has length %g", length));
+    /* In the world, as the frame of the sky is turned by to_world. */
+    s->sun = local(s, s->sun * imp__spec(1 / length));
+out:
+    return st;
+}
+
+static enum imp_status build(const struct imp_build *b, void *self, struct imp_emitter *e)
+{
+    enum imp_status st = IMP_OK;
+    struct sunsky *s = self;
+    double aperture;
+    const enum imp_color_mode mode = imp_build_color_mode(b);
+    s->mono = mode == IMP_MONO;
+    s->by_wave = mode != IMP_MONO && mode != IMP_RGB;
+    IMP_TRY(imp__sky_axes(b, s->axis));
+    IMP_TRY(sun_read(b, s));
+    IMP_TRY(imp_build_float(b, "sun_aperture", 2 * SUN_RADIUS_DEGREES, &aperture));
+    IMP_TRY(imp_build_bool(b, "complex_sun", false, &s->limb));
+    if (!(aperture > 0 && aperture < 180))
+        IMP_TRY(imp_build_error(b, "sun_aperture", IMP_E_SCENE,
+                                "sun_aperture = %g degrees is outside (0, 180)",
+                                aperture));
+    const double radius = aperture * IMP_PI / 360;
+    const double half = sin(radius / 2), own = sin(SUN_RADIUS_DEGREES * IMP_PI / 360);
+    s->cos_radius = cos(radius);
+    s->sun_solid = 4 * IMP_PI * half * half;
+    s->dim = own * own / (half * half);
+    s->dark = s->sun[2] < 0;
+    imp__skylight_set(&s->light, asin(imp_clamp(s->sun[2], 0.0, 1.0)), radius,
+                      s->by_wave);
+    s->table = (struct imp__weight_table){
+        TURNS, HEIGHTS, imp_build_alloc(b, HEIGHTS, sizeof(double)),
+        imp_build_alloc(b, (size_t)HEIGHTS * TURNS, sizeof(double))};
+    s->sun_share = imp_build_alloc(b, 1, sizeof *s->sun_share);
+    if (!s->table.row || !s->table.column || !s->sun_share)
+        IMP_TRY(imp_build_error(b, NULL, IMP_E_NOMEM, "no memory for a sky"));
+    changed(e);
+out:
+    return st;
+}
+
+const struct imp_emitter_ops imp__sunsky = {.size = sizeof(struct imp_emitter_ops),
+                                            .name = "sunsky",
+                                            .object_size = sizeof(struct sunsky),
+                                            .flags = IMP_EMITTER_ENVIRONMENT,
+                                            .inputs = inputs,
+                                            .build = build,
+                                            .eval = eval,
+                                            .eval_d = eval_d,
+                                            .sample = sample,
+                                            .pdf = pdf,
+                                            .changed = changed,
+                                            .sample_emission = imp__sky_emission_sample,
+                                            .pdf_emission = imp__sky_emission_pdf};
