@@ -78,6 +78,36 @@ static void json_derivatives(struct json *j, const struct block *blocks, size_t 
     json_end_array(j);
 }
 
+/* A number as JSON or as a line; the object stays open for derivatives. */
+static void number_print(struct json *j, const struct imp_sensor_info *info,
+                         const char *channel, struct imp_estimate value,
+                         struct imp_estimate other, int *apart)
+{
+    const double both = hypot(value.se, other.se);
+    const double z = both > 0                     ? (other.value - value.value) / both
+                     : other.value == value.value ? 0
+                                                  : INFINITY;
+    if (o.ends) *apart |= !(fabs(z) <= APART);
+    if (cli.json) {
+        json_object(j, NULL);
+        json_text(j, "sensor", info->name);
+        json_text(j, "channel", channel);
+        json_text(j, "unit", info->unit);
+        json_number(j, "value", value.value);
+        json_number(j, "se", value.se);
+        if (o.ends) {
+            print_number(j, "from_lights", other.value, other.se);
+            json_number(j, "z", z);
+        }
+        return;
+    }
+    printf("%-20s %-3s %-12.6g +- %-8.2g %s", info->name, channel, value.value, value.se,
+           info->unit);
+    if (o.ends)
+        printf("   from the lights %-12.6g +- %-8.2g z %.1f", other.value, other.se, z);
+    printf("\n");
+}
+
 /* One number of one sensor; *apart: do the ends differ? */
 static int number_read(imp_problem *problem, struct json *j, struct imp_run run,
                        const struct imp_sensor_info *info, const char *channel,
@@ -100,36 +130,51 @@ static int number_read(imp_problem *problem, struct json *j, struct imp_run run,
         rc = cli_fail(st, cli.scene_path);
         goto out;
     }
-    const double both = hypot(r.value.se, other.se);
-    const double z = both > 0                       ? (other.value - r.value.value) / both
-                     : other.value == r.value.value ? 0
-                                                    : INFINITY;
-    if (o.ends) *apart |= !(fabs(z) <= APART);
-    if (cli.json) {
-        json_object(j, NULL);
-        json_text(j, "sensor", info->name);
-        json_text(j, "channel", channel);
-        json_text(j, "unit", info->unit);
-        json_number(j, "value", r.value.value);
-        json_number(j, "se", r.value.se);
-        if (o.ends) {
-            print_number(j, "from_lights", other.value, other.se);
-            json_number(j, "z", z);
-        }
-        if (n) json_derivatives(j, blocks, n_blocks, &r);
-        json_end_object(j);
-    } else {
-        printf("%-20s %-3s %-12.6g +- %-8.2g %s", info->name, channel, r.value.value,
-               r.value.se, info->unit);
-        if (o.ends)
-            printf("   from the lights %-12.6g +- %-8.2g z %.1f", other.value, other.se,
-                   z);
-        printf("\n");
-        if (n) print_derivatives(blocks, n_blocks, &r, info->unit);
-    }
+    number_print(j, info, channel, r.value, other, apart);
+    if (n && cli.json) json_derivatives(j, blocks, n_blocks, &r);
+    if (n && !cli.json) print_derivatives(blocks, n_blocks, &r, info->unit);
+    if (cli.json) json_end_object(j);
 out:
     free(r.grad);
     free(r.se);
+    return rc;
+}
+
+/* The film of one pixel of a sensor: mean and standard error of its channels. */
+static int pixel_read(struct imp_run run, int n, struct imp_estimate *out)
+{
+    imp_film *film = NULL;
+    const enum imp_status st = imp_render(cli.scene, &run, &film);
+    if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+    for (int c = 0; c < n; c++)
+        out[c] = (struct imp_estimate){imp_film_mean(film)[c], imp_film_se(film)[c], 0};
+    imp_film_destroy(film);
+    return 0;
+}
+
+/* A specfilm's numbers, one for each response curve. */
+static int curves_read(struct json *j, struct imp_run run,
+                       const struct imp_sensor_info *info, int *apart)
+{
+    const int n = info->n_responses;
+    if (info->width != 1 || info->height != 1)
+        return cli_error(EXIT_USAGE,
+                         "%s: sensor '%s' has %d x %d pixels; of a film with response "
+                         "curves one pixel is read (render makes pictures)",
+                         cli.scene_path, info->name, info->width, info->height);
+    struct imp_estimate *value = cli_alloc(2 * (size_t)n, sizeof *value);
+    struct imp_estimate *other = value + n;
+    if (o.ends) run.from = IMP_FROM_SENSOR;
+    int rc = pixel_read(run, n, value);
+    if (!rc && o.ends) {
+        run.from = IMP_FROM_LIGHTS;
+        rc = pixel_read(run, n, other);
+    }
+    for (int c = 0; c < n && !rc; c++) {
+        number_print(j, info, info->response_names[c], value[c], other[c], apart);
+        if (cli.json) json_end_object(j);
+    }
+    free(value);
     return rc;
 }
 
@@ -142,6 +187,7 @@ static int sensor_read(imp_problem *problem, struct json *j, struct imp_run run,
     imp_scene_get_info(cli.scene, &scene);
     const enum imp_status st = imp_scene_get_sensor(cli.scene, run.sensor, &info);
     if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+    if (info.n_responses > 0 && n_blocks == 0) return curves_read(j, run, &info, apart);
     const int luminous = strchr("lc", info.unit[0]) != NULL; /* lx, cd m^-2 */
     const int one = luminous || scene.channels == 1;
     int rc = 0;

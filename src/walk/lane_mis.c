@@ -9,7 +9,11 @@ int imp__lane_mis_count(const struct imp_step *s)
 int imp__lane_mis_drew(struct imp_step *s)
 {
     struct imp_lane_mis *l = &s->lanes;
-    if (l->drew < 0) l->drew = imp__lane_drawn(s->walk->key, imp__lane_mis_count(s));
+    /* Of wavelengths the walk has chosen: its branches, and what follows a meter, have
+     * other keys. */
+    if (l->drew < 0)
+        l->drew = s->at.carried ? imp__waves_drew(s->at.carried)
+                                : imp__lane_drawn(s->walk->key, imp__lane_mis_count(s));
     return l->drew;
 }
 
