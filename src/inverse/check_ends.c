@@ -8,9 +8,11 @@
 #include "walk/light_walk.h"
 #include <math.h>
 
-#define Z_LIMIT  4.5 /* of many rows, with few batches behind a standard error */
-#define RESOLVED 0.2 /* a larger standard error, in parts of the value, decides nothing */
-#define BATCHES  16  /* of a direction through many numbers */
+#define Z_LIMIT 4.5 /* of many rows, with few batches behind a standard error */
+/* With a standard error above this part of its own value an end decides nothing: what few
+ * walks bring is not normal, and where it is too low its standard error is, too. */
+#define RESOLVED 0.2
+#define BATCHES  16 /* of a direction through many numbers */
 
 /* Has the scene a material that sends light into single directions? */
 static bool has_delta(const struct imp_scene *scene)
@@ -66,7 +68,10 @@ static enum imp_status row_add(struct imp__check *c, const char *param, int64_t 
         row.error = off == 0 ? 0 : isfinite(off) ? off / size : INFINITY;
         row.limit = 1e-6;
     }
-    row.ok = !(row.error <= row.limit) ? 0 : row.se > RESOLVED * size ? -1 : 1;
+    const bool noisy = row.se > RESOLVED * size ||
+                       lights.se > RESOLVED * fabs(lights.value) ||
+                       sensor.se > RESOLVED * fabs(sensor.value);
+    row.ok = noisy ? -1 : row.error <= row.limit;
     return imp__check_row(c, "ends", param, element, &row);
 }
 

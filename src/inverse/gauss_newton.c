@@ -49,6 +49,12 @@ static enum imp_status workers_create(struct imp__normal_job *j, imp_context *ct
     return IMP_OK;
 }
 
+/* Does a walk have a part in several pixels? */
+static bool shares_walks(const struct imp_tracer *tracer)
+{
+    return imp__film_border(&tracer->sensor->film) > 0 || tracer->integrator->from_lights;
+}
+
 static enum imp_status target_add(struct imp__normal_job *j,
                                   const struct imp__target *target, int part,
                                   const struct imp_run *run, double lo, double hi,
@@ -57,10 +63,16 @@ static enum imp_status target_add(struct imp__normal_job *j,
     const struct imp_problem *p = j->problem;
     struct imp_run own = *run;
     j->target = target;
-    enum imp_status st = imp__target_tracer(p, target, part, false, &own, &j->tracer);
+    enum imp_status st = imp__target_tracer(p, target, part, true, &own, &j->tracer);
     if (st != IMP_OK) return st;
     const struct imp_film_desc *film = &j->tracer.sensor->film;
-    if (imp__film_border(film) > 0) {
+    if (j->tracer.integrator->from_lights && !imp__loss_quadratic(target->desc.loss))
+        return imp__error(p->ctx, IMP_E_UNSUPPORTED,
+                          "Gauss-Newton matrices of walks from the lights are those of "
+                          "losses that are quadratic in the picture (l2, relative): in "
+                          "others the noise of few walks a pixel is a bias; let walks "
+                          "begin at the sensor");
+    if (shares_walks(&j->tracer)) {
         struct imp__normal_sums total = imp__normal_at(j->total, j->K);
         total.cov_excess = j->excess;
         return imp__gauss_newton_wide(p, &j->tracer, target, &own, lo, hi, &total);
@@ -156,9 +168,9 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
             (double)(p->targets[t].desc.channels) * pixels_in_use(&p->targets[t]);
         const int bias = imp__loss_bias_order(p->targets[t].desc.loss);
         if (bias && (!bias_order || bias < bias_order)) bias_order = bias;
-        wide |= imp__film_border(&j.tracer.sensor->film) > 0;
+        wide |= shares_walks(&j.tracer);
     }
-    /* With wide filters, the same estimate as that of trial steps from the same walks. */
+    /* Where pixels share walks, the same estimate as that of trial steps from the same walks. */
     const struct imp__normal_sums total = imp__normal_at(j.total, j.K);
     struct imp_estimate objective = {total.scalars[IMP_NORMAL_OBJECTIVE],
                                      sqrt(fmax(0, total.scalars[IMP_NORMAL_VARIANCE])),

@@ -15,8 +15,8 @@ struct imp__normal_sums { /* matrices [K*K], lower triangles */
 /* Of a target: loss, its variance, chi^2. */
 enum { IMP_NORMAL_OBJECTIVE, IMP_NORMAL_VARIANCE, IMP_NORMAL_CHI2, IMP_NORMAL_SCALARS };
 
-/* Adds H, H_same, H_meas, g, cov_g, cov_excess and chi2 of a target seen through a filter wider than
- * a pixel; lo, hi: the part of the caller's progress. */
+/* Adds H, H_same, H_meas, g, cov_g, cov_excess and chi2 of a target whose pixels share walks
+ * (a filter wider than a pixel, or walks from the lights); lo, hi: the part of the caller's progress. */
 enum imp_status imp__gauss_newton_wide(const struct imp_problem *p,
                                        const struct imp_tracer *tracer,
                                        const struct imp__target *target,

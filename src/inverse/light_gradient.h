@@ -54,6 +54,12 @@ enum imp_status imp__light_functional(const struct imp_tracer *tracer,
                                       const struct imp_run *run,
                                       struct imp_estimate *value);
 
+/* The picture of light walks first, first + 1, .., first + walks - 1 with its derivative
+ * pictures: mean [height][width][1 + active][channels]; lo, hi: part of the progress. */
+enum imp_status imp__light_rows(const struct imp_tracer *tracer,
+                                const struct imp_run *run, int64_t first, int64_t walks,
+                                double lo, double hi, double *mean);
+
 /* Groups of two sets of n walks a pixel. */
 struct imp__light_plan {
     int groups, n;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * J^T W J through filters wider than a pixel, where a walk has a part in several pixels
- * and pixels share walks. R independent replicates, each a picture L and a derivative
+ * J^T W J where a walk has a part in several pixels and pixels share walks: through filters
+ * wider than a pixel, and of walks from the lights. R independent replicates, each a picture L and a derivative
  * picture X_k for every number, take the place of walks (docs/estimators.md 15):
  *
  *     (J^T J)_kl ~ w [ (sum_b X_k)(sum_b X_l) - sum_b X_k X_l ] / (R (R-1))
@@ -17,6 +17,7 @@
 #include "film/film_picture.h"
 #include "gauss_newton.h"
 #include "lanes.h"
+#include "light_gradient.h"
 #include "loss.h"
 #include "pair_noise.h"
 #include <stdio.h>
@@ -37,6 +38,7 @@ struct wide {
     int R;
     size_t K;
     imp_film *films[MANY]; /* channels: the radiance, then [K][channels] */
+    double *rows[MANY];    /* the same of walks from the lights */
     double *L, *X;         /* of a pixel and channel: [R], [R][K] */
     double *sum;           /* [K] */
     struct imp__pair_noise noise;
@@ -101,16 +103,41 @@ out:
     return st;
 }
 
+/* A walk from a light reaches many pixels, whatever the filter. */
+static enum imp_status light_replicates(struct wide *w, const struct imp_tracer *tracer,
+                                        const struct imp_run *run, double lo, double hi)
+{
+    const size_t pixels = (size_t)w->width * (size_t)w->height;
+    const int spp = imp_max(run->spp > 0 ? run->spp : tracer->sensor->spp, 4);
+    struct imp_run own = *run;
+    own.time_limit_s = 0;
+    w->R = spp < 8 ? 4 : MANY;
+    const int64_t walks = (int64_t)((spp - 1) / w->R + 1) * (int64_t)pixels;
+    for (int b = 0; b < w->R; b++) {
+        w->rows[b] =
+            imp__alloc(w->ctx, pixels * (w->K + 1) * (size_t)w->channels, sizeof(double));
+        if (!w->rows[b])
+            return imp__error(w->ctx, IMP_E_NOMEM, "no memory for derivative pictures");
+        const enum imp_status st =
+            imp__light_rows(tracer, &own, b * walks, walks, lo + (hi - lo) * b / w->R,
+                            lo + (hi - lo) * (b + 1) / w->R, w->rows[b]);
+        if (st != IMP_OK) return st;
+    }
+    return IMP_OK;
+}
+
 /* L, X of a pixel and channel, as the target sees them. */
 static void gather(struct wide *w, size_t pixel, int c)
 {
     const size_t stride = (w->K + 1) * (size_t)w->channels;
     for (int b = 0; b < w->R; b++) {
-        const float *from = w->films[b]->mean + pixel * stride;
+        const float *from = w->films[b] ? w->films[b]->mean + pixel * stride : NULL;
         for (size_t k = 0; k <= w->K; k++) {
             double lanes[3];
-            for (int l = 0; l < w->channels; l++)
-                lanes[l] = from[k * (size_t)w->channels + (size_t)l];
+            for (int l = 0; l < w->channels; l++) {
+                const size_t at = k * (size_t)w->channels + (size_t)l;
+                lanes[l] = from ? (double)from[at] : w->rows[b][pixel * stride + at];
+            }
             const double v = imp__seen(w->luminance, lanes, c);
             if (k == 0) w->L[b] = v;
             else w->X[(size_t)b * w->K + k - 1] = v;
@@ -174,7 +201,9 @@ static void pixel_add(struct wide *w, int px, int py, int c, struct imp__normal_
     out->scalars[IMP_NORMAL_CHI2] += 2 * imp__loss_unbiased(weight, T, R, S, S2);
     double residual[MANY];
     for (int b = 0; b < w->R; b++) residual[b] = w->L[b] - T;
-    imp__pair_noise_add(&w->noise, px, py, weight, residual, w->X);
+    const bool apart = w->rows[0] == NULL; /* else all pixels share walks */
+    imp__pair_noise_add(&w->noise, apart ? px : 0, apart ? py : 0, weight, residual,
+                        w->X);
     for (size_t k = 0; k < K; k++) {
         double lx = 0;
         for (int b = 0; b < w->R; b++) lx += w->L[b] * w->X[(size_t)b * K + k];
@@ -334,14 +363,20 @@ enum imp_status imp__gauss_newton_wide(const struct imp_problem *p,
                      .luminance = imp__sees_luminance(target, p->scene->channels),
                      .K = p->n};
     IMP_TRY(buffers(&w));
-    IMP_TRY(replicates(&w, tracer, run, lo, hi));
-    IMP_TRY(imp__pair_noise_create(w.ctx, w.width, w.height, w.R, w.K, &w.noise));
+    const bool lights = tracer->integrator->from_lights;
+    IMP_TRY(lights ? light_replicates(&w, tracer, run, lo, hi)
+                   : replicates(&w, tracer, run, lo, hi));
+    IMP_TRY(imp__pair_noise_create(w.ctx, lights ? 1 : w.width, lights ? 1 : w.height,
+                                   w.R, w.K, &w.noise));
     normal_add(&w, out);
     IMP_TRY(imp__pair_noise_covariance(&w.noise, 2 * imp__film_border(w.film), out->cov_g,
                                        out->cov_excess));
     measurement_add(&w, out);
 out:
-    for (int b = 0; b < MANY; b++) imp_film_destroy(w.films[b]);
+    for (int b = 0; b < MANY; b++) {
+        imp_film_destroy(w.films[b]);
+        imp__release(w.ctx, w.rows[b]);
+    }
     imp__release(w.ctx, w.L);
     imp__pair_noise_destroy(&w.noise);
     imp__release(w.ctx, w.sigma2);
