@@ -51,6 +51,9 @@ no_memory:
 /* ---- Media of uniform extinction --------------------------------------------------- */
 
 #define DEEP 0.5 /* optical depth from which on a stretch stands */
+/* ... and that of the scene's radius, for a stretch without an end: all of these are deep,
+ * but what light there is to scatter is near the scene. */
+#define DEEP_OPEN 0.1
 
 static bool uniform_fly(struct imp_free_flight *w, const struct imp_medium *m,
                         double near, double far, bool collides, double *t, bool *stands)
@@ -60,7 +63,10 @@ static bool uniform_fly(struct imp_free_flight *w, const struct imp_medium *m,
     double length = far - near, sum = 0;
     bool hit = false;
     for (int c = 0; c < imp__lane_mis_count(w->s); c++) sum += sigma[c];
-    *stands = collides && sum * length >= DEEP * imp__lane_mis_count(w->s);
+    *stands =
+        collides && (isfinite(far) ? sum * length >= DEEP * imp__lane_mis_count(w->s)
+                                   : sum * w->s->scene->ball.radius >=
+                                         DEEP_OPEN * imp__lane_mis_count(w->s));
     if (collides) {
         const double path = free_path(w), mine = sigma[imp__lane_mis_drew(w->s)];
         hit = mine > 0 && path < length * mine;
@@ -234,7 +240,13 @@ bool imp__fly(struct imp_free_flight *w, const struct imp_medium *m, double near
     }
     if (s->walk->dropped) return false;
     if (collides) s->flight.stands = stands;
-    if (collides && !stands && s->probing && s->tracer->active->medium[m->index])
-        imp__probe_offer(s, m, w->track, first, before, near, hit ? *t : far);
+    if (!s->probing || !s->tracer->active->medium[m->index]) return hit;
+    if (imp_unlikely(isinf(far)) && !hit && !imp__is_zero_used(w->f, s->at.carried) &&
+        (!collides || imp__probe_diverges(s, m))) {
+        s->walk->dropped = IMP_DROP_INFINITE;
+        return false;
+    }
+    if (collides && !stands)
+        imp__probe_offer(s, m, w->track, first, before, near, hit ? *t : far, w->open);
     return hit;
 }

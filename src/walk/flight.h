@@ -16,6 +16,7 @@ struct imp_free_flight {
     imp_spec f;              /* the segment's value */
     struct imp_track *track; /* NULL: not kept */
     bool any;                /* it has crossed a medium */
+    bool open;               /* no surface ends the stretch at work */
     struct imp_event line;   /* IMP_LINE_AT so far; bound 0: none */
     double length;           /* of the stretches that it was chosen from */
     double control;          /* optical depth of controls on the way */

@@ -19,15 +19,53 @@ static imp_spec value_to(const struct imp_step *s, const struct imp_medium *m,
     return f;
 }
 
+/* Where a stretch is probed: at s on [near, far], with 1/p(s); `length`: what it counts in
+ * the choice among stretches, l where s is uniform. */
+struct place {
+    double s, length, over_p;
+};
+
+static struct place uniform_place(double near, double far, double u)
+{
+    return (struct place){near + (far - near) * u, far - near, far - near};
+}
+
+static struct place open_place(const struct imp_step *s, double near, double far,
+                               double u)
+{
+    const struct imp_ball *ball = &s->scene->ball;
+    const imp_v3 to = ball->centre - s->o;
+    const double s0 = imp__dot(to, s->d) + s->flight.base,
+                 h = imp__length(to - s->d * imp__dot(to, s->d)) + ball->radius,
+                 a = atan((near - s0) / h),
+                 b = isfinite(far) ? atan((far - s0) / h) : M_PI_2,
+                 x = h * tan(a + (b - a) * u);
+    return (struct place){.s = imp_clamp(s0 + x, near, far),
+                          .length = ball->radius * ball->radius / h * (b - a),
+                          .over_p = (b - a) * (h * h + x * x) / h};
+}
+
+bool imp__probe_diverges(const struct imp_step *s, const struct imp_medium *m)
+{
+    const struct imp_texcoord at = {.p = s->o, .carried = s->at.carried};
+    imp_spec in[IMP_INPUTS_MAX];
+    struct imp_coefficients c;
+    imp__inputs_eval(m->input, m->n_own, &at, in);
+    m->ops->eval(m, in, &c);
+    return s->scene->environment >= 0 || !imp__is_zero_used(c.emission, s->at.carried);
+}
+
 void imp__probe_offer(struct imp_step *s, const struct imp_medium *m,
                       const struct imp_track *track, int first, imp_spec before,
-                      double near, double far)
+                      double near, double far, bool open)
 {
     struct imp_probing *p = s->probing;
     struct imp_vertex *from = s->walk->last;
     const struct imp_key key = imp__key_branch(s->walk->key, (int)p->n++, 0x9e0be);
-    const double length = far - near,
-                 weight = length * imp__max_used(s->beta, s->at.carried);
+    const double u = imp__u01(key, 1);
+    const struct place at =
+        imp_likely(!open) ? uniform_place(near, far, u) : open_place(s, near, far, u);
+    const double t = at.s, weight = at.length * imp__max_used(s->beta, s->at.carried);
     if (!(weight > 0)) return;
     if (!isfinite(weight)) {
         s->walk->dropped = IMP_DROP_INFINITE;
@@ -36,7 +74,6 @@ void imp__probe_offer(struct imp_step *s, const struct imp_medium *m,
     p->total += weight;
     if (!(imp__u01(key, 0) * p->total < weight)) return;
 
-    const double t = near + length * imp__u01(key, 1);
     if (!p->state) p->state = imp__arena_take(s->arena, 1, sizeof *p->state);
     if (!p->probe) p->probe = imp__arena_take(s->arena, 1, sizeof *p->probe);
     if (!p->state || !p->probe) {
@@ -55,7 +92,7 @@ void imp__probe_offer(struct imp_step *s, const struct imp_medium *m,
         .medium = m,
         .at = {.p = s->o + s->d * (t - s->flight.base), .carried = s->at.carried},
         .reach = from->w * pass,
-        .length = length};
+        .length = at.over_p};
 }
 
 /* So many walks follow their probe, which costs about as much as the walk. On a plume

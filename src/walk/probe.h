@@ -13,7 +13,15 @@
  * the length l that it flew in the medium, l times the bracket is an estimate, in which
  * what the walk itself brings from beyond is L and an extra walk from s gives S. One
  * stretch of a walk is chosen, by length times throughput, so that the cost is linear in
- * the walk's length. Deep stretches of uniform media have no probe (tracking.h). */
+ * the walk's length. Deep stretches of uniform media have no probe (tracking.h).
+ *
+ * A stretch without an end, of a thin medium around the scene, has no uniform s. There s is
+ * drawn with a density that falls as light does, from the scene's middle at distance s_0
+ * along the ray,
+ *
+ *     p(s) ~ 1/(h^2 + (s - s_0)^2)        on [0, l], l = infinity where sigma = 0
+ *
+ * and 1/p takes the place of l (equi-angular, as Kulla and Fajardo 2012 aim at lights). */
 #ifndef IMP_WALK_PROBE_H
 #define IMP_WALK_PROBE_H
 
@@ -24,7 +32,7 @@ struct imp_probe {
     struct imp_texcoord at; /* the point */
     imp_spec reach;         /* weight of what leaves the point for vertex k */
     imp_spec scattered;     /* S */
-    double length;          /* l over the probability of having been chosen */
+    double length;          /* l or 1/p(s), over the probability of having been chosen */
     bool emits;             /* emission there counts */
 };
 
@@ -38,11 +46,15 @@ struct imp_probing {
     uint32_t n; /* stretches */
 };
 
-/* The flight has gone l = far - near in m, with events [first, track->n) of the track;
- * `before`: the segment's value at `near`. */
+/* The flight has gone from near to far in m, with events [first, track->n) of the track;
+ * `before`: the segment's value at `near`; open: only a
+ * collision could have ended it. */
 void imp__probe_offer(struct imp_step *s, const struct imp_medium *m,
                       const struct imp_track *track, int first, imp_spec before,
-                      double near, double far);
+                      double near, double far, bool open);
+/* A flight passes an endless medium of extinction 0. Is the derivative infinite, since light
+ * comes from infinity, or from all of the medium? */
+bool imp__probe_diverges(const struct imp_step *s, const struct imp_medium *m);
 /* The walk has ended: follow what was chosen. */
 void imp__probe_follow(struct imp_step *s);
 

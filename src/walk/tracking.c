@@ -131,6 +131,7 @@ static enum imp_meeting meet(struct imp_step *s, struct imp_hit *hit)
                      far = base + (found ? hit->t : t_max);
         const struct imp_medium *m = s->flight.medium;
         s->flight.base = base;
+        w.open = !found;
         if (m && imp__fly(&w, m, near, far, true, &t)) {
             met = collision(s, m, s->o + d * (t - base), t);
             break;
