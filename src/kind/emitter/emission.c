@@ -2,7 +2,9 @@
 #include "emission.h"
 #include "kind/shape/shape.h"
 #include "math/transform.h"
+#include "math/vec.h"
 #include "math/warp.h"
+#include <math.h>
 
 void imp__even_eval(const struct imp_emitter *e, const imp_spec *in,
                     const struct imp_emission *x, imp_spec *le)
@@ -107,4 +109,24 @@ enum imp_status imp__sky_axes(const struct imp_build *b, imp_v3 axis[3])
                                "to_world of an environment can turn and mirror it only");
     for (int k = 0; k < 3; k++) axis[k] = imp__normalize(axis[k]);
     return IMP_OK;
+}
+
+enum imp_status imp__travel_read(const struct imp_build *b, imp_v3 *along)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_mat4 to_world;
+    double d[3];
+    if (imp_build_has(b, "direction") && imp_build_has(b, "to_world"))
+        IMP_TRY(imp_build_error(b, "to_world", IMP_E_SCENE,
+                                "give direction or to_world, not both"));
+    IMP_TRY(imp_build_vector(b, "direction", (double[3]){0, 0, 1}, d));
+    IMP_TRY(imp_build_transform(b, "to_world", to_world.m));
+    *along = imp__vector(&to_world, imp__v3(d[0], d[1], d[2]));
+    const double length = imp__length(*along);
+    if (!(length > 0 && length < INFINITY))
+        IMP_TRY(imp_build_error(b, imp_build_has(b, "direction") ? "direction" : NULL,
+                                IMP_E_SCENE, "its direction has length %g", length));
+    *along *= imp__spec(1 / length);
+out:
+    return st;
 }

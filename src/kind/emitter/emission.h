@@ -30,6 +30,10 @@ double imp__point_emission_pdf(const struct imp_emitter *e, const struct imp_emi
  * it only. */
 enum imp_status imp__sky_axes(const struct imp_build *b, imp_v3 axis[3]);
 
+/* Whither light from infinitely far travels, unit: reads `direction`, or to_world, whose +z
+ * it is. */
+enum imp_status imp__travel_read(const struct imp_build *b, imp_v3 *along);
+
 /* Of the environment, whose `sample` and `pdf` do not look at the receiver. */
 bool imp__sky_emission_sample(const struct imp_emitter *e, const struct imp_ball *scene,
                               const double u[4], struct imp_emission_sample *out);

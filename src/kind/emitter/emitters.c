@@ -14,6 +14,7 @@
     X(imp__envmap)                                                                       \
     X(imp__directional)                                                                  \
     X(imp__spot_light)                                                                   \
+    X(imp__sun)                                                                          \
     X(imp__projector)                                                                    \
     X(imp__sunsky)
 

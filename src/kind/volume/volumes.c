@@ -5,6 +5,7 @@
 
 #define VOLUMES(X)                                                                       \
     X(imp__constvolume)                                                                  \
+    X(imp__expvolume)                                                                    \
     X(imp__gridvolume)
 
 #define DECLARE(kind) extern const struct imp_texture_ops kind;
