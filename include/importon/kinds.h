@@ -95,7 +95,7 @@ struct imp_input_desc { /* the list ends with {0} */
 
 /* Inputs of one object, its children's included: more is an error when it is built, so
  * that whoever visits an object has room for them on the stack. */
-#define IMP_INPUTS_MAX 32
+#define IMP_INPUTS_MAX 64
 
 /* What the lanes of a walk are where they are not the scene's colours: up to four
  * wavelengths. Unused lanes repeat the first. */
@@ -370,6 +370,8 @@ struct imp_phase_ops {
                    const struct imp_dirs *d, imp_spec *df);
     /* As imp_bsdf_ops.changed. */
     void (*changed)(const struct imp_phase *p);
+    /* As imp_bsdf_ops.prepare. */
+    enum imp_status (*prepare)(const struct imp_build *build);
 };
 
 /* Cosine of the angle between the directions of travel before and after: 1 is straight

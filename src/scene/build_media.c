@@ -37,6 +37,8 @@ static enum imp_status phase_build(struct imp_scene *scene, struct imp_node *nod
                             .name = imp__build_object_name(scene, node, parent, slot)};
     if (!p->name) IMP_TRY(imp__build_no_memory(scene));
 
+    const struct imp_build build = imp__build_make(scene, node);
+    if (ops->prepare) IMP_TRY(ops->prepare(&build));
     const struct imp_input *in[IMP_INPUTS_MAX];
     IMP_TRY(imp__build_inputs(scene, node, p->name, ops->inputs, in, &p->n_own));
     p->n_in = p->n_own;
@@ -67,7 +69,6 @@ static enum imp_status phase_build(struct imp_scene *scene, struct imp_node *nod
     if (!p->input) IMP_TRY(imp__build_no_memory(scene));
     if (p->n_in) memcpy(p->input, in, (size_t)p->n_in * sizeof *p->input);
 
-    const struct imp_build build = imp__build_make(scene, node);
     if (ops->build) IMP_TRY(ops->build(&build, self, p));
     IMP_TRY(imp__props_finish(ctx, node));
     if (ops->changed)
