@@ -48,8 +48,8 @@
 #define IMP_FINITE_ALL(ctx, values, n, name)                                             \
     IMP_CHECKED(imp__finite_check(ctx, __func__, name, values, n))
 
-enum imp_status imp__argument_missing(imp_context *ctx, const char *function,
-                                      const char *name);
+IMP_COLD enum imp_status imp__argument_missing(imp_context *ctx, const char *function,
+                                               const char *name);
 enum imp_status imp__size_check(imp_context *ctx, const char *function, const char *name,
                                 size_t size, size_t known);
 enum imp_status imp__options_take(imp_context *ctx, const char *function,

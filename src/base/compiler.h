@@ -7,6 +7,9 @@
 #define imp_likely(x)    __builtin_expect(!!(x), 1)
 #define imp_unlikely(x)  __builtin_expect(!!(x), 0)
 #define IMP_PRINTF(f, a) __attribute__((format(printf, f, a)))
+/* Called when something goes wrong: what leads to such a call is laid out apart from code that
+ * runs, so that it is not loaded. */
+#define IMP_COLD __attribute__((cold))
 
 #define IMP_CACHE_LINE 64 /* bytes; what two threads write should not share one */
 

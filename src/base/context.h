@@ -62,12 +62,12 @@ void imp__context_drop(imp_context *ctx);
 
 /* Record the message for this thread; returns `status`. Never fails: out of memory leaves
  * a fixed text. ctx NULL: where no context is known; imp_last_error(NULL) has it. */
-enum imp_status imp__error(imp_context *ctx, enum imp_status status, const char *format,
-                           ...) IMP_PRINTF(3, 4);
+IMP_COLD enum imp_status imp__error(imp_context *ctx, enum imp_status status,
+                                    const char *format, ...) IMP_PRINTF(3, 4);
 /* Put "prefix: " before the message that is there. */
-enum imp_status imp__error_prefix(imp_context *ctx, enum imp_status status,
-                                  const char *format, ...) IMP_PRINTF(3, 4);
-void imp__warn(imp_context *ctx, const char *format, ...) IMP_PRINTF(2, 3);
+IMP_COLD enum imp_status imp__error_prefix(imp_context *ctx, enum imp_status status,
+                                           const char *format, ...) IMP_PRINTF(3, 4);
+IMP_COLD void imp__warn(imp_context *ctx, const char *format, ...) IMP_PRINTF(2, 3);
 
 /* 64-byte aligned; NULL if out of memory or n*size overflows. Zeroed. */
 void *imp__alloc(imp_context *ctx, size_t n, size_t size);

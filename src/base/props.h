@@ -135,12 +135,13 @@ void imp__node_remove(struct imp_node *node, const char *name);
 /* "file:line:column", or "scene" for scenes built by calls; then " (type 'id')". */
 const char *imp__loc_text(struct imp_loc loc, char *buffer, size_t size);
 /* "file:line:column: shape 'ball' (sphere): message" */
-enum imp_status imp__node_error(imp_context *ctx, const struct imp_node *node,
-                                enum imp_status status, const char *format, ...)
+IMP_COLD enum imp_status imp__node_error(imp_context *ctx, const struct imp_node *node,
+                                         enum imp_status status, const char *format, ...)
     IMP_PRINTF(4, 5);
-enum imp_status imp__prop_error(imp_context *ctx, const struct imp_node *node,
-                                const struct imp_prop *prop, enum imp_status status,
-                                const char *format, ...) IMP_PRINTF(5, 6);
+IMP_COLD enum imp_status imp__prop_error(imp_context *ctx, const struct imp_node *node,
+                                         const struct imp_prop *prop,
+                                         enum imp_status status, const char *format, ...)
+    IMP_PRINTF(5, 6);
 
 /* ---- Reading. Each marks the property used, leaves *out at the default if it is absent,
  * and returns IMP_E_SCENE with the place and both types if it is of another type.

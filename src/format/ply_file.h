@@ -71,7 +71,7 @@ struct ply {
     uint32_t *indices;
 };
 
-enum imp_status IMP_PRINTF(2, 3)
+IMP_COLD enum imp_status IMP_PRINTF(2, 3)
     imp__ply_error(const struct ply *p, const char *format, ...);
 bool imp__ply_has(const struct ply *p, enum ply_use use);
 /* Up to the first byte of the body. The counts are not larger than the file can hold. */

@@ -26,8 +26,8 @@ void imp__tree_init(struct imp_tree *t, struct imp_scene *scene);
 void imp__tree_free(struct imp_tree *t);
 
 /* "file:line:column: message" ("scene: message" for building calls). */
-enum imp_status imp__loc_error(imp_context *ctx, struct imp_loc loc,
-                               enum imp_status status, const char *format, ...)
+IMP_COLD enum imp_status imp__loc_error(imp_context *ctx, struct imp_loc loc,
+                                        enum imp_status status, const char *format, ...)
     IMP_PRINTF(4, 5);
 
 bool imp__is_object_tag(const char *tag);

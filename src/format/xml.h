@@ -70,10 +70,10 @@ struct xml_attributes {
 
 struct imp_loc imp__xml_loc(const struct xml_file *f);
 /* Record "file:line:column: message" and stop reading; only the first failure counts. */
-void imp__xml_fail(struct xml_file *f, enum imp_status status, const char *format, ...)
-    IMP_PRINTF(3, 4);
+IMP_COLD void imp__xml_fail(struct xml_file *f, enum imp_status status,
+                            const char *format, ...) IMP_PRINTF(3, 4);
 /* Put the place before the message that is there, and stop reading. */
-void imp__xml_fail_here(struct xml_file *f, enum imp_status status);
+IMP_COLD void imp__xml_fail_here(struct xml_file *f, enum imp_status status);
 /* Stop with a message that names its place already; nothing happens for IMP_OK. */
 void imp__xml_fail_placed(struct xml_file *f, enum imp_status status);
 /* Read the file `name` as if it stood here. */
