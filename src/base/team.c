@@ -8,6 +8,9 @@
 #include <stddef.h>
 #include <stdio.h>
 #include <string.h>
+#if defined(__x86_64__) && __has_include(<sys/platform/x86.h>)
+#include <sys/platform/x86.h> /* glibc 2.33; the 2.34 macro */
+#endif
 
 /* ---- Joining ----------------------------------------------------------------------- */
 
@@ -28,21 +31,27 @@ enum imp_status imp__team_join(imp_context *ctx, const struct imp_team *host,
     return IMP_OK;
 }
 
-/* Embree and libm choose their code by these. */
+/* Embree and libm choose their code by these. glibc knows them; GCC's own list would be made by a
+ * constructor that every start of a program runs. */
 void imp__machine_text(char text[256])
 {
     snprintf(text, 256, "importon %s", IMP_VERSION_STRING);
 #if defined(__x86_64__)
+#ifdef CPU_FEATURE_ACTIVE
+#define IMP_HAS(name, feature)                                                           \
+    if (CPU_FEATURE_ACTIVE(feature)) strncat(text, " " name, 255 - strlen(text))
+#else
     __builtin_cpu_init();
-#define IMP_HAS(name)                                                                    \
+#define IMP_HAS(name, feature)                                                           \
     if (__builtin_cpu_supports(name)) strncat(text, " " name, 255 - strlen(text))
-    IMP_HAS("sse4.2");
-    IMP_HAS("avx");
-    IMP_HAS("fma");
-    IMP_HAS("avx2");
-    IMP_HAS("avx512f");
-    IMP_HAS("avx512dq");
-    IMP_HAS("avx512vl");
+#endif
+    IMP_HAS("sse4.2", SSE4_2);
+    IMP_HAS("avx", AVX);
+    IMP_HAS("fma", FMA);
+    IMP_HAS("avx2", AVX2);
+    IMP_HAS("avx512f", AVX512F);
+    IMP_HAS("avx512dq", AVX512DQ);
+    IMP_HAS("avx512vl", AVX512VL);
 #undef IMP_HAS
 #endif
 }
