@@ -4,9 +4,10 @@
  * seconds (user and system) and peak memory of pictures, losses with gradients and checks,
  * one thread each. Memory is told in all (maximum resident set), and without the pages of
  * program and libraries, which are a part of files that all processes share. A round runs
- * every job once with either build, in turn. The minimum of all rounds counts; of memory
- * without files, which is looked at every millisecond, so that a round may miss its peak,
- * the median. Prints a table for docs/speed.md.
+ * every job once with either build, in turn. Of seconds, the minimum of all rounds counts; of
+ * memory the median, since the kernel's counters of pages are exact to some ten pages a core, and
+ * memory without files is looked at every millisecond, so that a round may miss its peak. Prints
+ * a table for docs/speed.md. bench/link_order.py tells what should be linked side by side.
  *
  *     versions [--rounds N] [--job TEXT] [--scenes FOLDER] OLD NEW
  *
@@ -24,7 +25,7 @@ enum { WORDS_MAX = 32, ROUNDS_MAX = 99 };
 struct job {
     const char *name;
     const char *words[WORDS_MAX]; /* of the command line, after the program */
-    double seconds[2], mib[2], own[2][ROUNDS_MAX]; /* of the old and the new build */
+    double seconds[2], mib[2][ROUNDS_MAX], own[2][ROUNDS_MAX]; /* of old and new build */
 };
 
 #define CORNELL  "@cornell.xml", "-D", "res=128"
@@ -102,9 +103,8 @@ static void run(const char *program, const char *const *words, double *seconds,
     }
     const double s = (double)(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
                      1e-6 * (double)(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
-    const double m = (double)usage.ru_maxrss / 1024;
     if (s < *seconds) *seconds = s;
-    if (m < *mib) *mib = m;
+    *mib = (double)usage.ru_maxrss / 1024;
     *own = most;
 }
 
@@ -147,15 +147,15 @@ int main(int argc, char **argv)
         return 3;
     }
     for (size_t t = 0; t < sizeof targets / sizeof targets[0]; t++) {
-        double seconds = 1e30, mib = 1e30, own;
+        double seconds = 1e30, mib, own;
         run(path[0], targets[t], &seconds, &mib, &own);
     }
     for (int k = 0; k < JOBS; k++)
-        for (int b = 0; b < 2; b++) jobs[k].seconds[b] = jobs[k].mib[b] = 1e30;
+        for (int b = 0; b < 2; b++) jobs[k].seconds[b] = 1e30;
     for (int r = 0; r < rounds; r++)
         for (int k = 0; k < JOBS; k++)
             for (int b = 0; strstr(jobs[k].name, wanted) && b < 2; b++)
-                run(path[b], jobs[k].words, &jobs[k].seconds[b], &jobs[k].mib[b],
+                run(path[b], jobs[k].words, &jobs[k].seconds[b], &jobs[k].mib[b][r],
                     &jobs[k].own[b][r]);
 
     printf("| %d rounds | old s | new s | new / old | old MiB | new MiB | new / old | "
@@ -164,11 +164,11 @@ int main(int argc, char **argv)
     for (int k = 0; k < JOBS; k++) {
         struct job *j = &jobs[k];
         if (!strstr(j->name, wanted)) continue;
+        const double mib[2] = {median(j->mib[0], rounds), median(j->mib[1], rounds)};
         const double own[2] = {median(j->own[0], rounds), median(j->own[1], rounds)};
         printf("| %s | %.3f | %.3f | %.3f | %.1f | %.1f | %.2f | %.2f | %.2f | %.2f |\n",
                j->name, j->seconds[0], j->seconds[1], j->seconds[1] / j->seconds[0],
-               j->mib[0], j->mib[1], j->mib[1] / j->mib[0], own[0], own[1],
-               own[1] / own[0]);
+               mib[0], mib[1], mib[1] / mib[0], own[0], own[1], own[1] / own[0]);
     }
     unlink("picture.exr"), unlink("cornell.exr"), unlink("textured.exr");
     if (chdir("/") == 0) rmdir(work);
