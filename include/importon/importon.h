@@ -637,7 +637,8 @@ enum imp_points {
 
 /** The end at which walks begin. */
 enum imp_from {
-    IMP_FROM_SCENE = 0, /**< that of the scene's integrator: the lights for ptracer */
+    IMP_FROM_SCENE = 0, /**< that of the scene's integrator: the lights for ptracer,
+                             both ends for bdpt */
     IMP_FROM_SENSOR,
     IMP_FROM_LIGHTS
 };

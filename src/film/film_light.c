@@ -11,6 +11,8 @@
 #define ITEMS_MAX   64
 #define ITEM_WALKS  256 /* at least */
 #define CHECK_WALKS 1024
+#define GROUPS_MAX  256 /* of samples from both ends */
+#define GROUP_ITEMS 16
 
 struct worker {
     struct imp_arena arena;
@@ -28,6 +30,12 @@ struct job {
     imp_context *ctx;
     struct imp_splat_scale scale;
     size_t pixels, n, items;
+    /* Samples from both ends: groups of `group` items each, whose spread is the error. */
+    size_t groups, group;
+    int64_t each;     /* walks of a pixel, in groups as even as can be */
+    double *spread;   /* [pixels][n][2]: sums of S^2 and N S over groups of N walks */
+    double **waiting; /* [groups] sums of groups behind one that is not there yet */
+    size_t next;      /* group to be added, guarded by lock */
     struct worker *workers; /* [threads] */
     pthread_mutex_t lock;   /* guards drops */
     bool has_lock;
@@ -82,7 +90,8 @@ static void walk_drop(const struct job *j, struct worker *w, enum imp_drop cause
     imp__drops_add(&w->drops, &key);
 }
 
-/* Adds walk `index` to the item's sums, [pixels][n][2]. */
+/* Adds walk `index` to the item's sums, [pixels][n][2]; of groups [pixels][n], since what is
+ * wanted of them is the square of the sum. */
 static enum imp_status walk_add(const struct job *j, struct worker *w, int64_t index,
                                 double *sums)
 {
@@ -112,18 +121,33 @@ static enum imp_status walk_add(const struct job *j, struct worker *w, int64_t i
     }
     for (int k = 0; k < w->n_touched; k++) {
         const size_t pixel = (size_t)w->touched[k];
-        double *to = sums + pixel * j->n * 2;
         const double *from = w->sum + (size_t)k * j->n;
-        for (size_t c = 0; c < j->n; c++) {
-            to[2 * c] += from[c];
-            to[2 * c + 1] += from[c] * from[c];
-        }
+        double *to = sums + pixel * j->n * (j->groups ? 1 : 2);
+        if (j->groups)
+            for (size_t c = 0; c < j->n; c++) to[c] += from[c];
+        else
+            for (size_t c = 0; c < j->n; c++) {
+                to[2 * c] += from[c];
+                to[2 * c + 1] += from[c] * from[c];
+            }
         w->slot[pixel] = 0;
     }
     w->n_touched = 0;
 out:
     imp__arena_rewind(&w->arena, mark);
     return st;
+}
+
+static size_t result_size(const struct job *j)
+{
+    return j->pixels * j->n * (j->groups ? 1 : 2) * sizeof(double);
+}
+
+/* The first walk of a group: of each pixel it has the same number. */
+static int64_t group_begin(const struct job *j, size_t group)
+{
+    const int64_t pixels = j->picture->walks / j->each;
+    return j->each * (int64_t)group / (int64_t)j->groups * pixels;
 }
 
 static enum imp_status item_work(size_t item, int worker, void *result, void *payload)
@@ -133,9 +157,17 @@ static enum imp_status item_work(size_t item, int worker, void *result, void *pa
     struct worker *w = &j->workers[worker];
     double *sums = result;
     enum imp_status st = IMP_OK;
-    const int64_t from = p->first + p->walks * (int64_t)item / (int64_t)j->items;
-    const int64_t to = p->first + p->walks * (int64_t)(item + 1) / (int64_t)j->items;
-    memset(sums, 0, j->pixels * j->n * 2 * sizeof *sums);
+    int64_t from = p->walks * (int64_t)item / (int64_t)j->items;
+    int64_t to = p->walks * (int64_t)(item + 1) / (int64_t)j->items;
+    if (j->groups) {
+        const size_t g = item / j->group, k = item % j->group;
+        const int64_t begin = group_begin(j, g), walks = group_begin(j, g + 1) - begin;
+        from = begin + walks * (int64_t)k / (int64_t)j->group;
+        to = begin + walks * (int64_t)(k + 1) / (int64_t)j->group;
+    }
+    from += p->first;
+    to += p->first;
+    memset(sums, 0, result_size(j));
     for (int64_t i = from; i < to && st == IMP_OK; i++) {
         st = walk_add(j, w, i, sums);
         if (st == IMP_OK && (i - from) % CHECK_WALKS == 0 && imp__drops_total(&w->drops))
@@ -156,7 +188,33 @@ static void item_add(void *into, const void *from, void *payload)
     const struct job *j = payload;
     double *a = into;
     const double *b = from;
-    for (size_t k = 0; k < j->pixels * j->n * 2; k++) a[k] += b[k];
+    for (size_t k = 0; k < result_size(j) / sizeof *a; k++) a[k] += b[k];
+}
+
+/* Groups are taken in any order, and each is added in its turn. */
+static enum imp_status group_take(size_t group, void *sum, void *payload)
+{
+    struct job *j = payload;
+    const size_t n = j->pixels * j->n;
+    double *kept = imp__alloc(j->ctx, n, sizeof *kept);
+    if (!kept) return imp__error(j->ctx, IMP_E_NOMEM, "no memory for a picture");
+    memcpy(kept, sum, n * sizeof *kept);
+    pthread_mutex_lock(&j->lock);
+    j->waiting[group] = kept;
+    for (; j->next < j->groups && j->waiting[j->next]; j->next++) {
+        const double *s = j->waiting[j->next];
+        const double N = (double)(group_begin(j, j->next + 1) - group_begin(j, j->next));
+        for (size_t k = 0; k < n; k++) {
+            j->mean[k] += s[k];
+            if (!j->spread) continue;
+            j->spread[2 * k] += s[k] * s[k];
+            j->spread[2 * k + 1] += N * s[k];
+        }
+        imp__release(j->ctx, j->waiting[j->next]);
+        j->waiting[j->next] = NULL;
+    }
+    pthread_mutex_unlock(&j->lock);
+    return IMP_OK;
 }
 
 static enum imp_status sums_take(size_t group, void *sum, void *payload)
@@ -172,6 +230,44 @@ static enum imp_status sums_take(size_t group, void *sum, void *payload)
                 N > 1 ? sqrt(fmax(0, square - total * total / N) / (N * (N - 1))) : NAN;
     }
     return IMP_OK;
+}
+
+/* From the groups' sums the mean, and with N_g walks of N in group g
+ *
+ *     se^2 = G/(G - 1) sum (S_g - N_g mean)^2 / N^2 */
+static void groups_end(struct job *j)
+{
+    const double N = (double)j->picture->walks, G = (double)j->groups;
+    double square = 0;
+    for (size_t g = 0; g < j->groups; g++)
+        square += imp__sqr((double)(group_begin(j, g + 1) - group_begin(j, g)));
+    for (size_t k = 0; k < j->pixels * j->n; k++) {
+        const double mean = j->mean[k] / N;
+        j->mean[k] = mean;
+        if (!j->se) continue;
+        const double sum =
+            j->spread[2 * k] - 2 * mean * j->spread[2 * k + 1] + mean * mean * square;
+        j->se[k] = G > 1 ? sqrt(fmax(0, sum) * G / (G - 1)) / N : NAN;
+    }
+}
+
+static enum imp_status groups_create(struct job *j)
+{
+    const size_t n = j->pixels * j->n;
+    j->waiting = imp__alloc(j->ctx, j->groups, sizeof *j->waiting);
+    if (j->se) j->spread = imp__alloc(j->ctx, 2 * n, sizeof *j->spread);
+    if (!j->waiting || (j->se && !j->spread))
+        return imp__error(j->ctx, IMP_E_NOMEM, "no memory for a picture");
+    memset(j->mean, 0, n * sizeof *j->mean);
+    return IMP_OK;
+}
+
+static void groups_destroy(struct job *j)
+{
+    for (size_t g = 0; j->waiting && g < j->groups; g++)
+        imp__release(j->ctx, j->waiting[g]);
+    imp__release(j->ctx, j->waiting);
+    imp__release(j->ctx, j->spread);
 }
 
 static enum imp_status workers_create(struct job *j)
@@ -233,14 +329,23 @@ enum imp_status imp__light_picture_make(const struct imp_light_picture *p, doubl
     if (j.pixels > INT32_MAX)
         IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,
                            "walks from the lights: more than 2^31 pixels"));
+    if (p->tracer->integrator->both) {
+        const int64_t pixels = (int64_t)film->crop_w * film->crop_h;
+        j.each = p->walks / pixels;
+        j.groups = (size_t)imp_clamp(j.each, (int64_t)1, (int64_t)GROUPS_MAX);
+        j.group = (size_t)imp_clamp(p->walks / (int64_t)j.groups / ITEM_WALKS, (int64_t)1,
+                                    (int64_t)GROUP_ITEMS);
+        j.items = j.groups * j.group;
+        IMP_TRY(groups_create(&j));
+    }
     IMP_TRY(imp__splat_scale_create(ctx, film, &j.scale));
     IMP_TRY(workers_create(&j));
     struct imp_shared shared = {.drops = &j.drops};
     const struct imp_sum_desc desc = {.n_items = j.items,
-                                      .group = j.items,
-                                      .size = j.pixels * j.n * 2 * sizeof(double),
+                                      .group = j.groups ? j.group : j.items,
+                                      .size = result_size(&j),
                                       .add = item_add,
-                                      .take = sums_take,
+                                      .take = j.groups ? group_take : sums_take,
                                       .payload = &j};
     const struct imp_loop loop = {.n_items = j.items,
                                   .payload = &j,
@@ -254,8 +359,10 @@ enum imp_status imp__light_picture_make(const struct imp_light_picture *p, doubl
     IMP_TRY(imp__shared_sum(ctx, &loop, &desc, item_work, &shared));
     IMP_TRY(imp__drops_budget(ctx, &j.drops, p->run->drop_budget, (double)p->walks));
     if (drops) imp__drops_merge(drops, &j.drops);
+    if (j.groups) groups_end(&j);
 out:
     workers_destroy(&j);
+    groups_destroy(&j);
     imp__splat_scale_destroy(ctx, &j.scale);
     return st;
 }
@@ -283,12 +390,10 @@ enum imp_status imp__render_from_lights(const struct imp_measure *m,
     imp_context *ctx = m->scene->ctx;
     const struct imp_film_desc *f = &m->sensor->film;
     const size_t values = (size_t)f->crop_w * (size_t)f->crop_h * (size_t)m->n;
-    const struct imp_walk_integrator *integrator =
-        imp__walk_integrator_of(m->scene->integrator);
+    const struct imp_walk_integrator *integrator = m->integrator;
     double *mean = NULL, *se = NULL;
     imp_film *film = NULL;
     struct imp_drops drops = {0};
-    IMP_TRY(imp__walks_from(m->scene, integrator, IMP_FROM_LIGHTS, &integrator));
     IMP_TRY(imp__light_walks_allowed(m->scene, m->sensor, integrator, NULL));
     if (f->n_responses == 0 &&
         (f->pixel_format == IMP_PIXEL_LUMINANCE_ALPHA ||

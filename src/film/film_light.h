@@ -7,6 +7,10 @@
  * with the filter h and its integral H_p over the part of the film that is sampled. Walks
  * are independent, c_ip is 0 in most pixels, and se^2 = (sum c^2 - (sum c)^2/N)/(N (N-1)).
  *
+ * A sample from both ends (walk/both.h) adds what its walk from the sensor, which begins in
+ * a pixel, brings: N of a pixel, not of the picture. The samples are cut into groups with as
+ * many of each pixel, and the spread of the groups' pictures is the standard error.
+ *
  * Order of the sums: the walks are cut into a fixed number of items, each adds its walks up
  * one by one in a film of its own, and items are added in a fixed binary tree. */
 #ifndef IMP_FILM_LIGHT_H

@@ -51,24 +51,16 @@ void imp__light_replicate(struct imp__gradient_job *job, struct imp_tile_worker 
         struct imp_light_walk walk;
         imp__light_walk_trace(&job->tracer, &worker->arena, index, &walk);
         imp__tile_drop(worker, walk.walk.dropped, -1, -1, index);
-        const size_t n = (size_t)imp_max(walk.walk.n, 1);
-        struct imp_entry *entry = imp__arena_array(&worker->arena, n, sizeof *entry);
-        if (!entry) {
+        imp_spec *P =
+            imp__arena_take(&worker->arena, (size_t)walk.n_reach + 1, sizeof *P);
+        size_t k = 0;
+        for (const struct imp_reach *r = P ? walk.reach : NULL; r; r = r->next)
+            P[k++] = imp__walk_lanes(&walk.walk, adjoint_at(a, image, r->px, r->py));
+        if (!P || !imp__light_walk_sweep(&job->tracer, &worker->arena, &walk, P,
+                                         1 / ((double)job->plan.n * (double)pixels),
+                                         &tally->sink)) {
             worker->no_memory = true;
             return;
-        }
-        for (const struct imp_reach *r = walk.reach; r; r = r->next) {
-            const imp_spec P =
-                imp__walk_lanes(&walk.walk, adjoint_at(a, image, r->px, r->py));
-            if (r->met) entry[r->number].e = P;
-            else entry[r->number].b = P;
-        }
-        if (walk.n_reach > 0) {
-            walk.walk.entry = entry;
-            imp__walk_fold(&walk.walk);
-            imp__walk_sweep_values(&job->tracer, &walk.walk,
-                                   imp__spec(1 / ((double)job->plan.n * (double)pixels)),
-                                   &tally->sink);
         }
         imp__arena_rewind(&worker->arena, mark);
     }

@@ -2,7 +2,7 @@
  *
  * Emission: met by chance, and asked for by light samples, each with the weight of the
  * power heuristic (Veach 1997) against the other. */
-#include "step.h"
+#include "both.h"
 
 static double light_pmf(const struct imp_scene *s, int light)
 {
@@ -34,8 +34,10 @@ void imp__emission_meet(struct imp_step *s, struct imp_vertex *v, int emitter,
                                    at ? imp__decide1(hit->t) : INFINITY,
                                    at ? imp__decide1(-imp__dot(at->n, s->d)) : 1,
                                    imp__decide(-s->d)};
-    if (s->pdf > 0 && s->tracer->integrator->lights &&
-        !s->tracer->integrator->only_points) {
+    if (imp_unlikely(s->both != NULL)) {
+        weight = imp__decide1(imp__both_met_weight(s, emitter, hit, at));
+    } else if (s->pdf > 0 && s->tracer->integrator->lights &&
+               !s->tracer->integrator->only_points) {
         const double pmf = light_pmf_at(s, s->guided.left, &s->guided.from, emitter);
         const double pe = pmf * e->ops->pdf(e, &s->from, &s->d, hit, at);
         weight = imp__decide1(weight * power_heuristic(s->pdf, pe));
@@ -146,8 +148,11 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
     const double p = ls.pdf * pmf;
     const bool alone =
         (e->ops->flags & IMP_EMITTER_DELTA) || !s->tracer->integrator->directions;
-    const double weight = imp__emitter_timed(
-        e, s->walk->time, imp__decide1((alone ? 1 : power_heuristic(p, pdf)) / p));
+    const double mis = imp_unlikely(s->both != NULL)
+                           ? imp__both_sample_weight(s, light, &ls, b, &dirs)
+                       : alone ? 1
+                               : power_heuristic(p, pdf);
+    const double weight = imp__emitter_timed(e, s->walk->time, imp__decide1(mis / p));
 
     /* What it brings, if it is seen. */
     const imp_v3 there = imp__decide((imp_v3){ls.uv[0], ls.uv[1], ls.dist, ls.cos_light});

@@ -133,6 +133,29 @@ static enum imp_status sensor_allowed(const struct imp_scene *scene,
     return IMP_OK;
 }
 
+/* Weights of samples from both ends count the vertices of a path, so every way must find
+ * the same ones, and film positions of both walks must have the same bounds. */
+static enum imp_status both_allowed(const struct imp_scene *scene,
+                                    const struct imp_sensor *sensor,
+                                    const struct imp_walk_integrator *integrator)
+{
+    for (int b = 0; integrator->media && b < scene->n_bsdfs; b++)
+        if (scene->bsdfs[b]->straight && !(scene->bsdfs[b]->flags & IMP_BSDF_NULL))
+            return imp__error(
+                scene->ctx, IMP_E_UNSUPPORTED,
+                "integrator bdpt: connections through media pass material '%s' (%s), "
+                "which lets light go straight on and is a vertex of walks; use volpath "
+                "or ptracer",
+                scene->bsdfs[b]->name, scene->bsdfs[b]->ops->name);
+    if (sensor->film.sample_border)
+        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                          "integrator bdpt: the film of sensor '%s' has sample_border, "
+                          "and walks from the sensor begin inside of the picture alone; "
+                          "set it to false, or use path or ptracer",
+                          sensor->name);
+    return IMP_OK;
+}
+
 /* Where collisions are drawn depends on the extinction. That they stand still makes a
  * derivative that is whole only where every collision had a chance to be drawn. */
 static enum imp_status media_allowed(const struct imp_scene *scene,
@@ -156,6 +179,7 @@ enum imp_status imp__light_walks_allowed(const struct imp_scene *scene,
     enum imp_status st = IMP_OK;
     IMP_TRY(emission_allowed(scene, active));
     IMP_TRY(sensor_allowed(scene, sensor, integrator));
+    if (integrator->both) IMP_TRY(both_allowed(scene, sensor, integrator));
     if (active) IMP_TRY(media_allowed(scene, active));
 out:
     return st;

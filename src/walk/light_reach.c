@@ -2,8 +2,8 @@
  *
  * How a walk from a light reaches the sensor: its vertices are connected to a point of
  * the sensor, or meet its surface. Of both ways, weights of MIS (Veach 1997, 9.2). */
+#include "both.h"
 #include "kind/bsdf/transport.h"
-#include "light_step.h"
 
 static void reach_add(struct imp_light_step *w, struct imp_vertex *v, bool met, double px,
                       double py)
@@ -53,8 +53,9 @@ void imp__light_meet_sensor(struct imp_light_step *w, struct imp_vertex *v,
     const double cosine = -imp__dot(at->ng, s->d);
     if (!(cosine > 0) || !imp__light_depth_allows(s, s->depth)) return;
     if (s->tracer->integrator->hide_emitters && s->depth == 1) return;
-    const double weight =
-        imp__decide1(film_per_area(sensor) * met_weight(w, cosine, v->t));
+    const double mis =
+        w->both ? imp__both_sensor_weight(w, cosine) : met_weight(w, cosine, v->t);
+    const double weight = imp__decide1(film_per_area(sensor) * mis);
     const bool square = sensor->shape->ops->flags & IMP_SHAPE_SQUARE;
     const struct imp_key key = s->walk->key;
     const double u =
@@ -146,6 +147,17 @@ void imp__light_connect(struct imp_light_step *w, struct imp_vertex *v,
     reach_add(w, v, false, to->px, to->py);
 }
 
+/* Density with which the walk would go on that way. */
+static double continues_pdf(const struct imp_step *s, const struct imp_bsdf *b,
+                            const struct imp_dirs *dirs)
+{
+    if (imp_likely(!b->shaped)) return imp__bsdf_transposed_pdf(b, s->in, dirs);
+    const struct imp_dirs exchanged = {dirs->wi, dirs->wo, IMP_SMOOTH, dirs->derivative};
+    imp_spec p;
+    imp__shaped_pdf(b, s->at.carried, s->in, &exchanged, &p);
+    return imp__lane_mis_density(s, p);
+}
+
 /* A vertex that scatters, at `at`. */
 void imp__light_connect_vertex(struct imp_light_step *w, struct imp_vertex *v,
                                const struct imp_surface *at,
@@ -171,14 +183,12 @@ void imp__light_connect_vertex(struct imp_light_step *w, struct imp_vertex *v,
                          ? imp__bsdf_exchange(b, s->in, &dirs, imp__dot(to.wo, at->ng),
                                               imp__dot(-s->d, at->ng))
                          : 1;
-    imp_spec f, p;
+    imp_spec f;
     imp__bsdf_eval(b, s->at.carried, s->in, &dirs, &f);
-    const struct imp_dirs exchanged = {dirs.wi, dirs.wo, IMP_SMOOTH, dirs.derivative};
-    if (imp_likely(!b->shaped)) p = imp__spec(b->ops->pdf(b, s->in, &exchanged));
-    else imp__shaped_pdf(b, s->at.carried, s->in, &exchanged, &p);
-    const double pdf = imp_likely(!b->shaped) ? p[0] : imp__lane_mis_density(s, p);
-    const double weight =
-        imp__decide1(to.weight * c * imp__light_connect_weight(s, &to, pdf, 0));
+    const double mis =
+        w->both ? imp__both_reach_weight(w, &to, b, &dirs)
+                : imp__light_connect_weight(s, &to, continues_pdf(s, b, &dirs), 0);
+    const double weight = imp__decide1(to.weight * c * mis);
     if (!(weight > 0)) return;
     if (imp__is_zero_used(f, s->at.carried) && !imp__wants_derivative(s, b)) return;
     struct imp_shadow shadow;

@@ -2,7 +2,7 @@
  *
  * Vertex 0 of a walk from a light: which light sends it, from where, and whither. The
  * point itself may be seen by the sensor, too. */
-#include "light_step.h"
+#include "both.h"
 #include "scene/media_around.h"
 
 static bool is_far(const struct imp_emitter *e)
@@ -32,6 +32,7 @@ static void light_itself_connect(struct imp_light_step *w, struct imp_vertex *v,
     const struct imp_walk_integrator *i = s->tracer->integrator;
     const bool far = is_far(e);
     const bool point = e->ops->flags & IMP_EMITTER_DELTA;
+    if (w->both && sensor->shape) return; /* which has it as its light sample */
     if (!i->lights || i->hide_emitters || !imp__light_depth_allows(s, 1) ||
         !sensor->ops->connect || (point && !sensor->shape))
         return;
@@ -47,9 +48,11 @@ static void light_itself_connect(struct imp_light_step *w, struct imp_vertex *v,
         emission_of(start, far ? INFINITY : 1, surface ? imp__dot(n, d) : 1, d);
     const double pdf = far ? 0 : e->ops->pdf_emission(e, &x);
     if (!far && !(pdf > 0)) return; /* this way nothing is emitted */
-    const double weight = imp__decide1(
-        imp__emitter_timed(e, s->walk->time, to.weight * c) *
-        imp__light_connect_weight(s, &to, pdf, far ? start->pdf_p : 0) / per);
+    const double mis =
+        w->both ? imp__both_light_weight(w, light, start, &x, &to)
+                : imp__light_connect_weight(s, &to, pdf, far ? start->pdf_p : 0);
+    const double weight =
+        imp__decide1(imp__emitter_timed(e, s->walk->time, to.weight * c) * mis / per);
     const imp_spec le =
         imp__emitter_radiance(s->scene, light, &x, s->at.p, s->at.carried);
     const struct imp_active *active = s->tracer->active;
@@ -186,5 +189,7 @@ bool imp__light_start(struct imp_light_step *w)
     s->pdf = far ? 0 : start.pdf_d;
     w->pdf_across = far ? start.pdf_p : 0;
     s->depth = 1;
-    return true;
+    if (!w->both || imp__both_light_begins(w, light, &start)) return true;
+    s->walk->dropped = IMP_DROP_MEMORY;
+    return false;
 }

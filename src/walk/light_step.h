@@ -18,6 +18,7 @@ struct imp_light_step {
     struct imp_reach **end; /* of the list */
     /* The ray in flight: its density per area across it, where the sky sent it; else 0. */
     double pdf_across;
+    struct imp_both *both; /* of a sample from both ends; NULL: none */
 };
 
 static inline bool imp__light_depth_allows(const struct imp_step *s, int segments)
@@ -25,6 +26,13 @@ static inline bool imp__light_depth_allows(const struct imp_step *s, int segment
     const int max = s->tracer->integrator->max_depth;
     return max < 0 || segments <= max;
 }
+
+/* ---- light_walk.c ---- */
+/* All steps of out->walk, whose key, time and wavelengths are set. */
+void imp__light_walk_follow(const struct imp_tracer *tracer, struct imp_arena *arena,
+                            struct imp_light_walk *out);
+/* The values of what reaches the film. */
+void imp__light_walk_close(const struct imp_tracer *tracer, struct imp_light_walk *out);
 
 /* ---- light_start.c ---- */
 /* Vertex 0: the light that sends the walk, and the ray that leaves it. False: nothing is

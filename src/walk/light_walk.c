@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * One walk from a light is decided (light_walk.h), from its start on. */
+#include "both.h"
 #include "kind/bsdf/transport.h"
-#include "light_step.h"
 #include <float.h>
 
 /* In place of a pixel in the key: no pixel of a film has this number. */
@@ -88,6 +88,7 @@ static bool scatter(struct imp_light_step *w, struct imp_vertex *v,
     if (s->segment->leave) s->segment->leave(s, v, at);
     s->pdf = dirs.lobe == IMP_SMOOTH ? density : 0;
     w->pdf_across = 0;
+    if (w->both) imp__both_light_leaves(w, b, &dirs);
     return true;
 }
 
@@ -109,6 +110,11 @@ static bool step(struct imp_light_step *w)
         imp__store_v3(v->d.wo, (imp_v3){0});
     }
 
+    if (w->both && !imp__both_light_arrives(w, v, &at, &frame)) {
+        s->walk->dropped = IMP_DROP_MEMORY;
+        return false;
+    }
+
     /* Light that reaches the sensor from here: it is met, or connected to. */
     if (v->shape && v->shape->sensor == s->tracer->sensor)
         imp__light_meet_sensor(w, v, &at);
@@ -126,38 +132,37 @@ static bool step(struct imp_light_step *w)
 
 /* ---- Walks ------------------------------------------------------------------------ */
 
-/* What reaches the film, with the throughput up to each vertex. */
-static void close(const struct imp_tracer *tracer, struct imp_light_walk *out)
+static void value_set(const struct imp_tracer *tracer, struct imp_walk *walk,
+                      struct imp_reach *r, imp_spec values)
+{
+    imp_spec used = r->values = values;
+    if (!tracer->wavelengths) used[3] = 0;
+    if (imp_unlikely(!imp__is_within(used, FLT_MAX)))
+        walk->dropped = imp__drop_cause(used);
+    r->L = imp__walk_seen(walk, values);
+}
+
+void imp__light_walk_close(const struct imp_tracer *tracer, struct imp_light_walk *out)
 {
     struct imp_walk *walk = &out->walk;
     imp_spec P = imp__spec(1);
     struct imp_reach *r = out->reach;
     for (struct imp_vertex *v = walk->first; v && r && !walk->dropped; v = v->next) {
-        for (; r && r->vertex == v; r = r->next) {
-            r->values = P * (r->met ? v->e : v->b);
-            imp_spec used = r->values;
-            if (!tracer->wavelengths) used[3] = 0;
-            if (imp_unlikely(!imp__is_within(used, FLT_MAX)))
-                walk->dropped = imp__drop_cause(used);
-            r->L = imp__walk_seen(walk, r->values);
-        }
+        for (; r && r->vertex == v; r = r->next)
+            value_set(tracer, walk, r, P * (r->met ? v->e : v->b));
         P *= v->w;
     }
+    if (r && !r->vertex && !walk->dropped)
+        value_set(tracer, walk, r, imp__walk_fold(&out->both->eye) * out->both->pixels);
     if (!walk->dropped) return;
     out->reach = NULL;
     out->n_reach = 0;
 }
 
-void imp__light_walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
-                           int64_t index, struct imp_light_walk *out)
+void imp__light_walk_follow(const struct imp_tracer *tracer, struct imp_arena *arena,
+                            struct imp_light_walk *out)
 {
-    const struct imp_key key = imp__key(tracer->seed, LIGHT_WALKS, (uint64_t)index);
-    *out = (struct imp_light_walk){.walk = {.key = key, .valid = true}};
     struct imp_walk *walk = &out->walk;
-    walk->time = imp__walk_time(tracer, walk);
-    if (tracer->wavelengths &&
-        !imp__walk_wave(tracer, arena, imp__wave_draw(tracer, walk, index), walk))
-        return;
     imp_spec scratch[IMP_INPUTS_MAX];
     struct imp_light_step w = {
         .s = {.tracer = tracer,
@@ -172,8 +177,28 @@ void imp__light_walk_trace(const struct imp_tracer *tracer, struct imp_arena *ar
               .eta = 1,
               .lanes = IMP_LANE_MIS_INIT},
         .out = out,
-        .end = &out->reach};
+        .end = &out->reach,
+        .both = out->both};
+    if (out->both)
+        w.s.lanes.drew = imp__lane_drawn(out->both->eye.key, imp__lane_mis_count(&w.s));
     if (imp__light_start(&w))
         while (step(&w)) {}
-    close(tracer, out);
+}
+
+void imp__light_walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
+                           int64_t index, struct imp_light_walk *out)
+{
+    const struct imp_key key = imp__key(tracer->seed, LIGHT_WALKS, (uint64_t)index);
+    *out = (struct imp_light_walk){.walk = {.key = key, .valid = true}};
+    struct imp_walk *walk = &out->walk;
+    if (tracer->integrator->both) {
+        imp__both_trace(tracer, arena, index, out);
+        return;
+    }
+    walk->time = imp__walk_time(tracer, walk);
+    if (tracer->wavelengths &&
+        !imp__walk_wave(tracer, arena, imp__wave_draw(tracer, walk, index), walk))
+        return;
+    imp__light_walk_follow(tracer, arena, out);
+    imp__light_walk_close(tracer, out);
 }

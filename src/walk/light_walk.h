@@ -18,7 +18,9 @@
 
 #include "walk.h"
 
-/* Light that reaches the sensor from a vertex. */
+struct imp_both;
+/* Light that reaches the sensor from a vertex; NULL: what the walk from the sensor brings
+ * of a sample from both ends. */
 struct imp_reach {
     struct imp_reach *next;    /* of the walk, in order */
     struct imp_vertex *vertex; /* from which it comes */
@@ -33,12 +35,30 @@ struct imp_light_walk {
     struct imp_walk walk;
     struct imp_reach *reach; /* what reaches the film, wherever */
     int n_reach;
+    struct imp_both
+        *both; /* walks begin at both ends (both.h); NULL: at the light alone */
 };
 
 /* Record light walk `index` in the arena with its values at the scene's present
  * parameters. A walk that is dropped reaches nothing. */
 void imp__light_walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
                            int64_t index, struct imp_light_walk *out);
+
+/* ---- light_sweep.c: `adjoint` has one for each reach, in order, by lanes; false: no
+ * memory. ---- */
+/* Reverse mode: adds the derivative of the sum over the reaches of adjoint times values,
+ * times factor, to the sink. */
+bool imp__light_walk_sweep(const struct imp_tracer *tracer, struct imp_arena *arena,
+                           struct imp_light_walk *walk, const imp_spec *adjoint,
+                           double factor, struct imp_sink *sink);
+/* Forward mode: its derivative in the direction x_dot [active->n], by lanes. */
+bool imp__light_walk_tangent(const struct imp_tracer *tracer, struct imp_arena *arena,
+                             struct imp_light_walk *walk, const imp_spec *adjoint,
+                             const double *x_dot, imp_spec *L_dot);
+/* All values at the scene's present parameters, to the bit those that tracing gave at the
+ * parameters it was done with: at others they are those of a frozen walk. */
+bool imp__light_walk_evaluate(const struct imp_tracer *tracer, struct imp_arena *arena,
+                              struct imp_light_walk *walk);
 
 /* May walks of this integrator begin at the lights and reach this sensor? If not, the error
  * says why. `active`: derivatives that are wanted, or NULL. */

@@ -13,6 +13,8 @@
 #include "segment.h"
 #include "shaped.h"
 
+struct imp_both;
+
 /* What a guide knows of the walk (guided.c). */
 struct imp_guided {
     const struct imp_guide *guide; /* NULL: none */
@@ -88,6 +90,7 @@ struct imp_step {
     struct imp_graded_state *graded; /* NULL: no graded medium in the scene */
     struct imp_guided guided;
     struct imp_mixed mixed;
+    struct imp_both *both; /* of a sample from both ends, whose weights it has; NULL */
 };
 
 /* Depth of the vertex at work as max_depth counts it. */
@@ -142,6 +145,8 @@ struct imp_vertex *imp__vertex_meet(struct imp_step *s, enum imp_meeting met,
 void imp__vertex_place(struct imp_step *s, struct imp_vertex *v,
                        const struct imp_surface *at, const struct imp_frame *frame,
                        imp_v3 d, double t);
+/* The ray in flight leaves the scene and meets the environment. */
+void imp__sky_meet(struct imp_step *s);
 /* The vertex that the first segment begins at, if it has a weight. False: no memory. */
 bool imp__sensor_vertex(struct imp_step *s);
 /* Step after step from the ray in flight, until the walk ends; from a sensor that is a

@@ -17,7 +17,7 @@ imp_spec imp__walk_fold(struct imp_walk *walk)
             L = v->e + v->w * L + v->b;
         } else {
             entry--;
-            L = (entry->e * v->e + entry->b * v->b) + v->w * L;
+            L = (entry->e * v->e + entry->b * v->b) + v->w * L + entry->joints;
         }
         for (struct imp_side *s = v->side; s; s = s->next)
             L += s->walk.L = imp__walk_fold(&s->walk);
@@ -25,12 +25,17 @@ imp_spec imp__walk_fold(struct imp_walk *walk)
     return L;
 }
 
-static bool bsdf_active(const struct imp_tracer *t, const struct imp_vertex *v)
+static inline bool bsdf_active(const struct imp_tracer *t, const struct imp_vertex *v)
 {
     const struct imp_bsdf *b = v->bsdf;
     if (!b || b->index < 0 || !t->active->bsdf[b->index]) return false;
     return t->active->bsdf[b->index] != IMP_BY_EXTINCTION || t->collisions_stand ||
            v->d.stands;
+}
+
+bool imp__vertex_active(const struct imp_tracer *t, const struct imp_vertex *v)
+{
+    return bsdf_active(t, v);
 }
 
 /* ---- Lane by lane, d of a vertex's three pieces / d its inputs ------------------ */
@@ -233,6 +238,22 @@ static void light_scatter(const struct imp_tracer *tracer, const struct imp_vert
     emitter_scatter(tracer, v->d.light.emitter, &x, &at, bar, sink);
 }
 
+static inline void vertex_scatter(const struct imp_tracer *tracer,
+                                  const struct imp_vertex *v, const imp_spec *bar,
+                                  struct imp_sink *sink)
+{
+    const struct imp_bsdf *b = v->bsdf;
+    const struct imp_texcoord at = imp__vertex_at(v);
+    if (imp_unlikely(v->d.scatterer == IMP_IN_MEDIUM))
+        point_scatter(tracer, v, &at, bar, sink);
+    else imp__inputs_scatter(b->input, b->n_in, &at, bar, sink);
+}
+void imp__vertex_scatter(const struct imp_tracer *tracer, const struct imp_vertex *v,
+                         const imp_spec *bar, struct imp_sink *sink)
+{
+    vertex_scatter(tracer, v, bar, sink);
+}
+
 void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_walk *walk,
                             imp_spec adjoint, struct imp_sink *sink)
 {
@@ -280,12 +301,7 @@ void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_wa
                 for (int j = 0; j < b->n_in; j++) bar[j] += d[j] * arriving;
                 any = true;
             }
-            if (any) {
-                const struct imp_texcoord at = imp__vertex_at(v);
-                if (imp_unlikely(v->d.scatterer == IMP_IN_MEDIUM))
-                    point_scatter(tracer, v, &at, bar, sink);
-                else imp__inputs_scatter(b->input, b->n_in, &at, bar, sink);
-            }
+            if (any) vertex_scatter(tracer, v, bar, sink);
         }
         if (imp_unlikely(crosses(v))) media_scatter(tracer, v, P, lit, sink);
         P *= v->w;
@@ -375,6 +391,31 @@ static imp_spec tangent(const struct imp_tracer *tracer, const struct imp_walk *
     }
     if (walk->moving) L_dot += walk->moving->tangent(tracer, walk, x_dot);
     return L_dot;
+}
+
+void imp__vertex_tangent(const struct imp_tracer *tracer, const struct imp_vertex *v,
+                         const double *x_dot, imp_spec *in_dot)
+{
+    const struct direction direction = {tracer->active, x_dot};
+    const struct imp_texcoord at = imp__vertex_at(v);
+    imp__inputs_tangent(v->bsdf->input, v->bsdf->n_in, &at, direction_at, &direction,
+                        in_dot);
+    extinction_drop(tracer, v, in_dot);
+}
+
+imp_spec imp__track_tangent_along(const struct imp_tracer *tracer,
+                                  const struct imp_track *track,
+                                  const struct imp_carried *carried,
+                                  const imp_spec *value, const double *x_dot)
+{
+    const struct direction direction = {tracer->active, x_dot};
+    return imp__track_tangent(tracer, track, carried, value, direction_at, &direction);
+}
+
+imp_spec imp__walk_tangent_values(const struct imp_tracer *tracer,
+                                  const struct imp_walk *walk, const double *x_dot)
+{
+    return tangent(tracer, walk, x_dot);
 }
 
 imp_spec imp__walk_tangent(const struct imp_tracer *tracer, const struct imp_walk *walk,

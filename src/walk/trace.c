@@ -102,8 +102,7 @@ static bool seen(const struct imp_step *s)
     return !integrator->hide_emitters || (integrator->first_hit && imp__bounces(s) > 0);
 }
 
-/* The ray leaves the scene and meets the environment. */
-static void sky_meet(struct imp_step *s)
+void imp__sky_meet(struct imp_step *s)
 {
     const int max_depth = s->tracer->integrator->max_depth;
     const bool counts = max_depth < 0 || imp__bounces(s) < max_depth;
@@ -319,7 +318,7 @@ static inline __attribute__((always_inline)) bool step(struct imp_step *s)
         v = medium_meet(s, s->flight.here->scatterer, s->flight.here->index, s->flight.at,
                         s->flight.t, &at, &frame);
         break;
-    case IMP_MEETS_NOTHING: sky_meet(s); return false;
+    case IMP_MEETS_NOTHING: imp__sky_meet(s); return false;
     default: return false;
     }
     return v && vertex_work(s, v, &hit, &at, &frame);

@@ -78,6 +78,12 @@ imp_spec imp__track_tangent(const struct imp_tracer *tracer,
                             double (*dot)(const void *x_dot, int param, size_t element),
                             const void *x_dot);
 
+/* ... along x_dot [active->n] (sweep.c). */
+imp_spec imp__track_tangent_along(const struct imp_tracer *tracer,
+                                  const struct imp_track *track,
+                                  const struct imp_carried *carried,
+                                  const imp_spec *value, const double *x_dot);
+
 /* What goes straight on through a surface of this material, in the event and the next. */
 imp_spec imp__passes_eval(const struct imp_scene *scene, const struct imp_track *track,
                           const struct imp_event *e, const struct imp_carried *carried);

@@ -138,6 +138,7 @@ struct imp_vertex {
 
 struct imp_entry {
     imp_spec e, b;
+    imp_spec joints; /* what reaches the sensor otherwise from there (both.h) */
 };
 
 struct imp_walk {
@@ -313,6 +314,10 @@ bool imp__walk_wave(const struct imp_tracer *tracer, struct imp_arena *arena, do
 void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, int x,
                      int y, int64_t sample, struct imp_walk *walk);
 
+/* Its number, film position, first ray and time alone; lens: the numbers of the ray. */
+void imp__walk_begin(const struct imp_tracer *tracer, int x, int y, int64_t sample,
+                     struct imp_walk *walk, double lens[2]);
+
 /* Film position alone of the same walk. */
 void imp__walk_position(const struct imp_tracer *tracer, int x, int y, int64_t sample,
                         double *px, double *py);
@@ -382,6 +387,14 @@ imp_spec imp__walk_fold(struct imp_walk *walk);
 void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_walk *walk,
                             imp_spec adjoint, struct imp_sink *sink);
 
+/* Of one vertex: do its BSDF's inputs count; what bar [n_in] gives to their parameters;
+ * their tangent, into in_dot [n_in]. */
+bool imp__vertex_active(const struct imp_tracer *tracer, const struct imp_vertex *v);
+void imp__vertex_scatter(const struct imp_tracer *tracer, const struct imp_vertex *v,
+                         const imp_spec *bar, struct imp_sink *sink);
+void imp__vertex_tangent(const struct imp_tracer *tracer, const struct imp_vertex *v,
+                         const double *x_dot, imp_spec *in_dot);
+
 /* ---- From a walk to the picture (gain.c) ------------------------------------------ */
 
 /* The camera's factor for this walk, by channel. */
@@ -430,6 +443,9 @@ static inline void imp__walk_sweep(const struct imp_tracer *tracer,
 /* Forward mode: dL in the direction x_dot [active->n]. */
 imp_spec imp__walk_tangent(const struct imp_tracer *tracer, const struct imp_walk *walk,
                            const double *x_dot);
+/* That of the walk's values. */
+imp_spec imp__walk_tangent_values(const struct imp_tracer *tracer,
+                                  const struct imp_walk *walk, const double *x_dot);
 
 /* ---- Decisions as the readers of a record want them ------------------------------- */
 

@@ -23,6 +23,7 @@ uint64_t imp__walk_integrator_hash(const struct imp_walk_integrator *i)
     uint64_t h = imp__hash(0, number, sizeof number);
     if (i->transmittance) h = imp__hash(h, &i->transmittance, sizeof i->transmittance);
     if (i->from_lights) h = imp__hash(h, &i->rr_depth, sizeof i->rr_depth);
+    if (i->both) h = imp__hash(h, &i->both, sizeof i->both);
     if (!i->mixes && !i->photons) return h;
     const double other[] = {i->photons ? i->h : 0, i->split};
     h = imp__hash(h, other, sizeof other);
@@ -33,6 +34,7 @@ enum imp_status imp__walks_from(const struct imp_scene *scene,
                                 const struct imp_walk_integrator *of, enum imp_from from,
                                 const struct imp_walk_integrator **out)
 {
+    if (of && of->both && from != IMP_FROM_SCENE) of = of->other_end; /* from one */
     *out = of;
     if (from == IMP_FROM_SCENE || !of || (from == IMP_FROM_LIGHTS) == of->from_lights)
         return IMP_OK;
@@ -341,7 +343,26 @@ static enum imp_status ptracer_ready(struct imp_scene *scene,
 {
     struct imp_walk_integrator *w = i->self;
     w->media = w->other_end->media = scene->n_media > 0 || scene->priorities;
-    return mixture_settle(scene, i, w->other_end);
+    if (!w->both) return mixture_settle(scene, i, w->other_end);
+    w->other_end->other_end->media = w->media;
+    return mixture_settle(scene, i, w->other_end->other_end);
+}
+
+/* Walks from both ends, joined. Its other ends are ptracer's, and of that path's. */
+static enum imp_status bdpt_build(const struct imp_build *build, struct imp_integrator *i)
+{
+    struct imp_walk_integrator *w = i->self;
+    enum imp_status st = IMP_OK;
+    IMP_TRY(ptracer_build(build, i));
+    struct imp_walk_integrator *lights =
+        imp__arena_array(build->arena, 1, sizeof *lights);
+    if (!lights)
+        IMP_TRY(imp__error(build->ctx, IMP_E_NOMEM, "no memory for the integrator"));
+    *lights = *w;
+    w->both = true;
+    w->other_end = lights;
+out:
+    return st;
 }
 
 const struct imp_integrator_ops imp__integrator_path = {
@@ -377,6 +398,14 @@ const struct imp_integrator_ops imp__integrator_ptracer = {
     .object_size = sizeof(struct imp_walk_integrator),
     .flags = IMP_INTEGRATOR_WALKS | IMP_INTEGRATOR_MEDIA,
     .build = ptracer_build,
+    .ready = ptracer_ready};
+
+const struct imp_integrator_ops imp__integrator_bdpt = {
+    .size = sizeof(struct imp_integrator_ops),
+    .name = "bdpt",
+    .object_size = sizeof(struct imp_walk_integrator),
+    .flags = IMP_INTEGRATOR_WALKS | IMP_INTEGRATOR_MEDIA,
+    .build = bdpt_build,
     .ready = ptracer_ready};
 
 #define VOLPATH(kind)                                                                    \

@@ -37,6 +37,7 @@ struct imp_walk_integrator {
     bool mixes;                /* some vertex may draw from more than its kernel */
     int split;                 /* so many vertices of a walk draw from each density */
     bool from_lights;          /* walks begin at the lights (light_walk.h) */
+    bool both; /* ... and as many at the sensor, joined with them (both.h) */
     struct imp_walk_integrator *other_end; /* the same numbers from the other end; NULL:
                                               there is none */
 };
@@ -45,7 +46,7 @@ extern const struct imp_integrator_ops imp__integrator_path, imp__integrator_dir
     imp__integrator_stam, imp__integrator_photons, imp__integrator_volpath,
     imp__integrator_volpathmis, imp__integrator_prbvolpath, imp__integrator_prb,
     imp__integrator_prb_basic, imp__integrator_prb_projective,
-    imp__integrator_direct_projective, imp__integrator_ptracer;
+    imp__integrator_direct_projective, imp__integrator_ptracer, imp__integrator_bdpt;
 
 /* NULL: not one of walks. */
 static inline const struct imp_walk_integrator *

@@ -82,9 +82,11 @@ void imp__walk_close(const struct imp_tracer *tracer, struct imp_walk *walk)
 #define FILL(p) memset((p), 0xff, sizeof *(p))
 #endif
 
-static inline void walk_begin(const struct imp_tracer *tracer, int x, int y,
-                              int64_t sample, struct imp_walk *walk)
+static inline __attribute__((always_inline)) void
+walk_begin(const struct imp_tracer *tracer, int x, int y, int64_t sample,
+           struct imp_walk *walk, double lens[2])
 {
+    const struct imp_sensor *sensor = tracer->sensor;
     FILL(walk);
     walk->first = walk->last = NULL;
     walk->n = walk->depth = 0;
@@ -99,6 +101,16 @@ static inline void walk_begin(const struct imp_tracer *tracer, int x, int y,
     walk->dropped = IMP_DROP_NONE;
     walk->entry = NULL;
     walk->moving = NULL;
+    lens[0] = imp__start_number(walk->key, walk->point, IMP_DIM_LENS_U);
+    lens[1] = imp__start_number(walk->key, walk->point, IMP_DIM_LENS_V);
+    sensor->ops->ray(sensor, walk->px, walk->py, lens, &walk->ray);
+    walk->time = imp__walk_time(tracer, walk);
+}
+
+void imp__walk_begin(const struct imp_tracer *tracer, int x, int y, int64_t sample,
+                     struct imp_walk *walk, double lens[2])
+{
+    walk_begin(tracer, x, y, sample, walk, lens);
 }
 
 /* The first ray in flight. What a guide and a mixture know is written where they are
@@ -145,6 +157,7 @@ static inline void step_begin(const struct imp_tracer *tracer, struct imp_arena 
                    : tracer->integrator->mixes ? tracer->integrator->mixing
                                                : NULL;
     s->mixed.here = s->mixed.splits = s->mixed.sphere = false;
+    s->both = NULL;
 }
 
 void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, int x,
@@ -155,11 +168,8 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
         imp__store_walk(tracer, arena, x, y, sample, walk);
         return;
     }
-    walk_begin(tracer, x, y, sample, walk);
-    const double lens[2] = {imp__start_number(walk->key, walk->point, IMP_DIM_LENS_U),
-                            imp__start_number(walk->key, walk->point, IMP_DIM_LENS_V)};
-    sensor->ops->ray(sensor, walk->px, walk->py, lens, &walk->ray);
-    walk->time = imp__walk_time(tracer, walk);
+    double lens[2];
+    walk_begin(tracer, x, y, sample, walk, lens);
 
     if (imp_unlikely(tracer->wavelengths != NULL) &&
         !imp__walk_wave(tracer, arena, imp__wave_draw(tracer, walk, sample), walk))

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Derivatives of walks from the lights, walk by walk, with another adjoint wherever they
- * reach the sensor: reverse against forward mode, and both against central differences of
- * frozen walks, which are linear in lamps and smooth in all else. */
+ * Derivatives of walks from the lights, and of samples from both ends, walk by walk, with
+ * another adjoint wherever they reach the sensor: reverse against forward mode, and both
+ * against central differences of frozen walks, which are linear in lamps and smooth in all
+ * else. */
 #include "imp_light_room.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
@@ -53,7 +54,7 @@ static void set(struct imp_scene *scene, struct imp_param *p, size_t e, double v
 }
 
 #define HEAD                                                                             \
-    "<scene version='3.0.0'><integrator type='ptracer'><integer name='max_depth' "       \
+    "<scene version='3.0.0'><integrator type='%s'><integer name='max_depth' "            \
     "value='6'/></integrator>"
 #define ROOM                                                                             \
     "<shape type='cube'>" AT(                                                            \
@@ -82,14 +83,25 @@ static void set(struct imp_scene *scene, struct imp_param *p, size_t e, double v
                                                                 "type='box'/></film></"  \
                                                                 "sensor></scene>"
 
-static void check(const char *what, const char *xml)
+/* The sum of adjoint times what reaches the film. */
+static double brings(const struct imp_light_walk *w, const imp_spec *P)
 {
+    double sum = 0;
+    for (const struct imp_reach *r = w->reach; r; r = r->next, P++)
+        for (int c = 0; c < 3; c++) sum += (*P)[c] * r->values[c];
+    return sum;
+}
+
+static void check(const char *integrator_name, const char *what, const char *body)
+{
+    char xml[8192];
+    snprintf(xml, sizeof xml, body, integrator_name);
     imp_scene *scene = test_scene_text(ctx, xml, IMP_RGB);
     uint8_t chosen[MANY] = {0};
     struct imp_active active;
     struct imp_arena arena;
     double exact = 0, frozen = 0;
-    int reached = 0, compared = 0;
+    int reached = 0, compared = 0, same = 0;
     for (size_t i = 0; i < scene->n_params && i < MANY; i++)
         chosen[i] = scene->params[i].info.flags & IMP_PARAM_DIFFERENTIABLE;
     test_must(ctx, imp__active_create(scene, chosen, &active));
@@ -106,56 +118,53 @@ static void check(const char *what, const char *xml)
     for (int i = 0; i < WALKS; i++) {
         const struct imp_arena_mark mark = imp__arena_mark(&arena);
         struct imp_light_walk w;
+        imp_spec P[256];
+        int n = 0;
         imp__light_walk_trace(&tracer, &arena, i, &w);
-        struct imp_entry *entry =
-            imp__arena_array(&arena, (size_t)w.walk.n + 1, sizeof *entry);
-        imp_spec whole = {0};
-        for (const struct imp_reach *r = w.reach; r; r = r->next) {
-            const imp_spec P = {1 + r->px / 7, 2 - r->py / 9, 0.5 + r->number, 0};
-            if (r->met) entry[r->number].e = P;
-            else entry[r->number].b = P;
-            whole += P * r->values;
-        }
-        if (w.n_reach == 0) {
+        for (const struct imp_reach *r = w.reach; r && n < 256; r = r->next)
+            P[n++] = (imp_spec){1 + r->px / 7, 2 - r->py / 9, 0.5 + r->number, 0};
+        const double value = brings(&w, P);
+        if (value == 0) {
             imp__arena_rewind(&arena, mark);
             continue;
         }
         reached++;
-        w.walk.entry = entry;
-        const imp_spec L = imp__walk_fold(&w.walk);
-        for (int c = 0; c < 3; c++)
-            exact = fmax(exact, fabs(L[c] - whole[c]) / (1e-30 + fabs(whole[c])));
         struct sum s = {.sink = {.add = sum_add}, .active = &active};
-        imp__walk_sweep(&tracer, &w.walk, imp__spec(1), &s.sink);
+        if (!imp__light_walk_sweep(&tracer, &arena, &w, P, 1, &s.sink)) break;
         double x_dot[MANY] = {0}, dot = 0, size = 0;
         for (size_t k = 0; k < active.n; k++) {
             x_dot[k] = sin((double)(k + 1) * (i % 97 + 1));
             dot += x_dot[k] * s.g[k];
             size += fabs(x_dot[k] * s.g[k]);
         }
-        const imp_spec t = imp__walk_tangent(&tracer, &w.walk, x_dot);
+        imp_spec t;
+        if (!imp__light_walk_tangent(&tracer, &arena, &w, P, x_dot, &t)) break;
         if (size > 0) exact = fmax(exact, fabs((t[0] + t[1]) + t[2] - dot) / size);
         const size_t k = (size_t)i % active.n;
         size_t e = 0;
         struct imp_param *p = param_at(scene, &active, k, &e);
         const double x = imp__param_get(p, e), h = 1e-4 * fmax(fabs(x), 0.1);
-        set(scene, p, e, x + h);
-        const imp_spec up = imp__walk_frozen(&tracer, &w.walk);
-        set(scene, p, e, x - h);
-        const imp_spec down = imp__walk_frozen(&tracer, &w.walk);
-        set(scene, p, e, x);
-        const imp_spec d = (up - down) * (1 / (2 * h));
-        const double value = fabs(whole[0]) + fabs(whole[1]) + fabs(whole[2]);
-        frozen = fmax(frozen, fabs((d[0] + d[1]) + d[2] - s.g[k]) /
-                                  (fabs(s.g[k]) + value / fmax(fabs(x), 0.1)));
+        double at[3];
+        for (int j = 0; j < 3; j++) {
+            set(scene, p, e, x + (j == 2 ? 0 : j ? -h : h));
+            if (!imp__light_walk_evaluate(&tracer, &arena, &w)) break;
+            at[j] = brings(&w, P);
+        }
+        const double d = (at[0] - at[1]) / (2 * h);
+        same += at[2] == value;
+        frozen = fmax(frozen, fabs(d - s.g[k]) /
+                                  (fabs(s.g[k]) + fabs(value) / fmax(fabs(x), 0.1)));
         compared += s.g[k] != 0;
         imp__arena_rewind(&arena, mark);
     }
     tap_ok(exact < 1e-12 && reached > WALKS / 8,
-           "%s: fold, forward and reverse, %zu numbers, %d walks # %.1e", what, active.n,
-           reached, exact);
+           "%s, %s: forward and reverse, %zu numbers, %d walks # %.1e", integrator_name,
+           what, active.n, reached, exact);
     tap_ok(frozen < 1e-6 && compared > WALKS / 64,
-           "%s: frozen differences of %d walks # %.1e", what, compared, frozen);
+           "%s, %s: frozen differences of %d walks # %.1e", integrator_name, what,
+           compared, frozen);
+    tap_ok(same == reached, "%s, %s: evaluated again to the bit # %d of %d",
+           integrator_name, what, same, reached);
     imp__arena_free(&arena);
     imp__active_destroy(ctx, &active);
     imp_scene_destroy(scene);
@@ -164,15 +173,20 @@ static void check(const char *what, const char *xml)
 int main(void)
 {
     ctx = test_context(1);
-    check("a room", HEAD ROOM CAMERA);
-    check("rough metal and plastic",
-          HEAD ROOM BALL("-.8,-.9,-.5", "<bsdf type='roughconductor'><float name='alpha' "
-                                        "value='.3'/></bsdf>")
-              BALL("1,-1,.3", "<bsdf type='phong'/>") CAMERA);
-    check("fog, with its density", HEAD ROOM FOG CAMERA);
-    check("point light and sky", HEAD
-          "<emitter type='point'><point name='position' value='.3,1,1'/></emitter>"
-          "<emitter type='constant'/>" BALL("0,0,0", "<bsdf type='diffuse'/>") CAMERA);
+    static const char *const ends[] = {"ptracer", "bdpt"};
+    for (int k = 0; k < 2; k++) {
+        check(ends[k], "a room", HEAD ROOM CAMERA);
+        check(ends[k], "rough metal and plastic",
+              HEAD ROOM BALL("-.8,-.9,-.5", "<bsdf type='roughconductor'><float "
+                                            "name='alpha' value='.3'/></bsdf>")
+                  BALL("1,-1,.3", "<bsdf type='phong'/>") CAMERA);
+        check(ends[k], "fog, with its density", HEAD ROOM FOG CAMERA);
+        check(ends[k], "point light and sky",
+              HEAD
+              "<emitter type='point'><point name='position' value='.3,1,1'/></emitter>"
+              "<emitter type='constant'/>" BALL("0,0,0", "<bsdf type='diffuse'/>")
+                  CAMERA);
+    }
     imp_context_destroy(ctx);
     return tap_done();
 }

@@ -1,0 +1,196 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Losses of walks from the lights and from both ends, and of linear functions of their
+ * pictures: values and gradients against those of walks from the sensor, whose adjoints
+ * leave out one walk at a time, and standard errors against the spread of fresh seeds; at
+ * the optimum and away from it, through a box and through filters that share walks. */
+#include "imp_light_room.h"
+#include "imp_scene.h"
+#include "imp_tap.h"
+#include <stdbool.h>
+
+enum { W = 6, H = 4, N = 6, SEEDS = 160, SPP = 32 };
+
+static imp_context *ctx;
+
+/* clang-format off: literals are broken where the markup is */
+#define ROOM                                                                             \
+    "<scene version='3.0.0'><integrator type='%s'><integer name='max_depth' value='4'/>" \
+    "</integrator><shape type='cube'>" AT(                                               \
+        "<scale value='2'/>") "<boolean name='flip_normals' value='true'/><bsdf "        \
+                              "type='diffuse' id='wall'><rgb "                           \
+                              "name='reflectance' "                                      \
+                              "value='.6,.5,.4'/></bsdf></shape><shape "                 \
+                              "type='rectangle'>" AT(                                    \
+                                  "<scale x='.6' y='.6'/><rotate x='1' "                 \
+                                  "angle='90'/><translate y='1.95'/>") "<emitter "       \
+                                                                       "type='area' "    \
+                                                                       "id='lamp'><rgb " \
+                                                                       "name='radiance'" \
+                                                                       " value='5,4,3'/" \
+                                                                       "></emitter>"     \
+                                                                       "</"              \
+                                                                       "shape><sensor "  \
+                                                                       "type='"          \
+                                                                       "perspective'><"  \
+                                                                       "float "          \
+                                                                       "name='fov' "     \
+                                                                       "value='50'/"     \
+                                                                       ">" AT(           \
+                                                                           "<lookat "    \
+                                                                           "origin='0,"  \
+                                                                           "0,1.9' "     \
+                                                                           "target='0,"  \
+                                                                           "0,0' "       \
+                                                                           "up='0,1,0'/" \
+                                                                           ">") "<film " \
+                                                                                "type='" \
+                                                                                "hdrfil" \
+                                                                                "m'><"   \
+                                                                                "intege" \
+                                                                                "r "     \
+                                                                                "name='" \
+                                                                                "width'" \
+                                                                                " value" \
+                                                                                "='6'/"  \
+                                                                                "><"     \
+                                                                                "intege" \
+                                                                                "r "     \
+                                                                                "name='" \
+                                                                                "height" \
+                                                                                "' "     \
+                                                                                "value=" \
+                                                                                "'4'/"   \
+                                                                                "><"     \
+                                                                                "rfilte" \
+                                                                                "r "     \
+                                                                                "type='" \
+                                                                                "%s'/"   \
+                                                                                "></"    \
+                                                                                "film><" \
+                                                                                "/senso" \
+                                                                                "r></"   \
+                                                                                "scene>"
+/* clang-format on */
+
+static imp_scene *room(const char *integrator, const char *filter)
+{
+    char xml[4096];
+    snprintf(xml, sizeof xml, ROOM, integrator, filter);
+    return test_scene_text(ctx, xml, IMP_RGB);
+}
+
+/* The mean picture. */
+static void picture(const char *filter, float *pixels)
+{
+    imp_scene *scene = room("path", filter);
+    struct imp_run run = IMP_RUN_INIT;
+    imp_film *film;
+    run.spp = 8192;
+    run.seed = 77;
+    test_must(ctx, imp_render(scene, &run, &film));
+    memcpy(pixels, imp_film_mean(film), sizeof(float) * 3 * W * H);
+    imp_film_destroy(film);
+    imp_scene_destroy(scene);
+}
+
+static imp_problem *problem_of(imp_scene *scene, const float *target)
+{
+    imp_problem *p = test_problem(ctx, scene, "*.reflectance.value");
+    test_must(ctx, imp_problem_activate(p, "*.radiance.value"));
+    if (target) {
+        struct imp_target t = IMP_TARGET_INIT;
+        t.width = W;
+        t.height = H;
+        t.channels = 3;
+        t.pixels = target;
+        test_must(ctx, imp_problem_add_target(p, &t));
+    }
+    return p;
+}
+
+struct answer {
+    struct imp_estimate value;
+    double g[N], se[N];
+};
+
+static void ask(imp_problem *p, const float *adjoint, int spp, uint64_t seed,
+                struct answer *a)
+{
+    struct imp_run run = IMP_RUN_INIT;
+    run.spp = spp;
+    run.seed = seed;
+    run.points = IMP_POINTS_INDEPENDENT;
+    test_must(ctx, adjoint
+                       ? imp_problem_functional(p, adjoint, &run, &a->value, a->g, a->se)
+                       : imp_problem_objective(p, NULL, &run, &a->value, a->g, a->se));
+}
+
+static double ratio(const struct tap_stat *s, double told)
+{
+    return sqrt(s->m2 / (s->n - 1) / (told / s->n));
+}
+
+static void compare(const char *integrator, const char *filter, const float *target,
+                    const float *adjoint, const char *what)
+{
+    imp_scene *scene = room(integrator, filter), *eye = room("path", filter);
+    imp_problem *p = problem_of(scene, target), *q = problem_of(eye, target);
+    struct answer truth, a;
+    struct tap_stat value = {0}, g[N] = {{0}};
+    double told = 0, told_g[N] = {0}, worst = 0, least = 9, most = 0;
+    if (imp_problem_n(p) != N) test_must(ctx, IMP_E_ARG);
+    ask(q, adjoint, 4096, 5, &truth);
+    for (int i = 0; i < SEEDS; i++) {
+        ask(p, adjoint, SPP, 1000 + (uint64_t)i, &a);
+        tap_add(&value, a.value.value);
+        told += a.value.se * a.value.se;
+        for (int k = 0; k < N; k++) {
+            tap_add(&g[k], a.g[k]);
+            told_g[k] += a.se[k] * a.se[k];
+        }
+    }
+    const double z =
+        (value.mean - truth.value.value) / hypot(tap_se(&value), truth.value.se);
+    for (int k = 0; k < N; k++) {
+        const double r = ratio(&g[k], told_g[k]);
+        worst =
+            fmax(worst, fabs(g[k].mean - truth.g[k]) / hypot(tap_se(&g[k]), truth.se[k]));
+        least = fmin(least, r);
+        most = fmax(most, r);
+    }
+    tap_ok(fabs(z) < 4 && worst < 4.5,
+           "%s, %s, %s: %.6g +- %.1g, by the sensor %.6g # z %.2f, of %d gradients %.2f",
+           integrator, filter, what, value.mean, tap_se(&value), truth.value.value, z, N,
+           worst);
+    const double r = ratio(&value, told);
+    tap_ok(r > .85 && r < 1.2 && least > .85 && most < 1.2,
+           "%s, %s, %s: spread of %d seeds over error # %.3f, of gradients %.3f to %.3f",
+           integrator, filter, what, SEEDS, r, least, most);
+    imp_problem_destroy(p);
+    imp_problem_destroy(q);
+    imp_scene_destroy(scene);
+    imp_scene_destroy(eye);
+}
+
+int main(void)
+{
+    static const char *const ends[] = {"ptracer", "bdpt"}, *const filters[] = {
+                                                               "box", "gaussian"};
+    float pixels[3 * W * H], away[3 * W * H], adjoint[3 * W * H];
+    ctx = test_context(2);
+    for (int f = 0; f < 2; f++) {
+        picture(filters[f], pixels);
+        for (int i = 0; i < 3 * W * H; i++) {
+            away[i] = pixels[i] * (i % 2 ? 1.3f : .6f);
+            adjoint[i] = (float)(i % 5) - 1;
+        }
+        for (int e = 0; e < 2; e++) {
+            compare(ends[e], filters[f], away, NULL, "loss away from the optimum");
+            compare(ends[e], filters[f], pixels, NULL, "loss at the optimum");
+            compare(ends[e], filters[f], NULL, adjoint, "linear");
+        }
+    }
+    imp_context_destroy(ctx);
+    return tap_done();
+}
