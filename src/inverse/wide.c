@@ -83,6 +83,7 @@ static enum imp_status replicates(struct wide *w, const struct imp_tracer *trace
         struct imp_run own = *run;
         own.spp = plan.n;
         own.time_limit_s = 0;
+        own.walks = NULL; /* the tracer has them */
         const struct pass pass = {tracer, run, lo + (hi - lo) * b / w->R,
                                   lo + (hi - lo) * (b + 1) / w->R};
         if (run->progress) {
