@@ -42,10 +42,13 @@ struct imp_walks_options {
     /** Least effective sample size, a fraction of the walks, with which they are evaluated;
      * 0: .5. */
     double ess;
+    /** Ranks of a team keep a share each, to be written (imp_walks_write) and not evaluated:
+     * memory and work are divided. 0: each keeps all of them. */
+    int spread;
 };
 #define IMP_WALKS_OPTIONS_INIT                                                           \
     {                                                                                    \
-        sizeof(struct imp_walks_options), 0, 0, 0, 0, 0                                  \
+        sizeof(struct imp_walks_options), 0, 0, 0, 0, 0, 0                               \
     }
 
 /** Draw walks at the scene's present parameters and keep them: about 160 bytes a vertex.
@@ -63,6 +66,31 @@ IMP_API IMP_MUST_CHECK enum imp_status
 imp_walks_keep(imp_scene *scene, const struct imp_run *run,
                const struct imp_walks_options *options, imp_walks **out);
 IMP_API void imp_walks_destroy(imp_walks *walks);
+
+/** Write the walks to a file, with all that evaluating them takes: materials, lights,
+ * textures and grids with their numbers, but no meshes. The file is written whole or not
+ * at all, by rank 0 of a team, of which all ranks make this call. Its bytes do not depend
+ * on the number of threads and ranks.
+ * @return IMP_OK; IMP_E_ARG; IMP_E_IO; IMP_E_NOMEM; IMP_E_UNSUPPORTED, with the reason, for
+ *         scenes whose materials need triangles (attributes, bump maps on meshes), with
+ *         graded indices, and instances in instances. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_walks_write(const imp_walks *walks,
+                                                       const char *path);
+
+/** Read walks from a file.
+ * @param scene   NULL: what the file holds becomes a scene (imp_walks_scene) that has all
+ *                parameters and no geometry: walks are evaluated in it, and none are
+ *                traced. It is destroyed with the walks; problems on it go first. Else the
+ *                scene that they were drawn in, at any numbers that may change.
+ * @param options memory and ess count; NULL for the defaults.
+ * @param[out] out the caller destroys it. The parameters are those of the draw if the scene
+ *                is the file's.
+ * @return IMP_OK; IMP_E_ARG: walks of another scene, and what differs; IMP_E_SCENE: the file
+ *         is damaged, or of another version, byte order or build; IMP_E_IO; IMP_E_NOMEM:
+ *         they need more than options->memory. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_walks_read(imp_context *context, imp_scene *scene, const char *path,
+               const struct imp_walks_options *options, imp_walks **out);
 
 struct imp_walks_info {
     size_t size;

@@ -39,7 +39,7 @@ from ._render import denoise, render, walk
 from ._report import report
 from ._scene import Scene, Sensor, load_file, load_string, set_variant, variant
 from ._transform import ScalarTransform4f, Transform4f
-from ._walks import Walks, keep
+from ._walks import Walks, keep, read_walks
 
 if TYPE_CHECKING:
     from . import ad, bend, elements
@@ -52,7 +52,7 @@ __all__ = [
     "Picture", "Progress", "ScalarTransform4f", "Scene", "SceneError", "SceneParameters", "SelfTestRow", "Sensor",
     "Transform4f", "UnsupportedError", "Values", "Walks", "__version__", "ad", "bend", "check", "compare", "cornell_box", "denoise",
     "elements", "fit", "functional", "guide", "jacobian", "join_parts", "keep", "library_path", "load_dict", "load_file",
-    "load_string", "loss", "merge", "part", "parts_info", "project", "read", "render", "render_backward",
+    "load_string", "loss", "merge", "part", "parts_info", "project", "read", "read_walks", "render", "render_backward",
     "render_forward", "report", "selftest", "set_progress", "set_threads", "set_variant", "team", "threads",
     "traverse", "variant", "walk", "write",
 ]

@@ -9,7 +9,7 @@ import numpy as np
 
 from . import _c
 from ._array import address, numbers
-from ._library import ArgumentError, Handle, decode, failure, lib, make, not_inside, run
+from ._library import ArgumentError, Handle, context, decode, failure, lib, make, not_inside, run, text, warn_said
 from ._problem import check_scene, push, run_options
 from ._scene import Scene
 
@@ -96,6 +96,86 @@ class Walks:
                 raise failure(status, decode(lib.imp_last_error(scene._context.pointer)))
             refused = None if weight.refused is None else decode(weight.refused)
         return weight.ess, weight.growth, refused
+
+    def write(self, path: Any) -> None:
+        """Write the walks to a file, with all that evaluating them takes but meshes: see
+        `read_walks`. It is written whole or not at all.
+
+        Parameters
+        ----------
+        path : str or PathLike
+
+        Raises
+        ------
+        FileError
+        UnsupportedError
+            Materials need triangles, a graded index bends rays, or instances stand in
+            instances.
+
+        Examples
+        --------
+        >>> scene = importon.load_dict(importon.cornell_box(res=8))
+        >>> importon.keep(scene, spp=16, losses=True).write("room.walks")
+        >>> walks = importon.read_walks("room.walks")
+        >>> params = importon.traverse(walks.scene)
+        >>> params["white.reflectance.value"] = 0.5
+        >>> picture = importon.render(walks.scene, params, walks=walks)
+        """
+        not_inside()
+        with self.scene.lock:
+            status = lib.imp_walks_write(self._walks_pointer(self.scene), text(path, "path"))
+            if status:
+                raise failure(status, decode(lib.imp_last_error(self.scene._context.pointer)))
+
+
+def read_walks(path: Any, scene: Optional[Scene] = None, *, memory: float = 0, ess: float = 0) -> Walks:
+    """Read walks that `Walks.write` or ``importon record`` has written.
+
+    Parameters
+    ----------
+    path : str or PathLike
+    scene : Scene, optional
+        The scene that they were drawn in. Without it ``Walks.scene`` is what the file holds:
+        all parameters and no geometry, so that walks are evaluated in it and none are traced.
+    memory : float
+        Bytes that the walks may take; 0: 2^30.
+    ess : float
+        Least effective sample size, as a fraction, with which they are evaluated; 0: the file's.
+
+    Returns
+    -------
+    Walks
+
+    Raises
+    ------
+    FileError
+    SceneError
+        The file is damaged, or of another version, byte order or build.
+    ArgumentError
+        They are walks of another scene; the message says what differs.
+    OutOfMemoryError
+
+    Examples
+    --------
+    >>> scene = importon.load_dict(importon.cornell_box(res=8))
+    >>> importon.keep(scene, spp=16, losses=True).write("room.walks")
+    >>> walks = importon.read_walks("room.walks")
+    >>> walks.weigh()[0]
+    1.0
+    """
+    not_inside()
+    ctx = context() if scene is None else check_scene(scene)._context
+    options = make(_c.imp_walks_options, memory=float(memory), ess=float(ess))
+    out = ctypes.c_void_p()
+    status = lib.imp_walks_read(ctx.pointer, None if scene is None else scene.pointer, text(path, "path"),
+                                ctypes.byref(options), ctypes.byref(out))
+    ctx.check(status)
+    warn_said()
+    assert out.value
+    handle = Handle(out.value, lib.imp_walks_destroy)
+    if scene is None:  # which lives as long as its walks
+        scene = Scene(Handle(lib.imp_walks_scene(out.value), lambda _, owner=handle: None), ctx, decode(text(path, "path")))
+    return Walks(scene, handle)
 
 
 def keep(scene: Scene, params: Any = None, sensor: Any = 0, seed: int = 0, spp: int = 0, *, memory: float = 0,

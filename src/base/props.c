@@ -76,6 +76,7 @@ void imp__node_remove(struct imp_node *node, const char *name)
 {
     struct imp_prop *p = imp__node_prop(node, name);
     if (!p) return;
+    if (p < node->props + node->given_props) node->given_props--;
     memmove(p, p + 1, (size_t)(node->props + node->n_props - (p + 1)) * sizeof *p);
     node->n_props--;
 }

@@ -68,6 +68,12 @@ static inline bool imp__team_merges(const imp_context *ctx)
     return ctx->team && ctx->team->role == IMP_TEAM_MERGE;
 }
 
+/* Are there other processes that work at this moment? */
+static inline bool imp__team_ranks(const imp_context *ctx)
+{
+    return ctx->team && ctx->team->role == IMP_TEAM_RANK;
+}
+
 /* Does this process write files? Of the ranks of a team, the first. */
 static inline bool imp__team_writes(const imp_context *ctx)
 {

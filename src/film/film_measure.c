@@ -20,6 +20,10 @@ enum imp_status imp__run_sensor(const struct imp_scene *scene, const struct imp_
         return imp__node_error(scene->ctx, scene->root, IMP_E_SCENE,
                                "there is no integrator in it; Mitsuba's default is "
                                "<integrator type=\"path\"/>");
+    if (scene->rayless && !run->walks)
+        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                          "a scene from a file of kept walks has no geometry: its walks "
+                          "are evaluated (run->walks), and none are traced");
     if (scene->n_sensors == 0)
         return imp__node_error(scene->ctx, scene->root, IMP_E_SCENE,
                                "there is no sensor in it");

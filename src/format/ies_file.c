@@ -181,6 +181,19 @@ static bool span_is_known(int n, const double *h)
            (h[0] == 90 && last == 270);
 }
 
+static bool ascends(int n, const double *x, double hi)
+{
+    for (int k = 0; k < n; k++)
+        if (!(x[k] >= 0 && x[k] <= hi) || (k > 0 && !(x[k] > x[k - 1]))) return false;
+    return true;
+}
+bool imp__ies_is_valid(const struct imp_ies_data *d)
+{
+    return ascends(d->n_vertical, d->vertical, 180) &&
+           ascends(d->n_horizontal, d->horizontal, 360) &&
+           span_is_known(d->n_horizontal, d->horizontal);
+}
+
 static enum imp_status parse(struct reader *r, struct imp_arena *keep,
                              struct imp_ies_data *d)
 {

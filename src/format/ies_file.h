@@ -17,5 +17,7 @@
  * B and for tilt in a file of its own; IMP_E_NOMEM. */
 enum imp_status imp__ies_parse(imp_context *ctx, struct imp_arena *keep, const char *name,
                                const struct imp_bytes *text, struct imp_ies_data *out);
+/* Are its angles such as a file may have? */
+bool imp__ies_is_valid(const struct imp_ies_data *d);
 
 #endif

@@ -222,13 +222,14 @@ static enum imp_status attach(struct imp_scene *scene, struct imp_node *node)
     if (mesh) IMP_TRY(mesh_attach(scene, node));
     if (strcmp(node->tag, "medium") == 0 && strcmp(node->type, "graded") == 0)
         IMP_TRY(imp__graded_attach(scene, node));
-    if (strcmp(node->tag, "emitter") == 0 && strcmp(node->type, "ies") == 0)
+    if (strcmp(node->tag, "emitter") == 0 && strcmp(node->type, "ies") == 0 && !node->ies)
         IMP_TRY(ies_attach(scene, node));
-    if (strcmp(node->tag, "bsdf") == 0 && strcmp(node->type, "merl") == 0)
+    if (strcmp(node->tag, "bsdf") == 0 && strcmp(node->type, "merl") == 0 && !node->merl)
         IMP_TRY(merl_attach(scene, node));
     if (strcmp(node->tag, "emitter") == 0 && strcmp(node->type, "envmap") == 0)
         IMP_TRY(sky_expand(scene, node));
-    if (strcmp(node->tag, "volume") == 0 && strcmp(node->type, "gridvolume") == 0)
+    if (strcmp(node->tag, "volume") == 0 && strcmp(node->type, "gridvolume") == 0 &&
+        !node->grid)
         IMP_TRY(grid_attach(scene, node));
     if (bitmap && !node->image) IMP_TRY(image_attach(scene, node));
     else if (bitmap && imp__node_prop(node, "filename"))

@@ -50,10 +50,19 @@ void imp__load_close(imp_context *ctx, struct imp__load_file *f)
     imp__bytes_free(ctx, &f->text);
 }
 
+static void given_count(struct imp_node *node)
+{
+    node->given_props = (uint32_t)node->n_props;
+    node->given_children = (uint32_t)node->n_children;
+    for (size_t i = 0; i < node->n_children; i++)
+        if (!node->children[i].ref) given_count(node->children[i].node);
+}
+
 enum imp_status imp__scene_finish(struct imp_scene *scene)
 {
     enum imp_status st = imp__survey(scene);
     if (st == IMP_OK) st = imp__files_attach(scene);
+    if (st == IMP_OK) given_count(scene->root);
     if (st == IMP_OK) st = imp__scene_build(scene, imp__integrator_kinds);
     if (st == IMP_OK) st = imp__graded_finish(scene);
     if (st == IMP_OK) st = imp__survey_finish(scene);

@@ -74,21 +74,29 @@ struct filling {
     struct imp_store *store;
     struct imp_tracer tracer;
     struct imp_arena *arenas; /* [threads] */
+    size_t first;             /* tile of this process */
 };
 
 static enum imp_status tile_fill(size_t item, int worker, int slot, void *payload)
 {
     (void)slot;
     struct filling *f = payload;
-    return imp__store_fill(f->store, &f->tracer, &f->arenas[worker], item);
+    return imp__store_fill(f->store, &f->tracer, &f->arenas[worker], f->first + item);
 }
 
-static enum imp_status store_fill(imp_context *ctx, const struct imp_run *run,
-                                  struct filling *f)
+static enum imp_status store_fill(const struct imp_walks *w, struct filling *f)
 {
     enum imp_status st = IMP_OK;
-    const double walks = (double)f->store->width * f->store->height * (double)f->store->n;
-    const struct imp_loop loop = {.n_items = imp__store_tiles(f->store),
+    imp_context *ctx = w->ctx;
+    const struct imp_run *run = &w->run;
+    const int rank = w->spread ? ctx->team->host.rank : 0,
+              ranks = w->spread ? ctx->team->host.ranks : 1;
+    const size_t end = imp__store_share(f->store, rank + 1, ranks);
+    f->first = imp__store_share(f->store, rank, ranks);
+    const double walks = (double)f->store->width * f->store->height *
+                         (double)f->store->n * (double)(end - f->first) /
+                         (double)imp__store_tiles(f->store);
+    const struct imp_loop loop = {.n_items = end - f->first,
                                   .work = tile_fill,
                                   .payload = f,
                                   .progress = run->progress,
@@ -108,8 +116,8 @@ static enum imp_status store_fill(imp_context *ctx, const struct imp_run *run,
     return st;
 }
 
-static enum imp_status sensor_keep(struct imp_walks *w, const struct imp_active *active,
-                                   int index, size_t budget)
+enum imp_status imp__walks_sensor(struct imp_walks *w, const struct imp_active *active,
+                                  int index, size_t budget, struct imp_tracer *tracer)
 {
     enum imp_status st = IMP_OK;
     struct imp_scene *scene = w->scene;
@@ -117,36 +125,40 @@ static enum imp_status sensor_keep(struct imp_walks *w, const struct imp_active 
     struct numbers numbers = {.ctx = w->ctx};
     struct imp_run run = w->run;
     struct imp_store *store = &w->stores[w->n_stores];
-    struct filling f = {.store = store};
     run.sensor = index;
     IMP_TRY(numbers_of(scene, index, w, &numbers));
-    f.tracer =
-        (struct imp_tracer){.scene = scene,
-                            .integrator = w->integrator,
-                            .sensor = sensor,
-                            .active = active,
-                            .seed = run.seed,
-                            .guide = imp__guide_of(scene, w->integrator, run.guide),
-                            .collisions_stand = true,
-                            .survival = w->survival};
-    imp__tracer_numbers(&f.tracer, &run, w->losses ? 0 : (int64_t)numbers.n);
-    if (w->losses) f.tracer.set = 1;
-    IMP_TRY(imp__store_create(&f.tracer, index,
-                              sensor->film.sample_border ? imp__film_border(&sensor->film)
-                                                         : 0,
-                              numbers.sample, numbers.n, budget, store));
+    *tracer = (struct imp_tracer){.scene = scene,
+                                  .integrator = w->integrator,
+                                  .sensor = sensor,
+                                  .active = active,
+                                  .seed = run.seed,
+                                  .guide = imp__guide_of(scene, w->integrator, run.guide),
+                                  .collisions_stand = true,
+                                  .survival = w->survival};
+    imp__tracer_numbers(tracer, &run, w->losses ? 0 : (int64_t)numbers.n);
+    if (w->losses) tracer->set = 1;
+    IMP_TRY(imp__store_create(
+        tracer, index, sensor->film.sample_border ? imp__film_border(&sensor->film) : 0,
+        numbers.sample, numbers.n, budget, store));
     w->n_stores++;
-    store->stratified = f.tracer.wavelengths && f.tracer.set > 1;
-    if (w->losses && f.tracer.points) {
+    store->stratified = tracer->wavelengths && tracer->set > 1;
+    if (w->losses && tracer->points) {
         const struct imp__target l2 = {.desc = {.sensor = index}};
         run.walks = w;
         const struct imp__replicates r = imp__replicates_of(scene, &l2, &run);
         store->set = r.n / r.m;
     }
-    IMP_TRY(store_fill(w->ctx, &w->run, &f));
 out:
     imp__release(w->ctx, numbers.sample);
     return st;
+}
+
+static enum imp_status sensor_keep(struct imp_walks *w, const struct imp_active *active,
+                                   int index, size_t budget)
+{
+    struct filling f = {.store = &w->stores[w->n_stores]};
+    const enum imp_status st = imp__walks_sensor(w, active, index, budget, &f.tracer);
+    return st == IMP_OK ? store_fill(w, &f) : st;
 }
 
 /* ---- All of them ----------------------------------------------------------------- */
@@ -195,6 +207,7 @@ enum imp_status imp__walks_begin(imp_scene *scene, const struct imp_run *run,
                             .scene = scene,
                             .run = *run,
                             .losses = o->losses != 0,
+                            .spread = o->spread && imp__team_ranks(ctx),
                             .survival = o->survival < 0 ? 0 : o->survival,
                             .ess = o->ess,
                             .integrator = integrator};
@@ -209,29 +222,52 @@ out:
     return st;
 }
 
+static enum imp_status sensors_keep(struct imp_walks *w, const uint8_t *sensors,
+                                    double memory)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_active active = {0};
+    IMP_TRY(imp__active_create(w->scene, w->chosen, &active));
+    for (int k = 0; k < w->scene->n_sensors; k++) {
+        if (!sensors[k]) continue;
+        IMP_TRY(sensor_keep(w, &active, k, (size_t)fmin(memory, 0x1p62)));
+        memory -= (double)w->stores[w->n_stores - 1].bytes;
+    }
+out:
+    imp__active_destroy(w->ctx, &active);
+    return st;
+}
+
+/* A share may fail on one rank alone, but all have to go on alike. */
+static enum imp_status spread_agree(struct imp_walks *w, enum imp_status st)
+{
+    bool any;
+    if (!w->spread) return st;
+    const enum imp_status asked = imp__team_any(w->ctx, st != IMP_OK, &any);
+    if (st != IMP_OK || asked != IMP_OK) return st != IMP_OK ? st : asked;
+    if (any) return imp__error(w->ctx, IMP_E_NOMEM, "another rank keeps no walks");
+    for (int k = 0; k < w->n_stores; k++) { /* the walks of all are one draw */
+        IMP_CHECKED(imp__team_any(w->ctx, atomic_load(&w->stores[k].roulette), &any));
+        atomic_store(&w->stores[k].roulette, any);
+    }
+    return IMP_OK;
+}
+
 enum imp_status imp__walks_make(imp_scene *scene, const struct imp_run *run,
                                 const struct imp_walks_options *o, const uint8_t *sensors,
                                 imp_walks **out)
 {
     enum imp_status st = IMP_OK;
     struct imp_walks *w = NULL;
-    struct imp_active active = {0};
-    double left = o->memory;
     if (imp__team_apart(scene->ctx))
         return imp__error(scene->ctx, IMP_E_UNSUPPORTED, "walks are not kept in parts");
     IMP_TRY(imp__walks_begin(scene, run, o, &w));
-    IMP_TRY(imp__active_create(scene, w->chosen, &active));
-    for (int k = 0; k < scene->n_sensors; k++) {
-        if (!sensors[k]) continue;
-        IMP_TRY(sensor_keep(w, &active, k, (size_t)fmin(left, 0x1p62)));
-        left -= (double)w->stores[w->n_stores - 1].bytes;
-    }
+    IMP_TRY(spread_agree(w, sensors_keep(w, sensors, o->memory)));
     w->run.progress = NULL; /* of this call alone */
     w->run.guide = NULL;
     *out = w;
     w = NULL;
 out:
-    imp__active_destroy(scene->ctx, &active);
     imp__walks_destroy(w);
     return st;
 }

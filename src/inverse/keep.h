@@ -13,5 +13,10 @@ enum imp_status imp__walks_make(imp_scene *scene, const struct imp_run *run,
 enum imp_status imp__walks_begin(imp_scene *scene, const struct imp_run *run,
                                  const struct imp_walks_options *options,
                                  imp_walks **out);
+/* The store of the next sensor, empty, and the tracer that fills it; active NULL: what is
+ * read, not traced. */
+enum imp_status imp__walks_sensor(struct imp_walks *walks,
+                                  const struct imp_active *active, int index,
+                                  size_t budget, struct imp_tracer *tracer);
 
 #endif

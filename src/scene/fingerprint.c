@@ -150,6 +150,45 @@ uint64_t imp__fingerprint_objects(const struct imp_scene *scene)
     return h;
 }
 
+uint64_t imp__fingerprint_evaluated(const struct imp_scene *scene)
+{
+    uint64_t h = HASH(0, scene->mode);
+    h = HASH(h, scene->linear_colors);
+    h = HASH(h, scene->environment);
+    h = imp__hash_text(h, scene->integrator ? scene->integrator->ops->name : "");
+    for (int s = 0; s < scene->n_all_shapes; s++) {
+        const struct imp_shape *shape = scene->shapes[s];
+        const int medium[2] = {shape->interior ? shape->interior->index : -1,
+                               shape->exterior ? shape->exterior->index : -1};
+        h = HASH(h, shape->bsdf);
+        h = HASH(h, shape->emitter);
+        h = HASH(h, shape->n_attributes);
+        h = HASH(h, medium);
+    }
+    for (int b = 0; b < scene->n_bsdfs; b++) {
+        h = imp__hash_text(h, scene->bsdfs[b]->ops->name);
+        h = HASH(h, scene->bsdfs[b]->flags);
+        h = HASH(h, scene->bsdfs[b]->n_in);
+    }
+    for (int m = 0; m < scene->n_media; m++) {
+        h = imp__hash_text(h, scene->media[m]->name);
+        h = HASH(h, scene->media[m]->n_in);
+    }
+    for (int e = 0; e < scene->n_emitters; e++) h = emitter_hash(h, scene->emitters[e]);
+    for (int s = 0; s < scene->n_sensors && scene->wavelengths; s++)
+        for (int k = 0; k < IMP_WAVES_DRAWN; k++)
+            h = imp__wavelengths_hash(h, &scene->wavelengths[s * IMP_WAVES_DRAWN + k]);
+    for (size_t k = 0; k < scene->n_params; k++) {
+        const struct imp_param *p = &scene->params[k];
+        const bool how[2] = {p->info.flags & IMP_PARAM_DIFFERENTIABLE, p->probed};
+        h = imp__hash_text(h, p->info.name);
+        h = HASH(h, p->info.dims);
+        h = HASH(h, p->info.count);
+        h = HASH(h, how);
+    }
+    return h;
+}
+
 /* ---- The rest -------------------------------------------------------------------- */
 
 uint64_t imp__fingerprint_sensor(const struct imp_sensor *sensor)

@@ -15,5 +15,9 @@ uint64_t imp__fingerprint_sensor(const struct imp_sensor *sensor);
 /* Values of parameters that move or bend rays: those without a derivative, and those of
  * media. */
 uint64_t imp__fingerprint_rays(const struct imp_scene *scene);
+/* What walks are evaluated with: materials, lights and media in their order, what lights do
+ * with direction, wavelengths, parameters and which of them have a derivative; but no
+ * geometry. */
+uint64_t imp__fingerprint_evaluated(const struct imp_scene *scene);
 
 #endif

@@ -154,9 +154,11 @@ enum imp_status imp__scene_build(struct imp_scene *scene,
     IMP_TRY(imp__bodies_check(scene));
     IMP_TRY(imp__media_check(scene));
     imp__theta_finish(scene);
-    IMP_TRY(imp__intersector_create(scene));
-    if (scene->aims.aimed) IMP_TRY(imp__aims_aim(scene));
-    IMP_TRY(imp__media_survey(scene));
+    if (!scene->rayless) {
+        IMP_TRY(imp__intersector_create(scene));
+        if (scene->aims.aimed) IMP_TRY(imp__aims_aim(scene));
+        IMP_TRY(imp__media_survey(scene));
+    }
     scene->committed = true;
 out:
     return st;

@@ -13,7 +13,7 @@ _Static_assert(IMP_WALK_MAX <= UINT16_MAX, "imp_record_walk.n");
 
 /* ---- Making ---------------------------------------------------------------------- */
 
-static struct imp_record_of made_with(const struct imp_tracer *t)
+struct imp_record_of imp__record_made_with(const struct imp_tracer *t)
 {
     struct imp_record_of of = {
         imp__fingerprint_objects(t->scene), imp__fingerprint_sensor(t->sensor),
@@ -41,7 +41,8 @@ enum imp_status imp__record_create(const struct imp_tracer *tracer, size_t budge
         return imp__error(ctx, IMP_E_UNSUPPORTED,
                           "walks are not kept where shapes have a priority: a boundary's "
                           "index depends on what lies around it");
-    *out = (struct imp_record){.ctx = ctx, .of = made_with(tracer), .budget = budget};
+    *out = (struct imp_record){
+        .ctx = ctx, .of = imp__record_made_with(tracer), .budget = budget};
     return IMP_OK;
 }
 
@@ -289,6 +290,6 @@ enum imp_status imp__record_same(imp_context *ctx, const char *what,
 enum imp_status imp__record_check(const struct imp_record *r,
                                   const struct imp_tracer *tracer)
 {
-    const struct imp_record_of of = made_with(tracer);
+    const struct imp_record_of of = imp__record_made_with(tracer);
     return imp__record_same(r->ctx, "kept walks", &r->of, &of);
 }

@@ -8,6 +8,7 @@
 #ifndef IMP_WALK_RECORD_H
 #define IMP_WALK_RECORD_H
 
+#include "base/file.h"
 #include "tracking.h"
 
 /* ---- What is kept ---------------------------------------------------------------- */
@@ -145,6 +146,23 @@ enum imp_status imp__record_write(const struct imp_record *record, const char *p
  * IMP_E_NOMEM: more than the budget. */
 enum imp_status imp__record_read(const struct imp_tracer *tracer, const char *path,
                                  size_t budget, struct imp_record *out);
+
+/* The same inside of a file: what imp__record_write writes, checksum included. `of`: what
+ * the walks were made with; NULL: with the tracer. */
+void imp__record_put(struct imp_file_writer *to, const struct imp_record *record);
+/* Into memory; false: there is too little. */
+bool imp__record_bytes_put(const struct imp_record *record, struct imp_bytes *to);
+struct imp_record_source {
+    imp_context *ctx;
+    const char *path; /* for messages */
+    FILE *f;
+    uint64_t sum;
+};
+enum imp_status imp__record_take(struct imp_record_source *from,
+                                 const struct imp_tracer *tracer,
+                                 const struct imp_record_of *of, size_t budget,
+                                 struct imp_record *out);
+struct imp_record_of imp__record_made_with(const struct imp_tracer *tracer);
 
 /* Room for so many walks, vertices and items more. */
 enum imp_status imp__record_reserve(struct imp_record *record, size_t walks,

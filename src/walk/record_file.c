@@ -3,7 +3,6 @@
  * Files of kept walks: a head, the walks, their vertices, what belongs to these, and a
  * checksum of all, as they are in memory. What is read is checked vertex by vertex against the scene, so that
  * evaluating it is safe whatever the bytes are. */
-#include "base/file.h"
 #include "math/hash.h"
 #include "record.h"
 #include <errno.h>
@@ -25,17 +24,28 @@ _Static_assert(sizeof(struct head) == 88, "no padding: it is written");
 
 /* ---- Writing --------------------------------------------------------------------- */
 
-/* The parts of a file in turn; n elements in pages. */
-static struct imp_chunk *pages_put(struct imp_chunk *part, void *const *pages, size_t n,
-                                   size_t size)
+struct writing {
+    imp_context *ctx;
+    struct imp_file_writer *file; /* to a file, or */
+    struct imp_bytes *bytes;      /* into memory, */
+    bool full;                    /* of which there may be too little */
+    uint64_t sum;
+};
+static void put(struct writing *w, const void *data, size_t n)
+{
+    w->sum = imp__hash(w->sum, data, n);
+    if (w->file) imp__file_put(w->file, data, n);
+    else w->full = w->full || !imp__bytes_add(w->ctx, w->bytes, data, n);
+}
+/* n elements in pages. */
+static void pages_put(struct writing *w, void *const *pages, size_t n, size_t size)
 {
     for (size_t at = 0; at < n; at += IMP_RECORD_PAGE)
-        *part++ = (struct imp_chunk){pages[at / IMP_RECORD_PAGE],
-                                     imp_min(n - at, (size_t)IMP_RECORD_PAGE) * size};
-    return part;
+        put(w, pages[at / IMP_RECORD_PAGE],
+            imp_min(n - at, (size_t)IMP_RECORD_PAGE) * size);
 }
 
-enum imp_status imp__record_write(const struct imp_record *r, const char *path)
+static void record_put(struct writing *w, const struct imp_record *r)
 {
     const struct head head = {.magic = MAGIC,
                               .byte_order = BYTE_ORDER,
@@ -47,22 +57,33 @@ enum imp_status imp__record_write(const struct imp_record *r, const char *path)
                               .n_walks = r->n_walks,
                               .n_vertices = r->n_vertices,
                               .n_items = r->n_items};
-    uint64_t sum = 0;
-    struct imp_chunk *parts = imp__alloc(
-        r->ctx, r->n_walk_pages + r->n_vertex_pages + r->n_item_pages + 2, sizeof *parts);
-    if (!parts) return imp__error(r->ctx, IMP_E_NOMEM, "%s: out of memory", path);
-    struct imp_chunk *end = parts;
-    *end++ = (struct imp_chunk){&head, sizeof head};
-    end = pages_put(end, (void *const *)r->walks, r->n_walks, sizeof **r->walks);
-    end = pages_put(end, (void *const *)r->vertices, r->n_vertices, sizeof **r->vertices);
-    end = pages_put(end, (void *const *)r->items, r->n_items, sizeof **r->items);
-    for (const struct imp_chunk *p = parts; p < end; p++)
-        sum = imp__hash(sum, p->data, p->size);
-    *end++ = (struct imp_chunk){&sum, sizeof sum};
-    const enum imp_status st =
-        imp__file_write_parts(r->ctx, path, parts, (size_t)(end - parts));
-    imp__release(r->ctx, parts);
-    return st;
+    put(w, &head, sizeof head);
+    pages_put(w, (void *const *)r->walks, r->n_walks, sizeof **r->walks);
+    pages_put(w, (void *const *)r->vertices, r->n_vertices, sizeof **r->vertices);
+    pages_put(w, (void *const *)r->items, r->n_items, sizeof **r->items);
+    const uint64_t sum = w->sum;
+    put(w, &sum, sizeof sum);
+}
+
+void imp__record_put(struct imp_file_writer *to, const struct imp_record *r)
+{
+    struct writing w = {.file = to};
+    record_put(&w, r);
+}
+bool imp__record_bytes_put(const struct imp_record *r, struct imp_bytes *to)
+{
+    struct writing w = {.ctx = r->ctx, .bytes = to};
+    record_put(&w, r);
+    return !w.full;
+}
+
+static void record_fill(struct imp_file_writer *to, const void *payload)
+{
+    imp__record_put(to, payload);
+}
+enum imp_status imp__record_write(const struct imp_record *r, const char *path)
+{
+    return imp__file_write_by(r->ctx, path, record_fill, r);
 }
 
 /* ---- Are these decisions that the scene allows? ---------------------------------- */
@@ -250,20 +271,13 @@ static bool walk_fits(const struct imp_scene *scene, const struct imp_record *r,
 
 /* ---- Reading --------------------------------------------------------------------- */
 
-struct source {
-    imp_context *ctx;
-    const char *path;
-    FILE *f;
-    uint64_t sum;
-};
-
-static enum imp_status damaged(const struct source *s, const char *what)
+static enum imp_status damaged(const struct imp_record_source *s, const char *what)
 {
     return imp__error(s->ctx, IMP_E_SCENE, "%s: damaged file of kept walks (%s)", s->path,
                       what);
 }
 
-static enum imp_status take(struct source *s, void *data, size_t size)
+static enum imp_status take(struct imp_record_source *s, void *data, size_t size)
 {
     if (fread(data, 1, size, s->f) != size)
         return ferror(s->f)
@@ -273,7 +287,7 @@ static enum imp_status take(struct source *s, void *data, size_t size)
     return IMP_OK;
 }
 
-static enum imp_status head_take(struct source *s, struct head *h)
+static enum imp_status head_take(struct imp_record_source *s, struct head *h)
 {
     *h = (struct head){.magic = ""};
     if (fread(h, 1, sizeof *h, s->f) != sizeof *h &&
@@ -299,7 +313,7 @@ static enum imp_status head_take(struct source *s, struct head *h)
 }
 
 /* Page by page: a size that the file does not have takes no memory. */
-static enum imp_status body_take(struct source *s, struct imp_record *r,
+static enum imp_status body_take(struct imp_record_source *s, struct imp_record *r,
                                  const struct head *h)
 {
     enum imp_status st = IMP_OK;
@@ -326,49 +340,64 @@ static enum imp_status body_take(struct source *s, struct imp_record *r,
     uint64_t end;
     IMP_TRY(take(s, &end, sizeof end));
     if (end != sum) IMP_TRY(damaged(s, "checksum"));
-    if (fgetc(s->f) != EOF) IMP_TRY(damaged(s, "it goes on behind its end"));
 out:
+    return st;
+}
+
+enum imp_status imp__record_take(struct imp_record_source *s,
+                                 const struct imp_tracer *tracer,
+                                 const struct imp_record_of *of, size_t budget,
+                                 struct imp_record *out)
+{
+    enum imp_status st = IMP_OK;
+    const struct imp_scene *scene = tracer->scene;
+    struct imp_record r = {.ctx = NULL};
+    struct head head;
+    uint64_t needed, vertices, items, first = 0, first_item = 0;
+
+    IMP_TRY(imp__record_create(tracer, budget, &r));
+    IMP_TRY(head_take(s, &head));
+    IMP_TRY(imp__record_same(s->ctx, s->path, &head.of, of ? of : &r.of));
+    if (__builtin_mul_overflow(head.n_walks, sizeof **r.walks, &needed) ||
+        __builtin_mul_overflow(head.n_vertices, sizeof **r.vertices, &vertices) ||
+        __builtin_mul_overflow(head.n_items, sizeof **r.items, &items) ||
+        __builtin_add_overflow(needed, vertices, &needed) ||
+        __builtin_add_overflow(needed, items, &needed))
+        IMP_TRY(damaged(s, "absurd size"));
+    if (needed > budget)
+        IMP_TRY(imp__error(s->ctx, IMP_E_NOMEM,
+                           "%s: its walks need %llu bytes; the budget is %zu", s->path,
+                           (unsigned long long)needed, budget));
+    IMP_TRY(body_take(s, &r, &head));
+    for (size_t i = 0; i < r.n_walks; i++) {
+        const struct imp_record_walk *w = imp__record_at(&r, i);
+        if (!walk_fits(scene, &r, w, first, first_item))
+            IMP_TRY(damaged(s, "a walk that this scene cannot have"));
+        first += w->n_vertices;
+        first_item += w->n_items;
+    }
+    if (first != r.n_vertices || first_item != r.n_items)
+        IMP_TRY(damaged(s, "vertices of no walk"));
+    *out = r;
+    r = (struct imp_record){.ctx = NULL};
+out:
+    imp__record_destroy(&r);
     return st;
 }
 
 enum imp_status imp__record_read(const struct imp_tracer *tracer, const char *path,
                                  size_t budget, struct imp_record *out)
 {
-    enum imp_status st = IMP_OK;
-    const struct imp_scene *scene = tracer->scene;
-    struct source s = {.ctx = scene->ctx, .path = path, .f = fopen(path, "rbe")};
-    struct imp_record r = {.ctx = NULL};
-    struct head head;
-    uint64_t needed, vertices, items, first = 0, first_item = 0;
-
+    struct imp_record_source s = {
+        .ctx = tracer->scene->ctx, .path = path, .f = fopen(path, "rbe")};
+    struct imp_record r;
     if (!s.f) return imp__error(s.ctx, IMP_E_IO, "%s: %s", path, strerror(errno));
-    IMP_TRY(imp__record_create(tracer, budget, &r));
-    IMP_TRY(head_take(&s, &head));
-    IMP_TRY(imp__record_same(s.ctx, path, &head.of, &r.of));
-    if (__builtin_mul_overflow(head.n_walks, sizeof **r.walks, &needed) ||
-        __builtin_mul_overflow(head.n_vertices, sizeof **r.vertices, &vertices) ||
-        __builtin_mul_overflow(head.n_items, sizeof **r.items, &items) ||
-        __builtin_add_overflow(needed, vertices, &needed) ||
-        __builtin_add_overflow(needed, items, &needed))
-        IMP_TRY(damaged(&s, "absurd size"));
-    if (needed > budget)
-        IMP_TRY(imp__error(s.ctx, IMP_E_NOMEM,
-                           "%s: its walks need %llu bytes; the budget is %zu", path,
-                           (unsigned long long)needed, budget));
-    IMP_TRY(body_take(&s, &r, &head));
-    for (size_t i = 0; i < r.n_walks; i++) {
-        const struct imp_record_walk *w = imp__record_at(&r, i);
-        if (!walk_fits(scene, &r, w, first, first_item))
-            IMP_TRY(damaged(&s, "a walk that this scene cannot have"));
-        first += w->n_vertices;
-        first_item += w->n_items;
+    enum imp_status st = imp__record_take(&s, tracer, NULL, budget, &r);
+    if (st == IMP_OK && fgetc(s.f) != EOF) {
+        st = damaged(&s, "it goes on behind its end");
+        imp__record_destroy(&r);
     }
-    if (first != r.n_vertices || first_item != r.n_items)
-        IMP_TRY(damaged(&s, "vertices of no walk"));
-    *out = r;
-    r = (struct imp_record){.ctx = NULL};
-out:
-    imp__record_destroy(&r);
+    if (st == IMP_OK) *out = r;
     fclose(s.f);
     return st;
 }

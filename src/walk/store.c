@@ -132,3 +132,47 @@ void imp__store_walk(const struct imp_tracer *tracer, struct imp_arena *arena, i
 {
     imp__store_walk_at(tracer, arena, x, y, imp__store_find(tracer->kept, sample), walk);
 }
+
+/* ---- In files -------------------------------------------------------------------- */
+
+void imp__store_put(struct imp_file_writer *to, const struct imp_store *s, size_t first,
+                    size_t end)
+{
+    for (size_t k = first; k < end; k++) imp__record_put(to, &s->records[k]);
+}
+
+/* Is walk i of a tile the one that is traced there? */
+static bool is_placed(const struct imp_store *s, const struct imp_tracer *tracer,
+                      const struct tile *t, const struct imp_record_walk *w, size_t i)
+{
+    const int pixel = (int)(i / s->n), across = t->x1 - t->x0;
+    double px, py;
+    if (w->sample != s->sample[i % s->n]) return false;
+    imp__walk_position(tracer, t->x0 + pixel % across, t->y0 + pixel / across, w->sample,
+                       &px, &py);
+    return px == w->px && py == w->py;
+}
+
+enum imp_status imp__store_take(struct imp_record_source *from, struct imp_store *s,
+                                const struct imp_tracer *tracer,
+                                const struct imp_record_of *of)
+{
+    enum imp_status st = IMP_OK;
+    for (size_t k = 0; k < imp__store_tiles(s); k++) {
+        const struct tile t = tile_at(s, k);
+        struct imp_record *r = &s->records[k];
+        const size_t n = (size_t)(t.x1 - t.x0) * (size_t)(t.y1 - t.y0) * s->n;
+        IMP_TRY(imp__record_take(from, tracer, of, s->budget - (size_t)s->bytes, r));
+        bool placed = r->n_walks == n;
+        for (size_t i = 0; i < n && placed; i++)
+            placed = is_placed(s, tracer, &t, imp__record_at(r, i), i);
+        if (!placed)
+            IMP_TRY(imp__error(s->ctx, IMP_E_SCENE,
+                               "%s: damaged (walks that are not those of their pixels)",
+                               from->path));
+        IMP_TRY(imp__record_trim(r));
+        s->bytes += imp__record_bytes(r);
+    }
+out:
+    return st;
+}

@@ -57,6 +57,20 @@ void imp__store_walk(const struct imp_tracer *tracer, struct imp_arena *arena, i
 void imp__store_walk_at(const struct imp_tracer *tracer, struct imp_arena *arena, int x,
                         int y, int64_t k, struct imp_walk *walk);
 
+/* The tiles of this process, of `ranks` that share them. */
+static inline size_t imp__store_share(const struct imp_store *s, int rank, int ranks)
+{
+    return imp__store_tiles(s) * (size_t)rank / (size_t)ranks;
+}
+
+/* In a file, from tile `first` to before `end`. What is read is what this store would
+ * trace: as many walks of every pixel, at their places. `of`: as of imp__record_take. */
+void imp__store_put(struct imp_file_writer *to, const struct imp_store *store,
+                    size_t first, size_t end);
+enum imp_status imp__store_take(struct imp_record_source *from, struct imp_store *store,
+                                const struct imp_tracer *tracer,
+                                const struct imp_record_of *of);
+
 /* ---- Densities (store_weight.c) -------------------------------------------------- */
 
 /* What the densities of walks depend on. */
@@ -96,6 +110,7 @@ struct imp_walks {
     imp_context *ctx;
     imp_scene *scene; /* that they are evaluated in */
     bool owns_scene;  /* it was read with them */
+    bool spread;      /* over ranks: this one has a share of the tiles */
     struct imp_run
         run;     /* seed, samples, points and wavelengths that they were drawn with */
     bool losses; /* numbers of samples are those of losses */

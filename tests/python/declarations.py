@@ -136,7 +136,6 @@ WITHOUT = {
     "imp_context_set_manifest": "the same",
     "imp_film_merge": "pictures are arrays, whose means are one line",
     "imp_film_add_layer": "of one file for viewers: arrays are written one by one",
-    "imp_walks_scene": "Walks.scene is the object of Python",
     "imp_report_page": "for servers of a live page: importon view",
     "imp_report_data": "the same",
     "imp_problem_shares": "of one pixel, for pages of walks: importon report --scene; render_backward has its gradient",

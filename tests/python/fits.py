@@ -25,6 +25,26 @@ def setting(noise_spp=256, res=16):
     return s, target, p, truth
 
 
+def test_walks_in_files():
+    """Kept walks come back from a file, and answer without their scene, to the bit"""
+    s = box(8)
+    im.keep(s, spp=8, seed=3, losses=True).write("box.walks")
+    kept, walks = im.keep(s, spp=8, seed=3, losses=True), im.read_walks("box.walks")
+    p, q = im.traverse(s), im.traverse(walks.scene)
+    assert list(p) == list(q) and walks.seed == 3 and walks.spp == 8
+    p[RED] = q[RED] = .3, .2, .1
+    assert np.array_equal(im.render(s, p, walks=kept), im.render(walks.scene, q, walks=walks))
+    again = im.read_walks("box.walks", s)
+    assert again.scene is s and np.array_equal(im.render(s, p, walks=again), im.render(s, p, walks=kept))
+    raises(im.UnsupportedError, lambda: im.render(walks.scene), "no geometry")
+    raises(im.ArgumentError, lambda: im.read_walks("box.walks", box(9)), "walks of another scene")
+    scene = walks.scene
+    del walks
+    assert len(im.traverse(scene)) == len(p)  # lives as long as somebody has it
+    open("bad.walks", "wb").write(open("box.walks", "rb").read()[:-100])
+    raises(im.SceneError, lambda: im.read_walks("bad.walks"), "ends early")
+
+
 def test_answer():
     """The truth comes back within its errors; covariance and intervals belong together"""
     s, target, p, truth = setting()

@@ -175,7 +175,7 @@ NULLABLE = {"imp_report_page.length", "imp_problem_shares.walk_share", "imp_repo
             "imp_problem_functional.gradient", "imp_problem_jacobian_sums.adjoint",
             "imp_problem_jacobian_sums.group", "imp_problem_jacobian_sums.value",
             "imp_problem_nlopt.gradient", "imp_field_eval.gradient", "imp_bend_objective.gradient",
-            "imp_scene_write_volume.values", "imp_walks_weigh.mask", "imp_build_error.name", "imp_build_string.fallback", "imp_field_read.grid", "imp_bend_tangent.theta_dot", "imp_bend_tangent.x_dot",
+            "imp_scene_write_volume.values", "imp_walks_weigh.mask", "imp_walks_read.scene", "imp_build_error.name", "imp_build_string.fallback", "imp_field_read.grid", "imp_bend_tangent.theta_dot", "imp_bend_tangent.x_dot",
             "imp_bend_tangent.d_dot", "imp_bend_fit.result", "imp_last_error.context",
             "imp_bend_set_progress.payload", "imp_bend_set_progress.progress",
             "imp_input_tangent.x_dot"}
@@ -387,11 +387,15 @@ class Fixture:
                      "imp_film_write": self.folder + "/x.exr", "imp_elements_save": self.folder + "/x.el",
                      "imp_elements_export": self.folder + "/x.ply", "imp_field_write": self.folder + "/x.npy",
                      "imp_parts_write": self.folder + "/x.part", "imp_scene_write_volume": self.folder + "/x.vol", "imp_report_write": self.folder + "/x.html",
-                     "imp_manifest_write": self.folder + "/x.proof"}
+                     "imp_manifest_write": self.folder + "/x.proof", "imp_walks_write": self.folder + "/x.walks"}
             if key == "imp_manifest_output.path": return os.path.join(top, "scenes", "furnace.xml").encode(), None
             if key == "imp_manifest_read.path":
                 path = (self.folder + "/read.proof").encode()
                 if lib.imp_manifest_write(self.object("imp_manifest", ""), path) != OK: raise RuntimeError(self.said())
+                return path, None
+            if key == "imp_walks_read.path":
+                w, path = self.object("imp_walks", ""), (self.folder + "/read.walks").encode()
+                if lib.imp_walks_write(w, path) != OK: raise RuntimeError(self.said())
                 return path, None
             if key == "imp_film_read.path":
                 f, path = self.object("imp_film", ""), self.folder + "/read.exr"

@@ -1,0 +1,444 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Kept walks in a file: a head, the scene without its geometry (tree_file.h), the numbers
+ * at which they were drawn, a checksum of these; then for each sensor a head and the
+ * records of its tiles (walk/record_file.c), each with a checksum of its own. */
+#include "base/arguments.h"
+#include "base/team.h"
+#include "inverse/keep.h"
+#include "math/hash.h"
+#include "scene/fingerprint.h"
+#include "tree_file.h"
+#include <errno.h>
+#include <string.h>
+
+#define MAGIC      "impdrawn"
+#define BYTE_ORDER 0x01020304u
+#define VERSION    1
+#define PIECE      ((size_t)4 << 20) /* bytes that a rank sends at once */
+#define MEMORY     0x1p30
+#define ESS        0.5
+
+struct head {
+    char magic[8];
+    uint32_t byte_order, version;
+    uint64_t scene_bytes, n_theta;
+    uint64_t evaluated; /* imp__fingerprint_evaluated */
+    uint64_t seed;
+    int32_t spp, points, wavelengths, wavelength_set, losses, n_stores;
+    double survival, ess;
+};
+_Static_assert(sizeof(struct head) == 88, "no padding: it is written");
+
+struct store_head {
+    struct imp_record_of of;
+    int32_t index, roulette;
+};
+_Static_assert(sizeof(struct store_head) == 40, "no padding: it is written");
+
+/* ---- Numbers that are no texels ------------------------------------------------------ */
+
+/* Texels and cells are in the scene's bytes. */
+static bool is_number(const struct imp_param *p) { return p->store != IMP_STORE_BULK; }
+
+static void theta_get(const struct imp_scene *scene, double *theta)
+{
+    for (size_t k = 0; k < scene->n_params; k++)
+        for (size_t e = 0; e < scene->params[k].info.count; e++)
+            theta[scene->params[k].info.offset + e] =
+                imp__param_get(&scene->params[k], e);
+}
+static void theta_set(struct imp_scene *scene, const double *theta)
+{
+    for (size_t k = 0; k < scene->n_params; k++) {
+        struct imp_param *p = &scene->params[k];
+        for (size_t e = 0; is_number(p) && e < p->info.count; e++)
+            imp__param_set(p, e, theta[p->info.offset + e]);
+    }
+    imp__theta_announce(scene);
+}
+
+/* ---- Writing ------------------------------------------------------------------------- */
+
+/* Is what a reader makes of the scene's bytes what these walks are evaluated with? */
+static enum imp_status scene_prove(const struct imp_walks *w,
+                                   const struct imp_bytes *bytes)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = w->ctx;
+    imp_scene *again = NULL;
+    double *theta = imp__alloc(ctx, w->scene->n_theta + 1, sizeof *theta);
+    if (!theta) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory to write kept walks"));
+    IMP_TRY(imp__tree_take(ctx, "kept walks", bytes->data, bytes->size, &again));
+    bool same = again->n_theta == w->scene->n_theta;
+    if (same) theta_set(again, w->theta);
+    if (same) theta_get(again, theta);
+    same = same && memcmp(theta, w->theta, again->n_theta * sizeof *theta) == 0 &&
+           imp__fingerprint_evaluated(again) == imp__fingerprint_evaluated(w->scene);
+    if (!same)
+        IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,
+                           "kept walks: this scene is not whole without its geometry "
+                           "(a light that derives something from its shape, or "
+                           "instances in instances)"));
+out:
+    imp_scene_destroy(again);
+    imp__release(ctx, theta);
+    return st;
+}
+
+struct writing {
+    const struct imp_walks *walks;
+    struct head head;
+    const struct imp_bytes *scene;
+    struct imp_file_writer *to;
+    bool begun;             /* the file is there, and its start is written */
+    bool again;             /* the rank has more to send */
+    enum imp_status status; /* of the team */
+};
+
+/* What follows the last byte of a message: nothing, another one, or that there was no
+ * memory for it. */
+enum { LAST, AGAIN, FAILED };
+
+static void start_put(struct imp_file_writer *to, const struct writing *x)
+{
+    const struct imp_walks *w = x->walks;
+    uint64_t sum = imp__hash(0, &x->head, sizeof x->head);
+    imp__file_put(to, &x->head, sizeof x->head);
+    sum = imp__hash(sum, x->scene->data, x->scene->size);
+    imp__file_put(to, x->scene->data, x->scene->size);
+    for (size_t k = 0; k < w->scene->n_params; k++) {
+        const struct imp_param *p = &w->scene->params[k];
+        const double *at = w->theta + p->info.offset;
+        if (!is_number(p)) continue;
+        sum = imp__hash(sum, at, p->info.count * sizeof *at);
+        imp__file_put(to, at, p->info.count * sizeof *at);
+    }
+    imp__file_put(to, &sum, sizeof sum);
+}
+
+static void piece_receive(void *receiver, int rank, const void *message, size_t bytes)
+{
+    struct writing *x = receiver;
+    (void)rank;
+    if (bytes == 0) return;
+    const unsigned char follows = ((const unsigned char *)message)[bytes - 1];
+    x->again = follows == AGAIN;
+    if (follows == FAILED) x->status = IMP_E_NOMEM;
+    if (x->to) imp__file_put(x->to, message, bytes - 1);
+}
+
+/* The tiles of one rank; `to` NULL: they are not written here. */
+static void share_put(struct writing *x, const struct imp_store *s, int rank)
+{
+    imp_context *ctx = x->walks->ctx;
+    const struct imp_team *host = &ctx->team->host;
+    const bool own = host->rank == rank;
+    size_t at = imp__store_share(s, rank, host->ranks);
+    const size_t end = imp__store_share(s, rank + 1, host->ranks);
+    if (rank == 0) {
+        if (x->to) imp__store_put(x->to, s, at, end);
+        return;
+    }
+    x->again = true;
+    while (x->again && x->status == IMP_OK) {
+        static const unsigned char failed = FAILED;
+        struct imp_bytes piece = {0};
+        bool fits = true;
+        while (own && at < end && piece.size < PIECE && fits)
+            fits = imp__record_bytes_put(&s->records[at++], &piece);
+        const unsigned char follows = at < end ? AGAIN : LAST;
+        fits = fits && (!own || imp__bytes_add(ctx, &piece, &follows, 1));
+        const enum imp_status sent =
+            host->gather(fits ? piece.data : &failed, fits ? piece.size : own,
+                         piece_receive, x, host->payload);
+        if (sent != IMP_OK) x->status = sent;
+        imp__bytes_free(ctx, &piece);
+    }
+}
+
+static void stores_put(struct writing *x)
+{
+    const struct imp_walks *w = x->walks;
+    for (int k = 0; k < w->n_stores; k++) {
+        const struct imp_store *s = &w->stores[k];
+        const struct store_head head = {s->records[0].of, s->index,
+                                        atomic_load(&s->roulette)};
+        if (x->to) imp__file_put(x->to, &head, sizeof head);
+        if (!w->spread) imp__store_put(x->to, s, 0, imp__store_tiles(s));
+        for (int rank = 0; w->spread && rank < w->ctx->team->host.ranks; rank++)
+            share_put(x, s, rank);
+    }
+}
+
+/* As of imp__file_write_by. */
+static void walks_fill(struct imp_file_writer *to, const void *payload)
+{
+    struct writing *x = *(struct writing *const *)payload;
+    x->begun = true;
+    x->to = to;
+    start_put(to, x);
+    stores_put(x);
+    if (x->status != IMP_OK && !to->error) to->error = EIO;
+}
+
+enum imp_status imp_walks_write(const imp_walks *w, const char *path)
+{
+    IMP_REQUIRE(NULL, w, "walks");
+    IMP_REQUIRE(w->ctx, path, "path");
+    IMP_FLOAT_MODE;
+    IMP_READS(w->scene);
+    imp_context *ctx = w->ctx;
+    struct imp_bytes scene = {0}, none = {0};
+    struct writing x = {.walks = w, .scene = &scene}, *const payload = &x;
+    const bool team = imp__team_ranks(ctx);
+    enum imp_status st = imp__tree_put(w->scene, w->theta, &scene);
+    if (st == IMP_OK) st = scene_prove(w, &scene);
+    if (st == IMP_OK) {
+        x.head = (struct head){.magic = MAGIC,
+                               .byte_order = BYTE_ORDER,
+                               .version = VERSION,
+                               .scene_bytes = scene.size,
+                               .n_theta = w->scene->n_theta,
+                               .evaluated = imp__fingerprint_evaluated(w->scene),
+                               .seed = w->run.seed,
+                               .spp = w->run.spp,
+                               .points = (int32_t)w->run.points,
+                               .wavelengths = (int32_t)w->run.wavelengths,
+                               .wavelength_set = w->run.wavelength_set,
+                               .losses = w->losses,
+                               .n_stores = w->n_stores,
+                               .survival = w->survival,
+                               .ess = w->ess};
+        st = imp__file_write_by(ctx, path, walks_fill, &payload);
+        if (w->spread && !x.begun) stores_put(&x); /* the others wait for it */
+        if (x.status != IMP_OK)
+            st = imp__error(ctx, x.status, "%s: kept walks did not come together", path);
+        if (team) {
+            const enum imp_status first = imp__team_broadcast(ctx, st, &none);
+            if (st == IMP_OK) st = first;
+        }
+    }
+    imp__bytes_free(ctx, &none);
+    imp__bytes_free(ctx, &scene);
+    return st;
+}
+
+/* ---- Reading ------------------------------------------------------------------------- */
+
+struct reading {
+    struct imp_record_source from;
+    uint64_t size; /* of the file */
+    struct head head;
+    imp_scene *held; /* that the file holds */
+    double *theta;   /* [n_theta] of the draw */
+};
+
+static enum imp_status damaged(const struct reading *r, const char *what)
+{
+    return imp__error(r->from.ctx, IMP_E_SCENE, "%s: damaged file of kept walks (%s)",
+                      r->from.path, what);
+}
+
+static enum imp_status take(struct reading *r, void *out, size_t n)
+{
+    if (fread(out, 1, n, r->from.f) != n)
+        return ferror(r->from.f) ? imp__error(r->from.ctx, IMP_E_IO, "%s: %s",
+                                              r->from.path, strerror(errno))
+                                 : damaged(r, "it ends early");
+    r->from.sum = imp__hash(r->from.sum, out, n);
+    return IMP_OK;
+}
+
+static enum imp_status head_take(struct reading *r)
+{
+    imp_context *ctx = r->from.ctx;
+    struct head *h = &r->head;
+    const char *path = r->from.path;
+    enum imp_status st = IMP_OK;
+    if (fseeko(r->from.f, 0, SEEK_END) != 0 || ftello(r->from.f) < 0)
+        IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: %s", path, strerror(errno)));
+    r->size = (uint64_t)ftello(r->from.f);
+    rewind(r->from.f);
+    if (r->size < sizeof *h)
+        IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: not a file of kept walks", path));
+    IMP_TRY(take(r, h, sizeof *h));
+    if (memcmp(h->magic, MAGIC, sizeof h->magic) != 0)
+        IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: not a file of kept walks", path));
+    if (h->byte_order != BYTE_ORDER)
+        IMP_TRY(imp__error(ctx, IMP_E_SCENE,
+                           "%s: kept walks of byte order %08x; this machine's is %08x",
+                           path, h->byte_order, BYTE_ORDER));
+    if (h->version != VERSION)
+        IMP_TRY(imp__error(ctx, IMP_E_SCENE,
+                           "%s: kept walks of version %u; this program reads version %d",
+                           path, h->version, VERSION));
+    if (h->spp < 0 || h->points < 0 || h->points > IMP_POINTS_SOBOL ||
+        h->wavelengths < 0 || h->wavelengths > IMP_WAVELENGTHS_IMPORTANCE ||
+        h->wavelength_set < 0 || h->losses < 0 || h->losses > 1 || h->n_stores < 1 ||
+        !(h->survival >= 0 && h->survival <= 1) || !(h->ess >= 0 && h->ess <= 1) ||
+        h->n_theta > SIZE_MAX / 16)
+        IMP_TRY(damaged(r, "its head"));
+    if (h->scene_bytes > r->size) IMP_TRY(damaged(r, "it ends early"));
+out:
+    return st;
+}
+
+/* The scene that the file holds, at the numbers of the draw. */
+static enum imp_status scene_take(struct reading *r)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = r->from.ctx;
+    const size_t bytes = (size_t)r->head.scene_bytes;
+    unsigned char *data = imp__alloc_raw(ctx, bytes + 1, 1);
+    uint64_t sum, end;
+    if (!data)
+        return imp__error(ctx, IMP_E_NOMEM, "%s: no memory for a scene", r->from.path);
+    IMP_TRY(take(r, data, bytes));
+    IMP_TRY(imp__tree_take(ctx, r->from.path, data, bytes, &r->held));
+    if (r->held->n_theta != r->head.n_theta) IMP_TRY(damaged(r, "its parameters"));
+    r->theta = imp__alloc(ctx, r->held->n_theta + 1, sizeof *r->theta);
+    if (!r->theta)
+        IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "%s: no memory for numbers", r->from.path));
+    for (size_t k = 0; k < r->held->n_params; k++) {
+        const struct imp_param *p = &r->held->params[k];
+        double *at = r->theta + p->info.offset;
+        if (!is_number(p)) continue;
+        IMP_TRY(take(r, at, p->info.count * sizeof *at));
+        for (size_t e = 0; e < p->info.count; e++)
+            if (!isfinite(at[e])) IMP_TRY(damaged(r, "a number is not finite"));
+    }
+    sum = r->from.sum;
+    IMP_TRY(take(r, &end, sizeof end));
+    if (end != sum) IMP_TRY(damaged(r, "checksum of its scene"));
+    theta_set(r->held, r->theta);
+    theta_get(r->held, r->theta);
+    if (imp__fingerprint_evaluated(r->held) != r->head.evaluated)
+        IMP_TRY(imp__error(ctx, IMP_E_SCENE,
+                           "%s: damaged, or written by another build: its materials and "
+                           "lights are not those that it was written with",
+                           r->from.path));
+out:
+    imp__release(ctx, data);
+    return st;
+}
+
+/* Are these the walks of a given scene? The records say so tile by tile as well. */
+static enum imp_status scene_same(const struct reading *r, const struct imp_scene *scene)
+{
+    if (scene->n_theta == r->head.n_theta &&
+        imp__fingerprint_evaluated(scene) == r->head.evaluated)
+        return IMP_OK;
+    return imp__error(r->from.ctx, IMP_E_ARG,
+                      "%s: walks of another scene: its materials, lights or parameters "
+                      "differ (%llu numbers there, %zu here)",
+                      r->from.path, (unsigned long long)r->head.n_theta, scene->n_theta);
+}
+
+/* A walk has its bytes in the file: what is not there takes no memory. */
+static bool has_room(const struct reading *r, const struct imp_sensor *sensor)
+{
+    const int spp = r->head.spp > 0 ? r->head.spp : sensor->spp;
+    return (double)sensor->film.crop_w * sensor->film.crop_h * spp *
+               (double)sizeof(struct imp_record_walk) <=
+           (double)r->size;
+}
+
+static enum imp_status stores_take(struct reading *r, struct imp_walks *w, double memory)
+{
+    enum imp_status st = IMP_OK;
+    int last = -1;
+    const bool own = w->scene == r->held;
+    for (int k = 0; k < r->head.n_stores; k++) {
+        struct store_head h;
+        struct imp_tracer tracer;
+        IMP_TRY(take(r, &h, sizeof h));
+        if (h.index <= last || h.index >= w->scene->n_sensors || h.roulette < 0 ||
+            h.roulette > 1 || !has_room(r, w->scene->sensors[h.index]))
+            IMP_TRY(damaged(r, "its sensors"));
+        last = h.index;
+        IMP_TRY(
+            imp__walks_sensor(w, NULL, h.index, (size_t)fmin(memory, 0x1p62), &tracer));
+        struct imp_store *s = &w->stores[k];
+        atomic_store(&s->roulette, h.roulette != 0);
+        IMP_TRY(imp__store_take(&r->from, s, &tracer, own ? &h.of : NULL));
+        memory -= (double)s->bytes;
+    }
+    if (fgetc(r->from.f) != EOF) IMP_TRY(damaged(r, "it goes on behind its end"));
+out:
+    return st;
+}
+
+/* `scene`: NULL, or whose walks these have to be. */
+static enum imp_status walks_take(struct reading *r, imp_scene *scene, double memory,
+                                  double ess, imp_walks **out)
+{
+    enum imp_status st = IMP_OK;
+    imp_walks *w = NULL;
+    struct imp_run run = IMP_RUN_INIT;
+    IMP_TRY(head_take(r));
+    IMP_TRY(scene_take(r));
+    if (scene) IMP_TRY(scene_same(r, scene));
+    else scene = r->held;
+    run.seed = r->head.seed;
+    run.spp = r->head.spp;
+    run.points = (enum imp_points)r->head.points;
+    run.wavelengths = (enum imp_wavelength_sampling)r->head.wavelengths;
+    run.wavelength_set = r->head.wavelength_set;
+    const struct imp_walks_options o = {.size = sizeof o,
+                                        .losses = r->head.losses,
+                                        .survival =
+                                            r->head.survival > 0 ? r->head.survival : -1,
+                                        .ess = ess > 0 ? ess : r->head.ess};
+    IMP_TRY(imp__walks_begin(scene, &run, &o, &w));
+    memcpy(w->theta, r->theta, scene->n_theta * sizeof *w->theta);
+    IMP_TRY(stores_take(r, w, memory));
+    w->owns_scene = scene == r->held;
+    for (size_t k = 0; k < scene->n_params && w->owns_scene; k++) {
+        struct imp_param_info *info = &scene->params[k].info;
+        if (w->chosen[k]) continue;
+        if (info->flags & IMP_PARAM_DIFFERENTIABLE && scene->params[k].probed)
+            info->why = "collisions of the walks were drawn by it";
+        info->flags &= ~(unsigned)IMP_PARAM_DIFFERENTIABLE;
+    }
+    if (w->owns_scene) r->held = NULL;
+    *out = w;
+    w = NULL;
+out:
+    imp__walks_destroy(w);
+    return st;
+}
+
+enum imp_status imp_walks_read(imp_context *ctx, imp_scene *scene, const char *path,
+                               const struct imp_walks_options *options, imp_walks **out)
+{
+    IMP_REQUIRE(NULL, ctx, "context");
+    IMP_REQUIRE(ctx, path, "path");
+    IMP_REQUIRE(ctx, out, "out");
+    struct imp_walks_options o = IMP_WALKS_OPTIONS_INIT;
+    IMP_OPTIONS(ctx, o, options, "options");
+    IMP_FLOAT_MODE;
+    enum imp_status st = IMP_OK;
+    struct imp_bytes held = {0};
+    struct reading r = {.from = {.ctx = ctx, .path = path}};
+    if (scene && (scene->ctx != ctx || !scene->committed))
+        return imp__error(ctx, IMP_E_ARG,
+                          "the scene has not been committed, or is another context's");
+    if (!(o.memory >= 0) || isinf(o.memory) || !(o.ess >= 0 && o.ess <= 1))
+        return imp__error(ctx, IMP_E_ARG, "options: memory %g or ess %g is out of range",
+                          o.memory, o.ess);
+    IMP_TRY(imp__file_open(ctx, path, &held, &r.from.f));
+    if (!r.from.f) IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: there is no such file", path));
+    if (scene) {
+        IMP_READS(scene);
+        IMP_TRY(walks_take(&r, scene, o.memory > 0 ? o.memory : MEMORY, o.ess, out));
+    } else {
+        IMP_TRY(walks_take(&r, NULL, o.memory > 0 ? o.memory : MEMORY, o.ess, out));
+    }
+out:
+    if (r.from.f) fclose(r.from.f);
+    imp__bytes_free(ctx, &held);
+    imp_scene_destroy(r.held);
+    imp__release(ctx, r.theta);
+    return st;
+}
