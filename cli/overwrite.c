@@ -26,6 +26,7 @@ static const struct {
     [OUTPUT_CHECKPOINT] = {"a checkpoint", {"importon checkpoint "}, NULL},
     [OUTPUT_SOLUTION] = {"a saved solution", {"IMPELEM"}, NULL},
     [OUTPUT_PART] = {"a part of a run", {"impparts"}, NULL},
+    [OUTPUT_RECORD] = {"a record of walks", {"impdrawn"}, NULL},
     [OUTPUT_MANIFEST] = {"a manifest", {"impproof"}, NULL},
     [OUTPUT_SETTINGS] = {"a list of settings (ID=VALUE)", {NULL}, NULL},
     [OUTPUT_TABLE] = {"a table of importon's",

@@ -13,6 +13,7 @@ enum output_kind {
     OUTPUT_SOLUTION,
     OUTPUT_PART,
     OUTPUT_MANIFEST,
+    OUTPUT_RECORD,
     OUTPUT_SETTINGS, /* name=value,.. for --set @FILE */
     OUTPUT_TABLE,
     OUTPUT_CURVE,
