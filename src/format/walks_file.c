@@ -427,6 +427,9 @@ enum imp_status imp_walks_read(imp_context *ctx, imp_scene *scene, const char *p
     if (!(o.memory >= 0) || isinf(o.memory) || !(o.ess >= 0 && o.ess <= 1))
         return imp__error(ctx, IMP_E_ARG, "options: memory %g or ess %g is out of range",
                           o.memory, o.ess);
+    if (o.survival != 0)
+        return imp__error(ctx, IMP_E_ARG, "options: the file has its own survival, not %g",
+                          o.survival);
     IMP_TRY(imp__file_open(ctx, path, &held, &r.from.f));
     if (!r.from.f) IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: there is no such file", path));
     if (scene) {

@@ -68,7 +68,11 @@ static enum imp_status row_add(struct imp__check *c, const char *param, int64_t 
         row.error = off == 0 ? 0 : isfinite(off) ? off / size : INFINITY;
         row.limit = 1e-6;
     }
-    const bool noisy = row.se > RESOLVED * size ||
+    /* An end whose walks have found nothing has no error to go by: a small sensor before a
+     * large lamp. */
+    const bool unseen =
+        (lights.value == 0 && lights.se == 0) != (sensor.value == 0 && sensor.se == 0);
+    const bool noisy = unseen || row.se > RESOLVED * size ||
                        lights.se > RESOLVED * fabs(lights.value) ||
                        sensor.se > RESOLVED * fabs(sensor.value);
     row.ok = noisy ? -1 : row.error <= row.limit;
