@@ -66,6 +66,12 @@ static enum imp_status target_add(struct imp__normal_job *j,
     enum imp_status st = imp__target_tracer(p, target, part, true, &own, &j->tracer);
     if (st != IMP_OK) return st;
     const struct imp_film_desc *film = &j->tracer.sensor->film;
+    if (j->tracer.integrator->both)
+        return imp__error(p->ctx, IMP_E_UNSUPPORTED,
+                          "Gauss-Newton matrices are made by walks from one end, and "
+                          "integrator %s has walks from both; let them begin at the "
+                          "sensor, or at the lights",
+                          p->scene->integrator->ops->name);
     if (j->tracer.integrator->from_lights && !imp__loss_quadratic(target->desc.loss))
         return imp__error(p->ctx, IMP_E_UNSUPPORTED,
                           "Gauss-Newton matrices of walks from the lights are those of "

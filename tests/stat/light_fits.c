@@ -206,7 +206,8 @@ static void coverage(int fits)
     imp_scene_destroy(scene);
 }
 
-/* Of a loss that is not quadratic, few walks a pixel are a bias: refused by name. */
+/* Of a loss that is not quadratic, few walks a pixel are a bias; derivative pictures of walks
+ * from both ends are not there. Both are refused by name. */
 static void refused(void)
 {
     char xml[4096];
@@ -222,6 +223,18 @@ static void refused(void)
     const enum imp_status st = imp_fit(p, &o, NULL, &r);
     tap_ok(st == IMP_E_UNSUPPORTED && strstr(imp_last_error(ctx), "quadratic"),
            "the log loss is refused # %s", imp_last_error(ctx));
+    imp_problem_destroy(p);
+    imp_scene_destroy(scene);
+
+    char both[4096];
+    snprintf(both, sizeof both, "%.*sbdpt%s", (int)(strstr(xml, "ptracer") - xml), xml,
+             strstr(xml, "ptracer") + strlen("ptracer"));
+    scene = test_scene_text(ctx, both, IMP_MONO);
+    p = problem_of(scene);
+    target_set(p, target, IMP_LOSS_L2);
+    const enum imp_status of_both = imp_fit(p, &o, NULL, &r);
+    tap_ok(of_both == IMP_E_UNSUPPORTED && strstr(imp_last_error(ctx), "bdpt"),
+           "and walks from both ends # %s", imp_last_error(ctx));
     imp_problem_destroy(p);
     imp_scene_destroy(scene);
 }
