@@ -78,6 +78,9 @@ enum imp_input_flags {
     IMP_INPUT_WAVELENGTH = 131072, /* no property: the wavelength of each lane, in nm, of
                                       a kind whose rule depends on it; 0 where lanes are
                                       colours */
+    IMP_INPUT_AFFINE = 262144, /* of a medium: extinction and scattering are affine in it,
+                                  and the emission does not depend on it. Derivatives with
+                                  respect to it alone are made without looking it up */
     IMP_INPUT_BUMP = 65536 /* a texture, read as one number, of which the slope counts:
                                    lanes 0..2 are the normal, not unit, of the surface that
                                    is raised by the texture times the property scale, in

@@ -10,6 +10,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
 #define ERROR_LENGTH 2048
@@ -30,12 +31,25 @@ static bool fits_machine(size_t bytes)
     const long pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGE_SIZE);
     return pages <= 0 || page <= 0 || bytes / (size_t)page < (size_t)pages;
 }
+/* Large arrays are read at random (volumes, their gradients): with pages of 2 MB the
+ * processor finds them in its tables, and asks the system for each 4 kB no more. */
+#define HUGE_PAGE ((size_t)1 << 21)
+
+/* Large arrays are read at random (volumes, their gradients): with pages of 2 MB the
+ * processor keeps their addresses, and the system is not asked for each 4 kB. */
+#define HUGE_PAGE ((size_t)1 << 21)
+
 static void *default_allocate(size_t bytes, void *payload)
 {
     (void)payload;
+    const bool large = bytes >= 2 * HUGE_PAGE;
     void *p = NULL;
     if (!fits_machine(bytes)) return NULL;
-    return posix_memalign(&p, IMP_CACHE_LINE, bytes) == 0 ? p : NULL;
+    if (posix_memalign(&p, large ? HUGE_PAGE : IMP_CACHE_LINE, bytes) != 0) return NULL;
+#ifdef MADV_HUGEPAGE
+    if (large) (void)madvise(p, bytes / HUGE_PAGE * HUGE_PAGE, MADV_HUGEPAGE);
+#endif
+    return p;
 }
 static void default_release(void *memory, void *payload)
 {

@@ -2,7 +2,6 @@
  *
  * Fixed-point sums: the choice of the unit, and the way back to doubles. */
 #include "fixed_sum.h"
-#include <string.h>
 
 void imp__fixed_begin(struct imp_fixed_sum *f, double largest, int spare_bits,
                       double n_terms)
@@ -17,16 +16,22 @@ void imp__fixed_begin(struct imp_fixed_sum *f, double largest, int spare_bits,
     f->per_unit = ldexp(1, -unit);
     f->limit = ldexp(1, imp_min(unit + 62 - terms, 1023));
     f->too_large = f->bits = 0;
-    if (f->sum) memset(f->sum, 0, f->n * sizeof *f->sum);
-    if (f->fine) memset(f->fine, 0, f->n * sizeof *f->fine);
+    if (f->clear) {
+        f->clear = false;
+        return;
+    }
+    for (size_t k = 0; k < f->n; k++) {
+        if (f->sum) *imp__fixed_at(f, f->sum, k) = 0;
+        if (f->fine) *imp__fixed_at(f, f->fine, k) = 0;
+    }
 }
 
-void imp__fixed_end(struct imp_fixed_sum *f)
+void imp__fixed_end(const struct imp_fixed_sum *f, double *out)
 {
-    double *out = (double *)f->sum;
     for (size_t k = 0; k < f->n; k++) {
-        const imp_fixed units = f->sum[k];
-        const double below = f->fine ? (double)f->fine[k] / IMP_FIXED_FINE : 0;
+        const imp_fixed units = *imp__fixed_at(f, f->sum, k);
+        const double below =
+            f->fine ? (double)*imp__fixed_at(f, f->fine, k) / IMP_FIXED_FINE : 0;
         out[k] = ((double)units + below) * f->unit;
     }
 }

@@ -22,17 +22,27 @@ struct imp_fixed_sum {
     imp_fixed *sum; /* [n]; NULL: terms are only looked at */
     /* [n] what is below the unit, in 2^-40 of it, for terms of many sizes; or NULL. */
     imp_fixed *fine;
+    size_t apart; /* numbers that lie between two of sum, and of fine */
     double unit, per_unit, limit;
     uint64_t too_large; /* terms left out */
     uint64_t bits;      /* of the largest |term| so far, a double */
+    bool clear;         /* nothing was added to sum and fine yet: they are 0 */
+    bool alone;         /* one thread adds: additions need no lock */
 };
 
 /* Largest term that is expected, times 2^spare_bits, of at most n_terms a sum: sets the
  * unit and clears sum and counts. */
 void imp__fixed_begin(struct imp_fixed_sum *f, double largest, int spare_bits,
                       double n_terms);
-/* The sums as doubles, in place. */
-void imp__fixed_end(struct imp_fixed_sum *f);
+/* The sums as doubles, out [n]; it may be where they are, if nothing lies between them. */
+void imp__fixed_end(const struct imp_fixed_sum *f, double *out);
+
+/* Number k of f->sum or f->fine. */
+static inline imp_fixed *imp__fixed_at(const struct imp_fixed_sum *f, imp_fixed *row,
+                                       size_t k)
+{
+    return &row[k * (1 + f->apart)];
+}
 
 static inline double imp__fixed_largest(const struct imp_fixed_sum *f)
 {
@@ -41,6 +51,16 @@ static inline double imp__fixed_largest(const struct imp_fixed_sum *f)
         double value;
     } u = {.bits = f->bits};
     return u.value;
+}
+
+/* Of a sum that is added to soon: they lie far apart, and each would be waited for. (GCC 12
+ * drops calls of functions that prefetch and do nothing else, unless it inlines them
+ * first.) */
+static inline __attribute__((always_inline)) void
+imp__fixed_prefetch(const struct imp_fixed_sum *f, size_t k)
+{
+    if (f->sum) __builtin_prefetch((void *)imp__fixed_at(f, f->sum, k), 1);
+    if (f->fine) __builtin_prefetch((void *)imp__fixed_at(f, f->fine, k), 1);
 }
 
 /* By any thread. */
@@ -62,11 +82,16 @@ static inline void imp__fixed_add(struct imp_fixed_sum *f, size_t k, double term
     }
     const double units = term * f->per_unit;
     const imp_fixed whole = llrint(units);
-    __atomic_fetch_add(&f->sum[k], whole, __ATOMIC_RELAXED);
+    const imp_fixed below =
+        f->fine ? (imp_fixed)llrint((units - (double)whole) * IMP_FIXED_FINE) : 0;
+    if (f->alone) {
+        *imp__fixed_at(f, f->sum, k) += whole;
+        if (f->fine) *imp__fixed_at(f, f->fine, k) += below;
+        return;
+    }
+    __atomic_fetch_add(imp__fixed_at(f, f->sum, k), whole, __ATOMIC_RELAXED);
     if (f->fine)
-        __atomic_fetch_add(&f->fine[k],
-                           (imp_fixed)llrint((units - (double)whole) * IMP_FIXED_FINE),
-                           __ATOMIC_RELAXED);
+        __atomic_fetch_add(imp__fixed_at(f, f->fine, k), below, __ATOMIC_RELAXED);
 }
 
 #endif

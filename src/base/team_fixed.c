@@ -26,8 +26,9 @@ static bool touched(const struct imp_fixed_sum *f, size_t block)
 {
     const size_t first = block * BLOCK, n = block_size(f, block);
     imp_fixed any = 0;
-    for (size_t k = first; k < first + n; k++) any |= f->sum[k];
-    for (size_t k = first; f->fine && k < first + n; k++) any |= f->fine[k];
+    for (size_t k = first; k < first + n; k++) any |= *imp__fixed_at(f, f->sum, k);
+    for (size_t k = first; f->fine && k < first + n; k++)
+        any |= *imp__fixed_at(f, f->fine, k);
     return any != 0;
 }
 
@@ -56,11 +57,11 @@ static void blocks_add(struct receiving *r, const unsigned char *at, size_t left
         if (r->strange) break;
         at += sizeof block;
         for (size_t row = 0; row < rows; row++) {
-            imp_fixed *to = (row ? f->fine : f->sum) + first;
+            imp_fixed *to = row ? f->fine : f->sum;
             for (size_t k = 0; k < n; k++) {
                 int64_t term;
                 memcpy(&term, at + k * sizeof term, sizeof term);
-                to[k] += term;
+                *imp__fixed_at(f, to, first + k) += term;
             }
             at += n * sizeof(imp_fixed);
         }
@@ -86,6 +87,14 @@ static void receive(void *receiver, int rank, const void *message, size_t bytes)
                head.blocks);
 }
 
+static bool block_write(imp_context *ctx, const struct imp_fixed_sum *f, imp_fixed *row,
+                        size_t first, size_t n, struct imp_bytes *out)
+{
+    imp_fixed packed[BLOCK];
+    for (size_t k = 0; k < n; k++) packed[k] = *imp__fixed_at(f, row, first + k);
+    return imp__bytes_add(ctx, out, packed, n * sizeof *packed);
+}
+
 static bool blocks_write(imp_context *ctx, const struct imp_fixed_sum *f,
                          struct head *head, struct imp_bytes *out)
 {
@@ -94,10 +103,9 @@ static bool blocks_write(imp_context *ctx, const struct imp_fixed_sum *f,
         const size_t first = (size_t)b * BLOCK, n = block_size(f, (size_t)b);
         if (!touched(f, (size_t)b)) continue;
         head->blocks++;
-        fits =
-            imp__bytes_add(ctx, out, &b, sizeof b) &&
-            imp__bytes_add(ctx, out, f->sum + first, n * sizeof *f->sum) &&
-            (!f->fine || imp__bytes_add(ctx, out, f->fine + first, n * sizeof *f->fine));
+        fits = imp__bytes_add(ctx, out, &b, sizeof b) &&
+               block_write(ctx, f, f->sum, first, n, out) &&
+               (!f->fine || block_write(ctx, f, f->fine, first, n, out));
     }
     return fits;
 }
@@ -120,11 +128,13 @@ static size_t piece_copy(const struct packing *p, size_t *block, bool back)
         const size_t first = *block * BLOCK, n = block_size(f, *block);
         if (!p->ranks[*block]) continue;
         for (int row = 0; row < (f->fine ? 2 : 1); row++, at += n) {
-            imp_fixed *own = (row ? f->fine : f->sum) + first;
+            imp_fixed *own = row ? f->fine : f->sum;
             if (back)
-                for (size_t k = 0; k < n; k++) own[k] = p->packed[at + k];
+                for (size_t k = 0; k < n; k++)
+                    *imp__fixed_at(f, own, first + k) = p->packed[at + k];
             else
-                for (size_t k = 0; k < n; k++) p->packed[at + k] = own[k];
+                for (size_t k = 0; k < n; k++)
+                    p->packed[at + k] = *imp__fixed_at(f, own, first + k);
         }
     }
     return at;

@@ -186,11 +186,16 @@ enum imp_status imp_problem_functional(imp_problem *p, const float *adjoint,
     float *ones = NULL;
     IMP_TRY(begin(p, adjoint, &own, &f, &weights, &ones));
     if (gradient) {
-        g = imp__alloc(ctx, 2 * p->n, sizeof *g);
-        if (!g) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for gradients"));
-        st = imp_problem_reverse(p, f.adjoint, &own, g, g + p->n);
+        /* What may fail behind it must not find the caller's numbers overwritten. */
+        if (value) g = imp__alloc(ctx, 2 * p->n, sizeof *g);
+        if (value && !g) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for gradients"));
+        double *mean = g ? g : gradient, *se = g ? g + p->n : gradient_se;
+        st = imp_problem_reverse(p, f.adjoint, &own, mean, se);
         if (st != IMP_PART) IMP_TRY(st);
-        for (size_t k = 0; k < 2 * p->n; k++) g[k] /= f.norm;
+        for (size_t k = 0; st == IMP_OK && k < p->n; k++) {
+            mean[k] /= f.norm;
+            if (se) se[k] /= f.norm;
+        }
     }
     if (value) {
         IMP_TRY(imp__problem_same(p, &own, "functional"));
@@ -200,8 +205,8 @@ enum imp_status imp_problem_functional(imp_problem *p, const float *adjoint,
     }
     if (imp__team_part(ctx)) IMP_TRY(IMP_PART);
     if (value) *value = estimate;
-    if (gradient) memcpy(gradient, g, p->n * sizeof *g);
-    if (gradient && gradient_se) memcpy(gradient_se, g + p->n, p->n * sizeof *g);
+    if (g) memcpy(gradient, g, p->n * sizeof *g);
+    if (g && gradient_se) memcpy(gradient_se, g + p->n, p->n * sizeof *g);
 out:
     imp__release(ctx, g);
     imp__release(ctx, weights);

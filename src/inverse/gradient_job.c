@@ -85,6 +85,15 @@ static size_t dense_numbers(const struct imp__gradient_job *j)
     return j->want_gradient && !j->totals->many ? rows * j->problem->n : 0;
 }
 
+/* Between pixels: what a tally is full of goes to the sums. */
+static void tally_empty(const struct imp__gradient_job *j, struct imp_tally *t,
+                        double by_variance)
+{
+    if (imp_likely(!imp__tally_full(t))) return;
+    imp__tally_flush(t, by_variance, j->overlap.gradient, j->mean, j->spread);
+    imp__tally_clear(t);
+}
+
 static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worker *w,
                                  void *result, void *payload)
 {
@@ -115,6 +124,7 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
             if (!paired) {
                 /* mean over all R replicates; variance R/(R-1) spread / all^2 */
                 imp__tally_pixel(tally, R, 1 / all, by_variance);
+                tally_empty(j, tally, by_variance);
                 out->objective += sum / all;
                 out->variance += (square - sum * sum / R) * R / ((R - 1) * all * all);
                 continue;
@@ -125,6 +135,7 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
                 continue;
             }
             imp__tally_pixel(tally, 2, 1, 2);
+            tally_empty(j, tally, by_variance);
             out->variance += imp__sqr(first - sum);
             in_pair = 0;
         }

@@ -329,12 +329,23 @@ void imp__tally_tile(struct imp_tally *t, double by_variance)
     }
 }
 
+#define AHEAD 12 /* entries */
+
+static inline __attribute__((always_inline)) void
+prefetch(const struct imp_fixed_sum *mean, const struct imp_fixed_sum *variance,
+         uint32_t key)
+{
+    imp__fixed_prefetch(mean, key);
+    if (variance) imp__fixed_prefetch(variance, key);
+}
+
 void imp__tally_flush(const struct imp_tally *t, double by_variance, double factor,
                       struct imp_fixed_sum *mean, struct imp_fixed_sum *variance)
 {
     const size_t R = (size_t)t->R;
     for (size_t k = 0; k < t->n_triples; k++) {
         const struct imp__tally_triple *e = &t->triples[k];
+        if (k + AHEAD < t->n_triples) prefetch(mean, variance, e[AHEAD].key);
         imp_spec sum = {0}, square = {0};
         for (size_t b = 0; b < R; b++) {
             const imp_spec v = t->triples_of_tile[k * R + b];
@@ -352,6 +363,7 @@ void imp__tally_flush(const struct imp_tally *t, double by_variance, double fact
     }
     for (size_t k = 0; k < t->n_singles; k++) {
         const struct imp__tally_single *e = &t->singles[k];
+        if (k + AHEAD < t->n_singles) prefetch(mean, variance, e[AHEAD].key);
         double v = e->variance, sum = 0, square = 0;
         for (size_t b = 0; b < R; b++) {
             sum += t->singles_of_tile[k * R + b];

@@ -15,6 +15,7 @@
 #include "walk/walk.h"
 
 #define IMP_TALLY_DENSE 1024 /* numbers, above which the hash table is used */
+#define IMP_TALLY_FULL  16384
 
 struct imp__tally_triple { /* three neighbouring numbers */
     /* Of the pixel at work. What an addition needs is on one cache line. */
@@ -70,6 +71,13 @@ void imp__tally_batch(struct imp_tally *t, int b);
  * (sum of squares - sum^2/replicates). */
 void imp__tally_pixel(struct imp_tally *t, double replicates, double by_mean,
                       double by_variance);
+/* Many numbers, between pixels that share no walks: has the tile so many that they are to
+ * be flushed and cleared before it goes on? Memory then does not grow with the samples, and
+ * stays in the cache. */
+static inline bool imp__tally_full(const struct imp_tally *t)
+{
+    return !t->dense && t->R == 0 && t->n_triples + t->n_singles > IMP_TALLY_FULL;
+}
 /* Few numbers, after a tile whose pixels share walks: the variance of sums over it,
  * by_variance (sum of squares - sum^2/R). */
 void imp__tally_tile(struct imp_tally *t, double by_variance);

@@ -10,9 +10,11 @@ enum imp_status imp__totals_begin(struct imp_problem *p, bool in_place, double *
 {
     const size_t n = p->n;
     *t = (struct imp__totals){.many = n > IMP_TALLY_DENSE};
-    if (!t->many || !in_place) {
-        const size_t rows = t->many ? !!gradient + !!gradient_se : 2;
-        t->own = imp__alloc(p->ctx, rows * n, sizeof *t->own);
+    const bool fine = t->many && gradient_se;
+    const size_t rows = t->many ? !!gradient + !!gradient_se : 2;
+    const size_t own = t->many && in_place ? fine : rows + fine;
+    if (own > 0) {
+        t->own = imp__alloc(p->ctx, own * n, sizeof *t->own);
         if (!t->own) return imp__error(p->ctx, IMP_E_NOMEM, "no memory for gradients");
     }
     if (!t->many) {
@@ -20,26 +22,28 @@ enum imp_status imp__totals_begin(struct imp_problem *p, bool in_place, double *
         t->gradient_variance = t->own + n;
         return IMP_OK;
     }
-    double *mean = in_place ? gradient : gradient ? t->own : NULL;
-    double *spread = in_place      ? gradient_se
-                     : gradient_se ? t->own + (gradient ? n : 0)
-                                   : NULL;
-    t->mean = (struct imp_fixed_sum){.n = n, .sum = (imp_fixed *)mean};
-    t->spread = (struct imp_fixed_sum){.n = n, .sum = (imp_fixed *)spread};
-    if (spread) {
-        t->spread.fine = imp__alloc(p->ctx, n, sizeof *t->spread.fine);
-        if (!t->spread.fine)
-            return imp__error(p->ctx, IMP_E_NOMEM, "no memory for errors");
-    }
-    if (mean) memset(mean, 0, n * sizeof *mean);
-    if (spread) memset(spread, 0, n * sizeof *spread);
+    /* What belongs to a number lies together: additions wait for memory. */
+    imp_fixed *mean = in_place ? (imp_fixed *)gradient : (imp_fixed *)t->own;
+    imp_fixed *spread =
+        in_place ? (imp_fixed *)gradient_se : (imp_fixed *)t->own + !!gradient;
+    const size_t apart = in_place ? 0 : own - 1;
+    const bool alone = p->ctx->threads == 1;
+    t->mean = (struct imp_fixed_sum){.n = n,
+                                     .sum = gradient ? mean : NULL,
+                                     .apart = apart,
+                                     .clear = true,
+                                     .alone = alone};
+    t->spread = t->mean;
+    t->spread.sum = gradient_se ? spread : NULL;
+    if (fine) t->spread.fine = in_place ? (imp_fixed *)t->own : spread + 1;
+    if (in_place && gradient) memset(gradient, 0, n * sizeof *gradient);
+    if (in_place && gradient_se) memset(gradient_se, 0, n * sizeof *gradient_se);
     return IMP_OK;
 }
 
 void imp__totals_free(struct imp_problem *p, struct imp__totals *t)
 {
     imp__release(p->ctx, t->own);
-    imp__release(p->ctx, t->spread.fine);
 }
 
 enum imp_status imp__totals_share(struct imp_problem *p, struct imp__totals *t)
@@ -78,14 +82,16 @@ void imp__totals_end(struct imp_problem *p, struct imp__totals *t, double *gradi
                      double *gradient_se)
 {
     const size_t bytes = p->n * sizeof(double);
-    const void *mean = t->gradient, *spread = t->gradient_variance;
-    if (t->many) {
-        if (t->mean.sum && t->unit_known) imp__fixed_end(&t->mean);
-        if (t->spread.sum && t->unit_known) imp__fixed_end(&t->spread);
-        mean = t->mean.sum, spread = t->spread.sum;
+    if (!t->many) {
+        if (gradient) memcpy(gradient, t->gradient, bytes);
+        if (gradient_se) memcpy(gradient_se, t->gradient_variance, bytes);
+    } else {
+        /* Without a unit there was no term. */
+        if (gradient && t->unit_known) imp__fixed_end(&t->mean, gradient);
+        else if (gradient) memset(gradient, 0, bytes);
+        if (gradient_se && t->unit_known) imp__fixed_end(&t->spread, gradient_se);
+        else if (gradient_se) memset(gradient_se, 0, bytes);
     }
-    if (gradient && mean != gradient) memcpy(gradient, mean, bytes);
-    if (gradient_se && spread != gradient_se) memcpy(gradient_se, spread, bytes);
     for (size_t k = 0; gradient_se && k < p->n; k++)
         gradient_se[k] = sqrt(fmax(gradient_se[k], 0));
 }

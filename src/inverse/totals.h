@@ -14,7 +14,7 @@ struct imp__totals {
     /* Of many: fixed point, in the place of the caller's arrays. */
     bool many, unit_known;
     struct imp_fixed_sum mean, spread;
-    double *own; /* [2 n] of few numbers */
+    double *own; /* where sums stand that are not in the caller's arrays */
 };
 
 /* gradient, gradient_se: where the results go, either may be NULL. Of many numbers they

@@ -21,6 +21,47 @@ static bool texture_depends(const struct imp_texture *t, const uint8_t *chosen)
     return false;
 }
 
+/* Inputs of the medium that need not be looked up for derivatives by its extinction: where
+ * one input alone is active, itself. */
+static uint32_t medium_unseen(const struct imp_medium *m, const uint8_t *chosen)
+{
+    uint32_t only = 0;
+    for (int k = 0; k < m->n_own; k++) {
+        const unsigned flags = m->ops->inputs[k].flags;
+        if (!imp__input_depends(m->input[k], chosen)) continue;
+        if (!(flags & IMP_INPUT_EXTINCTION)) continue;
+        if (only || !(flags & IMP_INPUT_AFFINE)) return 0;
+        only = UINT32_C(1) << k;
+    }
+    return only;
+}
+
+static bool media_create(const struct imp_scene *scene, const uint8_t *chosen,
+                         struct imp_active *a)
+{
+    for (int m = 0; m < scene->n_media; m++) {
+        const struct imp_medium *medium = scene->media[m];
+        uint8_t *points = &a->bsdf[medium->scatterer->index];
+        if (*points) *points = IMP_BY_EXTINCTION;
+        for (int k = 0; k < medium->n_in; k++)
+            if ((k >= medium->n_own ||
+                 !(medium->ops->inputs[k].flags & IMP_INPUT_EXTINCTION)) &&
+                imp__input_depends(medium->input[k], chosen))
+                *points = 1;
+        for (int k = 0; k < medium->n_own; k++) {
+            if (!(medium->ops->inputs[k].flags & IMP_INPUT_EXTINCTION)) continue;
+            if (!imp__input_depends(medium->input[k], chosen)) continue;
+            const size_t n = (size_t)scene->n_media;
+            if (!a->medium) a->medium = imp__alloc(scene->ctx, n, 1);
+            if (!a->unseen) a->unseen = imp__alloc(scene->ctx, n, sizeof *a->unseen);
+            if (!a->medium || !a->unseen) return false;
+            a->medium[m] = 1;
+            a->unseen[m] = medium_unseen(medium, chosen);
+        }
+    }
+    return true;
+}
+
 enum imp_status imp__active_create(const struct imp_scene *scene, const uint8_t *chosen,
                                    struct imp_active *out)
 {
@@ -43,26 +84,9 @@ enum imp_status imp__active_create(const struct imp_scene *scene, const uint8_t 
     for (int e = 0; e < scene->n_emitters; e++)
         for (int k = 0; k < scene->emitters[e]->n_in; k++)
             a.emitter[e] |= imp__input_depends(scene->emitters[e]->input[k], chosen);
-    for (int m = 0; m < scene->n_media; m++) {
-        const struct imp_medium *medium = scene->media[m];
-        uint8_t *points = &a.bsdf[medium->scatterer->index];
-        if (*points) *points = IMP_BY_EXTINCTION;
-        for (int k = 0; k < medium->n_in; k++)
-            if ((k >= medium->n_own ||
-                 !(medium->ops->inputs[k].flags & IMP_INPUT_EXTINCTION)) &&
-                imp__input_depends(medium->input[k], chosen))
-                *points = 1;
-        for (int k = 0; k < medium->n_own; k++) {
-            if (!(medium->ops->inputs[k].flags & IMP_INPUT_EXTINCTION)) continue;
-            if (!imp__input_depends(medium->input[k], chosen)) continue;
-            if (!a.medium) a.medium = imp__alloc(ctx, (size_t)scene->n_media, 1);
-            if (!a.medium) {
-                imp__active_destroy(ctx, &a);
-                return imp__error(ctx, IMP_E_NOMEM,
-                                  "no memory for the active parameters");
-            }
-            a.medium[m] = 1;
-        }
+    if (!media_create(scene, chosen, &a)) {
+        imp__active_destroy(ctx, &a);
+        return imp__error(ctx, IMP_E_NOMEM, "no memory for the active parameters");
     }
     for (int m = 0; m < scene->n_bodies; m++)
         for (int k = 0; k < scene->bodies[m]->n_numbers; k++) {
@@ -88,6 +112,7 @@ void imp__active_destroy(imp_context *ctx, struct imp_active *a)
     imp__release(ctx, a->emitter);
     imp__release(ctx, a->body);
     imp__release(ctx, a->medium);
+    imp__release(ctx, a->unseen);
     *a = (struct imp_active){0};
 }
 

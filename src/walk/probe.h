@@ -43,8 +43,11 @@ struct imp_probing {
     struct imp_vertex *from; /* vertex k */
     struct imp_probe *probe; /* NULL: none yet */
     double weight;
-    uint32_t n; /* stretches */
+    uint32_t n;    /* stretches */
+    bool followed; /* else nothing of them is kept */
 };
+
+void imp__probe_begin(const struct imp_walk *walk, struct imp_probing *p);
 
 /* The flight has gone from near to far in m, with events [first, track->n) of the track;
  * `before`: the segment's value at `near`; open: only a
@@ -60,6 +63,7 @@ void imp__probe_follow(struct imp_step *s);
 
 /* Derivative of what arrives at vertex v with respect to the inputs of the medium,
  * d [n_own], lane by lane; of inputs that the extinction does not depend on 0. */
-void imp__probe_d(const struct imp_vertex *v, imp_spec *d);
+void imp__probe_d(const struct imp_tracer *tracer, const struct imp_vertex *v,
+                  imp_spec *d);
 
 #endif

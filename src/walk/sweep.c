@@ -146,7 +146,10 @@ static imp_spec weight_before(const struct imp_vertex *v)
 }
 
 /* Of the segment that goes on, does something stand for its derivative? */
-static bool segment_counts(const struct imp_vertex *v) { return v->on && v->d.goes_on; }
+static bool segment_counts(const struct imp_tracer *tracer, const struct imp_vertex *v)
+{
+    return v->on && v->d.goes_on && imp__track_counts(tracer, v->on);
+}
 /* d B_k / d T of the way to the light. */
 static imp_spec light_before(const struct imp_vertex *v)
 {
@@ -167,13 +170,13 @@ static void media_scatter(const struct imp_tracer *tracer, const struct imp_vert
         imp__track_sweep(tracer, v->to_light, v->carried, &T, own * light_before(v),
                          sink);
     }
-    if (segment_counts(v))
+    if (segment_counts(tracer, v))
         imp__track_sweep(tracer, v->on, v->carried, NULL,
                          P * weight_before(v) * v->beyond, sink);
     if (v->probe) {
         const struct imp_medium *m = v->probe->medium;
         imp_spec d[IMP_INPUTS_MAX];
-        imp__probe_d(v, d);
+        imp__probe_d(tracer, v, d);
         for (int j = 0; j < m->n_own; j++) {
             d[j] *= P;
             if (m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION)
@@ -193,13 +196,13 @@ static imp_spec media_tangent(const struct imp_tracer *tracer, const struct imp_
         L_dot += own * light_before(v) *
                  imp__track_tangent(tracer, v->to_light, v->carried, &T, dot, x_dot);
     }
-    if (segment_counts(v))
+    if (segment_counts(tracer, v))
         L_dot += weight_before(v) * v->beyond *
                  imp__track_tangent(tracer, v->on, v->carried, NULL, dot, x_dot);
     if (v->probe) {
         const struct imp_medium *m = v->probe->medium;
         imp_spec d[IMP_INPUTS_MAX], in_dot;
-        imp__probe_d(v, d);
+        imp__probe_d(tracer, v, d);
         for (int j = 0; j < m->n_own; j++) {
             if (!(m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION)) continue;
             imp__inputs_tangent(&m->input[j], 1, &v->probe->at, dot, x_dot, &in_dot);

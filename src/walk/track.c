@@ -26,6 +26,15 @@ imp_spec imp__extinction_at(const struct imp_medium *m, imp_v3 p,
     return c.extinction;
 }
 
+void imp__seen_inputs(const struct imp_tracer *tracer, const struct imp_medium *m,
+                      const struct imp_texcoord *at, imp_spec *in)
+{
+    const uint32_t unseen = tracer->active->unseen[m->index];
+    for (int j = 0; j < m->n_own; j++)
+        if (unseen >> j & 1) in[j] = (imp_spec){0};
+        else imp__inputs_eval(&m->input[j], 1, at, &in[j]);
+}
+
 /* An event's factor, and its derivative with respect to the extinction there. */
 struct factor {
     imp_spec f, slope;
@@ -196,36 +205,48 @@ static bool stands(const struct derived *x, const struct imp_event *e)
 
 /* Factors of the events that surfaces have are differentiated as they are, and those of
  * tentative collisions where these stand; else IMP_LINE_AT takes their place. */
+static bool apart(const struct derived *x)
+{
+    if (x->tracer->collisions_stand) return true;
+    for (int i = 0; i < x->track->n; i++)
+        if (x->track->event[i].kind == IMP_PASSES || stands(x, &x->track->event[i]))
+            return true;
+    return false;
+}
+
+bool imp__track_counts(const struct imp_tracer *tracer, const struct imp_track *track)
+{
+    const struct derived x = {.tracer = tracer, .track = track};
+    return apart(&x);
+}
+
 static bool derived_of(const struct imp_tracer *tracer, const struct imp_track *track,
                        const struct imp_carried *carried, const imp_spec *value,
                        struct derived *x)
 {
-    *x = (struct derived){.tracer = tracer,
-                          .track = track,
-                          .carried = carried,
-                          .value = value,
-                          .apart = tracer->collisions_stand};
-    for (int i = 0; i < track->n; i++)
-        x->apart |= track->event[i].kind == IMP_PASSES || stands(x, &track->event[i]);
+    *x = (struct derived){
+        .tracer = tracer, .track = track, .carried = carried, .value = value};
+    x->apart = apart(x);
     if (!x->apart) return tracer->active->medium && value;
     x->p = product_of(tracer->scene, track, carried);
     return true;
 }
 
 /* d product/d extinction of event i; in: its medium's inputs there. False: it is 0. */
-static bool extinction_slope(const struct derived *x, const struct imp_event *e, imp_v3 p,
-                             imp_spec *in, imp_spec *slope)
+static bool extinction_slope(const struct derived *x, const struct imp_event *e,
+                             const struct imp_texcoord *at, imp_spec *in, imp_spec *slope)
 {
     const struct imp_medium *m = x->tracer->scene->media[e->medium];
     const bool as_is = stands(x, e);
     if (!as_is && e->kind != IMP_LINE_AT && (e->kind != IMP_CROSSES || !x->value))
         return false;
-    const imp_spec sigma = imp__extinction_at(m, p, x->carried, in);
     if (as_is) {
+        const imp_spec sigma = imp__extinction_at(m, at->p, x->carried, in);
         const struct factor f = factor_of(e, sigma, true);
         *slope = f.slope * others(&x->p, f.f);
     } else {
         const double l = e->kind == IMP_LINE_AT ? e->bound : e->t;
+        imp__seen_inputs(x->tracer, m, at, in);
         *slope = *x->value * (isfinite(l) ? -l : 0); /* there T is 0, or no path is */
     }
     return true;
@@ -240,6 +261,7 @@ event_d(const struct derived *x, int i, struct imp_texcoord *at, int *n, imp_spe
     const struct imp_event *e = &x->track->event[i];
     if (e->kind == IMP_PASSES_UV || e->kind == IMP_RESIDUAL_OF || e->kind == IMP_CONTROL)
         return NULL;
+    if (!x->apart && e->kind != IMP_LINE_AT && e->kind != IMP_CROSSES) return NULL;
     if (e->kind == IMP_PASSES) {
         *at = passed_at(x->tracer->scene->shapes[e->medium], x->track, e, x->carried);
         const struct imp_bsdf *b = passes_d(x->tracer, e, at, d);
@@ -255,7 +277,7 @@ event_d(const struct derived *x, int i, struct imp_texcoord *at, int *n, imp_spe
     imp_spec in[IMP_INPUTS_MAX], slope;
     if (!active->medium || !active->medium[e->medium]) return NULL;
     *at = (struct imp_texcoord){.p = event_place(x->track, e), .carried = x->carried};
-    if (!extinction_slope(x, e, at->p, in, &slope)) return NULL;
+    if (!extinction_slope(x, e, at, in, &slope)) return NULL;
     m->ops->eval_d(m, in, dc);
     for (int j = 0; j < m->n_own; j++)
         d[j] = m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION ? dc[j].extinction * slope

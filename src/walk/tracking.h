@@ -67,7 +67,9 @@ extern const struct imp_segment_ops imp__tracking;
 /* The segment's value at the scene's present parameters. */
 imp_spec imp__track_eval(const struct imp_scene *scene, const struct imp_track *track,
                          const struct imp_carried *carried);
-/* Its derivative with the events where they are: f_bar to the sink, or along x_dot.
+/* Along a walk: has it a derivative with the events where they are? */
+bool imp__track_counts(const struct imp_tracer *tracer, const struct imp_track *track);
+/* This derivative: f_bar to the sink, or along x_dot.
  * value: the segment's, to a light sample; NULL along a walk. */
 void imp__track_sweep(const struct imp_tracer *tracer, const struct imp_track *track,
                       const struct imp_carried *carried, const imp_spec *value,
@@ -92,6 +94,11 @@ imp_spec imp__passes_eval(const struct imp_scene *scene, const struct imp_track 
  */
 imp_spec imp__extinction_at(const struct imp_medium *m, imp_v3 p,
                             const struct imp_carried *carried, imp_spec *in);
+
+/* Inputs that derivatives with respect to the extinction look at, the others 0. in [n_own]
+ */
+void imp__seen_inputs(const struct imp_tracer *tracer, const struct imp_medium *m,
+                      const struct imp_texcoord *at, imp_spec *in);
 
 /* Factor of IMP_RESIDUAL_AT, and of what follows it. */
 static inline imp_spec imp__residual(imp_spec sigma, const struct imp_event e[2])

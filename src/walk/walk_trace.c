@@ -181,7 +181,7 @@ void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, i
     struct imp_probing probing;
     if (imp_unlikely(tracer->active && tracer->active->medium) && s.recorded &&
         !tracer->collisions_stand && tracer->integrator->media) {
-        probing = (struct imp_probing){.n = 0};
+        imp__probe_begin(walk, &probing);
         s.probing = &probing;
     }
     if (imp_unlikely(sensor->shape != NULL)) imp__walk_on_meter(&s);

@@ -11,7 +11,8 @@ enum {
     EMISSION = IMP_COEFFICIENT_EMISSION
 };
 
-#define OF_EXTINCTION (IMP_INPUT_EXTINCTION | IMP_INPUT_VOLUME | IMP_INPUT_OPTIONAL)
+#define OF_EXTINCTION                                                                    \
+    (IMP_INPUT_EXTINCTION | IMP_INPUT_AFFINE | IMP_INPUT_VOLUME | IMP_INPUT_OPTIONAL)
 const struct imp_input_desc imp__coefficient_inputs[] = {
     [SIGMA_T] = {.name = "sigma_t",
                  .role = IMP_UNBOUNDED,
@@ -34,7 +35,7 @@ const struct imp_input_desc imp__coefficient_inputs[] = {
                  .unit = "1/length"},
     [SCALE] = {.name = "scale",
                .role = IMP_UNBOUNDED,
-               .flags = IMP_INPUT_EXTINCTION | IMP_INPUT_SCALAR,
+               .flags = IMP_INPUT_EXTINCTION | IMP_INPUT_AFFINE | IMP_INPUT_SCALAR,
                .fallback = 1,
                .unit = "1"},
     [EMISSION] = {.name = "emission",
