@@ -1,11 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * A rod: light goes to and fro along one line. Eight cells of width 1/8, one of them
- * empty, scatter half of it back; light enters at both ends, and what leaves at the left
- * is read. The exact answer and its derivatives with respect to the eight extinctions and
- * albedos are those of the two-stream equations
- *
- *     dL+/dx = -sigma L+ + sigma albedo (L+ + L-)/2,    -dL-/dx = the same for L-
+ * The rod (rod.h): what leaves at its left end, and the derivatives with respect to the
+ * eight extinctions and albedos.
  *
  * In three dimensions the rod is a medium whose phase function is two narrow cones, which
  * a host registers. The derivative of an empty cell is where estimators differ that
@@ -14,15 +10,9 @@
 #include "imp_tap.h"
 #include "inverse/estimate.h"
 #include "math/warp.h"
+#include "rod.h"
 #include "vol_write.h"
 #include "walk/walk.h"
-
-enum { CELLS = 8 };
-#define LEFT  .2
-#define RIGHT 1.
-
-static const float sigma[CELLS] = {4, 0, 2, 8, .05f, 6, 3, 1};
-static const float albedo[CELLS] = {.9f, .5f, .99f, .2f, .9f, .8f, .95f, .6f};
 
 static imp_context *ctx;
 
@@ -61,39 +51,6 @@ static const struct imp_phase_ops rod = {.size = sizeof rod,
                                          .pdf = rod_pdf,
                                          .eval_d = rod_eval_d};
 
-/* ---- The truth: transfer matrices of the cells ---------------------------------------- */
-
-/* What leaves at the left. Of a cell of optical depth t and albedo a the equations have
- * eigenvalues +-k, k^2 = 1 - a, in units of t. */
-static double exact(const double s[CELLS], const double a[CELLS])
-{
-    double m[2][2] = {{1, 0}, {0, 1}}; /* (L+, L-) at the left to that at the right */
-    for (int i = 0; i < CELLS; i++) {
-        const double t = s[i] / CELLS, k = sqrt(1 - a[i]), h = a[i] / 2;
-        const double C = cosh(k * t), S = k > 0 ? sinh(k * t) / k : t;
-        const double e[2][2] = {{C - (1 - h) * S, h * S}, {-h * S, C + (1 - h) * S}};
-        double next[2][2];
-        for (int r = 0; r < 2; r++)
-            for (int c = 0; c < 2; c++)
-                next[r][c] = e[r][0] * m[0][c] + e[r][1] * m[1][c];
-        memcpy(m, next, sizeof m);
-    }
-    return (RIGHT - m[1][0] * LEFT) / m[1][1];
-}
-
-static double difference(int cell, int of_albedo)
-{
-    double s[CELLS], a[CELLS], out[2];
-    const double h = 1e-5;
-    for (int i = 0; i < CELLS; i++) s[i] = (double)sigma[i], a[i] = (double)albedo[i];
-    double *x = of_albedo ? &a[cell] : &s[cell];
-    *x += h;
-    out[0] = exact(s, a);
-    *x -= 2 * h; /* of the empty cell a formal one: the formula is analytic */
-    out[1] = exact(s, a);
-    return (out[0] - out[1]) / (2 * h);
-}
-
 /* ---- The scene ------------------------------------------------------------------------ */
 
 static imp_scene *scene_make(const char *extinction, const char *albedo_file)
@@ -128,7 +85,7 @@ static imp_scene *scene_make(const char *extinction, const char *albedo_file)
         "<film type='hdrfilm'><integer name='width' value='16'/>"
         "<integer name='height' value='16'/><rfilter type='box'/></film></sensor>"
         "</scene>",
-        extinction, albedo_file, LEFT, RIGHT);
+        extinction, albedo_file, ROD_LEFT, ROD_RIGHT);
     return test_scene_text(ctx, text, IMP_MONO);
 }
 
@@ -136,7 +93,7 @@ static imp_scene *scene_make(const char *extinction, const char *albedo_file)
 struct sums {
     struct imp_sink sink;
     int param;
-    double sum[CELLS];
+    double sum[ROD_CELLS];
 };
 static void sums_add(struct imp_sink *sink, int param, size_t element, int channels,
                      const imp_spec *bar)
@@ -148,21 +105,24 @@ static void sums_add(struct imp_sink *sink, int param, size_t element, int chann
 
 int main(void)
 {
-    static const double published[CELLS] = {-.00394, -.01404, -.00166, -.01853,
-                                            -.00754, -.00911, -.00679, -.01163};
+    static const double published[ROD_CELLS] = {-.00394, -.01404, -.00166, -.01853,
+                                                -.00754, -.00911, -.00679, -.01163};
     char s_path[64], a_path[64];
-    double s[CELLS], a[CELLS], g[64], se[64];
+    double s[ROD_CELLS], a[ROD_CELLS], g[64], se[64];
     struct imp_estimate v;
     struct imp_run run = IMP_RUN_INIT;
-    for (int i = 0; i < CELLS; i++) s[i] = (double)sigma[i], a[i] = (double)albedo[i];
-    tap_near(exact(s, a), .21356738, 0, 5e-8, "truth: what leaves");
-    for (int i = 0; i < CELLS; i++)
-        tap_near(difference(i, 0), published[i], 0, 6e-6, "truth: its derivative");
+    for (int i = 0; i < ROD_CELLS; i++) {
+        s[i] = (double)rod_sigma[i];
+        a[i] = (double)rod_albedo[i];
+    }
+    tap_near(rod_exact(s, a), .21356738, 0, 5e-8, "truth: what leaves");
+    for (int i = 0; i < ROD_CELLS; i++)
+        tap_near(rod_derivative(i, 0), published[i], 0, 6e-6, "truth: its derivative");
 
     ctx = test_context(0);
     test_must(ctx, imp_register_phase(ctx, &rod));
-    vol_write(s_path, 1, 1, CELLS, 1, sigma);
-    vol_write(a_path, 1, 1, CELLS, 1, albedo);
+    vol_write(s_path, 1, 1, ROD_CELLS, 1, rod_sigma);
+    vol_write(a_path, 1, 1, ROD_CELLS, 1, rod_albedo);
     imp_scene *scene = scene_make(s_path, a_path);
     imp_problem *p = test_problem(ctx, scene, "*");
     run.spp = 1500;
@@ -170,16 +130,16 @@ int main(void)
     test_must(ctx, imp_problem_functional(p, NULL, &run, &v, g, se));
     struct tap_stat stat = {run.spp * 256., v.value, 0};
     stat.m2 = v.se * v.se * stat.n * (stat.n - 1);
-    tap_z(&stat, exact(s, a), 1e-3, "what leaves");
+    tap_z(&stat, rod_exact(s, a), 1e-3, "what leaves");
     for (int k = 0; k < 2; k++) {
         const size_t at = test_variable(p, scene, ctx, k ? "albedo.data" : "sigma.data");
-        for (size_t i = 0; i < CELLS; i++) {
+        for (size_t i = 0; i < ROD_CELLS; i++) {
             char what[64];
             struct tap_stat d = {1e6, g[at + i], 0};
             d.m2 = se[at + i] * se[at + i] * d.n * (d.n - 1);
             snprintf(what, sizeof what, "derivative by %s of cell %zu",
                      k ? "albedo" : "extinction", i);
-            tap_z(&d, difference((int)i, k), 6e-4, what);
+            tap_z(&d, rod_derivative((int)i, k), 6e-4, what);
         }
     }
 
@@ -207,10 +167,10 @@ int main(void)
     imp__arena_free(&arena);
     const double se_empty = tap_se(&empty);
     tap_ok(fabs(empty.mean - -.02669) <= 4 * se_empty + 1e-5 && se_empty < 5e-4 &&
-               fabs(empty.mean - difference(1, 0)) > 10 * se_empty,
+               fabs(empty.mean - rod_derivative(1, 0)) > 10 * se_empty,
            "collisions that stand never see the gain of the empty cell "
            "# mean %.5f se %.2g, truth %.5f",
-           empty.mean, se_empty, difference(1, 0));
+           empty.mean, se_empty, rod_derivative(1, 0));
     imp_problem_destroy(p);
     imp_scene_destroy(scene);
     imp_context_destroy(ctx);
