@@ -567,7 +567,8 @@ enum imp_shape_flags {
                              0 or 1 */
     IMP_SHAPE_NEAREST = 4, /* of the points on a line, sample_toward draws the nearest
                              only; else all of them */
-    IMP_SHAPE_TRIANGLES = 8 /* it can be looked up by triangle */
+    IMP_SHAPE_TRIANGLES = 8, /* it can be looked up by triangle */
+    IMP_SHAPE_FLAT = 16      /* one normal everywhere */
 };
 
 struct imp_shape_ops {
@@ -600,6 +601,10 @@ struct imp_shape_ops {
      * *prim where it is looked up by triangle. NULL: bump maps are refused. */
     void (*place)(const struct imp_shape *s, const double uv[2], struct imp_surface *out,
                   int *prim);
+    /* As sample_toward, of one triangle: uniformly by area, density 1/its area. NULL: the
+     * triangles of a light are not chosen one by one. */
+    bool (*sample_triangle)(const struct imp_shape *s, int prim, const imp_v3 *ref,
+                            const double u[2], struct imp_light_sample *out);
 };
 
 /* ---- Emitter ------------------------------------------------------------------- */
@@ -608,11 +613,13 @@ enum imp_emitter_flags {
     IMP_EMITTER_DELTA = 1,
     IMP_EMITTER_AREA = 2,
     IMP_EMITTER_ENVIRONMENT = 4,
-    IMP_EMITTER_UNIFORM = 8, /* eval is its first input, whatever the direction (of a
+    IMP_EMITTER_UNIFORM = 8,  /* eval is its first input, whatever the direction (of a
                                 surface: on its front) */
-    IMP_EMITTER_GAPS = 16,   /* the density of sample is 0 where eval is, also where a
+    IMP_EMITTER_GAPS = 16,    /* the density of sample is 0 where eval is, also where a
                                 derivative is not */
-    IMP_EMITTER_FAR = 32     /* a delta light without end: its light is parallel */
+    IMP_EMITTER_FAR = 32,     /* a delta light without end: its light is parallel */
+    IMP_EMITTER_BY_SHAPE = 64 /* its points are drawn as the shape draws them: sample and
+                                 pdf are the shape's, evenly by area on triangles */
 };
 
 struct imp_emission { /* where and whither light leaves */
@@ -691,6 +698,9 @@ struct imp_emitter_ops {
                             const double u[4], struct imp_emission_sample *out);
     /* pdf_d of direction x->d, from the point that x describes. With sample_emission. */
     double (*pdf_emission)(const struct imp_emitter *e, const struct imp_emission *x);
+    /* Of a delta light: light leaves within a cone about `axis` alone, of this cosine, as
+     * its inputs are now. NULL: all around. */
+    void (*cone)(const struct imp_emitter *e, imp_v3 *axis, double *cosine);
 };
 
 /* ---- Sensor and filter --------------------------------------------------------- */

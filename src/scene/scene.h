@@ -75,6 +75,8 @@ struct imp_body {
     struct imp_body_numbers *numbers;
 };
 
+struct imp_light_tree;
+
 /* An object of a room above, which this one does not know: destroyed with the scene. */
 struct imp_owned {
     struct imp_owned *next; /* made earlier */
@@ -128,7 +130,9 @@ struct imp_scene {
     struct imp_bsdf *default_bsdf, *black_bsdf;
     const struct imp_integrator *integrator; /* NULL: none was written */
     int environment;                         /* emitter index, -1: none */
-    double *light_cdf; /* [n_emitters] by sampling_weight, last is 1 */
+    double *light_cdf;                 /* [n_emitters] by sampling_weight, last is 1 */
+    bool lights_in_tree;               /* some integrator chooses lights by the tree */
+    struct imp_light_tree *light_tree; /* NULL: none does (light_tree.h) */
     int n_bsdf_mixing;
     struct imp_mixing **bsdf_mixing; /* [n_bsdfs] NULL: the integrator's */
     bool materials_mix;              /* some material has weights */

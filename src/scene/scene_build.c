@@ -5,6 +5,7 @@
  * top by its name. */
 #include "scene_build.h"
 #include "instances.h"
+#include "light_tree.h"
 #include "priorities.h"
 
 /* Top-level objects without id: <tag><n>, counted per tag. */
@@ -157,6 +158,7 @@ enum imp_status imp__scene_build(struct imp_scene *scene,
     if (!scene->rayless) {
         IMP_TRY(imp__intersector_create(scene));
         if (scene->aims.aimed) IMP_TRY(imp__aims_aim(scene));
+        if (scene->lights_in_tree) IMP_TRY(imp__light_tree_build(scene));
         IMP_TRY(imp__media_survey(scene));
     }
     scene->committed = true;

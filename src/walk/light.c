@@ -15,14 +15,15 @@ static double power_heuristic(double a, double b)
     return a2 > 0 ? a2 / (a2 + b2) : 0;
 }
 
-/* Probability with which light samples choose this light: at the vertex itself, or where
- * the ray in flight left. */
-static double light_pmf_at(const struct imp_step *s, bool known,
-                           const struct imp_guide_place *place, int light)
+/* By what the density of a point of this light is multiplied, since light samples choose
+ * the light where the ray in flight left: its probability. prim: of the point that is met. */
+static double choice_factor(const struct imp_step *s, int light, int prim)
 {
-    const struct imp_guide *g = s->guided.guide;
-    return imp_unlikely(known) ? g->light_pmf(g, place, light)
-                               : light_pmf(s->scene, light);
+    const struct imp_guided *g = &s->guided;
+    if (imp_unlikely(g->left)) return g->guide->light_pmf(g->guide, &g->from, light);
+    if (imp_unlikely(s->light_tree != NULL))
+        return imp__light_tree_factor(s->light_tree, &s->left, light, prim);
+    return light_pmf(s->scene, light);
 }
 
 void imp__emission_meet(struct imp_step *s, struct imp_vertex *v, int emitter,
@@ -38,8 +39,8 @@ void imp__emission_meet(struct imp_step *s, struct imp_vertex *v, int emitter,
         weight = imp__decide1(imp__both_met_weight(s, emitter, hit, at));
     } else if (s->pdf > 0 && s->tracer->integrator->lights &&
                !s->tracer->integrator->only_points) {
-        const double pmf = light_pmf_at(s, s->guided.left, &s->guided.from, emitter);
-        const double pe = pmf * e->ops->pdf(e, &s->from, &s->d, hit, at);
+        const double factor = choice_factor(s, emitter, hit ? hit->prim : -1);
+        const double pe = factor * e->ops->pdf(e, &s->from, &s->d, hit, at);
         weight = imp__decide1(weight * power_heuristic(s->pdf, pe));
     }
     weight = imp__emitter_timed(e, s->walk->time, weight);
@@ -59,7 +60,7 @@ static int light_choose(const struct imp_step *s, double u, double *pmf)
     const struct imp_guided *g = &s->guided;
     if (imp_likely(!g->here)) return imp__light_pick(s->scene, u, pmf);
     const int light = g->guide->light(g->guide, &g->at, u);
-    *pmf = light_pmf_at(s, g->here, &g->at, light);
+    *pmf = g->guide->light_pmf(g->guide, &g->at, light);
     return light;
 }
 
@@ -68,6 +69,41 @@ static double light_part(const struct imp_scene *scene, int light, double u, dou
 {
     const double below = light > 0 ? scene->light_cdf[light - 1] : 0;
     return imp_clamp((u - below) / pmf, 0, 0x1.fffffffffffffp-1);
+}
+
+/* A light and a point on it, for the vertex at `at`; *pmf: probability of the light, or of
+ * the triangle that the density in `ls` is that of. -1: none. Of points in sets, the first
+ * number chooses the light too: those that a light gets then cover it evenly. */
+static __attribute__((noinline)) int tree_sample(const struct imp_step *s,
+                                                 const struct imp_bsdf *b,
+                                                 const struct imp_surface *at,
+                                                 double u[2], double *pmf,
+                                                 struct imp_light_sample *ls)
+{
+    const struct imp_light_place place = imp__light_place(s, b, at);
+    const bool one = s->walk->point.points;
+    double which = one ? u[0] : imp__step_number(s, IMP_DIM_LIGHT);
+    int prim;
+    *pmf = 0;
+    const int light = imp__light_tree_choose(s->light_tree, &place, &which, &prim, pmf);
+    if (light < 0) return -1;
+    if (one) u[0] = which;
+    const struct imp_emitter *e = s->scene->emitters[light];
+    const struct imp_shape *shape = e->shape;
+    if (prim >= 0)
+        return shape->ops->sample_triangle(shape, prim, &at->p, u, ls) ? light : -1;
+    return e->ops->sample(e, &at->p, u, ls) ? light : -1;
+}
+static inline int weights_sample(const struct imp_step *s, const struct imp_surface *at,
+                                 double u[2], double *pmf, struct imp_light_sample *ls)
+{
+    const bool one = s->walk->point.points && !s->guided.here;
+    const int light =
+        light_choose(s, one ? u[0] : imp__step_number(s, IMP_DIM_LIGHT), pmf);
+    if (!(*pmf > 0)) return -1;
+    if (one) u[0] = light_part(s->scene, light, u[0], *pmf);
+    const struct imp_emitter *e = s->scene->emitters[light];
+    return e->ops->sample(e, &at->p, u, ls) ? light : -1;
 }
 
 /* there: uv, distance, cosine at the light. */
@@ -123,20 +159,16 @@ void imp__light_sample(struct imp_step *s, struct imp_vertex *v,
     /* A light and a point on it. */
     double u[2] = {imp__step_number(s, IMP_DIM_LIGHT_U),
                    imp__step_number(s, IMP_DIM_LIGHT_V)};
-    /* Of points in sets, the first number chooses the light too: those that a light gets
-     * then cover it evenly. */
-    const bool one = s->walk->point.points && !s->guided.here;
     double pmf;
-    const int light =
-        light_choose(s, one ? u[0] : imp__step_number(s, IMP_DIM_LIGHT), &pmf);
-    if (!(pmf > 0)) return;
-    if (one) u[0] = light_part(scene, light, u[0], pmf);
+    struct imp_light_sample ls;
+    const int light = imp_unlikely(s->light_tree != NULL && !s->guided.here)
+                          ? tree_sample(s, b, at, u, &pmf, &ls)
+                          : weights_sample(s, at, u, &pmf, &ls);
+    if (light < 0 || !(ls.pdf > 0)) return;
     const struct imp_emitter *e = scene->emitters[light];
     if (imp_unlikely(s->tracer->integrator->only_points) &&
         !(e->ops->flags & IMP_EMITTER_DELTA))
         return;
-    struct imp_light_sample ls;
-    if (!e->ops->sample(e, &at->p, u, &ls) || !(ls.pdf > 0)) return;
     if ((e->ops->flags & IMP_EMITTER_AREA) && !(ls.cos_light > 0)) return; /* its back */
 
     /* Its weight against the continuation that could have met it. */

@@ -152,6 +152,7 @@ bool imp__scatter(struct imp_step *s, struct imp_vertex *v, const struct imp_sur
         return true;
     }
     s->from = at->p;
+    if (imp_unlikely(s->light_tree != NULL)) s->left = imp__light_place(s, b, at);
     if (imp_likely(!s->mixed.splits)) competing = pdf;
     s->pdf = dirs.lobe == IMP_SMOOTH && s->segment->connects ? competing : 0;
     return true;

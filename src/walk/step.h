@@ -9,6 +9,7 @@
 
 #include "dims.h"
 #include "lane_mis.h"
+#include "scene/light_tree.h"
 #include "scene/priorities.h"
 #include "segment.h"
 #include "shaped.h"
@@ -91,6 +92,9 @@ struct imp_step {
     struct imp_guided guided;
     struct imp_mixed mixed;
     struct imp_both *both; /* of a sample from both ends, whose weights it has; NULL */
+    /* Where lights are chosen by a tree. */
+    const struct imp_light_tree *light_tree; /* NULL: by their weights */
+    struct imp_light_place left;             /* where the ray in flight left */
 };
 
 /* Depth of the vertex at work as max_depth counts it. */
@@ -265,6 +269,18 @@ static inline double imp__direction_pdf(const struct imp_step *s, double kernel,
     return imp_unlikely(s->mixed.here)
                ? imp__mixture_pdf(s, kernel, w, drawn, lobe, competing)
                : (*competing = kernel);
+}
+
+/* A vertex of material b as the tree of lights sees it. */
+static inline struct imp_light_place imp__light_place(const struct imp_step *s,
+                                                      const struct imp_bsdf *b,
+                                                      const struct imp_surface *at)
+{
+    const bool medium = at->n[0] == 0 && at->n[1] == 0 && at->n[2] == 0;
+    return (struct imp_light_place){
+        .p = at->p,
+        .n = s->wo[2] < 0 ? -at->n : at->n,
+        .faces = !medium && !(b->flags & (IMP_BSDF_TRANSMIT | IMP_BSDF_TURNED))};
 }
 
 /* A light by its sampling weight, and the probability of that. */

@@ -21,6 +21,7 @@ uint64_t imp__walk_integrator_hash(const struct imp_walk_integrator *i)
                           i->absorbs,   i->first_hit,  (int)i->alpha_gradient,
                           i->media};
     uint64_t h = imp__hash(0, number, sizeof number);
+    if (i->light_tree) h = imp__hash(h, &i->light_tree, sizeof i->light_tree);
     if (i->transmittance) h = imp__hash(h, &i->transmittance, sizeof i->transmittance);
     if (i->from_lights) h = imp__hash(h, &i->rr_depth, sizeof i->rr_depth);
     if (i->both) h = imp__hash(h, &i->both, sizeof i->both);
@@ -64,6 +65,30 @@ out:
     return st;
 }
 
+/* How light samples choose among the lights. */
+enum light_choice { BY_COUNT, BY_WEIGHTS, BY_TREE };
+#define LIGHTS_MANY 64 /* from so many on by the tree, if nobody says */
+
+static enum imp_status light_choice_read(const struct imp_build *build,
+                                         struct imp_walk_integrator *w)
+{
+    static const char *const words[] = {"automatic", "weights", "tree"};
+    int choice;
+    const enum imp_status st = imp__props_choice(build->ctx, build->node, "light_choice",
+                                                 words, 3, BY_COUNT, &choice);
+    w->light_choice = choice;
+    return st;
+}
+
+static void light_choice_ready(struct imp_scene *scene, struct imp_walk_integrator *w)
+{
+    w->light_tree =
+        w->lights && (w->light_choice == BY_TREE ||
+                      (w->light_choice == BY_COUNT && scene->n_emitters >= LIGHTS_MANY));
+    scene->lights_in_tree |= w->light_tree;
+    if (w->other_end) w->other_end->light_tree = w->light_tree;
+}
+
 /* Weights of the densities of directions, and how many vertices draw from each of them:
  * walks then become trees of up to IMP_DENSITIES^split branches. */
 #define SPLIT_MAX 6
@@ -102,6 +127,7 @@ static enum imp_status mixture_settle(struct imp_scene *scene,
             weight[IMP_DENSITY_ENVIRONMENT] = varied;
         }
     }
+    light_choice_ready(scene, w);
     const enum imp_status st = imp__mixing_settle(scene, w->mixing);
     w->mixes = scene->materials_mix || imp__mixing_mixes(w->mixing);
     if (st == IMP_OK && w->split > 0 &&
@@ -145,6 +171,7 @@ static enum imp_status path_read(const struct imp_build *build, int depth,
     *w = (struct imp_walk_integrator){.lights = true, .directions = true, .guided = true};
     IMP_TRY(imp__props_int(build->ctx, build->node, "rr_depth", 5, 1, INT32_MAX, &rr));
     IMP_TRY(depth_read(build, depth, i, w));
+    IMP_TRY(light_choice_read(build, w));
     IMP_TRY(mixture_read(build, w));
     w->rr_depth = (int)rr;
     IMP_TRY(other_end_make(build, w));
@@ -225,10 +252,18 @@ static enum imp_status direct_build(const struct imp_build *build,
     if (emitter + bsdf == 0)
         IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
                                 "emitter_samples and bsdf_samples are both 0"));
+    IMP_TRY(light_choice_read(build, w));
     w->lights = emitter > 0;
     w->directions = bsdf > 0;
 out:
     return st;
+}
+
+static enum imp_status direct_ready(struct imp_scene *scene,
+                                    const struct imp_integrator *i)
+{
+    light_choice_ready(scene, i->self);
+    return IMP_OK;
 }
 
 /* Mitsuba's integrators for derivatives of path and direct; prb_basic samples no lights. */
@@ -377,7 +412,8 @@ const struct imp_integrator_ops imp__integrator_direct = {
     .name = "direct",
     .object_size = sizeof(struct imp_walk_integrator),
     .flags = IMP_INTEGRATOR_WALKS | IMP_INTEGRATOR_INNER,
-    .build = direct_build};
+    .build = direct_build,
+    .ready = direct_ready};
 const struct imp_integrator_ops imp__integrator_stam = {
     .size = sizeof(struct imp_integrator_ops),
     .name = "stam",
@@ -431,4 +467,4 @@ VOLPATH(prbvolpath);
 DERIVATIVE(prb, mixture_ready);
 DERIVATIVE(prb_basic, mixture_ready);
 DERIVATIVE(prb_projective, mixture_ready);
-DERIVATIVE(direct_projective, NULL);
+DERIVATIVE(direct_projective, direct_ready);

@@ -18,6 +18,8 @@ struct imp_walk_integrator {
     int rr_depth;  /* Russian roulette from this vertex on, the first is 1 */
     bool hide_emitters;
     bool lights;      /* vertices are connected to lights */
+    int light_choice; /* as written */
+    bool light_tree;  /* lights are chosen by the scene's tree, not by their weights */
     bool only_points; /* of lights, those that no direction meets: the others are met */
     bool directions;  /* walks go on behind the first vertex; false: lights alone */
     bool guided;      /* a guide's densities are made for these walks */

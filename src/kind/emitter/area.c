@@ -38,21 +38,22 @@ static void eval_d(const struct imp_emitter *e, const imp_spec *in,
     dle[RADIANCE] = imp__spec(x->cos_light > 0);
 }
 
-const struct imp_emitter_ops imp__area = {.size = sizeof(struct imp_emitter_ops),
-                                          .name = "area",
-                                          .flags = IMP_EMITTER_AREA | IMP_EMITTER_UNIFORM,
-                                          .inputs = area_inputs,
-                                          .build = build,
-                                          .eval = eval,
-                                          .eval_d = eval_d,
-                                          .sample = imp__surface_light_sample,
-                                          .pdf = imp__surface_light_pdf,
-                                          .sample_emission = imp__surface_emission_sample,
-                                          .pdf_emission = imp__surface_emission_pdf};
+const struct imp_emitter_ops imp__area = {
+    .size = sizeof(struct imp_emitter_ops),
+    .name = "area",
+    .flags = IMP_EMITTER_AREA | IMP_EMITTER_UNIFORM | IMP_EMITTER_BY_SHAPE,
+    .inputs = area_inputs,
+    .build = build,
+    .eval = eval,
+    .eval_d = eval_d,
+    .sample = imp__surface_light_sample,
+    .pdf = imp__surface_light_pdf,
+    .sample_emission = imp__surface_emission_sample,
+    .pdf_emission = imp__surface_emission_pdf};
 const struct imp_emitter_ops imp__stam_m1 = {
     .size = sizeof(struct imp_emitter_ops),
     .name = "stam_m1",
-    .flags = IMP_EMITTER_AREA | IMP_EMITTER_UNIFORM,
+    .flags = IMP_EMITTER_AREA | IMP_EMITTER_UNIFORM | IMP_EMITTER_BY_SHAPE,
     .inputs = stam_inputs,
     .build = build,
     .eval = eval,

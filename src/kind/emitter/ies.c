@@ -372,17 +372,17 @@ const struct imp_emitter_ops imp__ies_light = {.size = sizeof(struct imp_emitter
                                                .pdf = imp__point_light_pdf,
                                                .sample_emission = emission_sample,
                                                .pdf_emission = imp__point_emission_pdf};
-const struct imp_emitter_ops imp__ies_area = {.size = sizeof(struct imp_emitter_ops),
-                                              .name = "ies",
-                                              .object_size = sizeof(struct imp__ies),
-                                              .flags = IMP_EMITTER_AREA,
-                                              .inputs = inputs,
-                                              .build = area_build,
-                                              .eval = area_eval,
-                                              .eval_d = area_eval_d,
-                                              .sample = area_sample,
-                                              .pdf = area_pdf,
-                                              .profile = &area_profile,
-                                              .sample_emission =
-                                                  imp__surface_emission_sample,
-                                              .pdf_emission = imp__surface_emission_pdf};
+const struct imp_emitter_ops imp__ies_area = {
+    .size = sizeof(struct imp_emitter_ops),
+    .name = "ies",
+    .object_size = sizeof(struct imp__ies),
+    .flags = IMP_EMITTER_AREA | IMP_EMITTER_BY_SHAPE,
+    .inputs = inputs,
+    .build = area_build,
+    .eval = area_eval,
+    .eval_d = area_eval_d,
+    .sample = area_sample,
+    .pdf = area_pdf,
+    .profile = &area_profile,
+    .sample_emission = imp__surface_emission_sample,
+    .pdf_emission = imp__surface_emission_pdf};

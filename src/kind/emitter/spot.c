@@ -133,6 +133,13 @@ static bool sample(const struct imp_emitter *e, const imp_v3 *ref, const double 
     return imp__point_light_sample(f->origin, *ref, out);
 }
 
+static void cone(const struct imp_emitter *e, imp_v3 *axis, double *cosine)
+{
+    const struct imp__light_frame *f = e->self;
+    *axis = f->axis[2];
+    *cosine = cos(fmin(e->input[CUTOFF]->value[0], 180) * DEGREE);
+}
+
 /* Uniformly in the cone of the cutoff, at whose border the light is 0. */
 static double cone_height(const struct imp_emitter *e)
 {
@@ -176,4 +183,5 @@ const struct imp_emitter_ops imp__spot_light = {.size = sizeof(struct imp_emitte
                                                 .place = place,
                                                 .place_d = place_d,
                                                 .sample_emission = sample_emission,
-                                                .pdf_emission = pdf_emission};
+                                                .pdf_emission = pdf_emission,
+                                                .cone = cone};

@@ -112,7 +112,7 @@ static double pdf_toward(const struct imp_shape *s, const imp_v3 *ref,
 
 const struct imp_shape_ops imp__disk = {.size = sizeof(struct imp_shape_ops),
                                         .name = "disk",
-                                        .flags = IMP_SHAPE_CONVEX,
+                                        .flags = IMP_SHAPE_CONVEX | IMP_SHAPE_FLAT,
                                         .object_size = sizeof(struct disk),
                                         .build = build,
                                         .intersect = intersect,

@@ -130,22 +130,41 @@ static inline struct imp_hit draw(const struct imp_shape *s, const struct imp__m
     return (struct imp_hit){.prim = (int)lo, .u = b[0], .v = b[1]};
 }
 
+/* The point of a hit as a light sample: density inv_area. */
+static inline bool sample_at(const struct imp_shape *s, const struct imp_hit *hit,
+                             const imp_v3 *ref, const double *inv_area,
+                             struct imp_light_sample *out)
+{
+    const struct imp__mesh *m = s->self;
+    const size_t lo = (size_t)hit->prim;
+    const struct imp__facet *f = m->facets ? &m->facets[lo] : NULL;
+    const struct imp__mesh_corner c =
+        f ? (struct imp__mesh_corner){f->p0, f->e1, f->e2} : imp__mesh_corner(m, lo);
+    struct imp_surface at;
+    imp__mesh_point(m, hit, &c, f ? f->ng : imp__mesh_face_normal(m, lo), &at);
+    if (imp_unlikely(s->by_triangle)) point_write(s, hit, at.uv);
+    out->uv[0] = at.uv[0];
+    out->uv[1] = at.uv[1];
+    const double one = inv_area ? *inv_area : 2 / imp__length(imp__cross(c.e1, c.e2));
+    return imp__light_from_area(*ref, at.p, at.ng, at.n, one, out);
+}
+
 bool imp__mesh_sample(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
                       struct imp_light_sample *out)
 {
     const struct imp__mesh *m = s->self;
     if (!(s->area > 0)) return false;
     const struct imp_hit hit = draw(s, m, u);
-    const size_t lo = (size_t)hit.prim;
-    const struct imp__facet *f = m->facets ? &m->facets[lo] : NULL;
-    const struct imp__mesh_corner c =
-        f ? (struct imp__mesh_corner){f->p0, f->e1, f->e2} : imp__mesh_corner(m, lo);
-    struct imp_surface at;
-    imp__mesh_point(m, &hit, &c, f ? f->ng : imp__mesh_face_normal(m, lo), &at);
-    if (imp_unlikely(s->by_triangle)) point_write(s, &hit, at.uv);
-    out->uv[0] = at.uv[0];
-    out->uv[1] = at.uv[1];
-    return imp__light_from_area(*ref, at.p, at.ng, at.n, m->inv_area, out);
+    return sample_at(s, &hit, ref, &m->inv_area, out);
+}
+
+bool imp__mesh_sample_triangle(const struct imp_shape *s, int prim, const imp_v3 *ref,
+                               const double u[2], struct imp_light_sample *out)
+{
+    double b[2];
+    imp__uniform_triangle(u, b);
+    const struct imp_hit hit = {.prim = prim, .u = b[0], .v = b[1]};
+    return sample_at(s, &hit, ref, NULL, out);
 }
 
 void imp__mesh_sample_area(const struct imp_shape *s, const double u[2],
@@ -203,7 +222,8 @@ const struct imp_shape_ops imp__mesh = {.size = sizeof(struct imp_shape_ops),
                                         .pdf_toward = imp__mesh_pdf,
                                         .sample_area = imp__mesh_sample_area,
                                         .flags = IMP_SHAPE_TRIANGLES,
-                                        .place = imp__mesh_place};
+                                        .place = imp__mesh_place,
+                                        .sample_triangle = imp__mesh_sample_triangle};
 const struct imp_shape_ops imp__obj = {.size = sizeof(struct imp_shape_ops),
                                        .name = "obj",
                                        .object_size = sizeof(struct imp__mesh),
@@ -213,7 +233,8 @@ const struct imp_shape_ops imp__obj = {.size = sizeof(struct imp_shape_ops),
                                        .pdf_toward = imp__mesh_pdf,
                                        .sample_area = imp__mesh_sample_area,
                                        .flags = IMP_SHAPE_TRIANGLES,
-                                       .place = imp__mesh_place};
+                                       .place = imp__mesh_place,
+                                       .sample_triangle = imp__mesh_sample_triangle};
 const struct imp_shape_ops imp__ply = {.size = sizeof(struct imp_shape_ops),
                                        .name = "ply",
                                        .object_size = sizeof(struct imp__mesh),
@@ -223,7 +244,8 @@ const struct imp_shape_ops imp__ply = {.size = sizeof(struct imp_shape_ops),
                                        .pdf_toward = imp__mesh_pdf,
                                        .sample_area = imp__mesh_sample_area,
                                        .flags = IMP_SHAPE_TRIANGLES,
-                                       .place = imp__mesh_place};
+                                       .place = imp__mesh_place,
+                                       .sample_triangle = imp__mesh_sample_triangle};
 const struct imp_shape_ops imp__serialized = {.size = sizeof(struct imp_shape_ops),
                                               .name = "serialized",
                                               .object_size = sizeof(struct imp__mesh),
@@ -233,4 +255,6 @@ const struct imp_shape_ops imp__serialized = {.size = sizeof(struct imp_shape_op
                                               .pdf_toward = imp__mesh_pdf,
                                               .sample_area = imp__mesh_sample_area,
                                               .flags = IMP_SHAPE_TRIANGLES,
-                                              .place = imp__mesh_place};
+                                              .place = imp__mesh_place,
+                                              .sample_triangle =
+                                                  imp__mesh_sample_triangle};

@@ -110,7 +110,8 @@ static double pdf_toward(const struct imp_shape *s, const imp_v3 *ref,
 
 const struct imp_shape_ops imp__rectangle = {.size = sizeof(struct imp_shape_ops),
                                              .name = "rectangle",
-                                             .flags = IMP_SHAPE_CONVEX | IMP_SHAPE_SQUARE,
+                                             .flags = IMP_SHAPE_CONVEX |
+                                                      IMP_SHAPE_SQUARE | IMP_SHAPE_FLAT,
                                              .object_size = sizeof(struct rectangle),
                                              .build = build,
                                              .surface = surface,

@@ -123,6 +123,9 @@ void imp__mesh_sample_area(const struct imp_shape *s, const double u[2],
                            struct imp_surface *out);
 bool imp__mesh_sample(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
                       struct imp_light_sample *out);
+/* As imp_shape_ops.sample_triangle. */
+bool imp__mesh_sample_triangle(const struct imp_shape *s, int prim, const imp_v3 *ref,
+                               const double u[2], struct imp_light_sample *out);
 double imp__mesh_pdf(const struct imp_shape *s, const imp_v3 *ref,
                      const struct imp_hit *hit, const struct imp_surface *at);
 
