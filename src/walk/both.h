@@ -40,7 +40,7 @@ struct imp_end {
 };
 
 /* A vertex of the walk from the light that vertices of the other can be connected to. */
-struct imp_light_place {
+struct imp_both_place {
     struct imp_vertex *vertex; /* NULL: it cannot */
     int number;
     const imp_spec *in; /* inputs of its BSDF */
@@ -71,7 +71,7 @@ struct imp_both {
 
     /* While they are decided: */
     struct imp_end *light, *from_eye; /* [n_light], [n_eye] */
-    struct imp_light_place *place;    /* [n_light] */
+    struct imp_both_place *place;     /* [n_light] */
     int n_light, cap_light, n_eye, cap_eye;
     double lens[2];
     double pdf_light, pdf_eye; /* of the rays in flight, per steradian; 0: delta lobes */

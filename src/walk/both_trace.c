@@ -10,7 +10,7 @@
 /* ---- Joints ------------------------------------------------------------------------ */
 
 static struct imp_joint *joint_add(struct imp_step *s, struct imp_vertex *y,
-                                   const struct imp_light_place *z)
+                                   const struct imp_both_place *z)
 {
     struct imp_both *b = s->both;
     struct imp_joint *j = imp__arena_take(s->arena, 1, sizeof *j);
@@ -63,7 +63,7 @@ static void join(struct imp_step *s, struct imp_vertex *v, int k,
                  const struct imp_surface *at, const struct imp_frame *frame)
 {
     const struct imp_both *b = s->both;
-    const struct imp_light_place *z = &b->place[k];
+    const struct imp_both_place *z = &b->place[k];
     const struct imp_end *end = &b->light[k];
     const struct imp_bsdf *by = v->bsdf, *bz = z->vertex->bsdf;
     const imp_v3 d = end->p - at->p;

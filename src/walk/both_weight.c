@@ -143,7 +143,7 @@ bool imp__both_light_arrives(struct imp_light_step *w, struct imp_vertex *v,
     if (!end) return false;
     const int k = b->n_light - 1;
     const struct imp_end *before = end - 1;
-    struct imp_light_place *place = &b->place[k];
+    struct imp_both_place *place = &b->place[k];
     end->p = at->p;
     end->ng = at->ng;
     if (k == 1 && before->far) end->own = arrives_across(s->scene, end, s->d);
@@ -383,7 +383,7 @@ double imp__both_joint_weight(const struct imp_step *s, int k,
                               const struct imp_dirs *at_z)
 {
     const struct imp_both *b = s->both;
-    const struct imp_light_place *place = &b->place[k];
+    const struct imp_both_place *place = &b->place[k];
     const struct imp_end *y = &b->from_eye[b->n_eye - 1], *z = &b->light[k];
     struct way w = {.both = b, .eye = b->from_eye, .t = b->n_eye};
     other_light(

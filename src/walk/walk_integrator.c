@@ -82,9 +82,10 @@ static enum imp_status light_choice_read(const struct imp_build *build,
 
 static void light_choice_ready(struct imp_scene *scene, struct imp_walk_integrator *w)
 {
-    w->light_tree =
-        w->lights && (w->light_choice == BY_TREE ||
-                      (w->light_choice == BY_COUNT && scene->n_emitters >= LIGHTS_MANY));
+    w->light_tree = /* walks from both ends are weighed by the lights' weights */
+        w->lights && !w->both &&
+        (w->light_choice == BY_TREE ||
+         (w->light_choice == BY_COUNT && scene->n_emitters >= LIGHTS_MANY));
     scene->lights_in_tree |= w->light_tree;
     if (w->other_end) w->other_end->light_tree = w->light_tree;
 }
