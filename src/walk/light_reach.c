@@ -34,7 +34,7 @@ static double film_per_area(const struct imp_sensor *s)
 /* ---- The sensor is met ------------------------------------------------------------ */
 
 /* Weight of meeting the sensor's surface against a connection to it, both per area of the
- * surface. `d`: of the ray; t: its length. */
+ * surface; t: from where a connection could have been made. */
 static double met_weight(const struct imp_light_step *w, double cosine, double t)
 {
     const struct imp_step *s = &w->s;
@@ -52,9 +52,9 @@ void imp__light_meet_sensor(struct imp_light_step *w, struct imp_vertex *v,
     const struct imp_sensor *sensor = s->tracer->sensor;
     const double cosine = -imp__dot(at->ng, s->d);
     if (!(cosine > 0) || !imp__light_depth_allows(s, s->depth)) return;
-    if (s->tracer->integrator->hide_emitters && s->depth == 1) return;
-    const double mis =
-        w->both ? imp__both_sensor_weight(w, cosine) : met_weight(w, cosine, v->t);
+    if (s->tracer->integrator->hide_emitters && s->depth - s->straight == 1) return;
+    const double mis = w->both ? imp__both_sensor_weight(w, cosine)
+                               : met_weight(w, cosine, w->passed + v->t);
     const double weight = imp__decide1(film_per_area(sensor) * mis);
     const bool square = sensor->shape->ops->flags & IMP_SHAPE_SQUARE;
     const struct imp_key key = s->walk->key;

@@ -5,7 +5,8 @@
  * light reaches the sensor (light_reach.c).
  *
  * Depth: a connection from vertex k, 0 on the light, makes a path of k + 1 segments, and a
- * sensor that is met there one of k; they count up to max_depth. */
+ * sensor that is met there one of k; they count up to max_depth. Vertices where light goes
+ * straight on, which connections through media pass, are left out (imp_step.straight). */
 #ifndef IMP_WALK_LIGHT_STEP_H
 #define IMP_WALK_LIGHT_STEP_H
 
@@ -18,13 +19,15 @@ struct imp_light_step {
     struct imp_reach **end; /* of the list */
     /* The ray in flight: its density per area across it, where the sky sent it; else 0. */
     double pdf_across;
+    double passed; /* length of the way to where it begins, from where a connection could
+                      have been made: light went straight on in between */
     struct imp_both *both; /* of a sample from both ends; NULL: none */
 };
 
 static inline bool imp__light_depth_allows(const struct imp_step *s, int segments)
 {
     const int max = s->tracer->integrator->max_depth;
-    return max < 0 || segments <= max;
+    return max < 0 || segments - s->straight <= max;
 }
 
 /* ---- light_walk.c ---- */

@@ -34,7 +34,8 @@ static double direction_pdf(struct imp_step *s, const struct imp_bsdf *b,
 
 /* Whether the walk goes on, and where. */
 static bool scatter(struct imp_light_step *w, struct imp_vertex *v,
-                    const struct imp_surface *at, const struct imp_frame *frame)
+                    const struct imp_surface *at, const struct imp_frame *frame,
+                    bool bounces)
 {
     struct imp_step *s = &w->s;
     const struct imp_walk_integrator *integrator = s->tracer->integrator;
@@ -48,6 +49,10 @@ static bool scatter(struct imp_light_step *w, struct imp_vertex *v,
     struct imp_dirs dirs = {
         .wi = s->wo_drawn, .lobe = IMP_SMOOTH, .derivative = imp__wants_derivative(s, b)};
     if (!direction_draw(s, b, u, &dirs)) return false;
+    const bool straight = imp_unlikely(b->straight) && s->segment->through &&
+                          dirs.lobe >= 0 && dirs.lobe < 64 &&
+                          b->straight >> dirs.lobe & 1;
+    if (!straight && !bounces) return false;
     const imp_v3 d = imp__to_world(frame, dirs.wo);
     dirs.wi = s->wo;
     dirs.wo = imp__decide(dirs.wo);
@@ -82,10 +87,16 @@ static bool scatter(struct imp_light_step *w, struct imp_vertex *v,
     /* The ray in flight. */
     s->d = d;
     s->o = v->shape ? imp__offset(at->p, at->ng, d) : at->p;
-    s->from = at->p;
     s->t_min = 0;
     s->t_max = INFINITY;
     if (s->segment->leave) s->segment->leave(s, v, at);
+    if (imp_unlikely(straight)) { /* connections pass here: it goes on from before */
+        s->straight++;
+        w->passed += v->t;
+        return true;
+    }
+    s->from = at->p;
+    w->passed = 0;
     s->pdf = dirs.lobe == IMP_SMOOTH ? density : 0;
     w->pdf_across = 0;
     if (w->both) imp__both_light_leaves(w, b, &dirs);
@@ -123,9 +134,11 @@ static bool step(struct imp_light_step *w)
     if (s->walk->dropped || !s->tracer->integrator->directions) return false;
 
     /* The continuation. */
-    if (!imp__light_depth_allows(s, s->depth + (s->tracer->sensor->shape ? 1 : 2)))
+    const bool bounces =
+        imp__light_depth_allows(s, s->depth + (s->tracer->sensor->shape ? 1 : 2));
+    if (!bounces && !(imp_unlikely(v->bsdf->straight) && s->segment->through))
         return false;
-    if (!scatter(w, v, &at, &frame)) return false;
+    if (!scatter(w, v, &at, &frame, bounces)) return false;
     s->depth++;
     return !s->walk->dropped;
 }

@@ -85,6 +85,24 @@ static void ends(const char *what, int max_depth, const char *body,
                                                "name='reflectance' value='0'/></bsdf>" b \
                                                "</shape>"
 
+/* Thin glass between the discs, in a scene with a medium, where connections pass it: light
+ * that meets the sensor behind the glass has been connected to it, too. */
+static void behind_glass(void)
+{
+    /* clang-format off */
+    const char *const glass =
+        "<shape type='rectangle'>" AT("<scale value='3'/><translate z='.5'/>")
+        "<bsdf type='thindielectric'/></shape><shape type='sphere'><point name='center' "
+        "value='0,0,-9'/><bsdf type='null'/><medium name='interior' type='homogeneous'/>"
+        "</shape>";
+    /* clang-format on */
+    char body[8192];
+    snprintf(body, sizeof body, DISCS("0", METER, "1", LAMP("1")) "%s", glass);
+    ends("discs with thin glass between them", 6, body, IMP_MONO, 100000, 100000, NAN,
+         1e-2);
+    ends("and without another reflection", 1, body, IMP_MONO, 100000, 100000, NAN, 1e-2);
+}
+
 static void discs(void)
 {
     const double R = 1.1568931, pi = acos(-1);
@@ -576,6 +594,7 @@ int main(int argc, char **argv)
     const bool slow = argc > 1 && strcmp(argv[1], "long") == 0;
     ctx = test_context(2);
     discs();
+    behind_glass();
     block();
     kernels();
     shading_normals();
