@@ -116,6 +116,53 @@ static void pass(struct imp_step *s, const struct imp_free_flight *w)
     from->on = w->track;
 }
 
+/* What a ray in medium m has met. */
+struct surface_ahead {
+    const struct imp_shape *shape;
+    struct imp_surface at; /* unless plain */
+    bool plain;            /* it has nothing to do with media */
+    bool passes;           /* as if it were not there */
+    bool left;             /* the ray has left it already */
+    bool wrong;            /* the ray is not in the medium that should be before it */
+};
+static void look(const struct imp_step *s, imp_v3 d, bool hide, const struct imp_hit *hit,
+                 const struct imp_nest *nest, const struct imp_medium *m, int passed,
+                 struct surface_ahead *a)
+{
+    const struct imp_scene *scene = s->scene;
+    const struct imp_shape *shape = a->shape = scene->shapes[hit->shape];
+    a->passes = is_passed(scene, shape) || (hide && shape->emitter >= 0);
+    a->left = a->wrong = false;
+    a->plain = !a->passes && !shape->interior && !shape->exterior && shape->priority == 0;
+    if (a->plain) return;
+    imp__hit_surface(scene, hit, &s->o, &d, &a->at);
+    const bool wrong = !consistent(s, shape, a->at.ng, d, nest, m);
+    a->left = wrong && hit->t <= 2 * s->flight.behind && !passed;
+    a->wrong = wrong && !a->left && !is_copy(shape, a->at.ng, d);
+}
+
+/* Where a ray grazes an edge of a mesh, Embree may meet its two sides in the wrong order, or
+ * one of them alone: they lie within its rounding. A ray that starts close before them has
+ * digits enough to tell. What it meets is looked at in place of *hit; if that is nothing,
+ * the ray passes beside the edge. */
+static void look_closely(const struct imp_step *s, imp_v3 d, bool hide,
+                         struct imp_hit *hit, const struct imp_nest *nest,
+                         const struct imp_medium *m, int passed, struct surface_ahead *a)
+{
+    const imp_v3 p = s->o + d * hit->t;
+    const double back = fmin(behind(p) + hit->t * IMP_RAY_EPSILON, hit->t);
+    const imp_v3 from = s->o + d * (hit->t - back);
+    struct imp_hit first;
+    if (!imp__intersect_at(s->scene, s->walk->time, &from, &d, 0, 2 * back, &first)) {
+        a->left = a->passes = true;
+        a->wrong = false;
+        return;
+    }
+    first.t += hit->t - back;
+    *hit = first;
+    look(s, d, hide, hit, nest, m, passed, a);
+}
+
 static enum imp_meeting meet(struct imp_step *s, struct imp_hit *hit)
 {
     const struct imp_scene *scene = s->scene;
@@ -142,21 +189,22 @@ static enum imp_meeting meet(struct imp_step *s, struct imp_hit *hit)
         if (!found) break;
 
         /* A surface: does the ray end there, and what is behind it? */
-        const struct imp_shape *shape = scene->shapes[hit->shape];
-        bool passes = is_passed(scene, shape) || (hide && shape->emitter >= 0);
-        if (!passes && !shape->interior && !shape->exterior && shape->priority == 0) {
+        struct surface_ahead a;
+        struct imp_nest *nest = &s->flight.nest_here;
+        look(s, d, hide, hit, nest, m, passed, &a);
+        if (imp_unlikely(a.wrong)) look_closely(s, d, hide, hit, nest, m, passed, &a);
+        if (a.plain) {
             met = IMP_MEETS_SURFACE;
             break;
         }
-        struct imp_surface at;
-        imp__hit_surface(scene, hit, &s->o, &d, &at);
-        struct imp_nest *nest = &s->flight.nest_here;
-        const bool wrong = !consistent(s, shape, at.ng, d, nest, m);
-        const bool left = wrong && hit->t <= 2 * s->flight.behind && !passed;
-        if (wrong && !left && !is_copy(shape, at.ng, d)) {
+        if (a.wrong) {
             s->walk->dropped = IMP_DROP_MEDIUM;
             return IMP_MEETS_DROP;
         }
+        const struct imp_shape *shape = a.shape;
+        const struct imp_surface at = a.at;
+        const bool left = a.left;
+        bool passes = a.passes;
         if (imp_unlikely(shape->priority > 0) && !left)
             passes |= hidden(s, shape, at.ng, d, nest);
         if (!passes && !left) {
