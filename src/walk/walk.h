@@ -23,68 +23,12 @@
 #ifndef IMP_WALK_H
 #define IMP_WALK_H
 
-#include "math/course.h"
+#include "decision.h"
+#include "emitted.h"
 #include "math/points.h"
 #include "scene/guide.h"
 #include "shaped.h"
 #include "walk_integrator.h"
-
-/* ---- Decisions ------------------------------------------------------------------- */
-
-/* Decisions are rounded to what a kept record stores before they are first evaluated:
- * evaluating a kept record gives the walk's value and gradient to the bit. Rays go on
- * from places and directions in double. */
-typedef float imp_decided;
-
-enum imp_scatterer {
-    IMP_AT_SURFACE,  /* a BSDF */
-    IMP_AT_BOUNDARY, /* a surface that light passes as if nothing were there */
-    IMP_AT_SKY,      /* the environment, met where the walk leaves the scene */
-    IMP_IN_MEDIUM,   /* a phase function, between surfaces */
-    IMP_AT_SENSOR,   /* where a walk begins, if its first segment crosses media */
-    IMP_AT_LIGHT     /* where a walk from a light begins (light_walk.h) */
-};
-
-enum imp_connection { IMP_NOT_CONNECTED, IMP_OCCLUDED, IMP_CONNECTED };
-
-/* Emission that the ray met: of an area light at the vertex, or of the environment. */
-struct imp_met {
-    int32_t emitter;    /* -1: none */
-    imp_decided weight; /* MIS weight, or 1/absorb */
-    imp_decided dist, cos_light, d[3];
-};
-
-/* The light sample of a vertex, the walk's connection to a light. */
-struct imp_light {
-    int32_t emitter;
-    imp_decided weight; /* MIS weight over the sample's density */
-    imp_decided uv[2], dist, cos_light, d[3], p[3];
-    imp_decided wi[3]; /* towards it, shading frame of the vertex */
-};
-
-struct imp_decision {
-    int32_t shape;       /* index; in a medium, the medium's; -1: none */
-    uint8_t scatterer;   /* enum imp_scatterer */
-    int8_t lobe;         /* of the continuation: IMP_SMOOTH or a delta lobe */
-    uint8_t connection;  /* enum imp_connection: what became of the light sample */
-    bool glows : 1;      /* the BSDF's own emission counts */
-    bool goes_on : 1;    /* the walk continues */
-    bool stands : 1;     /* in a medium: this collision stands for derivatives with
-                                 respect to the extinction (tracking.h) */
-    uint8_t drawn : 3;   /* enum imp_density that drew the continuation */
-    bool from_light : 1; /* of a walk from a light: the light sample is a connection to
-                                 the sensor, what is met the sensor, wi is given */
-    imp_decided uv[2], p[3];  /* the place; at the sky p is the direction */
-    imp_decided wo[3], wi[3]; /* of the continuation, shading frame */
-    imp_decided pdf, survive; /* p, s of the continuation */
-    imp_decided kernel;       /* density of wi by the BSDF alone; of lanes that differ, by
-                                 the one that drew */
-    imp_decided passes;       /* T of the segment that follows, where no parameter that
-                                 is differentiated changes it */
-    imp_decided glow_weight;  /* of the BSDF's own emission: 1, or 1/absorb */
-    struct imp_met met;
-    struct imp_light light;
-};
 
 /* ---- Record ---------------------------------------------------------------------- */
 
@@ -347,38 +291,6 @@ void imp__decided_values(const struct imp_tracer *tracer, const struct imp_decis
                          const struct imp_bsdf *bsdf, const struct imp_carried *carried,
                          struct imp_values *out);
 
-/* The weight of light from an emitter that varies in time: a decision, since no parameter
- * moves its course. */
-static inline double imp__emitter_timed(const struct imp_emitter *e, double time,
-                                        double weight)
-{
-    if (imp_likely(e->course == NULL)) return weight;
-    const imp_decided timed = (imp_decided)(weight * imp__course_at(e->course, time));
-    return timed;
-}
-
-/* Where the emitter's inputs are looked up. */
-static inline void imp__emitter_place(const struct imp_emitter *e,
-                                      const struct imp_emission *x,
-                                      struct imp_texcoord *at)
-{
-    if (imp_unlikely(e->ops->place != NULL)) e->ops->place(e, x, at->uv);
-}
-/* Radiance of an emitter at x, point p of it, at the scene's present parameters. */
-static inline imp_spec imp__emitter_radiance(const struct imp_scene *scene, int emitter,
-                                             const struct imp_emission *x, imp_v3 p,
-                                             const struct imp_carried *carried)
-{
-    const struct imp_emitter *e = scene->emitters[emitter];
-    struct imp_texcoord at = {
-        .uv = {x->uv[0], x->uv[1]}, .p = p, .carried = carried, .shape = e->shape};
-    imp_spec in[IMP_INPUTS_MAX], le;
-    imp__emitter_place(e, x, &at);
-    imp__inputs_eval(e->input, e->n_in, &at, in);
-    imp__light_eval(e, carried, in, x, &le);
-    return le;
-}
-
 /* ---- Fold, sweep, tangent (sweep.c) ---------------------------------------------- */
 
 /* L = E + B + w L, from the last vertex to the first; sets `beyond` of every vertex. */
@@ -451,10 +363,6 @@ imp_spec imp__walk_tangent_values(const struct imp_tracer *tracer,
 
 /* ---- Decisions as the readers of a record want them ------------------------------- */
 
-static inline imp_v3 imp__decided_v3(const imp_decided v[3])
-{
-    return imp__widen((imp_float4){v[0], v[1], v[2], 0});
-}
 static inline struct imp_texcoord imp__vertex_at(const struct imp_vertex *v)
 {
     if (imp_unlikely(v->segment->exact != NULL)) return v->segment->exact->at;
@@ -479,11 +387,6 @@ static inline struct imp_emission imp__vertex_met(const struct imp_vertex *v)
     const struct imp_texcoord at = imp__vertex_at(v);
     return (struct imp_emission){
         {at.uv[0], at.uv[1]}, m->dist, m->cos_light, imp__decided_v3(m->d)};
-}
-static inline struct imp_emission imp__light_emission(const struct imp_light *l)
-{
-    return (struct imp_emission){
-        {l->uv[0], l->uv[1]}, l->dist, l->cos_light, imp__decided_v3(l->d)};
 }
 static inline struct imp_texcoord imp__light_at(const struct imp_scene *scene,
                                                 const struct imp_vertex *v)
