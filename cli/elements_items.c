@@ -2,13 +2,14 @@
 #include "elements_items.h"
 
 #include "cmd_picture.h"
+#include "elements_mesh.h"
 #include "output.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
-enum { SHOWN = 3000, LINKS = 12, MAPS = 8, MAP_SIDE = 32 };
+enum { LINKS = 12, MAPS = 8, MAP_SIDE = 32 };
 
 static const char *const files[] = {"elements.json", "mesh.json", "picture.exr",
                                     "importance.exr"};
@@ -34,127 +35,6 @@ static void put_shorts(struct json *j, const char *key, int n, const double *v)
     json_end_array(j);
 }
 
-/* ---- Which elements ----------------------------------------------------------------- */
-
-/* Ids of elements on the page: those that are drawn first, then others that links come
- * from. Where there are too many leaves, an element with at most `most` of them stands
- * for them: it is fine where the solution is. */
-struct mesh {
-    const imp_elements *e;
-    size_t n; /* elements of the solution */
-    struct imp_elements_element *all;
-    int channels;
-    size_t *leaves; /* [n] below each, or 1 */
-    size_t most;
-    double least_area; /* of what is drawn, where there are too many polygons */
-    size_t n_leaves, shown, others;
-    size_t *index;     /* [shown + others] of an element */
-    size_t *id;        /* [n] NONE: not yet given */
-    const char **name; /* [n_names] shapes */
-    size_t n_names;
-};
-#define NONE SIZE_MAX
-
-static int whole_parent(const struct mesh *m, size_t k)
-{
-    const size_t parent = m->all[k].parent;
-    return parent == IMP_ELEMENTS_NO_PARENT || m->leaves[parent] > m->most;
-}
-static int is_shown(const struct mesh *m, size_t k)
-{
-    return m->all[k].area > 0 && m->leaves[k] <= m->most && whole_parent(m, k);
-}
-static size_t count_shown(struct mesh *m, size_t most)
-{
-    size_t n = 0;
-    m->most = most;
-    for (size_t k = 0; k < m->n; k++) n += (size_t)is_shown(m, k);
-    return n;
-}
-
-static int mesh_read(struct mesh *m, const imp_elements *e, size_t n)
-{
-    m->e = e;
-    m->n = n;
-    m->all = cli_alloc(n, sizeof *m->all);
-    m->leaves = cli_alloc(n, sizeof *m->leaves);
-    m->index = cli_alloc(n, sizeof *m->index);
-    m->id = cli_alloc(n, sizeof *m->id);
-    m->name = cli_alloc(n, sizeof *m->name);
-    for (size_t k = 0; k < n; k++) {
-        m->all[k] = (struct imp_elements_element)IMP_ELEMENTS_ELEMENT_INIT;
-        const enum imp_status st = imp_elements_get_element(e, k, &m->all[k]);
-        if (st != IMP_OK) return cli_fail(st, cli.scene_path);
-        m->n_leaves += (size_t)m->all[k].leaf;
-    }
-    for (size_t k = n; k-- > 0;) { /* children come after their parents */
-        if (m->all[k].leaf) m->leaves[k] = 1;
-        if (m->all[k].parent != IMP_ELEMENTS_NO_PARENT)
-            m->leaves[m->all[k].parent] += m->leaves[k];
-    }
-    return 0;
-}
-
-/* A name's place in the list; the same pointer is the same shape. */
-static size_t name_of(struct mesh *m, const char *name)
-{
-    for (size_t k = m->n_names; k-- > 0;)
-        if (m->name[k] == name) return k;
-    m->name[m->n_names] = name;
-    return m->n_names++;
-}
-
-static int descending(const void *p, const void *q)
-{
-    const double a = *(const double *)p, b = *(const double *)q;
-    return (a < b) - (a > b);
-}
-
-static void mesh_choose(struct mesh *m)
-{
-    size_t lo = 1, hi = m->n_leaves;
-    while (lo < hi) { /* the fewest leaves an element that are not too many elements */
-        const size_t mid = lo + (hi - lo) / 2;
-        if (count_shown(m, mid) <= SHOWN) hi = mid;
-        else lo = mid + 1;
-    }
-    const size_t n = count_shown(m, lo);
-    if (n > SHOWN) {
-        double *area = cli_alloc(n, sizeof *area);
-        size_t used = 0;
-        for (size_t k = 0; k < m->n; k++)
-            if (is_shown(m, k)) area[used++] = m->all[k].area;
-        qsort(area, n, sizeof *area, descending);
-        m->least_area = area[SHOWN - 1];
-        free(area);
-    }
-    for (size_t k = 0; k < m->n; k++) m->id[k] = NONE;
-    for (size_t k = 0; k < m->n && m->shown < SHOWN; k++)
-        if (is_shown(m, k) && m->all[k].area >= m->least_area) {
-            m->id[k] = m->shown;
-            m->index[m->shown++] = k;
-        }
-}
-
-/* Of what is drawn in an element's place, or of another place. */
-static size_t id_of(struct mesh *m, size_t k)
-{
-    if (m->id[k] != NONE) return m->id[k];
-    if (!whole_parent(m, k)) return m->id[k] = id_of(m, m->all[k].parent);
-    m->id[k] = m->shown + m->others;
-    m->index[m->shown + m->others++] = k;
-    return m->id[k];
-}
-
-static void mesh_free(struct mesh *m)
-{
-    free(m->all);
-    free(m->leaves);
-    free(m->index);
-    free(m->id);
-    free(m->name);
-}
-
 /* ---- Links ------------------------------------------------------------------------- */
 
 struct sums { /* by id of the sender */
@@ -173,7 +53,8 @@ static int brightest(const void *p, const void *q, void *payload)
 
 /* [[from, illuminance, measure], ...], brightest first, how many there are, and what all
  * others bring. */
-static int put_links(struct json *j, struct mesh *m, size_t index, struct sums *s)
+static int put_links(struct json *j, struct elements_mesh *m, size_t index,
+                     struct sums *s)
 {
     struct imp_elements_arrival *a;
     size_t n;
@@ -181,7 +62,7 @@ static int put_links(struct json *j, struct mesh *m, size_t index, struct sums *
     if (st != IMP_OK) return cli_fail(st, cli.scene_path);
     s->n = 0;
     for (size_t k = 0; k < n; k++) {
-        const size_t from = id_of(m, a[k].from);
+        const size_t from = elements_mesh_id(m, a[k].from);
         if (!(a[k].illuminance > 0)) continue;
         if (s->illuminance[from] == 0) s->met[s->n++] = from;
         s->illuminance[from] += a[k].illuminance;
@@ -208,7 +89,7 @@ static int put_links(struct json *j, struct mesh *m, size_t index, struct sums *
     return 0;
 }
 
-static int put_elements(struct json *j, struct mesh *m)
+static int put_elements(struct json *j, struct elements_mesh *m)
 {
     struct sums s = {cli_alloc(m->n, sizeof *s.illuminance),
                      cli_alloc(m->n, sizeof *s.measure), cli_alloc(m->n, sizeof *s.met),
@@ -218,7 +99,7 @@ static int put_elements(struct json *j, struct mesh *m)
     for (size_t k = 0; k < m->shown && !rc; k++) {
         const struct imp_elements_element *x = &m->all[m->index[k]];
         json_object(j, NULL);
-        json_integer(j, "shape", (int64_t)name_of(m, x->shape));
+        json_integer(j, "shape", (int64_t)elements_mesh_name(m, x->shape));
         json_integer(j, "polygon", (int64_t)x->polygon);
         json_integer(j, "level", x->level);
         json_integer(j, "leaves", (int64_t)m->leaves[m->index[k]]);
@@ -234,7 +115,7 @@ static int put_elements(struct json *j, struct mesh *m)
     for (size_t k = m->shown; k < m->shown + m->others; k++) {
         const struct imp_elements_element *x = &m->all[m->index[k]];
         json_array(j, NULL);
-        json_integer(j, NULL, (int64_t)name_of(m, x->shape));
+        json_integer(j, NULL, (int64_t)elements_mesh_name(m, x->shape));
         for (int c = 0; c < 3; c++) {
             double sum = 0;
             for (int i = 0; i < x->corners; i++) sum += x->corner[i][c];
@@ -259,7 +140,7 @@ static double length_of(const double a[3], const double b[3])
     return sqrt(pow(b[0] - a[0], 2) + pow(b[1] - a[1], 2) + pow(b[2] - a[2], 2));
 }
 
-static int put_map(struct json *j, const struct mesh *m, size_t index,
+static int put_map(struct json *j, const struct elements_mesh *m, size_t index,
                    const struct elements_answer *a)
 {
     const struct imp_elements_element *x = &m->all[index];
@@ -290,7 +171,8 @@ static int put_map(struct json *j, const struct mesh *m, size_t index,
 }
 
 /* Of the largest polygons that are measured. */
-static int put_maps(struct json *j, const struct mesh *m, const struct elements_answer *a)
+static int put_maps(struct json *j, const struct elements_mesh *m,
+                    const struct elements_answer *a)
 {
     char *done = cli_alloc(m->n, 1);
     size_t n = 0;
@@ -299,12 +181,12 @@ static int put_maps(struct json *j, const struct mesh *m, const struct elements_
     json_integer(j, "n_maps", (int64_t)n);
     json_array(j, "maps");
     for (int i = 0; i < MAPS && !rc; i++) {
-        size_t best = NONE;
+        size_t best = ELEMENTS_NONE;
         for (size_t k = 0; k < m->n; k++)
             if (m->all[k].level == 0 && m->all[k].source >= 0 && m->all[k].area > 0 &&
-                !done[k] && (best == NONE || m->all[k].area > m->all[best].area))
+                !done[k] && (best == ELEMENTS_NONE || m->all[k].area > m->all[best].area))
                 best = k;
-        if (best == NONE) break;
+        if (best == ELEMENTS_NONE) break;
         done[best] = 1;
         rc = put_map(j, m, best, a);
     }
@@ -366,14 +248,14 @@ static int put_mesh(struct json *j, const imp_elements *e,
 {
     struct imp_scene_info scene = {.size = sizeof scene};
     struct imp_sensor_info sensor = {.size = sizeof sensor};
-    struct mesh m = {0};
+    struct elements_mesh m = {0};
     enum imp_status st = imp_scene_get_info(cli.scene, &scene);
     if (st == IMP_OK) st = imp_scene_get_sensor(cli.scene, cli.sensor, &sensor);
     if (st != IMP_OK) return cli_fail(st, cli.scene_path);
     m.channels = scene.channels;
-    int rc = mesh_read(&m, e, a->info->elements);
+    int rc = elements_mesh_read(&m, e, a->info->elements);
     if (!rc) {
-        mesh_choose(&m);
+        elements_mesh_choose(&m);
         json_array(j, "bounds");
         json_numbers(j, NULL, 3, scene.bounds_min);
         json_numbers(j, NULL, 3, scene.bounds_max);
@@ -386,7 +268,7 @@ static int put_mesh(struct json *j, const imp_elements *e,
     }
     if (!rc) rc = put_maps(j, &m, a);
     if (!rc) put_ranks(j, a);
-    mesh_free(&m);
+    elements_mesh_free(&m);
     return rc;
 }
 
