@@ -112,13 +112,19 @@ static void curves_drop(struct imp_node *film)
     film->n_children = n;
 }
 
-/* The property `bins` of the films of sensors beside shapes, whatever the file says of their channels. */
-static enum imp_status bins_set(struct imp_scene *scene, const char *text)
+/* The property `bins` of the films of the sensors in `parent` and in its shapes, whatever the
+ * file says of their channels. */
+static enum imp_status bins_set(struct imp_scene *scene, const struct imp_node *parent,
+                                const char *text)
 {
     static const struct imp_loc nowhere = {NULL, 0, 0};
     struct imp_arena *arena = &scene->arena;
-    for (size_t i = 0; scene->root && i < scene->root->n_children; i++) {
-        struct imp_node *sensor = scene->root->children[i].node, *film = NULL;
+    for (size_t i = 0; parent && i < parent->n_children; i++) {
+        struct imp_node *sensor = parent->children[i].node, *film = NULL;
+        if (sensor && parent == scene->root && strcmp(sensor->tag, "shape") == 0) {
+            const enum imp_status st = bins_set(scene, sensor, text);
+            if (st != IMP_OK) return st;
+        }
         if (!sensor || strcmp(sensor->tag, "sensor") != 0) continue;
         for (size_t k = 0; k < sensor->n_children; k++) {
             struct imp_node *child = sensor->children[k].node;
@@ -152,7 +158,7 @@ static enum imp_status load(imp_context *ctx, const struct imp_bytes *text,
     IMP_TRY(imp__search_init(scene, o->search, o->n_search, folder));
     IMP_TRY(imp__xml_read(scene, text, name, o));
     if (o->weights) IMP_TRY(weights_set(scene, o->weights));
-    if (o->bins) IMP_TRY(bins_set(scene, o->bins));
+    if (o->bins) IMP_TRY(bins_set(scene, scene->root, o->bins));
     IMP_TRY(imp__scene_finish(scene));
     *out = scene;
     return IMP_OK;

@@ -83,3 +83,6 @@ for bins in 400,700 400,700,0 400,700,65 700,400,3 0,700,3 400,inf,3 400,700,3x 
     importon render -m spectral lamp.xml -q --bins "$bins" -o x.exr
 done
 importon render lamp.xml -q --bins 400,700,6 -o x.exr
+# Films of sensors in shapes, too.
+sed -e '/<sensor/,/<\/sensor/d' -e 's/<emitter type="area" id/<bsdf type="diffuse"\/><sensor type="irradiancemeter"><film type="hdrfilm"><integer name="width" value="1"\/><integer name="height" value="1"\/><\/film><\/sensor>&/' lamp.xml >meter.xml
+importon render -m spectral meter.xml -q --no-manifest --no-preview --spp 4 --bins 400,700,3 -o m.exr && importon info m.exr | grep -o 'S0[^ ]*'
