@@ -100,6 +100,14 @@ int picture_writable(const char *path, int preview)
     return rc;
 }
 
+void picture_remove(const char *path)
+{
+    char *beside = preview_path(path);
+    unlink(path);
+    if (beside) unlink(beside);
+    free(beside);
+}
+
 /* A new temporary .exr file: EXR readers and writers want files they can seek in. */
 static int temporary(char *path, size_t size)
 {

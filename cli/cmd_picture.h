@@ -48,6 +48,8 @@ void picture_target_free(struct imp_target *target);
 /* May picture_write write `path` and, if asked, the preview beside it? Asked before hours
  * of work. 0, or an exit code with the reason printed. */
 int picture_writable(const char *path, int preview);
+/* It and its preview, if they are there. */
+void picture_remove(const char *path);
 
 /* Make the folder `path` and what is missing above it. */
 int make_folder(const char *path);

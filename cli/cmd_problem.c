@@ -340,6 +340,13 @@ int block_writable(const struct block *b, const char *folder, int errors)
     return rc;
 }
 
+void block_remove(const struct block *b, const char *folder)
+{
+    char *path = block_path(b, folder, "");
+    picture_remove(path);
+    free(path);
+}
+
 /* A .vol file; standard errors have one of their own. */
 static int volume_write(const struct block *b, const double *x, const double *se,
                         const char *folder, char **path)

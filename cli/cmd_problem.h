@@ -35,6 +35,8 @@ void block_json(struct json *j, const struct block *b);
 void block_ties_json(struct json *j, const struct block *b);
 /* May block_write write there? `errors`: with standard errors. */
 int block_writable(const struct block *b, const char *folder, int errors);
+/* What block_write wrote there in a former run, if anything; it was found writable. */
+void block_remove(const struct block *b, const char *folder);
 /* A texture's numbers as a picture in `folder`, named by the parameter: `x` in plain
  * colours, or, with `se` of the same length, signed. [h][w] or [h][w][1 or 3]; what has
  * another shape is a row. Of a volume, a .vol file. *path is to be freed. 0, or an exit code with the reason

@@ -299,7 +299,7 @@ static void print_table(const struct fit_answer *a, char **paths)
 }
 
 /* Half the width of the 95 % intervals of a field as a picture of its own, where there are
- * any: NAME.interval.exr. Volumes have none. */
+ * any: NAME.interval.exr; where there are none, that of an earlier fit goes. Volumes have none. */
 static int write_intervals(const struct fit_answer *a, const struct block *b)
 {
     double *half = cli_alloc(imp_problem_n(a->problem), sizeof *half);
@@ -313,9 +313,10 @@ static int write_intervals(const struct fit_answer *a, const struct block *b)
     }
     snprintf(name, sizeof name, "%s.interval", b->info.name);
     of.info.name = name;
-    if (known && !(b->info.flags & IMP_PARAM_VOLUME)) {
+    if (!(b->info.flags & IMP_PARAM_VOLUME)) {
         rc = block_writable(&of, cli.out, 0);
-        if (!rc) rc = block_write(&of, half, NULL, cli.out, &path);
+        if (!rc && known) rc = block_write(&of, half, NULL, cli.out, &path);
+        if (!rc && !known) block_remove(&of, cli.out);
     }
     free(path);
     free(half);
