@@ -126,10 +126,14 @@ class Fit(Values):
                 v.start, v.value, v.se, *v.interval, v.at_bound, v.determined)]
             about = {"unit": info.unit, "min": info.lo, "max": info.hi} if info else {"unit": "1"}
             if flat[0].size > 12:
-                rows.append({"name": name, "count": flat[0].size, "file": "the layer " + name, **about})
+                half = (np.asarray(v.interval[1], float) - np.asarray(v.interval[0], float)) / 2
+                rows.append({"name": name, "count": flat[0].size, "file": "the layer " + name,
+                             "n_intervals": int(np.count_nonzero(np.isfinite(half))), **about})
                 field = np.asarray(v.value, float)
                 if field.ndim in (2, 3) and field.shape[-1] in (1, 3) or field.ndim == 2:
                     items.append({"picture": field, "name": name, "view": len(self._targets)})
+                    if np.isfinite(half).any():
+                        items.append({"picture": half, "name": name + ".interval", "view": len(self._targets)})
                 continue
             label = info.name if info else name
             for k, (start, value, se, lo, hi, at_bound, determined) in enumerate(zip(*flat)):

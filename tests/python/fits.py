@@ -87,7 +87,15 @@ def test_report():
     g = im.fit(scene, shot, name, spp=2, max_iterations=2, intervals=False)
     g.report("field.html", spp=2)
     data = json.loads(re.search(r'id="data">(.*?)</script>', open("field.html", encoding="utf-8").read(), re.S)[1])
-    assert [i["data"]["params"][0]["count"] for i in data["items"] if i["kind"] == "fit"] == [np.size(g[name].value)]
+    row, = [i["data"]["params"][0] for i in data["items"] if i["kind"] == "fit"]
+    assert row["count"] == np.size(g[name].value) and row["n_intervals"] == 0
+    g = im.fit(scene, shot, name, optimizer="lm", spp=8, max_iterations=1)
+    g.report("field.html", spp=2)
+    data = json.loads(re.search(r'id="data">(.*?)</script>', open("field.html", encoding="utf-8").read(), re.S)[1])
+    row, = [i["data"]["params"][0] for i in data["items"] if i["kind"] == "fit"]
+    known = int(np.count_nonzero(np.isfinite(g[name].interval[1] - g[name].interval[0])))
+    assert row["n_intervals"] == known > 0, (row, known)
+    assert name + ".interval" in [i["name"] for i in data["items"]]
     raises(im.FileError, lambda: f.report("/nowhere/fit.html", spp=1))
 
 
