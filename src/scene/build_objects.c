@@ -20,6 +20,18 @@ static struct imp_node *medium_child(struct imp_node *node)
     return NULL;
 }
 
+/* May a light or a sensor be built here? `shape`: whose surface it is given, or NULL. */
+static enum imp_status attachment_check(imp_context *ctx, const struct imp_node *node,
+                                        bool area, const struct imp_shape *shape)
+{
+    if (!area && shape)
+        return imp__node_error(ctx, node, IMP_E_SCENE, "cannot be attached to a shape");
+    if (node->object)
+        return imp__node_error(ctx, node, IMP_E_SCENE,
+                               "is attached to a second shape; each needs its own");
+    return IMP_OK;
+}
+
 void imp__emitter_changed(void *payload)
 {
     const struct imp_emitter *e = payload;
@@ -46,11 +58,7 @@ enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *nod
     const bool area = ops->flags & IMP_EMITTER_AREA;
     if (area && !shape)
         return IMP_OK; /* declared only; used where a shape refers to it */
-    if (!area && shape)
-        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "cannot be attached to a shape"));
-    if (node->object)
-        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
-                                "is attached to a second shape; each needs its own"));
+    IMP_TRY(attachment_check(ctx, node, area, shape));
 
     struct imp_emitter *e = imp__arena_array(&scene->arena, 1, sizeof *e);
     void *self = imp__arena_array(&scene->arena, 1, ops->object_size);
@@ -252,11 +260,7 @@ enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node
     const bool area = ops->flags & IMP_SENSOR_AREA;
     if (area && !shape)
         return IMP_OK; /* declared only; used where a shape refers to it */
-    if (!area && shape)
-        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "cannot be attached to a shape"));
-    if (node->object)
-        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
-                                "is attached to a second shape; each needs its own"));
+    IMP_TRY(attachment_check(ctx, node, area, shape));
     struct imp_sensor *s = imp__arena_array(&scene->arena, 1, sizeof *s);
     void *self = imp__arena_array(&scene->arena, 1, ops->object_size);
     if (!s || !self) IMP_TRY(imp__build_no_memory(scene));

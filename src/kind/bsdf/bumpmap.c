@@ -41,19 +41,6 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_b
     return imp__turning_build(b, self, normal, bsdf);
 }
 
-const struct imp_bsdf_ops imp__bumpmap = {.size = sizeof(struct imp_bsdf_ops),
-                                          .name = "bumpmap",
-                                          .object_size = sizeof(struct imp__turning),
-                                          .inputs = inputs,
-                                          .min_children = 1,
-                                          .max_children = 1,
-                                          .prepare = prepare,
-                                          .build = build,
-                                          .sample = imp__turned_sample,
-                                          .eval = imp__turned_eval,
-                                          .pdf = imp__turned_pdf,
-                                          .index_ratio = imp__turned_index_ratio,
-                                          .eval_d = imp__turned_eval_d,
-                                          .emit = imp__turned_emit,
-                                          .emit_d = imp__turned_emit_d,
-                                          .albedo = imp__turned_albedo};
+const struct imp_bsdf_ops imp__bumpmap = {IMP__TURNED_OPS, .name = "bumpmap",
+                                          .inputs = inputs, .prepare = prepare,
+                                          .build = build};

@@ -46,4 +46,12 @@ void imp__turned_emit_d(const struct imp_bsdf *b, const imp_spec *in, const imp_
 void imp__turned_albedo(const struct imp_bsdf *b, const imp_spec *in, const imp_v3 *wo,
                         imp_spec *albedo);
 
+/* What the tables of such kinds have in common. */
+#define IMP__TURNED_OPS                                                                  \
+    .size = sizeof(struct imp_bsdf_ops), .object_size = sizeof(struct imp__turning),     \
+    .min_children = 1, .max_children = 1, .sample = imp__turned_sample,                  \
+    .eval = imp__turned_eval, .pdf = imp__turned_pdf,                                    \
+    .index_ratio = imp__turned_index_ratio, .eval_d = imp__turned_eval_d,                \
+    .emit = imp__turned_emit, .emit_d = imp__turned_emit_d, .albedo = imp__turned_albedo
+
 #endif

@@ -38,27 +38,15 @@ static void eval_d(const struct imp_emitter *e, const imp_spec *in,
     dle[RADIANCE] = imp__spec(x->cos_light > 0);
 }
 
-const struct imp_emitter_ops imp__area = {
-    .size = sizeof(struct imp_emitter_ops),
-    .name = "area",
-    .flags = IMP_EMITTER_AREA | IMP_EMITTER_UNIFORM | IMP_EMITTER_BY_SHAPE,
-    .inputs = area_inputs,
-    .build = build,
-    .eval = eval,
-    .eval_d = eval_d,
-    .sample = imp__surface_light_sample,
-    .pdf = imp__surface_light_pdf,
-    .sample_emission = imp__surface_emission_sample,
-    .pdf_emission = imp__surface_emission_pdf};
-const struct imp_emitter_ops imp__stam_m1 = {
-    .size = sizeof(struct imp_emitter_ops),
-    .name = "stam_m1",
-    .flags = IMP_EMITTER_AREA | IMP_EMITTER_UNIFORM | IMP_EMITTER_BY_SHAPE,
-    .inputs = stam_inputs,
-    .build = build,
-    .eval = eval,
-    .eval_d = eval_d,
-    .sample = imp__surface_light_sample,
-    .pdf = imp__surface_light_pdf,
-    .sample_emission = imp__surface_emission_sample,
-    .pdf_emission = imp__surface_emission_pdf};
+#define AREA_OPS(name_, inputs_)                                                         \
+    {                                                                                    \
+        .size = sizeof(struct imp_emitter_ops), .name = name_,                           \
+        .flags = IMP_EMITTER_AREA | IMP_EMITTER_UNIFORM | IMP_EMITTER_BY_SHAPE,          \
+        .inputs = inputs_, .build = build, .eval = eval, .eval_d = eval_d,               \
+        .sample = imp__surface_light_sample, .pdf = imp__surface_light_pdf,              \
+        .sample_emission = imp__surface_emission_sample,                                 \
+        .pdf_emission = imp__surface_emission_pdf                                        \
+    }
+
+const struct imp_emitter_ops imp__area = AREA_OPS("area", area_inputs);
+const struct imp_emitter_ops imp__stam_m1 = AREA_OPS("stam_m1", stam_inputs);

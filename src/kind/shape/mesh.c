@@ -213,48 +213,17 @@ static enum imp_status serialized_build(const struct imp_build *b, void *self,
     return st == IMP_OK ? file_build(b, self, s) : st;
 }
 
-const struct imp_shape_ops imp__mesh = {.size = sizeof(struct imp_shape_ops),
-                                        .name = "mesh",
-                                        .object_size = sizeof(struct imp__mesh),
-                                        .build = mesh_build,
-                                        .surface = imp__mesh_surface,
-                                        .sample_toward = imp__mesh_sample,
-                                        .pdf_toward = imp__mesh_pdf,
-                                        .sample_area = imp__mesh_sample_area,
-                                        .flags = IMP_SHAPE_TRIANGLES,
-                                        .place = imp__mesh_place,
-                                        .sample_triangle = imp__mesh_sample_triangle};
-const struct imp_shape_ops imp__obj = {.size = sizeof(struct imp_shape_ops),
-                                       .name = "obj",
-                                       .object_size = sizeof(struct imp__mesh),
-                                       .build = file_build,
-                                       .surface = imp__mesh_surface,
-                                       .sample_toward = imp__mesh_sample,
-                                       .pdf_toward = imp__mesh_pdf,
-                                       .sample_area = imp__mesh_sample_area,
-                                       .flags = IMP_SHAPE_TRIANGLES,
-                                       .place = imp__mesh_place,
-                                       .sample_triangle = imp__mesh_sample_triangle};
-const struct imp_shape_ops imp__ply = {.size = sizeof(struct imp_shape_ops),
-                                       .name = "ply",
-                                       .object_size = sizeof(struct imp__mesh),
-                                       .build = file_build,
-                                       .surface = imp__mesh_surface,
-                                       .sample_toward = imp__mesh_sample,
-                                       .pdf_toward = imp__mesh_pdf,
-                                       .sample_area = imp__mesh_sample_area,
-                                       .flags = IMP_SHAPE_TRIANGLES,
-                                       .place = imp__mesh_place,
-                                       .sample_triangle = imp__mesh_sample_triangle};
-const struct imp_shape_ops imp__serialized = {.size = sizeof(struct imp_shape_ops),
-                                              .name = "serialized",
-                                              .object_size = sizeof(struct imp__mesh),
-                                              .build = serialized_build,
-                                              .surface = imp__mesh_surface,
-                                              .sample_toward = imp__mesh_sample,
-                                              .pdf_toward = imp__mesh_pdf,
-                                              .sample_area = imp__mesh_sample_area,
-                                              .flags = IMP_SHAPE_TRIANGLES,
-                                              .place = imp__mesh_place,
-                                              .sample_triangle =
-                                                  imp__mesh_sample_triangle};
+#define MESH_OPS(name_, build_)                                                          \
+    {                                                                                    \
+        .size = sizeof(struct imp_shape_ops), .name = name_,                             \
+        .object_size = sizeof(struct imp__mesh), .build = build_,                        \
+        .surface = imp__mesh_surface, .sample_toward = imp__mesh_sample,                 \
+        .pdf_toward = imp__mesh_pdf, .sample_area = imp__mesh_sample_area,               \
+        .flags = IMP_SHAPE_TRIANGLES, .place = imp__mesh_place,                          \
+        .sample_triangle = imp__mesh_sample_triangle                                     \
+    }
+
+const struct imp_shape_ops imp__mesh = MESH_OPS("mesh", mesh_build);
+const struct imp_shape_ops imp__obj = MESH_OPS("obj", file_build);
+const struct imp_shape_ops imp__ply = MESH_OPS("ply", file_build);
+const struct imp_shape_ops imp__serialized = MESH_OPS("serialized", serialized_build);
