@@ -63,5 +63,22 @@ static inline imp_context *fail_alloc_context(struct fail_alloc *heap)
     printf("Bail out! no context\n");
     exit(99);
 }
+/* `call` with every allocation failing in turn, until it succeeds: how many failed, or -1 if one
+ * of them was told as something else than IMP_E_NOMEM. */
+static inline int fail_alloc_in_turn(struct fail_alloc *heap,
+                                     enum imp_status (*call)(imp_context *ctx),
+                                     imp_context *ctx)
+{
+    enum imp_status st;
+    int n = 0, other = 0;
+    do {
+        heap->calls = 0;
+        heap->fail_at = ++n;
+        st = call(ctx);
+        heap->fail_at = 0;
+        other += st != IMP_OK && st != IMP_E_NOMEM;
+    } while (st != IMP_OK && n < 1000);
+    return st == IMP_OK && other == 0 ? n - 1 : -1;
+}
 
 #endif

@@ -57,4 +57,17 @@ static inline double media_integral(double (*f)(double x, const void *with),
     return sum * (b - a) / (6 * n);
 }
 
+/* A scene in one colour is refused, for a reason that says `why`. */
+static inline void media_refused(imp_context *ctx, const char *text, const char *why)
+{
+    struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
+    imp_scene *s;
+    o.mode = IMP_MONO;
+    const enum imp_status st =
+        imp_scene_load_string(ctx, text, strlen(text), "test", &o, &s);
+    tap_ok(st != IMP_OK && strstr(imp_last_error(ctx), why), "refused: %s # %s", why,
+           imp_last_error(ctx));
+    if (st == IMP_OK) imp_scene_destroy(s);
+}
+
 #endif

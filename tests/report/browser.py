@@ -15,17 +15,10 @@ import tempfile
 import zlib
 
 from chromium import PROGRAM, Browser
+from tap import done, ok
 
 importon, scenes = sys.argv[1:]
 VERSION = 2  # of the data
-count = failed = 0
-
-
-def ok(good, what):
-    global count, failed
-    count += 1
-    failed += not good
-    print("%sok %d - %s" % ("" if good else "not ", count, what), flush=True)
 
 
 def run(*words):
@@ -162,5 +155,4 @@ for what, items in cases.items():
     if what == "wrong types": ok("cannot be shown" in answer[1], "and says what it cannot show")
 browser.close()
 shutil.rmtree(folder, ignore_errors=True)
-print("1..%d" % count)
-sys.exit(failed > 0)
+done()

@@ -5,7 +5,6 @@ of the command's own files.
 
 Usage: contents.py IMPORTON SCENES
 """
-import html
 import json
 import os
 import re
@@ -14,16 +13,10 @@ import subprocess
 import sys
 import tempfile
 
+from chromium import PROGRAM, Browser
+from tap import done, ok
+
 importon, scenes = sys.argv[1:]
-browser = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
-count = failed = 0
-
-
-def ok(good, what):
-    global count, failed
-    count += 1
-    failed += not good
-    print("%sok %d - %s" % ("" if good else "not ", count, what), flush=True)
 
 
 def run(*words):
@@ -37,25 +30,18 @@ def data(page, kind):
 
 def look(page, script):
     """What `script`, the body of a function, returns in the page."""
-    text = open(page, encoding="utf-8").read()
-    end = text.rindex("</body>")
-    probe = "<script>(function wait() { if (document.documentElement.dataset.ready !== '1') { setTimeout(wait, 20); return; }" \
-            " let found; try { found = (() => { %s })(); } catch (error) { found = {error: String(error.stack)}; }" \
-            " const out = document.createElement('pre'); out.id = 'found'; out.textContent = JSON.stringify(found); document.body.append(out); })()</script>" % script
-    copy = os.path.join(os.path.dirname(page), "probe.html")
-    open(copy, "w", encoding="utf-8").write(text[:end] + probe + text[end:])
-    done = subprocess.run([browser, "--headless", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=20000",
-        "--user-data-dir=" + os.path.join(folder, "profile"), "--dump-dom", "file://" + copy], capture_output=True, text=True, timeout=300)
-    found = re.search(r'<pre id="found">(.*?)</pre>', done.stdout, re.S)
-    if not found: raise RuntimeError("the page left nothing: " + done.stderr[-500:])
-    answer = json.loads(html.unescape(found[1]))
-    if isinstance(answer, dict) and "error" in answer: raise RuntimeError(answer["error"])
+    tab = browser.tab("file://" + page)
+    tab.wait("document.documentElement.dataset.ready")
+    answer = tab.run(script)
+    ok(not tab.errors, "no script failed # %s" % tab.errors)
+    tab.close()
     return answer
 
 
-if not browser:
+if not PROGRAM:
     print("1..0 # SKIP no chromium")
     sys.exit(0)
+browser = Browser()
 folder = tempfile.mkdtemp()
 cornell, room = os.path.join(scenes, "cornell.xml"), os.path.join(scenes, "elements", "d.xml")
 near = lambda shown, value, digits: abs(float(shown) - value) <= 10. ** (1 - digits) * abs(value)
@@ -114,6 +100,6 @@ told = {p: s for p, s in zip(params, walks["pixels"][0]["shares"]) if s[0]}
 ok(answer["ways"][2:] == ["x dL/dx of " + p for p in params] and answer["colours"] >= 4, "walks are coloured by what each parameter does")
 ok({r[0] for r in answer["shares"]} == set(told) and all(near(r[1].split()[0], 100 * told[r[0]][0], 4) for r in answer["shares"]),
    "which lamp and which reflectance carried the pixel")
+browser.close()
 shutil.rmtree(folder, ignore_errors=True)
-print("1..%d" % count)
-sys.exit(failed > 0)
+done()

@@ -16,17 +16,10 @@ import sys
 import tempfile
 
 from chromium import PROGRAM, Browser
+from tap import done, ok
 
 importon, scenes, baselines = sys.argv[1:]
 shots = os.environ.get("REPORT_SHOTS")
-count = failed = 0
-
-
-def ok(good, what):
-    global count, failed
-    count += 1
-    failed += not good
-    print("%sok %d - %s" % ("" if good else "not ", count, what), flush=True)
 
 
 def opened(page, **options):
@@ -317,5 +310,4 @@ ok(wall <= 1000 * max(1, base / 100), "something is seen within a second # %.0f 
 
 browser.close()
 shutil.rmtree(folder, ignore_errors=True)
-print("1..%d" % count)
-sys.exit(failed > 0)
+done()

@@ -21,16 +21,9 @@ import threading
 import time
 
 from chromium import PROGRAM, Browser
+from tap import done, ok
 
 importon, scenes = sys.argv[1:]
-count = failed = 0
-
-
-def ok(good, what):
-    global count, failed
-    count += 1
-    failed += not good
-    print("%sok %d - %s" % ("" if good else "not ", count, what), flush=True)
 
 
 if not PROGRAM:
@@ -167,5 +160,4 @@ finally:
         if process.poll() is None: process.kill()
     browser.close()
 shutil.rmtree(folder, ignore_errors=True)
-print("1..%d" % count)
-sys.exit(failed > 0)
+done()

@@ -21,16 +21,10 @@ import time
 import urllib.parse
 import zlib
 
+from tap import done, ok
+
 importon, scenes = sys.argv[1:]
-count = failed = 0
 PATIENCE = 120
-
-
-def ok(good, what):
-    global count, failed
-    count += 1
-    failed += not good
-    print("%sok %d - %s" % ("" if good else "not ", count, what), flush=True)
 
 
 class View:
@@ -310,5 +304,4 @@ finally:
     if view.process.poll() is None: view.process.kill()
 
 shutil.rmtree(folder, ignore_errors=True)
-print("1..%d" % count)
-sys.exit(failed > 0)
+done()

@@ -4,7 +4,7 @@
  * against the spread over seeds, in every eigenvector of J^T W J: where the pictures tell
  * little, most of the noise is of second order, of two replicates at once. Run with "long"
  * for whole fits: how often their intervals hold the truth. */
-#include "imp_scene.h"
+#include "imp_cornell.h"
 #include "imp_tap.h"
 #include "inverse/problem.h"
 #include "math/linalg.h"
@@ -14,31 +14,11 @@ enum { N = 9, SIDE = 12, SPP = 16, SEEDS = 300, FITS = 100 };
 static const char *const active[] = {"white.reflectance.value", "red.reflectance.value",
                                      "green.reflectance.value"};
 
-/* The Cornell box through another filter. */
 static imp_scene *box(imp_context *ctx, const char *filter)
 {
-    static char text[65536], changed[66000];
-    const char element[] = "<rfilter type=\"box\"/>";
-    const char *defines[] = {"res=12"}, *folders[] = {IMP_SCENES};
-    struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
-    char path[1024];
-    imp_scene *scene;
-    snprintf(path, sizeof path, "%s/cornell.xml", IMP_SCENES);
-    FILE *f = fopen(path, "rb");
-    const size_t n = f ? fread(text, 1, sizeof text - 1, f) : 0;
-    if (f) fclose(f);
-    text[n] = 0;
-    const char *at = strstr(text, element);
-    if (!at) exit(99);
-    snprintf(changed, sizeof changed, "%.*s<rfilter type='%s'/>%s", (int)(at - text),
-             text, filter, at + sizeof element - 1);
-    o.defines = defines;
-    o.n_defines = 1;
-    o.search = folders;
-    o.n_search = 1;
-    test_must(ctx,
-              imp_scene_load_string(ctx, changed, strlen(changed), path, &o, &scene));
-    return scene;
+    char element[40];
+    snprintf(element, sizeof element, "<rfilter type='%s'/>", filter);
+    return test_cornell_through(ctx, element, SIDE);
 }
 
 static double along(const double *v, const double *matrix)

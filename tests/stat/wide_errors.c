@@ -3,7 +3,7 @@
  * Standard errors of losses and their gradients through filters wider than a pixel, whose
  * pixels share walks, against the spread over seeds: at the optimum, where adjoints are
  * noise that neighbours share, and away from it. Run with "long" for all filters. */
-#include "imp_scene.h"
+#include "imp_cornell.h"
 #include "imp_tap.h"
 #include <stdbool.h>
 
@@ -20,35 +20,6 @@ static double median(double *x, size_t n)
 {
     qsort(x, n, sizeof *x, by_value);
     return x[n / 2];
-}
-
-/* The Cornell box through another filter. */
-static imp_scene *scene_of(const char *filter, int side)
-{
-    static char text[65536];
-    char path[1024], *at;
-    const char box[] = "<rfilter type=\"box\"/>";
-    struct imp_load_options o = IMP_LOAD_OPTIONS_INIT;
-    char size[32], new_text[sizeof text + 256];
-    const char *defines[] = {size}, *folders[] = {IMP_SCENES};
-    imp_scene *scene;
-    snprintf(path, sizeof path, "%s/cornell.xml", IMP_SCENES);
-    FILE *f = fopen(path, "rb");
-    const size_t n = f ? fread(text, 1, sizeof text - 1, f) : 0;
-    if (f) fclose(f);
-    text[n] = 0;
-    at = strstr(text, box);
-    if (!at) exit(99);
-    snprintf(new_text, sizeof new_text, "%.*s%s%s", (int)(at - text), text, filter,
-             at + sizeof box - 1);
-    snprintf(size, sizeof size, "res=%d", side);
-    o.defines = defines;
-    o.n_defines = 1;
-    o.search = folders;
-    o.n_search = 1;
-    test_must(ctx,
-              imp_scene_load_string(ctx, new_text, strlen(new_text), path, &o, &scene));
-    return scene;
 }
 
 /* ---- A few numbers ----------------------------------------------------------------- */
@@ -81,7 +52,7 @@ static void errors(const struct setting *s)
     static struct tap_stat value[MOST + 1];
     double x[MOST], g[MOST], se[MOST], told[MOST + 1] = {0}, ratio[MOST];
     char name[200];
-    imp_scene *scene = scene_of(s->filter, s->side);
+    imp_scene *scene = test_cornell_through(ctx, s->filter, s->side);
     struct imp_run run = IMP_RUN_INIT;
     struct imp_target target = IMP_TARGET_INIT;
     imp_film *film;
