@@ -2,12 +2,13 @@
  *
  * Two builds of the program beside each other, say of today and of a month ago: processor
  * seconds (user and system) and peak memory of pictures, losses with gradients and checks,
- * one thread each. Memory is told in all (maximum resident set), and without the pages of
- * program and libraries, which are a part of files that all processes share. A round runs
- * every job once with either build, in turn. Of seconds, the minimum of all rounds counts; of
- * memory the median, since the kernel's counters of pages are exact to some ten pages a core, and
- * memory without files is looked at every millisecond, so that a round may miss its peak. Prints
- * a table for docs/speed.md. bench/link_order.py tells what should be linked side by side.
+ * one thread each. Memory is told in all, and without the pages of program and libraries,
+ * which are a part of files that all processes share. Both are looked at every millisecond or
+ * two, in the page tables (/proc/PID/smaps_rollup): the kernel's own maximum is made of counters
+ * that each core keeps for itself, and is wrong by some hundred kB. A round runs every job once
+ * with either build, in turn. Of seconds, the minimum of all rounds counts; of memory the
+ * median, since a round may miss its peak. Prints a table for docs/speed.md.
+ * bench/link_order.py tells which files should be linked side by side.
  *
  *     versions [--rounds N] [--job TEXT] [--scenes FOLDER] OLD NEW
  *
@@ -56,17 +57,22 @@ static const char *const targets[][WORDS_MAX] = {
 
 static const char *scenes = IMP_SCENES; /* where "@..." of a command line is */
 
-/* Resident pages that belong to no file, MiB; looked at every millisecond. */
-static double own_memory(pid_t pid)
+/* Resident memory in all and that of no file, MiB: the larger of what is there and what was
+ * seen. */
+static void look(pid_t pid, double *all, double *own)
 {
-    char name[64];
-    long size = 0, resident = 0, shared = 0;
-    snprintf(name, sizeof name, "/proc/%ld/statm", (long)pid);
+    char name[64], line[256];
+    long kib;
+    snprintf(name, sizeof name, "/proc/%ld/smaps_rollup", (long)pid);
     FILE *f = fopen(name, "r");
-    if (!f) return 0;
-    if (fscanf(f, "%ld %ld %ld", &size, &resident, &shared) != 3) resident = shared;
+    if (!f) return;
+    while (fgets(line, sizeof line, f)) {
+        if (sscanf(line, "Rss: %ld", &kib) == 1 && (double)kib / 1024 > *all)
+            *all = (double)kib / 1024;
+        if (sscanf(line, "Anonymous: %ld", &kib) == 1 && (double)kib / 1024 > *own)
+            *own = (double)kib / 1024;
+    }
     fclose(f);
-    return (double)(resident - shared) * (double)sysconf(_SC_PAGESIZE) / 0x1p20;
 }
 
 /* Run it once; its processor seconds and peak memory. This program is small: what a child
@@ -90,10 +96,9 @@ static void run(const char *program, const char *const *words, double *seconds,
         execv(program, argv);
         _exit(127);
     }
-    double most = 0;
+    *mib = *own = 0;
     while (wait4(pid, &status, WNOHANG, &usage) == 0) {
-        const double now = own_memory(pid);
-        if (now > most) most = now;
+        look(pid, mib, own);
         usleep(1000);
     }
     /* 1: a check that a difference stays too noisy for. */
@@ -104,8 +109,6 @@ static void run(const char *program, const char *const *words, double *seconds,
     const double s = (double)(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
                      1e-6 * (double)(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
     if (s < *seconds) *seconds = s;
-    *mib = (double)usage.ru_maxrss / 1024;
-    *own = most;
 }
 
 static int compare(const void *a, const void *b)
