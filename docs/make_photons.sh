@@ -3,7 +3,7 @@
 #
 # Everything in docs/adjoint-photons.md that was computed, computed again: its pictures, and the
 # parts between "<!-- NAME -->" and "<!-- /NAME -->". Two to four minutes. With the name of a figure
-# (3, 4, 5 or 11) that one alone.
+# (1, 2, 3, 4, 5 or 11) that one alone.
 #
 #     docs/make_photons.sh [BUILD FOLDER, default build] [FIGURE]
 set -euo pipefail
@@ -30,6 +30,18 @@ picture() { # NAME OPTIONS...
     "$importon" render "${@:2}" --seed 1 -q --overwrite --no-manifest -o "$images/photons_$1.png"
 }
 
+if wanted 1; then
+    say "Figure 1: instances, smoke, sky and sun"
+    picture cottage scenes/photons/cottage.xml -D width=240 -D height=135 --spp 256
+fi
+if wanted 2; then
+    say "Figure 2: a ball of glass between two plates, from both ends"
+    picture lens_sensor scenes/photons/lens.xml -D picture=pattern -D res=96 --spp 1000 --from sensor --exposure 2
+    picture lens_lights scenes/photons/lens.xml -D picture=pattern -D res=96 --spp 3000 --from lights --exposure 2
+    for emits in left right; do
+        "$importon" read scenes/photons/lens.xml -m spectral -D emits=$emits --spp 400000 --ends --json >"$out/lens_$emits.json"
+    done
+fi
 if wanted 3; then
     say "Figure 3: weights of material and environment"
     for w in 1,0 .75,.25 .5,.5 .25,.75; do
@@ -105,6 +117,13 @@ if has("sky_1,0.json"):
         first = first or n
         rows.append("| %s | %.3f | %.3f |" % (w.replace(",", ", "), n / mean, (n / first) ** 2))
     put("weights", "\n".join(rows) + "\n")
+if has("lens_left.json"):
+    rows = ["| emits | from the sensor | from the lamp | z |", "|---|---|---|---|"]
+    for emits, what in (("left", "the lamp, read through the response"), ("right", "the response, read through the lamp's spectrum")):
+        r = json.loads(read("lens_%s.json" % emits))["readings"][0]
+        l = r["from_lights"]
+        rows.append("| %s | %.5f +- %.5f | %.5f +- %.5f | %.1f |" % (what, r["value"], r["se"], l["value"], l["se"], r["z"]))
+    put("lens", "\n".join(rows) + "\n")
 if has("reflector.tap"):
     cost = {}
     for m in re.finditer(r"^#   (.*?) +[\d.]+ of [\d.]+, paths x ([\d.]+), rays a path ([\d.]+)", read("reflector.tap"), re.M):

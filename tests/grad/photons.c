@@ -6,6 +6,7 @@
  *
  * Negative controls: slips of the text of Morley et al. (2006), planted into walks of this
  * library or into a walk of this test's own, give the wrong number that each must give. */
+#include "math/warp.h"
 #include "photon_walks.h"
 
 static imp_context *ctx;
@@ -371,6 +372,42 @@ static void slips(void)
         expect(true, &m.L, truth, "without it: L");
         photons_close(&p);
     }
+
+    /* ME2: R = R + Q w in place of R + (Q/N) w. N photons give N times the reading. */
+    enum { N = 50 };
+    const struct furnace grey = {8, 1, 1, .5, "kernel=1", "diffuse", "reflectance"};
+    struct tap_stat no_n = {0}, with_n = {0};
+    for (uint64_t i = 0; i < 2000; i++) {
+        double R = 0;
+        for (uint64_t k = 0; k < N; k++)
+            R += pseudo_code(NO_SLIP, imp__key(2, i, k), &grey, .2);
+        tap_add(&no_n, R);
+        tap_add(&with_n, R / N);
+    }
+    const double right = furnace_truth(.2, .5, 8);
+    expect(true, &no_n, N * right, "ME2: L, as predicted 50 times the truth,");
+    expect(false, &no_n, right, "ME2: L");
+    expect(true, &with_n, right, "without it: L");
+
+    /* ME3: the adjoint photons are those on the right of Fig. 2, not on the left. What is
+     * on the left begins at the lamp: with the power of the adjoint, Q = int w cos, it is
+     * off by the ratio of the areas. Coaxial discs of radius .5 (lamp) and 1 (sensor) at
+     * distance 1: R = pi A1 F12 = 1.1568931, and four times as much. */
+    struct tap_stat left = {0}, from_right = {0};
+    for (uint64_t i = 0; i < 100000; i++) {
+        const struct imp_key key = imp__key(3, 0, i);
+        for (int side = 0; side < 2; side++) { /* begin at the lamp; at the sensor */
+            const double r = side ? 1 : .5, other = side ? .5 : 1, Q = IMP_PI * IMP_PI;
+            const double u[2] = {imp__u01(key, 1), imp__u01(key, 2)};
+            const imp_v3 d = imp__cosine_hemisphere(u);
+            const double rho = r * sqrt(imp__u01(key, 3)), t = 1 / d[2];
+            const double x = rho + t * d[0], y = t * d[1];
+            tap_add(side ? &from_right : &left, Q * (x * x + y * y < other * other));
+        }
+    }
+    expect(true, &from_right, 1.1568931, "photons from the sensor: R");
+    expect(true, &left, 4 * 1.1568931, "ME3: R, as predicted four times the truth,");
+    expect(false, &left, 1.1568931, "ME3: R");
 
     /* ME7: h = 3 at H = .6 without the clamp. Every photon survives, with E *= 1/h. */
     const struct furnace f = {6, 3, 1, .6, "kernel=1", "diffuse", "reflectance"};

@@ -117,7 +117,7 @@ static void target_set(imp_problem *p, const float *pixels, enum imp_loss loss)
 /* J^T J, the gradient and the objective from both ends, as means over seeds. */
 static void matrices(const char *filter)
 {
-    enum { SEEDS = 24, NUMBERS = 6 };
+    enum { SEEDS = 16, NUMBERS = 6 };
     char xml[4096];
     float target[30];
     snprintf(xml, sizeof xml, room, filter);
@@ -245,7 +245,7 @@ int main(int argc, char **argv)
     ctx = test_context(2);
     matrices("box");
     matrices("gaussian");
-    coverage(slow ? 400 : 40);
+    coverage(slow ? 400 : 24);
     refused();
     imp_context_destroy(ctx);
     return tap_done();
