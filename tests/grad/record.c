@@ -539,7 +539,7 @@ static void not_kept(void)
     end(&t);
 
     begin(&t, "cornell.xml", "res=32", true);
-    const struct imp_entry one = {{1, 1, 1, 1}, {1, 1, 1, 1}};
+    const struct imp_entry one = {.e = {1, 1, 1, 1}, .b = {1, 1, 1, 1}};
     struct imp_walk w;
     for (int i = 0; trace(&t, i, &w), !w.first; i++) {}
     test_must(ctx, imp__record_create(&t.tracer, PLENTY, &r));
