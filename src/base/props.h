@@ -100,7 +100,7 @@ struct imp_node {
     } * children;
     size_t n_children, cap_children;
     uint32_t given_props, given_children; /* before its object was made: kinds add some */
-    const struct imp_mesh_data *mesh; /* attached data, or NULL */
+    const struct imp_mesh_data *mesh;     /* attached data, or NULL */
     const struct imp_image_data *image;
     const struct imp_ies_data *ies;
     const struct imp_merl_data *merl;

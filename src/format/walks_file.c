@@ -14,7 +14,7 @@
 
 #define MAGIC      "impdrawn"
 #define BYTE_ORDER 0x01020304u
-#define VERSION    1
+#define VERSION    2
 #define PIECE      ((size_t)4 << 20) /* bytes that a rank sends at once */
 #define MEMORY     0x1p30
 #define ESS        0.5
@@ -25,10 +25,10 @@ struct head {
     uint64_t scene_bytes, n_theta;
     uint64_t evaluated; /* imp__fingerprint_evaluated */
     uint64_t seed;
-    int32_t spp, points, wavelengths, wavelength_set, losses, n_stores;
+    int32_t spp, points, wavelengths, wavelength_set, losses, n_stores, guided, reserved;
     double survival, ess;
 };
-_Static_assert(sizeof(struct head) == 88, "no padding: it is written");
+_Static_assert(sizeof(struct head) == 96, "no padding: it is written");
 
 struct store_head {
     struct imp_record_of of;
@@ -208,6 +208,7 @@ enum imp_status imp_walks_write(const imp_walks *w, const char *path)
                                .wavelength_set = w->run.wavelength_set,
                                .losses = w->losses,
                                .n_stores = w->n_stores,
+                               .guided = w->guided,
                                .survival = w->survival,
                                .ess = w->ess};
         st = imp__file_write_by(ctx, path, walks_fill, &payload);
@@ -276,6 +277,7 @@ static enum imp_status head_take(struct reading *r)
     if (h->spp < 0 || h->points < 0 || h->points > IMP_POINTS_SOBOL ||
         h->wavelengths < 0 || h->wavelengths > IMP_WAVELENGTHS_IMPORTANCE ||
         h->wavelength_set < 0 || h->losses < 0 || h->losses > 1 || h->n_stores < 1 ||
+        h->guided < 0 || h->guided > 1 || h->reserved != 0 ||
         !(h->survival >= 0 && h->survival <= 1) || !(h->ess >= 0 && h->ess <= 1) ||
         h->n_theta > SIZE_MAX / 16)
         IMP_TRY(damaged(r, "its head"));
@@ -391,6 +393,7 @@ static enum imp_status walks_take(struct reading *r, imp_scene *scene, double me
                                             r->head.survival > 0 ? r->head.survival : -1,
                                         .ess = ess > 0 ? ess : r->head.ess};
     IMP_TRY(imp__walks_begin(scene, &run, &o, &w));
+    w->guided = r->head.guided != 0;
     memcpy(w->theta, r->theta, scene->n_theta * sizeof *w->theta);
     IMP_TRY(stores_take(r, w, memory));
     w->owns_scene = scene == r->held;
@@ -428,8 +431,8 @@ enum imp_status imp_walks_read(imp_context *ctx, imp_scene *scene, const char *p
         return imp__error(ctx, IMP_E_ARG, "options: memory %g or ess %g is out of range",
                           o.memory, o.ess);
     if (o.survival != 0)
-        return imp__error(ctx, IMP_E_ARG, "options: the file has its own survival, not %g",
-                          o.survival);
+        return imp__error(ctx, IMP_E_ARG,
+                          "options: the file has its own survival, not %g", o.survival);
     IMP_TRY(imp__file_open(ctx, path, &held, &r.from.f));
     if (!r.from.f) IMP_TRY(imp__error(ctx, IMP_E_IO, "%s: there is no such file", path));
     if (scene) {

@@ -150,7 +150,8 @@ enum imp_status imp__splat_create(const struct imp_problem *p,
         if (s.m > 1)
             own.spp = imp__replicates_set(plan, set + 1) - imp__replicates_set(plan, set);
         own.time_limit_s = 0;
-        own.walks = NULL; /* the tracer has them: a picture of run->walks takes them all */
+        own.walks =
+            NULL; /* the tracer has them: a picture of run->walks takes them all */
         const int n = target ? s.channels : 1;
         const struct imp_picture picture = {.sensor = tracer->sensor,
                                             .stage = "picture",

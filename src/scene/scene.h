@@ -94,7 +94,8 @@ struct imp_scene {
     const struct imp_wavelengths *wavelengths; /* [n_sensors][IMP_WAVES_DRAWN]; NULL:
                                                   colours */
     bool committed;
-    bool rayless; /* of a file of kept walks, which no ray meets: shapes have no geometry */
+    bool
+        rayless; /* of a file of kept walks, which no ray meets: shapes have no geometry */
     int lenient; /* not 0: it goes on without what there is not; 1: with warnings */
     const char **missing; /* [n_missing] a line for each */
     int n_missing;

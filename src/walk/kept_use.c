@@ -8,6 +8,8 @@
 #include <string.h>
 
 #define TILES_AT_ONCE 16
+#define SEEN_LEAST                                                                       \
+    0.5 /* mean ratio of densities, which is 1 where all of them was drawn */
 /* Roulette's growth, over all its steps of walks that have a last depth. */
 #define GROWTH_MOST 4
 
@@ -172,6 +174,7 @@ enum imp_status imp__walks_weigh(const struct imp_walks *w, const struct imp_sto
     imp_context *ctx = w->ctx;
     enum imp_status st = IMP_OK;
     struct imp_densities own = w->densities; /* with `moved` of this call */
+    own.guided = w->guided;
     uint8_t *changed = imp__alloc(ctx, w->scene->n_params + 1, 1);
     const size_t walks = imp__store_tiles(store);
     own.moved = imp__alloc(ctx, (size_t)w->scene->n_bsdfs + 1, 1);
@@ -196,6 +199,9 @@ enum imp_status imp__walks_weigh(const struct imp_walks *w, const struct imp_sto
     out->n_walks = x.sum.n;
     if (x.sum.w2 > 0) out->ess = x.sum.w * x.sum.w / (x.sum.n * x.sum.w2);
     else if (x.sum.n > 0) out->ess = 0;
+    /* A mean of ratios that is below 1 by chance is not looked at. */
+    if (x.sum.seen < SEEN_LEAST * x.sum.moved)
+        out->ess = fmin(out->ess, x.sum.seen / x.sum.moved);
     out->growth = imp__moments_radius(&x.sum);
 out:
     imp__release(ctx, changed);

@@ -78,6 +78,7 @@ struct imp_densities {
     const struct imp_scene *scene;
     const struct imp_walk_integrator *integrator;
     double survival;  /* of the tracer they were drawn with */
+    bool guided;      /* their survival was decided by a guide */
     uint32_t *inputs; /* [n_bsdfs] bit j: the density depends on input j */
     uint8_t *moved;   /* [n_bsdfs] it has changed */
     bool any;         /* of moved */
@@ -94,6 +95,9 @@ void imp__densities_move(struct imp_densities *d, const uint8_t *changed);
  * roulette looked at of what they add to the second moment. */
 struct imp_moments {
     double n, w, w2;
+    double moved,
+        seen; /* walks with a direction whose density has changed, and the sum of
+                           its ratios alone */
     double steps[IMP_STORE_CLASSES];                        /* from class a */
     double growth[IMP_STORE_CLASSES][IMP_STORE_CLASSES][4]; /* from a to b, by lane */
 };
@@ -110,6 +114,7 @@ struct imp_walks {
     imp_context *ctx;
     imp_scene *scene; /* that they are evaluated in */
     bool owns_scene;  /* it was read with them */
+    bool guided;      /* a guide decided how they go on */
     bool spread;      /* over ranks: this one has a share of the tiles */
     struct imp_run
         run;     /* seed, samples, points and wavelengths that they were drawn with */

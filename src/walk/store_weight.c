@@ -8,7 +8,10 @@
  * one positive number a walk, and the effective sample size of n walks is
  * (sum w)^2/(n sum w^2) of n. It ranks draws: where it is below .8 a new draw is worth its
  * price. A direction that another density than the BSDF's drew counts 1, since the choice
- * of the density is part of the draw.
+ * of the density is part of the draw; so does a step whose survival a guide decided.
+ *
+ * The ratios of densities alone have the mean 1, as far as walks were drawn where the new
+ * density is. A mean far below 1 says that they were not: then they count no more than it.
  *
  * No sample shows that a variance is infinite. A step that is survived with probability q
  * adds to the second moment of the throughput the factor f'^2/(p^2 q); from materials a to
@@ -201,44 +204,73 @@ static double survival_now(const struct imp_densities *m, const struct looked *v
     return fmax(q, m->survival);
 }
 
-/* w of the walk's own vertices, and its steps' share in the growth. */
+/* T of the segment that follows, over its density, by lane. `v`: the vertex, evaluated; NULL:
+ * nothing that was crossed is kept. */
+static imp_spec crossed(const struct imp_decision *d, const struct imp_vertex *v)
+{
+    if (!v || !v->on) return imp__spec((double)d->passes);
+    return v->scale * ((double)d->pdf * (double)d->survive);
+}
+
+/* Throughput as roulette sees it (scatter.c): in a lane, the first factor that is zero but
+ * may have a derivative is another number. */
+static imp_spec seen_by_roulette(imp_spec factor, bool four, int zeros[4])
+{
+    const double stand_in = fmax(imp__max_used(factor, four), 0.5);
+    for (int c = 0; c < 4; c++)
+        if (factor[c] == 0 && zeros[c]++ == 0) factor[c] = stand_in;
+    return factor;
+}
+
+/* w of the walk's own vertices, and its steps' share in the growth. `v`: the vertices,
+ * evaluated, of a walk with tracks; else NULL. */
 static double walk_weight(const struct imp_store *s, const struct imp_record *r,
                           const struct imp_densities *m, const struct imp_record_walk *k,
-                          const struct imp_walk *walk, struct imp_moments *sum)
+                          const struct imp_walk *walk, const struct imp_vertex *at,
+                          struct imp_moments *sum)
 {
     const struct imp_carried *carried = walk->waves ? &walk->waves->carried : NULL;
     const struct imp_scene *scene = m->scene;
     const bool rolls = s->roulette && m->weights && !m->integrator->absorbs;
     imp_spec beta = imp__spec(1);
-    double w = 1, eta = 1;
+    double w = 1, eta = 1, seen = 1;
+    int zeros[4] = {0};
     bool settled = false; /* roulette's first step answers for all before it */
+    bool any = false;
     for (uint32_t j = 0; j < k->n_vertices; j++) {
         const struct imp_decision *d = imp__record_vertex(r, k->first + j);
+        const struct imp_vertex *here = at;
         struct looked v;
+        if (at) at = at->next;
         v.carried = carried;
         v.bsdf = imp__decided_bsdf(scene, d);
-        if (!v.bsdf || !d->goes_on) continue;
-        const bool moved = v.bsdf->index >= 0 && m->moved[v.bsdf->index];
+        if (!d->goes_on) continue;
+        const bool moved = v.bsdf && v.bsdf->index >= 0 && m->moved[v.bsdf->index];
         const bool own = rolls && j < k->n;
-        if (!moved && !own) continue;
+        if (own && !v.bsdf) beta *= crossed(d, here);
+        if (!v.bsdf || (!moved && !own)) continue;
         look(scene, d, &v);
         const double ratio = moved ? density_ratio(&v, d) : 1;
+        any |= moved && d->drawn == IMP_DENSITY_KERNEL;
+        seen *= ratio;
         w *= ratio;
         if (!own) continue;
         imp_spec f;
         imp__bsdf_eval(v.bsdf, carried, v.in, &v.dirs, &f);
         const imp_spec step = f * (1 / (double)d->pdf);
-        imp_spec now = step * (1 / fmax(ratio, 1e-300));
-        const double stand_in = fmax(imp__max_used(now, carried != NULL), 0.5);
-        for (int c = 0; c < 4; c++)
-            if (now[c] == 0) now[c] = stand_in;
-        beta *= now;
+        beta *=
+            seen_by_roulette(step * (1 / fmax(ratio, 1e-300)), carried != NULL, zeros);
         if (v.bsdf->ops->index_ratio && !v.bsdf->shaped)
             eta *= v.bsdf->ops->index_ratio(v.bsdf, v.in, &v.dirs);
-        if (!(d->survive < 1)) continue;
-        const double q = survival_now(m, &v, step, beta, eta, carried != NULL);
+        if (!(d->survive < 1)) {
+            beta *= crossed(d, here);
+            continue;
+        }
+        const double q = m->guided
+                             ? (double)d->survive
+                             : survival_now(m, &v, step, beta, eta, carried != NULL);
         w *= q / (double)d->survive;
-        beta *= imp__spec(1 / q);
+        beta *= crossed(d, here) * (1 / q);
         const bool first = !settled;
         settled = true;
         if (first) continue;
@@ -250,6 +282,10 @@ static double walk_weight(const struct imp_store *s, const struct imp_record *r,
         sum->steps[a]++;
         for (int c = 0; next && c < 4; c++)
             sum->growth[a][class_of(next)][c] += step[c] * step[c] / (double)d->survive;
+    }
+    if (any) {
+        sum->moved++;
+        sum->seen += seen;
     }
     return w;
 }
@@ -264,6 +300,7 @@ enum imp_status imp__store_moments(const struct imp_store *s,
     const int x0 = (int)(tile % (size_t)s->across) * IMP_STORE_SIDE - s->margin;
     const int y0 = (int)(tile / (size_t)s->across) * IMP_STORE_SIDE - s->margin;
     const int side = imp_min(IMP_STORE_SIDE, s->width + s->margin - x0);
+    const bool tracks = s->roulette && d->weights && !d->guided;
     for (size_t i = 0; i < r->n_walks; i++) {
         const struct imp_record_walk *k = imp__record_at(r, i);
         const int pixel = (int)(i / s->n);
@@ -272,9 +309,12 @@ enum imp_status imp__store_moments(const struct imp_store *s,
         struct imp_walk walk = {.key = k->key};
         if (mask && !(mask[(size_t)y * (size_t)s->width + (size_t)x] > 0)) continue;
         const struct imp_arena_mark mark = imp__arena_mark(arena);
-        if (tracer->wavelengths && !imp__walk_wave(tracer, arena, k->wave, &walk))
+        if (tracks && k->n_items > 0) imp__record_walk(r, i, tracer, arena, &walk);
+        else if (tracer->wavelengths && !imp__walk_wave(tracer, arena, k->wave, &walk))
             return imp__error(s->ctx, IMP_E_NOMEM, "no memory for a walk");
-        const double w = walk_weight(s, r, d, k, &walk, sum);
+        if (walk.dropped == IMP_DROP_MEMORY)
+            return imp__error(s->ctx, IMP_E_NOMEM, "no memory for a walk");
+        const double w = walk_weight(s, r, d, k, &walk, walk.first, sum);
         sum->n++;
         sum->w += w;
         sum->w2 += w * w;

@@ -8,6 +8,7 @@
 #include "imp_scene.h"
 #include "imp_tap.h"
 #include "walk/store.h"
+#include <importon/elements.h>
 #include <importon/walks.h>
 
 #define FAIL_Z 4.5
@@ -367,6 +368,72 @@ static void closed_form(double m)
     imp_scene_destroy(scene);
 }
 
+/* Roulette's part is 1 at the numbers of the draw, whoever decided the survival: with
+ * extinctions that differ between lanes, behind which the throughput has a colour, and by
+ * a guide. A number is moved by so little that only the looking begins. */
+static void roulette_at_the_draw(imp_scene *scene, const imp_guide *guide,
+                                 const char *name, const char *what)
+{
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_walks_options o = IMP_WALKS_OPTIONS_INIT;
+    struct imp_walks_weight w = IMP_WALKS_WEIGHT_INIT;
+    imp_walks *walks;
+    run.spp = 8;
+    run.seed = 3;
+    run.guide = guide;
+    o.survival = -1;
+    test_must(ctx, imp_walks_keep(scene, &run, &o, &walks));
+    set(scene, name, 1 - 1e-9);
+    size_t k;
+    test_must(ctx, imp_scene_find_param(scene, name, &k));
+    struct imp_param_info info = {.size = sizeof info};
+    test_must(ctx, imp_scene_get_param(scene, k, &info));
+    double x[NUMBERS];
+    test_must(ctx, imp_scene_get_values(scene, k, x));
+    for (size_t e = 0; e < info.count; e++) x[e] = x[e] / (1 + 0.05 * (double)(e % 3));
+    test_must(ctx, imp_scene_set_values(scene, k, info.count, x));
+    test_must(ctx, imp_walks_weigh(walks, 0, NULL, &w));
+    tap_ok(w.growth > 0 && w.ess > 1 - 1e-6,
+           "%s: all walks count # 1 - %.2g, growth %.3f", what, 1 - w.ess, w.growth);
+    imp_walks_destroy(walks);
+}
+
+static void roulette_counts_once(void)
+{
+    static const char fog[] =
+        "<scene version='3.0.0'><integrator type='volpath'><integer name='rr_depth' "
+        "value='2'/></integrator><medium type='homogeneous' id='fog'><rgb name='sigma_t' "
+        "value='.2,.6,1.4'/><rgb name='albedo' value='.9,.8,.7'/></medium><sensor "
+        "type='perspective'><transform name='to_world'><lookat origin='0,0,2' "
+        "target='0,0,0' up='0,1,0'/></transform><ref id='fog'/><film "
+        "type='hdrfilm'><integer name='width' value='12'/><integer name='height' "
+        "value='12'/></film></sensor><shape type='sphere'><boolean name='flip_normals' "
+        "value='true'/><float name='radius' value='3'/><bsdf type='diffuse' "
+        "id='wall'><rgb name='reflectance' value='.7,.6,.5'/></bsdf><ref name='exterior' "
+        "id='fog'/></shape><shape type='sphere'><float name='radius' "
+        "value='.3'/><emitter "
+        "type='area'/><ref name='exterior' id='fog'/></shape></scene>";
+    imp_scene *scene = test_scene_text(ctx, fog, IMP_RGB);
+    roulette_at_the_draw(scene, NULL, "wall.reflectance.value", "coloured extinction");
+    imp_scene_destroy(scene);
+
+    struct imp_elements_options o = IMP_ELEMENTS_OPTIONS_INIT;
+    struct imp_elements_guide_options go = IMP_ELEMENTS_GUIDE_OPTIONS_INIT;
+    imp_elements *e;
+    imp_guide *guide;
+    scene = test_scene(ctx, "cornell.xml", IMP_RGB, "res=12 max_depth=-1");
+    o.stop = 0.05;
+    go.roulette = 1;
+    go.share = 0.3;
+    test_must(ctx, imp_elements_create(scene, &o, &e));
+    test_must(ctx, imp_elements_solve(e));
+    test_must(ctx, imp_elements_guide(e, &go, &guide));
+    roulette_at_the_draw(scene, guide, "white.reflectance.value", "guided roulette");
+    imp_guide_destroy(guide);
+    imp_elements_destroy(e);
+    imp_scene_destroy(scene);
+}
+
 /* ---- Refused --------------------------------------------------------------------- */
 
 static void refused_with(imp_scene *scene, const imp_walks *walks, const char *word,
@@ -526,6 +593,7 @@ int main(void)
     walk_by_walk("cornell.xml", "res=24", "white.reflectance");
     closed_form(5);
     closed_form(9);
+    roulette_counts_once();
     diverging();
     refusals();
     imp_context_destroy(ctx);
