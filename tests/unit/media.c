@@ -363,6 +363,142 @@ static void refused(const char *medium, const char *more, const char *why)
     media_refused(ctx, text, why);
 }
 
+/* A volume of value 2 whose bound says 1, as a host program might write it. */
+static void careless_eval(const struct imp_texture *t, const struct imp_texcoord *at,
+                          bool scalar, imp_spec *value)
+{
+    (void)t, (void)at, (void)scalar;
+    imp_spec_fill(value, 2);
+}
+static void careless_scatter(const struct imp_texture *t, const struct imp_texcoord *at,
+                             bool scalar, const imp_spec *bar, struct imp_sink *sink)
+{
+    (void)t, (void)at, (void)scalar, (void)bar, (void)sink;
+}
+static void careless_tangent(const struct imp_texture *t, const struct imp_texcoord *at,
+                             bool scalar, imp_dot_fn *dot, const void *x_dot,
+                             imp_spec *value_dot)
+{
+    (void)t, (void)at, (void)scalar, (void)dot, (void)x_dot;
+    imp_spec_fill(value_dot, 0);
+}
+static void careless_bound(const struct imp_texture *t, const imp_v3 *lo,
+                           const imp_v3 *hi, bool scalar, imp_spec *most)
+{
+    (void)t, (void)lo, (void)hi, (void)scalar;
+    imp_spec_fill(most, 1);
+}
+static void careless_extent(const struct imp_texture *t, double to_unit[12], int cells[3])
+{
+    (void)t;
+    for (int k = 0; k < 12; k++) to_unit[k] = k % 4 == 3 ? .5 : k % 5 == 0 ? .5 : 0;
+    cells[0] = cells[1] = cells[2] = 1;
+}
+
+/* Walks that a scene of bad numbers drops: by which cause, and that a run without leave to
+ * drop fails and says so. */
+static void counted(imp_context *c, imp_scene *s, int cause, const char *what)
+{
+    struct imp_film_info info = {.size = sizeof info};
+    struct imp_run run = IMP_RUN_INIT;
+    imp_film *film = NULL;
+    run.spp = 64;
+    run.drop_budget = 1;
+    test_must(c, imp_render(s, &run, &film));
+    test_must(c, imp_film_get_info(film, &info));
+    tap_ok(info.dropped > 0 && info.dropped_by_cause[cause] == info.dropped,
+           "%s: %llu of %d walks are dropped and counted", what,
+           (unsigned long long)info.dropped, 64 * info.width * info.height);
+    imp_film_destroy(film);
+    film = NULL;
+    run.drop_budget = 0;
+    const enum imp_status st = imp_render(s, &run, &film);
+    tap_ok(st == IMP_E_PATHS, "... and the run fails # %s", imp_last_error(c));
+    imp_film_destroy(film);
+}
+
+#define SEEN                                                                             \
+    "<emitter type='constant'/><sensor type='orthographic'><transform name='to_world'>"  \
+    "<scale value='0.2'/><lookat origin='0,0,-3' target='0,0,0' "                        \
+    "up='0,1,0'/></transform>"                                                           \
+    "<film type='hdrfilm'><integer name='width' value='4'/><integer name='height' "      \
+    "value='4'/><rfilter type='box'/></film></sensor></scene>"
+
+static void low_bound(void)
+{
+    static const struct imp_texture_ops careless = {.size = sizeof careless,
+                                                    .name = "careless",
+                                                    .object_size = 1,
+                                                    .eval = careless_eval,
+                                                    .scatter = careless_scatter,
+                                                    .tangent = careless_tangent,
+                                                    .bound = careless_bound,
+                                                    .extent = careless_extent};
+    imp_context *c = test_context(1);
+    test_must(c, imp_register_volume(c, &careless));
+    imp_scene *s = test_scene_text(
+        c,
+        "<scene version='3.0.0'><integrator type='volpath'/><medium type='heterogeneous' "
+        "id='fog'><volume name='sigma_t' type='careless'/></medium><shape type='cube'>"
+        "<bsdf type='null'/><ref id='fog' name='interior'/></shape>" SEEN,
+        IMP_MONO);
+    counted(c, s, IMP_DROP_MAJORANT, "an extinction above its bound");
+    imp_scene_destroy(s);
+    imp_context_destroy(c);
+}
+
+/* Fog in a box without a lid on the far side: rays come in through it, and leave a medium
+ * by a wall from its inside that they have never entered. */
+static void no_outside(void)
+{
+    imp_scene *s = test_scene_text(
+        ctx,
+        "<scene version='3.0.0'><integrator type='volpath'/><medium type='homogeneous' "
+        "id='fog'><float name='sigma_t' value='1'/><float name='albedo' value='1'/>"
+        "</medium><shape type='rectangle'><transform name='to_world'><scale value='3'/>"
+        "<rotate y='1' angle='180'/></transform><bsdf type='null'/><ref id='fog' "
+        "name='interior'/></shape><shape type='rectangle'><transform name='to_world'>"
+        "<scale value='0.5'/><translate z='1'/></transform><bsdf type='null'/><ref "
+        "id='fog' name='interior'/></shape>" SEEN,
+        IMP_MONO);
+    counted(ctx, s, IMP_DROP_MEDIUM, "a medium without an outside");
+    imp_scene_destroy(s);
+}
+
+/* An extinction of 1e12 in one of eight cells: a walk that has had a million tentative
+ * collisions ends. */
+static void immense(void)
+{
+    float value[8] = {1e12F};
+    char path[64], text[2048];
+    vol_write(path, 2, 2, 2, 1, value);
+    snprintf(text, sizeof text,
+             "<scene version='3.0.0'><integrator type='volpath'/><medium "
+             "type='heterogeneous' id='fog'><float name='albedo' value='1'/><volume "
+             "name='sigma_t' type='gridvolume'><string name='filename' value='%s'/>"
+             "<string name='filter_type' value='nearest'/><transform name='to_world'>"
+             "<scale value='2'/><translate x='-1' y='-1' z='-1'/></transform></volume>"
+             "</medium><shape type='cube'><bsdf type='null'/><ref id='fog' "
+             "name='interior'/></shape>" SEEN,
+             path);
+    imp_scene *s = test_scene_text(ctx, text, IMP_MONO);
+    struct imp_film_info info = {.size = sizeof info};
+    struct imp_run run = IMP_RUN_INIT;
+    imp_film *film;
+    run.spp = 1;
+    run.drop_budget = 1;
+    test_must(ctx, imp_render(s, &run, &film));
+    test_must(ctx, imp_film_get_info(film, &info));
+    int finite = 1;
+    for (int k = 0; k < info.width * info.height; k++)
+        finite &= isfinite(imp_film_mean(film)[k]);
+    tap_ok(finite, "an extinction of 1e12: %llu of 16 walks dropped",
+           (unsigned long long)info.dropped);
+    imp_film_destroy(film);
+    imp_scene_destroy(s);
+    remove(path);
+}
+
 int main(void)
 {
     ctx = test_context(0);
@@ -374,12 +510,36 @@ int main(void)
     bounds_do_not_matter();
     bounds_follow();
     furnace();
+    low_bound();
+    no_outside();
+    immense();
 
 #define FOG(inner) "<medium type='homogeneous' id='fog'>" inner "</medium>"
     refused(FOG("<float name='sigma_t' value='-1'/>"), "", "outside [0, inf]");
     refused(FOG("<rgb name='albedo' value='0.5,1.5,0.5'/>"), "", "albedo");
     refused(FOG("<phase type='hg'><float name='g' value='1'/></phase>"), "", "g = 1");
+    refused(FOG("<phase type='hg'><float name='g' value='-1'/></phase>"), "", "g = -1");
+    refused(FOG("<phase type='hg'><rgb name='g' value='0.5,1.5,0.5'/></phase>"), "", "g");
     refused(FOG("<float name='scale' value='-2'/>"), "", "scale");
+    refused(FOG("<float name='sigma_t' value='nan'/>"), "", "finite");
+    refused(FOG("<float name='sigma_t' value='inf'/>"), "", "finite");
+#define AIR(inner)                                                                       \
+    "<medium type='heterogeneous' id='fog'><volume name='sigma_t' "                      \
+    "type='expvolume'>" inner "</volume></medium>"
+    refused(AIR("<float name='top' value='1'/>"), "", "'scale_height' is missing");
+    refused(AIR("<float name='scale_height' value='1'/>"), "", "top");
+    refused(AIR("<float name='scale_height' value='0'/><float name='top' value='1'/>"),
+            "", "scale_height = 0");
+    refused(AIR("<float name='scale_height' value='1'/><float name='top' value='1'/>"
+                "<float name='value' value='-1'/>"),
+            "", "value = -1");
+    refused(AIR("<float name='scale_height' value='1'/><float name='top' value='1'/>"
+                "<float name='radius' value='-1'/>"),
+            "", "radius = -1");
+    refused(FOG("") "<emitter type='constant'/><emitter type='sun'/>", "",
+            "a second environment");
+    refused(FOG("") "<emitter type='sun'><float name='radius' value='2'/></emitter>", "",
+            "radius");
     refused(FOG("<float name='sigma_s' value='1'/><float name='sigma_t' value='1'/>"), "",
             "the one pair");
     refused(FOG("<phase type='hg'/><phase type='rayleigh'/>"), "", "blendphase");
