@@ -58,7 +58,7 @@ static bool sees(struct imp_step *s, struct imp_vertex *v, int k,
     return free;
 }
 
-/* The vertex at work, joined with place k; P: light that its walk would have brought. */
+/* The vertex at work, joined with place k of the walk from the light. */
 static void join(struct imp_step *s, struct imp_vertex *v, int k,
                  const struct imp_surface *at, const struct imp_frame *frame)
 {

@@ -11,8 +11,6 @@
 #include "both.h"
 #include "tracking.h"
 
-/* What light that reaches the film at z is worth by its joints: sums over them of A P_y f_y
- * T m f_z. With bar: f, its derivatives. */
 struct joints {
     const struct imp_tracer *tracer;
     struct imp_both *both;

@@ -189,33 +189,30 @@ static void lights(void)
          "<emitter type='point'><point name='position' value='.3,0,1'/></emitter>"
          "<shape type='disk'>" DIFFUSE(".5") METER "</shape>" SIDE(DIFFUSE(".7")),
          IMP_MONO, EYE, 40000, 20000, .01);
-    same(
-        "a spot, seen by a camera", 4,
-        "<emitter type='spot'>" AT("<lookat origin='.3,0,1.2' target='0,0,0' "
-                                   "up='0,1,0'/>") "<float "
-                                                   "name='cutoff_angle' "
-                                                   "value='40'/></emitter><shape "
-                                                   "type='disk'>" DIFFUSE(
-                                                       ".5") "</shape>" SIDE(DIFFUSE("."
-                                                                                     "7"))
-                                                       CAMERA(3, "box"),
-        IMP_MONO, EYE, 2000, 1000, .02);
-    same(
-        "a projector", 3,
-        "<emitter type='projector'>" AT("<lookat origin='.5,0,2' target='0,0,0' "
-                                        "up='0,1,0'/>") "<float name='fov' "
-                                                        "value='50'/><texture "
-                                                        "type='checkerboard' "
-                                                        "name='irradiance'/></emitter>"
-                                                        "<shape "
-                                                        "type='rectangle'>" DIFFUSE(
-                                                            ".5") "</shape>" BALL("0,0,."
-                                                                                  "2",
-                                                                                  DIFFUSE(
-                                                                                      "."
-                                                                                      "7"))
-                                                            CAMERA(3, "box"),
-        IMP_RGB, EYE, 4000, 2000, .02);
+    same("a spot, seen by a camera", 4,
+         "<emitter type='spot'>" AT(
+             "<lookat origin='.3,0,1.2' target='0,0,0' "
+             "up='0,1,0'/>") "<float "
+                             "name='cutoff_angle' "
+                             "value='40'/></emitter><shape "
+                             "type='disk'>" DIFFUSE(".5") "</shape>" SIDE(DIFFUSE("."
+                                                                                  "7"))
+                                 CAMERA(3, "box"),
+         IMP_MONO, EYE, 2000, 1000, .02);
+    same("a projector", 3,
+         "<emitter type='projector'>" AT(
+             "<lookat origin='.5,0,2' target='0,0,0' "
+             "up='0,1,0'/>") "<float name='fov' "
+                             "value='50'/><texture "
+                             "type='checkerboard' "
+                             "name='irradiance'/></emitter>"
+                             "<shape "
+                             "type='rectangle'>" DIFFUSE(".5") "</shape>" BALL(
+                                 "0,0,."
+                                 "2",
+                                 DIFFUSE("."
+                                         "7")) CAMERA(3, "box"),
+         IMP_RGB, EYE, 4000, 2000, .02);
     same("parallel light, a wall and a meter", 4,
          "<emitter type='directional'><vector name='direction' value='.3,.1,-1'/>"
          "</emitter><shape type='disk'>" DIFFUSE(".5") METER
@@ -240,21 +237,25 @@ static void lights(void)
          IMP_MONO, EYE, 20000, 20000, .02);
     same(
         "light that varies in time", 3,
-        WALLS
-        "<shape type='rectangle'>" AT("<scale x='.6' y='.6'/><rotate x='1' "
-                                      "angle='90'/><translate y='1.95'/>") "<emitter "
-                                                                           "type='area'"
-                                                                           ">" RGB(
-                                                                               "radiance",
-                                                                               "5,4,3") "<string name='times' "
-                                                                                        "value='0:1, .5:3, 1:0'/></emitter></shape><sensor type='perspective'><float "
-                                                                                        "name='fov' value='50'/><float name='shutter_open' value='0'/><float "
-                                                                                        "name='shutter_close' value='1'/>" LOOK(
-                                                                                            1.9)
-                                                                                            FILM(
-                                                                                                6,
-                                                                                                4,
-                                                                                                "box") "</sensor>",
+        WALLS "<shape type='rectangle'>" AT(
+            "<scale x='.6' y='.6'/><rotate x='1' "
+            "angle='90'/><translate y='1.95'/>") "<emitter "
+                                                 "type='area'"
+                                                 ">" RGB(
+                                                     "radiance",
+                                                     "5,4,3") "<string name='times' "
+                                                              "value='0:1, .5:3, "
+                                                              "1:0'/></emitter></"
+                                                              "shape><sensor "
+                                                              "type='perspective'><float "
+                                                              "name='fov' "
+                                                              "value='50'/><float "
+                                                              "name='shutter_open' "
+                                                              "value='0'/><float "
+                                                              "name='shutter_close' "
+                                                              "value='1'/>" LOOK(1.9)
+                                                                  FILM(6, 4,
+                                                                       "box") "</sensor>",
         IMP_RGB, EYE, 3000, 1500, .03);
 }
 
@@ -290,8 +291,8 @@ static void truth(const char *what, int max_depth, const char *body, double valu
     imp_scene_destroy(scene);
 }
 
-/* A sphere of reflectance rho, of which a patch of area A_e emits e: everywhere E = pi e
- * A_e/(4 pi r^2 (1 - rho)). The patch is a small disc before it, seen from one side. */
+/* Two coaxial discs (F12 = .4688711), and a sphere that glows with 1 and reflects rho: what
+ * has at most n segments makes the radiance (1 - rho^n)/(1 - rho) everywhere in it. */
 static void closed_forms(void)
 {
     const double pi = acos(-1), R = 1.1568931;
@@ -305,9 +306,6 @@ static void closed_forms(void)
           40000, 3e-3);
     truth("discs, roles exchanged", -1, DISCS("0", METER, "1", LAMP("1")), R / (pi / 4),
           40000, 3e-3);
-    /* An integrating sphere: the whole sphere glows with e and reflects rho, so that the
-     * radiance is e/(1 - rho) everywhere, and with n reflections e (1 - rho^(n+1))/(1 -
-     * rho). */
     truth("integrating sphere, reflectance .9, 8 segments", 8,
           "<shape type='sphere'><boolean name='flip_normals' value='true'/>" DIFFUSE(".9")
               LAMP("1") "</shape><shape type='disk'>" AT("<scale value='.01'/>")
