@@ -92,7 +92,7 @@ double imp__light_strength(const struct imp_scene *scene, const struct imp_emitt
 {
     struct imp_light_node bound;
     imp__light_bound(e, -1, &bound);
-    if (e->ops->flags & IMP_EMITTER_DELTA) return strength_of_point(scene, e, &bound);
+    if (!e->shape) return strength_of_point(scene, e, &bound);
     bool plain = true;
     for (int j = 0; j < e->n_in; j++) plain &= !e->input[j]->texture;
     if ((e->ops->flags & IMP_EMITTER_UNIFORM) && plain && bound.cos_normals >= 1) {

@@ -186,7 +186,8 @@ static double triangle_area(const struct imp_shape *s, int prim)
 
 static bool is_far(const struct imp_emitter *e)
 {
-    return e->ops->flags & (IMP_EMITTER_ENVIRONMENT | IMP_EMITTER_FAR);
+    return e->ops->flags & (IMP_EMITTER_ENVIRONMENT | IMP_EMITTER_FAR) ||
+           (!e->shape && !(e->ops->flags & IMP_EMITTER_DELTA));
 }
 
 static size_t items_of(const struct imp_emitter *e)
