@@ -84,5 +84,11 @@ for bins in 400,700 400,700,0 400,700,65 700,400,3 0,700,3 400,inf,3 400,700,3x 
 done
 importon render lamp.xml -q --bins 400,700,6 -o x.exr
 # Films of sensors in shapes, too.
-sed -e '/<sensor/,/<\/sensor/d' -e 's/<emitter type="area" id/<bsdf type="diffuse"\/><sensor type="irradiancemeter"><film type="hdrfilm"><integer name="width" value="1"\/><integer name="height" value="1"\/><\/film><\/sensor>&/' lamp.xml >meter.xml
-importon render -m spectral meter.xml -q --no-manifest --no-preview --spp 4 --bins 400,700,3 -o m.exr && importon info m.exr | grep -o 'S0[^ ]*'
+cat >meter.xml <<'XML'
+<scene version="3.0.0">
+    <integrator type="direct"/>
+    <shape type="rectangle"><sensor type="irradiancemeter"><film type="hdrfilm"><integer name="width" value="1"/><integer name="height" value="1"/></film></sensor></shape>
+    <shape type="sphere"><point name="center" value="0,0,5"/><emitter type="area"><spectrum name="radiance" value="350:.5, 850:5.5"/></emitter></shape>
+</scene>
+XML
+importon render -m spectral meter.xml -q --no-manifest --no-preview --spp 4 --bins 400,700,3 -o m.exr && grep -ao 'S0\.[0-9,]*nm' m.exr | sort -u
