@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 #
 # The pictures of docs/media.md that were computed, computed again; five to ten minutes. With the
-# number of a figure of Morley et al. (2006) that one alone: 6, 9 or 10.
+# number of a figure of Morley et al. (2006) that one alone: 6, 7 (and 8), 9 or 10.
 #
 #     docs/make_media.sh [BUILD FOLDER, default build] [FIGURE]
 set -euo pipefail
@@ -48,6 +48,13 @@ out.append('<text x="%.1f" y="%d" text-anchor="middle">cells along the ray</text
 out.append('<text transform="translate(14 %.1f) rotate(-90)" text-anchor="middle">look-ups of the extinction</text></svg>' % ((H - low) / 2))
 open(sys.argv[2], "w").write("\n".join(out) + "\n")
 PYTHON
+fi
+if wanted 7 || wanted 8; then
+    say "Figures 7 and 8: smoke and its shadow by walks and by marched rays, in equal time"
+    "$build/bench/smoke_marched" "$out"
+    for name in smoke_walks smoke_marched shadow_walks shadow_marched; do
+        cp "$out/$name.png" "$images/media_$name.png"
+    done
 fi
 if wanted 9; then
     say "Figure 9: the sky at three times of day"
