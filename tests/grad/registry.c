@@ -246,7 +246,10 @@ static void emitter_make(imp_scene *s, const struct subject *q, bool lifted)
     const double at[16] = {x, 0.2,   0.4, -0.3, z, -0.4, -0.8, 0.7,
                            0, 2 * z, -z,  0.4,  0, 0,    0,    1};
     imp_scene_begin(s, "emitter", q->emitter->name, "subject", NULL);
-    if (q->emitter->flags & IMP_EMITTER_DELTA) imp_scene_transform(s, "to_world", at);
+    const bool sun = strcmp(q->emitter->name, "sun") == 0;
+    if (q->emitter->flags & IMP_EMITTER_DELTA || sun)
+        imp_scene_transform(s, "to_world", at);
+    if (sun) imp_scene_float(s, "radius", 1.4); /* that walks meet it by chance */
     if (strcmp(q->emitter->name, "ies") == 0) {
         imp_scene_string(s, "filename", IMP_SCENES "/lamps/wallwash.ies");
         imp_scene_string(s, "units", "radiometric");
