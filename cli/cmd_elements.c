@@ -211,6 +211,9 @@ static int run_elements(int n, char **operand)
     enum imp_status st;
     (void)n;
     int rc = cli_load(operand[0]), complete = 1;
+    if (!rc && cli.from)
+        rc = cli_error(EXIT_USAGE, "elements solves, and makes no walks that could begin "
+                                   "at one end: it goes without --from");
     if (!rc) rc = options_make(&options_e);
     if (!rc) {
         /* The report has its picture. */

@@ -4,6 +4,8 @@ furnace="$ROOT/scenes/furnace.xml"
 importon read "$ROOT/scenes/desk.xml" --ends --from lights
 importon render "$ROOT/scenes/stam.xml" --from lights -o a.exr
 importon jacobian "$ROOT/scenes/cornell.xml" -D res=4 --from lights -o J
+importon elements "$ROOT/scenes/cornell.xml" --from lights
+importon check "$ROOT/scenes/cornell.xml" -D res=4 --from lights --verify-sampling
 cat >ray.xml <<'X'
 <scene version="3.0.0"><integrator type="ptracer"/><sensor type="radiancemeter"><film type="hdrfilm">
 <integer name="width" value="1"/><integer name="height" value="1"/></film></sensor>
