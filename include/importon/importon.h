@@ -1070,6 +1070,35 @@ IMP_API IMP_MUST_CHECK enum imp_status
 imp_problem_fit_variable(const imp_problem *problem, size_t i,
                          struct imp_fit_variable *variable);
 
+/** A number that is not active, and what it would bring to fit it too. */
+struct imp_missing {
+    size_t param, element; /**< of the scene */
+    int factor;   /**< 1: the common factor of all numbers of a texture, volume or
+                                list, which is 1 now; element is 0 */
+    double value; /**< now */
+    double step,
+        step_se; /**< by which it would move, the active numbers following; in its
+                                unit; by measurement and Monte Carlo */
+    double chi2,
+        chi2_se;   /**< expected drop of chi-square, in units of the pictures' noise,
+                                and its Monte Carlo error */
+    double chance; /**< probability, at most, that some number stands out like this
+                                where all are right: that of this one, for Gaussian noise,
+                                times the numbers that were looked at */
+};
+
+/** Which number may be wrong? One sweep gives the score of all numbers that are not active
+ * and have a derivative; about 20 that stand out of their Monte Carlo noise have
+ * Gauss-Newton rows, by which the active ones follow them (docs/estimators.md 15.1). To be
+ * asked where the active numbers are fitted, as they stand in the scene. A parameter of more than 8
+ * numbers is looked at as a common factor.
+ * @param run       run->sensor is ignored; NULL for defaults.
+ * @param[out] rows [n] in order of chi2 - 2 chi2_se; they belong to the problem, until the next call.
+ * @return as imp_problem_objective; IMP_E_UNSUPPORTED with more than 236 active numbers. */
+IMP_API IMP_MUST_CHECK enum imp_status
+imp_problem_missing(imp_problem *problem, const struct imp_run *run,
+                    const struct imp_missing **rows, size_t *n);
+
 /* ---- Steps of an optimiser ------------------------------------------------------- */
 
 enum imp_rule {

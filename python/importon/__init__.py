@@ -31,6 +31,7 @@ from ._gradient import Estimate, Jacobian, Loss, functional, jacobian, loss, ren
 from ._library import (ArgumentError, BiasError, Cancelled, Error, FileError, ImportonWarning, NumericError, Part,
                        OutOfMemoryError, ParameterError, PathsError, Progress, SceneError, UnsupportedError,
                        explained, library_path, set_threads, threads)
+from ._missing import Missing, missing
 from ._params import Gradient, ParameterInfo, SceneParameters, Values, traverse
 from ._parts import PartsInfo, join_parts, merge, part, parts_info, team
 from ._picture import DroppedWalk, Picture, project, read, write
@@ -47,12 +48,12 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ArgumentError", "BiasError", "Cancelled", "Check", "CheckRow", "Color3f", "Comparison", "DroppedWalk", "Error",
-    "Estimate", "FileError", "Fit", "FitVariable", "Gradient", "ImportonWarning", "Jacobian", "Loss",
+    "Estimate", "FileError", "Fit", "FitVariable", "Gradient", "ImportonWarning", "Jacobian", "Loss", "Missing",
     "NumericError", "OutOfMemoryError", "ParameterError", "ParameterInfo", "Part", "PartsInfo", "PathsError",
     "Picture", "Progress", "ScalarTransform4f", "Scene", "SceneError", "SceneParameters", "SelfTestRow", "Sensor",
     "Transform4f", "UnsupportedError", "Values", "Walks", "__version__", "ad", "bend", "check", "compare", "cornell_box", "denoise",
     "elements", "fit", "functional", "guide", "jacobian", "join_parts", "keep", "library_path", "load_dict", "load_file",
-    "load_string", "loss", "merge", "part", "parts_info", "project", "read", "read_walks", "render", "render_backward",
+    "load_string", "loss", "merge", "missing", "part", "parts_info", "project", "read", "read_walks", "render", "render_backward",
     "render_forward", "report", "selftest", "set_progress", "set_threads", "set_variant", "team", "threads",
     "traverse", "variant", "walk", "write",
 ]

@@ -102,7 +102,8 @@ struct imp_problem {
     bool same_known;            /* the ranks of a team have the same problem */
     struct imp_arena fit_arena; /* of the last fit's result */
     struct imp__fit_answer fit_answer;
-    struct imp_arena check_arena; /* of the last check's rows */
+    struct imp_arena check_arena;   /* of the last check's rows */
+    struct imp_arena missing_arena; /* of rows of imp_problem_missing */
 };
 
 /* ---- ties.c ---- */
@@ -129,6 +130,8 @@ double imp__block_get(const struct imp_problem *p, const struct imp__block *b, s
 void imp__tied_set(const struct imp_active *active, struct imp_param *param, size_t k,
                    const double *x);
 void imp__ties_free(struct imp_problem *p);
+/* Forgets the tie that was made last; the layout is the caller's. */
+void imp__tie_last_free(struct imp_problem *p);
 uint64_t imp__ties_hash(const struct imp_problem *p, uint64_t hash);
 /* IMP_E_UNSUPPORTED where `what` knows equal numbers alone. */
 enum imp_status imp__ties_equal_only(const struct imp_problem *p, const char *what);

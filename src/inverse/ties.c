@@ -222,6 +222,11 @@ void imp__ties_free(struct imp_problem *p)
     p->n_ties = p->cap_ties = 0;
 }
 
+void imp__tie_last_free(struct imp_problem *p)
+{
+    tie_free(p->ctx, &p->ties[--p->n_ties]);
+}
+
 static bool alike(const struct imp_param_info *a, const struct imp_param_info *b)
 {
     if (a->count != b->count || a->n_dims != b->n_dims ||
