@@ -93,10 +93,16 @@ static int run_fit(int n, char **operand)
         if (!rc) rc = manifest_pause();
         if (!rc && result) rc = note_results(problem, result);
     }
-    if (!rc && result && !cli.verifies)
-        rc = fit_answer_give(&(struct fit_answer){problem, result, blocks, n_blocks,
-                                                  fit_optimizer_word(),
-                                                  fit_choice.no_intervals});
+    if (!rc && result && !cli.verifies) {
+        struct fit_answer answer = {.problem = problem,
+                                    .result = result,
+                                    .blocks = blocks,
+                                    .n_blocks = n_blocks,
+                                    .optimizer = fit_optimizer_word(),
+                                    .no_intervals = fit_choice.no_intervals};
+        if (!progress_interrupted()) rc = fit_missing_find(&answer);
+        if (!rc) rc = fit_answer_give(&answer);
+    }
     if (!rc && result && cli.out) {
         progress_resume(); /* after Ctrl-C the state reached is still written */
         rc = fit_pictures_write("recovered", o.picture_spp);

@@ -223,6 +223,7 @@ void fit_answer_json(struct json *j, const struct fit_answer *a, char **paths)
     }
     json_end_array(j);
     put_curves(j, a);
+    if (a->looked) fit_missing_json(j, a);
 }
 
 static int write_json(const struct fit_answer *a, char **paths)
@@ -296,6 +297,7 @@ static void print_table(const struct fit_answer *a, char **paths)
     printf("\n%s %.6g +- %.2g after %d iterations: %s\n", loss_word(), r->objective.value,
            r->objective.se, r->iterations, r->reason ? r->reason : "");
     print_residual(r);
+    if (a->looked) fit_missing_print(a);
 }
 
 /* Half the width of the 95 % intervals of a field as a picture of its own, where there are

@@ -12,7 +12,10 @@ struct fit_answer {
     const struct block *blocks;
     size_t n_blocks;
     const char *optimizer;
-    int no_intervals; /* they were not asked for */
+    int no_intervals;                  /* they were not asked for */
+    const struct imp_missing *missing; /* [n_missing] numbers that may be wrong */
+    size_t n_missing;
+    int looked; /* they were looked for */
 };
 /* Print it, and write it into -o DIR. 0, or an exit code with the reason printed, as the
  * next two. */
@@ -25,6 +28,13 @@ int fit_answer_writable(const struct block *blocks, size_t n_blocks);
 int fit_answer_manifest(void);
 /* The members of its JSON. paths [n_blocks]: files of large blocks; NULL: none. */
 void fit_answer_json(struct json *j, const struct fit_answer *a, char **paths);
+
+/* fit_missing.c: sets missing, n_missing and looked, if they are to be looked for. 0, or an
+ * exit code with the reason printed. */
+int fit_missing_find(struct fit_answer *a);
+/* "missing":[..] */
+void fit_missing_json(struct json *j, const struct fit_answer *a);
+void fit_missing_print(const struct fit_answer *a);
 
 /* Losses [n], their errors and where they were [n][n_numbers]; these may be NULL. */
 struct fit_history {

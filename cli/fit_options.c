@@ -4,6 +4,8 @@
 static const char *const optimizer_words[] = {"adam", "lm",    "lbfgs",
                                               "mma",  "slsqp", NULL};
 
+static const char *const missing_words[] = {"auto", "always", "never", NULL};
+
 struct fit_choice fit_choice = {.memory = -1};
 
 const struct arg_option options_search[] = {
@@ -25,6 +27,10 @@ const struct arg_option options_search[] = {
      &fit_choice.memory, 0, 1e12, NULL},
     {ARG_FLAG, 0, "no-intervals", NULL, "do not estimate 95 % intervals at the end",
      &fit_choice.no_intervals, 0, 0, NULL},
+    {ARG_CHOICE, 0, "missing", "WHEN",
+     "name numbers, not fitted, that may be wrong: auto (default: where the pictures are "
+     "not explained), always or never",
+     &fit_choice.missing, 0, 0, missing_words},
     {0}};
 
 struct imp_fit_options fit_choice_options(void)

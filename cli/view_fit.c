@@ -178,12 +178,12 @@ static int step(const struct imp_fit_step *s, void *payload)
 
 static struct fit_answer answer(void)
 {
-    return (struct fit_answer){f.problem,
-                               f.result,
-                               f.blocks,
-                               f.n_blocks,
-                               fit_optimizer_word(),
-                               fit_choice.no_intervals};
+    return (struct fit_answer){.problem = f.problem,
+                               .result = f.result,
+                               .blocks = f.blocks,
+                               .n_blocks = f.n_blocks,
+                               .optimizer = fit_optimizer_word(),
+                               .no_intervals = fit_choice.no_intervals};
 }
 
 static void result_show(void)
