@@ -43,3 +43,53 @@ imp_v3 imp__sun_direction(const struct imp__sun_date *d)
     const double seen = zenith + 6371.01 / 149597890 * sin(zenith); /* parallax */
     return imp__v3(-cos(azimuth) * sin(seen), -sin(azimuth) * sin(seen), cos(seen));
 }
+
+static enum imp_status date_read(const struct imp_build *b, imp_v3 *sun)
+{
+    enum imp_status st = IMP_OK;
+    struct imp__sun_date d;
+    int64_t year, month, day;
+    IMP_TRY(imp_build_float(b, "latitude", 35.6894, &d.latitude));
+    IMP_TRY(imp_build_float(b, "longitude", 139.6917, &d.longitude));
+    IMP_TRY(imp_build_float(b, "timezone", 9, &d.timezone));
+    IMP_TRY(imp_build_int(b, "year", 2010, 1900, 2100, &year));
+    IMP_TRY(imp_build_int(b, "month", 7, 1, 12, &month));
+    IMP_TRY(imp_build_int(b, "day", 10, 1, 31, &day));
+    IMP_TRY(imp_build_float(b, "hour", 15, &d.hour));
+    IMP_TRY(imp_build_float(b, "minute", 0, &d.minute));
+    IMP_TRY(imp_build_float(b, "second", 0, &d.second));
+    d.year = (int)year;
+    d.month = (int)month;
+    d.day = (int)day;
+    if (!(fabs(d.latitude) <= 90))
+        IMP_TRY(imp_build_error(b, "latitude", IMP_E_SCENE,
+                                "latitude = %g is outside [-90, 90]", d.latitude));
+    *sun = imp__sun_direction(&d);
+out:
+    return st;
+}
+
+enum imp_status imp__sun_read(const struct imp_build *b, imp_v3 *sun, bool *of_world)
+{
+    static const char *const times[] = {"latitude", "longitude", "timezone",
+                                        "year",     "month",     "day",
+                                        "hour",     "minute",    "second"};
+    enum imp_status st = IMP_OK;
+    double d[3];
+    *of_world = imp_build_has(b, "sun_direction");
+    if (!*of_world) return date_read(b, sun);
+    for (size_t k = 0; k < sizeof times / sizeof *times; k++)
+        if (imp_build_has(b, times[k]))
+            IMP_TRY(
+                imp_build_error(b, times[k], IMP_E_SCENE,
+                                "give sun_direction, or a place and a time, not both"));
+    IMP_TRY(imp_build_vector(b, "sun_direction", (double[3]){0, 0, 1}, d));
+    *sun = imp__v3(d[0], d[1], d[2]);
+    const double length = imp__length(*sun);
+    if (!(length > 0) || !isfinite(length))
+        IMP_TRY(imp_build_error(b, "sun_direction", IMP_E_SCENE,
+                                "sun_direction has length %g", length));
+    *sun *= imp__spec(1 / length);
+out:
+    return st;
+}

@@ -2,6 +2,7 @@
 #ifndef IMP_KIND_EMITTER_SUN_POSITION_H
 #define IMP_KIND_EMITTER_SUN_POSITION_H
 
+#include "kind/build.h"
 #include "math/vec.h"
 
 struct imp__sun_date {
@@ -15,5 +16,9 @@ struct imp__sun_date {
  * 2015 (Blanco-Muriel, Alarcon-Padilla, Lopez-Moratalla and Lara-Coira 2001, "Computing the
  * solar vector"). */
 imp_v3 imp__sun_direction(const struct imp__sun_date *d);
+
+/* From the properties of a scene: sun_direction, which is of the world (*of_world), or a
+ * place and a time. *sun is unit. */
+enum imp_status imp__sun_read(const struct imp_build *b, imp_v3 *sun, bool *of_world);
 
 #endif

@@ -311,66 +311,18 @@ static double pdf(const struct imp_emitter *e, const imp_v3 *ref, const imp_v3 *
 
 /* ---- Building -------------------------------------------------------------------- */
 
-static enum imp_status date_read(const struct imp_build *b, imp_v3 *sun)
-{
-    enum imp_status st = IMP_OK;
-    struct imp__sun_date d;
-    int64_t year, month, day;
-    IMP_TRY(imp_build_float(b, "latitude", 35.6894, &d.latitude));
-    IMP_TRY(imp_build_float(b, "longitude", 139.6917, &d.longitude));
-    IMP_TRY(imp_build_float(b, "timezone", 9, &d.timezone));
-    IMP_TRY(imp_build_int(b, "year", 2010, 1900, 2100, &year));
-    IMP_TRY(imp_build_int(b, "month", 7, 1, 12, &month));
-    IMP_TRY(imp_build_int(b, "day", 10, 1, 31, &day));
-    IMP_TRY(imp_build_float(b, "hour", 15, &d.hour));
-    IMP_TRY(imp_build_float(b, "minute", 0, &d.minute));
-    IMP_TRY(imp_build_float(b, "second", 0, &d.second));
-    d.year = (int)year;
-    d.month = (int)month;
-    d.day = (int)day;
-    if (!(fabs(d.latitude) <= 90))
-        IMP_TRY(imp_build_error(b, "latitude", IMP_E_SCENE,
-                                "latitude = %g is outside [-90, 90]", d.latitude));
-    *sun = imp__sun_direction(&d);
-out:
-    return st;
-}
-
-static enum imp_status sun_read(const struct imp_build *b, struct sunsky *s)
-{
-    static const char *const times[] = {"latitude", "longitude", "timezone",
-                                        "year",     "month",     "day",
-                                        "hour",     "minute",    "second"};
-    enum imp_status st = IMP_OK;
-    double d[3];
-    if (!imp_build_has(b, "sun_direction")) return date_read(b, &s->sun);
-    for (size_t k = 0; k < sizeof times / sizeof *times; k++)
-        if (imp_build_has(b, times[k]))
-            IMP_TRY(
-                imp_build_error(b, times[k], IMP_E_SCENE,
-                                "give sun_direction, or a place and a time, not both"));
-    IMP_TRY(imp_build_vector(b, "sun_direction", (double[3]){0, 0, 1}, d));
-    s->sun = imp__v3(d[0], d[1], d[2]);
-    const double length = imp__length(s->sun);
-    if (!(length > 0) || !isfinite(length))
-        IMP_TRY(imp_build_error(b, "sun_direction", IMP_E_SCENE,
-                                "sun_direction has length %g", length));
-    /* In the world, as the frame of the sky is turned by to_world. */
-    s->sun = local(s, s->sun * imp__spec(1 / length));
-out:
-    return st;
-}
-
 static enum imp_status build(const struct imp_build *b, void *self, struct imp_emitter *e)
 {
     enum imp_status st = IMP_OK;
     struct sunsky *s = self;
     double aperture;
+    bool of_world;
     const enum imp_color_mode mode = imp_build_color_mode(b);
     s->mono = mode == IMP_MONO;
     s->by_wave = mode != IMP_MONO && mode != IMP_RGB;
     IMP_TRY(imp__sky_axes(b, s->axis));
-    IMP_TRY(sun_read(b, s));
+    IMP_TRY(imp__sun_read(b, &s->sun, &of_world));
+    if (of_world) s->sun = local(s, s->sun);
     IMP_TRY(imp_build_float(b, "sun_aperture", 2 * SUN_RADIUS_DEGREES, &aperture));
     IMP_TRY(imp_build_bool(b, "complex_sun", false, &s->limb));
     if (!(aperture > 0 && aperture < 180))
