@@ -73,7 +73,7 @@ def missing(scene: Scene, params: Any = None, target: Any = None, *, spp: int = 
     --------
     >>> scene = importon.load_dict(importon.cornell_box(res=8))
     >>> target = importon.render(scene, spp=256)
-    >>> importon.traverse(scene)["light.radiance.value"] = 20, 9, 2
+    >>> importon.traverse(scene)["light.emitter.radiance.value"] = 20, 9, 2
     >>> rows = importon.missing(scene, "white.*", target, spp=64)
     >>> 0 <= rows[0].chance <= 1
     True

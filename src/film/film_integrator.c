@@ -122,5 +122,6 @@ const struct imp_integrator_ops *const imp__integrator_kinds[] = {
     &imp__integrator_prb_basic,
     &imp__integrator_prb_projective,
     &imp__integrator_direct_projective,
-    &imp__integrator_bdpt, &imp__integrator_ptracer,
+    &imp__integrator_bdpt,
+    &imp__integrator_ptracer,
     NULL};

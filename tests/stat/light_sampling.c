@@ -403,7 +403,8 @@ static void emitters(void)
             ops->eval(e, in, &x, &le);
             ops->eval(e, twice, &x, &le2);
             ops->eval_d(e, in, &x, dle);
-            for (int c = 0; c < 3; c++) {
+            /* Light is linear in the first input, unless that is no strength (sunsky). */
+            for (int c = 0; c < 3 && ops->inputs[0].role == IMP_EMISSION; c++) {
                 slope = fmax(slope, fabs(le2[c] - 2 * le[c]) / (1 + le[c]));
                 slope = fmax(slope, fabs(le[c] - dle[0][c] * in[0][c]) / (1 + le[c]));
             }

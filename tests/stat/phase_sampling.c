@@ -69,8 +69,8 @@ static void check(const struct imp_phase *p, uint64_t stream, const char *name)
         }
     double off = fabs(total - 1);
     for (int c = 0; c < 3; c++) off = fmax(off, fabs(sum[c] - 1));
-    tap_ok(off < (p->n_in ? 1e-4 : 1e-6), "%s: integrals of value and density are 1 # off by %.1e", name,
-           off);
+    tap_ok(off < (p->n_in ? 1e-4 : 1e-6),
+           "%s: integrals of value and density are 1 # off by %.1e", name, off);
     tap_ok(asymmetry < 1e-12, "%s: reciprocal # %.1e", name, asymmetry);
 
     struct tap_stat weight = {0, 0, 0};

@@ -4,7 +4,7 @@ for page in "$ROOT"/man/*.[0-9]; do
     command -v mandoc >/dev/null && mandoc -Tlint -Wwarning "$page"
 done
 options() {
-    importon help | sed -n 's/^  \([a-z]*\) .*/\1/p' | while read -r command; do
+    importon help | sed -n 's/^  \([a-z-]*\) .*/\1/p' | while read -r command; do
         importon help "$command" | grep -oE '^ +(-., )?--[a-z-]+' | sed 's/.*--//'
     done | sort -u
 }
