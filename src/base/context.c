@@ -31,9 +31,6 @@ static bool fits_machine(size_t bytes)
     const long pages = sysconf(_SC_PHYS_PAGES), page = sysconf(_SC_PAGE_SIZE);
     return pages <= 0 || page <= 0 || bytes / (size_t)page < (size_t)pages;
 }
-/* Large arrays are read at random (volumes, their gradients): with pages of 2 MB the
- * processor finds them in its tables, and asks the system for each 4 kB no more. */
-#define HUGE_PAGE ((size_t)1 << 21)
 
 /* Large arrays are read at random (volumes, their gradients): with pages of 2 MB the
  * processor keeps their addresses, and the system is not asked for each 4 kB. */

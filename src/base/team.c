@@ -31,6 +31,15 @@ enum imp_status imp__team_join(imp_context *ctx, const struct imp_team *host,
     return IMP_OK;
 }
 
+#ifdef CPU_FEATURE_ACTIVE
+/* As the macro, which shifts a signed 1 by 31. */
+static bool is_active(unsigned index)
+{
+    const struct cpuid_feature *leaf = __x86_get_cpuid_feature_leaf(index / 128);
+    return leaf->active_array[index % 128 / 32] >> index % 32 & 1;
+}
+#endif
+
 /* Embree and libm choose their code by these. glibc knows them; GCC's own list would be made by a
  * constructor that every start of a program runs. */
 void imp__machine_text(char text[256])
@@ -39,7 +48,7 @@ void imp__machine_text(char text[256])
 #if defined(__x86_64__)
 #ifdef CPU_FEATURE_ACTIVE
 #define IMP_HAS(name, feature)                                                           \
-    if (CPU_FEATURE_ACTIVE(feature)) strncat(text, " " name, 255 - strlen(text))
+    if (is_active(x86_cpu_##feature)) strncat(text, " " name, 255 - strlen(text))
 #else
     __builtin_cpu_init();
 #define IMP_HAS(name, feature)                                                           \
