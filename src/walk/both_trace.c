@@ -137,6 +137,7 @@ static bool scatter(struct imp_step *s, struct imp_vertex *v,
 {
     const struct imp_both *b = s->both;
     const int segments = s->depth + 1;
+    imp__step_numbers(s);
     if (!imp__light_depth_allows(s, segments + 1)) return false;
     if (v->bsdf->flags & IMP_BSDF_SMOOTH) {
         struct imp_shadow shadow = {.wanted = false};
