@@ -79,7 +79,7 @@ struct imp_densities {
     const struct imp_walk_integrator *integrator;
     double survival;  /* of the tracer they were drawn with */
     bool guided;      /* their survival was decided by a guide */
-    uint32_t *inputs; /* [n_bsdfs] bit j: the density depends on input j */
+    uint64_t *inputs; /* [n_bsdfs] bit j: the density depends on input j */
     uint8_t *moved;   /* [n_bsdfs] it has changed */
     bool any;         /* of moved */
     bool weights;     /* some value that roulette looks at has changed */

@@ -22,6 +22,8 @@
 #include "store.h"
 #include <string.h>
 
+_Static_assert(IMP_INPUTS_MAX <= 64, "masks of inputs have 64 bits");
+
 /* ---- What densities depend on ---------------------------------------------------- */
 
 #define TRIES 24 /* pairs of directions */
@@ -114,7 +116,7 @@ enum imp_status imp__densities_create(const struct imp_scene *scene,
         const bool medium = bsdf->ops->inputs == NULL && bsdf->n_in > 0;
         for (int j = 0; j < bsdf->n_in; j++)
             if (medium || bsdf->shaped || depends(bsdf, j))
-                d.inputs[b] |= UINT32_C(1) << j;
+                d.inputs[b] |= UINT64_C(1) << j;
     }
     *out = d;
     return IMP_OK;
