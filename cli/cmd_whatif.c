@@ -160,6 +160,10 @@ static enum imp_status weigh(struct answer *a)
         const int sensor = n ? target_sensor(i) : w.run.sensor;
         const enum imp_status st = imp_walks_weigh(w.walks, sensor, w.mask, &weight);
         if (st != IMP_OK) return st;
+        if (weight.refused) {
+            snprintf(a->refused, sizeof a->refused, "%s", weight.refused);
+            return IMP_E_NUMERIC;
+        }
         a->ess = fmin(a->ess, weight.ess);
         a->growth = fmax(a->growth, weight.growth);
     }

@@ -105,7 +105,8 @@ struct imp_walks_info {
 IMP_API enum imp_status imp_walks_get_info(const imp_walks *walks,
                                            struct imp_walks_info *info);
 
-/** The scene in which they are evaluated; the caller's. */
+/** The scene in which they are evaluated; the caller's. Of walks that were read with their
+ * scene: destroyed with the walks, not by the caller. */
 IMP_API imp_scene *imp_walks_scene(const imp_walks *walks);
 
 struct imp_walks_weight {

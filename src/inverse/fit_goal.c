@@ -193,6 +193,8 @@ static void fingerprint(struct imp__fit *f)
                               f->options.tolerance,
                               f->run.spp > 0 ? f->run.spp : sensor->spp};
     h->options = imp__hash(f->outer.seed, number, sizeof number);
+    if (f->outer.from != IMP_FROM_SCENE)
+        h->options = imp__hash(h->options, &f->outer.from, sizeof f->outer.from);
     if (imp__fit_keeps(f))
         h->options = imp__hash(h->options, &f->options.memory, sizeof f->options.memory);
     if (imp__points_of(sensor, &f->outer) == IMP_POINTS_SOBOL) {
