@@ -20,8 +20,8 @@ enum { VALUES_MAX = 1 << 16, NUMBERS = 24 };
 
 struct tabphase {
     int n;
-    double *value; /* [n] of a longer table; NULL: the inputs are the values */
-    double *below; /* [n] of a longer table: the integral from -1 */
+    double *value; /* [n] of a table that stands; NULL: the inputs are the values */
+    double *below; /* [n] of one that stands: the integral from -1 */
 };
 
 #define VALUE(k)                                                                         \
@@ -78,12 +78,22 @@ out:
     return st;
 }
 
+/* Are the values numbers of the scene? Of a long table they are not; nor where two
+ * neighbours are 0, since no direction is drawn between them, where one that rises would
+ * bring light. */
+static bool are_numbers(int n, const double *value)
+{
+    for (int i = 1; i < n; i++)
+        if (value[i - 1] == 0 && value[i] == 0) return false;
+    return n <= NUMBERS;
+}
+
 static enum imp_status prepare(const struct imp_build *b)
 {
     double *value;
     int n;
     enum imp_status st = values_read(b, &n, &value);
-    for (int i = 0; st == IMP_OK && i < n && n <= NUMBERS; i++) {
+    for (int i = 0; st == IMP_OK && i < n && are_numbers(n, value); i++) {
         if (imp_build_has(b, inputs[i].name))
             return imp_build_error(b, inputs[i].name, IMP_E_SCENE,
                                    "'%s' is a number of 'values'", inputs[i].name);
@@ -107,7 +117,8 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_p
     double *value;
     (void)p;
     IMP_TRY(values_read(b, &t->n, &value));
-    for (int i = t->n; i < NUMBERS; i++)
+    const bool numbers = are_numbers(t->n, value);
+    for (int i = numbers ? t->n : 0; i < NUMBERS; i++)
         if (imp_build_has(b, inputs[i].name))
             IMP_TRY(imp_build_error(b, inputs[i].name, IMP_E_SCENE,
                                     "'%s' is a number of 'values', which has %d",
@@ -119,7 +130,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_p
     if (!(below[t->n - 1] > 0) || !isfinite(below[t->n - 1]))
         IMP_TRY(imp_build_error(b, "values", IMP_E_SCENE,
                                 "the integral of its values is %g", below[t->n - 1]));
-    if (t->n <= NUMBERS) goto out;
+    if (numbers) goto out;
     t->value = value;
     t->below = below;
 out:
@@ -156,6 +167,10 @@ static void sample(const struct imp_phase *p, const imp_spec *in, const double u
 {
     struct table t;
     table_of(p, in, &t);
+    if (!(t.all > 0)) { /* a search went there */
+        d->wi = imp__turn(d->wo, 2 * u[1] - 1, u[2]);
+        return;
+    }
     int i = 0, above = t.n - 1;
     const double target = u[1] * t.all;
     while (above - i > 1) {
