@@ -161,13 +161,24 @@ static enum imp_status both_allowed(const struct imp_scene *scene,
 static enum imp_status media_allowed(const struct imp_scene *scene,
                                      const struct imp_active *active)
 {
-    for (int m = 0; active->medium && m < scene->n_media; m++)
-        if (active->medium[m] && scene->media[m]->majorants)
+    for (int m = 0; active->medium && m < scene->n_media; m++) {
+        const struct imp_medium *medium = scene->media[m];
+        imp_spec in[IMP_INPUTS_MAX];
+        if (!active->medium[m]) continue;
+        if (medium->majorants)
             return imp__error(scene->ctx, IMP_E_BIAS,
                               "walks from the lights: the derivative with respect to the "
                               "extinction of medium '%s', which varies, is not whole "
                               "where it is 0; let walks begin at the sensor",
-                              scene->media[m]->name);
+                              medium->name);
+        if (imp__is_zero(imp__extinction_at(medium, (imp_v3){0}, NULL, in)))
+            return imp__error(
+                scene->ctx, IMP_E_BIAS,
+                "walks from the lights: the extinction of medium '%s' is 0, "
+                "and what it would scatter is not in the derivative; let "
+                "walks begin at the sensor",
+                medium->name);
+    }
     return IMP_OK;
 }
 
