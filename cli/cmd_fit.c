@@ -100,8 +100,8 @@ static int run_fit(int n, char **operand)
                                     .n_blocks = n_blocks,
                                     .optimizer = fit_optimizer_word(),
                                     .no_intervals = fit_choice.no_intervals};
-        if (!progress_interrupted()) rc = fit_missing_find(&answer);
-        if (!rc) rc = fit_answer_give(&answer);
+        if (!progress_interrupted()) fit_missing_find(&answer);
+        rc = fit_answer_give(&answer);
     }
     if (!rc && result && cli.out) {
         progress_resume(); /* after Ctrl-C the state reached is still written */

@@ -31,7 +31,7 @@ void fit_answer_json(struct json *j, const struct fit_answer *a, char **paths);
 
 /* fit_missing.c: sets missing, n_missing and looked, if they are to be looked for. 0, or an
  * exit code with the reason printed. */
-int fit_missing_find(struct fit_answer *a);
+void fit_missing_find(struct fit_answer *a);
 /* "missing":[..] */
 void fit_missing_json(struct json *j, const struct fit_answer *a);
 void fit_missing_print(const struct fit_answer *a);

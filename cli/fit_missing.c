@@ -45,38 +45,42 @@ void fit_missing_json(struct json *j, const struct fit_answer *a)
 void fit_missing_print(const struct fit_answer *a)
 {
     enum { MOST = 8 };
+    const struct imp_missing *named[MOST];
     size_t n = 0;
     char name[576];
-    while (n < a->n_missing && n < MOST && a->missing[n].chance < CHANCE) n++;
+    for (size_t k = 0; k < a->n_missing && n < MOST; k++)
+        if (a->missing[k].chance < CHANCE) named[n++] = &a->missing[k];
     if (n == 0) {
-        printf("no single number that is not fitted explains what is left\n");
+        printf("no number that is not fitted stands out of the noise\n");
         return;
     }
     int width = 0;
     for (size_t k = 0; k < n; k++) {
-        const int length = (int)strlen(missing_name(&a->missing[k], name, sizeof name));
+        const int length = (int)strlen(missing_name(named[k], name, sizeof name));
         width = length > width ? length : width;
     }
     printf("not fitted, and may be wrong (if it were fitted too):\n");
     for (size_t k = 0; k < n; k++) {
-        const struct imp_missing *m = &a->missing[k];
+        const struct imp_missing *m = named[k];
         printf("  %-*s  %.6g -> %.6g +- %.1g   chi-square -%.4g +- %.1g\n", width,
                missing_name(m, name, sizeof name), m->value, m->value + m->step,
                m->step_se, m->chi2, m->chi2_se);
     }
 }
 
-int fit_missing_find(struct fit_answer *a)
+void fit_missing_find(struct fit_answer *a)
 {
     enum { AUTO, ALWAYS, NEVER };
     const double excess = (a->result->chi2 - 1) / a->result->chi2_se;
     const struct imp_run run = cli_run();
     if (fit_choice.missing == NEVER || (fit_choice.missing == AUTO && !(excess > 3)))
-        return 0;
+        return;
     const enum imp_status st =
         imp_problem_missing(a->problem, &run, &a->missing, &a->n_missing);
     a->looked = st == IMP_OK;
-    if (fit_choice.missing == AUTO && (st == IMP_E_UNSUPPORTED || st == IMP_E_BIAS))
-        return 0;
-    return cli_failed(st) ? cli_fail(st, cli.scene_path) : 0;
+    if (st == IMP_CANCELLED || st == IMP_OK ||
+        (fit_choice.missing == AUTO && (st == IMP_E_UNSUPPORTED || st == IMP_E_BIAS)))
+        return;
+    cli_say("importon: warning: numbers that may be wrong were not looked for: %s",
+            imp_last_error(cli.context));
 }

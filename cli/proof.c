@@ -2,6 +2,7 @@
  *
  * Manifests of render, gradient and fit. */
 #include "proof.h"
+#include "cmd_problem.h"
 #include "overwrite.h"
 #include "part.h"
 #include "progress.h"
@@ -83,12 +84,25 @@ int manifest_whole(void)
     return cli.manifest ? status(imp_manifest_set_limit(cli.manifest, 0)) : 0;
 }
 
+/* Losses of walks from the lights are sums over all pixels: no parts of them are kept. */
+static int loss_from_lights(void)
+{
+    struct imp_scene_info info = {.size = sizeof info};
+    const int is_fit = !strcmp(cli.name, "fit");
+    if (!is_fit && (strcmp(cli.name, "gradient") || problem_options.targets.n == 0))
+        return 0;
+    if (cli.from != IMP_FROM_SCENE) return cli.from == IMP_FROM_LIGHTS;
+    return imp_scene_get_info(cli.scene, &info) == IMP_OK && info.integrator &&
+           (!strcmp(info.integrator, "ptracer") || !strcmp(info.integrator, "bdpt"));
+}
+
 int manifest_begin(const char *output)
 {
     if (!cli.manifest || cli.verifies || cli.manifest_path)
         return cli.manifest ? status(imp_context_set_manifest(cli.context, cli.manifest))
                             : 0;
-    if (!output || !strcmp(output, "-") || !is_file_or_none(output)) {
+    if (!output || !strcmp(output, "-") || !is_file_or_none(output) ||
+        loss_from_lights()) {
         beside_drop();
         return 0;
     }

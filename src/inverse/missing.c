@@ -68,6 +68,9 @@ static bool may_ask(const struct imp_scene *s, size_t k)
 {
     const struct imp_param *q = &s->params[k];
     if (!(q->info.flags & IMP_PARAM_DIFFERENTIABLE) || q->info.count == 0) return false;
+    for (int b = 0; b < s->n_bodies; b++) /* bent rays have no rows here */
+        for (int i = 0; i < s->bodies[b]->n_numbers; i++)
+            if (s->bodies[b]->numbers[i].param == (int)k) return false;
     if (q->info.count <= APART) return true;
     for (size_t e = 0; e < q->info.count; e++)
         if (imp__param_get(q, e) != 0) return !strpbrk(q->info.name, "*?[],");
