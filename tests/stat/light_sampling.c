@@ -417,7 +417,8 @@ static void emitters(void)
                 ops->eval(e, up, &x, &a);
                 ops->eval(e, down, &x, &b);
                 for (int c = 0; c < 3; c++)
-                    other = fmax(other, fabs((a[c] - b[c]) / 2e-5 - dle[j][c]));
+                    other =
+                        fmax(other, fabs((a[c] - b[c]) / 2e-5 - dle[j][c]) / (1 + le[c]));
             }
             lit += le[0] > 0;
             behind += area && ref[2] < 0 && le[0] != 0;
