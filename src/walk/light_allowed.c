@@ -3,6 +3,7 @@
  * The reasons to refuse walks from the lights. */
 #include "light_walk.h"
 #include "scene/media_around.h"
+#include "tracking.h"
 
 /* Is what the material emits 0, whatever is differentiated? */
 static bool is_dark(const struct imp_bsdf *b, const struct imp_active *active)
