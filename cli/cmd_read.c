@@ -23,6 +23,11 @@ static const struct arg_option options[] = {
      NULL},
     {0}};
 
+struct findings {
+    int apart; /* do the ends differ? */
+    int lit;   /* has light reached the present sensor? */
+};
+
 struct reading {
     struct imp_estimate value;
     double *grad, *se; /* NULL: no derivatives are asked for */
@@ -81,13 +86,14 @@ static void json_derivatives(struct json *j, const struct block *blocks, size_t 
 /* A number as JSON or as a line; the object stays open for derivatives. */
 static void number_print(struct json *j, const struct imp_sensor_info *info,
                          const char *channel, struct imp_estimate value,
-                         struct imp_estimate other, int *apart)
+                         struct imp_estimate other, struct findings *found)
 {
     const double both = hypot(value.se, other.se);
     const double z = both > 0                     ? (other.value - value.value) / both
                      : other.value == value.value ? 0
                                                   : INFINITY;
-    if (o.ends) *apart |= !(fabs(z) <= APART);
+    if (o.ends) found->apart |= !(fabs(z) <= APART);
+    found->lit |= value.value != 0 || value.se > 0 || other.value != 0 || other.se > 0;
     if (cli.json) {
         json_object(j, NULL);
         json_text(j, "sensor", info->name);
@@ -108,11 +114,11 @@ static void number_print(struct json *j, const struct imp_sensor_info *info,
     printf("\n");
 }
 
-/* One number of one sensor; *apart: do the ends differ? */
+/* One number of one sensor. */
 static int number_read(imp_problem *problem, struct json *j, struct imp_run run,
                        const struct imp_sensor_info *info, const char *channel,
                        const float *adjoint, const struct block *blocks, size_t n_blocks,
-                       int *apart)
+                       struct findings *found)
 {
     const size_t n = n_blocks ? imp_problem_n(problem) : 0;
     struct reading r = {.grad = n ? cli_alloc(n, sizeof(double)) : NULL,
@@ -130,7 +136,7 @@ static int number_read(imp_problem *problem, struct json *j, struct imp_run run,
         rc = cli_fail(st, cli.scene_path);
         goto out;
     }
-    number_print(j, info, channel, r.value, other, apart);
+    number_print(j, info, channel, r.value, other, found);
     if (n && cli.json) json_derivatives(j, blocks, n_blocks, &r);
     if (n && !cli.json) print_derivatives(blocks, n_blocks, &r, info->unit);
     if (cli.json) json_end_object(j);
@@ -154,7 +160,7 @@ static int pixel_read(struct imp_run run, int n, struct imp_estimate *out)
 
 /* A specfilm's numbers, one for each response curve. */
 static int curves_read(struct json *j, struct imp_run run,
-                       const struct imp_sensor_info *info, int *apart)
+                       const struct imp_sensor_info *info, struct findings *found)
 {
     const int n = info->n_responses;
     if (info->width != 1 || info->height != 1)
@@ -171,7 +177,7 @@ static int curves_read(struct json *j, struct imp_run run,
         rc = pixel_read(run, n, other);
     }
     for (int c = 0; c < n && !rc; c++) {
-        number_print(j, info, info->response_names[c], value[c], other[c], apart);
+        number_print(j, info, info->response_names[c], value[c], other[c], found);
         if (cli.json) json_end_object(j);
     }
     free(value);
@@ -179,7 +185,8 @@ static int curves_read(struct json *j, struct imp_run run,
 }
 
 static int sensor_read(imp_problem *problem, struct json *j, struct imp_run run,
-                       const struct block *blocks, size_t n_blocks, int *apart)
+                       const struct block *blocks, size_t n_blocks,
+                       struct findings *found)
 {
     static const char *const names[] = {"R", "G", "B"};
     struct imp_sensor_info info = {.size = sizeof info};
@@ -187,17 +194,34 @@ static int sensor_read(imp_problem *problem, struct json *j, struct imp_run run,
     imp_scene_get_info(cli.scene, &scene);
     const enum imp_status st = imp_scene_get_sensor(cli.scene, run.sensor, &info);
     if (st != IMP_OK) return cli_fail(st, cli.scene_path);
-    if (info.n_responses > 0 && n_blocks == 0) return curves_read(j, run, &info, apart);
+    if (info.n_responses > 0 && n_blocks == 0) return curves_read(j, run, &info, found);
     const int luminous = strchr("lc", info.unit[0]) != NULL; /* lx, cd m^-2 */
     const int one = luminous || scene.channels == 1;
     int rc = 0;
     for (int c = 0; c < (one ? 1 : scene.channels) && !rc; c++) {
         float *adjoint = adjoint_of(&info, scene.channels, one ? -1 : c);
         rc = number_read(problem, j, run, &info, one ? "Y" : names[c], adjoint, blocks,
-                         n_blocks, apart);
+                         n_blocks, found);
         free(adjoint);
     }
     return rc;
+}
+
+/* Sensors to which no walk brought light. */
+static void unlit_tell(struct json *j, const int *sensor, int n)
+{
+    if (cli.json) json_array(j, "unlit");
+    for (int k = 0; k < n; k++) {
+        struct imp_sensor_info info = {.size = sizeof info};
+        if (imp_scene_get_sensor(cli.scene, sensor[k], &info) != IMP_OK) continue;
+        if (cli.json) json_text(j, NULL, info.name);
+        cli_say(
+            "importon: warning: sensor '%s' (%s): no walk brought light to it, and its "
+            "error of 0 tells nothing: is it in the dark, or do walks of the other end "
+            "find it?",
+            info.name, info.type);
+    }
+    if (cli.json) json_end_array(j);
 }
 
 /* Is one sensor asked for, and not all? */
@@ -214,7 +238,7 @@ static int run_read(int n, char **operand)
     struct block *blocks = NULL;
     size_t n_blocks = 0;
     imp_problem *problem = NULL;
-    int apart = 0;
+    struct findings found = {0, 0};
     (void)n;
     int rc = cli_load(operand[0]);
     if (rc) return rc;
@@ -241,18 +265,22 @@ static int run_read(int n, char **operand)
         json_array(&j, "readings");
     }
     const int one = sensor_named(), first = one ? cli.sensor : 0;
-    for (int s = first; s < (one ? first + 1 : scene.n_sensors) && !rc; s++) {
+    const int end = one ? first + 1 : scene.n_sensors;
+    int *unlit = cli_alloc((size_t)scene.n_sensors, sizeof *unlit), n_unlit = 0;
+    for (int s = first; s < end && !rc; s++) {
         run.sensor = s;
-        rc = sensor_read(problem, &j, run, blocks, n_blocks, &apart);
+        found.lit = 0;
+        rc = sensor_read(problem, &j, run, blocks, n_blocks, &found);
+        if (!rc && !found.lit) unlit[n_unlit++] = s;
     }
-    if (cli.json && !rc) {
-        json_end_array(&j);
-        cli_json_end(&j);
-    }
+    if (cli.json && !rc) json_end_array(&j);
+    if (!rc) unlit_tell(&j, unlit, n_unlit);
+    if (cli.json && !rc) cli_json_end(&j);
+    free(unlit);
     free(blocks);
     problem_close(problem);
     if (rc) return rc;
-    return apart ? EXIT_NO : cli_done();
+    return found.apart ? EXIT_NO : cli_done();
 }
 
 const struct command command_read = {

@@ -395,6 +395,7 @@ enum imp_status imp__render_from_lights(const struct imp_measure *m,
     imp_film *film = NULL;
     struct imp_drops drops = {0};
     IMP_TRY(imp__light_walks_allowed(m->scene, m->sensor, integrator, NULL));
+    imp__light_walks_tell(m->scene, m->sensor, integrator);
     if (f->n_responses == 0 &&
         (f->pixel_format == IMP_PIXEL_LUMINANCE_ALPHA ||
          f->pixel_format == IMP_PIXEL_RGBA || f->pixel_format == IMP_PIXEL_XYZA))

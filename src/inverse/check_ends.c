@@ -14,16 +14,6 @@
 #define RESOLVED 0.2
 #define BATCHES  16 /* of a direction through many numbers */
 
-/* Has the scene a material that sends light into single directions? */
-static bool has_delta(const struct imp_scene *scene)
-{
-    for (int b = 0; b < scene->n_bsdfs; b++)
-        if (scene->bsdfs[b]->flags & IMP_BSDF_DELTA &&
-            !(scene->bsdfs[b]->flags & IMP_BSDF_NULL))
-            return true;
-    return false;
-}
-
 static bool has_point_lights(const struct imp_scene *scene)
 {
     for (int i = 0; i < scene->n_emitters; i++)
@@ -42,7 +32,7 @@ static bool both_ends(const struct imp__check *c)
     if (imp__walks_from(scene, own, IMP_FROM_SENSOR, &from[0]) != IMP_OK ||
         imp__walks_from(scene, own, IMP_FROM_LIGHTS, &from[1]) != IMP_OK)
         return false;
-    if (has_delta(scene) && (!c->tracer.sensor->shape || has_point_lights(scene)))
+    if (imp__delta_bsdf(scene) && (!c->tracer.sensor->shape || has_point_lights(scene)))
         return false;
     return imp__light_walks_allowed(scene, c->tracer.sensor, from[1],
                                     &c->problem->active) == IMP_OK;

@@ -7,6 +7,7 @@
 #include "fit.h"
 #include "math/hash.h"
 #include "scene/fingerprint.h"
+#include "walk/light_walk.h"
 #include "walk/run.h"
 #include "walk/store.h"
 #include <float.h>
@@ -283,6 +284,18 @@ static enum imp_status bounds_make(struct imp__fit *f)
     return IMP_OK;
 }
 
+/* Walks from the lights do not bring everything that targets may hold. */
+static void missing_tell(struct imp_problem *p, enum imp_from end)
+{
+    const struct imp_scene *scene = p->scene;
+    const struct imp_walk_integrator *from = imp__walk_integrator(scene);
+    if (p->missing_told || !from || imp__walks_from(scene, from, end, &from) != IMP_OK)
+        return;
+    for (size_t i = 0; i < p->n_targets; i++)
+        imp__light_walks_tell(scene, scene->sensors[p->targets[i].desc.sensor], from);
+    p->missing_told = true;
+}
+
 enum imp_status imp__fit_begin(struct imp_problem *p,
                                const struct imp_fit_options *options,
                                const struct imp_run *run, struct imp__fit *out)
@@ -332,6 +345,7 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
     f.noise_known = true;
     for (size_t i = 0; i < p->n_targets; i++)
         f.noise_known &= p->targets[i].noise_se != NULL;
+    missing_tell(p, f.outer.from);
     f.start_s = imp__now();
     f.last_checkpoint_s = f.start_s;
     f.deadline_s = f.outer.time_limit_s > 0 ? f.start_s + f.outer.time_limit_s : 0;

@@ -6,6 +6,8 @@
 #include "influence.h"
 #include "light_gradient.h"
 #include "math/hash.h"
+#include "scene/unlit.h"
+#include "walk/light_walk.h"
 #include "walk/run.h"
 #include <math.h>
 #include <string.h>
@@ -43,8 +45,12 @@ static enum imp_status begin(imp_problem *p, const float *adjoint,
                              double **weights, float **ones)
 {
     imp_context *ctx = p->ctx;
-    const enum imp_status st = imp__problem_tracer_of_any_end(p, run, NULL, &f->tracer);
+    enum imp_status st = imp__problem_tracer_of_any_end(p, run, NULL, &f->tracer);
+    if (st == IMP_OK) st = imp__sensor_lit(p->scene, f->tracer.sensor);
     if (st != IMP_OK) return st;
+    if (!p->missing_told)
+        imp__light_walks_tell(p->scene, f->tracer.sensor, f->tracer.integrator);
+    p->missing_told = true;
     f->film = &f->tracer.sensor->film;
     f->channels = p->scene->channels;
     f->margin = f->film->sample_border ? imp__film_border(f->film) : 0;

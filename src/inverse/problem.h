@@ -99,6 +99,7 @@ struct imp_problem {
     size_t n_regularisers, cap_regularisers;
     struct imp__regulariser *regularisers;
     struct imp_run run;         /* of imp_problem_nlopt */
+    bool missing_told;          /* that walks from the lights miss some light */
     bool same_known;            /* the ranks of a team have the same problem */
     struct imp_arena fit_arena; /* of the last fit's result */
     struct imp__fit_answer fit_answer;

@@ -4,6 +4,7 @@
  * sees, or with a density proportional to its responses times the light of the scene. */
 #include "color/cie.h"
 #include "scene_build.h"
+#include "unlit.h"
 
 /* Steps of the density stop stratification at about 100 walks if they are as wide as 1 nm. */
 #define BIN_NM   0.125
@@ -118,22 +119,12 @@ static bool light_reaches(const struct imp_scene *scene, struct range seen)
     return met || !any; /* a scene without light is dark, and no error */
 }
 
-/* The node that an object was made from. */
-static const struct imp_node *node_of(const struct imp_node *at, const void *object)
-{
-    const struct imp_node *found = at->object == object ? at : NULL;
-    for (size_t k = 0; k < at->n_children && !found; k++)
-        if (at->children[k].node && !at->children[k].ref)
-            found = node_of(at->children[k].node, object);
-    return found;
-}
-
 static enum imp_status lit_check(const struct imp_scene *scene,
                                  const struct imp_sensor *s)
 {
     for (int c = 0; c < s->film.n_responses; c++) {
         const struct range seen = curve_range(&s->film.response[c]);
-        const struct imp_node *node = node_of(scene->root, s);
+        const struct imp_node *node = imp__node_of(scene->root, s);
         if (light_reaches(scene, seen)) continue;
         return imp__node_error(scene->ctx, node ? node : scene->root, IMP_E_SCENE,
                                "response '%s' sees nothing: no light of the scene has "

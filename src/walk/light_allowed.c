@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The reasons to refuse walks from the lights. */
+ * The reasons to refuse walks from the lights, and what they cannot find. */
 #include "light_walk.h"
 #include "scene/media_around.h"
 #include "tracking.h"
@@ -195,4 +195,34 @@ enum imp_status imp__light_walks_allowed(const struct imp_scene *scene,
     if (active) IMP_TRY(media_allowed(scene, active));
 out:
     return st;
+}
+
+const struct imp_bsdf *imp__delta_bsdf(const struct imp_scene *scene)
+{
+    for (int b = 0; b < scene->n_bsdfs; b++)
+        if (scene->bsdfs[b]->flags & IMP_BSDF_DELTA &&
+            !(scene->bsdfs[b]->flags & IMP_BSDF_NULL))
+            return scene->bsdfs[b];
+    return NULL;
+}
+
+const struct imp_bsdf *imp__light_walks_miss(const struct imp_scene *scene,
+                                             const struct imp_sensor *sensor,
+                                             const struct imp_walk_integrator *integrator)
+{
+    if (!integrator->from_lights || integrator->both || sensor->shape) return NULL;
+    return imp__delta_bsdf(scene);
+}
+
+void imp__light_walks_tell(const struct imp_scene *scene, const struct imp_sensor *sensor,
+                           const struct imp_walk_integrator *integrator)
+{
+    const struct imp_bsdf *b = imp__light_walks_miss(scene, sensor, integrator);
+    if (b)
+        imp__warn(
+            scene->ctx,
+            "walks from the lights: light that material '%s' (%s) mirrors or refracts "
+            "straight to sensor '%s' (%s) is missing; let walks begin at the sensor, "
+            "or at both ends (bdpt)",
+            b->name, b->ops->name, sensor->name, sensor->ops->name);
 }

@@ -67,4 +67,15 @@ enum imp_status imp__light_walks_allowed(const struct imp_scene *scene,
                                          const struct imp_walk_integrator *integrator,
                                          const struct imp_active *active);
 
+/* A material that sends light into single directions; NULL: there is none. */
+const struct imp_bsdf *imp__delta_bsdf(const struct imp_scene *scene);
+/* Such a material, where walks of this integrator bring no light by it to the sensor: one
+ * that they cannot meet, and to which they are connected. NULL: nothing is missing. */
+const struct imp_bsdf *
+imp__light_walks_miss(const struct imp_scene *scene, const struct imp_sensor *sensor,
+                      const struct imp_walk_integrator *integrator);
+/* Warn of it. */
+void imp__light_walks_tell(const struct imp_scene *scene, const struct imp_sensor *sensor,
+                           const struct imp_walk_integrator *integrator);
+
 #endif

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+# Sensors in the dark, and what walks from the lights cannot bring: an error or a warning.
+cat >unlit.xml <<'X'
+<scene version="3.0.0"><integrator type="path"/>
+<shape type="rectangle"><sensor type="irradiancemeter" id="meter"><film type="hdrfilm">
+<integer name="width" value="1"/><integer name="height" value="1"/></film></sensor></shape></scene>
+X
+importon read unlit.xml
+importon read unlit.xml --from lights
+# One of two meters has its back to the lamp.
+cat >wall.xml <<'X'
+<scene version="3.0.0"><integrator type="path"/>
+<default name="radiance" value="0,1,0"/>
+<shape type="rectangle"><transform name="to_world"><scale value=".1"/><translate z="1"/></transform>
+<bsdf type="diffuse"><float name="reflectance" value="0"/></bsdf><sensor type="irradiancemeter" id="before"><film type="hdrfilm">
+<integer name="width" value="1"/><integer name="height" value="1"/></film></sensor></shape>
+<shape type="disk"><transform name="to_world"><rotate y="1" angle="180"/><scale value=".1"/><translate z="-1"/></transform>
+<bsdf type="diffuse"><float name="reflectance" value="0"/></bsdf><sensor type="irradiancemeter" id="behind"><film type="hdrfilm">
+<integer name="width" value="1"/><integer name="height" value="1"/></film></sensor></shape>
+<shape type="rectangle"><transform name="to_world"><scale value="3"/><rotate y="1" angle="180"/><translate z="2"/></transform>
+<emitter type="area"><rgb name="radiance" value="$radiance"/></emitter></shape></scene>
+X
+importon read wall.xml --spp 16
+importon read wall.xml --spp 16 -s 1 --json | grep -A3 unlit
+importon read wall.xml --spp 16 -s 0 --json | grep -A1 unlit
+importon read wall.xml --spp 16 -s 0 -D radiance=0
+importon read wall.xml --spp 1 -s 1 --ends >/dev/null
+# A camera before clear glass and a mirror.
+cat >glass.xml <<'X'
+<scene version="3.0.0"><integrator type="ptracer"/><sensor type="perspective" id="eye"><film type="hdrfilm">
+<integer name="width" value="4"/><integer name="height" value="4"/></film></sensor>
+<shape type="sphere"><bsdf type="dielectric" id="glass"/></shape>
+<shape type="sphere"><point name="center" value="0,0,5"/><emitter type="area"/></shape></scene>
+X
+importon render glass.xml --spp 1 -o a.exr
+importon render glass.xml --spp 1 --from sensor -o a.exr
+importon read glass.xml --spp 1 >/dev/null
+importon fit glass.xml -m mono -T a.exr -p shape1.emitter.radiance.value --spp 4 --optimizer lm --iterations 1 -o fit >told 2>&1
+grep -m 1 warning told >&2
+true
