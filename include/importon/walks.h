@@ -53,7 +53,9 @@ struct imp_walks_options {
 
 /** Draw walks at the scene's present parameters and keep them: about 160 bytes a vertex.
  * The scene must outlive them. Parameters with a gradient may change afterwards, but for
- * those of graded indices and extinctions, which move rays and collisions.
+ * those of graded indices, which move rays. By extinctions collisions were drawn: they may
+ * change where they were not 0, up to the bounds under which collisions were drawn, and
+ * walks have no derivative with respect to them. Alpha stays that of the draw.
  * @param run     as of imp_render; NULL for the defaults.
  * @param options NULL for the defaults.
  * @param[out] out the caller destroys it.

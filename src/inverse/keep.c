@@ -163,24 +163,29 @@ static enum imp_status sensor_keep(struct imp_walks *w, const struct imp_active 
 
 /* ---- All of them ----------------------------------------------------------------- */
 
-/* Chooses the parameters whose derivative is that of frozen walks. */
+/* Chooses the parameters whose derivative is that of frozen walks, and those by which
+ * collisions were drawn. */
 static enum imp_status chosen_make(struct imp_walks *w)
 {
     const struct imp_scene *scene = w->scene;
     w->chosen = imp__alloc(w->ctx, scene->n_params + 1, 1);
+    w->flights = imp__alloc(w->ctx, scene->n_params + 1, 1);
     w->theta = imp__alloc(w->ctx, scene->n_theta + 1, sizeof *w->theta);
-    if (!w->chosen || !w->theta)
+    if (!w->chosen || !w->flights || !w->theta)
         return imp__error(w->ctx, IMP_E_NOMEM, "no memory for kept walks");
     for (size_t k = 0; k < scene->n_params; k++) {
         const struct imp_param *p = &scene->params[k];
-        w->chosen[k] = (p->info.flags & IMP_PARAM_DIFFERENTIABLE) && !p->probed;
+        const bool smooth = p->info.flags & IMP_PARAM_DIFFERENTIABLE;
+        w->chosen[k] = smooth && !p->probed;
+        w->flights[k] = smooth && p->probed;
         for (size_t e = 0; e < p->info.count; e++)
             w->theta[p->info.offset + e] = imp__param_get(p, e);
     }
     for (int b = 0; b < scene->n_bodies; b++)
-        for (int k = 0; k < scene->bodies[b]->n_numbers; k++)
-            if (scene->bodies[b]->numbers[k].param >= 0)
-                w->chosen[scene->bodies[b]->numbers[k].param] = 0;
+        for (int k = 0; k < scene->bodies[b]->n_numbers; k++) {
+            const int param = scene->bodies[b]->numbers[k].param;
+            if (param >= 0) w->chosen[param] = w->flights[param] = 0;
+        }
     return IMP_OK;
 }
 

@@ -30,6 +30,7 @@ void imp__walks_destroy(struct imp_walks *w)
     imp__densities_destroy(ctx, &w->densities);
     imp__release(ctx, w->theta);
     imp__release(ctx, w->chosen);
+    imp__release(ctx, w->flights);
     if (w->owns_scene) imp_scene_destroy(w->scene);
     imp__release(ctx, w);
     imp__context_drop(ctx);
@@ -56,6 +57,18 @@ enum imp_status imp__walks_run(imp_context *ctx, const char *function,
     return IMP_OK;
 }
 
+/* Where an extinction was 0 nothing collided, so that walks say nothing of another one. */
+static enum imp_status zeros_check(const struct imp_walks *w, const struct imp_param *p)
+{
+    for (size_t e = 0; e < p->info.count; e++)
+        if (w->theta[p->info.offset + e] == 0 && imp__param_get(p, e) != 0)
+            return imp__error(w->ctx, IMP_E_UNSUPPORTED,
+                              "kept walks: number %zu of %s was 0 when they were drawn, "
+                              "so that no collision was, and is %g now",
+                              e, p->info.name, imp__param_get(p, e));
+    return IMP_OK;
+}
+
 enum imp_status imp__walks_changed(const struct imp_walks *w, uint8_t *changed)
 {
     const struct imp_scene *scene = w->scene;
@@ -65,12 +78,12 @@ enum imp_status imp__walks_changed(const struct imp_walks *w, uint8_t *changed)
         for (size_t e = 0; e < p->info.count && !changed[k]; e++)
             changed[k] = imp__param_get(p, e) != w->theta[p->info.offset + e];
         if (!changed[k] || w->chosen[k]) continue;
-        return imp__error(
-            w->ctx, IMP_E_UNSUPPORTED,
-            "kept walks: %s has another value than when they were drawn, and %s",
-            p->info.name,
-            p->probed ? "their collisions were drawn by it"
-                      : "rays or densities follow it that were not kept");
+        if (!w->flights[k])
+            return imp__error(w->ctx, IMP_E_UNSUPPORTED,
+                              "kept walks: %s has another value than when they were "
+                              "drawn, and rays or densities follow it that were not kept",
+                              p->info.name);
+        IMP_CHECKED(zeros_check(w, p));
     }
     return IMP_OK;
 }
@@ -148,6 +161,38 @@ bool imp__walks_finite(const struct imp_walks *w, const struct imp_walks_weight 
            (steps < 0 ? x->growth < 1 : pow(x->growth, steps) <= GROWTH_MOST);
 }
 
+/* Are there collisions that say nothing? The medium of some, and how many. */
+static bool collisions_of(const struct imp_scene *scene, const double *count,
+                          const char **medium, double *n)
+{
+    *n = 0;
+    for (int k = IMP_STORE_CLASSES; k-- > 0;) {
+        *n += count[k];
+        if (count[k] > 0 && k < scene->n_media) *medium = scene->media[k]->name;
+    }
+    return *n > 0;
+}
+
+/* Could walks with the present collisions, and without them, be drawn? */
+static enum imp_status collisions_check(const struct imp_walks *w,
+                                        const struct imp_moments *sum)
+{
+    const char *medium;
+    double n;
+    if (collisions_of(w->scene, sum->passed, &medium, &n))
+        return imp__error(w->ctx, IMP_E_UNSUPPORTED,
+                          "kept walks: the extinction of medium '%s' is above the bound "
+                          "under which %g collisions were drawn; draw new ones",
+                          medium, n);
+    if (collisions_of(w->scene, sum->certain, &medium, &n))
+        return imp__error(w->ctx, IMP_E_UNSUPPORTED,
+                          "kept walks: the extinction of medium '%s' had reached its "
+                          "bound where it is smaller now, so that no null collisions "
+                          "were drawn beside %g real ones; draw new ones",
+                          medium, n);
+    return IMP_OK;
+}
+
 /* The reason why walks of this worth are not evaluated, as an error. */
 static enum imp_status worth_check(const struct imp_walks *w,
                                    const struct imp_walks_weight *x)
@@ -203,6 +248,7 @@ enum imp_status imp__walks_weigh(const struct imp_walks *w, const struct imp_sto
     if (x.sum.seen < SEEN_LEAST * x.sum.moved)
         out->ess = fmin(out->ess, x.sum.seen / x.sum.moved);
     out->growth = imp__moments_radius(&x.sum);
+    IMP_TRY(collisions_check(w, &x.sum));
 out:
     imp__release(ctx, changed);
     imp__release(ctx, own.moved);
@@ -218,9 +264,8 @@ static enum imp_status active_check(const struct imp_walks *w,
             return imp__error(w->ctx, IMP_E_UNSUPPORTED,
                               "kept walks have no derivative with respect to %s: %s",
                               w->scene->params[k].info.name,
-                              w->scene->params[k].probed
-                                  ? "their collisions were drawn by it"
-                                  : "rays or densities follow it");
+                              w->flights[k] ? "their collisions were drawn by it"
+                                            : "rays or densities follow it");
     return IMP_OK;
 }
 

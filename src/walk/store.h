@@ -82,6 +82,7 @@ struct imp_densities {
     uint64_t *inputs; /* [n_bsdfs] bit j: the density depends on input j */
     uint8_t *moved;   /* [n_bsdfs] it has changed */
     bool any;         /* of moved */
+    bool flights;     /* an extinction has changed */
     bool weights;     /* some value that roulette looks at has changed */
 };
 enum imp_status imp__densities_create(const struct imp_scene *scene,
@@ -100,6 +101,12 @@ struct imp_moments {
                            its ratios alone */
     double steps[IMP_STORE_CLASSES];                        /* from class a */
     double growth[IMP_STORE_CLASSES][IMP_STORE_CLASSES][4]; /* from a to b, by lane */
+    /* Tentative collisions that say nothing of the present extinction, by media modulo
+     * IMP_STORE_CLASSES. */
+    double
+        passed[IMP_STORE_CLASSES]; /* it is above the bound that they were drawn under */
+    double certain[IMP_STORE_CLASSES]; /* it is below a bound that it had reached, so that
+                                          no null collision was drawn */
 };
 /* Adds the walks of a tile; mask [height][width]: pixels with 0 are left out; NULL: none
  * are. */
@@ -121,8 +128,10 @@ struct imp_walks {
     bool losses; /* numbers of samples are those of losses */
     double survival, ess; /* ess < 0: imp__walks_use does not look at it */
     const struct imp_walk_integrator *integrator;
-    double *theta;   /* [n_theta] where they were drawn */
-    uint8_t *chosen; /* [n_params] parameters that may change */
+    double *theta;    /* [n_theta] where they were drawn */
+    uint8_t *chosen;  /* [n_params] parameters that may change and have a derivative */
+    uint8_t *flights; /* [n_params] those that may change, and by which collisions were
+                         drawn: they have none */
     int n_stores;
     struct imp_store *stores;
     struct imp_densities densities; /* its `moved` is of nobody: see imp__walks_weigh */
@@ -135,7 +144,7 @@ const struct imp_store *imp__walks_store(const struct imp_walks *walks,
 enum imp_status imp__walks_run(imp_context *ctx, const char *function,
                                struct imp_run *run);
 /* tracer->kept, where run->walks is set. IMP_E_ARG: they are another scene's, or none of
- * this sensor. IMP_E_UNSUPPORTED: a parameter has changed, or is active, with which they
+ * this sensor. IMP_E_UNSUPPORTED: a parameter has changed, or is active, of which they
  * say nothing. IMP_E_NUMERIC: too few of them count now, or their variance is infinite. */
 enum imp_status imp__walks_use(const struct imp_run *run, struct imp_tracer *tracer);
 /* What they are worth at the scene's present parameters; mask as of imp__store_moments. */

@@ -13,6 +13,11 @@
  * The ratios of densities alone have the mean 1, as far as walks were drawn where the new
  * density is. A mean far below 1 says that they were not: then they count no more than it.
  *
+ * A free flight has the density of its events, in the mean over the lanes of a walk
+ * (lane_mis.h). Tentative collisions at which the extinction is now above their bound have
+ * no density, nor have null collisions where the extinction was the bound: both are
+ * counted, and such walks are refused.
+ *
  * No sample shows that a variance is infinite. A step that is survived with probability q
  * adds to the second moment of the throughput the factor f'^2/(p^2 q); from materials a to
  * materials b these have the mean T_ab (0 where the walk leaves the scene), and the second
@@ -27,6 +32,9 @@ _Static_assert(IMP_INPUTS_MAX <= 64, "masks of inputs have 64 bits");
 /* ---- What densities depend on ---------------------------------------------------- */
 
 #define TRIES 24 /* pairs of directions */
+
+/* A bound that is reached is above its extinction by a few roundings (majorants.c). */
+#define CERTAIN 1e-6
 
 /* A value of an input inside its bounds. */
 static imp_spec drawn_input(const struct imp_input_desc *d, uint64_t k)
@@ -132,7 +140,7 @@ void imp__densities_destroy(imp_context *ctx, struct imp_densities *d)
 
 void imp__densities_move(struct imp_densities *d, const uint8_t *changed)
 {
-    d->any = d->weights = false;
+    d->any = d->weights = d->flights = false;
     for (int b = 0; b < d->scene->n_bsdfs; b++) {
         const struct imp_bsdf *bsdf = d->scene->bsdfs[b];
         d->moved[b] = 0;
@@ -142,6 +150,12 @@ void imp__densities_move(struct imp_densities *d, const uint8_t *changed)
             d->moved[b] |= d->inputs[b] >> j & 1;
         }
         d->any |= d->moved[b];
+    }
+    for (int k = 0; k < d->scene->n_media; k++) {
+        const struct imp_medium *m = d->scene->media[k];
+        for (int j = 0; j < m->n_own; j++)
+            d->flights |= (m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION) &&
+                          imp__input_depends(m->input[j], changed);
     }
 }
 
@@ -222,6 +236,59 @@ static imp_spec seen_by_roulette(imp_spec factor, bool four, int zeros[4])
     for (int c = 0; c < 4; c++)
         if (factor[c] == 0 && zeros[c]++ == 0) factor[c] = stand_in;
     return factor;
+}
+
+/* ---- Free flights ---------------------------------------------------------------- */
+
+/* Tentative collisions whose factors are no densities now, or were drawn where a null
+ * collision could not be. Alone in its track and without a colour, a collision has the
+ * density 1/passes. */
+static void collisions_look(const struct imp_scene *scene, const struct imp_vertex *v,
+                            struct imp_moments *sum)
+{
+    const struct imp_track *track = v->on;
+    const bool certain = track->n == 1 && fabs((double)v->d.passes - 1) < CERTAIN;
+    for (int i = 0; i < track->n; i++) {
+        const struct imp_event *e = &track->event[i];
+        imp_spec in[IMP_INPUTS_MAX];
+        if (e->kind != IMP_NULL_AT && e->kind != IMP_REAL_AT) continue;
+        const imp_v3 p =
+            imp__decided_v3(track->o) + imp__decided_v3(track->d) * (double)e->t;
+        const imp_spec sigma =
+            imp__extinction_at(scene->media[e->medium], p, v->carried, in);
+        const double most = imp__max_used(sigma, v->carried != NULL) / (double)e->bound;
+        const int of = e->medium % IMP_STORE_CLASSES;
+        if (most > 1) sum->passed[of]++;
+        else if (certain && most < 1 - 2 * CERTAIN) sum->certain[of]++;
+    }
+}
+
+static double lanes_mean(imp_spec f, int n)
+{
+    double sum = 0;
+    for (int c = 0; c < n; c++) sum += f[c];
+    return sum / n;
+}
+
+/* Density now over density then of all flights of a walk, and of those that hang on it:
+ * each the mean over the lanes (lane_mis.h). Of the latter, `passes` is the reciprocal. f:
+ * of the way to the walk's start. */
+static double flights_ratio(const struct imp_scene *scene, const struct imp_walk *walk,
+                            int lanes, imp_spec f, struct imp_moments *sum)
+{
+    double ratio = 1, mean = lanes_mean(f, lanes);
+    for (const struct imp_vertex *v = walk->first; v; v = v->next) {
+        for (const struct imp_side *s = v->side; s; s = s->next)
+            ratio *= flights_ratio(scene, &s->walk, lanes, f, sum);
+        if (!v->on) continue;
+        collisions_look(scene, v, sum);
+        f *= imp__track_eval(scene, v->on, v->carried);
+        const double next = lanes_mean(f, lanes);
+        if (!(mean > 0) || !(next > 0)) return 0;
+        ratio *= next / mean * (double)v->d.passes;
+        mean = next;
+    }
+    return ratio;
 }
 
 /* w of the walk's own vertices, and its steps' share in the growth. `v`: the vertices,
@@ -311,12 +378,18 @@ enum imp_status imp__store_moments(const struct imp_store *s,
         struct imp_walk walk = {.key = k->key};
         if (mask && !(mask[(size_t)y * (size_t)s->width + (size_t)x] > 0)) continue;
         const struct imp_arena_mark mark = imp__arena_mark(arena);
-        if (tracks && k->n_items > 0) imp__record_walk(r, i, tracer, arena, &walk);
+        if ((tracks || d->flights) && k->n_items > 0)
+            imp__record_walk(r, i, tracer, arena, &walk);
         else if (tracer->wavelengths && !imp__walk_wave(tracer, arena, k->wave, &walk))
             return imp__error(s->ctx, IMP_E_NOMEM, "no memory for a walk");
         if (walk.dropped == IMP_DROP_MEMORY)
             return imp__error(s->ctx, IMP_E_NOMEM, "no memory for a walk");
-        const double w = walk_weight(s, r, d, k, &walk, walk.first, sum);
+        double w = walk_weight(s, r, d, k, &walk, walk.first, sum);
+        if (d->flights)
+            w *= flights_ratio(tracer->scene, &walk,
+                               walk.waves ? walk.waves->carried.n
+                                          : tracer->scene->channels,
+                               imp__spec(1), sum);
         sum->n++;
         sum->w += w;
         sum->w2 += w * w;

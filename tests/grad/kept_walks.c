@@ -547,17 +547,6 @@ static void refusals(void)
     imp_problem_destroy(p);
     imp_walks_destroy(walks);
     imp_scene_destroy(scene);
-
-    scene = test_scene(ctx, "fog.xml", IMP_RGB, "res=8");
-    walks = keep(scene, 2, 3, IMP_POINTS_SCENE, true, 0);
-    for (size_t k = 0; k < scene->n_params; k++)
-        if (scene->params[k].probed) {
-            set(scene, scene->params[k].info.name, 0.8);
-            break;
-        }
-    refused_with(scene, walks, "collisions were drawn by it", "another extinction");
-    imp_walks_destroy(walks);
-    imp_scene_destroy(scene);
 }
 
 int main(void)

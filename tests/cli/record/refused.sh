@@ -2,7 +2,8 @@
 # What recorded walks cannot answer is refused, with the reason.
 export TMPDIR=$PWD
 importon record "$ROOT/scenes/fog.xml" -D res=8 --spp 2 -q -o fog.walks
-importon what-if fog.walks --set fog.sigma_t.value=0.5; echo $?
+importon record "$ROOT/scenes/fog.xml" -D res=8 -D sigma=0 --spp 2 -q -o clear.walks
+importon what-if clear.walks --set fog.sigma_t.value=0.5; echo $?
 importon what-if fog.walks -p 'fog.sigma*' --gradient; echo $?
 importon record "$ROOT/scenes/textured.xml" -D width=8 -D height=6 --spp 4 -q -o metal.walks
 importon what-if metal.walks --set metal.alpha.value=0.01 2>&1 | sed 's/[0-9.e-]* of them/X of them/'; echo "${PIPESTATUS[0]}"

@@ -1,0 +1,433 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Kept walks at another extinction. Their collisions are weighed anew: pictures agree with
+ * fresh ones within their errors, in uniform media and grids, with and without a colour;
+ * so do derivatives with respect to what is no extinction. At the extinction of the draw
+ * they are those of tracing, to the bit. Where no collision was drawn, or none could be
+ * at the bound, they are refused. */
+#include "imp_scene.h"
+#include "imp_tap.h"
+#include "vol_write.h"
+#include <importon/walks.h>
+#include <math.h>
+#include <stdbool.h>
+
+#define FAIL_Z 4.5
+#define CELLS  64
+
+static imp_context *ctx;
+static char grey[64], coloured[64], full[64];
+
+/* ---- Scenes ---------------------------------------------------------------------- */
+
+#define CAMERA(medium)                                                                   \
+    "<sensor type='perspective'><float name='fov' value='45'/><transform "               \
+    "name='to_world'><lookat origin='0,0,2.6' target='0,0,0' "                           \
+    "up='0,1,0'/></transform>" medium                                                    \
+    "<film type='hdrfilm'><integer name='width' value='16'/><integer "                   \
+    "name='height' value='16'/><string name='pixel_format' value='rgb'/><rfilter "       \
+    "type='box'/></film></sensor>"
+
+/* The camera in a ball of fog. */
+static imp_scene *ball(const char *sigma, const char *rr_depth, enum imp_color_mode mode)
+{
+    char xml[4096];
+    snprintf(xml, sizeof xml,
+             "<scene version='3.0.0'><integrator type='volpath'><integer name='rr_depth' "
+             "value='%s'/></integrator><medium type='homogeneous' id='fog'>%s<rgb "
+             "name='albedo' value='.9,.8,.6'/></medium>" CAMERA(
+                 "<ref id='fog'/>") "<shape type='sphere'><boolean name='flip_normals' "
+                                    "value='true'/><float "
+                                    "name='radius' value='3'/><bsdf type='diffuse' "
+                                    "id='wall'><rgb "
+                                    "name='reflectance' value='.7,.6,.5'/></bsdf><ref "
+                                    "name='exterior' "
+                                    "id='fog'/></shape><shape type='sphere'><point "
+                                    "name='center' x='.6' y='.8' "
+                                    "z='0'/><float name='radius' value='.4'/><emitter "
+                                    "type='area'/><ref "
+                                    "name='exterior' id='fog'/></shape></scene>",
+             rr_depth, sigma);
+    return test_scene_text(ctx, xml, mode);
+}
+
+/* A cloud in a box under a sky and a lamp. */
+static imp_scene *cloud(const char *vol, const char *filter, const char *how,
+                        enum imp_color_mode mode)
+{
+    char xml[4096];
+    snprintf(
+        xml, sizeof xml,
+        "<scene version='3.0.0'><integrator type='volpath'><integer name='rr_depth' "
+        "value='6'/>%s</integrator>" CAMERA(
+            "") "<emitter type='constant'><rgb name='radiance' "
+                "value='.3,.4,.5'/></emitter>"
+                "<shape type='sphere'><point name='center' x='.8' y='2' z='1'/><float "
+                "name='radius' value='.4'/><emitter type='area'><float name='radiance' "
+                "value='8'/></emitter></shape><shape type='cube'><transform "
+                "name='to_world'>"
+                "<scale value='.8'/></transform><bsdf type='null'/><medium "
+                "name='interior' "
+                "id='cloud' type='heterogeneous'><volume name='sigma_t' "
+                "type='gridvolume'><string "
+                "name='filename' value='%s'/><string name='filter_type' "
+                "value='%s'/><transform "
+                "name='to_world'><scale value='1.6'/><translate x='-.8' y='-.8' z='-.8'/>"
+                "</transform></volume><rgb name='albedo' value='.9,.7,.5'/><phase "
+                "type='hg'><float "
+                "name='g' value='.4'/></phase></medium></shape></scene>",
+        how, vol, filter);
+    return test_scene_text(ctx, xml, mode);
+}
+
+/* ---- Tools ----------------------------------------------------------------------- */
+
+static imp_walks *keep(imp_scene *scene, int spp, bool losses)
+{
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_walks_options o = IMP_WALKS_OPTIONS_INIT;
+    imp_walks *walks;
+    run.spp = spp;
+    run.seed = 21;
+    run.points = IMP_POINTS_INDEPENDENT;
+    o.survival = -1;
+    o.losses = losses;
+    o.ess = 0.1;
+    test_must(ctx, imp_walks_keep(scene, &run, &o, &walks));
+    return walks;
+}
+static imp_film *render(imp_scene *scene, const imp_walks *walks, int spp, uint64_t seed)
+{
+    struct imp_run run = IMP_RUN_INIT;
+    imp_film *film;
+    run.spp = spp;
+    run.seed = seed;
+    run.points = IMP_POINTS_INDEPENDENT;
+    run.walks = walks;
+    test_must(ctx, imp_render(scene, &run, &film));
+    return film;
+}
+static struct imp_walks_weight weigh(const imp_walks *walks)
+{
+    struct imp_walks_weight w = IMP_WALKS_WEIGHT_INIT;
+    test_must(ctx, imp_walks_weigh(walks, 0, NULL, &w));
+    return w;
+}
+static size_t param(imp_scene *scene, const char *name, double *x, size_t *n)
+{
+    struct imp_param_info info = {.size = sizeof info};
+    size_t k;
+    test_must(ctx, imp_scene_find_param(scene, name, &k));
+    test_must(ctx, imp_scene_get_param(scene, k, &info));
+    test_must(ctx, imp_scene_get_values(scene, k, x));
+    *n = info.count;
+    return k;
+}
+/* Times a factor; only: those below it. */
+static void scale(imp_scene *scene, const char *name, double factor, double only)
+{
+    double x[3 * CELLS];
+    size_t n, k = param(scene, name, x, &n);
+    for (size_t e = 0; e < n; e++)
+        if (x[e] < only) x[e] *= factor;
+    test_must(ctx, imp_scene_set_values(scene, k, n, x));
+}
+
+static bool same(imp_film *a, imp_film *b)
+{
+    struct imp_film_info i = {.size = sizeof i};
+    imp_film_get_info(a, &i);
+    const size_t n = (size_t)i.width * (size_t)i.height * (size_t)i.channels;
+    return memcmp(imp_film_mean(a), imp_film_mean(b), n * sizeof(float)) == 0 &&
+           memcmp(imp_film_se(a), imp_film_se(b), n * sizeof(float)) == 0;
+}
+
+/* Largest difference of the means over blocks of 4 x 4 pixels, channel by channel, in
+ * standard errors: pixels are independent of each other. Its square's mean: about 1. */
+static double worst_of(imp_film *a, imp_film *b, double *square)
+{
+    struct imp_film_info i = {.size = sizeof i};
+    imp_film_get_info(a, &i);
+    double worst = 0, sum = 0;
+    int n = 0;
+    for (int block = 0; block < 16; block++)
+        for (int c = 0; c < i.channels; c++) {
+            double d = 0, var = 0;
+            for (int k = 0; k < 16; k++) {
+                const int x = block % 4 * 4 + k % 4, y = block / 4 * 4 + k / 4;
+                const size_t at = (size_t)((y * i.width + x) * i.channels + c);
+                d += (double)imp_film_mean(a)[at] - (double)imp_film_mean(b)[at];
+                var += pow((double)imp_film_se(a)[at], 2) +
+                       pow((double)imp_film_se(b)[at], 2);
+            }
+            if (!(var > 0)) continue;
+            worst = fmax(worst, fabs(d) / sqrt(var));
+            sum += d * d / var;
+            n++;
+        }
+    *square = sum / n;
+    return worst;
+}
+
+/* ---- Values ---------------------------------------------------------------------- */
+
+/* Kept walks against fresh ones. */
+static void elsewhere(imp_scene *scene, const char *name, double factor, double only,
+                      const char *what)
+{
+    double square, moved;
+    imp_walks *walks = keep(scene, 96, false);
+    imp_film *traced = render(scene, NULL, 96, 21);
+    imp_film *before = render(scene, walks, 0, 0);
+    tap_ok(same(traced, before), "%s: at the draw, to the bit", what);
+    scale(scene, name, factor, only);
+    const struct imp_walks_weight w = weigh(walks);
+    imp_film *kept = render(scene, walks, 0, 0);
+    imp_film *fresh = render(scene, NULL, 192, 22);
+    const double worst = worst_of(kept, fresh, &square);
+    worst_of(before, fresh, &moved);
+    tap_ok(worst < FAIL_Z && square < 1.6 && moved > 2 && w.ess < 1 && !w.refused,
+           "%s: times %g # worst z %.2f, mean square %.2f, without weights %.0f, ess "
+           "%.3f",
+           what, factor, worst, square, moved, w.ess);
+    imp_film_destroy(traced);
+    imp_film_destroy(before);
+    imp_film_destroy(kept);
+    imp_film_destroy(fresh);
+    imp_walks_destroy(walks);
+    imp_scene_destroy(scene);
+}
+
+/* A ball of vacuum or of fog that absorbs: 0 where it was not. */
+static void to_nothing(void)
+{
+    imp_scene *scene = ball("<float name='sigma_t' value='.01'/>", "5", IMP_RGB);
+    double square;
+    imp_walks *walks = keep(scene, 96, false);
+    scale(scene, "fog.sigma_t.value", 0, INFINITY);
+    imp_film *kept = render(scene, walks, 0, 0);
+    imp_film *fresh = render(scene, NULL, 256, 22);
+    const double worst = worst_of(kept, fresh, &square);
+    tap_ok(worst < FAIL_Z && square < 1.6, "fog that has gone # worst z %.2f, %.2f",
+           worst, square);
+    imp_film_destroy(kept);
+    imp_film_destroy(fresh);
+    imp_walks_destroy(walks);
+    imp_scene_destroy(scene);
+}
+
+/* ---- Derivatives ------------------------------------------------------------------- */
+
+struct answer {
+    struct imp_estimate f;
+    double g[8], se[8];
+};
+static struct answer loss(imp_problem *p, const imp_walks *walks, int spp, uint64_t seed)
+{
+    struct answer a = {.f = {0}};
+    struct imp_run run = IMP_RUN_INIT;
+    run.spp = spp;
+    run.seed = seed;
+    run.points = IMP_POINTS_INDEPENDENT;
+    run.walks = walks;
+    test_must(ctx, imp_problem_objective(p, NULL, &run, &a.f, a.g, a.se));
+    return a;
+}
+
+/* A loss and its derivatives with respect to the wall and the albedo. */
+static void derivatives(imp_scene *scene, const char *name, const char *active,
+                        double factor, const char *what)
+{
+    imp_problem *p;
+    struct imp_target t = IMP_TARGET_INIT;
+    struct imp_run run = IMP_RUN_INIT;
+    float pixels[16 * 16 * 3];
+    imp_walks *walks = keep(scene, 128, true);
+    for (int k = 0; k < 16 * 16 * 3; k++) pixels[k] = 0.1f + 0.3f * (float)(k % 7) / 7;
+    test_must(ctx, imp_problem_create(scene, &p));
+    test_must(ctx, imp_problem_activate(p, active));
+    t.width = t.height = 16;
+    t.channels = 3;
+    t.pixels = pixels;
+    test_must(ctx, imp_problem_add_target(p, &t));
+    const size_t n = imp_problem_n(p);
+    const struct answer before = loss(p, walks, 0, 0);
+    scale(scene, name, factor, INFINITY);
+    const struct answer kept = loss(p, walks, 0, 0);
+    const struct answer fresh = loss(p, NULL, 256, 22);
+    double worst = fabs(kept.f.value - fresh.f.value) / hypot(kept.f.se, fresh.f.se);
+    double moved = fabs(before.f.value - fresh.f.value) / hypot(before.f.se, fresh.f.se);
+    for (size_t k = 0; k < n; k++)
+        worst =
+            fmax(worst, fabs(kept.g[k] - fresh.g[k]) / hypot(kept.se[k], fresh.se[k]));
+    tap_ok(n == 3 && worst < FAIL_Z && moved > 3,
+           "%s: loss and its derivatives # worst z %.2f, without weights %.1f", what,
+           worst, moved);
+
+    /* Of an extinction itself there is none. */
+    struct imp_estimate f;
+    double g[3 * CELLS + 8], se[3 * CELLS + 8];
+    test_must(ctx, imp_problem_activate(p, name));
+    run.walks = walks;
+    run.points = IMP_POINTS_INDEPENDENT;
+    tap_ok(imp_problem_objective(p, NULL, &run, &f, g, se) == IMP_E_UNSUPPORTED &&
+               strstr(imp_last_error(ctx), "no derivative with respect to"),
+           "%s: of its extinction there is none # %s", what, imp_last_error(ctx));
+    imp_problem_destroy(p);
+    imp_walks_destroy(walks);
+    imp_scene_destroy(scene);
+}
+
+/* ---- How many count ---------------------------------------------------------------- */
+
+/* Fewer and fewer, on both sides, and all of them at the draw. */
+static void distance(void)
+{
+    enum { FACTORS = 8 };
+    static const double factor[FACTORS] = {1, 1.1, 1.3, 1.6, 1, 0.9, 0.7, 0.4};
+    double ess[FACTORS], x[3];
+    size_t n;
+    imp_scene *scene = ball("<rgb name='sigma_t' value='.2,.3,.5'/>", "100", IMP_RGB);
+    imp_walks *walks = keep(scene, 32, false);
+    const size_t k = param(scene, "fog.sigma_t.value", x, &n);
+    for (int i = 0; i < FACTORS; i++) {
+        double y[3];
+        for (size_t e = 0; e < n; e++) y[e] = x[e] * factor[i];
+        test_must(ctx, imp_scene_set_values(scene, k, n, y));
+        ess[i] = weigh(walks).ess;
+    }
+    tap_ok(ess[0] == 1 && ess[1] < 1 && ess[2] < ess[1] && ess[3] < ess[2] &&
+               ess[4] == 1 && ess[5] < 1 && ess[6] < ess[5] && ess[7] < ess[6],
+           "fewer count the farther away # 1.1: %.4f 1.3: %.4f 1.6: %.4f .9: %.4f .7: "
+           "%.4f .4: %.4f",
+           ess[1], ess[2], ess[3], ess[5], ess[6], ess[7]);
+    imp_walks_destroy(walks);
+    imp_scene_destroy(scene);
+}
+
+/* One flight of length D in a fog that absorbs, before a wall of radiance 1: in the mean
+ * over walks, with sigma' = r sigma,
+ *
+ *     n/ESS = int_0^D r^2 sigma exp(-(2r - 1) sigma t) dt + exp(-(2r - 1) sigma D) */
+static void closed_form(double r)
+{
+    const double sigma = 0.8, D = 2, a = (2 * r - 1) * sigma;
+    char xml[2048];
+    snprintf(xml, sizeof xml,
+             "<scene version='3.0.0'><integrator type='volpath'><integer "
+             "name='max_depth' value='1'/></integrator><medium type='homogeneous' "
+             "id='fog'><float name='sigma_t' value='%g'/><float name='albedo' "
+             "value='0'/></medium><sensor type='orthographic'><transform "
+             "name='to_world'><lookat origin='0,0,%g' target='0,0,0' up='0,1,0'/>"
+             "</transform><float name='near_clip' value='1e-4'/><ref id='fog'/><film "
+             "type='hdrfilm'><integer name='width' value='16'/><integer name='height' "
+             "value='16'/><rfilter type='box'/></film></sensor><shape type='rectangle'>"
+             "<transform name='to_world'><scale value='4'/></transform><emitter "
+             "type='area'/><ref name='exterior' id='fog'/></shape></scene>",
+             sigma, D);
+    imp_scene *scene = test_scene_text(ctx, xml, IMP_MONO);
+    imp_walks *walks = keep(scene, 1024, false);
+    scale(scene, "fog.sigma_t.value", r, INFINITY);
+    tap_near(weigh(walks).ess, 1 / (r * r * sigma * (1 - exp(-a * D)) / a + exp(-a * D)),
+             0.004, 0, "one flight: effective sample size in closed form");
+    imp_walks_destroy(walks);
+    imp_scene_destroy(scene);
+}
+
+/* ---- Refused --------------------------------------------------------------------- */
+
+static void refused(imp_scene *scene, const imp_walks *walks, const char *word,
+                    const char *name, const char *what)
+{
+    struct imp_run run = IMP_RUN_INIT;
+    imp_film *film;
+    run.walks = walks;
+    const enum imp_status st = imp_render(scene, &run, &film);
+    tap_ok(st == IMP_E_UNSUPPORTED && strstr(imp_last_error(ctx), word) &&
+               strstr(imp_last_error(ctx), name),
+           "%s # %s", what, st == IMP_OK ? "not refused" : imp_last_error(ctx));
+    if (st == IMP_OK) imp_film_destroy(film);
+    const struct imp_walks_weight w = weigh(walks);
+    tap_ok(w.refused && w.ess == 0, "%s: none of them counts", what);
+}
+
+static void refusals(void)
+{
+    double x[3 * CELLS];
+    size_t n, k;
+    imp_scene *scene = ball("<rgb name='sigma_t' value='.3,0,.5'/>", "5", IMP_RGB);
+    imp_walks *walks = keep(scene, 4, false);
+    k = param(scene, "fog.sigma_t.value", x, &n);
+    x[1] = 0.1;
+    test_must(ctx, imp_scene_set_values(scene, k, n, x));
+    refused(scene, walks, "was 0 when they were drawn", "number 1 of fog.sigma_t",
+            "an extinction that was 0");
+    imp_walks_destroy(walks);
+    imp_scene_destroy(scene);
+
+    scene = cloud(grey, "trilinear", "", IMP_RGB);
+    walks = keep(scene, 16, false);
+    scale(scene, "cloud.sigma_t.data", 1.2, INFINITY);
+    refused(scene, walks, "above the bound", "'cloud'", "a grid above its bounds");
+    imp_walks_destroy(walks);
+    imp_scene_destroy(scene);
+
+    scene = cloud(full, "trilinear", "", IMP_RGB);
+    walks = keep(scene, 16, false);
+    scale(scene, "cloud.sigma_t.data", 0.7, INFINITY);
+    refused(scene, walks, "had reached its bound", "'cloud'",
+            "a grid without null collisions");
+    imp_walks_destroy(walks);
+    imp_scene_destroy(scene);
+}
+
+int main(void)
+{
+    float value[3 * CELLS];
+    uint32_t state = 1;
+    ctx = test_context(2);
+    for (int k = 0; k < 3 * CELLS; k++) {
+        state = state * 1664525u + 1013904223u;
+        value[k] = 0.2f + 2.3f * (float)(state >> 8) / 16777216.0f;
+    }
+    vol_write(grey, 4, 4, 4, 1, value);
+    vol_write(coloured, 4, 4, 4, 3, value);
+    for (int k = 0; k < CELLS; k++) value[k] = 1;
+    vol_write(full, 4, 4, 4, 1, value);
+
+    static const char one[] = "<float name='sigma_t' value='.3'/>",
+                      three[] = "<rgb name='sigma_t' value='.2,.3,.5'/>";
+    static const double factor[] = {1.2, 0.7};
+    for (int k = 0; k < 2; k++) {
+        elsewhere(ball(one, "5", IMP_MONO), "fog.sigma_t.value", factor[k], INFINITY,
+                  "fog, mono");
+        elsewhere(ball(one, "5", IMP_RGB), "fog.sigma_t.value", factor[k], INFINITY,
+                  "fog");
+        elsewhere(ball(three, "5", IMP_RGB), "fog.sigma_t.value", factor[k], INFINITY,
+                  "coloured fog");
+        /* Above their bounds grids are refused: only what is far below rises. */
+        const double only = k == 0 ? 1.2 : INFINITY;
+        elsewhere(cloud(grey, "trilinear", "", IMP_MONO), "cloud.sigma_t.data", factor[k],
+                  only, "a cloud, mono");
+        elsewhere(cloud(coloured, "trilinear", "", IMP_RGB), "cloud.sigma_t.data",
+                  factor[k], only, "a coloured cloud");
+    }
+    elsewhere(cloud(grey, "trilinear", "<string name='transmittance' value='residual'/>",
+                    IMP_RGB),
+              "cloud.sigma_t.data", 0.7, INFINITY, "a cloud, by residuals");
+    elsewhere(ball(three, "5", IMP_SPECTRAL), "fog.sigma_t.value", 0.7, INFINITY,
+              "coloured fog, spectral");
+    to_nothing();
+    derivatives(ball(three, "5", IMP_RGB), "fog.sigma_t.value", "wall.*", 0.7, "fog");
+    derivatives(cloud(coloured, "trilinear", "", IMP_RGB), "cloud.sigma_t.data",
+                "cloud.albedo*", 0.8, "a cloud");
+    distance();
+    closed_form(1.4);
+    closed_form(0.7);
+    refusals();
+    remove(grey);
+    remove(coloured);
+    remove(full);
+    imp_context_destroy(ctx);
+    return tap_done();
+}
