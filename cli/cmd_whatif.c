@@ -160,10 +160,7 @@ static enum imp_status weigh(struct answer *a)
         const int sensor = n ? target_sensor(i) : w.run.sensor;
         const enum imp_status st = imp_walks_weigh(w.walks, sensor, w.mask, &weight);
         if (st != IMP_OK) return st;
-        if (weight.refused) {
-            snprintf(a->refused, sizeof a->refused, "%s", weight.refused);
-            return IMP_E_NUMERIC;
-        }
+        if (weight.refused) snprintf(a->refused, sizeof a->refused, "%s", weight.refused);
         a->ess = fmin(a->ess, weight.ess);
         a->growth = fmax(a->growth, weight.growth);
     }
@@ -182,7 +179,8 @@ static enum imp_status ask(struct answer *a, double *grad, double *se)
                  : imp_problem_objective(w.problem, NULL, &w.run, &a->value, grad, se);
     if (st == IMP_E_NUMERIC || st == IMP_E_UNSUPPORTED)
         snprintf(a->refused, sizeof a->refused, "%s", imp_last_error(cli.context));
-    return st;
+    /* Evaluation looks at all pixels, the weights at those that were asked. */
+    return st == IMP_OK && a->refused[0] ? IMP_E_NUMERIC : st;
 }
 
 static const char *functional(void)
@@ -253,7 +251,10 @@ static int answer_one(const char *picture)
     double *x = cli_alloc(3 * w.n + 1, sizeof *x), *grad = x + w.n, *se = grad + w.n;
     imp_problem_get_x(w.problem, x);
     const enum imp_status st = ask(&a, o.gradient ? grad : NULL, o.gradient ? se : NULL);
-    int rc = st == IMP_OK ? 0 : cli_fail(st, cli.scene_path);
+    int rc = st == IMP_OK ? 0
+             : st == IMP_E_NUMERIC && a.refused[0]
+                 ? cli_error(EXIT_RUN, "%s: %s", cli.scene_path, a.refused)
+                 : cli_fail(st, cli.scene_path);
     if (!rc) blocks = problem_blocks(w.problem, &n_blocks);
     if (!rc && cli.json) {
         struct json j = begin_json();

@@ -177,7 +177,7 @@ static bool collisions_of(const struct imp_scene *scene, const double *count,
 static enum imp_status collisions_check(const struct imp_walks *w,
                                         const struct imp_moments *sum)
 {
-    const char *medium;
+    const char *medium = "";
     double n;
     if (collisions_of(w->scene, sum->passed, &medium, &n))
         return imp__error(w->ctx, IMP_E_UNSUPPORTED,
