@@ -5,6 +5,7 @@
  * air; single scattering by quadrature and all orders on a grid (shell_orders.h), for the sun
  * at 60, 15 and 2 degrees; colours of the zenith; nothing without scattering. */
 #include "adding_doubling.h"
+#include "imp_check_rows.h"
 #include "media_kit.h"
 #include "scene/scene.h"
 #include "shell_orders.h"
@@ -380,21 +381,9 @@ static void checked(void)
     imp_scene *s = shell_scene(&x, (double[3]){.5, 1, 2}, IMP_RGB);
     imp_problem *p = test_problem(ctx, s, "*");
     struct imp_check_options o = IMP_CHECK_OPTIONS_INIT;
-    const struct imp_check_row *rows;
-    size_t n;
-    int frozen = 0, wrong = 0;
     o.paths = 400;
     o.fresh_spp = 16384;
-    test_must(ctx, imp_check(p, &o, NULL, &rows, &n));
-    for (size_t k = 0; k < n; k++) {
-        frozen += strcmp(rows[k].method, "frozen") == 0;
-        if (rows[k].ok) continue;
-        wrong++;
-        printf("# %s %s %g, reference %g, error %g\n", rows[k].method, rows[k].param,
-               rows[k].value, rows[k].reference, rows[k].error);
-    }
-    tap_ok(frozen > 0 && wrong == 0, "all numbers: %d rows of check, %d frozen, %d wrong",
-           (int)n, frozen, wrong);
+    test_check(ctx, p, &o, "all numbers");
     imp_problem_destroy(p);
     imp_scene_destroy(s);
 }

@@ -2,6 +2,7 @@
  *
  * Media that emit: slabs in closed form and by quadrature, uniform and in volumes, with
  * derivatives; what absorbs emits as much under light of its own radiance (Kirchhoff). */
+#include "imp_check_rows.h"
 #include "media_kit.h"
 #include "vol_write.h"
 
@@ -20,21 +21,9 @@ static imp_context *ctx;
 static void checked(imp_problem *p, const char *what)
 {
     struct imp_check_options o = IMP_CHECK_OPTIONS_INIT;
-    const struct imp_check_row *rows;
-    size_t n;
-    int frozen = 0, wrong = 0;
     o.paths = 100;
     o.fresh_spp = 2048;
-    test_must(ctx, imp_check(p, &o, NULL, &rows, &n));
-    for (size_t k = 0; k < n; k++) {
-        frozen += strcmp(rows[k].method, "frozen") == 0;
-        if (rows[k].ok) continue;
-        wrong++;
-        printf("# %s %s %g, reference %g, error %g\n", rows[k].method, rows[k].param,
-               rows[k].value, rows[k].reference, rows[k].error);
-    }
-    tap_ok(frozen > 0 && wrong == 0, "%s: %d rows of check, %d frozen, %d wrong", what,
-           (int)n, frozen, wrong);
+    test_check(ctx, p, &o, what);
 }
 
 /* Le (1 - exp(-sigma)) */
