@@ -141,7 +141,7 @@ static void entries(void)
         static const double all[D] = {1, 1, 1, 1, 1}, any[D] = {0.5, -2, 0, 3, 1};
         const struct imp_arena_mark mark = imp__arena_mark(&r.arena);
         struct imp_walk w;
-        struct imp_entry entry[D];
+        struct imp_entry entry[D] = {0};
         imp_spec sum = {0};
         imp__walk_trace(&r.tracer, &r.arena, i % 8, i / 8 % 8, i, &w);
         const imp_spec L = w.L;
