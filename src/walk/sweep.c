@@ -5,7 +5,7 @@
  * piece of gradient falls off at every vertex. Tangent: derivative and radiance together,
  * from the last vertex to the first. The three differ only in the order in which the
  * product rule is read. */
-#include "probe.h"
+#include "sweep_media.h"
 
 imp_spec imp__walk_fold(struct imp_walk *walk)
 {
@@ -99,119 +99,6 @@ static void light_d(const struct imp_vertex *v, imp_spec *d)
     for (int j = 0; j < v->bsdf->n_in; j++) d[j] *= v->light_e * v->light_w;
 }
 
-/* ---- Media ----------------------------------------------------------------------- */
-
-/* Where collisions are does not stand for the derivative with respect to an extinction:
- * probes give it, and a collision's albedo none of it. x [b->n_in] */
-static void extinction_drop(const struct imp_tracer *tracer, const struct imp_vertex *v,
-                            imp_spec *x)
-{
-    const struct imp_medium *m;
-    if (v->d.scatterer != IMP_IN_MEDIUM || tracer->collisions_stand || v->d.stands)
-        return;
-    m = v->bsdf->self;
-    for (int j = 0; j < m->n_own; j++)
-        if (m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION) x[j] = (imp_spec){0};
-}
-
-/* The transpose: what a point of a medium gives to the inputs of its scatterer. */
-static void point_scatter(const struct imp_tracer *tracer, const struct imp_vertex *v,
-                          const struct imp_texcoord *at, const imp_spec *bar,
-                          struct imp_sink *sink)
-{
-    const struct imp_medium *m = v->bsdf->self;
-    for (int j = 0; j < m->n_in; j++)
-        if (j >= m->n_own || tracer->collisions_stand || v->d.stands ||
-            !(m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION))
-            imp__inputs_scatter(&m->input[j], 1, at, &bar[j], sink);
-}
-
-static bool crosses(const struct imp_vertex *v)
-{
-    return v->on || v->to_light || v->probe;
-}
-
-/* w_k without the value of what the segment crosses. */
-static imp_spec weight_before(const struct imp_vertex *v)
-{
-    const double scale = (double)v->d.passes / ((double)v->d.pdf * (double)v->d.survive);
-    imp_spec f = imp__spec(1);
-    if (v->bsdf) {
-        const struct imp_dirs dirs = imp__vertex_dirs(v);
-        imp__bsdf_eval(v->bsdf, v->carried, v->in, &dirs, &f);
-    } else if (v->d.scatterer == IMP_AT_LIGHT) {
-        f = v->in[0];
-    }
-    return f * scale;
-}
-
-/* Of the segment that goes on, does something stand for its derivative? */
-static bool segment_counts(const struct imp_tracer *tracer, const struct imp_vertex *v)
-{
-    return v->on && v->d.goes_on && imp__track_counts(tracer, v->on);
-}
-/* d B_k / d T of the way to the light. */
-static imp_spec light_before(const struct imp_vertex *v)
-{
-    return v->light_f * v->light_e * (double)v->d.light.weight;
-}
-
-/* T of the way to the light. */
-static imp_spec to_light_value(const struct imp_vertex *v)
-{
-    return v->light_w * (1 / (double)v->d.light.weight);
-}
-
-static void media_scatter(const struct imp_tracer *tracer, const struct imp_vertex *v,
-                          imp_spec P, imp_spec own, struct imp_sink *sink)
-{
-    if (v->to_light) {
-        const imp_spec T = to_light_value(v);
-        imp__track_sweep(tracer, v->to_light, v->carried, &T, own * light_before(v),
-                         sink);
-    }
-    if (segment_counts(tracer, v))
-        imp__track_sweep(tracer, v->on, v->carried, NULL,
-                         P * weight_before(v) * v->beyond, sink);
-    if (v->probe) {
-        const struct imp_medium *m = v->probe->medium;
-        imp_spec d[IMP_INPUTS_MAX];
-        imp__probe_d(tracer, v, d);
-        for (int j = 0; j < m->n_own; j++) {
-            d[j] *= P;
-            if (m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION)
-                imp__inputs_scatter(&m->input[j], 1, &v->probe->at, &d[j], sink);
-        }
-    }
-}
-
-typedef double dot_fn(const void *x_dot, int param, size_t element);
-
-static imp_spec media_tangent(const struct imp_tracer *tracer, const struct imp_vertex *v,
-                              imp_spec own, dot_fn *dot, const void *x_dot)
-{
-    imp_spec L_dot = {0};
-    if (v->to_light) {
-        const imp_spec T = to_light_value(v);
-        L_dot += own * light_before(v) *
-                 imp__track_tangent(tracer, v->to_light, v->carried, &T, dot, x_dot);
-    }
-    if (segment_counts(tracer, v))
-        L_dot += weight_before(v) * v->beyond *
-                 imp__track_tangent(tracer, v->on, v->carried, NULL, dot, x_dot);
-    if (v->probe) {
-        const struct imp_medium *m = v->probe->medium;
-        imp_spec d[IMP_INPUTS_MAX], in_dot;
-        imp__probe_d(tracer, v, d);
-        for (int j = 0; j < m->n_own; j++) {
-            if (!(m->ops->inputs[j].flags & IMP_INPUT_EXTINCTION)) continue;
-            imp__inputs_tangent(&m->input[j], 1, &v->probe->at, dot, x_dot, &in_dot);
-            L_dot += d[j] * in_dot;
-        }
-    }
-    return L_dot;
-}
-
 /* ---- Reverse ------------------------------------------------------------------- */
 
 static inline __attribute__((always_inline)) void
@@ -248,7 +135,7 @@ static inline void vertex_scatter(const struct imp_tracer *tracer,
     const struct imp_bsdf *b = v->bsdf;
     const struct imp_texcoord at = imp__vertex_at(v);
     if (imp_unlikely(v->d.scatterer == IMP_IN_MEDIUM))
-        point_scatter(tracer, v, &at, bar, sink);
+        imp__point_scatter(tracer, v, &at, bar, sink);
     else imp__inputs_scatter(b->input, b->n_in, &at, bar, sink);
 }
 void imp__vertex_scatter(const struct imp_tracer *tracer, const struct imp_vertex *v,
@@ -306,7 +193,8 @@ void imp__walk_sweep_values(const struct imp_tracer *tracer, const struct imp_wa
             }
             if (any) vertex_scatter(tracer, v, bar, sink);
         }
-        if (imp_unlikely(crosses(v))) media_scatter(tracer, v, P, lit, sink);
+        if (imp_unlikely(imp__vertex_crosses(v)))
+            imp__media_scatter(tracer, v, P, lit, sink);
         P *= v->w;
         if (imp__is_zero_used(P, v->carried)) break;
     }
@@ -373,12 +261,12 @@ static imp_spec tangent(const struct imp_tracer *tracer, const struct imp_walk *
             L_dot += emitter_tangent(tracer, light->emitter, imp__light_emission(light),
                                      imp__light_at(tracer->scene, v), &direction) *
                      v->light_f * v->light_w * lit;
-        if (imp_unlikely(crosses(v)))
-            L_dot += media_tangent(tracer, v, lit, direction_at, &direction);
+        if (imp_unlikely(imp__vertex_crosses(v)))
+            L_dot += imp__media_tangent(tracer, v, lit, direction_at, &direction);
         if (!bsdf_active(tracer, v)) continue;
         imp_spec in_dot[IMP_INPUTS_MAX], d[IMP_INPUTS_MAX];
         imp__inputs_tangent(b->input, b->n_in, &at, direction_at, &direction, in_dot);
-        extinction_drop(tracer, v, in_dot);
+        imp__extinction_drop(tracer, v, in_dot);
         if (v->d.glows) {
             glow_d(v, d);
             for (int j = 0; j < b->n_in; j++) L_dot += d[j] * in_dot[j] * own;
@@ -403,7 +291,7 @@ void imp__vertex_tangent(const struct imp_tracer *tracer, const struct imp_verte
     const struct imp_texcoord at = imp__vertex_at(v);
     imp__inputs_tangent(v->bsdf->input, v->bsdf->n_in, &at, direction_at, &direction,
                         in_dot);
-    extinction_drop(tracer, v, in_dot);
+    imp__extinction_drop(tracer, v, in_dot);
 }
 
 imp_spec imp__track_tangent_along(const struct imp_tracer *tracer,
