@@ -1,236 +1,36 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Kept walks in a file: a head, the scene without its geometry (tree_file.h), the numbers
- * at which they were drawn, a checksum of these; then for each sensor a head and the
- * records of its tiles (walk/record_file.c), each with a checksum of its own. */
+ * Kept walks read from a file. */
 #include "base/arguments.h"
-#include "base/team.h"
-#include "inverse/keep.h"
 #include "math/hash.h"
-#include "scene/fingerprint.h"
-#include "tree_file.h"
+#include "walks_file.h"
 #include <errno.h>
 #include <string.h>
 
-#define MAGIC      "impdrawn"
-#define BYTE_ORDER 0x01020304u
-#define VERSION    2
-#define PIECE      ((size_t)4 << 20) /* bytes that a rank sends at once */
-#define MEMORY     0x1p30
-#define ESS        0.5
+#define MEMORY 0x1p30
 
-struct head {
-    char magic[8];
-    uint32_t byte_order, version;
-    uint64_t scene_bytes, n_theta;
-    uint64_t evaluated; /* imp__fingerprint_evaluated */
-    uint64_t seed;
-    int32_t spp, points, wavelengths, wavelength_set, losses, n_stores, guided, reserved;
-    double survival, ess;
-};
-_Static_assert(sizeof(struct head) == 96, "no padding: it is written");
-
-struct store_head {
-    struct imp_record_of of;
-    int32_t index, roulette;
-};
-_Static_assert(sizeof(struct store_head) == 40, "no padding: it is written");
-
-/* ---- Numbers that are no texels ------------------------------------------------------ */
-
-/* Texels and cells are in the scene's bytes. */
-static bool is_number(const struct imp_param *p) { return p->store != IMP_STORE_BULK; }
-
-static void theta_get(const struct imp_scene *scene, double *theta)
+void imp__walks_theta_get(const struct imp_scene *scene, double *theta)
 {
     for (size_t k = 0; k < scene->n_params; k++)
         for (size_t e = 0; e < scene->params[k].info.count; e++)
             theta[scene->params[k].info.offset + e] =
                 imp__param_get(&scene->params[k], e);
 }
-static void theta_set(struct imp_scene *scene, const double *theta)
+
+void imp__walks_theta_set(struct imp_scene *scene, const double *theta)
 {
     for (size_t k = 0; k < scene->n_params; k++) {
         struct imp_param *p = &scene->params[k];
-        for (size_t e = 0; is_number(p) && e < p->info.count; e++)
+        for (size_t e = 0; imp__walks_is_number(p) && e < p->info.count; e++)
             imp__param_set(p, e, theta[p->info.offset + e]);
     }
     imp__theta_announce(scene);
 }
 
-/* ---- Writing ------------------------------------------------------------------------- */
-
-/* Is what a reader makes of the scene's bytes what these walks are evaluated with? */
-static enum imp_status scene_prove(const struct imp_walks *w,
-                                   const struct imp_bytes *bytes)
-{
-    enum imp_status st = IMP_OK;
-    imp_context *ctx = w->ctx;
-    imp_scene *again = NULL;
-    double *theta = imp__alloc(ctx, w->scene->n_theta + 1, sizeof *theta);
-    if (!theta) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory to write kept walks"));
-    IMP_TRY(imp__tree_take(ctx, "kept walks", bytes->data, bytes->size, &again));
-    bool same = again->n_theta == w->scene->n_theta;
-    if (same) theta_set(again, w->theta);
-    if (same) theta_get(again, theta);
-    same = same && memcmp(theta, w->theta, again->n_theta * sizeof *theta) == 0 &&
-           imp__fingerprint_evaluated(again) == imp__fingerprint_evaluated(w->scene);
-    if (!same)
-        IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,
-                           "kept walks: this scene is not whole without its geometry "
-                           "(a light that derives something from its shape, or "
-                           "instances in instances)"));
-out:
-    imp_scene_destroy(again);
-    imp__release(ctx, theta);
-    return st;
-}
-
-struct writing {
-    const struct imp_walks *walks;
-    struct head head;
-    const struct imp_bytes *scene;
-    struct imp_file_writer *to;
-    bool begun;             /* the file is there, and its start is written */
-    bool again;             /* the rank has more to send */
-    enum imp_status status; /* of the team */
-};
-
-/* What follows the last byte of a message: nothing, another one, or that there was no
- * memory for it. */
-enum { LAST, AGAIN, FAILED };
-
-static void start_put(struct imp_file_writer *to, const struct writing *x)
-{
-    const struct imp_walks *w = x->walks;
-    uint64_t sum = imp__hash(0, &x->head, sizeof x->head);
-    imp__file_put(to, &x->head, sizeof x->head);
-    sum = imp__hash(sum, x->scene->data, x->scene->size);
-    imp__file_put(to, x->scene->data, x->scene->size);
-    for (size_t k = 0; k < w->scene->n_params; k++) {
-        const struct imp_param *p = &w->scene->params[k];
-        const double *at = w->theta + p->info.offset;
-        if (!is_number(p)) continue;
-        sum = imp__hash(sum, at, p->info.count * sizeof *at);
-        imp__file_put(to, at, p->info.count * sizeof *at);
-    }
-    imp__file_put(to, &sum, sizeof sum);
-}
-
-static void piece_receive(void *receiver, int rank, const void *message, size_t bytes)
-{
-    struct writing *x = receiver;
-    (void)rank;
-    if (bytes == 0) return;
-    const unsigned char follows = ((const unsigned char *)message)[bytes - 1];
-    x->again = follows == AGAIN;
-    if (follows == FAILED) x->status = IMP_E_NOMEM;
-    if (x->to) imp__file_put(x->to, message, bytes - 1);
-}
-
-/* The tiles of one rank; `to` NULL: they are not written here. */
-static void share_put(struct writing *x, const struct imp_store *s, int rank)
-{
-    imp_context *ctx = x->walks->ctx;
-    const struct imp_team *host = &ctx->team->host;
-    const bool own = host->rank == rank;
-    size_t at = imp__store_share(s, rank, host->ranks);
-    const size_t end = imp__store_share(s, rank + 1, host->ranks);
-    if (rank == 0) {
-        if (x->to) imp__store_put(x->to, s, at, end);
-        return;
-    }
-    x->again = true;
-    while (x->again && x->status == IMP_OK) {
-        static const unsigned char failed = FAILED;
-        struct imp_bytes piece = {0};
-        bool fits = true;
-        while (own && at < end && piece.size < PIECE && fits)
-            fits = imp__record_bytes_put(&s->records[at++], &piece);
-        const unsigned char follows = at < end ? AGAIN : LAST;
-        fits = fits && (!own || imp__bytes_add(ctx, &piece, &follows, 1));
-        const enum imp_status sent =
-            host->gather(fits ? piece.data : &failed, fits ? piece.size : own,
-                         piece_receive, x, host->payload);
-        if (sent != IMP_OK) x->status = sent;
-        imp__bytes_free(ctx, &piece);
-    }
-}
-
-static void stores_put(struct writing *x)
-{
-    const struct imp_walks *w = x->walks;
-    for (int k = 0; k < w->n_stores; k++) {
-        const struct imp_store *s = &w->stores[k];
-        const struct store_head head = {s->records[0].of, s->index,
-                                        atomic_load(&s->roulette)};
-        if (x->to) imp__file_put(x->to, &head, sizeof head);
-        if (!w->spread) imp__store_put(x->to, s, 0, imp__store_tiles(s));
-        for (int rank = 0; w->spread && rank < w->ctx->team->host.ranks; rank++)
-            share_put(x, s, rank);
-    }
-}
-
-/* As of imp__file_write_by. */
-static void walks_fill(struct imp_file_writer *to, const void *payload)
-{
-    struct writing *x = *(struct writing *const *)payload;
-    x->begun = true;
-    x->to = to;
-    start_put(to, x);
-    stores_put(x);
-    if (x->status != IMP_OK && !to->error) to->error = EIO;
-}
-
-enum imp_status imp_walks_write(const imp_walks *w, const char *path)
-{
-    IMP_REQUIRE(NULL, w, "walks");
-    IMP_REQUIRE(w->ctx, path, "path");
-    IMP_FLOAT_MODE;
-    IMP_READS(w->scene);
-    imp_context *ctx = w->ctx;
-    struct imp_bytes scene = {0}, none = {0};
-    struct writing x = {.walks = w, .scene = &scene}, *const payload = &x;
-    const bool team = imp__team_ranks(ctx);
-    enum imp_status st = imp__tree_put(w->scene, w->theta, &scene);
-    if (st == IMP_OK) st = scene_prove(w, &scene);
-    if (st == IMP_OK) {
-        x.head = (struct head){.magic = MAGIC,
-                               .byte_order = BYTE_ORDER,
-                               .version = VERSION,
-                               .scene_bytes = scene.size,
-                               .n_theta = w->scene->n_theta,
-                               .evaluated = imp__fingerprint_evaluated(w->scene),
-                               .seed = w->run.seed,
-                               .spp = w->run.spp,
-                               .points = (int32_t)w->run.points,
-                               .wavelengths = (int32_t)w->run.wavelengths,
-                               .wavelength_set = w->run.wavelength_set,
-                               .losses = w->losses,
-                               .n_stores = w->n_stores,
-                               .guided = w->guided,
-                               .survival = w->survival,
-                               .ess = w->ess};
-        st = imp__file_write_by(ctx, path, walks_fill, &payload);
-        if (w->spread && !x.begun) stores_put(&x); /* the others wait for it */
-        if (x.status != IMP_OK)
-            st = imp__error(ctx, x.status, "%s: kept walks did not come together", path);
-        if (team) {
-            const enum imp_status first = imp__team_broadcast(ctx, st, &none);
-            if (st == IMP_OK) st = first;
-        }
-    }
-    imp__bytes_free(ctx, &none);
-    imp__bytes_free(ctx, &scene);
-    return st;
-}
-
-/* ---- Reading ------------------------------------------------------------------------- */
-
 struct reading {
     struct imp_record_source from;
     uint64_t size; /* of the file */
-    struct head head;
+    struct imp_walks_head head;
     imp_scene *held; /* that the file holds */
     double *theta;   /* [n_theta] of the draw */
 };
@@ -254,7 +54,7 @@ static enum imp_status take(struct reading *r, void *out, size_t n)
 static enum imp_status head_take(struct reading *r)
 {
     imp_context *ctx = r->from.ctx;
-    struct head *h = &r->head;
+    struct imp_walks_head *h = &r->head;
     const char *path = r->from.path;
     enum imp_status st = IMP_OK;
     if (fseeko(r->from.f, 0, SEEK_END) != 0 || ftello(r->from.f) < 0)
@@ -264,16 +64,16 @@ static enum imp_status head_take(struct reading *r)
     if (r->size < sizeof *h)
         IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: not a file of kept walks", path));
     IMP_TRY(take(r, h, sizeof *h));
-    if (memcmp(h->magic, MAGIC, sizeof h->magic) != 0)
+    if (memcmp(h->magic, IMP_WALKS_MAGIC, sizeof h->magic) != 0)
         IMP_TRY(imp__error(ctx, IMP_E_SCENE, "%s: not a file of kept walks", path));
-    if (h->byte_order != BYTE_ORDER)
+    if (h->byte_order != IMP_WALKS_BYTE_ORDER)
         IMP_TRY(imp__error(ctx, IMP_E_SCENE,
                            "%s: kept walks of byte order %08x; this machine's is %08x",
-                           path, h->byte_order, BYTE_ORDER));
-    if (h->version != VERSION)
+                           path, h->byte_order, IMP_WALKS_BYTE_ORDER));
+    if (h->version != IMP_WALKS_VERSION)
         IMP_TRY(imp__error(ctx, IMP_E_SCENE,
                            "%s: kept walks of version %u; this program reads version %d",
-                           path, h->version, VERSION));
+                           path, h->version, IMP_WALKS_VERSION));
     if (h->spp < 0 || h->points < 0 || h->points > IMP_POINTS_SOBOL ||
         h->wavelengths < 0 || h->wavelengths > IMP_WAVELENGTHS_IMPORTANCE ||
         h->wavelength_set < 0 || h->losses < 0 || h->losses > 1 || h->n_stores < 1 ||
@@ -305,7 +105,7 @@ static enum imp_status scene_take(struct reading *r)
     for (size_t k = 0; k < r->held->n_params; k++) {
         const struct imp_param *p = &r->held->params[k];
         double *at = r->theta + p->info.offset;
-        if (!is_number(p)) continue;
+        if (!imp__walks_is_number(p)) continue;
         IMP_TRY(take(r, at, p->info.count * sizeof *at));
         for (size_t e = 0; e < p->info.count; e++)
             if (!isfinite(at[e])) IMP_TRY(damaged(r, "a number is not finite"));
@@ -313,8 +113,8 @@ static enum imp_status scene_take(struct reading *r)
     sum = r->from.sum;
     IMP_TRY(take(r, &end, sizeof end));
     if (end != sum) IMP_TRY(damaged(r, "checksum of its scene"));
-    theta_set(r->held, r->theta);
-    theta_get(r->held, r->theta);
+    imp__walks_theta_set(r->held, r->theta);
+    imp__walks_theta_get(r->held, r->theta);
     if (imp__fingerprint_evaluated(r->held) != r->head.evaluated)
         IMP_TRY(imp__error(ctx, IMP_E_SCENE,
                            "%s: damaged, or written by another build: its materials and "
@@ -352,7 +152,7 @@ static enum imp_status stores_take(struct reading *r, struct imp_walks *w, doubl
     int last = -1;
     const bool own = w->scene == r->held;
     for (int k = 0; k < r->head.n_stores; k++) {
-        struct store_head h;
+        struct imp_walks_store_head h;
         struct imp_tracer tracer;
         IMP_TRY(take(r, &h, sizeof h));
         if (h.index <= last || h.index >= w->scene->n_sensors || h.roulette < 0 ||
