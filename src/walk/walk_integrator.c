@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "walk_integrator.h"
 #include "math/hash.h"
 #include "scene/majorants.h"
+#include "walk_settings.h"
 #include <string.h>
 
 const struct imp_walk_integrator *imp__walk_integrator(const struct imp_scene *scene)
@@ -50,116 +50,10 @@ enum imp_status imp__walks_from(const struct imp_scene *scene,
 
 /* ---- Kinds ----------------------------------------------------------------------- */
 
-/* Reads hide_emitters and max_depth. */
-static enum imp_status depth_read(const struct imp_build *build, int fallback,
-                                  struct imp_integrator *i, struct imp_walk_integrator *w)
-{
-    enum imp_status st = IMP_OK;
-    int64_t depth;
-    IMP_TRY(imp__props_bool(build->ctx, build->node, "hide_emitters", false,
-                            &w->hide_emitters));
-    IMP_TRY(imp__props_int(build->ctx, build->node, "max_depth", fallback, -1, INT32_MAX,
-                           &depth));
-    i->max_depth = w->max_depth = (int)depth;
-out:
-    return st;
-}
-
-/* How light samples choose among the lights. */
-enum light_choice { BY_COUNT, BY_WEIGHTS, BY_TREE };
-#define LIGHTS_MANY 64 /* from so many on by the tree, if nobody says */
-
-static enum imp_status light_choice_read(const struct imp_build *build,
-                                         struct imp_walk_integrator *w)
-{
-    static const char *const words[] = {"automatic", "weights", "tree"};
-    int choice;
-    const enum imp_status st = imp__props_choice(build->ctx, build->node, "light_choice",
-                                                 words, 3, BY_COUNT, &choice);
-    w->light_choice = choice;
-    return st;
-}
-
-static void light_choice_ready(struct imp_scene *scene, struct imp_walk_integrator *w)
-{
-    w->light_tree = /* walks from both ends are weighed by the lights' weights */
-        w->lights && !w->both &&
-        (w->light_choice == BY_TREE ||
-         (w->light_choice == BY_COUNT && scene->n_emitters >= LIGHTS_MANY));
-    scene->lights_in_tree |= w->light_tree;
-    if (w->other_end) w->other_end->light_tree = w->light_tree;
-}
-
-/* Weights of the densities of directions, and how many vertices draw from each of them:
- * walks then become trees of up to IMP_DENSITIES^split branches. */
-#define SPLIT_MAX 6
-static enum imp_status mixture_read(const struct imp_build *build,
-                                    struct imp_walk_integrator *w)
-{
-    enum imp_status st = IMP_OK;
-    int64_t split;
-    IMP_TRY(imp__mixing_read(build, &w->mixing));
-    IMP_TRY(imp__props_int(build->ctx, build->node, "split", 0, 0, SPLIT_MAX, &split));
-    w->split = (int)split;
-out:
-    return st;
-}
-
-/* If nobody wrote weights: path draws from kernels, and towards proxies, which are there to
- * be aimed at; photons, which no connection helps, towards lights as well. */
-static enum imp_status mixture_settle(struct imp_scene *scene,
-                                      const struct imp_integrator *i,
-                                      struct imp_walk_integrator *w)
-{
-    if (!w->mixing) {
-        w->mixing = imp__arena_array(&scene->arena, 1, sizeof *w->mixing);
-        if (!w->mixing)
-            return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for the scene");
-        double *weight = w->mixing->weight;
-        const bool varied =
-            scene->environment >= 0 &&
-            !(scene->emitters[scene->environment]->ops->flags & IMP_EMITTER_UNIFORM);
-        weight[IMP_DENSITY_KERNEL] = 1;
-        weight[IMP_DENSITY_GUIDE] = -1;
-        weight[IMP_DENSITY_PROXIES] = imp__mixing_possible(scene, IMP_DENSITY_PROXIES);
-        if (w->photons) {
-            weight[IMP_DENSITY_EMITTERS] =
-                imp__mixing_possible(scene, IMP_DENSITY_EMITTERS);
-            weight[IMP_DENSITY_ENVIRONMENT] = varied;
-        }
-    }
-    light_choice_ready(scene, w);
-    const enum imp_status st = imp__mixing_settle(scene, w->mixing);
-    w->mixes = scene->materials_mix || imp__mixing_mixes(w->mixing);
-    if (st == IMP_OK && w->split > 0 &&
-        (scene->n_bodies > 0 || (w->media && (scene->n_media > 0 || scene->priorities))))
-        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
-                          "integrator %s: walks through media do not split; set 'split' "
-                          "to 0",
-                          i->ops->name);
-    return st;
-}
-
 static enum imp_status mixture_ready(struct imp_scene *scene,
                                      const struct imp_integrator *i)
 {
-    return mixture_settle(scene, i, i->self);
-}
-
-/* The same from the other end. */
-static enum imp_status other_end_make(const struct imp_build *build,
-                                      struct imp_walk_integrator *w)
-{
-    struct imp_walk_integrator *other = imp__arena_array(build->arena, 1, sizeof *other);
-    if (!other)
-        return imp__error(build->ctx, IMP_E_NOMEM, "no memory for the integrator");
-    *other = *w;
-    other->from_lights = !w->from_lights;
-    other->guided = false;
-    other->mixing = NULL;
-    other->split = 0;
-    w->other_end = other;
-    return IMP_OK;
+    return imp__mixture_settle(scene, i, i->self);
 }
 
 /* `depth`: default of max_depth. */
@@ -171,11 +65,11 @@ static enum imp_status path_read(const struct imp_build *build, int depth,
     int64_t rr;
     *w = (struct imp_walk_integrator){.lights = true, .directions = true, .guided = true};
     IMP_TRY(imp__props_int(build->ctx, build->node, "rr_depth", 5, 1, INT32_MAX, &rr));
-    IMP_TRY(depth_read(build, depth, i, w));
-    IMP_TRY(light_choice_read(build, w));
-    IMP_TRY(mixture_read(build, w));
+    IMP_TRY(imp__depth_read(build, depth, i, w));
+    IMP_TRY(imp__light_choice_read(build, w));
+    IMP_TRY(imp__mixture_read(build, w));
     w->rr_depth = (int)rr;
-    IMP_TRY(other_end_make(build, w));
+    IMP_TRY(imp__other_end_make(build, w));
 out:
     return st;
 }
@@ -253,7 +147,7 @@ static enum imp_status direct_build(const struct imp_build *build,
     if (emitter + bsdf == 0)
         IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
                                 "emitter_samples and bsdf_samples are both 0"));
-    IMP_TRY(light_choice_read(build, w));
+    IMP_TRY(imp__light_choice_read(build, w));
     w->lights = emitter > 0;
     w->directions = bsdf > 0;
 out:
@@ -263,7 +157,7 @@ out:
 static enum imp_status direct_ready(struct imp_scene *scene,
                                     const struct imp_integrator *i)
 {
-    light_choice_ready(scene, i->self);
+    imp__light_choice_ready(scene, i->self);
     return IMP_OK;
 }
 
@@ -305,7 +199,7 @@ static enum imp_status stam_build(const struct imp_build *build, struct imp_inte
     enum imp_status st = IMP_OK;
     int choice;
     *w = (struct imp_walk_integrator){.rr_depth = 5, .directions = true, .absorbs = true};
-    IMP_TRY(depth_read(build, 64, i, w));
+    IMP_TRY(imp__depth_read(build, 64, i, w));
     IMP_TRY(imp__props_choice(build->ctx, build->node, "alpha_gradient", words, 3, 0,
                               &choice));
     w->alpha_gradient = (enum imp_stam_alpha)choice;
@@ -329,13 +223,13 @@ static enum imp_status photons_build(const struct imp_build *build,
                                       .guided = true,
                                       .photons = true,
                                       .media = true};
-    IMP_TRY(depth_read(build, -1, i, w));
+    IMP_TRY(imp__depth_read(build, -1, i, w));
     IMP_TRY(imp__props_float(build->ctx, build->node, "h", 1, &w->h));
     if (!(w->h > 0))
         IMP_TRY(imp__node_error(build->ctx, build->node, IMP_E_SCENE,
                                 "h = %g is not positive", w->h));
-    IMP_TRY(mixture_read(build, w));
-    IMP_TRY(other_end_make(build, w));
+    IMP_TRY(imp__mixture_read(build, w));
+    IMP_TRY(imp__other_end_make(build, w));
 out:
     return st;
 }
@@ -366,9 +260,9 @@ static enum imp_status ptracer_build(const struct imp_build *build,
     *w = (struct imp_walk_integrator){
         .lights = true, .directions = true, .media = true, .from_lights = true};
     IMP_TRY(imp__props_int(build->ctx, build->node, "rr_depth", 5, 1, INT32_MAX, &rr));
-    IMP_TRY(depth_read(build, -1, i, w));
+    IMP_TRY(imp__depth_read(build, -1, i, w));
     w->rr_depth = (int)rr;
-    IMP_TRY(other_end_make(build, w));
+    IMP_TRY(imp__other_end_make(build, w));
 out:
     return st;
 }
@@ -379,9 +273,9 @@ static enum imp_status ptracer_ready(struct imp_scene *scene,
 {
     struct imp_walk_integrator *w = i->self;
     w->media = w->other_end->media = scene->n_media > 0 || scene->priorities;
-    if (!w->both) return mixture_settle(scene, i, w->other_end);
+    if (!w->both) return imp__mixture_settle(scene, i, w->other_end);
     w->other_end->other_end->media = w->media;
-    return mixture_settle(scene, i, w->other_end->other_end);
+    return imp__mixture_settle(scene, i, w->other_end->other_end);
 }
 
 /* Walks from both ends, joined. Its other ends are ptracer's, and of that path's. */

@@ -1,0 +1,101 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "walk_settings.h"
+
+enum imp_status imp__depth_read(const struct imp_build *build, int fallback,
+                                struct imp_integrator *i, struct imp_walk_integrator *w)
+{
+    enum imp_status st = IMP_OK;
+    int64_t depth;
+    IMP_TRY(imp__props_bool(build->ctx, build->node, "hide_emitters", false,
+                            &w->hide_emitters));
+    IMP_TRY(imp__props_int(build->ctx, build->node, "max_depth", fallback, -1, INT32_MAX,
+                           &depth));
+    i->max_depth = w->max_depth = (int)depth;
+out:
+    return st;
+}
+
+enum light_choice { BY_COUNT, BY_WEIGHTS, BY_TREE };
+#define LIGHTS_MANY 64 /* from so many on by the tree, if nobody says */
+
+enum imp_status imp__light_choice_read(const struct imp_build *build,
+                                       struct imp_walk_integrator *w)
+{
+    static const char *const words[] = {"automatic", "weights", "tree"};
+    int choice;
+    const enum imp_status st = imp__props_choice(build->ctx, build->node, "light_choice",
+                                                 words, 3, BY_COUNT, &choice);
+    w->light_choice = choice;
+    return st;
+}
+
+void imp__light_choice_ready(struct imp_scene *scene, struct imp_walk_integrator *w)
+{
+    w->light_tree = /* walks from both ends are weighed by the lights' weights */
+        w->lights && !w->both &&
+        (w->light_choice == BY_TREE ||
+         (w->light_choice == BY_COUNT && scene->n_emitters >= LIGHTS_MANY));
+    scene->lights_in_tree |= w->light_tree;
+    if (w->other_end) w->other_end->light_tree = w->light_tree;
+}
+
+#define SPLIT_MAX 6
+enum imp_status imp__mixture_read(const struct imp_build *build,
+                                  struct imp_walk_integrator *w)
+{
+    enum imp_status st = IMP_OK;
+    int64_t split;
+    IMP_TRY(imp__mixing_read(build, &w->mixing));
+    IMP_TRY(imp__props_int(build->ctx, build->node, "split", 0, 0, SPLIT_MAX, &split));
+    w->split = (int)split;
+out:
+    return st;
+}
+
+enum imp_status imp__mixture_settle(struct imp_scene *scene,
+                                    const struct imp_integrator *i,
+                                    struct imp_walk_integrator *w)
+{
+    if (!w->mixing) {
+        w->mixing = imp__arena_array(&scene->arena, 1, sizeof *w->mixing);
+        if (!w->mixing)
+            return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for the scene");
+        double *weight = w->mixing->weight;
+        const bool varied =
+            scene->environment >= 0 &&
+            !(scene->emitters[scene->environment]->ops->flags & IMP_EMITTER_UNIFORM);
+        weight[IMP_DENSITY_KERNEL] = 1;
+        weight[IMP_DENSITY_GUIDE] = -1;
+        weight[IMP_DENSITY_PROXIES] = imp__mixing_possible(scene, IMP_DENSITY_PROXIES);
+        if (w->photons) {
+            weight[IMP_DENSITY_EMITTERS] =
+                imp__mixing_possible(scene, IMP_DENSITY_EMITTERS);
+            weight[IMP_DENSITY_ENVIRONMENT] = varied;
+        }
+    }
+    imp__light_choice_ready(scene, w);
+    const enum imp_status st = imp__mixing_settle(scene, w->mixing);
+    w->mixes = scene->materials_mix || imp__mixing_mixes(w->mixing);
+    if (st == IMP_OK && w->split > 0 &&
+        (scene->n_bodies > 0 || (w->media && (scene->n_media > 0 || scene->priorities))))
+        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                          "integrator %s: walks through media do not split; set 'split' "
+                          "to 0",
+                          i->ops->name);
+    return st;
+}
+
+enum imp_status imp__other_end_make(const struct imp_build *build,
+                                    struct imp_walk_integrator *w)
+{
+    struct imp_walk_integrator *other = imp__arena_array(build->arena, 1, sizeof *other);
+    if (!other)
+        return imp__error(build->ctx, IMP_E_NOMEM, "no memory for the integrator");
+    *other = *w;
+    other->from_lights = !w->from_lights;
+    other->guided = false;
+    other->mixing = NULL;
+    other->split = 0;
+    w->other_end = other;
+    return IMP_OK;
+}
