@@ -85,7 +85,7 @@ struct imp_both {
 void imp__both_trace(const struct imp_tracer *tracer, struct imp_arena *arena,
                      int64_t index, struct imp_light_walk *out);
 
-/* ---- both_weight.c: densities, and the weights made of them ---- */
+/* ---- both_density.c ---- */
 /* Room for one more end. NULL: no memory. */
 struct imp_end *imp__both_light_end(struct imp_both *b);
 struct imp_end *imp__both_eye_end(struct imp_both *b);
@@ -103,6 +103,7 @@ bool imp__both_eye_arrives(struct imp_step *s, const struct imp_surface *at);
 void imp__both_eye_leaves(struct imp_step *s, const struct imp_bsdf *b,
                           const struct imp_frame *frame);
 
+/* ---- both_weight.c ---- */
 /* Weight of emission that the walk from the sensor meets (hit, at NULL: the sky). */
 double imp__both_met_weight(const struct imp_step *s, int emitter,
                             const struct imp_hit *hit, const struct imp_surface *at);
