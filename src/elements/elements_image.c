@@ -213,6 +213,7 @@ static enum imp_status row_work(size_t item, int worker, void *result, void *pay
     const struct picture *p = payload;
     const imp_elements *e = p->e;
     const int n = p->side * p->side, channels = p->film->channels;
+    const double reads = p->kind == IMP_ELEMENTS_IMPORTANCE ? 1 : p->sensor->scale;
     (void)worker;
     for (int x = 0; x < p->film->width; x++) {
         double sum[3] = {0};
@@ -231,7 +232,7 @@ static enum imp_status row_work(size_t item, int worker, void *result, void *pay
             for (int c = 0; c < channels; c++) sum[c] += out[c];
         }
         float *pixel = (float *)result + (size_t)x * (size_t)channels;
-        for (int c = 0; c < channels; c++) pixel[c] = (float)(sum[c] / n);
+        for (int c = 0; c < channels; c++) pixel[c] = (float)(reads * sum[c] / n);
     }
     return IMP_OK;
 }

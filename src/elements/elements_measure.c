@@ -75,7 +75,9 @@ void imp__el_weigh(imp_elements *e, const double *w)
             size_t n = 0;
             for (size_t i = 0; i < e->n_hits; i++) n += e->hits[i].source == k;
             for (size_t i = 0; i < e->n_hits; i++)
-                if (e->hits[i].source == k) e->hits[i].weight = w[k] / (double)n;
+                if (e->hits[i].source == k)
+                    e->hits[i].weight =
+                        e->scene->sensors[src->sensor]->scale * w[k] / (double)n;
         } else if (src->kind == IMP_ELEMENTS_PLANE) {
             struct imp__el_root *r = &e->roots[plane++];
             r->measure = w[k] / r->area;
@@ -166,12 +168,13 @@ static double flux_of(const imp_elements *e, const struct imp__element *x, int n
 
 static double mean_seen(const imp_elements *e, size_t source)
 {
-    const int *r = e->sources[source].region;
+    const struct imp_elements_source *src = &e->sources[source];
+    const int *r = src->region;
     const size_t n = (size_t)(r[2] - r[0]) * (size_t)(r[3] - r[1]) *
                      (size_t)(e->opt.rays * e->opt.rays);
     double sum = 0;
     for (size_t k = 0; k < n; k++) sum += e->seen[e->first_ray[source] + k];
-    return sum / (double)n;
+    return e->scene->sensors[src->sensor]->scale * sum / (double)n;
 }
 
 enum imp_status imp__el_measure_each(imp_elements *e, double *J)

@@ -8,13 +8,15 @@
 
 /* At least 384 rays across the picture, 3 to 24 a side of a pixel: the edges of lamps in
  * view are then as well resolved in small pictures as in large ones (0.1 % of their
- * light; with 3 a pixel 8 % at 16 pixels across). */
+ * light; with 3 a pixel 8 % at 16 pixels across). A meter's rays have directions to cover,
+ * too: up to 64 (0.3 %). */
 static int rays_by_default(const struct imp_scene *scene, int sensor)
 {
     if (sensor < 0 || sensor >= scene->n_sensors) return 3;
     const struct imp_film_desc *f = &scene->sensors[sensor]->film;
     const int across = imp_max(imp_min(f->crop_w, f->crop_h), 1);
-    return imp_clamp((384 + across - 1) / across, 3, 24);
+    return imp_clamp((384 + across - 1) / across, 3,
+                     scene->sensors[sensor]->shape ? 64 : 24);
 }
 
 enum imp_status imp__el_options(imp_elements *e,

@@ -138,6 +138,61 @@ static void means(imp_context *ctx)
     imp_scene_destroy(s);
 }
 
+/* ---- Through a meter --------------------------------------------------------------- */
+
+/* An irradiancemeter on one of two facing squares looks in all directions: its reading is
+ * pi times the form factor to the lamp, plus what goes to and fro between them. */
+static void meter(imp_context *ctx)
+{
+    static const char *const facing =
+        "<scene version='3.0.0'><shape type='rectangle' id='desk'><transform "
+        "name='to_world'><scale value='0.5'/></transform><bsdf type='diffuse'>"
+        "<float name='reflectance' value='%g'/></bsdf><sensor type='irradiancemeter'>"
+        "<film type='hdrfilm'><integer name='width' value='%d'/>"
+        "<integer name='height' value='1'/><rfilter type='box'/></film></sensor></shape>"
+        "<shape type='rectangle' id='lamp'><transform name='to_world'>"
+        "<scale value='0.5'/><rotate x='1' angle='180'/><translate z='1'/></transform>"
+        "<bsdf type='diffuse'><float name='reflectance' value='%g'/></bsdf>"
+        "<emitter type='area'><float name='radiance' value='1'/></emitter></shape>"
+        "</scene>";
+    const double F = opposed(1);
+    for (int pixels = 1; pixels <= 4; pixels += 3)
+        for (int k = 0; k < 2; k++) {
+            const double rho = k ? 0.8 : 0;
+            const struct imp_elements_source desk = {
+                .size = sizeof desk, .kind = IMP_ELEMENTS_SHAPE, .shape = "desk"};
+            struct imp_elements_options o = IMP_ELEMENTS_OPTIONS_INIT;
+            struct imp_elements_info info = {.size = sizeof info};
+            double lux = 0, mean = 0;
+            char xml[2048];
+            snprintf(xml, sizeof xml, facing, rho, pixels, rho);
+            imp_scene *s = test_scene_text(ctx, xml, IMP_MONO);
+            for (int by = 0; by < 2; by++) {
+                imp_elements *e;
+                imp_film *f;
+                o.sources = by ? &desk : NULL, o.n_sources = by ? 1 : 0;
+                o.eps_last = 1e-4, o.stop = 1e-4;
+                test_must(ctx, imp_elements_create(s, &o, &e));
+                test_must(ctx, imp_elements_solve(e));
+                test_must(ctx, imp_elements_get_info(e, &info));
+                if (by) lux = info.measure;
+                if (!by) {
+                    mean = info.measure;
+                    test_must(ctx, imp_elements_image(e, 0, IMP_ELEMENTS_FLAT, 0, &f));
+                    double sum = 0;
+                    for (int p = 0; p < pixels; p++) sum += (double)f->mean[p] / pixels;
+                    tap_near(sum, mean, 1e-6, 0, "the meter's picture has its reading");
+                    tap_near(info.measure_adjoint, mean, 1e-5, 0, "... from the lights");
+                    imp_film_destroy(f);
+                }
+                imp_elements_destroy(e);
+            }
+            tap_near(mean, lux, 5e-3, 0, "a meter reads the illuminance of its shape");
+            if (k == 0) tap_near(mean, IMP_PI * F, 5e-3, 0, "... which is known");
+            imp_scene_destroy(s);
+        }
+}
+
 /* ---- Errors of shares ----------------------------------------------------------- */
 
 /* Scene d: the lamp behind the eye comes by the glossy walls alone, and its share swings
@@ -193,6 +248,7 @@ int main(void)
     imp_context *ctx = test_context(2);
     closed_forms(ctx);
     means(ctx);
+    meter(ctx);
     shares(ctx);
     imp_context_destroy(ctx);
     return tap_done();
