@@ -115,6 +115,9 @@ static enum imp_status walk_add(const struct job *j, struct worker *w, int64_t i
                                   (size_t)(taps.across.first + x),
                               taps.down.w[y] * taps.across.w[x]));
     }
+    if (imp_unlikely(
+            w->arena.failed)) /* what is made of the walk takes room in it, too */
+        IMP_TRY(imp__error(j->ctx, IMP_E_NOMEM, "no memory for a walk's derivatives"));
     for (int k = 0; k < w->n_touched; k++) {
         const size_t pixel = (size_t)w->touched[k];
         const double *from = w->sum + (size_t)k * j->n;

@@ -69,7 +69,14 @@ enum imp_status imp__light_picture_make(const struct imp_light_picture *picture,
                                         double *mean, double *se,
                                         struct imp_drops *drops);
 
-/* The picture of a run (film_render.c). */
+/* The values of a pixel as films of as many channels each, out [n_films]. The caller destroys
+ * them; none after an error.
+ * @return as imp__light_picture_make; IMP_E_UNSUPPORTED for a time limit alone;
+ *         IMP_E_NUMERIC if a pixel is not finite; IMP_PART. */
+enum imp_status imp__light_films_make(const struct imp_light_picture *picture,
+                                      const char *names, int n_films, imp_film **out);
+
+/* The picture of a run (film_from_lights.c). */
 struct imp_measure;
 enum imp_status imp__render_from_lights(const struct imp_measure *measure,
                                         const struct imp_run *run, imp_film **out);

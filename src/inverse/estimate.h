@@ -68,6 +68,8 @@ enum imp_status imp__problem_tracer_of_any_end(const struct imp_problem *p,
                                                const struct imp_run *run,
                                                const struct imp_wavelengths *waves,
                                                struct imp_tracer *out);
+/* Warn, once, of light that its walks do not bring. */
+void imp__problem_tell(struct imp_problem *p, const struct imp_tracer *tracer);
 /* The tracer of one part of a target (struct imp__target). `run` becomes the part's run. */
 enum imp_status imp__target_tracer(const struct imp_problem *p,
                                    const struct imp__target *target, int part,

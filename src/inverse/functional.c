@@ -48,9 +48,7 @@ static enum imp_status begin(imp_problem *p, const float *adjoint,
     enum imp_status st = imp__problem_tracer_of_any_end(p, run, NULL, &f->tracer);
     if (st == IMP_OK) st = imp__sensor_lit(p->scene, f->tracer.sensor);
     if (st != IMP_OK) return st;
-    if (!p->missing_told)
-        imp__light_walks_tell(p->scene, f->tracer.sensor, f->tracer.integrator);
-    p->missing_told = true;
+    imp__problem_tell(p, &f->tracer);
     f->film = &f->tracer.sensor->film;
     f->channels = p->scene->channels;
     f->margin = f->film->sample_border ? imp__film_border(f->film) : 0;
@@ -206,7 +204,7 @@ enum imp_status imp_problem_functional(imp_problem *p, const float *adjoint,
     if (value) {
         IMP_TRY(imp__problem_same(p, &own, "functional"));
         if (f.tracer.integrator->from_lights)
-            IMP_TRY(imp__light_functional(&f.tracer, f.adjoint, f.norm, &own, &estimate));
+            IMP_TRY(imp__light_functional(&f, &own, &estimate.value, &estimate.se));
         else IMP_TRY(picture_value(ctx, &f, weights, &own, &estimate));
     }
     if (imp__team_part(ctx)) IMP_TRY(IMP_PART);
@@ -254,6 +252,22 @@ out:
     return st;
 }
 
+/* The same of walks from the lights, which need no pictures. */
+static enum imp_status light_errors(imp_context *ctx, const struct imp__functional *f,
+                                    const struct imp_run *run, double *se)
+{
+    const size_t n = 1 + (size_t)f->n_groups;
+    struct imp_run own = *run;
+    own.spp = imp__error_spp(f->spp);
+    double *mean = imp__alloc(ctx, n, sizeof *mean);
+    if (!mean) return imp__error(ctx, IMP_E_NOMEM, "no memory for sums");
+    const enum imp_status st = imp__light_functional(f, &own, mean, se);
+    for (size_t k = 0; st == IMP_OK && k < n; k++)
+        se[k] *= sqrt((double)own.spp / f->spp);
+    imp__release(ctx, mean);
+    return st;
+}
+
 enum imp_status imp_problem_jacobian_sums(imp_problem *p, const float *adjoint,
                                           const struct imp_run *run,
                                           const imp_film *primal, imp_film *const *films,
@@ -279,9 +293,6 @@ enum imp_status imp_problem_jacobian_sums(imp_problem *p, const float *adjoint,
     float *ones = NULL;
     int *each = NULL;
     IMP_TRY(begin(p, adjoint, &own, &f, &weights, &ones));
-    if (f.tracer.integrator->from_lights)
-        IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,
-                           "derivative pictures are made by walks from the sensor"));
     f.picture = primal;
     f.films = films;
     if (!part) IMP_TRY(pictures_check(p, &f));
@@ -300,7 +311,9 @@ enum imp_status imp_problem_jacobian_sums(imp_problem *p, const float *adjoint,
     for (size_t k = 0; k <= n; k++) se[k] = NAN;
     IMP_TRY(sums_same(p, &f, &own));
     if (f.spp > 0) { /* else interrupted before every pixel had its samples */
-        const enum imp_status ended = errors(ctx, &f, &own, weights, false, se);
+        const enum imp_status ended = f.tracer.integrator->from_lights
+                                          ? light_errors(ctx, &f, &own, se)
+                                          : errors(ctx, &f, &own, weights, false, se);
         if (ended != IMP_CANCELLED) IMP_TRY(ended);
     }
     if (value) *value = (struct imp_estimate){inner_product(&f, primal), se[0], 0};

@@ -66,18 +66,12 @@ static enum imp_status target_add(struct imp__normal_job *j,
     enum imp_status st = imp__target_tracer(p, target, part, true, &own, &j->tracer);
     if (st != IMP_OK) return st;
     const struct imp_film_desc *film = &j->tracer.sensor->film;
-    if (j->tracer.integrator->both)
-        return imp__error(p->ctx, IMP_E_UNSUPPORTED,
-                          "Gauss-Newton matrices are made by walks from one end, and "
-                          "integrator %s has walks from both; let them begin at the "
-                          "sensor, or at the lights",
-                          p->scene->integrator->ops->name);
     if (j->tracer.integrator->from_lights && !imp__loss_quadratic(target->desc.loss))
         return imp__error(p->ctx, IMP_E_UNSUPPORTED,
-                          "Gauss-Newton matrices of walks from the lights are those of "
-                          "losses that are quadratic in the picture (l2, relative): in "
-                          "others the noise of few walks a pixel is a bias; let walks "
-                          "begin at the sensor");
+                          "Gauss-Newton matrices of walks from the lights, or from both "
+                          "ends, are those of losses that are quadratic in the picture "
+                          "(l2, relative): in others the noise of few walks a pixel is a "
+                          "bias; let walks begin at the sensor");
     if (shares_walks(&j->tracer)) {
         struct imp__normal_sums total = imp__normal_at(j->total, j->K);
         total.cov_excess = j->excess;

@@ -12,7 +12,7 @@
 #define ERROR_SPP   16
 #define PART_SPP    64 /* of one item of work, about */
 
-static int error_spp(int spp)
+int imp__error_spp(int spp)
 {
     return imp_max(2, imp_min(spp, imp_max(ERROR_SPP, spp / ERROR_SHARE)));
 }
@@ -290,7 +290,7 @@ static enum imp_status pass_run(imp_context *ctx, const struct imp__functional *
                      .positions = positions,
                      .n = (size_t)f->n_groups + 1,
                      .border = f->W ? imp__film_border(f->film) : 0,
-                     .spp = error_spp(f->spp)};
+                     .spp = imp__error_spp(f->spp)};
     const int width = f->film->crop_w, height = f->film->crop_h;
     if (f->tracer.kept && (f->tracer.kept->set > 0 || f->tracer.kept->n < 2))
         IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,
@@ -358,7 +358,7 @@ enum imp_status imp__influence_errors(imp_context *ctx, const struct imp__functi
     struct imp__influence known = {0};
     struct stratum t = {0};
     const struct pass p = {.f = f, .n = (size_t)f->n_groups + 1};
-    const double samples = (double)f->spp / error_spp(f->spp);
+    const double samples = (double)f->spp / imp__error_spp(f->spp);
     t.value = imp__alloc(ctx, p.n, sizeof *t.value);
     if (!t.value) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for standard errors"));
     if (f->W) IMP_TRY(pass_run(ctx, f, run, true, &known));

@@ -51,6 +51,9 @@ struct imp__influence {
     double *cross;    /* [height][width][n] as well, with u_p; NULL: box filter */
 };
 
+/* Samples per pixel that errors of a picture of `spp` are taken from. */
+int imp__error_spp(int spp);
+
 /* The first pass. Release `out` with imp__influence_free, also after a failure.
  * @return as imp__picture_make; `out` is not whole for a part. */
 enum imp_status imp__influence_sample(imp_context *ctx, const struct imp__functional *f,

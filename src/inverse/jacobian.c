@@ -5,6 +5,7 @@
 #include "estimate.h"
 #include "film/film_picture.h"
 #include "lanes.h"
+#include "light_gradient.h"
 #include "walk/run.h"
 #include <string.h>
 
@@ -38,8 +39,11 @@ enum imp_status imp_problem_forward(imp_problem *p, const double *x_dot,
     IMP_READS(p->scene);
     struct forward f = {.x_dot = x_dot, .channels = p->scene->channels};
     enum imp_status st = imp__problem_same(p, &own, "forward");
-    if (st == IMP_OK) st = imp__problem_tracer(p, &own, NULL, &f.tracer);
+    if (st == IMP_OK) st = imp__problem_tracer_of_any_end(p, &own, NULL, &f.tracer);
     if (st != IMP_OK) return st;
+    imp__problem_tell(p, &f.tracer);
+    if (f.tracer.integrator->from_lights)
+        return imp__light_forward(&f.tracer, x_dot, &own, out);
     const struct imp_picture picture = {
         .sensor = f.tracer.sensor,
         .stage = "derivative",
@@ -79,7 +83,8 @@ enum imp_status imp_problem_jacobian(imp_problem *p, const struct imp_run *run,
     imp_film **made = imp__alloc(ctx, (size_t)n, sizeof *made);
     if (!made) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory"));
     IMP_TRY(imp__problem_same(p, &own, "jacobian"));
-    IMP_TRY(imp__problem_tracer(p, &own, NULL, &tracer));
+    IMP_TRY(imp__problem_tracer_of_any_end(p, &own, NULL, &tracer));
+    imp__problem_tell(p, &tracer);
     const struct imp_picture picture = {
         .sensor = tracer.sensor,
         .stage = "jacobian",
@@ -89,7 +94,8 @@ enum imp_status imp_problem_jacobian(imp_problem *p, const struct imp_run *run,
         .payload = &tracer,
         .n_films = n,
         .set = imp__tracer_set(&tracer, imp__walks_of(&own, tracer.sensor))};
-    st = imp__picture_make(ctx, &picture, &own, made);
+    st = tracer.integrator->from_lights ? imp__light_jacobian(&tracer, &own, made)
+                                        : imp__picture_make(ctx, &picture, &own, made);
     if (st != IMP_OK && st != IMP_CANCELLED) goto out;
     if (films) memcpy(films, made + 1, p->n * sizeof *made);
     if (primal) *primal = made[0];

@@ -53,20 +53,35 @@ static inline void imp__lanes_add(struct imp_sink *sink, int param, size_t eleme
         x[(channels == 3 ? c * s->channels : 0) + c] += (*bar)[c];
 }
 
-/* x [active->n][channels] += derivatives of the walk's channels. */
-static inline void imp__lanes_sweep(const struct imp_tracer *tracer,
-                                    const struct imp_walk *walk, double *x)
+/* The sink that adds to x [active->n][channels]. */
+static inline struct imp_lanes imp__lanes_into(const struct imp_tracer *tracer,
+                                               const struct imp_walk *walk, double *x)
 {
-    const bool gained = tracer->sensor->gain != NULL;
-    struct imp_lanes lanes = {.sink = {imp__lanes_add, true},
+    return (struct imp_lanes){.sink = {imp__lanes_add, true},
                               .active = tracer->active,
                               .walk = walk,
                               .channels = tracer->scene->channels,
                               .x = x,
                               .gain = imp__spec(1)};
-    const int n = walk->waves ? walk->waves->carried.n : lanes.channels;
+}
+
+/* 1 in every lane that is in use. */
+static inline imp_spec imp__lanes_one(const struct imp_tracer *tracer,
+                                      const struct imp_walk *walk)
+{
+    const int n = walk->waves ? walk->waves->carried.n : tracer->scene->channels;
     imp_spec one = {0};
     for (int c = 0; c < n; c++) one[c] = 1;
+    return one;
+}
+
+/* x [active->n][channels] += derivatives of the walk's channels. */
+static inline void imp__lanes_sweep(const struct imp_tracer *tracer,
+                                    const struct imp_walk *walk, double *x)
+{
+    const bool gained = tracer->sensor->gain != NULL;
+    struct imp_lanes lanes = imp__lanes_into(tracer, walk, x);
+    imp_spec one = imp__lanes_one(tracer, walk);
     if (imp_unlikely(gained)) lanes.gain = imp__walk_gain(tracer, walk);
     if (imp_unlikely(gained) && !walk->waves) one *= lanes.gain;
     imp__walk_sweep_values(tracer, walk, one, &lanes.sink);

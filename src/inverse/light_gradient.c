@@ -2,6 +2,7 @@
 #include "light_gradient.h"
 #include "base/team.h"
 #include "gradient_job.h"
+#include "influence.h"
 #include "loss.h"
 #include "seen.h"
 #include <math.h>
@@ -112,22 +113,25 @@ out:
 /* ---- Functionals ------------------------------------------------------------------ */
 
 struct functional {
-    const struct imp_film_desc *film;
-    const float *adjoint;
-    int channels;
+    const struct imp__functional *f;
     struct imp_splat_scale scale;
-    double norm;
 };
 
+/* value [1 + groups] of a walk: sums over the pixels that it reaches. */
 static void walk_value(const void *payload, const struct imp_light_walk *walk,
                        double *value)
 {
-    const struct functional *f = payload;
-    const size_t C = (size_t)f->channels;
-    value[0] = 0;
-    for (const struct imp_reach *r = walk->reach; r; r = r->next) {
+    const struct functional *own = payload;
+    const struct imp__functional *f = own->f;
+    const size_t C = (size_t)f->channels, K = f->derivatives ? f->tracer.active->n : 0;
+    double L[3], *row = K ? imp__arena_take(walk->arena, (K + 1) * C, sizeof *row) : L;
+    value[0] = row ? 0 : NAN; /* no memory is said by a number that is none */
+    for (size_t k = 0; k < K; k++) value[1 + f->group[k]] = 0;
+    for (const struct imp_reach *r = row ? walk->reach : NULL; r; r = r->next) {
         struct imp_splat_taps taps;
-        imp__splat_taps(f->film, &f->scale, r->px, r->py, &taps);
+        imp__splat_taps(f->film, &own->scale, r->px, r->py, &taps);
+        if (K) imp__light_row(&f->tracer, walk, r, row);
+        for (size_t c = 0; !K && c < C; c++) row[c] = r->L[c];
         for (int j = 0; j < taps.down.n; j++)
             for (int i = 0; i < taps.across.n; i++) {
                 const float *a = f->adjoint + ((size_t)(taps.down.first + j) *
@@ -135,39 +139,36 @@ static void walk_value(const void *payload, const struct imp_light_walk *walk,
                                                (size_t)(taps.across.first + i)) *
                                                   C;
                 const double w = taps.down.w[j] * taps.across.w[i] / f->norm;
-                for (size_t c = 0; c < C; c++) value[0] += w * a[c] * r->L[c];
+                for (size_t c = 0; c < C; c++) value[0] += w * a[c] * row[c];
+                for (size_t k = 0; k < K; k++)
+                    for (size_t c = 0; c < C; c++)
+                        value[1 + f->group[k]] += w * a[c] * row[(k + 1) * C + c];
             }
     }
 }
 
-enum imp_status imp__light_functional(const struct imp_tracer *tracer,
-                                      const float *adjoint, double norm,
-                                      const struct imp_run *run,
-                                      struct imp_estimate *value)
+enum imp_status imp__light_functional(const struct imp__functional *f,
+                                      const struct imp_run *run, double *mean, double *se)
 {
     enum imp_status st = IMP_OK;
-    imp_context *ctx = tracer->scene->ctx;
-    struct imp_tracer plain = *tracer;
-    plain.active = NULL;
-    plain.value_only = true;
-    struct functional f = {.film = &tracer->sensor->film,
-                           .adjoint = adjoint,
-                           .channels = tracer->scene->channels,
-                           .norm = norm};
+    struct functional own = {.f = f};
+    struct imp_tracer tracer = f->tracer;
+    if (!f->derivatives) {
+        tracer.active = NULL;
+        tracer.value_only = true;
+    }
     const struct imp_light_picture picture = {
-        .tracer = &plain,
+        .tracer = &tracer,
         .run = run,
-        .stage = "picture",
-        .n = 1,
+        .stage = f->derivatives ? "errors" : "picture",
+        .n = 1 + (f->derivatives ? f->n_groups : 0),
         .whole = walk_value,
-        .payload = &f,
-        .walks = imp__light_walks_of(run, tracer->sensor)};
-    double mean = 0, se = 0;
-    IMP_TRY(imp__splat_scale_create(ctx, f.film, &f.scale));
-    IMP_TRY(imp__light_picture_make(&picture, &mean, &se, NULL));
-    *value = (struct imp_estimate){mean, se, 0};
+        .payload = &own,
+        .walks = imp__light_walks_of(run, tracer.sensor)};
+    IMP_TRY(imp__splat_scale_create(tracer.scene->ctx, f->film, &own.scale));
+    IMP_TRY(imp__light_picture_make(&picture, mean, se, NULL));
 out:
-    imp__splat_scale_destroy(ctx, &f.scale);
+    imp__splat_scale_destroy(tracer.scene->ctx, &own.scale);
     return st;
 }
 

@@ -21,6 +21,7 @@
 
 struct imp_tile_worker;
 struct imp__gradient_job;
+struct imp__functional;
 
 /* Adjoints of light walks: replicate b of a job has image b % n_images. */
 struct imp__light_adjoints {
@@ -48,17 +49,28 @@ enum imp_status imp__light_objective(struct imp_problem *p,
                                      const struct imp_run *run, double *objective,
                                      double *variance, double *gradient,
                                      double *gradient_variance);
-/* F = sum of adjoint times picture, over norm. */
-enum imp_status imp__light_functional(const struct imp_tracer *tracer,
-                                      const float *adjoint, double norm,
-                                      const struct imp_run *run,
-                                      struct imp_estimate *value);
+/* F of the picture and, where f says so, of groups of derivative pictures: mean, se
+ * [1 + n_groups]. */
+enum imp_status imp__light_functional(const struct imp__functional *f,
+                                      const struct imp_run *run, double *mean,
+                                      double *se);
 
+/* ---- light_rows.c: derivative pictures ---------------------------------------------- */
+
+/* What a reach brings, and its derivatives: value [1 + active][channels]. value[0] is NaN
+ * where there is no memory. */
+void imp__light_row(const struct imp_tracer *tracer, const struct imp_light_walk *walk,
+                    const struct imp_reach *reach, double *value);
 /* The picture of light walks first, first + 1, .., first + walks - 1 with its derivative
  * pictures: mean [height][width][1 + active][channels]; lo, hi: part of the progress. */
 enum imp_status imp__light_rows(const struct imp_tracer *tracer,
                                 const struct imp_run *run, int64_t first, int64_t walks,
                                 double lo, double hi, double *mean);
+/* The same as films, out [1 + active]; and the derivative picture along x_dot. */
+enum imp_status imp__light_jacobian(const struct imp_tracer *tracer,
+                                    const struct imp_run *run, imp_film **out);
+enum imp_status imp__light_forward(const struct imp_tracer *tracer, const double *x_dot,
+                                   const struct imp_run *run, imp_film **out);
 
 /* Groups of two sets of n walks a pixel. */
 struct imp__light_plan {

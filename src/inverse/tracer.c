@@ -55,10 +55,10 @@ enum imp_status imp__problem_tracer(const struct imp_problem *p,
 {
     const enum imp_status st = imp__problem_tracer_of_any_end(p, run, waves, out);
     if (st != IMP_OK || !out->integrator->from_lights) return st;
-    return imp__error(p->ctx, IMP_E_UNSUPPORTED,
-                      "walks from the lights make pictures, losses, their gradients and "
-                      "those of linear functions, but not this; let walks begin at the "
-                      "sensor");
+    return imp__error(
+        p->ctx, IMP_E_UNSUPPORTED,
+        "walks from the lights make pictures, losses and their derivatives, "
+        "but not this; let walks begin at the sensor");
 }
 
 enum imp_status imp__problem_tracer_of_any_end(const struct imp_problem *p,
@@ -124,4 +124,11 @@ enum imp_status imp__problem_tracer_of_any_end(const struct imp_problem *p,
         return imp__walks_use(run, out);
     }
     return p->active.body ? imp__graded_survey(out) : IMP_OK;
+}
+
+void imp__problem_tell(struct imp_problem *p, const struct imp_tracer *tracer)
+{
+    if (!p->missing_told)
+        imp__light_walks_tell(p->scene, tracer->sensor, tracer->integrator);
+    p->missing_told = true;
 }

@@ -202,7 +202,7 @@ void imp__light_walk_trace(const struct imp_tracer *tracer, struct imp_arena *ar
                            int64_t index, struct imp_light_walk *out)
 {
     const struct imp_key key = imp__key(tracer->seed, LIGHT_WALKS, (uint64_t)index);
-    *out = (struct imp_light_walk){.walk = {.key = key, .valid = true}};
+    *out = (struct imp_light_walk){.walk = {.key = key, .valid = true}, .arena = arena};
     struct imp_walk *walk = &out->walk;
     if (tracer->integrator->both) {
         imp__both_trace(tracer, arena, index, out);

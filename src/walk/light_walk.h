@@ -33,6 +33,7 @@ struct imp_reach {
 
 struct imp_light_walk {
     struct imp_walk walk;
+    struct imp_arena *arena; /* that it is recorded in */
     struct imp_reach *reach; /* what reaches the film, wherever */
     int n_reach;
     struct imp_both

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Fits by walks from the lights with Gauss-Newton matrices: J^T J and the gradient are those
- * of walks from the sensor, and intervals hold the truth as often as they say. */
+ * Fits by walks from the lights, and from both ends, with Gauss-Newton matrices: J^T J and
+ * the gradient are those of walks from the sensor, and intervals hold the truth as often as
+ * they say. */
 #include "imp_light_room.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
@@ -10,7 +11,7 @@
 static imp_context *ctx;
 
 static const char room[] =
-    "<scene version='3.0.0'><integrator type='ptracer'><integer "
+    "<scene version='3.0.0'><integrator type='bdpt'><integer "
     "name='max_depth' "
     "value='4'/></integrator><shape type='cube'>" AT(
         "<scale value='2'/>") "<boolean name='flip_normals' value='true'/><bsdf "
@@ -114,8 +115,9 @@ static void target_set(imp_problem *p, const float *pixels, enum imp_loss loss)
     test_must(ctx, imp_problem_add_target(p, &t));
 }
 
-/* J^T J, the gradient and the objective from both ends, as means over seeds. */
-static void matrices(const char *filter)
+/* J^T J, the gradient and the objective against those of walks from the sensor, as means
+ * over seeds. */
+static void matrices(const char *filter, enum imp_from by, const char *name, int spp)
 {
     enum { SEEDS = 16, NUMBERS = 6 };
     char xml[4096];
@@ -132,8 +134,8 @@ static void matrices(const char *filter)
             double H[4], g[2], g_se[2];
             struct imp_run run = IMP_RUN_INIT;
             struct imp__gauss_newton out = {.H = H, .g = g, .g_se = g_se};
-            run.from = from ? IMP_FROM_LIGHTS : IMP_FROM_SENSOR;
-            run.spp = from ? 256 : 64;
+            run.from = from ? by : IMP_FROM_SENSOR;
+            run.spp = from ? spp : 64;
             run.seed = 100 + (uint64_t)k;
             test_must(ctx, imp__gauss_newton(p, NULL, &run, &out));
             const double x[NUMBERS] = {H[0], H[1], H[3], g[0], g[1], out.objective.value};
@@ -146,17 +148,17 @@ static void matrices(const char *filter)
         const double a = tap_se(&s[0][i]), b = tap_se(&s[1][i]);
         const double z = (s[0][i].mean - s[1][i].mean) / hypot(a, b);
         tap_ok(fabs(z) < 4 && hypot(a, b) < .1 * fabs(s[0][i].mean),
-               "%s filter: %s from both ends # %.5g and %.5g, z %.2f", filter, names[i],
-               s[0][i].mean, s[1][i].mean, z);
+               "%s filter: %s from the sensor and from %s # %.5g and %.5g, z %.2f",
+               filter, names[i], name, s[0][i].mean, s[1][i].mean, z);
     }
     ratio /= s[1][3].m2 / (SEEDS - 1);
-    tap_ok(ratio > .5 && ratio < 2.2, "%s filter: variance of g1 told over seen # %.2f",
-           filter, ratio);
+    tap_ok(ratio > .5 && ratio < 2.2,
+           "%s filter, %s: variance of g1 told over seen # %.2f", filter, name, ratio);
     imp_problem_destroy(p);
     imp_scene_destroy(scene);
 }
 
-static void coverage(int fits)
+static void coverage(int fits, enum imp_from from, const char *name, int spp)
 {
     char xml[4096];
     double square = 0, widest = 0;
@@ -180,7 +182,8 @@ static void coverage(int fits)
         o.optimizer = IMP_LM;
         o.intervals = 1;
         o.max_iterations = 8;
-        run.spp = 300;
+        run.from = from;
+        run.spp = spp;
         run.seed = 9000 + (uint64_t)k;
         test_must(ctx, imp_fit(p, &o, &run, &r));
         for (size_t i = 0; i < 2; i++) {
@@ -200,15 +203,14 @@ static void coverage(int fits)
      * count, though they are not quite independent. */
     const double n = 2. * fits, expected = .95 * n, sd = sqrt(.95 * .05 * n);
     tap_ok(none == 0 && held >= expected - 3.5 * sd && square > .6 && square < 1.5,
-           "%d fits from the lights: %d of %g intervals hold the truth, mean z^2 %.2f # "
+           "%d fits from %s: %d of %g intervals hold the truth, mean z^2 %.2f # "
            "errors up to %.3f",
-           fits, held, n, square, widest);
+           fits, name, held, n, square, widest);
     imp_scene_destroy(scene);
 }
 
-/* Of a loss that is not quadratic, few walks a pixel are a bias; derivative pictures of walks
- * from both ends are not there. Both are refused by name. */
-static void refused(void)
+/* Of a loss that is not quadratic, few walks a pixel are a bias, which is refused. */
+static void refused(enum imp_from from, const char *name)
 {
     char xml[4096];
     float target[30];
@@ -218,23 +220,13 @@ static void refused(void)
     imp_problem *p = problem_of(scene);
     target_set(p, target, IMP_LOSS_LOG);
     struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
+    struct imp_run run = IMP_RUN_INIT;
     const struct imp_fit_result *r;
     o.optimizer = IMP_LM;
-    const enum imp_status st = imp_fit(p, &o, NULL, &r);
+    run.from = from;
+    const enum imp_status st = imp_fit(p, &o, &run, &r);
     tap_ok(st == IMP_E_UNSUPPORTED && strstr(imp_last_error(ctx), "quadratic"),
-           "the log loss is refused # %s", imp_last_error(ctx));
-    imp_problem_destroy(p);
-    imp_scene_destroy(scene);
-
-    char both[4096];
-    snprintf(both, sizeof both, "%.*sbdpt%s", (int)(strstr(xml, "ptracer") - xml), xml,
-             strstr(xml, "ptracer") + strlen("ptracer"));
-    scene = test_scene_text(ctx, both, IMP_MONO);
-    p = problem_of(scene);
-    target_set(p, target, IMP_LOSS_L2);
-    const enum imp_status of_both = imp_fit(p, &o, NULL, &r);
-    tap_ok(of_both == IMP_E_UNSUPPORTED && strstr(imp_last_error(ctx), "bdpt"),
-           "and walks from both ends # %s", imp_last_error(ctx));
+           "the log loss is refused from %s # %s", name, imp_last_error(ctx));
     imp_problem_destroy(p);
     imp_scene_destroy(scene);
 }
@@ -243,10 +235,15 @@ int main(int argc, char **argv)
 {
     const bool slow = argc > 1 && strcmp(argv[1], "long") == 0;
     ctx = test_context(2);
-    matrices("box");
-    matrices("gaussian");
-    coverage(slow ? 400 : 24);
-    refused();
+    static const char lights[] = "the lights", both[] = "both ends";
+    matrices("box", IMP_FROM_LIGHTS, lights, 256);
+    if (slow) matrices("gaussian", IMP_FROM_LIGHTS, lights, 256);
+    if (slow) matrices("box", IMP_FROM_SCENE, both, 64);
+    matrices("gaussian", IMP_FROM_SCENE, both, 64);
+    coverage(slow ? 400 : 24, IMP_FROM_LIGHTS, lights, 300);
+    coverage(slow ? 400 : 12, IMP_FROM_SCENE, both, 100);
+    refused(IMP_FROM_LIGHTS, lights);
+    refused(IMP_FROM_SCENE, both);
     imp_context_destroy(ctx);
     return tap_done();
 }

@@ -18,7 +18,7 @@ static char folder[] = "/tmp/importon-memory-XXXXXX";
 static char path[128];
 
 static const char xml[] =
-    "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='4'/>"
+    "<scene version='3.0.0'><integrator type='%s'><integer name='max_depth' value='4'/>"
     "</integrator><sensor type='perspective'><transform name='to_world'>"
     "<lookat origin='0,1,4' target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'>"
     "<integer name='width' value='10'/><integer name='height' value='9'/>"
@@ -170,6 +170,15 @@ static enum imp_status problem_make(void)
     return st;
 }
 
+static enum imp_status functional(void)
+{
+    struct imp_estimate F = {-1, -1, -1};
+    double g[64] = {-7};
+    enum imp_status st = imp_problem_functional(problem, NULL, &run, &F, g, NULL);
+    if (st != IMP_OK && (F.value != -1 || g[0] != -7)) st = IMP_E_NUMERIC;
+    return st;
+}
+
 static void check(const char *name, enum imp_status (*call)(void))
 {
     long n, wrong = 0, leaks = 0, silent = 0;
@@ -213,9 +222,9 @@ int main(void)
         strcpy(folder, "/tmp/importon-memory-XXXXXX");
         if (!mkdtemp(folder)) return 1;
         run.spp = 5;
-        snprintf(text, sizeof text, xml, "box");
+        snprintf(text, sizeof text, xml, "path", "box");
         scene = test_scene_text(ctx, text, IMP_RGB);
-        snprintf(text, sizeof text, xml, "gaussian");
+        snprintf(text, sizeof text, xml, "path", "gaussian");
         wide = test_scene_text(ctx, text, IMP_RGB);
         texture = textured(256);
         problem = matching(scene, IMP_LOSS_L2);
@@ -251,6 +260,23 @@ int main(void)
         imp_problem_destroy(l1_problem);
         imp_problem_destroy(wide_problem);
         imp_problem_destroy(texture_problem);
+        imp_scene_destroy(scene);
+
+        snprintf(text, sizeof text, xml, "bdpt", "box");
+        scene = test_scene_text(ctx, text, IMP_RGB);
+        problem = matching(scene, IMP_LOSS_L2);
+        for (int k = 0; k < 2; k++) {
+            run.from = k ? IMP_FROM_LIGHTS : IMP_FROM_SCENE;
+            printf("# from %s\n", k ? "the lights" : "both ends");
+            check("render", render);
+            check("objective", objective);
+            check("functional", functional);
+            check("forward", forward);
+            check("jacobian", jacobian);
+            check("Gauss-Newton", gauss_newton);
+        }
+        run.from = IMP_FROM_SCENE;
+        imp_problem_destroy(problem);
         imp_scene_destroy(scene);
         imp_scene_destroy(wide);
         imp_scene_destroy(texture);

@@ -3,7 +3,6 @@
 furnace="$ROOT/scenes/furnace.xml"
 importon read "$ROOT/scenes/desk.xml" --ends --from lights
 importon render "$ROOT/scenes/stam.xml" --from lights -o a.exr
-importon jacobian "$ROOT/scenes/cornell.xml" -D res=4 --from lights -o J
 importon elements "$ROOT/scenes/cornell.xml" --from lights
 importon check "$ROOT/scenes/cornell.xml" -D res=4 --from lights --verify-sampling
 cat >ray.xml <<'X'
