@@ -62,8 +62,8 @@ struct imp_walks_options {
  * @return IMP_OK; IMP_CANCELLED; IMP_E_ARG; IMP_E_NOMEM if they need more than
  *         options->memory (the message says how much); IMP_E_UNSUPPORTED, with the reason,
  *         for walks from the lights, through graded indices that are active, past shapes
- *         with a priority, from sensors that are surfaces, integrators that make no walks,
- *         and in parts. Ranks of a team keep all walks each. */
+ *         with a priority, from sensors that are surfaces, integrators that make no walks
+ *         or have transmittance=delta, and in parts. Ranks of a team keep all walks each. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_walks_keep(imp_scene *scene, const struct imp_run *run,
                const struct imp_walks_options *options, imp_walks **out);

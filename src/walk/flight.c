@@ -88,23 +88,32 @@ static bool uniform_fly(struct imp_free_flight *w, const struct imp_medium *m,
 /* Of a walk, in all; extinctions without measure would go on for hours. */
 #define EVENTS_MAX (1 << 20)
 
-/* A tentative collision at t. Real, by the lane that draws? */
-static bool collide(struct imp_free_flight *w, const struct imp_medium *m, double t,
-                    double bound, bool collides)
+/* Extinction over its bound at a tentative collision. False: the walk is dropped. */
+static inline bool tentative(struct imp_free_flight *w, const struct imp_medium *m,
+                             double t, double bound, imp_spec *sigma)
 {
     struct imp_step *s = w->s;
     imp_spec in[IMP_INPUTS_MAX];
     if (imp_unlikely(s->flight.events++ == EVENTS_MAX)) {
         s->walk->dropped = IMP_DROP_EVENTS;
-        return true;
+        return false;
     }
-    const imp_spec sigma =
-        imp__extinction_at(m, w->o + w->d * t, s->at.carried, in) * (1 / bound);
+    *sigma = imp__extinction_at(m, w->o + w->d * t, s->at.carried, in) * (1 / bound);
     for (int c = 0; c < imp__lane_mis_count(s); c++)
-        if (!(sigma[c] >= 0 && sigma[c] <= 1)) {
+        if (!((*sigma)[c] >= 0 && (*sigma)[c] <= 1)) {
             s->walk->dropped = IMP_DROP_MAJORANT;
-            return true;
+            return false;
         }
+    return true;
+}
+
+/* A tentative collision at t. Real, by the lane that draws? */
+static bool collide(struct imp_free_flight *w, const struct imp_medium *m, double t,
+                    double bound, bool collides)
+{
+    struct imp_step *s = w->s;
+    imp_spec sigma;
+    if (!tentative(w, m, t, bound, &sigma)) return true;
     const bool real = collides && uniform(w) < sigma[imp__lane_mis_drew(s)];
     w->f *= real ? sigma : 1 - sigma;
     imp__flight_event(w, (struct imp_event){.t = (imp_decided)t,
@@ -114,10 +123,32 @@ static bool collide(struct imp_free_flight *w, const struct imp_medium *m, doubl
     return real;
 }
 
+/* ... on the way to a light sample, decided for each lane. */
+static void decide_lanes(struct imp_free_flight *w, const struct imp_medium *m, double t,
+                         double bound)
+{
+    imp_spec sigma, p;
+    if (!tentative(w, m, t, bound, &sigma)) return;
+    const double u = uniform(w);
+    for (int c = 0; c < 4; c++)
+        p[c] = u < sigma[c] ? INFINITY : imp__decide1(1 - sigma[c]);
+    const struct imp_event e[3] = {
+        {.t = (imp_decided)t,
+         .bound = (imp_decided)bound,
+         .medium = m->index,
+         .kind = IMP_DELTA_AT},
+        {.t = (imp_decided)p[0], .bound = (imp_decided)p[1], .kind = IMP_DELTA_OF},
+        {.t = (imp_decided)p[2], .bound = (imp_decided)p[3], .kind = IMP_DELTA_OF}};
+    w->f *= (1 - sigma) * imp__delta_weight(e);
+    for (int k = 0; k < 3 && imp__flight_event(w, e[k]); k++) {}
+}
+
 /* Tentative collisions with the density of the local bound, one after another. */
 static bool varying_fly(struct imp_free_flight *w, const struct imp_medium *m,
                         struct imp_majorant_walk *cells, bool collides, double *t)
 {
+    const bool lanes =
+        !collides && w->s->tracer->integrator->transmittance == IMP_DELTA_TRACKING;
     double path = free_path(w), at = cells->t;
     for (;;) {
         const double room = (cells->leave - at) * cells->bound;
@@ -129,7 +160,10 @@ static bool varying_fly(struct imp_free_flight *w, const struct imp_medium *m,
         }
         at += path / cells->bound;
         path = free_path(w);
-        const bool real = collide(w, m, imp__decide1(at), cells->bound, collides);
+        const double here = imp__decide1(at);
+        bool real = false;
+        if (imp_unlikely(lanes)) decide_lanes(w, m, here, cells->bound);
+        else real = collide(w, m, here, cells->bound, collides);
         if (w->s->walk->dropped) return false;
         if (real) {
             *t = at;

@@ -37,6 +37,10 @@ enum imp_status imp__record_create(const struct imp_tracer *tracer, size_t budge
         return imp__error(ctx, IMP_E_UNSUPPORTED,
                           "walks from a sensor that is a surface (%s) are not kept",
                           tracer->sensor->name);
+    if (tracer->integrator->transmittance == IMP_DELTA_TRACKING)
+        return imp__error(ctx, IMP_E_UNSUPPORTED,
+                          "walks are not kept where light samples are blocked by chance "
+                          "(transmittance=delta): use ratio or residual");
     if (tracer->scene->priorities)
         return imp__error(ctx, IMP_E_UNSUPPORTED,
                           "walks are not kept where shapes have a priority: a boundary's "

@@ -54,6 +54,12 @@ static struct factor factor_of(const struct imp_event *e, imp_spec sigma, bool d
         x.slope = imp__spec(-1 / (double)e->bound);
         return x;
     }
+    if (e->kind == IMP_DELTA_AT) {
+        const double over = 1 / (double)e->bound;
+        x.f = (1 - sigma * over) * imp__delta_weight(e);
+        x.slope = -over * imp__delta_weight(e);
+        return x;
+    }
     if (e->kind == IMP_NULL_AT || e->kind == IMP_REAL_AT) {
         const double over = 1 / (double)e->bound, sign = e->kind == IMP_REAL_AT ? 1 : -1;
         x.f = sigma * over;
@@ -139,7 +145,8 @@ static imp_spec event_factor(const struct imp_scene *scene, const struct imp_tra
     imp_spec in[IMP_INPUTS_MAX];
     if (e->kind == IMP_PASSES) return imp__passes_eval(scene, track, e, carried);
     if (e->kind == IMP_CONTROL) return imp__spec(exp(-(double)e->t));
-    if (e->kind == IMP_PASSES_UV || e->kind == IMP_RESIDUAL_OF || e->kind == IMP_LINE_AT)
+    if (e->kind == IMP_PASSES_UV || e->kind == IMP_RESIDUAL_OF ||
+        e->kind == IMP_DELTA_OF || e->kind == IMP_LINE_AT)
         return imp__spec(1);
     const imp_spec sigma =
         imp__extinction_at(scene->media[e->medium], event_place(track, e), carried, in);
@@ -199,7 +206,8 @@ struct derived {
  * not matter for uniform media: nothing is drawn. */
 static bool stands(const struct derived *x, const struct imp_event *e)
 {
-    return (e->kind <= IMP_REAL_AT || e->kind == IMP_RESIDUAL_AT) &&
+    return (e->kind <= IMP_REAL_AT || e->kind == IMP_RESIDUAL_AT ||
+            e->kind == IMP_DELTA_AT) &&
            (x->tracer->collisions_stand || (e->kind <= IMP_COLLIDES && e->bound > 0));
 }
 
@@ -259,7 +267,8 @@ event_d(const struct derived *x, int i, struct imp_texcoord *at, int *n, imp_spe
 {
     const struct imp_active *active = x->tracer->active;
     const struct imp_event *e = &x->track->event[i];
-    if (e->kind == IMP_PASSES_UV || e->kind == IMP_RESIDUAL_OF || e->kind == IMP_CONTROL)
+    if (e->kind == IMP_PASSES_UV || e->kind == IMP_RESIDUAL_OF ||
+        e->kind == IMP_DELTA_OF || e->kind == IMP_CONTROL)
         return NULL;
     if (!x->apart && e->kind != IMP_LINE_AT && e->kind != IMP_CROSSES) return NULL;
     if (e->kind == IMP_PASSES) {

@@ -18,6 +18,8 @@
  *     bounded by b, a null collision at t          1 - sigma(t)/b
  *     bounded by b, a collision at t               sigma(t)/b
  *     near a control c, a null collision at t      1 - (sigma(t) - c)/r
+ *     bounded by b, a null collision at t that
+ *     had the probability p, inf if it was real    (1 - sigma(t)/b)/p
  *     controls along the way, of optical depth t   exp(-t)
  *     on the way to a light sample, a surface      sum of its lobes that go straight on
  *
@@ -27,7 +29,8 @@
  * light sample no collision is drawn: exp(-sigma t), or ratio tracking (Novak, Selle,
  * Jarosz 2014), whose events are all null collisions. Residual ratio tracking (the same)
  * takes a control c out of the extinction of each cell, in closed form, and draws null
- * collisions with a rate r >= |sigma - c| for the rest. */
+ * collisions with a rate r >= |sigma - c| for the rest. Delta tracking decides each of them,
+ * with one number for all lanes: the transmittance of a lane is 0 or 1. */
 #ifndef IMP_WALK_TRACKING_H
 #define IMP_WALK_TRACKING_H
 
@@ -43,6 +46,8 @@ enum imp_event_kind {
     IMP_PASSES_UV, /* follows it; t, bound: u, v */
     IMP_RESIDUAL_AT, /* bound: r */
     IMP_RESIDUAL_OF, /* follows it; t: c */
+    IMP_DELTA_AT,    /* bound: b */
+    IMP_DELTA_OF,    /* two follow it; t, bound: p of the lanes 0 and 1, 2 and 3 */
     IMP_CONTROL,
     IMP_LINE_AT /* factor 1. A point of the way to a light sample, uniform in the media
                       whose extinction varies and has a derivative; bound: their length l.
@@ -104,6 +109,13 @@ void imp__seen_inputs(const struct imp_tracer *tracer, const struct imp_medium *
 static inline imp_spec imp__residual(imp_spec sigma, const struct imp_event e[2])
 {
     return 1 - (sigma - (double)e[1].t) * (1 / (double)e[0].bound);
+}
+
+/* 1/p of IMP_DELTA_AT, by the two events that follow it. */
+static inline imp_spec imp__delta_weight(const struct imp_event e[3])
+{
+    return 1 / (imp_spec){(double)e[1].t, (double)e[1].bound, (double)e[2].t,
+                          (double)e[2].bound};
 }
 
 /* exp(-sigma t); 1 where sigma is 0, however large t. */

@@ -103,9 +103,9 @@ static enum imp_status volpath_build(const struct imp_build *build,
         IMP_TRY(imp_build_bool(build, "use_spectral_mis", true, &spectral));
     w->guided = false;
     w->media = w->other_end->media = true;
-    static const char *const estimators[] = {"ratio", "residual"};
+    static const char *const estimators[] = {"ratio", "residual", "delta"};
     int estimator;
-    IMP_TRY(imp__props_choice(build->ctx, build->node, "transmittance", estimators, 2, 0,
+    IMP_TRY(imp__props_choice(build->ctx, build->node, "transmittance", estimators, 3, 0,
                               &estimator));
     w->transmittance = w->other_end->transmittance = (enum imp_transmittance)estimator;
 out:
