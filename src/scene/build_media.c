@@ -231,7 +231,7 @@ enum imp_status imp__media_check(struct imp_scene *scene)
     if (scene->priorities && !knows)
         return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
                           "shapes have a priority, which the integrator, %s, does not "
-                          "know: volpath and photons do",
+                          "know: volpath, photons, ptracer and bdpt do",
                           scene->integrator ? scene->integrator->ops->name
                                             : "path by default");
     if (used && !knows)

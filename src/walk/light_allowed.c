@@ -94,10 +94,6 @@ static enum imp_status sensor_allowed(const struct imp_scene *scene,
             "walks from the lights: sensor '%s' (%s) measures one ray, which "
             "they never meet; let walks begin at the sensor",
             sensor->name, sensor->ops->name);
-    if (scene->priorities)
-        return imp__error(ctx, IMP_E_UNSUPPORTED,
-                          "walks from the lights: they do not know priorities of "
-                          "shapes; let walks begin at the sensor");
     if (sensor->gain)
         return imp__error(
             ctx, IMP_E_UNSUPPORTED,

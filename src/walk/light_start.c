@@ -20,6 +20,15 @@ static struct imp_emission emission_of(const struct imp_emission_sample *e, doub
                                  imp__decide(d)};
 }
 
+/* A ray along d begins at o; around: there, without the shapes that have a priority. False:
+ * the walk is dropped. */
+static bool flight_begin(struct imp_step *s, const struct imp_medium *around, imp_v3 o,
+                         imp_v3 d)
+{
+    s->flight.medium = s->flight.here = around;
+    return imp_likely(s->scene->priorities == NULL) || imp__nest_begin(s, around, o, d);
+}
+
 /* The light itself, seen by the sensor. per: the density of the point, with the choice of
  * the light; of the sky that of the direction. */
 static void light_itself_connect(struct imp_light_step *w, struct imp_vertex *v,
@@ -82,10 +91,14 @@ static void light_itself_connect(struct imp_light_step *w, struct imp_vertex *v,
         imp__store_v3(l->p, s->at.p);
         imp__store_v3(l->wi, (imp_v3){0});
     }
-    const struct imp_medium *here = s->flight.here;
-    if (far) s->flight.here = sensor->medium;
-    imp__light_connect(w, v, &from, &shadow, &to, imp__spec(1), le, weight);
-    s->flight.here = here;
+    if (!far) {
+        imp__light_connect(w, v, &from, &shadow, &to, imp__spec(1), le, weight);
+        return;
+    }
+    const struct imp_flight of_light = s->flight;
+    if (flight_begin(s, sensor->medium, shadow.o, shadow.d))
+        imp__light_connect(w, v, &from, &shadow, &to, imp__spec(1), le, weight);
+    s->flight = of_light;
 }
 
 /* The medium that light enters from a point of its light. */
@@ -139,7 +152,8 @@ bool imp__light_start(struct imp_light_step *w)
     }
     const struct imp_emission x =
         emission_of(&start, far ? INFINITY : 1, start.cos_light, start.d);
-    s->flight.medium = s->flight.here = medium_at(s, e, &start);
+    const imp_v3 o = surface ? imp__offset(start.p, start.ng, start.d) : start.p;
+    if (!flight_begin(s, medium_at(s, e, &start), o, start.d)) return false;
     if (s->recorded) {
         v->ng = start.ng;
         v->d.scatterer = IMP_AT_LIGHT;
@@ -182,7 +196,7 @@ bool imp__light_start(struct imp_light_step *w)
 
     /* The ray in flight. */
     s->d = start.d;
-    s->o = surface ? imp__offset(start.p, start.ng, start.d) : start.p;
+    s->o = o;
     s->from = start.p;
     s->t_min = 0;
     s->t_max = INFINITY;

@@ -74,7 +74,7 @@ struct imp_vertex *imp__meter_begin(struct imp_step *s, struct imp_surface *at,
     at->s = frame->s;
     at->t = frame->t;
     if (imp_unlikely(s->scene->priorities != NULL) &&
-        !imp__nest_begin(s, imp__offset(at->p, at->ng, at->ng), at->ng))
+        !imp__nest_begin(s, sensor->medium, imp__offset(at->p, at->ng, at->ng), at->ng))
         return NULL;
     v = imp__vertex_add(s, 0);
     if (!v) return NULL;

@@ -174,9 +174,10 @@ bool imp__scatter_split(struct imp_step *s, struct imp_vertex *v,
 enum imp_drop imp__drop_cause(imp_spec L);
 
 /* ---- tracking.c ---- */
-/* The shapes with a priority around p, where a walk begins, by a ray along d. False: it is
- * dropped. */
-bool imp__nest_begin(struct imp_step *s, imp_v3 p, imp_v3 d);
+/* The shapes with a priority around p, where a walk begins in `around` outside of them, by a
+ * ray along d. False: it is dropped. */
+bool imp__nest_begin(struct imp_step *s, const struct imp_medium *around, imp_v3 p,
+                     imp_v3 d);
 
 /* ---- segment.c ---- */
 /* The nearest hit of the ray in flight. With hide_emitters, a camera ray skips area

@@ -72,9 +72,10 @@ static bool is_copy(const struct imp_shape *shape, imp_v3 ng, imp_v3 d)
     return shape->priority > 0 && imp__dot(ng, d) < 0;
 }
 
-bool imp__nest_begin(struct imp_step *s, imp_v3 p, imp_v3 d)
+bool imp__nest_begin(struct imp_step *s, const struct imp_medium *around, imp_v3 p,
+                     imp_v3 d)
 {
-    struct imp_nest nest = {.around = s->tracer->sensor->medium};
+    struct imp_nest nest = {.around = around};
     if (!imp__nest_at(s->scene, s->walk->time, p, d, &nest)) {
         s->walk->dropped = IMP_DROP_MEDIUM;
         return false;
@@ -86,8 +87,10 @@ bool imp__nest_begin(struct imp_step *s, imp_v3 p, imp_v3 d)
 
 static bool begin(struct imp_step *s)
 {
-    s->flight.medium = s->flight.here = s->tracer->sensor->medium;
-    if (imp_unlikely(s->scene->priorities != NULL) && !imp__nest_begin(s, s->o, s->d))
+    const struct imp_medium *around = s->tracer->sensor->medium;
+    s->flight.medium = s->flight.here = around;
+    if (imp_unlikely(s->scene->priorities != NULL) &&
+        !imp__nest_begin(s, around, s->o, s->d))
         return false;
     return imp__sensor_vertex(s);
 }
@@ -285,7 +288,7 @@ static bool sees(struct imp_step *s, struct imp_vertex *v, const struct imp_surf
     const double time = s->walk->time;
     const double length = imp__length(shadow->d);
     const imp_v3 d = shadow->d * (1 / length);
-    const double back = v->shape ? 0 : behind(from->p);
+    const double back = imp__is_zero(from->ng) ? behind(from->p) : 0;
     const imp_v3 start = shadow->o - d * back;
     const double end = shadow->reach * length + back;
     const struct imp_medium *m = s->flight.here;
