@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
+# Not under sanitizers: output/overwrite traces and fits too, and fit/interrupt ends a fit.
 # SIGTERM ends a trace that would take many seconds, at once.
 for verb in trace check; do
     importon bend $verb "$ROOT/scenes/bend/rod.xml" -D count=3000000 -q >answer &

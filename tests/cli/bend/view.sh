@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
+# Not under sanitizers: output/overwrite draws all of these pictures too.
 # Pictures of a problem: axes around them, a colour bar or the wavelengths' colours beside
 # them; --json answers what they show.
 cat >w.xml <<'END'

@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
+# Not under sanitizers: fit/interrupt ends a fit too.
 # SIGTERM and SIGHUP end a fit as Ctrl-C does: results and checkpoint are written, and the status tells which.
 scene=$ROOT/scenes/furnace.xml
 importon render "$scene" --spp 64 -q -o t.exr || exit 9

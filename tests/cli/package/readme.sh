@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
+# Not under sanitizers: rendering, gradients and fits are run there by other transcripts.
 # The README's scene, commands and program work as printed, in their order, in a folder with nothing else
 # but the scenes that they name.
 sed -n '/^```xml/,/^```/p' "$ROOT/README.md" | grep -v '^```' >ball.xml

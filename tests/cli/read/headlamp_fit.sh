@@ -1,4 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
+# Not under sanitizers: the same walks are run by headlamp and fit_window.
 # From a picture of the beam, by walks from the lamp: how dense the fog is, and what the reflector reflects.
 headlamp="$ROOT/scenes/headlamp.xml"
 small="-D width=24 -D height=8"
