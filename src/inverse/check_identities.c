@@ -151,11 +151,17 @@ static bool first_degree(const struct imp_scene *s, const uint8_t *chosen)
 static enum imp_status check_emission(struct imp__kept *k, uint8_t *chosen)
 {
     const struct imp_scene *s = k->check->problem->scene;
+    bool all = true; /* has every light an input that is its radiance? */
     memset(chosen, 0, s->n_params);
-    for (int i = 0; i < s->n_emitters; i++)
-        for (int j = 0; j < s->emitters[i]->n_in; j++)
-            if (s->emitters[i]->ops->inputs[j].role == IMP_EMISSION)
-                mark(s, s->emitters[i]->input[j], chosen);
+    for (int i = 0; i < s->n_emitters; i++) {
+        bool any = false;
+        for (int j = 0; j < s->emitters[i]->n_in; j++) {
+            if (s->emitters[i]->ops->inputs[j].role != IMP_EMISSION) continue;
+            mark(s, s->emitters[i]->input[j], chosen);
+            any = true;
+        }
+        all &= any;
+    }
     for (int i = 0; i < s->n_bsdfs; i++)
         for (int j = 0; j < s->bsdfs[i]->n_own; j++)
             if (s->bsdfs[i]->ops->inputs[j].role == IMP_EMISSION)
@@ -164,7 +170,7 @@ static enum imp_status check_emission(struct imp__kept *k, uint8_t *chosen)
         for (int j = 0; j < s->media[i]->n_own; j++)
             if (s->media[i]->ops->inputs[j].role == IMP_EMISSION)
                 mark(s, s->media[i]->input[j], chosen);
-    if (!any_chosen(s, chosen) || !first_degree(s, chosen) ||
+    if (!all || !any_chosen(s, chosen) || !first_degree(s, chosen) ||
         used_otherwise(s, chosen, chosen + s->n_params))
         return IMP_OK; /* L is not of first degree then */
     return euler(k, chosen, NULL, "all emission");

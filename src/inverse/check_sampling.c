@@ -80,7 +80,7 @@ static void parts_add(const struct looked *j, const struct imp_walk *walk, imp_s
     for (const struct imp_vertex *v = walk->first; v; v = v->next) {
         part[MET] += sum_used(j, P * v->e);
         part[CONNECTED] += sum_used(j, P * v->b);
-        const bool choice = v->d.goes_on && v->d.lobe == IMP_SMOOTH;
+        const bool choice = v->bsdf && v->d.goes_on && v->d.lobe == IMP_SMOOTH;
         for (const struct imp_side *s = v->side; s; s = s->next)
             parts_add(j, &s->walk, P, part);
         if (choice) {
@@ -114,7 +114,8 @@ static double square_of(const struct looked *j, const struct imp_walk *walk)
             square += imp__sqr(sum_used(j, P)) * ratio * square_of(j, &s->walk);
         if (!v->d.goes_on) break;
         P *= v->w;
-        if (v->d.lobe == IMP_SMOOTH) ratio *= fmax((double)v->d.pdf * domain, 1e-3);
+        if (v->bsdf && v->d.lobe == IMP_SMOOTH)
+            ratio *= fmax((double)v->d.pdf * domain, 1e-3);
     }
     return square;
 }

@@ -92,6 +92,7 @@ static const char *fixed_because(const struct imp_scene *scene, const struct imp
     if (scene->environment >= 0 &&
         !(scene->emitters[scene->environment]->ops->flags & IMP_EMITTER_UNIFORM))
         return "an environment other than constant lies around it";
+    if (scene->n_environments > 1) return "several environments lie around it";
     for (int i = 0; i < scene->n_shapes; i++) {
         const struct imp_shape *s = scene->shapes[i];
         if (s->body != m) continue;

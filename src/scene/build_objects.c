@@ -92,12 +92,6 @@ enum imp_status imp__build_emitter(struct imp_scene *scene, struct imp_node *nod
     IMP_TRY(imp__props_finish(ctx, node));
     if (ops->changed)
         IMP_TRY(imp__build_watch(scene, e->input, e->n_in, imp__emitter_changed, e));
-    if (ops->flags & IMP_EMITTER_ENVIRONMENT) {
-        if (scene->environment >= 0)
-            IMP_TRY(
-                imp__node_error(ctx, node, IMP_E_SCENE, "a second environment emitter"));
-        scene->environment = e->index;
-    }
     if (shape) shape->emitter = e->index;
     IMP_TRY(
         imp__build_list_add(scene, (void ***)&scene->emitters, &scene->n_emitters, e));

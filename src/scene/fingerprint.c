@@ -155,6 +155,7 @@ uint64_t imp__fingerprint_evaluated(const struct imp_scene *scene)
     uint64_t h = HASH(0, scene->mode);
     h = HASH(h, scene->linear_colors);
     h = HASH(h, scene->environment);
+    for (int k = 1; k < scene->n_environments; k++) h = HASH(h, scene->environments[k]);
     h = imp__hash_text(h, scene->integrator ? scene->integrator->ops->name : "");
     for (int s = 0; s < scene->n_all_shapes; s++) {
         const struct imp_shape *shape = scene->shapes[s];

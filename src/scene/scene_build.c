@@ -114,6 +114,13 @@ static enum imp_status lights_build(struct imp_scene *scene)
         scene->light_cdf[i] = total > 0 ? sum / total : 0;
     }
     if (scene->n_emitters && total > 0) scene->light_cdf[scene->n_emitters - 1] = 1;
+    scene->environments = imp__arena_array(&scene->arena, (size_t)scene->n_emitters + 1,
+                                           sizeof *scene->environments);
+    if (!scene->environments) return imp__build_no_memory(scene);
+    for (int i = 0; i < scene->n_emitters; i++)
+        if (scene->emitters[i]->ops->flags & IMP_EMITTER_ENVIRONMENT)
+            scene->environments[scene->n_environments++] = i;
+    if (scene->n_environments > 0) scene->environment = scene->environments[0];
     return IMP_OK;
 }
 

@@ -18,7 +18,8 @@ typedef float imp_decided;
 enum imp_scatterer {
     IMP_AT_SURFACE,  /* a BSDF */
     IMP_AT_BOUNDARY, /* a surface that light passes as if nothing were there */
-    IMP_AT_SKY,      /* the environment, met where the walk leaves the scene */
+    IMP_AT_SKY,      /* an environment, met where the walk leaves the scene; where there
+                        are several, one vertex of each, one behind the other */
     IMP_IN_MEDIUM,   /* a phase function, between surfaces */
     IMP_AT_SENSOR,   /* where a walk begins, if its first segment crosses media */
     IMP_AT_LIGHT     /* where a walk from a light begins (light_walk.h) */

@@ -90,8 +90,11 @@ static void densities(const struct imp_step *s, double kernel, imp_v3 w, double 
         p[IMP_DENSITY_PROXIES] = aimed[1];
     }
     if (share[IMP_DENSITY_ENVIRONMENT] > 0) {
-        const struct imp_emitter *e = s->scene->emitters[s->scene->environment];
-        p[IMP_DENSITY_ENVIRONMENT] = e->ops->pdf(e, &m->p, &w, NULL, NULL);
+        const int n = s->scene->n_environments;
+        for (int k = 0; k < n; k++) {
+            const struct imp_emitter *e = s->scene->emitters[s->scene->environments[k]];
+            p[IMP_DENSITY_ENVIRONMENT] += e->ops->pdf(e, &m->p, &w, NULL, NULL) / n;
+        }
     }
     if (share[IMP_DENSITY_GUIDE] > 0)
         p[IMP_DENSITY_GUIDE] = s->guided.guide->pdf(s->guided.guide, &s->guided.at, w);
@@ -161,7 +164,8 @@ static bool member_draw(const struct imp_step *s, int k, const struct imp_bsdf *
         if (!aim_draw(s, k == IMP_DENSITY_PROXIES, u, &w)) return false;
         break;
     case IMP_DENSITY_ENVIRONMENT: {
-        const struct imp_emitter *e = s->scene->emitters[s->scene->environment];
+        const int n = s->scene->n_environments, one = (int)(u[0] * n);
+        const struct imp_emitter *e = s->scene->emitters[s->scene->environments[one]];
         struct imp_light_sample ls;
         if (!e->ops->sample(e, &s->mixed.p, &u[1], &ls)) return false;
         w = ls.wi;

@@ -105,10 +105,13 @@ static bool weight(imp_decided x) { return isfinite(x) && x >= 0; }
 static bool met_fits(const struct imp_scene *scene, const struct imp_decision *d)
 {
     const struct imp_met *m = &d->met;
-    const int here = d->shape < 0 ? scene->environment : scene->shapes[d->shape]->emitter;
     if (m->emitter < 0) return m->emitter == -1;
-    return m->emitter == here && weight(m->weight) && m->dist >= 0 &&
-           isfinite(m->cos_light) && unit(m->d);
+    if (m->emitter >= scene->n_emitters) return false;
+    const bool here =
+        d->shape < 0 ? scene->emitters[m->emitter]->ops->flags & IMP_EMITTER_ENVIRONMENT
+                     : m->emitter == scene->shapes[d->shape]->emitter;
+    return here && weight(m->weight) && m->dist >= 0 && isfinite(m->cos_light) &&
+           unit(m->d);
 }
 
 static bool light_fits(const struct imp_scene *scene, const struct imp_bsdf *b,
@@ -131,12 +134,24 @@ static bool continuation_fits(const struct imp_bsdf *b, const struct imp_decisio
            isfinite(d->survive) && d->survive > 0;
 }
 
+static bool goes_straight(const struct imp_decision *d)
+{
+    return d->goes_on && d->lobe == IMP_SMOOTH && unit(d->wi) && d->pdf == 1 &&
+           d->survive == 1;
+}
 /* Where the camera is, if the first segment crosses media. */
 static bool sensor_fits(const struct imp_decision *d)
 {
-    return d->goes_on && d->lobe == IMP_SMOOTH && unit(d->wi) && d->pdf == 1 &&
-           d->survive == 1 && !d->glows && d->met.emitter == -1 &&
+    return goes_straight(d) && !d->glows && d->met.emitter == -1 &&
            d->connection == IMP_NOT_CONNECTED;
+}
+/* Past an environment the walk comes to the next one. */
+static bool sky_fits(const struct imp_scene *scene, const struct imp_decision *d,
+                     bool last)
+{
+    return (last ? !d->goes_on : goes_straight(d)) && !d->glows &&
+           d->connection == IMP_NOT_CONNECTED && d->met.emitter >= 0 &&
+           met_fits(scene, d);
 }
 
 static bool vertex_fits(const struct imp_scene *scene, const struct imp_decision *d,
@@ -146,10 +161,7 @@ static bool vertex_fits(const struct imp_scene *scene, const struct imp_decision
         !weight(d->glow_weight) || (!d->goes_on && !last))
         return false;
     if (d->shape == -1 && d->scatterer == IMP_AT_SENSOR) return first && sensor_fits(d);
-    if (d->shape == -1)
-        return d->scatterer == IMP_AT_SKY && last && !d->goes_on && !d->glows &&
-               d->connection == IMP_NOT_CONNECTED && d->met.emitter >= 0 &&
-               met_fits(scene, d);
+    if (d->shape == -1) return d->scatterer == IMP_AT_SKY && sky_fits(scene, d, last);
     const bool inside = d->scatterer == IMP_IN_MEDIUM;
     if (d->shape < 0 || d->shape >= (inside ? scene->n_media : scene->n_all_shapes))
         return false;
@@ -207,11 +219,14 @@ static bool chain_fits(struct fitting *f, uint32_t first, uint32_t n, bool side)
 {
     if (first != f->end || n == 0 || n > IMP_WALK_MAX || n > f->walk->n_vertices - first)
         return false;
-    for (uint32_t k = 0; k < n; k++)
-        if (!vertex_fits(f->scene,
-                         imp__record_vertex(f->record, f->walk->first + first + k),
-                         k == 0 && !side, k + 1 == n))
-            return false;
+    bool sky = false;
+    for (uint32_t k = 0; k < n; k++) {
+        const struct imp_decision *d =
+            imp__record_vertex(f->record, f->walk->first + first + k);
+        if (!vertex_fits(f->scene, d, k == 0 && !side, k + 1 == n)) return false;
+        if (sky && d->scatterer != IMP_AT_SKY) return false;
+        sky = d->scatterer == IMP_AT_SKY;
+    }
     f->end = first + n;
     return true;
 }

@@ -102,24 +102,39 @@ static bool seen(const struct imp_step *s)
     return !integrator->hide_emitters || (integrator->first_hit && imp__bounces(s) > 0);
 }
 
+/* A vertex that scatters nothing, passed along d. */
+static void straight_on(struct imp_decision *v, imp_v3 d)
+{
+    v->goes_on = true;
+    v->pdf = 1;
+    v->lobe = IMP_SMOOTH;
+    imp__store_v3(v->wi, d);
+}
+
 void imp__sky_meet(struct imp_step *s)
 {
     const int max_depth = s->tracer->integrator->max_depth;
     const bool counts = max_depth < 0 || imp__bounces(s) < max_depth;
     const bool hidden = s->tracer->integrator->hide_emitters && imp__bounces(s) == 0;
-    if (s->scene->environment < 0 || hidden || !counts) return;
-    struct imp_vertex *v = vertex_add(s, 0);
-    if (!v) return;
-    v->t = INFINITY;
+    const int n = s->scene->n_environments;
+    if (n == 0 || hidden || !counts) return;
     s->at.p = imp__decide(s->d);
     s->at.uv[0] = s->at.uv[1] = 0;
     s->at.shape = NULL;
-    if (s->recorded) {
-        v->d.scatterer = IMP_AT_SKY;
-        v->d.uv[0] = v->d.uv[1] = 0;
-        imp__store_v3(v->d.p, s->at.p);
+    /* A vertex to each: past all but the last the walk goes straight on. */
+    for (int k = 0; k < n; k++) {
+        struct imp_vertex *v = vertex_add(s, 0);
+        if (!v) return;
+        v->t = INFINITY;
+        if (k + 1 < n) imp__step_weigh(v, imp__spec(1), 1, 1);
+        if (s->recorded) {
+            v->d.scatterer = IMP_AT_SKY;
+            v->d.uv[0] = v->d.uv[1] = 0;
+            imp__store_v3(v->d.p, s->at.p);
+            if (k + 1 < n) straight_on(&v->d, s->d);
+        }
+        imp__emission_meet(s, v, s->scene->environments[k], 1, NULL, NULL);
     }
-    imp__emission_meet(s, v, s->scene->environment, 1, NULL, NULL);
     s->walk->valid |= seen(s);
 }
 
@@ -191,13 +206,10 @@ bool imp__sensor_vertex(struct imp_step *s)
     imp__step_weigh(v, imp__spec(1), 1, 1);
     if (!s->recorded) return true;
     v->d.scatterer = IMP_AT_SENSOR;
-    v->d.goes_on = true;
-    v->d.pdf = 1;
     v->d.uv[0] = v->d.uv[1] = 0;
-    v->d.lobe = IMP_SMOOTH;
     imp__store_v3(v->d.p, s->o);
     imp__store_v3(v->d.wo, (imp_v3){0});
-    imp__store_v3(v->d.wi, s->d);
+    straight_on(&v->d, s->d);
     return true;
 }
 

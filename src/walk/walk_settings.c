@@ -61,9 +61,10 @@ enum imp_status imp__mixture_settle(struct imp_scene *scene,
         if (!w->mixing)
             return imp__error(scene->ctx, IMP_E_NOMEM, "no memory for the scene");
         double *weight = w->mixing->weight;
-        const bool varied =
-            scene->environment >= 0 &&
-            !(scene->emitters[scene->environment]->ops->flags & IMP_EMITTER_UNIFORM);
+        bool varied = false;
+        for (int k = 0; k < scene->n_environments; k++)
+            varied |= !(scene->emitters[scene->environments[k]]->ops->flags &
+                        IMP_EMITTER_UNIFORM);
         weight[IMP_DENSITY_KERNEL] = 1;
         weight[IMP_DENSITY_GUIDE] = -1;
         weight[IMP_DENSITY_PROXIES] = imp__mixing_possible(scene, IMP_DENSITY_PROXIES);

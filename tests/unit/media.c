@@ -536,8 +536,6 @@ int main(void)
     refused(AIR("<float name='scale_height' value='1'/><float name='top' value='1'/>"
                 "<float name='radius' value='-1'/>"),
             "", "radius = -1");
-    refused(FOG("") "<emitter type='constant'/><emitter type='sun'/>", "",
-            "a second environment");
     refused(FOG("") "<emitter type='sun'><float name='radius' value='2'/></emitter>", "",
             "radius");
     refused(FOG("<float name='sigma_s' value='1'/><float name='sigma_t' value='1'/>"), "",
