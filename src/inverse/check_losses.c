@@ -21,6 +21,7 @@
 #include "check.h"
 #include "film/film_picture.h"
 #include "loss.h"
+#include "walk/baseline.h"
 #include <math.h>
 #include <string.h>
 
@@ -72,8 +73,13 @@ static enum imp_status samples_make(struct losses *l)
 {
     enum imp_status st = IMP_OK;
     struct imp__check *c = l->check;
+    const struct imp_film_desc *film = &c->tracer.sensor->film;
+    struct imp_tracer tracer = c->tracer;
+    tracer.seed = l->seed;
+    /* That of the losses: their gradients are compared walk by walk. */
+    IMP_TRY(imp__baseline_set(&tracer, (int64_t)N * film->crop_w * film->crop_h));
     for (int i = 0; i < N; i++) {
-        struct pass pass = {c->tracer, l->x_dot, l->channels};
+        struct pass pass = {tracer, l->x_dot, l->channels};
         const struct imp_picture picture = {.sensor = c->tracer.sensor,
                                             .stage = "check",
                                             .names =
@@ -84,7 +90,6 @@ static enum imp_status samples_make(struct losses *l)
                                             .first = i};
         struct imp_run run = c->run;
         run.spp = 1;
-        pass.tracer.seed = l->seed;
         IMP_TRY(imp__picture_make(c->ctx, &picture, &run, &l->films[i]));
     }
 out:

@@ -3,6 +3,8 @@
  * The tracer of a problem, and refusals where its gradient would lack a term. */
 #include "estimate.h"
 #include "film/film_measure.h"
+#include "film/film_picture.h"
+#include "walk/baseline.h"
 #include "walk/graded.h"
 #include "walk/light_walk.h"
 #include <string.h>
@@ -123,6 +125,9 @@ enum imp_status imp__problem_tracer_of_any_end(const struct imp_problem *p,
         out->collisions_stand = true;
         return imp__walks_use(run, out);
     }
+    st = imp__baseline_set(out, imp__walks_of(run, sensor) * sensor->film.crop_w *
+                                    sensor->film.crop_h);
+    if (st != IMP_OK) return st;
     return p->active.body ? imp__graded_survey(out) : IMP_OK;
 }
 

@@ -280,6 +280,7 @@ bool imp__fly(struct imp_free_flight *w, const struct imp_medium *m, double near
         s->walk->dropped = IMP_DROP_INFINITE;
         return false;
     }
+    if (stands) s->walk->valid |= !imp__is_zero_used(s->tracer->baseline, true);
     if (collides && !stands)
         imp__probe_offer(s, m, w->track, first, before, near, hit ? *t : far, w->open);
     return hit;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "sweep_media.h"
+#include "baseline.h"
 
 void imp__extinction_drop(const struct imp_tracer *tracer, const struct imp_vertex *v,
                           imp_spec *x)
@@ -65,7 +66,8 @@ void imp__media_scatter(const struct imp_tracer *tracer, const struct imp_vertex
     }
     if (segment_counts(tracer, v))
         imp__track_sweep(tracer, v->on, v->carried, NULL,
-                         P * weight_before(v) * v->beyond, sink);
+                         P * weight_before(v) * (v->beyond - imp__baseline(tracer)),
+                         sink);
     if (v->probe) {
         const struct imp_medium *m = v->probe->medium;
         imp_spec d[IMP_INPUTS_MAX];
@@ -88,7 +90,7 @@ imp_spec imp__media_tangent(const struct imp_tracer *tracer, const struct imp_ve
                  imp__track_tangent(tracer, v->to_light, v->carried, &T, dot, x_dot);
     }
     if (segment_counts(tracer, v))
-        L_dot += weight_before(v) * v->beyond *
+        L_dot += weight_before(v) * (v->beyond - imp__baseline(tracer)) *
                  imp__track_tangent(tracer, v->on, v->carried, NULL, dot, x_dot);
     if (v->probe) {
         const struct imp_medium *m = v->probe->medium;

@@ -193,6 +193,8 @@ struct imp_tracer {
                   with media have one */
     double
         survival; /* least probability with which roulette lets a walk go on; 0: none */
+    imp_spec baseline; /* by lanes: what derivatives of flights take from the light that
+                          arrives (baseline.h) */
     const struct imp_store *kept; /* walks that are evaluated in place of tracing
                                     (store.h); NULL: they are traced */
 };
