@@ -101,6 +101,8 @@ static enum imp_status walk_add(const struct job *j, struct worker *w, int64_t i
     if (imp_unlikely(walk.walk.dropped)) walk_drop(j, w, walk.walk.dropped, index);
     if (p->whole && walk.reach) {
         p->whole(p->payload, &walk, w->value);
+        if (imp_unlikely(w->arena.failed))
+            IMP_TRY(imp__error(j->ctx, IMP_E_NOMEM, "no memory for a walk's derivative"));
         IMP_TRY(touch(j, w, 0, 1));
     }
     for (const struct imp_reach *r = p->whole ? NULL : walk.reach; r; r = r->next) {

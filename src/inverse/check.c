@@ -31,6 +31,15 @@ double imp__check_scale(const struct imp_param *p, size_t e)
     return size > 0 ? size : 1;
 }
 
+void imp__check_direction(const struct imp_param *p, double *w)
+{
+    for (size_t e = 0; e < p->info.count; e++) {
+        const double by = 0.5 + imp__u01(imp__key(9, 9, 9), (uint32_t)e);
+        const double x = imp__param_get(p, e);
+        w[e] = x - p->info.lo > p->info.hi - x ? -by : by;
+    }
+}
+
 static bool report(struct imp__check *c, double fraction)
 {
     if (!c->outer.progress) return false;
@@ -124,6 +133,7 @@ static enum imp_status check(imp_problem *p, const struct imp_check_options *opt
     st = ended;
 out:
     imp__release(p->ctx, c.rows);
+    imp__release(p->ctx, c.slopes);
     return st;
 }
 

@@ -34,6 +34,28 @@ static void sample(const void *payload, struct imp_sample *out)
     for (int c = 0; c < s->tracer.scene->channels; c++) out->value[c] = v[c];
 }
 
+enum imp_status imp__fresh_begin(struct imp__fresh *f, struct imp__check *c)
+{
+    const struct imp_film_desc *film = &c->tracer.sensor->film;
+    const size_t w = (size_t)film->crop_w, h = (size_t)film->crop_h,
+                 C = (size_t)c->problem->scene->channels;
+    *f = (struct imp__fresh){.check = c, .channels = (int)C, .more = 1};
+    f->pattern = imp__alloc(c->ctx, w * h * C, sizeof *f->pattern);
+    if (!f->pattern) return imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check");
+    for (size_t i = 0; i < w * h * C; i++) {
+        const double x = (double)(i / C % w) / (double)w,
+                     y = (double)(i / C / w) / (double)h;
+        f->pattern[i] =
+            (float)((1 + 0.5 * cos(5 * x + 3 * y + (double)(i % C))) / (double)(w * h));
+    }
+    return IMP_OK;
+}
+
+void imp__fresh_end(struct imp__fresh *f)
+{
+    if (f->check) imp__release(f->check->ctx, f->pattern);
+}
+
 uint64_t imp__fresh_seed(struct imp__fresh *f)
 {
     return imp__mix64(f->check->outer.seed ^
@@ -96,29 +118,39 @@ static enum imp_status functional(struct imp__fresh *f, const double *x_dot,
 }
 
 /* Mean of batches and its standard error, from sums over them. */
-static struct imp_estimate batches_mean(double sum, double square)
+static struct imp_estimate batches_mean(int n, double sum, double square)
 {
-    const double mean = sum / IMP_CHECK_BATCHES;
-    const double variance =
-        fmax(square / IMP_CHECK_BATCHES - mean * mean, 0) / (IMP_CHECK_BATCHES - 1);
+    const double mean = sum / n;
+    const double variance = fmax(square / n - mean * mean, 0) / (n - 1);
     return (struct imp_estimate){mean, sqrt(variance), 0};
 }
 
-enum imp_status imp__fresh_slope(struct imp__fresh *f, const double *x_dot,
-                                 struct imp_estimate *out)
+static enum imp_status batches(struct imp__fresh *f, const double *x_dot, int n,
+                               struct imp_estimate *out)
 {
     enum imp_status st = IMP_OK;
     double sum = 0, square = 0;
-    for (int b = 0; b < IMP_CHECK_BATCHES; b++) {
+    for (int b = 0; b < n; b++) {
         double value;
         IMP_TRY(functional(f, x_dot, imp__fresh_seed(f), &value));
         sum += value;
         square += value * value;
     }
-    *out = batches_mean(sum, square);
+    *out = batches_mean(n, sum, square);
     st = imp__check_progress(f->check, f->more);
 out:
     return st;
+}
+
+enum imp_status imp__fresh_slope(struct imp__fresh *f, const double *x_dot,
+                                 struct imp_estimate *out)
+{
+    return batches(f, x_dot, IMP_CHECK_BATCHES, out);
+}
+
+enum imp_status imp__fresh_value(struct imp__fresh *f, struct imp_estimate *out)
+{
+    return batches(f, NULL, IMP_CHECK_BATCHES / 2, out);
 }
 
 /* ---- Differences --------------------------------------------------------------- */
@@ -169,7 +201,7 @@ static enum imp_status combine(struct imp__fresh *f, const struct imp__motion *m
         sum += difference;
         square += difference * difference;
     }
-    out->mean = batches_mean(sum, square);
+    out->mean = batches_mean(IMP_CHECK_BATCHES, sum, square);
     out->coarse = other ? coarse : out->mean.value;
     out->rounding = FLOAT_ROUNDING * largest * factors;
     st = imp__check_progress(f->check, (double)n * f->more);

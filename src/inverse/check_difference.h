@@ -9,7 +9,8 @@
 #define IMP_CHECK_BATCHES                                                                \
     16 /* independent differences behind an SE, known to 18 % then */
 
-/* The functional F = sum_pc s_pc I_pc that fresh checks differentiate. */
+/* The functional F = sum_pc s_pc I_pc that fresh checks differentiate, with a smooth positive
+ * pattern s of mean 1/pixels. */
 struct imp__fresh {
     struct imp__check *check;
     float *pattern; /* [height][width][channels] s */
@@ -17,6 +18,8 @@ struct imp__fresh {
     int more; /* samples per pixel of an evaluation, in units of those asked for */
     uint64_t next_seed;
 };
+enum imp_status imp__fresh_begin(struct imp__fresh *f, struct imp__check *c);
+void imp__fresh_end(struct imp__fresh *f); /* also after a failure */
 uint64_t imp__fresh_seed(struct imp__fresh *f);
 /* Samples per pixel of one batch. */
 int imp__fresh_batch(const struct imp__fresh *f);
@@ -24,6 +27,8 @@ int imp__fresh_batch(const struct imp__fresh *f);
 /* Derivative of F along x_dot [n active], from tangents. */
 enum imp_status imp__fresh_slope(struct imp__fresh *f, const double *x_dot,
                                  struct imp_estimate *out);
+/* F, by half as many samples. */
+enum imp_status imp__fresh_value(struct imp__fresh *f, struct imp_estimate *out);
 
 /* A parameter moved by step * weight[e]. */
 struct imp__motion {

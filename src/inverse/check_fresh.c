@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Gradients against differences of pictures that share no random number with them: what a
- * frozen walk cannot see (wrong densities, missing terms) shows here as z. The functional
- * is F = sum_pc s_pc I_pc with a smooth positive pattern s of mean 1/pixels.
+ * frozen walk cannot see (wrong densities, missing terms) shows here as z.
  *
  * How far the formula of lower order is from the difference bounds the error of the
  * latter (check_difference.c). A row's limit of |z| is Z_LIMIT plus that bound in
@@ -12,6 +11,7 @@
  * samples, up to 16 times as many in all, which are added to those before. */
 #include "check_difference.h"
 #include <math.h>
+#include <string.h>
 
 /* 6e-5 by chance for normal numbers, 1e-3 with the 15 degrees of freedom of a difference.
  */
@@ -145,17 +145,13 @@ static enum imp_status comparison_round(struct rows *r, struct comparison *c, in
     struct imp_estimate mine;
     for (size_t e = 0; e < count; e++) old[e] = imp__param_get(q, e);
     const struct imp__motion m = {q, old, weight};
-    if (count <= 3) {
+    if (count <= IMP_CHECK_SINGLY) {
         const size_t e = c->element < 0 ? 0 : (size_t)c->element;
         weight[e] = 1;
         mine = (struct imp_estimate){r->gradient[base + e], r->gradient_se[base + e], 0};
-    } else {                                 /* one direction through all of them */
-        for (size_t e = 0; e < count; e++) { /* each moves to the side where it has
-                                                more room: texels may be at both bounds */
-            const double w = 0.5 + imp__u01(imp__key(9, 9, 9), (uint32_t)e);
-            const bool down = old[e] - q->info.lo > q->info.hi - old[e];
-            weight[e] = x_dot[base + e] = down ? -w : w;
-        }
+    } else { /* one direction through all of them */
+        imp__check_direction(q, weight);
+        memcpy(x_dot + base, weight, count * sizeof *weight);
         IMP_TRY(imp__fresh_slope(&r->fresh, x_dot, &mine));
         if (before) mine = pool(before, c->mine, r->fresh.more, mine);
     }
@@ -170,7 +166,8 @@ static enum imp_status comparisons_list(struct rows *r)
     const struct imp_problem *p = r->fresh.check->problem;
     for (size_t k = 0; k < p->scene->n_params; k++) {
         if (p->active.base[k] < 0) continue;
-        const size_t count = p->scene->params[k].info.count, n = count <= 3 ? count : 1;
+        const size_t count = p->scene->params[k].info.count,
+                     n = count <= IMP_CHECK_SINGLY ? count : 1;
         for (size_t e = 0; e < n; e++) {
             struct comparison *grown = imp__grow(r->fresh.check->ctx, r->comparisons,
                                                  &r->cap, r->n + 1, sizeof *grown);
@@ -211,6 +208,18 @@ out:
     return st;
 }
 
+/* What ends compare (check_ends.c). */
+static enum imp_status slopes_keep(const struct rows *r)
+{
+    struct imp__check *c = r->fresh.check;
+    c->slopes = imp__alloc(c->ctx, r->n + 1, sizeof *c->slopes);
+    if (!c->slopes) return imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check");
+    for (size_t k = 0; k < r->n; k++)
+        c->slopes[c->n_slopes++] = (struct imp__slope){
+            r->comparisons[k].param, r->comparisons[k].element, r->comparisons[k].mine};
+    return IMP_OK;
+}
+
 /* Work of a round in pictures: a difference takes 2 to 6, counted as 4. */
 static double round_work(const struct rows *r)
 {
@@ -223,22 +232,12 @@ enum imp_status imp__check_fresh(struct imp__check *c)
 {
     enum imp_status st = IMP_OK;
     const struct imp_problem *p = c->problem;
-    const struct imp_film_desc *film = &c->tracer.sensor->film;
-    const size_t w = (size_t)film->crop_w, h = (size_t)film->crop_h;
-    struct rows r = {.fresh = {.check = c, .channels = p->scene->channels}};
-    const size_t C = (size_t)p->scene->channels;
+    struct rows r = {0};
 
-    r.fresh.pattern = imp__alloc(c->ctx, w * h * C, sizeof *r.fresh.pattern);
+    IMP_TRY(imp__fresh_begin(&r.fresh, c));
     r.gradient = imp__alloc(c->ctx, 2 * p->n, sizeof *r.gradient);
-    if (!r.fresh.pattern || !r.gradient)
-        IMP_TRY(imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check"));
+    if (!r.gradient) IMP_TRY(imp__error(c->ctx, IMP_E_NOMEM, "no memory for a check"));
     r.gradient_se = r.gradient + p->n;
-    for (size_t i = 0; i < w * h * C; i++) {
-        const double x = (double)(i / C % w) / (double)w,
-                     y = (double)(i / C / w) / (double)h;
-        r.fresh.pattern[i] =
-            (float)((1 + 0.5 * cos(5 * x + 3 * y + (double)(i % C))) / (double)(w * h));
-    }
     IMP_TRY(comparisons_list(&r));
     for (int round = 0, before = 0; round < ROUNDS; before += r.fresh.more, round++) {
         size_t open = 0;
@@ -254,8 +253,9 @@ enum imp_status imp__check_fresh(struct imp__check *c)
             if (r.comparisons[k].noisy)
                 IMP_TRY(comparison_round(&r, &r.comparisons[k], before));
     }
+    st = slopes_keep(&r);
 out:
-    imp__release(c->ctx, r.fresh.pattern);
+    imp__fresh_end(&r.fresh);
     imp__release(c->ctx, r.gradient);
     imp__release(c->ctx, r.comparisons);
     return st;

@@ -17,9 +17,8 @@ struct imp__light_plan imp__light_plan_of(const struct imp_sensor *sensor, int s
 
 /* ---- Sweeps ----------------------------------------------------------------------- */
 
-/* What the adjoint image makes of light at a film position, by channels. */
-static imp_spec adjoint_at(const struct imp__light_adjoints *a, const double *image,
-                           double px, double py)
+imp_spec imp__light_adjoint_at(const struct imp__light_adjoints *a, const double *image,
+                               double px, double py)
 {
     struct imp_splat_taps taps;
     const size_t C = (size_t)a->channels;
@@ -56,7 +55,8 @@ void imp__light_replicate(struct imp__gradient_job *job, struct imp_tile_worker 
             imp__arena_take(&worker->arena, (size_t)walk.n_reach + 1, sizeof *P);
         size_t k = 0;
         for (const struct imp_reach *r = P ? walk.reach : NULL; r; r = r->next)
-            P[k++] = imp__walk_lanes(&walk.walk, adjoint_at(a, image, r->px, r->py));
+            P[k++] = imp__walk_lanes(&walk.walk,
+                                     imp__light_adjoint_at(a, image, r->px, r->py));
         if (!P || !imp__light_walk_sweep(&job->tracer, &worker->arena, &walk, P,
                                          1 / ((double)job->plan.n * (double)pixels),
                                          &tally->sink)) {

@@ -33,6 +33,10 @@ struct imp__light_adjoints {
     const double *image[2]; /* [crop_h][crop_w][channels] */
 };
 
+/* What an adjoint image makes of light at a film position, by channels. */
+imp_spec imp__light_adjoint_at(const struct imp__light_adjoints *a, const double *image,
+                               double px, double py);
+
 /* The walks of replicate b of a pixel, swept (gradient_job.c). Pixels only number walks:
  * walk i of pixel q in replicate b is first + (b n + i) pixels + q. */
 void imp__light_replicate(struct imp__gradient_job *job, struct imp_tile_worker *worker,

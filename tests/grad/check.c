@@ -164,36 +164,42 @@ static bool wrong_emission(const struct imp_emitter *e, const struct imp_ball *s
                            const double u[4], struct imp_emission_sample *out)
 {
     const bool drawn = right_light->sample_emission(e, scene, u, out);
-    out->pdf_p *= 1.15;
+    out->pdf_p *= wrong_by;
     return drawn;
 }
 
-/* No check of one end alone sees it: pictures and gradients are wrong alike. */
-static void wrong_end(void)
+/* No check of one end alone sees it: pictures and gradients are wrong alike. Walks of the
+ * check itself begin at `from`; the texture has one row, of a direction. */
+static void wrong_end(const char *file, const char *size, const char *active,
+                      enum imp_from from, double by, size_t least)
 {
-    imp_scene *s = test_scene(ctx, "cornell.xml", IMP_RGB, "res=16");
-    imp_problem *p = test_problem(ctx, s, "*");
+    imp_scene *s = test_scene(ctx, file, IMP_RGB, size);
+    imp_problem *p = test_problem(ctx, s, active);
     struct imp_emitter *light = s->emitters[0];
+    if (!light->shape) light = s->emitters[1]; /* no sky */
     right_light = light->ops;
     struct imp_emitter_ops wrong = *right_light;
     wrong.sample_emission = wrong_emission;
+    wrong_by = by;
     light->ops = &wrong;
     struct imp_run run = IMP_RUN_INIT;
     struct imp_check_options o = IMP_CHECK_OPTIONS_INIT;
     const struct imp_check_row *rows;
     size_t n, caught = 0, other = 0;
-    run.spp = 400;
-    run.from = IMP_FROM_LIGHTS;
-    o.fresh_spp = 64;
+    run.from = from;
+    o.paths = 20;
+    o.fresh_spp = 32;
     for (int k = 0; k < 2; k++) {
         caught = other = 0;
         test_must(ctx, imp_check(p, &o, &run, &rows, &n));
         for (size_t i = 0; i < n; i++)
             *(strcmp(rows[i].method, "ends") ? &other : &caught) += rows[i].ok == 0;
-        tap_ok(other == 0 && (k == 0 ? caught >= 6 : caught == 0),
-               k == 0 ? "light that is drawn with another density is caught # %zu rows"
-                      : "and walks from the lights that are right are not # %zu rows",
-               caught);
+        tap_ok(
+            other == 0 && (k == 0 ? caught >= least : caught == 0),
+            k == 0
+                ? "%s from the %s: light drawn with another density is caught # %zu rows"
+                : "%s from the %s: walks that are right are not # %zu rows",
+            file, from == IMP_FROM_LIGHTS ? "lights" : "sensor", caught);
         light->ops = right_light;
     }
     imp_problem_destroy(p);
@@ -323,7 +329,9 @@ int main(void)
     imp_scene_destroy(s);
     planted();
     more_samples();
-    wrong_end();
+    wrong_end("cornell.xml", "res=16", "*", IMP_FROM_LIGHTS, 1.15, 6);
+    wrong_end("cornell.xml", "res=16", "*", IMP_FROM_SENSOR, 1.15, 5);
+    wrong_end("textured.xml", "width=24 height=18", "floor.*", IMP_FROM_SENSOR, 0.5, 2);
     wrong_densities();
     black_and_white();
     imp_context_destroy(ctx);
