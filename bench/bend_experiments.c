@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The experiments of docs/curved-rays.md, each a table on standard output:
+ * The experiments of docs/bend.md, each a table on standard output:
  *
  *     bend_experiments luneburg|maxwell|focus|slice|tape|fibre|display|gas|rod ...
  *                      [--full] [--figures DIR]

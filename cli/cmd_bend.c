@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * importon bend: rays in graded indices. trace, check, fit and view work on one file with
- * field, rays and targets (docs/curved-rays.md). */
+ * field, rays and targets (docs/bend.md). */
 #include "cmd_bend.h"
 #include "cmd_picture.h"
 #include "output.h"

@@ -138,7 +138,7 @@ IMP_API IMP_MUST_CHECK enum imp_status
 imp_field_sum_create(imp_context *context, size_t n, imp_field **parts, imp_field **out);
 
 /** Read .vol (Mitsuba's grid volume), .npy (3-D, [z][y][x], float32 or float64) or a
- * profile as text (docs/curved-rays.md). Volumes hold samples at the cell corners; `grid`
+ * profile as text (docs/bend.md). Volumes hold samples at the cell corners; `grid`
  * gives the box of a .npy and the interpolation of both (its `cells` are ignored); NULL:
  * the defaults. */
 IMP_API IMP_MUST_CHECK enum imp_status imp_field_read(imp_context *context,
@@ -636,7 +636,7 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_bend_step_error(imp_bend *bend, size_
                                                            double *error, double *order);
 
 /** A bend from a file: <scene> with a <medium type="graded">, <rays> and <target>s
- * (docs/curved-rays.md). options may be NULL. */
+ * (docs/bend.md). options may be NULL. */
 IMP_API IMP_MUST_CHECK enum imp_status
 imp_bend_load(imp_context *context, const char *path,
               const struct imp_load_options *options, imp_bend **out);

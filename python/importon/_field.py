@@ -87,7 +87,7 @@ class Field:
 
     @classmethod
     def profile(cls, kind: str, params: Any, axis: Any = None) -> Field:
-        """A profile by name (docs/curved-rays.md).
+        """A profile by name (docs/bend.md).
 
         Parameters
         ----------

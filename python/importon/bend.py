@@ -769,7 +769,7 @@ def _load(function: Any, arguments: tuple[Any, ...], search: Sequence[Any], defa
 
 
 def load_file(path: Any, *, search: Sequence[Any] = (), **defaults: Any) -> Bend:
-    """A problem from a file: <medium type="graded">, <rays> and <target>s (docs/curved-rays.md).
+    """A problem from a file: <medium type="graded">, <rays> and <target>s (docs/bend.md).
 
     Parameters
     ----------

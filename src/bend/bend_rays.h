@@ -4,7 +4,7 @@
  * splat, tangent); an integration scheme is a list of drifts and kicks; a ray ends, is
  * refracted or is reflected at a surface. The forward step, its adjoint and its tangent
  * read the same list, so the derivative is that of the program that traces. Equation
- * numbers: Teh et al. 2022, supplement, with the corrections of docs/curved-rays.md. */
+ * numbers: Teh et al. 2022, supplement, with the corrections of docs/bend.md. */
 #ifndef IMP_BEND_RAYS_H
 #define IMP_BEND_RAYS_H
 

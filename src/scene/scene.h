@@ -52,7 +52,7 @@ struct imp_param {
 enum { IMP_WAVES_UNIFORM, IMP_WAVES_IMPORTANCE, IMP_WAVES_DRAWN };
 
 /* A graded index inside shapes. What it is, and how rays step through it, is known to
- * `curved` alone; its numbers are parameters like all others. */
+ * src/bend alone; its numbers are parameters like all others. */
 struct imp_graded;
 struct imp_body_numbers {
     const char *key;     /* below the medium's name: "field.coefficients" */

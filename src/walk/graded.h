@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Segments in scenes with bodies of graded index (docs/curved-rays.md, "In scenes"). A
+ * Segments in scenes with bodies of graded index (docs/bend.md, "In scenes"). A
  * walk that is refracted into a body follows its bent ray to the next shape; nothing else
  * of the walk knows. Not possible, and dropped: bodies in bodies, shapes inside that let
  * light through, cameras inside. No light samples are taken inside, where a straight line

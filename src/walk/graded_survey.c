@@ -98,7 +98,7 @@ static enum imp_status refuse(const struct imp_tracer *t, const struct imp_body 
     snprintf(text, sizeof text, format, a, b);
     return imp__error(t->scene->ctx, IMP_E_BIAS,
                       "medium '%s': no unbiased derivative of its field: %s "
-                      "(docs/curved-rays.md, In scenes)",
+                      "(docs/bend.md, In scenes)",
                       m->name, text);
 }
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
  * Files of bent rays: the scene format's grammar, with <medium type="graded">, <rays>,
- * <surface> and <target> (docs/curved-rays.md). */
+ * <surface> and <target> (docs/bend.md). */
 #include "bend_load.h"
 #include "base/arguments.h"
 #include "format/load.h"

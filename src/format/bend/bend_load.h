@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0
- * Loader of problems of bent rays (docs/curved-rays.md): bend_load.c reads the file, and
+ * Loader of problems of bent rays (docs/bend.md): bend_load.c reads the file, and
  * one file reads each element. */
 #ifndef IMP_FORMAT_BEND_LOAD_H
 #define IMP_FORMAT_BEND_LOAD_H

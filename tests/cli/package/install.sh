@@ -11,7 +11,7 @@ prefix=$OUT/root$(sed -n 's/^prefix=//p' "$pc")
 for file in bin/importon include/importon/importon.h share/man/man1/importon.1 \
     share/man/man5/importon-scene.5 share/man/man3/libimporton.3 \
     share/importon/scenes/cornell/light.obj share/importon/scenes/bend/seen.xml \
-    share/doc/importon/curved-rays.md share/doc/importon/images/lenses.png \
+    share/doc/importon/bend.md share/doc/importon/images/lenses.png \
     share/doc/importon/README.md share/doc/importon/examples/render.c \
     share/bash-completion/completions/importon; do
     [[ -f $prefix/$file ]] || echo "not installed: $file"
@@ -21,7 +21,7 @@ for page in "$prefix"/share/man/man?/*; do
     sed -n 's/^\(\.It\|\.Pa\).*\(share\/[a-z/]*\).*/\2/p' "$page"
     sed -n 's/.*Pa \([a-z-]*\.md\) .*/share\/doc\/importon\/\1/p' "$page"
 done | sort -u >named
-grep -q share/importon/scenes named && grep -q curved-rays named || echo "the manual names no files"
+grep -q share/importon/scenes named && grep -q bend.md named || echo "the manual names no files"
 while read -r file; do
     [[ -e $prefix/$file ]] || echo "named by the manual, not installed: $file"
 done <named
