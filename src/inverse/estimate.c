@@ -51,7 +51,7 @@ static enum imp_status target_estimate(struct imp_problem *p,
     struct imp__splat splat = {0};
     struct imp__gradient_job j = {
         .problem = p, .totals = totals, .target = target, .want_gradient = want_gradient};
-    enum imp_status st = imp__target_tracer(p, target, part, true, &own, &j.tracer);
+    enum imp_status st = imp__target_tracer(p, target, part, &own, &j.tracer);
     if (st != IMP_OK) return st;
     if (j.tracer.integrator->from_lights && want_gradient && totals->many)
         return imp__error(p->ctx, IMP_E_UNSUPPORTED,
@@ -60,7 +60,7 @@ static enum imp_status target_estimate(struct imp_problem *p,
                           IMP_TALLY_DENSE);
     if (j.tracer.integrator->from_lights)
         return imp__light_objective(
-            p, target, &own, &totals->objective, &totals->variance,
+            p, target, &j.tracer, &own, &totals->objective, &totals->variance,
             want_gradient ? totals->gradient : NULL, totals->gradient_variance);
     if (!want_gradient) j.tracer.active = NULL;
     j.plan = imp__replicates_of(p->scene, target, &own);

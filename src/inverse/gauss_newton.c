@@ -63,7 +63,7 @@ static enum imp_status target_add(struct imp__normal_job *j,
     const struct imp_problem *p = j->problem;
     struct imp_run own = *run;
     j->target = target;
-    enum imp_status st = imp__target_tracer(p, target, part, true, &own, &j->tracer);
+    enum imp_status st = imp__target_tracer(p, target, part, &own, &j->tracer);
     if (st != IMP_OK) return st;
     const struct imp_film_desc *film = &j->tracer.sensor->film;
     if (j->tracer.integrator->from_lights && !imp__loss_quadratic(target->desc.loss))

@@ -258,27 +258,26 @@ out:
 
 enum imp_status imp__light_objective(struct imp_problem *p,
                                      const struct imp__target *target,
+                                     const struct imp_tracer *tracer,
                                      const struct imp_run *run, double *objective,
                                      double *variance, double *gradient,
                                      double *gradient_variance)
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = p->ctx;
-    struct imp_tracer tracer, plain;
+    struct imp_tracer plain = *tracer;
     struct imp_splat_scale scale = {0};
     struct sets s = {.target = target, .channels = p->scene->channels};
     double *g = NULL, *sum = NULL, *square = NULL, value = 0, value2 = 0;
-    IMP_TRY(imp__problem_tracer_of_any_end(p, run, NULL, &tracer));
     if (imp__team_shares(ctx))
         IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,
                            "losses of walks from the lights are not divided between "
                            "processes; let walks begin at the sensor"));
-    const struct imp_film_desc *film = &tracer.sensor->film;
-    const struct imp__light_plan plan = imp__light_plan_of(tracer.sensor, run->spp);
+    const struct imp_film_desc *film = &tracer->sensor->film;
+    const struct imp__light_plan plan = imp__light_plan_of(tracer->sensor, run->spp);
     s.pixels = (size_t)film->crop_w * (size_t)film->crop_h;
     const size_t values = s.pixels * (size_t)s.channels;
     const int64_t walks = (int64_t)plan.n * (int64_t)s.pixels;
-    plain = tracer;
     plain.active = NULL;
     plain.value_only = true;
     IMP_TRY(imp__splat_scale_create(ctx, film, &scale));
@@ -312,7 +311,7 @@ enum imp_status imp__light_objective(struct imp_problem *p,
         value += loss;
         value2 += loss * loss;
         if (!gradient) continue;
-        IMP_TRY(group_gradient(p, &tracer, &s, &scale, 2 * r * walks, plan.n, run,
+        IMP_TRY(group_gradient(p, tracer, &s, &scale, 2 * r * walks, plan.n, run,
                                (r + 0.4) * part, (r + 1) * part, g));
         for (size_t k = 0; k < p->n; k++) {
             sum[k] += g[k];

@@ -50,6 +50,7 @@ enum imp_status imp__light_reverse(struct imp_problem *p, const struct imp_trace
  * and gradient_variance [n], which may be NULL. */
 enum imp_status imp__light_objective(struct imp_problem *p,
                                      const struct imp__target *target,
+                                     const struct imp_tracer *tracer,
                                      const struct imp_run *run, double *objective,
                                      double *variance, double *gradient,
                                      double *gradient_variance);

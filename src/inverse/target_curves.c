@@ -67,16 +67,13 @@ out:
 
 enum imp_status imp__target_tracer(const struct imp_problem *p,
                                    const struct imp__target *target, int part,
-                                   bool any_end, struct imp_run *run,
-                                   struct imp_tracer *out)
+                                   struct imp_run *run, struct imp_tracer *out)
 {
     const struct imp_wavelengths *waves = target->of_curves ? target->waves : NULL;
     run->sensor = target->desc.sensor;
     /* A seed for each part makes the parts independent. */
     run->seed += (uint64_t)part * UINT64_C(0x9e3779b97f4a7c15);
-    const enum imp_status st = any_end && !waves
-                                   ? imp__problem_tracer_of_any_end(p, run, NULL, out)
-                                   : imp__problem_tracer(p, run, waves, out);
+    const enum imp_status st = imp__problem_tracer_of_any_end(p, run, waves, out);
     if (target->photograph.pixels) out->photograph = &target->photograph;
     return st;
 }

@@ -173,6 +173,99 @@ static void compare(const char *integrator, const char *filter, const float *tar
     imp_scene_destroy(eye);
 }
 
+/* ---- Films of any number of response curves ------------------------------------------ */
+
+static const char meter[] =
+    "<scene version='3.0.0'><integrator type='bdpt'><integer name='max_depth' value='4'/>"
+    "</integrator><shape type='cube'>" AT(
+        "<scale value='2'/>") "<boolean name='flip_normals' value='true'/><bsdf "
+                              "type='diffuse' id='wall'><spectrum "
+                              "name='reflectance' "
+                              "value='400:.3,700:.7'/></bsdf></shape><shape "
+                              "type='sphere'><point "
+                              "name='center' value='.4,.9,0'/><float name='radius' "
+                              "value='.3'/><emitter type='area' "
+                              "id='lamp'><spectrum name='radiance' "
+                              "value='400:3,700:6'/></emitter></shape><shape "
+                              "type='rectangle'>" AT(
+                                  "<scale value='.8'/><rotate x='1' angle='-90'/>"
+                                  "<translate y='-1.9'/>") "<sensor "
+                                                           "type='irradiancemeter'><film "
+                                                           "type='specfilm'><integer "
+                                                           "name='width' "
+                                                           "value='1'/><integer "
+                                                           "name='height' "
+                                                           "value='1'/>%s</film></"
+                                                           "sensor></shape></scene>";
+
+/* A reading of n curves as the target: its loss and gradient, and what lm finds of the
+ * lamp from it. */
+static void curves(int n, enum imp_from from, const char *name)
+{
+    char xml[4096], list[1024] = "";
+    float target[8];
+    for (int k = 0; k < n; k++)
+        snprintf(list + strlen(list), sizeof list - strlen(list),
+                 "<spectrum name='c%d' value='%d:0,%d:.01,%d:0'/>", k, 400 + 300 * k / n,
+                 400 + 300 * k / n + 150 / n, 400 + 300 * (k + 1) / n);
+    snprintf(xml, sizeof xml, meter, list);
+    imp_scene *scene = test_scene_text(ctx, xml, IMP_SPECTRAL);
+    struct imp_run run = IMP_RUN_INIT;
+    imp_film *film;
+    run.spp = 100000;
+    run.from = IMP_FROM_SENSOR;
+    test_must(ctx, imp_render(scene, &run, &film));
+    for (int k = 0; k < n; k++) target[k] = imp_film_mean(film)[k] * 1.3f;
+    imp_film_destroy(film);
+    imp_problem *p = test_problem(ctx, scene, "wall.*");
+    test_must(ctx, imp_problem_activate(p, "lamp.*"));
+    struct imp_target t = IMP_TARGET_INIT;
+    t.width = t.height = 1;
+    t.channels = n;
+    t.pixels = target;
+    test_must(ctx, imp_problem_add_target(p, &t));
+    struct answer eye, other;
+    double worst = 0, resolved = 0;
+    run.spp = 20000;
+    run.seed = 3;
+    test_must(ctx, imp_problem_objective(p, NULL, &run, &eye.value, eye.g, eye.se));
+    run.from = from;
+    run.seed = 4;
+    test_must(ctx, imp_problem_objective(p, NULL, &run, &other.value, other.g, other.se));
+    for (size_t k = 0; k < imp_problem_n(p); k++) {
+        const double se = hypot(eye.se[k], other.se[k]);
+        worst = fmax(worst, fabs(eye.g[k] - other.g[k]) / se);
+        resolved += fabs(eye.g[k]) > 10 * se;
+    }
+    const double z =
+        (eye.value.value - other.value.value) / hypot(eye.value.se, other.value.se);
+    /* Errors from 8 groups: t of 7 degrees of freedom, of which 1 in 10^4 is beyond 7.9. */
+    tap_ok(fabs(z) < 7.9 && worst < 7.9 && resolved > 0,
+           "%d curves from %s: loss %.5g and %.5g, %zu derivatives # z %.2f, worst %.2f",
+           n, name, eye.value.value, other.value.value, imp_problem_n(p), z, worst);
+    imp_problem_destroy(p);
+
+    p = test_problem(ctx, scene, "lamp.*");
+    test_must(ctx, imp_problem_add_target(p, &t));
+    struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
+    const struct imp_fit_result *r;
+    const double start[2] = {4.4, 5.5}, truth[2] = {3.9, 7.8};
+    test_must(ctx, imp_problem_set_x(p, start));
+    o.optimizer = IMP_LM;
+    o.max_iterations = 6;
+    run.spp = 10000;
+    test_must(ctx, imp_fit(p, &o, &run, &r));
+    worst = 0;
+    for (int k = 0; k < 2; k++)
+        worst = fmax(worst, fabs(r->variables[k].value / truth[k] - 1));
+    /* One curve does not tell two numbers. */
+    if (n > 1)
+        tap_ok(worst < .05, "%d curves from %s: lm finds the lamp # within %.2g", n, name,
+               worst);
+    imp_problem_destroy(p);
+    imp_scene_destroy(scene);
+}
+
 int main(void)
 {
     static const char *const ends[] = {"ptracer", "bdpt"}, *const filters[] = {
@@ -191,6 +284,9 @@ int main(void)
             compare(ends[e], filters[f], NULL, adjoint, "linear");
         }
     }
+    curves(5, IMP_FROM_LIGHTS, "the lights");
+    curves(5, IMP_FROM_SCENE, "both ends");
+    curves(1, IMP_FROM_LIGHTS, "the lights");
     imp_context_destroy(ctx);
     return tap_done();
 }
