@@ -511,7 +511,7 @@ struct imp_sensor_sample {
     double cos_sensor; /* and the cosine there; of others 1 */
 };
 
-enum imp_geometry { IMP_TRIANGLES, IMP_ANALYTIC };
+enum imp_geometry { IMP_TRIANGLES, IMP_ANALYTIC, IMP_CURVES };
 
 struct imp_triangles { /* world space */
     size_t n_vertices, n_triangles;
@@ -519,6 +519,16 @@ struct imp_triangles { /* world space */
     const uint32_t *indices; /* [3 n_triangles] */
     double volume;           /* enclosed: negative where the normals point inwards; of
                                 open meshes that of the cones to the centre of its box */
+};
+
+/* Tubes about lines, in world space, which rays meet from outside alone. Degree 1: cones
+ * from point to point, with a ball at each point; 3: uniform cubic B-splines, open. */
+struct imp_curves {
+    size_t n_points, n_segments;
+    const float *points;   /* [4 n_points] position and radius */
+    const uint32_t *first; /* [n_segments] first of the points of a segment */
+    const uint8_t *joined; /* [n_segments] degree 1: bit 0 one before, bit 1 one behind */
+    int degree;
 };
 
 /* A texture of a shape under a name. */
@@ -537,6 +547,7 @@ struct imp_shape {
     double area; /* world units; build sets it */
     enum imp_geometry geometry;
     struct imp_triangles triangles; /* if geometry is IMP_TRIANGLES */
+    struct imp_curves curves;       /* if it is IMP_CURVES */
     imp_v3 lo, hi;                  /* bounds; build sets them */
     const char *name;
     bool smooth; /* shading normals turn over flat facets; build sets it */
@@ -617,7 +628,8 @@ enum imp_emitter_flags {
                                 surface: on its front) */
     IMP_EMITTER_GAPS = 16,    /* the density of sample is 0 where eval is, also where a
                                 derivative is not */
-    IMP_EMITTER_FAR = 32,     /* a delta light without end: its light is parallel */
+    IMP_EMITTER_FAR = 32,     /* a delta light of parallel light: without end, or with
+                                 IMP_EMITTER_AREA from a flat surface */
     IMP_EMITTER_BY_SHAPE = 64 /* its points are drawn as the shape draws them: sample and
                                  pdf are the shape's, evenly by area on triangles */
 };
@@ -767,11 +779,15 @@ struct imp_sensor {
     /* The scene's: its rays have times from `open` to `close`, evenly or as `course`. */
     double open, close;
     const struct imp_course *course;
+    /* With IMP_SENSOR_GROUP: sensors whose pictures stand side by side in its film. */
+    int n_child;
+    const struct imp_sensor *const *child;
 };
 enum imp_sensor_flags {
-    IMP_SENSOR_AREA = 1, /* its rays start on the shape that it stands in */
-    IMP_SENSOR_PARALLEL =
-        2 /* its rays are parallel: `connect` knows no point without end */
+    IMP_SENSOR_AREA = 1,     /* its rays start on the shape that it stands in */
+    IMP_SENSOR_PARALLEL = 2, /* its rays are parallel: `connect` knows no point without
+                                end */
+    IMP_SENSOR_GROUP = 4     /* its children are sensors */
 };
 struct imp_sensor_ops {
     size_t size;

@@ -187,6 +187,10 @@ enum imp_status imp__build_shape(struct imp_scene *scene, struct imp_node *node,
         s->bsdf = -2;
     }
     IMP_TRY(imp__build_bumps_survey(scene, node, s));
+    if ((side[0] || side[1] || priority) && s->geometry == IMP_CURVES)
+        IMP_TRY(imp__node_error(ctx, node, IMP_E_UNSUPPORTED,
+                                "a medium needs a surface that is met from both sides, "
+                                "and curves are met from outside alone"));
     if (side[1] && strcmp(side[1]->type, "graded") == 0)
         IMP_TRY(imp__node_error(ctx, side[1], IMP_E_UNSUPPORTED,
                                 "a graded medium fills the interior of a shape"));
@@ -243,8 +247,69 @@ static enum imp_status child_or_default(struct imp_scene *scene, struct imp_node
     return *out ? IMP_OK : imp__build_no_memory(scene);
 }
 
-enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node,
-                                  const char *name, struct imp_shape *shape)
+/* A sensor, with the film `own` where it has a place in another's; it is in no list yet. */
+static enum imp_status sensor_make(struct imp_scene *scene, struct imp_node *node,
+                                   const char *name, struct imp_shape *shape,
+                                   const struct imp_film_desc *own,
+                                   struct imp_sensor **out);
+
+/* The sensors of a batch: each has its share of the film's columns, and nothing of its own
+ * film and sampler counts, as in Mitsuba. */
+static enum imp_status children_make(struct imp_scene *scene, struct imp_node *node,
+                                     struct imp_sensor *s)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = scene->ctx;
+    int n = 0, k = 0;
+    for (size_t i = 0; i < node->n_children; i++)
+        n += strcmp(node->children[i].node->tag, "sensor") == 0;
+    if (n == 0) IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE, "has no sensors"));
+    if (s->film.width % n != 0)
+        IMP_TRY(imp__node_error(ctx, node, IMP_E_SCENE,
+                                "the width of its film, %d pixels, is no multiple of its "
+                                "%d sensors",
+                                s->film.width, n));
+    const struct imp_sensor **child =
+        imp__arena_array(&scene->arena, (size_t)n, sizeof *child);
+    if (!child) IMP_TRY(imp__build_no_memory(scene));
+    struct imp_film_desc film = s->film;
+    film.width /= n;
+    film.crop_x = film.crop_y = 0;
+    film.crop_w = film.width;
+    film.crop_h = film.height;
+    for (size_t i = 0; i < node->n_children; i++) {
+        struct imp_child *c = &node->children[i];
+        struct imp_sensor *made = NULL;
+        if (strcmp(c->node->tag, "sensor") != 0) continue;
+        char slot[32];
+        snprintf(slot, sizeof slot, "sensor%d", k);
+        const char *name = imp__build_object_name(scene, c->node, s->name, slot);
+        if (!name) IMP_TRY(imp__build_no_memory(scene));
+        IMP_TRY(sensor_make(scene, c->node, name, NULL, &film, &made));
+        if (!made || made->ops->flags & IMP_SENSOR_GROUP)
+            IMP_TRY(imp__node_error(ctx, c->node, IMP_E_UNSUPPORTED,
+                                    made ? "stands in a batch, and is one"
+                                         : "stands in a batch, and is a surface"));
+        if (k > 0 && made->medium != s->medium)
+            IMP_TRY(imp__node_error(ctx, c->node, IMP_E_UNSUPPORTED,
+                                    "is in another medium than the sensors before it"));
+        if (made->photometric != s->photometric && made->photometric)
+            IMP_TRY(imp__node_error(ctx, c->node, IMP_E_SCENE,
+                                    "has units, which are those of its batch"));
+        s->medium = made->medium;
+        c->used = true;
+        child[k++] = made;
+    }
+    s->n_child = n;
+    s->child = child;
+out:
+    return st;
+}
+
+static enum imp_status sensor_make(struct imp_scene *scene, struct imp_node *node,
+                                   const char *name, struct imp_shape *shape,
+                                   const struct imp_film_desc *own,
+                                   struct imp_sensor **out)
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = scene->ctx;
@@ -278,6 +343,7 @@ enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node
     IMP_TRY(imp__film_desc_build(&film_build, &s->film));
     IMP_TRY(imp__gain_fit(scene, film, &s->film, gain));
     s->gain = gain;
+    if (own) s->film = *own;
     IMP_TRY(imp__sampler_build(&sampler_build, &s->spp, &s->points));
     static const char *const units[] = {"radiometric", "photometric"};
     int unit;
@@ -288,12 +354,22 @@ enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node
                                 "photometric units are those of rgb and mono modes"));
     IMP_TRY(imp__srf_read(&b, &s->film));
     IMP_TRY(imp__build_shutter(scene, node, s));
+    if (ops->flags & IMP_SENSOR_GROUP) IMP_TRY(children_make(scene, node, s));
     IMP_TRY(ops->build(&b, self, s)); /* needs the film's shape */
     struct imp_node *medium = medium_child(node);
     if (medium) IMP_TRY(imp__build_medium(scene, medium, name, "medium", &s->medium));
     else if (shape) s->medium = shape->exterior;
     IMP_TRY(imp__props_finish(ctx, node));
-    IMP_TRY(imp__build_list_add(scene, (void ***)&scene->sensors, &scene->n_sensors, s));
+    *out = s;
 out:
     return st;
+}
+
+enum imp_status imp__build_sensor(struct imp_scene *scene, struct imp_node *node,
+                                  const char *name, struct imp_shape *shape)
+{
+    struct imp_sensor *s = NULL;
+    const enum imp_status st = sensor_make(scene, node, name, shape, NULL, &s);
+    if (st != IMP_OK || !s) return st;
+    return imp__build_list_add(scene, (void ***)&scene->sensors, &scene->n_sensors, s);
 }

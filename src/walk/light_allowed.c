@@ -64,11 +64,13 @@ static enum imp_status emission_allowed(const struct imp_scene *scene,
     return IMP_OK;
 }
 
-/* A light without end; NULL: there is none. */
+/* A light infinitely far away; NULL: there is none. */
 static const struct imp_emitter *far_light(const struct imp_scene *scene)
 {
     for (int i = 0; i < scene->n_emitters; i++)
-        if (scene->emitters[i]->ops->flags & (IMP_EMITTER_ENVIRONMENT | IMP_EMITTER_FAR))
+        if (scene->emitters[i]->ops->flags &
+                (IMP_EMITTER_ENVIRONMENT | IMP_EMITTER_FAR) &&
+            !scene->emitters[i]->shape)
             return scene->emitters[i];
     return NULL;
 }
@@ -144,6 +146,11 @@ static enum imp_status both_allowed(const struct imp_scene *scene,
                 "which lets light go straight on and is a vertex of walks; use volpath "
                 "or ptracer",
                 scene->bsdfs[b]->name, scene->bsdfs[b]->ops->name);
+    if (sensor->ops->flags & IMP_SENSOR_GROUP)
+        return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                          "integrator bdpt: sensor '%s' (%s) is several, and weights of "
+                          "both ends are those of one; use path or ptracer",
+                          sensor->name, sensor->ops->name);
     if (sensor->film.sample_border)
         return imp__error(scene->ctx, IMP_E_UNSUPPORTED,
                           "integrator bdpt: the film of sensor '%s' has sample_border, "

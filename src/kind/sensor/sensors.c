@@ -9,7 +9,8 @@
     X(imp__orthographic)                                                                 \
     X(imp__irradiancemeter)                                                              \
     X(imp__radiancemeter)                                                                \
-    X(imp__distant)
+    X(imp__distant)                                                                      \
+    X(imp__batch)
 
 #define DECLARE(kind) extern const struct imp_sensor_ops kind;
 SENSORS(DECLARE)
