@@ -233,12 +233,14 @@ enum imp_status imp__el_roots(imp_elements *e)
                                "time",
                                scene->emitters[i]->name));
     for (int i = 0; i < scene->n_emitters; i++)
-        if (!(scene->emitters[i]->ops->flags & IMP_EMITTER_AREA))
+        if (!(scene->emitters[i]->ops->flags & IMP_EMITTER_AREA) ||
+            scene->emitters[i]->ops->flags & IMP_EMITTER_DELTA)
             IMP_TRY(imp__el_refused_at(
                 e,
                 imp__error(
                     e->ctx, IMP_E_UNSUPPORTED,
-                    "emitter '%s' (%s): finite elements take lights that are surfaces",
+                    "emitter '%s' (%s): finite elements take lights that are surfaces "
+                    "and shine in all directions",
                     scene->emitters[i]->name, scene->emitters[i]->ops->name),
                 scene->emitters[i]));
     for (size_t i = 0; i < e->opt.n_phong; i++)

@@ -56,7 +56,7 @@ bool imp__both_light_begins(struct imp_light_step *w, int light,
         {start->uv[0], start->uv[1]}, 1, start->cos_light, start->d};
     struct imp_end *end = imp__both_light_end(b);
     if (!end) return false;
-    end->far = e->ops->flags & (IMP_EMITTER_ENVIRONMENT | IMP_EMITTER_FAR);
+    end->far = imp__end_is_far(e);
     end->p = end->far ? -start->d : start->p;
     end->ng = start->ng;
     end->own = imp__end_begins(scene, light, &x);
@@ -78,7 +78,8 @@ bool imp__both_light_arrives(struct imp_light_step *w, struct imp_vertex *v,
     struct imp_both_place *place = &b->place[k];
     end->p = at->p;
     end->ng = at->ng;
-    if (k == 1 && before->far) end->own = imp__end_arrives_across(s->scene, end, s->d);
+    if (k == 1 && before->far)
+        end->own = imp__end_arrives_across(s->scene, b->emitter, end, s->d);
     else if (b->pdf_light > 0) end->own = imp__end_arrives(before, end, b->pdf_light);
     place->P = k == 1 ? v->prev->w : b->place[k - 1].P * v->prev->w;
     if (!(v->bsdf->flags & IMP_BSDF_SMOOTH) || !(end->own > 0)) return true;

@@ -34,13 +34,25 @@ static inline double imp__end_arrives(const struct imp_end *from,
     return pdf * fabs(imp__dot(to->ng, d)) / (r2 * sqrt(r2));
 }
 
-/* Of a vertex that light without end meets along d. */
-static inline double imp__end_arrives_across(const struct imp_scene *scene,
+static inline bool imp__end_is_far(const struct imp_emitter *e)
+{
+    return e->ops->flags & (IMP_EMITTER_ENVIRONMENT | IMP_EMITTER_FAR);
+}
+/* Does it shine from points of its surface in directions of a density? */
+static inline bool imp__end_is_area(const struct imp_emitter *e)
+{
+    return e->ops->flags & IMP_EMITTER_AREA && !(e->ops->flags & IMP_EMITTER_DELTA);
+}
+
+/* Of a vertex that parallel light of a far light meets along d: it begins on a disk about
+ * the scene, or on its surface. */
+static inline double imp__end_arrives_across(const struct imp_scene *scene, int light,
                                              const struct imp_end *to, imp_v3 d)
 {
+    const struct imp_shape *shape = scene->emitters[light]->shape;
     const double r = scene->ball.radius;
     const double c = imp__is_zero(to->ng) ? 1 : fabs(imp__dot(to->ng, d));
-    return IMP_INV_PI / (r * r) * c;
+    return (shape ? 1 / shape->area : IMP_INV_PI / (r * r)) * c;
 }
 
 /* Of a vertex that the sensor's walks meet first: film area per area across the ray, as

@@ -90,7 +90,7 @@ double imp__both_met_weight(const struct imp_step *s, int emitter,
     struct way w = {.both = b, .eye = b->from_eye, .t = t, .sampled = 1};
     w.other[2] = imp__end_begins(s->scene, emitter, &x);
     w.other[3] = at ? imp__end_arrives(x0, x1, e->ops->pdf_emission(e, &x))
-                    : imp__end_arrives_across(s->scene, x1, s->d);
+                    : imp__end_arrives_across(s->scene, emitter, x1, s->d);
     if (at && (t > 2 || b->sensor->shape))
         w.sampled = imp__end_arrives(x1, x0, e->ops->pdf(e, &x1->p, &s->d, hit, at)) *
                     e->shape->area;
@@ -103,7 +103,7 @@ double imp__both_sample_weight(const struct imp_step *s, int light,
 {
     const struct imp_both *b = s->both;
     const struct imp_emitter *e = s->scene->emitters[light];
-    const bool far = !isfinite(to->dist), area = e->ops->flags & IMP_EMITTER_AREA;
+    const bool far = imp__end_is_far(e), area = imp__end_is_area(e);
     const struct imp_end *y = &b->from_eye[b->n_eye - 1];
     const struct imp_emission x = {
         {to->uv[0], to->uv[1]}, to->dist, to->cos_light, -to->wi};
@@ -123,7 +123,7 @@ double imp__both_sample_weight(const struct imp_step *s, int light,
     if (area) w.sampled = imp__end_arrives(y, &end, to->pdf) * e->shape->area;
     if (!(end.own > 0)) return 1; /* the light begins no walk here */
     other_eye(&w,
-              far ? imp__end_arrives_across(s->scene, y, to->wi)
+              far ? imp__end_arrives_across(s->scene, light, y, to->wi)
                   : imp__end_arrives(&end, y, e->ops->pdf_emission(e, &x)),
               s, bsdf, dirs);
     return weight(&w);
@@ -153,7 +153,7 @@ static double sampled(const struct imp_both *b, const struct imp_scene *scene)
 {
     const struct imp_emitter *e = scene->emitters[b->emitter];
     const struct imp_end *x0 = &b->light[0], *x1 = &b->light[1];
-    if (!(e->ops->flags & IMP_EMITTER_AREA)) return 1;
+    if (!imp__end_is_area(e)) return 1;
     const struct imp_surface at = {.p = x0->p, .ng = x0->ng, .n = x0->ng};
     const imp_v3 d = x0->p - x1->p, wi = imp__normalize(d);
     const struct imp_hit hit = {.shape = e->shape->index, .t = imp__length(d)};

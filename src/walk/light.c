@@ -31,6 +31,8 @@ void imp__emission_meet(struct imp_step *s, struct imp_vertex *v, int emitter,
                         const struct imp_surface *at)
 {
     const struct imp_emitter *e = s->scene->emitters[emitter];
+    if (imp_unlikely(e->ops->flags & IMP_EMITTER_DELTA))
+        return; /* no ray meets its light */
     const struct imp_emission x = {{s->at.uv[0], s->at.uv[1]},
                                    at ? imp__decide1(hit->t) : INFINITY,
                                    at ? imp__decide1(-imp__dot(at->n, s->d)) : 1,

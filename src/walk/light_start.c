@@ -51,10 +51,19 @@ static void light_itself_connect(struct imp_light_step *w, struct imp_vertex *v,
     imp__light_sensor_numbers(s, u);
     if (!sensor->ops->connect(sensor, &ref, far, u, &to)) return;
     const imp_v3 d = far ? start->d : to.wo;
-    const bool surface = imp__dot(start->ng, start->ng) > 0;
+    const bool surface = !far && imp__dot(start->ng, start->ng) > 0;
     if (surface) c = fabs(imp__dot(start->ng, d));
-    const struct imp_emission x =
+    struct imp_emission x =
         emission_of(start, far ? INFINITY : 1, surface ? imp__dot(n, d) : 1, d);
+    imp_v3 p = s->at.p;
+    struct imp_light_sample beam; /* parallel light from a surface: its point before the
+                                     sensor's */
+    const bool in_beam = far && e->shape;
+    if (in_beam) {
+        if (!e->ops->sample(e, &to.p, u, &beam)) return;
+        p = imp__decide(beam.p);
+        for (int k = 0; k < 2; k++) x.uv[k] = imp__decide1(beam.uv[k]);
+    }
     const double pdf = far ? 0 : e->ops->pdf_emission(e, &x);
     if (!far && !(pdf > 0)) return; /* this way nothing is emitted */
     const double mis =
@@ -62,8 +71,7 @@ static void light_itself_connect(struct imp_light_step *w, struct imp_vertex *v,
                 : imp__light_connect_weight(s, &to, pdf, far ? start->pdf_p : 0);
     const double weight =
         imp__decide1(imp__emitter_timed(e, s->walk->time, to.weight * c) * mis / per);
-    const imp_spec le =
-        imp__emitter_radiance(s->scene, light, &x, s->at.p, s->at.carried);
+    const imp_spec le = imp__emitter_radiance(s->scene, light, &x, p, s->at.carried);
     const struct imp_active *active = s->tracer->active;
     if (!(weight > 0) ||
         (imp__is_zero_used(le, s->at.carried) && !(active && active->emitter[light])))
@@ -77,6 +85,10 @@ static void light_itself_connect(struct imp_light_step *w, struct imp_vertex *v,
                                      .d = -to.wo,
                                      .reach = INFINITY,
                                      .wanted = true};
+        if (in_beam) {
+            shadow.d = beam.p - shadow.o;
+            shadow.reach = 1 - 10 * IMP_RAY_EPSILON;
+        }
     } else {
         imp__light_shadow_aim(&from, &to, &shadow);
     }
@@ -88,7 +100,7 @@ static void light_itself_connect(struct imp_light_step *w, struct imp_vertex *v,
         l->dist = (imp_decided)x.dist;
         l->cos_light = (imp_decided)x.cos_light;
         imp__store_v3(l->d, x.d);
-        imp__store_v3(l->p, s->at.p);
+        imp__store_v3(l->p, p);
         imp__store_v3(l->wi, (imp_v3){0});
     }
     if (!far) {
@@ -110,9 +122,9 @@ static const struct imp_medium *medium_at(const struct imp_step *s,
     if (e->shape && (e->shape->interior || e->shape->exterior))
         return imp__dot(start->ng, start->d) < 0 ? e->shape->interior
                                                  : e->shape->exterior;
-    const bool far = is_far(e);
+    const bool endless = is_far(e) && !e->shape;
     return imp__medium_around(s->scene, start->p, start->d,
-                              far ? NULL : s->tracer->sensor->medium);
+                              endless ? NULL : s->tracer->sensor->medium);
 }
 
 bool imp__light_start(struct imp_light_step *w)

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "math/hash.h"
 #include "scene/majorants.h"
+#include "scene/unlit.h"
 #include "walk_settings.h"
 #include <string.h>
 
@@ -237,15 +238,14 @@ out:
 static enum imp_status photons_ready(struct imp_scene *scene,
                                      const struct imp_integrator *i)
 {
-    for (size_t k = 0; k < scene->root->n_children; k++) { /* they are in no shape */
-        const struct imp_node *node = scene->root->children[k].node;
-        if (!node || strcmp(node->tag, "emitter") != 0 || !node->object) continue;
-        const struct imp_emitter *e = node->object;
+    for (int k = 0; k < scene->n_emitters; k++) {
+        const struct imp_emitter *e = scene->emitters[k];
         if (e->ops->flags & IMP_EMITTER_DELTA)
-            return imp__node_error(scene->ctx, node, IMP_E_UNSUPPORTED,
-                                   "integrator photons: this light has no surface, and "
-                                   "no photon can meet it; use path, or a light with a "
-                                   "shape");
+            return imp__node_error(
+                scene->ctx, imp__node_of(scene->root, e), IMP_E_UNSUPPORTED,
+                "integrator photons: %s, and no photon can meet it; use "
+                "path, or an area light",
+                e->shape ? "this light has one direction" : "this light has no surface");
     }
     return mixture_ready(scene, i);
 }

@@ -46,6 +46,11 @@ static int times = 1; /* as many samples */
         inside "</shape>"
 /* clang-format on */
 
+#define BEAM                                                                             \
+    "<shape type='disk'>" AT("<rotate x='1' angle='170'/><translate z='4'/>") DIFFUSE(   \
+        "0") "<emitter type='directionalarea'><float name='radiance' value='3'/>"        \
+             "</emitter></shape>"
+
 static imp_film *picture(imp_scene *scene, enum imp_from from, int spp, uint64_t seed)
 {
     struct imp_run run = IMP_RUN_INIT;
@@ -243,6 +248,14 @@ static void lights(void)
          "<emitter type='directional'><vector name='direction' value='.3,.1,-1'/>"
          "</emitter><shape type='rectangle'>" DIFFUSE(".5") "</shape>" BALL(
              "0,0,.2", DIFFUSE(".7")) CAMERA(3, "box"),
+         IMP_RGB, EYE, 2000, 2000, .02);
+    same("a beam, a wall and a meter", 4,
+         BEAM "<shape type='disk'>" DIFFUSE(".5") METER "</shape>" SIDE(DIFFUSE(".7")),
+         IMP_MONO, EYE, 20000, 20000, .01);
+    same("a beam, seen by a camera", 4,
+         BEAM
+         "<shape type='rectangle'>" DIFFUSE(".5") "</shape>" BALL("0,0,.2", DIFFUSE(".7"))
+             CAMERA(3, "box"),
          IMP_RGB, EYE, 2000, 2000, .02);
     same("sky over a ball and a floor", 4,
          "<emitter type='constant'>" RGB("radiance", ".5,.6,.7") "</emitter>" BALL(

@@ -120,6 +120,12 @@ static void discs(void)
          200000, 200000, R / (pi / 4), 3e-3);
 }
 
+/* Light of irradiance 3 along -z, from a shape about (0, 0, 4) of half size 1. */
+#define BEAM(kind)                                                                       \
+    "<shape type='" kind "'>" AT("<rotate x='1' angle='180'/><translate z='4'/>")        \
+        DIFFUSE("0") "<emitter type='directionalarea'><float name='radiance' "           \
+                     "value='3'/></emitter></shape>"
+
 /* A meter in a block of index 1.5 under a flat surface, below a sky of radiance 1: pi (1 -
  * r_ext) = 2.85326 (F2d). The block has black walls. */
 #define BLOCK                                                                            \
@@ -450,6 +456,49 @@ static void rooms(bool slow)
          "<shape type='rectangle'>" AT("<rotate y='1' angle='90'/><translate x='-1.5'/>")
              DIFFUSE(".7") "</shape>",
          IMP_MONO, 40000 * k, 80000 * k, NAN, .01);
+    ends(
+        "a batch of cameras", 4,
+        ROOM "<sensor type='batch'>" FILM(8, 4, "box") "<sensor type='perspective'>" AT(
+            "<lookat origin='0,0,1.9' target='0,0,0' up='0,1,0'/>") "</sensor><sensor "
+                                                                    "type='thinlens'><"
+                                                                    "float name='fov' "
+                                                                    "value='50'/><float "
+                                                                    "name='aperture_"
+                                                                    "radius' "
+                                                                    "value='.1'/><float "
+                                                                    "name='focus_"
+                                                                    "distance' "
+                                                                    "value='2'/>" AT(
+                                                                        "<lookat "
+                                                                        "origin='0,0,-1."
+                                                                        "5' "
+                                                                        "target='0,0,0' "
+                                                                        "up='0,1,0'/>") "</sensor>"
+                                                                                        "</sensor>",
+        IMP_RGB, 2000 * k, 4000 * k, NAN, .01);
+    ends("a beam and a meter", 3,
+         BEAM("disk") "<shape type='disk'>" AT(
+             "<scale value='.5'/><rotate x='1' angle='30'/>") DIFFUSE(".5") METER
+         "</shape>"
+         "<shape type='rectangle'>" AT("<rotate y='1' angle='90'/><translate x='-1.5'/>")
+             DIFFUSE(".7") "</shape>",
+         IMP_MONO, 20000 * k, 40000 * k, NAN, .01);
+    ends("a beam across a black meter: E cos 30", 3,
+         BEAM("rectangle") "<shape type='disk'>" AT(
+             "<scale value='.5'/><rotate x='1' angle='30'/>") DIFFUSE("0") METER
+         "</shape>",
+         IMP_MONO, 2000 * k, 20000 * k, 3 * sqrt(3) / 2, .01);
+    ends("a beam that covers a quarter of a meter", 3,
+         BEAM("rectangle") "<shape type='rectangle'>" AT("<scale value='2'/>")
+             DIFFUSE("0") METER "</shape>",
+         IMP_MONO, 60000 * k, 2000 * k, 3. / 4, .01);
+    ends("a beam, seen by a camera", 3,
+         BEAM("rectangle") "<shape type='rectangle'>" DIFFUSE(".5") "</shape>" BALL(
+             "0,0,.2", DIFFUSE(".7")) CAMERA(3),
+         IMP_RGB, 2000 * k, 16000 * k, NAN, .015);
+    ends("a beam through fog", 4,
+         BEAM("disk") "<shape type='rectangle'>" DIFFUSE(".5") "</shape>" FOG CAMERA(1.9),
+         IMP_RGB, 4000 * k, 16000 * k, NAN, .03);
     ends("parallel light, seen by a camera", 3,
          "<emitter type='directional'><vector name='direction' value='.3,.1,-1'/>"
          "</emitter><shape type='rectangle'>" DIFFUSE(".5") "</shape>" BALL(

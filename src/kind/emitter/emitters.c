@@ -13,6 +13,7 @@
     X(imp__constant)                                                                     \
     X(imp__envmap)                                                                       \
     X(imp__directional)                                                                  \
+    X(imp__directionalarea)                                                              \
     X(imp__spot_light)                                                                   \
     X(imp__sun)                                                                          \
     X(imp__projector)                                                                    \
