@@ -78,6 +78,14 @@ struct imp_merl_data {
     const float *rho;
 };
 
+/* Control points of curves in space, x, y, z and radius: [n_points][4]; curve k has those
+ * from first[k] on, up to first[k + 1], [n_curves + 1]. */
+struct imp_curve_data {
+    size_t n_points, n_curves;
+    const float *points;
+    const uint32_t *first;
+};
+
 struct imp_grid_data {
     int n[3], channels; /* x, y, z */
     float box[6];       /* two corners */
@@ -104,6 +112,8 @@ struct imp_node {
     const struct imp_image_data *image;
     const struct imp_ies_data *ies;
     const struct imp_merl_data *merl;
+    const struct imp_rgl_data *rgl; /* base/rgl_data.h */
+    const struct imp_curve_data *curves;
     const struct imp_grid_data *grid;
     const struct imp_attribute_data *attribute;
     struct imp_body *body; /* attached: a graded index (format/graded_file.c), or NULL */

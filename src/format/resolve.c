@@ -2,9 +2,11 @@
  *
  * Nodes that name files get what the files hold: triangles for obj,
  * ply and serialized, pixels for
- * bitmap and envmap, intensities for ies, reflectances for merl, cells for gridvolume. */
+ * bitmap and envmap, intensities for ies, reflectances for merl, cells for gridvolume,
+ * control points for curves. */
 #include "base/film.h"
 #include "color/rgb.h"
+#include "curve_file.h"
 #include "ies_file.h"
 #include "image.h"
 #include "load.h"
@@ -192,6 +194,24 @@ out:
     return st;
 }
 
+static enum imp_status curves_attach(struct imp_scene *scene, struct imp_node *node)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = scene->ctx;
+    struct imp_bytes text = {0};
+    const char *path;
+    struct imp_curve_data *data = imp__arena_array(&scene->files, 1, sizeof *data);
+    if (!data) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "scene: out of memory"));
+    IMP_TRY(path_of(scene, node, &path));
+    st = imp__file_read(ctx, path, IMP_CURVE_BYTES_MAX, &text);
+    if (st == IMP_OK) st = imp__curve_parse(ctx, &scene->files, path, &text, data);
+    if (st != IMP_OK) IMP_TRY(placed(scene, node, st));
+    node->curves = data;
+out:
+    imp__bytes_free(ctx, &text);
+    return st;
+}
+
 static enum imp_status grid_attach(struct imp_scene *scene, struct imp_node *node)
 {
     enum imp_status st = IMP_OK;
@@ -220,6 +240,10 @@ static enum imp_status attach(struct imp_scene *scene, struct imp_node *node)
                bitmap =
                    strcmp(node->tag, "texture") == 0 && strcmp(node->type, "bitmap") == 0;
     if (mesh) IMP_TRY(mesh_attach(scene, node));
+    if (shape && !node->curves &&
+        (strcmp(node->type, "bsplinecurve") == 0 ||
+         strcmp(node->type, "linearcurve") == 0))
+        IMP_TRY(curves_attach(scene, node));
     if (strcmp(node->tag, "medium") == 0 && strcmp(node->type, "graded") == 0)
         IMP_TRY(imp__graded_attach(scene, node));
     if (strcmp(node->tag, "emitter") == 0 && strcmp(node->type, "ies") == 0 && !node->ies)

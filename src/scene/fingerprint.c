@@ -74,6 +74,11 @@ static uint64_t shape_hash(uint64_t h, const struct imp_shape *s)
     h = HASH(h, s->emitter);
     h = HASH(h, s->flip_normals);
     h = vector_hash(vector_hash(h, s->lo), s->hi);
+    if (s->geometry == IMP_CURVES) {
+        const struct imp_curves *c = &s->curves;
+        h = imp__hash(h, c->points, 4 * c->n_points * sizeof *c->points);
+        return imp__hash(h, c->first, c->n_segments * sizeof *c->first);
+    }
     if (s->geometry != IMP_TRIANGLES) return h;
     h = imp__hash(h, t->positions, 3 * t->n_vertices * sizeof *t->positions);
     h = imp__hash(h, t->indices, 3 * t->n_triangles * sizeof *t->indices);

@@ -58,6 +58,17 @@ void imp__analytic_occluded(const struct RTCOccludedFunctionNArguments *args)
         ((struct RTCRay *)args->ray)->tfar = -INFINITY;
 }
 
+/* A tube is met from outside alone, as in Mitsuba: what goes on inside is for its material.
+ * Embree may be built to do this itself; Debian's is not. */
+void imp__curve_filter(const struct RTCFilterFunctionNArguments *args)
+{
+    /* N is 1 for rtcIntersect1 and rtcOccluded1 */
+    const struct RTCRay *r = (const struct RTCRay *)args->ray;
+    const struct RTCHit *h = (const struct RTCHit *)args->hit;
+    const float c = h->Ng_x * r->dir_x + h->Ng_y * r->dir_y + h->Ng_z * r->dir_z;
+    if (args->valid[0] && !(c < 0)) args->valid[0] = 0;
+}
+
 /* ---- all hits ------------------------------------------------------------------ */
 
 /* Those of a ray with aims, nearest first, as many as there is room for. */

@@ -117,9 +117,29 @@ static RTCGeometry instances_create(RTCDevice rtc, const struct imp_group *g)
     return made;
 }
 
+static RTCGeometry curves_create(RTCDevice rtc, const struct imp_curves *c)
+{
+    const bool cones = c->degree == 1;
+    RTCGeometry g = rtcNewGeometry(rtc, cones ? RTC_GEOMETRY_TYPE_ROUND_LINEAR_CURVE
+                                              : RTC_GEOMETRY_TYPE_ROUND_BSPLINE_CURVE);
+    if (!g) return NULL;
+    rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT4, c->points,
+                               0, 4 * sizeof(float), c->n_points);
+    rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT, c->first, 0,
+                               sizeof(uint32_t), c->n_segments);
+    if (cones)
+        rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_FLAGS, 0, RTC_FORMAT_UCHAR,
+                                   c->joined, 0, 1, c->n_segments);
+    rtcSetGeometryIntersectFilterFunction(g, imp__curve_filter);
+    rtcSetGeometryOccludedFilterFunction(g, imp__curve_filter);
+    rtcCommitGeometry(g);
+    return g;
+}
+
 /* all: its geometries are asked for all hits of a ray, not for the nearest. */
 static RTCGeometry geometry_create(RTCDevice rtc, const struct imp_shape *s, bool all)
 {
+    if (s->geometry == IMP_CURVES) return curves_create(rtc, &s->curves);
     const bool analytic = s->geometry == IMP_ANALYTIC;
     RTCGeometry g = rtcNewGeometry(rtc, analytic ? RTC_GEOMETRY_TYPE_USER
                                                  : RTC_GEOMETRY_TYPE_TRIANGLE);

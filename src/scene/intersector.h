@@ -17,6 +17,8 @@ struct imp_intersector {
 /* What Embree calls for analytic shapes. */
 void imp__analytic_intersect(const struct RTCIntersectFunctionNArguments *args);
 void imp__analytic_occluded(const struct RTCOccludedFunctionNArguments *args);
+/* ... for curves, whether a hit counts ... */
+void imp__curve_filter(const struct RTCFilterFunctionNArguments *args);
 /* ... and for instances. */
 void imp__instance_intersect(const struct RTCIntersectFunctionNArguments *args);
 void imp__instance_occluded(const struct RTCOccludedFunctionNArguments *args);

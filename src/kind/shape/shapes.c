@@ -12,7 +12,9 @@
     X(imp__mesh)                                                                         \
     X(imp__obj)                                                                          \
     X(imp__ply)                                                                          \
-    X(imp__serialized)
+    X(imp__serialized)                                                                   \
+    X(imp__bsplinecurve)                                                                 \
+    X(imp__linearcurve)
 
 #define DECLARE(kind) extern const struct imp_shape_ops kind;
 SHAPES(DECLARE)

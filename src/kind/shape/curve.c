@@ -1,0 +1,157 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * bsplinecurve and linearcurve: hair, fur, grass. Rays meet them by Embree's round curves, in
+ * float and from outside alone; the surface is computed again in double. uv is the turn about
+ * the line and the place along all segments, as in Mitsuba 3.10. */
+#include "curve.h"
+
+static enum imp_status radius_check(const struct imp_build *b, const float *points,
+                                    size_t n)
+{
+    for (size_t k = 0; k < n; k++)
+        if (!(points[4 * k + 3] >= 0))
+            return imp_build_error(b, NULL, IMP_E_SCENE,
+                                   "the radius of control point %zu is %g", k,
+                                   (double)points[4 * k + 3]);
+    return IMP_OK;
+}
+
+/* to_world moves the points; their radii stay, as in Mitsuba. */
+static enum imp_status points_place(const struct imp_build *b, struct imp_shape *s,
+                                    const struct imp_curve_data *data,
+                                    const struct imp_placement *at)
+{
+    float *out = imp__arena_take(b->arena, 4 * data->n_points + 4, sizeof *out);
+    if (!out) return imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory");
+    s->lo = imp__v3(INFINITY, INFINITY, INFINITY);
+    s->hi = -s->lo;
+    for (size_t k = 0; k < data->n_points; k++) {
+        const float *q = data->points + 4 * k;
+        const imp_v3 p = imp__point(&at->to_world, imp__v3(q[0], q[1], q[2]));
+        for (int i = 0; i < 3; i++) {
+            if (!(fabs(p[i]) + q[3] < 1e18)) /* Embree takes more for invalid */
+                return imp_build_error(b, NULL, IMP_E_SCENE,
+                                       "control point %zu lies further out than 1e18", k);
+            out[4 * k + (size_t)i] = (float)p[i];
+            s->lo[i] = fmin(s->lo[i], p[i] - q[3]);
+            s->hi[i] = fmax(s->hi[i], p[i] + q[3]);
+        }
+        out[4 * k + 3] = q[3];
+    }
+    s->lo[3] = s->hi[3] = 0;
+    s->curves.points = out;
+    s->curves.n_points = data->n_points;
+    return IMP_OK;
+}
+
+static enum imp_status segments_make(const struct imp_build *b, struct imp_shape *s,
+                                     const struct imp_curve_data *data)
+{
+    struct imp_curves *c = &s->curves;
+    const size_t degree = (size_t)c->degree;
+    size_t n = 0;
+    for (size_t k = 0; k < data->n_curves; k++) {
+        const size_t points = data->first[k + 1] - data->first[k];
+        if (points < degree + 1)
+            return imp_build_error(b, NULL, IMP_E_SCENE,
+                                   "curve %zu has %zu control points; it needs %zu", k,
+                                   points, degree + 1);
+        n += points - degree;
+    }
+    uint32_t *first = imp__arena_take(b->arena, n, sizeof *first);
+    uint8_t *joined = imp__arena_take(b->arena, n, 1);
+    if (!first || !joined) return imp_build_error(b, NULL, IMP_E_NOMEM, "out of memory");
+    n = 0;
+    for (size_t k = 0; k < data->n_curves; k++) {
+        const size_t points = data->first[k + 1] - data->first[k];
+        for (size_t j = 0; j + degree < points; j++, n++) {
+            first[n] = data->first[k] + (uint32_t)j;
+            joined[n] = (uint8_t)((j > 0) | (j + degree + 1 < points) << 1);
+        }
+    }
+    c->first = first;
+    c->joined = joined;
+    c->n_segments = n;
+    return IMP_OK;
+}
+
+/* Side of the tubes, without what a radius that varies adds: Gauss's rule of three points. */
+static double area_of(const struct imp_curves *c)
+{
+    static const double x[3] = {0.1127016653792583, 0.5, 0.8872983346207417},
+                        w[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
+    double sum = 0;
+    for (size_t k = 0; k < c->n_segments; k++)
+        for (int i = 0; i < 3; i++) {
+            struct imp__curve_at at;
+            imp__curve_at(c, (int)k, x[i], &at);
+            sum += w[i] * IMP_2PI * at.r * imp__length(at.d1);
+        }
+    return sum;
+}
+
+static enum imp_status build(const struct imp_build *b, struct imp_shape *s, int degree)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_placement at;
+    const char *filename;
+    const struct imp_curve_data *data = b->node->curves;
+    IMP_TRY(imp__shape_placement(b, s, &at));
+    IMP_TRY(imp_build_string(b, "filename", NULL, &filename));
+    if (!data)
+        IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE,
+                                "has no control points: 'filename' is required"));
+    if (s->flip_normals)
+        IMP_TRY(imp_build_error(b, "flip_normals", IMP_E_UNSUPPORTED,
+                                "curves are met from outside alone, and their normals "
+                                "point there"));
+    s->geometry = IMP_CURVES;
+    s->curves.degree = degree;
+    IMP_TRY(radius_check(b, data->points, data->n_points));
+    IMP_TRY(points_place(b, s, data, &at));
+    IMP_TRY(segments_make(b, s, data));
+    s->area = area_of(&s->curves);
+out:
+    return st;
+}
+static enum imp_status bspline_build(const struct imp_build *b, void *self,
+                                     struct imp_shape *s)
+{
+    (void)self;
+    return build(b, s, 3);
+}
+static enum imp_status linear_build(const struct imp_build *b, void *self,
+                                    struct imp_shape *s)
+{
+    (void)self;
+    return build(b, s, 1);
+}
+
+static void surface(const struct imp_shape *s, const struct imp_hit *hit, const imp_v3 *o,
+                    const imp_v3 *d, struct imp_surface *out)
+{
+    const struct imp_curves *k = &s->curves;
+    struct imp__curve_at at;
+    double v = hit->u;
+    const imp_v3 q = imp__curve_meet(k, hit->prim, hit->t, &v, *o, *d, &at);
+    const imp_v3 axis = imp__curve_axis(&at), outward = imp__normalize(q);
+    out->p = at.c + q;
+    out->n = out->ng = imp__normalize(imp__curve_normal(k, &at, q));
+    const double along = axis[2];
+    const imp_v3 z = imp__v3(0, 0, 1) - axis * along;
+    const imp_v3 turned = imp__dot(z, z) > 1e-14 ? imp__normalize(z) : imp__v3(0, 1, 0);
+    const imp_v3 start = imp__cross(turned, axis);
+    out->uv[0] = imp__uv_turn(imp__dot(start, outward), imp__dot(turned, outward));
+    out->uv[1] = (v + hit->prim) / (double)k->n_segments;
+    out->dp_du = imp__cross(axis, q) * IMP_2PI;
+    out->dp_dv = (at.d1 + outward * at.r1) * (double)k->n_segments;
+    imp__surface_frame(out);
+}
+
+#define CURVE_OPS(name_, build_)                                                         \
+    {                                                                                    \
+        .size = sizeof(struct imp_shape_ops), .name = name_, .build = build_,            \
+        .surface = surface                                                               \
+    }
+const struct imp_shape_ops imp__bsplinecurve = CURVE_OPS("bsplinecurve", bspline_build);
+const struct imp_shape_ops imp__linearcurve = CURVE_OPS("linearcurve", linear_build);
