@@ -120,7 +120,10 @@ static uint64_t emitter_hash(uint64_t h, const struct imp_emitter *e)
     h = imp__hash_text(h, e->name);
     h = imp__hash_text(h, e->ops->name);
     h = number_hash(h, e->weight);
-    for (int j = 0; j < e->n_in; j++) in[j] = imp__spec(1);
+    for (int j = 0; j < e->n_in; j++)
+        in[j] = e->ops->inputs[j].flags & IMP_INPUT_WAVELENGTH
+                    ? (imp_spec){550, 450, 600, 650} /* nm */
+                    : imp__spec(1);
     for (int k = 0; k < 64; k++) { /* a spiral over the sphere */
         const double z = (k + 0.5) / 32 - 1, r = sqrt(1 - z * z), phi = 2.4 * k;
         const struct imp_emission x = {.uv = {0.5, 0.5},

@@ -5,6 +5,7 @@
 #include "scene/fingerprint.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
+#include "scene/scene.h"
 #include "walk/walk_integrator.h"
 
 static imp_context *ctx;
@@ -82,6 +83,30 @@ static void words(void)
     word("'5'", "'6'", "--i-", "another depth");
 }
 
+/* The light that a sky sends is in the print, in all modes: of two skies that differ in nothing
+ * else, here that of one in the other's scene. */
+static void skies(void)
+{
+    static const char sky[] =
+        "<scene version='3.0.0'><emitter type='sunsky'><vector name='sun_direction' "
+        "x='%g' y='0' z='1'/></emitter></scene>";
+    for (int mode = IMP_RGB; mode <= IMP_SINGLE; mode++) {
+        imp_scene *s[2];
+        char other[sizeof sky + 32];
+        for (int k = 0; k < 2; k++) {
+            snprintf(other, sizeof other, sky, k ? .5 : .2);
+            s[k] = test_scene_text(ctx, other, (enum imp_color_mode)mode);
+        }
+        const uint64_t before = imp__fingerprint_objects(s[0]);
+        void *own = s[0]->emitters[0]->self;
+        s[0]->emitters[0]->self = s[1]->emitters[0]->self;
+        tap_ok(imp__fingerprint_objects(s[0]) != before, "another sun, mode %d", mode);
+        s[0]->emitters[0]->self = own;
+        tap_ok(imp__fingerprint_objects(s[0]) == before, "and the first again");
+        for (int k = 0; k < 2; k++) imp_scene_destroy(s[k]);
+    }
+}
+
 /* ---- Arrays of a mesh ------------------------------------------------------------ */
 
 static struct prints mesh_prints(const float *positions, const float *normals,
@@ -120,6 +145,7 @@ int main(void)
 {
     ctx = test_context(1);
     words();
+    skies();
     meshes();
     imp_context_destroy(ctx);
     return tap_done();
