@@ -36,7 +36,7 @@ struct arg_option { /* tables end with {0} */
     const char *const *words; /* of ARG_CHOICE, NULL-terminated */
 };
 
-#define ARGS_MAX_GROUPS 10
+#define ARGS_MAX_GROUPS 12
 struct args_spec {
     const char *command, *operands, *summary;
     const struct arg_option *group[ARGS_MAX_GROUPS + 1]; /* NULL-terminated */

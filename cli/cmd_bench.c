@@ -159,7 +159,7 @@ const struct command command_bench = {
     {"bench",
      "SCENE",
      "measure the time for loading, rendering and gradients",
-     {options, options_run, options_scene, options_file, options_general},
+     {options, options_run, options_limits, options_scene, options_file, options_general},
      1,
      1},
     run_bench,

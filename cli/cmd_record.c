@@ -65,24 +65,13 @@ static void report(const char *path, const struct imp_walks_info *info)
     cli_json_end(&j);
 }
 
-static int refused(void)
-{
-    if (cli.part)
-        return cli_error(EXIT_USAGE, "--part: walks are recorded whole; mpirun divides "
-                                     "them between processes");
-    if (cli.manifest_path)
-        return cli_error(EXIT_USAGE, "--manifest is of render, gradient and fit");
-    return 0;
-}
-
 static int run_record(int n, char **operand)
 {
     struct imp_walks_options options_of = IMP_WALKS_OPTIONS_INIT;
     struct imp_walks_info info = {.size = sizeof info};
     imp_walks *walks = NULL;
     (void)n;
-    int rc = refused();
-    if (!rc) rc = cli_load(operand[0]);
+    int rc = cli_load(operand[0]);
     if (rc) return rc;
     const struct imp_run run = cli_run();
     char *path = cli.out ? cli_strdup(cli.out) : default_output();

@@ -331,10 +331,13 @@ static int answer_sweep(void)
     } else printf("%-14s %-14s %-10s %s\n", s.name, functional(), "se", "ess");
     for (int k = 0; k < s.points && !rc && !progress_interrupted(); k++) {
         const double at = s.from + (s.to - s.from) * k / (s.points - 1);
-        struct answer a;
+        struct answer a = {.ess = NAN};
         for (size_t e = 0; e < s.n; e++) s.values[s.first + e] = at;
         enum imp_status st = imp_scene_set_values(cli.scene, s.param, s.count, s.values);
-        if (st == IMP_OK) st = ask(&a, NULL, NULL);
+        if (st == IMP_E_ARG) { /* beyond a bound */
+            snprintf(a.refused, sizeof a.refused, "%s", imp_last_error(cli.context));
+            st = IMP_E_NUMERIC;
+        } else if (st == IMP_OK) st = ask(&a, NULL, NULL);
         if (st != IMP_OK && st != IMP_E_NUMERIC && st != IMP_E_UNSUPPORTED) {
             rc = cli_fail(st, cli.scene_path);
         } else if (cli.json) {

@@ -12,6 +12,7 @@
 
 #include <errno.h>
 #include <stdarg.h>
+#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 #include <time.h>
@@ -124,9 +125,21 @@ double cli_now(void)
 
 /* ---- Opening ------------------------------------------------------------------- */
 
+/* Was this warning said before? A fit and the pictures that it writes have the same to say. */
+static bool said_before(const char *warning)
+{
+    static char *said[16];
+    size_t k = 0;
+    for (; k < sizeof said / sizeof *said && said[k]; k++)
+        if (strcmp(said[k], warning) == 0) return true;
+    if (k < sizeof said / sizeof *said) said[k] = cli_strdup(warning);
+    return false;
+}
+
 static void on_log(enum imp_log_level level, const char *message, void *payload)
 {
     (void)payload;
+    if (level == IMP_LOG_WARNING && said_before(message)) return;
     if (level == IMP_LOG_WARNING) ranks_remember(false, message);
     cli_say("importon: %s%s", level == IMP_LOG_WARNING ? "warning: " : "", message);
 }

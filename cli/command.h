@@ -37,7 +37,7 @@ extern const struct command command_render, command_gradient, command_jacobian,
 /* Option tables, to be named in args_spec.group. -o is a file, or a folder for commands
  * that write several files. */
 extern const struct arg_option options_file[], options_folder[], options_file_or_folder[],
-    options_general[], options_scene[], options_run[], options_guide[];
+    options_general[], options_scene[], options_run[], options_limits[], options_guide[];
 
 /* The running command. A process runs one, so there is one. */
 struct cli {

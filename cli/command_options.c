@@ -73,16 +73,6 @@ const struct arg_option options_run[] = {
      1, 1e9, NULL},
     {ARG_SEED, 0, "seed", "N", "seed of the random numbers (default 0)", &cli.seed, 0, 0,
      NULL},
-    {ARG_NUMBER, 0, "time", "SECONDS", "stop after this time and keep the results so far",
-     &cli.time_s, 1e-3, 1e9, NULL},
-    {ARG_TEXT, 0, "part", "I/N",
-     "compute part I of N (from 1), to the file of -o; 'importon merge' makes the whole",
-     &cli.part, 0, 0, NULL},
-    {ARG_TEXT, 0, "manifest", "FILE",
-     "write what 'importon verify' needs, with sums of parts (render, gradient, fit)",
-     &cli.manifest_path, 0, 0, NULL},
-    {ARG_FLAG, 0, "no-manifest", NULL, "none beside an output file", &cli.no_manifest, 0,
-     0, NULL},
     {ARG_CHOICE, 0, "mpi-files", "HOW",
      "with mpirun: broadcast (default: rank 0 reads files for all) or shared (each does)",
      &cli.mpi_files, 0, 0, files_words},
@@ -103,6 +93,19 @@ const struct arg_option options_run[] = {
      "random numbers of a pixel's samples: independent, sobol, or scene (default: what "
      "the scene's sampler says)",
      &cli.points, 0, 0, point_words},
+    {0}};
+
+const struct arg_option options_limits[] = {
+    {ARG_NUMBER, 0, "time", "SECONDS", "stop after this time and keep the results so far",
+     &cli.time_s, 1e-3, 1e9, NULL},
+    {ARG_TEXT, 0, "part", "I/N",
+     "compute part I of N (from 1), to the file of -o; 'importon merge' makes the whole",
+     &cli.part, 0, 0, NULL},
+    {ARG_TEXT, 0, "manifest", "FILE",
+     "write what 'importon verify' needs, with sums of parts (render, gradient, fit)",
+     &cli.manifest_path, 0, 0, NULL},
+    {ARG_FLAG, 0, "no-manifest", NULL, "none beside an output file", &cli.no_manifest, 0,
+     0, NULL},
     {0}};
 
 const struct arg_option options_guide[] = {

@@ -27,6 +27,9 @@ const struct arg_option options_search[] = {
      &fit_choice.memory, 0, 1e12, NULL},
     {ARG_FLAG, 0, "no-intervals", NULL, "do not estimate 95 % intervals at the end",
      &fit_choice.no_intervals, 0, 0, NULL},
+    {0}};
+
+const struct arg_option options_missing[] = {
     {ARG_CHOICE, 0, "missing", "WHEN",
      "name numbers, not fitted, that may be wrong: auto (default: where the pictures are "
      "not explained), always or never",

@@ -12,7 +12,8 @@ struct fit_choice {
     double memory; /* MB; < 0: not given */
 };
 extern struct fit_choice fit_choice;
-extern const struct arg_option options_search[];
+extern const struct arg_option options_search[],
+    options_missing[]; /* the latter: of fit */
 struct imp_fit_options fit_choice_options(void);
 const char *fit_optimizer_word(void);
 

@@ -36,5 +36,5 @@ importon render glass.xml --spp 1 -o a.exr
 importon render glass.xml --spp 1 --from sensor -o a.exr
 importon read glass.xml --spp 1 >/dev/null
 importon fit glass.xml -m mono -T a.exr -p shape1.emitter.radiance.value --spp 4 --optimizer lm --iterations 1 -o fit >told 2>&1
-grep -m 1 warning told >&2
+grep 'is missing' told >&2 # once, though the fit writes two pictures
 true

@@ -13,7 +13,9 @@ importon what-if short.walks; echo $?
 importon what-if "$ROOT/scenes/fog.xml" 2>&1 | sed 's/.*: not/not/'
 importon what-if metal.walks --region 0,0,99,99; echo $?
 importon what-if metal.walks --sweep nothing=1; echo $?
-importon record "$ROOT/scenes/fog.xml" --part 1/2 -o x; echo $?
+# Beyond a bound, one value is refused and the rest are answered.
+importon what-if metal.walks --sweep metal.alpha.value=-0.1:0.5:3 | awk 'NR > 1 { print $1, ($2 == "refused:" ? $0 : NF) }'
+for option in '--part 1/2' '--time 1' '--manifest m'; do importon record "$ROOT/scenes/fog.xml" $option -o x; echo $?; done
 importon record "$ROOT/scenes/fog.xml" --spp 4 --memory 0.01 -q -o x 2>&1 | sed 's/need about.*/need more/'
 echo 1 >mine.txt
 importon record "$ROOT/scenes/fog.xml" -o mine.txt; echo $?
