@@ -115,9 +115,13 @@ static enum imp_status light_replicates(struct wide *w, const struct imp_tracer 
     own.time_limit_s = 0;
     w->R = spp < 8 ? 4 : MANY;
     const int64_t walks = (int64_t)((spp - 1) / w->R + 1) * (int64_t)pixels;
+    const size_t n = pixels * (w->K + 1) * (size_t)w->channels;
+    const enum imp_status fits =
+        imp__memory_check(w->ctx, (double)w->R * (double)n * sizeof(double),
+                          "derivative pictures of walks from the lights");
+    if (fits != IMP_OK) return fits;
     for (int b = 0; b < w->R; b++) {
-        w->rows[b] =
-            imp__alloc(w->ctx, pixels * (w->K + 1) * (size_t)w->channels, sizeof(double));
+        w->rows[b] = imp__alloc(w->ctx, n, sizeof(double));
         if (!w->rows[b])
             return imp__error(w->ctx, IMP_E_NOMEM, "no memory for derivative pictures");
         const enum imp_status st =
