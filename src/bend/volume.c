@@ -3,6 +3,7 @@
  * Files of index fields: Mitsuba's .vol (3, float32), NumPy .npy of three dimensions,
  * both [z][y][x] samples at the corners of cells; text is read in profile_file.c. */
 #include "base/file.h"
+#include "base/little.h"
 #include "base/number.h"
 #include "bend_rays.h"
 #include <stdio.h>
@@ -10,33 +11,6 @@
 
 #define FILE_BYTES_MAX ((size_t)1 << 34)
 #define HEADER_MAX     65536
-
-static uint32_t u32_at(const unsigned char *d)
-{
-    return (uint32_t)d[0] | (uint32_t)d[1] << 8 | (uint32_t)d[2] << 16 |
-           (uint32_t)d[3] << 24;
-}
-static int32_t i32_at(const unsigned char *d)
-{
-    const uint32_t bits = u32_at(d);
-    int32_t i;
-    memcpy(&i, &bits, sizeof i);
-    return i;
-}
-static double f32_at(const unsigned char *d)
-{
-    const uint32_t bits = u32_at(d);
-    float f;
-    memcpy(&f, &bits, sizeof f);
-    return f;
-}
-static double f64_at(const unsigned char *d)
-{
-    const uint64_t bits = u32_at(d) | (uint64_t)u32_at(d + 4) << 32;
-    double f;
-    memcpy(&f, &bits, sizeof f);
-    return f;
-}
 
 /* A grid through samples of `bytes` each; [z][y][x], or in Fortran order [x][y][z]. */
 static enum imp_status grid_make(imp_context *ctx, const char *path,
@@ -56,7 +30,7 @@ static enum imp_status grid_make(imp_context *ctx, const char *path,
         /* Fortran: z runs fastest in the file */
         const size_t at =
             fortran ? i / (nz * ny) + nx * (i / nz % ny + ny * (i % nz)) : i;
-        samples[at] = bytes == 8 ? f64_at(d) : f32_at(d);
+        samples[at] = bytes == 8 ? imp__little_double(d) : imp__little_float(d);
     }
     st = imp_field_grid_create(ctx, &g, 1, &f);
     if (st == IMP_OK) st = imp_field_set_samples(f, samples);
@@ -101,19 +75,20 @@ static enum imp_status vol_read(imp_context *ctx, const char *path,
 {
     const unsigned char *d = b->data;
     struct imp_field_grid g = *like;
-    if (b->size < 48 || d[3] != 3 || u32_at(d + 4) != 1)
+    if (b->size < 48 || d[3] != 3 || imp__little_u32(d + 4) != 1)
         return imp__error(ctx, IMP_E_SCENE, "%s: not a grid volume of version 3, float32",
                           path);
-    const int64_t given[3] = {i32_at(d + 8), i32_at(d + 12), i32_at(d + 16)};
+    const int64_t given[3] = {imp__little_i32(d + 8), imp__little_i32(d + 12),
+                              imp__little_i32(d + 16)};
     uint64_t size[3];
-    if (i32_at(d + 20) != 1)
+    if (imp__little_i32(d + 20) != 1)
         return imp__error(ctx, IMP_E_SCENE, "%s: %d channels: an index has one", path,
-                          i32_at(d + 20));
+                          imp__little_i32(d + 20));
     const enum imp_status st = size_check(ctx, path, given, 4, b->size - 48, size);
     if (st != IMP_OK) return st;
     for (int k = 0; k < 3; k++) {
-        g.lo[k] = f32_at(d + 24 + 4 * k);
-        g.hi[k] = f32_at(d + 36 + 4 * k);
+        g.lo[k] = imp__little_float(d + 24 + 4 * k);
+        g.hi[k] = imp__little_float(d + 36 + 4 * k);
     }
     return grid_make(ctx, path, &g, size, d + 48, 4, false, out);
 }
@@ -138,7 +113,7 @@ static enum imp_status npy_read(imp_context *ctx, const char *path,
     if (b->size < 12)
         return imp__error(ctx, IMP_E_SCENE, "%s: cut off in the NPY header", path);
     const size_t start = d[6] == 1 ? 10 : 12;
-    const size_t length = d[6] == 1 ? (size_t)(d[8] | d[9] << 8) : u32_at(d + 8);
+    const size_t length = d[6] == 1 ? (size_t)(d[8] | d[9] << 8) : imp__little_u32(d + 8);
     if (d[6] < 1 || d[6] > 3)
         return imp__error(ctx, IMP_E_SCENE, "%s: NPY version %d: 1 to 3 are read", path,
                           d[6]);

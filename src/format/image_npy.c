@@ -2,6 +2,7 @@
  *
  * NumPy arrays (H, W, C) or (H, W): <f4 and <f8 in either order are read, <f4 is written. The header is a
  * Python dictionary, of which three entries are looked for. */
+#include "base/little.h"
 #include "base/number.h"
 #include "image.h"
 #include <stdio.h>
@@ -59,10 +60,9 @@ enum imp_status imp__npy_parse(imp_context *ctx, const char *name,
     const unsigned char *d = file->data;
     if (file->size < 12) return imp__error(ctx, IMP_E_SCENE, "%s: cut off", name);
     const int version = d[6];
-    const size_t start = version == 1 ? 10 : 12,
-                 length = version == 1 ? (size_t)(d[8] | d[9] << 8)
-                                       : (size_t)(d[8] | d[9] << 8 | d[10] << 16 |
-                                                  (uint32_t)d[11] << 24);
+    const size_t start = version == 1 ? 10 : 12, length = version == 1
+                                                              ? (size_t)(d[8] | d[9] << 8)
+                                                              : imp__little_u32(d + 8);
     if (version < 1 || version > 3 || length > HEADER_MAX || length > file->size - start)
         return imp__error(ctx, IMP_E_SCENE, "%s: malformed NPY header", name);
     char *header = imp__alloc(ctx, length + 1, 1);

@@ -5,6 +5,7 @@
  * running fastest; little-endian. Numbers are reflectances in 1/sr over 1/1500, 1.15/1500
  * and 1.66/1500. Those below 0 mark what was not measured: they are 0 here. */
 #include "merl_file.h"
+#include "base/little.h"
 #include <math.h>
 #include <string.h>
 
@@ -12,20 +13,6 @@
 #define SIDE_MAX  4096
 #define TABLE_MAX ((size_t)1 << 24)
 #define RHO_MAX   1e12 /* 1/sr */
-
-static int32_t int_at(const unsigned char *p)
-{
-    return (int32_t)((uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 |
-                     (uint32_t)p[3] << 24);
-}
-static double double_at(const unsigned char *p)
-{
-    uint64_t bits = 0;
-    double x;
-    for (int k = 7; k >= 0; k--) bits = bits << 8 | p[k];
-    memcpy(&x, &bits, sizeof x);
-    return x;
-}
 
 enum imp_status imp__merl_parse(imp_context *ctx, struct imp_arena *keep,
                                 const char *name, const struct imp_bytes *file,
@@ -36,7 +23,7 @@ enum imp_status imp__merl_parse(imp_context *ctx, struct imp_arena *keep,
     if (file->size < HEADER)
         return imp__error(ctx, IMP_E_SCENE, "%s: %zu bytes are no measured material",
                           name, file->size);
-    for (int k = 0; k < 3; k++) n[k] = int_at(file->data + 4 * k);
+    for (int k = 0; k < 3; k++) n[k] = imp__little_i32(file->data + 4 * k);
     for (int k = 0; k < 3; k++)
         if (n[k] < 1 || n[k] > SIDE_MAX)
             return imp__error(ctx, IMP_E_SCENE,
@@ -52,7 +39,8 @@ enum imp_status imp__merl_parse(imp_context *ctx, struct imp_arena *keep,
     if (!rho) return imp__error(ctx, IMP_E_NOMEM, "%s: no memory for its table", name);
     for (size_t c = 0; c < 3; c++)
         for (size_t k = 0; k < cells; k++) {
-            const double x = double_at(file->data + HEADER + 8 * (c * cells + k));
+            const double x =
+                imp__little_double(file->data + HEADER + 8 * (c * cells + k));
             if (!(fabs(x) <= RHO_MAX))
                 return imp__error(ctx, IMP_E_SCENE, "%s: number %zu of plane %zu is %g",
                                   name, k, c, x);

@@ -1,25 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "vol_file.h"
 #include "base/arguments.h"
+#include "base/little.h"
 #include "image.h"
 #include "scene/scene.h"
 #include <math.h>
 #include <string.h>
 
 enum { HEADER = 48 };
-
-static uint32_t word(const unsigned char *b)
-{
-    return (uint32_t)b[0] | (uint32_t)b[1] << 8 | (uint32_t)b[2] << 16 |
-           (uint32_t)b[3] << 24;
-}
-static float number(const unsigned char *b)
-{
-    const uint32_t w = word(b);
-    float f;
-    memcpy(&f, &w, sizeof f);
-    return f;
-}
 
 enum imp_status imp__vol_parse(imp_context *ctx, struct imp_arena *keep, const char *name,
                                const struct imp_bytes *bytes, struct imp_grid_data *out)
@@ -31,19 +19,19 @@ enum imp_status imp__vol_parse(imp_context *ctx, struct imp_arena *keep, const c
     if (b[3] != 3)
         return imp__error(ctx, IMP_E_UNSUPPORTED, "%s: version %d of .vol; 3 is known",
                           name, b[3]);
-    if (word(b + 4) != 1)
+    if (imp__little_u32(b + 4) != 1)
         return imp__error(ctx, IMP_E_UNSUPPORTED,
                           "%s: values of type %u; 1, floats, is known", name,
-                          word(b + 4));
+                          imp__little_u32(b + 4));
     size_t n = 1;
     for (int k = 0; k < 3; k++) {
-        const uint32_t size = word(b + 8 + 4 * k);
+        const uint32_t size = imp__little_u32(b + 8 + 4 * k);
         if (size < 1 || size > INT32_MAX / 4 || __builtin_mul_overflow(n, size, &n))
             return imp__error(ctx, IMP_E_SCENE, "%s: %u cells along %c", name, size,
                               "xyz"[k]);
         g.n[k] = (int)size;
     }
-    g.channels = (int)word(b + 20);
+    g.channels = (int)imp__little_u32(b + 20);
     if (g.channels != 1 && g.channels != 3)
         return imp__error(ctx, IMP_E_UNSUPPORTED, "%s: %d channels; 1 or 3 are possible",
                           name, g.channels);
@@ -53,14 +41,14 @@ enum imp_status imp__vol_parse(imp_context *ctx, struct imp_arena *keep, const c
                           "%s: %zu bytes for %d x %d x %d cells of %d channels", name,
                           bytes->size, g.n[0], g.n[1], g.n[2], g.channels);
     for (int k = 0; k < 6; k++) {
-        g.box[k] = number(b + 24 + 4 * k);
+        g.box[k] = imp__little_float(b + 24 + 4 * k);
         if (!isfinite(g.box[k]))
             return imp__error(ctx, IMP_E_SCENE, "%s: its box is not finite", name);
     }
     float *value = imp__arena_take(keep, n, sizeof *value);
     if (!value) return imp__error(ctx, IMP_E_NOMEM, "%s: no memory for it", name);
     for (size_t i = 0; i < n; i++) {
-        value[i] = number(b + HEADER + 4 * i);
+        value[i] = imp__little_float(b + HEADER + 4 * i);
         if (!isfinite(value[i])) {
             const size_t cell = i / (size_t)g.channels, row = cell / (size_t)g.n[0];
             return imp__error(
