@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * Fixed-point sums: the choice of the unit, and the way back to doubles. */
+ * Fixed-point sums: the choice of the unit. */
 #include "fixed_sum.h"
 
 void imp__fixed_begin(struct imp_fixed_sum *f, double largest, int spare_bits,
@@ -23,15 +23,5 @@ void imp__fixed_begin(struct imp_fixed_sum *f, double largest, int spare_bits,
     for (size_t k = 0; k < f->n; k++) {
         if (f->sum) *imp__fixed_at(f, f->sum, k) = 0;
         if (f->fine) *imp__fixed_at(f, f->fine, k) = 0;
-    }
-}
-
-void imp__fixed_end(const struct imp_fixed_sum *f, double *out)
-{
-    for (size_t k = 0; k < f->n; k++) {
-        const imp_fixed units = *imp__fixed_at(f, f->sum, k);
-        const double below =
-            f->fine ? (double)*imp__fixed_at(f, f->fine, k) / IMP_FIXED_FINE : 0;
-        out[k] = ((double)units + below) * f->unit;
     }
 }

@@ -34,14 +34,21 @@ struct imp_fixed_sum {
  * unit and clears sum and counts. */
 void imp__fixed_begin(struct imp_fixed_sum *f, double largest, int spare_bits,
                       double n_terms);
-/* The sums as doubles, out [n]; it may be where they are, if nothing lies between them. */
-void imp__fixed_end(const struct imp_fixed_sum *f, double *out);
 
 /* Number k of f->sum or f->fine. */
 static inline imp_fixed *imp__fixed_at(const struct imp_fixed_sum *f, imp_fixed *row,
                                        size_t k)
 {
     return &row[k * (1 + f->apart)];
+}
+
+/* ... as a double. */
+static inline double imp__fixed_value(const struct imp_fixed_sum *f, size_t k)
+{
+    const double units = (double)*imp__fixed_at(f, f->sum, k),
+                 below =
+                     f->fine ? (double)*imp__fixed_at(f, f->fine, k) / IMP_FIXED_FINE : 0;
+    return (units + below) * f->unit;
 }
 
 static inline double imp__fixed_largest(const struct imp_fixed_sum *f)

@@ -84,14 +84,17 @@ void imp__totals_end(struct imp_problem *p, struct imp__totals *t, double *gradi
     const size_t bytes = p->n * sizeof(double);
     if (!t->many) {
         if (gradient) memcpy(gradient, t->gradient, bytes);
-        if (gradient_se) memcpy(gradient_se, t->gradient_variance, bytes);
-    } else {
-        /* Without a unit there was no term. */
-        if (gradient && t->unit_known) imp__fixed_end(&t->mean, gradient);
-        else if (gradient) memset(gradient, 0, bytes);
-        if (gradient_se && t->unit_known) imp__fixed_end(&t->spread, gradient_se);
-        else if (gradient_se) memset(gradient_se, 0, bytes);
+        for (size_t k = 0; gradient_se && k < p->n; k++)
+            gradient_se[k] = sqrt(fmax(t->gradient_variance[k], 0));
+    } else if (!t->unit_known) { /* there was no term */
+        if (gradient) memset(gradient, 0, bytes);
+        if (gradient_se) memset(gradient_se, 0, bytes);
+    } else { /* one pass through memory */
+        for (size_t k = 0; k < p->n; k++) {
+            if (gradient) gradient[k] = imp__fixed_value(&t->mean, k);
+            if (!gradient_se) continue;
+            const double variance = imp__fixed_value(&t->spread, k);
+            gradient_se[k] = sqrt(imp_max(variance, 0.0));
+        }
     }
-    for (size_t k = 0; gradient_se && k < p->n; k++)
-        gradient_se[k] = sqrt(fmax(gradient_se[k], 0));
 }

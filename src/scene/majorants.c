@@ -140,19 +140,11 @@ enum imp_status imp__majorants_control(struct imp_scene *scene, struct imp_major
 
 /* ---- A ray through the cells ------------------------------------------------------- */
 
-static double bound_at(const struct imp_majorant_walk *w)
-{
-    return w->of->bound[imp__majorants_cell(w)];
-}
-static double wall(const struct imp_majorant_walk *w)
-{
-    return imp_min(imp_min(w->next[0], w->next[1]), imp_min(w->next[2], w->end));
-}
-
 bool imp__majorants_enter(const struct imp_majorants *of, imp_v3 o, imp_v3 d, double near,
                           double far, struct imp_majorant_walk *w)
 {
     const imp_v3 u = imp__point(&of->to_unit, o), v = imp__vector(&of->to_unit, d);
+    ptrdiff_t stride = 1;
     w->of = of;
     for (int a = 0; a < 3; a++) { /* the slab of each axis */
         if (v[a] == 0) {
@@ -166,29 +158,20 @@ bool imp__majorants_enter(const struct imp_majorants *of, imp_v3 o, imp_v3 d, do
     if (!(near < far)) return false;
     w->t = near;
     w->end = far;
+    w->cell = 0;
+    w->next = w->each = imp__spec(INFINITY);
     for (int a = 0; a < 3; a++) {
         const double x = (u[a] + near * v[a]) * of->n[a], speed = v[a] * of->n[a];
-        w->cell[a] = (int)imp_clamp(floor(x), 0.0, of->n[a] - 1.0);
-        w->step[a] = speed > 0 ? 1 : -1;
-        w->each[a] = speed == 0 ? INFINITY : 1 / fabs(speed);
-        w->next[a] =
-            speed == 0 ? INFINITY : (w->cell[a] + (speed > 0) - u[a] * of->n[a]) / speed;
+        const int cell = (int)imp_clamp(floor(x), 0.0, of->n[a] - 1.0);
+        w->cell += cell * stride;
+        w->stride[a] = speed > 0 ? stride : -stride;
+        w->left[a] = speed > 0 ? of->n[a] - 1 - cell : cell;
+        stride *= of->n[a];
+        if (speed == 0) continue;
+        w->each[a] = 1 / fabs(speed);
+        w->next[a] = (cell + (speed > 0) - u[a] * of->n[a]) / speed;
     }
-    w->leave = wall(w);
-    w->bound = bound_at(w);
-    return true;
-}
-
-bool imp__majorants_next(struct imp_majorant_walk *w)
-{
-    int a = w->next[0] < w->next[1] ? 0 : 1;
-    if (w->next[2] < w->next[a]) a = 2;
-    if (!(w->next[a] < w->end)) return false;
-    w->cell[a] += w->step[a];
-    if (w->cell[a] < 0 || w->cell[a] >= w->of->n[a]) return false;
-    w->t = imp_max(w->t, w->next[a]);
-    w->next[a] += w->each[a];
-    w->leave = wall(w);
-    w->bound = bound_at(w);
+    w->leave = imp_min(imp__majorants_wall(w), w->end);
+    w->bound = (double)of->bound[w->cell];
     return true;
 }

@@ -36,19 +36,39 @@ struct imp_majorant_walk {
     const struct imp_majorants *of;
     double t, leave, end; /* where the ray is, where it leaves the cell, and the box */
     double bound;         /* in the cell */
-    int cell[3], step[3];
-    double next[3], each[3]; /* of the walls ahead: distance, and between two of them */
+    ptrdiff_t cell;       /* its index */
+    ptrdiff_t stride[3];  /* from a cell to the next along an axis, */
+    int left[3];          /* and how many there are */
+    /* Distance of the walls ahead, and between two of them; INFINITY in the fourth lane. */
+    imp_v3 next, each;
 };
 /* From o + near d to o + far d. False: it does not meet the box. */
 bool imp__majorants_enter(const struct imp_majorants *of, imp_v3 o, imp_v3 d, double near,
                           double far, struct imp_majorant_walk *w);
-static inline size_t imp__majorants_cell(const struct imp_majorant_walk *w)
+
+/* The nearest of the walls. */
+static inline double imp__majorants_wall(const struct imp_majorant_walk *w)
 {
-    return ((size_t)w->cell[2] * (size_t)w->of->n[1] + (size_t)w->cell[1]) *
-               (size_t)w->of->n[0] +
-           (size_t)w->cell[0];
+    return imp_min(imp_min(w->next[0], w->next[1]), w->next[2]);
 }
-/* To the next cell; false: the ray has left. */
-bool imp__majorants_next(struct imp_majorant_walk *w);
+/* To the next cell; false: the ray has left. Where walls meet, all of them are passed at
+ * once. Without a branch on the axis, which cannot be predicted. */
+static inline bool imp__majorants_next(struct imp_majorant_walk *w)
+{
+    typedef int64_t bits __attribute__((vector_size(32)));
+    const double t = imp__majorants_wall(w);
+    if (!(t < w->end)) return false;
+    const bits passed = w->next <= imp__spec(t);
+    w->next += (imp_v3)(passed & (bits)w->each);
+    for (int a = 0; a < 3; a++) {
+        w->left[a] += (int)passed[a];
+        w->cell += (ptrdiff_t)passed[a] & w->stride[a];
+    }
+    if ((w->left[0] | w->left[1] | w->left[2]) < 0) return false;
+    w->t = imp_max(w->t, t);
+    w->leave = imp_min(imp__majorants_wall(w), w->end);
+    w->bound = (double)w->of->bound[w->cell];
+    return true;
+}
 
 #endif

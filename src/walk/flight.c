@@ -145,25 +145,26 @@ static void decide_lanes(struct imp_free_flight *w, const struct imp_medium *m, 
 
 /* Tentative collisions with the density of the local bound, one after another. */
 static bool varying_fly(struct imp_free_flight *w, const struct imp_medium *m,
-                        struct imp_majorant_walk *cells, bool collides, double *t)
+                        const struct imp_majorant_walk *from, bool collides, double *t)
 {
+    struct imp_majorant_walk cells = *from; /* in registers */
     const bool lanes =
         !collides && w->s->tracer->integrator->transmittance == IMP_DELTA_TRACKING;
-    double path = free_path(w), at = cells->t;
+    double path = free_path(w), at = cells.t;
     for (;;) {
-        const double room = (cells->leave - at) * cells->bound;
+        const double room = (cells.leave - at) * cells.bound;
         if (!(path < room)) {
             path -= room;
-            if (!imp__majorants_next(cells)) return false;
-            at = cells->t;
+            if (!imp__majorants_next(&cells)) return false;
+            at = cells.t;
             continue;
         }
-        at += path / cells->bound;
+        at += path / cells.bound;
         path = free_path(w);
         const double here = imp__decide1(at);
         bool real = false;
-        if (imp_unlikely(lanes)) decide_lanes(w, m, here, cells->bound);
-        else real = collide(w, m, here, cells->bound, collides);
+        if (imp_unlikely(lanes)) decide_lanes(w, m, here, cells.bound);
+        else real = collide(w, m, here, cells.bound, collides);
         if (w->s->walk->dropped) return false;
         if (real) {
             *t = at;
@@ -201,7 +202,7 @@ static void residual_fly(struct imp_free_flight *w, const struct imp_medium *m,
 {
     double path = free_path(w);
     do {
-        const struct imp_control *c = &m->majorants->control[imp__majorants_cell(cells)];
+        const struct imp_control *c = &m->majorants->control[cells->cell];
         double at = cells->t;
         w->control += (double)c->mean * (cells->leave - at);
         while (path < (cells->leave - at) * (double)c->reach) {

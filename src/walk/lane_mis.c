@@ -20,8 +20,12 @@ int imp__lane_mis_drew(struct imp_step *s)
 double imp__lane_mis_decide(struct imp_step *s, imp_spec p)
 {
     struct imp_lane_mis *l = &s->lanes;
-    const int n = imp__lane_mis_count(s), drew = imp__lane_mis_drew(s);
+    const int n = imp__lane_mis_count(s);
     double sum = 0;
+    bool certain = true; /* as what meets nothing is */
+    for (int j = 0; j < n; j++) certain &= p[j] == 1;
+    if (certain) return 1;
+    const int drew = imp__lane_mis_drew(s);
     l->ratio *= p * (1 / p[drew]);
     l->ratio[drew] = 1;
     for (int j = 0; j < n; j++) sum += l->ratio[j];

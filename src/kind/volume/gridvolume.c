@@ -110,9 +110,15 @@ out:
     return st;
 }
 
-static int wrapped(int i, int n, enum wrap wrap)
+/* Without a call where the processor has no instruction for it. */
+static inline int floor_of(double x)
 {
-    if (wrap == WRAP_CLAMP) return imp_clamp(i, 0, n - 1);
+    const int i = (int)x;
+    return i - ((double)i > x);
+}
+static inline int wrapped(int i, int n, enum wrap wrap)
+{
+    if (imp_likely(wrap == WRAP_CLAMP)) return imp_clamp(i, 0, n - 1);
     if (wrap == WRAP_REPEAT) return (i % n + n) % n;
     const int k = (i % (2 * n) + 2 * n) % (2 * n);
     return k < n ? k : 2 * n - 1 - k;
@@ -125,28 +131,37 @@ struct footprint {
     double weight[8];
 };
 
-static void footprint(const struct gridvolume *v, imp_v3 p, struct footprint *f)
+static inline void footprint(const struct gridvolume *v, imp_v3 p, struct footprint *f)
 {
     const imp_v3 u = imp__point(&v->to_unit, p);
     const size_t nx = (size_t)v->n[0], ny = (size_t)v->n[1];
+    const bool linear = v->filter == FILTER_TRILINEAR;
     size_t at[3][2];
     double w[3];
     for (int a = 0; a < 3; a++) {
         const int n = v->n[a];
         /* Far outside any cell will do: an int holds it. */
         const double x = imp_clamp(u[a], -1e5, 1e5) * n;
-        const double shifted = v->filter == FILTER_TRILINEAR ? x - 0.5 : x;
-        const double below = floor(imp_clamp(shifted, -1e9, 1e9));
+        const double shifted = imp_clamp(linear ? x - 0.5 : x, -1e9, 1e9);
+        const int below = floor_of(shifted);
         w[a] = shifted - below;
-        at[a][0] = (size_t)wrapped((int)below, n, v->wrap);
-        at[a][1] = (size_t)wrapped((int)below + 1, n, v->wrap);
+        at[a][0] = (size_t)wrapped(below, n, v->wrap);
+        at[a][1] = (size_t)wrapped(below + 1, n, v->wrap);
     }
-    f->n = v->filter == FILTER_TRILINEAR ? 8 : 1;
-    for (int k = 0; k < f->n; k++) {
-        f->cell[k] = (at[2][k >> 2 & 1] * ny + at[1][k >> 1 & 1]) * nx + at[0][k & 1];
-        f->weight[k] = 1;
-        for (int a = 0; a < 3 && f->n > 1; a++)
-            f->weight[k] *= k >> a & 1 ? w[a] : 1 - w[a];
+    f->n = linear ? 8 : 1;
+    if (!linear) {
+        f->cell[0] = (at[2][0] * ny + at[1][0]) * nx + at[0][0];
+        f->weight[0] = 1;
+        return;
+    }
+    const double x[2] = {1 - w[0], w[0]}, y[2] = {1 - w[1], w[1]},
+                 z[2] = {1 - w[2], w[2]};
+    for (int k = 0; k < 4; k++) {
+        const size_t row = (at[2][k >> 1] * ny + at[1][k & 1]) * nx;
+        f->cell[2 * k] = row + at[0][0];
+        f->cell[2 * k + 1] = row + at[0][1];
+        f->weight[2 * k] = x[0] * y[k & 1] * z[k >> 1];
+        f->weight[2 * k + 1] = x[1] * y[k & 1] * z[k >> 1];
     }
 }
 
