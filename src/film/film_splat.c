@@ -45,10 +45,12 @@ void imp__splat_scale_destroy(imp_context *ctx, struct imp_splat_scale *s)
 static void axis_taps(const struct imp_filter *f, const double *scale, double x, int n,
                       int margin, struct imp_taps *out)
 {
-    *out = (struct imp_taps){.n = 0};
+    out->n = 0;
     if (!(x >= -margin && x < n + margin)) return;
     if (!scale) {
-        *out = (struct imp_taps){.first = (int)x, .n = 1, .w = {1}};
+        out->first = (int)x;
+        out->n = 1;
+        out->w[0] = 1;
         return;
     }
     imp__film_taps(f, x, 0, n - 1, out);

@@ -69,6 +69,15 @@ void imp__light_meet_sensor(struct imp_light_step *w, struct imp_vertex *v,
 
 /* ---- Connections ------------------------------------------------------------------ */
 
+bool imp__light_on_film(const struct imp_sensor *s, const struct imp_sensor_sample *to)
+{
+    const struct imp_film_desc *f = &s->film;
+    const double margin = f->sample_border ? ceil(f->filter.radius) : 0;
+    const double x = to->px - f->crop_x, y = to->py - f->crop_y;
+    return x >= -margin && x < f->crop_w + margin && y >= -margin &&
+           y < f->crop_h + margin;
+}
+
 /* With hide_emitters the sensor looks past area lights on the first segment of its rays. */
 static bool seen_past_lights(const struct imp_step *s, imp_v3 o, imp_v3 d, double reach)
 {
@@ -175,7 +184,9 @@ void imp__light_connect_vertex(struct imp_light_step *w, struct imp_vertex *v,
     if (!sensor->ops->connect || (i->hide_emitters && v->shape && v->shape->emitter >= 0))
         return;
     imp__light_sensor_numbers(s, u);
-    if (!sensor->ops->connect(sensor, &at->p, false, u, &to)) return;
+    if (!sensor->ops->connect(sensor, &at->p, false, u, &to) ||
+        !imp__light_on_film(sensor, &to))
+        return;
 
     const struct imp_dirs dirs = {imp__decide(imp__to_local(frame, to.wo)), s->wo,
                                   IMP_SMOOTH, imp__wants_derivative(s, b)};
@@ -186,8 +197,9 @@ void imp__light_connect_vertex(struct imp_light_step *w, struct imp_vertex *v,
     imp_spec f;
     imp__bsdf_eval(b, s->at.carried, s->in, &dirs, &f);
     const double mis =
-        w->both ? imp__both_reach_weight(w, &to, b, &dirs)
-                : imp__light_connect_weight(s, &to, continues_pdf(s, b, &dirs), 0);
+        w->both         ? imp__both_reach_weight(w, &to, b, &dirs)
+        : sensor->shape ? imp__light_connect_weight(s, &to, continues_pdf(s, b, &dirs), 0)
+                        : 1;
     const double weight = imp__decide1(to.weight * c * mis);
     if (!(weight > 0)) return;
     if (imp__is_zero_used(f, s->at.carried) && !imp__wants_derivative(s, b)) return;

@@ -49,7 +49,9 @@ static void light_itself_connect(struct imp_light_step *w, struct imp_vertex *v,
     double u[4], c = 1;
     const imp_v3 ref = far ? -start->d : start->p;
     imp__light_sensor_numbers(s, u);
-    if (!sensor->ops->connect(sensor, &ref, far, u, &to)) return;
+    if (!sensor->ops->connect(sensor, &ref, far, u, &to) ||
+        !imp__light_on_film(sensor, &to))
+        return;
     const imp_v3 d = far ? start->d : to.wo;
     const bool surface = !far && imp__dot(start->ng, start->ng) > 0;
     if (surface) c = fabs(imp__dot(start->ng, d));

@@ -50,6 +50,8 @@ void imp__light_meet_sensor(struct imp_light_step *w, struct imp_vertex *v,
 void imp__light_connect_vertex(struct imp_light_step *w, struct imp_vertex *v,
                                const struct imp_surface *at,
                                const struct imp_frame *frame);
+/* Can a connection reach a pixel? */
+bool imp__light_on_film(const struct imp_sensor *s, const struct imp_sensor_sample *to);
 /* The parts of a connection, for vertices and for lights: the random numbers of the
  * point on the sensor; the weight against a walk that meets the sensor, which has density
  * `pdf` per steradian, or `across` per area across the ray; the shadow ray; and, if the

@@ -177,21 +177,12 @@ void imp__light_walk_follow(const struct imp_tracer *tracer, struct imp_arena *a
 {
     struct imp_walk *walk = &out->walk;
     imp_spec scratch[IMP_INPUTS_MAX];
-    struct imp_light_step w = {
-        .s = {.tracer = tracer,
-              .scene = tracer->scene,
-              .walk = walk,
-              .arena = arena,
-              .recorded = !tracer->value_only,
-              .scratch = scratch,
-              .at.carried = walk->waves ? &walk->waves->carried : NULL,
-              .segment = imp__segment_first(tracer),
-              .beta = {1, 1, 1, 1},
-              .eta = 1,
-              .lanes = IMP_LANE_MIS_INIT},
-        .out = out,
-        .end = &out->reach,
-        .both = out->both};
+    struct imp_light_step w;
+    imp__step_begin(tracer, arena, walk, scratch, &w.s);
+    w.out = out;
+    w.end = &out->reach;
+    w.pdf_across = w.passed = 0;
+    w.both = out->both;
     if (out->both)
         w.s.lanes.drew = imp__lane_drawn(out->both->eye.key, imp__lane_mis_count(&w.s));
     if (imp__light_start(&w))
@@ -202,13 +193,16 @@ void imp__light_walk_trace(const struct imp_tracer *tracer, struct imp_arena *ar
                            int64_t index, struct imp_light_walk *out)
 {
     const struct imp_key key = imp__key(tracer->seed, LIGHT_WALKS, (uint64_t)index);
-    *out = (struct imp_light_walk){.walk = {.key = key, .valid = true}, .arena = arena};
     struct imp_walk *walk = &out->walk;
+    imp__light_walk_begin(tracer, walk, key);
+    out->reach = NULL;
+    out->n_reach = 0;
+    out->both = NULL;
+    out->arena = arena;
     if (tracer->integrator->both) {
         imp__both_trace(tracer, arena, index, out);
         return;
     }
-    walk->time = imp__walk_time(tracer, walk);
     if (tracer->wavelengths &&
         !imp__walk_wave(tracer, arena, imp__wave_draw(tracer, walk, index), walk))
         return;

@@ -169,6 +169,12 @@ bool imp__scatter_split(struct imp_step *s, struct imp_vertex *v,
                         const struct imp_surface *at, const struct imp_frame *frame);
 
 /* ---- walk_trace.c ---- */
+/* A walk from a light, with nothing but its key and time; a step at the beginning of a walk,
+ * with its ray in flight. Field by field: clearing such structs takes part of a walk's time. */
+void imp__light_walk_begin(const struct imp_tracer *tracer, struct imp_walk *walk,
+                           struct imp_key key);
+void imp__step_begin(const struct imp_tracer *tracer, struct imp_arena *arena,
+                     struct imp_walk *walk, imp_spec *scratch, struct imp_step *s);
 /* Why a walk of this radiance is dropped: no light can have it, or no picture can hold
  * it. */
 enum imp_drop imp__drop_cause(imp_spec L);

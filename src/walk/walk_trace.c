@@ -82,16 +82,11 @@ void imp__walk_close(const struct imp_tracer *tracer, struct imp_walk *walk)
 #define FILL(p) memset((p), 0xff, sizeof *(p))
 #endif
 
-static inline __attribute__((always_inline)) void
-walk_begin(const struct imp_tracer *tracer, int x, int y, int64_t sample,
-           struct imp_walk *walk, double lens[2])
+/* Nothing yet; its key, film position and time are set behind this. */
+static inline __attribute__((always_inline)) void walk_clear(struct imp_walk *walk)
 {
-    const struct imp_sensor *sensor = tracer->sensor;
-    FILL(walk);
     walk->first = walk->last = NULL;
     walk->n = walk->depth = 0;
-    number(tracer, x, y, sample, walk);
-    position(tracer, walk, x, y, &walk->px, &walk->py);
     walk->ray.o = walk->ray.d = (imp_v3){0};
     walk->ray.t_near = walk->ray.t_far = 0;
     walk->L = walk->values = (imp_spec){0};
@@ -101,6 +96,17 @@ walk_begin(const struct imp_tracer *tracer, int x, int y, int64_t sample,
     walk->dropped = IMP_DROP_NONE;
     walk->entry = NULL;
     walk->moving = NULL;
+}
+
+static inline __attribute__((always_inline)) void
+walk_begin(const struct imp_tracer *tracer, int x, int y, int64_t sample,
+           struct imp_walk *walk, double lens[2])
+{
+    const struct imp_sensor *sensor = tracer->sensor;
+    FILL(walk);
+    walk_clear(walk);
+    number(tracer, x, y, sample, walk);
+    position(tracer, walk, x, y, &walk->px, &walk->py);
     lens[0] = imp__start_number(walk->key, walk->point, IMP_DIM_LENS_U);
     lens[1] = imp__start_number(walk->key, walk->point, IMP_DIM_LENS_V);
     sensor->ops->ray(sensor, walk->px, walk->py, lens, &walk->ray);
@@ -159,6 +165,24 @@ static inline void step_begin(const struct imp_tracer *tracer, struct imp_arena 
                                                : NULL;
     s->mixed.here = s->mixed.splits = s->mixed.sphere = false;
     s->both = NULL;
+}
+
+void imp__light_walk_begin(const struct imp_tracer *tracer, struct imp_walk *walk,
+                           struct imp_key key)
+{
+    FILL(walk);
+    walk_clear(walk);
+    walk->key = key;
+    walk->px = walk->py = 0;
+    walk->point = (struct imp_point){0};
+    walk->valid = true;
+    walk->time = imp__walk_time(tracer, walk);
+}
+
+void imp__step_begin(const struct imp_tracer *tracer, struct imp_arena *arena,
+                     struct imp_walk *walk, imp_spec *scratch, struct imp_step *s)
+{
+    step_begin(tracer, arena, walk, scratch, s);
 }
 
 void imp__walk_trace(const struct imp_tracer *tracer, struct imp_arena *arena, int x,

@@ -143,7 +143,7 @@ static void check(const char *integrator_name, const char *what, const char *bod
         const size_t k = (size_t)i % active.n;
         size_t e = 0;
         struct imp_param *p = param_at(scene, &active, k, &e);
-        const double x = imp__param_get(p, e), h = 1e-4 * fmax(fabs(x), 0.1);
+        const double x = imp__param_get(p, e), h = 1e-5 * fmax(fabs(x), 0.1);
         double at[3];
         for (int j = 0; j < 3; j++) {
             set(scene, p, e, x + (j == 2 ? 0 : j ? -h : h));
@@ -157,7 +157,7 @@ static void check(const char *integrator_name, const char *what, const char *bod
         compared += s.g[k] != 0;
         imp__arena_rewind(&arena, mark);
     }
-    tap_ok(exact < 1e-12 && reached > WALKS / 8,
+    tap_ok(exact < 1e-12 && reached > WALKS / 16,
            "%s, %s: forward and reverse, %zu numbers, %d walks # %.1e", integrator_name,
            what, active.n, reached, exact);
     tap_ok(frozen < 1e-6 && compared > WALKS / 64,
