@@ -110,10 +110,10 @@ const struct arg_option options_limits[] = {
 
 const struct arg_option options_guide[] = {
     {ARG_FLAG, 0, "guide", NULL,
-     "solve by finite elements first, and choose lights by what they send to a point",
+     "solve by finite elements first: lights by what they send, walks by what they bring",
      &cli.guide, 0, 0, NULL},
     {ARG_NUMBER, 0, "guide-share", "S",
-     "fraction of directions drawn towards indirect light, below 1 (default 0)",
+     "fraction of directions drawn towards light, or importance, below 1 (default 0)",
      &cli.guide_share, 0, 0.99, NULL},
     {ARG_NUMBER, 0, "guide-roulette", "S",
      "survival by S times the expected remaining light (default: by throughput)",

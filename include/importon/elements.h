@@ -83,7 +83,8 @@ struct imp_elements_options {
     int order;         /**< of the directional basis, 2..12; 0: by the materials */
     int no_importance; /**< refine by radiance alone (the baseline of 1993) */
     int sensor;        /**< of the picture that decides when to stop */
-    int rays;    /**< per side of a pixel's grid; 0: 3 to 24, more in small pictures */
+    int rays;    /**< per side of a pixel's grid; 0: 3 to 24, more in small pictures;
+                      to 64 of a meter on a shape */
     double stop; /**< relative change of what is asked for: of the measurements if there
                     are sources, RMS of the picture if there are none or `picture` is
                     set; 0: 0.01; < 0: never stop for that */
@@ -262,8 +263,9 @@ imp_elements_fit(imp_elements *elements, imp_problem *problem,
 
 struct imp_elements_guide_options {
     size_t size;
-    int no_lights; /**< light samples as without a guide */
-    double share;  /**< of continuations drawn towards indirect light, 0 to 1 exclusive */
+    int no_lights; /**< light samples, and where walks from the lights begin, as without */
+    double share;  /**< of continuations drawn towards indirect light, or importance, 0 to
+                        1 exclusive */
     /** Russian roulette by expected contribution instead of throughput: a walk continues
      * with probability roulette x (radiance expected after this vertex) / (radiance
      * expected of the whole walk), clamped to [0.2, 1]. 0: off; 0.5 to 1 where most light
@@ -274,7 +276,10 @@ struct imp_elements_guide_options {
     IMP_ELEMENTS_SIZED(struct imp_elements_guide_options)
 /** The solution as a guide for walks: set imp_run.guide. Light samples follow what every
  * light sends to a place; drawing directions by it, or roulette, pays in some scenes only
- * (docs/elements.md) and is off unless asked for. The elements must outlive it; a guide
+ * (docs/elements.md) and is off unless asked for. Walks from the lights follow the
+ * importance of the elements' sensor, unless that was not solved: which light sends them,
+ * from where and whither, and `share` of their directions; roulette is for walks from the
+ * sensor. The elements must outlive it; a guide
  * of an old solution stays correct, and helps less. Destroy it with imp_guide_destroy.
  * options may be NULL.
  */

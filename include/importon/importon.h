@@ -659,7 +659,7 @@ struct imp_run {
     double drop_budget; /**< fraction of walks that may be dropped, 0 to 1; 0: 1e-4 */
     imp_progress_fn progress;
     void *progress_payload;
-    const imp_guide *guide; /**< NULL: none; paths (integrator path) alone follow it */
+    const imp_guide *guide; /**< NULL: none; for path, and for walks from the lights */
     /** Of scenes in a spectral mode. */
     enum imp_wavelength_sampling wavelengths;
     /** Walks of a pixel among which wavelengths are stratified; 0: a quarter of the

@@ -537,11 +537,11 @@ def guide(elements: Elements, *, lights: bool = True, share: float = 0, roulette
     ----------
     elements : Elements
     lights : bool
-        Light samples follow what every light sends to a place.
+        Light samples follow what every light sends to a place; walks from the lights begin by importance.
     share : float
-        Of continuations drawn towards indirect light, 0 to 1.
+        Of continuations drawn towards indirect light, or importance by walks from the lights, 0 to 1.
     roulette : float
-        Russian roulette by expected contribution; 0: off.
+        Russian roulette of walks from the sensor by expected contribution; 0: off.
 
     Returns
     -------

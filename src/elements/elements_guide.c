@@ -7,9 +7,12 @@
  *               distribution for choosing a light
  *   directions  incident indirect radiance times cosine: a histogram over the unit square
  *               that the concentric map takes to the cosine-weighted hemisphere
+ *   importance  the same histogram of the importance that arrives, for walks from the
+ *               lights
  *   leaving     exitant radiance by direction, and the part of it that was reflected at
  *               least twice: for Russian roulette
  *
+ * Where walks from the lights begin is in guide_send.c.
  * Histograms of directions are kept for a coarser level, so that they fit into the cache.
  * A cell receives over its own links and over those of its ancestors; of an ancestor's
  * link it receives the sample whose quarter contains the cell. Every distribution is
@@ -33,7 +36,7 @@ static size_t cell_of(const struct imp__guide *g, const struct imp_guide_place *
 }
 static const float *cdf_of(const struct imp__guide *g, const struct imp_guide_place *p)
 {
-    return g->cdf + (size_t)g->wide_of[cell_of(g, p)] * GUIDE_BINS;
+    return g->directions[p->field].cdf + (size_t)g->wide_of[cell_of(g, p)] * GUIDE_BINS;
 }
 
 static uint32_t cell_at(const struct imp__guide *g, uint32_t root, imp_v3 p)
@@ -50,8 +53,9 @@ static uint32_t cell_at(const struct imp__guide *g, uint32_t root, imp_v3 p)
     return f->grid[j * f->side + i];
 }
 
-static bool find(const struct imp_guide *base, const struct imp_hit *hit,
-                 const struct imp_surface *at, imp_v3 d, struct imp_guide_place *place)
+static bool find(const struct imp_guide *base, enum imp_guide_field field,
+                 const struct imp_hit *hit, const struct imp_surface *at, imp_v3 d,
+                 struct imp_guide_place *place)
 {
     const struct imp__guide *g = (const struct imp__guide *)base;
     const imp_elements *e = g->e;
@@ -63,7 +67,9 @@ static bool find(const struct imp_guide *base, const struct imp_hit *hit,
     if (cell == EL_NONE) return false;
     place->frame = &e->roots[root].frame;
     place->cell = &g->cells.where[cell];
-    place->share = g->share ? (double)g->share[g->wide_of[cell]] : 0;
+    place->field = field;
+    const float *share = g->directions[field].share;
+    place->share = share ? (double)share[g->wide_of[cell]] : 0;
     return true;
 }
 
@@ -89,22 +95,29 @@ static int light_choose(const struct imp_guide *base, const struct imp_guide_pla
     return lo;
 }
 
+double imp__guide_pick(const float *cdf, int n, double u, int *bin, double *rest)
+{
+    int lo = 0, hi = n - 1;
+    while (lo < hi) {
+        const int middle = (lo + hi) / 2;
+        if (u < (double)cdf[middle]) hi = middle;
+        else lo = middle + 1;
+    }
+    const double below = lo ? (double)cdf[lo - 1] : 0, width = (double)cdf[lo] - below;
+    *bin = lo;
+    *rest = width > 0 ? imp_clamp((u - below) / width, 0.0, 1 - 0x1p-30) : 0.5;
+    return width;
+}
+
 static imp_v3 draw(const struct imp_guide *base, const struct imp_guide_place *p,
                    const double u[2])
 {
     const struct imp__guide *g = (const struct imp__guide *)base;
-    const float *c = cdf_of(g, p);
-    int lo = 0, hi = GUIDE_BINS - 1;
-    while (lo < hi) {
-        const int middle = (lo + hi) / 2;
-        if (u[0] < (double)c[middle]) hi = middle;
-        else lo = middle + 1;
-    }
-    const double below = lo ? (double)c[lo - 1] : 0, width = (double)c[lo] - below;
-    const double rest =
-        width > 0 ? imp_clamp((u[0] - below) / width, 0.0, 1 - 0x1p-30) : 0.5;
-    const double square[2] = {(lo / GUIDE_SIDE + rest) / GUIDE_SIDE,
-                              (lo % GUIDE_SIDE + u[1]) / GUIDE_SIDE};
+    int bin;
+    double rest;
+    imp__guide_pick(cdf_of(g, p), GUIDE_BINS, u[0], &bin, &rest);
+    const double square[2] = {(bin / GUIDE_SIDE + rest) / GUIDE_SIDE,
+                              (bin % GUIDE_SIDE + u[1]) / GUIDE_SIDE};
     return imp__to_world(p->frame, imp__cosine_hemisphere(square));
 }
 
@@ -160,8 +173,13 @@ static void destroy(struct imp_guide *base)
     imp__release(ctx, g->grids);
     imp__release(ctx, g->light);
     imp__release(ctx, g->pmf);
-    imp__release(ctx, g->cdf);
-    imp__release(ctx, g->share);
+    for (int k = 0; k < IMP_GUIDE_FIELDS; k++) {
+        imp__release(ctx, g->directions[k].cdf);
+        imp__release(ctx, g->directions[k].share);
+        imp__release(ctx, g->emission[k].point);
+        imp__release(ctx, g->emission[k].direction);
+    }
+    imp__release(ctx, g->send);
     imp__release(ctx, g->wide_of);
     imp__release(ctx, g->leaving);
     imp__release(ctx, g);
@@ -170,27 +188,40 @@ static void destroy(struct imp_guide *base)
 
 /* ---- Making it ----------------------------------------------------------------- */
 
+static enum imp_status field_make(struct imp__guide_build *b, enum imp_guide_field field)
+{
+    struct imp__guide *g = b->g;
+    imp_context *ctx = g->e->ctx;
+    struct imp__guide_directions *d = &g->directions[field];
+    d->cdf = imp__alloc(ctx, g->wide.n * GUIDE_BINS + 1, sizeof *d->cdf);
+    d->share = imp__alloc(ctx, g->wide.n + 1, sizeof *d->share);
+    if (!d->cdf || !d->share)
+        return imp__error(ctx, IMP_E_NOMEM, "out of memory for a guide");
+    b->field = field;
+    const struct imp_loop loop = {
+        .n_items = g->wide.n, .work = imp__guide_wide_work, .payload = b};
+    return imp__parallel(ctx, &loop, NULL);
+}
+
 static enum imp_status directions_make(struct imp__guide_build *b)
 {
     enum imp_status st = IMP_OK;
     struct imp__guide *g = b->g;
     const imp_elements *e = g->e;
     IMP_TRY(imp__guide_cells(e, imp_min(DIR_LEVEL, g->cells.level), &g->wide));
-    g->cdf = imp__alloc(e->ctx, g->wide.n * GUIDE_BINS + 1, sizeof *g->cdf);
-    g->share = imp__alloc(e->ctx, g->wide.n + 1, sizeof *g->share);
     g->wide_of = imp__alloc(e->ctx, g->cells.n + 1, sizeof *g->wide_of);
     b->scratch = imp__alloc(e->ctx, (size_t)imp_context_threads(e->ctx) * 2 * GUIDE_BINS,
                             sizeof *b->scratch);
-    if (!g->cdf || !g->share || !g->wide_of || !b->scratch)
+    if (!g->wide_of || !b->scratch)
         IMP_TRY(imp__error(e->ctx, IMP_E_NOMEM, "out of memory for a guide"));
     for (size_t k = 0; k < g->cells.n; k++) {
         uint32_t i = g->cells.where[k];
         while (g->wide.of[i] == EL_NONE) i = e->elements[i].parent;
         g->wide_of[k] = g->wide.of[i];
     }
-    const struct imp_loop loop = {
-        .n_items = g->wide.n, .work = imp__guide_wide_work, .payload = b};
-    IMP_TRY(imp__parallel(e->ctx, &loop, NULL));
+    IMP_TRY(field_make(b, IMP_GUIDE_LIGHT));
+    if (e->has_importance) IMP_TRY(field_make(b, IMP_GUIDE_CONNECTED));
+    if (imp__guide_meter(e)) IMP_TRY(field_make(b, IMP_GUIDE_MET));
 out:
     return st;
 }
@@ -249,6 +280,7 @@ enum imp_status imp_elements_guide(const imp_elements *e,
                                  .pdf = pdf,
                                  .expected = o.roulette > 0 ? expected : NULL,
                                  .roulette = o.roulette,
+                                 .importance = e->has_importance,
                                  .destroy = destroy};
     g->e = e;
     g->light_base = o.no_lights ? 1 : LIGHT_BASE;
@@ -267,6 +299,7 @@ enum imp_status imp_elements_guide(const imp_elements *e,
     const struct imp_loop loop = {
         .n_items = g->cells.n, .work = imp__guide_cell_work, .payload = &b};
     IMP_TRY(imp__parallel(e->ctx, &loop, NULL));
+    if (e->has_importance && !o.no_lights) IMP_TRY(imp__guide_send(g));
     *out = &g->base;
     g = NULL;
 out:

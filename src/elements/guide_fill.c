@@ -31,8 +31,7 @@ static imp_spec carried(const imp_elements *e, const struct imp__el_link *k,
     return sum;
 }
 
-/* The emitter that a root shines for; -1: none, or an ambient term. */
-static int emitter_of(const imp_elements *e, const struct imp__el_root *r)
+int imp__guide_emitter(const imp_elements *e, const struct imp__el_root *r)
 {
     return r->light != EL_DARK && r->shape >= 0 ? e->scene->shapes[r->shape]->emitter
                                                 : -1;
@@ -97,7 +96,7 @@ static void arrive(const imp_elements *e, const struct imp__element *x, size_t a
 {
     const struct imp__el_link *k = &e->links[at];
     imp_spec emitted, l = carried(e, k, &emitted);
-    const int em = emitter_of(e, imp__el_root_of(e, &e->elements[k->src]));
+    const int em = imp__guide_emitter(e, imp__el_root_of(e, &e->elements[k->src]));
     double power = 0, direct = 0;
     for (int s = 0; s < 4; s++) {
         if (!(mask >> s & 1)) continue;
@@ -135,20 +134,71 @@ static void above(const imp_elements *e, const struct imp__element *x, uint32_t 
     }
 }
 
-/* A bin's neighbours get a part: the points are few, and a cell is not a point. */
-static void smooth(const double *in, double *out)
+/* ---- Importance, over links the other way ------------------------------------------- */
+
+/* Link `at` from the cell x, or `part` of it from an element above: of each sample the
+ * importance that leaves the receiver's quarter. */
+static void receive(const imp_elements *e, const struct imp__element *x, size_t at,
+                    double part, double *bins)
 {
-    for (int a = 0; a < GUIDE_SIDE; a++)
-        for (int b = 0; b < GUIDE_SIDE; b++) {
+    const struct imp__el_link *k = &e->links[at];
+    const struct imp__element *j = &e->elements[k->rcv];
+    imp_spec g[3];
+    imp__el_ends(e, k, NULL, g);
+    for (uint32_t s = 0; s < 4; s++) {
+        double power = 0;
+        for (int c = 0; c < e->ch; c++) power += part * k->k[s] * g[c][s];
+        deposit(e, x, j->child ? j->child + s : k->rcv, power, (uint32_t)(4 * at + s),
+                bins);
+    }
+}
+
+static void receive_below(const imp_elements *e, const struct imp__element *x, uint32_t i,
+                          double *bins)
+{
+    for (size_t at = e->out_start[i]; at < e->out_start[i + 1]; at++)
+        receive(e, x, e->out[at], 1, bins);
+    if (e->elements[i].child)
+        for (uint32_t q = 0; q < 4; q++)
+            receive_below(e, x, e->elements[i].child + q, bins);
+}
+
+static void receive_above(const imp_elements *e, const struct imp__element *x,
+                          double *bins)
+{
+    for (uint32_t i = x->parent; i != EL_NONE; i = e->elements[i].parent) {
+        const struct imp__element *y = &e->elements[i];
+        const double part =
+            imp__polygon_area(x->corners, x->v) / imp__polygon_area(y->corners, y->v);
+        for (size_t at = e->out_start[i]; at < e->out_start[i + 1]; at++)
+            receive(e, x, e->out[at], part, bins);
+    }
+}
+
+/* What the sensor itself sends: the directions of its rays. */
+static void receive_eye(const imp_elements *e, const struct imp__element *x, double *bins)
+{
+    const struct imp__el_root *r = imp__el_root_of(e, x);
+    double eye = 0;
+    for (int c = 0; c < e->ch; c++) eye += e->eye[c];
+    for (uint32_t k = x->hit[0]; k < x->hit[1]; k++)
+        bins[imp__guide_bin(imp__to_local(&r->frame, e->hits[k].w))] +=
+            eye * e->hits[k].weight;
+}
+
+/* The points are few, and a cell is not a point. */
+void imp__guide_smooth(int side, const double *in, double *out)
+{
+    for (int a = 0; a < side; a++)
+        for (int b = 0; b < side; b++) {
             double sum = 0, weight = 0;
-            for (int i = imp_max(a - 1, 0); i <= imp_min(a + 1, GUIDE_SIDE - 1); i++)
-                for (int j = imp_max(b - 1, 0); j <= imp_min(b + 1, GUIDE_SIDE - 1);
-                     j++) {
+            for (int i = imp_max(a - 1, 0); i <= imp_min(a + 1, side - 1); i++)
+                for (int j = imp_max(b - 1, 0); j <= imp_min(b + 1, side - 1); j++) {
                     const double w = (i == a ? 2 : 1) * (j == b ? 2 : 1);
-                    sum += w * in[i * GUIDE_SIDE + j];
+                    sum += w * in[i * side + j];
                     weight += w;
                 }
-            out[a * GUIDE_SIDE + b] = sum / weight;
+            out[a * side + b] = sum / weight;
         }
 }
 
@@ -208,6 +258,17 @@ enum imp_status imp__guide_cell_work(size_t item, int worker, int slot, void *pa
     return IMP_OK;
 }
 
+void imp__guide_cumulate(const double *sum, int n, double base, float *cdf)
+{
+    double all = 0, run = 0;
+    for (int k = 0; k < n; k++) all += sum[k];
+    for (int k = 0; k < n; k++) {
+        run += all > 0 ? base * all / n + (1 - base) * sum[k] : 1;
+        cdf[k] = (float)fmin(run / (all > 0 ? all : n), 1);
+    }
+    cdf[n - 1] = 1;
+}
+
 /* How flat a material's lobes are: of R all is in one number if it is Lambert's. Light
  * that arrives says nothing of lobes: where they are narrow, the BSDF draws better. */
 static double flatness(const imp_elements *e, const struct imp__el_material *m)
@@ -235,23 +296,25 @@ enum imp_status imp__guide_wide_work(size_t item, int worker, int slot, void *pa
     const struct imp__element *x = &e->elements[index];
     double *bins = b->scratch + (size_t)worker * 2 * GUIDE_BINS,
            *soft = bins + GUIDE_BINS;
-    double sum = 0, run = 0;
-    float *cdf = g->cdf + item * GUIDE_BINS;
+    double sum = 0;
+    const struct imp__guide_directions *d = &g->directions[b->field];
     struct arriving to = {.bins = bins};
     (void)slot;
     const double share = b->share * flatness(e, imp__el_material_of(e, x));
     if (share < 0.5 * b->share) return IMP_OK; /* not worth its densities */
     memset(bins, 0, GUIDE_BINS * sizeof *bins);
-    below(e, x, index, &to);
-    above(e, x, index, &to);
-    smooth(bins, soft);
+    if (b->field == IMP_GUIDE_LIGHT) {
+        below(e, x, index, &to);
+        above(e, x, index, &to);
+    } else {
+        receive_below(e, x, index, bins);
+        receive_above(e, x, bins);
+        if (b->field == IMP_GUIDE_MET) receive_eye(e, x, bins);
+    }
+    imp__guide_smooth(GUIDE_SIDE, bins, soft);
     for (int k = 0; k < GUIDE_BINS; k++) sum += soft[k];
     if (!(sum > 0)) return IMP_OK;
-    for (int k = 0; k < GUIDE_BINS; k++) {
-        run += soft[k];
-        cdf[k] = (float)fmin(run / sum, 1);
-    }
-    cdf[GUIDE_BINS - 1] = 1;
-    g->share[item] = (float)share;
+    imp__guide_cumulate(soft, GUIDE_BINS, 0, d->cdf + item * GUIDE_BINS);
+    d->share[item] = (float)share;
     return IMP_OK;
 }

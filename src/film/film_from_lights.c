@@ -76,6 +76,7 @@ enum imp_status imp__render_from_lights(const struct imp_measure *m,
     const struct imp_film_desc *f = &m->sensor->film;
     const struct imp_walk_integrator *integrator = m->integrator;
     IMP_TRY(imp__light_walks_allowed(m->scene, m->sensor, integrator, NULL));
+    IMP_TRY(imp__guide_lights_allowed(m->scene, integrator, run->guide));
     imp__light_walks_tell(m->scene, m->sensor, integrator);
     if (f->n_responses == 0 &&
         (f->pixel_format == IMP_PIXEL_LUMINANCE_ALPHA ||
@@ -87,6 +88,7 @@ enum imp_status imp__render_from_lights(const struct imp_measure *m,
                                 .integrator = integrator,
                                 .sensor = m->sensor,
                                 .seed = run->seed,
+                                .guide = imp__guide_of(m->scene, integrator, run->guide),
                                 .value_only = true};
     imp__tracer_numbers(&tracer, run, 0);
     tracer.set = 1;

@@ -51,7 +51,8 @@ static bool both_ends(const struct imp__check *c)
     if (imp__delta_bsdf(scene) && (!c->tracer.sensor->shape || has_point_lights(scene)))
         return false;
     return imp__light_walks_allowed(scene, c->tracer.sensor, from[1],
-                                    &c->problem->active) == IMP_OK;
+                                    &c->problem->active) == IMP_OK &&
+           imp__guide_lights_allowed(scene, from[1], c->run.guide) == IMP_OK;
 }
 
 /* ---- From the lights --------------------------------------------------------------- */

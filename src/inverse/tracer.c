@@ -90,6 +90,8 @@ enum imp_status imp__problem_tracer_of_any_end(const struct imp_problem *p,
     if (st != IMP_OK) return st;
     if (integrator->from_lights) {
         st = imp__light_walks_allowed(p->scene, sensor, integrator, &p->active);
+        if (st == IMP_OK)
+            st = imp__guide_lights_allowed(p->scene, integrator, run->guide);
         if (st != IMP_OK) return st;
     }
     if (integrator->alpha_gradient == IMP_ALPHA_ATTACHED) {

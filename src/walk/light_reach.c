@@ -158,9 +158,13 @@ void imp__light_connect(struct imp_light_step *w, struct imp_vertex *v,
 
 /* Density with which the walk would go on that way. */
 static double continues_pdf(const struct imp_step *s, const struct imp_bsdf *b,
-                            const struct imp_dirs *dirs)
+                            const struct imp_dirs *dirs, imp_v3 d)
 {
-    if (imp_likely(!b->shaped)) return imp__bsdf_transposed_pdf(b, s->in, dirs);
+    if (imp_likely(!b->shaped)) {
+        const double kernel = imp__bsdf_transposed_pdf(b, s->in, dirs);
+        return imp_unlikely(s->guided.here) ? imp__guided_light_pdf(s, kernel, d)
+                                            : kernel;
+    }
     const struct imp_dirs exchanged = {dirs->wi, dirs->wo, IMP_SMOOTH, dirs->derivative};
     imp_spec p;
     imp__shaped_pdf(b, s->at.carried, s->in, &exchanged, &p);
@@ -197,9 +201,10 @@ void imp__light_connect_vertex(struct imp_light_step *w, struct imp_vertex *v,
     imp_spec f;
     imp__bsdf_eval(b, s->at.carried, s->in, &dirs, &f);
     const double mis =
-        w->both         ? imp__both_reach_weight(w, &to, b, &dirs)
-        : sensor->shape ? imp__light_connect_weight(s, &to, continues_pdf(s, b, &dirs), 0)
-                        : 1;
+        w->both ? imp__both_reach_weight(w, &to, b, &dirs)
+        : sensor->shape
+            ? imp__light_connect_weight(s, &to, continues_pdf(s, b, &dirs, to.wo), 0)
+            : 1;
     const double weight = imp__decide1(to.weight * c * mis);
     if (!(weight > 0)) return;
     if (imp__is_zero_used(f, s->at.carried) && !imp__wants_derivative(s, b)) return;

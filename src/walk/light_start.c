@@ -66,8 +66,10 @@ static void light_itself_connect(struct imp_light_step *w, struct imp_vertex *v,
         p = imp__decide(beam.p);
         for (int k = 0; k < 2; k++) x.uv[k] = imp__decide1(beam.uv[k]);
     }
-    const double pdf = far ? 0 : e->ops->pdf_emission(e, &x);
+    double pdf = far ? 0 : e->ops->pdf_emission(e, &x);
     if (!far && !(pdf > 0)) return; /* this way nothing is emitted */
+    if (imp_unlikely(s->guided.guide && s->guided.guide->emit) && surface)
+        pdf *= imp__guided_emit_pdf(s, light, w->point, n, d);
     const double mis =
         w->both ? imp__both_light_weight(w, light, start, &x, &to)
                 : imp__light_connect_weight(s, &to, pdf, far ? start->pdf_p : 0);
@@ -139,12 +141,22 @@ bool imp__light_start(struct imp_light_step *w)
 
     /* Choose a light, and draw a point of it and a direction. */
     if (scene->n_emitters == 0) return false;
-    const int light =
-        imp__light_pick(scene, imp__u01(key, imp__dim_start(IMP_DIM_EMITTER)), &pmf);
+    const struct imp_guide *guide =
+        s->guided.guide && s->guided.guide->send ? s->guided.guide : NULL;
+    const int light = imp__light_pick_by(
+        scene, imp_unlikely(guide != NULL) ? guide->send : scene->light_cdf,
+        imp__u01(key, imp__dim_start(IMP_DIM_EMITTER)), &pmf);
     const struct imp_emitter *e = scene->emitters[light];
-    const double u[4] = {imp__u01(key, IMP_DIM_PIXEL_X), imp__u01(key, IMP_DIM_PIXEL_Y),
-                         imp__u01(key, IMP_DIM_LENS_U), imp__u01(key, IMP_DIM_LENS_V)};
+    double u[4] = {imp__u01(key, IMP_DIM_PIXEL_X), imp__u01(key, IMP_DIM_PIXEL_Y),
+                   imp__u01(key, IMP_DIM_LENS_U), imp__u01(key, IMP_DIM_LENS_V)};
+    double on_point = 1, on_direction = 1;
+    if (imp_unlikely(guide != NULL))
+        on_direction = imp__guided_emit(s, light, u, &on_point);
     if (!(pmf > 0) || !e->ops->sample_emission(e, &scene->ball, u, &start)) return false;
+    start.pdf_p *= on_point;
+    start.pdf_d *= on_direction;
+    w->point[0] = u[0];
+    w->point[1] = u[1];
     const bool far = is_far(e);
     const double per = pmf * start.pdf_p * start.pdf_d;
     if (!(per > 0)) return false;

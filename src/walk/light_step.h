@@ -10,8 +10,8 @@
 #ifndef IMP_WALK_LIGHT_STEP_H
 #define IMP_WALK_LIGHT_STEP_H
 
+#include "guided.h"
 #include "light_walk.h"
-#include "step.h"
 
 struct imp_light_step {
     struct imp_step s;
@@ -21,6 +21,7 @@ struct imp_light_step {
     double pdf_across;
     double passed; /* length of the way to where it begins, from where a connection could
                       have been made: light went straight on in between */
+    double point[2];       /* numbers that the point on the light was made of */
     struct imp_both *both; /* of a sample from both ends; NULL: none */
 };
 

@@ -12,24 +12,32 @@
 
 /* Draw where the light goes. False: nowhere. */
 static bool direction_draw(const struct imp_step *s, const struct imp_bsdf *b,
-                           const double u[3], struct imp_dirs *dirs)
+                           const struct imp_frame *frame, double u[3],
+                           struct imp_dirs *dirs)
 {
+    if (imp_unlikely(s->guided.here) && imp__guided_light_draw(s, frame, u, dirs))
+        return true;
     if (imp_likely(!b->shaped)) return imp__bsdf_transposed_sample(b, s->in, u, dirs);
     imp_spec own[IMP_INPUTS_MAX];
     imp__shaped_inputs(b, s->in, imp__waves_drew(s->at.carried), own);
     return imp__bsdf_transposed_sample(b, own, u, dirs);
 }
 
-/* Its density, in all lanes together where they differ; 0: the walk ends. */
+/* Its density, in all lanes together where they differ; 0: the walk ends. d: the direction in
+ * the world. *kernel: without a guide. */
 static double direction_pdf(struct imp_step *s, const struct imp_bsdf *b,
-                            const struct imp_dirs *dirs)
+                            const struct imp_dirs *dirs, imp_v3 d, double *kernel)
 {
-    if (imp_likely(!b->shaped)) return imp__bsdf_transposed_pdf(b, s->in, dirs);
+    if (imp_likely(!b->shaped)) {
+        *kernel = imp__bsdf_transposed_pdf(b, s->in, dirs);
+        return imp_unlikely(s->guided.here) ? imp__guided_light_pdf(s, *kernel, d)
+                                            : *kernel;
+    }
     const struct imp_dirs exchanged = {dirs->wi, dirs->wo, dirs->lobe, dirs->derivative};
     imp_spec p;
     imp__shaped_pdf(b, s->at.carried, s->in, &exchanged, &p);
     if (!(p[imp__lane_mis_drew(s)] > 0)) return 0;
-    return 1 / imp__lane_mis_decide(s, p);
+    return *kernel = 1 / imp__lane_mis_decide(s, p);
 }
 
 /* Whether the walk goes on, and where. */
@@ -43,12 +51,12 @@ static bool scatter(struct imp_light_step *w, struct imp_vertex *v,
     const struct imp_key key = s->walk->key;
 
     /* Draw a direction. */
-    const double u[3] = {imp__u01(key, imp__dim(s->depth, IMP_DIM_LOBE)),
-                         imp__u01(key, imp__dim(s->depth, IMP_DIM_DIR_U)),
-                         imp__u01(key, imp__dim(s->depth, IMP_DIM_DIR_V))};
+    double u[3] = {imp__u01(key, imp__dim(s->depth, IMP_DIM_LOBE)),
+                   imp__u01(key, imp__dim(s->depth, IMP_DIM_DIR_U)),
+                   imp__u01(key, imp__dim(s->depth, IMP_DIM_DIR_V))};
     struct imp_dirs dirs = {
         .wi = s->wo_drawn, .lobe = IMP_SMOOTH, .derivative = imp__wants_derivative(s, b)};
-    if (!direction_draw(s, b, u, &dirs)) return false;
+    if (!direction_draw(s, b, frame, u, &dirs)) return false;
     const bool straight = imp_unlikely(b->straight) && s->segment->through &&
                           dirs.lobe >= 0 && dirs.lobe < 64 &&
                           b->straight >> dirs.lobe & 1;
@@ -58,7 +66,8 @@ static bool scatter(struct imp_light_step *w, struct imp_vertex *v,
     dirs.wo = imp__decide(dirs.wo);
 
     /* The weight of the step: f c/p. */
-    const double density = direction_pdf(s, b, &dirs);
+    double kernel = 0;
+    const double density = direction_pdf(s, b, &dirs, d, &kernel);
     const double c = v->shape ? imp__bsdf_exchange(b, s->in, &dirs, imp__dot(d, at->ng),
                                                    imp__dot(-s->d, at->ng))
                               : 1;
@@ -66,7 +75,11 @@ static bool scatter(struct imp_light_step *w, struct imp_vertex *v,
     const double pdf = imp__decide1(density / c);
     imp_spec f;
     imp__bsdf_eval(b, s->at.carried, s->in, &dirs, &f);
-    if (!(pdf > 0) || !imp__throughput_add(s, b, f * (1 / pdf))) return false;
+    if (!(pdf > 0)) return false;
+    /* Roulette goes by the weight without a guide: where that sends more walks, each is
+     * worth no less for it. */
+    const double drawn = imp_unlikely(s->guided.here && kernel > 0) ? kernel / c : pdf;
+    if (!imp__throughput_add(s, b, f * (1 / drawn))) return false;
 
     /* Russian roulette. */
     double survive = 1;
@@ -114,6 +127,7 @@ static bool step(struct imp_light_step *w)
     struct imp_vertex *v =
         imp__vertex_meet(s, s->segment->meet(s, &hit), &hit, &at, &frame);
     if (!v) return false;
+    if (imp_unlikely(s->guided.guide != NULL)) imp__guided_light_arrive(s, v, &hit, &at);
     if (s->recorded) {
         v->d.from_light = true;
         v->d.met.weight = 0;

@@ -290,18 +290,24 @@ static inline struct imp_light_place imp__light_place(const struct imp_step *s,
         .faces = !medium && !(b->flags & (IMP_BSDF_TRANSMIT | IMP_BSDF_TURNED))};
 }
 
-/* A light by its sampling weight, and the probability of that. */
-static inline int imp__light_pick(const struct imp_scene *scene, double u, double *pmf)
+/* A light by cumulative probabilities [scene->n_emitters], and its own. */
+static inline int imp__light_pick_by(const struct imp_scene *scene, const double *cdf,
+                                     double u, double *pmf)
 {
     /* The first whose cumulative weight exceeds u. */
     int light = 0, above = scene->n_emitters - 1;
     while (light < above) {
         const int middle = (light + above) / 2;
-        if (u < scene->light_cdf[middle]) above = middle;
+        if (u < cdf[middle]) above = middle;
         else light = middle + 1;
     }
-    *pmf = scene->light_cdf[light] - (light ? scene->light_cdf[light - 1] : 0);
+    *pmf = cdf[light] - (light ? cdf[light - 1] : 0);
     return light;
+}
+/* By its sampling weight. */
+static inline int imp__light_pick(const struct imp_scene *scene, double u, double *pmf)
+{
+    return imp__light_pick_by(scene, scene->light_cdf, u, pmf);
 }
 
 /* ---- scatter.c ---- */

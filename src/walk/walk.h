@@ -199,16 +199,21 @@ struct imp_tracer {
                                     (store.h); NULL: they are traced */
 };
 
-/* The guide that walks of this integrator follow: its densities are made for paths, in
- * scenes that finite elements know. */
+/* The guide that walks of this integrator follow: its densities are made for paths and for
+ * walks from the lights, in scenes that finite elements know. */
 static inline const struct imp_guide *imp__guide_of(const struct imp_scene *scene,
                                                     const struct imp_walk_integrator *i,
                                                     const struct imp_guide *guide)
 {
-    return i->guided && scene->n_bodies == 0 && scene->n_media == 0 && !scene->priorities
+    return (i->guided || (i->from_lights && !i->both)) && scene->n_bodies == 0 &&
+                   scene->n_media == 0 && !scene->priorities
                ? guide
                : NULL;
 }
+/* May walks from the lights follow the guide, NULL: none? */
+enum imp_status imp__guide_lights_allowed(const struct imp_scene *scene,
+                                          const struct imp_walk_integrator *i,
+                                          const struct imp_guide *guide);
 
 /* The points of a run through a sensor: independent, or Sobol's. */
 static inline enum imp_points imp__points_of(const struct imp_sensor *sensor,

@@ -9,6 +9,7 @@
 #include "imp_tap.h"
 #include "scene/scene.h"
 #include "walk/light_walk.h"
+#include <importon/elements.h>
 
 #define WALKS 4000
 #define MANY  64
@@ -92,7 +93,9 @@ static double brings(const struct imp_light_walk *w, const imp_spec *P)
     return sum;
 }
 
-static void check(const char *integrator_name, const char *what, const char *body)
+/* guided: by importance that finite elements have solved. */
+static void check(const char *integrator_name, const char *what, const char *body,
+                  bool guided)
 {
     char xml[8192];
     snprintf(xml, sizeof xml, body, integrator_name);
@@ -108,11 +111,21 @@ static void check(const char *integrator_name, const char *what, const char *bod
     const struct imp_walk_integrator *integrator = imp__walk_integrator(scene);
     test_must(ctx,
               imp__light_walks_allowed(scene, scene->sensors[0], integrator, &active));
+    imp_elements *elements = NULL;
+    imp_guide *guide = NULL;
+    if (guided) {
+        struct imp_elements_guide_options o = IMP_ELEMENTS_GUIDE_OPTIONS_INIT;
+        o.share = 0.4;
+        test_must(ctx, imp_elements_create(scene, NULL, &elements));
+        test_must(ctx, imp_elements_solve(elements));
+        test_must(ctx, imp_elements_guide(elements, &o, &guide));
+    }
     const struct imp_tracer tracer = {.scene = scene,
                                       .integrator = integrator,
                                       .sensor = scene->sensors[0],
                                       .active = &active,
                                       .seed = 5,
+                                      .guide = guide,
                                       .collisions_stand = true};
     imp__arena_init(&arena, ctx);
     for (int i = 0; i < WALKS; i++) {
@@ -165,6 +178,8 @@ static void check(const char *integrator_name, const char *what, const char *bod
            compared, frozen);
     tap_ok(same == reached, "%s, %s: evaluated again to the bit # %d of %d",
            integrator_name, what, same, reached);
+    imp_guide_destroy(guide);
+    imp_elements_destroy(elements);
     imp__arena_free(&arena);
     imp__active_destroy(ctx, &active);
     imp_scene_destroy(scene);
@@ -175,18 +190,20 @@ int main(void)
     ctx = test_context(1);
     static const char *const ends[] = {"ptracer", "bdpt"};
     for (int k = 0; k < 2; k++) {
-        check(ends[k], "a room", HEAD ROOM CAMERA);
+        check(ends[k], "a room", HEAD ROOM CAMERA, false);
         check(ends[k], "rough metal and plastic",
               HEAD ROOM BALL("-.8,-.9,-.5", "<bsdf type='roughconductor'><float "
                                             "name='alpha' value='.3'/></bsdf>")
-                  BALL("1,-1,.3", "<bsdf type='phong'/>") CAMERA);
-        check(ends[k], "fog, with its density", HEAD ROOM FOG CAMERA);
+                  BALL("1,-1,.3", "<bsdf type='phong'/>") CAMERA,
+              false);
+        check(ends[k], "fog, with its density", HEAD ROOM FOG CAMERA, false);
         check(ends[k], "point light and sky",
               HEAD
               "<emitter type='point'><point name='position' value='.3,1,1'/></emitter>"
-              "<emitter type='constant'/>" BALL("0,0,0", "<bsdf type='diffuse'/>")
-                  CAMERA);
+              "<emitter type='constant'/>" BALL("0,0,0", "<bsdf type='diffuse'/>") CAMERA,
+              false);
     }
+    check("ptracer", "a room, guided", HEAD ROOM CAMERA, true);
     imp_context_destroy(ctx);
     return tap_done();
 }

@@ -45,7 +45,7 @@ static bool place_on(const imp_scene *s, const imp_guide *g, double x, double z,
     if (!imp__intersect(s, &o, &d, 0, INFINITY, &hit)) return false;
     const struct imp_shape *shape = s->shapes[hit.shape];
     shape->ops->surface(shape, &hit, &o, &d, &at);
-    return g->find(g, &hit, &at, d, place);
+    return g->find(g, IMP_GUIDE_LIGHT, &hit, &at, d, place);
 }
 
 /* The density is 1 over all directions, and draws follow it: E[h(w)/p(w)] by draws is the
@@ -209,7 +209,7 @@ static void expectations(imp_context *ctx, const char *file, double slack)
         if (!imp__intersect(s, &ray.o, &ray.d, 0, INFINITY, &hit)) continue;
         s->shapes[hit.shape]->ops->surface(s->shapes[hit.shape], &hit, &ray.o, &ray.d,
                                            &at);
-        if (!g->find(g, &hit, &at, ray.d, &p)) continue;
+        if (!g->find(g, IMP_GUIDE_LIGHT, &hit, &at, ray.d, &p)) continue;
         all += g->expected(g, &p, -ray.d, &part) / (SIDE * SIDE * RAYS * RAYS);
         wrong += !(part >= 0);
         beyond += part / (SIDE * SIDE * RAYS * RAYS);
