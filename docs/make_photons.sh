@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 #
 # Everything in docs/adjoint-photons.md that was computed, computed again: its pictures, and the
-# parts between "<!-- NAME -->" and "<!-- /NAME -->". Two to four minutes. With the name of a figure
-# (1, 2, 3, 4, 5 or 11) that one alone.
+# parts between "<!-- NAME -->" and "<!-- /NAME -->". Six to eight minutes. With the name of a figure
+# (1, 2, 3, 4, 5 or 11) that one alone, with "ends" the tables of which end to use.
 #
 #     docs/make_photons.sh [BUILD FOLDER, default build] [FIGURE]
 set -euo pipefail
@@ -40,6 +40,13 @@ if wanted 2; then
     picture lens_lights scenes/photons/lens.xml -D picture=pattern -D res=96 --spp 3000 --from lights --exposure 2
     for emits in left right; do
         "$importon" read scenes/photons/lens.xml -m spectral -D emits=$emits --spp 400000 --ends --json >"$out/lens_$emits.json"
+    done
+fi
+if wanted ends; then
+    say "Which end: time to 1 %, rays a second; the headlamp's derivatives"
+    "$build/bench/which_end" 2 >"$out/which_end.md"
+    for end in lights sensor; do
+        "$importon" read scenes/headlamp.xml -m mono -s 0 -p '*' --from $end --spp 2000000 -q --json >"$out/headlamp_$end.json"
     done
 fi
 if wanted 3; then
@@ -124,6 +131,24 @@ if has("lens_left.json"):
         l = r["from_lights"]
         rows.append("| %s | %.5f +- %.5f | %.5f +- %.5f | %.1f |" % (what, r["value"], r["se"], l["value"], l["se"], r["z"]))
     put("lens", "\n".join(rows) + "\n")
+if has("which_end.md"):
+    cells = [[c.strip() for c in line.strip("|\n").split("|")] for line in read("which_end.md").splitlines()[2:]]
+    for r in cells: # light that an end does not bring
+        means = [float(x) for x in r[7].split()]
+        for e, mean in enumerate(means):
+            if mean < 0.9 * means[0]:
+                r[1 + e] += " (lacks %.0f %% of the light)" % (100 * (1 - mean / means[0]))
+    for name, first, head in (("which_end", 1, "scene | from the sensor, s | from the lights, s | both ends, s"),
+                              ("rates", 4, "scene | from the sensor | from the lights | both ends")):
+        put(name, "\n".join(["| %s |" % head, "|---|---|---|---|"] +
+                            ["| " + " | ".join([r[0]] + r[first:first + 3]) + " |" for r in cells]) + "\n")
+if has("headlamp_sensor.json"):
+    of = [json.loads(read("headlamp_%s.json" % end))["readings"][0] for end in ("lights", "sensor")]
+    rows = ["| | from the lamp | from the meter |", "|---|---|---|",
+            "| reading, lx | " + " | ".join("%.4g +- %.1g" % (r["value"], r["se"]) for r in of) + " |"]
+    for a, b in zip(of[0]["derivatives"], of[1]["derivatives"]):
+        rows.append("| d/d `%s` | " % a["name"] + " | ".join("%.5g +- %.1g" % (d["grad"][0], d["se"][0]) for d in (a, b)) + " |")
+    put("headlamp", "\n".join(rows) + "\n")
 if has("reflector.tap"):
     cost = {}
     for m in re.finditer(r"^#   (.*?) +[\d.]+ of [\d.]+, paths x ([\d.]+), rays a path ([\d.]+)", read("reflector.tap"), re.M):
