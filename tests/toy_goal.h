@@ -53,34 +53,42 @@ static inline enum imp_status toy_eval(const double *x, uint64_t seed,
     return IMP_OK;
 }
 
-static inline enum imp_status toy_normal(const double *x, uint64_t seed,
+static inline enum imp_status toy_normal(const double *x, uint64_t seed, int rounds,
                                          struct imp__normal *out, void *payload)
 {
     struct toy *t = payload;
+    const double mc = t->mc, few = sqrt(1.0 / rounds);
     double r2 = 0;
+    t->mc *= few;
     const enum imp_status st = toy_eval(x, seed, &out->f, out->g, NULL, t);
+    t->mc = mc;
     if (st != IMP_OK) return st;
     for (int p = 0; p < TOY_M; p++) {
-        double r = t->mc * toy_gauss(seed, (uint64_t)p) - t->T[p];
+        double r = mc * few * toy_gauss(seed, (uint64_t)p) - t->T[p];
         for (int k = 0; k < TOY_N; k++) r += t->A[p][k] * x[k];
         r2 += r * r;
     }
-    out->chi2 = r2 - TOY_M * t->mc * t->mc;
+    out->chi2 = r2 - TOY_M * mc * mc / rounds;
     out->n_residuals = TOY_M;
     out->noise_known = false;
     for (int k = 0; k < TOY_N; k++)
         for (int l = 0; l <= k; l++) {
             double h = 0;
             for (int p = 0; p < TOY_M; p++) h += t->A[p][k] * t->A[p][l];
-            const double e =
-                t->H_noise * 5 * toy_gauss(seed, 1000 + (uint64_t)(k * TOY_N + l));
+            const uint64_t entry = (uint64_t)(k * TOY_N + l);
+            const double sigma = t->H_noise * 5 * few;
+            const double e = sigma * toy_gauss(seed, 1000 + entry);
             const int at[2] = {k * TOY_N + l, l * TOY_N + k};
             for (int i = 0; i < 2; i++) {
                 out->H[at[i]] = h + e;
                 out->H_same[at[i]] = h * (1 + (k == l) * 0.1);
                 out->H_prior[at[i]] = 0;
                 out->H_meas[at[i]] = 0;
-                out->cov_g[at[i]] = t->mc * t->mc * h;
+                out->cov_g[at[i]] = mc * mc * h / rounds;
+                for (uint64_t d = 0; out->deviations && d < IMP_DEVIATIONS; d++)
+                    out->deviations[d * TOY_N * TOY_N + (size_t)at[i]] =
+                        sigma * sqrt(1.0 / IMP_DEVIATIONS) *
+                        toy_gauss(seed, 2000 + 100 * d + entry);
             }
         }
     return IMP_OK;

@@ -47,7 +47,7 @@ double imp__design_value(const struct imp__design *d);
 /* For imp__goal. */
 enum imp_status imp__design_eval(const double *x, uint64_t seed, struct imp_estimate *f,
                                  double *g, double *g_se, void *payload);
-enum imp_status imp__design_normal(const double *x, uint64_t seed,
+enum imp_status imp__design_normal(const double *x, uint64_t seed, int rounds,
                                    struct imp__normal *out, void *payload);
 
 #endif

@@ -109,13 +109,14 @@ out:
     return st;
 }
 
-enum imp_status imp__design_normal(const double *x, uint64_t seed,
+enum imp_status imp__design_normal(const double *x, uint64_t seed, int rounds,
                                    struct imp__normal *out, void *payload)
 {
     struct imp__design *d = payload;
     enum imp_status st = IMP_OK;
     const size_t n = d->n;
     (void)seed;
+    (void)rounds;
     IMP_TRY(imp__design_at(d, x));
     if (!d->linear) IMP_TRY(rows_of(d, d->A));
     memset(out->g, 0, n * sizeof *out->g);

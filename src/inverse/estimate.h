@@ -27,10 +27,11 @@ struct imp__replicates imp__replicates_plan(int spp, int batch_max);
 struct imp__replicates imp__replicates_of(const struct imp_scene *scene,
                                           const struct imp__target *target,
                                           const struct imp_run *run);
-/* Those of Gauss-Newton matrices. */
+/* Those of Gauss-Newton matrices: the first are those of the objective, and `rounds` times
+ * as many follow. */
 struct imp__replicates imp__replicates_normal(const struct imp_scene *scene,
                                               const struct imp__target *target,
-                                              const struct imp_run *run);
+                                              const struct imp_run *run, int rounds);
 /* IMP_E_ARG if the tracer has kept walks, and not all of these. */
 enum imp_status imp__replicates_kept(const struct imp_tracer *tracer,
                                      struct imp__replicates r);

@@ -7,8 +7,8 @@
 #include <math.h>
 #include <string.h>
 
-#define REPLICATES   6 /* independent normal equations behind intervals */
-#define EFFORT_SHARE 4 /* they take at least 1/4 of the samples that the search took */
+#define ROUNDS       5 /* samples behind intervals, at most, in those of an evaluation */
+#define EFFORT_SHARE 4 /* ROUNDS are at least 1/4 of the samples that the search took */
 #define FINAL_SEED   0x40000001
 
 /* A loss that is not twice differentiable at its minimum has no second-order expansion,
@@ -38,21 +38,29 @@ static enum imp_status final_objective(struct imp__fit *f, const double *x,
     return f->goal.eval(x, seed, out, NULL, NULL, f);
 }
 
-/* Samples per pixel of each replicate. The answer of a search that averaged many
+/* Samples per pixel of a round. The answer of a search that averaged many
  * evaluations with few samples (Adam) has less noise than its last evaluations. */
-static int replicate_spp(const struct imp__fit *f, const struct imp__search *s, int spp)
+static int round_spp(const struct imp__fit *f, const struct imp__search *s, int spp)
 {
-    const double wanted = (double)spp * s->iteration / (EFFORT_SHARE * REPLICATES);
+    const double wanted = (double)spp * s->iteration / (EFFORT_SHARE * ROUNDS);
     return wanted > spp ? (int)fmin(wanted, 1 << 24) : f->outer.spp;
 }
 
-/* Walks of the replicates over walks behind the answer. An average of n iterates with
- * weights 1, 2, ..., n has the variance of 3/4 n equally weighted ones. */
-static double replicate_share(const struct imp__fit *f, const struct imp__search *s,
+/* Rounds behind an average of iterates: of n with weights 1, 2, ..., n it has the variance
+ * of 3/4 n equally weighted ones. */
+static double rounds_searched(const struct imp__fit *f, const struct imp__search *s,
                               int spp)
 {
-    const double mine = (double)REPLICATES * (f->run.spp > 0 ? f->run.spp : spp);
-    return mine / (mine + 0.75 * s->scalar[IMP_SEARCH_AVERAGED] * spp);
+    return 0.75 * s->scalar[IMP_SEARCH_AVERAGED] * spp /
+           (f->run.spp > 0 ? f->run.spp : spp);
+}
+
+/* Evaluations after the search: two of intervals, two that accept their step, bias, loss. */
+static int final_total(const struct imp__fit *f)
+{
+    return f->options.intervals && f->problem->n <= IMP_DENSE_MAX
+               ? 2 + 3 + imp__fit_is_biased(f->problem)
+               : 1;
 }
 
 /* Covariance, intervals, and the last Newton step that belongs to them. *why: the reason
@@ -71,15 +79,44 @@ static enum imp_status intervals(struct imp__fit *f, const struct imp__search *s
         *why = "the l1 loss has no second derivative";
         return IMP_OK;
     }
-    const int spp = f->outer.spp > 0 ? f->outer.spp
-                                     : p->scene->sensors[p->targets[0].desc.sensor]->spp;
-    f->run.spp = replicate_spp(f, s, spp);
-    const enum imp_status st = imp__covariance(&f->goal, x, REPLICATES,
-                                               replicate_share(f, s, spp), variables, u);
-    if (st == IMP_OK) memcpy(x, u->x, f->problem->n * sizeof *x);
+    const int spp = imp__fit_spp(f);
+    f->run.spp = round_spp(f, s, spp);
+    const struct imp__rounds rounds = {.most = ROUNDS,
+                                       .searched = rounds_searched(f, s, spp),
+                                       .at_newton = imp__search_is_coarse(s) &&
+                                                    s->finished == IMP_FINISH_NOISE};
+    const enum imp_status st = imp__covariance(&f->goal, x, &rounds, variables, u);
+    if (st == IMP_OK && u->is_linear) memcpy(x, u->x, f->problem->n * sizeof *x);
     if (st != IMP_E_NUMERIC && st != IMP_E_UNSUPPORTED) return st;
     *why = imp__arena_strdup(&f->problem->fit_arena, imp_last_error(ctx));
     return IMP_OK;
+}
+
+static enum imp_status search(struct imp__fit *f, const struct imp__opt_options *o,
+                              struct imp__search *s)
+{
+    const enum imp_status ended = imp__optimize(&f->goal, o, s);
+    if (!f->options.checkpoint || (ended != IMP_OK && ended != IMP_CANCELLED))
+        return ended;
+    const enum imp_status st =
+        imp__checkpoint_write(f->problem->ctx, f->options.checkpoint, &f->fingerprint, s);
+    return st == IMP_OK ? ended : st;
+}
+
+/* Intervals at the end of the search, and of one that has to go on from there. */
+static enum imp_status search_look(struct imp__fit *f, const struct imp__opt_options *o,
+                                   struct imp__search *s, struct imp_fit_variable *rows,
+                                   struct imp__uncertainty *u, const char **why)
+{
+    const bool coarse = imp__search_is_coarse(s) && s->finished == IMP_FINISH_NOISE;
+    enum imp_status st = intervals(f, s, s->x, rows, u, why);
+    if (st != IMP_OK || !coarse || u->is_linear) return st;
+    imp__search_refine(s);
+    f->final_total = 0;
+    st = search(f, o, s);
+    f->final_calls = 0;
+    f->final_total = final_total(f);
+    return st == IMP_OK ? intervals(f, s, s->x, rows, u, why) : st;
 }
 
 enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
@@ -124,13 +161,10 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
     f.first_iteration = s->iteration;
     if (f.options.levels > 1 && !found) st = imp__fit_levels(&f, &o, s);
     f.search = s;
-    if (st == IMP_OK) st = imp__optimize(&f.goal, &o, s);
+    if (st == IMP_OK) st = search(&f, &o, s);
     if (st != IMP_OK && st != IMP_CANCELLED) goto out;
     ended = st;
     st = IMP_OK;
-    if (f.options.checkpoint)
-        IMP_TRY(imp__checkpoint_write(ctx, f.options.checkpoint, &f.fingerprint, s));
-
     imp__search_settle(s);
     if (p->n <= IMP_SEARCH_FEW) {
         rows = imp__arena_array(&p->fit_arena, p->n, sizeof *rows);
@@ -143,10 +177,9 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
                                           s->history_se[s->n_history - 1], 0};
     const bool biased = imp__fit_is_biased(p);
     f.final_calls = 0;
-    f.final_total =
-        f.options.intervals && p->n <= IMP_DENSE_MAX ? REPLICATES + 3 + biased : 1;
+    f.final_total = final_total(&f);
     if (ended == IMP_OK && f.options.intervals)
-        ended = intervals(&f, s, s->x, rows, &u, &why);
+        ended = search_look(&f, &o, s, rows, &u, &why);
     struct imp__fit_shift shift = {.of_se = -1};
     if (ended == IMP_OK && u.n && biased)
         ended = imp__fit_shift(&f, s->x, u.G, imp__search_seed(&f.goal, FINAL_SEED, 1),

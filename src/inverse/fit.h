@@ -44,6 +44,8 @@ struct imp__fit {
 enum imp_status imp__fit_begin(struct imp_problem *problem,
                                const struct imp_fit_options *options,
                                const struct imp_run *run, struct imp__fit *fit);
+/* Samples per pixel of one evaluation, as asked for. */
+int imp__fit_spp(const struct imp__fit *fit);
 /* Scales of the variables, from where the search starts. */
 void imp__fit_scales(struct imp__fit *fit, const struct imp__search *search);
 void imp__fit_end(struct imp__fit *fit);

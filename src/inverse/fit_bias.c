@@ -35,9 +35,9 @@ enum imp_status imp__fit_shift(struct imp__fit *f, const double *x, const double
         f->run.spp > 0 ? f->run.spp : f->problem->scene->sensors[sensor]->spp;
     struct imp__fit_shift worst = {.of_se = -1};
     struct imp__normal e = {0}; /* the gradient that x is a zero of, not another one */
-    IMP_TRY(imp__normal_create(f->problem->ctx, n, &e));
+    IMP_TRY(imp__normal_create(f->problem->ctx, n, false, &e));
     f->run.spp = (int)fmin(MORE * spp, 1 << 26);
-    IMP_TRY(f->goal.normal(x, seed, &e, f));
+    IMP_TRY(f->goal.normal(x, seed, 1, &e, f));
     for (size_t k = 0; k < n; k++) {
         double step = 0, variance = 0;
         for (size_t l = 0; l < n; l++) {

@@ -6,21 +6,24 @@
 #define IMP_INVERSE_GAUSS_NEWTON_H
 
 #include "estimate.h"
+#include "search/optimize.h"
 #include "seen.h"
 
 struct imp__normal_sums { /* matrices [K*K], lower triangles */
     double *H, *H_same, *H_meas, *cov_g, *cov_excess, *g;
-    double *scalars; /* [IMP_NORMAL_SCALARS] */
+    double *scalars;    /* [IMP_NORMAL_SCALARS] */
+    double *deviations; /* [IMP_DEVIATIONS][K*K], or NULL */
 };
 /* Of a target: loss, its variance, chi^2. */
 enum { IMP_NORMAL_OBJECTIVE, IMP_NORMAL_VARIANCE, IMP_NORMAL_CHI2, IMP_NORMAL_SCALARS };
 
-/* Adds H, H_same, H_meas, g, cov_g, cov_excess and chi2 of a target whose pixels share walks
- * (a filter wider than a pixel, or walks from the lights); lo, hi: the part of the caller's progress. */
+/* Adds H, H_same, H_meas, g, cov_g, cov_excess, deviations and chi2 of a target whose pixels
+ * share walks (a filter wider than a pixel, or walks from the lights), from `rounds` times
+ * the samples of an evaluation; lo, hi: the part of the caller's progress. */
 enum imp_status imp__gauss_newton_wide(const struct imp_problem *p,
                                        const struct imp_tracer *tracer,
                                        const struct imp__target *target,
-                                       const struct imp_run *run, double lo, double hi,
-                                       struct imp__normal_sums *out);
+                                       const struct imp_run *run, int rounds, double lo,
+                                       double hi, struct imp__normal_sums *out);
 
 #endif

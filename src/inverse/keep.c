@@ -57,10 +57,10 @@ static enum imp_status numbers_of(const struct imp_scene *scene, int sensor,
     }
     int64_t n = spp;
     if (w->losses) {
-        const struct imp__replicates plans[] = {imp__replicates_of(scene, &l2, &run),
-                                                imp__replicates_of(scene, &log, &run),
-                                                imp__replicates_of(scene, NULL, &run),
-                                                imp__replicates_normal(scene, &l2, &run)};
+        const struct imp__replicates plans[] = {
+            imp__replicates_of(scene, &l2, &run), imp__replicates_of(scene, &log, &run),
+            imp__replicates_of(scene, NULL, &run),
+            imp__replicates_normal(scene, &l2, &run, 1)};
         for (size_t k = 0; k < imp_count(plans); k++)
             n = imp_max(n, (int64_t)plans[k].n * plans[k].R);
     }

@@ -7,6 +7,7 @@
 
 #include "lanes.h"
 #include "loss.h"
+#include <math.h>
 #include <string.h>
 
 /* A walk's L and x as the target sees them: its channels, or their luminance. */
@@ -17,6 +18,16 @@ static int seen_channels(const struct imp__normal_job *j)
 static double seen(const struct imp__normal_job *j, const double *lanes, int c)
 {
     return imp__seen(imp__sees_luminance(j->target, j->channels), lanes, c);
+}
+
+/* Units of so many sets, of one size where that can be: pairs of units are all pairs but
+ * those within a unit. */
+static int units_of(int sets)
+{
+    if (sets <= IMP_NORMAL_UNITS) return sets;
+    for (int m = IMP_NORMAL_UNITS; m >= IMP_NORMAL_UNITS / 2; m--)
+        if (sets % m == 0) return m;
+    return IMP_NORMAL_UNITS;
 }
 
 /* Set s of a replicate: its mean radiance, and x, the mean of its derivatives. */
@@ -43,144 +54,274 @@ static imp_spec set_mean(const struct imp__normal_job *j, struct imp_tile_worker
     return L / imp__spec(n);
 }
 
-/* One replicate of a pixel: adds to the tile's matrices with factor `share`, writes its
- * gradient, returns its loss. */
-static double replicate(const struct imp__normal_job *j, struct imp_tile_worker *tile,
-                        struct imp__normal_sums *out, int x, int y, int b, double share,
-                        double *g)
+/* ---- The units of a pixel ------------------------------------------------------- */
+
+struct pixel {
+    struct imp__normal_worker *w;
+    size_t index;         /* of the pixel */
+    int M;                /* units */
+    double share;         /* of the samples of the pixel that these are */
+    double value, square; /* sums over replicates of the loss, and of its square */
+};
+
+/* Replicates [b0, b1) of a pixel as units; their losses are those of the objective. */
+static void units_gather(const struct imp__normal_job *j, struct imp_tile_worker *tile,
+                         int x, int y, int b0, int b1, struct pixel *p)
 {
-    struct imp__normal_worker *w = &j->workers[tile->index];
+    struct imp__normal_worker *w = p->w;
     const size_t K = j->K, S = (size_t)seen_channels(j);
-    const struct imp_target *t = &j->target->desc;
-    const int m = j->plan.m;
-    const double N = m;
-    const size_t width = K * (size_t)j->channels;
-    const bool quadratic = imp__loss_quadratic(t->loss);
-    double sum[3] = {0}, square[3] = {0}, value = 0;
-    memset(w->sum_x, 0, K * S * sizeof(double));
-    memset(w->sum_lx, 0, K * S * sizeof(double));
-    memset(w->sum_xx, 0, K * K * S * sizeof(double));
-    memset(g, 0, K * sizeof *g);
-
-    for (int i = 0; i < m; i++) {
-        const imp_spec mean = set_mean(j, tile, x, y, b, i);
-        if (!quadratic) {
-            memcpy(w->each_x + (size_t)i * width, w->x, width * sizeof(double));
-            w->L[i] = mean;
-        }
+    const int m = j->plan.m, sets = (b1 - b0) * m;
+    memset(w->X, 0, (size_t)p->M * K * S * sizeof *w->X);
+    memset(w->r, 0, sizeof w->r);
+    for (int i = 0; i < sets; i++) {
+        const int u = (int)((int64_t)i * p->M / sets);
+        const int u1 = (int)(((int64_t)(u + 1) * sets + p->M - 1) / p->M);
+        const int u0 = (int)(((int64_t)u * sets + p->M - 1) / p->M);
+        const double part = 1.0 / (u1 - u0);
+        const imp_spec mean = set_mean(j, tile, x, y, b0 + i / m, i % m);
         const double L[3] = {mean[0], mean[1], mean[2]};
-        for (size_t c = 0; c < S; c++) {
-            const double l = seen(j, L, (int)c);
-            double *xx = w->sum_xx + c * K * K;
-            sum[c] += l;
-            square[c] += l * l;
-            for (size_t k = 0; k < K; k++) {
-                const double xk = seen(j, w->x + k * (size_t)j->channels, (int)c);
-                if (xk == 0) continue;
-                w->sum_x[k * S + c] += xk;
-                w->sum_lx[k * S + c] += l * xk;
-                for (size_t l = 0; l <= k; l++)
-                    xx[k * K + l] += xk * seen(j, w->x + l * (size_t)j->channels, (int)c);
-            }
-        }
+        double *X = w->X + (size_t)u * K * S;
+        for (size_t c = 0; c < S; c++) w->r[u][c] += part * seen(j, L, (int)c);
+        for (size_t k = 0; k < K; k++)
+            for (size_t c = 0; c < S; c++)
+                X[c * K + k] += part * seen(j, w->x + k * (size_t)j->channels, (int)c);
+        w->L[i % m] = mean;
+        if (i % m < m - 1) continue;
+        const double v =
+            imp__replicate_adjoints(j->target, j->channels, p->index, m, w->L, w->P);
+        p->value += v;
+        p->square += v * v;
     }
-
-    const size_t pixel = (size_t)y * (size_t)j->width + (size_t)x;
-    if (!quadratic) {
-        value = imp__replicate_adjoints(j->target, j->channels, pixel, m, w->L, w->P);
-        for (int i = 0; i < m; i++)
-            for (size_t k = 0; k < width; k++)
-                g[k / (size_t)j->channels] +=
-                    w->P[i][k % (size_t)j->channels] * w->each_x[(size_t)i * width + k];
-    }
-    const double scale = t->scale * (j->target->weights ? j->target->weights[pixel] : 1);
-    for (size_t c = 0; c < S; c++) {
-        const double T = j->target->pixels[pixel * S + c];
-        const double weight =
-            imp__loss_gauss_newton(t->loss, scale, t->epsilon, sum[c] / N, T);
-        double T_eff = T;
-        if (quadratic) {
-            value += imp__loss_unbiased(weight, T, N, sum[c], square[c]);
-        } else {
-            struct imp__loss_at at;
-            imp__loss_eval(t->loss, scale, t->epsilon, sum[c] / N, T, &at);
-            T_eff = weight > 0 ? sum[c] / N - at.d1 / weight : T;
-        }
-        const bool known = j->target->noise_se != NULL;
-        const double sigma = known ? j->target->noise_se[pixel * S + c] : 0;
-        const double residual = 2 * imp__loss_unbiased(1, T_eff, N, sum[c], square[c]);
-        const double square_w = weight * weight / (N * (N - 1));
-        double *U = w->u + c * K * K, *AU = w->au + c * K * K;
-        w->a[c] += residual;
-        const double a = weight * share / (N * (N - 1)), same = weight * share / (N * N);
-        const double meas = weight * weight * sigma * sigma * share / (N * (N - 1));
-        const double *xx = w->sum_xx + c * K * K;
-        out->scalars[IMP_NORMAL_CHI2] +=
-            2 * share * imp__loss_unbiased(weight, T_eff, N, sum[c], square[c]);
-        for (size_t k = 0; k < K; k++) {
-            const double xk = w->sum_x[k * S + c];
-            if (quadratic)
-                g[k] += weight * ((sum[c] / (N - 1) - T) * xk / N -
-                                  w->sum_lx[k * S + c] / (N * (N - 1)));
-            for (size_t l = 0; l <= k; l++) {
-                const double product = xk * w->sum_x[l * S + c],
-                             u = product - xx[k * K + l];
-                out->H[k * K + l] += a * u;
-                out->H_same[k * K + l] += same * product;
-                out->H_meas[k * K + l] += meas * u;
-                if (known) continue;
-                U[k * K + l] += square_w * u;
-                AU[k * K + l] += square_w * residual * u;
-            }
-        }
-    }
-    return value;
 }
+
+/* ---- One channel ---------------------------------------------------------------- */
+
+/* Of a loss that is not quadratic: what the derivative of unit a is multiplied with, by
+ * the jackknife over units (adjoint.c). */
+static void jackknife(const struct imp_target *t, double scale, double T,
+                      const struct pixel *p, size_t c, double *factor)
+{
+    struct imp__loss_at at;
+    const double M = p->M;
+    double S = 0, A = 0;
+    for (int a = 0; a < p->M; a++) S += p->w->r[a][c];
+    for (int a = 0; a < p->M; a++) {
+        imp__loss_eval(t->loss, scale, t->epsilon, (S - p->w->r[a][c]) / (M - 1), T, &at);
+        factor[a] = at.d1;
+        A += at.d1;
+    }
+    imp__loss_eval(t->loss, scale, t->epsilon, S / M, T, &at);
+    for (int a = 0; a < p->M; a++) factor[a] = at.d1 - (A - factor[a]) / M;
+}
+
+/* r: from radiance to residual, so that the loss is 1/2 w r^2; returns w. */
+static double residuals(const struct imp__normal_job *j, const struct pixel *p, size_t c,
+                        double *factor)
+{
+    const struct imp_target *t = &j->target->desc;
+    const double scale =
+        t->scale * (j->target->weights ? j->target->weights[p->index] : 1);
+    double T = t->pixels[p->index * (size_t)seen_channels(j) + c], mean = 0;
+    for (int a = 0; a < p->M; a++) mean += p->w->r[a][c] / p->M;
+    const double weight = imp__loss_gauss_newton(t->loss, scale, t->epsilon, mean, T);
+    if (!imp__loss_quadratic(t->loss)) {
+        struct imp__loss_at at;
+        jackknife(t, scale, T, p, c, factor);
+        imp__loss_eval(t->loss, scale, t->epsilon, mean, T, &at);
+        T = weight > 0 ? mean - at.d1 / weight : T;
+    }
+    for (int a = 0; a < p->M; a++) p->w->r[a][c] -= T;
+    return weight;
+}
+
+/* Mean of r_a r_b over pairs of units of [a0, a1). */
+static double square_residual(const struct pixel *p, size_t c, int a0, int a1)
+{
+    const double n = a1 - a0;
+    double sum = 0, square = 0;
+    for (int a = a0; a < a1; a++) {
+        sum += p->w->r[a][c];
+        square += p->w->r[a][c] * p->w->r[a][c];
+    }
+    return (sum * sum - square) / (n * (n - 1));
+}
+
+/* Sums of x and x x^T over units [a0, a1). */
+static void products(const struct imp__normal_job *j, const struct pixel *p, size_t c,
+                     int a0, int a1, double *sum, double *xx)
+{
+    const size_t K = j->K, S = (size_t)seen_channels(j);
+    memset(sum, 0, K * sizeof *sum);
+    memset(xx, 0, K * K * sizeof *xx);
+    for (int a = a0; a < a1; a++) {
+        const double *x = p->w->X + ((size_t)a * S + c) * K;
+        for (size_t k = 0; k < K; k++) {
+            if (x[k] == 0) continue;
+            sum[k] += x[k];
+            for (size_t l = 0; l <= k; l++) xx[k * K + l] += x[k] * x[l];
+        }
+    }
+}
+
+/* What the jackknife over groups of units g makes of J^T W J: ((M - u)/M)^(1/2) times its
+ * change when group g, u of the M units, is left out. */
+static void deviations_add(const struct imp__normal_job *j, const struct pixel *p,
+                           size_t c, double weight, const double *sum, const double *xx,
+                           double *deviations)
+{
+    const size_t K = j->K;
+    const double M = p->M;
+    double *own = p->w->own, *own_xx = own + K;
+    for (int g = 0; g < IMP_DEVIATIONS; g++) {
+        const int a0 = g * p->M / IMP_DEVIATIONS, a1 = (g + 1) * p->M / IMP_DEVIATIONS;
+        const double n = M - (a1 - a0), scale = weight * p->share * sqrt(n / M);
+        const double f = scale / (n * (n - 1)), all = scale / (M * (M - 1));
+        double *H = deviations + (size_t)g * K * K;
+        products(j, p, c, a0, a1, own, own_xx);
+        for (size_t k = 0; k < K; k++) {
+            const double xk = sum[k] - own[k];
+            for (size_t l = 0; l <= k; l++) {
+                const size_t kl = k * K + l;
+                H[kl] += f * (xk * (sum[l] - own[l]) - (xx[kl] - own_xx[kl])) -
+                         all * (sum[k] * sum[l] - xx[kl]);
+            }
+        }
+    }
+}
+
+static void channel_add(const struct imp__normal_job *j, const struct pixel *p, size_t c,
+                        struct imp__normal_sums *out)
+{
+    struct imp__normal_worker *w = p->w;
+    const size_t K = j->K, S = (size_t)seen_channels(j);
+    const int half = p->M / 2;
+    const double M = p->M, pairs = M * (M - 1), n0 = half, n1 = M - half;
+    double factor[IMP_NORMAL_UNITS];
+    const double weight = residuals(j, p, c, factor);
+    const bool quadratic = imp__loss_quadratic(j->target->desc.loss);
+    const bool known = j->target->noise_se != NULL;
+    const double sigma = known ? j->target->noise_se[p->index * S + c] : 0;
+    double *sum = w->sum, *xx = w->sum_xx, *sum1 = w->sum1, *xx1 = w->sum1_xx;
+    w->weight[c] = weight;
+    products(j, p, c, 0, half, sum, xx);
+    products(j, p, c, half, p->M, sum1, xx1);
+    /* Of each half: (J^T J of it) (squared residual of the other). */
+    const double meas = 0.5 * weight * weight * p->share;
+    const double m0 =
+        known ? 0 : meas / (n0 * (n0 - 1)) * square_residual(p, c, half, p->M);
+    const double m1 = known ? 0 : meas / (n1 * (n1 - 1)) * square_residual(p, c, 0, half);
+    const double m = 2 * meas * sigma * sigma / pairs;
+    const double h = weight * p->share / pairs, same = weight * p->share / (M * M);
+    for (size_t k = 0; k < K; k++)
+        for (size_t l = 0; l <= k; l++) {
+            const size_t kl = k * K + l;
+            const double u0 = sum[k] * sum[l] - xx[kl], u1 = sum1[k] * sum1[l] - xx1[kl];
+            const double all = (sum[k] + sum1[k]) * (sum[l] + sum1[l]);
+            const double u = all - xx[kl] - xx1[kl];
+            out->H[kl] += h * u;
+            out->H_same[kl] += same * all;
+            out->H_meas[kl] += known ? m * u : m0 * u0 + m1 * u1;
+        }
+    out->scalars[IMP_NORMAL_CHI2] += weight * p->share * square_residual(p, c, 0, p->M);
+    for (size_t i = 0; i < K * K; i++) xx[i] += xx1[i];
+    for (size_t k = 0; k < K; k++) sum[k] += sum1[k];
+    if (out->deviations) deviations_add(j, p, c, weight, sum, xx, out->deviations);
+    for (size_t k = 0; !quadratic && k < K; k++)
+        for (int a = 0; a < p->M; a++)
+            out->g[k] += p->share * factor[a] * w->X[((size_t)a * S + c) * K + k];
+}
+
+/* ---- The gradient and its noise --------------------------------------------------- */
+
+/* v += 1/2 sum over channels of w (r_a x_b + r_b x_a). */
+static void pair(const struct imp__normal_job *j, const struct pixel *p, int a, int b,
+                 double *v)
+{
+    const struct imp__normal_worker *w = p->w;
+    const size_t K = j->K, S = (size_t)seen_channels(j);
+    for (size_t c = 0; c < S; c++) {
+        const double *xa = w->X + ((size_t)a * S + c) * K;
+        const double *xb = w->X + ((size_t)b * S + c) * K;
+        const double ra = 0.5 * w->weight[c] * w->r[a][c];
+        const double rb = 0.5 * w->weight[c] * w->r[b][c];
+        for (size_t k = 0; k < K; k++) v[k] += ra * xb[k] + rb * xa[k];
+    }
+}
+
+static void square_add(size_t K, double scale, const double *v, double *out)
+{
+    for (size_t k = 0; k < K; k++) {
+        if (v[k] == 0) continue;
+        const double f = scale * v[k];
+        for (size_t l = 0; l <= k; l++) out[k * K + l] += f * v[l];
+    }
+}
+
+/* The mean over pairs, its jackknife, and what that has too much (pair_noise.h). */
+static void gradient_add(const struct imp__normal_job *j, const struct pixel *p,
+                         struct imp__normal_sums *out)
+{
+    struct imp__normal_worker *w = p->w;
+    const size_t K = j->K;
+    const double M = p->M, s2 = p->share * p->share;
+    double *h = w->h, *e = w->e, *total = w->total;
+    memset(h, 0, IMP_NORMAL_PAIRS * K * sizeof *h);
+    memset(e, 0, IMP_NORMAL_UNITS * K * sizeof *e);
+    memset(total, 0, K * sizeof *total);
+    for (int a = 0; a < p->M; a++)
+        for (int b = a + 1; b < p->M; b++, h += K) {
+            pair(j, p, a, b, h);
+            for (size_t k = 0; k < K; k++) {
+                e[(size_t)a * K + k] += h[k];
+                e[(size_t)b * K + k] += h[k];
+                total[k] += h[k];
+            }
+        }
+    if (imp__loss_quadratic(j->target->desc.loss))
+        for (size_t k = 0; k < K; k++)
+            out->g[k] += p->share * total[k] / (M * (M - 1) / 2);
+    for (int a = 0; a < p->M; a++) {
+        double *own = e + (size_t)a * K;
+        for (size_t k = 0; k < K; k++) own[k] = (own[k] - 2 * total[k] / M) / (M - 2);
+        square_add(K, s2 * 4 / (M * (M - 1)), own, out->cov_g);
+    }
+    const double scale = s2 * 4 / (M * (M - 1) * (M - 2) * (M - 3));
+    h = w->h;
+    for (int a = 0; a < p->M; a++)
+        for (int b = a + 1; b < p->M; b++, h += K) {
+            for (size_t k = 0; k < K; k++)
+                h[k] -= total[k] / (M * (M - 1) / 2) + e[(size_t)a * K + k] +
+                        e[(size_t)b * K + k];
+            square_add(K, scale, h, out->cov_excess);
+        }
+}
+
+/* ---- Tiles ------------------------------------------------------------------------ */
 
 enum imp_status imp__normal_work(const struct imp_tile *t, struct imp_tile_worker *tile,
                                  void *result, void *payload)
 {
     struct imp__normal_job *j = payload;
-    struct imp__normal_worker *w = &j->workers[tile->index];
-    const size_t K = j->K;
-    struct imp__normal_sums sums = imp__normal_at(result, K), *out = &sums;
+    struct imp__normal_sums out = imp__normal_at(result, j->K, j->deviate);
     const int b0 = imp__replicates_begin(j->plan, (int)t->part);
     const int b1 = imp__replicates_begin(j->plan, (int)t->part + 1);
     const double R = b1 - b0, all = j->plan.R;
-    memset(result, 0, imp__normal_count(K) * sizeof(double));
+    memset(result, 0, imp__normal_count(j->K, j->deviate) * sizeof(double));
     for (int y = t->y0; y < t->y1; y++)
         for (int x = t->x0; x < t->x1; x++) {
-            double sum = 0, square = 0;
-            memset(w->u, 0, 2 * (size_t)seen_channels(j) * K * K * sizeof(double));
-            memset(w->a, 0, sizeof w->a);
-            for (int b = b0; b < b1; b++) {
-                const double v = replicate(j, tile, out, x, y, b, 1 / all,
-                                           w->g + (size_t)(b - b0) * K);
-                sum += v;
-                square += v * v;
-            }
+            struct pixel p = {.w = &j->workers[tile->index],
+                              .index = (size_t)y * (size_t)j->width + (size_t)x,
+                              .M = units_of((b1 - b0) * j->plan.m),
+                              .share = R / all};
+            units_gather(j, tile, x, y, b0, b1, &p);
             const enum imp_status st = imp__tile_check(tile);
             if (st != IMP_OK) return st;
-            const double spread = R / ((R - 1) * all * all);
-            if (!j->target->noise_se)
-                for (size_t i = 0; i < (size_t)seen_channels(j) * K * K; i++)
-                    out->H_meas[i % (K * K)] +=
-                        (w->a[i / (K * K)] * w->u[i] - w->au[i]) / ((R - 1) * all);
-            out->scalars[IMP_NORMAL_OBJECTIVE] += sum / all;
-            out->scalars[IMP_NORMAL_VARIANCE] += (square - sum * sum / R) * spread;
-            for (size_t k = 0; k < K; k++) {
-                double mean_k = 0;
-                for (int b = 0; b < (int)R; b++) mean_k += w->g[(size_t)b * K + k] / R;
-                out->g[k] += mean_k * R / all;
-                for (size_t m = 0; m <= k; m++) {
-                    double s = 0, mean_m = 0;
-                    for (int b = 0; b < (int)R; b++) {
-                        s += w->g[(size_t)b * K + k] * w->g[(size_t)b * K + m];
-                        mean_m += w->g[(size_t)b * K + m] / R;
-                    }
-                    out->cov_g[k * K + m] += (s - R * mean_k * mean_m) * spread;
-                }
-            }
+            for (size_t c = 0; c < (size_t)seen_channels(j); c++)
+                channel_add(j, &p, c, &out);
+            gradient_add(j, &p, &out);
+            out.scalars[IMP_NORMAL_OBJECTIVE] += p.value / all;
+            out.scalars[IMP_NORMAL_VARIANCE] +=
+                (p.square - p.value * p.value / R) * R / ((R - 1) * all * all);
         }
     return IMP_OK;
 }
@@ -190,7 +331,7 @@ void imp__normal_add(void *into, const void *from, void *payload)
     const struct imp__normal_job *j = payload;
     double *a = into;
     const double *b = from;
-    for (size_t k = 0; k < imp__normal_count(j->K); k++) a[k] += b[k];
+    for (size_t k = 0; k < imp__normal_count(j->K, j->deviate); k++) a[k] += b[k];
 }
 
 enum imp_status imp__normal_take(size_t group, const void *sum, void *payload)

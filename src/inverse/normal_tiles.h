@@ -7,6 +7,13 @@
 #include "film/film_tiles.h"
 #include "gauss_newton.h"
 
+/* The sets of a pixel are put together to so many units at most, and to fewer where their
+ * number asks for it; all pairs of units are multiplied. */
+enum {
+    IMP_NORMAL_UNITS = 16,
+    IMP_NORMAL_PAIRS = IMP_NORMAL_UNITS * (IMP_NORMAL_UNITS - 1) / 2
+};
+
 struct imp__normal_job {
     const struct imp_problem *problem;
     const struct imp__target *target;
@@ -14,36 +21,38 @@ struct imp__normal_job {
     struct imp__replicates plan;
     int width, channels;
     size_t K;
+    bool deviate; /* the deviations of J^T W J, too */
     struct imp_tiles tiles;
     struct imp__normal_worker {
-        double *x;      /* [K][channels] of one walk, or set: mean */
-        double *sum_x;  /* [K][seen] of a replicate */
-        double *sum_lx; /* [K][seen] */
-        double *sum_xx; /* [seen][K*K] */
-        double *g;      /* [R][K] of a pixel */
-        double *u, *au; /* [seen][K*K] of a pixel: sums over its replicates of w^2 J^T J,
-                           and of that times the replicate's squared residual */
-        double a[3];    /* sum over replicates of squared residuals */
-        double *each_x; /* [n][K][channels] of all walks, for losses that are not
-                           quadratic; NULL: there are none */
+        double *x;              /* [K][channels] of one set: mean */
+        double *X;              /* [units][seen][K] of a pixel */
+        double *sum, *sum_xx;   /* [K], [K*K] of a channel: over half of the units */
+        double *sum1, *sum1_xx; /* and over the other half */
+        double *own;            /* [K], [K*K] of a group of units */
+        double *h, *e, *total;  /* [pairs][K], [units][K], [K] of the gradient */
+        double r[IMP_NORMAL_UNITS][3]; /* radiance, then residual of a unit */
+        double weight[3];
         imp_spec L[IMP_BATCH_MAX], P[IMP_BATCH_MAX];
     } * workers;
-    double *total, *excess; /* [imp__normal_count]; [K*K] of wide filters alone */
+    double *total; /* [imp__normal_count] */
 };
 
-static inline size_t imp__normal_count(size_t K)
+static inline size_t imp__normal_count(size_t K, bool deviate)
 {
-    return 4 * K * K + K + IMP_NORMAL_SCALARS;
+    return (5 + (deviate ? IMP_DEVIATIONS : 0)) * K * K + K + IMP_NORMAL_SCALARS;
 }
 
-static inline struct imp__normal_sums imp__normal_at(double *p, size_t K)
+static inline struct imp__normal_sums imp__normal_at(double *p, size_t K, bool deviate)
 {
-    return (struct imp__normal_sums){.H = p,
-                                     .H_same = p + K * K,
-                                     .H_meas = p + 2 * K * K,
-                                     .cov_g = p + 3 * K * K,
-                                     .g = p + 4 * K * K,
-                                     .scalars = p + 4 * K * K + K};
+    return (struct imp__normal_sums){
+        .H = p,
+        .H_same = p + K * K,
+        .H_meas = p + 2 * K * K,
+        .cov_g = p + 3 * K * K,
+        .cov_excess = p + 4 * K * K,
+        .g = p + 5 * K * K,
+        .scalars = p + 5 * K * K + K,
+        .deviations = deviate ? p + 5 * K * K + K + IMP_NORMAL_SCALARS : NULL};
 }
 
 /* For imp__tiles_run. */

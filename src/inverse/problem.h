@@ -164,8 +164,9 @@ struct imp__gauss_newton {
     double *g, *g_se; /* [K] leave-one-out gradient of the data term, standard errors; or
                          NULL */
     double *cov_g;    /* [K*K] covariance of g, too large by */
-    double *cov_excess; /* [K*K] this, unbiased (0 but through filters wider than a
-                           pixel: pair_noise.h); or NULL both */
+    double *cov_excess; /* [K*K] this, unbiased (pair_noise.h); or NULL both */
+    double *deviations; /* [IMP_DEVIATIONS][K*K] of H (search/optimize.h); or NULL */
+    int rounds;         /* set by the caller: so many times the samples; 0: once */
     struct imp_estimate objective; /* data term */
     double chi2;                   /* sum w (mean - T)^2 - w Var(mean), unbiased */
     double n_residuals;

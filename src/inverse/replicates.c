@@ -5,8 +5,10 @@
 #include "loss.h"
 #include "walk/run.h"
 #include "walk/store.h"
+#include <math.h>
 
-#define WIDE_MANY 16 /* samples per pixel */
+#define WIDE_MANY    16  /* samples per pixel */
+#define NORMAL_CHUNK 512 /* samples of a pixel, all pairs of which are products */
 
 /* Sets of points in a replicate: two for a product of independent means, more for the
  * jackknife of a loss that is not quadratic. A fixed adjoint needs one. */
@@ -91,16 +93,22 @@ struct imp__replicates imp__replicates_of(const struct imp_scene *scene,
 
 struct imp__replicates imp__replicates_normal(const struct imp_scene *scene,
                                               const struct imp__target *t,
-                                              const struct imp_run *run)
+                                              const struct imp_run *run, int rounds)
 {
     const struct imp_sensor *sensor = sensor_of(scene, t, run);
     const int sets =
         imp__points_of(sensor, run) == IMP_POINTS_SOBOL ? sets_of(t, run) : 0;
     const int spp = imp_max(spp_of(sensor, run), 4);
-    if (imp__film_border(&sensor->film) == 0)
-        return box_plan(spp, sets ? sets * IMP_SET_POINTS : IMP_BATCH_MAX, sets);
-    struct imp__replicates r = {.R = spp < 8 ? 4 : IMP_WIDE_REPLICATES, .chunks = 1};
-    r.n = (spp - 1) / r.R + 1;
+    struct imp__replicates r;
+    if (imp__film_border(&sensor->film) == 0) {
+        r = box_plan(spp, sets ? sets * IMP_SET_POINTS : IMP_BATCH_MAX, sets);
+        r.R *= rounds;
+        r.chunks = imp_max(1, (int)((int64_t)r.R * r.n / NORMAL_CHUNK));
+        return r;
+    }
+    const double all = fmin((double)spp * rounds, 1 << 26);
+    r = (struct imp__replicates){.R = all < 8 ? 4 : IMP_WIDE_REPLICATES, .chunks = 1};
+    r.n = ((int)all - 1) / r.R + 1;
     return in_sets(r, sets ? SETS_FIXED : 0);
 }
 

@@ -70,11 +70,13 @@ static int progress(const struct imp_progress *p, void *payload)
 }
 
 static enum imp_status replicates(struct wide *w, const struct imp_tracer *tracer,
-                                  const struct imp_run *run, double lo, double hi)
+                                  const struct imp_run *run, int rounds, double lo,
+                                  double hi)
 {
     enum imp_status st = IMP_OK;
     const int n = (int)(w->K + 1) * w->channels;
-    const struct imp__replicates plan = imp__replicates_normal(tracer->scene, w->of, run);
+    const struct imp__replicates plan =
+        imp__replicates_normal(tracer->scene, w->of, run, rounds);
     w->R = plan.R;
     char *names = imp__alloc(w->ctx, (size_t)n, 12);
     if (!names) IMP_TRY(imp__error(w->ctx, IMP_E_NOMEM, "no memory"));
@@ -107,14 +109,16 @@ out:
 
 /* A walk from a light reaches many pixels, whatever the filter. */
 static enum imp_status light_replicates(struct wide *w, const struct imp_tracer *tracer,
-                                        const struct imp_run *run, double lo, double hi)
+                                        const struct imp_run *run, int rounds, double lo,
+                                        double hi)
 {
     const size_t pixels = (size_t)w->width * (size_t)w->height;
-    const int spp = imp_max(run->spp > 0 ? run->spp : tracer->sensor->spp, 4);
+    const int64_t spp =
+        (int64_t)imp_max(run->spp > 0 ? run->spp : tracer->sensor->spp, 4) * rounds;
     struct imp_run own = *run;
     own.time_limit_s = 0;
     w->R = spp < 8 ? 4 : MANY;
-    const int64_t walks = (int64_t)((spp - 1) / w->R + 1) * (int64_t)pixels;
+    const int64_t walks = ((spp - 1) / w->R + 1) * (int64_t)pixels;
     const size_t n = pixels * (w->K + 1) * (size_t)w->channels;
     const enum imp_status fits =
         imp__memory_check(w->ctx, (double)w->R * (double)n * sizeof(double),
@@ -186,6 +190,21 @@ static void jackknife(const struct wide *w, size_t pixel, int c, double S, doubl
 
 /* ---- H, g, and the gradient's own noise ---------------------------------------- */
 
+/* ((R - 1)/R)^(1/2) times the change of H when one replicate is left out; pairs: sum of
+ * X_k X_m over pairs of replicates. */
+static void deviations_add(const struct wide *w, size_t k, size_t m, double weight,
+                           double pairs, double *deviations)
+{
+    const size_t K = w->K;
+    const double R = w->R, scale = weight * sqrt((R - 1) / R);
+    for (int b = 0; b < w->R; b++) {
+        const double xk = w->X[(size_t)b * K + k], xm = w->X[(size_t)b * K + m];
+        const double without = pairs - xk * (w->sum[m] - xm) - xm * (w->sum[k] - xk);
+        deviations[((size_t)b * K + k) * K + m] +=
+            scale * (without / ((R - 1) * (R - 2)) - pairs / (R * (R - 1)));
+    }
+}
+
 static void pixel_add(struct wide *w, int px, int py, int c, struct imp__normal_sums *out)
 {
     const size_t pixel = (size_t)py * (size_t)w->width + (size_t)px;
@@ -226,6 +245,8 @@ static void pixel_add(struct wide *w, int px, int py, int c, struct imp__normal_
             const double product = w->sum[k] * w->sum[m];
             out->H[k * K + m] += weight * (product - xx) / (R * (R - 1));
             out->H_same[k * K + m] += weight * product / (R * R);
+            if (out->deviations)
+                deviations_add(w, k, m, weight, product - xx, out->deviations);
         }
     }
 }
@@ -352,8 +373,8 @@ static enum imp_status buffers(struct wide *w)
 enum imp_status imp__gauss_newton_wide(const struct imp_problem *p,
                                        const struct imp_tracer *tracer,
                                        const struct imp__target *target,
-                                       const struct imp_run *run, double lo, double hi,
-                                       struct imp__normal_sums *out)
+                                       const struct imp_run *run, int rounds, double lo,
+                                       double hi, struct imp__normal_sums *out)
 {
     enum imp_status st = IMP_OK;
     struct wide w = {.ctx = p->ctx,
@@ -370,8 +391,8 @@ enum imp_status imp__gauss_newton_wide(const struct imp_problem *p,
                      .K = p->n};
     IMP_TRY(buffers(&w));
     const bool lights = tracer->integrator->from_lights;
-    IMP_TRY(lights ? light_replicates(&w, tracer, run, lo, hi)
-                   : replicates(&w, tracer, run, lo, hi));
+    IMP_TRY(lights ? light_replicates(&w, tracer, run, rounds, lo, hi)
+                   : replicates(&w, tracer, run, rounds, lo, hi));
     IMP_TRY(imp__pair_noise_create(w.ctx, lights ? 1 : w.width, lights ? 1 : w.height,
                                    w.R, w.K, &w.noise));
     normal_add(&w, out);

@@ -16,8 +16,8 @@ enum imp_status imp__basis_matrix(const struct imp__goal *goal, const double *x,
 
     *known = false;
     if (!goal->normal || n < 2 || n > IMP_BASIS_MAX) return IMP_OK;
-    IMP_TRY(imp__normal_create(goal->ctx, n, &eq));
-    st = goal->normal(x, seed, &eq, goal->payload);
+    IMP_TRY(imp__normal_create(goal->ctx, n, false, &eq));
+    st = goal->normal(x, seed, 1, &eq, goal->payload);
     if (st == IMP_E_UNSUPPORTED || st == IMP_E_NUMERIC) { /* then without */
         st = IMP_OK;
         goto out;

@@ -15,12 +15,17 @@
 #include "covariance.h"
 #include "directions.h"
 #include "excess.h"
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
 #define Z_TWO_SIDED 1.959963984540054
 #define Z_ONE_SIDED 1.6448536269514722
 #define SEED_BASE   0x40000000 /* iteration numbers no search reaches */
+
+/* Samples are taken in two stages: FIRST rounds, and as many more as the first asks for. */
+enum { FIRST = 2, STAGES = 2 };
+#define ENOUGH 0.2 /* Monte Carlo's variance over the measurement's: then no more */
 
 void imp__uncertainty_destroy(imp_context *ctx, struct imp__uncertainty *u)
 {
@@ -38,12 +43,13 @@ static enum imp_status no_memory(imp_context *ctx)
     return imp__error(ctx, IMP_E_NOMEM, "no memory for a covariance");
 }
 
-/* ---- Replicates ---------------------------------------------------------------- */
+/* ---- Samples -------------------------------------------------------------------- */
 
 static void sampled_destroy(struct imp__sampled *s)
 {
     imp__normal_destroy(s->ctx, &s->mean);
-    imp__release(s->ctx, s->H_each);
+    imp__release(s->ctx, s->cov);
+    imp__release(s->ctx, s->deviations);
     imp__release(s->ctx, s->scale);
 }
 
@@ -51,41 +57,69 @@ static enum imp_status sampled_create(const struct imp__goal *goal, const double
                                       struct imp__sampled *s)
 {
     const size_t n = s->n;
-    const enum imp_status st = imp__normal_create(s->ctx, n, &s->mean);
+    const enum imp_status st = imp__normal_create(s->ctx, n, false, &s->mean);
     if (st != IMP_OK) return st;
-    s->H_each = imp__alloc(s->ctx, (size_t)s->replicates * n * n, sizeof *s->H_each);
+    s->cov = imp__alloc(s->ctx, 3 * n * n + n, sizeof *s->cov);
+    s->deviations = imp__alloc(s->ctx, STAGES * IMP_DEVIATIONS * n * n, sizeof(double));
     s->scale = imp__alloc(s->ctx, n, sizeof *s->scale);
-    if (!s->H_each || !s->scale) return no_memory(s->ctx);
+    if (!s->cov || !s->deviations || !s->scale) return no_memory(s->ctx);
+    s->excess = s->cov + n * n;
+    s->last_cov = s->excess + n * n;
+    s->last_g = s->last_cov + n * n;
     for (size_t k = 0; k < n; k++) s->scale[k] = fmax(fabs(x[k]), goal->scale[k]);
     return IMP_OK;
 }
 
+static void mix(size_t count, double own, double *mean, double part, const double *more)
+{
+    for (size_t i = 0; i < count; i++) mean[i] = own * mean[i] + part * more[i];
+}
+
+/* From a gradient at `at` to that of the same quadratic at x. */
+static void shift(size_t n, const double *x, const double *at, struct imp__normal *e)
+{
+    for (size_t k = 0; k < n; k++) {
+        double change = 0;
+        for (size_t l = 0; l < n; l++) change += e->H[k * n + l] * (x[l] - at[l]);
+        e->chi2 += (2 * e->g[k] + change) * (x[k] - at[k]);
+    }
+    for (size_t k = 0; k < n; k++)
+        for (size_t l = 0; l < n; l++) e->g[k] += e->H[k * n + l] * (x[l] - at[l]);
+}
+
+/* More samples, taken at `at`, of the normal equations at x: means are weighted by the
+ * samples that they are of. */
 static enum imp_status sample(const struct imp__goal *goal, const double *x,
+                              const double *at, uint64_t seed, int rounds,
                               struct imp__sampled *s)
 {
     enum imp_status st = IMP_OK;
-    const size_t n = s->n, nn = n * n;
-    const double r = 1.0 / s->replicates;
-    struct imp__normal one = {0}, *sum = &s->mean;
+    const size_t n = s->n, nn = n * n, used = (size_t)s->n_deviations * nn;
+    const double part = (double)rounds / (s->rounds + rounds), own = 1 - part;
+    struct imp__normal one = {0}, *mean = &s->mean;
 
-    IMP_TRY(imp__normal_create(s->ctx, n, &one));
-    for (int b = 0; b < s->replicates; b++) {
-        IMP_TRY(
-            goal->normal(x, imp__search_seed(goal, SEED_BASE, b), &one, goal->payload));
-        for (size_t i = 0; i < nn; i++) {
-            s->H_each[(size_t)b * nn + i] = one.H[i] - one.H_prior[i];
-            sum->H[i] += r * one.H[i];
-            sum->H_prior[i] += r * one.H_prior[i];
-            sum->H_meas[i] += r * one.H_meas[i];
-            sum->cov_g[i] += r * r * one.cov_g[i]; /* of the mean of independent ones */
-            sum->cov_excess[i] += r * r * one.cov_excess[i];
-        }
-        for (size_t k = 0; k < n; k++) sum->g[k] += r * one.g[k];
-        sum->chi2 += r * one.chi2;
-        sum->n_residuals = one.n_residuals;
-        sum->noise_known = one.noise_known;
-    }
-    IMP_TRY(imp__excess_take(s->ctx, n, sum->cov_g, sum->cov_excess));
+    IMP_TRY(imp__normal_create(s->ctx, n, true, &one));
+    IMP_TRY(goal->normal(at, seed, rounds, &one, goal->payload));
+    memcpy(s->last_g, one.g, n * sizeof *s->last_g);
+    memcpy(s->last_cov, one.cov_g, nn * sizeof *s->last_cov);
+    IMP_TRY(imp__excess_take(s->ctx, n, s->last_cov, one.cov_excess));
+    if (at != x) shift(n, x, at, &one);
+    mix(nn, own, mean->H, part, one.H);
+    mix(nn, own, mean->H_prior, part, one.H_prior);
+    mix(nn, own, mean->H_meas, part, one.H_meas);
+    mix(n, own, mean->g, part, one.g);
+    mix(1, own, &mean->chi2, part, &one.chi2);
+    mix(nn, own * own, s->cov, part * part, one.cov_g);
+    mix(nn, own * own, s->excess, part * part, one.cov_excess);
+    for (size_t i = 0; i < used; i++) s->deviations[i] *= own;
+    for (size_t i = 0; i < IMP_DEVIATIONS * nn; i++)
+        s->deviations[used + i] = part * one.deviations[i];
+    s->n_deviations += IMP_DEVIATIONS;
+    s->rounds += rounds;
+    mean->n_residuals = one.n_residuals;
+    mean->noise_known = one.noise_known;
+    memcpy(mean->cov_g, s->cov, nn * sizeof *s->cov);
+    IMP_TRY(imp__excess_take(s->ctx, n, mean->cov_g, s->excess));
 out:
     imp__normal_destroy(s->ctx, &one);
     return st;
@@ -165,36 +199,33 @@ static enum imp_status newton_point(const struct imp__sampled *s, const double *
     return IMP_OK;
 }
 
-/* Is q = g^T G g no more than noise of g alone makes it? Its mean is then tr(G C) and its
- * variance 2 tr((G C)^2), C the covariance of g. */
-static bool within_noise(const struct imp__sampled *s, const struct imp__directions *a)
+/* q = g^T G g over the most that noise of g alone makes of it, two standard deviations
+ * above its mean. The mean is tr(G C) and the variance 2 tr((G C)^2), C the covariance of
+ * g. */
+static double over_noise(size_t n, const double *G, const double *g, const double *C)
 {
-    const size_t n = s->n;
-    const double *g = s->mean.g, *C = s->mean.cov_g;
     double q = 0, mean = 0, half_var = 0;
     for (size_t k = 0; k < n; k++)
         for (size_t l = 0; l < n; l++) {
             double kl = 0, lk = 0; /* of G C */
             for (size_t p = 0; p < n; p++) {
-                kl += a->G[k * n + p] * C[p * n + l];
-                lk += a->G[l * n + p] * C[p * n + k];
+                kl += G[k * n + p] * C[p * n + l];
+                lk += G[l * n + p] * C[p * n + k];
             }
-            q += g[k] * a->G[k * n + l] * g[l];
+            q += g[k] * G[k * n + l] * g[l];
             mean += k == l ? kl : 0;
             half_var += kl * lk;
         }
-    return q <= mean + 2 * sqrt(2 * half_var);
+    return q <= 0 ? 0 : q / fmax(mean + 2 * sqrt(fmax(2 * half_var, 0)), DBL_MIN);
 }
 
 /* Is the Newton point worth going to? A model that fails at x (not converged, far outside
  * its range) must not throw away what the search found. */
 static enum imp_status accept(const struct imp__goal *goal, const double *x,
-                              double *point, bool *yes)
+                              uint64_t seed, const double *point, bool *yes)
 {
     struct imp_estimate old, new;
-    const uint64_t seed = imp__search_seed(goal, SEED_BASE, 63);
     enum imp_status st = IMP_OK;
-    for (size_t k = 0; k < goal->n; k++) point[k] = imp__into_bounds(goal, k, point[k]);
     IMP_TRY(goal->eval(x, seed, &old, NULL, NULL, goal->payload));
     IMP_TRY(goal->eval(point, seed, &new, NULL, NULL, goal->payload));
     *yes = new.value <= old.value + 2 * sqrt(old.se * old.se + new.se *new.se);
@@ -283,75 +314,173 @@ static enum imp_status uncertainty_create(imp_context *ctx, size_t n,
                : no_memory(ctx);
 }
 
+/* What the samples so far say. */
+struct answer {
+    struct imp__directions every, free; /* of all variables; of those that may move */
+    double *wish;                       /* [n] Newton's point without bounds */
+    double *measurement, *monte_carlo;  /* [n][n] of `every`; u has those of `free` */
+    bool *fixed;                        /* [n] */
+    double kappa;
+};
+
+static void answer_destroy(imp_context *ctx, struct answer *a)
+{
+    imp__directions_destroy(ctx, &a->every);
+    imp__directions_destroy(ctx, &a->free);
+    imp__release(ctx, a->fixed);
+    imp__release(ctx, a->wish);
+}
+
+static enum imp_status answer_create(imp_context *ctx, size_t n, struct answer *a)
+{
+    a->fixed = imp__alloc(ctx, n, sizeof *a->fixed);
+    a->wish = imp__alloc(ctx, n + 2 * n * n, sizeof *a->wish);
+    if (!a->fixed || !a->wish) return no_memory(ctx);
+    a->measurement = a->wish + n;
+    a->monte_carlo = a->measurement + n * n;
+    return IMP_OK;
+}
+
+/* u->x: Newton's point, bounds kept, not looked at yet. */
+static enum imp_status answer_find(const struct imp__goal *goal,
+                                   const struct imp__sampled *s, const double *x,
+                                   double *noise, struct answer *a,
+                                   struct imp__uncertainty *u)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = goal->ctx;
+    const size_t n = s->n;
+    /* All variables: for the condition, and for those that press against a bound. */
+    imp__directions_destroy(ctx, &a->every);
+    IMP_TRY(imp__directions_find(s, NULL, &a->every));
+    IMP_TRY(newton_point(s, x, &a->every, a->wish));
+    IMP_TRY(newton_free(goal, s, x, a->fixed, &a->free, u->x));
+    const bool known = s->mean.noise_known;
+    a->kappa = known ? noise_ratio(s) : noise_scale(s, &a->free);
+    u->noise_scale = known ? 0 : a->kappa;
+    for (size_t i = 0; i < n * n; i++)
+        noise[i] = known ? s->mean.H_meas[i]
+                         : u->noise_scale * (s->mean.H[i] - s->mean.H_prior[i]);
+    IMP_TRY(sandwich(ctx, n, a->free.G, noise, u->measurement));
+    IMP_TRY(sandwich(ctx, n, a->free.G, s->mean.cov_g, u->monte_carlo));
+    IMP_TRY(sandwich(ctx, n, a->every.G, noise, a->measurement));
+    IMP_TRY(sandwich(ctx, n, a->every.G, s->mean.cov_g, a->monte_carlo));
+    IMP_TRY(prior_add(s, &a->free, a->kappa, u->measurement));
+    IMP_TRY(prior_add(s, &a->every, a->kappa, a->measurement));
+out:
+    return st;
+}
+
+/* Rounds that are missing until no variable's variance is more than ENOUGH Monte Carlo's,
+ * if that falls as 1/samples: 0 to `most`. */
+static int rounds_missing(const struct imp__sampled *s, const struct answer *a,
+                          const struct imp__uncertainty *u, int most)
+{
+    double worst = 0;
+    for (size_t k = 0; k < s->n; k++) {
+        const size_t d = k * s->n + k;
+        const double *measurement = a->fixed[k] ? a->measurement : u->measurement;
+        const double *monte_carlo = a->fixed[k] ? a->monte_carlo : u->monte_carlo;
+        const struct imp__directions *of = a->fixed[k] ? &a->every : &a->free;
+        if (imp__is_loose(of, k) && !of->held) return most; /* or is it noise? */
+        if (monte_carlo[d] > 0)
+            worst = fmax(worst, monte_carlo[d] / fmax(measurement[d], DBL_MIN));
+    }
+    if (worst <= ENOUGH) return 0;
+    return (int)fmin(ceil(s->rounds * (worst / ENOUGH - 1)), most);
+}
+
+/* The samples that are missing, at Newton's point of those that are there. H0, a linear
+ * model: the gradient there is the noise of both. */
+static enum imp_status newton_samples(const struct imp__goal *goal, const double *x,
+                                      int missing, struct imp__sampled *s,
+                                      const struct answer *a, struct imp__uncertainty *u)
+{
+    enum imp_status st = IMP_OK;
+    const size_t n = s->n, nn = n * n;
+    double *work = imp__alloc(s->ctx, n + nn, sizeof *work);
+    if (!work) IMP_TRY(no_memory(s->ctx));
+    double *at = work, *C = work + n;
+    for (size_t k = 0; k < n; k++) at[k] = imp__into_bounds(goal, k, u->x[k]);
+    memcpy(C, s->last_cov, nn * sizeof *C);
+    IMP_TRY(sample(goal, x, at, imp__search_seed(goal, SEED_BASE, 1), missing, s));
+    for (size_t i = 0; i < nn; i++) C[i] += s->last_cov[i];
+    u->is_linear = over_noise(n, a->free.G, s->last_g, C) <= 1;
+out:
+    imp__release(s->ctx, work);
+    return st;
+}
+
 enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
-                                int replicates, double share,
+                                const struct imp__rounds *rounds,
                                 struct imp_fit_variable *variables,
                                 struct imp__uncertainty *out)
 {
     enum imp_status st = IMP_OK;
     imp_context *ctx = goal->ctx;
     const size_t n = goal->n;
-    struct imp__sampled s = {.ctx = ctx, .n = n, .replicates = replicates};
-    struct imp__directions every = {0}, free = {0};
+    struct imp__sampled s = {.ctx = ctx, .n = n};
+    struct answer a = {0};
     struct imp__uncertainty u = {0};
-    bool *fixed = imp__alloc(ctx, n, sizeof *fixed), go = false;
-    double *wish = imp__alloc(ctx, n + 2 * n * n, sizeof *wish); /* without the bounds */
+    double *noise = imp__alloc(ctx, n * n, sizeof *noise);
+    const int first = rounds->at_newton ? 1 : imp_min(FIRST, rounds->most);
+    const int more = rounds->most - first;
+    bool go = false;
 
-    if (!fixed || !wish) IMP_TRY(no_memory(ctx));
-    double *measurement = wish + n, *monte_carlo = measurement + n * n;
+    *out = (struct imp__uncertainty){0};
+    if (!noise) IMP_TRY(no_memory(ctx));
+    IMP_TRY(answer_create(ctx, n, &a));
     IMP_TRY(uncertainty_create(ctx, n, &u));
     IMP_TRY(sampled_create(goal, x, &s));
-    IMP_TRY(sample(goal, x, &s));
-
-    /* All variables: for the condition, and for those that press against a bound. */
-    IMP_TRY(imp__directions_find(&s, NULL, &every));
-    IMP_TRY(newton_point(&s, x, &every, wish));
-    IMP_TRY(newton_free(goal, &s, x, fixed, &free, u.x));
-    if (share < 1 && within_noise(&s, &free))
-        for (size_t k = 0; k < n; k++) u.x[k] = x[k] + share * (u.x[k] - x[k]);
-    IMP_TRY(accept(goal, x, u.x, &go));
-    if (!go) memcpy(u.x, x, n * sizeof *x);
-
-    const double kappa = s.mean.noise_known ? noise_ratio(&s) : noise_scale(&s, &free);
-    double *noise = s.mean.H_meas;
-    if (!s.mean.noise_known) {
-        u.noise_scale = kappa;
-        for (size_t i = 0; i < n * n; i++)
-            noise[i] = u.noise_scale * (s.mean.H[i] - s.mean.H_prior[i]);
+    IMP_TRY(sample(goal, x, x, imp__search_seed(goal, SEED_BASE, 0), first, &s));
+    IMP_TRY(answer_find(goal, &s, x, noise, &a, &u));
+    const int missing = rounds_missing(&s, &a, &u, more);
+    if (rounds->at_newton) {
+        IMP_TRY(newton_samples(goal, x, imp_max(missing, 1), &s, &a, &u));
+        if (!u.is_linear) goto out;
+    } else {
+        u.is_linear = true;
+        if (missing > 0)
+            IMP_TRY(
+                sample(goal, x, x, imp__search_seed(goal, SEED_BASE, 1), missing, &s));
     }
-    IMP_TRY(sandwich(ctx, n, free.G, noise, u.measurement));
-    IMP_TRY(sandwich(ctx, n, free.G, s.mean.cov_g, u.monte_carlo));
-    IMP_TRY(sandwich(ctx, n, every.G, noise, measurement));
-    IMP_TRY(sandwich(ctx, n, every.G, s.mean.cov_g, monte_carlo));
-    IMP_TRY(prior_add(&s, &free, kappa, u.measurement));
-    IMP_TRY(prior_add(&s, &every, kappa, measurement));
+    if (s.rounds > first) IMP_TRY(answer_find(goal, &s, x, noise, &a, &u));
+    u.rounds = s.rounds;
+    const double share = s.rounds / (s.rounds + rounds->searched);
+    if (share < 1 && over_noise(n, a.free.G, s.mean.g, s.mean.cov_g) <= 1)
+        for (size_t k = 0; k < n; k++) u.x[k] = x[k] + share * (u.x[k] - x[k]);
+    for (size_t k = 0; k < n; k++) u.x[k] = imp__into_bounds(goal, k, u.x[k]);
+    if (!rounds->at_newton) {
+        IMP_TRY(accept(goal, x, imp__search_seed(goal, SEED_BASE, 63), u.x, &go));
+        if (!go) memcpy(u.x, x, n * sizeof *x);
+    }
 
-    memcpy(u.G, free.G, n * n * sizeof *u.G);
-    u.condition = every.values[0] > 0 && !every.loose[0]
-                      ? every.values[n - 1] / every.values[0]
+    memcpy(u.G, a.free.G, n * n * sizeof *u.G);
+    u.condition = a.every.values[0] > 0 && !a.every.loose[0]
+                      ? a.every.values[n - 1] / a.every.values[0]
                       : INFINITY;
-    u.n_loose = (int)every.n_loose;
-    memcpy(u.loosest, every.vectors, n * sizeof *u.loosest);
+    u.n_loose = (int)a.every.n_loose;
+    memcpy(u.loosest, a.every.vectors, n * sizeof *u.loosest);
     for (size_t k = 0; k < n; k++) {
         struct imp_fit_variable *v = &variables[k];
         v->value = u.x[k];
         v->at_bound = imp__at_bound(goal, u.x, k);
-        v->determined = !imp__is_loose(fixed[k] ? &every : &free, k);
-        if (fixed[k])
-            interval_bound(goal, k, wish[k],
-                           standard_error(&every, n, k, measurement, monte_carlo), v);
+        v->determined = !imp__is_loose(a.fixed[k] ? &a.every : &a.free, k);
+        if (a.fixed[k])
+            interval_bound(goal, k, a.wish[k],
+                           standard_error(&a.every, n, k, a.measurement, a.monte_carlo),
+                           v);
         else
             interval_free(goal, k,
-                          standard_error(&free, n, k, u.measurement, u.monte_carlo), v);
+                          standard_error(&a.free, n, k, u.measurement, u.monte_carlo), v);
     }
     *out = u;
-    u = (struct imp__uncertainty){0};
+    u = (struct imp__uncertainty){.is_linear = true};
 out:
+    if (st == IMP_E_NUMERIC && rounds->at_newton && !u.is_linear) st = IMP_OK;
     imp__uncertainty_destroy(ctx, &u);
-    imp__directions_destroy(ctx, &every);
-    imp__directions_destroy(ctx, &free);
+    answer_destroy(ctx, &a);
     sampled_destroy(&s);
-    imp__release(ctx, fixed);
-    imp__release(ctx, wish);
+    imp__release(ctx, noise);
     return st;
 }

@@ -19,17 +19,32 @@ struct imp__uncertainty {
     double *loosest;     /* [n] unit vector, in units of the scales: the worst of them */
     double
         noise_scale; /* estimated variance of the data in units of 1/weight; 0: known */
+    int rounds;      /* samples taken, in those of an evaluation */
+    bool is_linear;  /* the gradient at the first Newton point is 0 within noise */
 };
 
-/* Evaluate the normal equations at x `replicates` (>= 2) times with fresh random numbers.
- * Sets value, se, lo95, hi95, at_bound, determined of variables [n].
+/* Samples, in those of an evaluation by the goal. */
+struct imp__rounds {
+    int most;        /* >= 2 */
+    double searched; /* behind x, where that is an average over a search; 0: it is none */
+    bool at_newton;  /* all but the first are taken at the Newton point of the first */
+};
+
+/* Evaluate the normal equations at x with fresh random numbers: two rounds, and as many
+ * more, up to rounds->most, as bring Monte Carlo's variance below a fifth of the
+ * measurement's. Sets value, se, lo95, hi95, at_bound, determined of variables [n].
  *
- * share: the part of all walks behind the answer that these are; less than 1 where x is
- * an average over a search. If the Newton step is then no longer than its own noise, it
- * is taken by that share only, as the mean of two estimates would be; the errors stated
- * are still those of the whole step, and so an upper bound. */
+ * at_newton, where x is the end of a search with fewer samples, and further away: one round
+ * at x, the others at its Newton point u, all of them behind the answer. Where the model is
+ * linear the gradient at u is 0 but for the noise of both; where it is not, or there is no
+ * u, out->is_linear is false, and nothing else is set.
+ *
+ * Where x is an average over a search, these samples are a part of all that are behind the
+ * answer. If the Newton step is then no longer than its own noise, it is taken by that part
+ * only, as the mean of two estimates would be; the errors stated are still those of the
+ * whole step, and so an upper bound. */
 enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
-                                int replicates, double share,
+                                const struct imp__rounds *rounds,
                                 struct imp_fit_variable *variables,
                                 struct imp__uncertainty *out);
 void imp__uncertainty_destroy(imp_context *ctx, struct imp__uncertainty *u);

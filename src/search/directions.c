@@ -54,11 +54,9 @@ static enum imp_status spectrum(const struct imp__sampled *s, struct imp__direct
         IMP_TRY(imp__error(s->ctx, IMP_E_NUMERIC, "J^T J is not finite"));
     for (size_t j = 0; j < m; j++) {
         double sum = 0;
-        for (int b = 0; b < s->replicates; b++) {
-            const double d = along(s, a, s->H_each + (size_t)b * n * n, j) - a->values[j];
-            sum += d * d;
-        }
-        a->se[j] = sqrt(sum / (s->replicates - 1) / s->replicates);
+        for (int b = 0; b < s->n_deviations; b++)
+            sum += pow(along(s, a, s->deviations + (size_t)b * n * n, j), 2);
+        a->se[j] = sqrt(sum);
         a->loose[j] =
             !(a->values[j] > 2 * a->se[j]) || a->values[j] <= 1e-12 * a->values[m - 1];
         a->n_loose += a->loose[j];

@@ -8,7 +8,9 @@
  * Every iteration has its own random numbers; the trial steps of one iteration share
  * them, so that the gain is not drowned. The search ends when g^T H^-1 g is what noise in
  * g alone would give, twice in a row; the estimate is the average of the two Newton
- * points. */
+ * points. A goal may offer fewer samples for all of this; only that end counts then, and
+ * any other is where the search goes on with those asked for. */
+#include "excess.h"
 #include "math/linalg.h"
 #include "optimize.h"
 #include <math.h>
@@ -21,8 +23,13 @@
 #define NEARER   0.8  /* a step goes this part of the way to a bound, */
 #define TOUCH    1e-3 /* and all of it from this near, in scales */
 
-enum { FIRST };      /* arrays: [n] the first Newton point within noise */
-enum { MU, WITHIN }; /* scalars; WITHIN: iterations within noise, in a row */
+enum { FIRST }; /* arrays: [n] the first Newton point within noise */
+enum {
+    MU,
+    WITHIN,
+    COARSE
+}; /* scalars; WITHIN: iterations within noise, in a row;
+                                COARSE: with fewer samples than were asked for */
 
 struct work {
     struct imp__normal eq;
@@ -44,6 +51,7 @@ static enum imp_status init(const struct imp__goal *goal,
             "Adam",
             IMP_DENSE_MAX, goal->n);
     s->scalar[MU] = MU_START;
+    s->scalar[COARSE] = goal->coarsen != NULL;
     return imp__search_array(s, FIRST, goal->n);
 }
 
@@ -58,7 +66,7 @@ static void work_destroy(imp_context *ctx, struct work *w)
 
 static enum imp_status work_create(imp_context *ctx, size_t n, struct work *w)
 {
-    const enum imp_status st = imp__normal_create(ctx, n, &w->eq);
+    const enum imp_status st = imp__normal_create(ctx, n, false, &w->eq);
     if (st != IMP_OK) return st;
     w->a = imp__alloc(ctx, n * n, sizeof *w->a);
     w->p = imp__alloc(ctx, n * n, sizeof *w->p);
@@ -182,7 +190,8 @@ static enum imp_status iterate(const struct imp__goal *goal,
     double mu = s->scalar[MU];
     bool moved = false, quiet;
 
-    IMP_TRY(goal->normal(s->x, seed, &w->eq, goal->payload));
+    IMP_TRY(goal->normal(s->x, seed, 1, &w->eq, goal->payload));
+    IMP_TRY(imp__excess_take(goal->ctx, n, w->eq.cov_g, w->eq.cov_excess));
     const double f0 = w->eq.f.value;
     free_set(goal, s->x, w);
     if (w->n_free == 0) {
@@ -224,6 +233,18 @@ out:
     return st;
 }
 
+bool imp__search_is_coarse(const struct imp__search *s)
+{
+    return s->kind == IMP_LM && s->scalar[COARSE] != 0;
+}
+
+void imp__search_refine(struct imp__search *s)
+{
+    s->scalar[COARSE] = s->scalar[WITHIN] = 0;
+    s->finished = IMP_FINISH_NOT;
+    s->reason = NULL;
+}
+
 static enum imp_status run(const struct imp__goal *goal,
                            const struct imp__opt_options *options, struct imp__search *s)
 {
@@ -231,10 +252,14 @@ static enum imp_status run(const struct imp__goal *goal,
     struct work w = {0};
     IMP_TRY(work_create(goal->ctx, goal->n, &w));
     while (!s->finished && s->iteration < options->max_iterations) {
+        if (goal->coarsen) goal->coarsen(s->scalar[COARSE] != 0, goal->payload);
         IMP_TRY(iterate(goal, options, s, &w));
+        if (s->finished && s->finished != IMP_FINISH_NOISE && s->scalar[COARSE] != 0)
+            imp__search_refine(s);
         IMP_TRY(imp__search_iterated(goal, s));
     }
 out:
+    if (goal->coarsen) goal->coarsen(false, goal->payload);
     work_destroy(goal->ctx, &w);
     return st;
 }

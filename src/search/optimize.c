@@ -184,19 +184,23 @@ uint64_t imp__search_seed(const struct imp__goal *goal, int i, int k)
                       (uint64_t)k);
 }
 
-enum imp_status imp__normal_create(imp_context *ctx, size_t n, struct imp__normal *out)
+enum imp_status imp__normal_create(imp_context *ctx, size_t n, bool deviate,
+                                   struct imp__normal *out)
 {
     struct imp__normal m = {0};
-    double *all = imp__alloc(ctx, 6 * n * n + n, sizeof *all);
+    const size_t nn = n * n;
+    double *all =
+        imp__alloc(ctx, (deviate ? 6 + IMP_DEVIATIONS : 6) * nn + n, sizeof *all);
     if (!all)
         return imp__error(ctx, IMP_E_NOMEM, "no memory for %zu x %zu matrices", n, n);
     m.H = all;
-    m.H_same = all + n * n;
-    m.H_prior = all + 2 * n * n;
-    m.cov_g = all + 3 * n * n;
-    m.H_meas = all + 4 * n * n;
-    m.cov_excess = all + 5 * n * n;
-    m.g = all + 6 * n * n;
+    m.H_same = all + nn;
+    m.H_prior = all + 2 * nn;
+    m.cov_g = all + 3 * nn;
+    m.H_meas = all + 4 * nn;
+    m.cov_excess = all + 5 * nn;
+    m.g = all + 6 * nn;
+    if (deviate) m.deviations = m.g + n;
     *out = m;
     return IMP_OK;
 }

@@ -15,6 +15,9 @@
 #define IMP_SEARCH_FEW 1024 /* variables, above which Adam's memory counts */
 #define IMP_TRAIL_MAX  64   /* variables, up to which a search keeps where it was */
 
+/* Parts of the walks whose absence shows how noisy a matrix is. */
+enum { IMP_DEVIATIONS = 8 };
+
 /* Normal equations at one x, from one set of random numbers. */
 struct imp__normal {
     double *H;          /* [n][n] Gauss-Newton matrix, unbiased; may be indefinite */
@@ -24,6 +27,9 @@ struct imp__normal {
     double *cov_g;      /* [n][n] its covariance by Monte Carlo, too large by */
     double *cov_excess; /* [n][n] this: unbiased, noisy, less than 2/3 of cov_g */
     double *H_meas;     /* [n][n] its covariance by noise of the data */
+    double
+        *deviations; /* [IMP_DEVIATIONS][n][n] of the data's part of H: their squares add
+                           up to its variance, in every combination; or NULL */
     struct imp_estimate f;
     double chi2; /* sum of weighted squared residuals, Monte Carlo's part taken off */
     double n_residuals;
@@ -54,9 +60,14 @@ struct imp__goal {
      * equal seeds are common random numbers. g and g_se may be NULL. */
     enum imp_status (*eval)(const double *x, uint64_t seed, struct imp_estimate *f,
                             double *g, double *g_se, void *payload);
-    /* For Levenberg-Marquardt and covariances: sets all of `out`. NULL: not offered. */
-    enum imp_status (*normal)(const double *x, uint64_t seed, struct imp__normal *out,
-                              void *payload);
+    /* For Levenberg-Marquardt and covariances: sets all of `out`, from `rounds` >= 1 times
+     * the samples of eval. NULL: not offered. */
+    enum imp_status (*normal)(const double *x, uint64_t seed, int rounds,
+                              struct imp__normal *out, void *payload);
+    /* Levenberg-Marquardt: from here on eval and normal take fewer samples, or those asked
+     * for. A search that ends with fewer has to be looked at (imp__covariance) and may have
+     * to go on (imp__search_refine). NULL: they always take those asked for. */
+    void (*coarsen)(bool fewer, void *payload);
     /* For methods with common random numbers: those of `seed` are drawn at x, and are the
      * ones of all evaluations with this seed until the next draw. NULL: evaluations draw
      * their own. */
@@ -118,6 +129,11 @@ enum imp_status imp__optimize(const struct imp__goal *goal,
                               const struct imp__opt_options *options,
                               struct imp__search *search);
 
+/* Is the search one of Levenberg and Marquardt that has ended with fewer samples than were
+ * asked for? It goes on from where it is, with these. */
+bool imp__search_is_coarse(const struct imp__search *search);
+void imp__search_refine(struct imp__search *search);
+
 /* Sets the reason too. */
 void imp__search_finish(struct imp__search *search, enum imp__finish why);
 /* Variable k at the start of the search, and in its answer so far. */
@@ -171,7 +187,8 @@ enum imp_status imp__search_iterated(const struct imp__goal *goal, struct imp__s
 /* Random numbers of iteration i, purpose k: independent of each other. */
 uint64_t imp__search_seed(const struct imp__goal *goal, int i, int k);
 
-enum imp_status imp__normal_create(imp_context *ctx, size_t n, struct imp__normal *out);
+enum imp_status imp__normal_create(imp_context *ctx, size_t n, bool deviate,
+                                   struct imp__normal *out);
 void imp__normal_destroy(imp_context *ctx, struct imp__normal *normal);
 
 /* Does it keep where it was? Of few variables, unless they stand for others

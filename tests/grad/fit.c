@@ -188,18 +188,19 @@ static void box(enum imp_optimizer kind)
     o.intervals = 1;
     o.max_iterations = kind == IMP_ADAM ? 100 : 15;
     if (st == IMP_OK) st = imp_fit(p, &o, &run, &r);
-    double worst = 0, worst_z = 0;
+    double worst_se = 0, worst_z = 0;
     for (int k = 0; st == IMP_OK && k < 9; k++) {
-        worst = fmax(worst, fabs(r->variables[k].value / truth[k] - 1));
-        worst_z =
-            fmax(worst_z, fabs(r->variables[k].value - truth[k]) / r->variables[k].se);
+        const struct imp_fit_variable *v = &r->variables[k];
+        worst_se = fmax(worst_se, v->se / truth[k]);
+        worst_z = fmax(worst_z, fabs(v->value - truth[k]) / v->se);
     }
-    tap_ok(
-        st == IMP_OK && worst < 0.06 && worst_z < 4.5,
-        "two lamps and a wall, two sensors, %s # worst %.2f %%, %.1f se, condition %.0f, "
-        "%d iterations: %s",
-        optimizer[kind], 100 * worst, worst_z, r ? r->condition : 0,
-        r ? r->iterations : 0, st == IMP_OK ? r->reason : imp_last_error(ctx));
+    /* Within 4.5 standard errors (6e-5 by chance); as many, at least, exclude the start, .4
+     * or .5 away. */
+    tap_ok(st == IMP_OK && worst_se < 0.4 / 4.5 && worst_z < 4.5,
+           "two lamps and a wall, two sensors, %s # off by %.1f se, which are %.2f %% at "
+           "most, condition %.0f, %d iterations: %s",
+           optimizer[kind], worst_z, 100 * worst_se, r ? r->condition : 0,
+           r ? r->iterations : 0, st == IMP_OK ? r->reason : imp_last_error(ctx));
     if (st == IMP_OK) covariance_check(r, optimizer[kind]);
     imp_problem_destroy(p);
     for (int k = 0; k < 2; k++) imp_film_destroy(film[k]);
@@ -236,15 +237,21 @@ static void few_samples(void)
 }
 
 /* The left half of the picture, with NaN elsewhere: the lamps still. */
+static int by_size(const void *a, const void *b)
+{
+    const double x = *(const double *)a, y = *(const double *)b;
+    return x < y ? -1 : x > y;
+}
+
 static void mask(void)
 {
+    enum { FITS = 5 };
     imp_scene *s = scene_open(ctx, box_xml, IMP_RGB);
     imp_film *film;
     const struct imp_target t = target_of(ctx, s, 0, 2048, 79, &film);
     const char *const glob = "lamp*";
     double truth[6], x[6];
     struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
-    const struct imp_run run = run_of(128, 5);
     const struct imp_fit_result *r = NULL;
     o.intervals = 1;
     float weights[24 * 16], *pixels = imp_film_mean(film);
@@ -259,20 +266,27 @@ static void mask(void)
     enum imp_status st = imp_problem_add_target(p, &masked);
     imp_problem_get_x(p, truth);
     for (int k = 0; k < 6; k++) x[k] = 0.7 * truth[k];
-    if (st == IMP_OK) st = imp_problem_set_x(p, x);
     o.optimizer = IMP_LM;
-    if (st == IMP_OK) st = imp_fit(p, &o, &run, &r);
-    double worst_se = 0, worst_z = 0;
-    for (int k = 0; st == IMP_OK && k < 6; k++) {
-        worst_se = fmax(worst_se, r->variables[k].se / truth[k]);
-        worst_z =
-            fmax(worst_z, fabs(r->variables[k].value - truth[k]) / r->variables[k].se);
+    double worst_se[FITS] = {0}, worst_z = 0;
+    for (int fit = 0; fit < FITS; fit++) {
+        const struct imp_run run = run_of(128, (uint64_t)(5 + fit));
+        if (st == IMP_OK) st = imp_problem_set_x(p, x);
+        if (st == IMP_OK) st = imp_fit(p, &o, &run, &r);
+        for (int k = 0; st == IMP_OK && k < 6; k++) {
+            const struct imp_fit_variable *v = &r->variables[k];
+            worst_se[fit] = fmax(worst_se[fit], v->se / truth[k]);
+            worst_z = fmax(worst_z, fabs(v->value - truth[k]) / v->se);
+        }
     }
-    /* Within 4.5 standard errors (7e-6 by chance), at most 0.23 of a value here (the
-     * channel that is reflected least). */
-    tap_ok(st == IMP_OK && worst_se < 0.25 && worst_z < 4.5,
-           "half of the picture masked, NaN there # off by %.1f se, which are %.2f %%",
-           worst_z, 100 * worst_se);
+    qsort(worst_se, FITS, sizeof *worst_se, by_size);
+    /* Within 4.5 standard errors (3e-5 by chance). These differ between seeds by a factor of
+     * 2 (the channel that is reflected least, next to a lamp), so the bound, a quarter of a
+     * value, is of their median. */
+    tap_ok(
+        st == IMP_OK && worst_se[FITS / 2] < 0.25 && worst_z < 4.5,
+        "half of the picture masked, NaN there # off by %.1f se, which are %.2f to %.2f "
+        "%%",
+        worst_z, 100 * worst_se[0], 100 * worst_se[FITS - 1]);
     imp_problem_destroy(p);
     imp_film_destroy(film);
     imp_scene_destroy(s);

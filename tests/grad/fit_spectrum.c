@@ -258,6 +258,21 @@ static void coverage(int fits)
     imp_scene_destroy(s);
 }
 
+/* What the answer x leaves of the targets, by walks that are many: the loss of an answer by
+ * the 512 samples of its fit has a standard error of .0025, which is .09 of the targets. */
+static double left_over(imp_problem *p, imp_film *const *seen, const double *x)
+{
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_estimate J;
+    double square = 0;
+    for (int c = 0; c < 3; c++)
+        for (int i = 0; i < 108; i++) square += pow(imp_film_mean(seen[c])[i], 2);
+    run.spp = 32768;
+    run.seed = 99;
+    test_must(ctx, imp_problem_objective(p, x, &run, &J, NULL, NULL));
+    return sqrt(2 * fmax(J.value, 0) / square);
+}
+
 int main(int argc, char **argv)
 {
     ctx = test_context(0);
@@ -288,10 +303,11 @@ int main(int argc, char **argv)
         }
         const struct imp_fit_result *r = fit(p, prior ? 0.03 : 0, start, 512);
         int open = 0;
-        double rms = 0;
+        double rms = 0, x[N];
         for (int k = 0; k < N; k++) {
             const struct imp_fit_variable *v = &r->variables[k];
             const double error = v->value - macbeth[PATCH].rho[k];
+            x[k] = v->value;
             open += !v->determined;
             if (k >= 5 && k <= 29) rms += error * error / 25; /* 430 to 670 nm */
         }
@@ -300,7 +316,8 @@ int main(int argc, char **argv)
             "# %d iterations, %s; residual %.4f; %d not determined; rms error %.3f; %s\n",
             r->iterations, r->reason, r->residual, open, rms,
             r->warning ? r->warning : "no warning");
-        if (!prior) tap_ok(r->residual < 0.06, "the pictures agree # %.4f", r->residual);
+        const double left = left_over(p, seen, x);
+        if (!prior) tap_ok(left < 0.06, "the pictures agree # %.4f", left);
         if (!prior)
             tap_ok(open > 0 && r->warning,
                    "and the fit says what they do not determine # %d of 36", open);

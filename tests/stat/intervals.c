@@ -6,13 +6,139 @@
 #include "imp_tap.h"
 #include "search/covariance.h"
 #include "toy_goal.h"
+#include <stdlib.h>
 
 static imp_context *ctx;
+
+/* ---- Searches with fewer samples -------------------------------------------------- */
+
+/* The toy in other variables, y = x + bend (x - truth)^2/|truth|; bend 0: linear. */
+struct curved {
+    struct toy toy;
+    struct imp__goal goal;
+    double bend;
+    bool fewer;
+};
+
+static void unbend(const struct curved *c, const double *x, double *y, double *slope)
+{
+    for (int k = 0; k < TOY_N; k++) {
+        const double truth = c->toy.truth[k], d = x[k] - truth;
+        y[k] = x[k] + c->bend * d * d / fabs(truth);
+        slope[k] = 1 + 2 * c->bend * d / fabs(truth);
+    }
+}
+
+static enum imp_status curved_eval(const double *x, uint64_t seed, struct imp_estimate *f,
+                                   double *g, double *g_se, void *payload)
+{
+    struct curved *c = payload;
+    double y[TOY_N], slope[TOY_N];
+    unbend(c, x, y, slope);
+    const enum imp_status st = toy_eval(y, seed, f, g, g_se, &c->toy);
+    for (int k = 0; g && k < TOY_N; k++) g[k] *= slope[k];
+    return st;
+}
+
+static enum imp_status curved_normal(const double *x, uint64_t seed, int rounds,
+                                     struct imp__normal *out, void *payload)
+{
+    struct curved *c = payload;
+    double y[TOY_N], slope[TOY_N];
+    unbend(c, x, y, slope);
+    const enum imp_status st = toy_normal(y, seed, rounds, out, &c->toy);
+    for (size_t k = 0; k < TOY_N; k++) {
+        out->g[k] *= slope[k];
+        for (size_t l = 0; l < TOY_N; l++) {
+            const double both = slope[k] * slope[l];
+            double *const each[] = {out->H, out->H_same, out->cov_g};
+            for (int i = 0; i < 3; i++) each[i][k * TOY_N + l] *= both;
+            for (size_t d = 0; out->deviations && d < IMP_DEVIATIONS; d++)
+                out->deviations[(d * TOY_N + k) * TOY_N + l] *= both;
+        }
+    }
+    return st;
+}
+
+static void fewer(bool yes, void *payload)
+{
+    struct curved *c = payload;
+    c->fewer = yes;
+    c->toy.mc = yes ? 0.6 : 0.3;
+}
+
+static void curved_make(struct curved *c, uint64_t seed, double bend)
+{
+    toy_make(&c->toy, ctx, seed, 0.2, 0.3);
+    c->goal = c->toy.goal;
+    c->goal.eval = curved_eval;
+    c->goal.normal = curved_normal;
+    c->goal.coarsen = fewer;
+    c->goal.payload = c;
+    c->bend = bend;
+    c->fewer = false;
+}
+
+/* From far away, where the samples are taken at a Newton point: of a linear model intervals
+ * hold the truth as often as they say, and nearly all are told as what they are; a curved
+ * one is found out. */
+static void at_newton(double bend)
+{
+    enum { SEEDS = 200 };
+    const struct imp__rounds rounds = {.most = 6, .at_newton = true};
+    int linear = 0, held = 0;
+    for (uint64_t seed = 0; seed < SEEDS; seed++) {
+        struct curved c;
+        struct imp_fit_variable v[TOY_N];
+        struct imp__uncertainty u;
+        double x[TOY_N];
+        curved_make(&c, 5000 + 7 * seed, bend);
+        for (int k = 0; k < TOY_N; k++) x[k] = 0.5 * c.toy.truth[k];
+        if (imp__covariance(&c.goal, x, &rounds, v, &u) != IMP_OK) exit(99);
+        linear += u.is_linear;
+        for (int k = 0; u.is_linear && k < TOY_N; k++)
+            held += v[k].lo95 <= c.toy.truth[k] && c.toy.truth[k] <= v[k].hi95;
+        imp__uncertainty_destroy(ctx, &u);
+    }
+    if (bend > 0) {
+        tap_ok(linear <= SEEDS / 20, "a curved model is found out # all but %d of %d",
+               linear, SEEDS);
+        return;
+    }
+    /* Beyond its mean by two standard deviations is a sum of squares in 2 to 5 %. */
+    tap_ok(linear >= SEEDS * 9 / 10, "a linear model is one # %d of %d", linear, SEEDS);
+    const double share = (double)held / (TOY_N * linear);
+    tap_ok(share >= 0.92 && share <= 0.98, "its 95 %% intervals # cover %.1f %%",
+           100 * share);
+}
+
+static void refined(void)
+{
+    const struct imp__opt_options o = {40, 0.05, 1e-6};
+    struct imp__search *s = NULL;
+    struct curved c;
+    double x0[TOY_N];
+    curved_make(&c, 77, 0);
+    for (int k = 0; k < TOY_N; k++) x0[k] = 0.7 * c.toy.truth[k];
+    if (imp__search_create(&c.goal, IMP_LM, &o, x0, &s) != IMP_OK) exit(99);
+    enum imp_status st = imp__optimize(&c.goal, &o, s);
+    const int before = s->iteration;
+    tap_ok(st == IMP_OK && s->finished == IMP_FINISH_NOISE && imp__search_is_coarse(s) &&
+               !c.fewer,
+           "a search with fewer samples ends within their noise # %d iterations", before);
+    imp__search_refine(s);
+    st = imp__optimize(&c.goal, &o, s);
+    tap_ok(st == IMP_OK && s->finished && !imp__search_is_coarse(s) &&
+               s->iteration > before && !c.fewer,
+           "and goes on with all # %d", s->iteration - before);
+    imp__search_destroy(s);
+}
 
 int main(void)
 {
     if (imp_context_create(NULL, &ctx) != IMP_OK) return 1;
-    enum { SEEDS = 100, REPLICATES = 6 };
+    enum { SEEDS = 100, ROUNDS = 6 };
+    const struct imp__rounds rounds = {.most = ROUNDS};
     struct toy t;
     struct imp_fit_variable v[TOY_N];
     struct imp__uncertainty u;
@@ -27,7 +153,7 @@ int main(void)
         for (int k = 0; k < TOY_N; k++) x0[k] = 0.7 * t.truth[k];
         enum imp_status st = imp__search_create(&t.goal, IMP_LM, &o, x0, &s);
         if (st == IMP_OK) st = imp__optimize(&t.goal, &o, s);
-        if (st == IMP_OK) st = imp__covariance(&t.goal, s->x, REPLICATES, 1, v, &u);
+        if (st == IMP_OK) st = imp__covariance(&t.goal, s->x, &rounds, v, &u);
         if (st != IMP_OK) {
             failed++;
             imp__search_destroy(s);
@@ -39,7 +165,7 @@ int main(void)
             covered[k] += v[k].lo95 <= t.truth[k] && t.truth[k] <= v[k].hi95;
             tap_add(&ratio,
                     v[k].se * v[k].se /
-                        (inv[k * TOY_N + k] * (0.2 * 0.2 + 0.3 * 0.3 / REPLICATES)));
+                        (inv[k * TOY_N + k] * (u.noise_scale + 0.3 * 0.3 / u.rounds)));
         }
         tap_add(&sigma, u.noise_scale);
         imp__uncertainty_destroy(ctx, &u);
@@ -61,7 +187,7 @@ int main(void)
         t.A[p][3] = t.A[p][0] * t.scale[0] / t.scale[3];
     }
     for (int k = 0; k < TOY_N; k++) t.scale[k] = fabs(t.truth[k]);
-    enum imp_status st = imp__covariance(&t.goal, t.truth, REPLICATES, 1, v, &u);
+    enum imp_status st = imp__covariance(&t.goal, t.truth, &rounds, v, &u);
     tap_ok(st == IMP_OK && !v[0].determined && !v[3].determined && v[1].determined &&
                v[2].determined && isnan(v[0].lo95) && isnan(v[3].hi95) && u.n_loose == 1,
            "an ill-posed pair is found # loosest (%.2f %.2f %.2f %.2f), condition %g",
@@ -78,11 +204,15 @@ int main(void)
     double x[TOY_N];
     memcpy(x, t.truth, sizeof x);
     x[2] = t.lo[2];
-    st = imp__covariance(&t.goal, x, REPLICATES, 1, v, &u);
+    st = imp__covariance(&t.goal, x, &rounds, v, &u);
     tap_ok(st == IMP_OK && v[2].at_bound == -1 && v[2].lo95 == t.lo[2] &&
                v[2].hi95 > v[2].lo95 && v[2].determined,
            "at a bound # [%g, %g]", v[2].lo95, v[2].hi95);
     imp__uncertainty_destroy(ctx, &u);
+
+    at_newton(0);
+    at_newton(0.6);
+    refined();
     imp_context_destroy(ctx);
     return tap_done();
 }

@@ -157,13 +157,14 @@ static void valley(void)
  * I = p (a^2/(theta^2 + a^2)^2 + 1/4). From afar, Newton's step for a lands
  * beyond the bound 1e-4, where the lobe is out of everybody's sight and lowers the
  * objective all the same, and where noise of its gradient, of 0.3/a, ends the search. */
-static enum imp_status lobe_normal(const double *x, uint64_t seed,
+static enum imp_status lobe_normal(const double *x, uint64_t seed, int rounds,
                                    struct imp__normal *out, void *payload)
 {
     const double truth[2] = {0.2, 10};
     const double a2 = x[0] * x[0], *lamp = &x[1];
     double value = 0, g[2] = {0}, h[4] = {0};
     (void)payload;
+    (void)rounds;
     for (int p = 0; p < 20; p++) {
         const double t = 0.05 * (p + 1), t2 = t * t, q = t2 + a2;
         const double s = t2 + truth[0] * truth[0];
@@ -201,7 +202,7 @@ static enum imp_status lobe_eval(const double *x, uint64_t seed, struct imp_esti
                              .cov_g = none[2],
                              .g = none[3]};
     (void)g_se;
-    lobe_normal(x, seed, &eq, payload);
+    lobe_normal(x, seed, 1, &eq, payload);
     if (g) memcpy(g, eq.g, 2 * sizeof *g);
     *f = eq.f;
     return IMP_OK;
