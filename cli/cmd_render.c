@@ -8,6 +8,7 @@
 #include "output.h"
 #include "progress.h"
 #include "proof.h"
+#include "wanted.h"
 
 #include <errno.h>
 #include <limits.h>
@@ -20,6 +21,7 @@
 static struct {
     struct picture_options picture;
     int pixel[2], sample, count, denoise, sampling;
+    double until;
     const char *paths;
 } o = {.pixel = {NO_PIXEL, NO_PIXEL}};
 
@@ -44,6 +46,9 @@ static const struct arg_option options[] = {
      NULL},
     {ARG_INT, 0, "count", "N", "number of walks for --paths (default 100)", &o.count, 1,
      1e7, NULL},
+    {ARG_NUMBER, 0, "until", "REL",
+     "take samples, at most --spp, until the picture is this close, in 95 of 100 cases",
+     &o.until, 1e-6, 10, NULL},
     {ARG_FLAG, 0, "verify-sampling", NULL,
      "compare the picture with one of uniform directions, and tell who delivers its "
      "light",
@@ -142,7 +147,7 @@ static int sampling_check(const struct imp_run *run, struct sampling *s)
 }
 
 static void report(const char *path, imp_film *film, const struct imp_run *run,
-                   const struct sampling *sampling)
+                   const struct sampling *sampling, const struct imp_until_end *end)
 {
     struct imp_film_info info = {.size = sizeof info};
     imp_film_get_info(film, &info);
@@ -152,6 +157,7 @@ static void report(const char *path, imp_film *film, const struct imp_run *run,
             : info.spp
                 ? ", interrupted"
                 : ", interrupted in the first pass: a part of the picture is there");
+    if (o.until > 0) until_say("picture", end);
     report_drops(&info);
     if (!cli.json && sampling->rows) check_rows_print(sampling->rows, sampling->n);
     if (!cli.json || !strcmp(path, "-")) return;
@@ -163,6 +169,7 @@ static void report(const char *path, imp_film *film, const struct imp_run *run,
     json_integer(&j, "spp", info.spp);
     json_seed(&j, "dropped", info.dropped);
     json_bool(&j, "complete", !progress_interrupted());
+    if (o.until > 0) until_json(&j, o.until, end);
     json_array(&j, "channels");
     const size_t n = (size_t)info.width * (size_t)info.height;
     const float *mean = imp_film_mean(film), *se = imp_film_se(film);
@@ -220,12 +227,24 @@ static int sampling_refused(void)
     return 0;
 }
 
+static enum imp_status render_until(struct imp_run *run, imp_film **film,
+                                    struct imp_until_end *end)
+{
+    struct imp_until_options until = until_options(o.until, run);
+    return imp_render_until(cli.scene, run, &until, film, end);
+}
+
 static int run_render(int n, char **operand)
 {
+    struct imp_until_end end = IMP_UNTIL_END_INIT;
     imp_film *film = NULL;
     struct sampling sampling = {NULL, NULL, 0};
     (void)n;
     int rc = o.sampling ? sampling_refused() : 0;
+    if (!rc && o.until > 0) rc = until_refused();
+    if (!rc && o.until > 0 && (o.pixel[0] != NO_PIXEL || o.paths))
+        rc =
+            cli_error(EXIT_USAGE, "--until is of pictures: not with --pixel and --paths");
     if (!rc) rc = cli_load(operand[0]);
     if (rc) return rc;
     struct imp_run run = cli_run();
@@ -255,7 +274,9 @@ static int run_render(int n, char **operand)
             run.preview_payload = (void *)(uintptr_t)path;
         }
         rc = manifest_begin(path);
-        const enum imp_status st = rc ? IMP_OK : imp_render(cli.scene, &run, &film);
+        enum imp_status st = IMP_OK;
+        if (!rc && o.until > 0) st = render_until(&run, &film, &end);
+        else if (!rc) st = imp_render(cli.scene, &run, &film);
         if (cli_failed(st)) rc = cli_fail(st, cli.scene_path);
         if (!rc) rc = manifest_pause();
         if (!rc && film) rc = manifest_film("picture", film);
@@ -273,7 +294,7 @@ static int run_render(int n, char **operand)
         if (!rc) rc = manifest_output(path);
         if (!rc && o.sampling && !progress_interrupted())
             rc = sampling_check(&run, &sampling);
-        if (!rc) report(path, film, &run, &sampling);
+        if (!rc) report(path, film, &run, &sampling, &end);
     }
     imp_film_destroy(film);
     free(automatic);

@@ -40,6 +40,7 @@ from ._render import denoise, render, walk
 from ._report import report
 from ._scene import Scene, Sensor, load_file, load_string, set_variant, variant
 from ._transform import ScalarTransform4f, Transform4f
+from ._until import Reached, functional_until, render_until
 from ._walks import Walks, keep, read_walks
 
 if TYPE_CHECKING:
@@ -50,11 +51,11 @@ __all__ = [
     "ArgumentError", "BiasError", "Cancelled", "Check", "CheckRow", "Color3f", "Comparison", "DroppedWalk", "Error",
     "Estimate", "FileError", "Fit", "FitVariable", "Gradient", "ImportonWarning", "Jacobian", "Loss", "Missing",
     "NumericError", "OutOfMemoryError", "ParameterError", "ParameterInfo", "Part", "PartsInfo", "PathsError",
-    "Picture", "Progress", "ScalarTransform4f", "Scene", "SceneError", "SceneParameters", "SelfTestRow", "Sensor",
+    "Picture", "Progress", "Reached", "ScalarTransform4f", "Scene", "SceneError", "SceneParameters", "SelfTestRow", "Sensor",
     "Transform4f", "UnsupportedError", "Values", "Walks", "__version__", "ad", "bend", "check", "compare", "cornell_box", "denoise",
-    "elements", "fit", "functional", "guide", "jacobian", "join_parts", "keep", "library_path", "load_dict", "load_file",
+    "elements", "fit", "functional", "functional_until", "guide", "jacobian", "join_parts", "keep", "library_path", "load_dict", "load_file",
     "load_string", "loss", "merge", "missing", "part", "parts_info", "project", "read", "read_walks", "render", "render_backward",
-    "render_forward", "report", "selftest", "set_progress", "set_threads", "set_variant", "team", "threads",
+    "render_forward", "render_until", "report", "selftest", "set_progress", "set_threads", "set_variant", "team", "threads",
     "traverse", "variant", "walk", "write",
 ]
 

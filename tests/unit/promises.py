@@ -163,7 +163,8 @@ NOT_OK = {
 try: C.CDLL("libOpenImageDenoise.so.2")
 except OSError: NOT_OK["imp_denoise"] = "there is no Open Image Denoise"
 # Pointers that may be NULL, by name, or by function and name.
-NULLABLE = {"imp_report_page.length", "imp_problem_shares.walk_share", "imp_report_data.length", "options", "run", "stats", "id", "objective", "gradient_se", "primal", "normals", "uvs",
+NULLABLE = {"imp_report_page.length", "imp_problem_shares.walk_share", "imp_render_until.end", "imp_problem_until.end", "imp_problem_until.adjoint",
+            "imp_problem_until.value", "imp_problem_until.gradient", "imp_report_data.length", "options", "run", "stats", "id", "objective", "gradient_se", "primal", "normals", "uvs",
             "axis", "hessian", "taps", "tap_bars", "tap_dots", "power", "bundle", "exit", "targets",
             "error", "order", "param", "element", "memory",
             "imp_optimizer_step.rule", "imp_optimizer_step.lo", "imp_optimizer_step.hi",

@@ -1,0 +1,111 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A picture until its error is small enough: the mean over looks, each of its own walks.
+ *
+ * With s the standard errors, the squared error E = sum (I - truth)^2 has the mean S = sum
+ * s^2, and, where errors are normal and no more than c values share walks, at most the
+ * variance 2 c sum s^4. Whatever they share, E is beyond z^2 S no oftener than a normal
+ * number is beyond +-z, for z >= 1.54 (Szekely and Bakirov, Probab. Theory Relat. Fields
+ * 126, 2003). The smaller of the two bounds counts. */
+#include "base/arguments.h"
+#include "base/film.h"
+#include "film_filter.h"
+#include "film_measure.h"
+#include "walk/looks.h"
+#include "walk/walk_integrator.h"
+#include <math.h>
+
+/* Values whose errors depend on each other with one of them; 0: any may. */
+static double sharing(const imp_scene *scene, const struct imp_run *run,
+                      const struct imp_sensor *sensor, int channels)
+{
+    const struct imp_walk_integrator *walks = imp__walk_integrator(scene);
+    if (run->from == IMP_FROM_LIGHTS || !walks || walks->from_lights || walks->both)
+        return 0;
+    const double side = 2 * imp__film_border(&sensor->film) + 1;
+    return channels * side * side;
+}
+
+/* Bound of the error, over the picture's length, which is longer by its own noise. */
+static double bound(const struct imp__looks *l, const imp_film *film, double share)
+{
+    double S = 0, Q = 0, M = 0;
+    for (size_t i = 0; i < imp__film_values(film); i++) {
+        const double v = imp__sqr((double)film->se[i]);
+        S += v;
+        Q += v * v;
+        M += imp__sqr((double)film->mean[i]);
+    }
+    double E = imp__sqr(imp__looks_z(l, false)) * S;
+    if (share > 0) E = fmin(E, S + imp__looks_z(l, true) * sqrt(2 * share * Q));
+    return M > S ? sqrt(E / (M - S)) : S > 0 ? INFINITY : 0;
+}
+
+/* all: the mean with another film of weight w. */
+static void film_mix(imp_film *all, const imp_film *film, double w)
+{
+    for (size_t i = 0; i < imp__film_values(all); i++) {
+        const double se = hypot((1 - w) * (double)all->se[i], w * (double)film->se[i]);
+        all->mean[i] =
+            (float)((1 - w) * (double)all->mean[i] + w * (double)film->mean[i]);
+        all->se[i] = (float)se;
+    }
+    all->spp += film->spp;
+    all->dropped += film->dropped;
+    imp__drops_merge(&all->drops, &film->drops);
+}
+
+enum imp_status imp_render_until(const imp_scene *scene, const struct imp_run *run,
+                                 const struct imp_until_options *options, imp_film **out,
+                                 struct imp_until_end *end)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_run own;
+    struct imp__looks l;
+    const struct imp_sensor *sensor;
+    imp_film *all = NULL, *film = NULL;
+    IMP_REQUIRE(NULL, scene, "scene");
+    IMP_REQUIRE(scene->ctx, out, "out");
+    if (end) IMP_SIZED(scene->ctx, end, "end");
+    IMP_RUN(scene->ctx, own, run);
+    IMP_CHECKED(imp__looks_begin(scene->ctx, __func__, &own, options, &l));
+    IMP_CHECKED(imp__run_sensor(scene, &own, &sensor));
+    l.run.preview = NULL;
+    while (imp__looks_next(&l)) {
+        st = imp_render(scene, &l.run, &film);
+        if (st == IMP_CANCELLED && all) {
+            l.end.looks--;
+            break;
+        }
+        if (st != IMP_OK && st != IMP_CANCELLED) goto out;
+        if (!film || !film->se) {
+            if (st == IMP_OK)
+                st = imp__error(scene->ctx, IMP_E_UNSUPPORTED,
+                                "%s: the picture has no standard errors, so nobody "
+                                "knows when its error is reached",
+                                __func__);
+            goto out;
+        }
+        if (!all) {
+            all = film;
+            l.end.spp = film->spp; /* the time may have been up */
+        } else {
+            film_mix(all, film, imp__looks_weight(&l));
+            imp_film_destroy(film);
+        }
+        film = NULL;
+        if (st == IMP_CANCELLED) break;
+        imp__looks_bound(&l, bound(&l, all, sharing(scene, &own, sensor, all->channels)));
+        if (own.preview) own.preview(all, own.preview_payload);
+    }
+out:
+    imp_film_destroy(film);
+    if (st != IMP_OK && st != IMP_CANCELLED) {
+        imp_film_destroy(all);
+        return st;
+    }
+    *out = all;
+    if (all) l.end.spp = all->spp;
+    if (end) IMP_GIVE(scene->ctx, end, l.end, "end");
+    return st;
+}

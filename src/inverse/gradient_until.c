@@ -1,0 +1,90 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * A number and its gradient until they are known well enough: the mean over looks, each of
+ * its own walks. Of a parameter with standard errors s_i, |g - truth|^2 is beyond z^2 sum
+ * s_i^2 no oftener than a normal number is beyond +-z, for z >= 1.54 and however the errors
+ * depend on each other (Szekely and Bakirov, Probab. Theory Relat. Fields 126, 2003). */
+#include "base/arguments.h"
+#include "problem.h"
+#include "walk/looks.h"
+#include <math.h>
+#include <string.h>
+
+static double over(double error, double of)
+{
+    return error == 0 ? 0 : of > 0 ? error / of : INFINITY;
+}
+
+/* Of the parameter that is known least; of the value, if there is no gradient. */
+static double bound(const struct imp__looks *l, const struct imp_problem *p,
+                    const struct imp_estimate *value, const double *g, const double *se)
+{
+    const double z = imp__looks_z(l, false);
+    double worst = 0;
+    if (!g) return over(z * value->se, fabs(value->value));
+    for (size_t b = 0; b < p->n_blocks; b++) {
+        double square = 0, length = 0;
+        for (size_t i = p->blocks[b].first; i < p->blocks[b].first + p->blocks[b].count;
+             i++) {
+            square += se[i] * se[i];
+            length += g[i] * g[i];
+        }
+        worst = fmax(worst, over(z * sqrt(square), sqrt(length)));
+    }
+    return worst;
+}
+
+static void mix(double w, double value, double value_se, double *mean, double *se)
+{
+    *mean = (1 - w) * *mean + w * value;
+    *se = hypot((1 - w) * *se, w * value_se);
+}
+
+enum imp_status imp_problem_until(imp_problem *p, const float *adjoint,
+                                  const struct imp_run *run,
+                                  const struct imp_until_options *options,
+                                  struct imp_estimate *value, double *gradient,
+                                  double *gradient_se, struct imp_until_end *end)
+{
+    enum imp_status st = IMP_OK;
+    struct imp_run own;
+    struct imp__looks l;
+    struct imp_estimate all = {0}, f;
+    double *g = NULL;
+    IMP_REQUIRE(NULL, p, "problem");
+    imp_context *ctx = p->ctx;
+    if (end) IMP_SIZED(ctx, end, "end");
+    if (!gradient != !gradient_se)
+        return imp__error(ctx, IMP_E_ARG, "%s: gradient and gradient_se go together",
+                          __func__);
+    IMP_RUN(ctx, own, run);
+    IMP_CHECKED(imp__looks_begin(ctx, __func__, &own, options, &l));
+    const size_t n = gradient ? p->n : 0;
+    g = imp__alloc(ctx, 4 * n + 1, sizeof *g);
+    if (!g) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for %zu derivatives", n));
+    double *se = g + n, *mean = se + n, *mean_se = mean + n;
+    l.run.time_limit_s = 0;
+    while (imp__looks_next(&l)) {
+        double *to = gradient ? g : NULL, *to_se = gradient ? se : NULL;
+        st = adjoint ? imp_problem_functional(p, adjoint, &l.run, &f, to, to_se)
+                     : imp_problem_objective(p, NULL, &l.run, &f, to, to_se);
+        if (st == IMP_CANCELLED && l.end.looks > 1) {
+            l.end.spp = (int64_t)l.before;
+            l.end.looks--;
+            break;
+        }
+        IMP_TRY(st);
+        const double w = imp__looks_weight(&l);
+        mix(w, f.value, f.se, &all.value, &all.se);
+        all.bias_order = f.bias_order;
+        for (size_t i = 0; i < n; i++) mix(w, g[i], se[i], &mean[i], &mean_se[i]);
+        imp__looks_bound(&l, bound(&l, p, &all, gradient ? mean : NULL, mean_se));
+    }
+    if (value) *value = all;
+    if (n > 0) memcpy(gradient, mean, n * sizeof *mean);
+    if (n > 0) memcpy(gradient_se, mean_se, n * sizeof *mean_se);
+    if (end) IMP_GIVE(ctx, end, l.end, "end");
+out:
+    imp__release(ctx, g);
+    return st;
+}
