@@ -104,12 +104,20 @@ static const struct imp_mesh_data octahedron = {.n_vertices = 6,
                                                 .positions = octa_positions,
                                                 .indices = octa_indices};
 
+/* A tube along x. */
+static const float tube_points[16] = {-1.2f, 0, 0, .4f, -.4f, 0, 0, .4f,
+                                      .4f,   0, 0, .4f, 1.2f, 0, 0, .4f};
+static const uint32_t tube_first[2] = {0, 4};
+static const struct imp_curve_data tube_curves = {4, 1, tube_points, tube_first};
+
 static inline struct imp_node *kind_node(const struct imp_shape_ops *ops)
 {
     struct imp_node *n = node_new("shape", ops->name);
     if (strcmp(ops->name, "mesh") == 0 || strcmp(ops->name, "obj") == 0 ||
         strcmp(ops->name, "ply") == 0 || strcmp(ops->name, "serialized") == 0)
         n->mesh = &octahedron;
+    if (strcmp(ops->name, "bsplinecurve") == 0 || strcmp(ops->name, "linearcurve") == 0)
+        n->curves = &tube_curves;
     return n;
 }
 

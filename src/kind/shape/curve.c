@@ -133,10 +133,12 @@ static void surface(const struct imp_shape *s, const struct imp_hit *hit, const 
     const struct imp_curves *k = &s->curves;
     struct imp__curve_at at;
     double v = hit->u;
-    const imp_v3 q = imp__curve_meet(k, hit->prim, hit->t, &v, *o, *d, &at);
-    const imp_v3 axis = imp__curve_axis(&at), outward = imp__normalize(q);
+    const imp_v3 outward = imp__curve_meet(k, hit->prim, hit->t, &v, *o, *d, &at);
+    const imp_v3 q = outward * at.r;
+    const imp_v3 axis = imp__curve_axis(&at);
     out->p = at.c + q;
-    out->n = out->ng = imp__normalize(imp__curve_normal(k, &at, q));
+    const imp_v3 n = imp__normalize(imp__curve_normal(k, &at, outward));
+    out->n = out->ng = imp__is_finite(n) ? n : outward; /* a sharp bend */
     const double along = axis[2];
     const imp_v3 z = imp__v3(0, 0, 1) - axis * along;
     const imp_v3 turned = imp__dot(z, z) > 1e-14 ? imp__normalize(z) : imp__v3(0, 1, 0);

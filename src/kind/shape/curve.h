@@ -21,18 +21,18 @@ static inline imp_v3 imp__curve_axis(const struct imp__curve_at *at)
     return imp__dot(at->d1, at->d1) > 0 ? imp__normalize(at->d1) : imp__v3(1, 0, 0);
 }
 
-/* Its normal, q from the line to the point; not unit. Of a swept circle it is across the turn
- * and across c' + r' e + r de/dv, e of which is across c'. */
+/* Its normal, not unit, where `outward` is the unit vector from the line to the point, across c'
+ * if circles are swept: across the turn, and across c' + r' e + r de/dv, e for outward. */
 static inline imp_v3 imp__curve_normal(const struct imp_curves *k,
-                                       const struct imp__curve_at *at, imp_v3 q)
+                                       const struct imp__curve_at *at, imp_v3 outward)
 {
-    if (k->degree == 1) return q;
-    return q * (imp__dot(at->d1, at->d1) - imp__dot(q, at->d2)) -
-           at->d1 * (at->r * at->r1);
+    if (k->degree == 1) return outward;
+    return outward * (imp__dot(at->d1, at->d1) - at->r * imp__dot(outward, at->d2)) -
+           at->d1 * at->r1;
 }
 
 /* The point where the ray from o along d meets the tube, next to Embree's t and v, in double:
- * v, the line there, and from it to the point. */
+ * v, the line there, and the unit vector from it to the point, which is r away. */
 imp_v3 imp__curve_meet(const struct imp_curves *k, int segment, double t, double *v,
                        imp_v3 o, imp_v3 d, struct imp__curve_at *out);
 

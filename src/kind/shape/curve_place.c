@@ -54,7 +54,7 @@ imp_v3 imp__curve_meet(const struct imp_curves *k, int segment, double t, double
                        imp_v3 o, imp_v3 d, struct imp__curve_at *out)
 {
     const bool cone = k->degree == 1;
-    const double v0 = imp_clamp(*v, 0.0, 1.0);
+    const double v0 = *v > 0 ? fmin(*v, 1) : 0; /* Embree may give no number */
     double x = v0, y = t;
     bool fine = true;
     imp_v3 q;
@@ -76,20 +76,23 @@ imp_v3 imp__curve_meet(const struct imp_curves *k, int segment, double t, double
     }
     if (fine) { /* its front, and not where the ray leaves the tube */
         imp__curve_at(k, segment, x, out);
-        fine = imp__dot(imp__curve_normal(k, out, o + d * y - out->c), d) < 0;
+        q = imp__normalize(o + d * y - out->c);
+        fine = imp__dot(imp__curve_normal(k, out, q), d) < 0;
     }
     const bool at_end = v0 < 1e-3 || v0 > 1 - 1e-3;
     if (cone && (fine ? x <= 0 || x >= 1 : at_end)) {
         *v = (fine ? x : v0) < 0.5 ? 0 : 1;
         imp__curve_at(k, segment, *v, out);
-        return ball_meet(out, o, d);
+        q = ball_meet(out, o, d);
+        goto unit;
     }
     if (!fine) x = v0, y = t; /* edge-on: the point of the circle that is next */
     *v = imp_clamp(x, 0.0, 1.0);
     imp__curve_at(k, segment, *v, out);
     q = o + d * y - out->c;
     if (!cone) q -= out->d1 * (imp__dot(q, out->d1) / imp__dot(out->d1, out->d1));
-    const double length = imp__length(q);
-    return length > 0 ? q * (out->r / length)
-                      : imp__frame_from_normal(imp__curve_axis(out)).s * out->r;
+unit:
+    q = imp__normalize(q);
+    if (imp__is_finite(q)) return q;
+    return imp__frame_from_normal(imp__curve_axis(out)).s; /* the radius is 0 there */
 }

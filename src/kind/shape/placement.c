@@ -42,6 +42,9 @@ void imp__placement_frame(const struct imp_build *b, const struct imp_mat4 *to_w
             e[i] = e[i] - e[j] * imp__dot(e[i], e[j]);
         }
         e[i] = imp__normalize(e[i]);
+        /* Nearly parallel columns cancel: once more. */
+        for (int j = 0; j < i && !exact; j++) e[i] -= e[j] * imp__dot(e[i], e[j]);
+        if (!exact) e[i] = imp__normalize(e[i]);
     }
     for (int i = 1; i < equal; i++)
         exact &= fabs(length[i] - length[0]) < 1e-6 * length[0];
