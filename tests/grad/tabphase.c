@@ -9,7 +9,10 @@
 static imp_context *ctx;
 
 enum { N = 7 };
-static double value[N] = {.5, .4, .3, .4, .7, 1.5, 3};
+static const double usual[N] = {.5, .4, .3, .4, .7, 1.5, 3},
+                    dark[N] = {.5, 0,   0, .4,
+                               0,  1.5, 3}; /* neighbours of 0, and one alone */
+static double value[N];
 
 /* 4 pi p(c) */
 static double table(double c, double g)
@@ -32,12 +35,15 @@ static double truth(int reflected)
 
 static imp_scene *slab(int reflected)
 {
-    char text[4096];
+    char text[4096], values[256];
+    int n = 0;
+    for (int k = 0; k < N; k++)
+        n += snprintf(values + n, sizeof values - (size_t)n, "%g ", value[k]);
     snprintf(text, sizeof text,
              "<scene version='3.0.0'><integrator type='volpath'/><medium "
              "type='homogeneous' id='fog'><float name='sigma_t' value='1'/><float "
              "name='albedo' value='0.9'/><phase type='tabphase' id='turn'><string "
-             "name='values' value='0.5, 0.4, 0.3, 0.4, 0.7, 1.5, 3'/></phase></medium>"
+             "name='values' value='%s'/></phase></medium>"
              "<shape type='cube'><bsdf type='null'/><ref id='fog' name='interior'/>"
              "<transform name='to_world'><scale x='3000' y='3000' z='0.5'/></transform>"
              "</shape><shape type='rectangle'><emitter type='area'><float "
@@ -47,7 +53,7 @@ static imp_scene *slab(int reflected)
              "value='0.001'/><lookat origin='0,0,-0.8' target='0,0,1' up='0,1,0'/>"
              "</transform><film type='hdrfilm'><integer name='width' value='8'/><integer "
              "name='height' value='8'/><rfilter type='box'/></film></sensor></scene>",
-             reflected ? 0 : 180, reflected ? -1 : 1);
+             values, reflected ? 0 : 180, reflected ? -1 : 1);
     return test_scene_text(ctx, text, IMP_MONO);
 }
 
@@ -65,12 +71,15 @@ static void derivatives(int reflected)
     for (int k = 0; k < N; k++) {
         const double h = 1e-3, at = value[k];
         double d[2];
+        const double low = at == 0 ? 0 : -h; /* one-sided at 0 */
         for (int i = 0; i < 2; i++) {
-            value[k] = at + (i ? h : -h);
+            value[k] = at + (i ? h : low);
             d[i] = truth(reflected);
         }
         value[k] = at;
-        media_near(g[k], se[k], (d[1] - d[0]) / (2 * h), 2e-3, "... by a value");
+        media_near(g[k], se[k] + (at == 0 ? 1e-4 : 0), (d[1] - d[0]) / (h - low),
+                   at == 0 ? 5e-3 : 2e-3,
+                   at == 0 ? "... by a value that is 0" : "... by a value");
         sum += g[k] * at;
         size += fabs(g[k] * at);
     }
@@ -80,7 +89,7 @@ static void derivatives(int reflected)
     imp_scene_destroy(s);
 }
 
-static void checked(void)
+static void checked(int fresh_spp)
 {
     imp_scene *s = slab(1);
     imp_problem *p = test_problem(ctx, s, "turn.value_*");
@@ -89,7 +98,7 @@ static void checked(void)
     size_t n;
     int frozen = 0, fresh = 0, wrong = 0;
     o.paths = 400;
-    o.fresh_spp = 4096;
+    o.fresh_spp = fresh_spp;
     test_must(ctx, imp_check(p, &o, NULL, &rows, &n));
     for (size_t k = 0; k < n; k++) {
         frozen += strcmp(rows[k].method, "frozen") == 0;
@@ -109,9 +118,12 @@ static void checked(void)
 int main(void)
 {
     ctx = test_context(0);
-    derivatives(1);
-    derivatives(0);
-    checked();
+    for (int k = 0; k < 2; k++) {
+        memcpy(value, k ? dark : usual, sizeof value);
+        derivatives(1);
+        derivatives(0);
+        checked(k ? 256 : 2048);
+    }
     imp_context_destroy(ctx);
     return tap_done();
 }

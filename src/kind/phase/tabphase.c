@@ -10,13 +10,18 @@
  *
  *     dp/dv_k = (h_k - 2 pi p w_k)/(2 pi N)
  *
- * Values of up to NUMBERS are inputs, each with a derivative; longer tables stand. */
+ * Values of up to NUMBERS are inputs, each with a derivative; longer tables stand. A value
+ * that is 0 has a derivative where p is 0, or so small that h_k^2/p has no integral: where
+ * there is one, a part e of the directions is drawn evenly, with the density
+ *
+ *     q(c) = (1 - e) p(c) + e/(4 pi) */
 #include "base/number.h"
 #include "kind/build.h"
 #include "turn.h"
 #include <string.h>
 
 enum { VALUES_MAX = 1 << 16, NUMBERS = 24 };
+#define EVEN 0.1 /* e */
 
 struct tabphase {
     int n;
@@ -78,22 +83,15 @@ out:
     return st;
 }
 
-/* Are the values numbers of the scene? Of a long table they are not; nor where two
- * neighbours are 0, since no direction is drawn between them, where one that rises would
- * bring light. */
-static bool are_numbers(int n, const double *value)
-{
-    for (int i = 1; i < n; i++)
-        if (value[i - 1] == 0 && value[i] == 0) return false;
-    return n <= NUMBERS;
-}
+/* Are the values numbers of the scene? */
+static bool are_numbers(int n) { return n <= NUMBERS; }
 
 static enum imp_status prepare(const struct imp_build *b)
 {
     double *value;
     int n;
     enum imp_status st = values_read(b, &n, &value);
-    for (int i = 0; st == IMP_OK && i < n && are_numbers(n, value); i++) {
+    for (int i = 0; st == IMP_OK && i < n && are_numbers(n); i++) {
         if (imp_build_has(b, inputs[i].name))
             return imp_build_error(b, inputs[i].name, IMP_E_SCENE,
                                    "'%s' is a number of 'values'", inputs[i].name);
@@ -117,7 +115,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_p
     double *value;
     (void)p;
     IMP_TRY(values_read(b, &t->n, &value));
-    const bool numbers = are_numbers(t->n, value);
+    const bool numbers = are_numbers(t->n);
     for (int i = numbers ? t->n : 0; i < NUMBERS; i++)
         if (imp_build_has(b, inputs[i].name))
             IMP_TRY(imp_build_error(b, inputs[i].name, IMP_E_SCENE,
@@ -142,7 +140,8 @@ out:
 struct table {
     int n;
     const double *value, *below;
-    double all; /* N */
+    double all;  /* N */
+    double even; /* e */
     double room[2][NUMBERS];
 };
 
@@ -152,8 +151,12 @@ static void table_of(const struct imp_phase *p, const imp_spec *in, struct table
     x->n = t->n;
     x->value = t->value;
     x->below = t->below;
+    x->even = 0;
     if (!t->value) {
-        for (int i = 0; i < t->n; i++) x->room[0][i] = in[i][0];
+        for (int i = 0; i < t->n; i++) {
+            x->room[0][i] = in[i][0];
+            if (in[i][0] == 0) x->even = EVEN;
+        }
         integrate(t->n, x->room[0], x->room[1]);
         x->value = x->room[0];
         x->below = x->room[1];
@@ -167,12 +170,13 @@ static void sample(const struct imp_phase *p, const imp_spec *in, const double u
 {
     struct table t;
     table_of(p, in, &t);
-    if (!(t.all > 0)) { /* a search went there */
-        d->wi = imp__turn(d->wo, 2 * u[1] - 1, u[2]);
+    if (!(t.all > 0)) t.even = 1; /* a search went there */
+    if (u[1] < t.even) {
+        d->wi = imp__turn(d->wo, 2 * u[1] / t.even - 1, u[2]);
         return;
     }
     int i = 0, above = t.n - 1;
-    const double target = u[1] * t.all;
+    const double target = (u[1] - t.even) / (1 - t.even) * t.all;
     while (above - i > 1) {
         const int middle = (i + above) / 2;
         if (t.below[middle] <= target) i = middle;
@@ -202,12 +206,16 @@ static double pdf(const struct imp_phase *p, const imp_spec *in, const struct im
     double part;
     int i;
     table_of(p, in, &t);
-    return density(&t, d, &i, &part);
+    return (1 - t.even) * density(&t, d, &i, &part) + t.even * IMP_INV_PI / 4;
 }
 static void eval(const struct imp_phase *p, const imp_spec *in, const struct imp_dirs *d,
                  imp_spec *f)
 {
-    *f = imp__spec(pdf(p, in, d));
+    struct table t;
+    double part;
+    int i;
+    table_of(p, in, &t);
+    *f = imp__spec(density(&t, d, &i, &part));
 }
 static void eval_d(const struct imp_phase *p, const imp_spec *in,
                    const struct imp_dirs *d, imp_spec *df)
