@@ -26,11 +26,11 @@ static unsigned byte(struct bytes *b)
     return *b->data++;
 }
 
-/* Mostly ordinary numbers in [0, 1.6]. */
-/* Denser media only take as long as their collisions do: bounds of 1e12 ran for hours. */
+/* Mostly ordinary numbers in [0, 1.6]. Bounds of 1e12 end walks by their number of tentative
+ * collisions. */
 static double number(struct bytes *b)
 {
-    static const double odd[] = {0, -1, 1e-12, 1e2, NAN, INFINITY, 1e3, 1};
+    static const double odd[] = {0, -1, 1e-12, 1e2, NAN, INFINITY, 1e12, 1};
     const unsigned k = byte(b);
     return k < 8 ? odd[k] : k / 160.0;
 }
