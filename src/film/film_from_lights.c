@@ -4,6 +4,7 @@
 #include "base/team.h"
 #include "film_light.h"
 #include "film_measure.h"
+#include <string.h>
 
 static void measure_values(const void *payload, const struct imp_light_walk *walk,
                            const struct imp_reach *reach, double *value)
