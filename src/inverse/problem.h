@@ -125,6 +125,8 @@ static inline bool imp__block_factor(const struct imp_problem *p,
 }
 /* The name of its parameter, or of its factor. */
 const char *imp__block_name(const struct imp_problem *p, const struct imp__block *b);
+/* The tie that parameter k has, in logarithms or not; -1: none. */
+int imp__tie_of(const struct imp_problem *p, size_t k, bool log);
 /* Number e of a block, as x has it, from the scene. */
 double imp__block_get(const struct imp_problem *p, const struct imp__block *b, size_t e);
 /* Parameter k takes its numbers from x. */
