@@ -130,11 +130,11 @@ struct imp_scene {
     struct imp_priorities *priorities; /* NULL: no shape has one */
     struct imp_bsdf *default_bsdf, *black_bsdf;
     const struct imp_integrator *integrator; /* NULL: none was written */
-    int environment; /* emitter index of the first, -1: none */
+    int environment;                         /* emitter index of the first, -1: none */
     int n_environments;
-    int *environments; /* [n_environments] emitter indices: radiances of a ray add up */
-    double *light_cdf;                 /* [n_emitters] by sampling_weight, last is 1 */
-    bool lights_in_tree;               /* some integrator chooses lights by the tree */
+    int *environments;   /* [n_environments] emitter indices: radiances of a ray add up */
+    double *light_cdf;   /* [n_emitters] by sampling_weight, last is 1 */
+    bool lights_in_tree; /* some integrator chooses lights by the tree */
     struct imp_light_tree *light_tree; /* NULL: none does (light_tree.h) */
     int n_bsdf_mixing;
     struct imp_mixing **bsdf_mixing; /* [n_bsdfs] NULL: the integrator's */

@@ -10,11 +10,7 @@
 
 enum imp_stam_alpha { IMP_ALPHA_DETACHED, IMP_ALPHA_ATTACHED, IMP_ALPHA_PAPER };
 
-enum imp_transmittance {
-    IMP_RATIO_TRACKING,
-    IMP_RESIDUAL_TRACKING,
-    IMP_DELTA_TRACKING
-};
+enum imp_transmittance { IMP_RATIO_TRACKING, IMP_RESIDUAL_TRACKING, IMP_DELTA_TRACKING };
 
 /* What walks are made by. */
 struct imp_walk_integrator {
