@@ -44,7 +44,7 @@ if wanted 2; then
 fi
 if wanted ends; then
     say "Which end: time to 1 %, rays a second; the headlamp's derivatives"
-    "$build/bench/which_end" 2 >"$out/which_end.md"
+    "$build/bench/which_end" 2 >"$out/which_end.txt"
     for end in lights sensor; do
         "$importon" read scenes/headlamp.xml -m mono -s 0 -p '*' --from $end --spp 2000000 -q --json >"$out/headlamp_$end.json"
     done
@@ -131,8 +131,8 @@ if has("lens_left.json"):
         l = r["from_lights"]
         rows.append("| %s | %.5f +- %.5f | %.5f +- %.5f | %.1f |" % (what, r["value"], r["se"], l["value"], l["se"], r["z"]))
     put("lens", "\n".join(rows) + "\n")
-if has("which_end.md"):
-    cells = [[c.strip() for c in line.strip("|\n").split("|")] for line in read("which_end.md").splitlines()[2:]]
+if has("which_end.txt"):
+    cells = [[c.strip() for c in line.strip("|\n").split("|")] for line in read("which_end.txt").splitlines()[2:]]
     for r in cells: # light that an end does not bring
         means = [float(x) for x in r[7].split()]
         for e, mean in enumerate(means):
