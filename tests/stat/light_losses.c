@@ -175,28 +175,19 @@ static void compare(const char *integrator, const char *filter, const float *tar
 
 /* ---- Films of any number of response curves ------------------------------------------ */
 
+/* clang-format off */
 static const char meter[] =
     "<scene version='3.0.0'><integrator type='bdpt'><integer name='max_depth' value='4'/>"
-    "</integrator><shape type='cube'>" AT(
-        "<scale value='2'/>") "<boolean name='flip_normals' value='true'/><bsdf "
-                              "type='diffuse' id='wall'><spectrum "
-                              "name='reflectance' "
-                              "value='400:.3,700:.7'/></bsdf></shape><shape "
-                              "type='sphere'><point "
-                              "name='center' value='.4,.9,0'/><float name='radius' "
-                              "value='.3'/><emitter type='area' "
-                              "id='lamp'><spectrum name='radiance' "
-                              "value='400:3,700:6'/></emitter></shape><shape "
-                              "type='rectangle'>" AT(
-                                  "<scale value='.8'/><rotate x='1' angle='-90'/>"
-                                  "<translate y='-1.9'/>") "<sensor "
-                                                           "type='irradiancemeter'><film "
-                                                           "type='specfilm'><integer "
-                                                           "name='width' "
-                                                           "value='1'/><integer "
-                                                           "name='height' "
-                                                           "value='1'/>%s</film></"
-                                                           "sensor></shape></scene>";
+    "</integrator><shape type='cube'>" AT("<scale value='2'/>")
+    "<boolean name='flip_normals' value='true'/><bsdf type='diffuse' id='wall'><spectrum "
+    "name='reflectance' value='400:.3,700:.7'/></bsdf></shape><shape type='sphere'><point "
+    "name='center' value='.4,.9,0'/><float name='radius' value='.3'/><emitter type='area' "
+    "id='lamp'><spectrum name='radiance' value='400:3,700:6'/></emitter></shape><shape "
+    "type='rectangle'>"
+    AT("<scale value='.8'/><rotate x='1' angle='-90'/><translate y='-1.9'/>")
+    "<sensor type='irradiancemeter'><film type='specfilm'><integer name='width' "
+    "value='1'/><integer name='height' value='1'/>%s</film></sensor></shape></scene>";
+/* clang-format on */
 
 /* A reading of n curves as the target: its loss and gradient, and what lm finds of the
  * lamp from it. */
