@@ -20,6 +20,8 @@
 
 /* From the lights: few of them bring much, and without these the spread is too low. */
 #define WALKS_LEAST 32768
+/* From the sensor, where a fresh row brings what it has: with fewer a row decides nothing. */
+#define SAMPLES_LEAST 4096
 
 struct ends {
     struct imp__check *check;
@@ -206,6 +208,13 @@ out:
 
 /* ---- Rows ---------------------------------------------------------------------------- */
 
+static bool few_samples(const struct imp__check *c)
+{
+    const struct imp_sensor *sensor = c->tracer.sensor;
+    const double spp = c->run.spp > 0 ? c->run.spp : sensor->spp;
+    return spp * sensor->film.crop_w * sensor->film.crop_h < SAMPLES_LEAST;
+}
+
 static enum imp_status row_add(struct imp__check *c, const char *param, int64_t element,
                                struct imp_estimate lights, struct imp_estimate sensor)
 {
@@ -225,7 +234,7 @@ static enum imp_status row_add(struct imp__check *c, const char *param, int64_t 
      * large lamp. */
     const bool unseen =
         (lights.value == 0 && lights.se == 0) != (sensor.value == 0 && sensor.se == 0);
-    const bool noisy = unseen || row.se > RESOLVED * size ||
+    const bool noisy = unseen || few_samples(c) || row.se > RESOLVED * size ||
                        lights.se > RESOLVED * fabs(lights.value) ||
                        sensor.se > RESOLVED * fabs(sensor.value);
     row.ok = noisy ? -1 : row.error <= row.limit;

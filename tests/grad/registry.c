@@ -542,7 +542,8 @@ static void frozen(imp_problem *p, const char *what, bool at_bound)
         return;
     }
     for (size_t k = 0; k < n; k++) {
-        const bool is_fresh = strcmp(rows[k].method, "fresh") == 0;
+        const bool is_fresh =
+            strcmp(rows[k].method, "fresh") == 0 || strcmp(rows[k].method, "ends") == 0;
         if (is_fresh && !with_fresh) continue;
         if (strcmp(rows[k].method, "frozen") == 0 && rows[k].limit > 0) {
             n_frozen++;

@@ -105,6 +105,12 @@ static imp_v3 uniform3(struct imp_key key, uint32_t dim, double size)
            (2 * size);
 }
 
+/* Curves have no closed form: unit/curves holds their hits to the tubes' equations. */
+static int has_reference(const struct imp_shape_ops *ops)
+{
+    return strstr(ops->name, "curve") == NULL;
+}
+
 /* One shape alone: random rays, axis-aligned ones, from inside, and aimed at rims. */
 static void single(imp_context *ctx, const struct imp_shape_ops *ops, int place)
 {
@@ -190,10 +196,12 @@ static void together(imp_context *ctx)
     enum { N = 24 };
     struct imp_mat4 inverse[N];
     world_begin(ctx);
+    const struct imp_shape_ops *kinds[32];
     int n_kinds = 0;
-    while (imp__shape_kinds[n_kinds]) n_kinds++;
+    for (int k = 0; imp__shape_kinds[k]; k++)
+        if (has_reference(imp__shape_kinds[k])) kinds[n_kinds++] = imp__shape_kinds[k];
     for (int k = 0; k < N; k++) {
-        struct imp_node *node = kind_node(imp__shape_kinds[k % n_kinds]);
+        struct imp_node *node = kind_node(kinds[k % n_kinds]);
         const struct imp_key key = imp__key(5, 0, (uint64_t)k);
         const struct imp_mat4 p = placement(k % 3);
         const struct imp_mat4 t = imp__translate(uniform3(key, 0, 6));
@@ -227,7 +235,7 @@ static void together(imp_context *ctx)
         }
     /* A ray within float rounding of a rim may go either way. */
     tap_ok(rays > 18000 && hits > 3000 && wrong <= 2,
-           "24 shapes of all kinds: the nearest # rays %d hits %d wrong %d bytes %zu",
+           "24 shapes of these kinds: the nearest # rays %d hits %d wrong %d bytes %zu",
            rays, hits, wrong, imp__intersector_bytes(&world));
     tap_ok(imp__intersector_bytes(&world) > 1000, "Embree's memory is counted");
     world_end();
@@ -358,7 +366,8 @@ int main(void)
     imp_context *ctx;
     if (imp_context_create(NULL, &ctx) != IMP_OK) return 1;
     for (int k = 0; imp__shape_kinds[k]; k++)
-        for (int place = 0; place < 3; place++) single(ctx, imp__shape_kinds[k], place);
+        for (int place = 0; place < 3 && has_reference(imp__shape_kinds[k]); place++)
+            single(ctx, imp__shape_kinds[k], place);
     together(ctx);
     intervals(ctx);
     imp_context_destroy(ctx);
