@@ -248,7 +248,9 @@ static void emitter_make(imp_scene *s, const struct subject *q, bool lifted)
                            0, 2 * z, -z,  0.4,  0, 0,    0,    1};
     imp_scene_begin(s, "emitter", q->emitter->name, "subject", NULL);
     const bool sun = strcmp(q->emitter->name, "sun") == 0;
-    if (q->emitter->flags & IMP_EMITTER_DELTA || sun)
+    if ((q->emitter->flags & IMP_EMITTER_DELTA &&
+         !(q->emitter->flags & IMP_EMITTER_AREA)) ||
+        sun)
         imp_scene_transform(s, "to_world", at);
     if (sun) imp_scene_float(s, "radius", 1.4); /* that walks meet it by chance */
     if (strcmp(q->emitter->name, "ies") == 0) {

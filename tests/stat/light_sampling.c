@@ -146,6 +146,7 @@ static void densities(void)
     for (int k = 0; imp__shape_kinds[k]; k++)
         for (int place = 0; place < 4; place++) {
             const struct imp_shape_ops *ops = imp__shape_kinds[k];
+            if (!ops->sample_toward) continue; /* it cannot be a light */
             const int flat =
                 !strcmp(ops->name, "rectangle") || !strcmp(ops->name, "disk");
             const int round =
