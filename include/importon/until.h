@@ -7,7 +7,8 @@
  * DeMets, Biometrika 70, 1983). docs/estimators.md, 19.
  *
  * The promise rests on standard errors, and so on samples enough that these are right: light
- * that has not been found yet is in none of them.
+ * that has not been found yet is in none of them. An answer of 0 is never near enough. Each
+ * look reads the scene by itself: nobody may change it before the last one.
  */
 #ifndef IMPORTON_UNTIL_H
 #define IMPORTON_UNTIL_H
@@ -45,7 +46,7 @@ struct imp_until_end {
 /**
  * A picture whose error is a part `relative` of it: with probability 1 - risk
  * sum (I - truth)^2 <= relative^2 sum I^2, over pixels and channels.
- * @param run     run->spp: samples before the first look, 0: 16. With time_limit_s the first
+ * @param run     run->spp: samples before the first look, 0: 16; at least 2. With time_limit_s the first
  *                look ends then, and no other is begun that would not end in time if it
  *                took as long as all before.
  * @param options NULL for defaults.

@@ -2,11 +2,15 @@
  *
  * A picture until its error is small enough: the mean over looks, each of its own walks.
  *
- * With s the standard errors, the squared error E = sum (I - truth)^2 has the mean S = sum
- * s^2, and, where errors are normal and no more than c values share walks, at most the
- * variance 2 c sum s^4. Whatever they share, E is beyond z^2 S no oftener than a normal
+ * With s the standard errors of normal errors, the squared error E = sum (I - truth)^2 has
+ * the mean S = sum s^2. Whatever the errors share, E is beyond z^2 S no oftener than a normal
  * number is beyond +-z, for z >= 1.54 (Szekely and Bakirov, Probab. Theory Relat. Fields
- * 126, 2003). The smaller of the two bounds counts. */
+ * 126, 2003). Where no more than c values share walks, the eigenvalues of their covariance
+ * have at most the sum of squares c Q, Q = sum s^4, and at most the size c max s^2, and
+ *
+ *     E > S + 2 (c Q x)^(1/2) + 2 x min(S, c max s^2)    with probability exp(-x) at most
+ *
+ * (Laurent and Massart, Ann. Statist. 28, 2000, lemma 1). The smaller of the two counts. */
 #include "base/arguments.h"
 #include "base/film.h"
 #include "film_filter.h"
@@ -29,16 +33,20 @@ static double sharing(const imp_scene *scene, const struct imp_run *run,
 /* Bound of the error, over the picture's length, which is longer by its own noise. */
 static double bound(const struct imp__looks *l, const imp_film *film, double share)
 {
-    double S = 0, Q = 0, M = 0;
+    double S = 0, Q = 0, M = 0, most = 0;
     for (size_t i = 0; i < imp__film_values(film); i++) {
         const double v = imp__sqr((double)film->se[i]);
         S += v;
         Q += v * v;
+        most = fmax(most, v);
         M += imp__sqr((double)film->mean[i]);
     }
-    double E = imp__sqr(imp__looks_z(l, false)) * S;
-    if (share > 0) E = fmin(E, S + imp__looks_z(l, true) * sqrt(2 * share * Q));
-    return M > S ? sqrt(E / (M - S)) : S > 0 ? INFINITY : 0;
+    double E = imp__sqr(imp__looks_z(l)) * S;
+    if (share > 0) {
+        const double x = -log(imp__looks_risk(l));
+        E = fmin(E, S + 2 * sqrt(share * Q * x) + 2 * x * fmin(S, share * most));
+    }
+    return M > S ? sqrt(E / (M - S)) : INFINITY; /* darkness may be light not yet found */
 }
 
 /* all: the mean with another film of weight w. */

@@ -12,14 +12,14 @@
 
 static double over(double error, double of)
 {
-    return error == 0 ? 0 : of > 0 ? error / of : INFINITY;
+    return of > 0 ? error / of : INFINITY; /* what is 0 may not have been found yet */
 }
 
 /* Of the parameter that is known least; of the value, if there is no gradient. */
 static double bound(const struct imp__looks *l, const struct imp_problem *p,
                     const struct imp_estimate *value, const double *g, const double *se)
 {
-    const double z = imp__looks_z(l, false);
+    const double z = imp__looks_z(l);
     double worst = 0;
     if (!g) return over(z * value->se, fabs(value->value));
     for (size_t b = 0; b < p->n_blocks; b++) {
@@ -29,7 +29,8 @@ static double bound(const struct imp__looks *l, const struct imp_problem *p,
             square += se[i] * se[i];
             length += g[i] * g[i];
         }
-        worst = fmax(worst, over(z * sqrt(square), sqrt(length)));
+        const double part = over(z * sqrt(square), sqrt(length));
+        if (!(part <= worst)) worst = part; /* not a number, too */
     }
     return worst;
 }
@@ -76,7 +77,8 @@ enum imp_status imp_problem_until(imp_problem *p, const float *adjoint,
         IMP_TRY(st);
         const double w = imp__looks_weight(&l);
         mix(w, f.value, f.se, &all.value, &all.se);
-        all.bias_order = f.bias_order;
+        /* Each look has its own bias, of its own samples: the mean's is that of the first. */
+        all.bias_order = l.end.looks > 1 && f.bias_order ? 1 : f.bias_order;
         for (size_t i = 0; i < n; i++) mix(w, g[i], se[i], &mean[i], &mean_se[i]);
         imp__looks_bound(&l, bound(&l, p, &all, gradient ? mean : NULL, mean_se));
     }

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "looks.h"
 #include "base/pool.h"
+#include "base/team.h"
 #include "math/rng.h"
 #include "math/stat.h"
 #include <math.h>
@@ -43,6 +44,14 @@ enum imp_status imp__looks_begin(imp_context *ctx, const char *function,
     if (o->most_spp < 0)
         return imp__error(ctx, IMP_E_ARG, "%s: options->most_spp %d is negative",
                           function, o->most_spp);
+    if (imp__team_apart(ctx))
+        return imp__error(ctx, IMP_E_UNSUPPORTED,
+                          "%s: a part cannot see when the error of the whole is reached",
+                          function);
+    if (imp__team_ranks(ctx) && run->time_limit_s > 0)
+        return imp__error(ctx, IMP_E_UNSUPPORTED,
+                          "%s: ranks have a clock each, and would not stop together",
+                          function);
     IMP_CHECKED(imp__run_traces(ctx, function, run));
     if (o->relative == 0) o->relative = RELATIVE;
     if (o->risk == 0) o->risk = RISK;
@@ -59,10 +68,11 @@ enum imp_status imp__looks_begin(imp_context *ctx, const char *function,
 bool imp__looks_next(struct imp__looks *l)
 {
     const int64_t most = l->options.most_spp, so_far = l->end.spp;
-    const int first = l->outer->spp > 0 ? l->outer->spp : FIRST;
+    /* One sample has no spread, and so no error. */
+    const int first = l->outer->spp > 0 ? imp_max(l->outer->spp, 2) : FIRST;
     const double elapsed = imp__now() - l->start_s, limit = l->outer->time_limit_s;
     if (l->end.looks > 0) {
-        if (l->end.reached || so_far >= most || (limit > 0 && 2 * elapsed > limit))
+        if (l->end.reached || most - so_far < 2 || (limit > 0 && 2 * elapsed > limit))
             return false;
         l->run.time_limit_s = 0;
         l->run.seed =
@@ -80,10 +90,15 @@ double imp__looks_weight(const struct imp__looks *l)
     return 1 - l->before / (double)l->end.spp;
 }
 
-double imp__looks_z(const struct imp__looks *l, bool one_sided)
+double imp__looks_risk(const struct imp__looks *l)
 {
-    const double k = l->end.looks, risk = l->options.risk / (k * (k + 1));
-    return -imp__normal_quantile(one_sided ? risk : risk / 2);
+    const double k = l->end.looks;
+    return l->options.risk / (k * (k + 1));
+}
+
+double imp__looks_z(const struct imp__looks *l)
+{
+    return -imp__normal_quantile(imp__looks_risk(l) / 2);
 }
 
 void imp__looks_bound(struct imp__looks *l, double relative)
