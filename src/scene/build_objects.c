@@ -296,6 +296,13 @@ static enum imp_status children_make(struct imp_scene *scene, struct imp_node *n
         if (made->photometric != s->photometric && made->photometric)
             IMP_TRY(imp__node_error(ctx, c->node, IMP_E_SCENE,
                                     "has units, which are those of its batch"));
+        if (made->film.srf)
+            IMP_TRY(imp__node_error(ctx, c->node, IMP_E_SCENE,
+                                    "has srf, which is that of its batch"));
+        if (made->open != 0 || made->close != 0 || made->course)
+            IMP_TRY(
+                imp__node_error(ctx, c->node, IMP_E_SCENE,
+                                "has a shutter or times, which are those of its batch"));
         s->medium = made->medium;
         c->used = true;
         child[k++] = made;

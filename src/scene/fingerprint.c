@@ -207,6 +207,10 @@ uint64_t imp__fingerprint_sensor(const struct imp_sensor *sensor)
                         f->crop_w, f->crop_h, f->sample_border};
     uint64_t h = imp__hash_text(0, sensor->ops->name);
     h = HASH(h, size);
+    for (int k = 0; k < sensor->n_child; k++) {
+        const uint64_t child = imp__fingerprint_sensor(sensor->child[k]);
+        h = HASH(h, child);
+    }
     if (sensor->open != 0 || sensor->close != 0)
         h = number_hash(number_hash(h, sensor->open), sensor->close);
     for (size_t k = 0; sensor->course && k < sensor->course->n; k++)

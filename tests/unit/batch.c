@@ -152,6 +152,11 @@ int main(void)
                 8) "<sensor type='perspective'/><sensor type='perspective'><ref "
                    "id='fog'/></sensor></sensor>",
             "in another medium than the sensors before it");
+    refused("a shutter of one of them",
+            "<sensor type='batch'>" FILM(
+                8) "<sensor type='perspective'><float "
+                   "name='shutter_close' value='2'/></sensor></sensor>",
+            "has a shutter or times, which are those of its batch");
     refused("a film with a border",
             "<sensor type='batch'><film type='hdrfilm'><boolean name='sample_border' "
             "value='true'/></film><sensor type='perspective'/></sensor>",

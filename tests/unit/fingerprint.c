@@ -49,6 +49,26 @@ static const char text[] =
     "name='reflectance'><rgb name='color0' value='.1,.2,.3'/></texture></bsdf></shape>"
     "<emitter type='point'><rgb name='intensity' value='7,8,9'/></emitter></scene>";
 
+/* Of a batch each sensor counts, also one whose rays are not among those that are asked. */
+static void batch(void)
+{
+    static const char form[] =
+        "<scene version='3.0.0'><sensor type='batch'><film type='hdrfilm'><integer "
+        "name='width' value='8'/><integer name='height' value='2'/></film>"
+        "<sensor type='perspective'/><sensor type='perspective'><transform "
+        "name='to_world'><translate x='%d'/></transform></sensor>"
+        "<sensor type='perspective'/><sensor type='perspective'/></sensor></scene>";
+    char a[1024], b[1024];
+    snprintf(a, sizeof a, form, 0);
+    snprintf(b, sizeof b, form, 3);
+    imp_scene *here = test_scene_text(ctx, a, IMP_RGB),
+              *there = test_scene_text(ctx, b, IMP_RGB);
+    const char *is = differ(prints_of(here), prints_of(there));
+    tap_ok(is[1] == 's', "the second of four sensors of a batch moves # %s", is);
+    imp_scene_destroy(here);
+    imp_scene_destroy(there);
+}
+
 static void word(const char *from, const char *to, const char *expected, const char *what)
 {
     char other[sizeof text + 64];
@@ -145,6 +165,7 @@ int main(void)
 {
     ctx = test_context(1);
     words();
+    batch();
     skies();
     meshes();
     imp_context_destroy(ctx);
