@@ -112,7 +112,6 @@ struct imp_node {
     const struct imp_image_data *image;
     const struct imp_ies_data *ies;
     const struct imp_merl_data *merl;
-    const struct imp_rgl_data *rgl; /* base/rgl_data.h */
     const struct imp_curve_data *curves;
     const struct imp_grid_data *grid;
     const struct imp_attribute_data *attribute;

@@ -105,7 +105,8 @@ static void walk_rows(const void *payload, const struct imp_light_walk *walk,
         for (int c = 0; c < a->channels; c++) value[0] += p[c] * r->L[c];
         P[k++] = imp__walk_lanes(&walk->walk, p);
     }
-    if (P) imp__light_walk_sweep(rows->tracer, arena, &own, P, 1, &pieces.sink);
+    if (!P || !imp__light_walk_sweep(rows->tracer, arena, &own, P, 1, &pieces.sink))
+        value[0] = NAN;
 }
 
 static enum imp_status lights_measure(struct ends *e)

@@ -112,6 +112,7 @@ static enum imp_status search_look(struct imp__fit *f, const struct imp__opt_opt
     enum imp_status st = intervals(f, s, s->x, rows, u, why);
     if (st != IMP_OK || !coarse || u->is_linear) return st;
     imp__search_refine(s);
+    *why = NULL;
     f->final_total = 0;
     st = search(f, o, s);
     f->final_calls = 0;

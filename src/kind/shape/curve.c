@@ -2,7 +2,7 @@
  *
  * bsplinecurve and linearcurve: hair, fur, grass. Rays meet them by Embree's round curves, in
  * float and from outside alone; the surface is computed again in double. uv is the turn about
- * the line and the place along all segments, as in Mitsuba 3.10. */
+ * the line and the place along all segments, as in Mitsuba 3.9.1. */
 #include "curve.h"
 
 static enum imp_status radius_check(const struct imp_build *b, const float *points,
