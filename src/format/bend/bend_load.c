@@ -65,11 +65,6 @@ static enum imp_status truth_apply(struct imp__bendfile *l)
         struct imp__target_of_rays *t = &b->targets[i];
         if (t->power >= 0) continue; /* marked by bend_target */
         t->power = -t->power;
-        if (!l->truth)
-            IMP_TRY(imp__error(l->ctx, IMP_E_SCENE,
-                               "%s: a target from_truth, and no <volume "
-                               "name=\"truth\"> in the medium",
-                               l->scene->root->loc.file));
         if (!e) IMP_TRY(truth_trace(l, &e));
         for (size_t k = t->first; k < t->last; k++) {
             struct imp__arrival a;

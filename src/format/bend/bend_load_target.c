@@ -120,6 +120,11 @@ enum imp_status imp__bendfile_target(struct imp__bendfile *l, struct imp_node *n
                                 IMP_E_SCENE,
                                 "'from_truth' is for points, directions, "
                                 "deflection and path"));
+    if (from_truth && !l->truth)
+        IMP_TRY(imp__prop_error(l->ctx, node, imp__node_prop(node, "from_truth"),
+                                IMP_E_SCENE,
+                                "'from_truth', and no <volume name=\"truth\"> in the "
+                                "medium"));
     if (from_truth && !t.data) { /* filled when all is there */
         data = imp__alloc(l->ctx, 3 * n, sizeof *data);
         if (!data) IMP_TRY(imp__error(l->ctx, IMP_E_NOMEM, "no memory for a target"));
