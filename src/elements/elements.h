@@ -240,6 +240,9 @@ static inline double imp__el_lobe(const struct imp__el_root *r, imp_v3 w)
 enum imp_status imp__el_create(const imp_scene *scene,
                                const struct imp_elements_options *options, bool quiet,
                                imp_elements **out);
+/* Has the scene this sensor? Otherwise an error. */
+enum imp_status imp__el_sensor_check(const imp_elements *e, int sensor);
+
 /* options.c: check and copy. */
 enum imp_status imp__el_options(imp_elements *e,
                                 const struct imp_elements_options *options);

@@ -252,9 +252,7 @@ enum imp_status imp_elements_image(const imp_elements *e, int sensor,
     IMP_REQUIRE(e->ctx, out, "out");
     IMP_FLOAT_MODE;
     IMP_READS(e->scene);
-    if (sensor < 0 || sensor >= e->scene->n_sensors)
-        return imp__error(e->ctx, IMP_E_ARG, "there is no sensor %d; the scene has %d",
-                          sensor, e->scene->n_sensors);
+    IMP_CHECKED(imp__el_sensor_check(e, sensor));
     if (!e->solved)
         return imp__error(e->ctx, IMP_E_ARG, "the elements are not solved yet");
     if (rays < 0 || rays > 64 || kind < IMP_ELEMENTS_FLAT ||

@@ -19,6 +19,18 @@ static int rays_by_default(const struct imp_scene *scene, int sensor)
                      scene->sensors[sensor]->shape ? 64 : 24);
 }
 
+enum imp_status imp__el_sensor_check(const imp_elements *e, int sensor)
+{
+    const int n = e->scene->n_sensors;
+    if (n == 0)
+        return imp__node_error(e->ctx, e->scene->root, IMP_E_SCENE,
+                               "there is no sensor in it");
+    if (sensor < 0 || sensor >= n)
+        return imp__error(e->ctx, IMP_E_ARG, "there is no sensor %d; the scene has %d",
+                          sensor, n);
+    return IMP_OK;
+}
+
 enum imp_status imp__el_options(imp_elements *e,
                                 const struct imp_elements_options *options)
 {
@@ -72,9 +84,7 @@ enum imp_status imp__el_options(imp_elements *e,
                           o->n_sources && !o->sources ? "sources"
                           : o->n_phong && !o->phong   ? "phong"
                                                       : "beams");
-    if (e->scene->n_sensors > 0 && (o->sensor < 0 || o->sensor >= e->scene->n_sensors))
-        return imp__error(e->ctx, IMP_E_ARG, "there is no sensor %d; the scene has %d",
-                          o->sensor, e->scene->n_sensors);
+    if (e->scene->n_sensors > 0) IMP_CHECKED(imp__el_sensor_check(e, o->sensor));
 
     /* Copies: the host's arrays may go. */
     struct imp_elements_phong *phong =
@@ -138,10 +148,7 @@ enum imp_status imp__el_options(imp_elements *e,
             if (!s->shape || !(s->shape = imp__arena_strdup(&e->arena, s->shape)))
                 IMP_TRY(imp__error(e->ctx, IMP_E_ARG, "a measurement has no shape"));
         } else if (s->kind == IMP_ELEMENTS_CAMERA) {
-            if (s->sensor < 0 || s->sensor >= e->scene->n_sensors)
-                IMP_TRY(imp__error(e->ctx, IMP_E_ARG,
-                                   "there is no sensor %d; the scene has %d", s->sensor,
-                                   e->scene->n_sensors));
+            IMP_TRY(imp__el_sensor_check(e, s->sensor));
             const struct imp_film_desc *f = &e->scene->sensors[s->sensor]->film;
             int *r = s->region;
             if (!r[0] && !r[1] && !r[2] && !r[3]) r[2] = f->crop_w, r[3] = f->crop_h;

@@ -20,6 +20,8 @@ cat >mirror.xml <<END
 <bsdf type="conductor"/></shape></scene>
 END
 importon elements mirror.xml -o out.png && exit 9
+printf '<!-- lit, and not looked at -->\n<scene version="3.0.0"><shape type="rectangle"><emitter type="area"/></shape></scene>' >unseen.xml
+importon elements unseen.xml -q -o out.png && exit 9
 importon elements b.xml --phong 'floor=1' -o out.png && exit 9
 importon elements b.xml --lux 'nothing' -o out.png && exit 9
 importon elements b.xml --lux '0:floor' -o out.png && exit 9
