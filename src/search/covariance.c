@@ -14,7 +14,7 @@
  * has the sum of these covariances, wherever in its neighbourhood x was. */
 #include "covariance.h"
 #include "directions.h"
-#include "excess.h"
+#include "sampled.h"
 #include <float.h>
 #include <math.h>
 #include <string.h>
@@ -23,8 +23,9 @@
 #define Z_ONE_SIDED 1.6448536269514722
 #define SEED_BASE   0x40000000 /* iteration numbers no search reaches */
 
-/* Samples are taken in two stages: FIRST rounds, and as many more as the first asks for. */
-enum { FIRST = 2, STAGES = 2 };
+/* Samples are taken in two stages (IMP_SAMPLED_STAGES): FIRST rounds, and as many more as
+ * these show to be missing. */
+#define FIRST  2
 #define ENOUGH 0.2 /* Monte Carlo's variance over the measurement's: then no more */
 
 void imp__uncertainty_destroy(imp_context *ctx, struct imp__uncertainty *u)
@@ -41,88 +42,6 @@ void imp__uncertainty_destroy(imp_context *ctx, struct imp__uncertainty *u)
 static enum imp_status no_memory(imp_context *ctx)
 {
     return imp__error(ctx, IMP_E_NOMEM, "no memory for a covariance");
-}
-
-/* ---- Samples -------------------------------------------------------------------- */
-
-static void sampled_destroy(struct imp__sampled *s)
-{
-    imp__normal_destroy(s->ctx, &s->mean);
-    imp__release(s->ctx, s->cov);
-    imp__release(s->ctx, s->deviations);
-    imp__release(s->ctx, s->scale);
-}
-
-static enum imp_status sampled_create(const struct imp__goal *goal, const double *x,
-                                      struct imp__sampled *s)
-{
-    const size_t n = s->n;
-    const enum imp_status st = imp__normal_create(s->ctx, n, false, &s->mean);
-    if (st != IMP_OK) return st;
-    s->cov = imp__alloc(s->ctx, 3 * n * n + n, sizeof *s->cov);
-    s->deviations = imp__alloc(s->ctx, STAGES * IMP_DEVIATIONS * n * n, sizeof(double));
-    s->scale = imp__alloc(s->ctx, n, sizeof *s->scale);
-    if (!s->cov || !s->deviations || !s->scale) return no_memory(s->ctx);
-    s->excess = s->cov + n * n;
-    s->last_cov = s->excess + n * n;
-    s->last_g = s->last_cov + n * n;
-    for (size_t k = 0; k < n; k++) s->scale[k] = fmax(fabs(x[k]), goal->scale[k]);
-    return IMP_OK;
-}
-
-static void mix(size_t count, double own, double *mean, double part, const double *more)
-{
-    for (size_t i = 0; i < count; i++) mean[i] = own * mean[i] + part * more[i];
-}
-
-/* From a gradient at `at` to that of the same quadratic at x. */
-static void shift(size_t n, const double *x, const double *at, struct imp__normal *e)
-{
-    for (size_t k = 0; k < n; k++) {
-        double change = 0;
-        for (size_t l = 0; l < n; l++) change += e->H[k * n + l] * (x[l] - at[l]);
-        e->chi2 += (2 * e->g[k] + change) * (x[k] - at[k]);
-    }
-    for (size_t k = 0; k < n; k++)
-        for (size_t l = 0; l < n; l++) e->g[k] += e->H[k * n + l] * (x[l] - at[l]);
-}
-
-/* More samples, taken at `at`, of the normal equations at x: means are weighted by the
- * samples that they are of. */
-static enum imp_status sample(const struct imp__goal *goal, const double *x,
-                              const double *at, uint64_t seed, int rounds,
-                              struct imp__sampled *s)
-{
-    enum imp_status st = IMP_OK;
-    const size_t n = s->n, nn = n * n, used = (size_t)s->n_deviations * nn;
-    const double part = (double)rounds / (s->rounds + rounds), own = 1 - part;
-    struct imp__normal one = {0}, *mean = &s->mean;
-
-    IMP_TRY(imp__normal_create(s->ctx, n, true, &one));
-    IMP_TRY(goal->normal(at, seed, rounds, &one, goal->payload));
-    memcpy(s->last_g, one.g, n * sizeof *s->last_g);
-    memcpy(s->last_cov, one.cov_g, nn * sizeof *s->last_cov);
-    IMP_TRY(imp__excess_take(s->ctx, n, s->last_cov, one.cov_excess));
-    if (at != x) shift(n, x, at, &one);
-    mix(nn, own, mean->H, part, one.H);
-    mix(nn, own, mean->H_prior, part, one.H_prior);
-    mix(nn, own, mean->H_meas, part, one.H_meas);
-    mix(n, own, mean->g, part, one.g);
-    mix(1, own, &mean->chi2, part, &one.chi2);
-    mix(nn, own * own, s->cov, part * part, one.cov_g);
-    mix(nn, own * own, s->excess, part * part, one.cov_excess);
-    for (size_t i = 0; i < used; i++) s->deviations[i] *= own;
-    for (size_t i = 0; i < IMP_DEVIATIONS * nn; i++)
-        s->deviations[used + i] = part * one.deviations[i];
-    s->n_deviations += IMP_DEVIATIONS;
-    s->rounds += rounds;
-    mean->n_residuals = one.n_residuals;
-    mean->noise_known = one.noise_known;
-    memcpy(mean->cov_g, s->cov, nn * sizeof *s->cov);
-    IMP_TRY(imp__excess_take(s->ctx, n, mean->cov_g, s->excess));
-out:
-    imp__normal_destroy(s->ctx, &one);
-    return st;
 }
 
 /* out = G C G^T */
@@ -271,20 +190,6 @@ static double standard_error(const struct imp__directions *a, size_t n, size_t k
     return sqrt(fmax(measurement[d], 0) + fmax(monte_carlo[d], 0));
 }
 
-/* Variance of the data in units of 1/weight, where their noise is known: the ratio of the
- * traces of D H_meas D and D H_data D, which the best determined directions dominate. */
-static double noise_ratio(const struct imp__sampled *s)
-{
-    double noise = 0, data = 0;
-    for (size_t k = 0; k < s->n; k++) {
-        const size_t d = k * s->n + k;
-        const double square = s->scale[k] * s->scale[k];
-        noise += square * s->mean.H_meas[d];
-        data += square * (s->mean.H[d] - s->mean.H_prior[d]);
-    }
-    return data > 0 ? fmax(noise / data, 0) : 0;
-}
-
 /* measurement += kappa G H_prior G of directions that the prior alone determines. */
 static enum imp_status prior_add(const struct imp__sampled *s,
                                  const struct imp__directions *a, double kappa,
@@ -356,7 +261,7 @@ static enum imp_status answer_find(const struct imp__goal *goal,
     IMP_TRY(newton_point(s, x, &a->every, a->wish));
     IMP_TRY(newton_free(goal, s, x, a->fixed, &a->free, u->x));
     const bool known = s->mean.noise_known;
-    a->kappa = known ? noise_ratio(s) : noise_scale(s, &a->free);
+    a->kappa = known ? imp__sampled_noise(s) : noise_scale(s, &a->free);
     u->noise_scale = known ? 0 : a->kappa;
     for (size_t i = 0; i < n * n; i++)
         noise[i] = known ? s->mean.H_meas[i]
@@ -403,7 +308,8 @@ static enum imp_status newton_samples(const struct imp__goal *goal, const double
     double *at = work, *C = work + n;
     for (size_t k = 0; k < n; k++) at[k] = imp__into_bounds(goal, k, u->x[k]);
     memcpy(C, s->last_cov, nn * sizeof *C);
-    IMP_TRY(sample(goal, x, at, imp__search_seed(goal, SEED_BASE, 1), missing, s));
+    IMP_TRY(
+        imp__sampled_add(goal, x, at, imp__search_seed(goal, SEED_BASE, 1), missing, s));
     for (size_t i = 0; i < nn; i++) C[i] += s->last_cov[i];
     u->is_linear = over_noise(n, a->free.G, s->last_g, C) <= 1;
 out:
@@ -431,8 +337,9 @@ enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
     if (!noise) IMP_TRY(no_memory(ctx));
     IMP_TRY(answer_create(ctx, n, &a));
     IMP_TRY(uncertainty_create(ctx, n, &u));
-    IMP_TRY(sampled_create(goal, x, &s));
-    IMP_TRY(sample(goal, x, x, imp__search_seed(goal, SEED_BASE, 0), first, &s));
+    IMP_TRY(imp__sampled_create(goal, x, &s));
+    IMP_TRY(
+        imp__sampled_add(goal, x, x, imp__search_seed(goal, SEED_BASE, 0), first, &s));
     IMP_TRY(answer_find(goal, &s, x, noise, &a, &u));
     const int missing = rounds_missing(&s, &a, &u, more);
     if (rounds->at_newton) {
@@ -441,8 +348,8 @@ enum imp_status imp__covariance(const struct imp__goal *goal, const double *x,
     } else {
         u.is_linear = true;
         if (missing > 0)
-            IMP_TRY(
-                sample(goal, x, x, imp__search_seed(goal, SEED_BASE, 1), missing, &s));
+            IMP_TRY(imp__sampled_add(goal, x, x, imp__search_seed(goal, SEED_BASE, 1),
+                                     missing, &s));
     }
     if (s.rounds > first) IMP_TRY(answer_find(goal, &s, x, noise, &a, &u));
     u.rounds = s.rounds;
@@ -480,7 +387,7 @@ out:
     if (st == IMP_E_NUMERIC && rounds->at_newton && !u.is_linear) st = IMP_OK;
     imp__uncertainty_destroy(ctx, &u);
     answer_destroy(ctx, &a);
-    sampled_destroy(&s);
+    imp__sampled_destroy(&s);
     imp__release(ctx, noise);
     return st;
 }

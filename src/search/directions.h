@@ -6,21 +6,7 @@
 #ifndef IMP_SEARCH_DIRECTIONS_H
 #define IMP_SEARCH_DIRECTIONS_H
 
-#include "optimize.h"
-
-/* Normal equations at one x, from random numbers of their own. */
-struct imp__sampled {
-    imp_context *ctx;
-    size_t n;
-    int rounds;                /* samples, in those of an evaluation */
-    struct imp__normal mean;   /* over them; cov_g without excess */
-    double *cov, *excess;      /* [n][n] of the mean; cov with excess */
-    double *last_g, *last_cov; /* [n], [n][n] of the last samples, where they were taken;
-                                  without excess */
-    int n_deviations;          /* see imp__normal.deviations */
-    double *deviations;        /* [n_deviations][n][n], of the mean's H */
-    double *scale;             /* [n] max(|x|, goal's scale) */
-};
+#include "sampled.h"
 
 struct imp__directions {      /* of a subset of the variables; all zero is none */
     size_t m;                 /* variables in it */
