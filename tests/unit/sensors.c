@@ -183,16 +183,30 @@ static void rays(void)
            "an aperture of 0 is a pinhole");
 }
 
-static void refused(struct imp_node *n, const char *words)
+static void refused_at(struct imp_node *n, int w, int h, const char *words)
 {
-    sensor_build(n, 30, 20);
+    sensor_build(n, w, h);
     tap_ok(sensor_status == IMP_E_SCENE && strstr(imp_last_error(ctx), words),
            "sensor error: %s # %s", words, imp_last_error(ctx));
+}
+
+static void refused(struct imp_node *n, const char *words)
+{
+    refused_at(n, 30, 20, words);
 }
 
 static void sensor_errors(void)
 {
     struct imp_node *n;
+    static const char *const meters[] = {"distant", "radiancemeter"};
+    for (size_t k = 0; k < imp_count(meters); k++) {
+        n = sensor_node(meters[k]);
+        node_transform(n, imp__scale(imp__v3(1, 0, 1)));
+        refused_at(n, 1, 1, "singular");
+        n = sensor_node(meters[k]);
+        node_transform(n, imp__scale(imp__v3(1, NAN, 1)));
+        refused_at(n, 1, 1, "not finite");
+    }
     for (int kind = 0; imp__sensor_kinds[kind]; kind++) {
         const char *type = imp__sensor_kinds[kind]->name;
         if (!is_camera(imp__sensor_kinds[kind])) continue;

@@ -54,11 +54,6 @@ static bool sample_emission(const struct imp_emitter *e, const struct imp_ball *
                                         .pdf_d = 1};
     return true;
 }
-static double pdf_emission(const struct imp_emitter *e, const struct imp_emission *x)
-{
-    (void)e, (void)x;
-    return 1;
-}
 
 const struct imp_emitter_ops imp__directional = {
     .size = sizeof(struct imp_emitter_ops),
@@ -72,4 +67,4 @@ const struct imp_emitter_ops imp__directional = {
     .sample = sample,
     .pdf = imp__point_light_pdf,
     .sample_emission = sample_emission,
-    .pdf_emission = pdf_emission};
+    .pdf_emission = imp__along_emission_pdf};

@@ -68,6 +68,12 @@ double imp__point_emission_pdf(const struct imp_emitter *e, const struct imp_emi
     return IMP_INV_PI / 4;
 }
 
+double imp__along_emission_pdf(const struct imp_emitter *e, const struct imp_emission *x)
+{
+    (void)e, (void)x;
+    return 1;
+}
+
 bool imp__sky_emission_sample(const struct imp_emitter *e, const struct imp_ball *scene,
                               const double u[4], struct imp_emission_sample *out)
 {

@@ -26,6 +26,9 @@ void imp__point_emission_sample(imp_v3 position, const double u[4],
                                 struct imp_emission_sample *out);
 double imp__point_emission_pdf(const struct imp_emitter *e, const struct imp_emission *x);
 
+/* Of light along one direction: 1. */
+double imp__along_emission_pdf(const struct imp_emitter *e, const struct imp_emission *x);
+
 /* The axes of an environment in the world, unit, from its to_world, which can turn and mirror
  * it only. */
 enum imp_status imp__sky_axes(const struct imp_build *b, imp_v3 axis[3]);

@@ -4,8 +4,8 @@
  * mean over the cross section of the ball around the scene, or of one ray through
  * `target`. A film of more than one pixel is spread over the cross section. */
 #include "kind/build.h"
-#include "math/transform.h"
 #include "math/warp.h"
+#include "projection.h"
 
 struct distant {
     struct imp_frame frame; /* n: of its rays */
@@ -24,11 +24,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
         IMP_TRY(imp_build_error(b, "to_world", IMP_E_SCENE,
                                 "give direction or to_world, not both"));
     IMP_TRY(imp_build_vector(b, "direction", (double[3]){0, 0, 1}, d));
-    IMP_TRY(imp_build_transform(b, "to_world", m.m));
-    if (!imp__mat4_is_finite(&m) || !imp__mat4_is_affine(&m) ||
-        !imp__mat4_inverse(&m, &inverse))
-        IMP_TRY(imp_build_error(b, "to_world", IMP_E_SCENE,
-                                "to_world is not finite, affine and invertible"));
+    IMP_TRY(imp__sensor_place(b, &m, &inverse));
     const imp_v3 n = imp__vector(&m, imp__v3(d[0], d[1], d[2]));
     const double length = imp__length(n);
     if (!(length > 0) || !isfinite(length))

@@ -7,18 +7,27 @@
 #include <string.h>
 #include <strings.h>
 
+enum imp_status imp__sensor_place(const struct imp_build *b, struct imp_mat4 *m,
+                                  struct imp_mat4 *inverse)
+{
+    enum imp_status st = IMP_OK;
+    IMP_TRY(imp_build_transform(b, "to_world", m->m));
+    if (!imp__mat4_is_finite(m) || !imp__mat4_is_affine(m))
+        IMP_TRY(imp_build_error(b, "to_world", IMP_E_SCENE,
+                                "to_world is not finite and affine"));
+    if (!imp__mat4_inverse(m, inverse))
+        IMP_TRY(imp_build_error(b, "to_world", IMP_E_SCENE, "to_world is singular"));
+out:
+    return st;
+}
+
 static enum imp_status placement_read(const struct imp_build *b, bool rigid,
                                       struct imp_mat4 *out, struct imp_mat4 *out_inverse)
 {
     enum imp_status st = IMP_OK;
     struct imp_mat4 m, inverse;
 
-    IMP_TRY(imp_build_transform(b, "to_world", m.m));
-    if (!imp__mat4_is_finite(&m) || !imp__mat4_is_affine(&m))
-        IMP_TRY(imp_build_error(b, "to_world", IMP_E_SCENE,
-                                "to_world is not finite and affine"));
-    if (!imp__mat4_inverse(&m, &inverse))
-        IMP_TRY(imp_build_error(b, "to_world", IMP_E_SCENE, "to_world is singular"));
+    IMP_TRY(imp__sensor_place(b, &m, &inverse));
     /* Rigid up to mirroring: M M^T = 1. */
     for (int i = 0; rigid && i < 3; i++)
         for (int j = 0; j <= i; j++) {

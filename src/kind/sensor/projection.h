@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What the projective sensors share: placement, clipping planes, field of view.
+ * What sensors share: placement; of projective ones clipping planes, field of view.
  */
 #ifndef IMP_KIND_PROJECTION_H
 #define IMP_KIND_PROJECTION_H
@@ -12,6 +12,10 @@ struct imp_projection {
     struct imp_mat4 to_world, to_local;
     double near_clip, far_clip, focus_distance;
 };
+
+/* to_world and its inverse; an error where it is not finite, affine and invertible. */
+enum imp_status imp__sensor_place(const struct imp_build *b, struct imp_mat4 *m,
+                                  struct imp_mat4 *inverse);
 
 /* to_world, near_clip, far_clip and focus_distance. `rigid`: a scale in to_world is an error (tolerance 1e-3). */
 enum imp_status imp__projection_build(const struct imp_build *b, bool rigid,

@@ -2,7 +2,7 @@
  *
  * The radiance that arrives along one ray. */
 #include "kind/build.h"
-#include "math/transform.h"
+#include "projection.h"
 
 struct radiancemeter {
     imp_v3 o, d;
@@ -28,11 +28,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
                                 "origin and direction are given together"));
     IMP_TRY(imp_build_vector(b, "origin", (double[3]){0, 0, 0}, o));
     IMP_TRY(imp_build_vector(b, "direction", (double[3]){0, 0, 1}, d));
-    IMP_TRY(imp_build_transform(b, "to_world", m.m));
-    if (!imp__mat4_is_finite(&m) || !imp__mat4_is_affine(&m) ||
-        !imp__mat4_inverse(&m, &inverse))
-        IMP_TRY(imp_build_error(b, "to_world", IMP_E_SCENE,
-                                "to_world is not finite, affine and invertible"));
+    IMP_TRY(imp__sensor_place(b, &m, &inverse));
     r->o = imp__point(&m, imp__v3(o[0], o[1], o[2]));
     r->d = imp__vector(&m, imp__v3(d[0], d[1], d[2]));
     const double length = imp__length(r->d);
