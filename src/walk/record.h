@@ -162,6 +162,11 @@ enum imp_status imp__record_take(struct imp_record_source *from,
                                  const struct imp_tracer *tracer,
                                  const struct imp_record_of *of, size_t budget,
                                  struct imp_record *out);
+/* Is this walk such as the scene allows (record_fits.c)? Its vertices and items begin at
+ * `first` and `first_item`. */
+bool imp__record_walk_fits(const struct imp_scene *scene, const struct imp_record *record,
+                           const struct imp_record_walk *walk, uint64_t first,
+                           uint64_t first_item);
 struct imp_record_of imp__record_made_with(const struct imp_tracer *tracer);
 
 /* Room for so many walks, vertices and items more. */

@@ -71,7 +71,7 @@ enum imp_status imp__store_take(struct imp_record_source *from, struct imp_store
                                 const struct imp_tracer *tracer,
                                 const struct imp_record_of *of);
 
-/* ---- Densities (store_weight.c) -------------------------------------------------- */
+/* ---- Densities (densities.c, store_weight.c) --------------------------------------- */
 
 /* What the densities of walks depend on. */
 struct imp_densities {
