@@ -348,6 +348,8 @@ double imp__el_measure(const imp_elements *e, double *direct);
 double imp__el_luminance(const imp_elements *e);
 /* The same from the emitters: emission x importance. */
 double imp__el_measure_adjoint(const imp_elements *e);
+/* *sum += what element j's own light adds to the measurement over its links. */
+void imp__el_given_add(const imp_elements *e, size_t j, double *sum);
 /* The first source that measures a root; -1: none. */
 int imp__el_source_of(const imp_elements *e, uint32_t root);
 /* What every source measures by itself, from radiance, without weights: J [n_sources]. */

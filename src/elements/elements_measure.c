@@ -202,22 +202,27 @@ enum imp_status imp__el_measure_each(imp_elements *e, double *J)
     return st;
 }
 
+void imp__el_given_add(const imp_elements *e, size_t j, double *sum)
+{
+    const struct imp__el_root *r = imp__el_root_of(e, &e->elements[j]);
+    for (size_t at = e->out_start[j]; at < e->out_start[j + 1]; at++) {
+        const struct imp__el_link *k = &e->links[e->out[at]];
+        imp_spec emitted[3] = {{0}}, g[3];
+        imp__el_emission(e, k, r, emitted);
+        imp__el_ends(e, k, NULL, g);
+        for (int c = 0; c < e->ch; c++)
+            for (int s = 0; s < 4; s++) *sum += k->k[s] * emitted[c][s] * g[c][s];
+    }
+}
+
 static double lights_measure(const imp_elements *e, size_t first, size_t end,
                              const void *how)
 {
     double sum = 0;
     (void)how;
     for (size_t j = first; j < end; j++) {
-        const struct imp__el_root *r = imp__el_root_of(e, &e->elements[j]);
-        if (r->light == EL_DARK) continue;
-        for (size_t at = e->out_start[j]; at < e->out_start[j + 1]; at++) {
-            const struct imp__el_link *k = &e->links[e->out[at]];
-            imp_spec emitted[3] = {{0}}, g[3];
-            imp__el_emission(e, k, r, emitted);
-            imp__el_ends(e, k, NULL, g);
-            for (int c = 0; c < e->ch; c++)
-                for (int s = 0; s < 4; s++) sum += k->k[s] * emitted[c][s] * g[c][s];
-        }
+        if (imp__el_root_of(e, &e->elements[j])->light == EL_DARK) continue;
+        imp__el_given_add(e, j, &sum);
     }
     return sum;
 }

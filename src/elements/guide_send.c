@@ -45,22 +45,6 @@ static double seen(const imp_elements *e, const struct imp__el_root *r)
     return sum;
 }
 
-/* What an element's light gives the sensor over its links. */
-static double given(const imp_elements *e, size_t j)
-{
-    const struct imp__el_root *r = imp__el_root_of(e, &e->elements[j]);
-    double sum = 0;
-    for (size_t at = e->out_start[j]; at < e->out_start[j + 1]; at++) {
-        const struct imp__el_link *k = &e->links[e->out[at]];
-        imp_spec emitted[3] = {{0}}, g[3];
-        imp__el_emission(e, k, r, emitted);
-        imp__el_ends(e, k, NULL, g);
-        for (int c = 0; c < e->ch; c++)
-            for (int s = 0; s < 4; s++) sum += k->k[s] * emitted[c][s] * g[c][s];
-    }
-    return sum;
-}
-
 static void lights_fill(struct imp__guide *g)
 {
     const imp_elements *e = g->e;
@@ -71,7 +55,10 @@ static void lights_fill(struct imp__guide *g)
     }
     for (size_t j = 0; j < e->n_elements; j++) {
         const int light = imp__guide_emitter(e, imp__el_root_of(e, &e->elements[j]));
-        if (light >= 0) g->send[light] += given(e, j);
+        if (light < 0) continue;
+        double given = 0;
+        imp__el_given_add(e, j, &given);
+        g->send[light] += given;
     }
     for (int k = 0; k < g->n_lights; k++) {
         /* Lobes ring below zero; a light of weight 0 sends nothing. */
