@@ -6,6 +6,7 @@
 #ifndef IMP_MATH_WARP_H
 #define IMP_MATH_WARP_H
 
+#include "pair.h"
 #include "trig.h"
 #include "vec.h"
 
@@ -18,11 +19,13 @@ static inline void imp__concentric_disk(const double u[2], double xy[2])
         return;
     }
     /* phi = pi/4 b/a, or pi/2 - pi/4 a/b: sine and cosine change places. */
-    const bool wide = fabs(a) > fabs(b);
-    const double r = wide ? a : b, other = wide ? b : a, x = IMP_PI / 4 * (other / r);
+    const imp_pair_mask wide = imp__pair_exceeds(fabs(a), fabs(b));
+    const imp_pair larger = imp__pair_choose(wide, (imp_pair){a, b}, (imp_pair){b, a});
+    const double r = larger[0], x = IMP_PI / 4 * (larger[1] / r);
     const double s = imp__sin_eighth(x), c = imp__cos_eighth(x);
-    xy[0] = r * (wide ? c : s);
-    xy[1] = r * (wide ? s : c);
+    const imp_pair p = imp__pair_choose(wide, (imp_pair){c, s}, (imp_pair){s, c});
+    xy[0] = r * p[0];
+    xy[1] = r * p[1];
 }
 static inline void imp__concentric_disk_inverse(const double xy[2], double u[2])
 {

@@ -2,6 +2,7 @@
  *
  * The square [-1,1]^2 at z = 0 under an affine map: a parallelogram. Embree sees two
  * triangles; the surface is computed from the parallelogram itself, in double. */
+#include "math/pair.h"
 #include "shape.h"
 #include <string.h>
 
@@ -55,21 +56,27 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
     return IMP_OK;
 }
 
-static void surface(const struct imp_shape *s, const struct imp_hit *hit, const imp_v3 *o,
-                    const imp_v3 *d, struct imp_surface *out)
+static inline void surface_at(const struct rectangle *r, double u, double v,
+                              struct imp_surface *out)
 {
-    (void)o, (void)d;
-    const struct rectangle *r = s->self;
-    /* Corners (0,0) (1,0) (1,1) (0,1), triangles 012 and 023. */
-    const double sum = hit->u + hit->v;
-    out->uv[0] = hit->prim == 0 ? sum : hit->u;
-    out->uv[1] = hit->prim == 0 ? hit->v : sum;
-    out->p = r->corner + r->eu * out->uv[0] + r->ev * out->uv[1];
+    out->uv[0] = u;
+    out->uv[1] = v;
+    out->p = r->corner + r->eu * u + r->ev * v;
     out->ng = out->n = r->n;
     out->s = r->s;
     out->t = r->t;
     out->dp_du = r->eu;
     out->dp_dv = r->ev;
+}
+
+static void surface(const struct imp_shape *s, const struct imp_hit *hit, const imp_v3 *o,
+                    const imp_v3 *d, struct imp_surface *out)
+{
+    (void)o, (void)d;
+    /* Corners (0,0) (1,0) (1,1) (0,1), triangles 012 and 023. */
+    const double sum = hit->u + hit->v;
+    surface_at(s->self, hit->prim == 0 ? sum : hit->u, hit->prim == 0 ? hit->v : sum,
+               out);
 }
 
 static void place(const struct imp_shape *s, const double uv[2], struct imp_surface *out,
@@ -83,11 +90,12 @@ static void place(const struct imp_shape *s, const double uv[2], struct imp_surf
 static void sample_area(const struct imp_shape *s, const double u[2],
                         struct imp_surface *out)
 {
-    /* uv of the triangle before the diagonal or behind it, as `surface` reads them. */
-    struct imp_hit hit = {.prim = u[1] > u[0]};
-    hit.u = hit.prim ? u[0] : u[0] - u[1];
-    hit.v = hit.prim ? u[1] - u[0] : u[1];
-    surface(s, &hit, NULL, NULL, out);
+    /* uv as `surface` makes them of a hit before the diagonal or behind it: the larger one
+     * is the smaller one plus what it is larger by. */
+    const double sum = imp_min(u[0], u[1]) + fabs(u[0] - u[1]);
+    const imp_pair uv = imp__pair_choose(imp__pair_exceeds(u[1], u[0]),
+                                         (imp_pair){u[0], sum}, (imp_pair){sum, u[1]});
+    surface_at(s->self, uv[0], uv[1], out);
 }
 
 static bool sample_toward(const struct imp_shape *s, const imp_v3 *ref, const double u[2],
