@@ -70,6 +70,23 @@ out:
     return st;
 }
 
+static void side_bound(double x0, double dx, double pixels, double beside, double *least,
+                       double *most)
+{
+    const double a = x0 - beside * dx, b = x0 + (pixels + beside) * dx;
+    *least = fmin(a, b);
+    *most = fmax(a, b);
+}
+
+void imp__film_plane_bound(const struct imp_film_desc *film, struct imp_film_plane *plane)
+{
+    const double beside = ceil(film->filter.radius) + 1;
+    side_bound(plane->x0, plane->dx, film->width, beside, &plane->x_least,
+               &plane->x_most);
+    side_bound(plane->y0, plane->dy, film->height, beside, &plane->y_least,
+               &plane->y_most);
+}
+
 bool imp__projection_connect(const struct imp_projection *p,
                              const struct imp_film_plane *film, imp_v3 o, double focus,
                              imp_v3 ref, bool far, struct imp_sensor_sample *out)
@@ -78,13 +95,19 @@ bool imp__projection_connect(const struct imp_projection *p,
         far ? imp__vector(&p->to_local, ref) : imp__point(&p->to_local, ref) - o;
     if (!(q[2] > 0) || (!far && !(q[2] > p->near_clip && q[2] < p->far_clip)))
         return false;
+    const double ox = o[0] / focus, oy = o[1] / focus;
+    /* Most of what walks from the lights meet is beside the film: no division before. */
+    if (q[0] + ox * q[2] < film->x_least * q[2] ||
+        q[0] + ox * q[2] > film->x_most * q[2] ||
+        q[1] + oy * q[2] < film->y_least * q[2] || q[1] + oy * q[2] > film->y_most * q[2])
+        return false;
     const imp_v3 v = q * (1 / q[2]);
     const double length = imp__length(v), r2 = far ? 1 : imp__dot(q, q);
     const imp_v3 d = imp__normalize(imp__vector(&p->to_world, v));
     *out = (struct imp_sensor_sample){.wo = -d,
                                       .p = imp__point(&p->to_world, o + v * p->near_clip),
-                                      .px = (v[0] + o[0] / focus - film->x0) / film->dx,
-                                      .py = (v[1] + o[1] / focus - film->y0) / film->dy,
+                                      .px = (v[0] + ox - film->x0) / film->dx,
+                                      .py = (v[1] + oy - film->y0) / film->dy,
                                       .weight = length * length * length /
                                                 (fabs(film->dx * film->dy) * r2),
                                       .cos_sensor = 1};

@@ -41,12 +41,18 @@ static inline void imp__projection_ray(const struct imp_projection *p, imp_v3 o,
 }
 
 /* Of a camera whose rays through local point o run along (x0 + px dx, y0 + py dy, 1) - o/f:
- * the ray that comes from ref (imp_sensor_ops.connect). Solid angle and film area are
+ * the ray that comes from ref (imp_sensor_ops.connect), if it may be on the film. Solid
+ * angle and film area are
  *
  *     dw = |dx dy| cos(theta)^3 dpx dpy,    theta: the angle with the axis */
 struct imp_film_plane {
     double x0, dx, y0, dy;
+    /* Bounds of x0 + px dx and y0 + py dy on the film, with a filter's radius and a pixel
+     * beside it. */
+    double x_least, x_most, y_least, y_most;
 };
+void imp__film_plane_bound(const struct imp_film_desc *film,
+                           struct imp_film_plane *plane);
 bool imp__projection_connect(const struct imp_projection *p,
                              const struct imp_film_plane *film, imp_v3 o, double focus,
                              imp_v3 ref, bool far, struct imp_sensor_sample *out);

@@ -30,6 +30,7 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
     p->film.dx = -2 * t / w;
     p->film.y0 = t / a;
     p->film.dy = -2 * t / a / h;
+    imp__film_plane_bound(&s->film, &p->film);
 out:
     return st;
 }
