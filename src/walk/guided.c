@@ -52,6 +52,11 @@ enum imp_status imp__guide_lights_allowed(const struct imp_scene *scene,
                           "walks from the lights: a guide knows surfaces alone, and not "
                           "medium '%s'; leave the guide out",
                           scene->media[0]->name);
+    if (guide->roulette > 0)
+        return imp__error(
+            scene->ctx, IMP_E_UNSUPPORTED,
+            "walks from the lights: roulette by a guide (guide-roulette) is "
+            "for walks from the sensor; leave it out, they have their own");
     return IMP_OK;
 }
 
