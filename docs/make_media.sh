@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 #
 # The pictures of docs/media.md that were computed, computed again; five to ten minutes. With the
-# number of a figure of Morley et al. (2006) that one alone: 6, 7 (and 8), 9 or 10.
+# number of a figure of Morley et al. (2006) that one alone: 6, 7 (and 8), 9 or 10; or `fire`.
 #
 #     docs/make_media.sh [BUILD FOLDER, default build] [FIGURE]
 set -euo pipefail
@@ -67,6 +67,11 @@ if wanted 10; then
     say "Figure 10: subsurface scattering in a dielectric mesh"
     python3 scenes/wax/make.py "$out/wax.ply"
     picture wax scenes/wax.xml -D mesh="$out/wax.ply" -D res=112 --spp 1024
+fi
+if wanted fire; then
+    say "Fire: a plume that emits"
+    "$build/examples/example_smoke" 64 7 "$out/smoke.vol"
+    picture fire scenes/fire.xml -D density="$out/smoke.vol" -D res=256 --spp 256
 fi
 for picture in "$images"/media_*.png; do
     bytes=$(stat -c %s "$picture")
