@@ -6,12 +6,13 @@
  *
  *     media DIR [REPEATS [SPP [N]]]
  *
- * A homogeneous box and a plume of N^3 cells (128) are written to DIR as scenes, which
- * bench/peers/media.py has Mitsuba measure beside it. Lines for it are
+ * A homogeneous box, a plume of N^3 cells (128) and a clear sky are written to DIR as
+ * scenes, which bench/peers/media.py has Mitsuba measure beside it. Lines for it are
  *
- *     NAME picture SECONDS gradient SECONDS variance SUM
+ *     NAME picture SECONDS gradient SECONDS variance SUM noise ERROR segments NUMBER
  *
- * for `spp` samples a pixel, SUM the sum of the squared errors of all derivatives. */
+ * for `spp` samples a pixel, SUM the sum of the squared errors of all derivatives, ERROR
+ * the median pixel's, relative, NUMBER that of a walk. */
 #include "plume.h"
 #include "walk/walk.h"
 #include <sys/resource.h>
@@ -38,7 +39,6 @@ static int by_value(const void *a, const void *b)
 }
 
 static const char scene_text[] =
-    "<scene version=\"3.0.0\">\n"
     "<default name=\"integrator\" value=\"volpath\"/>\n"
     "<integrator type=\"$integrator\"><integer name=\"max_depth\" value=\"16\"/>"
     "</integrator>\n"
@@ -47,7 +47,6 @@ static const char scene_text[] =
     "up=\"0,1,0\"/></transform>\n"
     "<film type=\"hdrfilm\"><integer name=\"width\" value=\"128\"/><integer "
     "name=\"height\" value=\"128\"/><rfilter type=\"box\"/></film></sensor>\n"
-    "%s\n"
     "<shape type=\"cube\"><bsdf type=\"null\"/><ref id=\"smoke\" name=\"interior\"/>"
     "<transform name=\"to_world\"><translate x=\"1\" y=\"1\" z=\"1\"/>"
     "<scale value=\"0.5\"/></transform></shape>\n"
@@ -64,6 +63,59 @@ static const char plume_text[] =
     "name=\"sigma_t\" id=\"density\"><string name=\"filename\" value=\"plume.vol\"/>"
     "</volume><float name=\"albedo\" value=\"0.9\"/><phase type=\"hg\"><float "
     "name=\"g\" value=\"0.3\"/></phase></medium>";
+/* The air of scenes/sky.xml as a grid of three colours (650, 550, 450 nm), which Mitsuba
+ * has, too: up to 80 km over a black planet, within 500 km; the sun is a direction. */
+static const char sky_text[] =
+    "<default name=\"integrator\" value=\"volpath\"/>\n"
+    "<integrator type=\"$integrator\"><integer name=\"max_depth\" value=\"16\"/>"
+    "</integrator>\n"
+    "<medium type=\"heterogeneous\" id=\"air\"><volume type=\"gridvolume\" "
+    "name=\"sigma_t\" id=\"density\"><string name=\"filename\" value=\"sky.vol\"/>"
+    "<boolean name=\"raw\" value=\"true\"/><transform name=\"to_world\">"
+    "<scale x=\"1000\" y=\"125\" z=\"1000\"/>"
+    "<translate x=\"-500\" y=\"-45\" z=\"-500\"/></transform></volume>"
+    "<float name=\"albedo\" value=\"1\"/><phase type=\"rayleigh\"/></medium>\n"
+    "<shape type=\"cube\"><bsdf type=\"null\"/><ref id=\"air\" name=\"interior\"/>"
+    "<transform name=\"to_world\"><scale x=\"500\" y=\"62.5\" z=\"500\"/>"
+    "<translate y=\"17.5\"/></transform></shape>\n"
+    "<shape type=\"sphere\"><point name=\"center\" x=\"0\" y=\"-6360\" z=\"0\"/>"
+    "<float name=\"radius\" value=\"6360\"/><bsdf type=\"diffuse\"><float "
+    "name=\"reflectance\" value=\"0\"/></bsdf><ref id=\"air\" name=\"exterior\"/>"
+    "</shape>\n"
+    "<emitter type=\"directional\"><vector name=\"direction\" x=\"0\" y=\"-0.5\" "
+    "z=\"-0.8660254\"/><float name=\"irradiance\" value=\"3.1415927\"/></emitter>\n"
+    "<sensor type=\"perspective\"><float name=\"fov\" value=\"60\"/>"
+    "<transform name=\"to_world\"><lookat origin=\"0,0.1,0\" target=\"0,0.8,1\" "
+    "up=\"0,1,0\"/></transform><ref id=\"air\"/>\n"
+    "<film type=\"hdrfilm\"><integer name=\"width\" value=\"128\"/><integer "
+    "name=\"height\" value=\"128\"/><rfilter type=\"box\"/></film></sensor>\n</scene>\n";
+
+/* The grid of sky_text, in 1/km: optical depths of the column by Hansen and Travis (1974),
+ * scale height 8 km. 0: it cannot be written. */
+static int sky_write(const char *path)
+{
+    enum { NX = 32, NY = 128, NZ = 32 };
+    static const double depth[3] = {.0493, .0973, .2213};
+    const int32_t head[5] = {1, NX, NY, NZ, 3};
+    const float box[6] = {0, 0, 0, 1, 1, 1};
+    FILE *f = fopen(path, "wb");
+    if (!f) return 0;
+    int ok = fwrite("VOL\3", 1, 4, f) == 4 && fwrite(head, 4, 5, f) == 5 &&
+             fwrite(box, 4, 6, f) == 6;
+    for (int k = 0; k < NZ && ok; k++)
+        for (int j = 0; j < NY && ok; j++)
+            for (int i = 0; i < NX && ok; i++) {
+                const double x = 1000 * (i + .5) / NX - 500, y = 125 * (j + .5) / NY - 45,
+                             z = 1000 * (k + .5) / NZ - 500;
+                const double h =
+                    fmax(sqrt(x * x + (y + 6360) * (y + 6360) + z * z) - 6360, 0);
+                float value[3];
+                for (int c = 0; c < 3; c++)
+                    value[c] = (float)(depth[c] / 8 * exp(-h / 8));
+                ok = fwrite(value, 4, 3, f) == 3;
+            }
+    return fclose(f) == 0 && ok;
+}
 
 /* Median relative error of a pixel's green, of those that have one. */
 static double noise(imp_film *f)
@@ -166,25 +218,27 @@ static void measure(const char *name, const char *path, const char *numbers, int
         must(imp_problem_objective(p, NULL, &run, &value, g, se));
         loss = fmin(loss, cpu() - t);
     }
-    const double samples = 128. * 128. * spp;
+    const double samples = 128. * 128. * spp, walk = segments(scene);
     printf(
         "%s: %zu numbers, %.3g samples and %.3g segments a second; 1 %% in the median "
         "pixel in %.2f s; gradient/picture %.2f; (loss + gradient)/picture %.2f; memory "
         "of the gradient %.1f bytes a number\n",
-        name, n, samples / picture, segments(scene) * samples / picture,
+        name, n, samples / picture, walk * samples / picture,
         picture * pow(error / .01, 2), gradient / picture, loss / picture,
         1024. * (double)(peak_kib() - before) / (double)n);
-    printf("%s picture %.4f gradient %.4f variance %.6g\n", name, picture, gradient, sum);
+    printf("%s picture %.4f gradient %.4f variance %.6g noise %.6g segments %.4f\n", name,
+           picture, gradient, sum, error, walk);
     free(g);
     free(se);
     imp_problem_destroy(p);
     imp_scene_destroy(scene);
 }
 
-static void scene_write(const char *path, const char *medium)
+static void scene_write(const char *path, const char *medium, const char *rest)
 {
     FILE *f = fopen(path, "w");
-    if (!f || fprintf(f, scene_text, medium) < 0 || fclose(f) != 0) {
+    if (!f || fprintf(f, "<scene version=\"3.0.0\">\n%s\n%s", medium, rest) < 0 ||
+        fclose(f) != 0) {
         fprintf(stderr, "media: %s cannot be written\n", path);
         exit(3);
     }
@@ -193,7 +247,7 @@ static void scene_write(const char *path, const char *medium)
 int main(int argc, char **argv)
 {
     struct imp_context_options o = IMP_CONTEXT_OPTIONS_INIT;
-    char box[1024], plume[1024], grid[1024];
+    char box[1024], plume[1024], grid[1024], sky[1024], air[1024];
     if (argc < 2) {
         fprintf(stderr, "usage: media DIR [REPEATS [SPP [N]]]\n");
         return 2;
@@ -203,16 +257,20 @@ int main(int argc, char **argv)
     snprintf(box, sizeof box, "%s/box.xml", argv[1]);
     snprintf(plume, sizeof plume, "%s/plume.xml", argv[1]);
     snprintf(grid, sizeof grid, "%s/plume.vol", argv[1]);
-    scene_write(box, box_text);
-    scene_write(plume, plume_text);
-    if (repeats < 1 || spp < 2 || n < 1 || !plume_write(grid, n, 7)) {
-        fprintf(stderr, "media: %s cannot be written\n", grid);
+    snprintf(sky, sizeof sky, "%s/sky.xml", argv[1]);
+    snprintf(air, sizeof air, "%s/sky.vol", argv[1]);
+    scene_write(box, box_text, scene_text);
+    scene_write(plume, plume_text, scene_text);
+    scene_write(sky, "", sky_text);
+    if (repeats < 1 || spp < 2 || n < 1 || !plume_write(grid, n, 7) || !sky_write(air)) {
+        fprintf(stderr, "media: %s or %s cannot be written\n", grid, air);
         return 3;
     }
     o.threads = 1;
     must(imp_context_create(&o, &ctx));
     measure("box", box, "smoke.sigma_t.value", repeats, spp);
     measure("plume", plume, "density.data", repeats, spp);
+    measure("sky", sky, "density.data", repeats, spp);
     imp_context_destroy(ctx);
     return 0;
 }
