@@ -3,7 +3,7 @@
 picture's mean with respect to every number of an extinction.
 
     python3 bench/peers/media.py [-b MEDIA] [-i IMPORTON] [--repeats N] [--spp N] [--cells N]
-                                 [--runs N] [--agree SPP]
+                                 [--runs N] [--agree SPP] [--only NAME]
 
 MEDIA is bench/media, which writes the scenes and measures importon on one thread;
 Mitsuba's volpath and prbvolpath follow on one thread, kernels compiled beforehand. Seconds
@@ -13,7 +13,8 @@ the error of the median pixel's green, from which the time to 1 % follows. Segme
 counted by importon; walks have the same length in both. Memory is the peak of a process
 that loads the scene and makes one gradient.
 
-With --agree pictures of so many samples are compared as by zcompare.py.
+With --agree pictures of so many samples are compared as by zcompare.py. NAME is box, plume or
+sky.
 Skips (77) without mitsuba.
 """
 import argparse
@@ -112,6 +113,7 @@ def main():
     ap.add_argument("--cells", type=int, default=64)
     ap.add_argument("--runs", type=int, default=12)
     ap.add_argument("--agree", type=int, default=0)
+    ap.add_argument("--only", choices=sorted(NUMBERS))
     ap.add_argument("--one", nargs=2, help=argparse.SUPPRESS)  # a gradient, for its memory
     a = ap.parse_args()
     mi.set_variant("llvm_ad_rgb")
@@ -126,6 +128,8 @@ def main():
         row = (r"^(\w+) picture (\S+) gradient (\S+) variance (\S+) noise (\S+) "
                r"segments (\S+)$")
         for name, *numbers in re.findall(row, text, re.MULTILINE):
+            if a.only not in (None, name):
+                continue
             picture, gradient, variance, error, segments = [float(x) for x in numbers]
             path = "%s/%s.xml" % (folder, name)
             samples = 128 * 128 * a.spp
