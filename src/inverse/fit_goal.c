@@ -11,7 +11,6 @@
 #include "walk/light_walk.h"
 #include "walk/run.h"
 #include "walk/store.h"
-#include <float.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
@@ -241,56 +240,6 @@ static void fingerprint(struct imp__fit *f)
             imp__replicates_of(p->scene, &p->targets[0], &f->outer);
         const int sets[3] = {plan.n, plan.m, IMP_SET_POINTS};
         h->options = imp__hash(h->options, sets, sizeof sets);
-    }
-}
-
-/* A large change of a variable: its whole range, or its size at the start. Zeros take the
- * size of their neighbours in the same parameter, or 1 in the parameter's unit. */
-static bool is_bounded(const struct imp__block *b)
-{
-    return !b->log && isfinite(b->lo) && isfinite(b->hi) && b->hi - b->lo < DBL_MAX;
-}
-/* The large change of a logarithm is 1, a factor of e. */
-static double typical_of(const struct imp__block *b, double square)
-{
-    return square > 0 && !b->log ? sqrt(square / (double)b->count) : 1;
-}
-static void span_scale(const struct imp__block *b, double square, struct imp__span *span)
-{
-    const bool bounded = is_bounded(b);
-    const double scale = bounded ? b->hi - b->lo : typical_of(b, square);
-    span->by_start = !bounded && !b->log;
-    span->scale = scale > 0 ? scale : 1;
-}
-void imp__fit_span_scale(const struct imp__block *b, const double *x,
-                         struct imp__span *span)
-{
-    double square = 0;
-    for (size_t e = 0; e < b->count; e++) square += imp__sqr(x[b->first + e]);
-    span_scale(b, square, span);
-}
-
-void imp__fit_scales(struct imp__fit *f, const struct imp__search *search)
-{
-    const struct imp_problem *p = f->problem;
-    size_t span = 0;
-    for (size_t k = 0; k < p->n_blocks; k++) {
-        const struct imp__block *b = &p->blocks[k];
-        double square = 0;
-        for (size_t e = 0; e < b->count; e++)
-            square += imp__sqr(imp__search_start(search, b->first + e));
-        if (f->spans) {
-            span_scale(b, square, &f->spans[span++]);
-            continue;
-        }
-        const double typical = typical_of(b, square);
-        for (size_t e = 0; e < b->count; e++) {
-            const double start = fabs(imp__search_start(search, b->first + e));
-            const double scale = is_bounded(b) ? b->hi - b->lo
-                                 : b->log      ? 1
-                                               : fmax(start, typical);
-            f->scale[b->first + e] = scale > 0 ? scale : 1;
-        }
     }
 }
 
