@@ -195,14 +195,19 @@ static void report(const char *path, imp_film *film, const struct imp_run *run,
     cli_json_end(&j);
 }
 
-/* The picture's place is taken by one without noise, and without errors. */
+/* The picture's place is taken by one without noise, and without errors. Where that fails,
+ * the picture as it is stays, to be written before the command fails. */
 static int denoise(const struct imp_run *run, imp_film **film)
 {
     imp_film *made = NULL;
     struct imp_run own = *run;
     own.preview = NULL;
     enum imp_status st = imp_denoise(cli.scene, &own, *film, &made);
-    if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+    if (st != IMP_OK) {
+        const int rc = cli_fail(st, cli.scene_path);
+        cli_say("the picture is written with its noise");
+        return rc;
+    }
     imp_film_destroy(*film);
     *film = made;
     st = imp_film_set_text(made, "denoised", "Open Image Denoise");
@@ -239,6 +244,7 @@ static int run_render(int n, char **operand)
     struct imp_until_end end = IMP_UNTIL_END_INIT;
     imp_film *film = NULL;
     struct sampling sampling = {NULL, NULL, 0};
+    int noisy = 0; /* the exit code, where denoising failed */
     (void)n;
     int rc = o.sampling ? sampling_refused() : 0;
     if (!rc && o.until > 0) rc = until_refused();
@@ -258,6 +264,10 @@ static int run_render(int n, char **operand)
                          "nobody knows");
     if (o.denoise && (one || o.paths))
         return cli_error(EXIT_USAGE, "--denoise is of pictures, not of walks");
+    if (o.denoise && !cli.part) { /* before the time of a picture is spent */
+        const enum imp_status st = imp_denoiser_check(cli.context);
+        if (st != IMP_OK) return cli_fail(st, cli.scene_path);
+    }
     if (one) {
         rc = cli_redirect();
         return rc ? rc
@@ -288,9 +298,10 @@ static int run_render(int n, char **operand)
     }
     if (!film && !rc) cli_say("interrupted in the first pass: no picture is written");
     if (film && !rc) {
-        if (o.denoise) rc = denoise(&run, &film);
-        if (!rc) picture_stamp(film, &run);
-        if (!rc) rc = picture_write(film, path, &o.picture);
+        if (o.denoise) noisy = denoise(&run, &film);
+        picture_stamp(film, &run);
+        rc = picture_write(film, path, &o.picture);
+        if (!rc) rc = noisy;
         if (!rc) rc = manifest_output(path);
         if (!rc && o.sampling && !progress_interrupted())
             rc = sampling_check(&run, &sampling);

@@ -709,6 +709,10 @@ IMP_API IMP_MUST_CHECK enum imp_status imp_denoise(const imp_scene *scene,
                                                    const imp_film *picture,
                                                    imp_film **out);
 
+/** Is there a library for imp_denoise? To be asked before a long render.
+ * @return IMP_OK; IMP_E_UNSUPPORTED, with what to do, if there is none. */
+IMP_API IMP_MUST_CHECK enum imp_status imp_denoiser_check(imp_context *context);
+
 /** One walk, vertex by vertex, as text (json 0) or JSON: sample number `sample` of pixel
  * (x, y) of the picture, the same walk that renders and gradients of run->seed use. Pixels
  * of the border that a film with sample_border samples for its filter have numbers below 0

@@ -121,7 +121,8 @@ struct imp_node {
     int n_asked;           /* what a misspelt one may have meant. Full: no more */
     int visiting;          /* cycle detection */
     bool vector;           /* a texture read as IMP_INPUT_VECTOR */
-    bool surveyed, gone;   /* format/survey.c: visited; left out of a lenient scene */
+    bool surveyed, gone;   /* format/survey.c: visited; left out of a lenient scene; */
+    bool referred;         /* a reference names it */
     bool lenient;          /* what nobody reads is left out, not an error: */
     bool read;             /* its object was made: what is not used is used by nobody */
 };

@@ -66,6 +66,12 @@ static enum imp_status find(imp_context *ctx, struct denoiser *d)
     return IMP_OK;
 }
 
+enum imp_status imp__denoiser_find(imp_context *ctx)
+{
+    struct denoiser d;
+    return find(ctx, &d);
+}
+
 enum imp_status imp__denoise(imp_context *ctx, int width, int height, float *colour,
                              float *albedo, float *normal, float *out)
 {

@@ -53,6 +53,12 @@ static enum imp_status features_make(const imp_scene *scene, const struct imp_ru
     return st;
 }
 
+enum imp_status imp_denoiser_check(imp_context *context)
+{
+    IMP_REQUIRE(NULL, context, "context");
+    return imp__denoiser_find(context);
+}
+
 enum imp_status imp_denoise(const imp_scene *scene, const struct imp_run *run,
                             const imp_film *film, imp_film **out)
 {

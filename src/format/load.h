@@ -28,7 +28,8 @@ enum imp_status imp__graded_finish(struct imp_scene *scene);
 /* survey.c: IMP_E_UNSUPPORTED if two or more plugins do not exist, with all of them; a
  * lenient scene goes on without. References are resolved. */
 enum imp_status imp__survey(struct imp_scene *scene);
-/* survey.c: when objects are made, what of a lenient scene nobody has read. */
+/* survey.c: when objects are made, a warning for what is declared and stands nowhere; what
+ * of a lenient scene nobody has read. */
 enum imp_status imp__survey_finish(struct imp_scene *scene);
 /* resolve.c: attach meshes and pictures to the nodes that name files. */
 enum imp_status imp__files_attach(struct imp_scene *scene);

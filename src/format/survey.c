@@ -172,6 +172,7 @@ static enum imp_status walk(struct survey *s, struct imp_node *node)
     for (size_t i = 0; i < node->n_children; i++) {
         struct imp_node *child = node->children[i].node;
         bool gone = child->gone;
+        child->referred |= node->children[i].ref != NULL;
         if (!child->surveyed) IMP_TRY(look(s, child, &gone));
         child->gone = gone;
         if (gone) child_remove(node, i--);
@@ -225,7 +226,33 @@ out:
     return st;
 }
 
+/* What is declared at the top for others, and stands in none of them: it does nothing. */
+static void idle_list(struct imp_scene *scene)
+{
+    static const char *const idle[][2] = {
+        {"emitter", "no shape refers to it: it sends no light"},
+        {"sensor", "no shape refers to it: it makes no picture"},
+        {"film", "no sensor refers to it: its pixels and format are not used"},
+        {"sampler", "no sensor refers to it: its sample_count is not used"},
+        {"rfilter", "no film refers to it: it is not used"},
+        {"phase", "no medium refers to it: it is not used"},
+        {"volume", "no medium refers to it: it is not used"},
+    };
+    char where[256];
+    for (size_t i = 0; i < scene->root->n_children; i++) {
+        const struct imp_node *node = scene->root->children[i].node;
+        for (size_t k = 0; k < imp_count(idle); k++)
+            if (!node->object && !node->referred && strcmp(node->tag, idle[k][0]) == 0)
+                imp__warn(scene->ctx, "%s: %s%s%s%s (%s): %s",
+                          imp__loc_text(node->loc, where, sizeof where), node->tag,
+                          node->id ? " '" : "", node->id ? node->id : "",
+                          node->id ? "'" : "", node->type, idle[k][1]);
+    }
+}
+
 enum imp_status imp__survey_finish(struct imp_scene *scene)
 {
-    return scene->lenient && scene->root ? unused_list(scene, scene->root) : IMP_OK;
+    if (!scene->root) return IMP_OK;
+    idle_list(scene);
+    return scene->lenient ? unused_list(scene, scene->root) : IMP_OK;
 }

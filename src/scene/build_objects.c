@@ -326,7 +326,8 @@ static enum imp_status sensor_make(struct imp_scene *scene, struct imp_node *nod
     const bool area = ops->flags & IMP_SENSOR_AREA;
     if (area && !shape)
         return IMP_OK; /* declared only; used where a shape refers to it */
-    IMP_TRY(attachment_check(ctx, node, area, shape));
+    /* A sensor that a batch refers to may be one of the scene, too: it is made twice. */
+    if (!own) IMP_TRY(attachment_check(ctx, node, area, shape));
     struct imp_sensor *s = imp__arena_array(&scene->arena, 1, sizeof *s);
     void *self = imp__arena_array(&scene->arena, 1, ops->object_size);
     if (!s || !self) IMP_TRY(imp__build_no_memory(scene));
@@ -336,7 +337,7 @@ static enum imp_status sensor_make(struct imp_scene *scene, struct imp_node *nod
                              .shape = shape,
                              .scale = 1,
                              .scene = &scene->ball};
-    node->object = s;
+    if (!own) node->object = s;
     if (shape) shape->sensor = s;
 
     struct imp_node *film, *sampler;
@@ -346,7 +347,11 @@ static enum imp_status sensor_make(struct imp_scene *scene, struct imp_node *nod
     const struct imp_build sampler_build = imp__build_make(scene, sampler);
     const struct imp_build b = imp__build_make(scene, node);
     struct imp_camera_gain *gain = NULL;
-    IMP_TRY(imp__build_gain(scene, film, name, &gain));
+    if (own && imp__gain_written(film))
+        IMP_TRY(imp__node_error(ctx, film, IMP_E_SCENE,
+                                "an exposure, a white balance, vignetting and gamma of "
+                                "sensors in a batch are those of its film"));
+    if (!own) IMP_TRY(imp__build_gain(scene, film, name, &gain));
     IMP_TRY(imp__film_desc_build(&film_build, &s->film));
     IMP_TRY(imp__gain_fit(scene, film, &s->film, gain));
     s->gain = gain;

@@ -20,6 +20,13 @@ static const struct imp_input_desc inputs[IMP_GAIN_INPUTS + 1] = {
      1, 0.2, 5, "1"},
     {0}};
 
+bool imp__gain_written(const struct imp_node *film)
+{
+    for (int k = 0; k < IMP_GAIN_INPUTS; k++)
+        if (imp__node_prop(film, inputs[k].name)) return true;
+    return false;
+}
+
 enum imp_status imp__build_gain(struct imp_scene *scene, struct imp_node *film,
                                 const char *name, struct imp_camera_gain **out)
 {

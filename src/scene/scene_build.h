@@ -60,6 +60,7 @@ enum imp_status imp__build_shutter(struct imp_scene *scene, struct imp_node *nod
 /* Exposure, white balance, vignetting and response that a film has; NULL: none. */
 enum imp_status imp__build_gain(struct imp_scene *scene, struct imp_node *film,
                                 const char *name, struct imp_camera_gain **out);
+bool imp__gain_written(const struct imp_node *film);
 /* When the film's size is known; gain may be NULL. */
 enum imp_status imp__gain_fit(struct imp_scene *scene, struct imp_node *film,
                               const struct imp_film_desc *desc,

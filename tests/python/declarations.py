@@ -128,6 +128,7 @@ WITHOUT = {
     "imp_scene_n_theta": "parameters are read and set by name: SceneParameters",
     "imp_scene_get_theta": "the same",
     "imp_scene_set_theta": "the same",
+    "imp_denoiser_check": "importon.denoise is called with a picture that is there already, and says so itself",
     "imp_drop_text": "the header's sentences are in the declarations; Picture.dropped has the words",
     "imp_problem_nlopt": "NLopt's callback in C: importon.loss is a function of Python, for any optimiser",
     "imp_problem_set_run": "of that callback: functions take the run as keywords",

@@ -115,6 +115,35 @@ static void picture(void)
     imp_scene_destroy(s);
 }
 
+/* Sensors of the scene that a batch refers to are its sensors, too: before and behind it. */
+static void referred(void)
+{
+    imp_scene *s = scene_of("<sensor type='perspective' id='a'>" PINHOLE FILM(
+        8) "</sensor>"
+           "<sensor type='batch' id='both'><ref id='a'/><ref id='b'/>" FILM(
+               16) "</sensor>"
+                   "<sensor type='thinlens' id='b'>" LENS FILM(8) "</sensor>");
+    double off = 0;
+    tap_ok(s->n_sensors == 3 && strcmp(s->sensors[0]->name, "a") == 0 &&
+               strcmp(s->sensors[1]->name, "both") == 0 &&
+               strcmp(s->sensors[2]->name, "b") == 0,
+           "sensors by reference stay sensors of the scene");
+    const struct imp_sensor *batch = s->sensors[1];
+    for (uint32_t i = 0; i < 1000; i++) {
+        const struct imp_key key = imp__key(9, 0, i);
+        const int k = (int)(i % 2);
+        const struct imp_sensor *own = s->sensors[2 * k];
+        const double x = 8 * imp__u01(key, 0), y = 6 * imp__u01(key, 1),
+                     lens[2] = {imp__u01(key, 2), imp__u01(key, 3)};
+        struct imp_sensor_ray a, b;
+        own->ops->ray(own, x, y, lens, &a);
+        batch->ops->ray(batch, 8 * k + x, y, lens, &b);
+        off = fmax(off, imp__length(a.o - b.o) + imp__length(a.d - b.d));
+    }
+    tap_ok(off < 1e-13, "and make the rays of the batch # %.1e", off);
+    imp_scene_destroy(s);
+}
+
 static void refused(const char *what, const char *body, const char *reason)
 {
     imp_scene *s = NULL;
@@ -134,6 +163,12 @@ int main(void)
     sensors("cameras", perspectives);
     sensors("with parallel rays", parallel);
     picture();
+    referred();
+    refused("an exposure of one of them",
+            "<sensor type='batch'>" FILM(
+                8) "<sensor type='perspective'><film type='hdrfilm'><float "
+                   "name='exposure' value='2'/></film></sensor></sensor>",
+            "are those of its film");
     refused("no sensors", "<sensor type='batch'>" FILM(8) "</sensor>", "has no sensors");
     refused("a width that cannot be shared",
             "<sensor type='batch'>" FILM(8) "<sensor type='perspective'/><sensor "

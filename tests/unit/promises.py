@@ -161,7 +161,7 @@ NOT_OK = {
     "imp_scene_write_volume": "the scene has no volume",
 }
 try: C.CDLL("libOpenImageDenoise.so.2")
-except OSError: NOT_OK["imp_denoise"] = "there is no Open Image Denoise"
+except OSError: NOT_OK["imp_denoise"] = NOT_OK["imp_denoiser_check"] = "there is no Open Image Denoise"
 # Pointers that may be NULL, by name, or by function and name.
 NULLABLE = {"imp_report_page.length", "imp_problem_shares.walk_share", "imp_render_until.end", "imp_problem_until.end", "imp_problem_until.adjoint",
             "imp_problem_until.value", "imp_problem_until.gradient", "imp_report_data.length", "options", "run", "stats", "id", "objective", "gradient_se", "primal", "normals", "uvs",
