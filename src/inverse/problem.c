@@ -5,6 +5,7 @@
 #include "match.h"
 #include "walk/run.h"
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 enum imp_status imp_problem_create(imp_scene *scene, imp_problem **out)
@@ -60,10 +61,33 @@ void imp_problem_destroy(imp_problem *p)
 
 /* ---- Active parameters --------------------------------------------------------- */
 
+/* A camera's place and lens are no parameters: is it one of them that is meant? */
+static enum imp_status camera_geometry(const imp_problem *p, const char *glob)
+{
+    static const char *const names[] = {
+        "to_world",        "fov",       "focal_length", "principal_point_offset_x",
+        "aperture_radius", "opencv_fx", "opencv_fy",    "principal_point_offset_y",
+        "focus_distance",  "opencv_cx", "opencv_cy",    "opencv_k1",
+        "opencv_k2",       "opencv_k3", "opencv_p1",    "opencv_p2"};
+    char name[256];
+    for (int s = 0; s < p->scene->n_sensors; s++)
+        for (size_t k = 0; k < imp_count(names); k++) {
+            snprintf(name, sizeof name, "%s.%s", p->scene->sensors[s]->name, names[k]);
+            if (imp__glob(glob, name))
+                return imp__error(p->ctx, IMP_E_BIAS,
+                                  "%s has no unbiased derivative: it moves the edges of "
+                                  "the picture, and the terms of that motion are not "
+                                  "computed. Tell it, by a calibration",
+                                  name);
+        }
+    return IMP_OK;
+}
+
 static enum imp_status activate_named(imp_problem *p, const char *name, uint8_t *chosen)
 {
     size_t k;
     const enum imp_status st = imp_scene_find_param(p->scene, name, &k);
+    if (st == IMP_E_ARG) IMP_CHECKED(camera_geometry(p, name));
     if (st != IMP_OK) return st;
     const struct imp_param_info *info = &p->scene->params[k].info;
     if (info->flags & IMP_PARAM_INTEGER)
@@ -108,6 +132,7 @@ enum imp_status imp_problem_activate(imp_problem *p, const char *glob)
             usable++;
             chosen[k] = 1;
         }
+        if (!met) IMP_TRY(camera_geometry(p, glob));
         if (!met)
             IMP_TRY(imp__error(p->ctx, IMP_E_ARG,
                                "no parameter matches '%s' (there are %zu)", glob,

@@ -2,7 +2,9 @@
  *
  * A pinhole: the ray through film position (px, py) runs along (docs/scene-format.md 9)
  *
- *   (t (1 - 2X), (t/a)(1 - 2Y), 1),   X = px/W + offset_x,  Y = py/H + offset_y */
+ *   (t (1 - 2X), (t/a)(1 - 2Y), 1),   X = px/W + offset_x,  Y = py/H + offset_y
+ *
+ * unless a lens distorts the picture. */
 #include "projection.h"
 
 struct perspective {
@@ -14,18 +16,9 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
 {
     enum imp_status st = IMP_OK;
     struct perspective *p = self;
-    const double w = s->film.width, h = s->film.height, a = w / h;
-    double t, offset_x, offset_y;
 
     IMP_TRY(imp__projection_build(b, true, &p->projection));
-    IMP_TRY(imp__fov_build(b, a, &t));
-    IMP_TRY(imp_build_float(b, "principal_point_offset_x", 0, &offset_x));
-    IMP_TRY(imp_build_float(b, "principal_point_offset_y", 0, &offset_y));
-    p->film.x0 = t * (1 - 2 * offset_x);
-    p->film.dx = -2 * t / w;
-    p->film.y0 = t / a * (1 - 2 * offset_y);
-    p->film.dy = -2 * t / a / h;
-    imp__film_plane_bound(&s->film, &p->film);
+    IMP_TRY(imp__film_plane_build(b, true, &s->film, &p->film));
 out:
     return st;
 }
@@ -35,9 +28,8 @@ static void ray(const struct imp_sensor *s, double px, double py, const double l
 {
     (void)lens;
     const struct perspective *p = s->self;
-    imp__projection_ray(
-        &p->projection, imp__v3(0, 0, 0),
-        imp__v3(p->film.x0 + px * p->film.dx, p->film.y0 + py * p->film.dy, 1), out);
+    imp__projection_ray(&p->projection, imp__v3(0, 0, 0),
+                        imp__film_plane_at(&p->film, px, py), out);
 }
 
 static bool connect(const struct imp_sensor *s, const imp_v3 *ref, bool far,

@@ -70,21 +70,24 @@ out:
     return st;
 }
 
-static void side_bound(double x0, double dx, double pixels, double beside, double *least,
-                       double *most)
+/* Where the pinhole's x, y is seen, and film area over that without the lens. False: not
+ * on the film, or only where the polynomials have folded the plane back onto it. */
+static bool seen_by_lens(const struct imp_film_plane *film, double *x, double *y,
+                         double *stretch)
 {
-    const double a = x0 - beside * dx, b = x0 + (pixels + beside) * dx;
-    *least = fmin(a, b);
-    *most = fmax(a, b);
-}
-
-void imp__film_plane_bound(const struct imp_film_desc *film, struct imp_film_plane *plane)
-{
-    const double beside = ceil(film->filter.radius) + 1;
-    side_bound(plane->x0, plane->dx, film->width, beside, &plane->x_least,
-               &plane->x_most);
-    side_bound(plane->y0, plane->dy, film->height, beside, &plane->y_least,
-               &plane->y_most);
+    const double at[2] = {-*x, -*y};
+    double seen[2], slope[3], back[2];
+    imp__distort(film->lens, at, seen, slope);
+    *x = -seen[0];
+    *y = -seen[1];
+    *stretch = slope[0] * slope[2] - slope[1] * slope[1];
+    const double px = (*x - film->x0) / film->dx, py = (*y - film->y0) / film->dy;
+    if (!(px >= -film->beside && px <= film->width + film->beside &&
+          py >= -film->beside && py <= film->height + film->beside))
+        return false;
+    imp__undistort(film->lens, seen, back);
+    return fabs(back[0] - at[0]) + fabs(back[1] - at[1]) <
+           1e-6 * (1 + fabs(at[0]) + fabs(at[1]));
 }
 
 bool imp__projection_connect(const struct imp_projection *p,
@@ -102,13 +105,15 @@ bool imp__projection_connect(const struct imp_projection *p,
         q[1] + oy * q[2] < film->y_least * q[2] || q[1] + oy * q[2] > film->y_most * q[2])
         return false;
     const imp_v3 v = q * (1 / q[2]);
+    double x = v[0] + ox, y = v[1] + oy, stretch = 1;
+    if (film->lens && !seen_by_lens(film, &x, &y, &stretch)) return false;
     const double length = imp__length(v), r2 = far ? 1 : imp__dot(q, q);
     const imp_v3 d = imp__normalize(imp__vector(&p->to_world, v));
     *out = (struct imp_sensor_sample){.wo = -d,
                                       .p = imp__point(&p->to_world, o + v * p->near_clip),
-                                      .px = (v[0] + ox - film->x0) / film->dx,
-                                      .py = (v[1] + oy - film->y0) / film->dy,
-                                      .weight = length * length * length /
+                                      .px = (x - film->x0) / film->dx,
+                                      .py = (y - film->y0) / film->dy,
+                                      .weight = length * length * length * stretch /
                                                 (fabs(film->dx * film->dy) * r2),
                                       .cos_sensor = 1};
     out->dist = far ? INFINITY : imp__length(out->p - ref);

@@ -5,6 +5,7 @@
 #ifndef IMP_KIND_PROJECTION_H
 #define IMP_KIND_PROJECTION_H
 
+#include "distortion.h"
 #include "kind/build.h"
 #include "math/transform.h"
 
@@ -40,19 +41,35 @@ static inline void imp__projection_ray(const struct imp_projection *p, imp_v3 o,
     out->t_far = (p->far_clip - p->near_clip) * inv_z * length;
 }
 
-/* Of a camera whose rays through local point o run along (x0 + px dx, y0 + py dy, 1) - o/f:
- * the ray that comes from ref (imp_sensor_ops.connect), if it may be on the film. Solid
- * angle and film area are
+/* Of a camera whose rays through local point o run along (x, y, 1) - o/f. Without a lens
+ * x = x0 + px dx, y = y0 + py dy, and solid angle and film area are
  *
- *     dw = |dx dy| cos(theta)^3 dpx dpy,    theta: the angle with the axis */
+ *     dw = |dx dy| cos(theta)^3 dpx dpy,    theta: the angle with the axis
+ *
+ * A lens divides that by the determinant of its slope (distortion.h). */
 struct imp_film_plane {
     double x0, dx, y0, dy;
-    /* Bounds of x0 + px dx and y0 + py dy on the film, with a filter's radius and a pixel
-     * beside it. */
+    /* Bounds of x and y on the film, with a filter's radius and a pixel beside it. */
     double x_least, x_most, y_least, y_most;
+    double beside, width, height;      /* the filter's radius, and the film, in pixels */
+    const struct imp_distortion *lens; /* NULL: none */
 };
-void imp__film_plane_bound(const struct imp_film_desc *film,
-                           struct imp_film_plane *plane);
+/* Field of view, principal point and distortion. `offset`: principal_point_offset_x, _y
+ * are properties too. */
+enum imp_status imp__film_plane_build(const struct imp_build *b, bool offset,
+                                      const struct imp_film_desc *film,
+                                      struct imp_film_plane *out);
+/* (x, y, 1) at a film position. */
+static inline imp_v3 imp__film_plane_at(const struct imp_film_plane *film, double px,
+                                        double py)
+{
+    const double x = film->x0 + px * film->dx, y = film->y0 + py * film->dy;
+    if (!film->lens) return imp__v3(x, y, 1);
+    double out[2]; /* of axes to the right and down */
+    imp__undistort(film->lens, (double[2]){-x, -y}, out);
+    return imp__v3(-out[0], -out[1], 1);
+}
+/* The ray that comes from ref (imp_sensor_ops.connect), if it may be on the film. */
 bool imp__projection_connect(const struct imp_projection *p,
                              const struct imp_film_plane *film, imp_v3 o, double focus,
                              imp_v3 ref, bool far, struct imp_sensor_sample *out);

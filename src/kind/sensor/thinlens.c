@@ -15,22 +15,15 @@ static enum imp_status build(const struct imp_build *b, void *self, struct imp_s
 {
     enum imp_status st = IMP_OK;
     struct thinlens *p = self;
-    const double w = s->film.width, h = s->film.height, a = w / h;
-    double t;
 
     IMP_TRY(imp__projection_build(b, true, &p->projection));
-    IMP_TRY(imp__fov_build(b, a, &t));
+    IMP_TRY(imp__film_plane_build(b, false, &s->film, &p->film));
     if (!imp_build_has(b, "aperture_radius"))
         IMP_TRY(imp_build_error(b, NULL, IMP_E_SCENE, "aperture_radius is missing"));
     IMP_TRY(imp_build_float(b, "aperture_radius", 0, &p->aperture_radius));
     if (p->aperture_radius < 0)
         IMP_TRY(imp_build_error(b, "aperture_radius", IMP_E_SCENE,
                                 "aperture_radius = %g is negative", p->aperture_radius));
-    p->film.x0 = t;
-    p->film.dx = -2 * t / w;
-    p->film.y0 = t / a;
-    p->film.dy = -2 * t / a / h;
-    imp__film_plane_bound(&s->film, &p->film);
 out:
     return st;
 }
@@ -43,8 +36,7 @@ static void ray(const struct imp_sensor *s, double px, double py, const double l
     imp__concentric_disk(lens, xy);
     const imp_v3 o = imp__v3(p->aperture_radius * xy[0], p->aperture_radius * xy[1], 0);
     const imp_v3 focus =
-        imp__v3(p->film.x0 + px * p->film.dx, p->film.y0 + py * p->film.dy, 1) *
-        p->projection.focus_distance;
+        imp__film_plane_at(&p->film, px, py) * p->projection.focus_distance;
     imp__projection_ray(&p->projection, o, focus - o, out);
 }
 

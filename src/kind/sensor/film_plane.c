@@ -1,0 +1,147 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * The film of a camera with a perspective: field of view and principal point, as Mitsuba
+ * names them or as a calibration by OpenCV gives them, and the distortion of its lens. */
+#include "projection.h"
+#include <math.h>
+
+/* OpenCV counts pixels from the middle of the first one, and lengths in pixels:
+ * px - 1/2 = fx x'' + cx. A calibration made from larger or smaller pictures is scaled. */
+static enum imp_status calibration_read(const struct imp_build *b,
+                                        const struct imp_film_desc *film,
+                                        struct imp_film_plane *out)
+{
+    enum imp_status st = IMP_OK;
+    static const char *const others[] = {"fov", "fov_axis", "focal_length",
+                                         "principal_point_offset_x",
+                                         "principal_point_offset_y"};
+    int64_t width, height;
+    double fx, fy, cx, cy;
+    for (size_t i = 0; i < imp_count(others); i++)
+        if (imp_build_has(b, others[i]))
+            IMP_TRY(imp_build_error(b, others[i], IMP_E_SCENE,
+                                    "give %s or opencv_fx, not both", others[i]));
+    IMP_TRY(imp_build_int(b, "opencv_width", film->width, 1, 1 << 30, &width));
+    IMP_TRY(imp_build_int(b, "opencv_height", film->height, 1, 1 << 30, &height));
+    IMP_TRY(imp_build_float(b, "opencv_fx", 0, &fx));
+    IMP_TRY(imp_build_float(b, "opencv_fy", fx, &fy));
+    IMP_TRY(imp_build_float(b, "opencv_cx", 0.5 * ((double)width - 1), &cx));
+    IMP_TRY(imp_build_float(b, "opencv_cy", 0.5 * ((double)height - 1), &cy));
+    if (!(fx > 0))
+        IMP_TRY(imp_build_error(b, "opencv_fx", IMP_E_SCENE,
+                                "opencv_fx = %g must be greater than 0", fx));
+    if (!(fy > 0))
+        IMP_TRY(imp_build_error(b, "opencv_fy", IMP_E_SCENE,
+                                "opencv_fy = %g must be greater than 0", fy));
+    out->x0 = (cx + 0.5) / fx;
+    out->dx = -1 / fx * ((double)width / film->width);
+    out->y0 = (cy + 0.5) / fy;
+    out->dy = -1 / fy * ((double)height / film->height);
+out:
+    return st;
+}
+
+static enum imp_status field_read(const struct imp_build *b, bool offset,
+                                  const struct imp_film_desc *film,
+                                  struct imp_film_plane *out)
+{
+    enum imp_status st = IMP_OK;
+    static const char *const others[] = {"opencv_fy", "opencv_cx", "opencv_cy",
+                                         "opencv_width", "opencv_height"};
+    const double w = film->width, h = film->height, a = w / h;
+    double t, offset_x = 0, offset_y = 0;
+    for (size_t i = 0; i < imp_count(others); i++)
+        if (imp_build_has(b, others[i]))
+            IMP_TRY(imp_build_error(b, others[i], IMP_E_SCENE, "%s needs opencv_fx",
+                                    others[i]));
+    IMP_TRY(imp__fov_build(b, a, &t));
+    if (offset) {
+        IMP_TRY(imp_build_float(b, "principal_point_offset_x", 0, &offset_x));
+        IMP_TRY(imp_build_float(b, "principal_point_offset_y", 0, &offset_y));
+    }
+    out->x0 = t * (1 - 2 * offset_x);
+    out->dx = -2 * t / w;
+    out->y0 = t / a * (1 - 2 * offset_y);
+    out->dy = -2 * t / a / h;
+out:
+    return st;
+}
+
+/* One side of the film and its border: x0 + px dx. */
+static void side_bound(double x0, double dx, double pixels, double beside, double *least,
+                       double *most)
+{
+    const double a = x0 - beside * dx, b = x0 + (pixels + beside) * dx;
+    *least = fmin(a, b);
+    *most = fmax(a, b);
+}
+
+static void film_bound(struct imp_film_plane *p, double beside)
+{
+    side_bound(p->x0, p->dx, p->width, beside, &p->x_least, &p->x_most);
+    side_bound(p->y0, p->dy, p->height, beside, &p->y_least, &p->y_most);
+}
+
+/* What x and y reach without the lens: the table's nodes, and a cell more. */
+static void lens_bound(const struct imp_distortion *d, struct imp_film_plane *out)
+{
+    enum { N = IMP_DISTORTION_NODES };
+    double lo[2] = {INFINITY, INFINITY}, hi[2] = {-INFINITY, -INFINITY}, cell[2];
+    for (int j = 0; j < N; j++)
+        for (int i = 0; i < N; i++)
+            for (int k = 0; k < 2; k++) {
+                lo[k] = fmin(lo[k], d->node[j][i][k]);
+                hi[k] = fmax(hi[k], d->node[j][i][k]);
+            }
+    for (int k = 0; k < 2; k++) cell[k] = (hi[k] - lo[k]) / (N - 1);
+    out->x_least = -hi[0] - cell[0];
+    out->x_most = -lo[0] + cell[0];
+    out->y_least = -hi[1] - cell[1];
+    out->y_most = -lo[1] + cell[1];
+}
+
+static enum imp_status lens_build(const struct imp_build *b, struct imp_film_plane *out)
+{
+    enum imp_status st = IMP_OK;
+    static const char *const names[] = {"opencv_k1", "opencv_k2", "opencv_k3",
+                                        "opencv_p1", "opencv_p2"};
+    double k[5], seen[2];
+    int first = -1;
+    for (int i = 4; i >= 0; i--) {
+        IMP_TRY(imp_build_float(b, names[i], 0, &k[i]));
+        if (k[i] != 0) first = i;
+    }
+    if (first < 0) goto out;
+    struct imp_distortion *d = imp_build_alloc(b, 1, sizeof *d);
+    if (!d) IMP_TRY(imp_build_error(b, NULL, IMP_E_NOMEM, "no memory for a distortion"));
+    *d = (struct imp_distortion){
+        .k1 = k[0], .k2 = k[1], .k3 = k[2], .p1 = k[3], .p2 = k[4]};
+    film_bound(out, out->beside); /* no walk is connected farther out */
+    if (!imp__distortion_invert(d, (double[2]){-out->x_most, -out->y_most},
+                                (double[2]){-out->x_least, -out->y_least}, seen))
+        IMP_TRY(imp_build_error(
+            b, names[first], IMP_E_SCENE,
+            "the distortion %s = %g has no inverse in the picture: it folds before film "
+            "position (%.1f, %.1f)",
+            names[first], k[first], (-seen[0] - out->x0) / out->dx,
+            (-seen[1] - out->y0) / out->dy));
+    lens_bound(d, out);
+    out->lens = d;
+out:
+    return st;
+}
+
+enum imp_status imp__film_plane_build(const struct imp_build *b, bool offset,
+                                      const struct imp_film_desc *film,
+                                      struct imp_film_plane *out)
+{
+    enum imp_status st = IMP_OK;
+    *out = (struct imp_film_plane){
+        .beside = film->filter.radius, .width = film->width, .height = film->height};
+    if (imp_build_has(b, "opencv_fx")) IMP_TRY(calibration_read(b, film, out));
+    else IMP_TRY(field_read(b, offset, film, out));
+    film_bound(out, ceil(out->beside) + 1);
+    IMP_TRY(lens_build(b, out));
+out:
+    return st;
+}
