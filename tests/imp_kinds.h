@@ -9,6 +9,7 @@
 #ifndef IMP_KINDS_H
 #define IMP_KINDS_H
 
+#include "imp_measured.h"
 #include "imp_merl.h"
 #include "kind/build.h"
 #include "math/rng.h"
@@ -108,6 +109,11 @@ static bool kind_make(struct kind_factory *f, const struct imp_bsdf_ops *ops,
             .alpha = 0.3, .diffuse = 0.2, .albedo = {0.7, 0.5, 0.3}};
         merl_fill(30, 10, 12, &model, rho);
         node->merl = &table;
+    }
+    if (strcmp(ops->name, "measured") == 0) {
+        static struct rgl_tables tables;
+        rgl_fill(&(struct rgl_model){{0.3, 0.5}, 2, true, false, true}, &tables);
+        node->measured = &tables.data;
     }
     void *self = imp__arena_array(&f->arena, 1, ops->object_size + 1);
     const struct imp_input **input =
@@ -213,10 +219,10 @@ static inline bool kind_has_config(const struct kind_case *c, const char *prop)
     return false;
 }
 
-/* Tables that are constant in their cells: value and density jump. */
+/* Tables that are constant in their cells, or have kinks: value or density is not smooth. */
 static inline bool kind_steps(const struct kind_case *c)
 {
-    return strstr(c->label, "merl") != NULL;
+    return strstr(c->label, "merl") || strstr(c->label, "measured");
 }
 
 static inline int kinds_visit(struct kind_factory *f,

@@ -78,6 +78,29 @@ struct imp_merl_data {
     const float *rho;
 };
 
+/* A measured BRDF over the direction of sight (Dupuy and Jakob 2018), whose angles are
+ * those of the first two tables; the others run over the unit square, [rows][columns], for
+ * each of [n_phi][n_theta] directions and, of the last two, each channel. */
+enum imp__measured_table {
+    IMP_MEASURED_THETA,
+    IMP_MEASURED_PHI,
+    IMP_MEASURED_NDF,   /* of all directions together */
+    IMP_MEASURED_SIGMA, /* of all directions together */
+    IMP_MEASURED_VNDF,
+    IMP_MEASURED_LUMINANCE,
+    IMP_MEASURED_WAVELENGTHS, /* nm */
+    IMP_MEASURED_RGB,
+    IMP_MEASURED_SPECTRA,
+    IMP_MEASURED_TABLES
+};
+struct imp_measured_data {
+    /* n_wave 0: no spectra. side: rows and columns of the luminance, rgb and spectra. */
+    int n_theta, n_phi, n_wave, side;
+    int ndf[2], sigma[2], vndf[2]; /* rows, columns */
+    int rgb, jacobian;             /* 0 or 1 */
+    const float *table[IMP_MEASURED_TABLES];
+};
+
 /* Control points of curves in space, x, y, z and radius: [n_points][4]; curve k has those
  * from first[k] on, up to first[k + 1], [n_curves + 1]. */
 struct imp_curve_data {
@@ -112,6 +135,7 @@ struct imp_node {
     const struct imp_image_data *image;
     const struct imp_ies_data *ies;
     const struct imp_merl_data *merl;
+    const struct imp_measured_data *measured;
     const struct imp_curve_data *curves;
     const struct imp_grid_data *grid;
     const struct imp_attribute_data *attribute;

@@ -2,7 +2,7 @@
  *
  * Nodes that name files get what the files hold: triangles for obj,
  * ply and serialized, pixels for
- * bitmap and envmap, intensities for ies, reflectances for merl, cells for gridvolume,
+ * bitmap and envmap, intensities for ies, reflectances for merl and measured, cells for gridvolume,
  * control points for curves. */
 #include "base/film.h"
 #include "color/rgb.h"
@@ -10,6 +10,7 @@
 #include "ies_file.h"
 #include "image.h"
 #include "load.h"
+#include "measured_file.h"
 #include "merl_file.h"
 #include "mesh_file.h"
 #include "search.h"
@@ -194,6 +195,24 @@ out:
     return st;
 }
 
+static enum imp_status measured_attach(struct imp_scene *scene, struct imp_node *node)
+{
+    enum imp_status st = IMP_OK;
+    imp_context *ctx = scene->ctx;
+    struct imp_bytes file = {0};
+    const char *path;
+    struct imp_measured_data *data = imp__arena_array(&scene->arena, 1, sizeof *data);
+    if (!data) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "scene: out of memory"));
+    IMP_TRY(path_of(scene, node, &path));
+    st = imp__file_read(ctx, path, IMP_TENSOR_BYTES_MAX, &file);
+    if (st == IMP_OK) st = imp__measured_parse(ctx, &scene->arena, path, &file, data);
+    if (st != IMP_OK) IMP_TRY(placed(scene, node, st));
+    node->measured = data;
+out:
+    imp__bytes_free(ctx, &file);
+    return st;
+}
+
 static enum imp_status curves_attach(struct imp_scene *scene, struct imp_node *node)
 {
     enum imp_status st = IMP_OK;
@@ -250,6 +269,9 @@ static enum imp_status attach(struct imp_scene *scene, struct imp_node *node)
         IMP_TRY(ies_attach(scene, node));
     if (strcmp(node->tag, "bsdf") == 0 && strcmp(node->type, "merl") == 0 && !node->merl)
         IMP_TRY(merl_attach(scene, node));
+    if (strcmp(node->tag, "bsdf") == 0 && strcmp(node->type, "measured") == 0 &&
+        !node->measured)
+        IMP_TRY(measured_attach(scene, node));
     if (strcmp(node->tag, "emitter") == 0 && strcmp(node->type, "envmap") == 0)
         IMP_TRY(sky_expand(scene, node));
     if (strcmp(node->tag, "volume") == 0 && strcmp(node->type, "gridvolume") == 0 &&

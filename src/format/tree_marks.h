@@ -21,7 +21,8 @@ enum imp__tree_mark {
     MARK_MESH,
     MARK_IES,
     MARK_MERL,
-    MARK_GRID
+    MARK_GRID,
+    MARK_MEASURED
 };
 #define IMP_TREE_TEXT_MAX ((size_t)1 << 16)
 

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include "kind/bsdf/measured.h"
 #include "scene/instances.h"
 #include "tree_file.h"
 #include "tree_marks.h"
@@ -153,6 +154,16 @@ static void merl_put(struct putting *p, const struct imp_merl_data *d)
             sizeof *d->rho);
 }
 
+static void measured_put(struct putting *p, const struct imp_measured_data *d)
+{
+    size_t count[IMP_MEASURED_TABLES];
+    if (!imp__measured_counts(d, count)) return;
+    put_mark(p, MARK_MEASURED);
+    put(p, d, offsetof(struct imp_measured_data, table));
+    for (int k = 0; k < IMP_MEASURED_TABLES; k++)
+        if (count[k]) put(p, d->table[k], count[k] * sizeof *d->table[k]);
+}
+
 static bool is_mesh(const struct imp_node *node)
 {
     static const char *const types[] = {"obj", "ply", "serialized", "mesh"};
@@ -226,6 +237,7 @@ static enum imp_status data_put(struct putting *p, const struct imp_node *node)
     if (is_mesh(node)) return mesh_put(p, node);
     if (node->ies) ies_put(p, node->ies);
     if (node->merl) merl_put(p, node->merl);
+    if (node->measured) measured_put(p, node->measured);
     if (texture && strcmp(node->type, "bitmap") == 0) image_put(p, node);
     if (strcmp(node->tag, "volume") == 0 && strcmp(node->type, "gridvolume") == 0)
         return grid_put(p, node);

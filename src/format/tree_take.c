@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "ies_file.h"
+#include "kind/bsdf/measured.h"
 #include "mesh_file.h"
 #include "tree_file.h"
 #include "tree_marks.h"
@@ -90,6 +91,25 @@ static bool take_merl(struct taking *t)
     *d = (struct imp_merl_data){size[0], size[1], size[2], rho};
     node->merl = d;
     return rho != NULL;
+}
+
+static bool take_measured(struct taking *t)
+{
+    size_t count[IMP_MEASURED_TABLES];
+    struct imp_node *node = top_of(t);
+    struct imp_measured_data *d = imp__arena_array(&t->scene->arena, 1, sizeof *d);
+    if (!d || node->measured || !take(t, d, offsetof(struct imp_measured_data, table)) ||
+        !imp__measured_counts(d, count))
+        return false;
+    for (int k = 0; k < IMP_MEASURED_TABLES; k++) {
+        if (!count[k]) continue;
+        float *table = take_array(t, count[k], sizeof *table, true);
+        if (!table || imp__measured_mend((enum imp__measured_table)k, table, count[k]))
+            return false;
+        d->table[k] = table;
+    }
+    node->measured = d;
+    return true;
 }
 
 static bool take_grid(struct taking *t)
@@ -232,6 +252,7 @@ static bool take_calls(struct taking *t)
         else if (mark == MARK_MESH) good = take_mesh(t);
         else if (mark == MARK_IES) good = take_ies(t);
         else if (mark == MARK_MERL) good = take_merl(t);
+        else if (mark == MARK_MEASURED) good = take_measured(t);
         else if (mark == MARK_GRID) good = take_grid(t);
         else good = take_prop(t, (enum imp__tree_mark)mark);
         if (!good) return false;

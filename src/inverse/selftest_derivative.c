@@ -56,7 +56,8 @@ double imp__bsdf_derivative_error(const struct imp_bsdf *b, imp_spec *in,
     double worst = 0;
     value(b, in, d, &f);
     for (int j = 0; j < b->n_in; j++) {
-        if (imp__bsdf_input(b, j)->flags & IMP_INPUT_FIXED) { /* no gradient is offered */
+        if (imp__bsdf_input(b, j)->flags & (IMP_INPUT_FIXED | IMP_INPUT_WAVELENGTH)) {
+            /* no gradient is offered */
             if (!imp__is_zero(df[j])) worst = INFINITY;
             continue;
         }

@@ -4,6 +4,7 @@
  * another mathematical library may differ in their last bits. */
 #include "fingerprint.h"
 #include "instances.h"
+#include "kind/bsdf/measured.h"
 #include "math/course.h"
 #include "math/hash.h"
 #include <string.h>
@@ -34,6 +35,15 @@ static uint64_t prop_hash(uint64_t h, const struct imp_prop *p)
     return p->list ? imp__hash(h, p->list, 2 * p->n * sizeof *p->list) : h;
 }
 
+static uint64_t measured_hash(uint64_t h, const struct imp_measured_data *d)
+{
+    size_t count[IMP_MEASURED_TABLES];
+    if (!imp__measured_counts(d, count)) return h;
+    for (int k = 0; k < IMP_MEASURED_TABLES; k++)
+        if (count[k]) h = imp__hash(h, d->table[k], count[k] * sizeof *d->table[k]);
+    return HASH(h, d->jacobian);
+}
+
 static uint64_t node_hash(uint64_t h, const struct imp_node *node)
 {
     h = imp__hash_text(h, node->tag);
@@ -43,6 +53,7 @@ static uint64_t node_hash(uint64_t h, const struct imp_node *node)
         h = imp__hash(h, node->merl->rho,
                       3 * (size_t)node->merl->n_half * (size_t)node->merl->n_difference *
                           (size_t)node->merl->n_azimuth * sizeof *node->merl->rho);
+    if (node->measured) h = measured_hash(h, node->measured);
     for (size_t i = 0; i < node->n_props; i++) h = prop_hash(h, &node->props[i]);
     for (size_t i = 0; i < node->n_children; i++) {
         const struct imp_child *c = &node->children[i];

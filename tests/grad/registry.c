@@ -28,7 +28,7 @@ static const char *const mode_names[] = {"rgb", "mono", "spectral", "single"};
 static bool is_long;
 static const char *only; /* cases whose name begins so */
 static imp_context *ctx;
-static char measured[64]; /* a file that kinds of tables can read */
+static char measured[64], rgl[64]; /* files that kinds of tables can read */
 static double worst_z, worst_frozen, worst_dot;
 static int n_z, n_frozen;
 
@@ -223,6 +223,7 @@ static void bsdf_make(imp_scene *s, const struct subject *q,
         imp_scene_end(s);
     }
     if (strcmp(ops->name, "merl") == 0) imp_scene_string(s, "filename", measured);
+    if (strcmp(ops->name, "measured") == 0) imp_scene_string(s, "filename", rgl);
     inputs_make(s, q, ops->name, ops->max_children ? NULL : q->props, ops->inputs, true,
                 seed);
     imp_scene_end(s);
@@ -695,6 +696,8 @@ int main(int argc, char **argv)
     if (!merl_write(measured, 20, 10, 12,
                     &(struct merl_model){0.4, 0.3, {0.8, 0.6, 0.5}}))
         return 1;
+    snprintf(rgl, sizeof rgl, "registry_%d.bsdf", (int)getpid());
+    if (!rgl_write(rgl, &(struct rgl_model){{0.4, 0.4}, 0, true, true, true})) return 1;
     for (int k = 0; imp__bsdf_kinds[k]; k++) {
         const struct imp_bsdf_ops *ops = imp__bsdf_kinds[k];
         if (!ops->inputs[0].name && !ops->max_children) continue; /* no parameters */
@@ -740,6 +743,7 @@ int main(int argc, char **argv)
                                         .texture = imp__texture_kinds[i]});
     }
     remove(measured);
+    remove(rgl);
     imp_context_destroy(ctx);
     return tap_done();
 }

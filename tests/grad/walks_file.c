@@ -5,6 +5,7 @@
  * draw and at others, on any number of threads, in scenes with textures, skies, measured
  * lamps, media, meshes, groups and wavelengths. No ray is traced in what a file holds, and
  * files of other scenes, versions and byte orders, and damaged ones, are refused. */
+#include "imp_measured.h"
 #include "imp_merl.h"
 #include "imp_scene.h"
 #include "imp_tap.h"
@@ -172,7 +173,7 @@ static void to_the_bit(imp_scene *scene, const char *what, const char *moved, in
 /* ---- Their files ----------------------------------------------------------------- */
 
 /* Meshes, a measured material, a grid, and what else comes from files. */
-static char volume[64], mesh[64], measured[64], picture[64];
+static char volume[64], mesh[64], measured[64], rgl[64], picture[64];
 
 static const char tray[] =
     "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
@@ -183,6 +184,7 @@ static void files_make(void)
     float cell[8 * 8 * 8];
     snprintf(mesh, sizeof mesh, "walks_file_%d.obj", (int)getpid());
     snprintf(measured, sizeof measured, "walks_file_%d.binary", (int)getpid());
+    snprintf(rgl, sizeof rgl, "walks_file_%d.bsdf", (int)getpid());
     snprintf(picture, sizeof picture, "walks_file_%d.pfm", (int)getpid());
     FILE *f = fopen(picture, "w");
     const float height[4] = {0, 0.4f, 0, 0.8f};
@@ -195,7 +197,8 @@ static void files_make(void)
     vol_write(volume, 8, 8, 8, 1, cell);
     if (!f || fputs(tray, f) < 0 || fclose(f) != 0 ||
         !merl_write(measured, 20, 10, 12,
-                    &(struct merl_model){0.4, 0.3, {0.8, 0.6, 0.5}})) {
+                    &(struct merl_model){0.4, 0.3, {0.8, 0.6, 0.5}}) ||
+        !rgl_write(rgl, &(struct rgl_model){{0.3, 0.5}, 2, true, true, true})) {
         printf("Bail out! no files\n");
         exit(99);
     }
@@ -226,7 +229,10 @@ static const char room[] =
     "z='.5'/></transform><ref id='pair'/></shape>"
     "<shape type='sphere' id='ball'><point name='center' x='1.2' y='-1' z='.4'/><float "
     "name='radius' value='.4'/><bsdf type='merl'><string name='filename' "
-    "value='%s'/></bsdf></shape>%s</scene>";
+    "value='%s'/></bsdf></shape><shape type='sphere' id='orb'><point name='center' "
+    "x='-1' y='-1' "
+    "z='.3'/><float name='radius' value='.3'/><bsdf type='measured'><string "
+    "name='filename' value='%s'/></bsdf></shape>%s</scene>";
 
 static const char smoke[] =
     "<shape type='cube'><transform name='to_world'><scale value='.4'/><translate x='-1' "
@@ -243,7 +249,7 @@ static imp_scene *room_make(enum imp_color_mode mode, bool media, bool wide)
     if (media) snprintf(inside, sizeof inside, smoke, volume);
     snprintf(text, sizeof text, room, media ? "volpath" : "path",
              wide ? "<rfilter type='gaussian'/>" : "<rfilter type='box'/>", mesh, mesh,
-             measured, inside);
+             measured, rgl, inside);
     return test_scene_text(ctx, text, mode);
 }
 
@@ -426,6 +432,7 @@ int main(void)
     remove(volume);
     remove(mesh);
     remove(measured);
+    remove(rgl);
     remove(picture);
     imp_context_destroy(ctx);
     imp_context_destroy(three);

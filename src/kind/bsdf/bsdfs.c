@@ -12,6 +12,7 @@
     X(imp__diffuse)                                                                      \
     X(imp__mask)                                                                         \
     X(imp__normalmap)                                                                    \
+    X(imp__measured)                                                                     \
     X(imp__merl)                                                                         \
     X(imp__null)                                                                         \
     X(imp__phong)                                                                        \
