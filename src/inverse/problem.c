@@ -70,6 +70,7 @@ static enum imp_status camera_geometry(const imp_problem *p, const char *glob)
         "focus_distance",  "opencv_cx", "opencv_cy",    "opencv_k1",
         "opencv_k2",       "opencv_k3", "opencv_p1",    "opencv_p2"};
     char name[256];
+    if (strpbrk(glob, "*?[")) return IMP_OK; /* of parameters, then */
     for (int s = 0; s < p->scene->n_sensors; s++)
         for (size_t k = 0; k < imp_count(names); k++) {
             snprintf(name, sizeof name, "%s.%s", p->scene->sensors[s]->name, names[k]);
