@@ -323,6 +323,7 @@ static int run_gradient(int n, char **operand)
     if (!rc && adjoint_path && problem_options.targets.n)
         rc = cli_error(EXIT_USAGE, "--adjoint and --target exclude each other");
     if (!rc) rc = problem_open(&problem);
+    if (!rc && (rc = problem_censor(problem))) problem_close(problem);
     if (rc) return rc;
     const size_t n_x = imp_problem_n(problem);
     struct imp_run run = cli_run();

@@ -6,9 +6,10 @@
 
 #include "cmd_picture.h"
 #include "overwrite.h"
+#include "photograph.h"
 
+#include <importon/clip.h>
 #include <math.h>
-#include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -37,6 +38,9 @@ const struct arg_option options_targets[] = {
      &problem_options.targets, 0, 0, NULL},
     {ARG_LIST, 0, "mask", "FILE", "weights of the pixels, one for each --target in order",
      &problem_options.masks, 0, 0, NULL},
+    {ARG_TEXT, 0, "clip", "auto|LOW,HIGH",
+     "numbers at these levels were clipped: white is at least, black at most",
+     &problem_options.clip, 0, 0, NULL},
     {ARG_CHOICE, 0, "loss", "LOSS", "l2 (default), relative, l1 or log",
      &problem_options.loss, 0, 0, loss_words},
     {ARG_NUMBER, 0, "epsilon", "E",
@@ -94,6 +98,7 @@ static int needs_target(void)
 {
     const struct problem_options *o = &problem_options;
     const char *option = o->masks.n      ? "mask"
+                         : o->clip       ? "clip"
                          : o->loss       ? "loss"
                          : o->epsilon    ? "epsilon"
                          : o->tikhonov.n ? "tikhonov"
@@ -102,27 +107,6 @@ static int needs_target(void)
                                          : NULL;
     if (o->targets.n || !option) return 0;
     return cli_error(EXIT_USAGE, "--%s is part of a loss, and needs a --target", option);
-}
-
-/* Files of 8 bits hold nothing brighter than white, and a fit takes them at their word.
- * JPEG's own noise makes white a little darker. */
-static void warn_clipped(const char *spec, const struct imp_target *t)
-{
-    const bool png = strcasestr(spec, ".png"), jpeg = strcasestr(spec, ".jp");
-    const float white = png ? 0.9999f : 0.98f;
-    size_t clipped = 0;
-    if (!png && !jpeg) return;
-    for (size_t i = 0; i < (size_t)t->width * (size_t)t->height; i++) {
-        bool over = false;
-        for (int c = 0; c < t->channels; c++)
-            over |= t->pixels[i * (size_t)t->channels + (size_t)c] >= white;
-        clipped += over && !(t->weights && t->weights[i] == 0);
-    }
-    if (clipped)
-        cli_say("importon: warning: %s: %zu of %zu pixels are as bright as the file can "
-                "hold, and may have been brighter: leave them out with --mask, or give a "
-                "picture with its full range (.exr, .hdr, .pfm, .npy)",
-                spec, clipped, (size_t)t->width * (size_t)t->height);
 }
 
 int target_sensor(size_t i)
@@ -166,20 +150,18 @@ int problem_spp(const struct imp_run *run)
     return problem_options.targets.n && spp == 1 ? 2 : spp;
 }
 
-/* Files of 8 bits are read as sRGB. Where the film has a gamma of its own, it is the
- * numbers of the file that count. */
-static void undo_srgb(const char *spec, struct imp_target *t)
+static int add_target(imp_problem *problem, int i, const struct imp_target *target)
 {
-    struct imp_sensor_info sensor = {.size = sizeof sensor};
-    float *v = (float *)t->pixels; /* ours: picture_target made them */
-    if (!strcasestr(spec, ".png") && !strcasestr(spec, ".jp")) return;
-    if (imp_scene_get_sensor(cli.scene, t->sensor, &sensor) != IMP_OK ||
-        !sensor.photograph)
-        return;
-    for (size_t i = 0; i < (size_t)t->width * (size_t)t->height * (size_t)t->channels;
-         i++)
-        v[i] =
-            v[i] <= 0.0031308f ? 12.92f * v[i] : 1.055f * powf(v[i], 1 / 2.4f) - 0.055f;
+    const struct problem_options *o = &problem_options;
+    const char *spec = o->targets.item[i];
+    double low = 0, high = 0;
+    int rc = 0;
+    if (o->clip) rc = photograph_levels(spec, o->clip, target, &low, &high);
+    else photograph_warn_clipped(spec, target);
+    if (rc) return rc;
+    enum imp_status st = imp_problem_add_target(problem, target);
+    if (st == IMP_OK && o->clip) st = imp_problem_clip(problem, i, low, high);
+    return st == IMP_OK ? 0 : cli_fail(st, spec);
 }
 
 static int add_targets(imp_problem *problem)
@@ -195,14 +177,13 @@ static int add_targets(imp_problem *problem)
         const char *mask = i < o->masks.n ? o->masks.item[i] : NULL;
         const int rc = picture_target(o->targets.item[i], mask, &target);
         if (rc) return rc;
-        warn_clipped(o->targets.item[i], &target);
         target.sensor = target_sensor(i);
-        undo_srgb(o->targets.item[i], &target);
         target.loss = losses[o->loss];
         target.epsilon = o->epsilon;
-        const enum imp_status st = imp_problem_add_target(problem, &target);
+        photograph_undo_srgb(o->targets.item[i], &target);
+        const int failed = add_target(problem, (int)i, &target);
         picture_target_free(&target);
-        if (st != IMP_OK) return cli_fail(st, o->targets.item[i]);
+        if (failed) return failed;
     }
     return 0;
 }
@@ -245,6 +226,14 @@ int problem_open(imp_problem **out)
     if (rc) imp_problem_destroy(problem);
     else *out = problem;
     return rc;
+}
+
+int problem_censor(imp_problem *problem)
+{
+    const struct imp_run run = cli_run();
+    if (!problem_options.clip) return 0;
+    const enum imp_status st = imp_problem_censor(problem, &run);
+    return st == IMP_OK ? 0 : cli_fail(st, cli.scene_path);
 }
 
 void problem_close(imp_problem *problem)

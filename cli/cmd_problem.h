@@ -9,6 +9,7 @@
 
 struct problem_options {
     struct arg_list params, same, factor, log, targets, masks, tikhonov, stay, smooth;
+    const char *clip; /* NULL: not given */
     int loss;
     double epsilon;
 };
@@ -18,6 +19,9 @@ extern const struct arg_option options_params[], options_targets[];
 /* A problem on cli.scene with --param active ("*" if none is given), and --target,
  * --tikhonov, --stay and --smooth added. 0, or an exit code with the reason printed. */
 int problem_open(imp_problem **out);
+/* With --clip: decides which clipped numbers count, where the scene stands. A fit does that
+ * itself. 0, or an exit code with the reason printed. */
+int problem_censor(imp_problem *problem);
 void problem_close(imp_problem *problem);
 
 /* x in pieces: one for each active parameter, or for several that are tied. */

@@ -10,6 +10,7 @@
 #include "plot.h"
 #include "proof.h"
 
+#include <importon/clip.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -68,6 +69,35 @@ static void print_residual(const struct imp_fit_result *r)
     printf("\n");
 }
 
+static struct imp_clipped clipped_of(const imp_problem *problem)
+{
+    struct imp_clipped c = IMP_CLIPPED_INIT;
+    if (imp_problem_get_clipped(problem, &c) != IMP_OK) c.numbers = 0;
+    return c;
+}
+
+static void print_clipped(const imp_problem *problem)
+{
+    const struct imp_clipped c = clipped_of(problem);
+    if (c.numbers)
+        printf("%zu of %zu numbers are clipped, %zu in which the scene disagrees; %zu at "
+               "the "
+               "levels or near have no weight\n",
+               c.clipped, c.numbers, c.against, c.silent);
+}
+
+void fit_clipped_json(struct json *j, const imp_problem *problem)
+{
+    const struct imp_clipped c = clipped_of(problem);
+    if (!c.numbers) return;
+    json_object(j, "clipped");
+    json_integer(j, "numbers", (int64_t)c.numbers);
+    json_integer(j, "clipped", (int64_t)c.clipped);
+    json_integer(j, "silent", (int64_t)c.silent);
+    json_integer(j, "against", (int64_t)c.against);
+    json_end_object(j);
+}
+
 static void print_table(const struct fit_answer *a, char **paths)
 {
     const struct imp_fit_result *r = a->result;
@@ -105,6 +135,7 @@ static void print_table(const struct fit_answer *a, char **paths)
     printf("\n%s %.6g +- %.2g after %d iterations: %s\n", loss_word(), r->objective.value,
            r->objective.se, r->iterations, r->reason ? r->reason : "");
     print_residual(r);
+    print_clipped(a->problem);
     if (a->looked) fit_missing_print(a);
 }
 

@@ -29,6 +29,9 @@ int fit_answer_manifest(void);
 /* The members of its JSON. paths [n_blocks]: files of large blocks; NULL: none. */
 void fit_answer_json(struct json *j, const struct fit_answer *a, char **paths);
 
+/* "clipped":{..}, where targets have levels */
+void fit_clipped_json(struct json *j, const imp_problem *problem);
+
 /* fit_missing.c: sets missing, n_missing and looked, if they are to be looked for. 0, or an
  * exit code with the reason printed. */
 void fit_missing_find(struct fit_answer *a);

@@ -176,6 +176,7 @@ void fit_answer_json(struct json *j, const struct fit_answer *a, char **paths)
     json_number(j, "residual_hi", r->residual_hi);
     json_number(j, "chi2_per_freedom", r->chi2);
     json_number(j, "chi2_se", r->chi2_se);
+    fit_clipped_json(j, a->problem);
     json_number(j, "shift", r->shift);
     json_number(j, "condition", r->condition);
     json_text(j, "reason", r->reason);

@@ -57,6 +57,9 @@ class Fit(Values):
         How far four times the samples would move an answer, in standard errors, where the
         loss leaves a bias; else NaN.
     reason, warning : str
+    clipped : dict or None
+        With `clip`: how many "numbers" there are, how many are "clipped", how many have no
+        weight ("silent"), and in how many the scene disagrees ("against").
     walks : str
         Which evaluations of lbfgs, mma and slsqp were of kept walks, or why none were.
     """
@@ -66,6 +69,7 @@ class Fit(Values):
         super().__init__(scene, values)
         self._infos, self._targets, self._optimizer, self._loss_word = infos, targets, optimizer, loss
         self.iterations: int = result.iterations
+        self.clipped: Optional[dict[str, int]] = None
         self.loss: float = result.objective.value
         self.loss_se: float = result.objective.se
         self.bias_order: int = result.objective.bias_order
@@ -204,7 +208,7 @@ def variables(result: Any, blocks: Any, start: Any, value: Any) -> dict[str, Fit
 def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam", max_iterations: int = 0,
         learning_rate: float = 0, tolerance: float = 0, intervals: bool = True, checkpoint: Any = None,
         resume: bool = False, spp: int = 0, seed: int = 0, sensor: Any = 0, loss: str = "l2", epsilon: float = 0,
-        weights: Any = None, noise_se: Any = None, tikhonov: Optional[Mapping[str, float]] = None,
+        weights: Any = None, clip: Any = None, noise_se: Any = None, tikhonov: Optional[Mapping[str, float]] = None,
         stay: Optional[Mapping[str, float]] = None, smooth: Optional[Mapping[str, float]] = None,
         same: Any = None, factor: Any = None, log: Any = None, time_limit: float = 0, drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified",
         wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene", levels: int = 0, memory: float = 0,
@@ -238,7 +242,7 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
         Rewritten every few seconds.
     resume : bool
         Continue from the checkpoint, if it is there.
-    spp, seed, sensor, loss, epsilon, weights, tikhonov, stay, smooth, drop_budget, guide, wavelengths, wavelength_set, points, walks_from
+    spp, seed, sensor, loss, epsilon, weights, clip, tikhonov, stay, smooth, drop_budget, guide, wavelengths, wavelength_set, points, walks_from
         As `loss`'s; `spp` is that of each iteration.
     noise_se : array, optional
         [height][width][channels]: one standard error of the target's noise; default: that
@@ -280,7 +284,7 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
     with Problem(scene, params, same, factor, log) as p:
         options = run_options(p.scene, seed=seed, spp=spp, time_limit=time_limit, drop_budget=drop_budget, guide=guide,
                               wavelengths=wavelengths, wavelength_set=wavelength_set, points=points, walks_from=walks_from)
-        p.add_targets(target, sensor=sensor, weights=weights, loss=loss, epsilon=epsilon, noise_se=noise_se)
+        p.add_targets(target, clip, sensor=sensor, weights=weights, loss=loss, epsilon=epsilon, noise_se=noise_se)
         p.add_regularisers(tikhonov, stay, smooth)
         path = text(checkpoint, "checkpoint") if checkpoint is not None else None
         wanted = make(_c.imp_fit_options, optimizer=choice("imp_optimizer", optimizer, "optimizer"),
@@ -297,6 +301,7 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
                      for k in range(info.size)] if p.n <= 1024 else []
             answer = Fit(p.scene, variables(result, p.blocks, p.natural(start), p.natural(p.x())), result, names,
                          {info.name: info for info, _ in p.blocks}, target_list(p.scene, target, sensor), optimizer, loss)
+            answer.clipped = p.clipped()
         if status == _c.IMP_CANCELLED and answer and answer.reason == "time limit reached":
             return answer
         if status:

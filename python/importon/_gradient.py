@@ -336,7 +336,7 @@ class Loss(Estimate):
 
 
 def loss(scene: Scene, target: Any, params: Any = None, *, spp: int = 0, seed: int = 0, sensor: Any = 0,
-         loss: str = "l2", epsilon: float = 0, weights: Any = None, tikhonov: Optional[Mapping[str, float]] = None,
+         loss: str = "l2", epsilon: float = 0, weights: Any = None, clip: Any = None, tikhonov: Optional[Mapping[str, float]] = None,
          stay: Optional[Mapping[str, float]] = None, smooth: Optional[Mapping[str, float]] = None,
          drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified", wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene", walks: Any = None,
          progress: Any = None) -> Loss:
@@ -365,6 +365,10 @@ def loss(scene: Scene, target: Any, params: Any = None, *, spp: int = 0, seed: i
         Of the relative and log losses; 0: 0.01.
     weights : array or path, optional
         [height][width], >= 0.
+    clip : "auto" or (low, high), optional
+        Numbers at these levels of the file were clipped there (None: not at this end): they
+        have no weight where the scene agrees, which pictures of four times the samples
+        decide. "auto": by the file, PNG or JPEG.
     tikhonov, stay, smooth : mapping, optional
         Pattern -> weight W: W/2 |x|^2, W/2 |x - x now|^2, W/2 |grad x|^2 (of textures).
     drop_budget, guide, wavelengths, wavelength_set, points, walks_from, walks, progress
@@ -396,8 +400,10 @@ def loss(scene: Scene, target: Any, params: Any = None, *, spp: int = 0, seed: i
     with Problem(scene, params) as p:
         options = run_options(p.scene, seed=seed, spp=spp, drop_budget=drop_budget, guide=guide,
                               wavelengths=wavelengths, wavelength_set=wavelength_set, points=points, walks_from=walks_from, walks=walks)
-        n = p.add_targets(target, sensor=sensor, weights=weights, loss=loss, epsilon=epsilon)
+        n = p.add_targets(target, clip, sensor=sensor, weights=weights, loss=loss, epsilon=epsilon)
         p.add_regularisers(tikhonov, stay, smooth)
+        if clip is not None:
+            p.run(options, None, lib.imp_problem_censor, p.pointer, ctypes.byref(options))
         value, (g, se) = _c.imp_estimate(), p.gradient()
         p.run(options, progress, lib.imp_problem_objective, p.pointer, None, ctypes.byref(options),
               ctypes.byref(value), address(g), address(se))

@@ -174,12 +174,22 @@ class Problem:
     def gradient(self) -> tuple[Any, Any]:
         return np.zeros(self.n), np.zeros(self.n)
 
-    def add_targets(self, target: Any, **options: Any) -> int:
+    def add_targets(self, target: Any, clip: Any = None, **options: Any) -> int:
         """How many there are."""
         made = targets(self.scene, target, **options)
         for t in made:
             self.check(lib.imp_problem_add_target(self.pointer, ctypes.byref(t[0])))
+        if clip is not None:
+            for i, (s, value) in enumerate(target_list(self.scene, target, options.get("sensor", 0))):
+                low, high = levels(value, clip, is_photograph(self.scene, s))
+                self.check(lib.imp_problem_clip(self.pointer, i, low, high))
         return len(made)
+
+    def clipped(self) -> Optional[dict[str, int]]:
+        """Of targets with levels; None: there are none."""
+        c = make(_c.imp_clipped)
+        self.check(lib.imp_problem_get_clipped(self.pointer, ctypes.byref(c)))
+        return {"numbers": c.numbers, "clipped": c.clipped, "silent": c.silent, "against": c.against} if c.numbers else None
 
     def add_regularisers(self, tikhonov: Any, stay: Any, smooth: Any) -> None:
         for glob, weight in dict(tikhonov or {}).items():
@@ -201,11 +211,67 @@ def _colours(picture: Picture, channels: int) -> tuple[Any, Any]:
     return pixels[..., at], None if se is None else se[..., at]
 
 
+def is_photograph(scene: Scene, sensor: int) -> bool:
+    """Has its film a gamma, so that targets hold the numbers of a photograph?"""
+    info = make(_c.imp_sensor_info)
+    scene._context.check(lib.imp_scene_get_sensor(scene._handle.pointer, sensor, ctypes.byref(info)))
+    return bool(info.photograph)
+
+
+def _is_path(target: Any) -> bool:
+    return isinstance(target, (str, bytes)) or hasattr(target, "__fspath__")
+
+
+def _integers(path: Any) -> Optional[tuple[bool, int]]:
+    """Of a file of integers, which `read` takes for sRGB: is it JPEG, and its largest number."""
+    with open(path, "rb") as file:
+        head = file.read(64)
+    if head[:2] in (b"PF", b"Pf", b"#?") or head[:4] == b"\x76\x2f\x31\x01" or head[:6] == b"\x93NUMPY" or head[:3] == b"VOL":
+        return None
+    if head[:4] == b"\x89PNG":
+        return False, 65535 if head[24] == 16 else 255
+    if head[:2] in (b"P5", b"P6"):
+        return False, int(head.split()[3])
+    return head[:2] == b"\xff\xd8", 255
+
+
+def _encode(v: Any) -> Any:
+    """sRGB, from linear."""
+    v = np.asarray(v, float)
+    return np.where(v <= 0.0031308, 12.92 * v, 1.055 * np.maximum(v, 1e-9) ** (1 / 2.4) - 0.055)
+
+
+def _decode(v: float) -> float:
+    return v / 12.92 if v <= 0.04045 else float(((v + 0.055) / 1.055) ** 2.4)
+
+
+# Below and above all numbers.
+_ENDS = (-float(np.finfo(np.float32).max), float(np.finfo(np.float32).max))
+
+
+def levels(target: Any, clip: Any, photograph: bool) -> tuple[float, float]:
+    """Levels of clipping in the target's numbers."""
+    file = _integers(target) if _is_path(target) else None
+    if isinstance(clip, str):
+        if clip != "auto" or file is None:
+            raise ArgumentError("clip=%r: 'auto' is of files of integers; else (low, high) in the file's numbers" % (clip,))
+        part = (5 if file[0] else 0.5) / file[1]
+        pair = [part, 1 - part]
+    else:
+        pair = [bound if v is None else float(v) for v, bound in zip(clip, _ENDS)]
+    if len(pair) != 2:
+        raise ArgumentError("clip=%r: (low, high) is wanted" % (clip,))
+    if file is not None and not photograph:
+        pair = [v if v in _ENDS else _decode(v) for v in pair]
+    return pair[0], pair[1]
+
+
 def _one_target(scene: Scene, target: Any, sensor: int, weights: Any, loss: str, epsilon: float,
                 noise_se: Any) -> tuple[Any, Any]:
     """imp_target, and what it points to."""
-    if isinstance(target, (str, bytes)) or hasattr(target, "__fspath__"):
-        target = read(target)
+    path = target if _is_path(target) else None
+    if path is not None:
+        target = read(path)
     se = noise_se
     if isinstance(target, Picture) and target.ndim == 3 and target.channels:
         pixels, own = _colours(target, scene.channels)
@@ -213,6 +279,8 @@ def _one_target(scene: Scene, target: Any, sensor: int, weights: Any, loss: str,
             se = own  # one sample has no error
     else:
         pixels = target
+    if path is not None and is_photograph(scene, sensor) and _integers(path) is not None:
+        pixels = _encode(pixels)  # the numbers of the file
     pixels = numbers(pixels, "target", np.float32)
     pixels = pixels[..., None] if pixels.ndim == 2 else pixels
     if pixels.ndim != 3:

@@ -55,12 +55,11 @@ double imp__replicate_adjoints(const struct imp__target *target, int channels,
                                size_t pixel, int n, const imp_spec *L, imp_spec *P)
 {
     const struct imp_target *t = &target->desc;
-    const double scale = t->scale * (target->weights ? target->weights[pixel] : 1);
     const bool luminance = imp__sees_luminance(target, channels);
     double value = 0, l[IMP_REPLICATE_MAX], a[IMP_REPLICATE_MAX];
     for (int i = 0; i < n; i++) P[i] = (imp_spec){0};
     for (int c = 0; c < t->channels; c++) {
-        const struct loss f = {t->loss, scale, t->epsilon,
+        const struct loss f = {t->loss, imp__target_weight(target, pixel, c), t->epsilon,
                                target->pixels[pixel * (size_t)t->channels + (size_t)c]};
         for (int i = 0; i < n; i++)
             l[i] = imp__seen(luminance, (double[3]){L[i][0], L[i][1], L[i][2]}, c);

@@ -3,6 +3,7 @@
  * Fit: an optimiser is run on a problem; covariance and intervals of its answer. */
 #include "fit.h"
 #include "base/arguments.h"
+#include "clip.h"
 #include "search/covariance.h"
 #include <math.h>
 #include <string.h>
@@ -120,6 +121,31 @@ static enum imp_status search_look(struct imp__fit *f, const struct imp__opt_opt
     return st == IMP_OK ? intervals(f, s, s->x, rows, u, why) : st;
 }
 
+/* Of clipped targets: searches and their intervals, until the numbers that count stay. */
+static enum imp_status clipped_searches(struct imp__fit *f,
+                                        const struct imp__opt_options *o,
+                                        struct imp__search **s,
+                                        struct imp_fit_variable *rows,
+                                        struct imp__uncertainty *u, const char **why)
+{
+    for (int round = 0;; round++) {
+        struct imp__opt_options own = *o;
+        bool again;
+        IMP_CHECKED(imp__fit_clipped(f, round, &own, s, &again));
+        if (!again) return IMP_OK;
+        f->final_total = 0;
+        IMP_CHECKED(search(f, &own, *s));
+        imp__search_settle(*s);
+        f->final_calls = 0;
+        f->final_total = final_total(f);
+        if (!f->options.intervals) continue;
+        imp__uncertainty_destroy(f->problem->ctx, u);
+        *u = (struct imp__uncertainty){0};
+        *why = NULL;
+        IMP_CHECKED(search_look(f, &own, *s, rows, u, why));
+    }
+}
+
 enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
                         const struct imp_run *run, const struct imp_fit_result **result)
 {
@@ -146,6 +172,7 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
                            "and l1 has none: use Adam, or another loss"));
     IMP_TRY(imp__fit_start_keep(p, f.spans != NULL, &start));
     imp__fit_answer_free(p);
+    imp__clip_reset(p);
     const struct imp__opt_options o = {f.options.max_iterations, f.options.learning_rate,
                                        f.options.tolerance};
     x = imp__alloc_raw(ctx, p->n, sizeof *x);
@@ -181,6 +208,7 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
     f.final_total = final_total(&f);
     if (ended == IMP_OK && f.options.intervals)
         ended = search_look(&f, &o, s, rows, &u, &why);
+    if (ended == IMP_OK) ended = clipped_searches(&f, &o, &s, rows, &u, &why);
     struct imp__fit_shift shift = {.of_se = -1};
     if (ended == IMP_OK && u.n && biased)
         ended = imp__fit_shift(&f, s->x, u.G, imp__search_seed(&f.goal, FINAL_SEED, 1),

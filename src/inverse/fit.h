@@ -61,6 +61,14 @@ enum imp_status imp__fit_levels(struct imp__fit *fit,
 enum imp_status imp__fit_levels_allowed(const struct imp_problem *problem,
                                         const struct imp_fit_options *options);
 
+/* fit_clip.c: of clipped targets, decides anew after search *s, the round-th. *again: with
+ * other weights, and *s is the next search, which has not begun, of these options. */
+enum imp_status imp__fit_clipped(struct imp__fit *fit, int round,
+                                 struct imp__opt_options *options, struct imp__search **s,
+                                 bool *again);
+enum imp_status imp__fit_clipped_allowed(const struct imp_problem *problem,
+                                         const struct imp_fit_options *options);
+
 /* fit_kept.c: walks of the search are drawn and kept, where its method evaluates one draw;
  * what belongs to imp__goal.draw and is_stale. */
 bool imp__fit_keeps(const struct imp__fit *fit);

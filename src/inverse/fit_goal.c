@@ -315,6 +315,7 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
     if (!isfinite(f.options.memory))
         return imp__error(ctx, IMP_E_ARG, "options: memory %g", f.options.memory);
     IMP_CHECKED(imp__fit_levels_allowed(p, &f.options));
+    IMP_CHECKED(imp__fit_clipped_allowed(p, &f.options));
     if (f.options.resume && !f.options.checkpoint)
         return imp__error(ctx, IMP_E_ARG, "resume needs the name of a checkpoint");
     if (f.options.max_iterations == 0)

@@ -34,7 +34,7 @@ static void add_target(const struct imp__fit *f, const struct imp__target *targe
     const int n = t->channels;
     for (size_t i = 0; i < (size_t)t->width * (size_t)t->height * (size_t)n; i++) {
         const double weight =
-            t->scale * (target->weights ? target->weights[i / (size_t)n] : 1);
+            imp__target_weight(target, i / (size_t)n, (int)(i % (size_t)n));
         const double T = target->pixels[i];
         if (!(weight > 0)) continue;
         const double w = imp__loss_gauss_newton(t->loss, weight, t->epsilon, T, T);

@@ -198,10 +198,10 @@ static double group_loss(struct sets *s)
     const bool luminance = imp__sees_luminance(s->target, n);
     double sum = 0;
     for (size_t p = 0; p < s->pixels; p++) {
-        const double scale = t->scale * (s->target->weights ? s->target->weights[p] : 1);
         double bar[2][3] = {{0}};
         for (int c = 0; c < t->channels; c++) {
             const double T = s->target->pixels[p * (size_t)t->channels + (size_t)c];
+            const double scale = imp__target_weight(s->target, p, c);
             double I[2];
             struct imp__loss_at at;
             for (int k = 0; k < 2; k++)

@@ -119,8 +119,7 @@ static double residuals(const struct imp__normal_job *j, const struct pixel *p, 
                         double *factor)
 {
     const struct imp_target *t = &j->target->desc;
-    const double scale =
-        t->scale * (j->target->weights ? j->target->weights[p->index] : 1);
+    const double scale = imp__target_weight(j->target, p->index, (int)c);
     double T = t->pixels[p->index * (size_t)seen_channels(j) + c], mean = 0;
     for (int a = 0; a < p->M; a++) mean += p->w->r[a][c] / p->M;
     const double weight = imp__loss_gauss_newton(t->loss, scale, t->epsilon, mean, T);

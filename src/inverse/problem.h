@@ -19,6 +19,8 @@ struct imp__target {
     struct imp_target desc; /* pixels, weights, noise_se point to copies */
     float *pixels, *weights, *noise_se;
     struct imp_photograph photograph; /* the pixels, if they have a gamma; else NULL */
+    struct imp__clip *clip;           /* levels, and who has no weight; NULL: none */
+    const uint8_t *silent; /* of clip, [height][width][channels]; NULL: all speak */
     /* Of a film with response curves, unless they are three: targets of up to three of
      * its curves, each with walks of its own; they share the weights. n_parts 0: none. */
     int n_parts;
@@ -26,6 +28,12 @@ struct imp__target {
     bool of_curves;                                /* it is such a part */
     struct imp_wavelengths waves[IMP_WAVES_DRAWN]; /* of a part: its curves */
 };
+/* Factor of the loss of channel c of a pixel. */
+static inline double imp__target_weight(const struct imp__target *t, size_t pixel, int c)
+{
+    const double w = t->desc.scale * (t->weights ? t->weights[pixel] : 1);
+    return t->silent && t->silent[pixel * (size_t)t->desc.channels + (size_t)c] ? 0 : w;
+}
 static inline int imp__target_parts(const struct imp__target *t)
 {
     return t->n_parts ? t->n_parts : 1;

@@ -34,9 +34,9 @@ static void sets_loss(const struct imp__splat *s, int b, size_t p, double *total
 {
     const struct imp_target *t = &s->target->desc;
     const bool luminance = imp__sees_luminance(s->target, s->channels);
-    const double scale = t->scale * (s->target->weights ? s->target->weights[p] : 1);
     for (int c = 0; c < t->channels; c++) {
         const double T = s->target->pixels[p * (size_t)t->channels + (size_t)c];
+        const double scale = imp__target_weight(s->target, p, c);
         double mean[3], sum = 0, square = 0;
         for (int k = b * s->m; k < (b + 1) * s->m; k++) {
             mean_of(s, k, p, mean);
@@ -60,7 +60,6 @@ static void picture_loss(const struct imp__splat *s, int b, size_t p, double *to
     const struct imp_target *t = &s->target->desc;
     const imp_film *film = s->films[b];
     const bool luminance = imp__sees_luminance(s->target, s->channels);
-    const double scale = t->scale * (s->target->weights ? s->target->weights[p] : 1);
     for (int c = 0; c < t->channels; c++) {
         double mean[3], se[3];
         for (int k = 0; k < s->channels; k++) {
@@ -71,6 +70,7 @@ static void picture_loss(const struct imp__splat *s, int b, size_t p, double *to
         /* Channels of a sample correlate: the luminance of their errors. */
         const double variance = imp__sqr(imp__seen(luminance, se, c));
         const double T = s->target->pixels[p * (size_t)t->channels + (size_t)c];
+        const double scale = imp__target_weight(s->target, p, c);
         struct imp__loss_at at;
         imp__loss_eval(t->loss, scale, t->epsilon, I, T, &at);
         *total += at.value;
@@ -219,12 +219,12 @@ static imp_spec pixel_adjoint(const struct imp__splat *s, int b, int k, size_t p
         return imp__seen_bar(false, n, bar);
     }
     const struct imp_target *t = &s->target->desc;
-    const double scale = t->scale * (s->target->weights ? s->target->weights[p] : 1);
     const bool luminance = imp__sees_luminance(s->target, n);
     rest_of(s, b, k, p, w, L, rest);
     for (int c = 0; c < t->channels; c++) {
         struct imp__loss_at at;
-        imp__loss_eval(t->loss, scale, t->epsilon, imp__seen(luminance, rest, c),
+        imp__loss_eval(t->loss, imp__target_weight(s->target, p, c), t->epsilon,
+                       imp__seen(luminance, rest, c),
                        s->target->pixels[p * (size_t)t->channels + (size_t)c], &at);
         bar[c] = at.d1;
     }

@@ -3,6 +3,7 @@
  * Targets of films with response curves. A walk knows three channels; of a film with
  * another number of curves a loss is the sum of losses of up to three curves each, made
  * from independent walks. */
+#include "clip.h"
 #include "estimate.h"
 #include "problem.h"
 #include <string.h>
@@ -16,6 +17,7 @@ void imp__target_free(imp_context *ctx, struct imp__target *t)
         imp__release(ctx, t->part[k].noise_se);
     }
     imp__release(ctx, t->part);
+    imp__clip_free(ctx, t->clip);
     imp__release(ctx, t->pixels);
     imp__release(ctx, t->weights);
     imp__release(ctx, t->noise_se);

@@ -32,7 +32,7 @@ struct wide {
     imp_context *ctx;
     const struct imp__target *of;
     const struct imp_target *target; /* its description */
-    const float *weights, *noise_se;
+    const float *noise_se;
     const struct imp_film_desc *film;
     int width, height, channels, seen; /* of the scene, of the target */
     bool luminance;                    /* that is what the target sees */
@@ -159,7 +159,7 @@ static void gather(struct wide *w, size_t pixel, int c)
 static double weight_of(const struct wide *w, size_t pixel, int c, double mean, double *T)
 {
     const struct imp_target *t = w->target;
-    const double scale = t->scale * (w->weights ? w->weights[pixel] : 1);
+    const double scale = imp__target_weight(w->of, pixel, c);
     *T = t->pixels[pixel * (size_t)w->seen + (size_t)c];
     if (imp__loss_quadratic(t->loss))
         return imp__loss_weight(t->loss, scale, t->epsilon, *T);
@@ -175,7 +175,7 @@ static double weight_of(const struct wide *w, size_t pixel, int c, double mean, 
 static void jackknife(const struct wide *w, size_t pixel, int c, double S, double *factor)
 {
     const struct imp_target *t = w->target;
-    const double scale = t->scale * (w->weights ? w->weights[pixel] : 1), R = w->R;
+    const double scale = imp__target_weight(w->of, pixel, c), R = w->R;
     const double T = t->pixels[pixel * (size_t)w->seen + (size_t)c];
     struct imp__loss_at at;
     double A = 0;
@@ -380,7 +380,6 @@ enum imp_status imp__gauss_newton_wide(const struct imp_problem *p,
     struct wide w = {.ctx = p->ctx,
                      .of = target,
                      .target = &target->desc,
-                     .weights = target->weights,
                      .noise_se = target->noise_se,
                      .film = &tracer->sensor->film,
                      .width = tracer->sensor->film.crop_w,

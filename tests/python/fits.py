@@ -45,6 +45,39 @@ def test_walks_in_files():
     raises(im.SceneError, lambda: im.read_walks("bad.walks"), "ends early")
 
 
+def photographed():
+    """A box whose film has an exposure and a gamma, and a picture of 8 bits as such a camera makes it"""
+    d = im.cornell_box(res=12)
+    d["sensor"]["film"].update({"exposure": .5, "gamma": 1., "rfilter": {"type": "box"}})
+    s = im.load_dict(d)
+    linear = np.asarray(im.render(s, spp=512, seed=7))
+    encoded = np.where(linear <= .0031308, 12.92 * linear, 1.055 * np.maximum(linear, 1e-9) ** (1 / 2.4) - .055)
+    values = np.clip(np.round(255 * encoded), 0, 255).astype(np.uint8)
+    with open("photo.ppm", "wb") as f:
+        f.write(b"P6 12 12 255\n" + values.tobytes())
+    return s, values / 255
+
+
+def test_photographs():
+    """Files of 8 bits keep their numbers where the film has a gamma, and white is at least"""
+    s, values = photographed()
+    p = im.traverse(s)
+    name = [n for n in p if n.endswith("exposure.value")][0]
+    p.keep(name)
+    by_file = im.loss(s, "photo.ppm", p, spp=8, seed=2)
+    by_array = im.loss(s, values, p, spp=8, seed=2)
+    assert abs(float(by_file) / float(by_array) - 1) < 1e-5
+    told = im.loss(s, "photo.ppm", p, spp=8, seed=2, clip="auto")
+    again = im.loss(s, values, p, spp=8, seed=2, clip=(.5 / 255, 254.5 / 255))
+    assert abs(float(told) / float(again) - 1) < 1e-4 and float(told) < float(by_file)
+    one = im.loss(s, values, p, spp=8, seed=2, clip=(None, 254.5 / 255))
+    assert float(one) != float(again) or (values > 0).all()
+    raises(im.ArgumentError, lambda: im.loss(s, values, p, clip="auto"), "auto")
+    raises(im.ArgumentError, lambda: im.loss(s, values, p, clip=(1, 0)), "less than")
+    f = im.fit(s, values, [name, "light.*"], log="light.*", optimizer="lm", spp=16, max_iterations=2, clip=(0, .99))
+    assert f.clipped["clipped"] > 0 and f.clipped["numbers"] == 432, f.clipped
+
+
 def test_answer():
     """The truth comes back within its errors; covariance and intervals belong together"""
     s, target, p, truth = setting()
