@@ -6,6 +6,8 @@ static const char *const optimizer_words[] = {"adam", "lm",    "lbfgs",
 
 static const char *const missing_words[] = {"auto", "always", "never", NULL};
 
+static const char *const variate_words[] = {"auto", "on", "off", NULL};
+
 struct fit_choice fit_choice = {.memory = -1};
 
 const struct arg_option options_search[] = {
@@ -25,6 +27,10 @@ const struct arg_option options_search[] = {
     {ARG_NUMBER, 0, "memory", "MB",
      "of lbfgs, mma and slsqp, for the walks that they keep (default 1074; 0: none)",
      &fit_choice.memory, 0, 1e12, NULL},
+    {ARG_CHOICE, 0, "control-variate", "WHEN",
+     "of adam, walks are evaluated at the last numbers, too: auto (default: where "
+     "possible), on or off",
+     &fit_choice.variate, 0, 0, variate_words},
     {ARG_FLAG, 0, "no-intervals", NULL, "do not estimate 95 % intervals at the end",
      &fit_choice.no_intervals, 0, 0, NULL},
     {0}};
@@ -49,6 +55,9 @@ struct imp_fit_options fit_choice_options(void)
     fit.memory = fit_choice.memory < 0    ? 0
                  : fit_choice.memory == 0 ? -1
                                           : 1e6 * fit_choice.memory;
+    static const enum imp_variates variates[] = {IMP_VARIATES_AUTO, IMP_VARIATES_ON,
+                                                 IMP_VARIATES_OFF};
+    fit.control_variate = variates[fit_choice.variate];
     fit.intervals = !fit_choice.no_intervals;
     return fit;
 }

@@ -980,6 +980,16 @@ struct imp_fit_step {
  * rendered at these numbers (imp_problem_set_x, imp_render). Non-zero asks to stop. */
 typedef int (*imp_fit_step_fn)(const struct imp_fit_step *step, void *payload);
 
+/** Recursive control variates (docs/fitting.md): the walks of an iteration are evaluated at
+ * the numbers of the one before, too, and what was known of the pictures there is carried on.
+ * They are for IMP_ADAM, with losses L2 and relative L2, pixels of their own (rfilter box),
+ * walks from the sensor, and numbers that neither move rays nor are extinctions. */
+enum imp_variates {
+    IMP_VARIATES_AUTO = 0, /**< where they are possible */
+    IMP_VARIATES_ON,       /**< where not: the error says why */
+    IMP_VARIATES_OFF
+};
+
 struct imp_fit_options {
     size_t size;
     enum imp_optimizer optimizer;
@@ -1001,10 +1011,12 @@ struct imp_fit_options {
      * the memory does not suffice. Objective and intervals of the answer are of fresh
      * walks. */
     double memory;
+    enum imp_variates control_variate;
 };
 #define IMP_FIT_OPTIONS_INIT                                                             \
     {                                                                                    \
-        sizeof(struct imp_fit_options), IMP_ADAM, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0           \
+        sizeof(struct imp_fit_options), IMP_ADAM, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,          \
+            IMP_VARIATES_AUTO                                                            \
     }
 
 struct imp_fit_variable {
@@ -1054,6 +1066,8 @@ struct imp_fit_result {
     const char
         *walks; /**< which evaluations of the search were of kept walks, or why none
                             were; NULL: the optimizer draws new ones each time */
+    const char *control_variate; /**< Adam: what it brought, or why there was none; NULL:
+                                      not wanted */
 };
 
 /** Fit the active parameters to the targets; the scene ends at the best estimate.

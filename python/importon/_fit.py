@@ -62,6 +62,8 @@ class Fit(Values):
         weight ("silent"), and in how many the scene disagrees ("against").
     walks : str
         Which evaluations of lbfgs, mma and slsqp were of kept walks, or why none were.
+    control_variate : str
+        Of adam: what it brought, or why there was none.
     """
 
     def __init__(self, scene: Scene, values: dict[str, Any], result: Any, names: list[str], infos: Mapping[str, Any],
@@ -87,6 +89,7 @@ class Fit(Values):
         self.reason: str = decode(result.reason)
         self.warning: str = decode(result.warning)
         self.walks: str = decode(result.walks)
+        self.control_variate: str = decode(result.control_variate)
 
     def report(self, path: Any, *, title: Optional[str] = None, command: Optional[str] = None, spp: int = 0) -> None:
         """Write the fit as one HTML page that opens anywhere: the target beside the picture that was
@@ -212,7 +215,7 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
         stay: Optional[Mapping[str, float]] = None, smooth: Optional[Mapping[str, float]] = None,
         same: Any = None, factor: Any = None, log: Any = None, time_limit: float = 0, drop_budget: float = 0, guide: Any = None, wavelengths: str = "stratified",
         wavelength_set: int = 0, points: str = "scene", walks_from: str = "scene", levels: int = 0, memory: float = 0,
-        progress: Any = None) -> Fit:
+        control_variate: str = "auto", progress: Any = None) -> Fit:
     """Fit parameters to target pictures; the scene ends at the best estimate.
 
     Parameters
@@ -236,6 +239,9 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
     memory : float
         Bytes for the walks that lbfgs, mma and slsqp keep, since they evaluate one draw;
         0: 2^30; negative: walks are traced each time. `Fit.walks` says what was kept.
+    control_variate : str
+        Of adam, "auto", "on" or "off": walks are evaluated at the last iteration's numbers, too, which
+        makes gradients less noisy; "auto" where that is possible. `Fit.control_variate` says what it brought.
     intervals : bool
         Estimate covariance and 95 % intervals at the end.
     checkpoint : path, optional
@@ -290,7 +296,8 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
         wanted = make(_c.imp_fit_options, optimizer=choice("imp_optimizer", optimizer, "optimizer"),
                       max_iterations=integer(max_iterations, "max_iterations"), learning_rate=float(learning_rate),
                       tolerance=float(tolerance), intervals=bool(intervals), checkpoint=path, resume=bool(resume),
-                      levels=integer(levels, "levels"), memory=float(memory))
+                      levels=integer(levels, "levels"), memory=float(memory),
+                      control_variate=choice("imp_variates", control_variate, "control_variate"))
         out, start = ctypes.c_void_p(), p.x()
         status, message = run(p.context, options, progress, lib.imp_fit, p.pointer, ctypes.byref(wanted),
                               ctypes.byref(options), ctypes.byref(out))

@@ -8,6 +8,7 @@
 #include "load.h"
 #include "search.h"
 #include "tree.h"
+#include "twin.h"
 #include "xml.h"
 #include <string.h>
 
@@ -66,6 +67,7 @@ enum imp_status imp__scene_finish(struct imp_scene *scene)
     if (st == IMP_OK) st = imp__scene_build(scene, imp__integrator_kinds);
     if (st == IMP_OK) st = imp__graded_finish(scene);
     if (st == IMP_OK) st = imp__survey_finish(scene);
+    scene->twin = imp__scene_twin;
     imp__scene_release_files(scene);
     return st;
 }

@@ -4,6 +4,7 @@
 #include "base/arguments.h"
 #include "base/team.h"
 #include "math/hash.h"
+#include "twin.h"
 #include "walks_file.h"
 #include <errno.h>
 #include <string.h>
@@ -14,25 +15,9 @@
 static enum imp_status scene_prove(const struct imp_walks *w,
                                    const struct imp_bytes *bytes)
 {
-    enum imp_status st = IMP_OK;
-    imp_context *ctx = w->ctx;
     imp_scene *again = NULL;
-    double *theta = imp__alloc(ctx, w->scene->n_theta + 1, sizeof *theta);
-    if (!theta) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory to write kept walks"));
-    IMP_TRY(imp__tree_take(ctx, "kept walks", bytes->data, bytes->size, &again));
-    bool same = again->n_theta == w->scene->n_theta;
-    if (same) imp__walks_theta_set(again, w->theta);
-    if (same) imp__walks_theta_get(again, theta);
-    same = same && memcmp(theta, w->theta, again->n_theta * sizeof *theta) == 0 &&
-           imp__fingerprint_evaluated(again) == imp__fingerprint_evaluated(w->scene);
-    if (!same)
-        IMP_TRY(imp__error(ctx, IMP_E_UNSUPPORTED,
-                           "kept walks: this scene is not whole without its geometry "
-                           "(a light that derives something from its shape, or "
-                           "instances in instances)"));
-out:
+    const enum imp_status st = imp__twin_take(w->scene, w->theta, bytes, &again);
     imp_scene_destroy(again);
-    imp__release(ctx, theta);
     return st;
 }
 

@@ -71,7 +71,10 @@ static enum imp_status target_estimate(struct imp_problem *p,
                        "these walks were kept for pictures, with stratified wavelengths; "
                        "a loss needs independent ones: keep them with `losses`");
     if (st != IMP_OK) return st;
-    if (imp__film_border(&j.tracer.sensor->film) > 0)
+    if (p->variate && want_gradient)
+        st =
+            imp__variate_use(p->variate, target, j.plan, &j.tracer, &j.there, &j.variate);
+    if (st == IMP_OK && imp__film_border(&j.tracer.sensor->film) > 0)
         st = splat_prepare(&j, &own, &splat);
     if (st == IMP_OK && (!j.splat || want_gradient))
         st = imp__gradient_job_run(&j, &own, "gradient", lo, hi, start_s);
@@ -84,6 +87,7 @@ static enum imp_status targets_estimate(struct imp_problem *p, const struct imp_
 {
     const double start = imp__now(), n = (double)p->n_targets;
     enum imp_status st = IMP_OK;
+    if (p->variate) imp__variate_begin(p->variate);
     for (size_t t = 0; t < p->n_targets; t++) {
         const int parts = imp__target_parts(&p->targets[t]);
         for (int k = 0; k < parts && st == IMP_OK; k++)
@@ -131,6 +135,7 @@ enum imp_status imp__problem_objective(struct imp_problem *p, const double *x,
         IMP_TRY(targets_estimate(p, run, want_gradient, &totals));
         IMP_TRY(imp__totals_share(p, &totals));
     }
+    if (p->variate) IMP_TRY(imp__variate_end(p->variate, p));
     imp__totals_end(p, &totals, gradient, gradient_se);
     const double prior = imp__regularise(p, NULL, gradient);
     if (objective)

@@ -96,11 +96,12 @@ static enum imp_status intervals(struct imp__fit *f, const struct imp__search *s
 static enum imp_status search(struct imp__fit *f, const struct imp__opt_options *o,
                               struct imp__search *s)
 {
+    f->searching = true;
     const enum imp_status ended = imp__optimize(&f->goal, o, s);
+    f->searching = false;
     if (!f->options.checkpoint || (ended != IMP_OK && ended != IMP_CANCELLED))
         return ended;
-    const enum imp_status st =
-        imp__checkpoint_write(f->problem->ctx, f->options.checkpoint, &f->fingerprint, s);
+    const enum imp_status st = imp__fit_checkpoint_write(f, s);
     return st == IMP_OK ? ended : st;
 }
 
@@ -182,12 +183,12 @@ enum imp_status imp_fit(imp_problem *p, const struct imp_fit_options *options,
     imp__release(ctx, x);
     x = NULL;
     bool found = false;
-    if (f.options.resume)
-        IMP_TRY(imp__checkpoint_read(ctx, f.options.checkpoint, &f.fingerprint, &f.goal,
-                                     s, &found));
+    if (f.options.resume) IMP_TRY(imp__fit_checkpoint_read(&f, s, &found));
     imp__fit_scales(&f, s);
     f.first_iteration = s->iteration;
+    f.searching = true;
     if (f.options.levels > 1 && !found) st = imp__fit_levels(&f, &o, s);
+    f.searching = false;
     f.search = s;
     if (st == IMP_OK) st = search(&f, &o, s);
     if (st != IMP_OK && st != IMP_CANCELLED) goto out;

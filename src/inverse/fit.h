@@ -37,6 +37,11 @@ struct imp__fit {
     int draws, evaluated, traced;
     bool stale;          /* the last evaluation was far from the draw */
     const char *untaken; /* why walks are not kept; NULL: they are, or were not wanted */
+
+    /* Of Adam (fit_variates.c). */
+    struct imp__variate *variate; /* NULL: there is none */
+    bool searching;               /* evaluations are those of the search */
+    const char *without_variate;  /* why not; NULL: there is one, or none was wanted */
     char note[96];
 };
 
@@ -78,6 +83,17 @@ bool imp__fit_is_stale(void *fit);
 enum imp_status imp__fit_take_walks(struct imp__fit *fit, const double *x, uint64_t seed);
 /* What was kept, as a sentence; NULL: nothing was wanted. In the problem's fit_arena. */
 const char *imp__fit_walks_text(const struct imp__fit *fit);
+
+/* fit_variates.c: the control variates of the search, where they are wanted and possible;
+ * what they brought, or why there are none, as a sentence in the problem's fit_arena (NULL:
+ * nothing was wanted); and checkpoints, which hold them. */
+struct imp__variate;
+enum imp_status imp__fit_variates(struct imp__fit *fit);
+const char *imp__fit_variate_text(const struct imp__fit *fit);
+enum imp_status imp__fit_checkpoint_write(const struct imp__fit *fit,
+                                          const struct imp__search *search);
+enum imp_status imp__fit_checkpoint_read(struct imp__fit *fit, struct imp__search *search,
+                                         bool *found);
 
 struct imp__uncertainty;
 

@@ -8,6 +8,7 @@
 #include "loss.h"
 #include "math/hash.h"
 #include "scene/fingerprint.h"
+#include "variate.h"
 #include "walk/light_walk.h"
 #include "walk/run.h"
 #include "walk/store.h"
@@ -21,6 +22,7 @@
 #define COARSER          4  /* samples of an evaluation, over those of a coarse search, */
 #define COARSE_SPP       16 /* which are at least so many: fewer lead far away */
 #define PAIRS_VERSION    1  /* of what Levenberg-Marquardt estimates from its samples */
+#define VARIATE_VERSION  1  /* of what control variates keep */
 
 /* ---- Progress ------------------------------------------------------------------ */
 
@@ -85,8 +87,7 @@ static enum imp_status iterated(const struct imp__search *s, void *payload)
     if (f->options.checkpoint &&
         now - f->last_checkpoint_s >
             fmax(CHECKPOINT_S, CHECKPOINT_SHARE * f->checkpoint_cost_s)) {
-        const enum imp_status st = imp__checkpoint_write(
-            f->problem->ctx, f->options.checkpoint, &f->fingerprint, s);
+        const enum imp_status st = imp__fit_checkpoint_write(f, s);
         if (st != IMP_OK) return st;
         f->last_checkpoint_s = imp__now();
         f->checkpoint_cost_s = f->last_checkpoint_s - now;
@@ -114,8 +115,10 @@ static enum imp_status eval(const double *x, uint64_t seed, struct imp_estimate 
     fit->run.seed = seed;
     fit->final_calls++;
     enum imp_status st = imp__fit_take_walks(fit, x, seed);
+    fit->problem->variate = fit->searching && g ? fit->variate : NULL;
     if (st == IMP_OK)
         st = imp__problem_objective(fit->problem, x, &fit->run, true, f, g, g_se);
+    fit->problem->variate = NULL;
     fit->run.walks = NULL;
     if (st == IMP_CANCELLED) fit->stopped = true; /* by this rank or another */
     return st;
@@ -235,6 +238,10 @@ static void fingerprint(struct imp__fit *f)
     }
     if (imp__fit_keeps(f))
         h->options = imp__hash(h->options, &f->options.memory, sizeof f->options.memory);
+    if (f->variate) {
+        const int version = VARIATE_VERSION;
+        h->options = imp__hash(h->options, &version, sizeof version);
+    }
     if (imp__points_of(sensor, &f->outer) == IMP_POINTS_SOBOL) {
         const struct imp__replicates plan =
             imp__replicates_of(p->scene, &p->targets[0], &f->outer);
@@ -340,6 +347,7 @@ enum imp_status imp__fit_begin(struct imp_problem *p,
     f.search_share = f.options.intervals && n <= IMP_DENSE_MAX ? 0.7 : 0.98;
     f.run = f.outer;
     f.run.time_limit_s = 0;
+    IMP_TRY(imp__fit_variates(&f));
     if (f.options.checkpoint) fingerprint(&f);
     *out = f;
     /* Pointers to the fit itself: it does not move any more. */
@@ -372,6 +380,7 @@ void imp__fit_end(struct imp__fit *f)
 {
     if (!f->problem) return;
     imp__walks_destroy(f->walks);
+    imp__variate_destroy(f->variate);
     imp__release(f->problem->ctx, f->lo);
     imp__release(f->problem->ctx, f->spans);
     imp__release(f->problem->ctx, f->H_prior);

@@ -290,7 +290,8 @@ enum imp_status imp__fit_answer(struct imp__fit *f, struct imp__search *s,
         .chi2_se = left.chi2_se,
         .covariance = covariance,
         .loosest = loosest,
-        .walks = imp__fit_walks_text(f)};
+        .walks = imp__fit_walks_text(f),
+        .control_variate = imp__fit_variate_text(f)};
     answer->n = n;
     answer->rows = rows;
     if (rows) answer->search = NULL; /* all is said */

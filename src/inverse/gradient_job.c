@@ -11,12 +11,24 @@
 /* An item's result, and the sum of several. */
 struct part {
     double objective, variance;
+    double moments[IMP_VARIATE_MOMENTS];
     double dense[]; /* [2 or 3][n] of few numbers, as of imp__tally_dense */
 };
 
-/* Replicate b of a pixel: trace, fold, adjoints, sweep. Returns its loss estimate. */
+/* What the walk brings at the parameters of the last evaluation, if there was one and
+ * the loss sees this pixel. */
+static imp_spec walk_there(const struct imp__gradient_job *j, size_t pixel,
+                           const struct imp_walk *walk)
+{
+    if (!j->there.scene || (j->target->weights && j->target->weights[pixel] == 0))
+        return (imp_spec){0};
+    return imp__walk_elsewhere(&j->there, walk);
+}
+
+/* Replicate b of a pixel, in work item `part`: trace, fold, adjoints, sweep. Returns its
+ * loss estimate. */
 static double replicate(struct imp__gradient_job *j, struct imp_tile_worker *w, int x,
-                        int y, int b)
+                        int y, int b, int part, double *moments)
 {
     if (imp_unlikely(j->light != NULL)) {
         imp__light_replicate(j, w, x, y, b);
@@ -29,8 +41,10 @@ static double replicate(struct imp__gradient_job *j, struct imp_tile_worker *w, 
     /* Of sets: means of L, and their adjoints. */
     imp_spec *L = imp__arena_take(&w->arena, (size_t)m, sizeof *L);
     imp_spec *P = imp__arena_take(&w->arena, (size_t)m, sizeof *P);
+    imp_spec *H = L;
     double value = 0;
-    if (!walks || !L || !P) {
+    if (j->variate) H = imp__arena_take(&w->arena, (size_t)m, sizeof *H);
+    if (!walks || !L || !P || !H) {
         w->no_memory = true;
         goto out;
     }
@@ -39,13 +53,14 @@ static double replicate(struct imp__gradient_job *j, struct imp_tile_worker *w, 
     for (int s = 0; s < m; s++) {
         const int first = imp__replicates_set(j->plan, s);
         const int end = imp__replicates_set(j->plan, s + 1);
-        L[s] = (imp_spec){0};
+        L[s] = H[s] = (imp_spec){0};
         for (int i = first; i < end; i++) {
             const struct imp_arena_mark one = imp__arena_mark(&w->arena);
             const int64_t sample = imp__replicates_first(j->plan, b, s) + i - first;
             imp__walk_trace(&j->tracer, &w->arena, x, y, sample, &walks[i]);
             imp__tile_drop(w, walks[i].dropped, x, y, sample);
             L[s] += walks[i].L;
+            if (imp_unlikely(j->variate != NULL)) H[s] += walk_there(j, pixel, &walks[i]);
             if (keep) continue;
             if (j->splat)
                 P[0] = imp__splat_adjoint(j->splat, b, s, walks[i].px, walks[i].py,
@@ -60,9 +75,15 @@ static double replicate(struct imp__gradient_job *j, struct imp_tile_worker *w, 
             imp__arena_rewind(&w->arena, one);
         }
         if (end - first > 1) L[s] /= imp__spec(end - first);
+        if (end - first > 1 && j->variate) H[s] /= imp__spec(end - first);
     }
     if (keep) {
         value = imp__replicate_adjoints(j->target, j->channels, pixel, m, L, P);
+        if (j->variate) {
+            imp__variate_replicate(j->variate, j->target, j->plan, part, pixel, L, H,
+                                   j->look ? NULL : moments);
+            (void)imp__replicate_adjoints(j->target, j->channels, pixel, m, L, P);
+        }
         for (int s = 0; j->want_gradient && s < m; s++) {
             const int first = imp__replicates_set(j->plan, s);
             const int end = imp__replicates_set(j->plan, s + 1);
@@ -109,12 +130,13 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
     int in_pair = 0;
 
     out->objective = out->variance = 0;
+    memset(out->moments, 0, sizeof out->moments);
     imp__tally_clear(tally);
     for (int y = t->y0; y < t->y1; y++)
         for (int x = t->x0; x < t->x1; x++) {
             double sum = 0, square = 0;
             for (int b = b0; b < b1; b++) {
-                const double v = replicate(j, w, x, y, b);
+                const double v = replicate(j, w, x, y, b, (int)t->part, out->moments);
                 sum += v;
                 square += v * v;
             }
@@ -158,6 +180,7 @@ static void tile_add(void *into, const void *from, void *payload)
     const struct part *b = from;
     a->objective += b->objective;
     a->variance += b->variance;
+    for (int k = 0; k < IMP_VARIATE_MOMENTS; k++) a->moments[k] += b->moments[k];
     for (size_t k = 0; k < n; k++) a->dense[k] += b->dense[k];
 }
 
@@ -171,6 +194,8 @@ static enum imp_status tile_take(size_t group, const void *sum, void *payload)
     if (j->look) return IMP_OK;
     to->objective += in->objective;
     to->variance += in->variance;
+    for (int k = 0; j->variate && k < IMP_VARIATE_MOMENTS; k++)
+        j->variate->moments[k] += in->moments[k];
     for (size_t k = 0; k < n; k++) {
         double variance = in->dense[n + k];
         if (j->shared)

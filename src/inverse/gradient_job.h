@@ -14,6 +14,7 @@
 #include "splat.h"
 #include "tally.h"
 #include "totals.h"
+#include "variate.h"
 
 struct imp__gradient_job {
     const struct imp_problem *problem;
@@ -24,7 +25,9 @@ struct imp__gradient_job {
     const float *seed;                /* fixed adjoint image, [h][w][channels] */
     const struct imp__splat *splat;   /* wide filters: pass 2; NULL: box */
     const struct imp__light_adjoints
-        *light; /* of walks from the lights; NULL: not those */
+        *light;                        /* of walks from the lights; NULL: not those */
+    struct imp__variate_view *variate; /* NULL: none */
+    struct imp_tracer there;           /* of the variate */
     bool want_gradient;
     /* Set by imp__gradient_job_run. */
     int width, channels;

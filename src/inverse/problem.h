@@ -75,6 +75,7 @@ struct imp__block {
 };
 
 struct imp__search;
+struct imp__variate;
 
 /* The last fit, as imp_problem_fit_variable returns it (fit_result.c). */
 struct imp__fit_block { /* numbers of one parameter */
@@ -107,6 +108,7 @@ struct imp_problem {
     size_t n_regularisers, cap_regularisers;
     struct imp__regulariser *regularisers;
     struct imp_run run;         /* of imp_problem_nlopt */
+    struct imp__variate *variate; /* of the evaluation at work (variate.h); NULL: none */
     bool missing_told;          /* that walks from the lights miss some light */
     bool same_known;            /* the ranks of a team have the same problem */
     struct imp_arena fit_arena; /* of the last fit's result */

@@ -110,6 +110,10 @@ struct imp_scene {
     struct imp_tree *tree;  /* of the building calls, until commit (format/tree.h) */
     struct imp_arena files; /* what files held and objects copy; freed by commit */
     struct imp_owned *owned;
+    /* Another scene of the same objects and numbers, in which walks are evaluated and no ray
+     * meets anything. Of the room that makes scenes from files and calls (format/twin.c); NULL:
+     * no such room made it. */
+    enum imp_status (*twin)(const struct imp_scene *scene, struct imp_scene **out);
 
     int n_shapes, n_bsdfs, n_emitters, n_sensors, n_textures;
     int n_all_shapes;          /* with those of groups */

@@ -79,6 +79,7 @@ static void contents_put(struct imp_file_writer *w, const void *payload)
         snprintf(name, sizeof name, "array%d", k);
         put_array(&s, name, search->array[k], search->array_n[k]);
     }
+    if (search->n_goal > 0) put_array(&s, "goal", search->goal_numbers, search->n_goal);
     put(&s, "end %016llx\n", (unsigned long long)s.hash);
 }
 
@@ -237,6 +238,8 @@ static enum imp_status read_body(struct source *s, struct imp__search *t)
         if (n > 0 && s->take) IMP_TRY(imp__search_array(t, k, n));
         IMP_TRY(get_numbers(s, name, t->array[k], n, NULL));
     }
+    if (t->n_goal > 0)
+        IMP_TRY(get_array(s, "goal", t->goal_numbers, t->n_goal, is_number));
     const uint64_t hash = s->hash;
     unsigned long long end;
     if (fscanf(s->f, "end %16llx", &end) != 1 || end != hash || fgetc(s->f) != '\n' ||

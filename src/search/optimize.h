@@ -111,6 +111,10 @@ struct imp__search {
     size_t n_history, cap_history, cap_history_se, cap_history_x;
     double *history, *history_se;
     double *history_x; /* [n_history][n] where these were; see imp__search_trail */
+    /* [n_goal] what the goal knows from one iteration to the next: a checkpoint holds it. Of
+     * the goal, which has it there when a checkpoint is written or read. */
+    double *goal_numbers;
+    size_t n_goal;
     /* Private to the optimiser. */
     double *array[IMP_SEARCH_ARRAYS];
     size_t array_n[IMP_SEARCH_ARRAYS], array_cap[IMP_SEARCH_ARRAYS];

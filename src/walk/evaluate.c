@@ -3,6 +3,7 @@
  * Values from decisions: what the scene's present parameters make of a walk whose
  * vertices, directions, densities, MIS weights and roulette are settled. */
 #include "graded.h"
+#include "record.h"
 #include "tracking.h"
 
 /* Where a vertex was decided. Member by member: clearing all of it would take as long as
@@ -192,6 +193,59 @@ static imp_spec frozen(const struct imp_tracer *tracer, const struct imp_walk *w
             P *= now.w;
         }
     }
+    return L;
+}
+
+/* ---- In another scene ------------------------------------------------------------ */
+
+/* Do the values of this vertex depend on no active parameter? */
+static bool is_settled(const struct imp_active *active, const struct imp_vertex *v)
+{
+    const struct imp_decision *d = &v->d;
+    if (v->on || v->to_light) return false;
+    if (v->bsdf && v->bsdf->index >= 0 && active->bsdf[v->bsdf->index]) return false;
+    if (d->met.emitter >= 0 && active->emitter[d->met.emitter]) return false;
+    return d->connection != IMP_CONNECTED || d->light.emitter < 0 ||
+           !active->emitter[d->light.emitter];
+}
+
+/* Evaluate and fold, in the order that gives the bits of both. */
+static imp_spec elsewhere(const struct imp_tracer *there, const struct imp_walk *walk)
+{
+    const struct imp_scene *scene = there->scene;
+    imp_spec L = {0}, in[IMP_INPUTS_MAX];
+    for (const struct imp_vertex *v = walk->last; v; v = v->prev) {
+        if (is_settled(there->active, v)) {
+            L = v->e + v->w * L + v->b;
+        } else {
+            const struct imp_bsdf *bsdf = imp__decided_bsdf(scene, &v->d);
+            const struct imp_shape *shape = v->shape ? scene->shapes[v->d.shape] : NULL;
+            const struct decided at = {&v->d, bsdf, shape, v->carried, v->to_light};
+            struct imp_vertex now;
+            struct imp_place p;
+            struct values x;
+            place_set(&v->d, shape, v->carried, &p);
+            decided_values(scene, &at, &p, in, &x);
+            now.w = (imp_spec){0};
+            if (v->d.goes_on) {
+                imp__step_weigh(&now, x.f, v->d.pdf, v->d.survive);
+                imp__step_pass(&now, passes(there, v));
+            }
+            L = x.e + now.w * L + x.b;
+        }
+        for (const struct imp_side *s = v->side; s; s = s->next)
+            L += elsewhere(there, &s->walk);
+    }
+    return L;
+}
+
+imp_spec imp__walk_elsewhere(const struct imp_tracer *there, const struct imp_walk *walk)
+{
+    imp_spec L = {0};
+    if (walk->dropped || !walk->valid) return L;
+    L = imp__walk_channels(there, walk, elsewhere(there, walk));
+    for (int c = 0; c < 4; c++)
+        if (!isfinite(L[c])) return (imp_spec){0};
     return L;
 }
 

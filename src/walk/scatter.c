@@ -10,7 +10,8 @@ bool imp__throughput_part(struct imp_step *s, const struct imp_bsdf *b, imp_spec
     const double stand_in = imp_max(imp__max_used(factor, four), 0.5);
     for (int c = 0; c < 3 + four; c++) {
         if (factor[c] != 0) continue;
-        if (differentiable && s->zeros[c]++ == 0) factor[c] = stand_in;
+        if (differentiable && (s->zeros[c]++ == 0 || s->tracer->elsewhere))
+            factor[c] = stand_in;
     }
     s->beta *= factor;
     return !imp__is_zero_used(s->beta, four);

@@ -155,6 +155,9 @@ struct imp_tracer {
                           arrives (baseline.h) */
     const struct imp_store *kept; /* walks that are evaluated in place of tracing
                                     (store.h); NULL: they are traced */
+    bool
+        elsewhere; /* walks are evaluated at other numbers, too (imp__walk_elsewhere): any
+                       number of factors that are zero, but have a derivative, ends none */
 };
 
 /* The guide that walks of this integrator follow: its densities are made for paths and for
@@ -243,6 +246,10 @@ imp_spec imp__walk_frozen(const struct imp_tracer *tracer, const struct imp_walk
 /* Inputs and values of all vertices at the scene's present parameters, to the bit those
  * that tracing gave at the parameters it was done with. No vertex moves. */
 void imp__walk_evaluate(const struct imp_tracer *tracer, struct imp_walk *walk);
+/* L of the same decisions in another scene of the same objects, at its parameters; `there`
+ * is a tracer of it. The two scenes differ in active parameters alone: a vertex that depends
+ * on none of them keeps its values. 0 where the walk was dropped, or is no number there. */
+imp_spec imp__walk_elsewhere(const struct imp_tracer *there, const struct imp_walk *walk);
 /* Fold, and L as it counts: a walk that is not valid brings 0, and one whose value no
  * light can have, or no picture can hold, is dropped (trace.c). */
 void imp__walk_close(const struct imp_tracer *tracer, struct imp_walk *walk);

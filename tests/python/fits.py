@@ -164,6 +164,20 @@ def test_optimizers():
         z(f[RED].value, truth, f[RED].se, what=name)
 
 
+def test_control_variate():
+    """Control variates of Adam: other answers than without, and a reason where there are none"""
+    s, target, p, truth = setting(noise_spp=64, res=8)
+    fits = []
+    for which in ("on", "off"):
+        p[RED] = .4, .3, .2
+        fits.append(im.fit(s, target, p, spp=4, max_iterations=20, control_variate=which, intervals=False))
+    on, off = fits
+    assert "1/" in on.control_variate and off.control_variate == ""
+    assert not np.array_equal(on[RED].value, off[RED].value) and on.history[0] == off.history[0]
+    raises(im.UnsupportedError, lambda: im.fit(s, target, p, spp=4, loss="log", control_variate="on"), "not quadratic")
+    raises(im.ArgumentError, lambda: im.fit(s, target, p, control_variate="perhaps"), "auto, on, off")
+
+
 def test_cancel_and_resume():
     """A cancelled fit has its state; a checkpoint continues to the same bits"""
     s, target, p, truth = setting()

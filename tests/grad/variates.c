@@ -1,0 +1,415 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Control variates of fits: walks evaluated at the last numbers; pictures carried on along a
+ * given path of numbers, whose means, gradients and variances are those of estimators.md 21;
+ * the same bits for any threads, ranks and pauses; where they are refused.
+ *
+ *     variates long     # more chains, and the variances of docs/fitting.md */
+#include "imp_scene.h"
+#include "imp_tap.h"
+#include "inverse/estimate.h"
+#include "inverse/variate.h"
+#include "math/rng.h"
+#include "team_kit.h"
+
+static imp_context *ctx;
+
+/* ---- A walk at other numbers ------------------------------------------------------- */
+
+/* In another scene, against the same scene with its numbers changed. */
+static void elsewhere(const char *file, enum imp_color_mode mode, const char *defines,
+                      const char *glob)
+{
+    imp_scene *scene = test_scene(ctx, file, mode, defines);
+    struct imp_scene *twin = NULL;
+    imp_problem *p;
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_tracer tracer, there;
+    struct imp_arena arena;
+    test_must(ctx, imp_problem_create(scene, &p));
+    test_must(ctx, imp_problem_activate(p, glob));
+    test_must(ctx, imp__problem_tracer(p, &run, NULL, &tracer));
+    test_must(ctx, scene->twin(scene, &twin));
+    tracer.elsewhere = true;
+    there = tracer;
+    there.scene = twin;
+    there.sensor = twin->sensors[0];
+    imp__arena_init(&arena, ctx);
+    int equal = 0, walks = 0, moved = 0;
+    double worst = 0, largest = 0;
+    for (int k = 0; k < 300; k++) {
+        const struct imp_arena_mark mark = imp__arena_mark(&arena);
+        const int w = tracer.sensor->film.crop_w, h = tracer.sensor->film.crop_h;
+        struct imp_walk walk;
+        imp__walk_trace(&tracer, &arena, k % w, k / w % h, k, &walk);
+        if (!walk.dropped && walk.valid) {
+            const imp_spec same = imp__walk_elsewhere(&there, &walk);
+            walks++;
+            equal +=
+                memcmp(&same, &walk.L, (size_t)scene->channels * sizeof(double)) == 0;
+            /* The twin's numbers, then for reference the scene's own. */
+            for (int round = 0; round < 2; round++) {
+                struct imp_scene *s = round ? scene : twin;
+                for (size_t q = 0; q < s->n_params; q++) {
+                    struct imp_param *a = &s->params[q];
+                    for (size_t e = 0; p->active.base[q] >= 0 && e < a->info.count; e++) {
+                        const double now = imp__param_get(&twin->params[q], e);
+                        const double by = e % 2 == (size_t)k % 2 ? 0.8 : 1.25;
+                        const double x = round ? now : now * by;
+                        imp__param_set(a, e, imp_clamp(x, a->info.lo, a->info.hi));
+                    }
+                }
+                imp__theta_announce(s);
+            }
+            const imp_spec is = imp__walk_elsewhere(&there, &walk);
+            const imp_spec must = imp__walk_frozen(&tracer, &walk);
+            for (int c = 0; c < scene->channels; c++) {
+                worst = fmax(worst, fabs(is[c] - must[c]));
+                largest = fmax(largest, fabs(must[c]));
+                moved += is[c] != walk.L[c];
+            }
+        }
+        imp__arena_rewind(&arena, mark);
+        /* The next one is traced at the new numbers: both scenes have them. */
+    }
+    tap_ok(equal == walks && walks > 100,
+           "%s %s: at equal numbers a walk has its own value, to the bit # %d of %d",
+           file, glob, equal, walks);
+    tap_ok(worst <= 1e-12 * largest && moved > 50,
+           "... and at others that of the scene with these numbers # %.1e of %.3g, "
+           "%d differ",
+           worst, largest, moved);
+    imp__arena_free(&arena);
+    imp_problem_destroy(p);
+    imp_scene_destroy(scene);
+    imp_scene_destroy(twin);
+}
+
+/* ---- A path of numbers -------------------------------------------------------------- */
+
+enum { STEPS = 6, MOST = 32 };
+
+struct chain_sums {
+    struct tap_stat g[STEPS][MOST], plain[STEPS][MOST];
+    struct tap_stat mean[STEPS], variance[STEPS]; /* of the picture; by the variate */
+    struct tap_stat told[STEPS]; /* the variance less the squared error */
+};
+
+/* Numbers of step t: on both sides of the true ones, some of them 0 for a while. */
+static void path_at(int t, size_t n, const double *truth, double *x)
+{
+    for (size_t k = 0; k < n; k++) {
+        x[k] = truth[k] * (1 + 0.3 * cos(1.7 * (double)k + 0.6 * t));
+        if (truth[k] <= 1) x[k] = fmin(x[k], 1);
+        if (truth[k] <= 1 && (t == 2 || (t == 3 && k % 3 != 0))) x[k] = 0;
+    }
+}
+
+/* Along a given path the mean of I_t, of the gradient and of the squared error of I_t. */
+static void along_a_path(const char *file, const char *defines, const char *glob,
+                         enum imp_loss loss, bool masked, bool points, int chains)
+{
+    imp_scene *scene = test_scene(ctx, file, IMP_RGB, defines);
+    imp_problem *p;
+    struct imp_target target = IMP_TARGET_INIT;
+    struct imp_run run = IMP_RUN_INIT;
+    static struct chain_sums sums;
+    memset(&sums, 0, sizeof sums);
+    test_must(ctx, imp_problem_create(scene, &p));
+    test_must(ctx, imp_problem_activate(p, glob));
+    const struct imp_film_desc *film = &scene->sensors[0]->film;
+    const size_t n = imp_problem_n(p),
+                 pixels = (size_t)film->crop_w * (size_t)film->crop_h;
+    float *pixel = calloc(3 * pixels, sizeof *pixel),
+          *mask = calloc(pixels, sizeof *mask);
+    double truth[MOST], x[MOST], g[MOST];
+    if (n > MOST || !pixel || !mask) exit(99);
+    for (size_t i = 0; i < 3 * pixels; i++) pixel[i] = 0.2f + 0.1f * (float)(i % 5);
+    for (size_t i = 0; i < pixels; i++) mask[i] = (float)(i % 3);
+    imp_problem_get_x(p, truth);
+    target.width = film->crop_w;
+    target.height = film->crop_h;
+    target.channels = 3;
+    target.pixels = pixel;
+    target.loss = loss;
+    target.epsilon = 0.1;
+    if (masked) target.weights = mask;
+    test_must(ctx, imp_problem_add_target(p, &target));
+    run.spp = points ? 32 : 6;
+    run.points = points ? IMP_POINTS_SOBOL : IMP_POINTS_INDEPENDENT;
+
+    /* What pictures of the path are: many samples. */
+    double *is[STEPS];
+    for (int t = 0; t < STEPS; t++) {
+        struct imp_run fine = run;
+        imp_film *picture;
+        path_at(t, n, truth, x);
+        test_must(ctx, imp_problem_set_x(p, x));
+        fine.spp = 20000;
+        fine.points = IMP_POINTS_SOBOL;
+        test_must(ctx, imp_render(scene, &fine, &picture));
+        is[t] = calloc(3 * pixels, sizeof **is);
+        if (!is[t]) exit(99);
+        for (size_t i = 0; i < 3 * pixels; i++)
+            is[t][i] = (double)imp_film_mean(picture)[i];
+        imp_film_destroy(picture);
+    }
+    for (int chain = 0; chain < chains; chain++) {
+        struct imp__variate *v;
+        path_at(0, n, truth, x);
+        test_must(ctx, imp_problem_set_x(p, x));
+        test_must(ctx, imp__variate_create(p, &run, &v));
+        for (int t = 0; t < STEPS; t++) {
+            path_at(t, n, truth, x);
+            for (int with = 0; with < 2; with++) {
+                p->variate = with ? v : NULL;
+                run.seed = imp__mix64(2 * (uint64_t)(chain * STEPS + t) + (uint64_t)with);
+                test_must(ctx, imp__problem_objective(p, x, &run, false, NULL, g, NULL));
+                for (size_t k = 0; k < n; k++)
+                    tap_add(with ? &sums.g[t][k] : &sums.plain[t][k], g[k]);
+                p->variate = NULL;
+            }
+            const struct imp__variate_view *view = &v->views[0];
+            double error = 0, square = 0;
+            for (size_t i = 0; i < view->n; i++) {
+                const double weight = masked ? (double)mask[i / 3] : 1;
+                const double d = view->last[i] - is[t][i], T = (double)pixel[i];
+                error += weight * d;
+                square += weight / (loss == IMP_LOSS_L2 ? 1 : T * T + 0.1) * d * d;
+            }
+            tap_add(&sums.mean[t], error);
+            const double told = view->half[0].variance + view->half[1].variance;
+            tap_add(&sums.variance[t], told);
+            tap_add(&sums.told[t], told - square);
+        }
+        imp__variate_destroy(v);
+    }
+    double worst = 0, count = 0, gain = 0, off = 0, mean = 0;
+    for (int t = 1; t < STEPS; t++) {
+        for (size_t k = 0; k < n; k++) {
+            const struct tap_stat *a = &sums.g[t][k], *b = &sums.plain[t][k];
+            const double se = sqrt(imp__sqr(tap_se(a)) + imp__sqr(tap_se(b)));
+            if (!(se > 0)) continue;
+            worst = fmax(worst, fabs(a->mean - b->mean) / se);
+            count++;
+        }
+        mean = fmax(mean, fabs(sums.mean[t].mean / tap_se(&sums.mean[t])));
+        off = fmax(off, fabs(sums.told[t].mean / sums.variance[t].mean));
+    }
+    for (size_t k = 0; k < n; k++)
+        gain += sums.plain[STEPS - 1][k].m2 / sums.g[STEPS - 1][k].m2 / (double)n;
+    tap_ok(
+        worst < 4.5 && count > 5 && gain > 1.5,
+        "%s%s%s, loss %d: along a given path gradients have the mean of those without # "
+        "worst z of %.0f %.2f; variance without/with %.2f at last",
+        file, masked ? " masked" : "", points ? " in sets of points" : "", (int)loss,
+        count, worst, gain);
+    tap_ok(mean < 4.5, "... pictures that of many samples # worst z %.2f", mean);
+    tap_ok(off < 0.3, "... and the variance that is told # off by %.3f", off);
+    for (int t = 0; t < STEPS; t++) free(is[t]);
+    free(pixel);
+    free(mask);
+    imp_problem_destroy(p);
+    imp_scene_destroy(scene);
+}
+
+/* ---- Fits ---------------------------------------------------------------------------- */
+
+enum { W = 16, H = 12 };
+
+struct fitted {
+    imp_context *context;
+    int iterations;
+    const char *checkpoint;
+    bool resume;
+    double x[12288 + 1], loss, history;
+    char text[200];
+    struct team_rank rank;
+};
+
+/* The floor of textured.xml from a picture, and from two at once. */
+static void *fit(void *payload)
+{
+    struct fitted *f = payload;
+    imp_context *c = f->context;
+    imp_scene *scene = test_scene(c, "textured.xml", IMP_RGB, "width=16 height=12");
+    imp_problem *p;
+    imp_film *film;
+    struct imp_target t = IMP_TARGET_INIT;
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
+    const struct imp_fit_result *result;
+    size_t param;
+    const double half = 0.5;
+    run.spp = 64;
+    test_must(c, imp_render(scene, &run, &film));
+    test_must(c, imp_problem_create(scene, &p));
+    test_must(c, imp_problem_activate(p, "floor.*"));
+    t.width = W, t.height = H, t.channels = 3;
+    t.pixels = imp_film_mean(film);
+    test_must(c, imp_problem_add_target(p, &t));
+    t.loss = IMP_LOSS_RELATIVE_L2;
+    t.epsilon = 0.1;
+    test_must(c, imp_problem_add_target(p, &t));
+    test_must(c, imp_scene_find_param(scene, "floor.reflectance.data", &param));
+    test_must(c, imp_scene_set_values(scene, param, 1, &half));
+    o.max_iterations = f->iterations;
+    o.control_variate = IMP_VARIATES_ON;
+    o.checkpoint = f->checkpoint;
+    o.resume = f->resume;
+    run.spp = 4;
+    test_must(c, imp_fit(p, &o, &run, &result));
+    imp_problem_get_x(p, f->x);
+    f->loss = result->objective.value;
+    f->history = result->history[result->n_history - 1];
+    snprintf(f->text, sizeof f->text, "%s",
+             result->control_variate ? result->control_variate : "");
+    imp_film_destroy(film);
+    imp_problem_destroy(p);
+    imp_scene_destroy(scene);
+    return NULL;
+}
+
+static void *fit_of_rank(void *payload)
+{
+    struct fitted *f = payload;
+    test_must(f->context, team_join(f->context, &f->rank));
+    return fit(f);
+}
+
+static bool same(const struct fitted *a, const struct fitted *b)
+{
+    return memcmp(a->x, b->x, sizeof a->x) == 0 && a->loss == b->loss &&
+           a->history == b->history;
+}
+
+static void same_bits(void)
+{
+    static struct fitted one = {.iterations = 12}, other[3];
+    one.context = ctx;
+    fit(&one);
+    tap_ok(strncmp(one.text, "control variate: at the end", 27) == 0, "%s", one.text);
+    for (int threads = 1; threads <= 3; threads += 2) {
+        other[0] = (struct fitted){.iterations = 12, .context = test_context(threads)};
+        fit(&other[0]);
+        tap_ok(same(&one, &other[0]), "%d threads: the same bits", threads);
+        imp_context_destroy(other[0].context);
+    }
+    for (int sums = 0; sums < 2; sums++) {
+        struct team_hub hub = {.ranks = 3, .sums = sums};
+        pthread_t thread[3];
+        pthread_barrier_init(&hub.barrier, NULL, 3);
+        for (int k = 0; k < 3; k++) {
+            other[k] = (struct fitted){.iterations = 12, .context = test_context(1)};
+            other[k].rank = (struct team_rank){&hub, k};
+            if (pthread_create(&thread[k], NULL, fit_of_rank, &other[k]) != 0) exit(99);
+        }
+        for (int k = 0; k < 3; k++) pthread_join(thread[k], NULL);
+        tap_ok(same(&one, &other[0]) && same(&one, &other[1]) && same(&one, &other[2]),
+               "3 ranks%s: the same bits", sums ? ", whose integers are added up" : "");
+        for (int k = 0; k < 3; k++) imp_context_destroy(other[k].context);
+        pthread_barrier_destroy(&hub.barrier);
+    }
+    char path[] = "variates_XXXXXX";
+    if (mkstemp(path) < 0) exit(99);
+    remove(path);
+    other[0] = (struct fitted){.iterations = 5, .context = ctx, .checkpoint = path};
+    fit(&other[0]);
+    other[0].iterations = 12;
+    other[0].resume = true;
+    fit(&other[0]);
+    tap_ok(same(&one, &other[0]), "stopped and resumed: the same bits");
+    remove(path);
+}
+
+/* ---- Where they are refused ----------------------------------------------------------- */
+
+static enum imp_status refused(const char *file, const char *defines, const char *glob,
+                               enum imp_loss loss, enum imp_optimizer optimizer,
+                               enum imp_variates wanted, const char **text)
+{
+    static char reason[400];
+    imp_scene *scene = test_scene(ctx, file, IMP_RGB, defines);
+    imp_problem *p;
+    struct imp_target t = IMP_TARGET_INIT;
+    struct imp_run run = IMP_RUN_INIT;
+    struct imp_fit_options o = IMP_FIT_OPTIONS_INIT;
+    const struct imp_fit_result *result = NULL;
+    const struct imp_film_desc *film = &scene->sensors[0]->film;
+    float *pixels =
+        calloc(3 * (size_t)film->crop_w * (size_t)film->crop_h, sizeof *pixels);
+    if (!pixels) exit(99);
+    test_must(ctx, imp_problem_create(scene, &p));
+    test_must(ctx, imp_problem_activate(p, glob));
+    t.width = film->crop_w, t.height = film->crop_h, t.channels = 3;
+    t.pixels = pixels;
+    t.loss = loss;
+    test_must(ctx, imp_problem_add_target(p, &t));
+    o.optimizer = optimizer;
+    o.max_iterations = 2;
+    o.control_variate = wanted;
+    run.spp = 4;
+    const enum imp_status st = imp_fit(p, &o, &run, &result);
+    snprintf(reason, sizeof reason, "%s",
+             st != IMP_OK              ? imp_last_error(ctx)
+             : result->control_variate ? result->control_variate
+                                       : "");
+    *text = reason;
+    free(pixels);
+    imp_problem_destroy(p);
+    imp_scene_destroy(scene);
+    return st;
+}
+
+static void refusals(void)
+{
+    static const struct {
+        const char *file, *defines, *glob;
+        enum imp_loss loss;
+        enum imp_optimizer optimizer;
+        const char *word;
+    } row[] = {
+        {"cornell.xml", "res=4", "red.*", IMP_LOSS_LOG, IMP_ADAM, "not quadratic"},
+        {"cornell.xml", "res=4", "red.*", IMP_LOSS_L1, IMP_ADAM, "not quadratic"},
+        {"cornell.xml", "res=4", "red.*", IMP_LOSS_L2, IMP_LM, "for Adam"},
+        {"fog.xml", "res=4", "*sigma_t*", IMP_LOSS_L2, IMP_ADAM, "collisions"},
+        {"headlamp.xml", "width=6 height=2", "*reflectance*", IMP_LOSS_L2, IMP_ADAM,
+         "begin at the sensor"},
+    };
+    for (size_t k = 0; k < imp_count(row); k++) {
+        const char *text;
+        const enum imp_status on =
+            refused(row[k].file, row[k].defines, row[k].glob, row[k].loss,
+                    row[k].optimizer, IMP_VARIATES_ON, &text);
+        tap_ok(on == IMP_E_UNSUPPORTED && strstr(text, row[k].word), "refused: %s", text);
+        const enum imp_status off =
+            refused(row[k].file, row[k].defines, row[k].glob, row[k].loss,
+                    row[k].optimizer, IMP_VARIATES_OFF, &text);
+        tap_ok(off == IMP_OK && !*text, "... and without them it goes on # %s", text);
+    }
+}
+
+int main(int argc, char **argv)
+{
+    const bool more = argc > 1 && strcmp(argv[1], "long") == 0;
+    ctx = test_context(0);
+    elsewhere("textured.xml", IMP_RGB, "width=16 height=12", "*");
+    elsewhere("textured.xml", IMP_RGB, "width=16 height=12", "lamp.*");
+    elsewhere("cornell.xml", IMP_RGB, "res=8", "*");
+    elsewhere("cornell.xml", IMP_MONO, "res=8", "*");
+    elsewhere("cornell.xml", IMP_SPECTRAL, "res=8", "*");
+    elsewhere("stam.xml", IMP_RGB, NULL, "*");
+    elsewhere("lamps.xml", IMP_RGB, "res=16", "*");
+    elsewhere("skin.xml", IMP_RGB, NULL, "*albedo*");
+    elsewhere("fog.xml", IMP_RGB, "res=8", "*radiance*");
+    along_a_path("cornell.xml", "res=4", "*", IMP_LOSS_L2, false, false,
+                 more ? 20000 : 800);
+    along_a_path("cornell.xml", "res=4", "*", IMP_LOSS_RELATIVE_L2, true, false,
+                 more ? 20000 : 400);
+    along_a_path("cornell.xml", "res=4", "*", IMP_LOSS_L2, false, true,
+                 more ? 5000 : 100);
+    same_bits();
+    refusals();
+    imp_context_destroy(ctx);
+    return tap_done();
+}
