@@ -626,7 +626,9 @@ enum imp_wavelength_sampling {
 typedef void (*imp_preview_fn)(const imp_film *picture, void *payload);
 /** The random numbers of a pixel's walks. */
 enum imp_points {
-    IMP_POINTS_SCENE = 0,   /**< as the sampler of the sensor says */
+    /** As the sampler of the sensor says; where there is none, independent for pictures, of
+     * Sobol's sequence for losses and fits. */
+    IMP_POINTS_SCENE = 0,
     IMP_POINTS_INDEPENDENT, /**< independent */
     /** Sets of up to 64 points of Sobol's sequence, scrambled by Owen's method. Pixels and
      * sets are independent of each other. Means stay what they are, errors shrink; standard

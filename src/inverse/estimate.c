@@ -157,6 +157,7 @@ enum imp_status imp_problem_objective(imp_problem *p, const double *x,
     IMP_RUN(p->ctx, own, run);
     if (p->n_targets == 0)
         return imp__error(p->ctx, IMP_E_ARG, "the problem has no target");
+    imp__points_of_losses(p, &own);
     return imp__problem_objective(p, x, &own, false, objective, gradient, gradient_se);
 }
 

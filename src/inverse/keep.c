@@ -307,8 +307,12 @@ enum imp_status imp_walks_keep(imp_scene *scene, const struct imp_run *run,
     IMP_TRY(imp__run_sensor(scene, &own, &sensor));
     sensors = imp__alloc(ctx, (size_t)scene->n_sensors, 1);
     if (!sensors) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory for kept walks"));
-    for (int k = 0; k < scene->n_sensors; k++)
+    bool told = own.points != IMP_POINTS_SCENE;
+    for (int k = 0; k < scene->n_sensors; k++) {
         sensors[k] = o.all_sensors || k == own.sensor;
+        if (sensors[k]) told |= scene->sensors[k]->points != IMP_POINTS_SCENE;
+    }
+    if (o.losses && !told) own.points = IMP_POINTS_SOBOL; /* imp__points_of_losses */
     IMP_TRY(imp__walks_make(scene, &own, &o, sensors, out));
 out:
     imp__release(ctx, sensors);

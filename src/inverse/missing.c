@@ -14,6 +14,7 @@
  * alone (the score test: Rao 1948). One sweep gives the scores of all numbers; those that
  * stand out of their Monte Carlo noise most have Gauss-Newton rows. */
 #include "base/arguments.h"
+#include "estimate.h"
 #include "math/linalg.h"
 #include "math/rng.h"
 #include "problem.h"
@@ -326,6 +327,7 @@ enum imp_status imp_problem_missing(struct imp_problem *p, const struct imp_run 
     m.run = (struct imp_run)IMP_RUN_INIT;
     IMP_CHECKED(imp__run_take(ctx, "imp_problem_missing", run, &m.run));
     IMP_CHECKED(imp__run_traces(ctx, "imp_problem_missing", &m.run));
+    imp__points_of_losses(p, &m.run);
     if (p->n_targets == 0) return imp__error(ctx, IMP_E_ARG, "there is no target");
     if (p->n > IMP_DENSE_MAX - ROWS)
         return imp__error(ctx, IMP_E_UNSUPPORTED,

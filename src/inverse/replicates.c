@@ -75,6 +75,15 @@ static const struct imp_sensor *sensor_of(const struct imp_scene *scene,
     return scene->sensors[t ? t->desc.sensor : run->sensor];
 }
 
+void imp__points_of_losses(const struct imp_problem *p, struct imp_run *run)
+{
+    if (run->points != IMP_POINTS_SCENE || run->walks) return;
+    for (size_t i = 0; i < p->n_targets; i++)
+        if (p->scene->sensors[p->targets[i].desc.sensor]->points != IMP_POINTS_SCENE)
+            return;
+    if (p->n_targets > 0) run->points = IMP_POINTS_SOBOL;
+}
+
 struct imp__replicates imp__replicates_of(const struct imp_scene *scene,
                                           const struct imp__target *t,
                                           const struct imp_run *run)
@@ -142,6 +151,7 @@ enum imp_status imp_problem_spp(const imp_problem *p, int target,
                           target, p->n_targets);
     const struct imp__target *t = target < 0 ? NULL : &p->targets[target];
     const int sensor = t ? t->desc.sensor : own.sensor;
+    if (t) imp__points_of_losses(p, &own);
     if (sensor < 0 || sensor >= p->scene->n_sensors || own.spp < 0)
         return imp__error(p->ctx, IMP_E_ARG, "run: there is no sensor %d, or spp %d < 0",
                           sensor, own.spp);

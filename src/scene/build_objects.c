@@ -229,7 +229,7 @@ out:
     return st;
 }
 
-/* The child of this tag, or a default one of the given type. */
+/* The child of this tag, or a default one of the given type; type NULL: none. */
 static enum imp_status child_or_default(struct imp_scene *scene, struct imp_node *node,
                                         const char *tag, const char *type,
                                         struct imp_node **out)
@@ -243,7 +243,8 @@ static enum imp_status child_or_default(struct imp_scene *scene, struct imp_node
         c->used = true;
         *out = c->node;
     }
-    if (!*out) *out = imp__node_create(&scene->arena, tag, type, NULL, NULL, node->loc);
+    if (*out || !type) return IMP_OK;
+    *out = imp__node_create(&scene->arena, tag, type, NULL, NULL, node->loc);
     return *out ? IMP_OK : imp__build_no_memory(scene);
 }
 
@@ -342,7 +343,7 @@ static enum imp_status sensor_make(struct imp_scene *scene, struct imp_node *nod
 
     struct imp_node *film, *sampler;
     IMP_TRY(child_or_default(scene, node, "film", "hdrfilm", &film));
-    IMP_TRY(child_or_default(scene, node, "sampler", "independent", &sampler));
+    IMP_TRY(child_or_default(scene, node, "sampler", NULL, &sampler));
     const struct imp_build film_build = imp__build_make(scene, film);
     const struct imp_build sampler_build = imp__build_make(scene, sampler);
     const struct imp_build b = imp__build_make(scene, node);

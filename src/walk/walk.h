@@ -176,11 +176,14 @@ enum imp_status imp__guide_lights_allowed(const struct imp_scene *scene,
                                           const struct imp_walk_integrator *i,
                                           const struct imp_guide *guide);
 
-/* The points of a run through a sensor: independent, or Sobol's. */
+/* The points of a run through a sensor: independent, or Sobol's. Where neither says, a
+ * picture has independent ones, since its errors are exact then. */
 static inline enum imp_points imp__points_of(const struct imp_sensor *sensor,
                                              const struct imp_run *run)
 {
-    return run->points != IMP_POINTS_SCENE ? run->points : sensor->points;
+    const enum imp_points asked =
+        run->points != IMP_POINTS_SCENE ? run->points : sensor->points;
+    return asked != IMP_POINTS_SCENE ? asked : IMP_POINTS_INDEPENDENT;
 }
 
 /* ---- Wavelengths (waves.c) ------------------------------------------------------- */

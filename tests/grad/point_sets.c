@@ -8,12 +8,13 @@
 #include "imp_tap.h"
 #include "inverse/estimate.h"
 #include <stdbool.h>
+#include <string.h>
 
 enum { SEEDS = 60, RES = 8, N = 4, MOST = 1 + 2 * N + N * N };
 
 static imp_context *ctx;
 
-static imp_scene *scene_of(const char *filter)
+static imp_scene *scene_of(const char *filter, const char *sampler)
 {
     char xml[2048];
     snprintf(xml, sizeof xml,
@@ -22,7 +23,7 @@ static imp_scene *scene_of(const char *filter)
              "value='40'/><transform name='to_world'><lookat origin='0,0,4' "
              "target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'><integer "
              "name='width' value='%d'/><integer name='height' value='%d'/>%s</film>"
-             "</sensor><shape type='rectangle'><transform name='to_world'><scale "
+             "%s</sensor><shape type='rectangle'><transform name='to_world'><scale "
              "value='3'/><translate z='-1'/></transform><bsdf type='diffuse' id='wall'>"
              "<float name='reflectance' value='.5'/></bsdf></shape>"
              "<shape type='sphere'><point name='center' x='.5' y='0' z='0'/><float "
@@ -33,7 +34,7 @@ static imp_scene *scene_of(const char *filter)
              "<emitter type='area' id='lamp'><float name='radiance' value='8'/></emitter>"
              "</shape><emitter type='constant' id='sky'><float name='radiance' "
              "value='.4'/></emitter></scene>",
-             RES, RES, filter);
+             RES, RES, filter, sampler);
     return test_scene_text(ctx, xml, IMP_MONO);
 }
 
@@ -95,7 +96,7 @@ static void losses(const char *filter, const char *name, enum imp_loss loss, int
 {
     static struct answer one, sets, truth;
     const bool quadratic = loss == IMP_LOSS_L2 || loss == IMP_LOSS_RELATIVE_L2;
-    imp_scene *scene = scene_of(filter);
+    imp_scene *scene = scene_of(filter, "");
     imp_film *film;
     imp_problem *p = problem_of(scene, loss, &film);
     answers(p, IMP_POINTS_INDEPENDENT, spp, SEEDS, &one);
@@ -136,7 +137,7 @@ static void losses(const char *filter, const char *name, enum imp_loss loss, int
 /* Gradients of a fixed linear function, and pictures of derivatives. */
 static void fixed(const char *filter, const char *name)
 {
-    imp_scene *scene = scene_of(filter);
+    imp_scene *scene = scene_of(filter, "");
     imp_film *film;
     imp_problem *p = problem_of(scene, IMP_LOSS_L2, &film);
     static struct tap_stat value[2][2 * N];
@@ -177,6 +178,42 @@ static void fixed(const char *filter, const char *name)
     imp_scene_destroy(scene);
 }
 
+/* Where nothing is said, a loss has points in sets and a picture independent ones. */
+static void unsaid(void)
+{
+    static const char *const sampler[] = {"", "<sampler type='independent'/>",
+                                          "<sampler type='multijitter'/>"};
+    static const enum imp_points loss[] = {IMP_POINTS_SOBOL, IMP_POINTS_INDEPENDENT,
+                                           IMP_POINTS_SOBOL},
+                                 picture[] = {IMP_POINTS_INDEPENDENT,
+                                              IMP_POINTS_INDEPENDENT, IMP_POINTS_SOBOL};
+    for (int k = 0; k < 3; k++) {
+        imp_scene *scene = scene_of("<rfilter type='box'/>", sampler[k]);
+        imp_film *target, *film[3];
+        imp_problem *p = problem_of(scene, IMP_LOSS_L2, &target);
+        double value[3];
+        for (int j = 0; j < 3; j++) { /* IMP_POINTS_SCENE, independent, Sobol's */
+            struct imp_estimate e;
+            struct imp_run run = IMP_RUN_INIT;
+            run.spp = 16;
+            run.points = (enum imp_points)j;
+            test_must(ctx, imp_problem_objective(p, NULL, &run, &e, NULL, NULL));
+            test_must(ctx, imp_render(scene, &run, &film[j]));
+            value[j] = e.value;
+        }
+        const size_t bytes = RES * RES * sizeof(float);
+        tap_ok(value[0] == value[loss[k]] && value[1] != value[2],
+               "sampler \"%s\": the points of a loss", sampler[k]);
+        tap_ok(memcmp(imp_film_mean(film[0]), imp_film_mean(film[picture[k]]), bytes) ==
+                   0,
+               "sampler \"%s\": the points of a picture", sampler[k]);
+        for (int j = 0; j < 3; j++) imp_film_destroy(film[j]);
+        imp_film_destroy(target);
+        imp_problem_destroy(p);
+        imp_scene_destroy(scene);
+    }
+}
+
 int main(void)
 {
     const char *box = "<rfilter type='box'/>", *wide = "<rfilter type='gaussian'/>";
@@ -191,6 +228,7 @@ int main(void)
     losses(wide, "wide, log", IMP_LOSS_LOG, 32);
     fixed(box, "box");
     fixed(wide, "wide");
+    unsaid();
     imp_context_destroy(ctx);
     return tap_done();
 }

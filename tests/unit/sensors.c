@@ -538,8 +538,8 @@ static void samplers(void)
     tap_ok(misread == 0, "all but independent ask for points in sets");
     b.node = NULL;
     tap_ok(imp__sampler_build(&b, &spp, &points) == IMP_OK && spp == 4 &&
-               points == IMP_POINTS_INDEPENDENT,
-           "no sampler: 4 independent samples");
+               points == IMP_POINTS_SCENE,
+           "no sampler: 4 samples, of no kind");
     static const int counts[] = {0, -1};
     for (int k = 0; k < 2; k++) {
         b.node = node_new("sampler", "independent");

@@ -66,7 +66,7 @@ enum imp_status imp__sampler_build(const struct imp_build *b, int *spp,
 
     if (!b->node) {
         *spp = 4;
-        *points = IMP_POINTS_INDEPENDENT;
+        *points = IMP_POINTS_SCENE;
         return IMP_OK;
     }
     while (kind < imp_count(kinds) && strcmp(kinds[kind].name, b->node->type) != 0)
