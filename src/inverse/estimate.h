@@ -25,7 +25,8 @@ struct imp__replicates {
 struct imp__replicates imp__replicates_plan(int spp, int batch_max);
 /* Those of imp_problem_objective for a target, of imp_problem_reverse for none. */
 /* Losses have Sobol's points where neither the run nor the sampler of a sensor says which:
- * errors come from sets, which are independent. */
+ * errors come from sets, which are independent. In media most numbers of a walk are no
+ * points, and fewer pairs of sets than of samples cost more than the points bring. */
 void imp__points_of_losses(const struct imp_problem *p, struct imp_run *run);
 struct imp__replicates imp__replicates_of(const struct imp_scene *scene,
                                           const struct imp__target *target,

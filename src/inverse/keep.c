@@ -312,7 +312,8 @@ enum imp_status imp_walks_keep(imp_scene *scene, const struct imp_run *run,
         sensors[k] = o.all_sensors || k == own.sensor;
         if (sensors[k]) told |= scene->sensors[k]->points != IMP_POINTS_SCENE;
     }
-    if (o.losses && !told) own.points = IMP_POINTS_SOBOL; /* imp__points_of_losses */
+    if (o.losses && !told && scene->n_media == 0)
+        own.points = IMP_POINTS_SOBOL; /* imp__points_of_losses */
     IMP_TRY(imp__walks_make(scene, &own, &o, sensors, out));
 out:
     imp__release(ctx, sensors);

@@ -77,7 +77,7 @@ static const struct imp_sensor *sensor_of(const struct imp_scene *scene,
 
 void imp__points_of_losses(const struct imp_problem *p, struct imp_run *run)
 {
-    if (run->points != IMP_POINTS_SCENE || run->walks) return;
+    if (run->points != IMP_POINTS_SCENE || run->walks || p->scene->n_media > 0) return;
     for (size_t i = 0; i < p->n_targets; i++)
         if (p->scene->sensors[p->targets[i].desc.sensor]->points != IMP_POINTS_SCENE)
             return;
