@@ -271,7 +271,7 @@ static void gradients(void)
     tap_ok(n == 8, "walls and a camera");
     for (size_t k = 0; k < n; k++) {
         struct imp_estimate up, down;
-        const double h = 3e-5, at = x[k];
+        const double h = 3e-6, at = x[k];
         x[k] = at + h;
         test_must(ctx, imp_problem_objective(p, x, &run, &up, NULL, NULL));
         x[k] = at - h;
