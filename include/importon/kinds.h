@@ -157,9 +157,9 @@ enum imp_bsdf_flags {
     IMP_BSDF_JUMP = 16,    /* f/pdf of sample jumps at the horizon: sample_d, which has no
                            boundary term, is not the whole derivative */
     IMP_BSDF_NULL = 32,    /* light passes as if nothing were there */
-    IMP_BSDF_TURNED = 128, /* shades about a normal of its own, so its kernel has no
-                              transpose that `sample` could draw: walks from the lights
-                              refuse it */
+    IMP_BSDF_TURNED = 128, /* its kernel has no transpose that `sample` could draw (own
+                              normals; a fibre, which light enters where it is seen):
+                              walks from the lights refuse it */
     IMP_BSDF_LINEAR = 64   /* eval is of first degree in its own inputs of role
                             IMP_REFLECTANCE together, and emit is free of them: an
                             identity of integrator stam that `check` tests */

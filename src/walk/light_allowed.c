@@ -49,7 +49,8 @@ static enum imp_status emission_allowed(const struct imp_scene *scene,
         if (scene->bsdfs[b]->flags & IMP_BSDF_TURNED)
             return imp__error(ctx, IMP_E_UNSUPPORTED,
                               "walks from the lights: material '%s' (%s) shades about "
-                              "normals of its own; let walks begin at the sensor",
+                              "normals of its own, or is a fibre, which light enters "
+                              "where it is seen; let walks begin at the sensor",
                               scene->bsdfs[b]->name, scene->bsdfs[b]->ops->name);
     for (int b = 0; b < scene->n_bsdfs; b++)
         if (scene->bsdfs[b]->flags & IMP_BSDF_EMIT && !is_dark(scene->bsdfs[b], active))

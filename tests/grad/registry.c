@@ -48,6 +48,8 @@ static const struct {
     {"principled", "specular", "eta", "given by eta"},
     {"conductor", "eta", "material", "given by the preset"},
     {"conductor", "k", "material", "given by the preset"},
+    {"hair", "eumelanin", NULL, "given by sigma_a"},
+    {"hair", "pheomelanin", NULL, "given by sigma_a"},
 };
 
 static bool config_has(const char *const *props, const char *name)

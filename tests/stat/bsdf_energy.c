@@ -37,11 +37,13 @@ static double value(imp_v3 w, void *payload)
     return f[p->lane] * e * e * (p->from_light ? fabs(w[2] / p->fixed[2]) : 1);
 }
 
-/* Two of stam_m2 by their formulas (E28), and tables over one of the two directions. */
+/* Two of stam_m2 by their formulas (E28), tables over one of the two directions,
+ * and fibres, in which the place is told by one of them. */
 static bool is_one_way(const struct kind_case *c)
 {
     return kind_has_config(c, "variant=microfacet") ||
-           kind_has_config(c, "variant=paper") || strstr(c->label, "measured");
+           kind_has_config(c, "variant=paper") || strstr(c->label, "measured") ||
+           strstr(c->label, "hair");
 }
 
 /* ---- Albedo: two ways, and at most 1 ------------------------------------------- */

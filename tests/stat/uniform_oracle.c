@@ -98,7 +98,7 @@ static void materials(void)
 {
     for (int k = 0; imp__bsdf_kinds[k]; k++) {
         char xml[2048], what[96];
-        /* Of a file: stat/measured and render/measured_values compare directions. */
+        /* Of a file: stat/measured and render/drawn_values compare directions. */
         if (strcmp(imp__bsdf_kinds[k]->name, "merl") == 0 ||
             strcmp(imp__bsdf_kinds[k]->name, "measured") == 0)
             continue;

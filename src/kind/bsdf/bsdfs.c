@@ -10,6 +10,7 @@
     X(imp__conductor)                                                                    \
     X(imp__dielectric)                                                                   \
     X(imp__diffuse)                                                                      \
+    X(imp__hair)                                                                         \
     X(imp__mask)                                                                         \
     X(imp__normalmap)                                                                    \
     X(imp__measured)                                                                     \
