@@ -112,7 +112,8 @@ static int run_fit(int n, char **operand)
     free(blocks);
     problem_close(problem);
     const char *ended;
-    if (!rc || ranks_ended(&ended)) checkpoint_hint(o.checkpoint);
+    if ((!rc || ranks_ended(&ended)) && !problem_options.clip)
+        checkpoint_hint(o.checkpoint);
     return rc ? rc : cli_done();
 }
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import ctypes
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Optional
 
 from . import _c
 from ._check import Row
@@ -50,10 +51,12 @@ class Missing(Row):
 
 
 def missing(scene: Scene, params: Any = None, target: Any = None, *, spp: int = 0, seed: int = 0, sensor: Any = 0,
-            loss: str = "l2", epsilon: float = 0, drop_budget: float = 0, points: str = "scene",
-            progress: Any = None) -> list[Missing]:
+            loss: str = "l2", epsilon: float = 0, weights: Any = None, clip: Any = None, noise_se: Any = None,
+            tikhonov: Optional[Mapping[str, float]] = None, stay: Optional[Mapping[str, float]] = None,
+            smooth: Optional[Mapping[str, float]] = None, same: Any = None, factor: Any = None, log: Any = None,
+            drop_budget: float = 0, points: str = "scene", progress: Any = None) -> list[Missing]:
     """Which number that is not fitted may be wrong? To be asked after a fit, with its
-    parameters and targets: the scores of all other numbers, with the active ones following.
+    parameters, targets, priors and ties: the scores of all other numbers, with the active ones following.
 
     Parameters
     ----------
@@ -61,8 +64,12 @@ def missing(scene: Scene, params: Any = None, target: Any = None, *, spp: int = 
         As the fit has left it.
     params : SceneParameters, names or patterns
         The active parameters: those of the fit.
-    target, spp, seed, sensor, loss, epsilon, drop_budget, points, progress
+    target, spp, seed, sensor, loss, epsilon, weights, clip, tikhonov, smooth, drop_budget, points, progress
         As `loss`'s.
+    stay : mapping, optional
+        As `loss`'s; of numbers that a fit has moved, that is from where they are now.
+    noise_se, same, factor, log
+        As `fit`'s.
 
     Returns
     -------
@@ -78,9 +85,12 @@ def missing(scene: Scene, params: Any = None, target: Any = None, *, spp: int = 
     >>> 0 <= rows[0].chance <= 1
     True
     """
-    with Problem(scene, params) as p:
+    with Problem(scene, params, same, factor, log) as p:
         options = run_options(p.scene, sensor=sensor, seed=seed, spp=spp, drop_budget=drop_budget, points=points)
-        p.add_targets(target, sensor=sensor, loss=loss, epsilon=epsilon)
+        p.add_targets(target, clip, sensor=sensor, weights=weights, loss=loss, epsilon=epsilon, noise_se=noise_se)
+        p.add_regularisers(tikhonov, stay, smooth)
+        if clip is not None:
+            p.run(options, None, lib.imp_problem_censor, p.pointer, ctypes.byref(options))
         rows, n = ctypes.c_void_p(), ctypes.c_size_t()
         p.run(options, progress, lib.imp_problem_missing, p.pointer, ctypes.byref(options), ctypes.byref(rows),
               ctypes.byref(n))

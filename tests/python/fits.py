@@ -78,6 +78,27 @@ def test_photographs():
     assert f.clipped["clipped"] > 0 and f.clipped["numbers"] == 432, f.clipped
 
 
+def test_missing():
+    """Which number is wrong, with the priors, ties and masks of the fit"""
+    s = box(8)
+    target, p = im.render(s, spp=256, seed=1), im.traverse(s)
+    p["light.emitter.radiance.value"] = 20, 9, 2
+
+    def first(**kw):
+        return {r.name + str(r.element): r for r in im.missing(s, "white.*", target, spp=64, seed=3, **kw)}
+
+    name = LIGHT + "2"
+    free, held = first(), first(tikhonov={"white.*": 1e9})
+    assert name in free and name in held
+    # Walls that cannot follow explain nothing of it: its score has all of its variance.
+    assert held[name].chi2 > free[name].chi2 and held[name].step_se < free[name].step_se
+    half = np.ones((8, 8))
+    half[:4] = 0
+    assert first(weights=half)[name].step_se > free[name].step_se
+    assert name in first(factor="white.*,red.*") or first(factor="white.*,red.*")
+    raises(im.ArgumentError, lambda: first(weights=np.zeros((8, 8))), "weights")
+
+
 def test_answer():
     """The truth comes back within its errors; covariance and intervals belong together"""
     s, target, p, truth = setting()
