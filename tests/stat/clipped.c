@@ -194,7 +194,7 @@ static struct found fit(const struct setting *of, imp_scene *s, float T[2][N],
     return f;
 }
 
-static void photographs(const struct setting *of, int seeds)
+static void photographs(const struct setting *of, int seeds, bool all)
 {
     imp_scene *s = test_scene_text(ctx, of->xml, IMP_RGB);
     static float T[2][N];
@@ -202,14 +202,16 @@ static void photographs(const struct setting *of, int seeds)
     for (int seed = 1; seed <= seeds; seed++) {
         for (int i = 0; i < 2; i++)
             photograph(s, i, (uint64_t)seed, i ? 2.4 : 1.8, .01, T[i]);
-        const struct found f = fit(of, s, T, seed > 1 ? CENSORED : UNLIT, (uint64_t)seed);
+        const struct found f =
+            fit(of, s, T, seed == 1 && all ? UNLIT : CENSORED, (uint64_t)seed);
         tap_add(&inside, f.inside);
         if (seed > 1) continue;
         tap_ok(f.worst < 4 && f.clipped.clipped > 20 && f.clipped.against == 0,
                "%s from photographs of 8 bits: the truth is in the intervals # worst z "
                "%.1f; %zu of %zu clipped, %zu without weight",
                of->name, f.worst, f.clipped.clipped, f.clipped.numbers, f.clipped.silent);
-        tap_ok(f.told, "with the light unknown, it and the exposures are one number");
+        if (all)
+            tap_ok(f.told, "with the light unknown, it and the exposures are one number");
         const struct found plain = fit(of, s, T, AS_IT_IS, (uint64_t)seed);
         tap_ok(plain.worst > 6, "white taken at its word: it is not # worst z %.1f",
                plain.worst);
@@ -316,8 +318,8 @@ int main(int argc, char **argv)
     ctx = test_context(2);
     decisions();
     gradients();
-    photographs(&yard, all ? 100 : 1);
-    if (all) photographs(&room, 1);
+    photographs(&yard, all ? 100 : 1, all);
+    if (all) photographs(&room, 1, all);
     imp_context_destroy(ctx);
     return tap_done();
 }
