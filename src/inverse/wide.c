@@ -10,42 +10,15 @@
  *
  * unbiased but for the pixel itself, a ratio of sums (splat.h).
  *
- * Covariance of the gradient: pair_noise.h.
- *
- * Noise of the target is taken as correlated from pixel to pixel as the filter makes it,
- * since targets come through the same filter: H_meas = sum_pq w_p w_q rho(p - q)
- * sigma_p^2 J_p J_q, with the squared residual for sigma^2 where that is not given. */
+ * Covariance of the gradient: pair_noise.h. Noise of the target: wide_noise.c. */
+#include "wide.h"
 #include "film/film_picture.h"
 #include "gauss_newton.h"
 #include "lanes.h"
 #include "light_gradient.h"
 #include "loss.h"
-#include "pair_noise.h"
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
-
-#define MANY IMP_WIDE_REPLICATES
-#define TAPS 16 /* reach of rho in pixels, at most */
-
-struct wide {
-    imp_context *ctx;
-    const struct imp__target *of;
-    const struct imp_target *target; /* its description */
-    const float *noise_se;
-    const struct imp_film_desc *film;
-    int width, height, channels, seen; /* of the scene, of the target */
-    bool luminance;                    /* that is what the target sees */
-    int R;
-    size_t K;
-    imp_film *films[MANY]; /* channels: the radiance, then [K][channels] */
-    double *rows[MANY];    /* the same of walks from the lights */
-    double *L, *X;         /* of a pixel and channel: [R], [R][K] */
-    double *sum;           /* [K] */
-    struct imp__pair_noise noise;
-    /* Of one channel and half of the replicates, for H_meas: [pixels], [K][pixels]. */
-    double *sigma2, *Xc, *Xd, *row;
-};
 
 /* ---- Replicates ---------------------------------------------------------------- */
 
@@ -69,7 +42,7 @@ static int progress(const struct imp_progress *p, void *payload)
     return pass->run->progress(&own, pass->run->progress_payload);
 }
 
-static enum imp_status replicates(struct wide *w, const struct imp_tracer *tracer,
+static enum imp_status replicates(struct imp__wide *w, const struct imp_tracer *tracer,
                                   const struct imp_run *run, int rounds, double lo,
                                   double hi)
 {
@@ -108,7 +81,8 @@ out:
 }
 
 /* A walk from a light reaches many pixels, whatever the filter. */
-static enum imp_status light_replicates(struct wide *w, const struct imp_tracer *tracer,
+static enum imp_status light_replicates(struct imp__wide *w,
+                                        const struct imp_tracer *tracer,
                                         const struct imp_run *run, int rounds, double lo,
                                         double hi)
 {
@@ -117,7 +91,7 @@ static enum imp_status light_replicates(struct wide *w, const struct imp_tracer 
         (int64_t)imp_max(run->spp > 0 ? run->spp : tracer->sensor->spp, 4) * rounds;
     struct imp_run own = *run;
     own.time_limit_s = 0;
-    w->R = spp < 8 ? 4 : MANY;
+    w->R = spp < 8 ? 4 : IMP_WIDE_REPLICATES;
     const int64_t walks = ((spp - 1) / w->R + 1) * (int64_t)pixels;
     const size_t n = pixels * (w->K + 1) * (size_t)w->channels;
     const enum imp_status fits =
@@ -136,8 +110,7 @@ static enum imp_status light_replicates(struct wide *w, const struct imp_tracer 
     return IMP_OK;
 }
 
-/* L, X of a pixel and channel, as the target sees them. */
-static void gather(struct wide *w, size_t pixel, int c)
+void imp__wide_gather(struct imp__wide *w, size_t pixel, int c)
 {
     const size_t stride = (w->K + 1) * (size_t)w->channels;
     for (int b = 0; b < w->R; b++) {
@@ -155,8 +128,8 @@ static void gather(struct wide *w, size_t pixel, int c)
     }
 }
 
-/* Weight of a pixel and channel, and the target that makes its loss 1/2 w (I - T)^2. */
-static double weight_of(const struct wide *w, size_t pixel, int c, double mean, double *T)
+double imp__wide_weight(const struct imp__wide *w, size_t pixel, int c, double mean,
+                        double *T)
 {
     const struct imp_target *t = w->target;
     const double scale = imp__target_weight(w->of, pixel, c);
@@ -172,7 +145,8 @@ static double weight_of(const struct wide *w, size_t pixel, int c, double mean, 
 
 /* Of a loss that is not quadratic: what the derivative of replicate b is multiplied with,
  * by the jackknife over replicates (adjoint.c). */
-static void jackknife(const struct wide *w, size_t pixel, int c, double S, double *factor)
+static void jackknife(const struct imp__wide *w, size_t pixel, int c, double S,
+                      double *factor)
 {
     const struct imp_target *t = w->target;
     const double scale = imp__target_weight(w->of, pixel, c), R = w->R;
@@ -192,7 +166,7 @@ static void jackknife(const struct wide *w, size_t pixel, int c, double S, doubl
 
 /* ((R - 1)/R)^(1/2) times the change of H when one replicate is left out; pairs: sum of
  * X_k X_m over pairs of replicates. */
-static void deviations_add(const struct wide *w, size_t k, size_t m, double weight,
+static void deviations_add(const struct imp__wide *w, size_t k, size_t m, double weight,
                            double pairs, double *deviations)
 {
     const size_t K = w->K;
@@ -205,26 +179,27 @@ static void deviations_add(const struct wide *w, size_t k, size_t m, double weig
     }
 }
 
-static void pixel_add(struct wide *w, int px, int py, int c, struct imp__normal_sums *out)
+static void pixel_add(struct imp__wide *w, int px, int py, int c,
+                      struct imp__normal_sums *out)
 {
     const size_t pixel = (size_t)py * (size_t)w->width + (size_t)px;
     const size_t K = w->K;
     const double R = w->R;
     double S = 0, S2 = 0, T;
-    gather(w, pixel, c);
+    imp__wide_gather(w, pixel, c);
     memset(w->sum, 0, K * sizeof *w->sum);
     for (int b = 0; b < w->R; b++) {
         S += w->L[b];
         S2 += w->L[b] * w->L[b];
         for (size_t k = 0; k < K; k++) w->sum[k] += w->X[(size_t)b * K + k];
     }
-    const double weight = weight_of(w, pixel, c, S / R, &T);
+    const double weight = imp__wide_weight(w, pixel, c, S / R, &T);
     if (weight == 0) return;
     const bool quadratic = imp__loss_quadratic(w->target->loss);
-    double factor[MANY];
+    double factor[IMP_WIDE_REPLICATES];
     if (!quadratic) jackknife(w, pixel, c, S, factor);
     out->scalars[IMP_NORMAL_CHI2] += 2 * imp__loss_unbiased(weight, T, R, S, S2);
-    double residual[MANY];
+    double residual[IMP_WIDE_REPLICATES];
     for (int b = 0; b < w->R; b++) residual[b] = w->L[b] - T;
     const bool apart = w->rows[0] == NULL; /* else all pixels share walks */
     imp__pair_noise_add(&w->noise, apart ? px : 0, apart ? py : 0, weight, residual,
@@ -251,120 +226,28 @@ static void pixel_add(struct wide *w, int px, int py, int c, struct imp__normal_
     }
 }
 
-static void normal_add(struct wide *w, struct imp__normal_sums *out)
+static void normal_add(struct imp__wide *w, struct imp__normal_sums *out)
 {
     for (int y = 0; y < w->height; y++)
         for (int x = 0; x < w->width; x++)
             for (int c = 0; c < w->seen; c++) pixel_add(w, x, y, c, out);
 }
 
-/* ---- Noise of the target ------------------------------------------------------- */
-
-/* rho at 0, 1, 2, ... pixels along one axis; returns how many are not 0. */
-static int correlation(const struct imp_filter *f, double rho[TAPS])
-{
-    const int n = 512;
-    int taps = 0;
-    for (int d = 0; d < TAPS && d < 2 * f->radius; d++) {
-        rho[d] = 0;
-        for (int i = 0; i < n; i++) {
-            const double t = f->radius * (2 * (i + 0.5) / n - 1);
-            if (fabs(t - d) < f->radius)
-                rho[d] += f->ops->eval(f, t) * f->ops->eval(f, t - d);
-        }
-        taps = d + 1;
-    }
-    for (int d = taps - 1; d >= 0; d--) rho[d] /= rho[0];
-    return taps;
-}
-
-/* image = rho * image along one axis: `count` lines of n numbers, `stride` apart. */
-static void smooth(double *image, int n, size_t stride, int count, size_t step,
-                   const double *rho, int taps, double *row)
-{
-    for (int l = 0; l < count; l++) {
-        double *line = image + (size_t)l * step;
-        for (int i = 0; i < n; i++) row[i] = line[(size_t)i * stride];
-        for (int i = 0; i < n; i++) {
-            double sum = 0;
-            for (int j = imp_max(0, i - taps + 1); j <= imp_min(n - 1, i + taps - 1); j++)
-                sum += rho[abs(i - j)] * row[j];
-            line[(size_t)i * stride] = sum;
-        }
-    }
-}
-
-/* sigma^2 from half of the replicates, w J from two quarters each, so that our own noise
- * is not correlated between the factors. */
-static void measurement_fill(struct wide *w, int c, int half)
-{
-    const size_t K = w->K, pixels = (size_t)w->width * (size_t)w->height;
-    const int h = w->R / 2, quarter = w->R / 4;
-    for (size_t p = 0; p < pixels; p++) {
-        double S = 0, S2 = 0, all = 0, T;
-        gather(w, p, c);
-        for (int b = 0; b < w->R; b++) {
-            all += w->L[b];
-            if (b / h != half) continue;
-            S += w->L[b];
-            S2 += w->L[b] * w->L[b];
-        }
-        const double weight = weight_of(w, p, c, all / w->R, &T);
-        w->sigma2[p] = w->noise_se
-                           ? imp__sqr(w->noise_se[p * (size_t)w->seen + (size_t)c])
-                           : 2 * imp__loss_unbiased(1, T, h, S, S2);
-        for (size_t k = 0; k < K; k++) {
-            double x[2] = {0, 0};
-            for (int b = 0; b < w->R; b++)
-                if (b / h != half)
-                    x[b % h / quarter] += w->X[(size_t)b * K + k] / quarter;
-            w->Xc[k * pixels + p] = weight * x[0];
-            w->Xd[k * pixels + p] = weight * x[1];
-        }
-    }
-}
-
-static void measurement_add(struct wide *w, struct imp__normal_sums *out)
-{
-    const size_t K = w->K, pixels = (size_t)w->width * (size_t)w->height;
-    double rho[TAPS];
-    const int taps = correlation(&w->film->filter, rho);
-    for (int c = 0; c < w->seen; c++)
-        for (int half = 0; half < 2; half++) {
-            measurement_fill(w, c, half);
-            for (size_t k = 0; k < K; k++) {
-                double *image = w->Xd + k * pixels;
-                smooth(image, w->width, 1, w->height, (size_t)w->width, rho, taps,
-                       w->row);
-                smooth(image, w->height, (size_t)w->width, w->width, 1, rho, taps,
-                       w->row);
-            }
-            for (size_t k = 0; k < K; k++)
-                for (size_t m = 0; m <= k; m++) {
-                    double sum = 0;
-                    for (size_t p = 0; p < pixels; p++)
-                        sum += w->sigma2[p] *
-                               (w->Xc[k * pixels + p] * w->Xd[m * pixels + p] +
-                                w->Xc[m * pixels + p] * w->Xd[k * pixels + p]);
-                    out->H_meas[k * K + m] += sum / 4; /* symmetric; two halves */
-                }
-        }
-}
-
 /* ---- All ----------------------------------------------------------------------- */
 
-static enum imp_status buffers(struct wide *w)
+static enum imp_status buffers(struct imp__wide *w)
 {
     const size_t K = w->K, pixels = (size_t)w->width * (size_t)w->height;
-    w->L = imp__alloc(w->ctx, MANY + (MANY + 1) * K, sizeof(double));
+    w->L = imp__alloc(w->ctx, IMP_WIDE_REPLICATES + (IMP_WIDE_REPLICATES + 1) * K,
+                      sizeof(double));
     w->sigma2 = imp__alloc(w->ctx, pixels, (2 * K + 1) * sizeof(double));
     w->row = imp__alloc(w->ctx, (size_t)imp_max(w->width, w->height), sizeof(double));
     if (!w->L || !w->sigma2 || !w->row)
         return imp__error(w->ctx, IMP_E_NOMEM,
                           "no memory for %zu derivative pictures of %d x %d", K, w->width,
                           w->height);
-    w->X = w->L + MANY;
-    w->sum = w->X + MANY * K;
+    w->X = w->L + IMP_WIDE_REPLICATES;
+    w->sum = w->X + IMP_WIDE_REPLICATES * K;
     w->Xc = w->sigma2 + pixels;
     w->Xd = w->Xc + K * pixels;
     return IMP_OK;
@@ -377,17 +260,17 @@ enum imp_status imp__gauss_newton_wide(const struct imp_problem *p,
                                        double hi, struct imp__normal_sums *out)
 {
     enum imp_status st = IMP_OK;
-    struct wide w = {.ctx = p->ctx,
-                     .of = target,
-                     .target = &target->desc,
-                     .noise_se = target->noise_se,
-                     .film = &tracer->sensor->film,
-                     .width = tracer->sensor->film.crop_w,
-                     .height = tracer->sensor->film.crop_h,
-                     .channels = p->scene->channels,
-                     .seen = target->desc.channels,
-                     .luminance = imp__sees_luminance(target, p->scene->channels),
-                     .K = p->n};
+    struct imp__wide w = {.ctx = p->ctx,
+                          .of = target,
+                          .target = &target->desc,
+                          .noise_se = target->noise_se,
+                          .film = &tracer->sensor->film,
+                          .width = tracer->sensor->film.crop_w,
+                          .height = tracer->sensor->film.crop_h,
+                          .channels = p->scene->channels,
+                          .seen = target->desc.channels,
+                          .luminance = imp__sees_luminance(target, p->scene->channels),
+                          .K = p->n};
     IMP_TRY(buffers(&w));
     const bool lights = tracer->integrator->from_lights;
     IMP_TRY(lights ? light_replicates(&w, tracer, run, rounds, lo, hi)
@@ -397,9 +280,9 @@ enum imp_status imp__gauss_newton_wide(const struct imp_problem *p,
     normal_add(&w, out);
     IMP_TRY(imp__pair_noise_covariance(&w.noise, 2 * imp__film_border(w.film), out->cov_g,
                                        out->cov_excess));
-    measurement_add(&w, out);
+    imp__wide_measurement(&w, out);
 out:
-    for (int b = 0; b < MANY; b++) {
+    for (int b = 0; b < IMP_WIDE_REPLICATES; b++) {
         imp_film_destroy(w.films[b]);
         imp__release(w.ctx, w.rows[b]);
     }
