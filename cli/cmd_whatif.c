@@ -8,6 +8,7 @@
 #include "cmd_problem.h"
 #include "command.h"
 #include "progress.h"
+#include "region.h"
 #include "settings.h"
 
 #include <importon/walks.h>
@@ -64,51 +65,6 @@ static struct {
     size_t n;
 } w;
 
-/* [x0, x1) x [y0, y1) */
-static int region_read(const struct imp_sensor_info *sensor, int at[4])
-{
-    char end;
-    at[0] = at[1] = 0;
-    at[2] = sensor->width;
-    at[3] = sensor->height;
-    if (!o.region) return 0;
-    if (sscanf(o.region, "%d,%d,%d,%d%c", &at[0], &at[1], &at[2], &at[3], &end) != 4)
-        return cli_error(EXIT_USAGE, "--region %s: expected X0,Y0,X1,Y1", o.region);
-    if (at[0] < 0 || at[1] < 0 || at[2] <= at[0] || at[3] <= at[1] ||
-        at[2] > sensor->width || at[3] > sensor->height)
-        return cli_error(EXIT_USAGE,
-                         "--region %s does not lie in the picture, which has %d x %d "
-                         "pixels",
-                         o.region, sensor->width, sensor->height);
-    return 0;
-}
-
-/* The mean over a region is sum(adjoint picture), with 1/(its pixels and channels). */
-static int region_make(void)
-{
-    struct imp_scene_info scene = {.size = sizeof scene};
-    struct imp_sensor_info sensor = {.size = sizeof sensor};
-    int at[4];
-    imp_scene_get_info(cli.scene, &scene);
-    const enum imp_status st = imp_scene_get_sensor(cli.scene, w.run.sensor, &sensor);
-    if (st != IMP_OK) return cli_fail(st, cli.scene_path);
-    const int rc = region_read(&sensor, at);
-    if (rc) return rc;
-    const size_t pixels = (size_t)sensor.width * (size_t)sensor.height,
-                 C = (size_t)scene.channels;
-    const float one =
-        (float)(1 / ((double)(at[2] - at[0]) * (at[3] - at[1]) * scene.channels));
-    w.adjoint = cli_alloc(pixels * C, sizeof *w.adjoint);
-    if (o.region) w.mask = cli_alloc(pixels, sizeof *w.mask);
-    for (int y = at[1]; y < at[3]; y++)
-        for (int x = at[0]; x < at[2]; x++) {
-            const size_t p = (size_t)y * (size_t)sensor.width + (size_t)x;
-            if (w.mask) w.mask[p] = 1;
-            for (size_t c = 0; c < C; c++) w.adjoint[p * C + c] = one;
-        }
-    return 0;
-}
-
 static int open_all(const char *path)
 {
     struct imp_walks_options read = IMP_WALKS_OPTIONS_INIT;
@@ -129,7 +85,9 @@ static int open_all(const char *path)
     if (!rc) rc = problem_open(&w.problem);
     if (rc) return rc;
     w.n = imp_problem_n(w.problem);
-    return problem_options.targets.n ? 0 : region_make();
+    return problem_options.targets.n
+               ? 0
+               : region_take(o.region, w.run.sensor, &w.adjoint, &w.mask);
 }
 
 static void close_all(void)
