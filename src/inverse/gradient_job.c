@@ -11,8 +11,8 @@
 /* An item's result, and the sum of several. */
 struct part {
     double objective, variance;
-    double moments[IMP_VARIATE_MOMENTS];
-    double dense[]; /* [2 or 3][n] of few numbers, as of imp__tally_dense */
+    double dense[]; /* [2 or 3][n] of few numbers, as of imp__tally_dense; then moments of
+                       the variate, if there is one */
 };
 
 /* What the walk brings at the parameters of the last evaluation, if there was one and
@@ -106,6 +106,11 @@ static size_t dense_numbers(const struct imp__gradient_job *j)
     return j->want_gradient && !j->totals->many ? rows * j->problem->n : 0;
 }
 
+static size_t moment_numbers(const struct imp__gradient_job *j)
+{
+    return j->variate ? IMP_VARIATE_MOMENTS : 0;
+}
+
 /* Between pixels: what a tally is full of goes to the sums. */
 static void tally_empty(const struct imp__gradient_job *j, struct imp_tally *t,
                         double by_variance)
@@ -130,13 +135,14 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
     int in_pair = 0;
 
     out->objective = out->variance = 0;
-    memset(out->moments, 0, sizeof out->moments);
+    double *moments = out->dense + dense_numbers(j);
+    memset(moments, 0, moment_numbers(j) * sizeof *moments);
     imp__tally_clear(tally);
     for (int y = t->y0; y < t->y1; y++)
         for (int x = t->x0; x < t->x1; x++) {
             double sum = 0, square = 0;
             for (int b = b0; b < b1; b++) {
-                const double v = replicate(j, w, x, y, b, (int)t->part, out->moments);
+                const double v = replicate(j, w, x, y, b, (int)t->part, moments);
                 sum += v;
                 square += v * v;
             }
@@ -175,12 +181,11 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
 
 static void tile_add(void *into, const void *from, void *payload)
 {
-    const size_t n = dense_numbers(payload);
+    const size_t n = dense_numbers(payload) + moment_numbers(payload);
     struct part *a = into;
     const struct part *b = from;
     a->objective += b->objective;
     a->variance += b->variance;
-    for (int k = 0; k < IMP_VARIATE_MOMENTS; k++) a->moments[k] += b->moments[k];
     for (size_t k = 0; k < n; k++) a->dense[k] += b->dense[k];
 }
 
@@ -194,8 +199,8 @@ static enum imp_status tile_take(size_t group, const void *sum, void *payload)
     if (j->look) return IMP_OK;
     to->objective += in->objective;
     to->variance += in->variance;
-    for (int k = 0; j->variate && k < IMP_VARIATE_MOMENTS; k++)
-        j->variate->moments[k] += in->moments[k];
+    for (size_t k = 0; k < moment_numbers(j); k++)
+        j->variate->moments[k] += in->dense[dense_numbers(j) + k];
     for (size_t k = 0; k < n; k++) {
         double variance = in->dense[n + k];
         if (j->shared)
@@ -297,18 +302,19 @@ enum imp_status imp__gradient_job_run(struct imp__gradient_job *j,
     j->shared = j->splat != NULL;
     if (j->shared) j->overlap = imp__overlap_of(film, margin, j->plan.R);
     const double walks = (double)film->crop_w * film->crop_h * j->plan.n * j->plan.R;
-    j->tiles = (struct imp_tiles){.ctx = ctx,
-                                  .run = run,
-                                  .walks = walks,
-                                  .width = film->crop_w,
-                                  .height = film->crop_h,
-                                  .margin = margin,
-                                  .work = tile_work,
-                                  .size = sizeof(struct part) +
-                                          dense_numbers(j) * sizeof(double),
-                                  .add = tile_add,
-                                  .take = tile_take,
-                                  .payload = j};
+    j->tiles = (struct imp_tiles){
+        .ctx = ctx,
+        .run = run,
+        .walks = walks,
+        .width = film->crop_w,
+        .height = film->crop_h,
+        .margin = margin,
+        .work = tile_work,
+        .size =
+            sizeof(struct part) + (dense_numbers(j) + moment_numbers(j)) * sizeof(double),
+        .add = tile_add,
+        .take = tile_take,
+        .payload = j};
     IMP_TRY(imp__tiles_create(&j->tiles));
     j->tallies = imp__alloc(ctx, (size_t)ctx->threads, sizeof *j->tallies);
     if (!j->tallies) IMP_TRY(imp__error(ctx, IMP_E_NOMEM, "no memory"));
