@@ -28,8 +28,8 @@ const struct arg_option options_search[] = {
      "of lbfgs, mma and slsqp, for the walks that they keep (default 1074; 0: none)",
      &fit_choice.memory, 0, 1e12, NULL},
     {ARG_CHOICE, 0, "control-variate", "WHEN",
-     "of adam, walks are evaluated at the last numbers, too: auto (default: where "
-     "possible), on or off",
+     "of adam, walks are evaluated at the last numbers, too: auto (default: for more "
+     "than 64 numbers, where possible), on or off",
      &fit_choice.variate, 0, 0, variate_words},
     {ARG_FLAG, 0, "no-intervals", NULL, "do not estimate 95 % intervals at the end",
      &fit_choice.no_intervals, 0, 0, NULL},

@@ -987,7 +987,7 @@ typedef int (*imp_fit_step_fn)(const struct imp_fit_step *step, void *payload);
  * They are for IMP_ADAM, with losses L2 and relative L2, pixels of their own (rfilter box),
  * walks from the sensor, and numbers that neither move rays nor are extinctions. */
 enum imp_variates {
-    IMP_VARIATES_AUTO = 0, /**< where they are possible */
+    IMP_VARIATES_AUTO = 0, /**< of more than 64 numbers, where they are possible */
     IMP_VARIATES_ON,       /**< where not: the error says why */
     IMP_VARIATES_OFF
 };

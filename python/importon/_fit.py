@@ -241,7 +241,7 @@ def fit(scene: Scene, target: Any, params: Any = None, *, optimizer: str = "adam
         0: 2^30; negative: walks are traced each time. `Fit.walks` says what was kept.
     control_variate : str
         Of adam, "auto", "on" or "off": walks are evaluated at the last iteration's numbers, too, which
-        makes gradients less noisy; "auto" where that is possible. `Fit.control_variate` says what it brought.
+        makes gradients less noisy; "auto" for more than 64 numbers, where that is possible. `Fit.control_variate` says what it brought.
     intervals : bool
         Estimate covariance and 95 % intervals at the end.
     checkpoint : path, optional

@@ -17,7 +17,9 @@ enum imp_status imp__fit_variates(struct imp__fit *f)
     if ((unsigned)wanted > IMP_VARIATES_OFF)
         return imp__error(p->ctx, IMP_E_ARG, "options: control_variate %d does not exist",
                           (int)wanted);
-    if (!asked) return IMP_OK;
+    if (wanted == IMP_VARIATES_OFF) return IMP_OK;
+    if (!asked && (f->options.optimizer != IMP_ADAM || p->n <= IMP_TRAIL_MAX))
+        return IMP_OK;
     if (f->options.optimizer != IMP_ADAM) {
         return imp__error(p->ctx, IMP_E_UNSUPPORTED,
                           "control variate: it is for Adam; other optimisers take few "

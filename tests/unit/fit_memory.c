@@ -90,7 +90,8 @@ struct taken {
     double first, second, left; /* bytes: two fits, the second resumed; with the result */
 };
 
-static struct taken texture_fit(int texels, const char *checkpoint)
+static struct taken texture_fit(int texels, const char *checkpoint,
+                                enum imp_variates variates)
 {
     enum { SIDE = 16 };
     const size_t n = 3 * (size_t)texels * (size_t)texels;
@@ -122,6 +123,7 @@ static struct taken texture_fit(int texels, const char *checkpoint)
     run.spp = 4;
     o.checkpoint = checkpoint;
     o.resume = 1;
+    o.control_variate = variates;
     o.max_iterations = 2;
     heap.peak = heap.bytes;
     test_must(ctx, imp_fit(p, &o, &run, &r));
@@ -144,14 +146,20 @@ static void texture_memory(void)
     enum { SMALL = 64, LARGE = 320 };
     char path[64];
     snprintf(path, sizeof path, "/tmp/imp_fit_memory_%ld.ck", (long)getpid());
-    const struct taken a = texture_fit(SMALL, path), b = texture_fit(LARGE, path);
-    const double n = 3. * (LARGE * LARGE - SMALL * SMALL);
-    const double first = (b.first - a.first) / n, second = (b.second - a.second) / n;
-    /* Iterate 8, moments, window, average and start 24 and gradient 8; then x and start. */
-    tap_ok(first <= 40.1, "a fit of %d numbers # %.2f bytes each", 3 * LARGE * LARGE,
-           first);
-    tap_ok(second <= 40.1, "and another, resumed from a checkpoint # %.2f", second);
-    tap_ok((b.left - a.left) / n <= 12.1, "its result # %.2f", (b.left - a.left) / n);
+    for (int with = 0; with < 2; with++) {
+        const enum imp_variates which = with ? IMP_VARIATES_ON : IMP_VARIATES_OFF;
+        const struct taken a = texture_fit(SMALL, path, which),
+                           b = texture_fit(LARGE, path, which);
+        const double n = 3. * (LARGE * LARGE - SMALL * SMALL);
+        const double first = (b.first - a.first) / n, second = (b.second - a.second) / n;
+        /* Iterate 8, moments, window, average and start 24 and gradient 8; then x and start.
+         * With control variates, the texels of a second scene 4, and a checkpoint 8. */
+        const double most = with ? 52.1 : 40.1;
+        tap_ok(first <= most, "%sa fit of %d numbers # %.2f bytes each",
+               with ? "with control variates, " : "", 3 * LARGE * LARGE, first);
+        tap_ok(second <= most, "and another, resumed from a checkpoint # %.2f", second);
+        tap_ok((b.left - a.left) / n <= 12.1, "its result # %.2f", (b.left - a.left) / n);
+    }
 }
 
 int main(void)
