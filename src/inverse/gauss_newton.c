@@ -44,6 +44,8 @@ static enum imp_status workers_create(struct imp__normal_job *j, imp_context *ct
         w->sum1 = w->sum_xx + K * K;
         w->sum1_xx = w->sum1 + K;
         w->own = w->sum1_xx + K * K;
+        w->touched = imp__alloc(ctx, K, sizeof *w->touched);
+        if (!w->touched) return imp__error(ctx, IMP_E_NOMEM, "no memory for derivatives");
     }
     return IMP_OK;
 }
@@ -200,6 +202,7 @@ enum imp_status imp__gauss_newton(struct imp_problem *p, const double *x,
 out:
     for (int k = 0; j.workers && k < ctx->threads; k++) {
         imp__release(ctx, j.workers[k].x);
+        imp__release(ctx, j.workers[k].touched);
     }
     imp__release(ctx, j.workers);
     imp__release(ctx, j.total);

@@ -60,6 +60,7 @@ struct pixel {
     struct imp__normal_worker *w;
     size_t index;         /* of the pixel */
     int M;                /* units */
+    size_t T;             /* numbers touched */
     double share;         /* of the samples of the pixel that these are */
     double value, square; /* sums over replicates of the loss, and of its square */
 };
@@ -92,6 +93,23 @@ static void units_gather(const struct imp__normal_job *j, struct imp_tile_worker
         p->value += v;
         p->square += v * v;
     }
+}
+
+/* X without the numbers that are 0 in all units. */
+static void touched_find(const struct imp__normal_job *j, struct pixel *p)
+{
+    struct imp__normal_worker *w = p->w;
+    const size_t K = j->K, rows = (size_t)p->M * (size_t)seen_channels(j);
+    p->T = 0;
+    for (size_t k = 0; k < K; k++) {
+        bool any = false;
+        for (size_t i = 0; i < rows && !any; i++) any = w->X[i * K + k] != 0;
+        if (any) w->touched[p->T++] = k;
+    }
+    if (p->T == K) return;
+    double *to = w->X;
+    for (size_t i = 0; i < rows; i++) /* never ahead of what is read */
+        for (size_t t = 0; t < p->T; t++) *to++ = w->X[i * K + w->touched[t]];
 }
 
 /* ---- One channel ---------------------------------------------------------------- */
@@ -149,15 +167,15 @@ static double square_residual(const struct pixel *p, size_t c, int a0, int a1)
 static void products(const struct imp__normal_job *j, const struct pixel *p, size_t c,
                      int a0, int a1, double *sum, double *xx)
 {
-    const size_t K = j->K, S = (size_t)seen_channels(j);
-    memset(sum, 0, K * sizeof *sum);
-    memset(xx, 0, K * K * sizeof *xx);
+    const size_t T = p->T, S = (size_t)seen_channels(j);
+    memset(sum, 0, T * sizeof *sum);
+    memset(xx, 0, T * T * sizeof *xx);
     for (int a = a0; a < a1; a++) {
-        const double *x = p->w->X + ((size_t)a * S + c) * K;
-        for (size_t k = 0; k < K; k++) {
+        const double *x = p->w->X + ((size_t)a * S + c) * T;
+        for (size_t k = 0; k < T; k++) {
             if (x[k] == 0) continue;
             sum[k] += x[k];
-            for (size_t l = 0; l <= k; l++) xx[k * K + l] += x[k] * x[l];
+            for (size_t l = 0; l <= k; l++) xx[k * T + l] += x[k] * x[l];
         }
     }
 }
@@ -168,21 +186,22 @@ static void deviations_add(const struct imp__normal_job *j, const struct pixel *
                            size_t c, double weight, const double *sum, const double *xx,
                            double *deviations)
 {
-    const size_t K = j->K;
+    const size_t K = j->K, T = p->T, *touched = p->w->touched;
     const double M = p->M;
-    double *own = p->w->own, *own_xx = own + K;
+    double *own = p->w->own, *own_xx = own + T;
     for (int g = 0; g < IMP_DEVIATIONS; g++) {
         const int a0 = g * p->M / IMP_DEVIATIONS, a1 = (g + 1) * p->M / IMP_DEVIATIONS;
         const double n = M - (a1 - a0), scale = weight * p->share * sqrt(n / M);
         const double f = scale / (n * (n - 1)), all = scale / (M * (M - 1));
         double *H = deviations + (size_t)g * K * K;
         products(j, p, c, a0, a1, own, own_xx);
-        for (size_t k = 0; k < K; k++) {
+        for (size_t k = 0; k < T; k++) {
             const double xk = sum[k] - own[k];
+            double *row = H + touched[k] * K;
             for (size_t l = 0; l <= k; l++) {
-                const size_t kl = k * K + l;
-                H[kl] += f * (xk * (sum[l] - own[l]) - (xx[kl] - own_xx[kl])) -
-                         all * (sum[k] * sum[l] - xx[kl]);
+                const size_t kl = k * T + l;
+                row[touched[l]] += f * (xk * (sum[l] - own[l]) - (xx[kl] - own_xx[kl])) -
+                                   all * (sum[k] * sum[l] - xx[kl]);
             }
         }
     }
@@ -192,7 +211,8 @@ static void channel_add(const struct imp__normal_job *j, const struct pixel *p, 
                         struct imp__normal_sums *out)
 {
     struct imp__normal_worker *w = p->w;
-    const size_t K = j->K, S = (size_t)seen_channels(j);
+    const size_t K = j->K, S = (size_t)seen_channels(j), T = p->T;
+    const size_t *touched = w->touched;
     const int half = p->M / 2;
     const double M = p->M, pairs = M * (M - 1), n0 = half, n1 = M - half;
     double factor[IMP_NORMAL_UNITS];
@@ -211,23 +231,24 @@ static void channel_add(const struct imp__normal_job *j, const struct pixel *p, 
     const double m1 = known ? 0 : meas / (n1 * (n1 - 1)) * square_residual(p, c, 0, half);
     const double m = 2 * meas * sigma * sigma / pairs;
     const double h = weight * p->share / pairs, same = weight * p->share / (M * M);
-    for (size_t k = 0; k < K; k++)
+    for (size_t k = 0; k < T; k++)
         for (size_t l = 0; l <= k; l++) {
-            const size_t kl = k * K + l;
+            const size_t kl = k * T + l, to = touched[k] * K + touched[l];
             const double u0 = sum[k] * sum[l] - xx[kl], u1 = sum1[k] * sum1[l] - xx1[kl];
             const double all = (sum[k] + sum1[k]) * (sum[l] + sum1[l]);
             const double u = all - xx[kl] - xx1[kl];
-            out->H[kl] += h * u;
-            out->H_same[kl] += same * all;
-            out->H_meas[kl] += known ? m * u : m0 * u0 + m1 * u1;
+            out->H[to] += h * u;
+            out->H_same[to] += same * all;
+            out->H_meas[to] += known ? m * u : m0 * u0 + m1 * u1;
         }
     out->scalars[IMP_NORMAL_CHI2] += weight * p->share * square_residual(p, c, 0, p->M);
-    for (size_t i = 0; i < K * K; i++) xx[i] += xx1[i];
-    for (size_t k = 0; k < K; k++) sum[k] += sum1[k];
+    for (size_t i = 0; i < T * T; i++) xx[i] += xx1[i];
+    for (size_t k = 0; k < T; k++) sum[k] += sum1[k];
     if (out->deviations) deviations_add(j, p, c, weight, sum, xx, out->deviations);
-    for (size_t k = 0; !quadratic && k < K; k++)
+    for (size_t k = 0; !quadratic && k < T; k++)
         for (int a = 0; a < p->M; a++)
-            out->g[k] += p->share * factor[a] * w->X[((size_t)a * S + c) * K + k];
+            out->g[touched[k]] +=
+                p->share * factor[a] * w->X[((size_t)a * S + c) * T + k];
 }
 
 /* ---- The gradient and its noise --------------------------------------------------- */
@@ -237,22 +258,26 @@ static void pair(const struct imp__normal_job *j, const struct pixel *p, int a, 
                  double *v)
 {
     const struct imp__normal_worker *w = p->w;
-    const size_t K = j->K, S = (size_t)seen_channels(j);
+    const size_t T = p->T, S = (size_t)seen_channels(j);
     for (size_t c = 0; c < S; c++) {
-        const double *xa = w->X + ((size_t)a * S + c) * K;
-        const double *xb = w->X + ((size_t)b * S + c) * K;
+        const double *xa = w->X + ((size_t)a * S + c) * T;
+        const double *xb = w->X + ((size_t)b * S + c) * T;
         const double ra = 0.5 * w->weight[c] * w->r[a][c];
         const double rb = 0.5 * w->weight[c] * w->r[b][c];
-        for (size_t k = 0; k < K; k++) v[k] += ra * xb[k] + rb * xa[k];
+        for (size_t k = 0; k < T; k++) v[k] += ra * xb[k] + rb * xa[k];
     }
 }
 
-static void square_add(size_t K, double scale, const double *v, double *out)
+/* Of v [T], the numbers touched. */
+static void square_add(const struct imp__normal_job *j, const struct pixel *p,
+                       double scale, const double *v, double *out)
 {
-    for (size_t k = 0; k < K; k++) {
+    const size_t *touched = p->w->touched;
+    for (size_t k = 0; k < p->T; k++) {
         if (v[k] == 0) continue;
         const double f = scale * v[k];
-        for (size_t l = 0; l <= k; l++) out[k * K + l] += f * v[l];
+        double *row = out + touched[k] * j->K;
+        for (size_t l = 0; l <= k; l++) row[touched[l]] += f * v[l];
     }
 }
 
@@ -261,37 +286,37 @@ static void gradient_add(const struct imp__normal_job *j, const struct pixel *p,
                          struct imp__normal_sums *out)
 {
     struct imp__normal_worker *w = p->w;
-    const size_t K = j->K;
+    const size_t T = p->T;
     const double M = p->M, s2 = p->share * p->share;
     double *h = w->h, *e = w->e, *total = w->total;
-    memset(h, 0, IMP_NORMAL_PAIRS * K * sizeof *h);
-    memset(e, 0, IMP_NORMAL_UNITS * K * sizeof *e);
-    memset(total, 0, K * sizeof *total);
+    memset(h, 0, IMP_NORMAL_PAIRS * T * sizeof *h);
+    memset(e, 0, IMP_NORMAL_UNITS * T * sizeof *e);
+    memset(total, 0, T * sizeof *total);
     for (int a = 0; a < p->M; a++)
-        for (int b = a + 1; b < p->M; b++, h += K) {
+        for (int b = a + 1; b < p->M; b++, h += T) {
             pair(j, p, a, b, h);
-            for (size_t k = 0; k < K; k++) {
-                e[(size_t)a * K + k] += h[k];
-                e[(size_t)b * K + k] += h[k];
+            for (size_t k = 0; k < T; k++) {
+                e[(size_t)a * T + k] += h[k];
+                e[(size_t)b * T + k] += h[k];
                 total[k] += h[k];
             }
         }
     if (imp__loss_quadratic(j->target->desc.loss))
-        for (size_t k = 0; k < K; k++)
-            out->g[k] += p->share * total[k] / (M * (M - 1) / 2);
+        for (size_t k = 0; k < T; k++)
+            out->g[w->touched[k]] += p->share * total[k] / (M * (M - 1) / 2);
     for (int a = 0; a < p->M; a++) {
-        double *own = e + (size_t)a * K;
-        for (size_t k = 0; k < K; k++) own[k] = (own[k] - 2 * total[k] / M) / (M - 2);
-        square_add(K, s2 * 4 / (M * (M - 1)), own, out->cov_g);
+        double *own = e + (size_t)a * T;
+        for (size_t k = 0; k < T; k++) own[k] = (own[k] - 2 * total[k] / M) / (M - 2);
+        square_add(j, p, s2 * 4 / (M * (M - 1)), own, out->cov_g);
     }
     const double scale = s2 * 4 / (M * (M - 1) * (M - 2) * (M - 3));
     h = w->h;
     for (int a = 0; a < p->M; a++)
-        for (int b = a + 1; b < p->M; b++, h += K) {
-            for (size_t k = 0; k < K; k++)
-                h[k] -= total[k] / (M * (M - 1) / 2) + e[(size_t)a * K + k] +
-                        e[(size_t)b * K + k];
-            square_add(K, scale, h, out->cov_excess);
+        for (int b = a + 1; b < p->M; b++, h += T) {
+            for (size_t k = 0; k < T; k++)
+                h[k] -= total[k] / (M * (M - 1) / 2) + e[(size_t)a * T + k] +
+                        e[(size_t)b * T + k];
+            square_add(j, p, scale, h, out->cov_excess);
         }
 }
 
@@ -315,6 +340,7 @@ enum imp_status imp__normal_work(const struct imp_tile *t, struct imp_tile_worke
             units_gather(j, tile, x, y, b0, b1, &p);
             const enum imp_status st = imp__tile_check(tile);
             if (st != IMP_OK) return st;
+            touched_find(j, &p);
             for (size_t c = 0; c < (size_t)seen_channels(j); c++)
                 channel_add(j, &p, c, &out);
             gradient_add(j, &p, &out);

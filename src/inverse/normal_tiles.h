@@ -25,11 +25,13 @@ struct imp__normal_job {
     struct imp_tiles tiles;
     struct imp__normal_worker {
         double *x;              /* [K][channels] of one set: mean */
-        double *X;              /* [units][seen][K] of a pixel */
-        double *sum, *sum_xx;   /* [K], [K*K] of a channel: over half of the units */
+        double *X;              /* [units][seen][K] of a pixel, then [units][seen][T] */
+        size_t *touched;        /* [T] in increasing order: numbers that the pixel's walks
+                                   tell of; of others all is 0 */
+        double *sum, *sum_xx;   /* [T], [T*T] of a channel: over half of the units */
         double *sum1, *sum1_xx; /* and over the other half */
-        double *own;            /* [K], [K*K] of a group of units */
-        double *h, *e, *total;  /* [pairs][K], [units][K], [K] of the gradient */
+        double *own;            /* [T], [T*T] of a group of units */
+        double *h, *e, *total;  /* [pairs][T], [units][T], [T] of the gradient */
         double r[IMP_NORMAL_UNITS][3]; /* radiance, then residual of a unit */
         double weight[3];
         imp_spec L[IMP_BATCH_MAX], P[IMP_BATCH_MAX];
