@@ -3,7 +3,8 @@
  * Covariance of the gradient that Gauss-Newton takes from pairs of units, or from
  * pictures through a wide filter, against the spread over seeds, in every eigenvector of
  * J^T W J: where the pictures tell little, most of the noise is of second order, of two at
- * once. Run with "long" for whole fits: how often their intervals hold the truth. */
+ * once. Run with the name of a filter, or with "metal", for whole fits: how often
+ * their intervals hold the truth. */
 #include "imp_cornell.h"
 #include "imp_tap.h"
 #include "inverse/problem.h"
@@ -187,14 +188,15 @@ int main(int argc, char **argv)
 {
     static const char *const filters[] = {"box", "tent", "gaussian", "mitchell"};
     imp_context *ctx = test_context(2);
-    filter(ctx, "gaussian", IMP_POINTS_INDEPENDENT);
-    filter(ctx, "tent", IMP_POINTS_SOBOL);
-    filter(ctx, "box", IMP_POINTS_INDEPENDENT);
-    filter(ctx, "box", IMP_POINTS_SOBOL);
-    if (argc > 1 && strcmp(argv[1], "long") == 0) {
-        for (size_t f = 0; f < imp_count(filters); f++) cornell(ctx, filters[f]);
-        metal(ctx);
-    }
+    if (argc == 1) {
+        filter(ctx, "gaussian", IMP_POINTS_INDEPENDENT);
+        filter(ctx, "tent", IMP_POINTS_SOBOL);
+        filter(ctx, "box", IMP_POINTS_INDEPENDENT);
+        filter(ctx, "box", IMP_POINTS_SOBOL);
+    } else if (strcmp(argv[1], "metal") == 0) metal(ctx);
+    else
+        for (size_t f = 0; f < imp_count(filters); f++)
+            if (strcmp(argv[1], filters[f]) == 0) cornell(ctx, filters[f]);
     imp_context_destroy(ctx);
     return tap_done();
 }
