@@ -111,6 +111,13 @@ static size_t moment_numbers(const struct imp__gradient_job *j)
     return j->variate ? IMP_VARIATE_MOMENTS : 0;
 }
 
+/* Does a pixel have a part in the loss? One of weight 0 has no walks. */
+static bool counts(const struct imp__gradient_job *j, int x, int y)
+{
+    if (!j->target || !j->target->weights || j->splat || j->light) return true;
+    return j->target->weights[(size_t)y * (size_t)j->width + (size_t)x] != 0;
+}
+
 /* Between pixels: what a tally is full of goes to the sums. */
 static void tally_empty(const struct imp__gradient_job *j, struct imp_tally *t,
                         double by_variance)
@@ -141,6 +148,7 @@ static enum imp_status tile_work(const struct imp_tile *t, struct imp_tile_worke
     for (int y = t->y0; y < t->y1; y++)
         for (int x = t->x0; x < t->x1; x++) {
             double sum = 0, square = 0;
+            if (!counts(j, x, y)) continue;
             for (int b = b0; b < b1; b++) {
                 const double v = replicate(j, w, x, y, b, (int)t->part, moments);
                 sum += v;
